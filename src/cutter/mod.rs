@@ -1,0 +1,5 @@
+//! The cutter as a rotating profile. Knows nothing of parts.
+
+mod profile;
+
+pub use profile::{Cutter, CutterError, CutterShape};

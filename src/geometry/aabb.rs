@@ -1,0 +1,50 @@
+//! Axis-aligned boxes, mm.
+
+use super::Point3;
+
+/// An axis-aligned box; empty when `min > max` on any axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Aabb {
+    /// Least corner.
+    pub min: Point3,
+    /// Greatest corner.
+    pub max: Point3,
+}
+
+impl Aabb {
+    /// The box of nothing: growing it by a point gives that point.
+    pub const EMPTY: Self = Self {
+        min: Point3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY),
+        max: Point3::new(f64::NEG_INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY),
+    };
+
+    /// The smallest box around all points; [`Aabb::EMPTY`] for none.
+    pub fn of<'a>(points: impl IntoIterator<Item = &'a Point3>) -> Self {
+        let mut bounds = Self::EMPTY;
+        for p in points {
+            bounds.grow(p);
+        }
+        bounds
+    }
+
+    /// Enlarges the box to hold `p`.
+    pub fn grow(&mut self, p: &Point3) {
+        self.min = self.min.inf(p);
+        self.max = self.max.sup(p);
+    }
+
+    /// The smallest box that holds both.
+    pub fn union(&self, other: &Self) -> Self {
+        Self { min: self.min.inf(&other.min), max: self.max.sup(&other.max) }
+    }
+
+    /// Edge lengths.
+    pub fn size(&self) -> super::Vector3 {
+        self.max - self.min
+    }
+
+    /// Length of the space diagonal.
+    pub fn diagonal(&self) -> f64 {
+        self.size().norm()
+    }
+}

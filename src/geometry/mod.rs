@@ -1,0 +1,30 @@
+//! Points, surfaces, triangle meshes and their search tree. Knows nothing of cutters.
+
+mod aabb;
+mod analytic;
+mod bvh;
+mod jet;
+mod mesh;
+mod nurbs;
+mod tessellate;
+
+pub use aabb::Aabb;
+pub use analytic::{AnalyticError, AnalyticShape, AnalyticSurface};
+pub use bvh::{Bvh, MeshFoot, VerticalHit};
+pub use jet::{Jet2, PrincipalCurvatures};
+pub use mesh::{MeshError, RepairNotes, TriangleMesh};
+pub use nurbs::{NurbsError, NurbsSurface};
+pub use tessellate::{Tessellation, tessellate};
+
+/// A point, mm.
+pub type Point3 = nalgebra::Point3<f64>;
+/// A point of the plane, mm.
+pub type Point2 = nalgebra::Point2<f64>;
+/// A vector, mm.
+pub type Vector3 = nalgebra::Vector3<f64>;
+/// A vector of the plane, mm.
+pub type Vector2 = nalgebra::Vector2<f64>;
+
+/// Largest coordinate that any part, path or stock may have, mm (one kilometre). Beyond it f64
+/// still resolves 1e-10 mm, but f32 boxes and heights no longer resolve a micrometre.
+pub const MAX_COORDINATE: f64 = 1.0e6;

@@ -1,0 +1,5 @@
+//! The `millstream` command; all of it lives in [`millstream::cli`].
+
+fn main() -> std::process::ExitCode {
+    millstream::cli::main()
+}

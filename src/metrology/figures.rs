@@ -1,0 +1,156 @@
+//! The figures of one measured toolpath, with the names under which they stand in report.json.
+//! Lengths in mm, areas in mm², volumes in mm³, times in s.
+
+use serde::Serialize;
+
+/// What is tolerated, mm, all positive.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Limits {
+    /// Scallop height: the planning target and the limit measured against.
+    pub scallop: f64,
+    /// Depth below the design surface.
+    pub gouge: f64,
+    /// Height above the design surface from which a place counts as uncut.
+    pub uncut: f64,
+    /// Chord tolerance of the path.
+    pub chord: f64,
+}
+
+/// Figures of the path itself.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct PathFigures {
+    /// Length of all moves that feed along the surface.
+    pub cutting_length_mm: f64,
+    /// Length of all other moves.
+    pub air_length_mm: f64,
+    /// Passes.
+    pub passes: usize,
+    /// Cutter locations.
+    pub cl_points: usize,
+    /// Places inside a pass where the direction turns by more than 30°.
+    pub sharp_turns: usize,
+    /// Time that the machine would take.
+    pub machining_time_s: f64,
+}
+
+/// Heights of the ridges between neighbouring passes, weighted by ridge length. `None` (and a
+/// reason) where the cut surface has no such ridge.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct ScallopFigures {
+    /// The planning target.
+    pub target_mm: f64,
+    /// Greatest height.
+    pub max_mm: Option<f64>,
+    /// 95 % of the ridge length is lower.
+    pub p95_mm: Option<f64>,
+    /// Half of the ridge length is lower.
+    pub p50_mm: Option<f64>,
+    /// Mean over the ridge length.
+    pub mean_mm: Option<f64>,
+    /// Share of the ridge length above the target.
+    pub over_target_fraction: Option<f64>,
+    /// Length of all ridges.
+    pub ridge_length_mm: f64,
+    /// Where the greatest height stands.
+    pub max_at_mm: Option<[f64; 3]>,
+    /// Bound of the error of `max_mm`.
+    pub error_bound_mm: Option<f64>,
+    /// Why a figure is missing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+}
+
+/// A connected place deeper than the gouge tolerance.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct GougeRegion {
+    /// Greatest depth.
+    pub depth_mm: f64,
+    /// Area on the design surface.
+    pub area_mm2: f64,
+    /// Where the greatest depth is.
+    pub at_mm: [f64; 3],
+    /// The move that cut there, counted from 0.
+    #[serde(rename = "move")]
+    pub move_index: u32,
+    /// Its line in toolpath.nc, counted from 1.
+    pub line: u32,
+}
+
+/// Cuts below the design surface.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct GougeFigures {
+    /// Greatest depth anywhere, tolerated or not; 0 when nothing lies below the design.
+    pub max_depth_mm: f64,
+    /// Area deeper than the tolerance.
+    pub area_mm2: f64,
+    /// Bound of the error of `max_depth_mm`.
+    pub error_bound_mm: f64,
+    /// The deepest regions, deepest first.
+    pub regions: Vec<GougeRegion>,
+    /// Number of regions found, listed or not.
+    pub region_count: usize,
+}
+
+/// A connected place higher than the uncut tolerance.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct UncutRegion {
+    /// Greatest height along the design normal.
+    pub height_mm: f64,
+    /// Area on the design surface.
+    pub area_mm2: f64,
+    /// Material above the design surface.
+    pub volume_mm3: f64,
+    /// Where the greatest height is.
+    pub at_mm: [f64; 3],
+}
+
+/// Material that no pass reached.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct UncutFigures {
+    /// Greatest height of any uncut region.
+    pub max_height_mm: f64,
+    /// Area of all regions.
+    pub area_mm2: f64,
+    /// Share of the measured area.
+    pub fraction: f64,
+    /// Volume of all regions.
+    pub volume_mm3: f64,
+    /// Bound of the error of `max_height_mm`.
+    pub error_bound_mm: f64,
+    /// The highest regions, highest first.
+    pub regions: Vec<UncutRegion>,
+    /// Number of regions found, listed or not.
+    pub region_count: usize,
+}
+
+/// Signed deviation over all samples.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct DeviationFigures {
+    /// Samples taken, one a cell.
+    pub samples: usize,
+    /// Least (deepest gouge).
+    pub min_mm: f64,
+    /// Greatest (highest excess).
+    pub max_mm: f64,
+    /// Root mean square, weighted by area.
+    pub rms_mm: f64,
+    /// Area of the design surface that was measured.
+    pub area_mm2: f64,
+}
+
+/// All that is measured on one cut surface.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measurement {
+    /// Scallops.
+    pub scallop: ScallopFigures,
+    /// Gouges.
+    pub gouge: GougeFigures,
+    /// Uncut regions.
+    pub uncut: UncutFigures,
+    /// Deviation in all.
+    pub deviation: DeviationFigures,
+    /// Signed deviation at every cell of the stock's grid, mm, `[ny][nx]`; NaN off the part.
+    pub deviation_map: Vec<f32>,
+    /// Height and weight (ridge length, mm) of every ridge sample.
+    pub ridge_samples: Vec<[f32; 2]>,
+}

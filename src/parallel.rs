@@ -1,0 +1,39 @@
+//! The one place where work is spread over threads.
+//!
+//! Every function gives its results in index order and hands each item to exactly one closure
+//! call, so that results never depend on the number of threads. The number of threads is that of
+//! the rayon pool in which the call runs (`rayon::ThreadPool::install`).
+
+use rayon::prelude::*;
+
+/// Below this many items the closure runs on the calling thread: handing work out costs more than
+/// it saves.
+const SERIAL_BELOW: usize = 2;
+
+/// `f(0), f(1), … f(n - 1)`, in that order, computed on all threads.
+pub fn map<T: Send>(n: usize, f: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+    if n < SERIAL_BELOW {
+        return (0..n).map(f).collect();
+    }
+    (0..n).into_par_iter().map(f).collect()
+}
+
+/// As [`map`], stopping at the first error found (which of several errors is returned is the one
+/// with the smallest index among those computed).
+///
+/// # Errors
+/// The error of the closure.
+pub fn try_map<T: Send, E: Send>(
+    n: usize,
+    f: impl Fn(usize) -> Result<T, E> + Sync + Send,
+) -> Result<Vec<T>, E> {
+    if n < SERIAL_BELOW {
+        return (0..n).map(f).collect();
+    }
+    (0..n).into_par_iter().map(f).collect()
+}
+
+/// Calls `f(k, chunk)` on the `k`-th run of `chunk_len` items (the last one may be shorter).
+pub fn for_each_chunk<T: Send>(items: &mut [T], chunk_len: usize, f: impl Fn(usize, &mut [T]) + Sync + Send) {
+    items.par_chunks_mut(chunk_len.max(1)).enumerate().for_each(|(k, chunk)| f(k, chunk));
+}

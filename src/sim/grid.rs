@@ -1,0 +1,113 @@
+//! A regular grid of cells over a rectangle of the plane, mm.
+
+use crate::geometry::{Aabb, Point2};
+
+/// Cell centres `(x0 + i·cell, y0 + j·cell)` for `i < nx`, `j < ny`; arrays over a grid are
+/// `[ny][nx]`, row-major.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grid {
+    /// Centre of cell (0, 0).
+    pub origin: Point2,
+    /// Pitch, mm.
+    pub cell: f64,
+    /// Cells along x.
+    pub nx: usize,
+    /// Cells along y.
+    pub ny: usize,
+}
+
+/// Why no grid could be laid out.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum GridError {
+    /// The cell is not a positive number.
+    #[error("the cell size is {0} mm; it must be a positive number")]
+    Cell(f64),
+    /// The area is empty or not finite.
+    #[error("the area to cut is empty or not finite")]
+    Area,
+    /// The grid needs more memory than allowed.
+    #[error(
+        "a cell of {cell} mm needs {needed_mib} MiB for {nx} x {ny} cells, and {allowed_mib} MiB are allowed; \
+         the smallest cell that fits is {fitting} mm"
+    )]
+    Memory {
+        /// What was asked for, mm.
+        cell: f64,
+        /// Cells along x.
+        nx: usize,
+        /// Cells along y.
+        ny: usize,
+        /// What the run would need.
+        needed_mib: usize,
+        /// What it may use.
+        allowed_mib: usize,
+        /// A cell that fits, mm, rounded up to two digits.
+        fitting: f64,
+    },
+}
+
+impl Grid {
+    /// Covers the rectangle of `area` with cells whose centres lie half a cell inside its border.
+    /// `bytes_per_cell` is what the caller will allocate a cell in all; `memory` the bytes allowed.
+    ///
+    /// # Errors
+    /// See [`GridError`].
+    pub fn covering(area: &Aabb, cell: f64, bytes_per_cell: usize, memory: u64) -> Result<Self, GridError> {
+        if !(cell > 0.0 && cell.is_finite()) {
+            return Err(GridError::Cell(cell));
+        }
+        let size = area.size();
+        if !(size.x > 0.0 && size.y > 0.0 && size.x.is_finite() && size.y.is_finite()) {
+            return Err(GridError::Area);
+        }
+        let count = |length: f64| (length / cell - 1e-9).ceil().max(1.0);
+        let (nx, ny) = (count(size.x), count(size.y));
+        let needed = nx * ny * bytes_per_cell as f64;
+        if needed > memory as f64 {
+            let exact = (size.x * size.y * bytes_per_cell as f64 / memory as f64).sqrt() * 1.01;
+            let digit = 10f64.powf(exact.log10().floor() - 1.0);
+            const MIB: f64 = 1048576.0;
+            return Err(GridError::Memory {
+                cell,
+                nx: nx as usize,
+                ny: ny as usize,
+                needed_mib: (needed / MIB).ceil() as usize,
+                allowed_mib: (memory as f64 / MIB) as usize,
+                fitting: (exact / digit).ceil() * digit,
+            });
+        }
+        let origin = Point2::new(
+            area.min.x + 0.5 * (size.x - (nx - 1.0) * cell),
+            area.min.y + 0.5 * (size.y - (ny - 1.0) * cell),
+        );
+        Ok(Self { origin, cell, nx: nx as usize, ny: ny as usize })
+    }
+
+    /// Number of cells.
+    pub fn len(&self) -> usize {
+        self.nx * self.ny
+    }
+
+    /// True without cells.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Centre of cell `(i, j)`.
+    pub fn centre(&self, i: usize, j: usize) -> Point2 {
+        Point2::new(self.origin.x + i as f64 * self.cell, self.origin.y + j as f64 * self.cell)
+    }
+
+    /// Position of cell `(i, j)` in an array over this grid.
+    pub fn index(&self, i: usize, j: usize) -> usize {
+        j * self.nx + i
+    }
+
+    /// The cell whose centre is nearest to `(x, y)`; `None` outside of the grid.
+    pub fn cell_at(&self, x: f64, y: f64) -> Option<(usize, usize)> {
+        let i = ((x - self.origin.x) / self.cell).round();
+        let j = ((y - self.origin.y) / self.cell).round();
+        let inside = i >= 0.0 && j >= 0.0 && i < self.nx as f64 && j < self.ny as f64;
+        inside.then_some((i as usize, j as usize))
+    }
+}
