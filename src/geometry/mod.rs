@@ -2,6 +2,7 @@
 
 mod aabb;
 mod analytic;
+mod bspline;
 mod bvh;
 mod jet;
 mod mesh;
@@ -10,6 +11,7 @@ mod tessellate;
 
 pub use aabb::Aabb;
 pub use analytic::{AnalyticError, AnalyticShape, AnalyticSurface};
+pub use bspline::{KnotError, KnotVector, MAX_BASIS, MAX_DEGREE};
 pub use bvh::{Bvh, MeshFoot, VerticalHit};
 pub use jet::{Jet2, PrincipalCurvatures};
 pub use mesh::{MeshError, RepairNotes, TriangleMesh};
