@@ -13,4 +13,4 @@ mod scalar;
 pub use direction::orient;
 pub use fit::{FieldError, NormalEquations, StreamFit, StreamSample, fit_stream_function};
 pub use levels::{LevelCurve, LevelTracer};
-pub use scalar::{Axis, ScalarField, ScalarSpline};
+pub use scalar::{Axis, ScalarField, ScalarSpline, surface_gradient_length};

@@ -79,7 +79,9 @@ pub fn reduce(points: &[Point3], tolerance: f64) -> Vec<Point3> {
     let mut from = 0;
     while from + 1 < points.len() {
         let fits = |to: usize| {
-            points[from + 1..to].iter().all(|p| distance_to_segment(p, &points[from], &points[to]) <= tolerance)
+            points[from + 1..to]
+                .iter()
+                .all(|p| distance_to_segment(p, &points[from], &points[to]) <= tolerance)
         };
         let mut to = from + 1;
         while to + 1 < points.len() && to - from < MAX_SKIP && fits(to + 1) {

@@ -63,7 +63,11 @@ mod tests {
         let line = |y: f64| vec![Point3::new(0.0, y, 0.0), Point3::new(10.0, y, 0.0)];
         let path = chain(vec![line(0.0), line(1.0), vec![Point3::origin()]], true, &settings());
         assert_eq!(path.passes(), 2, "a single point is no pass");
-        assert_eq!(path.moves[3].to.tip, Point3::new(10.0, 1.0, 7.0), "the second pass starts where the first ended");
+        assert_eq!(
+            path.moves[3].to.tip,
+            Point3::new(10.0, 1.0, 7.0),
+            "the second pass starts where the first ended"
+        );
         for (from, to, m) in path.segments() {
             assert!(from != to, "no repeated point");
             assert_eq!(m.kind == MoveKind::Rapid, from.z == 7.0 && to.z == 7.0);
