@@ -10,7 +10,7 @@ mod nurbs;
 mod tessellate;
 
 pub use aabb::Aabb;
-pub use analytic::{AnalyticError, AnalyticShape, AnalyticSurface};
+pub use analytic::{AnalyticError, AnalyticShape, AnalyticSurface, HeightJet, MAX_SLOPE};
 pub use bspline::{KnotError, KnotVector, MAX_BASIS, MAX_DEGREE};
 pub use bvh::{Bvh, MeshFoot, VerticalHit};
 pub use jet::{Jet2, PrincipalCurvatures};
