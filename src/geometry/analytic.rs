@@ -175,7 +175,7 @@ impl AnalyticSurface {
         check_shape(&shape)?;
         check_reach(&shape, domain)?;
         let highest = greatest_height(&shape, domain);
-        if !(highest <= MAX_COORDINATE) {
+        if highest.is_nan() || highest > MAX_COORDINATE {
             return Err(AnalyticError::TooHigh(highest));
         }
         Ok(Self { shape, domain })

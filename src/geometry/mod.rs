@@ -7,6 +7,8 @@ mod bvh;
 mod jet;
 mod mesh;
 mod nurbs;
+#[cfg(test)]
+pub(crate) mod samples;
 mod tessellate;
 
 pub use aabb::Aabb;
@@ -15,7 +17,7 @@ pub use bspline::{KnotError, KnotVector, MAX_BASIS, MAX_DEGREE};
 pub use bvh::{Bvh, MeshFoot, VerticalHit};
 pub use jet::{Jet2, PrincipalCurvatures};
 pub use mesh::{MeshError, RepairNotes, TriangleMesh};
-pub use nurbs::{NurbsError, NurbsSurface};
+pub use nurbs::{MAX_WEIGHT, NurbsError, NurbsSurface};
 pub use tessellate::{Tessellation, tessellate};
 
 /// A point, mm.
