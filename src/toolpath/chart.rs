@@ -213,13 +213,12 @@ fn fit_heights(
     }
     let heights = equations.solve(false).map_err(|e| PlanError::mesh(&e.to_string()))?;
     let (gu, gv) = (greville(&knots_u), greville(&knots_v));
-    let points: Vec<Point3> = heights
-        .coefficients()
-        .iter()
-        .enumerate()
-        .map(|(k, &z)| Point3::new(gu[k % gu.len()], gv[k / gu.len()], z))
-        .collect();
-    NurbsSurface::from_grid(knots_u, knots_v, points).map_err(|e| PlanError::mesh(&e.to_string()))
+    let (nu, nv) = (gu.len(), gv.len());
+    let control = |i: usize, j: usize| Point3::new(gu[i], gv[j], heights.coefficients()[j * nu + i]);
+    let net: Vec<Vec<Point3>> = (0..nu).map(|i| (0..nv).map(|j| control(i, j)).collect()).collect();
+    let knots = [knots_u, knots_v].map(|k| k.knots().to_vec());
+    let [knots_u, knots_v] = knots;
+    NurbsSurface::new(3, 3, knots_u, knots_v, &net, None).map_err(|e| PlanError::mesh(&e.to_string()))
 }
 
 /// Greville abscissae: control points there make the parameter itself the coordinate.
