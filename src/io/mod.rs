@@ -1,1 +1,3 @@
-//! stub
+//! Reading and writing of files: scenes, parts, programs, pictures.
+
+pub mod scene;
