@@ -2,18 +2,22 @@
 
 mod aabb;
 mod analytic;
+mod bspline;
 mod bvh;
 mod jet;
 mod mesh;
 mod nurbs;
+#[cfg(test)]
+pub(crate) mod samples;
 mod tessellate;
 
 pub use aabb::Aabb;
-pub use analytic::{AnalyticError, AnalyticShape, AnalyticSurface};
+pub use analytic::{AnalyticError, AnalyticShape, AnalyticSurface, HeightJet, MAX_SLOPE};
+pub use bspline::{KnotError, KnotVector, MAX_BASIS, MAX_DEGREE};
 pub use bvh::{Bvh, MeshFoot, VerticalHit};
 pub use jet::{Jet2, PrincipalCurvatures};
 pub use mesh::{MeshError, RepairNotes, TriangleMesh};
-pub use nurbs::{NurbsError, NurbsSurface};
+pub use nurbs::{MAX_WEIGHT, NurbsError, NurbsSurface};
 pub use tessellate::{Tessellation, tessellate};
 
 /// A point, mm.
