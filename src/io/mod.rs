@@ -2,7 +2,11 @@
 
 pub mod apt_cl;
 pub mod atomic;
+pub mod exr;
 pub mod gcode;
+pub mod png;
 mod program_text;
+pub mod scene;
+pub mod stl_write;
 
 pub use program_text::ProgramHeader;

@@ -1,0 +1,129 @@
+//! The result in words and one table, 100 columns wide, for terminals and logs.
+
+use std::fmt::Write as _;
+
+use super::canvas::shortened;
+use super::result::{RunReport, ToolpathResult};
+use super::verdict::Verdict;
+
+/// Letters of a toolpath's name in the table; longer ones are cut.
+const NAME_WIDTH: usize = 17;
+
+/// A time as people read it: `1:02:03` or `2:03` or `12.3 s`.
+pub fn duration(seconds: f64) -> String {
+    if seconds < 60.0 {
+        return format!("{seconds:.1} s");
+    }
+    let whole = seconds.round() as u64;
+    let (hours, minutes, seconds) = (whole / 3600, whole / 60 % 60, whole % 60);
+    if hours > 0 { format!("{hours}:{minutes:02}:{seconds:02}") } else { format!("{minutes}:{seconds:02}") }
+}
+
+/// A length in mm as micrometres with the digits that matter, `-` for none.
+pub fn micrometres(length: Option<f64>) -> String {
+    match length.map(|mm| mm * 1000.0) {
+        None => "-".to_owned(),
+        Some(um) if um.abs() >= 100.0 => format!("{um:.0}"),
+        Some(um) if um.abs() >= 10.0 => format!("{um:.1}"),
+        Some(um) => format!("{um:.2}"),
+    }
+}
+
+/// `value ± bound` in micrometres.
+pub fn with_bound(value: Option<f64>, bound: Option<f64>) -> String {
+    match (value, bound) {
+        (Some(_), Some(_)) => format!("{} ± {}", micrometres(value), micrometres(bound)),
+        _ => micrometres(value),
+    }
+}
+
+/// Share as per cent, `-` for none.
+pub fn per_cent(share: Option<f64>) -> String {
+    share.map_or("-".to_owned(), |share| format!("{:.1}", 100.0 * share))
+}
+
+fn row(out: &mut String, cells: [&str; 11]) -> std::fmt::Result {
+    let [name, passes, length, time, max, p95, p50, over, uncut, gouge, verdict] = cells;
+    let line = format!(
+        "{name:<NAME_WIDTH$} {passes:>6} {length:>9} {time:>8} {max:>14} {p95:>6} {p50:>6} {over:>6} {uncut:>7} {gouge:>6}  {verdict}"
+    );
+    writeln!(out, "{}", line.trim_end())
+}
+
+fn toolpath_row(out: &mut String, t: &ToolpathResult) -> std::fmt::Result {
+    let scallop = &t.scallop;
+    row(
+        out,
+        [
+            &shortened(&t.name, NAME_WIDTH),
+            &t.path.passes.to_string(),
+            &format!("{:.0}", t.path.cutting_length_mm),
+            &duration(t.path.machining_time_s),
+            &with_bound(scallop.max_mm, scallop.error_bound_mm),
+            &micrometres(scallop.p95_mm),
+            &micrometres(scallop.p50_mm),
+            &per_cent(scallop.over_target_fraction),
+            &format!("{:.2}", t.uncut.area_mm2),
+            &micrometres(Some(t.gouge.max_depth_mm)),
+            t.verdict.word(),
+        ],
+    )
+}
+
+/// One row a toolpath, then what is wrong and what planners had to say, then which one is best.
+pub fn result_table(report: &RunReport) -> String {
+    let mut out = String::new();
+    write_table(&mut out, report).expect("writing into a string cannot fail");
+    out
+}
+
+fn write_table(out: &mut String, report: &RunReport) -> std::fmt::Result {
+    writeln!(out, "{}", report.title)?;
+    row(
+        out,
+        [
+            "toolpath",
+            "passes",
+            "cutting",
+            "time",
+            "scallop max",
+            "p95",
+            "p50",
+            "over",
+            "uncut",
+            "gouge",
+            "verdict",
+        ],
+    )?;
+    row(out, ["", "", "mm", "", "µm", "µm", "µm", "%", "mm²", "µm", ""])?;
+    writeln!(out, "{}", "-".repeat(100))?;
+    report.toolpaths.iter().try_for_each(|t| toolpath_row(out, t))?;
+    for t in report.toolpaths.iter().filter(|t| !t.violations.is_empty()) {
+        writeln!(out, "\n{} violates:", t.name)?;
+        t.violations.iter().try_for_each(|violation| writeln!(out, "  {}", violation.text))?;
+    }
+    for t in &report.toolpaths {
+        let reason = t.scallop.reason.iter().map(|reason| format!("no scallop height: {reason}"));
+        let notes: Vec<String> = t.notes.iter().cloned().chain(reason).collect();
+        if !notes.is_empty() {
+            writeln!(out, "\nNotes on {}:", t.name)?;
+            notes.iter().try_for_each(|note| writeln!(out, "  {note}"))?;
+        }
+    }
+    writeln!(out, "\n{}", conclusion(report))
+}
+
+/// The outcome in a sentence.
+pub fn conclusion(report: &RunReport) -> String {
+    let passing = report.toolpaths.iter().filter(|t| t.verdict == Verdict::Pass).count();
+    let best = |name: &str| report.toolpaths.iter().find(|t| t.name == name).map(|t| t.path.machining_time_s);
+    match (&report.best, report.toolpaths.len()) {
+        (None, 1) => "The toolpath violates a tolerance.".to_owned(),
+        (None, _) => "No toolpath holds every tolerance.".to_owned(),
+        (Some(_), 1) => "Every tolerance holds.".to_owned(),
+        (Some(name), all) => format!(
+            "{passing} of {all} toolpaths hold every tolerance; the quickest of them is {name} ({}).",
+            duration(best(name).unwrap_or_default())
+        ),
+    }
+}
