@@ -36,7 +36,9 @@ impl<'a> Border<'a> {
             let mut at_vertex: HashMap<u32, Vec<[Point3; 2]>> = HashMap::new();
             for (side, _) in count.iter().filter(|(_, n)| **n == 1) {
                 let ends = side.map(|i| mesh.vertices()[i as usize]);
-                side.map(|i| at_vertex.entry(i).or_default().push(ends));
+                for i in *side {
+                    at_vertex.entry(i).or_default().push(ends);
+                }
             }
             for (t, corners) in mesh.triangles().iter().enumerate() {
                 let near: Vec<[Point3; 2]> =
