@@ -32,7 +32,7 @@ pub(super) fn touch(form: &Form, track: &Track, along: f64, across: f64) -> Opti
     }
     let beyond = along - track.length;
     if beyond > 0.0 {
-        let rho = beyond.hypot(w);
+        let rho = (beyond * beyond + w * w).sqrt();
         if rho > form.radius {
             return None;
         }
@@ -46,7 +46,7 @@ pub(super) fn touch(form: &Form, track: &Track, along: f64, across: f64) -> Opti
 
 /// The cut of the cutter that stands at `sigma`, if it reaches a point `ahead` of its axis.
 fn at_place(form: &Form, track: &Track, ahead: f64, across: f64, sigma: f64) -> Option<Touch> {
-    let rho = ahead.hypot(across);
+    let rho = (ahead * ahead + across * across).sqrt();
     if rho > form.radius {
         return None;
     }
@@ -58,7 +58,7 @@ fn at_place(form: &Form, track: &Track, ahead: f64, across: f64, sigma: f64) -> 
 /// True when the cutter at the lower end reaches the point and moving on lifts it faster than the
 /// profile falls towards the point.
 fn climbs_too_fast(form: &Form, track: &Track, along: f64, w: f64) -> bool {
-    let rho = along.hypot(w);
+    let rho = (along * along + w * w).sqrt();
     let (sine, cosine) = form.steepness(rho);
     rho <= form.radius && along * sine <= track.slope * rho * cosine
 }
@@ -67,7 +67,7 @@ fn climbs_too_fast(form: &Form, track: &Track, along: f64, w: f64) -> bool {
 fn on_track(form: &Form, track: &Track, along: f64, across: f64) -> Option<Touch> {
     let w = across.abs();
     let (ahead, edge) = stationary(form, track.slope, w);
-    let rho = edge.unwrap_or_else(|| ahead.hypot(w).min(form.radius));
+    let rho = edge.unwrap_or_else(|| (ahead * ahead + w * w).sqrt().min(form.radius));
     let sigma = (along - ahead).clamp(0.0, track.length);
     let by = edge.map_or_else(
         || {
