@@ -222,11 +222,40 @@ impl AnalyticSurface {
         }
     }
 
+    /// The borders of the rectangle in x and y, and between them every quarter wave, so that no line
+    /// of samples can miss a wave by falling in step with it. Waves shorter than the range's
+    /// thousandth part add no lines: they cannot be triangulated anyway.
+    pub fn quarter_waves(&self) -> [Vec<f64>; 2] {
+        let (x, y) = match self.shape {
+            AnalyticShape::Wave { wavelength_x, wavelength_y, .. } => (Some(wavelength_x), wavelength_y),
+            _ => (None, None),
+        };
+        [quarter_waves(self.domain[0], x), quarter_waves(self.domain[1], y)]
+    }
+
     /// `max` and `min` instead of `clamp`, so that NaN becomes a border.
     fn clamp(&self, x: f64, y: f64) -> [f64; 2] {
         let [[x0, x1], [y0, y1]] = self.domain;
         [x.max(x0).min(x1), y.max(y0).min(y1)]
     }
+}
+
+/// Most waves over a side of the rectangle that are marked line by line. More would fill any
+/// tessellation with lines alone.
+const MOST_WAVES: f64 = 1000.0;
+
+fn quarter_waves([from, to]: [f64; 2], wavelength: Option<f64>) -> Vec<f64> {
+    let mut lines = vec![from];
+    if let Some(quarter) = wavelength.map(|l| 0.25 * l).filter(|q| to - from <= 4.0 * MOST_WAVES * q) {
+        let (first, last) = ((from / quarter).floor() as i64, (to / quarter).ceil() as i64);
+        // A line closer to the border than this would cut off slivers.
+        let margin = 0.01 * quarter;
+        lines.extend(
+            (first..=last).map(|k| k as f64 * quarter).filter(|&l| l > from + margin && l < to - margin),
+        );
+    }
+    lines.push(to);
+    lines
 }
 
 /// The formulas.

@@ -18,7 +18,7 @@ pub use bvh::{Bvh, MeshFoot, VerticalHit};
 pub use jet::{Jet2, PrincipalCurvatures};
 pub use mesh::{MeshError, RepairNotes, TriangleMesh};
 pub use nurbs::{MAX_WEIGHT, NurbsError, NurbsSurface};
-pub use tessellate::{Tessellation, tessellate};
+pub use tessellate::{MAX_TRIANGLES, TessellateError, Tessellation, tessellate};
 
 /// A point, mm.
 pub type Point3 = nalgebra::Point3<f64>;

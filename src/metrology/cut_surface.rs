@@ -39,7 +39,7 @@ impl Winners {
 /// A z-map together with the moves that made it.
 pub(super) struct CutSurface<'a> {
     /// Closed-form heights of the moves.
-    pub envelope: Envelope<'a>,
+    pub envelope: Envelope,
     /// Heights and winners at cell centres.
     pub cut: &'a ZMap,
     path: &'a Toolpath,
@@ -51,7 +51,7 @@ const MOST_STEPS: usize = 1000;
 
 impl<'a> CutSurface<'a> {
     /// Of a z-map that `path` has cut.
-    pub fn new(envelope: Envelope<'a>, cut: &'a ZMap, path: &'a Toolpath) -> Self {
+    pub fn new(envelope: Envelope, cut: &'a ZMap, path: &'a Toolpath) -> Self {
         Self { envelope, cut, path }
     }
 

@@ -24,7 +24,7 @@ use std::collections::HashMap;
 use crate::cutter::Cutter;
 use crate::geometry::{Point2, Point3};
 use crate::monitor::{self, Cancelled, Monitor};
-use crate::part::{HeightField, Part};
+use crate::part::{Part, SurfaceGrid};
 use crate::sim::{Envelope, Grid, ZMap};
 use crate::toolpath::Toolpath;
 use cut_surface::CutSurface;
@@ -59,7 +59,7 @@ pub fn measure(
     limits: &Limits,
     monitor: &dyn Monitor,
 ) -> Result<Measurement, Cancelled> {
-    let design = part.height_field(cut.grid.origin, cut.grid.cell, cut.grid.nx, cut.grid.ny, monitor)?;
+    let design = part.sample_grid(cut.grid.origin, cut.grid.cell, cut.grid.nx, cut.grid.ny, monitor)?;
     let surface = CutSurface::new(Envelope::new(cutter, path), cut, path);
     let inspection = Inspection { part, cutter, limits, surface: &surface, design: &design, grid: cut.grid };
     let samples = inspection.samples(monitor)?;
@@ -82,7 +82,7 @@ struct Inspection<'a> {
     cutter: &'a Cutter,
     limits: &'a Limits,
     surface: &'a CutSurface<'a>,
-    design: &'a HeightField,
+    design: &'a SurfaceGrid,
     grid: Grid,
 }
 
@@ -95,7 +95,10 @@ impl Inspection<'_> {
             monitor::check(monitor)?;
             let row: Vec<Sample> = (0..self.grid.nx)
                 .map(|i| {
-                    let Some((z, normal)) = self.design.at(self.grid.index(i, j)) else { return off };
+                    let design = self.design.at(i, j);
+                    if !design.is_on() {
+                        return off;
+                    }
                     let centre = self.grid.centre(i, j);
                     let p = Point3::new(centre.x, centre.y, z);
                     self.surface
@@ -111,13 +114,13 @@ impl Inspection<'_> {
 
     /// Area of the design surface that cell `k` stands for, mm².
     fn area(&self, k: usize) -> f64 {
-        let lean = self.design.at(k).map_or(1.0, |(_, n)| n.z);
+        let lean = self.design.samples[k].normal.z;
         self.grid.cell * self.grid.cell / lean.max(1e-3)
     }
 
     /// How far along the surface a place between centres may be from the nearest one, mm.
     fn reach(&self, k: usize) -> f64 {
-        let lean = self.design.at(k).map_or(1.0, |(_, n)| n.z);
+        let lean = self.design.samples[k].normal.z;
         self.grid.cell * std::f64::consts::FRAC_1_SQRT_2 / lean.max(1e-3)
     }
 
@@ -230,7 +233,7 @@ impl Inspection<'_> {
             }
             let k = highest as usize;
             let centre = self.grid.centre(k % self.grid.nx, k / self.grid.nx);
-            let z = self.design.at(k).map_or(0.0, |(z, _)| z);
+            let z = self.design.samples[k].z;
             figures.area_mm2 += area;
             figures.volume_mm3 += volume;
             figures.region_count += 1;

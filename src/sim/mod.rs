@@ -7,7 +7,7 @@ mod form;
 mod grid;
 mod reference;
 #[cfg(test)]
-mod scenes;
+pub(crate) mod scenes;
 mod swept;
 mod track;
 mod zmap;

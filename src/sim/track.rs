@@ -36,11 +36,12 @@ impl Track {
         let (dx, dy, rise) = (high.x - low.x, high.y - low.y, high.z - low.z);
         let length = (dx * dx + dy * dy).sqrt();
         let at = Self { x: low.x, y: low.y, z: low.z, ux: 1.0, uy: 0.0, length: 0.0, slope: 0.0, cos: 1.0 };
-        if !(length > PLUNGE_LENGTH) {
-            return at;
+        if length > PLUNGE_LENGTH {
+            let cos = length / (length * length + rise * rise).sqrt();
+            Self { ux: dx / length, uy: dy / length, length, slope: rise / length, cos, ..at }
+        } else {
+            at
         }
-        let cos = length / (length * length + rise * rise).sqrt();
-        Self { ux: dx / length, uy: dy / length, length, slope: rise / length, cos, ..at }
     }
 
     /// Position of `(x, y)` along the track from its lower end, and across it (positive to the

@@ -20,7 +20,7 @@ const SINE_RESOLUTION: f64 = 1.0e-14;
 /// The lowest cut of the form at the point `along` and `across` the track.
 pub(super) fn touch(form: &Form, track: &Track, along: f64, across: f64) -> Option<Touch> {
     let w = across.abs();
-    if !(w <= form.radius) {
+    if w > form.radius || (along + w).is_nan() {
         return None;
     }
     let at = |sigma: f64| at_place(form, track, along - sigma, across, sigma);

@@ -181,9 +181,22 @@ fn ends_are_continuous() {
             if let (Some((before, _)), Some((height, normal))) = (last, now)
                 && normal.z > 0.2
             {
-                assert!((height - before as f64).abs() < 2e-4 * 6.0, "{cutter:?} jumps at {x}");
+                assert!((height - before).abs() < 2e-4 * 6.0, "{cutter:?} jumps at {x}");
             }
             last = now;
+        }
+    }
+}
+
+#[test]
+fn nan_is_nowhere() {
+    for cutter in cutters() {
+        let ramp = SweptMove::new(&cutter, Point3::origin(), Point3::new(1.0, 0.5, 0.4));
+        let lost = SweptMove::new(&cutter, Point3::origin(), Point3::new(f64::NAN, 0.5, 0.4));
+        for (swept, x) in [(ramp, f64::NAN), (ramp, f64::INFINITY), (lost, 0.1)] {
+            let got = swept.height_and_normal(x, 0.1);
+            assert!(got.is_none_or(|(h, n)| h.is_finite() && n.norm() > 0.5), "{cutter:?} {got:?}");
+            assert_eq!(swept.height(x, 0.1), got.map(|g| g.0));
         }
     }
 }
