@@ -57,7 +57,9 @@ fn cell(text: &str) -> Result<f64, String> {
     /// The range of lengths that scenes take too, mm.
     const CELL: std::ops::RangeInclusive<f64> = 1e-6..=1e4;
     let value: Option<f64> = text.parse().ok();
-    value.filter(|v| CELL.contains(v)).ok_or_else(|| "give a positive number of millimetres, such as 0.05".to_owned())
+    value
+        .filter(|v| CELL.contains(v))
+        .ok_or_else(|| "give a positive number of millimetres, such as 0.05".to_owned())
 }
 
 #[cfg(test)]
@@ -71,7 +73,15 @@ mod tests {
     #[test]
     fn options_are_checked() {
         assert!(parse("millstream run a.toml --cell 0.05 --threads 3 --engine zmap --out x").is_ok());
-        for bad in ["--cell 0", "--cell nan", "--cell inf", "--cell -1", "--threads 0", "--engine rays", "--nonsense"] {
+        for bad in [
+            "--cell 0",
+            "--cell nan",
+            "--cell inf",
+            "--cell -1",
+            "--threads 0",
+            "--engine rays",
+            "--nonsense",
+        ] {
             let error = parse(&format!("millstream run a.toml {bad}")).unwrap_err();
             assert!(error.use_stderr() && error.exit_code() == 2, "{bad}");
         }

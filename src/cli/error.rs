@@ -103,7 +103,9 @@ mod tests {
     fn broken_toml_is_shown_where_it_breaks() {
         insta::assert_snapshot!(message("[part]\nfile = \"wave.stl\n"));
         insta::assert_snapshot!(message("[part]\nsurface = \"wav\"\n"));
-        insta::assert_snapshot!(message("[part]\nfile = \"wave.stl\"\n[cutter]\nshape = \"ball\"\ndiameter = -6\n"));
+        insta::assert_snapshot!(message(
+            "[part]\nfile = \"wave.stl\"\n[cutter]\nshape = \"ball\"\ndiameter = -6\n"
+        ));
         insta::assert_snapshot!(message(""));
     }
 

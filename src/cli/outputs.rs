@@ -23,15 +23,20 @@ impl Outputs {
     /// [`CliError::Output`] when that is not possible or `target` is a file.
     pub fn begin(target: &Path) -> Result<Self, CliError> {
         if target.exists() && !target.is_dir() {
-            return Err(CliError::Output { path: target.to_owned(), reason: "it is a file, and a folder is needed".into() });
+            return Err(CliError::Output {
+                path: target.to_owned(),
+                reason: "it is a file, and a folder is needed".into(),
+            });
         }
         let parent = match target.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
             _ => Path::new("."),
         };
         fs::create_dir_all(parent).map_err(CliError::output(parent))?;
-        let scratch =
-            tempfile::Builder::new().prefix(".millstream-").tempdir_in(parent).map_err(CliError::output(parent))?;
+        let scratch = tempfile::Builder::new()
+            .prefix(".millstream-")
+            .tempdir_in(parent)
+            .map_err(CliError::output(parent))?;
         // Scratch folders are closed to others; what is published must have usual permissions.
         let fresh = scratch.path().join("fresh");
         fs::create_dir(&fresh).map_err(CliError::output(&fresh))?;
@@ -76,7 +81,8 @@ impl Outputs {
             return fs::rename(&self.fresh, &self.target).map_err(CliError::output(&self.target));
         }
         let listed: Result<Vec<fs::DirEntry>, _> = fs::read_dir(&self.fresh).and_then(Iterator::collect);
-        let mut names: Vec<_> = listed.map_err(CliError::output(&self.fresh))?.iter().map(fs::DirEntry::file_name).collect();
+        let mut names: Vec<_> =
+            listed.map_err(CliError::output(&self.fresh))?.iter().map(fs::DirEntry::file_name).collect();
         names.sort_by_key(|name| (name == "report.json", name.clone()));
         for name in names {
             let (from, to) = (self.fresh.join(&name), self.target.join(&name));

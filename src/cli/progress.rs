@@ -26,7 +26,8 @@ pub struct Progress {
 impl Progress {
     /// Draws on stderr if that is a terminal, and begins to listen for the wish to stop.
     pub fn new() -> Self {
-        let target = if stderr_is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let target =
+            if stderr_is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(0), target);
         let stop = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&stop);
@@ -52,7 +53,8 @@ impl Monitor for Progress {
     fn start(&self, stage: &str, steps: u64) {
         /// How often a bar of unknown length moves.
         const BEAT: Duration = Duration::from_millis(120);
-        let template = if steps == 0 { "{spinner} {msg}" } else { "{msg:50} {wide_bar} {percent:>3} %  {eta}" };
+        let template =
+            if steps == 0 { "{spinner} {msg}" } else { "{msg:50} {wide_bar} {percent:>3} %  {eta}" };
         if let Ok(style) = ProgressStyle::with_template(template) {
             self.bar.set_style(style);
         }

@@ -17,8 +17,8 @@ const OFF_PART: Rgb = [176, 180, 184];
 
 /// Room around the map, pixels.
 const LEFT: usize = 92;
-const RIGHT: usize = 176;
-const TOP: usize = 64;
+const RIGHT: usize = 190;
+const TOP: usize = 92;
 const BOTTOM: usize = 96;
 /// Least map area, so that title and key fit, pixels.
 const MIN_WIDTH: usize = 480;
@@ -89,8 +89,8 @@ struct Key {
     /// Above and below the key.
     top: &'static str,
     bottom: &'static str,
-    /// Values beyond the ends occur and wear the colours of the ends.
-    clipped: bool,
+    /// Least and greatest value of all cells; those beyond the key wear the colours of its ends.
+    extremes: Option<(f64, f64)>,
 }
 
 impl Key {
@@ -119,30 +119,32 @@ pub fn deviation_range(limits: &Limits) -> f64 {
     round_up(HIGHEST_RIDGE * limits.scallop.max(limits.gouge))
 }
 
+/// Least and greatest of the finite values.
+fn extremes(values: &[f32]) -> Option<(f64, f64)> {
+    let finite = values.iter().copied().filter(|v| v.is_finite()).map(f64::from);
+    finite.fold(None, |range, v| Some(range.map_or((v, v), |(a, b): (f64, f64)| (a.min(v), b.max(v)))))
+}
+
 /// Signed deviation: blue below the design (gouge), white on it, red above (excess), grey off the
 /// part. Where several cells share a pixel it shows the one farthest from zero.
 pub fn deviation_picture(grid: &Grid, deviation: &[f32], limits: &Limits, words: &MapWords<'_>) -> Picture {
     let range = deviation_range(limits);
-    let clipped = deviation.iter().any(|d| f64::from(d.abs()) > range);
-    let key = Key { from: -range, to: range, gradient: diverging, top: "excess", bottom: "gouge", clipped };
+    let extremes = extremes(deviation);
+    let key = Key { from: -range, to: range, gradient: diverging, top: "excess", bottom: "gouge", extremes };
     draw(grid, &pool(grid, deviation, Pooling::Extreme), &key, words)
 }
 
 /// Heights of the cut stock, dark to light.
 pub fn height_picture(grid: &Grid, height: &[f32], words: &MapWords<'_>) -> Picture {
     let pooled = pool(grid, height, Pooling::Mean);
-    let finite = || pooled.values.iter().copied().filter(|v| v.is_finite()).map(f64::from);
-    let (mut from, mut to) =
-        (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
-    if !(from <= to) {
-        (from, to) = (0.0, 1.0);
-    }
+    let extremes = extremes(height);
+    let (mut from, mut to) = extremes.unwrap_or((0.0, 1.0));
     // A flat surface needs a range too.
     let least = 1e-3f64.max(to.abs() * 1e-6);
     if to - from < least {
         (from, to) = (0.5 * (from + to - least), 0.5 * (from + to + least));
     }
-    let key = Key { from, to, gradient: sequential, top: "high", bottom: "low", clipped: false };
+    let key = Key { from, to, gradient: sequential, top: "high", bottom: "low", extremes };
     draw(grid, &pooled, &key, words)
 }
 
@@ -190,8 +192,8 @@ fn draw_axes(page: &mut Picture, grid: &Grid, map: &Pooled) {
         page.fill(left - 7, bottom - 1 - at.min(height - 1), 6, 1, FAINT_INK);
         page.text(left - 11, bottom - 9 - at, &text, TextSize::Small, Align::Right, INK);
     }
-    page.text(left + width + 10, bottom + 10, "x mm", TextSize::Small, Align::Left, FAINT_INK);
-    page.text(left - 11, TOP as i64 - 26, "y mm", TextSize::Small, Align::Right, FAINT_INK);
+    page.text(left + width, bottom + 30, "x mm", TextSize::Small, Align::Right, FAINT_INK);
+    page.text(left - 11, TOP as i64 - 28, "y mm", TextSize::Small, Align::Right, FAINT_INK);
 }
 
 /// A bar of a round length, about a fifth of the map.
@@ -213,7 +215,7 @@ fn draw_key(page: &mut Picture, key: &Key, x: usize, room: usize) {
     const WIDTH: i64 = 22;
     const MAX_HEIGHT: usize = 420;
     let (x, top) = (x as i64, TOP as i64 + 24);
-    let height = (room - 64).clamp(120, MAX_HEIGHT) as i64;
+    let height = (room - 120).clamp(120, MAX_HEIGHT) as i64;
     for row in 0..height {
         let t = 1.0 - (row as f64 + 0.5) / height as f64;
         page.fill(x, top + row, WIDTH, 1, (key.gradient)(t));
@@ -236,10 +238,14 @@ fn draw_key(page: &mut Picture, key: &Key, x: usize, room: usize) {
             INK,
         );
     }
-    page.text(x, top - 24, &format!("{} {}", unit.name, key.top), TextSize::Small, Align::Left, INK);
+    page.text(x, top - 24, &format!("{}, {}", key.top, unit.name), TextSize::Small, Align::Left, INK);
     page.text(x, top + height + 8, key.bottom, TextSize::Small, Align::Left, INK);
-    if key.clipped {
-        page.text(x, top + height + 28, "ends: beyond", TextSize::Small, Align::Left, FAINT_INK);
+    let Some((least, greatest)) = key.extremes else { return };
+    /// Lines below the key are this far apart, pixels.
+    const LINE: i64 = 20;
+    for (line, (word, value)) in [("max", greatest), ("min", least)].into_iter().enumerate() {
+        let text = format!("{word} {} {}", unit.text(value, range / 1000.0), unit.name);
+        page.text(x, top + height + 8 + LINE * (line as i64 + 2), &text, TextSize::Small, Align::Left, FAINT_INK);
     }
 }
 

@@ -37,8 +37,6 @@ pub const DEFAULT_SPINDLE_SPEED: f64 = 12000.0;
 pub const DEFAULT_FEED_RATE: f64 = 1000.0;
 /// Default feed down to a pass, mm/min.
 pub const DEFAULT_PLUNGE_RATE: f64 = 300.0;
-/// Default speed limits of the machine (a common vertical machining centre).
-pub const DEFAULT_MACHINE: Machine = Machine { rapid_rate: 10000.0, acceleration: 1000.0 };
 /// Default height of rapid moves above stock, mm.
 pub const DEFAULT_CLEARANCE: f64 = 2.0;
 /// Default memory for one simulation, MiB.

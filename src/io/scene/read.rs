@@ -10,9 +10,8 @@ use super::formula;
 use super::section::{LENGTH, Located, Section};
 use super::{
     CuttingData, DEFAULT_ALLOWANCE, DEFAULT_CLEARANCE, DEFAULT_CONTROL_POINTS, DEFAULT_FEED_RATE,
-    DEFAULT_LIMITS, DEFAULT_MACHINE, DEFAULT_MARGIN, DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE,
-    DEFAULT_SPINDLE_SPEED, Engine, MeshFormat, NamedFile, PartSource, Scene, Simulation, Stock,
-    ToolpathRequest, default_cell,
+    DEFAULT_LIMITS, DEFAULT_MARGIN, DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE, DEFAULT_SPINDLE_SPEED, Engine,
+    MeshFormat, NamedFile, PartSource, Scene, Simulation, Stock, ToolpathRequest, default_cell,
 };
 use crate::cutter::Cutter;
 use crate::geometry::AnalyticSurface;
@@ -276,12 +275,16 @@ fn read_simulation(section: &Section<'_>, cutter: &Cutter) -> Result<Simulation,
 }
 
 fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
-    section.only(&["rapid_rate", "acceleration", "clearance"], &[], "[machine]")?;
+    section.only(&["rapid_rate", "acceleration", "junction_deviation", "clearance"], &[], "[machine]")?;
+    let default = Machine::default();
     let number =
         |key, default| Ok::<f64, SceneError>(section.number(key, RATE, "")?.map_or(default, |v| v.value));
     let machine = Machine {
-        rapid_rate: number("rapid_rate", DEFAULT_MACHINE.rapid_rate)?,
-        acceleration: number("acceleration", DEFAULT_MACHINE.acceleration)?,
+        rapid_rate: number("rapid_rate", default.rapid_rate)?,
+        acceleration: number("acceleration", default.acceleration)?,
+        junction_deviation: section
+            .length("junction_deviation")?
+            .map_or(default.junction_deviation, |v| v.value),
     };
     Ok((machine, section.length("clearance")?.map_or(DEFAULT_CLEARANCE, |v| v.value)))
 }

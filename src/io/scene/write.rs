@@ -56,6 +56,11 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     writeln!(out, "\n[machine]")?;
     writeln!(out, "rapid_rate = {}  # mm/min", number(scene.machine.rapid_rate))?;
     writeln!(out, "acceleration = {}  # mm/s2", number(scene.machine.acceleration))?;
+    writeln!(
+        out,
+        "junction_deviation = {}  # mm by which the control rounds corners",
+        number(scene.machine.junction_deviation)
+    )?;
     writeln!(out, "clearance = {}  # mm of rapid moves above stock", number(scene.clearance))?;
     scene.toolpaths.iter().try_for_each(|request| {
         writeln!(out, "\n[[toolpath]]")?;
