@@ -67,6 +67,11 @@ pub struct Part {
 }
 
 impl Part {
+    /// A part that is a mesh.
+    pub fn from_mesh(mesh: TriangleMesh) -> Self {
+        let bvh = Bvh::new(&mesh);
+        Self { patches: Vec::new(), mesh, bvh }
+    }
     /// The patches; empty for a mesh part.
     pub fn patches(&self) -> &[Patch] {
         &self.patches
