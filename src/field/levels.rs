@@ -26,6 +26,9 @@ pub struct LevelTracer<'a> {
     field: &'a ScalarField,
     /// First fundamental form `(E, F, G)` at `(u, v)`.
     metric: &'a (dyn Fn(f64, f64) -> (f64, f64, f64) + Sync),
+    /// Where the field is given; beyond it is continued linearly.
+    inner: [[f64; 2]; 2],
+    /// Where curves are traced.
     domain: [[f64; 2]; 2],
     cells: usize,
     /// ψ at the grid's nodes, `[cells + 1][cells + 1]`.
@@ -37,30 +40,37 @@ pub struct LevelTracer<'a> {
 type Edge = (usize, usize);
 
 impl<'a> LevelTracer<'a> {
-    /// Prepares a grid of `cells` × `cells` and traces with steps of `step` mm. A component that
-    /// passes through no grid edge is not found.
+    /// Prepares a grid of `cells` × `cells` over `inner` grown by `margins` on both sides, and traces
+    /// with steps of `step` mm. A component that passes through no grid edge is not found.
     pub fn new(
         field: &'a ScalarField,
         metric: &'a (dyn Fn(f64, f64) -> (f64, f64, f64) + Sync),
-        domain: [[f64; 2]; 2],
+        inner: [[f64; 2]; 2],
+        margins: [f64; 2],
         cells: usize,
         step: f64,
     ) -> Self {
-        let mut tracer = Self { field, metric, domain, cells: cells.max(1), values: Vec::new(), step };
+        let domain = [0, 1].map(|c| [inner[c][0] - margins[c], inner[c][1] + margins[c]]);
+        let mut tracer = Self { field, metric, inner, domain, cells: cells.max(1), values: Vec::new(), step };
         let n = tracer.cells + 1;
-        tracer.values = (0..n * n)
-            .map(|k| {
-                let [u, v] = tracer.node(k);
-                field.value_and_gradient(u, v)[0]
-            })
-            .collect();
+        tracer.values = (0..n * n).map(|k| tracer.value_and_gradient(tracer.node(k))[0]).collect();
         tracer
     }
 
-    /// Least and greatest ψ over the grid.
+    /// Least and greatest ψ over a grid on the domain without its margins.
     pub fn range(&self) -> [f64; 2] {
-        let least = self.values.iter().copied().fold(f64::INFINITY, f64::min);
-        [least, self.values.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
+        let at = |[lo, hi]: [f64; 2], k: usize| lo + (hi - lo) * k as f64 / self.cells as f64;
+        let n = self.cells + 1;
+        let values = (0..n * n)
+            .map(|k| self.field.value_and_gradient(at(self.inner[0], k % n), at(self.inner[1], k / n))[0]);
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], psi| [lo.min(psi), hi.max(psi)])
+    }
+
+    /// `[ψ, ψ_u, ψ_v]`; in the margins the tangent plane at the nearest border point continues ψ.
+    fn value_and_gradient(&self, p: [f64; 2]) -> [f64; 3] {
+        let q = [0, 1].map(|c| p[c].clamp(self.inner[c][0], self.inner[c][1]));
+        let [value, gu, gv] = self.field.value_and_gradient(q[0], q[1]);
+        [value + gu * (p[0] - q[0]) + gv * (p[1] - q[1]), gu, gv]
     }
 
     /// All components of `ψ = level`, in a fixed order.
@@ -81,7 +91,7 @@ impl<'a> LevelTracer<'a> {
     /// Moves `[u, v]` along the gradient onto the level, by Newton's method.
     pub fn onto_level(&self, mut p: [f64; 2], level: f64) -> [f64; 2] {
         for _ in 0..4 {
-            let [value, gu, gv] = self.field.value_and_gradient(p[0], p[1]);
+            let [value, gu, gv] = self.value_and_gradient(p);
             let square = gu * gu + gv * gv;
             if square == 0.0 {
                 break;
@@ -94,7 +104,7 @@ impl<'a> LevelTracer<'a> {
 
     /// Unit surface tangent along the level curve, in parameters; `None` at a critical point.
     pub fn direction(&self, p: [f64; 2]) -> Option<[f64; 2]> {
-        let [_, gu, gv] = self.field.value_and_gradient(p[0], p[1]);
+        let [_, gu, gv] = self.value_and_gradient(p);
         let (e, f, g) = (self.metric)(p[0], p[1]);
         let length = (e * gv * gv - 2.0 * f * gu * gv + g * gu * gu).max(0.0).sqrt();
         (length > 1e-300 && length.is_finite()).then(|| [gv / length, -gu / length])
@@ -192,7 +202,7 @@ impl<'a> LevelTracer<'a> {
         r[axis] = q[axis].clamp(self.domain[axis][0], self.domain[axis][1]);
         let along = 1 - axis;
         for _ in 0..4 {
-            let values = self.field.value_and_gradient(r[0], r[1]);
+            let values = self.value_and_gradient(r);
             let slope = values[1 + along];
             let step = (level - values[0]) / slope;
             // A curve that runs nearly along the border is left where the step ended.
@@ -333,7 +343,7 @@ mod tests {
     #[test]
     fn circles_close_and_keep_their_radius() {
         let field = spline(|x, y| x * x + y * y);
-        let tracer = LevelTracer::new(&field, &flat, SQUARE, 40, 0.02);
+        let tracer = LevelTracer::new(&field, &flat, SQUARE, [0.0; 2], 40, 0.02);
         let curves = tracer.curves(0.25);
         assert_eq!(curves.len(), 1);
         assert!(curves[0].closed);
@@ -349,7 +359,7 @@ mod tests {
     fn runge_kutta_alone_is_of_fourth_order() {
         let field = spline(|x, y| x * x + y * y);
         let error = |h: f64| {
-            let tracer = LevelTracer::new(&field, &flat, SQUARE, 10, h);
+            let tracer = LevelTracer::new(&field, &flat, SQUARE, [0.0; 2], 10, h);
             let mut p = [0.5, 0.0];
             for _ in 0..(1.0 / h).round() as usize {
                 p = tracer.step(p, h).unwrap();
@@ -363,7 +373,7 @@ mod tests {
     #[test]
     fn open_curves_end_on_the_border_and_saddles_give_two_branches() {
         let field = spline(|x, y| x * y);
-        let tracer = LevelTracer::new(&field, &flat, SQUARE, 33, 0.03);
+        let tracer = LevelTracer::new(&field, &flat, SQUARE, [0.0; 2], 33, 0.03);
         for level in [0.2, -0.2, 1e-4] {
             let curves = tracer.curves(level);
             assert_eq!(curves.len(), 2, "level {level}");
@@ -381,7 +391,7 @@ mod tests {
     #[test]
     fn coordinates_give_isoparametric_lines() {
         let field = ScalarField::Coordinate(Axis::V);
-        let tracer = LevelTracer::new(&field, &flat, SQUARE, 16, 0.1);
+        let tracer = LevelTracer::new(&field, &flat, SQUARE, [0.0; 2], 16, 0.1);
         let curves = tracer.curves(0.3);
         assert_eq!(curves.len(), 1);
         assert!(curves[0].points.iter().all(|p| (p[1] - 0.3).abs() < 1e-12));
@@ -390,11 +400,25 @@ mod tests {
     }
 
     #[test]
+    fn margins_continue_the_field_and_do_not_widen_its_range() {
+        let field = spline(|x, y| x + 0.1 * y);
+        let tracer = LevelTracer::new(&field, &flat, SQUARE, [0.25, 0.5], 20, 0.1);
+        let [lo, hi] = tracer.range();
+        assert!((lo + 1.1).abs() < 1e-9 && (hi - 1.1).abs() < 1e-9);
+        let curves = tracer.curves(1.05);
+        assert_eq!(curves.len(), 1);
+        let ends = [curves[0].points[0], curves[0].points[curves[0].points.len() - 1]];
+        for [x, y] in ends {
+            assert!((y.abs() - 1.5).abs() < 1e-9 && (x + 0.1 * y - 1.05).abs() < 1e-9, "{x} {y}");
+        }
+    }
+
+    #[test]
     fn steps_are_even_on_the_surface_not_in_parameters() {
         // A surface ten times as long in u as in v.
         let field = ScalarField::Coordinate(Axis::V);
         let metric = |_: f64, _: f64| (100.0, 0.0, 1.0);
-        let tracer = LevelTracer::new(&field, &metric, SQUARE, 16, 0.5);
+        let tracer = LevelTracer::new(&field, &metric, SQUARE, [0.0; 2], 16, 0.5);
         let curve = &tracer.curves(0.01)[0];
         assert_eq!(curve.points.len(), 41);
     }

@@ -148,12 +148,23 @@ impl<'a> Chart<'a> {
         Some(ChartPoint { jet, normal: jet.normal()? * self.sign, sign: self.sign })
     }
 
-    /// Position and derivatives at a parameter.
+    /// Position and derivatives at a parameter. Beyond the domain the tangent plane at the nearest
+    /// border point continues the surface.
     pub fn jet(&self, u: f64, v: f64) -> Jet2 {
-        match &self.source {
-            Source::Patch { part, patch } => part.patches()[*patch as usize].jet(u, v),
-            Source::Heights(surface) => surface.jet(u, v),
-        }
+        let [[u0, u1], [v0, v1]] = self.domain;
+        let (inner_u, inner_v) = (u.clamp(u0, u1), v.clamp(v0, v1));
+        let mut jet = match &self.source {
+            Source::Patch { part, patch } => part.patches()[*patch as usize].jet(inner_u, inner_v),
+            Source::Heights(surface) => surface.jet(inner_u, inner_v),
+        };
+        jet.p += jet.du * (u - inner_u) + jet.dv * (v - inner_v);
+        jet
+    }
+
+    /// True where the chart itself is, not its continuation.
+    pub fn holds(&self, [u, v]: [f64; 2]) -> bool {
+        let [[u0, u1], [v0, v1]] = self.domain;
+        u >= u0 && u <= u1 && v >= v0 && v <= v1
     }
 
     /// The parameters of an even grid of `n` × `n` places with the centre of each of its cells, and

@@ -5,7 +5,7 @@
 //! there. Levels are then spread so that every step keeps within that and all are equally near to
 //! it.
 
-use super::chart::Chart;
+use super::chart::{Chart, ChartPoint};
 use super::drop::DropCutter;
 use super::plan::{PassSettings, Passes, PlanError};
 use super::{Along, FeedDirection};
@@ -38,12 +38,22 @@ const SAMPLES_PER_CONTROL: usize = 3;
 /// stream function is determined where it matters nowhere.
 const LEAST_WEIGHT: f64 = 0.02;
 
-/// A pass never runs on over the border farther than this many intervals: one that is nearly
-/// parallel to the border has a neighbour there.
-const MOST_OVERRUN: f64 = 3.0;
+/// Passes are traced beyond the border by this share of their interval: a little more than the half
+/// that a pass outside the border still has to serve inside it.
+const BORDER_SHARE: f64 = 0.6;
+
+/// The margin is never more than this share of the chart; it would be where a parametrisation
+/// degenerates.
+const MOST_MARGIN: f64 = 0.1;
+
+/// Places a side at which the margin is computed.
+const MARGIN_SAMPLES: usize = 24;
 
 /// An overrun shorter than this many intervals is left out.
 const LEAST_OVERRUN: f64 = 0.05;
+
+/// How closely the crossing of a border is placed, in sampling distances.
+const BORDER_PRECISION: f64 = 1e-6;
 
 /// Passes along isoparametric lines.
 pub fn iso_parametric(
@@ -146,7 +156,8 @@ fn along_levels(
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
     let metric = |u: f64, v: f64| chart.jet(u, v).first_form();
-    let tracer = LevelTracer::new(field, &metric, chart.domain, TRACE_CELLS, settings.sampling);
+    let margins = margins(chart, cutter, field, settings);
+    let tracer = LevelTracer::new(field, &metric, chart.domain, margins, TRACE_CELLS, settings.sampling);
     let mut notes = Vec::new();
     let levels = place_levels(chart, cutter, field, tracer.range(), settings, &mut notes);
     let guide = Guide { tracer: &tracer, chart, cutter, drop: DropCutter::new(part, cutter), settings };
@@ -154,11 +165,35 @@ fn along_levels(
     let passes = crate::parallel::try_map(levels.len(), |k| {
         monitor::check(monitor)?;
         let curves = tracer.curves(levels[k]);
-        let passes: Vec<_> = curves.iter().map(|curve| guide.pass(curve, levels[k])).collect();
+        let passes: Vec<_> = curves.iter().flat_map(|curve| guide.passes(curve, levels[k])).collect();
         monitor.advance(1);
         Ok::<_, PlanError>(passes)
     })?;
     Ok(Passes { passes: passes.into_iter().flatten().collect(), notes })
+}
+
+/// How far beyond the chart passes are traced, in parameters: the width over which a pass outside
+/// the border still serves the strip inside it.
+fn margins(chart: &Chart, cutter: &Cutter, field: &ScalarField, settings: &PassSettings) -> [f64; 2] {
+    let (mut width, mut speed, mut places) = (0.0, [0.0; 2], 0.0);
+    for [u, v] in chart.grid(MARGIN_SAMPLES) {
+        let Some(p) = chart.at(u, v) else { continue };
+        if let Some(t) = level_tangent(&p, field, [u, v]) {
+            width += p.strip_width(cutter, &t, settings.step).0;
+            speed = [speed[0] + p.jet.du.norm(), speed[1] + p.jet.dv.norm()];
+            places += 1.0;
+        }
+    }
+    [0, 1].map(|c| {
+        let range = chart.domain[c][1] - chart.domain[c][0];
+        if places == 0.0 { 0.0 } else { (BORDER_SHARE * width / speed[c]).min(MOST_MARGIN * range) }
+    })
+}
+
+/// Unit tangent in space of the level curve of `field` through a chart point.
+fn level_tangent(p: &ChartPoint, field: &ScalarField, [u, v]: [f64; 2]) -> Option<Vector3> {
+    let [_, psi_u, psi_v] = field.value_and_gradient(u, v);
+    (p.jet.du * psi_v - p.jet.dv * psi_u).try_normalize(1e-300)
 }
 
 /// The levels of all passes, ascending.
@@ -179,8 +214,7 @@ fn place_levels(
     for [u, v] in chart.grid(STEP_SAMPLES) {
         let Some(p) = chart.at(u, v) else { continue };
         let [psi, psi_u, psi_v] = field.value_and_gradient(u, v);
-        let tangent = p.jet.du * psi_v - p.jet.dv * psi_u;
-        let Some(t) = tangent.try_normalize(1e-300) else { continue };
+        let Some(t) = level_tangent(&p, field, [u, v]) else { continue };
         let (width, too_concave) = p.strip_width(cutter, &t, settings.step);
         let step = width * surface_gradient_length(p.jet.first_form(), psi_u, psi_v);
         places += 1;
@@ -286,53 +320,91 @@ impl Guide<'_> {
         self.drop.at(x, y).map(|d| Point3::new(x, y, d.tip_z))
     }
 
-    fn pass(&self, curve: &LevelCurve, level: f64) -> Vec<Point3> {
+    /// The passes along one curve: it may leave the chart and come back.
+    fn passes(&self, curve: &LevelCurve, level: f64) -> Vec<Vec<Point3>> {
         let mut points = curve.points.clone();
         if curve.closed {
             points.push(points[0]);
         }
         let last = points.len() - 1;
-        // The parameter counts traced points, which are one sampling distance apart.
-        let settings = PassSettings { sampling: 1.0, ..*self.settings };
-        let mut tips = settings.moves(0.0, last as f64, &mut |s| {
+        // The parameter s counts traced points, which are one sampling distance apart.
+        let at = |s: f64| {
             let k = (s as usize).min(last - 1);
             let t = s - k as f64;
             let [a, b] = [points[k], points[k + 1]];
-            let between = [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])];
-            self.tip(self.tracer.onto_level(between, level))
-        });
-        if !curve.closed && tips.len() >= 2 {
-            let n = tips.len();
-            let mut before = self.overrun(points[0], &tips[0], &tips[1]);
-            let after = self.overrun(points[last], &tips[n - 1], &tips[n - 2]);
-            before.reverse();
-            tips = [before, tips, after].concat();
+            self.tracer.onto_level([a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])], level)
+        };
+        let settings = PassSettings { sampling: 1.0, ..*self.settings };
+        let mut stretches = self.stretches(&at, last);
+        if !curve.closed {
+            self.shorten_ends(&mut stretches, &at);
         }
-        tips
+        if !stretches.iter().any(|s| s.inside) {
+            return Vec::new();
+        }
+        let mut tips: Vec<Point3> = Vec::new();
+        for stretch in stretches {
+            let moves = settings.moves(stretch.from, stretch.to, &mut |s| self.tip(at(s)));
+            let joined = usize::from(!tips.is_empty());
+            tips.extend(moves.into_iter().skip(joined));
+        }
+        vec![tips]
     }
 
-    /// Moves on from the end `tip` of a pass, away from `inner`, over the border that it meets at the
-    /// parameter `p`. A pass that meets the border at the angle φ ends half an interval over tan φ
-    /// short of where its ridge to the neighbour leaves the part.
-    fn overrun(&self, p: [f64; 2], tip: &Point3, inner: &Point3) -> Vec<Point3> {
-        let [[u0, u1], _] = self.chart.domain;
-        let (Some(here), Some([du, dv])) = (self.chart.at(p[0], p[1]), self.tracer.direction(p)) else {
-            return Vec::new();
-        };
-        let feed = here.jet.du * du + here.jet.dv * dv;
-        let border = if p[0] == u0 || p[0] == u1 { here.jet.dv } else { here.jet.du };
-        let (along, across) = (feed.dot(&border).abs(), feed.cross(&border).norm());
-        let interval = here.strip_width(self.cutter, &feed, self.settings.step).0;
-        let length = (0.5 * interval * along / across.max(1e-9)).min(MOST_OVERRUN * interval);
-        let away = (tip - inner).xy();
-        if length < LEAST_OVERRUN * interval || away.norm() == 0.0 {
-            return Vec::new();
+    /// The stretches of a curve inside and outside of the chart, in order.
+    fn stretches(&self, at: &dyn Fn(f64) -> [f64; 2], last: usize) -> Vec<Stretch> {
+        let inside = |s: f64| self.chart.holds(at(s));
+        let mut stretches = vec![Stretch { inside: inside(0.0), from: 0.0, to: 0.0 }];
+        for k in 1..=last {
+            let now = inside(k as f64);
+            let n = stretches.len();
+            let current = &mut stretches[n - 1];
+            if now == current.inside {
+                current.to = k as f64;
+                continue;
+            }
+            let (mut same, mut other) = (current.to, k as f64);
+            while other - same > BORDER_PRECISION {
+                let middle = 0.5 * (same + other);
+                *(if inside(middle) == current.inside { &mut same } else { &mut other }) = middle;
+            }
+            current.to = same;
+            stretches.push(Stretch { inside: now, from: same, to: k as f64 });
         }
-        let away = away.normalize();
-        let moves = self.settings.moves(0.0, length, &mut |s| {
-            let (x, y) = (tip.x + s * away.x, tip.y + s * away.y);
-            self.drop.at(x, y).map(|d| Point3::new(x, y, d.tip_z))
-        });
-        moves.into_iter().skip(1).collect()
+        stretches.retain(|s| s.to - s.from > BORDER_PRECISION);
+        stretches
     }
+
+    /// Cuts stretches outside of the chart at both ends back to what is of use: a pass that meets the
+    /// border at the angle φ ends half an interval over tan φ short of where its ridge to the
+    /// neighbour leaves the part.
+    fn shorten_ends(&self, stretches: &mut Vec<Stretch>, at: &dyn Fn(f64) -> [f64; 2]) {
+        let useful = |s: f64| {
+            let p = at(s);
+            let (here, [du, dv]) = (self.chart.at(p[0], p[1])?, self.tracer.direction(p)?);
+            let feed = here.jet.du * du + here.jet.dv * dv;
+            let near = |x: f64, [lo, hi]: [f64; 2]| (x - lo).abs().min((hi - x).abs()) / (hi - lo);
+            let [along_u, along_v] = self.chart.domain;
+            let border = if near(p[0], along_u) < near(p[1], along_v) { here.jet.dv } else { here.jet.du };
+            let (along, across) = (feed.dot(&border).abs(), feed.cross(&border).norm());
+            let interval = here.strip_width(self.cutter, &feed, self.settings.step).0;
+            let length = 0.5 * interval * along / across.max(1e-9);
+            Some(if length < LEAST_OVERRUN * interval { 0.0 } else { length / self.settings.sampling })
+        };
+        if let Some(first) = stretches.first_mut().filter(|s| !s.inside) {
+            first.from = first.from.max(first.to - useful(first.to).unwrap_or(0.0));
+        }
+        if let Some(end) = stretches.last_mut().filter(|s| !s.inside) {
+            end.to = end.to.min(end.from + useful(end.from).unwrap_or(0.0));
+        }
+        stretches.retain(|s| s.to - s.from > BORDER_PRECISION);
+    }
+}
+
+/// A stretch of a level curve that lies inside or outside of the chart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Stretch {
+    inside: bool,
+    from: f64,
+    to: f64,
 }
