@@ -225,3 +225,26 @@ fn method(t: &ToolpathResult) -> Markup {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture;
+    use super::*;
+
+    #[test]
+    fn the_page_needs_nothing_from_outside_and_escapes_what_it_quotes() {
+        let report = fixture::report();
+        let png = vec![1u8, 2, 3];
+        let page = ToolpathPage {
+            deviation_png: png.clone(),
+            height_png: png,
+            histogram: Histogram::new(&[[0.004, 1.0]], 0.01, 0.0125),
+        };
+        let html = html_page(&report, &[page.clone(), page], "title = \"<script>\" # a & b");
+        assert!(html.contains("&lt;script&gt;") && !html.contains("<script"));
+        assert!(!html.contains("http://") && !html.contains("https://"), "nothing is fetched");
+        assert_eq!(html.matches("data:image/png;base64,AQID").count(), 4);
+        assert!(html.contains("toolpath.nc line 1240"));
+        assert!(html.contains("1 of 2 toolpaths hold every tolerance"));
+    }
+}

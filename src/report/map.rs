@@ -245,7 +245,14 @@ fn draw_key(page: &mut Picture, key: &Key, x: usize, room: usize) {
     const LINE: i64 = 20;
     for (line, (word, value)) in [("max", greatest), ("min", least)].into_iter().enumerate() {
         let text = format!("{word} {} {}", unit.text(value, range / 1000.0), unit.name);
-        page.text(x, top + height + 8 + LINE * (line as i64 + 2), &text, TextSize::Small, Align::Left, FAINT_INK);
+        page.text(
+            x,
+            top + height + 8 + LINE * (line as i64 + 2),
+            &text,
+            TextSize::Small,
+            Align::Left,
+            FAINT_INK,
+        );
     }
 }
 

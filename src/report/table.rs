@@ -4,10 +4,11 @@ use std::fmt::Write as _;
 
 use super::canvas::shortened;
 use super::result::{RunReport, ToolpathResult};
+use super::scale::plain;
 use super::verdict::Verdict;
 
 /// Letters of a toolpath's name in the table; longer ones are cut.
-const NAME_WIDTH: usize = 17;
+const NAME_WIDTH: usize = 16;
 
 /// A time as people read it: `1:02:03` or `2:03` or `12.3 s`.
 pub fn duration(seconds: f64) -> String {
@@ -39,13 +40,13 @@ pub fn with_bound(value: Option<f64>, bound: Option<f64>) -> String {
 
 /// Share as per cent, `-` for none.
 pub fn per_cent(share: Option<f64>) -> String {
-    share.map_or("-".to_owned(), |share| format!("{:.1}", 100.0 * share))
+    share.map_or("-".to_owned(), |share| plain(100.0 * share, 0.1))
 }
 
 fn row(out: &mut String, cells: [&str; 11]) -> std::fmt::Result {
     let [name, passes, length, time, max, p95, p50, over, uncut, gouge, verdict] = cells;
     let line = format!(
-        "{name:<NAME_WIDTH$} {passes:>6} {length:>9} {time:>8} {max:>14} {p95:>6} {p50:>6} {over:>6} {uncut:>7} {gouge:>6}  {verdict}"
+        "{name:<NAME_WIDTH$} {passes:>6} {length:>8} {time:>8} {max:>12} {p95:>6} {p50:>6} {over:>6} {uncut:>7} {gouge:>6}  {verdict}"
     );
     writeln!(out, "{}", line.trim_end())
 }
@@ -125,5 +126,29 @@ pub fn conclusion(report: &RunReport) -> String {
             "{passing} of {all} toolpaths hold every tolerance; the quickest of them is {name} ({}).",
             duration(best(name).unwrap_or_default())
         ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture;
+    use super::*;
+
+    #[test]
+    fn numbers_are_written_as_people_read_them() {
+        assert_eq!(duration(12.34), "12.3 s");
+        assert_eq!(duration(3723.4), "1:02:03");
+        assert_eq!(duration(59.96), "60.0 s");
+        assert_eq!(micrometres(Some(0.0098765)), "9.88");
+        assert_eq!(per_cent(Some(-1e-17)), "0.0");
+        assert_eq!(with_bound(Some(0.25), None), "250");
+    }
+
+    #[test]
+    fn the_table_fits_into_a_hundred_columns() {
+        let table = result_table(&fixture::report());
+        insta::assert_snapshot!(table);
+        // Sentences may be longer; rows may not.
+        assert!(table.lines().take(6).all(|line| line.chars().count() <= 100), "{table}");
     }
 }
