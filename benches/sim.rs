@@ -28,7 +28,7 @@ fn wave(stepover: f64, chord: f64) -> Toolpath {
         let z = 2.0 * (x / 8.0).sin() * (y / 10.0).cos() + shift - RADIUS;
         ClPoint { tip: Point3::new(x - shift * slope_x, y - shift * slope_y, z) }
     };
-    let pass = |j: usize| (0..=steps).map(move |k| tip(if j % 2 == 0 { k } else { steps - k }, j));
+    let pass = |j: usize| (0..=steps).map(move |k| tip(if j.is_multiple_of(2) { k } else { steps - k }, j));
     let mut moves =
         (0..rows).flat_map(pass).map(|to| Move { to, kind: MoveKind::Cut, feed_rate: 1000.0, pass: 0 });
     let start = moves.next().expect("a pass has places").to;

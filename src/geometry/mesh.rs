@@ -1,56 +1,223 @@
-//! Triangle meshes: shared vertices, checked once, then immutable.
+//! Triangle meshes: shared vertices, checked and repaired once, then immutable. mm.
+//!
+//! Enters: any soup of triangles. Leaves: a manifold, consistently oriented mesh in which every
+//! triangle has an area, with its neighbours, or the reason why that soup is none.
+//!
+//! Vertices are merged only where their coordinates are equal. A tolerance would close more seams,
+//! but "close to" is not transitive: a chain of merged vertices can swallow a narrow feature.
+
+mod repair;
+#[cfg(test)]
+mod tests;
 
 use super::{Aabb, Point3, Vector3};
 
 /// A checked triangle mesh: every index in range, every coordinate finite and within
-/// [`super::MAX_COORDINATE`], no degenerate triangle, orientation consistent across edges.
+/// [`super::MAX_COORDINATE`], no degenerate and no duplicate triangle, at most two triangles at an
+/// edge, orientation consistent across edges. Open borders are allowed.
 #[derive(Debug, Clone)]
 pub struct TriangleMesh {
     vertices: Vec<Point3>,
     triangles: Vec<[u32; 3]>,
+    neighbours: Vec<[u32; 3]>,
+    bounds: Aabb,
 }
+
+/// Stands for "no triangle" in neighbour lists.
+const NONE: u32 = u32::MAX;
 
 /// What was changed to make a mesh usable.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct RepairNotes {
-    /// Vertices merged because they coincide.
+    /// Vertices merged because they coincide. An STL file states every corner anew, so there this
+    /// is no defect.
     pub merged_vertices: usize,
-    /// Degenerate triangles dropped.
+    /// Degenerate triangles (without area) dropped.
     pub dropped_degenerate: usize,
+    /// Triangles dropped because the same three corners had occurred before.
+    pub dropped_duplicates: usize,
+    /// Triangles turned over so that they agree with their neighbours.
+    pub flipped_triangles: usize,
+    /// The whole mesh was turned over: it was inside out, or an open surface facing down.
+    pub turned_over: bool,
 }
 
-/// Why a mesh was refused.
+impl RepairNotes {
+    /// True when nothing but the merging of vertices was done.
+    pub fn is_clean(&self) -> bool {
+        *self == Self { merged_vertices: self.merged_vertices, ..Self::default() }
+    }
+}
+
+impl std::fmt::Display for RepairNotes {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut done = Vec::new();
+        let mut count = |n: usize, before: &str, one: &str, many: &str, after: &str| {
+            if n > 0 {
+                done.push(format!("{before} {n} {}{after}", if n == 1 { one } else { many }));
+            }
+        };
+        count(self.merged_vertices, "merged", "coincident vertex", "coincident vertices", "");
+        count(self.dropped_degenerate, "dropped", "triangle", "triangles", " without area");
+        count(self.dropped_duplicates, "dropped", "duplicate triangle", "duplicate triangles", "");
+        count(self.flipped_triangles, "turned over", "triangle", "triangles", " against the rest");
+        if self.turned_over {
+            done.push("turned the whole mesh over, because it faced the wrong way".to_owned());
+        }
+        if done.is_empty() { f.write_str("no repairs") } else { f.write_str(&done.join(", ")) }
+    }
+}
+
+/// Why a mesh was refused. Triangles are counted from 0 in the order in which they were given.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MeshError {
     /// No triangle is left.
-    #[error("the mesh has no triangles")]
-    Empty,
+    #[error(
+        "the mesh has no triangles{}; export the part as a triangle mesh again",
+        if *dropped > 0 { format!(" with an area ({dropped} without were dropped)") } else { String::new() }
+    )]
+    Empty {
+        /// How many triangles without area were dropped.
+        dropped: usize,
+    },
+    /// More vertices or triangles than 32-bit indices can count.
+    #[error("the mesh has {triangles} triangles and at most {limit} can be handled; export it coarser")]
+    TooMany {
+        /// Triangles given.
+        triangles: usize,
+        /// Triangles allowed.
+        limit: usize,
+    },
+    /// A triangle refers to a vertex that does not exist.
+    #[error("triangle {triangle} refers to vertex {index}, but there are {vertices} (counted from 0)")]
+    IndexOutOfRange {
+        /// Which triangle.
+        triangle: usize,
+        /// The index given.
+        index: u32,
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// A coordinate is not a number or infinite.
+    #[error("triangle {triangle} has the corner ({}), which is not finite; export the part again", show(point))]
+    NotFinite {
+        /// Which triangle.
+        triangle: usize,
+        /// The corner.
+        point: [f64; 3],
+    },
+    /// A coordinate is out of range.
+    #[error(
+        "triangle {triangle} has the corner ({}) mm; coordinates must lie within ±{} mm: \
+         check the units of the export, and move the part near the origin",
+        show(point), super::MAX_COORDINATE
+    )]
+    TooFar {
+        /// Which triangle.
+        triangle: usize,
+        /// The corner.
+        point: [f64; 3],
+    },
+    /// More than two triangles meet at an edge.
+    #[error(
+        "{count} triangles ({}{}) meet at the edge from ({}) to ({}); a surface has at most two there: \
+         unite the bodies, or remove inner walls, before exporting",
+        show_indices(triangles), if *count > 3 { ", …" } else { "" }, show(from), show(to)
+    )]
+    NonManifoldEdge {
+        /// The first three of the triangles.
+        triangles: [usize; 3],
+        /// How many there are.
+        count: usize,
+        /// One end of the edge.
+        from: [f64; 3],
+        /// The other end.
+        to: [f64; 3],
+    },
+    /// The mesh has no outer side: it is one-sided like a Möbius strip.
+    #[error(
+        "triangles {} and {} at the edge from ({}) to ({}) cannot be turned to face the same side: \
+         the surface is one-sided; repair it in the modeller",
+        triangles[0], triangles[1], show(from), show(to)
+    )]
+    NotOrientable {
+        /// The two triangles.
+        triangles: [usize; 2],
+        /// One end of their edge.
+        from: [f64; 3],
+        /// The other end.
+        to: [f64; 3],
+    },
+}
+
+fn show(p: &[f64; 3]) -> String {
+    format!("{}, {}, {}", p[0], p[1], p[2])
+}
+
+fn show_indices(t: &[usize; 3]) -> String {
+    format!("{}, {}, {}", t[0], t[1], t[2])
 }
 
 impl TriangleMesh {
-    /// TODO H1
+    /// Checks and repairs a mesh: merges vertices with equal coordinates, drops vertices that no
+    /// triangle uses, triangles without area and triangles that occurred before, turns triangles
+    /// to agree with their neighbours, and turns the whole mesh to face outward (closed) or upward
+    /// (open). A mesh that needs nothing of that keeps its numbering.
+    ///
+    /// # Errors
+    /// See [`MeshError`].
     pub fn new(vertices: Vec<Point3>, triangles: Vec<[u32; 3]>) -> Result<(Self, RepairNotes), MeshError> {
-        Ok((Self { vertices, triangles }, RepairNotes::default()))
+        Self::with_sources(vertices, triangles).map(|(mesh, notes, _)| (mesh, notes))
     }
+
+    /// As [`TriangleMesh::new`], and tells where each corner comes from: for every triangle of the
+    /// mesh, the indices into the given `vertices` of its corners, in the mesh's order. Whoever
+    /// keeps parameters per vertex finds them this way after merging, dropping and turning.
+    ///
+    /// # Errors
+    /// See [`MeshError`].
+    pub fn with_sources(
+        vertices: Vec<Point3>,
+        triangles: Vec<[u32; 3]>,
+    ) -> Result<(Self, RepairNotes, Vec<[u32; 3]>), MeshError> {
+        repair::repair(vertices, triangles)
+    }
+
     /// Vertices, mm.
     pub fn vertices(&self) -> &[Point3] {
         &self.vertices
     }
+
     /// Vertex indices, counter-clockwise seen from outside.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
+
     /// The three corners of triangle `t`.
     pub fn corners(&self, t: usize) -> [Point3; 3] {
         self.triangles[t].map(|i| self.vertices[i as usize])
     }
+
     /// Unit normal of triangle `t`, by its orientation.
     pub fn normal(&self, t: usize) -> Vector3 {
         let [a, b, c] = self.corners(t);
         (b - a).cross(&(c - a)).normalize()
     }
+
+    /// The triangle across side `k` (from corner `k` to corner `k + 1`) of triangle `t`; `None` at
+    /// a border.
+    pub fn neighbour(&self, t: usize, k: usize) -> Option<usize> {
+        let n = self.neighbours[t][k];
+        (n != NONE).then_some(n as usize)
+    }
+
+    /// True without borders.
+    pub fn is_closed(&self) -> bool {
+        self.neighbours.iter().flatten().all(|&n| n != NONE)
+    }
+
     /// Bounds of all vertices.
     pub fn bounds(&self) -> Aabb {
-        Aabb::of(&self.vertices)
+        self.bounds
     }
 }

@@ -140,7 +140,9 @@ impl NurbsSurface {
     /// Out of the net.
     pub fn control_point(&self, i: usize, j: usize) -> (Point3, f64) {
         let [x, y, z, w] = self.net[i * self.v.control_count() + j];
-        (Point3::new(x, y, z) / w, w)
+        // Multiplied and divided, a coordinate at the limit may come back beyond it.
+        let inside = |c: f64| (c / w).clamp(-MAX_COORDINATE, MAX_COORDINATE);
+        (Point3::new(inside(x), inside(y), inside(z)), w)
     }
 
     /// Box around all control points, which holds the whole patch (convex hull property).

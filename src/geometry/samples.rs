@@ -71,3 +71,26 @@ pub(crate) fn bicubic(weights: &[f64]) -> NurbsSurface {
         (0..7).map(|i| (0..6).map(|j| weights[(i * 6 + j) % weights.len()]).collect()).collect();
     NurbsSurface::new(3, 3, knots(7), knots(6), &points, Some(&weights)).unwrap()
 }
+
+/// The patch of scenes/ridge.json: a winding ridge between two winding valleys over 60 × 60 mm.
+/// Bicubic, 16 × 16 control points, parameter lines that wind as well; control points to 0.001 mm, so
+/// that the file does not depend on the last digit of anyone's sine.
+pub(crate) fn ridge() -> NurbsSurface {
+    const SIDE: f64 = 60.0;
+    const COUNT: usize = 16;
+    let knots = super::KnotVector::clamped_uniform(3, COUNT, [0.0, 1.0]).unwrap();
+    // Averages of three knots (Greville), where control points reproduce straight lines.
+    let average = |i: usize| knots.knots()[i + 1..=i + 3].iter().sum::<f64>() / 3.0;
+    let round = |c: f64| (c * 1000.0).round() / 1000.0 + 0.0;
+    let point = |i: usize, j: usize| {
+        use std::f64::consts::{PI, TAU};
+        let (s, t) = (average(i), average(j));
+        let x = SIDE * s + 2.5 * (PI * s).sin() * (TAU * t).sin();
+        let y = SIDE * t + 2.5 * (TAU * s).sin() * (PI * t).sin();
+        let across = (x - 0.5 * SIDE - 5.0 * (TAU * y / SIDE).sin()) / 15.0;
+        let z = 3.2 * (PI * across).cos() * (1.0 + 0.12 * (TAU * y / 40.0).cos()) + 0.02 * y;
+        Point3::new(round(x), round(y), round(z))
+    };
+    let points: Vec<Vec<Point3>> = (0..COUNT).map(|i| (0..COUNT).map(|j| point(i, j)).collect()).collect();
+    NurbsSurface::new(3, 3, knots.knots().to_vec(), knots.knots().to_vec(), &points, None).unwrap()
+}

@@ -36,7 +36,7 @@ const LEAST_SHARE: f64 = 0.01;
 /// search trees poor boxes.
 const LONGEST_ASPECT: f64 = 8.0;
 
-/// Border points nearer than this, mm, are one vertex (poles and closed seams); far out the rounding
+/// Border points nearer than this, mm, are one point (poles and closed seams); far out the rounding
 /// of coordinates is added. Greater closes real gaps, less leaves poles open by rounding.
 const WELD: f64 = 1.0e-9;
 
@@ -46,12 +46,13 @@ const LEAST_HEIGHT: f64 = 1.0e-9;
 /// Triangles inscribed in a parametric surface.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tessellation {
-    /// Points on the surface, mm; poles and closed seams share theirs.
+    /// Points on the surface, mm. At a pole or a closed seam several vertices with different
+    /// parameters have the very same coordinates, so that merging equal ones closes it.
     pub vertices: Vec<Point3>,
+    /// Parameters of each vertex.
+    pub parameters: Vec<[f64; 2]>,
     /// Vertex indices, counter-clockwise about `du × dv`; none is degenerate.
     pub triangles: Vec<[u32; 3]>,
-    /// Parameters of each triangle's corners. At a pole or seam they belong to the triangle's side.
-    pub corner_parameters: Vec<[[f64; 2]; 3]>,
     /// Bound of the distance between triangles and surface, mm: the greatest one measured and a
     /// quarter of it.
     pub deviation: f64,
@@ -381,58 +382,44 @@ impl Net {
         (a.0 == b.0 && (a.0 == 0 || a.0 == last_u)) || (a.1 == b.1 && (a.1 == 0 || a.1 == last_v))
     }
 
-    /// For each point of the net the vertex that stands for it: poles become one vertex, closed
-    /// seams one row.
-    fn weld(&self) -> Vec<usize> {
-        let mut stands: Vec<usize> = (0..self.points.len()).collect();
+    /// Gives the points of poles and closed seams, which differ by rounding, equal coordinates.
+    fn weld(&mut self) {
         let (nu, nv) = (self.us.len(), self.vs.len());
-        let near = |a: usize, b: usize| {
-            let limit = WELD + 1.0e-14 * self.points[a].coords.amax();
-            (self.points[a] - self.points[b]).norm() <= limit
+        let near = |points: &[Point3], a: usize, b: usize| {
+            (points[a] - points[b]).norm() <= WELD + 1.0e-14 * points[a].coords.amax()
         };
-        let column = |i: usize| -> Vec<usize> { (0..nv).map(|j| self.index(i, j)).collect() };
-        let row = |j: usize| -> Vec<usize> { (0..nu).map(|i| self.index(i, j)).collect() };
+        let column = |i: usize| -> Vec<usize> { (0..nv).map(|j| i * nv + j).collect() };
+        let row = |j: usize| -> Vec<usize> { (0..nu).map(|i| i * nv + j).collect() };
         for [first, last] in [[column(0), column(nu - 1)], [row(0), row(nv - 1)]] {
-            if first.iter().zip(&last).all(|(&a, &b)| near(a, b)) {
-                for (&a, &b) in first.iter().zip(&last) {
-                    stands[b] = stands[a];
+            for border in [&first, &last] {
+                if border.iter().all(|&k| near(&self.points, border[0], k)) {
+                    border.iter().for_each(|&k| self.points[k] = self.points[border[0]]);
                 }
             }
-            for border in [first, last] {
-                if border.iter().all(|&k| near(border[0], k)) {
-                    for &k in &border {
-                        stands[k] = stands[border[0]];
-                    }
-                }
+            if first.iter().zip(&last).all(|(&a, &b)| near(&self.points, a, b)) {
+                first.iter().zip(&last).for_each(|(&a, &b)| self.points[b] = self.points[a]);
             }
         }
-        stands
     }
 
-    fn triangulate(self, deviation: f64) -> Result<Tessellation, TessellateError> {
-        let stands = self.weld();
-        let mut number = vec![u32::MAX; self.points.len()];
-        let mut out =
-            Tessellation { vertices: vec![], triangles: vec![], corner_parameters: vec![], deviation };
+    fn triangulate(mut self, deviation: f64) -> Result<Tessellation, TessellateError> {
+        self.weld();
+        let mut triangles = Vec::with_capacity(2 * self.points.len());
         for i in 0..self.us.len() - 1 {
             for j in 0..self.vs.len() - 1 {
                 for corners in self.cell(i, j) {
-                    let at = corners.map(|(i, j)| stands[self.index(i, j)]);
-                    if is_degenerate(&at.map(|k| self.points[k])) {
-                        continue;
+                    let at = corners.map(|(i, j)| self.index(i, j));
+                    if !is_degenerate(&at.map(|k| self.points[k])) {
+                        triangles.push(at.map(|k| k as u32));
                     }
-                    out.triangles.push(at.map(|k| {
-                        if number[k] == u32::MAX {
-                            number[k] = out.vertices.len() as u32;
-                            out.vertices.push(self.points[k]);
-                        }
-                        number[k]
-                    }));
-                    out.corner_parameters.push(corners.map(|c| self.parameters(c)));
                 }
             }
         }
-        if out.triangles.is_empty() { Err(TessellateError::NoArea) } else { Ok(out) }
+        if triangles.is_empty() {
+            return Err(TessellateError::NoArea);
+        }
+        let parameters = self.us.iter().flat_map(|&u| self.vs.iter().map(move |&v| [u, v])).collect();
+        Ok(Tessellation { vertices: self.points, parameters, triangles, deviation })
     }
 }
 

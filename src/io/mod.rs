@@ -4,6 +4,7 @@ pub mod apt_cl;
 pub mod atomic;
 pub mod exr;
 pub mod gcode;
+pub mod nurbs_json;
 pub mod png;
 mod program_text;
 pub mod scene;

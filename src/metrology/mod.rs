@@ -19,23 +19,21 @@ pub use figures::{
 };
 pub use path::path_figures;
 
-use std::collections::HashMap;
-
 use crate::cutter::Cutter;
 use crate::geometry::{Point2, Point3};
 use crate::monitor::{self, Cancelled, Monitor};
 use crate::part::{Part, SurfaceGrid};
-use crate::sim::{Envelope, Grid, ZMap};
+use crate::sim::{Envelope, Grid, NOT_CUT, ZMap};
 use crate::toolpath::Toolpath;
 use cut_surface::CutSurface;
 use regions::connected;
-use ridges::{NUMERICAL_FLOOR, RidgeFinder, RidgeSample, scallop_figures};
+use ridges::{NUMERICAL_FLOOR, RidgeFinder, RidgeSample, reaches, scallop_figures};
 
 /// Regions listed one by one in the figures; the rest is counted.
 const LISTED_REGIONS: usize = 20;
 
-/// A region counts as a scallop, not as uncut, when no cell in it rises above its highest ridge by
-/// more than this share: cells are lower than the ridge between them.
+/// A place above the uncut tolerance is a scallop, or half of one on the part's border, when a pass
+/// came down to the design there and no cell rises above the highest ridge by more than this share.
 const RIDGE_IS_TOP: f64 = 1e-3;
 
 /// What is measured at one cell.
@@ -100,9 +98,9 @@ impl Inspection<'_> {
                         return off;
                     }
                     let centre = self.grid.centre(i, j);
-                    let p = Point3::new(centre.x, centre.y, z);
+                    let p = Point3::new(centre.x, centre.y, design.z);
                     self.surface
-                        .along_normal(&p, &normal)
+                        .along_normal(&p, &design.normal)
                         .map_or(off, |d| Sample { deviation: d.distance as f32, slope: d.slope as f32 })
                 })
                 .collect();
@@ -204,23 +202,26 @@ impl Inspection<'_> {
         best
     }
 
+    /// True where the pass that cut cell `k` came down to the design.
+    fn reached(&self, k: usize, height: f64) -> bool {
+        let by = self.surface.cut.cut_by[k];
+        let (design, centre) =
+            (&self.design.samples[k], self.grid.centre(k % self.grid.nx, k / self.grid.nx));
+        let at = Point3::new(centre.x, centre.y, design.z) + design.normal * height;
+        let cut = self.surface.normal(by, at.x, at.y);
+        by != NOT_CUT && reaches(self.part, self.cutter, self.limits, &at, &cut, &design.normal)
+    }
+
     fn uncut(&self, samples: &[Sample], ridges: &[RidgeSample], measured_area: f64) -> UncutFigures {
         let high = |k: usize| f64::from(samples[k].deviation) > self.limits.uncut;
-        let mut ridge_over: HashMap<u32, f64> = HashMap::new();
-        for ridge in ridges.iter().filter(|r| r.height > self.limits.uncut) {
-            for k in ridge.cells {
-                let highest = ridge_over.entry(k).or_insert(0.0);
-                *highest = highest.max(ridge.height);
-            }
-        }
+        let highest_ridge = ridges.iter().map(|r| r.height).fold(0.0, f64::max);
         let mut figures = UncutFigures { error_bound_mm: NUMERICAL_FLOOR, ..Default::default() };
         let mut possible = 0.0f64;
         for region in connected(&self.grid, &high) {
             let height = |k: usize| f64::from(samples[k].deviation);
             let Some(&highest) = least_by(&region, |k| -height(k)) else { continue };
             let top = height(highest as usize);
-            let ridge = region.iter().filter_map(|k| ridge_over.get(k)).copied().fold(0.0, f64::max);
-            if top <= ridge * (1.0 + RIDGE_IS_TOP) {
+            if top <= highest_ridge * (1.0 + RIDGE_IS_TOP) && self.reached(highest as usize, top) {
                 continue;
             }
             let mut area = 0.0;

@@ -30,8 +30,6 @@ pub(super) struct RidgeSample {
     pub length: f64,
     /// How much higher the ridge may be before the next grid line, mm (first order).
     pub rise: f64,
-    /// The cells on both sides.
-    pub cells: [u32; 2],
 }
 
 /// Two moves of one pass that lie farther apart along the path than this many cutter radii are
@@ -225,7 +223,8 @@ impl<'a> RidgeFinder<'a> {
         let [m, n] = moves.map(|by| self.surface.normal(by, q.x, q.y));
         // Where a pass does not come down to the design there is no scallop but material that no
         // pass reached; a high scallop alone does not mean that.
-        if height > self.limits.uncut && ![m, n].iter().any(|cut| self.reaches(&at, cut, &foot.normal)) {
+        let reached = |cut: &Vector3| reaches(self.part, self.cutter, self.limits, &at, cut, &foot.normal);
+        if height > self.limits.uncut && !reached(&m) && !reached(&n) {
             return None;
         }
         let tangent = m.cross(&n).try_normalize(1e-15)?;
@@ -243,16 +242,22 @@ impl<'a> RidgeFinder<'a> {
             at,
             length: pitch * share / plan,
             rise: tangent.dot(&foot.normal).abs() * 0.5 * reach,
-            cells: line.cells,
         })
     }
+}
 
-    /// True when the cutter that cut `at` with normal `cut` touches the design nearby: its deepest
-    /// point against the design normal lies within the uncut tolerance of the design.
-    fn reaches(&self, at: &Point3, cut: &Vector3, design: &Vector3) -> bool {
-        let deepest = at + (cut - design) * self.cutter.corner_radius();
-        self.part.closest_point(&deepest).1 <= self.limits.uncut
-    }
+/// True when the cutter that cut the point `at` with the normal `cut` touches the design nearby: its
+/// deepest point against the design normal `design` lies within the uncut tolerance of the part.
+pub(super) fn reaches(
+    part: &Part,
+    cutter: &Cutter,
+    limits: &Limits,
+    at: &Point3,
+    cut: &Vector3,
+    design: &Vector3,
+) -> bool {
+    let deepest = at + (cut - design) * cutter.corner_radius();
+    part.closest_point(&deepest).1 <= limits.uncut
 }
 
 /// Figures of all ridge samples.
@@ -276,7 +281,8 @@ pub(super) fn scallop_figures(samples: &[RidgeSample], limits: &Limits) -> Scall
             })
             .map_or(highest.height, |s| s.0)
     };
-    let over: f64 = samples.iter().filter(|s| s.height > limits.scallop).map(|s| s.length).sum();
+    // From 0.0, since an empty sum is -0.0.
+    let over = samples.iter().filter(|s| s.height > limits.scallop).fold(0.0, |sum, s| sum + s.length);
     let possible = samples.iter().map(|s| s.height + s.rise).fold(f64::NEG_INFINITY, f64::max);
     figures.max_mm = Some(highest.height);
     figures.max_at_mm = Some(highest.at.into());

@@ -38,12 +38,6 @@ pub enum PartError {
     /// The triangles do not make a mesh.
     #[error("the tessellated patches do not make a mesh: {0}")]
     Mesh(#[from] MeshError),
-    /// The mesh left out triangles, so that parameters no longer belong to corners.
-    #[error(
-        "{0} triangles of the tessellated patches are too small to be told from points; \
-         use a greater tessellation tolerance"
-    )]
-    TinyTriangles(usize),
 }
 
 /// The tessellation tolerance that suits patches, mm: 5 µm, less for parts below 50 mm across.
@@ -92,7 +86,7 @@ impl Part {
     /// A part that is made of patches. `tessellation_tolerance`, mm, bounds the distance between the
     /// search mesh and the patches; [`default_tessellation_tolerance`] suits unless the mesh itself is
     /// used. A patch whose area-weighted mean normal points down is turned over (its outward
-    /// normal is then `dv × du`).
+    /// normal is then `dv × du`), and patches that share their border points agree on the side.
     ///
     /// # Errors
     /// See [`PartError`].
@@ -110,16 +104,23 @@ impl Part {
                 return Err(PartError::TooManyTriangles(all.triangles.len()));
             }
         }
-        let given = all.triangles.len();
-        let (mesh, repairs) = TriangleMesh::new(all.vertices, all.triangles)?;
-        if mesh.triangles().len() != given {
-            return Err(PartError::TinyTriangles(given - mesh.triangles().len()));
+        let (mesh, repairs, sources) = TriangleMesh::with_sources(all.vertices, all.triangles)?;
+        let corners: Vec<[[f64; 2]; 3]> =
+            sources.iter().map(|c| c.map(|i| all.parameters[i as usize])).collect();
+        let patch_of = |c: &[u32; 3]| all.first_vertex.partition_point(|&first| first <= c[0]) - 1;
+        // The mesh keeps the order of its triangles, so those of a patch follow each other.
+        let first_triangle: Vec<u32> =
+            (0..patches.len()).map(|p| sources.partition_point(|c| patch_of(c) < p) as u32).collect();
+        // The mesh has the last word on what is outside: it also knows how patches are joined.
+        let mut turned = vec![0.0; patches.len()];
+        for (source, [p, q, r]) in sources.iter().zip(&corners) {
+            turned[patch_of(source)] += (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
         }
         Ok(Self {
             patches,
-            signs: all.signs,
-            first_triangle: all.first_triangle,
-            corners: all.corners,
+            signs: turned.into_iter().map(|area| if area < 0.0 { -1.0 } else { 1.0 }).collect(),
+            first_triangle,
+            corners,
             bvh: Bvh::new(&mesh),
             mesh,
             deviation: all.deviation,
@@ -128,20 +129,21 @@ impl Part {
     }
 }
 
-/// The tessellations of all patches, one after the other, all facing up.
+/// The tessellations of all patches, one after the other, each facing up.
 #[derive(Default)]
 struct Gathered {
     vertices: Vec<Point3>,
+    /// Parameters of each vertex.
+    parameters: Vec<[f64; 2]>,
     triangles: Vec<[u32; 3]>,
-    corners: Vec<[[f64; 2]; 3]>,
-    first_triangle: Vec<u32>,
-    signs: Vec<f64>,
+    /// Where each patch's vertices begin.
+    first_vertex: Vec<u32>,
     deviation: f64,
 }
 
 impl Gathered {
     fn add(&mut self, t: Tessellation) {
-        let first_vertex = self.vertices.len() as u32;
+        let first = self.vertices.len() as u32;
         let doubled_area: Vector3 = t
             .triangles
             .iter()
@@ -150,16 +152,12 @@ impl Gathered {
                 (b - a).cross(&(c - a))
             })
             .sum();
-        let sign = if doubled_area.z < 0.0 { -1.0 } else { 1.0 };
-        self.first_triangle.push(self.triangles.len() as u32);
-        self.signs.push(sign);
+        let up = doubled_area.z >= 0.0;
+        let turn = |[a, b, c]: [u32; 3]| if up { [a, b, c] } else { [a, c, b] };
+        self.first_vertex.push(first);
+        self.triangles.extend(t.triangles.into_iter().map(|c| turn(c).map(|i| i + first)));
         self.vertices.extend(t.vertices);
-        for ([a, b, c], [p, q, r]) in t.triangles.into_iter().zip(t.corner_parameters) {
-            let (triangle, corners) =
-                if sign > 0.0 { ([a, b, c], [p, q, r]) } else { ([a, c, b], [p, r, q]) };
-            self.triangles.push(triangle.map(|i| i + first_vertex));
-            self.corners.push(corners);
-        }
+        self.parameters.extend(t.parameters);
         self.deviation = self.deviation.max(t.deviation);
     }
 }

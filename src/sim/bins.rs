@@ -220,6 +220,25 @@ mod tests {
         }
     }
 
+    /// More moves than one chunk holds: the pieces join in the order of the moves.
+    #[test]
+    fn chunks_join_in_order() {
+        let grid = Grid { origin: Point2::new(0.5, 0.5), cell: 1.0, nx: 20, ny: 12 };
+        let mut rng = crate::sim::scenes::Rng::new(4);
+        let tips = (0..150_000).map(|_| Point3::new(rng.within(-2.0, 22.0), rng.within(-2.0, 14.0), 0.0));
+        let near = |tip: Point3, k: usize| Point3::new(tip.x + 0.01 * (k % 7) as f64, tip.y, 0.0);
+        let path = path_through(tips.enumerate().flat_map(|(k, tip)| [tip, near(tip, k)]).take(150_000));
+        assert!(path.len() > 2 * CHUNK_MOVES);
+        let bins = MoveBins::new(&grid, 4, 0.5, &path);
+        let mut expected = vec![Vec::new(); 15];
+        for (k, (a, b, _)) in path.segments().enumerate() {
+            bins.layout.visit(0.5, a, b, |bin| expected[bin].push(k as u32));
+        }
+        for (bin, expected) in expected.iter().enumerate() {
+            assert_eq!(bins.of_bin(bin % 5, bin / 5), expected);
+        }
+    }
+
     #[test]
     fn a_long_diagonal_enters_few_bins() {
         let grid = Grid { origin: Point2::new(0.5, 0.5), cell: 1.0, nx: 100, ny: 100 };

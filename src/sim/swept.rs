@@ -107,7 +107,7 @@ impl Touch {
     fn normal(&self, track: &Track) -> Vector3 {
         let (along, across, up) = match self.by {
             Part::Profile(sine, cosine) => {
-                let rho = self.along.hypot(self.across);
+                let rho = (self.along * self.along + self.across * self.across).sqrt();
                 let level = if rho > 0.0 { sine / rho } else { 0.0 };
                 (level * self.along, level * self.across, cosine)
             }
@@ -170,7 +170,8 @@ pub(super) fn ball_height(track: &Track, radius: f64, along: f64, across: f64) -
 fn ball_touch(track: &Track, radius: f64, along: f64, across: f64) -> Option<Touch> {
     let place = ball_place(track, radius, along, across);
     let ahead = along - place.sigma;
-    let by = Part::Profile(ahead.hypot(across) / radius, place.depth / radius);
+    let rho = (ahead * ahead + across * across).sqrt();
+    let by = Part::Profile(rho / radius, place.depth / radius);
     place.inside.then(|| Touch {
         height: ball_height(track, radius, along, across),
         along: ahead,

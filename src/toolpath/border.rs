@@ -27,16 +27,15 @@ impl<'a> Border<'a> {
         let tolerance = ON_BORDER * (part.bounds().diagonal() + 1.0);
         let mut edges = HashMap::new();
         if part.patches().is_empty() {
-            let mut count: HashMap<[u32; 2], u32> = HashMap::new();
-            let sides = |t: &[u32; 3]| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
-            let key = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
-            for side in mesh.triangles().iter().flat_map(sides) {
-                *count.entry(key(side)).or_default() += 1;
-            }
             let mut at_vertex: HashMap<u32, Vec<[Point3; 2]>> = HashMap::new();
-            for (side, _) in count.iter().filter(|(_, n)| **n == 1) {
-                let ends = side.map(|i| mesh.vertices()[i as usize]);
-                side.map(|i| at_vertex.entry(i).or_default().push(ends));
+            for (t, corners) in mesh.triangles().iter().enumerate() {
+                for k in (0..3).filter(|&k| mesh.neighbour(t, k).is_none()) {
+                    let side = [corners[k], corners[(k + 1) % 3]];
+                    let ends = side.map(|i| mesh.vertices()[i as usize]);
+                    for i in side {
+                        at_vertex.entry(i).or_default().push(ends);
+                    }
+                }
             }
             for (t, corners) in mesh.triangles().iter().enumerate() {
                 let near: Vec<[Point3; 2]> =

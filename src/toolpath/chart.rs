@@ -164,19 +164,32 @@ impl<'a> Chart<'a> {
         (0..n * n).map(move |k| [at(u0, u1, k % n), at(v0, v1, k / n)])
     }
 
-    /// Plan-view outline of the chart's border moved out to where a ball's centre is when it
-    /// touches there: the extreme values of `x·e` over all contacts.
-    pub fn extent_of_centres(&self, cutter: &Cutter, e: &Vector2) -> [f64; 2] {
+    /// Least and greatest `x·e` over the plan views of all places where the centre of the cutter's
+    /// corner circle can be when it touches the chart. On a mesh the triangles themselves answer:
+    /// the fitted surface has no creases.
+    pub fn extent_of_centres(&self, part: &Part, cutter: &Cutter, e: &Vector2) -> [f64; 2] {
         const N: usize = 200;
         let [[u0, u1], [v0, v1]] = self.domain;
         let at = |lo: f64, hi: f64, k: usize| lo + (hi - lo) * k as f64 / N as f64;
         let reach = cutter.corner_radius();
         let mut extent = [f64::INFINITY, f64::NEG_INFINITY];
+        let mut include = |p: &Point3, n: &Vector3| {
+            let x = p.coords.xy().dot(e) + reach * n.xy().dot(e);
+            extent = [extent[0].min(x), extent[1].max(x)];
+        };
+        if let Source::Heights(_) = self.source {
+            let mesh = part.mesh();
+            for t in 0..mesh.triangles().len() {
+                let normal = mesh.normal(t);
+                if normal.z > 0.0 {
+                    mesh.corners(t).iter().for_each(|corner| include(corner, &normal));
+                }
+            }
+            return extent;
+        }
         for k in 0..(N + 1) * (N + 1) {
-            let (u, v) = (at(u0, u1, k % (N + 1)), at(v0, v1, k / (N + 1)));
-            if let Some(p) = self.at(u, v) {
-                let x = p.jet.p.coords.xy().dot(e) + reach * p.normal.xy().dot(e);
-                extent = [extent[0].min(x), extent[1].max(x)];
+            if let Some(p) = self.at(at(u0, u1, k % (N + 1)), at(v0, v1, k / (N + 1))) {
+                include(&p.jet.p, &p.normal);
             }
         }
         extent

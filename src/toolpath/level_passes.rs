@@ -38,6 +38,13 @@ const SAMPLES_PER_CONTROL: usize = 3;
 /// stream function is determined where it matters nowhere.
 const LEAST_WEIGHT: f64 = 0.02;
 
+/// A pass never runs on over the border farther than this many intervals: one that is nearly
+/// parallel to the border has a neighbour there.
+const MOST_OVERRUN: f64 = 3.0;
+
+/// An overrun shorter than this many intervals is left out.
+const LEAST_OVERRUN: f64 = 0.05;
+
 /// Passes along isoparametric lines.
 pub fn iso_parametric(
     part: &Part,
@@ -198,6 +205,7 @@ fn place_levels(
         );
     }
     let width = (hi - lo) / STEP_BINS as f64;
+    fill_gaps(&mut least);
     let counts = cumulative_passes(&with_neighbours(&least, width, floor, hi - lo), width);
     let total = counts[STEP_BINS];
     let passes = (total - 1e-9).ceil().max(1.0);
@@ -212,6 +220,24 @@ fn place_levels(
             lo + width * (bin as f64 + (wanted - counts[bin]) / (counts[bin + 1] - counts[bin]))
         })
         .collect()
+}
+
+/// Gives bins that no sample fell into the lesser of the nearest known steps on both sides.
+fn fill_gaps(least: &mut [f64]) {
+    let mut from_below = least.to_vec();
+    for k in 1..least.len() {
+        if from_below[k].is_infinite() {
+            from_below[k] = from_below[k - 1];
+        }
+    }
+    let mut above = f64::INFINITY;
+    for k in (0..least.len()).rev() {
+        if least[k].is_infinite() {
+            least[k] = from_below[k].min(above);
+        } else {
+            above = least[k];
+        }
+    }
 }
 
 /// The least step around each bin: a step that begins or ends in a bin must suit all it passes over.
@@ -266,15 +292,47 @@ impl Guide<'_> {
             points.push(points[0]);
         }
         let last = points.len() - 1;
-        let mut locate = |s: f64| {
+        // The parameter counts traced points, which are one sampling distance apart.
+        let settings = PassSettings { sampling: 1.0, ..*self.settings };
+        let mut tips = settings.moves(0.0, last as f64, &mut |s| {
             let k = (s as usize).min(last - 1);
             let t = s - k as f64;
             let [a, b] = [points[k], points[k + 1]];
             let between = [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])];
             self.tip(self.tracer.onto_level(between, level))
+        });
+        if !curve.closed && tips.len() >= 2 {
+            let n = tips.len();
+            let mut before = self.overrun(points[0], &tips[0], &tips[1]);
+            let after = self.overrun(points[last], &tips[n - 1], &tips[n - 2]);
+            before.reverse();
+            tips = [before, tips, after].concat();
+        }
+        tips
+    }
+
+    /// Moves on from the end `tip` of a pass, away from `inner`, over the border that it meets at the
+    /// parameter `p`. A pass that meets the border at the angle φ ends half an interval over tan φ
+    /// short of where its ridge to the neighbour leaves the part.
+    fn overrun(&self, p: [f64; 2], tip: &Point3, inner: &Point3) -> Vec<Point3> {
+        let [[u0, u1], _] = self.chart.domain;
+        let (Some(here), Some([du, dv])) = (self.chart.at(p[0], p[1]), self.tracer.direction(p)) else {
+            return Vec::new();
         };
-        // The parameter counts traced points, which are one sampling distance apart.
-        let settings = PassSettings { sampling: 1.0, ..*self.settings };
-        settings.moves(0.0, last as f64, &mut locate)
+        let feed = here.jet.du * du + here.jet.dv * dv;
+        let border = if p[0] == u0 || p[0] == u1 { here.jet.dv } else { here.jet.du };
+        let (along, across) = (feed.dot(&border).abs(), feed.cross(&border).norm());
+        let interval = here.strip_width(self.cutter, &feed, self.settings.step).0;
+        let length = (0.5 * interval * along / across.max(1e-9)).min(MOST_OVERRUN * interval);
+        let away = (tip - inner).xy();
+        if length < LEAST_OVERRUN * interval || away.norm() == 0.0 {
+            return Vec::new();
+        }
+        let away = away.normalize();
+        let moves = self.settings.moves(0.0, length, &mut |s| {
+            let (x, y) = (tip.x + s * away.x, tip.y + s * away.y);
+            self.drop.at(x, y).map(|d| Point3::new(x, y, d.tip_z))
+        });
+        moves.into_iter().skip(1).collect()
     }
 }

@@ -41,7 +41,7 @@ pub fn passes(
     };
     let (along, across) = (Vector2::new(angle.cos(), angle.sin()), Vector2::new(-angle.sin(), angle.cos()));
     let extent = |e: &Vector2| {
-        let all = charts.iter().map(|c| c.extent_of_centres(cutter, e));
+        let all = charts.iter().map(|c| c.extent_of_centres(part, cutter, e));
         all.fold([f64::INFINITY, f64::NEG_INFINITY], |a, b| [a[0].min(b[0]), a[1].max(b[1])])
     };
     let (from_to, sides) = (extent(&along), extent(&across));
@@ -102,6 +102,21 @@ fn safe_stepover(charts: &[Chart], cutter: &Cutter, angle: f64, h: f64, notes: &
     LEAST_OVER_PLANE * plane
 }
 
+/// A roll over the border at the end of a pass that is shorter than this many overruns belongs to
+/// a pass that crosses the border at more than about 45°.
+const SQUARE_CROSSING: f64 = 1.5;
+
+/// How the cutter stands on the part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Contact {
+    /// It touches surface.
+    Inside,
+    /// It touches the border and has rolled over it by no more than the overrun.
+    Rolling,
+    /// It has rolled farther, or does not touch the part.
+    Off,
+}
+
 /// One family of parallel vertical planes.
 struct Line<'a> {
     drop: DropCutter<'a>,
@@ -124,16 +139,12 @@ impl Line<'_> {
         self.drop_at(offset, s).map(|(xy, d)| Point3::new(xy.x, xy.y, d.tip_z))
     }
 
-    /// True where the cutter cuts surface: it touches inside the border, or has not rolled over it
-    /// by more than the overrun.
-    fn on_part(&self, offset: f64, s: f64) -> bool {
-        let Some((xy, drop)) = self.drop_at(offset, s) else { return false };
-        if !self.border.holds(&drop.contact) {
-            return true;
-        }
+    /// How the cutter stands at `s`.
+    fn contact(&self, offset: f64, s: f64) -> Contact {
+        let Some((xy, drop)) = self.drop_at(offset, s) else { return Contact::Off };
         let rc = self.cutter.corner_radius();
-        if rc == 0.0 {
-            return true;
+        if rc == 0.0 || !self.border.holds(&drop.contact) {
+            return Contact::Inside;
         }
         // Direction from the contact to the centre of the corner's circle, against the normal.
         let out = xy - drop.contact.point.coords.xy();
@@ -141,46 +152,80 @@ impl Line<'_> {
         let lean = ((rho - self.cutter.flat_radius()).max(0.0) / rc).min(1.0);
         let horizontal = if rho > 0.0 { out * (lean / rho) } else { out };
         let toward = nalgebra::Vector3::new(horizontal.x, horizontal.y, (1.0 - lean * lean).sqrt());
-        (toward - drop.contact.normal).norm() * rc <= self.overrun
+        let rolled = (toward - drop.contact.normal).norm() * rc;
+        if rolled <= END_PRECISION {
+            Contact::Inside
+        } else if rolled <= self.overrun {
+            Contact::Rolling
+        } else {
+            Contact::Off
+        }
     }
 
-    /// The runs of the line at `offset` on which the cutter cuts surface, as moves.
+    /// The runs of the line at `offset` on which the cutter cuts surface, as moves. Each run is made
+    /// of stretches inside the part and stretches that roll along its border.
     fn pieces(&self, offset: f64, [s0, s1]: [f64; 2]) -> Vec<Vec<Point3>> {
         let count = ((s1 - s0) / self.settings.sampling).ceil().max(1.0) as usize;
         let at = |k: usize| s0 + (s1 - s0) * k as f64 / count as f64;
-        let on: Vec<bool> = (0..=count).map(|k| self.on_part(offset, at(k))).collect();
-        let mut pieces = Vec::new();
-        let mut k = 0;
-        while k <= count {
-            if !on[k] {
-                k += 1;
-                continue;
+        let mut stretches: Vec<(Contact, f64, f64)> = Vec::new();
+        let mut before = (s0, self.contact(offset, s0));
+        let mut start = s0;
+        for k in 1..=count {
+            let s = at(k);
+            let now = self.contact(offset, s);
+            // Several changes may lie between two samples; each is located in turn.
+            while before.1 != now {
+                let (end, next) = self.change(offset, before, s);
+                stretches.push((before.1, start, end));
+                (before, start) = ((next, self.contact(offset, next)), end);
             }
-            let first = k;
-            while k < count && on[k + 1] {
-                k += 1;
-            }
-            let start = if first == 0 { at(0) } else { self.end(offset, at(first), at(first - 1)) };
-            let end = if k == count { at(count) } else { self.end(offset, at(k), at(k + 1)) };
-            if end - start > END_PRECISION {
-                let points = self.settings.moves(start, end, &mut |s| self.tip(offset, s));
-                pieces.push(points);
-            }
-            k += 1;
+            before = (s, now);
         }
-        pieces
+        stretches.push((before.1, start, s1));
+        let runs = stretches.split(|(contact, ..)| *contact == Contact::Off);
+        runs.map(|run| self.moves(offset, self.without_square_ends(run))).filter(|p| p.len() >= 2).collect()
     }
 
-    /// The last place on the part between `on` (on it) and `off` (off it).
-    fn end(&self, offset: f64, mut on: f64, mut off: f64) -> f64 {
-        while (on - off).abs() > END_PRECISION {
-            let middle = 0.5 * (on + off);
-            if self.on_part(offset, middle) {
-                on = middle;
+    /// A run without a short roll at either end: there the pass crosses the border squarely, and
+    /// its end on the border is enough.
+    fn without_square_ends<'s>(&self, mut run: &'s [(Contact, f64, f64)]) -> &'s [(Contact, f64, f64)] {
+        let short = |(contact, a, b): &(Contact, f64, f64)| {
+            *contact == Contact::Rolling && b - a < SQUARE_CROSSING * self.overrun
+        };
+        if run.len() > 1 && run.first().is_some_and(short) {
+            run = &run[1..];
+        }
+        if run.len() > 1 && run.last().is_some_and(short) {
+            run = &run[..run.len() - 1];
+        }
+        run
+    }
+
+    fn moves(&self, offset: f64, run: &[(Contact, f64, f64)]) -> Vec<Point3> {
+        let mut points: Vec<Point3> = Vec::new();
+        for &(_, a, b) in run.iter().filter(|(_, a, b)| b - a > END_PRECISION) {
+            let stretch = self.settings.moves(a, b, &mut |s| self.tip(offset, s));
+            let joined = usize::from(!points.is_empty());
+            points.extend(stretch.into_iter().skip(joined));
+        }
+        points
+    }
+
+    /// Where the contact changes from what it is at `before` on the way to `s`: the last place that
+    /// is as before, and the first known one that is not.
+    fn change(&self, offset: f64, before: (f64, Contact), s: f64) -> (f64, f64) {
+        let (mut same, mut other) = (before.0, s);
+        while other - same > 0.5 * END_PRECISION {
+            let middle = 0.5 * (same + other);
+            if middle <= same || middle >= other {
+                break;
+            }
+            if self.contact(offset, middle) == before.1 {
+                same = middle;
             } else {
-                off = middle;
+                other = middle;
             }
         }
-        on
+        (same, other)
     }
 }

@@ -24,7 +24,10 @@ fn the_scallop_of_a_plane_does_not_depend_on_the_cell() {
         for cell in [0.05, 0.1, 0.2] {
             let m = plan_and_measure(&part, &cutter, ZIGZAG, Step::Stepover(s), cell);
             let [max, p50] = [m.scallop.max_mm.unwrap(), m.scallop.p50_mm.unwrap()];
-            println!("plane r={} s={s} cell={cell}: max {max:.7} p50 {p50:.7} exact {exact:.7}", 0.5 * diameter);
+            println!(
+                "plane r={} s={s} cell={cell}: max {max:.7} p50 {p50:.7} exact {exact:.7}",
+                0.5 * diameter
+            );
             assert!(off(max, exact) < 1e-3 && off(p50, exact) < 1e-3, "cell {cell}: {max} {p50} {exact}");
             assert!(m.scallop.error_bound_mm.unwrap() < 1e-3 * exact);
             assert!(m.gouge.max_depth_mm <= 1e-6 && m.uncut.region_count == 0);
@@ -61,7 +64,10 @@ fn cylinders_follow_the_exact_row() {
         let kappa = if concave { 1.0 / rho } else { -1.0 / rho };
         let exact = ball_scallop_height(r, kappa, interval).unwrap();
         let p50 = m.scallop.p50_mm.unwrap();
-        println!("cylinder concave={concave}: p50 {p50:.7} max {:.7} exact {exact:.7}", m.scallop.max_mm.unwrap());
+        println!(
+            "cylinder concave={concave}: p50 {p50:.7} max {:.7} exact {exact:.7}",
+            m.scallop.max_mm.unwrap()
+        );
         assert!(off(p50, exact) < 5e-3, "{p50} {exact}");
         assert!(off(m.scallop.max_mm.unwrap(), exact) < 5e-3);
     }
@@ -113,13 +119,33 @@ fn figures_of_a_curved_part_stay_within_their_bounds_as_the_cell_shrinks() {
     let figures = [0.2, 0.1, 0.05, 0.025].map(|cell| {
         let m = plan_and_measure(&part, &cutter, strategy, Step::Stepover(0.5), cell);
         let s = &m.scallop;
-        (s.max_mm.unwrap(), s.error_bound_mm.unwrap(), s.p50_mm.unwrap(), m.gouge.max_depth_mm, m.gouge.error_bound_mm)
+        (
+            s.max_mm.unwrap(),
+            s.error_bound_mm.unwrap(),
+            s.p50_mm.unwrap(),
+            m.gouge.max_depth_mm,
+            m.gouge.error_bound_mm,
+        )
     });
     let finest = figures[3];
     for (cell, f) in [0.2, 0.1, 0.05].into_iter().zip(figures) {
-        println!("cell {cell}: max {:.4} ± {:.4} um (finest {:.4}), p50 {:.4}, gouge {:.4} ± {:.4}", 1e3 * f.0, 1e3 * f.1, 1e3 * finest.0, 1e3 * f.2, 1e3 * f.3, 1e3 * f.4);
-        assert!(finest.0 - f.0 <= f.1 && f.0 - finest.0 <= finest.1, "scallop at cell {cell}: {f:?} {finest:?}");
-        assert!(finest.3 - f.3 <= f.4 && f.3 - finest.3 <= finest.4, "gouge at cell {cell}: {f:?} {finest:?}");
+        println!(
+            "cell {cell}: max {:.4} ± {:.4} um (finest {:.4}), p50 {:.4}, gouge {:.4} ± {:.4}",
+            1e3 * f.0,
+            1e3 * f.1,
+            1e3 * finest.0,
+            1e3 * f.2,
+            1e3 * f.3,
+            1e3 * f.4
+        );
+        assert!(
+            finest.0 - f.0 <= f.1 && f.0 - finest.0 <= finest.1,
+            "scallop at cell {cell}: {f:?} {finest:?}"
+        );
+        assert!(
+            finest.3 - f.3 <= f.4 && f.3 - finest.3 <= finest.4,
+            "gouge at cell {cell}: {f:?} {finest:?}"
+        );
         assert!(off(f.2, finest.2) < 0.01, "median at cell {cell}: {f:?} {finest:?}");
     }
     assert!(figures[2].1 < figures[0].1, "the bound shrinks with the cell");

@@ -10,7 +10,9 @@ use crate::support::{LIMITS, cut_and_measure, formula, mesh, off, plan_and_measu
 /// A symmetric groove along y with walls that rise at `angle` from the line x = 0.
 fn groove(angle: f64, half_width: f64, length: f64) -> millstream::part::Part {
     let z = half_width * angle.tan();
-    let row = |y: f64| [[-half_width, y, z], [0.0, y, 0.0], [half_width, y, z]].map(|p| Point3::new(p[0], p[1], p[2]));
+    let row = |y: f64| {
+        [[-half_width, y, z], [0.0, y, 0.0], [half_width, y, z]].map(|p| Point3::new(p[0], p[1], p[2]))
+    };
     let vertices = [row(0.0), row(length)].concat();
     mesh(vertices, vec![[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]])
 }
@@ -22,13 +24,20 @@ fn a_ball_leaves_the_corner_of_a_groove_uncut_as_geometry_says() {
     let cutter = Cutter::ball(2.0 * r).unwrap();
     let along = Strategy::Zigzag { angle: std::f64::consts::FRAC_PI_2, one_way: false };
     let cell = 0.05;
-    let m = plan_and_measure(&part, &cutter, along, Step::Stepover(0.1), cell);
+    // 75 passes over the 9 mm between the walls' ends, so that one runs in the corner itself.
+    let m = plan_and_measure(&part, &cutter, along, Step::Stepover(0.12), cell);
     // The ball touches each wall at r·tan(angle) from the corner; a wall point at distance d from
     // the corner sees the cut at r − √(r² − (contact − d)²) along its normal.
     let contact = r * angle.tan();
     let height = |d: f64| r - (r * r - (contact - d).powi(2)).sqrt();
     let nearest = 0.5 * cell / angle.cos();
-    println!("groove: uncut {:.4} ± {:.4}, closed form {:.4} to {:.4}", m.uncut.max_height_mm, m.uncut.error_bound_mm, height(nearest), height(0.0));
+    println!(
+        "groove: uncut {:.4} ± {:.4}, closed form {:.4} to {:.4}",
+        m.uncut.max_height_mm,
+        m.uncut.error_bound_mm,
+        height(nearest),
+        height(0.0)
+    );
     assert_eq!(m.uncut.region_count, 1, "{:?}", m.uncut.regions);
     let tallest = m.uncut.max_height_mm;
     assert!(tallest <= height(0.0) + 1e-6 && tallest + m.uncut.error_bound_mm >= height(0.0), "{tallest}");
@@ -51,7 +60,8 @@ fn a_missing_pass_is_uncut_and_a_tall_scallop_is_not() {
     assert_eq!(m.uncut.region_count, 0, "{:?}", m.uncut.regions);
     // Without every pass that reaches y > 12 the rest is uncut.
     let settings = settings(&part, Step::Stepover(0.5));
-    let plan = millstream::toolpath::plan(&part, &cutter, &zigzag, &settings, &millstream::monitor::Silent).unwrap();
+    let plan =
+        millstream::toolpath::plan(&part, &cutter, &zigzag, &settings, &millstream::monitor::Silent).unwrap();
     let mut path = plan.path;
     path.moves.retain(|m| m.to.tip.y < 12.0);
     let m = cut_and_measure(&part, &cutter, &path, 0.1, &LIMITS);
@@ -60,7 +70,10 @@ fn a_missing_pass_is_uncut_and_a_tall_scallop_is_not() {
     let last = path.moves.iter().map(|m| m.to.tip.y).fold(0.0, f64::max);
     let bare = 20.0 - last - (9.0f64 - 2.95 * 2.95).sqrt();
     assert!(off(m.uncut.area_mm2, 20.0 * bare) < 0.02, "{} {}", m.uncut.area_mm2, 20.0 * bare);
-    assert!(off(m.scallop.max_mm.unwrap(), 3.0 - (9.0f64 - 0.0625).sqrt()) < 1e-6, "scallops elsewhere as before");
+    assert!(
+        off(m.scallop.max_mm.unwrap(), 3.0 - (9.0f64 - 0.0625).sqrt()) < 1e-6,
+        "scallops elsewhere as before"
+    );
 }
 
 #[test]

@@ -34,7 +34,13 @@ pub fn settings(part: &Part, step: Step) -> PlanSettings {
 }
 
 /// Cuts a path out of a block around the part and measures.
-pub fn cut_and_measure(part: &Part, cutter: &Cutter, path: &Toolpath, cell: f64, limits: &Limits) -> Measurement {
+pub fn cut_and_measure(
+    part: &Part,
+    cutter: &Cutter,
+    path: &Toolpath,
+    cell: f64,
+    limits: &Limits,
+) -> Measurement {
     let bounds = part.bounds();
     let grid = Grid::covering(&bounds, cell, 64, 1 << 32).unwrap();
     let stock = ZMap::block(grid, bounds.max.z + ALLOWANCE);
@@ -42,7 +48,13 @@ pub fn cut_and_measure(part: &Part, cutter: &Cutter, path: &Toolpath, cell: f64,
     measure(part, cutter, path, &cut, limits, &Silent).unwrap()
 }
 
-pub fn plan_and_measure(part: &Part, cutter: &Cutter, strategy: Strategy, step: Step, cell: f64) -> Measurement {
+pub fn plan_and_measure(
+    part: &Part,
+    cutter: &Cutter,
+    strategy: Strategy,
+    step: Step,
+    cell: f64,
+) -> Measurement {
     let plan = plan(part, cutter, &strategy, &settings(part, step), &Silent).unwrap();
     cut_and_measure(part, cutter, &plan.path, cell, &LIMITS)
 }

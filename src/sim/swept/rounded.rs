@@ -9,13 +9,13 @@ use crate::sim::form::Form;
 use crate::sim::track::{Track, larger};
 
 /// Steps of the iteration on the arc. Bisection alone needs 52; a smaller number would leave the
-/// slowest cases (the point almost a radius beside the track) short of full precision.
+/// slowest cases (the point almost a radius beside a steep track) short of full precision.
 const MAX_STEPS: usize = 80;
 
-/// Two sines of the profile's angle closer than this count as one. The height is at its minimum there,
-/// so the error of the height is of the order of the square; a larger value would show on tracks
-/// steeper than a million to one, a smaller one is below the rounding of the function.
-const SINE_RESOLUTION: f64 = 1.0e-14;
+/// Two places closer than this part of the radius count as one. The height is at its minimum there, so
+/// its error is of the order of the square; a larger value would show on tracks steeper than a million
+/// to one, a smaller one is below the rounding of the function.
+const RESOLUTION: f64 = 1.0e-14;
 
 /// The lowest cut of the form at the point `along` and `across` the track.
 pub(super) fn touch(form: &Form, track: &Track, along: f64, across: f64) -> Option<Touch> {
@@ -32,7 +32,7 @@ pub(super) fn touch(form: &Form, track: &Track, along: f64, across: f64) -> Opti
     }
     let beyond = along - track.length;
     if beyond > 0.0 {
-        let rho = beyond.hypot(w);
+        let rho = (beyond * beyond + w * w).sqrt();
         if rho > form.radius {
             return None;
         }
@@ -46,7 +46,7 @@ pub(super) fn touch(form: &Form, track: &Track, along: f64, across: f64) -> Opti
 
 /// The cut of the cutter that stands at `sigma`, if it reaches a point `ahead` of its axis.
 fn at_place(form: &Form, track: &Track, ahead: f64, across: f64, sigma: f64) -> Option<Touch> {
-    let rho = ahead.hypot(across);
+    let rho = (ahead * ahead + across * across).sqrt();
     if rho > form.radius {
         return None;
     }
@@ -58,7 +58,7 @@ fn at_place(form: &Form, track: &Track, ahead: f64, across: f64, sigma: f64) -> 
 /// True when the cutter at the lower end reaches the point and moving on lifts it faster than the
 /// profile falls towards the point.
 fn climbs_too_fast(form: &Form, track: &Track, along: f64, w: f64) -> bool {
-    let rho = along.hypot(w);
+    let rho = (along * along + w * w).sqrt();
     let (sine, cosine) = form.steepness(rho);
     rho <= form.radius && along * sine <= track.slope * rho * cosine
 }
@@ -67,7 +67,7 @@ fn climbs_too_fast(form: &Form, track: &Track, along: f64, w: f64) -> bool {
 fn on_track(form: &Form, track: &Track, along: f64, across: f64) -> Option<Touch> {
     let w = across.abs();
     let (ahead, edge) = stationary(form, track.slope, w);
-    let rho = edge.unwrap_or_else(|| ahead.hypot(w).min(form.radius));
+    let rho = edge.unwrap_or_else(|| (ahead * ahead + w * w).sqrt().min(form.radius));
     let sigma = (along - ahead).clamp(0.0, track.length);
     let by = edge.map_or_else(
         || {
@@ -97,44 +97,44 @@ fn stationary(form: &Form, slope: f64, w: f64) -> (f64, Option<f64>) {
     if form.corner == 0.0 {
         return (ahead_at(form.flat), Some(form.flat));
     }
-    (ahead_at(form.flat + form.corner * arc_sine(form, slope, w)), None)
+    (arc_ahead(form, slope, w), None)
 }
 
-/// The sine g of the profile's angle at which F(g) = g·√(ρ² − w²) − m·ρ·√(1 − g²) vanishes, with
-/// ρ = e + c·g: one sign change between the inner end of the arc (or the point abeam) and its outer
-/// end. Newton steps, and bisection wherever they would leave the bracket or converge slowly.
-fn arc_sine(form: &Form, slope: f64, w: f64) -> f64 {
+/// The a at which G(a) = x·a − m·ρ·√(c² − x²) vanishes, x = ρ − e the place on the arc of radius c
+/// around e: that is f′(ρ)·a/ρ = m without its poles, with one sign change between the inner end of the
+/// arc (or the point abeam) and its outer end. Newton steps, and bisection wherever they would leave
+/// the bracket or converge slowly; four to eight steps in practice.
+fn arc_ahead(form: &Form, slope: f64, w: f64) -> f64 {
     let (flat, corner) = (form.flat, form.corner);
-    let mut low = larger((w - flat) / corner, 0.0);
-    let mut high = if form.arc_end < form.radius { form.cos_side } else { 1.0 };
+    let ahead_at = |rho: f64| larger((rho - w) * (rho + w), 0.0).sqrt();
+    let (mut low, mut high) = (ahead_at(flat), ahead_at(form.arc_end));
     // As if ρ were that of the arc's outer end: exact for w = 0, close for w small.
-    let outer = flat + corner * high;
-    let tangent = slope * outer / larger((outer - w) * (outer + w), f64::MIN_POSITIVE).sqrt();
-    let mut g = tangent / (1.0 + tangent * tangent).sqrt();
+    let tangent = slope * form.arc_end / larger(high, f64::MIN_POSITIVE);
+    let mut a = ahead_at(flat + corner * tangent / (1.0 + tangent * tangent).sqrt());
     let mut last_step = high - low;
     for _ in 0..MAX_STEPS {
-        if !(g > low && g < high) {
-            g = 0.5 * (low + high);
+        if a <= low || a >= high {
+            a = 0.5 * (low + high);
         }
-        let rho = flat + corner * g;
-        let root = larger((rho - w) * (rho + w), 0.0).sqrt();
-        let cosine = ((1.0 - g) * (1.0 + g)).sqrt();
-        let value = g * root - slope * rho * cosine;
+        let rho = (a * a + w * w).sqrt();
+        let x = rho - flat;
+        let level = larger((corner - x) * (corner + x), 0.0).sqrt();
+        let value = x * a - slope * rho * level;
         if value < 0.0 {
-            low = g
+            low = a;
         } else {
-            high = g
+            high = a;
         }
-        let rate = root + g * rho * corner / root - slope * (corner * cosine - rho * g / cosine);
-        let step = value / rate;
-        let newton = g - step;
-        let useful = newton > low && newton < high && step.abs() < 0.5 * last_step;
-        let next = if useful { newton } else { 0.5 * (low + high) };
-        last_step = (next - g).abs();
-        g = next;
-        if last_step <= SINE_RESOLUTION || high - low <= SINE_RESOLUTION {
+        let share = a / rho;
+        let step = value / (share * a + x - slope * (share * level - a * x / level));
+        let newton = a - step;
+        if step.abs() <= RESOLUTION * form.radius || high - low <= RESOLUTION * form.radius {
             break;
         }
+        let useful = newton > low && newton < high && step.abs() < 0.5 * last_step;
+        let next = if useful { newton } else { 0.5 * (low + high) };
+        last_step = (next - a).abs();
+        a = next;
     }
-    g
+    a
 }

@@ -174,7 +174,7 @@ fn closed_forms() {
 fn ends_are_continuous() {
     for cutter in cutters() {
         let swept = SweptMove::new(&cutter, Point3::origin(), Point3::new(1.0, 0.5, 0.4));
-        let mut last = None;
+        let mut last: Option<(f64, Vector3)> = None;
         for k in 0..40_000 {
             let x = -3.5 + 2e-4 * f64::from(k);
             let now = swept.height_and_normal(x, 0.3);
