@@ -1,7 +1,8 @@
 //! The part of a scene, from its file or its formula.
 
 use super::error::CliError;
-use crate::io::scene::{PartSource, Scene};
+use crate::io::nurbs_json;
+use crate::io::scene::{NamedFile, PartSource, Scene, SceneError};
 use crate::part::{Part, PartError, Patch, default_tessellation_tolerance};
 
 /// Loads the part. The notes tell what was mended to make it usable.
@@ -10,13 +11,27 @@ use crate::part::{Part, PartError, Patch, default_tessellation_tolerance};
 /// [`CliError`] when the part is refused; a file's fault is shown at its name in the scene.
 pub fn load_part(scene: &Scene) -> Result<(Part, Vec<String>), CliError> {
     match &scene.part {
-        PartSource::Formula { surface } => Ok((of_patch(Patch::Analytic(*surface))?, Vec::new())),
-        _ => todo!(),
+        PartSource::Formula { surface } => Ok((of_patches(vec![Patch::Analytic(*surface)])?, Vec::new())),
+        PartSource::Nurbs { file } => {
+            let patches = nurbs_json::read(&file.path).map_err(|e| refused(scene, file, &e))?;
+            let part = of_patches(patches.into_iter().map(Patch::Nurbs).collect())
+                .map_err(|e| refused(scene, file, &e))?;
+            Ok((part, Vec::new()))
+        }
+        PartSource::Mesh { .. } => todo!(),
     }
 }
 
-fn of_patch(patch: Patch) -> Result<Part, PartError> {
-    let patches = vec![patch];
+fn of_patches(patches: Vec<Patch>) -> Result<Part, PartError> {
     let tolerance = default_tessellation_tolerance(&patches);
     Part::from_patches(patches, tolerance)
+}
+
+/// A file's fault, shown at its name in the scene.
+fn refused(scene: &Scene, file: &NamedFile, fault: &dyn std::error::Error) -> SceneError {
+    scene.source.error(
+        file.span.clone(),
+        format!("the part's file cannot be used: {fault}"),
+        "mend that file or name another one",
+    )
 }
