@@ -14,6 +14,7 @@ mod tessellate;
 pub use aabb::Aabb;
 pub use analytic::{AnalyticError, AnalyticShape, AnalyticSurface, HeightJet, MAX_SLOPE};
 pub use bspline::{KnotError, KnotVector, MAX_BASIS, MAX_DEGREE};
+pub(crate) use bvh::{Feature, Node};
 pub use bvh::{Bvh, MeshFoot, VerticalHit};
 pub use jet::{Jet2, PrincipalCurvatures};
 pub use mesh::{MeshError, RepairNotes, TriangleMesh};
