@@ -13,12 +13,14 @@ pub fn load_part(scene: &Scene) -> Result<(Part, Vec<String>), CliError> {
     match &scene.part {
         PartSource::Formula { surface } => Ok((of_patches(vec![Patch::Analytic(*surface)])?, Vec::new())),
         PartSource::Nurbs { file } => {
-            let patches = nurbs_json::read(&file.path).map_err(|e| refused(scene, file, &e))?;
+            let patches = nurbs_json::read(&file.path).map_err(|e| refused(scene, file, e))?;
             let part = of_patches(patches.into_iter().map(Patch::Nurbs).collect())
-                .map_err(|e| refused(scene, file, &e))?;
+                .map_err(|e| refused(scene, file, e))?;
             Ok((part, Vec::new()))
         }
-        PartSource::Mesh { .. } => todo!(),
+        PartSource::Mesh { file, .. } => {
+            Err(refused(scene, file, "mesh files cannot be read by this version").into())
+        }
     }
 }
 
@@ -28,7 +30,7 @@ fn of_patches(patches: Vec<Patch>) -> Result<Part, PartError> {
 }
 
 /// A file's fault, shown at its name in the scene.
-fn refused(scene: &Scene, file: &NamedFile, fault: &dyn std::error::Error) -> SceneError {
+fn refused(scene: &Scene, file: &NamedFile, fault: impl std::fmt::Display) -> SceneError {
     scene.source.error(
         file.span.clone(),
         format!("the part's file cannot be used: {fault}"),

@@ -30,10 +30,24 @@ pub fn micrometres(length: Option<f64>) -> String {
     }
 }
 
+/// A bound of an error in micrometres, rounded up: a bound that is not zero never reads as zero.
+pub fn bound(length_mm: f64) -> String {
+    let um = length_mm * 1000.0;
+    let digits = if um >= 100.0 {
+        1.0
+    } else if um >= 10.0 {
+        10.0
+    } else {
+        100.0
+    };
+    // The hair keeps 0.25 from becoming 0.26 by rounding noise.
+    micrometres(Some((um * digits - 1e-9).ceil().max(0.0) / digits / 1000.0 + 0.0))
+}
+
 /// `value ± bound` in micrometres.
-pub fn with_bound(value: Option<f64>, bound: Option<f64>) -> String {
-    match (value, bound) {
-        (Some(_), Some(_)) => format!("{} ± {}", micrometres(value), micrometres(bound)),
+pub fn with_bound(value: Option<f64>, error_bound: Option<f64>) -> String {
+    match (value, error_bound) {
+        (Some(_), Some(error)) => format!("{} ± {}", micrometres(value), bound(error)),
         _ => micrometres(value),
     }
 }
@@ -71,6 +85,23 @@ fn toolpath_row(out: &mut String, t: &ToolpathResult) -> std::fmt::Result {
     )
 }
 
+/// Widest line, letters.
+const WIDTH: usize = 100;
+
+/// A sentence of a list, indented and broken between words.
+fn sentence(out: &mut String, text: &str) -> std::fmt::Result {
+    let mut line = String::from(" ");
+    for word in text.split_whitespace() {
+        if line.chars().count() + 1 + word.chars().count() > WIDTH {
+            writeln!(out, "{line}")?;
+            line = String::from("   ");
+        }
+        line.push(' ');
+        line.push_str(word);
+    }
+    writeln!(out, "{line}")
+}
+
 /// One row a toolpath, then what is wrong and what planners had to say, then which one is best.
 pub fn result_table(report: &RunReport) -> String {
     let mut out = String::new();
@@ -97,18 +128,18 @@ fn write_table(out: &mut String, report: &RunReport) -> std::fmt::Result {
         ],
     )?;
     row(out, ["", "", "mm", "", "µm", "µm", "µm", "%", "mm²", "µm", ""])?;
-    writeln!(out, "{}", "-".repeat(100))?;
+    writeln!(out, "{}", "-".repeat(WIDTH))?;
     report.toolpaths.iter().try_for_each(|t| toolpath_row(out, t))?;
     for t in report.toolpaths.iter().filter(|t| !t.violations.is_empty()) {
         writeln!(out, "\n{} violates:", t.name)?;
-        t.violations.iter().try_for_each(|violation| writeln!(out, "  {}", violation.text))?;
+        t.violations.iter().try_for_each(|violation| sentence(out, &violation.text))?;
     }
     for t in &report.toolpaths {
         let reason = t.scallop.reason.iter().map(|reason| format!("no scallop height: {reason}"));
         let notes: Vec<String> = t.notes.iter().cloned().chain(reason).collect();
         if !notes.is_empty() {
             writeln!(out, "\nNotes on {}:", t.name)?;
-            notes.iter().try_for_each(|note| writeln!(out, "  {note}"))?;
+            notes.iter().try_for_each(|note| sentence(out, note))?;
         }
     }
     writeln!(out, "\n{}", conclusion(report))
@@ -142,13 +173,15 @@ mod tests {
         assert_eq!(micrometres(Some(0.0098765)), "9.88");
         assert_eq!(per_cent(Some(-1e-17)), "0.0");
         assert_eq!(with_bound(Some(0.25), None), "250");
+        assert_eq!(with_bound(Some(0.0194), Some(1e-9)), "19.4 ± 0.01");
+        assert_eq!(with_bound(Some(0.0194), Some(0.01234)), "19.4 ± 12.4");
+        assert_eq!(with_bound(Some(0.0), Some(0.0)), "0.00 ± 0.00");
     }
 
     #[test]
     fn the_table_fits_into_a_hundred_columns() {
         let table = result_table(&fixture::report());
         insta::assert_snapshot!(table);
-        // Sentences may be longer; rows may not.
-        assert!(table.lines().take(6).all(|line| line.chars().count() <= 100), "{table}");
+        assert!(table.lines().all(|line| line.chars().count() <= WIDTH), "{table}");
     }
 }
