@@ -17,9 +17,7 @@ pub use build::{PartError, default_tessellation_tolerance};
 pub use patch::Patch;
 pub use sample::{GridSample, OFF_PART, SurfaceGrid};
 
-use crate::geometry::{
-    Aabb, Bvh, MeshFoot, Point3, PrincipalCurvatures, RepairNotes, TriangleMesh, Vector3, VerticalHit,
-};
+use crate::geometry::{Aabb, Bvh, MeshFoot, Point3, PrincipalCurvatures, RepairNotes, TriangleMesh, Vector3};
 
 /// Which point of which patch: patch index and parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -229,19 +227,21 @@ impl Part {
                 triangle: hit.triangle,
             });
         };
-        let meeting = self.refine_vertical(index, &hit, x, y)?;
+        let meeting =
+            self.refine_vertical(index, x, y, || self.interpolate(hit.triangle, &hit.barycentric))?;
         Some(self.on_vertical(index, hit.triangle, &meeting, x, y))
     }
 
     /// For points on the very border of a graph, which its triangles may miss by rounding.
     fn highest_graph_at(&self, x: f64, y: f64) -> Option<SurfacePoint> {
         let graphs = self.patches.iter().enumerate().filter_map(|(index, patch)| match patch {
-            Patch::Analytic(graph) if graph.covers(x, y) => Some((index, graph.height(x, y))),
+            Patch::Analytic(graph) if graph.covers(x, y) => {
+                Some((index, refine::vertical_on_graph(graph, x, y)))
+            }
             _ => None,
         });
-        let (index, z) = graphs.reduce(|a, b| if b.1 > a.1 { b } else { a })?;
-        let triangle = self.bvh.closest_point(&self.mesh, &Point3::new(x, y, z)).triangle;
-        let meeting = refine::vertical(&self.patches[index], x, y, [x, y]);
+        let (index, meeting) = graphs.reduce(|a, b| if b.1.z > a.1.z { b } else { a })?;
+        let triangle = self.bvh.closest_point(&self.mesh, &Point3::new(x, y, meeting.z)).triangle;
         Some(self.on_vertical(index, triangle, &meeting, x, y))
     }
 
@@ -262,17 +262,19 @@ impl Part {
         }
     }
 
-    /// Where the vertical line meets the exact patch that a triangle belongs to; `None` when it
-    /// passes beside by more than the deviation.
+    /// Where the vertical line meets an exact patch, searched from the parameters `start` (which graphs
+    /// do not need); `None` when it passes beside by more than the deviation.
     fn refine_vertical(
         &self,
         index: usize,
-        hit: &VerticalHit,
         x: f64,
         y: f64,
+        start: impl Fn() -> [f64; 2],
     ) -> Option<refine::VerticalMeeting> {
-        let start = self.interpolate(hit.triangle, &hit.barycentric);
-        let meeting = refine::vertical(&self.patches[index], x, y, start);
+        let meeting = match &self.patches[index] {
+            Patch::Analytic(graph) => refine::vertical_on_graph(graph, x, y),
+            Patch::Nurbs(surface) => refine::vertical(surface, x, y, start()),
+        };
         (meeting.miss <= self.deviation + ROUNDING).then_some(meeting)
     }
 

@@ -49,12 +49,11 @@ impl Patch {
 
     /// As [`Patch::normal`] for a jet that is already there.
     pub(super) fn normal_of(&self, jet: &Jet2, u: f64, v: f64) -> Vector3 {
-        jet.normal().or_else(|| self.borrowed_normal(u, v)).unwrap_or_else(Vector3::z)
-    }
-
-    fn borrowed_normal(&self, u: f64, v: f64) -> Option<Vector3> {
-        let [u_middle, v_middle] = self.domain().map(|[lo, hi]| 0.5 * (lo + hi));
-        BORROW.iter().find_map(|&t| self.jet(u + t * (u_middle - u), v + t * (v_middle - v)).normal())
+        match self {
+            Self::Nurbs(s) => normal_of(s, jet, [u, v]),
+            // Graphs have a normal everywhere.
+            Self::Analytic(_) => jet.normal().unwrap_or_else(Vector3::z),
+        }
     }
 
     /// Parameters a little inside of a degenerate border (a pole) at `at`, spread along it.
@@ -85,4 +84,12 @@ impl Patch {
             Self::Analytic(s) => s.quarter_waves(),
         }
     }
+}
+
+/// Normal of a jet at `[u, v]`; at a pole that of the surface close by; up where there is none.
+pub(super) fn normal_of(surface: &NurbsSurface, jet: &Jet2, [u, v]: [f64; 2]) -> Vector3 {
+    let [u_middle, v_middle] = surface.domain().map(|[lo, hi]| 0.5 * (lo + hi));
+    let borrowed =
+        || BORROW.iter().find_map(|&t| surface.jet(u + t * (u_middle - u), v + t * (v_middle - v)).normal());
+    jet.normal().or_else(borrowed).unwrap_or_else(Vector3::z)
 }

@@ -2,7 +2,8 @@
 //! vertical lines, by Newton's method in the patch's parameters, which stay inside their range.
 
 use super::Patch;
-use crate::geometry::{Jet2, Point3, Vector3};
+use super::patch::normal_of;
+use crate::geometry::{AnalyticSurface, Jet2, NurbsSurface, Point3, Vector3};
 
 /// Newton steps at most. Regular points take two to five; the rest is for starts beside poles and
 /// silhouettes, where steps are halved.
@@ -116,15 +117,17 @@ pub(super) struct VerticalMeeting {
     pub miss: f64,
 }
 
+/// The vertical line through `(x, y)` and a graph, in closed form.
+pub(super) fn vertical_on_graph(graph: &AnalyticSurface, x: f64, y: f64) -> VerticalMeeting {
+    let h = graph.height_jet(x, y);
+    let [[x0, x1], [y0, y1]] = graph.domain();
+    let beside = [x - x.max(x0).min(x1), y - y.max(y0).min(y1)];
+    let z = h.z + h.zx * beside[0] + h.zy * beside[1];
+    VerticalMeeting { at: [x, y], z, normal: h.normal(), miss: beside[0].hypot(beside[1]) }
+}
+
 /// Follows the patch from `start` to the vertical line through `(x, y)`.
-pub(super) fn vertical(patch: &Patch, x: f64, y: f64, start: [f64; 2]) -> VerticalMeeting {
-    if let Patch::Analytic(graph) = patch {
-        let h = graph.height_jet(x, y);
-        let [[x0, x1], [y0, y1]] = graph.domain();
-        let beside = [x - x.max(x0).min(x1), y - y.max(y0).min(y1)];
-        let z = h.z + h.zx * beside[0] + h.zy * beside[1];
-        return VerticalMeeting { at: [x, y], z, normal: h.normal(), miss: beside[0].hypot(beside[1]) };
-    }
+pub(super) fn vertical(patch: &NurbsSurface, x: f64, y: f64, start: [f64; 2]) -> VerticalMeeting {
     let domain = patch.domain();
     let mut at = clamp(&domain, start);
     let mut jet = patch.jet(at[0], at[1]);
@@ -194,7 +197,7 @@ fn vertical_step(jet: &Jet2, r: [f64; 2]) -> VerticalStep {
 }
 
 /// The surface a small step away from a jet.
-fn taylor(patch: &Patch, jet: &Jet2, at: [f64; 2], [a, b]: [f64; 2]) -> VerticalMeeting {
+fn taylor(patch: &NurbsSurface, jet: &Jet2, at: [f64; 2], [a, b]: [f64; 2]) -> VerticalMeeting {
     let z = jet.p.z
         + jet.du.z * a
         + jet.dv.z * b
@@ -202,14 +205,14 @@ fn taylor(patch: &Patch, jet: &Jet2, at: [f64; 2], [a, b]: [f64; 2]) -> Vertical
     let moved =
         Jet2 { du: jet.du + jet.duu * a + jet.duv * b, dv: jet.dv + jet.duv * a + jet.dvv * b, ..*jet };
     let at = [at[0] + a, at[1] + b];
-    VerticalMeeting { at, z, normal: patch.normal_of(&moved, at[0], at[1]), miss: 0.0 }
+    VerticalMeeting { at, z, normal: normal_of(patch, &moved, at), miss: 0.0 }
 }
 
 /// The tangent plane over `(x, y)`, for lines that pass beside the patch.
-fn beside(patch: &Patch, jet: &Jet2, at: [f64; 2], x: f64, y: f64) -> VerticalMeeting {
+fn beside(patch: &NurbsSurface, jet: &Jet2, at: [f64; 2], x: f64, y: f64) -> VerticalMeeting {
     /// Steeper tangent planes are not followed sideways.
     const LEAST_UPRIGHT: f64 = 0.01;
-    let normal = patch.normal_of(jet, at[0], at[1]);
+    let normal = normal_of(patch, jet, at);
     let (rx, ry) = (x - jet.p.x, y - jet.p.y);
     let rise = if normal.z.abs() > LEAST_UPRIGHT { -(normal.x * rx + normal.y * ry) / normal.z } else { 0.0 };
     VerticalMeeting { at, z: jet.p.z + rise, normal, miss: rx.hypot(ry) }

@@ -6,7 +6,7 @@
 //! triangle order, so any number of threads gives the same bits.
 
 use super::{Part, ROUNDING, refine};
-use crate::geometry::{Point2, Point3, Vector3, VerticalHit};
+use crate::geometry::{Point2, Point3, Vector3};
 use crate::monitor::{Cancelled, Monitor, check};
 use crate::parallel;
 
@@ -167,9 +167,11 @@ impl Part {
         let Some(index) = self.patch_of(t) else {
             return GridSample { normal: self.mesh.normal(t as usize), ..*sample };
         };
-        let barycentric = Plan::new(self, t).map_or([1.0 / 3.0; 3], |p| p.clamped_barycentric(x, y));
-        let hit = VerticalHit { z: sample.z, triangle: t, barycentric };
-        match self.refine_vertical(index, &hit, x, y) {
+        let start = || {
+            let barycentric = Plan::new(self, t).map_or([1.0 / 3.0; 3], |p| p.clamped_barycentric(x, y));
+            self.interpolate(t, &barycentric)
+        };
+        match self.refine_vertical(index, x, y, start) {
             Some(refine::VerticalMeeting { z, normal, .. }) => {
                 GridSample { z, normal: normal * self.signs[index], triangle: t }
             }

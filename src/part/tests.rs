@@ -126,14 +126,14 @@ proptest! {
             let (foot, distance) = part.closest_point(&q);
             prop_assert!(((foot.point - q).norm() - distance.abs()).abs() < 1e-12);
             let dense = lattice.iter().map(|p| (p - q).norm()).fold(f64::INFINITY, f64::min);
-            // Never farther than any other point, up to twice the deviation, as documented …
+            // Never farther than any other point, up to twice the deviation, as documented.
             prop_assert!(distance.abs() <= dense + 2.0 * part.mesh_deviation());
             let on_mesh = part.bvh().closest_point(part.mesh(), &q).signed_distance.abs();
             prop_assert!(distance.abs() <= on_mesh + part.mesh_deviation() + 1e-9);
-            // … and nearer than the lattice is dense, where it is not held by a border.
-            prop_assert!(distance.abs() >= dense - 1.0);
             let at = foot.at.unwrap();
             let jet = surface.jet(at.u, at.v);
+            prop_assert!((jet.p - foot.point).norm() < 1e-12);
+            // A foot of the perpendicular, where no border holds it.
             for (d, t) in [(jet.du, at.u), (jet.dv, at.v)] {
                 if t > 0.0 && t < 1.0 {
                     prop_assert!((q - foot.point).dot(&d.normalize()).abs() < 1e-10);

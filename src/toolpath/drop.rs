@@ -93,11 +93,9 @@ impl<'a> DropCutter<'a> {
         exact: Option<(&'a dyn ExactSurface, f64)>,
     ) -> Self {
         let profile = Profile::of(cutter, 0.0);
-        let search =
-            exact.map_or(profile, |(_, deviation)| Profile::of(cutter, DEVIATION_MARGIN * deviation));
-        let facets = crate::parallel::map(bvh.slots(), |slot| {
-            Facet::new(mesh.corners(bvh.triangle_in(slot)), &search)
-        });
+        let search = exact.map_or(profile, |(_, deviation)| Profile::of(cutter, DEVIATION_MARGIN * deviation));
+        let facets =
+            crate::parallel::map(bvh.slots(), |slot| Facet::new(mesh.corners(bvh.triangle_in(slot)), &search));
         Self { mesh, bvh, exact: exact.map(|(surface, _)| surface), profile, search, facets }
     }
 

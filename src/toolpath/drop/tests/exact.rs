@@ -63,52 +63,75 @@ impl<F: Fn(f64, f64) -> [f64; 6] + Sync> Graph<F> {
         Point3::new(x, y, (self.z)(x, y)[0])
     }
 
-    /// Rest height by a dense grid and ever finer grids around its best places.
+    /// Rest height by two pattern searches: in parameters, where the borders are straight, and in
+    /// polar coordinates around the axis, where the rim is.
     fn rest(&self, cutter: &Cutter, x: f64, y: f64) -> f64 {
-        let value = |at: [f64; 2]| {
-            let p = self.point(at[0], at[1]);
-            cutter.height((p.x - x).hypot(p.y - y)).map_or(f64::NEG_INFINITY, |h| p.z - h)
+        let on_surface = |p: Point3| {
+            let height = cutter.height((p.x - x).hypot(p.y - y));
+            height.map_or(f64::NEG_INFINITY, |h| p.z - h)
         };
-        const N: i32 = 160;
-        // Only parameters within reach: the plan view is nearly linear.
-        let reach = [cutter.radius() / STRETCH[0] * 1.2, cutter.radius() * STRETCH[1] * 1.6];
-        let u = x / STRETCH[0] / (1.0 + 0.02 * x / STRETCH[0]);
-        let centre = [u, (y - STRETCH[2] * STRETCH[0] * u) * STRETCH[1]];
-        let clamp = |at: [f64; 2]| [0, 1].map(|i| at[i].clamp(self.domain[i][0], self.domain[i][1]));
-        let mut starts: Vec<(f64, [f64; 2])> = Vec::new();
-        for i in -N..=N {
-            for j in -N..=N {
-                let at = clamp([
-                    centre[0] + reach[0] * f64::from(i) / f64::from(N),
-                    centre[1] + reach[1] * f64::from(j) / f64::from(N),
-                ]);
-                starts.push((value(at), at));
+        let reach = cutter.radius();
+        let [u, v] = parameters_of(x, y);
+        let size = [1.2 * reach / STRETCH[0], 1.6 * reach * STRETCH[1]];
+        let limits = |i: usize, at: f64| {
+            let [low, high] = self.domain[i];
+            [(at - size[i]).clamp(low, high), (at + size[i]).clamp(low, high)]
+        };
+        let by_parameters =
+            highest_by_pattern([limits(0, u), limits(1, v)], &|[u, v]| on_surface(self.point(u, v)));
+        let by_angle = highest_by_pattern([[0.0, reach], [-4.0, 4.0]], &|[rho, angle]| {
+            let (sin, cos) = angle.sin_cos();
+            let (px, py) = (x + rho * cos, y + rho * sin);
+            let at = parameters_of(px, py);
+            let inside = (0..2).all(|i| at[i] >= self.domain[i][0] && at[i] <= self.domain[i][1]);
+            if !inside {
+                return f64::NEG_INFINITY;
             }
-        }
-        starts.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut best = f64::NEG_INFINITY;
-        for &(start_value, start) in starts.iter().step_by(5).take(12) {
-            let (mut top, mut at) = (start_value, start);
-            let mut size = [3.0 * reach[0] / f64::from(N), 3.0 * reach[1] / f64::from(N)];
-            // Patterns of 24 directions, finer angles than any rim needs, shrinking slowly.
-            while size[0] > 1e-13 {
-                let mut moved = false;
-                for k in 0..24 {
-                    let (sin, cos) =
-                        (std::f64::consts::TAU * (f64::from(k) + 0.37 * size[0]) / 24.0).sin_cos();
-                    let there = clamp([at[0] + size[0] * cos, at[1] + size[1] * sin]);
-                    if value(there) > top {
-                        (top, at, moved) = (value(there), there, true);
-                    }
-                }
-                if !moved {
-                    size = size.map(|s| 0.8 * s);
-                }
-            }
-            best = best.max(top);
-        }
-        best
+            (self.z)(px, py)[0] - cutter.height(rho).unwrap()
+        });
+        by_parameters.max(by_angle)
     }
+}
+
+/// Inverts [`place`].
+fn parameters_of(x: f64, y: f64) -> [f64; 2] {
+    let w = x / STRETCH[0];
+    let u = 2.0 * w / (1.0 + (1.0 + 0.08 * w).sqrt());
+    [u, (y - STRETCH[2] * STRETCH[0] * u) * STRETCH[1]]
+}
+
+/// The greatest value over a box, by a dense grid and patterns of 24 directions that shrink around
+/// its best places.
+fn highest_by_pattern(limits: [[f64; 2]; 2], value: &dyn Fn([f64; 2]) -> f64) -> f64 {
+    const N: i32 = 160;
+    let size = limits.map(|[low, high]| high - low);
+    let at = |i: usize, k: i32| limits[i][0] + size[i] * f64::from(k) / f64::from(N);
+    let mut starts: Vec<(f64, [f64; 2])> = (0..=N)
+        .flat_map(|i| (0..=N).map(move |j| (i, j)))
+        .map(|(i, j)| [at(0, i), at(1, j)])
+        .map(|p| (value(p), p))
+        .collect();
+    starts.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut best = f64::NEG_INFINITY;
+    for &(start_value, start) in starts.iter().step_by(7).take(5) {
+        let (mut top, mut here, mut share) = (start_value, start, 3.0 / f64::from(N));
+        while share > 1e-12 {
+            let mut moved = false;
+            for k in 0..24 {
+                let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / 24.0).sin_cos();
+                let step = [share * size[0] * cos, share * size[1] * sin];
+                let there = [0, 1].map(|i| (here[i] + step[i]).clamp(limits[i][0], limits[i][1]));
+                if value(there) > top {
+                    (top, here, moved) = (value(there), there, true);
+                }
+            }
+            if !moved {
+                share *= 0.7;
+            }
+        }
+        best = best.max(top);
+    }
+    best
 }
 
 impl<F: Fn(f64, f64) -> [f64; 6] + Sync> ExactSurface for Graph<F> {
@@ -127,9 +150,7 @@ impl<F: Fn(f64, f64) -> [f64; 6] + Sync> ExactSurface for Graph<F> {
         let [z, zx, zy, zxx, zxy, zyy] = (self.z)(x, y);
         let (xu, xuu) = (STRETCH[0] * (1.0 + 0.04 * u), 0.04 * STRETCH[0]);
         let (yu, yv) = (STRETCH[2] * STRETCH[0], 1.0 / STRETCH[1]);
-        let second = |a: [f64; 2], b: [f64; 2]| {
-            zxx * a[0] * b[0] + zxy * (a[0] * b[1] + a[1] * b[0]) + zyy * a[1] * b[1]
-        };
+        let second = |a: [f64; 2], b: [f64; 2]| zxx * a[0] * b[0] + zxy * (a[0] * b[1] + a[1] * b[0]) + zyy * a[1] * b[1];
         let (du, dv) = ([xu, yu], [0.0, yv]);
         Jet2 {
             p: Point3::new(x, y, z),
@@ -232,8 +253,9 @@ fn bumps_borders_and_corners_agree_with_a_pattern_search() {
     };
     let graph = Graph::new(60, [[-0.4, 0.4], [-0.4, 0.4]], bumps);
     let mut numbers = Numbers(14);
-    let mut places: Vec<[f64; 2]> =
-        (0..5).map(|_| place(numbers.within(-0.35, 0.35), numbers.within(-0.35, 0.35))).collect();
+    let mut places: Vec<[f64; 2]> = (0..5)
+        .map(|_| place(numbers.within(-0.35, 0.35), numbers.within(-0.35, 0.35)))
+        .collect();
     // Beyond a border and beyond a corner.
     let [x, y] = place(0.4, 0.1);
     places.push([x + 0.7, y]);
@@ -245,8 +267,7 @@ fn bumps_borders_and_corners_agree_with_a_pattern_search() {
 #[test]
 fn flat_ground_takes_any_cutter() {
     // No curvature at all: every step of the climb meets a model without a maximum.
-    let graph =
-        Graph::new(8, [[-0.4, 0.4], [-0.4, 0.4]], |x, y| [0.3 * x - 0.2 * y, 0.3, -0.2, 0.0, 0.0, 0.0]);
+    let graph = Graph::new(8, [[-0.4, 0.4], [-0.4, 0.4]], |x, y| [0.3 * x - 0.2 * y, 0.3, -0.2, 0.0, 0.0, 0.0]);
     let level = Graph::new(8, [[-0.4, 0.4], [-0.4, 0.4]], |_, _| [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
     let (bvh, level_bvh) = (Bvh::new(&graph.mesh), Bvh::new(&level.mesh));
     for cutter in cutters() {
