@@ -6,6 +6,7 @@ use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme};
 
 use crate::io::scene::SceneError;
 use crate::monitor::Cancelled;
+use crate::part::PartError;
 use crate::report::ReportError;
 use crate::sim::GridError;
 use crate::toolpath::PlanError;
@@ -17,8 +18,12 @@ pub enum CliError {
     #[error(transparent)]
     #[diagnostic(transparent)]
     Scene(#[from] SceneError),
+    /// The part's surface cannot be searched.
+    #[error("the part cannot be used")]
+    #[diagnostic(help("change [part] in the scene"))]
+    Part(#[from] PartError),
     /// No grid could be laid out.
-    #[error("the stock cannot be simulated: {0}")]
+    #[error("the stock cannot be simulated")]
     #[diagnostic(help("choose another `cell` or `memory_mib` in [simulation], or `--cell`"))]
     Grid(#[from] GridError),
     /// A toolpath could not be planned.

@@ -36,6 +36,19 @@ impl Progress {
         Self { stop, bar, prefix: Mutex::new(String::new()) }
     }
 
+    /// Shows nothing and hears no signal.
+    #[cfg(test)]
+    pub fn quiet() -> Self {
+        let stop = Arc::new(AtomicBool::new(false));
+        Self { stop, bar: ProgressBar::hidden(), prefix: Mutex::new(String::new()) }
+    }
+
+    /// As if the user had asked to stop.
+    #[cfg(test)]
+    pub fn stop(&self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+
     /// Names what the next stages belong to.
     pub fn belongs_to(&self, name: &str) {
         if let Ok(mut prefix) = self.prefix.lock() {

@@ -301,3 +301,83 @@ impl<'a> Job<'a> {
         Ok(SurfaceMeshFigures { triangles: triangles.len(), tolerance_mm })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PLATE: &str = "[part]\nsurface = \"plane\"\nx = [0, 8]\ny = [0, 6]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n\
+        [tolerance]\nscallop = 0.0105\n[simulation]\ncell = 0.1\n[[toolpath]]\nstrategy = \"zigzag\"\nstepover = 0.5\n";
+
+    fn options(folder: &Path, scene: &str, threads: u16) -> RunOptions {
+        let path = folder.join("plate.toml");
+        std::fs::write(&path, scene).unwrap();
+        let out = Some(folder.join(format!("out{threads}")));
+        RunOptions { scene: path, out, threads: Some(threads), cell: None, engine: None }
+    }
+
+    #[test]
+    fn a_plate_passes_and_leaves_every_file_of_the_contract() {
+        let home = tempfile::tempdir().unwrap();
+        let options = options(home.path(), PLATE, 1);
+        let outcome = run(&options, &Progress::quiet()).unwrap();
+        assert_eq!(outcome.verdict, Verdict::Pass, "{}", outcome.text);
+        let out = options.out.unwrap();
+        for name in
+            ["deviation.png", "height.png", "height.exr", "toolpath.nc", "toolpath.cls", "machined.stl"]
+        {
+            assert!(out.join("zigzag").join(name).metadata().unwrap().len() > 100, "{name}");
+        }
+        let json: serde_json::Value =
+            serde_json::from_str(&std::fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
+        // A ball of radius 3 between passes 0.5 apart.
+        let closed_form = 3.0 - (9.0 - 0.0625f64).sqrt();
+        let measured = &json["toolpaths"][0]["scallop"];
+        let error = (measured["max_mm"].as_f64().unwrap() - closed_form).abs();
+        assert!(error <= measured["error_bound_mm"].as_f64().unwrap() + 1e-9, "{error}");
+        assert!(std::fs::read_to_string(out.join("report.html")).unwrap().contains("PASS"));
+    }
+
+    #[test]
+    fn threads_change_nothing_but_the_time() {
+        let home = tempfile::tempdir().unwrap();
+        let read = |threads: u16| {
+            let options = options(home.path(), PLATE, threads);
+            run(&options, &Progress::quiet()).unwrap();
+            let out = options.out.unwrap();
+            let mut json: serde_json::Value =
+                serde_json::from_str(&std::fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
+            json["toolpaths"][0]["simulation"]["wall_s"] = 0.into();
+            json["toolpaths"][0]["simulation"]["threads"] = 0.into();
+            let files =
+                ["deviation.png", "height.png", "height.exr", "toolpath.nc", "toolpath.cls", "machined.stl"];
+            (json, files.map(|name| std::fs::read(out.join("zigzag").join(name)).unwrap()))
+        };
+        assert!(read(1) == read(3));
+    }
+
+    #[test]
+    fn a_wish_to_stop_leaves_nothing_behind() {
+        let home = tempfile::tempdir().unwrap();
+        let options = options(home.path(), PLATE, 1);
+        let progress = Progress::quiet();
+        progress.stop();
+        assert!(matches!(run(&options, &progress), Err(CliError::Interrupted)));
+        assert_eq!(std::fs::read_dir(home.path()).unwrap().count(), 1, "only the scene is there");
+    }
+
+    #[test]
+    fn a_chosen_cell_is_kept_or_refused_and_a_default_one_grows() {
+        let scene = |simulation: &str| {
+            let text = PLATE.replace("[simulation]\ncell = 0.1\n", simulation).replace("[0, 8]", "[0, 800]");
+            Scene::parse("plate.toml", text).unwrap()
+        };
+        let (part, _) = load_part(&scene("")).unwrap();
+        let lay_out_of = |scene: &Scene| lay_out(scene, &stock_area(scene, &part));
+        let (grid, note) = lay_out_of(&scene("[simulation]\nmemory_mib = 2\n")).unwrap();
+        assert!(grid.cell > 0.05 && grid.len() * BYTES_PER_CELL <= 2 << 20);
+        assert!(note.unwrap().contains("instead of 0.05 mm, to fit into 2 MiB"));
+        let chosen = scene("[simulation]\nmemory_mib = 2\ncell = 0.05\n");
+        assert!(matches!(lay_out_of(&chosen), Err(GridError::Memory { .. })));
+    }
+}

@@ -30,7 +30,7 @@ impl Histogram {
                 .filter(|[h, w]| h.is_finite() && *w > 0.0 && w.is_finite())
         };
         let total: f64 = usable().map(|[_, weight]| weight).sum();
-        if !(total > 0.0) {
+        if total <= 0.0 {
             return None;
         }
         let highest = usable().map(|[height, _]| height).fold(0.0, f64::max);

@@ -5,7 +5,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::histogram::Histogram;
 use super::result::{RunReport, ToolpathResult};
-use super::table::{conclusion, duration, micrometres, per_cent, with_bound};
+use super::table::{bound, conclusion, duration, micrometres, per_cent, with_bound};
 use super::verdict::{Verdict, place};
 
 /// What the page shows of one toolpath besides its figures.
@@ -214,14 +214,37 @@ fn method(t: &ToolpathResult) -> Markup {
             "The stock was cut by the engine called " em { (s.engine) } " on " (s.cells) " cells of " (s.cell_mm) " mm by "
             (s.moves) " moves, then compared with the design part at " (t.deviation.samples) " places over "
             (format!("{:.1}", t.deviation.area_mm2)) " mm². The planner's own predictions were not used. "
-            @if let Some(bound) = t.scallop.error_bound_mm { "The true highest scallop lies within " (micrometres(Some(bound))) " µm of the figure; " }
-            "the true deepest gouge within " (micrometres(Some(t.gouge.error_bound_mm))) " µm, the true uncut height within "
-            (micrometres(Some(t.uncut.error_bound_mm))) " µm. machined.stl has " (t.surface_mesh.triangles)
+            @if let Some(error) = t.scallop.error_bound_mm { "The true highest scallop lies within " (bound(error)) " µm of the figure; " }
+            "the true deepest gouge within " (bound(t.gouge.error_bound_mm)) " µm, the true uncut height within "
+            (bound(t.uncut.error_bound_mm)) " µm. machined.stl has " (t.surface_mesh.triangles)
             " triangles, whose top stays within " (micrometres(Some(t.surface_mesh.tolerance_mm))) " µm of the cells. Cutting and measuring took "
             (format!("{:.2}", s.wall_s)) " s on " (s.threads) @if s.threads == 1 { " thread." } @else { " threads." }
         }
         p.faint {
             "Files: " (t.folder) "/toolpath.nc, toolpath.cls, machined.stl, height.exr (height, deviation and move of every cell)."
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture;
+    use super::*;
+
+    #[test]
+    fn the_page_needs_nothing_from_outside_and_escapes_what_it_quotes() {
+        let report = fixture::report();
+        let png = vec![1u8, 2, 3];
+        let page = ToolpathPage {
+            deviation_png: png.clone(),
+            height_png: png,
+            histogram: Histogram::new(&[[0.004, 1.0]], 0.01, 0.0125),
+        };
+        let html = html_page(&report, &[page.clone(), page], "title = \"<script>\" # a & b");
+        assert!(html.contains("&lt;script&gt;") && !html.contains("<script"));
+        assert!(!html.contains("http://") && !html.contains("https://"), "nothing is fetched");
+        assert_eq!(html.matches("data:image/png;base64,AQID").count(), 4);
+        assert!(html.contains("toolpath.nc line 1240"));
+        assert!(html.contains("1 of 2 toolpaths hold every tolerance"));
     }
 }

@@ -2,7 +2,6 @@
 
 use super::canvas::{Align, FAINT_INK, INK, Picture, Rgb, TextSize, shortened};
 use super::scale::{Unit, plain, round_down, round_up, ticks};
-use super::verdict::HIGHEST_RIDGE;
 use crate::metrology::Limits;
 use crate::sim::Grid;
 
@@ -113,10 +112,9 @@ fn sequential(t: f64) -> Rgb {
     [colour.r, colour.g, colour.b]
 }
 
-/// End of the deviation's colour key, mm: the round number just above the limits that matter for
-/// the surface, so that pictures of several toolpaths of one scene can be compared.
+/// End of the deviation's colour key, mm: the scallop or the gouge tolerance, rounded up, so that pictures of several toolpaths of one scene can be compared.
 pub fn deviation_range(limits: &Limits) -> f64 {
-    round_up(HIGHEST_RIDGE * limits.scallop.max(limits.gouge))
+    round_up(limits.scallop.max(limits.gouge))
 }
 
 /// Least and greatest of the finite values.
@@ -306,7 +304,8 @@ mod tests {
     }
 
     #[test]
-    fn the_key_ends_at_a_round_number_above_the_limits() {
-        assert!((deviation_range(&LIMITS) - 0.02).abs() < 1e-12);
+    fn the_key_ends_at_a_round_number_that_holds_the_limits() {
+        assert!((deviation_range(&LIMITS) - 0.01).abs() < 1e-12);
+        assert!((deviation_range(&Limits { gouge: 0.011, ..LIMITS }) - 0.02).abs() < 1e-12);
     }
 }

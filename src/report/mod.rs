@@ -2,6 +2,8 @@
 //! rasters; writing them to files is the business of [`crate::io`] and [`crate::cli`].
 
 mod canvas;
+#[cfg(test)]
+mod fixture;
 mod histogram;
 mod html;
 mod map;

@@ -183,3 +183,43 @@ fn check_nulls(path: &str, value: &serde_json::Value) -> Result<(), ReportError>
         _ => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture;
+    use super::*;
+
+    #[test]
+    fn the_report_is_written_in_its_fixed_order() {
+        let text = fixture::report().to_json().unwrap();
+        insta::assert_snapshot!(text);
+        let read: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(read["toolpaths"][0]["gouge"]["regions"][0]["line"], 1240);
+    }
+
+    #[test]
+    fn figures_that_are_not_finite_are_refused_by_name() {
+        for bad in [f64::NAN, f64::INFINITY] {
+            let mut report = fixture::report();
+            report.toolpaths[1].deviation.rms_mm = bad;
+            let error = report.to_json().unwrap_err();
+            assert_eq!(error, ReportError::NotFinite("report.toolpaths[1].deviation.rms_mm".into()));
+        }
+        let mut report = fixture::report();
+        report.toolpaths[0].scallop.max_mm = None;
+        assert!(report.to_json().is_err(), "null without a reason");
+        report.toolpaths[0].scallop.reason = Some("no ridge".into());
+        assert!(report.to_json().is_ok());
+    }
+
+    #[test]
+    fn the_quickest_that_passes_is_the_best() {
+        let report = fixture::report();
+        assert_eq!(report.best.as_deref(), Some("streamline"));
+        assert_eq!(report.verdict, Verdict::Fail);
+        let slower = fixture::toolpath("slower", 900.0, 0.0);
+        let both = vec![slower, report.toolpaths[1].clone()];
+        let report = RunReport::new("a".into(), "b".into(), "c".into(), &fixture::LIMITS, both);
+        assert_eq!((report.best.as_deref(), report.verdict), (Some("streamline"), Verdict::Pass));
+    }
+}

@@ -213,7 +213,7 @@ impl<'a> Network<'a> {
 /// Ends of the diagonal along which a square is cut in two, the left one first. Squares alternate
 /// like a chessboard, so that the diagonals of the four quarters of a square meet in its middle.
 fn diagonal((x, y): Node, size: usize) -> (Node, Node) {
-    if (x / size + y / size) % 2 == 0 {
+    if (x / size + y / size).is_multiple_of(2) {
         ((x, y), (x + size, y + size))
     } else {
         ((x, y + size), (x + size, y))

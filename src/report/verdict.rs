@@ -129,3 +129,46 @@ fn others(region_count: usize) -> String {
         n => format!(", and {} more places", n - 1),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture::{LIMITS, measurement};
+    use super::*;
+    use crate::metrology::UncutRegion;
+
+    #[test]
+    fn a_limit_is_violated_above_it_and_not_at_it() {
+        let mut measured = measurement(LIMITS.gouge);
+        measured.scallop.max_mm = Some(HIGHEST_RIDGE * LIMITS.scallop);
+        measured.scallop.p95_mm = Some(LIMITS.scallop);
+        assert_eq!(violations(&measured, &LIMITS), []);
+        measured.gouge.max_depth_mm = LIMITS.gouge * (1.0 + 1e-12);
+        measured.scallop.max_mm = Some(HIGHEST_RIDGE * LIMITS.scallop * (1.0 + 1e-12));
+        measured.scallop.p95_mm = Some(LIMITS.scallop * (1.0 + 1e-12));
+        let kinds: Vec<&str> = violations(&measured, &LIMITS).iter().map(|v| v.what).collect();
+        assert_eq!(kinds, ["gouge", "scallop", "scallop"]);
+    }
+
+    #[test]
+    fn any_uncut_region_is_a_violation_with_its_place() {
+        let mut measured = measurement(0.0);
+        let at_mm = [1.0, 2.0, 3.0];
+        measured.uncut.regions = vec![UncutRegion { height_mm: 0.2, area_mm2: 1.0, volume_mm3: 0.1, at_mm }];
+        measured.uncut.max_height_mm = 0.2;
+        measured.uncut.region_count = 3;
+        let found = violations(&measured, &LIMITS);
+        assert_eq!(found[0].what, "uncut");
+        assert!(
+            found[0].text.ends_with("at x 1.000 y 2.000 z 3.000, and 2 more places"),
+            "{}",
+            found[0].text
+        );
+    }
+
+    #[test]
+    fn a_gouge_names_move_and_line() {
+        let text = violations(&measurement(0.032), &LIMITS)[0].text.clone();
+        assert!(text.contains("gouge 0.0320 mm deep"), "{text}");
+        assert!(text.contains("at x 12.500 y 7.250 z -1.032, move 1234, toolpath.nc line 1240"), "{text}");
+    }
+}

@@ -77,7 +77,7 @@ pub struct Finding {
 pub enum SceneError {
     /// The file could not be read.
     #[error("cannot read the scene {}: {reason}", path.display())]
-    #[diagnostic(help("name an existing TOML file; its keys are listed by `millstream run --help`"))]
+    #[diagnostic(help("name an existing TOML file"))]
     Unreadable {
         /// The file.
         path: PathBuf,
