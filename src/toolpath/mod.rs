@@ -9,6 +9,8 @@ mod level_passes;
 mod link;
 mod path;
 mod plan;
+mod spacing;
+mod streamline;
 mod strip;
 mod zigzag;
 
