@@ -10,7 +10,7 @@ mod tessellate;
 
 pub use aabb::Aabb;
 pub use analytic::{AnalyticError, AnalyticShape, AnalyticSurface};
-pub(crate) use bvh::{Feature, Node};
+pub(crate) use bvh::{Feature, Node, round_down, round_up};
 pub use bvh::{Bvh, MeshFoot, VerticalHit};
 pub use jet::{Jet2, PrincipalCurvatures};
 pub use mesh::{MeshError, RepairNotes, TriangleMesh};
