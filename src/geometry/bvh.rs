@@ -79,6 +79,11 @@ pub(crate) struct Node {
     first: u32,
 }
 
+/// As `f64::max` for numbers, in one instruction instead of five: the walk does little else.
+fn greater(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
 impl Node {
     /// Squared distance from `(x, y)` to the box in the plan view, mm²; 0 inside.
     pub(crate) fn plan_distance_squared(&self, x: f64, y: f64) -> f64 {
@@ -94,7 +99,13 @@ impl Node {
     }
 
     fn gap(&self, axis: usize, x: f64) -> f64 {
-        (f64::from(self.min[axis]) - x).max(x - f64::from(self.max[axis])).max(0.0)
+        let (before, beyond) = (f64::from(self.min[axis]) - x, x - f64::from(self.max[axis]));
+        greater(greater(before, beyond), 0.0)
+    }
+
+    /// Middle of the box in the plan view, mm.
+    pub(crate) fn plan_centre(&self) -> [f64; 2] {
+        [0, 1].map(|axis| 0.5 * (f64::from(self.min[axis]) + f64::from(self.max[axis])))
     }
 
     /// Upper end of the box, mm.
@@ -125,13 +136,42 @@ impl Boundable for Bounds {
     }
 }
 
-fn round_down(x: f64) -> f32 {
+/// The greatest f32 that is not above `x`.
+pub(crate) fn round_down(x: f64) -> f32 {
     let near = x as f32;
     if f64::from(near) > x { near.next_down() } else { near }
 }
 
-fn round_up(x: f64) -> f32 {
+/// The least f32 that is not below `x`.
+pub(crate) fn round_up(x: f64) -> f32 {
     -round_down(-x)
+}
+
+/// Nodes and triangles in the order of a depth-first walk: what a query visits one after the other
+/// then lies close together in memory, which is most of what a scattered query costs.
+fn depth_first(tree: &obvhs::bvh2::Bvh2) -> (Vec<Node>, Vec<u32>) {
+    let copy = |index: usize| {
+        let n = &tree.nodes[index];
+        let (min, max) = (n.aabb().min.to_array(), n.aabb().max.to_array());
+        Node { min, count: n.prim_count, max, first: n.first_index }
+    };
+    let mut nodes = vec![copy(0)];
+    let mut triangles = Vec::with_capacity(tree.primitive_indices.len());
+    let mut waiting = vec![0];
+    while let Some(index) = waiting.pop() {
+        let Node { first, count, .. } = nodes[index];
+        let first = first as usize;
+        if count > 0 {
+            nodes[index].first = triangles.len() as u32;
+            triangles.extend_from_slice(&tree.primitive_indices[first..first + count as usize]);
+        } else {
+            let children = nodes.len();
+            nodes[index].first = children as u32;
+            nodes.extend([copy(first), copy(first + 1)]);
+            waiting.extend([children + 1, children]);
+        }
+    }
+    (nodes, triangles)
 }
 
 impl Bvh {
@@ -147,17 +187,8 @@ impl Bvh {
         });
         let parameters = BvhBuildParams { max_prims_per_leaf: LEAF, ..BvhBuildParams::medium_build() };
         let tree = build_bvh2(&boxes, parameters, &mut Duration::default());
-        let nodes = tree.nodes.iter().map(|n| Node {
-            min: n.aabb().min.to_array(),
-            count: n.prim_count,
-            max: n.aabb().max.to_array(),
-            first: n.first_index,
-        });
-        Self {
-            nodes: nodes.collect(),
-            triangles: tree.primitive_indices,
-            vertex_normals: nearest::vertex_normals(mesh),
-        }
+        let (nodes, triangles) = depth_first(&tree);
+        Self { nodes, triangles, vertex_normals: nearest::vertex_normals(mesh) }
     }
 
     /// Number of slots; each holds one triangle.
@@ -170,13 +201,38 @@ impl Bvh {
         self.triangles[slot] as usize
     }
 
-    /// Branch and bound for a maximum: walks down to every leaf whose `bound` exceeds the best
-    /// value so far, the most promising first, and calls `visit(slot, best)` there, which returns
-    /// the best value from then on. Starts with `best`; allocates nothing in trees of usual depth.
+    /// Number of boxes.
+    pub(crate) fn boxes(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Box `index` and the slots in it, if there are at most `limit`.
+    pub(crate) fn few_slots_in(&self, index: usize, limit: usize) -> Option<(&Node, Vec<usize>)> {
+        let mut slots = Vec::new();
+        let mut waiting = vec![index];
+        while let Some(i) = waiting.pop() {
+            let node = &self.nodes[i];
+            let (first, count) = (node.first as usize, node.count as usize);
+            if count > 0 {
+                slots.extend(first..first + count);
+            } else {
+                waiting.extend([first, first + 1]);
+            }
+            if slots.len() + waiting.len() > limit {
+                return None;
+            }
+        }
+        Some((&self.nodes[index], slots))
+    }
+
+    /// Branch and bound for a maximum: walks down to every leaf whose `bound(index, box, best)`
+    /// exceeds the best value so far, the most promising first, and calls `visit(slot, best)`
+    /// there, which returns the best value from then on. Starts with `best`; allocates nothing in
+    /// trees of usual depth.
     pub(crate) fn search(
         &self,
         mut best: f64,
-        bound: impl Fn(&Node) -> f64,
+        bound: impl Fn(usize, &Node, f64) -> f64,
         mut visit: impl FnMut(usize, f64) -> f64,
     ) {
         let mut waiting = Stack::new();
@@ -193,8 +249,8 @@ impl Bvh {
                 }
                 continue;
             }
-            let a = (node.first, bound(&self.nodes[first]));
-            let b = (node.first + 1, bound(&self.nodes[first + 1]));
+            let a = (node.first, bound(first, &self.nodes[first], best));
+            let b = (node.first + 1, bound(first + 1, &self.nodes[first + 1], best));
             let (near, far) = if a.1 >= b.1 { (a, b) } else { (b, a) };
             if near.1 > best {
                 next = Some(near);

@@ -10,6 +10,7 @@
 //! wall carries it with its edges, not with its side.
 
 mod refine;
+mod roof;
 #[cfg(test)]
 mod tests;
 mod touch;
@@ -18,6 +19,7 @@ use crate::cutter::Cutter;
 use crate::geometry::{Bvh, Jet2, Node, TriangleMesh};
 use crate::part::{Part, PatchPoint, SurfacePoint};
 use refine::{Hill, Peak};
+use roof::Roof;
 use touch::{Facet, Profile, Touch};
 
 /// Where a cutter dropped along -z comes to rest on a part.
@@ -43,6 +45,8 @@ pub struct DropCutter<'a> {
     search: Profile,
     /// The triangles in the order of the tree's slots, prepared for `search`.
     facets: Vec<Facet>,
+    /// One for each box of the tree.
+    roofs: Vec<Roof>,
 }
 
 /// The surface behind a tessellation.
@@ -96,9 +100,16 @@ impl<'a> DropCutter<'a> {
         let search =
             exact.map_or(profile, |(_, deviation)| Profile::of(cutter, DEVIATION_MARGIN * deviation));
         let facets = crate::parallel::map(bvh.slots(), |slot| {
-            Facet::new(mesh.corners(bvh.triangle_in(slot)), &search)
+            let t = bvh.triangle_in(slot);
+            Facet::new(mesh.corners(t), &mesh.normal(t), &search)
         });
-        Self { mesh, bvh, exact: exact.map(|(surface, _)| surface), profile, search, facets }
+        let roofs = crate::parallel::map(bvh.boxes(), |index| {
+            bvh.few_slots_in(index, roof::MOST_BELOW).map_or(Roof::NONE, |(node, slots)| {
+                let below: Vec<_> = slots.iter().map(|&s| mesh.corners(bvh.triangle_in(s))).collect();
+                Roof::over(node, &below, &search)
+            })
+        });
+        Self { mesh, bvh, exact: exact.map(|(surface, _)| surface), profile, search, facets, roofs }
     }
 
     /// Highest tip position over `(x, y)` at which the cutter touches the part without cutting into
@@ -110,7 +121,7 @@ impl<'a> DropCutter<'a> {
         let mut best: Option<(usize, Touch)> = None;
         self.bvh.search(
             f64::NEG_INFINITY,
-            |node| self.bound(node, x, y),
+            |index, node, floor| self.bound(index, node, floor, x, y),
             |slot, floor| match self.facets[slot].touch(&self.search, x, y, floor) {
                 Some(touch) => {
                     best = Some((slot, touch));
@@ -126,22 +137,23 @@ impl<'a> DropCutter<'a> {
         }
     }
 
-    /// No triangle in the box lifts the tip higher than this.
-    fn bound(&self, node: &Node, x: f64, y: f64) -> f64 {
+    /// No triangle in the box lifts the tip higher than this, unless this is below `floor`: then
+    /// none lifts it above `floor`.
+    fn bound(&self, index: usize, node: &Node, floor: f64, x: f64, y: f64) -> f64 {
         let distance2 = node.plan_distance_squared(x, y);
         if distance2 > self.search.radius * self.search.radius {
-            f64::NEG_INFINITY
-        } else {
-            node.top() - self.search.height_squared(distance2)
+            return f64::NEG_INFINITY;
         }
+        let level = node.top() - self.search.height_squared(distance2);
+        if level <= floor { level } else { level.min(self.roofs[index].bound(node, &self.search, x, y)) }
     }
 
     fn on_mesh(&self, slot: usize, touch: &Touch, x: f64, y: f64) -> Drop {
-        let facet = &self.facets[slot];
         let triangle = self.bvh.triangle_in(slot);
+        let contact = self.facets[slot].contact(touch, &self.mesh.normal(triangle), x, y);
         let contact = SurfacePoint {
-            point: facet.point(facet.barycentric(touch, x, y)),
-            normal: self.bvh.normal_at(self.mesh, triangle, touch.feature),
+            point: contact.point,
+            normal: self.bvh.normal_at(self.mesh, triangle, contact.feature),
             at: None,
             triangle: triangle as u32,
         };
@@ -167,7 +179,7 @@ impl<'a> DropCutter<'a> {
         self.refine(surface, slot, touch, x, y, &mut found);
         self.bvh.search(
             found.height(),
-            |node| self.bound(node, x, y),
+            |index, node, floor| self.bound(index, node, floor, x, y),
             |other, floor| {
                 // The first triangle was refined already.
                 if other != slot
@@ -208,7 +220,7 @@ impl<'a> DropCutter<'a> {
         let Some(corners) = surface.corner_parameters(triangle) else {
             return;
         };
-        let weights = self.facets[slot].barycentric(touch, x, y);
+        let weights = self.facets[slot].contact(touch, &self.mesh.normal(triangle), x, y).barycentric;
         let mean = |of: fn(&PatchPoint) -> f64| (0..3).map(|k| weights[k] * of(&corners[k])).sum::<f64>();
         let (patch, start) = (corners[0].patch, [mean(|p| p.u), mean(|p| p.v)]);
         let jet = |u: f64, v: f64| surface.jet(patch, u, v);

@@ -20,9 +20,7 @@ fn height_mesh(n: usize, size: [f64; 2], height: impl Fn(f64, f64) -> f64) -> Tr
     let k = |i: usize, j: usize| (j * (n + 1) + i) as u32;
     let triangles = (0..n)
         .flat_map(|j| (0..n).map(move |i| (i, j)))
-        .flat_map(|(i, j)| {
-            [[k(i, j), k(i + 1, j), k(i + 1, j + 1)], [k(i, j), k(i + 1, j + 1), k(i, j + 1)]]
-        })
+        .flat_map(|(i, j)| [[k(i, j), k(i + 1, j), k(i + 1, j + 1)], [k(i, j), k(i + 1, j + 1), k(i, j + 1)]])
         .collect();
     TriangleMesh::new(vertices, triangles).unwrap().0
 }

@@ -22,7 +22,7 @@ impl Bvh {
         let mut best = closest_on_triangle(&mesh.corners(best_triangle), q);
         self.search(
             -best.distance_squared,
-            |node| -node.distance_squared(q),
+            |_, node, _| -node.distance_squared(q),
             |slot, _| {
                 let t = self.triangle_in(slot);
                 let foot = closest_on_triangle(&mesh.corners(t), q);

@@ -15,7 +15,7 @@ impl Bvh {
         let mut best: Option<VerticalHit> = None;
         self.search(
             f64::NEG_INFINITY,
-            |node| if node.plan_distance_squared(x, y) == 0.0 { node.top() } else { f64::NEG_INFINITY },
+            |_, node, _| if node.plan_distance_squared(x, y) == 0.0 { node.top() } else { f64::NEG_INFINITY },
             |slot, floor| {
                 let triangle = self.triangle_in(slot);
                 let Some((z, barycentric)) = height_on_triangle(&mesh.corners(triangle), x, y) else {

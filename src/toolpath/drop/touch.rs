@@ -85,27 +85,45 @@ impl Profile {
         }
     }
 
-    /// Where on a line the cutter touches: the line passes the axis at distance `h` and rises by
-    /// `slope` per mm; answers the place along it, counted from the point next to the axis, or
-    /// `None` where the line passes by the cutter.
-    fn along_line(&self, h: f64, slope: f64) -> Option<f64> {
+    /// How strictly the profile bends where it touches a plane of that slope: `(κ, s)` such that
+    /// within `s` of that place it rises above the plane by at least `κ d² / 2` at distance `d`.
+    fn bend(&self, slope: f64, reach: f64) -> (f64, f64) {
+        if self.corner == 0.0 || slope > self.cone {
+            return (0.0, 0.0);
+        }
+        let to_cone = if self.cone.is_finite() { self.arc_end - reach } else { f64::INFINITY };
+        if self.flat == 0.0 {
+            return (1.0 / self.corner, to_cone);
+        }
+        // Across the arc it bends by 1/corner or more; around the axis by f'/ρ, which dies out
+        // toward the disc: stay on the outer half of the way from there.
+        let half = 0.5 * (reach - self.flat).max(0.0);
+        let around = half / (self.corner * (reach + half));
+        (around.min(1.0 / self.corner), half.min(to_cone))
+    }
+
+    /// Where on a line the cutter touches: the line passes the axis at distance `h` and climbs by
+    /// `dz` over the plan length `length`; answers the place along it, counted from the point next
+    /// to the axis, or `None` where the line passes by the cutter.
+    fn along_line(&self, h: f64, dz: f64, length: f64) -> Option<f64> {
         let width = self.radius * self.radius - h * h;
         if width < 0.0 {
             return None;
         }
-        let rise = slope.abs();
-        let place = if rise == 0.0 {
-            0.0
-        } else if self.flat == 0.0 && self.cone.is_infinite() {
+        if dz == 0.0 {
+            return Some(0.0);
+        }
+        let sine = dz.abs() / (dz * dz + length * length).sqrt();
+        let place = if self.flat == 0.0 && self.cone.is_infinite() {
             // A ball: the line sees a circle.
-            width.sqrt() * rise / rise.hypot(1.0)
+            width.sqrt() * sine
         } else {
-            self.along_line_general(h, rise).min(width.sqrt())
+            self.along_line_general(h, dz.abs() / length, sine).min(width.sqrt())
         };
-        Some(place.copysign(slope))
+        Some(place.copysign(dz))
     }
 
-    fn along_line_general(&self, h: f64, rise: f64) -> f64 {
+    fn along_line_general(&self, h: f64, rise: f64, sine: f64) -> f64 {
         let arc_width = (self.arc_end * self.arc_end - h * h).max(0.0).sqrt();
         // Beyond the end of the arc while the line still outruns the cone there?
         if h >= self.arc_end || rise * self.arc_end > self.cone * arc_width {
@@ -119,7 +137,7 @@ impl Profile {
         if self.corner == 0.0 {
             return (self.flat * self.flat - h * h).max(0.0).sqrt();
         }
-        torus_along_line(self.flat, self.corner, h, rise).min(arc_width)
+        torus_along_line(self.flat, self.corner, h, sine).min(arc_width)
     }
 }
 
@@ -127,14 +145,13 @@ impl Profile {
 const MAX_STEPS: usize = 60;
 
 /// Where a torus (ring radius `e`, tube radius `r`) touches a line that passes its axis at
-/// distance `h < e + r` and rises by `rise > 0` per mm.
+/// distance `h < e + r` and climbs at an angle with the sine `s > 0`.
 ///
 /// The contact normal is perpendicular to the line: `C` (0..1) its part across the line in the
-/// plan view, `√(1 − C²)` the rest, of which the share `s = sin(atan rise)` lies along the line.
+/// plan view, `√(1 − C²)` the rest, of which the share `s` lies along the line.
 /// Then `h = r C + e C / √(C² + (1 − C²) s²) = H(C)`. `H` is concave and grows, so Newton's method
 /// from below never overshoots.
-fn torus_along_line(e: f64, r: f64, h: f64, rise: f64) -> f64 {
-    let s = rise / rise.hypot(1.0);
+fn torus_along_line(e: f64, r: f64, h: f64, s: f64) -> f64 {
     let s2 = s * s;
     // H(C) <= r C + e and H(C) <= (r + e / s) C bound C from below.
     let mut c = (h / (r + e / s)).max((h - e) / r).clamp(0.0, 1.0);
@@ -157,19 +174,62 @@ fn torus_along_line(e: f64, r: f64, h: f64, rise: f64) -> f64 {
     r * along + e * along / sine2.sqrt()
 }
 
-/// A triangle prepared for one profile.
+/// A profile resting on a plane, and how fast it leaves the plane from there.
 #[derive(Debug, Clone, Copy)]
+pub(super) struct Rest {
+    /// ∂z/∂x and ∂z/∂y of the plane.
+    pub(super) gradient: [f64; 2],
+    /// From the axis to where the profile touches the plane.
+    pub(super) shift: [f64; 2],
+    /// Tip height, less the plane's height at the axis.
+    pub(super) lift: f64,
+    /// See [`Profile::bend`].
+    pub(super) bend: f64,
+    /// Up to where `bend` holds.
+    pub(super) bend_within: f64,
+}
+
+impl Rest {
+    /// Rests the profile on the plane that climbs by `gradient`.
+    pub(super) fn on_plane(gradient: [f64; 2], profile: &Profile) -> Self {
+        let slope = gradient[0].hypot(gradient[1]);
+        let reach = profile.reach(slope, slope / slope.hypot(1.0));
+        let uphill = if slope > 0.0 { reach / slope } else { 0.0 };
+        let (bend, bend_within) = profile.bend(slope, reach);
+        Self {
+            gradient,
+            shift: gradient.map(|g| g * uphill),
+            lift: slope * reach - profile.height(reach),
+            bend,
+            bend_within,
+        }
+    }
+}
+
+/// How far a profile has risen above a plane it rests on, at least, at distance `d` from the
+/// contact. It is convex: beyond the place up to where it bends it goes straight on, at worst.
+pub(super) fn gap(bend: f64, bend_within: f64, d: f64) -> f64 {
+    let within = d.min(bend_within);
+    bend * within * (d - 0.5 * within)
+}
+
+/// A triangle prepared for one profile: two cache lines, of which the first decides whether the
+/// second is needed.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
 pub(super) struct Facet {
-    corners: [Point3; 3],
-    /// ∂z/∂x and ∂z/∂y of its plane.
+    /// First corner.
+    a: Point3,
     gradient: [f64; 2],
-    /// From the axis to where the profile touches its plane.
     shift: [f64; 2],
-    /// Tip height when resting on its plane, less the plane's height at the axis.
+    /// As in [`Rest`]; infinite where the triangle is vertical.
     lift: f64,
-    /// +1 where its corners run counter-clockwise in the plan view, −1 clockwise, 0 where it is
-    /// vertical.
-    winding: f64,
+    /// Second corner: counter-clockwise in the plan view, unlike the mesh's where [`turned`].
+    b: Point3,
+    /// Third corner.
+    c: Point3,
+    bend: f64,
+    bend_within: f64,
 }
 
 /// Where a cutter rests on one triangle.
@@ -177,8 +237,8 @@ pub(super) struct Facet {
 pub(super) struct Touch {
     /// Height of the tip.
     pub(super) tip_z: f64,
-    /// Which part of the triangle.
-    pub(super) feature: Feature,
+    /// Which part of the triangle, by its corners in the facet's order.
+    feature: Feature,
     /// Place along the side, 0 to 1.
     along: f64,
 }
@@ -187,87 +247,167 @@ pub(super) struct Touch {
 /// slope is rounding. Its sides still carry the cutter.
 const VERTICAL: f64 = 1e-14;
 
+/// Whether a facet has its last two corners the other way round than its triangle in the mesh,
+/// which has that unit normal.
+fn turned(normal: &Vector3) -> bool {
+    normal.z <= -VERTICAL
+}
+
 impl Facet {
-    pub(super) fn new(corners: [Point3; 3], profile: &Profile) -> Self {
-        let [a, b, c] = corners;
-        let normal: Vector3 = (b - a).cross(&(c - a)).normalize();
-        if normal.z.abs() < VERTICAL {
-            return Self { corners, gradient: [0.0; 2], shift: [0.0; 2], lift: 0.0, winding: 0.0 };
+    /// Prepares a triangle, given by its corners and its unit normal.
+    pub(super) fn new([a, mut b, mut c]: [Point3; 3], normal: &Vector3, profile: &Profile) -> Self {
+        if turned(normal) {
+            std::mem::swap(&mut b, &mut c);
         }
-        let sine = normal.x.hypot(normal.y);
-        let slope = sine / normal.z.abs();
-        let reach = profile.reach(slope, sine);
-        // Uphill: against the horizontal part of the normal that points up.
-        let winding = normal.z.signum();
-        let uphill = if sine > 0.0 { -winding / sine } else { 0.0 };
-        Self {
-            corners,
-            gradient: [-normal.x / normal.z, -normal.y / normal.z],
-            shift: [normal.x * uphill * reach, normal.y * uphill * reach],
-            lift: slope * reach - profile.height(reach),
-            winding,
-        }
+        let level = normal.z.abs() >= VERTICAL;
+        let gradient = if level { [-normal.x / normal.z, -normal.y / normal.z] } else { [0.0; 2] };
+        let Rest { gradient, shift, lift, bend, bend_within } = Rest::on_plane(gradient, profile);
+        let lift = if level { lift } else { f64::INFINITY };
+        Self { a, gradient, shift, lift, b, c, bend, bend_within }
+    }
+
+    fn corners(&self) -> [&Point3; 3] {
+        [&self.a, &self.b, &self.c]
     }
 
     /// Rests the cutter on this triangle alone; `None` where it passes by or where the tip would
     /// not come above `floor`.
+    #[inline]
     pub(super) fn touch(&self, profile: &Profile, x: f64, y: f64, floor: f64) -> Option<Touch> {
-        let mut best: Option<Touch> = None;
-        let mut sides = [true; 3];
-        if self.winding != 0.0 {
-            let a = &self.corners[0];
-            let tip_z = a.z + self.lift + (self.gradient[0] * (x - a.x) + self.gradient[1] * (y - a.y));
-            // Nothing on the triangle lifts the tip higher than its whole plane does.
-            if tip_z <= floor {
+        let climb = self.gradient[0] * (x - self.a.x) + self.gradient[1] * (y - self.a.y);
+        let peak = self.a.z + self.lift + climb;
+        // Nothing on the triangle lifts the tip higher than its whole plane does.
+        if peak <= floor { None } else { self.touch_below(peak, profile, x, y, floor) }
+    }
+
+    /// As [`Facet::touch`], knowing the tip height `peak` when resting on the whole plane.
+    fn touch_below(&self, peak: f64, profile: &Profile, x: f64, y: f64, floor: f64) -> Option<Touch> {
+        if self.lift == f64::INFINITY {
+            return self.touch_sides([true; 3], profile, x, y, floor);
+        }
+        let at = [x + self.shift[0], y + self.shift[1]];
+        let beyond = [0, 1, 2].map(|k| Side::of(self.corners(), k).area_beyond(at));
+        let outside = beyond.map(|area| area > 0.0);
+        if outside == [false; 3] {
+            return Some(Touch { tip_z: peak, feature: Feature::Face, along: 0.0 });
+        }
+        // Nor does any point of it, if all lie that far from where the cutter touches the plane.
+        for k in (0..3).filter(|&k| outside[k]) {
+            let away = beyond[k] / Side::of(self.corners(), k).length();
+            if peak - gap(self.bend, self.bend_within, away) <= floor {
                 return None;
             }
-            let at = [x + self.shift[0], y + self.shift[1]];
-            sides = [0, 1, 2].map(|k| self.outside(k, at));
-            if sides == [false; 3] {
-                return Some(Touch { tip_z, feature: Feature::Face, along: 0.0 });
-            }
         }
+        self.touch_sides(outside, profile, x, y, floor)
+    }
+
+    /// Rests the cutter on some of the sides.
+    fn touch_sides(&self, sides: [bool; 3], profile: &Profile, x: f64, y: f64, floor: f64) -> Option<Touch> {
+        let mut best: Option<Touch> = None;
         for k in (0..3).filter(|&k| sides[k]) {
             let least = best.map_or(floor, |b| b.tip_z);
-            best = self.touch_side(k, profile, x, y, least).or(best);
+            best = Side::of(self.corners(), k).touch(k, profile, x, y, least).or(best);
         }
         best
     }
 
-    fn outside(&self, k: usize, p: [f64; 2]) -> bool {
-        let (a, b) = (&self.corners[k], &self.corners[(k + 1) % 3]);
-        self.winding * ((b.x - a.x) * (p[1] - a.y) - (b.y - a.y) * (p[0] - a.x)) < 0.0
+    /// Barycentric coordinates of the place of contact of a cutter at `(x, y)`, in the facet's
+    /// order of corners.
+    fn weights(&self, touch: &Touch, x: f64, y: f64) -> [f64; 3] {
+        let mut weights = [0.0; 3];
+        match touch.feature {
+            Feature::Corner(k) => weights[k] = 1.0,
+            Feature::Side(k) => {
+                (weights[k], weights[(k + 1) % 3]) = (1.0 - touch.along, touch.along);
+            }
+            Feature::Face => {
+                let at = [x + self.shift[0], y + self.shift[1]];
+                let areas = [1, 2, 0].map(|k| -Side::of(self.corners(), k).area_beyond(at));
+                let sum: f64 = areas.iter().sum();
+                weights = areas.map(|w| w / sum);
+            }
+        }
+        weights
     }
 
-    fn touch_side(&self, k: usize, profile: &Profile, x: f64, y: f64, floor: f64) -> Option<Touch> {
-        let end = (k + 1) % 3;
-        let (a, b) = (&self.corners[k], &self.corners[end]);
+    /// The place of contact: the point, its barycentric coordinates and its feature, these in the
+    /// mesh's order of corners. `normal` is the triangle's.
+    pub(super) fn contact(&self, touch: &Touch, normal: &Vector3, x: f64, y: f64) -> Contact {
+        let mut barycentric = self.weights(touch, x, y);
+        let corners = self.corners();
+        let point = Point3::from((0..3).map(|k| corners[k].coords * barycentric[k]).sum::<Vector3>());
+        let mut feature = touch.feature;
+        if turned(normal) {
+            barycentric.swap(1, 2);
+            feature = match feature {
+                Feature::Face => Feature::Face,
+                Feature::Side(k) => Feature::Side(2 - k),
+                Feature::Corner(k) => Feature::Corner((3 - k) % 3),
+            };
+        }
+        Contact { point, barycentric, feature }
+    }
+}
+
+/// See [`Facet::contact`].
+pub(super) struct Contact {
+    pub(super) point: Point3,
+    pub(super) barycentric: [f64; 3],
+    pub(super) feature: Feature,
+}
+
+/// A side of a facet.
+struct Side<'f> {
+    from: &'f Point3,
+    to: &'f Point3,
+    /// In the plan view.
+    along: [f64; 2],
+}
+
+impl<'f> Side<'f> {
+    fn of(corners: [&'f Point3; 3], k: usize) -> Self {
+        let (from, to) = (corners[k], corners[(k + 1) % 3]);
+        Self { from, to, along: [to.x - from.x, to.y - from.y] }
+    }
+
+    /// In the plan view.
+    fn length(&self) -> f64 {
+        (self.along[0] * self.along[0] + self.along[1] * self.along[1]).sqrt()
+    }
+
+    /// Twice the area between the side and `p`, positive where `p` lies outside the facet.
+    fn area_beyond(&self, p: [f64; 2]) -> f64 {
+        self.along[1] * (p[0] - self.from.x) - self.along[0] * (p[1] - self.from.y)
+    }
+
+    /// Rests the cutter on this side alone, the `k`-th of its triangle, if that comes above `floor`.
+    fn touch(&self, k: usize, profile: &Profile, x: f64, y: f64, floor: f64) -> Option<Touch> {
+        let (a, b) = (self.from, self.to);
         if a.z.max(b.z) - profile.height_squared(0.0) <= floor {
             return None;
         }
-        let (dx, dy, dz) = (b.x - a.x, b.y - a.y, b.z - a.z);
+        let (dz, length) = (b.z - a.z, self.length());
         let (ax, ay) = (a.x - x, a.y - y);
-        let length2 = dx * dx + dy * dy;
         let reach2 = profile.radius * profile.radius;
-        let (along, rho2) = if length2 == 0.0 {
+        let (along, rho2) = if length == 0.0 {
             (if dz > 0.0 { 1.0 } else { 0.0 }, ax * ax + ay * ay)
         } else {
-            let length = length2.sqrt();
-            let (ux, uy) = (dx / length, dy / length);
-            let h = ax * uy - ay * ux;
-            let start = ax * ux + ay * uy;
-            let place = profile.along_line(h.abs(), dz / length)?;
-            let place_on_side = place.clamp(start, start + length);
-            let along = if place_on_side == start {
+            let unit = self.along.map(|d| d / length);
+            let h = ax * unit[1] - ay * unit[0];
+            let start = ax * unit[0] + ay * unit[1];
+            let place = profile.along_line(h.abs(), dz, length)?;
+            let end = start + length;
+            let on_side = place.clamp(start, end);
+            let along = if on_side == start {
                 0.0
-            } else if place_on_side == start + length {
+            } else if on_side == end {
                 1.0
             } else {
-                (place_on_side - start) / length
+                (on_side - start) / length
             };
-            // A place on the line within reach may lie at the radius up to rounding.
-            let limit = if place_on_side == place { reach2 } else { f64::INFINITY };
-            (along, (h * h + place_on_side * place_on_side).min(limit))
+            // A place on the line within reach may lie beyond the radius by rounding.
+            let limit = if on_side == place { reach2 } else { f64::INFINITY };
+            (along, (h * h + on_side * on_side).min(limit))
         };
         if rho2 > reach2 {
             return None;
@@ -276,36 +416,9 @@ impl Facet {
         let tip_z = z - profile.height_squared(rho2);
         let feature = match along {
             0.0 => Feature::Corner(k),
-            1.0 => Feature::Corner(end),
+            1.0 => Feature::Corner((k + 1) % 3),
             _ => Feature::Side(k),
         };
         (tip_z > floor).then_some(Touch { tip_z, feature, along })
-    }
-
-    /// Barycentric coordinates of the place of contact of a cutter at `(x, y)`.
-    pub(super) fn barycentric(&self, touch: &Touch, x: f64, y: f64) -> [f64; 3] {
-        let mut weights = [0.0; 3];
-        match touch.feature {
-            Feature::Corner(k) => weights[k] = 1.0,
-            Feature::Side(k) => {
-                (weights[k], weights[(k + 1) % 3]) = (1.0 - touch.along, touch.along);
-            }
-            Feature::Face => {
-                let p = [x + self.shift[0], y + self.shift[1]];
-                let twice = |a: &Point3, b: &Point3| {
-                    ((b.x - a.x) * (p[1] - a.y) - (b.y - a.y) * (p[0] - a.x)) * self.winding
-                };
-                let [a, b, c] = &self.corners;
-                let areas = [twice(b, c), twice(c, a), twice(a, b)];
-                let sum: f64 = areas.iter().sum();
-                weights = areas.map(|w| w / sum);
-            }
-        }
-        weights
-    }
-
-    /// The point with the given barycentric coordinates.
-    pub(super) fn point(&self, barycentric: [f64; 3]) -> Point3 {
-        Point3::from((0..3).map(|k| self.corners[k].coords * barycentric[k]).sum::<Vector3>())
     }
 }
