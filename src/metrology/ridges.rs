@@ -266,7 +266,7 @@ pub(super) fn scallop_figures(samples: &[RidgeSample], limits: &Limits) -> Scall
     let total: f64 = samples.iter().map(|s| s.length).sum();
     let highest = samples.iter().max_by(|a, b| a.height.total_cmp(&b.height));
     let (Some(highest), true) = (highest, total > 0.0) else {
-        figures.reason = Some("no two passes meet on the part, so there is no ridge to measure".into());
+        figures.reason = Some("no ridge stands between passes on the part".into());
         return figures;
     };
     let mut by_height: Vec<(f64, f64)> = samples.iter().map(|s| (s.height, s.length)).collect();

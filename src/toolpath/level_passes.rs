@@ -8,6 +8,7 @@ use super::chart::Chart;
 use super::drop::DropCutter;
 use super::plan::{PassSettings, Passes, PlanError};
 use super::spacing::{level_tangent, place_levels};
+use super::strip::axis_offset;
 use crate::cutter::Cutter;
 use crate::field::{LevelCurve, LevelTracer, ScalarField, surface_gradient_length};
 use crate::geometry::Point3;
@@ -154,16 +155,12 @@ struct Guide<'a> {
 }
 
 impl Guide<'_> {
-    /// Where the tip is when the curve's point `(u, v)` guides the cutter.
-    ///
-    /// A ball is put where it touches that point, then dropped, so that it is held off by any other
-    /// place of the part. Cutters with a flat have no single place where they touch a level plane:
-    /// the curve guides their axis.
+    /// Where the tip is when the cutter touches the chart at `(u, v)`: put there by the chart's
+    /// normal, then dropped, so that it is held off by any other place of the part.
     fn tip(&self, [u, v]: [f64; 2]) -> Option<Point3> {
         let p = self.chart.at(u, v)?;
-        let offset = if self.cutter.flat_radius() > 0.0 { 0.0 } else { self.cutter.corner_radius() };
-        let (x, y) = (p.jet.p.x + offset * p.normal.x, p.jet.p.y + offset * p.normal.y);
-        self.drop.at(x, y).map(|d| Point3::new(x, y, d.tip_z))
+        let axis = p.jet.p.xy() + axis_offset(self.cutter, &p.normal);
+        self.drop.at(axis.x, axis.y).map(|d| Point3::new(axis.x, axis.y, d.tip_z))
     }
 
     /// Appends the further passes that a gap needs.

@@ -41,7 +41,7 @@ pub fn passes(
     };
     let (along, across) = (Vector2::new(angle.cos(), angle.sin()), Vector2::new(-angle.sin(), angle.cos()));
     let extent = |e: &Vector2| {
-        let all = charts.iter().map(|c| c.extent_of_centres(part, cutter, e));
+        let all = charts.iter().map(|c| c.extent_of_axes(part, cutter, e));
         all.fold([f64::INFINITY, f64::NEG_INFINITY], |a, b| [a[0].min(b[0]), a[1].max(b[1])])
     };
     let (from_to, sides) = (extent(&along), extent(&across));

@@ -117,3 +117,14 @@ fn a_rapid_through_the_part_is_a_gouge() {
     assert!((m.gouge.max_depth_mm - 0.1).abs() < 1e-6);
     assert_eq!(m.gouge.regions[0].move_index, 0);
 }
+#[test]
+fn dbg_flat() {
+    let part = formula(AnalyticShape::Wave { amplitude: 2.0, wavelength_x: 40.0, wavelength_y: None }, [0.0, 40.0], [0.0, 30.0]);
+    let cutter = Cutter::flat(6.0).unwrap();
+    let d = millstream::toolpath::DropCutter::new(&part, &cutter);
+    for (x, y) in [(3.0, 2.0), (0.0, 0.25), (10.0, 7.25), (20.2, 3.0), (33.6, 3.0)] {
+        println!("{x} {y} {:?}", d.at(x, y).map(|d| (d.tip_z, d.contact.point)));
+    }
+    let p = millstream::toolpath::plan(&part, &cutter, &Strategy::Zigzag{angle:0.0, one_way:false}, &settings(&part, Step::Stepover(2.0)), &millstream::monitor::Silent).unwrap();
+    println!("{:?}", p);
+}
