@@ -34,7 +34,8 @@ fn wavy() -> Part {
 
 /// Places without order: the golden ratio and its plastic cousin fill the square evenly.
 fn scattered() -> Vec<[f64; 2]> {
-    let place = |k: u64| [0.754_877_666_246_692_8, 0.569_840_290_998_053_2].map(|a| SIZE * (a * k as f64).fract());
+    let place =
+        |k: u64| [0.754_877_666_246_692_8, 0.569_840_290_998_053_2].map(|a| SIZE * (a * k as f64).fract());
     (0..PLACES).map(place).collect()
 }
 

@@ -37,3 +37,14 @@ pub fn try_map<T: Send, E: Send>(
 pub fn for_each_chunk<T: Send>(items: &mut [T], chunk_len: usize, f: impl Fn(usize, &mut [T]) + Sync + Send) {
     items.par_chunks_mut(chunk_len.max(1)).enumerate().for_each(|(k, chunk)| f(k, chunk));
 }
+
+/// Calls `f(k, item)` on every item, stopping at the first error found.
+///
+/// # Errors
+/// The error of the closure.
+pub fn try_for_each<T: Send, E: Send>(
+    items: &mut [T],
+    f: impl Fn(usize, &mut T) -> Result<(), E> + Sync + Send,
+) -> Result<(), E> {
+    items.par_iter_mut().enumerate().try_for_each(|(k, item)| f(k, item))
+}

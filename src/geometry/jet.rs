@@ -108,3 +108,103 @@ impl Jet2 {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use proptest::prelude::*;
+
+    /// A jet with z = ½(a x² + 2 b x y + c y²) + p x + q y at the origin.
+    fn graph([p, q]: [f64; 2], [a, b, c]: [f64; 3]) -> Jet2 {
+        let up = |z| Vector3::new(0.0, 0.0, z);
+        Jet2 {
+            p: Point3::origin(),
+            du: Vector3::new(1.0, 0.0, p),
+            dv: Vector3::new(0.0, 1.0, q),
+            duu: up(a),
+            duv: up(b),
+            dvv: up(c),
+        }
+    }
+
+    #[test]
+    fn a_torus_has_its_two_curvatures() {
+        // Major radius 10, minor 3, at angle v around the tube: outward curvatures −1/3 and
+        // −cos v / (10 + 3 cos v).
+        let (big, small) = (10.0, 3.0);
+        for v in [0.0, 0.4, 1.3, 2.0, 3.1] {
+            let (sv, cv) = f64::sin_cos(v);
+            let (su, cu) = f64::sin_cos(0.7);
+            let ring = big + small * cv;
+            let jet = Jet2 {
+                p: Point3::new(ring * cu, ring * su, small * sv),
+                du: Vector3::new(-ring * su, ring * cu, 0.0),
+                dv: Vector3::new(-small * sv * cu, -small * sv * su, small * cv),
+                duu: Vector3::new(-ring * cu, -ring * su, 0.0),
+                duv: Vector3::new(small * sv * su, -small * sv * cu, 0.0),
+                dvv: Vector3::new(-small * cv * cu, -small * cv * su, -small * sv),
+            };
+            assert_relative_eq!(jet.normal().unwrap(), Vector3::new(cv * cu, cv * su, sv), epsilon = 1e-14);
+            let k = jet.principal_curvatures().unwrap();
+            assert_relative_eq!(k.min, -1.0 / small, epsilon = 1e-13);
+            assert_relative_eq!(k.max, -cv / ring, epsilon = 1e-13);
+            assert_relative_eq!(k.max_direction.dot(&jet.du.normalize()).abs(), 1.0, epsilon = 1e-12);
+        }
+    }
+
+    #[test]
+    fn bowls_are_positive_and_umbilics_have_a_frame() {
+        let k = graph([0.0, 0.0], [0.5, 0.0, 0.5]).principal_curvatures().unwrap();
+        assert_relative_eq!(k.min, 0.5);
+        assert_relative_eq!(k.max, 0.5);
+        assert_relative_eq!(k.min_direction.dot(&k.max_direction), 0.0);
+        assert_relative_eq!(k.min_direction.norm(), 1.0, epsilon = 1e-15);
+    }
+
+    #[test]
+    fn degenerate_jets_say_so() {
+        let mut jet = graph([0.0, 0.0], [1.0, 0.0, 1.0]);
+        jet.dv = jet.du * 2.0;
+        assert!(jet.normal().is_none() && jet.principal_curvatures().is_none());
+        assert!(jet.pull_back(&Vector3::x()).is_none() && jet.normal_curvature(1.0, 0.0).is_none());
+        jet.du = Vector3::zeros();
+        jet.dv = Vector3::zeros();
+        assert!(jet.normal().is_none() && jet.pull_back(&Vector3::x()).is_none());
+        assert!(graph([0.0, 0.0], [1.0; 3]).normal_curvature(0.0, 0.0).is_none());
+    }
+
+    proptest! {
+        /// Principal curvatures bound every normal section, are attained along their directions, and
+        /// Euler's formula gives all others; none of it depends on the parametrisation.
+        #[test]
+        fn euler(
+            slope in proptest::array::uniform2(-2.0f64..2.0),
+            bend in proptest::array::uniform3(-1.0f64..1.0),
+            angle in 0.0f64..3.2,
+            [a, d] in proptest::array::uniform2(0.5f64..2.0),
+            [b, c] in proptest::array::uniform2(-0.4f64..0.4),
+        ) {
+            let jet = graph(slope, bend);
+            let k = jet.principal_curvatures().unwrap();
+            let tangent = k.min_direction * angle.cos() + k.max_direction * angle.sin();
+            let (s, t) = jet.pull_back(&tangent).unwrap();
+            prop_assert!((jet.du * s + jet.dv * t - tangent).norm() < 1e-12);
+            let euler = k.min * angle.cos().powi(2) + k.max * angle.sin().powi(2);
+            prop_assert!((jet.normal_curvature(s, t).unwrap() - euler).abs() < 1e-12);
+            let (_, m, _) = jet.second_form(&jet.normal().unwrap());
+            prop_assert!((m - bend[1] / (1.0 + slope[0].powi(2) + slope[1].powi(2)).sqrt()).abs() < 1e-14);
+            // Other parameters on the same side: a d − b c > 0.
+            let other = Jet2 {
+                p: jet.p,
+                du: jet.du * a + jet.dv * b,
+                dv: jet.du * c + jet.dv * d,
+                duu: jet.duu * (a * a) + jet.duv * (2.0 * a * b) + jet.dvv * (b * b),
+                duv: jet.duu * (a * c) + jet.duv * (a * d + b * c) + jet.dvv * (b * d),
+                dvv: jet.duu * (c * c) + jet.duv * (2.0 * c * d) + jet.dvv * (d * d),
+            };
+            let same = other.principal_curvatures().unwrap();
+            prop_assert!((same.min - k.min).abs() < 1e-9 && (same.max - k.max).abs() < 1e-9);
+        }
+    }
+}

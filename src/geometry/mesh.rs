@@ -99,7 +99,10 @@ pub enum MeshError {
         vertices: usize,
     },
     /// A coordinate is not a number or infinite.
-    #[error("triangle {triangle} has the corner ({}), which is not finite; export the part again", show(point))]
+    #[error(
+        "triangle {triangle} has the corner ({}), which is not finite; export the part again",
+        show(point)
+    )]
     NotFinite {
         /// Which triangle.
         triangle: usize,
@@ -110,7 +113,8 @@ pub enum MeshError {
     #[error(
         "triangle {triangle} has the corner ({}) mm; coordinates must lie within ±{} mm: \
          check the units of the export, and move the part near the origin",
-        show(point), super::MAX_COORDINATE
+        show(point),
+        super::MAX_COORDINATE
     )]
     TooFar {
         /// Which triangle.

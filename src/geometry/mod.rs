@@ -2,20 +2,24 @@
 
 mod aabb;
 mod analytic;
+mod bspline;
 mod bvh;
 mod jet;
 mod mesh;
 mod nurbs;
+#[cfg(test)]
+pub(crate) mod samples;
 mod tessellate;
 
 pub use aabb::Aabb;
-pub use analytic::{AnalyticError, AnalyticShape, AnalyticSurface};
-pub(crate) use bvh::{Feature, Node, round_down, round_up};
+pub use analytic::{AnalyticError, AnalyticShape, AnalyticSurface, HeightJet, MAX_SLOPE};
+pub use bspline::{KnotError, KnotVector, MAX_BASIS, MAX_DEGREE};
 pub use bvh::{Bvh, MeshFoot, VerticalHit};
+pub(crate) use bvh::{Feature, Node, round_down, round_up};
 pub use jet::{Jet2, PrincipalCurvatures};
 pub use mesh::{MeshError, RepairNotes, TriangleMesh};
-pub use nurbs::{NurbsError, NurbsSurface};
-pub use tessellate::{Tessellation, tessellate};
+pub use nurbs::{MAX_WEIGHT, NurbsError, NurbsSurface};
+pub use tessellate::{MAX_TRIANGLES, TessellateError, Tessellation, tessellate};
 
 /// A point, mm.
 pub type Point3 = nalgebra::Point3<f64>;

@@ -1,1 +1,25 @@
-//! stub
+//! The tables, pictures and pages that people read. Enters: figures and maps. Leaves: texts and
+//! rasters; writing them to files is the business of [`crate::io`] and [`crate::cli`].
+
+mod canvas;
+#[cfg(test)]
+mod fixture;
+mod histogram;
+mod html;
+mod map;
+mod result;
+mod scale;
+mod surface_mesh;
+mod table;
+mod verdict;
+
+pub use canvas::Picture;
+pub use histogram::Histogram;
+pub use html::{ToolpathPage, html_page};
+pub use map::{MapWords, deviation_picture, deviation_range, height_picture};
+pub use result::{
+    ReportError, RunReport, SimulationFigures, SurfaceMeshFigures, ToleranceFigures, ToolpathResult,
+};
+pub use surface_mesh::{MAX_TRIANGLES, SurfaceMesh, surface_mesh};
+pub use table::{conclusion, result_table};
+pub use verdict::{HIGHEST_RIDGE, Verdict, Violation, place, violations};

@@ -46,6 +46,29 @@ pub enum GridError {
     },
 }
 
+/// Cells of this pitch that cover a length.
+fn count(length: f64, cell: f64) -> f64 {
+    // The hair keeps 0.3 / 0.1 from taking a fourth cell.
+    (length / cell - 1e-9).ceil().max(1.0)
+}
+
+/// A cell, mm, rounded up to two digits, of which no more than `cells` cover a rectangle (or a single
+/// one does).
+fn fitting_cell(width: f64, depth: f64, cells: f64) -> f64 {
+    let mut cell = (width * depth / cells).sqrt().min(width.max(depth));
+    loop {
+        let digit = 10f64.powf(cell.log10().floor() - 1.0);
+        // Through decimal digits, so that messages say 0.35 and not 0.35000000000000003.
+        let rounded = format!("{:.1e}", (cell / digit).ceil() * digit).parse().unwrap_or(cell);
+        let needed = count(width, rounded) * count(depth, rounded);
+        if needed <= cells || needed <= 1.0 {
+            return rounded;
+        }
+        // Whole rows and columns need a little more than the area alone.
+        cell = 1.01 * rounded;
+    }
+}
+
 impl Grid {
     /// Covers the rectangle of `area` with cells whose centres lie half a cell inside its border.
     /// `bytes_per_cell` is what the caller will allocate a cell in all; `memory` the bytes allowed.
@@ -60,12 +83,9 @@ impl Grid {
         if !(size.x > 0.0 && size.y > 0.0 && size.x.is_finite() && size.y.is_finite()) {
             return Err(GridError::Area);
         }
-        let count = |length: f64| (length / cell - 1e-9).ceil().max(1.0);
-        let (nx, ny) = (count(size.x), count(size.y));
+        let (nx, ny) = (count(size.x, cell), count(size.y, cell));
         let needed = nx * ny * bytes_per_cell as f64;
         if needed > memory as f64 {
-            let exact = (size.x * size.y * bytes_per_cell as f64 / memory as f64).sqrt() * 1.01;
-            let digit = 10f64.powf(exact.log10().floor() - 1.0);
             const MIB: f64 = 1048576.0;
             return Err(GridError::Memory {
                 cell,
@@ -73,7 +93,7 @@ impl Grid {
                 ny: ny as usize,
                 needed_mib: (needed / MIB).ceil() as usize,
                 allowed_mib: (memory as f64 / MIB) as usize,
-                fitting: (exact / digit).ceil() * digit,
+                fitting: fitting_cell(size.x, size.y, memory as f64 / bytes_per_cell as f64),
             });
         }
         let origin = Point2::new(
@@ -109,5 +129,25 @@ impl Grid {
         let j = ((y - self.origin.y) / self.cell).round();
         let inside = i >= 0.0 && j >= 0.0 && i < self.nx as f64 && j < self.ny as f64;
         inside.then_some((i as usize, j as usize))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Point3;
+
+    #[test]
+    fn the_cell_that_is_said_to_fit_does_fit() {
+        for (width, depth) in [(800.0, 6.0), (60.0, 40.0), (0.3, 5000.0), (1.0, 1.0)] {
+            let area = Aabb { min: Point3::origin(), max: Point3::new(width, depth, 1.0) };
+            for memory in [60u64, 1000, 2 << 20, 50 << 20] {
+                let Err(GridError::Memory { fitting, .. }) = Grid::covering(&area, 1e-4, 52, memory) else {
+                    panic!()
+                };
+                let grid = Grid::covering(&area, fitting, 52, memory).unwrap();
+                assert!(grid.len() as u64 * 52 <= memory, "{width} x {depth} in {memory}");
+            }
+        }
     }
 }

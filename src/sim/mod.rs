@@ -1,11 +1,19 @@
 //! Stock, the swept cutter, and the engines that cut. Sees stock, cutter and moves only: neither
 //! strategies nor the design part.
 
+mod bins;
+mod envelope;
+mod form;
 mod grid;
 mod reference;
+#[cfg(test)]
+pub(crate) mod scenes;
 mod swept;
+mod track;
 mod zmap;
 
+pub use bins::MoveBins;
+pub use envelope::Envelope;
 pub use grid::{Grid, GridError};
 pub use reference::cut_reference;
 pub use swept::SweptMove;

@@ -97,12 +97,12 @@ impl<'a> DropCutter<'a> {
         exact: Option<(&'a dyn ExactSurface, f64)>,
     ) -> Self {
         let profile = Profile::of(cutter, 0.0);
-        let search = exact.map_or(profile, |(_, deviation)| Profile::of(cutter, DEVIATION_MARGIN * deviation));
-        let facets =
-            crate::parallel::map(bvh.slots(), |slot| {
-                let t = bvh.triangle_in(slot);
-                Facet::new(mesh.corners(t), &mesh.normal(t), &search)
-            });
+        let search =
+            exact.map_or(profile, |(_, deviation)| Profile::of(cutter, DEVIATION_MARGIN * deviation));
+        let facets = crate::parallel::map(bvh.slots(), |slot| {
+            let t = bvh.triangle_in(slot);
+            Facet::new(mesh.corners(t), &mesh.normal(t), &search)
+        });
         let roofs = crate::parallel::map(bvh.boxes(), |index| {
             bvh.few_slots_in(index, roof::MOST_BELOW).map_or(Roof::NONE, |(node, slots)| {
                 let below: Vec<_> = slots.iter().map(|&s| mesh.corners(bvh.triangle_in(s))).collect();

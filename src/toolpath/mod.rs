@@ -1,10 +1,19 @@
 //! Cutter contacts, cutter locations, moves and the strategies that plan them. Knows nothing of how
 //! stock is stored.
 
+mod border;
+mod chart;
+mod chord;
 mod drop;
+mod level_passes;
+mod link;
 mod path;
 mod plan;
+mod strip;
+mod zigzag;
 
+pub use chord::distance_to_segment;
 pub use drop::{Drop, DropCutter};
 pub use path::{CcPoint, ClPoint, Move, MoveKind, Toolpath};
 pub use plan::{Along, FeedDirection, Plan, PlanError, PlanSettings, Step, Strategy, plan};
+pub use strip::{ball_scallop_height, cutter_curvature, strip_width};

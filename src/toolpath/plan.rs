@@ -1,7 +1,10 @@
 //! What a strategy is asked for, and the one entrance to all strategies.
 
-use super::Toolpath;
+use super::chord::{reduce, sample_within_chord};
+use super::link::chain;
+use super::{Toolpath, level_passes, zigzag};
 use crate::cutter::Cutter;
+use crate::geometry::Point3;
 use crate::monitor::{Cancelled, Monitor};
 use crate::part::Part;
 
@@ -101,16 +104,93 @@ pub struct Plan {
     pub notes: Vec<String>,
 }
 
+impl PlanError {
+    pub(super) fn mesh(reason: &str) -> Self {
+        Self::NotApplicable { strategy: "a mesh", reason: format!("no surface could be fitted: {reason}") }
+    }
+}
+
+/// What every pass needs.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PassSettings {
+    /// Distance of passes, already less what the chords may add.
+    pub step: Step,
+    /// First sampling distance along a pass, mm.
+    pub sampling: f64,
+    /// Chord tolerance, mm.
+    pub chord_tolerance: f64,
+}
+
+/// Share of the chord tolerance that sampling may use; point reduction uses the rest.
+const SAMPLING_SHARE: f64 = 0.4;
+
+impl PassSettings {
+    /// Straight moves along `locate` over `[s0, s1]` within the chord tolerance.
+    pub fn moves(&self, s0: f64, s1: f64, locate: &mut dyn FnMut(f64) -> Option<Point3>) -> Vec<Point3> {
+        let fine = SAMPLING_SHARE * self.chord_tolerance;
+        let points = sample_within_chord(s0, s1, self.sampling, fine, locate);
+        reduce(&points, self.chord_tolerance - fine)
+    }
+}
+
+/// Planned passes, not yet joined, and remarks for the user.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Passes {
+    /// Tip positions of each pass.
+    pub passes: Vec<Vec<Point3>>,
+    /// Remarks.
+    pub notes: Vec<String>,
+}
+
+impl Passes {
+    /// Appends the passes and remarks of another piece of the part.
+    pub fn append(&mut self, other: Self) {
+        self.passes.extend(other.passes);
+        self.notes.extend(other.notes);
+    }
+}
+
+/// First sampling distance along a pass as a share of the cutter's radius: features narrower than
+/// that could hide between two samples of a pass.
+const SAMPLING_OVER_RADIUS: f64 = 0.15;
+
+/// A scallop target is planned for less the chord tolerance, which may raise a ridge by as much,
+/// but not for less than this share of itself.
+const LEAST_SHARE_OF_TARGET: f64 = 0.5;
+
 /// Plans one path.
 ///
 /// # Errors
 /// See [`PlanError`].
 pub fn plan(
-    _part: &Part,
-    _cutter: &Cutter,
-    _strategy: &Strategy,
-    _settings: &PlanSettings,
-    _monitor: &dyn Monitor,
+    part: &Part,
+    cutter: &Cutter,
+    strategy: &Strategy,
+    settings: &PlanSettings,
+    monitor: &dyn Monitor,
 ) -> Result<Plan, PlanError> {
-    todo!()
+    let step = match settings.step {
+        Step::Scallop(h) => Step::Scallop((h - settings.chord_tolerance).max(LEAST_SHARE_OF_TARGET * h)),
+        stepover => stepover,
+    };
+    let sampling = SAMPLING_OVER_RADIUS * cutter.radius();
+    let pass = PassSettings { step, sampling, chord_tolerance: settings.chord_tolerance };
+    let (passes, both_ways) = match *strategy {
+        Strategy::Zigzag { angle, one_way } => {
+            (zigzag::passes(part, cutter, angle, &pass, monitor)?, !one_way)
+        }
+        Strategy::IsoParametric { along } => {
+            (level_passes::iso_parametric(part, cutter, along, &pass, monitor)?, true)
+        }
+        Strategy::Streamline { direction, control_points } => {
+            let passes = level_passes::streamline(part, cutter, direction, control_points, &pass, monitor)?;
+            (passes, true)
+        }
+    };
+    let Passes { passes, mut notes } = passes;
+    let path = chain(passes, both_ways, settings);
+    if path.is_empty() {
+        notes.push("no pass reaches the part: the program is empty".into());
+    }
+    Ok(Plan { path, notes })
 }

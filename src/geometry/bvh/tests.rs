@@ -112,7 +112,11 @@ fn the_foot_on_a_triangle_beats_every_sample() {
     for flat in [1.0, 1e-3, 1e-7] {
         for _ in 0..50 {
             let corners = [0, 1, 2].map(|_| {
-                Point3::new(numbers.within(-1.0, 1.0), flat * numbers.within(-1.0, 1.0), numbers.within(-1.0, 1.0))
+                Point3::new(
+                    numbers.within(-1.0, 1.0),
+                    flat * numbers.within(-1.0, 1.0),
+                    numbers.within(-1.0, 1.0),
+                )
             });
             let q = Point3::from(Vector3::from_fn(|_, _| numbers.within(-2.0, 2.0)));
             let foot = closest_on_triangle(&corners, &q);
@@ -138,9 +142,8 @@ fn the_sign_is_right_where_two_faces_are_equally_near() {
     let (a, b) = (Point3::new(0.0, 0.0, 0.0), Point3::new(0.0, 10.0, 0.0));
     let (c, d) = (Point3::new(1.0, 0.0, -8.0), Point3::new(1.0, 10.0, -8.0));
     let (e, f) = (Point3::new(-1.0, 0.0, -8.0), Point3::new(-1.0, 10.0, -8.0));
-    let triangles = vec![
-        [0, 2, 3], [0, 3, 1], [0, 1, 5], [0, 5, 4], [2, 4, 5], [2, 5, 3], [0, 4, 2], [1, 3, 5],
-    ];
+    let triangles =
+        vec![[0, 2, 3], [0, 3, 1], [0, 1, 5], [0, 5, 4], [2, 4, 5], [2, 5, 3], [0, 4, 2], [1, 3, 5]];
     let mesh = mesh_of(vec![a, b, c, d, e, f], triangles);
     assert!(mesh.is_closed());
     let bvh = Bvh::new(&mesh);
@@ -162,8 +165,7 @@ fn vertical_lines_agree_with_brute_force_and_never_slip_through() {
     let mesh = mesh_of(scaled, base.triangles().to_vec());
     let bvh = Bvh::new(&mesh);
     let mut numbers = Numbers(11);
-    let mut places: Vec<[f64; 2]> =
-        (0..500).map(|_| [0, 1].map(|_| numbers.within(-0.5, 7.0))).collect();
+    let mut places: Vec<[f64; 2]> = (0..500).map(|_| [0, 1].map(|_| numbers.within(-0.5, 7.0))).collect();
     places.extend(mesh.vertices().iter().map(|p| [p.x, p.y]));
     for face in mesh.triangles() {
         for k in 0..3 {

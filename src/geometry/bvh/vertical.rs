@@ -42,9 +42,9 @@ pub(super) fn height_on_triangle(corners: &[Point3; 3], x: f64, y: f64) -> Optio
     let (left, right) = (weights.iter().any(|&w| w > 0.0), weights.iter().any(|&w| w < 0.0));
     match (left, right) {
         (true, true) => None,
-        (false, false) => (0..3)
-            .filter_map(|k| height_on_side(corners, k, x, y))
-            .max_by(|a, b| a.0.total_cmp(&b.0)),
+        (false, false) => {
+            (0..3).filter_map(|k| height_on_side(corners, k, x, y)).max_by(|a, b| a.0.total_cmp(&b.0))
+        }
         _ => {
             let sum: f64 = weights.iter().sum();
             let barycentric = weights.map(|w| w / sum);

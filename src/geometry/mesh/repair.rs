@@ -318,9 +318,8 @@ fn orient(vertices: &[Point3], soup: &mut Soup, neighbours: &mut [[u32; 3]]) -> 
                 }
                 let (other, from, to) =
                     (neighbours[t][k] as usize, soup.faces[t][k], soup.faces[t][(k + 1) % 3]);
-                let against = (0..3).any(|j| {
-                    soup.faces[other][j] == from && soup.faces[other][(j + 1) % 3] == to
-                });
+                let against =
+                    (0..3).any(|j| soup.faces[other][j] == from && soup.faces[other][(j + 1) % 3] == to);
                 let wanted = turned[t].map(|f| f ^ against);
                 if turned[other].is_none() {
                     turned[other] = wanted;

@@ -54,7 +54,10 @@ fn a_clean_mesh_keeps_its_numbering() {
 #[test]
 fn a_soup_is_welded_and_minus_zero_is_zero() {
     let (mut vertices, triangles) = unweld(&cube());
-    vertices.iter_mut().step_by(2).for_each(|p| *p = Point3::from(p.coords.map(|x| if x == 0.0 { -0.0 } else { x })));
+    vertices
+        .iter_mut()
+        .step_by(2)
+        .for_each(|p| *p = Point3::from(p.coords.map(|x| if x == 0.0 { -0.0 } else { x })));
     let (mesh, notes) = TriangleMesh::new(vertices, triangles).unwrap();
     assert_eq!((mesh.vertices().len(), notes.merged_vertices), (8, 28));
     assert!(mesh.is_closed() && notes.is_clean());
@@ -153,7 +156,10 @@ fn what_cannot_be_repaired_is_refused_with_its_place() {
         v.push(Point3::new(-1.0, -1.0, 0.5));
         t.push([0, 4, 8]);
     });
-    assert!(text.starts_with("3 triangles (5, 8, 12) meet at the edge from (0, 0, 0) to (0, 0, 1)"), "{text}");
+    assert!(
+        text.starts_with("3 triangles (5, 8, 12) meet at the edge from (0, 0, 0) to (0, 0, 1)"),
+        "{text}"
+    );
 }
 
 #[test]

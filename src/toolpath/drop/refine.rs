@@ -125,7 +125,8 @@ impl<'s, J: Fn(f64, f64) -> Jet2> Hill<'s, J> {
     /// Climbs from `start` to a local maximum; `None` where the surface near `start` is out of the
     /// cutter's reach, or when the climb heads for a `known` maximum.
     pub(super) fn climb(&self, start: [f64; 2], known: impl Iterator<Item = [f64; 2]>) -> Option<Peak> {
-        let mut here = self.reachable([0, 1].map(|i| start[i].clamp(self.domain[i][0], self.domain[i][1])))?;
+        let mut here =
+            self.reachable([0, 1].map(|i| start[i].clamp(self.domain[i][0], self.domain[i][1])))?;
         let mut model = self.model(&here.jet);
         let mut step = self.step(here.at, &here.jet, &model);
         let target = [here.at[0] + step.0[0], here.at[1] + step.0[1]];
@@ -159,9 +160,8 @@ impl<'s, J: Fn(f64, f64) -> Jet2> Hill<'s, J> {
     fn advance(&self, here: &Peak, (step, gain): &([f64; 2], f64)) -> Option<Peak> {
         let mut share = 1.0;
         for _ in 0..MAX_HALVINGS {
-            let at = [0, 1].map(|i| {
-                (here.at[i] + share * step[i]).clamp(self.domain[i][0], self.domain[i][1])
-            });
+            let at =
+                [0, 1].map(|i| (here.at[i] + share * step[i]).clamp(self.domain[i][0], self.domain[i][1]));
             if let Some(there) = self.reachable(at)
                 && there.tip_z > here.tip_z + 1e-4 * share * gain
             {

@@ -66,7 +66,6 @@ impl Roof {
         let climb = f64::from(self.gradient[0]) * (x - ox) + f64::from(self.gradient[1]) * (y - oy);
         let at = [x + f64::from(self.shift[0]), y + f64::from(self.shift[1])];
         let away = node.plan_distance_squared(at[0], at[1]).sqrt() - SLACK * profile.radius;
-        climb + f64::from(self.rest)
-            - gap(f64::from(self.bend), f64::from(self.bend_within), away.max(0.0))
+        climb + f64::from(self.rest) - gap(f64::from(self.bend), f64::from(self.bend_within), away.max(0.0))
     }
 }

@@ -240,7 +240,9 @@ fn drops_are_those_of_brute_force() {
     let mut numbers = Numbers(21);
     let slivers = mesh_of(
         (0..120)
-            .map(|_| Point3::new(numbers.within(0.0, 15.0), numbers.within(0.0, 15.0), numbers.within(0.0, 6.0)))
+            .map(|_| {
+                Point3::new(numbers.within(0.0, 15.0), numbers.within(0.0, 15.0), numbers.within(0.0, 6.0))
+            })
             .collect(),
         (0..40).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
     );

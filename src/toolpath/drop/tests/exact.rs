@@ -150,7 +150,9 @@ impl<F: Fn(f64, f64) -> [f64; 6] + Sync> ExactSurface for Graph<F> {
         let [z, zx, zy, zxx, zxy, zyy] = (self.z)(x, y);
         let (xu, xuu) = (STRETCH[0] * (1.0 + 0.04 * u), 0.04 * STRETCH[0]);
         let (yu, yv) = (STRETCH[2] * STRETCH[0], 1.0 / STRETCH[1]);
-        let second = |a: [f64; 2], b: [f64; 2]| zxx * a[0] * b[0] + zxy * (a[0] * b[1] + a[1] * b[0]) + zyy * a[1] * b[1];
+        let second = |a: [f64; 2], b: [f64; 2]| {
+            zxx * a[0] * b[0] + zxy * (a[0] * b[1] + a[1] * b[0]) + zyy * a[1] * b[1]
+        };
         let (du, dv) = ([xu, yu], [0.0, yv]);
         Jet2 {
             p: Point3::new(x, y, z),
@@ -253,9 +255,8 @@ fn bumps_borders_and_corners_agree_with_a_pattern_search() {
     };
     let graph = Graph::new(60, [[-0.4, 0.4], [-0.4, 0.4]], bumps);
     let mut numbers = Numbers(14);
-    let mut places: Vec<[f64; 2]> = (0..5)
-        .map(|_| place(numbers.within(-0.35, 0.35), numbers.within(-0.35, 0.35)))
-        .collect();
+    let mut places: Vec<[f64; 2]> =
+        (0..5).map(|_| place(numbers.within(-0.35, 0.35), numbers.within(-0.35, 0.35))).collect();
     // Beyond a border and beyond a corner.
     let [x, y] = place(0.4, 0.1);
     places.push([x + 0.7, y]);
@@ -267,7 +268,8 @@ fn bumps_borders_and_corners_agree_with_a_pattern_search() {
 #[test]
 fn flat_ground_takes_any_cutter() {
     // No curvature at all: every step of the climb meets a model without a maximum.
-    let graph = Graph::new(8, [[-0.4, 0.4], [-0.4, 0.4]], |x, y| [0.3 * x - 0.2 * y, 0.3, -0.2, 0.0, 0.0, 0.0]);
+    let graph =
+        Graph::new(8, [[-0.4, 0.4], [-0.4, 0.4]], |x, y| [0.3 * x - 0.2 * y, 0.3, -0.2, 0.0, 0.0, 0.0]);
     let level = Graph::new(8, [[-0.4, 0.4], [-0.4, 0.4]], |_, _| [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
     let (bvh, level_bvh) = (Bvh::new(&graph.mesh), Bvh::new(&level.mesh));
     for cutter in cutters() {

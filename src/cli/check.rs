@@ -1,0 +1,35 @@
+//! `millstream check`: reads and validates a scene and its part, and shows every default in effect.
+
+use std::path::Path;
+
+use super::error::CliError;
+use super::load::load_part;
+use super::run::{lay_out, stock_area};
+use crate::io::scene::{Scene, complete_toml};
+
+/// What `check` prints: the complete scene, which can be run again, after what was found in
+/// comments.
+///
+/// # Errors
+/// [`CliError`] when the scene could not be run.
+pub fn check(path: &Path) -> Result<String, CliError> {
+    let mut scene = Scene::read(path)?;
+    let (part, notes) = load_part(&scene)?;
+    let (grid, note) = lay_out(&scene, &stock_area(&scene, &part))?;
+    scene.simulation.cell = grid.cell;
+    let (bounds, size) = (part.bounds(), part.bounds().size());
+    let mut found = vec![format!("{} is valid. Every default in effect:", path.display())];
+    found.push(format!(
+        "The part spans {:.3} x {:.3} x {:.3} mm from x {:.3} y {:.3} z {:.3}; {} x {} cells are simulated.",
+        size.x, size.y, size.z, bounds.min.x, bounds.min.y, bounds.min.z, grid.nx, grid.ny
+    ));
+    found.extend(notes.into_iter().chain(note).map(|note| format!("Note: {note}")));
+    let mut text = String::new();
+    for line in found {
+        // A line break in a file's name would end the comment.
+        text += &format!("# {}\n", line.replace(char::is_control, " "));
+    }
+    text.push('\n');
+    text += &complete_toml(&scene);
+    Ok(text)
+}

@@ -1,0 +1,122 @@
+//! Why a command could not be done, and how that is told.
+
+use std::path::{Path, PathBuf};
+
+use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme};
+
+use crate::io::scene::SceneError;
+use crate::monitor::Cancelled;
+use crate::part::PartError;
+use crate::report::ReportError;
+use crate::sim::GridError;
+use crate::toolpath::PlanError;
+
+/// Why a command could not be done.
+#[derive(Debug, thiserror::Error, Diagnostic)]
+pub enum CliError {
+    /// The scene, or a file that it names, cannot be used.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Scene(#[from] SceneError),
+    /// The part's surface cannot be searched.
+    #[error("the part cannot be used")]
+    #[diagnostic(help("change [part] in the scene"))]
+    Part(#[from] PartError),
+    /// No grid could be laid out.
+    #[error("the stock cannot be simulated")]
+    #[diagnostic(help("choose another `cell` or `memory_mib` in [simulation], or `--cell`"))]
+    Grid(#[from] GridError),
+    /// A toolpath could not be planned.
+    #[error("the toolpath \"{name}\" could not be planned: {reason}")]
+    #[diagnostic(help("change or delete that [[toolpath]] in the scene"))]
+    Plan {
+        /// Name of the toolpath.
+        name: String,
+        /// What the planner said.
+        reason: PlanError,
+    },
+    /// A result could not be written.
+    #[error("cannot write {}: {reason}", path.display())]
+    #[diagnostic(help("name another folder with --out"))]
+    Output {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        reason: String,
+    },
+    /// A figure cannot stand in the report.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    /// The threads could not be started.
+    #[error("cannot start the threads: {0}")]
+    #[diagnostic(help("ask for fewer with --threads"))]
+    Threads(String),
+    /// The user asked to stop.
+    #[error("interrupted; nothing was written")]
+    Interrupted,
+}
+
+impl From<Cancelled> for CliError {
+    fn from(_: Cancelled) -> Self {
+        Self::Interrupted
+    }
+}
+
+impl CliError {
+    /// For results that could not be written: `map_err(CliError::output(path))`.
+    pub fn output(path: &Path) -> impl Fn(std::io::Error) -> Self + use<'_> {
+        |error| Self::Output { path: path.to_owned(), reason: error.to_string() }
+    }
+
+    /// A planner's error, told with the toolpath's name.
+    pub fn plan(name: &str, reason: PlanError) -> Self {
+        match reason {
+            PlanError::Cancelled(_) => Self::Interrupted,
+            reason => Self::Plan { name: name.to_owned(), reason },
+        }
+    }
+}
+
+/// The message as it stands on stderr: what, where (file, line, column and caret when the text of a
+/// scene is meant), and the cure.
+pub fn render(error: &CliError, colour: bool) -> String {
+    let theme = if colour { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() };
+    let handler = GraphicalReportHandler::new_themed(theme).with_width(100).with_links(false);
+    let mut text = String::new();
+    match handler.render_report(&mut text, error) {
+        Ok(()) => text,
+        Err(_) => format!("error: {error}\n"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::scene::Scene;
+
+    fn message(text: &str) -> String {
+        render(&CliError::Scene(Scene::parse("scenes/wave.toml", text).unwrap_err()), false)
+    }
+
+    #[test]
+    fn a_misspelt_key_is_shown_in_its_line() {
+        let text = message("[part]\nfile = \"wave.stl\"\n[cutter]\nshape = \"ball\"\ndiametr = 6.0\n");
+        insta::assert_snapshot!(text);
+    }
+
+    #[test]
+    fn broken_toml_is_shown_where_it_breaks() {
+        insta::assert_snapshot!(message("[part]\nfile = \"wave.stl\n"));
+        insta::assert_snapshot!(message("[part]\nsurface = \"wav\"\n"));
+        insta::assert_snapshot!(message(
+            "[part]\nfile = \"wave.stl\"\n[cutter]\nshape = \"ball\"\ndiameter = -6\n"
+        ));
+        insta::assert_snapshot!(message(""));
+    }
+
+    #[test]
+    fn errors_without_a_place_name_the_cure() {
+        insta::assert_snapshot!(render(&CliError::Interrupted, false));
+        insta::assert_snapshot!(render(&CliError::Grid(GridError::Cell(-1.0)), false));
+    }
+}

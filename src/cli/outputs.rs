@@ -1,0 +1,153 @@
+//! Results come into being in a folder of their own beside the target, and are moved into place
+//! when all of them are there, so that nothing is ever half-written.
+
+use std::fs;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use super::error::CliError;
+
+/// A folder that fills up, unseen until [`Outputs::publish`].
+#[derive(Debug)]
+pub struct Outputs {
+    target: PathBuf,
+    /// Removed with all that is left in it when the run ends, one way or the other.
+    scratch: tempfile::TempDir,
+    fresh: PathBuf,
+}
+
+impl Outputs {
+    /// Makes the scratch folder beside `target`, whose parents are made if need be.
+    ///
+    /// # Errors
+    /// [`CliError::Output`] when that is not possible or `target` is a file.
+    pub fn begin(target: &Path) -> Result<Self, CliError> {
+        if target.exists() && !target.is_dir() {
+            return Err(CliError::Output {
+                path: target.to_owned(),
+                reason: "it is a file, and a folder is needed".into(),
+            });
+        }
+        let parent = match target.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        fs::create_dir_all(parent).map_err(CliError::output(parent))?;
+        let scratch = tempfile::Builder::new()
+            .prefix(".millstream-")
+            .tempdir_in(parent)
+            .map_err(CliError::output(parent))?;
+        // Scratch folders are closed to others; what is published must have usual permissions.
+        let fresh = scratch.path().join("fresh");
+        fs::create_dir(&fresh).map_err(CliError::output(&fresh))?;
+        Ok(Self { target: target.to_owned(), scratch, fresh })
+    }
+
+    /// Makes a folder within the results.
+    ///
+    /// # Errors
+    /// [`CliError::Output`].
+    pub fn folder(&self, name: &str) -> Result<(), CliError> {
+        let path = self.fresh.join(name);
+        fs::create_dir_all(&path).map_err(CliError::output(&path))
+    }
+
+    /// Writes one file; `name` is relative to the results.
+    ///
+    /// # Errors
+    /// [`CliError::Output`], also for what `body` returns.
+    pub fn file<T>(
+        &self,
+        name: &str,
+        body: impl FnOnce(&mut dyn Write) -> std::io::Result<T>,
+    ) -> Result<T, CliError> {
+        let path = self.target.join(name);
+        let write = || {
+            let mut out = BufWriter::new(fs::File::create(self.fresh.join(name))?);
+            let value = body(&mut out)?;
+            out.flush()?;
+            Ok(value)
+        };
+        write().map_err(CliError::output(&path))
+    }
+
+    /// Moves everything into place: the whole folder at once when there was none, else one entry
+    /// after the other, replacing those of an earlier run, `report.json` last.
+    ///
+    /// # Errors
+    /// [`CliError::Output`].
+    pub fn publish(self) -> Result<(), CliError> {
+        if !self.target.exists() {
+            return fs::rename(&self.fresh, &self.target).map_err(CliError::output(&self.target));
+        }
+        let listed: Result<Vec<fs::DirEntry>, _> = fs::read_dir(&self.fresh).and_then(Iterator::collect);
+        let mut names: Vec<_> =
+            listed.map_err(CliError::output(&self.fresh))?.iter().map(fs::DirEntry::file_name).collect();
+        names.sort_by_key(|name| (name == "report.json", name.clone()));
+        for name in names {
+            let (from, to) = (self.fresh.join(&name), self.target.join(&name));
+            let mut old = std::ffi::OsString::from("old-");
+            old.push(&name);
+            // A folder can only take the place of an empty one: move the old one out of the way.
+            if to.is_dir() || (to.exists() && from.is_dir()) {
+                fs::rename(&to, self.scratch.path().join(old)).map_err(CliError::output(&to))?;
+            }
+            fs::rename(&from, &to).map_err(CliError::output(&to))?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entries(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> =
+            fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    fn fill(target: &Path, text: &str) -> Outputs {
+        let outputs = Outputs::begin(target).unwrap();
+        outputs.folder("zigzag").unwrap();
+        outputs.file("zigzag/a.txt", |out| out.write_all(text.as_bytes())).unwrap();
+        outputs.file("report.json", |out| out.write_all(text.as_bytes())).unwrap();
+        outputs
+    }
+
+    #[test]
+    fn results_appear_all_at_once_and_replace_earlier_ones() {
+        let home = tempfile::tempdir().unwrap();
+        let target = home.path().join("out/wave");
+        fill(&target, "first").publish().unwrap();
+        assert_eq!(entries(&target), ["report.json", "zigzag"]);
+        fs::write(target.join("mine.txt"), "kept").unwrap();
+        fs::write(target.join("zigzag/stale.txt"), "gone").unwrap();
+        fill(&target, "second").publish().unwrap();
+        assert_eq!(entries(&target), ["mine.txt", "report.json", "zigzag"]);
+        assert_eq!(entries(&target.join("zigzag")), ["a.txt"]);
+        assert_eq!(fs::read_to_string(target.join("zigzag/a.txt")).unwrap(), "second");
+        assert_eq!(entries(&home.path().join("out")), ["wave"], "no scratch is left");
+    }
+
+    #[test]
+    fn nothing_appears_when_a_run_stops_early() {
+        let home = tempfile::tempdir().unwrap();
+        let target = home.path().join("out");
+        drop(fill(&target, "text"));
+        let outputs = fill(&target, "text");
+        assert!(outputs.file("x", |_| Err::<(), _>(std::io::Error::other("full"))).is_err());
+        drop(outputs);
+        assert_eq!(entries(home.path()), [""; 0]);
+    }
+
+    #[test]
+    fn a_file_in_the_place_of_the_folder_is_refused() {
+        let home = tempfile::tempdir().unwrap();
+        let target = home.path().join("out");
+        fs::write(&target, "").unwrap();
+        assert!(matches!(Outputs::begin(&target), Err(CliError::Output { .. })));
+    }
+}

@@ -1,0 +1,90 @@
+//! Progress on stderr while it is a terminal, and the wish to stop.
+
+use std::io::IsTerminal as _;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::monitor::Monitor;
+
+/// True when people read stderr.
+pub fn stderr_is_terminal() -> bool {
+    std::io::stderr().is_terminal()
+}
+
+/// Shows what the stages tell and hands them the user's wish to stop (Ctrl-C, SIGTERM).
+#[derive(Debug)]
+pub struct Progress {
+    stop: Arc<AtomicBool>,
+    bar: ProgressBar,
+    /// The toolpath at work, before the stage's name.
+    prefix: Mutex<String>,
+}
+
+impl Progress {
+    /// Draws on stderr if that is a terminal, and begins to listen for the wish to stop.
+    pub fn new() -> Self {
+        let target =
+            if stderr_is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let bar = ProgressBar::with_draw_target(Some(0), target);
+        let stop = Arc::new(AtomicBool::new(false));
+        let flag = Arc::clone(&stop);
+        // Without a handler the process simply ends at Ctrl-C, and nothing is half-written either.
+        let _ = ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed));
+        Self { stop, bar, prefix: Mutex::new(String::new()) }
+    }
+
+    /// Shows nothing and hears no signal.
+    #[cfg(test)]
+    pub fn quiet() -> Self {
+        let stop = Arc::new(AtomicBool::new(false));
+        Self { stop, bar: ProgressBar::hidden(), prefix: Mutex::new(String::new()) }
+    }
+
+    /// As if the user had asked to stop.
+    #[cfg(test)]
+    pub fn stop(&self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+
+    /// Names what the next stages belong to.
+    pub fn belongs_to(&self, name: &str) {
+        if let Ok(mut prefix) = self.prefix.lock() {
+            name.clone_into(&mut prefix);
+        }
+    }
+
+    /// Wipes the bar away.
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+impl Monitor for Progress {
+    fn start(&self, stage: &str, steps: u64) {
+        /// How often a bar of unknown length moves.
+        const BEAT: Duration = Duration::from_millis(120);
+        let template =
+            if steps == 0 { "{spinner} {msg}" } else { "{msg:50} {wide_bar} {percent:>3} %  {eta}" };
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            self.bar.set_style(style);
+        }
+        let prefix = self.prefix.lock().map(|p| p.clone()).unwrap_or_default();
+        self.bar.set_message(if prefix.is_empty() { stage.to_owned() } else { format!("{prefix}: {stage}") });
+        self.bar.reset();
+        self.bar.set_length(steps);
+        if !self.bar.is_hidden() {
+            self.bar.enable_steady_tick(BEAT);
+        }
+    }
+
+    fn advance(&self, steps: u64) {
+        self.bar.inc(steps);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}

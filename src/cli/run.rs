@@ -1,0 +1,383 @@
+//! `millstream run`: scene → part → for each toolpath plan, cut, measure → results.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use super::args::RunOptions;
+use super::error::CliError;
+use super::load::load_part;
+use super::outputs::Outputs;
+use super::progress::Progress;
+use crate::geometry::Aabb;
+use crate::io::scene::{Engine, Scene, ToolpathRequest};
+use crate::io::{ProgramHeader, apt_cl, exr, gcode, png, stl_write};
+use crate::machine::machining_time;
+use crate::metrology::{Measurement, measure, path_figures};
+use crate::monitor::{self, Monitor as _};
+use crate::part::Part;
+use crate::report::{
+    HIGHEST_RIDGE, Histogram, MAX_TRIANGLES, MapWords, RunReport, SimulationFigures, SurfaceMeshFigures,
+    ToolpathPage, ToolpathResult, Verdict, deviation_picture, height_picture, html_page, result_table,
+    surface_mesh, violations,
+};
+use crate::sim::{Grid, GridError, ZMap, cut_reference};
+use crate::toolpath::{Plan, PlanSettings, plan};
+
+/// Bytes a cell that one toolpath takes at its peak: stock and cut stock (8 each), heights and
+/// normals of the design surface and the deviation (up to 28), ridges (8). Too small a figure lets a
+/// run exhaust the machine that the scene's `memory_mib` promised to spare.
+const BYTES_PER_CELL: usize = 52;
+
+/// The machined part's triangles stay within this share of the scallop tolerance: ridges remain
+/// visible in them.
+const MESH_SHARE: f64 = 0.25;
+
+/// Thickness of machined.stl below the lowest point, mm.
+const BASE: f64 = 5.0;
+
+/// What a run hands back to the command line.
+#[derive(Debug)]
+pub struct RunOutcome {
+    /// The result table.
+    pub text: String,
+    /// Whether every tolerance holds.
+    pub verdict: Verdict,
+}
+
+/// Runs a scene and writes its results.
+///
+/// # Errors
+/// [`CliError`]; nothing is written then.
+pub fn run(options: &RunOptions, progress: &Progress) -> Result<RunOutcome, CliError> {
+    let mut pool = rayon::ThreadPoolBuilder::new();
+    if let Some(threads) = options.threads {
+        pool = pool.num_threads(usize::from(threads));
+    }
+    let pool = pool.build().map_err(|e| CliError::Threads(e.to_string()))?;
+    pool.install(|| run_scene(options, progress))
+}
+
+/// The scene with what the command line says in its stead.
+fn read_scene(options: &RunOptions) -> Result<Scene, CliError> {
+    let mut scene = Scene::read(&options.scene)?;
+    if let Some(cell) = options.cell {
+        scene.simulation.cell = cell;
+        scene.simulation.cell_is_default = false;
+    }
+    if let Some(engine) = options.engine.as_deref().and_then(Engine::from_word) {
+        scene.simulation.engine = engine;
+    }
+    Ok(scene)
+}
+
+fn run_scene(options: &RunOptions, progress: &Progress) -> Result<RunOutcome, CliError> {
+    let scene = read_scene(options)?;
+    let job = Job::new(&scene, progress)?;
+    let target = options.out.clone().unwrap_or_else(|| default_target(&options.scene));
+    let outputs = Outputs::begin(&target)?;
+    let mut results = Vec::with_capacity(scene.toolpaths.len());
+    let mut pages = Vec::with_capacity(scene.toolpaths.len());
+    for request in &scene.toolpaths {
+        progress.belongs_to(&request.name);
+        let (result, page) = job.toolpath(request, &outputs)?;
+        results.push(result);
+        pages.push(page);
+    }
+    let name = options.scene.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let report =
+        RunReport::new(name, sha256(&scene.source.text), scene.title.clone(), &scene.tolerance, results);
+    let json = report.to_json()?;
+    let page = html_page(&report, &pages, &scene.source.text);
+    outputs.file("report.html", |out| out.write_all(page.as_bytes()))?;
+    outputs.file("report.json", |out| out.write_all(json.as_bytes()))?;
+    monitor::check(progress)?;
+    outputs.publish()?;
+    let text = format!("{}Results: {}\n", result_table(&report), target.display());
+    Ok(RunOutcome { text, verdict: report.verdict })
+}
+
+/// `out/NAME` in the working folder.
+fn default_target(scene: &Path) -> PathBuf {
+    Path::new("out").join(scene.file_stem().unwrap_or("scene".as_ref()))
+}
+
+fn sha256(text: &str) -> String {
+    use sha2::Digest as _;
+    sha2::Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// The rectangle to simulate: the part's, grown by the stock's margin.
+pub fn stock_area(scene: &Scene, part: &Part) -> Aabb {
+    let mut area = part.bounds();
+    let margin = scene.stock.margin;
+    (area.min.x, area.min.y) = (area.min.x - margin, area.min.y - margin);
+    (area.max.x, area.max.y) = (area.max.x + margin, area.max.y + margin);
+    area
+}
+
+/// The grid over `area`, and a note when the default cell had to grow to fit into the memory. A cell
+/// that the user chose is never changed.
+///
+/// # Errors
+/// [`GridError`] when the grid does not fit.
+pub fn lay_out(scene: &Scene, area: &Aabb) -> Result<(Grid, Option<String>), GridError> {
+    const MIB: u64 = 1 << 20;
+    let memory = u64::from(scene.simulation.memory_mib) * MIB;
+    let cell = scene.simulation.cell;
+    match Grid::covering(area, cell, BYTES_PER_CELL, memory) {
+        Ok(grid) => Ok((grid, None)),
+        Err(GridError::Memory { fitting, .. }) if scene.simulation.cell_is_default => {
+            let grid = Grid::covering(area, fitting, BYTES_PER_CELL, memory)?;
+            let allowed = scene.simulation.memory_mib;
+            Ok((
+                grid,
+                Some(format!("the cell is {fitting} mm instead of {cell} mm, to fit into {allowed} MiB")),
+            ))
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// What all toolpaths of a scene share.
+struct Job<'a> {
+    scene: &'a Scene,
+    progress: &'a Progress,
+    part: Part,
+    grid: Grid,
+    /// Height of the stock's flat top, mm.
+    top: f64,
+    notes: Vec<String>,
+}
+
+impl<'a> Job<'a> {
+    fn new(scene: &'a Scene, progress: &'a Progress) -> Result<Self, CliError> {
+        monitor::check(progress)?;
+        let (part, mut notes) = load_part(scene)?;
+        let (grid, note) = lay_out(scene, &stock_area(scene, &part))?;
+        notes.extend(note);
+        let top = part.bounds().max.z + scene.stock.allowance;
+        Ok(Self { scene, progress, part, grid, top, notes })
+    }
+
+    fn settings(&self, request: &ToolpathRequest) -> PlanSettings {
+        PlanSettings {
+            step: request.step,
+            chord_tolerance: self.scene.tolerance.chord,
+            clearance: self.scene.clearance,
+            stock_top: self.top,
+            feed_rate: self.scene.cutting.feed_rate,
+            plunge_rate: self.scene.cutting.plunge_rate,
+        }
+    }
+
+    /// Plans, cuts and measures one toolpath and writes its folder.
+    fn toolpath(
+        &self,
+        request: &ToolpathRequest,
+        outputs: &Outputs,
+    ) -> Result<(ToolpathResult, ToolpathPage), CliError> {
+        let (scene, monitor) = (self.scene, self.progress);
+        monitor::check(monitor)?;
+        let planned = plan(&self.part, &scene.cutter, &request.strategy, &self.settings(request), monitor)
+            .map_err(|reason| CliError::plan(&request.name, reason))?;
+        let begun = Instant::now();
+        let cut = cut_reference(&ZMap::block(self.grid, self.top), &scene.cutter, &planned.path, monitor)?;
+        let mut measured =
+            measure(&self.part, &scene.cutter, &planned.path, &cut, &scene.tolerance, monitor)?;
+        let simulation = SimulationFigures {
+            engine: scene.simulation.engine.name(),
+            cell_mm: self.grid.cell,
+            cells: self.grid.len(),
+            moves: planned.path.len(),
+            wall_s: begun.elapsed().as_secs_f64(),
+            threads: rayon::current_num_threads(),
+        };
+        monitor::check(monitor)?;
+        monitor.start("writing results", 0);
+        outputs.folder(&request.folder)?;
+        let lines = self.write_programs(request, &planned, outputs)?;
+        for region in &mut measured.gouge.regions {
+            region.line = lines.get(region.move_index as usize).copied().unwrap_or_default();
+        }
+        let page = self.write_maps(request, &cut, &measured, outputs)?;
+        let surface_mesh = self.write_mesh(request, &cut, outputs)?;
+        Ok((self.result(request, &planned, measured, simulation, surface_mesh), page))
+    }
+
+    fn result(
+        &self,
+        request: &ToolpathRequest,
+        planned: &Plan,
+        measured: Measurement,
+        simulation: SimulationFigures,
+        surface_mesh: SurfaceMeshFigures,
+    ) -> ToolpathResult {
+        let violations = violations(&measured, &self.scene.tolerance);
+        let time = machining_time(&planned.path, &self.scene.machine);
+        ToolpathResult {
+            name: request.name.clone(),
+            strategy: request.strategy_name().to_owned(),
+            folder: request.folder.clone(),
+            verdict: if violations.is_empty() { Verdict::Pass } else { Verdict::Fail },
+            violations,
+            notes: self.notes.iter().chain(&planned.notes).cloned().collect(),
+            path: path_figures(&planned.path, time),
+            scallop: measured.scallop,
+            gouge: measured.gouge,
+            uncut: measured.uncut,
+            deviation: measured.deviation,
+            simulation,
+            surface_mesh,
+        }
+    }
+
+    /// Writes toolpath.nc and toolpath.cls; leaves the line of each move in the former.
+    fn write_programs(
+        &self,
+        request: &ToolpathRequest,
+        planned: &Plan,
+        outputs: &Outputs,
+    ) -> Result<Vec<u32>, CliError> {
+        let (path, cutter) = (&planned.path, &self.scene.cutter);
+        let header = ProgramHeader {
+            name: format!("{} - {}", self.scene.title, request.name),
+            spindle_speed: Some(self.scene.cutting.spindle_speed),
+        };
+        let file = |name: &str| format!("{}/{name}", request.folder);
+        outputs.file(&file("toolpath.cls"), |out| apt_cl::write(out, path, cutter, &header))?;
+        outputs.file(&file("toolpath.nc"), |out| gcode::write(out, path, cutter, &header))
+    }
+
+    fn write_maps(
+        &self,
+        request: &ToolpathRequest,
+        cut: &ZMap,
+        measured: &Measurement,
+        outputs: &Outputs,
+    ) -> Result<ToolpathPage, CliError> {
+        let limits = &self.scene.tolerance;
+        let file = |name: &str| format!("{}/{name}", request.folder);
+        let cell = format!("{} mm", self.grid.cell);
+        let subtitle =
+            format!("{} · cell {cell} · engine {}", self.scene.title, self.scene.simulation.engine.name());
+        let notes =
+            [("Title", self.scene.title.as_str()), ("Scene", &self.scene.source.name), ("Cell", &cell)];
+        let picture = |name: &str, picture: crate::report::Picture| {
+            let bytes = png::encode(&picture, &notes).map_err(CliError::output(Path::new(name)))?;
+            outputs.file(&file(name), |out| out.write_all(&bytes))?;
+            Ok::<_, CliError>(bytes)
+        };
+        let words = |title| MapWords { title, subtitle: &subtitle };
+        let title = format!("Deviation, {}", request.name);
+        let deviation = deviation_picture(&self.grid, &measured.deviation_map, limits, &words(&title));
+        let deviation_png = picture("deviation.png", deviation)?;
+        let title = format!("Height, {}", request.name);
+        let height_png = picture("height.png", height_picture(&self.grid, &cut.height, &words(&title)))?;
+        let name = file("height.exr");
+        let bytes = exr::encode(cut, &measured.deviation_map).map_err(CliError::output(Path::new(&name)))?;
+        outputs.file(&name, |out| out.write_all(&bytes))?;
+        let histogram =
+            Histogram::new(&measured.ridge_samples, limits.scallop, HIGHEST_RIDGE * limits.scallop);
+        Ok(ToolpathPage { deviation_png, height_png, histogram })
+    }
+
+    fn write_mesh(
+        &self,
+        request: &ToolpathRequest,
+        cut: &ZMap,
+        outputs: &Outputs,
+    ) -> Result<SurfaceMeshFigures, CliError> {
+        let tolerance = MESH_SHARE * self.scene.tolerance.scallop;
+        let lowest = cut.height.iter().copied().fold(f32::INFINITY, f32::min);
+        let bottom = f64::from(lowest).min(self.part.bounds().min.z) - BASE;
+        // A grid of one row has no surface; its file then holds no triangle.
+        let mesh = surface_mesh(cut, bottom, tolerance, MAX_TRIANGLES);
+        let (vertices, triangles): (&[_], &[_]) =
+            mesh.as_ref().map_or((&[], &[]), |m| (&m.vertices, &m.triangles));
+        outputs.file(&format!("{}/machined.stl", request.folder), |out| {
+            stl_write::write(out, vertices, triangles)
+        })?;
+        let tolerance_mm = mesh.as_ref().map_or(tolerance, |m| m.tolerance);
+        Ok(SurfaceMeshFigures { triangles: triangles.len(), tolerance_mm })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PLATE: &str = "[part]\nsurface = \"plane\"\nx = [0, 8]\ny = [0, 6]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n\
+        [tolerance]\nscallop = 0.0105\n[simulation]\ncell = 0.1\n[[toolpath]]\nstrategy = \"zigzag\"\nstepover = 0.5\n";
+
+    fn options(folder: &Path, scene: &str, threads: u16) -> RunOptions {
+        let path = folder.join("plate.toml");
+        std::fs::write(&path, scene).unwrap();
+        let out = Some(folder.join(format!("out{threads}")));
+        RunOptions { scene: path, out, threads: Some(threads), cell: None, engine: None }
+    }
+
+    #[test]
+    fn a_plate_passes_and_leaves_every_file_of_the_contract() {
+        let home = tempfile::tempdir().unwrap();
+        let options = options(home.path(), PLATE, 1);
+        let outcome = run(&options, &Progress::quiet()).unwrap();
+        assert_eq!(outcome.verdict, Verdict::Pass, "{}", outcome.text);
+        let out = options.out.unwrap();
+        for name in
+            ["deviation.png", "height.png", "height.exr", "toolpath.nc", "toolpath.cls", "machined.stl"]
+        {
+            assert!(out.join("zigzag").join(name).metadata().unwrap().len() > 100, "{name}");
+        }
+        let json: serde_json::Value =
+            serde_json::from_str(&std::fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
+        // A ball of radius 3 between passes 0.5 apart.
+        let closed_form = 3.0 - (9.0 - 0.0625f64).sqrt();
+        let measured = &json["toolpaths"][0]["scallop"];
+        let error = (measured["max_mm"].as_f64().unwrap() - closed_form).abs();
+        assert!(error <= measured["error_bound_mm"].as_f64().unwrap() + 1e-9, "{error}");
+        assert!(std::fs::read_to_string(out.join("report.html")).unwrap().contains("PASS"));
+    }
+
+    #[test]
+    fn threads_change_nothing_but_the_time() {
+        let home = tempfile::tempdir().unwrap();
+        let read = |threads: u16| {
+            let options = options(home.path(), PLATE, threads);
+            run(&options, &Progress::quiet()).unwrap();
+            let out = options.out.unwrap();
+            let mut json: serde_json::Value =
+                serde_json::from_str(&std::fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
+            json["toolpaths"][0]["simulation"]["wall_s"] = 0.into();
+            json["toolpaths"][0]["simulation"]["threads"] = 0.into();
+            let files =
+                ["deviation.png", "height.png", "height.exr", "toolpath.nc", "toolpath.cls", "machined.stl"];
+            (json, files.map(|name| std::fs::read(out.join("zigzag").join(name)).unwrap()))
+        };
+        assert!(read(1) == read(3));
+    }
+
+    #[test]
+    fn a_wish_to_stop_leaves_nothing_behind() {
+        let home = tempfile::tempdir().unwrap();
+        let options = options(home.path(), PLATE, 1);
+        let progress = Progress::quiet();
+        progress.stop();
+        assert!(matches!(run(&options, &progress), Err(CliError::Interrupted)));
+        assert_eq!(std::fs::read_dir(home.path()).unwrap().count(), 1, "only the scene is there");
+    }
+
+    #[test]
+    fn a_chosen_cell_is_kept_or_refused_and_a_default_one_grows() {
+        let scene = |simulation: &str| {
+            let text = PLATE.replace("[simulation]\ncell = 0.1\n", simulation).replace("[0, 8]", "[0, 800]");
+            Scene::parse("plate.toml", text).unwrap()
+        };
+        let (part, _) = load_part(&scene("")).unwrap();
+        let lay_out_of = |scene: &Scene| lay_out(scene, &stock_area(scene, &part));
+        let (grid, note) = lay_out_of(&scene("[simulation]\nmemory_mib = 2\n")).unwrap();
+        assert!(grid.cell > 0.05 && grid.len() * BYTES_PER_CELL <= 2 << 20);
+        assert!(note.unwrap().contains("instead of 0.05 mm, to fit into 2 MiB"));
+        let chosen = scene("[simulation]\nmemory_mib = 2\ncell = 0.05\n");
+        assert!(matches!(lay_out_of(&chosen), Err(GridError::Memory { .. })));
+    }
+}

@@ -1,0 +1,104 @@
+//! OpenEXR files of maps over a grid, full precision.
+//!
+//! Channels: `Z` height, mm, and `deviation`, mm (NaN off the part), 32-bit float; `move` the index
+//! of the move that cut a cell last, 32-bit whole number, 4294967295 where none did. Row 0 of the
+//! picture holds the greatest y, as pictures are looked at. One text attribute, `millstream`, holds
+//! JSON: `cell_mm`, `origin_mm` (centre of the cell at the lower left), `unit`.
+
+use std::io::{self, Cursor};
+
+use exr::prelude::{
+    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec,
+    Text, WritableImage,
+};
+
+use crate::sim::{Grid, ZMap};
+
+/// The bytes of an EXR file. `deviation` is over the grid of `cut`.
+///
+/// # Errors
+/// What the encoder says; [`io::ErrorKind::InvalidInput`] when the maps differ in size.
+pub fn encode(cut: &ZMap, deviation: &[f32]) -> io::Result<Vec<u8>> {
+    let grid = &cut.grid;
+    if [cut.height.len(), cut.cut_by.len(), deviation.len()] != [grid.len(); 3] {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "the maps differ in size"));
+    }
+    let channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = [
+        AnyChannel::new("Z", FlatSamples::F32(top_down(grid, &cut.height))),
+        AnyChannel::new("deviation", FlatSamples::F32(top_down(grid, deviation))),
+        AnyChannel::new("move", FlatSamples::U32(top_down(grid, &cut.cut_by))),
+    ]
+    .into_iter()
+    .collect();
+    let layer = Layer::new(
+        (grid.nx, grid.ny),
+        LayerAttributes::default(),
+        Encoding::SMALL_LOSSLESS,
+        AnyChannels::sort(channels),
+    );
+    let mut image = Image::from_layer(layer);
+    // A single attribute: the crate keeps them in a hash map, and with two the bytes would vary.
+    image
+        .attributes
+        .other
+        .insert(Text::from("millstream"), AttributeValue::Text(Text::from(description(grid).as_str())));
+    let mut bytes = Cursor::new(Vec::new());
+    image.write().to_buffered(&mut bytes).map_err(io::Error::other)?;
+    Ok(bytes.into_inner())
+}
+
+/// What the pixels are, as JSON.
+fn description(grid: &Grid) -> String {
+    format!(
+        r#"{{"unit":"mm","cell_mm":{:?},"origin_mm":[{:?},{:?}],"rows":"greatest y first","move_none":{}}}"#,
+        grid.cell,
+        grid.origin.x,
+        grid.origin.y,
+        crate::sim::NOT_CUT
+    )
+}
+
+fn top_down<T: Copy>(grid: &Grid, values: &[T]) -> Vec<T> {
+    values.chunks_exact(grid.nx).rev().flatten().copied().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Point2;
+    use exr::prelude::{ReadChannels, ReadLayers};
+
+    #[test]
+    fn maps_come_back_bit_for_bit_with_cell_and_origin() {
+        let grid = Grid { origin: Point2::new(-1.5, 0.25), cell: 0.05, nx: 3, ny: 2 };
+        let height = vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.5];
+        let cut = ZMap { grid, height, cut_by: vec![0, 1, 2, 3, u32::MAX, 16_777_217] };
+        let deviation = [0.0, -0.25, f32::NAN, 1e-9, 0.5, 7.0];
+        let bytes = encode(&cut, &deviation).unwrap();
+        assert_eq!(bytes, encode(&cut, &deviation).unwrap(), "the same bytes every time");
+        let image = exr::prelude::read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .all_channels()
+            .first_valid_layer()
+            .all_attributes()
+            .from_buffered(Cursor::new(bytes))
+            .unwrap();
+        let channels = &image.layer_data.channel_data.list;
+        let names: Vec<String> = channels.iter().map(|c| c.name.to_string()).collect();
+        assert_eq!(names, ["Z", "deviation", "move"]);
+        assert_eq!(channels[0].sample_data, FlatSamples::F32(vec![4.0, 5.0, 6.5, 1.0, 2.0, 3.0]));
+        assert_eq!(channels[2].sample_data, FlatSamples::U32(vec![3, u32::MAX, 16_777_217, 0, 1, 2]));
+        let FlatSamples::F32(read) = &channels[1].sample_data else { panic!() };
+        assert_eq!((read[0], read[4]), (1e-9, -0.25));
+        assert!(read[5].is_nan());
+        let Some(AttributeValue::Text(text)) =
+            image.layer_data.attributes.other.get(&Text::from("millstream"))
+        else {
+            panic!()
+        };
+        let json: serde_json::Value = serde_json::from_str(&text.to_string()).unwrap();
+        assert_eq!(json["cell_mm"], 0.05);
+        assert_eq!(json["origin_mm"][0], -1.5);
+    }
+}

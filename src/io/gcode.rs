@@ -1,0 +1,198 @@
+//! Writes a toolpath as a plain ISO 6983 program for three axes: G0, G1, F and the axis words that
+//! changed. mm, mm/min, absolute.
+//!
+//! There is no O-number, because controls disagree about what an O-word is, no tool change and no length
+//! offset: the tip is taken to be where the program says. Rapids are simulated as straight lines; a
+//! control whose G0 runs each axis at its own speed strays from them.
+
+use super::program_text::{ProgramHeader, describe, number, rounded};
+use crate::cutter::Cutter;
+use crate::geometry::Point3;
+use crate::toolpath::{MoveKind, Toolpath};
+use std::fmt::Write as _;
+use std::io::{self, Write};
+
+/// For each move of the path the line of the program, counted from 1, on which it is reached.
+pub type MoveLines = Vec<u32>;
+
+/// Writes the program and tells the line of each move. A move that rounds to where the tip already is
+/// has no line of its own: it gets the line that brought the tip there.
+///
+/// Coordinates and feeds are rounded to four decimals, so each stands within 0.05 µm of the path. Before
+/// the first move the tip rises to the highest tip of the path, moves over its start and comes down there;
+/// after the last one it rises again.
+///
+/// # Errors
+/// Whatever the writer returns.
+pub fn write(
+    writer: &mut dyn Write,
+    path: &Toolpath,
+    cutter: &Cutter,
+    header: &ProgramHeader,
+) -> io::Result<MoveLines> {
+    let mut program = Program { writer, lines: 0, tip: [None; 3], rapid: None, feed: None };
+    let start = path.start.tip;
+    let top = path.moves.iter().map(|m| m.to.tip.z).fold(start.z, f64::max);
+    program.line("%")?;
+    program.line(&format!("({})", header.plain_name()))?;
+    program.line(&format!("({})", describe(cutter)))?;
+    program.line("(MM, TIP OF THE CUTTER)")?;
+    program.line("G17 G21 G40 G80 G90 G94")?;
+    if let Some(speed) = header.spindle_speed {
+        program.line(&format!("S{} M3", speed.round()))?;
+    }
+    program.rise(top)?;
+    program.go(Point3::new(start.x, start.y, top), None)?;
+    program.go(start, None)?;
+    let mut lines = Vec::with_capacity(path.len());
+    for step in &path.moves {
+        let feed = (step.kind != MoveKind::Rapid).then_some(step.feed_rate);
+        program.go(step.to.tip, feed)?;
+        lines.push(program.lines);
+    }
+    program.rise(top)?;
+    if header.spindle_speed.is_some() {
+        program.line("M5")?;
+    }
+    program.line("M30")?;
+    program.line("%")?;
+    Ok(lines)
+}
+
+/// A program in the making, and what its last lines have left in force.
+struct Program<'a> {
+    writer: &'a mut dyn Write,
+    lines: u32,
+    /// In the units of [`rounded`].
+    tip: [Option<f64>; 3],
+    rapid: Option<bool>,
+    feed: Option<f64>,
+}
+
+impl Program<'_> {
+    fn line(&mut self, text: &str) -> io::Result<()> {
+        self.lines += 1;
+        writeln!(self.writer, "{text}")
+    }
+
+    /// A rapid to height `z` alone.
+    fn rise(&mut self, z: f64) -> io::Result<()> {
+        self.step([None, None, Some(z)], None)
+    }
+
+    fn go(&mut self, to: Point3, feed: Option<f64>) -> io::Result<()> {
+        self.step([Some(to.x), Some(to.y), Some(to.z)], feed)
+    }
+
+    /// A line with the words that change; none when no axis does.
+    fn step(&mut self, to: [Option<f64>; 3], feed: Option<f64>) -> io::Result<()> {
+        let mut words = String::new();
+        for ((axis, value), tip) in ["X", "Y", "Z"].into_iter().zip(to).zip(&mut self.tip) {
+            let Some(value) = value else { continue };
+            if *tip != Some(rounded(value)) {
+                *tip = Some(rounded(value));
+                let _ = write!(words, " {axis}{}", number(value));
+            }
+        }
+        if words.is_empty() {
+            return Ok(());
+        }
+        let mut text = String::new();
+        if self.rapid != Some(feed.is_none()) {
+            self.rapid = Some(feed.is_none());
+            text.push_str(if feed.is_none() { "G0" } else { "G1" });
+        }
+        text.push_str(&words);
+        if let Some(feed) = feed
+            && self.feed != Some(rounded(feed))
+        {
+            self.feed = Some(rounded(feed));
+            let _ = write!(text, " F{}", number(feed));
+        }
+        self.line(text.trim_start())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::program_text::tests::{example, random};
+
+    fn text(path: &Toolpath, header: &ProgramHeader) -> (String, MoveLines) {
+        let mut bytes = Vec::new();
+        let lines = write(&mut bytes, path, &Cutter::bull(6.0, 0.5).unwrap(), header).unwrap();
+        (String::from_utf8(bytes).unwrap(), lines)
+    }
+
+    #[test]
+    fn a_short_program() {
+        let header = ProgramHeader { name: "wave, zigzag".into(), spindle_speed: Some(12_000.0) };
+        let (text, lines) = text(&example(), &header);
+        let expected = "\
+%
+(wave_ zigzag)
+(BULL NOSE D=6.0 R=0.5)
+(MM, TIP OF THE CUTTER)
+G17 G21 G40 G80 G90 G94
+S12000 M3
+G0 Z10.0
+X0.0 Y0.0
+X1.0 Y2.5
+G1 Z-0.1235 F300.0
+X4.0 F1200.0
+Z2.0
+G0 Z10.0
+M5
+M30
+%
+";
+        assert_eq!(text, expected);
+        assert_eq!(lines, [9, 10, 11, 11, 12, 13]);
+    }
+
+    /// Follows the modal words, as a control would: tip, rapid and feed after each line.
+    fn follow(text: &str) -> Vec<([f64; 3], bool, f64)> {
+        let (mut tip, mut rapid, mut feed) = ([f64::NAN; 3], false, f64::NAN);
+        let mut states = Vec::new();
+        for line in text.lines() {
+            for word in line.split_whitespace().filter(|_| !line.starts_with('(')) {
+                let value = || word[1..].parse::<f64>().unwrap();
+                match word.as_bytes()[0] {
+                    b'X' => tip[0] = value(),
+                    b'Y' => tip[1] = value(),
+                    b'Z' => tip[2] = value(),
+                    b'F' => feed = value(),
+                    b'G' if value() < 2.0 => rapid = value() == 0.0,
+                    _ => {}
+                }
+            }
+            states.push((tip, rapid, feed));
+        }
+        states
+    }
+
+    #[test]
+    fn reading_back_gives_the_moves() {
+        let path = random(300);
+        let (text, lines) = text(&path, &ProgramHeader::default());
+        assert_eq!(lines.len(), path.len());
+        let states = follow(&text);
+        for (k, step) in path.moves.iter().enumerate() {
+            let (tip, rapid, feed) = states[lines[k] as usize - 1];
+            for axis in 0..3 {
+                assert!((tip[axis] - step.to.tip[axis]).abs() <= 0.5001e-4, "move {k}");
+            }
+            let stands = path.start_of(k) == step.to.tip;
+            assert!(stands || rapid == (step.kind == MoveKind::Rapid), "move {k}");
+            assert!(stands || rapid || (feed - step.feed_rate).abs() <= 0.5001e-4, "move {k}");
+        }
+    }
+
+    #[test]
+    fn a_path_without_moves_is_a_program_too() {
+        let mut path = example();
+        path.moves.clear();
+        let (text, lines) = text(&path, &ProgramHeader::default());
+        assert!(lines.is_empty() && text.ends_with("M30\n%\n") && !text.contains("M3\n"), "{text}");
+    }
+}

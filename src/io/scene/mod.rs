@@ -1,0 +1,215 @@
+//! The scene: what a user asks for, in TOML. Enters: a file. Leaves: a [`Scene`], in which every
+//! value is checked, every default filled in, lengths are in mm and angles in rad.
+//!
+//! The text is read as a tree of values with their places (not by derived deserialisation), so that
+//! every refusal can point at the very key or value: tagged enums of serde only know the table.
+
+mod error;
+mod formula;
+mod read;
+mod section;
+#[cfg(test)]
+mod tests;
+mod write;
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+pub use error::{Finding, SceneError, SceneText};
+pub use write::complete_toml;
+
+use crate::cutter::Cutter;
+use crate::geometry::AnalyticSurface;
+use crate::machine::Machine;
+use crate::metrology::Limits;
+use crate::toolpath::{Step, Strategy};
+
+/// Default allowance of stock above the part's highest point, mm.
+pub const DEFAULT_ALLOWANCE: f64 = 1.0;
+/// Default margin of stock around the part in the plan view, mm. Cells off the part measure
+/// nothing, so that any margin costs time and memory only.
+pub const DEFAULT_MARGIN: f64 = 0.0;
+/// Default tolerances, mm: scallop, gouge, uncut, chord (finishing of moulds and dies).
+pub const DEFAULT_LIMITS: Limits = Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chord: 0.001 };
+/// Default spindle speed, rev/min; written into programs, measures nothing.
+pub const DEFAULT_SPINDLE_SPEED: f64 = 12000.0;
+/// Default feed along passes, mm/min.
+pub const DEFAULT_FEED_RATE: f64 = 1000.0;
+/// Default feed down to a pass, mm/min.
+pub const DEFAULT_PLUNGE_RATE: f64 = 300.0;
+/// Default height of rapid moves above stock, mm.
+pub const DEFAULT_CLEARANCE: f64 = 2.0;
+/// Default memory for one simulation, MiB.
+pub const DEFAULT_MEMORY_MIB: u32 = 2048;
+/// Default control points a side of a streamline's stream function. More follow finer changes of
+/// the feed direction and cost time as their cube; fewer smooth them away.
+pub const DEFAULT_CONTROL_POINTS: usize = 24;
+
+/// A file that the scene names, and where in the scene it does.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NamedFile {
+    /// As the scene has it.
+    pub written: String,
+    /// From the scene's folder.
+    pub path: PathBuf,
+    /// Bytes of the scene's text.
+    pub span: Range<usize>,
+}
+
+/// Kind of a mesh file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MeshFormat {
+    /// STL, binary or text.
+    Stl,
+    /// Wavefront OBJ.
+    Obj,
+}
+
+/// Where the part comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PartSource {
+    /// A triangle mesh.
+    Mesh {
+        /// The file.
+        file: NamedFile,
+        /// Its kind, from its extension.
+        format: MeshFormat,
+        /// Name of the unit of its coordinates.
+        unit: &'static str,
+        /// That unit in mm.
+        scale: f64,
+    },
+    /// A NURBS patch in a JSON file.
+    Nurbs {
+        /// The file.
+        file: NamedFile,
+    },
+    /// A surface by formula over a rectangle.
+    Formula {
+        /// The formula with its parameters and its rectangle.
+        surface: AnalyticSurface,
+    },
+}
+
+/// Stock around the part.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stock {
+    /// Height of the flat top above the part's highest point, mm.
+    pub allowance: f64,
+    /// Growth of the part's rectangle on all four sides, mm.
+    pub margin: f64,
+}
+
+/// Speeds of the cutter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CuttingData {
+    /// Spindle speed, rev/min.
+    pub spindle_speed: f64,
+    /// Feed along passes, mm/min.
+    pub feed_rate: f64,
+    /// Feed down to a pass, mm/min.
+    pub plunge_rate: f64,
+}
+
+/// Which engine cuts. Both words of the scene mean the reference engine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Engine {
+    /// Every cell under every move that can reach it, in closed form.
+    Reference,
+}
+
+impl Engine {
+    /// The words that a scene and the command line accept.
+    pub const WORDS: [&'static str; 2] = ["zmap", "reference"];
+
+    /// The engine that a word stands for.
+    pub fn from_word(word: &str) -> Option<Self> {
+        Self::WORDS.contains(&word).then_some(Self::Reference)
+    }
+
+    /// The engine that really runs, as reports call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Reference => "reference",
+        }
+    }
+}
+
+/// How the stock is simulated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Simulation {
+    /// Pitch of the cells, mm.
+    pub cell: f64,
+    /// True when the scene leaves the cell to the program, which may then make it coarser to fit
+    /// into the memory.
+    pub cell_is_default: bool,
+    /// Memory that one simulation may take, MiB.
+    pub memory_mib: u32,
+    /// Which engine cuts.
+    pub engine: Engine,
+}
+
+/// One toolpath to plan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ToolpathRequest {
+    /// What the user calls it; unique in the scene.
+    pub name: String,
+    /// Folder of its files; unique in the scene, a plain file name everywhere.
+    pub folder: String,
+    /// How to plan it.
+    pub strategy: Strategy,
+    /// How far its passes lie apart.
+    pub step: Step,
+}
+
+impl ToolpathRequest {
+    /// The strategy's name as scenes spell it.
+    pub fn strategy_name(&self) -> &'static str {
+        match self.strategy {
+            Strategy::Zigzag { .. } => "zigzag",
+            Strategy::IsoParametric { .. } => "iso-parametric",
+            Strategy::Streamline { .. } => "streamline",
+        }
+    }
+}
+
+/// A checked scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scene {
+    /// The text it was read from.
+    pub source: SceneText,
+    /// What the user calls it (the file's name without extension by default).
+    pub title: String,
+    /// What is to be made.
+    pub part: PartSource,
+    /// What it is made from.
+    pub stock: Stock,
+    /// With what.
+    pub cutter: Cutter,
+    /// How fast.
+    pub cutting: CuttingData,
+    /// What is tolerated.
+    pub tolerance: Limits,
+    /// How it is simulated.
+    pub simulation: Simulation,
+    /// On what.
+    pub machine: Machine,
+    /// Height of rapid moves above stock, mm.
+    pub clearance: f64,
+    /// The toolpaths, in the order of the scene; at least one.
+    pub toolpaths: Vec<ToolpathRequest>,
+}
+
+/// The default cell for a cutter: a sixtieth of its radius, rounded down to 1, 2 or 5 times a power
+/// of ten. A ball of 6 mm gets 0.05 mm, ten cells between passes at a scallop of 10 µm. Coarser
+/// cells widen the error bounds; finer ones cost memory and time as their square.
+pub fn default_cell(cutter: &Cutter) -> f64 {
+    const CELLS_A_RADIUS: f64 = 60.0;
+    let exact = cutter.radius() / CELLS_A_RADIUS;
+    let exponent = exact.log10().floor() as i32;
+    let power = 10f64.powi(exponent);
+    // A hair of rounding must not turn 0.05 into 0.02.
+    let digit = [5.0, 2.0].into_iter().find(|d| d * power <= exact * (1.0 + 1e-9)).unwrap_or(1.0);
+    // Divide rather than multiply by 0.01: 5/100 is the number that a user writes as 0.05.
+    if exponent < 0 { digit / 10f64.powi(-exponent) } else { digit * power }
+}

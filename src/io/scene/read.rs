@@ -1,0 +1,439 @@
+//! From text to a checked scene.
+
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+use toml::de::DeTable;
+
+use super::error::{SceneError, SceneText};
+use super::formula;
+use super::section::{LENGTH, Located, Section};
+use super::{
+    CuttingData, DEFAULT_ALLOWANCE, DEFAULT_CLEARANCE, DEFAULT_CONTROL_POINTS, DEFAULT_FEED_RATE,
+    DEFAULT_LIMITS, DEFAULT_MARGIN, DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE, DEFAULT_SPINDLE_SPEED, Engine,
+    MeshFormat, NamedFile, PartSource, Scene, Simulation, Stock, ToolpathRequest, default_cell,
+};
+use crate::cutter::Cutter;
+use crate::geometry::AnalyticSurface;
+use crate::machine::Machine;
+use crate::metrology::Limits;
+use crate::toolpath::{Along, FeedDirection, Step, Strategy};
+
+/// Largest scene that is read, bytes. A scene is a page of text; a larger file is a mistake.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// Units that a mesh may be in, and each in mm.
+const UNITS: [(&str, f64); 5] = [("mm", 1.0), ("cm", 10.0), ("m", 1000.0), ("inch", 25.4), ("um", 0.001)];
+
+/// Feeds and speeds that make sense.
+const RATE: std::ops::RangeInclusive<f64> = 0.001..=1e6;
+
+impl Scene {
+    /// Reads and checks a scene file. Files that it names are looked for beside it.
+    ///
+    /// # Errors
+    /// [`SceneError`] when the file cannot be read or anything in it is wrong.
+    pub fn read(path: &Path) -> Result<Self, SceneError> {
+        let unreadable = |reason: String| SceneError::unreadable(path, reason);
+        let file = std::fs::File::open(path).map_err(|e| unreadable(e.to_string()))?;
+        let mut bytes = Vec::new();
+        file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(|e| unreadable(e.to_string()))?;
+        if bytes.len() as u64 > MAX_BYTES {
+            return Err(unreadable(format!("it is larger than {MAX_BYTES} bytes, too large for a scene")));
+        }
+        let text = String::from_utf8(bytes).map_err(|e| {
+            let line =
+                e.as_bytes()[..e.utf8_error().valid_up_to()].iter().filter(|b| **b == b'\n').count() + 1;
+            unreadable(format!("line {line} is not UTF-8 text"))
+        })?;
+        let scene = Self::parse(&path.to_string_lossy(), text)?;
+        scene.check_files()?;
+        Ok(scene)
+    }
+
+    /// Checks a scene's text. `name` is what messages call it, and relative paths start from its
+    /// folder. Touches no file.
+    ///
+    /// # Errors
+    /// [`SceneError::Invalid`] for the first thing that is wrong.
+    pub fn parse(name: &str, text: impl Into<String>) -> Result<Self, SceneError> {
+        let source = SceneText::new(name, text);
+        let table = DeTable::parse(&source.text).map_err(|e| {
+            let end = source.text.len();
+            let message = e.message().trim().replace('\n', ", ");
+            source.error(
+                e.span().unwrap_or(end..end),
+                format!("not valid TOML: {message}"),
+                "see https://toml.io for how TOML is written",
+            )
+        })?;
+        let root = Section::root(&source, table.get_ref());
+        root.only(
+            &["title", "part", "stock", "cutter", "tolerance", "simulation", "machine", "toolpath"],
+            &[],
+            "a scene",
+        )?;
+        let title = match root.text("title")? {
+            Some(title) => title.value.to_owned(),
+            None => Path::new(name).file_stem().map_or("scene".into(), |s| s.to_string_lossy().into_owned()),
+        };
+        let folder = Path::new(name).parent().unwrap_or(Path::new("")).to_owned();
+        let part = read_part(&root.section("part")?, &folder)?;
+        let stock = read_stock(&root.section("stock")?)?;
+        let (cutter, cutting) = read_cutter(&root.section("cutter")?)?;
+        let tolerance = read_tolerance(&root.section("tolerance")?)?;
+        let simulation = read_simulation(&root.section("simulation")?, &cutter)?;
+        let (machine, clearance) = read_machine(&root.section("machine")?)?;
+        let toolpaths = read_toolpaths(&root, &tolerance, &cutter)?;
+        Ok(Self {
+            source: source.clone(),
+            title,
+            part,
+            stock,
+            cutter,
+            cutting,
+            tolerance,
+            simulation,
+            machine,
+            clearance,
+            toolpaths,
+        })
+    }
+
+    /// The file that the part comes from, if it comes from one.
+    pub fn part_file(&self) -> Option<&NamedFile> {
+        match &self.part {
+            PartSource::Mesh { file, .. } | PartSource::Nurbs { file } => Some(file),
+            PartSource::Formula { .. } => None,
+        }
+    }
+
+    /// Refuses a file that is not there or cannot be opened, pointing at its name in the scene.
+    fn check_files(&self) -> Result<(), SceneError> {
+        let Some(file) = self.part_file() else { return Ok(()) };
+        let reason = match std::fs::metadata(&file.path) {
+            Ok(found) if found.is_dir() => "it is a folder".to_owned(),
+            Ok(_) => match std::fs::File::open(&file.path) {
+                Ok(_) => return Ok(()),
+                Err(e) => e.to_string(),
+            },
+            Err(e) => e.to_string(),
+        };
+        let message = format!("cannot read the part's file {}: {reason}", file.path.display());
+        Err(self.source.error(file.span.clone(), message, "relative paths start from the scene's folder"))
+    }
+}
+
+fn read_part(part: &Section<'_>, folder: &Path) -> Result<PartSource, SceneError> {
+    let mut words = vec!["nurbs"];
+    words.extend(formula::names());
+    let mut all_keys = vec!["surface", "file", "unit", "x", "y"];
+    all_keys.extend(formula::all_keys());
+    if !part.has("surface") && !part.has("file") {
+        part.only(&all_keys, &[], "a part")?;
+        return Err(part.error(
+            part.header(),
+            "the scene does not say which part to make",
+            "add a table [part] with `file = \"part.stl\"`, or with `surface = \"wave\"` and its parameters",
+        ));
+    }
+    let named = |file: Located<&str>| NamedFile {
+        written: file.value.to_owned(),
+        path: if Path::new(file.value).is_absolute() {
+            PathBuf::from(file.value)
+        } else {
+            folder.join(file.value)
+        },
+        span: file.span,
+    };
+    match part.word("surface", &words)? {
+        None => {
+            part.only(&["file", "unit"], &all_keys, "a part from a mesh file (it has no `surface`)")?;
+            let file = part.required_text("file", "part.stl")?;
+            let unit_words = UNITS.map(|(word, _)| word);
+            let unit = part.word("unit", &unit_words)?.map_or("mm", |u| u.value);
+            let scale = UNITS.iter().find(|(word, _)| *word == unit).map_or(1.0, |(_, scale)| *scale);
+            let extension = Path::new(file.value).extension().map(|e| e.to_string_lossy().to_lowercase());
+            let format = match extension.as_deref() {
+                Some("stl") => MeshFormat::Stl,
+                Some("obj") => MeshFormat::Obj,
+                Some("json") => {
+                    return Err(part.error(
+                        &file.span,
+                        "a part from a .json file needs to say what it holds",
+                        "add `surface = \"nurbs\"`",
+                    ));
+                }
+                _ => {
+                    return Err(part.error(
+                        &file.span,
+                        format!("\"{}\" is no kind of part file that can be read", file.value),
+                        "name a file that ends in .stl or .obj",
+                    ));
+                }
+            };
+            Ok(PartSource::Mesh { file: named(file), format, unit, scale })
+        }
+        Some(word) if word.value == "nurbs" => {
+            part.only(&["surface", "file"], &all_keys, "surface = \"nurbs\"")?;
+            Ok(PartSource::Nurbs { file: named(part.required_text("file", "wave.json")?) })
+        }
+        Some(word) => {
+            let mut keys = vec!["surface", "x", "y"];
+            keys.extend(formula::keys(word.value));
+            part.only(&keys, &all_keys, &format!("surface = \"{}\"", word.value))?;
+            let (x, y) = (part.required_interval("x")?, part.required_interval("y")?);
+            let shape = formula::read(part, word.value)?;
+            let surface = AnalyticSurface::new(shape, [x, y]).map_err(|e| {
+                part.error(&word.span, e.to_string(), "change the shape's parameters, or `x` and `y`")
+            })?;
+            Ok(PartSource::Formula { surface })
+        }
+    }
+}
+
+fn read_stock(stock: &Section<'_>) -> Result<Stock, SceneError> {
+    stock.only(&["allowance", "margin"], &[], "[stock]")?;
+    // Zero is meant in both: stock may end at the part's top and at its rim.
+    let length = |key| stock.number(key, 0.0..=*LENGTH.end(), " mm");
+    Ok(Stock {
+        allowance: length("allowance")?.map_or(DEFAULT_ALLOWANCE, |v| v.value),
+        margin: length("margin")?.map_or(DEFAULT_MARGIN, |v| v.value),
+    })
+}
+
+fn read_cutter(section: &Section<'_>) -> Result<(Cutter, CuttingData), SceneError> {
+    const SPEEDS: [&str; 3] = ["spindle_speed", "feed_rate", "plunge_rate"];
+    const SHAPES: [&str; 5] = ["diameter", "corner_radius", "half_angle", "tip_diameter", "shank_diameter"];
+    let all: Vec<&str> = ["shape"].into_iter().chain(SHAPES).chain(SPEEDS).collect();
+    if !section.has("shape") {
+        section.only(&all, &[], "a cutter")?;
+    }
+    let shape = section.required_word("shape", &["ball", "flat", "bull", "taper"])?;
+    let own: &[&str] = match shape.value {
+        "bull" => &["diameter", "corner_radius"],
+        "taper" => &["tip_diameter", "corner_radius", "half_angle", "shank_diameter"],
+        _ => &["diameter"],
+    };
+    let keys: Vec<&str> = ["shape"].iter().chain(own).chain(&SPEEDS).copied().collect();
+    section.only(&keys, &all, &format!("shape = \"{}\"", shape.value))?;
+    // The cutter's own refusals speak of whole dimensions; point at the key that they are about.
+    let (made, blamed) = match shape.value {
+        "ball" => (Cutter::ball(section.required_length("diameter", 6.0)?.value), "diameter"),
+        "flat" => (Cutter::flat(section.required_length("diameter", 6.0)?.value), "diameter"),
+        "bull" => {
+            let diameter = section.required_length("diameter", 6.0)?.value;
+            (Cutter::bull(diameter, section.required_length("corner_radius", 1.0)?.value), "corner_radius")
+        }
+        _ => read_taper(section)?,
+    };
+    let cutter = made
+        .map_err(|e| section.error(&section.key_span(blamed), e.to_string(), format!("change `{blamed}`")))?;
+    let rate =
+        |key, default| Ok::<f64, SceneError>(section.number(key, RATE, "")?.map_or(default, |v| v.value));
+    let cutting = CuttingData {
+        spindle_speed: rate("spindle_speed", DEFAULT_SPINDLE_SPEED)?,
+        feed_rate: rate("feed_rate", DEFAULT_FEED_RATE)?,
+        plunge_rate: rate("plunge_rate", DEFAULT_PLUNGE_RATE)?,
+    };
+    Ok((cutter, cutting))
+}
+
+fn read_taper(
+    section: &Section<'_>,
+) -> Result<(Result<Cutter, crate::cutter::CutterError>, &'static str), SceneError> {
+    let tip = section.required_length("tip_diameter", 2.0)?.value;
+    // A tapered ball unless said otherwise.
+    let corner = section.number("corner_radius", 0.0..=*LENGTH.end(), " mm")?.map_or(0.5 * tip, |v| v.value);
+    let angle = section.required_number("half_angle", 0.01..=79.99, " degrees", 5.0)?.value;
+    let shank = section.required_length("shank_diameter", 6.0)?.value;
+    let blamed = if corner > 0.5 * tip { "corner_radius" } else { "shank_diameter" };
+    Ok((Cutter::taper(tip, corner, angle.to_radians(), shank), blamed))
+}
+
+fn read_tolerance(section: &Section<'_>) -> Result<Limits, SceneError> {
+    section.only(&["scallop", "gouge", "uncut", "chord"], &[], "[tolerance]")?;
+    let length = |key, default| Ok::<f64, SceneError>(section.length(key)?.map_or(default, |v| v.value));
+    Ok(Limits {
+        scallop: length("scallop", DEFAULT_LIMITS.scallop)?,
+        gouge: length("gouge", DEFAULT_LIMITS.gouge)?,
+        uncut: length("uncut", DEFAULT_LIMITS.uncut)?,
+        chord: length("chord", DEFAULT_LIMITS.chord)?,
+    })
+}
+
+fn read_simulation(section: &Section<'_>, cutter: &Cutter) -> Result<Simulation, SceneError> {
+    section.only(&["cell", "memory_mib", "engine"], &[], "[simulation]")?;
+    let cell = section.length("cell")?.map(|v| v.value);
+    let engine = section.word("engine", &Engine::WORDS)?.and_then(|word| Engine::from_word(word.value));
+    Ok(Simulation {
+        cell: cell.unwrap_or_else(|| default_cell(cutter)),
+        cell_is_default: cell.is_none(),
+        memory_mib: section.count("memory_mib", 1..=1 << 20)?.unwrap_or(DEFAULT_MEMORY_MIB),
+        engine: engine.unwrap_or(Engine::Reference),
+    })
+}
+
+fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
+    section.only(&["rapid_rate", "acceleration", "junction_deviation", "clearance"], &[], "[machine]")?;
+    let default = Machine::default();
+    let number =
+        |key, default| Ok::<f64, SceneError>(section.number(key, RATE, "")?.map_or(default, |v| v.value));
+    let machine = Machine {
+        rapid_rate: number("rapid_rate", default.rapid_rate)?,
+        acceleration: number("acceleration", default.acceleration)?,
+        junction_deviation: section
+            .length("junction_deviation")?
+            .map_or(default.junction_deviation, |v| v.value),
+    };
+    Ok((machine, section.length("clearance")?.map_or(DEFAULT_CLEARANCE, |v| v.value)))
+}
+
+fn read_toolpaths(
+    root: &Section<'_>,
+    limits: &Limits,
+    cutter: &Cutter,
+) -> Result<Vec<ToolpathRequest>, SceneError> {
+    let sections = root.sections("toolpath")?;
+    if sections.is_empty() {
+        return Err(root.error(
+            &root.key_span("toolpath"),
+            "the scene has no toolpath",
+            "add a table [[toolpath]] with `strategy = \"zigzag\"`",
+        ));
+    }
+    let mut requests: Vec<ToolpathRequest> = Vec::with_capacity(sections.len());
+    for section in &sections {
+        let request = read_toolpath(section, limits, cutter)?;
+        if let Some(other) = requests.iter().find(|other| other.folder == request.folder) {
+            let place = if section.has("name") { section.key_span("name") } else { section.header().clone() };
+            let message = if other.name == request.name {
+                format!("two toolpaths are called \"{}\"", request.name)
+            } else {
+                format!(
+                    "the toolpaths \"{}\" and \"{}\" would share the folder {}",
+                    other.name, request.name, request.folder
+                )
+            };
+            return Err(section.error(
+                &place,
+                message,
+                format!("give this one another name, such as `name = \"{}-2\"`", request.folder),
+            ));
+        }
+        requests.push(request);
+    }
+    Ok(requests)
+}
+
+fn read_toolpath(
+    section: &Section<'_>,
+    limits: &Limits,
+    cutter: &Cutter,
+) -> Result<ToolpathRequest, SceneError> {
+    const COMMON: [&str; 4] = ["name", "strategy", "stepover", "scallop"];
+    const OWN: [&str; 5] = ["angle", "one_way", "along", "direction", "control_points"];
+    let all: Vec<&str> = COMMON.into_iter().chain(OWN).collect();
+    if !section.has("strategy") {
+        section.only(&all, &[], "a toolpath")?;
+    }
+    let word = section.required_word("strategy", &["zigzag", "iso-parametric", "streamline"])?;
+    let own: &[&str] = match word.value {
+        "zigzag" => &["angle", "one_way"],
+        "iso-parametric" => &["along"],
+        _ => &["direction", "control_points"],
+    };
+    let keys: Vec<&str> = COMMON.iter().chain(own).copied().collect();
+    section.only(&keys, &all, &format!("strategy = \"{}\"", word.value))?;
+    let strategy = match word.value {
+        "zigzag" => Strategy::Zigzag {
+            angle: read_angle(section)?.unwrap_or(0.0),
+            one_way: section.flag("one_way")?.unwrap_or(false),
+        },
+        "iso-parametric" => Strategy::IsoParametric { along: read_along(section)? },
+        _ => read_streamline(section)?,
+    };
+    let step = read_step(section, limits, cutter)?;
+    let (name, span) = match section.text("name")? {
+        Some(name) => (name.value.to_owned(), name.span),
+        None => (word.value.to_owned(), word.span),
+    };
+    let folder = folder_name(&name).ok_or_else(|| {
+        section.error(
+            &span,
+            format!("\"{name}\" cannot name a toolpath"),
+            "use up to 64 characters, at least one of them a letter or a digit of the Latin alphabet",
+        )
+    })?;
+    Ok(ToolpathRequest { name, folder, strategy, step })
+}
+
+fn read_angle(section: &Section<'_>) -> Result<Option<f64>, SceneError> {
+    Ok(section.number("angle", -360.0..=360.0, " degrees")?.map(|v| v.value.to_radians()))
+}
+
+fn read_along(section: &Section<'_>) -> Result<Along, SceneError> {
+    let word = section.word("along", &["u", "v"])?.map_or("u", |word| word.value);
+    Ok(if word == "v" { Along::V } else { Along::U })
+}
+
+fn read_streamline(section: &Section<'_>) -> Result<Strategy, SceneError> {
+    let direction = if let Some(table) = section.inline("direction") {
+        table.only(&["angle"], &[], "a direction")?;
+        let angle = table.required_number("angle", -360.0..=360.0, " degrees", 30.0)?;
+        FeedDirection::Angle(angle.value.to_radians())
+    } else {
+        match section.word("direction", &["widest-strip", "u", "v"])?.map(|word| word.value) {
+            Some("u") => FeedDirection::Parameter(Along::U),
+            Some("v") => FeedDirection::Parameter(Along::V),
+            _ => FeedDirection::WidestStrip,
+        }
+    };
+    let control_points =
+        section.count("control_points", 4..=200)?.map_or(DEFAULT_CONTROL_POINTS, |n| n as usize);
+    Ok(Strategy::Streamline { direction, control_points })
+}
+
+/// The step of one toolpath: its own stepover or scallop, or else the scene's scallop.
+fn read_step(section: &Section<'_>, limits: &Limits, cutter: &Cutter) -> Result<Step, SceneError> {
+    match (section.length("stepover")?, section.length("scallop")?) {
+        (Some(_), Some(scallop)) => Err(section.error(
+            &scallop.span,
+            "a toolpath has either `stepover` or `scallop`",
+            "delete one of the two",
+        )),
+        (Some(stepover), None) if stepover.value > 2.0 * cutter.radius() => {
+            let message = format!(
+                "`stepover` is {} mm, wider than the cutter's diameter of {} mm",
+                stepover.value,
+                2.0 * cutter.radius()
+            );
+            Err(section.error(
+                &stepover.span,
+                message,
+                "write a stepover below the diameter, or delete it to step by scallop height",
+            ))
+        }
+        (Some(stepover), None) => Ok(Step::Stepover(stepover.value)),
+        (None, Some(scallop)) => Ok(Step::Scallop(scallop.value)),
+        (None, None) => Ok(Step::Scallop(limits.scallop)),
+    }
+}
+
+/// A folder's name for a toolpath's name: lower case, and every run of other characters than
+/// letters, digits and `_` becomes one `-`. `None` when nothing is left or it is too long.
+fn folder_name(name: &str) -> Option<String> {
+    /// File systems take 255 bytes a name; tables become unreadable long before.
+    const MAX_CHARACTERS: usize = 64;
+    let mut folder = String::new();
+    for c in name.chars() {
+        if c.is_ascii_alphanumeric() || c == '_' {
+            folder.push(c.to_ascii_lowercase());
+        } else if !folder.is_empty() && !folder.ends_with('-') {
+            folder.push('-');
+        }
+    }
+    let folder = folder.trim_end_matches('-').to_owned();
+    let printable = name.chars().count() <= MAX_CHARACTERS && !name.chars().any(char::is_control);
+    (printable && folder.chars().any(|c| c.is_ascii_alphanumeric())).then_some(folder)
+}

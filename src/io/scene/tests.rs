@@ -1,0 +1,275 @@
+//! Scenes that are read, and scenes that are refused with place and cure.
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::cutter::CutterShape;
+use crate::toolpath::{Along, FeedDirection, Strategy};
+
+const VALID: &str = r#"
+title = "Wave, zigzag against streamlines"
+[part]
+surface = "wave"
+amplitude = 2.0
+wavelength_x = 40
+x = [0, 60.0]
+y = [0.0, 40.0]
+[cutter]
+shape = "ball"
+diameter = 6.0
+[tolerance]
+scallop = 0.010
+gouge = 0.005
+[[toolpath]]
+strategy = "zigzag"
+angle = 30
+[[toolpath]]
+strategy = "zigzag"
+name = "Zigzag by stepover"
+stepover = 0.3
+one_way = true
+[[toolpath]]
+strategy = "iso-parametric"
+along = "v"
+scallop = 0.02
+[[toolpath]]
+strategy = "streamline"
+direction = { angle = 12.5 }
+"#;
+
+fn refused(text: &str) -> (String, String, (usize, usize)) {
+    match Scene::parse("folder/wave.toml", text) {
+        Ok(scene) => panic!("accepted: {scene:?}"),
+        Err(SceneError::Invalid(finding)) => {
+            let source = SceneText::new("", text);
+            (finding.message.clone(), finding.cure.clone(), source.line_and_column(finding.at.offset()))
+        }
+        Err(other) => panic!("{other}"),
+    }
+}
+
+/// The valid scene with one piece of text replaced, which must be there.
+fn with(old: &str, new: &str) -> String {
+    assert!(VALID.contains(old), "{old}");
+    VALID.replacen(old, new, 1)
+}
+
+#[test]
+fn a_scene_becomes_typed_values_in_mm_and_rad() {
+    let scene = Scene::parse("folder/wave.toml", VALID).unwrap();
+    assert_eq!(scene.title, "Wave, zigzag against streamlines");
+    assert_eq!((scene.cutter.shape(), scene.cutter.radius()), (CutterShape::Ball, 3.0));
+    assert_eq!(scene.tolerance, Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chord: 0.001 });
+    assert_eq!((scene.simulation.cell, scene.simulation.cell_is_default), (0.05, true));
+    assert_eq!(scene.simulation.memory_mib, 2048);
+    let [a, b, c, d] = &scene.toolpaths[..] else { panic!() };
+    assert_eq!(a.strategy, Strategy::Zigzag { angle: 30f64.to_radians(), one_way: false });
+    assert_eq!((a.name.as_str(), a.step), ("zigzag", Step::Scallop(0.010)));
+    assert_eq!((b.folder.as_str(), b.step), ("zigzag-by-stepover", Step::Stepover(0.3)));
+    assert_eq!(c.strategy, Strategy::IsoParametric { along: Along::V });
+    assert_eq!(c.step, Step::Scallop(0.02));
+    let direction = FeedDirection::Angle(12.5f64.to_radians());
+    assert_eq!(d.strategy, Strategy::Streamline { direction, control_points: DEFAULT_CONTROL_POINTS });
+}
+
+#[test]
+fn files_are_looked_for_beside_the_scene() {
+    let text = "[part]\nfile = \"a/wave.STL\"\nunit = \"inch\"\n[cutter]\nshape=\"flat\"\ndiameter=6\n[[toolpath]]\nstrategy=\"zigzag\"";
+    let scene = Scene::parse("folder/wave.toml", text).unwrap();
+    let PartSource::Mesh { file, format, scale, .. } = &scene.part else { panic!() };
+    assert_eq!(file.path, std::path::Path::new("folder").join("a/wave.STL"));
+    assert_eq!((*format, *scale), (MeshFormat::Stl, 25.4));
+    assert_eq!(scene.title, "wave", "the file's name is the title by default");
+}
+
+#[test]
+fn the_complete_scene_reads_back_as_itself() {
+    let taper = with(
+        "shape = \"ball\"\ndiameter = 6.0",
+        "shape = \"taper\"\ntip_diameter = 2\nhalf_angle = 7.3\nshank_diameter = 6",
+    );
+    let surfaces = [
+        "plane\"\nheight = 1",
+        "inclined_plane\"\nangle = 20\nazimuth = 77",
+        "cylinder\"\nradius = 900\nconcave = true",
+        "sphere\"\nradius = 900",
+        "saddle\"\nradius_concave = 400\nradius_convex = 500",
+        "pit_and_crest\"\nscale = 2",
+        "wave\"\namplitude = 2\nwavelength_x = 40\nwavelength_y = 33.3",
+    ];
+    let formula = "wave\"\namplitude = 2.0\nwavelength_x = 40";
+    let all = surfaces.iter().map(|s| with(formula, s)).chain([VALID.to_owned(), taper]);
+    for text in all {
+        let first = Scene::parse("wave.toml", text).unwrap();
+        let complete = complete_toml(&first);
+        let second =
+            Scene::parse("wave.toml", complete.clone()).unwrap_or_else(|e| panic!("{e}\n{complete}"));
+        assert_eq!(complete_toml(&second), complete);
+        assert_eq!(second.cutter, first.cutter);
+        assert_eq!(second.tolerance, first.tolerance);
+        assert_eq!(second.toolpaths, first.toolpaths);
+        assert_eq!(second.part, first.part);
+    }
+}
+
+#[test]
+fn misspelt_words_are_answered_with_the_nearest_valid_one() {
+    let (message, cure, place) = refused(&with("diameter = 6.0", "diametr = 6.0"));
+    assert_eq!(message, "unknown key `diametr` in [cutter]");
+    assert!(cure.starts_with("did you mean `diameter`?"), "{cure}");
+    assert_eq!(place, (11, 1));
+    let (message, cure, place) = refused(&with("strategy = \"streamline\"", "strategy = \"stream-line\""));
+    assert_eq!(message, "`strategy` in [[toolpath]] number 4 cannot be \"stream-line\"");
+    assert!(cure.starts_with("did you mean `streamline`?"), "{cure}");
+    assert_eq!(place, (28, 12));
+    let (_, cure, _) = refused(&with("[tolerance]", "[tolerances]"));
+    assert!(cure.starts_with("did you mean `tolerance`?"), "{cure}");
+    let (message, cure, _) = refused(&with("strategy = \"zigzag\"", "stratgy = \"zigzag\""));
+    assert_eq!(message, "unknown key `stratgy` in [[toolpath]] number 1");
+    assert!(cure.contains("`strategy`"), "{cure}");
+}
+
+#[test]
+fn keys_apply_to_their_own_strategy_surface_and_shape() {
+    let cases = [
+        (
+            with("along = \"v\"", "angle = 30"),
+            "the key `angle` does not apply to strategy = \"iso-parametric\"",
+        ),
+        (with("wavelength_x", "radius"), "the key `radius` does not apply to surface = \"wave\""),
+        (
+            with("diameter = 6.0", "diameter = 6.0\ncorner_radius = 1"),
+            "the key `corner_radius` does not apply to shape = \"ball\"",
+        ),
+        (
+            with("surface = \"wave\"", "file = \"wave.stl\""),
+            "the key `amplitude` does not apply to a part from a mesh file (it has no `surface`)",
+        ),
+    ];
+    for (text, expected) in cases {
+        assert_eq!(refused(&text).0, expected);
+    }
+}
+
+#[test]
+fn numbers_out_of_range_are_refused_where_they_stand() {
+    for value in ["0", "-1", "nan", "inf", "-inf", "0.0", "1e99", "-nan", "1e-9"] {
+        let (message, _, place) = refused(&with("scallop = 0.010", &format!("scallop = {value}")));
+        assert!(message.starts_with("`scallop` in [tolerance] is "), "{message}");
+        assert_eq!(place, (13, 11), "{value}");
+        refused(&with("diameter = 6.0", &format!("diameter = {value}")));
+        refused(&with("stepover = 0.3", &format!("stepover = {value}")));
+    }
+    let (message, _, _) = refused(&with("diameter = 6.0", "diameter = \"6\""));
+    assert_eq!(
+        message,
+        "`diameter` in [cutter] must be a number from 0.000001 to 10000 mm, and here is a text"
+    );
+    let (message, _, _) = refused(&with("x = [0, 60.0]", "x = [60, 0]"));
+    assert_eq!(message, "`x` in [part] must run from a lesser to a greater number");
+    refused(&with("x = [0, 60.0]", "x = [0, nan]"));
+    refused(&with("x = [0, 60.0]", "x = [0]"));
+    let (message, ..) = refused(&with("direction = { angle = 12.5 }", "control_points = 4.5"));
+    assert_eq!(message, "`control_points` in [[toolpath]] number 4 is 4.5; it must be a whole number");
+    let (message, cure, _) = refused(&with("stepover = 0.3", "stepover = 7"));
+    assert!(message.contains("wider than the cutter's diameter"), "{message} {cure}");
+}
+
+#[test]
+fn missing_things_are_named_with_an_example() {
+    let cases = [
+        (with("diameter = 6.0", ""), "[cutter] has no `diameter`", "add `diameter = 6.0`"),
+        (with("shape = \"ball\"", ""), "[cutter] has no `shape`", "add `shape = \"ball\"`"),
+        (with("amplitude = 2.0", ""), "[part] has no `amplitude`", "add `amplitude = 2.0`"),
+        (with("x = [0, 60.0]", ""), "[part] has no `x`", "add `x = [0.0, 100.0]`"),
+        (
+            VALID.split("[[toolpath]]").next().unwrap().to_owned(),
+            "the scene has no toolpath",
+            "add a table [[toolpath]] with `strategy = \"zigzag\"`",
+        ),
+    ];
+    for (text, message, cure) in cases {
+        let found = refused(&text);
+        assert_eq!((found.0.as_str(), found.1.as_str()), (message, cure));
+    }
+    assert_eq!(refused("").0, "the scene does not say which part to make");
+    let no_cutter =
+        "[part]\nsurface = \"plane\"\nx = [0, 1]\ny = [0, 1]\n[[toolpath]]\nstrategy = \"zigzag\"";
+    assert_eq!(refused(no_cutter).0, "the scene has no [cutter]");
+}
+
+#[test]
+fn toolpaths_need_names_of_their_own() {
+    let (message, _, place) = refused(&with("name = \"Zigzag by stepover\"", ""));
+    assert_eq!(message, "two toolpaths are called \"zigzag\"");
+    assert_eq!(place.0, 18);
+    let (message, ..) = refused(&with("Zigzag by stepover", "ZigZag!"));
+    assert_eq!(message, "the toolpaths \"zigzag\" and \"ZigZag!\" would share the folder zigzag");
+    let (message, ..) = refused(&with("Zigzag by stepover", "../.."));
+    assert_eq!(message, "\"../..\" cannot name a toolpath");
+    let (message, ..) = refused(&with("stepover = 0.3", "stepover = 0.3\nscallop = 0.1"));
+    assert_eq!(message, "a toolpath has either `stepover` or `scallop`");
+}
+
+#[test]
+fn a_file_that_is_not_there_is_reported_at_its_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.toml");
+    std::fs::write(&path, "[part]\nfile = \"none.stl\"\n[cutter]\nshape=\"flat\"\ndiameter=6\n[[toolpath]]\nstrategy=\"zigzag\"").unwrap();
+    let Err(SceneError::Invalid(finding)) = Scene::read(&path) else { panic!() };
+    assert!(finding.message.starts_with("cannot read the part's file "), "{}", finding.message);
+    assert_eq!(finding.at.offset(), 14);
+    assert!(matches!(Scene::read(&folder.path().join("no.toml")), Err(SceneError::Unreadable { .. })));
+    assert!(matches!(Scene::read(folder.path()), Err(SceneError::Unreadable { .. })));
+    std::fs::write(&path, b"title = \"\xff\"").unwrap();
+    let Err(SceneError::Unreadable { reason, .. }) = Scene::read(&path) else { panic!() };
+    assert_eq!(reason, "line 1 is not UTF-8 text");
+}
+
+#[test]
+fn the_default_cell_is_a_round_number() {
+    let cells: Vec<f64> = [0.6, 1.0, 6.0, 10.0, 12.0, 20.0, 63.0, 400.0]
+        .map(|d| default_cell(&Cutter::ball(d).unwrap()))
+        .to_vec();
+    assert_eq!(cells, [0.005, 0.005, 0.05, 0.05, 0.1, 0.1, 0.5, 2.0]);
+}
+
+/// Any outcome but a panic is right; an error must be printable.
+fn survive(text: &str) {
+    match Scene::parse("wave.toml", text) {
+        Ok(scene) => {
+            let complete = complete_toml(&scene);
+            let again = Scene::parse("wave.toml", complete.clone());
+            assert!(again.is_ok(), "{:?}\n{complete}", again.err());
+        }
+        Err(error) => {
+            let handler =
+                miette::GraphicalReportHandler::new_themed(miette::GraphicalTheme::unicode_nocolor());
+            let mut out = String::new();
+            handler.render_report(&mut out, &error).unwrap();
+            assert!(out.contains("wave.toml:"), "{out}");
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
+
+    #[test]
+    fn random_text_never_panics(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+        survive(&String::from_utf8_lossy(&bytes));
+    }
+
+    #[test]
+    fn mutated_scenes_never_panic(
+        cuts in proptest::collection::vec((0usize..VALID.len(), 0usize..12, "[\\PC\n]{0,6}"), 1..4)
+    ) {
+        let mut text = VALID.to_owned();
+        for (at, length, insert) in cuts {
+            let from = (0..=at.min(text.len())).rev().find(|k| text.is_char_boundary(*k)).unwrap();
+            let to = (from + length..).find(|k| *k >= text.len() || text.is_char_boundary(*k)).unwrap().min(text.len());
+            text.replace_range(from..to, &insert);
+        }
+        survive(&text);
+    }
+}

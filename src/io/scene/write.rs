@@ -1,0 +1,151 @@
+//! From a checked scene back to TOML with every default written out.
+
+use std::fmt::Write as _;
+
+use super::{PartSource, Scene, formula};
+use crate::cutter::{Cutter, CutterShape};
+use crate::toolpath::{Along, FeedDirection, Step, Strategy};
+
+/// A number as TOML takes it, rounded to 12 digits so that an angle that went through radians comes
+/// back as it was written.
+pub(super) fn number(value: f64) -> String {
+    let rounded: f64 = format!("{value:.11e}").parse().unwrap_or(value);
+    format!("{rounded:?}")
+}
+
+fn text(value: &str) -> String {
+    toml::Value::String(value.to_owned()).to_string()
+}
+
+fn along(along: Along) -> &'static str {
+    match along {
+        Along::U => "u",
+        Along::V => "v",
+    }
+}
+
+/// The whole scene as TOML, every default in effect included. Reading it gives the same scene
+/// again; relative paths still start from the scene's folder.
+pub fn complete_toml(scene: &Scene) -> String {
+    let mut out = String::new();
+    write_all(&mut out, scene).expect("writing into a string cannot fail");
+    out
+}
+
+fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
+    writeln!(out, "title = {}\n", text(&scene.title))?;
+    write_part(out, &scene.part)?;
+    writeln!(out, "\n[stock]")?;
+    writeln!(out, "allowance = {}  # mm above the part's highest point", number(scene.stock.allowance))?;
+    writeln!(out, "margin = {}  # mm around the part in the plan view", number(scene.stock.margin))?;
+    write_cutter(out, scene)?;
+    let limits = &scene.tolerance;
+    writeln!(out, "\n[tolerance]  # mm")?;
+    writeln!(
+        out,
+        "scallop = {}  # 95 % of the ridge length stay below it, the highest ridge below 1.25 times",
+        number(limits.scallop)
+    )?;
+    writeln!(out, "gouge = {}", number(limits.gouge))?;
+    writeln!(out, "uncut = {}", number(limits.uncut))?;
+    writeln!(out, "chord = {}", number(limits.chord))?;
+    writeln!(out, "\n[simulation]")?;
+    writeln!(out, "cell = {}  # mm", number(scene.simulation.cell))?;
+    writeln!(out, "memory_mib = {}", scene.simulation.memory_mib)?;
+    writeln!(out, "engine = {}", text(scene.simulation.engine.name()))?;
+    writeln!(out, "\n[machine]")?;
+    writeln!(out, "rapid_rate = {}  # mm/min", number(scene.machine.rapid_rate))?;
+    writeln!(out, "acceleration = {}  # mm/s2", number(scene.machine.acceleration))?;
+    writeln!(
+        out,
+        "junction_deviation = {}  # mm by which the control rounds corners",
+        number(scene.machine.junction_deviation)
+    )?;
+    writeln!(out, "clearance = {}  # mm of rapid moves above stock", number(scene.clearance))?;
+    scene.toolpaths.iter().try_for_each(|request| {
+        writeln!(out, "\n[[toolpath]]")?;
+        writeln!(out, "name = {}", text(&request.name))?;
+        writeln!(out, "strategy = {}", text(request.strategy_name()))?;
+        write_strategy(out, &request.strategy)?;
+        match request.step {
+            Step::Scallop(height) => {
+                writeln!(out, "scallop = {}  # mm, steps are planned for it", number(height))
+            }
+            Step::Stepover(width) => writeln!(out, "stepover = {}  # mm", number(width)),
+        }
+    })
+}
+
+fn write_part(out: &mut String, part: &PartSource) -> std::fmt::Result {
+    writeln!(out, "[part]")?;
+    match part {
+        PartSource::Mesh { file, unit, .. } => {
+            writeln!(out, "file = {}", text(&file.written))?;
+            writeln!(out, "unit = {}", text(unit))
+        }
+        PartSource::Nurbs { file } => {
+            writeln!(out, "surface = \"nurbs\"")?;
+            writeln!(out, "file = {}", text(&file.written))
+        }
+        PartSource::Formula { surface } => {
+            let ([x, y], (name, parameters)) = (surface.domain(), formula::describe(surface.shape()));
+            writeln!(out, "surface = {}", text(name))?;
+            for (key, value) in parameters {
+                match value {
+                    formula::Value::Number(value) => writeln!(out, "{key} = {}", number(value))?,
+                    formula::Value::Flag(value) => writeln!(out, "{key} = {value}")?,
+                }
+            }
+            writeln!(out, "x = [{}, {}]  # mm", number(x[0]), number(x[1]))?;
+            writeln!(out, "y = [{}, {}]  # mm", number(y[0]), number(y[1]))
+        }
+    }
+}
+
+fn write_cutter(out: &mut String, scene: &Scene) -> std::fmt::Result {
+    writeln!(out, "\n[cutter]  # mm, degrees")?;
+    let cutter: &Cutter = &scene.cutter;
+    let diameter = 2.0 * cutter.radius();
+    match cutter.shape() {
+        CutterShape::Ball => writeln!(out, "shape = \"ball\"\ndiameter = {}", number(diameter))?,
+        CutterShape::Flat => writeln!(out, "shape = \"flat\"\ndiameter = {}", number(diameter))?,
+        CutterShape::Bull => {
+            writeln!(out, "shape = \"bull\"\ndiameter = {}", number(diameter))?;
+            writeln!(out, "corner_radius = {}", number(cutter.corner_radius()))?;
+        }
+        CutterShape::Taper => {
+            let tip = 2.0 * (cutter.flat_radius() + cutter.corner_radius());
+            writeln!(out, "shape = \"taper\"\ntip_diameter = {}", number(tip))?;
+            writeln!(out, "corner_radius = {}", number(cutter.corner_radius()))?;
+            writeln!(out, "half_angle = {}", number(cutter.half_angle().to_degrees()))?;
+            writeln!(out, "shank_diameter = {}", number(diameter))?;
+        }
+    }
+    writeln!(out, "spindle_speed = {}  # rev/min", number(scene.cutting.spindle_speed))?;
+    writeln!(out, "feed_rate = {}  # mm/min", number(scene.cutting.feed_rate))?;
+    writeln!(out, "plunge_rate = {}  # mm/min", number(scene.cutting.plunge_rate))
+}
+
+fn write_strategy(out: &mut String, strategy: &Strategy) -> std::fmt::Result {
+    match *strategy {
+        Strategy::Zigzag { angle, one_way } => {
+            writeln!(out, "angle = {}  # degrees from the x axis", number(angle.to_degrees()))?;
+            writeln!(out, "one_way = {one_way}")
+        }
+        Strategy::IsoParametric { along: a } => writeln!(out, "along = \"{}\"", along(a)),
+        Strategy::Streamline { direction, control_points } => {
+            match direction {
+                FeedDirection::Parameter(a) => writeln!(out, "direction = \"{}\"", along(a))?,
+                FeedDirection::Angle(angle) => {
+                    writeln!(
+                        out,
+                        "direction = {{ angle = {} }}  # degrees from the x axis",
+                        number(angle.to_degrees())
+                    )?;
+                }
+                FeedDirection::WidestStrip => writeln!(out, "direction = \"widest-strip\"")?,
+            }
+            writeln!(out, "control_points = {control_points}")
+        }
+    }
+}

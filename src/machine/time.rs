@@ -1,0 +1,202 @@
+//! How long a machine takes for a path: trapezoids of velocity with look-ahead over the whole path.
+//!
+//! Every move is run at its feed (rapids at the rapid rate) as far as acceleration allows. At a corner
+//! that turns by β the speed v is the least of
+//! - the feeds of both moves;
+//! - v² = a·δ·cos(β/2)/(1 − cos(β/2)): the corner is taken as if rounded by an arc that leaves it
+//!   by the junction deviation δ, with centripetal acceleration a (S. K. Jeon, "Improving grbl: cornering
+//!   algorithm", 2011);
+//! - v² = a·(l/2)·cot(β/2), l the shorter of both moves: the arc must fit between the moves' middles.
+//!   Without this second rule curves of short chords would be as fast as straight lines; with it an arc of
+//!   radius ρ is run at √(a·ρ) whatever its chords (the rule of K. O'Connor's Klipper, "Kinematics").
+//!
+//! A backward pass then limits speeds to what can still be braked, a forward pass to what can have been
+//! reached: both in one sweep, O(n). The path starts and ends at rest. Jerk, the single axes' limits and
+//! the control's block rate are not modelled: real machines take somewhat longer.
+
+use super::Machine;
+use crate::geometry::Vector3;
+use crate::toolpath::{Move, MoveKind, Toolpath};
+
+const SECONDS_PER_MINUTE: f64 = 60.0;
+
+/// A move with a length, in mm and s.
+struct Block {
+    length: f64,
+    direction: Vector3,
+    /// Feed, mm/s.
+    feed: f64,
+    /// Square of the speed at its start, as far as known.
+    entry: f64,
+}
+
+/// Time for the whole path, s. Moves of no length take none. Infinite when a move has no positive feed
+/// or `machine` fails its [`Machine::check`].
+///
+/// # Tolerance
+/// A model of the machine (see the module), computed to f64 rounding.
+pub fn machining_time(path: &Toolpath, machine: &Machine) -> f64 {
+    let acceleration = machine.acceleration;
+    let mut blocks: Vec<Block> = Vec::with_capacity(path.len());
+    for (from, to, step) in path.segments() {
+        let length = (to - from).norm();
+        if length == 0.0 {
+            continue;
+        }
+        let feed = feed(step, machine);
+        if !(feed > 0.0 && length.is_finite() && machine.check().is_ok()) {
+            return f64::INFINITY;
+        }
+        let mut block = Block { length, direction: (to - from) / length, feed, entry: 0.0 };
+        if let Some(last) = blocks.last() {
+            block.entry = corner_speed_squared(last, &block, machine);
+        }
+        blocks.push(block);
+    }
+    let mut exit = 0.0;
+    for block in blocks.iter_mut().rev() {
+        block.entry = block.entry.min(exit + 2.0 * acceleration * block.length);
+        exit = block.entry;
+    }
+    let mut entry = 0.0;
+    let mut time = 0.0;
+    for (k, block) in blocks.iter().enumerate() {
+        let wanted = blocks.get(k + 1).map_or(0.0, |next| next.entry);
+        let exit = wanted.min(entry + 2.0 * acceleration * block.length);
+        time += block_time(block, entry, exit, acceleration);
+        entry = exit;
+    }
+    time
+}
+
+/// mm/s.
+fn feed(step: &Move, machine: &Machine) -> f64 {
+    let per_minute = match step.kind {
+        MoveKind::Rapid => machine.rapid_rate,
+        MoveKind::Plunge | MoveKind::Cut | MoveKind::Retract => step.feed_rate,
+    };
+    per_minute / SECONDS_PER_MINUTE
+}
+
+/// Square of the greatest speed from one move into the next.
+fn corner_speed_squared(last: &Block, next: &Block, machine: &Machine) -> f64 {
+    let turn = last.direction.cross(&next.direction).norm().atan2(last.direction.dot(&next.direction));
+    let (sin_quarter, (sin_half, cos_half)) = ((0.25 * turn).sin(), (0.5 * turn).sin_cos());
+    // 1 − cos(β/2) = 2 sin²(β/4), which keeps its digits for small angles. Division by zero, for
+    // moves in one line, gives infinity: no limit.
+    let rounded = machine.junction_deviation * cos_half / (2.0 * sin_quarter * sin_quarter);
+    let fitting = 0.5 * last.length.min(next.length) * cos_half / sin_half;
+    let feed = last.feed.min(next.feed);
+    (machine.acceleration * rounded.min(fitting).max(0.0)).min(feed * feed)
+}
+
+/// Time for one move from its entry to its exit speed (given squared): up to the feed or to where
+/// braking must begin, along at the feed, down.
+fn block_time(block: &Block, entry: f64, exit: f64, acceleration: f64) -> f64 {
+    let peak = (0.5 * (entry + exit) + acceleration * block.length).min(block.feed * block.feed);
+    let (v_in, v_out, v) = (entry.sqrt(), exit.sqrt(), peak.sqrt());
+    let ramps = (2.0 * peak - entry - exit) / (2.0 * acceleration);
+    let level = (block.length - ramps).max(0.0);
+    ((v - v_in) + (v - v_out)).max(0.0) / acceleration + level / v
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Point3;
+    use crate::toolpath::ClPoint;
+    use approx::assert_relative_eq;
+
+    const MACHINE: Machine = Machine { rapid_rate: 12_000.0, acceleration: 1000.0, junction_deviation: 0.01 };
+
+    /// Cuts at 6000 mm/min = 100 mm/s, which takes 5 mm and 0.1 s to reach.
+    fn path(tips: impl IntoIterator<Item = [f64; 3]>) -> Toolpath {
+        let mut tips = tips.into_iter().map(|t| ClPoint { tip: Point3::from(t) });
+        let start = tips.next().unwrap();
+        let moves = tips.map(|to| Move { to, kind: MoveKind::Cut, feed_rate: 6000.0, pass: 0 }).collect();
+        Toolpath { start, moves }
+    }
+
+    fn time(tips: impl IntoIterator<Item = [f64; 3]>) -> f64 {
+        machining_time(&path(tips), &MACHINE)
+    }
+
+    #[test]
+    fn a_trapezoid_a_triangle_and_a_rapid() {
+        // 0.1 s up, 90 mm at 100 mm/s, 0.1 s down.
+        assert_relative_eq!(time([[0.0; 3], [100.0, 0.0, 0.0]]), 1.1, epsilon = 1e-12);
+        // 1.6 mm: half of it speeding up, t = 2·√(s/a).
+        assert_relative_eq!(time([[0.0; 3], [0.0, 0.0, 1.6]]), 2.0 * (1.6e-3f64).sqrt(), epsilon = 1e-12);
+        let mut rapid = path([[0.0; 3], [100.0, 0.0, 0.0]]);
+        rapid.moves[0].kind = MoveKind::Rapid;
+        // 200 mm/s: 0.2 s and 20 mm each for up and down, 60 mm level.
+        assert_relative_eq!(machining_time(&rapid, &MACHINE), 0.7, epsilon = 1e-12);
+    }
+
+    #[test]
+    fn nothing_takes_no_time_and_no_feed_takes_for_ever() {
+        assert_eq!(time([[1.0; 3]]), 0.0);
+        assert_eq!(time([[1.0; 3], [1.0; 3]]), 0.0);
+        let mut standing = path([[0.0; 3], [1.0, 0.0, 0.0]]);
+        standing.moves[0].feed_rate = 0.0;
+        assert_eq!(machining_time(&standing, &MACHINE), f64::INFINITY);
+        standing.moves[0].feed_rate = f64::NAN;
+        assert_eq!(machining_time(&standing, &MACHINE), f64::INFINITY);
+        let still = Machine { acceleration: 0.0, ..MACHINE };
+        assert_eq!(machining_time(&path([[0.0; 3], [1.0; 3]]), &still), f64::INFINITY);
+    }
+
+    #[test]
+    fn collinear_pieces_take_the_time_of_one_move() {
+        let end = [81.3, -47.1, 12.9];
+        let whole = time([[0.0; 3], end]);
+        let pieces = (0..=1000).map(|k| end.map(|c| 0.001 * f64::from(k) * c));
+        assert_relative_eq!(time(pieces), whole, max_relative = 1e-9);
+        // Moves of no length in between change nothing.
+        let doubled = (0..=1000).flat_map(|k| [end.map(|c| 0.001 * f64::from(k) * c); 2]);
+        assert_relative_eq!(time(doubled), whole, max_relative = 1e-9);
+    }
+
+    #[test]
+    fn a_right_angle_follows_the_junction_deviation() {
+        // cos 45° = c: v² = 1000·0.01·c/(1 − c).
+        let c = 0.5f64.sqrt();
+        let corner: f64 = 10.0 * c / (1.0 - c);
+        // From rest to 100 mm/s, level, down to the corner; the same backwards.
+        let half = 0.1 + (100.0 - corner.sqrt()) / 1000.0 + (50.0 - 5.0 - (1e4 - corner) / 2000.0) / 100.0;
+        let got = time([[0.0; 3], [50.0, 0.0, 0.0], [50.0, 50.0, 0.0]]);
+        assert_relative_eq!(got, 2.0 * half, epsilon = 1e-12);
+    }
+
+    #[test]
+    fn a_reversal_stops() {
+        let there_and_back = time([[0.0; 3], [30.0, 0.0, 0.0], [0.0; 3]]);
+        assert_relative_eq!(there_and_back, 2.0 * time([[0.0; 3], [30.0, 0.0, 0.0]]), epsilon = 1e-9);
+    }
+
+    #[test]
+    fn an_arc_runs_at_its_centripetal_limit_whatever_its_chords() {
+        // ρ = 4 mm: √(1000·4) = 63.25 mm/s, ten rounds.
+        let speed = 4000f64.sqrt();
+        let length = 20.0 * std::f64::consts::PI * 4.0;
+        let expected = length / speed + speed / 1000.0;
+        for chords in [1000u32, 2000, 5000] {
+            let point = |k: u32| {
+                let angle = 20.0 * std::f64::consts::PI * f64::from(k) / f64::from(10 * chords);
+                [4.0 * angle.cos(), 4.0 * angle.sin(), 0.0]
+            };
+            let got = time((0..=10 * chords).map(point));
+            // Between two corners the machine gains a·l/2 of v² and brakes again.
+            assert_relative_eq!(got, expected, max_relative = 1.6 / f64::from(chords));
+        }
+    }
+
+    #[test]
+    fn braking_begins_moves_ahead() {
+        // Short moves before a reversal: the whole takes the time of one move there, one back.
+        let there = (0..=100).map(|k| [0.1 * f64::from(k), 0.0, 0.0]);
+        let back = (0..100).rev().map(|k| [0.1 * f64::from(k), 0.0, 0.0]);
+        let expected = 2.0 * time([[0.0; 3], [10.0, 0.0, 0.0]]);
+        assert_relative_eq!(time(there.chain(back)), expected, max_relative = 1e-9);
+    }
+}

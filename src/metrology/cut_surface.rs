@@ -1,0 +1,249 @@
+//! The cut surface between cell centres: the lowest of the moves around a point.
+//!
+//! The z-map knows which move made each cell. Between cells the surface is the lower envelope of
+//! the moves that won the cells around, followed along the program to neighbouring moves of the
+//! same pass as long as they cut lower. It is evaluated in closed form in f64, so what is measured
+//! on it does not depend on the grid, except that a move which is lowest nowhere on a cell centre
+//! nor next to one that is would be missed.
+
+use crate::geometry::{Point3, Vector3};
+use crate::sim::{Envelope, NOT_CUT, ZMap};
+use crate::toolpath::Toolpath;
+
+/// A point of the cut surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct CutPoint {
+    /// Height, mm.
+    pub z: f64,
+    /// The move that cut it, or [`NOT_CUT`] where stock still stands.
+    pub by: u32,
+}
+
+/// Up to nine different moves around a cell.
+pub(super) struct Winners {
+    moves: [u32; 9],
+    len: usize,
+    /// Height of stock that no move touched, if any cell around is such; infinite otherwise.
+    stock: f64,
+}
+
+impl Winners {
+    fn push(&mut self, by: u32) {
+        if !self.moves[..self.len].contains(&by) && self.len < self.moves.len() {
+            self.moves[self.len] = by;
+            self.len += 1;
+        }
+    }
+}
+
+/// A z-map together with the moves that made it.
+pub(super) struct CutSurface<'a> {
+    /// Closed-form heights of the moves.
+    pub envelope: Envelope,
+    /// Heights and winners at cell centres.
+    pub cut: &'a ZMap,
+    path: &'a Toolpath,
+}
+
+/// Most steps along the program in search of a lower move. Reached only where moves are some
+/// hundred times shorter than a cell.
+const MOST_STEPS: usize = 1000;
+
+impl<'a> CutSurface<'a> {
+    /// Of a z-map that `path` has cut.
+    pub fn new(envelope: Envelope, cut: &'a ZMap, path: &'a Toolpath) -> Self {
+        Self { envelope, cut, path }
+    }
+
+    /// The moves that won cell `(i, j)` and the eight around it, the cell's own first.
+    pub fn winners(&self, i: usize, j: usize) -> Winners {
+        let grid = &self.cut.grid;
+        let mut winners = Winners { moves: [NOT_CUT; 9], len: 0, stock: f64::INFINITY };
+        let columns = i.saturating_sub(1)..=(i + 1).min(grid.nx - 1);
+        let rows = j.saturating_sub(1)..=(j + 1).min(grid.ny - 1);
+        let around = rows.flat_map(|j| columns.clone().map(move |i| (i, j)));
+        for (i, j) in std::iter::once((i, j)).chain(around) {
+            let k = grid.index(i, j);
+            match self.cut.cut_by[k] {
+                NOT_CUT => winners.stock = f64::from(self.cut.height[k]),
+                by => winners.push(by),
+            }
+        }
+        winners
+    }
+
+    /// The lowest of the given moves at `(x, y)`.
+    pub fn lowest_of(&self, winners: &Winners, x: f64, y: f64) -> CutPoint {
+        let mut lowest = CutPoint { z: winners.stock, by: NOT_CUT };
+        for &by in &winners.moves[..winners.len] {
+            if let Some(z) = self.envelope.height(by, x, y)
+                && z < lowest.z
+            {
+                lowest = CutPoint { z, by };
+            }
+        }
+        lowest
+    }
+
+    /// The cut surface at `(x, y)`; `None` off the grid.
+    pub fn at(&self, x: f64, y: f64) -> Option<CutPoint> {
+        let (i, j) = self.cut.grid.cell_at(x, y)?;
+        let lowest = self.lowest_of(&self.winners(i, j), x, y);
+        lowest.z.is_finite().then(|| self.follow(lowest, x, y))
+    }
+
+    /// Goes along the program from `from` while the next move of the same pass is lower there.
+    pub fn follow(&self, from: CutPoint, x: f64, y: f64) -> CutPoint {
+        if from.by == NOT_CUT {
+            return from;
+        }
+        let pass = self.path.moves[from.by as usize].pass;
+        let mut lowest = from;
+        for step in [-1i64, 1] {
+            let mut k = i64::from(from.by) + step;
+            for _ in 0..MOST_STEPS {
+                let same = usize::try_from(k).ok().and_then(|k| self.path.moves.get(k));
+                if same.is_none_or(|m| m.pass != pass) {
+                    break;
+                }
+                match self.envelope.height(k as u32, x, y) {
+                    Some(z) if z < lowest.z => lowest = CutPoint { z, by: k as u32 },
+                    _ => break,
+                }
+                k += step;
+            }
+        }
+        lowest
+    }
+
+    /// Upward unit normal of the cut surface made by `by` at `(x, y)`.
+    pub fn normal(&self, by: u32, x: f64, y: f64) -> Vector3 {
+        if by == NOT_CUT {
+            return Vector3::z();
+        }
+        self.envelope.height_and_normal(by, x, y).map_or(Vector3::z(), |(_, n)| n)
+    }
+
+    /// The pass that a cut point belongs to; `None` on stock.
+    pub fn pass(&self, by: u32) -> Option<u32> {
+        self.path.moves.get(by as usize).map(|m| m.pass)
+    }
+}
+
+/// Where the line from a design point along its normal meets the cut surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Deviation {
+    /// Signed distance, mm: positive excess, negative gouge.
+    pub distance: f64,
+    /// Sine of the angle between the two surfaces there: how fast the distance changes sideways.
+    pub slope: f64,
+    /// The move that cut there.
+    pub by: u32,
+}
+
+/// The meeting is found to this height, mm.
+const MEETING: f64 = 1e-9;
+
+/// Newton steps before the search turns to bisection for good, and steps in all.
+const NEWTON_STEPS: usize = 12;
+const MOST_ITERATIONS: usize = 70;
+
+/// A ray along the normal is followed cell by cell at most this far, in steps of half a cell.
+const MOST_MARCHING_STEPS: usize = 20_000;
+
+impl CutSurface<'_> {
+    /// Signed distance from the design point `p` with outward unit normal `n` to the cut surface
+    /// along `n`. `None` off the grid.
+    ///
+    /// # Tolerance
+    /// The meeting lies on the closed-form surface to [`MEETING`]. Where the line leaves the grid
+    /// before it meets the surface, the vertical distance times `n.z` stands in for it.
+    pub fn along_normal(&self, p: &Point3, n: &Vector3) -> Option<Deviation> {
+        let (i, j) = self.cut.grid.cell_at(p.x, p.y)?;
+        let winners = self.winners(i, j);
+        let start = self.lowest_of(&winners, p.x, p.y);
+        if !start.z.is_finite() {
+            return None;
+        }
+        let vertical = start.z - p.z;
+        let sideways = vertical * n.z * n.xy().norm();
+        let found = if sideways.abs() < 0.5 * self.cut.grid.cell {
+            let at = |x: f64, y: f64| Some(self.lowest_of(&winners, x, y));
+            self.newton(p, n, start, None, &at)
+        } else {
+            let at = |x: f64, y: f64| self.at(x, y);
+            self.march(p, n, vertical).and_then(|(lo, hi)| self.newton(p, n, start, Some((lo, hi)), &at))
+        };
+        Some(found.unwrap_or(Deviation {
+            distance: vertical * n.z,
+            slope: n.cross(&self.normal(start.by, p.x, p.y)).norm(),
+            by: start.by,
+        }))
+    }
+
+    /// Follows the normal in steps of half a cell to the first change of side; the bracket
+    /// `(lower, upper)` of the meeting.
+    fn march(&self, p: &Point3, n: &Vector3, vertical: f64) -> Option<(f64, f64)> {
+        let step = 0.5 * self.cut.grid.cell * vertical.signum();
+        let mut t = 0.0;
+        for _ in 0..MOST_MARCHING_STEPS {
+            let next = t + step;
+            let q = p + n * next;
+            let gap = self.at(q.x, q.y)?.z - q.z;
+            if gap * vertical.signum() <= 0.0 {
+                return Some(if step > 0.0 { (t, next) } else { (next, t) });
+            }
+            t = next;
+        }
+        None
+    }
+
+    /// Safeguarded Newton for the meeting; `gap(t)` (surface above the line's point) falls with t.
+    fn newton(
+        &self,
+        p: &Point3,
+        n: &Vector3,
+        start: CutPoint,
+        bracket: Option<(f64, f64)>,
+        at: &dyn Fn(f64, f64) -> Option<CutPoint>,
+    ) -> Option<Deviation> {
+        let (mut lo, mut hi) = bracket.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+        let mut t = bracket.map_or(0.0, |(lo, hi)| 0.5 * (lo + hi));
+        let mut here = if bracket.is_some() { None } else { Some(start) };
+        let mut result = None;
+        for iteration in 0..MOST_ITERATIONS {
+            let q = p + n * t;
+            let point = match here.take() {
+                Some(point) => point,
+                None => at(q.x, q.y)?,
+            };
+            let m = self.normal(point.by, q.x, q.y);
+            let gap = point.z - q.z;
+            result = Some(Deviation { distance: t, slope: m.cross(n).norm(), by: point.by });
+            if gap.abs() < MEETING {
+                break;
+            }
+            if gap > 0.0 {
+                lo = t
+            } else {
+                hi = t
+            }
+            let facing = m.dot(n);
+            let next = t + gap * m.z / facing;
+            let halfway = 0.5 * (lo + hi);
+            let trusted = facing > 0.05 && iteration < NEWTON_STEPS && next > lo && next < hi;
+            let next = if trusted {
+                next
+            } else if halfway.is_finite() {
+                halfway
+            } else {
+                t + gap * n.z
+            };
+            if next == t || hi - lo < 1e-3 * MEETING {
+                break;
+            }
+            t = next;
+        }
+        result
+    }
+}

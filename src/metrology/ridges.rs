@@ -1,0 +1,296 @@
+//! Scallop ridges: where the cuts of two passes meet.
+//!
+//! Wherever two neighbouring cells were cut by different passes, a ridge runs between them. On the
+//! line from one cell centre to the other the closed-form cuts of the two are brought to
+//! intersection, so the height found there is that of the ridge itself and not of the highest cell
+//! (which misses up to `s·p/(4√(r² − s²/4))`). Moves that are lowest only between the centres are
+//! found on the way. Heights are distances from the design surface.
+//!
+//! A ridge that crosses a grid line counts for the length that it runs between grid lines: for a
+//! crossing of a line along x, pitch times `|n_x|`, `n` the ridge's plan normal (the sum over both
+//! families of lines gives the length of any curve: `ds = |n_x||dy| + |n_y||dx|`), stretched by its
+//! rise.
+
+use super::cut_surface::CutSurface;
+use super::figures::{Limits, ScallopFigures};
+use crate::cutter::Cutter;
+use crate::geometry::{Point2, Point3, Vector3};
+use crate::monitor::{self, Cancelled, Monitor};
+use crate::part::Part;
+use crate::toolpath::Toolpath;
+
+/// One crossing of a ridge with a grid line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct RidgeSample {
+    /// Height over the design surface, mm.
+    pub height: f64,
+    /// Where.
+    pub at: Point3,
+    /// Length of ridge that it stands for, mm.
+    pub length: f64,
+    /// How much higher the ridge may be before the next grid line, mm (first order).
+    pub rise: f64,
+}
+
+/// Two moves of one pass that lie farther apart along the path than this many cutter radii are
+/// neighbouring turns of a spiral or loop, not neighbouring chords.
+const SAME_TRACK: f64 = 4.0;
+
+/// Ridges inside ridges (a pass that shows only between two cells): at most this deep.
+const MOST_DEPTH: usize = 8;
+
+/// Position on the line between two centres is found to this share of the pitch.
+const CROSSING: f64 = 1e-10;
+
+/// Numerical floor of every bound, mm: root finding and the design surface's own evaluation.
+pub(super) const NUMERICAL_FLOOR: f64 = 1e-6;
+
+pub(super) struct RidgeFinder<'a> {
+    pub surface: &'a CutSurface<'a>,
+    pub part: &'a Part,
+    pub cutter: &'a Cutter,
+    pub limits: &'a Limits,
+    /// Distance along the path to the end of each move, mm.
+    along: Vec<f64>,
+}
+
+/// A line between two neighbouring centres.
+struct GridLine {
+    a: Point2,
+    b: Point2,
+    cells: [u32; 2],
+    along_x: bool,
+}
+
+impl GridLine {
+    fn at(&self, t: f64) -> Point2 {
+        self.a + (self.b - self.a) * t
+    }
+}
+
+impl<'a> RidgeFinder<'a> {
+    pub fn new(
+        surface: &'a CutSurface<'a>,
+        part: &'a Part,
+        cutter: &'a Cutter,
+        path: &Toolpath,
+        limits: &'a Limits,
+    ) -> Self {
+        let mut length = 0.0;
+        let along = path
+            .segments()
+            .map(|(from, to, _)| {
+                length += (to - from).norm();
+                length
+            })
+            .collect();
+        Self { surface, part, cutter, limits, along }
+    }
+
+    /// All ridge samples, row by row. `on_part` tells which cells are measured.
+    pub fn find(
+        &self,
+        on_part: &(dyn Fn(usize) -> bool + Sync),
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<RidgeSample>, Cancelled> {
+        let grid = self.surface.cut.grid;
+        monitor.start("measuring ridges", grid.ny as u64);
+        let rows = crate::parallel::try_map(grid.ny, |j| {
+            monitor::check(monitor)?;
+            let mut samples = Vec::new();
+            for i in 0..grid.nx {
+                let k = grid.index(i, j);
+                if !on_part(k) {
+                    continue;
+                }
+                for (ni, nj, along_x) in [(i + 1, j, true), (i, j + 1, false)] {
+                    if ni >= grid.nx || nj >= grid.ny {
+                        continue;
+                    }
+                    let other = grid.index(ni, nj);
+                    if on_part(other)
+                        && self.apart(self.surface.cut.cut_by[k], self.surface.cut.cut_by[other])
+                    {
+                        let line = GridLine {
+                            a: grid.centre(i, j),
+                            b: grid.centre(ni, nj),
+                            cells: [k as u32, other as u32],
+                            along_x,
+                        };
+                        self.on_line(&line, &mut samples);
+                    }
+                }
+            }
+            monitor.advance(1);
+            Ok(samples)
+        })?;
+        Ok(rows.into_iter().flatten().collect())
+    }
+
+    /// True when two moves belong to neighbouring tracks rather than to one.
+    fn apart(&self, a: u32, b: u32) -> bool {
+        match (self.surface.pass(a), self.surface.pass(b)) {
+            (Some(p), Some(q)) => {
+                let distance = (self.along[a as usize] - self.along[b as usize]).abs();
+                p != q || distance > SAME_TRACK * self.cutter.radius()
+            }
+            _ => false,
+        }
+    }
+
+    fn on_line(&self, line: &GridLine, out: &mut Vec<RidgeSample>) {
+        let [a, b] = line.cells.map(|k| self.surface.cut.cut_by[k as usize]);
+        self.between(line, (0.0, a), (1.0, b), MOST_DEPTH, out);
+    }
+
+    /// Finds the ridges between `a` at parameter `ta`, lowest there, and `b` at `tb`.
+    fn between(
+        &self,
+        line: &GridLine,
+        (ta, a): (f64, u32),
+        (tb, b): (f64, u32),
+        depth: usize,
+        out: &mut Vec<RidgeSample>,
+    ) {
+        if !self.apart(a, b) {
+            return;
+        }
+        let t = self.crossing(line, (ta, a), (tb, b));
+        let q = line.at(t);
+        let height = |by: u32| self.surface.envelope.height(by, q.x, q.y).unwrap_or(f64::INFINITY);
+        let (za, zb) = (height(a), height(b));
+        let z = za.max(zb);
+        let Some(lowest) = self.surface.at(q.x, q.y) else { return };
+        // Another move is lower at the crossing: it stands between the two.
+        let third = lowest.z < za.min(zb) - 1e-9 && lowest.by != a && lowest.by != b;
+        if third && depth > 0 && self.surface.pass(lowest.by).is_some() {
+            self.between(line, (ta, a), (t, lowest.by), depth - 1, out);
+            self.between(line, (t, lowest.by), (tb, b), depth - 1, out);
+        } else if z.is_finite() {
+            out.extend(self.sample(line, q, z, [a, b]));
+        }
+    }
+
+    /// Where the cuts of `a` and `b` are equally high, by bisection and regula falsi (Illinois).
+    fn crossing(&self, line: &GridLine, (mut ta, a): (f64, u32), (mut tb, b): (f64, u32)) -> f64 {
+        let difference = |t: f64| {
+            let q = line.at(t);
+            let height = |by: u32| self.surface.envelope.height(by, q.x, q.y);
+            match (height(a), height(b)) {
+                (Some(za), Some(zb)) => za - zb,
+                (None, Some(_)) => f64::INFINITY,
+                _ => f64::NEG_INFINITY,
+            }
+        };
+        let (mut fa, mut fb) = (difference(ta), difference(tb));
+        if fa >= 0.0 {
+            return ta;
+        }
+        if fb <= 0.0 {
+            return tb;
+        }
+        let mut side = 0i8;
+        for _ in 0..100 {
+            if tb - ta < CROSSING {
+                break;
+            }
+            let secant = ta + (tb - ta) * (fa / (fa - fb));
+            let t = if secant > ta && secant < tb { secant } else { 0.5 * (ta + tb) };
+            let f = difference(t);
+            if f.abs() < 1e-13 {
+                return t;
+            }
+            if f < 0.0 {
+                (ta, fa) = (t, f);
+                if side == -1 && fb.is_finite() {
+                    fb *= 0.5;
+                }
+                side = -1;
+            } else {
+                (tb, fb) = (t, f);
+                if side == 1 && fa.is_finite() {
+                    fa *= 0.5;
+                }
+                side = 1;
+            }
+        }
+        0.5 * (ta + tb)
+    }
+
+    fn sample(&self, line: &GridLine, q: Point2, z: f64, moves: [u32; 2]) -> Option<RidgeSample> {
+        let at = Point3::new(q.x, q.y, z);
+        let (foot, height) = self.part.closest_point(&at);
+        let [m, n] = moves.map(|by| self.surface.normal(by, q.x, q.y));
+        // Where a pass does not come down to the design there is no scallop but material that no
+        // pass reached; a high scallop alone does not mean that.
+        let reached = |cut: &Vector3| reaches(self.part, self.cutter, self.limits, &at, cut, &foot.normal);
+        if height > self.limits.uncut && !reached(&m) && !reached(&n) {
+            return None;
+        }
+        let tangent = m.cross(&n).try_normalize(1e-15)?;
+        let plan = tangent.xy().norm();
+        if plan < 1e-9 {
+            return None;
+        }
+        let (plan_normal_x, plan_normal_y) = (tangent.y.abs() / plan, tangent.x.abs() / plan);
+        let pitch = self.surface.cut.grid.cell;
+        let share = if line.along_x { plan_normal_x } else { plan_normal_y };
+        // A ridge meets the next grid line within a diagonal of the grid.
+        let reach = pitch * std::f64::consts::SQRT_2 / plan;
+        Some(RidgeSample {
+            height,
+            at,
+            length: pitch * share / plan,
+            rise: tangent.dot(&foot.normal).abs() * 0.5 * reach,
+        })
+    }
+}
+
+/// True when the cutter that cut the point `at` with the normal `cut` touches the design nearby: its
+/// deepest point against the design normal `design` lies within the uncut tolerance of the part.
+pub(super) fn reaches(
+    part: &Part,
+    cutter: &Cutter,
+    limits: &Limits,
+    at: &Point3,
+    cut: &Vector3,
+    design: &Vector3,
+) -> bool {
+    let deepest = at + (cut - design) * cutter.corner_radius();
+    part.closest_point(&deepest).1 <= limits.uncut
+}
+
+/// Figures of all ridge samples.
+pub(super) fn scallop_figures(samples: &[RidgeSample], limits: &Limits) -> ScallopFigures {
+    let mut figures = ScallopFigures { target_mm: limits.scallop, ..ScallopFigures::default() };
+    let total: f64 = samples.iter().map(|s| s.length).sum();
+    let highest = samples.iter().max_by(|a, b| a.height.total_cmp(&b.height));
+    let (Some(highest), true) = (highest, total > 0.0) else {
+        figures.reason = Some("no two passes meet on the part, so there is no ridge to measure".into());
+        return figures;
+    };
+    let mut by_height: Vec<(f64, f64)> = samples.iter().map(|s| (s.height, s.length)).collect();
+    by_height.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let quantile = |share: f64| {
+        let mut below = 0.0;
+        by_height
+            .iter()
+            .find(|(_, length)| {
+                below += length;
+                below >= share * total
+            })
+            .map_or(highest.height, |s| s.0)
+    };
+    // From 0.0, since an empty sum is -0.0.
+    let over = samples.iter().filter(|s| s.height > limits.scallop).fold(0.0, |sum, s| sum + s.length);
+    let possible = samples.iter().map(|s| s.height + s.rise).fold(f64::NEG_INFINITY, f64::max);
+    figures.max_mm = Some(highest.height);
+    figures.max_at_mm = Some(highest.at.into());
+    figures.p95_mm = Some(quantile(0.95));
+    figures.p50_mm = Some(quantile(0.5));
+    figures.mean_mm = Some(samples.iter().map(|s| s.height * s.length).sum::<f64>() / total);
+    figures.over_target_fraction = Some(over / total);
+    figures.ridge_length_mm = total;
+    figures.error_bound_mm = Some(possible - highest.height + NUMERICAL_FLOOR);
+    figures
+}

@@ -1,0 +1,140 @@
+//! A raster to draw rectangles, lines and text on. Row 0 is the top; colours are 8-bit sRGB.
+
+use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
+
+/// A colour, red green blue.
+pub type Rgb = [u8; 3];
+
+/// Ink of text, frames and ticks.
+pub const INK: Rgb = [32, 36, 42];
+/// Quieter ink.
+pub const FAINT_INK: Rgb = [96, 102, 110];
+/// Paper.
+pub const PAPER: Rgb = [255, 255, 255];
+
+/// A finished raster.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Picture {
+    /// Pixels along x.
+    pub width: usize,
+    /// Pixels along y.
+    pub height: usize,
+    /// Red, green and blue of each pixel, row by row from the top.
+    pub rgb: Vec<u8>,
+}
+
+/// Size of letters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TextSize {
+    /// 16 pixels a line.
+    Small,
+    /// 20 pixels a line, bold.
+    Title,
+}
+
+impl TextSize {
+    fn face(self) -> (FontWeight, RasterHeight) {
+        match self {
+            Self::Small => (FontWeight::Regular, RasterHeight::Size16),
+            Self::Title => (FontWeight::Bold, RasterHeight::Size20),
+        }
+    }
+
+    /// Width of one letter (all are equally wide), pixels.
+    pub fn letter_width(self) -> usize {
+        let (weight, height) = self.face();
+        get_raster_width(weight, height)
+    }
+
+    /// Height of a line, pixels.
+    pub fn line_height(self) -> usize {
+        self.face().1.val()
+    }
+}
+
+/// Which end of a text stands at the given x.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Align {
+    /// Its left end.
+    Left,
+    /// Its middle.
+    Middle,
+    /// Its right end.
+    Right,
+}
+
+impl Picture {
+    /// A white page.
+    pub fn blank(width: usize, height: usize) -> Self {
+        Self { width, height, rgb: PAPER.repeat(width * height) }
+    }
+
+    /// Colours one pixel; outside of the page nothing happens.
+    pub fn set(&mut self, x: i64, y: i64, colour: Rgb) {
+        if (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y) {
+            let at = 3 * (y as usize * self.width + x as usize);
+            self.rgb[at..at + 3].copy_from_slice(&colour);
+        }
+    }
+
+    /// Colour of one pixel, which must be on the page.
+    pub fn get(&self, x: usize, y: usize) -> Rgb {
+        let at = 3 * (y * self.width + x);
+        [self.rgb[at], self.rgb[at + 1], self.rgb[at + 2]]
+    }
+
+    /// Fills `width` × `height` pixels from `(x, y)` right and down.
+    pub fn fill(&mut self, x: i64, y: i64, width: i64, height: i64, colour: Rgb) {
+        for row in y..y + height {
+            (x..x + width).for_each(|column| self.set(column, row, colour));
+        }
+    }
+
+    /// A frame of one pixel just outside of the rectangle.
+    pub fn frame(&mut self, x: i64, y: i64, width: i64, height: i64, colour: Rgb) {
+        self.fill(x - 1, y - 1, width + 2, 1, colour);
+        self.fill(x - 1, y + height, width + 2, 1, colour);
+        self.fill(x - 1, y - 1, 1, height + 2, colour);
+        self.fill(x + width, y - 1, 1, height + 2, colour);
+    }
+
+    /// Writes one line; `(x, y)` is its top at the end named by `align`. Letters that the built-in
+    /// face lacks become `?`.
+    pub fn text(&mut self, x: i64, y: i64, text: &str, size: TextSize, align: Align, colour: Rgb) {
+        let (weight, height) = size.face();
+        let width = (text.chars().count() * size.letter_width()) as i64;
+        let mut left = match align {
+            Align::Left => x,
+            Align::Middle => x - width / 2,
+            Align::Right => x - width,
+        };
+        for letter in text.chars() {
+            let raster = get_raster(letter, weight, height).or_else(|| get_raster('?', weight, height));
+            for (row, coverages) in raster.iter().flat_map(|r| r.rows()).enumerate() {
+                for (column, coverage) in coverages.iter().enumerate() {
+                    self.blend(left + column as i64, y + row as i64, colour, *coverage);
+                }
+            }
+            left += size.letter_width() as i64;
+        }
+    }
+
+    fn blend(&mut self, x: i64, y: i64, colour: Rgb, coverage: u8) {
+        if coverage == 0 || !(0..self.width as i64).contains(&x) || !(0..self.height as i64).contains(&y) {
+            return;
+        }
+        let under = self.get(x as usize, y as usize);
+        let share = u32::from(coverage);
+        let mixed =
+            |k: usize| ((u32::from(colour[k]) * share + u32::from(under[k]) * (255 - share)) / 255) as u8;
+        self.set(x, y, [mixed(0), mixed(1), mixed(2)]);
+    }
+}
+
+/// `text` cut to at most `letters` letters, with `...` at the end where something is missing.
+pub fn shortened(text: &str, letters: usize) -> String {
+    if text.chars().count() <= letters {
+        return text.to_owned();
+    }
+    text.chars().take(letters.saturating_sub(3)).chain("...".chars()).collect()
+}

@@ -1,0 +1,250 @@
+//! report.html: one page that opens offline and prints well. Pictures stand in it as data.
+
+use base64::Engine as _;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use super::histogram::Histogram;
+use super::result::{RunReport, ToolpathResult};
+use super::table::{bound, conclusion, duration, micrometres, per_cent, with_bound};
+use super::verdict::{Verdict, place};
+
+/// What the page shows of one toolpath besides its figures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ToolpathPage {
+    /// deviation.png.
+    pub deviation_png: Vec<u8>,
+    /// height.png.
+    pub height_png: Vec<u8>,
+    /// Scallop heights; `None` without ridges.
+    pub histogram: Option<Histogram>,
+}
+
+const STYLE: &str = include_str!("style.css");
+
+/// The whole page. `pages` has one entry for each toolpath of `report`; `scene` is the scene's
+/// text.
+pub fn html_page(report: &RunReport, pages: &[ToolpathPage], scene: &str) -> String {
+    let body = html! {
+        header {
+            h1 { (report.title) }
+            p.verdict.(report.verdict.word()) { (verdict_word(report.verdict)) span { (conclusion(report)) } }
+            p.faint { "scene " (report.scene) " · millstream " (report.millstream) }
+        }
+        section { h2 { "Comparison" } (comparison(report)) (tolerances(report)) }
+        @for (toolpath, page) in report.toolpaths.iter().zip(pages) { (toolpath_section(toolpath, page)) }
+        section {
+            h2 { "Scene" }
+            p.faint { "SHA-256 " code { (report.scene_sha256) } }
+            pre { (scene) }
+        }
+    };
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { (report.title) " - millstream" }
+                style { (PreEscaped(STYLE)) }
+            }
+            body { (body) }
+        }
+    };
+    page.into_string()
+}
+
+fn verdict_word(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Pass => "PASS",
+        Verdict::Fail => "FAIL",
+    }
+}
+
+fn badge(verdict: Verdict) -> Markup {
+    html! { span.badge.(verdict.word()) { (verdict.word()) } }
+}
+
+fn comparison(report: &RunReport) -> Markup {
+    html! {
+        table.figures {
+            thead {
+                tr {
+                    th { "toolpath" } th { "passes" } th { "cutting" } th { "time" } th { "scallop max" } th { "p95" } th { "p50" }
+                    th { "over target" } th { "uncut" } th { "gouge" } th { "verdict" }
+                }
+                tr.unit {
+                    th { } th { } th { "mm" } th { "h:min:s" } th { "µm" } th { "µm" } th { "µm" } th { "% of ridges" } th { "mm²" } th { "µm" } th { }
+                }
+            }
+            tbody {
+                @for t in &report.toolpaths {
+                    tr.best[report.best.as_ref() == Some(&t.name)] {
+                        th { a href=(format!("#{}", t.folder)) { (t.name) } }
+                        td { (t.path.passes) }
+                        td { (format!("{:.0}", t.path.cutting_length_mm)) }
+                        td { (duration(t.path.machining_time_s)) }
+                        td { (with_bound(t.scallop.max_mm, t.scallop.error_bound_mm)) }
+                        td { (micrometres(t.scallop.p95_mm)) }
+                        td { (micrometres(t.scallop.p50_mm)) }
+                        td { (per_cent(t.scallop.over_target_fraction)) }
+                        td { (format!("{:.2}", t.uncut.area_mm2)) }
+                        td { (with_bound(Some(t.gouge.max_depth_mm), Some(t.gouge.error_bound_mm))) }
+                        td { (badge(t.verdict)) }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn tolerances(report: &RunReport) -> Markup {
+    let t = &report.tolerance;
+    html! {
+        p.faint {
+            "Limits: scallop " (micrometres(Some(t.scallop_mm))) " µm for 95 % of the ridge length and "
+            (micrometres(Some(t.scallop_highest_mm))) " µm for the highest ridge; gouge " (micrometres(Some(t.gouge_mm)))
+            " µm; uncut " (micrometres(Some(t.uncut_mm))) " µm. A limit is violated when the measured figure exceeds it; "
+            "± is the bound of the figure's error."
+        }
+    }
+}
+
+fn toolpath_section(t: &ToolpathResult, page: &ToolpathPage) -> Markup {
+    html! {
+        section.toolpath id=(t.folder) {
+            h2 { (t.name) " " (badge(t.verdict)) }
+            p.faint { (t.strategy) }
+            @if !t.violations.is_empty() {
+                ul.violations { @for violation in &t.violations { li { (violation.text) } } }
+            }
+            @if !t.notes.is_empty() {
+                h3 { "Notes" }
+                ul { @for note in &t.notes { li { (note) } } }
+            }
+            (figures(t))
+            figure {
+                img src=(data_url(&page.deviation_png)) alt=(format!("Deviation of {}", t.name));
+                figcaption { "Deviation of the cut surface along the design normal. Red stands above the design, blue below, grey is off the part." }
+            }
+            figure {
+                @if let Some(histogram) = &page.histogram {
+                    (histogram.svg())
+                    figcaption { "Scallop heights by ridge length: share of each height (bars, left) and share that is lower (line, right). The last bar holds all that is higher." }
+                } @else {
+                    figcaption { "No scallop heights: " (t.scallop.reason.as_deref().unwrap_or("no ridge was found")) }
+                }
+            }
+            figure {
+                img src=(data_url(&page.height_png)) alt=(format!("Height of {}", t.name));
+                figcaption { "Height of the cut stock." }
+            }
+            (regions(t))
+            (method(t))
+        }
+    }
+}
+
+fn data_url(png: &[u8]) -> String {
+    format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png))
+}
+
+fn figures(t: &ToolpathResult) -> Markup {
+    let (path, deviation) = (&t.path, &t.deviation);
+    let rows: [(&str, String); 12] = [
+        ("machining time", duration(path.machining_time_s)),
+        ("cutting length", format!("{:.1} mm", path.cutting_length_mm)),
+        ("air length", format!("{:.1} mm", path.air_length_mm)),
+        ("passes, cutter locations", format!("{}, {}", path.passes, path.cl_points)),
+        ("turns above 30° inside a pass", path.sharp_turns.to_string()),
+        ("highest scallop", format!("{} µm", with_bound(t.scallop.max_mm, t.scallop.error_bound_mm))),
+        ("mean scallop height", format!("{} µm", micrometres(t.scallop.mean_mm))),
+        ("ridge length", format!("{:.1} mm", t.scallop.ridge_length_mm)),
+        (
+            "deepest gouge",
+            format!("{} µm", with_bound(Some(t.gouge.max_depth_mm), Some(t.gouge.error_bound_mm))),
+        ),
+        ("uncut area, volume", format!("{:.3} mm², {:.4} mm³", t.uncut.area_mm2, t.uncut.volume_mm3)),
+        (
+            "deviation from, to",
+            format!("{} to {} µm", micrometres(Some(deviation.min_mm)), micrometres(Some(deviation.max_mm))),
+        ),
+        ("deviation, root mean square", format!("{} µm", micrometres(Some(deviation.rms_mm)))),
+    ];
+    html! { dl.grid { @for (name, value) in &rows { div { dt { (name) } dd { (value) } } } } }
+}
+
+fn regions(t: &ToolpathResult) -> Markup {
+    html! {
+        @if !t.gouge.regions.is_empty() {
+            h3 { "Gouges" }
+            p.faint { (shown(t.gouge.regions.len(), t.gouge.region_count)) }
+            table.figures {
+                thead { tr { th { "depth µm" } th { "area mm²" } th { "at mm" } th { "move" } th { "line of toolpath.nc" } } }
+                tbody { @for r in &t.gouge.regions {
+                    tr { td { (micrometres(Some(r.depth_mm))) } td { (format!("{:.4}", r.area_mm2)) } td { (place(r.at_mm)) } td { (r.move_index) } td { (r.line) } }
+                } }
+            }
+        }
+        @if !t.uncut.regions.is_empty() {
+            h3 { "Uncut material" }
+            p.faint { (shown(t.uncut.regions.len(), t.uncut.region_count)) }
+            table.figures {
+                thead { tr { th { "height µm" } th { "area mm²" } th { "volume mm³" } th { "at mm" } } }
+                tbody { @for r in &t.uncut.regions {
+                    tr { td { (micrometres(Some(r.height_mm))) } td { (format!("{:.4}", r.area_mm2)) } td { (format!("{:.4}", r.volume_mm3)) } td { (place(r.at_mm)) } }
+                } }
+            }
+        }
+    }
+}
+
+fn shown(listed: usize, found: usize) -> String {
+    if listed == found {
+        format!("{found} found")
+    } else {
+        format!("{found} found, the {listed} worst listed")
+    }
+}
+
+fn method(t: &ToolpathResult) -> Markup {
+    let s = &t.simulation;
+    html! {
+        h3 { "How it was measured" }
+        p {
+            "The stock was cut by the engine called " em { (s.engine) } " on " (s.cells) " cells of " (s.cell_mm) " mm by "
+            (s.moves) " moves, then compared with the design part at " (t.deviation.samples) " places over "
+            (format!("{:.1}", t.deviation.area_mm2)) " mm². The planner's own predictions were not used. "
+            @if let Some(error) = t.scallop.error_bound_mm { "The true highest scallop lies within " (bound(error)) " µm of the figure; " }
+            "the true deepest gouge within " (bound(t.gouge.error_bound_mm)) " µm, the true uncut height within "
+            (bound(t.uncut.error_bound_mm)) " µm. machined.stl has " (t.surface_mesh.triangles)
+            " triangles, whose top stays within " (micrometres(Some(t.surface_mesh.tolerance_mm))) " µm of the cells. Cutting and measuring took "
+            (format!("{:.2}", s.wall_s)) " s on " (s.threads) @if s.threads == 1 { " thread." } @else { " threads." }
+        }
+        p.faint {
+            "Files: " (t.folder) "/toolpath.nc, toolpath.cls, machined.stl, height.exr (height, deviation and move of every cell)."
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture;
+    use super::*;
+
+    #[test]
+    fn the_page_needs_nothing_from_outside_and_escapes_what_it_quotes() {
+        let report = fixture::report();
+        let png = vec![1u8, 2, 3];
+        let page = ToolpathPage {
+            deviation_png: png.clone(),
+            height_png: png,
+            histogram: Histogram::new(&[[0.004, 1.0]], 0.01, 0.0125),
+        };
+        let html = html_page(&report, &[page.clone(), page], "title = \"<script>\" # a & b");
+        assert!(html.contains("&lt;script&gt;") && !html.contains("<script"));
+        assert!(!html.contains("http://") && !html.contains("https://"), "nothing is fetched");
+        assert_eq!(html.matches("data:image/png;base64,AQID").count(), 4);
+        assert!(html.contains("toolpath.nc line 1240"));
+        assert!(html.contains("1 of 2 toolpaths hold every tolerance"));
+    }
+}

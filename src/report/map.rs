@@ -1,0 +1,311 @@
+//! Pictures of maps over a grid: title, map with axes, scale bar, colour key. y points up.
+
+use super::canvas::{Align, FAINT_INK, INK, Picture, Rgb, TextSize, shortened};
+use super::scale::{Unit, plain, round_down, round_up, ticks};
+use crate::metrology::Limits;
+use crate::sim::Grid;
+
+/// Widest and highest map, pixels. More makes files that no screen shows at once.
+const MAX_PIXELS: usize = 1600;
+/// Small grids are magnified by whole numbers up to about this size, pixels.
+const COMFORTABLE_PIXELS: usize = 900;
+/// Greatest magnification of one cell, pixels.
+const MAX_MAGNIFICATION: usize = 24;
+/// Colour of cells off the part; far from white, which is "no deviation".
+const OFF_PART: Rgb = [176, 180, 184];
+
+/// Room around the map, pixels.
+const LEFT: usize = 92;
+const RIGHT: usize = 190;
+const TOP: usize = 92;
+const BOTTOM: usize = 96;
+/// Least map area, so that title and key fit, pixels.
+const MIN_WIDTH: usize = 480;
+const MIN_HEIGHT: usize = 260;
+
+/// Words around a map.
+#[derive(Debug, Clone, Copy)]
+pub struct MapWords<'a> {
+    /// First line.
+    pub title: &'a str,
+    /// Second line: scene, cell, engine.
+    pub subtitle: &'a str,
+}
+
+/// How several cells become one pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Pooling {
+    /// The value farthest from zero: no gouge or spike is lost.
+    Extreme,
+    /// The mean.
+    Mean,
+}
+
+/// A map brought to pixels: `width` × `height` values, top row first, each `magnify` pixels wide.
+struct Pooled {
+    width: usize,
+    height: usize,
+    magnify: usize,
+    values: Vec<f32>,
+    /// mm that one pixel stands for.
+    pixel: f64,
+}
+
+fn pool(grid: &Grid, values: &[f32], pooling: Pooling) -> Pooled {
+    let longest = grid.nx.max(grid.ny).max(1);
+    let block = longest.div_ceil(MAX_PIXELS);
+    let magnify = (COMFORTABLE_PIXELS / longest).clamp(1, MAX_MAGNIFICATION);
+    let (width, height) = (grid.nx.div_ceil(block), grid.ny.div_ceil(block));
+    let one = |pixel: usize| {
+        // Row 0 of the picture holds the highest y.
+        let (column, row) = (pixel % width, height - 1 - pixel / width);
+        let rows = row * block..((row + 1) * block).min(grid.ny);
+        let cells = rows.flat_map(|j| {
+            (column * block..((column + 1) * block).min(grid.nx)).map(move |i| grid.index(i, j))
+        });
+        pooled(cells.map(|k| values[k]).filter(|v| v.is_finite()), pooling)
+    };
+    let values = crate::parallel::map(width * height, one);
+    Pooled { width, height, magnify, values, pixel: grid.cell * block as f64 / magnify as f64 }
+}
+
+/// NaN of no values.
+fn pooled(values: impl Iterator<Item = f32>, pooling: Pooling) -> f32 {
+    match pooling {
+        Pooling::Extreme => values.fold(f32::NAN, |a, b| if a.abs() >= b.abs() { a } else { b }),
+        Pooling::Mean => {
+            let (sum, count) = values.fold((0f64, 0u32), |(s, n), v| (s + f64::from(v), n + 1));
+            (sum / f64::from(count)) as f32
+        }
+    }
+}
+
+/// Values to colours, and what the key says.
+struct Key {
+    from: f64,
+    to: f64,
+    gradient: fn(f64) -> Rgb,
+    /// Above and below the key.
+    top: &'static str,
+    bottom: &'static str,
+    /// Least and greatest value of all cells; those beyond the key wear the colours of its ends.
+    extremes: Option<(f64, f64)>,
+}
+
+impl Key {
+    fn colour(&self, value: f32) -> Rgb {
+        if value.is_nan() {
+            return OFF_PART;
+        }
+        let t = (f64::from(value) - self.from) / (self.to - self.from);
+        (self.gradient)(t.clamp(0.0, 1.0))
+    }
+}
+
+fn diverging(t: f64) -> Rgb {
+    let colour = colorous::RED_BLUE.eval_continuous(1.0 - t);
+    [colour.r, colour.g, colour.b]
+}
+
+fn sequential(t: f64) -> Rgb {
+    let colour = colorous::VIRIDIS.eval_continuous(t);
+    [colour.r, colour.g, colour.b]
+}
+
+/// End of the deviation's colour key, mm: the scallop or the gouge tolerance, rounded up, so that pictures of several toolpaths of one scene can be compared.
+pub fn deviation_range(limits: &Limits) -> f64 {
+    round_up(limits.scallop.max(limits.gouge))
+}
+
+/// Least and greatest of the finite values.
+fn extremes(values: &[f32]) -> Option<(f64, f64)> {
+    let finite = values.iter().copied().filter(|v| v.is_finite()).map(f64::from);
+    finite.fold(None, |range, v| Some(range.map_or((v, v), |(a, b): (f64, f64)| (a.min(v), b.max(v)))))
+}
+
+/// Signed deviation: blue below the design (gouge), white on it, red above (excess), grey off the
+/// part. Where several cells share a pixel it shows the one farthest from zero.
+pub fn deviation_picture(grid: &Grid, deviation: &[f32], limits: &Limits, words: &MapWords<'_>) -> Picture {
+    let range = deviation_range(limits);
+    let extremes = extremes(deviation);
+    let key = Key { from: -range, to: range, gradient: diverging, top: "excess", bottom: "gouge", extremes };
+    draw(grid, &pool(grid, deviation, Pooling::Extreme), &key, words)
+}
+
+/// Heights of the cut stock, dark to light.
+pub fn height_picture(grid: &Grid, height: &[f32], words: &MapWords<'_>) -> Picture {
+    let pooled = pool(grid, height, Pooling::Mean);
+    let extremes = extremes(height);
+    let (mut from, mut to) = extremes.unwrap_or((0.0, 1.0));
+    // A flat surface needs a range too.
+    let least = 1e-3f64.max(to.abs() * 1e-6);
+    if to - from < least {
+        (from, to) = (0.5 * (from + to - least), 0.5 * (from + to + least));
+    }
+    let key = Key { from, to, gradient: sequential, top: "high", bottom: "low", extremes };
+    draw(grid, &pooled, &key, words)
+}
+
+fn draw(grid: &Grid, map: &Pooled, key: &Key, words: &MapWords<'_>) -> Picture {
+    let (width, height) = (map.width * map.magnify, map.height * map.magnify);
+    let mut page = Picture::blank(LEFT + width.max(MIN_WIDTH) + RIGHT, TOP + height.max(MIN_HEIGHT) + BOTTOM);
+    let letters = |size: TextSize| (page.width - 2 * 16) / size.letter_width();
+    let (title, subtitle) = (
+        shortened(words.title, letters(TextSize::Title)),
+        shortened(words.subtitle, letters(TextSize::Small)),
+    );
+    page.text(16, 12, &title, TextSize::Title, Align::Left, INK);
+    page.text(16, 36, &subtitle, TextSize::Small, Align::Left, FAINT_INK);
+    for y in 0..height {
+        for x in 0..width {
+            let value = map.values[(y / map.magnify) * map.width + x / map.magnify];
+            page.set((LEFT + x) as i64, (TOP + y) as i64, key.colour(value));
+        }
+    }
+    page.frame(LEFT as i64, TOP as i64, width as i64, height as i64, FAINT_INK);
+    draw_axes(&mut page, grid, map);
+    draw_bar(&mut page, map, height);
+    draw_key(&mut page, key, LEFT + width.max(MIN_WIDTH) + 28, height.max(MIN_HEIGHT));
+    page
+}
+
+/// Round positions in mm along the bottom and the left side.
+fn draw_axes(page: &mut Picture, grid: &Grid, map: &Pooled) {
+    let (width, height) = ((map.width * map.magnify) as i64, (map.height * map.magnify) as i64);
+    let (left, bottom) = (LEFT as i64, TOP as i64 + height);
+    // Cells reach half a cell beyond their centres.
+    let (x0, y0) = (grid.origin.x - 0.5 * grid.cell, grid.origin.y - 0.5 * grid.cell);
+    let span = |pixels: i64| pixels as f64 * map.pixel;
+    const PIXELS_A_TICK: f64 = 90.0;
+    let marks = |from: f64, length: i64| {
+        let marks = ticks(from, from + span(length), (length as f64 / PIXELS_A_TICK).max(1.0));
+        let step = marks.get(1).map_or(span(length), |second| second - marks[0]);
+        marks.into_iter().map(move |at| (((at - from) / map.pixel).round() as i64, plain(at, step)))
+    };
+    for (at, text) in marks(x0, width) {
+        page.fill(left + at.min(width - 1), bottom + 1, 1, 6, FAINT_INK);
+        page.text(left + at, bottom + 10, &text, TextSize::Small, Align::Middle, INK);
+    }
+    for (at, text) in marks(y0, height) {
+        page.fill(left - 7, bottom - 1 - at.min(height - 1), 6, 1, FAINT_INK);
+        page.text(left - 11, bottom - 9 - at, &text, TextSize::Small, Align::Right, INK);
+    }
+    page.text(left + width, bottom + 30, "x mm", TextSize::Small, Align::Right, FAINT_INK);
+    page.text(left - 11, TOP as i64 - 28, "y mm", TextSize::Small, Align::Right, FAINT_INK);
+}
+
+/// A bar of a round length, about a fifth of the map.
+fn draw_bar(page: &mut Picture, map: &Pooled, height: usize) {
+    let width = (map.width * map.magnify) as f64 * map.pixel;
+    let length = round_down(0.25 * width.max(0.5 * MIN_WIDTH as f64 * map.pixel));
+    let pixels = (length / map.pixel).round().max(1.0) as i64;
+    let (x, y) = (LEFT as i64, (TOP + height) as i64 + 52);
+    page.fill(x, y, pixels, 3, INK);
+    page.fill(x, y - 4, 1, 11, INK);
+    page.fill(x + pixels - 1, y - 4, 1, 11, INK);
+    let unit = Unit::for_range(length);
+    let text = format!("{} {}", unit.text(length, length), unit.name);
+    page.text(x, y + 10, &text, TextSize::Small, Align::Left, INK);
+}
+
+/// The colour key with its unit, ends and round values between.
+fn draw_key(page: &mut Picture, key: &Key, x: usize, room: usize) {
+    const WIDTH: i64 = 22;
+    const MAX_HEIGHT: usize = 420;
+    let (x, top) = (x as i64, TOP as i64 + 24);
+    let height = (room - 120).clamp(120, MAX_HEIGHT) as i64;
+    for row in 0..height {
+        let t = 1.0 - (row as f64 + 0.5) / height as f64;
+        page.fill(x, top + row, WIDTH, 1, (key.gradient)(t));
+    }
+    page.frame(x, top, WIDTH, height, FAINT_INK);
+    let range = key.to - key.from;
+    let unit = Unit::for_range(range);
+    let marks = ticks(key.from, key.to, 8.0);
+    let step = marks.get(1).map_or(range, |second| second - marks[0]);
+    for mark in &marks {
+        let y = top + ((key.to - mark) / range * (height - 1) as f64).round() as i64;
+        page.fill(x + WIDTH + 1, y, 5, 1, FAINT_INK);
+        let sign = if key.from < 0.0 && *mark > 1e-12 && key.to == -key.from { "+" } else { "" };
+        page.text(
+            x + WIDTH + 10,
+            y - 8,
+            &format!("{sign}{}", unit.text(*mark, step)),
+            TextSize::Small,
+            Align::Left,
+            INK,
+        );
+    }
+    page.text(x, top - 24, &format!("{}, {}", key.top, unit.name), TextSize::Small, Align::Left, INK);
+    page.text(x, top + height + 8, key.bottom, TextSize::Small, Align::Left, INK);
+    let Some((least, greatest)) = key.extremes else { return };
+    /// Lines below the key are this far apart, pixels.
+    const LINE: i64 = 20;
+    for (line, (word, value)) in [("max", greatest), ("min", least)].into_iter().enumerate() {
+        let text = format!("{word} {} {}", unit.text(value, range / 1000.0), unit.name);
+        page.text(
+            x,
+            top + height + 8 + LINE * (line as i64 + 2),
+            &text,
+            TextSize::Small,
+            Align::Left,
+            FAINT_INK,
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Point2;
+
+    const LIMITS: Limits = Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chord: 0.001 };
+    const WORDS: MapWords<'_> = MapWords { title: "a title", subtitle: "a subtitle" };
+
+    fn grid(nx: usize, ny: usize) -> Grid {
+        Grid { origin: Point2::new(0.5, 0.5), cell: 1.0, nx, ny }
+    }
+
+    #[test]
+    fn a_single_gouged_cell_survives_any_shrinking() {
+        let grid = grid(5001, 37);
+        let mut deviation = vec![0.001f32; grid.len()];
+        deviation[grid.index(3456, 30)] = -0.004;
+        let pooled = pool(&grid, &deviation, Pooling::Extreme);
+        assert!(pooled.width <= MAX_PIXELS);
+        assert_eq!(pooled.values.iter().filter(|v| **v == -0.004).count(), 1);
+    }
+
+    #[test]
+    fn small_grids_are_magnified_with_y_up() {
+        let grid = grid(3, 2);
+        let mut deviation = vec![0.0f32; 6];
+        deviation[grid.index(0, 0)] = 1.0;
+        deviation[grid.index(2, 1)] = f32::NAN;
+        let page = deviation_picture(&grid, &deviation, &LIMITS, &WORDS);
+        let at = |i: usize, row: usize| {
+            page.get(LEFT + i * MAX_MAGNIFICATION + 3, TOP + row * MAX_MAGNIFICATION + 3)
+        };
+        assert_eq!(at(0, 1), diverging(1.0), "y = 0 is the bottom row");
+        assert_eq!(at(2, 0), OFF_PART);
+        assert_eq!(at(1, 0), diverging(0.5));
+    }
+
+    #[test]
+    fn maps_of_any_shape_and_content_can_be_drawn() {
+        for (nx, ny) in [(1, 1), (1, 3000), (3000, 1), (700, 500)] {
+            let grid = grid(nx, ny);
+            for value in [f32::NAN, 0.0, 1e6, -7.25] {
+                let values = vec![value; grid.len()];
+                deviation_picture(&grid, &values, &LIMITS, &WORDS);
+                height_picture(&grid, &values, &WORDS);
+            }
+        }
+    }
+
+    #[test]
+    fn the_key_ends_at_a_round_number_that_holds_the_limits() {
+        assert!((deviation_range(&LIMITS) - 0.01).abs() < 1e-12);
+        assert!((deviation_range(&Limits { gouge: 0.011, ..LIMITS }) - 0.02).abs() < 1e-12);
+    }
+}

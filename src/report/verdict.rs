@@ -1,0 +1,174 @@
+//! The rule by which a toolpath passes or is violated, and the words for it.
+//!
+//! A tolerance is violated when the MEASURED figure exceeds the limit; the bound of the figure's
+//! error stands beside it and decides nothing, so that the verdict never depends on how cautious a
+//! bound is. The limits:
+//!
+//! - scallop: 95 % of the ridge length stay below the scallop tolerance, and the highest ridge
+//!   below [`HIGHEST_RIDGE`] times that. A planner steps for the tolerance itself and meets it up
+//!   to its own discretisation, so that the highest ridge would otherwise fail by a hair in the
+//!   best of plans.
+//! - gouge: the greatest depth stays within the gouge tolerance.
+//! - uncut: no place stands higher than the uncut tolerance.
+
+use serde::Serialize;
+
+use crate::metrology::{Limits, Measurement};
+
+/// The highest ridge may exceed the scallop tolerance by this factor. Less fails plans for single
+/// points of a few per cent; more lets visible ridges pass.
+pub const HIGHEST_RIDGE: f64 = 1.25;
+
+/// Whether all tolerances hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// Every tolerance holds.
+    Pass,
+    /// At least one does not.
+    Fail,
+}
+
+impl Verdict {
+    /// `pass` or `fail`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Pass => "pass",
+            Self::Fail => "fail",
+        }
+    }
+}
+
+/// One tolerance that does not hold.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Violation {
+    /// `scallop`, `gouge` or `uncut`.
+    pub what: &'static str,
+    /// The limit that was exceeded.
+    pub limit_mm: f64,
+    /// What was measured.
+    pub measured_mm: f64,
+    /// The finding in a sentence, with its place.
+    pub text: String,
+}
+
+/// A place as reports write it.
+pub fn place(at: [f64; 3]) -> String {
+    format!("x {:.3} y {:.3} z {:.3}", at[0], at[1], at[2])
+}
+
+/// All violations of `limits`, gravest kind first.
+pub fn violations(measured: &Measurement, limits: &Limits) -> Vec<Violation> {
+    [gouge(measured, limits), uncut(measured, limits)]
+        .into_iter()
+        .flatten()
+        .chain(scallop(measured, limits))
+        .collect()
+}
+
+fn gouge(measured: &Measurement, limits: &Limits) -> Option<Violation> {
+    let figures = &measured.gouge;
+    if figures.max_depth_mm <= limits.gouge {
+        return None;
+    }
+    let mut text = format!(
+        "gouge {:.4} mm deep (limit {:.4}, error within {:.4})",
+        figures.max_depth_mm, limits.gouge, figures.error_bound_mm
+    );
+    if let Some(worst) = figures.regions.first() {
+        text += &format!(
+            " at {}, move {}, toolpath.nc line {}",
+            place(worst.at_mm),
+            worst.move_index,
+            worst.line
+        );
+        text += &others(figures.region_count);
+    }
+    Some(Violation { what: "gouge", limit_mm: limits.gouge, measured_mm: figures.max_depth_mm, text })
+}
+
+fn uncut(measured: &Measurement, limits: &Limits) -> Option<Violation> {
+    let figures = &measured.uncut;
+    let worst = figures.regions.first()?;
+    let text = format!(
+        "uncut material {:.4} mm high (limit {:.4}, error within {:.4}) over {:.3} mm² at {}{}",
+        figures.max_height_mm,
+        limits.uncut,
+        figures.error_bound_mm,
+        figures.area_mm2,
+        place(worst.at_mm),
+        others(figures.region_count)
+    );
+    Some(Violation { what: "uncut", limit_mm: limits.uncut, measured_mm: figures.max_height_mm, text })
+}
+
+fn scallop(measured: &Measurement, limits: &Limits) -> Vec<Violation> {
+    let figures = &measured.scallop;
+    let violation = |limit: f64, value: Option<f64>, what: &str, place: String| {
+        let value = value.filter(|value| *value > limit)?;
+        let bound =
+            figures.error_bound_mm.map_or(String::new(), |bound| format!(", error within {bound:.4}"));
+        let text = format!("{what} is {value:.4} mm (limit {limit:.4}{bound}){place}");
+        Some(Violation { what: "scallop", limit_mm: limit, measured_mm: value, text })
+    };
+    let at = figures.max_at_mm.map_or(String::new(), |at| format!(" at {}", place(at)));
+    let highest = violation(HIGHEST_RIDGE * limits.scallop, figures.max_mm, "the highest scallop", at);
+    let most = violation(
+        limits.scallop,
+        figures.p95_mm,
+        "the scallop height that 95 % of the ridges stay below",
+        String::new(),
+    );
+    highest.into_iter().chain(most).collect()
+}
+
+fn others(region_count: usize) -> String {
+    match region_count {
+        0 | 1 => String::new(),
+        2 => ", and one more place".to_owned(),
+        n => format!(", and {} more places", n - 1),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture::{LIMITS, measurement};
+    use super::*;
+    use crate::metrology::UncutRegion;
+
+    #[test]
+    fn a_limit_is_violated_above_it_and_not_at_it() {
+        let mut measured = measurement(LIMITS.gouge);
+        measured.scallop.max_mm = Some(HIGHEST_RIDGE * LIMITS.scallop);
+        measured.scallop.p95_mm = Some(LIMITS.scallop);
+        assert_eq!(violations(&measured, &LIMITS), []);
+        measured.gouge.max_depth_mm = LIMITS.gouge * (1.0 + 1e-12);
+        measured.scallop.max_mm = Some(HIGHEST_RIDGE * LIMITS.scallop * (1.0 + 1e-12));
+        measured.scallop.p95_mm = Some(LIMITS.scallop * (1.0 + 1e-12));
+        let kinds: Vec<&str> = violations(&measured, &LIMITS).iter().map(|v| v.what).collect();
+        assert_eq!(kinds, ["gouge", "scallop", "scallop"]);
+    }
+
+    #[test]
+    fn any_uncut_region_is_a_violation_with_its_place() {
+        let mut measured = measurement(0.0);
+        let at_mm = [1.0, 2.0, 3.0];
+        measured.uncut.regions = vec![UncutRegion { height_mm: 0.2, area_mm2: 1.0, volume_mm3: 0.1, at_mm }];
+        measured.uncut.max_height_mm = 0.2;
+        measured.uncut.region_count = 3;
+        let found = violations(&measured, &LIMITS);
+        assert_eq!(found[0].what, "uncut");
+        assert!(
+            found[0].text.ends_with("at x 1.000 y 2.000 z 3.000, and 2 more places"),
+            "{}",
+            found[0].text
+        );
+    }
+
+    #[test]
+    fn a_gouge_names_move_and_line() {
+        let text = violations(&measurement(0.032), &LIMITS)[0].text.clone();
+        assert!(text.contains("gouge 0.0320 mm deep"), "{text}");
+        assert!(text.contains("at x 12.500 y 7.250 z -1.032, move 1234, toolpath.nc line 1240"), "{text}");
+    }
+}

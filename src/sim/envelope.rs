@@ -1,0 +1,109 @@
+//! The lower envelope of chosen moves at single points, for those who measure between cells.
+
+use super::form::{Family, Form};
+use super::swept::{ball_height, swept_height, swept_height_and_normal};
+use super::track::Track;
+use crate::cutter::Cutter;
+use crate::geometry::Vector3;
+use crate::parallel;
+use crate::toolpath::Toolpath;
+
+/// All moves of a path, ready to be evaluated one by one: 64 bytes a move. mm.
+#[derive(Debug, Clone)]
+pub struct Envelope {
+    form: Form,
+    tracks: Vec<Track>,
+}
+
+impl Envelope {
+    /// Prepares every move of `path`.
+    pub fn new(cutter: &Cutter, path: &Toolpath) -> Self {
+        let tracks = parallel::map(path.len(), |k| Track::new(path.start_of(k), path.moves[k].to.tip));
+        Self { form: Form::new(cutter), tracks }
+    }
+
+    /// The lowest cut at `(x, y)` among the moves `candidates` (indices into the path's moves) and
+    /// the move that makes it, the least index of equals; `None` where none of them passes. The
+    /// order of the candidates is of no account.
+    ///
+    /// # Tolerance
+    /// As [`SweptMove`](super::SweptMove).
+    pub fn lowest(&self, x: f64, y: f64, candidates: &[u32]) -> Option<(f64, u32)> {
+        let radius = self.form.radius;
+        match self.form.family {
+            Family::Ball => self.lowest_by(candidates, |track| {
+                let (along, across) = track.along_across(x, y);
+                ball_height(track, radius, along, across)
+            }),
+            _ => self.lowest_by(candidates, |track| swept_height(&self.form, track, x, y)),
+        }
+    }
+
+    #[inline(always)]
+    fn lowest_by(&self, candidates: &[u32], height: impl Fn(&Track) -> f64) -> Option<(f64, u32)> {
+        let mut best = (f64::INFINITY, u32::MAX);
+        for &k in candidates {
+            let h = height(&self.tracks[k as usize]);
+            if h < best.0 || (h == best.0 && k < best.1) {
+                best = (h, k);
+            }
+        }
+        (best.0 < f64::INFINITY).then_some(best)
+    }
+
+    /// Height of the cut of move `index` at `(x, y)`; `None` where it does not pass.
+    pub fn height(&self, index: u32, x: f64, y: f64) -> Option<f64> {
+        let height = swept_height(&self.form, &self.tracks[index as usize], x, y);
+        (height < f64::INFINITY).then_some(height)
+    }
+
+    /// Unit normal (up) of the cut of move `index` at `(x, y)`; `None` where it does not pass.
+    pub fn normal(&self, index: u32, x: f64, y: f64) -> Option<Vector3> {
+        self.height_and_normal(index, x, y).map(|(_, normal)| normal)
+    }
+
+    /// [`Envelope::height`] and [`Envelope::normal`] at once.
+    pub fn height_and_normal(&self, index: u32, x: f64, y: f64) -> Option<(f64, Vector3)> {
+        swept_height_and_normal(&self.form, &self.tracks[index as usize], x, y)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Point3;
+    use crate::sim::SweptMove;
+    use crate::sim::scenes::{Rng, cutters, random_path};
+
+    #[test]
+    fn the_envelope_is_the_lowest_of_the_swept_moves() {
+        let mut rng = Rng::new(7);
+        for cutter in cutters() {
+            let path = random_path(&mut rng, 60, 8.0);
+            let envelope = Envelope::new(&cutter, &path);
+            let moves: Vec<SweptMove> =
+                path.segments().map(|(a, b, _)| SweptMove::new(&cutter, a, b)).collect();
+            let backwards: Vec<u32> = (0..60).rev().collect();
+            for _ in 0..300 {
+                let (x, y) = (rng.within(-2.0, 10.0), rng.within(-2.0, 10.0));
+                let mut expected: Option<(f64, u32)> = None;
+                for (k, m) in moves.iter().enumerate() {
+                    assert_eq!(m.height(x, y), envelope.height(k as u32, x, y));
+                    assert_eq!(m.height_and_normal(x, y), envelope.height_and_normal(k as u32, x, y));
+                    if let Some(h) = m.height(x, y).filter(|h| expected.is_none_or(|e| *h < e.0)) {
+                        expected = Some((h, k as u32));
+                    }
+                }
+                assert_eq!(envelope.lowest(x, y, &backwards), expected);
+            }
+            assert_eq!(envelope.lowest(0.0, 0.0, &[]), None);
+        }
+    }
+
+    #[test]
+    fn of_equal_moves_the_first_wins() {
+        let cutter = Cutter::flat(6.0).unwrap();
+        let path = crate::sim::scenes::path_through([0.0, 1.0, 2.0].map(|x| Point3::new(x, 0.0, 0.0)));
+        assert_eq!(Envelope::new(&cutter, &path).lowest(1.0, 0.5, &[1, 0]), Some((0.0, 0)));
+    }
+}

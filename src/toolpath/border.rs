@@ -1,0 +1,64 @@
+//! Where the part ends: a cutter that touches its border rolls over an edge instead of cutting a
+//! surface.
+
+use std::collections::HashMap;
+
+use super::chord::distance_to_segment;
+use crate::geometry::Point3;
+use crate::part::{Part, SurfacePoint};
+
+/// Contacts within this share of the part's size of its border lie on it: a thousand times f64's
+/// rounding of coordinates, a millionth of a cutter.
+const ON_BORDER: f64 = 1e-10;
+
+/// Answers whether a point of the surface lies on the border of the part.
+pub struct Border<'a> {
+    part: &'a Part,
+    /// Border edges that start or end at a vertex or bound a triangle, by triangle of the mesh;
+    /// only triangles that have any.
+    edges: HashMap<u32, Vec<[Point3; 2]>>,
+    tolerance: f64,
+}
+
+impl<'a> Border<'a> {
+    /// Finds the border of the part's mesh: edges of one triangle only.
+    pub fn of(part: &'a Part) -> Self {
+        let mesh = part.mesh();
+        let tolerance = ON_BORDER * (part.bounds().diagonal() + 1.0);
+        let mut edges = HashMap::new();
+        if part.patches().is_empty() {
+            let mut at_vertex: HashMap<u32, Vec<[Point3; 2]>> = HashMap::new();
+            for (t, corners) in mesh.triangles().iter().enumerate() {
+                for k in (0..3).filter(|&k| mesh.neighbour(t, k).is_none()) {
+                    let side = [corners[k], corners[(k + 1) % 3]];
+                    let ends = side.map(|i| mesh.vertices()[i as usize]);
+                    for i in side {
+                        at_vertex.entry(i).or_default().push(ends);
+                    }
+                }
+            }
+            for (t, corners) in mesh.triangles().iter().enumerate() {
+                let near: Vec<[Point3; 2]> =
+                    corners.iter().filter_map(|i| at_vertex.get(i)).flatten().copied().collect();
+                if !near.is_empty() {
+                    edges.insert(t as u32, near);
+                }
+            }
+        }
+        Self { part, edges, tolerance }
+    }
+
+    /// True when `contact` lies on the border.
+    pub fn holds(&self, contact: &SurfacePoint) -> bool {
+        if let Some(at) = contact.at {
+            let domain = self.part.patches()[at.patch as usize].domain();
+            let ends = |x: f64, [lo, hi]: [f64; 2]| {
+                let near = ON_BORDER * (hi - lo);
+                x <= lo + near || x >= hi - near
+            };
+            return ends(at.u, domain[0]) || ends(at.v, domain[1]);
+        }
+        let near = |[a, b]: &[Point3; 2]| distance_to_segment(&contact.point, a, b) <= self.tolerance;
+        self.edges.get(&contact.triangle).is_some_and(|edges| edges.iter().any(near))
+    }
+}

@@ -1,0 +1,252 @@
+//! The part as planners see it: smooth surfaces over parameter rectangles.
+//!
+//! Patches are planned on as they are. A mesh has no curvature, so a bicubic B-spline height
+//! surface z(x, y) is fitted to it; directions and distances of passes come from that surface,
+//! while heights of cutter locations always come from dropping the cutter on the mesh itself.
+
+use super::plan::PlanError;
+use super::strip::{cutter_curvature, strip_width};
+use super::{Along, FeedDirection, Step};
+use crate::cutter::Cutter;
+use crate::field::NormalEquations;
+use crate::geometry::{Jet2, KnotVector, NurbsSurface, Point3, Vector2, Vector3};
+use crate::part::{Part, PatchPoint};
+
+/// Control points of a height surface lie this share of the cutter's radius apart. Finer follows
+/// the facets of a mesh instead of its shape; coarser misses curvature that the cutter feels.
+const CONTROL_PITCH_OVER_RADIUS: f64 = 0.5;
+
+/// Most control points a side of a height surface; bounds time and memory of the fit.
+const MAX_CONTROLS: usize = 140;
+
+/// Height samples per control point and side.
+const SAMPLES_PER_CONTROL: usize = 3;
+
+/// Weight of smoothness against height in the fit, both in units of the control pitch. It decides
+/// only where the mesh has holes.
+const SMOOTHNESS: f64 = 1e-6;
+
+/// A smooth surface to plan on.
+pub struct Chart<'a> {
+    source: Source<'a>,
+    /// Parameter range `[[u0, u1], [v0, v1]]`.
+    pub domain: [[f64; 2]; 2],
+    /// +1 where the parametrisation's normal points outward, −1 where it points inward.
+    sign: f64,
+}
+
+enum Source<'a> {
+    Patch { part: &'a Part, patch: u32 },
+    Heights(NurbsSurface),
+}
+
+/// A point of a chart with all that planning needs.
+#[derive(Debug, Clone, Copy)]
+pub struct ChartPoint {
+    /// Position and derivatives.
+    pub jet: Jet2,
+    /// Outward unit normal.
+    pub normal: Vector3,
+    sign: f64,
+}
+
+impl ChartPoint {
+    /// Normal curvature along the tangent `b`, 1/mm, positive where concave toward the outside.
+    pub fn curvature_along(&self, b: &Vector3) -> f64 {
+        let along = self.jet.pull_back(b).and_then(|(du, dv)| self.jet.normal_curvature(du, dv));
+        self.sign * along.unwrap_or(0.0)
+    }
+
+    /// Unit feed tangent in space for a wanted direction; `None` where there is none.
+    pub fn feed_tangent(&self, direction: FeedDirection) -> Option<Vector3> {
+        let t = match direction {
+            FeedDirection::Parameter(Along::U) => self.jet.du,
+            FeedDirection::Parameter(Along::V) => self.jet.dv,
+            FeedDirection::Angle(angle) => {
+                // The tangent whose plan view has this direction lies in its vertical plane.
+                let across = Vector3::new(-angle.sin(), angle.cos(), 0.0);
+                across.cross(&self.normal)
+            }
+            FeedDirection::WidestStrip => {
+                let k = self.jet.principal_curvatures()?;
+                // The most convex section, seen from outside.
+                if self.sign > 0.0 { k.min_direction } else { k.max_direction }
+            }
+        };
+        t.try_normalize(1e-12)
+    }
+
+    /// How much the direction of feed matters here, 0 to 1.
+    pub fn direction_matters(&self, direction: FeedDirection, cutter: &Cutter) -> f64 {
+        match (direction, self.jet.principal_curvatures()) {
+            (FeedDirection::WidestStrip, Some(k)) => ((k.max - k.min) * cutter.radius()).min(1.0),
+            (FeedDirection::WidestStrip, None) => 0.0,
+            _ => 1.0,
+        }
+    }
+
+    /// Distance on the surface that neighbouring passes with unit feed tangent `t` may have, mm,
+    /// and whether the surface is too concave for the formula.
+    pub fn strip_width(&self, cutter: &Cutter, t: &Vector3, step: Step) -> (f64, bool) {
+        match step {
+            Step::Stepover(width) => (width, false),
+            Step::Scallop(h) => {
+                let b = self.normal.cross(t);
+                let cutting = cutter_curvature(cutter, &self.normal, &b);
+                strip_width(cutting, self.curvature_along(&b), h, cutter.radius())
+            }
+        }
+    }
+}
+
+impl<'a> Chart<'a> {
+    /// All charts of a part.
+    ///
+    /// # Errors
+    /// When no height surface can be fitted to a mesh.
+    pub fn all(part: &'a Part, cutter: &Cutter) -> Result<Vec<Self>, PlanError> {
+        if part.patches().is_empty() {
+            return Ok(vec![Self::of_mesh(part, cutter)?]);
+        }
+        Ok((0..part.patches().len()).map(|k| Self::of_patch(part, k)).collect())
+    }
+
+    fn of_patch(part: &'a Part, k: usize) -> Self {
+        let (patch, domain) = (k as u32, part.patches()[k].domain());
+        let at = |t: f64| (0..2).map(move |c| domain[c][0] + t * (domain[c][1] - domain[c][0]));
+        // Any place with a normal tells which way the patch is turned.
+        let sign = [0.5, 0.37, 0.71, 0.13]
+            .into_iter()
+            .find_map(|t| {
+                let uv: Vec<f64> = at(t).collect();
+                let inherent = part.patches()[k].jet(uv[0], uv[1]).normal()?;
+                let outward = part.surface_point(PatchPoint { patch, u: uv[0], v: uv[1] }).normal;
+                Some(if inherent.dot(&outward) < 0.0 { -1.0 } else { 1.0 })
+            })
+            .unwrap_or(1.0);
+        Self { source: Source::Patch { part, patch }, domain, sign }
+    }
+
+    fn of_mesh(part: &'a Part, cutter: &Cutter) -> Result<Self, PlanError> {
+        let bounds = part.bounds();
+        let domain = [[bounds.min.x, bounds.max.x], [bounds.min.y, bounds.max.y]];
+        let pitch = CONTROL_PITCH_OVER_RADIUS * cutter.radius();
+        let knots = domain.map(|range| {
+            let controls = ((range[1] - range[0]) / pitch).ceil().clamp(5.0, MAX_CONTROLS as f64);
+            KnotVector::clamped_uniform(3, controls as usize, range)
+        });
+        let [Ok(knots_u), Ok(knots_v)] = knots else {
+            return Err(PlanError::mesh("its plan view has no area"));
+        };
+        let surface = fit_heights(part, domain, knots_u, knots_v)?;
+        Ok(Self { source: Source::Heights(surface), domain, sign: 1.0 })
+    }
+
+    /// The surface at a parameter; `None` where the parametrisation is degenerate.
+    pub fn at(&self, u: f64, v: f64) -> Option<ChartPoint> {
+        let jet = self.jet(u, v);
+        Some(ChartPoint { jet, normal: jet.normal()? * self.sign, sign: self.sign })
+    }
+
+    /// Position and derivatives at a parameter. Beyond the domain the tangent plane at the nearest
+    /// border point continues the surface.
+    pub fn jet(&self, u: f64, v: f64) -> Jet2 {
+        let [[u0, u1], [v0, v1]] = self.domain;
+        let (inner_u, inner_v) = (u.clamp(u0, u1), v.clamp(v0, v1));
+        let mut jet = match &self.source {
+            Source::Patch { part, patch } => part.patches()[*patch as usize].jet(inner_u, inner_v),
+            Source::Heights(surface) => surface.jet(inner_u, inner_v),
+        };
+        jet.p += jet.du * (u - inner_u) + jet.dv * (v - inner_v);
+        jet
+    }
+
+    /// True where the chart itself is, not its continuation.
+    pub fn holds(&self, [u, v]: [f64; 2]) -> bool {
+        let [[u0, u1], [v0, v1]] = self.domain;
+        u >= u0 && u <= u1 && v >= v0 && v <= v1
+    }
+
+    /// The parameters of an even grid of `n` × `n` places with the centre of each of its cells, and
+    /// the share of the domain's sides that a cell has.
+    pub fn grid(&self, n: usize) -> impl Iterator<Item = [f64; 2]> + use<> {
+        let [[u0, u1], [v0, v1]] = self.domain;
+        let at = move |lo: f64, hi: f64, k: usize| lo + (hi - lo) * (k as f64 + 0.5) / n as f64;
+        (0..n * n).map(move |k| [at(u0, u1, k % n), at(v0, v1, k / n)])
+    }
+
+    /// Least and greatest `x·e` over the plan views of all places where the centre of the cutter's
+    /// corner circle can be when it touches the chart. On a mesh the triangles themselves answer:
+    /// the fitted surface has no creases.
+    pub fn extent_of_centres(&self, part: &Part, cutter: &Cutter, e: &Vector2) -> [f64; 2] {
+        const N: usize = 200;
+        let [[u0, u1], [v0, v1]] = self.domain;
+        let at = |lo: f64, hi: f64, k: usize| lo + (hi - lo) * k as f64 / N as f64;
+        let reach = cutter.corner_radius();
+        let mut extent = [f64::INFINITY, f64::NEG_INFINITY];
+        let mut include = |p: &Point3, n: &Vector3| {
+            let x = p.coords.xy().dot(e) + reach * n.xy().dot(e);
+            extent = [extent[0].min(x), extent[1].max(x)];
+        };
+        if let Source::Heights(_) = self.source {
+            let mesh = part.mesh();
+            for t in 0..mesh.triangles().len() {
+                let normal = mesh.normal(t);
+                if normal.z > 0.0 {
+                    mesh.corners(t).iter().for_each(|corner| include(corner, &normal));
+                }
+            }
+            return extent;
+        }
+        for k in 0..(N + 1) * (N + 1) {
+            if let Some(p) = self.at(at(u0, u1, k % (N + 1)), at(v0, v1, k / (N + 1))) {
+                include(&p.jet.p, &p.normal);
+            }
+        }
+        extent
+    }
+}
+
+/// Least-squares bicubic height surface over the plan view of a mesh part.
+fn fit_heights(
+    part: &Part,
+    domain: [[f64; 2]; 2],
+    knots_u: KnotVector,
+    knots_v: KnotVector,
+) -> Result<NurbsSurface, PlanError> {
+    let counts = [knots_u.control_count(), knots_v.control_count()];
+    let samples = counts.map(|n| n * SAMPLES_PER_CONTROL);
+    let at = |c: usize, k: usize| {
+        domain[c][0] + (domain[c][1] - domain[c][0]) * (k as f64 + 0.5) / samples[c] as f64
+    };
+    let rows = crate::parallel::map(samples[1], |j| {
+        (0..samples[0]).map(|i| part.highest_at(at(0, i), at(1, j)).map(|s| s.point.z)).collect::<Vec<_>>()
+    });
+    let pitch = [0, 1].map(|c| (domain[c][1] - domain[c][0]) / counts[c] as f64);
+    let mut equations = NormalEquations::new(knots_u.clone(), knots_v.clone());
+    for (j, row) in rows.iter().enumerate() {
+        for (i, z) in row.iter().enumerate() {
+            let (x, y) = (at(0, i), at(1, j));
+            if let Some(z) = z {
+                equations.add(x, y, &[[1.0, 0.0, 0.0], [0.0; 3], [0.0; 3]], *z, 1.0);
+            }
+            let (bend_x, bend_y) = (pitch[0] * pitch[0], pitch[1] * pitch[1]);
+            equations.add(x, y, &[[0.0; 3], [0.0; 3], [bend_x, 0.0, 0.0]], 0.0, SMOOTHNESS);
+            equations.add(x, y, &[[0.0, 0.0, bend_y], [0.0; 3], [0.0; 3]], 0.0, SMOOTHNESS);
+        }
+    }
+    let heights = equations.solve(false).map_err(|e| PlanError::mesh(&e.to_string()))?;
+    let (gu, gv) = (greville(&knots_u), greville(&knots_v));
+    let (nu, nv) = (gu.len(), gv.len());
+    let control = |i: usize, j: usize| Point3::new(gu[i], gv[j], heights.coefficients()[j * nu + i]);
+    let net: Vec<Vec<Point3>> = (0..nu).map(|i| (0..nv).map(|j| control(i, j)).collect()).collect();
+    let knots = [knots_u, knots_v].map(|k| k.knots().to_vec());
+    let [knots_u, knots_v] = knots;
+    NurbsSurface::new(3, 3, knots_u, knots_v, &net, None).map_err(|e| PlanError::mesh(&e.to_string()))
+}
+
+/// Greville abscissae: control points there make the parameter itself the coordinate.
+fn greville(knots: &KnotVector) -> Vec<f64> {
+    let p = knots.degree();
+    (0..knots.control_count()).map(|i| knots.knots()[i + 1..=i + p].iter().sum::<f64>() / p as f64).collect()
+}

@@ -1,0 +1,9 @@
+//! All integration tests, in one binary: whole flows from a part to figures.
+
+#[path = "all/analytic.rs"]
+mod analytic;
+#[path = "all/defects.rs"]
+mod defects;
+
+#[path = "all/support.rs"]
+mod support;

@@ -1,0 +1,119 @@
+//! Planted defects are found where they are, with the size that they have.
+
+use millstream::cutter::Cutter;
+use millstream::geometry::{AnalyticShape, Point3};
+use millstream::metrology::Limits;
+use millstream::toolpath::{ClPoint, Move, MoveKind, Step, Strategy, Toolpath};
+
+use crate::support::{LIMITS, cut_and_measure, formula, mesh, off, plan_and_measure, settings};
+
+/// A symmetric groove along y with walls that rise at `angle` from the line x = 0.
+fn groove(angle: f64, half_width: f64, length: f64) -> millstream::part::Part {
+    let z = half_width * angle.tan();
+    let row = |y: f64| {
+        [[-half_width, y, z], [0.0, y, 0.0], [half_width, y, z]].map(|p| Point3::new(p[0], p[1], p[2]))
+    };
+    let vertices = [row(0.0), row(length)].concat();
+    mesh(vertices, vec![[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]])
+}
+
+#[test]
+fn a_ball_leaves_the_corner_of_a_groove_uncut_as_geometry_says() {
+    let (angle, r, length) = (30f64.to_radians(), 3.0, 12.0);
+    let part = groove(angle, 6.0, length);
+    let cutter = Cutter::ball(2.0 * r).unwrap();
+    let along = Strategy::Zigzag { angle: std::f64::consts::FRAC_PI_2, one_way: false };
+    let cell = 0.05;
+    // 75 passes over the 9 mm between the walls' ends, so that one runs in the corner itself.
+    let m = plan_and_measure(&part, &cutter, along, Step::Stepover(0.12), cell);
+    // The ball touches each wall at r·tan(angle) from the corner; a wall point at distance d from
+    // the corner sees the cut at r − √(r² − (contact − d)²) along its normal.
+    let contact = r * angle.tan();
+    let height = |d: f64| r - (r * r - (contact - d).powi(2)).sqrt();
+    let nearest = 0.5 * cell / angle.cos();
+    println!(
+        "groove: uncut {:.4} ± {:.4}, closed form {:.4} to {:.4}",
+        m.uncut.max_height_mm,
+        m.uncut.error_bound_mm,
+        height(nearest),
+        height(0.0)
+    );
+    assert_eq!(m.uncut.region_count, 1, "{:?}", m.uncut.regions);
+    let tallest = m.uncut.max_height_mm;
+    assert!(tallest <= height(0.0) + 1e-6 && tallest + m.uncut.error_bound_mm >= height(0.0), "{tallest}");
+    assert!(off(tallest, height(nearest)) < 5e-3, "{tallest} {}", height(nearest));
+    let wide = contact - (r * r - (r - LIMITS.uncut).powi(2)).sqrt();
+    let area = 2.0 * wide * length;
+    assert!(off(m.uncut.area_mm2, area) < 0.06, "{} {area}", m.uncut.area_mm2);
+    assert!(m.uncut.regions[0].at_mm[0].abs() < 2.0 * cell);
+    assert!(m.gouge.max_depth_mm < 1e-3);
+}
+
+#[test]
+fn a_missing_pass_is_uncut_and_a_tall_scallop_is_not() {
+    let part = formula(AnalyticShape::Plane { height: 0.0 }, [0.0, 20.0], [0.0, 20.0]);
+    let cutter = Cutter::ball(6.0).unwrap();
+    let zigzag = Strategy::Zigzag { angle: 0.0, one_way: false };
+    // A stepover of 2 mm leaves scallops of 0.17 mm: high, yet each is a scallop.
+    let m = plan_and_measure(&part, &cutter, zigzag, Step::Stepover(2.0), 0.1);
+    assert!(off(m.scallop.max_mm.unwrap(), 3.0 - 8f64.sqrt()) < 1e-6);
+    assert_eq!(m.uncut.region_count, 0, "{:?}", m.uncut.regions);
+    // Without every pass that reaches y > 12 the rest is uncut.
+    let settings = settings(&part, Step::Stepover(0.5));
+    let plan =
+        millstream::toolpath::plan(&part, &cutter, &zigzag, &settings, &millstream::monitor::Silent).unwrap();
+    let mut path = plan.path;
+    path.moves.retain(|m| m.to.tip.y < 12.0);
+    let m = cut_and_measure(&part, &cutter, &path, 0.1, &LIMITS);
+    assert_eq!(m.uncut.region_count, 1);
+    assert!((m.uncut.max_height_mm - 1.0).abs() < 1e-6, "stock stands 1 mm over the part");
+    let last = path.moves.iter().map(|m| m.to.tip.y).fold(0.0, f64::max);
+    let bare = 20.0 - last - (9.0f64 - 2.95 * 2.95).sqrt();
+    assert!(off(m.uncut.area_mm2, 20.0 * bare) < 0.02, "{} {}", m.uncut.area_mm2, 20.0 * bare);
+    assert!(
+        off(m.scallop.max_mm.unwrap(), 3.0 - (9.0f64 - 0.0625).sqrt()) < 1e-6,
+        "scallops elsewhere as before"
+    );
+}
+
+#[test]
+fn a_planted_gouge_is_found_with_its_depth_place_and_move() {
+    let part = formula(AnalyticShape::Plane { height: 0.0 }, [0.0, 20.0], [0.0, 20.0]);
+    let cutter = Cutter::ball(6.0).unwrap();
+    let at = |x: f64, y: f64, z: f64, kind| Move {
+        to: ClPoint { tip: Point3::new(x, y, z) },
+        kind,
+        feed_rate: 1000.0,
+        pass: 0,
+    };
+    let path = Toolpath {
+        start: ClPoint { tip: Point3::new(4.03, 7.01, 5.0) },
+        moves: vec![
+            at(4.03, 7.01, 0.0, MoveKind::Plunge),
+            at(9.0, 7.01, 0.0, MoveKind::Cut),
+            at(11.013, 9.537, -0.032, MoveKind::Cut),
+            at(13.0, 12.0, 0.0, MoveKind::Cut),
+        ],
+    };
+    for cell in [0.05, 0.2] {
+        let m = cut_and_measure(&part, &cutter, &path, cell, &Limits { uncut: 10.0, ..LIMITS });
+        assert_eq!(m.gouge.region_count, 1);
+        let gouge = m.gouge.regions[0];
+        println!("gouge at cell {cell}: {:.6} ± {:.6}", gouge.depth_mm, m.gouge.error_bound_mm);
+        assert!((gouge.depth_mm - 0.032).abs() < 2e-6, "cell {cell}: {}", gouge.depth_mm);
+        assert!((gouge.at_mm[0] - 11.013).abs() < 0.01 && (gouge.at_mm[1] - 9.537).abs() < 0.01);
+        assert!(gouge.move_index == 2 || gouge.move_index == 3);
+    }
+}
+
+#[test]
+fn a_rapid_through_the_part_is_a_gouge() {
+    let part = formula(AnalyticShape::Plane { height: 0.0 }, [0.0, 20.0], [0.0, 20.0]);
+    let cutter = Cutter::ball(6.0).unwrap();
+    let to = Point3::new(25.0, 10.0, -0.1);
+    let rapid = Move { to: ClPoint { tip: to }, kind: MoveKind::Rapid, feed_rate: 0.0, pass: 0 };
+    let path = Toolpath { start: ClPoint { tip: Point3::new(-5.0, 10.0, -0.1) }, moves: vec![rapid] };
+    let m = cut_and_measure(&part, &cutter, &path, 0.1, &LIMITS);
+    assert!((m.gouge.max_depth_mm - 0.1).abs() < 1e-6);
+    assert_eq!(m.gouge.regions[0].move_index, 0);
+}
