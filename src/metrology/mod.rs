@@ -66,7 +66,7 @@ pub fn measure(
     let ridges = finder.find(&on_part, monitor)?;
     let deviation = inspection.deviation_figures(&samples);
     Ok(Measurement {
-        scallop: scallop_figures(&ridges, limits),
+        scallop: scallop_figures(&ridges, finder.highest(&ridges), limits),
         gouge: inspection.gouges(&samples),
         uncut: inspection.uncut(&samples, &ridges, deviation.area_mm2),
         deviation,
