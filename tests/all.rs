@@ -4,6 +4,7 @@
 mod analytic;
 #[path = "all/defects.rs"]
 mod defects;
-
+#[path = "all/scenes.rs"]
+mod scenes;
 #[path = "all/support.rs"]
 mod support;

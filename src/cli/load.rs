@@ -1,8 +1,9 @@
 //! The part of a scene, from its file or its formula.
 
 use super::error::CliError;
-use crate::io::nurbs_json;
-use crate::io::scene::{NamedFile, PartSource, Scene, SceneError};
+use crate::geometry::{MeshError, TriangleMesh};
+use crate::io::scene::{MeshFormat, NamedFile, PartSource, Scene, SceneError};
+use crate::io::{nurbs_json, obj, stl};
 use crate::part::{Part, PartError, Patch, default_tessellation_tolerance};
 
 /// Loads the part. The notes tell what was mended to make it usable.
@@ -18,10 +19,27 @@ pub fn load_part(scene: &Scene) -> Result<(Part, Vec<String>), CliError> {
                 .map_err(|e| refused(scene, file, e))?;
             Ok((part, Vec::new()))
         }
-        PartSource::Mesh { file, .. } => {
-            Err(refused(scene, file, "mesh files cannot be read by this version").into())
+        PartSource::Mesh { file, format, scale, .. } => {
+            let read = match format {
+                MeshFormat::Stl => stl::read(&file.path),
+                MeshFormat::Obj => obj::read(&file.path),
+            };
+            let (mesh, repairs) = read.map_err(|e| refused(scene, file, e))?;
+            let mesh = in_mm(mesh, *scale).map_err(|e| refused(scene, file, e))?;
+            let notes =
+                if repairs.is_clean() { Vec::new() } else { vec![format!("{}: {repairs}", file.written)] };
+            Ok((Part::from_mesh(mesh), notes))
         }
     }
+}
+
+/// A mesh whose unit is `scale` mm.
+fn in_mm(mesh: TriangleMesh, scale: f64) -> Result<TriangleMesh, MeshError> {
+    if scale == 1.0 {
+        return Ok(mesh);
+    }
+    let vertices = mesh.vertices().iter().map(|p| p * scale).collect();
+    TriangleMesh::new(vertices, mesh.triangles().to_vec()).map(|(mesh, _)| mesh)
 }
 
 fn of_patches(patches: Vec<Patch>) -> Result<Part, PartError> {

@@ -24,9 +24,11 @@ use faer::sparse::{SparseColMat, Triplet};
 use super::scalar::ScalarSpline;
 use crate::geometry::KnotVector;
 
-/// Weight of following the direction over matching the density, α above. Greater lets passes
-/// crowd and spread to follow the field; less lets them leave the field to keep their distance.
-pub const DIRECTION_WEIGHT: f64 = 10.0;
+/// Weight of following the direction over matching the density, α above. Greater keeps passes along
+/// the wanted directions at uneven distances; less bends them to keep their distances even. On a wave
+/// of 32° slopes 10, 1 and 0.3 gave paths 1, 4 and 7 % shorter than zigzag, 0.02°, 0.6° and 2.3° off
+/// the directions; below 0.1 passes begin to leave them by more than a machinist would accept.
+pub const DIRECTION_WEIGHT: f64 = 0.3;
 
 /// Greatest residual of the normal equations, relative to their terms, that counts as solved.
 const RESIDUAL_LIMIT: f64 = 1e-8;
@@ -134,8 +136,7 @@ impl NormalEquations {
         let mut coefficients = vec![0.0; skip];
         coefficients.extend((0..n).map(|k| solution[k]));
         let residual = self.relative_residual(&coefficients, skip);
-        // A NaN residual fails the comparison too.
-        if !(residual <= RESIDUAL_LIMIT) {
+        if residual.is_nan() || residual > RESIDUAL_LIMIT {
             return Err(rank_deficient(residual));
         }
         ScalarSpline::new(self.knots_u.clone(), self.knots_v.clone(), coefficients)

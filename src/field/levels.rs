@@ -36,6 +36,11 @@ pub struct LevelTracer<'a> {
     step: f64,
 }
 
+/// A step advances by about its own length; one that does not has come to a critical point, or its
+/// level was found on another branch.
+const LEAST_ADVANCE: f64 = 0.3;
+const MOST_ADVANCE: f64 = 2.0;
+
 /// A grid edge, by its lower node and direction (0 along u, 1 along v).
 type Edge = (usize, usize);
 
@@ -125,8 +130,8 @@ impl<'a> LevelTracer<'a> {
         self.clamp(p) == p
     }
 
-    /// Surface length between neighbouring parameters.
-    fn distance(&self, a: [f64; 2], b: [f64; 2]) -> f64 {
+    /// Surface length between neighbouring parameters, mm.
+    pub fn distance(&self, a: [f64; 2], b: [f64; 2]) -> f64 {
         let (e, f, g) = (self.metric)(0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]));
         let (du, dv) = (b[0] - a[0], b[1] - a[1]);
         (e * du * du + 2.0 * f * du * dv + g * dv * dv).max(0.0).sqrt()
@@ -170,6 +175,10 @@ impl<'a> LevelTracer<'a> {
                 break;
             }
             let q = self.onto_level(q, level);
+            let advanced = self.distance(p, q) / self.step;
+            if !(LEAST_ADVANCE..MOST_ADVANCE).contains(&advanced) {
+                break;
+            }
             travelled += self.step;
             if closed && travelled > 3.0 * self.step && self.distance(q, seed) < 0.75 * self.step {
                 break;

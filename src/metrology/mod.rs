@@ -27,7 +27,7 @@ use crate::sim::{Envelope, Grid, NOT_CUT, ZMap};
 use crate::toolpath::Toolpath;
 use cut_surface::CutSurface;
 use regions::connected;
-use ridges::{NUMERICAL_FLOOR, RidgeFinder, RidgeSample, reaches, scallop_figures};
+use ridges::{NUMERICAL_FLOOR, RidgeFinder, RidgeSample, contact_against, scallop_figures};
 
 /// Regions listed one by one in the figures; the rest is counted.
 const LISTED_REGIONS: usize = 20;
@@ -203,13 +203,15 @@ impl Inspection<'_> {
     }
 
     /// True where the pass that cut cell `k` came down to the design.
-    fn reached(&self, k: usize, height: f64) -> bool {
+    fn reached(&self, k: usize) -> bool {
         let by = self.surface.cut.cut_by[k];
         let (design, centre) =
             (&self.design.samples[k], self.grid.centre(k % self.grid.nx, k / self.grid.nx));
-        let at = Point3::new(centre.x, centre.y, design.z) + design.normal * height;
-        let cut = self.surface.normal(by, at.x, at.y);
-        by != NOT_CUT && reaches(self.part, self.cutter, self.limits, &at, &cut, &design.normal)
+        by != NOT_CUT && {
+            let tip = self.surface.nearest_tip(by, centre.x, centre.y);
+            let contact = contact_against(self.cutter, &tip, &design.normal);
+            self.part.closest_point(&contact).1 <= self.limits.uncut
+        }
     }
 
     fn uncut(&self, samples: &[Sample], ridges: &[RidgeSample], measured_area: f64) -> UncutFigures {
@@ -221,7 +223,7 @@ impl Inspection<'_> {
             let height = |k: usize| f64::from(samples[k].deviation);
             let Some(&highest) = least_by(&region, |k| -height(k)) else { continue };
             let top = height(highest as usize);
-            if top <= highest_ridge * (1.0 + RIDGE_IS_TOP) && self.reached(highest as usize, top) {
+            if top <= highest_ridge * (1.0 + RIDGE_IS_TOP) && self.reached(highest as usize) {
                 continue;
             }
             let mut area = 0.0;

@@ -16,8 +16,8 @@ use super::figures::{Limits, ScallopFigures};
 use crate::cutter::Cutter;
 use crate::geometry::{Point2, Point3, Vector3};
 use crate::monitor::{self, Cancelled, Monitor};
-use crate::part::Part;
-use crate::toolpath::Toolpath;
+use crate::part::{Part, SurfacePoint};
+use crate::toolpath::{Toolpath, axis_offset};
 
 /// One crossing of a ridge with a grid line.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,6 +35,10 @@ pub(super) struct RidgeSample {
 /// Two moves of one pass that lie farther apart along the path than this many cutter radii are
 /// neighbouring turns of a spiral or loop, not neighbouring chords.
 const SAME_TRACK: f64 = 4.0;
+
+/// A pass serves a ridge when it touches the design within this many distances of the two passes.
+/// On a plane it is half of one; in a hollow of radius 4/3 of the cutter's, two.
+const FARTHEST_CONTACT: f64 = 2.0;
 
 /// Ridges inside ridges (a pass that shows only between two cells): at most this deep.
 const MOST_DEPTH: usize = 8;
@@ -221,10 +225,7 @@ impl<'a> RidgeFinder<'a> {
         let at = Point3::new(q.x, q.y, z);
         let (foot, height) = self.part.closest_point(&at);
         let [m, n] = moves.map(|by| self.surface.normal(by, q.x, q.y));
-        // Where a pass does not come down to the design there is no scallop but material that no
-        // pass reached; a high scallop alone does not mean that.
-        let reached = |cut: &Vector3| reaches(self.part, self.cutter, self.limits, &at, cut, &foot.normal);
-        if height > self.limits.uncut && !reached(&m) && !reached(&n) {
+        if height > self.limits.uncut && !self.is_scallop(moves, &foot) {
             return None;
         }
         let tangent = m.cross(&n).try_normalize(1e-15)?;
@@ -246,18 +247,24 @@ impl<'a> RidgeFinder<'a> {
     }
 }
 
-/// True when the cutter that cut the point `at` with the normal `cut` touches the design nearby: its
-/// deepest point against the design normal `design` lies within the uncut tolerance of the part.
-pub(super) fn reaches(
-    part: &Part,
-    cutter: &Cutter,
-    limits: &Limits,
-    at: &Point3,
-    cut: &Vector3,
-    design: &Vector3,
-) -> bool {
-    let deepest = at + (cut - design) * cutter.corner_radius();
-    part.closest_point(&deepest).1 <= limits.uncut
+impl RidgeFinder<'_> {
+    /// True when a high ridge over `foot` stands between passes that came down to the design on its
+    /// sides: one of them touches it, and not much farther away than the passes lie apart. Else it
+    /// stands in a hollow that the cutter does not fit, and is material that no pass reached.
+    fn is_scallop(&self, moves: [u32; 2], foot: &SurfacePoint) -> bool {
+        let tips = moves.map(|by| self.surface.nearest_tip(by, foot.point.x, foot.point.y));
+        let far = FARTHEST_CONTACT * (tips[0] - tips[1]).norm();
+        tips.iter().any(|tip| {
+            let contact = contact_against(self.cutter, tip, &foot.normal);
+            (contact - foot.point).norm() <= far && self.part.closest_point(&contact).1 <= self.limits.uncut
+        })
+    }
+}
+
+/// Where the cutter with its tip at `tip` touches, or would touch, a surface of outward normal `n`.
+pub(super) fn contact_against(cutter: &Cutter, tip: &Point3, n: &Vector3) -> Point3 {
+    let offset = axis_offset(cutter, n);
+    Point3::new(tip.x - offset.x, tip.y - offset.y, tip.z + cutter.corner_radius() * (1.0 - n.z))
 }
 
 /// Figures of all ridge samples.
@@ -266,7 +273,7 @@ pub(super) fn scallop_figures(samples: &[RidgeSample], limits: &Limits) -> Scall
     let total: f64 = samples.iter().map(|s| s.length).sum();
     let highest = samples.iter().max_by(|a, b| a.height.total_cmp(&b.height));
     let (Some(highest), true) = (highest, total > 0.0) else {
-        figures.reason = Some("no two passes meet on the part, so there is no ridge to measure".into());
+        figures.reason = Some("no ridge stands between passes on the part".into());
         return figures;
     };
     let mut by_height: Vec<(f64, f64)> = samples.iter().map(|s| (s.height, s.length)).collect();

@@ -5,7 +5,7 @@
 //! while heights of cutter locations always come from dropping the cutter on the mesh itself.
 
 use super::plan::PlanError;
-use super::strip::{cutter_curvature, strip_width};
+use super::strip::{axis_offset, strip_width_at};
 use super::{Along, FeedDirection, Step};
 use crate::cutter::Cutter;
 use crate::field::NormalEquations;
@@ -92,8 +92,7 @@ impl ChartPoint {
             Step::Stepover(width) => (width, false),
             Step::Scallop(h) => {
                 let b = self.normal.cross(t);
-                let cutting = cutter_curvature(cutter, &self.normal, &b);
-                strip_width(cutting, self.curvature_along(&b), h, cutter.radius())
+                strip_width_at(cutter, &self.normal, &b, self.curvature_along(&b), h)
             }
         }
     }
@@ -175,17 +174,16 @@ impl<'a> Chart<'a> {
         (0..n * n).map(move |k| [at(u0, u1, k % n), at(v0, v1, k / n)])
     }
 
-    /// Least and greatest `x·e` over the plan views of all places where the centre of the cutter's
-    /// corner circle can be when it touches the chart. On a mesh the triangles themselves answer:
+    /// Least and greatest `x·e` over the plan views of all places where the cutter's axis can be when
+    /// the cutter touches the chart. On a mesh the triangles themselves answer:
     /// the fitted surface has no creases.
-    pub fn extent_of_centres(&self, part: &Part, cutter: &Cutter, e: &Vector2) -> [f64; 2] {
+    pub fn extent_of_axes(&self, part: &Part, cutter: &Cutter, e: &Vector2) -> [f64; 2] {
         const N: usize = 200;
         let [[u0, u1], [v0, v1]] = self.domain;
         let at = |lo: f64, hi: f64, k: usize| lo + (hi - lo) * k as f64 / N as f64;
-        let reach = cutter.corner_radius();
         let mut extent = [f64::INFINITY, f64::NEG_INFINITY];
         let mut include = |p: &Point3, n: &Vector3| {
-            let x = p.coords.xy().dot(e) + reach * n.xy().dot(e);
+            let x = (p.coords.xy() + axis_offset(cutter, n)).dot(e);
             extent = [extent[0].min(x), extent[1].max(x)];
         };
         if let Source::Heights(_) = self.source {

@@ -18,8 +18,8 @@ pub fn distance_to_segment(p: &Point3, a: &Point3, b: &Point3) -> f64 {
 /// Samples `locate` over `[s0, s1]` so that the straight moves between samples stay within
 /// `tolerance` (mm) of the exact curve.
 ///
-/// `locate(s)` gives the cutter location at parameter `s`; the first samples are `step` apart in
-/// `s`. Each interval is tested at its middle and its quarters, and halved until all three hold.
+/// `locate(s)` gives the cutter location at parameter `s`, `None` where there is none: samples before
+/// the first location and after the next gap are left out. The first samples are `step` apart in `s`. Each interval is tested at its middle and its quarters, and halved until all three hold.
 ///
 /// # Tolerance
 /// A curve whose curvature changes sign more than four times within one final interval could slip
@@ -33,10 +33,12 @@ pub fn sample_within_chord(
 ) -> Vec<Point3> {
     let count = ((s1 - s0) / step).ceil().max(1.0) as usize;
     let at = |k: usize| s0 + (s1 - s0) * k as f64 / count as f64;
-    let Some(first) = locate(s0) else { return Vec::new() };
+    let Some((start, first)) = (0..=count).find_map(|k| locate(at(k)).map(|p| (k, p))) else {
+        return Vec::new();
+    };
     let mut points = vec![first];
-    let mut a = (s0, first);
-    for k in 1..=count {
+    let mut a = (at(start), first);
+    for k in start + 1..=count {
         let s = at(k);
         let Some(p) = locate(s) else { break };
         halve(a, (s, p), tolerance, MAX_HALVINGS, locate, &mut points);

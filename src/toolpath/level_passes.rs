@@ -1,42 +1,22 @@
-//! Passes along level curves of a scalar field: isoparametric lines and streamlines.
+//! Passes along the level curves of a scalar field ψ on a chart.
 //!
-//! Neighbouring levels c and c + δ lie δ/|∇ψ| apart on the surface, so a pass at level c may have its
-//! neighbour at most `δ(c) = min w·|∇ψ|` higher, the minimum over the pass and `w` the strip width
-//! there. Levels are then spread so that every step keeps within that and all are equally near to
-//! it.
+//! Whole passes run along levels that `spacing` has placed. Where the surface or the field asks for
+//! a smaller interval than the levels leave, further passes are put halfway between them, only
+//! along the stretches that need one, and between those again.
 
-use super::chart::{Chart, ChartPoint};
+use super::chart::Chart;
 use super::drop::DropCutter;
 use super::plan::{PassSettings, Passes, PlanError};
-use super::{Along, FeedDirection};
+use super::spacing::{level_tangent, place_levels};
+use super::strip::axis_offset;
 use crate::cutter::Cutter;
-use crate::field::{
-    self, Axis, LevelCurve, LevelTracer, ScalarField, StreamSample, fit_stream_function,
-    surface_gradient_length,
-};
-use crate::geometry::{KnotVector, Point3, Vector3};
+use crate::field::{LevelCurve, LevelTracer, ScalarField, surface_gradient_length};
+use crate::geometry::Point3;
 use crate::monitor::{self, Monitor};
 use crate::part::Part;
 
 /// Grid cells a side on which level curves are found.
 const TRACE_CELLS: usize = 240;
-
-/// Places a side of a chart at which the step between levels is computed.
-const STEP_SAMPLES: usize = 240;
-
-/// Bins over the range of ψ in which the least step is kept.
-const STEP_BINS: usize = 4000;
-
-/// The step between levels is never less than this share of its median: near a singular point of
-/// the field |∇ψ| vanishes, and passes would crowd without end. What is left there is measured.
-const LEAST_OVER_MEDIAN: f64 = 0.2;
-
-/// Samples of the feed direction per control point of the stream function and side.
-const SAMPLES_PER_CONTROL: usize = 3;
-
-/// Part of a direction's weight that does not depend on how much the direction matters, so that a
-/// stream function is determined where it matters nowhere.
-const LEAST_WEIGHT: f64 = 0.02;
 
 /// Passes are traced beyond the border by this share of their interval: a little more than the half
 /// that a pass outside the border still has to serve inside it.
@@ -52,102 +32,30 @@ const MARGIN_SAMPLES: usize = 24;
 /// An overrun shorter than this many intervals is left out.
 const LEAST_OVERRUN: f64 = 0.05;
 
+/// A pass counts as nearly parallel to the border where its angle to it has less than one over this
+/// as tangent.
+const NEARLY_PARALLEL: f64 = 3.0;
+
+/// A point between two traced ones may be this many sampling distances off the line between them.
+const MOST_STRAY: f64 = 0.25;
+
 /// How closely the crossing of a border is placed, in sampling distances.
 const BORDER_PRECISION: f64 = 1e-6;
 
-/// Passes along isoparametric lines.
-pub fn iso_parametric(
-    part: &Part,
-    cutter: &Cutter,
-    along: Along,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
-) -> Result<Passes, PlanError> {
-    let field = ScalarField::Coordinate(match along {
-        Along::U => Axis::V,
-        Along::V => Axis::U,
-    });
-    let mut all = Passes::default();
-    for chart in Chart::all(part, cutter)? {
-        all.append(along_levels(part, cutter, &chart, &field, settings, monitor)?);
-    }
-    Ok(all)
-}
+/// How often the interval between two levels may be halved by further passes. Six times is a
+/// sixty-fourth; only singular points of the field ask for more, and are measured.
+const MOST_HALVINGS: usize = 6;
 
-/// Passes along the level curves of a stream function fitted to feed directions, with
-/// `control_points` coefficients a side.
-pub fn streamline(
-    part: &Part,
-    cutter: &Cutter,
-    direction: FeedDirection,
-    control_points: usize,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
-) -> Result<Passes, PlanError> {
-    let mut all = Passes::default();
-    for chart in Chart::all(part, cutter)? {
-        let (field, notes) = stream_function(&chart, cutter, direction, control_points, settings)?;
-        all.notes.extend(notes);
-        all.append(along_levels(part, cutter, &chart, &field, settings, monitor)?);
-    }
-    Ok(all)
-}
+/// An interval may exceed the allowed one by this share before a further pass is put in: 2 % are
+/// 4 % of the scallop height.
+const INTERVAL_SLACK: f64 = 0.02;
 
-/// Samples feed directions over a chart and fits the stream function.
-fn stream_function(
-    chart: &Chart,
-    cutter: &Cutter,
-    direction: FeedDirection,
-    control_points: usize,
-    settings: &PassSettings,
-) -> Result<(ScalarField, Vec<String>), PlanError> {
-    let n = control_points * SAMPLES_PER_CONTROL;
-    let places: Vec<[f64; 2]> = chart.grid(n).collect();
-    let points: Vec<_> = places.iter().map(|&[u, v]| chart.at(u, v)).collect();
-    let mut lines: Vec<Option<(Vector3, f64)>> = points
-        .iter()
-        .map(|p| p.and_then(|p| Some((p.feed_tangent(direction)?, p.direction_matters(direction, cutter)))))
-        .collect();
-    let disagreement = field::orient(&mut lines, n);
-    let mut samples = Vec::with_capacity(places.len());
-    for ((&[u, v], point), line) in places.iter().zip(&points).zip(&lines) {
-        let (Some(p), Some((t, matters))) = (point, line) else { continue };
-        let b = p.normal.cross(t);
-        let (Some(along), Some(across)) = (p.jet.pull_back(t), p.jet.pull_back(&b)) else { continue };
-        let (e, f, g) = p.jet.first_form();
-        samples.push(StreamSample {
-            u,
-            v,
-            along: along.into(),
-            across: across.into(),
-            density: 1.0 / p.strip_width(cutter, t, settings.step).0,
-            weight: (e * g - f * f).max(0.0).sqrt() * (matters + LEAST_WEIGHT),
-        });
-    }
-    let knots = |range| KnotVector::clamped_uniform(3, control_points, range);
-    let not_applicable = |reason: String| PlanError::NotApplicable { strategy: "streamline", reason };
-    let [Ok(knots_u), Ok(knots_v)] = chart.domain.map(knots) else {
-        return Err(not_applicable(format!(
-            "{control_points} control points a side are too few; use 4 or more"
-        )));
-    };
-    let fit = fit_stream_function(&samples, knots_u, knots_v).map_err(|e| not_applicable(e.to_string()))?;
-    let mut notes = vec![format!(
-        "the stream function follows the feed directions within {:.2} degrees (root mean square)",
-        fit.angle_rms.to_degrees()
-    )];
-    if disagreement > 0.0 {
-        notes.push(format!(
-            "the feed directions have singular points ({:.1} % of neighbouring samples cannot be oriented alike); \
-             passes bend around them",
-            100.0 * disagreement
-        ));
-    }
-    Ok((ScalarField::Spline(fit.psi), notes))
-}
+/// Further passes reach beyond the stretch that needs them by this many allowed intervals, so that
+/// their ends lie where the interval is wide enough without them.
+const OVERLAP: f64 = 1.0;
 
 /// Places levels, traces them and turns them into passes.
-fn along_levels(
+pub(super) fn along_levels(
     part: &Part,
     cutter: &Cutter,
     chart: &Chart,
@@ -159,17 +67,63 @@ fn along_levels(
     let margins = margins(chart, cutter, field, settings);
     let tracer = LevelTracer::new(field, &metric, chart.domain, margins, TRACE_CELLS, settings.sampling);
     let mut notes = Vec::new();
-    let levels = place_levels(chart, cutter, field, tracer.range(), settings, &mut notes);
-    let guide = Guide { tracer: &tracer, chart, cutter, drop: DropCutter::new(part, cutter), settings };
+    let range = tracer.range();
+    let levels = place_levels(chart, cutter, field, range, settings, &mut notes);
+    let guide =
+        Guide { tracer: &tracer, chart, cutter, field, drop: DropCutter::new(part, cutter), settings };
     monitor.start("planning passes", levels.len() as u64);
-    let passes = crate::parallel::try_map(levels.len(), |k| {
+    let work = crate::parallel::try_map(levels.len() + 1, |k| {
         monitor::check(monitor)?;
-        let curves = tracer.curves(levels[k]);
-        let passes: Vec<_> = curves.iter().flat_map(|curve| guide.passes(curve, levels[k])).collect();
-        monitor.advance(1);
-        Ok::<_, PlanError>(passes)
+        // Between two levels, or between a level and the border of the range.
+        let below = k.checked_sub(1).map(|k| levels[k]);
+        let gap = Gap {
+            from: below.unwrap_or(range[0]),
+            to: levels.get(k).copied().unwrap_or(range[1]),
+            open_from: below.is_none(),
+            open_to: k == levels.len(),
+        };
+        let mut passes = Vec::new();
+        guide.fill(&gap, MOST_HALVINGS, &mut passes);
+        let further = passes.len();
+        if let Some(&level) = levels.get(k) {
+            for curve in tracer.curves(level) {
+                passes.extend(guide.pass(&curve, level, None));
+            }
+            monitor.advance(1);
+        }
+        Ok::<_, PlanError>((passes, further))
     })?;
-    Ok(Passes { passes: passes.into_iter().flatten().collect(), notes })
+    let further: usize = work.iter().map(|(_, further)| further).sum();
+    if further > 0 {
+        notes.push(format!(
+            "{further} short passes were put between others where the interval had to be smaller"
+        ));
+    }
+    Ok(Passes { passes: work.into_iter().flat_map(|(passes, _)| passes).collect(), notes })
+}
+
+/// A range of ψ between two passes; at an open end stands the end of the range, not a pass.
+#[derive(Debug, Clone, Copy)]
+struct Gap {
+    from: f64,
+    to: f64,
+    open_from: bool,
+    open_to: bool,
+}
+
+impl Gap {
+    /// Where a further pass would stand, and the interval of ψ that must hold for none to be needed:
+    /// a pass serves half an interval beyond itself, so a gap with an open end is half of one.
+    fn middle(&self) -> (f64, f64) {
+        let width = self.to - self.from;
+        match (self.open_from, self.open_to) {
+            (false, false) => (self.from + 0.5 * width, width),
+            (true, false) => (self.from + width / 3.0, 2.0 * width),
+            (false, true) => (self.to - width / 3.0, 2.0 * width),
+            // No pass at all: the first one stands in the middle.
+            (true, true) => (self.from + 0.5 * width, f64::INFINITY),
+        }
+    }
 }
 
 /// How far beyond the chart passes are traced, in parameters: the width over which a pass outside
@@ -190,157 +144,104 @@ fn margins(chart: &Chart, cutter: &Cutter, field: &ScalarField, settings: &PassS
     })
 }
 
-/// Unit tangent in space of the level curve of `field` through a chart point.
-fn level_tangent(p: &ChartPoint, field: &ScalarField, [u, v]: [f64; 2]) -> Option<Vector3> {
-    let [_, psi_u, psi_v] = field.value_and_gradient(u, v);
-    (p.jet.du * psi_v - p.jet.dv * psi_u).try_normalize(1e-300)
-}
-
-/// The levels of all passes, ascending.
-fn place_levels(
-    chart: &Chart,
-    cutter: &Cutter,
-    field: &ScalarField,
-    [lo, hi]: [f64; 2],
-    settings: &PassSettings,
-    notes: &mut Vec<String>,
-) -> Vec<f64> {
-    if !(hi > lo) {
-        return vec![lo];
-    }
-    let bin_of = |psi: f64| (((psi - lo) / (hi - lo) * STEP_BINS as f64) as usize).min(STEP_BINS - 1);
-    let mut least = vec![f64::INFINITY; STEP_BINS];
-    let (mut steps, mut limited, mut places) = (Vec::new(), 0usize, 0usize);
-    for [u, v] in chart.grid(STEP_SAMPLES) {
-        let Some(p) = chart.at(u, v) else { continue };
-        let [psi, psi_u, psi_v] = field.value_and_gradient(u, v);
-        let Some(t) = level_tangent(&p, field, [u, v]) else { continue };
-        let (width, too_concave) = p.strip_width(cutter, &t, settings.step);
-        let step = width * surface_gradient_length(p.jet.first_form(), psi_u, psi_v);
-        places += 1;
-        limited += usize::from(too_concave);
-        steps.push(step);
-        let bin = &mut least[bin_of(psi)];
-        *bin = bin.min(step);
-    }
-    if limited > 0 {
-        notes.push(format!(
-            "on {:.1} % of the surface the part is nearly as concave as the cutter, or more: the strip is limited there",
-            100.0 * limited as f64 / places as f64
-        ));
-    }
-    steps.sort_by(f64::total_cmp);
-    let floor = LEAST_OVER_MEDIAN * steps.get(steps.len() / 2).copied().unwrap_or(hi - lo);
-    if steps.first().is_some_and(|&s| s < floor) {
-        notes.push(
-            "passes diverge strongly or the field has a singular point: their distance was limited there, and \
-             scallops may exceed the target"
-                .into(),
-        );
-    }
-    let width = (hi - lo) / STEP_BINS as f64;
-    fill_gaps(&mut least);
-    let counts = cumulative_passes(&with_neighbours(&least, width, floor, hi - lo), width);
-    let total = counts[STEP_BINS];
-    let passes = (total - 1e-9).ceil().max(1.0);
-    // Levels at (k + 1/2)/passes of the total count.
-    let mut bin = 0;
-    (0..passes as usize)
-        .map(|k| {
-            let wanted = total * (k as f64 + 0.5) / passes;
-            while bin + 1 < STEP_BINS && counts[bin + 1] < wanted {
-                bin += 1;
-            }
-            lo + width * (bin as f64 + (wanted - counts[bin]) / (counts[bin + 1] - counts[bin]))
-        })
-        .collect()
-}
-
-/// Gives bins that no sample fell into the lesser of the nearest known steps on both sides.
-fn fill_gaps(least: &mut [f64]) {
-    let mut from_below = least.to_vec();
-    for k in 1..least.len() {
-        if from_below[k].is_infinite() {
-            from_below[k] = from_below[k - 1];
-        }
-    }
-    let mut above = f64::INFINITY;
-    for k in (0..least.len()).rev() {
-        if least[k].is_infinite() {
-            least[k] = from_below[k].min(above);
-        } else {
-            above = least[k];
-        }
-    }
-}
-
-/// The least step around each bin: a step that begins or ends in a bin must suit all it passes over.
-fn with_neighbours(least: &[f64], width: f64, floor: f64, range: f64) -> Vec<f64> {
-    let own: Vec<f64> = least.iter().map(|s| s.max(floor)).collect();
-    (0..own.len())
-        .map(|k| {
-            let reach = |step: f64| if step.is_finite() { (step / width).ceil() as usize } else { 1 };
-            let r = reach(own[k]).min(own.len());
-            let around = &own[k.saturating_sub(r)..(k + r + 1).min(own.len())];
-            around.iter().copied().fold(range, f64::min)
-        })
-        .collect()
-}
-
-/// Running sum of `width/step`: how many passes lie below each bin's start.
-fn cumulative_passes(steps: &[f64], width: f64) -> Vec<f64> {
-    let mut sum = 0.0;
-    std::iter::once(0.0)
-        .chain(steps.iter().map(|step| {
-            sum += width / step;
-            sum
-        }))
-        .collect()
-}
-
 /// Turns level curves into passes.
 struct Guide<'a> {
     tracer: &'a LevelTracer<'a>,
     chart: &'a Chart<'a>,
     cutter: &'a Cutter,
+    field: &'a ScalarField,
     drop: DropCutter<'a>,
     settings: &'a PassSettings,
 }
 
 impl Guide<'_> {
-    /// Where the tip is when the curve's point `(u, v)` guides the cutter.
-    ///
-    /// A ball is put where it touches that point, then dropped, so that it is held off by any other
-    /// place of the part. Cutters with a flat have no single place where they touch a level plane:
-    /// the curve guides their axis.
+    /// Where the tip is when the cutter touches the chart at `(u, v)`: put there by the chart's
+    /// normal, then dropped, so that it is held off by any other place of the part.
     fn tip(&self, [u, v]: [f64; 2]) -> Option<Point3> {
         let p = self.chart.at(u, v)?;
-        let offset = if self.cutter.flat_radius() > 0.0 { 0.0 } else { self.cutter.corner_radius() };
-        let (x, y) = (p.jet.p.x + offset * p.normal.x, p.jet.p.y + offset * p.normal.y);
-        self.drop.at(x, y).map(|d| Point3::new(x, y, d.tip_z))
+        let axis = p.jet.p.xy() + axis_offset(self.cutter, &p.normal);
+        self.drop.at(axis.x, axis.y).map(|d| Point3::new(axis.x, axis.y, d.tip_z))
     }
 
-    /// The passes along one curve: it may leave the chart and come back.
-    fn passes(&self, curve: &LevelCurve, level: f64) -> Vec<Vec<Point3>> {
+    /// Appends the further passes that a gap needs.
+    fn fill(&self, gap: &Gap, halvings: usize, passes: &mut Vec<Vec<Point3>>) {
+        let (level, interval) = gap.middle();
+        let before = passes.len();
+        for curve in self.tracer.curves(level) {
+            let (curve, runs) = self.needed(curve, interval);
+            for run in runs {
+                passes.extend(self.pass(&curve, level, Some(run)));
+            }
+        }
+        if passes.len() > before && halvings > 1 {
+            self.fill(&Gap { to: level, open_to: false, ..*gap }, halvings - 1, passes);
+            self.fill(&Gap { from: level, open_from: false, ..*gap }, halvings - 1, passes);
+        }
+    }
+
+    /// The runs of a curve (first and last point) on which an interval of ψ is wider on the surface
+    /// than allowed, with their overlap. A closed curve is turned to begin outside of any run.
+    fn needed(&self, mut curve: LevelCurve, interval: f64) -> (LevelCurve, Vec<[usize; 2]>) {
+        let too_wide = |&[u, v]: &[f64; 2]| {
+            let p = self.chart.at(u, v)?;
+            let t = level_tangent(&p, self.field, [u, v])?;
+            let [_, psi_u, psi_v] = self.field.value_and_gradient(u, v);
+            let gradient = surface_gradient_length(p.jet.first_form(), psi_u, psi_v);
+            let (width, _) = p.strip_width(self.cutter, &t, self.settings.step);
+            let reach = (OVERLAP * width / self.settings.sampling).ceil() as usize;
+            (interval > gradient * width * (1.0 + INTERVAL_SLACK)).then_some(reach)
+        };
+        let mut reach: Vec<Option<usize>> = curve.points.iter().map(too_wide).collect();
+        let n = curve.points.len();
+        if curve.closed
+            && let Some(calm) = reach.iter().position(Option::is_none)
+        {
+            curve.points.rotate_left(calm);
+            reach.rotate_left(calm);
+            curve.points.push(curve.points[0]);
+            curve.closed = false;
+        }
+        let mut runs: Vec<[usize; 2]> = Vec::new();
+        for (k, reach) in reach.iter().enumerate().filter_map(|(k, r)| r.map(|r| (k, r))) {
+            let run = [k.saturating_sub(reach), (k + reach).min(n - 1)];
+            match runs.last_mut() {
+                Some(last) if run[0] <= last[1] + 1 => last[1] = last[1].max(run[1]),
+                _ => runs.push(run),
+            }
+        }
+        (curve, runs)
+    }
+
+    /// The pass along a curve, or along a run of its points; `None` where it does not touch the
+    /// chart.
+    fn pass(&self, curve: &LevelCurve, level: f64, run: Option<[usize; 2]>) -> Option<Vec<Point3>> {
         let mut points = curve.points.clone();
         if curve.closed {
             points.push(points[0]);
         }
         let last = points.len() - 1;
+        let [first, end] = run.map_or([0, last], |[a, b]| [a, if curve.closed { last } else { b }]);
+        if end <= first {
+            return None;
+        }
         // The parameter s counts traced points, which are one sampling distance apart.
         let at = |s: f64| {
             let k = (s as usize).min(last - 1);
             let t = s - k as f64;
             let [a, b] = [points[k], points[k + 1]];
-            self.tracer.onto_level([a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])], level)
+            let between = [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])];
+            let q = self.tracer.onto_level(between, level);
+            // Near a singular point the level may be found on another branch.
+            let strayed = self.tracer.distance(between, q) > MOST_STRAY * self.settings.sampling;
+            if strayed { between } else { q }
         };
         let settings = PassSettings { sampling: 1.0, ..*self.settings };
-        let mut stretches = self.stretches(&at, last);
+        let mut stretches = self.stretches(&at, first, end);
         if !curve.closed {
             self.shorten_ends(&mut stretches, &at);
         }
         if !stretches.iter().any(|s| s.inside) {
-            return Vec::new();
+            return None;
         }
         let mut tips: Vec<Point3> = Vec::new();
         for stretch in stretches {
@@ -348,14 +249,15 @@ impl Guide<'_> {
             let joined = usize::from(!tips.is_empty());
             tips.extend(moves.into_iter().skip(joined));
         }
-        vec![tips]
+        Some(tips)
     }
 
     /// The stretches of a curve inside and outside of the chart, in order.
-    fn stretches(&self, at: &dyn Fn(f64) -> [f64; 2], last: usize) -> Vec<Stretch> {
+    fn stretches(&self, at: &dyn Fn(f64) -> [f64; 2], first: usize, last: usize) -> Vec<Stretch> {
         let inside = |s: f64| self.chart.holds(at(s));
-        let mut stretches = vec![Stretch { inside: inside(0.0), from: 0.0, to: 0.0 }];
-        for k in 1..=last {
+        let start = first as f64;
+        let mut stretches = vec![Stretch { inside: inside(start), from: start, to: start }];
+        for k in first + 1..=last {
             let now = inside(k as f64);
             let n = stretches.len();
             let current = &mut stretches[n - 1];
@@ -388,8 +290,14 @@ impl Guide<'_> {
             let border = if near(p[0], along_u) < near(p[1], along_v) { here.jet.dv } else { here.jet.du };
             let (along, across) = (feed.dot(&border).abs(), feed.cross(&border).norm());
             let interval = here.strip_width(self.cutter, &feed, self.settings.step).0;
-            let length = 0.5 * interval * along / across.max(1e-9);
-            Some(if length < LEAST_OVERRUN * interval { 0.0 } else { length / self.settings.sampling })
+            // Nearly parallel to the border the pass serves the strip inside it until it leaves the
+            // margin; elsewhere the angle tells.
+            let length = match along / across.max(1e-9) {
+                ratio if ratio > NEARLY_PARALLEL => f64::INFINITY,
+                ratio if 0.5 * ratio < LEAST_OVERRUN => 0.0,
+                ratio => 0.5 * ratio * interval,
+            };
+            Some(length / self.settings.sampling)
         };
         if let Some(first) = stretches.first_mut().filter(|s| !s.inside) {
             first.from = first.from.max(first.to - useful(first.to).unwrap_or(0.0));

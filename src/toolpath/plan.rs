@@ -2,7 +2,7 @@
 
 use super::chord::{reduce, sample_within_chord};
 use super::link::chain;
-use super::{Toolpath, level_passes, zigzag};
+use super::{Toolpath, streamline, zigzag};
 use crate::cutter::Cutter;
 use crate::geometry::Point3;
 use crate::monitor::{Cancelled, Monitor};
@@ -180,10 +180,10 @@ pub fn plan(
             (zigzag::passes(part, cutter, angle, &pass, monitor)?, !one_way)
         }
         Strategy::IsoParametric { along } => {
-            (level_passes::iso_parametric(part, cutter, along, &pass, monitor)?, true)
+            (streamline::iso_parametric(part, cutter, along, &pass, monitor)?, true)
         }
         Strategy::Streamline { direction, control_points } => {
-            let passes = level_passes::streamline(part, cutter, direction, control_points, &pass, monitor)?;
+            let passes = streamline::streamline(part, cutter, direction, control_points, &pass, monitor)?;
             (passes, true)
         }
     };

@@ -41,7 +41,7 @@ pub fn passes(
     };
     let (along, across) = (Vector2::new(angle.cos(), angle.sin()), Vector2::new(-angle.sin(), angle.cos()));
     let extent = |e: &Vector2| {
-        let all = charts.iter().map(|c| c.extent_of_centres(part, cutter, e));
+        let all = charts.iter().map(|c| c.extent_of_axes(part, cutter, e));
         all.fold([f64::INFINITY, f64::NEG_INFINITY], |a, b| [a[0].min(b[0]), a[1].max(b[1])])
     };
     let (from_to, sides) = (extent(&along), extent(&across));
@@ -81,11 +81,12 @@ fn safe_stepover(charts: &[Chart], cutter: &Cutter, angle: f64, h: f64, notes: &
         for [u, v] in chart.grid(STEPOVER_SAMPLES) {
             let Some(p) = chart.at(u, v) else { continue };
             let Some(t) = p.feed_tangent(FeedDirection::Angle(angle)) else { continue };
-            let (width, _) = p.strip_width(cutter, &t, Step::Scallop(h));
+            let (width, too_concave) = p.strip_width(cutter, &t, Step::Scallop(h));
             let bend = 1.0 - p.curvature_along(&p.normal.cross(&t)) * cutter.corner_radius();
             let lean = (1.0 - p.normal.xy().dot(&e).powi(2)).max(0.0).sqrt();
-            // Where the ball does not fit there is no ridge to keep low.
-            if bend > 0.0 {
+            // Where the cutter hardly fits, one pass serves the whole hollow, though the formula asks
+            // for ever closer ones.
+            if bend > 0.0 && !too_concave {
                 least = least.min(width * bend * lean);
             }
         }
@@ -177,7 +178,7 @@ impl Line<'_> {
             while before.1 != now {
                 let (end, next) = self.change(offset, before, s);
                 stretches.push((before.1, start, end));
-                (before, start) = ((next, self.contact(offset, next)), end);
+                (before, start) = ((next, self.contact(offset, next)), next);
             }
             before = (s, now);
         }

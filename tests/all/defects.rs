@@ -117,3 +117,32 @@ fn a_rapid_through_the_part_is_a_gouge() {
     assert!((m.gouge.max_depth_mm - 0.1).abs() < 1e-6);
     assert_eq!(m.gouge.regions[0].move_index, 0);
 }
+
+#[test]
+fn flat_and_bull_ends_cover_a_hill() {
+    let shape = AnalyticShape::Cylinder { height: 0.0, radius: 60.0, azimuth: 0.0, concave: false };
+    let part = formula(shape, [0.0, 20.0], [-10.0, 10.0]);
+    for cutter in [Cutter::flat(6.0).unwrap(), Cutter::bull(6.0, 1.0).unwrap()] {
+        for angle in [0.0, std::f64::consts::FRAC_PI_2] {
+            let zigzag = Strategy::Zigzag { angle, one_way: false };
+            let m = plan_and_measure(&part, &cutter, zigzag, Step::Stepover(0.5), 0.1);
+            assert_eq!(m.uncut.region_count, 0, "{cutter:?} at {angle}: {:?}", m.uncut.regions);
+            assert!(m.gouge.max_depth_mm < 0.0011, "{cutter:?} at {angle}: {}", m.gouge.max_depth_mm);
+        }
+    }
+}
+
+#[test]
+fn ridges_in_a_corner_that_no_pass_reached_are_no_scallops() {
+    let part = groove(30f64.to_radians(), 6.0, 12.0);
+    let cutter = Cutter::ball(6.0).unwrap();
+    let along = Strategy::Zigzag { angle: std::f64::consts::FRAC_PI_2, one_way: false };
+    // An even number of passes, so that two of them leave a ridge right over the corner.
+    for stepover in [0.1, 0.3, 0.5] {
+        let m = plan_and_measure(&part, &cutter, along, Step::Stepover(stepover), 0.05);
+        let interval = stepover / 30f64.to_radians().cos();
+        let exact = 3.0 - (9.0 - 0.25 * interval * interval).sqrt();
+        assert!(off(m.scallop.max_mm.unwrap(), exact) < 1e-3, "{stepover}: {:?} {exact}", m.scallop);
+        assert!(m.uncut.max_height_mm > 0.5);
+    }
+}

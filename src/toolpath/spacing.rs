@@ -1,0 +1,182 @@
+//! Where the levels of whole passes stand.
+//!
+//! Neighbouring levels c and c + δ lie δ/|∇ψ| apart on the surface, so at a place with strip width w a
+//! step of `w·|∇ψ|` is allowed. A pass meets places that allow much and places that allow little. A
+//! step for the least of them serves all, and wastes length wherever more is allowed; a greater step
+//! needs further passes, at halves and quarters of the interval, along the places that allow less.
+//! For every part of the range of ψ the step is chosen that makes the sum of both shortest. (Placing
+//! each pass at the least step of the one before, as streamline paths were first planned, is the
+//! choice of the least step throughout.)
+
+use super::chart::{Chart, ChartPoint};
+use super::plan::PassSettings;
+use crate::cutter::Cutter;
+use crate::field::{ScalarField, surface_gradient_length};
+use crate::geometry::Vector3;
+
+/// Places a side of a chart at which the allowed step is computed.
+const SAMPLES: usize = 240;
+
+/// Parts of the range of ψ with a step of their own. More follow the surface closer; fewer places
+/// then speak for each.
+const WINDOWS: usize = 48;
+
+/// Shares of the length (of level curves, not of places) whose allowed step is tried as the step.
+const CANDIDATES: [f64; 12] = [0.0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0];
+
+/// What each halving adds to the length of the passes that it puts in: overlaps and air moves.
+const HALVING_COST: f64 = 0.1;
+
+/// No step is less than this share of the median: a critical point of ψ allows none at all.
+const LEAST_OVER_MEDIAN: f64 = 1e-3;
+
+/// Unit tangent in space of the level curve of `field` through a chart point.
+pub(super) fn level_tangent(p: &ChartPoint, field: &ScalarField, [u, v]: [f64; 2]) -> Option<Vector3> {
+    let [_, psi_u, psi_v] = field.value_and_gradient(u, v);
+    (p.jet.du * psi_v - p.jet.dv * psi_u).try_normalize(1e-300)
+}
+
+/// What a place allows.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    psi: f64,
+    /// The allowed step of ψ.
+    step: f64,
+    /// Length of level curves per step of ψ around the place: its area times |∇ψ|.
+    length: f64,
+}
+
+/// The levels of all whole passes, ascending.
+pub(super) fn place_levels(
+    chart: &Chart,
+    cutter: &Cutter,
+    field: &ScalarField,
+    [lo, hi]: [f64; 2],
+    settings: &PassSettings,
+    notes: &mut Vec<String>,
+) -> Vec<f64> {
+    if hi <= lo {
+        return vec![lo];
+    }
+    let mut windows: Vec<Vec<Place>> = vec![Vec::new(); WINDOWS];
+    let (mut limited, mut count) = (0usize, 0usize);
+    for [u, v] in chart.grid(SAMPLES) {
+        let Some(p) = chart.at(u, v) else { continue };
+        let Some(t) = level_tangent(&p, field, [u, v]) else { continue };
+        let [psi, psi_u, psi_v] = field.value_and_gradient(u, v);
+        let (e, f, g) = p.jet.first_form();
+        let gradient = surface_gradient_length((e, f, g), psi_u, psi_v);
+        let (width, too_concave) = p.strip_width(cutter, &t, settings.step);
+        let area = (e * g - f * f).max(0.0).sqrt();
+        count += 1;
+        limited += usize::from(too_concave);
+        let window = ((psi - lo) / (hi - lo) * WINDOWS as f64).clamp(0.0, WINDOWS as f64 - 1.0) as usize;
+        windows[window].push(Place { psi, step: width * gradient, length: area * gradient });
+    }
+    if limited > 0 {
+        notes.push(format!(
+            "on {:.1} % of the surface the part is nearly as concave as the cutter, or more: the strip is limited there",
+            100.0 * limited as f64 / count as f64
+        ));
+    }
+    let mut all: Vec<f64> = windows.iter().flatten().map(|p| p.step).collect();
+    all.sort_by(f64::total_cmp);
+    let least = LEAST_OVER_MEDIAN * all.get(all.len() / 2).copied().unwrap_or(hi - lo);
+    let steps: Vec<Option<f64>> = windows.iter().map(|places| shortest(places, least)).collect();
+    spread(&filled(&steps, hi - lo), [lo, hi])
+}
+
+/// The step with the shortest passes for places that share a window; `None` for none.
+fn shortest(places: &[Place], least: f64) -> Option<f64> {
+    let mut ordered = places.to_vec();
+    ordered.sort_by(|a, b| a.step.total_cmp(&b.step).then(a.psi.total_cmp(&b.psi)));
+    let total: f64 = ordered.iter().map(|p| p.length).sum();
+    let mut below = 0.0;
+    let mut candidates = CANDIDATES.iter().peekable();
+    let mut tried = Vec::new();
+    for place in &ordered {
+        below += place.length;
+        while candidates.next_if(|share| below >= **share * total).is_some() {
+            tried.push(place.step.max(least));
+        }
+    }
+    let cost = |step: f64| {
+        let per_place = ordered.iter().map(|p| {
+            let halvings = (step / p.step.max(least)).log2().ceil().max(0.0);
+            p.length * halvings.exp2() * (1.0 + HALVING_COST * halvings)
+        });
+        per_place.sum::<f64>() / step
+    };
+    tried.into_iter().map(|step| (cost(step), step)).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, step)| step)
+}
+
+/// Gives windows without places the step of the nearest one with places, the lesser of two.
+fn filled(steps: &[Option<f64>], range: f64) -> Vec<f64> {
+    (0..steps.len())
+        .map(|k| {
+            let known = |k: Option<usize>| k.and_then(|k| steps.get(k).copied().flatten());
+            (0..steps.len())
+                .find_map(|d| match (known(k.checked_sub(d)), known(Some(k + d))) {
+                    (Some(a), Some(b)) => Some(a.min(b)),
+                    (a, b) => a.or(b),
+                })
+                .unwrap_or(range)
+        })
+        .collect()
+}
+
+/// Levels at equal shares of the running sum of 1/step, half a share from both ends.
+fn spread(steps: &[f64], [lo, hi]: [f64; 2]) -> Vec<f64> {
+    let width = (hi - lo) / steps.len() as f64;
+    let mut sums = vec![0.0];
+    for step in steps {
+        sums.push(sums[sums.len() - 1] + width / step);
+    }
+    let total = sums[steps.len()];
+    let passes = (total - 1e-9).ceil().max(1.0);
+    let mut window = 0;
+    (0..passes as usize)
+        .map(|k| {
+            let wanted = total * (k as f64 + 0.5) / passes;
+            while window + 1 < steps.len() && sums[window + 1] < wanted {
+                window += 1;
+            }
+            lo + width * (window as f64 + (wanted - sums[window]) / (sums[window + 1] - sums[window]))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn place(step: f64, length: f64) -> Place {
+        Place { psi: 0.0, step, length }
+    }
+
+    #[test]
+    fn few_tight_places_get_further_passes_and_many_decide_the_step() {
+        let mut places = vec![place(1.0, 1.0); 98];
+        places.extend([place(0.2, 1.0); 2]);
+        assert_eq!(shortest(&places, 1e-3), Some(1.0));
+        let half: Vec<Place> = (0..100).map(|k| place(if k < 50 { 0.9 } else { 1.0 }, 1.0)).collect();
+        assert_eq!(shortest(&half, 1e-3), Some(0.9));
+        assert_eq!(shortest(&[], 1e-3), None);
+    }
+
+    #[test]
+    fn levels_share_the_range_evenly_and_begin_half_a_step_inside() {
+        let levels = spread(&[0.5; 8], [0.0, 4.0]);
+        assert_eq!(levels.len(), 8);
+        assert!((levels[0] - 0.25).abs() < 1e-12 && (levels[7] - 3.75).abs() < 1e-12);
+        let uneven = spread(&[1.0, 0.25], [0.0, 2.0]);
+        assert_eq!(uneven.len(), 5);
+        assert!(uneven.windows(2).all(|w| w[1] > w[0]));
+    }
+
+    #[test]
+    fn empty_windows_take_the_nearest_step() {
+        assert_eq!(filled(&[None, Some(2.0), None, None, Some(1.0)], 9.0), [2.0, 2.0, 2.0, 1.0, 1.0]);
+        assert_eq!(filled(&[None, None], 9.0), [9.0, 9.0]);
+    }
+}
