@@ -2,6 +2,8 @@
 
 #[path = "all/analytic.rs"]
 mod analytic;
+#[path = "all/bad_input.rs"]
+mod bad_input;
 #[path = "all/cli.rs"]
 mod cli;
 #[path = "all/command.rs"]
