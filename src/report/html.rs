@@ -128,7 +128,7 @@ fn toolpath_section(t: &ToolpathResult, page: &ToolpathPage) -> Markup {
             }
             figure {
                 @if let Some(histogram) = &page.histogram {
-                    (histogram.svg())
+                    (PreEscaped(histogram.svg()))
                     figcaption { "Scallop heights by ridge length: share of each height (bars, left) and share that is lower (line, right). The last bar holds all that is higher." }
                 } @else {
                     figcaption { "No scallop heights: " (t.scallop.reason.as_deref().unwrap_or("no ridge was found")) }

@@ -1,14 +1,16 @@
 //! Pictures of maps over a grid: title, map with axes, scale bar, colour key. y points up.
 
+use image::imageops::{self, FilterType};
+use image::RgbImage;
+
 use super::canvas::{Align, FAINT_INK, INK, Picture, Rgb, TextSize, shortened};
 use super::scale::{Unit, plain, round_down, round_up, ticks};
 use crate::metrology::Limits;
 use crate::sim::Grid;
 
-/// Widest and highest map, pixels. More makes files that no screen shows at once.
-const MAX_PIXELS: usize = 1600;
-/// Small grids are magnified by whole numbers up to about this size, pixels.
-const COMFORTABLE_PIXELS: usize = 900;
+/// Colours of a key, an odd number so that its middle is one of them. Fewer show as bands; many more,
+/// and the picture with its letters no longer fits into a palette of 256, which doubles its bytes.
+const SHADES: usize = 151;
 /// Greatest magnification of one cell, pixels.
 const MAX_MAGNIFICATION: usize = 24;
 /// Colour of cells off the part; far from white, which is "no deviation".
@@ -22,6 +24,34 @@ const BOTTOM: usize = 96;
 /// Least map area, so that title and key fit, pixels.
 const MIN_WIDTH: usize = 480;
 const MIN_HEIGHT: usize = 260;
+
+/// What a picture is drawn for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MapSize {
+    /// A file of its own: as much as a screen shows.
+    File,
+    /// A page: fits into its column without being scaled, so that letters stay sharp, and keeps the
+    /// page small enough to be mailed.
+    Page,
+}
+
+impl MapSize {
+    /// Widest and highest map, pixels. More makes pictures that do not fit where they are shown.
+    fn most(self) -> usize {
+        match self {
+            Self::File => 1600,
+            Self::Page => 740,
+        }
+    }
+
+    /// Small grids are magnified by whole numbers up to about this size, pixels.
+    fn comfortable(self) -> usize {
+        match self {
+            Self::File => 900,
+            Self::Page => 640,
+        }
+    }
+}
 
 /// Words around a map.
 #[derive(Debug, Clone, Copy)]
@@ -51,10 +81,10 @@ struct Pooled {
     pixel: f64,
 }
 
-fn pool(grid: &Grid, values: &[f32], pooling: Pooling) -> Pooled {
+fn pool(grid: &Grid, values: &[f32], pooling: Pooling, size: MapSize) -> Pooled {
     let longest = grid.nx.max(grid.ny).max(1);
-    let block = longest.div_ceil(MAX_PIXELS);
-    let magnify = (COMFORTABLE_PIXELS / longest).clamp(1, MAX_MAGNIFICATION);
+    let block = longest.div_ceil(size.most());
+    let magnify = (size.comfortable() / longest).clamp(1, MAX_MAGNIFICATION);
     let (width, height) = (grid.nx.div_ceil(block), grid.ny.div_ceil(block));
     let one = |pixel: usize| {
         // Row 0 of the picture holds the highest y.
@@ -97,8 +127,13 @@ impl Key {
         if value.is_nan() {
             return OFF_PART;
         }
-        let t = (f64::from(value) - self.from) / (self.to - self.from);
-        (self.gradient)(t.clamp(0.0, 1.0))
+        self.shade((f64::from(value) - self.from) / (self.to - self.from))
+    }
+
+    /// The colour at a share of the key, from its lower end.
+    fn shade(&self, share: f64) -> Rgb {
+        let last = (SHADES - 1) as f64;
+        (self.gradient)((share.clamp(0.0, 1.0) * last).round() / last)
     }
 }
 
@@ -125,16 +160,22 @@ fn extremes(values: &[f32]) -> Option<(f64, f64)> {
 
 /// Signed deviation: blue below the design (gouge), white on it, red above (excess), grey off the
 /// part. Where several cells share a pixel it shows the one farthest from zero.
-pub fn deviation_picture(grid: &Grid, deviation: &[f32], limits: &Limits, words: &MapWords<'_>) -> Picture {
+pub fn deviation_picture(
+    grid: &Grid,
+    deviation: &[f32],
+    limits: &Limits,
+    words: &MapWords<'_>,
+    size: MapSize,
+) -> Picture {
     let range = deviation_range(limits);
     let extremes = extremes(deviation);
     let key = Key { from: -range, to: range, gradient: diverging, top: "excess", bottom: "gouge", extremes };
-    draw(grid, &pool(grid, deviation, Pooling::Extreme), &key, words)
+    draw(grid, &pool(grid, deviation, Pooling::Extreme, size), &key, words)
 }
 
 /// Heights of the cut stock, dark to light.
-pub fn height_picture(grid: &Grid, height: &[f32], words: &MapWords<'_>) -> Picture {
-    let pooled = pool(grid, height, Pooling::Mean);
+pub fn height_picture(grid: &Grid, height: &[f32], words: &MapWords<'_>, size: MapSize) -> Picture {
+    let pooled = pool(grid, height, Pooling::Mean, size);
     let extremes = extremes(height);
     let (mut from, mut to) = extremes.unwrap_or((0.0, 1.0));
     // A flat surface needs a range too.
@@ -149,19 +190,18 @@ pub fn height_picture(grid: &Grid, height: &[f32], words: &MapWords<'_>) -> Pict
 fn draw(grid: &Grid, map: &Pooled, key: &Key, words: &MapWords<'_>) -> Picture {
     let (width, height) = (map.width * map.magnify, map.height * map.magnify);
     let mut page = Picture::blank(LEFT + width.max(MIN_WIDTH) + RIGHT, TOP + height.max(MIN_HEIGHT) + BOTTOM);
-    let letters = |size: TextSize| (page.width - 2 * 16) / size.letter_width();
+    let letters = |size: TextSize| (page.pixels.width() as usize - 2 * 16) / size.letter_width();
     let (title, subtitle) = (
         shortened(words.title, letters(TextSize::Title)),
         shortened(words.subtitle, letters(TextSize::Small)),
     );
     page.text(16, 12, &title, TextSize::Title, Align::Left, INK);
     page.text(16, 36, &subtitle, TextSize::Small, Align::Left, FAINT_INK);
-    for y in 0..height {
-        for x in 0..width {
-            let value = map.values[(y / map.magnify) * map.width + x / map.magnify];
-            page.set((LEFT + x) as i64, (TOP + y) as i64, key.colour(value));
-        }
-    }
+    let pixels = RgbImage::from_fn(map.width as u32, map.height as u32, |x, y| {
+        image::Rgb(key.colour(map.values[y as usize * map.width + x as usize]))
+    });
+    let pixels = imageops::resize(&pixels, width as u32, height as u32, FilterType::Nearest);
+    imageops::replace(&mut page.pixels, &pixels, LEFT as i64, TOP as i64);
     page.frame(LEFT as i64, TOP as i64, width as i64, height as i64, FAINT_INK);
     draw_axes(&mut page, grid, map);
     draw_bar(&mut page, map, height);
@@ -216,7 +256,7 @@ fn draw_key(page: &mut Picture, key: &Key, x: usize, room: usize) {
     let height = (room - 120).clamp(120, MAX_HEIGHT) as i64;
     for row in 0..height {
         let t = 1.0 - (row as f64 + 0.5) / height as f64;
-        page.fill(x, top + row, WIDTH, 1, (key.gradient)(t));
+        page.fill(x, top + row, WIDTH, 1, key.shade(t));
     }
     page.frame(x, top, WIDTH, height, FAINT_INK);
     let range = key.to - key.from;
@@ -271,8 +311,8 @@ mod tests {
         let grid = grid(5001, 37);
         let mut deviation = vec![0.001f32; grid.len()];
         deviation[grid.index(3456, 30)] = -0.004;
-        let pooled = pool(&grid, &deviation, Pooling::Extreme);
-        assert!(pooled.width <= MAX_PIXELS);
+        let pooled = pool(&grid, &deviation, Pooling::Extreme, MapSize::File);
+        assert!(pooled.width <= MapSize::File.most());
         assert_eq!(pooled.values.iter().filter(|v| **v == -0.004).count(), 1);
     }
 
@@ -282,9 +322,10 @@ mod tests {
         let mut deviation = vec![0.0f32; 6];
         deviation[grid.index(0, 0)] = 1.0;
         deviation[grid.index(2, 1)] = f32::NAN;
-        let page = deviation_picture(&grid, &deviation, &LIMITS, &WORDS);
+        let page = deviation_picture(&grid, &deviation, &LIMITS, &WORDS, MapSize::File);
         let at = |i: usize, row: usize| {
-            page.get(LEFT + i * MAX_MAGNIFICATION + 3, TOP + row * MAX_MAGNIFICATION + 3)
+            let middle = |base: usize, k: usize| (base + k * MAX_MAGNIFICATION + 3) as u32;
+            page.pixels.get_pixel(middle(LEFT, i), middle(TOP, row)).0
         };
         assert_eq!(at(0, 1), diverging(1.0), "y = 0 is the bottom row");
         assert_eq!(at(2, 0), OFF_PART);
@@ -295,10 +336,11 @@ mod tests {
     fn maps_of_any_shape_and_content_can_be_drawn() {
         for (nx, ny) in [(1, 1), (1, 3000), (3000, 1), (700, 500)] {
             let grid = grid(nx, ny);
-            for value in [f32::NAN, 0.0, 1e6, -7.25] {
+            let sizes = [MapSize::File, MapSize::Page];
+            for (value, size) in [f32::NAN, 0.0, 1e6, -7.25].into_iter().flat_map(|v| sizes.map(|s| (v, s))) {
                 let values = vec![value; grid.len()];
-                deviation_picture(&grid, &values, &LIMITS, &WORDS);
-                height_picture(&grid, &values, &WORDS);
+                deviation_picture(&grid, &values, &LIMITS, &WORDS, size);
+                height_picture(&grid, &values, &WORDS, size);
             }
         }
     }

@@ -16,7 +16,7 @@ mod verdict;
 pub use canvas::Picture;
 pub use histogram::Histogram;
 pub use html::{ToolpathPage, html_page};
-pub use map::{MapWords, deviation_picture, deviation_range, height_picture};
+pub use map::{MapSize, MapWords, deviation_picture, deviation_range, height_picture};
 pub use result::{
     ReportError, RunReport, SimulationFigures, SurfaceMeshFigures, ToleranceFigures, ToolpathResult,
 };
