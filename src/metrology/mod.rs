@@ -27,7 +27,7 @@ use crate::sim::{Envelope, Grid, NOT_CUT, ZMap};
 use crate::toolpath::Toolpath;
 use cut_surface::CutSurface;
 use regions::connected;
-use ridges::{NUMERICAL_FLOOR, RidgeFinder, RidgeSample, contact_to_tip, scallop_figures};
+use ridges::{NUMERICAL_FLOOR, RidgeFinder, RidgeSample, scallop_figures};
 
 /// Regions listed one by one in the figures; the rest is counted.
 const LISTED_REGIONS: usize = 20;
@@ -218,7 +218,7 @@ impl Inspection<'_> {
             (&self.design.samples[k], self.grid.centre(k % self.grid.nx, k / self.grid.nx));
         by != NOT_CUT && {
             let contact = Point3::new(centre.x, centre.y, design.z);
-            let from_contact = contact_to_tip(self.cutter, &design.normal);
+            let from_contact = self.cutter.contact_to_tip(&design.normal);
             let tip = self.surface.nearest_tip(by, &(contact + from_contact));
             self.part.closest_point(&(tip - from_contact)).1 <= self.limits.uncut
         }

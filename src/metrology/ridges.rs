@@ -14,11 +14,11 @@
 use super::cut_surface::CutSurface;
 use super::figures::{Limits, ScallopFigures};
 use crate::cutter::Cutter;
-use crate::geometry::{Point2, Point3, Vector2, Vector3};
+use crate::geometry::{Point2, Point3, Vector2};
 use crate::monitor::{self, Cancelled, Monitor};
 use crate::part::{Part, SurfacePoint};
 use crate::sim::Grid;
-use crate::toolpath::{Toolpath, axis_offset};
+use crate::toolpath::Toolpath;
 
 /// One crossing of a ridge with a grid line.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -321,7 +321,7 @@ impl RidgeFinder<'_> {
     /// sides: one of them touches it, and not much farther away than the passes lie apart. Else it
     /// stands in a hollow that the cutter does not fit, and is material that no pass reached.
     fn is_scallop(&self, moves: [u32; 2], foot: &SurfacePoint) -> bool {
-        let from_contact = contact_to_tip(self.cutter, &foot.normal);
+        let from_contact = self.cutter.contact_to_tip(&foot.normal);
         let tips = moves.map(|by| self.surface.nearest_tip(by, &(foot.point + from_contact)));
         let far = FARTHEST_CONTACT * (tips[0] - tips[1]).norm();
         tips.iter().any(|tip| {
@@ -329,11 +329,6 @@ impl RidgeFinder<'_> {
             (contact - foot.point).norm() <= far && self.part.closest_point(&contact).1 <= self.limits.uncut
         })
     }
-}
-
-/// From the contact to the tip of a cutter that touches a surface of outward normal `n`.
-pub(super) fn contact_to_tip(cutter: &Cutter, n: &Vector3) -> Vector3 {
-    axis_offset(cutter, n).push(cutter.corner_radius() * (n.z - 1.0))
 }
 
 /// Figures of all ridge samples.
