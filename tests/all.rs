@@ -2,6 +2,10 @@
 
 #[path = "all/analytic.rs"]
 mod analytic;
+#[path = "all/cli.rs"]
+mod cli;
+#[path = "all/command.rs"]
+mod command;
 #[path = "all/defects.rs"]
 mod defects;
 #[path = "all/scenes.rs"]

@@ -1,5 +1,6 @@
-//! Any bytes as a scene: an answer or an error, never a panic. What is accepted must be accepted
-//! again when it is written out with its defaults.
+//! Any bytes as a scene: an answer or an error, never a panic. What is accepted is accepted again
+//! when it is written out with its defaults, and then says the same.
+
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -7,9 +8,10 @@ use millstream::io::scene::{Scene, complete_toml};
 
 fuzz_target!(|bytes: &[u8]| {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
-    if let Ok(scene) = Scene::parse("scene.toml", text) {
-        let complete = complete_toml(&scene);
-        let again = Scene::parse("scene.toml", complete.as_str());
-        assert!(again.is_ok(), "{complete}");
+    let Ok(scene) = Scene::parse("scene.toml", text) else { return };
+    let complete = complete_toml(&scene);
+    match Scene::parse("scene.toml", complete.as_str()) {
+        Ok(again) => assert_eq!(complete_toml(&again), complete),
+        Err(error) => panic!("{error:?}\n{complete}"),
     }
 });

@@ -24,7 +24,8 @@ use super::{Point3, TriangleMesh, Vector3};
 /// wrong answers.
 #[derive(Debug)]
 pub struct Bvh {
-    nodes: Vec<Node>,
+    /// The root at 0, nothing of use at 1, then the children of inner nodes side by side.
+    nodes: Paired<Node>,
     /// Triangle in each slot; the slots of a leaf follow each other.
     triangles: Vec<u32>,
     /// Angle-weighted mean normal at each vertex, any length (Bærentzen & Aanæs 2005).
@@ -68,7 +69,28 @@ pub(crate) enum Feature {
     Corner(usize),
 }
 
-/// A box of the tree: two of them fill a cache line.
+/// Values of up to 32 bytes, two in each cache line: what belongs to the two children of one node
+/// then comes with one access to memory, and those accesses are most of what a query costs.
+#[derive(Debug, Clone)]
+pub(crate) struct Paired<T>(Vec<Pair<T>>);
+
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+struct Pair<T>([T; 2]);
+
+impl<T: Copy> Paired<T> {
+    /// From an even number of values; a last odd one is left out.
+    pub(crate) fn from_values(values: &[T]) -> Self {
+        Self(values.chunks_exact(2).map(|pair| Pair([pair[0], pair[1]])).collect())
+    }
+
+    /// Value `i`.
+    pub(crate) fn at(&self, i: usize) -> &T {
+        &self.0[i / 2].0[i % 2]
+    }
+}
+
+/// A box of the tree: 32 bytes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Node {
     min: [f32; 3],
@@ -116,7 +138,7 @@ impl Node {
 
 /// Triangles a leaf may hold. More makes the walk test triangles in vain, fewer makes it test
 /// boxes in vain.
-const LEAF: u32 = 4;
+const LEAF: u32 = 2;
 
 /// Boxes are grown on each side by this share of the mesh's largest coordinate: far more than the
 /// f64 rounding of any distance computed from them, so that no bound is ever too tight; far less
@@ -149,13 +171,13 @@ pub(crate) fn round_up(x: f64) -> f32 {
 
 /// Nodes and triangles in the order of a depth-first walk: what a query visits one after the other
 /// then lies close together in memory, which is most of what a scattered query costs.
-fn depth_first(tree: &obvhs::bvh2::Bvh2) -> (Vec<Node>, Vec<u32>) {
+fn depth_first(tree: &obvhs::bvh2::Bvh2) -> (Paired<Node>, Vec<u32>) {
     let copy = |index: usize| {
         let n = &tree.nodes[index];
         let (min, max) = (n.aabb().min.to_array(), n.aabb().max.to_array());
         Node { min, count: n.prim_count, max, first: n.first_index }
     };
-    let mut nodes = vec![copy(0)];
+    let mut nodes = vec![copy(0); 2];
     let mut triangles = Vec::with_capacity(tree.primitive_indices.len());
     let mut waiting = vec![0];
     while let Some(index) = waiting.pop() {
@@ -171,7 +193,7 @@ fn depth_first(tree: &obvhs::bvh2::Bvh2) -> (Vec<Node>, Vec<u32>) {
             waiting.extend([children + 1, children]);
         }
     }
-    (nodes, triangles)
+    (Paired::from_values(&nodes), triangles)
 }
 
 impl Bvh {
@@ -201,9 +223,9 @@ impl Bvh {
         self.triangles[slot] as usize
     }
 
-    /// Number of boxes.
+    /// One more than the greatest index of a box; even.
     pub(crate) fn boxes(&self) -> usize {
-        self.nodes.len()
+        2 * self.nodes.0.len()
     }
 
     /// Box `index` and the slots in it, if there are at most `limit`.
@@ -211,7 +233,7 @@ impl Bvh {
         let mut slots = Vec::new();
         let mut waiting = vec![index];
         while let Some(i) = waiting.pop() {
-            let node = &self.nodes[i];
+            let node = self.nodes.at(i);
             let (first, count) = (node.first as usize, node.count as usize);
             if count > 0 {
                 slots.extend(first..first + count);
@@ -222,7 +244,7 @@ impl Bvh {
                 return None;
             }
         }
-        Some((&self.nodes[index], slots))
+        Some((self.nodes.at(index), slots))
     }
 
     /// Branch and bound for a maximum: walks down to every leaf whose `bound(index, box, best)`
@@ -236,12 +258,12 @@ impl Bvh {
         mut visit: impl FnMut(usize, f64) -> f64,
     ) {
         let mut waiting = Stack::new();
-        let mut next = Some((0, f64::INFINITY));
+        let mut next = Some((0, bound(0, self.nodes.at(0), best)));
         while let Some((index, limit)) = next.take().or_else(|| waiting.pop()) {
             if limit <= best {
                 continue;
             }
-            let node = &self.nodes[index as usize];
+            let node = self.nodes.at(index as usize);
             let first = node.first as usize;
             if node.count > 0 {
                 for slot in first..first + node.count as usize {
@@ -249,8 +271,8 @@ impl Bvh {
                 }
                 continue;
             }
-            let a = (node.first, bound(first, &self.nodes[first], best));
-            let b = (node.first + 1, bound(first + 1, &self.nodes[first + 1], best));
+            let a = (node.first, bound(first, self.nodes.at(first), best));
+            let b = (node.first + 1, bound(first + 1, self.nodes.at(first + 1), best));
             let (near, far) = if a.1 >= b.1 { (a, b) } else { (b, a) };
             if near.1 > best {
                 next = Some(near);

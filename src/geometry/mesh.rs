@@ -220,6 +220,16 @@ impl TriangleMesh {
         self.neighbours.iter().flatten().all(|&n| n != NONE)
     }
 
+    /// The mesh in a unit that is `factor > 0` times as small: every coordinate times `factor`.
+    ///
+    /// # Errors
+    /// [`MeshError::TooFar`] or [`MeshError::NotFinite`] when a coordinate leaves its range, and
+    /// [`MeshError::Empty`] when nothing with an area is left of it.
+    pub fn scaled(&self, factor: f64) -> Result<Self, MeshError> {
+        let vertices = self.vertices.iter().map(|p| p * factor).collect();
+        Self::new(vertices, self.triangles.clone()).map(|(mesh, _)| mesh)
+    }
+
     /// Bounds of all vertices.
     pub fn bounds(&self) -> Aabb {
         self.bounds

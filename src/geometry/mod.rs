@@ -15,7 +15,7 @@ pub use aabb::Aabb;
 pub use analytic::{AnalyticError, AnalyticShape, AnalyticSurface, HeightJet, MAX_SLOPE};
 pub use bspline::{KnotError, KnotVector, MAX_BASIS, MAX_DEGREE};
 pub use bvh::{Bvh, MeshFoot, VerticalHit};
-pub(crate) use bvh::{Feature, Node, round_down, round_up};
+pub(crate) use bvh::{Feature, Node, Paired, round_down, round_up};
 pub use jet::{Jet2, PrincipalCurvatures};
 pub use mesh::{MeshError, RepairNotes, TriangleMesh};
 pub use nurbs::{MAX_WEIGHT, NurbsError, NurbsSurface};

@@ -27,10 +27,14 @@ use crate::sim::{Envelope, Grid, NOT_CUT, ZMap};
 use crate::toolpath::Toolpath;
 use cut_surface::CutSurface;
 use regions::connected;
-use ridges::{NUMERICAL_FLOOR, RidgeFinder, RidgeSample, contact_against, scallop_figures};
+use ridges::{NUMERICAL_FLOOR, RidgeFinder, RidgeSample, scallop_figures};
 
 /// Regions listed one by one in the figures; the rest is counted.
 const LISTED_REGIONS: usize = 20;
+
+/// Cells in which a cut might be deeper than anything found are searched between their centres, the
+/// most promising first, and at most so many: each takes some 0.1 ms. What is left over is the bound.
+const MOST_CLOSER: usize = 4000;
 
 /// A place above the uncut tolerance is a scallop, or half of one on the part's border, when a pass
 /// came down to the design there and no cell rises above the highest ridge by more than this share.
@@ -66,7 +70,7 @@ pub fn measure(
     let ridges = finder.find(&on_part, monitor)?;
     let deviation = inspection.deviation_figures(&samples);
     Ok(Measurement {
-        scallop: scallop_figures(&ridges, limits),
+        scallop: scallop_figures(&ridges, finder.highest(&ridges), limits),
         gouge: inspection.gouges(&samples),
         uncut: inspection.uncut(&samples, &ridges, deviation.area_mm2),
         deviation,
@@ -160,20 +164,25 @@ impl Inspection<'_> {
         }
         figures.regions.sort_by(|a, b| b.depth_mm.total_cmp(&a.depth_mm));
         figures.regions.truncate(LISTED_REGIONS);
-        let all: Vec<u32> = measured(samples).map(|(k, _)| k as u32).collect();
-        let Some(&deepest) = least_by(&all, |k| f64::from(samples[k].deviation)) else { return figures };
-        let tolerated = self.deepest_near(deepest as usize).0;
+        let deepest = measured(samples).map(|(_, d)| -d).fold(0.0, f64::max);
         let listed = figures.regions.first().map_or(0.0, |r| r.depth_mm);
-        figures.max_depth_mm = tolerated.max(listed).max(0.0);
+        figures.max_depth_mm = deepest.max(listed);
         // Between centres a cut may be deeper: by the slope times the distance, but a cutter of
         // radius r that meets the design at a slope s cannot go deeper than about s²r below that.
-        let possible = all.iter().map(|&k| {
-            let s = f64::from(samples[k as usize].slope);
-            let deeper = (s * self.reach(k as usize)).min(s * s * self.cutter.radius());
-            deeper - f64::from(samples[k as usize].deviation)
-        });
-        let possible = possible.fold(0.0, f64::max);
-        figures.error_bound_mm = (possible - figures.max_depth_mm).max(0.0) + NUMERICAL_FLOOR;
+        let possible = |k: usize| {
+            let s = f64::from(samples[k].slope);
+            let deeper = (s * self.reach(k)).min(s * s * self.cutter.radius());
+            deeper - f64::from(samples[k].deviation)
+        };
+        let floor = figures.max_depth_mm + NUMERICAL_FLOOR;
+        let mut open: Vec<(f64, usize)> =
+            measured(samples).map(|(k, _)| (possible(k), k)).filter(|(p, _)| *p > floor).collect();
+        open.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let closer = open.len().min(MOST_CLOSER);
+        let depths = crate::parallel::map(closer, |k| self.deepest_near(open[k].1).0);
+        figures.max_depth_mm = depths.into_iter().fold(figures.max_depth_mm, f64::max);
+        let left = open.get(closer).map_or(0.0, |(possible, _)| possible - figures.max_depth_mm);
+        figures.error_bound_mm = left.max(0.0) + NUMERICAL_FLOOR;
         figures
     }
 
@@ -208,9 +217,10 @@ impl Inspection<'_> {
         let (design, centre) =
             (&self.design.samples[k], self.grid.centre(k % self.grid.nx, k / self.grid.nx));
         by != NOT_CUT && {
-            let tip = self.surface.nearest_tip(by, centre.x, centre.y);
-            let contact = contact_against(self.cutter, &tip, &design.normal);
-            self.part.closest_point(&contact).1 <= self.limits.uncut
+            let contact = Point3::new(centre.x, centre.y, design.z);
+            let from_contact = self.cutter.contact_to_tip(&design.normal);
+            let tip = self.surface.nearest_tip(by, &(contact + from_contact));
+            self.part.closest_point(&(tip - from_contact)).1 <= self.limits.uncut
         }
     }
 

@@ -14,10 +14,11 @@
 use super::cut_surface::CutSurface;
 use super::figures::{Limits, ScallopFigures};
 use crate::cutter::Cutter;
-use crate::geometry::{Point2, Point3, Vector3};
+use crate::geometry::{Point2, Point3, Vector2};
 use crate::monitor::{self, Cancelled, Monitor};
 use crate::part::{Part, SurfacePoint};
-use crate::toolpath::{Toolpath, axis_offset};
+use crate::sim::Grid;
+use crate::toolpath::Toolpath;
 
 /// One crossing of a ridge with a grid line.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,7 +31,35 @@ pub(super) struct RidgeSample {
     pub length: f64,
     /// How much higher the ridge may be before the next grid line, mm (first order).
     pub rise: f64,
+    /// The moves that meet.
+    moves: [u32; 2],
+    /// The cell on the lower side, and whether the line to the next one runs along x.
+    from: (u32, bool),
+    /// Length of the ridge's plan normal along the line: near 1 where it crosses the line squarely.
+    squareness: f64,
 }
+
+/// The highest place of all ridges.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Highest {
+    /// Height over the design surface, mm.
+    pub height: f64,
+    /// Where.
+    pub at: Point3,
+    /// No ridge is higher than this, mm (first order).
+    pub possible: f64,
+}
+
+/// Where a ridge could rise above the highest sample between two grid lines, it is looked at on this
+/// many lines between them.
+const CLOSER_LINES: i32 = 8;
+
+/// Ridges are looked at closer on lines that they cross with at least this plan normal; the lines of
+/// the other family see the same ridge less squarely.
+const SQUARE_ENOUGH: f64 = 0.7;
+
+/// Two heights that differ by more than this, mm, do not meet.
+const MEETING: f64 = 1e-6;
 
 /// Two moves of one pass that lie farther apart along the path than this many cutter radii are
 /// neighbouring turns of a spiral or loop, not neighbouring chords.
@@ -58,15 +87,28 @@ pub(super) struct RidgeFinder<'a> {
     along: Vec<f64>,
 }
 
-/// A line between two neighbouring centres.
+/// A line between two neighbouring centres: from the cell `from`, along x or along y.
 struct GridLine {
     a: Point2,
     b: Point2,
-    cells: [u32; 2],
+    from: u32,
     along_x: bool,
 }
 
 impl GridLine {
+    fn new(grid: &Grid, from: u32, along_x: bool) -> Self {
+        let a = grid.centre(from as usize % grid.nx, from as usize / grid.nx);
+        let step = if along_x { Vector2::new(grid.cell, 0.0) } else { Vector2::new(0.0, grid.cell) };
+        Self { a, b: a + step, from, along_x }
+    }
+
+    /// The same line moved sideways by a share of its length.
+    fn beside(&self, share: f64) -> Self {
+        let along = self.b - self.a;
+        let aside = Vector2::new(-along.y, along.x) * share;
+        Self { a: self.a + aside, b: self.b + aside, ..*self }
+    }
+
     fn at(&self, t: f64) -> Point2 {
         self.a + (self.b - self.a) * t
     }
@@ -112,16 +154,10 @@ impl<'a> RidgeFinder<'a> {
                         continue;
                     }
                     let other = grid.index(ni, nj);
-                    if on_part(other)
-                        && self.apart(self.surface.cut.cut_by[k], self.surface.cut.cut_by[other])
-                    {
-                        let line = GridLine {
-                            a: grid.centre(i, j),
-                            b: grid.centre(ni, nj),
-                            cells: [k as u32, other as u32],
-                            along_x,
-                        };
-                        self.on_line(&line, &mut samples);
+                    let [a, b] = [k, other].map(|k| self.surface.cut.cut_by[k]);
+                    if on_part(other) && self.apart(a, b) {
+                        let line = GridLine::new(&grid, k as u32, along_x);
+                        self.between(&line, (0.0, a), (1.0, b), MOST_DEPTH, &mut samples);
                     }
                 }
             }
@@ -142,11 +178,6 @@ impl<'a> RidgeFinder<'a> {
         }
     }
 
-    fn on_line(&self, line: &GridLine, out: &mut Vec<RidgeSample>) {
-        let [a, b] = line.cells.map(|k| self.surface.cut.cut_by[k as usize]);
-        self.between(line, (0.0, a), (1.0, b), MOST_DEPTH, out);
-    }
-
     /// Finds the ridges between `a` at parameter `ta`, lowest there, and `b` at `tb`.
     fn between(
         &self,
@@ -163,15 +194,17 @@ impl<'a> RidgeFinder<'a> {
         let q = line.at(t);
         let height = |by: u32| self.surface.envelope.height(by, q.x, q.y).unwrap_or(f64::INFINITY);
         let (za, zb) = (height(a), height(b));
-        let z = za.max(zb);
         let Some(lowest) = self.surface.at(q.x, q.y) else { return };
         // Another move is lower at the crossing: it stands between the two.
         let third = lowest.z < za.min(zb) - 1e-9 && lowest.by != a && lowest.by != b;
         if third && depth > 0 && self.surface.pass(lowest.by).is_some() {
             self.between(line, (ta, a), (t, lowest.by), depth - 1, out);
             self.between(line, (t, lowest.by), (tb, b), depth - 1, out);
-        } else if z.is_finite() {
-            out.extend(self.sample(line, q, z, [a, b]));
+        } else if za.is_finite() && zb.is_finite() && (za - zb).abs() <= MEETING {
+            out.extend(self.sample(line, q, za.max(zb), [a, b]));
+        } else if za.is_infinite() != zb.is_infinite() {
+            // A cutter with a flat ends in a wall: the ridge is its edge.
+            out.extend(self.sample(line, q, za.min(zb), [a, b]));
         }
     }
 
@@ -243,7 +276,43 @@ impl<'a> RidgeFinder<'a> {
             at,
             length: pitch * share / plan,
             rise: tangent.dot(&foot.normal).abs() * 0.5 * reach,
+            moves,
+            from: (line.from, line.along_x),
+            squareness: share,
         })
+    }
+
+    /// The highest place of all ridges, looked at closer wherever a ridge might rise above the highest
+    /// sample before the next grid line; `None` without samples.
+    pub fn highest(&self, samples: &[RidgeSample]) -> Option<Highest> {
+        let first = samples.iter().max_by(|a, b| a.height.total_cmp(&b.height))?;
+        let mut highest = Highest { height: first.height, at: first.at, possible: first.height };
+        let might = |s: &&RidgeSample| {
+            s.squareness >= SQUARE_ENOUGH && s.height + s.rise > first.height + NUMERICAL_FLOOR
+        };
+        let candidates: Vec<&RidgeSample> = samples.iter().filter(might).collect();
+        let grid = &self.surface.cut.grid;
+        let closer = crate::parallel::map(candidates.len(), |k| {
+            let sample = candidates[k];
+            let line = GridLine::new(grid, sample.from.0, sample.from.1);
+            let [a, b] = sample.moves;
+            let mut found = Vec::new();
+            for k in -CLOSER_LINES / 2..=CLOSER_LINES / 2 {
+                let line = line.beside(f64::from(k) / f64::from(CLOSER_LINES));
+                // The ridge may leave the cell sideways by half of it.
+                self.between(&line, (-0.5, a), (1.5, b), MOST_DEPTH, &mut found);
+            }
+            found.retain(|s| self.part.highest_at(s.at.x, s.at.y).is_some());
+            found
+        });
+        for sample in closer.iter().flatten() {
+            if sample.height > highest.height {
+                (highest.height, highest.at) = (sample.height, sample.at);
+            }
+            highest.possible = highest.possible.max(sample.height + sample.rise / f64::from(CLOSER_LINES));
+        }
+        highest.possible = highest.possible.max(highest.height);
+        Some(highest)
     }
 }
 
@@ -252,26 +321,24 @@ impl RidgeFinder<'_> {
     /// sides: one of them touches it, and not much farther away than the passes lie apart. Else it
     /// stands in a hollow that the cutter does not fit, and is material that no pass reached.
     fn is_scallop(&self, moves: [u32; 2], foot: &SurfacePoint) -> bool {
-        let tips = moves.map(|by| self.surface.nearest_tip(by, foot.point.x, foot.point.y));
+        let from_contact = self.cutter.contact_to_tip(&foot.normal);
+        let tips = moves.map(|by| self.surface.nearest_tip(by, &(foot.point + from_contact)));
         let far = FARTHEST_CONTACT * (tips[0] - tips[1]).norm();
         tips.iter().any(|tip| {
-            let contact = contact_against(self.cutter, tip, &foot.normal);
+            let contact = tip - from_contact;
             (contact - foot.point).norm() <= far && self.part.closest_point(&contact).1 <= self.limits.uncut
         })
     }
 }
 
-/// Where the cutter with its tip at `tip` touches, or would touch, a surface of outward normal `n`.
-pub(super) fn contact_against(cutter: &Cutter, tip: &Point3, n: &Vector3) -> Point3 {
-    let offset = axis_offset(cutter, n);
-    Point3::new(tip.x - offset.x, tip.y - offset.y, tip.z + cutter.corner_radius() * (1.0 - n.z))
-}
-
 /// Figures of all ridge samples.
-pub(super) fn scallop_figures(samples: &[RidgeSample], limits: &Limits) -> ScallopFigures {
+pub(super) fn scallop_figures(
+    samples: &[RidgeSample],
+    highest: Option<Highest>,
+    limits: &Limits,
+) -> ScallopFigures {
     let mut figures = ScallopFigures { target_mm: limits.scallop, ..ScallopFigures::default() };
     let total: f64 = samples.iter().map(|s| s.length).sum();
-    let highest = samples.iter().max_by(|a, b| a.height.total_cmp(&b.height));
     let (Some(highest), true) = (highest, total > 0.0) else {
         figures.reason = Some("no ridge stands between passes on the part".into());
         return figures;
@@ -290,7 +357,6 @@ pub(super) fn scallop_figures(samples: &[RidgeSample], limits: &Limits) -> Scall
     };
     // From 0.0, since an empty sum is -0.0.
     let over = samples.iter().filter(|s| s.height > limits.scallop).fold(0.0, |sum, s| sum + s.length);
-    let possible = samples.iter().map(|s| s.height + s.rise).fold(f64::NEG_INFINITY, f64::max);
     figures.max_mm = Some(highest.height);
     figures.max_at_mm = Some(highest.at.into());
     figures.p95_mm = Some(quantile(0.95));
@@ -298,6 +364,6 @@ pub(super) fn scallop_figures(samples: &[RidgeSample], limits: &Limits) -> Scall
     figures.mean_mm = Some(samples.iter().map(|s| s.height * s.length).sum::<f64>() / total);
     figures.over_target_fraction = Some(over / total);
     figures.ridge_length_mm = total;
-    figures.error_bound_mm = Some(possible - highest.height + NUMERICAL_FLOOR);
+    figures.error_bound_mm = Some(highest.possible - highest.height + NUMERICAL_FLOOR);
     figures
 }

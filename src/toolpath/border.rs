@@ -11,6 +11,24 @@ use crate::part::{Part, SurfacePoint};
 /// rounding of coordinates, a millionth of a cutter.
 const ON_BORDER: f64 = 1e-10;
 
+/// A pass counts as nearly parallel to the border where its angle to it has less than one over this
+/// as tangent.
+const NEARLY_PARALLEL: f64 = 3.0;
+
+/// An overrun shorter than this many intervals is left out.
+const LEAST_OVERRUN: f64 = 0.05;
+
+/// How far a pass is worth running on over a border, in intervals, when it meets it at the angle φ
+/// (given as 1/tan φ): it ends half an interval over tan φ short of where its ridge to the neighbour
+/// leaves the part. A pass nearly parallel to the border serves the strip inside it to its end.
+pub fn useful_overrun(cotangent: f64) -> f64 {
+    match 0.5 * cotangent {
+        _ if cotangent > NEARLY_PARALLEL => f64::INFINITY,
+        length if length < LEAST_OVERRUN => 0.0,
+        length => length,
+    }
+}
+
 /// Answers whether a point of the surface lies on the border of the part.
 pub struct Border<'a> {
     part: &'a Part,

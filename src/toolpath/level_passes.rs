@@ -4,11 +4,11 @@
 //! a smaller interval than the levels leave, further passes are put halfway between them, only
 //! along the stretches that need one, and between those again.
 
+use super::border::useful_overrun;
 use super::chart::Chart;
 use super::drop::DropCutter;
 use super::plan::{PassSettings, Passes, PlanError};
 use super::spacing::{level_tangent, place_levels};
-use super::strip::axis_offset;
 use crate::cutter::Cutter;
 use crate::field::{LevelCurve, LevelTracer, ScalarField, surface_gradient_length};
 use crate::geometry::Point3;
@@ -28,13 +28,6 @@ const MOST_MARGIN: f64 = 0.1;
 
 /// Places a side at which the margin is computed.
 const MARGIN_SAMPLES: usize = 24;
-
-/// An overrun shorter than this many intervals is left out.
-const LEAST_OVERRUN: f64 = 0.05;
-
-/// A pass counts as nearly parallel to the border where its angle to it has less than one over this
-/// as tangent.
-const NEARLY_PARALLEL: f64 = 3.0;
 
 /// A point between two traced ones may be this many sampling distances off the line between them.
 const MOST_STRAY: f64 = 0.25;
@@ -159,7 +152,7 @@ impl Guide<'_> {
     /// normal, then dropped, so that it is held off by any other place of the part.
     fn tip(&self, [u, v]: [f64; 2]) -> Option<Point3> {
         let p = self.chart.at(u, v)?;
-        let axis = p.jet.p.xy() + axis_offset(self.cutter, &p.normal);
+        let axis = p.jet.p.xy() + self.cutter.axis_offset(&p.normal);
         self.drop.at(axis.x, axis.y).map(|d| Point3::new(axis.x, axis.y, d.tip_z))
     }
 
@@ -277,9 +270,7 @@ impl Guide<'_> {
         stretches
     }
 
-    /// Cuts stretches outside of the chart at both ends back to what is of use: a pass that meets the
-    /// border at the angle φ ends half an interval over tan φ short of where its ridge to the
-    /// neighbour leaves the part.
+    /// Cuts stretches outside of the chart at both ends back to what is of use.
     fn shorten_ends(&self, stretches: &mut Vec<Stretch>, at: &dyn Fn(f64) -> [f64; 2]) {
         let useful = |s: f64| {
             let p = at(s);
@@ -290,14 +281,7 @@ impl Guide<'_> {
             let border = if near(p[0], along_u) < near(p[1], along_v) { here.jet.dv } else { here.jet.du };
             let (along, across) = (feed.dot(&border).abs(), feed.cross(&border).norm());
             let interval = here.strip_width(self.cutter, &feed, self.settings.step).0;
-            // Nearly parallel to the border the pass serves the strip inside it until it leaves the
-            // margin; elsewhere the angle tells.
-            let length = match along / across.max(1e-9) {
-                ratio if ratio > NEARLY_PARALLEL => f64::INFINITY,
-                ratio if 0.5 * ratio < LEAST_OVERRUN => 0.0,
-                ratio => 0.5 * ratio * interval,
-            };
-            Some(length / self.settings.sampling)
+            Some(useful_overrun(along / across.max(1e-9)) * interval / self.settings.sampling)
         };
         if let Some(first) = stretches.first_mut().filter(|s| !s.inside) {
             first.from = first.from.max(first.to - useful(first.to).unwrap_or(0.0));

@@ -5,7 +5,7 @@
 //! plan direction across the feed; that surface is the part's offset, where lengths across the
 //! feed are `1 − κ r` times those on the part.
 
-use super::border::Border;
+use super::border::{Border, useful_overrun};
 use super::chart::Chart;
 use super::drop::{Drop, DropCutter};
 use super::plan::{PassSettings, Passes, PlanError};
@@ -103,10 +103,6 @@ fn safe_stepover(charts: &[Chart], cutter: &Cutter, angle: f64, h: f64, notes: &
     LEAST_OVER_PLANE * plane
 }
 
-/// A roll over the border at the end of a pass that is shorter than this many overruns belongs to
-/// a pass that crosses the border at more than about 45°.
-const SQUARE_CROSSING: f64 = 1.5;
-
 /// How the cutter stands on the part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Contact {
@@ -183,23 +179,28 @@ impl Line<'_> {
             before = (s, now);
         }
         stretches.push((before.1, start, s1));
-        let runs = stretches.split(|(contact, ..)| *contact == Contact::Off);
-        runs.map(|run| self.moves(offset, self.without_square_ends(run))).filter(|p| p.len() >= 2).collect()
+        let runs = stretches.split_mut(|(contact, ..)| *contact == Contact::Off);
+        runs.map(|run| {
+            self.shorten_ends(run);
+            self.moves(offset, run)
+        })
+        .filter(|points| points.len() >= 2)
+        .collect()
     }
 
-    /// A run without a short roll at either end: there the pass crosses the border squarely, and
-    /// its end on the border is enough.
-    fn without_square_ends<'s>(&self, mut run: &'s [(Contact, f64, f64)]) -> &'s [(Contact, f64, f64)] {
-        let short = |(contact, a, b): &(Contact, f64, f64)| {
-            *contact == Contact::Rolling && b - a < SQUARE_CROSSING * self.overrun
+    /// Cuts the rolls at both ends of a run back to what is of use. A roll over the whole overrun on a
+    /// length l means that the pass meets the border at an angle of sine overrun/l.
+    fn shorten_ends(&self, run: &mut [(Contact, f64, f64)]) {
+        let useful = |a: f64, b: f64| {
+            let sine = (self.overrun / (b - a)).min(1.0);
+            useful_overrun((1.0 - sine * sine).sqrt() / sine) * self.overrun
         };
-        if run.len() > 1 && run.first().is_some_and(short) {
-            run = &run[1..];
+        if let Some((Contact::Rolling, a, b)) = run.first_mut() {
+            *a = a.max(*b - useful(*a, *b));
         }
-        if run.len() > 1 && run.last().is_some_and(short) {
-            run = &run[..run.len() - 1];
+        if let Some((Contact::Rolling, a, b)) = run.last_mut() {
+            *b = b.min(*a + useful(*a, *b));
         }
-        run
     }
 
     fn moves(&self, offset: f64, run: &[(Contact, f64, f64)]) -> Vec<Point3> {

@@ -52,6 +52,16 @@ fn a_clean_mesh_keeps_its_numbering() {
 }
 
 #[test]
+fn inches_become_millimetres() {
+    let (mesh, _) = TriangleMesh::new(cube().0, cube().1).unwrap();
+    let scaled = mesh.scaled(25.4).unwrap();
+    assert!((volume(&scaled) - 25.4f64.powi(3)).abs() < 1e-9);
+    assert_eq!(scaled.triangles(), mesh.triangles());
+    assert!(matches!(mesh.scaled(1e7), Err(MeshError::TooFar { .. })));
+    assert!(matches!(mesh.scaled(f64::NAN), Err(MeshError::NotFinite { .. })));
+}
+
+#[test]
 fn a_soup_is_welded_and_minus_zero_is_zero() {
     let (mut vertices, triangles) = unweld(&cube());
     vertices
@@ -139,20 +149,19 @@ fn a_thin_but_honest_sliver_is_kept() {
 
 #[test]
 fn what_cannot_be_repaired_is_refused_with_its_place() {
-    let (vertices, triangles) = cube();
-    assert_eq!(TriangleMesh::new(vertices.clone(), vec![]).unwrap_err(), MeshError::Empty { dropped: 0 });
-    let bad = |f: &dyn Fn(&mut Vec<Point3>, &mut Vec<[u32; 3]>)| {
-        let (mut v, mut t) = (vertices.clone(), triangles.clone());
-        f(&mut v, &mut t);
-        TriangleMesh::new(v, t).unwrap_err().to_string()
+    assert_eq!(TriangleMesh::new(cube().0, vec![]).unwrap_err(), MeshError::Empty { dropped: 0 });
+    let bad = |change: fn(&mut Soup)| {
+        let mut soup = cube();
+        change(&mut soup);
+        TriangleMesh::new(soup.0, soup.1).unwrap_err().to_string()
     };
-    let text = bad(&|_, t| t[5][2] = 8);
+    let text = bad(|(_, t)| t[5][2] = 8);
     assert!(text.starts_with("triangle 5 refers to vertex 8, but there are 8"), "{text}");
-    let text = bad(&|v, _| v[7].y = f64::NAN);
+    let text = bad(|(v, _)| v[7].y = f64::NAN);
     assert!(text.contains("triangle 2 has the corner (1, NaN, 1), which is not finite"), "{text}");
-    let text = bad(&|v, _| v[7].y = 2.0 * MAX_COORDINATE);
+    let text = bad(|(v, _)| v[7].y = 2.0 * MAX_COORDINATE);
     assert!(text.contains("(1, 2000000, 1) mm") && text.contains("±1000000 mm"), "{text}");
-    let text = bad(&|v, t| {
+    let text = bad(|(v, t)| {
         v.push(Point3::new(-1.0, -1.0, 0.5));
         t.push([0, 4, 8]);
     });

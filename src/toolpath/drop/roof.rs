@@ -20,7 +20,6 @@ const SLACK: f64 = 4.0 * f32::EPSILON as f64;
 
 /// The cutter resting on a plane above all triangles in a box, in f32, rounded to the safe side.
 #[derive(Debug, Clone, Copy)]
-#[repr(align(32))]
 pub(super) struct Roof {
     gradient: [f32; 2],
     shift: [f32; 2],

@@ -228,7 +228,9 @@ fn a_needle_and_a_ridge_carry_every_cutter() {
             assert!((past_end.contact.point - Point3::new(0.0, 0.0, 7.0)).norm() < 1e-13);
         }
         assert!(drops.at(4.0, 4.0).is_none());
-        assert!(drops.at(f64::NAN, 4.0).is_none() && drops.at(0.0, f64::INFINITY).is_none());
+        for far in [f64::NAN, f64::INFINITY, -1e308, 1e200, 1e7] {
+            assert!(drops.at(far, 4.0).is_none() && drops.at(0.0, far).is_none());
+        }
     }
 }
 

@@ -383,9 +383,6 @@ impl<'f> Side<'f> {
     /// Rests the cutter on this side alone, the `k`-th of its triangle, if that comes above `floor`.
     fn touch(&self, k: usize, profile: &Profile, x: f64, y: f64, floor: f64) -> Option<Touch> {
         let (a, b) = (self.from, self.to);
-        if a.z.max(b.z) - profile.height_squared(0.0) <= floor {
-            return None;
-        }
         let (dz, length) = (b.z - a.z, self.length());
         let (ax, ay) = (a.x - x, a.y - y);
         let reach2 = profile.radius * profile.radius;
@@ -395,8 +392,13 @@ impl<'f> Side<'f> {
             let unit = self.along.map(|d| d / length);
             let h = ax * unit[1] - ay * unit[0];
             let start = ax * unit[0] + ay * unit[1];
-            let place = profile.along_line(h.abs(), dz, length)?;
             let end = start + length;
+            // The side's top end at its place next to the axis would be the best of all.
+            let next = 0f64.clamp(start, end);
+            if a.z.max(b.z) - profile.height_squared((h * h + next * next).min(reach2)) <= floor {
+                return None;
+            }
+            let place = profile.along_line(h.abs(), dz, length)?;
             let on_side = place.clamp(start, end);
             let along = if on_side == start {
                 0.0

@@ -1,0 +1,387 @@
+//! The program as its users meet it: arguments, exit status, streams and the files of a run.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use exr::prelude::{AttributeValue, FlatSamples, ReadChannels as _, ReadLayers as _, Text};
+use serde_json::Value;
+
+use crate::command::{PLATE, entries, millstream};
+
+/// Files of every toolpath.
+const TOOLPATH_FILES: [&str; 6] =
+    ["deviation.png", "height.exr", "height.png", "machined.stl", "toolpath.cls", "toolpath.nc"];
+
+/// The plate, and a strategy of each kind on a surface that curves.
+const WAVE: &str = r#"title = "A wave <&> its \"passes\""
+[part]
+surface = "wave"
+amplitude = 0.5
+wavelength_x = 12
+x = [-2.5, 7.5]
+y = [0, 5]
+[stock]
+margin = 1.0
+[cutter]
+shape = "bull"
+diameter = 6
+corner_radius = 1.5
+[tolerance]
+scallop = 0.02
+[simulation]
+cell = 0.1
+[[toolpath]]
+strategy = "zigzag"
+angle = 33.3
+[[toolpath]]
+name = "along v: 1/2"
+strategy = "iso-parametric"
+along = "v"
+[[toolpath]]
+strategy = "streamline"
+direction = { angle = 10 }
+control_points = 8
+"#;
+
+fn home_with(scene: &str) -> tempfile::TempDir {
+    let home = tempfile::tempdir().unwrap();
+    std::fs::write(home.path().join("plate.toml"), scene).unwrap();
+    home
+}
+
+/// Runs `plate.toml` in `home`; it must have run, and leaves nothing on stderr.
+fn run(home: &Path, out: &str, more: &[&str]) -> String {
+    let answer = millstream(home, &[&["run", "plate.toml", "--out", out], more].concat());
+    assert!(answer.code == Some(0) || answer.code == Some(1), "{answer:?}");
+    assert_eq!(answer.stderr, "");
+    answer.stdout
+}
+
+fn report(out: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(out.join("report.json")).unwrap()).unwrap()
+}
+
+/// All files below a folder: their paths with slashes, and their bytes.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    for name in entries(folder) {
+        let path = folder.join(&name);
+        if path.is_dir() {
+            found.extend(files(&path).into_iter().map(|(below, bytes)| (format!("{name}/{below}"), bytes)));
+        } else {
+            found.insert(name, std::fs::read(&path).unwrap());
+        }
+    }
+    found
+}
+
+/// What may differ from run to run: the time taken, and how many threads took it.
+fn without_time(mut report: Value) -> Value {
+    for toolpath in report["toolpaths"].as_array_mut().unwrap() {
+        let simulation = toolpath["simulation"].as_object_mut().unwrap();
+        simulation.remove("wall_s").unwrap();
+        simulation.remove("threads").unwrap();
+    }
+    report
+}
+
+/// The page without the sentences that tell the time.
+fn page_without_time(page: &[u8]) -> String {
+    let page = std::str::from_utf8(page).unwrap();
+    let mut pieces = page.split("Cutting and measuring took ");
+    let mut kept = pieces.next().unwrap().to_owned();
+    for piece in pieces {
+        kept += &piece[piece.find("</p>").expect("the sentence ends its paragraph")..];
+    }
+    assert!(kept.len() < page.len(), "the page tells the time");
+    kept
+}
+
+fn no_number_is_missing(place: &str, value: &Value) {
+    match value {
+        // JSON has no NaN; serde_json writes null for it.
+        Value::Null => panic!("{place} is null"),
+        Value::Number(number) => assert!(number.as_f64().is_some_and(f64::is_finite), "{place}"),
+        Value::Array(items) => items.iter().for_each(|item| no_number_is_missing(place, item)),
+        Value::Object(map) => {
+            for (key, item) in map {
+                no_number_is_missing(&format!("{place}.{key}"), item);
+            }
+        }
+        Value::Bool(_) | Value::String(_) => (),
+    }
+}
+
+#[test]
+fn exit_status_and_streams_tell_the_verdict() {
+    let home = home_with(PLATE);
+    let passed = millstream(home.path(), &["run", "plate.toml"]);
+    assert_eq!((passed.code, passed.stderr.as_str()), (Some(0), ""), "{passed:?}");
+    assert!(passed.stdout.starts_with("Plate\n") && passed.stdout.contains("pass"), "{}", passed.stdout);
+    assert!(passed.stdout.ends_with(&format!("Results: {}\n", Path::new("out").join("plate").display())));
+    assert!(!passed.stdout.contains('\x1b'), "no colours in a pipe");
+    assert!(home.path().join("out/plate/report.json").is_file());
+
+    std::fs::write(home.path().join("plate.toml"), PLATE.replace("0.0105", "0.005")).unwrap();
+    let violated = millstream(home.path(), &["run", "plate.toml"]);
+    assert_eq!((violated.code, violated.stderr.as_str()), (Some(1), ""), "{violated:?}");
+    assert!(violated.stdout.contains("fail"), "{}", violated.stdout);
+    let report = report(&home.path().join("out/plate"));
+    assert_eq!(report["verdict"], "fail");
+    assert!(!report["toolpaths"][0]["violations"].as_array().unwrap().is_empty());
+}
+
+#[test]
+fn wrong_usage_is_told_on_stderr() {
+    let home = home_with(PLATE);
+    let cases: [(&[&str], &str); 11] = [
+        (&[], "Usage"),
+        (&["run"], "<SCENE>"),
+        (&["runn", "plate.toml"], "runn"),
+        (&["run", "plate.toml", "--thread", "2"], "--threads"),
+        (&["run", "plate.toml", "--threads", "0"], "0"),
+        (&["run", "plate.toml", "--threads", "many"], "many"),
+        (&["run", "plate.toml", "--cell", "-1"], "-1"),
+        (&["run", "plate.toml", "--cell", "nan"], "millimetres"),
+        (&["run", "plate.toml", "--engine", "zmapp"], "zmap"),
+        (&["run", "plate.toml", "--out"], "--out"),
+        (&["run", "plate.toml", "other.toml"], "other.toml"),
+    ];
+    for (arguments, word) in cases {
+        let answer = millstream(home.path(), arguments);
+        assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{arguments:?}");
+        assert!(answer.stderr.contains(word), "{arguments:?}: {}", answer.stderr);
+        assert!(!answer.stderr.contains('\x1b'), "{arguments:?}");
+        assert_eq!(entries(home.path()), ["plate.toml"], "{arguments:?}");
+    }
+    for (arguments, word) in
+        [(["--help"], "Exit status"), (["--version"], concat!("millstream ", env!("CARGO_PKG_VERSION")))]
+    {
+        let answer = millstream(home.path(), &arguments);
+        assert_eq!((answer.code, answer.stderr.as_str()), (Some(0), ""));
+        assert!(answer.stdout.contains(word), "{}", answer.stdout);
+    }
+}
+
+#[test]
+fn a_run_leaves_the_files_of_the_contract_and_no_other() {
+    let home = home_with(WAVE);
+    run(home.path(), "deep/er/out", &[]);
+    let out = home.path().join("deep/er/out");
+    assert_eq!(entries(out.parent().unwrap()), ["out"], "no scratch is left");
+    let report = report(&out);
+    let toolpaths = report["toolpaths"].as_array().unwrap();
+    let folders: Vec<&str> = toolpaths.iter().map(|t| t["folder"].as_str().unwrap()).collect();
+    let names: Vec<&str> = toolpaths.iter().map(|t| t["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["zigzag", "along v: 1/2", "streamline"]);
+    let mut expected = vec!["report.html", "report.json"];
+    expected.extend(&folders);
+    expected.sort_unstable();
+    assert_eq!(entries(&out), expected);
+    for (folder, toolpath) in folders.iter().zip(toolpaths) {
+        let folder = out.join(folder);
+        assert_eq!(entries(&folder), TOOLPATH_FILES);
+        // 10 x 5 mm and a margin of 1 mm in cells of 0.1 mm.
+        assert_eq!(toolpath["simulation"]["cells"], 120 * 70);
+        pictures_have_the_grid(&folder, [120, 70]);
+        the_programs_and_the_part_are_whole(&folder, toolpath);
+    }
+    let page = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(!page.contains("http://") && !page.contains("https://"), "the page opens offline");
+    assert!(!page.contains("src=\"") || page.contains("src=\"data:"), "pictures stand in the page");
+    assert!(page.contains("A wave &lt;&amp;&gt; its"), "the title is shown as it was written");
+}
+
+fn pictures_have_the_grid(folder: &Path, [nx, ny]: [usize; 2]) {
+    for name in ["deviation.png", "height.png"] {
+        let picture = image::open(folder.join(name)).unwrap();
+        // The map is drawn with one pixel or more a cell, and has axes, a key and a scale bar around.
+        assert!(picture.width() as usize > nx && picture.height() as usize > ny, "{name}");
+        assert!((picture.width() as usize) < 4000 && (picture.height() as usize) < 4000, "{name}");
+    }
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_file(folder.join("height.exr"))
+        .unwrap();
+    let layer = &image.layer_data;
+    assert_eq!([layer.size.0, layer.size.1], [nx, ny]);
+    let channels = &layer.channel_data.list;
+    let names: Vec<String> = channels.iter().map(|c| c.name.to_string()).collect();
+    assert_eq!(names, ["Z", "deviation", "move"]);
+    let FlatSamples::F32(heights) = &channels[0].sample_data else { panic!("Z is 32-bit float") };
+    assert!(heights.iter().all(|z| z.is_finite()));
+    let Some(AttributeValue::Text(text)) = layer.attributes.other.get(&Text::from("millstream")) else {
+        panic!("cell and origin stand in an attribute")
+    };
+    let about: Value = serde_json::from_str(&text.to_string()).unwrap();
+    assert_eq!(about["cell_mm"], 0.1);
+    // Centre of the first cell: half a cell inside the border of part and margin.
+    let [x, y] = [0, 1].map(|k| about["origin_mm"][k].as_f64().unwrap());
+    assert!((x + 3.45).abs() < 1e-9 && (y + 0.95).abs() < 1e-9, "{x} {y}");
+}
+
+fn the_programs_and_the_part_are_whole(folder: &Path, toolpath: &Value) {
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
+    let points = toolpath["path"]["cl_points"].as_u64().unwrap() as usize;
+    let program = read("toolpath.nc");
+    assert!(program.contains("G21") && program.trim_end().ends_with('%'), "{}", &program[..200]);
+    let cl = read("toolpath.cls");
+    assert!(cl.lines().filter(|line| line.starts_with("GOTO")).count() >= points);
+    assert!(cl.trim_end().ends_with("FINI"));
+    let (mesh, repairs) = millstream::io::stl::read(&folder.join("machined.stl")).unwrap();
+    assert!(mesh.is_closed() && repairs.is_clean(), "{repairs}");
+    assert_eq!(toolpath["surface_mesh"]["triangles"], mesh.triangles().len());
+}
+
+#[test]
+fn the_report_has_the_keys_of_the_contract_and_finite_numbers() {
+    let home = home_with(WAVE);
+    run(home.path(), "out", &["--threads", "2"]);
+    let report = report(&home.path().join("out"));
+    no_number_is_missing("report", &report);
+    let has = |value: &Value, keys: &str| {
+        for key in keys.split(' ') {
+            assert!(!value[key].is_null(), "{key}");
+        }
+    };
+    has(&report, "millstream scene scene_sha256 verdict toolpaths");
+    assert_eq!(report["millstream"], env!("CARGO_PKG_VERSION"));
+    assert_eq!(report["scene"], "plate.toml");
+    let digest = report["scene_sha256"].as_str().unwrap();
+    assert!(digest.len() == 64 && digest.bytes().all(|b| b.is_ascii_hexdigit()), "{digest}");
+    for t in report["toolpaths"].as_array().unwrap() {
+        has(t, "name strategy verdict violations path scallop gouge uncut deviation simulation");
+        has(
+            &t["path"],
+            "cutting_length_mm air_length_mm passes cl_points sharp_turns machining_time_s",
+        );
+        has(
+            &t["scallop"],
+            "target_mm max_mm p95_mm p50_mm mean_mm over_target_fraction error_bound_mm",
+        );
+        has(&t["gouge"], "max_depth_mm area_mm2 error_bound_mm regions");
+        has(&t["uncut"], "max_height_mm area_mm2 fraction volume_mm3 regions");
+        has(&t["deviation"], "samples min_mm max_mm rms_mm");
+        has(&t["simulation"], "engine cell_mm cells moves wall_s threads");
+        assert_eq!(t["simulation"]["threads"], 2);
+    }
+}
+
+#[test]
+fn what_check_prints_is_the_same_scene() {
+    let home = home_with(WAVE);
+    let check = |name: &str| {
+        let answer = millstream(home.path(), &["check", name]);
+        assert_eq!((answer.code, answer.stderr.as_str()), (Some(0), ""), "{answer:?}");
+        answer.stdout
+    };
+    let complete = check("plate.toml");
+    assert_eq!(entries(home.path()), ["plate.toml"], "check writes nothing");
+    run(home.path(), "short", &[]);
+    std::fs::write(home.path().join("plate.toml"), &complete).unwrap();
+    assert_eq!(check("plate.toml"), complete);
+    run(home.path(), "complete", &[]);
+    let read = |out: &str| {
+        let mut report = without_time(report(&home.path().join(out)));
+        (report.as_object_mut().unwrap().remove("scene_sha256").unwrap(), report)
+    };
+    let ((digest, report), (digest_of_complete, report_of_complete)) = (read("short"), read("complete"));
+    assert_ne!(digest, digest_of_complete);
+    assert_eq!(report, report_of_complete);
+}
+
+#[test]
+fn every_file_is_the_same_for_any_number_of_threads() {
+    let home = home_with(WAVE);
+    let table = run(home.path(), "out", &["--threads", "1"]);
+    let first = files(&home.path().join("out"));
+    // Over the results of the first run, which are replaced.
+    assert_eq!(run(home.path(), "out", &["--threads", "3"]), table);
+    let second = files(&home.path().join("out"));
+    assert!(first.keys().eq(second.keys()));
+    for (name, bytes) in &first {
+        let json = |bytes: &[u8]| without_time(serde_json::from_slice(bytes).unwrap());
+        match name.as_str() {
+            "report.json" => assert_eq!(json(bytes), json(&second[name])),
+            "report.html" => assert!(page_without_time(bytes) == page_without_time(&second[name])),
+            _ => assert!(*bytes == second[name], "{name}"),
+        }
+    }
+}
+
+#[test]
+fn the_cell_can_be_given_in_place_of_the_scenes() {
+    let home = home_with(PLATE);
+    run(home.path(), "out", &["--cell", "0.2", "--engine", "reference"]);
+    let coarse = report(&home.path().join("out"));
+    assert_eq!(coarse["toolpaths"][0]["simulation"]["cell_mm"], 0.2);
+    assert_eq!(coarse["toolpaths"][0]["simulation"]["cells"], 40 * 30);
+    // The scallop between two passes is no matter of the cell: 3 - sqrt(9 - 0.25 * 0.25).
+    let scallop = &coarse["toolpaths"][0]["scallop"];
+    let error = scallop["max_mm"].as_f64().unwrap() - (3.0 - (9.0 - 0.0625f64).sqrt());
+    assert!(error.abs() <= scallop["error_bound_mm"].as_f64().unwrap() + 1e-9, "{scallop}");
+}
+
+#[test]
+fn a_second_run_replaces_the_first() {
+    let home = home_with(PLATE);
+    run(home.path(), "out", &[]);
+    let out = home.path().join("out");
+    std::fs::write(out.join("notes.txt"), "mine").unwrap();
+    std::fs::write(out.join("zigzag/stale.txt"), "old").unwrap();
+    std::fs::write(home.path().join("plate.toml"), PLATE.replace("\"Plate\"", "\"Second\"")).unwrap();
+    run(home.path(), "out", &[]);
+    assert_eq!(report(&out)["title"], "Second");
+    assert_eq!(entries(&out), ["notes.txt", "report.html", "report.json", "zigzag"]);
+    assert_eq!(entries(&out.join("zigzag")), TOOLPATH_FILES);
+    assert_eq!(entries(home.path()), ["out", "plate.toml"], "no scratch is left");
+}
+
+#[test]
+fn results_that_cannot_be_written_are_told_and_the_scene_stays() {
+    let home = home_with(PLATE);
+    for (out, word) in [("plate.toml", "it is a file"), ("plate.toml/out", "plate.toml")] {
+        let answer = millstream(home.path(), &["run", "plate.toml", "--out", out]);
+        assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{answer:?}");
+        assert!(answer.stderr.contains(word) && answer.stderr.contains("--out"), "{}", answer.stderr);
+        assert!(!answer.stderr.contains("panicked"));
+        assert_eq!(entries(home.path()), ["plate.toml"]);
+    }
+    assert_eq!(std::fs::read_to_string(home.path().join("plate.toml")).unwrap(), PLATE);
+}
+
+/// Ctrl-C at moments all over a run that would take a minute: status 2, within seconds, and no file.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_leaves_nothing() {
+    use crate::command::{Answer, command};
+    use std::time::{Duration, Instant};
+
+    /// Far beyond what stopping takes on a busy machine, and far below the whole run.
+    const PATIENCE: Duration = Duration::from_secs(10);
+
+    let scene = WAVE.replace("x = [-2.5, 7.5]", "x = [0, 250]").replace("y = [0, 5]", "y = [0, 250]");
+    let home = home_with(&scene);
+    for delay_ms in [0, 200, 1000] {
+        let child = command(home.path(), &["run", "plate.toml", "--out", "out"]).spawn().unwrap();
+        // The scratch folder shows that scene and part were read and signals are listened to.
+        let begun = Instant::now();
+        while entries(home.path()).len() < 2 {
+            assert!(begun.elapsed() < PATIENCE, "the run does not begin");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        std::thread::sleep(Duration::from_millis(delay_ms));
+        let asked = Instant::now();
+        let kill = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+        assert!(kill.unwrap().success());
+        let answer = Answer::from(child.wait_with_output().unwrap());
+        assert!(asked.elapsed() < PATIENCE, "{:?} after {delay_ms} ms", asked.elapsed());
+        assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{answer:?}");
+        assert!(answer.stderr.contains("interrupted; nothing was written"), "{}", answer.stderr);
+        assert_eq!(entries(home.path()), ["plate.toml"]);
+    }
+}
