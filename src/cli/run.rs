@@ -17,9 +17,9 @@ use crate::monitor::{self, Monitor as _};
 use crate::parallel;
 use crate::part::Part;
 use crate::report::{
-    HIGHEST_RIDGE, Histogram, MAX_TRIANGLES, MapSize, MapWords, Picture, RunReport, SimulationFigures, SurfaceMeshFigures,
-    ToolpathPage, ToolpathResult, Verdict, deviation_picture, height_picture, html_page, result_table,
-    surface_mesh, violations,
+    HIGHEST_RIDGE, Histogram, MAX_TRIANGLES, MapSize, MapWords, Picture, RunReport, SimulationFigures,
+    SurfaceMeshFigures, ToolpathPage, ToolpathResult, Verdict, deviation_picture, height_picture, html_page,
+    marks, result_table, surface_mesh, violations,
 };
 use crate::sim::{Grid, GridError, ZMap, cut_reference};
 use crate::toolpath::{Plan, PlanSettings, plan};
@@ -267,8 +267,7 @@ impl<'a> Job<'a> {
                 exr::encode(cut, &measured.deviation_map).map_err(CliError::output(Path::new(&name)))?;
             outputs.file(&name, |out| out.write_all(&bytes))
         };
-        let (exr, pictures) =
-            parallel::join(exr, || self.write_pictures(request, cut, &measured.deviation_map, outputs));
+        let (exr, pictures) = parallel::join(exr, || self.write_pictures(request, cut, measured, outputs));
         exr?;
         let (deviation_png, height_png) = pictures?;
         let scallop = self.scene.tolerance.scallop;
@@ -281,10 +280,10 @@ impl<'a> Job<'a> {
         &self,
         request: &ToolpathRequest,
         cut: &ZMap,
-        deviation: &[f32],
+        measured: &Measurement,
         outputs: &Outputs,
     ) -> Result<(Vec<u8>, Vec<u8>), CliError> {
-        let (scene, grid) = (self.scene, &self.grid);
+        let (scene, grid, deviation) = (self.scene, &self.grid, &measured.deviation_map);
         let cell = format!("{} mm", grid.cell);
         let subtitle = format!("{} · cell {cell} · engine {}", scene.title, scene.simulation.engine.name());
         let notes = [("Title", scene.title.as_str()), ("Scene", &scene.source.name), ("Cell", &cell)];
@@ -297,14 +296,15 @@ impl<'a> Job<'a> {
         };
         let (deviations, heights) =
             (format!("Deviation, {}", request.name), format!("Height, {}", request.name));
-        let words = |title| MapWords { title, subtitle: &subtitle };
+        let marks = marks(measured, &scene.tolerance);
+        let words = |title, marks| MapWords { title, subtitle: &subtitle, marks };
         let (deviation, height) = parallel::join(
             || {
                 both("deviation.png", &|size| {
-                    deviation_picture(grid, deviation, &scene.tolerance, &words(&deviations), size)
+                    deviation_picture(grid, deviation, &scene.tolerance, &words(&deviations, &marks), size)
                 })
             },
-            || both("height.png", &|size| height_picture(grid, &cut.height, &words(&heights), size)),
+            || both("height.png", &|size| height_picture(grid, &cut.height, &words(&heights, &[]), size)),
         );
         Ok((deviation?, height?))
     }

@@ -8,8 +8,8 @@
 use std::io::{self, Cursor};
 
 use exr::prelude::{
-    AttributeValue, Blocks, Compression, Encoding, Image, Layer, LayerAttributes, LineOrder, SpecificChannels,
-    Text, Vec2, WritableImage,
+    AttributeValue, Blocks, Compression, Encoding, Image, Layer, LayerAttributes, LineOrder,
+    SpecificChannels, Text, Vec2, WritableImage,
 };
 
 use crate::sim::{Grid, ZMap};

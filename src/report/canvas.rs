@@ -93,6 +93,16 @@ impl Picture {
         self.fill(x + width, y - 1, 1, height + 2, colour);
     }
 
+    /// A ring of two pixels around `(x, y)`.
+    pub fn ring(&mut self, x: i64, y: i64, radius: i64, colour: Rgb) {
+        let (inner, outer) = ((radius - 1) * (radius - 1), (radius + 1) * (radius + 1));
+        for (dx, dy) in (-radius..=radius).flat_map(|dy| (-radius..=radius).map(move |dx| (dx, dy))) {
+            if (inner..outer).contains(&(dx * dx + dy * dy)) {
+                self.set(x + dx, y + dy, colour);
+            }
+        }
+    }
+
     /// Writes one line; `(x, y)` is its top at the end named by `align`. Letters that the built-in
     /// face lacks become `?`.
     pub fn text(&mut self, x: i64, y: i64, text: &str, size: TextSize, align: Align, colour: Rgb) {

@@ -6,6 +6,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::scale::{Unit, plain, round_up};
+use super::table::micrometres;
 
 /// Size of the drawing; the page shows it at half of that, since the backend rounds to whole units.
 const SIZE: (u32, u32) = (1440, 560);
@@ -118,10 +119,18 @@ impl Histogram {
             Some(sum.min(1.0))
         });
         let ends = (1..).map(|k| f64::from(k) * self.bin).zip(sums);
-        chart.draw_secondary_series(LineSeries::new([(0.0, 0.0)].into_iter().chain(ends), SUM.stroke_width(4)))?;
+        chart.draw_secondary_series(LineSeries::new(
+            [(0.0, 0.0)].into_iter().chain(ends),
+            SUM.stroke_width(4),
+        ))?;
         let marks = [
-            ("target", self.target, PASS, HPos::Right),
-            ("limit of the highest", self.limit, FAIL, HPos::Left),
+            (format!("target {} ", micrometres(Some(self.target))), self.target, PASS, HPos::Right),
+            (
+                format!(" limit of the highest {}", micrometres(Some(self.limit))),
+                self.limit,
+                FAIL,
+                HPos::Left,
+            ),
         ];
         for (words, at, colour, end) in marks {
             let line = [(at, 0.0), (at, tallest)];
