@@ -18,6 +18,12 @@ pub fn map<T: Send>(n: usize, f: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
     (0..n).into_par_iter().map(f).collect()
 }
 
+/// The results of two pieces of work of different kinds, done at the same time where a thread is
+/// free.
+pub fn join<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
+    rayon::join(a, b)
+}
+
 /// As [`map`], stopping at the first error found (which of several errors is returned is the one
 /// with the smallest index among those computed).
 ///

@@ -10,6 +10,9 @@ mod cli;
 mod command;
 #[path = "all/defects.rs"]
 mod defects;
+#[cfg(target_os = "linux")]
+#[path = "all/memory.rs"]
+mod memory;
 #[path = "all/scenes.rs"]
 mod scenes;
 #[path = "all/support.rs"]

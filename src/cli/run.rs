@@ -14,19 +14,22 @@ use crate::io::{ProgramHeader, apt_cl, exr, gcode, png, stl_write};
 use crate::machine::machining_time;
 use crate::metrology::{Measurement, measure, path_figures};
 use crate::monitor::{self, Monitor as _};
+use crate::parallel;
 use crate::part::Part;
 use crate::report::{
-    HIGHEST_RIDGE, Histogram, MAX_TRIANGLES, MapWords, RunReport, SimulationFigures, SurfaceMeshFigures,
-    ToolpathPage, ToolpathResult, Verdict, deviation_picture, height_picture, html_page, result_table,
-    surface_mesh, violations,
+    HIGHEST_RIDGE, Histogram, MAX_TRIANGLES, MapSize, MapWords, Picture, RunReport, SimulationFigures,
+    SurfaceMeshFigures, ToolpathPage, ToolpathResult, Verdict, deviation_picture, height_picture, html_page,
+    marks, result_table, surface_mesh, violations,
 };
 use crate::sim::{Grid, GridError, ZMap, cut_reference};
 use crate::toolpath::{Plan, PlanSettings, plan};
 
-/// Bytes a cell that one toolpath takes at its peak: stock and cut stock (8 each), heights and
-/// normals of the design surface and the deviation (up to 28), ridges (8). Too small a figure lets a
-/// run exhaust the machine that the scene's `memory_mib` promised to spare.
-const BYTES_PER_CELL: usize = 52;
+/// Bytes a cell that a run takes at its peak, which is while ridges are measured: stock (8), design
+/// surface (40), deviations (8), and up to 96 of ridges where every cell has one. The peak resident
+/// memory of whole runs was 150 with passes one cell apart, 100 with two, and 66 to 91 on the shipped
+/// scenes. Too small a figure lets a run exhaust the machine that the scene's `memory_mib` promised
+/// to spare; too great a one refuses grids that would fit. Part and path come on top, 12 to 36 MiB.
+const BYTES_PER_CELL: usize = 160;
 
 /// The machined part's triangles stay within this share of the scallop tolerance: ridges remain
 /// visible in them.
@@ -195,12 +198,14 @@ impl<'a> Job<'a> {
         monitor::check(monitor)?;
         monitor.start("writing results", 0);
         outputs.folder(&request.folder)?;
-        let lines = self.write_programs(request, &planned, outputs)?;
+        let programs = || self.write_programs(request, &planned, outputs);
+        let maps = || self.write_maps(request, &cut, &measured, outputs);
+        let mesh = || self.write_mesh(request, &cut, outputs);
+        let (surface_mesh, (page, lines)) = parallel::join(mesh, || parallel::join(maps, programs));
+        let (surface_mesh, page, lines) = (surface_mesh?, page?, lines?);
         for region in &mut measured.gouge.regions {
             region.line = lines.get(region.move_index as usize).copied().unwrap_or_default();
         }
-        let page = self.write_maps(request, &cut, &measured, outputs)?;
-        let surface_mesh = self.write_mesh(request, &cut, outputs)?;
         Ok((self.result(request, &planned, measured, simulation, surface_mesh), page))
     }
 
@@ -248,6 +253,7 @@ impl<'a> Job<'a> {
         outputs.file(&file("toolpath.nc"), |out| gcode::write(out, path, cutter, &header))
     }
 
+    /// Writes height.exr and the pictures; leaves what the page shows.
     fn write_maps(
         &self,
         request: &ToolpathRequest,
@@ -255,30 +261,52 @@ impl<'a> Job<'a> {
         measured: &Measurement,
         outputs: &Outputs,
     ) -> Result<ToolpathPage, CliError> {
-        let limits = &self.scene.tolerance;
-        let file = |name: &str| format!("{}/{name}", request.folder);
-        let cell = format!("{} mm", self.grid.cell);
-        let subtitle =
-            format!("{} · cell {cell} · engine {}", self.scene.title, self.scene.simulation.engine.name());
-        let notes =
-            [("Title", self.scene.title.as_str()), ("Scene", &self.scene.source.name), ("Cell", &cell)];
-        let picture = |name: &str, picture: crate::report::Picture| {
-            let bytes = png::encode(&picture, &notes).map_err(CliError::output(Path::new(name)))?;
-            outputs.file(&file(name), |out| out.write_all(&bytes))?;
-            Ok::<_, CliError>(bytes)
+        let exr = || {
+            let name = format!("{}/height.exr", request.folder);
+            let bytes =
+                exr::encode(cut, &measured.deviation_map).map_err(CliError::output(Path::new(&name)))?;
+            outputs.file(&name, |out| out.write_all(&bytes))
         };
-        let words = |title| MapWords { title, subtitle: &subtitle };
-        let title = format!("Deviation, {}", request.name);
-        let deviation = deviation_picture(&self.grid, &measured.deviation_map, limits, &words(&title));
-        let deviation_png = picture("deviation.png", deviation)?;
-        let title = format!("Height, {}", request.name);
-        let height_png = picture("height.png", height_picture(&self.grid, &cut.height, &words(&title)))?;
-        let name = file("height.exr");
-        let bytes = exr::encode(cut, &measured.deviation_map).map_err(CliError::output(Path::new(&name)))?;
-        outputs.file(&name, |out| out.write_all(&bytes))?;
-        let histogram =
-            Histogram::new(&measured.ridge_samples, limits.scallop, HIGHEST_RIDGE * limits.scallop);
+        let (exr, pictures) = parallel::join(exr, || self.write_pictures(request, cut, measured, outputs));
+        exr?;
+        let (deviation_png, height_png) = pictures?;
+        let scallop = self.scene.tolerance.scallop;
+        let histogram = Histogram::new(&measured.ridge_samples, scallop, HIGHEST_RIDGE * scallop);
         Ok(ToolpathPage { deviation_png, height_png, histogram })
+    }
+
+    /// Writes deviation.png and height.png; leaves the smaller ones for the page, in that order.
+    fn write_pictures(
+        &self,
+        request: &ToolpathRequest,
+        cut: &ZMap,
+        measured: &Measurement,
+        outputs: &Outputs,
+    ) -> Result<(Vec<u8>, Vec<u8>), CliError> {
+        let (scene, grid, deviation) = (self.scene, &self.grid, &measured.deviation_map);
+        let cell = format!("{} mm", grid.cell);
+        let subtitle = format!("{} · cell {cell} · engine {}", scene.title, scene.simulation.engine.name());
+        let notes = [("Title", scene.title.as_str()), ("Scene", &scene.source.name), ("Cell", &cell)];
+        let both = |name: &str, draw: &dyn Fn(MapSize) -> Picture| {
+            let name = format!("{}/{name}", request.folder);
+            let encode = |size| png::encode(&draw(size), &notes).map_err(CliError::output(Path::new(&name)));
+            let bytes = encode(MapSize::File)?;
+            outputs.file(&name, |out| out.write_all(&bytes))?;
+            encode(MapSize::Page)
+        };
+        let (deviations, heights) =
+            (format!("Deviation, {}", request.name), format!("Height, {}", request.name));
+        let marks = marks(measured, &scene.tolerance);
+        let words = |title, marks| MapWords { title, subtitle: &subtitle, marks };
+        let (deviation, height) = parallel::join(
+            || {
+                both("deviation.png", &|size| {
+                    deviation_picture(grid, deviation, &scene.tolerance, &words(&deviations, &marks), size)
+                })
+            },
+            || both("height.png", &|size| height_picture(grid, &cut.height, &words(&heights, &[]), size)),
+        );
+        Ok((deviation?, height?))
     }
 
     fn write_mesh(

@@ -8,11 +8,19 @@
 use std::io::{self, Cursor};
 
 use exr::prelude::{
-    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec,
-    Text, WritableImage,
+    AttributeValue, Blocks, Compression, Encoding, Image, Layer, LayerAttributes, LineOrder,
+    SpecificChannels, Text, Vec2, WritableImage,
 };
 
 use crate::sim::{Grid, ZMap};
+
+/// ZIP over 16 lines. On the maps of the shipped scenes ZIP by lines took two thirds of the time for
+/// files 7 to 31 % larger, PIZ as long for larger ones, and run lengths saved nothing.
+const ENCODING: Encoding = Encoding {
+    compression: Compression::ZIP16,
+    blocks: Blocks::ScanLines,
+    line_order: LineOrder::Increasing,
+};
 
 /// The bytes of an EXR file. `deviation` is over the grid of `cut`.
 ///
@@ -23,19 +31,16 @@ pub fn encode(cut: &ZMap, deviation: &[f32]) -> io::Result<Vec<u8>> {
     if [cut.height.len(), cut.cut_by.len(), deviation.len()] != [grid.len(); 3] {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "the maps differ in size"));
     }
-    let channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = [
-        AnyChannel::new("Z", FlatSamples::F32(top_down(grid, &cut.height))),
-        AnyChannel::new("deviation", FlatSamples::F32(top_down(grid, deviation))),
-        AnyChannel::new("move", FlatSamples::U32(top_down(grid, &cut.cut_by))),
-    ]
-    .into_iter()
-    .collect();
-    let layer = Layer::new(
-        (grid.nx, grid.ny),
-        LayerAttributes::default(),
-        Encoding::SMALL_LOSSLESS,
-        AnyChannels::sort(channels),
-    );
+    let pixel = |Vec2(column, row): Vec2<usize>| {
+        let cell = grid.index(column, grid.ny - 1 - row);
+        (cut.height[cell], deviation[cell], cut.cut_by[cell])
+    };
+    let channels = SpecificChannels::build()
+        .with_channel("Z")
+        .with_channel("deviation")
+        .with_channel("move")
+        .with_pixel_fn(pixel);
+    let layer = Layer::new((grid.nx, grid.ny), LayerAttributes::default(), ENCODING, channels);
     let mut image = Image::from_layer(layer);
     // A single attribute: the crate keeps them in a hash map, and with two the bytes would vary.
     image
@@ -43,7 +48,8 @@ pub fn encode(cut: &ZMap, deviation: &[f32]) -> io::Result<Vec<u8>> {
         .other
         .insert(Text::from("millstream"), AttributeValue::Text(Text::from(description(grid).as_str())));
     let mut bytes = Cursor::new(Vec::new());
-    image.write().to_buffered(&mut bytes).map_err(io::Error::other)?;
+    // On this thread: the crate's own threads would ignore how many the user allows.
+    image.write().non_parallel().to_buffered(&mut bytes).map_err(io::Error::other)?;
     Ok(bytes.into_inner())
 }
 
@@ -58,15 +64,11 @@ fn description(grid: &Grid) -> String {
     )
 }
 
-fn top_down<T: Copy>(grid: &Grid, values: &[T]) -> Vec<T> {
-    values.chunks_exact(grid.nx).rev().flatten().copied().collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geometry::Point2;
-    use exr::prelude::{ReadChannels, ReadLayers};
+    use exr::prelude::{FlatSamples, ReadChannels, ReadLayers};
 
     #[test]
     fn maps_come_back_bit_for_bit_with_cell_and_origin() {

@@ -6,7 +6,7 @@
 //! on it does not depend on the grid, except that a move which is lowest nowhere on a cell centre
 //! nor next to one that is would be missed.
 
-use crate::geometry::{Point3, Vector2, Vector3};
+use crate::geometry::{Point3, Vector3};
 use crate::sim::{Envelope, NOT_CUT, ZMap};
 use crate::toolpath::Toolpath;
 
@@ -124,14 +124,13 @@ impl<'a> CutSurface<'a> {
         self.envelope.height_and_normal(by, x, y).map_or(Vector3::z(), |(_, n)| n)
     }
 
-    /// The tip on move `by` where it passes nearest to `(x, y)` in the plan view.
-    pub fn nearest_tip(&self, by: u32, x: f64, y: f64) -> Point3 {
+    /// The place of the tip on move `by` that is nearest to `tip`.
+    pub fn nearest_tip(&self, by: u32, tip: &Point3) -> Point3 {
         let (from, to) = (self.path.start_of(by as usize), self.path.moves[by as usize].to.tip);
-        let along = (to - from).xy();
+        let along = to - from;
         let length2 = along.norm_squared();
-        let from_start = Vector2::new(x - from.x, y - from.y);
-        let t = if length2 > 0.0 { (from_start.dot(&along) / length2).clamp(0.0, 1.0) } else { 1.0 };
-        from + (to - from) * t
+        let t = if length2 > 0.0 { ((tip - from).dot(&along) / length2).clamp(0.0, 1.0) } else { 0.0 };
+        from + along * t
     }
 
     /// The pass that a cut point belongs to; `None` on stock.

@@ -27,7 +27,7 @@ use crate::sim::{Envelope, Grid, NOT_CUT, ZMap};
 use crate::toolpath::Toolpath;
 use cut_surface::CutSurface;
 use regions::connected;
-use ridges::{NUMERICAL_FLOOR, RidgeFinder, RidgeSample, contact_against, scallop_figures};
+use ridges::{NUMERICAL_FLOOR, RidgeFinder, RidgeSample, scallop_figures};
 
 /// Regions listed one by one in the figures; the rest is counted.
 const LISTED_REGIONS: usize = 20;
@@ -217,9 +217,10 @@ impl Inspection<'_> {
         let (design, centre) =
             (&self.design.samples[k], self.grid.centre(k % self.grid.nx, k / self.grid.nx));
         by != NOT_CUT && {
-            let tip = self.surface.nearest_tip(by, centre.x, centre.y);
-            let contact = contact_against(self.cutter, &tip, &design.normal);
-            self.part.closest_point(&contact).1 <= self.limits.uncut
+            let contact = Point3::new(centre.x, centre.y, design.z);
+            let from_contact = self.cutter.contact_to_tip(&design.normal);
+            let tip = self.surface.nearest_tip(by, &(contact + from_contact));
+            self.part.closest_point(&(tip - from_contact)).1 <= self.limits.uncut
         }
     }
 

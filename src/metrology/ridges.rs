@@ -14,11 +14,11 @@
 use super::cut_surface::CutSurface;
 use super::figures::{Limits, ScallopFigures};
 use crate::cutter::Cutter;
-use crate::geometry::{Point2, Point3, Vector2, Vector3};
+use crate::geometry::{Point2, Point3, Vector2};
 use crate::monitor::{self, Cancelled, Monitor};
 use crate::part::{Part, SurfacePoint};
 use crate::sim::Grid;
-use crate::toolpath::{Toolpath, axis_offset};
+use crate::toolpath::Toolpath;
 
 /// One crossing of a ridge with a grid line.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -321,19 +321,14 @@ impl RidgeFinder<'_> {
     /// sides: one of them touches it, and not much farther away than the passes lie apart. Else it
     /// stands in a hollow that the cutter does not fit, and is material that no pass reached.
     fn is_scallop(&self, moves: [u32; 2], foot: &SurfacePoint) -> bool {
-        let tips = moves.map(|by| self.surface.nearest_tip(by, foot.point.x, foot.point.y));
+        let from_contact = self.cutter.contact_to_tip(&foot.normal);
+        let tips = moves.map(|by| self.surface.nearest_tip(by, &(foot.point + from_contact)));
         let far = FARTHEST_CONTACT * (tips[0] - tips[1]).norm();
         tips.iter().any(|tip| {
-            let contact = contact_against(self.cutter, tip, &foot.normal);
+            let contact = tip - from_contact;
             (contact - foot.point).norm() <= far && self.part.closest_point(&contact).1 <= self.limits.uncut
         })
     }
-}
-
-/// Where the cutter with its tip at `tip` touches, or would touch, a surface of outward normal `n`.
-pub(super) fn contact_against(cutter: &Cutter, tip: &Point3, n: &Vector3) -> Point3 {
-    let offset = axis_offset(cutter, n);
-    Point3::new(tip.x - offset.x, tip.y - offset.y, tip.z + cutter.corner_radius() * (1.0 - n.z))
 }
 
 /// Figures of all ridge samples.

@@ -1,5 +1,6 @@
 //! A raster to draw rectangles, lines and text on. Row 0 is the top; colours are 8-bit sRGB.
 
+use image::RgbImage;
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
 /// A colour, red green blue.
@@ -12,15 +13,11 @@ pub const FAINT_INK: Rgb = [96, 102, 110];
 /// Paper.
 pub const PAPER: Rgb = [255, 255, 255];
 
-/// A finished raster.
+/// A raster under way or finished.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Picture {
-    /// Pixels along x.
-    pub width: usize,
-    /// Pixels along y.
-    pub height: usize,
-    /// Red, green and blue of each pixel, row by row from the top.
-    pub rgb: Vec<u8>,
+    /// Its pixels.
+    pub pixels: RgbImage,
 }
 
 /// Size of letters.
@@ -64,23 +61,21 @@ pub enum Align {
 }
 
 impl Picture {
-    /// A white page.
+    /// A white page of this size, pixels.
     pub fn blank(width: usize, height: usize) -> Self {
-        Self { width, height, rgb: PAPER.repeat(width * height) }
+        Self { pixels: RgbImage::from_pixel(width as u32, height as u32, image::Rgb(PAPER)) }
+    }
+
+    /// The pixel at `(x, y)`; `None` outside of the page.
+    fn at(&mut self, x: i64, y: i64) -> Option<&mut image::Rgb<u8>> {
+        self.pixels.get_pixel_mut_checked(u32::try_from(x).ok()?, u32::try_from(y).ok()?)
     }
 
     /// Colours one pixel; outside of the page nothing happens.
     pub fn set(&mut self, x: i64, y: i64, colour: Rgb) {
-        if (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y) {
-            let at = 3 * (y as usize * self.width + x as usize);
-            self.rgb[at..at + 3].copy_from_slice(&colour);
+        if let Some(pixel) = self.at(x, y) {
+            pixel.0 = colour;
         }
-    }
-
-    /// Colour of one pixel, which must be on the page.
-    pub fn get(&self, x: usize, y: usize) -> Rgb {
-        let at = 3 * (y * self.width + x);
-        [self.rgb[at], self.rgb[at + 1], self.rgb[at + 2]]
     }
 
     /// Fills `width` × `height` pixels from `(x, y)` right and down.
@@ -96,6 +91,16 @@ impl Picture {
         self.fill(x - 1, y + height, width + 2, 1, colour);
         self.fill(x - 1, y - 1, 1, height + 2, colour);
         self.fill(x + width, y - 1, 1, height + 2, colour);
+    }
+
+    /// A ring of two pixels around `(x, y)`.
+    pub fn ring(&mut self, x: i64, y: i64, radius: i64, colour: Rgb) {
+        let (inner, outer) = ((radius - 1) * (radius - 1), (radius + 1) * (radius + 1));
+        for (dx, dy) in (-radius..=radius).flat_map(|dy| (-radius..=radius).map(move |dx| (dx, dy))) {
+            if (inner..outer).contains(&(dx * dx + dy * dy)) {
+                self.set(x + dx, y + dy, colour);
+            }
+        }
     }
 
     /// Writes one line; `(x, y)` is its top at the end named by `align`. Letters that the built-in
@@ -120,14 +125,13 @@ impl Picture {
     }
 
     fn blend(&mut self, x: i64, y: i64, colour: Rgb, coverage: u8) {
-        if coverage == 0 || !(0..self.width as i64).contains(&x) || !(0..self.height as i64).contains(&y) {
-            return;
+        /// Steps from paper to ink. Fewer make letters rough; more take room in a file's palette.
+        const STEPS: u32 = 15;
+        let share = (u32::from(coverage) * STEPS + 127) / 255 * 255 / STEPS;
+        let Some(pixel) = self.at(x, y).filter(|_| share > 0) else { return };
+        for (under, ink) in pixel.0.iter_mut().zip(colour) {
+            *under = ((u32::from(ink) * share + u32::from(*under) * (255 - share)) / 255) as u8;
         }
-        let under = self.get(x as usize, y as usize);
-        let share = u32::from(coverage);
-        let mixed =
-            |k: usize| ((u32::from(colour[k]) * share + u32::from(under[k]) * (255 - share)) / 255) as u8;
-        self.set(x, y, [mixed(0), mixed(1), mixed(2)]);
     }
 }
 

@@ -1,8 +1,28 @@
 //! Distribution of scallop heights over ridge length, and its plot as SVG.
 
-use maud::{Markup, html};
+use plotters::coord::Shift;
+use plotters::drawing::DrawingAreaErrorKind;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::scale::{Unit, round_up, ticks};
+use super::scale::{Unit, plain, round_up};
+use super::table::micrometres;
+
+/// Size of the drawing; the page shows it at half of that, since the backend rounds to whole units.
+const SIZE: (u32, u32) = (1440, 560);
+/// Marks along the axis, at most. More run into each other.
+const TICKS: f64 = 10.0;
+
+const INK: RGBColor = RGBColor(0x20, 0x24, 0x2a);
+const FAINT: RGBColor = RGBColor(0x60, 0x66, 0x6e);
+const GRID: RGBColor = RGBColor(0xd5, 0xd9, 0xde);
+const BAR: RGBColor = RGBColor(0x8f, 0xb3, 0xd9);
+const SUM: RGBColor = RGBColor(0x1f, 0x4e, 0x79);
+const PASS: RGBColor = RGBColor(0x1b, 0x7f, 0x4b);
+const FAIL: RGBColor = RGBColor(0xb3, 0x26, 0x1e);
+
+type Page<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type Drawn<'a> = Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>;
 
 /// Bins of the plot. More shows noise of the samples; fewer hides two kinds of ridges.
 const BINS: usize = 48;
@@ -44,61 +64,88 @@ impl Histogram {
         Some(Self { bin, shares, target, limit })
     }
 
-    /// Bars of the shares, their running sum, and lines at target and limit.
-    pub fn svg(&self) -> Markup {
-        const WIDTH: f64 = 660.0;
-        const HEIGHT: f64 = 260.0;
-        const LEFT: f64 = 52.0;
-        const RIGHT: f64 = 52.0;
-        const TOP: f64 = 26.0;
-        const BOTTOM: f64 = 46.0;
-        let (plot_width, plot_height) = (WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM);
-        let end = self.bin * self.shares.len() as f64;
-        let x = |mm: f64| LEFT + mm / end * plot_width;
-        let tallest = round_up(self.shares.iter().copied().fold(0.0, f64::max) * 100.0) / 100.0;
-        let y = |share: f64, full: f64| TOP + (1.0 - share / full) * plot_height;
-        let unit = Unit::for_range(end);
-        let marks = ticks(0.0, end, 9.0);
-        let step = marks.get(1).copied().unwrap_or(end);
-        let mut sum = 0.0;
-        let mut line = format!("M{:.2} {:.2}", x(0.0), y(0.0, 1.0));
-        for (k, share) in self.shares.iter().enumerate() {
-            sum += share;
-            line += &format!(" L{:.2} {:.2}", x((k + 1) as f64 * self.bin), y(sum.min(1.0), 1.0));
-        }
-        html! {
-            svg viewBox=(format!("0 0 {WIDTH} {HEIGHT}")) width=(WIDTH) height=(HEIGHT) role="img"
-                aria-label="Distribution of scallop heights" {
-                @for part in [0.0, 0.25, 0.5, 0.75, 1.0] {
-                    line x1=(LEFT) x2=(WIDTH - RIGHT) y1=(y(part, 1.0)) y2=(y(part, 1.0)) class="grid" {}
-                    text x=(WIDTH - RIGHT + 6.0) y=(y(part, 1.0) + 4.0) { (format!("{:.0} %", part * 100.0)) }
-                    text x=(LEFT - 6.0) y=(y(part, 1.0) + 4.0) text-anchor="end" { (format!("{:.3}", part * tallest * 100.0).trim_end_matches('0').trim_end_matches('.')) " %" }
-                }
-                @for (k, share) in self.shares.iter().enumerate() {
-                    @if *share > 0.0 {
-                        rect x=(format!("{:.2}", x(k as f64 * self.bin) + 0.5)) width=(format!("{:.2}", plot_width / self.shares.len() as f64 - 1.0))
-                            y=(format!("{:.2}", y(*share, tallest))) height=(format!("{:.2}", share / tallest * plot_height)) class="bar" {}
-                    }
-                }
-                path d=(line) class="sum" {}
-                @for mark in &marks {
-                    line x1=(x(*mark)) x2=(x(*mark)) y1=(TOP + plot_height) y2=(TOP + plot_height + 5.0) class="axis" {}
-                    text x=(x(*mark)) y=(TOP + plot_height + 18.0) text-anchor="middle" { (unit.text(*mark, step)) }
-                }
-                line x1=(LEFT) x2=(WIDTH - RIGHT) y1=(TOP + plot_height) y2=(TOP + plot_height) class="axis" {}
-                (self.mark(x(self.target), "target", "target", TOP, plot_height, "end"))
-                (self.mark(x(self.limit), "limit", "limit of the highest", TOP, plot_height, "start"))
-                text x=(LEFT + 0.5 * plot_width) y=(HEIGHT - 8.0) text-anchor="middle" { "scallop height, " (unit.name) }
-            }
-        }
+    /// Bars of the shares, their running sum, and lines at target and limit, as an SVG element.
+    pub fn svg(&self) -> String {
+        let mut svg = String::new();
+        self.draw(&SVGBackend::with_string(&mut svg, SIZE).into_drawing_area())
+            .expect("drawing into a string cannot fail");
+        // Within a page the namespace is known, and its address would be the only one in it.
+        svg.replacen(" xmlns=\"http://www.w3.org/2000/svg\"", " role=\"img\"", 1)
     }
 
-    fn mark(&self, x: f64, class: &str, words: &str, top: f64, height: f64, anchor: &str) -> Markup {
-        html! {
-            line x1=(x) x2=(x) y1=(top - 6.0) y2=(top + height) class=(class) {}
-            text x=(x) y=(top - 10.0) text-anchor=(anchor) class=(class) { (words) }
+    fn draw(&self, page: &Page<'_>) -> Drawn<'_> {
+        let end = self.bin * self.shares.len() as f64;
+        let tallest = round_up(self.shares.iter().copied().fold(0.0, f64::max));
+        let mut chart = ChartBuilder::on(page)
+            .margin_top(44)
+            .margin_right(10)
+            .x_label_area_size(76)
+            .y_label_area_size(110)
+            .right_y_label_area_size(110)
+            .build_cartesian_2d(0.0..end, 0.0..tallest)?
+            .set_secondary_coord(0.0..end, 0.0..1.0);
+        let unit = Unit::for_range(end);
+        let step = round_up(end / TICKS);
+        let shares = |full: f64| move |share: &f64| format!("{} %", plain(100.0 * share, 5.0 * full));
+        chart
+            .configure_mesh()
+            .disable_x_mesh()
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(GRID)
+            .axis_style(FAINT)
+            .label_style(letters())
+            .x_labels(TICKS as usize)
+            .x_label_formatter(&|mm| unit.text(*mm, step))
+            .y_label_formatter(&shares(tallest))
+            .x_desc(format!("scallop height, {}", unit.name))
+            .y_desc("share of the ridges")
+            .draw()?;
+        chart
+            .configure_secondary_axes()
+            .axis_style(FAINT)
+            .label_style(letters())
+            .y_label_formatter(&shares(1.0))
+            .y_desc("lower than this")
+            .draw()?;
+        let bars = (0..self.shares.len()).filter(|k| self.shares[*k] > 0.0);
+        chart.draw_series(bars.map(|k| {
+            let (from, to) = (k as f64 * self.bin, (k + 1) as f64 * self.bin);
+            let mut bar = Rectangle::new([(from, 0.0), (to, self.shares[k])], BAR.filled());
+            bar.set_margin(0, 0, 1, 1);
+            bar
+        }))?;
+        let sums = self.shares.iter().scan(0.0, |sum, share| {
+            *sum += share;
+            Some(sum.min(1.0))
+        });
+        let ends = (1..).map(|k| f64::from(k) * self.bin).zip(sums);
+        chart.draw_secondary_series(LineSeries::new(
+            [(0.0, 0.0)].into_iter().chain(ends),
+            SUM.stroke_width(4),
+        ))?;
+        let marks = [
+            (format!("target {} ", micrometres(Some(self.target))), self.target, PASS, HPos::Right),
+            (
+                format!(" limit of the highest {}", micrometres(Some(self.limit))),
+                self.limit,
+                FAIL,
+                HPos::Left,
+            ),
+        ];
+        for (words, at, colour, end) in marks {
+            let line = [(at, 0.0), (at, tallest)];
+            chart.draw_series(DashedLineSeries::new(line, 10, 6, colour.stroke_width(3)))?;
+            let (x, y) = chart.backend_coord(&(at, tallest));
+            let style = letters().color(&colour).pos(Pos::new(end, VPos::Bottom));
+            page.draw(&Text::new(words, (x, y - 6), style))?;
         }
+        page.present()
     }
+}
+
+/// Letters as high as the page's small ones; the page names the face.
+fn letters() -> TextStyle<'static> {
+    ("sans-serif", 22).into_font().color(&INK)
 }
 
 #[cfg(test)]
@@ -113,7 +160,7 @@ mod tests {
         assert_eq!(histogram.shares[BINS - 1], 0.2, "what is far higher stands in the last bin");
         let at = (0.004f32 as f64 / histogram.bin) as usize;
         assert!((histogram.shares[at] - 0.6).abs() < 1e-12);
-        assert!(histogram.svg().into_string().contains("scallop height, µm"));
+        assert!(histogram.svg().contains("scallop height, µm"));
         assert_eq!(Histogram::new(&[], 0.01, 0.0125), None);
     }
 }

@@ -28,10 +28,12 @@ pub fn html_page(report: &RunReport, pages: &[ToolpathPage], scene: &str) -> Str
         header {
             h1 { (report.title) }
             p.verdict.(report.verdict.word()) { (verdict_word(report.verdict)) span { (conclusion(report)) } }
+            (findings(report))
             p.faint { "scene " (report.scene) " · millstream " (report.millstream) }
         }
         section { h2 { "Comparison" } (comparison(report)) (tolerances(report)) }
         @for (toolpath, page) in report.toolpaths.iter().zip(pages) { (toolpath_section(toolpath, page)) }
+        section id="figures" { h2 { "What the figures mean" } (meanings()) }
         section {
             h2 { "Scene" }
             p.faint { "SHA-256 " code { (report.scene_sha256) } }
@@ -57,6 +59,19 @@ fn verdict_word(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Pass => "PASS",
         Verdict::Fail => "FAIL",
+    }
+}
+
+/// What is wrong, of all toolpaths.
+fn findings(report: &RunReport) -> Markup {
+    html! {
+        @if report.verdict == Verdict::Fail {
+            ul.violations {
+                @for t in &report.toolpaths {
+                    @for violation in &t.violations { li { a href=(format!("#{}", t.folder)) { (t.name) } ": " (violation.text) } }
+                }
+            }
+        }
     }
 }
 
@@ -101,19 +116,60 @@ fn tolerances(report: &RunReport) -> Markup {
     let t = &report.tolerance;
     html! {
         p.faint {
-            "Limits: scallop " (micrometres(Some(t.scallop_mm))) " µm for 95 % of the ridge length and "
-            (micrometres(Some(t.scallop_highest_mm))) " µm for the highest ridge; gouge " (micrometres(Some(t.gouge_mm)))
-            " µm; uncut " (micrometres(Some(t.uncut_mm))) " µm. A limit is violated when the measured figure exceeds it; "
-            "± is the bound of the figure's error."
+            "Limits: 95 % of the ridge length stay below " (micrometres(Some(t.scallop_mm)))
+            " µm, the highest ridge below " (micrometres(Some(t.scallop_highest_mm))) " µm; gouges stay within "
+            (micrometres(Some(t.gouge_mm))) " µm, material left standing within " (micrometres(Some(t.uncut_mm)))
+            " µm. The path's chords keep " (micrometres(Some(t.chord_mm))) " µm. " a href="#figures" { "What the figures and each ± mean" } "."
         }
     }
+}
+
+/// What each figure is and what the ± behind it bounds. The same for every run: whoever reads the
+/// page may never have seen the program.
+fn meanings() -> Markup {
+    let rows = [
+        (
+            "±",
+            "Bound of the figure's own error: the true value differs by no more. A limit counts as violated \
+             when the figure itself exceeds it; where figure and ± together reach the limit, a smaller cell \
+             tells for sure.",
+        ),
+        (
+            "scallop",
+            "Height of the ridges between neighbouring passes, along the normal of the design surface, \
+             found where the cuts of both passes meet. p95 and p50: 95 % and half of the ridge length are \
+             lower. Over target: share of the ridge length above the target. Its ± is how much higher a ridge \
+             may rise between two grid lines.",
+        ),
+        (
+            "gouge",
+            "How deep the cut goes below the design. Its ± is how much deeper it may go between two \
+             measured places.",
+        ),
+        (
+            "uncut",
+            "Material above its limit that is no ridge between passes: places that the cutter does not fit \
+             into or that no pass reached. Its ± is how much higher it may stand between two measured places.",
+        ),
+        (
+            "deviation",
+            "Distance from the design to the cut surface at every cell, excess positive. Ridges mostly peak \
+             between cells, so the greatest deviation is a little below the highest scallop.",
+        ),
+        (
+            "time",
+            "All moves at their feeds, as far as the machine's acceleration and cornering allow. Jerk and the \
+             control's own limits are not in it: machines take somewhat longer.",
+        ),
+    ];
+    html! { dl.words { @for (word, meaning) in rows { dt { (word) } dd { (meaning) } } } }
 }
 
 fn toolpath_section(t: &ToolpathResult, page: &ToolpathPage) -> Markup {
     html! {
         section.toolpath id=(t.folder) {
             h2 { (t.name) " " (badge(t.verdict)) }
-            p.faint { (t.strategy) }
+            p.faint { "strategy " (t.strategy) " · files in " code { (t.folder) "/" } }
             @if !t.violations.is_empty() {
                 ul.violations { @for violation in &t.violations { li { (violation.text) } } }
             }
@@ -124,12 +180,13 @@ fn toolpath_section(t: &ToolpathResult, page: &ToolpathPage) -> Markup {
             (figures(t))
             figure {
                 img src=(data_url(&page.deviation_png)) alt=(format!("Deviation of {}", t.name));
-                figcaption { "Deviation of the cut surface along the design normal. Red stands above the design, blue below, grey is off the part." }
+                figcaption { "Deviation of the cut surface along the design normal. Red stands above the design, blue below; each side of the key has its own scale and ends at its limit, rounded up. Grey is off the part. Where several cells share a pixel, the worst of them shows. " (ringed(t)) }
             }
+            (regions(t))
             figure {
                 @if let Some(histogram) = &page.histogram {
-                    (histogram.svg())
-                    figcaption { "Scallop heights by ridge length: share of each height (bars, left) and share that is lower (line, right). The last bar holds all that is higher." }
+                    (PreEscaped(histogram.svg()))
+                    figcaption { "Scallop heights: share of the ridge length in each bar (left axis), and share that is lower (line, right axis). The last bar holds all that is higher." }
                 } @else {
                     figcaption { "No scallop heights: " (t.scallop.reason.as_deref().unwrap_or("no ridge was found")) }
                 }
@@ -138,9 +195,17 @@ fn toolpath_section(t: &ToolpathResult, page: &ToolpathPage) -> Markup {
                 img src=(data_url(&page.height_png)) alt=(format!("Height of {}", t.name));
                 figcaption { "Height of the cut stock." }
             }
-            (regions(t))
             (method(t))
         }
+    }
+}
+
+/// Explains the rings on the map, if there are any.
+fn ringed(t: &ToolpathResult) -> &'static str {
+    if t.violations.is_empty() {
+        ""
+    } else {
+        "Rings mark the worst places: G gouges and U uncut material as numbered below, S the highest scallop if it is too high."
     }
 }
 
@@ -179,9 +244,9 @@ fn regions(t: &ToolpathResult) -> Markup {
             h3 { "Gouges" }
             p.faint { (shown(t.gouge.regions.len(), t.gouge.region_count)) }
             table.figures {
-                thead { tr { th { "depth µm" } th { "area mm²" } th { "at mm" } th { "move" } th { "line of toolpath.nc" } } }
-                tbody { @for r in &t.gouge.regions {
-                    tr { td { (micrometres(Some(r.depth_mm))) } td { (format!("{:.4}", r.area_mm2)) } td { (place(r.at_mm)) } td { (r.move_index) } td { (r.line) } }
+                thead { tr { th { "ring" } th { "depth µm" } th { "area mm²" } th { "at mm" } th { "move" } th { "line of toolpath.nc" } } }
+                tbody { @for (k, r) in (1..).zip(&t.gouge.regions) {
+                    tr { th { "G" (k) } td { (micrometres(Some(r.depth_mm))) } td { (format!("{:.4}", r.area_mm2)) } td { (place(r.at_mm)) } td { (r.move_index) } td { (r.line) } }
                 } }
             }
         }
@@ -189,9 +254,9 @@ fn regions(t: &ToolpathResult) -> Markup {
             h3 { "Uncut material" }
             p.faint { (shown(t.uncut.regions.len(), t.uncut.region_count)) }
             table.figures {
-                thead { tr { th { "height µm" } th { "area mm²" } th { "volume mm³" } th { "at mm" } } }
-                tbody { @for r in &t.uncut.regions {
-                    tr { td { (micrometres(Some(r.height_mm))) } td { (format!("{:.4}", r.area_mm2)) } td { (format!("{:.4}", r.volume_mm3)) } td { (place(r.at_mm)) } }
+                thead { tr { th { "ring" } th { "height µm" } th { "area mm²" } th { "volume mm³" } th { "at mm" } } }
+                tbody { @for (k, r) in (1..).zip(&t.uncut.regions) {
+                    tr { th { "U" (k) } td { (micrometres(Some(r.height_mm))) } td { (format!("{:.4}", r.area_mm2)) } td { (format!("{:.4}", r.volume_mm3)) } td { (place(r.at_mm)) } }
                 } }
             }
         }
@@ -211,17 +276,19 @@ fn method(t: &ToolpathResult) -> Markup {
     html! {
         h3 { "How it was measured" }
         p {
-            "The stock was cut by the engine called " em { (s.engine) } " on " (s.cells) " cells of " (s.cell_mm) " mm by "
-            (s.moves) " moves, then compared with the design part at " (t.deviation.samples) " places over "
+            "The stock was cut by " (s.moves) " moves on " (s.cells) " cells of " (s.cell_mm) " mm (engine " em { (s.engine) }
+            "), then compared with the design part at " (t.deviation.samples) " places over "
             (format!("{:.1}", t.deviation.area_mm2)) " mm². The planner's own predictions were not used. "
-            @if let Some(error) = t.scallop.error_bound_mm { "The true highest scallop lies within " (bound(error)) " µm of the figure; " }
-            "the true deepest gouge within " (bound(t.gouge.error_bound_mm)) " µm, the true uncut height within "
-            (bound(t.uncut.error_bound_mm)) " µm. machined.stl has " (t.surface_mesh.triangles)
-            " triangles, whose top stays within " (micrometres(Some(t.surface_mesh.tolerance_mm))) " µm of the cells. Cutting and measuring took "
-            (format!("{:.2}", s.wall_s)) " s on " (s.threads) @if s.threads == 1 { " thread." } @else { " threads." }
+            @if let Some(error) = t.scallop.error_bound_mm { "The true highest scallop lies within " (bound(error)) " µm of the figure, " }
+            "the true deepest gouge within " (bound(t.gouge.error_bound_mm)) " µm, the true height of uncut material within "
+            (bound(t.uncut.error_bound_mm)) " µm. Cutting and measuring took " (format!("{:.2}", s.wall_s)) " s on " (s.threads)
+            @if s.threads == 1 { " thread." } @else { " threads." }
         }
         p.faint {
-            "Files: " (t.folder) "/toolpath.nc, toolpath.cls, machined.stl, height.exr (height, deviation and move of every cell)."
+            "Files: toolpath.nc (the program), toolpath.cls (cutter locations), height.exr (height, deviation and move of every cell), machined.stl ("
+            (t.surface_mesh.triangles) " triangles within " (bound(t.surface_mesh.tolerance_mm)) " µm of the cells"
+            @if t.surface_mesh.tolerance_mm > t.scallop.target_mm { ": too coarse for ridges of the target's height; height.exr has them" }
+            "), deviation.png and height.png (larger than here)."
         }
     }
 }
@@ -244,7 +311,8 @@ mod tests {
         assert!(html.contains("&lt;script&gt;") && !html.contains("<script"));
         assert!(!html.contains("http://") && !html.contains("https://"), "nothing is fetched");
         assert_eq!(html.matches("data:image/png;base64,AQID").count(), 4);
-        assert!(html.contains("toolpath.nc line 1240"));
+        assert_eq!(html.matches("toolpath.nc line 1240").count(), 2, "in the head and in its toolpath");
+        assert!(html.contains("Rings mark") && html.contains("<th>G1</th>") && !html.contains("<th>G2</th>"));
         assert!(html.contains("1 of 2 toolpaths hold every tolerance"));
     }
 }

@@ -1,14 +1,16 @@
 //! Pictures of maps over a grid: title, map with axes, scale bar, colour key. y points up.
 
-use super::canvas::{Align, FAINT_INK, INK, Picture, Rgb, TextSize, shortened};
+use image::RgbImage;
+use image::imageops::{self, FilterType};
+
+use super::canvas::{Align, FAINT_INK, INK, PAPER, Picture, Rgb, TextSize, shortened};
 use super::scale::{Unit, plain, round_down, round_up, ticks};
 use crate::metrology::Limits;
 use crate::sim::Grid;
 
-/// Widest and highest map, pixels. More makes files that no screen shows at once.
-const MAX_PIXELS: usize = 1600;
-/// Small grids are magnified by whole numbers up to about this size, pixels.
-const COMFORTABLE_PIXELS: usize = 900;
+/// Colours of a key, an odd number so that its middle is one of them. Fewer show as bands; many more,
+/// and the picture with its letters no longer fits into a palette of 256, which doubles its bytes.
+const SHADES: usize = 151;
 /// Greatest magnification of one cell, pixels.
 const MAX_MAGNIFICATION: usize = 24;
 /// Colour of cells off the part; far from white, which is "no deviation".
@@ -23,6 +25,34 @@ const BOTTOM: usize = 96;
 const MIN_WIDTH: usize = 480;
 const MIN_HEIGHT: usize = 260;
 
+/// What a picture is drawn for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MapSize {
+    /// A file of its own: as much as a screen shows.
+    File,
+    /// A page: fits into its column without being scaled, so that letters stay sharp, and keeps the
+    /// page small enough to be mailed.
+    Page,
+}
+
+impl MapSize {
+    /// Widest and highest map, pixels. More makes pictures that do not fit where they are shown.
+    fn most(self) -> usize {
+        match self {
+            Self::File => 1600,
+            Self::Page => 740,
+        }
+    }
+
+    /// Small grids are magnified by whole numbers up to about this size, pixels.
+    fn comfortable(self) -> usize {
+        match self {
+            Self::File => 900,
+            Self::Page => 640,
+        }
+    }
+}
+
 /// Words around a map.
 #[derive(Debug, Clone, Copy)]
 pub struct MapWords<'a> {
@@ -30,13 +60,25 @@ pub struct MapWords<'a> {
     pub title: &'a str,
     /// Second line: scene, cell, engine.
     pub subtitle: &'a str,
+    /// Places to be ringed.
+    pub marks: &'a [MapMark],
+}
+
+/// A place on a map, ringed and named.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MapMark {
+    /// Where, mm.
+    pub at: [f64; 2],
+    /// A few letters.
+    pub name: String,
 }
 
 /// How several cells become one pixel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum Pooling {
-    /// The value farthest from zero: no gouge or spike is lost.
-    Extreme,
+    /// The value that exceeds its end of the key the most (both ends are positive lengths, mm): no
+    /// gouge is lost beside a scallop, and no spike beside a gouge.
+    Extreme { below: f64, above: f64 },
     /// The mean.
     Mean,
 }
@@ -51,10 +93,10 @@ struct Pooled {
     pixel: f64,
 }
 
-fn pool(grid: &Grid, values: &[f32], pooling: Pooling) -> Pooled {
+fn pool(grid: &Grid, values: &[f32], pooling: Pooling, size: MapSize) -> Pooled {
     let longest = grid.nx.max(grid.ny).max(1);
-    let block = longest.div_ceil(MAX_PIXELS);
-    let magnify = (COMFORTABLE_PIXELS / longest).clamp(1, MAX_MAGNIFICATION);
+    let block = longest.div_ceil(size.most());
+    let magnify = (size.comfortable() / longest).clamp(1, MAX_MAGNIFICATION);
     let (width, height) = (grid.nx.div_ceil(block), grid.ny.div_ceil(block));
     let one = |pixel: usize| {
         // Row 0 of the picture holds the highest y.
@@ -72,7 +114,10 @@ fn pool(grid: &Grid, values: &[f32], pooling: Pooling) -> Pooled {
 /// NaN of no values.
 fn pooled(values: impl Iterator<Item = f32>, pooling: Pooling) -> f32 {
     match pooling {
-        Pooling::Extreme => values.fold(f32::NAN, |a, b| if a.abs() >= b.abs() { a } else { b }),
+        Pooling::Extreme { below, above } => {
+            let rank = |v: f32| f64::from(v) / if v < 0.0 { -below } else { above };
+            values.fold(f32::NAN, |a, b| if rank(a) >= rank(b) { a } else { b })
+        }
         Pooling::Mean => {
             let (sum, count) = values.fold((0f64, 0u32), |(s, n), v| (s + f64::from(v), n + 1));
             (sum / f64::from(count)) as f32
@@ -83,8 +128,13 @@ fn pooled(values: impl Iterator<Item = f32>, pooling: Pooling) -> f32 {
 /// Values to colours, and what the key says.
 struct Key {
     from: f64,
+    /// Stands in the middle of the key; both halves have their own scale.
+    middle: f64,
     to: f64,
     gradient: fn(f64) -> Rgb,
+    /// Round values beside the key, with their words.
+    ticks: Vec<(f64, String)>,
+    unit: Unit,
     /// Above and below the key.
     top: &'static str,
     bottom: &'static str,
@@ -94,12 +144,27 @@ struct Key {
 
 impl Key {
     fn colour(&self, value: f32) -> Rgb {
-        if value.is_nan() {
-            return OFF_PART;
-        }
-        let t = (f64::from(value) - self.from) / (self.to - self.from);
-        (self.gradient)(t.clamp(0.0, 1.0))
+        if value.is_nan() { OFF_PART } else { self.shade(self.share(f64::from(value))) }
     }
+
+    /// Where a value stands between the lower end (0) and the upper end (1).
+    fn share(&self, value: f64) -> f64 {
+        let (middle, end) = (self.middle, if value < self.middle { self.from } else { self.to });
+        0.5 + 0.5 * (value - middle) / (end - middle).abs()
+    }
+
+    /// The colour at a share of the key, from its lower end.
+    fn shade(&self, share: f64) -> Rgb {
+        let last = (SHADES - 1) as f64;
+        (self.gradient)((share.clamp(0.0, 1.0) * last).round() / last)
+    }
+}
+
+/// Ticks with as many digits as their distance needs.
+fn labelled(from: f64, to: f64, count: f64, unit: Unit) -> Vec<(f64, String)> {
+    let marks = ticks(from, to, count);
+    let step = marks.get(1).map_or(to - from, |second| second - marks[0]);
+    marks.into_iter().map(|mark| (mark, unit.text(mark, step))).collect()
 }
 
 fn diverging(t: f64) -> Rgb {
@@ -112,9 +177,11 @@ fn sequential(t: f64) -> Rgb {
     [colour.r, colour.g, colour.b]
 }
 
-/// End of the deviation's colour key, mm: the scallop or the gouge tolerance, rounded up, so that pictures of several toolpaths of one scene can be compared.
-pub fn deviation_range(limits: &Limits) -> f64 {
-    round_up(limits.scallop.max(limits.gouge))
+/// Ends of the deviation's colour key below and above the design, both positive, mm: gouge and scallop
+/// tolerance, rounded up. A gouge counts in micrometres where scallops may be ten times as high; on
+/// one scale it would be lost. Pictures of several toolpaths of one scene can be compared.
+fn deviation_ends(limits: &Limits) -> (f64, f64) {
+    (round_up(limits.gouge), round_up(limits.scallop))
 }
 
 /// Least and greatest of the finite values.
@@ -125,16 +192,37 @@ fn extremes(values: &[f32]) -> Option<(f64, f64)> {
 
 /// Signed deviation: blue below the design (gouge), white on it, red above (excess), grey off the
 /// part. Where several cells share a pixel it shows the one farthest from zero.
-pub fn deviation_picture(grid: &Grid, deviation: &[f32], limits: &Limits, words: &MapWords<'_>) -> Picture {
-    let range = deviation_range(limits);
-    let extremes = extremes(deviation);
-    let key = Key { from: -range, to: range, gradient: diverging, top: "excess", bottom: "gouge", extremes };
-    draw(grid, &pool(grid, deviation, Pooling::Extreme), &key, words)
+pub fn deviation_picture(
+    grid: &Grid,
+    deviation: &[f32],
+    limits: &Limits,
+    words: &MapWords<'_>,
+    size: MapSize,
+) -> Picture {
+    /// Steps along half of the key: 1, 2 and 5 then all have a tick at the end.
+    const HALF_TICKS: f64 = 5.0;
+    let (below, above) = deviation_ends(limits);
+    let unit = Unit::for_range(below.max(above));
+    let mut ticks = labelled(-below, 0.0, HALF_TICKS, unit);
+    let excess = labelled(0.0, above, HALF_TICKS, unit).into_iter().skip(1);
+    ticks.extend(excess.map(|(mark, text)| (mark, format!("+{text}"))));
+    let key = Key {
+        from: -below,
+        middle: 0.0,
+        to: above,
+        gradient: diverging,
+        ticks,
+        unit,
+        top: "excess",
+        bottom: "gouge",
+        extremes: extremes(deviation),
+    };
+    draw(grid, &pool(grid, deviation, Pooling::Extreme { below, above }, size), &key, words)
 }
 
 /// Heights of the cut stock, dark to light.
-pub fn height_picture(grid: &Grid, height: &[f32], words: &MapWords<'_>) -> Picture {
-    let pooled = pool(grid, height, Pooling::Mean);
+pub fn height_picture(grid: &Grid, height: &[f32], words: &MapWords<'_>, size: MapSize) -> Picture {
+    let pooled = pool(grid, height, Pooling::Mean, size);
     let extremes = extremes(height);
     let (mut from, mut to) = extremes.unwrap_or((0.0, 1.0));
     // A flat surface needs a range too.
@@ -142,31 +230,58 @@ pub fn height_picture(grid: &Grid, height: &[f32], words: &MapWords<'_>) -> Pict
     if to - from < least {
         (from, to) = (0.5 * (from + to - least), 0.5 * (from + to + least));
     }
-    let key = Key { from, to, gradient: sequential, top: "high", bottom: "low", extremes };
+    let unit = Unit::for_range(to - from);
+    let key = Key {
+        from,
+        middle: 0.5 * (from + to),
+        to,
+        gradient: sequential,
+        ticks: labelled(from, to, 8.0, unit),
+        unit,
+        top: "high",
+        bottom: "low",
+        extremes,
+    };
     draw(grid, &pooled, &key, words)
 }
 
 fn draw(grid: &Grid, map: &Pooled, key: &Key, words: &MapWords<'_>) -> Picture {
     let (width, height) = (map.width * map.magnify, map.height * map.magnify);
     let mut page = Picture::blank(LEFT + width.max(MIN_WIDTH) + RIGHT, TOP + height.max(MIN_HEIGHT) + BOTTOM);
-    let letters = |size: TextSize| (page.width - 2 * 16) / size.letter_width();
+    let letters = |size: TextSize| (page.pixels.width() as usize - 2 * 16) / size.letter_width();
     let (title, subtitle) = (
         shortened(words.title, letters(TextSize::Title)),
         shortened(words.subtitle, letters(TextSize::Small)),
     );
     page.text(16, 12, &title, TextSize::Title, Align::Left, INK);
     page.text(16, 36, &subtitle, TextSize::Small, Align::Left, FAINT_INK);
-    for y in 0..height {
-        for x in 0..width {
-            let value = map.values[(y / map.magnify) * map.width + x / map.magnify];
-            page.set((LEFT + x) as i64, (TOP + y) as i64, key.colour(value));
-        }
-    }
+    let pixels = RgbImage::from_fn(map.width as u32, map.height as u32, |x, y| {
+        image::Rgb(key.colour(map.values[y as usize * map.width + x as usize]))
+    });
+    let pixels = imageops::resize(&pixels, width as u32, height as u32, FilterType::Nearest);
+    imageops::replace(&mut page.pixels, &pixels, LEFT as i64, TOP as i64);
     page.frame(LEFT as i64, TOP as i64, width as i64, height as i64, FAINT_INK);
     draw_axes(&mut page, grid, map);
+    draw_marks(&mut page, grid, map, words.marks);
     draw_bar(&mut page, map, height);
     draw_key(&mut page, key, LEFT + width.max(MIN_WIDTH) + 28, height.max(MIN_HEIGHT));
     page
+}
+
+/// Rings around places, with their names beside them.
+fn draw_marks(page: &mut Picture, grid: &Grid, map: &Pooled, marks: &[MapMark]) {
+    const RADIUS: i64 = 9;
+    let corner = (grid.origin.x - 0.5 * grid.cell, grid.origin.y - 0.5 * grid.cell);
+    let bottom = (TOP + map.height * map.magnify) as i64;
+    for mark in marks {
+        let x = LEFT as i64 + ((mark.at[0] - corner.0) / map.pixel) as i64;
+        let y = bottom - 1 - ((mark.at[1] - corner.1) / map.pixel) as i64;
+        page.ring(x, y, RADIUS, PAPER);
+        page.ring(x, y, RADIUS - 2, INK);
+        let width = (mark.name.chars().count() * TextSize::Small.letter_width()) as i64;
+        page.fill(x + RADIUS + 2, y - 8, width + 4, 16, PAPER);
+        page.text(x + RADIUS + 4, y - 8, &mark.name, TextSize::Small, Align::Left, INK);
+    }
 }
 
 /// Round positions in mm along the bottom and the left side.
@@ -216,33 +331,22 @@ fn draw_key(page: &mut Picture, key: &Key, x: usize, room: usize) {
     let height = (room - 120).clamp(120, MAX_HEIGHT) as i64;
     for row in 0..height {
         let t = 1.0 - (row as f64 + 0.5) / height as f64;
-        page.fill(x, top + row, WIDTH, 1, (key.gradient)(t));
+        page.fill(x, top + row, WIDTH, 1, key.shade(t));
     }
     page.frame(x, top, WIDTH, height, FAINT_INK);
-    let range = key.to - key.from;
-    let unit = Unit::for_range(range);
-    let marks = ticks(key.from, key.to, 8.0);
-    let step = marks.get(1).map_or(range, |second| second - marks[0]);
-    for mark in &marks {
-        let y = top + ((key.to - mark) / range * (height - 1) as f64).round() as i64;
+    for (mark, text) in &key.ticks {
+        let y = top + ((1.0 - key.share(*mark)) * (height - 1) as f64).round() as i64;
         page.fill(x + WIDTH + 1, y, 5, 1, FAINT_INK);
-        let sign = if key.from < 0.0 && *mark > 1e-12 && key.to == -key.from { "+" } else { "" };
-        page.text(
-            x + WIDTH + 10,
-            y - 8,
-            &format!("{sign}{}", unit.text(*mark, step)),
-            TextSize::Small,
-            Align::Left,
-            INK,
-        );
+        page.text(x + WIDTH + 10, y - 8, text, TextSize::Small, Align::Left, INK);
     }
+    let unit = key.unit;
     page.text(x, top - 24, &format!("{}, {}", key.top, unit.name), TextSize::Small, Align::Left, INK);
     page.text(x, top + height + 8, key.bottom, TextSize::Small, Align::Left, INK);
     let Some((least, greatest)) = key.extremes else { return };
     /// Lines below the key are this far apart, pixels.
     const LINE: i64 = 20;
     for (line, (word, value)) in [("max", greatest), ("min", least)].into_iter().enumerate() {
-        let text = format!("{word} {} {}", unit.text(value, range / 1000.0), unit.name);
+        let text = format!("{word} {} {}", unit.text(value, (key.to - key.from) / 1000.0), unit.name);
         page.text(
             x,
             top + height + 8 + LINE * (line as i64 + 2),
@@ -260,7 +364,7 @@ mod tests {
     use crate::geometry::Point2;
 
     const LIMITS: Limits = Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chord: 0.001 };
-    const WORDS: MapWords<'_> = MapWords { title: "a title", subtitle: "a subtitle" };
+    const WORDS: MapWords<'_> = MapWords { title: "a title", subtitle: "a subtitle", marks: &[] };
 
     fn grid(nx: usize, ny: usize) -> Grid {
         Grid { origin: Point2::new(0.5, 0.5), cell: 1.0, nx, ny }
@@ -269,10 +373,11 @@ mod tests {
     #[test]
     fn a_single_gouged_cell_survives_any_shrinking() {
         let grid = grid(5001, 37);
-        let mut deviation = vec![0.001f32; grid.len()];
+        let mut deviation = vec![0.009f32; grid.len()];
         deviation[grid.index(3456, 30)] = -0.004;
-        let pooled = pool(&grid, &deviation, Pooling::Extreme);
-        assert!(pooled.width <= MAX_PIXELS);
+        let pooling = Pooling::Extreme { below: 0.002, above: 0.010 };
+        let pooled = pool(&grid, &deviation, pooling, MapSize::File);
+        assert!(pooled.width <= MapSize::File.most());
         assert_eq!(pooled.values.iter().filter(|v| **v == -0.004).count(), 1);
     }
 
@@ -282,9 +387,10 @@ mod tests {
         let mut deviation = vec![0.0f32; 6];
         deviation[grid.index(0, 0)] = 1.0;
         deviation[grid.index(2, 1)] = f32::NAN;
-        let page = deviation_picture(&grid, &deviation, &LIMITS, &WORDS);
+        let page = deviation_picture(&grid, &deviation, &LIMITS, &WORDS, MapSize::File);
         let at = |i: usize, row: usize| {
-            page.get(LEFT + i * MAX_MAGNIFICATION + 3, TOP + row * MAX_MAGNIFICATION + 3)
+            let middle = |base: usize, k: usize| (base + k * MAX_MAGNIFICATION + 3) as u32;
+            page.pixels.get_pixel(middle(LEFT, i), middle(TOP, row)).0
         };
         assert_eq!(at(0, 1), diverging(1.0), "y = 0 is the bottom row");
         assert_eq!(at(2, 0), OFF_PART);
@@ -295,17 +401,41 @@ mod tests {
     fn maps_of_any_shape_and_content_can_be_drawn() {
         for (nx, ny) in [(1, 1), (1, 3000), (3000, 1), (700, 500)] {
             let grid = grid(nx, ny);
-            for value in [f32::NAN, 0.0, 1e6, -7.25] {
+            let sizes = [MapSize::File, MapSize::Page];
+            for (value, size) in [f32::NAN, 0.0, 1e6, -7.25].into_iter().flat_map(|v| sizes.map(|s| (v, s))) {
                 let values = vec![value; grid.len()];
-                deviation_picture(&grid, &values, &LIMITS, &WORDS);
-                height_picture(&grid, &values, &WORDS);
+                deviation_picture(&grid, &values, &LIMITS, &WORDS, size);
+                height_picture(&grid, &values, &WORDS, size);
             }
         }
     }
 
     #[test]
-    fn the_key_ends_at_a_round_number_that_holds_the_limits() {
-        assert!((deviation_range(&LIMITS) - 0.01).abs() < 1e-12);
-        assert!((deviation_range(&Limits { gouge: 0.011, ..LIMITS }) - 0.02).abs() < 1e-12);
+    fn each_half_of_the_key_ends_at_a_round_number_that_holds_its_limit() {
+        assert_eq!(deviation_ends(&LIMITS), (0.005, 0.01));
+        assert_eq!(deviation_ends(&Limits { gouge: 0.011, ..LIMITS }), (0.02, 0.01));
+    }
+
+    #[test]
+    fn a_place_is_ringed_where_it_lies() {
+        let grid = grid(20, 10);
+        let marks = [MapMark { at: [2.5, 7.5], name: "G1".into() }];
+        let words = MapWords { marks: &marks, ..WORDS };
+        let picture =
+            |words| deviation_picture(&grid, &vec![0.0; grid.len()], &LIMITS, words, MapSize::File).pixels;
+        let (plain, marked) = (picture(&WORDS), picture(&words));
+        let changed: Vec<(u32, u32)> = plain
+            .enumerate_pixels()
+            .filter(|(x, y, pixel)| marked.get_pixel(*x, *y) != *pixel)
+            .map(|(x, y, _)| (x, y))
+            .collect();
+        let middle = |low: u32, high: u32| f64::from(low + high) / 2.0;
+        let (top, bottom) = (changed[0].1, changed[changed.len() - 1].1);
+        let left = changed.iter().map(|c| c.0).min().unwrap();
+        let side = f64::from(bottom - top);
+        // Cell (2, 7): the third from the left, the third from the top.
+        let expected = |base: usize| (base * 2 + 5 * MAX_MAGNIFICATION) as f64 / 2.0;
+        assert!((middle(top, bottom) - expected(TOP)).abs() <= 1.0);
+        assert!((f64::from(left) + side / 2.0 - expected(LEFT)).abs() <= 1.0);
     }
 }

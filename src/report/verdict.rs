@@ -13,6 +13,8 @@
 
 use serde::Serialize;
 
+use super::map::MapMark;
+use super::table::{micrometres, with_bound};
 use crate::metrology::{Limits, Measurement};
 
 /// The highest ridge may exceed the scallop tolerance by this factor. Less fails plans for single
@@ -72,8 +74,9 @@ fn gouge(measured: &Measurement, limits: &Limits) -> Option<Violation> {
         return None;
     }
     let mut text = format!(
-        "gouge {:.4} mm deep (limit {:.4}, error within {:.4})",
-        figures.max_depth_mm, limits.gouge, figures.error_bound_mm
+        "gouge {} µm deep (limit {})",
+        with_bound(Some(figures.max_depth_mm), Some(figures.error_bound_mm)),
+        micrometres(Some(limits.gouge))
     );
     if let Some(worst) = figures.regions.first() {
         text += &format!(
@@ -91,10 +94,9 @@ fn uncut(measured: &Measurement, limits: &Limits) -> Option<Violation> {
     let figures = &measured.uncut;
     let worst = figures.regions.first()?;
     let text = format!(
-        "uncut material {:.4} mm high (limit {:.4}, error within {:.4}) over {:.3} mm² at {}{}",
-        figures.max_height_mm,
-        limits.uncut,
-        figures.error_bound_mm,
+        "uncut material {} µm high (limit {}) over {:.3} mm² at {}{}",
+        with_bound(Some(figures.max_height_mm), Some(figures.error_bound_mm)),
+        micrometres(Some(limits.uncut)),
         figures.area_mm2,
         place(worst.at_mm),
         others(figures.region_count)
@@ -104,22 +106,49 @@ fn uncut(measured: &Measurement, limits: &Limits) -> Option<Violation> {
 
 fn scallop(measured: &Measurement, limits: &Limits) -> Vec<Violation> {
     let figures = &measured.scallop;
-    let violation = |limit: f64, value: Option<f64>, what: &str, place: String| {
+    let violation = |limit: f64, value: Option<f64>, error: Option<f64>, what: &str, place: String| {
         let value = value.filter(|value| *value > limit)?;
-        let bound =
-            figures.error_bound_mm.map_or(String::new(), |bound| format!(", error within {bound:.4}"));
-        let text = format!("{what} is {value:.4} mm (limit {limit:.4}{bound}){place}");
+        let text = format!(
+            "{what} is {} µm (limit {}){place}",
+            with_bound(Some(value), error),
+            micrometres(Some(limit))
+        );
         Some(Violation { what: "scallop", limit_mm: limit, measured_mm: value, text })
     };
     let at = figures.max_at_mm.map_or(String::new(), |at| format!(" at {}", place(at)));
-    let highest = violation(HIGHEST_RIDGE * limits.scallop, figures.max_mm, "the highest scallop", at);
+    let highest = violation(
+        HIGHEST_RIDGE * limits.scallop,
+        figures.max_mm,
+        figures.error_bound_mm,
+        "the highest scallop",
+        at,
+    );
     let most = violation(
         limits.scallop,
         figures.p95_mm,
+        None,
         "the scallop height that 95 % of the ridges stay below",
         String::new(),
     );
     highest.into_iter().chain(most).collect()
+}
+
+/// The gravest places of each kind of violation, named `G1`, `G2` … for gouges, `U1` … for uncut
+/// material, in the order of their lists, and `S` for a scallop that is too high.
+pub fn marks(measured: &Measurement, limits: &Limits) -> Vec<MapMark> {
+    /// More rings of one kind hide the map.
+    const MOST: usize = 5;
+    let numbered = |letter: char, places: Vec<[f64; 3]>| {
+        let named =
+            |(k, [x, y, _]): (usize, [f64; 3])| MapMark { at: [x, y], name: format!("{letter}{}", k + 1) };
+        places.into_iter().take(MOST).enumerate().map(named).collect::<Vec<_>>()
+    };
+    let high = measured.scallop.max_mm.is_some_and(|height| height > HIGHEST_RIDGE * limits.scallop);
+    let scallop = measured.scallop.max_at_mm.filter(|_| high);
+    let mut marks = numbered('G', measured.gouge.regions.iter().map(|r| r.at_mm).collect());
+    marks.extend(numbered('U', measured.uncut.regions.iter().map(|r| r.at_mm).collect()));
+    marks.extend(scallop.map(|[x, y, _]| MapMark { at: [x, y], name: "S".to_owned() }));
+    marks
 }
 
 fn others(region_count: usize) -> String {
@@ -166,9 +195,22 @@ mod tests {
     }
 
     #[test]
+    fn the_gravest_places_are_marked_and_those_within_limits_are_not() {
+        assert_eq!(marks(&measurement(0.001), &LIMITS), []);
+        let mut measured = measurement(0.032);
+        let region = measured.gouge.regions[0];
+        measured.gouge.regions.resize(7, region);
+        measured.scallop.max_mm = Some(1.01 * HIGHEST_RIDGE * LIMITS.scallop);
+        let found = marks(&measured, &LIMITS);
+        let names: Vec<&str> = found.iter().map(|m| m.name.as_str()).collect();
+        assert_eq!(names, ["G1", "G2", "G3", "G4", "G5", "S"]);
+        assert_eq!((found[0].at, found[5].at), ([12.5, 7.25], [3.0, 4.0]));
+    }
+
+    #[test]
     fn a_gouge_names_move_and_line() {
         let text = violations(&measurement(0.032), &LIMITS)[0].text.clone();
-        assert!(text.contains("gouge 0.0320 mm deep"), "{text}");
+        assert!(text.contains("gouge 32.0 ± 0.50 µm deep (limit 5.00)"), "{text}");
         assert!(text.contains("at x 12.500 y 7.250 z -1.032, move 1234, toolpath.nc line 1240"), "{text}");
     }
 }

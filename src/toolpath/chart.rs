@@ -5,7 +5,7 @@
 //! while heights of cutter locations always come from dropping the cutter on the mesh itself.
 
 use super::plan::PlanError;
-use super::strip::{axis_offset, strip_width_at};
+use super::strip::strip_width_at;
 use super::{Along, FeedDirection, Step};
 use crate::cutter::Cutter;
 use crate::field::NormalEquations;
@@ -183,7 +183,7 @@ impl<'a> Chart<'a> {
         let at = |lo: f64, hi: f64, k: usize| lo + (hi - lo) * k as f64 / N as f64;
         let mut extent = [f64::INFINITY, f64::NEG_INFINITY];
         let mut include = |p: &Point3, n: &Vector3| {
-            let x = (p.coords.xy() + axis_offset(cutter, n)).dot(e);
+            let x = (p.coords.xy() + cutter.axis_offset(n)).dot(e);
             extent = [extent[0].min(x), extent[1].max(x)];
         };
         if let Source::Heights(_) = self.source {

@@ -9,7 +9,6 @@ use super::chart::Chart;
 use super::drop::DropCutter;
 use super::plan::{PassSettings, Passes, PlanError};
 use super::spacing::{level_tangent, place_levels};
-use super::strip::axis_offset;
 use crate::cutter::Cutter;
 use crate::field::{LevelCurve, LevelTracer, ScalarField, surface_gradient_length};
 use crate::geometry::Point3;
@@ -153,7 +152,7 @@ impl Guide<'_> {
     /// normal, then dropped, so that it is held off by any other place of the part.
     fn tip(&self, [u, v]: [f64; 2]) -> Option<Point3> {
         let p = self.chart.at(u, v)?;
-        let axis = p.jet.p.xy() + axis_offset(self.cutter, &p.normal);
+        let axis = p.jet.p.xy() + self.cutter.axis_offset(&p.normal);
         self.drop.at(axis.x, axis.y).map(|d| Point3::new(axis.x, axis.y, d.tip_z))
     }
 

@@ -18,4 +18,4 @@ pub use chord::distance_to_segment;
 pub use drop::{Drop, DropCutter};
 pub use path::{CcPoint, ClPoint, Move, MoveKind, Toolpath};
 pub use plan::{Along, FeedDirection, Plan, PlanError, PlanSettings, Step, Strategy, plan};
-pub use strip::{axis_offset, ball_scallop_height, cutter_curvature, strip_width, strip_width_at};
+pub use strip::{ball_scallop_height, strip_width, strip_width_at};

@@ -7,7 +7,7 @@
 //! what really stands is measured on the cut surface.
 
 use crate::cutter::Cutter;
-use crate::geometry::{Vector2, Vector3};
+use crate::geometry::Vector3;
 
 /// The strip is never planned wider than this multiple of the strip on a plane. Where the surface
 /// is nearly as concave as the cutter the formula grows without bound while its error grows too;
@@ -21,31 +21,6 @@ const WIDEST_OVER_DIAMETER: f64 = 0.8;
 /// less, is left between them.
 const NEARLY_AS_CONCAVE: f64 = 0.25;
 
-/// Slope (sine) below which ground counts as nearly level for a cutter with a flat. Less lets the path
-/// swerve by the flat's radius at every change of a gentle slope; more leaves its contact inside the
-/// flat on slopes where only the rim can touch.
-const NEARLY_LEVEL: f64 = 0.05;
-
-/// Normal curvature of the cutter's surface, 1/mm, at the contact with outward surface normal `n`
-/// (unit) in the tangent direction `b` (unit, `b ⟂ n`), for a vertical tool axis.
-///
-/// A torus of corner radius `rc` around a flat disc `e` has the curvature `1/rc` in the meridian
-/// and `sin λ/(e + rc sin λ)` along the parallel, λ the slope of the surface; on a conical side
-/// the meridian is straight, and a sharp corner has none.
-pub fn cutter_curvature(cutter: &Cutter, n: &Vector3, b: &Vector3) -> f64 {
-    let slope = n.xy().norm();
-    let (e, rc) = (cutter.flat_radius(), cutter.corner_radius());
-    if slope < 1e-9 {
-        return if e > 0.0 { 0.0 } else { 1.0 / rc };
-    }
-    let parallel_direction = Vector3::new(-n.y, n.x, 0.0) / slope;
-    let along_parallel = b.dot(&parallel_direction).powi(2);
-    let on_arc = slope <= cutter.half_angle().cos();
-    let radius_of_parallel = if on_arc { e + rc * slope } else { cutter.radius() };
-    let meridian = if on_arc && rc > 0.0 { 1.0 / rc } else { 0.0 };
-    slope / radius_of_parallel * along_parallel + meridian * (1.0 - along_parallel)
-}
-
 /// Width of the strip, mm, that a cutter leaves below the scallop height `h` around a contact with
 /// outward surface normal `n`, across the feed in the tangent direction `b` (both unit), where the
 /// surface has the normal curvature `surface` along `b`; and whether the surface is so concave that
@@ -54,21 +29,13 @@ pub fn cutter_curvature(cutter: &Cutter, n: &Vector3, b: &Vector3) -> f64 {
 /// A sharp corner (no corner radius) leaves stairs on a slope: between passes `w` apart up the slope λ
 /// they stand `w sin λ cos λ` high.
 pub fn strip_width_at(cutter: &Cutter, n: &Vector3, b: &Vector3, surface: f64, h: f64) -> (f64, bool) {
-    let (width, limited) = strip_width(cutter_curvature(cutter, n, b), surface, h, cutter.radius());
+    let (width, limited) = strip_width(cutter.normal_curvature(n, b), surface, h, cutter.radius());
     if cutter.corner_radius() > 0.0 {
         return (width, limited);
     }
     let up_the_slope = b.z.abs();
     let stairs = if up_the_slope > 0.0 { h / (up_the_slope * n.z.abs().max(1e-3)) } else { f64::INFINITY };
     (width.min(stairs), limited)
-}
-
-/// Plan-view offset from a contact with outward surface normal `n` to the cutter's axis, mm: the
-/// corner radius and, on a slope, the flat radius up to its rim. On ground that is nearly level any
-/// place of the flat touches; the offset then grows with the slope, so that it never jumps.
-pub fn axis_offset(cutter: &Cutter, n: &Vector3) -> Vector2 {
-    let plan = n.xy();
-    plan * (cutter.corner_radius() + cutter.flat_radius() / plan.norm().max(NEARLY_LEVEL))
 }
 
 /// Width of the strip, mm, for scallop height `h` where the cutter has curvature `cutter` and the
@@ -131,22 +98,6 @@ mod tests {
     }
 
     #[test]
-    fn cutter_curvature_is_that_of_a_torus() {
-        let tilted = Vector3::new(0.5, 0.0, 0.75f64.sqrt());
-        let (along, down) = (Vector3::y(), Vector3::new(0.75f64.sqrt(), 0.0, -0.5));
-        let ball = Cutter::ball(6.0).unwrap();
-        assert!((cutter_curvature(&ball, &tilted, &along) - 1.0 / 3.0).abs() < 1e-12);
-        assert!((cutter_curvature(&ball, &tilted, &down) - 1.0 / 3.0).abs() < 1e-12);
-        let bull = Cutter::bull(6.0, 1.0).unwrap();
-        assert!((cutter_curvature(&bull, &tilted, &along) - 0.5 / 2.5).abs() < 1e-12);
-        assert!((cutter_curvature(&bull, &tilted, &down) - 1.0).abs() < 1e-12);
-        assert_eq!(cutter_curvature(&bull, &Vector3::z(), &along), 0.0);
-        let flat = Cutter::flat(6.0).unwrap();
-        assert!((cutter_curvature(&flat, &tilted, &along) - 0.5 / 3.0).abs() < 1e-12, "sin λ / R");
-        assert_eq!(cutter_curvature(&flat, &tilted, &down), 0.0);
-    }
-
-    #[test]
     fn a_sharp_corner_leaves_stairs() {
         let flat = Cutter::flat(6.0).unwrap();
         let slope = 30f64.to_radians();
@@ -156,13 +107,5 @@ mod tests {
         assert!((width * slope.sin() * slope.cos() - 0.01).abs() < 1e-12);
         let (along, _) = strip_width_at(&flat, &n, &Vector3::y(), 0.0, 0.01);
         assert!((along - (8.0 * 0.01 * 3.0 / slope.sin()).sqrt()).abs() < 1e-12);
-    }
-
-    #[test]
-    fn the_axis_stands_off_by_corner_and_flat() {
-        let n = Vector3::new(0.6, 0.0, 0.8);
-        assert!((axis_offset(&Cutter::ball(6.0).unwrap(), &n).x - 1.8).abs() < 1e-12);
-        assert!((axis_offset(&Cutter::bull(6.0, 1.0).unwrap(), &n).x - 2.6).abs() < 1e-12);
-        assert_eq!(axis_offset(&Cutter::flat(6.0).unwrap(), &Vector3::z()), Vector2::zeros());
     }
 }
