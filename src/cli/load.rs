@@ -17,7 +17,7 @@ pub fn load_part(scene: &Scene) -> Result<(Part, Vec<String>), CliError> {
             let patches = nurbs_json::read(&file.path).map_err(|e| refused(scene, file, e))?;
             let part = of_patches(patches.into_iter().map(Patch::Nurbs).collect())
                 .map_err(|e| refused(scene, file, e))?;
-            Ok((part, Vec::new()))
+            Ok((seen_from_above(part).map_err(|e| refused(scene, file, e))?, Vec::new()))
         }
         PartSource::Mesh { file, format, scale, .. } => {
             let read = match format {
@@ -28,9 +28,22 @@ pub fn load_part(scene: &Scene) -> Result<(Part, Vec<String>), CliError> {
             let mesh = in_mm(mesh, *scale).map_err(|e| refused(scene, file, e))?;
             let notes =
                 if repairs.is_clean() { Vec::new() } else { vec![format!("{}: {repairs}", file.written)] };
-            Ok((Part::from_mesh(mesh), notes))
+            let part = seen_from_above(Part::from_mesh(mesh)).map_err(|e| refused(scene, file, e))?;
+            Ok((part, notes))
         }
     }
+}
+
+/// A part that has an area in the plan view, which alone can be milled along z.
+fn seen_from_above(part: Part) -> Result<Part, String> {
+    let size = part.bounds().size();
+    if size.x > 0.0 && size.y > 0.0 {
+        return Ok(part);
+    }
+    Err(format!(
+        "seen from above it is a line, {} x {} mm: the cutter's axis is z, so turn the part before exporting it",
+        size.x, size.y
+    ))
 }
 
 /// A mesh whose unit is `scale` mm.

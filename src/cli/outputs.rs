@@ -14,6 +14,32 @@ pub struct Outputs {
     /// Removed with all that is left in it when the run ends, one way or the other.
     scratch: tempfile::TempDir,
     fresh: PathBuf,
+    /// Dropped, and so removed, after the scratch folder in them.
+    _parents: MadeFolders,
+}
+
+/// Folders that were made for the results, outermost first. Those still empty at the end go away.
+#[derive(Debug)]
+struct MadeFolders(Vec<PathBuf>);
+
+impl MadeFolders {
+    /// Makes a folder and its parents, as far as they are missing.
+    fn make(folder: &Path) -> Result<Self, CliError> {
+        let missing = folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists());
+        let mut made = Self(missing.map(Path::to_owned).collect());
+        made.0.reverse();
+        fs::create_dir_all(folder).map_err(CliError::output(folder))?;
+        Ok(made)
+    }
+}
+
+impl Drop for MadeFolders {
+    fn drop(&mut self) {
+        for folder in self.0.iter().rev() {
+            // Fails, as it should, where results are in it.
+            let _ = fs::remove_dir(folder);
+        }
+    }
 }
 
 impl Outputs {
@@ -32,7 +58,7 @@ impl Outputs {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
             _ => Path::new("."),
         };
-        fs::create_dir_all(parent).map_err(CliError::output(parent))?;
+        let parents = MadeFolders::make(parent)?;
         let scratch = tempfile::Builder::new()
             .prefix(".millstream-")
             .tempdir_in(parent)
@@ -40,7 +66,7 @@ impl Outputs {
         // Scratch folders are closed to others; what is published must have usual permissions.
         let fresh = scratch.path().join("fresh");
         fs::create_dir(&fresh).map_err(CliError::output(&fresh))?;
-        Ok(Self { target: target.to_owned(), scratch, fresh })
+        Ok(Self { target: target.to_owned(), scratch, fresh, _parents: parents })
     }
 
     /// Makes a folder within the results.
@@ -135,7 +161,7 @@ mod tests {
     #[test]
     fn nothing_appears_when_a_run_stops_early() {
         let home = tempfile::tempdir().unwrap();
-        let target = home.path().join("out");
+        let target = home.path().join("deep/out");
         drop(fill(&target, "text"));
         let outputs = fill(&target, "text");
         assert!(outputs.file("x", |_| Err::<(), _>(std::io::Error::other("full"))).is_err());

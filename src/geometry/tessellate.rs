@@ -70,7 +70,7 @@ pub enum TessellateError {
     /// More triangles are needed than allowed.
     #[error(
         "a tolerance of {tolerance} mm would need about {needed} triangles, and {MAX_TRIANGLES} are allowed; \
-         use a greater tolerance or a smoother surface"
+         use a greater tolerance, or a smoother surface with fewer control points"
     )]
     TooMany {
         /// What was asked for, mm.

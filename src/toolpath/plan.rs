@@ -2,6 +2,7 @@
 
 use super::chord::{reduce, sample_within_chord};
 use super::link::chain;
+use super::strip::strip_width;
 use super::{Toolpath, streamline, zigzag};
 use crate::cutter::Cutter;
 use crate::geometry::Point3;
@@ -93,6 +94,19 @@ pub enum PlanError {
         /// Why, and what would help.
         reason: String,
     },
+    /// The passes lie so close on so large a part that planning them would take days or all memory.
+    #[error(
+        "passes {step} mm apart over {x} x {y} mm would be too many; set a greater `stepover` or `scallop`, \
+         and check the units of the part"
+    )]
+    TooMany {
+        /// Greatest distance of passes that the settings allow, mm.
+        step: f64,
+        /// Size of the part along x, mm.
+        x: f64,
+        /// Size of the part along y, mm.
+        y: f64,
+    },
 }
 
 /// A planned path and what the planner has to say about it.
@@ -158,6 +172,29 @@ const SAMPLING_OVER_RADIUS: f64 = 0.15;
 /// but not for less than this share of itself.
 const LEAST_SHARE_OF_TARGET: f64 = 0.5;
 
+/// Most passes that are planned: ten times what a part of ten metres takes at 0.1 mm. More of them
+/// take up memory without end.
+const MAX_PASSES: f64 = 1e6;
+
+/// Most samples of passes that are planned; at a million a second they take a quarter of an hour.
+const MAX_SAMPLES: f64 = 1e9;
+
+/// Refuses what would never end. Counts no pass too many: steps are taken as great as any strategy
+/// plans them.
+fn check_extent(part: &Part, cutter: &Cutter, pass: &PassSettings) -> Result<(), PlanError> {
+    let step = match pass.step {
+        // As wide as the strip may be where cutter and surface fit each other.
+        Step::Scallop(h) => strip_width(0.0, 0.0, h, cutter.radius()).0,
+        Step::Stepover(s) => s,
+    };
+    let size = part.bounds().size();
+    let samples = size.x / step * (size.y / pass.sampling);
+    if size.x.max(size.y) > MAX_PASSES * step || samples > MAX_SAMPLES {
+        return Err(PlanError::TooMany { step, x: size.x, y: size.y });
+    }
+    Ok(())
+}
+
 /// Plans one path.
 ///
 /// # Errors
@@ -175,6 +212,7 @@ pub fn plan(
     };
     let sampling = SAMPLING_OVER_RADIUS * cutter.radius();
     let pass = PassSettings { step, sampling, chord_tolerance: settings.chord_tolerance };
+    check_extent(part, cutter, &pass)?;
     let (passes, both_ways) = match *strategy {
         Strategy::Zigzag { angle, one_way } => {
             (zigzag::passes(part, cutter, angle, &pass, monitor)?, !one_way)

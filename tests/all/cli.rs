@@ -18,14 +18,13 @@ const WAVE: &str = r#"title = "A wave <&> its \"passes\""
 surface = "wave"
 amplitude = 0.5
 wavelength_x = 12
-x = [-2.5, 7.5]
-y = [0, 5]
+x = [-2, 6]
+y = [0, 3]
 [stock]
 margin = 1.0
 [cutter]
-shape = "bull"
-diameter = 6
-corner_radius = 1.5
+shape = "ball"
+diameter = 4
 [tolerance]
 scallop = 0.02
 [simulation]
@@ -181,9 +180,9 @@ fn a_run_leaves_the_files_of_the_contract_and_no_other() {
     for (folder, toolpath) in folders.iter().zip(toolpaths) {
         let folder = out.join(folder);
         assert_eq!(entries(&folder), TOOLPATH_FILES);
-        // 10 x 5 mm and a margin of 1 mm in cells of 0.1 mm.
-        assert_eq!(toolpath["simulation"]["cells"], 120 * 70);
-        pictures_have_the_grid(&folder, [120, 70]);
+        // 8 x 3 mm and a margin of 1 mm in cells of 0.1 mm.
+        assert_eq!(toolpath["simulation"]["cells"], 100 * 50);
+        pictures_have_the_grid(&folder, [100, 50]);
         the_programs_and_the_part_are_whole(&folder, toolpath);
     }
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
@@ -221,7 +220,7 @@ fn pictures_have_the_grid(folder: &Path, [nx, ny]: [usize; 2]) {
     assert_eq!(about["cell_mm"], 0.1);
     // Centre of the first cell: half a cell inside the border of part and margin.
     let [x, y] = [0, 1].map(|k| about["origin_mm"][k].as_f64().unwrap());
-    assert!((x + 3.45).abs() < 1e-9 && (y + 0.95).abs() < 1e-9, "{x} {y}");
+    assert!((x + 2.95).abs() < 1e-9 && (y + 0.95).abs() < 1e-9, "{x} {y}");
 }
 
 fn the_programs_and_the_part_are_whole(folder: &Path, toolpath: &Value) {
@@ -358,10 +357,10 @@ fn an_interrupted_run_leaves_nothing() {
     /// Far beyond what stopping takes on a busy machine, and far below the whole run.
     const PATIENCE: Duration = Duration::from_secs(10);
 
-    let scene = WAVE.replace("x = [-2.5, 7.5]", "x = [0, 250]").replace("y = [0, 5]", "y = [0, 250]");
+    let scene = WAVE.replace("x = [-2, 6]", "x = [0, 250]").replace("y = [0, 3]", "y = [0, 250]");
     let home = home_with(&scene);
     for delay_ms in [0, 200, 1000] {
-        let child = command(home.path(), &["run", "plate.toml", "--out", "out"]).spawn().unwrap();
+        let child = command(home.path(), &["run", "plate.toml", "--out", "deep/out"]).spawn().unwrap();
         // The scratch folder shows that scene and part were read and signals are listened to.
         let begun = Instant::now();
         while entries(home.path()).len() < 2 {

@@ -32,12 +32,31 @@ impl SceneText {
         // A caret needs a character to stand under; at the end of the text it stands after the last.
         let start = self.boundary(span.start.min(end));
         let stop = self.boundary(span.end.clamp(start, end));
+        let mut message = readable(&message.into());
+        let source_code =
+            self.can_be_shown(start, stop).then(|| NamedSource::new(&self.name, Arc::clone(&self.text)));
+        if source_code.is_none() {
+            let (line, column) = self.line_and_column(start);
+            message = format!("{}:{line}:{column}: {message}", self.name);
+        }
         SceneError::Invalid(Box::new(Finding {
-            message: message.into(),
+            message,
             cure: cure.into(),
-            source_code: NamedSource::new(&self.name, Arc::clone(&self.text)),
+            source_code,
             at: SourceSpan::new(start.into(), stop - start),
         }))
+    }
+
+    /// True when the lines around `start..stop` can stand in a message: they are short, and have no
+    /// control character, which a terminal would obey.
+    fn can_be_shown(&self, start: usize, stop: usize) -> bool {
+        /// Bytes of a line. A longer one fills the screen and hides the message.
+        const LONGEST_LINE: usize = 400;
+        // A line before and a line after are shown too.
+        let first = self.text[..start].rmatch_indices('\n').nth(1).map_or(0, |(k, _)| k + 1);
+        let after = self.text[stop..].match_indices('\n').nth(1).map_or(self.text.len(), |(k, _)| stop + k);
+        let plain = |c: char| !c.is_control() || c == '\t' || c == '\r';
+        self.text[first..after].split('\n').all(|line| line.len() <= LONGEST_LINE && line.chars().all(plain))
     }
 
     /// The nearest character boundary at or before byte `at`.
@@ -56,6 +75,18 @@ impl SceneText {
     }
 }
 
+/// A message without control characters and no longer than a paragraph, whatever it quotes.
+fn readable(message: &str) -> String {
+    /// In characters.
+    const LONGEST: usize = 400;
+    let printable = |c: char| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c };
+    let mut text: String = message.chars().take(LONGEST).map(printable).collect();
+    if message.chars().nth(LONGEST).is_some() {
+        text.push('…');
+    }
+    text
+}
+
 /// One thing wrong at one place of a scene.
 #[derive(Debug, thiserror::Error, Diagnostic)]
 #[error("{message}")]
@@ -65,8 +96,9 @@ pub struct Finding {
     /// What to write instead.
     #[help]
     pub cure: String,
+    /// `None` when the text cannot be shown; the message then begins with the place.
     #[source_code]
-    source_code: NamedSource<Arc<String>>,
+    source_code: Option<NamedSource<Arc<String>>>,
     /// Bytes of the text that are meant.
     #[label("here")]
     pub at: SourceSpan,

@@ -104,20 +104,21 @@ impl<'a> Section<'a> {
     pub fn section(&self, key: &str) -> Result<Section<'a>, SceneError> {
         let title = format!("[{key}]");
         let (source, span) = (self.source, self.key_span(key));
-        match self.entry(key).map(|entry| entry.get_ref()) {
-            None => Ok(Section { source, title, span: 0..0, table: None }),
-            Some(DeValue::Table(table)) => Ok(Section { source, title, span, table: Some(table) }),
-            Some(other) => Err(self.wrong_type(key, "a table", other, &format!("write a header `[{key}]`"))),
+        let Some(entry) = self.entry(key) else {
+            return Ok(Section { source, title, span: 0..0, table: None });
+        };
+        match entry.get_ref() {
+            DeValue::Table(table) => Ok(Section { source, title, span, table: Some(table) }),
+            _ => Err(self.wrong_type(key, "a table", entry, &format!("write a header `[{key}]`"))),
         }
     }
 
     /// The tables under `[[key]]`, in order.
     pub fn sections(&self, key: &str) -> Result<Vec<Section<'a>>, SceneError> {
         let cure = format!("write `[[{key}]]` with two brackets, once for each");
-        let list = match self.entry(key).map(|entry| entry.get_ref()) {
-            None => return Ok(Vec::new()),
-            Some(DeValue::Array(list)) => list,
-            Some(other) => return Err(self.wrong_type(key, "a list of tables", other, &cure)),
+        let Some(entry) = self.entry(key) else { return Ok(Vec::new()) };
+        let DeValue::Array(list) = entry.get_ref() else {
+            return Err(self.wrong_type(key, "a list of tables", entry, &cure));
         };
         let one = |(k, item): (usize, &'a Spanned<DeValue<'a>>)| match item.get_ref() {
             DeValue::Table(table) => Ok(Section {
@@ -134,11 +135,10 @@ impl<'a> Section<'a> {
         list.iter().enumerate().map(one).collect()
     }
 
-    fn wrong_type(&self, key: &str, expected: &str, found: &DeValue<'_>, cure: &str) -> SceneError {
-        let span = self.entry(key).map_or(self.span.clone(), Spanned::span);
+    fn wrong_type(&self, key: &str, expected: &str, found: &Spanned<DeValue<'_>>, cure: &str) -> SceneError {
         self.error(
-            &span,
-            format!("`{key}` in {} must be {expected}, and here is {}", self.title, kind(found)),
+            &found.span(),
+            format!("`{key}` in {} must be {expected}, and here is {}", self.title, kind(found.get_ref())),
             cure,
         )
     }
@@ -155,7 +155,7 @@ impl<'a> Section<'a> {
         self.error(&self.span, message, cure)
     }
 
-    /// A text that is not empty.
+    /// A text that is not empty and has no control characters: it is printed, and stands in programs.
     pub fn text(&self, key: &str) -> Result<Option<Located<&'a str>>, SceneError> {
         let Some(entry) = self.entry(key) else { return Ok(None) };
         match entry.get_ref() {
@@ -164,8 +164,13 @@ impl<'a> Section<'a> {
                 format!("`{key}` is empty"),
                 "write something between the quotes",
             )),
+            DeValue::String(text) if text.contains(char::is_control) => Err(self.error(
+                &entry.span(),
+                format!("`{key}` has a line break or another control character in it"),
+                "write it in one line of letters",
+            )),
             DeValue::String(text) => Ok(Some(Located { value: text, span: entry.span() })),
-            other => Err(self.wrong_type(key, "a text", other, "write it between double quotes")),
+            _ => Err(self.wrong_type(key, "a text", entry, "write it between double quotes")),
         }
     }
 
@@ -201,12 +206,10 @@ impl<'a> Section<'a> {
 
     /// `true` or `false`.
     pub fn flag(&self, key: &str) -> Result<Option<bool>, SceneError> {
-        match self.entry(key).map(|entry| entry.get_ref()) {
-            None => Ok(None),
-            Some(DeValue::Boolean(value)) => Ok(Some(*value)),
-            Some(other) => {
-                Err(self.wrong_type(key, "true or false", other, "write true or false without quotes"))
-            }
+        let Some(entry) = self.entry(key) else { return Ok(None) };
+        match entry.get_ref() {
+            DeValue::Boolean(value) => Ok(Some(*value)),
+            _ => Err(self.wrong_type(key, "true or false", entry, "write true or false without quotes")),
         }
     }
 
@@ -231,12 +234,7 @@ impl<'a> Section<'a> {
         let (least, greatest) = (range.start(), range.end());
         let expected = format!("a number from {least} to {greatest}{unit}");
         let Some(value) = as_number(entry.get_ref()) else {
-            return Err(self.wrong_type(
-                key,
-                &expected,
-                entry.get_ref(),
-                "write digits without quotes or unit",
-            ));
+            return Err(self.wrong_type(key, &expected, entry, "write digits without quotes or unit"));
         };
         // NaN and infinities, which TOML can write, lie in no range.
         if !range.contains(&value) {
@@ -284,7 +282,7 @@ impl<'a> Section<'a> {
         let entry = self.entry(key).ok_or_else(|| self.missing(key, example))?;
         let cure = format!("write two numbers, the lesser first, such as `{key} = {example}`");
         let DeValue::Array(list) = entry.get_ref() else {
-            return Err(self.wrong_type(key, "a list of two numbers", entry.get_ref(), &cure));
+            return Err(self.wrong_type(key, "a list of two numbers", entry, &cure));
         };
         let numbers: Vec<f64> = list
             .iter()
