@@ -1,6 +1,6 @@
 //! PNG files of pictures: a palette where 256 colours suffice, else 8-bit RGB.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
 use image::RgbImage;
 
@@ -42,18 +42,31 @@ pub fn encode(picture: &Picture, notes: &[(&str, &str)]) -> std::io::Result<Vec<
 /// The colours of a picture, sorted, and which of them each pixel has. `None` when they are too
 /// many.
 fn indexed(rgb: &RgbImage) -> Option<(Vec<[u8; 3]>, Vec<u8>)> {
-    let mut order: BTreeMap<[u8; 3], u8> = BTreeMap::new();
+    // As one number a colour is compared in one step.
+    let colours = || rgb.pixels().map(|pixel| u32::from_be_bytes([0, pixel[0], pixel[1], pixel[2]]));
+    let mut palette = BTreeSet::new();
     // Neighbours are often alike: do not look the same colour up again.
     let mut last = None;
-    for pixel in rgb.pixels().filter(|pixel| last.replace(pixel.0) != Some(pixel.0)) {
-        order.insert(pixel.0, 0);
-        if order.len() > PALETTE {
+    for colour in colours().filter(|colour| last.replace(*colour) != Some(*colour)) {
+        palette.insert(colour);
+        if palette.len() > PALETTE {
             return None;
         }
     }
-    order.values_mut().zip(0..).for_each(|(index, k)| *index = k);
-    let indices = rgb.pixels().map(|pixel| order[&pixel.0]).collect();
-    Some((order.into_keys().collect(), indices))
+    let palette: Vec<u32> = palette.into_iter().collect();
+    let mut known = (*palette.first()?, 0);
+    let index = |colour: u32| {
+        if known.0 != colour {
+            known = (colour, palette.partition_point(|other| *other < colour) as u8);
+        }
+        known.1
+    };
+    let indices = colours().map(index).collect();
+    let rgb = |colour: &u32| {
+        let [_, red, green, blue] = colour.to_be_bytes();
+        [red, green, blue]
+    };
+    Some((palette.iter().map(rgb).collect(), indices))
 }
 
 #[cfg(test)]

@@ -334,10 +334,19 @@ fn draw_key(page: &mut Picture, key: &Key, x: usize, room: usize) {
         page.fill(x, top + row, WIDTH, 1, key.shade(t));
     }
     page.frame(x, top, WIDTH, height, FAINT_INK);
-    for (mark, text) in &key.ticks {
+    /// Words closer than this would touch, pixels.
+    const APART: i64 = 18;
+    // From zero outward, so that where room is short zero keeps its word.
+    let mut outward: Vec<_> = key.ticks.iter().collect();
+    outward.sort_by(|a, b| (a.0 - key.middle).abs().total_cmp(&(b.0 - key.middle).abs()));
+    let mut written: Vec<i64> = Vec::new();
+    for (mark, text) in outward {
         let y = top + ((1.0 - key.share(*mark)) * (height - 1) as f64).round() as i64;
         page.fill(x + WIDTH + 1, y, 5, 1, FAINT_INK);
-        page.text(x + WIDTH + 10, y - 8, text, TextSize::Small, Align::Left, INK);
+        if written.iter().all(|other| (other - y).abs() >= APART) {
+            page.text(x + WIDTH + 10, y - 8, text, TextSize::Small, Align::Left, INK);
+            written.push(y);
+        }
     }
     let unit = key.unit;
     page.text(x, top - 24, &format!("{}, {}", key.top, unit.name), TextSize::Small, Align::Left, INK);
