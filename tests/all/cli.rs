@@ -361,8 +361,9 @@ fn an_interrupted_run_leaves_nothing() {
         .replace("[0, 8]", "[0, 2000]")
         .replace("[0, 6]", "[0, 2000]")
         .replace("stepover = 0.5", "stepover = 0.1")
-        .replace("cell = 0.1", "cell = 0.5");
+        .replace("cell = 0.1", "cell = 1");
     let home = home_with(&scene);
+    assert_eq!(millstream(home.path(), &["check", "plate.toml"]).code, Some(0));
     for delay_ms in [0, 50, 400] {
         let child = command(home.path(), &["run", "plate.toml", "--out", "deep/out"]).spawn().unwrap();
         // The scratch folder shows that scene and part were read and signals are listened to.
