@@ -15,7 +15,7 @@ use crate::io::scene::{Scene, complete_toml};
 pub fn check(path: &Path) -> Result<String, CliError> {
     let mut scene = Scene::read(path)?;
     let (part, notes) = load_part(&scene)?;
-    let (grid, note) = lay_out(&scene, &stock_area(&scene, &part))?;
+    let (grid, note) = lay_out(&scene, &stock_area(&scene, &part)).map_err(CliError::grid(&scene))?;
     scene.simulation.cell = grid.cell;
     let (bounds, size) = (part.bounds(), part.bounds().size());
     let mut found = vec![format!("{} is valid. Every default in effect:", path.display())];

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme};
 
-use crate::io::scene::SceneError;
+use crate::io::scene::{Scene, SceneError};
 use crate::monitor::Cancelled;
 use crate::part::PartError;
 use crate::report::ReportError;
@@ -19,17 +19,29 @@ pub enum CliError {
     #[diagnostic(transparent)]
     Scene(#[from] SceneError),
     /// The part's surface cannot be searched.
-    #[error("the part cannot be used")]
+    #[error("{scene}: the part cannot be used: {reason}")]
     #[diagnostic(help("change [part] in the scene"))]
-    Part(#[from] PartError),
+    Part {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// What is wrong with the surface.
+        reason: PartError,
+    },
     /// No grid could be laid out.
-    #[error("the stock cannot be simulated")]
+    #[error("{scene}: the stock cannot be simulated: {reason}")]
     #[diagnostic(help("choose another `cell` or `memory_mib` in [simulation], or `--cell`"))]
-    Grid(#[from] GridError),
+    Grid {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// What is wrong with the grid.
+        reason: GridError,
+    },
     /// A toolpath could not be planned.
-    #[error("the toolpath \"{name}\" could not be planned: {reason}")]
+    #[error("{scene}: the toolpath \"{name}\" could not be planned: {reason}")]
     #[diagnostic(help("change or delete that [[toolpath]] in the scene"))]
     Plan {
+        /// The scene, as its messages call it.
+        scene: String,
         /// Name of the toolpath.
         name: String,
         /// What the planner said.
@@ -68,11 +80,21 @@ impl CliError {
         |error| Self::Output { path: path.to_owned(), reason: error.to_string() }
     }
 
+    /// For parts that a scene's formula does not make: `map_err(CliError::part(scene))`.
+    pub fn part(scene: &Scene) -> impl Fn(PartError) -> Self + use<'_> {
+        |reason| Self::Part { scene: scene.source.name.clone(), reason }
+    }
+
+    /// For grids that do not fit: `map_err(CliError::grid(scene))`.
+    pub fn grid(scene: &Scene) -> impl Fn(GridError) -> Self + use<'_> {
+        |reason| Self::Grid { scene: scene.source.name.clone(), reason }
+    }
+
     /// A planner's error, told with the toolpath's name.
-    pub fn plan(name: &str, reason: PlanError) -> Self {
+    pub fn plan(scene: &Scene, name: &str, reason: PlanError) -> Self {
         match reason {
             PlanError::Cancelled(_) => Self::Interrupted,
-            reason => Self::Plan { name: name.to_owned(), reason },
+            reason => Self::Plan { scene: scene.source.name.clone(), name: name.to_owned(), reason },
         }
     }
 }
@@ -92,7 +114,6 @@ pub fn render(error: &CliError, colour: bool) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::scene::Scene;
 
     fn message(text: &str) -> String {
         render(&CliError::Scene(Scene::parse("scenes/wave.toml", text).unwrap_err()), false)
@@ -117,6 +138,9 @@ mod tests {
     #[test]
     fn errors_without_a_place_name_the_cure() {
         insta::assert_snapshot!(render(&CliError::Interrupted, false));
-        insta::assert_snapshot!(render(&CliError::Grid(GridError::Cell(-1.0)), false));
+        insta::assert_snapshot!(render(
+            &CliError::Grid { scene: "plate.toml".into(), reason: GridError::Cell(-1.0) },
+            false
+        ));
     }
 }

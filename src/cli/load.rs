@@ -12,7 +12,10 @@ use crate::part::{Part, PartError, Patch, default_tessellation_tolerance};
 /// [`CliError`] when the part is refused; a file's fault is shown at its name in the scene.
 pub fn load_part(scene: &Scene) -> Result<(Part, Vec<String>), CliError> {
     match &scene.part {
-        PartSource::Formula { surface } => Ok((of_patches(vec![Patch::Analytic(*surface)])?, Vec::new())),
+        PartSource::Formula { surface } => {
+            let part = of_patches(vec![Patch::Analytic(*surface)]).map_err(CliError::part(scene))?;
+            Ok((part, Vec::new()))
+        }
         PartSource::Nurbs { file } => {
             let patches = nurbs_json::read(&file.path).map_err(|e| refused(scene, file, e))?;
             let part = of_patches(patches.into_iter().map(Patch::Nurbs).collect())

@@ -156,7 +156,7 @@ impl<'a> Job<'a> {
     fn new(scene: &'a Scene, progress: &'a Progress) -> Result<Self, CliError> {
         monitor::check(progress)?;
         let (part, mut notes) = load_part(scene)?;
-        let (grid, note) = lay_out(scene, &stock_area(scene, &part))?;
+        let (grid, note) = lay_out(scene, &stock_area(scene, &part)).map_err(CliError::grid(scene))?;
         notes.extend(note);
         let top = part.bounds().max.z + scene.stock.allowance;
         Ok(Self { scene, progress, part, grid, top, notes })
@@ -182,7 +182,7 @@ impl<'a> Job<'a> {
         let (scene, monitor) = (self.scene, self.progress);
         monitor::check(monitor)?;
         let planned = plan(&self.part, &scene.cutter, &request.strategy, &self.settings(request), monitor)
-            .map_err(|reason| CliError::plan(&request.name, reason))?;
+            .map_err(|reason| CliError::plan(scene, &request.name, reason))?;
         let begun = Instant::now();
         let cut = cut_reference(&ZMap::block(self.grid, self.top), &scene.cutter, &planned.path, monitor)?;
         let mut measured =

@@ -94,6 +94,11 @@ pub enum PlanError {
         /// Why, and what would help.
         reason: String,
     },
+    /// No smooth surface, which directions and distances of passes come from, could be fitted to a mesh.
+    #[error(
+        "no smooth surface could be fitted to the mesh ({0}); export a part that is more than a sliver seen from above"
+    )]
+    NoFit(String),
     /// The passes lie so close on so large a part that planning them would take days or all memory.
     #[error(
         "passes {step} mm apart over {x} x {y} mm would be too many; set a greater `stepover` or `scallop`, \
@@ -120,7 +125,7 @@ pub struct Plan {
 
 impl PlanError {
     pub(super) fn mesh(reason: &str) -> Self {
-        Self::NotApplicable { strategy: "a mesh", reason: format!("no surface could be fitted: {reason}") }
+        Self::NoFit(reason.to_owned())
     }
 }
 

@@ -205,6 +205,7 @@ fn grids_that_do_not_fit() {
     let too_fine = PLATE.replace("cell = 0.1", "cell = 0.00002\nmemory_mib = 16");
     std::fs::write(&scene, &too_fine).unwrap();
     let said = flat(&refused(home.path(), "a cell of 20 nm"));
+    assert!(said.contains("scene.toml: the stock cannot be simulated"), "{said}");
     let fitting = said.split("the smallest cell that fits is ").nth(1).expect("the cell that fits");
     let fitting: f64 = fitting.split(' ').next().unwrap().parse().unwrap();
     // The cell that is said to fit does fit, and one a tenth smaller does not (two digits are told).
@@ -217,6 +218,17 @@ fn grids_that_do_not_fit() {
     assert_eq!(answer.code, Some(2), "{answer:?}");
     assert!(flat(&answer.stderr).contains("the smallest cell that fits is"), "{answer:?}");
     assert_eq!(entries(home.path()), ["scene.toml"]);
+}
+
+#[test]
+fn formulas_that_are_no_part() {
+    let formula = "surface = \"plane\"\nx = [0, 8]";
+    let part = |text: &str| PLATE.replace(formula, text);
+    let ripples =
+        part("surface = \"wave\"\namplitude = 50\nwavelength_x = 0.07\nwavelength_y = 0.07\nx = [0, 8]");
+    scene_is_refused(ripples.as_bytes(), "ripples", &["the part cannot be used", "triangles", "[part]"]);
+    let ball = part("surface = \"sphere\"\nradius = 3\nx = [0, 8]");
+    scene_is_refused(ball.as_bytes(), "beyond a ball", &["scene.toml:3:11", "radius 3 mm"]);
 }
 
 /// Paths that would take days and all memory are refused before they are planned.
@@ -236,7 +248,7 @@ fn plans_without_end() {
             let answer = millstream(home.path(), &["run", "scene.toml"]);
             assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{scene}\n{answer:?}");
             let said = flat(&answer.stderr);
-            for word in ["would be too many", strategy, "`stepover`", "help: "] {
+            for word in ["scene.toml", "would be too many", strategy, "`stepover`", "help: "] {
                 assert!(said.contains(word), "{word}: {said}");
             }
             assert_eq!(entries(home.path()), ["scene.toml"]);
