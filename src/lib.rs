@@ -13,6 +13,7 @@ pub mod cutter;
 pub mod field;
 pub mod geometry;
 pub mod io;
+mod lanes;
 pub mod machine;
 pub mod metrology;
 pub mod monitor;

@@ -44,6 +44,17 @@ pub fn for_each_chunk<T: Send>(items: &mut [T], chunk_len: usize, f: impl Fn(usi
     items.par_chunks_mut(chunk_len.max(1)).enumerate().for_each(|(k, chunk)| f(k, chunk));
 }
 
+/// `f(k, item)` of every item, in order, stopping at the first error found.
+///
+/// # Errors
+/// The error of the closure.
+pub fn try_map_mut<I: Send, T: Send, E: Send>(
+    items: &mut [I],
+    f: impl Fn(usize, &mut I) -> Result<T, E> + Sync + Send,
+) -> Result<Vec<T>, E> {
+    items.par_iter_mut().enumerate().map(|(k, item)| f(k, item)).collect()
+}
+
 /// Calls `f(k, item)` on every item, stopping at the first error found.
 ///
 /// # Errors

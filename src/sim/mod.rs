@@ -2,6 +2,7 @@
 //! strategies nor the design part.
 
 mod bins;
+mod cut;
 mod envelope;
 mod form;
 mod grid;
@@ -13,6 +14,7 @@ mod track;
 mod zmap;
 
 pub use bins::MoveBins;
+pub use cut::{Work, cut, cut_counted};
 pub use envelope::Envelope;
 pub use grid::{Grid, GridError};
 pub use reference::cut_reference;

@@ -31,7 +31,7 @@ pub(crate) struct Track {
 impl Track {
     /// From the ends of the tip's path, in either order.
     pub fn new(from: Point3, to: Point3) -> Self {
-        let descends = (to.z, to.x, to.y) < (from.z, from.x, from.y);
+        let descends = Self::falls(from, to);
         let (low, high) = if descends { (to, from) } else { (from, to) };
         let (dx, dy, rise) = (high.x - low.x, high.y - low.y, high.z - low.z);
         let length = (dx * dx + dy * dy).sqrt();
@@ -42,6 +42,11 @@ impl Track {
         } else {
             at
         }
+    }
+
+    /// Whether the lower end is that where the move ends.
+    pub fn falls(from: Point3, to: Point3) -> bool {
+        (to.z, to.x, to.y) < (from.z, from.x, from.y)
     }
 
     /// Position of `(x, y)` along the track from its lower end, and across it (positive to the

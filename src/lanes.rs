@@ -1,0 +1,81 @@
+//! Vector width picked at run time: one build serves every x86-64 and arm64 machine.
+//!
+//! Plain loops over arrays of fixed length become vector code for the widest unit found (AVX-512,
+//! AVX2, NEON) if they are compiled for it; [`dispatch`] compiles its closure once for each. Nothing in
+//! such code fuses a product with a sum, so that every width gives the same bits.
+
+/// Runs `work`, compiled for the vector unit of this machine. Everything hot that it calls must be
+/// `#[inline(always)]`: what is not inlined stays code for the oldest machine.
+#[inline(always)]
+pub fn dispatch<R>(work: impl FnOnce() -> R) -> R {
+    struct Work<F>(F);
+    impl<R, F: FnOnce() -> R> pulp::NullaryFnOnce for Work<F> {
+        type Output = R;
+        #[inline(always)]
+        fn call(self) -> R {
+            (self.0)()
+        }
+    }
+    pulp::Arch::new().dispatch(Work(work))
+}
+
+/// The number type of a vector loop: f32 where its rounding is far below what is asked, else f64.
+pub trait Real:
+    Copy
+    + PartialOrd
+    + std::ops::Add<Output = Self>
+    + std::ops::Sub<Output = Self>
+    + std::ops::Mul<Output = Self>
+    + std::ops::Div<Output = Self>
+    + std::ops::Neg<Output = Self>
+    + Send
+    + Sync
+{
+    /// The nearest number of this type.
+    fn of(x: f64) -> Self;
+    /// Exactly this number.
+    fn wide(self) -> f64;
+    /// Square root; NaN of a negative number.
+    fn sqrt(self) -> Self;
+    /// The larger one; the second one where either is NaN. One machine instruction, which `f64::max` is
+    /// not, because that also orders NaN.
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        if self > other { self } else { other }
+    }
+    /// The smaller one; the second one where either is NaN.
+    #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        if self < other { self } else { other }
+    }
+}
+
+impl Real for f32 {
+    #[inline(always)]
+    fn of(x: f64) -> Self {
+        x as f32
+    }
+    #[inline(always)]
+    fn wide(self) -> f64 {
+        f64::from(self)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f32::sqrt(self)
+    }
+}
+
+impl Real for f64 {
+    #[inline(always)]
+    fn of(x: f64) -> Self {
+        x
+    }
+    #[inline(always)]
+    fn wide(self) -> f64 {
+        self
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f64::sqrt(self)
+    }
+}

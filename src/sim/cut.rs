@@ -1,0 +1,686 @@
+//! The z-map engine: the lower envelope of all swept moves by branch and bound. mm, z up.
+//!
+//! Enters: stock, cutter, path. Leaves: the stock after the whole path, as exact as that of
+//! [`cut_reference`](super::cut_reference) to 0.01 µm, in a small share of its time.
+//!
+//! Tiles of the grid, one worker each, hold the moves that can reach them and are divided like a
+//! quadtree, down to leaves of 8 × 8 cells. At every square moves are dropped that cannot be lowest
+//! anywhere in it, so that few are left in a leaf; those are evaluated in closed form at every cell.
+//!
+//! # The bound
+//! Let c be a square's corners and b a move that passes all of it. The height `h_b` is convex
+//! ([`sweep`]), so inside the square it lies below the bilinear interpolation of its values at the
+//! corners, which is a convex combination of them. Another move lies above any plane that touches it
+//! from below, and a plane is its own bilinear interpolation. Hence, if the plane of move j lies
+//! at or above `h_b` at the four corners, j lies at or above b in all of the square, and can go. The same
+//! holds with the level of the stock in place of b. No curvature enters, and no case is left out:
+//! plunges, moves of no length and moves beside the stock have convex heights too.
+
+mod local;
+mod sweep;
+#[cfg(test)]
+mod tests;
+
+use super::bins::MoveBins;
+use super::form::{Family, Form};
+use super::swept::swept_height;
+use super::track::Track;
+use super::{Grid, NOT_CUT, ZMap};
+use crate::cutter::Cutter;
+use crate::lanes::{self, Real};
+use crate::monitor::{Cancelled, Monitor, check};
+use crate::parallel;
+use crate::toolpath::Toolpath;
+use local::{Chunk, Frame, LANES, LocalMove, MoveList, Name};
+use sweep::{Ball, Flat, Rounded, Sweep};
+
+/// Cells along the side of a leaf. Smaller leaves keep fewer moves and ask for them more often.
+const LEAF: usize = 8;
+const LEAF_CELLS: usize = LEAF * LEAF;
+
+/// A leaf with more moves than this is divided once more.
+const CROWDED: usize = 5;
+
+/// Cells along the side of such a part of a leaf.
+const PART: usize = LEAF / 2;
+const PART_CELLS: usize = PART * PART;
+
+/// Most cells along the side of a tile, a power of two times [`LEAF`]. Larger ones leave too few for
+/// many workers.
+const LARGEST_TILE: usize = 256;
+
+/// Side of a tile in cutter radii, about. In larger ones many moves are carried down a level in vain; in
+/// smaller ones a move is listed in many tiles.
+const TILE_RADII: f64 = 1.7;
+
+/// How the cells are cut.
+pub fn cut(stock: ZMap, cutter: &Cutter, path: &Toolpath, monitor: &dyn Monitor) -> Result<ZMap, Cancelled> {
+    cut_counted(stock, cutter, path, monitor).map(|(map, _)| map)
+}
+
+/// As [`cut`], with what was done.
+///
+/// # Errors
+/// As [`cut`].
+pub fn cut_counted(
+    stock: ZMap,
+    cutter: &Cutter,
+    path: &Toolpath,
+    monitor: &dyn Monitor,
+) -> Result<(ZMap, Work), Cancelled> {
+    check(monitor)?;
+    let form = Form::new(cutter);
+    let side = tile_side(form.radius, stock.grid.cell);
+    Job { form, path, side, margin: 0.0 }.run(stock, monitor)
+}
+
+fn tile_side(radius: f64, cell: f64) -> usize {
+    let leaves = TILE_RADII * radius / (cell * LEAF as f64);
+    let mut side = LEAF;
+    while side < LARGEST_TILE && (2 * side) as f64 <= leaves * LEAF as f64 {
+        side *= 2;
+    }
+    side
+}
+
+/// Most moves that are compared each with each. Comparing more costs more than it saves.
+const MOST_JUDGES: usize = 2 * LANES;
+
+/// So few moves go down to the leaves without further tests.
+const FEW: usize = 2;
+
+/// What was done, for benchmarks and tests.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Moves tested at squares.
+    pub tests: u64,
+    /// Closed forms evaluated at cells.
+    pub evaluations: u64,
+    /// Cells worked out again in f64.
+    pub second_looks: u64,
+}
+
+struct Job<'a> {
+    form: Form,
+    path: &'a Toolpath,
+    side: usize,
+    /// Added to every bound: 0 but in tests.
+    margin: f64,
+}
+
+impl Job<'_> {
+    fn run(&self, mut stock: ZMap, monitor: &dyn Monitor) -> Result<(ZMap, Work), Cancelled> {
+        let grid = stock.grid;
+        let bins = MoveBins::new(&grid, self.side, self.form.radius, self.path);
+        monitor.start("cutting", (bins.nx() * bins.ny()) as u64);
+        let mut tiles = tiles(&mut stock, self.side);
+        let works = parallel::try_map_mut(&mut tiles, |k, tile| {
+            check(monitor)?;
+            let work = self.cut_tile(&grid, tile, bins.of_bin(k % bins.nx(), k / bins.nx()));
+            monitor.advance(1);
+            Ok(work)
+        })?;
+        drop(tiles);
+        let total = works.iter().fold(Work::default(), |sum, w| Work {
+            tests: sum.tests + w.tests,
+            evaluations: sum.evaluations + w.evaluations,
+            second_looks: sum.second_looks + w.second_looks,
+        });
+        Ok((stock, total))
+    }
+
+    fn cut_tile(&self, grid: &Grid, tile: &mut Tile<'_>, moves: &[u32]) -> Work {
+        let (radius, half) = (self.form.radius, 0.5 * (self.side as f64) * grid.cell);
+        let extent = radius + half * std::f64::consts::SQRT_2;
+        let (form, blur) = (&self.form, sweep::blur(extent));
+        let share = sweep::rim_share(extent);
+        lanes::dispatch(
+            #[inline(always)]
+            || match (form.family, share) {
+                (Family::Ball, Some(share)) => {
+                    self.cut_with::<f32, _>(Ball::new(radius, share), grid, tile, moves, extent)
+                }
+                (Family::Ball, None) => {
+                    self.cut_with::<f64, _>(Ball::new(radius, 0.0), grid, tile, moves, extent)
+                }
+                (Family::Flat, Some(_)) => {
+                    self.cut_with::<f32, _>(Flat::new(radius, blur), grid, tile, moves, extent)
+                }
+                (Family::Flat, None) => {
+                    self.cut_with::<f64, _>(Flat::new(radius, 0.0), grid, tile, moves, extent)
+                }
+                (Family::Rounded, Some(_)) if form.arc_end == form.radius => {
+                    self.cut_with::<f32, _>(Rounded::<_, false>::new(form, blur), grid, tile, moves, extent)
+                }
+                (Family::Rounded, Some(_)) => {
+                    self.cut_with::<f32, _>(Rounded::<_, true>::new(form, blur), grid, tile, moves, extent)
+                }
+                (Family::Rounded, None) => {
+                    self.cut_with::<f64, _>(Rounded::<_, true>::new(form, 0.0), grid, tile, moves, extent)
+                }
+            },
+        )
+    }
+
+    #[inline(always)]
+    fn cut_with<T: Real, S: Sweep<T>>(
+        &self,
+        sweep: S,
+        grid: &Grid,
+        tile: &mut Tile<'_>,
+        moves: &[u32],
+        extent: f64,
+    ) -> Work {
+        let (nx, ny) = (tile.rows.first().map_or(0, |row| row.0.len()), tile.rows.len());
+        let low = grid.centre(tile.i0, tile.j0);
+        let high = grid.centre(tile.i0 + nx - 1, tile.j0 + ny - 1);
+        let mut frame = Frame {
+            x: 0.5 * (low.x + high.x),
+            y: 0.5 * (low.y + high.y),
+            z: f64::INFINITY,
+            reach: 2.0 * extent,
+        };
+        let tracks: Vec<Track> = moves.iter().map(|&k| track(self.path, k)).collect();
+        for track in &tracks {
+            let (along, _) = track.along_across(frame.x, frame.y);
+            let lowest = track.tip((along - extent).max(0.0).min(track.length));
+            frame.z = frame.z.min(lowest);
+        }
+        if !frame.z.is_finite() {
+            frame.z = 0.0;
+        }
+        let mut levels = vec![MoveList::new()];
+        for (&k, track) in moves.iter().zip(&tracks) {
+            let (local, bound_only) = LocalMove::new(track, &frame);
+            let falling = Track::falls(self.path.start_of(k as usize), self.path.moves[k as usize].to.tip);
+            levels[0].push(&local, Name::new(k, bound_only, falling));
+        }
+        levels[0].seal();
+        let tops = leaf_tops(tile, self.side);
+        let mut worker = Worker {
+            job: self,
+            sweep,
+            grid,
+            tile,
+            frame,
+            offsets: std::array::from_fn(|k| T::of(k as f64 * grid.cell)),
+            tops,
+            levels,
+            planes: Vec::new(),
+            kept_planes: [Planes::none(); MOST_JUDGES / LANES],
+            work: Work::default(),
+        };
+        worker.square(0, 0, 0, self.side);
+        worker.work
+    }
+}
+
+fn track(path: &Toolpath, k: u32) -> Track {
+    Track::new(path.start_of(k as usize), path.moves[k as usize].to.tip)
+}
+
+/// A square of cells that one worker owns.
+struct Tile<'a> {
+    /// Its first cell in the grid.
+    i0: usize,
+    j0: usize,
+    /// Its part of each row of the map.
+    rows: Vec<(&'a mut [f32], &'a mut [u32])>,
+}
+
+/// The map dealt out to its tiles, row by row of tiles.
+fn tiles(map: &mut ZMap, side: usize) -> Vec<Tile<'_>> {
+    let grid = map.grid;
+    let mut tiles: Vec<Tile<'_>> = Vec::with_capacity(grid.nx.div_ceil(side) * grid.ny.div_ceil(side));
+    if grid.is_empty() {
+        return tiles;
+    }
+    let bands = map.height.chunks_mut(side * grid.nx).zip(map.cut_by.chunks_mut(side * grid.nx));
+    for (band, (height, cut_by)) in bands.enumerate() {
+        let first = tiles.len();
+        for i0 in (0..grid.nx).step_by(side) {
+            tiles.push(Tile { i0, j0: band * side, rows: Vec::with_capacity(side) });
+        }
+        for (height, cut_by) in height.chunks_mut(grid.nx).zip(cut_by.chunks_mut(grid.nx)) {
+            let pieces = height.chunks_mut(side).zip(cut_by.chunks_mut(side));
+            for (tile, piece) in tiles[first..].iter_mut().zip(pieces) {
+                tile.rows.push(piece);
+            }
+        }
+    }
+    tiles
+}
+
+/// The highest height in each leaf of a tile, `[side / LEAF][side / LEAF]`.
+#[inline(always)]
+fn leaf_tops(tile: &Tile<'_>, side: usize) -> Vec<f32> {
+    let leaves = side / LEAF;
+    let mut tops = vec![f32::NEG_INFINITY; leaves * leaves];
+    for (tops, rows) in tops.chunks_mut(leaves).zip(tile.rows.chunks(LEAF)) {
+        for (k, top) in tops.iter_mut().enumerate() {
+            // One maximum for each column.
+            let mut columns = [f32::NEG_INFINITY; LEAF];
+            for (heights, _) in rows {
+                let mut cells = [f32::NEG_INFINITY; LEAF];
+                let n = heights.len().saturating_sub(k * LEAF).min(LEAF);
+                copy_row::<LEAF, _>(&mut cells, heights.get(k * LEAF..).unwrap_or(&[]), n);
+                for c in 0..LEAF {
+                    columns[c] = if cells[c] > columns[c] { cells[c] } else { columns[c] };
+                }
+            }
+            *top = columns.into_iter().fold(f32::NEG_INFINITY, |a, b| if a > b { a } else { b });
+        }
+    }
+    tops
+}
+
+/// Planes below the moves of a chunk, at the middle of a square.
+#[derive(Clone, Copy)]
+struct Planes<T> {
+    z: [T; LANES],
+    x: [T; LANES],
+    y: [T; LANES],
+    /// Squared distance from the track.
+    away: [T; LANES],
+    /// Which end of the move alone cuts in the square, if any: bits [`AT_START`] and [`AT_END`].
+    ends: [u32; LANES],
+}
+
+/// Only the cutter at the start of the move cuts in the square.
+const AT_START: u32 = 1;
+/// Only the cutter at the end of the move cuts in the square.
+const AT_END: u32 = 2;
+
+impl<T: Real> Planes<T> {
+    fn none() -> Self {
+        let zero = [T::of(0.0); LANES];
+        Self { z: zero, x: zero, y: zero, away: zero, ends: [0; LANES] }
+    }
+
+    #[inline(always)]
+    fn set(&mut self, lane: usize, from: &Self, from_lane: usize) {
+        self.z[lane] = from.z[from_lane];
+        self.x[lane] = from.x[from_lane];
+        self.y[lane] = from.y[from_lane];
+    }
+
+    /// Heights at the corners of a square.
+    #[inline(always)]
+    fn corners(&self, lane: usize, square: &Square<T>) -> [T; 4] {
+        let (dx, dy) = (self.x[lane] * square.half_x, self.y[lane] * square.half_y);
+        let z = self.z[lane];
+        [z - dx - dy, z + dx - dy, z - dx + dy, z + dx + dy]
+    }
+}
+
+struct Worker<'a, 'b, T, S> {
+    job: &'a Job<'a>,
+    sweep: S,
+    grid: &'a Grid,
+    tile: &'a mut Tile<'b>,
+    frame: Frame,
+    /// Distances of a leaf's cells from its first one, along either axis.
+    offsets: [T; LEAF],
+    /// The highest stock in each leaf.
+    tops: Vec<f32>,
+    /// The moves left at each level of squares.
+    levels: Vec<MoveList<T>>,
+    planes: Vec<Planes<T>>,
+    /// Those of the moves that are kept, if they are few.
+    kept_planes: [Planes<T>; MOST_JUDGES / LANES],
+    work: Work,
+}
+
+/// A square of cells: its middle in the tile's frame, and the distance from there to its outermost
+/// cell centres.
+#[derive(Clone, Copy)]
+struct Square<T> {
+    x: T,
+    y: T,
+    half_x: T,
+    half_y: T,
+}
+
+impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
+    /// The cells of a square inside the tile.
+    #[inline(always)]
+    fn square_at(&self, i: usize, j: usize, nx: usize, ny: usize) -> Square<T> {
+        let centre = |first: f64, n: usize| first + 0.5 * (n - 1) as f64 * self.grid.cell;
+        let low = self.grid.centre(self.tile.i0 + i, self.tile.j0 + j);
+        let half = |n: usize| T::of(0.5 * (n - 1) as f64 * self.grid.cell);
+        Square {
+            x: T::of(centre(low.x, nx) - self.frame.x),
+            y: T::of(centre(low.y, ny) - self.frame.y),
+            half_x: half(nx),
+            half_y: half(ny),
+        }
+    }
+
+    /// Cuts the square of `side` cells at `(i, j)` of the tile with the moves of a level.
+    #[inline(always)]
+    fn square(&mut self, level: usize, i: usize, j: usize, side: usize) {
+        // A recursion that is all inlined: an explicit stack of squares.
+        let mut waiting = [(0usize, 0usize, 0usize, 0usize); 64];
+        waiting[0] = (level, i, j, side);
+        let mut count = 1;
+        while count > 0 {
+            count -= 1;
+            let (level, i, j, side) = waiting[count];
+            let (width, height) = (self.tile.rows[0].0.len(), self.tile.rows.len());
+            if i >= width || j >= height {
+                continue;
+            }
+            let (nx, ny) = (side.min(width - i), side.min(height - j));
+            if level + 1 == self.levels.len() {
+                self.levels.push(MoveList::new());
+            }
+            // Two moves cost less at every cell than telling them apart.
+            let level = if self.levels[level].len() <= FEW {
+                level
+            } else {
+                self.keep(level, i, j, nx, ny);
+                level + 1
+            };
+            if self.levels[level].len() == 0 {
+                for (_, cut_by) in &mut self.tile.rows[j..j + ny] {
+                    cut_by[i..i + nx].fill(NOT_CUT);
+                }
+            } else if side == PART {
+                self.leaf::<PART, PART_CELLS>(level, i, j, nx, ny);
+            } else if side == LEAF && self.levels[level].len() <= CROWDED {
+                self.leaf::<LEAF, LEAF_CELLS>(level, i, j, nx, ny);
+            } else {
+                let half = side / 2;
+                for (di, dj) in [(half, half), (0, half), (half, 0), (0, 0)] {
+                    waiting[count] = (level, i + di, j + dj, half);
+                    count += 1;
+                }
+            }
+        }
+    }
+
+    /// Leaves in the level below those of the level's moves that may be lowest somewhere in the
+    /// square.
+    #[inline(always)]
+    fn keep(&mut self, level: usize, i: usize, j: usize, nx: usize, ny: usize) {
+        let square = self.square_at(i, j, nx, ny);
+        let stock = self.stock_top(i, j, nx, ny);
+        let (above, below) = self.levels.split_at_mut(level + 1);
+        let (all, kept) = (&above[level], &mut below[0]);
+        kept.clear();
+        self.work.tests += all.len() as u64;
+        if self.planes.len() < all.chunks().len() {
+            self.planes.resize(all.chunks().len(), Planes::none());
+        }
+        let half_diagonal = (square.half_x * square.half_x + square.half_y * square.half_y).sqrt();
+        let (reach, within) = (self.sweep.radius() + half_diagonal, self.sweep.radius() - half_diagonal);
+        let reach2 = reach * reach;
+        // Moves that pass all of the square can judge others.
+        let covers = if within > T::of(0.0) { within * within } else { T::of(-1.0) };
+        let infinite = T::of(f64::INFINITY);
+        let mut least = [infinite; LANES];
+        let mut least_in = [0u32; LANES];
+        for (k, (chunk, planes)) in all.chunks().iter().zip(&mut self.planes).enumerate() {
+            *planes = planes_of(&self.sweep, chunk, &square);
+            for lane in 0..LANES {
+                let judges = !chunk.name(lane).bound_only() & (planes.away[lane] <= covers);
+                let z = if judges { planes.z[lane] } else { infinite };
+                let lower = z < least[lane];
+                least[lane] = if lower { z } else { least[lane] };
+                least_in[lane] = if lower { (k * LANES + lane) as u32 } else { least_in[lane] };
+            }
+        }
+        // The least of the lanes, by halves, without a branch.
+        let mut half = LANES / 2;
+        while half > 0 {
+            for lane in 0..half {
+                let lower = least[lane + half] < least[lane];
+                least[lane] = if lower { least[lane + half] } else { least[lane] };
+                least_in[lane] = if lower { least_in[lane + half] } else { least_in[lane] };
+            }
+            half /= 2;
+        }
+        let (best, ceiling) = if least[0] < infinite {
+            let k = least_in[0] as usize;
+            (k, corners(&self.sweep, &all.get(k).0, &square))
+        } else {
+            (usize::MAX, [infinite; 4])
+        };
+        let margin = T::of(self.job.margin);
+        for (k, (chunk, planes)) in all.chunks().iter().zip(&self.planes).enumerate() {
+            let mut keep = [false; LANES];
+            for lane in 0..LANES {
+                let corners = planes.corners(lane, &square).map(|z| z + margin);
+                let above = at_or_above(corners, ceiling);
+                let lowest = corners[0].smaller(corners[1]).smaller(corners[2].smaller(corners[3]));
+                keep[lane] = !above & (lowest < stock) & (planes.away[lane] <= reach2);
+            }
+            let valid = (all.len() - k * LANES).min(LANES);
+            for (lane, &keep) in keep[..valid].iter().enumerate() {
+                let place = k * LANES + lane;
+                if place == best || (keep && !is_covered(all, &self.planes, place)) {
+                    if kept.len() < MOST_JUDGES {
+                        self.kept_planes[kept.len() / LANES].set(kept.len() % LANES, planes, lane);
+                    }
+                    kept.push(&chunk.lane(lane), chunk.name(lane));
+                }
+            }
+        }
+        if (FEW + 1..=MOST_JUDGES).contains(&kept.len()) {
+            judge(&self.sweep, kept, &self.kept_planes, &square, margin);
+        }
+        kept.seal();
+    }
+
+    /// The highest stock in the square.
+    #[inline(always)]
+    fn stock_top(&self, i: usize, j: usize, nx: usize, ny: usize) -> T {
+        let mut top = f32::NEG_INFINITY;
+        for row in self.tops.chunks_exact(self.job.side / LEAF).skip(j / LEAF).take(ny.div_ceil(LEAF)) {
+            for &height in row.iter().skip(i / LEAF).take(nx.div_ceil(LEAF)) {
+                top = if height > top { height } else { top };
+            }
+        }
+        T::of(f64::from(top) - self.frame.z)
+    }
+
+    /// Cuts the cells of a leaf of `N` × `N` = `CELLS` cells with all moves of a level.
+    #[inline(always)]
+    fn leaf<const N: usize, const CELLS: usize>(
+        &mut self,
+        level: usize,
+        i: usize,
+        j: usize,
+        nx: usize,
+        ny: usize,
+    ) {
+        let infinite = T::of(f64::INFINITY);
+        let first = self.square_at(i, j, 1, 1);
+        let mut height = [infinite; CELLS];
+        let mut doubt = [infinite; CELLS];
+        let mut by = [NOT_CUT; CELLS];
+        let moves = &self.levels[level];
+        self.work.evaluations += (moves.len() * nx * ny) as u64;
+        let mut second_look = false;
+        for k in 0..moves.len() {
+            let (m, name) = moves.get(k);
+            second_look |= name.bound_only();
+            let index = name.index();
+            let (along, across) = m.along_across(first.x, first.y);
+            for c in 0..CELLS {
+                let (x, y) = (self.offsets[c % N], self.offsets[c / N]);
+                let a = along + (x * m.ux + y * m.uy);
+                let w = across + (y * m.ux - x * m.uy);
+                let (h, d) = self.sweep.height(&m, a, w);
+                let lower = h < height[c];
+                height[c] = if lower { h } else { height[c] };
+                by[c] = if lower { index } else { by[c] };
+                doubt[c] = d.smaller(doubt[c]);
+            }
+        }
+        for c in 0..CELLS {
+            second_look |= (doubt[c] <= height[c]) & (doubt[c] < infinite);
+        }
+        if second_look {
+            self.leaf_again(level, i, j, nx, ny);
+            return;
+        }
+        // Through arrays of a fixed length: loops over those become vector code.
+        let mut stored = [f32::NEG_INFINITY; CELLS];
+        for (row, (heights, _)) in self.tile.rows[j..j + ny].iter().enumerate() {
+            copy_row::<N, _>(&mut stored[row * N..], &heights[i..], nx);
+        }
+        for c in 0..CELLS {
+            let cut = (height[c].wide() + self.frame.z) as f32;
+            let lower = cut < stored[c];
+            stored[c] = if lower { cut } else { stored[c] };
+            by[c] = if lower { by[c] } else { NOT_CUT };
+        }
+        for (row, (heights, cut_by)) in self.tile.rows[j..j + ny].iter_mut().enumerate() {
+            copy_row::<N, _>(&mut heights[i..], &stored[row * N..], nx);
+            copy_row::<N, _>(&mut cut_by[i..], &by[row * N..], nx);
+        }
+    }
+
+    /// As [`Self::leaf`], by the closed forms of the reference engine in f64.
+    fn leaf_again(&mut self, level: usize, i: usize, j: usize, nx: usize, ny: usize) {
+        let moves = &self.levels[level];
+        self.work.second_looks += (nx * ny) as u64;
+        let tracks: Vec<(u32, Track)> = (0..moves.len())
+            .map(|k| moves.get(k).1.index())
+            .map(|index| (index, track(self.job.path, index)))
+            .collect();
+        for dj in 0..ny {
+            for di in 0..nx {
+                let p = self.grid.centre(self.tile.i0 + i + di, self.tile.j0 + j + dj);
+                let mut lowest = (f64::INFINITY, NOT_CUT);
+                for (index, track) in &tracks {
+                    let h = swept_height(&self.job.form, track, p.x, p.y);
+                    if h < lowest.0 {
+                        lowest = (h, *index);
+                    }
+                }
+                let (heights, cut_by) = &mut self.tile.rows[j + dj];
+                let h = lowest.0 as f32;
+                let lower = h < heights[i + di];
+                heights[i + di] = if lower { h } else { heights[i + di] };
+                cut_by[i + di] = if lower { lowest.1 } else { NOT_CUT };
+            }
+        }
+    }
+}
+
+/// Whether the move at `place` of the list is covered by its neighbour in the program, which is in the
+/// list too: where only the end of a move cuts, the next move, which begins there, cuts as low; and where
+/// only its start cuts, the one before does. Of two that would cover each other the later one stays.
+#[inline(always)]
+fn is_covered<T: Real>(list: &MoveList<T>, planes: &[Planes<T>], place: usize) -> bool {
+    let ends = |place: usize| planes[place / LANES].ends[place % LANES];
+    let index = |place: usize| list.name(place).index();
+    let (own, here) = (ends(place), index(place));
+    if own & AT_END != 0 && place + 1 < list.len() && index(place + 1) == here + 1 {
+        return true;
+    }
+    own & AT_START != 0 && place > 0 && index(place - 1) + 1 == here && ends(place - 1) & AT_END == 0
+}
+
+#[inline(always)]
+fn at_or_above<T: Real>(a: [T; 4], b: [T; 4]) -> bool {
+    (a[0] >= b[0]) & (a[1] >= b[1]) & (a[2] >= b[2]) & (a[3] >= b[3])
+}
+
+/// Compares few moves each with each and leaves those that none of the others makes useless.
+#[inline(always)]
+fn judge<T: Real, S: Sweep<T>>(
+    sweep: &S,
+    kept: &mut MoveList<T>,
+    planes: &[Planes<T>; MOST_JUDGES / LANES],
+    square: &Square<T>,
+    margin: T,
+) {
+    let zero = [T::of(0.0); LANES];
+    let mut floor = [[zero; 4]; MOST_JUDGES / LANES];
+    let mut height = [[zero; 4]; MOST_JUDGES / LANES];
+    let mut useless = [[false; LANES]; MOST_JUDGES / LANES];
+    for (k, chunk) in kept.chunks().iter().enumerate() {
+        for lane in 0..LANES {
+            let floors = planes[k].corners(lane, square);
+            let heights = corners(sweep, &chunk.lane(lane), square);
+            let unsure = chunk.name(lane).bound_only();
+            for c in 0..4 {
+                floor[k][c][lane] = floors[c] + margin;
+                height[k][c][lane] = if unsure { T::of(f64::INFINITY) } else { heights[c] };
+            }
+        }
+    }
+    let (chunks, len) = (kept.chunks().len(), kept.len());
+    for b in 0..len {
+        let (in_chunk, in_lane) = (b / LANES, b % LANES);
+        // One that is useless itself lies above another that judges as strictly.
+        if useless[in_chunk][in_lane] {
+            continue;
+        }
+        let ceiling = height[in_chunk].map(|h| h[in_lane]);
+        for k in 0..chunks {
+            for lane in 0..LANES {
+                useless[k][lane] |= at_or_above(floor[k].map(|f| f[lane]), ceiling);
+            }
+        }
+        useless[in_chunk][in_lane] = false;
+    }
+    kept.retain(|k| !useless[k / LANES][k % LANES]);
+}
+
+#[inline(always)]
+fn absolute<T: Real>(x: T) -> T {
+    x.larger(-x)
+}
+
+#[inline(always)]
+fn planes_of<T: Real, S: Sweep<T>>(sweep: &S, chunk: &Chunk<T>, square: &Square<T>) -> Planes<T> {
+    let mut planes = Planes::none();
+    for lane in 0..LANES {
+        let m = chunk.lane(lane);
+        let (along, across) = m.along_across(square.x, square.y);
+        let plane = sweep.plane(&m, along, across);
+        planes.z[lane] = plane.z;
+        planes.x[lane] = plane.along * m.ux - plane.across * m.uy;
+        planes.y[lane] = plane.along * m.uy + plane.across * m.ux;
+        let ahead = along - along.larger(m.low).smaller(m.high);
+        planes.away[lane] = ahead * ahead + across * across;
+        let half_along = square.half_x * absolute(m.ux) + square.half_y * absolute(m.uy);
+        let half_across = square.half_x * absolute(m.uy) + square.half_y * absolute(m.ux);
+        let (lower, upper) =
+            sweep.beyond(&m, [along - half_along, along + half_along], absolute(across) + half_across);
+        let name = chunk.name(lane);
+        let (start, end) = if name.falling() { (upper, lower) } else { (lower, upper) };
+        let ends = u32::from(start) * AT_START | u32::from(end) * AT_END;
+        // A plunge has both ends in one place, and only the lower one cuts.
+        planes.ends[lane] = if name.bound_only() | !(m.low < m.high) { 0 } else { ends };
+    }
+    planes
+}
+
+/// Heights of a move at the corners of a square, infinite where they are not known for sure.
+#[inline(always)]
+fn corners<T: Real, S: Sweep<T>>(sweep: &S, m: &LocalMove<T>, square: &Square<T>) -> [T; 4] {
+    let infinite = T::of(f64::INFINITY);
+    let at = |x: T, y: T| {
+        let (along, across) = m.along_across(x, y);
+        let (height, doubt) = sweep.height(m, along, across);
+        // NaN is not below.
+        if (height < infinite) & !(doubt < infinite) { height } else { infinite }
+    };
+    let (x0, x1) = (square.x - square.half_x, square.x + square.half_x);
+    let (y0, y1) = (square.y - square.half_y, square.y + square.half_y);
+    [at(x0, y0), at(x1, y0), at(x0, y1), at(x1, y1)]
+}
+
+/// The first `n` cells of a row of a leaf; nearly always all of them, in one move.
+#[inline(always)]
+fn copy_row<const N: usize, V: Copy>(to: &mut [V], from: &[V], n: usize) {
+    match (n, to.first_chunk_mut::<N>(), from.first_chunk::<N>()) {
+        (n, Some(to), Some(from)) if n == N => *to = *from,
+        _ => to[..n].copy_from_slice(&from[..n]),
+    }
+}

@@ -1,0 +1,219 @@
+//! Moves in the coordinates of one tile, many side by side, for vector loops. mm.
+
+use crate::lanes::Real;
+use crate::sim::track::Track;
+
+/// Moves in one chunk.
+pub(super) const LANES: usize = 16;
+
+/// Slope from which a move counts as steep. Along steep moves the rounding of the place is magnified by
+/// the slope; they are kept as the level move at their lowest tip, which bounds them from below, and
+/// evaluated in f64 where they may cut.
+const STEEP: f64 = 4.0;
+
+/// One straight move of the tip, seen from the point of its track next to the middle of the tile: all
+/// numbers that matter are then no larger than the cutter and the tile.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LocalMove<T> {
+    /// The point of the track next to the middle of the tile.
+    pub x: T,
+    pub y: T,
+    pub z: T,
+    /// Unit direction in the plan view, rising.
+    pub ux: T,
+    pub uy: T,
+    /// Where the track begins and ends, from that point on: `low <= 0 <= high`.
+    pub low: T,
+    pub high: T,
+    /// Rise over plan-view length, `>= 0`, and the sine of the angle of rise.
+    pub slope: T,
+    pub sin: T,
+}
+
+/// Where and how high the middle of a tile is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Frame {
+    pub x: f64,
+    pub y: f64,
+    pub z: f64,
+    /// Parts of a track farther than this from its point next to the middle cannot reach the tile.
+    pub reach: f64,
+}
+
+impl<T: Real> LocalMove<T> {
+    /// The record of a track, and whether it only bounds the move from below.
+    pub fn new(track: &Track, frame: &Frame) -> (Self, bool) {
+        let (along, _) = track.along_across(frame.x, frame.y);
+        let next = along.max(0.0).min(track.length);
+        let (low, high) = ((-next).max(-frame.reach), (track.length - next).min(frame.reach));
+        let steep = track.slope > STEEP;
+        let z = if steep { track.tip(next + low) } else { track.tip(next) };
+        let local = Self {
+            x: T::of(track.x + next * track.ux - frame.x),
+            y: T::of(track.y + next * track.uy - frame.y),
+            z: T::of(z - frame.z),
+            ux: T::of(track.ux),
+            uy: T::of(track.uy),
+            low: T::of(low),
+            high: T::of(high),
+            slope: T::of(if steep { 0.0 } else { track.slope }),
+            sin: T::of(if steep { 0.0 } else { track.sin() }),
+        };
+        (local, steep)
+    }
+
+    /// Place along the track and across it of a point of the tile.
+    #[inline(always)]
+    pub fn along_across(&self, x: T, y: T) -> (T, T) {
+        let (dx, dy) = (x - self.x, y - self.y);
+        (dx * self.ux + dy * self.uy, dy * self.ux - dx * self.uy)
+    }
+}
+
+/// A name of a move with two remarks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Name(u32);
+
+/// The record only bounds its move from below.
+const BOUND_ONLY: u32 = 1 << 31;
+
+/// The program goes along the track from its higher end to its lower one.
+const FALLING: u32 = 1 << 30;
+
+impl Name {
+    /// Most moves that can be named.
+    pub const MOST: usize = FALLING as usize;
+
+    pub fn new(index: u32, bound_only: bool, falling: bool) -> Self {
+        Self(index | if bound_only { BOUND_ONLY } else { 0 } | if falling { FALLING } else { 0 })
+    }
+    #[inline(always)]
+    pub fn index(self) -> u32 {
+        self.0 & !(BOUND_ONLY | FALLING)
+    }
+    #[inline(always)]
+    pub fn bound_only(self) -> bool {
+        self.0 & BOUND_ONLY != 0
+    }
+    #[inline(always)]
+    pub fn falling(self) -> bool {
+        self.0 & FALLING != 0
+    }
+}
+
+/// Up to [`LANES`] moves, one array for each of their numbers.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Chunk<T> {
+    numbers: [[T; LANES]; 9],
+    names: [Name; LANES],
+}
+
+/// A list of moves in chunks; its memory is kept when it is emptied.
+#[derive(Debug, Clone)]
+pub(super) struct MoveList<T> {
+    chunks: Vec<Chunk<T>>,
+    len: usize,
+}
+
+impl<T: Real> MoveList<T> {
+    pub fn new() -> Self {
+        Self { chunks: Vec::new(), len: 0 }
+    }
+
+    #[inline(always)]
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    #[inline(always)]
+    pub fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    /// The chunks in use. The last one may end with moves of an earlier use.
+    #[inline(always)]
+    pub fn chunks(&self) -> &[Chunk<T>] {
+        &self.chunks[..self.len.div_ceil(LANES)]
+    }
+
+    /// Appends a move.
+    #[inline(always)]
+    pub fn push(&mut self, m: &LocalMove<T>, name: Name) {
+        if self.len == LANES * self.chunks.len() {
+            self.chunks.push(Chunk { numbers: [[T::of(0.0); LANES]; 9], names: [Name(0); LANES] });
+        }
+        self.len += 1;
+        self.put(self.len - 1, m, name);
+    }
+
+    /// Marks what is behind the last move, so that loops over whole chunks do not take it for one.
+    #[inline(always)]
+    pub fn seal(&mut self) {
+        if let Some(chunk) = self.chunks.get_mut(self.len / LANES) {
+            chunk.names[self.len % LANES..].fill(Name(BOUND_ONLY));
+        }
+    }
+
+    /// Leaves the moves whose place in the list is wanted.
+    #[inline(always)]
+    pub fn retain(&mut self, wanted: impl Fn(usize) -> bool) {
+        let mut kept = 0;
+        for k in 0..self.len {
+            if !wanted(k) {
+                continue;
+            }
+            if kept < k {
+                let (m, name) = self.get(k);
+                self.put(kept, &m, name);
+            }
+            kept += 1;
+        }
+        self.len = kept;
+    }
+
+    #[inline(always)]
+    fn put(&mut self, k: usize, m: &LocalMove<T>, name: Name) {
+        let (chunk, lane) = (&mut self.chunks[k / LANES], k % LANES);
+        let numbers = [m.x, m.y, m.z, m.ux, m.uy, m.low, m.high, m.slope, m.sin];
+        for (column, number) in chunk.numbers.iter_mut().zip(numbers) {
+            column[lane] = number;
+        }
+        chunk.names[lane] = name;
+    }
+
+    /// The name of move `k`.
+    #[inline(always)]
+    pub fn name(&self, k: usize) -> Name {
+        self.chunks[k / LANES].names[k % LANES]
+    }
+
+    /// Move `k` and its name.
+    #[inline(always)]
+    pub fn get(&self, k: usize) -> (LocalMove<T>, Name) {
+        let chunk = &self.chunks[k / LANES];
+        (chunk.lane(k % LANES), chunk.names[k % LANES])
+    }
+}
+
+impl<T: Real> Chunk<T> {
+    #[inline(always)]
+    pub fn lane(&self, lane: usize) -> LocalMove<T> {
+        let [x, y, z, ux, uy, low, high, slope, sin] = &self.numbers;
+        LocalMove {
+            x: x[lane],
+            y: y[lane],
+            z: z[lane],
+            ux: ux[lane],
+            uy: uy[lane],
+            low: low[lane],
+            high: high[lane],
+            slope: slope[lane],
+            sin: sin[lane],
+        }
+    }
+
+    #[inline(always)]
+    pub fn name(&self, lane: usize) -> Name {
+        self.names[lane % LANES]
+    }
+}

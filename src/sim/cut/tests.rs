@@ -1,0 +1,229 @@
+//! The engine against the reference, and its bounds against samples. What every engine must keep is
+//! tested in `sim/engine_tests.rs`.
+
+use super::*;
+use crate::geometry::{Point2, Point3};
+use crate::monitor::Silent;
+use crate::sim::cut_reference;
+use crate::sim::scenes::{Rng, cutters, path_through, random_path, square_grid, wave_path};
+
+/// What the engine promises against the reference, mm.
+const PROMISED: f32 = 1e-5;
+
+/// A frame at the origin.
+const FRAME: Frame = Frame { x: 0.0, y: 0.0, z: 0.0, reach: 100.0 };
+
+/// A sweep at points of the plane.
+struct Probe<'a> {
+    form: &'a Form,
+    track: &'a Track,
+    height: &'a dyn Fn(f64, f64) -> (f64, f64),
+    /// Height and slopes.
+    plane: &'a dyn Fn(f64, f64) -> [f64; 3],
+}
+
+/// Calls `check` with the sweeps of all cutters along moves of all kinds, in f64.
+fn for_each_sweep(mut check: impl FnMut(&Probe)) {
+    let mut rng = Rng::new(21);
+    for cutter in cutters() {
+        let form = Form::new(&cutter);
+        for (from, to, _) in random_path(&mut rng, 400, 8.0).segments() {
+            let track = Track::new(from, to);
+            let (m, bound_only) = LocalMove::<f64>::new(&track, &FRAME);
+            if bound_only {
+                continue;
+            }
+            match form.family {
+                Family::Ball => probe(&form, &track, &m, Ball::<f64>::new(form.radius, 0.0), &mut check),
+                Family::Flat => probe(&form, &track, &m, Flat::<f64>::new(form.radius, 0.0), &mut check),
+                Family::Rounded => {
+                    probe(&form, &track, &m, Rounded::<f64, true>::new(&form, 0.0), &mut check)
+                }
+            }
+        }
+    }
+}
+
+fn probe<S: Sweep<f64>>(
+    form: &Form,
+    track: &Track,
+    m: &LocalMove<f64>,
+    sweep: S,
+    check: &mut dyn FnMut(&Probe),
+) {
+    let height = |x: f64, y: f64| {
+        let (along, across) = m.along_across(x, y);
+        let (height, doubt) = sweep.height(m, along, across);
+        (if height.is_nan() { f64::INFINITY } else { height }, doubt)
+    };
+    let plane = |x: f64, y: f64| {
+        let (along, across) = m.along_across(x, y);
+        let p = sweep.plane(m, along, across);
+        [p.z, p.along * m.ux - p.across * m.uy, p.along * m.uy + p.across * m.ux]
+    };
+    check(&Probe { form, track, height: &height, plane: &plane });
+}
+
+#[test]
+fn heights_are_those_of_the_reference() {
+    let mut rng = Rng::new(22);
+    let (mut compared, mut doubted) = (0, 0);
+    for_each_sweep(|probe| {
+        for _ in 0..20 {
+            let (x, y) = (probe.track.x + rng.within(-3.5, 3.5), probe.track.y + rng.within(-3.5, 3.5));
+            let ((got, doubt), expected) =
+                ((probe.height)(x, y), swept_height(probe.form, probe.track, x, y));
+            compared += 1;
+            if doubt <= expected && doubt < f64::INFINITY {
+                doubted += 1;
+            } else {
+                let limit = if probe.form.family == Family::Rounded { 2e-6 } else { 1e-12 };
+                let same = got == expected || (got - expected).abs() < limit;
+                assert!(same, "{:?} {:?} at {x} {y}: {got} {expected}", probe.form, probe.track);
+            }
+        }
+    });
+    assert!(doubted * 100 < compared, "{doubted} of {compared} in doubt");
+}
+
+/// The planes of the bound lie nowhere above the sweep, and no plane that lies a micrometre higher does.
+#[test]
+fn planes_lie_below_and_touch() {
+    let mut rng = Rng::new(23);
+    let (mut planes, mut touching) = (0, 0);
+    for_each_sweep(|probe| {
+        let near = |rng: &mut Rng, by: f64| {
+            let s = rng.within(0.0, probe.track.length);
+            let [x, y] = [probe.track.x + s * probe.track.ux, probe.track.y + s * probe.track.uy];
+            (x + rng.within(-by, by), y + rng.within(-by, by))
+        };
+        for _ in 0..4 {
+            let (x, y) = near(&mut rng, 4.0);
+            let [z, gx, gy] = (probe.plane)(x, y);
+            planes += 1;
+            touching += usize::from(z + 1e-3 > swept_height(probe.form, probe.track, x, y));
+            for _ in 0..40 {
+                let (px, py) = near(&mut rng, 3.0);
+                let height = swept_height(probe.form, probe.track, px, py);
+                let bound = z + gx * (px - x) + gy * (py - y);
+                assert!(bound <= height + 1e-9, "{:?} {:?}: {bound} {height}", probe.form, probe.track);
+            }
+        }
+    });
+    assert!(touching * 10 > planes * 3, "{touching} of {planes}");
+}
+
+/// Raised by a micrometre the bound drops moves that are needed.
+#[test]
+fn a_bound_tightened_by_a_micrometre_is_wrong() {
+    let path = wave_path(2.0, 0.3, 0.2);
+    // Small cells: in large leaves the bound is wide.
+    let stock = ZMap::block(square_grid(2.0, 0.005), 5.0);
+    for cutter in cutters() {
+        compare(&stock, &cutter, &path);
+        let exact = cut_reference(&stock, &cutter, &path, &Silent).unwrap();
+        let with = |margin: f64| {
+            let job = Job { form: Form::new(&cutter), path: &path, side: 64, margin };
+            farthest(&job.run(stock.clone(), &Silent).unwrap().0, &exact)
+        };
+        assert!(with(0.0) <= PROMISED, "{cutter:?} {}", with(0.0));
+        assert!(with(1e-3) > 10.0 * PROMISED, "{cutter:?} {}", with(1e-3));
+    }
+}
+
+fn farthest(a: &ZMap, b: &ZMap) -> f32 {
+    a.height.iter().zip(&b.height).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+}
+
+/// The engine cuts what the reference cuts, and names a move that does.
+fn compare(stock: &ZMap, cutter: &Cutter, path: &Toolpath) {
+    let expected = cut_reference(stock, cutter, path, &Silent).unwrap();
+    let got = cut(stock.clone(), cutter, path, &Silent).unwrap();
+    let envelope = crate::sim::Envelope::new(cutter, path);
+    for k in 0..got.height.len() {
+        let (height, by) = (got.height[k], got.cut_by[k]);
+        let place = || {
+            format!(
+                "{cutter:?} cell {k} {} by {} not {height} by {by}",
+                expected.height[k], expected.cut_by[k]
+            )
+        };
+        assert!(
+            (height - expected.height[k]).abs() <= PROMISED.max(height.abs() * f32::EPSILON),
+            "{}",
+            place()
+        );
+        if by != NOT_CUT {
+            let p = stock.grid.centre(k % stock.grid.nx, k / stock.grid.nx);
+            let made = envelope.height(by, p.x, p.y).unwrap();
+            assert!(
+                (made - f64::from(height)).abs() <= f64::from(PROMISED.max(height.abs() * f32::EPSILON)),
+                "{}",
+                place()
+            );
+        }
+    }
+}
+
+#[test]
+fn a_thousand_random_programs_agree_with_the_reference() {
+    let mut rng = Rng::new(24);
+    for round in 0..1000 {
+        let cutter = cutters()[round % 6];
+        let size = [2.0, 4.0, 12.0, 40.0, 200.0][rng.below(5)];
+        let moves = 1 + rng.below(60);
+        let path = random_path(&mut rng, moves, size);
+        let cell = size / rng.within(8.0, 60.0);
+        let origin = Point2::new(rng.within(-2.0, 1.0), rng.within(-2.0, 1.0));
+        let grid = Grid { origin, cell, nx: 1 + rng.below(40), ny: 1 + rng.below(40) };
+        compare(&ZMap::block(grid, 3.0), &cutter, &path);
+    }
+}
+
+#[test]
+fn dense_programs_agree_with_the_reference() {
+    for cutter in cutters() {
+        for (stepover, chord, cell) in [(0.3, 0.2, 0.05), (0.7, 1.3, 0.02), (0.2, 0.01, 0.1), (1.5, 0.4, 0.3)]
+        {
+            let size = if chord < 0.1 { 2.0 } else { 6.0 };
+            compare(&ZMap::block(square_grid(size, cell), 5.0), &cutter, &wave_path(size, stepover, chord));
+        }
+    }
+}
+
+/// Heights and places far from zero, large cutters (f64 throughout), stock that was cut before.
+#[test]
+fn unusual_sizes_agree_with_the_reference() {
+    let mut rng = Rng::new(25);
+    for diameter in [0.02, 30.0, 900.0] {
+        let cutter = Cutter::ball(diameter).unwrap();
+        let path = random_path(&mut rng, 40, 4.0 * diameter);
+        let grid = Grid { origin: Point2::new(-diameter, 0.0), cell: 0.07 * diameter, nx: 60, ny: 50 };
+        compare(&ZMap::block(grid, 3.0), &cutter, &path);
+    }
+    for cutter in cutters() {
+        let path = random_path(&mut rng, 40, 8.0);
+        let far = path.segments().map(|(from, ..)| from + nalgebra::Vector3::new(9000.0, -7000.0, 400.0));
+        let grid = Grid { origin: Point2::new(9000.0, -7000.0), cell: 0.1, nx: 80, ny: 80 };
+        let stock = ZMap::block(grid, 404.0);
+        let path = path_through(far.collect::<Vec<Point3>>());
+        compare(&stock, &cutter, &path);
+        let first = cut_reference(&stock, &cutter, &path, &Silent).unwrap();
+        let again = path_through(
+            path.segments().map(|(from, ..)| Point3::new(from.y + 16000.0, from.x - 16000.0, from.z)),
+        );
+        compare(&first, &cutter, &again);
+    }
+}
+
+/// Ten times as many moves of a tenth of the length: a cell sees few of them.
+#[test]
+fn evaluations_hardly_grow_with_the_moves() {
+    let stock = ZMap::block(square_grid(20.0, 0.05), 5.0);
+    let per_cell = |chord: f64| {
+        let path = wave_path(20.0, 0.3, chord);
+        let (_, work) = cut_counted(stock.clone(), &Cutter::ball(6.0).unwrap(), &path, &Silent).unwrap();
+        work.evaluations as f64 / stock.grid.len() as f64
+    };
+    assert!(per_cell(0.5) < 4.0 && per_cell(0.05) < 8.0, "{} {}", per_cell(0.5), per_cell(0.05));
+}
