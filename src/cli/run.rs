@@ -22,7 +22,7 @@ use crate::report::{
     marks, result_table, surface_mesh, violations,
 };
 use crate::sim::{Grid, GridError, ZMap, cut_reference};
-use crate::toolpath::{Plan, PlanSettings, plan};
+use crate::toolpath::{Plan, PlanSettings, Toolpath, plan};
 
 /// Bytes a cell that a run takes at its peak, which is while ridges are measured: stock (8), design
 /// surface (40), deviations (8), and up to 96 of ridges where every cell has one. The peak resident
@@ -200,7 +200,7 @@ impl<'a> Job<'a> {
         outputs.folder(&request.folder)?;
         let programs = || self.write_programs(request, &planned, outputs);
         let maps = || self.write_maps(request, &cut, &measured, outputs);
-        let mesh = || self.write_mesh(request, &cut, outputs);
+        let mesh = || self.write_mesh(request, &planned.path, &cut, outputs);
         let (surface_mesh, (page, lines)) = parallel::join(mesh, || parallel::join(maps, programs));
         let (surface_mesh, page, lines) = (surface_mesh?, page?, lines?);
         for region in &mut measured.gouge.regions {
@@ -312,6 +312,7 @@ impl<'a> Job<'a> {
     fn write_mesh(
         &self,
         request: &ToolpathRequest,
+        path: &Toolpath,
         cut: &ZMap,
         outputs: &Outputs,
     ) -> Result<SurfaceMeshFigures, CliError> {
@@ -319,7 +320,7 @@ impl<'a> Job<'a> {
         let lowest = cut.height.iter().copied().fold(f32::INFINITY, f32::min);
         let bottom = f64::from(lowest).min(self.part.bounds().min.z) - BASE;
         // A grid of one row has no surface; its file then holds no triangle.
-        let mesh = surface_mesh(cut, bottom, tolerance, MAX_TRIANGLES);
+        let mesh = surface_mesh(cut, &self.scene.cutter, path, bottom, tolerance, MAX_TRIANGLES);
         let (vertices, triangles): (&[_], &[_]) =
             mesh.as_ref().map_or((&[], &[]), |m| (&m.vertices, &m.triangles));
         outputs.file(&format!("{}/machined.stl", request.folder), |out| {

@@ -9,14 +9,17 @@
 
 mod cut_surface;
 mod figures;
+mod meetings;
 mod path;
 mod regions;
 mod ridges;
 
+pub(crate) use cut_surface::CutSurface;
 pub use figures::{
     DeviationFigures, GougeFigures, GougeRegion, Limits, Measurement, PathFigures, ScallopFigures,
     UncutFigures, UncutRegion,
 };
+pub(crate) use meetings::Meetings;
 pub use path::path_figures;
 
 use crate::cutter::Cutter;
@@ -25,7 +28,6 @@ use crate::monitor::{self, Cancelled, Monitor};
 use crate::part::{Part, SurfaceGrid};
 use crate::sim::{Envelope, Grid, NOT_CUT, ZMap};
 use crate::toolpath::Toolpath;
-use cut_surface::CutSurface;
 use regions::connected;
 use ridges::{NUMERICAL_FLOOR, RidgeFinder, RidgeSample, scallop_figures};
 

@@ -13,6 +13,7 @@
 
 use super::cut_surface::CutSurface;
 use super::figures::{Limits, ScallopFigures};
+use super::meetings::{Meeting, Meetings};
 use crate::cutter::Cutter;
 use crate::geometry::{Point2, Point3, Vector2};
 use crate::monitor::{self, Cancelled, Monitor};
@@ -58,22 +59,9 @@ const CLOSER_LINES: i32 = 8;
 /// the other family see the same ridge less squarely.
 const SQUARE_ENOUGH: f64 = 0.7;
 
-/// Two heights that differ by more than this, mm, do not meet.
-const MEETING: f64 = 1e-6;
-
-/// Two moves of one pass that lie farther apart along the path than this many cutter radii are
-/// neighbouring turns of a spiral or loop, not neighbouring chords.
-const SAME_TRACK: f64 = 4.0;
-
 /// A pass serves a ridge when it touches the design within this many distances of the two passes.
 /// On a plane it is half of one; in a hollow of radius 4/3 of the cutter's, two.
 const FARTHEST_CONTACT: f64 = 2.0;
-
-/// Ridges inside ridges (a pass that shows only between two cells): at most this deep.
-const MOST_DEPTH: usize = 8;
-
-/// Position on the line between two centres is found to this share of the pitch.
-const CROSSING: f64 = 1e-10;
 
 /// Numerical floor of every bound, mm: root finding and the design surface's own evaluation.
 pub(super) const NUMERICAL_FLOOR: f64 = 1e-6;
@@ -83,8 +71,7 @@ pub(super) struct RidgeFinder<'a> {
     pub part: &'a Part,
     pub cutter: &'a Cutter,
     pub limits: &'a Limits,
-    /// Distance along the path to the end of each move, mm.
-    along: Vec<f64>,
+    meetings: Meetings<'a>,
 }
 
 /// A line between two neighbouring centres: from the cell `from`, along x or along y.
@@ -122,15 +109,8 @@ impl<'a> RidgeFinder<'a> {
         path: &Toolpath,
         limits: &'a Limits,
     ) -> Self {
-        let mut length = 0.0;
-        let along = path
-            .segments()
-            .map(|(from, to, _)| {
-                length += (to - from).norm();
-                length
-            })
-            .collect();
-        Self { surface, part, cutter, limits, along }
+        let meetings = Meetings::new(surface, cutter, path, None);
+        Self { surface, part, cutter, limits, meetings }
     }
 
     /// All ridge samples, row by row. `on_part` tells which cells are measured.
@@ -155,9 +135,9 @@ impl<'a> RidgeFinder<'a> {
                     }
                     let other = grid.index(ni, nj);
                     let [a, b] = [k, other].map(|k| self.surface.cut.cut_by[k]);
-                    if on_part(other) && self.apart(a, b) {
+                    if on_part(other) && self.meetings.apart(a, b) {
                         let line = GridLine::new(&grid, k as u32, along_x);
-                        self.between(&line, (0.0, a), (1.0, b), MOST_DEPTH, &mut samples);
+                        self.between(&line, (0.0, a), (1.0, b), &mut samples);
                     }
                 }
             }
@@ -167,94 +147,13 @@ impl<'a> RidgeFinder<'a> {
         Ok(rows.into_iter().flatten().collect())
     }
 
-    /// True when two moves belong to neighbouring tracks rather than to one.
-    fn apart(&self, a: u32, b: u32) -> bool {
-        match (self.surface.pass(a), self.surface.pass(b)) {
-            (Some(p), Some(q)) => {
-                let distance = (self.along[a as usize] - self.along[b as usize]).abs();
-                p != q || distance > SAME_TRACK * self.cutter.radius()
-            }
-            _ => false,
-        }
+    /// Adds the ridges on a line between `a`, lowest at its share `ta`, and `b`, lowest at `tb`.
+    fn between(&self, line: &GridLine, a: (f64, u32), b: (f64, u32), out: &mut Vec<RidgeSample>) {
+        self.meetings.between(&|t| line.at(t), a, b, &mut |m| out.extend(self.sample(line, m)));
     }
 
-    /// Finds the ridges between `a` at parameter `ta`, lowest there, and `b` at `tb`.
-    fn between(
-        &self,
-        line: &GridLine,
-        (ta, a): (f64, u32),
-        (tb, b): (f64, u32),
-        depth: usize,
-        out: &mut Vec<RidgeSample>,
-    ) {
-        if !self.apart(a, b) {
-            return;
-        }
-        let t = self.crossing(line, (ta, a), (tb, b));
-        let q = line.at(t);
-        let height = |by: u32| self.surface.envelope.height(by, q.x, q.y).unwrap_or(f64::INFINITY);
-        let (za, zb) = (height(a), height(b));
-        let Some(lowest) = self.surface.at(q.x, q.y) else { return };
-        // Another move is lower at the crossing: it stands between the two.
-        let third = lowest.z < za.min(zb) - 1e-9 && lowest.by != a && lowest.by != b;
-        if third && depth > 0 && self.surface.pass(lowest.by).is_some() {
-            self.between(line, (ta, a), (t, lowest.by), depth - 1, out);
-            self.between(line, (t, lowest.by), (tb, b), depth - 1, out);
-        } else if za.is_finite() && zb.is_finite() && (za - zb).abs() <= MEETING {
-            out.extend(self.sample(line, q, za.max(zb), [a, b]));
-        } else if za.is_infinite() != zb.is_infinite() {
-            // A cutter with a flat ends in a wall: the ridge is its edge.
-            out.extend(self.sample(line, q, za.min(zb), [a, b]));
-        }
-    }
-
-    /// Where the cuts of `a` and `b` are equally high, by bisection and regula falsi (Illinois).
-    fn crossing(&self, line: &GridLine, (mut ta, a): (f64, u32), (mut tb, b): (f64, u32)) -> f64 {
-        let difference = |t: f64| {
-            let q = line.at(t);
-            let height = |by: u32| self.surface.envelope.height(by, q.x, q.y);
-            match (height(a), height(b)) {
-                (Some(za), Some(zb)) => za - zb,
-                (None, Some(_)) => f64::INFINITY,
-                _ => f64::NEG_INFINITY,
-            }
-        };
-        let (mut fa, mut fb) = (difference(ta), difference(tb));
-        if fa >= 0.0 {
-            return ta;
-        }
-        if fb <= 0.0 {
-            return tb;
-        }
-        let mut side = 0i8;
-        for _ in 0..100 {
-            if tb - ta < CROSSING {
-                break;
-            }
-            let secant = ta + (tb - ta) * (fa / (fa - fb));
-            let t = if secant > ta && secant < tb { secant } else { 0.5 * (ta + tb) };
-            let f = difference(t);
-            if f.abs() < 1e-13 {
-                return t;
-            }
-            if f < 0.0 {
-                (ta, fa) = (t, f);
-                if side == -1 && fb.is_finite() {
-                    fb *= 0.5;
-                }
-                side = -1;
-            } else {
-                (tb, fb) = (t, f);
-                if side == 1 && fa.is_finite() {
-                    fa *= 0.5;
-                }
-                side = 1;
-            }
-        }
-        0.5 * (ta + tb)
-    }
-
-    fn sample(&self, line: &GridLine, q: Point2, z: f64, moves: [u32; 2]) -> Option<RidgeSample> {
+    fn sample(&self, line: &GridLine, meeting: Meeting) -> Option<RidgeSample> {
+        let Meeting { at: q, z, moves, .. } = meeting;
         let at = Point3::new(q.x, q.y, z);
         let (foot, height) = self.part.closest_point(&at);
         let [m, n] = moves.map(|by| self.surface.normal(by, q.x, q.y));
@@ -300,7 +199,7 @@ impl<'a> RidgeFinder<'a> {
             for k in -CLOSER_LINES / 2..=CLOSER_LINES / 2 {
                 let line = line.beside(f64::from(k) / f64::from(CLOSER_LINES));
                 // The ridge may leave the cell sideways by half of it.
-                self.between(&line, (-0.5, a), (1.5, b), MOST_DEPTH, &mut found);
+                self.between(&line, (-0.5, a), (1.5, b), &mut found);
             }
             found.retain(|s| self.part.highest_at(s.at.x, s.at.y).is_some());
             found
