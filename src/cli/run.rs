@@ -10,7 +10,7 @@ use super::outputs::Outputs;
 use super::progress::Progress;
 use crate::geometry::Aabb;
 use crate::io::scene::{Engine, Scene, ToolpathRequest};
-use crate::io::{ProgramHeader, apt_cl, exr, gcode, png, stl_write};
+use crate::io::{ProgramHeader, apt_cl, exr, gcode, ply_write, png, stl_write};
 use crate::machine::machining_time;
 use crate::metrology::{Measurement, measure, path_figures};
 use crate::monitor::{self, Monitor as _};
@@ -18,8 +18,8 @@ use crate::parallel;
 use crate::part::Part;
 use crate::report::{
     HIGHEST_RIDGE, Histogram, MAX_TRIANGLES, MapSize, MapWords, Picture, RunReport, SimulationFigures,
-    SurfaceMeshFigures, ToolpathPage, ToolpathResult, Verdict, deviation_picture, height_picture, html_page,
-    marks, result_table, surface_mesh, violations,
+    SurfaceMeshFigures, ToolpathPage, ToolpathResult, Verdict, deviation_colours, deviation_picture,
+    height_picture, html_page, marks, result_table, surface_mesh, violations,
 };
 use crate::sim::{Grid, GridError, ZMap, cut_reference};
 use crate::toolpath::{Plan, PlanSettings, Toolpath, plan};
@@ -200,7 +200,7 @@ impl<'a> Job<'a> {
         outputs.folder(&request.folder)?;
         let programs = || self.write_programs(request, &planned, outputs);
         let maps = || self.write_maps(request, &cut, &measured, outputs);
-        let mesh = || self.write_mesh(request, &planned.path, &cut, outputs);
+        let mesh = || self.write_mesh(request, &planned.path, &cut, &measured, outputs);
         let (surface_mesh, (page, lines)) = parallel::join(mesh, || parallel::join(maps, programs));
         let (surface_mesh, page, lines) = (surface_mesh?, page?, lines?);
         for region in &mut measured.gouge.regions {
@@ -314,6 +314,7 @@ impl<'a> Job<'a> {
         request: &ToolpathRequest,
         path: &Toolpath,
         cut: &ZMap,
+        measured: &Measurement,
         outputs: &Outputs,
     ) -> Result<SurfaceMeshFigures, CliError> {
         let tolerance = MESH_SHARE * self.scene.tolerance.scallop;
@@ -325,6 +326,14 @@ impl<'a> Job<'a> {
             mesh.as_ref().map_or((&[], &[]), |m| (&m.vertices, &m.triangles));
         outputs.file(&format!("{}/machined.stl", request.folder), |out| {
             stl_write::write(out, vertices, triangles)
+        })?;
+        let deviations =
+            mesh.as_ref().map_or_else(Vec::new, |m| m.deviations(&self.part, &measured.deviation_map));
+        let colours = deviation_colours(&deviations, &self.scene.tolerance);
+        outputs.file(&format!("{}/machined.ply", request.folder), |out| {
+            let vertices =
+                ply_write::Vertices { places: vertices, colours: &colours, deviations: &deviations };
+            ply_write::write(out, &vertices, triangles)
         })?;
         let tolerance_mm = mesh.as_ref().map_or(tolerance, |m| m.tolerance);
         Ok(SurfaceMeshFigures { triangles: triangles.len(), tolerance_mm })
@@ -352,9 +361,15 @@ mod tests {
         let outcome = run(&options, &Progress::quiet()).unwrap();
         assert_eq!(outcome.verdict, Verdict::Pass, "{}", outcome.text);
         let out = options.out.unwrap();
-        for name in
-            ["deviation.png", "height.png", "height.exr", "toolpath.nc", "toolpath.cls", "machined.stl"]
-        {
+        for name in [
+            "deviation.png",
+            "height.png",
+            "height.exr",
+            "toolpath.nc",
+            "toolpath.cls",
+            "machined.stl",
+            "machined.ply",
+        ] {
             assert!(out.join("zigzag").join(name).metadata().unwrap().len() > 100, "{name}");
         }
         let json: serde_json::Value =
@@ -378,8 +393,15 @@ mod tests {
                 serde_json::from_str(&std::fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
             json["toolpaths"][0]["simulation"]["wall_s"] = 0.into();
             json["toolpaths"][0]["simulation"]["threads"] = 0.into();
-            let files =
-                ["deviation.png", "height.png", "height.exr", "toolpath.nc", "toolpath.cls", "machined.stl"];
+            let files = [
+                "deviation.png",
+                "height.png",
+                "height.exr",
+                "toolpath.nc",
+                "toolpath.cls",
+                "machined.stl",
+                "machined.ply",
+            ];
             (json, files.map(|name| std::fs::read(out.join("zigzag").join(name)).unwrap()))
         };
         assert!(read(1) == read(3));

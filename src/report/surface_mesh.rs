@@ -16,6 +16,8 @@ mod tests;
 use std::collections::HashMap;
 
 use crate::cutter::Cutter;
+use crate::geometry::Point3;
+use crate::part::Part;
 use crate::sim::ZMap;
 use crate::toolpath::Toolpath;
 use network::{Network, Scratch};
@@ -59,6 +61,25 @@ pub struct SurfaceMesh {
     /// No cell centre, and no ridge between two neighbouring ones, lies farther above or below the
     /// top than this, mm.
     pub tolerance: f64,
+}
+
+impl SurfaceMesh {
+    /// Signed deviation from the design surface at every vertex, mm: that of `map` (a value a cell) at
+    /// cell centres, the distance from `part` on ridges; NaN off the part and at the bottom.
+    pub fn deviations(&self, part: &Part, map: &[f32]) -> Vec<f32> {
+        crate::parallel::map(self.vertices.len(), |k| match self.places[k] {
+            VertexPlace::Cell(cell) => map[cell],
+            VertexPlace::Bottom => f32::NAN,
+            VertexPlace::Ridge => {
+                let vertex = Point3::from(self.vertices[k].map(f64::from));
+                if part.highest_at(vertex.x, vertex.y).is_none() {
+                    return f32::NAN;
+                }
+                let (foot, distance) = part.closest_point(&vertex);
+                (if (vertex - foot.point).dot(&foot.normal) < 0.0 { -distance } else { distance }) as f32
+            }
+        })
+    }
 }
 
 /// A node of the grid, in cells; nodes beyond the grid's last row and column hold no height.
