@@ -38,9 +38,12 @@ pub struct RunOptions {
     /// Threads to use [default: all cores]. Changes no result.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// Pitch of the simulation's cells, mm, instead of the scene's.
+    /// Pitch of the simulation's cells, mm, instead of the scene's; auto: the program chooses.
     #[arg(long, value_name = "MM", value_parser = cell)]
-    pub cell: Option<f64>,
+    pub cell: Option<Cell>,
+    /// Memory that one simulation may take, MiB, instead of the scene's.
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    pub memory: Option<u32>,
     /// Engine that cuts, instead of the scene's. Both words mean the reference engine at present.
     #[arg(long, value_name = "ENGINE", value_parser = clap::builder::PossibleValuesParser::new(Engine::WORDS))]
     pub engine: Option<String>,
@@ -53,13 +56,26 @@ pub struct CheckOptions {
     pub scene: PathBuf,
 }
 
-fn cell(text: &str) -> Result<f64, String> {
+/// Pitch of the cells.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Cell {
+    /// The program chooses.
+    Auto,
+    /// This, mm.
+    Mm(f64),
+}
+
+fn cell(text: &str) -> Result<Cell, String> {
     /// The range of lengths that scenes take too, mm.
     const CELL: std::ops::RangeInclusive<f64> = 1e-6..=1e4;
+    if text == "auto" {
+        return Ok(Cell::Auto);
+    }
     let value: Option<f64> = text.parse().ok();
     value
         .filter(|v| CELL.contains(v))
-        .ok_or_else(|| "give a positive number of millimetres, such as 0.05".to_owned())
+        .map(Cell::Mm)
+        .ok_or_else(|| "give a positive number of millimetres, such as 0.05, or auto".to_owned())
 }
 
 #[cfg(test)]
@@ -73,7 +89,11 @@ mod tests {
     #[test]
     fn options_are_checked() {
         assert!(parse("millstream run a.toml --cell 0.05 --threads 3 --engine zmap --out x").is_ok());
+        assert!(parse("millstream run a.toml --cell auto --memory 512").is_ok());
         for bad in [
+            "--cell automatic",
+            "--memory 0",
+            "--memory 1.5",
             "--cell 0",
             "--cell nan",
             "--cell inf",

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::error::CliError;
 use super::load::load_part;
-use super::run::{lay_out, stock_area};
+use super::run::lay_out_before_planning;
 use crate::io::scene::{Scene, complete_toml};
 
 /// What `check` prints: the complete scene, which can be run again, after what was found in
@@ -15,7 +15,7 @@ use crate::io::scene::{Scene, complete_toml};
 pub fn check(path: &Path) -> Result<String, CliError> {
     let mut scene = Scene::read(path)?;
     let (part, notes) = load_part(&scene)?;
-    let (grid, note) = lay_out(&scene, &stock_area(&scene, &part)).map_err(CliError::grid(&scene))?;
+    let (grid, note) = lay_out_before_planning(&scene, &part).map_err(CliError::grid(&scene))?;
     scene.simulation.cell = grid.cell;
     let (bounds, size) = (part.bounds(), part.bounds().size());
     let mut found = vec![format!("{} is valid. Every default in effect:", path.display())];
@@ -23,6 +23,11 @@ pub fn check(path: &Path) -> Result<String, CliError> {
         "The part spans {:.3} x {:.3} x {:.3} mm from x {:.3} y {:.3} z {:.3}; {} x {} cells are simulated.",
         size.x, size.y, size.z, bounds.min.x, bounds.min.y, bounds.min.z, grid.nx, grid.ny
     ));
+    if scene.simulation.cell_is_auto {
+        found.push(
+            "Note: the cell is chosen by the program, from the cutter and the steps of the toolpaths".into(),
+        );
+    }
     found.extend(notes.into_iter().chain(note).map(|note| format!("Note: {note}")));
     let mut text = String::new();
     for line in found {

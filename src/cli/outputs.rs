@@ -11,6 +11,9 @@ use super::error::CliError;
 #[derive(Debug)]
 pub struct Outputs {
     target: PathBuf,
+    /// Held as long as the run lives; by it later runs know that the scratch folder is in use. Closed
+    /// before that folder is removed.
+    _lock: fs::File,
     /// Removed with all that is left in it when the run ends, one way or the other.
     scratch: tempfile::TempDir,
     fresh: PathBuf,
@@ -42,6 +45,42 @@ impl Drop for MadeFolders {
     }
 }
 
+/// What the names of scratch folders begin with.
+const SCRATCH_PREFIX: &str = ".millstream-";
+
+/// The file in a scratch folder that its run holds locked.
+const LOCK: &str = "lock";
+
+/// Locks a scratch folder. The file gets its name once it is locked, so that none is ever found
+/// unlocked while its run lives. Where the file system knows no locks it gets none, and the folder is
+/// never taken for abandoned.
+fn lock(scratch: &Path) -> std::io::Result<fs::File> {
+    let unnamed = scratch.join("unlocked");
+    let file = fs::File::create(&unnamed)?;
+    if file.try_lock().is_ok() {
+        fs::rename(&unnamed, scratch.join(LOCK))?;
+    }
+    Ok(file)
+}
+
+/// Removes scratch folders whose run was killed: the system has released their locks. What cannot be
+/// opened, locked or removed stays, as does all that is not ours.
+fn remove_abandoned(parent: &Path) {
+    let Ok(entries) = fs::read_dir(parent) else { return };
+    for entry in entries.flatten() {
+        let ours = entry.file_name().to_str().is_some_and(|name| name.starts_with(SCRATCH_PREFIX));
+        // The type of a link is a link: nothing is followed out of the folder.
+        if !ours || !entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+            continue;
+        }
+        let Ok(lock) = fs::File::open(entry.path().join(LOCK)) else { continue };
+        if lock.try_lock().is_ok() {
+            drop(lock);
+            let _ = fs::remove_dir_all(entry.path());
+        }
+    }
+}
+
 impl Outputs {
     /// Makes the scratch folder beside `target`, whose parents are made if need be.
     ///
@@ -59,14 +98,16 @@ impl Outputs {
             _ => Path::new("."),
         };
         let parents = MadeFolders::make(parent)?;
+        remove_abandoned(parent);
         let scratch = tempfile::Builder::new()
-            .prefix(".millstream-")
+            .prefix(SCRATCH_PREFIX)
             .tempdir_in(parent)
             .map_err(CliError::output(parent))?;
+        let lock = lock(scratch.path()).map_err(CliError::output(scratch.path()))?;
         // Scratch folders are closed to others; what is published must have usual permissions.
         let fresh = scratch.path().join("fresh");
         fs::create_dir(&fresh).map_err(CliError::output(&fresh))?;
-        Ok(Self { target: target.to_owned(), scratch, fresh, _parents: parents })
+        Ok(Self { target: target.to_owned(), _lock: lock, scratch, fresh, _parents: parents })
     }
 
     /// Makes a folder within the results.
@@ -167,6 +208,23 @@ mod tests {
         assert!(outputs.file("x", |_| Err::<(), _>(std::io::Error::other("full"))).is_err());
         drop(outputs);
         assert_eq!(entries(home.path()), [""; 0]);
+    }
+
+    #[test]
+    fn scratch_of_killed_runs_goes_and_that_of_living_ones_stays() {
+        let home = tempfile::tempdir().unwrap();
+        let living = fill(&home.path().join("living"), "text");
+        let killed = home.path().join(".millstream-killed");
+        fs::create_dir_all(killed.join("fresh/zigzag")).unwrap();
+        fs::write(killed.join(LOCK), "").unwrap();
+        fs::create_dir(home.path().join(".millstream-foreign")).unwrap();
+        let at_work = entries(home.path()).len();
+        fill(&home.path().join("next"), "text").publish().unwrap();
+        assert!(!killed.exists());
+        // The killed one went, the next results came.
+        assert_eq!(entries(home.path()).len(), at_work);
+        living.publish().unwrap();
+        assert_eq!(entries(home.path()), [".millstream-foreign", "living", "next"]);
     }
 
     #[test]

@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use super::args::RunOptions;
+use super::args::{Cell, RunOptions};
 use super::error::CliError;
 use super::load::load_part;
 use super::outputs::Outputs;
 use super::progress::Progress;
 use crate::geometry::Aabb;
-use crate::io::scene::{Engine, Scene, ToolpathRequest};
-use crate::io::{ProgramHeader, apt_cl, exr, gcode, png, stl_write};
+use crate::io::scene::{Engine, Scene, ToolpathRequest, auto_cell};
+use crate::io::{ProgramHeader, apt_cl, exr, gcode, ply_write, png, stl_write};
 use crate::machine::machining_time;
 use crate::metrology::{Measurement, measure, path_figures};
 use crate::monitor::{self, Monitor as _};
@@ -18,18 +18,31 @@ use crate::parallel;
 use crate::part::Part;
 use crate::report::{
     HIGHEST_RIDGE, Histogram, MAX_TRIANGLES, MapSize, MapWords, Picture, RunReport, SimulationFigures,
-    SurfaceMeshFigures, ToolpathPage, ToolpathResult, Verdict, deviation_picture, height_picture, html_page,
-    marks, result_table, surface_mesh, violations,
+    SurfaceMeshFigures, ToolpathPage, ToolpathResult, Verdict, deviation_colours, deviation_picture,
+    height_picture, html_page, marks, result_table, surface_mesh, violations,
 };
 use crate::sim::{Grid, GridError, ZMap, cut_reference};
-use crate::toolpath::{Plan, PlanSettings, plan};
+use crate::toolpath::{Plan, PlanSettings, Toolpath, plan};
 
-/// Bytes a cell that a run takes at its peak, which is while ridges are measured: stock (8), design
-/// surface (40), deviations (8), and up to 96 of ridges where every cell has one. The peak resident
-/// memory of whole runs was 150 with passes one cell apart, 100 with two, and 66 to 91 on the shipped
-/// scenes. Too small a figure lets a run exhaust the machine that the scene's `memory_mib` promised
-/// to spare; too great a one refuses grids that would fit. Part and path come on top, 12 to 36 MiB.
-const BYTES_PER_CELL: usize = 160;
+/// Bytes a cell that a run takes at its peak: stock and winning moves 8, deviations 12, ridges 16 where
+/// every cell has one, the mesh of the surface and height.exr the rest. The peak resident memory of
+/// whole runs, less the program's own 12 MiB, was 75 with passes one cell apart, 61 with two or more
+/// and on the wave. Too small a figure lets a run exhaust the machine that the scene's `memory_mib`
+/// promised to spare; too great a one refuses grids that would fit.
+const BYTES_PER_CELL: usize = 80;
+
+/// Bytes a triangle of the part while it is read: its file, corners, neighbours, search tree; 345 were
+/// measured on an STL file of 880 000.
+const BYTES_PER_TRIANGLE: usize = 350;
+
+/// Bytes a move: the move itself, its prepared form, and its places in the engine's lists.
+const BYTES_PER_MOVE: usize = 240;
+
+/// One part in so many of the memory is kept for the path before there is one. If a path takes more,
+/// the cells are laid out again; a smaller share refuses fewer grids that would fit.
+const PATH_SHARE: u64 = 16;
+
+const MIB: u64 = 1 << 20;
 
 /// The machined part's triangles stay within this share of the scallop tolerance: ridges remain
 /// visible in them.
@@ -63,9 +76,16 @@ pub fn run(options: &RunOptions, progress: &Progress) -> Result<RunOutcome, CliE
 /// The scene with what the command line says in its stead.
 fn read_scene(options: &RunOptions) -> Result<Scene, CliError> {
     let mut scene = Scene::read(&options.scene)?;
-    if let Some(cell) = options.cell {
-        scene.simulation.cell = cell;
-        scene.simulation.cell_is_default = false;
+    match options.cell {
+        Some(Cell::Mm(cell)) => (scene.simulation.cell, scene.simulation.cell_is_auto) = (cell, false),
+        Some(Cell::Auto) => {
+            scene.simulation.cell = auto_cell(&scene.cutter, &scene.toolpaths);
+            scene.simulation.cell_is_auto = true;
+        }
+        None => {}
+    }
+    if let Some(memory) = options.memory {
+        scene.simulation.memory_mib = memory;
     }
     if let Some(engine) = options.engine.as_deref().and_then(Engine::from_word) {
         scene.simulation.engine = engine;
@@ -118,18 +138,18 @@ pub fn stock_area(scene: &Scene, part: &Part) -> Aabb {
     area
 }
 
-/// The grid over `area`, and a note when the default cell had to grow to fit into the memory. A cell
-/// that the user chose is never changed.
+/// The grid over the part's stock when all else takes `besides` bytes, and a note when the automatic
+/// cell had to grow to fit into the memory. A cell that the user chose is never changed.
 ///
 /// # Errors
 /// [`GridError`] when the grid does not fit.
-pub fn lay_out(scene: &Scene, area: &Aabb) -> Result<(Grid, Option<String>), GridError> {
-    const MIB: u64 = 1 << 20;
-    let memory = u64::from(scene.simulation.memory_mib) * MIB;
+fn lay_out(scene: &Scene, part: &Part, besides: u64) -> Result<(Grid, Option<String>), GridError> {
+    let area = &stock_area(scene, part);
+    let memory = (u64::from(scene.simulation.memory_mib) * MIB).saturating_sub(besides);
     let cell = scene.simulation.cell;
     match Grid::covering(area, cell, BYTES_PER_CELL, memory) {
         Ok(grid) => Ok((grid, None)),
-        Err(GridError::Memory { fitting, .. }) if scene.simulation.cell_is_default => {
+        Err(GridError::Memory { fitting, .. }) if scene.simulation.cell_is_auto => {
             let grid = Grid::covering(area, fitting, BYTES_PER_CELL, memory)?;
             let allowed = scene.simulation.memory_mib;
             Ok((
@@ -141,12 +161,45 @@ pub fn lay_out(scene: &Scene, area: &Aabb) -> Result<(Grid, Option<String>), Gri
     }
 }
 
+/// Bytes that a part takes.
+fn part_bytes(part: &Part) -> u64 {
+    (part.mesh().triangles().len() * BYTES_PER_TRIANGLE) as u64
+}
+
+/// [`lay_out`] before any toolpath is known: a share of the memory is kept for those.
+///
+/// # Errors
+/// [`GridError`] when the grid does not fit.
+pub fn lay_out_before_planning(scene: &Scene, part: &Part) -> Result<(Grid, Option<String>), GridError> {
+    let memory = u64::from(scene.simulation.memory_mib) * MIB;
+    lay_out(scene, part, part_bytes(part) + memory / PATH_SHARE)
+}
+
+/// [`lay_out`] for a planned path. The first grid stays where it fits.
+///
+/// # Errors
+/// [`GridError`] when the grid does not fit.
+fn lay_out_for(
+    scene: &Scene,
+    part: &Part,
+    first: &(Grid, Option<String>),
+    path: &Toolpath,
+) -> Result<(Grid, Option<String>), GridError> {
+    let memory = u64::from(scene.simulation.memory_mib) * MIB;
+    let besides = part_bytes(part) + (path.len() * BYTES_PER_MOVE) as u64;
+    if (first.0.len() * BYTES_PER_CELL) as u64 + besides <= memory {
+        return Ok(first.clone());
+    }
+    lay_out(scene, part, besides)
+}
+
 /// What all toolpaths of a scene share.
 struct Job<'a> {
     scene: &'a Scene,
     progress: &'a Progress,
     part: Part,
-    grid: Grid,
+    /// The cells, and what is to be said about them, if a path leaves memory for them.
+    grid: (Grid, Option<String>),
     /// Height of the stock's flat top, mm.
     top: f64,
     notes: Vec<String>,
@@ -155,9 +208,8 @@ struct Job<'a> {
 impl<'a> Job<'a> {
     fn new(scene: &'a Scene, progress: &'a Progress) -> Result<Self, CliError> {
         monitor::check(progress)?;
-        let (part, mut notes) = load_part(scene)?;
-        let (grid, note) = lay_out(scene, &stock_area(scene, &part)).map_err(CliError::grid(scene))?;
-        notes.extend(note);
+        let (part, notes) = load_part(scene)?;
+        let grid = lay_out_before_planning(scene, &part).map_err(CliError::grid(scene))?;
         let top = part.bounds().max.z + scene.stock.allowance;
         Ok(Self { scene, progress, part, grid, top, notes })
     }
@@ -183,14 +235,16 @@ impl<'a> Job<'a> {
         monitor::check(monitor)?;
         let planned = plan(&self.part, &scene.cutter, &request.strategy, &self.settings(request), monitor)
             .map_err(|reason| CliError::plan(scene, &request.name, reason))?;
+        let (grid, note) =
+            lay_out_for(scene, &self.part, &self.grid, &planned.path).map_err(CliError::grid(scene))?;
         let begun = Instant::now();
-        let cut = cut_reference(&ZMap::block(self.grid, self.top), &scene.cutter, &planned.path, monitor)?;
+        let cut = cut_reference(&ZMap::block(grid, self.top), &scene.cutter, &planned.path, monitor)?;
         let mut measured =
             measure(&self.part, &scene.cutter, &planned.path, &cut, &scene.tolerance, monitor)?;
         let simulation = SimulationFigures {
             engine: scene.simulation.engine.name(),
-            cell_mm: self.grid.cell,
-            cells: self.grid.len(),
+            cell_mm: grid.cell,
+            cells: grid.len(),
             moves: planned.path.len(),
             wall_s: begun.elapsed().as_secs_f64(),
             threads: rayon::current_num_threads(),
@@ -200,19 +254,20 @@ impl<'a> Job<'a> {
         outputs.folder(&request.folder)?;
         let programs = || self.write_programs(request, &planned, outputs);
         let maps = || self.write_maps(request, &cut, &measured, outputs);
-        let mesh = || self.write_mesh(request, &cut, outputs);
+        let mesh = || self.write_mesh(request, &planned.path, &cut, &measured, outputs);
         let (surface_mesh, (page, lines)) = parallel::join(mesh, || parallel::join(maps, programs));
         let (surface_mesh, page, lines) = (surface_mesh?, page?, lines?);
         for region in &mut measured.gouge.regions {
             region.line = lines.get(region.move_index as usize).copied().unwrap_or_default();
         }
-        Ok((self.result(request, &planned, measured, simulation, surface_mesh), page))
+        Ok((self.result(request, &planned, note, measured, simulation, surface_mesh), page))
     }
 
     fn result(
         &self,
         request: &ToolpathRequest,
         planned: &Plan,
+        note: Option<String>,
         measured: Measurement,
         simulation: SimulationFigures,
         surface_mesh: SurfaceMeshFigures,
@@ -225,7 +280,7 @@ impl<'a> Job<'a> {
             folder: request.folder.clone(),
             verdict: if violations.is_empty() { Verdict::Pass } else { Verdict::Fail },
             violations,
-            notes: self.notes.iter().chain(&planned.notes).cloned().collect(),
+            notes: self.notes.iter().chain(&note).chain(&planned.notes).cloned().collect(),
             path: path_figures(&planned.path, time),
             scallop: measured.scallop,
             gouge: measured.gouge,
@@ -283,7 +338,7 @@ impl<'a> Job<'a> {
         measured: &Measurement,
         outputs: &Outputs,
     ) -> Result<(Vec<u8>, Vec<u8>), CliError> {
-        let (scene, grid, deviation) = (self.scene, &self.grid, &measured.deviation_map);
+        let (scene, grid, deviation) = (self.scene, &cut.grid, &measured.deviation_map);
         let cell = format!("{} mm", grid.cell);
         let subtitle = format!("{} · cell {cell} · engine {}", scene.title, scene.simulation.engine.name());
         let notes = [("Title", scene.title.as_str()), ("Scene", &scene.source.name), ("Cell", &cell)];
@@ -312,18 +367,28 @@ impl<'a> Job<'a> {
     fn write_mesh(
         &self,
         request: &ToolpathRequest,
+        path: &Toolpath,
         cut: &ZMap,
+        measured: &Measurement,
         outputs: &Outputs,
     ) -> Result<SurfaceMeshFigures, CliError> {
         let tolerance = MESH_SHARE * self.scene.tolerance.scallop;
         let lowest = cut.height.iter().copied().fold(f32::INFINITY, f32::min);
         let bottom = f64::from(lowest).min(self.part.bounds().min.z) - BASE;
         // A grid of one row has no surface; its file then holds no triangle.
-        let mesh = surface_mesh(cut, bottom, tolerance, MAX_TRIANGLES);
+        let mesh = surface_mesh(cut, &self.scene.cutter, path, bottom, tolerance, MAX_TRIANGLES);
         let (vertices, triangles): (&[_], &[_]) =
             mesh.as_ref().map_or((&[], &[]), |m| (&m.vertices, &m.triangles));
         outputs.file(&format!("{}/machined.stl", request.folder), |out| {
             stl_write::write(out, vertices, triangles)
+        })?;
+        let deviations =
+            mesh.as_ref().map_or_else(Vec::new, |m| m.deviations(&self.part, &measured.deviation_map));
+        let colours = deviation_colours(&deviations, &self.scene.tolerance);
+        outputs.file(&format!("{}/machined.ply", request.folder), |out| {
+            let vertices =
+                ply_write::Vertices { places: vertices, colours: &colours, deviations: &deviations };
+            ply_write::write(out, &vertices, triangles)
         })?;
         let tolerance_mm = mesh.as_ref().map_or(tolerance, |m| m.tolerance);
         Ok(SurfaceMeshFigures { triangles: triangles.len(), tolerance_mm })
@@ -341,7 +406,7 @@ mod tests {
         let path = folder.join("plate.toml");
         std::fs::write(&path, scene).unwrap();
         let out = Some(folder.join(format!("out{threads}")));
-        RunOptions { scene: path, out, threads: Some(threads), cell: None, engine: None }
+        RunOptions { scene: path, out, threads: Some(threads), cell: None, memory: None, engine: None }
     }
 
     #[test]
@@ -351,9 +416,15 @@ mod tests {
         let outcome = run(&options, &Progress::quiet()).unwrap();
         assert_eq!(outcome.verdict, Verdict::Pass, "{}", outcome.text);
         let out = options.out.unwrap();
-        for name in
-            ["deviation.png", "height.png", "height.exr", "toolpath.nc", "toolpath.cls", "machined.stl"]
-        {
+        for name in [
+            "deviation.png",
+            "height.png",
+            "height.exr",
+            "toolpath.nc",
+            "toolpath.cls",
+            "machined.stl",
+            "machined.ply",
+        ] {
             assert!(out.join("zigzag").join(name).metadata().unwrap().len() > 100, "{name}");
         }
         let json: serde_json::Value =
@@ -377,8 +448,15 @@ mod tests {
                 serde_json::from_str(&std::fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
             json["toolpaths"][0]["simulation"]["wall_s"] = 0.into();
             json["toolpaths"][0]["simulation"]["threads"] = 0.into();
-            let files =
-                ["deviation.png", "height.png", "height.exr", "toolpath.nc", "toolpath.cls", "machined.stl"];
+            let files = [
+                "deviation.png",
+                "height.png",
+                "height.exr",
+                "toolpath.nc",
+                "toolpath.cls",
+                "machined.stl",
+                "machined.ply",
+            ];
             (json, files.map(|name| std::fs::read(out.join("zigzag").join(name)).unwrap()))
         };
         assert!(read(1) == read(3));
@@ -401,7 +479,7 @@ mod tests {
             Scene::parse("plate.toml", text).unwrap()
         };
         let (part, _) = load_part(&scene("")).unwrap();
-        let lay_out_of = |scene: &Scene| lay_out(scene, &stock_area(scene, &part));
+        let lay_out_of = |scene: &Scene| lay_out_before_planning(scene, &part);
         let (grid, note) = lay_out_of(&scene("[simulation]\nmemory_mib = 2\n")).unwrap();
         assert!(grid.cell > 0.05 && grid.len() * BYTES_PER_CELL <= 2 << 20);
         assert!(note.unwrap().contains("instead of 0.05 mm, to fit into 2 MiB"));

@@ -7,6 +7,7 @@ pub mod gcode;
 mod mesh_file;
 pub mod nurbs_json;
 pub mod obj;
+pub mod ply_write;
 pub mod png;
 mod program_text;
 pub mod scene;

@@ -12,7 +12,7 @@ use crate::toolpath::Toolpath;
 
 /// A point of the cut surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct CutPoint {
+pub(crate) struct CutPoint {
     /// Height, mm.
     pub z: f64,
     /// The move that cut it, or [`NOT_CUT`] where stock still stands.
@@ -20,7 +20,7 @@ pub(super) struct CutPoint {
 }
 
 /// Up to nine different moves around a cell.
-pub(super) struct Winners {
+pub(crate) struct Winners {
     moves: [u32; 9],
     len: usize,
     /// Height of stock that no move touched, if any cell around is such; infinite otherwise.
@@ -37,7 +37,7 @@ impl Winners {
 }
 
 /// A z-map together with the moves that made it.
-pub(super) struct CutSurface<'a> {
+pub(crate) struct CutSurface<'a> {
     /// Closed-form heights of the moves.
     pub envelope: Envelope,
     /// Heights and winners at cell centres.
@@ -141,7 +141,7 @@ impl<'a> CutSurface<'a> {
 
 /// Where the line from a design point along its normal meets the cut surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Deviation {
+pub(crate) struct Deviation {
     /// Signed distance, mm: positive excess, negative gouge.
     pub distance: f64,
     /// Sine of the angle between the two surfaces there: how fast the distance changes sideways.

@@ -9,25 +9,27 @@
 
 mod cut_surface;
 mod figures;
+mod meetings;
 mod path;
 mod regions;
 mod ridges;
 
+pub(crate) use cut_surface::CutSurface;
 pub use figures::{
     DeviationFigures, GougeFigures, GougeRegion, Limits, Measurement, PathFigures, ScallopFigures,
     UncutFigures, UncutRegion,
 };
+pub(crate) use meetings::Meetings;
 pub use path::path_figures;
 
 use crate::cutter::Cutter;
 use crate::geometry::{Point2, Point3};
 use crate::monitor::{self, Cancelled, Monitor};
-use crate::part::{Part, SurfaceGrid};
+use crate::part::Part;
 use crate::sim::{Envelope, Grid, NOT_CUT, ZMap};
 use crate::toolpath::Toolpath;
-use cut_surface::CutSurface;
 use regions::connected;
-use ridges::{NUMERICAL_FLOOR, RidgeFinder, RidgeSample, scallop_figures};
+use ridges::{NUMERICAL_FLOOR, RidgeFinder, scallop_figures};
 
 /// Regions listed one by one in the figures; the rest is counted.
 const LISTED_REGIONS: usize = 20;
@@ -40,6 +42,10 @@ const MOST_CLOSER: usize = 4000;
 /// came down to the design there and no cell rises above the highest ridge by more than this share.
 const RIDGE_IS_TOP: f64 = 1e-3;
 
+/// The design surface is sampled in so many bands of rows, one after the other: it takes 40 bytes a
+/// cell, more than all else that is kept. Every band looks at all triangles of the part.
+const DESIGN_BANDS: usize = 8;
+
 /// What is measured at one cell.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
@@ -47,6 +53,17 @@ struct Sample {
     deviation: f32,
     /// Sine of the angle between cut and design surface.
     slope: f32,
+    /// Vertical part of the design surface's unit normal.
+    lean: f32,
+}
+
+/// Asks the monitor whether to stop, and tells it nothing: for stages within a stage.
+struct Within<'a>(&'a dyn Monitor);
+
+impl Monitor for Within<'_> {
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
 }
 
 /// Measures `cut`, the stock after `path`, against `part`.
@@ -61,9 +78,8 @@ pub fn measure(
     limits: &Limits,
     monitor: &dyn Monitor,
 ) -> Result<Measurement, Cancelled> {
-    let design = part.sample_grid(cut.grid.origin, cut.grid.cell, cut.grid.nx, cut.grid.ny, monitor)?;
     let surface = CutSurface::new(Envelope::new(cutter, path), cut, path);
-    let inspection = Inspection { part, cutter, limits, surface: &surface, design: &design, grid: cut.grid };
+    let inspection = Inspection { part, cutter, limits, surface: &surface, grid: cut.grid };
     let samples = inspection.samples(monitor)?;
     let finder = RidgeFinder::new(&surface, part, cutter, path, limits);
     let on_part = |k: usize| !samples[k].deviation.is_nan();
@@ -72,9 +88,9 @@ pub fn measure(
     Ok(Measurement {
         scallop: scallop_figures(&ridges, finder.highest(&ridges), limits),
         gouge: inspection.gouges(&samples),
-        uncut: inspection.uncut(&samples, &ridges, deviation.area_mm2),
+        uncut: inspection.uncut(&samples, ridges.highest_sample(), deviation.area_mm2),
         deviation,
-        ridge_samples: ridges.iter().map(|r| [r.height as f32, r.length as f32]).collect(),
+        ridge_samples: ridges.samples,
         deviation_map: samples.into_iter().map(|s| s.deviation).collect(),
     })
 }
@@ -84,7 +100,6 @@ struct Inspection<'a> {
     cutter: &'a Cutter,
     limits: &'a Limits,
     surface: &'a CutSurface<'a>,
-    design: &'a SurfaceGrid,
     grid: Grid,
 }
 
@@ -92,45 +107,62 @@ impl Inspection<'_> {
     /// Deviation at the design point over every cell centre.
     fn samples(&self, monitor: &dyn Monitor) -> Result<Vec<Sample>, Cancelled> {
         monitor.start("measuring deviation", self.grid.ny as u64);
-        let off = Sample { deviation: f32::NAN, slope: 0.0 };
-        let rows = crate::parallel::try_map(self.grid.ny, |j| {
-            monitor::check(monitor)?;
-            let row: Vec<Sample> = (0..self.grid.nx)
-                .map(|i| {
-                    let design = self.design.at(i, j);
+        let off = Sample { deviation: f32::NAN, slope: 0.0, lean: 1.0 };
+        let mut samples = vec![off; self.grid.len()];
+        let nx = self.grid.nx;
+        let band_rows = self.grid.ny.div_ceil(DESIGN_BANDS);
+        for (band, samples) in samples.chunks_mut((band_rows * nx).max(1)).enumerate() {
+            let first = band * band_rows;
+            // A row more on either side: gaps between patches are closed from their neighbours.
+            let rows = first.saturating_sub(1)..(first + samples.len() / nx + 1).min(self.grid.ny);
+            let origin = self.grid.centre(0, rows.start);
+            let design = self.part.sample_grid(origin, self.grid.cell, nx, rows.len(), &Within(monitor))?;
+            crate::parallel::for_each_chunk(samples, nx, |j, row| {
+                if monitor.cancelled() {
+                    return;
+                }
+                for (i, sample) in row.iter_mut().enumerate() {
+                    let design = design.at(i, first + j - rows.start);
                     if !design.is_on() {
-                        return off;
+                        continue;
                     }
-                    let centre = self.grid.centre(i, j);
+                    let centre = self.grid.centre(i, first + j);
                     let p = Point3::new(centre.x, centre.y, design.z);
-                    self.surface
-                        .along_normal(&p, &design.normal)
-                        .map_or(off, |d| Sample { deviation: d.distance as f32, slope: d.slope as f32 })
-                })
-                .collect();
-            monitor.advance(1);
-            Ok(row)
-        })?;
-        Ok(rows.into_iter().flatten().collect())
+                    if let Some(d) = self.surface.along_normal(&p, &design.normal) {
+                        *sample = Sample {
+                            deviation: d.distance as f32,
+                            slope: d.slope as f32,
+                            lean: design.normal.z as f32,
+                        };
+                    }
+                }
+                monitor.advance(1);
+            });
+            monitor::check(monitor)?;
+        }
+        Ok(samples)
     }
 
-    /// Area of the design surface that cell `k` stands for, mm².
-    fn area(&self, k: usize) -> f64 {
-        let lean = self.design.samples[k].normal.z;
-        self.grid.cell * self.grid.cell / lean.max(1e-3)
+    /// Area of the design surface that a cell stands for, mm².
+    fn area(&self, sample: &Sample) -> f64 {
+        self.grid.cell * self.grid.cell / f64::from(sample.lean).max(1e-3)
     }
 
     /// How far along the surface a place between centres may be from the nearest one, mm.
-    fn reach(&self, k: usize) -> f64 {
-        let lean = self.design.samples[k].normal.z;
-        self.grid.cell * std::f64::consts::FRAC_1_SQRT_2 / lean.max(1e-3)
+    fn reach(&self, sample: &Sample) -> f64 {
+        self.grid.cell * std::f64::consts::FRAC_1_SQRT_2 / f64::from(sample.lean).max(1e-3)
+    }
+
+    /// Centre of cell `k`.
+    fn centre(&self, k: usize) -> Point2 {
+        self.grid.centre(k % self.grid.nx, k / self.grid.nx)
     }
 
     fn deviation_figures(&self, samples: &[Sample]) -> DeviationFigures {
         let mut figures = DeviationFigures { min_mm: f64::MAX, max_mm: f64::MIN, ..Default::default() };
         let mut squares = 0.0;
         for (k, d) in measured(samples) {
-            let area = self.area(k);
+            let area = self.area(&samples[k]);
             figures.samples += 1;
             figures.min_mm = figures.min_mm.min(d);
             figures.max_mm = figures.max_mm.max(d);
@@ -150,7 +182,7 @@ impl Inspection<'_> {
         let regions = connected(&self.grid, &deep);
         figures.region_count = regions.len();
         for region in &regions {
-            let area: f64 = region.iter().map(|&k| self.area(k as usize)).sum();
+            let area: f64 = region.iter().map(|&k| self.area(&samples[k as usize])).sum();
             figures.area_mm2 += area;
             let Some(&deepest) = least_by(region, |k| f64::from(samples[k].deviation)) else { continue };
             let (depth, at, by) = self.deepest_near(deepest as usize);
@@ -171,7 +203,7 @@ impl Inspection<'_> {
         // radius r that meets the design at a slope s cannot go deeper than about s²r below that.
         let possible = |k: usize| {
             let s = f64::from(samples[k].slope);
-            let deeper = (s * self.reach(k)).min(s * s * self.cutter.radius());
+            let deeper = (s * self.reach(&samples[k])).min(s * s * self.cutter.radius());
             deeper - f64::from(samples[k].deviation)
         };
         let floor = figures.max_depth_mm + NUMERICAL_FLOOR;
@@ -194,7 +226,7 @@ impl Inspection<'_> {
             let d = self.surface.along_normal(&design.point, &design.normal)?;
             Some((-d.distance, design.point, d.by))
         };
-        let mut centre = self.grid.centre(k % self.grid.nx, k / self.grid.nx);
+        let mut centre = self.centre(k);
         let Some(mut best) = at(centre) else { return (0.0, Point3::new(centre.x, centre.y, 0.0), 0) };
         let mut step = 0.5 * self.grid.cell;
         while step > 1e-3 * self.grid.cell {
@@ -213,20 +245,17 @@ impl Inspection<'_> {
 
     /// True where the pass that cut cell `k` came down to the design.
     fn reached(&self, k: usize) -> bool {
-        let by = self.surface.cut.cut_by[k];
-        let (design, centre) =
-            (&self.design.samples[k], self.grid.centre(k % self.grid.nx, k / self.grid.nx));
+        let (by, centre) = (self.surface.cut.cut_by[k], self.centre(k));
+        let Some(design) = self.part.highest_at(centre.x, centre.y) else { return false };
         by != NOT_CUT && {
-            let contact = Point3::new(centre.x, centre.y, design.z);
             let from_contact = self.cutter.contact_to_tip(&design.normal);
-            let tip = self.surface.nearest_tip(by, &(contact + from_contact));
+            let tip = self.surface.nearest_tip(by, &(design.point + from_contact));
             self.part.closest_point(&(tip - from_contact)).1 <= self.limits.uncut
         }
     }
 
-    fn uncut(&self, samples: &[Sample], ridges: &[RidgeSample], measured_area: f64) -> UncutFigures {
+    fn uncut(&self, samples: &[Sample], highest_ridge: f64, measured_area: f64) -> UncutFigures {
         let high = |k: usize| f64::from(samples[k].deviation) > self.limits.uncut;
-        let highest_ridge = ridges.iter().map(|r| r.height).fold(0.0, f64::max);
         let mut figures = UncutFigures { error_bound_mm: NUMERICAL_FLOOR, ..Default::default() };
         let mut possible = 0.0f64;
         for region in connected(&self.grid, &high) {
@@ -239,14 +268,13 @@ impl Inspection<'_> {
             let mut area = 0.0;
             let mut volume = 0.0;
             for &k in &region {
-                area += self.area(k as usize);
-                volume += self.area(k as usize) * height(k as usize);
-                let s = f64::from(samples[k as usize].slope);
-                possible = possible.max(height(k as usize) + s * self.reach(k as usize));
+                let sample = &samples[k as usize];
+                area += self.area(sample);
+                volume += self.area(sample) * height(k as usize);
+                possible = possible.max(height(k as usize) + f64::from(sample.slope) * self.reach(sample));
             }
-            let k = highest as usize;
-            let centre = self.grid.centre(k % self.grid.nx, k / self.grid.nx);
-            let z = self.design.samples[k].z;
+            let centre = self.centre(highest as usize);
+            let z = self.part.highest_at(centre.x, centre.y).map_or(0.0, |design| design.point.z);
             figures.area_mm2 += area;
             figures.volume_mm3 += volume;
             figures.region_count += 1;

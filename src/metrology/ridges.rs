@@ -13,6 +13,7 @@
 
 use super::cut_surface::CutSurface;
 use super::figures::{Limits, ScallopFigures};
+use super::meetings::{Meeting, Meetings};
 use crate::cutter::Cutter;
 use crate::geometry::{Point2, Point3, Vector2};
 use crate::monitor::{self, Cancelled, Monitor};
@@ -39,6 +40,32 @@ pub(super) struct RidgeSample {
     squareness: f64,
 }
 
+/// All ridges of a surface.
+#[derive(Debug, Default)]
+pub(super) struct Ridges {
+    /// Height and length of every sample, mm.
+    pub samples: Vec<[f32; 2]>,
+    /// The highest sample of each row of cells, and those that might rise above it.
+    candidates: Vec<RidgeSample>,
+}
+
+impl Ridges {
+    /// Of the samples of one row.
+    fn of_row(samples: &[RidgeSample]) -> Self {
+        let highest = samples.iter().map(|s| s.height).fold(f64::NEG_INFINITY, f64::max);
+        let candidates = samples.iter().filter(|s| s.height + s.rise >= highest);
+        Self {
+            samples: samples.iter().map(|s| [s.height as f32, s.length as f32]).collect(),
+            candidates: candidates.copied().collect(),
+        }
+    }
+
+    /// Height of the highest sample, mm; 0 without samples.
+    pub fn highest_sample(&self) -> f64 {
+        self.candidates.iter().map(|s| s.height).fold(0.0, f64::max)
+    }
+}
+
 /// The highest place of all ridges.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Highest {
@@ -58,22 +85,9 @@ const CLOSER_LINES: i32 = 8;
 /// the other family see the same ridge less squarely.
 const SQUARE_ENOUGH: f64 = 0.7;
 
-/// Two heights that differ by more than this, mm, do not meet.
-const MEETING: f64 = 1e-6;
-
-/// Two moves of one pass that lie farther apart along the path than this many cutter radii are
-/// neighbouring turns of a spiral or loop, not neighbouring chords.
-const SAME_TRACK: f64 = 4.0;
-
 /// A pass serves a ridge when it touches the design within this many distances of the two passes.
 /// On a plane it is half of one; in a hollow of radius 4/3 of the cutter's, two.
 const FARTHEST_CONTACT: f64 = 2.0;
-
-/// Ridges inside ridges (a pass that shows only between two cells): at most this deep.
-const MOST_DEPTH: usize = 8;
-
-/// Position on the line between two centres is found to this share of the pitch.
-const CROSSING: f64 = 1e-10;
 
 /// Numerical floor of every bound, mm: root finding and the design surface's own evaluation.
 pub(super) const NUMERICAL_FLOOR: f64 = 1e-6;
@@ -83,8 +97,7 @@ pub(super) struct RidgeFinder<'a> {
     pub part: &'a Part,
     pub cutter: &'a Cutter,
     pub limits: &'a Limits,
-    /// Distance along the path to the end of each move, mm.
-    along: Vec<f64>,
+    meetings: Meetings<'a>,
 }
 
 /// A line between two neighbouring centres: from the cell `from`, along x or along y.
@@ -122,23 +135,16 @@ impl<'a> RidgeFinder<'a> {
         path: &Toolpath,
         limits: &'a Limits,
     ) -> Self {
-        let mut length = 0.0;
-        let along = path
-            .segments()
-            .map(|(from, to, _)| {
-                length += (to - from).norm();
-                length
-            })
-            .collect();
-        Self { surface, part, cutter, limits, along }
+        let meetings = Meetings::new(surface, cutter, path, None);
+        Self { surface, part, cutter, limits, meetings }
     }
 
-    /// All ridge samples, row by row. `on_part` tells which cells are measured.
+    /// All ridges, row by row. `on_part` tells which cells are measured.
     pub fn find(
         &self,
         on_part: &(dyn Fn(usize) -> bool + Sync),
         monitor: &dyn Monitor,
-    ) -> Result<Vec<RidgeSample>, Cancelled> {
+    ) -> Result<Ridges, Cancelled> {
         let grid = self.surface.cut.grid;
         monitor.start("measuring ridges", grid.ny as u64);
         let rows = crate::parallel::try_map(grid.ny, |j| {
@@ -155,106 +161,33 @@ impl<'a> RidgeFinder<'a> {
                     }
                     let other = grid.index(ni, nj);
                     let [a, b] = [k, other].map(|k| self.surface.cut.cut_by[k]);
-                    if on_part(other) && self.apart(a, b) {
+                    if on_part(other) && self.meetings.apart(a, b) {
                         let line = GridLine::new(&grid, k as u32, along_x);
-                        self.between(&line, (0.0, a), (1.0, b), MOST_DEPTH, &mut samples);
+                        self.between(&line, (0.0, a), (1.0, b), &mut samples);
                     }
                 }
             }
             monitor.advance(1);
-            Ok(samples)
+            Ok(Ridges::of_row(&samples))
         })?;
-        Ok(rows.into_iter().flatten().collect())
-    }
-
-    /// True when two moves belong to neighbouring tracks rather than to one.
-    fn apart(&self, a: u32, b: u32) -> bool {
-        match (self.surface.pass(a), self.surface.pass(b)) {
-            (Some(p), Some(q)) => {
-                let distance = (self.along[a as usize] - self.along[b as usize]).abs();
-                p != q || distance > SAME_TRACK * self.cutter.radius()
-            }
-            _ => false,
-        }
-    }
-
-    /// Finds the ridges between `a` at parameter `ta`, lowest there, and `b` at `tb`.
-    fn between(
-        &self,
-        line: &GridLine,
-        (ta, a): (f64, u32),
-        (tb, b): (f64, u32),
-        depth: usize,
-        out: &mut Vec<RidgeSample>,
-    ) {
-        if !self.apart(a, b) {
-            return;
-        }
-        let t = self.crossing(line, (ta, a), (tb, b));
-        let q = line.at(t);
-        let height = |by: u32| self.surface.envelope.height(by, q.x, q.y).unwrap_or(f64::INFINITY);
-        let (za, zb) = (height(a), height(b));
-        let Some(lowest) = self.surface.at(q.x, q.y) else { return };
-        // Another move is lower at the crossing: it stands between the two.
-        let third = lowest.z < za.min(zb) - 1e-9 && lowest.by != a && lowest.by != b;
-        if third && depth > 0 && self.surface.pass(lowest.by).is_some() {
-            self.between(line, (ta, a), (t, lowest.by), depth - 1, out);
-            self.between(line, (t, lowest.by), (tb, b), depth - 1, out);
-        } else if za.is_finite() && zb.is_finite() && (za - zb).abs() <= MEETING {
-            out.extend(self.sample(line, q, za.max(zb), [a, b]));
-        } else if za.is_infinite() != zb.is_infinite() {
-            // A cutter with a flat ends in a wall: the ridge is its edge.
-            out.extend(self.sample(line, q, za.min(zb), [a, b]));
-        }
-    }
-
-    /// Where the cuts of `a` and `b` are equally high, by bisection and regula falsi (Illinois).
-    fn crossing(&self, line: &GridLine, (mut ta, a): (f64, u32), (mut tb, b): (f64, u32)) -> f64 {
-        let difference = |t: f64| {
-            let q = line.at(t);
-            let height = |by: u32| self.surface.envelope.height(by, q.x, q.y);
-            match (height(a), height(b)) {
-                (Some(za), Some(zb)) => za - zb,
-                (None, Some(_)) => f64::INFINITY,
-                _ => f64::NEG_INFINITY,
-            }
+        let mut ridges = Ridges {
+            samples: Vec::with_capacity(rows.iter().map(|r| r.samples.len()).sum()),
+            ..Ridges::default()
         };
-        let (mut fa, mut fb) = (difference(ta), difference(tb));
-        if fa >= 0.0 {
-            return ta;
+        for row in rows {
+            ridges.samples.extend(row.samples);
+            ridges.candidates.extend(row.candidates);
         }
-        if fb <= 0.0 {
-            return tb;
-        }
-        let mut side = 0i8;
-        for _ in 0..100 {
-            if tb - ta < CROSSING {
-                break;
-            }
-            let secant = ta + (tb - ta) * (fa / (fa - fb));
-            let t = if secant > ta && secant < tb { secant } else { 0.5 * (ta + tb) };
-            let f = difference(t);
-            if f.abs() < 1e-13 {
-                return t;
-            }
-            if f < 0.0 {
-                (ta, fa) = (t, f);
-                if side == -1 && fb.is_finite() {
-                    fb *= 0.5;
-                }
-                side = -1;
-            } else {
-                (tb, fb) = (t, f);
-                if side == 1 && fa.is_finite() {
-                    fa *= 0.5;
-                }
-                side = 1;
-            }
-        }
-        0.5 * (ta + tb)
+        Ok(ridges)
     }
 
-    fn sample(&self, line: &GridLine, q: Point2, z: f64, moves: [u32; 2]) -> Option<RidgeSample> {
+    /// Adds the ridges on a line between `a`, lowest at its share `ta`, and `b`, lowest at `tb`.
+    fn between(&self, line: &GridLine, a: (f64, u32), b: (f64, u32), out: &mut Vec<RidgeSample>) {
+        self.meetings.between(&|t| line.at(t), a, b, &mut |m| out.extend(self.sample(line, m)));
+    }
+
+    fn sample(&self, line: &GridLine, meeting: Meeting) -> Option<RidgeSample> {
+        let Meeting { at: q, z, moves, .. } = meeting;
         let at = Point3::new(q.x, q.y, z);
         let (foot, height) = self.part.closest_point(&at);
         let [m, n] = moves.map(|by| self.surface.normal(by, q.x, q.y));
@@ -284,7 +217,8 @@ impl<'a> RidgeFinder<'a> {
 
     /// The highest place of all ridges, looked at closer wherever a ridge might rise above the highest
     /// sample before the next grid line; `None` without samples.
-    pub fn highest(&self, samples: &[RidgeSample]) -> Option<Highest> {
+    pub fn highest(&self, ridges: &Ridges) -> Option<Highest> {
+        let samples = &ridges.candidates;
         let first = samples.iter().max_by(|a, b| a.height.total_cmp(&b.height))?;
         let mut highest = Highest { height: first.height, at: first.at, possible: first.height };
         let might = |s: &&RidgeSample| {
@@ -300,7 +234,7 @@ impl<'a> RidgeFinder<'a> {
             for k in -CLOSER_LINES / 2..=CLOSER_LINES / 2 {
                 let line = line.beside(f64::from(k) / f64::from(CLOSER_LINES));
                 // The ridge may leave the cell sideways by half of it.
-                self.between(&line, (-0.5, a), (1.5, b), MOST_DEPTH, &mut found);
+                self.between(&line, (-0.5, a), (1.5, b), &mut found);
             }
             found.retain(|s| self.part.highest_at(s.at.x, s.at.y).is_some());
             found
@@ -332,36 +266,35 @@ impl RidgeFinder<'_> {
 }
 
 /// Figures of all ridge samples.
-pub(super) fn scallop_figures(
-    samples: &[RidgeSample],
-    highest: Option<Highest>,
-    limits: &Limits,
-) -> ScallopFigures {
+pub(super) fn scallop_figures(ridges: &Ridges, highest: Option<Highest>, limits: &Limits) -> ScallopFigures {
     let mut figures = ScallopFigures { target_mm: limits.scallop, ..ScallopFigures::default() };
-    let total: f64 = samples.iter().map(|s| s.length).sum();
+    let samples = || ridges.samples.iter().map(|s| s.map(f64::from));
+    let total: f64 = samples().map(|[_, length]| length).sum();
     let (Some(highest), true) = (highest, total > 0.0) else {
         figures.reason = Some("no ridge stands between passes on the part".into());
         return figures;
     };
-    let mut by_height: Vec<(f64, f64)> = samples.iter().map(|s| (s.height, s.length)).collect();
-    by_height.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut by_height = ridges.samples.clone();
+    by_height.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     let quantile = |share: f64| {
         let mut below = 0.0;
         by_height
             .iter()
-            .find(|(_, length)| {
-                below += length;
+            .find(|[_, length]| {
+                below += f64::from(*length);
                 below >= share * total
             })
-            .map_or(highest.height, |s| s.0)
+            // Samples are stored rounded.
+            .map_or(highest.height, |s| f64::from(s[0]).min(highest.height))
     };
     // From 0.0, since an empty sum is -0.0.
-    let over = samples.iter().filter(|s| s.height > limits.scallop).fold(0.0, |sum, s| sum + s.length);
+    let over =
+        samples().filter(|[height, _]| *height > limits.scallop).fold(0.0, |sum, [_, length]| sum + length);
     figures.max_mm = Some(highest.height);
     figures.max_at_mm = Some(highest.at.into());
     figures.p95_mm = Some(quantile(0.95));
     figures.p50_mm = Some(quantile(0.5));
-    figures.mean_mm = Some(samples.iter().map(|s| s.height * s.length).sum::<f64>() / total);
+    figures.mean_mm = Some(samples().map(|[height, length]| height * length).sum::<f64>() / total);
     figures.over_target_fraction = Some(over / total);
     figures.ridge_length_mm = total;
     figures.error_bound_mm = Some(highest.possible - highest.height + NUMERICAL_FLOOR);

@@ -285,7 +285,7 @@ fn method(t: &ToolpathResult) -> Markup {
             @if s.threads == 1 { " thread." } @else { " threads." }
         }
         p.faint {
-            "Files: toolpath.nc (the program), toolpath.cls (cutter locations), height.exr (height, deviation and move of every cell), machined.stl ("
+            "Files: toolpath.nc (the program), toolpath.cls (cutter locations), height.exr (height, deviation and move of every cell), machined.stl and machined.ply (the part as cut, the latter coloured by deviation; "
             (t.surface_mesh.triangles) " triangles within " (bound(t.surface_mesh.tolerance_mm)) " µm of the cells"
             @if t.surface_mesh.tolerance_mm > t.scallop.target_mm { ": too coarse for ridges of the target's height; height.exr has them" }
             "), deviation.png and height.png (larger than here)."

@@ -184,6 +184,28 @@ fn deviation_ends(limits: &Limits) -> (f64, f64) {
     (round_up(limits.gouge), round_up(limits.scallop))
 }
 
+/// The deviation's key, without its words.
+fn deviation_key(limits: &Limits) -> Key {
+    let (below, above) = deviation_ends(limits);
+    Key {
+        from: -below,
+        middle: 0.0,
+        to: above,
+        gradient: diverging,
+        ticks: Vec::new(),
+        unit: Unit::for_range(below.max(above)),
+        top: "excess",
+        bottom: "gouge",
+        extremes: None,
+    }
+}
+
+/// Red, green and blue of each deviation (mm; NaN off the part), as the deviation's picture has them.
+pub fn deviation_colours(deviation: &[f32], limits: &Limits) -> Vec<[u8; 3]> {
+    let key = deviation_key(limits);
+    deviation.iter().map(|d| key.colour(*d)).collect()
+}
+
 /// Least and greatest of the finite values.
 fn extremes(values: &[f32]) -> Option<(f64, f64)> {
     let finite = values.iter().copied().filter(|v| v.is_finite()).map(f64::from);
@@ -202,21 +224,11 @@ pub fn deviation_picture(
     /// Steps along half of the key: 1, 2 and 5 then all have a tick at the end.
     const HALF_TICKS: f64 = 5.0;
     let (below, above) = deviation_ends(limits);
-    let unit = Unit::for_range(below.max(above));
-    let mut ticks = labelled(-below, 0.0, HALF_TICKS, unit);
-    let excess = labelled(0.0, above, HALF_TICKS, unit).into_iter().skip(1);
+    let mut key = deviation_key(limits);
+    let mut ticks = labelled(-below, 0.0, HALF_TICKS, key.unit);
+    let excess = labelled(0.0, above, HALF_TICKS, key.unit).into_iter().skip(1);
     ticks.extend(excess.map(|(mark, text)| (mark, format!("+{text}"))));
-    let key = Key {
-        from: -below,
-        middle: 0.0,
-        to: above,
-        gradient: diverging,
-        ticks,
-        unit,
-        top: "excess",
-        bottom: "gouge",
-        extremes: extremes(deviation),
-    };
+    (key.ticks, key.extremes) = (ticks, extremes(deviation));
     draw(grid, &pool(grid, deviation, Pooling::Extreme { below, above }, size), &key, words)
 }
 

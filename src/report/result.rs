@@ -22,12 +22,12 @@ pub struct SimulationFigures {
     pub threads: usize,
 }
 
-/// The triangles of machined.stl.
+/// The triangles of machined.stl and machined.ply.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SurfaceMeshFigures {
     /// Number of triangles, sides and bottom included.
     pub triangles: usize,
-    /// Greatest vertical distance of the top from the cells' heights.
+    /// Greatest vertical distance of the top from the cells' heights and from ridges between them.
     pub tolerance_mm: f64,
 }
 

@@ -27,8 +27,8 @@ pub enum GridError {
     Area,
     /// The grid needs more memory than allowed.
     #[error(
-        "a cell of {cell} mm needs {needed_mib} MiB for {nx} x {ny} cells, and {allowed_mib} MiB are allowed; \
-         the smallest cell that fits is {fitting} mm"
+        "a cell of {cell} mm needs {needed_mib} MiB for {nx} x {ny} cells, and {allowed_mib} MiB are left for \
+         them; the smallest cell that fits is {fitting} mm"
     )]
     Memory {
         /// What was asked for, mm.
@@ -39,7 +39,7 @@ pub enum GridError {
         ny: usize,
         /// What the run would need.
         needed_mib: usize,
-        /// What it may use.
+        /// What the cells may take.
         allowed_mib: usize,
         /// A cell that fits, mm, rounded up to two digits.
         fitting: f64,

@@ -9,8 +9,15 @@ use serde_json::Value;
 use crate::command::{PLATE, entries, millstream};
 
 /// Files of every toolpath.
-const TOOLPATH_FILES: [&str; 6] =
-    ["deviation.png", "height.exr", "height.png", "machined.stl", "toolpath.cls", "toolpath.nc"];
+const TOOLPATH_FILES: [&str; 7] = [
+    "deviation.png",
+    "height.exr",
+    "height.png",
+    "machined.ply",
+    "machined.stl",
+    "toolpath.cls",
+    "toolpath.nc",
+];
 
 /// The plate, and a strategy of each kind on a surface that curves.
 const WAVE: &str = r#"title = "A wave <&> its \"passes\""
@@ -234,6 +241,50 @@ fn the_programs_and_the_part_are_whole(folder: &Path, toolpath: &Value) {
     let (mesh, repairs) = millstream::io::stl::read(&folder.join("machined.stl")).unwrap();
     assert!(mesh.is_closed() && repairs.is_clean(), "{repairs}");
     assert_eq!(toolpath["surface_mesh"]["triangles"], mesh.triangles().len());
+    the_ply_is_the_stl(&std::fs::read(folder.join("machined.ply")).unwrap(), &mesh, toolpath);
+}
+
+/// Reads the PLY by its header and compares it with the STL, corner by corner.
+fn the_ply_is_the_stl(bytes: &[u8], stl: &millstream::geometry::TriangleMesh, toolpath: &Value) {
+    let end = b"end_header\n";
+    let body = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
+    let header = std::str::from_utf8(&bytes[..body]).unwrap();
+    let count = |element: &str| -> usize {
+        let line = header.lines().find_map(|l| l.strip_prefix(&format!("element {element} "))).unwrap();
+        line.parse().unwrap()
+    };
+    let (vertices, faces) = (count("vertex"), count("face"));
+    assert!(header.starts_with("ply\nformat binary_little_endian 1.0\n"));
+    assert_eq!(bytes.len(), body + vertices * 19 + faces * 13);
+    let float = |at: usize| f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+    let vertex = |k: usize| [0, 4, 8].map(|axis| f64::from(float(body + 19 * k + axis)));
+    for (f, triangle) in stl.triangles().iter().enumerate() {
+        let record = &bytes[body + 19 * vertices + 13 * f..][..13];
+        assert_eq!(record[0], 3);
+        for (k, corner) in triangle.iter().enumerate() {
+            let index = u32::from_le_bytes(record[1 + 4 * k..5 + 4 * k].try_into().unwrap());
+            let place: [f64; 3] = stl.vertices()[*corner as usize].into();
+            assert_eq!(vertex(index as usize), place, "face {f}");
+        }
+    }
+    let ridge_or_cell = |k: usize| (float(body + 19 * k + 15), &bytes[body + 19 * k + 12..][..3]);
+    let known: Vec<f64> =
+        (0..vertices).map(|k| f64::from(ridge_or_cell(k).0)).filter(|d| d.is_finite()).collect();
+    let extreme = |sign: f64| known.iter().map(|d| sign * d).fold(f64::MIN, f64::max);
+    let figure = |of: &str, key: &str| toolpath[of][key].as_f64().unwrap_or(0.0);
+    let highest = figure("deviation", "max_mm").max(figure("scallop", "max_mm"));
+    assert!(extreme(1.0) <= highest + 1e-5 && extreme(1.0) > 0.5 * highest, "{} {highest}", extreme(1.0));
+    assert!(extreme(-1.0) <= figure("gouge", "max_depth_mm") + 1e-5);
+    // Red where material stands, blue where it was gouged, grey where there is no design.
+    for k in 0..vertices {
+        let (deviation, colour) = ridge_or_cell(k);
+        match deviation {
+            d if d.is_nan() => assert_eq!(colour, [176, 180, 184]),
+            d if d > 0.002 => assert!(colour[0] > colour[2], "{d} {colour:?}"),
+            d if d < -0.002 => assert!(colour[2] > colour[0], "{d} {colour:?}"),
+            _ => {}
+        }
+    }
 }
 
 #[test]

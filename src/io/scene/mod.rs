@@ -140,9 +140,9 @@ impl Engine {
 pub struct Simulation {
     /// Pitch of the cells, mm.
     pub cell: f64,
-    /// True when the scene leaves the cell to the program, which may then make it coarser to fit
-    /// into the memory.
-    pub cell_is_default: bool,
+    /// True when the scene leaves the cell to the program (`"auto"`, or no word about it), which may
+    /// then make it coarser to fit into the memory.
+    pub cell_is_auto: bool,
     /// Memory that one simulation may take, MiB.
     pub memory_mib: u32,
     /// Which engine cuts.
@@ -200,12 +200,23 @@ pub struct Scene {
     pub toolpaths: Vec<ToolpathRequest>,
 }
 
-/// The default cell for a cutter: a sixtieth of its radius, rounded down to 1, 2 or 5 times a power
-/// of ten. A ball of 6 mm gets 0.05 mm, ten cells between passes at a scallop of 10 µm. Coarser
-/// cells widen the error bounds; finer ones cost memory and time as their square.
-pub fn default_cell(cutter: &Cutter) -> f64 {
-    const CELLS_A_RADIUS: f64 = 60.0;
-    let exact = cutter.radius() / CELLS_A_RADIUS;
+/// The cell that suits a cutter and the steps of its toolpaths: six cells between passes and thirty a
+/// radius (sixty for a flat, whose edge is sharp), rounded down to 1, 2 or 5 times a power of ten. A
+/// ball of 6 mm gets 0.05 mm at a scallop of 10 µm. With fewer cells between passes a narrow pass may
+/// be lowest on none of them, and the error bounds grow; more cost memory and time as their square.
+pub fn auto_cell(cutter: &Cutter, toolpaths: &[ToolpathRequest]) -> f64 {
+    const CELLS_A_PASS: f64 = 6.0;
+    const CELLS_A_RADIUS: f64 = 30.0;
+    let corner = cutter.corner_radius();
+    let coarsest = cutter.radius() / if corner > 0.0 { CELLS_A_RADIUS } else { 2.0 * CELLS_A_RADIUS };
+    let exact = toolpaths.iter().fold(coarsest, |cell, request| match request.step {
+        Step::Stepover(width) => cell.min(width / CELLS_A_PASS),
+        // The strip of a corner of radius r on a plane is √(8rh) wide; a flat has none.
+        Step::Scallop(height) if corner > 0.0 => cell.min((8.0 * corner * height).sqrt() / CELLS_A_PASS),
+        Step::Scallop(_) => cell,
+    });
+    // Finer than scenes may ask for is finer than heights are resolved.
+    let exact = exact.max(*section::LENGTH.start());
     let exponent = exact.log10().floor() as i32;
     let power = 10f64.powi(exponent);
     // A hair of rounding must not turn 0.05 into 0.02.

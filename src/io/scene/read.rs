@@ -11,7 +11,7 @@ use super::section::{LENGTH, Located, Section};
 use super::{
     CuttingData, DEFAULT_ALLOWANCE, DEFAULT_CLEARANCE, DEFAULT_CONTROL_POINTS, DEFAULT_FEED_RATE,
     DEFAULT_LIMITS, DEFAULT_MARGIN, DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE, DEFAULT_SPINDLE_SPEED, Engine,
-    MeshFormat, NamedFile, PartSource, Scene, Simulation, Stock, ToolpathRequest, default_cell,
+    MeshFormat, NamedFile, PartSource, Scene, Simulation, Stock, ToolpathRequest, auto_cell,
 };
 use crate::cutter::Cutter;
 use crate::geometry::AnalyticSurface;
@@ -82,9 +82,12 @@ impl Scene {
         let stock = read_stock(&root.section("stock")?)?;
         let (cutter, cutting) = read_cutter(&root.section("cutter")?)?;
         let tolerance = read_tolerance(&root.section("tolerance")?)?;
-        let simulation = read_simulation(&root.section("simulation")?, &cutter)?;
+        let mut simulation = read_simulation(&root.section("simulation")?, &cutter)?;
         let (machine, clearance) = read_machine(&root.section("machine")?)?;
         let toolpaths = read_toolpaths(&root, &tolerance, &cutter)?;
+        if simulation.cell_is_auto {
+            simulation.cell = auto_cell(&cutter, &toolpaths);
+        }
         Ok(Self {
             source: source.clone(),
             title,
@@ -262,13 +265,14 @@ fn read_tolerance(section: &Section<'_>) -> Result<Limits, SceneError> {
     })
 }
 
+/// An automatic cell is that of the cutter alone until the toolpaths are known.
 fn read_simulation(section: &Section<'_>, cutter: &Cutter) -> Result<Simulation, SceneError> {
     section.only(&["cell", "memory_mib", "engine"], &[], "[simulation]")?;
-    let cell = section.length("cell")?.map(|v| v.value);
+    let cell = section.length_or_word("cell", "auto")?;
     let engine = section.word("engine", &Engine::WORDS)?.and_then(|word| Engine::from_word(word.value));
     Ok(Simulation {
-        cell: cell.unwrap_or_else(|| default_cell(cutter)),
-        cell_is_default: cell.is_none(),
+        cell: cell.unwrap_or_else(|| auto_cell(cutter, &[])),
+        cell_is_auto: cell.is_none(),
         memory_mib: section.count("memory_mib", 1..=1 << 20)?.unwrap_or(DEFAULT_MEMORY_MIB),
         engine: engine.unwrap_or(Engine::Reference),
     })

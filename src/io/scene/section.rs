@@ -204,6 +204,14 @@ impl<'a> Section<'a> {
         self.word(key, words)?.ok_or_else(|| self.missing(key, &format!("\"{}\"", words[0])))
     }
 
+    /// A length, or `None` for that word or nothing.
+    pub fn length_or_word(&self, key: &str, word: &'static str) -> Result<Option<f64>, SceneError> {
+        if self.entry(key).is_some_and(|entry| matches!(entry.get_ref(), DeValue::String(_))) {
+            return self.word(key, &[word]).map(|_| None);
+        }
+        Ok(self.length(key)?.map(|length| length.value))
+    }
+
     /// `true` or `false`.
     pub fn flag(&self, key: &str) -> Result<Option<bool>, SceneError> {
         let Some(entry) = self.entry(key) else { return Ok(None) };

@@ -60,7 +60,7 @@ fn a_scene_becomes_typed_values_in_mm_and_rad() {
     assert_eq!(scene.title, "Wave, zigzag against streamlines");
     assert_eq!((scene.cutter.shape(), scene.cutter.radius()), (CutterShape::Ball, 3.0));
     assert_eq!(scene.tolerance, Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chord: 0.001 });
-    assert_eq!((scene.simulation.cell, scene.simulation.cell_is_default), (0.05, true));
+    assert_eq!((scene.simulation.cell, scene.simulation.cell_is_auto), (0.05, true));
     assert_eq!(scene.simulation.memory_mib, 2048);
     let [a, b, c, d] = &scene.toolpaths[..] else { panic!() };
     assert_eq!(a.strategy, Strategy::Zigzag { angle: 30f64.to_radians(), one_way: false });
@@ -227,11 +227,39 @@ fn a_file_that_is_not_there_is_reported_at_its_name() {
 }
 
 #[test]
-fn the_default_cell_is_a_round_number() {
-    let cells: Vec<f64> = [0.6, 1.0, 6.0, 10.0, 12.0, 20.0, 63.0, 400.0]
-        .map(|d| default_cell(&Cutter::ball(d).unwrap()))
-        .to_vec();
-    assert_eq!(cells, [0.005, 0.005, 0.05, 0.05, 0.1, 0.1, 0.5, 2.0]);
+fn the_auto_cell_is_a_round_number() {
+    let at = |step: Step| {
+        let mut requests = Scene::parse("folder/wave.toml", VALID).unwrap().toolpaths;
+        requests.truncate(1);
+        requests[0].step = step;
+        requests
+    };
+    let of = |cutter: Cutter, step: Step| auto_cell(&cutter, &at(step));
+    let ball = |d: f64| Cutter::ball(d).unwrap();
+    let cells = [0.6, 1.0, 6.0, 20.0, 400.0].map(|d| of(ball(d), Step::Scallop(0.01)));
+    assert_eq!(cells, [0.01, 0.01, 0.05, 0.1, 0.5]);
+    // A wide step leaves the radius to decide, a narrow one decides itself.
+    let cells = [100.0, 0.31, 0.05, 1e-9].map(|width| of(ball(6.0), Step::Stepover(width)));
+    assert_eq!(cells, [0.1, 0.05, 0.005, 1e-6]);
+    let flat = Cutter::flat(6.0).unwrap();
+    assert_eq!(of(flat, Step::Scallop(0.01)), 0.05);
+    assert_eq!(of(Cutter::bull(6.0, 1.0).unwrap(), Step::Scallop(0.01)), 0.02);
+}
+
+#[test]
+fn the_cell_may_be_left_to_the_program() {
+    let simulation = |cell: &str| {
+        let text = format!(
+            "[part]\nsurface = \"plane\"\nx = [0, 8]\ny = [0, 6]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n\
+             [simulation]\ncell = {cell}\n[[toolpath]]\nstrategy = \"zigzag\"\n"
+        );
+        Scene::parse("a.toml", text).map(|scene| (scene.simulation.cell, scene.simulation.cell_is_auto))
+    };
+    assert_eq!(simulation("\"auto\"").unwrap(), (0.05, true));
+    assert_eq!(simulation("0.2").unwrap(), (0.2, false));
+    for bad in ["\"fine\"", "true", "0"] {
+        assert!(matches!(simulation(bad), Err(SceneError::Invalid(_))), "{bad}");
+    }
 }
 
 /// Any outcome but a panic is right; an error must be printable.

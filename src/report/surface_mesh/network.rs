@@ -1,0 +1,378 @@
+//! The hierarchy of triangles over the cells, and how far each lies from the cut surface.
+//!
+//! A right-triangulated irregular network (Evans, Kirkpatrick and Townsend 2001): right triangles
+//! over the grid of cell centres, halved at the middle of their longest side. Sides that a ridge
+//! crosses carry the ridge's point, and the triangles at them are cut along it ([`super::split`]).
+//! Which points a side carries depends on that side alone, so its two triangles agree.
+//!
+//! The bound of a middle is the greatest vertical distance from the two triangles at its side to the
+//! cell centres and ridge points that they cover, and no less than the bounds of the middles below it
+//! (Lindstrom and others 1996). A side is halved exactly when its bound exceeds the tolerance; both
+//! triangles at a side read the same bound, so that no crack can open.
+
+use super::Node;
+use super::ridge_points::{Line, RidgePoints};
+use super::split::{Corner, split};
+use crate::sim::ZMap;
+
+/// Side of the squares from which halving starts, cells (a power of two). Greater squares allow
+/// greater triangles on flat ground, but more of the last row of squares hangs over the border.
+const MAX_SQUARE: usize = 256;
+
+/// A side longer than a cell carries its ridge points if they are so many at most: between more of
+/// them it would need the valleys too.
+const MOST_RIDGES: usize = 2;
+
+/// A long side carries its ridge points if they bring it at least this much closer.
+const WORTH: f64 = 0.5;
+
+/// Places, in cells, that differ by less are the same. Triangles are 1/256 of a cell at least.
+const SAME_PLACE: f64 = 1e-9;
+
+/// Factor by which the tolerance grows while there are too many triangles, and how often the last
+/// such step is then halved: 2^(1/8) is 9 % more than the least tolerance at most.
+const GROWTH: f64 = 2.0;
+const HALVINGS: usize = 3;
+
+/// The bounds at all middles, over whole squares that cover the grid.
+pub(super) struct Network<'a> {
+    cut: &'a ZMap,
+    ridges: &'a RidgePoints,
+    /// Ridge points closer to a side than this, mm, are left out of it.
+    floor: f64,
+    /// Side of a square, cells.
+    square: usize,
+    /// Nodes along x and y: whole squares, and one.
+    width: usize,
+    height: usize,
+    bound: Vec<f32>,
+    /// Greatest finite bound.
+    coarsest: f64,
+}
+
+/// Room for the pieces of one triangle.
+#[derive(Default)]
+pub(super) struct Scratch {
+    outline: Vec<Corner>,
+    pub pieces: Vec<[Corner; 3]>,
+}
+
+impl<'a> Network<'a> {
+    pub fn new(cut: &'a ZMap, ridges: &'a RidgePoints, floor: f64) -> Self {
+        let longest = cut.grid.nx.max(cut.grid.ny) - 1;
+        let square = longest.next_power_of_two().min(MAX_SQUARE);
+        let whole = |nodes: usize| (nodes - 1).div_ceil(square) * square + 1;
+        let (width, height) = (whole(cut.grid.nx), whole(cut.grid.ny));
+        let bound = vec![0.0; width * height];
+        let mut network = Self { cut, ridges, floor, square, width, height, bound, coarsest: 0.0 };
+        // From the smallest triangles up, since a bound holds those below it.
+        let mut size = 2;
+        while size <= square {
+            let half = size / 2;
+            // Middles of the sides of all squares of this size, then the middles of those squares.
+            network.bound_rows(0, half, size, |_, y| if y % size == 0 { half } else { 0 });
+            network.bound_rows(half, size, size, |_, _| half);
+            size *= 2;
+        }
+        let finite = network.bound.iter().copied().filter(|b| b.is_finite());
+        network.coarsest = f64::from(finite.fold(0.0, f32::max));
+        network
+    }
+
+    /// Bounds at the middles of one kind: rows from `first` in steps of `row_step`, in each of them
+    /// columns from `start` on in steps of `size`.
+    fn bound_rows(
+        &mut self,
+        first: usize,
+        row_step: usize,
+        size: usize,
+        start: impl Fn(usize, usize) -> usize + Sync + Send,
+    ) {
+        let rows: Vec<usize> = (first..self.height).step_by(row_step).collect();
+        let this = &*self;
+        let found = crate::parallel::map(rows.len(), |k| {
+            let mut scratch = Scratch::default();
+            let columns = (start(k, rows[k])..this.width).step_by(size);
+            columns.map(|x| this.bound_at((x, rows[k]), size, &mut scratch)).collect::<Vec<f32>>()
+        });
+        for (k, row) in found.into_iter().enumerate() {
+            let x0 = start(k, rows[k]);
+            for (n, bound) in row.into_iter().enumerate() {
+                self.bound[rows[k] * self.width + x0 + n * size] = bound;
+            }
+        }
+    }
+
+    /// The bound at a middle: of the side of a square of `size` or of such a square.
+    fn bound_at(&self, (x, y): Node, size: usize, scratch: &mut Scratch) -> f32 {
+        let half = size / 2;
+        let of_square = x % size == half && y % size == half;
+        let mut bound = 0f32;
+        let step = if of_square { half } else { half / 2 } as i64;
+        let below = if of_square {
+            [(-step, 0), (step, 0), (0, -step), (0, step)]
+        } else {
+            [(-step, -step), (step, -step), (-step, step), (step, step)]
+        };
+        for (dx, dy) in below.into_iter().filter(|_| step > 0) {
+            let (x, y) = (x as i64 + dx, y as i64 + dy);
+            if (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y) {
+                bound = bound.max(self.bound[y as usize * self.width + x as usize]);
+            }
+        }
+        let triangles = if of_square {
+            halves((x - half, y - half), size).map(Some)
+        } else {
+            // The side lies or stands; its two triangles have their right angles to either hand.
+            let (a, b) =
+                if y % size == 0 { ((x - half, y), (x + half, y)) } else { ((x, y + half), (x, y - half)) };
+            let ahead = if y % size == 0 { (x, y + half) } else { (x + half, y) };
+            let behind = if y % size == 0 {
+                y.checked_sub(half).map(|y| (x, y))
+            } else {
+                x.checked_sub(half).map(|x| (x, y))
+            };
+            let inside = (ahead.0 < self.width && ahead.1 < self.height).then_some([ahead, a, b]);
+            [inside, behind.map(|behind| [behind, b, a])]
+        };
+        for corners in triangles.into_iter().flatten() {
+            bound = bound.max(self.misfit(corners, scratch));
+        }
+        bound
+    }
+
+    /// Greatest vertical distance of a triangle from the centres and ridge points that it covers, mm;
+    /// infinite across the grid's border, where it must be halved down to the border.
+    fn misfit(&self, corners: [Node; 3], scratch: &mut Scratch) -> f32 {
+        let grid = &self.cut.grid;
+        let [columns, rows] = [corners.map(|c| c.0), corners.map(|c| c.1)];
+        let range = |of: [usize; 3]| (of[0].min(of[1]).min(of[2]), of[0].max(of[1]).max(of[2]));
+        let ((x0, x1), (y0, y1)) = (range(columns), range(rows));
+        if x0 >= grid.nx - 1 || y0 >= grid.ny - 1 {
+            return 0.0;
+        }
+        if x1 >= grid.nx || y1 >= grid.ny {
+            return f32::INFINITY;
+        }
+        self.pieces(corners, scratch);
+        let mut worst = 0f64;
+        for piece in &scratch.pieces {
+            let plane = Plane::through(piece);
+            let (low, high) = extent(piece.map(|c| c.y));
+            for j in (low - SAME_PLACE).ceil() as usize..=(high + SAME_PLACE).floor() as usize {
+                let Some((left, right)) = across(piece, j as f64) else { continue };
+                for i in (left - SAME_PLACE).ceil() as usize..=(right + SAME_PLACE).floor() as usize {
+                    let z = f64::from(self.cut.height[grid.index(i, j)]);
+                    worst = worst.max((plane.at(i as f64, j as f64) - z).abs());
+                }
+            }
+        }
+        for j in y0..=y1 {
+            for point in self.ridges.of_cells(x0, x1, j) {
+                let (x, y) = point.place(j);
+                if let Some(piece) = scratch.pieces.iter().find(|piece| covers(piece, x, y)) {
+                    worst = worst.max((Plane::through(piece).at(x, y) - f64::from(point.z)).abs());
+                }
+            }
+        }
+        worst as f32
+    }
+
+    /// The pieces of a triangle whose `corners` begin at the right angle and run counter-clockwise.
+    pub fn pieces(&self, corners: [Node; 3], scratch: &mut Scratch) {
+        let Scratch { outline, pieces } = scratch;
+        outline.clear();
+        pieces.clear();
+        for k in 0..3 {
+            let (own, before) = (1u8 << k, 1u8 << ((k + 2) % 3));
+            outline.push(Corner { sides: own | before, ..self.corner(corners[k]) });
+            self.side(corners[k], corners[(k + 1) % 3], own, outline);
+        }
+        split(outline, pieces);
+    }
+
+    fn corner(&self, (i, j): Node) -> Corner {
+        let vertex = self.cut.grid.index(i, j);
+        let z = f64::from(self.cut.height[vertex]);
+        Corner { x: i as f64, y: j as f64, z, vertex, on_ridge: false, sides: 0 }
+    }
+
+    /// Adds the ridge points that the side from `a` to `b` carries, in that order.
+    fn side(&self, a: Node, b: Node, side: u8, out: &mut Vec<Corner>) {
+        let begin = out.len();
+        // Both triangles at a side look at it from its left or lower end.
+        let (p, q) = if a < b { (a, b) } else { (b, a) };
+        let (dx, dy) = (q.0 - p.0, q.1.abs_diff(p.1));
+        let falls = q.1 < p.1;
+        let length = dx.max(dy);
+        for k in 0..length {
+            let (cell, line) = match (dx, dy) {
+                (_, 0) => ((p.0 + k, p.1), Line::AlongX),
+                (0, _) => ((p.0, p.1 + k), Line::AlongY),
+                _ if falls => ((p.0 + k, p.1 - k - 1), Line::Diagonal),
+                _ => ((p.0 + k, p.1 + k), Line::Diagonal),
+            };
+            let (first, points) = self.ridges.on(cell, line);
+            for (n, point) in points.iter().enumerate() {
+                let (x, y) = point.place(cell.1);
+                let vertex = self.cut.grid.len() + first + n;
+                out.push(Corner { x, y, z: f64::from(point.z), vertex, on_ridge: true, sides: side });
+            }
+            if length > 1 && out.len() - begin > MOST_RIDGES {
+                break;
+            }
+        }
+        let points = &out[begin..];
+        if points.is_empty() {
+            return;
+        }
+        let many = length > 1 && points.len() > MOST_RIDGES;
+        if many || !self.worthwhile(p, q, length, points) {
+            out.truncate(begin);
+        } else if p != a {
+            out[begin..].reverse();
+        }
+    }
+
+    /// True when a side comes closer to its centres and ridge points by carrying those points.
+    fn worthwhile(&self, p: Node, q: Node, length: usize, points: &[Corner]) -> bool {
+        let (from, to) = (self.corner(p), self.corner(q));
+        // Share of the side from its beginning, in cells.
+        let along = |c: &Corner| (c.x - from.x).max((c.y - from.y).abs());
+        let between =
+            |a: &Corner, b: &Corner, s: f64| a.z + (b.z - a.z) * (s - along(a)) / (along(b) - along(a));
+        let (mut without, mut with) = (0f64, 0f64);
+        for point in points {
+            without = without.max((between(&from, &to, along(point)) - point.z).abs());
+        }
+        let mut next = 0;
+        let step = |k: usize, from: usize, to: usize| {
+            if to >= from { from + (to - from) * k / length } else { from - (from - to) * k / length }
+        };
+        for k in 1..length {
+            let (z, s) = (self.corner((step(k, p.0, q.0), step(k, p.1, q.1))).z, k as f64);
+            while next < points.len() && along(&points[next]) <= s {
+                next += 1;
+            }
+            let (a, b) = (if next == 0 { &from } else { &points[next - 1] }, points.get(next).unwrap_or(&to));
+            without = without.max((between(&from, &to, s) - z).abs());
+            with = with.max((between(a, b, s) - z).abs());
+        }
+        without > self.floor && with <= WORTH * without
+    }
+
+    /// Hands every triangle to `emit` until that returns false.
+    pub fn visit(&self, tolerance: f64, emit: &mut dyn FnMut([Node; 3]) -> bool) {
+        for y in (0..self.height - 1).step_by(self.square) {
+            for x in (0..self.width - 1).step_by(self.square) {
+                let two = halves((x, y), self.square);
+                if !two.into_iter().all(|corners| self.halve(corners, tolerance, emit)) {
+                    return;
+                }
+            }
+        }
+    }
+
+    /// `corners` begin at the right angle and run counter-clockwise.
+    fn halve(&self, corners: [Node; 3], tolerance: f64, emit: &mut dyn FnMut([Node; 3]) -> bool) -> bool {
+        let [apex, a, b] = corners;
+        let least = (apex.0.min(a.0).min(b.0), apex.1.min(a.1).min(b.1));
+        if least.0 >= self.cut.grid.nx - 1 || least.1 >= self.cut.grid.ny - 1 {
+            return true;
+        }
+        let unit = (a.0 + b.0) % 2 == 1;
+        let middle = ((a.0 + b.0) / 2, (a.1 + b.1) / 2);
+        if unit || f64::from(self.bound[middle.1 * self.width + middle.0]) <= tolerance {
+            return emit(corners);
+        }
+        self.halve([middle, apex, a], tolerance, emit) && self.halve([middle, b, apex], tolerance, emit)
+    }
+
+    /// The least tolerance from `tolerance` up (about) that needs no more than `max_triangles`.
+    pub fn least_tolerance(&self, mut tolerance: f64, max_triangles: usize) -> f64 {
+        let mut factor = 1.0;
+        while self.exceeds(tolerance, max_triangles) && tolerance < self.coarsest {
+            factor = GROWTH;
+            tolerance *= factor;
+        }
+        for _ in 0..if factor > 1.0 { HALVINGS } else { 0 } {
+            factor = factor.sqrt();
+            if !self.exceeds(tolerance / factor, max_triangles) {
+                tolerance /= factor;
+            }
+        }
+        tolerance
+    }
+
+    fn exceeds(&self, tolerance: f64, max_triangles: usize) -> bool {
+        let (mut count, mut scratch) = (0, Scratch::default());
+        self.visit(tolerance, &mut |corners| {
+            self.pieces(corners, &mut scratch);
+            count += scratch.pieces.len();
+            count <= max_triangles
+        });
+        count > max_triangles
+    }
+}
+
+/// The two triangles of a square, right angle first, counter-clockwise. Squares alternate like a
+/// chessboard, so that the diagonals of the four quarters of a square meet in its middle.
+fn halves((x, y): Node, size: usize) -> [[Node; 3]; 2] {
+    let (south_west, south_east, north_west, north_east) =
+        ((x, y), (x + size, y), (x, y + size), (x + size, y + size));
+    if super::ridge_points::rises((x / size, y / size)) {
+        [[south_east, north_east, south_west], [north_west, south_west, north_east]]
+    } else {
+        [[north_east, north_west, south_east], [south_west, south_east, north_west]]
+    }
+}
+
+fn extent(of: [f64; 3]) -> (f64, f64) {
+    (of[0].min(of[1]).min(of[2]), of[0].max(of[1]).max(of[2]))
+}
+
+/// Where the row at `y` enters and leaves a triangle.
+fn across(piece: &[Corner; 3], y: f64) -> Option<(f64, f64)> {
+    let (mut left, mut right) = (f64::INFINITY, f64::NEG_INFINITY);
+    for k in 0..3 {
+        let (p, q) = (&piece[k], &piece[(k + 1) % 3]);
+        if (p.y - y).abs() <= SAME_PLACE {
+            (left, right) = (left.min(p.x), right.max(p.x));
+        }
+        if (p.y - y) * (q.y - y) < 0.0 {
+            let x = p.x + (q.x - p.x) * (y - p.y) / (q.y - p.y);
+            (left, right) = (left.min(x), right.max(x));
+        }
+    }
+    (left <= right).then_some((left, right))
+}
+
+fn covers(piece: &[Corner; 3], x: f64, y: f64) -> bool {
+    (0..3).all(|k| {
+        let (p, q) = (&piece[k], &piece[(k + 1) % 3]);
+        (q.x - p.x) * (y - p.y) - (x - p.x) * (q.y - p.y) >= -SAME_PLACE
+    })
+}
+
+/// The height of a triangle as a function of place.
+struct Plane {
+    x: f64,
+    y: f64,
+    z: f64,
+    by_x: f64,
+    by_y: f64,
+}
+
+impl Plane {
+    fn through([a, b, c]: &[Corner; 3]) -> Self {
+        let (ux, uy, uz) = (b.x - a.x, b.y - a.y, b.z - a.z);
+        let (vx, vy, vz) = (c.x - a.x, c.y - a.y, c.z - a.z);
+        let area = ux * vy - vx * uy;
+        let (by_x, by_y) = ((uz * vy - vz * uy) / area, (ux * vz - vx * uz) / area);
+        Self { x: a.x, y: a.y, z: a.z, by_x, by_y }
+    }
+
+    fn at(&self, x: f64, y: f64) -> f64 {
+        self.z + self.by_x * (x - self.x) + self.by_y * (y - self.y)
+    }
+}
