@@ -111,13 +111,7 @@ impl<'a> Bound<'a> {
     /// positive where the move cuts nothing. Their middles are `pitch` apart, the first at `(x, y)`,
     /// and their cells reach `half` from them.
     #[inline(always)]
-    pub fn gaps(
-        &self,
-        [x, y]: [f64; 2],
-        pitch: f64,
-        half: f64,
-        ceilings: &Ceilings,
-    ) -> [f64; CHILDREN] {
+    pub fn gaps(&self, [x, y]: [f64; 2], pitch: f64, half: f64, ceilings: &Ceilings) -> [f64; CHILDREN] {
         match self.form.family {
             Family::Ball => self.gaps_by([x, y], pitch, half, ceilings, Self::ball_plane),
             Family::Flat => self.gaps_by([x, y], pitch, half, ceilings, Self::level_plane),
@@ -171,7 +165,8 @@ impl<'a> Bound<'a> {
         let (by_along, by_across) = (a / depth, w / depth);
         let climb = track.slope - by_along;
         let elsewhere = if climb > 0.0 { -climb * sigma } else { climb * (track.length - sigma) };
-        let value = track.tip(sigma) + (radius - depth)
+        let value = track.tip(sigma)
+            + (radius - depth)
             + by_along * (ahead - a)
             + by_across * (across - w)
             + elsewhere;

@@ -62,12 +62,8 @@ fn random_programs_of_all_cutters_agree_with_the_plain_loop() {
             let size = [4.0, 12.0, 40.0][round % 3];
             let path = random_path(&mut rng, 150, size);
             let cell = size / rng.within(25.0, 160.0);
-            let grid = Grid {
-                origin: Point2::new(-1.0, 0.3),
-                cell,
-                nx: 1 + rng.below(300),
-                ny: 1 + rng.below(150),
-            };
+            let grid =
+                Grid { origin: Point2::new(-1.0, 0.3), cell, nx: 1 + rng.below(300), ny: 1 + rng.below(150) };
             check_against_plain(&ZMap::block(grid, 3.0), &cutter, &path);
         }
     }

@@ -3,19 +3,22 @@
 
 use super::bound::{Bound, CHILDREN, Ceiling, Ceilings};
 use super::contact::{first_touch, reach};
-use super::leaf::{LEAF, Lanes, Leaf};
+use super::leaf::{
+    GENTLE, LEAF, Lanes, Leaf, UNTOUCHED, ball_heights, each, flat_heights, gentle_ball_heights,
+};
 use super::{ENGAGED, Found, Job, RapidContact, Slices};
 use crate::geometry::Point3;
 use crate::monitor::{Cancelled, check};
 use crate::sim::form::{Family, Form};
-use crate::sim::swept::{ball_height, flat_height, rounded_height};
+use crate::sim::swept::rounded_height;
 use crate::sim::track::{Track, larger, smaller};
 use crate::toolpath::MoveKind;
+use pulp::Simd;
 
 /// Cells along the side of a node.
 const NODE: usize = 4 * LEAF;
 
-/// Cells along the side of a tile. A worker's tile takes 131 kB, which a second-level cache holds.
+/// Cells along the side of a tile. A worker's tile takes 262 kB, which a second-level cache holds.
 pub(super) const SIDE: usize = 4 * NODE;
 
 /// Moves between two questions whether to go on: a millisecond or so.
@@ -44,9 +47,8 @@ impl Tile {
         let axis = |given: &[f64]| {
             let last = given.len() - 1;
             // Extrapolated beyond the grid, so that bounds about a leaf's middle stay true.
-            let at = |k: usize| {
-                given.get(k).copied().unwrap_or(given[last] + (k - last) as f64 * slices.cell)
-            };
+            let at =
+                |k: usize| given.get(k).copied().unwrap_or(given[last] + (k - last) as f64 * slices.cell);
             std::array::from_fn(|leaf| std::array::from_fn(|k| at(leaf * LEAF + k)))
         };
         let mut tile = Self {
@@ -63,7 +65,7 @@ impl Tile {
                 let leaf = &mut tile.leaves[n][l];
                 for (j, (heights, _)) in slices.rows.iter().skip(row * LEAF).take(LEAF).enumerate() {
                     for (i, &height) in heights.iter().skip(column * LEAF).take(LEAF).enumerate() {
-                        leaf.height[j * LEAF + i] = height;
+                        leaf.height[j][i] = f64::from(height);
                     }
                 }
                 tile.nodes[n].set(l, leaf_ceiling(leaf, slices.cell));
@@ -80,8 +82,10 @@ impl Tile {
                 let leaf = &self.leaves[n][l];
                 for (j, (heights, cut_by)) in slices.rows.iter_mut().skip(row * LEAF).take(LEAF).enumerate() {
                     for i in 0..heights.len().saturating_sub(column * LEAF).min(LEAF) {
-                        heights[column * LEAF + i] = leaf.height[j * LEAF + i];
-                        cut_by[column * LEAF + i] = leaf.by[j * LEAF + i];
+                        if leaf.by[j][i] != UNTOUCHED {
+                            heights[column * LEAF + i] = leaf.height[j][i] as f32;
+                            cut_by[column * LEAF + i] = leaf.by[j][i] as u32;
+                        }
                     }
                 }
             }
@@ -90,18 +94,13 @@ impl Tile {
 
     /// Runs through `moves` and writes the cells back.
     pub fn cut(mut self, job: &Job, slices: &mut Slices, moves: &[u32]) -> Result<Found, Cancelled> {
-        // Vectors as wide as the machine has them; without fused operations, so that every machine
-        // gives the same bits.
-        let found = pulp::Arch::new().dispatch(
-            #[inline(always)]
-            || self.cut_all(job, moves),
-        )?;
+        let found = pulp::Arch::new().dispatch(Run { tile: &mut self, job, moves })?;
         self.store(slices);
         Ok(found)
     }
 
     #[inline(always)]
-    fn cut_all(&mut self, job: &Job, moves: &[u32]) -> Result<Found, Cancelled> {
+    fn cut_all<S: Simd>(&mut self, simd: S, job: &Job, moves: &[u32]) -> Result<Found, Cancelled> {
         let mut found = Found::default();
         for run in moves.chunks(MOVES_A_CHECK) {
             check(job.monitor)?;
@@ -111,10 +110,14 @@ impl Tile {
                 let track = Track::new(from, to);
                 let from_top = (from.x, from.y, from.z) != (track.x, track.y, track.z);
                 let bound = Bound::new(&job.form, &track, from_top, k == 0);
-                let mut rapid = (job.path.moves[k].kind == MoveKind::Rapid)
-                    .then(|| Watch { form: &job.form, index, ends: [from, to], first: None });
+                let mut rapid = (job.path.moves[k].kind == MoveKind::Rapid).then(|| Watch {
+                    form: &job.form,
+                    index,
+                    ends: [from, to],
+                    first: None,
+                });
                 let mut lanes = Lanes::new();
-                self.cut_one(&bound, index, &mut lanes, &mut rapid);
+                self.cut_one(simd, &bound, index, &mut lanes, &mut rapid);
                 let tally = lanes.tally();
                 if tally.sum > 0.0 {
                     found.tallies.push((index, tally));
@@ -126,7 +129,14 @@ impl Tile {
     }
 
     #[inline(always)]
-    fn cut_one(&mut self, bound: &Bound, index: u32, lanes: &mut Lanes, rapid: &mut Option<Watch>) {
+    fn cut_one<S: Simd>(
+        &mut self,
+        simd: S,
+        bound: &Bound,
+        index: u32,
+        lanes: &mut Lanes,
+        rapid: &mut Option<Watch>,
+    ) {
         let (node, leaf) = (NODE as f64 * self.cell, LEAF as f64 * self.cell);
         let cell = self.cell;
         let middle = |corner: f64, side: usize| corner + 0.5 * (side - 1) as f64 * cell;
@@ -137,7 +147,7 @@ impl Tile {
             let (x, y) = (middle(self.x[column][0], LEAF), middle(self.y[row][0], LEAF));
             let mut changed = false;
             for l in open(&bound.gaps([x, y], leaf, half(LEAF), &self.nodes[n])) {
-                changed |= self.cut_leaf(bound, n, l, index, lanes, rapid);
+                changed |= self.cut_leaf(simd, bound, n, l, index, lanes, rapid);
             }
             if changed {
                 self.raise(n);
@@ -146,8 +156,9 @@ impl Tile {
     }
 
     #[inline(always)]
-    fn cut_leaf(
+    fn cut_leaf<S: Simd>(
         &mut self,
+        simd: S,
         bound: &Bound,
         n: usize,
         l: usize,
@@ -163,14 +174,21 @@ impl Tile {
         }
         let (form, track, radius) = (bound.form, bound.track, bound.form.radius);
         let changed = match form.family {
-            Family::Ball => leaf.cut([x, y], track, index, lanes, |along, across, _| {
-                ball_height(track, radius, along, across)
+            Family::Ball if track.slope <= GENTLE => {
+                leaf.cut(simd, [x, y], track, index, lanes, |simd, along, across, _| {
+                    gentle_ball_heights(simd, track, radius, along, across)
+                })
+            }
+            Family::Ball => leaf.cut(simd, [x, y], track, index, lanes, |simd, along, across, _| {
+                ball_heights(simd, track, radius, along, across)
             }),
-            Family::Flat => leaf.cut([x, y], track, index, lanes, |along, across, _| {
-                flat_height(track, radius, along, across)
+            Family::Flat => leaf.cut(simd, [x, y], track, index, lanes, |simd, along, across, _| {
+                flat_heights(simd, track, radius, along, across)
             }),
-            Family::Rounded => leaf.cut([x, y], track, index, lanes, |along, across, now| {
-                rounded_height_below(form, track, along, across, now)
+            Family::Rounded => leaf.cut(simd, [x, y], track, index, lanes, |_, along, across, now| {
+                each::<S>(along, across, now, |along, across, now| {
+                    rounded_height_below(form, track, along, across, now)
+                })
             }),
         };
         if changed {
@@ -185,6 +203,24 @@ impl Tile {
         let half = 0.5 * (LEAF - 1) as f64 * self.cell;
         let ceiling = self.nodes[n].ceiling(LEAF as f64 * self.cell, half);
         self.root.set(n, ceiling);
+    }
+}
+
+/// All moves of a tile, compiled for the vectors that the machine has; without fused operations, so
+/// that every machine gives the same bits. (Of a closure the call in between is not inlined, and its
+/// code stays that of the plainest machine.)
+struct Run<'a, 'b> {
+    tile: &'a mut Tile,
+    job: &'a Job<'b>,
+    moves: &'a [u32],
+}
+
+impl pulp::WithSimd for Run<'_, '_> {
+    type Output = Result<Found, Cancelled>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        self.tile.cut_all(simd, self.job, self.moves)
     }
 }
 
@@ -211,7 +247,7 @@ fn leaf_ceiling(leaf: &Leaf, cell: f64) -> Ceiling {
     let mut up = [0.0f64; LEAF];
     for j in 0..LEAF {
         for i in 0..LEAF {
-            let height = f64::from(leaf.height[j * LEAF + i]);
+            let height = leaf.height[j][i];
             columns[i] += height;
             up[i] += if j >= LEAF / 2 { height } else { -height };
         }
@@ -226,7 +262,7 @@ fn leaf_ceiling(leaf: &Leaf, cell: f64) -> Ceiling {
     for j in 0..LEAF {
         for i in 0..LEAF {
             let plane = slope[0] * offset(i) + slope[1] * offset(j);
-            tops[i] = larger(tops[i], f64::from(leaf.height[j * LEAF + i]) - plane);
+            tops[i] = larger(tops[i], leaf.height[j][i] - plane);
         }
     }
     Ceiling { value: tops.into_iter().fold(f64::NEG_INFINITY, larger), slope }
@@ -260,9 +296,10 @@ impl Watch<'_> {
     /// Looks at the cells of a leaf before they are cut.
     #[inline(never)]
     fn look(&mut self, leaf: &Leaf, x: &[f64; LEAF], y: &[f64; LEAF]) {
-        let cells = leaf.height.iter().enumerate().filter(|(_, height)| height.is_finite());
-        for (k, &height) in cells {
-            self.see(x[k % LEAF], y[k / LEAF], f64::from(height));
+        for (row, &y) in leaf.height.iter().zip(y) {
+            for (&height, &x) in row.iter().zip(x).filter(|(height, _)| height.is_finite()) {
+                self.see(x, y, height);
+            }
         }
     }
 
