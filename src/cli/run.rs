@@ -12,16 +12,16 @@ use crate::geometry::Aabb;
 use crate::io::scene::{Engine, Scene, ToolpathRequest};
 use crate::io::{ProgramHeader, apt_cl, exr, gcode, png, stl_write};
 use crate::machine::machining_time;
-use crate::metrology::{Measurement, measure, path_figures};
+use crate::metrology::{Measurement, RemovalFigures, measure, path_figures, removal_figures};
 use crate::monitor::{self, Monitor as _};
 use crate::parallel;
 use crate::part::Part;
 use crate::report::{
     HIGHEST_RIDGE, Histogram, MAX_TRIANGLES, MapSize, MapWords, Picture, RunReport, SimulationFigures,
     SurfaceMeshFigures, ToolpathPage, ToolpathResult, Verdict, deviation_picture, height_picture, html_page,
-    marks, result_table, surface_mesh, violations,
+    marks, rapid_violation, result_table, surface_mesh, violations,
 };
-use crate::sim::{Grid, GridError, ZMap, cut_reference};
+use crate::sim::{Grid, GridError, ZMap, cut_in_order, cut_reference};
 use crate::toolpath::{Plan, PlanSettings, plan};
 
 /// Bytes a cell that a run takes at its peak, which is while ridges are measured: stock (8), design
@@ -185,6 +185,12 @@ impl<'a> Job<'a> {
             .map_err(|reason| CliError::plan(scene, &request.name, reason))?;
         let begun = Instant::now();
         let cut = cut_reference(&ZMap::block(self.grid, self.top), &scene.cutter, &planned.path, monitor)?;
+        let mut removal = None;
+        if scene.simulation.removal {
+            let stock = ZMap::block(self.grid, self.top);
+            let removed = cut_in_order(stock, &scene.cutter, &planned.path, monitor)?;
+            removal = Some(removal_figures(&planned.path, &removed, &cut.height));
+        }
         let mut measured =
             measure(&self.part, &scene.cutter, &planned.path, &cut, &scene.tolerance, monitor)?;
         let simulation = SimulationFigures {
@@ -206,7 +212,10 @@ impl<'a> Job<'a> {
         for region in &mut measured.gouge.regions {
             region.line = lines.get(region.move_index as usize).copied().unwrap_or_default();
         }
-        Ok((self.result(request, &planned, measured, simulation, surface_mesh), page))
+        for contact in removal.iter_mut().flat_map(|removal| &mut removal.rapid_contacts) {
+            contact.line = lines.get(contact.move_index as usize).copied().unwrap_or_default();
+        }
+        Ok((self.result(request, &planned, measured, removal, simulation, surface_mesh), page))
     }
 
     fn result(
@@ -214,10 +223,13 @@ impl<'a> Job<'a> {
         request: &ToolpathRequest,
         planned: &Plan,
         measured: Measurement,
+        removal: Option<RemovalFigures>,
         simulation: SimulationFigures,
         surface_mesh: SurfaceMeshFigures,
     ) -> ToolpathResult {
-        let violations = violations(&measured, &self.scene.tolerance);
+        let rapid = removal.as_ref().and_then(rapid_violation);
+        let violations: Vec<_> =
+            rapid.into_iter().chain(violations(&measured, &self.scene.tolerance)).collect();
         let time = machining_time(&planned.path, &self.scene.machine);
         ToolpathResult {
             name: request.name.clone(),
@@ -231,6 +243,7 @@ impl<'a> Job<'a> {
             gouge: measured.gouge,
             uncut: measured.uncut,
             deviation: measured.deviation,
+            removal,
             simulation,
             surface_mesh,
         }

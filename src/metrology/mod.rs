@@ -11,6 +11,7 @@ mod cut_surface;
 mod figures;
 mod path;
 mod regions;
+mod removal;
 mod ridges;
 
 pub use figures::{
@@ -18,6 +19,7 @@ pub use figures::{
     UncutFigures, UncutRegion,
 };
 pub use path::path_figures;
+pub use removal::{RapidContactFigures, RemovalFigures, removal_figures};
 
 use crate::cutter::Cutter;
 use crate::geometry::{Point2, Point3};

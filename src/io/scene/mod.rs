@@ -41,6 +41,8 @@ pub const DEFAULT_PLUNGE_RATE: f64 = 300.0;
 pub const DEFAULT_CLEARANCE: f64 = 2.0;
 /// Default memory for one simulation, MiB.
 pub const DEFAULT_MEMORY_MIB: u32 = 2048;
+/// Whether to find out what each move removes by default.
+pub const DEFAULT_REMOVAL: bool = false;
 /// Default control points a side of a streamline's stream function. More follow finer changes of
 /// the feed direction and cost time as their cube; fewer smooth them away.
 pub const DEFAULT_CONTROL_POINTS: usize = 24;
@@ -147,6 +149,8 @@ pub struct Simulation {
     pub memory_mib: u32,
     /// Which engine cuts.
     pub engine: Engine,
+    /// Whether the stock is also cut in the order of the program, for what each move removes.
+    pub removal: bool,
 }
 
 /// One toolpath to plan.

@@ -10,8 +10,9 @@ use super::formula;
 use super::section::{LENGTH, Located, Section};
 use super::{
     CuttingData, DEFAULT_ALLOWANCE, DEFAULT_CLEARANCE, DEFAULT_CONTROL_POINTS, DEFAULT_FEED_RATE,
-    DEFAULT_LIMITS, DEFAULT_MARGIN, DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE, DEFAULT_SPINDLE_SPEED, Engine,
-    MeshFormat, NamedFile, PartSource, Scene, Simulation, Stock, ToolpathRequest, default_cell,
+    DEFAULT_LIMITS, DEFAULT_MARGIN, DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE, DEFAULT_REMOVAL,
+    DEFAULT_SPINDLE_SPEED, Engine, MeshFormat, NamedFile, PartSource, Scene, Simulation, Stock,
+    ToolpathRequest, default_cell,
 };
 use crate::cutter::Cutter;
 use crate::geometry::AnalyticSurface;
@@ -263,7 +264,7 @@ fn read_tolerance(section: &Section<'_>) -> Result<Limits, SceneError> {
 }
 
 fn read_simulation(section: &Section<'_>, cutter: &Cutter) -> Result<Simulation, SceneError> {
-    section.only(&["cell", "memory_mib", "engine"], &[], "[simulation]")?;
+    section.only(&["cell", "memory_mib", "engine", "removal"], &[], "[simulation]")?;
     let cell = section.length("cell")?.map(|v| v.value);
     let engine = section.word("engine", &Engine::WORDS)?.and_then(|word| Engine::from_word(word.value));
     Ok(Simulation {
@@ -271,6 +272,7 @@ fn read_simulation(section: &Section<'_>, cutter: &Cutter) -> Result<Simulation,
         cell_is_default: cell.is_none(),
         memory_mib: section.count("memory_mib", 1..=1 << 20)?.unwrap_or(DEFAULT_MEMORY_MIB),
         engine: engine.unwrap_or(Engine::Reference),
+        removal: section.flag("removal")?.unwrap_or(DEFAULT_REMOVAL),
     })
 }
 
