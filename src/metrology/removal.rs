@@ -51,7 +51,7 @@ pub struct RemovalFigures {
     pub max_axial_engagement_mm: f64,
     /// Greatest extent of what one move cut, across its direction; moves along the axis left out.
     pub max_radial_engagement_mm: f64,
-    /// Bound of its error.
+    /// Bound of its error, lips thinner than a cell left out.
     pub max_radial_engagement_error_bound_mm: f64,
     /// Greatest difference at a cell between the heights of the two engines, which work apart.
     pub engine_difference_mm: f64,

@@ -45,7 +45,8 @@ pub const ENGAGED: f64 = 1.0e-4;
 /// by `volume_bound` at most, as long as what the move removes is, along each row and column of
 /// cells, one piece with one summit: the sum over a row then errs by a cell times the summit.
 /// `depth`, `axial` and `radial` are taken at cell centres. The true width lies within
-/// `radial_bound` of `radial` unless its edge is a lip that passes between the centres.
+/// `radial_bound` of `radial` where the cut ends at least a cell long in the direction of travel; a lip
+/// thinner than that (such as a rising cutter leaves) passes between the centres and is not seen.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct MoveRemoval {
     /// Volume removed, mm³.

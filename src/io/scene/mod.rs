@@ -41,8 +41,8 @@ pub const DEFAULT_PLUNGE_RATE: f64 = 300.0;
 pub const DEFAULT_CLEARANCE: f64 = 2.0;
 /// Default memory for one simulation, MiB.
 pub const DEFAULT_MEMORY_MIB: u32 = 2048;
-/// Whether to find out what each move removes by default.
-pub const DEFAULT_REMOVAL: bool = false;
+/// Whether to find out what each move removes by default: a tenth of the time of a run on the wave.
+pub const DEFAULT_REMOVAL: bool = true;
 /// Default control points a side of a streamline's stream function. More follow finer changes of
 /// the feed direction and cost time as their cube; fewer smooth them away.
 pub const DEFAULT_CONTROL_POINTS: usize = 24;
