@@ -7,7 +7,7 @@ use divan::counter::ItemsCount;
 use millstream::cutter::Cutter;
 use millstream::geometry::{Point2, Point3};
 use millstream::monitor::Silent;
-use millstream::sim::{Grid, MoveBins, SweptMove, ZMap, cut_reference};
+use millstream::sim::{Grid, MoveBins, SweptMove, ZMap, cut_in_order, cut_in_order_plain, cut_reference};
 use millstream::toolpath::{ClPoint, Move, MoveKind, Toolpath};
 
 const SIZE: f64 = 100.0;
@@ -79,4 +79,54 @@ fn swept_move(bencher: Bencher, name: &str) {
         let heights = (0..100).flat_map(|j| (0..100).map(move |i| (i, j)));
         heights.filter_map(|(i, j)| swept.height(at(i), at(j))).sum::<f64>()
     });
+}
+
+/// The engine that keeps the order of the program, with passes 0.3 mm apart (args: cell and chord), and
+/// the plain loop that it is measured against.
+mod in_order {
+    use super::*;
+
+    #[divan::bench(sample_count = 3, args = [(0.05, 0.2), (0.05, 1.0), (0.02, 0.2)])]
+    fn ball(bencher: Bencher, (cell, chord): (f64, f64)) {
+        cut(bencher, &Cutter::ball(2.0 * RADIUS).expect("valid"), cell, chord);
+    }
+
+    #[divan::bench(sample_count = 3, args = [(0.05, 0.2)])]
+    fn flat(bencher: Bencher, (cell, chord): (f64, f64)) {
+        cut(bencher, &Cutter::flat(2.0 * RADIUS).expect("valid"), cell, chord);
+    }
+
+    #[divan::bench(sample_count = 3, args = [(0.05, 0.2)])]
+    fn bull(bencher: Bencher, (cell, chord): (f64, f64)) {
+        cut(bencher, &Cutter::bull(2.0 * RADIUS, 1.0).expect("valid"), cell, chord);
+    }
+
+    fn cut(bencher: Bencher, cutter: &Cutter, cell: f64, chord: f64) {
+        let path = wave(0.3, chord);
+        bencher
+            .with_inputs(|| block(cell))
+            .bench_values(|stock| cut_in_order(stock, cutter, &path, &Silent).expect("never cancelled"));
+    }
+
+    #[divan::bench(sample_count = 1, args = [(0.05, 0.2), (0.05, 1.0), (0.02, 0.2)])]
+    fn plain_ball(bencher: Bencher, (cell, chord): (f64, f64)) {
+        plain(bencher, &Cutter::ball(2.0 * RADIUS).expect("valid"), cell, chord);
+    }
+
+    #[divan::bench(sample_count = 1, args = [(0.05, 0.2)])]
+    fn plain_flat(bencher: Bencher, (cell, chord): (f64, f64)) {
+        plain(bencher, &Cutter::flat(2.0 * RADIUS).expect("valid"), cell, chord);
+    }
+
+    #[divan::bench(sample_count = 1, args = [(0.05, 0.2)])]
+    fn plain_bull(bencher: Bencher, (cell, chord): (f64, f64)) {
+        plain(bencher, &Cutter::bull(2.0 * RADIUS, 1.0).expect("valid"), cell, chord);
+    }
+
+    fn plain(bencher: Bencher, cutter: &Cutter, cell: f64, chord: f64) {
+        let path = wave(0.3, chord);
+        bencher.with_inputs(|| block(cell)).bench_values(|stock| {
+            cut_in_order_plain(stock, cutter, &path, &Silent).expect("never cancelled")
+        });
+    }
 }

@@ -44,7 +44,7 @@ pub struct RunOptions {
     /// Memory that one simulation may take, MiB, instead of the scene's.
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     pub memory: Option<u32>,
-    /// Engine that cuts, instead of the scene's. Both words mean the reference engine at present.
+    /// Engine that cuts, instead of the scene's.
     #[arg(long, value_name = "ENGINE", value_parser = clap::builder::PossibleValuesParser::new(Engine::WORDS))]
     pub engine: Option<String>,
 }

@@ -12,16 +12,16 @@ use crate::geometry::Aabb;
 use crate::io::scene::{Engine, Scene, ToolpathRequest, auto_cell};
 use crate::io::{ProgramHeader, apt_cl, exr, gcode, ply_write, png, stl_write};
 use crate::machine::machining_time;
-use crate::metrology::{Measurement, measure, path_figures};
+use crate::metrology::{Measurement, RemovalFigures, measure, path_figures, removal_figures};
 use crate::monitor::{self, Monitor as _};
 use crate::parallel;
 use crate::part::Part;
 use crate::report::{
     HIGHEST_RIDGE, Histogram, MAX_TRIANGLES, MapSize, MapWords, Picture, RunReport, SimulationFigures,
     SurfaceMeshFigures, ToolpathPage, ToolpathResult, Verdict, deviation_colours, deviation_picture,
-    height_picture, html_page, marks, result_table, surface_mesh, violations,
+    height_picture, html_page, marks, rapid_violation, result_table, surface_mesh, violations,
 };
-use crate::sim::{Grid, GridError, ZMap, cut_reference};
+use crate::sim::{Grid, GridError, ZMap, cut, cut_in_order, cut_reference};
 use crate::toolpath::{Plan, PlanSettings, Toolpath, plan};
 
 /// Bytes a cell that a run takes at its peak: stock and winning moves 8, deviations 12, ridges 16 where
@@ -238,7 +238,17 @@ impl<'a> Job<'a> {
         let (grid, note) =
             lay_out_for(scene, &self.part, &self.grid, &planned.path).map_err(CliError::grid(scene))?;
         let begun = Instant::now();
-        let cut = cut_reference(&ZMap::block(grid, self.top), &scene.cutter, &planned.path, monitor)?;
+        let stock = ZMap::block(grid, self.top);
+        let cut = match scene.simulation.engine {
+            Engine::ZMap => cut(stock, &scene.cutter, &planned.path, monitor)?,
+            Engine::Reference => cut_reference(&stock, &scene.cutter, &planned.path, monitor)?,
+        };
+        let mut removal = None;
+        if scene.simulation.removal {
+            let stock = ZMap::block(grid, self.top);
+            let removed = cut_in_order(stock, &scene.cutter, &planned.path, monitor)?;
+            removal = Some(removal_figures(&planned.path, &removed, &cut.height));
+        }
         let mut measured =
             measure(&self.part, &scene.cutter, &planned.path, &cut, &scene.tolerance, monitor)?;
         let simulation = SimulationFigures {
@@ -260,7 +270,10 @@ impl<'a> Job<'a> {
         for region in &mut measured.gouge.regions {
             region.line = lines.get(region.move_index as usize).copied().unwrap_or_default();
         }
-        Ok((self.result(request, &planned, note, measured, simulation, surface_mesh), page))
+        for contact in removal.iter_mut().flat_map(|removal| &mut removal.rapid_contacts) {
+            contact.line = lines.get(contact.move_index as usize).copied().unwrap_or_default();
+        }
+        Ok((self.result(request, &planned, note, measured, removal, simulation, surface_mesh), page))
     }
 
     fn result(
@@ -269,10 +282,13 @@ impl<'a> Job<'a> {
         planned: &Plan,
         note: Option<String>,
         measured: Measurement,
+        removal: Option<RemovalFigures>,
         simulation: SimulationFigures,
         surface_mesh: SurfaceMeshFigures,
     ) -> ToolpathResult {
-        let violations = violations(&measured, &self.scene.tolerance);
+        let rapid = removal.as_ref().and_then(rapid_violation);
+        let violations: Vec<_> =
+            rapid.into_iter().chain(violations(&measured, &self.scene.tolerance)).collect();
         let time = machining_time(&planned.path, &self.scene.machine);
         ToolpathResult {
             name: request.name.clone(),
@@ -286,6 +302,7 @@ impl<'a> Job<'a> {
             gouge: measured.gouge,
             uncut: measured.uncut,
             deviation: measured.deviation,
+            removal,
             simulation,
             surface_mesh,
         }

@@ -12,6 +12,7 @@ mod figures;
 mod meetings;
 mod path;
 mod regions;
+mod removal;
 mod ridges;
 
 pub(crate) use cut_surface::CutSurface;
@@ -21,6 +22,7 @@ pub use figures::{
 };
 pub(crate) use meetings::Meetings;
 pub use path::path_figures;
+pub use removal::{RapidContactFigures, RemovalFigures, removal_figures};
 
 use crate::cutter::Cutter;
 use crate::geometry::{Point2, Point3};

@@ -68,6 +68,7 @@ pub fn toolpath(name: &str, machining_time_s: f64, gouge: f64) -> ToolpathResult
         gouge: measured.gouge,
         uncut: measured.uncut,
         deviation: measured.deviation,
+        removal: None,
         simulation: SimulationFigures {
             engine: "reference",
             cell_mm: 0.05,

@@ -157,6 +157,12 @@ fn meanings() -> Markup {
              between cells, so the greatest deviation is a little below the highest scallop.",
         ),
         (
+            "removal",
+            "What the moves take from the stock in the order of the program, at the programmed feed. The rate \
+             is the mean over a few cells of travel; engagement is how high the cutter meets stock and how \
+             wide a move cuts. No rapid move may touch stock.",
+        ),
+        (
             "time",
             "All moves at their feeds, as far as the machine's acceleration and cornering allow. Jerk and the \
              control's own limits are not in it: machines take somewhat longer.",
@@ -215,7 +221,7 @@ fn data_url(png: &[u8]) -> String {
 
 fn figures(t: &ToolpathResult) -> Markup {
     let (path, deviation) = (&t.path, &t.deviation);
-    let rows: [(&str, String); 12] = [
+    let mut rows = vec![
         ("machining time", duration(path.machining_time_s)),
         ("cutting length", format!("{:.1} mm", path.cutting_length_mm)),
         ("air length", format!("{:.1} mm", path.air_length_mm)),
@@ -235,6 +241,29 @@ fn figures(t: &ToolpathResult) -> Markup {
         ),
         ("deviation, root mean square", format!("{} µm", micrometres(Some(deviation.rms_mm)))),
     ];
+    if let Some(r) = &t.removal {
+        rows.extend([
+            ("volume removed", format!("{:.0} ± {:.0} mm³", r.volume_mm3, r.volume_error_bound_mm3)),
+            (
+                "removal rate, greatest",
+                format!(
+                    "{:.0} ± {:.0} mm³/min",
+                    r.max_material_removal_rate_mm3_min, r.max_material_removal_rate_error_bound_mm3_min
+                ),
+            ),
+            (
+                "removal rate, 95 % and mean",
+                format!(
+                    "{:.0}, {:.0} mm³/min",
+                    r.p95_material_removal_rate_mm3_min, r.mean_material_removal_rate_mm3_min
+                ),
+            ),
+            (
+                "engagement, axial and radial",
+                format!("{:.2}, {:.2} mm", r.max_axial_engagement_mm, r.max_radial_engagement_mm),
+            ),
+        ]);
+    }
     html! { dl.grid { @for (name, value) in &rows { div { dt { (name) } dd { (value) } } } } }
 }
 

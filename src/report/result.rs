@@ -3,7 +3,9 @@
 use serde::Serialize;
 
 use super::verdict::{Verdict, Violation};
-use crate::metrology::{DeviationFigures, GougeFigures, Limits, PathFigures, ScallopFigures, UncutFigures};
+use crate::metrology::{
+    DeviationFigures, GougeFigures, Limits, PathFigures, RemovalFigures, ScallopFigures, UncutFigures,
+};
 
 /// How a toolpath was cut.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -56,6 +58,9 @@ pub struct ToolpathResult {
     pub uncut: UncutFigures,
     /// Deviation in all.
     pub deviation: DeviationFigures,
+    /// What each move removed, if the scene asks for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub removal: Option<RemovalFigures>,
     /// How it was cut.
     pub simulation: SimulationFigures,
     /// The machined part as triangles.

@@ -9,13 +9,14 @@
 //!   to its own discretisation, so that the highest ridge would otherwise fail by a hair in the
 //!   best of plans.
 //! - gouge: the greatest depth stays within the gouge tolerance.
+//! - rapid: no rapid move touches stock, where the scene asks for what each move removes.
 //! - uncut: no place stands higher than the uncut tolerance.
 
 use serde::Serialize;
 
 use super::map::MapMark;
 use super::table::{micrometres, with_bound};
-use crate::metrology::{Limits, Measurement};
+use crate::metrology::{Limits, Measurement, RemovalFigures};
 
 /// The highest ridge may exceed the scallop tolerance by this factor. Less fails plans for single
 /// points of a few per cent; more lets visible ridges pass.
@@ -44,7 +45,7 @@ impl Verdict {
 /// One tolerance that does not hold.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Violation {
-    /// `scallop`, `gouge` or `uncut`.
+    /// `rapid`, `scallop`, `gouge` or `uncut`.
     pub what: &'static str,
     /// The limit that was exceeded.
     pub limit_mm: f64,
@@ -66,6 +67,26 @@ pub fn violations(measured: &Measurement, limits: &Limits) -> Vec<Violation> {
         .flatten()
         .chain(scallop(measured, limits))
         .collect()
+}
+
+/// The violation of rapid moves that touched stock, told of the first of them: on a machine it is the
+/// one that breaks the cutter.
+pub fn rapid_violation(removal: &RemovalFigures) -> Option<Violation> {
+    let first = removal.rapid_contacts.first()?;
+    let deepest = removal.rapid_contacts.iter().map(|c| c.depth_mm).fold(0.0, f64::max);
+    let mut text = format!(
+        "a rapid move touches stock, {:.3} mm deep, at {}, move {}, toolpath.nc line {}",
+        first.depth_mm,
+        place(first.at_mm),
+        first.move_index,
+        first.line
+    );
+    match removal.rapid_contact_count {
+        0 | 1 => {}
+        2 => text += ", and one more rapid move does",
+        n => text += &format!(", and {} more rapid moves do", n - 1),
+    }
+    Some(Violation { what: "rapid", limit_mm: 0.0, measured_mm: deepest, text })
 }
 
 fn gouge(measured: &Measurement, limits: &Limits) -> Option<Violation> {
@@ -205,6 +226,21 @@ mod tests {
         let names: Vec<&str> = found.iter().map(|m| m.name.as_str()).collect();
         assert_eq!(names, ["G1", "G2", "G3", "G4", "G5", "S"]);
         assert_eq!((found[0].at, found[5].at), ([12.5, 7.25], [3.0, 4.0]));
+    }
+
+    #[test]
+    fn the_first_rapid_in_stock_is_told_with_its_line() {
+        use crate::metrology::RapidContactFigures;
+        assert_eq!(rapid_violation(&RemovalFigures::default()), None);
+        let contact =
+            |depth_mm| RapidContactFigures { move_index: 7, line: 12, at_mm: [1.0, 2.0, 3.0], depth_mm };
+        let rapid_contacts = vec![contact(0.25), contact(1.5)];
+        let removal = RemovalFigures { rapid_contacts, rapid_contact_count: 3, ..Default::default() };
+        let found = rapid_violation(&removal).unwrap();
+        assert_eq!((found.what, found.measured_mm), ("rapid", 1.5));
+        let place =
+            "0.250 mm deep, at x 1.000 y 2.000 z 3.000, move 7, toolpath.nc line 12, and 2 more rapid";
+        assert!(found.text.contains(place), "{}", found.text);
     }
 
     #[test]

@@ -25,7 +25,7 @@ use super::bins::MoveBins;
 use super::form::{Family, Form};
 use super::swept::swept_height;
 use super::track::Track;
-use super::{Grid, NOT_CUT, ZMap};
+use super::{Grid, NOT_CUT, ZMap, cut_reference};
 use crate::cutter::Cutter;
 use crate::lanes::{self, Real};
 use crate::monitor::{Cancelled, Monitor, check};
@@ -53,7 +53,16 @@ const LARGEST_TILE: usize = 256;
 /// smaller ones a move is listed in many tiles.
 const TILE_RADII: f64 = 1.7;
 
-/// How the cells are cut.
+/// Cuts `stock` along every move of `path`, rapids included, in place: the height of a cell becomes the
+/// least of the stock and of all moves, and `cut_by` names a move that reaches down to it ([`NOT_CUT`]
+/// where the stored height stays that of the stock).
+///
+/// # Errors
+/// [`Cancelled`] when the monitor says so; the stock is lost then.
+///
+/// # Tolerance
+/// Heights lie within 1e-5 mm, or half a unit in the last place of f32 if that is more, of those of
+/// [`cut_reference`]. The bits depend neither on the number of threads nor on the machine's vector unit.
 pub fn cut(stock: ZMap, cutter: &Cutter, path: &Toolpath, monitor: &dyn Monitor) -> Result<ZMap, Cancelled> {
     cut_counted(stock, cutter, path, monitor).map(|(map, _)| map)
 }
@@ -69,6 +78,9 @@ pub fn cut_counted(
     monitor: &dyn Monitor,
 ) -> Result<(ZMap, Work), Cancelled> {
     check(monitor)?;
+    if path.len() > Name::MOST {
+        return Ok((cut_reference(&stock, cutter, path, monitor)?, Work::default()));
+    }
     let form = Form::new(cutter);
     let side = tile_side(form.radius, stock.grid.cell);
     Job { form, path, side, margin: 0.0 }.run(stock, monitor)

@@ -41,6 +41,8 @@ pub const DEFAULT_PLUNGE_RATE: f64 = 300.0;
 pub const DEFAULT_CLEARANCE: f64 = 2.0;
 /// Default memory for one simulation, MiB.
 pub const DEFAULT_MEMORY_MIB: u32 = 2048;
+/// Whether to find out what each move removes by default: a tenth of the time of a run on the wave.
+pub const DEFAULT_REMOVAL: bool = true;
 /// Default control points a side of a streamline's stream function. More follow finer changes of
 /// the feed direction and cost time as their cube; fewer smooth them away.
 pub const DEFAULT_CONTROL_POINTS: usize = 24;
@@ -111,10 +113,12 @@ pub struct CuttingData {
     pub plunge_rate: f64,
 }
 
-/// Which engine cuts. Both words of the scene mean the reference engine.
+/// Which engine cuts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Engine {
-    /// Every cell under every move that can reach it, in closed form.
+    /// Branch and bound, within 0.01 µm of the reference.
+    ZMap,
+    /// Every cell under every move that can reach it, in closed form in f64.
     Reference,
 }
 
@@ -124,13 +128,14 @@ impl Engine {
 
     /// The engine that a word stands for.
     pub fn from_word(word: &str) -> Option<Self> {
-        Self::WORDS.contains(&word).then_some(Self::Reference)
+        [Self::ZMap, Self::Reference].into_iter().find(|engine| engine.name() == word)
     }
 
-    /// The engine that really runs, as reports call it.
+    /// Its word.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Reference => "reference",
+            Self::ZMap => Self::WORDS[0],
+            Self::Reference => Self::WORDS[1],
         }
     }
 }
@@ -147,6 +152,8 @@ pub struct Simulation {
     pub memory_mib: u32,
     /// Which engine cuts.
     pub engine: Engine,
+    /// Whether the stock is also cut in the order of the program, for what each move removes.
+    pub removal: bool,
 }
 
 /// One toolpath to plan.

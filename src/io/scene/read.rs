@@ -10,8 +10,9 @@ use super::formula;
 use super::section::{LENGTH, Located, Section};
 use super::{
     CuttingData, DEFAULT_ALLOWANCE, DEFAULT_CLEARANCE, DEFAULT_CONTROL_POINTS, DEFAULT_FEED_RATE,
-    DEFAULT_LIMITS, DEFAULT_MARGIN, DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE, DEFAULT_SPINDLE_SPEED, Engine,
-    MeshFormat, NamedFile, PartSource, Scene, Simulation, Stock, ToolpathRequest, auto_cell,
+    DEFAULT_LIMITS, DEFAULT_MARGIN, DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE, DEFAULT_REMOVAL,
+    DEFAULT_SPINDLE_SPEED, Engine, MeshFormat, NamedFile, PartSource, Scene, Simulation, Stock,
+    ToolpathRequest, auto_cell,
 };
 use crate::cutter::Cutter;
 use crate::geometry::AnalyticSurface;
@@ -267,14 +268,15 @@ fn read_tolerance(section: &Section<'_>) -> Result<Limits, SceneError> {
 
 /// An automatic cell is that of the cutter alone until the toolpaths are known.
 fn read_simulation(section: &Section<'_>, cutter: &Cutter) -> Result<Simulation, SceneError> {
-    section.only(&["cell", "memory_mib", "engine"], &[], "[simulation]")?;
+    section.only(&["cell", "memory_mib", "engine", "removal"], &[], "[simulation]")?;
     let cell = section.length_or_word("cell", "auto")?;
     let engine = section.word("engine", &Engine::WORDS)?.and_then(|word| Engine::from_word(word.value));
     Ok(Simulation {
         cell: cell.unwrap_or_else(|| auto_cell(cutter, &[])),
         cell_is_auto: cell.is_none(),
         memory_mib: section.count("memory_mib", 1..=1 << 20)?.unwrap_or(DEFAULT_MEMORY_MIB),
-        engine: engine.unwrap_or(Engine::Reference),
+        engine: engine.unwrap_or(Engine::ZMap),
+        removal: section.flag("removal")?.unwrap_or(DEFAULT_REMOVAL),
     })
 }
 

@@ -53,6 +53,7 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     writeln!(out, "cell = {}  # mm", number(scene.simulation.cell))?;
     writeln!(out, "memory_mib = {}", scene.simulation.memory_mib)?;
     writeln!(out, "engine = {}", text(scene.simulation.engine.name()))?;
+    writeln!(out, "removal = {}  # what each move removes, and rapids in stock", scene.simulation.removal)?;
     writeln!(out, "\n[machine]")?;
     writeln!(out, "rapid_rate = {}  # mm/min", number(scene.machine.rapid_rate))?;
     writeln!(out, "acceleration = {}  # mm/s2", number(scene.machine.acceleration))?;

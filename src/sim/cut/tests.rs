@@ -4,7 +4,6 @@
 use super::*;
 use crate::geometry::{Point2, Point3};
 use crate::monitor::Silent;
-use crate::sim::cut_reference;
 use crate::sim::scenes::{Rng, cutters, path_through, random_path, square_grid, wave_path};
 
 /// What the engine promises against the reference, mm.

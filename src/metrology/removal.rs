@@ -1,0 +1,214 @@
+//! Figures of what a program removes on its way: volume, rate, engagement, rapid moves in stock.
+//!
+//! Enters: the path and what the in-order engine found for each of its moves. Leaves: the figures of
+//! report.json, in mm, mm³ and mm³/min. Rates are at the programmed feed; where the machine is slower
+//! than that, at corners and in short moves, they are lower.
+
+use serde::Serialize;
+
+use crate::sim::{MoveRemoval, Removal};
+use crate::toolpath::{MoveKind, Toolpath};
+
+/// Rates are means over consecutive feed moves of at least so many cells of travel. Fewer let the
+/// cells show that a steep cutter clears at a time; more smooth true peaks away.
+const STRETCH_CELLS: f64 = 4.0;
+
+/// Rapid moves that are listed, the first ones of the program.
+const LISTED_CONTACTS: usize = 100;
+
+/// A rapid move that touched stock.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct RapidContactFigures {
+    /// The move, counted from 0.
+    #[serde(rename = "move")]
+    pub move_index: u32,
+    /// Its line in toolpath.nc, counted from 1.
+    pub line: u32,
+    /// The cell that the cutter touched first, and the height of stock there.
+    pub at_mm: [f64; 3],
+    /// Greatest height that the move removed at a cell.
+    pub depth_mm: f64,
+}
+
+/// What a program removes. Rates and engagement are those of feed moves.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct RemovalFigures {
+    /// Volume of stock removed by all moves.
+    pub volume_mm3: f64,
+    /// Bound of its error.
+    pub volume_error_bound_mm3: f64,
+    /// Volume over the time of the feed moves that removed anything.
+    pub mean_material_removal_rate_mm3_min: f64,
+    /// 95 % of the time in material the rate is lower.
+    pub p95_material_removal_rate_mm3_min: f64,
+    /// Greatest rate over a few cells of travel.
+    pub max_material_removal_rate_mm3_min: f64,
+    /// Bound of its error.
+    pub max_material_removal_rate_error_bound_mm3_min: f64,
+    /// The move that ends the stretch with the greatest rate, counted from 0.
+    pub max_material_removal_rate_move: u32,
+    /// Greatest height above the tip at which the cutter met stock, at cell centres.
+    pub max_axial_engagement_mm: f64,
+    /// Greatest extent of what one move cut, across its direction; moves along the axis left out.
+    pub max_radial_engagement_mm: f64,
+    /// Bound of its error, lips thinner than a cell left out.
+    pub max_radial_engagement_error_bound_mm: f64,
+    /// Greatest difference at a cell between the heights of the two engines, which work apart.
+    pub engine_difference_mm: f64,
+    /// Rapid moves that touched stock, the first ones.
+    pub rapid_contacts: Vec<RapidContactFigures>,
+    /// Number of rapid moves that touched stock, listed or not.
+    pub rapid_contact_count: usize,
+}
+
+/// Consecutive feed moves.
+#[derive(Debug, Clone, Copy, Default)]
+struct Stretch {
+    length: f64,
+    minutes: f64,
+    volume: f64,
+    bound: f64,
+    last: u32,
+}
+
+/// The figures of a removal along `path`; `final_height` is what the other engine left, mm, cell by
+/// cell.
+pub fn removal_figures(path: &Toolpath, removal: &Removal, final_height: &[f32]) -> RemovalFigures {
+    let mut figures = RemovalFigures {
+        volume_mm3: removal.volume(),
+        volume_error_bound_mm3: removal.volume_bound,
+        rapid_contact_count: removal.rapid_contacts.len(),
+        ..RemovalFigures::default()
+    };
+    let apart = |(a, b): (&f32, &f32)| f64::from((a - b).abs());
+    figures.engine_difference_mm =
+        removal.stock.height.iter().zip(final_height).map(apart).fold(0.0, f64::max);
+    let listed = removal.rapid_contacts.iter().take(LISTED_CONTACTS);
+    figures.rapid_contacts = listed
+        .map(|c| RapidContactFigures {
+            move_index: c.move_index,
+            line: 0,
+            at_mm: c.at.into(),
+            depth_mm: c.depth,
+        })
+        .collect();
+    engagement(&mut figures, path, &removal.moves);
+    rates(&mut figures, path, removal);
+    figures
+}
+
+fn engagement(figures: &mut RemovalFigures, path: &Toolpath, moves: &[MoveRemoval]) {
+    for ((from, to, m), removed) in path.segments().zip(moves) {
+        if m.kind == MoveKind::Rapid {
+            continue;
+        }
+        figures.max_axial_engagement_mm = figures.max_axial_engagement_mm.max(removed.axial);
+        if from.xy() != to.xy() && removed.radial > figures.max_radial_engagement_mm {
+            figures.max_radial_engagement_mm = removed.radial;
+            figures.max_radial_engagement_error_bound_mm = removed.radial_bound;
+        }
+    }
+}
+
+fn rates(figures: &mut RemovalFigures, path: &Toolpath, removal: &Removal) {
+    let least = STRETCH_CELLS * removal.stock.grid.cell;
+    let (mut volume, mut minutes) = (0.0, 0.0);
+    let mut stretches: Vec<Stretch> = Vec::new();
+    let mut stretch = Stretch::default();
+    for ((k, (from, to, m)), removed) in path.segments().enumerate().zip(&removal.moves) {
+        if m.kind == MoveKind::Rapid || !(m.feed_rate > 0.0) {
+            stretch = Stretch::default();
+            continue;
+        }
+        let length = (to - from).norm();
+        let time = length / m.feed_rate;
+        if removed.volume > 0.0 {
+            volume += removed.volume;
+            minutes += time;
+        }
+        stretch.length += length;
+        stretch.minutes += time;
+        stretch.volume += removed.volume;
+        stretch.bound += removed.volume_bound;
+        stretch.last = k as u32;
+        // A hair less, so that moves of just the length do not go in pairs.
+        if stretch.length >= least * (1.0 - 1e-9) {
+            if stretch.volume > 0.0 {
+                stretches.push(stretch);
+            }
+            stretch = Stretch::default();
+        }
+    }
+    if minutes > 0.0 {
+        figures.mean_material_removal_rate_mm3_min = volume / minutes;
+    }
+    let rate = |s: &Stretch| s.volume / s.minutes;
+    stretches.sort_by(|a, b| rate(a).total_cmp(&rate(b)));
+    let Some(greatest) = stretches.last() else { return };
+    figures.max_material_removal_rate_mm3_min = rate(greatest);
+    figures.max_material_removal_rate_error_bound_mm3_min = greatest.bound / greatest.minutes;
+    figures.max_material_removal_rate_move = greatest.last;
+    let in_material: f64 = stretches.iter().map(|s| s.minutes).sum();
+    let mut below = 0.0;
+    for s in &stretches {
+        below += s.minutes;
+        if below >= 0.95 * in_material {
+            figures.p95_material_removal_rate_mm3_min = rate(s);
+            break;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cutter::Cutter;
+    use crate::geometry::{Point2, Point3};
+    use crate::monitor::Silent;
+    use crate::sim::{Grid, ZMap, cut_in_order};
+    use crate::toolpath::{ClPoint, Move};
+
+    /// A flat end of 6 mm in a slot 2 mm deep at 600 mm/min, in moves of 1 mm, with rapids about it.
+    fn slot(rapid_height: f64) -> (Toolpath, RemovalFigures) {
+        let tip = |x: f64, z: f64| ClPoint { tip: Point3::new(x, 10.0, z) };
+        let to = |x: f64, z: f64, kind| Move { to: tip(x, z), kind, feed_rate: 600.0, pass: 0 };
+        let mut moves = vec![to(-5.0, -2.0, MoveKind::Plunge)];
+        moves.extend((0..30).map(|k| to(f64::from(k - 4), -2.0, MoveKind::Cut)));
+        moves.push(to(25.0, rapid_height, MoveKind::Retract));
+        moves.push(to(35.0, rapid_height, MoveKind::Rapid));
+        let path = Toolpath { start: tip(-5.0, 5.0), moves };
+        let grid = Grid { origin: Point2::new(0.025, 0.025), cell: 0.05, nx: 800, ny: 400 };
+        let stock = ZMap::block(grid, 0.0);
+        let removal = cut_in_order(stock, &Cutter::flat(6.0).unwrap(), &path, &Silent).unwrap();
+        let figures = removal_figures(&path, &removal, &removal.stock.height);
+        (path, figures)
+    }
+
+    #[test]
+    fn a_slot_has_the_rate_of_its_cross_section() {
+        let (_, figures) = slot(5.0);
+        // Cross section times feed: 6 · 2 · 600.
+        let off = (figures.max_material_removal_rate_mm3_min - 7200.0).abs();
+        assert!(off <= figures.max_material_removal_rate_error_bound_mm3_min, "{figures:?}");
+        assert!((figures.p95_material_removal_rate_mm3_min / 7200.0 - 1.0).abs() < 0.02, "{figures:?}");
+        let half_disc = 0.5 * std::f64::consts::PI * 9.0;
+        let off = (figures.volume_mm3 - 2.0 * (25.0 * 6.0 + half_disc)).abs();
+        assert!(off <= figures.volume_error_bound_mm3 && off < 0.5, "{figures:?}");
+        assert_eq!(figures.max_axial_engagement_mm, 2.0);
+        let off = (figures.max_radial_engagement_mm - 6.0).abs();
+        assert!(off <= figures.max_radial_engagement_error_bound_mm, "{figures:?}");
+        assert_eq!((figures.rapid_contact_count, figures.engine_difference_mm), (0, 0.0));
+    }
+
+    #[test]
+    fn a_rapid_below_the_top_is_found_where_it_enters() {
+        let (path, figures) = slot(-0.5);
+        let contact = figures.rapid_contacts[0];
+        assert_eq!((figures.rapid_contact_count, contact.move_index), (1, path.len() as u32 - 1));
+        // Somewhere along the slot's round end, which the whole front of the cutter leaves at once.
+        let from_end = (contact.at_mm[0] - 25.0).hypot(contact.at_mm[1] - 10.0);
+        assert!((3.0..3.05).contains(&from_end) && contact.at_mm[0] > 25.0, "{contact:?}");
+        assert_eq!(contact.at_mm[2], 0.0);
+        assert!((contact.depth_mm - 0.5).abs() < 1e-6, "{contact:?}");
+    }
+}

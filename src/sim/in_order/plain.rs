@@ -1,0 +1,56 @@
+//! The same engine without any bound: every move evaluates every cell that its bounding rectangle
+//! meets. What the fast one is tested and timed against.
+
+use super::leaf::Tally;
+use super::{Found, Job, Removal, Slices, cut_by_tiles};
+use crate::cutter::Cutter;
+use crate::monitor::{Cancelled, Monitor};
+use crate::sim::ZMap;
+use crate::sim::swept::swept_height;
+use crate::toolpath::Toolpath;
+
+/// As [`cut_in_order`](super::cut_in_order), by a plain loop over cells and without
+/// [`Removal::rapid_contacts`].
+///
+/// # Errors
+/// [`Cancelled`] when the monitor says so.
+#[doc(hidden)]
+pub fn cut_in_order_plain(
+    stock: ZMap,
+    cutter: &Cutter,
+    path: &Toolpath,
+    monitor: &dyn Monitor,
+) -> Result<Removal, Cancelled> {
+    cut_by_tiles(stock, cutter, path, monitor, super::SIDE, |job, slices, moves| Ok(cut(job, slices, moves)))
+}
+
+fn cut(job: &Job, slices: &mut Slices, moves: &[u32]) -> Found {
+    let mut found = Found::default();
+    for &index in moves {
+        let (k, track) = (index as usize, job.track(index));
+        let (from, to) = (job.path.start_of(k), job.path.moves[k].to.tip);
+        let range = |centres: &[f64], a: f64, b: f64| {
+            let (low, high) = (a.min(b) - job.form.radius, a.max(b) + job.form.radius);
+            centres.partition_point(|c| *c < low)..centres.partition_point(|c| *c <= high)
+        };
+        let (columns, rows) = (range(&slices.x, from.x, to.x), range(&slices.y, from.y, to.y));
+        let mut tally = Tally::NOTHING;
+        for j in rows {
+            let (heights, cut_by) = &mut slices.rows[j];
+            for i in columns.clone() {
+                let (x, y) = (slices.x[i], slices.y[j]);
+                let stored = swept_height(&job.form, &track, x, y) as f32;
+                if stored < heights[i] {
+                    let now = f64::from(heights[i]);
+                    let (along, across) = track.along_across(x, y);
+                    tally.add_cell(now - f64::from(stored), now, &track, along, across);
+                    (heights[i], cut_by[i]) = (stored, index);
+                }
+            }
+        }
+        if tally.sum > 0.0 {
+            found.tallies.push((index, tally));
+        }
+    }
+    found
+}
