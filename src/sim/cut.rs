@@ -215,7 +215,8 @@ impl Job<'_> {
             grid,
             tile,
             frame,
-            offsets: std::array::from_fn(|k| T::of(k as f64 * grid.cell)),
+            cells: offsets(LEAF, grid.cell),
+            part_cells: offsets(PART, grid.cell),
             tops,
             levels,
             planes: Vec::new(),
@@ -286,6 +287,14 @@ fn leaf_tops(tile: &Tile<'_>, side: usize) -> Vec<f32> {
     tops
 }
 
+/// Places of `n` × `n` cells from the first one, row by row.
+fn offsets<T: Real, const CELLS: usize>(n: usize, cell: f64) -> [[T; CELLS]; 2] {
+    [
+        std::array::from_fn(|c| T::of((c % n) as f64 * cell)),
+        std::array::from_fn(|c| T::of((c / n) as f64 * cell)),
+    ]
+}
+
 /// Planes below the moves of a chunk, at the middle of a square.
 #[derive(Clone, Copy)]
 struct Planes<T> {
@@ -331,8 +340,9 @@ struct Worker<'a, 'b, T, S> {
     grid: &'a Grid,
     tile: &'a mut Tile<'b>,
     frame: Frame,
-    /// Distances of a leaf's cells from its first one, along either axis.
-    offsets: [T; LEAF],
+    /// Places of the cells of a leaf from its first one, and those of a part of a leaf.
+    cells: [[T; LEAF_CELLS]; 2],
+    part_cells: [[T; PART_CELLS]; 2],
     /// The highest stock in each leaf.
     tops: Vec<f32>,
     /// The moves left at each level of squares.
@@ -398,9 +408,9 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
                     cut_by[i..i + nx].fill(NOT_CUT);
                 }
             } else if side == PART {
-                self.leaf::<PART, PART_CELLS>(level, i, j, nx, ny);
+                self.leaf::<PART, PART_CELLS>(self.part_cells, level, [i, j], [nx, ny]);
             } else if side == LEAF && self.levels[level].len() <= CROWDED {
-                self.leaf::<LEAF, LEAF_CELLS>(level, i, j, nx, ny);
+                self.leaf::<LEAF, LEAF_CELLS>(self.cells, level, [i, j], [nx, ny]);
             } else {
                 let half = side / 2;
                 for (di, dj) in [(half, half), (0, half), (half, 0), (0, 0)] {
@@ -500,11 +510,10 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
     #[inline(always)]
     fn leaf<const N: usize, const CELLS: usize>(
         &mut self,
+        [x, y]: [[T; CELLS]; 2],
         level: usize,
-        i: usize,
-        j: usize,
-        nx: usize,
-        ny: usize,
+        [i, j]: [usize; 2],
+        [nx, ny]: [usize; 2],
     ) {
         let infinite = T::of(f64::INFINITY);
         let first = self.square_at(i, j, 1, 1);
@@ -520,9 +529,8 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
             let index = name.index();
             let (along, across) = m.along_across(first.x, first.y);
             for c in 0..CELLS {
-                let (x, y) = (self.offsets[c % N], self.offsets[c / N]);
-                let a = along + (x * m.ux + y * m.uy);
-                let w = across + (y * m.ux - x * m.uy);
+                let a = along + (x[c] * m.ux + y[c] * m.uy);
+                let w = across + (y[c] * m.ux - x[c] * m.uy);
                 let (h, d) = self.sweep.height(&m, a, w);
                 let lower = h < height[c];
                 height[c] = if lower { h } else { height[c] };
@@ -676,16 +684,23 @@ fn planes_of<T: Real, S: Sweep<T>>(sweep: &S, chunk: &Chunk<T>, square: &Square<
 /// Heights of a move at the corners of a square, infinite where they are not known for sure.
 #[inline(always)]
 fn corners<T: Real, S: Sweep<T>>(sweep: &S, m: &LocalMove<T>, square: &Square<T>) -> [T; 4] {
-    let infinite = T::of(f64::INFINITY);
-    let at = |x: T, y: T| {
-        let (along, across) = m.along_across(x, y);
-        let (height, doubt) = sweep.height(m, along, across);
-        // NaN is not below.
-        if (height < infinite) & !(doubt < infinite) { height } else { infinite }
-    };
     let (x0, x1) = (square.x - square.half_x, square.x + square.half_x);
     let (y0, y1) = (square.y - square.half_y, square.y + square.half_y);
-    [at(x0, y0), at(x1, y0), at(x0, y1), at(x1, y1)]
+    [
+        sure_height(sweep, m, x0, y0),
+        sure_height(sweep, m, x1, y0),
+        sure_height(sweep, m, x0, y1),
+        sure_height(sweep, m, x1, y1),
+    ]
+}
+
+#[inline(always)]
+fn sure_height<T: Real, S: Sweep<T>>(sweep: &S, m: &LocalMove<T>, x: T, y: T) -> T {
+    let (along, across) = m.along_across(x, y);
+    let (height, doubt) = sweep.height(m, along, across);
+    let infinite = T::of(f64::INFINITY);
+    // NaN is not below.
+    if (height < infinite) & !(doubt < infinite) { height } else { infinite }
 }
 
 /// The first `n` cells of a row of a leaf; nearly always all of them, in one move.

@@ -260,10 +260,6 @@ pub(super) struct Rounded<T, const CONES: bool> {
 /// Radius that stands for a sharp edge, mm.
 const SHARP: f64 = 1e-12;
 
-/// Newton steps for the arc. What they leave is seen by the slope at the place found, and put in doubt
-/// where it matters; fewer steps cast more doubts, more cost time at every cell.
-const ARC_STEPS: usize = 4;
-
 /// What the place on the arc may cost, mm, before a height is worked out in f64.
 const PLACE_LIMIT: f64 = 2.0e-6;
 
@@ -363,43 +359,66 @@ impl<T: Real, const CONES: bool> Rounded<T, CONES> {
     /// piece which is steep enough at its end counts.
     #[inline(always)]
     fn ahead(&self, m: &LocalMove<T>, across: T) -> T {
-        let (zero, one, tiny) = (T::of(0.0), T::of(1.0), T::of(1e-30));
         let w = absolute(across).smaller(self.radius);
-        let chord = |rho: T| ((rho - w) * (rho + w)).larger(zero).sqrt();
-        let on_cone = |slope: T| {
-            let rest = (slope - m.slope) * (slope + m.slope);
-            let ahead = m.slope * w / rest.larger(T::of(1e-30)).sqrt();
-            if rest > zero { ahead } else { T::of(f64::INFINITY) }
-        };
-        // C, the part of the contact's normal across the track, solves w = r C + e C/√(C² + (1 − C²) s²)
-        // =: H(C), s the sine of the rise. H is concave and grows: Newton's method from below.
-        let s2 = m.sin * m.sin;
-        let sine = m.sin.larger(T::of(1e-12));
-        let (r, e) = (self.corner, self.centre);
-        // Three bounds from below: H(C) <= rC + e, (r + e/s) C, and (r + e) C/√(C² + (1 − C²) s²).
-        let u = w / self.radius_of_arc;
-        let u2 = (u * u).smaller(one);
-        let third = u * sine / (one - u2 * (one - s2)).larger(tiny).sqrt();
-        let mut c = (w / (r + e / sine)).larger((w - e) / r).larger(third).larger(zero).smaller(one);
-        for _ in 0..ARC_STEPS {
-            let q = one / (s2 + (one - s2) * c * c).larger(tiny).sqrt();
-            let eq = e * q;
-            let step = (w - (r + eq) * c) / (r + eq * s2 * (q * q));
-            c = (c + step).larger(zero).smaller(one);
-        }
-        let rest = one - c * c;
-        let part = rest.larger(zero).sqrt() * m.sin;
-        let norm = (c * c + rest * s2).larger(tiny).sqrt();
-        let arc = r * part + e * part / norm;
+        let arc = self.ahead_on_arc(m.sin, w);
         if !CONES {
             return arc;
         }
-        let (first, last) = (chord(self.bottom_end), chord(self.arc_end));
-        let bottom = on_cone(self.bottom);
-        let side = on_cone(self.side);
-        let outer = if side > last { side.smaller(chord(self.radius)) } else { clamp(arc, first, last) };
+        let (first, last) = (chord(self.bottom_end, w), chord(self.arc_end, w));
+        let bottom = ahead_on_cone(self.bottom, m.slope, w);
+        let side = ahead_on_cone(self.side, m.slope, w);
+        let outer = if side > last { side.smaller(chord(self.radius, w)) } else { clamp(arc, first, last) };
         if bottom < first { bottom } else { outer }
     }
+
+    /// The same on the arc alone, for the sine s of the rise. C, the part of the contact's normal across
+    /// the track, solves w = r C + e C/√(C² + (1 − C²) s²) =: H(C). H is concave and grows, so that
+    /// Newton's method never overshoots from below.
+    #[inline(always)]
+    fn ahead_on_arc(&self, sine: T, w: T) -> T {
+        let (zero, one, tiny) = (T::of(0.0), T::of(1.0), T::of(1e-30));
+        let (r, e, s) = (self.corner, self.centre, sine.larger(T::of(1e-12)));
+        let s2 = sine * sine;
+        // Three bounds from below: H(C) <= rC + e, (r + e/s) C, and (r + e) C/√(C² + (1 − C²) s²).
+        let u = w / self.radius_of_arc;
+        let u2 = (u * u).smaller(one);
+        let third = u * s / (one - u2 * (one - s2)).larger(tiny).sqrt();
+        let start = (w / (r + e / s)).larger((w - e) / r).larger(third).larger(zero).smaller(one);
+        // Four steps, and no loop, which would keep the one over the cells from becoming vector code. What
+        // they leave is seen by the slope at the place found, and put in doubt where it matters.
+        let c = arc_step([r, e, s2, w], start);
+        let c = arc_step([r, e, s2, w], c);
+        let c = arc_step([r, e, s2, w], c);
+        let c = arc_step([r, e, s2, w], c);
+        let rest = one - c * c;
+        let part = rest.larger(zero).sqrt() * sine;
+        let norm = (c * c + rest * s2).larger(tiny).sqrt();
+        r * part + e * part / norm
+    }
+}
+
+/// One Newton step of [`Rounded::ahead_on_arc`].
+#[inline(always)]
+fn arc_step<T: Real>([r, e, s2, w]: [T; 4], c: T) -> T {
+    let (zero, one) = (T::of(0.0), T::of(1.0));
+    let q = one / (s2 + (one - s2) * c * c).larger(T::of(1e-30)).sqrt();
+    let eq = e * q;
+    let step = (w - (r + eq) * c) / (r + eq * s2 * (q * q));
+    (c + step).larger(zero).smaller(one)
+}
+
+/// How far a circle of radius `rho` reaches ahead at distance `w` across.
+#[inline(always)]
+fn chord<T: Real>(rho: T, w: T) -> T {
+    ((rho - w) * (rho + w)).larger(T::of(0.0)).sqrt()
+}
+
+/// Where a cone of the first slope touches a track of the second; infinite if the track is steeper.
+#[inline(always)]
+fn ahead_on_cone<T: Real>(cone: T, slope: T, w: T) -> T {
+    let rest = (cone - slope) * (cone + slope);
+    let ahead = slope * w / rest.larger(T::of(1e-30)).sqrt();
+    if rest > T::of(0.0) { ahead } else { T::of(f64::INFINITY) }
 }
 
 #[inline(always)]
