@@ -149,7 +149,7 @@ impl Line<'_> {
         // Direction from the contact to the centre of the corner's circle, against the normal.
         let out = xy - drop.contact.point.coords.xy();
         let rho = out.norm();
-        let lean = ((rho - self.cutter.flat_radius()).max(0.0) / rc).min(1.0);
+        let lean = self.cutter.profile().incline(rho).sin;
         let horizontal = if rho > 0.0 { out * (lean / rho) } else { out };
         let toward = nalgebra::Vector3::new(horizontal.x, horizontal.y, (1.0 - lean * lean).sqrt());
         let rolled = (toward - drop.contact.normal).norm() * rc;

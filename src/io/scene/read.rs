@@ -7,13 +7,13 @@ use toml::de::DeTable;
 
 use super::error::{SceneError, SceneText};
 use super::formula;
-use super::section::{LENGTH, Located, Section};
+use super::section::{COORDINATE, LENGTH, Located, Section};
 use super::{
     CuttingData, DEFAULT_ALLOWANCE, DEFAULT_CLEARANCE, DEFAULT_CONTROL_POINTS, DEFAULT_FEED_RATE,
     DEFAULT_LIMITS, DEFAULT_MARGIN, DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE, DEFAULT_SPINDLE_SPEED, Engine,
     MeshFormat, NamedFile, PartSource, Scene, Simulation, Stock, ToolpathRequest, default_cell,
 };
-use crate::cutter::Cutter;
+use crate::cutter::{AptWord, AptWords, Cutter, CutterError};
 use crate::geometry::AnalyticSurface;
 use crate::machine::Machine;
 use crate::metrology::Limits;
@@ -204,15 +204,27 @@ fn read_stock(stock: &Section<'_>) -> Result<Stock, SceneError> {
 
 fn read_cutter(section: &Section<'_>) -> Result<(Cutter, CuttingData), SceneError> {
     const SPEEDS: [&str; 3] = ["spindle_speed", "feed_rate", "plunge_rate"];
-    const SHAPES: [&str; 5] = ["diameter", "corner_radius", "half_angle", "tip_diameter", "shank_diameter"];
+    const SHAPES: [&str; 10] = [
+        "diameter",
+        "corner_radius",
+        "half_angle",
+        "tip_diameter",
+        "shank_diameter",
+        "corner_x",
+        "corner_z",
+        "tip_angle",
+        "side_angle",
+        "length",
+    ];
     let all: Vec<&str> = ["shape"].into_iter().chain(SHAPES).chain(SPEEDS).collect();
     if !section.has("shape") {
         section.only(&all, &[], "a cutter")?;
     }
-    let shape = section.required_word("shape", &["ball", "flat", "bull", "taper"])?;
+    let shape = section.required_word("shape", &["ball", "flat", "bull", "taper", "apt"])?;
     let own: &[&str] = match shape.value {
         "bull" => &["diameter", "corner_radius"],
         "taper" => &["tip_diameter", "corner_radius", "half_angle", "shank_diameter"],
+        "apt" => &["diameter", "corner_radius", "corner_x", "corner_z", "tip_angle", "side_angle", "length"],
         _ => &["diameter"],
     };
     let keys: Vec<&str> = ["shape"].iter().chain(own).chain(&SPEEDS).copied().collect();
@@ -225,10 +237,17 @@ fn read_cutter(section: &Section<'_>) -> Result<(Cutter, CuttingData), SceneErro
             let diameter = section.required_length("diameter", 6.0)?.value;
             (Cutter::bull(diameter, section.required_length("corner_radius", 1.0)?.value), "corner_radius")
         }
+        "apt" => (read_apt(section)?, "shape"),
         _ => read_taper(section)?,
     };
-    let cutter = made
-        .map_err(|e| section.error(&section.key_span(blamed), e.to_string(), format!("change `{blamed}`")))?;
+    let cutter = made.map_err(|e| {
+        let (key, cure) = match &e {
+            CutterError::Apt(refusal) => (apt_key(refusal.word), refusal.cure.clone()),
+            _ => (blamed, format!("change `{blamed}`")),
+        };
+        let span = section.key_span(if section.has(key) { key } else { "shape" });
+        section.error(&span, e.to_string(), format!("`{key}`: {cure}"))
+    })?;
     let rate =
         |key, default| Ok::<f64, SceneError>(section.number(key, RATE, "")?.map_or(default, |v| v.value));
     let cutting = CuttingData {
@@ -239,9 +258,41 @@ fn read_cutter(section: &Section<'_>) -> Result<(Cutter, CuttingData), SceneErro
     Ok((cutter, cutting))
 }
 
-fn read_taper(
-    section: &Section<'_>,
-) -> Result<(Result<Cutter, crate::cutter::CutterError>, &'static str), SceneError> {
+/// The cutter of seven words; a corner whose place is left away touches bottom and side.
+fn read_apt(section: &Section<'_>) -> Result<Result<Cutter, CutterError>, SceneError> {
+    let angle = |key| {
+        // Angles below zero are read, so that the refusal can say what they would mean.
+        let angle = section.number(key, -80.0..=79.99, " degrees")?;
+        Ok::<f64, SceneError>(angle.map_or(0.0, |v| v.value.to_radians()))
+    };
+    let place = |key| Ok::<_, SceneError>(section.number(key, COORDINATE, " mm")?.map(|v| v.value));
+    let words = AptWords {
+        diameter: section.required_length("diameter", 6.0)?.value,
+        corner_radius: section.number("corner_radius", 0.0..=*LENGTH.end(), " mm")?.map_or(0.0, |v| v.value),
+        corner_x: 0.0,
+        corner_z: 0.0,
+        tip_angle: angle("tip_angle")?,
+        side_angle: angle("side_angle")?,
+        length: section.required_length("length", 20.0)?.value,
+    };
+    let words = words.with_centre(place("corner_x")?, place("corner_z")?);
+    Ok(Cutter::apt(&words).map_err(CutterError::Apt))
+}
+
+/// The key that stands for a word.
+fn apt_key(word: AptWord) -> &'static str {
+    match word {
+        AptWord::Diameter => "diameter",
+        AptWord::CornerRadius => "corner_radius",
+        AptWord::CornerX => "corner_x",
+        AptWord::CornerZ => "corner_z",
+        AptWord::TipAngle => "tip_angle",
+        AptWord::SideAngle => "side_angle",
+        AptWord::Length => "length",
+    }
+}
+
+fn read_taper(section: &Section<'_>) -> Result<(Result<Cutter, CutterError>, &'static str), SceneError> {
     let tip = section.required_length("tip_diameter", 2.0)?.value;
     // A tapered ball unless said otherwise.
     let corner = section.number("corner_radius", 0.0..=*LENGTH.end(), " mm")?.map_or(0.5 * tip, |v| v.value);

@@ -98,7 +98,12 @@ fn the_complete_scene_reads_back_as_itself() {
         "wave\"\namplitude = 2\nwavelength_x = 40\nwavelength_y = 33.3",
     ];
     let formula = "wave\"\namplitude = 2.0\nwavelength_x = 40";
-    let all = surfaces.iter().map(|s| with(formula, s)).chain([VALID.to_owned(), taper]);
+    let apt = |words: &str| with("shape = \"ball\"\ndiameter = 6.0", &format!("shape = \"apt\"\n{words}"));
+    let tangent = apt("diameter = 4\ncorner_radius = 0.8\ntip_angle = 12\nside_angle = 20\nlength = 3.4");
+    let barrel = apt("diameter = 6\ncorner_radius = 20\ncorner_z = 6\nlength = 8");
+    let drill = apt("diameter = 6\ntip_angle = 31\nlength = 30");
+    let all = surfaces.iter().map(|s| with(formula, s));
+    let all = all.chain([VALID.to_owned(), taper, tangent, barrel, drill]);
     for text in all {
         let first = Scene::parse("wave.toml", text).unwrap();
         let complete = complete_toml(&first);
@@ -110,6 +115,30 @@ fn the_complete_scene_reads_back_as_itself() {
         assert_eq!(second.toolpaths, first.toolpaths);
         assert_eq!(second.part, first.part);
     }
+}
+
+#[test]
+fn words_of_a_cutter_are_refused_where_they_stand() {
+    let words = "diameter = 6\ncorner_radius = 1\nlength = 8";
+    let cases = [
+        ("tip_angle = -5", "hollow", "tip_angle"),
+        ("side_angle = -3", "undercut", "side_angle"),
+        ("tip_angle = 50\nside_angle = 60", "steeper than the side", "tip_angle"),
+        ("corner_z = 1.4", "above the bottom", "corner_z"),
+        ("corner_x = 1.5\ncorner_z = 0.9", "inside of the side", "corner_x"),
+        ("corner_x = 3.5\ncorner_z = 0.1", "beyond bottom and side", "corner_x"),
+    ];
+    for (edit, reason, key) in cases {
+        let text = with("shape = \"ball\"\ndiameter = 6.0", &format!("shape = \"apt\"\n{words}\n{edit}"));
+        let (message, cure, (line, _)) = refused(&text);
+        assert!(message.contains(reason) && cure.starts_with(&format!("`{key}`: ")), "{message} {cure}");
+        assert!(text.lines().nth(line - 1).unwrap().starts_with(key), "{line}");
+    }
+    let text = with(
+        "shape = \"ball\"\ndiameter = 6.0",
+        "shape = \"apt\"\ndiameter = 6\ncorner_radius = 1\nlength = 0.5",
+    );
+    assert!(refused(&text).1.contains("at least 1 mm"), "{:?}", refused(&text));
 }
 
 #[test]

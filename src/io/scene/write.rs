@@ -120,6 +120,20 @@ fn write_cutter(out: &mut String, scene: &Scene) -> std::fmt::Result {
             writeln!(out, "half_angle = {}", number(cutter.half_angle().to_degrees()))?;
             writeln!(out, "shank_diameter = {}", number(diameter))?;
         }
+        CutterShape::Apt => {
+            let w = cutter.words();
+            writeln!(
+                out,
+                "shape = \"apt\"\ndiameter = {}  # where bottom and side cross",
+                number(w.diameter)
+            )?;
+            writeln!(out, "corner_radius = {}", number(w.corner_radius))?;
+            writeln!(out, "corner_x = {}  # centre of the corner from the axis", number(w.corner_x))?;
+            writeln!(out, "corner_z = {}  # and above the tip", number(w.corner_z))?;
+            writeln!(out, "tip_angle = {}  # of the bottom from level", number(w.tip_angle.to_degrees()))?;
+            writeln!(out, "side_angle = {}  # of the side from the axis", number(w.side_angle.to_degrees()))?;
+            writeln!(out, "length = {}", number(w.length))?;
+        }
     }
     writeln!(out, "spindle_speed = {}  # rev/min", number(scene.cutting.spindle_speed))?;
     writeln!(out, "feed_rate = {}  # mm/min", number(scene.cutting.feed_rate))?;

@@ -6,45 +6,49 @@
 //! triangle lies on a side that separates the two. (The contacts known as facet, edge and vertex
 //! contact since Bobrow 1985.)
 
-use crate::cutter::{Cutter, CutterShape};
+use crate::cutter::{self, Cutter};
 use crate::geometry::{Feature, Point3, Vector3};
 
 /// The profile of [`Cutter`] with its constants worked out, since a drop evaluates it some hundred
 /// times; optionally grown on all sides.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Profile {
-    /// Radius of the flat disc.
+    /// The profile itself, from which the rest comes.
+    pub(super) shape: cutter::Profile,
+    /// Distance from the axis to the centre of the arc.
     pub(super) flat: f64,
     /// Corner radius.
     pub(super) corner: f64,
     /// Where the arc ends and the cone begins.
     pub(super) arc_end: f64,
-    /// Height of the profile there.
-    arc_end_height: f64,
     /// Slope of the cone; infinite where a cylinder follows the arc.
     pub(super) cone: f64,
     /// Largest radius.
     pub(super) radius: f64,
-    /// A cutter grown by this much has its tip that much lower.
-    grown: f64,
+    /// See [`cutter::Profile::is_plain`].
+    plain: bool,
+    /// An arc around the axis, up to here: its height needs no other root.
+    round_to: f64,
+    ball: bool,
 }
 
 impl Profile {
     /// The profile of `cutter`, grown by `growth` in every direction (0: as it is). Growing adds
     /// to the corner radius and to the radius: a flat end becomes a bull nose.
     pub(super) fn of(cutter: &Cutter, growth: f64) -> Self {
-        let (flat, corner) = (cutter.flat_radius(), cutter.corner_radius() + growth);
-        let (sin, cos) = cutter.half_angle().sin_cos();
-        let radius = cutter.radius() + growth;
-        let tapered = cutter.shape() == CutterShape::Taper;
+        let shape = cutter.profile().grown(growth);
+        let upright = shape.side.cos == 0.0;
+        let round = shape.centre_x == 0.0 && shape.bottom_end == 0.0;
         Self {
-            flat,
-            corner,
-            arc_end: if tapered { (flat + corner * cos).min(radius) } else { radius },
-            arc_end_height: if tapered { corner * (1.0 - sin) } else { corner },
-            cone: if tapered { cos / sin } else { f64::INFINITY },
-            radius,
-            grown: growth,
+            shape,
+            flat: shape.centre_x,
+            corner: shape.corner,
+            arc_end: shape.arc_end,
+            cone: if upright { f64::INFINITY } else { shape.side.slope() },
+            radius: shape.radius,
+            plain: shape.is_plain(),
+            round_to: if round { shape.arc_end } else { -1.0 },
+            ball: shape.is_ball(),
         }
     }
 
@@ -55,49 +59,35 @@ impl Profile {
 
     /// As [`Profile::height`], of the squared distance: a ball needs no other root.
     pub(super) fn height_squared(&self, rho2: f64) -> f64 {
-        if self.flat == 0.0 && rho2 <= self.arc_end * self.arc_end {
-            return self.arc(rho2);
+        if self.round_to >= 0.0 && rho2 <= self.round_to * self.round_to {
+            return self.shape.centre_z - (self.corner * self.corner - rho2).max(0.0).sqrt();
         }
-        let rho = rho2.sqrt();
-        let x = rho - self.flat;
-        if x <= 0.0 {
-            -self.grown
-        } else if rho <= self.arc_end || self.cone.is_infinite() {
-            self.arc(x * x)
-        } else {
-            self.arc_end_height + (rho - self.arc_end) * self.cone - self.grown
-        }
-    }
-
-    fn arc(&self, x2: f64) -> f64 {
-        self.corner - (self.corner * self.corner - x2).max(0.0).sqrt() - self.grown
+        self.shape.height(rho2.sqrt())
     }
 
     /// How far from the axis the profile is as steep as `slope >= 0`: where a plane of that slope
     /// touches it.
     fn reach(&self, slope: f64, sine: f64) -> f64 {
-        if slope == 0.0 {
-            0.0
-        } else if slope > self.cone {
-            self.radius
-        } else {
-            (self.flat + self.corner * sine).min(self.arc_end)
-        }
+        if slope > self.cone { self.radius } else { self.shape.reach(sine) }
     }
 
     /// How strictly the profile bends where it touches a plane of that slope: `(κ, s)` such that
     /// within `s` of that place it rises above the plane by at least `κ d² / 2` at distance `d`.
     fn bend(&self, slope: f64, reach: f64) -> (f64, f64) {
-        if self.corner == 0.0 || slope > self.cone {
+        let below_arc = slope < self.shape.bottom.slope() || reach < self.shape.bottom_end;
+        if self.corner == 0.0 || slope > self.cone || below_arc {
             return (0.0, 0.0);
         }
-        let to_cone = if self.cone.is_finite() { self.arc_end - reach } else { f64::INFINITY };
-        if self.flat == 0.0 {
-            return (1.0 / self.corner, to_cone);
+        let upright = self.cone.is_infinite() && !self.shape.side_edge;
+        let to_cone = if upright { f64::INFINITY } else { self.arc_end - reach };
+        if self.flat <= 0.0 {
+            // Around the axis it bends by f'/ρ, no less than across the arc.
+            let to_bottom = if self.plain { f64::INFINITY } else { reach - self.shape.bottom_end };
+            return (1.0 / self.corner, to_cone.min(to_bottom));
         }
         // Across the arc it bends by 1/corner or more; around the axis by f'/ρ, which dies out
         // toward the disc: stay on the outer half of the way from there.
-        let half = 0.5 * (reach - self.flat).max(0.0);
+        let half = (0.5 * (reach - self.flat)).min(reach - self.shape.bottom_end).max(0.0);
         let around = half / (self.corner * (reach + half));
         (around.min(1.0 / self.corner), half.min(to_cone))
     }
@@ -114,11 +104,14 @@ impl Profile {
             return Some(0.0);
         }
         let sine = dz.abs() / (dz * dz + length * length).sqrt();
-        let place = if self.flat == 0.0 && self.cone.is_infinite() {
+        let place = if self.ball {
             // A ball: the line sees a circle.
             width.sqrt() * sine
         } else {
-            self.along_line_general(h, dz.abs() / length, sine).min(width.sqrt())
+            let rise = dz.abs() / length;
+            let place =
+                if self.plain { self.along_line_general(h, rise, sine) } else { self.shape.ahead(rise, h).0 };
+            place.min(width.sqrt())
         };
         Some(place.copysign(dz))
     }
