@@ -1,6 +1,7 @@
 //! Cutter contacts, cutter locations, moves and the strategies that plan them. Knows nothing of how
 //! stock is stored.
 
+mod arc;
 mod border;
 mod chart;
 mod chord;
@@ -14,6 +15,7 @@ mod streamline;
 mod strip;
 mod zigzag;
 
+pub use arc::{ARC_SHARE, Arc, ArcError, Plane};
 pub use chord::distance_to_segment;
 pub use drop::{Drop, DropCutter};
 pub use path::{CcPoint, ClPoint, Move, MoveKind, Toolpath};
