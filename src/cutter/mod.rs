@@ -2,9 +2,11 @@
 
 mod apt;
 mod contact;
+mod holder;
 mod profile;
 mod shape;
 
 pub use apt::{AptError, AptWord, AptWords};
+pub use holder::{Holder, HolderError, HolderSection};
 pub use profile::{Incline, Profile};
 pub use shape::{Cutter, CutterError, CutterShape};

@@ -22,4 +22,4 @@ pub use result::{
 };
 pub use surface_mesh::{MAX_TRIANGLES, SurfaceMesh, surface_mesh};
 pub use table::{conclusion, result_table};
-pub use verdict::{HIGHEST_RIDGE, Verdict, Violation, marks, place, violations};
+pub use verdict::{HIGHEST_RIDGE, Verdict, Violation, collision, holder_note, marks, place, violations};

@@ -5,6 +5,7 @@ mod bins;
 mod envelope;
 mod form;
 mod grid;
+mod holder;
 mod reference;
 #[cfg(test)]
 pub(crate) mod scenes;
@@ -15,6 +16,7 @@ mod zmap;
 pub use bins::MoveBins;
 pub use envelope::Envelope;
 pub use grid::{Grid, GridError};
+pub use holder::{Collision, HolderClearance, holder_collisions};
 pub use reference::cut_reference;
 pub use swept::SweptMove;
 pub use zmap::{NOT_CUT, ZMap};

@@ -13,7 +13,7 @@ use super::{
     DEFAULT_LIMITS, DEFAULT_MARGIN, DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE, DEFAULT_SPINDLE_SPEED, Engine,
     MeshFormat, NamedFile, PartSource, Scene, Simulation, Stock, ToolpathRequest, default_cell,
 };
-use crate::cutter::{AptWord, AptWords, Cutter, CutterError};
+use crate::cutter::{AptWord, AptWords, Cutter, CutterError, CutterShape, Holder, HolderSection};
 use crate::geometry::AnalyticSurface;
 use crate::machine::Machine;
 use crate::metrology::Limits;
@@ -69,7 +69,7 @@ impl Scene {
         })?;
         let root = Section::root(&source, table.get_ref());
         root.only(
-            &["title", "part", "stock", "cutter", "tolerance", "simulation", "machine", "toolpath"],
+            &["title", "part", "stock", "cutter", "holder", "tolerance", "simulation", "machine", "toolpath"],
             &[],
             "a scene",
         )?;
@@ -81,6 +81,7 @@ impl Scene {
         let part = read_part(&root.section("part")?, &folder)?;
         let stock = read_stock(&root.section("stock")?)?;
         let (cutter, cutting) = read_cutter(&root.section("cutter")?)?;
+        let holder = read_holder(&root, &cutter)?;
         let tolerance = read_tolerance(&root.section("tolerance")?)?;
         let simulation = read_simulation(&root.section("simulation")?, &cutter)?;
         let (machine, clearance) = read_machine(&root.section("machine")?)?;
@@ -91,6 +92,7 @@ impl Scene {
             part,
             stock,
             cutter,
+            holder,
             cutting,
             tolerance,
             simulation,
@@ -300,6 +302,53 @@ fn read_taper(section: &Section<'_>) -> Result<(Result<Cutter, CutterError>, &'s
     let shank = section.required_length("shank_diameter", 6.0)?.value;
     let blamed = if corner > 0.5 * tip { "corner_radius" } else { "shank_diameter" };
     Ok((Cutter::taper(tip, corner, angle.to_radians(), shank), blamed))
+}
+
+/// What holds the cutter, if the scene says so.
+fn read_holder(root: &Section<'_>, cutter: &Cutter) -> Result<Option<Holder>, SceneError> {
+    if !root.has("holder") {
+        return Ok(None);
+    }
+    let holder = root.section("holder")?;
+    holder.only(&["cutting_length", "section"], &[], "[holder]")?;
+    let length = match (holder.length("cutting_length")?, cutter.shape()) {
+        (None, CutterShape::Apt) => cutter.words().length,
+        (None, _) => holder.required_length("cutting_length", 20.0)?.value,
+        (Some(length), _) if length.value < cutter.side_height() => {
+            let message = format!(
+                "the cutting length of {} mm ends below the cutter's full radius, at {:.4} mm",
+                length.value,
+                cutter.side_height()
+            );
+            return Err(holder.error(
+                &length.span,
+                message,
+                "write how far the cutting edges reach up from the tip",
+            ));
+        }
+        (Some(length), _) => length.value,
+    };
+    let sections: Vec<HolderSection> = holder
+        .sections("section")?
+        .iter()
+        .map(|section| {
+            section.only(&["diameter", "top_diameter", "length"], &[], "a section of the holder")?;
+            let diameter = section.required_length("diameter", 32.0)?.value;
+            let top_diameter = section.length("top_diameter")?.map_or(diameter, |v| v.value);
+            Ok(HolderSection {
+                diameter,
+                top_diameter,
+                length: section.required_length("length", 40.0)?.value,
+            })
+        })
+        .collect::<Result<_, SceneError>>()?;
+    Holder::new(length, sections).map(Some).map_err(|e| {
+        holder.error(
+            holder.header(),
+            e.to_string(),
+            "add `[[holder.section]]` with `diameter` and `length` for shank and holder, the lowest first",
+        )
+    })
 }
 
 fn read_tolerance(section: &Section<'_>) -> Result<Limits, SceneError> {

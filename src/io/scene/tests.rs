@@ -103,7 +103,9 @@ fn the_complete_scene_reads_back_as_itself() {
     let barrel = apt("diameter = 6\ncorner_radius = 20\ncorner_z = 6\nlength = 8");
     let drill = apt("diameter = 6\ntip_angle = 31\nlength = 30");
     let all = surfaces.iter().map(|s| with(formula, s));
-    let all = all.chain([VALID.to_owned(), taper, tangent, barrel, drill]);
+    let sections = "[[holder.section]]\ndiameter = 6\nlength = 12\n[[holder.section]]\ndiameter = 27\ntop_diameter = 32\nlength = 30";
+    let held = with("[tolerance]", &format!("[holder]\ncutting_length = 9.5\n{sections}\n[tolerance]"));
+    let all = all.chain([VALID.to_owned(), taper, tangent, barrel, drill, held]);
     for text in all {
         let first = Scene::parse("wave.toml", text).unwrap();
         let complete = complete_toml(&first);
@@ -111,6 +113,7 @@ fn the_complete_scene_reads_back_as_itself() {
             Scene::parse("wave.toml", complete.clone()).unwrap_or_else(|e| panic!("{e}\n{complete}"));
         assert_eq!(complete_toml(&second), complete);
         assert_eq!(second.cutter, first.cutter);
+        assert_eq!(second.holder, first.holder);
         assert_eq!(second.tolerance, first.tolerance);
         assert_eq!(second.toolpaths, first.toolpaths);
         assert_eq!(second.part, first.part);
@@ -139,6 +142,29 @@ fn words_of_a_cutter_are_refused_where_they_stand() {
         "shape = \"apt\"\ndiameter = 6\ncorner_radius = 1\nlength = 0.5",
     );
     assert!(refused(&text).1.contains("at least 1 mm"), "{:?}", refused(&text));
+}
+
+#[test]
+fn a_holder_is_read_and_refused_where_it_stands() {
+    let held = |text: &str| with("[tolerance]", &format!("[holder]\n{text}\n[tolerance]"));
+    let section = "[[holder.section]]\ndiameter = 27\nlength = 30";
+    let scene = Scene::parse("wave.toml", held(&format!("cutting_length = 9\n{section}"))).unwrap();
+    let holder = scene.holder.unwrap();
+    assert_eq!((holder.cutting_length(), holder.sections().len()), (9.0, 1));
+    assert_eq!(holder.sections()[0].top_diameter, 27.0);
+    assert!(Scene::parse("wave.toml", VALID).unwrap().holder.is_none());
+    let cases = [
+        (held("cutting_length = 9"), "the holder has no section"),
+        (held(section), "[holder] has no `cutting_length`"),
+        (held(&format!("cutting_length = 2\n{section}")), "below the cutter's full radius"),
+        (held(&format!("cutting_length = 9\n{section}\ncone = 3")), "unknown key `cone`"),
+        (held("cutting_length = 9\n[[holder.section]]\ndiameter = 27"), "has no `length`"),
+        (held("length = 9"), "unknown key `length`"),
+    ];
+    for (text, expected) in cases {
+        let (message, ..) = refused(&text);
+        assert!(message.contains(expected), "{message}");
+    }
 }
 
 #[test]
