@@ -153,7 +153,7 @@ impl AptWords {
                 let reason = format!("with a {what} angle of {degrees} degrees the profile {below}");
                 return refused(word, reason, "write an angle of 0 or more");
             }
-            if !(angle.to_degrees() < GREATEST_ANGLE) {
+            if angle.is_nan() || angle.to_degrees() >= GREATEST_ANGLE {
                 let reason = format!("the {what} angle is {degrees} degrees");
                 return refused(word, reason, format!("write an angle below {GREATEST_ANGLE} degrees"));
             }
@@ -376,14 +376,15 @@ mod tests {
     #[test]
     fn words_that_make_no_cutter_name_the_one_to_change() {
         use AptWord::{CornerRadius, CornerX, CornerZ, Diameter, Length, SideAngle, TipAngle};
+        type Edit = fn(&mut AptWords);
         let good = AptWords::examples()[0];
         assert!(Cutter::apt(&good).is_ok());
-        let change = |f: fn(&mut AptWords)| {
+        let change = |f: Edit| {
             let mut words = good;
             f(&mut words);
             Cutter::apt(&words).unwrap_err()
         };
-        let cases: [(fn(&mut AptWords), AptWord, &str); 12] = [
+        let cases: [(Edit, AptWord, &str); 12] = [
             (|w| w.diameter = 0.0, Diameter, "diameter is 0"),
             (|w| w.diameter = f64::NAN, Diameter, "NaN"),
             (|w| w.corner_radius = -1.0, CornerRadius, "-1"),

@@ -158,7 +158,7 @@ impl Arc {
     /// spiral the bound is used instead of the sagitta. Between chords the coordinates are rounded.
     pub fn chords(&self, deviation: f64) -> Result<Vec<Point3>, ArcError> {
         let sweep = self.sweep()?;
-        if !(deviation > 0.0) {
+        if deviation.is_nan() || deviation <= 0.0 {
             return Err(ArcError::Deviation(deviation));
         }
         let radius = sweep.radii[0].max(sweep.radii[1]);
@@ -173,7 +173,7 @@ impl Arc {
         };
         // The hair keeps a whole number of steps from taking one more by rounding.
         let count = (sweep.angle.abs() / step.min(GREATEST_STEP) - 1e-9).ceil().max(1.0);
-        if !(count <= MAX_CHORDS) {
+        if count.is_nan() || count > MAX_CHORDS {
             return Err(ArcError::TooMany(count));
         }
         let inner = (1..count as u64).map(|k| self.at(&sweep, k as f64 / count));
