@@ -172,7 +172,8 @@ impl Profile {
     #[inline]
     pub fn height(&self, rho: f64) -> f64 {
         if rho <= self.bottom_end {
-            return self.tip + rho * self.bottom.slope();
+            // Without the division for a disc, where this is asked most.
+            return if self.bottom.sin == 0.0 { self.tip } else { self.tip + rho * self.bottom.slope() };
         }
         // Beside an upright side a distance may lie beyond the radius by rounding.
         if rho <= self.arc_end || self.side.cos == 0.0 {
