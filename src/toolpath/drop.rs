@@ -10,6 +10,7 @@
 //! The cutter touches from above only: above its largest radius it is a cylinder, and a vertical
 //! wall carries it with its edges, not with its side.
 
+mod domain;
 mod refine;
 mod roof;
 #[cfg(test)]
@@ -17,11 +18,11 @@ mod tests;
 mod touch;
 
 use crate::cutter::Cutter;
-use crate::geometry::{Bvh, Jet2, Node, Paired, TriangleMesh};
+use crate::geometry::{BoxTree, Bvh, Extent, Jet2, Node, Paired, TriangleMesh};
 use crate::part::{Part, PatchPoint, SurfacePoint};
 use refine::{Hill, Peak};
 use roof::Roof;
-use touch::{Facet, Profile, Touch};
+use touch::{Carries, Facet, Profile, Touch};
 
 /// Where a cutter dropped along -z comes to rest on a part.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,8 +47,17 @@ pub struct DropCutter<'a> {
     search: Profile,
     /// The triangles in the order of the tree's slots, prepared for `search`.
     facets: Vec<Facet>,
-    /// One for each box of the tree.
-    roofs: Paired<Roof>,
+    cull: Cull,
+}
+
+/// What leaves triangles out of a search.
+#[derive(Debug, Clone)]
+enum Cull {
+    /// On a mesh: boxes around the places of the tip while the cutter rests on the triangles.
+    Domains(BoxTree),
+    /// Above a tessellation, where every triangle that the grown cutter would touch alone counts:
+    /// one for each box of the mesh's tree.
+    Roofs(Paired<Roof>),
 }
 
 /// The surface behind a tessellation.
@@ -100,25 +110,20 @@ impl<'a> DropCutter<'a> {
         let profile = Profile::of(cutter, 0.0);
         let search =
             exact.map_or(profile, |(_, deviation)| Profile::of(cutter, DEVIATION_MARGIN * deviation));
+        let domains = if exact.is_none() { domain::domains(mesh, &search) } else { Vec::new() };
         let facets = crate::parallel::map(bvh.slots(), |slot| {
             let t = bvh.triangle_in(slot);
-            Facet::new(mesh.corners(t), &mesh.normal(t), &search)
+            let carries = domains.get(t).map_or(Carries::ALL, |d| d.carries);
+            Facet::new(mesh.corners(t), &mesh.normal(t), carries, &search)
         });
-        let roofs: Vec<Roof> = crate::parallel::map(bvh.boxes(), |index| {
-            bvh.few_slots_in(index, roof::MOST_BELOW).map_or(Roof::NONE, |(node, slots)| {
-                let below: Vec<_> = slots.iter().map(|&s| mesh.corners(bvh.triangle_in(s))).collect();
-                Roof::over(node, &below, &search)
-            })
-        });
-        Self {
-            mesh,
-            bvh,
-            exact: exact.map(|(surface, _)| surface),
-            profile,
-            search,
-            facets,
-            roofs: Paired::from_values(&roofs),
-        }
+        let cull = if exact.is_none() {
+            let extents: Vec<Extent> =
+                (0..bvh.slots()).map(|slot| domains[bvh.triangle_in(slot)].extent).collect();
+            Cull::Domains(bvh.tree().refitted(&extents))
+        } else {
+            Cull::Roofs(Paired::from_values(&roofs(mesh, bvh, &search)))
+        };
+        Self { mesh, bvh, exact: exact.map(|(surface, _)| surface), profile, search, facets, cull }
     }
 
     /// Highest tip position over `(x, y)` at which the cutter touches the part without cutting into
@@ -128,17 +133,15 @@ impl<'a> DropCutter<'a> {
             return None;
         }
         let mut best: Option<(usize, Touch)> = None;
-        self.bvh.search(
-            f64::NEG_INFINITY,
-            |index, node, floor| self.bound(index, node, floor, x, y),
-            |slot, floor| match self.facets[slot].touch(&self.search, x, y, floor) {
+        self.search(f64::NEG_INFINITY, x, y, |slot, floor| {
+            match self.facets[slot].touch(&self.search, x, y, floor) {
                 Some(touch) => {
                     best = Some((slot, touch));
                     touch.tip_z
                 }
                 None => floor,
-            },
-        );
+            }
+        });
         let (slot, touch) = best?;
         match self.exact {
             None => Some(self.on_mesh(slot, &touch, x, y)),
@@ -146,15 +149,29 @@ impl<'a> DropCutter<'a> {
         }
     }
 
+    /// Visits the triangles that may lift the tip at `(x, y)` above `best`, as [`BoxTree::search`] does.
+    fn search(&self, best: f64, x: f64, y: f64, visit: impl FnMut(usize, f64) -> f64) {
+        match &self.cull {
+            Cull::Domains(tree) => {
+                let bound = |_, node: &Node, _| if node.holds(x, y) { node.top() } else { f64::NEG_INFINITY };
+                tree.search(best, bound, visit);
+            }
+            Cull::Roofs(roofs) => {
+                let bound = |index, node: &Node, floor| self.bound(roofs.at(index), node, floor, x, y);
+                self.bvh.tree().search(best, bound, visit);
+            }
+        }
+    }
+
     /// No triangle in the box lifts the tip higher than this, unless this is below `floor`: then
     /// none lifts it above `floor`.
-    fn bound(&self, index: usize, node: &Node, floor: f64, x: f64, y: f64) -> f64 {
+    fn bound(&self, roof: &Roof, node: &Node, floor: f64, x: f64, y: f64) -> f64 {
         let distance2 = node.plan_distance_squared(x, y);
         if distance2 > self.search.radius * self.search.radius {
             return f64::NEG_INFINITY;
         }
         let level = node.top() - self.search.height_squared(distance2);
-        if level <= floor { level } else { level.min(self.roofs.at(index).bound(node, &self.search, x, y)) }
+        if level <= floor { level } else { level.min(roof.bound(node, &self.search, x, y)) }
     }
 
     fn on_mesh(&self, slot: usize, touch: &Touch, x: f64, y: f64) -> Drop {
@@ -186,19 +203,15 @@ impl<'a> DropCutter<'a> {
     ) -> Option<Drop> {
         let mut found = Found { best: None, known: [((0, 0), [0.0; 2]); REMEMBERED], len: 0 };
         self.refine(surface, slot, touch, x, y, &mut found);
-        self.bvh.search(
-            found.height(),
-            |index, node, floor| self.bound(index, node, floor, x, y),
-            |other, floor| {
-                // The first triangle was refined already.
-                if other != slot
-                    && let Some(touch) = self.facets[other].touch(&self.search, x, y, floor)
-                {
-                    self.refine(surface, other, &touch, x, y, &mut found);
-                }
-                found.height()
-            },
-        );
+        self.search(found.height(), x, y, |other, floor| {
+            // The first triangle was refined already.
+            if other != slot
+                && let Some(touch) = self.facets[other].touch(&self.search, x, y, floor)
+            {
+                self.refine(surface, other, &touch, x, y, &mut found);
+            }
+            found.height()
+        });
         let (triangle, patch, peak) = found.best?;
         let facing = self.mesh.normal(triangle);
         let normal = match peak.jet.normal() {
@@ -242,6 +255,16 @@ impl<'a> DropCutter<'a> {
             }
         }
     }
+}
+
+/// A roof for each box of the tree.
+fn roofs(mesh: &TriangleMesh, bvh: &Bvh, profile: &Profile) -> Vec<Roof> {
+    crate::parallel::map(bvh.boxes(), |index| {
+        bvh.few_slots_in(index, roof::MOST_BELOW).map_or(Roof::NONE, |(node, slots)| {
+            let below: Vec<_> = slots.iter().map(|&s| mesh.corners(bvh.triangle_in(s))).collect();
+            Roof::over(node, &below, profile)
+        })
+    })
 }
 
 /// What the refinement has found so far in one drop.
