@@ -11,6 +11,7 @@
 //! wall carries it with its edges, not with its side.
 
 mod domain;
+mod grid;
 mod refine;
 mod roof;
 #[cfg(test)]
@@ -20,6 +21,7 @@ mod touch;
 use crate::cutter::Cutter;
 use crate::geometry::{BoxTree, Bvh, Extent, Jet2, Node, Paired, TriangleMesh};
 use crate::part::{Part, PatchPoint, SurfacePoint};
+pub use grid::{GridDrop, PlanGrid};
 use refine::{Hill, Peak};
 use roof::Roof;
 use touch::{Carries, Facet, Profile, Touch};
@@ -53,8 +55,9 @@ pub struct DropCutter<'a> {
 /// What leaves triangles out of a search.
 #[derive(Debug, Clone)]
 enum Cull {
-    /// On a mesh: boxes around the places of the tip while the cutter rests on the triangles.
-    Domains(BoxTree),
+    /// On a mesh: boxes around the places of the tip while the cutter rests on a triangle, for each
+    /// slot and as a tree.
+    Domains { tree: BoxTree, extents: Vec<Extent> },
     /// Above a tessellation, where every triangle that the grown cutter would touch alone counts:
     /// one for each box of the mesh's tree.
     Roofs(Paired<Roof>),
@@ -119,7 +122,7 @@ impl<'a> DropCutter<'a> {
         let cull = if exact.is_none() {
             let extents: Vec<Extent> =
                 (0..bvh.slots()).map(|slot| domains[bvh.triangle_in(slot)].extent).collect();
-            Cull::Domains(bvh.tree().refitted(&extents))
+            Cull::Domains { tree: bvh.tree().refitted(&extents), extents }
         } else {
             Cull::Roofs(Paired::from_values(&roofs(mesh, bvh, &search)))
         };
@@ -152,7 +155,7 @@ impl<'a> DropCutter<'a> {
     /// Visits the triangles that may lift the tip at `(x, y)` above `best`, as [`BoxTree::search`] does.
     fn search(&self, best: f64, x: f64, y: f64, visit: impl FnMut(usize, f64) -> f64) {
         match &self.cull {
-            Cull::Domains(tree) => {
+            Cull::Domains { tree, .. } => {
                 let bound = |_, node: &Node, _| if node.holds(x, y) { node.top() } else { f64::NEG_INFINITY };
                 tree.search(best, bound, visit);
             }

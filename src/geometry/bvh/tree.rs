@@ -129,6 +129,11 @@ impl Extent {
         Self { min: min.map(round_down), max: max.map(round_up) }
     }
 
+    /// From where to where it reaches along an axis, mm.
+    pub(crate) fn range(&self, axis: usize) -> [f64; 2] {
+        [self.min[axis], self.max[axis]].map(f64::from)
+    }
+
     /// The box around both.
     pub(crate) fn with(&self, other: &Self) -> Self {
         let pick = |i: usize| (self.min[i].min(other.min[i]), self.max[i].max(other.max[i]));

@@ -3,6 +3,7 @@ use super::*;
 use crate::geometry::{Point3, Vector3};
 
 mod exact;
+mod grid;
 
 /// Deterministic numbers in 0..1 (SplitMix64, Steele et al. 2014).
 pub(super) struct Numbers(pub(super) u64);
