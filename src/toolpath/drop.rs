@@ -19,8 +19,9 @@ mod tests;
 mod touch;
 
 use crate::cutter::Cutter;
-use crate::geometry::{BoxTree, Bvh, Extent, Jet2, Node, Paired, TriangleMesh};
+use crate::geometry::{BoxTree, Bvh, Extent, Feature, Jet2, Node, Paired, TriangleMesh};
 use crate::part::{Part, PatchPoint, SurfacePoint};
+use grid::Parts;
 pub use grid::{GridDrop, PlanGrid};
 use refine::{Hill, Peak};
 use roof::Roof;
@@ -55,9 +56,9 @@ pub struct DropCutter<'a> {
 /// What leaves triangles out of a search.
 #[derive(Debug, Clone)]
 enum Cull {
-    /// On a mesh: boxes around the places of the tip while the cutter rests on a triangle, for each
-    /// slot and as a tree.
-    Domains { tree: BoxTree, extents: Vec<Extent> },
+    /// On a mesh: boxes around the places of the tip while the cutter rests on a triangle, as a tree,
+    /// and around those for each of its parts.
+    Domains { tree: BoxTree, parts: Parts },
     /// Above a tessellation, where every triangle that the grown cutter would touch alone counts:
     /// one for each box of the mesh's tree.
     Roofs(Paired<Roof>),
@@ -116,13 +117,25 @@ impl<'a> DropCutter<'a> {
         let domains = if exact.is_none() { domain::domains(mesh, &search) } else { Vec::new() };
         let facets = crate::parallel::map(bvh.slots(), |slot| {
             let t = bvh.triangle_in(slot);
-            let carries = domains.get(t).map_or(Carries::ALL, |d| d.carries);
+            let carries = domains.get(t).map_or(Carries::ALL, domain::Domain::carries);
             Facet::new(mesh.corners(t), &mesh.normal(t), carries, &search)
         });
         let cull = if exact.is_none() {
-            let extents: Vec<Extent> =
-                (0..bvh.slots()).map(|slot| domains[bvh.triangle_in(slot)].extent).collect();
-            Cull::Domains { tree: bvh.tree().refitted(&extents), extents }
+            let in_slot = |slot: usize| &domains[bvh.triangle_in(slot)];
+            let around = |slot| in_slot(slot).parts().fold(Extent::NOTHING, |all, part| all.with(&part.1));
+            let extents: Vec<Extent> = (0..bvh.slots()).map(around).collect();
+            let mut slot_of = vec![0u32; bvh.slots()];
+            (0..bvh.slots()).for_each(|slot| slot_of[bvh.triangle_in(slot)] = slot as u32);
+            let slot_of = &slot_of;
+            let parts = Parts::new(bvh.slots(), |slot| {
+                let t = bvh.triangle_in(slot);
+                let normal = mesh.normal(t);
+                in_slot(slot).parts().map(move |(part, extent)| {
+                    let across = if let Feature::Side(k) = part { mesh.neighbour(t, k) } else { None };
+                    (Facet::part(&normal, part), extent, slot_of[across.unwrap_or(t)])
+                })
+            });
+            Cull::Domains { tree: bvh.tree().refitted(&extents), parts }
         } else {
             Cull::Roofs(Paired::from_values(&roofs(mesh, bvh, &search)))
         };

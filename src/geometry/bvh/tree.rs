@@ -129,9 +129,9 @@ impl Extent {
         Self { min: min.map(round_down), max: max.map(round_up) }
     }
 
-    /// From where to where it reaches along an axis, mm.
-    pub(crate) fn range(&self, axis: usize) -> [f64; 2] {
-        [self.min[axis], self.max[axis]].map(f64::from)
+    /// Its least and its greatest corner in the plan view, mm.
+    pub(crate) fn plan(&self) -> [[f32; 2]; 2] {
+        [self.min, self.max].map(|[x, y, _]| [x, y])
     }
 
     /// The box around both.

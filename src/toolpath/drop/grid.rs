@@ -7,7 +7,7 @@
 //! that domain. Each tile is worked out by itself, so the number of threads changes no bit.
 
 use super::{Cull, DropCutter};
-use crate::geometry::{BoxTree, Extent};
+use crate::geometry::{BoxTree, Extent, Feature};
 
 /// Points of a grid in the plan view.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,6 +63,10 @@ const TILE: usize = 8;
 /// visits triangles between the points of a wide grid in vain.
 const MOST_BELOW: f64 = 512.0;
 
+/// Slots whose sides wait until as many faces have been looked at. More raises the floor of the walk
+/// later, fewer looks at sides which a face would have made superfluous.
+const WAITING: usize = 64;
+
 impl DropCutter<'_> {
     /// The drops at all points of a grid, in rows along x: that of point `(i, j)` at
     /// `i + j · counts[0]`.
@@ -73,11 +77,11 @@ impl DropCutter<'_> {
         let [nx, ny] = grid.counts;
         let mut drops = vec![GridDrop::NOTHING; nx * ny];
         match &self.cull {
-            Cull::Domains { tree, extents } if self.below_tile(grid) <= MOST_BELOW => {
+            Cull::Domains { tree, parts } if self.below_tile(grid) <= MOST_BELOW => {
                 crate::parallel::for_each_chunk(&mut drops, TILE * nx, |band, rows| {
                     for i in (0..nx).step_by(TILE) {
                         let mut tile = Tile::new(grid, [i, TILE * band]);
-                        tile.drop_onto(self, tree, extents);
+                        tile.drop_onto(self, tree, parts);
                         for (j, row) in rows.chunks_mut(nx).enumerate() {
                             for (drop, k) in row[i..].iter_mut().zip(0..TILE) {
                                 let (tip_z, slot) = (tile.tips[j][k], tile.slots[j][k]);
@@ -111,6 +115,46 @@ impl DropCutter<'_> {
     }
 }
 
+/// The parts of the triangles on which the cutter can rest, by slot.
+#[derive(Debug, Clone)]
+pub(super) struct Parts {
+    /// Where those of each slot begin, and the end.
+    starts: Vec<u32>,
+    parts: Vec<Part>,
+}
+
+/// A part of a facet, and a box around the places of the axis while the cutter rests on it.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    min: [f32; 2],
+    max: [f32; 2],
+    part: Feature,
+    /// Of a side, the slot of the triangle across it; of others, and at a border, their own.
+    across: u32,
+}
+
+impl Parts {
+    /// Of the parts of each slot, with the slot across each of them.
+    pub(super) fn new<I: Iterator<Item = (Feature, Extent, u32)>>(
+        slots: usize,
+        of: impl Fn(usize) -> I,
+    ) -> Self {
+        let mut parts = Self { starts: vec![0], parts: Vec::with_capacity(3 * slots) };
+        for slot in 0..slots {
+            parts.parts.extend(of(slot).map(|(part, extent, across)| {
+                let [min, max] = extent.plan();
+                Part { min, max, part, across }
+            }));
+            parts.starts.push(parts.parts.len() as u32);
+        }
+        parts
+    }
+
+    fn of(&self, slot: usize) -> &[Part] {
+        &self.parts[self.starts[slot] as usize..self.starts[slot + 1] as usize]
+    }
+}
+
 /// A square of grid points with the best drops found so far.
 struct Tile {
     x: [f64; TILE],
@@ -119,6 +163,8 @@ struct Tile {
     high: [f64; 2],
     /// Steps in 1 mm.
     per_mm: [f64; 2],
+    /// The widest vectors of this machine; their width changes no bit.
+    arch: pulp::Arch,
     /// By rows along x. Infinite at points beyond the grid, which so stay as they are.
     tips: [[f64; TILE]; TILE],
     slots: [[u32; TILE]; TILE],
@@ -137,39 +183,105 @@ impl Tile {
             low: [x[0], y[0]],
             high: [x[count[0] - 1], y[count[1] - 1]],
             per_mm: grid.step.map(|s| 1.0 / s),
+            arch: pulp::Arch::new(),
             tips: std::array::from_fn(|j| std::array::from_fn(|i| tip(i, j))),
             slots: [[0; TILE]; TILE],
         }
     }
 
-    fn drop_onto(&mut self, drops: &DropCutter, tree: &BoxTree, extents: &[Extent]) {
+    /// Faces first: on most ground they carry most, and what they carry needs no look at the sides.
+    fn drop_onto(&mut self, drops: &DropCutter, tree: &BoxTree, parts: &Parts) {
         let (low, high) = (self.low, self.high);
+        let mut waiting = [0u32; WAITING];
+        let mut len = 0;
         tree.search(
             f64::NEG_INFINITY,
             |_, node, _| if node.meets(low, high) { node.top() } else { f64::NEG_INFINITY },
-            |slot, floor| if self.visit(drops, &extents[slot], slot) { self.floor() } else { floor },
+            |slot, floor| {
+                let mut raised = false;
+                for part in parts.of(slot) {
+                    if part.part == Feature::Face {
+                        raised |= self.rest_on_face(drops, part, slot);
+                    } else if self.reached(part).is_some() {
+                        // One entry serves all sides and corners of a slot.
+                        waiting[len] = slot as u32;
+                        len += 1;
+                        break;
+                    }
+                }
+                if len == WAITING {
+                    for &slot in &waiting {
+                        raised |= self.rest_on_sides(drops, parts, slot as usize);
+                    }
+                    len = 0;
+                }
+                if raised { self.floor() } else { floor }
+            },
         );
+        for &slot in &waiting[..len] {
+            self.rest_on_sides(drops, parts, slot as usize);
+        }
     }
 
-    /// Drops the cutter on one triangle at the points in its domain; tells whether that was of use.
-    fn visit(&mut self, drops: &DropCutter, extent: &Extent, slot: usize) -> bool {
-        let facet = &drops.facets[slot];
-        let [columns, rows] = [0, 1].map(|axis| {
-            let [from, to] = extent.range(axis).map(|x| (x - self.low[axis]) * self.per_mm[axis]);
-            // Rounded away from the domain; negative numbers become 0.
-            from as usize..(to + 1.0).min(TILE as f64) as usize
+    /// Columns and rows of points that may lie in the part's box.
+    fn reached(&self, part: &Part) -> Option<[std::ops::Range<usize>; 2]> {
+        let ranges = [0, 1].map(|axis| {
+            let place = |x: f32| (f64::from(x) - self.low[axis]) * self.per_mm[axis];
+            // Rounded away from the box; negative numbers become 0.
+            place(part.min[axis]) as usize..(place(part.max[axis]) + 1.0).min(TILE as f64) as usize
         });
-        let mut useful = false;
-        for j in rows {
-            for i in columns.clone() {
-                if let Some(touch) = facet.touch(&drops.search, self.x[i], self.y[j], self.tips[j][i]) {
-                    self.tips[j][i] = touch.tip_z;
-                    self.slots[j][i] = slot as u32;
-                    useful = true;
+        ranges.iter().all(|r| !r.is_empty()).then_some(ranges)
+    }
+
+    /// Drops the cutter on a face; tells whether that raised it.
+    fn rest_on_face(&mut self, drops: &DropCutter, part: &Part, slot: usize) -> bool {
+        let Some([_, rows]) = self.reached(part) else {
+            return false;
+        };
+        let (facet, x) = (&drops.facets[slot], &self.x);
+        self.arch.dispatch(|| {
+            let mut raised = false;
+            for j in rows {
+                let (tips, slots) = (&mut self.tips[j], &mut self.slots[j]);
+                raised |= facet.raise_by_face(x, self.y[j], slot as u32, tips, slots);
+            }
+            raised
+        })
+    }
+
+    /// Drops the cutter on sides and corners; tells whether that raised it.
+    fn rest_on_sides(&mut self, drops: &DropCutter, parts: &Parts, slot: usize) -> bool {
+        let mut raised = false;
+        let facet = &drops.facets[slot];
+        for part in parts.of(slot).iter().filter(|p| p.part != Feature::Face) {
+            let Some([columns, rows]) = self.reached(part) else {
+                continue;
+            };
+            let across = &drops.facets[part.across as usize];
+            let mut higher = [[false; TILE]; TILE];
+            self.arch.dispatch(|| {
+                for j in rows.clone() {
+                    // A side lies in both planes, so it lifts the tip no higher than either.
+                    let (y, tips) = (self.y[j], &self.tips[j]);
+                    let (own, other) = (facet.peaks(&self.x, y), across.peaks(&self.x, y));
+                    for i in 0..TILE {
+                        higher[j][i] = (own[i] > tips[i]) & (other[i] > tips[i]);
+                    }
+                }
+            });
+            for j in rows {
+                for i in columns.clone().filter(|&i| higher[j][i]) {
+                    let tip = &mut self.tips[j][i];
+                    if let Some(tip_z) =
+                        facet.touch_part(part.part, &drops.search, self.x[i], self.y[j], *tip)
+                    {
+                        (*tip, self.slots[j][i]) = (tip_z, slot as u32);
+                        raised = true;
+                    }
                 }
             }
         }
-        useful
+        raised
     }
 
     /// The lowest tip so far.

@@ -265,7 +265,6 @@ pub(super) struct Carries {
 }
 
 impl Carries {
-    pub(super) const NOTHING: Self = Self { sides: [false; 3], corners: [false; 3] };
     pub(super) const ALL: Self = Self { sides: [true; 3], corners: [true; 3] };
 
     /// For the last two corners the other way round.
@@ -293,6 +292,15 @@ pub(super) const LEVEL: f64 = 1e-13;
 /// A triangle counts as vertical where its plan view is less than this share of its area: then its
 /// slope is rounding. Its sides still carry the cutter.
 const VERTICAL: f64 = 1e-14;
+
+/// A part of a triangle in the other order of corners: a facet's in the mesh's, and the reverse.
+fn turned_feature(feature: Feature) -> Feature {
+    match feature {
+        Feature::Face => Feature::Face,
+        Feature::Side(k) => Feature::Side(2 - k),
+        Feature::Corner(k) => Feature::Corner((3 - k) % 3),
+    }
+}
 
 /// Whether a facet has its last two corners the other way round than its triangle in the mesh,
 /// which has that unit normal.
@@ -384,6 +392,65 @@ impl Facet {
         best
     }
 
+    /// The part of the facet which is that part of its triangle in the mesh, which has that normal.
+    pub(super) fn part(normal: &Vector3, feature: Feature) -> Feature {
+        if turned(normal) { turned_feature(feature) } else { feature }
+    }
+
+    /// Rests the cutter on one side or corner alone, whichever place of the triangle is best; answers
+    /// the height of the tip if that comes above `floor`.
+    pub(super) fn touch_part(
+        &self,
+        part: Feature,
+        profile: &Profile,
+        x: f64,
+        y: f64,
+        floor: f64,
+    ) -> Option<f64> {
+        let touch = match part {
+            Feature::Side(k) => Side::of(self.corners(), k).touch(k, profile, x, y, floor),
+            Feature::Corner(k) => self.touch_corner(k, profile, x, y, floor),
+            Feature::Face => None,
+        };
+        touch.map(|t| t.tip_z)
+    }
+
+    /// The height of the tip at `(x[i], y)` while resting on the whole plane of the face: nothing in
+    /// that plane lifts it higher.
+    #[inline(always)]
+    pub(super) fn peaks<const N: usize>(&self, x: &[f64; N], y: f64) -> [f64; N] {
+        let (height, climb) = (self.a.z + self.lift, self.gradient[1] * (y - self.a.y));
+        x.map(|x| height + (self.gradient[0] * (x - self.a.x) + climb))
+    }
+
+    /// Rests the cutter on the face alone at the places `(x[i], y)`: where that lifts the tip above
+    /// `tips[i]`, it becomes that, and `slots[i]` becomes `slot`.
+    #[inline(always)]
+    pub(super) fn raise_by_face<const N: usize>(
+        &self,
+        x: &[f64; N],
+        y: f64,
+        slot: u32,
+        tips: &mut [f64; N],
+        slots: &mut [u32; N],
+    ) -> bool {
+        let sides = [0, 1, 2].map(|k| Side::of(self.corners(), k));
+        let shift = self.gradient.map(|g| g * self.uphill);
+        let peaks = self.peaks(x, y);
+        let beyond = [0, 1, 2].map(|k| sides[k].along[0] * (y + shift[1] - sides[k].from.y));
+        let mut raised = false;
+        // Without branches, so that several places are worked out at once.
+        for i in 0..N {
+            let (peak, at) = (peaks[i], x[i] + shift[0]);
+            let area = |k: usize| sides[k].along[1] * (at - sides[k].from.x) - beyond[k];
+            let better = (area(0) <= 0.0) & (area(1) <= 0.0) & (area(2) <= 0.0) & (peak > tips[i]);
+            tips[i] = if better { peak } else { tips[i] };
+            slots[i] = if better { slot } else { slots[i] };
+            raised |= better;
+        }
+        raised
+    }
+
     /// Rests the cutter on one corner.
     fn touch_corner(&self, k: usize, profile: &Profile, x: f64, y: f64, floor: f64) -> Option<Touch> {
         let p = self.corners()[k];
@@ -423,11 +490,7 @@ impl Facet {
         let mut feature = touch.feature;
         if turned(normal) {
             barycentric.swap(1, 2);
-            feature = match feature {
-                Feature::Face => Feature::Face,
-                Feature::Side(k) => Feature::Side(2 - k),
-                Feature::Corner(k) => Feature::Corner((3 - k) % 3),
-            };
+            feature = turned_feature(feature);
         }
         Contact { point, barycentric, feature }
     }
