@@ -2,10 +2,11 @@
 //! the cutter touches without cutting in.
 //!
 //! Enters: a part, a cutter, places `(x, y)` in mm. Leaves: the height of the tip and the contact.
-//! On a mesh the answer is exact up to f64 rounding: closed forms at each triangle ([`touch`]) and
-//! branch and bound over the part's search tree, with bounds that tilt with the surface ([`roof`]).
-//! On patches the tessellation only finds where to
-//! look; the contact is then the maximum on the exact surface ([`refine`]).
+//! On a mesh the answer is exact up to f64 rounding: closed forms at each triangle ([`touch`]), found
+//! with a tree of the places from which each triangle can carry the cutter ([`domain`]), for one place
+//! or for a grid of them ([`grid`]). On patches the tessellation only finds where to look, by branch
+//! and bound over its own tree with bounds that tilt with the surface ([`roof`]); the contact is then
+//! the maximum on the exact surface ([`refine`]).
 //!
 //! The cutter touches from above only: above its largest radius it is a cylinder, and a vertical
 //! wall carries it with its edges, not with its side.
@@ -37,7 +38,7 @@ pub struct Drop {
     pub contact: SurfacePoint,
 }
 
-/// Drops one cutter onto one part. Holds about 160 bytes a triangle; serves any number of threads.
+/// Drops one cutter onto one part. Holds about 270 bytes a triangle; serves any number of threads.
 #[derive(Debug, Clone)]
 pub struct DropCutter<'a> {
     mesh: &'a TriangleMesh,
@@ -129,10 +130,10 @@ impl<'a> DropCutter<'a> {
             let slot_of = &slot_of;
             let parts = Parts::new(bvh.slots(), |slot| {
                 let t = bvh.triangle_in(slot);
-                let normal = mesh.normal(t);
+                let facet = &facets[slot];
                 in_slot(slot).parts().map(move |(part, extent)| {
                     let across = if let Feature::Side(k) = part { mesh.neighbour(t, k) } else { None };
-                    (Facet::part(&normal, part), extent, slot_of[across.unwrap_or(t)])
+                    (facet.part(part), extent, slot_of[across.unwrap_or(t)])
                 })
             });
             Cull::Domains { tree: bvh.tree().refitted(&extents), parts }
@@ -159,9 +160,10 @@ impl<'a> DropCutter<'a> {
             }
         });
         let (slot, touch) = best?;
+        let landing = Landing { x, y, slot, touch };
         match self.exact {
-            None => Some(self.on_mesh(slot, &touch, x, y)),
-            Some(surface) => self.on_surface(surface, slot, &touch, x, y),
+            None => Some(self.on_mesh(&landing)),
+            Some(surface) => self.on_surface(surface, &landing),
         }
     }
 
@@ -190,9 +192,10 @@ impl<'a> DropCutter<'a> {
         if level <= floor { level } else { level.min(roof.bound(node, &self.search, x, y)) }
     }
 
-    fn on_mesh(&self, slot: usize, touch: &Touch, x: f64, y: f64) -> Drop {
-        let triangle = self.bvh.triangle_in(slot);
-        let contact = self.facets[slot].contact(touch, &self.mesh.normal(triangle), x, y);
+    fn on_mesh(&self, landing: &Landing) -> Drop {
+        let Landing { x, y, slot, touch } = landing;
+        let triangle = self.bvh.triangle_in(*slot);
+        let contact = self.facets[*slot].contact(touch, *x, *y);
         let contact = SurfacePoint {
             point: contact.point,
             normal: self.bvh.normal_at(self.mesh, triangle, contact.feature),
@@ -209,22 +212,16 @@ impl<'a> DropCutter<'a> {
     /// on `q`'s triangle it would come to rest at `z*` or above. So the contact lies behind one of
     /// the triangles on which the grown cutter rests at `z*` or above, and any point of `S` that is
     /// found gives a lower bound of `z*`.
-    fn on_surface(
-        &self,
-        surface: &dyn ExactSurface,
-        slot: usize,
-        touch: &Touch,
-        x: f64,
-        y: f64,
-    ) -> Option<Drop> {
+    fn on_surface(&self, surface: &dyn ExactSurface, first: &Landing) -> Option<Drop> {
         let mut found = Found { best: None, known: [((0, 0), [0.0; 2]); REMEMBERED], len: 0 };
-        self.refine(surface, slot, touch, x, y, &mut found);
-        self.search(found.height(), x, y, |other, floor| {
+        self.refine(surface, first, &mut found);
+        let (x, y) = (first.x, first.y);
+        self.search(found.height(), x, y, |slot, floor| {
             // The first triangle was refined already.
-            if other != slot
-                && let Some(touch) = self.facets[other].touch(&self.search, x, y, floor)
+            if slot != first.slot
+                && let Some(touch) = self.facets[slot].touch(&self.search, x, y, floor)
             {
-                self.refine(surface, other, &touch, x, y, &mut found);
+                self.refine(surface, &Landing { x, y, slot, touch }, &mut found);
             }
             found.height()
         });
@@ -245,25 +242,18 @@ impl<'a> DropCutter<'a> {
     }
 
     /// Climbs to the maximum on the exact surface that is reached from the contact on a triangle.
-    fn refine(
-        &self,
-        surface: &dyn ExactSurface,
-        slot: usize,
-        touch: &Touch,
-        x: f64,
-        y: f64,
-        found: &mut Found,
-    ) {
-        let triangle = self.bvh.triangle_in(slot);
+    fn refine(&self, surface: &dyn ExactSurface, landing: &Landing, found: &mut Found) {
+        let Landing { x, y, slot, touch } = landing;
+        let triangle = self.bvh.triangle_in(*slot);
         let Some(corners) = surface.corner_parameters(triangle) else {
             return;
         };
-        let weights = self.facets[slot].contact(touch, &self.mesh.normal(triangle), x, y).barycentric;
+        let weights = self.facets[*slot].contact(touch, *x, *y).barycentric;
         let mean = |of: fn(&PatchPoint) -> f64| (0..3).map(|k| weights[k] * of(&corners[k])).sum::<f64>();
         let (patch, start) = (corners[0].patch, [mean(|p| p.u), mean(|p| p.v)]);
         let jet = |u: f64, v: f64| surface.jet(patch, u, v);
         for (number, law) in self.profile.laws().enumerate() {
-            let hill = Hill::new(&jet, surface.domain(patch), law, self.profile.radius, [x, y]);
+            let hill = Hill::new(&jet, surface.domain(patch), law, self.profile.radius, [*x, *y]);
             let key = (patch, number);
             let known = found.known[..found.len].iter().filter(|k| k.0 == key).map(|k| k.1);
             if let Some(peak) = hill.climb(start, known) {
@@ -281,6 +271,15 @@ fn roofs(mesh: &TriangleMesh, bvh: &Bvh, profile: &Profile) -> Vec<Roof> {
             Roof::over(node, &below, profile)
         })
     })
+}
+
+/// A cutter with its axis at `(x, y)` resting on the triangle in a slot.
+#[derive(Debug, Clone, Copy)]
+struct Landing {
+    x: f64,
+    y: f64,
+    slot: usize,
+    touch: Touch,
 }
 
 /// What the refinement has found so far in one drop.

@@ -134,6 +134,12 @@ impl Extent {
         [self.min, self.max].map(|[x, y, _]| [x, y])
     }
 
+    /// Whether it holds a point.
+    #[cfg(test)]
+    pub(crate) fn holds(&self, p: &Point3) -> bool {
+        (0..3).all(|i| f64::from(self.min[i]) <= p[i] && p[i] <= f64::from(self.max[i]))
+    }
+
     /// The box around both.
     pub(crate) fn with(&self, other: &Self) -> Self {
         let pick = |i: usize| (self.min[i].min(other.min[i]), self.max[i].max(other.max[i]));

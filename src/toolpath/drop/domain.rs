@@ -127,22 +127,26 @@ impl Face {
 struct Offsets {
     min: [f64; 2],
     max: [f64; 2],
-    /// Least height of the profile there.
-    lowest: f64,
+    /// Least and greatest height of the profile there.
+    heights: [f64; 2],
 }
 
 impl Offsets {
     /// The whole cutter.
     fn all(profile: &Profile) -> Self {
-        Self { min: [-profile.radius; 2], max: [profile.radius; 2], lowest: profile.height(0.0) }
+        Self {
+            min: [-profile.radius; 2],
+            max: [profile.radius; 2],
+            heights: [profile.height(0.0), profile.height(profile.radius)],
+        }
     }
 
     /// Where the axis and the tip may be while the contact lies in a box.
     fn domain(&self, contacts: &Aabb, margin: f64) -> Extent {
         let (low, high) = (contacts.min, contacts.max);
         let (min, max) = (
-            [low.x - self.max[0], low.y - self.max[1], low.z - self.lowest],
-            [high.x - self.min[0], high.y - self.min[1], high.z - self.lowest],
+            [low.x - self.max[0], low.y - self.max[1], low.z - self.heights[1]],
+            [high.x - self.min[0], high.y - self.min[1], high.z - self.heights[0]],
         );
         Extent::new(min.map(|x| x - margin), max.map(|x| x + margin))
     }
@@ -183,7 +187,7 @@ impl Hull {
             (low[i], high[i]) = (-high[i], -low[i]);
         }
         if leans().all(|w| length(w) <= LEVEL) {
-            return Offsets { min: [0.0; 2], max: [0.0; 2], lowest: profile.height(0.0) };
+            return Offsets { min: [0.0; 2], max: [0.0; 2], heights: [profile.height(0.0); 2] };
         }
         let from_zero = |i: usize| low[i].max(-high[i]).max(0.0);
         let to_end = |i: usize| low[i].abs().max(high[i].abs());
@@ -195,7 +199,8 @@ impl Hull {
         let directions = leans().map(|w| Vector3::new(w[0], w[1], 0.0).normalize());
         let (from, to) =
             if directed { bounds_of_units(directions) } else { None }.unwrap_or(([-1.0; 2], [1.0; 2]));
-        let mut offsets = Offsets { min: [0.0; 2], max: [0.0; 2], lowest: profile.height(near) };
+        let mut offsets =
+            Offsets { min: [0.0; 2], max: [0.0; 2], heights: [near, far].map(|rho| profile.height(rho)) };
         for i in 0..2 {
             offsets.min[i] = (near * from[i]).min(far * from[i]);
             offsets.max[i] = (near * to[i]).max(far * to[i]);

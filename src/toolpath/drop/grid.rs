@@ -57,11 +57,11 @@ impl GridDrop {
 
 /// Points along the side of a tile. More visits more triangles a tile that matter to few of its
 /// points, fewer walks down the tree more often.
-const TILE: usize = 8;
+const TILE: usize = 16;
 
 /// A tile which so many triangles lie below, on the mean of the mesh, is dropped point by point. More
 /// visits triangles between the points of a wide grid in vain.
-const MOST_BELOW: f64 = 512.0;
+const MOST_BELOW: f64 = 1024.0;
 
 /// Slots whose sides wait until as many faces have been looked at. More raises the floor of the walk
 /// later, fewer looks at sides which a face would have made superfluous.

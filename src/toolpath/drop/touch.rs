@@ -245,9 +245,11 @@ pub(super) struct Facet {
     /// From the axis to where the profile touches the plane, as a multiple of `gradient`.
     uphill: f64,
     carries: Carries,
+    /// Whether the last two corners are the other way round than in the mesh.
+    turned: bool,
     /// As in [`Rest`]; infinite where the triangle is vertical.
     lift: f64,
-    /// Second corner: counter-clockwise in the plan view, unlike the mesh's where [`turned`].
+    /// Second corner: counter-clockwise in the plan view, unlike the mesh's where `turned`.
     b: Point3,
     /// Third corner.
     c: Point3,
@@ -302,12 +304,6 @@ fn turned_feature(feature: Feature) -> Feature {
     }
 }
 
-/// Whether a facet has its last two corners the other way round than its triangle in the mesh,
-/// which has that unit normal.
-fn turned(normal: &Vector3) -> bool {
-    normal.z <= -VERTICAL
-}
-
 impl Facet {
     /// Prepares a triangle, given by its corners and its unit normal, and which of its sides and
     /// corners [`Facet::touch`] is to look at.
@@ -317,7 +313,8 @@ impl Facet {
         mut carries: Carries,
         profile: &Profile,
     ) -> Self {
-        if turned(normal) {
+        let turned = normal.z <= -VERTICAL;
+        if turned {
             std::mem::swap(&mut b, &mut c);
             carries = carries.turned();
         }
@@ -325,7 +322,7 @@ impl Facet {
         let gradient = if level { [-normal.x / normal.z, -normal.y / normal.z] } else { [0.0; 2] };
         let Rest { gradient, uphill, lift, bend, bend_within } = Rest::on_plane(gradient, profile);
         let lift = if level { lift } else { f64::INFINITY };
-        Self { a, gradient, uphill, carries, lift, b, c, bend, bend_within }
+        Self { a, gradient, uphill, carries, turned, lift, b, c, bend, bend_within }
     }
 
     fn corners(&self) -> [&Point3; 3] {
@@ -392,9 +389,9 @@ impl Facet {
         best
     }
 
-    /// The part of the facet which is that part of its triangle in the mesh, which has that normal.
-    pub(super) fn part(normal: &Vector3, feature: Feature) -> Feature {
-        if turned(normal) { turned_feature(feature) } else { feature }
+    /// The part of the facet which is that part of its triangle in the mesh.
+    pub(super) fn part(&self, feature: Feature) -> Feature {
+        if self.turned { turned_feature(feature) } else { feature }
     }
 
     /// Rests the cutter on one side or corner alone, whichever place of the triangle is best; answers
@@ -482,13 +479,13 @@ impl Facet {
     }
 
     /// The place of contact: the point, its barycentric coordinates and its feature, these in the
-    /// mesh's order of corners. `normal` is the triangle's.
-    pub(super) fn contact(&self, touch: &Touch, normal: &Vector3, x: f64, y: f64) -> Contact {
+    /// mesh's order of corners.
+    pub(super) fn contact(&self, touch: &Touch, x: f64, y: f64) -> Contact {
         let mut barycentric = self.weights(touch, x, y);
         let corners = self.corners();
         let point = Point3::from((0..3).map(|k| corners[k].coords * barycentric[k]).sum::<Vector3>());
         let mut feature = touch.feature;
-        if turned(normal) {
+        if self.turned {
             barycentric.swap(1, 2);
             feature = turned_feature(feature);
         }

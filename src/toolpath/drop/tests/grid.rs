@@ -86,6 +86,38 @@ fn no_contact_lies_outside_its_domain() {
     }
 }
 
+/// On smooth ground a ball touches each part of a triangle with every normal between those of its
+/// faces: the domains reach to the ends of that, so a domain narrower by 1 µm fails.
+#[test]
+fn domains_reach_to_the_normals_of_all_faces_around() {
+    let ball = Cutter::ball(6.0).unwrap();
+    let profile = Profile::of(&ball, 0.0);
+    for (name, mesh) in meshes().into_iter().take(5) {
+        let domains = domain::domains(&mesh, &profile);
+        let tip = |p: &Point3, n: &Vector3| p + (n - Vector3::z()) * ball.radius();
+        let mut around = vec![Vec::new(); mesh.vertices().len()];
+        for (t, face) in mesh.triangles().iter().enumerate() {
+            face.iter().for_each(|&v| around[v as usize].push(mesh.normal(t)));
+        }
+        for (t, domain) in domains.iter().enumerate() {
+            let (corners, normal) = (mesh.corners(t), mesh.normal(t));
+            let face = domain.face.unwrap();
+            assert!(corners.iter().all(|p| face.holds(&tip(p, &normal))), "{name}: face {t}");
+            for k in 0..3 {
+                let across = mesh.neighbour(t, k).map(|n| mesh.normal(n));
+                let ends = [corners[k], corners[(k + 1) % 3]];
+                for n in across.into_iter().chain([normal]) {
+                    let reached = |side: Extent| ends.iter().all(|p| side.holds(&tip(p, &n)));
+                    assert!(domain.sides[k].is_none_or(reached), "{name}: side {k} of {t}");
+                }
+                let normals = &around[mesh.triangles()[t][k] as usize];
+                let reached = |corner: Extent| normals.iter().all(|n| corner.holds(&tip(&corners[k], n)));
+                assert!(domain.corners[k].is_none_or(reached), "{name}: corner {k} of {t}");
+            }
+        }
+    }
+}
+
 #[test]
 fn grids_are_single_drops() {
     for (name, mesh) in meshes() {
