@@ -17,7 +17,7 @@ mod zigzag;
 
 pub use arc::{ARC_SHARE, Arc, ArcError, Plane};
 pub use chord::distance_to_segment;
-pub use drop::{Drop, DropCutter};
+pub use drop::{Drop, DropCutter, GridDrop, PlanGrid};
 pub use path::{CcPoint, ClPoint, Move, MoveKind, Toolpath};
 pub use plan::{Along, FeedDirection, Plan, PlanError, PlanSettings, Step, Strategy, plan};
 pub use strip::{ball_scallop_height, strip_width, strip_width_at};

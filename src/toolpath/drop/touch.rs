@@ -65,10 +65,52 @@ impl Profile {
         self.shape.height(rho2.sqrt())
     }
 
+    /// Whether the profile has no corner, up to the largest radius where it is vertical.
+    pub(super) fn is_smooth(&self) -> bool {
+        self.plain && self.corner > 0.0 && self.cone.is_infinite()
+    }
+
+    /// Whether a plane with that sine of its slope is as steep as the cone or steeper.
+    fn on_cone(&self, sine: f64) -> bool {
+        self.cone.is_finite() && sine >= self.cone / self.cone.hypot(1.0)
+    }
+
+    /// Whether planes up to that sine of their slope touch disc and arc only, where the contact's offset
+    /// is the sum of the disc's rim and of the lean.
+    pub(super) fn is_sum(&self, sine: f64) -> bool {
+        self.plain && !self.on_cone(sine)
+    }
+
+    /// Least distance from the axis at which the profile touches a plane with that sine `> 0` of its
+    /// slope.
+    pub(super) fn least_reach(&self, sine: f64) -> f64 {
+        match (self.plain, self.on_cone(sine)) {
+            (false, _) => self.shape.reaches(sine)[0],
+            (true, true) => self.arc_end,
+            (true, false) => self.flat + self.corner * sine,
+        }
+    }
+
+    /// Greatest distance from the axis at which the profile touches a plane with that sine of its
+    /// slope.
+    pub(super) fn greatest_reach(&self, sine: f64) -> f64 {
+        match (self.plain, self.on_cone(sine)) {
+            (false, _) => self.shape.reaches(sine)[1],
+            (true, true) => self.radius,
+            (true, false) => self.flat + self.corner * sine,
+        }
+    }
+
     /// How far from the axis the profile is as steep as `slope >= 0`: where a plane of that slope
     /// touches it.
     fn reach(&self, slope: f64, sine: f64) -> f64 {
-        if slope > self.cone { self.radius } else { self.shape.reach(sine) }
+        if slope <= LEVEL {
+            0.0
+        } else if slope > self.cone {
+            self.radius
+        } else {
+            self.shape.reach(sine)
+        }
     }
 
     /// How strictly the profile bends where it touches a plane of that slope: `(κ, s)` such that
@@ -172,8 +214,8 @@ fn torus_along_line(e: f64, r: f64, h: f64, s: f64) -> f64 {
 pub(super) struct Rest {
     /// ∂z/∂x and ∂z/∂y of the plane.
     pub(super) gradient: [f64; 2],
-    /// From the axis to where the profile touches the plane.
-    pub(super) shift: [f64; 2],
+    /// From the axis to where the profile touches the plane, as a multiple of `gradient`.
+    pub(super) uphill: f64,
     /// Tip height, less the plane's height at the axis.
     pub(super) lift: f64,
     /// See [`Profile::bend`].
@@ -183,19 +225,18 @@ pub(super) struct Rest {
 }
 
 impl Rest {
+    /// From the axis to where the profile touches the plane.
+    pub(super) fn shift(&self) -> [f64; 2] {
+        self.gradient.map(|g| g * self.uphill)
+    }
+
     /// Rests the profile on the plane that climbs by `gradient`.
     pub(super) fn on_plane(gradient: [f64; 2], profile: &Profile) -> Self {
         let slope = gradient[0].hypot(gradient[1]);
         let reach = profile.reach(slope, slope / slope.hypot(1.0));
-        let uphill = if slope > 0.0 { reach / slope } else { 0.0 };
+        let uphill = if reach > 0.0 { reach / slope } else { 0.0 };
         let (bend, bend_within) = profile.bend(slope, reach);
-        Self {
-            gradient,
-            shift: gradient.map(|g| g * uphill),
-            lift: slope * reach - profile.height(reach),
-            bend,
-            bend_within,
-        }
+        Self { gradient, uphill, lift: slope * reach - profile.height(reach), bend, bend_within }
     }
 }
 
@@ -214,15 +255,38 @@ pub(super) struct Facet {
     /// First corner.
     a: Point3,
     gradient: [f64; 2],
-    shift: [f64; 2],
+    /// From the axis to where the profile touches the plane, as a multiple of `gradient`.
+    uphill: f64,
+    carries: Carries,
+    /// Whether the last two corners are the other way round than in the mesh.
+    turned: bool,
     /// As in [`Rest`]; infinite where the triangle is vertical.
     lift: f64,
-    /// Second corner: counter-clockwise in the plan view, unlike the mesh's where [`turned`].
+    /// Second corner: counter-clockwise in the plan view, unlike the mesh's where `turned`.
     b: Point3,
     /// Third corner.
     c: Point3,
     bend: f64,
     bend_within: f64,
+}
+
+/// Sides and corners of a triangle on which the cutter is to be rested. A side that two triangles
+/// share and a corner that many share need to be looked at with one of them only.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Carries {
+    /// Side `k` runs from corner `k` to corner `k + 1`; with its ends.
+    pub(super) sides: [bool; 3],
+    pub(super) corners: [bool; 3],
+}
+
+impl Carries {
+    pub(super) const ALL: Self = Self { sides: [true; 3], corners: [true; 3] };
+
+    /// For the last two corners the other way round.
+    fn turned(&self) -> Self {
+        let ([p, q, r], [a, b, c]) = (self.sides, self.corners);
+        Self { sides: [r, q, p], corners: [a, c, b] }
+    }
 }
 
 /// Where a cutter rests on one triangle.
@@ -236,34 +300,55 @@ pub(super) struct Touch {
     along: f64,
 }
 
+/// A slope up to this counts as level: a flat end touches it below its axis, rather than at a place on
+/// its rim which rounding has chosen. Greater would lower the tip by more than rounding.
+pub(super) const LEVEL: f64 = 1e-13;
+
 /// A triangle counts as vertical where its plan view is less than this share of its area: then its
 /// slope is rounding. Its sides still carry the cutter.
 const VERTICAL: f64 = 1e-14;
 
-/// Whether a facet has its last two corners the other way round than its triangle in the mesh,
-/// which has that unit normal.
-fn turned(normal: &Vector3) -> bool {
-    normal.z <= -VERTICAL
+/// A part of a triangle in the other order of corners: a facet's in the mesh's, and the reverse.
+fn turned_feature(feature: Feature) -> Feature {
+    match feature {
+        Feature::Face => Feature::Face,
+        Feature::Side(k) => Feature::Side(2 - k),
+        Feature::Corner(k) => Feature::Corner((3 - k) % 3),
+    }
 }
 
 impl Facet {
-    /// Prepares a triangle, given by its corners and its unit normal.
-    pub(super) fn new([a, mut b, mut c]: [Point3; 3], normal: &Vector3, profile: &Profile) -> Self {
-        if turned(normal) {
+    /// Prepares a triangle, given by its corners and its unit normal, and which of its sides and
+    /// corners [`Facet::touch`] is to look at.
+    pub(super) fn new(
+        [a, mut b, mut c]: [Point3; 3],
+        normal: &Vector3,
+        mut carries: Carries,
+        profile: &Profile,
+    ) -> Self {
+        let turned = normal.z <= -VERTICAL;
+        if turned {
             std::mem::swap(&mut b, &mut c);
+            carries = carries.turned();
         }
         let level = normal.z.abs() >= VERTICAL;
         let gradient = if level { [-normal.x / normal.z, -normal.y / normal.z] } else { [0.0; 2] };
-        let Rest { gradient, shift, lift, bend, bend_within } = Rest::on_plane(gradient, profile);
+        let Rest { gradient, uphill, lift, bend, bend_within } = Rest::on_plane(gradient, profile);
         let lift = if level { lift } else { f64::INFINITY };
-        Self { a, gradient, shift, lift, b, c, bend, bend_within }
+        Self { a, gradient, uphill, carries, turned, lift, b, c, bend, bend_within }
     }
 
     fn corners(&self) -> [&Point3; 3] {
         [&self.a, &self.b, &self.c]
     }
 
-    /// Rests the cutter on this triangle alone; `None` where it passes by or where the tip would
+    /// Where the cutter touches the triangle's plane.
+    fn place(&self, x: f64, y: f64) -> [f64; 2] {
+        [x + self.gradient[0] * self.uphill, y + self.gradient[1] * self.uphill]
+    }
+
+    /// Rests the cutter on this triangle alone, on its face, the sides and the corners that are to be
+    /// looked at; `None` where it passes by or where the tip would
     /// not come above `floor`.
     #[inline]
     pub(super) fn touch(&self, profile: &Profile, x: f64, y: f64, floor: f64) -> Option<Touch> {
@@ -278,7 +363,7 @@ impl Facet {
         if self.lift == f64::INFINITY {
             return self.touch_sides([true; 3], profile, x, y, floor);
         }
-        let at = [x + self.shift[0], y + self.shift[1]];
+        let at = self.place(x, y);
         let beyond = [0, 1, 2].map(|k| Side::of(self.corners(), k).area_beyond(at));
         let outside = beyond.map(|area| area > 0.0);
         if outside == [false; 3] {
@@ -294,14 +379,97 @@ impl Facet {
         self.touch_sides(outside, profile, x, y, floor)
     }
 
-    /// Rests the cutter on some of the sides.
+    /// Rests the cutter on some of the sides, one of which is known to hold the best place of the
+    /// triangle, and on their corners.
     fn touch_sides(&self, sides: [bool; 3], profile: &Profile, x: f64, y: f64, floor: f64) -> Option<Touch> {
         let mut best: Option<Touch> = None;
-        for k in (0..3).filter(|&k| sides[k]) {
+        for k in 0..3 {
             let least = best.map_or(floor, |b| b.tip_z);
-            best = Side::of(self.corners(), k).touch(k, profile, x, y, least).or(best);
+            let looked_at = sides[k] && self.carries.sides[k];
+            if looked_at {
+                best = Side::of(self.corners(), k).touch(k, profile, x, y, least).or(best);
+            }
+            // The corner between this side and the last, unless it was looked at as an end.
+            let last = (k + 2) % 3;
+            if self.carries.corners[k]
+                && (sides[k] || sides[last])
+                && !looked_at
+                && !(sides[last] && self.carries.sides[last])
+            {
+                best = self.touch_corner(k, profile, x, y, least).or(best);
+            }
         }
         best
+    }
+
+    /// The part of the facet which is that part of its triangle in the mesh.
+    pub(super) fn part(&self, feature: Feature) -> Feature {
+        if self.turned { turned_feature(feature) } else { feature }
+    }
+
+    /// Rests the cutter on one side or corner alone, whichever place of the triangle is best; answers
+    /// the height of the tip if that comes above `floor`.
+    pub(super) fn touch_part(
+        &self,
+        part: Feature,
+        profile: &Profile,
+        x: f64,
+        y: f64,
+        floor: f64,
+    ) -> Option<f64> {
+        let touch = match part {
+            Feature::Side(k) => Side::of(self.corners(), k).touch(k, profile, x, y, floor),
+            Feature::Corner(k) => self.touch_corner(k, profile, x, y, floor),
+            Feature::Face => None,
+        };
+        touch.map(|t| t.tip_z)
+    }
+
+    /// The height of the tip at `(x[i], y)` while resting on the whole plane of the face: nothing in
+    /// that plane lifts it higher.
+    #[inline(always)]
+    pub(super) fn peaks<const N: usize>(&self, x: &[f64; N], y: f64) -> [f64; N] {
+        let (height, climb) = (self.a.z + self.lift, self.gradient[1] * (y - self.a.y));
+        x.map(|x| height + (self.gradient[0] * (x - self.a.x) + climb))
+    }
+
+    /// Rests the cutter on the face alone at the places `(x[i], y)`: where that lifts the tip above
+    /// `tips[i]`, it becomes that, and `slots[i]` becomes `slot`.
+    #[inline(always)]
+    pub(super) fn raise_by_face<const N: usize>(
+        &self,
+        x: &[f64; N],
+        y: f64,
+        slot: u32,
+        tips: &mut [f64; N],
+        slots: &mut [u32; N],
+    ) -> bool {
+        let sides = [0, 1, 2].map(|k| Side::of(self.corners(), k));
+        let shift = self.gradient.map(|g| g * self.uphill);
+        let peaks = self.peaks(x, y);
+        let beyond = [0, 1, 2].map(|k| sides[k].along[0] * (y + shift[1] - sides[k].from.y));
+        let mut raised = false;
+        // Without branches, so that several places are worked out at once.
+        for i in 0..N {
+            let (peak, at) = (peaks[i], x[i] + shift[0]);
+            let area = |k: usize| sides[k].along[1] * (at - sides[k].from.x) - beyond[k];
+            let better = (area(0) <= 0.0) & (area(1) <= 0.0) & (area(2) <= 0.0) & (peak > tips[i]);
+            tips[i] = if better { peak } else { tips[i] };
+            slots[i] = if better { slot } else { slots[i] };
+            raised |= better;
+        }
+        raised
+    }
+
+    /// Rests the cutter on one corner.
+    fn touch_corner(&self, k: usize, profile: &Profile, x: f64, y: f64, floor: f64) -> Option<Touch> {
+        let p = self.corners()[k];
+        let rho2 = (p.x - x) * (p.x - x) + (p.y - y) * (p.y - y);
+        if rho2 > profile.radius * profile.radius || p.z - profile.height(0.0) <= floor {
+            return None;
+        }
+        let tip_z = p.z - profile.height_squared(rho2);
+        (tip_z > floor).then_some(Touch { tip_z, feature: Feature::Corner(k), along: 0.0 })
     }
 
     /// Barycentric coordinates of the place of contact of a cutter at `(x, y)`, in the facet's
@@ -314,7 +482,7 @@ impl Facet {
                 (weights[k], weights[(k + 1) % 3]) = (1.0 - touch.along, touch.along);
             }
             Feature::Face => {
-                let at = [x + self.shift[0], y + self.shift[1]];
+                let at = self.place(x, y);
                 let areas = [1, 2, 0].map(|k| -Side::of(self.corners(), k).area_beyond(at));
                 let sum: f64 = areas.iter().sum();
                 weights = areas.map(|w| w / sum);
@@ -324,19 +492,15 @@ impl Facet {
     }
 
     /// The place of contact: the point, its barycentric coordinates and its feature, these in the
-    /// mesh's order of corners. `normal` is the triangle's.
-    pub(super) fn contact(&self, touch: &Touch, normal: &Vector3, x: f64, y: f64) -> Contact {
+    /// mesh's order of corners.
+    pub(super) fn contact(&self, touch: &Touch, x: f64, y: f64) -> Contact {
         let mut barycentric = self.weights(touch, x, y);
         let corners = self.corners();
         let point = Point3::from((0..3).map(|k| corners[k].coords * barycentric[k]).sum::<Vector3>());
         let mut feature = touch.feature;
-        if turned(normal) {
+        if self.turned {
             barycentric.swap(1, 2);
-            feature = match feature {
-                Feature::Face => Feature::Face,
-                Feature::Side(k) => Feature::Side(2 - k),
-                Feature::Corner(k) => Feature::Corner((3 - k) % 3),
-            };
+            feature = turned_feature(feature);
         }
         Contact { point, barycentric, feature }
     }
