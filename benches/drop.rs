@@ -6,7 +6,7 @@ use divan::counter::ItemsCount;
 use millstream::cutter::Cutter;
 use millstream::geometry::{AnalyticShape, AnalyticSurface, Point3, TriangleMesh};
 use millstream::part::{Part, Patch, default_tessellation_tolerance};
-use millstream::toolpath::DropCutter;
+use millstream::toolpath::{DropCutter, PlanGrid};
 
 fn main() {
     divan::main();
@@ -75,6 +75,27 @@ fn mesh_scattered(bencher: Bencher, cutter: &str) {
 #[divan::bench(args = ["ball", "flat", "bull", "taper"], sample_count = 10)]
 fn mesh_along_passes(bencher: Bencher, cutter: &str) {
     run(bencher, &wavy(), &named(cutter), &along_passes());
+}
+
+/// A million points.
+#[divan::bench(args = ["ball", "flat", "bull", "taper"], sample_count = 5)]
+fn mesh_grid(bencher: Bencher, cutter: &str) {
+    /// Points a side.
+    const SIDE: usize = 1000;
+    let part = wavy();
+    let drops = DropCutter::new(&part, &named(cutter));
+    let step = SIZE / SIDE as f64;
+    let grid = PlanGrid::new([0.5 * step; 2], [step; 2], [SIDE; 2]).expect("a grid");
+    bencher.counter(ItemsCount::new(SIDE * SIDE)).bench_local(|| drops.over_grid(&grid));
+}
+
+/// The preparation, in triangles.
+#[divan::bench(args = ["ball", "flat", "bull", "taper"], sample_count = 5)]
+fn mesh_prepare(bencher: Bencher, cutter: &str) {
+    let (part, cutter) = (wavy(), named(cutter));
+    bencher
+        .counter(ItemsCount::new(part.mesh().triangles().len()))
+        .bench_local(|| DropCutter::new(&part, &cutter));
 }
 
 #[divan::bench(args = ["ball", "flat", "bull", "taper"], sample_count = 10)]

@@ -18,10 +18,11 @@ use crate::parallel;
 use crate::part::Part;
 use crate::report::{
     HIGHEST_RIDGE, Histogram, MAX_TRIANGLES, MapSize, MapWords, Picture, RunReport, SimulationFigures,
-    SurfaceMeshFigures, ToolpathPage, ToolpathResult, Verdict, deviation_colours, deviation_picture,
-    height_picture, html_page, marks, rapid_violation, result_table, surface_mesh, violations,
+    SurfaceMeshFigures, ToolpathPage, ToolpathResult, Verdict, collision, deviation_colours,
+    deviation_picture, height_picture, holder_note, html_page, marks, rapid_violation, result_table,
+    surface_mesh, violations,
 };
-use crate::sim::{Grid, GridError, ZMap, cut, cut_in_order, cut_reference};
+use crate::sim::{Grid, GridError, ZMap, cut, cut_in_order, cut_reference, holder_collisions};
 use crate::toolpath::{Plan, PlanSettings, Toolpath, plan};
 
 /// Bytes a cell that a run takes at its peak: stock and winning moves 8, deviations 12, ridges 16 where
@@ -251,6 +252,8 @@ impl<'a> Job<'a> {
         }
         let mut measured =
             measure(&self.part, &scene.cutter, &planned.path, &cut, &scene.tolerance, monitor)?;
+        let check = |holder| holder_collisions(&cut, holder, &planned.path, monitor);
+        let held = scene.holder.as_ref().map(check).transpose()?;
         let simulation = SimulationFigures {
             engine: scene.simulation.engine.name(),
             cell_mm: grid.cell,
@@ -273,7 +276,15 @@ impl<'a> Job<'a> {
         for contact in removal.iter_mut().flat_map(|removal| &mut removal.rapid_contacts) {
             contact.line = lines.get(contact.move_index as usize).copied().unwrap_or_default();
         }
-        Ok((self.result(request, &planned, note, measured, removal, simulation, surface_mesh), page))
+        let mut result = self.result(request, &planned, note, measured, removal, simulation, surface_mesh);
+        if let Some(held) = held {
+            result.notes.push(holder_note(&held));
+            if let Some(violation) = collision(&held, &lines) {
+                result.violations.insert(0, violation);
+                result.verdict = Verdict::Fail;
+            }
+        }
+        Ok((result, page))
     }
 
     fn result(
@@ -452,6 +463,56 @@ mod tests {
         let error = (measured["max_mm"].as_f64().unwrap() - closed_form).abs();
         assert!(error <= measured["error_bound_mm"].as_f64().unwrap() + 1e-9, "{error}");
         assert!(std::fs::read_to_string(out.join("report.html")).unwrap().contains("PASS"));
+    }
+
+    #[test]
+    fn a_holder_that_meets_the_slope_is_a_collision() {
+        let home = tempfile::tempdir().unwrap();
+        let report = |name: &str, holder: &str| -> serde_json::Value {
+            let scene = PLATE.replace("\"plane\"", "\"inclined_plane\"\nangle = 30");
+            let folder = home.path().join(name);
+            std::fs::create_dir(&folder).unwrap();
+            let options = options(&folder, &format!("{scene}{holder}"), 2);
+            run(&options, &Progress::quiet()).unwrap();
+            serde_json::from_str(&std::fs::read_to_string(options.out.unwrap().join("report.json")).unwrap())
+                .unwrap()
+        };
+        // The slope rises by 4.6 mm: over its foot a holder 3 mm above the tip stands in its head.
+        let wide = "[holder]\ncutting_length = 3\n[[holder.section]]\ndiameter = 40\nlength = 30\n";
+        let hit = report("wide", wide);
+        let violation = &hit["toolpaths"][0]["violations"][0];
+        assert_eq!(
+            (&violation["what"], &hit["toolpaths"][0]["verdict"]),
+            (&"collision".into(), &"fail".into())
+        );
+        let depth = violation["measured_mm"].as_f64().unwrap();
+        assert!(depth > 0.5 && depth < 8.0 * 30f64.to_radians().tan() - 3.0 + 1.0, "{depth}");
+        assert!(violation["text"].as_str().unwrap().contains("toolpath.nc line "), "{violation}");
+        let clear = report("slim", &wide.replace("= 3\n", "= 12\n"));
+        let notes = clear["toolpaths"][0]["notes"].to_string();
+        assert!(notes.contains("above the finished stock"), "{notes}");
+        let collides = |v: &serde_json::Value| v["what"] == "collision";
+        assert!(!clear["toolpaths"][0]["violations"].as_array().unwrap().iter().any(collides));
+    }
+
+    #[test]
+    fn a_ball_by_its_seven_words_measures_as_a_ball() {
+        let home = tempfile::tempdir().unwrap();
+        let scallop = |name: &str, cutter: &str| {
+            let folder = home.path().join(name);
+            std::fs::create_dir(&folder).unwrap();
+            let options = options(&folder, &PLATE.replace("\"ball\"\ndiameter = 6", cutter), 1);
+            run(&options, &Progress::quiet()).unwrap();
+            let json = std::fs::read_to_string(options.out.unwrap().join("report.json")).unwrap();
+            let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+            json["toolpaths"][0]["scallop"]["max_mm"].as_f64().unwrap()
+        };
+        let ball = scallop("ball", "\"ball\"\ndiameter = 6");
+        let words = scallop("words", "\"apt\"\ndiameter = 6\ncorner_radius = 3\nlength = 10");
+        assert!((ball - words).abs() < 1e-12, "{ball} {words}");
+        // A point of 20 degrees leaves grooves of half the stepover times its tangent.
+        let point = scallop("point", "\"apt\"\ndiameter = 6\ntip_angle = 20\nlength = 10");
+        assert!((point - 0.25 * 20f64.to_radians().tan()).abs() < 1e-9, "{point}");
     }
 
     #[test]

@@ -1,6 +1,12 @@
-//! The cutter as a rotating profile. Knows nothing of parts.
+//! The cutter as a rotating profile, and what holds it. Knows nothing of parts.
 
+mod apt;
 mod contact;
+mod holder;
 mod profile;
+mod shape;
 
-pub use profile::{Cutter, CutterError, CutterShape};
+pub use apt::{AptError, AptWord, AptWords};
+pub use holder::{Holder, HolderError, HolderSection};
+pub use profile::{Incline, Profile};
+pub use shape::{Cutter, CutterError, CutterShape};

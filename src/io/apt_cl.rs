@@ -46,23 +46,27 @@ fn location(tip: Point3) -> String {
     format!("{},{},{}", number(tip.x), number(tip.y), number(tip.z))
 }
 
-/// `d,r`, and for a taper all seven: d, r, e, f, α, β, h. There d is twice the distance from the axis at
-/// which the side, carried on, meets the plane of the tip, (e, f) the centre of the corner's circle, α the
-/// angle of the bottom, β that between side and axis, h the height of the cutter.
+/// `d,r` for ball, flat and bull nose, else all seven words: d, r, e, f, α, β, h. There d is twice the
+/// distance from the axis at which bottom and side, carried on, cross, (e, f) the centre of the corner's
+/// circle, α the angle of the bottom, β that between side and axis, h the height of the cutter.
 fn cutter_words(cutter: &Cutter) -> String {
-    let (e, r) = (cutter.flat_radius(), cutter.corner_radius());
-    if cutter.shape() != CutterShape::Taper {
-        return format!("{},{}", number(2.0 * cutter.radius()), number(r));
+    let w = cutter.words();
+    match cutter.shape() {
+        CutterShape::Ball | CutterShape::Flat | CutterShape::Bull => {
+            format!("{},{}", number(w.diameter), number(w.corner_radius))
+        }
+        CutterShape::Taper | CutterShape::Apt => {
+            let (tip, side) = (w.tip_angle.to_degrees(), w.side_angle.to_degrees());
+            let words = [w.diameter, w.corner_radius, w.corner_x, w.corner_z, tip, side, w.length];
+            words.map(number).join(",")
+        }
     }
-    let side = cutter.half_angle();
-    let foot = e + r * (1.0 / side.cos() - side.tan());
-    let words = [2.0 * foot, r, e, r, 0.0, side.to_degrees(), cutter.side_height()];
-    words.map(number).join(",")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cutter::AptWords;
     use crate::io::program_text::tests::{example, random};
 
     fn text(path: &Toolpath, cutter: &Cutter, header: &ProgramHeader) -> String {
@@ -106,6 +110,28 @@ FINI
         let height = 0.5 + (3.0 - 0.75f64.sqrt()) * 3f64.sqrt();
         let expected = format!("{},1.0,0.0,1.0,0.0,30.0,{}", number(2.0 * foot), number(height));
         assert_eq!(cutter_words(&cutter), expected);
+    }
+
+    /// What is written makes the same cutter again, within its four decimals.
+    #[test]
+    fn seven_words_can_be_read_back() {
+        for words in AptWords::examples() {
+            let cutter = Cutter::apt(&words).unwrap();
+            let text = cutter_words(&cutter);
+            let read: Vec<f64> = text.split(',').map(|word| word.parse().unwrap()).collect();
+            let [diameter, corner_radius, corner_x, corner_z, tip, side, length] = read[..] else {
+                panic!("{text}")
+            };
+            let (tip_angle, side_angle) = (tip.to_radians(), side.to_radians());
+            let read =
+                AptWords { diameter, corner_radius, corner_x, corner_z, tip_angle, side_angle, length };
+            let again = Cutter::apt(&read).unwrap();
+            for k in 0..100 {
+                let rho = cutter.radius() * (f64::from(k) / 100.0);
+                let (a, b) = (again.height(rho).unwrap(), cutter.height(rho).unwrap());
+                assert!((a - b).abs() < 2e-3, "{text} at {rho}: {a} {b}");
+            }
+        }
     }
 
     #[test]

@@ -53,6 +53,12 @@ pub(super) fn describe(cutter: &Cutter) -> String {
             let tip = number(2.0 * (cutter.flat_radius() + cutter.corner_radius()));
             format!("TAPER TIP D={tip} R={corner} HALF ANGLE={angle} SHANK D={diameter}")
         }
+        CutterShape::Apt => {
+            let w = cutter.words();
+            let [d, e, f, length] = [w.diameter, w.corner_x, w.corner_z, w.length].map(number);
+            let [tip, side] = [w.tip_angle, w.side_angle].map(|angle| number(angle.to_degrees()));
+            format!("APT D={d} R={corner} E={e} F={f} A={tip} B={side} H={length}")
+        }
     }
 }
 

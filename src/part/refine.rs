@@ -5,20 +5,35 @@ use super::Patch;
 use super::patch::normal_of;
 use crate::geometry::{AnalyticSurface, Jet2, NurbsSurface, Point3, Vector3};
 
-/// Newton steps at most. Regular points take two to five; the rest is for starts beside poles and
-/// silhouettes, where steps are halved.
-const MAX_STEPS: usize = 60;
+/// Newton steps at most. Regular points take two to five; the rest is for starts beside poles,
+/// silhouettes and centres of curvature.
+const MAX_STEPS: usize = 100;
 
 /// Halvings of one step at most: 2⁻³⁰ of a step is no step.
-const MAX_HALVINGS: usize = 30;
+const MAX_HALVINGS: i32 = 30;
 
-/// Below this length, mm, a Newton step toward a foot is taken without asking whether the distance
-/// fell: that close to its minimum the distance no longer resolves the place.
-const TRUSTED_STEP: f64 = 1.0e-6;
+/// Stretches of one step to four times its length at most: a step of a nanometre becomes one of
+/// centimetres.
+const MAX_STRETCHES: i32 = 12;
+
+/// Two squared distances closer than this share of their rounding are the same: which of two feet is
+/// nearer is then told by how upright they stand. A smaller share takes rounding for a fall or a rise,
+/// and ends the search for a foot early; a larger one lets the distance rise by as much.
+const UNRESOLVED: f64 = 16.0 * f64::EPSILON;
 
 /// Steps shorter than this end the search for a foot, mm; far out the rounding of coordinates is
 /// added.
 const SETTLED: f64 = 1.0e-13;
+
+/// Bends of the squared distance below this, relative to that over a plane, count as no more than
+/// this: a smaller value sends steps far off where the bend is rounding, a larger one shortens steps
+/// beside centres of curvature and so the way that can be made there.
+const LEAST_BEND: f64 = 1.0e-7;
+
+/// Where distances are the same, a step must leave less than this share of what there was to gain: near 1
+/// the search walks about among rounding until its steps are used up, below 0.45 it refuses the
+/// slowest steps that still lead somewhere (beside a cusp Newton's leave 0.3 to 0.44).
+const PROGRESS: f64 = 0.6;
 
 /// A determinant below this share of its factors counts as singular.
 const SINGULAR: f64 = 1.0e-10;
@@ -44,6 +59,9 @@ pub(super) struct Foot {
 /// Descends from `start` to a foot of the perpendicular from `q`: a parameter at which `S − q` is
 /// perpendicular to the surface, or would be but for the border. The distance never rises above
 /// that of the start by more than rounding.
+///
+/// Near a foot the squared distance is flat, near a centre of curvature over a wide stretch: steps
+/// there change it by less than its rounding, and are judged by what is left of the gradient.
 pub(super) fn foot(patch: &Patch, q: &Point3, start: [f64; 2]) -> Foot {
     let domain = patch.domain();
     let mut at = clamp(&domain, start);
@@ -61,45 +79,82 @@ pub(super) fn foot(patch: &Patch, q: &Point3, start: [f64; 2]) -> Foot {
         if length <= SETTLED + f64::EPSILON * jet.p.coords.amax() {
             break;
         }
-        let mut accepted = None;
-        let mut share = 1.0;
-        for _ in 0..MAX_HALVINGS {
+        // Longer steps only where shorter ones gain nothing: past a place where a valley is all but level.
+        let shares =
+            (0..MAX_HALVINGS).map(|k| 0.5f64.powi(k)).chain((1..=MAX_STRETCHES).map(|k| 4f64.powi(k)));
+        let mut tried = shares.map(|share| {
             let next = clamp(&domain, [at[0] + share * step[0], at[1] + share * step[1]]);
-            let candidate = patch.jet(next[0], next[1]);
-            if length <= TRUSTED_STEP || (candidate.p - q).norm_squared() < r.norm_squared() {
-                accepted = Some((next, candidate));
-                break;
-            }
-            share *= 0.5;
-        }
+            (next, patch.jet(next[0], next[1]))
+        });
+        let accepted = tried.find(|(_, candidate)| nearer(candidate, &jet, q, step, held));
         let Some((next, candidate)) = accepted else { break };
         (at, jet) = (next, candidate);
     }
     Foot { at, jet, distance: (jet.p - q).norm(), held }
 }
 
-/// The step to the minimum of ½|S − q|², by its Hessian where that has a minimum, else by the
-/// first fundamental form, which always points downhill.
+/// True when `candidate` is nearer to `q` than `jet` is or, where the two distances are the same, when
+/// less is left to gain there than from `jet` by Newton's `step`. What is left to gain is measured by
+/// one Hessian for both (the natural test of Deuflhard, *Newton Methods for Nonlinear Problems*, 2004):
+/// lengths of the gradients alone would forbid all but the shortest steps along a bent valley.
+fn nearer(candidate: &Jet2, jet: &Jet2, q: &Point3, step: [f64; 2], held: [bool; 2]) -> bool {
+    let [now, before] = [candidate, jet].map(|j| (j.p - q).norm_squared());
+    // The difference of coordinates is no better than these are.
+    let rounding = UNRESOLVED * (before + before.sqrt() * (q.coords.amax() + jet.p.coords.amax()));
+    if (now - before).abs() > rounding {
+        return now < before;
+    }
+    let (r, r_now) = (jet.p - q, candidate.p - q);
+    let gradient = |j: &Jet2, r: &Vector3| [r.dot(&j.du), r.dot(&j.dv)];
+    let (g, g_now) = (gradient(jet, &r), gradient(candidate, &r_now));
+    let left = foot_step(jet, &r, g_now, held);
+    let lean = |j: &Jet2, g: [f64; 2]| {
+        let along = |k: usize, d: &Vector3| if held[k] { 0.0 } else { g[k] * g[k] / d.norm_squared() };
+        along(0, &j.du) + along(1, &j.dv)
+    };
+    let gain = |g: [f64; 2], step: [f64; 2]| (g[0] * step[0] + g[1] * step[1]).abs();
+    lean(candidate, g_now) < PROGRESS * lean(jet, g) || gain(g_now, left) < PROGRESS * gain(g, step)
+}
+
+/// The step to the minimum of ½|S − q|²: Newton's, where the Hessian has a minimum. Past a centre of
+/// curvature it has none: the step then goes downhill along each principal direction of the Hessian by
+/// the size of its bend, at most that over a plane (beside a pole of the parameters bends are
+/// rounding); by the first fundamental form alone it would creep.
 fn foot_step(jet: &Jet2, r: &Vector3, g: [f64; 2], held: [bool; 2]) -> [f64; 2] {
     let (e, f, gg) = jet.first_form();
     let [h00, h01, h11] = [e + r.dot(&jet.duu), f + r.dot(&jet.duv), gg + r.dot(&jet.dvv)];
-    let alone = |g: f64, newton: f64, metric: f64| match () {
-        () if newton > SINGULAR * metric => -g / newton,
-        () if metric > 0.0 => -g / metric,
-        () => 0.0,
+    let alone = |g: f64, bend: f64, metric: f64| {
+        if metric > 0.0 { -g / bend.abs().max(LEAST_BEND * metric) } else { 0.0 }
     };
     match held {
         [true, true] => [0.0, 0.0],
         [false, true] => [alone(g[0], h00, e), 0.0],
         [true, false] => [0.0, alone(g[1], h11, gg)],
         [false, false] => {
+            let area2 = e * gg - f * f;
             if h00 > 0.0 && h11 > 0.0 && h00 * h11 - h01 * h01 > SINGULAR * e * gg {
                 return solve(h00, h01, h01, h11, [-g[0], -g[1]]);
             }
-            if e * gg - f * f > SINGULAR * e * gg {
-                return solve(e, f, f, gg, [-g[0], -g[1]]);
+            if area2 <= SINGULAR * e * gg {
+                return [alone(g[0], e, e), alone(g[1], gg, gg)];
             }
-            [alone(g[0], 0.0, e), alone(g[1], 0.0, gg)]
+            // Orthonormal coordinates on the tangent plane: x = (√e u + f/√e v, √(area²/e) v).
+            let (a, b) = (e.sqrt(), (area2 / e).sqrt());
+            let c = f / a;
+            let [gx, gy] = [g[0] / a, (g[1] - c * g[0] / a) / b];
+            let hxx = h00 / e;
+            let hxy = (h01 - c * h00 / a) / (a * b);
+            let hyy = (h11 - 2.0 * c * h01 / a + c * c * h00 / e) / (b * b);
+            let (mean, half) = (0.5 * (hxx + hyy), 0.5 * (hxx - hyy));
+            let spread = half.hypot(hxy);
+            // Projector onto the direction of the greater eigenvalue.
+            let [pxx, pxy] = if spread > 0.0 { [half / spread, hxy / spread] } else { [1.0, 0.0] };
+            let greater = [0.5 * (gx + pxx * gx + pxy * gy), 0.5 * (gy + pxy * gx - pxx * gy)];
+            let bends = [mean + spread, mean - spread].map(|bend| bend.abs().clamp(LEAST_BEND, 1.0));
+            let step = |greater: f64, all: f64| -greater / bends[0] - (all - greater) / bends[1];
+            let (x, y) = (step(greater[0], gx), step(greater[1], gy));
+            let v = y / b;
+            [(x - c * v) / a, v]
         }
     }
 }

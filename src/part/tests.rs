@@ -163,6 +163,40 @@ proptest! {
     }
 }
 
+/// From beside a centre of curvature the distance to the surface is the same over a wide stretch; the
+/// foot still is where the line to it stands upright.
+#[test]
+fn feet_seen_from_centres_of_curvature_stand_upright() {
+    let mut compared = 0;
+    for seed in 0..40u32 {
+        let weights: Vec<f64> =
+            (0..42).map(|k| 0.4 + f64::from((seed * 97 + k * k * 31 + k * 7) % 64) / 30.0).collect();
+        let surface = samples::bicubic(&weights);
+        let part = nurbs_part(surface.clone(), 0.05);
+        for k in 0..24u32 {
+            let share = |n: u32| 0.08 + 0.84 * f64::from((k * n + seed * 5) % 29) / 28.0;
+            let at = PatchPoint { patch: 0, u: share(11), v: share(17) };
+            let Some(bend) = part.curvature(at) else { continue };
+            let (point, normal) = part.point_and_normal(at);
+            let sharpest = if bend.max.abs() > bend.min.abs() { bend.max } else { bend.min };
+            for off in [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9] {
+                let q = point + normal * ((1.0 - off) / sharpest);
+                let (foot, _) = part.closest_point(&q);
+                let at = foot.at.unwrap();
+                let jet = surface.jet(at.u, at.v);
+                for (d, t) in [(jet.du, at.u), (jet.dv, at.v)] {
+                    if t > 0.0 && t < 1.0 {
+                        compared += 1;
+                        let lean = (q - foot.point).dot(&d.normalize()).abs();
+                        assert!(lean < 1e-10, "{seed} {k} {off}: {lean:e}");
+                    }
+                }
+            }
+        }
+    }
+    assert!(compared > 10_000, "{compared}");
+}
+
 /// The grid gives what single lines give, on and off the part, for any number of threads.
 #[test]
 fn grids_agree_with_single_lines() {

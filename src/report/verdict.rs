@@ -10,6 +10,7 @@
 //!   best of plans.
 //! - gouge: the greatest depth stays within the gouge tolerance.
 //! - rapid: no rapid move touches stock, where the scene asks for what each move removes.
+//! - collision: shank and holder touch nothing that stands when all is cut.
 //! - uncut: no place stands higher than the uncut tolerance.
 
 use serde::Serialize;
@@ -17,6 +18,7 @@ use serde::Serialize;
 use super::map::MapMark;
 use super::table::{micrometres, with_bound};
 use crate::metrology::{Limits, Measurement, RemovalFigures};
+use crate::sim::HolderClearance;
 
 /// The highest ridge may exceed the scallop tolerance by this factor. Less fails plans for single
 /// points of a few per cent; more lets visible ridges pass.
@@ -45,7 +47,7 @@ impl Verdict {
 /// One tolerance that does not hold.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Violation {
-    /// `rapid`, `scallop`, `gouge` or `uncut`.
+    /// `collision`, `rapid`, `scallop`, `gouge` or `uncut`.
     pub what: &'static str,
     /// The limit that was exceeded.
     pub limit_mm: f64,
@@ -87,6 +89,44 @@ pub fn rapid_violation(removal: &RemovalFigures) -> Option<Violation> {
         n => text += &format!(", and {} more rapid moves do", n - 1),
     }
     Some(Violation { what: "rapid", limit_mm: 0.0, measured_mm: deepest, text })
+}
+
+/// The violation that shank or holder meet the stock; `lines` are those of the moves in the program.
+pub fn collision(holder: &HolderClearance, lines: &[u32]) -> Option<Violation> {
+    let worst = holder.collisions.iter().reduce(|a, b| if b.depth > a.depth { b } else { a })?;
+    let text = format!(
+        "section {} of the holder stands {:.3} ± {:.3} mm deep in the stock at {}, move {}, toolpath.nc line {}{}",
+        worst.section + 1,
+        worst.depth,
+        worst.error_bound,
+        place([worst.at.x, worst.at.y, worst.at.z]),
+        worst.move_index,
+        lines.get(worst.move_index as usize).copied().unwrap_or_default(),
+        match holder.collisions.len() {
+            1 => String::new(),
+            2 => ", and on one more move".to_owned(),
+            n => format!(", and on {} more moves", n - 1),
+        }
+    );
+    Some(Violation { what: "collision", limit_mm: 0.0, measured_mm: worst.depth, text })
+}
+
+/// What else is to be said about a holder that was checked.
+pub fn holder_note(holder: &HolderClearance) -> String {
+    let clearance = if holder.lowest == f64::INFINITY {
+        "shank and holder are never above the stock".to_owned()
+    } else if holder.lowest < 0.0 {
+        "shank and holder meet the stock; a longer cutter or a slimmer holder may clear it".to_owned()
+    } else {
+        format!(
+            "shank and holder stay {:.3} ± {:.3} mm above the finished stock",
+            holder.lowest, holder.error_bound
+        )
+    };
+    match holder.uncertain {
+        0 => clearance,
+        n => format!("{clearance}; on {n} moves only a finer cell can tell whether they touch it"),
+    }
 }
 
 fn gouge(measured: &Measurement, limits: &Limits) -> Option<Violation> {
@@ -185,6 +225,7 @@ mod tests {
     use super::super::fixture::{LIMITS, measurement};
     use super::*;
     use crate::metrology::UncutRegion;
+    use crate::sim::Collision;
 
     #[test]
     fn a_limit_is_violated_above_it_and_not_at_it() {
@@ -241,6 +282,29 @@ mod tests {
         let place =
             "0.250 mm deep, at x 1.000 y 2.000 z 3.000, move 7, toolpath.nc line 12, and 2 more rapid";
         assert!(found.text.contains(place), "{}", found.text);
+    }
+
+    #[test]
+    fn a_collision_names_section_move_and_line() {
+        let at = crate::geometry::Point3::new(1.0, 2.0, 3.0);
+        let one = Collision { move_index: 4, section: 1, at, depth: 0.5, error_bound: 0.1 };
+        let collisions = vec![one, Collision { move_index: 6, depth: 2.25, ..one }];
+        let mut holder = HolderClearance {
+            lowest: -2.25,
+            error_bound: 0.1,
+            at: Some((6, 1, at)),
+            collisions,
+            uncertain: 3,
+        };
+        let found = collision(&holder, &[0, 0, 0, 0, 14, 15, 16]).unwrap();
+        assert_eq!((found.what, found.measured_mm), ("collision", 2.25));
+        let expected = "section 2 of the holder stands 2.250 ± 0.100 mm deep in the stock at x 1.000 y 2.000 z 3.000, \
+                        move 6, toolpath.nc line 16, and on one more move";
+        assert_eq!(found.text, expected);
+        assert!(holder_note(&holder).contains("on 3 moves only a finer cell"));
+        (holder.collisions, holder.lowest, holder.uncertain) = (vec![], 1.5, 0);
+        assert_eq!(collision(&holder, &[]), None);
+        assert_eq!(holder_note(&holder), "shank and holder stay 1.500 ± 0.100 mm above the finished stock");
     }
 
     #[test]

@@ -78,10 +78,11 @@ pub fn cut_counted(
     monitor: &dyn Monitor,
 ) -> Result<(ZMap, Work), Cancelled> {
     check(monitor)?;
-    if path.len() > Name::MOST {
+    let form = Form::new(cutter);
+    // The place of a barrel on its track has no closed form here.
+    if path.len() > Name::MOST || form.profile.centre_x < 0.0 {
         return Ok((cut_reference(&stock, cutter, path, monitor)?, Work::default()));
     }
-    let form = Form::new(cutter);
     let side = tile_side(form.radius, stock.grid.cell);
     Job { form, path, side, margin: 0.0 }.run(stock, monitor)
 }
@@ -161,7 +162,9 @@ impl Job<'_> {
                 (Family::Flat, None) => {
                     self.cut_with::<f64, _>(Flat::new(radius, 0.0), grid, tile, moves, extent)
                 }
-                (Family::Rounded, Some(_)) if form.arc_end == form.radius => {
+                (Family::Rounded, Some(_))
+                    if form.profile.is_plain() && form.profile.arc_end == form.radius =>
+                {
                     self.cut_with::<f32, _>(Rounded::<_, false>::new(form, blur), grid, tile, moves, extent)
                 }
                 (Family::Rounded, Some(_)) => {

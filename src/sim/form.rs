@@ -1,8 +1,7 @@
-//! The cutter's profile prepared for sweeping: heights, slopes and reach without trigonometry.
-//! The profile itself is defined by [`Cutter`]. mm.
+//! The cutter's profile prepared for sweeping, and which formula sweeps it. The profile itself is
+//! defined by [`Cutter`]. mm.
 
-use super::track::larger;
-use crate::cutter::Cutter;
+use crate::cutter::{Cutter, Profile};
 
 /// Which formula sweeps the profile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -11,7 +10,7 @@ pub(crate) enum Family {
     Ball,
     /// A disc only.
     Flat,
-    /// A disc, an arc and a cone, any of which may be missing.
+    /// A bottom, an arc and a cone, any of which may be missing.
     Rounded,
 }
 
@@ -19,61 +18,36 @@ pub(crate) enum Family {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Form {
     pub family: Family,
-    /// Radius of the flat disc.
-    pub flat: f64,
-    /// Radius of the arc.
-    pub corner: f64,
     /// Largest radius.
     pub radius: f64,
-    /// Where the arc ends and the cone begins.
-    pub arc_end: f64,
-    /// Sine and cosine of the angle between axis and side.
-    pub sin_side: f64,
-    pub cos_side: f64,
+    pub profile: Profile,
 }
 
 impl Form {
     pub fn new(cutter: &Cutter) -> Self {
-        let (flat, corner, radius) = (cutter.flat_radius(), cutter.corner_radius(), cutter.radius());
-        let arc_end = cutter.arc_end_radius();
-        let family = if arc_end < radius || cutter.half_angle() > 0.0 {
-            Family::Rounded
-        } else if flat == 0.0 {
-            Family::Ball
-        } else if corner == 0.0 {
-            Family::Flat
-        } else {
-            Family::Rounded
-        };
-        let (sin_side, cos_side) = cutter.half_angle().sin_cos();
-        Self { family, flat, corner, radius, arc_end, sin_side, cos_side }
+        Self::of(*cutter.profile())
     }
 
-    /// f(ρ) for `0 <= rho <= radius`. The square root is taken of a product of differences, so that
-    /// near the side it loses no more than the rounding of `rho` itself costs.
+    /// Any profile: a cutter's, or that of what holds it.
+    pub fn of(profile: Profile) -> Self {
+        let family = match () {
+            () if profile.is_ball() => Family::Ball,
+            () if profile.is_flat() => Family::Flat,
+            () => Family::Rounded,
+        };
+        Self { family, radius: profile.radius, profile }
+    }
+
+    /// f(ρ) for `0 <= rho <= radius`.
     #[inline]
     pub fn height(&self, rho: f64) -> f64 {
-        let x = rho - self.flat;
-        if x <= 0.0 {
-            return 0.0;
-        }
-        if rho <= self.arc_end {
-            return self.corner - larger((self.corner - x) * (self.corner + x), 0.0).sqrt();
-        }
-        self.corner * (1.0 - self.sin_side) + (rho - self.arc_end) * self.cos_side / self.sin_side
+        self.profile.height(rho)
     }
 
     /// Sine and cosine of the angle of the profile at ρ: f′ = sine/cosine, which may be infinite.
     pub fn steepness(&self, rho: f64) -> (f64, f64) {
-        let x = rho - self.flat;
-        if x <= 0.0 {
-            return (0.0, 1.0);
-        }
-        if rho <= self.arc_end {
-            let sine = if x < self.corner { x / self.corner } else { 1.0 };
-            return (sine, ((1.0 - sine) * (1.0 + sine)).sqrt());
-        }
-        (self.cos_side, self.sin_side)
+        let incline = self.profile.incline(rho);
+        (incline.sin, incline.cos)
     }
 }
 
@@ -102,8 +76,9 @@ mod tests {
                 let (sine, cosine) = form.steepness(rho);
                 assert!((sine.hypot(cosine) - 1.0).abs() < 1e-14);
                 let ahead = cutter.height(rho + 1e-7);
+                let edge = [form.profile.bottom_end, form.profile.arc_end].contains(&rho);
                 if let Some(ahead) = ahead.filter(|_| cosine > 0.1) {
-                    assert!(((ahead - expected) * 1e7 - sine / cosine).abs() < 1e-4 || rho == form.flat);
+                    assert!(((ahead - expected) * 1e7 - sine / cosine).abs() < 1e-4 || edge);
                 }
             }
         }

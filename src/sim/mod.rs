@@ -6,6 +6,7 @@ mod cut;
 mod envelope;
 mod form;
 mod grid;
+mod holder;
 mod in_order;
 mod reference;
 #[cfg(test)]
@@ -18,6 +19,7 @@ pub use bins::MoveBins;
 pub use cut::{Work, cut, cut_counted};
 pub use envelope::Envelope;
 pub use grid::{Grid, GridError};
+pub use holder::{Collision, HolderClearance, holder_collisions};
 pub use in_order::{ENGAGED, MoveRemoval, RapidContact, Removal, cut_in_order, cut_in_order_plain};
 pub use reference::cut_reference;
 pub use swept::SweptMove;

@@ -1,7 +1,7 @@
 //! Cutters, paths and random numbers that the tests of this stage share.
 
 use super::Grid;
-use crate::cutter::Cutter;
+use crate::cutter::{AptWords, Cutter};
 use crate::geometry::{Point2, Point3};
 use crate::toolpath::{ClPoint, Move, MoveKind, Toolpath};
 
@@ -28,17 +28,19 @@ impl Rng {
     }
 }
 
-/// One of each family, diameter up to 6 mm.
-pub fn cutters() -> [Cutter; 6] {
+/// One of each family, diameter up to 6 mm, and profiles with every piece, with edges and without.
+pub fn cutters() -> Vec<Cutter> {
     let angle = f64::to_radians;
-    [
+    let mut cutters = vec![
         Cutter::ball(6.0).unwrap(),
         Cutter::flat(6.0).unwrap(),
         Cutter::bull(6.0, 1.0).unwrap(),
         Cutter::taper(2.0, 1.0, angle(10.0), 6.0).unwrap(),
         Cutter::taper(2.0, 0.4, angle(35.0), 5.0).unwrap(),
         Cutter::taper(2.0, 0.0, angle(35.0), 5.0).unwrap(),
-    ]
+    ];
+    cutters.extend(AptWords::examples().iter().map(|words| Cutter::apt(words).unwrap()));
+    cutters
 }
 
 /// A path of cutting moves through the given tips; the first one is the start.

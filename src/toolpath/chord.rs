@@ -1,6 +1,38 @@
 //! Turns a curve of cutter locations into straight moves within a chord tolerance.
 
 use crate::geometry::{Point3, Vector3};
+use crate::monitor::{self, Cancelled, Monitor};
+
+/// Steps of work (drops of the cutter, points thinned) between two questions whether to go on. A
+/// question costs next to nothing; at ten times as many a cancelled plan would still end within
+/// tenths of a second, and a rough surface takes ten times as long for each of them.
+const STEPS_BETWEEN_QUESTIONS: u32 = 256;
+
+/// Asks a monitor now and then whether to go on, from inside of a pass.
+pub struct Watch<'a> {
+    monitor: &'a dyn Monitor,
+    steps: u32,
+}
+
+impl<'a> Watch<'a> {
+    /// For the work of one pass.
+    pub fn new(monitor: &'a dyn Monitor) -> Self {
+        Self { monitor, steps: 0 }
+    }
+
+    /// Counts one step, and asks after every so many.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn step(&mut self) -> Result<(), Cancelled> {
+        self.steps += 1;
+        if self.steps < STEPS_BETWEEN_QUESTIONS {
+            return Ok(());
+        }
+        self.steps = 0;
+        monitor::check(self.monitor)
+    }
+}
 
 /// Two samples of a pass are never closer than this share of the first sampling interval: where the
 /// exact path has a kink, halving would never end. At 2⁻¹² of a quarter of a millimetre the kink is
@@ -19,7 +51,11 @@ pub fn distance_to_segment(p: &Point3, a: &Point3, b: &Point3) -> f64 {
 /// `tolerance` (mm) of the exact curve.
 ///
 /// `locate(s)` gives the cutter location at parameter `s`, `None` where there is none: samples before
-/// the first location and after the next gap are left out. The first samples are `step` apart in `s`. Each interval is tested at its middle and its quarters, and halved until all three hold.
+/// the first location and after the next gap are left out. The first samples are `step` apart in `s`.
+/// Each interval is tested at its middle and its quarters, and halved until all three hold.
+///
+/// # Errors
+/// [`Cancelled`] when the watch says so.
 ///
 /// # Tolerance
 /// A curve whose curvature changes sign more than four times within one final interval could slip
@@ -30,21 +66,30 @@ pub fn sample_within_chord(
     step: f64,
     tolerance: f64,
     locate: &mut dyn FnMut(f64) -> Option<Point3>,
-) -> Vec<Point3> {
+    watch: &mut Watch<'_>,
+) -> Result<Vec<Point3>, Cancelled> {
     let count = ((s1 - s0) / step).ceil().max(1.0) as usize;
     let at = |k: usize| s0 + (s1 - s0) * k as f64 / count as f64;
-    let Some((start, first)) = (0..=count).find_map(|k| locate(at(k)).map(|p| (k, p))) else {
-        return Vec::new();
+    let mut start = 0;
+    let first = loop {
+        if start > count {
+            return Ok(Vec::new());
+        }
+        watch.step()?;
+        match locate(at(start)) {
+            Some(first) => break first,
+            None => start += 1,
+        }
     };
     let mut points = vec![first];
     let mut a = (at(start), first);
     for k in start + 1..=count {
         let s = at(k);
         let Some(p) = locate(s) else { break };
-        halve(a, (s, p), tolerance, MAX_HALVINGS, locate, &mut points);
+        halve(a, (s, p), tolerance, MAX_HALVINGS, locate, watch, &mut points)?;
         a = (s, p);
     }
-    points
+    Ok(points)
 }
 
 /// Appends the samples after `a` up to and with `b`.
@@ -54,19 +99,22 @@ fn halve(
     tolerance: f64,
     halvings: u32,
     locate: &mut dyn FnMut(f64) -> Option<Point3>,
+    watch: &mut Watch<'_>,
     out: &mut Vec<Point3>,
-) {
+) -> Result<(), Cancelled> {
+    watch.step()?;
     let s = |t: f64| a.0 + (b.0 - a.0) * t;
     let off = |p: &Option<Point3>| p.is_some_and(|p| distance_to_segment(&p, &a.1, &b.1) > tolerance);
     let middle = locate(s(0.5));
     let split = halvings > 0 && (off(&middle) || off(&locate(s(0.25))) || off(&locate(s(0.75))));
     if let (true, Some(middle)) = (split, middle) {
         let middle = (s(0.5), middle);
-        halve(a, middle, tolerance, halvings - 1, locate, out);
-        halve(middle, b, tolerance, halvings - 1, locate, out);
+        halve(a, middle, tolerance, halvings - 1, locate, watch, out)?;
+        halve(middle, b, tolerance, halvings - 1, locate, watch, out)?;
     } else if (b.1 - a.1).norm() > 0.0 {
         out.push(b.1);
     }
+    Ok(())
 }
 
 /// No straight move skips more points than this: it bounds the cost on long straight passes, and a
@@ -75,8 +123,11 @@ const MAX_SKIP: usize = 400;
 
 /// Drops points that the rest does without: from each kept point the longest straight move that
 /// stays within `tolerance` of all points that it skips. The ends stay.
-pub fn reduce(points: &[Point3], tolerance: f64) -> Vec<Point3> {
-    let Some(&first) = points.first() else { return Vec::new() };
+///
+/// # Errors
+/// [`Cancelled`] when the watch says so.
+pub fn reduce(points: &[Point3], tolerance: f64, watch: &mut Watch<'_>) -> Result<Vec<Point3>, Cancelled> {
+    let Some(&first) = points.first() else { return Ok(Vec::new()) };
     let mut kept = vec![first];
     let mut from = 0;
     while from + 1 < points.len() {
@@ -85,6 +136,7 @@ pub fn reduce(points: &[Point3], tolerance: f64) -> Vec<Point3> {
                 .iter()
                 .all(|p| distance_to_segment(p, &points[from], &points[to]) <= tolerance)
         };
+        watch.step()?;
         let mut to = from + 1;
         while to + 1 < points.len() && to - from < MAX_SKIP && fits(to + 1) {
             to += 1;
@@ -92,12 +144,23 @@ pub fn reduce(points: &[Point3], tolerance: f64) -> Vec<Point3> {
         kept.push(points[to]);
         from = to;
     }
-    kept
+    Ok(kept)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::monitor::Silent;
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    /// Says stop at the given question and all that follow.
+    struct StopAt(AtomicU32);
+
+    impl Monitor for StopAt {
+        fn cancelled(&self) -> bool {
+            self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1)).is_err()
+        }
+    }
 
     fn circle(s: f64) -> Option<Point3> {
         Some(Point3::new(10.0 * s.cos(), 10.0 * s.sin(), 0.0))
@@ -106,7 +169,8 @@ mod tests {
     #[test]
     fn chords_of_a_circle_hold_the_tolerance_and_no_more() {
         let tolerance = 1e-3;
-        let points = sample_within_chord(0.0, 3.0, 0.5, tolerance, &mut circle);
+        let points =
+            sample_within_chord(0.0, 3.0, 0.5, tolerance, &mut circle, &mut Watch::new(&Silent)).unwrap();
         for pair in points.windows(2) {
             let chord = (pair[1] - pair[0]).norm();
             let sagitta = 10.0 - (100.0 - 0.25 * chord * chord).sqrt();
@@ -119,8 +183,8 @@ mod tests {
 
     #[test]
     fn a_kink_ends_after_finitely_many_halvings() {
-        let points =
-            sample_within_chord(0.0, 1.0, 1.0, 1e-9, &mut |s| Some(Point3::new(s, (s - 0.3).abs(), 0.0)));
+        let kink = &mut |s: f64| Some(Point3::new(s, (s - 0.3).abs(), 0.0));
+        let points = sample_within_chord(0.0, 1.0, 1.0, 1e-9, kink, &mut Watch::new(&Silent)).unwrap();
         assert!(points.len() < 40, "{}", points.len());
         assert!(points.iter().any(|p| (p.x - 0.3).abs() < 1e-3));
     }
@@ -128,7 +192,7 @@ mod tests {
     #[test]
     fn reduction_keeps_ends_and_tolerance() {
         let dense: Vec<Point3> = (0..=1000).map(|k| circle(0.003 * k as f64).unwrap()).collect();
-        let kept = reduce(&dense, 1e-3);
+        let kept = reduce(&dense, 1e-3, &mut Watch::new(&Silent)).unwrap();
         assert_eq!(kept.first(), dense.first());
         assert_eq!(kept.last(), dense.last());
         assert!(kept.len() < 120, "{}", kept.len());
@@ -137,6 +201,37 @@ mod tests {
             assert!(d <= 1e-3 + 1e-12);
         }
         let line: Vec<Point3> = (0..50).map(|k| Point3::new(k as f64, 0.0, 1.0)).collect();
-        assert_eq!(reduce(&line, 1e-9).len(), 2);
+        assert_eq!(reduce(&line, 1e-9, &mut Watch::new(&Silent)).unwrap().len(), 2);
+    }
+
+    /// A path so rough that it would take billions of places ends soon after the user asks for it,
+    /// also where nothing is located at all, and also while points are thinned.
+    #[test]
+    fn a_pass_is_left_half_way_when_asked() {
+        for questions in [0, 1, 7] {
+            let mut located = 0u32;
+            let mut rough = |s: f64| {
+                located += 1;
+                Some(Point3::new(s, (1e9 * s).sin(), 0.0))
+            };
+            let stop = StopAt(AtomicU32::new(questions));
+            let got = sample_within_chord(0.0, 1e6, 1.0, 1e-9, &mut rough, &mut Watch::new(&stop));
+            assert_eq!(got, Err(Cancelled));
+            // Up to four places a step.
+            assert!(located <= 4 * STEPS_BETWEEN_QUESTIONS * (questions + 1), "{located} for {questions}");
+        }
+        let mut located = 0u32;
+        let mut nowhere = |_| {
+            located += 1;
+            None
+        };
+        let stop = StopAt(AtomicU32::new(2));
+        let got = sample_within_chord(0.0, 1e9, 1.0, 1e-9, &mut nowhere, &mut Watch::new(&stop));
+        assert_eq!((got, located), (Err(Cancelled), 3 * STEPS_BETWEEN_QUESTIONS - 1));
+        let rough: Vec<Point3> =
+            (0..10_000).map(|k| Point3::new(f64::from(k), f64::from(k % 2), 0.0)).collect();
+        let stop = StopAt(AtomicU32::new(3));
+        assert_eq!(reduce(&rough, 1e-3, &mut Watch::new(&stop)), Err(Cancelled));
+        assert_eq!(stop.0.into_inner(), 0, "asked until it said stop");
     }
 }

@@ -2,14 +2,17 @@
 //! the cutter touches without cutting in.
 //!
 //! Enters: a part, a cutter, places `(x, y)` in mm. Leaves: the height of the tip and the contact.
-//! On a mesh the answer is exact up to f64 rounding: closed forms at each triangle ([`touch`]) and
-//! branch and bound over the part's search tree, with bounds that tilt with the surface ([`roof`]).
-//! On patches the tessellation only finds where to
-//! look; the contact is then the maximum on the exact surface ([`refine`]).
+//! On a mesh the answer is exact up to f64 rounding: closed forms at each triangle ([`touch`]), found
+//! with a tree of the places from which each triangle can carry the cutter ([`domain`]), for one place
+//! or for a grid of them ([`grid`]). On patches the tessellation only finds where to look, by branch
+//! and bound over its own tree with bounds that tilt with the surface ([`roof`]); the contact is then
+//! the maximum on the exact surface ([`refine`]).
 //!
 //! The cutter touches from above only: above its largest radius it is a cylinder, and a vertical
 //! wall carries it with its edges, not with its side.
 
+mod domain;
+mod grid;
 mod refine;
 mod roof;
 #[cfg(test)]
@@ -17,11 +20,13 @@ mod tests;
 mod touch;
 
 use crate::cutter::Cutter;
-use crate::geometry::{Bvh, Jet2, Node, Paired, TriangleMesh};
+use crate::geometry::{BoxTree, Bvh, Extent, Feature, Jet2, Node, Paired, TriangleMesh};
 use crate::part::{Part, PatchPoint, SurfacePoint};
+use grid::Parts;
+pub use grid::{GridDrop, PlanGrid};
 use refine::{Hill, Peak};
 use roof::Roof;
-use touch::{Facet, Profile, Touch};
+use touch::{Carries, Facet, Profile, Touch};
 
 /// Where a cutter dropped along -z comes to rest on a part.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,7 +38,7 @@ pub struct Drop {
     pub contact: SurfacePoint,
 }
 
-/// Drops one cutter onto one part. Holds about 160 bytes a triangle; serves any number of threads.
+/// Drops one cutter onto one part. Holds about 270 bytes a triangle; serves any number of threads.
 #[derive(Debug, Clone)]
 pub struct DropCutter<'a> {
     mesh: &'a TriangleMesh,
@@ -46,8 +51,18 @@ pub struct DropCutter<'a> {
     search: Profile,
     /// The triangles in the order of the tree's slots, prepared for `search`.
     facets: Vec<Facet>,
-    /// One for each box of the tree.
-    roofs: Paired<Roof>,
+    cull: Cull,
+}
+
+/// What leaves triangles out of a search.
+#[derive(Debug, Clone)]
+enum Cull {
+    /// On a mesh: boxes around the places of the tip while the cutter rests on a triangle, as a tree,
+    /// and around those for each of its parts.
+    Domains { tree: BoxTree, parts: Parts },
+    /// Above a tessellation, where every triangle that the grown cutter would touch alone counts:
+    /// one for each box of the mesh's tree.
+    Roofs(Paired<Roof>),
 }
 
 /// The surface behind a tessellation.
@@ -100,25 +115,32 @@ impl<'a> DropCutter<'a> {
         let profile = Profile::of(cutter, 0.0);
         let search =
             exact.map_or(profile, |(_, deviation)| Profile::of(cutter, DEVIATION_MARGIN * deviation));
+        let domains = if exact.is_none() { domain::domains(mesh, &search) } else { Vec::new() };
         let facets = crate::parallel::map(bvh.slots(), |slot| {
             let t = bvh.triangle_in(slot);
-            Facet::new(mesh.corners(t), &mesh.normal(t), &search)
+            let carries = domains.get(t).map_or(Carries::ALL, domain::Domain::carries);
+            Facet::new(mesh.corners(t), &mesh.normal(t), carries, &search)
         });
-        let roofs: Vec<Roof> = crate::parallel::map(bvh.boxes(), |index| {
-            bvh.few_slots_in(index, roof::MOST_BELOW).map_or(Roof::NONE, |(node, slots)| {
-                let below: Vec<_> = slots.iter().map(|&s| mesh.corners(bvh.triangle_in(s))).collect();
-                Roof::over(node, &below, &search)
-            })
-        });
-        Self {
-            mesh,
-            bvh,
-            exact: exact.map(|(surface, _)| surface),
-            profile,
-            search,
-            facets,
-            roofs: Paired::from_values(&roofs),
-        }
+        let cull = if exact.is_none() {
+            let in_slot = |slot: usize| &domains[bvh.triangle_in(slot)];
+            let around = |slot| in_slot(slot).parts().fold(Extent::NOTHING, |all, part| all.with(&part.1));
+            let extents: Vec<Extent> = (0..bvh.slots()).map(around).collect();
+            let mut slot_of = vec![0u32; bvh.slots()];
+            (0..bvh.slots()).for_each(|slot| slot_of[bvh.triangle_in(slot)] = slot as u32);
+            let slot_of = &slot_of;
+            let parts = Parts::new(bvh.slots(), |slot| {
+                let t = bvh.triangle_in(slot);
+                let facet = &facets[slot];
+                in_slot(slot).parts().map(move |(part, extent)| {
+                    let across = if let Feature::Side(k) = part { mesh.neighbour(t, k) } else { None };
+                    (facet.part(part), extent, slot_of[across.unwrap_or(t)])
+                })
+            });
+            Cull::Domains { tree: bvh.tree().refitted(&extents), parts }
+        } else {
+            Cull::Roofs(Paired::from_values(&roofs(mesh, bvh, &search)))
+        };
+        Self { mesh, bvh, exact: exact.map(|(surface, _)| surface), profile, search, facets, cull }
     }
 
     /// Highest tip position over `(x, y)` at which the cutter touches the part without cutting into
@@ -128,38 +150,52 @@ impl<'a> DropCutter<'a> {
             return None;
         }
         let mut best: Option<(usize, Touch)> = None;
-        self.bvh.search(
-            f64::NEG_INFINITY,
-            |index, node, floor| self.bound(index, node, floor, x, y),
-            |slot, floor| match self.facets[slot].touch(&self.search, x, y, floor) {
+        self.search(f64::NEG_INFINITY, x, y, |slot, floor| {
+            match self.facets[slot].touch(&self.search, x, y, floor) {
                 Some(touch) => {
                     best = Some((slot, touch));
                     touch.tip_z
                 }
                 None => floor,
-            },
-        );
+            }
+        });
         let (slot, touch) = best?;
+        let landing = Landing { x, y, slot, touch };
         match self.exact {
-            None => Some(self.on_mesh(slot, &touch, x, y)),
-            Some(surface) => self.on_surface(surface, slot, &touch, x, y),
+            None => Some(self.on_mesh(&landing)),
+            Some(surface) => self.on_surface(surface, &landing),
+        }
+    }
+
+    /// Visits the triangles that may lift the tip at `(x, y)` above `best`, as [`BoxTree::search`] does.
+    fn search(&self, best: f64, x: f64, y: f64, visit: impl FnMut(usize, f64) -> f64) {
+        match &self.cull {
+            Cull::Domains { tree, .. } => {
+                let bound = |_, node: &Node, _| if node.holds(x, y) { node.top() } else { f64::NEG_INFINITY };
+                tree.search(best, bound, visit);
+            }
+            Cull::Roofs(roofs) => {
+                let bound = |index, node: &Node, floor| self.bound(roofs.at(index), node, floor, x, y);
+                self.bvh.tree().search(best, bound, visit);
+            }
         }
     }
 
     /// No triangle in the box lifts the tip higher than this, unless this is below `floor`: then
     /// none lifts it above `floor`.
-    fn bound(&self, index: usize, node: &Node, floor: f64, x: f64, y: f64) -> f64 {
+    fn bound(&self, roof: &Roof, node: &Node, floor: f64, x: f64, y: f64) -> f64 {
         let distance2 = node.plan_distance_squared(x, y);
         if distance2 > self.search.radius * self.search.radius {
             return f64::NEG_INFINITY;
         }
         let level = node.top() - self.search.height_squared(distance2);
-        if level <= floor { level } else { level.min(self.roofs.at(index).bound(node, &self.search, x, y)) }
+        if level <= floor { level } else { level.min(roof.bound(node, &self.search, x, y)) }
     }
 
-    fn on_mesh(&self, slot: usize, touch: &Touch, x: f64, y: f64) -> Drop {
-        let triangle = self.bvh.triangle_in(slot);
-        let contact = self.facets[slot].contact(touch, &self.mesh.normal(triangle), x, y);
+    fn on_mesh(&self, landing: &Landing) -> Drop {
+        let Landing { x, y, slot, touch } = landing;
+        let triangle = self.bvh.triangle_in(*slot);
+        let contact = self.facets[*slot].contact(touch, *x, *y);
         let contact = SurfacePoint {
             point: contact.point,
             normal: self.bvh.normal_at(self.mesh, triangle, contact.feature),
@@ -176,29 +212,19 @@ impl<'a> DropCutter<'a> {
     /// on `q`'s triangle it would come to rest at `z*` or above. So the contact lies behind one of
     /// the triangles on which the grown cutter rests at `z*` or above, and any point of `S` that is
     /// found gives a lower bound of `z*`.
-    fn on_surface(
-        &self,
-        surface: &dyn ExactSurface,
-        slot: usize,
-        touch: &Touch,
-        x: f64,
-        y: f64,
-    ) -> Option<Drop> {
+    fn on_surface(&self, surface: &dyn ExactSurface, first: &Landing) -> Option<Drop> {
         let mut found = Found { best: None, known: [((0, 0), [0.0; 2]); REMEMBERED], len: 0 };
-        self.refine(surface, slot, touch, x, y, &mut found);
-        self.bvh.search(
-            found.height(),
-            |index, node, floor| self.bound(index, node, floor, x, y),
-            |other, floor| {
-                // The first triangle was refined already.
-                if other != slot
-                    && let Some(touch) = self.facets[other].touch(&self.search, x, y, floor)
-                {
-                    self.refine(surface, other, &touch, x, y, &mut found);
-                }
-                found.height()
-            },
-        );
+        self.refine(surface, first, &mut found);
+        let (x, y) = (first.x, first.y);
+        self.search(found.height(), x, y, |slot, floor| {
+            // The first triangle was refined already.
+            if slot != first.slot
+                && let Some(touch) = self.facets[slot].touch(&self.search, x, y, floor)
+            {
+                self.refine(surface, &Landing { x, y, slot, touch }, &mut found);
+            }
+            found.height()
+        });
         let (triangle, patch, peak) = found.best?;
         let facing = self.mesh.normal(triangle);
         let normal = match peak.jet.normal() {
@@ -216,25 +242,18 @@ impl<'a> DropCutter<'a> {
     }
 
     /// Climbs to the maximum on the exact surface that is reached from the contact on a triangle.
-    fn refine(
-        &self,
-        surface: &dyn ExactSurface,
-        slot: usize,
-        touch: &Touch,
-        x: f64,
-        y: f64,
-        found: &mut Found,
-    ) {
-        let triangle = self.bvh.triangle_in(slot);
+    fn refine(&self, surface: &dyn ExactSurface, landing: &Landing, found: &mut Found) {
+        let Landing { x, y, slot, touch } = landing;
+        let triangle = self.bvh.triangle_in(*slot);
         let Some(corners) = surface.corner_parameters(triangle) else {
             return;
         };
-        let weights = self.facets[slot].contact(touch, &self.mesh.normal(triangle), x, y).barycentric;
+        let weights = self.facets[*slot].contact(touch, *x, *y).barycentric;
         let mean = |of: fn(&PatchPoint) -> f64| (0..3).map(|k| weights[k] * of(&corners[k])).sum::<f64>();
         let (patch, start) = (corners[0].patch, [mean(|p| p.u), mean(|p| p.v)]);
         let jet = |u: f64, v: f64| surface.jet(patch, u, v);
         for (number, law) in self.profile.laws().enumerate() {
-            let hill = Hill::new(&jet, surface.domain(patch), law, self.profile.radius, [x, y]);
+            let hill = Hill::new(&jet, surface.domain(patch), law, self.profile.radius, [*x, *y]);
             let key = (patch, number);
             let known = found.known[..found.len].iter().filter(|k| k.0 == key).map(|k| k.1);
             if let Some(peak) = hill.climb(start, known) {
@@ -242,6 +261,25 @@ impl<'a> DropCutter<'a> {
             }
         }
     }
+}
+
+/// A roof for each box of the tree.
+fn roofs(mesh: &TriangleMesh, bvh: &Bvh, profile: &Profile) -> Vec<Roof> {
+    crate::parallel::map(bvh.boxes(), |index| {
+        bvh.few_slots_in(index, roof::MOST_BELOW).map_or(Roof::NONE, |(node, slots)| {
+            let below: Vec<_> = slots.iter().map(|&s| mesh.corners(bvh.triangle_in(s))).collect();
+            Roof::over(node, &below, profile)
+        })
+    })
+}
+
+/// A cutter with its axis at `(x, y)` resting on the triangle in a slot.
+#[derive(Debug, Clone, Copy)]
+struct Landing {
+    x: f64,
+    y: f64,
+    slot: usize,
+    touch: Touch,
 }
 
 /// What the refinement has found so far in one drop.

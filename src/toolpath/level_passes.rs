@@ -12,7 +12,7 @@ use super::spacing::{level_tangent, place_levels};
 use crate::cutter::Cutter;
 use crate::field::{LevelCurve, LevelTracer, ScalarField, surface_gradient_length};
 use crate::geometry::Point3;
-use crate::monitor::{self, Monitor};
+use crate::monitor::{self, Cancelled, Monitor};
 use crate::part::Part;
 
 /// Grid cells a side on which level curves are found.
@@ -62,8 +62,8 @@ pub(super) fn along_levels(
     let mut notes = Vec::new();
     let range = tracer.range();
     let levels = place_levels(chart, cutter, field, range, settings, &mut notes);
-    let guide =
-        Guide { tracer: &tracer, chart, cutter, field, drop: DropCutter::new(part, cutter), settings };
+    let drop = DropCutter::new(part, cutter);
+    let guide = Guide { tracer: &tracer, chart, cutter, field, drop, settings, monitor };
     monitor.start("planning passes", levels.len() as u64);
     let work = crate::parallel::try_map(levels.len() + 1, |k| {
         monitor::check(monitor)?;
@@ -76,11 +76,11 @@ pub(super) fn along_levels(
             open_to: k == levels.len(),
         };
         let mut passes = Vec::new();
-        guide.fill(&gap, MOST_HALVINGS, &mut passes);
+        guide.fill(&gap, MOST_HALVINGS, &mut passes)?;
         let further = passes.len();
         if let Some(&level) = levels.get(k) {
             for curve in tracer.curves(level) {
-                passes.extend(guide.pass(&curve, level, None));
+                passes.extend(guide.pass(&curve, level, None)?);
             }
             monitor.advance(1);
         }
@@ -145,6 +145,7 @@ struct Guide<'a> {
     field: &'a ScalarField,
     drop: DropCutter<'a>,
     settings: &'a PassSettings,
+    monitor: &'a dyn Monitor,
 }
 
 impl Guide<'_> {
@@ -157,19 +158,21 @@ impl Guide<'_> {
     }
 
     /// Appends the further passes that a gap needs.
-    fn fill(&self, gap: &Gap, halvings: usize, passes: &mut Vec<Vec<Point3>>) {
+    fn fill(&self, gap: &Gap, halvings: usize, passes: &mut Vec<Vec<Point3>>) -> Result<(), Cancelled> {
+        monitor::check(self.monitor)?;
         let (level, interval) = gap.middle();
         let before = passes.len();
         for curve in self.tracer.curves(level) {
             let (curve, runs) = self.needed(curve, interval);
             for run in runs {
-                passes.extend(self.pass(&curve, level, Some(run)));
+                passes.extend(self.pass(&curve, level, Some(run))?);
             }
         }
         if passes.len() > before && halvings > 1 {
-            self.fill(&Gap { to: level, open_to: false, ..*gap }, halvings - 1, passes);
-            self.fill(&Gap { from: level, open_from: false, ..*gap }, halvings - 1, passes);
+            self.fill(&Gap { to: level, open_to: false, ..*gap }, halvings - 1, passes)?;
+            self.fill(&Gap { from: level, open_from: false, ..*gap }, halvings - 1, passes)?;
         }
+        Ok(())
     }
 
     /// The runs of a curve (first and last point) on which an interval of ψ is wider on the surface
@@ -207,7 +210,12 @@ impl Guide<'_> {
 
     /// The pass along a curve, or along a run of its points; `None` where it does not touch the
     /// chart.
-    fn pass(&self, curve: &LevelCurve, level: f64, run: Option<[usize; 2]>) -> Option<Vec<Point3>> {
+    fn pass(
+        &self,
+        curve: &LevelCurve,
+        level: f64,
+        run: Option<[usize; 2]>,
+    ) -> Result<Option<Vec<Point3>>, Cancelled> {
         let mut points = curve.points.clone();
         if curve.closed {
             points.push(points[0]);
@@ -215,7 +223,7 @@ impl Guide<'_> {
         let last = points.len() - 1;
         let [first, end] = run.map_or([0, last], |[a, b]| [a, if curve.closed { last } else { b }]);
         if end <= first {
-            return None;
+            return Ok(None);
         }
         // The parameter s counts traced points, which are one sampling distance apart.
         let at = |s: f64| {
@@ -234,15 +242,16 @@ impl Guide<'_> {
             self.shorten_ends(&mut stretches, &at);
         }
         if !stretches.iter().any(|s| s.inside) {
-            return None;
+            return Ok(None);
         }
         let mut tips: Vec<Point3> = Vec::new();
         for stretch in stretches {
-            let moves = settings.moves(stretch.from, stretch.to, &mut |s| self.tip(at(s)));
+            let mut tip = |s| self.tip(at(s));
+            let moves = settings.moves(stretch.from, stretch.to, &mut tip, self.monitor)?;
             let joined = usize::from(!tips.is_empty());
             tips.extend(moves.into_iter().skip(joined));
         }
-        Some(tips)
+        Ok(Some(tips))
     }
 
     /// The stretches of a curve inside and outside of the chart, in order.

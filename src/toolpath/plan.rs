@@ -1,6 +1,6 @@
 //! What a strategy is asked for, and the one entrance to all strategies.
 
-use super::chord::{reduce, sample_within_chord};
+use super::chord::{Watch, reduce, sample_within_chord};
 use super::link::chain;
 use super::strip::strip_width;
 use super::{Toolpath, streamline, zigzag};
@@ -145,10 +145,20 @@ const SAMPLING_SHARE: f64 = 0.4;
 
 impl PassSettings {
     /// Straight moves along `locate` over `[s0, s1]` within the chord tolerance.
-    pub fn moves(&self, s0: f64, s1: f64, locate: &mut dyn FnMut(f64) -> Option<Point3>) -> Vec<Point3> {
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so, which is asked every few hundred places.
+    pub fn moves(
+        &self,
+        s0: f64,
+        s1: f64,
+        locate: &mut dyn FnMut(f64) -> Option<Point3>,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Point3>, Cancelled> {
         let fine = SAMPLING_SHARE * self.chord_tolerance;
-        let points = sample_within_chord(s0, s1, self.sampling, fine, locate);
-        reduce(&points, self.chord_tolerance - fine)
+        let mut watch = Watch::new(monitor);
+        let points = sample_within_chord(s0, s1, self.sampling, fine, locate, &mut watch)?;
+        reduce(&points, self.chord_tolerance - fine, &mut watch)
     }
 }
 

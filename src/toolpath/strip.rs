@@ -26,16 +26,31 @@ const NEARLY_AS_CONCAVE: f64 = 0.25;
 /// surface has the normal curvature `surface` along `b`; and whether the surface is so concave that
 /// the width had to be limited.
 ///
-/// A sharp corner (no corner radius) leaves stairs on a slope: between passes `w` apart up the slope λ
-/// they stand `w sin λ cos λ` high.
+/// A sharp edge leaves stairs on a slope: between passes `w` apart up the slope λ they stand
+/// `w sin λ cos λ` high. A point leaves grooves.
 pub fn strip_width_at(cutter: &Cutter, n: &Vector3, b: &Vector3, surface: f64, h: f64) -> (f64, bool) {
-    let (width, limited) = strip_width(cutter.normal_curvature(n, b), surface, h, cutter.radius());
-    if cutter.corner_radius() > 0.0 {
+    let curvature = cutter.normal_curvature(n, b);
+    if curvature.is_infinite() {
+        return (strip_of_point(cutter, b.z.abs(), h), false);
+    }
+    let (width, limited) = strip_width(curvature, surface, h, cutter.radius());
+    if !cutter.touches_with_edge(n) {
         return (width, limited);
     }
     let up_the_slope = b.z.abs();
     let stairs = if up_the_slope > 0.0 { h / (up_the_slope * n.z.abs().max(1e-3)) } else { f64::INFINITY };
     (width.min(stairs), limited)
+}
+
+/// Width of the strip, mm, below the ridges of height `h` that a pointed tip leaves: V-shaped grooves,
+/// seen across the feed on a section that rises by an angle of sine `rise`.
+fn strip_of_point(cutter: &Cutter, rise: f64, h: f64) -> f64 {
+    let (flank, rise) = (cutter.profile().point().sin.asin(), rise.min(1.0).asin());
+    let cotangent = |angle: f64| 1.0 / angle.max(1e-9).tan();
+    let width = h * (cotangent(flank + rise) + cotangent(flank - rise));
+    width
+        .min(WIDEST_OVER_PLANE * (8.0 * h * cutter.radius()).sqrt())
+        .min(WIDEST_OVER_DIAMETER * 2.0 * cutter.radius())
 }
 
 /// Width of the strip, mm, for scallop height `h` where the cutter has curvature `cutter` and the

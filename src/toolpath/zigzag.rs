@@ -7,12 +7,13 @@
 
 use super::border::{Border, useful_overrun};
 use super::chart::Chart;
+use super::chord::Watch;
 use super::drop::{Drop, DropCutter};
 use super::plan::{PassSettings, Passes, PlanError};
 use super::{FeedDirection, Step};
 use crate::cutter::Cutter;
 use crate::geometry::{Point3, Vector2};
-use crate::monitor::{self, Monitor};
+use crate::monitor::{self, Cancelled, Monitor};
 use crate::part::Part;
 
 /// The stepover is never planned below this share of that on a horizontal plane: a steep wall
@@ -60,12 +61,13 @@ pub fn passes(
         across,
         overrun: pitch,
         settings,
+        monitor,
     };
     monitor.start("planning zigzag", count as u64);
     let lines = crate::parallel::try_map(count, |k| {
         monitor::check(monitor)?;
         let offset = middle + (k as f64 - 0.5 * (count as f64 - 1.0)) * pitch;
-        let pieces = line.pieces(offset, [from_to[0] - pitch, from_to[1] + pitch]);
+        let pieces = line.pieces(offset, [from_to[0] - pitch, from_to[1] + pitch])?;
         monitor.advance(1);
         Ok::<_, PlanError>(pieces)
     })?;
@@ -124,6 +126,7 @@ struct Line<'a> {
     /// How far a pass may roll on over the border, mm.
     overrun: f64,
     settings: &'a PassSettings,
+    monitor: &'a dyn Monitor,
 }
 
 impl Line<'_> {
@@ -146,7 +149,7 @@ impl Line<'_> {
         // Direction from the contact to the centre of the corner's circle, against the normal.
         let out = xy - drop.contact.point.coords.xy();
         let rho = out.norm();
-        let lean = ((rho - self.cutter.flat_radius()).max(0.0) / rc).min(1.0);
+        let lean = self.cutter.profile().incline(rho).sin;
         let horizontal = if rho > 0.0 { out * (lean / rho) } else { out };
         let toward = nalgebra::Vector3::new(horizontal.x, horizontal.y, (1.0 - lean * lean).sqrt());
         let rolled = (toward - drop.contact.normal).norm() * rc;
@@ -161,17 +164,20 @@ impl Line<'_> {
 
     /// The runs of the line at `offset` on which the cutter cuts surface, as moves. Each run is made
     /// of stretches inside the part and stretches that roll along its border.
-    fn pieces(&self, offset: f64, [s0, s1]: [f64; 2]) -> Vec<Vec<Point3>> {
+    fn pieces(&self, offset: f64, [s0, s1]: [f64; 2]) -> Result<Vec<Vec<Point3>>, Cancelled> {
         let count = ((s1 - s0) / self.settings.sampling).ceil().max(1.0) as usize;
         let at = |k: usize| s0 + (s1 - s0) * k as f64 / count as f64;
         let mut stretches: Vec<(Contact, f64, f64)> = Vec::new();
         let mut before = (s0, self.contact(offset, s0));
         let mut start = s0;
+        let mut watch = Watch::new(self.monitor);
         for k in 1..=count {
+            watch.step()?;
             let s = at(k);
             let now = self.contact(offset, s);
             // Several changes may lie between two samples; each is located in turn.
             while before.1 != now {
+                watch.step()?;
                 let (end, next) = self.change(offset, before, s);
                 stretches.push((before.1, start, end));
                 (before, start) = ((next, self.contact(offset, next)), next);
@@ -180,12 +186,11 @@ impl Line<'_> {
         }
         stretches.push((before.1, start, s1));
         let runs = stretches.split_mut(|(contact, ..)| *contact == Contact::Off);
-        runs.map(|run| {
+        let pieces = runs.map(|run| {
             self.shorten_ends(run);
             self.moves(offset, run)
-        })
-        .filter(|points| points.len() >= 2)
-        .collect()
+        });
+        pieces.filter(|points| points.as_ref().map_or(true, |points| points.len() >= 2)).collect()
     }
 
     /// Cuts the rolls at both ends of a run back to what is of use. A roll over the whole overrun on a
@@ -203,14 +208,14 @@ impl Line<'_> {
         }
     }
 
-    fn moves(&self, offset: f64, run: &[(Contact, f64, f64)]) -> Vec<Point3> {
+    fn moves(&self, offset: f64, run: &[(Contact, f64, f64)]) -> Result<Vec<Point3>, Cancelled> {
         let mut points: Vec<Point3> = Vec::new();
         for &(_, a, b) in run.iter().filter(|(_, a, b)| b - a > END_PRECISION) {
-            let stretch = self.settings.moves(a, b, &mut |s| self.tip(offset, s));
+            let stretch = self.settings.moves(a, b, &mut |s| self.tip(offset, s), self.monitor)?;
             let joined = usize::from(!points.is_empty());
             points.extend(stretch.into_iter().skip(joined));
         }
-        points
+        Ok(points)
     }
 
     /// Where the contact changes from what it is at `before` on the way to `s`: the last place that

@@ -20,7 +20,7 @@ impl Bvh {
     pub fn closest_point(&self, mesh: &TriangleMesh, q: &Point3) -> MeshFoot {
         let mut best_triangle = self.triangle_in(0);
         let mut best = closest_on_triangle(&mesh.corners(best_triangle), q);
-        self.search(
+        self.tree.search(
             -best.distance_squared,
             |_, node, _| -node.distance_squared(q),
             |slot, _| {

@@ -13,7 +13,7 @@ impl Bvh {
     /// index.
     pub fn highest_at(&self, mesh: &TriangleMesh, x: f64, y: f64) -> Option<VerticalHit> {
         let mut best: Option<VerticalHit> = None;
-        self.search(
+        self.tree.search(
             f64::NEG_INFINITY,
             |_, node, _| if node.plan_distance_squared(x, y) == 0.0 { node.top() } else { f64::NEG_INFINITY },
             |slot, floor| {

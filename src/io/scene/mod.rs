@@ -18,7 +18,7 @@ use std::path::PathBuf;
 pub use error::{Finding, SceneError, SceneText};
 pub use write::complete_toml;
 
-use crate::cutter::Cutter;
+use crate::cutter::{Cutter, Holder};
 use crate::geometry::AnalyticSurface;
 use crate::machine::Machine;
 use crate::metrology::Limits;
@@ -193,6 +193,8 @@ pub struct Scene {
     pub stock: Stock,
     /// With what.
     pub cutter: Cutter,
+    /// What holds it; `None` leaves collisions of shank and holder unchecked.
+    pub holder: Option<Holder>,
     /// How fast.
     pub cutting: CuttingData,
     /// What is tolerated.

@@ -7,14 +7,14 @@ use toml::de::DeTable;
 
 use super::error::{SceneError, SceneText};
 use super::formula;
-use super::section::{LENGTH, Located, Section};
+use super::section::{COORDINATE, LENGTH, Located, Section};
 use super::{
     CuttingData, DEFAULT_ALLOWANCE, DEFAULT_CLEARANCE, DEFAULT_CONTROL_POINTS, DEFAULT_FEED_RATE,
     DEFAULT_LIMITS, DEFAULT_MARGIN, DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE, DEFAULT_REMOVAL,
     DEFAULT_SPINDLE_SPEED, Engine, MeshFormat, NamedFile, PartSource, Scene, Simulation, Stock,
     ToolpathRequest, auto_cell,
 };
-use crate::cutter::Cutter;
+use crate::cutter::{AptWord, AptWords, Cutter, CutterError, CutterShape, Holder, HolderSection};
 use crate::geometry::AnalyticSurface;
 use crate::machine::Machine;
 use crate::metrology::Limits;
@@ -70,7 +70,7 @@ impl Scene {
         })?;
         let root = Section::root(&source, table.get_ref());
         root.only(
-            &["title", "part", "stock", "cutter", "tolerance", "simulation", "machine", "toolpath"],
+            &["title", "part", "stock", "cutter", "holder", "tolerance", "simulation", "machine", "toolpath"],
             &[],
             "a scene",
         )?;
@@ -82,6 +82,7 @@ impl Scene {
         let part = read_part(&root.section("part")?, &folder)?;
         let stock = read_stock(&root.section("stock")?)?;
         let (cutter, cutting) = read_cutter(&root.section("cutter")?)?;
+        let holder = read_holder(&root, &cutter)?;
         let tolerance = read_tolerance(&root.section("tolerance")?)?;
         let mut simulation = read_simulation(&root.section("simulation")?, &cutter)?;
         let (machine, clearance) = read_machine(&root.section("machine")?)?;
@@ -95,6 +96,7 @@ impl Scene {
             part,
             stock,
             cutter,
+            holder,
             cutting,
             tolerance,
             simulation,
@@ -208,15 +210,27 @@ fn read_stock(stock: &Section<'_>) -> Result<Stock, SceneError> {
 
 fn read_cutter(section: &Section<'_>) -> Result<(Cutter, CuttingData), SceneError> {
     const SPEEDS: [&str; 3] = ["spindle_speed", "feed_rate", "plunge_rate"];
-    const SHAPES: [&str; 5] = ["diameter", "corner_radius", "half_angle", "tip_diameter", "shank_diameter"];
+    const SHAPES: [&str; 10] = [
+        "diameter",
+        "corner_radius",
+        "half_angle",
+        "tip_diameter",
+        "shank_diameter",
+        "corner_x",
+        "corner_z",
+        "tip_angle",
+        "side_angle",
+        "length",
+    ];
     let all: Vec<&str> = ["shape"].into_iter().chain(SHAPES).chain(SPEEDS).collect();
     if !section.has("shape") {
         section.only(&all, &[], "a cutter")?;
     }
-    let shape = section.required_word("shape", &["ball", "flat", "bull", "taper"])?;
+    let shape = section.required_word("shape", &["ball", "flat", "bull", "taper", "apt"])?;
     let own: &[&str] = match shape.value {
         "bull" => &["diameter", "corner_radius"],
         "taper" => &["tip_diameter", "corner_radius", "half_angle", "shank_diameter"],
+        "apt" => &["diameter", "corner_radius", "corner_x", "corner_z", "tip_angle", "side_angle", "length"],
         _ => &["diameter"],
     };
     let keys: Vec<&str> = ["shape"].iter().chain(own).chain(&SPEEDS).copied().collect();
@@ -229,10 +243,17 @@ fn read_cutter(section: &Section<'_>) -> Result<(Cutter, CuttingData), SceneErro
             let diameter = section.required_length("diameter", 6.0)?.value;
             (Cutter::bull(diameter, section.required_length("corner_radius", 1.0)?.value), "corner_radius")
         }
+        "apt" => (read_apt(section)?, "shape"),
         _ => read_taper(section)?,
     };
-    let cutter = made
-        .map_err(|e| section.error(&section.key_span(blamed), e.to_string(), format!("change `{blamed}`")))?;
+    let cutter = made.map_err(|e| {
+        let (key, cure) = match &e {
+            CutterError::Apt(refusal) => (apt_key(refusal.word), refusal.cure.clone()),
+            _ => (blamed, format!("change `{blamed}`")),
+        };
+        let span = section.key_span(if section.has(key) { key } else { "shape" });
+        section.error(&span, e.to_string(), format!("`{key}`: {cure}"))
+    })?;
     let rate =
         |key, default| Ok::<f64, SceneError>(section.number(key, RATE, "")?.map_or(default, |v| v.value));
     let cutting = CuttingData {
@@ -243,9 +264,41 @@ fn read_cutter(section: &Section<'_>) -> Result<(Cutter, CuttingData), SceneErro
     Ok((cutter, cutting))
 }
 
-fn read_taper(
-    section: &Section<'_>,
-) -> Result<(Result<Cutter, crate::cutter::CutterError>, &'static str), SceneError> {
+/// The cutter of seven words; a corner whose place is left away touches bottom and side.
+fn read_apt(section: &Section<'_>) -> Result<Result<Cutter, CutterError>, SceneError> {
+    let angle = |key| {
+        // Angles below zero are read, so that the refusal can say what they would mean.
+        let angle = section.number(key, -80.0..=79.99, " degrees")?;
+        Ok::<f64, SceneError>(angle.map_or(0.0, |v| v.value.to_radians()))
+    };
+    let place = |key| Ok::<_, SceneError>(section.number(key, COORDINATE, " mm")?.map(|v| v.value));
+    let words = AptWords {
+        diameter: section.required_length("diameter", 6.0)?.value,
+        corner_radius: section.number("corner_radius", 0.0..=*LENGTH.end(), " mm")?.map_or(0.0, |v| v.value),
+        corner_x: 0.0,
+        corner_z: 0.0,
+        tip_angle: angle("tip_angle")?,
+        side_angle: angle("side_angle")?,
+        length: section.required_length("length", 20.0)?.value,
+    };
+    let words = words.with_centre(place("corner_x")?, place("corner_z")?);
+    Ok(Cutter::apt(&words).map_err(CutterError::Apt))
+}
+
+/// The key that stands for a word.
+fn apt_key(word: AptWord) -> &'static str {
+    match word {
+        AptWord::Diameter => "diameter",
+        AptWord::CornerRadius => "corner_radius",
+        AptWord::CornerX => "corner_x",
+        AptWord::CornerZ => "corner_z",
+        AptWord::TipAngle => "tip_angle",
+        AptWord::SideAngle => "side_angle",
+        AptWord::Length => "length",
+    }
+}
+
+fn read_taper(section: &Section<'_>) -> Result<(Result<Cutter, CutterError>, &'static str), SceneError> {
     let tip = section.required_length("tip_diameter", 2.0)?.value;
     // A tapered ball unless said otherwise.
     let corner = section.number("corner_radius", 0.0..=*LENGTH.end(), " mm")?.map_or(0.5 * tip, |v| v.value);
@@ -253,6 +306,53 @@ fn read_taper(
     let shank = section.required_length("shank_diameter", 6.0)?.value;
     let blamed = if corner > 0.5 * tip { "corner_radius" } else { "shank_diameter" };
     Ok((Cutter::taper(tip, corner, angle.to_radians(), shank), blamed))
+}
+
+/// What holds the cutter, if the scene says so.
+fn read_holder(root: &Section<'_>, cutter: &Cutter) -> Result<Option<Holder>, SceneError> {
+    if !root.has("holder") {
+        return Ok(None);
+    }
+    let holder = root.section("holder")?;
+    holder.only(&["cutting_length", "section"], &[], "[holder]")?;
+    let length = match (holder.length("cutting_length")?, cutter.shape()) {
+        (None, CutterShape::Apt) => cutter.words().length,
+        (None, _) => holder.required_length("cutting_length", 20.0)?.value,
+        (Some(length), _) if length.value < cutter.side_height() => {
+            let message = format!(
+                "the cutting length of {} mm ends below the cutter's full radius, at {:.4} mm",
+                length.value,
+                cutter.side_height()
+            );
+            return Err(holder.error(
+                &length.span,
+                message,
+                "write how far the cutting edges reach up from the tip",
+            ));
+        }
+        (Some(length), _) => length.value,
+    };
+    let sections: Vec<HolderSection> = holder
+        .sections("section")?
+        .iter()
+        .map(|section| {
+            section.only(&["diameter", "top_diameter", "length"], &[], "a section of the holder")?;
+            let diameter = section.required_length("diameter", 32.0)?.value;
+            let top_diameter = section.length("top_diameter")?.map_or(diameter, |v| v.value);
+            Ok(HolderSection {
+                diameter,
+                top_diameter,
+                length: section.required_length("length", 40.0)?.value,
+            })
+        })
+        .collect::<Result<_, SceneError>>()?;
+    Holder::new(length, sections).map(Some).map_err(|e| {
+        holder.error(
+            holder.header(),
+            e.to_string(),
+            "add `[[holder.section]]` with `diameter` and `length` for shank and holder, the lowest first",
+        )
+    })
 }
 
 fn read_tolerance(section: &Section<'_>) -> Result<Limits, SceneError> {

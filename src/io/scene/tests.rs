@@ -98,7 +98,14 @@ fn the_complete_scene_reads_back_as_itself() {
         "wave\"\namplitude = 2\nwavelength_x = 40\nwavelength_y = 33.3",
     ];
     let formula = "wave\"\namplitude = 2.0\nwavelength_x = 40";
-    let all = surfaces.iter().map(|s| with(formula, s)).chain([VALID.to_owned(), taper]);
+    let apt = |words: &str| with("shape = \"ball\"\ndiameter = 6.0", &format!("shape = \"apt\"\n{words}"));
+    let tangent = apt("diameter = 4\ncorner_radius = 0.8\ntip_angle = 12\nside_angle = 20\nlength = 3.4");
+    let barrel = apt("diameter = 6\ncorner_radius = 20\ncorner_z = 6\nlength = 8");
+    let drill = apt("diameter = 6\ntip_angle = 31\nlength = 30");
+    let all = surfaces.iter().map(|s| with(formula, s));
+    let sections = "[[holder.section]]\ndiameter = 6\nlength = 12\n[[holder.section]]\ndiameter = 27\ntop_diameter = 32\nlength = 30";
+    let held = with("[tolerance]", &format!("[holder]\ncutting_length = 9.5\n{sections}\n[tolerance]"));
+    let all = all.chain([VALID.to_owned(), taper, tangent, barrel, drill, held]);
     for text in all {
         let first = Scene::parse("wave.toml", text).unwrap();
         let complete = complete_toml(&first);
@@ -106,9 +113,57 @@ fn the_complete_scene_reads_back_as_itself() {
             Scene::parse("wave.toml", complete.clone()).unwrap_or_else(|e| panic!("{e}\n{complete}"));
         assert_eq!(complete_toml(&second), complete);
         assert_eq!(second.cutter, first.cutter);
+        assert_eq!(second.holder, first.holder);
         assert_eq!(second.tolerance, first.tolerance);
         assert_eq!(second.toolpaths, first.toolpaths);
         assert_eq!(second.part, first.part);
+    }
+}
+
+#[test]
+fn words_of_a_cutter_are_refused_where_they_stand() {
+    let words = "diameter = 6\ncorner_radius = 1\nlength = 8";
+    let cases = [
+        ("tip_angle = -5", "hollow", "tip_angle"),
+        ("side_angle = -3", "undercut", "side_angle"),
+        ("tip_angle = 50\nside_angle = 60", "steeper than the side", "tip_angle"),
+        ("corner_z = 1.4", "above the bottom", "corner_z"),
+        ("corner_x = 1.5\ncorner_z = 0.9", "inside of the side", "corner_x"),
+        ("corner_x = 3.5\ncorner_z = 0.1", "beyond bottom and side", "corner_x"),
+    ];
+    for (edit, reason, key) in cases {
+        let text = with("shape = \"ball\"\ndiameter = 6.0", &format!("shape = \"apt\"\n{words}\n{edit}"));
+        let (message, cure, (line, _)) = refused(&text);
+        assert!(message.contains(reason) && cure.starts_with(&format!("`{key}`: ")), "{message} {cure}");
+        assert!(text.lines().nth(line - 1).unwrap().starts_with(key), "{line}");
+    }
+    let text = with(
+        "shape = \"ball\"\ndiameter = 6.0",
+        "shape = \"apt\"\ndiameter = 6\ncorner_radius = 1\nlength = 0.5",
+    );
+    assert!(refused(&text).1.contains("at least 1 mm"), "{:?}", refused(&text));
+}
+
+#[test]
+fn a_holder_is_read_and_refused_where_it_stands() {
+    let held = |text: &str| with("[tolerance]", &format!("[holder]\n{text}\n[tolerance]"));
+    let section = "[[holder.section]]\ndiameter = 27\nlength = 30";
+    let scene = Scene::parse("wave.toml", held(&format!("cutting_length = 9\n{section}"))).unwrap();
+    let holder = scene.holder.unwrap();
+    assert_eq!((holder.cutting_length(), holder.sections().len()), (9.0, 1));
+    assert_eq!(holder.sections()[0].top_diameter, 27.0);
+    assert!(Scene::parse("wave.toml", VALID).unwrap().holder.is_none());
+    let cases = [
+        (held("cutting_length = 9"), "the holder has no section"),
+        (held(section), "[holder] has no `cutting_length`"),
+        (held(&format!("cutting_length = 2\n{section}")), "below the cutter's full radius"),
+        (held(&format!("cutting_length = 9\n{section}\ncone = 3")), "unknown key `cone`"),
+        (held("cutting_length = 9\n[[holder.section]]\ndiameter = 27"), "has no `length`"),
+        (held("length = 9"), "unknown key `length`"),
+    ];
+    for (text, expected) in cases {
+        let (message, ..) = refused(&text);
+        assert!(message.contains(expected), "{message}");
     }
 }
 

@@ -39,6 +39,7 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     writeln!(out, "allowance = {}  # mm above the part's highest point", number(scene.stock.allowance))?;
     writeln!(out, "margin = {}  # mm around the part in the plan view", number(scene.stock.margin))?;
     write_cutter(out, scene)?;
+    write_holder(out, scene)?;
     let limits = &scene.tolerance;
     writeln!(out, "\n[tolerance]  # mm")?;
     writeln!(
@@ -121,10 +122,36 @@ fn write_cutter(out: &mut String, scene: &Scene) -> std::fmt::Result {
             writeln!(out, "half_angle = {}", number(cutter.half_angle().to_degrees()))?;
             writeln!(out, "shank_diameter = {}", number(diameter))?;
         }
+        CutterShape::Apt => {
+            let w = cutter.words();
+            writeln!(
+                out,
+                "shape = \"apt\"\ndiameter = {}  # where bottom and side cross",
+                number(w.diameter)
+            )?;
+            writeln!(out, "corner_radius = {}", number(w.corner_radius))?;
+            writeln!(out, "corner_x = {}  # centre of the corner from the axis", number(w.corner_x))?;
+            writeln!(out, "corner_z = {}  # and above the tip", number(w.corner_z))?;
+            writeln!(out, "tip_angle = {}  # of the bottom from level", number(w.tip_angle.to_degrees()))?;
+            writeln!(out, "side_angle = {}  # of the side from the axis", number(w.side_angle.to_degrees()))?;
+            writeln!(out, "length = {}", number(w.length))?;
+        }
     }
     writeln!(out, "spindle_speed = {}  # rev/min", number(scene.cutting.spindle_speed))?;
     writeln!(out, "feed_rate = {}  # mm/min", number(scene.cutting.feed_rate))?;
     writeln!(out, "plunge_rate = {}  # mm/min", number(scene.cutting.plunge_rate))
+}
+
+fn write_holder(out: &mut String, scene: &Scene) -> std::fmt::Result {
+    let Some(holder) = &scene.holder else { return Ok(()) };
+    writeln!(out, "\n[holder]  # mm")?;
+    writeln!(out, "cutting_length = {}  # the lowest section begins there", number(holder.cutting_length()))?;
+    holder.sections().iter().try_for_each(|section| {
+        writeln!(out, "\n[[holder.section]]")?;
+        writeln!(out, "diameter = {}", number(section.diameter))?;
+        writeln!(out, "top_diameter = {}", number(section.top_diameter))?;
+        writeln!(out, "length = {}", number(section.length))
+    })
 }
 
 fn write_strategy(out: &mut String, strategy: &Strategy) -> std::fmt::Result {

@@ -229,7 +229,8 @@ impl<T: Real> Sweep<T> for Flat<T> {
     }
 }
 
-/// Any other profile: a cone at the bottom, an arc, a cone at the side, any of which may be missing.
+/// Any other profile but barrels: a cone at the bottom, an arc, a cone at the side, any of which may be
+/// missing.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rounded<T, const CONES: bool> {
     /// Slope of the bottom and where it ends.
@@ -284,22 +285,23 @@ fn lowest_steep(form: &Form, slope: f64) -> f64 {
 impl<T: Real, const CONES: bool> Rounded<T, CONES> {
     /// The profile of `form`, its places rounded by `blur` mm; 0 leaves no doubt.
     pub fn new(form: &Form, blur: f64) -> Self {
-        let side = if form.sin_side > 0.0 { form.cos_side / form.sin_side } else { UPRIGHT };
+        let profile = &form.profile;
+        let side = if profile.side.cos > 0.0 { profile.side.slope() } else { UPRIGHT };
         let sine = STEEPEST_PLANE / STEEPEST_PLANE.hypot(1.0);
-        let gentle = form.flat + sine * form.corner;
-        let within = if side <= STEEPEST_PLANE || gentle > form.arc_end { form.radius } else { gentle };
+        let gentle = profile.centre_x + sine * profile.corner;
+        let within = if side <= STEEPEST_PLANE || gentle > profile.arc_end { form.radius } else { gentle };
         Self {
-            bottom: T::of(0.0),
-            bottom_end: T::of(form.flat),
-            centre: T::of(form.flat),
-            centre_z: T::of(form.corner),
+            bottom: T::of(profile.bottom.slope()),
+            bottom_end: T::of(profile.bottom_end),
+            centre: T::of(profile.centre_x),
+            centre_z: T::of(profile.centre_z),
             // A sharp edge is a very small arc.
-            corner: T::of(form.corner.max(SHARP)),
-            arc_end: T::of(form.arc_end),
-            arc_end_z: T::of(form.height(form.arc_end)),
+            corner: T::of(profile.corner.max(SHARP)),
+            arc_end: T::of(profile.arc_end),
+            arc_end_z: T::of(profile.arc_end_height),
             side: T::of(side),
             radius: T::of(form.radius),
-            radius_of_arc: T::of(form.flat + form.corner),
+            radius_of_arc: T::of(profile.centre_x + profile.corner.max(SHARP)),
             within: T::of(within),
             blur: T::of(blur),
             edge: T::of(2.0 * form.radius * blur),

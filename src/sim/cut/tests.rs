@@ -118,7 +118,7 @@ fn a_bound_tightened_by_a_micrometre_is_wrong() {
     let path = wave_path(2.0, 0.3, 0.2);
     // Small cells: in large leaves the bound is wide.
     let stock = ZMap::block(square_grid(2.0, 0.005), 5.0);
-    for cutter in cutters() {
+    for cutter in cutters().into_iter().take(6) {
         compare(&stock, &cutter, &path);
         let exact = cut_reference(&stock, &cutter, &path, &Silent).unwrap();
         let with = |margin: f64| {
@@ -168,7 +168,10 @@ fn compare(stock: &ZMap, cutter: &Cutter, path: &Toolpath) {
 fn a_thousand_random_programs_agree_with_the_reference() {
     let mut rng = Rng::new(24);
     for round in 0..1000 {
-        let cutter = cutters()[round % 6];
+        let cutter = {
+            let all = cutters();
+            all[round % all.len()]
+        };
         let size = [2.0, 4.0, 12.0, 40.0, 200.0][rng.below(5)];
         let moves = 1 + rng.below(60);
         let path = random_path(&mut rng, moves, size);

@@ -13,25 +13,40 @@ use crate::geometry::Jet2;
 /// How the profile's height depends on the distance from the axis, as one smooth piece.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Law {
+    /// The point at the axis, nothing beyond.
+    Point,
     /// Zero up to the given distance, nothing beyond.
     Disc(f64),
+    /// The cone at the bottom of a profile, nothing beyond.
+    Bottom(Profile),
+    /// The arc of a profile, carried on toward the axis, nothing beyond.
+    Arc(Profile),
     /// The whole profile, whose parts meet smoothly.
     Smooth(Profile),
-    /// The cone of a profile, carried on toward the axis.
+    /// The cone at the side of a profile, carried on toward the axis.
     Cone(Profile),
 }
 
 impl Profile {
-    /// The smooth pieces of which the profile is the greatest. A cone that starts at a sharp corner
-    /// needs two: the kink between them would stop a Newton method.
+    /// The smooth pieces of which the profile is the greatest. Where an edge lies between two pieces,
+    /// both are needed: the kink would stop a Newton method. The inner piece, which ends at the edge,
+    /// finds the contacts of the edge itself.
     pub(super) fn laws(&self) -> impl Iterator<Item = Law> + use<> {
-        let sharp = self.corner == 0.0;
-        let (first, second) = match (sharp, self.cone.is_finite()) {
-            (true, true) => (Law::Disc(self.flat), Some(Law::Cone(*self))),
-            (true, false) => (Law::Disc(self.flat), None),
-            (false, _) => (Law::Smooth(*self), None),
-        };
-        std::iter::once(first).chain(second)
+        let shape = &self.shape;
+        if shape.is_plain() && self.corner > 0.0 {
+            return [Some(Law::Smooth(*self)), None, None, None].into_iter().flatten();
+        }
+        let level = shape.bottom.sin == 0.0;
+        let point = shape.point().sin > 0.0;
+        let bottom = if level { Law::Disc(shape.bottom_end) } else { Law::Bottom(*self) };
+        [
+            point.then_some(Law::Point),
+            (shape.bottom_end > 0.0).then_some(bottom),
+            (self.corner > 0.0).then_some(Law::Arc(*self)),
+            self.cone.is_finite().then_some(Law::Cone(*self)),
+        ]
+        .into_iter()
+        .flatten()
     }
 }
 
@@ -39,13 +54,34 @@ impl Profile {
 /// than this share of the corner radius; nearer, second derivatives overflow.
 const EDGE: f64 = 1e-7;
 
+/// Derivatives beside the point of a cone, where they have no limit, are worked out no nearer to it
+/// than this, mm; nearer, second derivatives overflow.
+const POINT: f64 = 1e-9;
+
 impl Law {
     /// Height at distance `rho`, then `A = f'/ρ` and `B = (f'' − f'/ρ)/ρ²`: with `d = xy − c` the
     /// derivatives of `f(|d|)` are `A d·∂ᵢd` and `A (∂ᵢd·∂ⱼd + d·∂ᵢⱼd) + B (d·∂ᵢd)(d·∂ⱼd)`.
     fn height(&self, rho: f64) -> [f64; 3] {
+        let cone = |height: f64, slope: f64| {
+            let rho = rho.max(POINT);
+            [height, slope / rho, -slope / (rho * rho * rho)]
+        };
         match self {
-            Self::Disc(_) => [0.0; 3],
-            Self::Cone(p) => [p.cone * (rho - p.flat), p.cone / rho, -p.cone / (rho * rho * rho)],
+            Self::Point | Self::Disc(_) => [0.0; 3],
+            Self::Bottom(p) => {
+                let slope = p.shape.bottom.slope();
+                cone(slope * rho, slope)
+            }
+            Self::Cone(p) => cone(p.shape.arc_end_height + p.cone * (rho - p.arc_end), p.cone),
+            Self::Arc(p) if rho <= p.flat => [p.shape.centre_z - p.corner, 0.0, 0.0],
+            Self::Arc(p) => {
+                let (r, x) = (p.corner, rho - p.flat);
+                let w = (r * r - x * x).max(EDGE * EDGE * r * r).sqrt();
+                let rho = rho.max(POINT);
+                let a = x / (w * rho);
+                let height = p.shape.centre_z - ((r - x) * (r + x)).max(0.0).sqrt();
+                [height, a, (r * r / (w * w * w) - a) / (rho * rho)]
+            }
             Self::Smooth(p) if rho <= p.flat && p.flat > 0.0 => [0.0; 3],
             Self::Smooth(p) if rho > p.arc_end => [p.height(rho), p.cone / rho, -p.cone / (rho * rho * rho)],
             Self::Smooth(p) => {
@@ -57,6 +93,26 @@ impl Law {
                 let a = x / (w * rho);
                 [p.height(rho), a, (r * r / (w * w * w) - a) / (rho * rho)]
             }
+        }
+    }
+
+    /// Where the piece ends, of a cutter of that radius.
+    fn limit(&self, radius: f64) -> f64 {
+        match self {
+            Self::Point => 0.0,
+            Self::Disc(end) => *end,
+            Self::Bottom(p) => p.shape.bottom_end,
+            Self::Arc(p) => p.arc_end,
+            Self::Smooth(_) | Self::Cone(_) => radius,
+        }
+    }
+
+    /// Where the piece begins; carried on farther in it lies below the cutter and touches nothing.
+    fn begin(&self) -> f64 {
+        match self {
+            Self::Arc(p) => p.shape.bottom_end,
+            Self::Cone(p) => p.arc_end,
+            _ => 0.0,
         }
     }
 }
@@ -96,6 +152,9 @@ const ROUNDING: f64 = 2.0 * f64::EPSILON;
 /// A point this much (relative) beyond the radius still counts as on it.
 const ON_RIM: f64 = 1e-13;
 
+/// A point this close to the axis, mm, counts as on it.
+const ON_AXIS: f64 = 1e-11;
+
 /// A start whose first step ends within this share of its distance from a known maximum would
 /// reach that one again. Greater may skip a second maximum beside the first.
 const SAME: f64 = 0.25;
@@ -118,13 +177,15 @@ impl<'s, J: Fn(f64, f64) -> Jet2> Hill<'s, J> {
     /// The hill of a surface with the given domain for a cutter of that radius with its axis at
     /// `(axis[0], axis[1])`.
     pub(super) fn new(jet: &'s J, domain: [[f64; 2]; 2], law: Law, radius: f64, axis: [f64; 2]) -> Self {
-        let radius = if let Law::Disc(r) = law { r } else { radius };
-        Self { jet, domain, law, radius, axis }
+        Self { jet, domain, law, radius: law.limit(radius), axis }
     }
 
     /// Climbs from `start` to a local maximum; `None` where the surface near `start` is out of the
     /// cutter's reach, or when the climb heads for a `known` maximum.
     pub(super) fn climb(&self, start: [f64; 2], known: impl Iterator<Item = [f64; 2]>) -> Option<Peak> {
+        if let Law::Point = self.law {
+            return self.on_axis(start);
+        }
         let mut here =
             self.reachable([0, 1].map(|i| start[i].clamp(self.domain[i][0], self.domain[i][1])))?;
         let mut model = self.model(&here.jet);
@@ -149,11 +210,26 @@ impl<'s, J: Fn(f64, f64) -> Jet2> Hill<'s, J> {
             step = self.step(here.at, &here.jet, &model);
         }
         let [dx, dy] = self.offset(&here.jet);
-        match self.law {
-            // Inside the disc the cone carried on lies below the cutter: no contact.
-            Law::Cone(p) if dx.hypot(dy) < p.flat => None,
-            _ => Some(here),
+        (dx.hypot(dy) >= self.law.begin()).then_some(here)
+    }
+
+    /// The place of the surface on the cutter's axis, by Newton's method in the plan view.
+    fn on_axis(&self, start: [f64; 2]) -> Option<Peak> {
+        let mut at = start;
+        for _ in 0..MAX_RETURNS {
+            let jet = (self.jet)(at[0], at[1]);
+            let d = self.offset(&jet);
+            if d[0].hypot(d[1]) <= ON_AXIS {
+                return Some(Peak { at, jet, tip_z: jet.p.z });
+            }
+            let det = jet.du.x * jet.dv.y - jet.dv.x * jet.du.y;
+            let step = [(d[1] * jet.dv.x - d[0] * jet.dv.y) / det, (d[0] * jet.du.y - d[1] * jet.du.x) / det];
+            if !(step[0].is_finite() && step[1].is_finite()) {
+                return None;
+            }
+            at = [0, 1].map(|i| (at[i] + step[i]).clamp(self.domain[i][0], self.domain[i][1]));
         }
+        None
     }
 
     /// Goes as far along the step as gains height.

@@ -49,7 +49,7 @@ impl Roof {
         let rest = Rest::on_plane(exact, profile);
         Self {
             gradient,
-            shift: rest.shift.map(|s| s as f32),
+            shift: rest.shift().map(|s| s as f32),
             rest: round_up(height + rest.lift + SLACK * profile.radius),
             bend: round_down(rest.bend),
             bend_within: round_down(rest.bend_within),

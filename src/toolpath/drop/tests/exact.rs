@@ -87,7 +87,7 @@ impl<F: Fn(f64, f64) -> [f64; 6] + Sync> Graph<F> {
             if !inside {
                 return f64::NEG_INFINITY;
             }
-            (self.z)(px, py)[0] - cutter.height(rho).unwrap()
+            (self.z)(px, py)[0] - cutter.height(rho.min(reach)).unwrap()
         });
         by_parameters.max(by_angle)
     }

@@ -1,0 +1,429 @@
+//! The seven words of an APT cutter, `CUTTER/d,r,e,f,α,β,h` (ISO 4343): from words to a profile, and
+//! which words make none. mm, rad.
+//!
+//! The bottom runs from the tip at the angle α above the plane of the tip, the side at the angle β
+//! from the axis up to the height h; d is twice the distance from the axis at which the two, carried
+//! on, cross. The corner is a circle of radius r around the point `(e, f)`, distance from the axis and
+//! height above the tip. What lies inside all three is the cutter, so the profile is convex by the
+//! way it is made; words are refused where one of the three would have no part in it.
+
+use super::profile::{Incline, Profile};
+use super::{Cutter, CutterShape};
+
+/// Circle and line whose distance is off by no more than this, mm, are taken to touch: programs have
+/// four decimals. More turns shallow edges into smooth corners; less refuses cutters that were read
+/// from programs.
+const TOUCH: f64 = 2.0e-4;
+
+/// Two ends of the arc may be out of order by this angle, rad, of rounding.
+const SAME_ANGLE: f64 = 1.0e-9;
+
+/// Angles from this on leave so flat or so thin a cone that its other end is kilometres away, degrees.
+const GREATEST_ANGLE: f64 = 80.0;
+
+/// Lengths from this on are no cutter's, mm.
+const GREATEST_LENGTH: f64 = 1.0e4;
+
+/// The seven words: mm and rad.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AptWords {
+    /// d: twice the distance from the axis at which bottom and side, carried on, cross.
+    pub diameter: f64,
+    /// r: radius of the corner.
+    pub corner_radius: f64,
+    /// e: distance of the corner's centre from the axis.
+    pub corner_x: f64,
+    /// f: height of the corner's centre above the tip.
+    pub corner_z: f64,
+    /// α: angle of the bottom above the plane of the tip.
+    pub tip_angle: f64,
+    /// β: angle between axis and side.
+    pub side_angle: f64,
+    /// h: height of the cutter above its tip.
+    pub length: f64,
+}
+
+/// One of the seven words.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AptWord {
+    /// d.
+    Diameter,
+    /// r.
+    CornerRadius,
+    /// e.
+    CornerX,
+    /// f.
+    CornerZ,
+    /// α.
+    TipAngle,
+    /// β.
+    SideAngle,
+    /// h.
+    Length,
+}
+
+/// Why seven words make no cutter.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{reason}")]
+pub struct AptError {
+    /// The word to change.
+    pub word: AptWord,
+    /// What is wrong.
+    pub reason: String,
+    /// What would cure it.
+    pub cure: String,
+}
+
+fn refused<T>(word: AptWord, reason: impl Into<String>, cure: impl Into<String>) -> Result<T, AptError> {
+    Err(AptError { word, reason: reason.into(), cure: cure.into() })
+}
+
+/// A length or an angle in a message: four decimals, as programs have.
+fn shown(value: f64) -> f64 {
+    (value * 1e4).round() / 1e4
+}
+
+impl AptWords {
+    /// The centre `(e, f)` of the corner that touches bottom and side, whatever centre is given.
+    pub fn tangent_centre(&self) -> [f64; 2] {
+        let (sin, cos) = self.tip_angle.sin_cos();
+        let (sin_side, cos_side) = self.side_angle.sin_cos();
+        let r = self.corner_radius;
+        let e = if self.tip_angle == 0.0 && self.side_angle == 0.0 {
+            0.5 * self.diameter - r
+        } else {
+            (self.foot() * cos_side + r * sin_side / cos - r) / (cos_side - sin_side * sin / cos)
+        };
+        [e, (r + e * sin) / cos]
+    }
+
+    /// With a corner around the given centre; a coordinate that is left away is the one at which the
+    /// circle touches the side (e) or the bottom (f).
+    pub fn with_centre(mut self, e: Option<f64>, f: Option<f64>) -> Self {
+        let (tip, side, r) = (self.tip_angle, self.side_angle, self.corner_radius);
+        [self.corner_x, self.corner_z] = match (e, f) {
+            (None, None) => self.tangent_centre(),
+            (Some(e), None) => [e, (r + e * tip.sin()) / tip.cos()],
+            (None, Some(f)) => [self.foot() + (f * side.sin() - r) / side.cos(), f],
+            (Some(e), Some(f)) => [e, f],
+        };
+        self
+    }
+
+    /// Distance from the axis at which the side, carried on, meets the plane of the tip.
+    fn foot(&self) -> f64 {
+        0.5 * self.diameter * (1.0 - self.tip_angle.tan() * self.side_angle.tan())
+    }
+
+    fn check_ranges(&self) -> Result<(), AptError> {
+        use AptWord::{CornerRadius, CornerX, CornerZ, Diameter, Length, SideAngle, TipAngle};
+        let lengths = [
+            (Diameter, "diameter", self.diameter, f64::MIN_POSITIVE),
+            (CornerRadius, "corner radius", self.corner_radius, 0.0),
+            (CornerX, "place of the corner's centre along x", self.corner_x, -GREATEST_LENGTH),
+            (CornerZ, "place of the corner's centre along z", self.corner_z, -GREATEST_LENGTH),
+            (Length, "length", self.length, 0.0),
+        ];
+        for (word, what, value, least) in lengths {
+            if !(value >= least && value < GREATEST_LENGTH) {
+                return refused(
+                    word,
+                    format!("the {what} is {value} mm"),
+                    "write a length that a cutter can have",
+                );
+            }
+        }
+        let angles = [
+            (
+                TipAngle,
+                "tip",
+                self.tip_angle,
+                "falls toward the axis: a hollow end, which leaves a cone in the middle",
+            ),
+            (
+                SideAngle,
+                "side",
+                self.side_angle,
+                "leans inward: an undercut, which a vertical axis cannot use",
+            ),
+        ];
+        for (word, what, angle, below) in angles {
+            let degrees = shown(angle.to_degrees());
+            if angle < 0.0 {
+                let reason = format!("with a {what} angle of {degrees} degrees the profile {below}");
+                return refused(word, reason, "write an angle of 0 or more");
+            }
+            if angle.is_nan() || angle.to_degrees() >= GREATEST_ANGLE {
+                let reason = format!("the {what} angle is {degrees} degrees");
+                return refused(word, reason, format!("write an angle below {GREATEST_ANGLE} degrees"));
+            }
+        }
+        let sum = (self.tip_angle + self.side_angle).to_degrees();
+        if sum > 90.0 - 1e-6 {
+            let reason = format!(
+                "tip angle and side angle make {} degrees: the bottom is steeper than the side",
+                shown(sum)
+            );
+            return refused(TipAngle, reason, "write angles that make less than 90 degrees together");
+        }
+        Ok(())
+    }
+}
+
+impl Cutter {
+    /// The cutter of seven words. The corner's circle touches bottom and side or crosses them in an
+    /// edge; with a radius greater than half of the diameter and a centre beyond the axis (e < 0) it is
+    /// a barrel or a lens.
+    ///
+    /// # Errors
+    /// [`AptError`] where a word is out of range, the bottom is hollow or the side undercut, the pieces
+    /// do not meet, one of them has no part in the profile, or the length ends below the corner.
+    ///
+    /// # Tolerance
+    /// A circle within 0.2 µm of touching a line is moved until it does.
+    pub fn apt(words: &AptWords) -> Result<Self, AptError> {
+        words.check_ranges()?;
+        let mut words = *words;
+        let r = words.corner_radius;
+        let (bottom, side) = (Incline::from_plane(words.tip_angle), Incline::from_axis(words.side_angle));
+        let foot = words.foot();
+        let (e, f) = (words.corner_x, words.corner_z);
+        let from_bottom = f * bottom.cos - e * bottom.sin;
+        let from_side = (foot - e) * side.sin + f * side.cos;
+        let [tangent_e, tangent_f] = words.tangent_centre();
+        if from_bottom > r + TOUCH {
+            let reason = format!(
+                "the corner's circle hangs {} mm above the bottom and does not meet it",
+                shown(from_bottom - r)
+            );
+            return refused(AptWord::CornerZ, reason, touching(AptWord::CornerZ, [tangent_e, tangent_f]));
+        }
+        if from_side > r + TOUCH {
+            let reason = format!(
+                "the corner's circle stands {} mm inside of the side and does not meet it",
+                shown(from_side - r)
+            );
+            return refused(AptWord::CornerX, reason, touching(AptWord::CornerX, [tangent_e, tangent_f]));
+        }
+        let (bottom_edge, side_edge) = (from_bottom < r - TOUCH, from_side < r - TOUCH);
+        [words.corner_x, words.corner_z] = match (bottom_edge, side_edge) {
+            (false, false) => [tangent_e, tangent_f],
+            (false, true) => [e, (r + e * bottom.sin) / bottom.cos],
+            (true, false) => [foot + (f * side.cos - r) / side.sin, f],
+            (true, true) => [e, f],
+        };
+        let begins = words.tip_angle + (from_bottom / r).clamp(-1.0, 1.0).acos();
+        let ends = 90f64.to_radians() - words.side_angle - (from_side / r).clamp(-1.0, 1.0).acos();
+        // Without a radius the corner is where bottom and side cross, or the words contradict themselves.
+        let apart = r > 0.0 && (bottom_edge || side_edge) && begins > ends + SAME_ANGLE;
+        if apart || (r == 0.0 && (bottom_edge || side_edge)) {
+            let reason =
+                "the corner's circle lies beyond bottom and side, and cuts nothing off where they cross";
+            return refused(AptWord::CornerX, reason, touching(AptWord::CornerX, [tangent_e, tangent_f]));
+        }
+        let radius = if side.cos == 0.0 { foot } else { foot + words.length * side.cos / side.sin };
+        let centre = [words.corner_x, words.corner_z];
+        let mut profile = Profile::tangent(bottom, centre, r, side, f64::INFINITY);
+        profile.arc_end = words.corner_x + r * side.sin;
+        (profile.bottom_edge, profile.side_edge) = (bottom_edge, side_edge);
+        profile.meet(foot);
+        if profile.bottom_end < -TOUCH {
+            let reason = "the corner's circle crosses the axis above the tip";
+            return refused(
+                AptWord::CornerZ,
+                reason,
+                "move the centre down until the circle passes through the tip",
+            );
+        }
+        profile.bottom_end = profile.bottom_end.max(0.0);
+        if words.length < profile.arc_end_height - TOUCH {
+            let reason =
+                format!("the length of {} mm ends below the side, inside of the corner", shown(words.length));
+            let cure = format!("write at least {} mm", (profile.arc_end_height * 1e4).ceil() / 1e4);
+            return refused(AptWord::Length, reason, cure);
+        }
+        if side.cos == 0.0 {
+            profile.arc_end = radius;
+        }
+        profile.radius = radius.max(profile.arc_end);
+        Ok(Self::new(CutterShape::Apt, words, profile))
+    }
+}
+
+/// The cure for a corner that is out of place.
+fn touching(word: AptWord, [e, f]: [f64; 2]) -> String {
+    let value = if word == AptWord::CornerX { e } else { f };
+    format!("leave it away, or write {}, for a corner that touches bottom and side", shown(value))
+}
+
+#[cfg(test)]
+impl AptWords {
+    /// Profiles of up to 3 mm of radius with every piece, with edges and without; angles in degrees.
+    pub fn examples() -> Vec<Self> {
+        let words = |d: f64, r: f64, centre: Option<[f64; 2]>, alpha: f64, beta: f64, length: f64| {
+            let mut words = Self {
+                diameter: d,
+                corner_radius: r,
+                corner_x: 0.0,
+                corner_z: 0.0,
+                tip_angle: alpha.to_radians(),
+                side_angle: beta.to_radians(),
+                length,
+            };
+            [words.corner_x, words.corner_z] = centre.unwrap_or_else(|| words.tangent_centre());
+            words
+        };
+        let barrel = 20f64;
+        vec![
+            // A bull nose with a cone below and a cone above, all tangent.
+            words(4.0, 0.8, None, 12.0, 20.0, 3.4),
+            // A drill point, an engraver's point and a chamfer mill.
+            words(6.0, 0.0, None, 31.0, 0.0, 5.0),
+            words(0.2, 0.0, None, 0.0, 20.0, 7.0),
+            words(3.0, 0.0, None, 10.0, 35.0, 2.0),
+            // A rounded point.
+            words(1.5, 0.5, None, 15.0, 40.0, 2.4),
+            // A barrel: a flat tip, an edge, an arc of 20 mm that ends upright.
+            words(6.0, barrel, Some([3.0 - barrel, 6.0]), 0.0, 0.0, 8.0),
+            // A barrel that ends in an edge against a leaning side, over a conical bottom.
+            words(4.0, 6.0, Some([-2.7, 5.0]), 5.0, 15.0, 5.0),
+            // A lens: an arc of 5 mm through the tip that ends in an edge at 3 mm.
+            words(6.0, 5.0, Some([0.0, 5.0]), 0.0, 0.0, 4.0),
+            // A bull nose whose circle dips below the bottom and beyond the side: two edges.
+            words(6.0, 1.2, Some([2.0, 1.0]), 0.0, 0.0, 4.0),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What lies inside bottom, circle and side, asked of the three one by one: the least height of
+    /// any point at distance ρ, by bisection.
+    fn height_by_definition(w: &AptWords, rho: f64) -> f64 {
+        let foot = w.foot();
+        let inside = |z: f64| {
+            let above_bottom = z >= rho * w.tip_angle.tan();
+            let within_side = rho <= foot + z * w.side_angle.tan() + 1e-12;
+            // Where the corner stands out of the circle around (e, f), between the two normals.
+            let (x, y) = (rho - w.corner_x, z - w.corner_z);
+            let beside = x * w.tip_angle.cos() + y * w.tip_angle.sin() > 0.0;
+            let below = x * w.side_angle.sin() + y * w.side_angle.cos() < 0.0;
+            above_bottom && within_side && (!(beside && below) || x.hypot(y) <= w.corner_radius)
+        };
+        let (mut low, mut high) = (-1.0, w.length);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            *(if inside(middle) { &mut high } else { &mut low }) = middle;
+        }
+        high
+    }
+
+    #[test]
+    fn profiles_are_what_lies_inside_bottom_circle_and_side() {
+        for words in AptWords::examples() {
+            let cutter = Cutter::apt(&words).unwrap();
+            let radius = cutter.radius();
+            for k in 0..=400 {
+                let rho = radius * f64::from(k) / 400.0 * (1.0 - 1e-9);
+                let (got, expected) = (cutter.height(rho).unwrap(), height_by_definition(&words, rho));
+                assert!((got - expected).abs() < 1e-7, "{words:?} at {rho}: {got} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn profiles_are_convex_and_never_fall_and_grow_on_all_sides() {
+        for words in AptWords::examples() {
+            let cutter = Cutter::apt(&words).unwrap();
+            for growth in [0.0, 0.003, 0.5] {
+                let profile = cutter.profile().grown(growth);
+                let heights: Vec<f64> =
+                    (0..=900).map(|k| profile.height(profile.radius * f64::from(k) / 900.0)).collect();
+                for h in heights.windows(3) {
+                    assert!(h[1] >= h[0] && h[0] - 2.0 * h[1] + h[2] > -1e-12, "{words:?} {growth} {h:?}");
+                }
+                // It holds a ball of that radius rolled around the cutter, from below.
+                for k in 0..=90 {
+                    let rho = cutter.radius() * (f64::from(k) / 90.0).min(1.0 - 1e-15);
+                    for angle in 0..=30 {
+                        let (sin, cos) = (f64::from(angle) * 3f64.to_radians()).sin_cos();
+                        let (x, z) = (rho + growth * sin, cutter.height(rho).unwrap() - growth * cos);
+                        assert!(profile.height(x.min(profile.radius)) <= z + 1e-9, "{words:?} {growth} {x}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn named_cutters_are_made_by_their_words() {
+        let taper = Cutter::taper(2.0, 0.4, 20f64.to_radians(), 6.0).unwrap();
+        let named =
+            [Cutter::ball(6.0).unwrap(), Cutter::flat(6.0).unwrap(), Cutter::bull(6.0, 1.3).unwrap(), taper];
+        for cutter in named {
+            let again = Cutter::apt(cutter.words()).unwrap();
+            assert!((again.radius() - cutter.radius()).abs() < 1e-12);
+            for k in 0..=300 {
+                let rho = 2.999 * f64::from(k) / 300.0;
+                let (a, b) = (again.height(rho).unwrap(), cutter.height(rho).unwrap());
+                assert!((a - b).abs() < 1e-12, "{cutter:?} at {rho}: {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn words_that_make_no_cutter_name_the_one_to_change() {
+        use AptWord::{CornerRadius, CornerX, CornerZ, Diameter, Length, SideAngle, TipAngle};
+        type Edit = fn(&mut AptWords);
+        let good = AptWords::examples()[0];
+        assert!(Cutter::apt(&good).is_ok());
+        let change = |f: Edit| {
+            let mut words = good;
+            f(&mut words);
+            Cutter::apt(&words).unwrap_err()
+        };
+        let cases: [(Edit, AptWord, &str); 12] = [
+            (|w| w.diameter = 0.0, Diameter, "diameter is 0"),
+            (|w| w.diameter = f64::NAN, Diameter, "NaN"),
+            (|w| w.corner_radius = -1.0, CornerRadius, "-1"),
+            (|w| w.tip_angle = -0.1, TipAngle, "hollow"),
+            (|w| w.tip_angle = f64::INFINITY, TipAngle, "inf"),
+            (|w| w.side_angle = -0.1, SideAngle, "undercut"),
+            (|w| w.side_angle = 79f64.to_radians(), TipAngle, "steeper than the side"),
+            (|w| w.corner_z += 0.3, CornerZ, "above the bottom"),
+            (|w| w.corner_x -= 0.3, CornerZ, "above the bottom"),
+            (
+                |w| (w.corner_x, w.corner_z) = (w.corner_x - 0.3, w.corner_z - 0.1),
+                CornerX,
+                "inside of the side",
+            ),
+            (
+                |w| (w.corner_x, w.corner_z) = (w.corner_x + 0.4, w.corner_z - 0.3),
+                CornerX,
+                "beyond bottom and side",
+            ),
+            (|w| w.length = 0.2, Length, "ends below the side"),
+        ];
+        for (edit, word, expected) in cases {
+            let error = change(edit);
+            assert_eq!(error.word, word, "{error}");
+            assert!(error.reason.contains(expected) && !error.cure.is_empty(), "{error}");
+        }
+        // A pointed barrel: its circle crosses the axis above the tip.
+        let pointed = AptWords {
+            diameter: 6.0,
+            corner_radius: 10.0,
+            corner_x: -7.0,
+            corner_z: 9.0,
+            tip_angle: 0.0,
+            side_angle: 0.0,
+            length: 12.0,
+        };
+        let error = Cutter::apt(&pointed).unwrap_err();
+        assert_eq!(error.word, CornerZ, "{error}");
+        let through_tip = AptWords { corner_z: 51f64.sqrt(), ..pointed };
+        assert!(Cutter::apt(&through_tip).unwrap().height(0.0).unwrap().abs() < 1e-12);
+    }
+}
