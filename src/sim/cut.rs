@@ -100,7 +100,7 @@ fn tile_side(radius: f64, cell: f64) -> usize {
 const MOST_JUDGES: usize = 2 * LANES;
 
 /// So few moves go down to the leaves without further tests.
-const FEW: usize = 2;
+const FEW: usize = 3;
 
 /// What was done, for benchmarks and tests.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -328,11 +328,11 @@ impl<T: Real> Planes<T> {
         self.y[lane] = from.y[from_lane];
     }
 
-    /// Heights at the corners of a square.
+    /// Heights at the corners of a square, raised by a margin.
     #[inline(always)]
-    fn corners(&self, lane: usize, square: &Square<T>) -> [T; 4] {
+    fn corners(&self, lane: usize, square: &Square<T>, margin: T) -> [T; 4] {
         let (dx, dy) = (self.x[lane] * square.half_x, self.y[lane] * square.half_y);
-        let z = self.z[lane];
+        let z = self.z[lane] + margin;
         [z - dx - dy, z + dx - dy, z - dx + dy, z + dx + dy]
     }
 }
@@ -399,7 +399,7 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
             if level + 1 == self.levels.len() {
                 self.levels.push(MoveList::new());
             }
-            // Two moves cost less at every cell than telling them apart.
+            // So few cost less at every cell than telling them apart.
             let level = if self.levels[level].len() <= FEW {
                 level
             } else {
@@ -443,52 +443,46 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
         // Moves that pass all of the square can judge others.
         let covers = if within > T::of(0.0) { within * within } else { T::of(-1.0) };
         let infinite = T::of(f64::INFINITY);
-        let mut least = [infinite; LANES];
-        let mut least_in = [0u32; LANES];
+        let (mut least, mut best) = (infinite, usize::MAX);
         for (k, (chunk, planes)) in all.chunks().iter().zip(&mut self.planes).enumerate() {
             *planes = planes_of(&self.sweep, chunk, &square);
+            let mut judges = [infinite; LANES];
             for lane in 0..LANES {
-                let judges = !chunk.name(lane).bound_only() & (planes.away[lane] <= covers);
-                let z = if judges { planes.z[lane] } else { infinite };
-                let lower = z < least[lane];
-                least[lane] = if lower { z } else { least[lane] };
-                least_in[lane] = if lower { (k * LANES + lane) as u32 } else { least_in[lane] };
+                let may = !chunk.name(lane).bound_only() & (planes.away[lane] <= covers);
+                judges[lane] = if may { planes.z[lane] } else { infinite };
+            }
+            let (lowest, lane) = least_of(&judges);
+            if lowest < least {
+                (least, best) = (lowest, k * LANES + lane);
             }
         }
-        // The least of the lanes, by halves, without a branch.
-        let mut half = LANES / 2;
-        while half > 0 {
-            for lane in 0..half {
-                let lower = least[lane + half] < least[lane];
-                least[lane] = if lower { least[lane + half] } else { least[lane] };
-                least_in[lane] = if lower { least_in[lane + half] } else { least_in[lane] };
-            }
-            half /= 2;
-        }
-        let (best, ceiling) = if least[0] < infinite {
-            let k = least_in[0] as usize;
-            (k, corners(&self.sweep, &all.get(k).0, &square))
-        } else {
-            (usize::MAX, [infinite; 4])
-        };
+        let ceiling =
+            if least < infinite { corners(&self.sweep, &all.get(best).0, &square) } else { [infinite; 4] };
         let margin = T::of(self.job.margin);
         for (k, (chunk, planes)) in all.chunks().iter().zip(&self.planes).enumerate() {
-            let mut keep = [false; LANES];
+            let mut keep = [0u32; LANES];
             for lane in 0..LANES {
-                let corners = planes.corners(lane, &square).map(|z| z + margin);
+                let corners = planes.corners(lane, &square, margin);
                 let above = at_or_above(corners, ceiling);
                 let lowest = corners[0].smaller(corners[1]).smaller(corners[2].smaller(corners[3]));
-                keep[lane] = !above & (lowest < stock) & (planes.away[lane] <= reach2);
+                keep[lane] = u32::from(!above & (lowest < stock) & (planes.away[lane] <= reach2));
             }
             let valid = (all.len() - k * LANES).min(LANES);
-            for (lane, &keep) in keep[..valid].iter().enumerate() {
+            let mut wanted = bits(&keep) & (u32::MAX >> (32 - valid));
+            if best / LANES == k {
+                wanted |= 1 << (best % LANES);
+            }
+            while wanted != 0 {
+                let lane = wanted.trailing_zeros() as usize;
+                wanted &= wanted - 1;
                 let place = k * LANES + lane;
-                if place == best || (keep && !is_covered(all, &self.planes, place)) {
-                    if kept.len() < MOST_JUDGES {
-                        self.kept_planes[kept.len() / LANES].set(kept.len() % LANES, planes, lane);
-                    }
-                    kept.push(&chunk.lane(lane), chunk.name(lane));
+                if place != best && is_covered(all, &self.planes, place) {
+                    continue;
                 }
+                if kept.len() < MOST_JUDGES {
+                    self.kept_planes[kept.len() / LANES].set(kept.len() % LANES, planes, lane);
+                }
+                kept.push(&chunk.lane(lane), chunk.name(lane));
             }
         }
         if (FEW + 1..=MOST_JUDGES).contains(&kept.len()) {
@@ -621,37 +615,69 @@ fn judge<T: Real, S: Sweep<T>>(
     square: &Square<T>,
     margin: T,
 ) {
-    let zero = [T::of(0.0); LANES];
-    let mut floor = [[zero; 4]; MOST_JUDGES / LANES];
-    let mut height = [[zero; 4]; MOST_JUDGES / LANES];
-    let mut useless = [[false; LANES]; MOST_JUDGES / LANES];
+    const CHUNKS: usize = MOST_JUDGES / LANES;
+    let zero = [[T::of(0.0); LANES]; 4];
+    let (mut floor, mut height) = ([zero; CHUNKS], [zero; CHUNKS]);
+    let mut useless = [[0u32; LANES]; CHUNKS];
     for (k, chunk) in kept.chunks().iter().enumerate() {
         for lane in 0..LANES {
-            let floors = planes[k].corners(lane, square);
+            let floors = planes[k].corners(lane, square, margin);
             let heights = corners(sweep, &chunk.lane(lane), square);
             let unsure = chunk.name(lane).bound_only();
             for c in 0..4 {
-                floor[k][c][lane] = floors[c] + margin;
+                floor[k][c][lane] = floors[c];
                 height[k][c][lane] = if unsure { T::of(f64::INFINITY) } else { heights[c] };
             }
         }
     }
-    let (chunks, len) = (kept.chunks().len(), kept.len());
-    for b in 0..len {
-        let (in_chunk, in_lane) = (b / LANES, b % LANES);
+    for b in 0..kept.len() {
+        let (chunk, lane) = (b / LANES, b % LANES);
         // One that is useless itself lies above another that judges as strictly.
-        if useless[in_chunk][in_lane] {
+        if useless[chunk][lane] != 0 {
             continue;
         }
-        let ceiling = height[in_chunk].map(|h| h[in_lane]);
-        for k in 0..chunks {
+        let [h0, h1, h2, h3] = &height[chunk];
+        let ceiling = [h0[lane], h1[lane], h2[lane], h3[lane]];
+        for (useless, [f0, f1, f2, f3]) in useless.iter_mut().zip(&floor) {
             for lane in 0..LANES {
-                useless[k][lane] |= at_or_above(floor[k].map(|f| f[lane]), ceiling);
+                let above = at_or_above([f0[lane], f1[lane], f2[lane], f3[lane]], ceiling);
+                useless[lane] |= u32::from(above);
             }
         }
-        useless[in_chunk][in_lane] = false;
+        useless[chunk][lane] = 0;
     }
-    kept.retain(|k| !useless[k / LANES][k % LANES]);
+    kept.retain(|k| useless[k / LANES][k % LANES] == 0);
+}
+
+/// The least number and its lane. By halves of fixed length, which stay in registers.
+#[inline(always)]
+fn least_of<T: Real>(numbers: &[T; LANES]) -> (T, usize) {
+    let (mut eight, mut four, mut two) = ([numbers[0]; 8], [numbers[0]; 4], [numbers[0]; 2]);
+    for k in 0..8 {
+        eight[k] = numbers[k].smaller(numbers[k + 8]);
+    }
+    for k in 0..4 {
+        four[k] = eight[k].smaller(eight[k + 4]);
+    }
+    for k in 0..2 {
+        two[k] = four[k].smaller(four[k + 2]);
+    }
+    let least = two[0].smaller(two[1]);
+    let mut lanes = [0u32; LANES];
+    for lane in 0..LANES {
+        lanes[lane] = u32::from(numbers[lane] <= least);
+    }
+    (least, bits(&lanes).trailing_zeros() as usize % LANES)
+}
+
+/// One bit for each lane that is not zero.
+#[inline(always)]
+fn bits(lanes: &[u32; LANES]) -> u32 {
+    let mut bits = 0;
+    for lane in 0..LANES {
+        bits |= lanes[lane] << lane;
+    }
+    bits
 }
 
 #[inline(always)]

@@ -8,6 +8,7 @@
 
 use super::{Cull, DropCutter};
 use crate::geometry::{BoxTree, Extent, Feature};
+use crate::lanes;
 
 /// Points of a grid in the plan view.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -163,8 +164,6 @@ struct Tile {
     high: [f64; 2],
     /// Steps in 1 mm.
     per_mm: [f64; 2],
-    /// The widest vectors of this machine; their width changes no bit.
-    arch: pulp::Arch,
     /// By rows along x. Infinite at points beyond the grid, which so stay as they are.
     tips: [[f64; TILE]; TILE],
     slots: [[u32; TILE]; TILE],
@@ -183,7 +182,6 @@ impl Tile {
             low: [x[0], y[0]],
             high: [x[count[0] - 1], y[count[1] - 1]],
             per_mm: grid.step.map(|s| 1.0 / s),
-            arch: pulp::Arch::new(),
             tips: std::array::from_fn(|j| std::array::from_fn(|i| tip(i, j))),
             slots: [[0; TILE]; TILE],
         }
@@ -239,14 +237,17 @@ impl Tile {
             return false;
         };
         let (facet, x) = (&drops.facets[slot], &self.x);
-        self.arch.dispatch(|| {
-            let mut raised = false;
-            for j in rows {
-                let (tips, slots) = (&mut self.tips[j], &mut self.slots[j]);
-                raised |= facet.raise_by_face(x, self.y[j], slot as u32, tips, slots);
-            }
-            raised
-        })
+        lanes::dispatch(
+            #[inline(always)]
+            || {
+                let mut raised = false;
+                for j in rows {
+                    let (tips, slots) = (&mut self.tips[j], &mut self.slots[j]);
+                    raised |= facet.raise_by_face(x, self.y[j], slot as u32, tips, slots);
+                }
+                raised
+            },
+        )
     }
 
     /// Drops the cutter on sides and corners; tells whether that raised it.
@@ -259,16 +260,19 @@ impl Tile {
             };
             let across = &drops.facets[part.across as usize];
             let mut higher = [[false; TILE]; TILE];
-            self.arch.dispatch(|| {
-                for j in rows.clone() {
-                    // A side lies in both planes, so it lifts the tip no higher than either.
-                    let (y, tips) = (self.y[j], &self.tips[j]);
-                    let (own, other) = (facet.peaks(&self.x, y), across.peaks(&self.x, y));
-                    for i in 0..TILE {
-                        higher[j][i] = (own[i] > tips[i]) & (other[i] > tips[i]);
+            lanes::dispatch(
+                #[inline(always)]
+                || {
+                    for j in rows.clone() {
+                        // A side lies in both planes, so it lifts the tip no higher than either.
+                        let (y, tips) = (self.y[j], &self.tips[j]);
+                        let (own, other) = (facet.peaks(&self.x, y), across.peaks(&self.x, y));
+                        for i in 0..TILE {
+                            higher[j][i] = (own[i] > tips[i]) & (other[i] > tips[i]);
+                        }
                     }
-                }
-            });
+                },
+            );
             for j in rows {
                 for i in columns.clone().filter(|&i| higher[j][i]) {
                     let tip = &mut self.tips[j][i];
