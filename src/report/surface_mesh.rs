@@ -38,6 +38,11 @@ const LEAST_TOLERANCE: f64 = 1e-6;
 /// a smaller one ridges that nobody sees cost triangles.
 const UNSEEN: f64 = 1.0 / 16.0;
 
+/// Triangles that miss the surface by this many tolerances are not measured to the end. Where so many
+/// would be needed that the tolerance must grow past it, the cap grows as many times and all is measured
+/// again; a greater cap measures more in vain.
+const CAP: f64 = 16.0;
+
 /// What a vertex stands on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum VertexPlace {
@@ -108,8 +113,17 @@ pub fn surface_mesh(
     }
     let ridges = RidgePoints::find(cut, cutter, path);
     let wanted = tolerance.max(LEAST_TOLERANCE);
-    let network = Network::new(cut, &ridges, UNSEEN * wanted);
-    let tolerance = network.least_tolerance(wanted, max_triangles);
+    let lowest = cut.height.iter().copied().fold(f32::INFINITY, f32::min);
+    let highest = cut.height.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let mut cap = CAP * wanted;
+    let (network, tolerance) = loop {
+        let network = Network::new(cut, &ridges, UNSEEN * wanted, cap);
+        let tolerance = network.least_tolerance(wanted, max_triangles);
+        if cap >= f64::from(highest - lowest) || !network.exceeds(tolerance, max_triangles) {
+            break (network, tolerance);
+        }
+        cap *= CAP;
+    };
     let mut solid = Solid::new(cut, ridges.len());
     let mut scratch = Scratch::default();
     network.visit(tolerance, &mut |corners| {

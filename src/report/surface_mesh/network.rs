@@ -40,6 +40,8 @@ pub(super) struct Network<'a> {
     ridges: &'a RidgePoints,
     /// Ridge points closer to a side than this, mm, are left out of it.
     floor: f64,
+    /// Bounds above this, mm, are not worked out, but infinite.
+    cap: f64,
     /// Side of a square, cells.
     square: usize,
     /// Nodes along x and y: whole squares, and one.
@@ -58,13 +60,13 @@ pub(super) struct Scratch {
 }
 
 impl<'a> Network<'a> {
-    pub fn new(cut: &'a ZMap, ridges: &'a RidgePoints, floor: f64) -> Self {
+    pub fn new(cut: &'a ZMap, ridges: &'a RidgePoints, floor: f64, cap: f64) -> Self {
         let longest = cut.grid.nx.max(cut.grid.ny) - 1;
         let square = longest.next_power_of_two().min(MAX_SQUARE);
         let whole = |nodes: usize| (nodes - 1).div_ceil(square) * square + 1;
         let (width, height) = (whole(cut.grid.nx), whole(cut.grid.ny));
         let bound = vec![0.0; width * height];
-        let mut network = Self { cut, ridges, floor, square, width, height, bound, coarsest: 0.0 };
+        let mut network = Self { cut, ridges, floor, cap, square, width, height, bound, coarsest: 0.0 };
         // From the smallest triangles up, since a bound holds those below it.
         let mut size = 2;
         while size <= square {
@@ -120,6 +122,9 @@ impl<'a> Network<'a> {
                 bound = bound.max(self.bound[y as usize * self.width + x as usize]);
             }
         }
+        if f64::from(bound) > self.cap {
+            return f32::INFINITY;
+        }
         let triangles = if of_square {
             halves((x - half, y - half), size).map(Some)
         } else {
@@ -164,6 +169,9 @@ impl<'a> Network<'a> {
                 for i in (left - SAME_PLACE).ceil() as usize..=(right + SAME_PLACE).floor() as usize {
                     let z = f64::from(self.cut.height[grid.index(i, j)]);
                     worst = worst.max((plane.at(i as f64, j as f64) - z).abs());
+                }
+                if worst > self.cap {
+                    return f32::INFINITY;
                 }
             }
         }
@@ -304,7 +312,8 @@ impl<'a> Network<'a> {
         tolerance
     }
 
-    fn exceeds(&self, tolerance: f64, max_triangles: usize) -> bool {
+    /// True when a tolerance takes more triangles.
+    pub fn exceeds(&self, tolerance: f64, max_triangles: usize) -> bool {
         let (mut count, mut scratch) = (0, Scratch::default());
         self.visit(tolerance, &mut |corners| {
             self.pieces(corners, &mut scratch);
