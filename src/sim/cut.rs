@@ -723,6 +723,20 @@ fn corners<T: Real, S: Sweep<T>>(sweep: &S, m: &LocalMove<T>, square: &Square<T>
     ]
 }
 
+/// As [`corners`] of a single move. Most lanes work in vain, but all at the same time.
+#[inline(always)]
+fn corners_of_one<T: Real, S: Sweep<T>>(sweep: &S, m: &LocalMove<T>, square: &Square<T>) -> [T; 4] {
+    let mut x = [square.x - square.half_x; LANES];
+    let mut y = [square.y - square.half_y; LANES];
+    (x[1], x[3]) = (square.x + square.half_x, square.x + square.half_x);
+    (y[2], y[3]) = (square.y + square.half_y, square.y + square.half_y);
+    let mut heights = [T::of(0.0); LANES];
+    for lane in 0..LANES {
+        heights[lane] = sure_height(sweep, m, x[lane], y[lane]);
+    }
+    [heights[0], heights[1], heights[2], heights[3]]
+}
+
 #[inline(always)]
 fn sure_height<T: Real, S: Sweep<T>>(sweep: &S, m: &LocalMove<T>, x: T, y: T) -> T {
     let (along, across) = m.along_across(x, y);

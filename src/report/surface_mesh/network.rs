@@ -160,8 +160,12 @@ impl<'a> Network<'a> {
             return f32::INFINITY;
         }
         self.pieces(corners, scratch);
-        let mut worst = 0f64;
-        for piece in &scratch.pieces {
+        let whole = scratch.pieces.len() == 1;
+        let mut worst = if whole { self.whole_misfit(corners, y0..=y1) } else { 0.0 };
+        if worst > self.cap {
+            return f32::INFINITY;
+        }
+        for piece in scratch.pieces.iter().filter(|_| !whole) {
             let plane = Plane::through(piece);
             let (low, high) = extent(piece.map(|c| c.y));
             for j in (low - SAME_PLACE).ceil() as usize..=(high + SAME_PLACE).floor() as usize {
@@ -184,6 +188,37 @@ impl<'a> Network<'a> {
             }
         }
         worst as f32
+    }
+
+    /// Greatest vertical distance of a triangle that no ridge divides from the centres that it covers, or
+    /// one above the cap. Its sides run along rows, columns and diagonals, so they meet rows at nodes.
+    fn whole_misfit(&self, corners: [Node; 3], rows: std::ops::RangeInclusive<usize>) -> f64 {
+        let plane = Plane::through(&corners.map(|node| self.corner(node)));
+        let nodes = corners.map(|(i, j)| (i as i64, j as i64));
+        let mut worst = 0f64;
+        for j in rows {
+            let (mut left, mut right) = (i64::MAX, 0);
+            for k in 0..3 {
+                let (p, q) = (nodes[k], nodes[(k + 1) % 3]);
+                let (from, to) = (j as i64 - p.1, q.1 - p.1);
+                let met = if to == 0 { from == 0 } else { (0..=to.abs()).contains(&(from * to.signum())) };
+                if met {
+                    let x = p.0 + if to == 0 { 0 } else { (q.0 - p.0) * from / to };
+                    (left, right) = (left.min(x), right.max(x));
+                }
+            }
+            let start = plane.at(left as f64, j as f64);
+            let row =
+                &self.cut.height[self.cut.grid.index(left as usize, j)..][..(right - left) as usize + 1];
+            for (k, &z) in row.iter().enumerate() {
+                let miss = (start + plane.by_x * k as f64 - f64::from(z)).abs();
+                worst = if miss > worst { miss } else { worst };
+            }
+            if worst > self.cap {
+                break;
+            }
+        }
+        worst
     }
 
     /// The pieces of a triangle whose `corners` begin at the right angle and run counter-clockwise.
