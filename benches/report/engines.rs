@@ -34,6 +34,9 @@ fn name((cutter, cell, chord): (&str, f64, f64)) -> String {
     format!("{cutter}, cell {cell}, chord {chord}")
 }
 
+/// Seconds, and the stock that is left.
+type Engine = fn(&ZMap, &Cutter, &Toolpath) -> (f64, ZMap);
+
 fn by_cut(stock: &ZMap, cutter: &Cutter, path: &Toolpath) -> (f64, ZMap) {
     let stock = stock.clone();
     timed_with(|| cut(stock, cutter, path, &Silent).expect("never cancelled"))
@@ -237,9 +240,7 @@ fn two_threads(plan: &Plan) -> Table {
     let [one, two] =
         [1, 2].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("few threads"));
     let (tool, path, stock) = (cutter("ball"), wave(plan.part, STEPOVER, 0.2), block(plan.part, 0.05));
-    let engines: [(&str, fn(&ZMap, &Cutter, &Toolpath) -> (f64, ZMap)); 2] =
-        [("cut", by_cut), ("cut_reference", by_reference)];
-    for (name, engine) in engines {
+    for (name, engine) in [("cut", by_cut as Engine), ("cut_reference", by_reference)] {
         let [alone, together] = fastest(
             plan,
             [&mut || one.install(|| engine(&stock, &tool, &path)).0, &mut || {

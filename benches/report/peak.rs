@@ -6,6 +6,7 @@ use super::wave::{block, cutter, wave};
 use super::{Plan, Section};
 use millstream::monitor::Silent;
 use millstream::sim::cut;
+use millstream::toolpath::{Move, Toolpath};
 use std::hint::black_box;
 
 /// Makes this program a process that only cuts; a number of cells a side follows.
@@ -14,7 +15,7 @@ pub const ARGUMENT: &str = "--cut-only";
 /// Both sides of the part, mm.
 const PART: [f64; 2] = [0.0, 100.0];
 
-fn path() -> millstream::toolpath::Toolpath {
+fn path() -> Toolpath {
     wave(PART, 0.3, 0.2)
 }
 
@@ -53,8 +54,8 @@ pub fn section(plan: &Plan) -> Section {
         format!(
             "A process of its own that lays out a block over 100 x 100 mm and cuts it along {moves} moves with one \
              thread, and nothing else. `added` is the difference to the smallest grid: what a further cell takes. \
-             The map alone takes 8 bytes a cell, the path {}.",
-            moves * size_of::<millstream::toolpath::Move>()
+             The map alone takes 8 bytes a cell, the path {:.1} MiB.",
+            (moves * size_of::<Move>()) as f64 / 1048576.0
         ),
         &[
             Column("cells", "million"),
