@@ -21,9 +21,10 @@ pub fn section(plan: &Plan) -> Section {
         "drops",
         "Time of a drop",
         format!(
-            "Onto {} triangles over {SIZE} x {SIZE} mm: a grid of {SIDE} x {SIDE} points at once, and {PLACES} places \
-             one by one, without order and along passes. The grid keeps the triangle, single drops work out the \
-             contact too. One thread; `highest` is the greatest difference of tips between both ways.",
+            "Onto {} triangles over {SIZE} x {SIZE} mm: a grid of {SIDE} x {SIDE} points at once, and \
+             {PLACES} places one by one, without order and along passes. The grid keeps the triangle, \
+             single drops work out the contact too. One thread; `highest` is the greatest difference of \
+             tips between both ways.",
             part.mesh().triangles().len()
         ),
         &[

@@ -2,7 +2,7 @@
 
 use super::plot::{Mark, dots};
 use super::table::{Column, Table};
-use super::timing::{fastest, timed, timed_with, write_fresh, write_in_place};
+use super::timing::{fastest, square_roots, timed, timed_with, write_fresh, write_in_place};
 use super::wave::{RADIUS, block, cutter, wave};
 use super::{Plan, Section};
 use millstream::cutter::Cutter;
@@ -99,9 +99,9 @@ fn against_reference(plan: &Plan) -> Table {
         "wave",
         "cut against cut_reference",
         format!(
-            "Wave of {0} x {0} mm, cutters of radius {RADIUS} mm, passes {STEPOVER} mm apart. One thread, least of \
-             several rounds in turns. The last columns tell how many times as long a cut takes as writing its map \
-             once, fresh and in place; the map that cut works in was written before.",
+            "Wave of {0} x {0} mm, cutters of radius {RADIUS} mm, passes {STEPOVER} mm apart. One thread, \
+             least of several rounds in turns. The last columns tell how many times as long a cut takes \
+             as writing its map once, fresh and in place; the map that cut works in was written before.",
             high - low
         ),
         &[
@@ -161,10 +161,10 @@ fn against_plain(plan: &Plan) -> Table {
         "plain",
         "cut and cut_reference against a plain loop over tiles",
         format!(
-            "cut_reference has bounds itself. The plain loop evaluates every move of a tile of 64 x 64 cells at all \
-             cells of its bounding rectangle, in f64. It is slow: all three cut only {0} x {0} mm in the middle of \
-             the wave, with all moves that reach it. On the part of 100 x 100 mm it would take {1:.0} times as long \
-             (last column, not measured). One thread.",
+            "cut_reference has bounds itself. The plain loop evaluates every move of a tile of 64 x 64 \
+             cells at all cells of its bounding rectangle, in f64. It is slow: all three cut only {0} x \
+             {0} mm in the middle of the wave, with all moves that reach it. On the part of 100 x 100 mm \
+             it would take {1:.0} times as long (last column, not measured). One thread.",
             PATCH[1] - PATCH[0],
             scale()
         ),
@@ -231,8 +231,9 @@ fn two_threads(plan: &Plan) -> Table {
         "threads",
         "Two threads against one",
         format!(
-            "The same wave with a ball, by the same engines in pools of one and two threads, in turns. {} threads are \
-             there at once; others that work on the machine lower the ratio.",
+            "The same wave with a ball, by the same engines in pools of one and two threads, in turns. {} \
+             threads are there at once. Square roots need no memory: no engine can be expected to gain more \
+             than they do, on threads that share a core or with others at work.",
             std::thread::available_parallelism().map_or(0, |n| n.get())
         ),
         &[Column("one", "s"), Column("two", "s"), Column("ratio", "one/two")],
@@ -249,6 +250,9 @@ fn two_threads(plan: &Plan) -> Table {
         );
         table.row(name, [alone, together, alone / together]);
     }
+    let [alone, together] =
+        fastest(plan, [&mut || one.install(square_roots), &mut || two.install(square_roots)]);
+    table.row("square roots", [alone, together, alone / together]);
     table
 }
 
@@ -258,8 +262,8 @@ pub fn in_order(plan: &Plan) -> Section {
         "in_order",
         "cut_in_order against cut_in_order_plain",
         format!(
-            "{0} x {0} mm in the middle of the wave only, with all moves that reach it: on the whole part the plain \
-             loop would take {1:.0} times as long. Passes {STEPOVER} mm apart; one thread.",
+            "{0} x {0} mm in the middle of the wave only, with all moves that reach it: on the whole part \
+             the plain loop would take {1:.0} times as long. Passes {STEPOVER} mm apart; one thread.",
             PATCH[1] - PATCH[0],
             scale()
         ),

@@ -3,11 +3,11 @@
 
 use super::plot::{Curve, log_log};
 use super::table::{Column, Table};
-use super::timing::{fastest, timed};
+use super::timing::{fastest, timed_with};
 use super::wave::{block, cutter, wave};
 use super::{Plan, Section};
 use millstream::monitor::Silent;
-use millstream::sim::cut;
+use millstream::sim::{Work, cut_counted};
 use nalgebra::{DMatrix, DVector};
 
 /// Both sides of the part, mm, whatever the plan: cells and moves alone change.
@@ -25,6 +25,7 @@ struct Point {
     cells: f64,
     moves: f64,
     seconds: f64,
+    work: Work,
 }
 
 /// A law `seconds = Σ coefficient · term`, and how far it is off.
@@ -91,14 +92,18 @@ impl Fit {
 
 fn measured(plan: &Plan, side: usize, chord: f64) -> Point {
     let (tool, path) = (cutter("ball"), wave(PART, STEPOVER, chord));
+    let mut work = Work::default();
     let [seconds] = fastest(
         plan,
         [&mut || {
             let stock = block(PART, (PART[1] - PART[0]) / side as f64);
-            timed(|| cut(stock, &tool, &path, &Silent).expect("never cancelled"))
+            let (seconds, (_, done)) =
+                timed_with(|| cut_counted(stock, &tool, &path, &Silent).expect("never cancelled"));
+            work = done;
+            seconds
         }],
     );
-    Point { cells: (side * side) as f64, moves: path.len() as f64, seconds }
+    Point { cells: (side * side) as f64, moves: path.len() as f64, seconds, work }
 }
 
 /// All series, the laws fitted to all of their points, and plots.
@@ -143,27 +148,47 @@ fn points_table(series: &[Series], as_sum: &Fit, with_borders: &Fit) -> Table {
         "growth",
         "Time of cut",
         format!(
-            "A ball on the wave of 100 x 100 mm, passes {STEPOVER} mm apart; one thread. First the cells grow at \
-             chords of {CHORD} mm, then the moves (by shorter chords) at {SIDE} x {SIDE} cells, then both. The laws \
-             are those below."
+            "A ball on the wave of 100 x 100 mm, passes {STEPOVER} mm apart; one thread. First the cells \
+             grow at chords of {CHORD} mm, then the moves (by shorter chords) at {SIDE} x {SIDE} cells, \
+             then both. The laws are those below. The exponent is that of a power of what grows: where \
+             both grow, a product would have 2, and a sum 1."
         ),
         &[
             Column("cells", "million"),
             Column("moves", "thousand"),
             Column("time", "s"),
+            Column("exponent", "to the row above"),
+            Column("tests", "a move"),
+            Column("evaluations", "a cell"),
             Column("sum", "s"),
             Column("sum off", "%"),
-            Column("with borders", "s"),
             Column("borders off", "%"),
         ],
     );
-    for (s, p) in series.iter().flat_map(|s| s.points.iter().map(move |p| (s, p))) {
-        let off = |fit: &Fit| 100.0 * (fit.seconds(p) / p.seconds - 1.0);
-        let (sum, borders) = (as_sum.seconds(p), with_borders.seconds(p));
-        table.row(
-            s.name,
-            [1e-6 * p.cells, 1e-3 * p.moves, p.seconds, sum, off(as_sum), borders, off(with_borders)],
-        );
+    for s in series {
+        let mut before: Option<&Point> = None;
+        for p in &s.points {
+            let off = |fit: &Fit| 100.0 * (fit.seconds(p) / p.seconds - 1.0);
+            let exponent =
+                before.map_or(f64::NAN, |b| (p.seconds / b.seconds).ln() / ((s.x)(p) / (s.x)(b)).ln());
+            let (tests, evaluations) = (p.work.tests as f64 / p.moves, p.work.evaluations as f64 / p.cells);
+            let [cells, moves] = [1e-6 * p.cells, 1e-3 * p.moves];
+            table.row(
+                s.name,
+                [
+                    cells,
+                    moves,
+                    p.seconds,
+                    exponent,
+                    tests,
+                    evaluations,
+                    as_sum.seconds(p),
+                    off(as_sum),
+                    off(with_borders),
+                ],
+            );
+            before = Some(p);
+        }
     }
     table
 }
@@ -172,8 +197,9 @@ fn laws_table([as_sum, with_borders, as_product]: [&Fit; 3]) -> Table {
     let mut table = Table::new(
         "laws",
         "Laws fitted to these times",
-        "Least squares of relative residuals over all three series, no coefficient below zero. The residual is the \
-         root of their mean square; a law that tells nothing has 100 %. Only the last one is a product.",
+        "Least squares of relative residuals over all three series, no coefficient below zero. The \
+         residual is the root of their mean square; a law that tells nothing has 100 %. Only the last one \
+         is a product.",
         &[
             Column("fixed", "ms"),
             Column("cell", "ns"),
@@ -212,7 +238,7 @@ impl Series {
             let first = (t as usize).min(self.points.len() - 2);
             let (a, b, share) = (&self.points[first], &self.points[first + 1], t - first as f64);
             let mean = |f: fn(&Point) -> f64| f(a).powf(1.0 - share) * f(b).powf(share);
-            Point { cells: mean(|p| p.cells), moves: mean(|p| p.moves), seconds: 0.0 }
+            Point { cells: mean(|p| p.cells), moves: mean(|p| p.moves), ..*a }
         };
         let law = |name, seconds: &dyn Fn(&Point) -> f64| Curve {
             name,

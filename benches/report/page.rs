@@ -8,9 +8,9 @@ use serde_json::{Map, Value, json};
 /// The look of the program's own report.
 const STYLE: &str = include_str!("../../src/report/style.css");
 
-/// Tables side by side with no room to spare may scroll.
-const WIDE: &str = ".wide { overflow-x: auto; } .plots { display: flex; flex-wrap: wrap; gap: 12px; } \
-                    .plots svg { width: 520px; }";
+/// Wide tables scroll rather than break the names of their rows.
+const WIDE: &str = ".wide { overflow-x: auto; } .wide tbody th { white-space: nowrap !important; } .plots \
+                    { display: flex; flex-wrap: wrap; gap: 12px; } .plots svg { width: 520px; }";
 
 /// The whole page; it opens offline.
 pub fn html(sections: &[Section], quick: bool, minutes: f64) -> String {
@@ -30,8 +30,8 @@ pub fn html(sections: &[Section], quick: bool, minutes: f64) -> String {
                     @if quick { " · quick: a smaller part, fewer rounds" }
                 }
                 p {
-                    "What is compared ran in turns in this one run, and the least time of all rounds counts. Ratios \
-                     carry over to other machines better than seconds do."
+                    "What is compared ran in turns in this one run, and the least time of all rounds \
+                     counts. Ratios carry over to other machines better than seconds do."
                 }
                 @for section in sections {
                     section {

@@ -52,9 +52,9 @@ pub fn section(plan: &Plan) -> Section {
         "memory",
         "Peak memory of cut",
         format!(
-            "A process of its own that lays out a block over 100 x 100 mm and cuts it along {moves} moves with one \
-             thread, and nothing else. `added` is the difference to the smallest grid: what a further cell takes. \
-             The map alone takes 8 bytes a cell, the path {:.1} MiB.",
+            "A process of its own that lays out a block over 100 x 100 mm and cuts it along {moves} moves \
+             with one thread, and nothing else. `added` is the difference to the smallest grid: what a \
+             further cell takes. The map alone takes 8 bytes a cell, the path {:.1} MiB.",
             (moves * size_of::<Move>()) as f64 / 1048576.0
         ),
         &[

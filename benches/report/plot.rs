@@ -108,7 +108,7 @@ pub fn log_log(title: &str, x_name: &str, y_name: &str, curves: &[Curve]) -> Str
         }
         chart
             .configure_series_labels()
-            .position(SeriesLabelPosition::UpperLeft)
+            .position(SeriesLabelPosition::LowerRight)
             .label_font(letters())
             .background_style(WHITE)
             .border_style(GRID)
@@ -121,7 +121,8 @@ pub fn log_log(title: &str, x_name: &str, y_name: &str, curves: &[Curve]) -> Str
 /// Figures of several kinds, a line for each case, over an axis of decades.
 pub fn dots(title: &str, x_name: &str, cases: &[(String, Vec<Mark>)]) -> String {
     let x = decades(cases.iter().flat_map(|(_, marks)| marks).map(|m| m.1));
-    let y = -0.6..cases.len() as f64 - 0.4;
+    // Room above the cases for what the colours mean.
+    let y = -0.6..cases.len() as f64 + 1.4;
     svg(|page| {
         let mut chart = ChartBuilder::on(page)
             .caption(title, letters())
@@ -154,7 +155,7 @@ pub fn dots(title: &str, x_name: &str, cases: &[(String, Vec<Mark>)]) -> String 
         }
         chart
             .configure_series_labels()
-            .position(SeriesLabelPosition::LowerRight)
+            .position(SeriesLabelPosition::UpperRight)
             .label_font(letters())
             .background_style(WHITE)
             .border_style(GRID)

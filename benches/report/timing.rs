@@ -51,27 +51,33 @@ pub fn write_in_place(map: &mut ZMap) -> f64 {
     })
 }
 
-/// Square roots in a loop that the compiler makes vectors of.
-fn square_roots(n: usize) -> f64 {
+/// How many square roots are taken in a row.
+const ROOTS: usize = 1 << 24;
+
+/// Square roots in a loop that the compiler makes vectors of, on all threads of the pool.
+pub fn square_roots() -> f64 {
     /// Numbers that stay in the nearest cache.
     const NUMBERS: usize = 1024;
-    let mut numbers: Vec<f64> = (0..NUMBERS).map(|k| 1.0 + k as f64).collect();
+    /// Pieces that threads share among each other.
+    const PIECES: usize = 64;
     timed(|| {
-        for _ in 0..n / NUMBERS {
-            black_box(&mut numbers).iter_mut().for_each(|x| *x = (*x + 1.0).sqrt());
-        }
+        millstream::parallel::map(PIECES, |_| {
+            let mut numbers: Vec<f64> = (0..NUMBERS).map(|k| 1.0 + k as f64).collect();
+            for _ in 0..ROOTS / NUMBERS / PIECES {
+                black_box(&mut numbers).iter_mut().for_each(|x| *x = (*x + 1.0).sqrt());
+            }
+        })
     })
 }
 
 /// What memory and square roots cost here, to compare machines by.
 pub fn calibration(plan: &Plan) -> Section {
-    const ROOTS: usize = 1 << 24;
     let cell = if plan.quick { 0.02 } else { 0.04 };
     let mut map = block(plan.part, cell);
     let cells = map.grid.len() as f64;
     let [fresh, in_place, roots] = fastest(
         plan,
-        [&mut || write_fresh(plan.part, cell), &mut || write_in_place(&mut map), &mut || square_roots(ROOTS)],
+        [&mut || write_fresh(plan.part, cell), &mut || write_in_place(&mut map), &mut || square_roots()],
     );
     let mut table = Table::new(
         "calibration",
