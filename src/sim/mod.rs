@@ -3,6 +3,8 @@
 
 mod bins;
 mod cut;
+#[cfg(test)]
+mod engine_tests;
 mod envelope;
 mod form;
 mod grid;
