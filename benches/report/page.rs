@@ -9,8 +9,9 @@ use serde_json::{Map, Value, json};
 const STYLE: &str = include_str!("../../src/report/style.css");
 
 /// Wide tables scroll rather than break the names of their rows.
-const WIDE: &str = ".wide { overflow-x: auto; } .wide tbody th { white-space: nowrap !important; } .plots \
-                    { display: flex; flex-wrap: wrap; gap: 12px; } .plots svg { width: 520px; }";
+const WIDE: &str = "body { max-width: 1240px; } .wide { overflow-x: auto; } \
+                    .wide tbody th { white-space: nowrap !important; } \
+                    .plots { display: flex; flex-wrap: wrap; gap: 12px; } .plots svg { width: 520px; }";
 
 /// The whole page; it opens offline.
 pub fn html(sections: &[Section], quick: bool, minutes: f64) -> String {
