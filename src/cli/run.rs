@@ -250,8 +250,15 @@ impl<'a> Job<'a> {
             let removed = cut_in_order(stock, &scene.cutter, &planned.path, monitor)?;
             removal = Some(removal_figures(&planned.path, &removed, &cut.height));
         }
-        let mut measured =
-            measure(&self.part, &scene.cutter, &planned.path, &cut, &scene.tolerance, monitor)?;
+        let mut measured = measure(
+            &self.part,
+            &scene.cutter,
+            &planned.path,
+            &cut,
+            &scene.tolerance,
+            scene.simulation.error_bound,
+            monitor,
+        )?;
         let check = |holder| holder_collisions(&cut, holder, &planned.path, monitor);
         let held = scene.holder.as_ref().map(check).transpose()?;
         let simulation = SimulationFigures {

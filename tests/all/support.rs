@@ -10,6 +10,9 @@ use millstream::toolpath::{PlanSettings, Step, Strategy, Toolpath, plan};
 
 pub const LIMITS: Limits = Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chord: 0.001 };
 
+/// Error bound asked of every figure, mm.
+pub const ASKED: f64 = 0.0005;
+
 /// Stock over a part's highest point, mm.
 const ALLOWANCE: f64 = 1.0;
 
@@ -45,7 +48,7 @@ pub fn cut_and_measure(
     let grid = Grid::covering(&bounds, cell, 64, 1 << 32).unwrap();
     let stock = ZMap::block(grid, bounds.max.z + ALLOWANCE);
     let cut = cut_reference(&stock, cutter, path, &Silent).unwrap();
-    measure(part, cutter, path, &cut, limits, &Silent).unwrap()
+    measure(part, cutter, path, &cut, limits, ASKED, &Silent).unwrap()
 }
 
 pub fn plan_and_measure(
