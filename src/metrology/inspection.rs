@@ -36,9 +36,9 @@ pub(super) struct Sample {
     /// Signed deviation, mm; NaN off the part.
     pub deviation: f32,
     /// Sine of the angle between cut and design surface.
-    slope: f32,
+    pub slope: f32,
     /// Vertical part of the design surface's unit normal.
-    lean: f32,
+    pub lean: f32,
 }
 
 /// Asks the monitor whether to stop, and tells it nothing: for stages within a stage.

@@ -13,9 +13,11 @@ mod figures;
 mod inspection;
 mod meetings;
 mod path;
+mod refine;
 mod regions;
 mod removal;
 mod ridges;
+mod unseen;
 
 pub(crate) use cut_surface::CutSurface;
 pub use figures::{
@@ -24,6 +26,7 @@ pub use figures::{
 };
 pub(crate) use meetings::Meetings;
 pub use path::path_figures;
+pub use refine::{Asked, Refined};
 pub use removal::{RapidContactFigures, RemovalFigures, removal_figures};
 
 use crate::cutter::Cutter;
@@ -32,10 +35,16 @@ use crate::part::Part;
 use crate::sim::{Envelope, ZMap};
 use crate::toolpath::Toolpath;
 use inspection::Inspection;
-use ridges::{RidgeFinder, scallop_figures};
+use refine::Refinement;
+use ridges::{Highest, RidgeFinder, Ridges, scallop_figures};
+use unseen::unseen_depth;
 
-/// Measures `cut`, the stock after `path`, against `part`, until the error bounds of the greatest scallop,
-/// gouge and uncut height are at most `asked` mm each, if that can be reached.
+/// The least vertical part of the design's normal that dips between centres are thought of with.
+const LEAST_LEAN: f64 = 0.2;
+
+/// Measures `cut`, the stock after `path`, against `part`, looking closer until the error bounds of the
+/// greatest scallop, gouge and uncut height are the asked ones. Where they do not come down to that, a note
+/// in [`Measurement::refined`] says so.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -45,22 +54,68 @@ pub fn measure(
     path: &Toolpath,
     cut: &ZMap,
     limits: &Limits,
-    asked: f64,
+    asked: &Asked,
     monitor: &dyn Monitor,
 ) -> Result<Measurement, Cancelled> {
     let surface = CutSurface::new(Envelope::new(cutter, path), cut, path);
-    let inspection = Inspection { part, cutter, limits, asked, surface: &surface, grid: cut.grid };
+    let bound = asked.error_bound;
+    let inspection = Inspection { part, cutter, limits, asked: bound, surface: &surface, grid: cut.grid };
+    let found = inspect(&inspection, path, 0.0, monitor)?;
+    let highest_ridge = found.ridges.highest_sample();
+    let lean = found.least_lean;
+    let hidden = found.ridges.hidden.clone();
+    let mut measured = Measurement {
+        scallop: scallop_figures(&found.ridges, found.highest, limits),
+        gouge: found.gouge,
+        uncut: found.uncut,
+        deviation: found.deviation,
+        ridge_samples: found.ridges.samples,
+        deviation_map: found.deviation_map,
+        refined: Refined::default(),
+    };
+    let mut dips = Vec::new();
+    if unseen_depth(cutter, cut.grid.cell, lean.max(LEAST_LEAN)) > bound {
+        let known = measured.gouge.max_depth_mm + bound;
+        dips = unseen::dips(part, cutter, path, cut.grid.cell, known, monitor)?;
+    }
+    let refinement = Refinement { coarse: &inspection, path, asked, highest_ridge };
+    measured.refined = refinement.run(&hidden, &dips, &mut measured, monitor)?;
+    Ok(measured)
+}
+
+/// What one grid shows.
+struct Inspected {
+    deviation: DeviationFigures,
+    /// `[ny][nx]`, mm; NaN off the part.
+    deviation_map: Vec<f32>,
+    ridges: Ridges,
+    highest: Option<Highest>,
+    gouge: GougeFigures,
+    uncut: UncutFigures,
+    /// Least vertical part of the design's normal.
+    least_lean: f64,
+}
+
+/// Inspects one grid; `highest_ridge` is that of the surroundings, mm.
+fn inspect(
+    inspection: &Inspection<'_>,
+    path: &Toolpath,
+    highest_ridge: f64,
+    monitor: &dyn Monitor,
+) -> Result<Inspected, Cancelled> {
     let samples = inspection.samples(monitor)?;
-    let finder = RidgeFinder::new(&surface, part, cutter, path, limits);
-    let on_part = |k: usize| !samples[k].deviation.is_nan();
-    let ridges = finder.find(&on_part, monitor)?;
+    let finder =
+        RidgeFinder::new(inspection.surface, inspection.part, inspection.cutter, path, inspection.limits);
+    let ridges = finder.find(&|k| samples[k].deviation, monitor)?;
     let deviation = inspection.deviation_figures(&samples);
-    Ok(Measurement {
-        scallop: scallop_figures(&ridges, finder.highest(&ridges), limits),
+    let highest_ridge = highest_ridge.max(ridges.highest_sample());
+    Ok(Inspected {
+        highest: finder.highest(&ridges, inspection.asked),
+        ridges,
         gouge: inspection.gouges(&samples),
-        uncut: inspection.uncut(&samples, ridges.highest_sample(), deviation.area_mm2),
+        uncut: inspection.uncut(&samples, highest_ridge, deviation.area_mm2),
         deviation,
-        ridge_samples: ridges.samples,
+        least_lean: samples.iter().map(|s| f64::from(s.lean)).fold(1.0, f64::min),
         deviation_map: samples.into_iter().map(|s| s.deviation).collect(),
     })
 }

@@ -2,7 +2,7 @@
 
 use millstream::cutter::Cutter;
 use millstream::geometry::{AnalyticShape, AnalyticSurface, Point3, TriangleMesh};
-use millstream::metrology::{Limits, Measurement, measure};
+use millstream::metrology::{Asked, Limits, Measurement, measure};
 use millstream::monitor::Silent;
 use millstream::part::{Part, Patch};
 use millstream::sim::{Grid, ZMap, cut_reference};
@@ -48,7 +48,8 @@ pub fn cut_and_measure(
     let grid = Grid::covering(&bounds, cell, 64, 1 << 32).unwrap();
     let stock = ZMap::block(grid, bounds.max.z + ALLOWANCE);
     let cut = cut_reference(&stock, cutter, path, &Silent).unwrap();
-    measure(part, cutter, path, &cut, limits, ASKED, &Silent).unwrap()
+    let asked = Asked { error_bound: ASKED, stock_top: bounds.max.z + ALLOWANCE, most_cells: 1 << 20 };
+    measure(part, cutter, path, &cut, limits, &asked, &Silent).unwrap()
 }
 
 pub fn plan_and_measure(
