@@ -49,6 +49,10 @@ pub(crate) struct CutSurface<'a> {
 /// hundred times shorter than a cell.
 const MOST_STEPS: usize = 1000;
 
+/// Moves looked at on either side of a winner when none of the winners passes a point: asked at gaps only.
+/// With fewer, long chains of short chords under a flat are cut anew on finer cells in vain.
+const MOST_BESIDE: u32 = 32;
+
 impl<'a> CutSurface<'a> {
     /// Of a z-map that `path` has cut.
     pub fn new(envelope: Envelope, cut: &'a ZMap, path: &'a Toolpath) -> Self {
@@ -88,8 +92,27 @@ impl<'a> CutSurface<'a> {
     /// The cut surface at `(x, y)`; `None` off the grid.
     pub fn at(&self, x: f64, y: f64) -> Option<CutPoint> {
         let (i, j) = self.cut.grid.cell_at(x, y)?;
-        let lowest = self.lowest_of(&self.winners(i, j), x, y);
-        lowest.z.is_finite().then(|| self.follow(lowest, x, y))
+        let winners = self.winners(i, j);
+        let lowest = self.lowest_of(&winners, x, y);
+        let lowest = if lowest.z.is_finite() { lowest } else { self.beside(&winners, x, y)? };
+        Some(self.follow(lowest, x, y))
+    }
+
+    /// A move that passes `(x, y)`, near the winners along the program: of moves that are equally low
+    /// (flats on level ground) the first wins every cell and may yet end before the point.
+    fn beside(&self, winners: &Winners, x: f64, y: f64) -> Option<CutPoint> {
+        winners.moves[..winners.len].iter().find_map(|&by| {
+            let pass = self.pass(by);
+            pass?;
+            (1..=MOST_BESIDE)
+                .flat_map(|step| [by.checked_add(step), by.checked_sub(step)])
+                .flatten()
+                .find_map(|k| {
+                    // Beyond the path there is no pass.
+                    let z = (self.pass(k) == pass).then(|| self.envelope.height(k, x, y)).flatten()?;
+                    Some(CutPoint { z, by: k })
+                })
+        })
     }
 
     /// Goes along the program from `from` while the next move of the same pass is lower there.

@@ -30,6 +30,7 @@ pub use refine::{Asked, Refined};
 pub use removal::{RapidContactFigures, RemovalFigures, removal_figures};
 
 use crate::cutter::Cutter;
+use crate::geometry::Point3;
 use crate::monitor::{Cancelled, Monitor};
 use crate::part::Part;
 use crate::sim::{Envelope, ZMap};
@@ -80,7 +81,35 @@ pub fn measure(
     }
     let refinement = Refinement { coarse: &inspection, path, asked, highest_ridge };
     measured.refined = refinement.run(&hidden, &dips, &mut measured, monitor)?;
+    doubt(&mut measured, &surface, part, path, asked);
     Ok(measured)
+}
+
+/// Where a move that no cell saw cuts the highest scallop or uncut place away, the figure is too great by
+/// an unknown amount: its bound becomes the figure itself. All moves are asked at the two places.
+fn doubt(measured: &mut Measurement, surface: &CutSurface<'_>, part: &Part, path: &Toolpath, asked: &Asked) {
+    let all: Vec<u32> = (0..path.len() as u32).collect();
+    let cut_away = |at: &Point3| {
+        surface.envelope.lowest(at.x, at.y, &all).is_some_and(|(z, _)| z < at.z - asked.error_bound)
+    };
+    let (scallop, uncut) = (&mut measured.scallop, &mut measured.uncut);
+    let mut doubtful = false;
+    if scallop.max_at_mm.is_some_and(|at| cut_away(&at.into())) {
+        scallop.error_bound_mm = scallop.error_bound_mm.zip(scallop.max_mm).map(|(b, m)| b.max(m));
+        doubtful = true;
+    }
+    let highest = uncut.regions.first().and_then(|r| Some((r, part.highest_at(r.at_mm[0], r.at_mm[1])?)));
+    if highest.is_some_and(|(r, design)| cut_away(&(design.point + design.normal * r.height_mm))) {
+        uncut.error_bound_mm = uncut.error_bound_mm.max(uncut.max_height_mm);
+        doubtful = true;
+    }
+    if doubtful {
+        measured.refined.note = Some(
+            "moves between the centres of cells cut lower than what was measured there; passes so close need a \
+             cell of a third of their distance"
+                .into(),
+        );
+    }
 }
 
 /// What one grid shows.

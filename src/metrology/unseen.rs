@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn the_deepest_place_of_a_move_is_that_of_its_cutter() {
-        let shape = AnalyticShape::InclinedPlane { height: 0.0, angle: 0.5, azimuth: 0.3 };
+        let shape = AnalyticShape::Inclined { height: 0.0, angle: 0.5, azimuth: 0.3 };
         let surface = AnalyticSurface::new(shape, [[0.0, 20.0], [0.0, 20.0]]).unwrap();
         let part = Part::from_patches(vec![Patch::Analytic(surface)], 0.01).unwrap();
         let (foot, cutter) = (part.highest_at(9.0, 11.0).unwrap(), Cutter::bull(6.0, 1.0).unwrap());

@@ -47,9 +47,12 @@ pub const DEFAULT_REMOVAL: bool = true;
 /// is left open then decides no verdict but the closest. A smaller one costs time along crests.
 pub const DEFAULT_ERROR_SHARE: f64 = 0.1;
 
+/// No smaller error bound is asked by default, mm: root finding leaves a nanometre in any case.
+const LEAST_ERROR_BOUND: f64 = 1e-6;
+
 /// The error bound, mm, that is asked when the scene asks for none.
 pub fn default_error_bound(limits: &Limits) -> f64 {
-    DEFAULT_ERROR_SHARE * limits.scallop.min(limits.gouge).min(limits.uncut)
+    (DEFAULT_ERROR_SHARE * limits.scallop.min(limits.gouge).min(limits.uncut)).max(LEAST_ERROR_BOUND)
 }
 
 /// Default control points a side of a streamline's stream function. More follow finer changes of
