@@ -13,6 +13,8 @@ mod defects;
 #[cfg(target_os = "linux")]
 #[path = "all/memory.rs"]
 mod memory;
+#[path = "all/refined.rs"]
+mod refined;
 #[path = "all/scenes.rs"]
 mod scenes;
 #[path = "all/support.rs"]

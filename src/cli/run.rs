@@ -12,7 +12,7 @@ use crate::geometry::Aabb;
 use crate::io::scene::{Engine, Scene, ToolpathRequest, auto_cell};
 use crate::io::{ProgramHeader, apt_cl, exr, gcode, ply_write, png, stl_write};
 use crate::machine::machining_time;
-use crate::metrology::{Measurement, RemovalFigures, measure, path_figures, removal_figures};
+use crate::metrology::{Asked, Measurement, RemovalFigures, measure, path_figures, removal_figures};
 use crate::monitor::{self, Monitor as _};
 use crate::parallel;
 use crate::part::Part;
@@ -250,14 +250,21 @@ impl<'a> Job<'a> {
             let removed = cut_in_order(stock, &scene.cutter, &planned.path, monitor)?;
             removal = Some(removal_figures(&planned.path, &removed, &cut.height));
         }
+        let besides = part_bytes(&self.part) + (planned.path.len() * BYTES_PER_MOVE) as u64;
+        let memory = (u64::from(scene.simulation.memory_mib) * MIB).saturating_sub(besides);
+        let most_cells = (memory as usize / BYTES_PER_CELL).saturating_sub(grid.len());
+        let asked = Asked { error_bound: scene.simulation.error_bound, stock_top: self.top, most_cells };
         let mut measured =
-            measure(&self.part, &scene.cutter, &planned.path, &cut, &scene.tolerance, monitor)?;
+            measure(&self.part, &scene.cutter, &planned.path, &cut, &scene.tolerance, &asked, monitor)?;
         let check = |holder| holder_collisions(&cut, holder, &planned.path, monitor);
         let held = scene.holder.as_ref().map(check).transpose()?;
         let simulation = SimulationFigures {
             engine: scene.simulation.engine.name(),
             cell_mm: grid.cell,
             cells: grid.len(),
+            error_bound_asked_mm: asked.error_bound,
+            refined_rectangles: measured.refined.rectangles,
+            finest_cell_mm: measured.refined.finest_cell,
             moves: planned.path.len(),
             wall_s: begun.elapsed().as_secs_f64(),
             threads: rayon::current_num_threads(),
@@ -307,7 +314,14 @@ impl<'a> Job<'a> {
             folder: request.folder.clone(),
             verdict: if violations.is_empty() { Verdict::Pass } else { Verdict::Fail },
             violations,
-            notes: self.notes.iter().chain(&note).chain(&planned.notes).cloned().collect(),
+            notes: self
+                .notes
+                .iter()
+                .chain(&note)
+                .chain(&measured.refined.note)
+                .chain(&planned.notes)
+                .cloned()
+                .collect(),
             path: path_figures(&planned.path, time),
             scallop: measured.scallop,
             gouge: measured.gouge,

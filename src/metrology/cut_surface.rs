@@ -8,7 +8,7 @@
 
 use crate::geometry::{Point3, Vector3};
 use crate::sim::{Envelope, NOT_CUT, ZMap};
-use crate::toolpath::Toolpath;
+use crate::toolpath::{MoveKind, Toolpath};
 
 /// A point of the cut surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,6 +49,10 @@ pub(crate) struct CutSurface<'a> {
 /// hundred times shorter than a cell.
 const MOST_STEPS: usize = 1000;
 
+/// Moves looked at on either side of a winner when none of the winners passes a point: asked at gaps only.
+/// With fewer, long chains of short chords under a flat are cut anew on finer cells in vain.
+const MOST_BESIDE: u32 = 32;
+
 impl<'a> CutSurface<'a> {
     /// Of a z-map that `path` has cut.
     pub fn new(envelope: Envelope, cut: &'a ZMap, path: &'a Toolpath) -> Self {
@@ -88,8 +92,30 @@ impl<'a> CutSurface<'a> {
     /// The cut surface at `(x, y)`; `None` off the grid.
     pub fn at(&self, x: f64, y: f64) -> Option<CutPoint> {
         let (i, j) = self.cut.grid.cell_at(x, y)?;
-        let lowest = self.lowest_of(&self.winners(i, j), x, y);
-        lowest.z.is_finite().then(|| self.follow(lowest, x, y))
+        let winners = self.winners(i, j);
+        let lowest = self.lowest_of(&winners, x, y);
+        let lowest = if lowest.z.is_finite() { lowest } else { self.beside((i, j), &winners, x, y)? };
+        Some(self.follow(lowest, x, y))
+    }
+
+    /// A cut that passes `(x, y)`, near the winners of cell `(i, j)` along the program: of moves that are
+    /// equally low (flats on level ground) the first wins every cell and may yet end before the point.
+    /// What passes more than a cell above the cell's own height is no cut of this place.
+    fn beside(&self, (i, j): (usize, usize), winners: &Winners, x: f64, y: f64) -> Option<CutPoint> {
+        let grid = &self.cut.grid;
+        let highest = f64::from(self.cut.height[grid.index(i, j)]) + grid.cell;
+        let near = winners.moves[..winners.len].iter().flat_map(|&by| {
+            let steps = (1..=MOST_BESIDE).flat_map(move |s| [by.checked_add(s), by.checked_sub(s)]);
+            steps.flatten().map(move |k| (by, k))
+        });
+        let mut cuts = near.filter(|&(by, k)| {
+            let other = self.path.moves.get(k as usize);
+            other.is_some_and(|m| m.kind == MoveKind::Cut && Some(m.pass) == self.pass(by))
+        });
+        cuts.find_map(|(_, k)| {
+            let z = self.envelope.height(k, x, y).filter(|z| *z <= highest)?;
+            Some(CutPoint { z, by: k })
+        })
     }
 
     /// Goes along the program from `from` while the next move of the same pass is lower there.

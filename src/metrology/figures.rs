@@ -3,6 +3,8 @@
 
 use serde::Serialize;
 
+use super::refine::Refined;
+
 /// What is tolerated, mm, all positive.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Limits {
@@ -153,4 +155,6 @@ pub struct Measurement {
     pub deviation_map: Vec<f32>,
     /// Height and weight (ridge length, mm) of every ridge sample.
     pub ridge_samples: Vec<[f32; 2]>,
+    /// How the figures were refined.
+    pub refined: Refined,
 }

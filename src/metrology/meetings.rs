@@ -23,6 +23,10 @@ const MOST_DEPTH: usize = 8;
 /// A meeting is found to this share of the line.
 const CROSSING: f64 = 1e-10;
 
+/// What stands before an edge is asked for at this share of the line before it: more than [`CROSSING`].
+/// Gaps narrower than this are not seen.
+const EDGE: f64 = 1e-6;
+
 /// A place where two cuts are equally high and none is lower.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Meeting {
@@ -81,7 +85,20 @@ impl<'a> Meetings<'a> {
         b: (f64, u32),
         found: &mut dyn FnMut(Meeting),
     ) {
-        self.search(at, a, b, MOST_DEPTH, found);
+        self.between_or_gaps(at, a, b, found, &mut |_| {});
+    }
+
+    /// As [`Meetings::between`]; hands to `gap` the places between `a` and `b` that no move around reaches:
+    /// stock stands there, or a move passes that no cell saw.
+    pub fn between_or_gaps(
+        &self,
+        at: &dyn Fn(f64) -> Point2,
+        a: (f64, u32),
+        b: (f64, u32),
+        found: &mut dyn FnMut(Meeting),
+        gap: &mut dyn FnMut(Point2),
+    ) {
+        self.search(at, a, b, MOST_DEPTH, found, gap);
     }
 
     fn search(
@@ -91,6 +108,7 @@ impl<'a> Meetings<'a> {
         (tb, b): (f64, u32),
         depth: usize,
         found: &mut dyn FnMut(Meeting),
+        gap: &mut dyn FnMut(Point2),
     ) {
         if !self.apart(a, b) {
             return;
@@ -98,15 +116,21 @@ impl<'a> Meetings<'a> {
         let t = self.crossing(at, (ta, a), (tb, b));
         let q = at(t);
         let (za, zb) = (self.height(a, q), self.height(b, q));
-        let Some(lowest) = self.surface.at(q.x, q.y) else { return };
+        let Some(lowest) = self.surface.at(q.x, q.y) else { return gap(q) };
         // Another move is lower at the crossing: it stands between the two.
         let third = lowest.z < za.min(zb) - 1e-9 && lowest.by != a && lowest.by != b;
         if third && depth > 0 && self.surface.pass(lowest.by).is_some() {
-            self.search(at, (ta, a), (t, lowest.by), depth - 1, found);
-            self.search(at, (t, lowest.by), (tb, b), depth - 1, found);
+            self.search(at, (ta, a), (t, lowest.by), depth - 1, found, gap);
+            self.search(at, (t, lowest.by), (tb, b), depth - 1, found, gap);
         } else if za.is_finite() && zb.is_finite() && (za - zb).abs() <= MEETING {
             found(Meeting { t, at: q, z: za.max(zb), moves: [a, b] });
         } else if za.is_infinite() != zb.is_infinite() {
+            // The crossing is where `b` begins, if `a` has not ended there at the latest.
+            let before = at((t - EDGE).max(ta));
+            let ended = |by| self.height(by, before).is_infinite();
+            if ended(a) && ended(b) && self.surface.at(before.x, before.y).is_none() {
+                return gap(before);
+            }
             // A cutter with a flat ends in a wall: the ridge is its edge.
             found(Meeting { t, at: q, z: za.min(zb), moves: [a, b] });
         }

@@ -47,16 +47,28 @@ pub(super) struct Ridges {
     pub samples: Vec<[f32; 2]>,
     /// The highest sample of each row of cells, and those that might rise above it.
     candidates: Vec<RidgeSample>,
+    /// Places between centres where more stands than the cells saw.
+    pub hidden: Vec<Hidden>,
+}
+
+/// A place between centres where more stands than the cells around saw.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Hidden {
+    /// No move around passes here.
+    Gap(Point2),
+    /// A ridge above the uncut tolerance that is no scallop, between cells below it, and its height, mm.
+    Ridge(Point2, f64),
 }
 
 impl Ridges {
     /// Of the samples of one row.
-    fn of_row(samples: &[RidgeSample]) -> Self {
+    fn of_row(samples: &[RidgeSample], hidden: Vec<Hidden>) -> Self {
         let highest = samples.iter().map(|s| s.height).fold(f64::NEG_INFINITY, f64::max);
         let candidates = samples.iter().filter(|s| s.height + s.rise >= highest);
         Self {
             samples: samples.iter().map(|s| [s.height as f32, s.length as f32]).collect(),
             candidates: candidates.copied().collect(),
+            hidden,
         }
     }
 
@@ -80,6 +92,11 @@ pub(super) struct Highest {
 /// Where a ridge could rise above the highest sample between two grid lines, it is looked at on this
 /// many lines between them.
 const CLOSER_LINES: i32 = 8;
+
+/// On so many times more lines where it still could, by more than the asked bound, up to [`MOST_LINES`].
+/// More lines at once, or at most, take longer; fewer at most leave steep ridges open.
+const CLOSER_STILL: i32 = 8;
+const MOST_LINES: i32 = 512;
 
 /// Ridges are looked at closer on lines that they cross with at least this plan normal; the lines of
 /// the other family see the same ridge less squarely.
@@ -139,17 +156,19 @@ impl<'a> RidgeFinder<'a> {
         Self { surface, part, cutter, limits, meetings }
     }
 
-    /// All ridges, row by row. `on_part` tells which cells are measured.
+    /// All ridges, row by row. `deviation` is that of a cell, mm, NaN where it is not measured.
     pub fn find(
         &self,
-        on_part: &(dyn Fn(usize) -> bool + Sync),
+        deviation: &(dyn Fn(usize) -> f32 + Sync),
         monitor: &dyn Monitor,
     ) -> Result<Ridges, Cancelled> {
         let grid = self.surface.cut.grid;
+        let on_part = |k: usize| !deviation(k).is_nan();
+        let low = |k: usize| f64::from(deviation(k)) <= self.limits.uncut;
         monitor.start("measuring ridges", grid.ny as u64);
         let rows = crate::parallel::try_map(grid.ny, |j| {
             monitor::check(monitor)?;
-            let mut samples = Vec::new();
+            let (mut samples, mut hidden) = (Vec::new(), Vec::new());
             for i in 0..grid.nx {
                 let k = grid.index(i, j);
                 if !on_part(k) {
@@ -163,12 +182,16 @@ impl<'a> RidgeFinder<'a> {
                     let [a, b] = [k, other].map(|k| self.surface.cut.cut_by[k]);
                     if on_part(other) && self.meetings.apart(a, b) {
                         let line = GridLine::new(&grid, k as u32, along_x);
-                        self.between(&line, (0.0, a), (1.0, b), &mut samples);
+                        let first = hidden.len();
+                        self.between(&line, (0.0, a), (1.0, b), &mut samples, &mut hidden);
+                        if !(low(k) && low(other)) {
+                            hidden.truncate(first);
+                        }
                     }
                 }
             }
             monitor.advance(1);
-            Ok(Ridges::of_row(&samples))
+            Ok(Ridges::of_row(&samples, hidden))
         })?;
         let mut ridges = Ridges {
             samples: Vec::with_capacity(rows.iter().map(|r| r.samples.len()).sum()),
@@ -177,21 +200,34 @@ impl<'a> RidgeFinder<'a> {
         for row in rows {
             ridges.samples.extend(row.samples);
             ridges.candidates.extend(row.candidates);
+            ridges.hidden.extend(row.hidden);
         }
         Ok(ridges)
     }
 
-    /// Adds the ridges on a line between `a`, lowest at its share `ta`, and `b`, lowest at `tb`.
-    fn between(&self, line: &GridLine, a: (f64, u32), b: (f64, u32), out: &mut Vec<RidgeSample>) {
-        self.meetings.between(&|t| line.at(t), a, b, &mut |m| out.extend(self.sample(line, m)));
+    /// Adds the ridges on a line between `a`, lowest at its share `ta`, and `b`, lowest at `tb`, and what
+    /// else stands there.
+    fn between(
+        &self,
+        line: &GridLine,
+        a: (f64, u32),
+        b: (f64, u32),
+        out: &mut Vec<RidgeSample>,
+        hidden: &mut Vec<Hidden>,
+    ) {
+        let mut gaps = Vec::new();
+        let mut found = |m| out.extend(self.sample(line, m, hidden));
+        self.meetings.between_or_gaps(&|t| line.at(t), a, b, &mut found, &mut |q| gaps.push(Hidden::Gap(q)));
+        hidden.extend(gaps);
     }
 
-    fn sample(&self, line: &GridLine, meeting: Meeting) -> Option<RidgeSample> {
+    fn sample(&self, line: &GridLine, meeting: Meeting, hidden: &mut Vec<Hidden>) -> Option<RidgeSample> {
         let Meeting { at: q, z, moves, .. } = meeting;
         let at = Point3::new(q.x, q.y, z);
         let (foot, height) = self.part.closest_point(&at);
         let [m, n] = moves.map(|by| self.surface.normal(by, q.x, q.y));
         if height > self.limits.uncut && !self.is_scallop(moves, &foot) {
+            hidden.push(Hidden::Ridge(q, height));
             return None;
         }
         let tangent = m.cross(&n).try_normalize(1e-15)?;
@@ -216,37 +252,51 @@ impl<'a> RidgeFinder<'a> {
     }
 
     /// The highest place of all ridges, looked at closer wherever a ridge might rise above the highest
-    /// sample before the next grid line; `None` without samples.
-    pub fn highest(&self, ridges: &Ridges) -> Option<Highest> {
+    /// sample before the next grid line, and closer still until it cannot by more than `asked` mm; `None`
+    /// without samples.
+    pub fn highest(&self, ridges: &Ridges, asked: f64) -> Option<Highest> {
         let samples = &ridges.candidates;
         let first = samples.iter().max_by(|a, b| a.height.total_cmp(&b.height))?;
         let mut highest = Highest { height: first.height, at: first.at, possible: first.height };
         let might = |s: &&RidgeSample| {
             s.squareness >= SQUARE_ENOUGH && s.height + s.rise > first.height + NUMERICAL_FLOOR
         };
-        let candidates: Vec<&RidgeSample> = samples.iter().filter(might).collect();
-        let grid = &self.surface.cut.grid;
-        let closer = crate::parallel::map(candidates.len(), |k| {
-            let sample = candidates[k];
-            let line = GridLine::new(grid, sample.from.0, sample.from.1);
-            let [a, b] = sample.moves;
-            let mut found = Vec::new();
-            for k in -CLOSER_LINES / 2..=CLOSER_LINES / 2 {
-                let line = line.beside(f64::from(k) / f64::from(CLOSER_LINES));
-                // The ridge may leave the cell sideways by half of it.
-                self.between(&line, (-0.5, a), (1.5, b), &mut found);
+        let mut open: Vec<&RidgeSample> = samples.iter().filter(might).collect();
+        let mut lines = CLOSER_LINES;
+        while !open.is_empty() {
+            let closer = crate::parallel::map(open.len(), |k| self.closer(open[k], lines));
+            for sample in closer.iter().flatten() {
+                if sample.height > highest.height {
+                    (highest.height, highest.at) = (sample.height, sample.at);
+                }
             }
-            found.retain(|s| self.part.highest_at(s.at.x, s.at.y).is_some());
-            found
-        });
-        for sample in closer.iter().flatten() {
-            if sample.height > highest.height {
-                (highest.height, highest.at) = (sample.height, sample.at);
-            }
-            highest.possible = highest.possible.max(sample.height + sample.rise / f64::from(CLOSER_LINES));
+            let possible: Vec<f64> = closer
+                .iter()
+                .map(|found| found.iter().map(|s| s.height + s.rise / f64::from(lines)).fold(0.0, f64::max))
+                .collect();
+            lines *= CLOSER_STILL;
+            let last = lines > MOST_LINES;
+            let enough = highest.height + asked;
+            let settled = |p: &&f64| last || **p <= enough;
+            highest.possible = possible.iter().filter(settled).copied().fold(highest.possible, f64::max);
+            open = (0..open.len()).filter(|k| !settled(&&possible[*k])).map(|k| open[k]).collect();
         }
         highest.possible = highest.possible.max(highest.height);
         Some(highest)
+    }
+
+    /// The ridge of a sample on as many lines within half a cell on either side.
+    fn closer(&self, sample: &RidgeSample, lines: i32) -> Vec<RidgeSample> {
+        let line = GridLine::new(&self.surface.cut.grid, sample.from.0, sample.from.1);
+        let [a, b] = sample.moves;
+        let (mut found, mut hidden) = (Vec::new(), Vec::new());
+        for k in -lines / 2..=lines / 2 {
+            let line = line.beside(f64::from(k) / f64::from(lines));
+            // The ridge may leave the cell sideways by half of it.
+            self.between(&line, (-0.5, a), (1.5, b), &mut found, &mut hidden);
+        }
+        found.retain(|s| self.part.highest_at(s.at.x, s.at.y).is_some());
+        found
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::{RunReport, SimulationFigures, SurfaceMeshFigures, ToolpathResult, Verdict, violations};
 use crate::metrology::{
-    DeviationFigures, GougeFigures, GougeRegion, Limits, Measurement, PathFigures, ScallopFigures,
+    DeviationFigures, GougeFigures, GougeRegion, Limits, Measurement, PathFigures, Refined, ScallopFigures,
     UncutFigures,
 };
 
@@ -43,6 +43,7 @@ pub fn measurement(gouge: f64) -> Measurement {
         },
         deviation_map: Vec::new(),
         ridge_samples: Vec::new(),
+        refined: Refined::default(),
     }
 }
 
@@ -73,6 +74,9 @@ pub fn toolpath(name: &str, machining_time_s: f64, gouge: f64) -> ToolpathResult
             engine: "reference",
             cell_mm: 0.05,
             cells: 480_000,
+            error_bound_asked_mm: 0.0005,
+            refined_rectangles: 0,
+            finest_cell_mm: 0.05,
             moves: 12345,
             wall_s: 1.5,
             threads: 2,

@@ -16,6 +16,12 @@ pub struct SimulationFigures {
     pub cell_mm: f64,
     /// Number of cells.
     pub cells: usize,
+    /// The error bound that was asked for.
+    pub error_bound_asked_mm: f64,
+    /// Rectangles that were cut and measured anew on finer cells.
+    pub refined_rectangles: usize,
+    /// Pitch of the finest cells, [`SimulationFigures::cell_mm`] without such rectangles.
+    pub finest_cell_mm: f64,
     /// Number of moves.
     pub moves: usize,
     /// Time that cutting and measuring took on the wall clock. Differs from run to run.

@@ -2,13 +2,16 @@
 
 use millstream::cutter::Cutter;
 use millstream::geometry::{AnalyticShape, AnalyticSurface, Point3, TriangleMesh};
-use millstream::metrology::{Limits, Measurement, measure};
+use millstream::metrology::{Asked, Limits, Measurement, measure};
 use millstream::monitor::Silent;
 use millstream::part::{Part, Patch};
 use millstream::sim::{Grid, ZMap, cut_reference};
 use millstream::toolpath::{PlanSettings, Step, Strategy, Toolpath, plan};
 
 pub const LIMITS: Limits = Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chord: 0.001 };
+
+/// Error bound asked of every figure, mm.
+pub const ASKED: f64 = 0.0005;
 
 /// Stock over a part's highest point, mm.
 const ALLOWANCE: f64 = 1.0;
@@ -45,7 +48,8 @@ pub fn cut_and_measure(
     let grid = Grid::covering(&bounds, cell, 64, 1 << 32).unwrap();
     let stock = ZMap::block(grid, bounds.max.z + ALLOWANCE);
     let cut = cut_reference(&stock, cutter, path, &Silent).unwrap();
-    measure(part, cutter, path, &cut, limits, &Silent).unwrap()
+    let asked = Asked { error_bound: ASKED, stock_top: bounds.max.z + ALLOWANCE, most_cells: 1 << 20 };
+    measure(part, cutter, path, &cut, limits, &asked, &Silent).unwrap()
 }
 
 pub fn plan_and_measure(

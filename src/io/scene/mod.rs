@@ -43,6 +43,18 @@ pub const DEFAULT_CLEARANCE: f64 = 2.0;
 pub const DEFAULT_MEMORY_MIB: u32 = 2048;
 /// Whether to find out what each move removes by default: a tenth of the time of a run on the wave.
 pub const DEFAULT_REMOVAL: bool = true;
+/// The error bound asked by default is this share of the least tolerance that is measured against: what
+/// is left open then decides no verdict but the closest. A smaller one costs time along crests.
+pub const DEFAULT_ERROR_SHARE: f64 = 0.1;
+
+/// No smaller error bound is asked by default, mm: root finding leaves a nanometre in any case.
+const LEAST_ERROR_BOUND: f64 = 1e-6;
+
+/// The error bound, mm, that is asked when the scene asks for none.
+pub fn default_error_bound(limits: &Limits) -> f64 {
+    (DEFAULT_ERROR_SHARE * limits.scallop.min(limits.gouge).min(limits.uncut)).max(LEAST_ERROR_BOUND)
+}
+
 /// Default control points a side of a streamline's stream function. More follow finer changes of
 /// the feed direction and cost time as their cube; fewer smooth them away.
 pub const DEFAULT_CONTROL_POINTS: usize = 24;
@@ -154,6 +166,8 @@ pub struct Simulation {
     pub engine: Engine,
     /// Whether the stock is also cut in the order of the program, for what each move removes.
     pub removal: bool,
+    /// Error bound that is asked of the highest scallop, the deepest gouge and the highest uncut place, mm.
+    pub error_bound: f64,
 }
 
 /// One toolpath to plan.

@@ -12,7 +12,7 @@ use super::{
     CuttingData, DEFAULT_ALLOWANCE, DEFAULT_CLEARANCE, DEFAULT_CONTROL_POINTS, DEFAULT_FEED_RATE,
     DEFAULT_LIMITS, DEFAULT_MARGIN, DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE, DEFAULT_REMOVAL,
     DEFAULT_SPINDLE_SPEED, Engine, MeshFormat, NamedFile, PartSource, Scene, Simulation, Stock,
-    ToolpathRequest, auto_cell,
+    ToolpathRequest, auto_cell, default_error_bound,
 };
 use crate::cutter::{AptWord, AptWords, Cutter, CutterError, CutterShape, Holder, HolderSection};
 use crate::geometry::AnalyticSurface;
@@ -84,7 +84,7 @@ impl Scene {
         let (cutter, cutting) = read_cutter(&root.section("cutter")?)?;
         let holder = read_holder(&root, &cutter)?;
         let tolerance = read_tolerance(&root.section("tolerance")?)?;
-        let mut simulation = read_simulation(&root.section("simulation")?, &cutter)?;
+        let mut simulation = read_simulation(&root.section("simulation")?, &cutter, &tolerance)?;
         let (machine, clearance) = read_machine(&root.section("machine")?)?;
         let toolpaths = read_toolpaths(&root, &tolerance, &cutter)?;
         if simulation.cell_is_auto {
@@ -367,8 +367,12 @@ fn read_tolerance(section: &Section<'_>) -> Result<Limits, SceneError> {
 }
 
 /// An automatic cell is that of the cutter alone until the toolpaths are known.
-fn read_simulation(section: &Section<'_>, cutter: &Cutter) -> Result<Simulation, SceneError> {
-    section.only(&["cell", "memory_mib", "engine", "removal"], &[], "[simulation]")?;
+fn read_simulation(
+    section: &Section<'_>,
+    cutter: &Cutter,
+    limits: &Limits,
+) -> Result<Simulation, SceneError> {
+    section.only(&["cell", "memory_mib", "engine", "removal", "error_bound"], &[], "[simulation]")?;
     let cell = section.length_or_word("cell", "auto")?;
     let engine = section.word("engine", &Engine::WORDS)?.and_then(|word| Engine::from_word(word.value));
     Ok(Simulation {
@@ -377,6 +381,7 @@ fn read_simulation(section: &Section<'_>, cutter: &Cutter) -> Result<Simulation,
         memory_mib: section.count("memory_mib", 1..=1 << 20)?.unwrap_or(DEFAULT_MEMORY_MIB),
         engine: engine.unwrap_or(Engine::ZMap),
         removal: section.flag("removal")?.unwrap_or(DEFAULT_REMOVAL),
+        error_bound: section.length("error_bound")?.map_or_else(|| default_error_bound(limits), |v| v.value),
     })
 }
 

@@ -302,6 +302,30 @@ fn the_auto_cell_is_a_round_number() {
 }
 
 #[test]
+fn the_error_bound_is_a_tenth_of_the_least_tolerance_unless_the_scene_says() {
+    let text = |tolerance: &str, simulation: &str| {
+        format!(
+            "[part]\nsurface = \"plane\"\nx = [0, 8]\ny = [0, 6]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n\
+             [tolerance]\n{tolerance}\n[simulation]\n{simulation}\n[[toolpath]]\nstrategy = \"zigzag\"\n"
+        )
+    };
+    let bound = |tolerance: &str, simulation: &str| {
+        let scene = Scene::parse("a.toml", text(tolerance, simulation)).unwrap();
+        let again = Scene::parse("a.toml", complete_toml(&scene)).unwrap();
+        assert_eq!(scene.simulation.error_bound, again.simulation.error_bound);
+        scene.simulation.error_bound
+    };
+    let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-12;
+    assert!(near(bound("", ""), 0.0005) && near(bound("scallop = 0.002", ""), 0.0002));
+    assert!(near(bound("gouge = 0.1\nuncut = 0.003", ""), 0.0003));
+    assert_eq!(bound("scallop = 0.002", "error_bound = 0.004"), 0.004);
+    for bad in ["0", "-0.001", "\"small\""] {
+        let refused = Scene::parse("a.toml", text("", &format!("error_bound = {bad}")));
+        assert!(matches!(refused, Err(SceneError::Invalid(_))), "{bad}");
+    }
+}
+
+#[test]
 fn the_cell_may_be_left_to_the_program() {
     let simulation = |cell: &str| {
         let text = format!(

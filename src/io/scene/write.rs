@@ -55,6 +55,11 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     writeln!(out, "memory_mib = {}", scene.simulation.memory_mib)?;
     writeln!(out, "engine = {}", text(scene.simulation.engine.name()))?;
     writeln!(out, "removal = {}  # what each move removes, and rapids in stock", scene.simulation.removal)?;
+    writeln!(
+        out,
+        "error_bound = {}  # mm, asked of the highest scallop, deepest gouge and highest uncut place",
+        number(scene.simulation.error_bound)
+    )?;
     writeln!(out, "\n[machine]")?;
     writeln!(out, "rapid_rate = {}  # mm/min", number(scene.machine.rapid_rate))?;
     writeln!(out, "acceleration = {}  # mm/s2", number(scene.machine.acceleration))?;

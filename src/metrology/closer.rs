@@ -1,0 +1,188 @@
+//! The greatest value of a figure between cell centres, by branch and bound over squares of the plan.
+//!
+//! Enters: squares with what may stand in them at most, and a function that gives value and bound at the
+//! centre of any square. Leaves: the greatest value, its place, and what it may be at most. The square
+//! that promises most is divided into four, until none promises more than is asked, or the work that is
+//! allowed is done; what is left over is the bound. mm.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use super::ridges::NUMERICAL_FLOOR;
+use crate::geometry::Point2;
+
+/// A square of the plan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Square {
+    /// No value in it is greater, mm (first order).
+    pub possible: f64,
+    /// Centre, mm.
+    pub centre: Point2,
+    /// Half its side, mm.
+    pub half: f64,
+}
+
+/// What a square holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Value {
+    /// At its centre, mm.
+    pub here: f64,
+    /// At most anywhere in it, mm.
+    pub possible: f64,
+}
+
+/// Places asked for in any case, each some 2 µs: they bring most figures to nanometres. Fewer leave wider
+/// bounds than need be, more take time where nobody asked.
+const CHEAP: usize = 20_000;
+
+/// Places asked for while the asked bound does not hold: some seconds. With fewer, small asked bounds stay
+/// open along crests; with more a run that cannot meet its bound takes minutes to say so.
+const MOST: usize = 2_000_000;
+
+/// Squares divided at a time, by as many workers as there are. More of them look at squares that the
+/// first ones would have ruled out.
+const BATCH: usize = 256;
+
+/// A square whose centre lies off the part is divided until it is this share of the first one.
+const OFF_PART_SHARE: f64 = 1.0 / 16.0;
+
+/// What a search found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Found {
+    /// The greatest value and its place, where it exceeds what was known.
+    pub greatest: Option<(f64, Point2)>,
+    /// No value is greater by more than [`NUMERICAL_FLOOR`], mm.
+    pub possible: f64,
+}
+
+impl Eq for Square {}
+
+impl Ord for Square {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.possible
+            .total_cmp(&other.possible)
+            .then(other.centre.y.total_cmp(&self.centre.y))
+            .then(other.centre.x.total_cmp(&self.centre.x))
+    }
+}
+
+impl PartialOrd for Square {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+/// Searches `squares`, all of one size, for values above `known`. `at` tells what the square around a
+/// place with a given half side holds; `None` off the part.
+///
+/// # Tolerance
+/// `possible` exceeds the greater of `known` and the value found by no more than `asked` unless [`MOST`]
+/// places did not suffice. It is as right as the bounds that `at` gives.
+pub(super) fn greatest(
+    squares: Vec<Square>,
+    known: f64,
+    asked: f64,
+    at: &(dyn Fn(Point2, f64) -> Option<Value> + Sync),
+) -> Found {
+    let least = squares.first().map_or(0.0, |s| s.half * OFF_PART_SHARE);
+    let mut open = BinaryHeap::from(squares);
+    let (mut best, mut place, mut spent) = (known, None, 0);
+    while spent < MOST {
+        let enough = if spent < CHEAP { NUMERICAL_FLOOR } else { asked.max(NUMERICAL_FLOOR) };
+        let mut batch = Vec::with_capacity(BATCH);
+        while batch.len() < BATCH && open.peek().is_some_and(|s| s.possible > best + enough) {
+            batch.extend(open.pop());
+        }
+        if batch.is_empty() {
+            break;
+        }
+        spent += 4 * batch.len();
+        let quarters = crate::parallel::map(4 * batch.len(), |k| {
+            let (square, side) = (&batch[k / 4], |up: bool| if up { 0.5 } else { -0.5 });
+            let half = 0.5 * square.half;
+            let centre = Point2::new(
+                square.centre.x + side(k & 1 != 0) * square.half,
+                square.centre.y + side(k & 2 != 0) * square.half,
+            );
+            match at(centre, half) {
+                // A part of a square promises no more than the whole.
+                Some(v) => {
+                    let possible = v.possible.min(square.possible).max(v.here);
+                    (Some(v.here), Some(Square { possible, centre, half }))
+                }
+                None if half > least => (None, Some(Square { possible: square.possible, centre, half })),
+                None => (None, None),
+            }
+        });
+        for (here, square) in &quarters {
+            if let (Some(here), Some(square)) = (here, square)
+                && *here > best
+            {
+                (best, place) = (*here, Some(square.centre));
+            }
+        }
+        open.extend(quarters.into_iter().filter_map(|q| q.1).filter(|s| s.possible > best + NUMERICAL_FLOOR));
+    }
+    let possible = open.peek().map_or(best, |s| s.possible.max(best));
+    Found { greatest: place.map(|place| (best, place)), possible }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Squares of side 1 over [0, n]², with values and slopes of `f`.
+    fn search(n: u32, known: f64, asked: f64, f: &(dyn Fn(Point2) -> Option<(f64, f64)> + Sync)) -> Found {
+        let at = |centre: Point2, half: f64| {
+            let (here, slope) = f(centre)?;
+            Some(Value { here, possible: here + slope * half * std::f64::consts::SQRT_2 })
+        };
+        let centres = (0..n * n).map(|k| Point2::new(f64::from(k % n) + 0.5, f64::from(k / n) + 0.5));
+        let squares = centres
+            .filter_map(|centre| at(centre, 0.5).map(|v| Square { possible: v.possible, centre, half: 0.5 }));
+        greatest(squares.collect(), known, asked, &at)
+    }
+
+    #[test]
+    fn peaks_and_roofs_are_found_to_the_nanometre() {
+        let peak = |p: Point2| {
+            let d = p - Point2::new(3.217, 4.891);
+            Some((7.0 - 0.1 * d.norm_squared(), 0.2 * d.norm()))
+        };
+        let found = search(8, 0.0, 1e-4, &peak);
+        let (value, place) = found.greatest.unwrap();
+        assert!(
+            value <= 7.0 && found.possible >= 7.0 - NUMERICAL_FLOOR && found.possible - value <= 1.1e-6,
+            "{found:?}"
+        );
+        assert!((place - Point2::new(3.217, 4.891)).norm() < 1e-2);
+        // A crest askew to the squares, as high all along.
+        let roof = |p: Point2| Some((2.0 - 0.3 * (p.x - 0.61 * p.y - 1.07).abs(), 0.3 * 1.1714));
+        let found = search(8, 0.0, 1e-3, &roof);
+        let value = found.greatest.unwrap().0;
+        assert!(
+            value <= 2.0 && found.possible >= 2.0 - NUMERICAL_FLOOR && found.possible - value <= 1e-3,
+            "{found:?}"
+        );
+    }
+
+    #[test]
+    fn nothing_above_what_is_known_is_nothing_found() {
+        let hill = |p: Point2| Some((1.0 - 0.1 * (p.x - 2.0).powi(2), 0.2 * (p.x - 2.0).abs()));
+        let found = search(4, 5.0, 1e-3, &hill);
+        assert_eq!(found, Found { greatest: None, possible: 5.0 });
+    }
+
+    #[test]
+    fn a_peak_beside_the_border_is_found_and_nothing_beyond_it() {
+        // The value rises to the border at x = 2.93; the centre of the last square is off.
+        let cliff = |p: Point2| (p.x <= 2.93).then_some((p.x, 1.0));
+        let squares = vec![Square { possible: 4.0, centre: Point2::new(2.5, 0.5), half: 0.5 }];
+        let at = |centre: Point2, half: f64| {
+            let (here, slope) = cliff(centre)?;
+            Some(Value { here, possible: here + 1.5 * slope * half })
+        };
+        let value = greatest(squares, 0.0, 1e-3, &at).greatest.unwrap().0;
+        assert!((2.93 - 1.0 / 16.0..=2.93).contains(&value), "{value}");
+    }
+}

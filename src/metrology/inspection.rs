@@ -1,0 +1,320 @@
+//! Deviation, gouges and uncut places of one cut surface.
+//!
+//! Enters: a cut surface over its grid, and the part. Leaves: signed deviation at the design point above
+//! or below every cell centre, and the figures of what lies below and above the design, each with the
+//! bound of its error. mm.
+
+use super::closer::{self, Square, Value};
+use super::cut_surface::{CutSurface, Deviation};
+use super::figures::{DeviationFigures, GougeFigures, GougeRegion, Limits, UncutFigures, UncutRegion};
+use super::regions::connected;
+use super::ridges::NUMERICAL_FLOOR;
+use crate::cutter::Cutter;
+use crate::geometry::{Point2, Point3};
+use crate::monitor::{self, Cancelled, Monitor};
+use crate::part::Part;
+use crate::sim::{Grid, NOT_CUT};
+
+/// Regions listed one by one in the figures; the rest is counted.
+const LISTED_REGIONS: usize = 20;
+
+/// Cells that are searched between their centres, the most promising ones: 32 bytes each. What the others
+/// promise at most goes into the bound, so that fewer leave it wider.
+const MOST_SEARCHED: usize = 1 << 16;
+
+/// A place above the uncut tolerance is a scallop, or half of one on the part's border, when a pass
+/// came down to the design there and no cell rises above the highest ridge by more than this share.
+const RIDGE_IS_TOP: f64 = 1e-3;
+
+/// The design surface is sampled in so many bands of rows, one after the other: it takes 40 bytes a
+/// cell, more than all else that is kept. Every band looks at all triangles of the part.
+const DESIGN_BANDS: usize = 8;
+
+/// What is measured at one cell.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sample {
+    /// Signed deviation, mm; NaN off the part.
+    pub deviation: f32,
+    /// Sine of the angle between cut and design surface.
+    pub slope: f32,
+    /// Vertical part of the design surface's unit normal.
+    pub lean: f32,
+}
+
+/// Asks the monitor whether to stop, and tells it nothing: for stages within a stage.
+pub(super) struct Within<'a>(pub &'a dyn Monitor);
+
+impl Monitor for Within<'_> {
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
+}
+
+/// A cut surface and what it is measured by.
+pub(super) struct Inspection<'a> {
+    pub part: &'a Part,
+    pub cutter: &'a Cutter,
+    pub limits: &'a Limits,
+    /// The error bound that is asked for, mm.
+    pub asked: f64,
+    pub surface: &'a CutSurface<'a>,
+    pub grid: Grid,
+}
+
+impl Inspection<'_> {
+    /// Deviation at the design point over every cell centre.
+    pub fn samples(&self, monitor: &dyn Monitor) -> Result<Vec<Sample>, Cancelled> {
+        monitor.start("measuring deviation", self.grid.ny as u64);
+        let off = Sample { deviation: f32::NAN, slope: 0.0, lean: 1.0 };
+        let mut samples = vec![off; self.grid.len()];
+        let nx = self.grid.nx;
+        let band_rows = self.grid.ny.div_ceil(DESIGN_BANDS);
+        for (band, samples) in samples.chunks_mut((band_rows * nx).max(1)).enumerate() {
+            let first = band * band_rows;
+            // A row more on either side: gaps between patches are closed from their neighbours.
+            let rows = first.saturating_sub(1)..(first + samples.len() / nx + 1).min(self.grid.ny);
+            let origin = self.grid.centre(0, rows.start);
+            let design = self.part.sample_grid(origin, self.grid.cell, nx, rows.len(), &Within(monitor))?;
+            crate::parallel::for_each_chunk(samples, nx, |j, row| {
+                if monitor.cancelled() {
+                    return;
+                }
+                for (i, sample) in row.iter_mut().enumerate() {
+                    let design = design.at(i, first + j - rows.start);
+                    if !design.is_on() {
+                        continue;
+                    }
+                    let centre = self.grid.centre(i, first + j);
+                    let p = Point3::new(centre.x, centre.y, design.z);
+                    if let Some(d) = self.surface.along_normal(&p, &design.normal) {
+                        *sample = Sample {
+                            deviation: d.distance as f32,
+                            slope: d.slope as f32,
+                            lean: design.normal.z as f32,
+                        };
+                    }
+                }
+                monitor.advance(1);
+            });
+            monitor::check(monitor)?;
+        }
+        Ok(samples)
+    }
+
+    /// Area of the design surface that a cell stands for, mm².
+    fn area(&self, sample: &Sample) -> f64 {
+        self.grid.cell * self.grid.cell / f64::from(sample.lean).max(1e-3)
+    }
+
+    /// Centre of cell `k`.
+    fn centre(&self, k: usize) -> Point2 {
+        self.grid.centre(k % self.grid.nx, k / self.grid.nx)
+    }
+
+    pub fn deviation_figures(&self, samples: &[Sample]) -> DeviationFigures {
+        let mut figures = DeviationFigures { min_mm: f64::MAX, max_mm: f64::MIN, ..Default::default() };
+        let mut squares = 0.0;
+        for (k, d) in measured(samples) {
+            let area = self.area(&samples[k]);
+            figures.samples += 1;
+            figures.min_mm = figures.min_mm.min(d);
+            figures.max_mm = figures.max_mm.max(d);
+            figures.area_mm2 += area;
+            squares += area * d * d;
+        }
+        if figures.samples == 0 {
+            return DeviationFigures::default();
+        }
+        figures.rms_mm = (squares / figures.area_mm2).sqrt();
+        figures
+    }
+
+    pub fn gouges(&self, samples: &[Sample]) -> GougeFigures {
+        let deep = |k: usize| f64::from(samples[k].deviation) < -self.limits.gouge;
+        let mut figures = GougeFigures { error_bound_mm: NUMERICAL_FLOOR, ..Default::default() };
+        let regions = connected(&self.grid, &deep);
+        figures.region_count = regions.len();
+        for region in &regions {
+            let area: f64 = region.iter().map(|&k| self.area(&samples[k as usize])).sum();
+            figures.area_mm2 += area;
+            let Some(&deepest) = least_by(region, |k| f64::from(samples[k].deviation)) else { continue };
+            let (depth, at, by) = self.deepest_near(deepest as usize);
+            figures.regions.push(GougeRegion {
+                depth_mm: depth,
+                area_mm2: area,
+                at_mm: at.into(),
+                move_index: by,
+                line: 0,
+            });
+        }
+        figures.regions.sort_by(|a, b| b.depth_mm.total_cmp(&a.depth_mm));
+        figures.regions.truncate(LISTED_REGIONS);
+        let deepest = measured(samples).map(|(_, d)| -d).fold(0.0, f64::max);
+        let listed = figures.regions.first().map_or(0.0, |r| r.depth_mm);
+        figures.max_depth_mm = deepest.max(listed);
+        let cells = measured(samples).map(|(k, _)| k);
+        let found = self.between_centres(cells, figures.max_depth_mm, &|k| samples[k], &|d, lean, half| {
+            self.depth(d, lean, half)
+        });
+        figures.max_depth_mm = found.greatest.map_or(figures.max_depth_mm, |(depth, _)| depth);
+        figures.error_bound_mm += found.possible - figures.max_depth_mm;
+        figures
+    }
+
+    /// Depth at a centre, and at most in the square with half side `half` around it. Beside the centre a
+    /// cut may be deeper by the slope times the distance, but a cutter of radius r that meets the design
+    /// at a slope s cannot go deeper than about s²r below that.
+    fn depth(&self, d: &Deviation, lean: f64, half: f64) -> Value {
+        let deeper = (d.slope * reach(half, lean)).min(d.slope * d.slope * self.cutter.radius());
+        Value { here: -d.distance, possible: -d.distance + deeper }
+    }
+
+    /// The greatest value above `known` in the squares of `cells`, and what may be there at most.
+    /// `value` makes it of a deviation, the lean of the design's normal, and half the side of a square.
+    fn between_centres(
+        &self,
+        cells: impl Iterator<Item = usize>,
+        known: f64,
+        sample: &dyn Fn(usize) -> Sample,
+        value: &(dyn Fn(&Deviation, f64, f64) -> Value + Sync),
+    ) -> closer::Found {
+        let half = 0.5 * self.grid.cell;
+        let mut open: Vec<Square> = cells
+            .filter_map(|k| {
+                let s = sample(k);
+                let d = Deviation { distance: s.deviation.into(), slope: s.slope.into(), by: NOT_CUT };
+                let possible = value(&d, s.lean.into(), half).possible;
+                let centre = self.centre(k);
+                (possible > known + NUMERICAL_FLOOR).then_some(Square { possible, centre, half })
+            })
+            .collect();
+        let mut others = known;
+        if open.len() > MOST_SEARCHED {
+            open.select_nth_unstable_by(MOST_SEARCHED, |a, b| b.cmp(a));
+            others = open[MOST_SEARCHED].possible;
+            open.truncate(MOST_SEARCHED);
+        }
+        let at = |q: Point2, half: f64| {
+            let design = self.part.highest_at(q.x, q.y)?;
+            let d = self.surface.along_normal(&design.point, &design.normal)?;
+            Some(value(&d, design.normal.z, half))
+        };
+        let mut found = closer::greatest(open, known, self.asked, &at);
+        found.possible = found.possible.max(others);
+        found
+    }
+
+    /// The deepest place within a cell of cell `k`, by compass search on the exact surfaces: depth,
+    /// design point, move.
+    fn deepest_near(&self, k: usize) -> (f64, Point3, u32) {
+        let at = |q: Point2| {
+            let design = self.part.highest_at(q.x, q.y)?;
+            let d = self.surface.along_normal(&design.point, &design.normal)?;
+            Some((-d.distance, design.point, d.by))
+        };
+        let mut centre = self.centre(k);
+        let Some(mut best) = at(centre) else { return (0.0, Point3::new(centre.x, centre.y, 0.0), 0) };
+        let mut step = 0.5 * self.grid.cell;
+        while step > 1e-3 * self.grid.cell {
+            let around = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
+            let better = around.iter().find_map(|d| {
+                let q = Point2::new(centre.x + step * d[0], centre.y + step * d[1]);
+                at(q).filter(|found| found.0 > best.0).map(|found| (q, found))
+            });
+            match better {
+                Some((q, found)) => (centre, best) = (q, found),
+                None => step *= 0.5,
+            }
+        }
+        best
+    }
+
+    /// True where the pass that cut cell `k` came down to the design.
+    fn reached(&self, k: usize) -> bool {
+        let (by, centre) = (self.surface.cut.cut_by[k], self.centre(k));
+        let Some(design) = self.part.highest_at(centre.x, centre.y) else { return false };
+        by != NOT_CUT && {
+            let from_contact = self.cutter.contact_to_tip(&design.normal);
+            let tip = self.surface.nearest_tip(by, &(design.point + from_contact));
+            self.part.closest_point(&(tip - from_contact)).1 <= self.limits.uncut
+        }
+    }
+
+    /// What stands above the uncut tolerance and is no scallop, `highest_ridge` being the highest of those.
+    pub fn uncut(&self, samples: &[Sample], highest_ridge: f64, measured_area: f64) -> UncutFigures {
+        let high = |k: usize| f64::from(samples[k].deviation) > self.limits.uncut;
+        let mut figures = UncutFigures { error_bound_mm: NUMERICAL_FLOOR, ..Default::default() };
+        let mut cells = Vec::new();
+        let mut of_cells = Vec::new();
+        for region in connected(&self.grid, &high) {
+            let height = |k: usize| f64::from(samples[k].deviation);
+            let Some(&highest) = least_by(&region, |k| -height(k)) else { continue };
+            let top = height(highest as usize);
+            if top <= highest_ridge * (1.0 + RIDGE_IS_TOP) && self.reached(highest as usize) {
+                continue;
+            }
+            let mut area = 0.0;
+            let mut volume = 0.0;
+            for &k in &region {
+                let sample = &samples[k as usize];
+                area += self.area(sample);
+                volume += self.area(sample) * height(k as usize);
+            }
+            cells.push(region);
+            let centre = self.centre(highest as usize);
+            let z = self.part.highest_at(centre.x, centre.y).map_or(0.0, |design| design.point.z);
+            figures.area_mm2 += area;
+            figures.volume_mm3 += volume;
+            figures.region_count += 1;
+            of_cells.push(UncutRegion {
+                height_mm: top,
+                area_mm2: area,
+                volume_mm3: volume,
+                at_mm: [centre.x, centre.y, z],
+            });
+        }
+        let known = of_cells.iter().map(|r| r.height_mm).fold(0.0, f64::max);
+        let all = cells.iter().flatten().map(|&k| k as usize);
+        let found = self.between_centres(all, known, &|k| samples[k], &|d, lean, half| Value {
+            here: d.distance,
+            possible: d.distance + d.slope * reach(half, lean),
+        });
+        if let Some((height, q)) = found.greatest {
+            let cell = self.grid.cell_at(q.x, q.y).map(|(i, j)| self.grid.index(i, j) as u32);
+            let holds = |k: &usize| cell.is_some_and(|cell| cells[*k].contains(&cell));
+            let highest = (0..of_cells.len())
+                .max_by(|a, b| of_cells[*a].height_mm.total_cmp(&of_cells[*b].height_mm).then(b.cmp(a)));
+            let z = self.part.highest_at(q.x, q.y).map_or(0.0, |design| design.point.z);
+            // A place on the edge of its cell may belong to the next one.
+            if let Some(region) = (0..cells.len()).find(holds).or(highest) {
+                (of_cells[region].height_mm, of_cells[region].at_mm) = (height, [q.x, q.y, z]);
+            }
+        }
+        figures.error_bound_mm += found.possible - found.greatest.map_or(known, |(height, _)| height);
+        figures.regions = of_cells;
+        figures.regions.sort_by(|a, b| b.height_mm.total_cmp(&a.height_mm));
+        figures.max_height_mm = figures.regions.first().map_or(0.0, |r| r.height_mm);
+        figures.regions.truncate(LISTED_REGIONS);
+        figures.fraction = if measured_area > 0.0 { figures.area_mm2 / measured_area } else { 0.0 };
+        figures
+    }
+}
+
+/// How far along the design a place in a square of the plan may be from its centre, mm.
+fn reach(half: f64, lean: f64) -> f64 {
+    half * std::f64::consts::SQRT_2 / lean.max(1e-3)
+}
+
+/// Cells on the part with their deviation.
+fn measured(samples: &[Sample]) -> impl Iterator<Item = (usize, f64)> {
+    samples
+        .iter()
+        .enumerate()
+        .filter(|(_, s)| !s.deviation.is_nan())
+        .map(|(k, s)| (k, f64::from(s.deviation)))
+}
+
+/// The cell of a region with the least value, the first of equals.
+fn least_by(region: &[u32], value: impl Fn(usize) -> f64) -> Option<&u32> {
+    region.iter().min_by(|a, b| value(**a as usize).total_cmp(&value(**b as usize)))
+}

@@ -1,0 +1,127 @@
+//! Dips so narrow that no cell centre lies in them: where the cutter itself stands in the design.
+//!
+//! Enters: part, cutter, path, and the pitch of the cells. Leaves: how deep such a dip may be at most, and,
+//! where that is too much, the places of moves that stand deeper in the design than what the cells saw. mm.
+
+use crate::cutter::Cutter;
+use crate::geometry::{Point2, Point3};
+use crate::monitor::{self, Cancelled, Monitor};
+use crate::part::Part;
+use crate::toolpath::Toolpath;
+
+/// Most places looked at along one move: longer moves at a wider pitch. 3 µs each.
+const MOST_ON_A_MOVE: f64 = 1e5;
+
+/// From the design's normal below the tip to that at the contact in so many steps.
+const CONTACT_STEPS: usize = 2;
+
+/// A contact counts when it lies beside its foot along the normal to this share: not beyond the border.
+const BESIDE: f64 = 0.1;
+
+/// How deep the cutter may dip into a surface between centres `cell` mm apart and none of them be in the
+/// dip: w²/8r for a corner of radius r, w the diagonal of a cell along a surface whose
+/// normal has the vertical part `lean`. Edges and points may be as deep as half of w.
+pub(super) fn unseen_depth(cutter: &Cutter, cell: f64, lean: f64) -> f64 {
+    let (width, corner) = (cell * std::f64::consts::SQRT_2 / lean, cutter.corner_radius());
+    let rounded = corner > 0.0 && cutter.profile().is_plain();
+    let arc = if rounded { width * width / (8.0 * corner) } else { f64::INFINITY };
+    arc.min(0.5 * width)
+}
+
+/// A place where the cutter stands in the design.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Dip {
+    /// How deep, mm.
+    pub depth: f64,
+    /// How deep before the next place looked at, mm (first order).
+    pub possible: f64,
+    /// Where.
+    pub at: Point2,
+}
+
+/// The places on every move, `pitch` mm apart, where the cutter may stand deeper in the design than
+/// `known` mm, the deepest of each move.
+pub(super) fn dips(
+    part: &Part,
+    cutter: &Cutter,
+    path: &Toolpath,
+    pitch: f64,
+    known: f64,
+    monitor: &dyn Monitor,
+) -> Result<Vec<Dip>, Cancelled> {
+    let bounds = part.bounds();
+    let deepest = crate::parallel::try_map(path.len(), |k| {
+        monitor::check(monitor)?;
+        let (from, to) = (path.start_of(k), path.moves[k].to.tip);
+        if from.z.min(to.z) > bounds.max.z {
+            return Ok(None);
+        }
+        let steps = ((to - from).norm() / pitch).ceil().clamp(2.0, MOST_ON_A_MOVE);
+        let mut before: Option<Dip> = None;
+        let mut deepest: Option<Dip> = None;
+        for step in 0..=steps as usize {
+            let here = dip_at(part, cutter, &(from + (to - from) * (step as f64 / steps)));
+            if let Some(mut dip) = here {
+                let change = before.map_or(0.0, |b| (b.depth - dip.depth).abs());
+                dip.possible = dip.depth.max(before.map_or(dip.depth, |b| b.depth)) + 0.5 * change;
+                if dip.possible > known && deepest.is_none_or(|d| dip.possible > d.possible) {
+                    deepest = Some(dip);
+                }
+            }
+            before = here;
+        }
+        Ok(deepest)
+    })?;
+    Ok(deepest.into_iter().flatten().collect())
+}
+
+/// How deep the cutter with its tip at `tip` stands in the design where it touches; `None` off the part.
+fn dip_at(part: &Part, cutter: &Cutter, tip: &Point3) -> Option<Dip> {
+    let mut normal = part.highest_at(tip.x, tip.y)?.normal;
+    let mut dip = None;
+    for _ in 0..CONTACT_STEPS {
+        let contact = tip - cutter.contact_to_tip(&normal);
+        let (foot, height) = part.closest_point(&contact);
+        let aside = (contact - foot.point - foot.normal * height).norm();
+        if aside <= BESIDE * height.abs() + 1e-9 {
+            dip =
+                Some(Dip { depth: -height, possible: -height, at: Point2::new(foot.point.x, foot.point.y) });
+        }
+        normal = foot.normal;
+    }
+    dip
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{AnalyticShape, AnalyticSurface};
+    use crate::monitor::Silent;
+    use crate::part::Patch;
+    use crate::sim::scenes::path_through;
+
+    #[test]
+    fn the_deepest_place_of_a_move_is_that_of_its_cutter() {
+        let shape = AnalyticShape::Inclined { height: 0.0, angle: 0.5, azimuth: 0.3 };
+        let surface = AnalyticSurface::new(shape, [[0.0, 20.0], [0.0, 20.0]]).unwrap();
+        let part = Part::from_patches(vec![Patch::Analytic(surface)], 0.01).unwrap();
+        let (foot, cutter) = (part.highest_at(9.0, 11.0).unwrap(), Cutter::bull(6.0, 1.0).unwrap());
+        let touching = foot.point + cutter.contact_to_tip(&foot.normal);
+        // From 2 mm above the design to 0.25 mm in it.
+        let path = path_through([touching + foot.normal * 2.0, touching - foot.normal * 0.25]);
+        let found = dips(&part, &cutter, &path, 0.1, 0.1, &Silent).unwrap();
+        assert!(found.len() == 1 && (found[0].depth - 0.25).abs() < 1e-9, "{found:?}");
+        assert!((found[0].at - Point2::new(9.0, 11.0)).norm() < 1e-6);
+        assert!(dips(&part, &cutter, &path, 0.1, 0.4, &Silent).unwrap().is_empty());
+    }
+
+    #[test]
+    fn a_dip_of_the_unseen_depth_is_as_wide_as_a_cell() {
+        let cutter = Cutter::ball(6.0).unwrap();
+        let depth = unseen_depth(&cutter, 0.1, 0.5);
+        // Half the chord of a circle at that depth.
+        let half = (9.0 - (3.0 - depth).powi(2)).sqrt();
+        assert!((2.0 * half / (0.1 * 2f64.sqrt() / 0.5) - 1.0).abs() < 1e-3, "{half}");
+        assert!(unseen_depth(&Cutter::flat(6.0).unwrap(), 0.1, 0.7) > 0.1);
+    }
+}
