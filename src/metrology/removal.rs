@@ -116,7 +116,7 @@ fn rates(figures: &mut RemovalFigures, path: &Toolpath, removal: &Removal) {
     let mut stretches: Vec<Stretch> = Vec::new();
     let mut stretch = Stretch::default();
     for ((k, (from, to, m)), removed) in path.segments().enumerate().zip(&removal.moves) {
-        if m.kind == MoveKind::Rapid || !(m.feed_rate > 0.0) {
+        if m.kind == MoveKind::Rapid || m.feed_rate.is_nan() || m.feed_rate <= 0.0 {
             stretch = Stretch::default();
             continue;
         }

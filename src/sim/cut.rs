@@ -456,8 +456,11 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
                 (least, best) = (lowest, k * LANES + lane);
             }
         }
-        let ceiling =
-            if least < infinite { corners(&self.sweep, &all.get(best).0, &square) } else { [infinite; 4] };
+        let ceiling = if least < infinite {
+            corners_of_one(&self.sweep, &all.get(best).0, &square)
+        } else {
+            [infinite; 4]
+        };
         let margin = T::of(self.job.margin);
         for (k, (chunk, planes)) in all.chunks().iter().zip(&self.planes).enumerate() {
             let mut keep = [0u32; LANES];
@@ -703,9 +706,9 @@ fn planes_of<T: Real, S: Sweep<T>>(sweep: &S, chunk: &Chunk<T>, square: &Square<
             sweep.beyond(&m, [along - half_along, along + half_along], absolute(across) + half_across);
         let name = chunk.name(lane);
         let (start, end) = if name.falling() { (upper, lower) } else { (lower, upper) };
-        let ends = u32::from(start) * AT_START | u32::from(end) * AT_END;
+        let ends = u32::from(start) * AT_START + u32::from(end) * AT_END;
         // A plunge has both ends in one place, and only the lower one cuts.
-        planes.ends[lane] = if name.bound_only() | !(m.low < m.high) { 0 } else { ends };
+        planes.ends[lane] = if name.bound_only() | (m.low >= m.high) { 0 } else { ends };
     }
     planes
 }
@@ -743,7 +746,7 @@ fn sure_height<T: Real, S: Sweep<T>>(sweep: &S, m: &LocalMove<T>, x: T, y: T) ->
     let (height, doubt) = sweep.height(m, along, across);
     let infinite = T::of(f64::INFINITY);
     // NaN is not below.
-    if (height < infinite) & !(doubt < infinite) { height } else { infinite }
+    if (height < infinite) & (doubt >= infinite) { height } else { infinite }
 }
 
 /// The first `n` cells of a row of a leaf; nearly always all of them, in one move.

@@ -43,16 +43,17 @@ pub const DEFAULT_CLEARANCE: f64 = 2.0;
 pub const DEFAULT_MEMORY_MIB: u32 = 2048;
 /// Whether to find out what each move removes by default: a tenth of the time of a run on the wave.
 pub const DEFAULT_REMOVAL: bool = true;
-/// The error bound asked by default is this share of the least tolerance that is measured against: what
-/// is left open then decides no verdict but the closest. A smaller one costs time along crests.
-pub const DEFAULT_ERROR_SHARE: f64 = 0.1;
+/// The error bound asked by default is the least tolerance that is measured against over this: what is left
+/// open then decides no verdict but the closest. A greater one costs time along crests. Divided, not
+/// multiplied by a tenth: 0.003/10 is the number that a user writes as 0.0003.
+pub const ERROR_BOUNDS_A_TOLERANCE: f64 = 10.0;
 
 /// No smaller error bound is asked by default, mm: root finding leaves a nanometre in any case.
 const LEAST_ERROR_BOUND: f64 = 1e-6;
 
 /// The error bound, mm, that is asked when the scene asks for none.
 pub fn default_error_bound(limits: &Limits) -> f64 {
-    (DEFAULT_ERROR_SHARE * limits.scallop.min(limits.gouge).min(limits.uncut)).max(LEAST_ERROR_BOUND)
+    (limits.scallop.min(limits.gouge).min(limits.uncut) / ERROR_BOUNDS_A_TOLERANCE).max(LEAST_ERROR_BOUND)
 }
 
 /// Default control points a side of a streamline's stream function. More follow finer changes of

@@ -110,7 +110,7 @@ impl Tile {
                 let track = Track::new(from, to);
                 let from_top = (from.x, from.y, from.z) != (track.x, track.y, track.z);
                 let bound = Bound::new(&job.form, &track, from_top, k == 0);
-                let mut rapid = (job.path.moves[k].kind == MoveKind::Rapid).then(|| Watch {
+                let mut rapid = (job.path.moves[k].kind == MoveKind::Rapid).then_some(Watch {
                     form: &job.form,
                     index,
                     ends: [from, to],
