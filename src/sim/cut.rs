@@ -24,6 +24,7 @@ mod tests;
 use super::bins::MoveBins;
 use super::form::{Family, Form};
 use super::swept::swept_height;
+use super::tiles::{TileCells, tiles};
 use super::track::Track;
 use super::{Grid, NOT_CUT, ZMap, cut_reference};
 use crate::cutter::Cutter;
@@ -142,7 +143,7 @@ impl Job<'_> {
         Ok((stock, total))
     }
 
-    fn cut_tile(&self, grid: &Grid, tile: &mut Tile<'_>, moves: &[u32]) -> Work {
+    fn cut_tile(&self, grid: &Grid, tile: &mut TileCells<'_>, moves: &[u32]) -> Work {
         let (radius, half) = (self.form.radius, 0.5 * (self.side as f64) * grid.cell);
         let extent = radius + half * std::f64::consts::SQRT_2;
         let (form, blur) = (&self.form, sweep::blur(extent));
@@ -182,11 +183,11 @@ impl Job<'_> {
         &self,
         sweep: S,
         grid: &Grid,
-        tile: &mut Tile<'_>,
+        tile: &mut TileCells<'_>,
         moves: &[u32],
         extent: f64,
     ) -> Work {
-        let (nx, ny) = (tile.rows.first().map_or(0, |row| row.0.len()), tile.rows.len());
+        let (nx, ny) = (tile.nx(), tile.rows.len());
         let low = grid.centre(tile.i0, tile.j0);
         let high = grid.centre(tile.i0 + nx - 1, tile.j0 + ny - 1);
         let mut frame = Frame {
@@ -235,41 +236,9 @@ fn track(path: &Toolpath, k: u32) -> Track {
     Track::new(path.start_of(k as usize), path.moves[k as usize].to.tip)
 }
 
-/// A square of cells that one worker owns.
-struct Tile<'a> {
-    /// Its first cell in the grid.
-    i0: usize,
-    j0: usize,
-    /// Its part of each row of the map.
-    rows: Vec<(&'a mut [f32], &'a mut [u32])>,
-}
-
-/// The map dealt out to its tiles, row by row of tiles.
-fn tiles(map: &mut ZMap, side: usize) -> Vec<Tile<'_>> {
-    let grid = map.grid;
-    let mut tiles: Vec<Tile<'_>> = Vec::with_capacity(grid.nx.div_ceil(side) * grid.ny.div_ceil(side));
-    if grid.is_empty() {
-        return tiles;
-    }
-    let bands = map.height.chunks_mut(side * grid.nx).zip(map.cut_by.chunks_mut(side * grid.nx));
-    for (band, (height, cut_by)) in bands.enumerate() {
-        let first = tiles.len();
-        for i0 in (0..grid.nx).step_by(side) {
-            tiles.push(Tile { i0, j0: band * side, rows: Vec::with_capacity(side) });
-        }
-        for (height, cut_by) in height.chunks_mut(grid.nx).zip(cut_by.chunks_mut(grid.nx)) {
-            let pieces = height.chunks_mut(side).zip(cut_by.chunks_mut(side));
-            for (tile, piece) in tiles[first..].iter_mut().zip(pieces) {
-                tile.rows.push(piece);
-            }
-        }
-    }
-    tiles
-}
-
 /// The highest height in each leaf of a tile, `[side / LEAF][side / LEAF]`.
 #[inline(always)]
-fn leaf_tops(tile: &Tile<'_>, side: usize) -> Vec<f32> {
+fn leaf_tops(tile: &TileCells<'_>, side: usize) -> Vec<f32> {
     let leaves = side / LEAF;
     let mut tops = vec![f32::NEG_INFINITY; leaves * leaves];
     for (tops, rows) in tops.chunks_mut(leaves).zip(tile.rows.chunks(LEAF)) {
@@ -341,7 +310,7 @@ struct Worker<'a, 'b, T, S> {
     job: &'a Job<'a>,
     sweep: S,
     grid: &'a Grid,
-    tile: &'a mut Tile<'b>,
+    tile: &'a mut TileCells<'b>,
     frame: Frame,
     /// Places of the cells of a leaf from its first one, and those of a part of a leaf.
     cells: [[T; LEAF_CELLS]; 2],
@@ -391,7 +360,7 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
         while count > 0 {
             count -= 1;
             let (level, i, j, side) = waiting[count];
-            let (width, height) = (self.tile.rows[0].0.len(), self.tile.rows.len());
+            let (width, height) = (self.tile.nx(), self.tile.rows.len());
             if i >= width || j >= height {
                 continue;
             }

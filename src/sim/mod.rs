@@ -14,6 +14,7 @@ mod reference;
 #[cfg(test)]
 pub(crate) mod scenes;
 mod swept;
+mod tiles;
 mod track;
 mod zmap;
 

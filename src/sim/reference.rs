@@ -14,8 +14,9 @@ mod tests;
 use super::bins::MoveBins;
 use super::form::{Family, Form};
 use super::swept::{ball_height, flat_height, rounded_height};
+use super::tiles::{TileCells, tiles};
 use super::track::{Track, larger, smaller};
-use super::{NOT_CUT, ZMap};
+use super::{Grid, NOT_CUT, ZMap};
 use crate::cutter::Cutter;
 use crate::geometry::Point2;
 use crate::monitor::{Cancelled, Monitor, check};
@@ -64,7 +65,8 @@ pub fn cut_reference(
     monitor.start("cutting", (bins.nx() * bins.ny()) as u64);
     let mut cut =
         ZMap { grid: stock.grid, height: stock.height.clone(), cut_by: vec![NOT_CUT; stock.height.len()] };
-    let mut tiles = tiles(&mut cut, side);
+    let mut tiles: Vec<Tile> =
+        tiles(&mut cut, side).into_iter().map(|cells| Tile::new(&stock.grid, cells)).collect();
     parallel::try_for_each(&mut tiles, |k, tile| {
         check(monitor)?;
         tile.cut(&form, path, bins.of_bin(k % bins.nx(), k / bins.nx()));
@@ -75,39 +77,19 @@ pub fn cut_reference(
     Ok(cut)
 }
 
-/// A square of cells that one worker owns.
+/// A tile with the centres of its columns and rows.
 struct Tile<'a> {
-    /// Centres of its columns and rows.
     x: Vec<f64>,
     y: Vec<f64>,
-    /// Its part of each row of the map.
     rows: Vec<(&'a mut [f32], &'a mut [u32])>,
 }
 
-/// The map dealt out to its tiles, row by row of tiles.
-fn tiles(map: &mut ZMap, side: usize) -> Vec<Tile<'_>> {
-    let grid = map.grid;
-    let mut tiles = Vec::with_capacity(grid.nx.div_ceil(side) * grid.ny.div_ceil(side));
-    if grid.is_empty() {
-        return tiles;
+impl<'a> Tile<'a> {
+    fn new(grid: &Grid, cells: TileCells<'a>) -> Self {
+        let x = (0..cells.nx()).map(|i| grid.centre(cells.i0 + i, cells.j0).x).collect();
+        let y = (0..cells.rows.len()).map(|j| grid.centre(cells.i0, cells.j0 + j).y).collect();
+        Self { x, y, rows: cells.rows }
     }
-    let bands = map.height.chunks_mut(side * grid.nx).zip(map.cut_by.chunks_mut(side * grid.nx));
-    for (band, (height, cut_by)) in bands.enumerate() {
-        let first = tiles.len();
-        let j0 = band * side;
-        for i0 in (0..grid.nx).step_by(side) {
-            let x = (i0..(i0 + side).min(grid.nx)).map(|i| grid.centre(i, j0).x).collect();
-            let y = (j0..(j0 + side).min(grid.ny)).map(|j| grid.centre(i0, j).y).collect();
-            tiles.push(Tile { x, y, rows: Vec::with_capacity(side) });
-        }
-        for (height, cut_by) in height.chunks_mut(grid.nx).zip(cut_by.chunks_mut(grid.nx)) {
-            let pieces = height.chunks_mut(side).zip(cut_by.chunks_mut(side));
-            for (tile, piece) in tiles[first..].iter_mut().zip(pieces) {
-                tile.rows.push(piece);
-            }
-        }
-    }
-    tiles
 }
 
 /// A move that may cut in a tile.
