@@ -44,8 +44,7 @@ pub const DEFAULT_MEMORY_MIB: u32 = 2048;
 /// Whether to find out what each move removes by default: a tenth of the time of a run on the wave.
 pub const DEFAULT_REMOVAL: bool = true;
 /// The error bound asked by default is the least tolerance that is measured against over this: what is left
-/// open then decides no verdict but the closest. A greater one costs time along crests. Divided, not
-/// multiplied by a tenth: 0.003/10 is the number that a user writes as 0.0003.
+/// open then decides no verdict but the closest. A greater one costs time along crests.
 pub const ERROR_BOUNDS_A_TOLERANCE: f64 = 10.0;
 
 /// No smaller error bound is asked by default, mm: root finding leaves a nanometre in any case.
