@@ -37,6 +37,11 @@ pub trait Real:
     fn wide(self) -> f64;
     /// Square root; NaN of a negative number.
     fn sqrt(self) -> Self;
+    /// Without its sign.
+    #[inline(always)]
+    fn absolute(self) -> Self {
+        self.larger(-self)
+    }
     /// The larger one; the second one where either is NaN. One machine instruction, which `f64::max` is
     /// not, because that also orders NaN.
     #[inline(always)]

@@ -441,6 +441,17 @@ impl<'a> Job<'a> {
 mod tests {
     use super::*;
 
+    /// What every toolpath's folder holds.
+    const FILES: [&str; 7] = [
+        "deviation.png",
+        "height.png",
+        "height.exr",
+        "toolpath.nc",
+        "toolpath.cls",
+        "machined.stl",
+        "machined.ply",
+    ];
+
     const PLATE: &str = "[part]\nsurface = \"plane\"\nx = [0, 8]\ny = [0, 6]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n\
         [tolerance]\nscallop = 0.0105\n[simulation]\ncell = 0.1\n[[toolpath]]\nstrategy = \"zigzag\"\nstepover = 0.5\n";
 
@@ -458,15 +469,7 @@ mod tests {
         let outcome = run(&options, &Progress::quiet()).unwrap();
         assert_eq!(outcome.verdict, Verdict::Pass, "{}", outcome.text);
         let out = options.out.unwrap();
-        for name in [
-            "deviation.png",
-            "height.png",
-            "height.exr",
-            "toolpath.nc",
-            "toolpath.cls",
-            "machined.stl",
-            "machined.ply",
-        ] {
+        for name in FILES {
             assert!(out.join("zigzag").join(name).metadata().unwrap().len() > 100, "{name}");
         }
         let json: serde_json::Value =
@@ -540,16 +543,7 @@ mod tests {
                 serde_json::from_str(&std::fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
             json["toolpaths"][0]["simulation"]["wall_s"] = 0.into();
             json["toolpaths"][0]["simulation"]["threads"] = 0.into();
-            let files = [
-                "deviation.png",
-                "height.png",
-                "height.exr",
-                "toolpath.nc",
-                "toolpath.cls",
-                "machined.stl",
-                "machined.ply",
-            ];
-            (json, files.map(|name| std::fs::read(out.join("zigzag").join(name)).unwrap()))
+            (json, FILES.map(|name| std::fs::read(out.join("zigzag").join(name)).unwrap()))
         };
         assert!(read(1) == read(3));
     }

@@ -54,6 +54,10 @@ const LARGEST_TILE: usize = 256;
 /// smaller ones a move is listed in many tiles.
 const TILE_RADII: f64 = 1.7;
 
+/// Greatest height of stock above the lowest tip in a tile, mm, for which f32 is used: there half a unit in
+/// the last place is 1e-6 mm, and a height is rounded a few times. Deeper tiles are cut in f64.
+const DEEPEST: f64 = 32.0;
+
 /// Cuts `stock` along every move of `path`, rapids included, in place: the height of a cell becomes the
 /// least of the stock and of all moves, and `cut_by` names a move that reaches down to it ([`NOT_CUT`]
 /// where the stored height stays that of the stock).
@@ -143,76 +147,60 @@ impl Job<'_> {
         Ok((stock, total))
     }
 
-    fn cut_tile(&self, grid: &Grid, tile: &mut TileCells<'_>, moves: &[u32]) -> Work {
+    fn cut_tile(&self, grid: &Grid, cells: &mut TileCells<'_>, moves: &[u32]) -> Work {
         let (radius, half) = (self.form.radius, 0.5 * (self.side as f64) * grid.cell);
         let extent = radius + half * std::f64::consts::SQRT_2;
+        let tracks: Vec<Track> = moves.iter().map(|&k| track(self.path, k)).collect();
+        let low = grid.centre(cells.i0, cells.j0);
+        let high = grid.centre(cells.i0 + cells.nx() - 1, cells.j0 + cells.rows.len() - 1);
+        let (x, y) = (0.5 * (low.x + high.x), 0.5 * (low.y + high.y));
+        let lowest_tip = |track: &Track| {
+            let (along, _) = track.along_across(x, y);
+            track.tip((along - extent).max(0.0).min(track.length))
+        };
+        let z = tracks.iter().map(lowest_tip).fold(f64::INFINITY, f64::min);
+        let frame = Frame { x, y, z: if z.is_finite() { z } else { 0.0 }, reach: 2.0 * extent };
+        let tops = lanes::dispatch(
+            #[inline(always)]
+            || leaf_tops(cells, self.side),
+        );
+        let top = tops.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let shallow = f64::from(top) - frame.z <= DEEPEST;
         let (form, blur) = (&self.form, sweep::blur(extent));
-        let share = sweep::rim_share(extent);
+        let share = sweep::rim_share(extent).filter(|_| shallow);
+        let tile = Tile { cells, moves, tracks: &tracks, frame, tops };
         lanes::dispatch(
             #[inline(always)]
             || match (form.family, share) {
-                (Family::Ball, Some(share)) => {
-                    self.cut_with::<f32, _>(Ball::new(radius, share), grid, tile, moves, extent)
-                }
-                (Family::Ball, None) => {
-                    self.cut_with::<f64, _>(Ball::new(radius, 0.0), grid, tile, moves, extent)
-                }
-                (Family::Flat, Some(_)) => {
-                    self.cut_with::<f32, _>(Flat::new(radius, blur), grid, tile, moves, extent)
-                }
-                (Family::Flat, None) => {
-                    self.cut_with::<f64, _>(Flat::new(radius, 0.0), grid, tile, moves, extent)
-                }
+                (Family::Ball, Some(share)) => self.cut_with::<f32, _>(Ball::new(radius, share), grid, tile),
+                (Family::Ball, None) => self.cut_with::<f64, _>(Ball::new(radius, 0.0), grid, tile),
+                (Family::Flat, Some(_)) => self.cut_with::<f32, _>(Flat::new(radius, blur), grid, tile),
+                (Family::Flat, None) => self.cut_with::<f64, _>(Flat::new(radius, 0.0), grid, tile),
                 (Family::Rounded, Some(_))
                     if form.profile.is_plain() && form.profile.arc_end == form.radius =>
                 {
-                    self.cut_with::<f32, _>(Rounded::<_, false>::new(form, blur), grid, tile, moves, extent)
+                    self.cut_with::<f32, _>(Rounded::<_, false>::new(form, blur), grid, tile)
                 }
                 (Family::Rounded, Some(_)) => {
-                    self.cut_with::<f32, _>(Rounded::<_, true>::new(form, blur), grid, tile, moves, extent)
+                    self.cut_with::<f32, _>(Rounded::<_, true>::new(form, blur), grid, tile)
                 }
                 (Family::Rounded, None) => {
-                    self.cut_with::<f64, _>(Rounded::<_, true>::new(form, 0.0), grid, tile, moves, extent)
+                    self.cut_with::<f64, _>(Rounded::<_, true>::new(form, 0.0), grid, tile)
                 }
             },
         )
     }
 
     #[inline(always)]
-    fn cut_with<T: Real, S: Sweep<T>>(
-        &self,
-        sweep: S,
-        grid: &Grid,
-        tile: &mut TileCells<'_>,
-        moves: &[u32],
-        extent: f64,
-    ) -> Work {
-        let (nx, ny) = (tile.nx(), tile.rows.len());
-        let low = grid.centre(tile.i0, tile.j0);
-        let high = grid.centre(tile.i0 + nx - 1, tile.j0 + ny - 1);
-        let mut frame = Frame {
-            x: 0.5 * (low.x + high.x),
-            y: 0.5 * (low.y + high.y),
-            z: f64::INFINITY,
-            reach: 2.0 * extent,
-        };
-        let tracks: Vec<Track> = moves.iter().map(|&k| track(self.path, k)).collect();
-        for track in &tracks {
-            let (along, _) = track.along_across(frame.x, frame.y);
-            let lowest = track.tip((along - extent).max(0.0).min(track.length));
-            frame.z = frame.z.min(lowest);
-        }
-        if !frame.z.is_finite() {
-            frame.z = 0.0;
-        }
+    fn cut_with<T: Real, S: Sweep<T>>(&self, sweep: S, grid: &Grid, tile: Tile<'_, '_>) -> Work {
+        let Tile { cells: tile, moves, tracks, frame, tops } = tile;
         let mut levels = vec![MoveList::new()];
-        for (&k, track) in moves.iter().zip(&tracks) {
+        for (&k, track) in moves.iter().zip(tracks) {
             let (local, bound_only) = LocalMove::new(track, &frame);
             let falling = Track::falls(self.path.start_of(k as usize), self.path.moves[k as usize].to.tip);
             levels[0].push(&local, Name::new(k, bound_only, falling));
         }
         levels[0].seal();
-        let tops = leaf_tops(tile, self.side);
         let mut worker = Worker {
             job: self,
             sweep,
@@ -230,6 +218,17 @@ impl Job<'_> {
         worker.square(0, 0, 0, self.side);
         worker.work
     }
+}
+
+/// What a tile is cut with.
+struct Tile<'a, 'b> {
+    cells: &'a mut TileCells<'b>,
+    moves: &'a [u32],
+    /// Those of the moves.
+    tracks: &'a [Track],
+    frame: Frame,
+    /// The highest stock in each leaf.
+    tops: Vec<f32>,
 }
 
 fn track(path: &Toolpath, k: u32) -> Track {
@@ -653,11 +652,6 @@ fn bits(lanes: &[u32; LANES]) -> u32 {
 }
 
 #[inline(always)]
-fn absolute<T: Real>(x: T) -> T {
-    x.larger(-x)
-}
-
-#[inline(always)]
 fn planes_of<T: Real, S: Sweep<T>>(sweep: &S, chunk: &Chunk<T>, square: &Square<T>) -> Planes<T> {
     let mut planes = Planes::none();
     for lane in 0..LANES {
@@ -669,10 +663,10 @@ fn planes_of<T: Real, S: Sweep<T>>(sweep: &S, chunk: &Chunk<T>, square: &Square<
         planes.y[lane] = plane.along * m.uy + plane.across * m.ux;
         let ahead = along - along.larger(m.low).smaller(m.high);
         planes.away[lane] = ahead * ahead + across * across;
-        let half_along = square.half_x * absolute(m.ux) + square.half_y * absolute(m.uy);
-        let half_across = square.half_x * absolute(m.uy) + square.half_y * absolute(m.ux);
+        let half_along = square.half_x * m.ux.absolute() + square.half_y * m.uy.absolute();
+        let half_across = square.half_x * m.uy.absolute() + square.half_y * m.ux.absolute();
         let (lower, upper) =
-            sweep.beyond(&m, [along - half_along, along + half_along], absolute(across) + half_across);
+            sweep.beyond(&m, [along - half_along, along + half_along], across.absolute() + half_across);
         let name = chunk.name(lane);
         let (start, end) = if name.falling() { (upper, lower) } else { (lower, upper) };
         let ends = u32::from(start) * AT_START + u32::from(end) * AT_END;

@@ -13,7 +13,7 @@ mod tests;
 
 use super::bins::MoveBins;
 use super::form::{Family, Form};
-use super::swept::{ball_height, flat_height, rounded_height};
+use super::swept::{ball_height, flat_height, rounded_height_below};
 use super::tiles::{TileCells, tiles};
 use super::track::{Track, larger, smaller};
 use super::{Grid, NOT_CUT, ZMap};
@@ -245,18 +245,4 @@ impl Block {
             }
         }
     }
-}
-
-/// The rounded form's height where it may lie at or below `now`, else infinite. The true place on
-/// the track is looked for only when the nearest place and the lowest tip in reach, taken together,
-/// leave the question open.
-#[inline(always)]
-fn rounded_height_below(form: &Form, track: &Track, along: f64, across: f64, now: f64) -> f64 {
-    let ahead = along - smaller(larger(along, 0.0), track.length);
-    let near = (ahead * ahead + across * across).sqrt() - SLACK;
-    let bound = track.tip(larger(along - form.radius - SLACK, 0.0)) + form.height(near) - SLACK;
-    if near > form.radius || bound > now {
-        return f64::INFINITY;
-    }
-    rounded_height(form, track, along, across)
 }

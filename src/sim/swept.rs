@@ -89,6 +89,22 @@ pub(super) fn rounded_height(form: &Form, track: &Track, along: f64, across: f64
     rounded::touch(form, track, along, across).map_or(f64::INFINITY, |touch| touch.height)
 }
 
+/// As [`rounded_height`] where that may lie at or below `now`, else infinite. The true place on the track is
+/// looked for only when the nearest place and the lowest tip in reach, taken together, leave the
+/// question open.
+#[inline(always)]
+pub(super) fn rounded_height_below(form: &Form, track: &Track, along: f64, across: f64, now: f64) -> f64 {
+    /// Against rounding, mm; below 1e-12 a height could be left out that is lower than its bound.
+    const SLACK: f64 = 1.0e-9;
+    let ahead = along - smaller(larger(along, 0.0), track.length);
+    let near = larger((ahead * ahead + across * across).sqrt() - SLACK, 0.0);
+    let bound = track.tip(larger(along - form.radius - SLACK, 0.0)) + form.height(near) - SLACK;
+    if near > form.radius || bound > now {
+        return f64::INFINITY;
+    }
+    rounded_height(form, track, along, across)
+}
+
 /// As [`swept_height`], with the unit normal of the cut surface.
 pub(super) fn swept_height_and_normal(form: &Form, track: &Track, x: f64, y: f64) -> Option<(f64, Vector3)> {
     let (along, across) = track.along_across(x, y);

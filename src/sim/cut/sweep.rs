@@ -222,7 +222,7 @@ impl<T: Real> Sweep<T> for Flat<T> {
         let tip = m.z + m.slope * place;
         let margin = margin(m, along, chord2);
         let inside = margin >= T::of(0.0);
-        let at_edge = absolute(margin) < self.edge;
+        let at_edge = margin.absolute() < self.edge;
         let steep = inside & (half_chord < self.rim * m.slope) & (place > m.low);
         let doubt = if at_edge | steep { tip } else { infinite };
         (if inside { tip } else { infinite }, doubt)
@@ -361,7 +361,7 @@ impl<T: Real, const CONES: bool> Rounded<T, CONES> {
     /// piece which is steep enough at its end counts.
     #[inline(always)]
     fn ahead(&self, m: &LocalMove<T>, across: T) -> T {
-        let w = absolute(across).smaller(self.radius);
+        let w = across.absolute().smaller(self.radius);
         let arc = self.ahead_on_arc(m.sin, w);
         if !CONES {
             return arc;
@@ -423,11 +423,6 @@ fn ahead_on_cone<T: Real>(cone: T, slope: T, w: T) -> T {
     if rest > T::of(0.0) { ahead } else { T::of(f64::INFINITY) }
 }
 
-#[inline(always)]
-fn absolute<T: Real>(x: T) -> T {
-    x.larger(-x)
-}
-
 impl<T: Real, const CONES: bool> Sweep<T> for Rounded<T, CONES> {
     #[inline(always)]
     fn radius(&self) -> T {
@@ -464,7 +459,7 @@ impl<T: Real, const CONES: bool> Sweep<T> for Rounded<T, CONES> {
         let tip = m.z + m.slope * place;
         let margin = margin(m, along, (self.radius - across) * (self.radius + across));
         let inside = margin >= T::of(0.0);
-        let steep = (absolute(margin) < self.edge) | (inside & (slope > self.steep));
+        let steep = (margin.absolute() < self.edge) | (inside & (slope > self.steep));
         let off = inside & self.place_is_off(m, place, [ahead, across, rho], slope);
         let z = if inside { tip + height } else { infinite };
         let least = if off { m.z + m.slope * m.low } else { tip + self.steep_z };

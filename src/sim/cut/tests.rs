@@ -218,6 +218,17 @@ fn unusual_sizes_agree_with_the_reference() {
     }
 }
 
+/// A deep hole beside shallow passes: heights in one tile differ by far more than the cutter's size.
+#[test]
+fn a_deep_hole_leaves_the_passes_beside_it_exact() {
+    for cutter in cutters() {
+        let hole = [Point3::new(1.0, 1.0, 50.0), Point3::new(1.0, 1.0, -700.0), Point3::new(1.0, 1.0, 50.0)];
+        let passes = wave_path(8.0, 0.3, 0.2);
+        let path = path_through(hole.into_iter().chain(passes.segments().map(|(_, to, _)| to)));
+        compare(&ZMap::block(square_grid(8.0, 0.05), 5.0), &cutter, &path);
+    }
+}
+
 /// Ten times as many moves of a tenth of the length: a cell sees few of them.
 #[test]
 fn evaluations_hardly_grow_with_the_moves() {

@@ -10,8 +10,8 @@ use super::{ENGAGED, Found, Job, RapidContact, Slices};
 use crate::geometry::Point3;
 use crate::monitor::{Cancelled, check};
 use crate::sim::form::{Family, Form};
-use crate::sim::swept::rounded_height;
-use crate::sim::track::{Track, larger, smaller};
+use crate::sim::swept::rounded_height_below;
+use crate::sim::track::{Track, larger};
 use crate::toolpath::MoveKind;
 use pulp::Simd;
 
@@ -266,22 +266,6 @@ fn leaf_ceiling(leaf: &Leaf, cell: f64) -> Ceiling {
         }
     }
     Ceiling { value: tops.into_iter().fold(f64::NEG_INFINITY, larger), slope }
-}
-
-/// The rounded form's height where it may lie below `now`, else infinite. The true place on the track
-/// is looked for only when the nearest place and the lowest tip in reach, taken together, leave the
-/// question open.
-#[inline(always)]
-fn rounded_height_below(form: &Form, track: &Track, along: f64, across: f64, now: f64) -> f64 {
-    /// Against rounding; see the slack of the bounds.
-    const SLACK: f64 = 1.0e-9;
-    let ahead = along - smaller(larger(along, 0.0), track.length);
-    let near = larger((ahead * ahead + across * across).sqrt() - SLACK, 0.0);
-    let bound = track.tip(larger(along - form.radius - SLACK, 0.0)) + form.height(near) - SLACK;
-    if near > form.radius || bound > now {
-        return f64::INFINITY;
-    }
-    rounded_height(form, track, along, across)
 }
 
 /// Looks for the cell that a rapid move touches first.
