@@ -4,12 +4,16 @@
 mod analytic;
 #[path = "all/bad_input.rs"]
 mod bad_input;
+#[path = "all/classic.rs"]
+mod classic;
 #[path = "all/cli.rs"]
 mod cli;
 #[path = "all/command.rs"]
 mod command;
 #[path = "all/defects.rs"]
 mod defects;
+#[path = "all/directions.rs"]
+mod directions;
 #[cfg(target_os = "linux")]
 #[path = "all/memory.rs"]
 mod memory;

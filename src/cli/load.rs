@@ -1,6 +1,7 @@
 //! The part of a scene, from its file or its formula.
 
 use super::error::CliError;
+use super::pocket::{floor_part, pocket_of};
 use crate::geometry::{MeshError, TriangleMesh};
 use crate::io::scene::{MeshFormat, NamedFile, PartSource, Scene, SceneError};
 use crate::io::{nurbs_json, obj, stl};
@@ -12,6 +13,10 @@ use crate::part::{Part, PartError, Patch, default_tessellation_tolerance};
 /// [`CliError`] when the part is refused; a file's fault is shown at its name in the scene.
 pub fn load_part(scene: &Scene) -> Result<(Part, Vec<String>), CliError> {
     match &scene.part {
+        PartSource::Pocket { outline, depth } => {
+            let (pocket, notes) = pocket_of(scene, outline, *depth)?;
+            Ok((floor_part(scene, &pocket)?, notes))
+        }
         PartSource::Formula { surface } => {
             let part = of_patches(vec![Patch::Analytic(*surface)]).map_err(CliError::part(scene))?;
             Ok((part, Vec::new()))

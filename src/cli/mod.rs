@@ -8,6 +8,7 @@ mod check;
 mod error;
 mod load;
 mod outputs;
+mod pocket;
 mod progress;
 mod run;
 

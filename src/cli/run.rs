@@ -7,23 +7,24 @@ use super::args::{Cell, RunOptions};
 use super::error::CliError;
 use super::load::load_part;
 use super::outputs::Outputs;
+use super::pocket::{limit_feed_by, load_pocket, pocket_figures};
 use super::progress::Progress;
 use crate::geometry::Aabb;
-use crate::io::scene::{Engine, Scene, ToolpathRequest, auto_cell};
+use crate::io::scene::{Engine, PartSource, Scene, ToolpathRequest, auto_cell};
 use crate::io::{ProgramHeader, apt_cl, exr, gcode, ply_write, png, stl_write};
-use crate::machine::machining_time;
+use crate::machine::{machining_time, slow_corners};
 use crate::metrology::{Asked, Measurement, RemovalFigures, measure, path_figures, removal_figures};
 use crate::monitor::{self, Monitor as _};
 use crate::parallel;
 use crate::part::Part;
 use crate::report::{
-    HIGHEST_RIDGE, Histogram, MAX_TRIANGLES, MapSize, MapWords, Picture, RunReport, SimulationFigures,
-    SurfaceMeshFigures, ToolpathPage, ToolpathResult, Verdict, collision, deviation_colours,
-    deviation_picture, height_picture, holder_note, html_page, marks, rapid_violation, result_table,
-    surface_mesh, violations,
+    HIGHEST_RIDGE, Histogram, MAX_TRIANGLES, MapSize, MapWords, Picture, RunReport, ShortestFigures,
+    SimulationFigures, SurfaceMeshFigures, ToolpathPage, ToolpathResult, Verdict, collision,
+    deviation_colours, deviation_picture, height_picture, holder_note, html_page, marks, rapid_violation,
+    result_table, surface_mesh, violations, wall_violation,
 };
 use crate::sim::{Grid, GridError, ZMap, cut, cut_in_order, cut_reference, holder_collisions};
-use crate::toolpath::{Plan, PlanSettings, Toolpath, plan};
+use crate::toolpath::{Plan, PlanSettings, Pocket, Toolpath, plan, plan_pocket};
 
 /// Bytes a cell that a run takes at its peak: stock and winning moves 8, deviations 12, ridges 16 where
 /// every cell has one, the mesh of the surface and height.exr the rest. The peak resident memory of
@@ -133,7 +134,11 @@ fn sha256(text: &str) -> String {
 /// The rectangle to simulate: the part's, grown by the stock's margin.
 pub fn stock_area(scene: &Scene, part: &Part) -> Aabb {
     let mut area = part.bounds();
-    let margin = scene.stock.margin;
+    let mut margin = scene.stock.margin;
+    if matches!(scene.part, PartSource::Pocket { .. }) {
+        // The measured floor ends where the flat of the cutter's bottom does.
+        margin += scene.cutter.radius() - scene.cutter.flat_radius();
+    }
     (area.min.x, area.min.y) = (area.min.x - margin, area.min.y - margin);
     (area.max.x, area.max.y) = (area.max.x + margin, area.max.y + margin);
     area
@@ -199,6 +204,8 @@ struct Job<'a> {
     scene: &'a Scene,
     progress: &'a Progress,
     part: Part,
+    /// What the part is the floor of, if it is a pocket.
+    pocket: Option<Pocket>,
     /// The cells, and what is to be said about them, if a path leaves memory for them.
     grid: (Grid, Option<String>),
     /// Height of the stock's flat top, mm.
@@ -210,9 +217,11 @@ impl<'a> Job<'a> {
     fn new(scene: &'a Scene, progress: &'a Progress) -> Result<Self, CliError> {
         monitor::check(progress)?;
         let (part, notes) = load_part(scene)?;
+        let pocket = load_pocket(scene)?;
         let grid = lay_out_before_planning(scene, &part).map_err(CliError::grid(scene))?;
-        let top = part.bounds().max.z + scene.stock.allowance;
-        Ok(Self { scene, progress, part, grid, top, notes })
+        let face = if pocket.is_some() { 0.0 } else { part.bounds().max.z };
+        let top = face + scene.stock.allowance;
+        Ok(Self { scene, progress, part, pocket, grid, top, notes })
     }
 
     fn settings(&self, request: &ToolpathRequest) -> PlanSettings {
@@ -223,6 +232,8 @@ impl<'a> Job<'a> {
             stock_top: self.top,
             feed_rate: self.scene.cutting.feed_rate,
             plunge_rate: self.scene.cutting.plunge_rate,
+            rapid_rate: self.scene.machine.rapid_rate,
+            joining: request.joining,
         }
     }
 
@@ -234,8 +245,16 @@ impl<'a> Job<'a> {
     ) -> Result<(ToolpathResult, ToolpathPage), CliError> {
         let (scene, monitor) = (self.scene, self.progress);
         monitor::check(monitor)?;
-        let planned = plan(&self.part, &scene.cutter, &request.strategy, &self.settings(request), monitor)
-            .map_err(|reason| CliError::plan(scene, &request.name, reason))?;
+        let settings = self.settings(request);
+        let milled = self.pocket.as_ref().zip(request.strategy.pocket());
+        let mut planned = match milled {
+            Some((pocket, strategy)) => plan_pocket(pocket, &scene.cutter, strategy, &settings, monitor),
+            None => plan(&self.part, &scene.cutter, &request.strategy, &settings, monitor),
+        }
+        .map_err(|reason| CliError::plan(scene, &request.name, reason))?;
+        if scene.machine.slow_corners {
+            planned.path = slow_corners(&planned.path, &scene.machine);
+        }
         let (grid, note) =
             lay_out_for(scene, &self.part, &self.grid, &planned.path).map_err(CliError::grid(scene))?;
         let begun = Instant::now();
@@ -244,10 +263,14 @@ impl<'a> Job<'a> {
             Engine::ZMap => cut(stock, &scene.cutter, &planned.path, monitor)?,
             Engine::Reference => cut_reference(&stock, &scene.cutter, &planned.path, monitor)?,
         };
-        let mut removal = None;
+        let (mut removal, mut engaged) = (None, None);
         if scene.simulation.removal {
             let stock = ZMap::block(grid, self.top);
             let removed = cut_in_order(stock, &scene.cutter, &planned.path, monitor)?;
+            if let Some((_, strategy)) = milled {
+                engaged =
+                    Some(limit_feed_by(&mut planned.path, &removed, &scene.cutter, strategy, request.step));
+            }
             removal = Some(removal_figures(&planned.path, &removed, &cut.height));
         }
         let besides = part_bytes(&self.part) + (planned.path.len() * BYTES_PER_MOVE) as u64;
@@ -284,6 +307,15 @@ impl<'a> Job<'a> {
             contact.line = lines.get(contact.move_index as usize).copied().unwrap_or_default();
         }
         let mut result = self.result(request, &planned, note, measured, removal, simulation, surface_mesh);
+        if let Some((pocket, strategy)) = milled {
+            let figures =
+                pocket_figures(scene, pocket, strategy, request.step, &planned.path, &cut, self.top, engaged);
+            if let Some(violation) = wall_violation(&figures, &scene.tolerance, &lines) {
+                result.violations.insert(0, violation);
+                result.verdict = Verdict::Fail;
+            }
+            result.pocket = Some(figures);
+        }
         if let Some(held) = held {
             result.notes.push(holder_note(&held));
             if let Some(violation) = collision(&held, &lines) {
@@ -308,6 +340,7 @@ impl<'a> Job<'a> {
         let violations: Vec<_> =
             rapid.into_iter().chain(violations(&measured, &self.scene.tolerance)).collect();
         let time = machining_time(&planned.path, &self.scene.machine);
+        let path = path_figures(&planned.path, time);
         ToolpathResult {
             name: request.name.clone(),
             strategy: request.strategy_name().to_owned(),
@@ -322,12 +355,16 @@ impl<'a> Job<'a> {
                 .chain(&planned.notes)
                 .cloned()
                 .collect(),
-            path: path_figures(&planned.path, time),
+            path,
+            shortest: planned
+                .shortest
+                .and_then(|shortest| ShortestFigures::new(&shortest, path.cutting_length_mm)),
             scallop: measured.scallop,
             gouge: measured.gouge,
             uncut: measured.uncut,
             deviation: measured.deviation,
             removal,
+            pocket: None,
             simulation,
             surface_mesh,
         }
@@ -518,7 +555,9 @@ mod tests {
         let scallop = |name: &str, cutter: &str| {
             let folder = home.path().join(name);
             std::fs::create_dir(&folder).unwrap();
-            let options = options(&folder, &PLATE.replace("\"ball\"\ndiameter = 6", cutter), 1);
+            // Bends between passes leave other grooves beside the plate.
+            let scene = PLATE.replace("\"ball\"\ndiameter = 6", cutter) + "links = \"retract\"\n";
+            let options = options(&folder, &scene, 1);
             run(&options, &Progress::quiet()).unwrap();
             let json = std::fs::read_to_string(options.out.unwrap().join("report.json")).unwrap();
             let json: serde_json::Value = serde_json::from_str(&json).unwrap();

@@ -44,6 +44,17 @@ impl Ord for Candidate {
 /// `lines` holds unit tangents and a confidence ≥ 0; `None` where there is no direction.
 pub fn orient(lines: &mut [Option<(Vector3, f64)>], nu: usize) -> f64 {
     let nv = lines.len().checked_div(nu).unwrap_or(0);
+    orient_along(lines, |k| neighbours(k, nu, nv), |_, _, line| *line);
+    disagreement(lines, nu, nv)
+}
+
+/// As [`orient`], on any graph: `neighbours` of a sample, and the line of one sample carried to a
+/// neighbour, where the two can be compared.
+pub(super) fn orient_along<N: Iterator<Item = usize>>(
+    lines: &mut [Option<(Vector3, f64)>],
+    neighbours: impl Fn(usize) -> N,
+    carried: impl Fn(usize, usize, &Vector3) -> Vector3,
+) {
     let mut oriented = vec![false; lines.len()];
     let mut heap = BinaryHeap::new();
     // The surest sample of each connected piece keeps its direction.
@@ -61,17 +72,17 @@ pub fn orient(lines: &mut [Option<(Vector3, f64)>], nu: usize) -> f64 {
             }
             oriented[at] = true;
             let (Some((reference, _)), Some((line, sure))) = (lines[from], lines[at]) else { continue };
-            let line = if line.dot(&reference) < 0.0 { -line } else { line };
+            let turned = carried(from, at, &reference).dot(&line) < 0.0;
+            let line = if turned { -line } else { line };
             lines[at] = Some((line, sure));
-            for next in neighbours(at, nu, nv) {
+            for next in neighbours(at) {
                 if let (false, Some((other, other_sure))) = (oriented[next], lines[next]) {
-                    let agreement = line.dot(&other).abs() * sure.min(other_sure);
+                    let agreement = carried(at, next, &line).dot(&other).abs() * sure.min(other_sure);
                     heap.push(Candidate { agreement, at: next, from: at });
                 }
             }
         }
     }
-    disagreement(lines, nu, nv)
 }
 
 fn neighbours(k: usize, nu: usize, nv: usize) -> impl Iterator<Item = usize> {

@@ -1,5 +1,7 @@
-//! Scalar functions on a parameter rectangle: tensor-product B-splines and coordinates.
+//! Scalar functions on a parameter rectangle: tensor-product B-splines, grids and
+//! coordinates.
 
+use super::grid::GridField;
 use crate::geometry::KnotVector;
 
 /// A tensor-product B-spline function `Σ c_ij N_i(u) N_j(v)`.
@@ -64,6 +66,8 @@ pub enum Axis {
 pub enum ScalarField {
     /// A fitted stream function.
     Spline(ScalarSpline),
+    /// A function on a grid.
+    Grid(GridField),
     /// A parameter itself: its level curves are the isoparametric lines of the other one.
     Coordinate(Axis),
 }
@@ -73,6 +77,7 @@ impl ScalarField {
     pub fn value_and_gradient(&self, u: f64, v: f64) -> [f64; 3] {
         match self {
             Self::Spline(spline) => spline.value_and_gradient(u, v),
+            Self::Grid(grid) => grid.value_and_gradient(u, v),
             Self::Coordinate(Axis::U) => [u, 1.0, 0.0],
             Self::Coordinate(Axis::V) => [v, 0.0, 1.0],
         }

@@ -7,8 +7,10 @@ mod bvh;
 mod jet;
 mod mesh;
 mod nurbs;
+mod region;
 #[cfg(test)]
 pub(crate) mod samples;
+mod segment_grid;
 mod tessellate;
 
 pub use aabb::Aabb;
@@ -19,6 +21,9 @@ pub use bvh::{Bvh, MeshFoot, VerticalHit};
 pub use jet::{Jet2, PrincipalCurvatures};
 pub use mesh::{MeshError, RepairNotes, TriangleMesh};
 pub use nurbs::{MAX_WEIGHT, NurbsError, NurbsSurface};
+pub use region::{MAX_OUTLINE_POINTS, Piece, Region, RegionError, inside_curve, signed_area};
+pub(crate) use segment_grid::foot;
+pub use segment_grid::{CurveSegment, NearestSegment, SegmentGrid};
 pub use tessellate::{MAX_TRIANGLES, TessellateError, Tessellation, tessellate};
 
 /// A point, mm.

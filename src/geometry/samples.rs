@@ -94,3 +94,48 @@ pub(crate) fn ridge() -> NurbsSurface {
     let points: Vec<Vec<Point3>> = (0..COUNT).map(|i| (0..COUNT).map(|j| point(i, j)).collect()).collect();
     NurbsSurface::new(3, 3, knots.knots().to_vec(), knots.knots().to_vec(), &points, None).unwrap()
 }
+
+/// The patches of scenes/joined.json: three side by side with tangent planes in common along their borders, cut into spans and
+/// parametrised differently. About 54 × 36 mm; control points to 0.001 mm,
+/// but for those that follow from a neighbour's.
+pub(crate) fn joined() -> Vec<NurbsSurface> {
+    let round = |c: f64| (c * 1000.0).round() / 1000.0 + 0.0;
+    let height = |x: f64, y: f64| 2.6 * (0.16 * x + 0.5).sin() * (0.13 * y).cos() + 0.04 * x;
+    // Control columns of each patch by their distance along x; the first two of a later patch follow
+    // from the last two of the one before.
+    let columns: [&[f64]; 3] = [
+        &[0.0, 4.0, 9.0, 13.0, 16.0, 18.0],
+        &[18.0, 20.0, 24.0, 27.0, 31.0, 34.0, 36.0],
+        &[36.0, 40.0, 45.0, 50.0, 54.0],
+    ];
+    let rows = 8;
+    let mut patches: Vec<Vec<Vec<Point3>>> = Vec::new();
+    for xs in columns {
+        let mut net: Vec<Vec<Point3>> = xs
+            .iter()
+            .map(|&x| {
+                (0..rows)
+                    .map(|j| {
+                        let y = 36.0 * j as f64 / (rows - 1) as f64;
+                        let x = x + 1.2 * (0.17 * y).sin();
+                        Point3::new(round(x), round(y), round(height(x, y)))
+                    })
+                    .collect()
+            })
+            .collect();
+        if let Some(before) = patches.last() {
+            let n = before.len();
+            let ratio = (xs[1] - xs[0]) / 2.0;
+            for j in 0..rows {
+                let (end, inner) = (before[n - 1][j], before[n - 2][j]);
+                net[0][j] = end;
+                net[1][j] = end + (end - inner) * ratio;
+            }
+        }
+        patches.push(net);
+    }
+    let knots = |n: usize| super::KnotVector::clamped_uniform(3, n, [0.0, 1.0]).unwrap().knots().to_vec();
+    let surface =
+        |net: &Vec<Vec<Point3>>| NurbsSurface::new(3, 3, knots(net.len()), knots(rows), net, None).unwrap();
+    patches.iter().map(surface).collect()
+}

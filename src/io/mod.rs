@@ -2,11 +2,13 @@
 
 pub mod apt_cl;
 pub mod atomic;
+pub mod direction_table;
 pub mod exr;
 pub mod gcode;
 mod mesh_file;
 pub mod nurbs_json;
 pub mod obj;
+pub mod outline;
 pub mod ply_write;
 pub mod png;
 mod program_text;

@@ -1,7 +1,9 @@
 //! The machine: speed and acceleration limits, machining time.
 
+mod feeds;
 mod time;
 
+pub use feeds::slow_corners;
 pub use time::machining_time;
 
 /// Limits of the machine's motion.
@@ -13,13 +15,24 @@ pub struct Machine {
     pub acceleration: f64,
     /// How far the control may round a corner, mm: it sets the speed at corners.
     pub junction_deviation: f64,
+    /// How fast acceleration may change, mm/s³: it sets the speed where curvature changes suddenly.
+    pub jerk: f64,
+    /// Whether programs have the feeds at which corners and bends can be run.
+    pub slow_corners: bool,
 }
 
 impl Default for Machine {
     /// A mid-sized vertical machining centre: rapids of 15 m/min, 0.3 g, and corners rounded by
-    /// 0.01 mm, the usual setting of controls for finishing (also grbl's).
+    /// 0.01 mm, the usual setting of controls for finishing (also grbl's); jerk as such machines are set
+    /// for finishing, 50 m/s³.
     fn default() -> Self {
-        Self { rapid_rate: 15_000.0, acceleration: 3000.0, junction_deviation: 0.01 }
+        Self {
+            rapid_rate: 15_000.0,
+            acceleration: 3000.0,
+            junction_deviation: 0.01,
+            jerk: 50_000.0,
+            slow_corners: true,
+        }
     }
 }
 
@@ -45,6 +58,7 @@ impl Machine {
             ("rapid rate", self.rapid_rate, "mm/min"),
             ("acceleration", self.acceleration, "mm/s²"),
             ("junction deviation", self.junction_deviation, "mm"),
+            ("jerk", self.jerk, "mm/s³"),
         ];
         match limits.into_iter().find(|(_, value, _)| !(*value > 0.0 && value.is_finite())) {
             Some((what, value, unit)) => Err(MachineError { what, value, unit }),
@@ -66,5 +80,6 @@ mod tests {
         assert_eq!(error.to_string(), message);
         assert!(Machine { rapid_rate: f64::NAN, ..machine }.check().is_err());
         assert!(Machine { junction_deviation: f64::INFINITY, ..machine }.check().is_err());
+        assert!(Machine { jerk: -1.0, ..machine }.check().is_err());
     }
 }

@@ -8,11 +8,15 @@
 //!   algorithm", 2011);
 //! - v² = a·(l/2)·cot(β/2), l the shorter of both moves: the arc must fit between the moves' middles.
 //!   Without this second rule curves of short chords would be as fast as straight lines; with it an arc of
-//!   radius ρ is run at √(a·ρ) whatever its chords (the rule of K. O'Connor's Klipper, "Kinematics").
+//!   radius ρ is run at √(a·ρ) whatever its chords (the rule of K. O'Connor's Klipper, "Kinematics");
+//! - v² = ∛(24 δ j²)/|Δκ|: where the curvature changes suddenly by Δκ, the acceleration across the path
+//!   would jump by v²Δκ. With the jerk j it rises over the time v²Δκ/j, and the tool strays from the path by
+//!   a 24th of jump times the square of that time, which must stay within the junction deviation.
+//!   Curvature at a corner is β over half of both moves' lengths.
 //!
 //! A backward pass then limits speeds to what can still be braked, a forward pass to what can have been
-//! reached: both in one sweep, O(n). The path starts and ends at rest. Jerk, the single axes' limits and
-//! the control's block rate are not modelled: real machines take somewhat longer.
+//! reached: both in one sweep, O(n). The path starts and ends at rest. Jerk along the path, the single axes'
+//! limits and the control's block rate are not modelled: real machines take somewhat longer.
 
 use super::Machine;
 use crate::geometry::Vector3;
@@ -21,13 +25,28 @@ use crate::toolpath::{Move, MoveKind, Toolpath};
 const SECONDS_PER_MINUTE: f64 = 60.0;
 
 /// A move with a length, in mm and s.
-struct Block {
-    length: f64,
+pub(super) struct Block {
+    /// Its index in the path.
+    pub step: usize,
+    pub length: f64,
     direction: Vector3,
     /// Feed, mm/s.
-    feed: f64,
-    /// Square of the speed at its start, as far as known.
-    entry: f64,
+    pub feed: f64,
+    /// Square of the speed at which the corner before it can be run at most.
+    pub corner: f64,
+    /// Angle that the corner before it turns by, and its curvature, 1/mm.
+    pub turn: f64,
+    curvature: f64,
+    /// Square of the speed at its start and at its end.
+    pub entry: f64,
+    pub exit: f64,
+}
+
+impl Block {
+    /// Square of the greatest speed within the move when its ends are run at the squared speeds `ends`.
+    pub fn peak(&self, ends: [f64; 2], acceleration: f64) -> f64 {
+        (0.5 * (ends[0] + ends[1]) + acceleration * self.length).min(self.feed * self.feed)
+    }
 }
 
 /// Time for the whole path, s. Moves of no length take none. Infinite when a move has no positive feed
@@ -36,51 +55,80 @@ struct Block {
 /// # Tolerance
 /// A model of the machine (see the module), computed to f64 rounding.
 pub fn machining_time(path: &Toolpath, machine: &Machine) -> f64 {
+    let Some(blocks) = profile(path, machine) else { return f64::INFINITY };
+    blocks.iter().map(|block| block_time(block, machine.acceleration)).sum()
+}
+
+/// The moves that have a length, with their speeds; `None` when no time can be told.
+pub(super) fn profile(path: &Toolpath, machine: &Machine) -> Option<Vec<Block>> {
     let acceleration = machine.acceleration;
     let mut blocks: Vec<Block> = Vec::with_capacity(path.len());
-    for (from, to, step) in path.segments() {
+    for (k, (from, to, step)) in path.segments().enumerate() {
         let length = (to - from).norm();
         if length == 0.0 {
             continue;
         }
         let feed = feed(step, machine);
         if !(feed > 0.0 && length.is_finite() && machine.check().is_ok()) {
-            return f64::INFINITY;
+            return None;
         }
-        let mut block = Block { length, direction: (to - from) / length, feed, entry: 0.0 };
+        let direction = (to - from) / length;
+        let mut block = Block {
+            step: k,
+            length,
+            direction,
+            feed,
+            corner: 0.0,
+            turn: 0.0,
+            curvature: 0.0,
+            entry: 0.0,
+            exit: 0.0,
+        };
         if let Some(last) = blocks.last() {
-            block.entry = corner_speed_squared(last, &block, machine);
+            block.turn = last.direction.cross(&direction).norm().atan2(last.direction.dot(&direction));
+            block.curvature = 2.0 * block.turn / (last.length + length);
+            block.corner = corner_speed_squared(last, &block, machine);
         }
         blocks.push(block);
     }
+    // A bend begins with a corner of half its turn, so that a change shows over one corner or two. All of
+    // them are run at its speed.
+    let sudden = (24.0 * machine.junction_deviation * machine.jerk * machine.jerk).cbrt();
+    for (k, apart) in (1..blocks.len()).flat_map(|k| [(k, 1), (k, 2)]) {
+        let Some(other) = blocks.get(k + apart) else { continue };
+        let limit = sudden / (other.curvature - blocks[k].curvature).abs();
+        for block in &mut blocks[k..=k + apart] {
+            block.corner = block.corner.min(limit);
+        }
+    }
     let mut exit = 0.0;
     for block in blocks.iter_mut().rev() {
-        block.entry = block.entry.min(exit + 2.0 * acceleration * block.length);
+        block.entry = block.corner.min(exit + 2.0 * acceleration * block.length);
         exit = block.entry;
     }
     let mut entry = 0.0;
-    let mut time = 0.0;
-    for (k, block) in blocks.iter().enumerate() {
+    for k in 0..blocks.len() {
         let wanted = blocks.get(k + 1).map_or(0.0, |next| next.entry);
-        let exit = wanted.min(entry + 2.0 * acceleration * block.length);
-        time += block_time(block, entry, exit, acceleration);
-        entry = exit;
+        let block = &mut blocks[k];
+        block.entry = entry;
+        block.exit = wanted.min(entry + 2.0 * acceleration * block.length);
+        entry = block.exit;
     }
-    time
+    Some(blocks)
 }
 
 /// mm/s.
 fn feed(step: &Move, machine: &Machine) -> f64 {
     let per_minute = match step.kind {
         MoveKind::Rapid => machine.rapid_rate,
-        MoveKind::Plunge | MoveKind::Cut | MoveKind::Retract => step.feed_rate,
+        MoveKind::Plunge | MoveKind::Cut | MoveKind::Link | MoveKind::Retract => step.feed_rate,
     };
     per_minute / SECONDS_PER_MINUTE
 }
 
 /// Square of the greatest speed from one move into the next.
 fn corner_speed_squared(last: &Block, next: &Block, machine: &Machine) -> f64 {
-    let turn = last.direction.cross(&next.direction).norm().atan2(last.direction.dot(&next.direction));
+    let turn = next.turn;
     let (sin_quarter, (sin_half, cos_half)) = ((0.25 * turn).sin(), (0.5 * turn).sin_cos());
     // 1 − cos(β/2) = 2 sin²(β/4), which keeps its digits for small angles. Division by zero, for
     // moves in one line, gives infinity: no limit.
@@ -90,10 +138,11 @@ fn corner_speed_squared(last: &Block, next: &Block, machine: &Machine) -> f64 {
     (machine.acceleration * rounded.min(fitting).max(0.0)).min(feed * feed)
 }
 
-/// Time for one move from its entry to its exit speed (given squared): up to the feed or to where
-/// braking must begin, along at the feed, down.
-fn block_time(block: &Block, entry: f64, exit: f64, acceleration: f64) -> f64 {
-    let peak = (0.5 * (entry + exit) + acceleration * block.length).min(block.feed * block.feed);
+/// Time for one move from its entry to its exit speed: up to the feed or to where braking must begin,
+/// along at the feed, down.
+fn block_time(block: &Block, acceleration: f64) -> f64 {
+    let (entry, exit) = (block.entry, block.exit);
+    let peak = block.peak([entry, exit], acceleration);
     let (v_in, v_out, v) = (entry.sqrt(), exit.sqrt(), peak.sqrt());
     let ramps = (2.0 * peak - entry - exit) / (2.0 * acceleration);
     let level = (block.length - ramps).max(0.0);
@@ -107,7 +156,13 @@ mod tests {
     use crate::toolpath::ClPoint;
     use approx::assert_relative_eq;
 
-    const MACHINE: Machine = Machine { rapid_rate: 12_000.0, acceleration: 1000.0, junction_deviation: 0.01 };
+    const MACHINE: Machine = Machine {
+        rapid_rate: 12_000.0,
+        acceleration: 1000.0,
+        junction_deviation: 0.01,
+        jerk: 1e12,
+        slow_corners: true,
+    };
 
     /// Cuts at 6000 mm/min = 100 mm/s, which takes 5 mm and 0.1 s to reach.
     fn path(tips: impl IntoIterator<Item = [f64; 3]>) -> Toolpath {
@@ -198,5 +253,22 @@ mod tests {
         let back = (0..100).rev().map(|k| [0.1 * f64::from(k), 0.0, 0.0]);
         let expected = 2.0 * time([[0.0; 3], [10.0, 0.0, 0.0]]);
         assert_relative_eq!(time(there.chain(back)), expected, max_relative = 1e-9);
+    }
+
+    /// A line into an arc of 4 mm and out again: Δκ = 1/4 mm limits v² to ∛(24·0.01·j²)·4.
+    #[test]
+    fn a_sudden_curvature_is_entered_at_what_the_jerk_allows() {
+        for (jerk, limit) in [(5000.0, 4.0 * (0.24 * 25e6f64).cbrt()), (1e9, 4000.0)] {
+            let machine = Machine { jerk, ..MACHINE };
+            let angle = |k: u32| f64::from(k) * 1e-3;
+            let arc = (0..=2000).map(|k| [4.0 * angle(k).sin(), 4.0 - 4.0 * angle(k).cos(), 0.0]);
+            let line = (0..=10_000).map(|k| [-40.0 + 0.004 * f64::from(k), 0.0, 0.0]);
+            let path = path(line.chain(arc));
+            let blocks = profile(&path, &machine).unwrap();
+            let joint = blocks.iter().find(|b| b.curvature > 0.2).unwrap();
+            assert_relative_eq!(joint.entry, limit, max_relative = 2e-3);
+            // Well inside the arc only its own radius counts.
+            assert_relative_eq!(blocks[11_000].corner, 4000.0, max_relative = 1e-3);
+        }
     }
 }

@@ -110,7 +110,7 @@ impl<'a> CutSurface<'a> {
         });
         let mut cuts = near.filter(|&(by, k)| {
             let other = self.path.moves.get(k as usize);
-            other.is_some_and(|m| m.kind == MoveKind::Cut && Some(m.pass) == self.pass(by))
+            other.is_some_and(|m| m.kind.is_on_surface() && Some(m.pass) == self.pass(by))
         });
         cuts.find_map(|(_, k)| {
             let z = self.envelope.height(k, x, y).filter(|z| *z <= highest)?;
@@ -157,6 +157,11 @@ impl<'a> CutSurface<'a> {
         let length2 = along.norm_squared();
         let t = if length2 > 0.0 { ((tip - from).dot(&along) / length2).clamp(0.0, 1.0) } else { 0.0 };
         from + along * t
+    }
+
+    /// True for a link between two passes.
+    pub fn is_link(&self, by: u32) -> bool {
+        self.path.moves.get(by as usize).is_some_and(|m| m.kind == MoveKind::Link)
     }
 
     /// The pass that a cut point belongs to; `None` on stock.

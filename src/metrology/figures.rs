@@ -21,15 +21,24 @@ pub struct Limits {
 /// Figures of the path itself.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct PathFigures {
-    /// Length of all moves that feed along the surface.
+    /// Length of all moves that feed along passes.
     pub cutting_length_mm: f64,
-    /// Length of all other moves.
+    /// Length of the links along the surface from pass to pass.
+    pub link_length_mm: f64,
+    /// Length of all other moves: plunges, lifts and rapids.
     pub air_length_mm: f64,
     /// Passes.
     pub passes: usize,
+    /// Links along the surface.
+    pub surface_links: usize,
+    /// How often the tool leaves the surface and comes back to it.
+    pub retracts: usize,
     /// Cutter locations.
     pub cl_points: usize,
-    /// Places inside a pass where the direction turns by more than 30°.
+    /// Sum of the angles between moves that follow each other along the surface, passes and links: the
+    /// integral of the path's curvature.
+    pub total_turning_rad: f64,
+    /// Places on the surface, in passes or links, where the direction turns by more than 30°.
     pub sharp_turns: usize,
     /// Time that the machine would take.
     pub machining_time_s: f64,

@@ -70,7 +70,9 @@ impl<'a> Meetings<'a> {
     pub fn apart(&self, a: u32, b: u32) -> bool {
         match (self.surface.pass(a), self.surface.pass(b)) {
             (Some(p), Some(q)) => {
-                p != q || (self.along[a as usize] - self.along[b as usize]).abs() > self.same_track
+                // A link goes on from the end of one pass to the start of the next without an edge between.
+                let other_pass = p != q && !self.surface.is_link(a) && !self.surface.is_link(b);
+                other_pass || (self.along[a as usize] - self.along[b as usize]).abs() > self.same_track
             }
             _ => a != b && self.stock.is_some(),
         }

@@ -13,6 +13,7 @@ mod figures;
 mod inspection;
 mod meetings;
 mod path;
+mod pocket;
 mod refine;
 mod regions;
 mod removal;
@@ -26,6 +27,7 @@ pub use figures::{
 };
 pub(crate) use meetings::Meetings;
 pub use path::path_figures;
+pub use pocket::{PocketFigures, wall_gouge_of_cells, wall_gouge_of_moves};
 pub use refine::{Asked, Refined};
 pub use removal::{RapidContactFigures, RemovalFigures, removal_figures};
 

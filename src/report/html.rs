@@ -224,9 +224,22 @@ fn figures(t: &ToolpathResult) -> Markup {
     let mut rows = vec![
         ("machining time", duration(path.machining_time_s)),
         ("cutting length", format!("{:.1} mm", path.cutting_length_mm)),
-        ("air length", format!("{:.1} mm", path.air_length_mm)),
+        (
+            "length of links, air length",
+            format!("{:.1} mm, {:.1} mm", path.link_length_mm, path.air_length_mm),
+        ),
+        (
+            "shortest possible cutting length",
+            t.shortest.map_or("-".to_owned(), |s| {
+                format!("{:.1} mm ({:.1} % of this path)", s.cutting_length_mm, 100.0 * s.efficiency)
+            }),
+        ),
         ("passes, cutter locations", format!("{}, {}", path.passes, path.cl_points)),
-        ("turns above 30° inside a pass", path.sharp_turns.to_string()),
+        ("links on the surface, retracts", format!("{}, {}", path.surface_links, path.retracts)),
+        (
+            "total turning, turns above 30°",
+            format!("{:.0} rad, {}", path.total_turning_rad, path.sharp_turns),
+        ),
         ("highest scallop", format!("{} µm", with_bound(t.scallop.max_mm, t.scallop.error_bound_mm))),
         ("mean scallop height", format!("{} µm", micrometres(t.scallop.mean_mm))),
         ("ridge length", format!("{:.1} mm", t.scallop.ridge_length_mm)),
@@ -262,6 +275,28 @@ fn figures(t: &ToolpathResult) -> Markup {
                 "engagement, axial and radial",
                 format!("{:.2}, {:.2} mm", r.max_axial_engagement_mm, r.max_radial_engagement_mm),
             ),
+        ]);
+    }
+    if let Some(p) = &t.pocket {
+        rows.extend([
+            ("stepover", format!("{:.3} mm", p.stepover_mm)),
+            (
+                "engagement, greatest and 95 %",
+                format!("{:.0}, {:.0} degrees", p.max_engagement_deg, p.p95_engagement_deg),
+            ),
+            (
+                "above the limit",
+                format!(
+                    "{:.1} % of the length above {:.0} degrees",
+                    100.0 * p.over_engagement_limit_fraction,
+                    p.engagement_limit_deg
+                ),
+            ),
+            ("cut beyond the walls", {
+                let bound = Some(p.wall_gouge_error_bound_mm);
+                format!("{} µm", with_bound(Some(p.wall_gouge_mm), bound))
+            }),
+            ("out of reach in corners", format!("{:.3} mm²", p.unreachable_area_mm2)),
         ]);
     }
     html! { dl.grid { @for (name, value) in &rows { div { dt { (name) } dd { (value) } } } } }

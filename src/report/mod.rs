@@ -18,10 +18,12 @@ pub use histogram::Histogram;
 pub use html::{ToolpathPage, html_page};
 pub use map::{MapMark, MapSize, MapWords, deviation_colours, deviation_picture, height_picture};
 pub use result::{
-    ReportError, RunReport, SimulationFigures, SurfaceMeshFigures, ToleranceFigures, ToolpathResult,
+    ReportError, RunReport, ShortestFigures, SimulationFigures, SurfaceMeshFigures, ToleranceFigures,
+    ToolpathResult,
 };
 pub use surface_mesh::{MAX_TRIANGLES, SurfaceMesh, VertexPlace, surface_mesh};
 pub use table::{conclusion, result_table};
 pub use verdict::{
     HIGHEST_RIDGE, Verdict, Violation, collision, holder_note, marks, place, rapid_violation, violations,
+    wall_violation,
 };

@@ -4,8 +4,10 @@ use serde::Serialize;
 
 use super::verdict::{Verdict, Violation};
 use crate::metrology::{
-    DeviationFigures, GougeFigures, Limits, PathFigures, RemovalFigures, ScallopFigures, UncutFigures,
+    DeviationFigures, GougeFigures, Limits, PathFigures, PocketFigures, RemovalFigures, ScallopFigures,
+    UncutFigures,
 };
+use crate::toolpath::ShortestPossible;
 
 /// How a toolpath was cut.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -56,6 +58,9 @@ pub struct ToolpathResult {
     pub notes: Vec<String>,
     /// The path itself.
     pub path: PathFigures,
+    /// What no path can be shorter than, for one planned by scallop height.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shortest: Option<ShortestFigures>,
     /// Scallops.
     pub scallop: ScallopFigures,
     /// Gouges.
@@ -67,10 +72,39 @@ pub struct ToolpathResult {
     /// What each move removed, if the scene asks for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub removal: Option<RemovalFigures>,
+    /// Walls and engagement, if the part is a pocket.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pocket: Option<PocketFigures>,
     /// How it was cut.
     pub simulation: SimulationFigures,
     /// The machined part as triangles.
     pub surface_mesh: SurfaceMeshFigures,
+}
+
+/// The length that no path below the scallop height can go under, by the widest strips over all directions, to second
+/// order.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ShortestFigures {
+    /// Of the cutter's way, as `path.cutting_length_mm` is.
+    pub cutting_length_mm: f64,
+    /// Of the contact's way on the part: the integral of 1/(widest strip).
+    pub contact_length_mm: f64,
+    /// The first of these over the path's cutting length.
+    pub efficiency: f64,
+    /// Share of the part's area where it is about as concave as the cutter and the strip was limited.
+    pub limited_fraction: f64,
+}
+
+impl ShortestFigures {
+    /// Of a path with a cutting length, mm; `None` for an empty one.
+    pub fn new(shortest: &ShortestPossible, cutting_length_mm: f64) -> Option<Self> {
+        (cutting_length_mm > 0.0).then(|| Self {
+            cutting_length_mm: shortest.cutting_mm,
+            contact_length_mm: shortest.contact_mm,
+            efficiency: shortest.cutting_mm / cutting_length_mm,
+            limited_fraction: shortest.limited_fraction,
+        })
+    }
 }
 
 /// The tolerances of the scene.

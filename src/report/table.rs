@@ -130,6 +130,14 @@ fn write_table(out: &mut String, report: &RunReport) -> std::fmt::Result {
     row(out, ["", "", "mm", "", "µm", "µm", "µm", "%", "mm²", "µm", ""])?;
     writeln!(out, "{}", "-".repeat(WIDTH))?;
     report.toolpaths.iter().try_for_each(|t| toolpath_row(out, t))?;
+    let efficiencies: Vec<String> = report.toolpaths.iter().filter_map(efficiency).collect();
+    if !efficiencies.is_empty() {
+        writeln!(
+            out,
+            "\nNo path below the scallop target can be shorter (widest strips, to second order) than"
+        )?;
+        efficiencies.iter().try_for_each(|text| sentence(out, text))?;
+    }
     for t in report.toolpaths.iter().filter(|t| !t.violations.is_empty()) {
         writeln!(out, "\n{} violates:", t.name)?;
         t.violations.iter().try_for_each(|violation| sentence(out, &violation.text))?;
@@ -143,6 +151,12 @@ fn write_table(out: &mut String, report: &RunReport) -> std::fmt::Result {
         }
     }
     writeln!(out, "\n{}", conclusion(report))
+}
+
+/// What a path could be shorter by.
+fn efficiency(t: &ToolpathResult) -> Option<String> {
+    let shortest = t.shortest?;
+    Some(format!("{:.0} mm: {:.1} % of {}", shortest.cutting_length_mm, 100.0 * shortest.efficiency, t.name))
 }
 
 /// The outcome in a sentence.

@@ -11,13 +11,14 @@
 //! - gouge: the greatest depth stays within the gouge tolerance.
 //! - rapid: no rapid move touches stock, where the scene asks for what each move removes.
 //! - collision: shank and holder touch nothing that stands when all is cut.
+//! - wall: nothing is cut beyond a pocket's outline by more than the gouge tolerance.
 //! - uncut: no place stands higher than the uncut tolerance.
 
 use serde::Serialize;
 
 use super::map::MapMark;
 use super::table::{micrometres, with_bound};
-use crate::metrology::{Limits, Measurement, RemovalFigures};
+use crate::metrology::{Limits, Measurement, PocketFigures, RemovalFigures};
 use crate::sim::HolderClearance;
 
 /// The highest ridge may exceed the scallop tolerance by this factor. Less fails plans for single
@@ -47,7 +48,7 @@ impl Verdict {
 /// One tolerance that does not hold.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Violation {
-    /// `collision`, `rapid`, `scallop`, `gouge` or `uncut`.
+    /// `collision`, `rapid`, `wall`, `scallop`, `gouge` or `uncut`.
     pub what: &'static str,
     /// The limit that was exceeded.
     pub limit_mm: f64,
@@ -109,6 +110,22 @@ pub fn collision(holder: &HolderClearance, lines: &[u32]) -> Option<Violation> {
         }
     );
     Some(Violation { what: "collision", limit_mm: 0.0, measured_mm: worst.depth, text })
+}
+
+/// The violation that the cutter came beyond a pocket's outline; `lines` are those of the moves.
+pub fn wall_violation(pocket: &PocketFigures, limits: &Limits, lines: &[u32]) -> Option<Violation> {
+    let measured = pocket.wall_gouge_mm.max(pocket.wall_gouge_of_cells_mm);
+    if measured <= limits.gouge {
+        return None;
+    }
+    let index = pocket.wall_gouge_move;
+    let text = format!(
+        "the wall is cut {} µm beyond the outline (limit {}) by move {index}, toolpath.nc line {}",
+        with_bound(Some(measured), Some(pocket.wall_gouge_error_bound_mm)),
+        micrometres(Some(limits.gouge)),
+        lines.get(index as usize).copied().unwrap_or_default()
+    );
+    Some(Violation { what: "wall", limit_mm: limits.gouge, measured_mm: measured, text })
 }
 
 /// What else is to be said about a holder that was checked.

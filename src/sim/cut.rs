@@ -16,6 +16,7 @@
 //! holds with the level of the stock in place of b. No curvature enters, and no case is left out:
 //! plunges, moves of no length and moves beside the stock have convex heights too.
 
+mod choose;
 mod local;
 mod sweep;
 #[cfg(test)]
@@ -32,7 +33,8 @@ use crate::lanes::{self, Real};
 use crate::monitor::{Cancelled, Monitor, check};
 use crate::parallel;
 use crate::toolpath::Toolpath;
-use local::{Chunk, Frame, LANES, LocalMove, MoveList, Name};
+use choose::{Chooser, FEW, SQUARES, Square, ones};
+use local::{Chunk, Frame, LocalMove, MoveList, Name};
 use sweep::{Ball, Flat, Rounded, Sweep};
 
 /// Cells along the side of a leaf. Smaller leaves keep fewer moves and ask for them more often.
@@ -100,12 +102,6 @@ fn tile_side(radius: f64, cell: f64) -> usize {
     }
     side
 }
-
-/// Most moves that are compared each with each. Comparing more costs more than it saves.
-const MOST_JUDGES: usize = 2 * LANES;
-
-/// So few moves go down to the leaves without further tests.
-const FEW: usize = 3;
 
 /// What was done, for benchmarks and tests.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -194,13 +190,13 @@ impl Job<'_> {
     #[inline(always)]
     fn cut_with<T: Real, S: Sweep<T>>(&self, sweep: S, grid: &Grid, tile: Tile<'_, '_>) -> Work {
         let Tile { cells: tile, moves, tracks, frame, tops } = tile;
-        let mut levels = vec![MoveList::new()];
+        let mut levels = vec![Level::new()];
         for (&k, track) in moves.iter().zip(tracks) {
             let (local, bound_only) = LocalMove::new(track, &frame);
             let falling = Track::falls(self.path.start_of(k as usize), self.path.moves[k as usize].to.tip);
-            levels[0].push(&local, Name::new(k, bound_only, falling));
+            levels[0].moves.push(&local, Name::new(k, bound_only, falling));
         }
-        levels[0].seal();
+        levels[0].moves.seal();
         let mut worker = Worker {
             job: self,
             sweep,
@@ -211,11 +207,10 @@ impl Job<'_> {
             part_cells: offsets(PART, grid.cell),
             tops,
             levels,
-            planes: Vec::new(),
-            kept_planes: [Planes::none(); MOST_JUDGES / LANES],
+            chooser: Chooser::new(),
             work: Work::default(),
         };
-        worker.square(0, 0, 0, self.side);
+        worker.whole(self.side);
         worker.work
     }
 }
@@ -266,42 +261,25 @@ fn offsets<T: Real, const CELLS: usize>(n: usize, cell: f64) -> [[T; CELLS]; 2] 
     ]
 }
 
-/// Planes below the moves of a chunk, at the middle of a square.
-#[derive(Clone, Copy)]
-struct Planes<T> {
-    z: [T; LANES],
-    x: [T; LANES],
-    y: [T; LANES],
-    /// Squared distance from the track.
-    away: [T; LANES],
-    /// Which end of the move alone cuts in the square, if any: bits [`AT_START`] and [`AT_END`].
-    ends: [u32; LANES],
+/// The moves of a square, and what the quarters of it chose from them.
+struct Level<T> {
+    moves: MoveList<T>,
+    /// For each chunk and quarter one bit for each lane.
+    chosen: Vec<[u32; SQUARES]>,
+    /// How many moves each quarter chose.
+    kept: [usize; SQUARES],
 }
 
-/// Only the cutter at the start of the move cuts in the square.
-const AT_START: u32 = 1;
-/// Only the cutter at the end of the move cuts in the square.
-const AT_END: u32 = 2;
-
-impl<T: Real> Planes<T> {
-    fn none() -> Self {
-        let zero = [T::of(0.0); LANES];
-        Self { z: zero, x: zero, y: zero, away: zero, ends: [0; LANES] }
+impl<T: Real> Level<T> {
+    fn new() -> Self {
+        Self { moves: MoveList::new(), chosen: Vec::new(), kept: [0; SQUARES] }
     }
 
+    /// The moves that a quarter chose: chunks and lanes.
     #[inline(always)]
-    fn set(&mut self, lane: usize, from: &Self, from_lane: usize) {
-        self.z[lane] = from.z[from_lane];
-        self.x[lane] = from.x[from_lane];
-        self.y[lane] = from.y[from_lane];
-    }
-
-    /// Heights at the corners of a square, raised by a margin.
-    #[inline(always)]
-    fn corners(&self, lane: usize, square: &Square<T>, margin: T) -> [T; 4] {
-        let (dx, dy) = (self.x[lane] * square.half_x, self.y[lane] * square.half_y);
-        let z = self.z[lane] + margin;
-        [z - dx - dy, z + dx - dy, z - dx + dy, z + dx + dy]
+    fn chosen_by(&self, q: usize) -> impl Iterator<Item = (&Chunk<T>, usize)> {
+        let chunks = self.moves.chunks().iter().zip(&self.chosen);
+        chunks.flat_map(move |(chunk, chosen)| ones(chosen[q]).map(move |lane| (chunk, lane)))
     }
 }
 
@@ -317,27 +295,15 @@ struct Worker<'a, 'b, T, S> {
     /// The highest stock in each leaf.
     tops: Vec<f32>,
     /// The moves left at each level of squares.
-    levels: Vec<MoveList<T>>,
-    planes: Vec<Planes<T>>,
-    /// Those of the moves that are kept, if they are few.
-    kept_planes: [Planes<T>; MOST_JUDGES / LANES],
+    levels: Vec<Level<T>>,
+    chooser: Chooser<T>,
     work: Work,
-}
-
-/// A square of cells: its middle in the tile's frame, and the distance from there to its outermost
-/// cell centres.
-#[derive(Clone, Copy)]
-struct Square<T> {
-    x: T,
-    y: T,
-    half_x: T,
-    half_y: T,
 }
 
 impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
     /// The cells of a square inside the tile.
     #[inline(always)]
-    fn square_at(&self, i: usize, j: usize, nx: usize, ny: usize) -> Square<T> {
+    fn square_at(&self, [i, j]: [usize; 2], [nx, ny]: [usize; 2]) -> Square<T> {
         let centre = |first: f64, n: usize| first + 0.5 * (n - 1) as f64 * self.grid.cell;
         let low = self.grid.centre(self.tile.i0 + i, self.tile.j0 + j);
         let half = |n: usize| T::of(0.5 * (n - 1) as f64 * self.grid.cell);
@@ -349,122 +315,89 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
         }
     }
 
-    /// Cuts the square of `side` cells at `(i, j)` of the tile with the moves of a level.
+    /// Cuts all of the tile with the moves of the first level.
     #[inline(always)]
-    fn square(&mut self, level: usize, i: usize, j: usize, side: usize) {
-        // A recursion that is all inlined: an explicit stack of squares.
-        let mut waiting = [(0usize, 0usize, 0usize, 0usize); 64];
-        waiting[0] = (level, i, j, side);
+    fn whole(&mut self, side: usize) {
+        self.choose::<1>(0, [[0, 0]], side);
+        // A recursion that is all inlined: an explicit stack of squares, each with the level whose moves
+        // it chose from and its place among the squares that chose together.
+        let mut waiting = [(0usize, 0usize, [0usize; 2], 0usize); 64];
+        waiting[0] = (0, 0, [0, 0], side);
         let mut count = 1;
         while count > 0 {
             count -= 1;
-            let (level, i, j, side) = waiting[count];
-            let (width, height) = (self.tile.nx(), self.tile.rows.len());
-            if i >= width || j >= height {
-                continue;
-            }
-            let (nx, ny) = (side.min(width - i), side.min(height - j));
-            if level + 1 == self.levels.len() {
-                self.levels.push(MoveList::new());
-            }
-            // So few cost less at every cell than telling them apart.
-            let level = if self.levels[level].len() <= FEW {
-                level
-            } else {
-                self.keep(level, i, j, nx, ny);
-                level + 1
-            };
-            if self.levels[level].len() == 0 {
+            let (level, q, [i, j], side) = waiting[count];
+            let Some([nx, ny]) = self.inside([i, j], side) else { continue };
+            let kept = self.levels[level].kept[q];
+            if kept == 0 {
                 for (_, cut_by) in &mut self.tile.rows[j..j + ny] {
                     cut_by[i..i + nx].fill(NOT_CUT);
                 }
             } else if side == PART {
-                self.leaf::<PART, PART_CELLS>(self.part_cells, level, [i, j], [nx, ny]);
-            } else if side == LEAF && self.levels[level].len() <= CROWDED {
-                self.leaf::<LEAF, LEAF_CELLS>(self.cells, level, [i, j], [nx, ny]);
+                self.leaf::<PART, PART_CELLS>(self.part_cells, [level, q], [i, j], [nx, ny]);
+            } else if side == LEAF && kept <= CROWDED {
+                self.leaf::<LEAF, LEAF_CELLS>(self.cells, [level, q], [i, j], [nx, ny]);
             } else {
+                self.hand_down(level, q);
                 let half = side / 2;
-                for (di, dj) in [(half, half), (0, half), (half, 0), (0, 0)] {
-                    waiting[count] = (level, i + di, j + dj, half);
+                let quarters = [[i, j], [i + half, j], [i, j + half], [i + half, j + half]];
+                self.choose(level + 1, quarters, half);
+                for (q, &at) in quarters.iter().enumerate() {
+                    waiting[count] = (level + 1, q, at, half);
                     count += 1;
                 }
             }
         }
     }
 
-    /// Leaves in the level below those of the level's moves that may be lowest somewhere in the
-    /// square.
+    /// The cells that a square has inside the tile, if any.
     #[inline(always)]
-    fn keep(&mut self, level: usize, i: usize, j: usize, nx: usize, ny: usize) {
-        let square = self.square_at(i, j, nx, ny);
-        let stock = self.stock_top(i, j, nx, ny);
-        let (above, below) = self.levels.split_at_mut(level + 1);
-        let (all, kept) = (&above[level], &mut below[0]);
-        kept.clear();
-        self.work.tests += all.len() as u64;
-        if self.planes.len() < all.chunks().len() {
-            self.planes.resize(all.chunks().len(), Planes::none());
+    fn inside(&self, [i, j]: [usize; 2], side: usize) -> Option<[usize; 2]> {
+        let (width, height) = (self.tile.nx(), self.tile.rows.len());
+        (i < width && j < height).then(|| [side.min(width - i), side.min(height - j)])
+    }
+
+    /// Marks for each of some squares those of the level's moves that may be lowest somewhere in it.
+    #[inline(always)]
+    fn choose<const Q: usize>(&mut self, level: usize, squares: [[usize; 2]; Q], side: usize) {
+        let cells = squares.map(|at| self.inside(at, side).map(|size| (at, size)));
+        let stocks = cells.map(|c| c.map_or(T::of(f64::NEG_INFINITY), |(at, size)| self.stock_top(at, size)));
+        let Some(first) = cells[0] else { return };
+        // Squares outside choose as the first one does, which always has cells, and are left out later.
+        let squares = cells.map(|c| c.unwrap_or(first)).map(|(at, size)| self.square_at(at, size));
+        let Level { moves, chosen, kept } = &mut self.levels[level];
+        if moves.len() <= FEW {
+            // So few cost less at every cell than telling them apart.
+            chosen.clear();
+            chosen.extend((0..moves.chunks().len()).map(|k| [moves.lanes_in_use(k); SQUARES]));
+            *kept = [moves.len(); SQUARES];
+            return;
         }
-        let half_diagonal = (square.half_x * square.half_x + square.half_y * square.half_y).sqrt();
-        let (reach, within) = (self.sweep.radius() + half_diagonal, self.sweep.radius() - half_diagonal);
-        let reach2 = reach * reach;
-        // Moves that pass all of the square can judge others.
-        let covers = if within > T::of(0.0) { within * within } else { T::of(-1.0) };
-        let infinite = T::of(f64::INFINITY);
-        let (mut least, mut best) = (infinite, usize::MAX);
-        for (k, (chunk, planes)) in all.chunks().iter().zip(&mut self.planes).enumerate() {
-            *planes = planes_of(&self.sweep, chunk, &square);
-            let mut judges = [infinite; LANES];
-            for lane in 0..LANES {
-                let may = !chunk.name(lane).bound_only() & (planes.away[lane] <= covers);
-                judges[lane] = if may { planes.z[lane] } else { infinite };
-            }
-            let (lowest, lane) = least_of(&judges);
-            if lowest < least {
-                (least, best) = (lowest, k * LANES + lane);
-            }
-        }
-        let ceiling = if least < infinite {
-            corners_of_one(&self.sweep, &all.get(best).0, &square)
-        } else {
-            [infinite; 4]
-        };
         let margin = T::of(self.job.margin);
-        for (k, (chunk, planes)) in all.chunks().iter().zip(&self.planes).enumerate() {
-            let mut keep = [0u32; LANES];
-            for lane in 0..LANES {
-                let corners = planes.corners(lane, &square, margin);
-                let above = at_or_above(corners, ceiling);
-                let lowest = corners[0].smaller(corners[1]).smaller(corners[2].smaller(corners[3]));
-                keep[lane] = u32::from(!above & (lowest < stock) & (planes.away[lane] <= reach2));
-            }
-            let valid = (all.len() - k * LANES).min(LANES);
-            let mut wanted = bits(&keep) & (u32::MAX >> (32 - valid));
-            if best / LANES == k {
-                wanted |= 1 << (best % LANES);
-            }
-            while wanted != 0 {
-                let lane = wanted.trailing_zeros() as usize;
-                wanted &= wanted - 1;
-                let place = k * LANES + lane;
-                if place != best && is_covered(all, &self.planes, place) {
-                    continue;
-                }
-                if kept.len() < MOST_JUDGES {
-                    self.kept_planes[kept.len() / LANES].set(kept.len() % LANES, planes, lane);
-                }
-                kept.push(&chunk.lane(lane), chunk.name(lane));
+        self.work.tests += (moves.len() * Q) as u64;
+        *kept = self.chooser.choose(&self.sweep, moves, &squares, &stocks, margin, chosen);
+    }
+
+    /// Leaves the moves that a square chose from a level in the one below.
+    #[inline(always)]
+    fn hand_down(&mut self, level: usize, q: usize) {
+        if level + 1 == self.levels.len() {
+            self.levels.push(Level::new());
+        }
+        let (above, below) = self.levels.split_at_mut(level + 1);
+        let (above, below) = (&above[level], &mut below[0].moves);
+        below.clear();
+        for (chunk, chosen) in above.moves.chunks().iter().zip(&above.chosen) {
+            for lane in ones(chosen[q]) {
+                below.push(&chunk.lane(lane), chunk.name(lane));
             }
         }
-        if (FEW + 1..=MOST_JUDGES).contains(&kept.len()) {
-            judge(&self.sweep, kept, &self.kept_planes, &square, margin);
-        }
-        kept.seal();
+        below.seal();
     }
 
     /// The highest stock in the square.
     #[inline(always)]
-    fn stock_top(&self, i: usize, j: usize, nx: usize, ny: usize) -> T {
+    fn stock_top(&self, [i, j]: [usize; 2], [nx, ny]: [usize; 2]) -> T {
         let mut top = f32::NEG_INFINITY;
         for row in self.tops.chunks_exact(self.job.side / LEAF).skip(j / LEAF).take(ny.div_ceil(LEAF)) {
             for &height in row.iter().skip(i / LEAF).take(nx.div_ceil(LEAF)) {
@@ -479,20 +412,19 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
     fn leaf<const N: usize, const CELLS: usize>(
         &mut self,
         [x, y]: [[T; CELLS]; 2],
-        level: usize,
+        [level, q]: [usize; 2],
         [i, j]: [usize; 2],
         [nx, ny]: [usize; 2],
     ) {
         let infinite = T::of(f64::INFINITY);
-        let first = self.square_at(i, j, 1, 1);
+        let first = self.square_at([i, j], [1, 1]);
         let mut height = [infinite; CELLS];
         let mut doubt = [infinite; CELLS];
         let mut by = [NOT_CUT; CELLS];
-        let moves = &self.levels[level];
-        self.work.evaluations += (moves.len() * nx * ny) as u64;
         let mut second_look = false;
-        for k in 0..moves.len() {
-            let (m, name) = moves.get(k);
+        self.work.evaluations += (self.levels[level].kept[q] * nx * ny) as u64;
+        for (chunk, lane) in self.levels[level].chosen_by(q) {
+            let (m, name) = (chunk.lane(lane), chunk.name(lane));
             second_look |= name.bound_only();
             let index = name.index();
             let (along, across) = m.along_across(first.x, first.y);
@@ -510,7 +442,7 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
             second_look |= (doubt[c] <= height[c]) & (doubt[c] < infinite);
         }
         if second_look {
-            self.leaf_again(level, i, j, nx, ny);
+            self.leaf_again([level, q], [i, j], [nx, ny]);
             return;
         }
         // Through arrays of a fixed length: loops over those become vector code.
@@ -531,11 +463,11 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
     }
 
     /// As [`Self::leaf`], by the closed forms of the reference engine in f64.
-    fn leaf_again(&mut self, level: usize, i: usize, j: usize, nx: usize, ny: usize) {
-        let moves = &self.levels[level];
+    fn leaf_again(&mut self, [level, q]: [usize; 2], [i, j]: [usize; 2], [nx, ny]: [usize; 2]) {
         self.work.second_looks += (nx * ny) as u64;
-        let tracks: Vec<(u32, Track)> = (0..moves.len())
-            .map(|k| moves.get(k).1.index())
+        let tracks: Vec<(u32, Track)> = self.levels[level]
+            .chosen_by(q)
+            .map(|(chunk, lane)| chunk.name(lane).index())
             .map(|index| (index, track(self.job.path, index)))
             .collect();
         for dj in 0..ny {
@@ -556,160 +488,6 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
             }
         }
     }
-}
-
-/// Whether the move at `place` of the list is covered by its neighbour in the program, which is in the
-/// list too: where only the end of a move cuts, the next move, which begins there, cuts as low; and where
-/// only its start cuts, the one before does. Of two that would cover each other the later one stays.
-#[inline(always)]
-fn is_covered<T: Real>(list: &MoveList<T>, planes: &[Planes<T>], place: usize) -> bool {
-    let ends = |place: usize| planes[place / LANES].ends[place % LANES];
-    let index = |place: usize| list.name(place).index();
-    let (own, here) = (ends(place), index(place));
-    if own & AT_END != 0 && place + 1 < list.len() && index(place + 1) == here + 1 {
-        return true;
-    }
-    own & AT_START != 0 && place > 0 && index(place - 1) + 1 == here && ends(place - 1) & AT_END == 0
-}
-
-#[inline(always)]
-fn at_or_above<T: Real>(a: [T; 4], b: [T; 4]) -> bool {
-    (a[0] >= b[0]) & (a[1] >= b[1]) & (a[2] >= b[2]) & (a[3] >= b[3])
-}
-
-/// Compares few moves each with each and leaves those that none of the others makes useless.
-#[inline(always)]
-fn judge<T: Real, S: Sweep<T>>(
-    sweep: &S,
-    kept: &mut MoveList<T>,
-    planes: &[Planes<T>; MOST_JUDGES / LANES],
-    square: &Square<T>,
-    margin: T,
-) {
-    const CHUNKS: usize = MOST_JUDGES / LANES;
-    let zero = [[T::of(0.0); LANES]; 4];
-    let (mut floor, mut height) = ([zero; CHUNKS], [zero; CHUNKS]);
-    let mut useless = [[0u32; LANES]; CHUNKS];
-    for (k, chunk) in kept.chunks().iter().enumerate() {
-        for lane in 0..LANES {
-            let floors = planes[k].corners(lane, square, margin);
-            let heights = corners(sweep, &chunk.lane(lane), square);
-            let unsure = chunk.name(lane).bound_only();
-            for c in 0..4 {
-                floor[k][c][lane] = floors[c];
-                height[k][c][lane] = if unsure { T::of(f64::INFINITY) } else { heights[c] };
-            }
-        }
-    }
-    for b in 0..kept.len() {
-        let (chunk, lane) = (b / LANES, b % LANES);
-        // One that is useless itself lies above another that judges as strictly.
-        if useless[chunk][lane] != 0 {
-            continue;
-        }
-        let [h0, h1, h2, h3] = &height[chunk];
-        let ceiling = [h0[lane], h1[lane], h2[lane], h3[lane]];
-        for (useless, [f0, f1, f2, f3]) in useless.iter_mut().zip(&floor) {
-            for lane in 0..LANES {
-                let above = at_or_above([f0[lane], f1[lane], f2[lane], f3[lane]], ceiling);
-                useless[lane] |= u32::from(above);
-            }
-        }
-        useless[chunk][lane] = 0;
-    }
-    kept.retain(|k| useless[k / LANES][k % LANES] == 0);
-}
-
-/// The least number and its lane. By halves of fixed length, which stay in registers.
-#[inline(always)]
-fn least_of<T: Real>(numbers: &[T; LANES]) -> (T, usize) {
-    let (mut eight, mut four, mut two) = ([numbers[0]; 8], [numbers[0]; 4], [numbers[0]; 2]);
-    for k in 0..8 {
-        eight[k] = numbers[k].smaller(numbers[k + 8]);
-    }
-    for k in 0..4 {
-        four[k] = eight[k].smaller(eight[k + 4]);
-    }
-    for k in 0..2 {
-        two[k] = four[k].smaller(four[k + 2]);
-    }
-    let least = two[0].smaller(two[1]);
-    let mut lanes = [0u32; LANES];
-    for lane in 0..LANES {
-        lanes[lane] = u32::from(numbers[lane] <= least);
-    }
-    (least, bits(&lanes).trailing_zeros() as usize % LANES)
-}
-
-/// One bit for each lane that is not zero.
-#[inline(always)]
-fn bits(lanes: &[u32; LANES]) -> u32 {
-    let mut bits = 0;
-    for lane in 0..LANES {
-        bits |= lanes[lane] << lane;
-    }
-    bits
-}
-
-#[inline(always)]
-fn planes_of<T: Real, S: Sweep<T>>(sweep: &S, chunk: &Chunk<T>, square: &Square<T>) -> Planes<T> {
-    let mut planes = Planes::none();
-    for lane in 0..LANES {
-        let m = chunk.lane(lane);
-        let (along, across) = m.along_across(square.x, square.y);
-        let plane = sweep.plane(&m, along, across);
-        planes.z[lane] = plane.z;
-        planes.x[lane] = plane.along * m.ux - plane.across * m.uy;
-        planes.y[lane] = plane.along * m.uy + plane.across * m.ux;
-        let ahead = along - along.larger(m.low).smaller(m.high);
-        planes.away[lane] = ahead * ahead + across * across;
-        let half_along = square.half_x * m.ux.absolute() + square.half_y * m.uy.absolute();
-        let half_across = square.half_x * m.uy.absolute() + square.half_y * m.ux.absolute();
-        let (lower, upper) =
-            sweep.beyond(&m, [along - half_along, along + half_along], across.absolute() + half_across);
-        let name = chunk.name(lane);
-        let (start, end) = if name.falling() { (upper, lower) } else { (lower, upper) };
-        let ends = u32::from(start) * AT_START + u32::from(end) * AT_END;
-        // A plunge has both ends in one place, and only the lower one cuts.
-        planes.ends[lane] = if name.bound_only() | (m.low >= m.high) { 0 } else { ends };
-    }
-    planes
-}
-
-/// Heights of a move at the corners of a square, infinite where they are not known for sure.
-#[inline(always)]
-fn corners<T: Real, S: Sweep<T>>(sweep: &S, m: &LocalMove<T>, square: &Square<T>) -> [T; 4] {
-    let (x0, x1) = (square.x - square.half_x, square.x + square.half_x);
-    let (y0, y1) = (square.y - square.half_y, square.y + square.half_y);
-    [
-        sure_height(sweep, m, x0, y0),
-        sure_height(sweep, m, x1, y0),
-        sure_height(sweep, m, x0, y1),
-        sure_height(sweep, m, x1, y1),
-    ]
-}
-
-/// As [`corners`] of a single move. Most lanes work in vain, but all at the same time.
-#[inline(always)]
-fn corners_of_one<T: Real, S: Sweep<T>>(sweep: &S, m: &LocalMove<T>, square: &Square<T>) -> [T; 4] {
-    let mut x = [square.x - square.half_x; LANES];
-    let mut y = [square.y - square.half_y; LANES];
-    (x[1], x[3]) = (square.x + square.half_x, square.x + square.half_x);
-    (y[2], y[3]) = (square.y + square.half_y, square.y + square.half_y);
-    let mut heights = [T::of(0.0); LANES];
-    for lane in 0..LANES {
-        heights[lane] = sure_height(sweep, m, x[lane], y[lane]);
-    }
-    [heights[0], heights[1], heights[2], heights[3]]
-}
-
-#[inline(always)]
-fn sure_height<T: Real, S: Sweep<T>>(sweep: &S, m: &LocalMove<T>, x: T, y: T) -> T {
-    let (along, across) = m.along_across(x, y);
-    let (height, doubt) = sweep.height(m, along, across);
-    let infinite = T::of(f64::INFINITY);
-    // NaN is not below.
-    if (height < infinite) & (doubt >= infinite) { height } else { infinite }
 }
 
 /// The first `n` cells of a row of a leaf; nearly always all of them, in one move.

@@ -4,7 +4,8 @@
 use std::collections::HashMap;
 
 use super::chord::distance_to_segment;
-use crate::geometry::Point3;
+use crate::cutter::Cutter;
+use crate::geometry::{Point2, Point3, Vector3};
 use crate::part::{Part, SurfacePoint};
 
 /// Contacts within this share of the part's size of its border lie on it: a thousand times f64's
@@ -64,6 +65,18 @@ impl<'a> Border<'a> {
             }
         }
         Self { part, edges, tolerance }
+    }
+
+    /// How far a cutter with its axis at `axis` has rolled over an edge that it touches at `contact`, mm: the
+    /// distance of the corner's contact from where it would touch the surface beside the edge.
+    pub fn rolled(&self, cutter: &Cutter, axis: &Point2, contact: &SurfacePoint) -> f64 {
+        // Direction from the contact to the centre of the corner's circle, against the normal.
+        let out = axis - contact.point.xy();
+        let rho = out.norm();
+        let lean = cutter.profile().incline(rho).sin;
+        let horizontal = if rho > 0.0 { out * (lean / rho) } else { out };
+        let toward = Vector3::new(horizontal.x, horizontal.y, (1.0 - lean * lean).sqrt());
+        (toward - contact.normal).norm() * cutter.corner_radius()
     }
 
     /// True when `contact` lies on the border.

@@ -8,7 +8,7 @@ use super::plan::PlanError;
 use super::strip::strip_width_at;
 use super::{Along, FeedDirection, Step};
 use crate::cutter::Cutter;
-use crate::field::NormalEquations;
+use crate::field::{NormalEquations, SamplePlane};
 use crate::geometry::{Jet2, KnotVector, NurbsSurface, Point3, Vector2, Vector3};
 use crate::part::{Part, PatchPoint};
 
@@ -47,19 +47,35 @@ pub struct ChartPoint {
     pub jet: Jet2,
     /// Outward unit normal.
     pub normal: Vector3,
+    /// Its parameters.
+    pub at: [f64; 2],
     sign: f64,
 }
 
 impl ChartPoint {
+    /// Where samples of directions in `plane` are asked for this point.
+    fn sampled_at(&self, plane: SamplePlane) -> [f64; 2] {
+        match plane {
+            SamplePlane::Plan => [self.jet.p.x, self.jet.p.y],
+            SamplePlane::Parameters => self.at,
+        }
+    }
+
     /// Normal curvature along the tangent `b`, 1/mm, positive where concave toward the outside.
     pub fn curvature_along(&self, b: &Vector3) -> f64 {
         let along = self.jet.pull_back(b).and_then(|(du, dv)| self.jet.normal_curvature(du, dv));
         self.sign * along.unwrap_or(0.0)
     }
 
+    /// How much longer the way of the cutter's corner centre is than that of the contact, along the unit tangent `t`; 0
+    /// where the corner does not fit.
+    pub fn offset_ratio(&self, cutter: &Cutter, t: &Vector3) -> f64 {
+        (1.0 - self.curvature_along(t) * cutter.corner_radius()).max(0.0)
+    }
+
     /// Unit feed tangent in space for a wanted direction; `None` where there is none.
-    pub fn feed_tangent(&self, direction: FeedDirection) -> Option<Vector3> {
-        let t = match direction {
+    pub fn feed_tangent(&self, direction: &FeedDirection) -> Option<Vector3> {
+        let t = match *direction {
             FeedDirection::Parameter(Along::U) => self.jet.du,
             FeedDirection::Parameter(Along::V) => self.jet.dv,
             FeedDirection::Angle(angle) => {
@@ -72,12 +88,23 @@ impl ChartPoint {
                 // The most convex section, seen from outside.
                 if self.sign > 0.0 { k.min_direction } else { k.max_direction }
             }
+            FeedDirection::Samples(ref samples) => {
+                let (line, _) = samples.at(self.sampled_at(samples.plane()))?;
+                match samples.plane() {
+                    SamplePlane::Plan => Vector3::new(-line[1], line[0], 0.0).cross(&self.normal),
+                    SamplePlane::Parameters => self.jet.du * line[0] + self.jet.dv * line[1],
+                }
+            }
         };
         t.try_normalize(1e-12)
     }
 
     /// How much the direction of feed matters here, 0 to 1.
-    pub fn direction_matters(&self, direction: FeedDirection, cutter: &Cutter) -> f64 {
+    pub fn direction_matters(&self, direction: &FeedDirection, cutter: &Cutter) -> f64 {
+        if let FeedDirection::Samples(samples) = direction {
+            return samples.at(self.sampled_at(samples.plane())).map_or(0.0, |(_, sure)| sure);
+        }
+
         match (direction, self.jet.principal_curvatures()) {
             (FeedDirection::WidestStrip, Some(k)) => ((k.max - k.min) * cutter.radius()).min(1.0),
             (FeedDirection::WidestStrip, None) => 0.0,
@@ -144,7 +171,7 @@ impl<'a> Chart<'a> {
     /// The surface at a parameter; `None` where the parametrisation is degenerate.
     pub fn at(&self, u: f64, v: f64) -> Option<ChartPoint> {
         let jet = self.jet(u, v);
-        Some(ChartPoint { jet, normal: jet.normal()? * self.sign, sign: self.sign })
+        Some(ChartPoint { jet, normal: jet.normal()? * self.sign, at: [u, v], sign: self.sign })
     }
 
     /// Position and derivatives at a parameter. Beyond the domain the tangent plane at the nearest

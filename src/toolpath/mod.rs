@@ -5,19 +5,38 @@ mod arc;
 mod border;
 mod chart;
 mod chord;
+mod contour_spiral;
 mod drop;
+mod halving;
+mod iso_scallop;
 mod level_passes;
 mod link;
+mod mesh_passes;
+mod mesh_surface;
 mod path;
 mod plan;
+mod plan_curve;
+mod pocket;
+mod shortest;
+mod smooth;
 mod spacing;
+mod spiral;
 mod streamline;
 mod strip;
+mod waterline;
 mod zigzag;
 
 pub use arc::{ARC_SHARE, Arc, ArcError, Plane};
 pub use chord::distance_to_segment;
 pub use drop::{Drop, DropCutter, GridDrop, PlanGrid};
+pub use link::{Joining, LONGEST_LINK, Links, longest_link};
 pub use path::{CcPoint, ClPoint, Move, MoveKind, Toolpath};
-pub use plan::{Along, FeedDirection, Plan, PlanError, PlanSettings, Step, Strategy, plan};
+pub use plan::{
+    Along, FeedDirection, FrontStart, LevelSteps, Plan, PlanError, PlanSettings, Step, Strategy,
+    StreamMethod, plan,
+};
+pub use pocket::{
+    Engagement, Flow, Pattern, Pocket, PocketStrategy, engagement, engagement_angle, limit_feed, plan_pocket,
+};
+pub use shortest::{ShortestPossible, shortest_possible};
 pub use strip::{ball_scallop_height, strip_width, strip_width_at};

@@ -27,8 +27,17 @@ pub enum MoveKind {
     Plunge,
     /// Cutting along a pass.
     Cut,
+    /// Feeding along the surface from the end of a pass to the start of the next.
+    Link,
     /// Feeding up from the end of a pass.
     Retract,
+}
+
+impl MoveKind {
+    /// True for moves that feed along the surface.
+    pub fn is_on_surface(self) -> bool {
+        matches!(self, Self::Cut | Self::Link)
+    }
 }
 
 /// A straight move of the tip to a new location.
@@ -40,8 +49,8 @@ pub struct Move {
     pub kind: MoveKind,
     /// Feed rate, mm/min; ignored for [`MoveKind::Rapid`].
     pub feed_rate: f64,
-    /// The pass it belongs to, counted from 0 in program order; a rapid belongs to the pass that
-    /// it leads to.
+    /// The pass it belongs to, counted from 0 in program order; rapids and links belong to the
+    /// pass that they lead to.
     pub pass: u32,
 }
 

@@ -38,41 +38,69 @@ pub(super) fn level_tangent(p: &ChartPoint, field: &ScalarField, [u, v]: [f64; 2
 
 /// What a place allows.
 #[derive(Debug, Clone, Copy)]
-struct Place {
-    psi: f64,
+pub(super) struct Place {
+    pub psi: f64,
     /// The allowed step of ψ.
-    step: f64,
+    pub step: f64,
     /// Length of level curves per step of ψ around the place: its area times |∇ψ|.
-    length: f64,
+    pub length: f64,
+    /// The surface is nearly as concave as the cutter there, or more.
+    pub too_concave: bool,
 }
 
-/// The levels of all whole passes, ascending.
-pub(super) fn place_levels(
+/// How the levels of whole passes are placed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Placing {
+    /// Each part of the range with the step that makes the passes shortest in all.
+    Shortest,
+    /// One step for the whole range, the one that makes the passes shortest in all.
+    OneStep,
+    /// Each at the least step that the one before allows.
+    Least,
+}
+
+/// What the places of a chart allow.
+pub(super) fn places_of(
     chart: &Chart,
     cutter: &Cutter,
     field: &ScalarField,
-    [lo, hi]: [f64; 2],
     settings: &PassSettings,
-    notes: &mut Vec<String>,
-) -> Vec<f64> {
-    if hi <= lo {
-        return vec![lo];
-    }
-    let mut windows: Vec<Vec<Place>> = vec![Vec::new(); WINDOWS];
-    let (mut limited, mut count) = (0usize, 0usize);
-    for [u, v] in chart.grid(SAMPLES) {
-        let Some(p) = chart.at(u, v) else { continue };
-        let Some(t) = level_tangent(&p, field, [u, v]) else { continue };
+) -> Vec<Place> {
+    let at = |[u, v]: [f64; 2]| {
+        let p = chart.at(u, v)?;
+        let t = level_tangent(&p, field, [u, v])?;
         let [psi, psi_u, psi_v] = field.value_and_gradient(u, v);
         let (e, f, g) = p.jet.first_form();
         let gradient = surface_gradient_length((e, f, g), psi_u, psi_v);
         let (width, too_concave) = p.strip_width(cutter, &t, settings.step);
         let area = (e * g - f * f).max(0.0).sqrt();
-        count += 1;
-        limited += usize::from(too_concave);
-        let window = ((psi - lo) / (hi - lo) * WINDOWS as f64).clamp(0.0, WINDOWS as f64 - 1.0) as usize;
-        windows[window].push(Place { psi, step: width * gradient, length: area * gradient });
+        Some(Place { psi, step: width * gradient, length: area * gradient, too_concave })
+    };
+    chart.grid(SAMPLES).filter_map(at).collect()
+}
+
+/// The levels of all whole passes, ascending.
+pub(super) fn place_levels(
+    places: &[Place],
+    [lo, hi]: [f64; 2],
+    placing: Placing,
+    notes: &mut Vec<String>,
+) -> Vec<f64> {
+    let count_of_windows = match placing {
+        Placing::Shortest => WINDOWS,
+        Placing::OneStep => 1,
+        Placing::Least => SAMPLES,
+    };
+    if hi <= lo {
+        return vec![lo];
     }
+    let mut windows: Vec<Vec<Place>> = vec![Vec::new(); count_of_windows];
+    for place in places {
+        let share = (place.psi - lo) / (hi - lo);
+        let window = (share * count_of_windows as f64).clamp(0.0, count_of_windows as f64 - 1.0) as usize;
+        windows[window].push(*place);
+    }
+    let (limited, count) = (places.iter().filter(|p| p.too_concave).count(), places.len());
     if limited > 0 {
         notes.push(format!(
             "on {:.1} % of the surface the part is nearly as concave as the cutter, or more: the strip is limited there",
@@ -82,6 +110,11 @@ pub(super) fn place_levels(
     let mut all: Vec<f64> = windows.iter().flatten().map(|p| p.step).collect();
     all.sort_by(f64::total_cmp);
     let least = LEAST_OVER_MEDIAN * all.get(all.len() / 2).copied().unwrap_or(hi - lo);
+    if placing == Placing::Least {
+        let least_of = |places: &Vec<Place>| places.iter().map(|p| p.step.max(least)).min_by(f64::total_cmp);
+        let steps: Vec<Option<f64>> = windows.iter().map(least_of).collect();
+        return one_after_the_other(&filled(&steps, hi - lo), [lo, hi]);
+    }
     let steps: Vec<Option<f64>> = windows.iter().map(|places| shortest(places, least)).collect();
     spread(&filled(&steps, hi - lo), [lo, hi])
 }
@@ -146,12 +179,30 @@ fn spread(steps: &[f64], [lo, hi]: [f64; 2]) -> Vec<f64> {
         .collect()
 }
 
+/// Levels from the lower end, each the least step after the one before that holds at both, half a step from the ends.
+fn one_after_the_other(steps: &[f64], [lo, hi]: [f64; 2]) -> Vec<f64> {
+    let width = (hi - lo) / steps.len() as f64;
+    let window = |level: f64| (((level - lo) / width).max(0.0) as usize).min(steps.len() - 1);
+    // The least over all windows from one level to another.
+    let least = |a: f64, b: f64| steps[window(a)..=window(b)].iter().copied().fold(f64::INFINITY, f64::min);
+    let step = |level: f64| least(level, level + steps[window(level)]);
+    let mut levels = vec![(lo + 0.5 * step(lo)).min(0.5 * (lo + hi))];
+    loop {
+        let last = levels[levels.len() - 1];
+        let next = last + step(last);
+        if hi - last <= 0.5 * step(last) {
+            return levels;
+        }
+        levels.push(next.min(hi));
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn place(step: f64, length: f64) -> Place {
-        Place { psi: 0.0, step, length }
+        Place { psi: 0.0, step, length, too_concave: false }
     }
 
     #[test]
@@ -172,6 +223,20 @@ mod tests {
         let uneven = spread(&[1.0, 0.25], [0.0, 2.0]);
         assert_eq!(uneven.len(), 5);
         assert!(uneven.windows(2).all(|w| w[1] > w[0]));
+    }
+
+    #[test]
+    fn least_steps_follow_one_another_and_hold_at_both_ends() {
+        let levels = one_after_the_other(&[0.5; 8], [0.0, 4.0]);
+        assert_eq!(levels, [0.25, 0.75, 1.25, 1.75, 2.25, 2.75, 3.25, 3.75]);
+        let levels = one_after_the_other(&[1.0, 1.0, 0.25, 1.0], [0.0, 4.0]);
+        assert!(
+            levels
+                .windows(2)
+                .all(|w| w[1] - w[0] <= 1.0 && (w[1] <= 2.0 || w[0] >= 3.0 || w[1] - w[0] <= 0.25))
+        );
+        assert!(4.0 - levels[levels.len() - 1] <= 0.5);
+        assert_eq!(one_after_the_other(&[9.0], [0.0, 1.0]), [0.5]);
     }
 
     #[test]

@@ -1,12 +1,16 @@
 //! Streamlines: passes along the level curves of a stream function fitted to feed directions; and
 //! isoparametric lines, whose stream function is a parameter itself.
 
-use super::chart::Chart;
-use super::level_passes::along_levels;
+use super::chart::{Chart, ChartPoint};
+use super::level_passes::{along_levels, along_levels_placed};
 use super::plan::{PassSettings, Passes, PlanError};
-use super::{Along, FeedDirection};
+use super::spacing::Placing;
+use super::{Along, FeedDirection, StreamMethod};
 use crate::cutter::Cutter;
-use crate::field::{self, Axis, ScalarField, StreamSample, fit_stream_function};
+use crate::field::{
+    self, Axis, FieldError, KnotRule, LineField, SamplePlane, ScalarField, Solver, StreamSample,
+    averaged_knots, equal_shares, fit_by_differences, fit_stream_function, weighted_knots,
+};
 use crate::geometry::{KnotVector, Vector3};
 use crate::monitor::Monitor;
 use crate::part::Part;
@@ -18,11 +22,36 @@ const SAMPLES_PER_CONTROL: usize = 3;
 /// stream function is determined where it matters nowhere.
 const LEAST_WEIGHT: f64 = 0.02;
 
-/// Passes along isoparametric lines.
+/// Passes along isoparametric lines, with levels placed in a given way; without `along` whichever of the two families
+/// is shorter on all patches together.
 pub fn iso_parametric(
     part: &Part,
     cutter: &Cutter,
+    along: Option<Along>,
+    placing: Placing,
+    settings: &PassSettings,
+    monitor: &dyn Monitor,
+) -> Result<Passes, PlanError> {
+    if let Some(along) = along {
+        return iso_parametric_along(part, cutter, along, placing, settings, monitor);
+    }
+    let [u, v] =
+        [Along::U, Along::V].map(|a| iso_parametric_along(part, cutter, a, placing, settings, monitor));
+    let (u, v) = (u?, v?);
+    let lengths = [u.length(), v.length()];
+    let (mut best, word) = if lengths[0] <= lengths[1] { (u, "u") } else { (v, "v") };
+    best.notes.push(format!(
+        "feed along {word} was chosen: {:.0} mm of passes along u, {:.0} mm along v",
+        lengths[0], lengths[1]
+    ));
+    Ok(best)
+}
+
+fn iso_parametric_along(
+    part: &Part,
+    cutter: &Cutter,
     along: Along,
+    placing: Placing,
     settings: &PassSettings,
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
@@ -32,39 +61,80 @@ pub fn iso_parametric(
     });
     let mut all = Passes::default();
     for chart in Chart::all(part, cutter)? {
-        all.append(along_levels(part, cutter, &chart, &field, settings, monitor)?);
+        all.append(along_levels_placed(part, cutter, &chart, &field, placing, settings, monitor)?);
     }
     Ok(all)
 }
 
-/// Passes along the level curves of a stream function fitted to feed directions, with
-/// `control_points` coefficients a side.
+/// How a stream function is fitted, and to how many coefficients.
+pub struct Fitting {
+    /// Control points a side.
+    pub controls: usize,
+    /// B-spline or differences.
+    pub method: StreamMethod,
+    /// What solves the equations.
+    pub solver: Solver,
+}
+
+/// Passes along the level curves of a stream function fitted to feed directions.
 pub fn streamline(
     part: &Part,
     cutter: &Cutter,
-    direction: FeedDirection,
-    control_points: usize,
+    direction: &FeedDirection,
+    fitting: &Fitting,
     settings: &PassSettings,
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
+    let charts = Chart::all(part, cutter)?;
+    if let FeedDirection::Samples(samples) = direction {
+        check_samples(samples, part, &charts)?;
+    }
     let mut all = Passes::default();
-    for chart in Chart::all(part, cutter)? {
-        let (field, notes) = stream_function(&chart, cutter, direction, control_points, settings)?;
+    for chart in charts {
+        let (field, notes) = stream_function(&chart, cutter, direction, fitting, settings)?;
         all.notes.extend(notes);
         all.append(along_levels(part, cutter, &chart, &field, settings, monitor)?);
     }
     Ok(all)
 }
 
+fn not_applicable(reason: String) -> PlanError {
+    PlanError::NotApplicable { strategy: "streamline", reason }
+}
+
+/// Refuses sampled directions that all lie outside of the part.
+fn check_samples(samples: &LineField, part: &Part, charts: &[Chart<'_>]) -> Result<(), PlanError> {
+    let (names, inside) = match samples.plane() {
+        SamplePlane::Plan => {
+            let b = part.bounds();
+            let rectangle = [[b.min.x, b.max.x], [b.min.y, b.max.y]];
+            (["x", "y"], samples.count_inside(rectangle) > 0)
+        }
+        SamplePlane::Parameters => {
+            (["u", "v"], charts.iter().any(|chart| samples.count_inside(chart.domain) > 0))
+        }
+    };
+    if inside {
+        return Ok(());
+    }
+    let [a, b] = samples.bounds();
+    let ([name_a, name_b], count) = (names, samples.len());
+    Err(not_applicable(format!(
+        "all {count} sampled directions lie outside of it ({name_a} from {} to {}, {name_b} from {} to {}); check \
+         their unit and origin, and whether they are x and y or u and v",
+        a[0], a[1], b[0], b[1]
+    )))
+}
+
 /// Samples feed directions over a chart and fits the stream function.
 fn stream_function(
     chart: &Chart,
     cutter: &Cutter,
-    direction: FeedDirection,
-    control_points: usize,
+    direction: &FeedDirection,
+    fitting: &Fitting,
     settings: &PassSettings,
 ) -> Result<(ScalarField, Vec<String>), PlanError> {
-    let n = control_points * SAMPLES_PER_CONTROL;
+    let n = fitting.controls * SAMPLES_PER_CONTROL;
     let places: Vec<[f64; 2]> = chart.grid(n).collect();
     let points: Vec<_> = places.iter().map(|&[u, v]| chart.at(u, v)).collect();
     let mut lines: Vec<Option<(Vector3, f64)>> = points
@@ -72,33 +142,46 @@ fn stream_function(
         .map(|p| p.and_then(|p| Some((p.feed_tangent(direction)?, p.direction_matters(direction, cutter)))))
         .collect();
     let disagreement = field::orient(&mut lines, n);
-    let mut samples = Vec::with_capacity(places.len());
-    for ((&[u, v], point), line) in places.iter().zip(&points).zip(&lines) {
-        let (Some(p), Some((t, matters))) = (point, line) else { continue };
-        let b = p.normal.cross(t);
-        let (Some(along), Some(across)) = (p.jet.pull_back(t), p.jet.pull_back(&b)) else { continue };
+    let sample = |k: usize| {
+        let (p, (t, matters)) = (points[k]?, lines[k]?);
+        let (along, across) = (p.jet.pull_back(&t)?, p.jet.pull_back(&p.normal.cross(&t))?);
         let (e, f, g) = p.jet.first_form();
-        samples.push(StreamSample {
-            u,
-            v,
+        Some(StreamSample {
+            u: places[k][0],
+            v: places[k][1],
             along: along.into(),
             across: across.into(),
-            density: 1.0 / p.strip_width(cutter, t, settings.step).0,
+            density: 1.0 / p.strip_width(cutter, &t, settings.step).0,
             weight: (e * g - f * f).max(0.0).sqrt() * (matters + LEAST_WEIGHT),
-        });
-    }
-    let knots = |range| KnotVector::clamped_uniform(3, control_points, range);
-    let not_applicable = |reason: String| PlanError::NotApplicable { strategy: "streamline", reason };
-    let [Ok(knots_u), Ok(knots_v)] = chart.domain.map(knots) else {
-        return Err(not_applicable(format!(
-            "{control_points} control points a side are too few; use 4 or more"
-        )));
+        })
     };
-    let fit = fit_stream_function(&samples, knots_u, knots_v).map_err(|e| not_applicable(e.to_string()))?;
-    let mut notes = vec![format!(
-        "the stream function follows the feed directions within {:.2} degrees (root mean square)",
-        fit.angle_rms.to_degrees()
-    )];
+    let samples: Vec<Option<StreamSample>> = (0..places.len()).map(sample).collect();
+    let refused = |e: FieldError| not_applicable(e.to_string());
+    let (psi, angle_rms, method, report) = match fitting.method {
+        StreamMethod::Differences => {
+            let fit = fit_by_differences(&samples, chart.domain, [n; 2], fitting.solver).map_err(refused)?;
+            (ScalarField::Grid(fit.psi), fit.angle_rms, format!("differences on {n} x {n} cells"), fit.report)
+        }
+        spline => {
+            let (degree, knots) = match spline {
+                StreamMethod::BSpline { degree, knots } => (degree, knots),
+                _ => (3, KnotRule::Uniform),
+            };
+            let given: Vec<StreamSample> = samples.into_iter().flatten().collect();
+            let [knots_u, knots_v] = placed_knots(chart, &points, degree, fitting.controls, knots)?;
+            let fit = fit_stream_function(&given, knots_u, knots_v, fitting.solver).map_err(refused)?;
+            let name =
+                format!("a B-spline of degree {degree} with {0} x {0} control points", fitting.controls);
+            (ScalarField::Spline(fit.psi), fit.angle_rms, name, fit.report)
+        }
+    };
+    let mut notes = vec![
+        format!(
+            "the stream function follows the feed directions within {:.2} degrees (root mean square)",
+            angle_rms.to_degrees()
+        ),
+        format!("the stream function is {method}, solved by {report}"),
+    ];
     if disagreement > 0.0 {
         notes.push(format!(
             "the feed directions have singular points ({:.1} % of neighbouring samples cannot be oriented alike); \
@@ -106,5 +189,41 @@ fn stream_function(
             100.0 * disagreement
         ));
     }
-    Ok((ScalarField::Spline(fit.psi), notes))
+    Ok((psi, notes))
+}
+
+/// Knots of both parameters by a rule. What the rule weighs along one parameter is the mean over the
+/// other: speed for averaged knots, which then suit samples evenly spaced on the surface; speed times
+/// the root of the normal curvature where the surface bends.
+fn placed_knots(
+    chart: &Chart,
+    points: &[Option<ChartPoint>],
+    degree: usize,
+    controls: usize,
+    rule: KnotRule,
+) -> Result<[KnotVector; 2], PlanError> {
+    let n = controls * SAMPLES_PER_CONTROL;
+    let along = |axis: usize| {
+        let range = chart.domain[axis];
+        let mut weights = vec![0.0; n];
+        for (k, p) in points.iter().enumerate() {
+            let Some(p) = p else { continue };
+            let d = if axis == 0 { p.jet.du } else { p.jet.dv };
+            let bend = if rule == KnotRule::Curvature { p.curvature_along(&d).abs().sqrt() } else { 1.0 };
+            weights[if axis == 0 { k % n } else { k / n }] += d.norm() * bend;
+        }
+        match rule {
+            KnotRule::Uniform => KnotVector::clamped_uniform(degree, controls, range),
+            KnotRule::Curvature => weighted_knots(degree, controls, &weights, range),
+            KnotRule::Averaged => {
+                let shares = equal_shares(&weights, n);
+                let inner = shares.iter().map(|t| range[0] + t * (range[1] - range[0]));
+                let parameters: Vec<f64> =
+                    std::iter::once(range[0]).chain(inner).chain(std::iter::once(range[1])).collect();
+                averaged_knots(degree, controls, &parameters, range)
+            }
+        }
+        .map_err(|e| not_applicable(format!("its control points cannot be placed: {e}")))
+    };
+    Ok([along(0)?, along(1)?])
 }

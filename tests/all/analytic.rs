@@ -3,8 +3,9 @@
 use std::f64::consts::FRAC_PI_2;
 
 use millstream::cutter::Cutter;
+use millstream::field::{KnotRule, Solver};
 use millstream::geometry::AnalyticShape;
-use millstream::toolpath::{Along, FeedDirection, Step, Strategy, ball_scallop_height};
+use millstream::toolpath::{Along, FeedDirection, Step, Strategy, StreamMethod, ball_scallop_height};
 
 use crate::support::{formula, off, plan_and_measure};
 
@@ -87,11 +88,19 @@ fn a_scallop_target_holds_on_every_smooth_test_surface() {
     let strategies = [
         ("zigzag", ZIGZAG),
         ("iso-parametric", Strategy::IsoParametric { along: Along::U }),
-        ("streamline", Strategy::Streamline { direction: FeedDirection::Angle(0.5), control_points: 16 }),
+        (
+            "streamline",
+            Strategy::Streamline {
+                direction: FeedDirection::Angle(0.5),
+                control_points: 16,
+                method: StreamMethod::BSpline { degree: 3, knots: KnotRule::Uniform },
+                solver: Solver::Cholesky,
+            },
+        ),
     ];
     for (shape_name, shape) in shapes {
         let part = formula(shape, x, y);
-        for (name, strategy) in strategies {
+        for (name, strategy) in strategies.clone() {
             let m = plan_and_measure(&part, &cutter, strategy, Step::Scallop(0.010), 0.1);
             let [max, over] = [m.scallop.max_mm.unwrap(), m.scallop.over_target_fraction.unwrap()];
             println!(
@@ -117,7 +126,7 @@ fn figures_of_a_curved_part_stay_within_their_bounds_as_the_cell_shrinks() {
     let cutter = Cutter::ball(6.0).unwrap();
     let strategy = Strategy::Zigzag { angle: 0.3, one_way: false };
     let figures = [0.2, 0.1, 0.05, 0.025].map(|cell| {
-        let m = plan_and_measure(&part, &cutter, strategy, Step::Stepover(0.5), cell);
+        let m = plan_and_measure(&part, &cutter, strategy.clone(), Step::Stepover(0.5), cell);
         let s = &m.scallop;
         (
             s.max_mm.unwrap(),

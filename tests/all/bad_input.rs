@@ -153,7 +153,7 @@ fn words_that_no_scene_knows() {
     edit_is_refused("title", "§zzz", &["unknown key `zzz`", "`title`"]);
     edit_is_refused("diameter = 6", "diameter = 6\n§corner_radius = 1", &["does not apply", "\"ball\""]);
     edit_is_refused("\"zigzag\"", "§\"zigzig\"", &["did you mean `zigzag`?"]);
-    edit_is_refused("\"zigzag\"", "§\"spiral\"", &["`streamline`"]);
+    edit_is_refused("\"zigzag\"", "§\"stremline\"", &["`streamline`"]);
     edit_is_refused("\"plane\"", "§\"plain\"", &["did you mean `plane`?"]);
     edit_is_refused("\"plane\"", "§\"torus\"", &["`sphere`"]);
     edit_is_refused("\"ball\"", "§\"bal\"", &["did you mean `ball`?"]);

@@ -305,7 +305,10 @@ fn the_report_has_the_keys_of_the_contract_and_finite_numbers() {
     assert!(digest.len() == 64 && digest.bytes().all(|b| b.is_ascii_hexdigit()), "{digest}");
     for t in report["toolpaths"].as_array().unwrap() {
         has(t, "name strategy verdict violations path scallop gouge uncut deviation simulation");
-        has(&t["path"], "cutting_length_mm air_length_mm passes cl_points sharp_turns machining_time_s");
+        has(
+            &t["path"],
+            "cutting_length_mm link_length_mm air_length_mm passes surface_links retracts cl_points total_turning_rad sharp_turns machining_time_s",
+        );
         has(&t["scallop"], "target_mm max_mm p95_mm p50_mm mean_mm over_target_fraction error_bound_mm");
         has(&t["gouge"], "max_depth_mm area_mm2 error_bound_mm regions");
         has(&t["uncut"], "max_height_mm area_mm2 fraction volume_mm3 regions");

@@ -53,7 +53,7 @@ fn a_missing_pass_is_uncut_and_a_tall_scallop_is_not() {
     let cutter = Cutter::ball(6.0).unwrap();
     let zigzag = Strategy::Zigzag { angle: 0.0, one_way: false };
     // A stepover of 2 mm leaves scallops of 0.17 mm: high, yet each is a scallop.
-    let m = plan_and_measure(&part, &cutter, zigzag, Step::Stepover(2.0), 0.1);
+    let m = plan_and_measure(&part, &cutter, zigzag.clone(), Step::Stepover(2.0), 0.1);
     assert!(off(m.scallop.max_mm.unwrap(), 3.0 - 8f64.sqrt()) < 1e-6);
     assert_eq!(m.uncut.region_count, 0, "{:?}", m.uncut.regions);
     // Without every pass that reaches y > 12 the rest is uncut.
@@ -137,7 +137,7 @@ fn ridges_in_a_corner_that_no_pass_reached_are_no_scallops() {
     let along = Strategy::Zigzag { angle: std::f64::consts::FRAC_PI_2, one_way: false };
     // An even number of passes, so that two of them leave a ridge right over the corner.
     for stepover in [0.1, 0.3, 0.5] {
-        let m = plan_and_measure(&part, &cutter, along, Step::Stepover(stepover), 0.05);
+        let m = plan_and_measure(&part, &cutter, along.clone(), Step::Stepover(stepover), 0.05);
         let interval = stepover / 30f64.to_radians().cos();
         let exact = 3.0 - (9.0 - 0.25 * interval * interval).sqrt();
         assert!(off(m.scallop.max_mm.unwrap(), exact) < 1e-3, "{stepover}: {:?} {exact}", m.scallop);

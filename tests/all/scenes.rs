@@ -48,10 +48,70 @@ fn groove() -> TriangleMesh {
     height_mesh(2, [30.0, 20.0], |x, _| (x - 15.0).abs() * 30f64.to_radians().tan())
 }
 
+/// A plateau that falls to a lower floor over a sharp edge at x = 14: a wall of 55°, a fillet of
+/// radius 5, the floor with a round hole of radius 4; all of it gently waved. 40 × 30 mm.
+fn stepped() -> TriangleMesh {
+    let (edge, slope, fillet, height) = (14.0, 55f64.to_radians(), 5.0, 4.0);
+    let (hole, radius) = ([29.0, 15.0], 4.0);
+    let fall = fillet * (1.0 - slope.cos());
+    let foot = edge + (height - fall) / slope.tan();
+    let profile = |x: f64| {
+        if x <= edge {
+            height
+        } else if x < foot {
+            height - (x - edge) * slope.tan()
+        } else if x < foot + fillet * slope.sin() {
+            let along = foot + fillet * slope.sin() - x;
+            fillet - (fillet * fillet - along * along).sqrt()
+        } else {
+            0.0
+        }
+    };
+    let z = |x: f64, y: f64| profile(x) + 0.6 * (0.21 * y).sin() + 0.3 * (0.25 * x + 0.1 * y).cos();
+    // Columns a quarter as wide over wall and fillet: a ball stands off the edges between facets of a
+    // hollow, by r (1/cos ½δ − 1) where they meet at the angle δ.
+    let columns = (0..35).map(|i| 0.4 * f64::from(i));
+    let columns = columns.chain((0..60).map(|i| 14.0 + 0.1 * f64::from(i)));
+    let xs: Vec<f64> = columns.chain((0..=50).map(|i| 20.0 + 0.4 * f64::from(i))).collect();
+    let (nx, ny, cell) = (xs.len() - 1, 75usize, 0.4);
+    let mut points: Vec<[f64; 2]> =
+        (0..=ny).flat_map(|j| xs.iter().map(move |&x| [x, cell * j as f64])).collect();
+    let inside = |x: f64, y: f64| (x - hole[0]).hypot(y - hole[1]) < radius;
+    let at = |i: usize, j: usize| j * (nx + 1) + i;
+    let squares: Vec<[usize; 2]> = (0..ny)
+        .flat_map(|j| (0..nx).map(move |i| [i, j]))
+        .filter(|&[i, j]| !inside(0.5 * (xs[i] + xs[i + 1]), cell * (j as f64 + 0.5)))
+        .collect();
+    // Vertices of the hole's border move onto the circle.
+    let mut squares_at = vec![0u8; points.len()];
+    for &[i, j] in &squares {
+        for k in [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)] {
+            squares_at[k] += 1;
+        }
+    }
+    for (k, p) in points.iter_mut().enumerate() {
+        let inner = k % (nx + 1) > 0 && k % (nx + 1) < nx && k > nx && k < (nx + 1) * ny;
+        if inner && (1..4).contains(&squares_at[k]) {
+            let d = [p[0] - hole[0], p[1] - hole[1]];
+            let stretch = radius / d[0].hypot(d[1]);
+            *p = [hole[0] + d[0] * stretch, hole[1] + d[1] * stretch];
+        }
+    }
+    let vertices = points.iter().map(|p| Point3::new(p[0], p[1], z(p[0], p[1]))).collect();
+    let triangles = squares
+        .iter()
+        .flat_map(|&[i, j]| {
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)].map(|k| k as u32);
+            [[a, b, c], [a, c, d]]
+        })
+        .collect();
+    TriangleMesh::new(vertices, triangles).unwrap().0
+}
+
 /// Each part of a scene is what its generator makes; `MILLSTREAM_BLESS=1` writes them anew.
 #[test]
 fn mesh_parts_are_those_of_their_generators() {
-    for (name, mesh) in [("relief.stl", relief()), ("groove.stl", groove())] {
+    for (name, mesh) in [("relief.stl", relief()), ("groove.stl", groove()), ("stepped.stl", stepped())] {
         let path = scene(name);
         if std::env::var_os("MILLSTREAM_BLESS").is_some() {
             let triangles: Vec<[Point3; 3]> = (0..mesh.triangles().len()).map(|t| mesh.corners(t)).collect();
@@ -126,8 +186,8 @@ fn wave_streamlines_are_good_and_shorter_than_zigzag() {
 }
 
 #[test]
-fn pit_and_crest_ridge_and_relief_are_good() {
-    for name in ["pit_and_crest.toml", "ridge.toml", "relief.toml"] {
+fn the_other_parts_are_good() {
+    for name in ["pit_and_crest.toml", "ridge.toml", "relief.toml", "stepped.toml", "joined.toml"] {
         let (status, report) = run(name);
         assert_eq!(status, 0, "{name}");
         assert_good(name, &report);
@@ -171,4 +231,38 @@ fn write_stl(path: &Path, triangles: &[[Point3; 3]]) {
         bytes.extend([0, 0]);
     }
     std::fs::write(path, bytes).unwrap();
+}
+
+/// Both pockets: nothing gouged, on the floor or beyond the walls, nothing left but in corners, no rapid in
+/// stock, and less of the length in too much stock than plain offsets of the walls have.
+#[test]
+fn pockets_are_cleared_to_their_walls() {
+    for name in ["bracket.toml", "tray.toml"] {
+        let (status, report) = run(name);
+        assert_eq!(status, 0, "{name}");
+        let toolpaths = report["toolpaths"].as_array().unwrap();
+        for t in toolpaths {
+            let what = format!("{name}, {}", t["name"]);
+            assert_eq!(number(t, "/uncut/area_mm2"), 0.0, "{what}");
+            assert!(number(t, "/gouge/max_depth_mm") < 1e-3, "{what}");
+            let bound = number(t, "/pocket/wall_gouge_error_bound_mm");
+            assert!(number(t, "/pocket/wall_gouge_mm") <= bound && bound <= 0.0025, "{what}");
+            assert!(number(t, "/pocket/wall_gouge_of_cells_mm") <= 1e-6, "{what}");
+            assert_eq!(number(t, "/removal/rapid_contact_count"), 0.0, "{what}");
+            assert!(number(t, "/removal/max_axial_engagement_mm") <= 4.001, "{what}");
+        }
+        let over = |strategy: &str| {
+            let t = toolpaths.iter().find(|t| t["strategy"] == strategy).unwrap();
+            number(t, "/pocket/over_engagement_limit_fraction")
+        };
+        assert!(over("pocket-flow") < over("pocket-offset"), "{name}");
+    }
+    // Corners of the tray, by closed form: from both sides of a corner of angle 2a the disc leaves r²/tan a
+    // less its sector r²(π/2 − a).
+    let (_, report) = run("tray.toml");
+    let corner = |a: f64| 16.0 * (1.0 / a.tan() - (std::f64::consts::FRAC_PI_2 - a));
+    let slant = 20f64.atan2(10.0);
+    let exact = 4.0 * corner(0.5 * (std::f64::consts::PI - slant)) + 2.0 * corner(slant);
+    let found = number(&report, "/toolpaths/0/pocket/unreachable_area_mm2");
+    assert!((found - exact).abs() < 0.15, "{found} {exact}");
 }

@@ -6,7 +6,7 @@ use millstream::metrology::{Asked, Limits, Measurement, measure};
 use millstream::monitor::Silent;
 use millstream::part::{Part, Patch};
 use millstream::sim::{Grid, ZMap, cut_reference};
-use millstream::toolpath::{PlanSettings, Step, Strategy, Toolpath, plan};
+use millstream::toolpath::{Joining, PlanSettings, Step, Strategy, Toolpath, plan};
 
 pub const LIMITS: Limits = Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chord: 0.001 };
 
@@ -33,6 +33,8 @@ pub fn settings(part: &Part, step: Step) -> PlanSettings {
         stock_top: part.bounds().max.z + ALLOWANCE,
         feed_rate: 1000.0,
         plunge_rate: 300.0,
+        rapid_rate: 15_000.0,
+        joining: Joining::default(),
     }
 }
 

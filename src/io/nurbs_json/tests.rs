@@ -91,6 +91,28 @@ fn files_are_named() {
     assert!(matches!(read(folder.path()), Err(NurbsFileError::Io { .. })));
 }
 
+/// scenes/joined.json is made by `samples::joined`. Its patches share border points and tangent planes,
+/// and are parametrised differently.
+#[test]
+fn the_joined_scene_is_what_its_generator_makes() {
+    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/joined.json"));
+    let made = samples::joined();
+    if std::env::var_os("MILLSTREAM_BLESS").is_some() {
+        std::fs::write(path, to_text(&made)).unwrap();
+    }
+    assert_eq!(read(path).unwrap(), made);
+    for pair in made.windows(2) {
+        for k in 0..=50 {
+            let v = f64::from(k) / 50.0;
+            let (left, right) = (pair[0].jet(1.0, v), pair[1].jet(0.0, v));
+            assert!((left.p - right.p).norm() < 1e-12);
+            assert!((left.normal().unwrap() - right.normal().unwrap()).norm() < 1e-12);
+        }
+    }
+    let jump = |pair: &[NurbsSurface]| (pair[0].jet(1.0, 0.5).du - pair[1].jet(0.0, 0.5).du).norm();
+    assert!(made.windows(2).any(|pair| jump(pair) > 1.0), "the speed along u changes somewhere");
+}
+
 /// scenes/ridge.json is made by `samples::ridge`. After a change there, write it anew with
 /// `MILLSTREAM_BLESS=1 cargo test --release --lib ridge`.
 #[test]

@@ -4,8 +4,10 @@
 //! The text is read as a tree of values with their places (not by derived deserialisation), so that
 //! every refusal can point at the very key or value: tagged enums of serde only know the table.
 
+mod classic;
 mod error;
 mod formula;
+mod pocket;
 mod read;
 mod section;
 #[cfg(test)]
@@ -13,16 +15,17 @@ mod tests;
 mod write;
 
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 pub use error::{Finding, SceneError, SceneText};
+pub use pocket::OutlineSource;
 pub use write::complete_toml;
 
 use crate::cutter::{Cutter, Holder};
 use crate::geometry::AnalyticSurface;
 use crate::machine::Machine;
 use crate::metrology::Limits;
-use crate::toolpath::{Step, Strategy};
+use crate::toolpath::{Joining, Step, Strategy};
 
 /// Default allowance of stock above the part's highest point, mm.
 pub const DEFAULT_ALLOWANCE: f64 = 1.0;
@@ -59,6 +62,9 @@ pub fn default_error_bound(limits: &Limits) -> f64 {
 /// the feed direction and cost time as their cube; fewer smooth them away.
 pub const DEFAULT_CONTROL_POINTS: usize = 24;
 
+/// Default degree of a streamline's stream function: smooth to the curvature of passes.
+pub const DEFAULT_DEGREE: usize = 3;
+
 /// A file that the scene names, and where in the scene it does.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NamedFile {
@@ -68,6 +74,14 @@ pub struct NamedFile {
     pub path: PathBuf,
     /// Bytes of the scene's text.
     pub span: Range<usize>,
+}
+
+impl NamedFile {
+    /// The file that a scene in `folder` names.
+    fn beside(folder: &Path, written: &str, span: Range<usize>) -> Self {
+        // Joining an absolute path gives that path.
+        Self { written: written.to_owned(), path: folder.join(written), span }
+    }
 }
 
 /// Kind of a mesh file.
@@ -102,6 +116,13 @@ pub enum PartSource {
     Formula {
         /// The formula with its parameters and its rectangle.
         surface: AnalyticSurface,
+    },
+    /// A pocket: a plane region with islands, cut down to a level floor.
+    Pocket {
+        /// Its outlines.
+        outline: OutlineSource,
+        /// How far its floor lies below z = 0, mm.
+        depth: f64,
     },
 }
 
@@ -181,15 +202,18 @@ pub struct ToolpathRequest {
     pub strategy: Strategy,
     /// How far its passes lie apart.
     pub step: Step,
+    /// The file of its feed directions, if it has one; [`Scene::read`] reads it into the strategy.
+    pub directions: Option<NamedFile>,
+    /// How its passes are smoothed and joined.
+    pub joining: Joining,
 }
 
 impl ToolpathRequest {
     /// The strategy's name as scenes spell it.
     pub fn strategy_name(&self) -> &'static str {
-        match self.strategy {
-            Strategy::Zigzag { .. } => "zigzag",
-            Strategy::IsoParametric { .. } => "iso-parametric",
-            Strategy::Streamline { .. } => "streamline",
+        match &self.strategy {
+            Strategy::Pocket(strategy) => strategy.name(),
+            strategy => classic::name(strategy).unwrap_or("streamline"),
         }
     }
 }

@@ -1,24 +1,27 @@
 //! From text to a checked scene.
 
 use std::io::Read as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::sync::Arc;
 
 use toml::de::DeTable;
 
 use super::error::{SceneError, SceneText};
-use super::formula;
 use super::section::{COORDINATE, LENGTH, Located, Section};
 use super::{
-    CuttingData, DEFAULT_ALLOWANCE, DEFAULT_CLEARANCE, DEFAULT_CONTROL_POINTS, DEFAULT_FEED_RATE,
-    DEFAULT_LIMITS, DEFAULT_MARGIN, DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE, DEFAULT_REMOVAL,
-    DEFAULT_SPINDLE_SPEED, Engine, MeshFormat, NamedFile, PartSource, Scene, Simulation, Stock,
-    ToolpathRequest, auto_cell, default_error_bound,
+    CuttingData, DEFAULT_ALLOWANCE, DEFAULT_CLEARANCE, DEFAULT_CONTROL_POINTS, DEFAULT_DEGREE,
+    DEFAULT_FEED_RATE, DEFAULT_LIMITS, DEFAULT_MARGIN, DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE,
+    DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, Engine, MeshFormat, NamedFile, OutlineSource, PartSource, Scene,
+    Simulation, Stock, ToolpathRequest, auto_cell, default_error_bound,
 };
+use super::{classic, formula, pocket};
 use crate::cutter::{AptWord, AptWords, Cutter, CutterError, CutterShape, Holder, HolderSection};
+use crate::field::{KnotRule, MAX_DENSE, Solver};
 use crate::geometry::AnalyticSurface;
+use crate::io::direction_table;
 use crate::machine::Machine;
 use crate::metrology::Limits;
-use crate::toolpath::{Along, FeedDirection, Step, Strategy};
+use crate::toolpath::{Along, FeedDirection, Joining, Links, Step, Strategy, StreamMethod};
 
 /// Largest scene that is read, bytes. A scene is a page of text; a larger file is a mistake.
 const MAX_BYTES: u64 = 1 << 20;
@@ -28,6 +31,9 @@ const UNITS: [(&str, f64); 5] = [("mm", 1.0), ("cm", 10.0), ("m", 1000.0), ("inc
 
 /// Feeds and speeds that make sense.
 const RATE: std::ops::RangeInclusive<f64> = 0.001..=1e6;
+
+/// Jerks that make sense, mm/s³.
+const JERK: std::ops::RangeInclusive<f64> = 1.0..=1e12;
 
 impl Scene {
     /// Reads and checks a scene file. Files that it names are looked for beside it.
@@ -47,8 +53,9 @@ impl Scene {
                 e.as_bytes()[..e.utf8_error().valid_up_to()].iter().filter(|b| **b == b'\n').count() + 1;
             unreadable(format!("line {line} is not UTF-8 text"))
         })?;
-        let scene = Self::parse(&path.to_string_lossy(), text)?;
+        let mut scene = Self::parse(&path.to_string_lossy(), text)?;
         scene.check_files()?;
+        scene.load_directions()?;
         Ok(scene)
     }
 
@@ -80,13 +87,14 @@ impl Scene {
         };
         let folder = Path::new(name).parent().unwrap_or(Path::new("")).to_owned();
         let part = read_part(&root.section("part")?, &folder)?;
-        let stock = read_stock(&root.section("stock")?)?;
         let (cutter, cutting) = read_cutter(&root.section("cutter")?)?;
+        let stock = read_stock(&root.section("stock")?, &part, &cutter)?;
         let holder = read_holder(&root, &cutter)?;
         let tolerance = read_tolerance(&root.section("tolerance")?)?;
         let mut simulation = read_simulation(&root.section("simulation")?, &cutter, &tolerance)?;
         let (machine, clearance) = read_machine(&root.section("machine")?)?;
-        let toolpaths = read_toolpaths(&root, &tolerance, &cutter)?;
+        let toolpaths = read_toolpaths(&root, &folder, &tolerance, &cutter)?;
+        check_pocket_strategies(&root, &part, &toolpaths)?;
         if simulation.cell_is_auto {
             simulation.cell = auto_cell(&cutter, &toolpaths);
         }
@@ -110,8 +118,26 @@ impl Scene {
     pub fn part_file(&self) -> Option<&NamedFile> {
         match &self.part {
             PartSource::Mesh { file, .. } | PartSource::Nurbs { file } => Some(file),
-            PartSource::Formula { .. } => None,
+            PartSource::Pocket { outline: OutlineSource::File { file, .. }, .. } => Some(file),
+            PartSource::Pocket { .. } | PartSource::Formula { .. } => None,
         }
+    }
+
+    /// Reads the files of feed directions into the strategies that follow them.
+    fn load_directions(&mut self) -> Result<(), SceneError> {
+        for request in &mut self.toolpaths {
+            let (Some(file), Strategy::Streamline { direction, .. }) =
+                (&request.directions, &mut request.strategy)
+            else {
+                continue;
+            };
+            let samples = direction_table::read(&file.path).map_err(|e| {
+                let message = format!("the file of directions cannot be used: {e}");
+                self.source.error(file.span.clone(), message, "mend that file or name another one")
+            })?;
+            *direction = FeedDirection::Samples(Arc::new(samples));
+        }
+        Ok(())
     }
 
     /// Refuses a file that is not there or cannot be opened, pointing at its name in the scene.
@@ -131,10 +157,11 @@ impl Scene {
 }
 
 fn read_part(part: &Section<'_>, folder: &Path) -> Result<PartSource, SceneError> {
-    let mut words = vec!["nurbs"];
+    let mut words = vec!["nurbs", pocket::SURFACE];
     words.extend(formula::names());
     let mut all_keys = vec!["surface", "file", "unit", "x", "y"];
     all_keys.extend(formula::all_keys());
+    all_keys.extend(pocket::PART_KEYS);
     if !part.has("surface") && !part.has("file") {
         part.only(&all_keys, &[], "a part")?;
         return Err(part.error(
@@ -143,15 +170,7 @@ fn read_part(part: &Section<'_>, folder: &Path) -> Result<PartSource, SceneError
             "add a table [part] with `file = \"part.stl\"`, or with `surface = \"wave\"` and its parameters",
         ));
     }
-    let named = |file: Located<&str>| NamedFile {
-        written: file.value.to_owned(),
-        path: if Path::new(file.value).is_absolute() {
-            PathBuf::from(file.value)
-        } else {
-            folder.join(file.value)
-        },
-        span: file.span,
-    };
+    let named = |file: Located<&str>| NamedFile::beside(folder, file.value, file.span);
     match part.word("surface", &words)? {
         None => {
             part.only(&["file", "unit"], &all_keys, "a part from a mesh file (it has no `surface`)")?;
@@ -180,6 +199,7 @@ fn read_part(part: &Section<'_>, folder: &Path) -> Result<PartSource, SceneError
             };
             Ok(PartSource::Mesh { file: named(file), format, unit, scale })
         }
+        Some(word) if word.value == pocket::SURFACE => pocket::read_source(part, &UNITS, named),
         Some(word) if word.value == "nurbs" => {
             part.only(&["surface", "file"], &all_keys, "surface = \"nurbs\"")?;
             Ok(PartSource::Nurbs { file: named(part.required_text("file", "wave.json")?) })
@@ -198,13 +218,16 @@ fn read_part(part: &Section<'_>, folder: &Path) -> Result<PartSource, SceneError
     }
 }
 
-fn read_stock(stock: &Section<'_>) -> Result<Stock, SceneError> {
+fn read_stock(stock: &Section<'_>, part: &PartSource, cutter: &Cutter) -> Result<Stock, SceneError> {
     stock.only(&["allowance", "margin"], &[], "[stock]")?;
     // Zero is meant in both: stock may end at the part's top and at its rim.
     let length = |key| stock.number(key, 0.0..=*LENGTH.end(), " mm");
+    // A pocket is milled into a finished face, and what is cut beside it has to be seen.
+    let pocket = matches!(part, PartSource::Pocket { .. });
+    let (top, around) = if pocket { (0.0, cutter.radius()) } else { (DEFAULT_ALLOWANCE, DEFAULT_MARGIN) };
     Ok(Stock {
-        allowance: length("allowance")?.map_or(DEFAULT_ALLOWANCE, |v| v.value),
-        margin: length("margin")?.map_or(DEFAULT_MARGIN, |v| v.value),
+        allowance: length("allowance")?.map_or(top, |v| v.value),
+        margin: length("margin")?.map_or(around, |v| v.value),
     })
 }
 
@@ -386,7 +409,11 @@ fn read_simulation(
 }
 
 fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
-    section.only(&["rapid_rate", "acceleration", "junction_deviation", "clearance"], &[], "[machine]")?;
+    section.only(
+        &["rapid_rate", "acceleration", "junction_deviation", "jerk", "slow_corners", "clearance"],
+        &[],
+        "[machine]",
+    )?;
     let default = Machine::default();
     let number =
         |key, default| Ok::<f64, SceneError>(section.number(key, RATE, "")?.map_or(default, |v| v.value));
@@ -396,12 +423,15 @@ fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
         junction_deviation: section
             .length("junction_deviation")?
             .map_or(default.junction_deviation, |v| v.value),
+        jerk: section.number("jerk", JERK, " mm/s3")?.map_or(default.jerk, |v| v.value),
+        slow_corners: section.flag("slow_corners")?.unwrap_or(default.slow_corners),
     };
     Ok((machine, section.length("clearance")?.map_or(DEFAULT_CLEARANCE, |v| v.value)))
 }
 
 fn read_toolpaths(
     root: &Section<'_>,
+    folder: &Path,
     limits: &Limits,
     cutter: &Cutter,
 ) -> Result<Vec<ToolpathRequest>, SceneError> {
@@ -415,7 +445,7 @@ fn read_toolpaths(
     }
     let mut requests: Vec<ToolpathRequest> = Vec::with_capacity(sections.len());
     for section in &sections {
-        let request = read_toolpath(section, limits, cutter)?;
+        let request = read_toolpath(section, folder, limits, cutter)?;
         if let Some(other) = requests.iter().find(|other| other.folder == request.folder) {
             let place = if section.has("name") { section.key_span("name") } else { section.header().clone() };
             let message = if other.name == request.name {
@@ -439,53 +469,101 @@ fn read_toolpaths(
 
 fn read_toolpath(
     section: &Section<'_>,
+    folder: &Path,
     limits: &Limits,
     cutter: &Cutter,
 ) -> Result<ToolpathRequest, SceneError> {
-    const COMMON: [&str; 4] = ["name", "strategy", "stepover", "scallop"];
-    const OWN: [&str; 5] = ["angle", "one_way", "along", "direction", "control_points"];
-    let all: Vec<&str> = COMMON.into_iter().chain(OWN).collect();
+    const COMMON: [&str; 7] =
+        ["name", "strategy", "stepover", "scallop", "links", "longest_link", "smoothing"];
+    const STREAMLINE: [&str; 7] =
+        ["direction", "directions", "control_points", "method", "degree", "knots", "solver"];
+    let all: Vec<&str> =
+        COMMON.into_iter().chain(classic::KEYS).chain(STREAMLINE).chain(pocket::ALL_KEYS).collect();
     if !section.has("strategy") {
         section.only(&all, &[], "a toolpath")?;
     }
-    let word = section.required_word("strategy", &["zigzag", "iso-parametric", "streamline"])?;
-    let own: &[&str] = match word.value {
-        "zigzag" => &["angle", "one_way"],
-        "iso-parametric" => &["along"],
-        _ => &["direction", "control_points"],
-    };
+    let words: Vec<&'static str> =
+        classic::WORDS.into_iter().chain(["streamline"]).chain(pocket::STRATEGIES).collect();
+    let word = section.required_word("strategy", &words)?;
+    if pocket::STRATEGIES.contains(&word.value) {
+        let (strategy, step) = pocket::read_strategy(section, word.value, cutter.radius())?;
+        return named_request(section, &word, Strategy::Pocket(strategy), step, None);
+    }
+    let own = classic::keys(word.value).unwrap_or(&STREAMLINE);
     let keys: Vec<&str> = COMMON.iter().chain(own).copied().collect();
     section.only(&keys, &all, &format!("strategy = \"{}\"", word.value))?;
-    let strategy = match word.value {
-        "zigzag" => Strategy::Zigzag {
-            angle: read_angle(section)?.unwrap_or(0.0),
-            one_way: section.flag("one_way")?.unwrap_or(false),
-        },
-        "iso-parametric" => Strategy::IsoParametric { along: read_along(section)? },
-        _ => read_streamline(section)?,
+    let strategy = match classic::read(word.value, section)? {
+        Some(strategy) => strategy,
+        None => read_streamline(section)?,
     };
+    let directions = read_directions(section, folder)?;
     let step = read_step(section, limits, cutter)?;
+    named_request(section, &word, strategy, step, directions)
+}
+
+/// A request with its name and the name of its folder.
+fn named_request(
+    section: &Section<'_>,
+    word: &Located<&str>,
+    strategy: Strategy,
+    step: Step,
+    directions: Option<NamedFile>,
+) -> Result<ToolpathRequest, SceneError> {
     let (name, span) = match section.text("name")? {
         Some(name) => (name.value.to_owned(), name.span),
-        None => (word.value.to_owned(), word.span),
+        None => (word.value.to_owned(), word.span.clone()),
     };
-    let folder = folder_name(&name).ok_or_else(|| {
+    let own_folder = folder_name(&name).ok_or_else(|| {
         section.error(
             &span,
             format!("\"{name}\" cannot name a toolpath"),
             "use up to 64 characters, at least one of them a letter or a digit of the Latin alphabet",
         )
     })?;
-    Ok(ToolpathRequest { name, folder, strategy, step })
+    let joining = if strategy.pocket().is_some() { Joining::default() } else { read_joining(section)? };
+    Ok(ToolpathRequest { name, folder: own_folder, strategy, step, directions, joining })
 }
 
-fn read_angle(section: &Section<'_>) -> Result<Option<f64>, SceneError> {
-    Ok(section.number("angle", -360.0..=360.0, " degrees")?.map(|v| v.value.to_radians()))
+/// How passes are smoothed and joined.
+fn read_joining(section: &Section<'_>) -> Result<Joining, SceneError> {
+    let default = Joining::default();
+    let links = match section.word("links", &["surface", "retract"])?.map(|word| word.value) {
+        Some("surface") => Links::Surface,
+        Some(_) => Links::Retract,
+        None => default.links,
+    };
+    let longest_link = section.length_or_word("longest_link", "auto")?;
+    if links == Links::Retract && longest_link.is_some() {
+        return Err(section.error(
+            &section.key_span("longest_link"),
+            "`longest_link` does not apply to links = \"retract\"",
+            "delete one of the two",
+        ));
+    }
+    let smoothing = section.flag("smoothing")?.unwrap_or(default.smoothing);
+    Ok(Joining { links, longest_link, smoothing })
 }
 
-fn read_along(section: &Section<'_>) -> Result<Along, SceneError> {
-    let word = section.word("along", &["u", "v"])?.map_or("u", |word| word.value);
-    Ok(if word == "v" { Along::V } else { Along::U })
+/// Pockets are milled by their own strategies, and nothing else is.
+fn check_pocket_strategies(
+    root: &Section<'_>,
+    part: &PartSource,
+    toolpaths: &[ToolpathRequest],
+) -> Result<(), SceneError> {
+    let pocket = matches!(part, PartSource::Pocket { .. });
+    let strange = |t: &&ToolpathRequest| matches!(t.strategy, Strategy::Pocket(_)) != pocket;
+    let Some(wrong) = toolpaths.iter().find(strange) else { return Ok(()) };
+    let message = format!(
+        "strategy = \"{}\" does not mill {}",
+        wrong.strategy_name(),
+        if pocket { "a pocket" } else { "anything but a pocket" }
+    );
+    let cure = if pocket {
+        "use one of pocket-flow, pocket-offset, pocket-zigzag"
+    } else {
+        "use one of zigzag, iso-parametric, streamline, or `surface = \"pocket\"` in [part]"
+    };
+    Err(root.error(&root.key_span("toolpath"), message, cure))
 }
 
 fn read_streamline(section: &Section<'_>) -> Result<Strategy, SceneError> {
@@ -494,7 +572,27 @@ fn read_streamline(section: &Section<'_>) -> Result<Strategy, SceneError> {
         let angle = table.required_number("angle", -360.0..=360.0, " degrees", 30.0)?;
         FeedDirection::Angle(angle.value.to_radians())
     } else {
-        match section.word("direction", &["widest-strip", "u", "v"])?.map(|word| word.value) {
+        let words = ["widest-strip", "shortest", "u", "v", "file"];
+        match section.word("direction", &words)?.map(|word| word.value) {
+            Some("shortest") => {
+                section.only(
+                    &[
+                        "name",
+                        "strategy",
+                        "stepover",
+                        "scallop",
+                        "links",
+                        "longest_link",
+                        "smoothing",
+                        "direction",
+                    ],
+                    &[],
+                    "direction = \"shortest\"",
+                )?;
+                return Ok(Strategy::ShortestStreamline);
+            }
+            // Until the file is read (`Scene::load_directions`).
+            Some("file") => FeedDirection::WidestStrip,
             Some("u") => FeedDirection::Parameter(Along::U),
             Some("v") => FeedDirection::Parameter(Along::V),
             _ => FeedDirection::WidestStrip,
@@ -502,7 +600,75 @@ fn read_streamline(section: &Section<'_>) -> Result<Strategy, SceneError> {
     };
     let control_points =
         section.count("control_points", 4..=200)?.map_or(DEFAULT_CONTROL_POINTS, |n| n as usize);
-    Ok(Strategy::Streamline { direction, control_points })
+    let (method, solver) = read_stream_method(section, control_points)?;
+    Ok(Strategy::Streamline { direction, control_points, method, solver })
+}
+
+fn read_stream_method(
+    section: &Section<'_>,
+    control_points: usize,
+) -> Result<(StreamMethod, Solver), SceneError> {
+    let method = section.word("method", &["auto", "bspline", "differences", "elements"])?.map(|m| m.value);
+    let degree = section.count("degree", 2..=5)?.map(|degree| degree as usize);
+    let rule = section.word("knots", &KnotRule::WORDS)?.and_then(|word| KnotRule::from_word(word.value));
+    let chosen = section.word("solver", &Solver::WORDS)?;
+    let solver = chosen.as_ref().and_then(|word| Solver::from_word(word.value));
+    let refuse =
+        |key: &str, message: String, cure: &str| Err(section.error(&section.key_span(key), message, cure));
+    if method == Some("elements") {
+        if let Some(key) = ["degree", "knots", "solver"].into_iter().find(|key| section.has(key)) {
+            let message = format!("`{key}` does not apply to finite elements, which `method` asks for");
+            return refuse(key, message, "delete it, or write `method = \"bspline\"`");
+        }
+        return Ok((StreamMethod::Elements, Solver::Cholesky));
+    }
+    if method == Some("differences") {
+        if let Some(key) = ["degree", "knots"].into_iter().find(|key| section.has(key)) {
+            let message = format!("`{key}` belongs to B-splines, and `method` is \"differences\"");
+            return refuse(key, message, "delete it, or write `method = \"bspline\"`");
+        }
+        if matches!(solver, Some(Solver::Qr | Solver::MinimumNorm)) {
+            let message = "differences have no rectangular system, which this solver takes".to_owned();
+            return refuse("solver", message, "write `solver = \"cg\"`, \"cholesky\" or \"gmres\"");
+        }
+        return Ok((StreamMethod::Differences, solver.unwrap_or(Solver::ConjugateGradient)));
+    }
+    let degree = degree.unwrap_or(DEFAULT_DEGREE);
+    if control_points <= degree {
+        let message = format!("{control_points} control points a side are too few for degree {degree}");
+        return refuse(
+            if section.has("degree") { "degree" } else { "control_points" },
+            message,
+            "write at least one control point more than the degree",
+        );
+    }
+    if solver == Some(Solver::MinimumNorm) && control_points.pow(2) > MAX_DENSE {
+        let message = format!(
+            "the minimum-norm solver takes at most {MAX_DENSE} coefficients, and {control_points} control points a \
+             side make {}",
+            control_points.pow(2)
+        );
+        return refuse("solver", message, "write `control_points = 24` or fewer, or another solver");
+    }
+    let spline = StreamMethod::BSpline { degree, knots: rule.unwrap_or_default() };
+    let asked = method == Some("bspline") || ["degree", "knots", "solver"].iter().any(|key| section.has(key));
+    let method = if asked { spline } else { StreamMethod::Automatic };
+    Ok((method, solver.unwrap_or(Solver::Cholesky)))
+}
+
+/// The file of directions that `direction = "file"` asks for.
+fn read_directions(section: &Section<'_>, folder: &Path) -> Result<Option<NamedFile>, SceneError> {
+    let wanted = section.inline("direction").is_none()
+        && section.text("direction")?.is_some_and(|word| word.value == "file");
+    match (wanted, section.text("directions")?) {
+        (true, None) => section.required_text("directions", "directions.txt").map(|_| None),
+        (false, Some(file)) => Err(section.error(
+            &file.span,
+            "`directions` names a file that nothing reads",
+            "add `direction = \"file\"`, or delete it",
+        )),
+        (_, file) => Ok(file.map(|file| NamedFile::beside(folder, file.value, file.span))),
+    }
 }
 
 /// The step of one toolpath: its own stepover or scallop, or else the scene's scallop.

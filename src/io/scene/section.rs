@@ -6,6 +6,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::error::{SceneError, SceneText, suggestion};
+use crate::geometry::Point2;
 
 /// A value and where it stands in the text.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,6 +76,11 @@ impl<'a> Section<'a> {
     /// True when the key is there.
     pub fn has(&self, key: &str) -> bool {
         self.entry(key).is_some()
+    }
+
+    /// True when the key's value is a text.
+    pub fn is_text(&self, key: &str) -> bool {
+        self.entry(key).is_some_and(|entry| matches!(entry.get_ref(), DeValue::String(_)))
     }
 
     /// Where the name of a key stands (the header if it is not there).
@@ -206,7 +212,7 @@ impl<'a> Section<'a> {
 
     /// A length, or `None` for that word or nothing.
     pub fn length_or_word(&self, key: &str, word: &'static str) -> Result<Option<f64>, SceneError> {
-        if self.entry(key).is_some_and(|entry| matches!(entry.get_ref(), DeValue::String(_))) {
+        if self.is_text(key) {
             return self.word(key, &[word]).map(|_| None);
         }
         Ok(self.length(key)?.map(|length| length.value))
@@ -304,6 +310,43 @@ impl<'a> Section<'a> {
                 cure,
             )),
         }
+    }
+
+    /// Points of a closed curve, `[[x, y], ...]`, mm, which must be there.
+    pub fn points(&self, key: &str) -> Result<Located<Vec<Point2>>, SceneError> {
+        let entry =
+            self.entry(key).ok_or_else(|| self.missing(key, "[[0, 0], [60, 0], [60, 40], [0, 40]]"))?;
+        self.point_list(key, entry)
+    }
+
+    /// Several curves, `[[[x, y], ...], ...]`, mm; none when the key is not there.
+    pub fn curves(&self, key: &str) -> Result<Vec<Located<Vec<Point2>>>, SceneError> {
+        let Some(entry) = self.entry(key) else { return Ok(Vec::new()) };
+        let DeValue::Array(list) = entry.get_ref() else {
+            let cure = format!("write a list of lists of points: `{key} = [[[x, y], ...], ...]`");
+            return Err(self.wrong_type(key, "a list of curves", entry, &cure));
+        };
+        list.iter().map(|curve| self.point_list(key, curve)).collect()
+    }
+
+    fn point_list(
+        &self,
+        key: &str,
+        entry: &Spanned<DeValue<'a>>,
+    ) -> Result<Located<Vec<Point2>>, SceneError> {
+        let cure = "write points as `[x, y]`, between brackets and commas";
+        let DeValue::Array(list) = entry.get_ref() else {
+            return Err(self.wrong_type(key, "a list of points", entry, cure));
+        };
+        let point = |item: &Spanned<DeValue<'a>>| match item.get_ref() {
+            DeValue::Array(pair) if pair.len() == 2 => {
+                let at = |k: usize| Ok(self.in_range(key, &pair[k], &COORDINATE, " mm")?.value);
+                Ok(Point2::new(at(0)?, at(1)?))
+            }
+            _ => Err(self.wrong_type(key, "points of two numbers", item, cure)),
+        };
+        let value = list.iter().map(point).collect::<Result<_, _>>()?;
+        Ok(Located { value, span: entry.span() })
     }
 
     /// The table written in place as the value of `key`, if it is one.

@@ -4,7 +4,8 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::cutter::CutterShape;
-use crate::toolpath::{Along, FeedDirection, Strategy};
+use crate::field::{KnotRule, Solver};
+use crate::toolpath::{Along, FeedDirection, FrontStart, LevelSteps, Strategy, StreamMethod};
 
 const VALID: &str = r#"
 title = "Wave, zigzag against streamlines"
@@ -69,7 +70,49 @@ fn a_scene_becomes_typed_values_in_mm_and_rad() {
     assert_eq!(c.strategy, Strategy::IsoParametric { along: Along::V });
     assert_eq!(c.step, Step::Scallop(0.02));
     let direction = FeedDirection::Angle(12.5f64.to_radians());
-    assert_eq!(d.strategy, Strategy::Streamline { direction, control_points: DEFAULT_CONTROL_POINTS });
+    let method = StreamMethod::Automatic;
+    let (control_points, solver) = (DEFAULT_CONTROL_POINTS, Solver::Cholesky);
+    assert_eq!(d.strategy, Strategy::Streamline { direction, control_points, method, solver });
+}
+
+#[test]
+fn classical_strategies_are_read_and_written_back() {
+    let line = FrontStart::Line([[0.5, 0.0], [0.25, 1.0]]);
+    let steps = |along, steps| Strategy::IsoParametricSteps { along, steps };
+    let cases = [
+        ("zigzag\"\nangle = \"best\"\none_way = true", Strategy::BestZigzag { one_way: true }),
+        ("iso-parametric\"\nstep = \"shortest\"", Strategy::IsoParametric { along: Along::U }),
+        ("iso-parametric\"\nalong = \"best\"", steps(None, LevelSteps::Shortest)),
+        ("iso-parametric\"\nalong = \"v\"\nstep = \"least\"", steps(Some(Along::V), LevelSteps::Least)),
+        ("iso-scallop\"", Strategy::IsoScallop { start: FrontStart::BestBorder }),
+        ("iso-scallop\"\nstart = \"all\"", Strategy::IsoScallop { start: FrontStart::AllBorders }),
+        (
+            "iso-scallop\"\nstart = \"v-max\"",
+            Strategy::IsoScallop { start: FrontStart::Border { constant: Along::V, greatest: true } },
+        ),
+        (
+            "iso-scallop\"\nstart = { from_u = 0.5, from_v = 0, to_u = 0.25, to_v = 1 }",
+            Strategy::IsoScallop { start: line },
+        ),
+        ("waterline\"", Strategy::Waterline { steps: LevelSteps::Shortest }),
+        ("waterline\"\nstep = \"constant\"", Strategy::Waterline { steps: LevelSteps::Constant }),
+        ("spiral\"", Strategy::Spiral),
+        ("spiral\"\nkind = \"contour\"", Strategy::ContourSpiral),
+    ];
+    let head = &VALID[..VALID.find("[[toolpath]]").unwrap()];
+    for (text, strategy) in cases {
+        let scene = Scene::parse("wave.toml", format!("{head}[[toolpath]]\nstrategy = \"{text}\n")).unwrap();
+        assert_eq!(scene.toolpaths[0].strategy, strategy, "{text}");
+        let again = Scene::parse("wave.toml", complete_toml(&scene)).unwrap();
+        assert_eq!(again.toolpaths, scene.toolpaths, "{text}");
+    }
+    let refuse = |text: &str| refused(&format!("{head}[[toolpath]]\nstrategy = \"{text}\n")).0;
+    assert!(refuse("zigzag\"\nangle = \"bets\"").contains("`angle`"));
+    assert!(refuse("spiral\"\nangle = 3").contains("does not apply"));
+    assert!(refuse("waterline\"\nstep = \"least\"").contains("cannot be \"least\""));
+    let point = "iso-scallop\"\nstart = { from_u = 0.5, from_v = 0.5, to_u = 0.5, to_v = 0.5 }";
+    assert!(refuse(point).contains("same place"));
+    assert!(refuse("iso-scallop\"\nstart = { from_u = 2 }").contains("from_u"));
 }
 
 #[test]
@@ -338,6 +381,67 @@ fn the_cell_may_be_left_to_the_program() {
     assert_eq!(simulation("0.2").unwrap(), (0.2, false));
     for bad in ["\"fine\"", "true", "0"] {
         assert!(matches!(simulation(bad), Err(SceneError::Invalid(_))), "{bad}");
+    }
+}
+
+/// The valid scene, its last toolpath with these keys.
+fn streamline(keys: &str) -> String {
+    with("direction = { angle = 12.5 }", keys)
+}
+
+#[test]
+fn methods_and_solvers_of_stream_functions_are_read_and_written() {
+    let read = |keys: &str| {
+        let scene =
+            Scene::parse("folder/wave.toml", streamline(keys)).unwrap_or_else(|e| panic!("{keys}: {e}"));
+        let complete = complete_toml(&scene);
+        let again =
+            Scene::parse("folder/wave.toml", complete.clone()).unwrap_or_else(|e| panic!("{e}\n{complete}"));
+        assert_eq!(again.toolpaths[3].strategy, scene.toolpaths[3].strategy, "{complete}");
+        assert_eq!(complete_toml(&again), complete);
+        let written =
+            |r: &ToolpathRequest| r.directions.as_ref().map(|f| (f.written.clone(), f.path.clone()));
+        assert_eq!(written(&again.toolpaths[3]), written(&scene.toolpaths[3]));
+        let request = scene.toolpaths[3].clone();
+        let Strategy::Streamline { method, solver, .. } = request.strategy else { panic!("{keys}") };
+        (method, solver, request.directions)
+    };
+    let spline = |degree, knots| StreamMethod::BSpline { degree, knots };
+    let (method, solver, file) = read("degree = 5\nknots = \"curvature\"\nsolver = \"gmres\"");
+    assert_eq!((method, solver), (spline(5, KnotRule::Curvature), Solver::Gmres));
+    assert!(file.is_none());
+    assert_eq!(read("method = \"differences\"").0, StreamMethod::Differences);
+    assert_eq!(read("method = \"differences\"").1, Solver::ConjugateGradient);
+    assert_eq!(read("method = \"differences\"\nsolver = \"cholesky\"").1, Solver::Cholesky);
+    for solver in Solver::ALL {
+        assert_eq!(read(&format!("control_points = 20\nsolver = \"{}\"", solver.name())).1, solver);
+    }
+    for (word, rule) in [("uniform", KnotRule::Uniform), ("averaged", KnotRule::Averaged)] {
+        assert_eq!(read(&format!("method = \"bspline\"\nknots = \"{word}\"")).0, spline(3, rule));
+    }
+    let (_, _, file) = read("direction = \"file\"\ndirections = \"flow.txt\"");
+    assert_eq!(file.unwrap().path, std::path::Path::new("folder/flow.txt"));
+}
+
+#[test]
+fn methods_that_do_not_go_together_are_refused() {
+    for (keys, word) in [
+        ("method = \"differences\"\ndegree = 3", "belongs to B-splines"),
+        ("method = \"differences\"\nknots = \"uniform\"", "belongs to B-splines"),
+        ("method = \"differences\"\nsolver = \"qr\"", "no rectangular system"),
+        ("method = \"volumes\"", "cannot be"),
+        ("method = \"elements\"\ndegree = 3", "does not apply to finite elements"),
+        ("degree = 1", "from 2 to 5"),
+        ("degree = 6", "from 2 to 5"),
+        ("degree = 5\ncontrol_points = 5", "too few for degree 5"),
+        ("solver = \"minimum-norm\"\ncontrol_points = 25", "at most 600 coefficients"),
+        ("solver = \"lu\"", "cannot be"),
+        ("direction = \"file\"", "has no `directions`"),
+        ("directions = \"flow.txt\"", "nothing reads"),
+        ("direction = \"u\"\ndirections = \"flow.txt\"", "nothing reads"),
+    ] {
+        let (message, ..) = refused(&streamline(keys));
+        assert!(message.contains(word), "{keys}: {message}");
     }
 }
 

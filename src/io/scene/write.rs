@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::{PartSource, Scene, formula};
+use super::{PartSource, Scene, ToolpathRequest, classic, formula, pocket};
 use crate::cutter::{Cutter, CutterShape};
-use crate::toolpath::{Along, FeedDirection, Step, Strategy};
+use crate::toolpath::{Along, FeedDirection, Links, Step, Strategy, StreamMethod, longest_link};
 
 /// A number as TOML takes it, rounded to 12 digits so that an angle that went through radians comes
 /// back as it was written.
@@ -13,7 +13,7 @@ pub(super) fn number(value: f64) -> String {
     format!("{rounded:?}")
 }
 
-fn text(value: &str) -> String {
+pub(super) fn text(value: &str) -> String {
     toml::Value::String(value.to_owned()).to_string()
 }
 
@@ -68,18 +68,21 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
         "junction_deviation = {}  # mm by which the control rounds corners",
         number(scene.machine.junction_deviation)
     )?;
+    writeln!(out, "jerk = {}  # mm/s3", number(scene.machine.jerk))?;
+    writeln!(out, "slow_corners = {}  # feeds of sharp bends in the program", scene.machine.slow_corners)?;
     writeln!(out, "clearance = {}  # mm of rapid moves above stock", number(scene.clearance))?;
     scene.toolpaths.iter().try_for_each(|request| {
         writeln!(out, "\n[[toolpath]]")?;
         writeln!(out, "name = {}", text(&request.name))?;
         writeln!(out, "strategy = {}", text(request.strategy_name()))?;
-        write_strategy(out, &request.strategy)?;
+        write_strategy(out, request)?;
         match request.step {
             Step::Scallop(height) => {
-                writeln!(out, "scallop = {}  # mm, steps are planned for it", number(height))
+                writeln!(out, "scallop = {}  # mm, steps are planned for it", number(height))?;
             }
-            Step::Stepover(width) => writeln!(out, "stepover = {}  # mm", number(width)),
+            Step::Stepover(width) => writeln!(out, "stepover = {}  # mm", number(width))?,
         }
+        write_joining(out, request, scene)
     })
 }
 
@@ -90,6 +93,7 @@ fn write_part(out: &mut String, part: &PartSource) -> std::fmt::Result {
             writeln!(out, "file = {}", text(&file.written))?;
             writeln!(out, "unit = {}", text(unit))
         }
+        PartSource::Pocket { outline, depth } => pocket::write_source(out, outline, *depth),
         PartSource::Nurbs { file } => {
             writeln!(out, "surface = \"nurbs\"")?;
             writeln!(out, "file = {}", text(&file.written))
@@ -159,16 +163,35 @@ fn write_holder(out: &mut String, scene: &Scene) -> std::fmt::Result {
     })
 }
 
-fn write_strategy(out: &mut String, strategy: &Strategy) -> std::fmt::Result {
-    match *strategy {
-        Strategy::Zigzag { angle, one_way } => {
-            writeln!(out, "angle = {}  # degrees from the x axis", number(angle.to_degrees()))?;
-            writeln!(out, "one_way = {one_way}")
+fn write_joining(out: &mut String, request: &ToolpathRequest, scene: &Scene) -> std::fmt::Result {
+    if request.strategy.pocket().is_some() {
+        return Ok(());
+    }
+    let joining = &request.joining;
+    match joining.links {
+        Links::Surface => {
+            writeln!(out, "links = \"surface\"  # where that is quicker than \"retract\"")?;
+            let longest = number(longest_link(joining, &scene.cutter, request.step));
+            match joining.longest_link {
+                Some(_) => writeln!(out, "longest_link = {longest}  # mm")?,
+                None => writeln!(out, "longest_link = \"auto\"  # {longest} mm")?,
+            }
         }
-        Strategy::IsoParametric { along: a } => writeln!(out, "along = \"{}\"", along(a)),
-        Strategy::Streamline { direction, control_points } => {
+        Links::Retract => writeln!(out, "links = \"retract\"")?,
+    }
+    writeln!(out, "smoothing = {}  # of the points of a pass, within the chord tolerance", joining.smoothing)
+}
+
+fn write_strategy(out: &mut String, request: &ToolpathRequest) -> std::fmt::Result {
+    match &request.strategy {
+        Strategy::Pocket(strategy) => pocket::write_strategy(out, strategy),
+        Strategy::ShortestStreamline => writeln!(out, "direction = \"shortest\""),
+        Strategy::Streamline { direction, control_points, method, solver } => {
             match direction {
-                FeedDirection::Parameter(a) => writeln!(out, "direction = \"{}\"", along(a))?,
+                _ if let Some(file) = &request.directions => {
+                    writeln!(out, "direction = \"file\"\ndirections = {}", text(&file.written))?;
+                }
+                FeedDirection::Parameter(a) => writeln!(out, "direction = \"{}\"", along(*a))?,
                 FeedDirection::Angle(angle) => {
                     writeln!(
                         out,
@@ -176,9 +199,26 @@ fn write_strategy(out: &mut String, strategy: &Strategy) -> std::fmt::Result {
                         number(angle.to_degrees())
                     )?;
                 }
-                FeedDirection::WidestStrip => writeln!(out, "direction = \"widest-strip\"")?,
+                FeedDirection::WidestStrip | FeedDirection::Samples(_) => {
+                    writeln!(out, "direction = \"widest-strip\"")?;
+                }
             }
-            writeln!(out, "control_points = {control_points}")
+            writeln!(out, "control_points = {control_points}")?;
+            match method {
+                StreamMethod::Automatic => return writeln!(out, "method = \"auto\""),
+                StreamMethod::Elements => return writeln!(out, "method = \"elements\""),
+                StreamMethod::Differences => {
+                    writeln!(
+                        out,
+                        "method = \"differences\"  # on three cells for each control point and side"
+                    )?;
+                }
+                StreamMethod::BSpline { degree, knots } => {
+                    writeln!(out, "method = \"bspline\"\ndegree = {degree}\nknots = {}", text(knots.name()))?;
+                }
+            }
+            writeln!(out, "solver = {}", text(solver.name()))
         }
+        classic_strategy => classic::write(out, classic_strategy),
     }
 }

@@ -10,6 +10,8 @@
 //! (Lindstrom and others 1996). A side is halved exactly when its bound exceeds the tolerance; both
 //! triangles at a side read the same bound, so that no crack can open.
 
+use std::cmp::Ordering;
+
 use super::Node;
 use super::ridge_points::{Line, RidgePoints};
 use super::split::{Corner, split};
@@ -48,6 +50,9 @@ pub(super) struct Network<'a> {
     width: usize,
     height: usize,
     bound: Vec<f32>,
+    /// How many ridge points the side carries whose middle is there; of no meaning where the bound is
+    /// infinite.
+    carried: Vec<u8>,
     /// Greatest finite bound.
     coarsest: f64,
 }
@@ -55,7 +60,10 @@ pub(super) struct Network<'a> {
 /// Room for the pieces of one triangle.
 #[derive(Default)]
 pub(super) struct Scratch {
+    /// Ridge points on the longest side, in the order of the triangle that looks at it.
+    longest: Vec<Corner>,
     outline: Vec<Corner>,
+    planes: Vec<Plane>,
     pub pieces: Vec<[Corner; 3]>,
 }
 
@@ -65,8 +73,9 @@ impl<'a> Network<'a> {
         let square = longest.next_power_of_two().min(MAX_SQUARE);
         let whole = |nodes: usize| (nodes - 1).div_ceil(square) * square + 1;
         let (width, height) = (whole(cut.grid.nx), whole(cut.grid.ny));
-        let bound = vec![0.0; width * height];
-        let mut network = Self { cut, ridges, floor, cap, square, width, height, bound, coarsest: 0.0 };
+        let (bound, carried) = (vec![0.0; width * height], vec![0; width * height]);
+        let mut network =
+            Self { cut, ridges, floor, cap, square, width, height, bound, carried, coarsest: 0.0 };
         // From the smallest triangles up, since a bound holds those below it.
         let mut size = 2;
         while size <= square {
@@ -95,18 +104,20 @@ impl<'a> Network<'a> {
         let found = crate::parallel::map(rows.len(), |k| {
             let mut scratch = Scratch::default();
             let columns = (start(k, rows[k])..this.width).step_by(size);
-            columns.map(|x| this.bound_at((x, rows[k]), size, &mut scratch)).collect::<Vec<f32>>()
+            columns.map(|x| this.bound_at((x, rows[k]), size, &mut scratch)).collect::<Vec<(f32, u8)>>()
         });
         for (k, row) in found.into_iter().enumerate() {
             let x0 = start(k, rows[k]);
-            for (n, bound) in row.into_iter().enumerate() {
-                self.bound[rows[k] * self.width + x0 + n * size] = bound;
+            for (n, (bound, carried)) in row.into_iter().enumerate() {
+                let at = rows[k] * self.width + x0 + n * size;
+                (self.bound[at], self.carried[at]) = (bound, carried);
             }
         }
     }
 
-    /// The bound at a middle: of the side of a square of `size` or of such a square.
-    fn bound_at(&self, (x, y): Node, size: usize, scratch: &mut Scratch) -> f32 {
+    /// The bound at a middle (of the side of a square of `size` or of such a square), and how many ridge
+    /// points the longest side through it carries.
+    fn bound_at(&self, (x, y): Node, size: usize, scratch: &mut Scratch) -> (f32, u8) {
         let half = size / 2;
         let of_square = x % size == half && y % size == half;
         let mut bound = 0f32;
@@ -123,7 +134,7 @@ impl<'a> Network<'a> {
             }
         }
         if f64::from(bound) > self.cap {
-            return f32::INFINITY;
+            return (f32::INFINITY, 0);
         }
         let triangles = if of_square {
             halves((x - half, y - half), size).map(Some)
@@ -140,14 +151,51 @@ impl<'a> Network<'a> {
             let inside = (ahead.0 < self.width && ahead.1 < self.height).then_some([ahead, a, b]);
             [inside, behind.map(|behind| [behind, b, a])]
         };
-        for corners in triangles.into_iter().flatten() {
-            bound = bound.max(self.misfit(corners, scratch));
+        let mut triangles = triangles.into_iter().flatten();
+        let Some(first) = triangles.next() else { return (bound, 0) };
+        let [_, a, b] = first;
+        if size == 2 && self.is_plain((x, y), of_square) {
+            // The middles of the other sides have their bounds.
+            let z = |node: Node| f64::from(self.cut.height[self.cut.grid.index(node.0, node.1)]);
+            let worst = (0.5 * (z(a) + z(b)) - z((x, y))).abs();
+            return (if worst > self.cap { f32::INFINITY } else { bound.max(worst as f32) }, 0);
         }
-        bound
+        scratch.longest.clear();
+        if a.0.max(b.0) < self.cut.grid.nx && a.1.max(b.1) < self.cut.grid.ny {
+            self.choose(a, b, &mut scratch.longest);
+        }
+        bound = bound.max(self.misfit(first, scratch));
+        if let Some(second) = triangles.next() {
+            scratch.longest.reverse();
+            bound = bound.max(self.misfit(second, scratch));
+        }
+        (bound, scratch.longest.len() as u8)
+    }
+
+    /// True where the two smallest triangles at a middle lie inside the grid and no ridge touches them.
+    fn is_plain(&self, (x, y): Node, of_square: bool) -> bool {
+        let grid = &self.cut.grid;
+        if x == 0 || y == 0 || x + 1 >= grid.nx || y + 1 >= grid.ny {
+            return false;
+        }
+        let crosses = |i: usize, j: usize, line: Line| self.ridges.crosses((i, j), line);
+        let (columns, rows) = ([x - 1, x], [y - 1, y]);
+        let through = |line: Line| columns.iter().any(|&i| rows.iter().any(|&j| crosses(i, j, line)));
+        if !of_square {
+            // A square on its corner: its sides are diagonals, and the middle's four lines lie within.
+            let along_x = columns.iter().any(|&i| crosses(i, y, Line::AlongX));
+            let along_y = rows.iter().any(|&j| crosses(x, j, Line::AlongY));
+            return !(along_x || along_y || through(Line::Diagonal));
+        }
+        let top = columns.iter().any(|&i| crosses(i, y + 1, Line::AlongX));
+        let right = rows.iter().any(|&j| crosses(x + 1, j, Line::AlongY));
+        let inside = [Line::AlongX, Line::AlongY, Line::Diagonal].into_iter().any(through);
+        !(inside || top || right)
     }
 
     /// Greatest vertical distance of a triangle from the centres and ridge points that it covers, mm;
-    /// infinite across the grid's border, where it must be halved down to the border.
+    /// infinite across the grid's border, where it must be halved down to the border. Its longest side
+    /// carries `scratch.longest`.
     fn misfit(&self, corners: [Node; 3], scratch: &mut Scratch) -> f32 {
         let grid = &self.cut.grid;
         let [columns, rows] = [corners.map(|c| c.0), corners.map(|c| c.1)];
@@ -159,41 +207,60 @@ impl<'a> Network<'a> {
         if x1 >= grid.nx || y1 >= grid.ny {
             return f32::INFINITY;
         }
-        self.pieces(corners, scratch);
-        let whole = scratch.pieces.len() == 1;
-        let mut worst = if whole { self.whole_misfit(corners, y0..=y1) } else { 0.0 };
+        let Scratch { longest, outline, pieces, planes } = scratch;
+        let [apex, a, b] = corners;
+        outline.clear();
+        pieces.clear();
+        outline.push(Corner { sides: 0b101, ..self.corner(apex) });
+        self.side(apex, a, 0b001, outline);
+        outline.push(Corner { sides: 0b011, ..self.corner(a) });
+        outline.extend(longest.iter().map(|point| Corner { sides: 0b010, ..*point }));
+        outline.push(Corner { sides: 0b110, ..self.corner(b) });
+        self.side(b, apex, 0b100, outline);
+        split(outline, pieces);
+        planes.clear();
+        planes.extend(pieces.iter().map(Plane::through));
+        let mut worst = match planes[..] {
+            [ref plane] => self.whole_misfit(corners, y0..=y1, plane),
+            _ => self.divided_misfit(pieces, planes),
+        };
         if worst > self.cap {
             return f32::INFINITY;
-        }
-        for piece in scratch.pieces.iter().filter(|_| !whole) {
-            let plane = Plane::through(piece);
-            let (low, high) = extent(piece.map(|c| c.y));
-            for j in (low - SAME_PLACE).ceil() as usize..=(high + SAME_PLACE).floor() as usize {
-                let Some((left, right)) = across(piece, j as f64) else { continue };
-                for i in (left - SAME_PLACE).ceil() as usize..=(right + SAME_PLACE).floor() as usize {
-                    let z = f64::from(self.cut.height[grid.index(i, j)]);
-                    worst = worst.max((plane.at(i as f64, j as f64) - z).abs());
-                }
-                if worst > self.cap {
-                    return f32::INFINITY;
-                }
-            }
         }
         for j in y0..=y1 {
             for point in self.ridges.of_cells(x0, x1, j) {
                 let (x, y) = point.place(j);
-                if let Some(piece) = scratch.pieces.iter().find(|piece| covers(piece, x, y)) {
-                    worst = worst.max((Plane::through(piece).at(x, y) - f64::from(point.z)).abs());
+                if let Some(k) = pieces.iter().position(|piece| covers(piece, x, y)) {
+                    worst = worst.max((planes[k].at(x, y) - f64::from(point.z)).abs());
                 }
             }
         }
         worst as f32
     }
 
+    /// Greatest vertical distance of the pieces of a triangle from the centres that they cover, or one
+    /// above the cap.
+    fn divided_misfit(&self, pieces: &[[Corner; 3]], planes: &[Plane]) -> f64 {
+        let mut worst = 0f64;
+        for (piece, plane) in pieces.iter().zip(planes) {
+            let (low, high) = extent(piece.map(|c| c.y));
+            for j in rounded_up(low - SAME_PLACE)..=(high + SAME_PLACE) as usize {
+                let Some((left, right)) = across(piece, j as f64) else { continue };
+                for i in rounded_up(left - SAME_PLACE)..=(right + SAME_PLACE) as usize {
+                    let z = f64::from(self.cut.height[self.cut.grid.index(i, j)]);
+                    worst = worst.max((plane.at(i as f64, j as f64) - z).abs());
+                }
+                if worst > self.cap {
+                    return worst;
+                }
+            }
+        }
+        worst
+    }
+
     /// Greatest vertical distance of a triangle that no ridge divides from the centres that it covers, or
     /// one above the cap. Its sides run along rows, columns and diagonals, so they meet rows at nodes.
-    fn whole_misfit(&self, corners: [Node; 3], rows: std::ops::RangeInclusive<usize>) -> f64 {
-        let plane = Plane::through(&corners.map(|node| self.corner(node)));
+    fn whole_misfit(&self, corners: [Node; 3], rows: std::ops::RangeInclusive<usize>, plane: &Plane) -> f64 {
         let nodes = corners.map(|(i, j)| (i as i64, j as i64));
         let mut worst = 0f64;
         for j in rows {
@@ -203,7 +270,7 @@ impl<'a> Network<'a> {
                 let (from, to) = (j as i64 - p.1, q.1 - p.1);
                 let met = if to == 0 { from == 0 } else { (0..=to.abs()).contains(&(from * to.signum())) };
                 if met {
-                    let x = p.0 + if to == 0 { 0 } else { (q.0 - p.0) * from / to };
+                    let x = p.0 + (q.0 - p.0).signum() * from.abs();
                     (left, right) = (left.min(x), right.max(x));
                 }
             }
@@ -223,7 +290,7 @@ impl<'a> Network<'a> {
 
     /// The pieces of a triangle whose `corners` begin at the right angle and run counter-clockwise.
     pub fn pieces(&self, corners: [Node; 3], scratch: &mut Scratch) {
-        let Scratch { outline, pieces } = scratch;
+        let Scratch { outline, pieces, .. } = scratch;
         outline.clear();
         pieces.clear();
         for k in 0..3 {
@@ -240,15 +307,49 @@ impl<'a> Network<'a> {
         Corner { x: i as f64, y: j as f64, z, vertex, on_ridge: false, sides: 0 }
     }
 
-    /// Adds the ridge points that the side from `a` to `b` carries, in that order.
+    /// Adds the ridge points that the side from `a` to `b` carries, in that order. The bound at its middle
+    /// is known, and finite.
     fn side(&self, a: Node, b: Node, side: u8, out: &mut Vec<Corner>) {
         let begin = out.len();
+        if is_long(a, b) {
+            let count = self.carried[self.middle(a, b)];
+            if count > 0 {
+                self.gather(a, b, usize::from(count), out);
+            }
+        } else {
+            self.choose(a, b, out);
+        }
+        out[begin..].iter_mut().for_each(|point| point.sides = side);
+    }
+
+    /// Chooses the ridge points that the side from `a` to `b` carries, and adds them in that order.
+    fn choose(&self, a: Node, b: Node, out: &mut Vec<Corner>) {
+        let begin = out.len();
+        let most = if is_long(a, b) { MOST_RIDGES } else { usize::MAX };
+        self.gather(a, b, most.saturating_add(1), out);
+        let points = &mut out[begin..];
+        if points.is_empty() {
+            return;
+        }
         // Both triangles at a side look at it from its left or lower end.
+        let (p, q) = if a < b { (a, b) } else { (b, a) };
+        if p != a {
+            points.reverse();
+        }
+        if points.len() > most || !self.worthwhile(p, q, points) {
+            out.truncate(begin);
+        } else if p != a {
+            points.reverse();
+        }
+    }
+
+    /// Adds the ridge points on a side from `a` to `b`, in that order, until they are `enough`.
+    fn gather(&self, a: Node, b: Node, enough: usize, out: &mut Vec<Corner>) {
+        let begin = out.len();
         let (p, q) = if a < b { (a, b) } else { (b, a) };
         let (dx, dy) = (q.0 - p.0, q.1.abs_diff(p.1));
         let falls = q.1 < p.1;
-        let length = dx.max(dy);
-        for k in 0..length {
+        for k in 0..dx.max(dy) {
             let (cell, line) = match (dx, dy) {
                 (_, 0) => ((p.0 + k, p.1), Line::AlongX),
                 (0, _) => ((p.0, p.1 + k), Line::AlongY),
@@ -259,26 +360,24 @@ impl<'a> Network<'a> {
             for (n, point) in points.iter().enumerate() {
                 let (x, y) = point.place(cell.1);
                 let vertex = self.cut.grid.len() + first + n;
-                out.push(Corner { x, y, z: f64::from(point.z), vertex, on_ridge: true, sides: side });
+                out.push(Corner { x, y, z: f64::from(point.z), vertex, on_ridge: true, sides: 0 });
             }
-            if length > 1 && out.len() - begin > MOST_RIDGES {
+            if out.len() - begin >= enough {
                 break;
             }
         }
-        let points = &out[begin..];
-        if points.is_empty() {
-            return;
-        }
-        let many = length > 1 && points.len() > MOST_RIDGES;
-        if many || !self.worthwhile(p, q, length, points) {
-            out.truncate(begin);
-        } else if p != a {
+        if p != a {
             out[begin..].reverse();
         }
     }
 
+    /// Index of the middle of a side.
+    fn middle(&self, a: Node, b: Node) -> usize {
+        (a.1 + b.1) / 2 * self.width + (a.0 + b.0) / 2
+    }
+
     /// True when a side comes closer to its centres and ridge points by carrying those points.
-    fn worthwhile(&self, p: Node, q: Node, length: usize, points: &[Corner]) -> bool {
+    fn worthwhile(&self, p: Node, q: Node, points: &[Corner]) -> bool {
         let (from, to) = (self.corner(p), self.corner(q));
         // Share of the side from its beginning, in cells.
         let along = |c: &Corner| (c.x - from.x).max((c.y - from.y).abs());
@@ -289,8 +388,11 @@ impl<'a> Network<'a> {
             without = without.max((between(&from, &to, along(point)) - point.z).abs());
         }
         let mut next = 0;
-        let step = |k: usize, from: usize, to: usize| {
-            if to >= from { from + (to - from) * k / length } else { from - (from - to) * k / length }
+        let length = p.0.abs_diff(q.0).max(p.1.abs_diff(q.1));
+        let step = |k: usize, from: usize, to: usize| match from.cmp(&to) {
+            Ordering::Less => from + k,
+            Ordering::Equal => from,
+            Ordering::Greater => from - k,
         };
         for k in 1..length {
             let (z, s) = (self.corner((step(k, p.0, q.0), step(k, p.1, q.1))).z, k as f64);
@@ -324,10 +426,10 @@ impl<'a> Network<'a> {
             return true;
         }
         let unit = (a.0 + b.0) % 2 == 1;
-        let middle = ((a.0 + b.0) / 2, (a.1 + b.1) / 2);
-        if unit || f64::from(self.bound[middle.1 * self.width + middle.0]) <= tolerance {
+        if unit || f64::from(self.bound[self.middle(a, b)]) <= tolerance {
             return emit(corners);
         }
+        let middle = ((a.0 + b.0) / 2, (a.1 + b.1) / 2);
         self.halve([middle, apex, a], tolerance, emit) && self.halve([middle, b, apex], tolerance, emit)
     }
 
@@ -349,10 +451,14 @@ impl<'a> Network<'a> {
 
     /// True when a tolerance takes more triangles.
     pub fn exceeds(&self, tolerance: f64, max_triangles: usize) -> bool {
-        let (mut count, mut scratch) = (0, Scratch::default());
+        let (mut count, mut points) = (0, Vec::new());
         self.visit(tolerance, &mut |corners| {
-            self.pieces(corners, &mut scratch);
-            count += scratch.pieces.len();
+            points.clear();
+            for k in 0..3 {
+                self.side(corners[k], corners[(k + 1) % 3], 0, &mut points);
+            }
+            // Each point on a side makes one triangle more.
+            count += 1 + points.len();
             count <= max_triangles
         });
         count > max_triangles
@@ -369,6 +475,17 @@ fn halves((x, y): Node, size: usize) -> [[Node; 3]; 2] {
     } else {
         [[north_east, north_west, south_east], [south_west, south_east, north_west]]
     }
+}
+
+/// True for a side longer than from cell to cell.
+fn is_long(a: Node, b: Node) -> bool {
+    a.0.abs_diff(b.0).max(a.1.abs_diff(b.1)) > 1
+}
+
+/// The least whole number from `value` up, 0 below: [`f64::ceil`] is a call on the plainest machines.
+fn rounded_up(value: f64) -> usize {
+    let below = value as usize;
+    below + usize::from((below as f64) < value)
 }
 
 fn extent(of: [f64; 3]) -> (f64, f64) {

@@ -17,6 +17,10 @@ const APART: f32 = 1.0 / 256.0;
 /// Lines that begin at a cell.
 const FAMILIES: u32 = 3;
 
+/// The points of a row are looked up from the nearest of every so many columns: with more the search
+/// is longer, with fewer the table is (4 bytes an entry).
+const STRIDE: usize = 16;
+
 /// A ridge on the line between two neighbouring centres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct RidgePoint {
@@ -29,9 +33,14 @@ pub(super) struct RidgePoint {
 }
 
 impl RidgePoint {
+    /// Column of the cell whose line it lies on.
+    fn column(&self) -> usize {
+        (self.key / FAMILIES) as usize
+    }
+
     /// Where it lies, in cells, when it stands in `row`.
     pub fn place(&self, row: usize) -> (f64, f64) {
-        let (i, t) = ((self.key / FAMILIES) as usize, f64::from(self.t));
+        let (i, t) = (self.column(), f64::from(self.t));
         let (x, y) = (i as f64, row as f64);
         match Line::of(self.key % FAMILIES) {
             Line::AlongX => (x + t, y),
@@ -79,6 +88,8 @@ pub(super) struct RidgePoints {
     first: Vec<usize>,
     /// A bit a family for every cell: whether there are points on that line.
     present: Vec<u8>,
+    /// Rank in its row of the first point from each [`STRIDE`]-th column on.
+    starts: Vec<u32>,
     nx: usize,
 }
 
@@ -116,13 +127,19 @@ impl RidgePoints {
     fn new(rows: Vec<Vec<RidgePoint>>, nx: usize) -> Self {
         let mut first = vec![0];
         let mut present = vec![0u8; nx * rows.len()];
+        let mut starts = Vec::with_capacity(nx.div_ceil(STRIDE) * rows.len());
         for (j, row) in rows.iter().enumerate() {
             first.push(first[j] + row.len());
+            let mut rank = 0;
+            for i in (0..nx).step_by(STRIDE) {
+                rank += row[rank..].iter().take_while(|p| p.column() < i).count();
+                starts.push(rank as u32);
+            }
             for point in row {
-                present[j * nx + (point.key / FAMILIES) as usize] |= 1 << (point.key % FAMILIES);
+                present[j * nx + point.column()] |= 1 << (point.key % FAMILIES);
             }
         }
-        Self { rows, first, present, nx }
+        Self { rows, first, present, starts, nx }
     }
 
     /// How many there are.
@@ -130,24 +147,40 @@ impl RidgePoints {
         self.first.last().copied().unwrap_or(0)
     }
 
+    /// True where a ridge crosses that line of a cell.
+    pub fn crosses(&self, (i, j): Node, line: Line) -> bool {
+        self.present[j * self.nx + i] & (1 << line as u8) != 0
+    }
+
     /// Those on one line of a cell, from its left or lower end, and the number of the first.
     pub fn on(&self, (i, j): Node, line: Line) -> (usize, &[RidgePoint]) {
-        if self.present[j * self.nx + i] & (1 << line as u8) == 0 {
+        if !self.crosses((i, j), line) {
             return (0, &[]);
         }
         let (row, key) = (&self.rows[j], FAMILIES * i as u32 + line as u32);
-        let from = row.partition_point(|p| p.key < key);
+        let start = self.start(i, j);
+        let from = start + row[start..].iter().take_while(|p| p.key < key).count();
         let count = row[from..].iter().take_while(|p| p.key == key).count();
         (self.first[j] + from, &row[from..from + count])
     }
 
     /// Those on all lines of the cells from `from` up to `to` of row `j`.
     pub fn of_cells(&self, from: usize, to: usize, j: usize) -> &[RidgePoint] {
-        let row = self.rows.get(j).map_or(&[][..], Vec::as_slice);
-        let at = |i: usize| row.partition_point(|p| ((p.key / FAMILIES) as usize) < i);
-        let begin = at(from);
-        let count = row[begin..].iter().take_while(|p| (p.key / FAMILIES) as usize <= to).count();
-        &row[begin..begin + count]
+        let bits = &self.present[j * self.nx..][from..(to + 1).min(self.nx)];
+        if bits.iter().all(|bits| *bits == 0) {
+            return &[];
+        }
+        let row = &self.rows[j];
+        let rank = |i: usize| {
+            let start = self.start(i.min(self.nx - 1), j);
+            start + row[start..].iter().take_while(|p| p.column() < i).count()
+        };
+        &row[rank(from)..rank(to + 1)]
+    }
+
+    /// Rank in row `j` of a point at or before the first of column `i`.
+    fn start(&self, i: usize, j: usize) -> usize {
+        self.starts[j * self.nx.div_ceil(STRIDE) + i / STRIDE] as usize
     }
 }
 

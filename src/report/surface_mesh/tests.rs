@@ -297,6 +297,28 @@ fn ridge_points_are_those_of_a_dense_search() {
 }
 
 #[test]
+fn points_of_some_cells_are_those_of_the_row_that_stand_there() {
+    let (cut, cutter, path, _) = oblique_passes(0.1);
+    let ridges = RidgePoints::find(&cut, &cutter, &path);
+    let nx = cut.grid.nx;
+    let mut rng = Rng::new(5);
+    for j in 0..cut.grid.ny {
+        let all = ridges.of_cells(0, nx, j);
+        let column = |p: &ridge_points::RidgePoint| p.place(j).0.floor() as usize;
+        for _ in 0..20 {
+            let from = rng.within(0.0, nx as f64) as usize;
+            let to = from + rng.within(0.0, if from.is_multiple_of(2) { 3.0 } else { 60.0 }) as usize;
+            let expected: Vec<_> = all.iter().filter(|p| (from..=to).contains(&column(p))).collect();
+            assert_eq!(ridges.of_cells(from, to, j).iter().collect::<Vec<_>>(), expected);
+            let lines =
+                [ridge_points::Line::AlongX, ridge_points::Line::AlongY, ridge_points::Line::Diagonal];
+            let on_lines: Vec<_> = lines.into_iter().flat_map(|line| ridges.on((from, j), line).1).collect();
+            assert_eq!(on_lines, ridges.of_cells(from, from, j).iter().collect::<Vec<_>>());
+        }
+    }
+}
+
+#[test]
 fn threads_do_not_change_the_mesh() {
     let (cut, cutter, path, _) = oblique_passes(0.1);
     let on = |threads: usize| {

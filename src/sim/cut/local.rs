@@ -25,9 +25,10 @@ pub(super) struct LocalMove<T> {
     /// Where the track begins and ends, from that point on: `low <= 0 <= high`.
     pub low: T,
     pub high: T,
-    /// Rise over plan-view length, `>= 0`, and the sine of the angle of rise.
+    /// Rise over plan-view length, `>= 0`, the sine of the angle of rise, and one over its cosine.
     pub slope: T,
     pub sin: T,
+    pub sec: T,
 }
 
 /// Where and how high the middle of a tile is.
@@ -58,6 +59,7 @@ impl<T: Real> LocalMove<T> {
             high: T::of(high),
             slope: T::of(if steep { 0.0 } else { track.slope }),
             sin: T::of(if steep { 0.0 } else { track.sin() }),
+            sec: T::of(if steep { 1.0 } else { 1.0 / track.cos }),
         };
         (local, steep)
     }
@@ -101,10 +103,13 @@ impl Name {
     }
 }
 
+/// Numbers of one move.
+const NUMBERS: usize = 10;
+
 /// Up to [`LANES`] moves, one array for each of their numbers.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Chunk<T> {
-    numbers: [[T; LANES]; 9],
+    numbers: [[T; LANES]; NUMBERS],
     names: [Name; LANES],
 }
 
@@ -140,7 +145,7 @@ impl<T: Real> MoveList<T> {
     #[inline(always)]
     pub fn push(&mut self, m: &LocalMove<T>, name: Name) {
         if self.len == LANES * self.chunks.len() {
-            self.chunks.push(Chunk { numbers: [[T::of(0.0); LANES]; 9], names: [Name(0); LANES] });
+            self.chunks.push(Chunk::empty());
         }
         self.len += 1;
         self.put(self.len - 1, m, name);
@@ -154,37 +159,16 @@ impl<T: Real> MoveList<T> {
         }
     }
 
-    /// Leaves the moves whose place in the list is wanted.
+    /// One bit for each lane of chunk `k` that holds a move.
     #[inline(always)]
-    pub fn retain(&mut self, wanted: impl Fn(usize) -> bool) {
-        let mut kept = 0;
-        for k in 0..self.len {
-            if !wanted(k) {
-                continue;
-            }
-            if kept < k {
-                let (m, name) = self.get(k);
-                self.put(kept, &m, name);
-            }
-            kept += 1;
-        }
-        self.len = kept;
+    pub fn lanes_in_use(&self, k: usize) -> u32 {
+        let count = (self.len - k * LANES).min(LANES);
+        u32::MAX >> (u32::BITS as usize - count)
     }
 
     #[inline(always)]
     fn put(&mut self, k: usize, m: &LocalMove<T>, name: Name) {
-        let (chunk, lane) = (&mut self.chunks[k / LANES], k % LANES);
-        let numbers = [m.x, m.y, m.z, m.ux, m.uy, m.low, m.high, m.slope, m.sin];
-        for (column, number) in chunk.numbers.iter_mut().zip(numbers) {
-            column[lane] = number;
-        }
-        chunk.names[lane] = name;
-    }
-
-    /// The name of move `k`.
-    #[inline(always)]
-    pub fn name(&self, k: usize) -> Name {
-        self.chunks[k / LANES].names[k % LANES]
+        self.chunks[k / LANES].set(k % LANES, m, name);
     }
 
     /// Move `k` and its name.
@@ -196,9 +180,24 @@ impl<T: Real> MoveList<T> {
 }
 
 impl<T: Real> Chunk<T> {
+    /// Of moves that only bound.
+    #[inline(always)]
+    pub fn empty() -> Self {
+        Self { numbers: [[T::of(0.0); LANES]; NUMBERS], names: [Name(BOUND_ONLY); LANES] }
+    }
+
+    #[inline(always)]
+    pub fn set(&mut self, lane: usize, m: &LocalMove<T>, name: Name) {
+        let numbers = [m.x, m.y, m.z, m.ux, m.uy, m.low, m.high, m.slope, m.sin, m.sec];
+        for (column, number) in self.numbers.iter_mut().zip(numbers) {
+            column[lane] = number;
+        }
+        self.names[lane] = name;
+    }
+
     #[inline(always)]
     pub fn lane(&self, lane: usize) -> LocalMove<T> {
-        let [x, y, z, ux, uy, low, high, slope, sin] = &self.numbers;
+        let [x, y, z, ux, uy, low, high, slope, sin, sec] = &self.numbers;
         LocalMove {
             x: x[lane],
             y: y[lane],
@@ -209,6 +208,7 @@ impl<T: Real> Chunk<T> {
             high: high[lane],
             slope: slope[lane],
             sin: sin[lane],
+            sec: sec[lane],
         }
     }
 

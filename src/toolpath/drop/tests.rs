@@ -325,3 +325,29 @@ fn no_cutter_cuts_into_a_vertical_wall_or_a_needle() {
         assert!((drops.at(5.0, 5.0).unwrap().contact.normal - Vector3::z()).norm() == 0.0);
     }
 }
+
+#[test]
+fn a_row_of_drops_gives_what_single_drops_give() {
+    let waves = height_field(14, 20.0, 0.3, |x, y| 2.0 * (0.9 * x).sin() * (0.7 * y).cos() + 0.2 * x);
+    let mut numbers = Numbers(9);
+    let noise = height_field(12, 14.0, 0.3, |_, _| 4.0 * numbers.next());
+    for mesh in [waves, noise] {
+        let bvh = Bvh::new(&mesh);
+        for cutter in cutters() {
+            let drops = dropper(&mesh, &bvh, &cutter);
+            let (mut beside, mut kept) = (Beside::default(), 0);
+            for k in 0..400 {
+                // Along a line over both borders; every tenth drop jumps, from far away and from no drop.
+                let s = 0.1 * f64::from(k) - 8.0;
+                let (x, y) = if k % 10 == 9 { (17.0 - s, 3.0 + 0.1 * s) } else { (s, 5.0 + 0.3 * s) };
+                let row = drops.at_beside(x, y, &mut beside).map(|d| d.tip_z);
+                let single = drops.at(x, y).map(|d| d.tip_z);
+                assert_eq!(row.is_some(), single.is_some(), "{cutter:?} at {x} {y}");
+                // From the other side of an edge the same contact is rounded otherwise.
+                assert!(row.zip(single).is_none_or(|(a, b)| (a - b).abs() < 1e-12), "{row:?} {single:?}");
+                kept += usize::from(row.is_some());
+            }
+            assert!((100..400).contains(&kept), "rows leave the part: {kept}");
+        }
+    }
+}

@@ -176,12 +176,14 @@ fn compare<F: Fn(f64, f64) -> [f64; 6] + Sync>(
     for cutter in cutters() {
         let drops = DropCutter::over(&graph.mesh, &bvh, &cutter, Some((graph, deviation)));
         let on_mesh = dropper(&graph.mesh, &bvh, &cutter);
-        let mut mesh_error = 0.0f64;
+        let (mut mesh_error, mut beside) = (0.0f64, Beside::default());
         for &[x, y] in places {
             let drop = drops.at(x, y).unwrap();
             let expected = rest(&cutter, x, y);
             let error = drop.tip_z - expected;
             assert!(error.abs() < 1e-9, "{name} {cutter:?} at {x} {y}: {error}");
+            let error = drops.at_beside(x, y, &mut beside).unwrap().tip_z - expected;
+            assert!(error.abs() < 1e-9, "after another drop, {name} {cutter:?} at {x} {y}: {error}");
             let p = drop.contact.point;
             let at = drop.contact.at.unwrap();
             assert!((graph.point(at.u, at.v) - p).norm() < 1e-12);

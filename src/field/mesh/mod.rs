@@ -1,0 +1,27 @@
+//! Fields on triangle meshes: surfaces with holes, several patches as one, plane regions.
+//!
+//! Enters: a mesh, directions at its vertices and the density of passes wanted there. Leaves: smooth
+//! line fields with their singular points, stream functions, and their level curves.
+
+mod levels;
+mod lines;
+mod recover;
+mod refine;
+mod sheets;
+mod sources;
+mod sparse;
+mod stream;
+mod surface;
+#[cfg(test)]
+mod tests;
+mod weld;
+
+pub use levels::{MeshCurve, MeshLevels, MeshPoint};
+pub use lines::{Line, SingularPoint, Wanted, blend, flows, orient_lines, singular_points, smooth_lines};
+pub use recover::vertex_gradients;
+pub use refine::Refined;
+pub use sheets::{Bend, Sheets};
+pub use sources::{Sense, borders, fixed_angle, guides, slope};
+pub use stream::{Flow, Held, MeshStream, solve_stream, triangle_gradients};
+pub use surface::{FieldMesh, MeshFieldError};
+pub use weld::weld;

@@ -1,0 +1,180 @@
+//! Sews the triangles of several patches together along the borders that they share.
+//!
+//! Each patch is cut into triangles on its own, so that along a common border the vertices of one lie
+//! between those of the other. Enters: points and triangles, a distance (mm) below which borders are
+//! one. Leaves: border vertices that lie that near to each other merged, and triangles split at those
+//! that lie on their sides.
+
+use std::collections::HashMap;
+
+use crate::geometry::{Aabb, Point3};
+
+/// What is left of a polygon after cutting off an ear must have this share of the polygon's area, or
+/// the rest would be a line.
+const LEAST_REST: f64 = 1e-6;
+
+/// Border edges in the cells of a coarse grid.
+struct Sides {
+    cell: f64,
+    cells: HashMap<[i64; 3], Vec<u32>>,
+}
+
+impl Sides {
+    fn new(points: &[Point3], sides: &[[u32; 2]], cell: f64) -> Self {
+        let mut grid = Self { cell, cells: HashMap::new() };
+        for (k, side) in sides.iter().enumerate() {
+            let mut bounds = Aabb::EMPTY;
+            side.iter().for_each(|&i| bounds.grow(&points[i as usize]));
+            let (lo, hi) = (grid.key(&bounds.min), grid.key(&bounds.max));
+            for x in lo[0]..=hi[0] {
+                for y in lo[1]..=hi[1] {
+                    for z in lo[2]..=hi[2] {
+                        grid.cells.entry([x, y, z]).or_default().push(k as u32);
+                    }
+                }
+            }
+        }
+        grid
+    }
+
+    fn key(&self, p: &Point3) -> [i64; 3] {
+        [p.x, p.y, p.z].map(|c| (c / self.cell).floor() as i64)
+    }
+
+    /// Sides that may come within a cell's size of `p`, ascending.
+    fn near(&self, p: &Point3) -> Vec<u32> {
+        let [x, y, z] = self.key(p);
+        let mut found: Vec<u32> = (0..27)
+            .filter_map(|k| self.cells.get(&[x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1]))
+            .flatten()
+            .copied()
+            .collect();
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+}
+
+/// Sews borders nearer than `distance` together. Merged vertices keep the place of the first of them;
+/// triangles that vanish are left out, and so are vertices that no triangle has.
+pub fn weld(points: &[Point3], triangles: &[[u32; 3]], distance: f64) -> (Vec<Point3>, Vec<[u32; 3]>) {
+    let mut used: HashMap<(u32, u32), u32> = HashMap::new();
+    let directed = |t: &[u32; 3]| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
+    for (a, b) in triangles.iter().flat_map(directed) {
+        *used.entry((a.min(b), a.max(b))).or_default() += 1;
+    }
+    let borders: Vec<[u32; 2]> = triangles
+        .iter()
+        .flat_map(directed)
+        .filter(|&(a, b)| used[&(a.min(b), a.max(b))] == 1)
+        .map(|(a, b)| [a, b])
+        .collect();
+    if borders.is_empty() || distance <= 0.0 {
+        return (points.to_vec(), triangles.to_vec());
+    }
+    let mean = borders.iter().map(|[a, b]| (points[*a as usize] - points[*b as usize]).norm()).sum::<f64>()
+        / borders.len() as f64;
+    let grid = Sides::new(points, &borders, mean.max(2.0 * distance));
+    let mut vertices: Vec<u32> = borders.iter().flatten().copied().collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    // First merge ends that meet, then see which of the rest lie on sides.
+    let mut head: Vec<u32> = (0..points.len() as u32).collect();
+    for &v in &vertices {
+        let p = points[v as usize];
+        let ends = grid.near(&p).into_iter().flat_map(|k| borders[k as usize]);
+        let near = ends.filter(|&w| w < v && (points[w as usize] - p).norm() <= distance);
+        let joined_already = |w: &u32| used.contains_key(&(*w.min(&v), *w.max(&v)));
+        let nearest = near
+            .filter(|w| !joined_already(w))
+            .min_by(|&a, &b| (points[a as usize] - p).norm().total_cmp(&(points[b as usize] - p).norm()));
+        if let Some(w) = nearest {
+            head[v as usize] = root(&head, w);
+        }
+    }
+    let heads: Vec<u32> = (0..head.len() as u32).map(|v| root(&head, v)).collect();
+    // Vertices on each border edge, named by its ends after merging.
+    let mut on_side: HashMap<(u32, u32), Vec<(f64, u32)>> = HashMap::new();
+    for &v in vertices.iter().filter(|&&v| heads[v as usize] == v) {
+        let p = points[v as usize];
+        for k in grid.near(&p) {
+            let [a, b] = borders[k as usize].map(|i| heads[i as usize]);
+            if a == b || a == v || b == v {
+                continue;
+            }
+            let (from, to) = (points[a as usize], points[b as usize]);
+            let d = to - from;
+            let s = (p - from).dot(&d) / d.norm_squared();
+            if s > 0.0 && s < 1.0 && (p - (from + d * s)).norm() <= distance {
+                on_side.entry((a, b)).or_default().push((s, v));
+            }
+        }
+    }
+    for list in on_side.values_mut() {
+        list.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        list.dedup_by_key(|x| x.1);
+    }
+    let mut sewn = Vec::with_capacity(triangles.len());
+    for corners in triangles {
+        let [a, b, c] = corners.map(|i| heads[i as usize]);
+        if a == b || b == c || c == a {
+            continue;
+        }
+        let mut polygon = Vec::new();
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            polygon.push(from);
+            polygon.extend(on_side.get(&(from, to)).into_iter().flatten().map(|x| x.1));
+        }
+        cut_ears(points, polygon, &mut sewn);
+    }
+    compact(points, sewn)
+}
+
+fn root(head: &[u32], mut v: u32) -> u32 {
+    while head[v as usize] != v {
+        v = head[v as usize];
+    }
+    v
+}
+
+/// Cuts a polygon, convex but for rounding, into triangles, the best-shaped ears first.
+fn cut_ears(points: &[Point3], mut polygon: Vec<u32>, out: &mut Vec<[u32; 3]>) {
+    let area = |polygon: &[u32]| {
+        let p = |k: usize| points[polygon[k] as usize];
+        let sum: crate::geometry::Vector3 =
+            (1..polygon.len() - 1).map(|k| (p(k) - p(0)).cross(&(p(k + 1) - p(0)))).sum();
+        sum.norm()
+    };
+    let whole = area(&polygon);
+    while polygon.len() > 3 {
+        let n = polygon.len();
+        let quality = |k: usize| {
+            let ear = [polygon[(k + n - 1) % n], polygon[k], polygon[(k + 1) % n]];
+            let mut rest = polygon.clone();
+            rest.remove(k);
+            let [a, b, c] = ear.map(|i| points[i as usize]);
+            let longest2 = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
+            let shape = area(&ear) / longest2;
+            if area(&rest) > LEAST_REST * whole { shape } else { -1.0 }
+        };
+        let best = (0..n).map(|k| (quality(k), k)).max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
+        let Some((_, k)) = best else { return };
+        out.push([polygon[(k + n - 1) % n], polygon[k], polygon[(k + 1) % n]]);
+        polygon.remove(k);
+    }
+    out.push([polygon[0], polygon[1], polygon[2]]);
+}
+
+/// Leaves out vertices without triangles.
+pub(super) fn compact(points: &[Point3], mut triangles: Vec<[u32; 3]>) -> (Vec<Point3>, Vec<[u32; 3]>) {
+    let mut number = vec![u32::MAX; points.len()];
+    let mut kept = Vec::new();
+    for v in triangles.iter_mut().flatten() {
+        if number[*v as usize] == u32::MAX {
+            number[*v as usize] = kept.len() as u32;
+            kept.push(points[*v as usize]);
+        }
+        *v = number[*v as usize];
+    }
+    (kept, triangles)
+}

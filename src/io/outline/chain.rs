@@ -1,0 +1,103 @@
+//! Open polylines joined to closed ones where their ends meet within [`JOIN_TOLERANCE`].
+
+use super::{Drawn, JOIN_TOLERANCE, OutlineError};
+use crate::geometry::Point2;
+
+/// Gaps below this, mm, are rounding of the file and not worth a note.
+const ROUNDING: f64 = 1.0e-6;
+
+fn gap(a: &Point2, b: &Point2) -> f64 {
+    (a - b).norm()
+}
+
+/// All as closed outlines.
+///
+/// # Errors
+/// [`OutlineError`] where an end meets no other, with its place and the nearest other end.
+pub fn join(drawn: Vec<Drawn>, notes: &mut Vec<String>) -> Result<Vec<Drawn>, OutlineError> {
+    let mut closed = Vec::new();
+    let mut open: Vec<Drawn> = Vec::new();
+    for mut d in drawn {
+        d.points.dedup();
+        if d.points.len() > 1
+            && !d.closed
+            && gap(&d.points[0], &d.points[d.points.len() - 1]) <= JOIN_TOLERANCE
+            && d.points.len() > 3
+        {
+            d.points.pop();
+            d.closed = true;
+        }
+        match (d.closed, d.points.len()) {
+            (true, _) => closed.push(d),
+            (false, 0 | 1) => notes.push(format!("{} has no length and is left out", d.name())),
+            (false, _) => open.push(d),
+        }
+    }
+    let (mut joined, mut widest) = (0usize, 0.0f64);
+    while let Some(mut chain) = (!open.is_empty()).then(|| open.remove(0)) {
+        let first = chain.points[0];
+        loop {
+            let end = chain.points[chain.points.len() - 1];
+            // Of all ends within the tolerance the nearest; its own beginning closes the chain.
+            let ends = open.iter().enumerate().flat_map(|(k, d)| {
+                [(gap(&end, &d.points[0]), k, false), (gap(&end, &d.points[d.points.len() - 1]), k, true)]
+            });
+            let next = ends.fold(None, |best: Option<(f64, usize, bool)>, e| match best {
+                Some(b) if b.0 <= e.0 => Some(b),
+                _ => Some(e),
+            });
+            let to_first = gap(&end, &first);
+            let near = next.filter(|n| n.0 <= JOIN_TOLERANCE);
+            if chain.points.len() > 2 && to_first <= JOIN_TOLERANCE && near.is_none_or(|n| to_first <= n.0) {
+                widest = widest.max(to_first);
+                chain.points.pop();
+                chain.closed = true;
+                break;
+            }
+            let Some((distance, k, backwards)) = near else {
+                let nearest = next.map_or_else(
+                    || format!("its other end is {to_first:.4} mm away"),
+                    |n| {
+                        let at = if n.2 {
+                            open[n.1].points[open[n.1].points.len() - 1]
+                        } else {
+                            open[n.1].points[0]
+                        };
+                        if n.0 < to_first {
+                            format!(
+                                "the nearest other end, of {} at x {:.4} y {:.4}, is {:.4} mm away",
+                                open[n.1].name(),
+                                at.x,
+                                at.y,
+                                n.0
+                            )
+                        } else {
+                            format!(
+                                "its other end, at x {:.4} y {:.4}, is {to_first:.4} mm away",
+                                first.x, first.y
+                            )
+                        }
+                    },
+                );
+                return Err(OutlineError::at(
+                    chain.line,
+                    format!(
+                        "{}: the outline is open at x {:.4} y {:.4}; {nearest}, and ends within {JOIN_TOLERANCE} mm are joined",
+                        chain.entity, end.x, end.y
+                    ),
+                ));
+            };
+            let mut piece = open.remove(k).points;
+            if backwards {
+                piece.reverse();
+            }
+            (joined, widest) = (joined + 1, widest.max(distance));
+            chain.points.extend(piece.into_iter().skip(1));
+        }
+        closed.push(chain);
+    }
+    if widest > ROUNDING {
+        notes.push(format!("{joined} open pieces of outlines were joined over gaps of up to {widest:.4} mm"));
+    }
+    Ok(closed)
+}

@@ -1,0 +1,154 @@
+//! Outlines of plane regions from drawings.
+//!
+//! Enters: a DXF file (text) or an SVG file. Leaves: closed polylines in mm, y up, and the entity that
+//! each came from. Curves are flattened within a chord tolerance; open chains are joined where ends lie
+//! within [`JOIN_TOLERANCE`]. Nothing is left out in silence: what cannot be an outline is refused with
+//! file, line and place, or named in a note.
+
+mod chain;
+mod curve;
+mod dxf;
+mod svg;
+#[cfg(test)]
+mod tests;
+
+use std::path::Path;
+
+use crate::geometry::{Point2, Region, RegionError};
+
+/// Ends of open chains that lie no farther apart are joined, mm. Drawings are exact to four decimals as a
+/// rule; much more would close gaps that were meant, or join neighbours.
+pub const JOIN_TOLERANCE: f64 = 0.01;
+
+/// Largest drawing that is read, bytes.
+pub const MAX_BYTES: u64 = 64 << 20;
+
+/// Kind of a drawing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OutlineFormat {
+    /// AutoCAD DXF as text.
+    Dxf,
+    /// Scalable Vector Graphics.
+    Svg,
+}
+
+/// How a drawing is read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OutlineOptions {
+    /// Largest distance between a curve and its chords, mm.
+    pub chord_tolerance: f64,
+    /// One unit of the drawing in mm; `None`: as the file says (a DXF without units is in mm, an SVG
+    /// without them has 96 to the inch).
+    pub scale: Option<f64>,
+    /// Only entities of this layer (DXF), or within the element of this id or Inkscape label (SVG).
+    pub layer: Option<String>,
+}
+
+/// Why a drawing holds no outlines.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{}{what}", line.map_or_else(String::new, |line| format!("line {line}: ")))]
+pub struct OutlineError {
+    /// Line of the file, counted from 1, where there is one to name.
+    pub line: Option<usize>,
+    /// What is wrong, where, and what would help.
+    pub what: String,
+}
+
+impl OutlineError {
+    fn at(line: usize, what: impl Into<String>) -> Self {
+        Self { line: Some(line), what: what.into() }
+    }
+
+    fn new(what: impl Into<String>) -> Self {
+        Self { line: None, what: what.into() }
+    }
+}
+
+/// A polyline of a drawing, mm.
+#[derive(Debug, Clone, PartialEq)]
+struct Drawn {
+    points: Vec<Point2>,
+    /// Whether the drawing says that the last point is joined to the first.
+    closed: bool,
+    /// Its line in the file and its kind (`LINE`, `circle`).
+    line: usize,
+    entity: String,
+}
+
+impl Drawn {
+    fn name(&self) -> String {
+        format!("{} (line {})", self.entity, self.line)
+    }
+}
+
+/// The closed outlines of a drawing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outlines {
+    /// The region that they bound: outlines, islands in them, outlines in those.
+    pub region: Region,
+    /// What was left out or joined, in words.
+    pub notes: Vec<String>,
+}
+
+/// Reads a drawing.
+///
+/// # Errors
+/// [`OutlineError`].
+pub fn read(path: &Path, format: OutlineFormat, options: &OutlineOptions) -> Result<Outlines, OutlineError> {
+    use std::io::Read as _;
+    let unreadable = |e: std::io::Error| OutlineError::new(e.to_string());
+    let mut bytes = Vec::new();
+    let file = std::fs::File::open(path).map_err(unreadable)?;
+    file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(OutlineError::new(format!("it is larger than {} MiB", MAX_BYTES >> 20)));
+    }
+    parse(&bytes, format, options)
+}
+
+/// Outlines from the bytes of a drawing.
+///
+/// # Errors
+/// [`OutlineError`].
+pub fn parse(
+    bytes: &[u8],
+    format: OutlineFormat,
+    options: &OutlineOptions,
+) -> Result<Outlines, OutlineError> {
+    let mut notes = Vec::new();
+    let drawn = match format {
+        OutlineFormat::Dxf => dxf::parse(bytes, options, &mut notes)?,
+        OutlineFormat::Svg => svg::parse(bytes, options, &mut notes)?,
+    };
+    if drawn.is_empty() {
+        let place = options.layer.as_ref().map_or_else(String::new, |layer| format!(" on \"{layer}\""));
+        return Err(OutlineError::new(format!("it has no outlines{place}")));
+    }
+    let closed = chain::join(drawn, &mut notes)?;
+    let names: Vec<String> = closed.iter().map(Drawn::name).collect();
+    let curves = closed.into_iter().map(|d| d.points).collect();
+    let (region, _) = Region::nested(curves).map_err(|e| blame(&e, &names))?;
+    Ok(Outlines { region, notes })
+}
+
+fn blame(error: &RegionError, names: &[String]) -> OutlineError {
+    let name = |k: usize| names.get(k).map_or("an outline", String::as_str);
+    OutlineError::new(match *error {
+        RegionError::Coordinate { curve, .. }
+        | RegionError::NoArea { curve }
+        | RegionError::SelfCrossing { curve, .. } => format!("{}: {error}", name(curve)),
+        RegionError::Crossing { curves: [a, b], at } => {
+            format!(
+                "{} and {} meet at x {:.4} y {:.4}; outlines and islands must stay apart",
+                name(a),
+                name(b),
+                at.x,
+                at.y
+            )
+        }
+        RegionError::Duplicate { curves: [a, b] } => {
+            format!("{} and {} are the same outline; delete one", name(a), name(b))
+        }
+        RegionError::Empty | RegionError::TooManyPoints(_) => error.to_string(),
+    })
+}

@@ -1,0 +1,157 @@
+use super::*;
+use proptest::prelude::*;
+use std::f64::consts::PI;
+
+fn options() -> OutlineOptions {
+    OutlineOptions { chord_tolerance: 1e-3, scale: None, layer: None }
+}
+
+fn dxf(entities: &str) -> String {
+    let text = format!(
+        "0 SECTION 2 HEADER 9 $INSUNITS 70 4 0 ENDSEC 0 SECTION 2 ENTITIES {entities} 0 ENDSEC 0 EOF"
+    );
+    text.split_whitespace().collect::<Vec<_>>().join("\n")
+}
+
+fn from_dxf(entities: &str) -> Result<Outlines, OutlineError> {
+    parse(dxf(entities).as_bytes(), OutlineFormat::Dxf, &options())
+}
+
+fn svg(body: &str) -> Result<Outlines, OutlineError> {
+    let text = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"100mm\" height=\"50mm\" viewBox=\"0 0 200 100\">{body}</svg>"
+    );
+    parse(text.as_bytes(), OutlineFormat::Svg, &options())
+}
+
+fn near(outlines: Result<Outlines, OutlineError>, area: f64) {
+    let found = outlines.unwrap().region.area();
+    // Chords within a micrometre of curves of at most some 400 mm in length.
+    assert!((found - area).abs() < 0.4, "{found} {area}");
+}
+
+#[test]
+fn every_kind_of_dxf_entity_has_the_area_of_its_closed_form() {
+    near(from_dxf("0 CIRCLE 8 0 10 5 20 6 40 10"), 100.0 * PI);
+    near(from_dxf("0 ELLIPSE 8 0 10 0 20 0 11 20 21 0 40 0.5"), 200.0 * PI);
+    // A stadium: lines and half circles by bulges, and by lines and arcs in any order and sense.
+    let stadium = 400.0 + 100.0 * PI;
+    near(
+        from_dxf("0 LWPOLYLINE 8 0 90 4 70 1 10 0 20 0 10 20 20 0 42 1 10 20 20 20 10 0 20 20 42 1"),
+        stadium,
+    );
+    near(
+        from_dxf(
+            "0 POLYLINE 8 0 70 1 0 VERTEX 10 0 20 0 0 VERTEX 10 20 20 0 42 1 0 VERTEX 10 20 20 20 0 VERTEX 10 0 20 20 42 1 0 SEQEND",
+        ),
+        stadium,
+    );
+    near(
+        from_dxf(
+            "0 LINE 8 0 10 0 20 0 11 20 21 0 0 ARC 8 0 10 0 20 10 40 10 50 90 51 270 0 LINE 8 0 10 0 20 20 11 20 21 20.004 0 ARC 8 0 10 20 20 10 40 10 50 270 51 90",
+        ),
+        stadium,
+    );
+    // A half circle seen from below lies on the other side of the y axis.
+    let below =
+        from_dxf("0 ARC 8 0 10 10 20 0 40 5 50 0 51 180 230 -1 0 LINE 8 0 10 -5 20 0 11 -15 21 0").unwrap();
+    assert!((below.region.area() - 12.5 * PI).abs() < 0.05);
+    assert!(below.region.bounds().unwrap()[1].x <= -5.0 + 1e-9);
+    // A full circle as a rational quadratic spline of nine control points.
+    let w = 0.5f64.sqrt();
+    let corners = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1), (1, 0)];
+    let control: String = corners
+        .iter()
+        .enumerate()
+        .map(|(k, (x, y))| format!(" 41 {} 10 {} 20 {}", if k % 2 == 0 { 1.0 } else { w }, 10 * x, 10 * y))
+        .collect();
+    let knots: String = [0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4].iter().map(|k| format!(" 40 {k}")).collect();
+    near(from_dxf(&format!("0 SPLINE 8 0 70 1 71 2{knots}{control}")), 100.0 * PI);
+}
+
+#[test]
+fn every_kind_of_svg_element_has_the_area_of_its_closed_form() {
+    // One unit is half a millimetre.
+    near(svg("<circle cx='50' cy='50' r='20'/>"), 100.0 * PI);
+    near(svg("<ellipse cx='50' cy='50' rx='20' ry='10' transform='rotate(30) scale(1 -1)'/>"), 50.0 * PI);
+    near(svg("<rect x='5' y='5' width='80' height='40' rx='10'/>"), 800.0 - (4.0 - PI) * 25.0);
+    near(svg("<polygon points='0,0 80,0 80,40'/>"), 400.0);
+    near(
+        svg(
+            "<g transform='translate(3 4)'><path d='m 0 0 h 40 a 20 20 0 0 1 0 40 h -40 A 20 20 0 0 1 0 0 z'/></g>",
+        ),
+        400.0 + 100.0 * PI,
+    );
+    // A cubic whose area follows from its control polygon: 3/20 of it and so on; here 0.6 of the square.
+    near(svg("<path d='M0 0 C 0 40 40 40 40 0 Z'/>"), 0.6 * 400.0);
+    near(svg("<path d='M0 0 Q 20 40 40 0 Z'/>"), 400.0 / 3.0);
+    near(svg("<path d='M0 0 H80 V60 H0 Z M20 20 v20 h20 v-20 z'/>"), 1100.0);
+    let flipped = svg("<rect width='10' height='20'/>").unwrap().region.bounds().unwrap();
+    assert_eq!(flipped, [Point2::new(0.0, 40.0), Point2::new(5.0, 50.0)], "y runs up from the lower edge");
+}
+
+#[test]
+fn units_and_layers_are_those_of_the_file_or_of_the_scene() {
+    let square = "0 LWPOLYLINE 8 cut 90 4 70 1 10 0 20 0 10 2 20 0 10 2 20 2 10 0 20 2 0 CIRCLE 8 marks 10 9 20 9 40 1";
+    let inches = dxf(square).replace("$INSUNITS\n70\n4", "$INSUNITS\n70\n1");
+    let wanted = OutlineOptions { layer: Some("cut".into()), ..options() };
+    let area = |options: &OutlineOptions| {
+        parse(inches.as_bytes(), OutlineFormat::Dxf, options).unwrap().region.area()
+    };
+    assert!((area(&wanted) - 4.0 * 25.4 * 25.4).abs() < 1e-9);
+    assert_eq!(area(&OutlineOptions { scale: Some(1.0), ..wanted }), 4.0);
+    let missing = OutlineOptions { layer: Some("cuts".into()), ..options() };
+    let error = parse(inches.as_bytes(), OutlineFormat::Dxf, &missing).unwrap_err().to_string();
+    assert!(error.contains("\"cut\", \"marks\""), "{error}");
+}
+
+#[test]
+fn what_is_wrong_is_told_with_its_place() {
+    let says = |r: Result<Outlines, OutlineError>, words: &[&str]| {
+        let text = r.unwrap_err().to_string();
+        assert!(words.iter().all(|w| text.contains(w)), "{text}");
+    };
+    says(
+        from_dxf("0 LINE 8 0 10 0 20 0 11 20 21 0 0 LINE 8 0 10 20 20 0 11 20 21 20"),
+        &["line 15", "LINE", "open at x 20", "28.2843 mm"],
+    );
+    says(
+        from_dxf("0 LWPOLYLINE 8 0 70 1 10 0 20 0 10 9 20 9 10 9 20 0 10 0 20 8"),
+        &["LWPOLYLINE (line 15)", "crosses itself at x 4.2353 y 4.2353"],
+    );
+    says(
+        from_dxf("0 CIRCLE 8 0 10 0 20 0 40 5 0 CIRCLE 8 0 10 6 20 0 40 5"),
+        &["CIRCLE (line 15) and CIRCLE (line 25) meet at x 2.99"],
+    );
+    says(from_dxf("0 CIRCLE 8 0 10 0 20 0 40 5 0 CIRCLE 8 0 10 0 20 0 40 5"), &["same outline"]);
+    says(from_dxf("0 CIRCLE 8 0 10 nan 20 0 40 5"), &["line 19", "not a finite number"]);
+    says(from_dxf("0 CIRCLE 8 0 10 1e300 20 0 40 5"), &["CIRCLE (line 15)", "1e6"]);
+    says(from_dxf("0 CIRCLE 8 0 10 0 20 0 40 -5"), &["radius is -5"]);
+    says(from_dxf("0 INSERT 8 0 2 block"), &["explode"]);
+    says(from_dxf("0 TEXT 8 0 1 hello"), &["no outlines"]);
+    says(from_dxf("0 SPLINE 8 0 71 3 40 0 10 0 20 0"), &["SPLINE", "degree 3 needs more than 1"]);
+    says(parse(b"solid cube", OutlineFormat::Dxf, &options()), &["line 1", "no group code"]);
+    says(svg("<path d='M0 0 L10 0 L10 10'/>"), &["line 1", "open at x 5.0000 y 45.0000"]);
+    says(svg("<path id='p' d='M0 0 L10 zz'/>"), &["path \"p\""]);
+    says(svg("<use href='#a'/>"), &["convert them to paths"]);
+    says(parse(b"<svg><g></svg>", OutlineFormat::Svg, &options()), &["not valid XML"]);
+    says(svg("<text>hello</text>"), &["no outlines"]);
+}
+
+proptest! {
+    /// Mutated drawings are read or refused, never a panic.
+    #[test]
+    fn mutated_drawings_never_panic(at in 0..4000usize, byte: u8, cut in 0..4000usize, which in 0..2usize) {
+        let drawing = [
+            dxf("0 LWPOLYLINE 8 0 90 4 70 1 10 0 20 0 10 20 20 0 42 1 10 20 20 20 10 0 20 20 42 1 0 SPLINE 8 0 71 1 40 0 40 0 40 1 40 2 40 2 10 5 20 5 10 8 20 5 10 8 20 8 0 LINE 10 8 20 8 11 5 21 5"),
+            "<svg width='9mm' viewBox='0 0 9 9'><g transform='scale(2)'><path d='M1 1 C 2 3 4 5 6 7 A 1 2 3 0 1 4 5 Q 1 2 3 4 T 5 6 z'/><rect width='3' height='4' rx='1'/></g></svg>".to_owned(),
+        ];
+        let format = [OutlineFormat::Dxf, OutlineFormat::Svg][which];
+        let mut bytes = drawing[which].clone().into_bytes();
+        let n = bytes.len();
+        bytes[at % n] = byte;
+        let _ = parse(&bytes, format, &options());
+        bytes.truncate(cut % n);
+        let _ = parse(&bytes, format, &options());
+    }
+}

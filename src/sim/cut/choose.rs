@@ -1,0 +1,387 @@
+//! Which of many moves may be lowest somewhere in a square of cells (see the bound in `cut.rs`).
+//!
+//! Enters: a list of moves and up to four squares. Leaves: one bit for each move and square. Squares are
+//! worked on side by side, because each step of one waits for the step before it.
+
+use super::local::{Chunk, LANES, LocalMove, MoveList};
+use super::sweep::Sweep;
+use crate::lanes::Real;
+
+/// Most squares that choose together.
+pub(super) const SQUARES: usize = 4;
+
+/// A square of cells: its middle in the tile's frame, and the distance from there to its outermost
+/// cell centres.
+#[derive(Clone, Copy)]
+pub(super) struct Square<T> {
+    pub x: T,
+    pub y: T,
+    pub half_x: T,
+    pub half_y: T,
+}
+
+/// Planes below the moves of a chunk, at the middle of a square.
+#[derive(Clone, Copy)]
+struct Planes<T> {
+    z: [T; LANES],
+    x: [T; LANES],
+    y: [T; LANES],
+    /// Squared distance from the track.
+    away: [T; LANES],
+}
+
+impl<T: Real> Planes<T> {
+    fn none() -> Self {
+        let zero = [T::of(0.0); LANES];
+        Self { z: zero, x: zero, y: zero, away: zero }
+    }
+
+    /// Heights at the corners of a square, raised by a margin.
+    #[inline(always)]
+    fn corners(&self, lane: usize, square: &Square<T>, margin: T) -> [T; 4] {
+        let (dx, dy) = (self.x[lane] * square.half_x, self.y[lane] * square.half_y);
+        let z = self.z[lane] + margin;
+        [z - dx - dy, z + dx - dy, z - dx + dy, z + dx + dy]
+    }
+}
+
+/// Most moves that are compared each with each. Comparing more costs more than it saves.
+const MOST_JUDGES: usize = 2 * LANES;
+
+/// So few moves go down to the leaves without further tests.
+pub(super) const FEW: usize = 3;
+
+/// Room to choose in, kept from one call to the next.
+pub(super) struct Chooser<T> {
+    planes: Vec<[Planes<T>; SQUARES]>,
+    neighbours: Vec<[Neighbours; SQUARES]>,
+}
+
+impl<T: Real> Chooser<T> {
+    pub fn new() -> Self {
+        Self { planes: Vec::new(), neighbours: Vec::new() }
+    }
+
+    /// Marks for each square those of `all` that may be lowest somewhere in it and below its stock, and
+    /// counts them. `margin` is added to every bound.
+    #[inline(always)]
+    pub fn choose<S: Sweep<T>, const Q: usize>(
+        &mut self,
+        sweep: &S,
+        all: &MoveList<T>,
+        squares: &[Square<T>; Q],
+        stocks: &[T; Q],
+        margin: T,
+        chosen: &mut Vec<[u32; SQUARES]>,
+    ) -> [usize; SQUARES] {
+        let chunks = all.chunks();
+        if self.planes.len() < chunks.len() {
+            self.planes.resize(chunks.len(), [Planes::none(); SQUARES]);
+            self.neighbours.resize(chunks.len(), [Neighbours::default(); SQUARES]);
+        }
+        let infinite = T::of(f64::INFINITY);
+        let mut best = [Best { least: [infinite; LANES], chunk: [0; LANES] }; Q];
+        for (k, (chunk, (planes, neighbours))) in
+            chunks.iter().zip(self.planes.iter_mut().zip(&mut self.neighbours)).enumerate()
+        {
+            let followed = followed(chunk, chunks.get(k + 1));
+            for q in 0..Q {
+                (planes[q], neighbours[q]) = planes_of(sweep, chunk, &squares[q], followed);
+                best[q].include(k, chunk, &planes[q], covered_within(sweep, &squares[q]));
+            }
+        }
+        let best = best.map(|b| b.place());
+        let ceilings = ceilings(sweep, all, &best, squares);
+        let reach2 = squares.map(|s| {
+            let reach = sweep.radius() + half_diagonal(&s);
+            reach * reach
+        });
+        chosen.clear();
+        let mut kept = [0; SQUARES];
+        let mut before = [Neighbours::default(); Q];
+        for (k, (planes, neighbours)) in
+            self.planes.iter().zip(&self.neighbours).take(chunks.len()).enumerate()
+        {
+            let mut marks = [0; SQUARES];
+            for q in 0..Q {
+                let mut keep = [0u32; LANES];
+                for lane in 0..LANES {
+                    let corners = planes[q].corners(lane, &squares[q], margin);
+                    let above = at_or_above(corners, ceilings[q]);
+                    let lowest = corners[0].smaller(corners[1]).smaller(corners[2].smaller(corners[3]));
+                    keep[lane] =
+                        u32::from(!above & (lowest < stocks[q]) & (planes[q].away[lane] <= reach2[q]));
+                }
+                let own = neighbours[q];
+                let of_best = best[q].filter(|[chunk, _]| *chunk == k).map_or(0, |[_, lane]| 1 << lane);
+                marks[q] = (bits(&keep) & !own.covered(&before[q]) | of_best) & all.lanes_in_use(k);
+                kept[q] += marks[q].count_ones() as usize;
+                before[q] = own;
+            }
+            chosen.push(marks);
+        }
+        if all.len() <= MOST_JUDGES {
+            for q in 0..Q {
+                if kept[q] > FEW {
+                    kept[q] = judge(sweep, all, q, &self.planes, chosen, &squares[q], margin);
+                }
+            }
+        }
+        kept
+    }
+}
+
+#[inline(always)]
+fn half_diagonal<T: Real>(square: &Square<T>) -> T {
+    (square.half_x * square.half_x + square.half_y * square.half_y).sqrt()
+}
+
+/// Squared distance from the track within which a move passes all of a square.
+#[inline(always)]
+fn covered_within<T: Real, S: Sweep<T>>(sweep: &S, square: &Square<T>) -> T {
+    let within = sweep.radius() - half_diagonal(square);
+    if within > T::of(0.0) { within * within } else { T::of(-1.0) }
+}
+
+/// The lowest of the moves that pass all of a square, lane by lane.
+#[derive(Clone, Copy)]
+struct Best<T> {
+    least: [T; LANES],
+    chunk: [u32; LANES],
+}
+
+impl<T: Real> Best<T> {
+    #[inline(always)]
+    fn include(&mut self, k: usize, chunk: &Chunk<T>, planes: &Planes<T>, within: T) {
+        for lane in 0..LANES {
+            let may = !chunk.name(lane).bound_only() & (planes.away[lane] <= within);
+            let lower = may & (planes.z[lane] < self.least[lane]);
+            self.least[lane] = if lower { planes.z[lane] } else { self.least[lane] };
+            self.chunk[lane] = if lower { k as u32 } else { self.chunk[lane] };
+        }
+    }
+
+    /// Chunk and lane of the lowest one.
+    #[inline(always)]
+    fn place(&self) -> Option<[usize; 2]> {
+        let (least, lane) = least_of(&self.least);
+        (least < T::of(f64::INFINITY)).then(|| [self.chunk[lane] as usize, lane])
+    }
+}
+
+/// Heights at the corners of each square of its best move; infinite where they are not known for sure.
+#[inline(always)]
+fn ceilings<T: Real, S: Sweep<T>, const Q: usize>(
+    sweep: &S,
+    all: &MoveList<T>,
+    best: &[Option<[usize; 2]>; Q],
+    squares: &[Square<T>; Q],
+) -> [[T; 4]; Q] {
+    let infinite = T::of(f64::INFINITY);
+    // All corners of all squares side by side.
+    let mut moves = Chunk::empty();
+    let (mut x, mut y) = ([T::of(0.0); LANES], [T::of(0.0); LANES]);
+    for q in 0..Q {
+        let Some([chunk, lane]) = best[q] else { continue };
+        let (m, name) = all.get(chunk * LANES + lane);
+        let square = &squares[q];
+        for c in 0..4 {
+            moves.set(4 * q + c, &m, name);
+            x[4 * q + c] = if c % 2 == 0 { square.x - square.half_x } else { square.x + square.half_x };
+            y[4 * q + c] = if c / 2 == 0 { square.y - square.half_y } else { square.y + square.half_y };
+        }
+    }
+    let mut heights = [infinite; LANES];
+    for lane in 0..LANES {
+        heights[lane] = sure_height(sweep, &moves.lane(lane), x[lane], y[lane]);
+    }
+    std::array::from_fn(|q| match best[q] {
+        Some(_) => std::array::from_fn(|c| heights[4 * q + c]),
+        None => [infinite; 4],
+    })
+}
+
+/// What the moves of a chunk have to do with their neighbours in the program: one bit for each lane.
+#[derive(Clone, Copy, Default)]
+struct Neighbours {
+    /// Only the end, only the start of the move cuts.
+    at_end: u32,
+    at_start: u32,
+    /// The next move of the list is the next one of the program.
+    followed: u32,
+}
+
+impl Neighbours {
+    /// The moves that their neighbours in the program cover, which are in the list too: where only the
+    /// end of a move cuts, the next one, which begins there, cuts as low; and where only its start cuts,
+    /// the one before does. Of two that would cover each other the later one stays.
+    #[inline(always)]
+    fn covered(&self, before: &Self) -> u32 {
+        let last = 1 << (LANES - 1);
+        let covers_next = self.followed & !self.at_end;
+        let first = u32::from(before.followed & !before.at_end & last != 0);
+        (self.at_end & self.followed) | (self.at_start & (covers_next << 1 | first))
+    }
+}
+
+/// Which moves of a chunk are followed in the list by the next one of the program.
+#[inline(always)]
+fn followed<T: Real>(chunk: &Chunk<T>, next: Option<&Chunk<T>>) -> u32 {
+    let mut following = [u32::MAX; LANES];
+    for lane in 0..LANES - 1 {
+        following[lane] = chunk.name(lane + 1).index();
+    }
+    following[LANES - 1] = next.map_or(u32::MAX, |next| next.name(0).index());
+    let mut followed = [0; LANES];
+    for lane in 0..LANES {
+        followed[lane] = u32::from(following[lane] == chunk.name(lane).index() + 1);
+    }
+    bits(&followed)
+}
+
+/// The places of the ones in a number, least first.
+#[inline(always)]
+pub(super) fn ones(mut number: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let place = number.trailing_zeros() as usize;
+        number &= number.wrapping_sub(1);
+        (place < LANES).then_some(place)
+    })
+}
+
+#[inline(always)]
+fn at_or_above<T: Real>(a: [T; 4], b: [T; 4]) -> bool {
+    (a[0] >= b[0]) & (a[1] >= b[1]) & (a[2] >= b[2]) & (a[3] >= b[3])
+}
+
+/// Compares few chosen moves each with each, leaves those that none of the others makes useless, and
+/// counts them.
+#[inline(always)]
+fn judge<T: Real, S: Sweep<T>>(
+    sweep: &S,
+    list: &MoveList<T>,
+    q: usize,
+    planes: &[[Planes<T>; SQUARES]],
+    chosen: &mut [[u32; SQUARES]],
+    square: &Square<T>,
+    margin: T,
+) -> usize {
+    const CHUNKS: usize = MOST_JUDGES / LANES;
+    let zero = [[T::of(0.0); LANES]; 4];
+    let (mut floor, mut height) = ([zero; CHUNKS], [zero; CHUNKS]);
+    for (k, (chunk, planes)) in list.chunks().iter().zip(planes).enumerate().take(CHUNKS) {
+        for lane in 0..LANES {
+            let floors = planes[q].corners(lane, square, margin);
+            let heights = corners(sweep, &chunk.lane(lane), square);
+            let unsure = chunk.name(lane).bound_only();
+            for c in 0..4 {
+                floor[k][c][lane] = floors[c];
+                height[k][c][lane] = if unsure { T::of(f64::INFINITY) } else { heights[c] };
+            }
+        }
+    }
+    for b in 0..chosen.len().min(CHUNKS) {
+        for lane in ones(chosen[b][q]) {
+            // One that is useless itself lies above another that judges as strictly.
+            if chosen[b][q] & (1 << lane) == 0 {
+                continue;
+            }
+            let [h0, h1, h2, h3] = &height[b];
+            let ceiling = [h0[lane], h1[lane], h2[lane], h3[lane]];
+            for (k, (chosen, [f0, f1, f2, f3])) in chosen.iter_mut().zip(&floor).enumerate() {
+                let mut above = [0; LANES];
+                for lane in 0..LANES {
+                    above[lane] = u32::from(at_or_above([f0[lane], f1[lane], f2[lane], f3[lane]], ceiling));
+                }
+                let own = if k == b { 1 << lane } else { 0 };
+                chosen[q] &= !bits(&above) | own;
+            }
+        }
+    }
+    chosen.iter().map(|chosen| chosen[q].count_ones() as usize).sum()
+}
+
+/// The least number and its lane. By halves of fixed length, which stay in registers.
+#[inline(always)]
+fn least_of<T: Real>(numbers: &[T; LANES]) -> (T, usize) {
+    let (mut eight, mut four, mut two) = ([numbers[0]; 8], [numbers[0]; 4], [numbers[0]; 2]);
+    for k in 0..8 {
+        eight[k] = numbers[k].smaller(numbers[k + 8]);
+    }
+    for k in 0..4 {
+        four[k] = eight[k].smaller(eight[k + 4]);
+    }
+    for k in 0..2 {
+        two[k] = four[k].smaller(four[k + 2]);
+    }
+    let least = two[0].smaller(two[1]);
+    let mut lanes = [0u32; LANES];
+    for lane in 0..LANES {
+        lanes[lane] = u32::from(numbers[lane] <= least);
+    }
+    (least, bits(&lanes).trailing_zeros() as usize % LANES)
+}
+
+/// One bit for each lane that is not zero.
+#[inline(always)]
+fn bits(lanes: &[u32; LANES]) -> u32 {
+    let mut bits = 0;
+    for lane in 0..LANES {
+        bits |= lanes[lane] << lane;
+    }
+    bits
+}
+
+/// The planes of a chunk, and what its moves have to do with their neighbours.
+#[inline(always)]
+fn planes_of<T: Real, S: Sweep<T>>(
+    sweep: &S,
+    chunk: &Chunk<T>,
+    square: &Square<T>,
+    followed: u32,
+) -> (Planes<T>, Neighbours) {
+    let mut planes = Planes::none();
+    let (mut at_start, mut at_end) = ([0u32; LANES], [0u32; LANES]);
+    for lane in 0..LANES {
+        let m = chunk.lane(lane);
+        let (along, across) = m.along_across(square.x, square.y);
+        let plane = sweep.plane(&m, along, across);
+        planes.z[lane] = plane.z;
+        planes.x[lane] = plane.along * m.ux - plane.across * m.uy;
+        planes.y[lane] = plane.along * m.uy + plane.across * m.ux;
+        let ahead = along - along.larger(m.low).smaller(m.high);
+        planes.away[lane] = ahead * ahead + across * across;
+        let half_along = square.half_x * m.ux.absolute() + square.half_y * m.uy.absolute();
+        let half_across = square.half_x * m.uy.absolute() + square.half_y * m.ux.absolute();
+        let (lower, upper) =
+            sweep.beyond(&m, [along - half_along, along + half_along], across.absolute() + half_across);
+        let name = chunk.name(lane);
+        // A plunge has both ends in one place, and only the lower one cuts.
+        let counts = !name.bound_only() & (m.low < m.high);
+        at_start[lane] = u32::from(counts & if name.falling() { upper } else { lower });
+        at_end[lane] = u32::from(counts & if name.falling() { lower } else { upper });
+    }
+    (planes, Neighbours { at_start: bits(&at_start), at_end: bits(&at_end), followed })
+}
+
+/// Heights of a move at the corners of a square, infinite where they are not known for sure.
+#[inline(always)]
+fn corners<T: Real, S: Sweep<T>>(sweep: &S, m: &LocalMove<T>, square: &Square<T>) -> [T; 4] {
+    let (x0, x1) = (square.x - square.half_x, square.x + square.half_x);
+    let (y0, y1) = (square.y - square.half_y, square.y + square.half_y);
+    [
+        sure_height(sweep, m, x0, y0),
+        sure_height(sweep, m, x1, y0),
+        sure_height(sweep, m, x0, y1),
+        sure_height(sweep, m, x1, y1),
+    ]
+}
+
+#[inline(always)]
+fn sure_height<T: Real, S: Sweep<T>>(sweep: &S, m: &LocalMove<T>, x: T, y: T) -> T {
+    let (along, across) = m.along_across(x, y);
+    let (height, doubt) = sweep.height(m, along, across);
+    let infinite = T::of(f64::INFINITY);
+    // NaN is not below.
+    if (height < infinite) & (doubt >= infinite) { height } else { infinite }
+}

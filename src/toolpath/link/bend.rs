@@ -1,0 +1,219 @@
+//! Links on the surface: from the end of a pass to the start of the next along a bend that leaves and
+//! joins them smoothly, the cutter dropped on the part all along it.
+//!
+//! In the plan view a bend is a cubic whose ends have the directions of the passes (C. Hermite's form).
+//! With tangents twice as long as the ends lie apart, a turn between two parallel passes is nearly a half
+//! circle, as cubics go; where the ends lie farther apart than passes do, tangents stop growing, and the
+//! way between two turns becomes straight. Heights come from dropping the cutter, so that a link can
+//! never cut deeper into the part than its chords, and never raises what stands beside it.
+
+use super::super::chord::{Watch, reduce, sample_within_chord};
+use super::super::{DropCutter, border::Border};
+use crate::cutter::Cutter;
+use crate::geometry::{Point2, Point3, Vector2};
+use crate::monitor::{Cancelled, Monitor};
+
+/// Length of the tangents at both ends over the distance of the ends: 2 makes a half circle's bulge,
+/// half the distance. Less makes turns tighter, more drives them farther over the border.
+const TANGENT: f64 = 2.0;
+
+/// Tangents are never longer than this many intervals between passes.
+const LONGEST_TANGENT: f64 = 4.0;
+
+/// A link may roll over the border of the part by this many intervals: one for the pass itself, one
+/// for the bend. A greater roll would cut the edges of a solid part, a smaller one forbids turns at
+/// borders that passes meet at an angle.
+const MOST_ROLL: f64 = 2.0;
+
+/// Ends with opposite feeds that lie beside each other by less than this many intervals are joined by a
+/// loop, for a plain bend between them would be a hairpin.
+const NARROW: f64 = 0.5;
+
+/// Tangents at the ends of a loop, in intervals. Half as long, the loop is hardly wider than a hairpin.
+const LOOP_TANGENT: f64 = 2.0;
+
+/// First sampling distance along a bend, in intervals.
+const SAMPLING: f64 = 0.25;
+
+/// Share of the chord tolerance that sampling may use; thinning uses the rest.
+const SAMPLING_SHARE: f64 = 0.4;
+
+/// What links on the surface are made from.
+pub struct Bends<'a> {
+    /// Drops the cutter.
+    pub drop: DropCutter<'a>,
+    /// Where the part ends.
+    pub border: Border<'a>,
+    /// The cutter.
+    pub cutter: &'a Cutter,
+    /// Interval between passes, mm.
+    pub interval: f64,
+    /// No link is longer, mm.
+    pub longest: f64,
+    /// Largest distance between the moves of a link and its exact curve, mm.
+    pub chord_tolerance: f64,
+}
+
+/// An end of a pass: a tip, and the direction of the feed there in the plan view (zero where the pass
+/// stands still in it).
+#[derive(Debug, Clone, Copy)]
+pub struct End {
+    /// Tip, mm.
+    pub tip: Point3,
+    /// Unit vector, or zero.
+    pub feed: Vector2,
+}
+
+impl End {
+    /// Where a pass begins.
+    pub fn first(points: &[Point3]) -> Self {
+        let last = Self::last_of(points.iter());
+        Self { feed: -last.feed, ..last }
+    }
+
+    /// Where a pass ends.
+    pub fn last(points: &[Point3]) -> Self {
+        Self::last_of(points.iter().rev())
+    }
+
+    /// The end from which `inward` goes: its direction is that of the circle through three points, for
+    /// the chord's own is off by half the angle that the pass turns by from chord to chord.
+    fn last_of<'p>(mut inward: impl Iterator<Item = &'p Point3>) -> Self {
+        let Some(tip) = inward.next() else { return Self { tip: Point3::origin(), feed: Vector2::zeros() } };
+        let mut two = inward.filter(|p| p.xy() != tip.xy()).take(2);
+        let (Some(a), b) = (two.next(), two.next()) else {
+            return Self { tip: *tip, feed: Vector2::zeros() };
+        };
+        let chord = (tip - a).xy();
+        let unit = chord.normalize();
+        let feed = match b.map(|b| (a - b).xy()) {
+            Some(before) if before.norm() > 0.0 => {
+                let share = chord.norm() / (chord.norm() + before.norm());
+                let turned = unit + (unit - before.normalize()) * share;
+                turned.try_normalize(0.0).unwrap_or(unit)
+            }
+            _ => unit,
+        };
+        Self { tip: *tip, feed }
+    }
+}
+
+/// A cubic of the plan view over the parameters 0 to 1.
+struct Cubic {
+    ends: [Point2; 2],
+    tangents: [Vector2; 2],
+}
+
+impl Cubic {
+    fn new(ends: [Point2; 2], tangents: [Vector2; 2]) -> Self {
+        Self { ends, tangents }
+    }
+
+    fn at(&self, t: f64) -> Point2 {
+        let (t2, t3) = (t * t, t * t * t);
+        let [a, b] = self.tangents;
+        self.ends[0]
+            + (self.ends[1] - self.ends[0]) * (3.0 * t2 - 2.0 * t3)
+            + a * (t3 - 2.0 * t2 + t)
+            + b * (t3 - t2)
+    }
+
+    /// Length of sixteen chords, which is near enough to refuse what is too long.
+    fn length(&self) -> f64 {
+        let at = |k: u32| self.at(f64::from(k) / 16.0);
+        (0..16).map(|k| (at(k + 1) - at(k)).norm()).sum()
+    }
+}
+
+impl Bends<'_> {
+    /// The moves after `from` up to and with the tip of `to`; `None` where a link would be too long, or
+    /// leave the part.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    ///
+    /// # Tolerance
+    /// Straight moves stay within the chord tolerance of where the dropped cutter would be.
+    pub fn link(
+        &self,
+        from: &End,
+        to: &End,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Vec<Point3>>, Cancelled> {
+        let span = to.tip - from.tip;
+        if span.norm() > self.longest || span.xy().norm() == 0.0 {
+            return Ok(None);
+        }
+        for curve in self.curves(from, to) {
+            if let Some(moves) = self.follow(&curve, from, to, monitor)? {
+                return Ok(Some(moves));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The bends worth trying, the best one first.
+    fn curves(&self, from: &End, to: &End) -> Vec<Vec<Cubic>> {
+        let span = (to.tip - from.tip).xy();
+        let tangent = (TANGENT * span.norm()).min(LONGEST_TANGENT * self.interval);
+        let plain = Cubic::new([from.tip.xy(), to.tip.xy()], [from.feed * tangent, to.feed * tangent]);
+        let Some(out) = (from.feed - to.feed).try_normalize(0.5) else { return vec![vec![plain]] };
+        let beside = span - out * span.dot(&out);
+        if beside.norm() >= NARROW * self.interval {
+            return vec![vec![plain]];
+        }
+        // Out to the far point of a loop, across it, and back.
+        let across = Vector2::new(out.y, -out.x);
+        let across = if across.dot(&span) < 0.0 { -across } else { across };
+        let far = from.tip.xy() + beside * 0.5 + out * (span.dot(&out).max(0.0) + self.interval);
+        let (wide, at_far) = (LOOP_TANGENT * self.interval, across * self.interval);
+        let first = Cubic::new([from.tip.xy(), far], [from.feed * wide, at_far]);
+        let second = Cubic::new([far, to.tip.xy()], [at_far, to.feed * wide]);
+        vec![vec![first, second], vec![plain]]
+    }
+
+    /// The moves along some cubics that follow each other.
+    fn follow(
+        &self,
+        curve: &[Cubic],
+        from: &End,
+        to: &End,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Vec<Point3>>, Cancelled> {
+        let mut stays = true;
+        let mut locate = |t: f64| {
+            let k = (t as usize).min(curve.len() - 1);
+            let p = curve[k].at(t - k as f64);
+            let drop = self.drop.at(p.x, p.y);
+            let drop = drop.filter(|d| {
+                !self.border.holds(&d.contact)
+                    || self.border.rolled(self.cutter, &p, &d.contact) <= MOST_ROLL * self.interval
+            });
+            stays &= drop.is_some();
+            drop.map(|d| Point3::new(p.x, p.y, d.tip_z))
+        };
+        let mut watch = Watch::new(monitor);
+        let fine = SAMPLING_SHARE * self.chord_tolerance;
+        let (end, length) = (curve.len() as f64, curve.iter().map(Cubic::length).sum::<f64>());
+        if length > self.longest {
+            return Ok(None);
+        }
+        let step = (SAMPLING * self.interval * end / length).min(0.25);
+        let mut points = sample_within_chord(0.0, end, step, fine, &mut locate, &mut watch)?;
+        // The passes' own ends lie within their tolerance of the part, but not always on it.
+        let close =
+            |a: Option<&Point3>, b: &Point3| a.is_some_and(|a| (a - b).norm() <= self.chord_tolerance);
+        if !stays || !close(points.first(), &from.tip) || !close(points.last(), &to.tip) {
+            return Ok(None);
+        }
+        let last = points.len() - 1;
+        (points[0], points[last]) = (from.tip, to.tip);
+        let length: f64 = points.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
+        if length > self.longest {
+            return Ok(None);
+        }
+        let mut moves = reduce(&points, self.chord_tolerance - fine, &mut watch)?;
+        moves.remove(0);
+        Ok(Some(moves))
+    }
+}

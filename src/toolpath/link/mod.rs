@@ -1,0 +1,339 @@
+//! Joins passes into one program: in the order that keeps air moves short, along the surface where the
+//! next pass begins nearby, else by retracts no higher than stock asks for.
+//!
+//! Enters: passes as runs of tip positions, mm. Leaves: a program that feeds along every pass from one
+//! end to the other. Between two passes it takes the quicker of
+//! - a link on the surface ([`bend`]): a smooth bend, fed at the cutting feed, that the dropped cutter
+//!   holds on the part;
+//! - a retract: straight up at the feed, over and down at rapid rate, the last of the way down fed. No rapid
+//!   runs lower than the clearance above what stock can stand there ([`ceiling`]), and none rises above the
+//!   safe height over all stock.
+//!
+//! Times are those of length over rate; what the machine loses in corners is left out, which favours
+//! retracts a little.
+
+mod bend;
+mod ceiling;
+mod order;
+#[cfg(test)]
+mod tests;
+
+use super::border::Border;
+use super::chord::distance_to_segment;
+use super::{ClPoint, DropCutter, Move, MoveKind, PlanSettings, Step, Toolpath, strip_width};
+use crate::cutter::Cutter;
+use crate::geometry::{Point2, Point3, Vector2};
+use crate::monitor::{self, Cancelled, Monitor};
+use crate::part::Part;
+use bend::{Bends, End};
+use ceiling::Ceiling;
+use order::{Visit, is_closed, order};
+
+/// How the end of a pass and the start of the next are joined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Links {
+    /// Along the surface where that is quicker, else by a retract.
+    Surface,
+    /// By retracts only.
+    Retract,
+}
+
+/// How passes become a program.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Joining {
+    /// What joins them.
+    pub links: Links,
+    /// No link on the surface is longer, mm; `None` takes [`LONGEST_LINK`] intervals.
+    pub longest_link: Option<f64>,
+    /// Whether the points of each pass are smoothed and spread within the chord tolerance.
+    pub smoothing: bool,
+}
+
+impl Default for Joining {
+    fn default() -> Self {
+        Self { links: Links::Retract, longest_link: None, smoothing: false }
+    }
+}
+
+/// Longest link on the surface, in intervals between passes on a plane, unless another is asked for. It
+/// reaches the next pass along borders that passes meet at six degrees or more; longer ones leave traces
+/// across finished surface.
+pub const LONGEST_LINK: f64 = 10.0;
+
+/// A closed pass begins this many times as far ahead as it lies beside the tool, so that the link to
+/// it bends gently.
+const LEAD: f64 = 2.0;
+
+/// A descent at rapid rate shorter than this, mm, is left to the plunge.
+const LEAST_DESCENT: f64 = 1e-3;
+
+/// Longest link on the surface in effect, mm.
+pub fn longest_link(joining: &Joining, cutter: &Cutter, step: Step) -> f64 {
+    joining.longest_link.unwrap_or(LONGEST_LINK * plane_interval(cutter, step))
+}
+
+/// Interval between passes on a plane, mm.
+fn plane_interval(cutter: &Cutter, step: Step) -> f64 {
+    match step {
+        Step::Stepover(width) => width,
+        Step::Scallop(height) => strip_width(1.0 / cutter.radius(), 0.0, height, cutter.radius()).0,
+    }
+}
+
+/// Joins passes. Each is a run of at least two tip positions without repeats; passes of fewer are left
+/// out. Without `both_ways` each keeps its direction.
+///
+/// # Errors
+/// [`Cancelled`] when the monitor says so.
+pub fn join(
+    passes: Vec<Vec<Point3>>,
+    both_ways: bool,
+    part: &Part,
+    cutter: &Cutter,
+    settings: &PlanSettings,
+    monitor: &dyn Monitor,
+) -> Result<Toolpath, Cancelled> {
+    let passes: Vec<Vec<Point3>> = passes.into_iter().filter(|p| p.len() >= 2).collect();
+    monitor.start("joining passes", 0);
+    let rates = Rates::of(settings, &passes);
+    let longest = match settings.joining.links {
+        Links::Surface => longest_link(&settings.joining, cutter, settings.step),
+        Links::Retract => 0.0,
+    };
+    let cost = |distance: f64| rates.between(distance, longest);
+    let visits = order(&passes, both_ways, &cost);
+    monitor::check(monitor)?;
+    let passes = in_order(passes, &visits, both_ways);
+    let mut links: Vec<Option<Vec<Point3>>> = Vec::new();
+    if longest > 0.0 && passes.len() > 1 {
+        let bends = Bends {
+            drop: DropCutter::new(part, cutter),
+            border: Border::of(part),
+            cutter,
+            interval: plane_interval(cutter, settings.step),
+            longest,
+            chord_tolerance: settings.chord_tolerance,
+        };
+        links = crate::parallel::try_map(passes.len() - 1, |k| {
+            bends.link(&End::last(&passes[k]), &End::first(&passes[k + 1]), monitor)
+        })?;
+    }
+    let mut program = Program::new(&passes, cutter, settings, rates);
+    for (k, pass) in passes.iter().enumerate() {
+        monitor::check(monitor)?;
+        let link = k.checked_sub(1).and_then(|k| links.get_mut(k)?.take());
+        program.reach(k as u32, pass[0], link);
+        program.feed_along(k as u32, MoveKind::Cut, &pass[1..]);
+    }
+    Ok(program.finish())
+}
+
+/// Speeds of moves between passes, mm/s.
+#[derive(Debug, Clone, Copy)]
+struct Rates {
+    feed: f64,
+    plunge: f64,
+    rapid: f64,
+    /// Time of a retract besides the way over, s, as far as it can be told before there is a program.
+    retract: f64,
+}
+
+/// Length of a bend over the distance of its ends: that of a half circle.
+const BEND: f64 = std::f64::consts::FRAC_PI_2;
+
+impl Rates {
+    fn of(settings: &PlanSettings, passes: &[Vec<Point3>]) -> Self {
+        let [feed, plunge, rapid] =
+            [settings.feed_rate, settings.plunge_rate, settings.rapid_rate].map(|rate| rate / 60.0);
+        let ends = passes.iter().flat_map(|p| [p[0].z, p[p.len() - 1].z]);
+        let (sum, count) = ends.fold((0.0, 0.0), |(sum, n), z| (sum + z, n + 1.0));
+        let mean = if count > 0.0 { sum / count } else { settings.stock_top };
+        let height = settings.stock_top + settings.clearance - mean;
+        Self { feed, plunge, rapid, retract: height / feed + height / plunge }
+    }
+
+    /// What it takes to go on at a distance, s.
+    fn between(&self, distance: f64, longest: f64) -> f64 {
+        let retract = self.retract + distance / self.rapid;
+        if distance * BEND > longest { retract } else { retract.min(distance * BEND / self.feed) }
+    }
+}
+
+/// The passes as they are visited: turned round, and closed ones begun where they are to begin.
+fn in_order(mut passes: Vec<Vec<Point3>>, visits: &[Visit], both_ways: bool) -> Vec<Vec<Point3>> {
+    let mut all: Vec<Vec<Point3>> = Vec::with_capacity(visits.len());
+    for visit in visits {
+        let mut points = std::mem::take(&mut passes[visit.pass]);
+        if is_closed(&points) {
+            points = match all.last() {
+                None => begun_at(points, visit.start),
+                Some(before) => begun_ahead(points, &End::last(before), both_ways),
+            };
+        } else if visit.reversed {
+            points.reverse();
+        }
+        all.push(points);
+    }
+    all
+}
+
+/// A closed pass that begins (and ends) at another of its points.
+fn begun_at(mut points: Vec<Point3>, start: usize) -> Vec<Point3> {
+    points.pop();
+    points.rotate_left(start);
+    points.push(points[0]);
+    points
+}
+
+/// A closed pass that begins a little ahead of where it is nearest to `from`, in the sense that `from`
+/// feeds, so that the tool swings over to it.
+fn begun_ahead(mut points: Vec<Point3>, from: &End, both_ways: bool) -> Vec<Point3> {
+    let nearest = |points: &[Point3]| {
+        let gaps = points.windows(2).map(|w| distance_to_segment(&from.tip, &w[0], &w[1])).enumerate();
+        gaps.fold((0, f64::INFINITY), |best, gap| if gap.1 < best.1 { gap } else { best })
+    };
+    let (segment, distance) = nearest(&points);
+    let along = (points[segment + 1] - points[segment]).xy();
+    if both_ways && along.dot(&from.feed) < 0.0 {
+        points.reverse();
+    }
+    let (segment, _) = nearest(&points);
+    let (a, b) = (points[segment], points[segment + 1]);
+    let length2 = (b - a).norm_squared();
+    let share = if length2 > 0.0 { ((from.tip - a).dot(&(b - a)) / length2).clamp(0.0, 1.0) } else { 0.0 };
+    let mut ahead = share * length2.sqrt() + LEAD * distance;
+    let mut start = begun_at(points, segment);
+    // Not round and round a pass that is shorter than that.
+    for _ in 1..start.len() {
+        let length = (start[1] - start[0]).norm();
+        if ahead < length {
+            break;
+        }
+        ahead -= length;
+        start = begun_at(start, 1);
+    }
+    let (a, b) = (start[0], start[1]);
+    let length = (b - a).norm();
+    let share = if length > 0.0 { (ahead / length).min(1.0) } else { 0.0 };
+    if share > 0.0 && share < 1.0 {
+        let begin = a + (b - a) * share;
+        start[0] = begin;
+        let last = start.len() - 1;
+        start[last] = a;
+        start.push(begin);
+    }
+    start
+}
+
+/// A program in the making.
+struct Program<'a> {
+    settings: &'a PlanSettings,
+    rates: Rates,
+    ceiling: Ceiling<'a>,
+    start: Option<Point3>,
+    moves: Vec<Move>,
+    /// Moves that the ceiling knows of.
+    lowered: usize,
+}
+
+impl<'a> Program<'a> {
+    fn new(passes: &[Vec<Point3>], cutter: &'a Cutter, settings: &'a PlanSettings, rates: Rates) -> Self {
+        let mut low = Point2::new(f64::INFINITY, f64::INFINITY);
+        let mut high = -low;
+        for p in passes.iter().flatten() {
+            low = low.inf(&p.xy());
+            high = high.sup(&p.xy());
+        }
+        if passes.is_empty() {
+            (low, high) = (Point2::origin(), Point2::origin());
+        }
+        // Links swing a little beyond the passes.
+        let margin = Vector2::new(cutter.radius(), cutter.radius());
+        let ceiling = Ceiling::new(cutter, low - margin, high + margin, settings.stock_top);
+        Self { settings, rates, ceiling, start: None, moves: Vec::new(), lowered: 0 }
+    }
+
+    fn safe(&self) -> f64 {
+        self.settings.stock_top + self.settings.clearance
+    }
+
+    fn push(&mut self, tip: Point3, kind: MoveKind, feed_rate: f64, pass: u32) {
+        self.moves.push(Move { to: ClPoint { tip }, kind, feed_rate, pass });
+    }
+
+    fn feed_along(&mut self, pass: u32, kind: MoveKind, tips: &[Point3]) {
+        tips.iter().for_each(|&tip| self.push(tip, kind, self.settings.feed_rate, pass));
+    }
+
+    /// Brings the tool to where a pass begins.
+    fn reach(&mut self, pass: u32, to: Point3, link: Option<Vec<Point3>>) {
+        let Some(from) = self.moves.last().map(|m| m.to.tip) else {
+            self.start = Some(Point3::new(to.x, to.y, self.safe()));
+            return self.push(to, MoveKind::Plunge, self.settings.plunge_rate, pass);
+        };
+        let time = link.as_ref().map(|tips| {
+            let mut at = from;
+            let length: f64 = tips.iter().map(|p| (p - std::mem::replace(&mut at, *p)).norm()).sum();
+            length / self.rates.feed
+        });
+        if let (Some(tips), Some(time)) = (link, time) {
+            // No retract is quicker than its last way down, which spares looking at stock.
+            if time <= self.settings.clearance / self.rates.plunge || time <= self.retract(from, to).time {
+                return self.feed_along(pass, MoveKind::Link, &tips);
+            }
+        }
+        let retract = self.retract(from, to);
+        let above = |p: Point3, z: f64| Point3::new(p.x, p.y, z);
+        let mut at = above(from, retract.over);
+        if at != from {
+            self.push(at, MoveKind::Retract, self.settings.feed_rate, pass);
+        }
+        for tip in [above(to, retract.over), above(to, retract.down)] {
+            if tip != at {
+                self.push(tip, MoveKind::Rapid, 0.0, pass);
+                at = tip;
+            }
+        }
+        if at != to {
+            self.push(to, MoveKind::Plunge, self.settings.plunge_rate, pass);
+        }
+    }
+
+    /// The lowest retract that keeps the clearance from what stock can stand after all moves so far.
+    fn retract(&mut self, from: Point3, to: Point3) -> Retract {
+        for k in self.lowered..self.moves.len() {
+            if self.moves[k].kind != MoveKind::Rapid && k > 0 {
+                self.ceiling.lower(&self.moves[k - 1].to.tip, &self.moves[k].to.tip);
+            }
+        }
+        self.lowered = self.moves.len();
+        let (safe, clearance) = (self.safe(), self.settings.clearance);
+        let (a, b) = (from.xy(), to.xy());
+        let over = self.ceiling.free_height(&a, &b).max(from.z).max(to.z) + clearance;
+        let over = over.min(safe).max(from.z);
+        let down = (self.ceiling.free_height(&b, &b).max(to.z) + clearance).min(over);
+        let down = if over - down < LEAST_DESCENT { over } else { down };
+        let rapid = (b - a).norm() + (over - down);
+        let fed = (over - from.z) / self.rates.feed + (down - to.z) / self.rates.plunge;
+        Retract { over, down, time: rapid / self.rates.rapid + fed }
+    }
+
+    /// Up from the last pass.
+    fn finish(mut self) -> Toolpath {
+        let safe = self.safe();
+        if let Some(last) = self.moves.last().copied() {
+            let tip = Point3::new(last.to.tip.x, last.to.tip.y, safe);
+            self.push(tip, MoveKind::Retract, self.settings.feed_rate, last.pass);
+        }
+        let start = self.start.unwrap_or(Point3::new(0.0, 0.0, safe));
+        Toolpath { start: ClPoint { tip: start }, moves: self.moves }
+    }
+}
+
+/// A retract: up to `over`, across, down to `down`, mm.
+struct Retract {
+    over: f64,
+    down: f64,
+    /// s.
+    time: f64,
+}

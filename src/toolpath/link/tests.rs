@@ -1,0 +1,321 @@
+use proptest::prelude::*;
+
+use super::*;
+use crate::geometry::{AnalyticShape, AnalyticSurface, TriangleMesh};
+use crate::monitor::Silent;
+use crate::part::Patch;
+use crate::sim::{Grid, ZMap, cut_in_order};
+
+const TOP: f64 = 7.0;
+
+fn settings(links: Links) -> PlanSettings {
+    PlanSettings {
+        step: Step::Stepover(0.5),
+        chord_tolerance: 1e-3,
+        clearance: 2.0,
+        stock_top: TOP,
+        feed_rate: 1000.0,
+        plunge_rate: 300.0,
+        rapid_rate: 15_000.0,
+        joining: Joining { links, ..Joining::default() },
+    }
+}
+
+/// A level plate of 20 × 20 mm at height 0.
+fn plate() -> Part {
+    let surface =
+        AnalyticSurface::new(AnalyticShape::Plane { height: 0.0 }, [[0.0, 20.0], [0.0, 20.0]]).unwrap();
+    Part::from_patches(vec![Patch::Analytic(surface)], 0.002).unwrap()
+}
+
+/// The plate with a wall 1 mm thick and 5 mm high along x = 10.
+fn walled() -> Part {
+    let profile = [(0.0, 0.0), (9.5, 0.0), (9.5001, 5.0), (10.4999, 5.0), (10.5, 0.0), (20.0, 0.0)];
+    let vertices =
+        profile.iter().flat_map(|&(x, z)| [Point3::new(x, 0.0, z), Point3::new(x, 20.0, z)]).collect();
+    let triangles =
+        (0..5u32).flat_map(|k| [[2 * k, 2 * k + 2, 2 * k + 1], [2 * k + 1, 2 * k + 2, 2 * k + 3]]).collect();
+    Part::from_mesh(TriangleMesh::new(vertices, triangles).unwrap().0)
+}
+
+fn line(a: [f64; 2], b: [f64; 2]) -> Vec<Point3> {
+    vec![Point3::new(a[0], a[1], 0.0), Point3::new(b[0], b[1], 0.0)]
+}
+
+fn joined(part: &Part, passes: &[Vec<Point3>], both_ways: bool, links: Links) -> Toolpath {
+    let cutter = Cutter::ball(6.0).unwrap();
+    join(passes.to_vec(), both_ways, part, &cutter, &settings(links), &Silent).unwrap()
+}
+
+fn count(path: &Toolpath, kind: MoveKind) -> usize {
+    path.moves.iter().filter(|m| m.kind == kind).count()
+}
+
+/// Every pass stands in the program whole, in one direction or the other; closed ones round about.
+fn assert_all_visited(path: &Toolpath, passes: &[Vec<Point3>], both_ways: bool) {
+    assert_eq!(path.passes(), passes.iter().filter(|p| p.len() >= 2).count());
+    let mut cut = vec![Vec::new(); path.passes()];
+    for (from, to, m) in path.segments().filter(|(.., m)| m.kind == MoveKind::Cut) {
+        let points = &mut cut[m.pass as usize];
+        if points.is_empty() {
+            points.push(from);
+        }
+        points.push(to);
+    }
+    for pass in passes.iter().filter(|p| p.len() >= 2) {
+        let back: Vec<Point3> = pass.iter().rev().copied().collect();
+        let open = cut.iter().any(|c| c == pass || both_ways && *c == back);
+        let round = || cut.iter().any(|c| is_closed(c) && pass.iter().all(|p| c.contains(p)));
+        assert!(open || is_closed(pass) && round(), "{pass:?} is missing");
+    }
+}
+
+/// What the tool touches in rapid moves, cut in the order of the program out of a block.
+fn rapids_in_stock(path: &Toolpath) -> usize {
+    let cell = 0.1;
+    let grid = Grid { origin: Point2::new(-4.0, -4.0), cell, nx: 280, ny: 280 };
+    let removal = cut_in_order(ZMap::block(grid, TOP), &Cutter::ball(6.0).unwrap(), path, &Silent).unwrap();
+    removal.rapid_contacts.len()
+}
+
+#[test]
+fn neighbouring_passes_are_joined_by_half_circles() {
+    let passes: Vec<_> =
+        (0..8).map(|k| 5.0 + 0.5 * f64::from(k)).map(|y| line([5.0, y], [15.0, y])).collect();
+    let path = joined(&plate(), &passes, true, Links::Surface);
+    assert_all_visited(&path, &passes, true);
+    assert_eq!(count(&path, MoveKind::Rapid), 0);
+    let mut ends = Vec::new();
+    for (from, to, m) in path.segments() {
+        if m.kind == MoveKind::Link {
+            assert_eq!((from.z, to.z), (0.0, 0.0));
+            // Within a twentieth of a half circle of 0.25 mm around the middle between two passes.
+            let x = if to.x < 10.0 { 5.0 - to.x } else { to.x - 15.0 };
+            assert!((-1e-9..0.2625).contains(&x), "{to}");
+            ends.push(to);
+        }
+    }
+    let length: f64 =
+        path.segments().filter(|(.., m)| m.kind == MoveKind::Link).map(|(a, b, _)| (b - a).norm()).sum();
+    let circles = 7.0 * 0.25 * std::f64::consts::PI;
+    assert!((length / circles - 1.0).abs() < 0.03, "{length} {circles}");
+    // No corner sharper than the chords of the bend make it.
+    let steps: Vec<_> =
+        path.segments().filter(|(.., m)| m.kind.is_on_surface()).map(|(a, b, _)| b - a).collect();
+    let sharpest = steps.windows(2).map(|w| w[0].angle(&w[1])).fold(0.0, f64::max);
+    assert!(sharpest < 0.3, "{sharpest}");
+}
+
+#[test]
+fn ends_close_beside_each_other_are_joined_by_a_loop() {
+    for shift in [0.0, 0.3, -0.3] {
+        let passes = [line([5.0, 10.0], [15.0, 10.0]), line([15.0 + shift, 10.05], [5.0, 10.05])];
+        let path = joined(&plate(), &passes, false, Links::Surface);
+        assert!(count(&path, MoveKind::Link) > 0 && count(&path, MoveKind::Rapid) == 0);
+        let on_surface = path.segments().filter(|(.., m)| m.kind.is_on_surface());
+        let steps: Vec<_> = on_surface.map(|(a, b, _)| b - a).collect();
+        let sharpest = steps.windows(2).map(|w| w[0].angle(&w[1])).fold(0.0, f64::max);
+        assert!(sharpest < 0.4, "{sharpest}");
+    }
+}
+
+#[test]
+fn links_do_not_leave_the_part() {
+    // Passes up to the very border, at an angle to it, and across a gap in it.
+    let passes: Vec<_> = (0..30)
+        .map(|k| 2.0 + 0.5 * f64::from(k))
+        .map(|y| line([0.25 * (y - 2.0), y], [20.0 - 0.1 * y, y]))
+        .collect();
+    let path = joined(&plate(), &passes, true, Links::Surface);
+    assert_all_visited(&path, &passes, true);
+    assert!(count(&path, MoveKind::Link) > 0);
+    let roll = MOST_ROLL_OF_TESTS * 0.5;
+    for m in path.moves.iter().filter(|m| m.kind.is_on_surface()) {
+        let p = m.to.tip;
+        let outside = (-p.x).max(p.x - 20.0).max(-p.y).max(p.y - 20.0);
+        // A ball of 3 mm that hangs over by d has turned by d/3 and rolled by as much of its rim.
+        assert!(outside <= roll * 1.01, "{p}");
+        let hang = outside.max(0.0);
+        assert!((p.z - ((9.0 - hang * hang).sqrt() - 3.0)).abs() < 1.1e-3, "{p}");
+    }
+}
+
+/// Intervals that [`bend`] lets a link roll over the border.
+const MOST_ROLL_OF_TESTS: f64 = 2.0;
+
+#[test]
+fn a_wall_between_two_ends_forces_a_retract() {
+    let part = walled();
+    // The ball stands 3 mm off the wall on either side, at most 7.1 mm from end to end.
+    let passes = [line([2.0, 10.0], [6.45, 10.0]), line([13.55, 10.0], [18.0, 10.0])];
+    let mut longer = settings(Links::Surface);
+    longer.joining.longest_link = Some(8.0);
+    let cutter = Cutter::ball(6.0).unwrap();
+    let path = join(passes.to_vec(), true, &part, &cutter, &longer, &Silent).unwrap();
+    assert_eq!(count(&path, MoveKind::Link), 0, "over the wall it is longer than 8 mm");
+    let over = path.segments().filter(|(.., m)| m.kind == MoveKind::Rapid).map(|(_, to, _)| to.z);
+    assert!(over.fold(0.0, f64::max) >= 7.0);
+    assert_eq!(rapids_in_stock(&path), 0);
+    // Without the wall the same passes are linked.
+    let path = join(passes.to_vec(), true, &plate(), &cutter, &longer, &Silent).unwrap();
+    assert!(count(&path, MoveKind::Link) > 0 && count(&path, MoveKind::Rapid) == 0);
+}
+
+#[test]
+fn retracts_stay_low_where_all_around_is_cut() {
+    let cutter = Cutter::ball(6.0).unwrap();
+    let mut ceiling = Ceiling::new(&cutter, Point2::new(0.0, 0.0), Point2::new(20.0, 20.0), TOP);
+    let free = |ceiling: &Ceiling| ceiling.free_height(&Point2::new(4.5, 10.2), &Point2::new(14.5, 10.2));
+    assert_eq!(free(&ceiling), TOP);
+    for pass in (0..41).map(|k| 0.5 * f64::from(k)).map(|y| line([0.0, y], [20.0, y])) {
+        ceiling.lower(&pass[0], &pass[1]);
+    }
+    // Cut to 0 by passes that stand at most 0.3 mm away; squares are 0.375 mm wide.
+    assert!((0.0..0.15).contains(&free(&ceiling)), "{}", free(&ceiling));
+    // At the border uncut stock stands beside the tool, which may stay below its top by what its
+    // profile rises.
+    let at_border = ceiling.free_height(&Point2::new(0.0, 10.0), &Point2::new(0.0, 10.0));
+    assert!((4.0..TOP - 1.0).contains(&at_border), "{at_border}");
+    let outside = Point2::new(-0.1, 10.0);
+    assert_eq!(ceiling.free_height(&outside, &outside), TOP);
+}
+
+/// Sloped moves at random: a tool at the free height touches nothing of what they left.
+#[test]
+fn nothing_stands_above_the_free_height() {
+    let mut rng = crate::sim::scenes::Rng::new(3);
+    for cutter in
+        [Cutter::ball(6.0), Cutter::flat(5.0), Cutter::bull(6.0, 1.0), Cutter::taper(2.0, 1.0, 0.3, 6.0)]
+    {
+        let cutter = cutter.unwrap();
+        let corners = [Point2::new(0.0, 0.0), Point2::new(20.0, 20.0)];
+        let mut ceiling = Ceiling::new(&cutter, corners[0], corners[1], TOP);
+        let mut place = || Point3::new(rng.within(0.0, 20.0), rng.within(0.0, 20.0), rng.within(0.0, 5.0));
+        let mut moves = Vec::new();
+        let start = place();
+        let mut at = start;
+        for k in 0..600 {
+            let to = place();
+            let kind = if k < 400 { MoveKind::Cut } else { MoveKind::Rapid };
+            if kind == MoveKind::Cut {
+                ceiling.lower(&at, &to);
+                moves.push(Move { to: ClPoint { tip: to }, kind, feed_rate: 1.0, pass: 0 });
+                at = to;
+                continue;
+            }
+            let free = ceiling.free_height(&at.xy(), &to.xy()) + 1e-5;
+            // Up at feed, since it is the way over that is tested.
+            let up = Point3::new(at.x, at.y, free);
+            moves.push(Move { to: ClPoint { tip: up }, kind: MoveKind::Retract, feed_rate: 1.0, pass: 0 });
+            let over = Point3::new(to.x, to.y, free);
+            moves.push(Move { to: ClPoint { tip: over }, kind, feed_rate: 0.0, pass: 0 });
+            at = over;
+        }
+        let path = Toolpath { start: ClPoint { tip: start }, moves };
+        let grid = Grid { origin: Point2::new(-4.0, -4.0), cell: 0.1, nx: 280, ny: 280 };
+        let removal = cut_in_order(ZMap::block(grid, TOP), &cutter, &path, &Silent).unwrap();
+        assert_eq!(removal.rapid_contacts.first(), None);
+    }
+}
+
+#[test]
+fn closed_passes_are_entered_where_they_are_near_and_in_the_same_sense() {
+    let circle = |r: f64| -> Vec<Point3> {
+        let mut points: Vec<Point3> = (0..200)
+            .map(|k| std::f64::consts::TAU * f64::from(k) / 200.0)
+            .map(|t| Point3::new(10.0 + r * t.cos(), 10.0 + r * t.sin(), 0.0))
+            .collect();
+        points.push(points[0]);
+        points
+    };
+    let mut passes: Vec<_> = (1..12).map(|k| circle(0.5 * f64::from(k))).collect();
+    passes.iter_mut().step_by(2).for_each(|p| p.reverse());
+    let path = joined(&plate(), &passes, true, Links::Surface);
+    assert_all_visited(&path, &passes, true);
+    assert_eq!(count(&path, MoveKind::Rapid), 0, "one spiral");
+    let steps: Vec<_> =
+        path.segments().filter(|(.., m)| m.kind.is_on_surface()).map(|(a, b, _)| b - a).collect();
+    let sharpest = steps.windows(2).map(|w| w[0].angle(&w[1])).fold(0.0, f64::max);
+    assert!(sharpest < 0.5, "{sharpest}");
+}
+
+/// The shortest of all orders and directions, by trying them all.
+fn brute_force(passes: &[Vec<Point3>]) -> f64 {
+    fn go(passes: &[Vec<Point3>], used: u32, at: Option<Point3>) -> f64 {
+        let mut best = f64::INFINITY;
+        for (k, p) in passes.iter().enumerate().filter(|(k, _)| used & (1 << k) == 0) {
+            for (a, b) in [(p[0], p[1]), (p[1], p[0])] {
+                let way = at.map_or(0.0, |at| (a - at).norm());
+                best = best.min(way + go(passes, used | (1 << k), Some(b)));
+            }
+        }
+        if best.is_infinite() { 0.0 } else { best }
+    }
+    go(passes, 0, None)
+}
+
+fn air(passes: &[Vec<Point3>], visits: &[Visit]) -> f64 {
+    let ends = |v: &Visit| {
+        let p = &passes[v.pass];
+        if v.reversed { (p[p.len() - 1], p[0]) } else { (p[0], p[p.len() - 1]) }
+    };
+    visits.windows(2).map(|w| (ends(&w[1]).0 - ends(&w[0]).1).norm()).sum()
+}
+
+fn random_passes(n: usize, seed: u64) -> Vec<Vec<Point3>> {
+    let mut rng = crate::sim::scenes::Rng::new(seed);
+    (0..n)
+        .map(|_| {
+            let (x, y) = (rng.within(0.0, 100.0), rng.within(0.0, 100.0));
+            line([x, y], [x + rng.within(-9.0, 9.0), y + rng.within(-9.0, 9.0)])
+        })
+        .collect()
+}
+
+#[test]
+fn orders_are_nearly_the_shortest() {
+    let (mut found, mut best) = (0.0, 0.0);
+    for seed in 1..40 {
+        let passes = random_passes(6, seed);
+        let got = air(&passes, &order(&passes, true, &|d| d));
+        let least = brute_force(&passes);
+        assert!(got >= least - 1e-9 && got < 1.5 * least, "{seed}: {got} {least}");
+        (found, best) = (found + got, best + least);
+    }
+    assert!(found < 1.04 * best, "{found} {best}");
+}
+
+#[test]
+fn ten_thousand_passes_are_ordered_better_than_by_nearest_ends() {
+    let passes = random_passes(10_000, 7);
+    let visits = order(&passes, true, &|d| d);
+    let mut seen: Vec<usize> = visits.iter().map(|v| v.pass).collect();
+    seen.sort_unstable();
+    assert!(seen.iter().enumerate().all(|(k, &p)| k == p) && seen.len() == 10_000);
+    let greedy = air(&passes, &order::nearest_ends(&passes, &vec![false; passes.len()], true));
+    let got = air(&passes, &visits);
+    assert!(got < 0.85 * greedy, "{got} {greedy}");
+    assert_eq!(visits, order(&passes, true, &|d| d));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn whatever_the_passes_all_are_cut_and_no_rapid_touches_stock(
+        ends in prop::collection::vec((0.0..20.0f64, 0.0..20.0f64, -6.0..6.0f64, -6.0..6.0f64), 1..25),
+        both_ways in any::<bool>(),
+        surface in any::<bool>(),
+    ) {
+        let passes: Vec<_> = ends
+            .iter()
+            .map(|&(x, y, dx, dy)| line([x, y], [(x + dx).clamp(0.0, 20.0), (y + dy).clamp(0.0, 20.0)]))
+            .collect();
+        let links = if surface { Links::Surface } else { Links::Retract };
+        let path = joined(&plate(), &passes, both_ways, links);
+        assert_all_visited(&path, &passes, both_ways);
+        prop_assert_eq!(rapids_in_stock(&path), 0);
+        // Never below the plate by more than the chords, and never over more than the safe height.
+        prop_assert!(path.moves.iter().all(|m| m.to.tip.z <= TOP + 2.0));
+    }
+}

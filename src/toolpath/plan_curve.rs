@@ -1,0 +1,142 @@
+//! Curves of the plan view as passes: the cutter dropped on the part along each.
+//!
+//! Enters: a curve `s → (x, y)` of the cutter's axis, about one mm a unit. Leaves: tip positions of the runs on which the
+//! cutter touches surface, and rolls over the part's border no farther than is of use.
+
+use super::border::{Border, useful_overrun};
+use super::chord::Watch;
+use super::drop::{Drop, DropCutter};
+use super::plan::PassSettings;
+use crate::cutter::Cutter;
+use crate::geometry::{Point3, Vector2};
+use crate::monitor::{Cancelled, Monitor};
+
+/// How closely the end of a pass is placed, mm.
+const END_PRECISION: f64 = 1e-6;
+
+/// Where the axis is at `s`.
+pub(super) type Curve<'a> = &'a (dyn Fn(f64) -> Vector2 + Sync);
+
+/// How the cutter stands on the part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Contact {
+    /// It touches surface.
+    Inside,
+    /// It touches the border and has rolled over it by no more than the overrun.
+    Rolling,
+    /// It has rolled farther, or does not touch the part.
+    Off,
+}
+
+/// Turns curves of the plan view into passes.
+pub(super) struct PlanCurves<'a> {
+    pub drop: DropCutter<'a>,
+    pub border: Border<'a>,
+    pub cutter: &'a Cutter,
+    /// How far a pass may roll on over the border, mm.
+    pub overrun: f64,
+    pub settings: &'a PassSettings,
+    pub monitor: &'a dyn Monitor,
+}
+
+impl PlanCurves<'_> {
+    fn drop_at(&self, curve: Curve<'_>, s: f64) -> Option<(Vector2, Drop)> {
+        let xy = curve(s);
+        self.drop.at(xy.x, xy.y).map(|d| (xy, d))
+    }
+
+    fn tip(&self, curve: Curve<'_>, s: f64) -> Option<Point3> {
+        self.drop_at(curve, s).map(|(xy, d)| Point3::new(xy.x, xy.y, d.tip_z))
+    }
+
+    /// How the cutter stands at `s`.
+    fn contact(&self, curve: Curve<'_>, s: f64) -> Contact {
+        let Some((xy, drop)) = self.drop_at(curve, s) else { return Contact::Off };
+        let rc = self.cutter.corner_radius();
+        if rc == 0.0 || !self.border.holds(&drop.contact) {
+            return Contact::Inside;
+        }
+        let rolled = self.border.rolled(self.cutter, &xy.into(), &drop.contact);
+        if rolled <= END_PRECISION {
+            Contact::Inside
+        } else if rolled <= self.overrun {
+            Contact::Rolling
+        } else {
+            Contact::Off
+        }
+    }
+
+    /// The runs of a curve over `[s0, s1]` (`s` in mm) on which the cutter cuts surface, as moves. Each run is made
+    /// of stretches inside the part and stretches that roll along its border.
+    pub fn pieces(&self, curve: Curve<'_>, [s0, s1]: [f64; 2]) -> Result<Vec<Vec<Point3>>, Cancelled> {
+        let count = ((s1 - s0) / self.settings.sampling).ceil().max(1.0) as usize;
+        let at = |k: usize| s0 + (s1 - s0) * k as f64 / count as f64;
+        let mut stretches: Vec<(Contact, f64, f64)> = Vec::new();
+        let mut before = (s0, self.contact(curve, s0));
+        let mut start = s0;
+        let mut watch = Watch::new(self.monitor);
+        for k in 1..=count {
+            watch.step()?;
+            let s = at(k);
+            let now = self.contact(curve, s);
+            // Several changes may lie between two samples; each is located in turn.
+            while before.1 != now {
+                watch.step()?;
+                let (end, next) = self.change(curve, before, s);
+                stretches.push((before.1, start, end));
+                (before, start) = ((next, self.contact(curve, next)), next);
+            }
+            before = (s, now);
+        }
+        stretches.push((before.1, start, s1));
+        let runs = stretches.split_mut(|(contact, ..)| *contact == Contact::Off);
+        let pieces = runs.map(|run| {
+            self.shorten_ends(run);
+            self.moves(curve, run)
+        });
+        pieces.filter(|points| points.as_ref().map_or(true, |points| points.len() >= 2)).collect()
+    }
+
+    /// Cuts the rolls at both ends of a run back to what is of use. A roll over the whole overrun on a
+    /// length l means that the pass meets the border at an angle of sine overrun/l.
+    fn shorten_ends(&self, run: &mut [(Contact, f64, f64)]) {
+        let useful = |a: f64, b: f64| {
+            let sine = (self.overrun / (b - a)).min(1.0);
+            useful_overrun((1.0 - sine * sine).sqrt() / sine) * self.overrun
+        };
+        if let Some((Contact::Rolling, a, b)) = run.first_mut() {
+            *a = a.max(*b - useful(*a, *b));
+        }
+        if let Some((Contact::Rolling, a, b)) = run.last_mut() {
+            *b = b.min(*a + useful(*a, *b));
+        }
+    }
+
+    fn moves(&self, curve: Curve<'_>, run: &[(Contact, f64, f64)]) -> Result<Vec<Point3>, Cancelled> {
+        let mut points: Vec<Point3> = Vec::new();
+        for &(_, a, b) in run.iter().filter(|(_, a, b)| b - a > END_PRECISION) {
+            let stretch = self.settings.moves(a, b, &mut |s| self.tip(curve, s), self.monitor)?;
+            let joined = usize::from(!points.is_empty());
+            points.extend(stretch.into_iter().skip(joined));
+        }
+        Ok(points)
+    }
+
+    /// Where the contact changes from what it is at `before` on the way to `s`: the last place that
+    /// is as before, and the first known one that is not.
+    fn change(&self, curve: Curve<'_>, before: (f64, Contact), s: f64) -> (f64, f64) {
+        let (mut same, mut other) = (before.0, s);
+        while other - same > 0.5 * END_PRECISION {
+            let middle = 0.5 * (same + other);
+            if middle <= same || middle >= other {
+                break;
+            }
+            if self.contact(curve, middle) == before.1 {
+                same = middle;
+            } else {
+                other = middle;
+            }
+        }
+        (same, other)
+    }
+}

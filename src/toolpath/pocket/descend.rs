@@ -1,0 +1,152 @@
+//! Runs in the plane made into a program: step by step down, with helices and ramps.
+
+use super::route::circle;
+use super::{Entry, PocketStrategy, Run};
+use crate::geometry::{Point2, Point3, foot};
+use crate::toolpath::{ARC_SHARE, ClPoint, Move, MoveKind, PlanSettings, Toolpath};
+
+/// A way down begins this far above the stock that is left, mm: rapids end there.
+const ABOVE: f64 = 0.5;
+
+/// A ramp shorter than this, mm, is a plunge.
+const LEAST_RAMP: f64 = 0.5;
+
+/// Depths below which a difference is rounding, mm.
+const ROUNDING: f64 = 1.0e-9;
+
+/// The floors of the steps, mm, from the first to the last.
+pub(super) fn floors(depth: f64, strategy: &PocketStrategy) -> Vec<f64> {
+    let finish = if strategy.floor_allowance < depth { strategy.floor_allowance } else { 0.0 };
+    let rough = depth - finish;
+    let count = strategy.stepdown.map_or(1.0, |s| (rough / s - ROUNDING).ceil().max(1.0));
+    let mut floors: Vec<f64> = (1..=count as usize).map(|k| -rough * k as f64 / count).collect();
+    if finish > 0.0 {
+        floors.push(-depth);
+    }
+    if let Some(last) = floors.last_mut() {
+        *last = -depth;
+    }
+    floors
+}
+
+/// A polyline with fewer points (within `tolerance`), none farther apart than `longest`.
+pub(super) fn shortened(points: &[Point2], tolerance: f64, longest: f64) -> Vec<Point2> {
+    const MAX_SKIP: usize = 200;
+    let Some(&first) = points.first() else { return Vec::new() };
+    let mut out = vec![first];
+    let mut from = 0;
+    while from + 1 < points.len() {
+        let fits =
+            |to: usize| (from + 1..to).all(|k| foot(&points[k], &[points[from], points[to]]).1 <= tolerance);
+        let mut to = from + 1;
+        while to + 1 < points.len() && to - from < MAX_SKIP && fits(to + 1) {
+            to += 1;
+        }
+        let side = points[to] - points[from];
+        let n = (side.norm() / longest).ceil().max(1.0);
+        if side.norm() > 0.0 {
+            out.extend((1..n as usize).map(|k| points[from] + side * (k as f64 / n)));
+            out.push(points[to]);
+        }
+        from = to;
+    }
+    out
+}
+
+struct Writer<'a> {
+    settings: &'a PlanSettings,
+    moves: Vec<Move>,
+    at: Option<Point3>,
+    start: Option<Point3>,
+    pass: u32,
+}
+
+impl Writer<'_> {
+    fn to(&mut self, tip: Point3, kind: MoveKind, feed_rate: f64) {
+        if self.start.is_none() {
+            self.start = Some(tip);
+        } else if self.at != Some(tip) {
+            self.moves.push(Move { to: ClPoint { tip }, kind, feed_rate, pass: self.pass });
+        }
+        self.at = Some(tip);
+    }
+}
+
+/// Every run at every floor.
+pub(super) fn program(
+    runs: &[Run],
+    depth: f64,
+    strategy: &PocketStrategy,
+    settings: &PlanSettings,
+) -> Toolpath {
+    let safe = settings.stock_top + settings.clearance;
+    let mut writer = Writer { settings, moves: Vec::new(), at: None, start: None, pass: 0 };
+    let mut above = settings.stock_top;
+    for floor in floors(depth, strategy) {
+        for run in runs.iter().filter(|run| run.points.len() > 1) {
+            let way = way_down(run, above, floor, strategy, settings.chord_tolerance);
+            let first = way[0];
+            let (over, near) = (Point3::new(first.x, first.y, safe), (first.z + ABOVE).min(safe));
+            writer.to(over, MoveKind::Rapid, 0.0);
+            writer.to(Point3::new(first.x, first.y, near), MoveKind::Rapid, 0.0);
+            for tip in way {
+                let from = writer.at.unwrap_or(over);
+                let (run_length, drop) = ((tip.xy() - from.xy()).norm(), from.z - tip.z);
+                // The plunge rate bounds the speed downwards, whatever the slope.
+                let steep = if drop > 0.0 { run_length.hypot(drop) / drop } else { f64::INFINITY };
+                let feed = (settings.plunge_rate * steep).min(settings.feed_rate);
+                writer.to(tip, MoveKind::Plunge, feed);
+            }
+            for p in &run.points {
+                writer.to(Point3::new(p.x, p.y, floor), MoveKind::Cut, settings.feed_rate);
+            }
+            if let Some(at) = writer.at {
+                writer.to(Point3::new(at.x, at.y, safe), MoveKind::Retract, writer.settings.feed_rate);
+            }
+            writer.pass += 1;
+        }
+        above = floor;
+    }
+    let start = writer.start.unwrap_or(Point3::new(0.0, 0.0, safe));
+    Toolpath { start: ClPoint { tip: start }, moves: writer.moves }
+}
+
+/// Tips from `above` down to where a run begins.
+fn way_down(
+    run: &Run,
+    above: f64,
+    floor: f64,
+    strategy: &PocketStrategy,
+    chord_tolerance: f64,
+) -> Vec<Point3> {
+    let drop = above - floor;
+    let begin = run.points[0];
+    let plunge = vec![Point3::new(begin.x, begin.y, above), Point3::new(begin.x, begin.y, floor)];
+    let once: Vec<Point2> = match &run.entry {
+        Entry::Helix { centre, radius } => {
+            // Chords within the share of the tolerance that arcs have everywhere.
+            let spacing = (8.0 * radius * ARC_SHARE * chord_tolerance).sqrt();
+            let mut turn = circle(centre, *radius, spacing);
+            turn.push(turn[0]);
+            turn
+        }
+        Entry::Ramp(way) => way.clone(),
+    };
+    let length: f64 = once.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
+    if length < LEAST_RAMP || drop <= ROUNDING {
+        return plunge;
+    }
+    let times = (drop / (length * strategy.ramp_angle.tan()) - ROUNDING).ceil().max(1.0);
+    let mut tips = vec![Point3::new(once[0].x, once[0].y, above)];
+    let mut gone = 0.0;
+    for _ in 0..times as usize {
+        for w in once.windows(2) {
+            gone += (w[1] - w[0]).norm();
+            let z = above - drop * (gone / (times * length)).min(1.0);
+            tips.push(Point3::new(w[1].x, w[1].y, z));
+        }
+    }
+    tips.push(Point3::new(begin.x, begin.y, floor));
+    tips.dedup();
+    tips
+}

@@ -1,0 +1,107 @@
+//! The feed where more of the cutter is in stock than is good for it.
+//!
+//! Enters: a program and the width across each move that it cuts, as a simulation found it. Leaves: the
+//! same moves with feeds reduced, and figures of the engagement.
+
+use crate::toolpath::{MoveKind, Toolpath};
+
+/// The feed never falls below this share: rubbing wears a cutter more than load does.
+pub const LEAST_SHARE: f64 = 0.3;
+
+/// A move counts with those this far before it and after it, over the cutter's radius: of a move shorter
+/// than a cell little is seen.
+const WINDOW: f64 = 0.15;
+
+/// Angle of the cutter's circumference in stock, rad, when it cuts `width` mm beside cleared ground; π in a
+/// slot.
+pub fn engagement_angle(width: f64, radius: f64) -> f64 {
+    (1.0 - width / radius).clamp(-1.0, 1.0).acos()
+}
+
+/// The engagement of a program's passes, ways down left out.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Engagement {
+    /// Greatest angle, rad.
+    pub max: f64,
+    /// 95 % of the cutting length have less, rad.
+    pub p95: f64,
+    /// Share of the cutting length above the limit.
+    pub over_limit: f64,
+    /// The move with the greatest angle.
+    pub max_move: u32,
+}
+
+/// Engagement angle of every move, rad, the greatest within a little way before and after it.
+fn angles(path: &Toolpath, widths: &[f64], radius: f64) -> Vec<f64> {
+    let lengths: Vec<f64> = path.segments().map(|(a, b, _)| (b - a).norm()).collect();
+    let cuts = |k: usize| path.moves[k].kind == MoveKind::Cut;
+    let own = |k: usize| engagement_angle(widths.get(k).copied().unwrap_or(0.0), radius);
+    (0..path.len())
+        .map(|k| {
+            if !cuts(k) {
+                return 0.0;
+            }
+            let mut angle = own(k);
+            let (mut back, mut gone) = (k, 0.0);
+            while back > 0 && cuts(back - 1) && gone < WINDOW * radius {
+                back -= 1;
+                gone += lengths[back];
+                if gone < WINDOW * radius {
+                    angle = angle.max(own(back));
+                }
+            }
+            let (mut on, mut gone) = (k, 0.0);
+            while on + 1 < path.len() && cuts(on + 1) && gone < WINDOW * radius {
+                on += 1;
+                gone += lengths[on];
+                if gone < WINDOW * radius {
+                    angle = angle.max(own(on));
+                }
+            }
+            angle
+        })
+        .collect()
+}
+
+/// Figures of the passes' engagement. `widths` are the extents of what each move cuts across its
+/// direction, mm.
+pub fn engagement(path: &Toolpath, widths: &[f64], radius: f64, limit: f64) -> Engagement {
+    let angles = angles(path, widths, radius);
+    let mut figures = Engagement::default();
+    let mut all: Vec<(f64, f64)> = Vec::new();
+    for (k, (a, b, m)) in path.segments().enumerate() {
+        if m.kind != MoveKind::Cut {
+            continue;
+        }
+        if angles[k] > figures.max {
+            (figures.max, figures.max_move) = (angles[k], k as u32);
+        }
+        all.push((angles[k], (b - a).norm()));
+    }
+    let whole: f64 = all.iter().map(|a| a.1).sum();
+    if whole <= 0.0 {
+        return figures;
+    }
+    figures.over_limit = all.iter().filter(|a| a.0 > limit).map(|a| a.1).sum::<f64>() / whole;
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut below = 0.0;
+    for (angle, length) in all {
+        below += length;
+        if below >= 0.95 * whole {
+            figures.p95 = angle;
+            break;
+        }
+    }
+    figures
+}
+
+/// Reduces the feed of cutting moves whose engagement is above `limit`, rad, in proportion, down to
+/// `LEAST_SHARE`.
+pub fn limit_feed(path: &mut Toolpath, widths: &[f64], radius: f64, limit: f64) {
+    let angles = angles(path, widths, radius);
+    for (m, angle) in path.moves.iter_mut().zip(angles) {
+        if m.kind == MoveKind::Cut && angle > limit {
+            m.feed_rate *= (limit / angle).max(LEAST_SHARE);
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! Zigzag over a plane piece: parallel lines, joined along the walls, then once around each wall.
+
+use super::route::{Entry, Run, begun_near};
+use crate::geometry::{Piece, Point2, SegmentGrid, Vector2};
+
+/// One line within the piece.
+#[derive(Debug, Clone, Copy)]
+struct Line {
+    ends: [Point2; 2],
+    row: usize,
+}
+
+/// Lines at `angle` (rad) from the x axis, `step` apart.
+pub fn runs(piece: &Piece, angle: f64, step: f64) -> Vec<Run> {
+    let (sin, cos) = angle.sin_cos();
+    let (u, v) = (Vector2::new(cos, sin), Vector2::new(-sin, cos));
+    let rows = |p: &Point2| p.coords.dot(&v);
+    let (lo, hi) = piece.outer.iter().map(rows).fold((f64::MAX, f64::MIN), |(a, b), r| (a.min(r), b.max(r)));
+    // The walls are gone around: the first line stands off by a step or less.
+    let count = ((hi - lo) / step).ceil().max(1.0) as usize;
+    let spacing = (hi - lo) / count as f64;
+    let mut lines: Vec<Line> = Vec::new();
+    for row in 1..count.max(2) {
+        let level = if count == 1 { 0.5 * (lo + hi) } else { lo + spacing * row as f64 };
+        let mut cuts: Vec<f64> = Vec::new();
+        for curve in piece.curves() {
+            for (k, a) in curve.iter().enumerate() {
+                let b = &curve[(k + 1) % curve.len()];
+                let (ra, rb) = (rows(a), rows(b));
+                if (ra > level) != (rb > level) {
+                    cuts.push((a + (b - a) * ((level - ra) / (rb - ra))).coords.dot(&u));
+                }
+            }
+        }
+        cuts.sort_by(f64::total_cmp);
+        let at = |s: f64| Point2::from(u * s + v * level);
+        lines.extend(
+            cuts.chunks_exact(2).filter(|c| c[1] > c[0]).map(|c| Line { ends: [at(c[0]), at(c[1])], row }),
+        );
+    }
+    let mut runs = chained(lines, piece, spacing);
+    for wall in piece.curves() {
+        let end = runs.last().and_then(|r: &Run| r.points.last()).copied();
+        let closed = begun_near(wall, &end.unwrap_or(wall[0]), 0.0);
+        let mut around = closed.clone();
+        around.push(closed[0]);
+        match runs.last_mut() {
+            // The last line ended at this wall.
+            Some(run) if end.is_some_and(|e| (e - closed[0]).norm() < 1e-6) => {
+                run.points.extend(around.into_iter().skip(1))
+            }
+            _ => runs.push(Run { entry: Entry::Ramp(around.clone()), points: around }),
+        }
+    }
+    runs
+}
+
+/// Lines one after the other: from each to one of the next row whose end can be reached along a wall.
+fn chained(mut lines: Vec<Line>, piece: &Piece, spacing: f64) -> Vec<Run> {
+    /// A way along the wall to the next row is at most so many times the distance of rows.
+    const LONGEST_LINK: f64 = 4.0;
+    let walls = SegmentGrid::of_curves(piece.curves());
+    let mut runs: Vec<Run> = Vec::new();
+    let mut at: Option<(usize, Point2)> = None;
+    while !lines.is_empty() {
+        let next = at.and_then(|(row, end)| {
+            let ends = lines.iter().enumerate().filter(|(_, l)| l.row == row + 1);
+            ends.flat_map(|(k, l)| [(k, 0), (k, 1)].map(|(k, e)| (k, e, l.ends[e])))
+                .filter_map(|(k, e, p)| {
+                    along_wall(piece, &walls, &end, &p, LONGEST_LINK * spacing).map(|way| (k, e, way))
+                })
+                .min_by(|a, b| length(&a.2).total_cmp(&length(&b.2)))
+        });
+        if let (Some((k, e, way)), Some(run)) = (next, runs.last_mut()) {
+            let line = lines.remove(k);
+            run.points.extend(way.into_iter().skip(1));
+            run.points.push(line.ends[1 - e]);
+            at = Some((line.row, line.ends[1 - e]));
+        } else {
+            let first = (0..lines.len()).min_by_key(|k| lines[*k].row).unwrap_or(0);
+            let line = lines.remove(first);
+            let way = vec![line.ends[0], line.ends[1], line.ends[0]];
+            runs.push(Run { entry: Entry::Ramp(way), points: line.ends.to_vec() });
+            at = Some((line.row, line.ends[1]));
+        }
+    }
+    runs
+}
+
+fn length(way: &[Point2]) -> f64 {
+    way.windows(2).map(|w| (w[1] - w[0]).norm()).sum()
+}
+
+/// The way along one wall from `a` to `b`, both on it, if it is no longer than `longest`.
+fn along_wall(
+    piece: &Piece,
+    walls: &SegmentGrid,
+    a: &Point2,
+    b: &Point2,
+    longest: f64,
+) -> Option<Vec<Point2>> {
+    if (b - a).norm() > longest {
+        return None;
+    }
+    let (from, to) = (walls.nearest(a)?, walls.nearest(b)?);
+    let (s, t) = (walls.segments()[from.segment as usize], walls.segments()[to.segment as usize]);
+    if s.curve != t.curve {
+        return None;
+    }
+    let curve = piece.curves().nth(s.curve as usize)?;
+    let n = curve.len();
+    let walk = |forwards: bool| {
+        let mut way = vec![*a];
+        let (mut k, last) = (s.index as usize, t.index as usize);
+        let ahead = if forwards { from.share <= to.share } else { from.share >= to.share };
+        let mut first = true;
+        while k != last || (first && !ahead) {
+            first = false;
+            way.push(curve[if forwards { (k + 1) % n } else { k }]);
+            k = if forwards { (k + 1) % n } else { (k + n - 1) % n };
+            if length(&way) > longest {
+                return None;
+            }
+        }
+        way.push(*b);
+        (length(&way) <= longest).then_some(way)
+    };
+    match (walk(true), walk(false)) {
+        (Some(x), Some(y)) => Some(if length(&x) <= length(&y) { x } else { y }),
+        (x, y) => x.or(y),
+    }
+}

@@ -1,0 +1,253 @@
+//! Pockets: a plane region with islands, cut down to a level floor in steps.
+//!
+//! Enters: the region, its depth, the cutter. Leaves: a program. The cutter's centre stays in the region
+//! drawn in by the cutter's radius. Passes there are level curves of a flow that follows walls and islands
+//! (or offsets of them, or parallel lines), cut from the inside outwards, so that only the first pass of
+//! each nest is a slot; each nest is entered by a helix where there is room, else by a ramp along its first
+//! pass. The design's frame: z = 0 is the upper face, the floor lies at minus the depth; mm.
+
+mod descend;
+mod feed;
+mod lines;
+mod nest;
+mod route;
+#[cfg(test)]
+mod tests;
+
+pub use feed::{Engagement, engagement, engagement_angle, limit_feed};
+use nest::NestError;
+use route::{Entry, Run};
+
+use super::{Plan, PlanError, PlanSettings, Step};
+use crate::cutter::{Cutter, CutterShape};
+use crate::geometry::{Piece, Region, SegmentGrid};
+use crate::monitor::{self, Monitor};
+
+/// A pocket to mill.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pocket {
+    /// Its region in the plan view.
+    pub region: Region,
+    /// How far the floor lies below z = 0, mm.
+    pub depth: f64,
+}
+
+/// How a flow is made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Flow {
+    /// Length over which the distance from the walls is smoothed, mm; `None`: that of four with the
+    /// shortest passes.
+    pub smoothing: Option<f64>,
+    /// One spiral where passes are nested around one place.
+    pub spiral: bool,
+}
+
+/// The passes of one step down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Pattern {
+    /// Level curves of a flow that follows the walls.
+    Flow(Flow),
+    /// Offsets of the walls.
+    Offset {
+        /// One spiral where passes are nested around one place.
+        spiral: bool,
+    },
+    /// Parallel lines.
+    Zigzag {
+        /// Their angle from the x axis, rad.
+        angle: f64,
+    },
+}
+
+/// How a pocket is milled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PocketStrategy {
+    /// The passes.
+    pub pattern: Pattern,
+    /// Largest step down, mm; `None`: all of the depth at once.
+    pub stepdown: Option<f64>,
+    /// Left for a last step over the floor, mm; 0 for none.
+    pub floor_allowance: f64,
+    /// Left at the walls for a last pass along them, mm; 0 for none.
+    pub wall_allowance: f64,
+    /// Steepest way down, rad from level.
+    pub ramp_angle: f64,
+    /// Radius of the helix of the cutter's centre, mm; `None`: 0.8 of the cutter's radius, which leaves no
+    /// core.
+    pub helix_radius: Option<f64>,
+    /// Most of the cutter's circumference in stock at full feed, rad; where more is, the feed falls in
+    /// proportion. It bounds the stepover, and a flow's passes then lie within it everywhere. `None`: a
+    /// quarter more than the stepover has in straight passes.
+    pub engagement: Option<f64>,
+}
+
+/// Helix radius over the cutter's radius when none is asked for. Above 1 a core would stand.
+const HELIX_OVER_RADIUS: f64 = 0.8;
+
+/// The least helix that is worth one, over the cutter's radius: a smaller one is a plunge.
+const LEAST_HELIX: f64 = 0.2;
+
+/// Share of the flat bottom's radius that innermost passes may lie from what they have to clear.
+const REACH: f64 = 0.95;
+
+/// Longest move over the cutter's radius: feeds and engagement belong to moves.
+const MOVE_OVER_RADIUS: f64 = 0.5;
+
+/// Sides of spirals and links over the stepover.
+const SPACING: f64 = 0.25;
+
+/// Precision of the largest cutter that an error names, mm.
+const DISC_PRECISION: f64 = 0.005;
+
+impl PocketStrategy {
+    /// Name as scenes spell it.
+    pub fn name(&self) -> &'static str {
+        match self.pattern {
+            Pattern::Flow(_) => "pocket-flow",
+            Pattern::Offset { .. } => "pocket-offset",
+            Pattern::Zigzag { .. } => "pocket-zigzag",
+        }
+    }
+
+    /// The stepover, mm: the one asked for, or less where the engagement asks for it.
+    pub fn stepover(&self, step: Step, radius: f64) -> f64 {
+        let asked = match step {
+            Step::Stepover(s) => s,
+            Step::Scallop(_) => 0.8 * radius,
+        };
+        self.engagement.map_or(asked, |angle| asked.min(radius * (1.0 - angle.cos())))
+    }
+
+    /// Angle of the cutter in stock, rad, above which the feed falls.
+    pub fn engagement_limit(&self, step: Step, radius: f64) -> f64 {
+        /// Curved passes and links have a little more than straight ones; a feed that falls there is
+        /// restless.
+        const SLACK: f64 = 1.25;
+        let straight = engagement_angle(self.stepover(step, radius), radius);
+        self.engagement.unwrap_or(SLACK * straight).clamp(0.01, std::f64::consts::PI)
+    }
+}
+
+impl Pocket {
+    /// The floor that a cutter can reach: the region that the flat of its bottom sweeps.
+    pub fn reachable_floor(&self, cutter: &Cutter) -> Region {
+        self.region.inset(cutter.radius()).grown(cutter.flat_radius())
+    }
+
+    /// Area of the region that no position of the cutter sweeps, mm²: what stays in sharp corners. Over a
+    /// square corner it is `r² (1 − π/4)`.
+    pub fn rest_area(&self, cutter: &Cutter) -> f64 {
+        let r = cutter.radius();
+        (self.region.area() - self.region.inset(r).grown(r).area()).max(0.0)
+    }
+}
+
+/// Plans one pocket.
+///
+/// # Errors
+/// [`PlanError`]: no position for the cutter (with the largest diameter that would do), a cutter whose
+/// sides are not vertical, passes without end.
+pub fn plan_pocket(
+    pocket: &Pocket,
+    cutter: &Cutter,
+    strategy: &PocketStrategy,
+    settings: &PlanSettings,
+    monitor: &dyn Monitor,
+) -> Result<Plan, PlanError> {
+    let refuse = |reason: String| PlanError::NotApplicable { strategy: strategy.name(), reason };
+    if !matches!(cutter.shape(), CutterShape::Flat | CutterShape::Bull | CutterShape::Ball) {
+        return Err(refuse("its walls are vertical; use a flat, bull or ball cutter".into()));
+    }
+    let radius = cutter.radius();
+    // Half of the chord tolerance is for chords, which may come as much nearer to the walls.
+    let chords = 0.5 * settings.chord_tolerance;
+    let walls_at = pocket.region.inset(radius + chords);
+    if walls_at.is_empty() {
+        let largest = pocket.region.largest_disc(DISC_PRECISION).map_or(0.0, |d| 2.0 * d.1);
+        return Err(refuse(format!(
+            "a cutter of {} mm fits nowhere in the outline; the largest that would is {:.2} mm",
+            2.0 * radius,
+            (largest * 100.0).floor() / 100.0
+        )));
+    }
+    let rough = if strategy.wall_allowance > 0.0 {
+        pocket.region.inset(radius + chords + strategy.wall_allowance)
+    } else {
+        walls_at.clone()
+    };
+    let mut notes = Vec::new();
+    if rough.is_empty() {
+        notes.push(
+            "no room for passes within the wall allowance: only the pass along the walls is cut".into(),
+        );
+    }
+    let step = strategy.stepover(settings.step, radius);
+    let mut runs = Vec::new();
+    for piece in &rough.pieces {
+        monitor::check(monitor)?;
+        runs.extend(piece_runs(piece, cutter, strategy, step, &mut notes, monitor)?);
+    }
+    if strategy.wall_allowance > 0.0 {
+        for piece in &walls_at.pieces {
+            for wall in piece.curves() {
+                let mut around = wall.to_vec();
+                around.push(wall[0]);
+                runs.push(Run { entry: Entry::Ramp(around.clone()), points: around });
+            }
+        }
+    }
+    if walls_at.pieces.len() > 1 {
+        notes.push(format!(
+            "the cutter's centre has room in {} places apart from each other",
+            walls_at.pieces.len()
+        ));
+    }
+    let rest = pocket.rest_area(cutter);
+    notes.push(format!(
+        "{rest:.3} mm² of {:.1} mm² lie in corners that no position of the cutter reaches",
+        pocket.region.area()
+    ));
+    for run in &mut runs {
+        run.points = descend::shortened(&run.points, chords, MOVE_OVER_RADIUS * radius);
+    }
+    let path = descend::program(&runs, pocket.depth, strategy, settings);
+    Ok(Plan { path, notes, shortest: None })
+}
+
+fn piece_runs(
+    piece: &Piece,
+    cutter: &Cutter,
+    strategy: &PocketStrategy,
+    step: f64,
+    notes: &mut Vec<String>,
+    monitor: &dyn Monitor,
+) -> Result<Vec<Run>, PlanError> {
+    let failed = |e: NestError| match e {
+        NestError::Cancelled(c) => PlanError::Cancelled(c),
+        e => PlanError::NotApplicable { strategy: strategy.name(), reason: e.to_string() },
+    };
+    let radius = cutter.radius();
+    let flat = cutter.flat_radius();
+    let reach = if flat > 0.0 { REACH * flat } else { step };
+    let (nest, spiral) = match strategy.pattern {
+        Pattern::Zigzag { angle } => return Ok(lines::runs(piece, angle, step)),
+        Pattern::Offset { spiral } => (nest::offsets(piece, step, reach, monitor).map_err(failed)?, spiral),
+        Pattern::Flow(flow) => {
+            let strict = strategy.engagement.is_some();
+            let spacing =
+                if strict { nest::Spacing::strict(step) } else { nest::Spacing::lenient(step, reach) };
+            let (nest, sigma) = nest::flow(piece, &flow, spacing, reach, monitor).map_err(failed)?;
+            let plain = nest::offsets(piece, step, reach, monitor).map_err(failed)?.length();
+            notes.push(format!(
+                "the flow is smoothed over {sigma:.2} mm; its passes are {:.1} mm long, offsets of the walls would be {plain:.1} mm",
+                nest.length()
+            ));
+            (nest, flow.spiral)
+        }
+    };
+    let walls = SegmentGrid::of_curves(piece.curves());
+    let helix = strategy.helix_radius.unwrap_or(HELIX_OVER_RADIUS * radius);
+    let settings =
+        route::RouteSettings { helix: [helix, LEAST_HELIX * radius], spiral, spacing: SPACING * step };
+    Ok(route::runs(&nest, &walls, &settings))
+}

@@ -1,0 +1,210 @@
+use super::*;
+use crate::geometry::{Point2, Point3};
+use crate::monitor::Silent;
+use crate::toolpath::{Joining, MoveKind};
+use std::f64::consts::PI;
+
+fn rectangle(x0: f64, y0: f64, x1: f64, y1: f64) -> Vec<Point2> {
+    [(x0, y0), (x1, y0), (x1, y1), (x0, y1)].map(|(x, y)| Point2::new(x, y)).to_vec()
+}
+
+fn disc(x: f64, y: f64, r: f64) -> Vec<Point2> {
+    (0..90)
+        .map(|k| 2.0 * PI * f64::from(k) / 90.0)
+        .map(|a| Point2::new(x + r * a.cos(), y + r * a.sin()))
+        .collect()
+}
+
+fn pocket(curves: Vec<Vec<Point2>>) -> Pocket {
+    Pocket { region: Region::nested(curves).unwrap().0, depth: 6.0 }
+}
+
+fn with_island() -> Pocket {
+    pocket(vec![rectangle(0.0, 0.0, 60.0, 40.0), disc(40.0, 22.0, 7.0)])
+}
+
+fn settings() -> PlanSettings {
+    PlanSettings {
+        step: Step::Stepover(2.4),
+        chord_tolerance: 0.005,
+        clearance: 2.0,
+        stock_top: 0.0,
+        feed_rate: 1000.0,
+        plunge_rate: 300.0,
+        rapid_rate: 5000.0,
+        joining: Joining::default(),
+    }
+}
+
+fn strategy(pattern: Pattern) -> PocketStrategy {
+    PocketStrategy {
+        pattern,
+        stepdown: Some(3.0),
+        floor_allowance: 0.0,
+        wall_allowance: 0.0,
+        ramp_angle: 3f64.to_radians(),
+        helix_radius: None,
+        engagement: None,
+    }
+}
+
+fn patterns() -> [Pattern; 6] {
+    [
+        Pattern::Flow(Flow { smoothing: None, spiral: false }),
+        Pattern::Flow(Flow { smoothing: Some(4.0), spiral: true }),
+        Pattern::Offset { spiral: false },
+        Pattern::Offset { spiral: true },
+        Pattern::Zigzag { angle: 0.0 },
+        Pattern::Zigzag { angle: 0.5 },
+    ]
+}
+
+/// Every tip below the face keeps the cutter's radius from all walls, no rapid is fed through stock height,
+/// no way down is steeper than asked, and every place of the floor is within the radius of a pass.
+#[test]
+fn programs_keep_to_the_pocket_and_clear_it() {
+    let cutter = Cutter::flat(6.0).unwrap();
+    let dumbbell = [(0., 0.), (20., 0.), (20., 8.), (30., 8.), (30., 0.), (50., 0.), (50., 20.), (30., 20.)]
+        .into_iter()
+        .chain([(30., 12.), (20., 12.), (20., 20.), (0., 20.)])
+        .map(|(x, y)| Point2::new(x, y))
+        .collect();
+    for pocket in [with_island(), pocket(vec![rectangle(0.0, 0.0, 30.0, 30.0)]), pocket(vec![dumbbell])] {
+        let walls = SegmentGrid::of_curves(pocket.region.curves());
+        let floor = pocket.reachable_floor(&cutter).inset(0.02);
+        for pattern in patterns() {
+            let plan = plan_pocket(&pocket, &cutter, &strategy(pattern), &settings(), &Silent).unwrap();
+            let mut segments = Vec::new();
+            for (a, b, m) in plan.path.segments() {
+                let what = format!("{pattern:?} {a} {b} {:?}", m.kind);
+                if m.kind == MoveKind::Rapid {
+                    let vertical = a.xy() == b.xy();
+                    assert!(vertical || (a.z == 2.0 && b.z == 2.0), "{what}");
+                    continue;
+                }
+                for t in [0.0, 0.3, 0.7, 1.0] {
+                    let p = a + (b - a) * t;
+                    let off = walls.distance(&p.xy());
+                    assert!(pocket.region.contains(&p.xy()) && off > 3.0 - 1e-4 - 0.005, "{what}: {off}");
+                }
+                if m.kind == MoveKind::Plunge && a.xy() != b.xy() {
+                    let slope = (a.z - b.z) / (b.xy() - a.xy()).norm();
+                    assert!(slope <= 3f64.to_radians().tan() * 1.001, "{what}: {slope}");
+                }
+                if m.kind == MoveKind::Cut && a.z == -6.0 && b.z == -6.0 {
+                    segments.push(crate::geometry::CurveSegment {
+                        ends: [a.xy(), b.xy()],
+                        curve: 0,
+                        index: 0,
+                    });
+                }
+            }
+            let passes = SegmentGrid::new(segments);
+            let [lo, hi] = floor.bounds().unwrap();
+            let mut farthest = 0.0f64;
+            for j in 0..200 {
+                for i in 0..200 {
+                    let at = |a: f64, b: f64, k: i32| a + (b - a) * (f64::from(k) + 0.5) / 200.0;
+                    let p = Point2::new(at(lo.x, hi.x, i), at(lo.y, hi.y, j));
+                    if floor.contains(&p) {
+                        farthest = farthest.max(passes.distance(&p));
+                    }
+                }
+            }
+            assert!(farthest <= 3.0, "{pattern:?}: a place is {farthest} from the nearest pass");
+            let lowest = plan.path.moves.iter().map(|m| m.to.tip.z).fold(0.0, f64::min);
+            assert_eq!(lowest, -6.0);
+        }
+    }
+}
+
+/// From each curve of a flow the next one inwards is within the stepover, and somewhere just that far.
+#[test]
+fn neighbouring_passes_lie_within_the_stepover() {
+    let region = with_island().region.inset(3.0);
+    let step = 2.4;
+    for sigma in [0.5, 2.0, 8.0] {
+        let field = nest::FlowField::new(&region.pieces[0], step).unwrap();
+        let nest = field.nest(&region.pieces[0], sigma, nest::Spacing::strict(step), 2.85, &Silent).unwrap();
+        let mut greatest = 0.0f64;
+        let mut stack = vec![&nest];
+        while let Some(nest) = stack.pop() {
+            if nest.inner.is_empty() {
+                continue;
+            }
+            let closed = nest.inner.iter().flat_map(|n| n.curves.curves());
+            let mut sides = SegmentGrid::of_curves(closed).segments().to_vec();
+            for w in nest.between.iter().flat_map(|s| s.windows(2)) {
+                sides.push(crate::geometry::CurveSegment { ends: [w[0], w[1]], curve: 0, index: 0 });
+            }
+            let inner = SegmentGrid::new(sides);
+            for p in nest.curves.curves().flatten() {
+                greatest = greatest.max(inner.distance(p));
+            }
+            stack.extend(&nest.inner);
+        }
+        assert!(greatest <= step * 1.01 && greatest > 0.95 * step, "{sigma}: {greatest}");
+    }
+}
+
+#[test]
+fn what_corners_keep_has_a_closed_form() {
+    let cutter = Cutter::flat(6.0).unwrap();
+    let rest = pocket(vec![rectangle(0.0, 0.0, 60.0, 40.0)]).rest_area(&cutter);
+    let exact = 4.0 * 9.0 * (1.0 - PI / 4.0);
+    assert!((rest - exact).abs() < 0.1, "{rest} {exact}: chords and sides stand off by 0.4 µm over 200 mm");
+}
+
+#[test]
+fn a_cutter_that_fits_nowhere_is_told_the_largest_that_does() {
+    let slot = pocket(vec![rectangle(0.0, 0.0, 30.0, 5.0)]);
+    let error =
+        plan_pocket(&slot, &Cutter::flat(6.0).unwrap(), &strategy(patterns()[0]), &settings(), &Silent)
+            .unwrap_err();
+    assert!(
+        error.to_string().contains("fits nowhere") && error.to_string().contains("is 4.99 mm")
+            || error.to_string().contains("is 5.00 mm"),
+        "{error}"
+    );
+    let taper = Cutter::taper(2.0, 0.5, 0.1, 6.0).unwrap();
+    assert!(plan_pocket(&slot, &taper, &strategy(patterns()[0]), &settings(), &Silent).is_err());
+    // Just room: a single line of positions.
+    assert!(
+        plan_pocket(&slot, &Cutter::flat(4.9).unwrap(), &strategy(patterns()[0]), &settings(), &Silent)
+            .is_ok()
+    );
+}
+
+#[test]
+fn steps_go_down_evenly_and_the_floor_has_its_own() {
+    let mut s = strategy(patterns()[2]);
+    assert_eq!(descend::floors(6.0, &s), [-3.0, -6.0]);
+    assert_eq!(descend::floors(7.0, &s).len(), 3);
+    s.floor_allowance = 0.5;
+    assert_eq!(descend::floors(6.0, &s), [-2.75, -5.5, -6.0]);
+    s.stepdown = None;
+    assert_eq!(descend::floors(6.0, &s), [-5.5, -6.0]);
+}
+
+#[test]
+fn feeds_fall_where_more_of_the_cutter_cuts() {
+    assert!((engagement_angle(3.0, 3.0) - PI / 2.0).abs() < 1e-15);
+    assert_eq!(engagement_angle(6.0, 3.0), PI);
+    let to = |x: f64| crate::toolpath::Move {
+        to: crate::toolpath::ClPoint { tip: Point3::new(x, 0.0, 0.0) },
+        kind: MoveKind::Cut,
+        feed_rate: 1000.0,
+        pass: 0,
+    };
+    let mut path = crate::toolpath::Toolpath {
+        start: crate::toolpath::ClPoint { tip: Point3::origin() },
+        moves: vec![to(10.0), to(20.0), to(30.0)],
+    };
+    let widths = [1.0, 6.0, 1.0];
+    let figures = engagement(&path, &widths, 3.0, PI / 2.0);
+    assert_eq!((figures.max, figures.p95, figures.max_move), (PI, PI, 1));
+    assert!((figures.over_limit - 1.0 / 3.0).abs() < 1e-12);
+    limit_feed(&mut path, &widths, 3.0, PI / 2.0);
+    let feeds: Vec<f64> = path.moves.iter().map(|m| m.feed_rate).collect();
+    assert_eq!(feeds, [1000.0, 500.0, 1000.0]);
+}
