@@ -8,7 +8,9 @@ use super::{Plan, Section};
 use millstream::cutter::Cutter;
 use millstream::monitor::Silent;
 use millstream::sim::{MoveBins, SweptMove, Work, ZMap};
-use millstream::sim::{cut, cut_counted, cut_in_order, cut_in_order_plain, cut_reference};
+use millstream::sim::{
+    cut, cut_all_candidates, cut_counted, cut_in_order, cut_in_order_plain, cut_reference,
+};
 use millstream::toolpath::Toolpath;
 
 /// Distance between passes, mm.
@@ -44,6 +46,11 @@ fn by_cut(stock: &ZMap, cutter: &Cutter, path: &Toolpath) -> (f64, ZMap) {
 
 fn by_reference(stock: &ZMap, cutter: &Cutter, path: &Toolpath) -> (f64, ZMap) {
     timed_with(|| cut_reference(stock, cutter, path, &Silent).expect("never cancelled"))
+}
+
+fn by_all_candidates(stock: &ZMap, cutter: &Cutter, path: &Toolpath) -> (f64, ZMap) {
+    let stock = stock.clone();
+    timed_with(|| cut_all_candidates(stock, cutter, path, &Silent).expect("never cancelled").0)
 }
 
 /// Farthest difference of heights, mm.
@@ -159,21 +166,24 @@ fn against_reference(plan: &Plan) -> Table {
 fn against_plain(plan: &Plan) -> Table {
     let mut table = Table::new(
         "plain",
-        "cut and cut_reference against a plain loop over tiles",
+        "cut and cut_reference against engines without bounds",
         format!(
-            "cut_reference has bounds itself. The plain loop evaluates every move of a tile of 64 x 64 \
-             cells at all cells of its bounding rectangle, in f64. It is slow: all three cut only {0} x \
-             {0} mm in the middle of the wave, with all moves that reach it. On the part of 100 x 100 mm \
-             it would take {1:.0} times as long (last column, not measured). One thread.",
+            "cut_reference has bounds itself. All candidates: every move of a tile of 64 x 64 cells at each \
+             of its cells, by the closed forms in f32 and the vectors of cut. The plain loop: every such move \
+             at all cells of its bounding rectangle, in f64. Both are slow: all four cut only {0} x {0} mm in \
+             the middle of the wave, with all moves that reach it. On the part of 100 x 100 mm the plain loop \
+             would take {1:.0} times as long (last column, not measured). One thread.",
             PATCH[1] - PATCH[0],
             scale()
         ),
         &[
             Column("plain", "ns a cell"),
+            Column("all candidates", "ns a cell"),
             Column("reference", "ns a cell"),
             Column("cut", "ns a cell"),
             Column("write fresh", "ns a cell"),
             Column("plain/cut", "times"),
+            Column("all candidates/cut", "times"),
             Column("plain/reference", "times"),
             Column("farthest", "nm"),
             Column("plain on the part", "s, scaled"),
@@ -185,13 +195,14 @@ fn against_plain(plan: &Plan) -> Table {
         }
         let (tool, path, stock) = (cutter(kind), wave(AROUND, STEPOVER, chord), block(PATCH, cell));
         let off = farthest(&by_cut(&stock, &tool, &path).1, &cut_plainly(stock.clone(), &tool, &path));
-        let [plain, by_reference, by_cut, fresh] = fastest(
+        let [plain, all_candidates, by_reference, by_cut, fresh] = fastest(
             plan,
             [
                 &mut || {
                     let stock = stock.clone();
                     timed(|| cut_plainly(stock, &tool, &path))
                 },
+                &mut || by_all_candidates(&stock, &tool, &path).0,
                 &mut || by_reference(&stock, &tool, &path).0,
                 &mut || by_cut(&stock, &tool, &path).0,
                 &mut || write_fresh(PATCH, cell),
@@ -202,10 +213,12 @@ fn against_plain(plan: &Plan) -> Table {
             name(scene),
             [
                 each * plain,
+                each * all_candidates,
                 each * by_reference,
                 each * by_cut,
                 each * fresh,
                 plain / by_cut,
+                all_candidates / by_cut,
                 plain / by_reference,
                 1e6 * off,
                 scale() * plain,
@@ -220,9 +233,9 @@ fn scale() -> f64 {
     (100.0 / (PATCH[1] - PATCH[0])).powi(2)
 }
 
-/// The first four columns of the table of plain loops as dots.
+/// The first five columns of the table of engines without bounds as dots.
 fn plain_marks(table: &Table) -> Vec<(String, Vec<Mark>)> {
-    let marks = |row: &[f64]| table.columns.iter().zip(row).take(4).map(|(c, v)| Mark(c.0, *v)).collect();
+    let marks = |row: &[f64]| table.columns.iter().zip(row).take(5).map(|(c, v)| Mark(c.0, *v)).collect();
     table.rows.iter().map(|(name, row)| (name.clone(), marks(row))).collect()
 }
 

@@ -52,6 +52,9 @@ const PART_CELLS: usize = PART * PART;
 /// many workers.
 const LARGEST_TILE: usize = 256;
 
+/// The same where no bound is used: fewer cells see a move in vain.
+const CANDIDATES_TILE: usize = 64;
+
 /// Side of a tile in cutter radii, about. In larger ones many moves are carried down a level in vain; in
 /// smaller ones a move is listed in many tiles.
 const TILE_RADII: f64 = 1.7;
@@ -91,7 +94,24 @@ pub fn cut_counted(
         return Ok((cut_reference(&stock, cutter, path, monitor)?, Work::default()));
     }
     let side = tile_side(form.radius, stock.grid.cell);
-    Job { form, path, side, margin: 0.0 }.run(stock, monitor)
+    Job { form, path, side, bounded: true, margin: 0.0 }.run(stock, monitor)
+}
+
+/// As [`cut_counted`] without any bound: every move that reaches a tile is evaluated at each of its cells,
+/// by the same closed forms and vectors. What the bounds are measured against.
+///
+/// # Errors
+/// As [`cut`].
+#[doc(hidden)]
+pub fn cut_all_candidates(
+    stock: ZMap,
+    cutter: &Cutter,
+    path: &Toolpath,
+    monitor: &dyn Monitor,
+) -> Result<(ZMap, Work), Cancelled> {
+    let form = Form::new(cutter);
+    let side = tile_side(form.radius, stock.grid.cell).min(CANDIDATES_TILE);
+    Job { form, path, side, bounded: false, margin: 0.0 }.run(stock, monitor)
 }
 
 fn tile_side(radius: f64, cell: f64) -> usize {
@@ -118,6 +138,8 @@ struct Job<'a> {
     form: Form,
     path: &'a Toolpath,
     side: usize,
+    /// Whether squares drop moves.
+    bounded: bool,
     /// Added to every bound: 0 but in tests.
     margin: f64,
 }
@@ -318,6 +340,16 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
     /// Cuts all of the tile with the moves of the first level.
     #[inline(always)]
     fn whole(&mut self, side: usize) {
+        if !self.job.bounded {
+            self.choose_all(0);
+            for at in (0..side * side / LEAF_CELLS).map(|k| [k % (side / LEAF), k / (side / LEAF)]) {
+                let at = at.map(|k| k * LEAF);
+                if let Some(size) = self.inside(at, LEAF) {
+                    self.leaf::<LEAF, LEAF_CELLS>(self.cells, [0, 0], at, size);
+                }
+            }
+            return;
+        }
         self.choose::<1>(0, [[0, 0]], side);
         // A recursion that is all inlined: an explicit stack of squares, each with the level whose moves
         // it chose from and its place among the squares that chose together.
@@ -365,17 +397,24 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
         let Some(first) = cells[0] else { return };
         // Squares outside choose as the first one does, which always has cells, and are left out later.
         let squares = cells.map(|c| c.unwrap_or(first)).map(|(at, size)| self.square_at(at, size));
-        let Level { moves, chosen, kept } = &mut self.levels[level];
-        if moves.len() <= FEW {
+        if self.levels[level].moves.len() <= FEW {
             // So few cost less at every cell than telling them apart.
-            chosen.clear();
-            chosen.extend((0..moves.chunks().len()).map(|k| [moves.lanes_in_use(k); SQUARES]));
-            *kept = [moves.len(); SQUARES];
+            self.choose_all(level);
             return;
         }
+        let Level { moves, chosen, kept } = &mut self.levels[level];
         let margin = T::of(self.job.margin);
         self.work.tests += (moves.len() * Q) as u64;
         *kept = self.chooser.choose(&self.sweep, moves, &squares, &stocks, margin, chosen);
+    }
+
+    /// Marks all of the level's moves for each square.
+    #[inline(always)]
+    fn choose_all(&mut self, level: usize) {
+        let Level { moves, chosen, kept } = &mut self.levels[level];
+        chosen.clear();
+        chosen.extend((0..moves.chunks().len()).map(|k| [moves.lanes_in_use(k); SQUARES]));
+        *kept = [moves.len(); SQUARES];
     }
 
     /// Leaves the moves that a square chose from a level in the one below.

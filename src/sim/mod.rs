@@ -19,7 +19,7 @@ mod track;
 mod zmap;
 
 pub use bins::MoveBins;
-pub use cut::{Work, cut, cut_counted};
+pub use cut::{Work, cut, cut_all_candidates, cut_counted};
 pub use envelope::Envelope;
 pub use grid::{Grid, GridError};
 pub use holder::{Collision, HolderClearance, holder_collisions};

@@ -203,8 +203,10 @@ pub(super) struct Flat<T> {
     within: T,
     /// Rounding of places, as one of squared distances from the axis.
     edge: T,
-    /// Half chord, as a share of the radius and of the slope, below which the edge is too steep.
+    /// Half chord, as a share of the slope, below which the edge is too steep, and what rounding may change
+    /// the place by there.
     rim: T,
+    shift: T,
 }
 
 impl<T: Real> Flat<T> {
@@ -215,6 +217,7 @@ impl<T: Real> Flat<T> {
             within: T::of(PLANE_SHARE * radius),
             edge: T::of(2.0 * radius * blur),
             rim: T::of(radius * blur / ROUNDING_LIMIT),
+            shift: T::of((2.0 * radius * blur).sqrt()),
         }
     }
 }
@@ -257,8 +260,8 @@ impl<T: Real> Sweep<T> for Flat<T> {
         let inside = margin >= T::of(0.0);
         let at_edge = margin.absolute() < self.edge;
         let steep = inside & (half_chord < self.rim * m.slope) & (place > m.low);
-        let doubt = if at_edge | steep { tip } else { infinite };
-        (if inside { tip } else { infinite }, doubt)
+        let lowest = tip - if steep { m.slope * self.shift } else { T::of(0.0) };
+        (if inside { tip } else { infinite }, if at_edge | steep { lowest } else { infinite })
     }
 }
 
@@ -275,6 +278,8 @@ pub(super) struct Rounded<T, const CONES: bool> {
     corner: T,
     arc_end: T,
     arc_end_z: T,
+    /// Slope of the arc where it ends.
+    arc_end_slope: T,
     /// Slope of the side.
     side: T,
     radius: T,
@@ -285,6 +290,10 @@ pub(super) struct Rounded<T, const CONES: bool> {
     /// Rounding of places, and as one of squared distances from the axis.
     blur: T,
     edge: T,
+    /// Half chord of the rim, as a share of the slope of the track, below which the place where the rim cuts
+    /// is rounded too badly, and what that may change it by.
+    rim: T,
+    shift: T,
     /// Slopes from which it costs too much, and the least height above the tip where that, or the
     /// radius, is near.
     steep: T,
@@ -322,6 +331,14 @@ fn lowest_steep(form: &Form, slope: f64) -> f64 {
     form.height(gentle) - ROUNDING_LIMIT
 }
 
+/// Slope of the arc where it ends.
+fn arc_end_slope(form: &Form) -> f64 {
+    let profile = &form.profile;
+    let x = profile.arc_end - profile.centre_x;
+    let corner = profile.corner.max(SHARP);
+    if x < corner { x / ((corner - x) * (corner + x)).sqrt() } else { f64::INFINITY }
+}
+
 impl<T: Real, const CONES: bool> Rounded<T, CONES> {
     /// The profile of `form`, its places rounded by `blur` mm; 0 leaves no doubt.
     pub fn new(form: &Form, blur: f64) -> Self {
@@ -339,12 +356,15 @@ impl<T: Real, const CONES: bool> Rounded<T, CONES> {
             corner: T::of(profile.corner.max(SHARP)),
             arc_end: T::of(profile.arc_end),
             arc_end_z: T::of(profile.arc_end_height),
+            arc_end_slope: T::of(arc_end_slope(form)),
             side: T::of(side),
             radius: T::of(form.radius),
             radius_of_arc: T::of(profile.centre_x + profile.corner.max(SHARP)),
             within: T::of(within),
             blur: T::of(blur),
             edge: T::of(2.0 * form.radius * blur),
+            rim: T::of(form.radius * blur / ROUNDING_LIMIT),
+            shift: T::of((2.0 * form.radius * blur).sqrt()),
             steep: T::of(if blur > 0.0 { ROUNDING_LIMIT / blur } else { f64::INFINITY }),
             steep_z: T::of(if blur > 0.0 { lowest_steep(form, ROUNDING_LIMIT / blur) } else { 0.0 }),
         }
@@ -384,16 +404,20 @@ impl<T: Real, const CONES: bool> Rounded<T, CONES> {
     /// one: with D the slope there and K the least bend, D²/2K.
     #[inline(always)]
     fn place_is_off(&self, m: &LocalMove<T>, place: T, [ahead, across, rho]: [T; 3], slope: T) -> bool {
-        // Inside of the arc too: a place there would be off by more.
-        let on_arc = rho < self.arc_end - self.blur;
+        // Inside of the arc too: a place there would be off by more. Where the arc ends, Newton's steps may
+        // have stopped short of a place farther in; the side, from there on, has its place in closed form.
+        let inside_end = rho < self.arc_end - self.blur;
+        let at_end = rho <= self.arc_end + self.blur;
+        let slope = if CONES & at_end { slope.smaller(self.arc_end_slope) } else { slope };
         let rho2 = (rho * rho).larger(T::of(1e-30));
         let level = slope / rho.larger(T::of(1e-30));
         let off = level * ahead - m.slope;
         let bend = (ahead * ahead / self.corner + level * across * across) / rho2;
         // Off the wrong way: farther on, or back, the cutter would cut lower.
         let zero = T::of(0.0);
-        let could_move = ((off > zero) & (place < m.high)) | ((off < zero) & (place > m.low));
-        on_arc & could_move & (off * off > T::of(2.0 * PLACE_LIMIT) * bend)
+        let could_move =
+            (at_end & (off > zero) & (place < m.high)) | (inside_end & (off < zero) & (place > m.low));
+        could_move & (off * off > T::of(2.0 * PLACE_LIMIT) * bend)
     }
 
     /// How far the point lies ahead of the axis when the cutter that cuts it stands on its track: there
@@ -507,12 +531,16 @@ impl<T: Real, const CONES: bool> Sweep<T> for Rounded<T, CONES> {
         let rho = (ahead * ahead + across * across).sqrt().smaller(self.radius);
         let (height, slope) = self.height_and_slope(rho);
         let tip = m.z + m.slope * place;
-        let margin = margin(m, along, (self.radius - across) * (self.radius + across));
+        let chord2 = (self.radius - across) * (self.radius + across);
+        let margin = margin(m, along, chord2);
         let inside = margin >= T::of(0.0);
-        let steep = (margin.absolute() < self.edge) | (inside & (slope > self.steep));
+        let short = self.rim * m.slope;
+        let at_rim = (rho >= self.radius - self.blur) & (place > m.low) & (chord2 < short * short);
+        let steep = (margin.absolute() < self.edge) | (inside & ((slope > self.steep) | at_rim));
         let off = inside & self.place_is_off(m, place, [ahead, across, rho], slope);
         let z = if inside { tip + height } else { infinite };
-        let least = if off { m.z + m.slope * m.low } else { tip + self.steep_z };
+        let shift = if at_rim { m.slope * self.shift } else { T::of(0.0) };
+        let least = if off { m.z + m.slope * m.low } else { tip + self.steep_z - shift };
         (z, if steep | off { least } else { infinite })
     }
 }

@@ -122,7 +122,7 @@ fn a_bound_tightened_by_a_micrometre_is_wrong() {
         compare(&stock, &cutter, &path);
         let exact = cut_reference(&stock, &cutter, &path, &Silent).unwrap();
         let with = |margin: f64| {
-            let job = Job { form: Form::new(&cutter), path: &path, side: 64, margin };
+            let job = Job { form: Form::new(&cutter), path: &path, side: 64, bounded: true, margin };
             farthest(&job.run(stock.clone(), &Silent).unwrap().0, &exact)
         };
         assert!(with(0.0) <= PROMISED, "{cutter:?} {}", with(0.0));
@@ -180,6 +180,33 @@ fn a_thousand_random_programs_agree_with_the_reference() {
         let grid = Grid { origin, cell, nx: 1 + rng.below(40), ny: 1 + rng.below(40) };
         compare(&ZMap::block(grid, 3.0), &cutter, &path);
     }
+}
+
+/// Alone in its stock a move cuts with every part of its cutter. (Where the side of a taper takes over from
+/// its corner, places on the corner were once taken for it: 0.07 µm too high.)
+#[test]
+fn single_moves_agree_with_the_reference() {
+    let mut rng = Rng::new(26);
+    let stock = ZMap::block(square_grid(10.0, 0.0625), 5.0);
+    for cutter in cutters() {
+        for k in 0..100 {
+            let from = Point3::new(rng.within(0.0, 10.0), rng.within(0.0, 10.0), 0.0);
+            let by = 10.0 * rng.within(0.1, 1.0).powi(2);
+            let (y, x) = rng.within(0.0, std::f64::consts::TAU).sin_cos();
+            let rise = by * if k % 4 == 0 { rng.within(0.0, 4.0) } else { rng.within(0.0, 1.0) };
+            compare(
+                &stock,
+                &cutter,
+                &path_through([from, Point3::new(from.x + by * x, from.y + by * y, rise)]),
+            );
+        }
+    }
+    let taper = Cutter::taper(2.0, 0.4, 35f64.to_radians(), 5.0).unwrap();
+    let tips = [
+        Point3::new(6.491700149109909, 0.0, 3.497523830535373),
+        Point3::new(6.465612557934223, 7.850611841699978, 0.0),
+    ];
+    compare(&stock, &taper, &path_through(tips));
 }
 
 #[test]
