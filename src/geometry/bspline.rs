@@ -147,6 +147,12 @@ impl KnotVector {
         Self::new(degree, knots, control_count)
     }
 
+    /// Greville's averages, one for each control point: the function `x` has them as its coefficients.
+    pub fn averages(&self) -> impl Iterator<Item = f64> + '_ {
+        let mean = |w: &[f64]| w.iter().sum::<f64>() / w.len() as f64;
+        (0..self.control_count()).map(move |k| mean(&self.knots[k + 1..=k + self.degree]))
+    }
+
     /// Degree.
     pub fn degree(&self) -> usize {
         self.degree

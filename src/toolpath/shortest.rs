@@ -3,52 +3,43 @@
 //! A pass costs `1 − κ_f r` mm of the cutter's way for each mm along the surface (κ_f its curvature along the feed, r the
 //! cutter's corner radius) and serves a strip of width w(direction). No path that holds the scallop is shorter than
 //! the integral of the least `(1 − κ_f r)/w` over all directions: [`shortest_possible`]. Directions that reach it
-//! everywhere seldom belong to passes that also lie one strip apart. Fronts that move by the strip's width do keep their
-//! distance, whatever curve they start on; what is open is the curve. It is searched here: straight lines first, then bent
-//! ones, by the length that the front predicts.
+//! everywhere seldom belong to passes that also lie one strip apart. The stream function that costs least in all
+//! ([`crate::field::minimise`]) settles between both: a B-spline, from straight passes in several directions on a coarse net,
+//! the best of them refined.
 //!
 //! Enters: a part and the scallop height. Leaves: passes. Lengths in mm; planned to second order, as [`super::strip`]
 //! is.
 
 use std::f64::consts::PI;
 
-use super::chart::{Chart, ChartPoint};
-use super::iso_scallop::{arrival, front_at, places, predicted_length};
+use super::chart::Chart;
+use super::iso_scallop::{front_at, places};
 use super::level_passes::along_levels;
 use super::plan::{PassSettings, Passes, PlanError, Step};
 use crate::cutter::Cutter;
-use crate::field::{Front, GridField, ScalarField, Start, eikonal};
-use crate::geometry::Vector3;
-use crate::monitor::{self, Cancelled, Monitor};
+use crate::field::{Gradients, NormalEquations, Packed, ScalarField, ScalarSpline, Site, minimise};
+use crate::geometry::{KnotVector, Vector3};
+use crate::monitor::{Cancelled, Monitor};
 use crate::parallel;
 use crate::part::Part;
 
-/// Nodes a side of the fronts that are compared. Coarser ones blur what makes the difference, finer ones take longer.
-const SEARCH_NODES: usize = 41;
+/// Spans of the spline's knots are this many of the cutter's radii long. Features that a cutter fits into are wider; finer
+/// nets gain a few tenths of a per cent.
+const SPAN_OVER_RADIUS: f64 = 1.0;
 
-/// Angles over half a turn, and places across, of the straight lines that are tried.
-const ANGLES: usize = 12;
-const OFFSETS: [f64; 3] = [-0.6, 0.0, 0.6];
+/// Fewest and most spans a side. Time grows with their product.
+const SPANS: [usize; 2] = [8, 72];
 
-/// Sines and cosines that a line is bent by. More follow the surface closer and take longer to search.
-const BENDS: usize = 6;
+/// Spans of the coarsest net, on which directions are tried, along the longer side.
+const COARSEST: usize = 16;
 
-/// First steps of the search: rad, and shares of half the diagonal; and the share of them at which it ends.
-const FIRST_STEPS: [f64; 3] = [0.15, 0.1, 0.08];
-const LAST_STEP: f64 = 0.2;
+/// Straight passes to start from, over half a turn.
+const STARTS: usize = 8;
 
-/// Rounds of the search at most.
-const MOST_ROUNDS: usize = 12;
+/// Gauss's points of each span and side.
+const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
-/// A path from a border is planned too where it promises to be at most so much longer than the best: promises are
-/// right within a per cent.
-const WORTH_PLANNING: f64 = 1.02;
-
-/// Pieces of a start curve.
-const PIECES: usize = 96;
-
-/// A start curve reaches beyond the middle by this many halves of the diagonal, to be sure to leave the domain.
-const REACH: f64 = 1.2;
+const DEGREE: usize = 3;
 
 /// Places a side, and directions over half a turn, of the shortest possible length. With twice as many it changes by
 /// less than 0.1 % on the shipped parts.
@@ -99,7 +90,7 @@ pub fn shortest_possible(part: &Part, cutter: &Cutter, h: f64) -> Result<Shortes
     Ok(sum)
 }
 
-/// Plans passes from the start curve with the shortest path.
+/// Plans passes along the stream function with the shortest path.
 pub(super) fn passes(
     part: &Part,
     cutter: &Cutter,
@@ -108,224 +99,162 @@ pub(super) fn passes(
 ) -> Result<Passes, PlanError> {
     let mut all = Passes::default();
     for chart in Chart::all(part, cutter)? {
-        let search = Search::new(&chart, cutter, settings.step, monitor);
-        let (curve, tried) = search.best_curve()?;
-        let border = search.best_border()?;
-        let mut planned = Vec::new();
-        for found in [Some(curve), Some(border).filter(|b| b.length < WORTH_PLANNING * curve.length)] {
-            let Some(found) = found else { continue };
-            let curves = [search.in_parameters(&found.curve.shares())];
-            let field = arrival(&chart, cutter, settings.step, &curves, true, monitor)?;
-            let field = ScalarField::Grid(field);
-            planned.push((along_levels(part, cutter, &chart, &field, settings, monitor)?, found));
-        }
-        planned.sort_by(|(a, _), (b, _)| a.length().total_cmp(&b.length()));
-        let Some((mut planned, found)) = planned.into_iter().next() else { continue };
+        let search = Search { chart: &chart, cutter, step: settings.step, monitor };
+        let (spline, found) = search.run()?;
+        let field = ScalarField::Spline(spline);
+        let mut planned = along_levels(part, cutter, &chart, &field, settings, monitor)?;
         planned.notes.push(format!(
-            "passes start {}, the best of {tried} curves: {:.0} mm planned, {:.0} mm predicted",
-            found.curve.name(),
+            "passes follow the stream function of the shortest path: {:.0} mm planned, {:.0} mm predicted",
             planned.length(),
-            found.length,
+            found.cost,
         ));
         all.append(planned);
     }
     Ok(all)
 }
 
-/// A start curve in shares of the parameters' ranges.
-#[derive(Debug, Clone, Copy)]
-enum Curve {
-    Line(Line),
-    /// The border where the parameter (0: u, 1: v) is least (0) or greatest (1).
-    Border(usize, usize),
-}
-
-/// A line through the domain's unit square, turned, shifted and bent.
-#[derive(Debug, Clone, Copy)]
-struct Line {
-    /// From the first parameter's axis, rad.
-    angle: f64,
-    /// Distance from the middle to the left, and amplitudes of the bends, in halves of the diagonal.
-    offset: f64,
-    bends: [f64; BENDS],
-}
-
-/// A curve and the length, mm, that its front promises.
-#[derive(Debug, Clone, Copy)]
-struct Found {
-    curve: Curve,
-    length: f64,
-}
-
-impl Curve {
-    fn shares(&self) -> Vec<[f64; 2]> {
-        match self {
-            Self::Line(line) => line.shares(),
-            Self::Border(parameter, end) => [0.0, 1.0]
-                .map(|along| {
-                    let mut at = [along; 2];
-                    at[*parameter] = *end as f64;
-                    at
-                })
-                .to_vec(),
-        }
-    }
-
-    fn name(&self) -> String {
-        match self {
-            Self::Line(line) => {
-                format!("on a curve at {:.0} degrees", line.angle.to_degrees().rem_euclid(180.0))
-            }
-            Self::Border(parameter, end) => {
-                format!("at the border of {} {}", ["least", "greatest"][*end], ["u", "v"][*parameter])
-            }
-        }
-    }
-}
-
-impl Line {
-    /// Number of what can be changed.
-    const FREEDOMS: usize = 2 + BENDS;
-
-    fn shares(&self) -> Vec<[f64; 2]> {
-        let (sin, cos) = self.angle.sin_cos();
-        let half_diagonal = std::f64::consts::FRAC_1_SQRT_2;
-        let at = |k: usize| {
-            let s = 2.0 * k as f64 / PIECES as f64 - 1.0;
-            let bend = |(k, amplitude): (usize, &f64)| {
-                let wave = 0.5 * PI * (k / 2 + 1) as f64 * s;
-                amplitude * if k % 2 == 0 { wave.sin() } else { wave.cos() - 1.0 }
-            };
-            let across = self.offset + self.bends.iter().enumerate().map(bend).sum::<f64>();
-            let along = REACH * s;
-            [
-                0.5 + half_diagonal * (cos * along - sin * across),
-                0.5 + half_diagonal * (sin * along + cos * across),
-            ]
-        };
-        (0..=PIECES).map(at).collect()
-    }
-
-    /// Changed by `steps` (of angle, offset and bends) along freedom `k`.
-    fn moved(mut self, k: usize, steps: [f64; 3]) -> Self {
-        match k {
-            0 => self.angle += steps[0],
-            1 => self.offset += steps[1],
-            _ => self.bends[k - 2] += steps[2],
-        }
-        self
-    }
-}
-
-/// What all fronts over a chart share: metric and speeds at the nodes, and the places where lengths are summed.
+/// The search for the stream function of one chart.
 struct Search<'a> {
     chart: &'a Chart<'a>,
     cutter: &'a Cutter,
     step: Step,
-    fronts: Vec<Option<Front>>,
-    places: (Vec<([f64; 2], ChartPoint)>, f64),
     monitor: &'a dyn Monitor,
 }
 
-impl<'a> Search<'a> {
-    fn new(chart: &'a Chart, cutter: &'a Cutter, step: Step, monitor: &'a dyn Monitor) -> Self {
-        let n = SEARCH_NODES;
-        let [[u0, u1], [v0, v1]] = chart.domain;
-        let at = |lo: f64, hi: f64, k: usize| lo + (hi - lo) * k as f64 / (n - 1) as f64;
-        let front = |k: usize| front_at(chart, cutter, step, at(u0, u1, k % n), at(v0, v1, k / n));
-        let fronts = parallel::map(n * n, front);
-        Self { chart, cutter, step, fronts, places: places(chart, n), monitor }
-    }
+/// A net of control points with the sites that its functions are judged at.
+struct Net {
+    knots: [KnotVector; 2],
+    sites: Vec<Site>,
+    gradients: Gradients,
+}
 
-    fn in_parameters(&self, shares: &[[f64; 2]]) -> Vec<[f64; 2]> {
-        let domain = self.chart.domain;
-        let at = |p: &[f64; 2]| [0, 1].map(|c| domain[c][0] + p[c] * (domain[c][1] - domain[c][0]));
-        shares.iter().map(at).collect()
-    }
-
-    /// The path's length for a start curve; infinite where no front can start on it.
-    fn length(&self, curve: &Curve) -> Result<f64, Cancelled> {
-        monitor::check(self.monitor)?;
-        let shares = curve.shares();
-        // One that only passes by is met by coarse grids, but not by fine ones.
-        if !shares.iter().any(|p| p.iter().all(|x| (0.0..=1.0).contains(x))) {
-            return Ok(f64::INFINITY);
+impl Search<'_> {
+    fn run(&self) -> Result<(ScalarSpline, Packed), PlanError> {
+        let sides = self.sides();
+        let finest = SPAN_OVER_RADIUS * self.cutter.radius();
+        let longest = (sides[0].max(sides[1]) / finest).clamp(SPANS[0] as f64, SPANS[1] as f64);
+        let mut counts = vec![longest];
+        while counts[counts.len() - 1] > COARSEST as f64 {
+            counts.push(0.5 * counts[counts.len() - 1]);
         }
-        let field = self.front_from(&[self.in_parameters(&shares)]);
-        let length =
-            |field| predicted_length(&self.places, self.cutter, self.step, &ScalarField::Grid(field));
-        Ok(field.map_or(f64::INFINITY, length))
+        let unfit = || PlanError::NotApplicable {
+            strategy: "streamline",
+            reason: "no stream function of least length was found; use another direction".into(),
+        };
+        self.monitor.start("searching directions", (STARTS + counts.len()) as u64);
+        let net = self.net(counts.pop().unwrap_or(longest), sides).ok_or_else(unfit)?;
+        let found = parallel::try_map(STARTS, |k| {
+            let start = self.straight(&net, sides, PI * k as f64 / STARTS as f64);
+            let found = minimise(&net.sites, &net.gradients, start, false, self.monitor)?;
+            self.monitor.advance(1);
+            Ok::<_, Cancelled>(found)
+        })?;
+        let best = found.into_iter().flatten().min_by(|a, b| a.cost.total_cmp(&b.cost));
+        let (mut net, mut best) = (net, best.ok_or_else(unfit)?);
+        while let Some(count) = counts.pop() {
+            let spline = net.spline(&best).ok_or_else(unfit)?;
+            net = self.net(count, sides).ok_or_else(unfit)?;
+            let start = net.values_of(&spline).ok_or_else(unfit)?;
+            best = minimise(&net.sites, &net.gradients, start, true, self.monitor)?.ok_or_else(unfit)?;
+            self.monitor.advance(1);
+        }
+        Ok((net.spline(&best).ok_or_else(unfit)?, best))
     }
 
-    fn front_from(&self, curves: &[Vec<[f64; 2]>]) -> Option<GridField> {
-        let n = SEARCH_NODES;
+    /// Lengths of the chart through its middle, along u and v, mm.
+    fn sides(&self) -> [f64; 2] {
         let [[u0, u1], [v0, v1]] = self.chart.domain;
-        let node = |x: f64, lo: f64, hi: f64| {
-            let k = (x - lo) / (hi - lo) * (n - 1) as f64;
-            let near = k.round();
-            ((k - near).abs() < 1e-6 && near >= 0.0 && near < n as f64).then_some(near as usize)
+        let (u, v) = (0.5 * (u0 + u1), 0.5 * (v0 + v1));
+        const PIECES: usize = 64;
+        let at = |lo: f64, hi: f64, k: usize| lo + (hi - lo) * k as f64 / PIECES as f64;
+        let length = |point: &dyn Fn(usize) -> [f64; 2]| {
+            let place = |k: usize| self.chart.jet(point(k)[0], point(k)[1]).p;
+            (0..PIECES).map(|k| (place(k + 1) - place(k)).norm()).sum::<f64>()
         };
-        let front = |u: f64, v: f64| match (node(u, u0, u1), node(v, v0, v1)) {
-            (Some(i), Some(j)) => self.fronts[j * n + i].clone(),
-            _ => front_at(self.chart, self.cutter, self.step, u, v),
-        };
-        let start = Start { curves, signed: true };
-        eikonal(self.chart.domain, [n, n], &front, &start, self.monitor).ok().map(|arrival| arrival.field)
+        [length(&|k| [at(u0, u1, k), v]), length(&|k| [u, at(v0, v1, k)])]
     }
 
-    /// The border with the shortest path.
-    fn best_border(&self) -> Result<Found, PlanError> {
-        let borders = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(parameter, end)| Curve::Border(parameter, end));
-        Ok(self.shortest(&borders)?)
+    /// The net with so many spans along the longer side.
+    fn net(&self, spans: f64, sides: [f64; 2]) -> Option<Net> {
+        let longer = sides[0].max(sides[1]);
+        let knots = [0, 1].map(|c| {
+            let spans = (spans * sides[c] / longer).ceil().max(4.0) as usize;
+            KnotVector::clamped_uniform(DEGREE, spans + DEGREE, self.chart.domain[c])
+        });
+        let [Ok(knots_u), Ok(knots_v)] = knots else { return None };
+        let at = |knots: &KnotVector| {
+            let breaks = knots.breaks();
+            let places = |w: &[f64]| GAUSS.map(|t| (w[0] + t * (w[1] - w[0]), 0.5 * (w[1] - w[0])));
+            breaks.windows(2).flat_map(places).collect::<Vec<_>>()
+        };
+        let (us, vs) = (at(&knots_u), at(&knots_v));
+        let sites = parallel::map(us.len() * vs.len(), |k| {
+            let ((u, du), (v, dv)) = (us[k % us.len()], vs[k / us.len()]);
+            Some((u, v, self.site(u, v, du * dv)?))
+        });
+        let nu = knots_u.control_count();
+        let mut gradients = Gradients::new(nu * knots_v.control_count());
+        let mut kept = Vec::with_capacity(sites.len());
+        for (u, v, site) in sites.into_iter().flatten() {
+            let (i, [bu, su, _]) = knots_u.basis_derivatives(u, 1);
+            let (j, [bv, sv, _]) = knots_v.basis_derivatives(v, 1);
+            let terms = (0..=DEGREE).flat_map(|b| (0..=DEGREE).map(move |a| (a, b)));
+            gradients.push(
+                &site,
+                terms.map(|(a, b)| (((j + b) * nu + i + a) as u32, [su[a] * bv[b], bu[a] * sv[b]])),
+            );
+            kept.push(site);
+        }
+        Some(Net { knots: [knots_u, knots_v], sites: kept, gradients })
     }
 
-    /// Straight lines, and from the best of them on bent ones; and how many were tried.
-    fn best_curve(&self) -> Result<(Found, usize), PlanError> {
-        let lines: Vec<Line> = (0..ANGLES * OFFSETS.len())
-            .map(|k| Line {
-                angle: PI * (k % ANGLES) as f64 / ANGLES as f64,
-                offset: OFFSETS[k / ANGLES],
-                bends: [0.0; BENDS],
-            })
-            .collect();
-        self.monitor.start("searching directions", (lines.len() + MOST_ROUNDS * 2 * Line::FREEDOMS) as u64);
-        let mut tried = lines.len();
-        let curves: Vec<Curve> = lines.into_iter().map(Curve::Line).collect();
-        let mut best = self.shortest(&curves)?;
-        let mut steps = FIRST_STEPS;
-        for _ in 0..MOST_ROUNDS {
-            let Curve::Line(line) = best.curve else { break };
-            let around: Vec<Curve> = (0..2 * Line::FREEDOMS)
-                .map(|k| line.moved(k / 2, if k % 2 == 0 { steps } else { steps.map(|s| -s) }))
-                .map(Curve::Line)
-                .collect();
-            tried += around.len();
-            let found = self.shortest(&around)?;
-            if found.length < best.length {
-                best = found;
-            } else if steps[0] > LAST_STEP * FIRST_STEPS[0] {
-                steps = steps.map(|s| 0.5 * s);
-            } else {
-                break;
+    /// What passes may do and cost at a place that stands for an area in parameters.
+    fn site(&self, u: f64, v: f64, area: f64) -> Option<Site> {
+        let front = front_at(self.chart, self.cutter, self.step, u, v)?;
+        let p = self.chart.at(u, v)?;
+        let (e, f, g) = p.jet.first_form();
+        let costs = [0, 1, 2].map(|k| {
+            let [du, dv] = front.vector(PI * k as f64 / 3.0);
+            let feed = (p.jet.du * du + p.jet.dv * dv).cross(&p.normal);
+            1.0 - p.curvature_along(&feed) * self.cutter.corner_radius()
+        });
+        // Curvature has a mean and a second harmonic, which three directions tell.
+        let mean = (costs[0] + costs[1] + costs[2]) / 3.0;
+        let cost = [mean, costs[0] - mean, (costs[1] - costs[2]) / 3f64.sqrt()];
+        Some(Site { area: area * (e * g - f * f).max(0.0).sqrt(), front, cost })
+    }
+
+    /// Coefficients of ψ for straight passes, as dense on the whole as the strips ask for.
+    fn straight(&self, net: &Net, sides: [f64; 2], angle: f64) -> Vec<f64> {
+        let area: f64 = net.sites.iter().map(|site| site.area).sum();
+        let passes = net.sites.iter().map(|site| site.area * site.front.mean_slowness()).sum::<f64>() / area;
+        let (sin, cos) = angle.sin_cos();
+        let shares = [0, 1].map(|c| {
+            let [lo, hi] = net.knots[c].domain();
+            net.knots[c].averages().map(|x| (x - lo) / (hi - lo)).collect::<Vec<f64>>()
+        });
+        let along_u = |t: f64| passes * sides[0] * cos * t;
+        let along_v = |t: f64| passes * sides[1] * sin * t;
+        shares[1].iter().flat_map(|&v| shares[0].iter().map(move |&u| along_u(u) + along_v(v))).collect()
+    }
+}
+
+impl Net {
+    fn spline(&self, found: &Packed) -> Option<ScalarSpline> {
+        let [u, v] = self.knots.clone();
+        ScalarSpline::new(u, v, found.coefficients.clone())
+    }
+
+    /// Coefficients of the same function on these knots, or nearly.
+    fn values_of(&self, spline: &ScalarSpline) -> Option<Vec<f64>> {
+        let [u, v] = self.knots.clone();
+        let mut equations = NormalEquations::new(u, v);
+        let value = [[1.0, 0.0, 0.0], [0.0; 3], [0.0; 3]];
+        for y in self.knots[1].averages() {
+            for x in self.knots[0].averages() {
+                equations.add(x, y, &value, spline.value_and_gradient(x, y)[0], 1.0);
             }
         }
-        if !best.length.is_finite() {
-            return Err(PlanError::NotApplicable {
-                strategy: "streamline",
-                reason: "no front of passes can move over the part; use another direction".into(),
-            });
-        }
-        Ok((best, tried))
-    }
-
-    fn shortest(&self, curves: &[Curve]) -> Result<Found, Cancelled> {
-        let lengths = parallel::try_map(curves.len(), |k| {
-            let length = self.length(&curves[k]);
-            self.monitor.advance(1);
-            length
-        })?;
-        let found = curves.iter().zip(lengths).map(|(&curve, length)| Found { curve, length });
-        let none = Found { curve: Curve::Border(0, 0), length: f64::INFINITY };
-        Ok(found.min_by(|a, b| a.length.total_cmp(&b.length)).unwrap_or(none))
+        equations.solve(false).ok().map(|fine| fine.coefficients().to_vec())
     }
 }
