@@ -9,8 +9,13 @@
 //! ∫ c(θ) |∇ψ| dA    with    |∇ψ| >= s(θ),    θ the direction of ∇ψ.
 //! ```
 //!
+//! plus, along borders, half a mm for each mm that passes run parallel to (a pass that meets a border aslant runs on until
+//! its strip is cut): `½ |cos φ|`, φ the angle between both.
+//!
 //! Passes are packed where `|∇ψ| = s`. A front has that everywhere (see [`super::eikonal`]) and pays for it by kinks and by
 //! the directions that its start leaves; here a little of the distance is given up where better directions are worth more.
+//!
+//! Functions that may bend sharply from place to place take a [`Roughness`] as well.
 //!
 //! Method: a shortfall `x = (s/|∇ψ| − 1)₊` counts as `c |∇ψ| (1 + x + ρ x²)` (as if the passes were as dense as they must be,
 //! and a penalty); ρ grows in rounds, each minimised by L-BFGS (Nocedal 1980), preconditioned by the equations of
@@ -47,6 +52,9 @@ const LEAST_COST: f64 = 0.02;
 /// A shortfall above this doubles the passes: they are put between others.
 const DOUBLED: f64 = 0.02;
 
+/// The angle, as a cosine, below which meeting a border aslant is not told from meeting it squarely.
+const SQUARE: f64 = 0.1;
+
 /// What passes may do at one place, and what they cost there.
 #[derive(Debug, Clone)]
 pub struct Site {
@@ -56,6 +64,8 @@ pub struct Site {
     pub front: Front,
     /// Cost of a mm of pass, `[m, c, s]` of `m + c cos 2θ + s sin 2θ`, θ the direction across it in the frame of `front`.
     pub cost: [f64; 3],
+    /// On a border: the vector along it that the place stands for, mm, in the frame of `front`.
+    pub border: Option<[f64; 2]>,
 }
 
 /// How the gradients of a function at sites follow from its coefficients.
@@ -94,6 +104,19 @@ impl Gradients {
     }
 }
 
+/// A quadratic form, small where a function is smooth: the sum of `weight · (Σ terms)²`.
+#[derive(Debug, Clone, Default)]
+pub struct Roughness {
+    rows: Vec<(f64, Vec<(u32, f64)>)>,
+}
+
+impl Roughness {
+    /// Adds a row of coefficients with what they are multiplied by.
+    pub fn push(&mut self, weight: f64, terms: Vec<(u32, f64)>) {
+        self.rows.push((weight, terms));
+    }
+}
+
 /// A minimum.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Packed {
@@ -101,41 +124,63 @@ pub struct Packed {
     pub coefficients: Vec<f64>,
     /// Cost of all passes one apart (`∫ c |∇ψ| dA`), twice where they would be too far apart.
     pub cost: f64,
+    /// That of their ends at borders.
+    pub ends: f64,
     /// Share of the cost where they would.
     pub short: f64,
 }
 
-/// Minimises from `start`. With `refined`, the start is a minimum of a coarser function already, and the first rounds are
-/// left out.
+/// Which rounds are gone through.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rounds {
+    /// All but the last two: enough to compare starts.
+    First,
+    /// The last two, from a minimum of the first, or of a coarser function.
+    Last,
+}
+
+/// Minimises from `start`.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so; `Ok(None)` where sites do not determine the function.
 pub fn minimise(
     sites: &[Site],
     gradients: &Gradients,
+    roughness: &Roughness,
     start: Vec<f64>,
-    refined: bool,
+    rounds: Rounds,
     monitor: &dyn Monitor,
 ) -> Result<Option<Packed>, Cancelled> {
-    let problem = Problem { sites, gradients };
-    let Some(factor) = problem.stiffness().filter(|_| start.len() == gradients.coefficients) else { return Ok(None) };
+    let problem = Problem { sites, gradients, roughness };
+    let Some(factor) = problem.stiffness().filter(|_| start.len() == gradients.coefficients) else {
+        return Ok(None);
+    };
     let mut x = start;
-    for &penalty in &PENALTIES[if refined { PENALTIES.len() - 2 } else { 0 }..] {
+    let (first, last) = PENALTIES.split_at(PENALTIES.len() - 2);
+    for &penalty in if rounds == Rounds::First { first } else { last } {
         problem.descend(&factor, penalty, &mut x, monitor)?;
     }
-    let (mut cost, mut short) = (0.0, 0.0);
+    let (mut cost, mut ends, mut short) = (0.0, 0.0, 0.0);
     for (k, site) in sites.iter().enumerate() {
         let q = gradients.at(k, &x);
         let (length, shortfall) = site.length_and_shortfall(q);
+        let norm = q[0].hypot(q[1]).max(f64::MIN_POSITIVE);
+        ends += site.ends([q[0] / norm, q[1] / norm]).0;
         let doubled = shortfall > DOUBLED;
         cost += if doubled { 2.0 * length } else { length };
         short += if doubled { length } else { 0.0 };
     }
     let sound = cost.is_finite() && x.iter().all(|x| x.is_finite());
-    Ok(sound.then(|| Packed { coefficients: x, cost, short: short / cost }))
+    Ok(sound.then(|| Packed { coefficients: x, cost, ends, short: short / cost }))
 }
 
 impl Site {
+    /// The cost from what a mm of pass costs when the direction across it is 0, 60 and 120 degrees in the frame.
+    pub fn harmonic([a, b, c]: [f64; 3]) -> [f64; 3] {
+        let mean = (a + b + c) / 3.0;
+        [mean, a - mean, (b - c) / 3f64.sqrt()]
+    }
+
     /// Cost for each unit of length in the direction of `q`, and its derivative by the angle.
     fn cost_at(&self, [q1, q2]: [f64; 2], norm2: f64) -> (f64, f64) {
         let [mean, cosine, sine] = self.cost;
@@ -150,6 +195,18 @@ impl Site {
         let (cost, _) = self.cost_at(q, norm2);
         let (square, _) = self.front.square(q);
         (self.area * cost * norm2.sqrt(), (square.max(0.0) / norm2).sqrt() - 1.0)
+    }
+
+    /// What the ends of passes cost at a border, and the derivative of that by the angle; `unit` is the direction across
+    /// the passes.
+    fn ends(&self, unit: [f64; 2]) -> (f64, f64) {
+        let Some([along, across]) = self.border else { return (0.0, 0.0) };
+        let length = along.hypot(across);
+        // The cosine between pass and border, times the length, and its derivative.
+        let parallel = along * unit[1] - across * unit[0];
+        let turn = along * unit[0] + across * unit[1];
+        let smooth = parallel.hypot(SQUARE * length);
+        (0.5 * (smooth - SQUARE * length), if smooth > 0.0 { 0.5 * parallel * turn / smooth } else { 0.0 })
     }
 
     /// What a gradient costs with the penalty, and the derivatives of that by its components.
@@ -170,15 +227,17 @@ impl Site {
             (cost * dear, by_norm, cost_turn * dear + cost * slow_turn * (1.0 + 2.0 * penalty * short))
         };
         let unit = [q[0] / norm, q[1] / norm];
-        let turn = by_angle / norm;
+        let (ends, ends_turn) = self.ends(unit);
+        let (by_norm, turn) = (self.area * by_norm, (self.area * by_angle + ends_turn) / norm);
         let by = [by_norm * unit[0] - turn * unit[1], by_norm * unit[1] + turn * unit[0]];
-        (self.area * value, by.map(|b| self.area * b))
+        (self.area * value + ends, by)
     }
 }
 
 struct Problem<'a> {
     sites: &'a [Site],
     gradients: &'a Gradients,
+    roughness: &'a Roughness,
 }
 
 /// Sites that one worker looks at.
@@ -201,11 +260,16 @@ impl Problem<'_> {
                 by[k as usize] += slope[0] * share[0] + slope[1] * share[1];
             }
         }
+        for (weight, terms) in &self.roughness.rows {
+            let row: f64 = terms.iter().map(|&(k, share)| share * x[k as usize]).sum();
+            sum += weight * row * row;
+            terms.iter().for_each(|&(k, share)| by[k as usize] += 2.0 * weight * row * share);
+        }
         sum
     }
 
-    /// The factor of the equations of `∫ s²-weighted |∇ψ|²`, the first coefficient held: about the second derivatives
-    /// of the cost.
+    /// The factor of the equations of `∫ (c/s) |∇ψ|²` and the roughness, the first coefficient held: about the second
+    /// derivatives of the cost.
     fn stiffness(&self) -> Option<Factor> {
         let n = self.gradients.coefficients;
         let mut entries: Vec<(u32, u32, f64)> = Vec::new();
@@ -215,6 +279,15 @@ impl Problem<'_> {
                 for &(b, gb) in self.gradients.of(k) {
                     if a >= b && b > 0 {
                         entries.push((b - 1, a - 1, weight * (ga[0] * gb[0] + ga[1] * gb[1])));
+                    }
+                }
+            }
+        }
+        for (weight, terms) in &self.roughness.rows {
+            for &(a, ga) in terms {
+                for &(b, gb) in terms {
+                    if a >= b && b > 0 {
+                        entries.push((b - 1, a - 1, 2.0 * weight * ga * gb));
                     }
                 }
             }
@@ -305,5 +378,171 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 fn add(to: &mut [f64], what: &[f64], times: f64) {
     for (to, what) in to.iter_mut().zip(what) {
         *to += times * what;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::monitor::Silent;
+    use proptest::prelude::*;
+
+    /// Cells a side of the unit square.
+    const CELLS: usize = 12;
+
+    /// Bilinear functions on the unit square, the speed at a place by the direction across, the cost likewise.
+    fn square(
+        speed: impl Fn(f64, f64, [f64; 2]) -> f64,
+        cost: [f64; 3],
+        borders: bool,
+    ) -> (Vec<Site>, Gradients) {
+        let h = 1.0 / CELLS as f64;
+        let gauss = [0.5 - 0.5 / 3f64.sqrt(), 0.5 + 0.5 / 3f64.sqrt()];
+        let (mut sites, mut gradients) = (Vec::new(), Gradients::new((CELLS + 1) * (CELLS + 1)));
+        let mut push = |i: usize, j: usize, s: f64, t: f64, area: f64, border: Option<[f64; 2]>| {
+            let (x, y) = ((i as f64 + s) * h, (j as f64 + t) * h);
+            let front = Front::new((1.0, 0.0, 1.0), |b| speed(x, y, b)).unwrap();
+            let site = Site { area, front, cost, border };
+            let corner = (j * (CELLS + 1) + i) as u32;
+            let above = corner + CELLS as u32 + 1;
+            let slopes = [
+                (corner, [t - 1.0, s - 1.0]),
+                (corner + 1, [1.0 - t, -s]),
+                (above, [-t, 1.0 - s]),
+                (above + 1, [t, s]),
+            ];
+            gradients.push(&site, slopes.into_iter().map(|(k, d)| (k, d.map(|d| d / h))));
+            sites.push(site);
+        };
+        for k in 0..CELLS * CELLS {
+            for q in 0..4 {
+                push(k % CELLS, k / CELLS, gauss[q % 2], gauss[q / 2], 0.25 * h * h, None);
+            }
+        }
+        for k in (0..CELLS).filter(|_| borders) {
+            push(k, 0, 0.5, 0.0, 0.0, Some([h, 0.0]));
+            push(k, CELLS - 1, 0.5, 1.0, 0.0, Some([h, 0.0]));
+            push(0, k, 0.0, 0.5, 0.0, Some([0.0, h]));
+            push(CELLS - 1, k, 1.0, 0.5, 0.0, Some([0.0, h]));
+        }
+        (sites, gradients)
+    }
+
+    fn straight(angle: f64, density: f64) -> Vec<f64> {
+        let at = |k: usize| k as f64 / CELLS as f64;
+        let side = CELLS + 1;
+        (0..side * side)
+            .map(|k| density * (angle.cos() * at(k % side) + angle.sin() * at(k / side)))
+            .collect()
+    }
+
+    fn run((sites, gradients): &(Vec<Site>, Gradients), start: Vec<f64>) -> Packed {
+        let first = minimise(sites, gradients, &Roughness::default(), start, Rounds::First, &Silent)
+            .unwrap()
+            .unwrap();
+        minimise(sites, gradients, &Roughness::default(), first.coefficients, Rounds::Last, &Silent)
+            .unwrap()
+            .unwrap()
+    }
+
+    /// The widest interval over the allowed one.
+    fn widest((sites, gradients): &(Vec<Site>, Gradients), found: &Packed) -> f64 {
+        let short = |k: usize| sites[k].length_and_shortfall(gradients.at(k, &found.coefficients)).1;
+        (0..sites.len()).map(short).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn even_ground_is_covered_by_its_area_over_the_interval() {
+        let problem = square(|_, _, _| 0.05, [1.0, 0.0, 0.0], false);
+        let mut start = straight(0.7, 9.0);
+        start.iter_mut().enumerate().for_each(|(k, x)| *x += 0.1 * (k as f64 * 1.7).sin());
+        let found = run(&problem, start);
+        assert!((found.cost / 20.0 - 1.0).abs() < 2e-3 && found.short == 0.0, "{}", found.cost);
+        assert!(widest(&problem, &found) < 5e-3);
+    }
+
+    /// Where the widest strip has one direction everywhere, passes turn to it.
+    #[test]
+    fn passes_turn_to_the_widest_strip_and_to_the_shorter_way() {
+        let slow = |b: [f64; 2]| (500.0 + 300.0 * (b[0] * b[0] - b[1] * b[1])).sqrt();
+        let problem = square(|_, _, b| 1.0 / slow(b), [1.0, 0.0, 0.0], false);
+        let least = 200f64.sqrt();
+        for angle in [0.3, 1.0, 2.2] {
+            let found = run(&problem, straight(angle, 20.0));
+            assert!((found.cost / least - 1.0).abs() < 5e-3, "{angle}: {} {least}", found.cost);
+        }
+        let problem = square(|_, _, _| 0.1, [1.0, 0.3, 0.0], false);
+        let found = run(&problem, straight(0.4, 10.0));
+        assert!((found.cost / 7.0 - 1.0).abs() < 5e-3, "{}", found.cost);
+    }
+
+    /// An interval that grows along x alone is served exactly by passes along y.
+    #[test]
+    fn an_uneven_interval_is_served_exactly() {
+        let problem = square(|x, _, _| 0.05 * (1.0 + x), [1.0, 0.0, 0.0], false);
+        let found = run(&problem, straight(0.5, 15.0));
+        let least = 20.0 * 2f64.ln();
+        assert!(found.cost > 0.999 * least && found.cost < 1.02 * least, "{} {least}", found.cost);
+        assert!(widest(&problem, &found) < 0.01);
+    }
+
+    /// Of directions that are equally good inside, passes that meet the borders squarely are shorter: they end at two
+    /// of four sides, and the other two see them parallel.
+    #[test]
+    fn ends_at_borders_count() {
+        let problem = square(|_, _, _| 0.05, [1.0, 0.0, 0.0], true);
+        let aslant: f64 = problem.0.iter().map(|site| site.ends([0.5f64.sqrt(); 2]).0).sum();
+        // Four sides of 1 mm at 45 degrees, half of the cosine each; less what is not told from a square meeting.
+        assert!((aslant - 2.0 * (0.5f64.sqrt() - SQUARE)).abs() < 0.03, "{aslant}");
+        let along: f64 = problem.0.iter().map(|site| site.ends([1.0, 0.0]).0).sum();
+        assert!((along - 1.0).abs() < 0.11, "{along}");
+    }
+
+    #[test]
+    fn what_determines_nothing_is_refused() {
+        let (sites, gradients) = square(|_, _, _| 0.05, [1.0, 0.0, 0.0], false);
+        assert_eq!(
+            minimise(&sites, &gradients, &Roughness::default(), vec![0.0; 3], Rounds::First, &Silent),
+            Ok(None)
+        );
+        assert_eq!(
+            minimise(&[], &Gradients::new(4), &Roughness::default(), vec![0.0; 4], Rounds::First, &Silent),
+            Ok(None)
+        );
+    }
+
+    proptest! {
+        /// The derivatives are those of the charge, also where the front is a table and costs depend on direction.
+        #[test]
+        fn derivatives_are_those_of_the_charge(
+            angle in 0.0..6.3f64, norm in 0.3..3.0f64, swing in -0.6..0.6f64, sine in -0.4..0.4f64,
+            table in any::<bool>(), border in any::<bool>(),
+        ) {
+            let speed = |b: [f64; 2]| {
+                let second = 1.0 + swing * (b[0] * b[0] - b[1] * b[1]);
+                1.0 / (second + if table { 0.05 * (b[0] * b[1]).powi(2) } else { 0.0 }).sqrt()
+            };
+            let site = Site {
+                area: 2.0,
+                front: Front::new((1.3, 0.2, 0.9), speed).unwrap(),
+                cost: [1.0, swing * 0.5, sine],
+                border: border.then_some([0.4, -0.7]),
+            };
+            let q = [norm * angle.cos(), norm * angle.sin()];
+            // The second derivative jumps where the interval is the allowed one.
+            let (_, short) = site.length_and_shortfall(q);
+            prop_assume!(short.abs() > 1e-3);
+            let (_, by) = site.charge(q, 30.0);
+            for c in 0..2 {
+                let h = 1e-6;
+                let at = |s: f64| {
+                    let mut moved = q;
+                    moved[c] += s * h;
+                    site.charge(moved, 30.0).0
+                };
+                let numeric = (at(1.0) - at(-1.0)) / (2.0 * h);
+                prop_assert!((numeric - by[c]).abs() < 1e-4 * (1.0 + by[c].abs()), "{numeric} {}", by[c]);
+            }
+        }
     }
 }

@@ -244,7 +244,8 @@ impl Factor {
     /// Solves in place of the right side.
     pub fn solve(&self, side: &mut [f64]) {
         let n = side.len();
-        let Ok(mut memory) = MemBuffer::try_new(self.symbolic.solve_in_place_scratch::<f64>(1, Par::Seq)) else {
+        let Ok(mut memory) = MemBuffer::try_new(self.symbolic.solve_in_place_scratch::<f64>(1, Par::Seq))
+        else {
             return;
         };
         LltRef::<'_, usize, f64>::new(&self.symbolic, &self.values).solve_in_place_with_conj(

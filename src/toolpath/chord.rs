@@ -121,14 +121,29 @@ fn halve(
 /// pass of n points keeps n/400 at worst where one move would do.
 const MAX_SKIP: usize = 400;
 
-/// Drops points that the rest does without: from each kept point the longest straight move that
-/// stays within `tolerance` of all points that it skips. The ends stay.
+/// Drops points that the rest does without, and moves those that are left aside so that the curve runs on both
+/// sides of the moves: within `tolerance`, and half of it where the curve bends evenly. The ends stay.
 ///
 /// # Errors
 /// [`Cancelled`] when the watch says so.
 pub fn reduce(points: &[Point3], tolerance: f64, watch: &mut Watch<'_>) -> Result<Vec<Point3>, Cancelled> {
-    let Some(&first) = points.first() else { return Ok(Vec::new()) };
-    let mut kept = vec![first];
+    Ok(moved_aside(points, &reduced_indices(points, tolerance, watch)?, tolerance))
+}
+
+/// Indices of the points that the rest does without least: from each the longest straight move that stays within
+/// `tolerance` of all points that it skips. The ends stay.
+///
+/// # Errors
+/// [`Cancelled`] when the watch says so.
+pub fn reduced_indices(
+    points: &[Point3],
+    tolerance: f64,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<usize>, Cancelled> {
+    if points.is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut kept = vec![0];
     let mut from = 0;
     while from + 1 < points.len() {
         let fits = |to: usize| {
@@ -141,10 +156,42 @@ pub fn reduce(points: &[Point3], tolerance: f64, watch: &mut Watch<'_>) -> Resul
         while to + 1 < points.len() && to - from < MAX_SKIP && fits(to + 1) {
             to += 1;
         }
-        kept.push(points[to]);
+        kept.push(to);
         from = to;
     }
     Ok(kept)
+}
+
+/// The points at `knots`, each moved by half the greater sagitta on its two sides, where the curve bends
+/// both ways by their mean. The ends stay.
+pub fn moved_aside(curve: &[Point3], knots: &[usize], tolerance: f64) -> Vec<Point3> {
+    let half_sagitta = |k: usize| {
+        let (a, b) = (curve[knots[k]], curve[knots[k + 1]]);
+        let off = |p: &Point3| {
+            let d = b - a;
+            let t = ((p - a).dot(&d) / d.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            p - (a + d * t)
+        };
+        let between = &curve[knots[k]..=knots[k + 1]];
+        let far = |e: &Vector3| e.norm_squared();
+        let most =
+            between.iter().map(off).fold(Vector3::zeros(), |m, e| if far(&e) > far(&m) { e } else { m });
+        if far(&most) == 0.0 {
+            return most;
+        }
+        // A chord that the curve crosses is off on both sides already.
+        let least = between.iter().map(|p| off(p).dot(&most) / far(&most)).fold(0.0, f64::min);
+        most * (0.5 * (1.0 + least))
+    };
+    let halves: Vec<Vector3> = (0..knots.len().saturating_sub(1)).map(half_sagitta).collect();
+    let aside = |k: usize| {
+        let (a, b) = (halves[k - 1], halves[k]);
+        let greater = if a.norm_squared() > b.norm_squared() { a } else { b };
+        let by = if a.dot(&b) < 0.0 { 0.5 * (a + b) } else { greater };
+        curve[knots[k]] + by * (tolerance / by.norm().max(f64::MIN_POSITIVE)).min(1.0)
+    };
+    let last = knots.len().saturating_sub(1);
+    (0..knots.len()).map(|k| if k == 0 || k == last { curve[knots[k]] } else { aside(k) }).collect()
 }
 
 #[cfg(test)]

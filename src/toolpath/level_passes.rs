@@ -3,7 +3,6 @@
 //! Curves are traced a little beyond the chart, on its continuation, and every place of the cutter comes
 //! from dropping it onto the part. Which levels and stretches are cut is decided in `halving`.
 
-use super::border::useful_overrun;
 use super::chart::Chart;
 use super::drop::{Beside, DropCutter};
 use super::halving::{Allowed, LevelSource, Track, along_and_between};
@@ -31,6 +30,12 @@ const MARGIN_SAMPLES: usize = 24;
 
 /// A point between two traced ones may be this many sampling distances off the line between them.
 const MOST_STRAY: f64 = 0.25;
+
+/// Places looked at between two points outside of the chart.
+const PARTS_OUTSIDE: usize = 8;
+
+/// Places beyond a border are tried this far apart, in sampling distances.
+const OVERRUN_STEP: f64 = 0.05;
 
 /// How closely the crossing of a border is placed, in sampling distances.
 const BORDER_PRECISION: f64 = 1e-6;
@@ -114,21 +119,27 @@ impl Guide<'_> {
         let inside = |s: f64| self.chart.holds(at(s));
         let start = first as f64;
         let mut stretches = vec![Stretch { inside: inside(start), from: start, to: start }];
-        for k in first + 1..=last {
-            let now = inside(k as f64);
+        let mut places: Vec<f64> = Vec::new();
+        for k in first..last {
+            // Outside more of them, so that no corner of the chart is missed.
+            let parts = if inside(k as f64) || inside((k + 1) as f64) { 1 } else { PARTS_OUTSIDE };
+            places.extend((1..=parts).map(|part| k as f64 + part as f64 / parts as f64));
+        }
+        for s in places {
+            let now = inside(s);
             let n = stretches.len();
             let current = &mut stretches[n - 1];
             if now == current.inside {
-                current.to = k as f64;
+                current.to = s;
                 continue;
             }
-            let (mut same, mut other) = (current.to, k as f64);
+            let (mut same, mut other) = (current.to, s);
             while other - same > BORDER_PRECISION {
                 let middle = 0.5 * (same + other);
                 *(if inside(middle) == current.inside { &mut same } else { &mut other }) = middle;
             }
             current.to = same;
-            stretches.push(Stretch { inside: now, from: same, to: k as f64 });
+            stretches.push(Stretch { inside: now, from: same, to: s });
         }
         stretches.retain(|s| s.to - s.from > BORDER_PRECISION);
         stretches
@@ -136,24 +147,33 @@ impl Guide<'_> {
 
     /// Cuts stretches outside of the chart at both ends back to what is of use.
     fn shorten_ends(&self, stretches: &mut Vec<Stretch>, at: &dyn Fn(f64) -> [f64; 2]) {
-        let useful = |s: f64| {
-            let p = at(s);
-            let (here, [du, dv]) = (self.chart.at(p[0], p[1])?, self.tracer.direction(p)?);
-            let feed = here.jet.du * du + here.jet.dv * dv;
-            let near = |x: f64, [lo, hi]: [f64; 2]| (x - lo).abs().min((hi - x).abs()) / (hi - lo);
-            let [along_u, along_v] = self.chart.domain;
-            let border = if near(p[0], along_u) < near(p[1], along_v) { here.jet.dv } else { here.jet.du };
-            let (along, across) = (feed.dot(&border).abs(), feed.cross(&border).norm());
-            let interval = here.strip_width(self.cutter, &feed, self.settings.step).0;
-            Some(useful_overrun(along / across.max(1e-9)) * interval / self.settings.sampling)
+        // The farthest place, from the border on, whose strip still lies on the chart.
+        let useful = |from: f64, to: f64| {
+            let steps = ((to - from).abs() / OVERRUN_STEP).ceil().max(1.0) as usize;
+            let place = |k: usize| from + (to - from) * k as f64 / steps as f64;
+            place((1..=steps).find(|&k| !self.serves(at(place(k)))).unwrap_or(steps))
         };
         if let Some(first) = stretches.first_mut().filter(|s| !s.inside) {
-            first.from = first.from.max(first.to - useful(first.to).unwrap_or(0.0));
+            first.from = useful(first.to, first.from);
         }
         if let Some(end) = stretches.last_mut().filter(|s| !s.inside) {
-            end.to = end.to.min(end.from + useful(end.from).unwrap_or(0.0));
+            end.to = useful(end.from, end.to);
         }
         stretches.retain(|s| s.to - s.from > BORDER_PRECISION);
+    }
+
+    /// Whether half an interval to either side of a place outside lies the chart.
+    fn serves(&self, p: [f64; 2]) -> bool {
+        let beside = || {
+            let (here, [du, dv]) = (self.chart.at(p[0], p[1])?, self.tracer.direction(p)?);
+            let feed = (here.jet.du * du + here.jet.dv * dv).try_normalize(1e-300)?;
+            let interval = here.strip_width(self.cutter, &feed, self.settings.step).0;
+            let (du, dv) = here.jet.pull_back(&here.normal.cross(&feed))?;
+            Some([0.5 * interval * du, 0.5 * interval * dv])
+        };
+        beside().is_some_and(|[du, dv]| {
+            self.chart.holds([p[0] + du, p[1] + dv]) || self.chart.holds([p[0] - du, p[1] - dv])
+        })
     }
 }
 

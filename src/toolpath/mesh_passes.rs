@@ -9,8 +9,10 @@
 use super::border::useful_overrun;
 use super::drop::DropCutter;
 use super::halving::{Allowed, LevelSource, Track, along_and_between};
+use super::mesh_shortest::shortest_stream;
 use super::mesh_surface::{MeshSurface, not_applicable, reachable};
 use super::plan::{PassSettings, Passes, PlanError};
+use super::shortest::shortest_note;
 use super::spacing::{Place, Placing, place_levels};
 use super::strip::strip_width_at;
 use super::{Along, FeedDirection, Step};
@@ -57,11 +59,11 @@ const EVENINGS: usize = 2;
 const EVEN: [f64; 5] = [-3.0 / 35.0, 12.0 / 35.0, 17.0 / 35.0, 12.0 / 35.0, -3.0 / 35.0];
 
 /// Passes along the level curves of a stream function over everything of the part that is reached from
-/// above.
+/// above; without a direction, of the one with the shortest path.
 pub(super) fn on_mesh(
     part: &Part,
     cutter: &Cutter,
-    direction: &FeedDirection,
+    direction: Option<&FeedDirection>,
     settings: &PassSettings,
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
@@ -88,15 +90,48 @@ pub(super) fn on_mesh(
 fn on_piece(
     part: &Part,
     cutter: &Cutter,
-    direction: &FeedDirection,
+    direction: Option<&FeedDirection>,
     surface: &MeshSurface,
     settings: &PassSettings,
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
-    let mesh = &surface.mesh;
     let mut notes = Vec::new();
-    let lines = feed_lines(part, cutter, direction, surface, &mut notes).map_err(refused)?;
+    let (values, predicted) = match direction {
+        Some(direction) => (along_direction(part, cutter, direction, surface, settings, &mut notes)?, None),
+        None => {
+            let found = shortest_stream(surface, cutter, settings.step, monitor)?;
+            let found =
+                found.ok_or_else(|| not_applicable("no stream function of least length was found"))?;
+            (found.coefficients, Some(found.cost))
+        }
+    };
+    let levels = MeshLevels::new(&surface.mesh, &values).map_err(refused)?;
+    let own_values = values.iter().zip(&surface.origin).enumerate();
+    let own_values = own_values.filter(|&(v, (_, &origin))| origin as usize == v).map(|(_, (psi, _))| *psi);
+    let range = own_values.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], x| [lo.min(x), hi.max(x)]);
+    let drop = DropCutter::new(part, cutter);
+    let guide = MeshGuide { surface, levels, cutter, drop, settings, monitor };
+    let places = guide.places(&values);
+    let placed = place_levels(&places, range, Placing::Shortest, &mut notes);
+    let mut passes = along_and_between(&guide, &placed, range, settings.sampling, monitor)?;
+    notes.extend(predicted.map(|predicted| shortest_note(&passes, predicted)));
+    passes.notes.splice(0..0, notes);
+    Ok(passes)
+}
+
+/// ψ at the vertices whose levels follow feed directions.
+fn along_direction(
+    part: &Part,
+    cutter: &Cutter,
+    direction: &FeedDirection,
+    surface: &MeshSurface,
+    settings: &PassSettings,
+    notes: &mut Vec<String>,
+) -> Result<Vec<f64>, PlanError> {
+    let refused = |e: MeshFieldError| not_applicable(&e.to_string());
+    let mesh = &surface.mesh;
+    let lines = feed_lines(part, cutter, direction, surface, notes).map_err(refused)?;
     let widths =
         |v: usize, b: &Vector3| width_at(cutter, &mesh.normals()[v], b, &surface.bends[v], settings.step);
     let count = mesh.points().len();
@@ -111,20 +146,11 @@ fn on_piece(
         "the stream function follows the feed directions within {:.2} degrees (root mean square)",
         stream.angle_rms.to_degrees()
     ));
-    let levels = MeshLevels::new(mesh, &stream.values).map_err(refused)?;
-    let own_values = stream.values.iter().enumerate().filter(|&(v, _)| own(v) == v).map(|(_, psi)| *psi);
-    let range = own_values.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], x| [lo.min(x), hi.max(x)]);
-    let drop = DropCutter::new(part, cutter);
-    let guide = MeshGuide { surface, levels, cutter, drop, settings, monitor };
-    let places = guide.places(&stream.values);
-    let placed = place_levels(&places, range, Placing::Shortest, &mut notes);
-    let mut passes = along_and_between(&guide, &placed, range, settings.sampling, monitor)?;
-    passes.notes.splice(0..0, notes);
-    Ok(passes)
+    Ok(stream.values)
 }
 
 /// Strip width across the feed, and whether it had to be limited.
-fn width_at(cutter: &Cutter, n: &Vector3, b: &Vector3, bend: &Bend, step: Step) -> (f64, bool) {
+pub(super) fn width_at(cutter: &Cutter, n: &Vector3, b: &Vector3, bend: &Bend, step: Step) -> (f64, bool) {
     match step {
         Step::Stepover(width) => (width, false),
         Step::Scallop(h) => strip_width_at(cutter, n, b, bend.along(b), h),

@@ -12,6 +12,7 @@ mod iso_scallop;
 mod level_passes;
 mod link;
 mod mesh_passes;
+mod mesh_shortest;
 mod mesh_surface;
 mod path;
 mod plan;

@@ -269,8 +269,10 @@ pub(super) struct PassSettings {
     pub smoothing: Option<f64>,
 }
 
-/// Share of the chord tolerance that sampling may use; point reduction uses the rest.
-const SAMPLING_SHARE: f64 = 0.4;
+/// Shares of the chord tolerance that sampling and point reduction may use. Together they leave a part of it: ridges stand
+/// between chords of two passes, and passes lie the closer the more chords may raise them.
+const SAMPLING_SHARE: f64 = 0.1;
+const REDUCTION_SHARE: f64 = 0.6;
 
 impl PassSettings {
     /// Straight moves along `locate` over `[s0, s1]` within the chord tolerance.
@@ -289,7 +291,7 @@ impl PassSettings {
         let points = sample_within_chord(s0, s1, self.sampling, fine, locate, &mut watch)?;
         match self.smoothing {
             Some(sampling) => smooth_and_spread(&points, sampling, self.chord_tolerance - fine, &mut watch),
-            None => reduce(&points, self.chord_tolerance - fine, &mut watch),
+            None => reduce(&points, REDUCTION_SHARE * self.chord_tolerance, &mut watch),
         }
     }
 }
@@ -324,8 +326,8 @@ const SAMPLING_OVER_RADIUS: f64 = 0.15;
 /// ridges stand between chords of two passes, whose greatest deviations seldom meet: planned for 9 µm with chords of
 /// 1 µm, the highest ridges of a saddle and of a pit stood at 9.3 and 9.4 µm, 95 % below 9.1. The facets of a mesh, which
 /// the planned surface does not have, take the rest.
-const CHORD_SHARE: f64 = 0.5;
-const CHORD_SHARE_OF_MESHES: f64 = 1.0;
+const CHORD_SHARE: f64 = 0.25;
+const CHORD_SHARE_OF_MESHES: f64 = 0.7;
 
 /// But it is not planned for less than this share of itself.
 const LEAST_SHARE_OF_TARGET: f64 = 0.5;
@@ -396,12 +398,15 @@ pub fn plan(
         }
         Strategy::Spiral => (spiral::passes(part, cutter, &pass, monitor)?, true),
         Strategy::ContourSpiral => (contour_spiral::passes(part, cutter, &pass, monitor)?, true),
+        Strategy::ShortestStreamline if mesh_surface::wants_mesh(part, cutter) => {
+            (mesh_passes::on_mesh(part, cutter, None, &pass, monitor)?, true)
+        }
         Strategy::ShortestStreamline => (shortest::passes(part, cutter, &pass, monitor)?, true),
         Strategy::Streamline { direction, method, .. }
             if *method == StreamMethod::Elements
                 || (*method == StreamMethod::Automatic && mesh_surface::wants_mesh(part, cutter)) =>
         {
-            (mesh_passes::on_mesh(part, cutter, direction, &pass, monitor)?, true)
+            (mesh_passes::on_mesh(part, cutter, Some(direction), &pass, monitor)?, true)
         }
         Strategy::Streamline { direction, control_points, method, solver } => {
             let fitting = Fitting { controls: *control_points, method: *method, solver: *solver };

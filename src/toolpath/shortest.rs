@@ -17,7 +17,10 @@ use super::iso_scallop::{front_at, places};
 use super::level_passes::along_levels;
 use super::plan::{PassSettings, Passes, PlanError, Step};
 use crate::cutter::Cutter;
-use crate::field::{Gradients, NormalEquations, Packed, ScalarField, ScalarSpline, Site, minimise};
+use crate::field::{
+    Gradients, NormalEquations, Packed, Roughness, Rounds, ScalarField, ScalarSpline, Site, Start, eikonal,
+    minimise,
+};
 use crate::geometry::{KnotVector, Vector3};
 use crate::monitor::{Cancelled, Monitor};
 use crate::parallel;
@@ -25,7 +28,7 @@ use crate::part::Part;
 
 /// Spans of the spline's knots are this many of the cutter's radii long. Features that a cutter fits into are wider; finer
 /// nets gain a few tenths of a per cent.
-const SPAN_OVER_RADIUS: f64 = 1.0;
+const SPAN_OVER_RADIUS: f64 = 0.6;
 
 /// Fewest and most spans a side. Time grows with their product.
 const SPANS: [usize; 2] = [8, 72];
@@ -35,6 +38,9 @@ const COARSEST: usize = 16;
 
 /// Straight passes to start from, over half a turn.
 const STARTS: usize = 8;
+
+/// Nodes a side of the fronts to start from.
+const FRONT_NODES: usize = 41;
 
 /// Gauss's points of each span and side.
 const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
@@ -100,18 +106,29 @@ pub(super) fn passes(
     let mut all = Passes::default();
     for chart in Chart::all(part, cutter)? {
         let search = Search { chart: &chart, cutter, step: settings.step, monitor };
-        let (spline, found) = search.run()?;
-        let field = ScalarField::Spline(spline);
-        let mut planned = along_levels(part, cutter, &chart, &field, settings, monitor)?;
-        planned.notes.push(format!(
-            "passes follow the stream function of the shortest path: {:.0} mm planned, {:.0} mm predicted",
-            planned.length(),
-            found.cost,
-        ));
+        let mut all_planned = Vec::new();
+        for (spline, promised) in search.run()? {
+            let field = ScalarField::Spline(spline);
+            all_planned.push((along_levels(part, cutter, &chart, &field, settings, monitor)?, promised));
+        }
+        all_planned.sort_by(|(a, _), (b, _)| a.length().total_cmp(&b.length()));
+        let Some((mut planned, promised)) = all_planned.into_iter().next() else { continue };
+        planned.notes.push(shortest_note(&planned, promised));
         all.append(planned);
     }
     Ok(all)
 }
+
+/// What the user is told of it.
+pub(super) fn shortest_note(planned: &Passes, predicted: f64) -> String {
+    let length = planned.length();
+    format!(
+        "passes follow the stream function of the shortest path: {length:.0} mm planned, {predicted:.0} mm predicted"
+    )
+}
+
+/// Borders that fronts start from.
+const BORDERS: [(usize, usize); 4] = [(0, 0), (0, 1), (1, 0), (1, 1)];
 
 /// The search for the stream function of one chart.
 struct Search<'a> {
@@ -129,7 +146,8 @@ struct Net {
 }
 
 impl Search<'_> {
-    fn run(&self) -> Result<(ScalarSpline, Packed), PlanError> {
+    /// The best stream functions and the lengths that they promise, mm.
+    fn run(&self) -> Result<Vec<(ScalarSpline, f64)>, PlanError> {
         let sides = self.sides();
         let finest = SPAN_OVER_RADIUS * self.cutter.radius();
         let longest = (sides[0].max(sides[1]) / finest).clamp(SPANS[0] as f64, SPANS[1] as f64);
@@ -141,24 +159,47 @@ impl Search<'_> {
             strategy: "streamline",
             reason: "no stream function of least length was found; use another direction".into(),
         };
-        self.monitor.start("searching directions", (STARTS + counts.len()) as u64);
-        let net = self.net(counts.pop().unwrap_or(longest), sides).ok_or_else(unfit)?;
-        let found = parallel::try_map(STARTS, |k| {
-            let start = self.straight(&net, sides, PI * k as f64 / STARTS as f64);
-            let found = minimise(&net.sites, &net.gradients, start, false, self.monitor)?;
+        self.monitor.start("searching directions", (STARTS + BORDERS.len() + counts.len()) as u64);
+        let finest = self.net(longest, sides).ok_or_else(unfit)?;
+        let minimise = |net: &Net, start: Vec<f64>, rounds: Rounds| {
+            let found =
+                minimise(&net.sites, &net.gradients, &Roughness::default(), start, rounds, self.monitor);
             self.monitor.advance(1);
-            Ok::<_, Cancelled>(found)
+            found
+        };
+        // Straight passes on a coarse net first; fronts are good already, and lose by coarse nets.
+        let mut net = self.net(counts.pop().unwrap_or(longest), sides).ok_or_else(unfit)?;
+        let straight = parallel::try_map(STARTS, |k| {
+            minimise(&net, self.straight(&net, sides, PI * k as f64 / STARTS as f64), Rounds::First)
         })?;
-        let best = found.into_iter().flatten().min_by(|a, b| a.cost.total_cmp(&b.cost));
-        let (mut net, mut best) = (net, best.ok_or_else(unfit)?);
+        let shortest = |found: Vec<Option<Packed>>| {
+            found.into_iter().flatten().min_by(|a, b| (a.cost + a.ends).total_cmp(&(b.cost + b.ends)))
+        };
+        let mut best = shortest(straight).ok_or_else(unfit)?;
         while let Some(count) = counts.pop() {
+            best = minimise(&net, best.coefficients, Rounds::Last)?.ok_or_else(unfit)?;
             let spline = net.spline(&best).ok_or_else(unfit)?;
             net = self.net(count, sides).ok_or_else(unfit)?;
-            let start = net.values_of(&spline).ok_or_else(unfit)?;
-            best = minimise(&net.sites, &net.gradients, start, true, self.monitor)?.ok_or_else(unfit)?;
-            self.monitor.advance(1);
+            best.coefficients =
+                net.coefficients(|u, v| spline.value_and_gradient(u, v)[0]).ok_or_else(unfit)?;
         }
-        Ok((net.spline(&best).ok_or_else(unfit)?, best))
+        let best = minimise(&net, best.coefficients, Rounds::Last)?;
+        let fronts = parallel::try_map(BORDERS.len(), |k| {
+            let start = self.border_front(&finest, BORDERS[k]);
+            let found = start.map(|start| minimise(&finest, start, Rounds::Last)).transpose()?;
+            Ok::<_, Cancelled>(found.flatten())
+        })?;
+        let found: Vec<Packed> = fronts.into_iter().chain([best]).flatten().collect();
+        // Passes along a whole border have no ends there, which the cost of ends does not know: the best without them
+        // is planned too.
+        let least = |cost: &dyn Fn(&Packed) -> f64| {
+            (0..found.len()).min_by(|&a, &b| cost(&found[a]).total_cmp(&cost(&found[b])))
+        };
+        let best = [least(&|f| f.cost + f.ends), least(&|f| f.cost)];
+        let mut chosen: Vec<usize> = best.into_iter().flatten().collect();
+        chosen.dedup();
+        let spline = |k: usize| Some((finest.spline(&found[k])?, found[k].cost + found[k].ends));
+        Ok(chosen.into_iter().filter_map(spline).collect())
     }
 
     /// Lengths of the chart through its middle, along u and v, mm.
@@ -188,10 +229,19 @@ impl Search<'_> {
             breaks.windows(2).flat_map(places).collect::<Vec<_>>()
         };
         let (us, vs) = (at(&knots_u), at(&knots_v));
-        let sites = parallel::map(us.len() * vs.len(), |k| {
+        let mut sites = parallel::map(us.len() * vs.len(), |k| {
             let ((u, du), (v, dv)) = (us[k % us.len()], vs[k / us.len()]);
-            Some((u, v, self.site(u, v, du * dv)?))
+            Some((u, v, self.site(u, v, du * dv, [0.0; 2])?))
         });
+        let [ends_u, ends_v] = self.chart.domain;
+        for end in 0..2 {
+            sites.extend(
+                us.iter().map(|&(u, du)| Some((u, ends_v[end], self.site(u, ends_v[end], 0.0, [du, 0.0])?))),
+            );
+            sites.extend(
+                vs.iter().map(|&(v, dv)| Some((ends_u[end], v, self.site(ends_u[end], v, 0.0, [0.0, dv])?))),
+            );
+        }
         let nu = knots_u.control_count();
         let mut gradients = Gradients::new(nu * knots_v.control_count());
         let mut kept = Vec::with_capacity(sites.len());
@@ -208,8 +258,24 @@ impl Search<'_> {
         Some(Net { knots: [knots_u, knots_v], sites: kept, gradients })
     }
 
-    /// What passes may do and cost at a place that stands for an area in parameters.
-    fn site(&self, u: f64, v: f64, area: f64) -> Option<Site> {
+    /// Coefficients of the front that starts at the border where the parameter (0: u, 1: v) is least (0) or greatest (1).
+    fn border_front(&self, net: &Net, (parameter, end): (usize, usize)) -> Option<Vec<f64>> {
+        let domain = self.chart.domain;
+        let corner = |other: usize| {
+            let mut at = [0.0; 2];
+            at[parameter] = domain[parameter][end];
+            at[1 - parameter] = domain[1 - parameter][other];
+            at
+        };
+        let curves = [vec![corner(0), corner(1)]];
+        let front = |u, v| front_at(self.chart, self.cutter, self.step, u, v);
+        let start = Start { curves: &curves, signed: false };
+        let front = eikonal(domain, [FRONT_NODES; 2], &front, &start, self.monitor).ok()?;
+        net.coefficients(|u, v| front.field.value_and_gradient(u, v)[0])
+    }
+
+    /// What passes may do and cost at a place that stands for an area in parameters, or for a step along a border.
+    fn site(&self, u: f64, v: f64, area: f64, along: [f64; 2]) -> Option<Site> {
         let front = front_at(self.chart, self.cutter, self.step, u, v)?;
         let p = self.chart.at(u, v)?;
         let (e, f, g) = p.jet.first_form();
@@ -218,10 +284,9 @@ impl Search<'_> {
             let feed = (p.jet.du * du + p.jet.dv * dv).cross(&p.normal);
             1.0 - p.curvature_along(&feed) * self.cutter.corner_radius()
         });
-        // Curvature has a mean and a second harmonic, which three directions tell.
-        let mean = (costs[0] + costs[1] + costs[2]) / 3.0;
-        let cost = [mean, costs[0] - mean, (costs[1] - costs[2]) / 3f64.sqrt()];
-        Some(Site { area: area * (e * g - f * f).max(0.0).sqrt(), front, cost })
+        let cost = Site::harmonic(costs);
+        let border = (along != [0.0; 2]).then(|| front.components(along));
+        Some(Site { area: area * (e * g - f * f).max(0.0).sqrt(), front, cost, border })
     }
 
     /// Coefficients of ψ for straight passes, as dense on the whole as the strips ask for.
@@ -245,16 +310,16 @@ impl Net {
         ScalarSpline::new(u, v, found.coefficients.clone())
     }
 
-    /// Coefficients of the same function on these knots, or nearly.
-    fn values_of(&self, spline: &ScalarSpline) -> Option<Vec<f64>> {
+    /// Coefficients of the spline that has the values of a function at the averages of its knots.
+    fn coefficients(&self, function: impl Fn(f64, f64) -> f64) -> Option<Vec<f64>> {
         let [u, v] = self.knots.clone();
         let mut equations = NormalEquations::new(u, v);
         let value = [[1.0, 0.0, 0.0], [0.0; 3], [0.0; 3]];
         for y in self.knots[1].averages() {
             for x in self.knots[0].averages() {
-                equations.add(x, y, &value, spline.value_and_gradient(x, y)[0], 1.0);
+                equations.add(x, y, &value, function(x, y), 1.0);
             }
         }
-        equations.solve(false).ok().map(|fine| fine.coefficients().to_vec())
+        equations.solve(false).ok().map(|spline| spline.coefficients().to_vec())
     }
 }

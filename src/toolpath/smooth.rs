@@ -12,7 +12,7 @@
 //! whole sagitta, between points as far on the other side by half of it, so that chords can be √2 times
 //! as long. Every input point is held against the move that passes it, whatever smoothing did.
 
-use super::chord::{Watch, distance_to_segment, reduce};
+use super::chord::{Watch, distance_to_segment, moved_aside, reduce, reduced_indices};
 use crate::geometry::{Point3, Vector3};
 use crate::monitor::Cancelled;
 
@@ -177,56 +177,6 @@ fn spread(
         knots.sort_unstable();
     }
     reduce(points, tolerance, watch)
-}
-
-/// Indices of the points that [`reduce`] keeps.
-fn reduced_indices(curve: &[Point3], tolerance: f64, watch: &mut Watch<'_>) -> Result<Vec<usize>, Cancelled> {
-    let kept = reduce(curve, tolerance, watch)?;
-    let mut from = 0;
-    let mut indices = Vec::with_capacity(kept.len());
-    for p in &kept {
-        let at = from + curve[from..].iter().position(|q| q == p).unwrap_or(0);
-        indices.push(at);
-        from = (at + 1).min(curve.len() - 1);
-    }
-    // The last point, whatever was found on the way.
-    if let Some(last) = indices.last_mut() {
-        *last = curve.len() - 1;
-    }
-    indices.dedup();
-    Ok(indices)
-}
-
-/// The points at `knots`, each moved by half the greater sagitta on its two sides, where the curve bends
-/// both ways by their mean. The ends stay.
-fn moved_aside(curve: &[Point3], knots: &[usize], tolerance: f64) -> Vec<Point3> {
-    let half_sagitta = |k: usize| {
-        let (a, b) = (curve[knots[k]], curve[knots[k + 1]]);
-        let off = |p: &Point3| {
-            let d = b - a;
-            let t = ((p - a).dot(&d) / d.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-            p - (a + d * t)
-        };
-        let between = &curve[knots[k]..=knots[k + 1]];
-        let far = |e: &Vector3| e.norm_squared();
-        let most =
-            between.iter().map(off).fold(Vector3::zeros(), |m, e| if far(&e) > far(&m) { e } else { m });
-        if far(&most) == 0.0 {
-            return most;
-        }
-        // A chord that the curve crosses is off on both sides already.
-        let least = between.iter().map(|p| off(p).dot(&most) / far(&most)).fold(0.0, f64::min);
-        most * (0.5 * (1.0 + least))
-    };
-    let halves: Vec<Vector3> = (0..knots.len() - 1).map(half_sagitta).collect();
-    let aside = |k: usize| {
-        let (a, b) = (halves[k - 1], halves[k]);
-        let greater = if a.norm_squared() > b.norm_squared() { a } else { b };
-        let by = if a.dot(&b) < 0.0 { 0.5 * (a + b) } else { greater };
-        curve[knots[k]] + by * (tolerance / by.norm().max(f64::MIN_POSITIVE)).min(1.0)
-    };
-    let last = knots.len() - 1;
-    (0..=last).map(|k| if k == 0 || k == last { curve[knots[k]] } else { aside(k) }).collect()
 }
 
 #[cfg(test)]

@@ -126,7 +126,7 @@ impl Front {
     }
 
     /// Components in the orthonormal frame of the vector with the parameters `[du, dv]`.
-    fn components(&self, [du, dv]: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn components(&self, [du, dv]: [f64; 2]) -> [f64; 2] {
         let x2 = dv / self.frame[2];
         [(du - self.frame[1] * x2) / self.frame[0], x2]
     }

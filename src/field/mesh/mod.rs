@@ -18,7 +18,7 @@ mod weld;
 
 pub use levels::{MeshCurve, MeshLevels, MeshPoint};
 pub use lines::{Line, SingularPoint, Wanted, blend, flows, orient_lines, singular_points, smooth_lines};
-pub use recover::vertex_gradients;
+pub use recover::{gradient_terms, vertex_gradients};
 pub use refine::Refined;
 pub use sheets::{Bend, Sheets};
 pub use sources::{Sense, borders, fixed_angle, guides, slope};

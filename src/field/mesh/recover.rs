@@ -89,21 +89,53 @@ pub fn vertex_gradients(mesh: &FieldMesh, values: &[f64]) -> Vec<Vector3> {
         for (k, gradient) in out.iter_mut().enumerate() {
             let v = chunk * CHUNK + k;
             rings(mesh, v, &mut near, &mut seen);
-            let [e1, e2] = mesh.frame(v);
-            samples.list.clear();
-            for &w in &near {
-                let d = mesh.points()[w as usize] - mesh.points()[v];
-                let (x, y) = (d.dot(&e1), d.dot(&e2));
-                let value = values[w as usize] - values[v];
-                samples.list.push(([x, y], value, 1.0 / d.norm_squared()));
-            }
-            *gradient = match samples.fit() {
-                Some([x, y, ..]) => e1 * x + e2 * y,
-                None => mean_of_triangles(mesh, v, values),
-            };
+            *gradient = gradient_at(mesh, v, &near, &mut samples, &|w| values[w as usize] - values[v]);
         }
     });
     gradients
+}
+
+/// How [`vertex_gradients`] follow from the values: for each vertex the vertices that count, each with what its
+/// value is multiplied by.
+pub fn gradient_terms(mesh: &FieldMesh) -> Vec<Vec<(u32, Vector3)>> {
+    let mut terms = vec![Vec::new(); mesh.points().len()];
+    parallel::for_each_chunk(&mut terms, CHUNK, |chunk, out| {
+        let (mut samples, mut near, mut seen) = (Samples::default(), Vec::new(), Vec::new());
+        for (k, terms) in out.iter_mut().enumerate() {
+            let v = chunk * CHUNK + k;
+            rings(mesh, v, &mut near, &mut seen);
+            let mut own = Vector3::zeros();
+            for &one in &near {
+                // The fit is linear: that of a function which is 1 there and 0 elsewhere.
+                let value = |w: u32| if w == one { 1.0 } else { 0.0 };
+                let gradient = gradient_at(mesh, v, &near, &mut samples, &value);
+                own -= gradient;
+                terms.push((one, gradient));
+            }
+            terms.push((v as u32, own));
+        }
+    });
+    terms
+}
+
+/// The gradient at `v` from the values of the vertices `near`, less its own.
+fn gradient_at(
+    mesh: &FieldMesh,
+    v: usize,
+    near: &[u32],
+    samples: &mut Samples,
+    value: &dyn Fn(u32) -> f64,
+) -> Vector3 {
+    let [e1, e2] = mesh.frame(v);
+    samples.list.clear();
+    for &w in near {
+        let d = mesh.points()[w as usize] - mesh.points()[v];
+        samples.list.push(([d.dot(&e1), d.dot(&e2)], value(w), 1.0 / d.norm_squared()));
+    }
+    match samples.fit() {
+        Some([x, y, ..]) => e1 * x + e2 * y,
+        None => mean_of_triangles(mesh, v, &|w| if w as usize == v { 0.0 } else { value(w) }),
+    }
 }
 
 /// The vertices within two edges of `v`, without `v`, ascending.
@@ -124,12 +156,12 @@ fn rings(mesh: &FieldMesh, v: usize, near: &mut Vec<u32>, first: &mut Vec<u32>) 
     near.retain(|&w| w as usize != v);
 }
 
-fn mean_of_triangles(mesh: &FieldMesh, v: usize, values: &[f64]) -> Vector3 {
+fn mean_of_triangles(mesh: &FieldMesh, v: usize, value: &dyn Fn(u32) -> f64) -> Vector3 {
     let (mut sum, mut areas) = (Vector3::zeros(), 0.0);
     for &t in mesh.triangles_at(v) {
         let t = t as usize;
         let hats = mesh.hat_gradients(t);
-        let gradient: Vector3 = (0..3).map(|k| hats[k] * values[mesh.triangles()[t][k] as usize]).sum();
+        let gradient: Vector3 = (0..3).map(|k| hats[k] * value(mesh.triangles()[t][k])).sum();
         let area = mesh.area(t);
         sum += turned(&mesh.area_vector(t).normalize(), &mesh.normals()[v], &gradient) * area;
         areas += area;
