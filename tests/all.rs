@@ -10,6 +10,8 @@ mod classic;
 mod cli;
 #[path = "all/command.rs"]
 mod command;
+#[path = "all/compare.rs"]
+mod compare;
 #[path = "all/defects.rs"]
 mod defects;
 #[path = "all/directions.rs"]

@@ -1,28 +1,14 @@
 //! The scenes that ship: their generated parts, and what their reports must say.
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use millstream::geometry::{Point3, TriangleMesh};
 use serde_json::Value;
 
+use crate::support::{height_mesh, number, run_scene, write_stl};
+
 fn scene(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)
-}
-
-/// A grid of `n` × `n` squares over `[0, size]²`, each split in two.
-fn height_mesh(n: usize, size: [f64; 2], height: impl Fn(f64, f64) -> f64) -> TriangleMesh {
-    let at = |c: usize, k: usize| size[c] * k as f64 / n as f64;
-    let vertices: Vec<Point3> = (0..=n)
-        .flat_map(|j| (0..=n).map(move |i| (i, j)))
-        .map(|(i, j)| Point3::new(at(0, i), at(1, j), height(at(0, i), at(1, j))))
-        .collect();
-    let k = |i: usize, j: usize| (j * (n + 1) + i) as u32;
-    let triangles = (0..n)
-        .flat_map(|j| (0..n).map(move |i| (i, j)))
-        .flat_map(|(i, j)| [[k(i, j), k(i + 1, j), k(i + 1, j + 1)], [k(i, j), k(i + 1, j + 1), k(i, j + 1)]])
-        .collect();
-    TriangleMesh::new(vertices, triangles).unwrap().0
 }
 
 /// Four soft bumps and two hollows on a plate of 40 × 40 mm.
@@ -130,25 +116,7 @@ fn mesh_parts_are_those_of_their_generators() {
 
 /// Runs a shipped scene and returns its exit status and report.
 fn run(name: &str) -> (i32, Value) {
-    let out = tempfile::tempdir().unwrap();
-    let folder = out.path().join("out");
-    let output = Command::new(env!("CARGO_BIN_EXE_millstream"))
-        .arg("run")
-        .arg(scene(name))
-        .arg("--out")
-        .arg(&folder)
-        .output()
-        .unwrap();
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    println!("{text}");
-    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(errors.is_empty(), "{name}: {errors}");
-    let report = std::fs::read_to_string(folder.join("report.json")).unwrap();
-    (output.status.code().unwrap(), serde_json::from_str(&report).unwrap())
-}
-
-fn number(value: &Value, pointer: &str) -> f64 {
-    value.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("{pointer} in {value}"))
+    run_scene(&scene(name))
 }
 
 /// What every streamline of a shipped scene must reach, and every other strategy as well.
@@ -217,20 +185,6 @@ fn coarse_chords_fail_for_their_gouges() {
     assert!(depth > 0.005 && depth <= 0.030 + 1e-6, "not deeper than the chord tolerance: {depth}");
     let region = &toolpath["gouge"]["regions"][0];
     assert!(number(region, "/line") > 1.0);
-}
-
-/// Binary STL.
-fn write_stl(path: &Path, triangles: &[[Point3; 3]]) {
-    let mut bytes = vec![0u8; 80];
-    bytes.extend((triangles.len() as u32).to_le_bytes());
-    for [a, b, c] in triangles {
-        let normal = (b - a).cross(&(c - a)).normalize();
-        for v in [normal, a.coords, b.coords, c.coords] {
-            v.iter().for_each(|x| bytes.extend((*x as f32).to_le_bytes()));
-        }
-        bytes.extend([0, 0]);
-    }
-    std::fs::write(path, bytes).unwrap();
 }
 
 /// Both pockets: nothing gouged, on the floor or beyond the walls, nothing left but in corners, no rapid in

@@ -1,5 +1,8 @@
 //! What several tests need: a part cut by a strategy and measured.
 
+use std::path::Path;
+use std::process::Command;
+
 use millstream::cutter::Cutter;
 use millstream::geometry::{AnalyticShape, AnalyticSurface, Point3, TriangleMesh};
 use millstream::metrology::{Asked, Limits, Measurement, measure};
@@ -7,6 +10,7 @@ use millstream::monitor::Silent;
 use millstream::part::{Part, Patch};
 use millstream::sim::{Grid, ZMap, cut_reference};
 use millstream::toolpath::{Joining, PlanSettings, Step, Strategy, Toolpath, plan};
+use serde_json::Value;
 
 pub const LIMITS: Limits = Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chord: 0.001 };
 
@@ -68,4 +72,56 @@ pub fn plan_and_measure(
 /// |a / b − 1|.
 pub fn off(a: f64, b: f64) -> f64 {
     (a / b - 1.0).abs()
+}
+
+/// A grid of `n` × `n` squares over `[0, size]²`, each split in two.
+pub fn height_mesh(n: usize, size: [f64; 2], height: impl Fn(f64, f64) -> f64) -> TriangleMesh {
+    let at = |c: usize, k: usize| size[c] * k as f64 / n as f64;
+    let vertices: Vec<Point3> = (0..=n)
+        .flat_map(|j| (0..=n).map(move |i| (i, j)))
+        .map(|(i, j)| Point3::new(at(0, i), at(1, j), height(at(0, i), at(1, j))))
+        .collect();
+    let k = |i: usize, j: usize| (j * (n + 1) + i) as u32;
+    let triangles = (0..n)
+        .flat_map(|j| (0..n).map(move |i| (i, j)))
+        .flat_map(|(i, j)| [[k(i, j), k(i + 1, j), k(i + 1, j + 1)], [k(i, j), k(i + 1, j + 1), k(i, j + 1)]])
+        .collect();
+    TriangleMesh::new(vertices, triangles).unwrap().0
+}
+
+/// Binary STL.
+pub fn write_stl(path: &Path, triangles: &[[Point3; 3]]) {
+    let mut bytes = vec![0u8; 80];
+    bytes.extend((triangles.len() as u32).to_le_bytes());
+    for [a, b, c] in triangles {
+        let normal = (b - a).cross(&(c - a)).normalize();
+        for v in [normal, a.coords, b.coords, c.coords] {
+            v.iter().for_each(|x| bytes.extend((*x as f32).to_le_bytes()));
+        }
+        bytes.extend([0, 0]);
+    }
+    std::fs::write(path, bytes).unwrap();
+}
+
+/// Runs a scene and returns its exit status and report.
+pub fn run_scene(scene: &Path) -> (i32, Value) {
+    let out = tempfile::tempdir().unwrap();
+    let folder = out.path().join("out");
+    let output = Command::new(env!("CARGO_BIN_EXE_millstream"))
+        .arg("run")
+        .arg(scene)
+        .arg("--out")
+        .arg(&folder)
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    println!("{text}");
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(errors.is_empty(), "{}: {errors}", scene.display());
+    let report = std::fs::read_to_string(folder.join("report.json")).unwrap();
+    (output.status.code().unwrap(), serde_json::from_str(&report).unwrap())
+}
+
+pub fn number(value: &Value, pointer: &str) -> f64 {
+    value.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("{pointer} in {value}"))
 }

@@ -1,0 +1,156 @@
+//! The comparison on eight surfaces (`scenes/compare`): the shortest streamlines against the best zigzag and iso-scallop
+//! passes, by what the simulated cut measures.
+
+use std::path::{Path, PathBuf};
+
+use millstream::geometry::TriangleMesh;
+use serde_json::{Value, json};
+
+use crate::support::{height_mesh, number, run_scene, write_stl};
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/compare")
+}
+
+const SURFACES: [&str; 8] =
+    ["pit_and_crest", "wave", "saddle", "bumps", "twisted", "blade_side", "relief", "joined"];
+
+/// Bumps and hollows as Gaussians: middle, width, height, mm.
+fn gaussians(bumps: &[[f64; 4]]) -> impl Fn(f64, f64) -> f64 {
+    move |x, y| {
+        let bump = |[cx, cy, width, height]: &[f64; 4]| {
+            height * (-((x - cx).powi(2) + (y - cy).powi(2)) / (width * width)).exp()
+        };
+        bumps.iter().map(bump).sum()
+    }
+}
+
+/// A bicubic patch whose control points stand where a surface has them at the averages of its knots.
+fn patch([nu, nv]: [usize; 2], surface: impl Fn(f64, f64) -> [f64; 3]) -> Value {
+    let knots = |n: usize| -> Vec<f64> {
+        let inner = (1..n - 3).map(|k| k as f64 / (n - 3) as f64);
+        [0.0; 4].into_iter().chain(inner).chain([1.0; 4]).collect()
+    };
+    let averages = |n: usize| -> Vec<f64> { knots(n)[1..].windows(3).take(n).map(|w| w.iter().sum::<f64>() / 3.0).collect() };
+    let rounded = |p: [f64; 3]| p.map(|c| (c * 1e3).round() / 1e3);
+    let points: Vec<Vec<[f64; 3]>> =
+        averages(nu).iter().map(|&u| averages(nv).iter().map(|&v| rounded(surface(u, v))).collect()).collect();
+    json!({
+        "unit": "mm",
+        "patches": [{
+            "degree_u": 3, "degree_v": 3, "knots_u": knots(nu), "knots_v": knots(nv), "control_points": points,
+        }],
+    })
+}
+
+fn bumps() -> Value {
+    let height = gaussians(&[
+        [14.0, 14.0, 8.0, 3.2],
+        [44.0, 12.0, 7.0, 2.4],
+        [30.0, 30.0, 9.0, 3.6],
+        [12.0, 44.0, 7.5, -2.2],
+        [46.0, 46.0, 8.5, 3.0],
+        [47.0, 30.0, 6.0, -1.4],
+        [30.0, 50.0, 6.5, 1.6],
+        [28.0, 9.0, 6.0, -1.5],
+    ]);
+    patch([23, 23], |u, v| [60.0 * u, 60.0 * v, height(60.0 * u, 60.0 * v)])
+}
+
+/// A saddle between skewed borders, bent along x.
+fn twisted() -> Value {
+    patch([12, 12], |u, v| {
+        let (x, y) = (50.0 * u - 25.0, 50.0 * v - 25.0);
+        let z = 0.03 * x * y + 0.01 * x * x - 0.005 * y * y + 0.0002 * x * x * x;
+        [x + 2.5 * (0.12 * y).sin(), y + 1.5 * (0.1 * x).cos(), z]
+    })
+}
+
+/// The upper side of a section, 40 mm long at the root and 30 at the tip, that turns by 25 degrees over a span of
+/// 60 mm, from just behind the leading edge.
+fn blade_side() -> Value {
+    patch([14, 9], |u, v| {
+        let chord = 40.0 - 10.0 * v;
+        let turn = (-12.0 + 25.0 * v).to_radians();
+        let s = 0.04 + 0.96 * u;
+        // A section of four digits, thickness and camber both.
+        let thickness = 1.48 * s.sqrt() - 0.63 * s - 1.76 * s * s + 1.42 * s * s * s - 0.51 * s.powi(4);
+        let z = chord * (0.3 * (1.0 - 0.25 * v) * thickness + 0.22 * s * (1.0 - s));
+        let x = chord * (s - 0.4);
+        [x * turn.cos(), 60.0 * v, 0.35 * x * turn.sin() + z]
+    })
+}
+
+/// Wide bumps and hollows, 50 × 50 mm, as an STL mesh with edges of 0.4 mm.
+fn relief() -> TriangleMesh {
+    height_mesh(
+        125,
+        [50.0, 50.0],
+        gaussians(&[
+            [12.0, 14.0, 10.5, 2.5],
+            [36.0, 11.0, 9.0, 1.8],
+            [39.0, 38.0, 12.0, 3.0],
+            [13.0, 38.0, 9.8, -1.8],
+            [25.0, 25.0, 9.0, 1.2],
+            [46.0, 24.0, 9.0, -1.0],
+        ]),
+    )
+}
+
+/// Each part of a scene is what its generator makes; `MILLSTREAM_BLESS=1` writes them anew.
+#[test]
+fn parts_are_those_of_their_generators() {
+    let bless = std::env::var_os("MILLSTREAM_BLESS").is_some();
+    for (name, part) in [("bumps", bumps()), ("twisted", twisted()), ("blade_side", blade_side())] {
+        let path = folder().join(name).with_extension("json");
+        if bless {
+            std::fs::write(&path, part.to_string() + "\n").unwrap();
+        }
+        let shipped: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+        assert_eq!(shipped, part, "{name}");
+    }
+    let (path, mesh) = (folder().join("relief.stl"), relief());
+    if bless {
+        let triangles: Vec<_> = (0..mesh.triangles().len()).map(|t| mesh.corners(t)).collect();
+        write_stl(&path, &triangles);
+    }
+    let (shipped, _) = millstream::io::stl::read(&path).unwrap();
+    for t in 0..mesh.triangles().len() {
+        let apart = |(a, b): (&millstream::geometry::Point3, &millstream::geometry::Point3)| (a - b).norm();
+        assert!(shipped.corners(t).iter().zip(&mesh.corners(t)).map(apart).all(|d| d < 1e-5));
+    }
+}
+
+/// On each of the eight surfaces: nothing uncut, no gouge, at most 1 % of the ridges over the target and none above
+/// 1.1 times it; at least 92 % of the shortest possible path; and no longer than the best zigzag and iso-scallop.
+#[test]
+fn streamlines_are_the_shortest_of_all_on_eight_surfaces() {
+    let mut told = String::from("\nsurface          zigzag  iso-scallop  streamline  of the possible  over   highest\n");
+    let mut failed = Vec::new();
+    for name in SURFACES {
+        let (_, report) = run_scene(&folder().join(name).with_extension("toml"));
+        let of = |k: usize, what: &str| number(&report, &format!("/toolpaths/{k}/{what}"));
+        let [zigzag, iso_scallop, streamline] = [0, 1, 2].map(|k| of(k, "path/cutting_length_mm"));
+        let possible = of(2, "path/shortest_possible_mm") / streamline;
+        let over = of(2, "scallop/over_target_fraction");
+        let highest = of(2, "scallop/max_mm") / of(2, "scallop/target_mm");
+        told += &format!(
+            "{name:<16}{zigzag:7.0}{iso_scallop:13.0}{streamline:12.0}{:15.1} %{:5.1} %{highest:9.3}\n",
+            100.0 * possible,
+            100.0 * over
+        );
+        let good = [
+            possible >= 0.92,
+            over <= 0.01,
+            highest <= 1.1,
+            of(2, "uncut/area_mm2") == 0.0,
+            of(2, "gouge/max_depth_mm") <= 0.001,
+            streamline <= zigzag && streamline <= 1.001 * iso_scallop,
+        ];
+        if good.contains(&false) {
+            failed.push(format!("{name}: {good:?}"));
+        }
+    }
+    println!("{told}");
+    assert!(failed.is_empty(), "{told}\n{}", failed.join("\n"));
+}
