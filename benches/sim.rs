@@ -74,6 +74,11 @@ mod in_order {
         cut(bencher, &cutter("bull"), cell, chord);
     }
 
+    #[divan::bench(sample_count = 3, args = [(0.05, 0.2)])]
+    fn taper(bencher: Bencher, (cell, chord): (f64, f64)) {
+        cut(bencher, &cutter("taper"), cell, chord);
+    }
+
     fn cut(bencher: Bencher, cutter: &Cutter, cell: f64, chord: f64) {
         let path = wave(PART, 0.3, chord);
         bencher
@@ -94,6 +99,11 @@ mod in_order {
     #[divan::bench(sample_count = 1, args = [(0.05, 0.2)])]
     fn plain_bull(bencher: Bencher, (cell, chord): (f64, f64)) {
         plain(bencher, &cutter("bull"), cell, chord);
+    }
+
+    #[divan::bench(sample_count = 1, args = [(0.05, 0.2)])]
+    fn plain_taper(bencher: Bencher, (cell, chord): (f64, f64)) {
+        plain(bencher, &cutter("taper"), cell, chord);
     }
 
     fn plain(bencher: Bencher, cutter: &Cutter, cell: f64, chord: f64) {

@@ -18,12 +18,12 @@
 
 mod choose;
 mod local;
-mod sweep;
 #[cfg(test)]
 mod tests;
 
 use super::bins::MoveBins;
 use super::form::{Family, Form};
+use super::sweep::{self, Ball, Flat, LocalMove, Rounded, Sweep};
 use super::swept::swept_height;
 use super::tiles::{TileCells, tiles};
 use super::track::Track;
@@ -34,8 +34,7 @@ use crate::monitor::{Cancelled, Monitor, check};
 use crate::parallel;
 use crate::toolpath::Toolpath;
 use choose::{Chooser, FEW, SQUARES, Square, ones};
-use local::{Chunk, Frame, LocalMove, MoveList, Name};
-use sweep::{Ball, Flat, Rounded, Sweep};
+use local::{Chunk, Frame, MoveList, Name};
 
 /// Cells along the side of a leaf. Smaller leaves keep fewer moves and ask for them more often.
 const LEAF: usize = 8;
@@ -194,13 +193,11 @@ impl Job<'_> {
                 (Family::Ball, None) => self.cut_with::<f64, _>(Ball::new(radius, 0.0), grid, tile),
                 (Family::Flat, Some(_)) => self.cut_with::<f32, _>(Flat::new(radius, blur), grid, tile),
                 (Family::Flat, None) => self.cut_with::<f64, _>(Flat::new(radius, 0.0), grid, tile),
-                (Family::Rounded, Some(_))
-                    if form.profile.is_plain() && form.profile.arc_end == form.radius =>
-                {
-                    self.cut_with::<f32, _>(Rounded::<_, false>::new(form, blur), grid, tile)
+                (Family::Rounded, Some(_)) if form.has_cones() => {
+                    self.cut_with::<f32, _>(Rounded::<_, true>::new(form, blur), grid, tile)
                 }
                 (Family::Rounded, Some(_)) => {
-                    self.cut_with::<f32, _>(Rounded::<_, true>::new(form, blur), grid, tile)
+                    self.cut_with::<f32, _>(Rounded::<_, false>::new(form, blur), grid, tile)
                 }
                 (Family::Rounded, None) => {
                     self.cut_with::<f64, _>(Rounded::<_, true>::new(form, 0.0), grid, tile)

@@ -38,6 +38,11 @@ impl Form {
         Self { family, radius: profile.radius, profile }
     }
 
+    /// Whether there is more than a disc and an arc up to the radius.
+    pub fn has_cones(&self) -> bool {
+        !self.profile.is_plain() || self.profile.arc_end < self.radius
+    }
+
     /// f(ρ) for `0 <= rho <= radius`.
     #[inline]
     pub fn height(&self, rho: f64) -> f64 {

@@ -7,11 +7,13 @@
 //! The grid is cut into tiles, one worker each, and a tile runs through its moves in the order of the
 //! program. Over the cells of a tile stands a tree with sixteen children a node (`tile`), each with a
 //! plane above all heights below it; a move descends only where a plane below its own cut reaches
-//! beneath that plane (`bound`), and cuts the leaves of 8 × 8 cells by the closed forms of
-//! [`SweptMove`](super::SweptMove) (`leaf`).
+//! beneath that plane (`bound`). It cuts leaves of 8 × 8 cells (`leaf`), whose heights come from the
+//! vector loops of the engine without order, and from the closed forms of [`SweptMove`](super::SweptMove)
+//! where those leave a doubt (`heights`).
 
 mod bound;
 mod contact;
+mod heights;
 mod leaf;
 mod plain;
 #[cfg(test)]
@@ -110,7 +112,9 @@ impl Removal {
 ///
 /// # Tolerance
 /// Heights are those of [`cut_reference`](super::cut_reference) to one unit in the last place of f32
-/// (the order of moves changes no height). The bits do not depend on the number of threads.
+/// (the order of moves changes no height), except that a cell whose centre lies on the rim of the cutter to
+/// the last bits may be cut or not. The bits depend neither on the number of threads nor on the machine's
+/// vector unit.
 ///
 /// # Cost
 /// Beside the stock 64 bytes for each move in each tile of 128 × 128 cells that it cuts in, and 48 a

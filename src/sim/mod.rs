@@ -13,6 +13,7 @@ mod in_order;
 mod reference;
 #[cfg(test)]
 pub(crate) mod scenes;
+mod sweep;
 mod swept;
 mod tiles;
 mod track;

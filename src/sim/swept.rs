@@ -77,6 +77,12 @@ impl SweptMove {
 #[inline(always)]
 pub(super) fn swept_height(form: &Form, track: &Track, x: f64, y: f64) -> f64 {
     let (along, across) = track.along_across(x, y);
+    swept_height_at(form, track, along, across)
+}
+
+/// As [`swept_height`], at a place along the track and across it.
+#[inline(always)]
+pub(super) fn swept_height_at(form: &Form, track: &Track, along: f64, across: f64) -> f64 {
     match form.family {
         Family::Ball => ball_height(track, form.radius, along, across),
         Family::Flat => flat_height(track, form.radius, along, across),

@@ -3,9 +3,9 @@
 //! Enters: a list of moves and up to four squares. Leaves: one bit for each move and square. Squares are
 //! worked on side by side, because each step of one waits for the step before it.
 
-use super::local::{Chunk, LANES, LocalMove, MoveList};
-use super::sweep::Sweep;
+use super::local::{Chunk, LANES, MoveList};
 use crate::lanes::Real;
+use crate::sim::sweep::{LocalMove, Sweep};
 
 /// Most squares that choose together.
 pub(super) const SQUARES: usize = 4;
@@ -353,8 +353,12 @@ fn planes_of<T: Real, S: Sweep<T>>(
         planes.away[lane] = ahead * ahead + across * across;
         let half_along = square.half_x * m.ux.absolute() + square.half_y * m.uy.absolute();
         let half_across = square.half_x * m.uy.absolute() + square.half_y * m.ux.absolute();
-        let (lower, upper) =
-            sweep.beyond(&m, [along - half_along, along + half_along], across.absolute() + half_across);
+        let nearest = (across.absolute() - half_across).larger(T::of(0.0));
+        let (lower, upper) = sweep.beyond(
+            &m,
+            [along - half_along, along + half_along],
+            [nearest, across.absolute() + half_across],
+        );
         let name = chunk.name(lane);
         // A plunge has both ends in one place, and only the lower one cuts.
         let counts = !name.bound_only() & (m.low < m.high);

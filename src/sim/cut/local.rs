@@ -1,6 +1,7 @@
 //! Moves in the coordinates of one tile, many side by side, for vector loops. mm.
 
 use crate::lanes::Real;
+use crate::sim::sweep::LocalMove;
 use crate::sim::track::Track;
 
 /// Moves in one chunk.
@@ -10,26 +11,6 @@ pub(super) const LANES: usize = 16;
 /// the slope; they are kept as the level move at their lowest tip, which bounds them from below, and
 /// evaluated in f64 where they may cut.
 const STEEP: f64 = 4.0;
-
-/// One straight move of the tip, seen from the point of its track next to the middle of the tile: all
-/// numbers that matter are then no larger than the cutter and the tile.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct LocalMove<T> {
-    /// The point of the track next to the middle of the tile.
-    pub x: T,
-    pub y: T,
-    pub z: T,
-    /// Unit direction in the plan view, rising.
-    pub ux: T,
-    pub uy: T,
-    /// Where the track begins and ends, from that point on: `low <= 0 <= high`.
-    pub low: T,
-    pub high: T,
-    /// Rise over plan-view length, `>= 0`, the sine of the angle of rise, and one over its cosine.
-    pub slope: T,
-    pub sin: T,
-    pub sec: T,
-}
 
 /// Where and how high the middle of a tile is.
 #[derive(Debug, Clone, Copy)]
@@ -43,7 +24,7 @@ pub(super) struct Frame {
 
 impl<T: Real> LocalMove<T> {
     /// The record of a track, and whether it only bounds the move from below.
-    pub fn new(track: &Track, frame: &Frame) -> (Self, bool) {
+    pub(super) fn new(track: &Track, frame: &Frame) -> (Self, bool) {
         let (along, _) = track.along_across(frame.x, frame.y);
         let next = along.max(0.0).min(track.length);
         let (low, high) = ((-next).max(-frame.reach), (track.length - next).min(frame.reach));
@@ -62,13 +43,6 @@ impl<T: Real> LocalMove<T> {
             sec: T::of(if steep { 1.0 } else { 1.0 / track.cos }),
         };
         (local, steep)
-    }
-
-    /// Place along the track and across it of a point of the tile.
-    #[inline(always)]
-    pub fn along_across(&self, x: T, y: T) -> (T, T) {
-        let (dx, dy) = (x - self.x, y - self.y);
-        (dx * self.ux + dy * self.uy, dy * self.ux - dx * self.uy)
     }
 }
 

@@ -1,4 +1,4 @@
-//! The engine against the reference, and its bounds against samples. What every engine must keep is
+//! The engine against the reference. What every engine must keep is
 //! tested in `sim/engine_tests.rs`.
 
 use super::*;
@@ -8,109 +8,6 @@ use crate::sim::scenes::{Rng, cutters, path_through, random_path, square_grid, w
 
 /// What the engine promises against the reference, mm.
 const PROMISED: f32 = 1e-5;
-
-/// A frame at the origin.
-const FRAME: Frame = Frame { x: 0.0, y: 0.0, z: 0.0, reach: 100.0 };
-
-/// A sweep at points of the plane.
-struct Probe<'a> {
-    form: &'a Form,
-    track: &'a Track,
-    height: &'a dyn Fn(f64, f64) -> (f64, f64),
-    /// Height and slopes.
-    plane: &'a dyn Fn(f64, f64) -> [f64; 3],
-}
-
-/// Calls `check` with the sweeps of all cutters along moves of all kinds, in f64.
-fn for_each_sweep(mut check: impl FnMut(&Probe)) {
-    let mut rng = Rng::new(21);
-    for cutter in cutters() {
-        let form = Form::new(&cutter);
-        for (from, to, _) in random_path(&mut rng, 400, 8.0).segments() {
-            let track = Track::new(from, to);
-            let (m, bound_only) = LocalMove::<f64>::new(&track, &FRAME);
-            if bound_only {
-                continue;
-            }
-            match form.family {
-                Family::Ball => probe(&form, &track, &m, Ball::<f64>::new(form.radius, 0.0), &mut check),
-                Family::Flat => probe(&form, &track, &m, Flat::<f64>::new(form.radius, 0.0), &mut check),
-                Family::Rounded => {
-                    probe(&form, &track, &m, Rounded::<f64, true>::new(&form, 0.0), &mut check)
-                }
-            }
-        }
-    }
-}
-
-fn probe<S: Sweep<f64>>(
-    form: &Form,
-    track: &Track,
-    m: &LocalMove<f64>,
-    sweep: S,
-    check: &mut dyn FnMut(&Probe),
-) {
-    let height = |x: f64, y: f64| {
-        let (along, across) = m.along_across(x, y);
-        let (height, doubt) = sweep.height(m, along, across);
-        (if height.is_nan() { f64::INFINITY } else { height }, doubt)
-    };
-    let plane = |x: f64, y: f64| {
-        let (along, across) = m.along_across(x, y);
-        let p = sweep.plane(m, along, across);
-        [p.z, p.along * m.ux - p.across * m.uy, p.along * m.uy + p.across * m.ux]
-    };
-    check(&Probe { form, track, height: &height, plane: &plane });
-}
-
-#[test]
-fn heights_are_those_of_the_reference() {
-    let mut rng = Rng::new(22);
-    let (mut compared, mut doubted) = (0, 0);
-    for_each_sweep(|probe| {
-        for _ in 0..20 {
-            let (x, y) = (probe.track.x + rng.within(-3.5, 3.5), probe.track.y + rng.within(-3.5, 3.5));
-            let ((got, doubt), expected) =
-                ((probe.height)(x, y), swept_height(probe.form, probe.track, x, y));
-            compared += 1;
-            if doubt <= expected && doubt < f64::INFINITY {
-                doubted += 1;
-            } else {
-                let limit = if probe.form.family == Family::Rounded { 2e-6 } else { 1e-12 };
-                let same = got == expected || (got - expected).abs() < limit;
-                assert!(same, "{:?} {:?} at {x} {y}: {got} {expected}", probe.form, probe.track);
-            }
-        }
-    });
-    assert!(doubted * 100 < compared, "{doubted} of {compared} in doubt");
-}
-
-/// The planes of the bound lie nowhere above the sweep, and no plane that lies a micrometre higher does.
-#[test]
-fn planes_lie_below_and_touch() {
-    let mut rng = Rng::new(23);
-    let (mut planes, mut touching) = (0, 0);
-    for_each_sweep(|probe| {
-        let near = |rng: &mut Rng, by: f64| {
-            let s = rng.within(0.0, probe.track.length);
-            let [x, y] = [probe.track.x + s * probe.track.ux, probe.track.y + s * probe.track.uy];
-            (x + rng.within(-by, by), y + rng.within(-by, by))
-        };
-        for _ in 0..4 {
-            let (x, y) = near(&mut rng, 4.0);
-            let [z, gx, gy] = (probe.plane)(x, y);
-            planes += 1;
-            touching += usize::from(z + 1e-3 > swept_height(probe.form, probe.track, x, y));
-            for _ in 0..40 {
-                let (px, py) = near(&mut rng, 3.0);
-                let height = swept_height(probe.form, probe.track, px, py);
-                let bound = z + gx * (px - x) + gy * (py - y);
-                assert!(bound <= height + 1e-9, "{:?} {:?}: {bound} {height}", probe.form, probe.track);
-            }
-        }
-    });
-    assert!(touching * 10 > planes * 3, "{touching} of {planes}");
-}
 
 /// Raised by a micrometre the bound drops moves that are needed.
 #[test]

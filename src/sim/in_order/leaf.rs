@@ -1,6 +1,9 @@
 //! The lowest level: 8 × 8 cells cut by one move, and what the move removed there. mm.
 
+use super::bound::Bound;
+use super::heights::Cells;
 use super::{ENGAGED, MoveRemoval};
+use crate::sim::sweep::Sweep;
 use crate::sim::track::{Track, larger, smaller};
 use pulp::Simd;
 
@@ -17,9 +20,8 @@ pub(super) struct Leaf {
     pub by: [[f64; LEAF]; LEAF],
 }
 
-/// Steepest track of which [`gentle_ball_heights`] are taken. The error grows with the slope: 1e-12 mm
-/// at this one for a ball of 10 mm, and hundreds of times the tolerance on the steepest tracks there are.
-pub(super) const GENTLE: f64 = 100.0;
+/// Cells of a leaf.
+pub(super) const CELLS: usize = LEAF * LEAF;
 
 /// In [`Leaf::by`]: no move cut the cell.
 pub(super) const UNTOUCHED: f64 = -1.0;
@@ -148,38 +150,48 @@ impl Leaf {
         Self { height: [[f64::NEG_INFINITY; LEAF]; LEAF], by: [[UNTOUCHED; LEAF]; LEAF] }
     }
 
-    /// Lowers each cell to `height(along, across, height now)` (infinite where the move does not pass)
-    /// where that is less once it is stored, and adds to `lanes`. True when a cell was lowered.
+    /// Lowers each cell to the height of the sweep where that is less once it is stored, and adds to
+    /// `lanes`. True when a cell was lowered.
     #[inline(always)]
-    pub fn cut<S: Simd>(
+    pub fn cut<S: Simd, W: Sweep<f64>>(
         &mut self,
         simd: S,
-        [x, y]: [&[f64; LEAF]; 2],
-        track: &Track,
+        bound: &Bound<W>,
+        centres: [&[f64; LEAF]; 2],
         index: u32,
         lanes: &mut Lanes,
-        height: impl Fn(S, S::f64s, S::f64s, S::f64s) -> S::f64s,
+    ) -> bool {
+        let cells = Cells::new(simd, centres, bound.track);
+        let heights = cells.heights(bound, self.height.as_flattened());
+        self.lower(simd, bound.track, &cells, &heights, index, lanes)
+    }
+
+    #[inline(always)]
+    fn lower<S: Simd>(
+        &mut self,
+        simd: S,
+        track: &Track,
+        cells: &Cells,
+        heights: &[[f64; LEAF]; LEAF],
+        index: u32,
+        lanes: &mut Lanes,
     ) -> bool {
         let rank = simd.splat_f64s(f64::from(index));
-        let (ux, uy) = (simd.splat_f64s(track.ux), simd.splat_f64s(track.uy));
         let (zero, engaged_drop) = (simd.splat_f64s(0.0), simd.splat_f64s(ENGAGED));
         let (none, beyond) = (simd.splat_f64s(f64::INFINITY), simd.splat_f64s(f64::NEG_INFINITY));
         let mut most = zero;
         for v in 0..LEAF / S::F64_LANES {
-            let dx = simd.sub_f64s(S::as_simd_f64s(x).0[v], simd.splat_f64s(track.x));
-            let (dx_ux, dx_uy) = (simd.mul_f64s(dx, ux), simd.mul_f64s(dx, uy));
             let (mut sum, mut depth, mut axial) = (zero, zero, zero);
             let (mut along_low, mut along_high) = (none, beyond);
             let (mut across_low, mut across_high) = (none, beyond);
             for j in 0..LEAF {
-                let dy = simd.splat_f64s(y[j] - track.y);
-                let along = simd.add_f64s(dx_ux, simd.mul_f64s(dy, uy));
-                let across = simd.sub_f64s(simd.mul_f64s(dy, ux), dx_uy);
+                let along = S::as_simd_f64s(&cells.along[j]).0[v];
+                let across = S::as_simd_f64s(&cells.across[j]).0[v];
                 let now = &mut S::as_mut_simd_f64s(&mut self.height[j]).0[v];
                 let by = &mut S::as_mut_simd_f64s(&mut self.by[j]).0[v];
                 let before = *now;
                 // Compared as it is stored: what each move removes then adds up without remainder.
-                let stored = to_single(simd, height(simd, along, across, before));
+                let stored = to_single(simd, S::as_simd_f64s(&heights[j]).0[v]);
                 let lower = simd.less_than_f64s(stored, before);
                 *now = simd.select_f64s(lower, stored, before);
                 *by = simd.select_f64s(lower, rank, *by);
@@ -225,119 +237,5 @@ fn to_single<S: Simd>(simd: S, value: S::f64s) -> S::f64s {
 #[inline(always)]
 fn tip_abeam<S: Simd>(simd: S, track: &Track, along: S::f64s) -> S::f64s {
     let sigma = simd.min_f64s(simd.max_f64s(along, simd.splat_f64s(0.0)), simd.splat_f64s(track.length));
-    tip(simd, track, sigma)
-}
-
-#[inline(always)]
-fn tip<S: Simd>(simd: S, track: &Track, sigma: S::f64s) -> S::f64s {
     simd.add_f64s(simd.splat_f64s(track.z), simd.mul_f64s(simd.splat_f64s(track.slope), sigma))
-}
-
-/// [`swept::ball_height`](crate::sim::swept::ball_height) on a vector of places, operation by
-/// operation.
-#[inline(always)]
-pub(super) fn ball_heights<S: Simd>(
-    simd: S,
-    track: &Track,
-    radius: f64,
-    along: S::f64s,
-    across: S::f64s,
-) -> S::f64s {
-    let (zero, length) = (simd.splat_f64s(0.0), simd.splat_f64s(track.length));
-    let r = simd.splat_f64s(radius);
-    let chord_square = simd.mul_f64s(simd.sub_f64s(r, across), simd.add_f64s(r, across));
-    let half_chord = simd.sqrt_f64s(simd.max_f64s(chord_square, zero));
-    let free = simd.sub_f64s(along, simd.mul_f64s(half_chord, simd.splat_f64s(track.sin())));
-    let sigma = simd.min_f64s(simd.max_f64s(free, zero), length);
-    let ahead = simd.sub_f64s(along, sigma);
-    let on_track = simd.and_m64s(simd.less_than_f64s(zero, free), simd.less_than_f64s(free, length));
-    let end_square = simd.mul_f64s(simd.sub_f64s(half_chord, ahead), simd.add_f64s(half_chord, ahead));
-    let at_end = simd.sqrt_f64s(simd.max_f64s(end_square, zero));
-    let on_side = simd.mul_f64s(half_chord, simd.splat_f64s(track.cos));
-    let depth = simd.select_f64s(on_track, on_side, at_end);
-    let height = simd.add_f64s(tip(simd, track, sigma), simd.sub_f64s(r, depth));
-    let near = simd.less_than_or_equal_f64s(simd.abs_f64s(ahead), half_chord);
-    let inside =
-        simd.and_m64s(simd.less_than_or_equal_f64s(zero, chord_square), simd.or_m64s(on_track, near));
-    simd.select_f64s(inside, height, simd.splat_f64s(f64::INFINITY))
-}
-
-/// As [`ball_heights`] for tracks up to [`GENTLE`], with one square root. With q the half chord and
-/// m = tan φ the slope, the ball cuts at s − q sin φ, so that the cut lies at z + m·s + r − q/cos φ;
-/// beyond the ends at z + m·σ + r − √(q² − (s − σ)²). Which of the three holds is seen from squares.
-#[inline(always)]
-pub(super) fn gentle_ball_heights<S: Simd>(
-    simd: S,
-    track: &Track,
-    radius: f64,
-    along: S::f64s,
-    across: S::f64s,
-) -> S::f64s {
-    let (zero, length) = (simd.splat_f64s(0.0), simd.splat_f64s(track.length));
-    let r = simd.splat_f64s(radius);
-    let chord_square = simd.mul_f64s(simd.sub_f64s(r, across), simd.add_f64s(r, across));
-    let climb_square = simd.mul_f64s(chord_square, simd.splat_f64s(track.sin() * track.sin()));
-    let past_start = simd.and_m64s(
-        simd.less_than_f64s(zero, along),
-        simd.less_than_f64s(climb_square, simd.mul_f64s(along, along)),
-    );
-    let beyond = simd.sub_f64s(along, length);
-    let before_end = simd.or_m64s(
-        simd.less_than_f64s(beyond, zero),
-        simd.less_than_f64s(simd.mul_f64s(beyond, beyond), climb_square),
-    );
-    let on_track = simd.and_m64s(past_start, before_end);
-    let end = simd.select_f64s(past_start, length, zero);
-    let ahead = simd.sub_f64s(along, end);
-    let at_end = simd.sub_f64s(chord_square, simd.mul_f64s(ahead, ahead));
-    let on_side = simd.mul_f64s(chord_square, simd.splat_f64s(1.0 / (track.cos * track.cos)));
-    let square = simd.select_f64s(on_track, on_side, at_end);
-    let place = simd.select_f64s(on_track, along, end);
-    let depth = simd.sqrt_f64s(simd.max_f64s(square, zero));
-    let height = simd.add_f64s(tip(simd, track, place), simd.sub_f64s(r, depth));
-    let inside = simd.and_m64s(
-        simd.less_than_or_equal_f64s(zero, chord_square),
-        simd.less_than_or_equal_f64s(zero, square),
-    );
-    simd.select_f64s(inside, height, simd.splat_f64s(f64::INFINITY))
-}
-
-/// [`swept::flat_height`](crate::sim::swept::flat_height) on a vector of places, operation by
-/// operation.
-#[inline(always)]
-pub(super) fn flat_heights<S: Simd>(
-    simd: S,
-    track: &Track,
-    radius: f64,
-    along: S::f64s,
-    across: S::f64s,
-) -> S::f64s {
-    let (zero, r) = (simd.splat_f64s(0.0), simd.splat_f64s(radius));
-    let chord_square = simd.mul_f64s(simd.sub_f64s(r, across), simd.add_f64s(r, across));
-    let half_chord = simd.sqrt_f64s(simd.max_f64s(chord_square, zero));
-    let sigma = simd.max_f64s(simd.sub_f64s(along, half_chord), zero);
-    let in_length = simd.and_m64s(
-        simd.less_than_or_equal_f64s(sigma, simd.splat_f64s(track.length)),
-        simd.less_than_or_equal_f64s(zero, simd.add_f64s(along, half_chord)),
-    );
-    let inside = simd.and_m64s(simd.less_than_or_equal_f64s(zero, chord_square), in_length);
-    simd.select_f64s(inside, tip(simd, track, sigma), simd.splat_f64s(f64::INFINITY))
-}
-
-/// Any height, one place after the other.
-#[inline(always)]
-pub(super) fn each<S: Simd>(
-    along: S::f64s,
-    across: S::f64s,
-    now: S::f64s,
-    height: impl Fn(f64, f64, f64) -> f64,
-) -> S::f64s {
-    let (along, across, mut now) = ([along], [across], [now]);
-    let (along, across): (&[f64], &[f64]) =
-        (pulp::bytemuck::cast_slice(&along), pulp::bytemuck::cast_slice(&across));
-    let heights: &mut [f64] = pulp::bytemuck::cast_slice_mut(&mut now);
-    for i in 0..heights.len() {
-        heights[i] = height(along[i], across[i], heights[i]);
-    }
-    now[0]
 }

@@ -2,10 +2,11 @@
 //! of removal must satisfy.
 
 use super::*;
-use crate::geometry::Point2;
+use crate::geometry::{Point2, Vector3};
 use crate::monitor::Silent;
 use crate::sim::cut_reference;
 use crate::sim::scenes::{Rng, cutters, path_through, random_path, square_grid, wave_path};
+use crate::sim::swept::swept_height;
 use crate::toolpath::MoveKind;
 use proptest::prelude::*;
 
@@ -74,6 +75,29 @@ fn milling_in_passes_agrees_with_the_plain_loop() {
     for cutter in cutters() {
         let path = wave_path(12.0, 0.4, 0.3);
         check_against_plain(&ZMap::block(square_grid(12.0, 0.06), 5.0), &cutter, &path);
+    }
+}
+
+/// Moves along the axes and along sides of triangles of 3, 4 and 5, over cells of the same lattice: many lie on
+/// the rim of the cutter, and whether it reaches them is a matter of rounding.
+#[test]
+fn cells_on_the_rim_are_cut_where_the_closed_forms_say_so() {
+    let mut rng = Rng::new(33);
+    let grid = Grid { origin: Point2::new(0.0, 0.0), cell: 0.1, nx: 100, ny: 100 };
+    for cutter in cutters() {
+        for direction in [[5.0, 0.0], [0.0, 5.0], [3.0, 4.0], [-4.0, 3.0], [-3.0, -4.0], [4.0, -3.0]] {
+            let from = Point3::new(4.0 + 0.1 * rng.below(20) as f64, 4.0 + 0.1 * rng.below(20) as f64, 1.0);
+            let [dx, dy] = direction.map(|d| d * 0.1 * rng.below(7) as f64);
+            let to = from + Vector3::new(dx, dy, rng.below(3) as f64 * 0.3 - 0.3);
+            let got = cut(&ZMap::block(grid, 5.0), &cutter, &path_through([from, to])).stock;
+            let (form, track) = (Form::new(&cutter), Track::new(from, to));
+            for k in 0..grid.len() {
+                let p = grid.centre(k % grid.nx, k / grid.nx);
+                let expected = (swept_height(&form, &track, p.x, p.y) as f32).min(5.0);
+                let off = (got.height[k] - expected).abs();
+                assert!(off <= LAST_PLACE, "{cutter:?} {from} {to} at {p}: {} {expected}", got.height[k]);
+            }
+        }
     }
 }
 

@@ -3,14 +3,12 @@
 
 use super::bound::{Bound, CHILDREN, Ceiling, Ceilings};
 use super::contact::{first_touch, reach};
-use super::leaf::{
-    GENTLE, LEAF, Lanes, Leaf, UNTOUCHED, ball_heights, each, flat_heights, gentle_ball_heights,
-};
+use super::leaf::{LEAF, Lanes, Leaf, UNTOUCHED};
 use super::{ENGAGED, Found, Job, RapidContact, Slices};
 use crate::geometry::Point3;
 use crate::monitor::{Cancelled, check};
 use crate::sim::form::{Family, Form};
-use crate::sim::swept::rounded_height_below;
+use crate::sim::sweep::{Ball, Flat, Rounded, Sweep};
 use crate::sim::track::{Track, larger};
 use crate::toolpath::MoveKind;
 use pulp::Simd;
@@ -94,13 +92,30 @@ impl Tile {
 
     /// Runs through `moves` and writes the cells back.
     pub fn cut(mut self, job: &Job, slices: &mut Slices, moves: &[u32]) -> Result<Found, Cancelled> {
-        let found = pulp::Arch::new().dispatch(Run { tile: &mut self, job, moves })?;
+        let arch = pulp::Arch::new();
+        let (form, tile) = (&job.form, &mut self);
+        let found = match form.family {
+            Family::Ball => arch.dispatch(Run { tile, sweep: Ball::new(form.radius, 0.0), job, moves }),
+            Family::Flat => arch.dispatch(Run { tile, sweep: Flat::new(form.radius, 0.0), job, moves }),
+            Family::Rounded if form.has_cones() => {
+                arch.dispatch(Run { tile, sweep: Rounded::<_, true>::new(form, 0.0), job, moves })
+            }
+            Family::Rounded => {
+                arch.dispatch(Run { tile, sweep: Rounded::<_, false>::new(form, 0.0), job, moves })
+            }
+        }?;
         self.store(slices);
         Ok(found)
     }
 
     #[inline(always)]
-    fn cut_all<S: Simd>(&mut self, simd: S, job: &Job, moves: &[u32]) -> Result<Found, Cancelled> {
+    fn cut_all<S: Simd, W: Sweep<f64>>(
+        &mut self,
+        simd: S,
+        sweep: W,
+        job: &Job,
+        moves: &[u32],
+    ) -> Result<Found, Cancelled> {
         let mut found = Found::default();
         for run in moves.chunks(MOVES_A_CHECK) {
             check(job.monitor)?;
@@ -108,8 +123,8 @@ impl Tile {
                 let k = index as usize;
                 let (from, to) = (job.path.start_of(k), job.path.moves[k].to.tip);
                 let track = Track::new(from, to);
-                let from_top = (from.x, from.y, from.z) != (track.x, track.y, track.z);
-                let bound = Bound::new(&job.form, &track, from_top, k == 0);
+                let rises = !Track::falls(from, to);
+                let bound = Bound::new(sweep, &job.form, &track, rises, k == 0);
                 let mut rapid = (job.path.moves[k].kind == MoveKind::Rapid).then_some(Watch {
                     form: &job.form,
                     index,
@@ -129,10 +144,10 @@ impl Tile {
     }
 
     #[inline(always)]
-    fn cut_one<S: Simd>(
+    fn cut_one<S: Simd, W: Sweep<f64>>(
         &mut self,
         simd: S,
-        bound: &Bound,
+        bound: &Bound<W>,
         index: u32,
         lanes: &mut Lanes,
         rapid: &mut Option<Watch>,
@@ -156,10 +171,10 @@ impl Tile {
     }
 
     #[inline(always)]
-    fn cut_leaf<S: Simd>(
+    fn cut_leaf<S: Simd, W: Sweep<f64>>(
         &mut self,
         simd: S,
-        bound: &Bound,
+        bound: &Bound<W>,
         n: usize,
         l: usize,
         index: u32,
@@ -172,25 +187,7 @@ impl Tile {
         if let Some(watch) = rapid {
             watch.look(leaf, x, y);
         }
-        let (form, track, radius) = (bound.form, bound.track, bound.form.radius);
-        let changed = match form.family {
-            Family::Ball if track.slope <= GENTLE => {
-                leaf.cut(simd, [x, y], track, index, lanes, |simd, along, across, _| {
-                    gentle_ball_heights(simd, track, radius, along, across)
-                })
-            }
-            Family::Ball => leaf.cut(simd, [x, y], track, index, lanes, |simd, along, across, _| {
-                ball_heights(simd, track, radius, along, across)
-            }),
-            Family::Flat => leaf.cut(simd, [x, y], track, index, lanes, |simd, along, across, _| {
-                flat_heights(simd, track, radius, along, across)
-            }),
-            Family::Rounded => leaf.cut(simd, [x, y], track, index, lanes, |_, along, across, now| {
-                each::<S>(along, across, now, |along, across, now| {
-                    rounded_height_below(form, track, along, across, now)
-                })
-            }),
-        };
+        let changed = leaf.cut(simd, bound, [x, y], index, lanes);
         if changed {
             self.nodes[n].set(l, leaf_ceiling(leaf, self.cell));
         }
@@ -209,18 +206,19 @@ impl Tile {
 /// All moves of a tile, compiled for the vectors that the machine has; without fused operations, so
 /// that every machine gives the same bits. (Of a closure the call in between is not inlined, and its
 /// code stays that of the plainest machine.)
-struct Run<'a, 'b> {
+struct Run<'a, 'b, W> {
+    sweep: W,
     tile: &'a mut Tile,
     job: &'a Job<'b>,
     moves: &'a [u32],
 }
 
-impl pulp::WithSimd for Run<'_, '_> {
+impl<W: Sweep<f64>> pulp::WithSimd for Run<'_, '_, W> {
     type Output = Result<Found, Cancelled>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        self.tile.cut_all(simd, self.job, self.moves)
+        self.tile.cut_all(simd, self.sweep, self.job, self.moves)
     }
 }
 
@@ -252,10 +250,13 @@ fn leaf_ceiling(leaf: &Leaf, cell: f64) -> Ceiling {
             up[i] += if j >= LEAF / 2 { height } else { -height };
         }
     }
-    let right: f64 = (0..LEAF).map(|i| if i >= LEAF / 2 { columns[i] } else { -columns[i] }).sum();
+    let [a, b, c, d, e, f, g, h] = columns;
+    let right = ((e - a) + (f - b)) + ((g - c) + (h - d));
+    let [a, b, c, d, e, f, g, h] = up;
+    let up = ((a + b) + (c + d)) + ((e + f) + (g + h));
     // Half a leaf from the mean of one half to that of the other.
     let scale = 2.0 / (LEAF * LEAF) as f64 / (0.5 * LEAF as f64 * cell);
-    let slope = [right * scale, up.into_iter().sum::<f64>() * scale];
+    let slope = [right * scale, up * scale];
     let slope = if slope[0].is_finite() && slope[1].is_finite() { slope } else { [0.0; 2] };
     let mut tops = [f64::NEG_INFINITY; LEAF];
     let offset = |k: usize| (k as f64 - 0.5 * (LEAF - 1) as f64) * cell;
@@ -265,7 +266,9 @@ fn leaf_ceiling(leaf: &Leaf, cell: f64) -> Ceiling {
             tops[i] = larger(tops[i], leaf.height[j][i] - plane);
         }
     }
-    Ceiling { value: tops.into_iter().fold(f64::NEG_INFINITY, larger), slope }
+    let [a, b, c, d, e, f, g, h] = tops;
+    let value = larger(larger(larger(a, b), larger(c, d)), larger(larger(e, f), larger(g, h)));
+    Ceiling { value, slope }
 }
 
 /// Looks for the cell that a rapid move touches first.

@@ -13,9 +13,50 @@
 //! is a plane below the whole sweep. It touches it where σ₀ is the place that cuts at p₀; another place
 //! only makes it lower.
 
-use super::local::LocalMove;
+#[cfg(test)]
+mod tests;
+
+use super::form::Form;
+use super::track::Track;
 use crate::lanes::Real;
-use crate::sim::form::Form;
+
+/// One straight move of the tip, seen from a point on the line of its track. In f32 that is the point next to the
+/// middle of a tile: all numbers that matter are then no larger than the cutter and the tile.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LocalMove<T> {
+    /// That point.
+    pub x: T,
+    pub y: T,
+    pub z: T,
+    /// Unit direction in the plan view, rising.
+    pub ux: T,
+    pub uy: T,
+    /// Where the track begins and ends, from that point on: `low <= 0 <= high`.
+    pub low: T,
+    pub high: T,
+    /// Rise over plan-view length, `>= 0`, the sine of the angle of rise, and one over its cosine.
+    pub slope: T,
+    pub sin: T,
+    pub sec: T,
+}
+
+impl LocalMove<f64> {
+    /// A track in the coordinates of the map, seen from its lower end.
+    #[inline(always)]
+    pub fn of(track: &Track) -> Self {
+        let Track { x, y, z, ux, uy, length, slope, cos } = *track;
+        Self { x, y, z, ux, uy, low: 0.0, high: length, slope, sin: slope * cos, sec: 1.0 / cos }
+    }
+}
+
+impl<T: Real> LocalMove<T> {
+    /// Place along the track and across it of a point.
+    #[inline(always)]
+    pub fn along_across(&self, x: T, y: T) -> (T, T) {
+        let (dx, dy) = (x - self.x, y - self.y);
+        (dx * self.ux + dy * self.uy, dy * self.ux - dx * self.uy)
+    }
+}
 
 /// Height and slopes of a plane at a point: along the track and across it.
 pub(super) struct Plane<T> {
@@ -35,15 +76,44 @@ pub(super) trait Sweep<T: Real>: Copy + Sync {
 
     /// Whether all points of a square are cut by the cutter at the lower end of the track, and whether
     /// all are by the cutter at its upper end, if they are cut at all: given the square's extent along
-    /// the track and its greatest distance across.
-    fn beyond(&self, m: &LocalMove<T>, along: [T; 2], farthest_across: T) -> (bool, bool);
+    /// the track, and its least and greatest distance across.
+    fn beyond(&self, m: &LocalMove<T>, along: [T; 2], across: [T; 2]) -> (bool, bool);
 
     /// Height of the sweep at a point, infinite or NaN where it does not pass, and whether that may be
     /// wrong by more than the rounding limit that this was made for.
     fn height(&self, m: &LocalMove<T>, along: T, across: T) -> (T, Doubt<T>);
+
+    /// As [`Sweep::height`], at many points: `[blocks][N]` of each.
+    #[inline(always)]
+    fn heights<const N: usize>(
+        &self,
+        m: &LocalMove<T>,
+        along: &[[T; N]],
+        across: &[[T; N]],
+        height: &mut [[T; N]],
+        doubt: &mut [[T; N]],
+    ) {
+        for b in 0..along.len() {
+            for k in 0..N {
+                (height[b][k], doubt[b][k]) = self.height(m, along[b][k], across[b][k]);
+            }
+        }
+    }
+
+    /// Whether [`Sweep::at_end`] takes so much less time than [`Sweep::height`] that it pays to ask it first.
+    const TRIES_END: bool = false;
+
+    /// Height of the cutter that stands at the upper or the lower end of its track, infinite where it does not
+    /// reach, and a height that the sweep is nowhere below: infinite where the first is the height of the
+    /// sweep. By the convexity of F: from its value and its slope there along the track.
+    #[inline(always)]
+    fn at_end(&self, _: &LocalMove<T>, _upper: bool, _along: T, _across: T) -> (T, T) {
+        (T::of(f64::INFINITY), T::of(f64::NEG_INFINITY))
+    }
 }
 
-/// Heights from here on are in doubt: those of cells that stand higher need a second look in f64.
+/// Heights from here on are in doubt: those of cells that stand higher need a second look by the closed forms
+/// of the reference.
 /// Infinite where there is no doubt.
 pub(super) type Doubt<T> = T;
 
@@ -89,6 +159,15 @@ pub(super) fn rim_share(extent: f64) -> Option<f64> {
     (share < DEEPEST_RIM).then_some(share)
 }
 
+/// Share of the radius within which, in f64 too, it is left to the closed forms of the reference whether a
+/// cutter still reaches a point: cells of round coordinates lie on the rim itself.
+const RIM_SHARE: f64 = 1e-12;
+
+/// Rounding of places as it counts at the rim.
+fn rim_blur(blur: f64, radius: f64) -> f64 {
+    blur.max(RIM_SHARE * radius)
+}
+
 /// Rounding of places at a distance, mm.
 pub(super) fn blur(extent: f64) -> f64 {
     ROUNDING_SHARE * extent
@@ -96,9 +175,10 @@ pub(super) fn blur(extent: f64) -> f64 {
 
 impl<T: Real> Ball<T> {
     /// A ball whose heights are in doubt where the depth below its centre is less than the given
-    /// share of its radius.
+    /// share of its radius; 0 in f64.
     pub fn new(radius: f64, rim_share: f64) -> Self {
-        let rim = rim_share * radius;
+        // Depths are square roots.
+        let rim = rim_share.max(RIM_SHARE.sqrt()) * radius;
         Self {
             radius: T::of(radius),
             within: T::of(PLANE_SHARE * radius),
@@ -130,8 +210,8 @@ impl<T: Real> Sweep<T> for Ball<T> {
 
     /// The ball stands at s − q sin φ, q the half chord, where that is on the track.
     #[inline(always)]
-    fn beyond(&self, m: &LocalMove<T>, along: [T; 2], farthest_across: T) -> (bool, bool) {
-        let w = farthest_across.smaller(self.radius);
+    fn beyond(&self, m: &LocalMove<T>, along: [T; 2], across: [T; 2]) -> (bool, bool) {
+        let w = across[1].smaller(self.radius);
         let least_chord2 = (self.radius - w) * (self.radius + w);
         (is_behind(m, along[1] - m.low, least_chord2), along[0] - self.radius * m.sin >= m.high)
     }
@@ -210,12 +290,12 @@ pub(super) struct Flat<T> {
 }
 
 impl<T: Real> Flat<T> {
-    /// A flat end whose places are rounded by `blur` mm; 0 leaves no doubt.
+    /// A flat end whose places are rounded by `blur` mm; 0 in f64.
     pub fn new(radius: f64, blur: f64) -> Self {
         Self {
             radius: T::of(radius),
             within: T::of(PLANE_SHARE * radius),
-            edge: T::of(2.0 * radius * blur),
+            edge: T::of(2.0 * radius * rim_blur(blur, radius)),
             rim: T::of(radius * blur / ROUNDING_LIMIT),
             shift: T::of((2.0 * radius * blur).sqrt()),
         }
@@ -245,7 +325,7 @@ impl<T: Real> Sweep<T> for Flat<T> {
 
     /// The first place that reaches a point cuts there; at the upper end that is so on its rim only.
     #[inline(always)]
-    fn beyond(&self, m: &LocalMove<T>, along: [T; 2], _: T) -> (bool, bool) {
+    fn beyond(&self, m: &LocalMove<T>, along: [T; 2], _: [T; 2]) -> (bool, bool) {
         (along[1] <= m.low, false)
     }
 
@@ -265,8 +345,9 @@ impl<T: Real> Sweep<T> for Flat<T> {
     }
 }
 
-/// Any other profile but barrels: a cone at the bottom, an arc, a cone at the side, any of which may be
-/// missing.
+/// Any other profile: a cone at the bottom, an arc, a cone at the side, any of which may be
+/// missing. On the arc of a barrel (its centre beyond the axis) the place is not always found: such heights are
+/// in doubt.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rounded<T, const CONES: bool> {
     /// Slope of the bottom and where it ends.
@@ -283,17 +364,24 @@ pub(super) struct Rounded<T, const CONES: bool> {
     /// Slope of the side.
     side: T,
     radius: T,
-    /// Radius of the arc with its centre's.
-    radius_of_arc: T,
-    /// No plane is looked for farther from the axis.
+    /// One over the radius, over that of the arc, and over that of the arc with its centre's.
+    inverse_radius: T,
+    inverse_corner: T,
+    inverse_arc_radius: T,
+    /// No plane is looked for farther from the axis; height and slope there.
     within: T,
-    /// Rounding of places, and as one of squared distances from the axis.
+    within_z: T,
+    within_slope: T,
+    /// Twice what the place on the arc may cost.
+    place_limit: T,
+    /// Rounding of places, as one of squared distances from the axis, and the radius less it.
     blur: T,
     edge: T,
     /// Half chord of the rim, as a share of the slope of the track, below which the place where the rim cuts
     /// is rounded too badly, and what that may change it by.
     rim: T,
     shift: T,
+    surely_inside: T,
     /// Slopes from which it costs too much, and the least height above the tip where that, or the
     /// radius, is near.
     steep: T,
@@ -306,15 +394,18 @@ const SHARP: f64 = 1e-12;
 /// What the place on the arc may cost, mm, before a height is worked out in f64.
 const PLACE_LIMIT: f64 = 2.0e-6;
 
+/// The same where places are f64: far below half a unit in the last place of a stored height.
+const EXACT_PLACE_LIMIT: f64 = 1.0e-11;
+
 /// Steepest profile at which planes are looked for. Steeper ones say less away from their point.
 const STEEPEST_PLANE: f64 = 4.0;
 
-/// Newton steps for the place that a plane touches: fewer only make it lower. With two of them 3 % more moves
-/// are tested than with four.
-const PLANE_STEPS: usize = 2;
+/// Steps of Halley's method for the place that a plane touches: fewer only make it lower.
+const PLANE_STEPS: usize = 1;
 
-/// The same for heights, where the place counts.
-const HEIGHT_STEPS: usize = 4;
+/// The same for heights, where the place counts: on tracks that rise by 0.01 or more, three leave 1e-15 mm and
+/// two 1e-6.
+const HEIGHT_STEPS: usize = 3;
 
 /// Slope that stands for a vertical side, where no height is looked for.
 const UPRIGHT: f64 = 1e6;
@@ -340,7 +431,7 @@ fn arc_end_slope(form: &Form) -> f64 {
 }
 
 impl<T: Real, const CONES: bool> Rounded<T, CONES> {
-    /// The profile of `form`, its places rounded by `blur` mm; 0 leaves no doubt.
+    /// The profile of `form`, its places rounded by `blur` mm; 0 in f64.
     pub fn new(form: &Form, blur: f64) -> Self {
         let profile = &form.profile;
         let side = if profile.side.cos > 0.0 { profile.side.slope() } else { UPRIGHT };
@@ -359,34 +450,48 @@ impl<T: Real, const CONES: bool> Rounded<T, CONES> {
             arc_end_slope: T::of(arc_end_slope(form)),
             side: T::of(side),
             radius: T::of(form.radius),
-            radius_of_arc: T::of(profile.centre_x + profile.corner.max(SHARP)),
+            inverse_radius: T::of(1.0 / form.radius),
+            inverse_corner: T::of(1.0 / profile.corner.max(SHARP)),
+            inverse_arc_radius: T::of(1.0 / (profile.centre_x + profile.corner.max(SHARP))),
             within: T::of(within),
+            within_z: T::of(form.height(within)),
+            within_slope: T::of(profile.incline(within).slope()),
+            place_limit: T::of(2.0 * if blur > 0.0 { PLACE_LIMIT } else { EXACT_PLACE_LIMIT }),
             blur: T::of(blur),
-            edge: T::of(2.0 * form.radius * blur),
             rim: T::of(form.radius * blur / ROUNDING_LIMIT),
             shift: T::of((2.0 * form.radius * blur).sqrt()),
+            edge: T::of(2.0 * form.radius * rim_blur(blur, form.radius)),
+            surely_inside: T::of(form.radius - rim_blur(blur, form.radius)),
             steep: T::of(if blur > 0.0 { ROUNDING_LIMIT / blur } else { f64::INFINITY }),
             steep_z: T::of(if blur > 0.0 { lowest_steep(form, ROUNDING_LIMIT / blur) } else { 0.0 }),
         }
     }
 
-    /// Height above the tip and slope at a distance from the axis, up to the radius.
+    /// Height above the tip at a distance from the axis, up to the radius, and the slope there as rise and run.
     #[inline(always)]
-    fn height_and_slope(&self, rho: T) -> (T, T) {
+    fn height_and_rise(&self, rho: T) -> (T, [T; 2]) {
+        let (zero, one) = (T::of(0.0), T::of(1.0));
         let x = rho - self.centre;
         let level = ((self.corner - x) * (self.corner + x)).larger(T::of(1e-30)).sqrt();
-        let (arc, arc_slope) = (self.centre_z - level, x / level);
+        let arc = self.centre_z - level;
+        let at_bottom = rho <= self.bottom_end;
         if !CONES {
-            let at_bottom = rho <= self.bottom_end;
-            let zero = T::of(0.0);
-            return (if at_bottom { zero } else { arc }, if at_bottom { zero } else { arc_slope });
+            return (if at_bottom { zero } else { arc }, [if at_bottom { zero } else { x }, level]);
         }
         let beyond = rho - self.arc_end;
-        let at_side = beyond > T::of(0.0);
-        let at_bottom = rho <= self.bottom_end;
+        let at_side = beyond > zero;
         let height = if at_side { self.arc_end_z + beyond * self.side } else { arc };
-        let slope = if at_side { self.side } else { arc_slope };
-        (if at_bottom { rho * self.bottom } else { height }, if at_bottom { self.bottom } else { slope })
+        let height = if at_bottom { rho * self.bottom } else { height };
+        let cone = if at_bottom { self.bottom } else { self.side };
+        let on_cone = at_bottom | at_side;
+        (height, if on_cone { [cone, one] } else { [x, level] })
+    }
+
+    /// The same with the slope itself.
+    #[inline(always)]
+    fn height_and_slope(&self, rho: T) -> (T, T) {
+        let (height, [rise, run]) = self.height_and_rise(rho);
+        (height, rise / run)
     }
 
     /// At an edge any slope between those of its sides gives a plane; the best is the one that keeps the
@@ -404,20 +509,19 @@ impl<T: Real, const CONES: bool> Rounded<T, CONES> {
     /// one: with D the slope there and K the least bend, D²/2K.
     #[inline(always)]
     fn place_is_off(&self, m: &LocalMove<T>, place: T, [ahead, across, rho]: [T; 3], slope: T) -> bool {
-        // Inside of the arc too: a place there would be off by more. Where the arc ends, Newton's steps may
-        // have stopped short of a place farther in; the side, from there on, has its place in closed form.
+        // Inside of the arc too: a place there would be off by more. Where the arc ends, the steps may have
+        // stopped short of a place farther in; the side, from there on, has its place in closed form.
         let inside_end = rho < self.arc_end - self.blur;
         let at_end = rho <= self.arc_end + self.blur;
         let slope = if CONES & at_end { slope.smaller(self.arc_end_slope) } else { slope };
-        let rho2 = (rho * rho).larger(T::of(1e-30));
-        let level = slope / rho.larger(T::of(1e-30));
-        let off = level * ahead - m.slope;
-        let bend = (ahead * ahead / self.corner + level * across * across) / rho2;
+        // Both times ρ, the bend with the radius for the last ρ in it.
+        let off = slope * ahead - m.slope * rho;
+        let bend = ahead * ahead * self.inverse_corner + slope * across * across * self.inverse_radius;
         // Off the wrong way: farther on, or back, the cutter would cut lower.
         let zero = T::of(0.0);
         let could_move =
             (at_end & (off > zero) & (place < m.high)) | (inside_end & (off < zero) & (place > m.low));
-        could_move & (off * off > T::of(2.0 * PLACE_LIMIT) * bend)
+        could_move & (off * off > self.place_limit * bend)
     }
 
     /// How far the point lies ahead of the axis when the cutter that cuts it stands on its track: there
@@ -425,8 +529,26 @@ impl<T: Real, const CONES: bool> Rounded<T, CONES> {
     /// piece which is steep enough at its end counts.
     #[inline(always)]
     fn ahead<const STEPS: usize>(&self, m: &LocalMove<T>, across: T) -> T {
+        let mut c = self.arc_start(m, across);
+        // No loop, which would keep the one over the cells from becoming vector code. What the steps leave
+        // is seen by the slope at the place found, and put in doubt where it matters.
+        if STEPS > 0 {
+            c = self.arc_step(m, across, c);
+        }
+        if STEPS > 1 {
+            c = self.arc_step(m, across, c);
+        }
+        if STEPS > 2 {
+            c = self.arc_step(m, across, c);
+        }
+        self.ahead_at(m, across, c)
+    }
+
+    /// The same, from what was found for the arc.
+    #[inline(always)]
+    fn ahead_at(&self, m: &LocalMove<T>, across: T, c: T) -> T {
         let w = across.absolute().smaller(self.radius);
-        let arc = self.ahead_on_arc::<STEPS>(m.sin, w);
+        let arc = self.arc_ahead(m, c);
         if !CONES {
             return arc;
         }
@@ -437,50 +559,68 @@ impl<T: Real, const CONES: bool> Rounded<T, CONES> {
         if bottom < first { bottom } else { outer }
     }
 
-    /// The same on the arc alone, for the sine s of the rise. C, the part of the contact's normal across
-    /// the track, solves w = r C + e C/√(C² + (1 − C²) s²) =: H(C). H is concave and grows, so that
-    /// Newton's method never overshoots from below.
+    /// Where to begin on the arc, for the sine s of the rise. C, the part of the contact's normal across
+    /// the track, solves w = r C + e C/√(C² + (1 − C²) s²) =: H(C). H is concave and grows.
     #[inline(always)]
-    fn ahead_on_arc<const STEPS: usize>(&self, sine: T, w: T) -> T {
+    fn arc_start(&self, m: &LocalMove<T>, across: T) -> T {
         let (zero, one, tiny) = (T::of(0.0), T::of(1.0), T::of(1e-30));
-        let (r, e, s) = (self.corner, self.centre, sine.larger(T::of(1e-12)));
-        let s2 = sine * sine;
+        let w = across.absolute().smaller(self.radius);
+        let (r, e, s) = (self.corner, self.centre, m.sin.larger(T::of(1e-12)));
         // Three bounds from below: H(C) <= rC + e, (r + e/s) C, and (r + e) C/√(C² + (1 − C²) s²).
-        let u = w / self.radius_of_arc;
+        let u = w * self.inverse_arc_radius;
         let u2 = (u * u).smaller(one);
-        let third = u * s / (one - u2 * (one - s2)).larger(tiny).sqrt();
-        let start = (w / (r + e / s)).larger((w - e) / r).larger(third).larger(zero).smaller(one);
-        // No loop, which would keep the one over the cells from becoming vector code. What the steps leave
-        // is seen by the slope at the place found, and put in doubt where it matters.
-        let numbers = [r, e, s2, w];
-        let mut c = start;
-        if STEPS > 0 {
-            c = arc_step(numbers, c);
-        }
-        if STEPS > 1 {
-            c = arc_step(numbers, c);
-        }
-        if STEPS > 2 {
-            c = arc_step(numbers, c);
-        }
-        if STEPS > 3 {
-            c = arc_step(numbers, c);
-        }
-        let rest = one - c * c;
-        let part = rest.larger(zero).sqrt() * sine;
-        let norm = (c * c + rest * s2).larger(tiny).sqrt();
-        r * part + e * part / norm
+        let third = u * s / (one - u2 * (one - m.sin * m.sin)).larger(tiny).sqrt();
+        (w * (s / (r * s + e))).larger((w - e) * self.inverse_corner).larger(third).larger(zero).smaller(one)
     }
-}
 
-/// One Newton step of [`Rounded::ahead_on_arc`].
-#[inline(always)]
-fn arc_step<T: Real>([r, e, s2, w]: [T; 4], c: T) -> T {
-    let (zero, one) = (T::of(0.0), T::of(1.0));
-    let q = one / (s2 + (one - s2) * c * c).larger(T::of(1e-30)).sqrt();
-    let eq = e * q;
-    let step = (w - (r + eq) * c) / (r + eq * s2 * (q * q));
-    (c + step).larger(zero).smaller(one)
+    /// One step of Halley's method for it.
+    #[inline(always)]
+    fn arc_step(&self, m: &LocalMove<T>, across: T, c: T) -> T {
+        let (zero, one, s2) = (T::of(0.0), T::of(1.0), m.sin * m.sin);
+        let w = across.absolute().smaller(self.radius);
+        let (r, e) = (self.corner, self.centre);
+        let q = one / (s2 + (one - s2) * c * c).larger(T::of(1e-30)).sqrt();
+        let (eq, q2) = (e * q, q * q);
+        let off = w - (r + eq) * c;
+        let bend = eq * s2 * q2;
+        // H′, and -H″/2.
+        let slope = r + bend;
+        let half_curve = T::of(1.5) * bend * q2 * (one - s2) * c;
+        let step = off * slope / (slope * slope - off * half_curve);
+        (c + step).larger(zero).smaller(one)
+    }
+
+    /// How far ahead the point lies where the normal at the contact has the part `c` across.
+    #[inline(always)]
+    fn arc_ahead(&self, m: &LocalMove<T>, c: T) -> T {
+        let (zero, one, tiny) = (T::of(0.0), T::of(1.0), T::of(1e-30));
+        let rest = one - c * c;
+        let part = rest.larger(zero).sqrt() * m.sin;
+        let norm = (c * c + rest * (m.sin * m.sin)).larger(tiny).sqrt();
+        self.corner * part + self.centre * part / norm
+    }
+
+    /// The height, and from where it is in doubt, if the point lies so far ahead.
+    #[inline(always)]
+    fn height_ahead(&self, m: &LocalMove<T>, along: T, across: T, ahead: T) -> (T, Doubt<T>) {
+        let infinite = T::of(f64::INFINITY);
+        let place = clamp(along - ahead, m.low, m.high);
+        let ahead = along - place;
+        let rho = (ahead * ahead + across * across).sqrt().smaller(self.radius);
+        let (height, slope) = self.height_and_slope(rho);
+        let tip = m.z + m.slope * place;
+        let chord2 = (self.radius - across) * (self.radius + across);
+        let margin = margin(m, along, chord2);
+        let inside = margin >= T::of(0.0);
+        let short = self.rim * m.slope;
+        let at_rim = (rho >= self.radius - self.blur) & (place > m.low) & (chord2 < short * short);
+        let steep = (margin.absolute() < self.edge) | (inside & ((slope > self.steep) | at_rim));
+        let off = inside & self.place_is_off(m, place, [ahead, across, rho], slope);
+        let z = if inside { tip + height } else { infinite };
+        let shift = if at_rim { m.slope * self.shift } else { T::of(0.0) };
+        let least = if off { m.z + m.slope * m.low } else { tip + self.steep_z - shift };
+        (z, if steep | off { least } else { infinite })
+    }
 }
 
 /// How far a circle of radius `rho` reaches ahead at distance `w` across.
@@ -517,30 +657,83 @@ impl<T: Real, const CONES: bool> Sweep<T> for Rounded<T, CONES> {
         Plane { z, along: ga, across: gw }
     }
 
-    /// The lower end cuts wherever it is the nearest place; the upper one too if the track is level.
+    /// The cutter stands at the lower end where f′(ρ)·ahead/ρ is no more than the slope of the track
+    /// there, and at the upper end where it is no less. Both factors are bounded over the square.
     #[inline(always)]
-    fn beyond(&self, m: &LocalMove<T>, along: [T; 2], _: T) -> (bool, bool) {
-        (along[1] <= m.low, (along[0] >= m.high) & (m.slope == T::of(0.0)))
+    fn beyond(&self, m: &LocalMove<T>, along: [T; 2], [nearest, farthest]: [T; 2]) -> (bool, bool) {
+        let (zero, tiny) = (T::of(0.0), T::of(1e-30));
+        let root = |a: T, w: T| (a * a + w * w).larger(tiny).sqrt();
+        let ahead = along[1] - m.low;
+        let outer = root(ahead, farthest);
+        let (_, steepest) = self.height_and_slope(outer.smaller(self.radius));
+        let all_gentle = (outer <= self.surely_inside) & (steepest * ahead <= m.slope * root(ahead, nearest));
+        let at_low = (ahead <= zero) | all_gentle;
+        let ahead = along[0] - m.high;
+        let (_, gentlest) = self.height_and_slope(root(ahead, nearest).smaller(self.radius));
+        let at_high = (ahead >= zero) & (gentlest * ahead >= m.slope * root(ahead, farthest));
+        (at_low, at_high)
+    }
+
+    const TRIES_END: bool = true;
+
+    #[inline(always)]
+    fn at_end(&self, m: &LocalMove<T>, upper: bool, along: T, across: T) -> (T, T) {
+        let (zero, infinite) = (T::of(0.0), T::of(f64::INFINITY));
+        let end = if upper { m.high } else { m.low };
+        let ahead = along - end;
+        let rho = (ahead * ahead + across * across).sqrt();
+        let inside = rho <= self.radius;
+        let gentle = rho <= self.within;
+        let (f, rise) = self.height_and_rise(rho.smaller(self.radius));
+        let [rise, run] = if gentle { rise } else { [self.within_slope, T::of(1.0)] };
+        let by_ahead = rise * ahead / (run * rho).larger(T::of(1e-30));
+        let nearest = if upper { ahead >= zero } else { ahead <= zero };
+        // Steeper than assumed beyond `within`, the profile only holds the cutter at the upper end the more.
+        let lowest = if upper { by_ahead >= m.slope } else { (by_ahead <= m.slope) & (gentle | nearest) };
+        let right = (if inside { lowest } else { nearest }) | (m.low >= m.high);
+        let under = if gentle { f } else { self.within_z + self.within_slope * (rho - self.within) };
+        let wrong = (by_ahead - m.slope).absolute() * (m.high - m.low);
+        let tip = m.z + m.slope * end;
+        (if inside { tip + f } else { infinite }, if right { infinite } else { tip + under - wrong })
     }
 
     #[inline(always)]
     fn height(&self, m: &LocalMove<T>, along: T, across: T) -> (T, Doubt<T>) {
-        let infinite = T::of(f64::INFINITY);
-        let place = clamp(along - self.ahead::<HEIGHT_STEPS>(m, across), m.low, m.high);
-        let ahead = along - place;
-        let rho = (ahead * ahead + across * across).sqrt().smaller(self.radius);
-        let (height, slope) = self.height_and_slope(rho);
-        let tip = m.z + m.slope * place;
-        let chord2 = (self.radius - across) * (self.radius + across);
-        let margin = margin(m, along, chord2);
-        let inside = margin >= T::of(0.0);
-        let short = self.rim * m.slope;
-        let at_rim = (rho >= self.radius - self.blur) & (place > m.low) & (chord2 < short * short);
-        let steep = (margin.absolute() < self.edge) | (inside & ((slope > self.steep) | at_rim));
-        let off = inside & self.place_is_off(m, place, [ahead, across, rho], slope);
-        let z = if inside { tip + height } else { infinite };
-        let shift = if at_rim { m.slope * self.shift } else { T::of(0.0) };
-        let least = if off { m.z + m.slope * m.low } else { tip + self.steep_z - shift };
-        (z, if steep | off { least } else { infinite })
+        self.height_ahead(m, along, across, self.ahead::<HEIGHT_STEPS>(m, across))
+    }
+
+    /// One step for all points after the other: the steps of one point wait for each other's roots, and
+    /// machines look ahead by less than two vectors of points.
+    #[inline(always)]
+    fn heights<const N: usize>(
+        &self,
+        m: &LocalMove<T>,
+        along: &[[T; N]],
+        across: &[[T; N]],
+        height: &mut [[T; N]],
+        doubt: &mut [[T; N]],
+    ) {
+        for (c, w) in height.iter_mut().zip(across) {
+            for k in 0..N {
+                c[k] = self.arc_start(m, w[k]);
+            }
+        }
+        for _ in 0..HEIGHT_STEPS {
+            for (c, w) in height.iter_mut().zip(across) {
+                for k in 0..N {
+                    c[k] = self.arc_step(m, w[k], c[k]);
+                }
+            }
+        }
+        for (c, w) in height.iter_mut().zip(across) {
+            for k in 0..N {
+                c[k] = self.ahead_at(m, w[k], c[k]);
+            }
+        }
+        for b in 0..along.len() {
+            for k in 0..N {
+                (height[b][k], doubt[b][k]) = self.height_ahead(m, along[b][k], across[b][k], height[b][k]);
+            }
+        }
     }
 }
