@@ -33,9 +33,10 @@ use crate::parallel;
 /// ρ of each round. The last leaves shortfalls of about a thousandth.
 const PENALTIES: [f64; 4] = [3.0, 30.0, 300.0, 3000.0];
 
-/// Steps of a round at most, and the relative gain below which it ends.
+/// Steps of a round at most. It ends earlier after so many steps in turn that gain less than this share.
 const MOST_STEPS: usize = 150;
-const SETTLED: f64 = 1e-7;
+const SETTLED: f64 = 1e-6;
+const SETTLED_STEPS: usize = 5;
 
 /// Steps that L-BFGS remembers.
 const MEMORY: usize = 12;
@@ -308,6 +309,7 @@ impl Problem<'_> {
         let mut value = self.charge(x, penalty, &mut slope);
         // Steps and changes of the slope.
         let mut memory: std::collections::VecDeque<[Vec<f64>; 2]> = std::collections::VecDeque::new();
+        let mut settled = 0;
         for _ in 0..MOST_STEPS {
             monitor::check(monitor)?;
             let mut direction: Vec<f64> = slope.iter().map(|g| -g).collect();
@@ -361,9 +363,9 @@ impl Problem<'_> {
                     memory.pop_front();
                 }
             }
-            let gain = value - there;
+            settled = if value - there <= SETTLED * value { settled + 1 } else { 0 };
             (*x, slope, value) = (to, by, there);
-            if gain <= SETTLED * value {
+            if settled == SETTLED_STEPS {
                 return Ok(());
             }
         }

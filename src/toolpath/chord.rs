@@ -162,8 +162,8 @@ pub fn reduced_indices(
     Ok(kept)
 }
 
-/// The points at `knots`, each moved by half the greater sagitta on its two sides, where the curve bends
-/// both ways by their mean. The ends stay.
+/// The points at `knots`, each moved by half the lesser sagitta of its two sides; not where the curve bends both ways or
+/// runs straight on one side, which would be tilted. The ends stay.
 pub fn moved_aside(curve: &[Point3], knots: &[usize], tolerance: f64) -> Vec<Point3> {
     let half_sagitta = |k: usize| {
         let (a, b) = (curve[knots[k]], curve[knots[k + 1]]);
@@ -186,8 +186,8 @@ pub fn moved_aside(curve: &[Point3], knots: &[usize], tolerance: f64) -> Vec<Poi
     let halves: Vec<Vector3> = (0..knots.len().saturating_sub(1)).map(half_sagitta).collect();
     let aside = |k: usize| {
         let (a, b) = (halves[k - 1], halves[k]);
-        let greater = if a.norm_squared() > b.norm_squared() { a } else { b };
-        let by = if a.dot(&b) < 0.0 { 0.5 * (a + b) } else { greater };
+        let lesser = if a.norm_squared() < b.norm_squared() { a } else { b };
+        let by = if a.dot(&b) > 0.0 { lesser } else { Vector3::zeros() };
         curve[knots[k]] + by * (tolerance / by.norm().max(f64::MIN_POSITIVE)).min(1.0)
     };
     let last = knots.len().saturating_sub(1);

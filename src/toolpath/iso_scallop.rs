@@ -45,30 +45,43 @@ pub fn passes(
 ) -> Result<Passes, PlanError> {
     let mut all = Passes::default();
     for chart in Chart::all(part, cutter)? {
-        let mut tried = Vec::new();
-        let places = places(&chart, LENGTH_SAMPLES);
-        for (name, curves) in starts(&chart, start) {
-            let signed = matches!(start, FrontStart::Line(_));
-            let field = arrival(&chart, cutter, settings.step, &curves, signed, monitor)?;
-            let field = ScalarField::Grid(field);
-            tried.push((predicted_length(&places, cutter, settings.step, &field), name, field));
-        }
-        tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let searched = tried.len();
-        let mut planned = Vec::new();
-        for (length, name, field) in tried.into_iter().take(PLANNED) {
-            planned.push((along_levels(part, cutter, &chart, &field, settings, monitor)?, name, length));
-        }
-        planned.sort_by(|a, b| a.0.length().total_cmp(&b.0.length()));
-        let Some((mut best, name, length)) = planned.into_iter().next() else { continue };
-        best.notes.push(format!(
-            "passes start {name}{}: {:.0} mm planned, {length:.0} mm predicted",
-            if searched > 1 { ", the best of four borders" } else { "" },
-            best.length()
-        ));
-        all.append(best);
+        all.append(on_chart(part, cutter, &chart, start, f64::INFINITY, settings, monitor)?);
     }
     Ok(all)
+}
+
+/// Plans passes over one chart; none from starts that promise a path longer than `worth`, mm.
+pub(super) fn on_chart(
+    part: &Part,
+    cutter: &Cutter,
+    chart: &Chart,
+    start: FrontStart,
+    worth: f64,
+    settings: &PassSettings,
+    monitor: &dyn Monitor,
+) -> Result<Passes, PlanError> {
+    let mut tried = Vec::new();
+    let places = places(chart, LENGTH_SAMPLES);
+    for (name, curves) in starts(chart, start) {
+        let signed = matches!(start, FrontStart::Line(_));
+        let field = arrival(chart, cutter, settings.step, &curves, signed, monitor)?;
+        let field = ScalarField::Grid(field);
+        tried.push((predicted_length(&places, cutter, settings.step, &field), name, field));
+    }
+    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let searched = tried.len();
+    let mut planned = Vec::new();
+    for (length, name, field) in tried.into_iter().take(PLANNED).filter(|(length, ..)| *length < worth) {
+        planned.push((along_levels(part, cutter, chart, &field, settings, monitor)?, name, length));
+    }
+    planned.sort_by(|a, b| a.0.length().total_cmp(&b.0.length()));
+    let Some((mut best, name, length)) = planned.into_iter().next() else { return Ok(Passes::default()) };
+    best.notes.push(format!(
+        "passes start {name}{}: {:.0} mm planned, {length:.0} mm predicted",
+        if searched > 1 { ", the best of four borders" } else { "" },
+        best.length()
+    ));
+    Ok(best)
 }
 
 /// The start curves to try, each with its name.

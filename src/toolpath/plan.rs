@@ -327,7 +327,7 @@ const SAMPLING_OVER_RADIUS: f64 = 0.15;
 /// 1 µm, the highest ridges of a saddle and of a pit stood at 9.3 and 9.4 µm, 95 % below 9.1. The facets of a mesh, which
 /// the planned surface does not have, take the rest.
 const CHORD_SHARE: f64 = 0.25;
-const CHORD_SHARE_OF_MESHES: f64 = 0.7;
+const CHORD_SHARE_OF_MESHES: f64 = 0.45;
 
 /// But it is not planned for less than this share of itself.
 const LEAST_SHARE_OF_TARGET: f64 = 0.5;

@@ -13,9 +13,9 @@
 use std::f64::consts::PI;
 
 use super::chart::Chart;
-use super::iso_scallop::{front_at, places};
+use super::iso_scallop::{front_at, on_chart, places};
 use super::level_passes::along_levels;
-use super::plan::{PassSettings, Passes, PlanError, Step};
+use super::plan::{FrontStart, PassSettings, Passes, PlanError, Step};
 use crate::cutter::Cutter;
 use crate::field::{
     Gradients, NormalEquations, Packed, Roughness, Rounds, ScalarField, ScalarSpline, Site, Start, eikonal,
@@ -114,6 +114,13 @@ pub(super) fn passes(
         all_planned.sort_by(|(a, _), (b, _)| a.length().total_cmp(&b.length()));
         let Some((mut planned, promised)) = all_planned.into_iter().next() else { continue };
         planned.notes.push(shortest_note(&planned, promised));
+        // A front whose passes run along two whole borders, or are packed without any slack, may still be shorter.
+        let worth = planned.length();
+        match on_chart(part, cutter, &chart, FrontStart::BestBorder, worth, settings, monitor) {
+            Ok(front) if !front.passes.is_empty() && front.length() < worth => planned = front,
+            Err(PlanError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            _ => {}
+        }
         all.append(planned);
     }
     Ok(all)
