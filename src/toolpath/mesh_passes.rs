@@ -8,19 +8,20 @@
 
 use super::border::useful_overrun;
 use super::drop::DropCutter;
+use super::feed::{self, SMOOTHING_OVER_RADIUS};
 use super::halving::{Allowed, LevelSource, Track, along_and_between};
 use super::mesh_shortest::shortest_stream;
-use super::mesh_surface::{MeshSurface, not_applicable, reachable};
+use super::mesh_surface::{MeshSurface, Piece, not_applicable, reachable};
 use super::plan::{PassSettings, Passes, PlanError};
 use super::shortest::shortest_note;
 use super::spacing::{Place, Placing, place_levels};
 use super::strip::strip_width_at;
-use super::{Along, FeedDirection, Step};
+use super::{FeedDirection, Step};
 use crate::cutter::Cutter;
 use crate::field::DIRECTION_WEIGHT;
 use crate::field::mesh::{
-    Bend, FieldMesh, Held, Line, MeshCurve, MeshFieldError, MeshLevels, MeshPoint, Wanted, fixed_angle,
-    flows, orient_lines, singular_points, smooth_lines, solve_stream,
+    Bend, Held, Line, MeshCurve, MeshFieldError, MeshLevels, MeshPoint, flows, orient_lines, singular_points,
+    smooth_lines, solve_stream,
 };
 use crate::geometry::{Point2, Point3, Vector2, Vector3};
 use crate::monitor::{Cancelled, Monitor};
@@ -34,10 +35,6 @@ const LEAST_TOLD: f64 = 0.05;
 
 /// The strip beyond borders is this share of an interval wide, as on charts.
 const BORDER_SHARE: f64 = 0.6;
-
-/// Directions give way to their neighbours over this share of the cutter's radius. More bends passes
-/// away from what was asked for, less lets the noise of fitted curvature turn them.
-const SMOOTHING_OVER_RADIUS: f64 = 0.5;
 
 /// Part of a direction's weight that does not depend on how much the direction matters.
 const LEAST_WEIGHT: f64 = 0.02;
@@ -71,6 +68,12 @@ pub(super) fn on_mesh(
         Step::Stepover(width) => width,
         Step::Scallop(h) => strip_width_at(cutter, &Vector3::z(), &Vector3::x(), 0.0, h).0,
     };
+    let parameters: Vec<_> = match part.patches() {
+        // u and v of a mesh are its x and y.
+        [] => [part.bounds()].map(|b| [[b.min.x, b.max.x], [b.min.y, b.max.y]]).to_vec(),
+        patches => patches.iter().map(|patch| patch.domain()).collect(),
+    };
+    direction.map_or(Ok(()), |direction| feed::check(direction, part, &parameters))?;
     let reached = reachable(part, cutter, flat)?;
     let mut all = Passes::default();
     if reached.steep_area >= LEAST_TOLD {
@@ -82,7 +85,7 @@ pub(super) fn on_mesh(
     }
     for piece in &reached.pieces {
         let surface = MeshSurface::with_margin(piece, BORDER_SHARE * flat)?;
-        all.append(on_piece(part, cutter, direction, &surface, settings, monitor)?);
+        all.append(on_piece(part, cutter, direction, piece, &surface, settings, monitor)?);
     }
     Ok(all)
 }
@@ -91,6 +94,7 @@ fn on_piece(
     part: &Part,
     cutter: &Cutter,
     direction: Option<&FeedDirection>,
+    piece: &Piece,
     surface: &MeshSurface,
     settings: &PassSettings,
     monitor: &dyn Monitor,
@@ -98,7 +102,7 @@ fn on_piece(
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     let mut notes = Vec::new();
     let (values, predicted) = match direction {
-        Some(direction) => (along_direction(part, cutter, direction, surface, settings, &mut notes)?, None),
+        Some(direction) => (along_direction(part, cutter, direction, piece, surface, settings, &mut notes)?, None),
         None => {
             let found = shortest_stream(surface, cutter, settings.step, monitor)?;
             let found =
@@ -125,21 +129,21 @@ fn along_direction(
     part: &Part,
     cutter: &Cutter,
     direction: &FeedDirection,
+    piece: &Piece,
     surface: &MeshSurface,
     settings: &PassSettings,
     notes: &mut Vec<String>,
 ) -> Result<Vec<f64>, PlanError> {
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     let mesh = &surface.mesh;
-    let lines = feed_lines(part, cutter, direction, surface, notes).map_err(refused)?;
+    let (lines, matters) = feed_lines(part, cutter, direction, piece, surface, notes)?;
     let widths =
         |v: usize, b: &Vector3| width_at(cutter, &mesh.normals()[v], b, &surface.bends[v], settings.step);
     let count = mesh.points().len();
     let own = |v: usize| surface.origin[v] as usize;
     let across = |v: usize| mesh.normals()[v].cross(&lines[v].direction);
     let density: Vec<f64> = (0..count).map(|v| 1.0 / widths(own(v), &across(own(v))).0).collect();
-    let weight: Vec<f64> =
-        (0..count).map(|v| matters(cutter, direction, mesh, &surface.bends, own(v)) + LEAST_WEIGHT).collect();
+    let weight: Vec<f64> = (0..count).map(|v| matters[own(v)] + LEAST_WEIGHT).collect();
     let flows = flows(mesh, &lines, &density, &weight);
     let stream = solve_stream(mesh, &flows, DIRECTION_WEIGHT, &Held::default()).map_err(refused)?;
     notes.push(format!(
@@ -157,43 +161,31 @@ pub(super) fn width_at(cutter: &Cutter, n: &Vector3, b: &Vector3, bend: &Bend, s
     }
 }
 
-/// How much the direction of feed matters at a vertex, 0 to 1.
-fn matters(cutter: &Cutter, direction: &FeedDirection, mesh: &FieldMesh, bends: &[Bend], v: usize) -> f64 {
-    if *direction != FeedDirection::WidestStrip {
-        return 1.0;
-    }
-    let (least, greatest, _) = bends[v].principal(mesh.frame(v));
-    ((greatest - least) * cutter.radius()).min(1.0)
-}
-
-/// The smooth, oriented field of feed directions.
+/// The smooth, oriented field of feed directions, and how much they matter at each vertex (0 to 1, or to the weight of
+/// samples).
 fn feed_lines(
     part: &Part,
     cutter: &Cutter,
     direction: &FeedDirection,
+    piece: &Piece,
     surface: &MeshSurface,
     notes: &mut Vec<String>,
-) -> Result<Vec<Line>, MeshFieldError> {
+) -> Result<(Vec<Line>, Vec<f64>), PlanError> {
+    let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     let mesh = &surface.mesh;
-    let mut wanted = match direction {
-        FeedDirection::Angle(angle) => fixed_angle(mesh, *angle),
-        FeedDirection::Parameter(along) => along_parameter(part, mesh, *along),
-        // Refused at the entrance.
-        FeedDirection::Samples(_) => vec![None; mesh.points().len()],
-        FeedDirection::WidestStrip => (0..mesh.points().len())
-            .map(|v| {
-                let (least, greatest, tangent) = surface.bends[v].principal(mesh.frame(v));
-                Some((tangent, ((greatest - least) * cutter.radius()).min(1.0)))
-            })
-            .collect(),
-    };
+    let mut wanted = feed::on_mesh(part, cutter, direction, piece, surface).map_err(refused)?;
+    let matters = wanted.iter().map(|w| w.map_or(0.0, |(_, matters)| matters)).collect();
     // Beyond the border the field goes on as it comes.
     for v in 0..wanted.len() {
         if surface.origin[v] as usize != v {
             wanted[v] = None;
         }
     }
-    let mut lines = smooth_lines(mesh, &wanted, &[], SMOOTHING_OVER_RADIUS * cutter.radius())?;
+    if wanted.iter().all(Option::is_none) {
+        return Err(feed::nowhere(direction, piece.mesh.points().iter().copied()));
+    }
+    let smoothing = SMOOTHING_OVER_RADIUS * cutter.radius();
+    let mut lines = smooth_lines(mesh, &wanted, &[], smoothing).map_err(refused)?;
     let cut = orient_lines(mesh, &mut lines);
     let singular = singular_points(mesh, &lines, MERGE_OVER_RADIUS * cutter.radius());
     if !singular.is_empty() {
@@ -217,20 +209,7 @@ fn feed_lines(
             if cut.is_empty() { "" } else { ", and turn back along a cut between those of half index" }
         ));
     }
-    Ok(lines)
-}
-
-/// Along a parameter of each patch; along x or y on a mesh.
-fn along_parameter(part: &Part, mesh: &FieldMesh, along: Along) -> Vec<Wanted> {
-    if part.patches().is_empty() {
-        return fixed_angle(mesh, if along == Along::U { 0.0 } else { std::f64::consts::FRAC_PI_2 });
-    }
-    crate::parallel::map(mesh.points().len(), |v| {
-        let at = part.closest_point(&mesh.points()[v]).0.at?;
-        let jet = part.patches()[at.patch as usize].jet(at.u, at.v);
-        let tangent = if along == Along::U { jet.du } else { jet.dv };
-        tangent.try_normalize(1e-12).map(|t| (t, 1.0))
-    })
+    Ok((lines, matters))
 }
 
 /// A place of a level curve.

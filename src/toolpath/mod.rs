@@ -7,6 +7,7 @@ mod chart;
 mod chord;
 mod contour_spiral;
 mod drop;
+mod feed;
 mod halving;
 mod iso_scallop;
 mod level_passes;

@@ -14,8 +14,9 @@ use super::{
     streamline, waterline, zigzag,
 };
 use crate::cutter::Cutter;
+use crate::field::mesh::Sense;
 use crate::field::{KnotRule, LineField, Solver};
-use crate::geometry::Point3;
+use crate::geometry::{Point2, Point3};
 use crate::monitor::{Cancelled, Monitor};
 use crate::part::Part;
 
@@ -47,8 +48,25 @@ pub enum FeedDirection {
     Angle(f64),
     /// Across the widest strip, from the principal curvatures.
     WidestStrip,
+    /// Up the slope of the surface; none on level ground.
+    Steepest,
+    /// Level along the surface, square to the slope; none on level ground.
+    Contour,
     /// As sampled at places of the plan view, or of the parameters of each patch.
     Samples(Arc<LineField>),
+    /// From curves of the plan view; between and beyond them the smoothest field that they allow.
+    Guides {
+        /// Polylines of at least two different points, mm.
+        curves: Arc<Vec<Vec<Point2>>>,
+        /// Along or across them.
+        sense: Sense,
+    },
+    /// From the borders of the part, of each patch where patches are planned one by one; inside, the smoothest field
+    /// that they allow.
+    Border(Sense),
+    /// The mean of directions as lines (of their doubled angles in the tangent plane) by positive weights, each times how
+    /// much its direction matters at the place.
+    Blend(Vec<(FeedDirection, f64)>),
 }
 
 /// How a stream function is fitted to feed directions.

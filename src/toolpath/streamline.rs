@@ -2,14 +2,16 @@
 //! isoparametric lines, whose stream function is a parameter itself.
 
 use super::chart::{Chart, ChartPoint};
+use super::feed;
 use super::level_passes::{along_levels, along_levels_placed};
+use super::mesh_surface::not_applicable;
 use super::plan::{PassSettings, Passes, PlanError};
 use super::spacing::Placing;
 use super::{Along, FeedDirection, StreamMethod};
 use crate::cutter::Cutter;
 use crate::field::{
-    self, Axis, FieldError, KnotRule, LineField, SamplePlane, ScalarField, Solver, StreamSample,
-    averaged_knots, equal_shares, fit_by_differences, fit_stream_function, weighted_knots,
+    self, Axis, FieldError, KnotRule, ScalarField, Solver, StreamSample, averaged_knots, equal_shares,
+    fit_by_differences, fit_stream_function, weighted_knots,
 };
 use crate::geometry::{KnotVector, Vector3};
 use crate::monitor::Monitor;
@@ -86,44 +88,16 @@ pub fn streamline(
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
     let charts = Chart::all(part, cutter)?;
-    if let FeedDirection::Samples(samples) = direction {
-        check_samples(samples, part, &charts)?;
-    }
+    let parameters: Vec<_> = charts.iter().map(|chart| chart.domain).collect();
+    feed::check(direction, part, &parameters)?;
     let mut all = Passes::default();
     for chart in charts {
-        let (field, notes) = stream_function(&chart, cutter, direction, fitting, settings)?;
+        let direction = feed::on_chart(direction, &chart, cutter)?;
+        let (field, notes) = stream_function(&chart, cutter, &direction, fitting, settings)?;
         all.notes.extend(notes);
         all.append(along_levels(part, cutter, &chart, &field, settings, monitor)?);
     }
     Ok(all)
-}
-
-fn not_applicable(reason: String) -> PlanError {
-    PlanError::NotApplicable { strategy: "streamline", reason }
-}
-
-/// Refuses sampled directions that all lie outside of the part.
-fn check_samples(samples: &LineField, part: &Part, charts: &[Chart<'_>]) -> Result<(), PlanError> {
-    let (names, inside) = match samples.plane() {
-        SamplePlane::Plan => {
-            let b = part.bounds();
-            let rectangle = [[b.min.x, b.max.x], [b.min.y, b.max.y]];
-            (["x", "y"], samples.count_inside(rectangle) > 0)
-        }
-        SamplePlane::Parameters => {
-            (["u", "v"], charts.iter().any(|chart| samples.count_inside(chart.domain) > 0))
-        }
-    };
-    if inside {
-        return Ok(());
-    }
-    let [a, b] = samples.bounds();
-    let ([name_a, name_b], count) = (names, samples.len());
-    Err(not_applicable(format!(
-        "all {count} sampled directions lie outside of it ({name_a} from {} to {}, {name_b} from {} to {}); check \
-         their unit and origin, and whether they are x and y or u and v",
-        a[0], a[1], b[0], b[1]
-    )))
 }
 
 /// Samples feed directions over a chart and fits the stream function.
@@ -137,10 +111,11 @@ fn stream_function(
     let n = fitting.controls * SAMPLES_PER_CONTROL;
     let places: Vec<[f64; 2]> = chart.grid(n).collect();
     let points: Vec<_> = places.iter().map(|&[u, v]| chart.at(u, v)).collect();
-    let mut lines: Vec<Option<(Vector3, f64)>> = points
-        .iter()
-        .map(|p| p.and_then(|p| Some((p.feed_tangent(direction)?, p.direction_matters(direction, cutter)))))
-        .collect();
+    let mut lines: Vec<Option<(Vector3, f64)>> =
+        points.iter().map(|p| p.and_then(|p| p.feed(direction, cutter))).collect();
+    if lines.iter().all(Option::is_none) {
+        return Err(feed::nowhere(direction, chart.corners().into_iter()));
+    }
     let disagreement = field::orient(&mut lines, n);
     let sample = |k: usize| {
         let (p, (t, matters)) = (points[k]?, lines[k]?);
@@ -156,7 +131,7 @@ fn stream_function(
         })
     };
     let samples: Vec<Option<StreamSample>> = (0..places.len()).map(sample).collect();
-    let refused = |e: FieldError| not_applicable(e.to_string());
+    let refused = |e: FieldError| not_applicable(&e.to_string());
     let (psi, angle_rms, method, report) = match fitting.method {
         StreamMethod::Differences => {
             let fit = fit_by_differences(&samples, chart.domain, [n; 2], fitting.solver).map_err(refused)?;
@@ -223,7 +198,7 @@ fn placed_knots(
                 averaged_knots(degree, controls, &parameters, range)
             }
         }
-        .map_err(|e| not_applicable(format!("its control points cannot be placed: {e}")))
+        .map_err(|e| not_applicable(&format!("its control points cannot be placed: {e}")))
     };
     Ok([along(0)?, along(1)?])
 }

@@ -156,7 +156,7 @@ fn borders_guides_slopes_and_blends_give_their_directions() {
         }
     }
     assert_eq!((on, corners), (4 * 16 - 4, 4));
-    let curve = vec![Point3::new(0.2, -1.0, 0.1), Point3::new(0.2, 2.0, 0.1)];
+    let curve = vec![Point2::new(0.2, -1.0), Point2::new(0.2, 2.0)];
     for (sense, exact) in [(Sense::Along, Vector3::y()), (Sense::Across, up)] {
         let near = guides(&mesh, std::slice::from_ref(&curve), 0.1, sense);
         let found = near.iter().zip(mesh.points()).filter(|(w, _)| w.is_some());
