@@ -249,7 +249,7 @@ mod tests {
     use crate::geometry::{AnalyticShape, AnalyticSurface, Vector2};
     use crate::part::Patch;
 
-    /// Short stretches of guides at 0.2 rad on one side of a plate and at 1.4 rad on the other: between them exp(2iθ) is
+    /// Short stretches of guides at 0.2 rad on one side of a plate and at 0.9 rad on the other: between them exp(2iθ) is
     /// harmonic and depends on x only, so it is a straight line between its values.
     #[test]
     fn between_guides_the_field_is_harmonic() {
@@ -259,7 +259,7 @@ mod tests {
             let half = Vector2::new(angle.cos(), angle.sin()) * 0.05;
             vec![Point2::new(x, y) - half, Point2::new(x, y) + half]
         };
-        let (first, last) = (0.2, 1.4);
+        let (first, last) = (0.2, 0.9);
         let sides = (0..=40)
             .flat_map(|k| [(0.0, first), (30.0, last)].map(|(x, a)| stretch(x, 0.5 * f64::from(k), a)));
         let direction = FeedDirection::Guides { curves: Arc::new(sides.collect()), sense: Sense::Along };
