@@ -12,7 +12,7 @@ use super::mesh_surface::{MeshSurface, Piece, not_applicable};
 use super::plan::{Along, FeedDirection, PlanError};
 use crate::cutter::Cutter;
 use crate::field::mesh::{
-    FieldMesh, MeshFieldError, Wanted, blend, borders, fixed_angle, guides, slope, smooth_lines,
+    FieldMesh, Line, MeshFieldError, Wanted, blend, borders, fixed_angle, guides, slope, smooth_lines,
 };
 use crate::field::{LineField, LineSample, SamplePlane};
 use crate::geometry::{Aabb, Point2, Point3, Vector3};
@@ -27,6 +27,15 @@ const REACH_OVER_RADIUS: f64 = 0.5;
 
 /// Nodes a side of the mesh on which curves spread their directions over a chart.
 const NODES: usize = 97;
+
+/// Inside a corner of the border lines pass through nothing, where less than this is left of them: nothing tells in which
+/// sense they turn. Below it the bisector of what the border wants on both sides does.
+const MITRE: f64 = 0.35;
+
+/// How fast a place of the border loses its say with distance, as the exponent of the distance; and the share of all says
+/// that must be left of their sum for it to count.
+const SAY: i32 = 4;
+const LEAST_SAY: f64 = 0.3;
 
 /// Refuses directions that are given only outside of the part. `domains` are the parameters of its patches.
 pub(super) fn check(
@@ -99,7 +108,6 @@ pub(super) fn nowhere(direction: &FeedDirection, places: impl Iterator<Item = Po
             "the part is level there; use another direction, or blend it with one"
         }
         FeedDirection::Blend(_) => "the blended directions cancel there; give them other weights",
-        FeedDirection::Border(_) => "the part's border has corners only; use another direction",
         _ => "use another direction",
     };
     not_applicable(&format!(
@@ -150,9 +158,8 @@ fn spread(
         [[a, b, c], [a, c, d]]
     });
     let mesh = FieldMesh::new(points, triangles.collect(), None)?;
-    let wanted = beside_curves(direction, &mesh, cutter);
-    let lines = smooth_lines(&mesh, &wanted, &[], SMOOTHING_OVER_RADIUS * cutter.radius())?;
-    let sample = |(&[u, v], line): (&[f64; 2], &crate::field::mesh::Line)| {
+    let lines = from_curves(direction, &mesh, &beside_curves(direction, &mesh, cutter), cutter)?;
+    let sample = |(&[u, v], line): (&[f64; 2], &Line)| {
         let (du, dv) = chart.jet(u, v).pull_back(&line.direction)?;
         Some(LineSample { at: [u, v], line: [du, dv], weight: line.agreement })
     };
@@ -168,6 +175,38 @@ fn beside_curves(direction: &FeedDirection, mesh: &FieldMesh, cutter: &Cutter) -
         FeedDirection::Border(sense) => borders(mesh, *sense),
         _ => vec![None; mesh.points().len()],
     }
+}
+
+/// The field over a whole mesh from what curves want beside them.
+fn from_curves(
+    direction: &FeedDirection,
+    mesh: &FieldMesh,
+    wanted: &[Wanted],
+    cutter: &Cutter,
+) -> Result<Vec<Line>, MeshFieldError> {
+    let FeedDirection::Border(_) = direction else {
+        return smooth_lines(mesh, wanted, &[], SMOOTHING_OVER_RADIUS * cutter.radius());
+    };
+    let hard: Vec<(u32, Vector3)> = (0..).zip(wanted).filter_map(|(v, w)| Some((v, w.as_ref()?.0))).collect();
+    let length = SMOOTHING_OVER_RADIUS * cutter.radius();
+    let lines = smooth_lines(mesh, wanted, &hard, length)?;
+    let turned = crate::parallel::map(lines.len(), |v| {
+        let line = lines[v];
+        if line.agreement >= MITRE {
+            return Some((line.direction, 1.0));
+        }
+        let p = mesh.points()[v];
+        let (mut sum, mut total) = (Vector3::zeros(), 0.0);
+        // Borders are directed along their loops, so that sides of one corner add up to its bisector.
+        for (w, tangent) in &hard {
+            let say = (mesh.points()[*w as usize] - p).norm().max(1e-9).powi(-SAY);
+            (sum, total) = (sum + tangent * say, total + say);
+        }
+        let normal = &mesh.normals()[v];
+        let sum = sum - normal * normal.dot(&sum);
+        (sum.norm() > LEAST_SAY * total).then_some((sum, 1.0))
+    });
+    smooth_lines(mesh, &turned, &hard, length)
 }
 
 /// What is wanted at every vertex of a piece of the part and of the strip around it.
@@ -195,7 +234,7 @@ pub(super) fn on_mesh(
             // The border is the part's own, not that of the strip around it; the piece's vertices come first.
             let mut wanted = beside_curves(direction, &piece.mesh, cutter);
             wanted.resize(mesh.points().len(), None);
-            let lines = smooth_lines(mesh, &wanted, &[], SMOOTHING_OVER_RADIUS * cutter.radius())?;
+            let lines = from_curves(direction, mesh, &wanted, cutter)?;
             lines.iter().map(|line| Some((line.direction, line.agreement))).collect()
         }
         FeedDirection::Blend(parts) => {

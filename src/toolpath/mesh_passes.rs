@@ -13,6 +13,7 @@ use super::halving::{Allowed, LevelSource, Track, along_and_between};
 use super::mesh_shortest::shortest_stream;
 use super::mesh_surface::{MeshSurface, Piece, not_applicable, reachable};
 use super::plan::{PassSettings, Passes, PlanError};
+use super::planned_field::Contact;
 use super::shortest::shortest_note;
 use super::spacing::{Place, Placing, place_levels};
 use super::strip::strip_width_at;
@@ -20,8 +21,8 @@ use super::{FeedDirection, Step};
 use crate::cutter::Cutter;
 use crate::field::DIRECTION_WEIGHT;
 use crate::field::mesh::{
-    Bend, Held, Line, MeshCurve, MeshFieldError, MeshLevels, MeshPoint, flows, orient_lines, singular_points,
-    smooth_lines, solve_stream,
+    Bend, Held, Line, MeshCurve, MeshFieldError, MeshLevels, MeshPoint, flows, orient_lines, smooth_lines,
+    solve_stream,
 };
 use crate::geometry::{Point2, Point3, Vector2, Vector3};
 use crate::monitor::{Cancelled, Monitor};
@@ -38,12 +39,6 @@ const BORDER_SHARE: f64 = 0.6;
 
 /// Part of a direction's weight that does not depend on how much the direction matters.
 const LEAST_WEIGHT: f64 = 0.02;
-
-/// Singular points nearer than this many radii of the cutter count as one.
-const MERGE_OVER_RADIUS: f64 = 1.0;
-
-/// Most singular points that a note names.
-const MOST_NAMED: usize = 4;
 
 /// Evening out moves a pass by at most this share of its interval; the scallop grows by twice that
 /// share twice over where two neighbours move apart.
@@ -73,7 +68,9 @@ pub(super) fn on_mesh(
         [] => [part.bounds()].map(|b| [[b.min.x, b.max.x], [b.min.y, b.max.y]]).to_vec(),
         patches => patches.iter().map(|patch| patch.domain()).collect(),
     };
-    direction.map_or(Ok(()), |direction| feed::check(direction, part, &parameters))?;
+    if let Some(direction) = direction {
+        feed::check(direction, part, &parameters)?;
+    }
     let reached = reachable(part, cutter, flat)?;
     let mut all = Passes::default();
     if reached.steep_area >= LEAST_TOLD {
@@ -100,9 +97,12 @@ fn on_piece(
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
-    let mut notes = Vec::new();
+    // Notes and field, to which passes come later.
+    let mut all = Passes::default();
     let (values, predicted) = match direction {
-        Some(direction) => (along_direction(part, cutter, direction, piece, surface, settings, &mut notes)?, None),
+        Some(direction) => {
+            (along_direction(part, cutter, direction, piece, surface, settings, &mut all)?, None)
+        }
         None => {
             let found = shortest_stream(surface, cutter, settings.step, monitor)?;
             let found =
@@ -117,11 +117,24 @@ fn on_piece(
     let drop = DropCutter::new(part, cutter);
     let guide = MeshGuide { surface, levels, cutter, drop, settings, monitor };
     let places = guide.places(&values);
-    let placed = place_levels(&places, range, Placing::Shortest, &mut notes);
-    let mut passes = along_and_between(&guide, &placed, range, settings.sampling, monitor)?;
-    notes.extend(predicted.map(|predicted| shortest_note(&passes, predicted)));
-    passes.notes.splice(0..0, notes);
-    Ok(passes)
+    let placed = place_levels(&places, range, Placing::Shortest, &mut all.notes);
+    all.field.set_mesh_levels(&guide.levels, range, surface.own_triangles);
+    if direction.is_none() {
+        all.field.set_mesh_feed(part, cutter, &level_lines(surface, &guide.levels), surface);
+    }
+    all.append(along_and_between(&guide, &placed, range, settings.sampling, monitor)?);
+    all.notes.extend(predicted.map(|predicted| shortest_note(&all, predicted)));
+    Ok(all)
+}
+
+/// The directions of levels at the vertices.
+fn level_lines(surface: &MeshSurface, levels: &MeshLevels<'_>) -> Vec<Line> {
+    let mesh = &surface.mesh;
+    let line = |(v, gradient): (usize, &Vector3)| {
+        let along = gradient.cross(&mesh.normals()[v]).try_normalize(1e-300);
+        Line { direction: along.unwrap_or(mesh.frame(v)[0]), agreement: f64::from(along.is_some()) }
+    };
+    levels.gradients().iter().enumerate().map(line).collect()
 }
 
 /// ψ at the vertices whose levels follow feed directions.
@@ -132,11 +145,11 @@ fn along_direction(
     piece: &Piece,
     surface: &MeshSurface,
     settings: &PassSettings,
-    notes: &mut Vec<String>,
+    all: &mut Passes,
 ) -> Result<Vec<f64>, PlanError> {
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     let mesh = &surface.mesh;
-    let (lines, matters) = feed_lines(part, cutter, direction, piece, surface, notes)?;
+    let (lines, matters) = feed_lines(part, cutter, direction, piece, surface, all)?;
     let widths =
         |v: usize, b: &Vector3| width_at(cutter, &mesh.normals()[v], b, &surface.bends[v], settings.step);
     let count = mesh.points().len();
@@ -146,7 +159,7 @@ fn along_direction(
     let weight: Vec<f64> = (0..count).map(|v| matters[own(v)] + LEAST_WEIGHT).collect();
     let flows = flows(mesh, &lines, &density, &weight);
     let stream = solve_stream(mesh, &flows, DIRECTION_WEIGHT, &Held::default()).map_err(refused)?;
-    notes.push(format!(
+    all.notes.push(format!(
         "the stream function follows the feed directions within {:.2} degrees (root mean square)",
         stream.angle_rms.to_degrees()
     ));
@@ -169,7 +182,7 @@ fn feed_lines(
     direction: &FeedDirection,
     piece: &Piece,
     surface: &MeshSurface,
-    notes: &mut Vec<String>,
+    passes: &mut Passes,
 ) -> Result<(Vec<Line>, Vec<f64>), PlanError> {
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     let mesh = &surface.mesh;
@@ -186,35 +199,17 @@ fn feed_lines(
     }
     let smoothing = SMOOTHING_OVER_RADIUS * cutter.radius();
     let mut lines = smooth_lines(mesh, &wanted, &[], smoothing).map_err(refused)?;
-    let cut = orient_lines(mesh, &mut lines);
-    let singular = singular_points(mesh, &lines, MERGE_OVER_RADIUS * cutter.radius());
-    if !singular.is_empty() {
-        let named: Vec<String> = singular
-            .iter()
-            .take(MOST_NAMED)
-            .map(|s| {
-                format!(
-                    "({:.1}, {:.1}) index {:+}",
-                    s.position.x,
-                    s.position.y,
-                    0.5 * f64::from(s.half_turns)
-                )
-            })
-            .collect();
-        let more = if singular.len() > MOST_NAMED { ", …" } else { "" };
-        notes.push(format!(
-            "the feed directions have {} singular points: {}{more}; passes bend around them{}",
-            singular.len(),
-            named.join(", "),
-            if cut.is_empty() { "" } else { ", and turn back along a cut between those of half index" }
-        ));
-    }
+    orient_lines(mesh, &mut lines);
+    passes.field.set_mesh_feed(part, cutter, &lines, surface);
+    passes.notes.extend(passes.field.singular_note());
     Ok((lines, matters))
 }
 
 /// A place of a level curve.
 #[derive(Debug, Clone, Copy)]
 struct Spot {
+    /// On the mesh.
+    at: MeshPoint,
     /// Plan view of the cutter's axis.
     axis: Point2,
     /// What neighbouring passes may do here.
@@ -381,9 +376,14 @@ impl MeshGuide<'_> {
             let (a, b) = (&knots[k], &knots[k + 1]);
             let t = if b.s > a.s { ((s - a.s) / (b.s - a.s)).clamp(0.0, 1.0) } else { 0.0 };
             let contact = a.contact + (b.contact - a.contact) * t;
-            let allowed = self.allowed_at(&self.in_triangle(a.triangle, contact)).map(|(allowed, _)| allowed);
+            let at = self.in_triangle(a.triangle, contact);
+            let allowed = self.allowed_at(&at).map(|(allowed, _)| allowed);
             let nowhere = Allowed { step: f64::INFINITY, width: self.settings.sampling };
-            spots.push(Spot { axis: a.axis + (b.axis - a.axis) * t, allowed: allowed.unwrap_or(nowhere) });
+            spots.push(Spot {
+                at,
+                axis: a.axis + (b.axis - a.axis) * t,
+                allowed: allowed.unwrap_or(nowhere),
+            });
         }
         even_out(&mut spots, curve.closed);
         Some(Track { points: spots, closed: curve.closed })
@@ -425,6 +425,17 @@ impl LevelSource for MeshGuide<'_> {
 
     fn allowed(&self, spot: &Spot) -> Option<Allowed> {
         Some(spot.allowed)
+    }
+
+    fn contacts(&self, curve: &Track<Spot>, run: Option<[usize; 2]>) -> Vec<Contact> {
+        let contact = |spot: &Spot| {
+            let gradient = self.mixed(&spot.at, self.levels.gradients());
+            let normal = self.normal(&spot.at);
+            let across = (gradient - normal * normal.dot(&gradient)).try_normalize(1e-300)?;
+            let inside = (spot.at.triangle as usize) < self.surface.own_triangles;
+            Some(Contact { at: spot.at.position, across, allowed: spot.allowed.width, inside })
+        };
+        curve.along(run).filter_map(contact).collect()
     }
 
     fn pass(

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::chord::{Watch, reduce, sample_within_chord};
 use super::link::{Joining, join};
+use super::planned_field::{Contact, PlannedField};
 use super::shortest::{ShortestPossible, shortest_possible};
 use super::smooth::smooth_and_spread;
 use super::spacing::Placing;
@@ -256,6 +257,8 @@ pub struct Plan {
     pub notes: Vec<String>,
     /// What no path below the asked scallop height can be shorter than.
     pub shortest: Option<ShortestPossible>,
+    /// What a streamline path was planned by.
+    pub field: Option<PlannedField>,
 }
 
 impl LevelSteps {
@@ -321,6 +324,10 @@ pub(super) struct Passes {
     pub passes: Vec<Vec<Point3>>,
     /// Remarks.
     pub notes: Vec<String>,
+    /// What they were planned by, where they are levels of a function.
+    pub field: PlannedField,
+    /// Where the cutter touches along each pass, in no order, where they are levels of a function.
+    pub contacts: Vec<Vec<Contact>>,
 }
 
 impl Passes {
@@ -333,6 +340,8 @@ impl Passes {
     pub fn append(&mut self, other: Self) {
         self.passes.extend(other.passes);
         self.notes.extend(other.notes);
+        self.field.append(other.field);
+        self.contacts.extend(other.contacts);
     }
 }
 
@@ -431,7 +440,13 @@ pub fn plan(
             (streamline::streamline(part, cutter, direction, &fitting, &pass, monitor)?, true)
         }
     };
-    let Passes { passes, mut notes } = passes;
+    let Passes { passes, mut notes, mut field, contacts } = passes;
+    let by_streamlines = matches!(strategy, Strategy::Streamline { .. } | Strategy::ShortestStreamline);
+    let field = by_streamlines.then(|| {
+        field.measure(&contacts);
+        field
+    });
+    drop(contacts);
     let path = join(passes, both_ways, part, cutter, settings, monitor)?;
     if path.is_empty() {
         notes.push("no pass reaches the part: the program is empty".into());
@@ -440,5 +455,5 @@ pub fn plan(
         Step::Scallop(h) => Some(shortest_possible(part, cutter, h)?),
         Step::Stepover(_) => None,
     };
-    Ok(Plan { path, notes, shortest })
+    Ok(Plan { path, notes, shortest, field })
 }

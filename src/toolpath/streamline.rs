@@ -93,11 +93,24 @@ pub fn streamline(
     let mut all = Passes::default();
     for chart in charts {
         let direction = feed::on_chart(direction, &chart, cutter)?;
-        let (field, notes) = stream_function(&chart, cutter, &direction, fitting, settings)?;
+        let (field, mut notes, wanted) = stream_function(&chart, cutter, &direction, fitting, settings)?;
+        let mut passes = along_levels(part, cutter, &chart, &field, settings, monitor)?;
+        let feed = |[u, v]: [f64; 2]| chart.at(u, v)?.feed(&direction, cutter);
+        passes.field.set_directions(part, &chart, feed);
+        let places: Vec<[f64; 2]> = chart.grid(wanted.side).collect();
+        passes.field.set_singular_points(&chart, cutter, &places, &wanted.lines, wanted.side);
+        notes.extend(passes.field.singular_note());
         all.notes.extend(notes);
-        all.append(along_levels(part, cutter, &chart, &field, settings, monitor)?);
+        all.append(passes);
     }
     Ok(all)
+}
+
+/// Feed directions and how much they matter on an even grid of a chart, oriented alike.
+struct Wanted {
+    /// Places a side.
+    side: usize,
+    lines: Vec<Option<(Vector3, f64)>>,
 }
 
 /// Samples feed directions over a chart and fits the stream function.
@@ -107,7 +120,7 @@ fn stream_function(
     direction: &FeedDirection,
     fitting: &Fitting,
     settings: &PassSettings,
-) -> Result<(ScalarField, Vec<String>), PlanError> {
+) -> Result<(ScalarField, Vec<String>, Wanted), PlanError> {
     let n = fitting.controls * SAMPLES_PER_CONTROL;
     let places: Vec<[f64; 2]> = chart.grid(n).collect();
     let points: Vec<_> = places.iter().map(|&[u, v]| chart.at(u, v)).collect();
@@ -116,7 +129,7 @@ fn stream_function(
     if lines.iter().all(Option::is_none) {
         return Err(feed::nowhere(direction, chart.corners().into_iter()));
     }
-    let disagreement = field::orient(&mut lines, n);
+    field::orient(&mut lines, n);
     let sample = |k: usize| {
         let (p, (t, matters)) = (points[k]?, lines[k]?);
         let (along, across) = (p.jet.pull_back(&t)?, p.jet.pull_back(&p.normal.cross(&t))?);
@@ -150,21 +163,14 @@ fn stream_function(
             (ScalarField::Spline(fit.psi), fit.angle_rms, name, fit.report)
         }
     };
-    let mut notes = vec![
+    let notes = vec![
         format!(
             "the stream function follows the feed directions within {:.2} degrees (root mean square)",
             angle_rms.to_degrees()
         ),
         format!("the stream function is {method}, solved by {report}"),
     ];
-    if disagreement > 0.0 {
-        notes.push(format!(
-            "the feed directions have singular points ({:.1} % of neighbouring samples cannot be oriented alike); \
-             passes bend around them",
-            100.0 * disagreement
-        ));
-    }
-    Ok((psi, notes))
+    Ok((psi, notes, Wanted { side: n, lines }))
 }
 
 /// Knots of both parameters by a rule. What the rule weighs along one parameter is the mean over the

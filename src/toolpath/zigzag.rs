@@ -67,7 +67,7 @@ pub fn passes(
         monitor.advance(1);
         Ok::<_, PlanError>(pieces)
     })?;
-    Ok(Passes { passes: lines.into_iter().flatten().collect(), notes })
+    Ok(Passes { passes: lines.into_iter().flatten().collect(), notes, ..Passes::default() })
 }
 
 /// Plans passes in the direction with the shortest path. Angles over half a turn are compared by the predicted length

@@ -264,6 +264,11 @@ pub fn singular_points(mesh: &FieldMesh, lines: &[Line], merge: f64) -> Vec<Sing
             });
         }
     }
+    merge_singular_points(&found, merge)
+}
+
+/// Counts singular points nearer to each other than `merge` (mm) as one; they vanish where their turns cancel.
+pub fn merge_singular_points(found: &[SingularPoint], merge: f64) -> Vec<SingularPoint> {
     let mut merged: Vec<SingularPoint> = Vec::new();
     let mut taken = vec![false; found.len()];
     for first in 0..found.len() {

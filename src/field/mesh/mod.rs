@@ -18,7 +18,8 @@ mod weld;
 
 pub use levels::{MeshCurve, MeshLevels, MeshPoint};
 pub use lines::{
-    Line, SingularPoint, Wanted, blend, blend_lines, flows, orient_lines, singular_points, smooth_lines,
+    Line, SingularPoint, Wanted, blend, blend_lines, flows, merge_singular_points, orient_lines,
+    singular_points, smooth_lines,
 };
 pub use recover::{gradient_terms, vertex_gradients};
 pub use refine::Refined;

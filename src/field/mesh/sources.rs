@@ -5,8 +5,8 @@ use super::{FieldMesh, Wanted};
 use crate::geometry::{Point2, Vector3};
 use crate::parallel;
 
-/// A border that turns by more than this at a vertex has no direction there, rad.
-const CORNER: f64 = 0.6;
+/// A border that turns by more than this at a vertex, nearly back, has no direction there, rad.
+const CUSP: f64 = 2.6;
 
 /// Tangents shorter than this, of unit vectors, have no direction.
 const NO_DIRECTION: f64 = 1e-9;
@@ -53,8 +53,8 @@ pub fn slope(mesh: &FieldMesh, up: bool) -> Vec<Wanted> {
     mesh.normals().iter().map(|n| slope_at(n, up)).collect()
 }
 
-/// Along or across the borders, at their vertices except corners. Where passes reach the border they
-/// follow it; inside, the field is as smooth as the borders allow.
+/// Along or across the borders, at corners along their bisector, which tells in which sense passes turn there. Where
+/// passes reach the border they follow it; inside, the field is as smooth as the borders allow.
 pub fn borders(mesh: &FieldMesh, sense: Sense) -> Vec<Wanted> {
     let mut wanted = vec![None; mesh.points().len()];
     for ring in mesh.loops() {
@@ -66,10 +66,12 @@ pub fn borders(mesh: &FieldMesh, sense: Sense) -> Vec<Wanted> {
             let normal = &mesh.normals()[v];
             let flat = |d: Vector3| d - normal * normal.dot(&d);
             let (before, after) = (flat(before), flat(after));
-            if before.cross(&after).norm().atan2(before.dot(&after)) > CORNER {
+            if before.cross(&after).norm().atan2(before.dot(&after)) > CUSP {
                 continue;
             }
-            wanted[v] = (before + after).try_normalize(NO_DIRECTION).map(|t| (sense.feed(t, normal), 1.0));
+            let unit = |d: Vector3| d.try_normalize(NO_DIRECTION * d.norm()).unwrap_or_else(Vector3::zeros);
+            let tangent = (unit(before) + unit(after)).try_normalize(NO_DIRECTION);
+            wanted[v] = tangent.map(|t| (sense.feed(t, normal), 1.0));
         }
     }
     wanted
