@@ -221,7 +221,7 @@ fn lines(page: &mut Picture, grid: &Grid, map: &Pooled, field: &PlannedField) {
     let apart = |p: &PassPoint| p.interval.unwrap_or(p.allowed) / map.pixel >= APART;
     let mut strokes = strokes_over(map);
     for pair in field.passes.iter().flat_map(|pass| pass.windows(2)) {
-        if apart(&pair[0]) && pair[0].inside && pair[1].inside {
+        if apart(&pair[0]) {
             strokes.line(map.place(grid, pair[0].at.xy()), map.place(grid, pair[1].at.xy()), 0.0);
         }
     }

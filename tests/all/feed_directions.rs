@@ -181,7 +181,7 @@ fn blends_are_means_of_doubled_angles() {
 fn samples_are_followed_on_meshes_and_by_elements() {
     let sample = |k: usize| {
         let at = [30.0 * ((k * 37) % 599) as f64 / 598.0, 20.0 * ((k * 101) % 593) as f64 / 592.0];
-        let sign = if k % 3 == 0 { -1.0 } else { 1.0 };
+        let sign = if k.is_multiple_of(3) { -1.0 } else { 1.0 };
         LineSample { at, line: [-sign * (at[1] + 15.0), sign * (at[0] + 20.0)], weight: 1.0 }
     };
     let samples: Vec<LineSample> = (0..600).map(sample).collect();
