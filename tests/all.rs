@@ -16,6 +16,8 @@ mod compare;
 mod defects;
 #[path = "all/directions.rs"]
 mod directions;
+#[path = "all/feed_directions.rs"]
+mod feed_directions;
 #[cfg(target_os = "linux")]
 #[path = "all/memory.rs"]
 mod memory;

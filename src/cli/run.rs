@@ -18,10 +18,10 @@ use crate::monitor::{self, Monitor as _};
 use crate::parallel;
 use crate::part::Part;
 use crate::report::{
-    HIGHEST_RIDGE, Histogram, MAX_TRIANGLES, MapSize, MapWords, Picture, RunReport, ShortestFigures,
-    SimulationFigures, SurfaceMeshFigures, ToolpathPage, ToolpathResult, Verdict, collision,
-    deviation_colours, deviation_picture, height_picture, holder_note, html_page, marks, rapid_violation,
-    result_table, surface_mesh, violations, wall_violation,
+    FieldFigures, HIGHEST_RIDGE, Histogram, MAX_TRIANGLES, MapSize, MapWords, Picture, RunReport,
+    ShortestFigures, SimulationFigures, SurfaceMeshFigures, ToolpathPage, ToolpathResult, Verdict, collision,
+    deviation_colours, deviation_picture, field_picture, height_picture, holder_note, html_page,
+    interval_picture, marks, rapid_violation, result_table, surface_mesh, violations, wall_violation,
 };
 use crate::sim::{Grid, GridError, ZMap, cut, cut_in_order, cut_reference, holder_collisions};
 use crate::toolpath::{Plan, PlanSettings, Pocket, Toolpath, plan, plan_pocket};
@@ -296,7 +296,7 @@ impl<'a> Job<'a> {
         monitor.start("writing results", 0);
         outputs.folder(&request.folder)?;
         let programs = || self.write_programs(request, &planned, outputs);
-        let maps = || self.write_maps(request, &cut, &measured, outputs);
+        let maps = || self.write_maps(request, &planned, &cut, &measured, outputs);
         let mesh = || self.write_mesh(request, &planned.path, &cut, &measured, outputs);
         let (surface_mesh, (page, lines)) = parallel::join(mesh, || parallel::join(maps, programs));
         let (surface_mesh, page, lines) = (surface_mesh?, page?, lines?);
@@ -359,6 +359,7 @@ impl<'a> Job<'a> {
             shortest: planned
                 .shortest
                 .and_then(|shortest| ShortestFigures::new(&shortest, path.cutting_length_mm)),
+            field: planned.field.as_ref().map(FieldFigures::new),
             scallop: measured.scallop,
             gouge: measured.gouge,
             uncut: measured.uncut,
@@ -391,6 +392,7 @@ impl<'a> Job<'a> {
     fn write_maps(
         &self,
         request: &ToolpathRequest,
+        planned: &Plan,
         cut: &ZMap,
         measured: &Measurement,
         outputs: &Outputs,
@@ -401,22 +403,25 @@ impl<'a> Job<'a> {
                 exr::encode(cut, &measured.deviation_map).map_err(CliError::output(Path::new(&name)))?;
             outputs.file(&name, |out| out.write_all(&bytes))
         };
-        let (exr, pictures) = parallel::join(exr, || self.write_pictures(request, cut, measured, outputs));
+        let pictures = || self.write_pictures(request, planned, cut, measured, outputs);
+        let (exr, pictures) = parallel::join(exr, pictures);
         exr?;
-        let (deviation_png, height_png) = pictures?;
+        let pictures = pictures?;
         let scallop = self.scene.tolerance.scallop;
         let histogram = Histogram::new(&measured.ridge_samples, scallop, HIGHEST_RIDGE * scallop);
-        Ok(ToolpathPage { deviation_png, height_png, histogram })
+        Ok(ToolpathPage { histogram, ..pictures })
     }
 
-    /// Writes deviation.png and height.png; leaves the smaller ones for the page, in that order.
+    /// Writes deviation.png, height.png, and field.png and interval.png of streamlines; leaves the smaller ones for the
+    /// page.
     fn write_pictures(
         &self,
         request: &ToolpathRequest,
+        planned: &Plan,
         cut: &ZMap,
         measured: &Measurement,
         outputs: &Outputs,
-    ) -> Result<(Vec<u8>, Vec<u8>), CliError> {
+    ) -> Result<ToolpathPage, CliError> {
         let (scene, grid, deviation) = (self.scene, &cut.grid, &measured.deviation_map);
         let cell = format!("{} mm", grid.cell);
         let subtitle = format!("{} · cell {cell} · engine {}", scene.title, scene.simulation.engine.name());
@@ -430,9 +435,11 @@ impl<'a> Job<'a> {
         };
         let (deviations, heights) =
             (format!("Deviation, {}", request.name), format!("Height, {}", request.name));
+        let (fields, intervals) =
+            (format!("Feed directions, {}", request.name), format!("Interval of passes, {}", request.name));
         let marks = marks(measured, &scene.tolerance);
         let words = |title, marks| MapWords { title, subtitle: &subtitle, marks };
-        let (deviation, height) = parallel::join(
+        let (deviation_png, height_png) = parallel::join(
             || {
                 both("deviation.png", &|size| {
                     deviation_picture(grid, deviation, &scene.tolerance, &words(&deviations, &marks), size)
@@ -440,7 +447,28 @@ impl<'a> Job<'a> {
             },
             || both("height.png", &|size| height_picture(grid, &cut.height, &words(&heights, &[]), size)),
         );
-        Ok((deviation?, height?))
+        let field_pngs = planned.field.as_ref().map(|field| {
+            let (field, interval) = parallel::join(
+                || {
+                    both("field.png", &|size| {
+                        field_picture(grid, deviation, field, &words(&fields, &[]), size)
+                    })
+                },
+                || {
+                    both("interval.png", &|size| {
+                        interval_picture(grid, deviation, field, &words(&intervals, &[]), size)
+                    })
+                },
+            );
+            Ok::<_, CliError>([field?, interval?])
+        });
+        let field_pngs = field_pngs.transpose()?;
+        Ok(ToolpathPage {
+            deviation_png: deviation_png?,
+            height_png: height_png?,
+            field_pngs,
+            histogram: None,
+        })
     }
 
     fn write_mesh(

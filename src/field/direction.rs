@@ -3,6 +3,7 @@
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
+use std::f64::consts::TAU;
 
 use crate::geometry::Vector3;
 
@@ -85,6 +86,24 @@ pub(super) fn orient_along<N: Iterator<Item = usize>>(
     }
 }
 
+/// The squares of a grid `[n][n]` of lines around which the field turns: their corners and the number of half turns,
+/// counter-clockwise. `lines` are tangents in a frame that turns little from place to place; where one is missing nothing
+/// is found. More than one half turn may be found in several squares side by side.
+pub fn grid_turns(lines: &[Option<[f64; 2]>], n: usize) -> Vec<([usize; 4], i32)> {
+    let double = |k: usize| lines.get(k).copied().flatten().map(|[x, y]| 2.0 * y.atan2(x));
+    let turn = |corners: [usize; 4]| {
+        let mut sum = 0.0;
+        for k in 0..4 {
+            let d = double(corners[(k + 1) % 4])? - double(corners[k])?;
+            sum += d - TAU * (d / TAU).round();
+        }
+        let half_turns = (sum / TAU).round() as i32;
+        (half_turns != 0).then_some((corners, half_turns))
+    };
+    let squares = (0..n.saturating_sub(1)).flat_map(|j| (0..n - 1).map(move |i| j * n + i));
+    squares.filter_map(|k| turn([k, k + 1, k + 1 + n, k + n])).collect()
+}
+
 fn neighbours(k: usize, nu: usize, nv: usize) -> impl Iterator<Item = usize> {
     let (i, j) = (k % nu, k / nu);
     let left = (i > 0).then(|| k - 1);
@@ -135,6 +154,21 @@ mod tests {
         let mut lines = grid(20, |x, y| 0.5 * y.atan2(x));
         let left = orient(&mut lines, 20);
         assert!(left > 0.0 && left < 0.05, "{left}");
+    }
+
+    #[test]
+    fn the_index_of_a_point_is_counted_in_half_turns() {
+        for half_turns in [-3, -2, -1, 1, 2, 3] {
+            let lines = grid(20, |x, y| 0.5 * f64::from(half_turns) * y.atan2(x));
+            let lines: Vec<_> = lines.iter().map(|l| l.map(|(t, _)| [t.x, t.y])).collect();
+            let found = grid_turns(&lines, 20);
+            assert_eq!(found.iter().map(|f| f.1).sum::<i32>(), half_turns, "{found:?}");
+            // Places are (k − 9.7, l − 9.6). More than a half turn is more than four places can tell, and is found in
+            // several squares side by side.
+            let near = |k: &usize| (8..=11).contains(&(k % 20)) && (8..=11).contains(&(k / 20));
+            assert!(found.iter().all(|f| f.0.iter().all(near)), "{found:?}");
+        }
+        assert!(grid_turns(&[], 0).is_empty() && grid_turns(&[None; 9], 3).is_empty());
     }
 
     #[test]

@@ -22,7 +22,7 @@ mod scattered;
 mod solve;
 
 pub use difference::{GridFit, GridSolution, fit_by_differences, solve_poisson};
-pub use direction::orient;
+pub use direction::{grid_turns, orient};
 pub use eikonal::{Arrival, EikonalError, Front, Start, eikonal};
 pub use fit::{DIRECTION_WEIGHT, FieldError, NormalEquations, StreamFit, StreamSample, fit_stream_function};
 pub use grid::GridField;

@@ -103,6 +103,23 @@ impl Picture {
         }
     }
 
+    /// A disc around `(x, y)`.
+    pub fn disc(&mut self, x: i64, y: i64, radius: i64, colour: Rgb) {
+        for (dx, dy) in (-radius..=radius).flat_map(|dy| (-radius..=radius).map(move |dx| (dx, dy))) {
+            if dx * dx + dy * dy <= radius * (radius + 1) {
+                self.set(x + dx, y + dy, colour);
+            }
+        }
+    }
+
+    /// Lays lines onto the page, their corner at `(x, y)`.
+    pub fn ink(&mut self, [x, y]: [i64; 2], strokes: &Strokes, colour: Rgb) {
+        for (k, coverage) in strokes.coverage.iter().enumerate().filter(|(_, c)| **c > 0) {
+            let (column, row) = (k % strokes.width, k / strokes.width);
+            self.blend(x + column as i64, y + row as i64, colour, *coverage);
+        }
+    }
+
     /// Writes one line; `(x, y)` is its top at the end named by `align`. Letters that the built-in
     /// face lacks become `?`.
     pub fn text(&mut self, x: i64, y: i64, text: &str, size: TextSize, align: Align, colour: Rgb) {
@@ -133,6 +150,52 @@ impl Picture {
             *under = ((u32::from(ink) * share + u32::from(*under) * (255 - share)) / 255) as u8;
         }
     }
+}
+
+/// Pixels whose middle is this near to a line without width are its own; a hair more than a half, so that a line along
+/// the border of two rows is not lost.
+const NEAREST_PIXEL: f64 = 0.500_001;
+
+/// Lines of one colour over a rectangle of pixels, smooth at their edges: where they meet or cross nothing is laid on
+/// twice.
+#[derive(Debug, Clone)]
+pub struct Strokes {
+    width: usize,
+    height: usize,
+    coverage: Vec<u8>,
+}
+
+impl Strokes {
+    /// None yet, over a rectangle of this size, pixels.
+    pub fn blank(width: usize, height: usize) -> Self {
+        Self { width, height, coverage: vec![0; width * height] }
+    }
+
+    /// A line from `a` to `b` (pixels, fractions count; y down) of this width; one of width 0 covers the nearest pixels
+    /// wholly and nothing else.
+    pub fn line(&mut self, a: [f64; 2], b: [f64; 2], width: f64) {
+        let reach = 0.5 * width + 0.5;
+        let range = |c: usize, most: usize| {
+            let lo = (a[c].min(b[c]) - reach - 1.0).floor().clamp(0.0, most as f64) as usize;
+            lo..(a[c].max(b[c]) + reach + 1.0).ceil().clamp(0.0, most as f64) as usize
+        };
+        for y in range(1, self.height) {
+            for x in range(0, self.width) {
+                let distance = distance_to_segment_2d([x as f64 + 0.5, y as f64 + 0.5], a, b);
+                let share = if width > 0.0 { reach - distance } else { f64::from(distance <= NEAREST_PIXEL) };
+                let cell = &mut self.coverage[y * self.width + x];
+                *cell = (*cell).max((share.clamp(0.0, 1.0) * 255.0) as u8);
+            }
+        }
+    }
+}
+
+/// Distance of a point from a segment.
+pub fn distance_to_segment_2d(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
+    let (d, q) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
+    let square = d[0] * d[0] + d[1] * d[1];
+    let t = if square > 0.0 { ((q[0] * d[0] + q[1] * d[1]) / square).clamp(0.0, 1.0) } else { 0.0 };
+    (q[0] - t * d[0]).hypot(q[1] - t * d[1])
 }
 
 /// `text` cut to at most `letters` letters, with `...` at the end where something is missing.

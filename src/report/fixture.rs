@@ -70,6 +70,7 @@ pub fn toolpath(name: &str, machining_time_s: f64, gouge: f64) -> ToolpathResult
             machining_time_s,
         },
         shortest: None,
+        field: None,
         scallop: measured.scallop,
         gouge: measured.gouge,
         uncut: measured.uncut,

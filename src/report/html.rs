@@ -15,6 +15,8 @@ pub struct ToolpathPage {
     pub deviation_png: Vec<u8>,
     /// height.png.
     pub height_png: Vec<u8>,
+    /// field.png and interval.png, for a streamline.
+    pub field_pngs: Option<[Vec<u8>; 2]>,
     /// Scallop heights; `None` without ridges.
     pub histogram: Option<Histogram>,
 }
@@ -201,7 +203,23 @@ fn toolpath_section(t: &ToolpathResult, page: &ToolpathPage) -> Markup {
                 img src=(data_url(&page.height_png)) alt=(format!("Height of {}", t.name));
                 figcaption { "Height of the cut stock." }
             }
+            @if let Some([field, interval]) = &page.field_pngs { (planned(t, field, interval)) }
             (method(t))
+        }
+    }
+}
+
+/// What a streamline was planned by.
+fn planned(t: &ToolpathResult, field: &[u8], interval: &[u8]) -> Markup {
+    html! {
+        h3 { "How it was planned" }
+        figure {
+            img src=(data_url(field)) alt=(format!("Feed directions of {}", t.name));
+            figcaption { "Feed directions (strokes), levels of the stream function psi that passes follow (lines, at even steps), and singular points with their index: passes end or turn around them." }
+        }
+        figure {
+            img src=(data_url(interval)) alt=(format!("Intervals of {}", t.name));
+            figcaption { "Passes, each as wide as what it serves, coloured by the distance of the farther neighbour over the distance that the scallop height (or the stepover) allows there. White is as allowed, blue narrower, red wider; light grey has no neighbour. Planned, not measured." }
         }
     }
 }
@@ -254,6 +272,16 @@ fn figures(t: &ToolpathResult) -> Markup {
         ),
         ("deviation, root mean square", format!("{} µm", micrometres(Some(deviation.rms_mm)))),
     ];
+    if let Some(f) = &t.field {
+        rows.push(("singular points of the feed", f.singular_point_count.to_string()));
+        if let Some(i) = &f.interval_over_allowed {
+            let [p5, p50, p95, max] = [i.p5, i.p50, i.p95, i.max].map(|r| format!("{:.0}", 100.0 * r));
+            rows.push((
+                "interval planned, % of allowed",
+                format!("{p5}, {p50}, {p95} (5, 50, 95 %), widest {max}"),
+            ));
+        }
+    }
     if let Some(r) = &t.removal {
         rows.extend([
             ("volume removed", format!("{:.0} ± {:.0} mm³", r.volume_mm3, r.volume_error_bound_mm3)),
@@ -352,7 +380,7 @@ fn method(t: &ToolpathResult) -> Markup {
             "Files: toolpath.nc (the program), toolpath.cls (cutter locations), height.exr (height, deviation and move of every cell), machined.stl and machined.ply (the part as cut, the latter coloured by deviation; "
             (t.surface_mesh.triangles) " triangles within " (bound(t.surface_mesh.tolerance_mm)) " µm of the cells"
             @if t.surface_mesh.tolerance_mm > t.scallop.target_mm { ": too coarse for ridges of the target's height; height.exr has them" }
-            "), deviation.png and height.png (larger than here)."
+            "), deviation.png and height.png" @if t.field.is_some() { ", field.png and interval.png" } " (larger than here)."
         }
     }
 }
@@ -368,13 +396,15 @@ mod tests {
         let png = vec![1u8, 2, 3];
         let page = ToolpathPage {
             deviation_png: png.clone(),
-            height_png: png,
+            height_png: png.clone(),
+            field_pngs: None,
             histogram: Histogram::new(&[[0.004, 1.0]], 0.01, 0.0125),
         };
-        let html = html_page(&report, &[page.clone(), page], "title = \"<script>\" # a & b");
+        let streamline = ToolpathPage { field_pngs: Some([png.clone(), png]), ..page.clone() };
+        let html = html_page(&report, &[page, streamline], "title = \"<script>\" # a & b");
         assert!(html.contains("&lt;script&gt;") && !html.contains("<script"));
         assert!(!html.contains("http://") && !html.contains("https://"), "nothing is fetched");
-        assert_eq!(html.matches("data:image/png;base64,AQID").count(), 4);
+        assert_eq!(html.matches("data:image/png;base64,AQID").count(), 6);
         assert_eq!(html.matches("toolpath.nc line 1240").count(), 2, "in the head and in its toolpath");
         assert!(html.contains("Rings mark") && html.contains("<th>G1</th>") && !html.contains("<th>G2</th>"));
         assert!(html.contains("1 of 2 toolpaths hold every tolerance"));

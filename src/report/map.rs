@@ -5,6 +5,7 @@ use image::imageops::{self, FilterType};
 
 use super::canvas::{Align, FAINT_INK, INK, PAPER, Picture, Rgb, TextSize, shortened};
 use super::scale::{Unit, plain, round_down, round_up, ticks};
+use crate::geometry::{Point2, Vector2};
 use crate::metrology::Limits;
 use crate::sim::Grid;
 
@@ -14,7 +15,7 @@ const SHADES: usize = 151;
 /// Greatest magnification of one cell, pixels.
 const MAX_MAGNIFICATION: usize = 24;
 /// Colour of cells off the part; far from white, which is "no deviation".
-const OFF_PART: Rgb = [176, 180, 184];
+pub(super) const OFF_PART: Rgb = [176, 180, 184];
 
 /// Room around the map, pixels.
 const LEFT: usize = 92;
@@ -75,7 +76,7 @@ pub struct MapMark {
 
 /// How several cells become one pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Pooling {
+pub(super) enum Pooling {
     /// The value that exceeds its end of the key the most (both ends are positive lengths, mm): no
     /// gouge is lost beside a scallop, and no spike beside a gouge.
     Extreme { below: f64, above: f64 },
@@ -84,16 +85,29 @@ enum Pooling {
 }
 
 /// A map brought to pixels: `width` × `height` values, top row first, each `magnify` pixels wide.
-struct Pooled {
-    width: usize,
-    height: usize,
-    magnify: usize,
-    values: Vec<f32>,
+pub(super) struct Pooled {
+    pub width: usize,
+    pub height: usize,
+    pub magnify: usize,
+    pub values: Vec<f32>,
     /// mm that one pixel stands for.
-    pixel: f64,
+    pub pixel: f64,
 }
 
-fn pool(grid: &Grid, values: &[f32], pooling: Pooling, size: MapSize) -> Pooled {
+impl Pooled {
+    /// The page's pixel at the map's upper left.
+    pub const CORNER: [i64; 2] = [LEFT as i64, TOP as i64];
+
+    /// Where a place of the plan view is on the map, pixels from its corner, y down.
+    pub fn place(&self, grid: &Grid, at: Point2) -> [f64; 2] {
+        // Cells reach half a cell beyond their centres; the last row may reach beyond the grid.
+        let bottom = (self.height * self.magnify) as f64;
+        let from = grid.origin - Vector2::repeat(0.5 * grid.cell);
+        [(at.x - from.x) / self.pixel, bottom - (at.y - from.y) / self.pixel]
+    }
+}
+
+pub(super) fn pool(grid: &Grid, values: &[f32], pooling: Pooling, size: MapSize) -> Pooled {
     let longest = grid.nx.max(grid.ny).max(1);
     let block = longest.div_ceil(size.most());
     let magnify = (size.comfortable() / longest).clamp(1, MAX_MAGNIFICATION);
@@ -126,24 +140,24 @@ fn pooled(values: impl Iterator<Item = f32>, pooling: Pooling) -> f32 {
 }
 
 /// Values to colours, and what the key says.
-struct Key {
-    from: f64,
+pub(super) struct Key {
+    pub from: f64,
     /// Stands in the middle of the key; both halves have their own scale.
-    middle: f64,
-    to: f64,
-    gradient: fn(f64) -> Rgb,
+    pub middle: f64,
+    pub to: f64,
+    pub gradient: fn(f64) -> Rgb,
     /// Round values beside the key, with their words.
-    ticks: Vec<(f64, String)>,
-    unit: Unit,
+    pub ticks: Vec<(f64, String)>,
+    pub unit: Unit,
     /// Above and below the key.
-    top: &'static str,
-    bottom: &'static str,
+    pub top: &'static str,
+    pub bottom: &'static str,
     /// Least and greatest value of all cells; those beyond the key wear the colours of its ends.
-    extremes: Option<(f64, f64)>,
+    pub extremes: Option<(f64, f64)>,
 }
 
 impl Key {
-    fn colour(&self, value: f32) -> Rgb {
+    pub fn colour(&self, value: f32) -> Rgb {
         if value.is_nan() { OFF_PART } else { self.shade(self.share(f64::from(value))) }
     }
 
@@ -151,6 +165,11 @@ impl Key {
     fn share(&self, value: f64) -> f64 {
         let (middle, end) = (self.middle, if value < self.middle { self.from } else { self.to });
         0.5 + 0.5 * (value - middle) / (end - middle).abs()
+    }
+
+    /// Draws the key at a place of the page, beside a map of this height, pixels.
+    pub fn draw(&self, page: &mut Picture, at: [i64; 2], map_height: usize) {
+        draw_key(page, self, at, map_height);
     }
 
     /// The colour at a share of the key, from its lower end.
@@ -161,13 +180,13 @@ impl Key {
 }
 
 /// Ticks with as many digits as their distance needs.
-fn labelled(from: f64, to: f64, count: f64, unit: Unit) -> Vec<(f64, String)> {
+pub(super) fn labelled(from: f64, to: f64, count: f64, unit: Unit) -> Vec<(f64, String)> {
     let marks = ticks(from, to, count);
     let step = marks.get(1).map_or(to - from, |second| second - marks[0]);
     marks.into_iter().map(|mark| (mark, unit.text(mark, step))).collect()
 }
 
-fn diverging(t: f64) -> Rgb {
+pub(super) fn diverging(t: f64) -> Rgb {
     let colour = colorous::RED_BLUE.eval_continuous(1.0 - t);
     [colour.r, colour.g, colour.b]
 }
@@ -229,7 +248,7 @@ pub fn deviation_picture(
     let excess = labelled(0.0, above, HALF_TICKS, key.unit).into_iter().skip(1);
     ticks.extend(excess.map(|(mark, text)| (mark, format!("+{text}"))));
     (key.ticks, key.extremes) = (ticks, extremes(deviation));
-    draw(grid, &pool(grid, deviation, Pooling::Extreme { below, above }, size), &key, words)
+    draw_keyed(grid, &pool(grid, deviation, Pooling::Extreme { below, above }, size), &key, words)
 }
 
 /// Heights of the cut stock, dark to light.
@@ -254,10 +273,23 @@ pub fn height_picture(grid: &Grid, height: &[f32], words: &MapWords<'_>, size: M
         bottom: "low",
         extremes,
     };
-    draw(grid, &pooled, &key, words)
+    draw_keyed(grid, &pooled, &key, words)
 }
 
-fn draw(grid: &Grid, map: &Pooled, key: &Key, words: &MapWords<'_>) -> Picture {
+fn draw_keyed(grid: &Grid, map: &Pooled, key: &Key, words: &MapWords<'_>) -> Picture {
+    let (mut page, at) = draw(grid, map, &|value| key.colour(value), words, |_| ());
+    key.draw(&mut page, at, map.height * map.magnify);
+    page
+}
+
+/// A map with what stands around it but its key, whose place comes with it; `over` draws on the map.
+pub(super) fn draw(
+    grid: &Grid,
+    map: &Pooled,
+    colour: &dyn Fn(f32) -> Rgb,
+    words: &MapWords<'_>,
+    over: impl FnOnce(&mut Picture),
+) -> (Picture, [i64; 2]) {
     let (width, height) = (map.width * map.magnify, map.height * map.magnify);
     let mut page = Picture::blank(LEFT + width.max(MIN_WIDTH) + RIGHT, TOP + height.max(MIN_HEIGHT) + BOTTOM);
     let letters = |size: TextSize| (page.pixels.width() as usize - 2 * 16) / size.letter_width();
@@ -268,16 +300,16 @@ fn draw(grid: &Grid, map: &Pooled, key: &Key, words: &MapWords<'_>) -> Picture {
     page.text(16, 12, &title, TextSize::Title, Align::Left, INK);
     page.text(16, 36, &subtitle, TextSize::Small, Align::Left, FAINT_INK);
     let pixels = RgbImage::from_fn(map.width as u32, map.height as u32, |x, y| {
-        image::Rgb(key.colour(map.values[y as usize * map.width + x as usize]))
+        image::Rgb(colour(map.values[y as usize * map.width + x as usize]))
     });
     let pixels = imageops::resize(&pixels, width as u32, height as u32, FilterType::Nearest);
     imageops::replace(&mut page.pixels, &pixels, LEFT as i64, TOP as i64);
+    over(&mut page);
     page.frame(LEFT as i64, TOP as i64, width as i64, height as i64, FAINT_INK);
     draw_axes(&mut page, grid, map);
     draw_marks(&mut page, grid, map, words.marks);
     draw_bar(&mut page, map, height);
-    draw_key(&mut page, key, LEFT + width.max(MIN_WIDTH) + 28, height.max(MIN_HEIGHT));
-    page
+    (page, [(LEFT + width.max(MIN_WIDTH) + 28) as i64, TOP as i64 + 24])
 }
 
 /// Rings around places, with their names beside them.
@@ -336,11 +368,10 @@ fn draw_bar(page: &mut Picture, map: &Pooled, height: usize) {
 }
 
 /// The colour key with its unit, ends and round values between.
-fn draw_key(page: &mut Picture, key: &Key, x: usize, room: usize) {
+fn draw_key(page: &mut Picture, key: &Key, [x, top]: [i64; 2], map_height: usize) {
     const WIDTH: i64 = 22;
     const MAX_HEIGHT: usize = 420;
-    let (x, top) = (x as i64, TOP as i64 + 24);
-    let height = (room - 120).clamp(120, MAX_HEIGHT) as i64;
+    let height = (map_height.max(MIN_HEIGHT) - 120).clamp(120, MAX_HEIGHT) as i64;
     for row in 0..height {
         let t = 1.0 - (row as f64 + 0.5) / height as f64;
         page.fill(x, top + row, WIDTH, 1, key.shade(t));
@@ -382,7 +413,6 @@ fn draw_key(page: &mut Picture, key: &Key, x: usize, room: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Point2;
 
     const LIMITS: Limits = Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chord: 0.001 };
     const WORDS: MapWords<'_> = MapWords { title: "a title", subtitle: "a subtitle", marks: &[] };

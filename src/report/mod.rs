@@ -2,6 +2,7 @@
 //! rasters; writing them to files is the business of [`crate::io`] and [`crate::cli`].
 
 mod canvas;
+mod field_map;
 #[cfg(test)]
 mod fixture;
 mod histogram;
@@ -14,12 +15,13 @@ mod table;
 mod verdict;
 
 pub use canvas::Picture;
+pub use field_map::{field_picture, interval_picture};
 pub use histogram::Histogram;
 pub use html::{ToolpathPage, html_page};
 pub use map::{MapMark, MapSize, MapWords, deviation_colours, deviation_picture, height_picture};
 pub use result::{
-    ReportError, RunReport, ShortestFigures, SimulationFigures, SurfaceMeshFigures, ToleranceFigures,
-    ToolpathResult,
+    FieldFigures, ReportError, RunReport, ShortestFigures, SimulationFigures, SurfaceMeshFigures,
+    ToleranceFigures, ToolpathResult,
 };
 pub use surface_mesh::{MAX_TRIANGLES, SurfaceMesh, VertexPlace, surface_mesh};
 pub use table::{conclusion, result_table};

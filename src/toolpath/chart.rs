@@ -8,6 +8,7 @@ use super::plan::PlanError;
 use super::strip::strip_width_at;
 use super::{Along, FeedDirection, Step};
 use crate::cutter::Cutter;
+use crate::field::mesh::{blend_lines, slope_at};
 use crate::field::{NormalEquations, SamplePlane};
 use crate::geometry::{Jet2, KnotVector, NurbsSurface, Point3, Vector2, Vector3};
 use crate::part::{Part, PatchPoint};
@@ -73,42 +74,50 @@ impl ChartPoint {
         (1.0 - self.curvature_along(t) * cutter.corner_radius()).max(0.0)
     }
 
-    /// Unit feed tangent in space for a wanted direction; `None` where there is none.
-    pub fn feed_tangent(&self, direction: &FeedDirection) -> Option<Vector3> {
-        let t = match *direction {
-            FeedDirection::Parameter(Along::U) => self.jet.du,
-            FeedDirection::Parameter(Along::V) => self.jet.dv,
-            FeedDirection::Angle(angle) => {
-                // The tangent whose plan view has this direction lies in its vertical plane.
-                let across = Vector3::new(-angle.sin(), angle.cos(), 0.0);
-                across.cross(&self.normal)
-            }
+    /// The unit tangent whose plan view runs at an angle from the x axis, rad; `None` on a wall along it.
+    pub fn tangent_at(&self, angle: f64) -> Option<Vector3> {
+        self.tangent_over([angle.cos(), angle.sin()])
+    }
+
+    /// The unit tangent over a direction of the plan view: it lies in the vertical plane along that.
+    fn tangent_over(&self, line: [f64; 2]) -> Option<Vector3> {
+        Vector3::new(-line[1], line[0], 0.0).cross(&self.normal).try_normalize(1e-12)
+    }
+
+    /// The feed as a unit tangent in space, and how much it matters here (0 to 1, or to the weight of samples); `None`
+    /// where there is none, also for directions that curves give (see [`super::feed`]).
+    pub fn feed(&self, direction: &FeedDirection, cutter: &Cutter) -> Option<(Vector3, f64)> {
+        let unit = |t: &Vector3| t.try_normalize(1e-12);
+        match direction {
+            FeedDirection::Parameter(Along::U) => Some((unit(&self.jet.du)?, 1.0)),
+            FeedDirection::Parameter(Along::V) => Some((unit(&self.jet.dv)?, 1.0)),
+            FeedDirection::Angle(angle) => Some((self.tangent_at(*angle)?, 1.0)),
             FeedDirection::WidestStrip => {
                 let k = self.jet.principal_curvatures()?;
                 // The most convex section, seen from outside.
-                if self.sign > 0.0 { k.min_direction } else { k.max_direction }
+                let t = if self.sign > 0.0 { k.min_direction } else { k.max_direction };
+                Some((unit(&t)?, ((k.max - k.min) * cutter.radius()).min(1.0)))
             }
-            FeedDirection::Samples(ref samples) => {
-                let (line, _) = samples.at(self.sampled_at(samples.plane()))?;
-                match samples.plane() {
-                    SamplePlane::Plan => Vector3::new(-line[1], line[0], 0.0).cross(&self.normal),
-                    SamplePlane::Parameters => self.jet.du * line[0] + self.jet.dv * line[1],
-                }
+            FeedDirection::Steepest => slope_at(&self.normal, true),
+            FeedDirection::Contour => slope_at(&self.normal, false),
+            FeedDirection::Samples(samples) => {
+                let (line, sure) = samples.at(self.sampled_at(samples.plane()))?;
+                let t = match samples.plane() {
+                    SamplePlane::Plan => self.tangent_over(line)?,
+                    SamplePlane::Parameters => unit(&(self.jet.du * line[0] + self.jet.dv * line[1]))?,
+                };
+                Some((t, sure))
             }
-        };
-        t.try_normalize(1e-12)
-    }
-
-    /// How much the direction of feed matters here, 0 to 1.
-    pub fn direction_matters(&self, direction: &FeedDirection, cutter: &Cutter) -> f64 {
-        if let FeedDirection::Samples(samples) = direction {
-            return samples.at(self.sampled_at(samples.plane())).map_or(0.0, |(_, sure)| sure);
-        }
-
-        match (direction, self.jet.principal_curvatures()) {
-            (FeedDirection::WidestStrip, Some(k)) => ((k.max - k.min) * cutter.radius()).min(1.0),
-            (FeedDirection::WidestStrip, None) => 0.0,
-            _ => 1.0,
+            FeedDirection::Blend(parts) => {
+                let e1 = unit(&self.jet.du)?;
+                let lines = parts.iter().filter_map(|(part, weight)| {
+                    let (t, matters) = self.feed(part, cutter)?;
+                    Some((t, weight * matters))
+                });
+                let (t, length) = blend_lines(&[e1, self.normal.cross(&e1)], lines)?;
+                Some((t, length / parts.iter().map(|(_, weight)| weight).sum::<f64>()))
+            }
+            FeedDirection::Guides { .. } | FeedDirection::Border(_) => None,
         }
     }
 
@@ -185,6 +194,12 @@ impl<'a> Chart<'a> {
         };
         jet.p += jet.du * (u - inner_u) + jet.dv * (v - inner_v);
         jet
+    }
+
+    /// The points at the corners of the domain.
+    pub fn corners(&self) -> [Point3; 4] {
+        let [[u0, u1], [v0, v1]] = self.domain;
+        [[u0, v0], [u1, v0], [u1, v1], [u0, v1]].map(|[u, v]| self.jet(u, v).p)
     }
 
     /// True where the chart itself is, not its continuation.

@@ -95,7 +95,7 @@ fn on_chart(
     if passes.len() > 1 {
         notes.push(format!("{} short passes run between turns where they have corners", passes.len() - 1));
     }
-    Ok(Passes { passes, notes })
+    Ok(Passes { passes, notes, ..Passes::default() })
 }
 
 /// The point at `s` of a polyline whose points have the parameters 0, 1, 2, …, rounded through them (Catmull–Rom).

@@ -5,6 +5,7 @@
 //! along the stretches that need one, and between those again.
 
 use super::plan::{Passes, PlanError};
+use super::planned_field::Contact;
 use crate::geometry::Point3;
 use crate::monitor::{self, Cancelled, Monitor};
 
@@ -56,6 +57,18 @@ pub(super) trait LevelSource: Sync {
         level: f64,
         run: Option<[usize; 2]>,
     ) -> Result<Option<Vec<Point3>>, Cancelled>;
+
+    /// Where the cutter touches along a curve, or along a run of its points.
+    fn contacts(&self, curve: &Track<Self::Place>, run: Option<[usize; 2]>) -> Vec<Contact>;
+}
+
+impl<P: Copy> Track<P> {
+    /// All points, or a run of them; the first one again at the end of a whole closed curve.
+    pub fn along(&self, run: Option<[usize; 2]>) -> impl Iterator<Item = &P> {
+        let [first, last] = run.unwrap_or([0, self.points.len().saturating_sub(1)]);
+        let closing = self.points.first().filter(|_| self.closed && run.is_none());
+        self.points.iter().take(last + 1).skip(first).chain(closing)
+    }
 }
 
 /// Passes along the given levels (ascending, within `range`), and the further passes between them that
@@ -79,12 +92,12 @@ pub(super) fn along_and_between<S: LevelSource>(
             open_from: below.is_none(),
             open_to: k == levels.len(),
         };
-        let mut passes = Vec::new();
+        let mut passes = Passes::default();
         filler.fill(&gap, MOST_HALVINGS, &mut passes)?;
-        let further = passes.len();
+        let further = passes.passes.len();
         if let Some(&level) = levels.get(k) {
             for curve in source.curves(level) {
-                passes.extend(source.pass(&curve, level, None)?);
+                filler.add(&curve, level, None, &mut passes)?;
             }
             monitor.advance(1);
         }
@@ -97,7 +110,9 @@ pub(super) fn along_and_between<S: LevelSource>(
             "{further} short passes were put between others where the interval had to be smaller"
         ));
     }
-    Ok(Passes { passes: work.into_iter().flat_map(|(passes, _)| passes).collect(), notes })
+    let mut all = Passes { notes, ..Passes::default() };
+    work.into_iter().for_each(|(passes, _)| all.append(passes));
+    Ok(all)
 }
 
 /// A range of ψ between two passes; at an open end stands the end of the range, not a pass.
@@ -132,18 +147,33 @@ struct Filler<'a, S> {
 }
 
 impl<S: LevelSource> Filler<'_, S> {
+    /// Appends the pass along a curve, or along a run of its points.
+    fn add(
+        &self,
+        curve: &Track<S::Place>,
+        level: f64,
+        run: Option<[usize; 2]>,
+        passes: &mut Passes,
+    ) -> Result<(), Cancelled> {
+        if let Some(pass) = self.source.pass(curve, level, run)? {
+            passes.passes.push(pass);
+            passes.contacts.push(self.source.contacts(curve, run));
+        }
+        Ok(())
+    }
+
     /// Appends the further passes that a gap needs.
-    fn fill(&self, gap: &Gap, halvings: usize, passes: &mut Vec<Vec<Point3>>) -> Result<(), Cancelled> {
+    fn fill(&self, gap: &Gap, halvings: usize, passes: &mut Passes) -> Result<(), Cancelled> {
         monitor::check(self.monitor)?;
         let (level, interval) = gap.middle();
-        let before = passes.len();
+        let before = passes.passes.len();
         for curve in self.source.curves(level) {
             let (curve, runs) = self.needed(curve, interval);
             for run in runs {
-                passes.extend(self.source.pass(&curve, level, Some(run))?);
+                self.add(&curve, level, Some(run), passes)?;
             }
         }
-        if passes.len() > before && halvings > 1 {
+        if passes.passes.len() > before && halvings > 1 {
             self.fill(&Gap { to: level, open_to: false, ..*gap }, halvings - 1, passes)?;
             self.fill(&Gap { from: level, open_from: false, ..*gap }, halvings - 1, passes)?;
         }

@@ -7,6 +7,7 @@ use super::chart::Chart;
 use super::drop::{Beside, DropCutter};
 use super::halving::{Allowed, LevelSource, Track, along_and_between};
 use super::plan::{PassSettings, Passes, PlanError};
+use super::planned_field::{Contact, PlannedField};
 use super::spacing::{Placing, level_tangent, place_levels, places_of};
 use crate::cutter::Cutter;
 use crate::field::{LevelCurve, LevelTracer, ScalarField, surface_gradient_length};
@@ -73,6 +74,7 @@ pub(super) fn along_levels_placed(
     let guide = Guide { tracer: &tracer, chart, cutter, field, drop, settings, monitor };
     let mut passes = along_and_between(&guide, &levels, range, settings.sampling, monitor)?;
     passes.notes.splice(0..0, notes);
+    passes.field = PlannedField::of_levels(part, cutter, chart, field);
     Ok(passes)
 }
 
@@ -192,6 +194,17 @@ impl LevelSource for Guide<'_> {
         let gradient = surface_gradient_length(p.jet.first_form(), psi_u, psi_v);
         let (width, _) = p.strip_width(self.cutter, &t, self.settings.step);
         Some(Allowed { step: gradient * width, width })
+    }
+
+    fn contacts(&self, curve: &Track<[f64; 2]>, run: Option<[usize; 2]>) -> Vec<Contact> {
+        let contact = |&[u, v]: &[f64; 2]| {
+            let p = self.chart.at(u, v)?;
+            let t = level_tangent(&p, self.field, [u, v])?;
+            let (allowed, _) = p.strip_width(self.cutter, &t, self.settings.step);
+            let across = p.normal.cross(&t);
+            Some(Contact { at: p.jet.p, across, allowed, inside: self.chart.holds([u, v]) })
+        };
+        curve.along(run).filter_map(contact).collect()
     }
 
     /// The pass along a curve, or along a run of its points; `None` where it does not touch the

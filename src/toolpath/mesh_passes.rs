@@ -8,19 +8,21 @@
 
 use super::border::useful_overrun;
 use super::drop::DropCutter;
+use super::feed::{self, SMOOTHING_OVER_RADIUS};
 use super::halving::{Allowed, LevelSource, Track, along_and_between};
 use super::mesh_shortest::shortest_stream;
-use super::mesh_surface::{MeshSurface, not_applicable, reachable};
+use super::mesh_surface::{MeshSurface, Piece, not_applicable, reachable};
 use super::plan::{PassSettings, Passes, PlanError};
+use super::planned_field::Contact;
 use super::shortest::shortest_note;
 use super::spacing::{Place, Placing, place_levels};
 use super::strip::strip_width_at;
-use super::{Along, FeedDirection, Step};
+use super::{FeedDirection, Step};
 use crate::cutter::Cutter;
 use crate::field::DIRECTION_WEIGHT;
 use crate::field::mesh::{
-    Bend, FieldMesh, Held, Line, MeshCurve, MeshFieldError, MeshLevels, MeshPoint, Wanted, fixed_angle,
-    flows, orient_lines, singular_points, smooth_lines, solve_stream,
+    Bend, Held, Line, MeshCurve, MeshFieldError, MeshLevels, MeshPoint, flows, orient_lines, smooth_lines,
+    solve_stream,
 };
 use crate::geometry::{Point2, Point3, Vector2, Vector3};
 use crate::monitor::{Cancelled, Monitor};
@@ -35,18 +37,8 @@ const LEAST_TOLD: f64 = 0.05;
 /// The strip beyond borders is this share of an interval wide, as on charts.
 const BORDER_SHARE: f64 = 0.6;
 
-/// Directions give way to their neighbours over this share of the cutter's radius. More bends passes
-/// away from what was asked for, less lets the noise of fitted curvature turn them.
-const SMOOTHING_OVER_RADIUS: f64 = 0.5;
-
 /// Part of a direction's weight that does not depend on how much the direction matters.
 const LEAST_WEIGHT: f64 = 0.02;
-
-/// Singular points nearer than this many radii of the cutter count as one.
-const MERGE_OVER_RADIUS: f64 = 1.0;
-
-/// Most singular points that a note names.
-const MOST_NAMED: usize = 4;
 
 /// Evening out moves a pass by at most this share of its interval; the scallop grows by twice that
 /// share twice over where two neighbours move apart.
@@ -71,6 +63,14 @@ pub(super) fn on_mesh(
         Step::Stepover(width) => width,
         Step::Scallop(h) => strip_width_at(cutter, &Vector3::z(), &Vector3::x(), 0.0, h).0,
     };
+    let parameters: Vec<_> = match part.patches() {
+        // u and v of a mesh are its x and y.
+        [] => [part.bounds()].map(|b| [[b.min.x, b.max.x], [b.min.y, b.max.y]]).to_vec(),
+        patches => patches.iter().map(|patch| patch.domain()).collect(),
+    };
+    if let Some(direction) = direction {
+        feed::check(direction, part, &parameters)?;
+    }
     let reached = reachable(part, cutter, flat)?;
     let mut all = Passes::default();
     if reached.steep_area >= LEAST_TOLD {
@@ -82,7 +82,7 @@ pub(super) fn on_mesh(
     }
     for piece in &reached.pieces {
         let surface = MeshSurface::with_margin(piece, BORDER_SHARE * flat)?;
-        all.append(on_piece(part, cutter, direction, &surface, settings, monitor)?);
+        all.append(on_piece(part, cutter, direction, piece, &surface, settings, monitor)?);
     }
     Ok(all)
 }
@@ -91,14 +91,18 @@ fn on_piece(
     part: &Part,
     cutter: &Cutter,
     direction: Option<&FeedDirection>,
+    piece: &Piece,
     surface: &MeshSurface,
     settings: &PassSettings,
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
-    let mut notes = Vec::new();
+    // Notes and field, to which passes come later.
+    let mut all = Passes::default();
     let (values, predicted) = match direction {
-        Some(direction) => (along_direction(part, cutter, direction, surface, settings, &mut notes)?, None),
+        Some(direction) => {
+            (along_direction(part, cutter, direction, piece, surface, settings, &mut all)?, None)
+        }
         None => {
             let found = shortest_stream(surface, cutter, settings.step, monitor)?;
             let found =
@@ -113,11 +117,24 @@ fn on_piece(
     let drop = DropCutter::new(part, cutter);
     let guide = MeshGuide { surface, levels, cutter, drop, settings, monitor };
     let places = guide.places(&values);
-    let placed = place_levels(&places, range, Placing::Shortest, &mut notes);
-    let mut passes = along_and_between(&guide, &placed, range, settings.sampling, monitor)?;
-    notes.extend(predicted.map(|predicted| shortest_note(&passes, predicted)));
-    passes.notes.splice(0..0, notes);
-    Ok(passes)
+    let placed = place_levels(&places, range, Placing::Shortest, &mut all.notes);
+    all.field.set_mesh_levels(&guide.levels, range, surface.own_triangles);
+    if direction.is_none() {
+        all.field.set_mesh_feed(part, cutter, &level_lines(surface, &guide.levels), surface);
+    }
+    all.append(along_and_between(&guide, &placed, range, settings.sampling, monitor)?);
+    all.notes.extend(predicted.map(|predicted| shortest_note(&all, predicted)));
+    Ok(all)
+}
+
+/// The directions of levels at the vertices.
+fn level_lines(surface: &MeshSurface, levels: &MeshLevels<'_>) -> Vec<Line> {
+    let mesh = &surface.mesh;
+    let line = |(v, gradient): (usize, &Vector3)| {
+        let along = gradient.cross(&mesh.normals()[v]).try_normalize(1e-300);
+        Line { direction: along.unwrap_or(mesh.frame(v)[0]), agreement: f64::from(along.is_some()) }
+    };
+    levels.gradients().iter().enumerate().map(line).collect()
 }
 
 /// ψ at the vertices whose levels follow feed directions.
@@ -125,24 +142,24 @@ fn along_direction(
     part: &Part,
     cutter: &Cutter,
     direction: &FeedDirection,
+    piece: &Piece,
     surface: &MeshSurface,
     settings: &PassSettings,
-    notes: &mut Vec<String>,
+    all: &mut Passes,
 ) -> Result<Vec<f64>, PlanError> {
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     let mesh = &surface.mesh;
-    let lines = feed_lines(part, cutter, direction, surface, notes).map_err(refused)?;
+    let (lines, matters) = feed_lines(part, cutter, direction, piece, surface, all)?;
     let widths =
         |v: usize, b: &Vector3| width_at(cutter, &mesh.normals()[v], b, &surface.bends[v], settings.step);
     let count = mesh.points().len();
     let own = |v: usize| surface.origin[v] as usize;
     let across = |v: usize| mesh.normals()[v].cross(&lines[v].direction);
     let density: Vec<f64> = (0..count).map(|v| 1.0 / widths(own(v), &across(own(v))).0).collect();
-    let weight: Vec<f64> =
-        (0..count).map(|v| matters(cutter, direction, mesh, &surface.bends, own(v)) + LEAST_WEIGHT).collect();
+    let weight: Vec<f64> = (0..count).map(|v| matters[own(v)] + LEAST_WEIGHT).collect();
     let flows = flows(mesh, &lines, &density, &weight);
     let stream = solve_stream(mesh, &flows, DIRECTION_WEIGHT, &Held::default()).map_err(refused)?;
-    notes.push(format!(
+    all.notes.push(format!(
         "the stream function follows the feed directions within {:.2} degrees (root mean square)",
         stream.angle_rms.to_degrees()
     ));
@@ -157,85 +174,42 @@ pub(super) fn width_at(cutter: &Cutter, n: &Vector3, b: &Vector3, bend: &Bend, s
     }
 }
 
-/// How much the direction of feed matters at a vertex, 0 to 1.
-fn matters(cutter: &Cutter, direction: &FeedDirection, mesh: &FieldMesh, bends: &[Bend], v: usize) -> f64 {
-    if *direction != FeedDirection::WidestStrip {
-        return 1.0;
-    }
-    let (least, greatest, _) = bends[v].principal(mesh.frame(v));
-    ((greatest - least) * cutter.radius()).min(1.0)
-}
-
-/// The smooth, oriented field of feed directions.
+/// The smooth, oriented field of feed directions, and how much they matter at each vertex (0 to 1, or to the weight of
+/// samples).
 fn feed_lines(
     part: &Part,
     cutter: &Cutter,
     direction: &FeedDirection,
+    piece: &Piece,
     surface: &MeshSurface,
-    notes: &mut Vec<String>,
-) -> Result<Vec<Line>, MeshFieldError> {
+    passes: &mut Passes,
+) -> Result<(Vec<Line>, Vec<f64>), PlanError> {
+    let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     let mesh = &surface.mesh;
-    let mut wanted = match direction {
-        FeedDirection::Angle(angle) => fixed_angle(mesh, *angle),
-        FeedDirection::Parameter(along) => along_parameter(part, mesh, *along),
-        // Refused at the entrance.
-        FeedDirection::Samples(_) => vec![None; mesh.points().len()],
-        FeedDirection::WidestStrip => (0..mesh.points().len())
-            .map(|v| {
-                let (least, greatest, tangent) = surface.bends[v].principal(mesh.frame(v));
-                Some((tangent, ((greatest - least) * cutter.radius()).min(1.0)))
-            })
-            .collect(),
-    };
+    let mut wanted = feed::on_mesh(part, cutter, direction, piece, surface).map_err(refused)?;
+    let matters = wanted.iter().map(|w| w.map_or(0.0, |(_, matters)| matters)).collect();
     // Beyond the border the field goes on as it comes.
     for v in 0..wanted.len() {
         if surface.origin[v] as usize != v {
             wanted[v] = None;
         }
     }
-    let mut lines = smooth_lines(mesh, &wanted, &[], SMOOTHING_OVER_RADIUS * cutter.radius())?;
-    let cut = orient_lines(mesh, &mut lines);
-    let singular = singular_points(mesh, &lines, MERGE_OVER_RADIUS * cutter.radius());
-    if !singular.is_empty() {
-        let named: Vec<String> = singular
-            .iter()
-            .take(MOST_NAMED)
-            .map(|s| {
-                format!(
-                    "({:.1}, {:.1}) index {:+}",
-                    s.position.x,
-                    s.position.y,
-                    0.5 * f64::from(s.half_turns)
-                )
-            })
-            .collect();
-        let more = if singular.len() > MOST_NAMED { ", …" } else { "" };
-        notes.push(format!(
-            "the feed directions have {} singular points: {}{more}; passes bend around them{}",
-            singular.len(),
-            named.join(", "),
-            if cut.is_empty() { "" } else { ", and turn back along a cut between those of half index" }
-        ));
+    if wanted.iter().all(Option::is_none) {
+        return Err(feed::nowhere(direction, piece.mesh.points().iter().copied()));
     }
-    Ok(lines)
-}
-
-/// Along a parameter of each patch; along x or y on a mesh.
-fn along_parameter(part: &Part, mesh: &FieldMesh, along: Along) -> Vec<Wanted> {
-    if part.patches().is_empty() {
-        return fixed_angle(mesh, if along == Along::U { 0.0 } else { std::f64::consts::FRAC_PI_2 });
-    }
-    crate::parallel::map(mesh.points().len(), |v| {
-        let at = part.closest_point(&mesh.points()[v]).0.at?;
-        let jet = part.patches()[at.patch as usize].jet(at.u, at.v);
-        let tangent = if along == Along::U { jet.du } else { jet.dv };
-        tangent.try_normalize(1e-12).map(|t| (t, 1.0))
-    })
+    let smoothing = SMOOTHING_OVER_RADIUS * cutter.radius();
+    let mut lines = smooth_lines(mesh, &wanted, &[], smoothing).map_err(refused)?;
+    orient_lines(mesh, &mut lines);
+    passes.field.set_mesh_feed(part, cutter, &lines, surface);
+    passes.notes.extend(passes.field.singular_note());
+    Ok((lines, matters))
 }
 
 /// A place of a level curve.
 #[derive(Debug, Clone, Copy)]
 struct Spot {
+    /// On the mesh.
+    at: MeshPoint,
     /// Plan view of the cutter's axis.
     axis: Point2,
     /// What neighbouring passes may do here.
@@ -402,9 +376,14 @@ impl MeshGuide<'_> {
             let (a, b) = (&knots[k], &knots[k + 1]);
             let t = if b.s > a.s { ((s - a.s) / (b.s - a.s)).clamp(0.0, 1.0) } else { 0.0 };
             let contact = a.contact + (b.contact - a.contact) * t;
-            let allowed = self.allowed_at(&self.in_triangle(a.triangle, contact)).map(|(allowed, _)| allowed);
+            let at = self.in_triangle(a.triangle, contact);
+            let allowed = self.allowed_at(&at).map(|(allowed, _)| allowed);
             let nowhere = Allowed { step: f64::INFINITY, width: self.settings.sampling };
-            spots.push(Spot { axis: a.axis + (b.axis - a.axis) * t, allowed: allowed.unwrap_or(nowhere) });
+            spots.push(Spot {
+                at,
+                axis: a.axis + (b.axis - a.axis) * t,
+                allowed: allowed.unwrap_or(nowhere),
+            });
         }
         even_out(&mut spots, curve.closed);
         Some(Track { points: spots, closed: curve.closed })
@@ -446,6 +425,17 @@ impl LevelSource for MeshGuide<'_> {
 
     fn allowed(&self, spot: &Spot) -> Option<Allowed> {
         Some(spot.allowed)
+    }
+
+    fn contacts(&self, curve: &Track<Spot>, run: Option<[usize; 2]>) -> Vec<Contact> {
+        let contact = |spot: &Spot| {
+            let gradient = self.mixed(&spot.at, self.levels.gradients());
+            let normal = self.normal(&spot.at);
+            let across = (gradient - normal * normal.dot(&gradient)).try_normalize(1e-300)?;
+            let inside = (spot.at.triangle as usize) < self.surface.own_triangles;
+            Some(Contact { at: spot.at.position, across, allowed: spot.allowed.width, inside })
+        };
+        curve.along(run).filter_map(contact).collect()
     }
 
     fn pass(

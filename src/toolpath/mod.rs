@@ -7,6 +7,7 @@ mod chart;
 mod chord;
 mod contour_spiral;
 mod drop;
+mod feed;
 mod halving;
 mod iso_scallop;
 mod level_passes;
@@ -17,6 +18,7 @@ mod mesh_surface;
 mod path;
 mod plan;
 mod plan_curve;
+mod planned_field;
 mod pocket;
 mod shortest;
 mod smooth;
@@ -36,6 +38,7 @@ pub use plan::{
     Along, FeedDirection, FrontStart, LevelSteps, Plan, PlanError, PlanSettings, Step, Strategy,
     StreamMethod, plan,
 };
+pub use planned_field::{FeedSample, PassPoint, PlannedField};
 pub use pocket::{
     Engagement, Flow, Pattern, Pocket, PocketStrategy, engagement, engagement_angle, limit_feed, plan_pocket,
 };

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::chord::{Watch, reduce, sample_within_chord};
 use super::link::{Joining, join};
+use super::planned_field::{Contact, PlannedField};
 use super::shortest::{ShortestPossible, shortest_possible};
 use super::smooth::smooth_and_spread;
 use super::spacing::Placing;
@@ -14,8 +15,9 @@ use super::{
     streamline, waterline, zigzag,
 };
 use crate::cutter::Cutter;
+use crate::field::mesh::Sense;
 use crate::field::{KnotRule, LineField, Solver};
-use crate::geometry::Point3;
+use crate::geometry::{Point2, Point3};
 use crate::monitor::{Cancelled, Monitor};
 use crate::part::Part;
 
@@ -47,8 +49,25 @@ pub enum FeedDirection {
     Angle(f64),
     /// Across the widest strip, from the principal curvatures.
     WidestStrip,
+    /// Up the slope of the surface; none on level ground.
+    Steepest,
+    /// Level along the surface, square to the slope; none on level ground.
+    Contour,
     /// As sampled at places of the plan view, or of the parameters of each patch.
     Samples(Arc<LineField>),
+    /// From curves of the plan view; between and beyond them the smoothest field that they allow.
+    Guides {
+        /// Polylines of at least two different points, mm.
+        curves: Arc<Vec<Vec<Point2>>>,
+        /// Along or across them.
+        sense: Sense,
+    },
+    /// From the borders of the part, of each patch where patches are planned one by one; inside, the smoothest field
+    /// that they allow.
+    Border(Sense),
+    /// The mean of directions as lines (of their doubled angles in the tangent plane) by positive weights, each times how
+    /// much its direction matters at the place.
+    Blend(Vec<(FeedDirection, f64)>),
 }
 
 /// How a stream function is fitted to feed directions.
@@ -238,6 +257,8 @@ pub struct Plan {
     pub notes: Vec<String>,
     /// What no path below the asked scallop height can be shorter than.
     pub shortest: Option<ShortestPossible>,
+    /// What a streamline path was planned by.
+    pub field: Option<PlannedField>,
 }
 
 impl LevelSteps {
@@ -303,6 +324,10 @@ pub(super) struct Passes {
     pub passes: Vec<Vec<Point3>>,
     /// Remarks.
     pub notes: Vec<String>,
+    /// What they were planned by, where they are levels of a function.
+    pub field: PlannedField,
+    /// Where the cutter touches along each pass, in no order, where they are levels of a function.
+    pub contacts: Vec<Vec<Contact>>,
 }
 
 impl Passes {
@@ -315,6 +340,8 @@ impl Passes {
     pub fn append(&mut self, other: Self) {
         self.passes.extend(other.passes);
         self.notes.extend(other.notes);
+        self.field.append(other.field);
+        self.contacts.extend(other.contacts);
     }
 }
 
@@ -413,7 +440,13 @@ pub fn plan(
             (streamline::streamline(part, cutter, direction, &fitting, &pass, monitor)?, true)
         }
     };
-    let Passes { passes, mut notes } = passes;
+    let Passes { passes, mut notes, mut field, contacts } = passes;
+    let by_streamlines = matches!(strategy, Strategy::Streamline { .. } | Strategy::ShortestStreamline);
+    let field = by_streamlines.then(|| {
+        field.measure(&contacts);
+        field
+    });
+    drop(contacts);
     let path = join(passes, both_ways, part, cutter, settings, monitor)?;
     if path.is_empty() {
         notes.push("no pass reaches the part: the program is empty".into());
@@ -422,5 +455,5 @@ pub fn plan(
         Step::Scallop(h) => Some(shortest_possible(part, cutter, h)?),
         Step::Stepover(_) => None,
     };
-    Ok(Plan { path, notes, shortest })
+    Ok(Plan { path, notes, shortest, field })
 }

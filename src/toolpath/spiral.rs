@@ -76,7 +76,7 @@ pub fn passes(
             passes.len()
         ));
     }
-    Ok(Passes { passes, notes })
+    Ok(Passes { passes, notes, ..Passes::default() })
 }
 
 /// The pitch of each ring.

@@ -2,14 +2,16 @@
 //! isoparametric lines, whose stream function is a parameter itself.
 
 use super::chart::{Chart, ChartPoint};
+use super::feed;
 use super::level_passes::{along_levels, along_levels_placed};
+use super::mesh_surface::not_applicable;
 use super::plan::{PassSettings, Passes, PlanError};
 use super::spacing::Placing;
 use super::{Along, FeedDirection, StreamMethod};
 use crate::cutter::Cutter;
 use crate::field::{
-    self, Axis, FieldError, KnotRule, LineField, SamplePlane, ScalarField, Solver, StreamSample,
-    averaged_knots, equal_shares, fit_by_differences, fit_stream_function, weighted_knots,
+    self, Axis, FieldError, KnotRule, ScalarField, Solver, StreamSample, averaged_knots, equal_shares,
+    fit_by_differences, fit_stream_function, weighted_knots,
 };
 use crate::geometry::{KnotVector, Vector3};
 use crate::monitor::Monitor;
@@ -86,44 +88,29 @@ pub fn streamline(
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
     let charts = Chart::all(part, cutter)?;
-    if let FeedDirection::Samples(samples) = direction {
-        check_samples(samples, part, &charts)?;
-    }
+    let parameters: Vec<_> = charts.iter().map(|chart| chart.domain).collect();
+    feed::check(direction, part, &parameters)?;
     let mut all = Passes::default();
     for chart in charts {
-        let (field, notes) = stream_function(&chart, cutter, direction, fitting, settings)?;
+        let direction = feed::on_chart(direction, &chart, cutter)?;
+        let (field, mut notes, wanted) = stream_function(&chart, cutter, &direction, fitting, settings)?;
+        let mut passes = along_levels(part, cutter, &chart, &field, settings, monitor)?;
+        let feed = |[u, v]: [f64; 2]| chart.at(u, v)?.feed(&direction, cutter);
+        passes.field.set_directions(part, &chart, feed);
+        let places: Vec<[f64; 2]> = chart.grid(wanted.side).collect();
+        passes.field.set_singular_points(&chart, cutter, &places, &wanted.lines, wanted.side);
+        notes.extend(passes.field.singular_note());
         all.notes.extend(notes);
-        all.append(along_levels(part, cutter, &chart, &field, settings, monitor)?);
+        all.append(passes);
     }
     Ok(all)
 }
 
-fn not_applicable(reason: String) -> PlanError {
-    PlanError::NotApplicable { strategy: "streamline", reason }
-}
-
-/// Refuses sampled directions that all lie outside of the part.
-fn check_samples(samples: &LineField, part: &Part, charts: &[Chart<'_>]) -> Result<(), PlanError> {
-    let (names, inside) = match samples.plane() {
-        SamplePlane::Plan => {
-            let b = part.bounds();
-            let rectangle = [[b.min.x, b.max.x], [b.min.y, b.max.y]];
-            (["x", "y"], samples.count_inside(rectangle) > 0)
-        }
-        SamplePlane::Parameters => {
-            (["u", "v"], charts.iter().any(|chart| samples.count_inside(chart.domain) > 0))
-        }
-    };
-    if inside {
-        return Ok(());
-    }
-    let [a, b] = samples.bounds();
-    let ([name_a, name_b], count) = (names, samples.len());
-    Err(not_applicable(format!(
-        "all {count} sampled directions lie outside of it ({name_a} from {} to {}, {name_b} from {} to {}); check \
-         their unit and origin, and whether they are x and y or u and v",
-        a[0], a[1], b[0], b[1]
-    )))
+/// Feed directions and how much they matter on an even grid of a chart, oriented alike.
+struct Wanted {
+    /// Places a side.
+    side: usize,
+    lines: Vec<Option<(Vector3, f64)>>,
 }
 
 /// Samples feed directions over a chart and fits the stream function.
@@ -133,15 +120,16 @@ fn stream_function(
     direction: &FeedDirection,
     fitting: &Fitting,
     settings: &PassSettings,
-) -> Result<(ScalarField, Vec<String>), PlanError> {
+) -> Result<(ScalarField, Vec<String>, Wanted), PlanError> {
     let n = fitting.controls * SAMPLES_PER_CONTROL;
     let places: Vec<[f64; 2]> = chart.grid(n).collect();
     let points: Vec<_> = places.iter().map(|&[u, v]| chart.at(u, v)).collect();
-    let mut lines: Vec<Option<(Vector3, f64)>> = points
-        .iter()
-        .map(|p| p.and_then(|p| Some((p.feed_tangent(direction)?, p.direction_matters(direction, cutter)))))
-        .collect();
-    let disagreement = field::orient(&mut lines, n);
+    let mut lines: Vec<Option<(Vector3, f64)>> =
+        points.iter().map(|p| p.and_then(|p| p.feed(direction, cutter))).collect();
+    if lines.iter().all(Option::is_none) {
+        return Err(feed::nowhere(direction, chart.corners().into_iter()));
+    }
+    field::orient(&mut lines, n);
     let sample = |k: usize| {
         let (p, (t, matters)) = (points[k]?, lines[k]?);
         let (along, across) = (p.jet.pull_back(&t)?, p.jet.pull_back(&p.normal.cross(&t))?);
@@ -156,7 +144,7 @@ fn stream_function(
         })
     };
     let samples: Vec<Option<StreamSample>> = (0..places.len()).map(sample).collect();
-    let refused = |e: FieldError| not_applicable(e.to_string());
+    let refused = |e: FieldError| not_applicable(&e.to_string());
     let (psi, angle_rms, method, report) = match fitting.method {
         StreamMethod::Differences => {
             let fit = fit_by_differences(&samples, chart.domain, [n; 2], fitting.solver).map_err(refused)?;
@@ -175,21 +163,14 @@ fn stream_function(
             (ScalarField::Spline(fit.psi), fit.angle_rms, name, fit.report)
         }
     };
-    let mut notes = vec![
+    let notes = vec![
         format!(
             "the stream function follows the feed directions within {:.2} degrees (root mean square)",
             angle_rms.to_degrees()
         ),
         format!("the stream function is {method}, solved by {report}"),
     ];
-    if disagreement > 0.0 {
-        notes.push(format!(
-            "the feed directions have singular points ({:.1} % of neighbouring samples cannot be oriented alike); \
-             passes bend around them",
-            100.0 * disagreement
-        ));
-    }
-    Ok((psi, notes))
+    Ok((psi, notes, Wanted { side: n, lines }))
 }
 
 /// Knots of both parameters by a rule. What the rule weighs along one parameter is the mean over the
@@ -223,7 +204,7 @@ fn placed_knots(
                 averaged_knots(degree, controls, &parameters, range)
             }
         }
-        .map_err(|e| not_applicable(format!("its control points cannot be placed: {e}")))
+        .map_err(|e| not_applicable(&format!("its control points cannot be placed: {e}")))
     };
     Ok([along(0)?, along(1)?])
 }

@@ -5,12 +5,12 @@
 //! plan direction across the feed; that surface is the part's offset, where lengths across the
 //! feed are `1 − κ r` times those on the part.
 
+use super::Step;
 use super::border::Border;
 use super::chart::{Chart, ChartPoint};
 use super::drop::DropCutter;
 use super::plan::{PassSettings, Passes, PlanError};
 use super::plan_curve::PlanCurves;
-use super::{FeedDirection, Step};
 use crate::cutter::Cutter;
 use crate::geometry::Vector2;
 use crate::monitor::{self, Monitor};
@@ -67,7 +67,7 @@ pub fn passes(
         monitor.advance(1);
         Ok::<_, PlanError>(pieces)
     })?;
-    Ok(Passes { passes: lines.into_iter().flatten().collect(), notes })
+    Ok(Passes { passes: lines.into_iter().flatten().collect(), notes, ..Passes::default() })
 }
 
 /// Plans passes in the direction with the shortest path. Angles over half a turn are compared by the predicted length
@@ -95,7 +95,7 @@ pub fn best(
         };
         let covered = places.iter().filter_map(|(p, area)| {
             // The way of the corner's centre over one place: its length along the feed, and its width in the plan view.
-            let t = p.feed_tangent(&FeedDirection::Angle(angle(k)))?;
+            let t = p.tangent_at(angle(k))?;
             let e = Vector2::new(-angle(k).sin(), angle(k).cos());
             let b = p.normal.cross(&t);
             let (along, across) = (p.offset_ratio(cutter, &t), p.offset_ratio(cutter, &b));
@@ -146,7 +146,7 @@ pub(super) fn least_over_plane(cutter: &Cutter, h: f64) -> f64 {
 /// since the cutter hardly fits: one pass serves the whole hollow, though the formula asks for ever closer ones.
 pub(super) fn stepover_at(p: &ChartPoint, cutter: &Cutter, angle: f64, h: f64) -> Option<f64> {
     let e = Vector2::new(-angle.sin(), angle.cos());
-    let t = p.feed_tangent(&FeedDirection::Angle(angle))?;
+    let t = p.tangent_at(angle)?;
     let (width, too_concave) = p.strip_width(cutter, &t, Step::Scallop(h));
     let bend = 1.0 - p.curvature_along(&p.normal.cross(&t)) * cutter.corner_radius();
     let lean = (1.0 - p.normal.xy().dot(&e).powi(2)).max(0.0).sqrt();

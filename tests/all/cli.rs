@@ -186,7 +186,12 @@ fn a_run_leaves_the_files_of_the_contract_and_no_other() {
     assert_eq!(entries(&out), expected);
     for (folder, toolpath) in folders.iter().zip(toolpaths) {
         let folder = out.join(folder);
-        assert_eq!(entries(&folder), TOOLPATH_FILES);
+        let streamline = toolpath["strategy"] == "streamline";
+        let mut files = TOOLPATH_FILES.to_vec();
+        files.extend(["field.png", "interval.png"].iter().filter(|_| streamline));
+        files.sort_unstable();
+        assert_eq!(entries(&folder), files);
+        assert_eq!(toolpath.get("field").is_some(), streamline);
         // 8 x 3 mm and a margin of 1 mm in cells of 0.1 mm.
         assert_eq!(toolpath["simulation"]["cells"], 100 * 50);
         pictures_have_the_grid(&folder, [100, 50]);
@@ -199,7 +204,8 @@ fn a_run_leaves_the_files_of_the_contract_and_no_other() {
 }
 
 fn pictures_have_the_grid(folder: &Path, [nx, ny]: [usize; 2]) {
-    for name in ["deviation.png", "height.png"] {
+    let names = ["deviation.png", "height.png", "field.png", "interval.png"];
+    for name in names.into_iter().filter(|name| folder.join(name).exists()) {
         let picture = image::open(folder.join(name)).unwrap();
         // The map is drawn with one pixel or more a cell, and has axes, a key and a scale bar around.
         assert!(picture.width() as usize > nx && picture.height() as usize > ny, "{name}");

@@ -23,6 +23,9 @@ use crate::geometry::{Point3, Vector3};
 /// have less, or negative ones, with which the field may turn more sharply between them than anywhere.
 const LEAST_COTANGENT: f64 = 0.05;
 
+/// Blended lines cancel where their sum is less than this share of the sum of their weights: what rounding leaves.
+const CANCELLED: f64 = 1e-9;
+
 /// What is wanted at one vertex: a tangent of any length > 0 and how much it matters (≥ 0). Nothing
 /// where the field is to follow its neighbours.
 pub type Wanted = Option<(Vector3, f64)>;
@@ -69,7 +72,28 @@ fn turn(mesh: &FieldMesh, from: usize, to: usize) -> f64 {
     carried.dot(&e2).atan2(carried.dot(&e1))
 }
 
-/// Blends wanted lines by their weights times the given ones; opposite wishes of equal weight cancel.
+/// The mean of lines in the tangent plane of a frame, as the mean of their doubled angles by weights ≥ 0: its direction,
+/// and the length of the sum. `None` where the lines cancel.
+pub fn blend_lines(
+    [e1, e2]: &[Vector3; 2],
+    lines: impl IntoIterator<Item = (Vector3, f64)>,
+) -> Option<(Vector3, f64)> {
+    let (mut sum, mut total) = (c64::new(0.0, 0.0), 0.0);
+    for (direction, weight) in lines {
+        let z = c64::new(direction.dot(e1), direction.dot(e2));
+        let square = z * z;
+        let length = square.re.hypot(square.im);
+        if length > 0.0 && length.is_finite() {
+            sum += square / length * weight;
+            total += weight;
+        }
+    }
+    let length = sum.re.hypot(sum.im);
+    let (sin, cos) = (0.5 * sum.im.atan2(sum.re)).sin_cos();
+    (length > CANCELLED * total).then(|| (e1 * cos + e2 * sin, length))
+}
+
+/// Blends wanted lines by their weights times the given ones ([`blend_lines`]); opposite wishes of equal weight cancel.
 ///
 /// # Errors
 /// [`MeshFieldError::Invalid`] when a list has not one entry for each vertex.
@@ -79,16 +103,8 @@ pub fn blend(mesh: &FieldMesh, parts: &[(&[Wanted], f64)]) -> Result<Vec<Wanted>
         return Err(MeshFieldError::Invalid(format!("{count} vertices need as many wanted directions")));
     }
     let at = |v: usize| {
-        let mut sum = c64::new(0.0, 0.0);
-        for (wanted, weight) in parts {
-            if let Some((direction, own)) = wanted[v]
-                && let Some(z) = doubled(mesh, v, &direction)
-            {
-                sum += z * (own * weight);
-            }
-        }
-        let length = sum.re.hypot(sum.im);
-        (length > 0.0).then(|| (halved(mesh, v, sum), length))
+        let wishes = parts.iter().filter_map(|(wanted, weight)| wanted[v].map(|(d, own)| (d, own * weight)));
+        blend_lines(&mesh.frame(v), wishes)
     };
     Ok((0..count).map(at).collect())
 }
@@ -248,6 +264,11 @@ pub fn singular_points(mesh: &FieldMesh, lines: &[Line], merge: f64) -> Vec<Sing
             });
         }
     }
+    merge_singular_points(&found, merge)
+}
+
+/// Counts singular points nearer to each other than `merge` (mm) as one; they vanish where their turns cancel.
+pub fn merge_singular_points(found: &[SingularPoint], merge: f64) -> Vec<SingularPoint> {
     let mut merged: Vec<SingularPoint> = Vec::new();
     let mut taken = vec![false; found.len()];
     for first in 0..found.len() {

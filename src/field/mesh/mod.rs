@@ -17,11 +17,14 @@ mod tests;
 mod weld;
 
 pub use levels::{MeshCurve, MeshLevels, MeshPoint};
-pub use lines::{Line, SingularPoint, Wanted, blend, flows, orient_lines, singular_points, smooth_lines};
+pub use lines::{
+    Line, SingularPoint, Wanted, blend, blend_lines, flows, merge_singular_points, orient_lines,
+    singular_points, smooth_lines,
+};
 pub use recover::{gradient_terms, vertex_gradients};
 pub use refine::Refined;
 pub use sheets::{Bend, Sheets};
-pub use sources::{Sense, borders, fixed_angle, guides, slope};
+pub use sources::{Sense, borders, fixed_angle, guides, slope, slope_at};
 pub use stream::{Flow, Held, MeshStream, solve_stream, triangle_gradients};
 pub use surface::{FieldMesh, MeshFieldError};
 pub use weld::weld;

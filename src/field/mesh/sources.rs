@@ -2,14 +2,17 @@
 //! smoothed ([`super::smooth_lines`]) or blended with others ([`super::blend`]).
 
 use super::{FieldMesh, Wanted};
-use crate::geometry::{Aabb, Point3, Vector3};
+use crate::geometry::{Point2, Vector3};
 use crate::parallel;
 
-/// A border that turns by more than this at a vertex has no direction there, rad.
-const CORNER: f64 = 0.6;
+/// A border that turns by more than this at a vertex, nearly back, has no direction there, rad.
+const CUSP: f64 = 2.6;
 
 /// Tangents shorter than this, of unit vectors, have no direction.
 const NO_DIRECTION: f64 = 1e-9;
+
+/// Ground that rises by less than this has no slope, rad: what rounding and fits leave of level ground would have one.
+const LEVEL: f64 = 1e-4;
 
 /// Along a curve or square to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,20 +39,22 @@ pub fn fixed_angle(mesh: &FieldMesh, angle: f64) -> Vec<Wanted> {
     mesh.normals().iter().map(|n| across.cross(n).try_normalize(NO_DIRECTION).map(|t| (t, 1.0))).collect()
 }
 
-/// Up the slope, or level along it; the steeper the place the more it matters (as the sine of its
-/// slope).
-pub fn slope(mesh: &FieldMesh, up: bool) -> Vec<Wanted> {
-    let at = |n: &Vector3| {
-        let level = Vector3::z().cross(n);
-        let steepness = level.norm();
-        let direction = if up { n.cross(&level) } else { level };
-        direction.try_normalize(NO_DIRECTION).map(|t| (t, steepness))
-    };
-    mesh.normals().iter().map(at).collect()
+/// The direction up the slope, or level along it, for a surface with this unit normal, and how much it matters: the sine
+/// of the slope. `None` on level ground.
+pub fn slope_at(normal: &Vector3, up: bool) -> Option<(Vector3, f64)> {
+    let level = Vector3::z().cross(normal);
+    let steepness = level.norm();
+    let direction = if up { normal.cross(&level) } else { level };
+    (steepness > LEVEL).then(|| (direction / steepness, steepness))
 }
 
-/// Along or across the borders, at their vertices except corners. Where passes reach the border they
-/// follow it; inside, the field is as smooth as the borders allow.
+/// [`slope_at`] every vertex.
+pub fn slope(mesh: &FieldMesh, up: bool) -> Vec<Wanted> {
+    mesh.normals().iter().map(|n| slope_at(n, up)).collect()
+}
+
+/// Along or across the borders, at corners along their bisector, which tells in which sense passes turn there. Where
+/// passes reach the border they follow it; inside, the field is as smooth as the borders allow.
 pub fn borders(mesh: &FieldMesh, sense: Sense) -> Vec<Wanted> {
     let mut wanted = vec![None; mesh.points().len()];
     for ring in mesh.loops() {
@@ -61,38 +66,37 @@ pub fn borders(mesh: &FieldMesh, sense: Sense) -> Vec<Wanted> {
             let normal = &mesh.normals()[v];
             let flat = |d: Vector3| d - normal * normal.dot(&d);
             let (before, after) = (flat(before), flat(after));
-            if before.cross(&after).norm().atan2(before.dot(&after)) > CORNER {
+            if before.cross(&after).norm().atan2(before.dot(&after)) > CUSP {
                 continue;
             }
-            wanted[v] = (before + after).try_normalize(NO_DIRECTION).map(|t| (sense.feed(t, normal), 1.0));
+            let unit = |d: Vector3| d.try_normalize(NO_DIRECTION * d.norm()).unwrap_or_else(Vector3::zeros);
+            let tangent = (unit(before) + unit(after)).try_normalize(NO_DIRECTION);
+            wanted[v] = tangent.map(|t| (sense.feed(t, normal), 1.0));
         }
     }
     wanted
 }
 
-/// Along or across guide curves, each a polyline, at the vertices within `reach` (mm) of it; the
-/// nearest stretch counts.
-pub fn guides(mesh: &FieldMesh, curves: &[Vec<Point3>], reach: f64, sense: Sense) -> Vec<Wanted> {
-    let segments: Vec<[Point3; 2]> =
+/// Along or across guide curves, each a polyline of the plan view, at the vertices within `reach` (mm, in the plan view)
+/// of it, or of the vertex nearest to it; the nearest stretch counts.
+pub fn guides(mesh: &FieldMesh, curves: &[Vec<Point2>], reach: f64, sense: Sense) -> Vec<Wanted> {
+    let segments: Vec<[Point2; 2]> =
         curves.iter().flat_map(|c| c.windows(2).map(|w| [w[0], w[1]])).filter(|[a, b]| a != b).collect();
-    let mut around = Aabb::EMPTY;
-    segments.iter().flatten().for_each(|p| around.grow(p));
-    let near = |p: &Point3| (0..3).all(|c| p[c] >= around.min[c] - reach && p[c] <= around.max[c] + reach);
-    parallel::map(mesh.points().len(), |v| {
-        let p = mesh.points()[v];
-        if !near(&p) {
-            return None;
-        }
-        let distance = |[a, b]: &[Point3; 2]| {
+    let nearest = parallel::map(mesh.points().len(), |v| {
+        let p = mesh.points()[v].xy();
+        let distance = |[a, b]: &[Point2; 2]| {
             let d = b - a;
             let s = ((p - a).dot(&d) / d.norm_squared()).clamp(0.0, 1.0);
             (p - (a + d * s)).norm()
         };
-        let nearest = segments.iter().map(|s| (distance(s), s)).min_by(|a, b| a.0.total_cmp(&b.0));
-        let (_, [a, b]) = nearest.filter(|n| n.0 <= reach)?;
-        let normal = &mesh.normals()[v];
-        let d = b - a;
-        let tangent = (d - normal * normal.dot(&d)).try_normalize(NO_DIRECTION * d.norm())?;
+        segments.iter().map(|s| (distance(s), s)).min_by(|a, b| a.0.total_cmp(&b.0))
+    });
+    let least = nearest.iter().flatten().map(|n| n.0).fold(f64::INFINITY, f64::min);
+    let wanted = |(nearest, normal): (&Option<(f64, &[Point2; 2])>, &Vector3)| {
+        let (_, [a, b]) = nearest.filter(|n| n.0 <= least + reach)?;
+        let d = (b - a).normalize();
+        let tangent = Vector3::new(-d.y, d.x, 0.0).cross(normal).try_normalize(NO_DIRECTION)?;
         Some((sense.feed(tangent, normal), 1.0))
-    })
+    };
+    nearest.iter().zip(mesh.normals()).map(wanted).collect()
 }

@@ -5,6 +5,7 @@
 //! every refusal can point at the very key or value: tagged enums of serde only know the table.
 
 mod classic;
+mod direction;
 mod error;
 mod formula;
 mod pocket;
@@ -202,8 +203,8 @@ pub struct ToolpathRequest {
     pub strategy: Strategy,
     /// How far its passes lie apart.
     pub step: Step,
-    /// The file of its feed directions, if it has one; [`Scene::read`] reads it into the strategy.
-    pub directions: Option<NamedFile>,
+    /// The files of its feed directions, in the order of the scene; [`Scene::read`] reads them into the strategy.
+    pub directions: Vec<NamedFile>,
     /// How its passes are smoothed and joined.
     pub joining: Joining,
 }

@@ -2,7 +2,6 @@
 
 use std::io::Read as _;
 use std::path::Path;
-use std::sync::Arc;
 
 use toml::de::DeTable;
 
@@ -14,14 +13,13 @@ use super::{
     DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, Engine, MeshFormat, NamedFile, OutlineSource, PartSource, Scene,
     Simulation, Stock, ToolpathRequest, auto_cell, default_error_bound,
 };
-use super::{classic, formula, pocket};
+use super::{classic, direction, formula, pocket};
 use crate::cutter::{AptWord, AptWords, Cutter, CutterError, CutterShape, Holder, HolderSection};
 use crate::field::{KnotRule, MAX_DENSE, Solver};
 use crate::geometry::AnalyticSurface;
-use crate::io::direction_table;
 use crate::machine::Machine;
 use crate::metrology::Limits;
-use crate::toolpath::{Along, FeedDirection, Joining, Links, Step, Strategy, StreamMethod};
+use crate::toolpath::{Joining, Links, Step, Strategy, StreamMethod};
 
 /// Largest scene that is read, bytes. A scene is a page of text; a larger file is a mistake.
 const MAX_BYTES: u64 = 1 << 20;
@@ -126,16 +124,9 @@ impl Scene {
     /// Reads the files of feed directions into the strategies that follow them.
     fn load_directions(&mut self) -> Result<(), SceneError> {
         for request in &mut self.toolpaths {
-            let (Some(file), Strategy::Streamline { direction, .. }) =
-                (&request.directions, &mut request.strategy)
-            else {
-                continue;
-            };
-            let samples = direction_table::read(&file.path).map_err(|e| {
-                let message = format!("the file of directions cannot be used: {e}");
-                self.source.error(file.span.clone(), message, "mend that file or name another one")
-            })?;
-            *direction = FeedDirection::Samples(Arc::new(samples));
+            if let Strategy::Streamline { direction, .. } = &mut request.strategy {
+                direction::load(direction, &mut request.directions.iter(), &self.source)?;
+            }
         }
         Ok(())
     }
@@ -467,16 +458,28 @@ fn read_toolpaths(
     Ok(requests)
 }
 
+/// Keys of all toolpaths but pockets'.
+const COMMON: [&str; 7] = ["name", "strategy", "stepover", "scallop", "links", "longest_link", "smoothing"];
+
+/// Keys of streamlines.
+const STREAMLINE: [&str; 9] = [
+    direction::KEYS[0],
+    direction::KEYS[1],
+    direction::KEYS[2],
+    direction::KEYS[3],
+    "control_points",
+    "method",
+    "degree",
+    "knots",
+    "solver",
+];
+
 fn read_toolpath(
     section: &Section<'_>,
     folder: &Path,
     limits: &Limits,
     cutter: &Cutter,
 ) -> Result<ToolpathRequest, SceneError> {
-    const COMMON: [&str; 7] =
-        ["name", "strategy", "stepover", "scallop", "links", "longest_link", "smoothing"];
-    const STREAMLINE: [&str; 7] =
-        ["direction", "directions", "control_points", "method", "degree", "knots", "solver"];
     let all: Vec<&str> =
         COMMON.into_iter().chain(classic::KEYS).chain(STREAMLINE).chain(pocket::ALL_KEYS).collect();
     if !section.has("strategy") {
@@ -487,16 +490,16 @@ fn read_toolpath(
     let word = section.required_word("strategy", &words)?;
     if pocket::STRATEGIES.contains(&word.value) {
         let (strategy, step) = pocket::read_strategy(section, word.value, cutter.radius())?;
-        return named_request(section, &word, Strategy::Pocket(strategy), step, None);
+        return named_request(section, &word, Strategy::Pocket(strategy), step, Vec::new());
     }
     let own = classic::keys(word.value).unwrap_or(&STREAMLINE);
     let keys: Vec<&str> = COMMON.iter().chain(own).copied().collect();
     section.only(&keys, &all, &format!("strategy = \"{}\"", word.value))?;
+    let mut directions = Vec::new();
     let strategy = match classic::read(word.value, section)? {
         Some(strategy) => strategy,
-        None => read_streamline(section)?,
+        None => read_streamline(section, folder, &mut directions)?,
     };
-    let directions = read_directions(section, folder)?;
     let step = read_step(section, limits, cutter)?;
     named_request(section, &word, strategy, step, directions)
 }
@@ -507,7 +510,7 @@ fn named_request(
     word: &Located<&str>,
     strategy: Strategy,
     step: Step,
-    directions: Option<NamedFile>,
+    directions: Vec<NamedFile>,
 ) -> Result<ToolpathRequest, SceneError> {
     let (name, span) = match section.text("name")? {
         Some(name) => (name.value.to_owned(), name.span),
@@ -566,37 +569,15 @@ fn check_pocket_strategies(
     Err(root.error(&root.key_span("toolpath"), message, cure))
 }
 
-fn read_streamline(section: &Section<'_>) -> Result<Strategy, SceneError> {
-    let direction = if let Some(table) = section.inline("direction") {
-        table.only(&["angle"], &[], "a direction")?;
-        let angle = table.required_number("angle", -360.0..=360.0, " degrees", 30.0)?;
-        FeedDirection::Angle(angle.value.to_radians())
-    } else {
-        let words = ["widest-strip", "shortest", "u", "v", "file"];
-        match section.word("direction", &words)?.map(|word| word.value) {
-            Some("shortest") => {
-                section.only(
-                    &[
-                        "name",
-                        "strategy",
-                        "stepover",
-                        "scallop",
-                        "links",
-                        "longest_link",
-                        "smoothing",
-                        "direction",
-                    ],
-                    &[],
-                    "direction = \"shortest\"",
-                )?;
-                return Ok(Strategy::ShortestStreamline);
-            }
-            // Until the file is read (`Scene::load_directions`).
-            Some("file") => FeedDirection::WidestStrip,
-            Some("u") => FeedDirection::Parameter(Along::U),
-            Some("v") => FeedDirection::Parameter(Along::V),
-            _ => FeedDirection::WidestStrip,
-        }
+fn read_streamline(
+    section: &Section<'_>,
+    folder: &Path,
+    files: &mut Vec<NamedFile>,
+) -> Result<Strategy, SceneError> {
+    let Some(direction) = direction::read(section, folder, files)? else {
+        let keys: Vec<&str> = COMMON.into_iter().chain(["direction"]).collect();
+        section.only(&keys, &STREAMLINE, "direction = \"shortest\"")?;
+        return Ok(Strategy::ShortestStreamline);
     };
     let control_points =
         section.count("control_points", 4..=200)?.map_or(DEFAULT_CONTROL_POINTS, |n| n as usize);
@@ -654,21 +635,6 @@ fn read_stream_method(
     let asked = method == Some("bspline") || ["degree", "knots", "solver"].iter().any(|key| section.has(key));
     let method = if asked { spline } else { StreamMethod::Automatic };
     Ok((method, solver.unwrap_or(Solver::Cholesky)))
-}
-
-/// The file of directions that `direction = "file"` asks for.
-fn read_directions(section: &Section<'_>, folder: &Path) -> Result<Option<NamedFile>, SceneError> {
-    let wanted = section.inline("direction").is_none()
-        && section.text("direction")?.is_some_and(|word| word.value == "file");
-    match (wanted, section.text("directions")?) {
-        (true, None) => section.required_text("directions", "directions.txt").map(|_| None),
-        (false, Some(file)) => Err(section.error(
-            &file.span,
-            "`directions` names a file that nothing reads",
-            "add `direction = \"file\"`, or delete it",
-        )),
-        (_, file) => Ok(file.map(|file| NamedFile::beside(folder, file.value, file.span))),
-    }
 }
 
 /// The step of one toolpath: its own stepover or scallop, or else the scene's scallop.

@@ -2,9 +2,13 @@
 
 use proptest::prelude::*;
 
+use std::sync::Arc;
+
 use super::*;
 use crate::cutter::CutterShape;
+use crate::field::mesh::Sense;
 use crate::field::{KnotRule, Solver};
+use crate::geometry::Point2;
 use crate::toolpath::{Along, FeedDirection, FrontStart, LevelSteps, Strategy, StreamMethod};
 
 const VALID: &str = r#"
@@ -399,12 +403,13 @@ fn methods_and_solvers_of_stream_functions_are_read_and_written() {
             Scene::parse("folder/wave.toml", complete.clone()).unwrap_or_else(|e| panic!("{e}\n{complete}"));
         assert_eq!(again.toolpaths[3].strategy, scene.toolpaths[3].strategy, "{complete}");
         assert_eq!(complete_toml(&again), complete);
-        let written =
-            |r: &ToolpathRequest| r.directions.as_ref().map(|f| (f.written.clone(), f.path.clone()));
+        let written = |r: &ToolpathRequest| {
+            r.directions.iter().map(|f| (f.written.clone(), f.path.clone())).collect::<Vec<_>>()
+        };
         assert_eq!(written(&again.toolpaths[3]), written(&scene.toolpaths[3]));
         let request = scene.toolpaths[3].clone();
         let Strategy::Streamline { method, solver, .. } = request.strategy else { panic!("{keys}") };
-        (method, solver, request.directions)
+        (method, solver, request.directions.first().cloned())
     };
     let spline = |degree, knots| StreamMethod::BSpline { degree, knots };
     let (method, solver, file) = read("degree = 5\nknots = \"curvature\"\nsolver = \"gmres\"");
@@ -421,6 +426,90 @@ fn methods_and_solvers_of_stream_functions_are_read_and_written() {
     }
     let (_, _, file) = read("direction = \"file\"\ndirections = \"flow.txt\"");
     assert_eq!(file.unwrap().path, std::path::Path::new("folder/flow.txt"));
+}
+
+#[test]
+fn feed_directions_are_read_and_written_back() {
+    let guide = |sense| FeedDirection::Guides {
+        curves: Arc::new(vec![vec![Point2::new(0.0, 1.0), Point2::new(50.0, 2.5)]]),
+        sense,
+    };
+    let blend = FeedDirection::Blend(vec![
+        (FeedDirection::WidestStrip, 2.0),
+        (guide(Sense::Across), 1.0),
+        (FeedDirection::Angle(30f64.to_radians()), 0.5),
+    ]);
+    for (keys, direction) in [
+        ("direction = \"steepest\"", FeedDirection::Steepest),
+        ("direction = \"contour\"", FeedDirection::Contour),
+        ("direction = \"guide\"\nguides = [[[0, 1], [50, 2.5]]]", guide(Sense::Along)),
+        ("direction = \"guide\"\nguides = [[[0, 1], [50, 2.5]]]\nacross = true", guide(Sense::Across)),
+        ("direction = \"border\"", FeedDirection::Border(Sense::Along)),
+        ("direction = \"border\"\nacross = true", FeedDirection::Border(Sense::Across)),
+        (
+            "direction = { blend = [{ direction = \"widest-strip\", weight = 2 }, { direction = \"guide\", \
+             guides = [[[0, 1], [50, 2.5]]], across = true }, { direction = { angle = 30 }, weight = 0.5 }] }",
+            blend,
+        ),
+    ] {
+        let scene = Scene::parse("wave.toml", streamline(keys)).unwrap_or_else(|e| panic!("{keys}: {e}"));
+        let Strategy::Streamline { direction: read, .. } = &scene.toolpaths[3].strategy else {
+            panic!("{keys}")
+        };
+        assert_eq!(*read, direction, "{keys}");
+        let complete = complete_toml(&scene);
+        let again = Scene::parse("wave.toml", complete.clone()).unwrap_or_else(|e| panic!("{e}\n{complete}"));
+        assert_eq!(again.toolpaths[3].strategy, scene.toolpaths[3].strategy, "{complete}");
+    }
+    let keys = "direction = { blend = [{ direction = \"file\", directions = \"a.txt\" }, { direction = \"file\", \
+                directions = \"b.txt\", weight = 3 }] }";
+    let scene = Scene::parse("folder/wave.toml", streamline(keys)).unwrap();
+    let files: Vec<&str> = scene.toolpaths[3].directions.iter().map(|f| f.written.as_str()).collect();
+    assert_eq!(files, ["a.txt", "b.txt"]);
+    let again = Scene::parse("folder/wave.toml", complete_toml(&scene)).unwrap();
+    let written: Vec<&str> = again.toolpaths[3].directions.iter().map(|f| f.written.as_str()).collect();
+    assert_eq!(written, files);
+}
+
+#[test]
+fn feed_directions_that_say_nothing_are_refused() {
+    for (keys, word) in [
+        ("direction = \"steepst\"", "cannot be"),
+        ("direction = \"guide\"", "no `guides` to follow"),
+        ("direction = \"guide\"\nguides = []", "no `guides` to follow"),
+        ("direction = \"guide\"\nguides = [[[1, 2], [1, 2]]]", "has no length"),
+        ("direction = \"guide\"\nguides = [[[1, 2]]]", "has no length"),
+        ("direction = \"guide\"\nguides = [[1, 2]]", "points of two numbers"),
+        ("direction = \"guide\"\nguides = [[[1, 2], [3, nan]]]", "a number from"),
+        ("direction = \"steepest\"\nguides = [[[0, 1], [50, 2]]]", "nothing follows"),
+        ("direction = \"contour\"\nacross = true", "a sense of no curve"),
+        ("direction = \"border\"\nacross = 1", "true or false"),
+        ("direction = \"shortest\"\nacross = true", "a sense of no curve"),
+        ("direction = \"shortest\"\nmethod = \"bspline\"", "does not apply"),
+        ("direction = { blend = [] }", "two directions or more"),
+        ("direction = { blend = [{ direction = \"u\" }] }", "two directions or more"),
+        ("direction = { blend = \"u\" }", "a list of tables"),
+        ("direction = { blend = [{ direction = \"u\" }, { weight = 2 }] }", "has no `direction`"),
+        ("direction = { blend = [{ direction = \"u\" }, { direction = \"shortest\" }] }", "cannot be"),
+        (
+            "direction = { blend = [{ direction = \"u\" }, { direction = \"v\", weight = 0 }] }",
+            "a number from",
+        ),
+        (
+            "direction = { blend = [{ direction = \"u\" }, { direction = \"v\", wait = 1 }] }",
+            "unknown key `wait`",
+        ),
+        ("direction = { blend = [{ direction = \"u\" }, { direction = \"file\" }] }", "has no `directions`"),
+        (
+            "direction = { blend = [{ direction = \"u\" }, { direction = { blend = [] } }] }",
+            "cannot be blended again",
+        ),
+        ("direction = { blend = [], angle = 3 }", "does not apply"),
+    ] {
+        let (message, cure, place) = refused(&streamline(keys));
+        assert!(message.contains(word), "{keys}: {message}");
+        assert!(!cure.is_empty() && place.0 >= streamline("").lines().count(), "{keys}: {place:?} {cure}");
+    }
 }
 
 #[test]

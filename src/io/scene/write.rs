@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::{PartSource, Scene, ToolpathRequest, classic, formula, pocket};
+use super::{PartSource, Scene, ToolpathRequest, classic, direction, formula, pocket};
 use crate::cutter::{Cutter, CutterShape};
-use crate::toolpath::{Along, FeedDirection, Links, Step, Strategy, StreamMethod, longest_link};
+use crate::toolpath::{Links, Step, Strategy, StreamMethod, longest_link};
 
 /// A number as TOML takes it, rounded to 12 digits so that an angle that went through radians comes
 /// back as it was written.
@@ -15,13 +15,6 @@ pub(super) fn number(value: f64) -> String {
 
 pub(super) fn text(value: &str) -> String {
     toml::Value::String(value.to_owned()).to_string()
-}
-
-fn along(along: Along) -> &'static str {
-    match along {
-        Along::U => "u",
-        Along::V => "v",
-    }
 }
 
 /// The whole scene as TOML, every default in effect included. Reading it gives the same scene
@@ -187,22 +180,8 @@ fn write_strategy(out: &mut String, request: &ToolpathRequest) -> std::fmt::Resu
         Strategy::Pocket(strategy) => pocket::write_strategy(out, strategy),
         Strategy::ShortestStreamline => writeln!(out, "direction = \"shortest\""),
         Strategy::Streamline { direction, control_points, method, solver } => {
-            match direction {
-                _ if let Some(file) = &request.directions => {
-                    writeln!(out, "direction = \"file\"\ndirections = {}", text(&file.written))?;
-                }
-                FeedDirection::Parameter(a) => writeln!(out, "direction = \"{}\"", along(*a))?,
-                FeedDirection::Angle(angle) => {
-                    writeln!(
-                        out,
-                        "direction = {{ angle = {} }}  # degrees from the x axis",
-                        number(angle.to_degrees())
-                    )?;
-                }
-                FeedDirection::WidestStrip | FeedDirection::Samples(_) => {
-                    writeln!(out, "direction = \"widest-strip\"")?;
-                }
-            }
+            direction::write(out, direction, &mut request.directions.iter(), "\n")?;
+            writeln!(out)?;
             writeln!(out, "control_points = {control_points}")?;
             match method {
                 StreamMethod::Automatic => return writeln!(out, "method = \"auto\""),

@@ -211,7 +211,7 @@ pub fn plan_pocket(
         run.points = descend::shortened(&run.points, chords, MOVE_OVER_RADIUS * radius);
     }
     let path = descend::program(&runs, pocket.depth, strategy, settings);
-    Ok(Plan { path, notes, shortest: None })
+    Ok(Plan { path, notes, shortest: None, field: None })
 }
 
 fn piece_runs(

@@ -1,4 +1,4 @@
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
 use super::*;
 
@@ -148,15 +148,18 @@ fn borders_guides_slopes_and_blends_give_their_directions() {
     for (v, p) in mesh.points().iter().enumerate() {
         match side[v] {
             Some((t, _)) => {
-                on += 1;
-                let exact = if p.x == 0.0 || p.x == 1.0 { Vector3::y() } else { up };
-                assert!(between(&t, &exact) < 1e-9 && mesh.is_border(v));
+                let [beside, across] = [p.x, p.y].map(|c| c == 0.0 || c == 1.0);
+                let exact = if beside { Vector3::y() } else { up };
+                // Halfway between its two sides at a corner.
+                let turned = if beside && across { FRAC_PI_4 } else { 0.0 };
+                assert!((between(&t, &exact) - turned).abs() < 1e-9 && mesh.is_border(v));
+                (on, corners) = (on + 1, corners + usize::from(beside && across));
             }
-            None => corners += usize::from(mesh.is_border(v)),
+            None => assert!(!mesh.is_border(v)),
         }
     }
-    assert_eq!((on, corners), (4 * 16 - 4, 4));
-    let curve = vec![Point3::new(0.2, -1.0, 0.1), Point3::new(0.2, 2.0, 0.1)];
+    assert_eq!((on, corners), (4 * 16, 4));
+    let curve = vec![Point2::new(0.2, -1.0), Point2::new(0.2, 2.0)];
     for (sense, exact) in [(Sense::Along, Vector3::y()), (Sense::Across, up)] {
         let near = guides(&mesh, std::slice::from_ref(&curve), 0.1, sense);
         let found = near.iter().zip(mesh.points()).filter(|(w, _)| w.is_some());
