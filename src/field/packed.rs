@@ -474,7 +474,7 @@ mod tests {
             assert!((found.cost / least - 1.0).abs() < 5e-3, "{angle}: {} {least}", found.cost);
         }
         let problem = square(|_, _, _| 0.1, [1.0, 0.3, 0.0], false);
-        let found = run(&problem, straight(0.4, 10.0));
+        let found = run(&problem, straight(1.0, 10.0));
         assert!((found.cost / 7.0 - 1.0).abs() < 5e-3, "{}", found.cost);
     }
 

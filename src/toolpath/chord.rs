@@ -127,7 +127,7 @@ const MAX_SKIP: usize = 400;
 /// # Errors
 /// [`Cancelled`] when the watch says so.
 pub fn reduce(points: &[Point3], tolerance: f64, watch: &mut Watch<'_>) -> Result<Vec<Point3>, Cancelled> {
-    Ok(moved_aside(points, &reduced_indices(points, tolerance, watch)?, tolerance))
+    Ok(moved_aside(points, &reduced_indices(points, tolerance, watch)?, Side::Lesser, tolerance))
 }
 
 /// Indices of the points that the rest does without least: from each the longest straight move that stays within
@@ -162,9 +162,17 @@ pub fn reduced_indices(
     Ok(kept)
 }
 
-/// The points at `knots`, each moved by half the lesser sagitta of its two sides; not where the curve bends both ways or
-/// runs straight on one side, which would be tilted. The ends stay.
-pub fn moved_aside(curve: &[Point3], knots: &[usize], tolerance: f64) -> Vec<Point3> {
+/// By which of its two sides a point is moved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// The straighter one; where the curve bends both ways not at all. Straight moves stay where they are.
+    Lesser,
+    /// The more bent one, by the mean of both where the curve bends both ways. What is beside it must be checked.
+    Greater,
+}
+
+/// The points at `knots`, each moved by half the sagitta of one of its sides, at most by the tolerance. The ends stay.
+pub fn moved_aside(curve: &[Point3], knots: &[usize], side: Side, tolerance: f64) -> Vec<Point3> {
     let half_sagitta = |k: usize| {
         let (a, b) = (curve[knots[k]], curve[knots[k + 1]]);
         let off = |p: &Point3| {
@@ -186,8 +194,13 @@ pub fn moved_aside(curve: &[Point3], knots: &[usize], tolerance: f64) -> Vec<Poi
     let halves: Vec<Vector3> = (0..knots.len().saturating_sub(1)).map(half_sagitta).collect();
     let aside = |k: usize| {
         let (a, b) = (halves[k - 1], halves[k]);
-        let lesser = if a.norm_squared() < b.norm_squared() { a } else { b };
-        let by = if a.dot(&b) > 0.0 { lesser } else { Vector3::zeros() };
+        let (lesser, greater) = if a.norm_squared() < b.norm_squared() { (a, b) } else { (b, a) };
+        let by = match (side, a.dot(&b) > 0.0) {
+            (Side::Lesser, true) => lesser,
+            (Side::Lesser, false) => Vector3::zeros(),
+            (Side::Greater, true) => greater,
+            (Side::Greater, false) => 0.5 * (a + b),
+        };
         curve[knots[k]] + by * (tolerance / by.norm().max(f64::MIN_POSITIVE)).min(1.0)
     };
     let last = knots.len().saturating_sub(1);

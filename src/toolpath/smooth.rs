@@ -12,7 +12,7 @@
 //! whole sagitta, between points as far on the other side by half of it, so that chords can be √2 times
 //! as long. Every input point is held against the move that passes it, whatever smoothing did.
 
-use super::chord::{Watch, distance_to_segment, moved_aside, reduce, reduced_indices};
+use super::chord::{Side, Watch, distance_to_segment, moved_aside, reduce, reduced_indices};
 use crate::geometry::{Point3, Vector3};
 use crate::monitor::Cancelled;
 
@@ -158,7 +158,7 @@ fn spread(
     let used = points.iter().zip(curve).map(|(p, q)| (p - q).norm()).fold(0.0, f64::max);
     let mut knots = reduced_indices(curve, SAGITTA * (tolerance - used), watch)?;
     for _ in 0..DIVISIONS {
-        let tips = moved_aside(curve, &knots, tolerance - used);
+        let tips = moved_aside(curve, &knots, Side::Greater, tolerance - used);
         let fails = |k: usize| {
             let held = &points[knots[k]..=knots[k + 1]];
             held.iter().any(|p| distance_to_segment(p, &tips[k], &tips[k + 1]) > tolerance)
