@@ -50,12 +50,21 @@ const EVENINGS: usize = 2;
 /// Weights of five neighbours that keep every parabola (Savitzky and Golay 1964).
 const EVEN: [f64; 5] = [-3.0 / 35.0, 12.0 / 35.0, 17.0 / 35.0, 12.0 / 35.0, -3.0 / 35.0];
 
+/// What the stream function shall do.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Aim<'a> {
+    /// Follow a direction.
+    Fitted(&'a FeedDirection),
+    /// Make the path shortest; with a direction and how much dearer passes square to it are.
+    Shortest(Option<(&'a FeedDirection, f64)>),
+}
+
 /// Passes along the level curves of a stream function over everything of the part that is reached from
-/// above; without a direction, of the one with the shortest path.
+/// above.
 pub(super) fn on_mesh(
     part: &Part,
     cutter: &Cutter,
-    direction: Option<&FeedDirection>,
+    aim: Aim,
     settings: &PassSettings,
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
@@ -68,7 +77,7 @@ pub(super) fn on_mesh(
         [] => [part.bounds()].map(|b| [[b.min.x, b.max.x], [b.min.y, b.max.y]]).to_vec(),
         patches => patches.iter().map(|patch| patch.domain()).collect(),
     };
-    if let Some(direction) = direction {
+    if let Aim::Fitted(direction) | Aim::Shortest(Some((direction, _))) = aim {
         feed::check(direction, part, &parameters)?;
     }
     let reached = reachable(part, cutter, flat)?;
@@ -82,7 +91,7 @@ pub(super) fn on_mesh(
     }
     for piece in &reached.pieces {
         let surface = MeshSurface::with_margin(piece, BORDER_SHARE * flat)?;
-        all.append(on_piece(part, cutter, direction, piece, &surface, settings, monitor)?);
+        all.append(on_piece(part, cutter, aim, piece, &surface, settings, monitor)?);
     }
     Ok(all)
 }
@@ -90,7 +99,7 @@ pub(super) fn on_mesh(
 fn on_piece(
     part: &Part,
     cutter: &Cutter,
-    direction: Option<&FeedDirection>,
+    aim: Aim,
     piece: &Piece,
     surface: &MeshSurface,
     settings: &PassSettings,
@@ -99,15 +108,21 @@ fn on_piece(
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     // Notes and field, to which passes come later.
     let mut all = Passes::default();
-    let (values, predicted) = match direction {
-        Some(direction) => {
+    let (values, predicted) = match aim {
+        Aim::Fitted(direction) => {
             (along_direction(part, cutter, direction, piece, surface, settings, &mut all)?, None)
         }
-        None => {
-            let found = shortest_stream(surface, cutter, settings.step, monitor)?;
+        Aim::Shortest(toward) => {
+            let lines = toward.map(|(direction, dearer)| {
+                let (lines, matters) = feed_lines(part, cutter, direction, piece, surface, &mut all)?;
+                let pull = |(line, matters): (&Line, &f64)| (line.direction, dearer * matters);
+                Ok::<_, PlanError>(lines.iter().zip(&matters).map(pull).collect::<Vec<_>>())
+            });
+            let toward = lines.transpose()?;
+            let found = shortest_stream(surface, cutter, settings.step, toward.as_deref(), monitor)?;
             let found =
                 found.ok_or_else(|| not_applicable("no stream function of least length was found"))?;
-            (found.coefficients, Some(found.cost))
+            (found.coefficients, toward.is_none().then_some(found.cost))
         }
     };
     let levels = MeshLevels::new(&surface.mesh, &values).map_err(refused)?;
@@ -119,7 +134,7 @@ fn on_piece(
     let places = guide.places(&values);
     let placed = place_levels(&places, range, Placing::Shortest, &mut all.notes);
     all.field.set_mesh_levels(&guide.levels, range, surface.own_triangles);
-    if direction.is_none() {
+    if matches!(aim, Aim::Shortest(None)) {
         all.field.set_mesh_feed(part, cutter, &level_lines(surface, &guide.levels), surface);
     }
     all.append(along_and_between(&guide, &placed, range, settings.sampling, monitor)?);

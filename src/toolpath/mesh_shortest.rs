@@ -26,7 +26,8 @@ const BEND: f64 = 0.03;
 /// The strip beyond borders counts this share of its area: ψ goes on in it as it comes.
 const STRIP_SHARE: f64 = 0.02;
 
-/// ψ at the vertices, and what its passes cost; `None` where no passes can be planned.
+/// ψ at the vertices, and what its passes cost; `None` where no passes can be planned. `toward` has at each vertex a
+/// direction and how much dearer passes square to it are.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -34,6 +35,7 @@ pub(super) fn shortest_stream(
     surface: &MeshSurface,
     cutter: &Cutter,
     step: Step,
+    toward: Option<&[(Vector3, f64)]>,
     monitor: &dyn Monitor,
 ) -> Result<Option<Packed>, Cancelled> {
     let mesh = &surface.mesh;
@@ -43,7 +45,7 @@ pub(super) fn shortest_stream(
     for (t, corners) in mesh.triangles().iter().enumerate() {
         corners.iter().for_each(|&v| around[v as usize] += share(t) / 3.0);
     }
-    let place = Place { surface, cutter, step };
+    let place = Place { surface, cutter, step, toward };
     let sites = parallel::map(count + mesh.triangles().len(), |k| match k.checked_sub(count) {
         None => place.at_vertex(k, (1.0 - DAMPING) * around[k]),
         Some(t) => place.on_triangle(t, DAMPING * share(t)),
@@ -111,13 +113,14 @@ struct Place<'a> {
     surface: &'a MeshSurface,
     cutter: &'a Cutter,
     step: Step,
+    toward: Option<&'a [(Vector3, f64)]>,
 }
 
 impl Place<'_> {
     fn at_vertex(&self, v: usize, area: f64) -> Option<(Site, [Vector3; 2])> {
         let surface = self.surface;
         let bend = &surface.bends[surface.origin[v] as usize];
-        self.site(&surface.mesh.normals()[v], surface.mesh.frame(v), bend, area)
+        self.site(&surface.mesh.normals()[v], surface.mesh.frame(v), bend, v, area)
     }
 
     fn on_triangle(&self, t: usize, area: f64) -> Option<(Site, [Vector3; 2])> {
@@ -129,15 +132,16 @@ impl Place<'_> {
         for v in mesh.triangles()[t] {
             bend.add(&self.surface.bends[self.surface.origin[v as usize] as usize], 1.0 / 3.0);
         }
-        self.site(&normal, [e1, normal.cross(&e1)], &bend, area)
+        self.site(&normal, [e1, normal.cross(&e1)], &bend, mesh.triangles()[t][0] as usize, area)
     }
 
-    /// And the two tangents that its components are of.
+    /// With the direction wanted at a vertex; and the two tangents that its components are of.
     fn site(
         &self,
         normal: &Vector3,
         [e1, e2]: [Vector3; 2],
         bend: &Bend,
+        vertex: usize,
         area: f64,
     ) -> Option<(Site, [Vector3; 2])> {
         let width = |[x, y]: [f64; 2]| width_at(self.cutter, normal, &(e1 * x + e2 * y), bend, self.step).0;
@@ -145,7 +149,12 @@ impl Place<'_> {
         // Across the passes at three angles; the feed is square to them.
         let costs = [0, 1, 2].map(|k| {
             let (sin, cos) = (PI * f64::from(k) / 3.0).sin_cos();
-            1.0 - bend.along(&(e2 * cos - e1 * sin)) * self.cutter.corner_radius()
+            let feed = e2 * cos - e1 * sin;
+            let away = self.toward.map_or(0.0, |toward| {
+                let (direction, dearer) = toward[vertex];
+                dearer * (1.0 - feed.dot(&direction).powi(2))
+            });
+            1.0 - bend.along(&feed) * self.cutter.corner_radius() + away
         });
         Some((Site { area, front, cost: Site::harmonic(costs), border: None }, [e1, e2]))
     }

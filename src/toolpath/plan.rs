@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::chord::{Watch, reduce, sample_within_chord};
 use super::link::{Joining, join};
+use super::mesh_passes::Aim;
 use super::planned_field::{Contact, PlannedField};
 use super::shortest::{ShortestPossible, shortest_possible};
 use super::smooth::smooth_and_spread;
@@ -17,7 +18,7 @@ use super::{
 use crate::cutter::Cutter;
 use crate::field::mesh::Sense;
 use crate::field::{KnotRule, LineField, Solver};
-use crate::geometry::{Point2, Point3};
+use crate::geometry::{Point2, Point3, TriangleMesh};
 use crate::monitor::{Cancelled, Monitor};
 use crate::part::Part;
 
@@ -166,7 +167,11 @@ pub enum Strategy {
     ContourSpiral,
     /// Streamlines of the feed directions with the shortest path: each one strip from the next, their first curve
     /// searched.
-    ShortestStreamline,
+    ShortestStreamline {
+        /// A direction to keep to, and how much dearer a mm of pass square to it is, in mm: 0 leaves all freedom, a great
+        /// number none.
+        toward: Option<(FeedDirection, f64)>,
+    },
     /// Level curves of a stream function fitted to feed directions.
     Streamline {
         /// The feed directions.
@@ -349,15 +354,45 @@ impl Passes {
 /// that could hide between two samples of a pass.
 const SAMPLING_OVER_RADIUS: f64 = 0.15;
 
-/// A scallop target is planned for less this share of the chord tolerance. A chord may raise a ridge by all of it, but
-/// ridges stand between chords of two passes, whose greatest deviations seldom meet: planned for 9 µm with chords of
-/// 1 µm, the highest ridges of a saddle and of a pit stood at 9.3 and 9.4 µm, 95 % below 9.1. The facets of a mesh, which
-/// the planned surface does not have, take the rest.
+/// A scallop target is planned for less this share of the chord tolerance. A chord may raise a ridge by half of it, but
+/// ridges stand between chords of two passes, whose greatest deviations seldom meet.
 const CHORD_SHARE: f64 = 0.25;
-const CHORD_SHARE_OF_MESHES: f64 = 0.45;
+
+/// On a mesh it is planned for less by what facets stand off the smooth surface, too: the height of this share of them
+/// (by area) is less. Facets at sharper angles than this, rad, are edges of the part.
+const FACETS: f64 = 0.9;
+const SHARPEST_FACETS: f64 = 0.3;
 
 /// But it is not planned for less than this share of itself.
 const LEAST_SHARE_OF_TARGET: f64 = 0.5;
+
+/// How far facets stand off the smooth surface that they are chords of, mm: where two meet at the angle δ, each is as wide
+/// as its neighbours and has a sagitta of an eighth of δ times the width.
+fn facet_height(mesh: &TriangleMesh) -> f64 {
+    let mut facets: Vec<(f64, f64)> = Vec::new();
+    let area = |t: usize| {
+        let [a, b, c] = mesh.corners(t);
+        0.5 * (b - a).cross(&(c - a)).norm()
+    };
+    for t in 0..mesh.triangles().len() {
+        for k in 0..3 {
+            let Some(n) = mesh.neighbour(t, k).filter(|&n| n > t) else { continue };
+            let corners = mesh.corners(t);
+            let (edge, both) = ((corners[(k + 1) % 3] - corners[k]).norm(), area(t) + area(n));
+            let angle = mesh.normal(t).cross(&mesh.normal(n)).norm();
+            if angle < SHARPEST_FACETS && edge > 0.0 {
+                facets.push((0.125 * angle * both / edge, both));
+            }
+        }
+    }
+    facets.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut left = FACETS * facets.iter().map(|(_, area)| area).sum::<f64>();
+    let reached = facets.iter().find(|(_, area)| {
+        left -= area;
+        left <= 0.0
+    });
+    reached.map_or(0.0, |(height, _)| *height)
+}
 
 /// Most passes that are planned: ten times what a part of ten metres takes at 0.1 mm. More of them
 /// take up memory without end.
@@ -395,8 +430,9 @@ pub fn plan(
 ) -> Result<Plan, PlanError> {
     let step = match settings.step {
         Step::Scallop(h) => {
-            let share = if part.patches().is_empty() { CHORD_SHARE_OF_MESHES } else { CHORD_SHARE };
-            Step::Scallop((h - share * settings.chord_tolerance).max(LEAST_SHARE_OF_TARGET * h))
+            let facets = if part.patches().is_empty() { facet_height(part.mesh()) } else { 0.0 };
+            let less = CHORD_SHARE * settings.chord_tolerance + facets;
+            Step::Scallop((h - less).max(LEAST_SHARE_OF_TARGET * h))
         }
         stepover => stepover,
     };
@@ -425,15 +461,20 @@ pub fn plan(
         }
         Strategy::Spiral => (spiral::passes(part, cutter, &pass, monitor)?, true),
         Strategy::ContourSpiral => (contour_spiral::passes(part, cutter, &pass, monitor)?, true),
-        Strategy::ShortestStreamline if mesh_surface::wants_mesh(part, cutter) => {
-            (mesh_passes::on_mesh(part, cutter, None, &pass, monitor)?, true)
+        Strategy::ShortestStreamline { toward } => {
+            let toward = toward.as_ref().map(|(direction, dearer)| (direction, *dearer));
+            let passes = if mesh_surface::wants_mesh(part, cutter) {
+                mesh_passes::on_mesh(part, cutter, Aim::Shortest(toward), &pass, monitor)?
+            } else {
+                shortest::passes(part, cutter, toward, &pass, monitor)?
+            };
+            (passes, true)
         }
-        Strategy::ShortestStreamline => (shortest::passes(part, cutter, &pass, monitor)?, true),
         Strategy::Streamline { direction, method, .. }
             if *method == StreamMethod::Elements
                 || (*method == StreamMethod::Automatic && mesh_surface::wants_mesh(part, cutter)) =>
         {
-            (mesh_passes::on_mesh(part, cutter, Some(direction), &pass, monitor)?, true)
+            (mesh_passes::on_mesh(part, cutter, Aim::Fitted(direction), &pass, monitor)?, true)
         }
         Strategy::Streamline { direction, control_points, method, solver } => {
             let fitting = Fitting { controls: *control_points, method: *method, solver: *solver };
@@ -441,7 +482,8 @@ pub fn plan(
         }
     };
     let Passes { passes, mut notes, mut field, contacts } = passes;
-    let by_streamlines = matches!(strategy, Strategy::Streamline { .. } | Strategy::ShortestStreamline);
+    let by_streamlines =
+        matches!(strategy, Strategy::Streamline { .. } | Strategy::ShortestStreamline { .. });
     let field = by_streamlines.then(|| {
         field.measure(&contacts);
         field

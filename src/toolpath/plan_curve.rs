@@ -49,20 +49,21 @@ impl PlanCurves<'_> {
         self.drop_at(curve, s).map(|(xy, d)| Point3::new(xy.x, xy.y, d.tip_z))
     }
 
+    /// How far the cutter has rolled over the border at `s`; `None` off the part.
+    fn rolled(&self, curve: Curve<'_>, s: f64) -> Option<f64> {
+        let (xy, drop) = self.drop_at(curve, s)?;
+        if self.cutter.corner_radius() == 0.0 || !self.border.holds(&drop.contact) {
+            return Some(0.0);
+        }
+        Some(self.border.rolled(self.cutter, &xy.into(), &drop.contact))
+    }
+
     /// How the cutter stands at `s`.
     fn contact(&self, curve: Curve<'_>, s: f64) -> Contact {
-        let Some((xy, drop)) = self.drop_at(curve, s) else { return Contact::Off };
-        let rc = self.cutter.corner_radius();
-        if rc == 0.0 || !self.border.holds(&drop.contact) {
-            return Contact::Inside;
-        }
-        let rolled = self.border.rolled(self.cutter, &xy.into(), &drop.contact);
-        if rolled <= END_PRECISION {
-            Contact::Inside
-        } else if rolled <= self.overrun {
-            Contact::Rolling
-        } else {
-            Contact::Off
+        match self.rolled(curve, s) {
+            Some(rolled) if rolled <= END_PRECISION => Contact::Inside,
+            Some(rolled) if rolled <= self.overrun => Contact::Rolling,
+            _ => Contact::Off,
         }
     }
 
@@ -91,21 +92,22 @@ impl PlanCurves<'_> {
         stretches.push((before.1, start, s1));
         let runs = stretches.split_mut(|(contact, ..)| *contact == Contact::Off);
         let pieces = runs.map(|run| {
-            self.shorten_ends(run);
+            self.shorten_ends(curve, run);
             self.moves(curve, run)
         });
         pieces.filter(|points| points.as_ref().map_or(true, |points| points.len() >= 2)).collect()
     }
 
-    /// Cuts the rolls at both ends of a run back to what is of use. A roll over the whole overrun on a
-    /// length l means that the pass meets the border at an angle of sine overrun/l.
-    fn shorten_ends(&self, run: &mut [(Contact, f64, f64)]) {
-        let useful = |a: f64, b: f64| {
-            let sine = (self.overrun / (b - a)).min(1.0);
+    /// Cuts the rolls at both ends of a run back to what is of use. A roll by some distance over a length l
+    /// means that the pass meets the border at an angle of sine distance/l; it may end early, at a corner.
+    fn shorten_ends(&self, curve: Curve<'_>, run: &mut [(Contact, f64, f64)]) {
+        let useful = |from: f64, end: f64| {
+            let rolled = self.rolled(curve, end).unwrap_or(self.overrun).min(self.overrun);
+            let sine = (rolled / (end - from).abs()).min(1.0);
             useful_overrun((1.0 - sine * sine).sqrt() / sine) * self.overrun
         };
         if let Some((Contact::Rolling, a, b)) = run.first_mut() {
-            *a = a.max(*b - useful(*a, *b));
+            *a = a.max(*b - useful(*b, *a));
         }
         if let Some((Contact::Rolling, a, b)) = run.last_mut() {
             *b = b.min(*a + useful(*a, *b));

@@ -13,9 +13,10 @@
 use std::f64::consts::PI;
 
 use super::chart::Chart;
+use super::feed;
 use super::iso_scallop::{front_at, on_chart, places};
 use super::level_passes::along_levels;
-use super::plan::{FrontStart, PassSettings, Passes, PlanError, Step};
+use super::plan::{FeedDirection, FrontStart, PassSettings, Passes, PlanError, Step};
 use crate::cutter::Cutter;
 use crate::field::{
     Gradients, NormalEquations, Packed, Roughness, Rounds, ScalarField, ScalarSpline, Site, Start, eikonal,
@@ -100,12 +101,23 @@ pub fn shortest_possible(part: &Part, cutter: &Cutter, h: f64) -> Result<Shortes
 pub(super) fn passes(
     part: &Part,
     cutter: &Cutter,
+    toward: Option<(&FeedDirection, f64)>,
     settings: &PassSettings,
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
+    let charts = Chart::all(part, cutter)?;
+    if let Some((direction, _)) = toward {
+        let parameters: Vec<_> = charts.iter().map(|chart| chart.domain).collect();
+        feed::check(direction, part, &parameters)?;
+    }
     let mut all = Passes::default();
-    for chart in Chart::all(part, cutter)? {
-        let search = Search { chart: &chart, cutter, step: settings.step, monitor };
+    for chart in charts {
+        let toward = match toward {
+            Some((direction, dearer)) => Some((feed::on_chart(direction, &chart, cutter)?, dearer)),
+            None => None,
+        };
+        let toward = toward.as_ref().map(|(direction, dearer)| (&**direction, *dearer));
+        let search = Search { chart: &chart, cutter, step: settings.step, toward, monitor };
         let mut all_planned = Vec::new();
         for (spline, promised) in search.run()? {
             let field = ScalarField::Spline(spline);
@@ -113,6 +125,11 @@ pub(super) fn passes(
         }
         all_planned.sort_by(|(a, _), (b, _)| a.length().total_cmp(&b.length()));
         let Some((mut planned, promised)) = all_planned.into_iter().next() else { continue };
+        if let Some((direction, _)) = toward {
+            planned.field.set_directions(part, &chart, |[u, v]| chart.at(u, v)?.feed(direction, cutter));
+            all.append(planned);
+            continue;
+        }
         planned.notes.push(shortest_note(&planned, promised));
         // A front whose passes run along two whole borders, or are packed without any slack, may still be shorter.
         let worth = planned.length();
@@ -142,6 +159,8 @@ struct Search<'a> {
     chart: &'a Chart<'a>,
     cutter: &'a Cutter,
     step: Step,
+    /// A direction and how much dearer passes square to it are.
+    toward: Option<(&'a FeedDirection, f64)>,
     monitor: &'a dyn Monitor,
 }
 
@@ -286,10 +305,16 @@ impl Search<'_> {
         let front = front_at(self.chart, self.cutter, self.step, u, v)?;
         let p = self.chart.at(u, v)?;
         let (e, f, g) = p.jet.first_form();
+        let wanted = self.toward.and_then(|(direction, dearer)| {
+            let (tangent, matters) = p.feed(direction, self.cutter)?;
+            Some((tangent, dearer * matters))
+        });
         let costs = [0, 1, 2].map(|k| {
             let [du, dv] = front.vector(PI * k as f64 / 3.0);
             let feed = (p.jet.du * du + p.jet.dv * dv).cross(&p.normal);
-            1.0 - p.curvature_along(&feed) * self.cutter.corner_radius()
+            let away =
+                wanted.map_or(0.0, |(direction, dearer)| dearer * (1.0 - feed.dot(&direction).powi(2)));
+            1.0 - p.curvature_along(&feed) * self.cutter.corner_radius() + away
         });
         let cost = Site::harmonic(costs);
         let border = (along != [0.0; 2]).then(|| front.components(along));

@@ -24,8 +24,8 @@ const WINDOWS: usize = 48;
 /// Shares of the length (of level curves, not of places) whose allowed step is tried as the step.
 const CANDIDATES: [f64; 12] = [0.0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0];
 
-/// A step this share wider than allowed is not worth a further pass: 0.5 % are 1 % of the scallop height.
-const TOLERATED: f64 = 0.005;
+/// A step this share wider than allowed is not worth a further pass: 0.2 % are 0.4 % of the scallop height.
+const TOLERATED: f64 = 0.002;
 
 /// What each halving adds to the length of the passes that it puts in: overlaps and air moves.
 const HALVING_COST: f64 = 0.1;

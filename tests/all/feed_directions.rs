@@ -291,3 +291,41 @@ fn the_report_tells_singular_points_and_intervals() {
     let page = std::fs::read_to_string(home.path().join("out/report.html")).unwrap();
     assert!(page.contains("singular points with their index") && page.contains("Intervals of streamline"));
 }
+
+/// Between the shortest path and a wanted direction: the dearer passes square to it are, the nearer they keep to it and
+/// the longer the path is; on charts and on meshes.
+#[test]
+fn passes_keep_to_a_direction_as_far_as_it_is_worth() {
+    let shape = AnalyticShape::Saddle { radius_concave: 20.0, radius_convex: 20.0 };
+    let patch = formula(shape, [-12.0, 12.0], [-12.0, 12.0]);
+    let n = 48;
+    let at = |k: usize| -12.0 + 24.0 * k as f64 / n as f64;
+    let corner = |i: usize, j: usize| (j * (n + 1) + i) as u32;
+    let squares = (0..n)
+        .flat_map(|j| (0..n).map(move |i| (i, j)))
+        .filter(|&(i, j)| !(20..24).contains(&i) || !(20..24).contains(&j));
+    let triangles = squares.flat_map(|(i, j)| {
+        let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+        [[a, b, c], [a, c, d]]
+    });
+    let z = |x: f64, y: f64| (x * x - y * y) / 40.0;
+    let vertices = (0..=n).flat_map(|j| (0..=n).map(move |i| Point3::new(at(i), at(j), z(at(i), at(j)))));
+    let holed = mesh(vertices.collect(), triangles.collect());
+    let cutter = Cutter::ball(12.0).unwrap();
+    for part in [patch, holed] {
+        let run = |toward: Option<(FeedDirection, f64)>| {
+            let strategy = Strategy::ShortestStreamline { toward };
+            plan(&part, &cutter, &strategy, &settings(&part, Step::Scallop(0.01)), &Silent).unwrap().path
+        };
+        let length = |path: &Toolpath| -> f64 {
+            let cuts = path.moves.windows(2).filter(|w| w[1].kind == MoveKind::Cut);
+            cuts.map(|w| (w[1].to.tip - w[0].to.tip).norm()).sum()
+        };
+        let inside = [[-10.0, 10.0], [-10.0, 10.0]];
+        let off = |path: &Toolpath| share_off(path, inside, 0.1, |_| FRAC_PI_2);
+        let [free, held] = [run(None), run(Some((FeedDirection::Angle(FRAC_PI_2), 10.0)))];
+        assert!(off(&free) > 0.9, "along the valley's bend the cutter moves least: {}", off(&free));
+        assert!(off(&held) < 0.1, "{}", off(&held));
+        assert!(length(&free) < 0.95 * length(&held), "{} {}", length(&free), length(&held));
+    }
+}

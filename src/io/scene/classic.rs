@@ -115,7 +115,9 @@ pub(super) fn name(strategy: &Strategy) -> Option<&'static str> {
         Strategy::IsoScallop { .. } => "iso-scallop",
         Strategy::Waterline { .. } => "waterline",
         Strategy::Spiral | Strategy::ContourSpiral => "spiral",
-        Strategy::Pocket(_) | Strategy::ShortestStreamline | Strategy::Streamline { .. } => return None,
+        Strategy::Pocket(_) | Strategy::ShortestStreamline { .. } | Strategy::Streamline { .. } => {
+            return None;
+        }
     })
 }
 
@@ -152,6 +154,6 @@ pub(super) fn write(out: &mut String, strategy: &Strategy) -> fmt::Result {
         Strategy::Waterline { steps } => writeln!(out, "step = \"{}\"", word(&HEIGHT_STEPS, steps)),
         Strategy::Spiral => writeln!(out, "kind = \"plan\""),
         Strategy::ContourSpiral => writeln!(out, "kind = \"contour\""),
-        Strategy::Pocket(_) | Strategy::ShortestStreamline | Strategy::Streamline { .. } => Ok(()),
+        Strategy::Pocket(_) | Strategy::ShortestStreamline { .. } | Strategy::Streamline { .. } => Ok(()),
     }
 }

@@ -461,8 +461,12 @@ fn read_toolpaths(
 /// Keys of all toolpaths but pockets'.
 const COMMON: [&str; 7] = ["name", "strategy", "stepover", "scallop", "links", "longest_link", "smoothing"];
 
+/// How much dearer passes square to a wanted direction may be made.
+const FOLLOW: std::ops::RangeInclusive<f64> = 0.0..=1000.0;
+
 /// Keys of streamlines.
-const STREAMLINE: [&str; 9] = [
+const STREAMLINE: [&str; 10] = [
+    "follow",
     direction::KEYS[0],
     direction::KEYS[1],
     direction::KEYS[2],
@@ -574,11 +578,19 @@ fn read_streamline(
     folder: &Path,
     files: &mut Vec<NamedFile>,
 ) -> Result<Strategy, SceneError> {
-    let Some(direction) = direction::read(section, folder, files)? else {
-        let keys: Vec<&str> = COMMON.into_iter().chain(["direction"]).collect();
-        section.only(&keys, &STREAMLINE, "direction = \"shortest\"")?;
-        return Ok(Strategy::ShortestStreamline);
+    let shortest = |keys: &[&'static str], what: &str| {
+        let keys: Vec<&str> = COMMON.into_iter().chain(keys.iter().copied()).collect();
+        section.only(&keys, &STREAMLINE, what)
     };
+    let Some(direction) = direction::read(section, folder, files)? else {
+        shortest(&["direction"], "direction = \"shortest\"")?;
+        return Ok(Strategy::ShortestStreamline { toward: None });
+    };
+    if let Some(dearer) = section.number("follow", FOLLOW, "")? {
+        let keys: Vec<&str> = direction::KEYS.into_iter().chain(["follow"]).collect();
+        shortest(&keys, "`follow`, which leaves no method to choose")?;
+        return Ok(Strategy::ShortestStreamline { toward: Some((direction, dearer.value)) });
+    }
     let control_points =
         section.count("control_points", 4..=200)?.map_or(DEFAULT_CONTROL_POINTS, |n| n as usize);
     let (method, solver) = read_stream_method(section, control_points)?;

@@ -101,6 +101,11 @@ fn classical_strategies_are_read_and_written_back() {
         ("waterline\"", Strategy::Waterline { steps: LevelSteps::Shortest }),
         ("waterline\"\nstep = \"constant\"", Strategy::Waterline { steps: LevelSteps::Constant }),
         ("spiral\"", Strategy::Spiral),
+        ("streamline\"\ndirection = \"shortest\"", Strategy::ShortestStreamline { toward: None }),
+        (
+            "streamline\"\ndirection = \"contour\"\nfollow = 1.5",
+            Strategy::ShortestStreamline { toward: Some((FeedDirection::Contour, 1.5)) },
+        ),
         ("spiral\"\nkind = \"contour\"", Strategy::ContourSpiral),
     ];
     let head = &VALID[..VALID.find("[[toolpath]]").unwrap()];
@@ -485,6 +490,9 @@ fn feed_directions_that_say_nothing_are_refused() {
         ("direction = \"contour\"\nacross = true", "a sense of no curve"),
         ("direction = \"border\"\nacross = 1", "true or false"),
         ("direction = \"shortest\"\nacross = true", "a sense of no curve"),
+        ("direction = \"shortest\"\nfollow = 1", "does not apply"),
+        ("direction = \"u\"\nfollow = 1\nsolver = \"cg\"", "does not apply"),
+        ("direction = \"u\"\nfollow = -1", "follow"),
         ("direction = \"shortest\"\nmethod = \"bspline\"", "does not apply"),
         ("direction = { blend = [] }", "two directions or more"),
         ("direction = { blend = [{ direction = \"u\" }] }", "two directions or more"),

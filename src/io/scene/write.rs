@@ -178,7 +178,11 @@ fn write_joining(out: &mut String, request: &ToolpathRequest, scene: &Scene) -> 
 fn write_strategy(out: &mut String, request: &ToolpathRequest) -> std::fmt::Result {
     match &request.strategy {
         Strategy::Pocket(strategy) => pocket::write_strategy(out, strategy),
-        Strategy::ShortestStreamline => writeln!(out, "direction = \"shortest\""),
+        Strategy::ShortestStreamline { toward: None } => writeln!(out, "direction = \"shortest\""),
+        Strategy::ShortestStreamline { toward: Some((toward, dearer)) } => {
+            direction::write(out, toward, &mut request.directions.iter(), "\n")?;
+            writeln!(out, "\nfollow = {}  # mm more for each mm of pass square to it", number(*dearer))
+        }
         Strategy::Streamline { direction, control_points, method, solver } => {
             direction::write(out, direction, &mut request.directions.iter(), "\n")?;
             writeln!(out)?;
