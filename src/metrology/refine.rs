@@ -116,24 +116,22 @@ impl Refinement<'_> {
                 refined.rectangles += 1;
                 self.look(tile, suspicion, measured, &mut greatest, &mut refined, monitor)?;
                 monitor.advance(1);
-            } else if open {
-                greatest.possible_height = greatest.possible_height.max(suspicion.height);
+            } else {
+                let height = if open { suspicion.height } else { 0.0 };
+                greatest.possible_height = greatest.possible_height.max(height);
                 greatest.possible_depth = greatest.possible_depth.max(suspicion.deeper);
             }
         }
-        if refined.rectangles > 0 {
-            let (uncut, gouge) = (&mut measured.uncut, &mut measured.gouge);
-            uncut.error_bound_mm =
-                (greatest.possible_height - uncut.max_height_mm).max(0.0) + NUMERICAL_FLOOR;
-            gouge.error_bound_mm = (greatest.possible_depth - gouge.max_depth_mm).max(0.0) + NUMERICAL_FLOOR;
-            uncut.regions.sort_by(|a, b| b.height_mm.total_cmp(&a.height_mm));
-            gouge.regions.sort_by(|a, b| b.depth_mm.total_cmp(&a.depth_mm));
-            let area = measured.deviation.area_mm2;
-            uncut.fraction = if area > 0.0 { uncut.area_mm2 / area } else { 0.0 };
-            let possible = greatest.possible_ridge.max(greatest.ridge);
-            measured.scallop.error_bound_mm =
-                measured.scallop.max_mm.map(|height| possible - height + NUMERICAL_FLOOR);
-        }
+        let (uncut, gouge) = (&mut measured.uncut, &mut measured.gouge);
+        uncut.error_bound_mm = (greatest.possible_height - uncut.max_height_mm).max(0.0) + NUMERICAL_FLOOR;
+        gouge.error_bound_mm = (greatest.possible_depth - gouge.max_depth_mm).max(0.0) + NUMERICAL_FLOOR;
+        uncut.regions.sort_by(|a, b| b.height_mm.total_cmp(&a.height_mm));
+        gouge.regions.sort_by(|a, b| b.depth_mm.total_cmp(&a.depth_mm));
+        let area = measured.deviation.area_mm2;
+        uncut.fraction = if area > 0.0 { uncut.area_mm2 / area } else { 0.0 };
+        let possible = greatest.possible_ridge.max(greatest.ridge);
+        measured.scallop.error_bound_mm =
+            measured.scallop.max_mm.map(|height| possible - height + NUMERICAL_FLOOR);
         refined.note = open_bounds(measured, bound, self.coarse.grid.cell);
         Ok(refined)
     }
@@ -216,9 +214,12 @@ impl Refinement<'_> {
                 ..*greatest
             };
             rest.height = hidden;
+            // What these cells may have missed in turn.
+            let missed = unseen_depth(self.coarse.cutter, cell, 1.0);
+            rest.deeper = rest.deeper.min(found.gouge.max_depth_mm + found.gouge.error_bound_mm + missed);
             last = Some(found);
             if !self.open(&rest, &now, cell) {
-                (rest.height, rest.deeper) = (0.0, 0.0);
+                rest.height = 0.0;
                 break;
             }
         }
