@@ -70,13 +70,23 @@ impl<'a> Border<'a> {
     /// How far a cutter with its axis at `axis` has rolled over an edge that it touches at `contact`, mm: the
     /// distance of the corner's contact from where it would touch the surface beside the edge.
     pub fn rolled(&self, cutter: &Cutter, axis: &Point2, contact: &SurfacePoint) -> f64 {
+        self.roll(cutter, axis, contact).norm()
+    }
+
+    /// True where the part has surface in the plan view.
+    pub fn under(&self, p: &Point2) -> bool {
+        self.part.highest_at(p.x, p.y).is_some()
+    }
+
+    /// By how much the corner's contact would lie elsewhere had the surface gone on beside the edge.
+    pub fn roll(&self, cutter: &Cutter, axis: &Point2, contact: &SurfacePoint) -> Vector3 {
         // Direction from the contact to the centre of the corner's circle, against the normal.
         let out = axis - contact.point.xy();
         let rho = out.norm();
         let lean = cutter.profile().incline(rho).sin;
         let horizontal = if rho > 0.0 { out * (lean / rho) } else { out };
         let toward = Vector3::new(horizontal.x, horizontal.y, (1.0 - lean * lean).sqrt());
-        (toward - contact.normal).norm() * cutter.corner_radius()
+        (toward - contact.normal) * cutter.corner_radius()
     }
 
     /// True when `contact` lies on the border.

@@ -298,7 +298,7 @@ pub(super) struct PassSettings {
 /// Shares of the chord tolerance that sampling and point reduction may use. Together they leave a part of it: ridges stand
 /// between chords of two passes, and passes lie the closer the more chords may raise them.
 const SAMPLING_SHARE: f64 = 0.1;
-const REDUCTION_SHARE: f64 = 0.6;
+const REDUCTION_SHARE: f64 = 0.4;
 
 impl PassSettings {
     /// Straight moves along `locate` over `[s0, s1]` within the chord tolerance.
@@ -356,11 +356,11 @@ const SAMPLING_OVER_RADIUS: f64 = 0.15;
 
 /// A scallop target is planned for less this share of the chord tolerance. A chord may raise a ridge by half of it, but
 /// ridges stand between chords of two passes, whose greatest deviations seldom meet.
-const CHORD_SHARE: f64 = 0.25;
+const CHORD_SHARE: f64 = 0.28;
 
-/// On a mesh it is planned for less by what facets stand off the smooth surface, too: the height of this share of them
-/// (by area) is less. Facets at sharper angles than this, rad, are edges of the part.
-const FACETS: f64 = 0.9;
+/// On a mesh it is planned for less by what facets stand off the smooth surface, too: the height that this share of
+/// them (by area) stays below. Facets at sharper angles than this, rad, are edges of the part.
+const FACETS: f64 = 0.5;
 const SHARPEST_FACETS: f64 = 0.3;
 
 /// But it is not planned for less than this share of itself.

@@ -3,7 +3,7 @@
 //! Enters: a curve `s → (x, y)` of the cutter's axis, about one mm a unit. Leaves: tip positions of the runs on which the
 //! cutter touches surface, and rolls over the part's border no farther than is of use.
 
-use super::border::{Border, useful_overrun};
+use super::border::Border;
 use super::chord::Watch;
 use super::drop::{Drop, DropCutter};
 use super::plan::PassSettings;
@@ -13,6 +13,9 @@ use crate::monitor::{Cancelled, Monitor};
 
 /// How closely the end of a pass is placed, mm.
 const END_PRECISION: f64 = 1e-6;
+
+/// Places of a roll at the end of a pass that are looked at.
+const ROLL_STEPS: usize = 24;
 
 /// Where the axis is at `s`.
 pub(super) type Curve<'a> = &'a (dyn Fn(f64) -> Vector2 + Sync);
@@ -98,20 +101,27 @@ impl PlanCurves<'_> {
         pieces.filter(|points| points.as_ref().map_or(true, |points| points.len() >= 2)).collect()
     }
 
-    /// Cuts the rolls at both ends of a run back to what is of use. A roll by some distance over a length l
-    /// means that the pass meets the border at an angle of sine distance/l; it may end early, at a corner.
+    /// Cuts the rolls at both ends of a run back to what is of use.
     fn shorten_ends(&self, curve: Curve<'_>, run: &mut [(Contact, f64, f64)]) {
         let useful = |from: f64, end: f64| {
-            let rolled = self.rolled(curve, end).unwrap_or(self.overrun).min(self.overrun);
-            let sine = (rolled / (end - from).abs()).min(1.0);
-            useful_overrun((1.0 - sine * sine).sqrt() / sine) * self.overrun
+            let place = |k: usize| from + (end - from) * k as f64 / ROLL_STEPS as f64;
+            place((1..=ROLL_STEPS).find(|&k| !self.serves(curve, place(k))).unwrap_or(ROLL_STEPS))
         };
         if let Some((Contact::Rolling, a, b)) = run.first_mut() {
-            *a = a.max(*b - useful(*b, *a));
+            *a = useful(*b, *a);
         }
         if let Some((Contact::Rolling, a, b)) = run.last_mut() {
-            *b = b.min(*a + useful(*a, *b));
+            *b = useful(*a, *b);
         }
+    }
+
+    /// Whether half an interval to either side of where the cutter would touch, had the surface gone on, the part lies.
+    fn serves(&self, curve: Curve<'_>, s: f64) -> bool {
+        let Some((xy, drop)) = self.drop_at(curve, s) else { return false };
+        let contact = drop.contact.point.xy() + self.border.roll(self.cutter, &xy.into(), &drop.contact).xy();
+        let along = (curve(s + END_PRECISION) - curve(s - END_PRECISION)) / (2.0 * END_PRECISION);
+        let across = Vector2::new(-along.y, along.x) * (0.5 * self.overrun);
+        [across, -across].iter().any(|beside| self.border.under(&(contact + beside)))
     }
 
     fn moves(&self, curve: Curve<'_>, run: &[(Contact, f64, f64)]) -> Result<Vec<Point3>, Cancelled> {
