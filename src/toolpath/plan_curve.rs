@@ -107,6 +107,14 @@ impl PlanCurves<'_> {
             let place = |k: usize| from + (end - from) * k as f64 / ROLL_STEPS as f64;
             place((1..=ROLL_STEPS).find(|&k| !self.serves(curve, place(k))).unwrap_or(ROLL_STEPS))
         };
+        if let [(Contact::Rolling, a, b)] = run {
+            // Beside the part all along.
+            let place = |k: usize| *a + (*b - *a) * k as f64 / ROLL_STEPS as f64;
+            if !(1..ROLL_STEPS).any(|k| self.serves(curve, place(k))) {
+                *b = *a;
+            }
+            return;
+        }
         if let Some((Contact::Rolling, a, b)) = run.first_mut() {
             *a = useful(*b, *a);
         }
