@@ -56,7 +56,7 @@ const CANDIDATES_TILE: usize = 64;
 
 /// Side of a tile in cutter radii, about. In larger ones many moves are carried down a level in vain; in
 /// smaller ones a move is listed in many tiles.
-const TILE_RADII: f64 = 1.7;
+const TILE_RADII: f64 = 2.2;
 
 /// Greatest height of stock above the lowest tip in a tile, mm, for which f32 is used: there half a unit in
 /// the last place is 1e-6 mm, and a height is rounded a few times. Deeper tiles are cut in f64.
