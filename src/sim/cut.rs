@@ -56,7 +56,7 @@ const CANDIDATES_TILE: usize = 64;
 
 /// Side of a tile in cutter radii, about. In larger ones many moves are carried down a level in vain; in
 /// smaller ones a move is listed in many tiles.
-const TILE_RADII: f64 = 1.7;
+const TILE_RADII: f64 = 2.2;
 
 /// Greatest height of stock above the lowest tip in a tile, mm, for which f32 is used: there half a unit in
 /// the last place is 1e-6 mm, and a height is rounded a few times. Deeper tiles are cut in f64.
@@ -210,12 +210,12 @@ impl Job<'_> {
     fn cut_with<T: Real, S: Sweep<T>>(&self, sweep: S, grid: &Grid, tile: Tile<'_, '_>) -> Work {
         let Tile { cells: tile, moves, tracks, frame, tops } = tile;
         let mut levels = vec![Level::new()];
-        for (&k, track) in moves.iter().zip(tracks) {
+        levels[0].moves.reset(moves.len());
+        for (n, (&k, track)) in moves.iter().zip(tracks).enumerate() {
             let (local, bound_only) = LocalMove::new(track, &frame);
             let falling = Track::falls(self.path.start_of(k as usize), self.path.moves[k as usize].to.tip);
-            levels[0].moves.push(&local, Name::new(k, bound_only, falling));
+            levels[0].moves.put(n, &local, Name::new(k, bound_only, falling));
         }
-        levels[0].moves.seal();
         let mut worker = Worker {
             job: self,
             sweep,
@@ -389,20 +389,25 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
     /// Marks for each of some squares those of the level's moves that may be lowest somewhere in it.
     #[inline(always)]
     fn choose<const Q: usize>(&mut self, level: usize, squares: [[usize; 2]; Q], side: usize) {
-        let cells = squares.map(|at| self.inside(at, side).map(|size| (at, size)));
-        let stocks = cells.map(|c| c.map_or(T::of(f64::NEG_INFINITY), |(at, size)| self.stock_top(at, size)));
-        let Some(first) = cells[0] else { return };
-        // Squares outside choose as the first one does, which always has cells, and are left out later.
-        let squares = cells.map(|c| c.unwrap_or(first)).map(|(at, size)| self.square_at(at, size));
         if self.levels[level].moves.len() <= FEW {
             // So few cost less at every cell than telling them apart.
             self.choose_all(level);
             return;
         }
+        let Some(first) = self.inside(squares[0], side) else { return };
+        // Squares outside choose as the first one does, which always has cells, and are left out later.
+        let first = self.square_at(squares[0], first);
+        let (mut places, mut stocks) = ([first; Q], [T::of(f64::NEG_INFINITY); Q]);
+        // No calls of `map`: what is not inlined is not vector code.
+        for q in 0..Q {
+            if let Some(size) = self.inside(squares[q], side) {
+                (places[q], stocks[q]) = (self.square_at(squares[q], size), self.stock_top(squares[q], size));
+            }
+        }
         let Level { moves, chosen, kept } = &mut self.levels[level];
         let margin = T::of(self.job.margin);
         self.work.tests += (moves.len() * Q) as u64;
-        *kept = self.chooser.choose(&self.sweep, moves, &squares, &stocks, margin, chosen);
+        *kept = self.chooser.choose(&self.sweep, moves, &places, &stocks, margin, chosen);
     }
 
     /// Marks all of the level's moves for each square.
@@ -422,13 +427,14 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
         }
         let (above, below) = self.levels.split_at_mut(level + 1);
         let (above, below) = (&above[level], &mut below[0].moves);
-        below.clear();
+        below.reset(above.kept[q]);
+        let mut n = 0;
         for (chunk, chosen) in above.moves.chunks().iter().zip(&above.chosen) {
             for lane in ones(chosen[q]) {
-                below.push(&chunk.lane(lane), chunk.name(lane));
+                below.put(n, &chunk.lane(lane), chunk.name(lane));
+                n += 1;
             }
         }
-        below.seal();
     }
 
     /// The highest stock in the square.
@@ -454,6 +460,12 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
     ) {
         let infinite = T::of(f64::INFINITY);
         let first = self.square_at([i, j], [1, 1]);
+        // Through arrays of a fixed length: loops over those become vector code. Read long before they are needed:
+        // vectors of what was just written in parts have to wait for it.
+        let mut stored = [f32::NEG_INFINITY; CELLS];
+        for (row, (heights, _)) in self.tile.rows[j..j + ny].iter().enumerate() {
+            copy_row::<N, _>(&mut stored[row * N..], &heights[i..], nx);
+        }
         let mut height = [infinite; CELLS];
         let mut doubt = [infinite; CELLS];
         let mut by = [NOT_CUT; CELLS];
@@ -469,7 +481,7 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
                 let w = across + (y[c] * m.ux - x[c] * m.uy);
                 let (h, d) = self.sweep.height(&m, a, w);
                 let lower = h < height[c];
-                height[c] = if lower { h } else { height[c] };
+                height[c] = h.smaller(height[c]);
                 by[c] = if lower { index } else { by[c] };
                 doubt[c] = d.smaller(doubt[c]);
             }
@@ -480,11 +492,6 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
         if second_look {
             self.leaf_again([level, q], [i, j], [nx, ny]);
             return;
-        }
-        // Through arrays of a fixed length: loops over those become vector code.
-        let mut stored = [f32::NEG_INFINITY; CELLS];
-        for (row, (heights, _)) in self.tile.rows[j..j + ny].iter().enumerate() {
-            copy_row::<N, _>(&mut stored[row * N..], &heights[i..], nx);
         }
         for c in 0..CELLS {
             let cut = (height[c].wide() + self.frame.z) as f32;

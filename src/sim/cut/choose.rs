@@ -86,16 +86,16 @@ impl<T: Real> Chooser<T> {
         {
             let followed = followed(chunk, chunks.get(k + 1));
             for q in 0..Q {
-                (planes[q], neighbours[q]) = planes_of(sweep, chunk, &squares[q], followed);
-                best[q].include(k, chunk, &planes[q], covered_within(sweep, &squares[q]));
+                (planes[q], neighbours[q]) = planes_of(sweep, chunk, &squares[q], followed, k, &mut best[q]);
             }
         }
-        let best = best.map(|b| b.place());
-        let ceilings = ceilings(sweep, all, &best, squares);
-        let reach2 = squares.map(|s| {
-            let reach = sweep.radius() + half_diagonal(&s);
-            reach * reach
-        });
+        let (mut places, mut reach2) = ([None; Q], [T::of(0.0); Q]);
+        for q in 0..Q {
+            places[q] = best[q].place();
+            let reach = sweep.radius() + half_diagonal(&squares[q]);
+            reach2[q] = reach * reach;
+        }
+        let ceilings = ceilings(sweep, all, &places, squares);
         chosen.clear();
         let mut kept = [0; SQUARES];
         let mut before = [Neighbours::default(); Q];
@@ -104,16 +104,16 @@ impl<T: Real> Chooser<T> {
         {
             let mut marks = [0; SQUARES];
             for q in 0..Q {
-                let mut keep = [0u32; LANES];
+                let mut keep = [0; LANES];
                 for lane in 0..LANES {
                     let corners = planes[q].corners(lane, &squares[q], margin);
                     let above = at_or_above(corners, ceilings[q]);
                     let lowest = corners[0].smaller(corners[1]).smaller(corners[2].smaller(corners[3]));
                     keep[lane] =
-                        u32::from(!above & (lowest < stocks[q]) & (planes[q].away[lane] <= reach2[q]));
+                        u8::from(!above & (lowest < stocks[q]) & (planes[q].away[lane] <= reach2[q]));
                 }
                 let own = neighbours[q];
-                let of_best = best[q].filter(|[chunk, _]| *chunk == k).map_or(0, |[_, lane]| 1 << lane);
+                let of_best = places[q].filter(|[chunk, _]| *chunk == k).map_or(0, |[_, lane]| 1 << lane);
                 marks[q] = (bits(&keep) & !own.covered(&before[q]) | of_best) & all.lanes_in_use(k);
                 kept[q] += marks[q].count_ones() as usize;
                 before[q] = own;
@@ -151,16 +151,6 @@ struct Best<T> {
 }
 
 impl<T: Real> Best<T> {
-    #[inline(always)]
-    fn include(&mut self, k: usize, chunk: &Chunk<T>, planes: &Planes<T>, within: T) {
-        for lane in 0..LANES {
-            let may = !chunk.name(lane).bound_only() & (planes.away[lane] <= within);
-            let lower = may & (planes.z[lane] < self.least[lane]);
-            self.least[lane] = if lower { planes.z[lane] } else { self.least[lane] };
-            self.chunk[lane] = if lower { k as u32 } else { self.chunk[lane] };
-        }
-    }
-
     /// Chunk and lane of the lowest one.
     #[inline(always)]
     fn place(&self) -> Option<[usize; 2]> {
@@ -195,10 +185,13 @@ fn ceilings<T: Real, S: Sweep<T>, const Q: usize>(
     for lane in 0..LANES {
         heights[lane] = sure_height(sweep, &moves.lane(lane), x[lane], y[lane]);
     }
-    std::array::from_fn(|q| match best[q] {
-        Some(_) => std::array::from_fn(|c| heights[4 * q + c]),
-        None => [infinite; 4],
-    })
+    let mut ceilings = [[infinite; 4]; Q];
+    for q in 0..Q {
+        if best[q].is_some() {
+            ceilings[q].copy_from_slice(&heights[4 * q..4 * q + 4]);
+        }
+    }
+    ceilings
 }
 
 /// What the moves of a chunk have to do with their neighbours in the program: one bit for each lane.
@@ -234,7 +227,7 @@ fn followed<T: Real>(chunk: &Chunk<T>, next: Option<&Chunk<T>>) -> u32 {
     following[LANES - 1] = next.map_or(u32::MAX, |next| next.name(0).index());
     let mut followed = [0; LANES];
     for lane in 0..LANES {
-        followed[lane] = u32::from(following[lane] == chunk.name(lane).index() + 1);
+        followed[lane] = u8::from(following[lane] == chunk.name(lane).index() + 1);
     }
     bits(&followed)
 }
@@ -291,7 +284,7 @@ fn judge<T: Real, S: Sweep<T>>(
             for (k, (chosen, [f0, f1, f2, f3])) in chosen.iter_mut().zip(&floor).enumerate() {
                 let mut above = [0; LANES];
                 for lane in 0..LANES {
-                    above[lane] = u32::from(at_or_above([f0[lane], f1[lane], f2[lane], f3[lane]], ceiling));
+                    above[lane] = u8::from(at_or_above([f0[lane], f1[lane], f2[lane], f3[lane]], ceiling));
                 }
                 let own = if k == b { 1 << lane } else { 0 };
                 chosen[q] &= !bits(&above) | own;
@@ -315,33 +308,40 @@ fn least_of<T: Real>(numbers: &[T; LANES]) -> (T, usize) {
         two[k] = four[k].smaller(four[k + 2]);
     }
     let least = two[0].smaller(two[1]);
-    let mut lanes = [0u32; LANES];
+    let mut lanes = [0; LANES];
     for lane in 0..LANES {
-        lanes[lane] = u32::from(numbers[lane] <= least);
+        lanes[lane] = u8::from(numbers[lane] <= least);
     }
     (least, bits(&lanes).trailing_zeros() as usize % LANES)
 }
 
-/// One bit for each lane that is not zero.
+/// One bit for each lane: lanes are 0 or 1.
 #[inline(always)]
-fn bits(lanes: &[u32; LANES]) -> u32 {
-    let mut bits = 0;
-    for lane in 0..LANES {
-        bits |= lanes[lane] << lane;
-    }
-    bits
+fn bits(lanes: &[u8; LANES]) -> u32 {
+    // Kept in memory, or what fills the lanes is taken apart into sixteen scalars.
+    let lanes = std::hint::black_box(lanes);
+    // The product moves the lowest bits of eight bytes side by side to the top.
+    let eight = |k: usize| {
+        let bytes = u64::from_le_bytes(std::array::from_fn(|b| lanes[k + b]));
+        (bytes.wrapping_mul(0x0102_0408_1020_4080) >> 56) as u32
+    };
+    eight(0) | eight(8) << 8
 }
 
-/// The planes of a chunk, and what its moves have to do with their neighbours.
+/// The planes of chunk `k`, and what its moves have to do with their neighbours; the lowest that pass all of the
+/// square enter `best`. All in one loop: short ones do not become vector code.
 #[inline(always)]
 fn planes_of<T: Real, S: Sweep<T>>(
     sweep: &S,
     chunk: &Chunk<T>,
     square: &Square<T>,
     followed: u32,
+    k: usize,
+    best: &mut Best<T>,
 ) -> (Planes<T>, Neighbours) {
+    let within = covered_within(sweep, square);
     let mut planes = Planes::none();
-    let (mut at_start, mut at_end) = ([0u32; LANES], [0u32; LANES]);
+    let (mut at_start, mut at_end) = ([0; LANES], [0; LANES]);
     for lane in 0..LANES {
         let m = chunk.lane(lane);
         let (along, across) = m.along_across(square.x, square.y);
@@ -350,7 +350,8 @@ fn planes_of<T: Real, S: Sweep<T>>(
         planes.x[lane] = plane.along * m.ux - plane.across * m.uy;
         planes.y[lane] = plane.along * m.uy + plane.across * m.ux;
         let ahead = along - along.larger(m.low).smaller(m.high);
-        planes.away[lane] = ahead * ahead + across * across;
+        let away = ahead * ahead + across * across;
+        planes.away[lane] = away;
         let half_along = square.half_x * m.ux.absolute() + square.half_y * m.uy.absolute();
         let half_across = square.half_x * m.uy.absolute() + square.half_y * m.ux.absolute();
         let nearest = (across.absolute() - half_across).larger(T::of(0.0));
@@ -360,10 +361,13 @@ fn planes_of<T: Real, S: Sweep<T>>(
             [nearest, across.absolute() + half_across],
         );
         let name = chunk.name(lane);
+        let lowest = !name.bound_only() & (away <= within) & (plane.z < best.least[lane]);
+        best.least[lane] = if lowest { plane.z } else { best.least[lane] };
+        best.chunk[lane] = if lowest { k as u32 } else { best.chunk[lane] };
         // A plunge has both ends in one place, and only the lower one cuts.
         let counts = !name.bound_only() & (m.low < m.high);
-        at_start[lane] = u32::from(counts & if name.falling() { upper } else { lower });
-        at_end[lane] = u32::from(counts & if name.falling() { lower } else { upper });
+        at_start[lane] = u8::from(counts & if name.falling() { upper } else { lower });
+        at_end[lane] = u8::from(counts & if name.falling() { lower } else { upper });
     }
     (planes, Neighbours { at_start: bits(&at_start), at_end: bits(&at_end), followed })
 }

@@ -104,33 +104,23 @@ impl<T: Real> MoveList<T> {
         self.len
     }
 
+    /// Makes room for `len` moves, all of which are to be put in.
     #[inline(always)]
-    pub fn clear(&mut self) {
-        self.len = 0;
+    pub fn reset(&mut self, len: usize) {
+        if self.chunks.len() * LANES < len {
+            self.chunks.resize(len.div_ceil(LANES), Chunk::empty());
+        }
+        self.len = len;
+        // Loops over whole chunks do not take what is behind the last move for one.
+        if let Some(chunk) = self.chunks.get_mut(len / LANES) {
+            chunk.names[len % LANES..].fill(Name(BOUND_ONLY));
+        }
     }
 
     /// The chunks in use. The last one may end with moves of an earlier use.
     #[inline(always)]
     pub fn chunks(&self) -> &[Chunk<T>] {
         &self.chunks[..self.len.div_ceil(LANES)]
-    }
-
-    /// Appends a move.
-    #[inline(always)]
-    pub fn push(&mut self, m: &LocalMove<T>, name: Name) {
-        if self.len == LANES * self.chunks.len() {
-            self.chunks.push(Chunk::empty());
-        }
-        self.len += 1;
-        self.put(self.len - 1, m, name);
-    }
-
-    /// Marks what is behind the last move, so that loops over whole chunks do not take it for one.
-    #[inline(always)]
-    pub fn seal(&mut self) {
-        if let Some(chunk) = self.chunks.get_mut(self.len / LANES) {
-            chunk.names[self.len % LANES..].fill(Name(BOUND_ONLY));
-        }
     }
 
     /// One bit for each lane of chunk `k` that holds a move.
@@ -140,8 +130,9 @@ impl<T: Real> MoveList<T> {
         u32::MAX >> (u32::BITS as usize - count)
     }
 
+    /// Move `k`.
     #[inline(always)]
-    fn put(&mut self, k: usize, m: &LocalMove<T>, name: Name) {
+    pub fn put(&mut self, k: usize, m: &LocalMove<T>, name: Name) {
         self.chunks[k / LANES].set(k % LANES, m, name);
     }
 
