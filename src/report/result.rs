@@ -138,7 +138,7 @@ pub struct IntervalFigures {
 pub struct FieldFigures {
     /// Number of singular points.
     pub singular_point_count: usize,
-    /// The first of them, 16 at most.
+    /// The first of them, 100 at most.
     pub singular_points: Vec<SingularPointFigures>,
     /// Intervals over the allowed ones, where passes have neighbours.
     #[serde(skip_serializing_if = "Option::is_none")]

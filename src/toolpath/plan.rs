@@ -360,7 +360,7 @@ const CHORD_SHARE: f64 = 0.18;
 
 /// On a mesh it is planned for less by what facets stand off the smooth surface, too: the height that this share of
 /// them (by area) stays below. Facets at sharper angles than this, rad, are edges of the part.
-const FACETS: f64 = 0.5;
+const FACETS: f64 = 0.6;
 const SHARPEST_FACETS: f64 = 0.3;
 
 /// But it is not planned for less than this share of itself.

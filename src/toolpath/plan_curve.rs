@@ -14,6 +14,9 @@ use crate::monitor::{Cancelled, Monitor};
 /// How closely the end of a pass is placed, mm.
 const END_PRECISION: f64 = 1e-6;
 
+/// First sampling distance of rolls as a share of that on surface.
+const ROLLING_SAMPLING: f64 = 0.1;
+
 /// Places of a roll at the end of a pass that are looked at.
 const ROLL_STEPS: usize = 24;
 
@@ -134,8 +137,11 @@ impl PlanCurves<'_> {
 
     fn moves(&self, curve: Curve<'_>, run: &[(Contact, f64, f64)]) -> Result<Vec<Point3>, Cancelled> {
         let mut points: Vec<Point3> = Vec::new();
-        for &(_, a, b) in run.iter().filter(|(_, a, b)| b - a > END_PRECISION) {
-            let stretch = self.settings.moves(a, b, &mut |s| self.tip(curve, s), self.monitor)?;
+        for &(contact, a, b) in run.iter().filter(|(_, a, b)| b - a > END_PRECISION) {
+            // Rolling over corners of the border the cutter rises and falls within less than it does on surface.
+            let share = if contact == Contact::Rolling { ROLLING_SAMPLING } else { 1.0 };
+            let settings = PassSettings { sampling: share * self.settings.sampling, ..*self.settings };
+            let stretch = settings.moves(a, b, &mut |s| self.tip(curve, s), self.monitor)?;
             let joined = usize::from(!points.is_empty());
             points.extend(stretch.into_iter().skip(joined));
         }
