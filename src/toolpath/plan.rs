@@ -356,7 +356,7 @@ const SAMPLING_OVER_RADIUS: f64 = 0.15;
 
 /// A scallop target is planned for less this share of the chord tolerance. A chord may raise a ridge by half of it, but
 /// ridges stand between chords of two passes, whose greatest deviations seldom meet.
-const CHORD_SHARE: f64 = 0.18;
+const CHORD_SHARE: f64 = 0.26;
 
 /// On a mesh it is planned for less by what facets stand off the smooth surface, too: the height that this share of
 /// them (by area) stays below. Facets at sharper angles than this, rad, are edges of the part.

@@ -98,7 +98,7 @@ fn iso_scallop_passes_on_a_cylinder_are_those_of_its_arc() {
     let part = formula(shape, [-half, half], [0.0, 12.0]);
     let start = FrontStart::Border { constant: Along::U, greatest: false };
     let path = planned(&part, Strategy::IsoScallop { start }).path;
-    let (arc, h) = (2.0 * rho * (half / rho).asin(), 0.010 - 0.18 * LIMITS.chord);
+    let (arc, h) = (2.0 * rho * (half / rho).asin(), 0.010 - 0.26 * LIMITS.chord);
     let exact = arc / (8.0 * h / (1.0 / r + 1.0 / rho)).sqrt();
     let passes = path.passes() as f64;
     assert!(passes >= exact && passes <= 1.02 * exact + 1.0, "{passes} for {exact}");
@@ -149,7 +149,7 @@ fn the_contour_spiral_is_one_pass_and_a_few_short_ones() {
     lengths.sort_by(|a, b| b.total_cmp(a));
     let all: f64 = lengths.iter().sum();
     // A square of 20 mm in strips of the plane's width.
-    let strip = (8.0 * (0.010 - 0.18 * LIMITS.chord) * 3.0f64).sqrt();
+    let strip = (8.0 * (0.010 - 0.26 * LIMITS.chord) * 3.0f64).sqrt();
     // The first turn is whole though half of one would do.
     assert!(off(lengths[0], 400.0 / strip + 40.0) < 0.05, "{}", lengths[0]);
     assert!(lengths[0] > 0.8 * all, "{} of {all}", lengths[0]);
