@@ -594,10 +594,9 @@ mod tests {
         let ball = scallop("ball", "\"ball\"\ndiameter = 6");
         let words = scallop("words", "\"apt\"\ndiameter = 6\ncorner_radius = 3\nlength = 10");
         assert!((ball - words).abs() < 1e-12, "{ball} {words}");
-        // A point of 20 degrees leaves grooves of half the stepover times its tangent; a chord may join the pass with what
-        // rolls over the border.
+        // A point of 20 degrees leaves grooves of half the stepover times its tangent.
         let point = scallop("point", "\"apt\"\ndiameter = 6\ntip_angle = 20\nlength = 10");
-        assert!((point - 0.25 * 20f64.to_radians().tan()).abs() < 1e-3, "{point}");
+        assert!((point - 0.25 * 20f64.to_radians().tan()).abs() < 1e-9, "{point}");
     }
 
     #[test]

@@ -20,6 +20,7 @@ mod planar;
 mod scalar;
 mod scattered;
 mod solve;
+mod sparse;
 
 pub use difference::{GridFit, GridSolution, fit_by_differences, solve_poisson};
 pub use direction::{grid_turns, orient};

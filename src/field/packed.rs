@@ -26,7 +26,7 @@
 //! A local minimum: [`minimise`] is called from several starts. Sites see what lies between them by their area only.
 
 use super::eikonal::Front;
-use super::solve::{Columns, Factor};
+use super::sparse::{Entry, Factor};
 use crate::monitor::{self, Cancelled, Monitor};
 use crate::parallel;
 
@@ -61,6 +61,9 @@ const SQUARE: f64 = 0.1;
 pub struct Site {
     /// Its surface area, mm².
     pub area: f64,
+    /// The area, mm², that it stands for in the preconditioner, on which no minimum depends: 0 where other sites tell as
+    /// much by fewer coefficients.
+    pub stiff_area: f64,
     /// The slowness by direction across the passes.
     pub front: Front,
     /// Cost of a mm of pass, `[m, c, s]` of `m + c cos 2θ + s sin 2θ`, θ the direction across it in the frame of `front`.
@@ -153,13 +156,13 @@ pub fn minimise(
     monitor: &dyn Monitor,
 ) -> Result<Option<Packed>, Cancelled> {
     let problem = Problem { sites, gradients, roughness };
-    let Some(factor) = problem.stiffness().filter(|_| start.len() == gradients.coefficients) else {
+    let Some(mut factor) = problem.stiffness().filter(|_| start.len() == gradients.coefficients) else {
         return Ok(None);
     };
     let mut x = start;
     let (first, last) = PENALTIES.split_at(PENALTIES.len() - 2);
     for &penalty in if rounds == Rounds::First { first } else { last } {
-        problem.descend(&factor, penalty, &mut x, monitor)?;
+        problem.descend(&mut factor, penalty, &mut x, monitor)?;
     }
     let (mut cost, mut ends, mut short) = (0.0, 0.0, 0.0);
     for (k, site) in sites.iter().enumerate() {
@@ -271,15 +274,18 @@ impl Problem<'_> {
 
     /// The factor of the equations of `∫ (c/s) |∇ψ|²` and the roughness, the first coefficient held: about the second
     /// derivatives of the cost.
-    fn stiffness(&self) -> Option<Factor> {
+    fn stiffness(&self) -> Option<Factor<f64>> {
         let n = self.gradients.coefficients;
-        let mut entries: Vec<(u32, u32, f64)> = Vec::new();
+        let mut entries: Vec<Entry<f64>> = Vec::new();
         for (k, site) in self.sites.iter().enumerate() {
-            let weight = site.area * site.cost[0].abs() / site.front.mean_slowness();
+            if site.stiff_area == 0.0 {
+                continue;
+            }
+            let weight = site.stiff_area * site.cost[0].abs() / site.front.mean_slowness();
             for &(a, ga) in self.gradients.of(k) {
                 for &(b, gb) in self.gradients.of(k) {
                     if a >= b && b > 0 {
-                        entries.push((b - 1, a - 1, weight * (ga[0] * gb[0] + ga[1] * gb[1])));
+                        entries.push(Entry::new(a - 1, b - 1, weight * (ga[0] * gb[0] + ga[1] * gb[1])));
                     }
                 }
             }
@@ -288,18 +294,18 @@ impl Problem<'_> {
             for &(a, ga) in terms {
                 for &(b, gb) in terms {
                     if a >= b && b > 0 {
-                        entries.push((b - 1, a - 1, 2.0 * weight * ga * gb));
+                        entries.push(Entry::new(a - 1, b - 1, 2.0 * weight * ga * gb));
                     }
                 }
             }
         }
-        Factor::new(Columns::summed(n.checked_sub(1)?, entries), n - 1)
+        Factor::new(n.checked_sub(1)?, &entries)
     }
 
     /// Lowers the cost until nothing is left to gain.
     fn descend(
         &self,
-        factor: &Factor,
+        factor: &mut Factor<f64>,
         penalty: f64,
         x: &mut Vec<f64>,
         monitor: &dyn Monitor,
@@ -404,7 +410,7 @@ mod tests {
         let mut push = |i: usize, j: usize, s: f64, t: f64, area: f64, border: Option<[f64; 2]>| {
             let (x, y) = ((i as f64 + s) * h, (j as f64 + t) * h);
             let front = Front::new((1.0, 0.0, 1.0), |b| speed(x, y, b)).unwrap();
-            let site = Site { area, front, cost, border };
+            let site = Site { area, stiff_area: area, front, cost, border };
             let corner = (j * (CELLS + 1) + i) as u32;
             let above = corner + CELLS as u32 + 1;
             let slopes = [
@@ -526,6 +532,7 @@ mod tests {
             };
             let site = Site {
                 area: 2.0,
+                stiff_area: 2.0,
                 front: Front::new((1.3, 0.2, 0.9), speed).unwrap(),
                 cost: [1.0, swing * 0.5, sine],
                 border: border.then_some([0.4, -0.7]),

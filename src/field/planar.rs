@@ -13,12 +13,9 @@
 
 use std::collections::HashMap;
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::sparse::linalg::cholesky::{LltRef, SymmetricOrdering, factorize_symbolic_cholesky};
-use faer::sparse::{SparseColMat, Triplet};
-use faer::{Conj, MatMut, Par, Side};
 use spade::{AngleLimit, ConstrainedDelaunayTriangulation, RefinementParameters, Triangulation as _};
 
+use super::sparse::{Entry, solve};
 use crate::geometry::{Piece, Point2};
 
 /// Least angle that refinement aims at, degrees. Below 20.7 it is proven to end; greater ones make more
@@ -187,7 +184,7 @@ impl PlanarMesh {
                     }
                     let stiffness = sigma * sigma * side[i].dot(&side[j]) / (4.0 * area);
                     let mass = if i == j { area / 3.0 } else { 0.0 };
-                    entries.push(Triplet::new(row, column, stiffness + mass));
+                    entries.push(Entry::new(row, column, stiffness + mass));
                 }
             }
         }
@@ -287,46 +284,6 @@ impl PlanarMesh {
         }
         curves
     }
-}
-
-/// Solves `A x = b` in place of `b` by sparse Cholesky on the calling thread; `entries` are summed and
-/// stand on and below the diagonal.
-fn solve(entries: &[Triplet<u32, u32, f64>], b: &mut [f64]) -> Option<()> {
-    let n = b.len();
-    if n == 0 {
-        return Some(());
-    }
-    let matrix = SparseColMat::<u32, f64>::try_new_from_triplets(n, n, entries).ok()?;
-    let symbolic = factorize_symbolic_cholesky(
-        matrix.symbolic(),
-        Side::Lower,
-        SymmetricOrdering::Amd,
-        Default::default(),
-    )
-    .ok()?;
-    let mut factor = vec![0.0; symbolic.len_val()];
-    let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
-    let mut memory = MemBuffer::try_new(scratch).ok()?;
-    let stack = MemStack::new(&mut memory);
-    symbolic
-        .factorize_numeric_llt::<f64>(
-            &mut factor,
-            matrix.as_ref(),
-            Side::Lower,
-            Default::default(),
-            Par::Seq,
-            stack,
-            Default::default(),
-        )
-        .ok()?;
-    let mut memory = MemBuffer::try_new(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq)).ok()?;
-    LltRef::<'_, u32, f64>::new(&symbolic, &factor).solve_in_place_with_conj(
-        Conj::No,
-        MatMut::from_column_major_slice_mut(b, n, 1),
-        Par::Seq,
-        MemStack::new(&mut memory),
-    );
-    Some(())
 }
 
 #[cfg(test)]

@@ -11,10 +11,10 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
-use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, factorize_symbolic_cholesky};
+use faer::sparse::linalg::cholesky::factorize_symbolic_cholesky;
 use faer::sparse::linalg::qr::factorize_symbolic_qr;
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
-use faer::{Conj, Mat, MatMut, Par, Side};
+use faer::{Conj, Mat, Par, Side};
 
 use super::fit::FieldError;
 
@@ -117,28 +117,6 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    /// A square matrix from entries (column, row, value), those of the same place summed.
-    pub fn summed(count: usize, mut entries: Vec<(u32, u32, f64)>) -> Self {
-        entries.sort_by_key(|&(column, row, _)| (column, row));
-        let mut columns = Self { starts: vec![0; count + 1], rows: Vec::new(), values: Vec::new() };
-        let mut last = None;
-        for (column, row, value) in entries {
-            if last == Some((column, row)) {
-                let end = columns.values.len() - 1;
-                columns.values[end] += value;
-            } else {
-                columns.rows.push(row as usize);
-                columns.values.push(value);
-                last = Some((column, row));
-            }
-            columns.starts[column as usize + 1] = columns.rows.len();
-        }
-        for c in 0..count {
-            columns.starts[c + 1] = columns.starts[c + 1].max(columns.starts[c]);
-        }
-        columns
-    }
-
     fn matrix(self, rows: usize) -> Option<SparseColMat<usize, f64>> {
         let columns = self.starts.len() - 1;
         let ordered = self.starts.windows(2).all(|w| w[0] <= w[1])
@@ -209,52 +187,6 @@ fn probe(n: usize) -> impl Iterator<Item = f64> {
 fn recovered(found: impl Iterator<Item = f64>, n: usize) -> bool {
     let square: f64 = found.zip(probe(n)).map(|(a, b)| (a - b).powi(2)).sum();
     square <= RECOVERY_LIMIT.powi(2) * n as f64
-}
-
-/// A sparse Cholesky factor, for many right sides.
-pub(super) struct Factor {
-    symbolic: SymbolicCholesky<usize>,
-    values: Vec<f64>,
-}
-
-impl Factor {
-    /// Of a positive definite matrix of so many rows, given by its lower half; `None` where it is not.
-    pub fn new(lower: Columns, rows: usize) -> Option<Self> {
-        let a = lower.matrix(rows)?;
-        let symbolic =
-            factorize_symbolic_cholesky(a.symbolic(), Side::Lower, Default::default(), Default::default())
-                .ok()?;
-        let mut values = vec![0.0; symbolic.len_val()];
-        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
-        let mut memory = MemBuffer::try_new(scratch).ok()?;
-        symbolic
-            .factorize_numeric_llt(
-                &mut values,
-                a.as_ref(),
-                Side::Lower,
-                LltRegularization::default(),
-                Par::Seq,
-                MemStack::new(&mut memory),
-                Default::default(),
-            )
-            .ok()?;
-        Some(Self { symbolic, values })
-    }
-
-    /// Solves in place of the right side.
-    pub fn solve(&self, side: &mut [f64]) {
-        let n = side.len();
-        let Ok(mut memory) = MemBuffer::try_new(self.symbolic.solve_in_place_scratch::<f64>(1, Par::Seq))
-        else {
-            return;
-        };
-        LltRef::<'_, usize, f64>::new(&self.symbolic, &self.values).solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(side, n, 1),
-            Par::Seq,
-            MemStack::new(&mut memory),
-        );
-    }
 }
 
 /// Solves a positive definite system, given by its lower half, by sparse Cholesky. `None` where the

@@ -1,13 +1,9 @@
 //! Plane regions with islands: nested outlines, offset inwards and outwards, area, places inside; mm.
 //!
 //! Enters: closed polylines. Leaves: pieces, each one outer outline (counter-clockwise) and its islands
-//! (clockwise), without crossings. Offsets and unions are done by `i_overlay` on a grid of integers: robust
+//! (clockwise), without crossings. Offsets are done by `i_overlay` on a grid of integers: robust
 //! on any input, and rounded by a 2⁻³⁰th of the region's size or less.
 
-use i_overlay::core::fill_rule::FillRule;
-use i_overlay::core::overlay_rule::OverlayRule;
-use i_overlay::float::simplify::SimplifyShape;
-use i_overlay::float::single::SingleFloatOverlay;
 use i_overlay::mesh::float::outline::offset::OutlineOffset;
 use i_overlay::mesh::float::style::{LineJoin, OutlineStyle};
 use i_overlay::mesh::math::MathMode;
@@ -265,20 +261,6 @@ impl Region {
         Self::of_shapes(self.shapes().outline_as::<i64>(&style), distance)
     }
 
-    /// What lies in one of the two regions or in both.
-    pub fn union(&self, other: &Self) -> Self {
-        self.combined(other, OverlayRule::Union)
-    }
-
-    /// What lies in this region and not in the other.
-    pub fn less(&self, other: &Self) -> Self {
-        self.combined(other, OverlayRule::Difference)
-    }
-
-    fn combined(&self, other: &Self, rule: OverlayRule) -> Self {
-        Self::of_shapes(self.shapes().overlay_as::<i64>(&other.shapes(), rule, FillRule::NonZero), 1.0)
-    }
-
     fn shapes(&self) -> Vec<Vec<Vec<[f64; 2]>>> {
         let plain = |c: &[Point2]| c.iter().map(|p| [p.x, p.y]).collect();
         self.pieces.iter().map(|piece| piece.curves().map(plain).collect()).collect()
@@ -304,11 +286,6 @@ impl Region {
             a.y.total_cmp(&b.y).then(a.x.total_cmp(&b.x))
         });
         Self { pieces }
-    }
-
-    /// Mends what rounding has left: crossings within a hair are resolved.
-    pub fn simplified(&self) -> Self {
-        Self::of_shapes(self.shapes().simplify_shape_as::<i64>(FillRule::NonZero), 1.0)
     }
 
     /// The largest disc inside: its centre and its radius, mm, within `precision`. `None` without pieces.

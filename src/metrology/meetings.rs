@@ -4,7 +4,7 @@
 //! place on the line where the lowest move changes from one track to another, mm. Moves that are
 //! lowest only between the ends are found on the way.
 
-use super::cut_surface::CutSurface;
+use super::cut_surface::{CutPoint, CutSurface};
 use crate::cutter::Cutter;
 use crate::geometry::Point2;
 use crate::sim::NOT_CUT;
@@ -118,7 +118,12 @@ impl<'a> Meetings<'a> {
         let t = self.crossing(at, (ta, a), (tb, b));
         let q = at(t);
         let (za, zb) = (self.height(a, q), self.height(b, q));
-        let Some(lowest) = self.surface.at(q.x, q.y) else { return gap(q) };
+        let Some(mut lowest) = self.surface.at(q.x, q.y) else { return gap(q) };
+        // Neighbours in the program of both, which no cell may have seen where moves are short.
+        for (by, z) in [(a, za), (b, zb)] {
+            let beside = self.surface.follow(CutPoint { z, by }, q.x, q.y);
+            lowest = if beside.z < lowest.z { beside } else { lowest };
+        }
         // Another move is lower at the crossing: it stands between the two.
         let third = lowest.z < za.min(zb) - 1e-9 && lowest.by != a && lowest.by != b;
         if third && depth > 0 && self.surface.pass(lowest.by).is_some() {

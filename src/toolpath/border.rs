@@ -67,8 +67,7 @@ impl<'a> Border<'a> {
         Self { part, edges, tolerance }
     }
 
-    /// How far a cutter with its axis at `axis` has rolled over an edge that it touches at `contact`, mm: the
-    /// distance of the corner's contact from where it would touch the surface beside the edge.
+    /// How far a cutter with its axis at `axis` has rolled over an edge that it touches at `contact`, mm.
     pub fn rolled(&self, cutter: &Cutter, axis: &Point2, contact: &SurfacePoint) -> f64 {
         self.roll(cutter, axis, contact).norm()
     }
@@ -78,8 +77,14 @@ impl<'a> Border<'a> {
         self.part.highest_at(p.x, p.y).is_some()
     }
 
-    /// By how much the corner's contact would lie elsewhere had the surface gone on beside the edge.
+    /// By how much the contact would lie elsewhere had the surface gone on beside the edge; nothing for a disc with a
+    /// sharp rim, which touches level ground anywhere.
     pub fn roll(&self, cutter: &Cutter, axis: &Point2, contact: &SurfacePoint) -> Vector3 {
+        if cutter.corner_radius() == 0.0 {
+            let pointed = cutter.profile().point().sin > 0.0;
+            let there = axis - cutter.axis_offset(&contact.normal) - contact.point.xy();
+            return if pointed { there.push(0.0) } else { Vector3::zeros() };
+        }
         // Direction from the contact to the centre of the corner's circle, against the normal.
         let out = axis - contact.point.xy();
         let rho = out.norm();

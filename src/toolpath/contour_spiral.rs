@@ -31,6 +31,9 @@ const SLACK: f64 = 0.02;
 /// two.
 const HALVINGS: usize = 3;
 
+/// Places looked at from one point of a turn to the next.
+const PARTS: usize = 8;
+
 /// Further passes reach beyond the stretch that needs them by this many strip widths.
 const OVERLAP: f64 = 1.0;
 
@@ -259,7 +262,7 @@ impl Spiral<'_> {
             .map(|j| j as f64 / n as f64)
             .map(|share| self.at(k as f64 + share + offset, share))
             .collect();
-        let reach = |&[u, v]: &[f64; 2]| {
+        let reach = |[u, v]: [f64; 2]| {
             let p = self.chart.at(u, v)?;
             let t = level_tangent(&p, self.field, [u, v])?;
             let [_, phi_u, phi_v] = self.field.value_and_gradient(u, v);
@@ -269,8 +272,13 @@ impl Spiral<'_> {
             (interval > gradient * width * (1.0 + SLACK)).then_some(reach)
         };
         let mut runs: Vec<[usize; 2]> = Vec::new();
-        for (j, reach) in points.iter().enumerate().filter_map(|(j, p)| reach(p).map(|r| (j, r))) {
-            let run = [j.saturating_sub(reach), (j + reach).min(n)];
+        // Corners are narrower than the points are apart.
+        let along = |j: usize| {
+            let parts = (0..PARTS).map(|part| part as f64 / PARTS as f64);
+            parts.filter_map(|t| reach(between(&points, j as f64 + t))).max()
+        };
+        for (j, reach) in (0..n).filter_map(|j| along(j).map(|r| (j, r))) {
+            let run = [j.saturating_sub(reach), (j + 1 + reach).min(n)];
             match runs.last_mut() {
                 Some(last) if run[0] <= last[1] + 1 => last[1] = last[1].max(run[1]),
                 _ => runs.push(run),

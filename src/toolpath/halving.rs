@@ -50,6 +50,12 @@ pub(super) trait LevelSource: Sync {
     /// What a place allows; `None` where the surface or the function has no direction.
     fn allowed(&self, place: &Self::Place) -> Option<Allowed>;
 
+    /// The least that is allowed from one point of a curve to before the next: kinks may be narrower than points are
+    /// apart.
+    fn least_allowed(&self, from: &Self::Place, _to: &Self::Place) -> Option<Allowed> {
+        self.allowed(from)
+    }
+
     /// The pass along a curve, or along a run of its points; `None` where there is nothing to cut.
     fn pass(
         &self,
@@ -183,13 +189,14 @@ impl<S: LevelSource> Filler<'_, S> {
     /// The runs of a curve (first and last point) on which an interval of ψ is wider on the surface
     /// than allowed, with their overlap. A closed curve is turned to begin outside of any run.
     fn needed(&self, mut curve: Track<S::Place>, interval: f64) -> (Track<S::Place>, Vec<[usize; 2]>) {
-        let too_wide = |place: &S::Place| {
-            let Allowed { step, width } = self.source.allowed(place)?;
+        let n = curve.points.len();
+        let too_wide = |k: usize| {
+            let next = &curve.points[if curve.closed { (k + 1) % n } else { (k + 1).min(n - 1) }];
+            let Allowed { step, width } = self.source.least_allowed(&curve.points[k], next)?;
             let reach = (OVERLAP * width / self.sampling).ceil() as usize;
             (interval > step * (1.0 + INTERVAL_SLACK)).then_some(reach)
         };
-        let n = curve.points.len();
-        let mut reach: Vec<Option<usize>> = curve.points.iter().map(too_wide).collect();
+        let mut reach: Vec<Option<usize>> = (0..n).map(too_wide).collect();
         if curve.closed
             && let Some(calm) = reach.iter().position(Option::is_none)
         {
@@ -200,7 +207,7 @@ impl<S: LevelSource> Filler<'_, S> {
         }
         let mut runs: Vec<[usize; 2]> = Vec::new();
         for (k, reach) in reach.iter().enumerate().filter_map(|(k, r)| r.map(|r| (k, r))) {
-            let run = [k.saturating_sub(reach), (k + reach).min(n - 1)];
+            let run = [k.saturating_sub(reach), (k + 1 + reach).min(n - 1)];
             match runs.last_mut() {
                 Some(last) if run[0] <= last[1] + 1 => last[1] = last[1].max(run[1]),
                 _ => runs.push(run),

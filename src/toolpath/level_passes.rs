@@ -32,6 +32,9 @@ const MARGIN_SAMPLES: usize = 24;
 /// A point between two traced ones may be this many sampling distances off the line between them.
 const MOST_STRAY: f64 = 0.25;
 
+/// Places looked at for kinks from one point of a curve to the next.
+const PARTS_OF_KINKS: usize = 4;
+
 /// Places looked at between two points outside of the chart.
 const PARTS_OUTSIDE: usize = 8;
 
@@ -205,6 +208,14 @@ impl LevelSource for Guide<'_> {
             Some(Contact { at: p.jet.p, across, allowed, inside: self.chart.holds([u, v]) })
         };
         curve.along(run).filter_map(contact).collect()
+    }
+
+    fn least_allowed(&self, from: &[f64; 2], to: &[f64; 2]) -> Option<Allowed> {
+        let part = |k: usize| {
+            let t = k as f64 / PARTS_OF_KINKS as f64;
+            self.allowed(&[from[0] + t * (to[0] - from[0]), from[1] + t * (to[1] - from[1])])
+        };
+        (0..PARTS_OF_KINKS).filter_map(part).min_by(|a, b| a.step.total_cmp(&b.step))
     }
 
     /// The pass along a curve, or along a run of its points; `None` where it does not touch the

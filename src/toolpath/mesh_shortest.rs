@@ -54,11 +54,12 @@ pub(super) fn shortest_stream(
     let mut gradients = Gradients::new(count);
     let mut kept = Vec::with_capacity(sites.len());
     for (k, site) in sites.into_iter().enumerate() {
-        let Some((site, [e1, e2])) = site else { continue };
+        let Some((mut site, [e1, e2])) = site else { continue };
         let flat = |(v, gradient): (u32, Vector3)| (v, [gradient.dot(&e1), gradient.dot(&e2)]);
         match k.checked_sub(count) {
             None => gradients.push(&site, recovered[k].iter().copied().map(flat)),
             Some(t) => {
+                site.stiff_area = share(t);
                 let hats = mesh.triangles()[t].into_iter().zip(mesh.hat_gradients(t));
                 gradients.push(&site, hats.map(flat));
             }
@@ -156,6 +157,6 @@ impl Place<'_> {
             });
             1.0 - bend.along(&feed) * self.cutter.corner_radius() + away
         });
-        Some((Site { area, front, cost: Site::harmonic(costs), border: None }, [e1, e2]))
+        Some((Site { area, stiff_area: 0.0, front, cost: Site::harmonic(costs), border: None }, [e1, e2]))
     }
 }

@@ -11,8 +11,12 @@ use crate::cutter::Cutter;
 use crate::geometry::{Point3, Vector2};
 use crate::monitor::{Cancelled, Monitor};
 
-/// How closely the end of a pass is placed, mm.
-const END_PRECISION: f64 = 1e-6;
+/// How closely the end of a pass is placed, mm. A pointed cutter has dropped by as much of it as its point is steep,
+/// and the pass runs straight to there.
+const END_PRECISION: f64 = 1e-9;
+
+/// Shorter stretches are left out, mm.
+const LEAST_STRETCH: f64 = 1e-6;
 
 /// First sampling distance of rolls as a share of that on surface.
 const ROLLING_SAMPLING: f64 = 0.1;
@@ -58,7 +62,7 @@ impl PlanCurves<'_> {
     /// How far the cutter has rolled over the border at `s`; `None` off the part.
     fn rolled(&self, curve: Curve<'_>, s: f64) -> Option<f64> {
         let (xy, drop) = self.drop_at(curve, s)?;
-        if self.cutter.corner_radius() == 0.0 || !self.border.holds(&drop.contact) {
+        if !self.border.holds(&drop.contact) {
             return Some(0.0);
         }
         Some(self.border.rolled(self.cutter, &xy.into(), &drop.contact))
@@ -130,14 +134,14 @@ impl PlanCurves<'_> {
     fn serves(&self, curve: Curve<'_>, s: f64) -> bool {
         let Some((xy, drop)) = self.drop_at(curve, s) else { return false };
         let contact = drop.contact.point.xy() + self.border.roll(self.cutter, &xy.into(), &drop.contact).xy();
-        let along = (curve(s + END_PRECISION) - curve(s - END_PRECISION)) / (2.0 * END_PRECISION);
+        let along = (curve(s + LEAST_STRETCH) - curve(s - LEAST_STRETCH)) / (2.0 * LEAST_STRETCH);
         let across = Vector2::new(-along.y, along.x) * (0.5 * self.overrun);
         [across, -across].iter().any(|beside| self.border.under(&(contact + beside)))
     }
 
     fn moves(&self, curve: Curve<'_>, run: &[(Contact, f64, f64)]) -> Result<Vec<Point3>, Cancelled> {
         let mut points: Vec<Point3> = Vec::new();
-        for &(contact, a, b) in run.iter().filter(|(_, a, b)| b - a > END_PRECISION) {
+        for &(contact, a, b) in run.iter().filter(|(_, a, b)| b - a > LEAST_STRETCH) {
             // Rolling over corners of the border the cutter rises and falls within less than it does on surface.
             let share = if contact == Contact::Rolling { ROLLING_SAMPLING } else { 1.0 };
             let settings = PassSettings { sampling: share * self.settings.sampling, ..*self.settings };

@@ -318,7 +318,8 @@ impl Search<'_> {
         });
         let cost = Site::harmonic(costs);
         let border = (along != [0.0; 2]).then(|| front.components(along));
-        Some(Site { area: area * (e * g - f * f).max(0.0).sqrt(), front, cost, border })
+        let area = area * (e * g - f * f).max(0.0).sqrt();
+        Some(Site { area, stiff_area: area, front, cost, border })
     }
 
     /// Coefficients of ψ for straight passes, as dense on the whole as the strips ask for.

@@ -126,7 +126,7 @@ fn parts_are_those_of_their_generators() {
 }
 
 /// On each of the eight surfaces: nothing uncut, no gouge, at most 1 % of the ridges over the target and none above
-/// 1.1 times it; at least 92 % of the shortest possible path (90 % on the mesh, whose facets take their share of the
+/// 1.1 times it; at least 92 % of the shortest possible path (91.5 % on the mesh, whose facets take their share of the
 /// target); and no longer than the best zigzag and iso-scallop.
 #[test]
 fn streamlines_are_the_shortest_of_all_on_eight_surfaces() {
@@ -146,13 +146,12 @@ fn streamlines_are_the_shortest_of_all_on_eight_surfaces() {
             100.0 * over
         );
         let good = [
-            possible >= if name == "relief" { 0.90 } else { 0.92 },
+            possible >= if name == "relief" { 0.915 } else { 0.92 },
             over <= 0.01,
-            // One spot of the joined patches lies over a slit between their meshes.
-            highest <= if name == "joined" { 1.2 } else { 1.1 },
+            highest <= 1.1,
             of(2, "uncut/area_mm2") == 0.0,
             of(2, "gouge/max_depth_mm") <= 0.001,
-            streamline <= zigzag && streamline <= 1.001 * iso_scallop,
+            streamline <= zigzag && streamline <= iso_scallop,
         ];
         if good.contains(&false) {
             failed.push(format!("{name}: {good:?}"));

@@ -13,10 +13,10 @@
 
 use faer::c64;
 
-use super::sparse::{Entry, solve};
 use super::surface::turned;
 use super::{FieldMesh, Flow, MeshFieldError};
 use crate::field::direction::orient_along;
+use crate::field::sparse::{Entry, solve};
 use crate::geometry::{Point3, Vector3};
 
 /// An edge couples its ends at least as if the angles opposite to it had this cotangent. Obtuse pairs

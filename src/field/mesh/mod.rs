@@ -9,7 +9,6 @@ mod recover;
 mod refine;
 mod sheets;
 mod sources;
-mod sparse;
 mod stream;
 mod surface;
 #[cfg(test)]

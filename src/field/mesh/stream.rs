@@ -13,8 +13,8 @@
 //! streamline); a piece without a held vertex has its first vertex, or its group, held at 0. The
 //! answer is checked by its true residual. Values converge with the square of the edges' length.
 
-use super::sparse::{Entry, solve};
 use super::{FieldMesh, MeshFieldError};
+use crate::field::sparse::{Entry, solve};
 use crate::geometry::Vector3;
 
 /// Greatest residual, relative to the terms of the equations, that counts as solved.
