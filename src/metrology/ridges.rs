@@ -40,6 +40,13 @@ pub(super) struct RidgeSample {
     squareness: f64,
 }
 
+impl RidgeSample {
+    /// True when the ridge may stand higher than `highest` before the next grid line that it crosses squarely.
+    fn might_rise_above(&self, highest: &RidgeSample) -> bool {
+        self.squareness >= SQUARE_ENOUGH && self.height + self.rise > highest.height + NUMERICAL_FLOOR
+    }
+}
+
 /// All ridges of a surface.
 #[derive(Debug, Default)]
 pub(super) struct Ridges {
@@ -63,11 +70,11 @@ pub(super) enum Hidden {
 impl Ridges {
     /// Of the samples of one row.
     fn of_row(samples: &[RidgeSample], hidden: Vec<Hidden>) -> Self {
-        let highest = samples.iter().map(|s| s.height).fold(f64::NEG_INFINITY, f64::max);
-        let candidates = samples.iter().filter(|s| s.height + s.rise >= highest);
+        let highest = samples.iter().max_by(|a, b| a.height.total_cmp(&b.height));
+        let others = samples.iter().filter(|s| highest.is_some_and(|highest| s.might_rise_above(highest)));
         Self {
             samples: samples.iter().map(|s| [s.height as f32, s.length as f32]).collect(),
-            candidates: candidates.copied().collect(),
+            candidates: highest.into_iter().chain(others).copied().collect(),
             hidden,
         }
     }
@@ -258,10 +265,7 @@ impl<'a> RidgeFinder<'a> {
         let samples = &ridges.candidates;
         let first = samples.iter().max_by(|a, b| a.height.total_cmp(&b.height))?;
         let mut highest = Highest { height: first.height, at: first.at, possible: first.height };
-        let might = |s: &&RidgeSample| {
-            s.squareness >= SQUARE_ENOUGH && s.height + s.rise > first.height + NUMERICAL_FLOOR
-        };
-        let mut open: Vec<&RidgeSample> = samples.iter().filter(might).collect();
+        let mut open: Vec<&RidgeSample> = samples.iter().filter(|s| s.might_rise_above(first)).collect();
         let mut lines = CLOSER_LINES;
         while !open.is_empty() {
             let closer = crate::parallel::map(open.len(), |k| self.closer(open[k], lines));
