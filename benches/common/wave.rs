@@ -18,7 +18,7 @@ pub fn wave([low, high]: [f64; 2], stepover: f64, chord: f64) -> Toolpath {
         let slope_y = -0.2 * (x / 8.0).sin() * (y / 10.0).sin();
         let shift = RADIUS / (1.0 + slope_x * slope_x + slope_y * slope_y).sqrt();
         let z = 2.0 * (x / 8.0).sin() * (y / 10.0).cos() + shift - RADIUS;
-        ClPoint { tip: Point3::new(x - shift * slope_x, y - shift * slope_y, z) }
+        ClPoint::upright(Point3::new(x - shift * slope_x, y - shift * slope_y, z))
     };
     let pass = |j: usize| (0..=steps).map(move |k| tip(if j.is_multiple_of(2) { k } else { steps - k }, j));
     let mut moves =

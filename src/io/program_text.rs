@@ -70,7 +70,7 @@ pub(super) mod tests {
 
     /// Over, down, along (and once to where it is already), up, up at rapid rate.
     pub fn example() -> Toolpath {
-        let at = |x, y, z| ClPoint { tip: Point3::new(x, y, z) };
+        let at = |x, y, z| ClPoint::upright(Point3::new(x, y, z));
         let step = |to, kind, feed_rate| Move { to, kind, feed_rate, pass: 0 };
         let moves = vec![
             step(at(1.0, 2.5, 10.0), MoveKind::Rapid, 0.0),
@@ -87,7 +87,7 @@ pub(super) mod tests {
     pub fn random(moves: usize) -> Toolpath {
         let mut rng = crate::sim::scenes::Rng::new(5);
         let mut tip = Point3::new(1.0, 2.0, 50.0);
-        let start = ClPoint { tip };
+        let start = ClPoint::upright(tip);
         let kinds = [MoveKind::Rapid, MoveKind::Plunge, MoveKind::Cut, MoveKind::Retract];
         let moves = (0..moves).map(|_| {
             for axis in 0..3 {
@@ -96,7 +96,7 @@ pub(super) mod tests {
                 }
             }
             let feed_rate = if rng.below(2) == 0 { 1200.0 } else { rng.within(1.0, 5000.0) };
-            Move { to: ClPoint { tip }, kind: kinds[rng.below(4)], feed_rate, pass: 0 }
+            Move { to: ClPoint::upright(tip), kind: kinds[rng.below(4)], feed_rate, pass: 0 }
         });
         Toolpath { start, moves: moves.collect() }
     }

@@ -32,7 +32,7 @@ pub fn slow_corners(path: &Toolpath, machine: &Machine) -> Toolpath {
     let Some(blocks) = profile(path, machine) else { return path.clone() };
     let mut moves = Vec::with_capacity(path.len());
     let mut next = blocks.iter().enumerate().peekable();
-    for (k, (from, _, step)) in path.segments().enumerate() {
+    for (k, step) in path.moves.iter().enumerate() {
         let Some((at, block)) = next.next_if(|(_, block)| block.step == k) else {
             moves.push(*step);
             continue;
@@ -55,7 +55,7 @@ pub fn slow_corners(path: &Toolpath, machine: &Machine) -> Toolpath {
         let before = at.checked_sub(1).map(|k| kind(&blocks[k]));
         let after = blocks.get(at + 1);
         let ends = [sharp(Some(block), before), sharp(after, after.map(kind))];
-        slowed(&mut moves, from, step, block, peak, ends, machine);
+        slowed(&mut moves, path.location_before(k), step, block, peak, ends, machine);
     }
     Toolpath { start: path.start, moves }
 }
@@ -63,7 +63,7 @@ pub fn slow_corners(path: &Toolpath, machine: &Machine) -> Toolpath {
 /// Appends a move that reaches the speed `peak`, with the squared speeds of its sharp ends.
 fn slowed(
     moves: &mut Vec<Move>,
-    from: Point3,
+    from: ClPoint,
     step: &Move,
     block: &Block,
     peak: f64,
@@ -76,9 +76,8 @@ fn slowed(
     let zone = |corner: f64| (block.feed * block.feed - corner).max(0.0) / (2.0 * machine.acceleration);
     let zones = ends.map(|corner| corner.map_or(0.0, zone));
     let mut push = |at: f64, feed_rate: f64| {
-        let tip =
-            if at < block.length { from + (step.to.tip - from) * (at / block.length) } else { step.to.tip };
-        moves.push(Move { to: ClPoint { tip }, feed_rate, ..*step });
+        let to = if at < block.length { from.towards(&step.to, at / block.length) } else { step.to };
+        moves.push(Move { to, feed_rate, ..*step });
     };
     if zones[0] + zones[1] >= block.length {
         return push(block.length, feed);
@@ -118,7 +117,7 @@ mod tests {
     };
 
     fn path(tips: impl IntoIterator<Item = [f64; 3]>) -> Toolpath {
-        let mut tips = tips.into_iter().map(|t| ClPoint { tip: Point3::from(t) });
+        let mut tips = tips.into_iter().map(|t| ClPoint::upright(Point3::from(t)));
         let start = tips.next().unwrap();
         let moves = tips.map(|to| Move { to, kind: MoveKind::Cut, feed_rate: 6000.0, pass: 0 }).collect();
         Toolpath { start, moves }

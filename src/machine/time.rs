@@ -166,7 +166,7 @@ mod tests {
 
     /// Cuts at 6000 mm/min = 100 mm/s, which takes 5 mm and 0.1 s to reach.
     fn path(tips: impl IntoIterator<Item = [f64; 3]>) -> Toolpath {
-        let mut tips = tips.into_iter().map(|t| ClPoint { tip: Point3::from(t) });
+        let mut tips = tips.into_iter().map(|t| ClPoint::upright(Point3::from(t)));
         let start = tips.next().unwrap();
         let moves = tips.map(|to| Move { to, kind: MoveKind::Cut, feed_rate: 6000.0, pass: 0 }).collect();
         Toolpath { start, moves }

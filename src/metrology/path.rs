@@ -56,13 +56,13 @@ mod tests {
     use std::f64::consts::{FRAC_PI_2, PI};
 
     fn to(x: f64, y: f64, z: f64, kind: MoveKind, pass: u32) -> Move {
-        Move { to: ClPoint { tip: Point3::new(x, y, z) }, kind, feed_rate: 1000.0, pass }
+        Move { to: ClPoint::upright(Point3::new(x, y, z)), kind, feed_rate: 1000.0, pass }
     }
 
     #[test]
     fn lengths_and_turns_of_a_square_pass() {
         let path = Toolpath {
-            start: ClPoint { tip: Point3::new(0.0, 0.0, 5.0) },
+            start: ClPoint::upright(Point3::new(0.0, 0.0, 5.0)),
             moves: vec![
                 to(0.0, 0.0, 0.0, MoveKind::Plunge, 0),
                 to(10.0, 0.0, 0.0, MoveKind::Cut, 0),
@@ -95,7 +95,7 @@ mod tests {
             to(10.0, 4.0, 0.0, MoveKind::Cut, 2),
             to(10.0, 4.0, 5.0, MoveKind::Rapid, 2),
         ]);
-        let path = Toolpath { start: ClPoint { tip: Point3::new(0.0, 0.0, 5.0) }, moves };
+        let path = Toolpath { start: ClPoint::upright(Point3::new(0.0, 0.0, 5.0)), moves };
         let figures = path_figures(&path, 0.0);
         assert_eq!((figures.surface_links, figures.retracts, figures.sharp_turns), (1, 1, 0));
         assert!((figures.total_turning_rad - PI).abs() < 1e-9, "{}", figures.total_turning_rad);

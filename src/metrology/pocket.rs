@@ -140,13 +140,13 @@ mod tests {
         let grid = Grid { origin: Point2::new(-6.97, -6.97), cell: 0.05, nx: 860, ny: 660 };
         let measured = |y: f64, x: f64| {
             let to = |x: f64, y: f64, z: f64| Move {
-                to: ClPoint { tip: Point3::new(x, y, z) },
+                to: ClPoint::upright(Point3::new(x, y, z)),
                 kind: MoveKind::Cut,
                 feed_rate: 1.0,
                 pass: 0,
             };
             let path = Toolpath {
-                start: ClPoint { tip: Point3::new(10.0, 10.0, 5.0) },
+                start: ClPoint::upright(Point3::new(10.0, 10.0, 5.0)),
                 moves: vec![to(10.0, 10.0, -2.0), to(10.0, y, -2.0), to(x, y, -2.0)],
             };
             let stock = cut(ZMap::block(grid, 0.0), &cutter, &path, &Silent).unwrap();

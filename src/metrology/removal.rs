@@ -170,7 +170,7 @@ mod tests {
 
     /// A flat end of 6 mm in a slot 2 mm deep at 600 mm/min, in moves of 1 mm, with rapids about it.
     fn slot(rapid_height: f64) -> (Toolpath, RemovalFigures) {
-        let tip = |x: f64, z: f64| ClPoint { tip: Point3::new(x, 10.0, z) };
+        let tip = |x: f64, z: f64| ClPoint::upright(Point3::new(x, 10.0, z));
         let to = |x: f64, z: f64, kind| Move { to: tip(x, z), kind, feed_rate: 600.0, pass: 0 };
         let mut moves = vec![to(-5.0, -2.0, MoveKind::Plunge)];
         moves.extend((0..30).map(|k| to(f64::from(k - 4), -2.0, MoveKind::Cut)));

@@ -11,11 +11,34 @@ pub struct CcPoint {
     pub normal: Vector3,
 }
 
-/// Cutter location: the tip of the cutter, always.
+/// Cutter location: the tip of the cutter, always, and the tool axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClPoint {
     /// Tip, mm.
     pub tip: Point3,
+    /// Tool axis, a unit vector from the tip to the holder.
+    pub axis: Vector3,
+}
+
+impl ClPoint {
+    /// With the tool axis along z.
+    pub fn upright(tip: Point3) -> Self {
+        Self { tip, axis: Vector3::z() }
+    }
+
+    /// The location at the share `t` of a move from here to `to`: the tip runs straight, the axis turns at
+    /// an even rate in the plane of both axes, as controls that follow the tip move them.
+    pub fn towards(&self, to: &Self, t: f64) -> Self {
+        let tip = self.tip + (to.tip - self.tip) * t;
+        // The angle by both sine and cosine, exact for small and for large ones.
+        let (sin, cos) = (self.axis.cross(&to.axis).norm(), self.axis.dot(&to.axis));
+        if sin == 0.0 {
+            return Self { tip, axis: if t < 0.5 { self.axis } else { to.axis } };
+        }
+        let angle = sin.atan2(cos);
+        let axis = (self.axis * ((1.0 - t) * angle).sin() + to.axis * (t * angle).sin()) / sin;
+        Self { tip, axis: axis.normalize() }
+    }
 }
 
 /// What a move is for.
@@ -40,7 +63,7 @@ impl MoveKind {
     }
 }
 
-/// A straight move of the tip to a new location.
+/// A straight move of the tip to a new location; the axis turns evenly meanwhile.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Move {
     /// Where the move ends.
@@ -79,6 +102,16 @@ impl Toolpath {
         if k == 0 { self.start.tip } else { self.moves[k - 1].to.tip }
     }
 
+    /// The location where move `k` begins.
+    pub fn location_before(&self, k: usize) -> ClPoint {
+        if k == 0 { self.start } else { self.moves[k - 1].to }
+    }
+
+    /// True when the tool axis stands along z all the time.
+    pub fn is_upright(&self) -> bool {
+        std::iter::once(&self.start).chain(self.moves.iter().map(|m| &m.to)).all(|to| to.axis == Vector3::z())
+    }
+
     /// Start, end and move of every move, in program order.
     pub fn segments(&self) -> impl ExactSizeIterator<Item = (Point3, Point3, &Move)> {
         self.moves.iter().enumerate().map(|(k, m)| (self.start_of(k), m.to.tip, m))
@@ -87,5 +120,26 @@ impl Toolpath {
     /// One more than the greatest pass number; 0 without moves.
     pub fn passes(&self) -> usize {
         self.moves.iter().map(|m| m.pass as usize + 1).max().unwrap_or(0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_axis_turns_evenly() {
+        let tilted = |angle: f64| Vector3::new(angle.sin(), 0.0, angle.cos());
+        for whole in [1e-9, 0.3, 2.9] {
+            let from = ClPoint::upright(Point3::new(1.0, 2.0, 3.0));
+            let to = ClPoint { tip: Point3::new(3.0, 2.0, 3.0), axis: tilted(whole) };
+            for t in [0.0, 0.25, 0.5, 1.0] {
+                let at = from.towards(&to, t);
+                assert!((at.axis - tilted(t * whole)).norm() < 1e-15, "{whole} {t}");
+                assert!((at.tip.x - 1.0 - 2.0 * t).abs() < 1e-15);
+            }
+        }
+        let still = ClPoint::upright(Point3::origin());
+        assert_eq!(still.towards(&ClPoint::upright(Point3::new(1.0, 0.0, 0.0)), 0.3).axis, Vector3::z());
     }
 }

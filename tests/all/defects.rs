@@ -79,13 +79,13 @@ fn a_planted_gouge_is_found_with_its_depth_place_and_move() {
     let part = formula(AnalyticShape::Plane { height: 0.0 }, [0.0, 20.0], [0.0, 20.0]);
     let cutter = Cutter::ball(6.0).unwrap();
     let at = |x: f64, y: f64, z: f64, kind| Move {
-        to: ClPoint { tip: Point3::new(x, y, z) },
+        to: ClPoint::upright(Point3::new(x, y, z)),
         kind,
         feed_rate: 1000.0,
         pass: 0,
     };
     let path = Toolpath {
-        start: ClPoint { tip: Point3::new(4.03, 7.01, 5.0) },
+        start: ClPoint::upright(Point3::new(4.03, 7.01, 5.0)),
         moves: vec![
             at(4.03, 7.01, 0.0, MoveKind::Plunge),
             at(9.0, 7.01, 0.0, MoveKind::Cut),
@@ -109,8 +109,8 @@ fn a_rapid_through_the_part_is_a_gouge() {
     let part = formula(AnalyticShape::Plane { height: 0.0 }, [0.0, 20.0], [0.0, 20.0]);
     let cutter = Cutter::ball(6.0).unwrap();
     let to = Point3::new(25.0, 10.0, -0.1);
-    let rapid = Move { to: ClPoint { tip: to }, kind: MoveKind::Rapid, feed_rate: 0.0, pass: 0 };
-    let path = Toolpath { start: ClPoint { tip: Point3::new(-5.0, 10.0, -0.1) }, moves: vec![rapid] };
+    let rapid = Move { to: ClPoint::upright(to), kind: MoveKind::Rapid, feed_rate: 0.0, pass: 0 };
+    let path = Toolpath { start: ClPoint::upright(Point3::new(-5.0, 10.0, -0.1)), moves: vec![rapid] };
     let m = cut_and_measure(&part, &cutter, &path, 0.1, &LIMITS);
     assert!((m.gouge.max_depth_mm - 0.1).abs() < 1e-6);
     assert_eq!(m.gouge.regions[0].move_index, 0);

@@ -25,7 +25,7 @@ fn plane() -> Part {
 /// Passes along x, from end to end beyond the part, each with its y; `dip` lowers the cutter in the middle
 /// of the pass with that number.
 fn passes(lines: &[f64], dip: Option<(usize, f64)>) -> Toolpath {
-    let tip = |x, y, z| ClPoint { tip: Point3::new(x, y, z) };
+    let tip = |x, y, z| ClPoint::upright(Point3::new(x, y, z));
     let mut moves = Vec::new();
     for (k, &y) in lines.iter().enumerate() {
         let depth = dip.filter(|d| d.0 == k).map_or(0.0, |d| d.1);

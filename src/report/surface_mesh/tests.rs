@@ -147,7 +147,7 @@ fn oblique_passes(cell: f64) -> (ZMap, Cutter, Toolpath, impl Fn(f64, f64) -> f6
             [at(-30.0, across, 20.0), at(-30.0, across, 0.0), at(30.0, across, 0.0), at(30.0, across, 20.0)]
         {
             let kind = crate::toolpath::MoveKind::Cut;
-            let to = crate::toolpath::ClPoint { tip };
+            let to = crate::toolpath::ClPoint::upright(tip);
             path.moves.push(Move { to, kind, feed_rate: 1000.0, pass: (pass + 20) as u32 });
         }
     }

@@ -258,7 +258,7 @@ impl<'a> Program<'a> {
     }
 
     fn push(&mut self, tip: Point3, kind: MoveKind, feed_rate: f64, pass: u32) {
-        self.moves.push(Move { to: ClPoint { tip }, kind, feed_rate, pass });
+        self.moves.push(Move { to: ClPoint::upright(tip), kind, feed_rate, pass });
     }
 
     fn feed_along(&mut self, pass: u32, kind: MoveKind, tips: &[Point3]) {
@@ -326,7 +326,7 @@ impl<'a> Program<'a> {
             self.push(tip, MoveKind::Retract, self.settings.feed_rate, last.pass);
         }
         let start = self.start.unwrap_or(Point3::new(0.0, 0.0, safe));
-        Toolpath { start: ClPoint { tip: start }, moves: self.moves }
+        Toolpath { start: ClPoint::upright(start), moves: self.moves }
     }
 }
 

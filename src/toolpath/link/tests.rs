@@ -199,19 +199,19 @@ fn nothing_stands_above_the_free_height() {
             let kind = if k < 400 { MoveKind::Cut } else { MoveKind::Rapid };
             if kind == MoveKind::Cut {
                 ceiling.lower(&at, &to);
-                moves.push(Move { to: ClPoint { tip: to }, kind, feed_rate: 1.0, pass: 0 });
+                moves.push(Move { to: ClPoint::upright(to), kind, feed_rate: 1.0, pass: 0 });
                 at = to;
                 continue;
             }
             let free = ceiling.free_height(&at.xy(), &to.xy()) + 1e-5;
             // Up at feed, since it is the way over that is tested.
             let up = Point3::new(at.x, at.y, free);
-            moves.push(Move { to: ClPoint { tip: up }, kind: MoveKind::Retract, feed_rate: 1.0, pass: 0 });
+            moves.push(Move { to: ClPoint::upright(up), kind: MoveKind::Retract, feed_rate: 1.0, pass: 0 });
             let over = Point3::new(to.x, to.y, free);
-            moves.push(Move { to: ClPoint { tip: over }, kind, feed_rate: 0.0, pass: 0 });
+            moves.push(Move { to: ClPoint::upright(over), kind, feed_rate: 0.0, pass: 0 });
             at = over;
         }
-        let path = Toolpath { start: ClPoint { tip: start }, moves };
+        let path = Toolpath { start: ClPoint::upright(start), moves };
         let grid = Grid { origin: Point2::new(-4.0, -4.0), cell: 0.1, nx: 280, ny: 280 };
         let removal = cut_in_order(ZMap::block(grid, TOP), &cutter, &path, &Silent).unwrap();
         assert_eq!(removal.rapid_contacts.first(), None);

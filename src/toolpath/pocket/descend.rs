@@ -66,7 +66,7 @@ impl Writer<'_> {
         if self.start.is_none() {
             self.start = Some(tip);
         } else if self.at != Some(tip) {
-            self.moves.push(Move { to: ClPoint { tip }, kind, feed_rate, pass: self.pass });
+            self.moves.push(Move { to: ClPoint::upright(tip), kind, feed_rate, pass: self.pass });
         }
         self.at = Some(tip);
     }
@@ -108,7 +108,7 @@ pub(super) fn program(
         above = floor;
     }
     let start = writer.start.unwrap_or(Point3::new(0.0, 0.0, safe));
-    Toolpath { start: ClPoint { tip: start }, moves: writer.moves }
+    Toolpath { start: ClPoint::upright(start), moves: writer.moves }
 }
 
 /// Tips from `above` down to where a run begins.

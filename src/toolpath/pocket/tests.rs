@@ -191,13 +191,13 @@ fn feeds_fall_where_more_of_the_cutter_cuts() {
     assert!((engagement_angle(3.0, 3.0) - PI / 2.0).abs() < 1e-15);
     assert_eq!(engagement_angle(6.0, 3.0), PI);
     let to = |x: f64| crate::toolpath::Move {
-        to: crate::toolpath::ClPoint { tip: Point3::new(x, 0.0, 0.0) },
+        to: crate::toolpath::ClPoint::upright(Point3::new(x, 0.0, 0.0)),
         kind: MoveKind::Cut,
         feed_rate: 1000.0,
         pass: 0,
     };
     let mut path = crate::toolpath::Toolpath {
-        start: crate::toolpath::ClPoint { tip: Point3::origin() },
+        start: crate::toolpath::ClPoint::upright(Point3::origin()),
         moves: vec![to(10.0), to(20.0), to(30.0)],
     };
     let widths = [1.0, 6.0, 1.0];
