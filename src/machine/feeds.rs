@@ -9,7 +9,6 @@
 
 use super::Machine;
 use super::time::{Block, profile};
-use crate::geometry::Point3;
 use crate::toolpath::{ClPoint, Move, MoveKind, Toolpath};
 
 /// Each feed of the series over the next lower one. Closer feeds make more F words, wider ones leave more
