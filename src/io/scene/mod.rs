@@ -4,6 +4,7 @@
 //! The text is read as a tree of values with their places (not by derived deserialisation), so that
 //! every refusal can point at the very key or value: tagged enums of serde only know the table.
 
+mod axis;
 mod classic;
 mod direction;
 mod error;
@@ -18,6 +19,7 @@ mod write;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+pub use axis::AxisRequest;
 pub use error::{Finding, SceneError, SceneText};
 pub use pocket::OutlineSource;
 pub use write::complete_toml;
@@ -207,6 +209,8 @@ pub struct ToolpathRequest {
     pub directions: Vec<NamedFile>,
     /// How its passes are smoothed and joined.
     pub joining: Joining,
+    /// How its axis is tilted; `None` for an upright one.
+    pub axis: Option<AxisRequest>,
 }
 
 impl ToolpathRequest {
