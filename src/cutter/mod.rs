@@ -5,8 +5,10 @@ mod contact;
 mod holder;
 mod profile;
 mod shape;
+mod solid;
 
 pub use apt::{AptError, AptWord, AptWords};
 pub use holder::{Holder, HolderError, HolderSection};
 pub use profile::{Incline, Profile};
 pub use shape::{Cutter, CutterError, CutterShape};
+pub use solid::{OutlineFoot, Solid, SolidFoot};

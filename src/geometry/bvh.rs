@@ -2,8 +2,6 @@
 //!
 //! The boxes are f32 and hold their triangles with a margin; every answer is computed in f64 at the
 //! triangles. So the tree decides how fast an answer comes, never which.
-//! The tree is built by PLOC with reinsertion (Meister & Bittner 2018, crate obvhs) and is the same
-//! for any number of threads.
 
 mod nearest;
 mod orient;
@@ -11,11 +9,6 @@ mod orient;
 mod tests;
 mod tree;
 mod vertical;
-
-use std::time::Duration;
-
-use obvhs::bvh2::builder::build_bvh2;
-use obvhs::{Boundable, BvhBuildParams};
 
 use super::{Point3, TriangleMesh, Vector3};
 pub(crate) use tree::{BoxTree, Extent, Node, Paired, round_down, round_up};
@@ -79,56 +72,16 @@ const LEAF: u32 = 2;
 /// than a triangle, so that it costs nothing.
 const MARGIN: f64 = f32::EPSILON as f64;
 
-/// A triangle's grown box, for the builder.
-struct Bounds(obvhs::aabb::Aabb);
-
-impl Boundable for Bounds {
-    fn aabb(&self) -> obvhs::aabb::Aabb {
-        self.0
-    }
-}
-
-/// Nodes and triangles in the order of a depth-first walk: what a query visits one after the other
-/// then lies close together in memory, which is most of what a scattered query costs.
-fn depth_first(tree: &obvhs::bvh2::Bvh2) -> (BoxTree, Vec<u32>) {
-    let copy = |index: usize| {
-        let n = &tree.nodes[index];
-        let (min, max) = (n.aabb().min.to_array(), n.aabb().max.to_array());
-        Node { min, count: n.prim_count, max, first: n.first_index }
-    };
-    let mut nodes = vec![copy(0); 2];
-    let mut triangles = Vec::with_capacity(tree.primitive_indices.len());
-    let mut waiting = vec![0];
-    while let Some(index) = waiting.pop() {
-        let Node { first, count, .. } = nodes[index];
-        let first = first as usize;
-        if count > 0 {
-            nodes[index].first = triangles.len() as u32;
-            triangles.extend_from_slice(&tree.primitive_indices[first..first + count as usize]);
-        } else {
-            let children = nodes.len();
-            nodes[index].first = children as u32;
-            nodes.extend([copy(first), copy(first + 1)]);
-            waiting.extend([children + 1, children]);
-        }
-    }
-    (BoxTree { nodes: Paired::from_values(&nodes) }, triangles)
-}
-
 impl Bvh {
     /// Builds the tree.
     pub fn new(mesh: &TriangleMesh) -> Self {
         let bounds = mesh.bounds();
         let margin = MARGIN * bounds.min.coords.amax().max(bounds.max.coords.amax());
-        let boxes: Vec<Bounds> = crate::parallel::map(mesh.triangles().len(), |t| {
+        let boxes: Vec<Extent> = crate::parallel::map(mesh.triangles().len(), |t| {
             let b = super::Aabb::of(&mesh.corners(t));
-            let min = b.min.coords.map(|x| round_down(x - margin));
-            let max = b.max.coords.map(|x| round_up(x + margin));
-            Bounds(obvhs::aabb::Aabb::new([min.x, min.y, min.z].into(), [max.x, max.y, max.z].into()))
+            Extent::new(b.min.coords.map(|x| x - margin).into(), b.max.coords.map(|x| x + margin).into())
         });
-        let parameters = BvhBuildParams { max_prims_per_leaf: LEAF, ..BvhBuildParams::medium_build() };
-        let tree = build_bvh2(&boxes, parameters, &mut Duration::default());
-        let (tree, triangles) = depth_first(&tree);
+        let (tree, triangles) = BoxTree::around(&boxes, LEAF);
         Self { tree, triangles, vertex_normals: nearest::vertex_normals(mesh) }
     }
 

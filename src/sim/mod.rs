@@ -13,6 +13,7 @@ mod in_order;
 mod reference;
 #[cfg(test)]
 pub(crate) mod scenes;
+mod solid;
 mod sweep;
 mod swept;
 mod tiles;
@@ -26,5 +27,6 @@ pub use grid::{Grid, GridError};
 pub use holder::{Collision, HolderClearance, holder_collisions};
 pub use in_order::{ENGAGED, MoveRemoval, RapidContact, Removal, cut_in_order, cut_in_order_plain};
 pub use reference::cut_reference;
+pub use solid::{Nearest, OppositeAxes, SweptHit, SweptMoves, SweptSolid};
 pub use swept::SweptMove;
 pub use zmap::{NOT_CUT, ZMap};

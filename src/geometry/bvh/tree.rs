@@ -3,6 +3,14 @@
 //! Boxes are f32, rounded outward. A tree of the mesh's own boxes answers for the mesh; the same tree
 //! with other boxes around its slots ([`BoxTree::refitted`]) answers for what else belongs to each
 //! triangle, and costs no building.
+//!
+//! Trees are built by PLOC with reinsertion (Meister & Bittner 2018, crate obvhs) and are the same for
+//! any number of threads.
+
+use std::time::Duration;
+
+use obvhs::bvh2::builder::build_bvh2;
+use obvhs::{Boundable, BvhBuildParams};
 
 use crate::geometry::Point3;
 
@@ -92,6 +100,18 @@ impl Node {
             & (low[1] <= f64::from(self.max[1]))
     }
 
+    /// Middle of the box and half its sides, mm.
+    pub(crate) fn middle(&self) -> (Point3, [f64; 3]) {
+        let half =
+            |axis: usize, sign: f64| 0.5 * (f64::from(self.max[axis]) + sign * f64::from(self.min[axis]));
+        (Point3::from([0, 1, 2].map(|axis| half(axis, 1.0))), [0, 1, 2].map(|axis| half(axis, -1.0)))
+    }
+
+    /// First slot and number of slots of a leaf, or first of an inner node's two children and 0.
+    pub(crate) fn slots_or_children(&self) -> (usize, usize) {
+        (self.first as usize, self.count as usize)
+    }
+
     /// Upper end of the box, mm.
     pub(crate) fn top(&self) -> f64 {
         f64::from(self.max[2])
@@ -148,6 +168,12 @@ impl Extent {
     }
 }
 
+impl Boundable for Extent {
+    fn aabb(&self) -> obvhs::aabb::Aabb {
+        obvhs::aabb::Aabb::new(self.min.into(), self.max.into())
+    }
+}
+
 /// Boxes around boxes around slots.
 #[derive(Debug, Clone)]
 pub(crate) struct BoxTree {
@@ -157,6 +183,48 @@ pub(crate) struct BoxTree {
 }
 
 impl BoxTree {
+    /// A tree around boxes, up to `leaf` of them in a leaf, and which of them stands in each slot; the
+    /// slots of a leaf follow each other. There must be at least one box.
+    ///
+    /// Nodes and slots are in the order of a depth-first walk: what a query visits one after the other
+    /// then lies close together in memory, which is most of what a scattered query costs.
+    pub(crate) fn around(boxes: &[Extent], leaf: u32) -> (Self, Vec<u32>) {
+        let parameters = BvhBuildParams { max_prims_per_leaf: leaf, ..BvhBuildParams::medium_build() };
+        let tree = build_bvh2(boxes, parameters, &mut Duration::default());
+        let copy = |index: usize| {
+            let n = &tree.nodes[index];
+            let (min, max) = (n.aabb().min.to_array(), n.aabb().max.to_array());
+            Node { min, count: n.prim_count, max, first: n.first_index }
+        };
+        let mut nodes = vec![copy(0); 2];
+        let mut in_slots = Vec::with_capacity(tree.primitive_indices.len());
+        let mut waiting = vec![0];
+        while let Some(index) = waiting.pop() {
+            let Node { first, count, .. } = nodes[index];
+            let first = first as usize;
+            if count > 0 {
+                nodes[index].first = in_slots.len() as u32;
+                in_slots.extend_from_slice(&tree.primitive_indices[first..first + count as usize]);
+            } else {
+                let children = nodes.len();
+                nodes[index].first = children as u32;
+                nodes.extend([copy(first), copy(first + 1)]);
+                waiting.extend([children + 1, children]);
+            }
+        }
+        (Self { nodes: Paired::from_values(&nodes) }, in_slots)
+    }
+
+    /// One more than the greatest index of a box; even.
+    pub(crate) fn nodes_len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Box `index`.
+    pub(crate) fn node(&self, index: usize) -> &Node {
+        self.nodes.at(index)
+    }
+
     /// The same tree around other boxes, one for each slot.
     pub(crate) fn refitted(&self, slots: &[Extent]) -> Self {
         let mut nodes: Vec<Node> = (0..self.nodes.len()).map(|i| *self.nodes.at(i)).collect();

@@ -1,0 +1,109 @@
+//! The volume that a tool sweeps, as a solid, for any tool axis.
+//!
+//! Enters: the tool as a [`Solid`] and its moves, on each of which the tip runs straight while the axis
+//! turns evenly ([`ClPoint::towards`]). Leaves: the signed distance of a place from the swept volume, mm,
+//! with the time at which the tool comes nearest; for one move, and for all moves of a path through a
+//! search tree.
+//!
+//! Seen from a tool that stands still, a place runs along a smooth curve, and the distance from a convex
+//! solid is a convex function of the place. Its supporting plane at one time and a bound on how the curve
+//! bends therefore bound the distance from below at all other times, which both the tree and the search
+//! for the nearest time rest on.
+
+mod motion;
+mod moves;
+mod search;
+#[cfg(test)]
+mod tests;
+
+use crate::cutter::Solid;
+use crate::geometry::Point3;
+use crate::toolpath::ClPoint;
+pub(crate) use motion::Motion;
+pub use moves::{SweptHit, SweptMoves};
+use search::least;
+
+/// A move turns the axis to its very opposite, so that nobody can tell which way round.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("move {index} turns the tool axis around to its opposite: which way is not told")]
+pub struct OppositeAxes {
+    /// Index of the move; 0 where it is asked for alone.
+    pub index: usize,
+}
+
+/// How near a tool comes on one move.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Nearest {
+    /// Signed distance, mm; negative where the tool passes over the place.
+    pub distance: f64,
+    /// When, from 0 at the begin of the move to 1 at its end.
+    pub t: f64,
+}
+
+/// The volume that a solid sweeps on one move.
+///
+/// # Tolerance
+/// Distances are least over the time of the move to 1e-9 mm. Inside of a solid of several pieces it is
+/// the depth at the time at which one piece is deepest around the place, which another time may exceed;
+/// its sign, and all distances outside, are exact.
+#[derive(Debug, Clone, Copy)]
+pub struct SweptSolid<'a> {
+    solid: &'a Solid,
+    motion: Motion,
+}
+
+impl<'a> SweptSolid<'a> {
+    /// Prepares a move, of any length and turn; also of none.
+    ///
+    /// # Errors
+    /// [`OppositeAxes`] when the two axes are opposite within a millionth of a radian.
+    pub fn new(solid: &'a Solid, from: &ClPoint, to: &ClPoint) -> Result<Self, OppositeAxes> {
+        let motion = Motion::new(from, to).ok_or(OppositeAxes { index: 0 })?;
+        Ok(Self { solid, motion })
+    }
+
+    /// Signed distance of `q` from the swept volume: the least over the move.
+    pub fn distance(&self, q: &Point3) -> Nearest {
+        let begin = Nearest { distance: self.at(q, 0.0), t: 0.0 };
+        self.below(q, begin.distance).unwrap_or(begin)
+    }
+
+    /// As [`SweptSolid::distance`] where that is less than `limit`; else `None`, mostly at the cost of one
+    /// look at the middle of the move.
+    pub fn below(&self, q: &Point3, limit: f64) -> Option<Nearest> {
+        below(self.solid, &self.motion, q, [0.0, 1.0], limit)
+    }
+
+    /// Signed distance from the solid as it stands at time `t`.
+    pub fn at(&self, q: &Point3, t: f64) -> f64 {
+        distance_at(self.solid, &self.motion, q, t)
+    }
+}
+
+fn distance_at(solid: &Solid, motion: &Motion, q: &Point3, t: f64) -> f64 {
+    let pose = motion.at(t);
+    solid.distance(&pose.tip, &pose.axis, q)
+}
+
+/// The least distance within a stretch of a move, if it is below `limit`.
+pub(super) fn below(
+    solid: &Solid,
+    motion: &Motion,
+    q: &Point3,
+    range: [f64; 2],
+    limit: f64,
+) -> Option<Nearest> {
+    if solid.is_convex() {
+        return motion.ball_track(solid, q, range).map_or_else(
+            || least(&motion.seen(solid, 0, q), range, limit),
+            |track| least(&track, range, limit),
+        );
+    }
+    let (mut best, mut now) = (None, limit);
+    for piece in 0..solid.pieces() {
+        if let Some(found) = least(&motion.seen(solid, piece, q), range, now) {
+            (best, now) = (Some(found), found.distance);
+        }
+    }
+    best.map(|found: Nearest| Nearest { distance: distance_at(solid, motion, q, found.t), ..found })
+}
