@@ -11,7 +11,7 @@ use super::smooth::smooth_and_spread;
 use super::spacing::Placing;
 use super::streamline::Fitting;
 use super::strip::strip_width;
-use super::tilted::{self, Tilting, Touch};
+use super::tilted::{self, TiltedPasses, Tilting, Touch};
 use super::tool_axis::{AxisError, ToolAxis};
 use super::{
     PocketStrategy, Toolpath, contour_spiral, iso_scallop, mesh_passes, mesh_surface, shortest, spiral,
@@ -490,7 +490,7 @@ pub fn plan_tilted(
     let touches = if touches.is_empty() && !passes.is_empty() {
         tilted::around_centres(&passes, part, cutter, tilting.axis, settings.chord_tolerance, monitor)?
     } else {
-        touches
+        TiltedPasses::located(touches, settings.chord_tolerance)
     };
     let path = join_tilted(touches, both_ways, part, cutter, tilting, settings, &mut notes, monitor)?;
     Ok(Plan::new(path, notes, field, &contacts, strategy))

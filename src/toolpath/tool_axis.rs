@@ -15,7 +15,8 @@ const ALONG: f64 = 1e-9;
 pub enum ToolAxis {
     /// The same unit vector everywhere.
     Fixed(Vector3),
-    /// Leaning from the normal of the surface: by `lead` forward in feed direction, by `tilt` to the left of it, rad.
+    /// Leaning from the normal of the surface: by `lead` forward in feed direction (a flat then cuts with its toe and lifts
+    /// its heel), by `tilt` to the left of it, rad.
     LeadTilt {
         /// Forward, rad.
         lead: f64,
@@ -160,11 +161,11 @@ mod tests {
         let (lead, contact) = (0.2f64, level());
         let axis = Vector3::new(lead.sin(), 0.0, lead.cos());
         let flat = location(&Cutter::flat(6.0).unwrap(), &contact, &axis);
-        // The heel, a radius behind the axis, stands on the contact.
-        let heel = flat.tip + Vector3::new(-lead.cos(), 0.0, lead.sin()) * 3.0;
-        assert!((heel - contact.point).norm() < 1e-12);
+        // The toe, a radius ahead of the axis, stands on the contact, and the heel is lifted.
+        let toe = flat.tip + Vector3::new(lead.cos(), 0.0, -lead.sin()) * 3.0;
+        assert!((toe - contact.point).norm() < 1e-12);
         let bull = location(&Cutter::bull(6.0, 1.0).unwrap(), &contact, &axis);
-        let centre = bull.tip + axis + Vector3::new(-lead.cos(), 0.0, lead.sin()) * 2.0;
+        let centre = bull.tip + axis + Vector3::new(lead.cos(), 0.0, -lead.sin()) * 2.0;
         assert!((centre - (contact.point + Vector3::z())).norm() < 1e-12);
         let square = location(&Cutter::flat(6.0).unwrap(), &contact, &Vector3::z());
         assert_eq!(square.tip, contact.point);

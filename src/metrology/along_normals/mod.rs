@@ -14,9 +14,11 @@
 
 mod net;
 mod ridges;
+#[cfg(test)]
+mod tests;
 mod tracks;
 
-use std::collections::BinaryHeap;
+use std::collections::{BinaryHeap, HashMap};
 
 use super::figures::{
     DeviationFigures, GougeFigures, GougeRegion, Limits, Measurement, UncutFigures, UncutRegion,
@@ -169,6 +171,7 @@ struct Inspection<'a> {
     engine: &'a dyn AlongNormal,
     finder: Finder<'a>,
     limits: &'a Limits,
+    spacing: f64,
     /// A dip between places whose moves no place saw is at most the square of their distance over this, mm.
     dip: f64,
 }
@@ -193,7 +196,7 @@ pub fn measure_along_normals(
     let finder = Finder { part, engine, tracks: &tracks };
     // An arc of radius r that passes between two places e apart dips e²/8r below the line between them.
     let dip = 8.0 * if cutter.corner_radius() > 0.0 { cutter.corner_radius() } else { cutter.radius() };
-    let inspection = Inspection { part, engine, finder, limits, dip };
+    let inspection = Inspection { part, engine, finder, limits, spacing, dip };
     monitor.start("measuring along normals", net.places.len() as u64);
     let samples = crate::parallel::try_map(net.places.len(), |k| {
         if k % 256 == 0 {
@@ -362,7 +365,7 @@ impl Inspection<'_> {
     fn gouges(&self, net: &Net, samples: &[Sample], areas: &[f64]) -> GougeFigures {
         let depth = |k: u32| samples[k as usize].hit.map_or(0.0, |hit| -hit.deviation);
         let mut figures = GougeFigures::default();
-        for region in connected(net, &|k| depth(k) > self.limits.gouge) {
+        for region in connected(net, self.spacing, &|k| depth(k) > self.limits.gouge) {
             let Some(&deepest) = region.iter().max_by(|a, b| depth(**a).total_cmp(&depth(**b))) else {
                 continue;
             };
@@ -387,7 +390,7 @@ impl Inspection<'_> {
         let reach = self.engine.reach();
         let height = |k: u32| samples[k as usize].hit.map_or(reach, |hit| hit.deviation);
         let mut figures = UncutFigures::default();
-        for region in connected(net, &|k| height(k) > self.limits.uncut) {
+        for region in connected(net, self.spacing, &|k| height(k) > self.limits.uncut) {
             let Some(&highest) = region.iter().max_by(|a, b| height(**a).total_cmp(&height(**b))) else {
                 continue;
             };
@@ -436,30 +439,42 @@ fn deviation_figures(samples: &[Sample], areas: &[f64]) -> DeviationFigures {
     figures
 }
 
-/// The regions of places for which `inside` holds, joined by triangles; each in the order of its places, regions in the
-/// order of their first one.
-fn connected(net: &Net, inside: &dyn Fn(u32) -> bool) -> Vec<Vec<u32>> {
-    let count = net.places.len();
-    let marked: Vec<bool> = (0..count as u32).map(inside).collect();
-    let mut root: Vec<u32> = (0..count as u32).collect();
-    let find = |root: &mut Vec<u32>, mut k: u32| {
-        while root[k as usize] != k {
-            root[k as usize] = root[root[k as usize] as usize];
-            k = root[k as usize];
-        }
-        k
+/// The regions of places for which `inside` holds: places closer than `spacing` mm that face the same way belong together,
+/// across the borders of facets and patches too. Each in the order of its places, regions in that of their first one.
+fn connected(net: &Net, spacing: f64, inside: &dyn Fn(u32) -> bool) -> Vec<Vec<u32>> {
+    let marked: Vec<u32> = (0..net.places.len() as u32).filter(|&k| inside(k)).collect();
+    let cell = |k: u32| (net.places[k as usize].point.coords / spacing).map(|x| x.floor() as i64);
+    let mut cells: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
+    for (m, &k) in marked.iter().enumerate() {
+        cells.entry(cell(k).into()).or_default().push(m);
+    }
+    let near = |m: usize| {
+        let (here, place) = (cell(marked[m]), &net.places[marked[m] as usize]);
+        let around = (0..27).map(|n| [here.x + n % 3 - 1, here.y + n / 3 % 3 - 1, here.z + n / 9 - 1]);
+        let others = around.filter_map(|at| cells.get(&at)).flatten().copied();
+        let joined = |&o: &usize| {
+            let other = &net.places[marked[o] as usize];
+            (other.point - place.point).norm() <= spacing && other.normal.dot(&place.normal) > 0.0
+        };
+        others.filter(joined).collect::<Vec<usize>>()
     };
-    for t in &net.triangles {
-        for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
-            if marked[a as usize] && marked[b as usize] {
-                let (a, b) = (find(&mut root, a), find(&mut root, b));
-                root[a.max(b) as usize] = a.min(b);
-            }
+    let mut seen = vec![false; marked.len()];
+    let mut regions = Vec::new();
+    for start in 0..marked.len() {
+        if std::mem::replace(&mut seen[start], true) {
+            continue;
         }
+        let (mut region, mut next) = (vec![start], 0);
+        while next < region.len() {
+            for other in near(region[next]) {
+                if !std::mem::replace(&mut seen[other], true) {
+                    region.push(other);
+                }
+            }
+            next += 1;
+        }
+        region.sort_unstable();
+        regions.push(region.into_iter().map(|m| marked[m]).collect());
     }
-    let mut regions: std::collections::BTreeMap<u32, Vec<u32>> = std::collections::BTreeMap::new();
-    for k in (0..count as u32).filter(|&k| marked[k as usize]) {
-        regions.entry(find(&mut root, k)).or_default().push(k);
-    }
-    regions.into_values().collect()
+    regions
 }

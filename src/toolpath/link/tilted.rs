@@ -5,7 +5,7 @@
 //! against, and goes over at rapid rate: straight where that is free, else around a sphere that holds part
 //! and stock, on which every place of the cutter is outside while its axis points away from the middle.
 
-use super::super::tilted::{Tilting, Touch, limit_turning, reversed, thinned};
+use super::super::tilted::{TiltedPasses, Tilting, Touch, limit_turning, reversed, thinned};
 use super::super::{ClPoint, Move, MoveKind, PlanError, PlanSettings, Toolpath};
 use super::order::{Visit, is_closed, order};
 use super::{Links, Rates, longest_link};
@@ -23,7 +23,7 @@ const SPHERE_STEP: f64 = 0.15;
 /// # Errors
 /// [`PlanError::Axis`] where the rule gives no axis for a pass fed the other way round, or cancelled.
 pub fn join_tilted(
-    passes: Vec<Vec<Touch>>,
+    passes: TiltedPasses,
     both_ways: bool,
     part: &Part,
     cutter: &Cutter,
@@ -32,6 +32,7 @@ pub fn join_tilted(
     notes: &mut Vec<String>,
     monitor: &dyn Monitor,
 ) -> Result<Toolpath, PlanError> {
+    let TiltedPasses { passes, tolerance } = passes;
     let passes: Vec<Vec<Touch>> = passes.into_iter().filter(|p| p.len() >= 2).collect();
     monitor.start("joining passes", 0);
     let contacts: Vec<Vec<Point3>> =
@@ -47,7 +48,7 @@ pub fn join_tilted(
         let mut pass =
             visited(&passes[visits[k].pass], &contacts[visits[k].pass], &visits[k], cutter, tilting)?;
         let even = tilting.most_turning.is_none_or(|rate| limit_turning(&mut pass, cutter, rate));
-        Ok::<_, PlanError>((thinned(&pass, settings.chord_tolerance, monitor)?, even))
+        Ok::<_, PlanError>((thinned(&pass, tolerance, monitor)?, even))
     })?;
     let uneven = turned.iter().filter(|(_, even)| !even).count();
     if uneven > 0 {
