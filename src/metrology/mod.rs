@@ -21,7 +21,9 @@ mod removal;
 mod ridges;
 mod unseen;
 
-pub use along_normals::{AlongNormal, NormalHit, NormalMap, PatchGrid, measure_along_normals, net_places};
+pub use along_normals::{
+    AlongNormal, NormalHit, NormalMap, PatchGrid, SweptVolume, measure_along_normals, net_places,
+};
 pub(crate) use cut_surface::CutSurface;
 pub use figures::{
     DeviationFigures, GougeFigures, GougeRegion, Limits, Measurement, PathFigures, ScallopFigures,

@@ -273,15 +273,19 @@ mod tests {
             let touches = along(&arc, [0.0, 1.5], &cutter, &rule, 1e-3, &Silent).unwrap();
             let kept = thinned(&touches, 6e-4, &Silent).unwrap();
             assert!(kept.len() < 90 && kept.len() * 2 < touches.len(), "{} of {}", kept.len(), touches.len());
-            // The arc's centre stays as far from the cylinder's axis as the contact formula puts it.
+            // The circle of the arc's centres comes as near to the cylinder as the arc's radius.
             let profile = *cutter.profile();
             for w in kept.windows(2) {
-                for k in 0..=20 {
-                    let at = w[0].towards(&w[1], f64::from(k) / 20.0);
-                    let centre = at.tip + at.axis * profile.centre_z;
-                    let radial = Vector3::new(centre.x, 0.0, centre.z);
-                    let lean = (at.axis - radial.normalize() * at.axis.dot(&radial.normalize())).norm();
-                    let lowest = radial.norm() - profile.corner - profile.centre_x * lean;
+                for k in 0..=10 {
+                    let at = w[0].towards(&w[1], f64::from(k) / 10.0);
+                    let e = at.axis.cross(&Vector3::y()).normalize();
+                    let radial = |turn: f64| {
+                        let aside = (e * turn.cos() + at.axis.cross(&e) * turn.sin()) * profile.centre_x;
+                        let centre = at.tip + at.axis * profile.centre_z + aside;
+                        centre.x.hypot(centre.z)
+                    };
+                    let turns = (0..1000).map(|n| radial(f64::from(n) * std::f64::consts::TAU / 1000.0));
+                    let lowest = turns.fold(f64::INFINITY, f64::min) - profile.corner;
                     assert!((lowest - 10.0).abs() < 1.1e-3, "{lowest}");
                 }
             }

@@ -152,26 +152,41 @@ pub struct CuttingData {
 /// Which engine cuts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Engine {
-    /// Branch and bound, within 0.01 µm of the reference.
+    /// The z-map for upright cutters, normal rays for tilted ones.
+    Auto,
+    /// Heights over the plan view by branch and bound, within 0.01 µm of the reference; upright cutters only.
     ZMap,
-    /// Every cell under every move that can reach it, in closed form in f64.
+    /// Every cell under every move that can reach it, in closed form in f64; upright cutters only.
     Reference,
+    /// The swept volume along the normals of the design surface; any cutter axis, any shape.
+    Rays,
 }
 
 impl Engine {
     /// The words that a scene and the command line accept.
-    pub const WORDS: [&'static str; 2] = ["zmap", "reference"];
+    pub const WORDS: [&'static str; 4] = ["auto", "zmap", "reference", "rays"];
 
     /// The engine that a word stands for.
     pub fn from_word(word: &str) -> Option<Self> {
-        [Self::ZMap, Self::Reference].into_iter().find(|engine| engine.name() == word)
+        [Self::Auto, Self::ZMap, Self::Reference, Self::Rays].into_iter().find(|engine| engine.name() == word)
     }
 
     /// Its word.
     pub fn name(self) -> &'static str {
         match self {
-            Self::ZMap => Self::WORDS[0],
-            Self::Reference => Self::WORDS[1],
+            Self::Auto => Self::WORDS[0],
+            Self::ZMap => Self::WORDS[1],
+            Self::Reference => Self::WORDS[2],
+            Self::Rays => Self::WORDS[3],
+        }
+    }
+
+    /// The engine that cuts a path, upright or tilted.
+    pub fn for_path(self, tilted: bool) -> Self {
+        match (self, tilted) {
+            (Self::Auto, true) => Self::Rays,
+            (Self::Auto, false) => Self::ZMap,
+            (engine, _) => engine,
         }
     }
 }

@@ -393,7 +393,7 @@ fn read_simulation(
         cell: cell.unwrap_or_else(|| auto_cell(cutter, &[])),
         cell_is_auto: cell.is_none(),
         memory_mib: section.count("memory_mib", 1..=1 << 20)?.unwrap_or(DEFAULT_MEMORY_MIB),
-        engine: engine.unwrap_or(Engine::ZMap),
+        engine: engine.unwrap_or(Engine::Auto),
         removal: section.flag("removal")?.unwrap_or(DEFAULT_REMOVAL),
         error_bound: section.length("error_bound")?.map_or_else(|| default_error_bound(limits), |v| v.value),
     })

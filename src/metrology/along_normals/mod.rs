@@ -14,6 +14,7 @@
 
 mod net;
 mod ridges;
+mod swept_volume;
 #[cfg(test)]
 mod tests;
 mod tracks;
@@ -33,6 +34,7 @@ use crate::toolpath::Toolpath;
 use net::{Net, Place};
 pub use net::{PatchGrid, net_places};
 use ridges::{Crossing, Finder};
+pub use swept_volume::SweptVolume;
 use tracks::Tracks;
 
 /// The cut surface where the normal of a design point meets it.
@@ -222,9 +224,8 @@ pub fn measure_along_normals(
     let mut gouge = inspection.gouges(&net, &samples, &shares);
     let mut uncut = inspection.uncut(&net, &samples, &shares);
     let deviation = deviation_figures(&samples, &shares);
-    let open =
-        |k: usize| Open { promise: 0.0, samples: net.triangles[k].map(|v| samples[v as usize]), depth: 0 };
-    let triangles = (0..net.triangles.len()).map(|k| (open(k), of_triangle[k].clone())).collect();
+    let triangles =
+        net.triangles.iter().zip(&of_triangle).map(|(t, crossings)| (t.map(|v| samples[v as usize]), &crossings[..]));
     let left = inspection.search(triangles, &mut greatest, asked, monitor)?;
     gouge.max_depth_mm = greatest.depth;
     gouge.error_bound_mm = left.max(0.0) + NUMERICAL_FLOOR;
@@ -276,21 +277,31 @@ impl Inspection<'_> {
                 self.finder.between((&a.place, x), (&b.place, y), &mut found);
             }
         }
-        // From each crossing to the middle of all of them: with two, half the way from one to the other.
-        let middle =
-            found.iter().map(|c: &Crossing| c.at.coords).sum::<Vector3>() / found.len().max(1) as f64;
-        found.iter_mut().for_each(|c| c.length = (c.at.coords - middle).norm());
+        // Half the way to the other crossing of the same two passes; where ridges meet, to the middle of all.
+        let middle = |chosen: &dyn Fn(&Crossing) -> bool| {
+            let (sum, count) = found.iter().filter(|c| chosen(c)).fold((Vector3::zeros(), 0), |(sum, n), c| {
+                (sum + c.at.coords, n + 1)
+            });
+            (sum / f64::from(count.max(1)), count)
+        };
+        let length = |c: &Crossing| {
+            let (own, count) = middle(&|other| other.passes == c.passes);
+            let to = if count == 2 { own } else { middle(&|_| true).0 };
+            (c.at.coords - to).norm()
+        };
+        let lengths: Vec<f64> = found.iter().map(length).collect();
+        found.iter_mut().zip(lengths).for_each(|(c, length)| c.length = length);
         found
     }
 
     /// How much any figure may exceed the greatest ones in a triangle.
-    fn promise(&self, open: &Open, crossings: &[Crossing], greatest: &Greatest) -> f64 {
-        let points = open.samples.map(|sample| sample.place.point);
+    fn promise(&self, samples: &[Sample; 3], crossings: &[Crossing], greatest: &Greatest) -> f64 {
+        let points = samples.map(|sample| sample.place.point);
         let longest = (0..3).map(|k| (points[(k + 1) % 3] - points[k]).norm()).fold(0.0, f64::max);
         // No place of a triangle is farther than this from its nearest corner.
         let far = longest / 3f64.sqrt();
         let mut more = f64::NEG_INFINITY;
-        for sample in &open.samples {
+        for sample in samples {
             let Some(hit) = sample.hit else { continue };
             // A cut of radius r that meets the design at the slope s goes no deeper than about s²r below that.
             let slope = sample.slope();
@@ -305,9 +316,9 @@ impl Inspection<'_> {
     }
 
     /// Divides triangles, the most promising ones first. Returns what may still exceed the figures, mm.
-    fn search(
+    fn search<'b>(
         &self,
-        triangles: Vec<(Open, Vec<Crossing>)>,
+        triangles: impl Iterator<Item = ([Sample; 3], &'b [Crossing])>,
         greatest: &mut Greatest,
         asked: f64,
         monitor: &dyn Monitor,
@@ -315,37 +326,30 @@ impl Inspection<'_> {
         const BATCH: usize = 64;
         monitor.start("looking closer", 0);
         let enough = asked.max(NUMERICAL_FLOOR);
-        let keep =
-            |mut open: Open, crossings: &[Crossing], greatest: &Greatest, heap: &mut BinaryHeap<Open>| {
-                open.promise = self.promise(&open, crossings, greatest);
-                if open.promise > 0.0 {
-                    heap.push(open);
-                }
-            };
-        let mut heap = BinaryHeap::new();
-        for (open, crossings) in triangles {
-            keep(open, &crossings, greatest, &mut heap);
-        }
-        let (mut divided, mut left) = (0, 0.0f64);
-        // Promises were made against lesser figures; what was found since takes from all of them alike at least nothing.
-        while divided < MOST_DIVIDED && heap.peek().is_some_and(|open| open.promise > enough) {
-            monitor::check(monitor)?;
-            let mut batch = Vec::with_capacity(BATCH);
-            while batch.len() < BATCH && heap.peek().is_some_and(|open| open.promise > enough) {
-                batch.extend(heap.pop());
+        let (mut heap, mut divided, mut left) = (BinaryHeap::new(), 0, 0.0f64);
+        // What promises little is not kept, but counts.
+        let mut keep = |samples: [Sample; 3], crossings: &[Crossing], depth: u32, greatest: &Greatest| {
+            let promise = self.promise(&samples, crossings, greatest);
+            if promise <= enough || depth == MOST_DEPTH {
+                left = left.max(promise);
+                return None;
             }
+            Some(Open { promise, samples, depth })
+        };
+        for (samples, crossings) in triangles {
+            heap.extend(keep(samples, crossings, 0, greatest));
+        }
+        // Promises were made against lesser figures than are known later, so that they are never too small.
+        while divided < MOST_DIVIDED && !heap.is_empty() {
+            monitor::check(monitor)?;
+            let batch: Vec<Open> = std::iter::from_fn(|| heap.pop()).take(BATCH).collect();
             divided += batch.len();
             let closer = crate::parallel::map(batch.len(), |k| self.divided(&batch[k].samples));
             for (open, parts) in batch.iter().zip(closer) {
                 for (samples, Closer { middles, crossings }) in parts {
                     middles.iter().for_each(|sample| greatest.look_at(sample, self.engine.reach()));
                     crossings.iter().for_each(|crossing| greatest.look_at_ridge(crossing));
-                    let part = Open { promise: 0.0, samples, depth: open.depth + 1 };
-                    if part.depth < MOST_DEPTH {
-                        keep(part, &crossings, greatest, &mut heap);
-                    } else {
-                        left = left.max(self.promise(&part, &crossings, greatest));
-                    }
+                    heap.extend(keep(samples, &crossings, open.depth + 1, greatest));
                 }
             }
         }

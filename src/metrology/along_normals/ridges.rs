@@ -29,6 +29,8 @@ pub(super) struct Crossing {
     pub rise: f64,
     /// Length of ridge that it stands for, mm.
     pub length: f64,
+    /// The two passes that meet, the first one first.
+    pub passes: [u32; 2],
 }
 
 pub(super) struct Finder<'a> {
@@ -104,6 +106,7 @@ impl Finder<'_> {
             at: top.place.point + top.place.normal * top.hit.deviation,
             rise,
             length: 0.0,
+            passes: self.tracks.passes(a.hit.by, b.hit.by),
         });
     }
 }

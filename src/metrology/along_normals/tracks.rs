@@ -29,6 +29,12 @@ impl<'a> Tracks<'a> {
         Self { path, along, same_track: SAME_TRACK * cutter.radius() }
     }
 
+    /// The passes of two moves, in order.
+    pub fn passes(&self, a: u32, b: u32) -> [u32; 2] {
+        let [x, y] = [a, b].map(|k| self.path.moves[k as usize].pass);
+        [x.min(y), x.max(y)]
+    }
+
     /// True when two moves belong to neighbouring tracks.
     pub fn apart(&self, a: u32, b: u32) -> bool {
         let [x, y] = [a, b].map(|k| &self.path.moves[k as usize]);
