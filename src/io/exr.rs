@@ -7,9 +7,10 @@
 
 use std::io::{self, Cursor};
 
+use exr::image::write::layers::WritableLayers;
 use exr::prelude::{
-    AttributeValue, Blocks, Compression, Encoding, Image, Layer, LayerAttributes, LineOrder,
-    SpecificChannels, Text, Vec2, WritableChannels, WritableImage,
+    AttributeValue, Blocks, Compression, Encoding, Image, ImageAttributes, Layer, LayerAttributes, LineOrder,
+    SpecificChannels, Text, Vec2, WritableImage,
 };
 
 use crate::metrology::{NormalMap, PatchGrid};
@@ -38,7 +39,10 @@ pub fn encode(cut: &ZMap, deviation: &[f32]) -> io::Result<Vec<u8>> {
         .with_channel("deviation")
         .with_channel("move")
         .with_pixel_fn(pixel);
-    bytes_of([grid.nx, grid.ny], channels, &description(grid))
+    let layer = Layer::new((grid.nx, grid.ny), LayerAttributes::default(), ENCODING, channels);
+    let mut image = Image::from_layer(layer);
+    describe(&mut image.attributes, &description(grid));
+    bytes_of(&image)
 }
 
 /// The bytes of an EXR file over the parameters of a patch: channels `X`, `Y`, `Z`, the design point, mm, `deviation`, mm
@@ -66,21 +70,19 @@ pub fn encode_patch(map: &NormalMap, patch: &PatchGrid) -> io::Result<Vec<u8>> {
         r#"{{"unit":"mm","u":[{u0:?},{u1:?}],"v":[{v0:?},{v1:?}],"rows":"greatest v first","move_none":{}}}"#,
         u32::MAX
     );
-    bytes_of([nu, nv], channels, &description)
+    let mut image = Image::from_layer(Layer::new((nu, nv), LayerAttributes::default(), ENCODING, channels));
+    describe(&mut image.attributes, &description);
+    bytes_of(&image)
 }
 
-/// An image of one layer with its text attribute.
-fn bytes_of<C: for<'a> WritableChannels<'a>>(
-    [width, height]: [usize; 2],
-    channels: C,
-    description: &str,
-) -> io::Result<Vec<u8>> {
-    let layer = Layer::new((width, height), LayerAttributes::default(), ENCODING, channels);
-    let mut image = Image::from_layer(layer);
-    // A single attribute: the crate keeps them in a hash map, and with two the bytes would vary.
-    image.attributes.other.insert(Text::from("millstream"), AttributeValue::Text(Text::from(description)));
+/// A single attribute: the crate keeps them in a hash map, and with two the bytes would vary.
+fn describe(attributes: &mut ImageAttributes, description: &str) {
+    attributes.other.insert(Text::from("millstream"), AttributeValue::Text(Text::from(description)));
+}
+
+/// On this thread: the crate's own threads would ignore how many the user allows.
+fn bytes_of<'i, L: WritableLayers<'i>>(image: &'i Image<L>) -> io::Result<Vec<u8>> {
     let mut bytes = Cursor::new(Vec::new());
-    // On this thread: the crate's own threads would ignore how many the user allows.
     image.write().non_parallel().to_buffered(&mut bytes).map_err(io::Error::other)?;
     Ok(bytes.into_inner())
 }

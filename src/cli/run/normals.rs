@@ -11,7 +11,7 @@ use crate::geometry::Point2;
 use crate::io::scene::ToolpathRequest;
 use crate::io::{exr, ply_write, png, stl_write};
 use crate::machine::slow_corners;
-use crate::metrology::{Measurement, NormalMap, PatchGrid, measure_along_normals, net_places};
+use crate::metrology::{Measurement, NormalMap, PatchGrid, SweptVolume, measure_along_normals, net_places};
 use crate::monitor::{self, Monitor as _};
 use crate::report::{
     HIGHEST_RIDGE, Histogram, MapSize, MapWords, SimulationFigures, SurfaceMeshFigures, ToolpathPage,
@@ -52,8 +52,7 @@ impl Job<'_> {
         let begun = Instant::now();
         let solid = Solid::of_cutter(&scene.cutter, scene.holder.as_ref());
         let reach = (REACH_OVER_UNCUT * scene.tolerance.uncut).max(scene.cutter.radius());
-        let rays =
-            Rays::new(&planned.path, &solid, monitor).map_err(CliError::rays(scene, &request.name))?;
+        let rays = Rays::new(&planned.path, &solid, monitor).map_err(CliError::rays(scene, &request.name))?;
         let inward = scene.cutter.radius();
         let cut = SweptVolume { rays: &rays, path: &planned.path, solid: &solid, inward, outward: reach };
         let asked = scene.simulation.error_bound;

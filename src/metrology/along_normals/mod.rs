@@ -224,8 +224,11 @@ pub fn measure_along_normals(
     let mut gouge = inspection.gouges(&net, &samples, &shares);
     let mut uncut = inspection.uncut(&net, &samples, &shares);
     let deviation = deviation_figures(&samples, &shares);
-    let triangles =
-        net.triangles.iter().zip(&of_triangle).map(|(t, crossings)| (t.map(|v| samples[v as usize]), &crossings[..]));
+    let triangles = net
+        .triangles
+        .iter()
+        .zip(&of_triangle)
+        .map(|(t, crossings)| (t.map(|v| samples[v as usize]), &crossings[..]));
     let left = inspection.search(triangles, &mut greatest, asked, monitor)?;
     gouge.max_depth_mm = greatest.depth;
     gouge.error_bound_mm = left.max(0.0) + NUMERICAL_FLOOR;
@@ -279,9 +282,10 @@ impl Inspection<'_> {
         }
         // Half the way to the other crossing of the same two passes; where ridges meet, to the middle of all.
         let middle = |chosen: &dyn Fn(&Crossing) -> bool| {
-            let (sum, count) = found.iter().filter(|c| chosen(c)).fold((Vector3::zeros(), 0), |(sum, n), c| {
-                (sum + c.at.coords, n + 1)
-            });
+            let (sum, count) = found
+                .iter()
+                .filter(|c| chosen(c))
+                .fold((Vector3::zeros(), 0), |(sum, n), c| (sum + c.at.coords, n + 1));
             (sum / f64::from(count.max(1)), count)
         };
         let length = |c: &Crossing| {
