@@ -162,7 +162,8 @@ impl<'a, M: Moving> Search<'a, M> {
             rise: middle.rise,
             lean: self.moving.turn() * half,
         };
-        if support.reach([self.ray.low, self.limit]) > self.limit - TOLERANCE {
+        let reach = support.reach([self.ray.low, self.limit]);
+        if reach > self.limit - TOLERANCE || support.value.is_nan() {
             return None;
         }
         let middle = self.enter(middle);
@@ -196,7 +197,8 @@ impl<'a, M: Moving> Search<'a, M> {
         let (bound, crossing) = stretch.bound(self.bends);
         // By how much the distance may be less further down, where the tool's side faces downward.
         let fall = (open.a.rise.max(open.b.rise) + turn * width).max(0.0) * (top - open.low);
-        if bound - fall > -TOLERANCE || width < SHORTEST {
+        // No number comes of places that are none.
+        if bound - fall > -TOLERANCE || width < SHORTEST || bound.is_nan() {
             return;
         }
         if bound > -TOLERANCE && top - open.low > SHORTEST_RANGE {

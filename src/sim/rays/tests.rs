@@ -190,3 +190,34 @@ fn rapids_do_not_cut_but_are_found_apart() {
     let rapid = rapid.unwrap();
     assert!((rapid.s + 1.0).abs() < 1e-9 && rapid.index == 2 && (rapid.t - 0.6).abs() < 1e-4, "{rapid:?}");
 }
+
+#[test]
+fn far_from_the_origin_only_rounding_is_lost() {
+    let path = turning_path(400);
+    let away = Vector3::new(9e4, -7e4, 3e4);
+    let mut far = path.clone();
+    far.start.tip += away;
+    far.moves.iter_mut().for_each(|m| m.to.tip += away);
+    let mut rng = Rng::new(41);
+    for cutter in [Cutter::ball(3.0), Cutter::bull(3.0, 0.5)].map(Result::unwrap) {
+        let (near, far) = (alone(&cutter, &path), alone(&cutter, &far));
+        for _ in 0..500 {
+            let (p, n) = (Point3::new(rng.within(0.0, 20.0), rng.within(0.0, 2.0), 0.1), axis(&mut rng, 0.3));
+            let a = near.deviation(&p, &n, 1.0, 2.0).unwrap();
+            let b = far.deviation(&(p + away), &n, 1.0, 2.0).unwrap();
+            assert!((a.s - b.s).abs() < 1e-9, "{p:?} {a:?} {b:?}");
+        }
+    }
+}
+
+#[test]
+fn places_that_are_no_numbers_meet_nothing() {
+    let rays = alone(&Cutter::bull(6.0, 1.0).unwrap(), &turning_path(20));
+    let places = [f64::NAN, f64::INFINITY].map(|x| Point3::new(1.0, 0.0, x));
+    for n in [Vector3::z(), Vector3::new(f64::NAN, 0.0, 1.0)] {
+        for p in places {
+            assert_eq!(rays.deviation(&p, &n, 1.0, 1.0), None);
+            assert_eq!(rays.moves().nearest(&p, 1.0), None);
+        }
+    }
+}

@@ -116,7 +116,8 @@ pub(super) fn least(moving: &impl Moving, q: &Point3, [from, to]: [f64; 2], limi
     while let Some(stretch) = waiting.pop() {
         let (bound, crossing) = stretch.bound(bends);
         let width = stretch.b.t - stretch.a.t;
-        if bound > best.distance - TOLERANCE || width < SHORTEST {
+        // No number comes of places that are none.
+        if bound > best.distance - TOLERANCE || width < SHORTEST || bound.is_nan() {
             continue;
         }
         let between = take(sample(stretch.next(crossing)), &mut best);
