@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme};
 
-use crate::io::scene::{Scene, SceneError};
+use crate::io::scene::{Engine, Scene, SceneError};
 use crate::monitor::Cancelled;
 use crate::part::PartError;
 use crate::report::ReportError;
-use crate::sim::GridError;
+use crate::sim::{GridError, OppositeAxes, RaysError};
 use crate::toolpath::PlanError;
 
 /// Why a command could not be done.
@@ -46,6 +46,49 @@ pub enum CliError {
         name: String,
         /// What the planner said.
         reason: PlanError,
+    },
+    /// The engine does not know tilted cutters.
+    #[error(
+        "{scene}: the toolpath \"{name}\" tilts the cutter, and the engine `{engine}` knows upright ones only"
+    )]
+    #[diagnostic(help("write `engine = \"rays\"` or \"auto\" in [simulation], or delete `--engine`"))]
+    Engine {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// Name of the toolpath.
+        name: String,
+        /// The engine.
+        engine: &'static str,
+    },
+    /// A tilted path cannot be simulated.
+    #[error("{scene}: the toolpath \"{name}\" cannot be simulated: {reason}")]
+    #[diagnostic(help("change the `axis` of that [[toolpath]]"))]
+    Turn {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// Name of the toolpath.
+        name: String,
+        /// What is wrong with its moves.
+        reason: OppositeAxes,
+    },
+    /// The places along the normals take more memory than allowed.
+    #[error(
+        "{scene}: places {spacing} mm apart on the part need {needed_mib} MiB, and {allowed_mib} MiB are allowed"
+    )]
+    #[diagnostic(help(
+        "write `cell = {fitting}` or a greater one, or a greater `memory_mib`, in [simulation]"
+    ))]
+    Places {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// What was asked for, mm.
+        spacing: f64,
+        /// What the run would need.
+        needed_mib: u64,
+        /// What it may take.
+        allowed_mib: u32,
+        /// Spacing that fits, mm.
+        fitting: f64,
     },
     /// A result could not be written.
     #[error("cannot write {}: {reason}", path.display())]
@@ -88,6 +131,21 @@ impl CliError {
     /// For grids that do not fit: `map_err(CliError::grid(scene))`.
     pub fn grid(scene: &Scene) -> impl Fn(GridError) -> Self + use<'_> {
         |reason| Self::Grid { scene: scene.source.name.clone(), reason }
+    }
+
+    /// For an engine that does not know tilted cutters.
+    pub fn engine(scene: &Scene, name: &str, engine: Engine) -> Self {
+        Self::Engine { scene: scene.source.name.clone(), name: name.to_owned(), engine: engine.name() }
+    }
+
+    /// For paths with turns that no engine knows: `map_err(CliError::rays(scene, name))`.
+    pub fn rays(scene: &Scene, name: &str) -> impl Fn(RaysError) -> Self {
+        |reason| match reason {
+            RaysError::Cancelled(_) => Self::Interrupted,
+            RaysError::Opposite(reason) => {
+                Self::Turn { scene: scene.source.name.clone(), name: name.to_owned(), reason }
+            }
+        }
     }
 
     /// A planner's error, told with the toolpath's name.

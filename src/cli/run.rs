@@ -1,5 +1,7 @@
 //! `millstream run`: scene → part → for each toolpath plan, cut, measure → results.
 
+mod normals;
+
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -245,6 +247,13 @@ impl<'a> Job<'a> {
     ) -> Result<(ToolpathResult, ToolpathPage), CliError> {
         let (scene, monitor) = (self.scene, self.progress);
         monitor::check(monitor)?;
+        let engine = scene.simulation.engine.for_path(request.axis.is_some());
+        if engine == Engine::Rays {
+            return self.along_normals(request, outputs);
+        }
+        if request.axis.is_some() {
+            return Err(CliError::engine(scene, &request.name, engine));
+        }
         let settings = self.settings(request);
         let milled = self.pocket.as_ref().zip(request.strategy.pocket());
         let mut planned = match milled {
@@ -259,9 +268,9 @@ impl<'a> Job<'a> {
             lay_out_for(scene, &self.part, &self.grid, &planned.path).map_err(CliError::grid(scene))?;
         let begun = Instant::now();
         let stock = ZMap::block(grid, self.top);
-        let cut = match scene.simulation.engine {
-            Engine::ZMap => cut(stock, &scene.cutter, &planned.path, monitor)?,
+        let cut = match engine {
             Engine::Reference => cut_reference(&stock, &scene.cutter, &planned.path, monitor)?,
+            _ => cut(stock, &scene.cutter, &planned.path, monitor)?,
         };
         let (mut removal, mut engaged) = (None, None);
         if scene.simulation.removal {
@@ -282,7 +291,7 @@ impl<'a> Job<'a> {
         let check = |holder| holder_collisions(&cut, holder, &planned.path, monitor);
         let held = scene.holder.as_ref().map(check).transpose()?;
         let simulation = SimulationFigures {
-            engine: scene.simulation.engine.name(),
+            engine: engine.name(),
             cell_mm: grid.cell,
             cells: grid.len(),
             error_bound_asked_mm: asked.error_bound,
@@ -424,7 +433,8 @@ impl<'a> Job<'a> {
     ) -> Result<ToolpathPage, CliError> {
         let (scene, grid, deviation) = (self.scene, &cut.grid, &measured.deviation_map);
         let cell = format!("{} mm", grid.cell);
-        let subtitle = format!("{} · cell {cell} · engine {}", scene.title, scene.simulation.engine.name());
+        let engine = scene.simulation.engine.for_path(false).name();
+        let subtitle = format!("{} · cell {cell} · engine {engine}", scene.title);
         let notes = [("Title", scene.title.as_str()), ("Scene", &scene.source.name), ("Cell", &cell)];
         let both = |name: &str, draw: &dyn Fn(MapSize) -> Picture| {
             let name = format!("{}/{name}", request.folder);
@@ -465,7 +475,7 @@ impl<'a> Job<'a> {
         let field_pngs = field_pngs.transpose()?;
         Ok(ToolpathPage {
             deviation_png: deviation_png?,
-            height_png: height_png?,
+            height_png: Some(height_png?),
             field_pngs,
             histogram: None,
         })

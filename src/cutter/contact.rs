@@ -88,6 +88,24 @@ impl Cutter {
         };
         offset.push(-height)
     }
+
+    /// From the contact with a surface of outward unit normal `n` to the tip of a cutter along the unit
+    /// `axis`: on the arc `r n + (R − r) e − r a`, with e the unit part of n square to the axis and R − r the distance
+    /// of the arc's centre from it. Unlike [`Cutter::contact_to_tip`] exact for the least lean: a flat leaning by a
+    /// hair stands on its rim. Square to the surface it is centred over the contact.
+    pub fn contact_to_tip_along(&self, n: &Vector3, axis: &Vector3) -> Vector3 {
+        let profile = self.profile();
+        let outward = n - axis * n.dot(axis);
+        let Some(e) = outward.try_normalize(LEVEL) else { return -axis * profile.height(0.0) };
+        let lean = outward.norm();
+        let reach = profile.reach(lean);
+        let height = if self.touches_arc(lean) {
+            profile.centre_z - profile.corner * n.dot(axis)
+        } else {
+            profile.height(reach.min(profile.radius))
+        };
+        e * reach - axis * height
+    }
 }
 
 #[cfg(test)]

@@ -9,9 +9,10 @@ use std::io::{self, Cursor};
 
 use exr::prelude::{
     AttributeValue, Blocks, Compression, Encoding, Image, Layer, LayerAttributes, LineOrder,
-    SpecificChannels, Text, Vec2, WritableImage,
+    SpecificChannels, Text, Vec2, WritableChannels, WritableImage,
 };
 
+use crate::metrology::{NormalMap, PatchGrid};
 use crate::sim::{Grid, ZMap};
 
 /// ZIP by lines. On the maps of the shipped scenes ZIP over 16 lines took half as long again for files
@@ -37,13 +38,47 @@ pub fn encode(cut: &ZMap, deviation: &[f32]) -> io::Result<Vec<u8>> {
         .with_channel("deviation")
         .with_channel("move")
         .with_pixel_fn(pixel);
-    let layer = Layer::new((grid.nx, grid.ny), LayerAttributes::default(), ENCODING, channels);
+    bytes_of([grid.nx, grid.ny], channels, &description(grid))
+}
+
+/// The bytes of an EXR file over the parameters of a patch: channels `X`, `Y`, `Z`, the design point, mm, `deviation`, mm
+/// (NaN where nothing was cut near), and `move`. Row 0 holds the greatest v, columns run with u; the text attribute
+/// `millstream` holds the parameters' ranges.
+///
+/// # Errors
+/// What the encoder says.
+pub fn encode_patch(map: &NormalMap, patch: &PatchGrid) -> io::Result<Vec<u8>> {
+    let [nu, nv] = patch.counts;
+    let pixel = |Vec2(column, row): Vec2<usize>| {
+        let k = patch.first + (nv - 1 - row) * nu + column;
+        let [x, y, z] = map.points[k].coords.map(|c| c as f32).into();
+        (x, y, z, map.deviations[k], map.cut_by[k])
+    };
+    let channels = SpecificChannels::build()
+        .with_channel("X")
+        .with_channel("Y")
+        .with_channel("Z")
+        .with_channel("deviation")
+        .with_channel("move")
+        .with_pixel_fn(pixel);
+    let [[u0, u1], [v0, v1]] = patch.domain;
+    let description = format!(
+        r#"{{"unit":"mm","u":[{u0:?},{u1:?}],"v":[{v0:?},{v1:?}],"rows":"greatest v first","move_none":{}}}"#,
+        u32::MAX
+    );
+    bytes_of([nu, nv], channels, &description)
+}
+
+/// An image of one layer with its text attribute.
+fn bytes_of<C: for<'a> WritableChannels<'a>>(
+    [width, height]: [usize; 2],
+    channels: C,
+    description: &str,
+) -> io::Result<Vec<u8>> {
+    let layer = Layer::new((width, height), LayerAttributes::default(), ENCODING, channels);
     let mut image = Image::from_layer(layer);
     // A single attribute: the crate keeps them in a hash map, and with two the bytes would vary.
-    image
-        .attributes
-        .other
-        .insert(Text::from("millstream"), AttributeValue::Text(Text::from(description(grid).as_str())));
+    image.attributes.other.insert(Text::from("millstream"), AttributeValue::Text(Text::from(description)));
     let mut bytes = Cursor::new(Vec::new());
     // On this thread: the crate's own threads would ignore how many the user allows.
     image.write().non_parallel().to_buffered(&mut bytes).map_err(io::Error::other)?;

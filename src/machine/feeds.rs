@@ -105,6 +105,7 @@ fn in_series(speed: f64, feed: f64) -> f64 {
 mod tests {
     use super::super::machining_time;
     use super::*;
+    use crate::geometry::Point3;
     use proptest::prelude::*;
 
     const MACHINE: Machine = Machine {

@@ -7,6 +7,7 @@
 //! Deviation at a design point is the signed distance along its outward normal to the cut surface:
 //! positive is excess, negative is gouge.
 
+mod along_normals;
 mod closer;
 mod cut_surface;
 mod figures;
@@ -20,6 +21,9 @@ mod removal;
 mod ridges;
 mod unseen;
 
+pub use along_normals::{
+    AlongNormal, NormalHit, NormalMap, PatchGrid, SweptVolume, measure_along_normals, net_places,
+};
 pub(crate) use cut_surface::CutSurface;
 pub use figures::{
     DeviationFigures, GougeFigures, GougeRegion, Limits, Measurement, PathFigures, ScallopFigures,
@@ -68,7 +72,7 @@ pub fn measure(
     let lean = found.least_lean;
     let hidden = found.ridges.hidden.clone();
     let mut measured = Measurement {
-        scallop: scallop_figures(&found.ridges, found.highest, limits),
+        scallop: scallop_figures(&found.ridges.samples, found.highest, limits),
         gouge: found.gouge,
         uncut: found.uncut,
         deviation: found.deviation,

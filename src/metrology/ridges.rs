@@ -319,16 +319,20 @@ impl RidgeFinder<'_> {
     }
 }
 
-/// Figures of all ridge samples.
-pub(super) fn scallop_figures(ridges: &Ridges, highest: Option<Highest>, limits: &Limits) -> ScallopFigures {
+/// Figures of all ridge samples (height and length, mm).
+pub(super) fn scallop_figures(
+    ridges: &[[f32; 2]],
+    highest: Option<Highest>,
+    limits: &Limits,
+) -> ScallopFigures {
     let mut figures = ScallopFigures { target_mm: limits.scallop, ..ScallopFigures::default() };
-    let samples = || ridges.samples.iter().map(|s| s.map(f64::from));
+    let samples = || ridges.iter().map(|s| s.map(f64::from));
     let total: f64 = samples().map(|[_, length]| length).sum();
     let (Some(highest), true) = (highest, total > 0.0) else {
         figures.reason = Some("no ridge stands between passes on the part".into());
         return figures;
     };
-    let mut by_height = ridges.samples.clone();
+    let mut by_height = ridges.to_vec();
     by_height.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     let quantile = |share: f64| {
         let mut below = 0.0;

@@ -13,8 +13,8 @@ use super::verdict::{Verdict, place};
 pub struct ToolpathPage {
     /// deviation.png.
     pub deviation_png: Vec<u8>,
-    /// height.png.
-    pub height_png: Vec<u8>,
+    /// height.png; `None` where the part is measured along its normals.
+    pub height_png: Option<Vec<u8>>,
     /// field.png and interval.png, for a streamline.
     pub field_pngs: Option<[Vec<u8>; 2]>,
     /// Scallop heights; `None` without ridges.
@@ -199,9 +199,11 @@ fn toolpath_section(t: &ToolpathResult, page: &ToolpathPage) -> Markup {
                     figcaption { "No scallop heights: " (t.scallop.reason.as_deref().unwrap_or("no ridge was found")) }
                 }
             }
-            figure {
-                img src=(data_url(&page.height_png)) alt=(format!("Height of {}", t.name));
-                figcaption { "Height of the cut stock." }
+            @if let Some(height_png) = &page.height_png {
+                figure {
+                    img src=(data_url(height_png)) alt=(format!("Height of {}", t.name));
+                    figcaption { "Height of the cut stock." }
+                }
             }
             @if let Some([field, interval]) = &page.field_pngs { (planned(t, field, interval)) }
             (method(t))
@@ -396,7 +398,7 @@ mod tests {
         let png = vec![1u8, 2, 3];
         let page = ToolpathPage {
             deviation_png: png.clone(),
-            height_png: png.clone(),
+            height_png: Some(png.clone()),
             field_pngs: None,
             histogram: Histogram::new(&[[0.004, 1.0]], 0.01, 0.0125),
         };

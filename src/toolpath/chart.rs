@@ -6,10 +6,11 @@
 
 use super::plan::PlanError;
 use super::strip::strip_width_at;
-use super::{Along, FeedDirection, Step};
+use super::tool_axis::{ToolAxis, in_tool_frame};
+use super::{Along, CcPoint, FeedDirection, Step};
 use crate::cutter::Cutter;
 use crate::field::mesh::{blend_lines, slope_at};
-use crate::field::{NormalEquations, SamplePlane};
+use crate::field::{GridField, NormalEquations, SamplePlane};
 use crate::geometry::{Jet2, KnotVector, NurbsSurface, Point3, Vector2, Vector3};
 use crate::part::{Part, PatchPoint};
 
@@ -34,6 +35,8 @@ pub struct Chart<'a> {
     pub domain: [[f64; 2]; 2],
     /// +1 where the parametrisation's normal points outward, −1 where it points inward.
     sign: f64,
+    /// How the cutter is tilted; upright without it.
+    axis: Option<&'a ToolAxis>,
 }
 
 enum Source<'a> {
@@ -43,7 +46,7 @@ enum Source<'a> {
 
 /// A point of a chart with all that planning needs.
 #[derive(Debug, Clone, Copy)]
-pub struct ChartPoint {
+pub struct ChartPoint<'a> {
     /// Position and derivatives.
     pub jet: Jet2,
     /// Outward unit normal.
@@ -51,9 +54,10 @@ pub struct ChartPoint {
     /// Its parameters.
     pub at: [f64; 2],
     sign: f64,
+    axis: Option<&'a ToolAxis>,
 }
 
-impl ChartPoint {
+impl ChartPoint<'_> {
     /// Where samples of directions in `plane` are asked for this point.
     fn sampled_at(&self, plane: SamplePlane) -> [f64; 2] {
         match plane {
@@ -128,25 +132,29 @@ impl ChartPoint {
             Step::Stepover(width) => (width, false),
             Step::Scallop(h) => {
                 let b = self.normal.cross(t);
-                strip_width_at(cutter, &self.normal, &b, self.curvature_along(&b), h)
+                let contact = CcPoint { point: self.jet.p, normal: self.normal };
+                // A place without an axis is refused where it is cut.
+                let axis = self.axis.and_then(|rule| rule.at(&contact, t).ok());
+                let [n, across] = [self.normal, b].map(|v| axis.map_or(v, |axis| in_tool_frame(&axis, &v)));
+                strip_width_at(cutter, &n, &across, self.curvature_along(&b), h)
             }
         }
     }
 }
 
 impl<'a> Chart<'a> {
-    /// All charts of a part.
+    /// All charts of a part, for a cutter that is tilted by a rule, or upright.
     ///
     /// # Errors
     /// When no height surface can be fitted to a mesh.
-    pub fn all(part: &'a Part, cutter: &Cutter) -> Result<Vec<Self>, PlanError> {
+    pub fn all(part: &'a Part, cutter: &Cutter, axis: Option<&'a ToolAxis>) -> Result<Vec<Self>, PlanError> {
         if part.patches().is_empty() {
-            return Ok(vec![Self::of_mesh(part, cutter)?]);
+            return Ok(vec![Self::of_mesh(part, cutter, axis)?]);
         }
-        Ok((0..part.patches().len()).map(|k| Self::of_patch(part, k)).collect())
+        Ok((0..part.patches().len()).map(|k| Self::of_patch(part, k, axis)).collect())
     }
 
-    fn of_patch(part: &'a Part, k: usize) -> Self {
+    fn of_patch(part: &'a Part, k: usize, axis: Option<&'a ToolAxis>) -> Self {
         let (patch, domain) = (k as u32, part.patches()[k].domain());
         let at = |t: f64| (0..2).map(move |c| domain[c][0] + t * (domain[c][1] - domain[c][0]));
         // Any place with a normal tells which way the patch is turned.
@@ -159,10 +167,10 @@ impl<'a> Chart<'a> {
                 Some(if inherent.dot(&outward) < 0.0 { -1.0 } else { 1.0 })
             })
             .unwrap_or(1.0);
-        Self { source: Source::Patch { part, patch }, domain, sign }
+        Self { source: Source::Patch { part, patch }, domain, sign, axis }
     }
 
-    fn of_mesh(part: &'a Part, cutter: &Cutter) -> Result<Self, PlanError> {
+    fn of_mesh(part: &'a Part, cutter: &Cutter, axis: Option<&'a ToolAxis>) -> Result<Self, PlanError> {
         let bounds = part.bounds();
         let domain = [[bounds.min.x, bounds.max.x], [bounds.min.y, bounds.max.y]];
         let pitch = CONTROL_PITCH_OVER_RADIUS * cutter.radius();
@@ -174,13 +182,19 @@ impl<'a> Chart<'a> {
             return Err(PlanError::mesh("its plan view has no area"));
         };
         let surface = fit_heights(part, domain, knots_u, knots_v)?;
-        Ok(Self { source: Source::Heights(surface), domain, sign: 1.0 })
+        Ok(Self { source: Source::Heights(surface), domain, sign: 1.0, axis })
     }
 
     /// The surface at a parameter; `None` where the parametrisation is degenerate.
-    pub fn at(&self, u: f64, v: f64) -> Option<ChartPoint> {
+    pub fn at(&self, u: f64, v: f64) -> Option<ChartPoint<'a>> {
         let jet = self.jet(u, v);
-        Some(ChartPoint { jet, normal: jet.normal()? * self.sign, at: [u, v], sign: self.sign })
+        Some(ChartPoint {
+            jet,
+            normal: jet.normal()? * self.sign,
+            at: [u, v],
+            sign: self.sign,
+            axis: self.axis,
+        })
     }
 
     /// Position and derivatives at a parameter. Beyond the domain the tangent plane at the nearest
@@ -194,6 +208,28 @@ impl<'a> Chart<'a> {
         };
         jet.p += jet.du * (u - inner_u) + jet.dv * (v - inner_v);
         jet
+    }
+
+    /// A function of the parameters by its values at the nodes of an even grid, for a strategy.
+    ///
+    /// # Errors
+    /// When a value is not finite.
+    pub fn sampled(
+        &self,
+        cells: usize,
+        strategy: &'static str,
+        value: impl Fn(f64, f64) -> f64 + Sync,
+    ) -> Result<GridField, PlanError> {
+        let at = |c: usize, k: usize| {
+            let [lo, hi] = self.domain[c];
+            lo + (hi - lo) * k as f64 / cells as f64
+        };
+        let rows = crate::parallel::map(cells + 1, |j| {
+            (0..=cells).map(|i| value(at(0, i), at(1, j))).collect::<Vec<_>>()
+        });
+        let refused =
+            || PlanError::NotApplicable { strategy, reason: "its heights are not finite".to_owned() };
+        GridField::new(self.domain, [cells; 2], &rows.concat()).ok_or_else(refused)
     }
 
     /// The points at the corners of the domain.

@@ -47,6 +47,25 @@ pub fn distance_to_segment(p: &Point3, a: &Point3, b: &Point3) -> f64 {
     (p - (a + d * t)).norm()
 }
 
+/// A place of a cutter on its way.
+pub trait Waypoint: Copy {
+    /// How far this place lies off the move between two others, mm.
+    fn stray(&self, from: &Self, to: &Self) -> f64;
+
+    /// Whether the cutter need not move from here to another place.
+    fn is_at(&self, other: &Self) -> bool;
+}
+
+impl Waypoint for Point3 {
+    fn stray(&self, from: &Self, to: &Self) -> f64 {
+        distance_to_segment(self, from, to)
+    }
+
+    fn is_at(&self, other: &Self) -> bool {
+        self == other
+    }
+}
+
 /// Samples `locate` over `[s0, s1]` so that the straight moves between samples stay within
 /// `tolerance` (mm) of the exact curve.
 ///
@@ -60,14 +79,14 @@ pub fn distance_to_segment(p: &Point3, a: &Point3, b: &Point3) -> f64 {
 /// # Tolerance
 /// A curve whose curvature changes sign more than four times within one final interval could slip
 /// between the tests; `step` should be well below the radius of the cutter.
-pub fn sample_within_chord(
+pub fn sample_within_chord<P: Waypoint>(
     s0: f64,
     s1: f64,
     step: f64,
     tolerance: f64,
-    locate: &mut dyn FnMut(f64) -> Option<Point3>,
+    locate: &mut dyn FnMut(f64) -> Option<P>,
     watch: &mut Watch<'_>,
-) -> Result<Vec<Point3>, Cancelled> {
+) -> Result<Vec<P>, Cancelled> {
     let count = ((s1 - s0) / step).ceil().max(1.0) as usize;
     let at = |k: usize| s0 + (s1 - s0) * k as f64 / count as f64;
     let mut start = 0;
@@ -93,25 +112,25 @@ pub fn sample_within_chord(
 }
 
 /// Appends the samples after `a` up to and with `b`.
-fn halve(
-    a: (f64, Point3),
-    b: (f64, Point3),
+fn halve<P: Waypoint>(
+    a: (f64, P),
+    b: (f64, P),
     tolerance: f64,
     halvings: u32,
-    locate: &mut dyn FnMut(f64) -> Option<Point3>,
+    locate: &mut dyn FnMut(f64) -> Option<P>,
     watch: &mut Watch<'_>,
-    out: &mut Vec<Point3>,
+    out: &mut Vec<P>,
 ) -> Result<(), Cancelled> {
     watch.step()?;
     let s = |t: f64| a.0 + (b.0 - a.0) * t;
-    let off = |p: &Option<Point3>| p.is_some_and(|p| distance_to_segment(&p, &a.1, &b.1) > tolerance);
+    let off = |p: &Option<P>| p.is_some_and(|p| p.stray(&a.1, &b.1) > tolerance);
     let middle = locate(s(0.5));
     let split = halvings > 0 && (off(&middle) || off(&locate(s(0.25))) || off(&locate(s(0.75))));
     if let (true, Some(middle)) = (split, middle) {
         let middle = (s(0.5), middle);
         halve(a, middle, tolerance, halvings - 1, locate, watch, out)?;
         halve(middle, b, tolerance, halvings - 1, locate, watch, out)?;
-    } else if (b.1 - a.1).norm() > 0.0 {
+    } else if !b.1.is_at(&a.1) {
         out.push(b.1);
     }
     Ok(())
@@ -135,8 +154,8 @@ pub fn reduce(points: &[Point3], tolerance: f64, watch: &mut Watch<'_>) -> Resul
 ///
 /// # Errors
 /// [`Cancelled`] when the watch says so.
-pub fn reduced_indices(
-    points: &[Point3],
+pub fn reduced_indices<P: Waypoint>(
+    points: &[P],
     tolerance: f64,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<usize>, Cancelled> {
@@ -146,11 +165,8 @@ pub fn reduced_indices(
     let mut kept = vec![0];
     let mut from = 0;
     while from + 1 < points.len() {
-        let fits = |to: usize| {
-            points[from + 1..to]
-                .iter()
-                .all(|p| distance_to_segment(p, &points[from], &points[to]) <= tolerance)
-        };
+        let fits =
+            |to: usize| points[from + 1..to].iter().all(|p| p.stray(&points[from], &points[to]) <= tolerance);
         watch.step()?;
         let mut to = from + 1;
         while to + 1 < points.len() && to - from < MAX_SKIP && fits(to + 1) {
@@ -283,7 +299,7 @@ mod tests {
         let mut located = 0u32;
         let mut nowhere = |_| {
             located += 1;
-            None
+            None::<Point3>
         };
         let stop = StopAt(AtomicU32::new(2));
         let got = sample_within_chord(0.0, 1e9, 1.0, 1e-9, &mut nowhere, &mut Watch::new(&stop));

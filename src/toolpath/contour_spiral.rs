@@ -49,7 +49,7 @@ pub fn passes(
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
     let mut all = Passes::default();
-    for chart in Chart::all(part, cutter)? {
+    for chart in Chart::all(part, cutter, settings.axis)? {
         all.append(on_chart(part, cutter, &chart, settings, monitor)?);
     }
     Ok(all)
@@ -199,7 +199,7 @@ struct Spiral<'a> {
     chart: &'a Chart<'a>,
     cutter: &'a Cutter,
     field: &'a ScalarField,
-    settings: &'a PassSettings,
+    settings: &'a PassSettings<'a>,
 }
 
 impl Spiral<'_> {

@@ -6,6 +6,7 @@
 
 use super::plan::{Passes, PlanError};
 use super::planned_field::Contact;
+use super::tilted::Touch;
 use crate::geometry::Point3;
 use crate::monitor::{self, Cancelled, Monitor};
 
@@ -63,6 +64,17 @@ pub(super) trait LevelSource: Sync {
         level: f64,
         run: Option<[usize; 2]>,
     ) -> Result<Option<Vec<Point3>>, Cancelled>;
+
+    /// The pass of a tilted cutter along a curve, or along a run of its points; `None` where there is nothing to cut, or
+    /// the cutter stands upright.
+    fn touches(
+        &self,
+        _curve: &Track<Self::Place>,
+        _level: f64,
+        _run: Option<[usize; 2]>,
+    ) -> Result<Option<Vec<Touch>>, PlanError> {
+        Ok(None)
+    }
 
     /// Where the cutter touches along a curve, or along a run of its points.
     fn contacts(&self, curve: &Track<Self::Place>, run: Option<[usize; 2]>) -> Vec<Contact>;
@@ -160,8 +172,12 @@ impl<S: LevelSource> Filler<'_, S> {
         level: f64,
         run: Option<[usize; 2]>,
         passes: &mut Passes,
-    ) -> Result<(), Cancelled> {
-        if let Some(pass) = self.source.pass(curve, level, run)? {
+    ) -> Result<(), PlanError> {
+        if let Some(touches) = self.source.touches(curve, level, run)? {
+            passes.passes.push(touches.iter().map(|touch| touch.contact.point).collect());
+            passes.touches.push(touches);
+            passes.contacts.push(self.source.contacts(curve, run));
+        } else if let Some(pass) = self.source.pass(curve, level, run)? {
             passes.passes.push(pass);
             passes.contacts.push(self.source.contacts(curve, run));
         }
@@ -169,7 +185,7 @@ impl<S: LevelSource> Filler<'_, S> {
     }
 
     /// Appends the further passes that a gap needs.
-    fn fill(&self, gap: &Gap, halvings: usize, passes: &mut Passes) -> Result<(), Cancelled> {
+    fn fill(&self, gap: &Gap, halvings: usize, passes: &mut Passes) -> Result<(), PlanError> {
         monitor::check(self.monitor)?;
         let (level, interval) = gap.middle();
         let before = passes.passes.len();

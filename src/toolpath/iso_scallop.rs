@@ -44,7 +44,7 @@ pub fn passes(
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
     let mut all = Passes::default();
-    for chart in Chart::all(part, cutter)? {
+    for chart in Chart::all(part, cutter, settings.axis)? {
         all.append(on_chart(part, cutter, &chart, start, f64::INFINITY, settings, monitor)?);
     }
     Ok(all)
@@ -172,7 +172,7 @@ fn nodes(chart: &Chart, pitch: f64) -> [usize; 2] {
 }
 
 /// The places of an even grid of `n` × `n` on a chart, and the area in parameters that each stands for.
-pub(super) fn places(chart: &Chart, n: usize) -> (Vec<([f64; 2], ChartPoint)>, f64) {
+pub(super) fn places<'a>(chart: &Chart<'a>, n: usize) -> (Vec<([f64; 2], ChartPoint<'a>)>, f64) {
     let [[u0, u1], [v0, v1]] = chart.domain;
     let places = chart.grid(n).filter_map(|uv| Some((uv, chart.at(uv[0], uv[1])?))).collect();
     (places, (u1 - u0) * (v1 - v0) / (n * n) as f64)

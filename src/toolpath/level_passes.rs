@@ -3,12 +3,14 @@
 //! Curves are traced a little beyond the chart, on its continuation, and every place of the cutter comes
 //! from dropping it onto the part. Which levels and stretches are cut is decided in `halving`.
 
+use super::CcPoint;
 use super::chart::Chart;
 use super::drop::{Beside, DropCutter};
 use super::halving::{Allowed, LevelSource, Track, along_and_between};
 use super::plan::{PassSettings, Passes, PlanError};
 use super::planned_field::{Contact, PlannedField};
 use super::spacing::{Placing, level_tangent, place_levels, places_of};
+use super::tilted::{self, Touch};
 use crate::cutter::Cutter;
 use crate::field::{LevelCurve, LevelTracer, ScalarField, surface_gradient_length};
 use crate::geometry::Point3;
@@ -106,7 +108,7 @@ struct Guide<'a> {
     cutter: &'a Cutter,
     field: &'a ScalarField,
     drop: DropCutter<'a>,
-    settings: &'a PassSettings,
+    settings: &'a PassSettings<'a>,
     monitor: &'a dyn Monitor,
 }
 
@@ -165,6 +167,32 @@ impl Guide<'_> {
             end.to = useful(end.from, end.to);
         }
         stretches.retain(|s| s.to - s.from > BORDER_PRECISION);
+    }
+
+    /// The place at `s`, which counts traced points one sampling distance apart, pulled onto the level.
+    fn on_level(&self, points: &[[f64; 2]], level: f64, s: f64) -> [f64; 2] {
+        let k = (s as usize).min(points.len() - 2);
+        let t = s - k as f64;
+        let [a, b] = [points[k], points[k + 1]];
+        let between = [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])];
+        let q = self.tracer.onto_level(between, level);
+        // Near a singular point the level may be found on another branch.
+        let strayed = self.tracer.distance(between, q) > MOST_STRAY * self.settings.sampling;
+        if strayed { between } else { q }
+    }
+
+    /// The stretches of a run that are worth cutting; `None` where all of it lies outside.
+    fn useful_stretches(
+        &self,
+        at: &dyn Fn(f64) -> [f64; 2],
+        [first, end]: [usize; 2],
+        closed: bool,
+    ) -> Option<Vec<Stretch>> {
+        let mut stretches = self.stretches(at, first, end);
+        if !closed {
+            self.shorten_ends(&mut stretches, at);
+        }
+        stretches.iter().any(|s| s.inside).then_some(stretches)
     }
 
     /// Whether half an interval to either side of a place outside lies the chart.
@@ -226,34 +254,10 @@ impl LevelSource for Guide<'_> {
         level: f64,
         run: Option<[usize; 2]>,
     ) -> Result<Option<Vec<Point3>>, Cancelled> {
-        let mut points = curve.points.clone();
-        if curve.closed {
-            points.push(points[0]);
-        }
-        let last = points.len() - 1;
-        let [first, end] = run.map_or([0, last], |[a, b]| [a, if curve.closed { last } else { b }]);
-        if end <= first {
-            return Ok(None);
-        }
-        // The parameter s counts traced points, which are one sampling distance apart.
-        let at = |s: f64| {
-            let k = (s as usize).min(last - 1);
-            let t = s - k as f64;
-            let [a, b] = [points[k], points[k + 1]];
-            let between = [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])];
-            let q = self.tracer.onto_level(between, level);
-            // Near a singular point the level may be found on another branch.
-            let strayed = self.tracer.distance(between, q) > MOST_STRAY * self.settings.sampling;
-            if strayed { between } else { q }
-        };
+        let Some((points, run)) = points_of(curve, run) else { return Ok(None) };
+        let at = |s: f64| self.on_level(&points, level, s);
+        let Some(stretches) = self.useful_stretches(&at, run, curve.closed) else { return Ok(None) };
         let settings = PassSettings { sampling: 1.0, ..*self.settings };
-        let mut stretches = self.stretches(&at, first, end);
-        if !curve.closed {
-            self.shorten_ends(&mut stretches, &at);
-        }
-        if !stretches.iter().any(|s| s.inside) {
-            return Ok(None);
-        }
         let mut tips: Vec<Point3> = Vec::new();
         for stretch in stretches {
             let mut beside = Beside::default();
@@ -264,6 +268,46 @@ impl LevelSource for Guide<'_> {
         }
         Ok(Some(tips))
     }
+
+    fn touches(
+        &self,
+        curve: &Track<[f64; 2]>,
+        level: f64,
+        run: Option<[usize; 2]>,
+    ) -> Result<Option<Vec<Touch>>, PlanError> {
+        let (Some(rule), Some((points, run))) = (self.settings.axis, points_of(curve, run)) else {
+            return Ok(None);
+        };
+        let at = |s: f64| self.on_level(&points, level, s);
+        let Some(stretches) = self.useful_stretches(&at, run, curve.closed) else { return Ok(None) };
+        let contact = |s: f64| {
+            let [u, v] = at(s);
+            let p = self.chart.at(u, v)?;
+            let feed = level_tangent(&p, self.field, [u, v])?;
+            Some((CcPoint { point: p.jet.p, normal: p.normal }, feed))
+        };
+        let mut touches: Vec<Touch> = Vec::new();
+        let tolerance = self.settings.chord_tolerance;
+        for stretch in stretches {
+            let ends = [stretch.from, stretch.to];
+            let more = tilted::along(&contact, ends, self.cutter, rule, tolerance, self.monitor)?;
+            let joined = usize::from(!touches.is_empty());
+            touches.extend(more.into_iter().skip(joined));
+        }
+        Ok((touches.len() > 1).then_some(touches))
+    }
+}
+
+/// The points of a curve, the first one again at the end of a closed one, and the run that is asked for; `None` for a
+/// run of nothing.
+fn points_of(curve: &Track<[f64; 2]>, run: Option<[usize; 2]>) -> Option<(Vec<[f64; 2]>, [usize; 2])> {
+    let mut points = curve.points.clone();
+    if curve.closed {
+        points.push(points[0]);
+    }
+    let last = points.len() - 1;
+    let [first, end] = run.map_or([0, last], |[a, b]| [a, if curve.closed { last } else { b }]);
+    (end > first).then_some((points, [first, end]))
 }
 
 /// A stretch of a level curve that lies inside or outside of the chart.

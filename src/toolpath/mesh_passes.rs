@@ -257,7 +257,7 @@ struct MeshGuide<'a> {
     levels: MeshLevels<'a>,
     cutter: &'a Cutter,
     drop: DropCutter<'a>,
-    settings: &'a PassSettings,
+    settings: &'a PassSettings<'a>,
     monitor: &'a dyn Monitor,
 }
 

@@ -26,6 +26,8 @@ mod spacing;
 mod spiral;
 mod streamline;
 mod strip;
+mod tilted;
+mod tool_axis;
 mod waterline;
 mod zigzag;
 
@@ -36,7 +38,7 @@ pub use link::{Joining, LONGEST_LINK, Links, longest_link};
 pub use path::{CcPoint, ClPoint, Move, MoveKind, Toolpath};
 pub use plan::{
     Along, FeedDirection, FrontStart, LevelSteps, Plan, PlanError, PlanSettings, Step, Strategy,
-    StreamMethod, plan,
+    StreamMethod, plan, plan_tilted,
 };
 pub use planned_field::{FeedSample, PassPoint, PlannedField};
 pub use pocket::{
@@ -44,3 +46,5 @@ pub use pocket::{
 };
 pub use shortest::{ShortestPossible, shortest_possible};
 pub use strip::{ball_scallop_height, strip_width, strip_width_at};
+pub use tilted::Tilting;
+pub use tool_axis::{AxisError, ToolAxis, location};

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::chord::{Watch, reduce, sample_within_chord};
-use super::link::{Joining, join};
+use super::link::{Joining, join, join_tilted};
 use super::mesh_passes::Aim;
 use super::planned_field::{Contact, PlannedField};
 use super::shortest::{ShortestPossible, shortest_possible};
@@ -11,11 +11,13 @@ use super::smooth::smooth_and_spread;
 use super::spacing::Placing;
 use super::streamline::Fitting;
 use super::strip::strip_width;
+use super::tilted::{self, TiltedPasses, Tilting, Touch};
+use super::tool_axis::{AxisError, ToolAxis};
 use super::{
     PocketStrategy, Toolpath, contour_spiral, iso_scallop, mesh_passes, mesh_surface, shortest, spiral,
     streamline, waterline, zigzag,
 };
-use crate::cutter::Cutter;
+use crate::cutter::{Cutter, CutterShape};
 use crate::field::mesh::Sense;
 use crate::field::{KnotRule, LineField, Solver};
 use crate::geometry::{Point2, Point3, TriangleMesh};
@@ -238,6 +240,9 @@ pub enum PlanError {
         "no smooth surface could be fitted to the mesh ({0}); export a part that is more than a sliver seen from above"
     )]
     NoFit(String),
+    /// The rule gives no tool axis at a place.
+    #[error(transparent)]
+    Axis(#[from] AxisError),
     /// The passes lie so close on so large a part that planning them would take days or all memory.
     #[error(
         "passes {step} mm apart over {x} x {y} mm would be too many; set a greater `stepover` or `scallop`, \
@@ -266,6 +271,27 @@ pub struct Plan {
     pub field: Option<PlannedField>,
 }
 
+impl Plan {
+    fn new(
+        path: Toolpath,
+        mut notes: Vec<String>,
+        mut field: PlannedField,
+        contacts: &[Vec<Contact>],
+        strategy: &Strategy,
+    ) -> Self {
+        let by_streamlines =
+            matches!(strategy, Strategy::Streamline { .. } | Strategy::ShortestStreamline { .. });
+        let field = by_streamlines.then(|| {
+            field.measure(contacts);
+            field
+        });
+        if path.is_empty() {
+            notes.push("no pass reaches the part: the program is empty".into());
+        }
+        Self { path, notes, shortest: None, field }
+    }
+}
+
 impl LevelSteps {
     fn placing(self) -> Placing {
         match self {
@@ -284,7 +310,7 @@ impl PlanError {
 
 /// What every pass needs.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct PassSettings {
+pub(super) struct PassSettings<'a> {
     /// Distance of passes, already less what the chords may add.
     pub step: Step,
     /// First sampling distance along a pass, mm.
@@ -293,6 +319,8 @@ pub(super) struct PassSettings {
     pub chord_tolerance: f64,
     /// The sampling distance, mm, by which passes are smoothed; `None` leaves them as they are.
     pub smoothing: Option<f64>,
+    /// How the cutter is tilted; upright without it.
+    pub axis: Option<&'a ToolAxis>,
 }
 
 /// Shares of the chord tolerance that sampling and point reduction may use. Together they leave a part of it: ridges stand
@@ -300,7 +328,7 @@ pub(super) struct PassSettings {
 const SAMPLING_SHARE: f64 = 0.1;
 const REDUCTION_SHARE: f64 = 0.4;
 
-impl PassSettings {
+impl PassSettings<'_> {
     /// Straight moves along `locate` over `[s0, s1]` within the chord tolerance.
     ///
     /// # Errors
@@ -327,6 +355,8 @@ impl PassSettings {
 pub(super) struct Passes {
     /// Tip positions of each pass.
     pub passes: Vec<Vec<Point3>>,
+    /// Where a tilted cutter touches along each pass, whose tips then count for nothing; empty for an upright one.
+    pub touches: Vec<Vec<Touch>>,
     /// Remarks.
     pub notes: Vec<String>,
     /// What they were planned by, where they are levels of a function.
@@ -344,6 +374,7 @@ impl Passes {
     /// Appends the passes and remarks of another piece of the part.
     pub fn append(&mut self, other: Self) {
         self.passes.extend(other.passes);
+        self.touches.extend(other.touches);
         self.notes.extend(other.notes);
         self.field.append(other.field);
         self.contacts.extend(other.contacts);
@@ -417,7 +448,7 @@ fn check_extent(part: &Part, cutter: &Cutter, pass: &PassSettings) -> Result<(),
     Ok(())
 }
 
-/// Plans one path.
+/// Plans one path of an upright cutter.
 ///
 /// # Errors
 /// See [`PlanError`].
@@ -428,6 +459,52 @@ pub fn plan(
     settings: &PlanSettings,
     monitor: &dyn Monitor,
 ) -> Result<Plan, PlanError> {
+    let (planned, both_ways) = passes(part, cutter, strategy, None, settings, monitor)?;
+    let Passes { passes, notes, field, contacts, .. } = planned;
+    let path = join(passes, both_ways, part, cutter, settings, monitor)?;
+    let mut plan = Plan::new(path, notes, field, &contacts, strategy);
+    if let Step::Scallop(h) = settings.step {
+        plan.shortest = Some(shortest_possible(part, cutter, h)?);
+    }
+    Ok(plan)
+}
+
+/// Plans one path of a cutter that tilts.
+///
+/// On patches the cutter is located by its contact, on level curves of the strategy's function. A ball cutter's centre
+/// stands where it does upright, so that on meshes, and with strategies that drop the cutter, the upright path is tilted
+/// around it.
+///
+/// # Errors
+/// See [`PlanError`]; also where other cutters than balls would have to be dropped.
+pub fn plan_tilted(
+    part: &Part,
+    cutter: &Cutter,
+    strategy: &Strategy,
+    tilting: &Tilting,
+    settings: &PlanSettings,
+    monitor: &dyn Monitor,
+) -> Result<Plan, PlanError> {
+    let (planned, both_ways) = passes(part, cutter, strategy, Some(tilting.axis), settings, monitor)?;
+    let Passes { passes, touches, mut notes, field, contacts } = planned;
+    let touches = if touches.is_empty() && !passes.is_empty() {
+        tilted::around_centres(&passes, part, cutter, tilting.axis, settings.chord_tolerance, monitor)?
+    } else {
+        TiltedPasses::located(touches, settings.chord_tolerance)
+    };
+    let path = join_tilted(touches, both_ways, part, cutter, tilting, settings, &mut notes, monitor)?;
+    Ok(Plan::new(path, notes, field, &contacts, strategy))
+}
+
+/// The passes of a strategy, not yet joined, and whether they may be fed both ways.
+fn passes(
+    part: &Part,
+    cutter: &Cutter,
+    strategy: &Strategy,
+    axis: Option<&ToolAxis>,
+    settings: &PlanSettings,
+    monitor: &dyn Monitor,
+) -> Result<(Passes, bool), PlanError> {
     let step = match settings.step {
         Step::Scallop(h) => {
             let facets = if part.patches().is_empty() { facet_height(part.mesh()) } else { 0.0 };
@@ -438,12 +515,17 @@ pub fn plan(
     };
     let sampling = SAMPLING_OVER_RADIUS * cutter.radius();
     let smoothing = settings.joining.smoothing.then_some(sampling);
-    let pass = PassSettings { step, sampling, chord_tolerance: settings.chord_tolerance, smoothing };
+    let pass = PassSettings { step, sampling, chord_tolerance: settings.chord_tolerance, smoothing, axis };
     check_extent(part, cutter, &pass)?;
+    // A tilted cutter follows the level curves of the plan coordinate instead of being dropped.
+    let levels = axis.filter(|_| !part.patches().is_empty());
     let (passes, both_ways) = match strategy {
         Strategy::Pocket(pocket) => {
             let reason = "it mills pockets, and the part is none".to_owned();
             return Err(PlanError::NotApplicable { strategy: pocket.name(), reason });
+        }
+        Strategy::Zigzag { angle, one_way } if levels.is_some() => {
+            (zigzag::on_levels(part, cutter, *angle, &pass, monitor)?, !one_way)
         }
         Strategy::Zigzag { angle, one_way } => {
             (zigzag::passes(part, cutter, *angle, &pass, monitor)?, !one_way)
@@ -481,21 +563,10 @@ pub fn plan(
             (streamline::streamline(part, cutter, direction, &fitting, &pass, monitor)?, true)
         }
     };
-    let Passes { passes, mut notes, mut field, contacts } = passes;
-    let by_streamlines =
-        matches!(strategy, Strategy::Streamline { .. } | Strategy::ShortestStreamline { .. });
-    let field = by_streamlines.then(|| {
-        field.measure(&contacts);
-        field
-    });
-    drop(contacts);
-    let path = join(passes, both_ways, part, cutter, settings, monitor)?;
-    if path.is_empty() {
-        notes.push("no pass reaches the part: the program is empty".into());
+    if axis.is_some() && passes.touches.is_empty() && cutter.shape() != CutterShape::Ball {
+        let reason = "it drops the cutter, and only a ball can be tilted where it was dropped; use a ball, or a part of \
+                      patches with iso-parametric, iso-scallop, streamline, waterline or zigzag passes";
+        return Err(PlanError::NotApplicable { strategy: "this tool axis", reason: reason.to_owned() });
     }
-    let shortest = match settings.step {
-        Step::Scallop(h) => Some(shortest_possible(part, cutter, h)?),
-        Step::Stepover(_) => None,
-    };
-    Ok(Plan { path, notes, shortest, field })
+    Ok((passes, both_ways))
 }

@@ -45,7 +45,7 @@ pub(super) struct PlanCurves<'a> {
     pub cutter: &'a Cutter,
     /// How far a pass may roll on over the border, mm.
     pub overrun: f64,
-    pub settings: &'a PassSettings,
+    pub settings: &'a PassSettings<'a>,
     pub monitor: &'a dyn Monitor,
 }
 

@@ -71,7 +71,7 @@ pub struct ShortestPossible {
 pub fn shortest_possible(part: &Part, cutter: &Cutter, h: f64) -> Result<ShortestPossible, PlanError> {
     let mut sum = ShortestPossible { cutting_mm: 0.0, contact_mm: 0.0, limited_fraction: 0.0 };
     let mut total = 0.0;
-    for chart in Chart::all(part, cutter)? {
+    for chart in Chart::all(part, cutter, None)? {
         let (places, cell) = places(&chart, PLACES);
         for (_, p) in &places {
             let (e, f, g) = p.jet.first_form();
@@ -105,7 +105,7 @@ pub(super) fn passes(
     settings: &PassSettings,
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
-    let charts = Chart::all(part, cutter)?;
+    let charts = Chart::all(part, cutter, settings.axis)?;
     if let Some((direction, _)) = toward {
         let parameters: Vec<_> = charts.iter().map(|chart| chart.domain).collect();
         feed::check(direction, part, &parameters)?;

@@ -42,7 +42,7 @@ pub fn passes(
     settings: &PassSettings,
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
-    let charts = Chart::all(part, cutter)?;
+    let charts = Chart::all(part, cutter, settings.axis)?;
     let extent = |e: Vector2| {
         let all = charts.iter().map(|chart| chart.extent_of_axes(part, cutter, &e));
         all.fold([f64::INFINITY, f64::NEG_INFINITY], |a, b| [a[0].min(b[0]), a[1].max(b[1])])

@@ -62,7 +62,7 @@ fn iso_parametric_along(
         Along::V => Axis::U,
     });
     let mut all = Passes::default();
-    for chart in Chart::all(part, cutter)? {
+    for chart in Chart::all(part, cutter, settings.axis)? {
         all.append(along_levels_placed(part, cutter, &chart, &field, placing, settings, monitor)?);
     }
     Ok(all)
@@ -87,7 +87,7 @@ pub fn streamline(
     settings: &PassSettings,
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
-    let charts = Chart::all(part, cutter)?;
+    let charts = Chart::all(part, cutter, settings.axis)?;
     let parameters: Vec<_> = charts.iter().map(|chart| chart.domain).collect();
     feed::check(direction, part, &parameters)?;
     let mut all = Passes::default();

@@ -38,7 +38,7 @@ pub fn passes(
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
     let mut all = Passes::default();
-    for chart in Chart::all(part, cutter)? {
+    for chart in Chart::all(part, cutter, settings.axis)? {
         let field = ScalarField::Grid(heights(&chart, cutter)?);
         let level = level_share(&chart, cutter, &field, settings);
         all.append(along_levels_placed(part, cutter, &chart, &field, placing, settings, monitor)?);
@@ -54,27 +54,19 @@ pub fn passes(
 
 /// Height of the tip over the chart.
 fn heights(chart: &Chart, cutter: &Cutter) -> Result<GridField, PlanError> {
-    let at = |c: usize, k: usize| {
-        let [lo, hi] = chart.domain[c];
-        lo + (hi - lo) * k as f64 / CELLS as f64
-    };
-    let rows = crate::parallel::map(CELLS + 1, |j| {
-        let height = |i: usize| {
-            let (u, v) = (at(0, i), at(1, j));
-            // Where the parametrisation is degenerate the surface's own height serves.
-            let Some(p) = chart.at(u, v) else { return chart.jet(u, v).p.z };
-            let reach = cutter.axis_offset(&p.normal).norm();
-            p.jet.p.z - cutter.height(reach.min(cutter.radius())).unwrap_or(0.0)
-        };
-        (0..=CELLS).map(height).collect::<Vec<_>>()
-    });
-    let values = rows.concat();
-    let span = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], &z| [lo.min(z), hi.max(z)]);
-    let refuse = |reason: &str| PlanError::NotApplicable { strategy: "waterline", reason: reason.to_owned() };
-    if span[1] - span[0] < LEAST_SPAN {
-        return Err(refuse("it is level, so that there are no contours; zigzag suits it"));
+    let field = chart.sampled(CELLS, "waterline", |u, v| {
+        // Where the parametrisation is degenerate the surface's own height serves.
+        let Some(p) = chart.at(u, v) else { return chart.jet(u, v).p.z };
+        let reach = cutter.axis_offset(&p.normal).norm();
+        p.jet.p.z - cutter.height(reach.min(cutter.radius())).unwrap_or(0.0)
+    })?;
+    let nodes = (0..=CELLS).flat_map(|j| (0..=CELLS).map(move |i| (i, j))).map(|(i, j)| field.node(i, j));
+    let [low, high] = nodes.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], z| [lo.min(z), hi.max(z)]);
+    if high - low < LEAST_SPAN {
+        let reason = "it is level, so that there are no contours; zigzag suits it".to_owned();
+        return Err(PlanError::NotApplicable { strategy: "waterline", reason });
     }
-    GridField::new(chart.domain, [CELLS; 2], &values).ok_or_else(|| refuse("its heights are not finite"))
+    Ok(field)
 }
 
 /// Share of the chart's area on which the step of height that a strip allows is less than [`LEVEL_SHARE`] of the mean one.

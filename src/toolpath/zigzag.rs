@@ -9,9 +9,12 @@ use super::Step;
 use super::border::Border;
 use super::chart::{Chart, ChartPoint};
 use super::drop::DropCutter;
+use super::level_passes::along_levels_placed;
 use super::plan::{PassSettings, Passes, PlanError};
 use super::plan_curve::PlanCurves;
+use super::spacing::Placing;
 use crate::cutter::Cutter;
+use crate::field::ScalarField;
 use crate::geometry::Vector2;
 use crate::monitor::{self, Monitor};
 use crate::part::Part;
@@ -26,6 +29,9 @@ const STEPOVER_SAMPLES: usize = 160;
 /// Angles over half a turn whose length is predicted. Between two of them a length changes by a few per cent at most.
 const ANGLES: usize = 36;
 
+/// Cells a side on which the plan coordinate of a patch is sampled.
+const CELLS: usize = 240;
+
 /// How many of the angles with the least predicted length are planned; the prediction errs by a few per cent.
 const PLANNED: usize = 3;
 
@@ -37,7 +43,7 @@ pub fn passes(
     settings: &PassSettings,
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
-    let charts = Chart::all(part, cutter)?;
+    let charts = Chart::all(part, cutter, settings.axis)?;
     let mut notes = Vec::new();
     let stepover = match settings.step {
         Step::Stepover(s) => s,
@@ -70,6 +76,24 @@ pub fn passes(
     Ok(Passes { passes: lines.into_iter().flatten().collect(), notes, ..Passes::default() })
 }
 
+/// Plans passes of a tilted cutter: its contacts stand in parallel vertical planes, one distance apart on each patch.
+pub fn on_levels(
+    part: &Part,
+    cutter: &Cutter,
+    angle: f64,
+    settings: &PassSettings,
+    monitor: &dyn Monitor,
+) -> Result<Passes, PlanError> {
+    let across = Vector2::new(-angle.sin(), angle.cos());
+    let mut all = Passes::default();
+    for chart in Chart::all(part, cutter, settings.axis)? {
+        let field = chart.sampled(CELLS, "zigzag", |u, v| chart.jet(u, v).p.coords.xy().dot(&across))?;
+        let field = ScalarField::Grid(field);
+        all.append(along_levels_placed(part, cutter, &chart, &field, Placing::OneStep, settings, monitor)?);
+    }
+    Ok(all)
+}
+
 /// Plans passes in the direction with the shortest path. Angles over half a turn are compared by the predicted length
 /// (surface along the feed over the stepover), and the best are planned.
 pub fn best(
@@ -78,7 +102,7 @@ pub fn best(
     settings: &PassSettings,
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
-    let charts = Chart::all(part, cutter)?;
+    let charts = Chart::all(part, cutter, settings.axis)?;
     let places = places(&charts);
     let angle = |k: usize| std::f64::consts::PI * k as f64 / ANGLES as f64;
     let mut predicted: Vec<(f64, usize)> = crate::parallel::map(ANGLES, |k| {
@@ -123,8 +147,8 @@ pub fn best(
 }
 
 /// Points of all charts, and the area that each stands for, mm².
-fn places(charts: &[Chart]) -> Vec<(ChartPoint, f64)> {
-    let of = |chart: &Chart| {
+fn places<'a>(charts: &[Chart<'a>]) -> Vec<(ChartPoint<'a>, f64)> {
+    let of = |chart: &Chart<'a>| {
         let [[u0, u1], [v0, v1]] = chart.domain;
         let cell = (u1 - u0) * (v1 - v0) / (STEPOVER_SAMPLES * STEPOVER_SAMPLES) as f64;
         let point = |[u, v]: [f64; 2]| {

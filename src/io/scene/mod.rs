@@ -4,6 +4,7 @@
 //! The text is read as a tree of values with their places (not by derived deserialisation), so that
 //! every refusal can point at the very key or value: tagged enums of serde only know the table.
 
+mod axis;
 mod classic;
 mod direction;
 mod error;
@@ -18,6 +19,7 @@ mod write;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+pub use axis::AxisRequest;
 pub use error::{Finding, SceneError, SceneText};
 pub use pocket::OutlineSource;
 pub use write::complete_toml;
@@ -150,26 +152,41 @@ pub struct CuttingData {
 /// Which engine cuts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Engine {
-    /// Branch and bound, within 0.01 µm of the reference.
+    /// The z-map for upright cutters, normal rays for tilted ones.
+    Auto,
+    /// Heights over the plan view by branch and bound, within 0.01 µm of the reference; upright cutters only.
     ZMap,
-    /// Every cell under every move that can reach it, in closed form in f64.
+    /// Every cell under every move that can reach it, in closed form in f64; upright cutters only.
     Reference,
+    /// The swept volume along the normals of the design surface; any cutter axis, any shape.
+    Rays,
 }
 
 impl Engine {
     /// The words that a scene and the command line accept.
-    pub const WORDS: [&'static str; 2] = ["zmap", "reference"];
+    pub const WORDS: [&'static str; 4] = ["auto", "zmap", "reference", "rays"];
 
     /// The engine that a word stands for.
     pub fn from_word(word: &str) -> Option<Self> {
-        [Self::ZMap, Self::Reference].into_iter().find(|engine| engine.name() == word)
+        [Self::Auto, Self::ZMap, Self::Reference, Self::Rays].into_iter().find(|engine| engine.name() == word)
     }
 
     /// Its word.
     pub fn name(self) -> &'static str {
         match self {
-            Self::ZMap => Self::WORDS[0],
-            Self::Reference => Self::WORDS[1],
+            Self::Auto => Self::WORDS[0],
+            Self::ZMap => Self::WORDS[1],
+            Self::Reference => Self::WORDS[2],
+            Self::Rays => Self::WORDS[3],
+        }
+    }
+
+    /// The engine that cuts a path, upright or tilted.
+    pub fn for_path(self, tilted: bool) -> Self {
+        match (self, tilted) {
+            (Self::Auto, true) => Self::Rays,
+            (Self::Auto, false) => Self::ZMap,
+            (engine, _) => engine,
         }
     }
 }
@@ -207,6 +224,8 @@ pub struct ToolpathRequest {
     pub directions: Vec<NamedFile>,
     /// How its passes are smoothed and joined.
     pub joining: Joining,
+    /// How its axis is tilted; `None` for an upright one.
+    pub axis: Option<AxisRequest>,
 }
 
 impl ToolpathRequest {

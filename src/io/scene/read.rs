@@ -13,7 +13,7 @@ use super::{
     DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, Engine, MeshFormat, NamedFile, OutlineSource, PartSource, Scene,
     Simulation, Stock, ToolpathRequest, auto_cell, default_error_bound,
 };
-use super::{classic, direction, formula, pocket};
+use super::{axis, classic, direction, formula, pocket};
 use crate::cutter::{AptWord, AptWords, Cutter, CutterError, CutterShape, Holder, HolderSection};
 use crate::field::{KnotRule, MAX_DENSE, Solver};
 use crate::geometry::AnalyticSurface;
@@ -393,7 +393,7 @@ fn read_simulation(
         cell: cell.unwrap_or_else(|| auto_cell(cutter, &[])),
         cell_is_auto: cell.is_none(),
         memory_mib: section.count("memory_mib", 1..=1 << 20)?.unwrap_or(DEFAULT_MEMORY_MIB),
-        engine: engine.unwrap_or(Engine::ZMap),
+        engine: engine.unwrap_or(Engine::Auto),
         removal: section.flag("removal")?.unwrap_or(DEFAULT_REMOVAL),
         error_bound: section.length("error_bound")?.map_or_else(|| default_error_bound(limits), |v| v.value),
     })
@@ -459,7 +459,8 @@ fn read_toolpaths(
 }
 
 /// Keys of all toolpaths but pockets'.
-const COMMON: [&str; 7] = ["name", "strategy", "stepover", "scallop", "links", "longest_link", "smoothing"];
+const COMMON: [&str; 8] =
+    ["name", "strategy", "stepover", "scallop", "links", "longest_link", "smoothing", axis::KEY];
 
 /// How much dearer passes square to a wanted direction may be made.
 const FOLLOW: std::ops::RangeInclusive<f64> = 0.0..=1000.0;
@@ -528,7 +529,15 @@ fn named_request(
         )
     })?;
     let joining = if strategy.pocket().is_some() { Joining::default() } else { read_joining(section)? };
-    Ok(ToolpathRequest { name, folder: own_folder, strategy, step, directions, joining })
+    let axis = if strategy.pocket().is_some() { None } else { axis::read(section)? };
+    if axis.is_some() && joining.smoothing {
+        return Err(section.error(
+            &section.key_span("smoothing"),
+            "points of passes with a tilting axis are not smoothed",
+            "delete `smoothing`; `turning` in `axis` evens out the axis",
+        ));
+    }
+    Ok(ToolpathRequest { name, folder: own_folder, strategy, step, directions, joining, axis })
 }
 
 /// How passes are smoothed and joined.

@@ -334,19 +334,60 @@ impl<'a> Section<'a> {
         key: &str,
         entry: &Spanned<DeValue<'a>>,
     ) -> Result<Located<Vec<Point2>>, SceneError> {
-        let cure = "write points as `[x, y]`, between brackets and commas";
+        let rows = self.row_list(key, entry, "points as `[x, y]`")?;
+        Ok(Located { value: rows.value.into_iter().map(Point2::from).collect(), span: rows.span })
+    }
+
+    /// Rows of as many numbers, `[[…], …]`, none of them beyond what coordinates may be; `None` when the key is not there.
+    /// `what` completes the sentence "write … between brackets and commas".
+    pub fn rows<const N: usize>(
+        &self,
+        key: &str,
+        what: &str,
+    ) -> Result<Option<Located<Vec<[f64; N]>>>, SceneError> {
+        self.entry(key).map(|entry| self.row_list(key, entry, what)).transpose()
+    }
+
+    fn row_list<const N: usize>(
+        &self,
+        key: &str,
+        entry: &Spanned<DeValue<'a>>,
+        what: &str,
+    ) -> Result<Located<Vec<[f64; N]>>, SceneError> {
+        let cure = format!("write {what}, between brackets and commas");
         let DeValue::Array(list) = entry.get_ref() else {
-            return Err(self.wrong_type(key, "a list of points", entry, cure));
+            return Err(self.wrong_type(key, "a list of lists of numbers", entry, &cure));
         };
-        let point = |item: &Spanned<DeValue<'a>>| match item.get_ref() {
-            DeValue::Array(pair) if pair.len() == 2 => {
-                let at = |k: usize| Ok(self.in_range(key, &pair[k], &COORDINATE, " mm")?.value);
-                Ok(Point2::new(at(0)?, at(1)?))
-            }
-            _ => Err(self.wrong_type(key, "points of two numbers", item, cure)),
-        };
-        let value = list.iter().map(point).collect::<Result<_, _>>()?;
+        let value = list.iter().map(|item| self.row(key, item, &cure)).collect::<Result<_, _>>()?;
         Ok(Located { value, span: entry.span() })
+    }
+
+    fn row<const N: usize>(
+        &self,
+        key: &str,
+        item: &Spanned<DeValue<'a>>,
+        cure: &str,
+    ) -> Result<[f64; N], SceneError> {
+        let DeValue::Array(numbers) = item.get_ref() else {
+            return Err(self.wrong_type(key, &format!("lists of {N} numbers"), item, cure));
+        };
+        let row: Vec<f64> = numbers
+            .iter()
+            .map(|number| Ok(self.in_range(key, number, &COORDINATE, "")?.value))
+            .collect::<Result<_, SceneError>>()?;
+        let wrong = |row: Vec<f64>| {
+            let message =
+                format!("`{key}` in {} needs {N} numbers here, and here are {}", self.title, row.len());
+            self.error(&item.span(), message, cure)
+        };
+        <[f64; N]>::try_from(row).map_err(wrong)
+    }
+
+    /// A vector `[x, y, z]`; `None` when the key is not there.
+    pub fn vector(&self, key: &str) -> Result<Option<Located<[f64; 3]>>, SceneError> {
+        let Some(entry) = self.entry(key) else { return Ok(None) };
+        let value = self.row(key, entry, "write three numbers: `[0, 0.5, 1]`")?;
+        Ok(Some(Located { value, span: entry.span() }))
     }
 
     /// The table written in place as the value of `key`, if it is one.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{PartSource, Scene, ToolpathRequest, classic, direction, formula, pocket};
+use super::{PartSource, Scene, ToolpathRequest, axis, classic, direction, formula, pocket};
 use crate::cutter::{Cutter, CutterShape};
 use crate::toolpath::{Links, Step, Strategy, StreamMethod, longest_link};
 
@@ -172,7 +172,12 @@ fn write_joining(out: &mut String, request: &ToolpathRequest, scene: &Scene) -> 
         }
         Links::Retract => writeln!(out, "links = \"retract\"")?,
     }
-    writeln!(out, "smoothing = {}  # of the points of a pass, within the chord tolerance", joining.smoothing)
+    writeln!(
+        out,
+        "smoothing = {}  # of the points of a pass, within the chord tolerance",
+        joining.smoothing
+    )?;
+    axis::write(out, request.axis.as_ref())
 }
 
 fn write_strategy(out: &mut String, request: &ToolpathRequest) -> std::fmt::Result {

@@ -17,6 +17,7 @@ mod ceiling;
 mod order;
 #[cfg(test)]
 mod tests;
+mod tilted;
 
 use super::border::Border;
 use super::chord::distance_to_segment;
@@ -28,6 +29,7 @@ use crate::part::Part;
 use bend::{Bends, End};
 use ceiling::Ceiling;
 use order::{Visit, is_closed, order};
+pub(super) use tilted::join_tilted;
 
 /// How the end of a pass and the start of the next are joined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,0 +1,235 @@
+//! One toolpath measured along the normals of the design: planned upright or tilted, for any cutter axis.
+
+use std::path::Path;
+use std::time::Instant;
+
+use super::{BYTES_PER_MOVE, Job, MIB, part_bytes};
+use crate::cli::error::CliError;
+use crate::cli::outputs::Outputs;
+use crate::cutter::Solid;
+use crate::geometry::Point2;
+use crate::io::scene::ToolpathRequest;
+use crate::io::{exr, ply_write, png, stl_write};
+use crate::machine::slow_corners;
+use crate::metrology::{Measurement, NormalMap, PatchGrid, measure_along_normals, net_places};
+use crate::monitor::{self, Monitor as _};
+use crate::report::{
+    HIGHEST_RIDGE, Histogram, MapSize, MapWords, SimulationFigures, SurfaceMeshFigures, ToolpathPage,
+    ToolpathResult, deviation_colours, deviation_picture,
+};
+use crate::sim::{Grid, Rays};
+use crate::toolpath::{Tilting, plan, plan_tilted};
+
+/// Bytes a place of the net: place, hit, triangles with their crossings, and the map; 480 were counted.
+const BYTES_PER_PLACE: u64 = 600;
+
+/// Material is looked for this many uncut tolerances above the design, and no less far than the cutter's radius; cuts as
+/// far below it as that radius, so that the far side of a thin part counts for nothing.
+const REACH_OVER_UNCUT: f64 = 4.0;
+
+impl Job<'_> {
+    /// Plans one toolpath, measures it along the normals and writes its folder.
+    pub(super) fn along_normals(
+        &self,
+        request: &ToolpathRequest,
+        outputs: &Outputs,
+    ) -> Result<(ToolpathResult, ToolpathPage), CliError> {
+        let (scene, monitor) = (self.scene, self.progress);
+        let settings = self.settings(request);
+        let planned = match &request.axis {
+            Some(axis) => {
+                let tilting = Tilting { axis: &axis.rule, most_turning: axis.most_turning };
+                plan_tilted(&self.part, &scene.cutter, &request.strategy, &tilting, &settings, monitor)
+            }
+            None => plan(&self.part, &scene.cutter, &request.strategy, &settings, monitor),
+        };
+        let mut planned = planned.map_err(|reason| CliError::plan(scene, &request.name, reason))?;
+        if scene.machine.slow_corners {
+            planned.path = slow_corners(&planned.path, &scene.machine);
+        }
+        let spacing = scene.simulation.cell;
+        self.check_places(spacing, planned.path.len())?;
+        let begun = Instant::now();
+        let solid = Solid::of_cutter(&scene.cutter, scene.holder.as_ref());
+        let reach = (REACH_OVER_UNCUT * scene.tolerance.uncut).max(scene.cutter.radius());
+        let rays =
+            Rays::new(&planned.path, &solid, monitor).map_err(CliError::rays(scene, &request.name))?;
+        let inward = scene.cutter.radius();
+        let cut = SweptVolume { rays: &rays, path: &planned.path, solid: &solid, inward, outward: reach };
+        let asked = scene.simulation.error_bound;
+        let (mut measured, map) = measure_along_normals(
+            &self.part,
+            &scene.cutter,
+            &planned.path,
+            &cut,
+            spacing,
+            &scene.tolerance,
+            asked,
+            monitor,
+        )?;
+        let simulation = SimulationFigures {
+            engine: "rays",
+            cell_mm: spacing,
+            cells: map.points.len(),
+            error_bound_asked_mm: asked,
+            refined_rectangles: 0,
+            finest_cell_mm: spacing,
+            moves: planned.path.len(),
+            wall_s: begun.elapsed().as_secs_f64(),
+            threads: rayon::current_num_threads(),
+        };
+        monitor::check(monitor)?;
+        monitor.start("writing results", 0);
+        outputs.folder(&request.folder)?;
+        let lines = self.write_programs(request, &planned, outputs)?;
+        for region in &mut measured.gouge.regions {
+            region.line = lines.get(region.move_index as usize).copied().unwrap_or_default();
+        }
+        let surface_mesh = self.write_normal_mesh(request, &map, outputs)?;
+        let page = self.write_normal_maps(request, &map, &measured, outputs)?;
+        let result = self.result(request, &planned, None, measured, None, simulation, surface_mesh);
+        Ok((result, page))
+    }
+
+    /// Refuses places that do not fit into the memory.
+    fn check_places(&self, spacing: f64, moves: usize) -> Result<(), CliError> {
+        let allowed_mib = self.scene.simulation.memory_mib;
+        let besides = part_bytes(&self.part) + (moves * BYTES_PER_MOVE) as u64;
+        let needed = net_places(&self.part, spacing) * BYTES_PER_PLACE as f64;
+        let left = (u64::from(allowed_mib) * MIB).saturating_sub(besides) as f64;
+        if needed <= left {
+            return Ok(());
+        }
+        // Places grow as the square of what their distance shrinks; two digits, rounded up.
+        let exact = spacing * (needed / left.max(1.0)).sqrt();
+        let digit = 10f64.powf(exact.log10().floor() - 1.0);
+        Err(CliError::Places {
+            scene: self.scene.source.name.clone(),
+            spacing,
+            needed_mib: (needed as u64 + besides).div_ceil(MIB),
+            allowed_mib,
+            fitting: (exact / digit).ceil() * digit,
+        })
+    }
+
+    /// Writes machined.stl and machined.ply: the design moved by its deviation.
+    fn write_normal_mesh(
+        &self,
+        request: &ToolpathRequest,
+        map: &NormalMap,
+        outputs: &Outputs,
+    ) -> Result<SurfaceMeshFigures, CliError> {
+        let moved = |k: usize| {
+            let deviation = if map.deviations[k].is_nan() { 0.0 } else { f64::from(map.deviations[k]) };
+            (map.points[k] + map.normals[k] * deviation).coords.map(|c| c as f32).into()
+        };
+        let places: Vec<[f32; 3]> = crate::parallel::map(map.points.len(), moved);
+        outputs.file(&format!("{}/machined.stl", request.folder), |out| {
+            stl_write::write(out, &places, &map.triangles)
+        })?;
+        let colours = deviation_colours(&map.deviations, &self.scene.tolerance);
+        outputs.file(&format!("{}/machined.ply", request.folder), |out| {
+            let vertices =
+                ply_write::Vertices { places: &places, colours: &colours, deviations: &map.deviations };
+            ply_write::write(out, &vertices, &map.triangles)
+        })?;
+        Ok(SurfaceMeshFigures { triangles: map.triangles.len(), tolerance_mm: self.scene.tolerance.scallop })
+    }
+
+    /// Writes deviation.png and deviation.exr, of several patches with their number; a mesh is shown in the plan view.
+    fn write_normal_maps(
+        &self,
+        request: &ToolpathRequest,
+        map: &NormalMap,
+        measured: &Measurement,
+        outputs: &Outputs,
+    ) -> Result<ToolpathPage, CliError> {
+        let mut page = Vec::new();
+        if map.grids.is_empty() {
+            let (grid, values) = plan_view(map, self.scene.simulation.cell);
+            page =
+                self.write_normal_picture(request, "deviation.png", "plan view", &grid, &values, outputs)?;
+        }
+        for (k, patch) in map.grids.iter().enumerate() {
+            let number = if map.grids.len() > 1 { format!("-{}", k + 1) } else { String::new() };
+            let name = format!("{}/deviation{number}.exr", request.folder);
+            let bytes = exr::encode_patch(map, patch).map_err(CliError::output(Path::new(&name)))?;
+            outputs.file(&name, |out| out.write_all(&bytes))?;
+            let (grid, values) = unrolled(map, patch);
+            let name = format!("deviation{number}.png");
+            let picture = self.write_normal_picture(
+                request,
+                &name,
+                "over u (right) and v (up)",
+                &grid,
+                &values,
+                outputs,
+            )?;
+            if k == 0 {
+                page = picture;
+            }
+        }
+        let scallop = self.scene.tolerance.scallop;
+        Ok(ToolpathPage {
+            deviation_png: page,
+            height_png: None,
+            field_pngs: None,
+            histogram: Histogram::new(&measured.ridge_samples, scallop, HIGHEST_RIDGE * scallop),
+        })
+    }
+
+    /// Writes one picture; leaves the smaller one for the page.
+    fn write_normal_picture(
+        &self,
+        request: &ToolpathRequest,
+        name: &str,
+        view: &str,
+        grid: &Grid,
+        values: &[f32],
+        outputs: &Outputs,
+    ) -> Result<Vec<u8>, CliError> {
+        let scene = self.scene;
+        let title = format!("Deviation, {}", request.name);
+        let subtitle = format!("{} · {view} · every {} mm · engine rays", scene.title, scene.simulation.cell);
+        let cell = format!("{} mm", scene.simulation.cell);
+        let notes = [("Title", scene.title.as_str()), ("Scene", &scene.source.name), ("Cell", &cell)];
+        let name = format!("{}/{name}", request.folder);
+        let words = MapWords { title: &title, subtitle: &subtitle, marks: &[] };
+        let encode = |size| {
+            let picture = deviation_picture(grid, values, &scene.tolerance, &words, size);
+            png::encode(&picture, &notes).map_err(CliError::output(Path::new(&name)))
+        };
+        let bytes = encode(MapSize::File)?;
+        outputs.file(&name, |out| out.write_all(&bytes))?;
+        encode(MapSize::Page)
+    }
+}
+
+/// A patch laid flat: cells of its mean distances along u and v, made square.
+fn unrolled(map: &NormalMap, patch: &PatchGrid) -> (Grid, Vec<f32>) {
+    let [nu, nv] = patch.counts;
+    let cell = patch.pitch[0].min(patch.pitch[1]).max(f64::MIN_POSITIVE);
+    let [nx, ny] =
+        [0, 1].map(|c| (patch.counts[c] as f64 * (patch.pitch[c] / cell).min(8.0)).round() as usize);
+    let grid = Grid { origin: Point2::new(0.5 * cell, 0.5 * cell), cell, nx, ny };
+    let value = |i: usize, j: usize| map.deviations[patch.first + j * nv / ny * nu + i * nu / nx];
+    (grid, (0..ny).flat_map(|j| (0..nx).map(move |i| value(i, j))).collect())
+}
+
+/// The places seen from above, of those in one cell the one farthest from the design.
+fn plan_view(map: &NormalMap, cell: f64) -> (Grid, Vec<f32>) {
+    let bounds = crate::geometry::Aabb::of(&map.points);
+    let size = bounds.size();
+    let (nx, ny) = ((size.x / cell) as usize + 1, (size.y / cell) as usize + 1);
+    let grid = Grid { origin: bounds.min.xy(), cell, nx, ny };
+    let mut values = vec![f32::NAN; grid.len()];
+    for (point, deviation) in map.points.iter().zip(&map.deviations) {
+        let at = (point.xy() - grid.origin) / cell;
+        let (i, j) = ((at.x.round() as usize).min(nx - 1), (at.y.round() as usize).min(ny - 1));
+        let value = &mut values[grid.index(i, j)];
+        if value.is_nan() || deviation.abs() > value.abs() {
+            *value = *deviation;
+        }
+    }
+    (grid, values)
+}

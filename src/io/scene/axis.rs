@@ -1,0 +1,118 @@
+//! Tool axes in a scene: a word, or a table in place.
+
+use std::fmt::{self, Write as _};
+
+use super::error::SceneError;
+use super::section::{Located, Section};
+use super::write::number;
+use crate::geometry::{Point3, Vector3};
+use crate::toolpath::ToolAxis;
+
+/// The key of the axis of a toolpath.
+pub(super) const KEY: &str = "axis";
+
+/// Angles of lead and tilt, degrees: beyond, the shank would cut.
+const LEAN: std::ops::RangeInclusive<f64> = -80.0..=80.0;
+
+/// How fast an axis may be asked to turn, degrees a mm.
+const TURNING: std::ops::RangeInclusive<f64> = 1e-3..=360.0;
+
+/// How the axis of a toolpath is chosen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AxisRequest {
+    /// The rule.
+    pub rule: ToolAxis,
+    /// The axis turns by no more than this along a pass, rad a mm of contact.
+    pub most_turning: Option<f64>,
+}
+
+/// Reads the axis of a toolpath; `None` for an upright one.
+pub(super) fn read(section: &Section<'_>) -> Result<Option<AxisRequest>, SceneError> {
+    let Some(table) = section.inline(KEY) else {
+        let normal = ToolAxis::LeadTilt { lead: 0.0, tilt: 0.0 };
+        let word = section.word(KEY, &["upright", "normal"])?;
+        let leaning = word.filter(|word| word.value == "normal");
+        return Ok(leaning.map(|_| AxisRequest { rule: normal, most_turning: None }));
+    };
+    table.only(&["lead", "tilt", "fixed", "toward", "away", "between", "turning"], &[], "`axis`")?;
+    let [lead, tilt] = ["lead", "tilt"].map(|key| table.number(key, LEAN, " degrees"));
+    let (lead, tilt) = (lead?, tilt?);
+    let rules = [
+        (lead.is_some() || tilt.is_some()).then(|| {
+            let angle =
+                |angle: &Option<Located<f64>>| angle.as_ref().map_or(0.0, |angle| angle.value.to_radians());
+            ToolAxis::LeadTilt { lead: angle(&lead), tilt: angle(&tilt) }
+        }),
+        table.vector("fixed")?.map(|v| Ok(ToolAxis::Fixed(unit(&table, v.value, &v)?))).transpose()?,
+        curve(&table, "toward")?.map(ToolAxis::Toward),
+        curve(&table, "away")?.map(ToolAxis::Away),
+        guides(&table)?.map(ToolAxis::Between),
+    ];
+    let mut rules = rules.into_iter().flatten();
+    let (Some(rule), None) = (rules.next(), rules.next()) else {
+        let message = "`axis` needs one rule for the tool axis, and only one";
+        let cure = "write `{ lead = 15, tilt = 0 }`, `{ fixed = [0, 0.5, 1] }`, `{ toward = [[0, 0, 80]] }`, \
+                    `{ away = [[0, 0, -80]] }` or `{ between = [[0, 0, 0, 0, 0, 1], [50, 0, 0, 0.3, 0, 1]] }`";
+        return Err(section.error(&section.key_span(KEY), message, cure));
+    };
+    let most_turning = table.number("turning", TURNING, " degrees a mm")?.map(|rate| rate.value.to_radians());
+    Ok(Some(AxisRequest { rule, most_turning }))
+}
+
+/// The unit vector of three numbers.
+fn unit<T>(table: &Section<'_>, [x, y, z]: [f64; 3], at: &Located<T>) -> Result<Vector3, SceneError> {
+    let unit = Vector3::new(x, y, z).try_normalize(1e-9);
+    let message = "a tool axis of no length has no direction";
+    unit.ok_or_else(|| {
+        table.error(&at.span, message, "write a vector from the tip to the holder: `[0, 0, 1]`")
+    })
+}
+
+fn curve(table: &Section<'_>, key: &str) -> Result<Option<Vec<Point3>>, SceneError> {
+    let Some(rows) = table.rows::<3>(key, "one point, or the points of a curve, as `[x, y, z]`")? else {
+        return Ok(None);
+    };
+    if rows.value.is_empty() {
+        let message = format!("`{key}` has no point");
+        return Err(table.error(&rows.span, message, "write `[[0, 0, 80]]`, or several points for a curve"));
+    }
+    Ok(Some(rows.value.into_iter().map(Point3::from).collect()))
+}
+
+fn guides(table: &Section<'_>) -> Result<Option<Vec<(Point3, Vector3)>>, SceneError> {
+    let Some(rows) = table.rows::<6>("between", "places with their axes as `[x, y, z, i, j, k]`")? else {
+        return Ok(None);
+    };
+    if rows.value.is_empty() {
+        let cure = "write at least one place with its axis: `[[0, 0, 0, 0, 0, 1]]`";
+        return Err(table.error(&rows.span, "`between` has no place", cure));
+    }
+    let one = |&[x, y, z, i, j, k]: &[f64; 6]| Ok((Point3::new(x, y, z), unit(table, [i, j, k], &rows)?));
+    rows.value.iter().map(one).collect::<Result<_, SceneError>>().map(Some)
+}
+
+/// Writes the axis as scenes spell it.
+pub(super) fn write(out: &mut String, request: Option<&AxisRequest>) -> fmt::Result {
+    let Some(AxisRequest { rule, most_turning }) = request else {
+        return writeln!(out, "axis = \"upright\"");
+    };
+    let list =
+        |numbers: &[f64]| format!("[{}]", numbers.iter().map(|x| number(*x)).collect::<Vec<_>>().join(", "));
+    let lists = |rows: Vec<String>| format!("[{}]", rows.join(", "));
+    let curve = |points: &[Point3]| lists(points.iter().map(|p| list(p.coords.as_slice())).collect());
+    let rule = match rule {
+        ToolAxis::LeadTilt { lead, tilt } => {
+            format!("lead = {}, tilt = {}", number(lead.to_degrees()), number(tilt.to_degrees()))
+        }
+        ToolAxis::Fixed(axis) => format!("fixed = {}", list(axis.as_slice())),
+        ToolAxis::Toward(points) => format!("toward = {}", curve(points)),
+        ToolAxis::Away(points) => format!("away = {}", curve(points)),
+        ToolAxis::Between(guides) => {
+            let row = |(p, a): &(Point3, Vector3)| list(&[p.x, p.y, p.z, a.x, a.y, a.z]);
+            format!("between = {}", lists(guides.iter().map(row).collect()))
+        }
+    };
+    let turning =
+        most_turning.map_or_else(String::new, |rate| format!(", turning = {}", number(rate.to_degrees())));
+    writeln!(out, "axis = {{ {rule}{turning} }}  # degrees, mm")
+}

@@ -1,0 +1,142 @@
+use super::*;
+use crate::geometry::samples;
+use crate::monitor::Silent;
+use crate::part::Patch;
+use crate::toolpath::{ClPoint, Move, MoveKind, ball_scallop_height, distance_to_segment};
+
+const RADIUS: f64 = 3.0;
+
+/// All moves of a ball, one by one: steps as long as the distance.
+struct BruteForce<'a>(&'a Toolpath);
+
+impl AlongNormal for BruteForce<'_> {
+    fn hit(&self, point: &Point3, normal: &Vector3) -> Option<NormalHit> {
+        let up = Vector3::z() * RADIUS;
+        let mut best: Option<NormalHit> = None;
+        for (k, (from, to, step)) in self.0.segments().enumerate() {
+            if step.kind == MoveKind::Rapid {
+                continue;
+            }
+            let (a, b) = (from + up, to + up);
+            let mut s = -1.0;
+            while s < best.map_or(self.reach(), |best| best.deviation) {
+                let d = distance_to_segment(&(point + normal * s), &a, &b) - RADIUS;
+                if d < 1e-12 {
+                    let at = point + normal * s;
+                    let t = ((at - a).dot(&(b - a)) / (b - a).norm_squared()).clamp(0.0, 1.0);
+                    let inward = (a + (b - a) * t - at) / RADIUS;
+                    best = Some(NormalHit { deviation: s, by: k as u32, normal: inward });
+                    break;
+                }
+                s += d;
+            }
+        }
+        best
+    }
+
+    fn reach(&self) -> f64 {
+        0.5
+    }
+}
+
+/// A path through the tips of each pass.
+fn path(passes: &[Vec<Point3>]) -> Toolpath {
+    let mut moves = Vec::new();
+    for (pass, tips) in passes.iter().enumerate() {
+        for (k, tip) in tips.iter().enumerate() {
+            let kind = if k == 0 { MoveKind::Rapid } else { MoveKind::Cut };
+            moves.push(Move { to: ClPoint::upright(*tip), kind, feed_rate: 1000.0, pass: pass as u32 });
+        }
+    }
+    // Rapids are not cut here.
+    Toolpath { start: ClPoint::upright(passes[0][0]), moves }
+}
+
+fn measured(part: &Part, path: &Toolpath, spacing: f64) -> (Measurement, NormalMap) {
+    let limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.001 };
+    let ball = Cutter::ball(2.0 * RADIUS).unwrap();
+    measure_along_normals(part, &ball, path, &BruteForce(path), spacing, &limits, 1e-4, &Silent).unwrap()
+}
+
+fn plane() -> Part {
+    let corners = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 3.0, 0.0], [4.0, 3.0, 0.0]];
+    let corners = corners.map(Point3::from).to_vec();
+    Part::from_mesh(crate::geometry::TriangleMesh::new(corners, vec![[0, 1, 2], [1, 3, 2]]).unwrap().0)
+}
+
+/// Passes along x, half a mm apart, the third one `lower` by so much.
+fn passes(lower: f64) -> Vec<Vec<Point3>> {
+    let tip = |x: f64, k: usize| Point3::new(x, 0.5 * k as f64, if k == 3 { -lower } else { 0.0 });
+    (0..7)
+        .map(|k| if k % 2 == 0 { vec![tip(-4.0, k), tip(8.0, k)] } else { vec![tip(8.0, k), tip(-4.0, k)] })
+        .collect()
+}
+
+#[test]
+fn a_plane_has_the_scallops_of_the_closed_form_whatever_the_spacing() {
+    for spacing in [0.17, 0.31] {
+        let (measured, map) = measured(&plane(), &path(&passes(0.0)), spacing);
+        let exact = RADIUS - (RADIUS * RADIUS - 0.0625).sqrt();
+        let scallop = &measured.scallop;
+        let (max, p50) = (scallop.max_mm.unwrap(), scallop.p50_mm.unwrap());
+        assert!((max - exact).abs() < 1e-7 && (p50 - exact).abs() < 1e-7, "{max} {p50} {exact}");
+        assert!(scallop.error_bound_mm.unwrap() < 3e-4, "{scallop:?}");
+        assert!((scallop.ridge_length_mm / 24.0 - 1.0).abs() < 1e-3, "six ridges of 4 mm: {scallop:?}");
+        assert!(measured.gouge.max_depth_mm < 1e-9 && measured.uncut.region_count == 0);
+        assert!((measured.deviation.area_mm2 - 12.0).abs() < 1e-9);
+        assert_eq!(map.points.len(), map.deviations.len());
+    }
+}
+
+#[test]
+fn a_gouge_is_found_with_its_depth_area_and_move() {
+    let (measured, _) = measured(&plane(), &path(&passes(0.03)), 0.1);
+    let gouge = &measured.gouge;
+    assert!((gouge.max_depth_mm - 0.03).abs() <= gouge.error_bound_mm, "{gouge:?}");
+    assert!((gouge.max_depth_mm - 0.03).abs() < 1e-4 && gouge.error_bound_mm < 1e-3, "{gouge:?}");
+    assert_eq!((gouge.region_count, gouge.regions[0].move_index), (1, 7));
+    // Deeper than 5 µm over 2 √(2 r 0.025) across, less what the neighbours cut not.
+    let width = 2.0 * (2.0 * RADIUS * 0.025f64).sqrt();
+    assert!((gouge.area_mm2 / (4.0 * width) - 1.0).abs() < 0.1, "{gouge:?}");
+}
+
+#[test]
+fn a_missing_pass_is_uncut() {
+    let mut missing = passes(0.0);
+    missing.drain(2..5);
+    let (measured, _) = measured(&plane(), &path(&missing), 0.1);
+    let exact = RADIUS - (RADIUS * RADIUS - 1.0).sqrt();
+    assert!((measured.uncut.max_height_mm - exact).abs() < 1e-3, "{:?}", measured.uncut);
+    assert_eq!(measured.uncut.region_count, 1);
+}
+
+/// Rings of constant latitude around a dome: sections across the feed are circles.
+#[test]
+fn a_dome_has_the_scallops_of_a_circle_also_where_it_is_steep() {
+    let (centre, rho) = (Point3::new(0.0, 0.0, 0.0), 10.0);
+    let part = Part::from_patches(vec![Patch::Nurbs(samples::hemisphere(centre, rho))], 0.01).unwrap();
+    let step = 0.06f64;
+    let ring = |k: usize| {
+        let polar = 0.5 * step + step * k as f64;
+        let at = |n: usize| {
+            let turn = std::f64::consts::TAU * n as f64 / 240.0;
+            let normal = Vector3::new(polar.sin() * turn.cos(), polar.sin() * turn.sin(), polar.cos());
+            centre + normal * (rho + RADIUS) - Vector3::z() * RADIUS
+        };
+        (0..=240).map(at).collect::<Vec<_>>()
+    };
+    let rings: Vec<Vec<Point3>> = (0..27).map(ring).collect();
+    let (measured, map) = measured(&part, &path(&rings), 0.6);
+    let exact = ball_scallop_height(RADIUS, -1.0 / rho, step * rho).unwrap();
+    let (max, p50) = (measured.scallop.max_mm.unwrap(), measured.scallop.p50_mm.unwrap());
+    // Chords of 240 a turn lie up to 1.1 µm inside the greatest ring.
+    assert!((p50 - exact).abs() < 1.5e-3 && (max - exact).abs() < 2e-3, "{p50} {max} {exact}");
+    assert!(measured.gouge.max_depth_mm < 1.3e-3, "{:?}", measured.gouge);
+    let length: f64 = (1..27).map(|k| std::f64::consts::TAU * rho * (step * k as f64).sin()).sum();
+    assert!(
+        (measured.scallop.ridge_length_mm / length - 1.0).abs() < 0.02,
+        "{length} {:?}",
+        measured.scallop
+    );
+    assert_eq!(map.grids.len(), 1);
+}
