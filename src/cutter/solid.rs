@@ -262,7 +262,9 @@ impl Solid {
         let outline = Outline::new(whole);
         let radius = outline.edges.iter().map(|e| e.to[0]).fold(0.0, f64::max);
         let profile = cutter.map(Cutter::profile);
-        let ball = profile.filter(|p| p.is_ball() && p.corner <= 0.5 * cutting_length).map(|p| p.corner);
+        let ball = profile
+            .filter(|p| p.is_ball() && p.corner <= 0.5 * cutting_length && sections.is_empty())
+            .map(|p| p.corner);
         let pivot = match cutter {
             Some(c) => c.profile().centre_z.min(c.side_height()).min(cutting_length),
             None => cutting_length,
@@ -281,8 +283,8 @@ impl Solid {
         self.pieces.len().max(1)
     }
 
-    /// Radius of the ball around `(0, radius)` that is all of the solid below that height, if it is one
-    /// at least two radii long.
+    /// Radius of the ball around `(0, radius)` to which all places below that height are nearest: that of a
+    /// ball end at least two radii long, without a holder.
     pub fn ball(&self) -> Option<f64> {
         self.ball
     }

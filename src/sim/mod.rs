@@ -10,6 +10,7 @@ mod form;
 mod grid;
 mod holder;
 mod in_order;
+mod rays;
 mod reference;
 #[cfg(test)]
 pub(crate) mod scenes;
@@ -26,6 +27,7 @@ pub use envelope::Envelope;
 pub use grid::{Grid, GridError};
 pub use holder::{Collision, HolderClearance, holder_collisions};
 pub use in_order::{ENGAGED, MoveRemoval, RapidContact, Removal, cut_in_order, cut_in_order_plain};
+pub use rays::{RayHit, Rays, RaysError};
 pub use reference::cut_reference;
 pub use solid::{Nearest, OppositeAxes, SweptHit, SweptMoves, SweptSolid};
 pub use swept::SweptMove;

@@ -14,14 +14,16 @@ mod motion;
 mod moves;
 mod search;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use crate::cutter::Solid;
 use crate::geometry::Point3;
 use crate::toolpath::ClPoint;
 pub(crate) use motion::Motion;
+pub(crate) use moves::Part;
 pub use moves::{SweptHit, SweptMoves};
 use search::least;
+pub(crate) use search::{Look, Moving, SHORTEST, Stretch};
 
 /// A move turns the axis to its very opposite, so that nobody can tell which way round.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -93,17 +95,17 @@ pub(super) fn below(
     range: [f64; 2],
     limit: f64,
 ) -> Option<Nearest> {
-    if solid.is_convex() {
-        return motion.ball_track(solid, q, range).map_or_else(
-            || least(&motion.seen(solid, 0, q), range, limit),
-            |track| least(&track, range, limit),
-        );
+    if let Some(ball) = motion.ball(solid, std::slice::from_ref(q), range) {
+        return least(&ball, q, range, limit);
     }
     let (mut best, mut now) = (None, limit);
     for piece in 0..solid.pieces() {
-        if let Some(found) = least(&motion.seen(solid, piece, q), range, now) {
+        if let Some(found) = least(&motion.piece(solid, piece), q, range, now) {
             (best, now) = (Some(found), found.distance);
         }
+    }
+    if solid.is_convex() {
+        return best;
     }
     best.map(|found: Nearest| Nearest { distance: distance_at(solid, motion, q, found.t), ..found })
 }

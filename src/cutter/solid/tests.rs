@@ -95,7 +95,7 @@ fn surface(cutter: Option<&Cutter>, holder: Option<&Holder>, length: f64, step: 
 
 /// A lattice that does not fall on edges.
 fn places() -> impl Iterator<Item = Pair> {
-    (0..28).flat_map(|i| (0..60).map(move |j| [0.0137 + 0.31 * f64::from(i), -2.0 + 0.373 * f64::from(j)]))
+    (0..20).flat_map(|i| (0..40).map(move |j| [0.0137 + 0.43 * f64::from(i), -2.0 + 0.559 * f64::from(j)]))
 }
 
 fn check(name: &str, solid: &Solid, cutter: Option<&Cutter>, holder: Option<&Holder>, length: f64) {

@@ -1,6 +1,6 @@
 //! One move of a tool, and how a place looks from it.
 
-use super::search::{Curve, Sample};
+use super::search::{Look, Moving, Sample};
 use crate::cutter::Solid;
 use crate::geometry::{Point3, Vector3};
 use crate::toolpath::ClPoint;
@@ -73,42 +73,46 @@ impl Motion {
         [self.turn * arm + 2.0 * pace, self.turn * (self.turn * arm + 3.0 * pace)]
     }
 
-    /// The distance of `q` from one convex piece of the tool.
-    pub(super) fn seen<'a>(&'a self, solid: &'a Solid, piece: usize, q: &'a Point3) -> Seen<'a> {
-        Seen { motion: self, spin: self.spin(), solid, piece, q }
+    /// The distance from one convex piece of the tool.
+    pub(crate) fn piece<'a>(&'a self, solid: &'a Solid, piece: usize) -> MovingPiece<'a> {
+        MovingPiece { motion: self, spin: self.spin(), solid, piece }
     }
 
-    /// The distance of `q` from the ball of a ball end, where in all of `range` nothing else of it is
-    /// nearer: below its middle.
-    pub(super) fn ball_track<'a>(
+    /// The distance from the ball of a ball end, where in all of `range` nothing else of it is nearer to
+    /// any of the places: where they stay below its middle.
+    pub(crate) fn ball<'a>(
         &'a self,
         solid: &Solid,
-        q: &'a Point3,
+        places: &[Point3],
         range: [f64; 2],
-    ) -> Option<BallTrack<'a>> {
+    ) -> Option<MovingBall<'a>> {
         let radius = solid.ball()?;
-        let heights = range.map(|t| (q - self.tip - self.way * t).dot(&self.axis_at(t)));
         let duration = range[1] - range[0];
-        let bulge = 0.125 * self.bends(q, range)[0] * duration * duration;
-        let below = heights[0].max(heights[1]) + bulge < radius;
-        below.then_some(BallTrack { motion: self, radius, q })
+        let axes = range.map(|t| self.axis_at(t));
+        let below = |q: &Point3| {
+            let height = |k: usize| (q - self.tip - self.way * range[k]).dot(&axes[k]);
+            let bulge = 0.125 * self.bends(q, range)[0] * duration * duration;
+            height(0).max(height(1)) + bulge < radius
+        };
+        places.iter().all(below).then_some(MovingBall { motion: self, radius })
     }
 }
 
-/// A place seen from a tool that stands still, by its distance from a convex piece.
-pub(super) struct Seen<'a> {
+/// A convex piece of a tool on its way.
+#[derive(Clone, Copy)]
+pub(crate) struct MovingPiece<'a> {
     motion: &'a Motion,
     spin: Vector3,
     solid: &'a Solid,
     piece: usize,
-    q: &'a Point3,
 }
 
-impl Curve for Seen<'_> {
+impl Moving for MovingPiece<'_> {
     #[inline]
-    fn sample(&self, t: f64) -> Sample {
-        let axis = self.motion.axis_at(t);
-        let away = self.q - self.motion.tip - self.motion.way * t;
+    fn look(&self, q: &Point3, t: f64) -> Look {
+        let motion = self.motion;
+        let axis = motion.axis_at(t);
+        let away = q - motion.tip - motion.way * t;
         let z = away.dot(&axis);
         let outward = away - axis * z;
         let rho = outward.norm();
@@ -116,49 +120,52 @@ impl Curve for Seen<'_> {
         // On the axis the mean of both gradients supports the distance as well as either.
         let radial = if rho > 0.0 { foot.gradient[0] / rho } else { 0.0 };
         let gradient = outward * radial + axis * foot.gradient[1];
-        let turning = self.spin.cross(&away);
-        let bend = self.spin.cross(&(self.motion.way * 2.0 + turning));
-        Sample {
-            t,
-            value: foot.distance,
-            slope: -gradient.dot(&(self.motion.way + turning)),
-            bend: gradient.dot(&bend),
-        }
+        let (velocity, bend) = if motion.turn == 0.0 {
+            (motion.way, 0.0)
+        } else {
+            let turning = self.spin.cross(&away);
+            (motion.way + turning, gradient.dot(&self.spin.cross(&(motion.way * 2.0 + turning))))
+        };
+        Look { sample: Sample { t, value: foot.distance, slope: -gradient.dot(&velocity), bend }, gradient }
     }
 
-    fn bends(&self, range: [f64; 2]) -> [f64; 2] {
-        self.motion.bends(self.q, range)
+    fn bends(&self, q: &Point3, range: [f64; 2]) -> [f64; 2] {
+        self.motion.bends(q, range)
+    }
+
+    fn turn(&self) -> f64 {
+        self.motion.turn
     }
 }
 
-/// The distance from a ball whose middle runs along with the tool: `tip + r·axis`.
-pub(super) struct BallTrack<'a> {
+/// A ball whose middle runs along with the tool: `tip + r·axis`. How its axis turns is of no account.
+#[derive(Clone, Copy)]
+pub(crate) struct MovingBall<'a> {
     motion: &'a Motion,
     radius: f64,
-    q: &'a Point3,
 }
 
-impl Curve for BallTrack<'_> {
+impl Moving for MovingBall<'_> {
     #[inline]
-    fn sample(&self, t: f64) -> Sample {
+    fn look(&self, q: &Point3, t: f64) -> Look {
         let (m, r) = (self.motion, self.radius);
-        let (sin, cos) = (m.turn * t).sin_cos();
+        let (sin, cos) = if m.turn == 0.0 { (0.0, 1.0) } else { (m.turn * t).sin_cos() };
         let axis = m.axis * cos + m.side * sin;
-        let away = self.q - m.tip - m.way * t - axis * r;
+        let away = q - m.tip - m.way * t - axis * r;
         let size = away.norm();
         let velocity = m.way + (m.side * cos - m.axis * sin) * (r * m.turn);
         // At the middle itself zero supports the distance.
-        let toward = if size > 0.0 { away / size } else { Vector3::zeros() };
-        Sample {
-            t,
-            value: size - r,
-            slope: -toward.dot(&velocity),
-            bend: toward.dot(&axis) * r * m.turn * m.turn,
-        }
+        let gradient = if size > 0.0 { away / size } else { Vector3::zeros() };
+        let bend = gradient.dot(&axis) * r * m.turn * m.turn;
+        Look { sample: Sample { t, value: size - r, slope: -gradient.dot(&velocity), bend }, gradient }
     }
 
-    fn bends(&self, _: [f64; 2]) -> [f64; 2] {
+    fn bends(&self, _: &Point3, _: [f64; 2]) -> [f64; 2] {
         let bend = self.radius * self.motion.turn * self.motion.turn;
         [bend, bend * self.motion.turn]
+    }
+
+    fn turn(&self) -> f64 {
+        0.0
     }
 }

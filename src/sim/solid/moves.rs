@@ -39,11 +39,13 @@ pub struct SweptHit {
     pub t: f64,
 }
 
-/// Mean tool axis of a box, and the length of the chord to the axis that differs most.
+/// What is known of all tools in a box: their mean axis, the length of the chord to the axis that differs
+/// most, and the first move.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Lean {
+struct Summary {
     axis: [f32; 3],
     chord: f32,
+    first: u32,
 }
 
 /// A part of a move, in one slot of the tree.
@@ -55,18 +57,23 @@ pub(crate) struct Part {
     pub(crate) range: [f64; 2],
 }
 
-/// Lower bound on the distance from some tools, as the distance from one of them in the middle and what
-/// the others may be nearer.
+/// How near some tools may be, as the distance from one of them in the middle and what the others may be
+/// nearer.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct NodeView {
     /// Distance from the tool in the middle.
     pub(crate) distance: f64,
     /// Its gradient.
     pub(crate) gradient: Vector3,
-    /// How much nearer another tool may be.
-    pub(crate) slack: f64,
-    /// How far the gradient of another tool may be turned, as the length of a chord.
-    pub(crate) lean: f64,
+    /// How much nearer another tool may be that stands elsewhere, and that leans otherwise.
+    pub(crate) moved: f64,
+    pub(crate) leaned: f64,
+    /// How far directions seen from another tool may be turned, as the length of a chord.
+    pub(crate) chord: f64,
+    /// Axis of the tool in the middle.
+    pub(crate) axis: Vector3,
+    /// Greatest height of the place above the pivot of any of the tools.
+    pub(crate) height: f64,
 }
 
 /// Moves of a path as swept solids: about 250 bytes a move.
@@ -78,7 +85,7 @@ pub struct SweptMoves {
     indices: Vec<u32>,
     /// Nothing without moves.
     tree: Option<BoxTree>,
-    leans: Paired<Lean>,
+    summaries: Paired<Summary>,
     slots: Vec<Part>,
 }
 
@@ -98,7 +105,7 @@ impl SweptMoves {
             motions,
             indices,
             tree: None,
-            leans: Paired::from_values(&[]),
+            summaries: Paired::from_values(&[]),
             slots: Vec::new(),
         };
         moves.plant();
@@ -123,7 +130,7 @@ impl SweptMoves {
         let boxes = parallel::map(parts.len(), |k| self.extent(&parts[k]));
         let (tree, order) = BoxTree::around(&boxes, LEAF);
         self.slots = order.iter().map(|&k| parts[k as usize]).collect();
-        self.leans = self.leans_of(&tree);
+        self.summaries = self.summaries_of(&tree);
         self.tree = Some(tree);
     }
 
@@ -142,32 +149,34 @@ impl SweptMoves {
     }
 
     /// From the leaves upward: the mean axis and the farthest from it.
-    fn leans_of(&self, tree: &BoxTree) -> Paired<Lean> {
-        let nothing = Lean { axis: [0.0, 0.0, 1.0], chord: 0.0 };
-        let mut leans = vec![nothing; tree.nodes_len()];
-        for i in (0..leans.len()).rev() {
+    fn summaries_of(&self, tree: &BoxTree) -> Paired<Summary> {
+        let nothing = Summary { axis: [0.0, 0.0, 1.0], chord: 0.0, first: u32::MAX };
+        let mut summaries = vec![nothing; tree.nodes_len()];
+        for i in (0..summaries.len()).rev() {
             // Node 1 is of no use.
             let (first, count) = tree.node(i).slots_or_children();
-            let held: Vec<(Vector3, f64)> = if count > 0 && i != 1 {
-                self.slots[first..first + count].iter().map(|part| self.lean(part)).collect()
-            } else if i != 1 {
-                leans[first..first + 2].iter().map(Lean::wide).collect()
-            } else {
+            let held: Vec<(Vector3, f64, u32)> = if i == 1 {
                 continue;
+            } else if count > 0 {
+                self.slots[first..first + count].iter().map(|part| self.lean(part)).collect()
+            } else {
+                summaries[first..first + 2].iter().map(|s| (s.axis(), f64::from(s.chord), s.first)).collect()
             };
-            let sum: Vector3 = held.iter().map(|(axis, _)| axis).sum();
+            let sum: Vector3 = held.iter().map(|h| h.0).sum();
             let axis = sum.try_normalize(0.0).unwrap_or_else(Vector3::z).map(|x| x as f32);
-            let wide = axis.map(f64::from);
-            let chord = held.iter().map(|(a, chord)| (a - wide).norm() + chord).fold(0.0, f64::max);
-            leans[i] = Lean { axis: axis.into(), chord: round_up(chord.min(2.0)) };
+            let mean = axis.map(f64::from);
+            let chord = held.iter().map(|h| (h.0 - mean).norm() + h.1).fold(0.0, f64::max);
+            let first = held.iter().map(|h| h.2).min().unwrap_or(u32::MAX);
+            summaries[i] = Summary { axis: axis.into(), chord: round_up(chord.min(2.0)), first };
         }
-        Paired::from_values(&leans)
+        Paired::from_values(&summaries)
     }
 
-    /// The axis in the middle of a part, and the chord to those at its ends.
-    fn lean(&self, part: &Part) -> (Vector3, f64) {
+    /// The axis in the middle of a part, the chord to those at its ends, and its move.
+    fn lean(&self, part: &Part) -> (Vector3, f64, u32) {
         let (motion, [from, to]) = (self.motion(part), part.range);
-        (motion.at(0.5 * (from + to)).axis, 2.0 * (0.25 * motion.turn * (to - from)).sin())
+        let chord = 2.0 * (0.25 * motion.turn * (to - from)).sin();
+        (motion.at(0.5 * (from + to)).axis, chord, self.index(part))
     }
 
     /// The solid that is swept.
@@ -205,26 +214,45 @@ impl SweptMoves {
         self.indices[part.chosen as usize]
     }
 
-    /// How near the tools of node `index` may be to `q`.
+    /// Index of the first move in a node.
     #[inline]
-    pub(crate) fn view(&self, index: usize, node: &Node, q: &Point3) -> NodeView {
+    pub(crate) fn first_in(&self, index: usize) -> u32 {
+        self.summaries.at(index).first
+    }
+
+    /// How near one piece of the tools of node `index` may be to `q`.
+    #[inline]
+    pub(crate) fn view(&self, index: usize, node: &Node, piece: usize, q: &Point3) -> NodeView {
         let (middle, half) = node.middle();
-        let (axis, chord) = self.leans.at(index).wide();
+        let summary = self.summaries.at(index);
+        let (axis, chord) = (summary.axis(), f64::from(summary.chord));
         let away = q - middle;
         let along = away.dot(&axis);
         let outward = away - axis * along;
         let rho = outward.norm();
-        let foot = self.solid.outline_foot(rho, along + self.solid.pivot());
+        let foot = self.solid.piece_foot(piece, rho, along + self.solid.pivot());
         let radial = if rho > 0.0 { foot.gradient[0] / rho } else { 0.0 };
         let gradient = outward * radial + axis * foot.gradient[1];
-        let size = (half[0] * half[0] + half[1] * half[1] + half[2] * half[2]).sqrt();
-        let moved = if self.solid.is_convex() {
-            gradient.x.abs() * half[0] + gradient.y.abs() * half[1] + gradient.z.abs() * half[2]
-        } else {
-            size
+        let mut moved = gradient.x.abs() * half[0] + gradient.y.abs() * half[1] + gradient.z.abs() * half[2];
+        let (mut leaned, mut height) = (0.0, along);
+        if chord > 0.0 {
+            let reach = away.norm() + Vector3::from(half).norm();
+            leaned = chord * reach;
+            moved += ROUNDING * reach;
+            height += leaned + ROUNDING * reach;
+        }
+        height += axis.x.abs() * half[0] + axis.y.abs() * half[1] + axis.z.abs() * half[2];
+        NodeView { distance: foot.distance, gradient, moved, leaned, chord, axis, height }
+    }
+
+    /// Lower bound on the distance of `q` from the tools of node `index`.
+    #[inline]
+    fn bound(&self, index: usize, node: &Node, q: &Point3) -> f64 {
+        let below = |piece| {
+            let view = self.view(index, node, piece, q);
+            view.distance - view.moved - view.leaned
         };
-        let leaned = if chord > 0.0 { (chord + ROUNDING) * (away.norm() + size) } else { 0.0 };
-        NodeView { distance: foot.distance, gradient, slack: moved + leaned, lean: chord }
+        (0..self.solid.pieces()).map(below).fold(f64::INFINITY, f64::min)
     }
 
     /// The move that comes nearest to `q`, the first of equals, if it comes nearer than `limit`, mm.
@@ -235,10 +263,7 @@ impl SweptMoves {
         let mut best: Option<SweptHit> = None;
         self.tree.as_ref()?.search(
             -limit,
-            |index, node, _| {
-                let view = self.view(index, node, q);
-                view.slack - view.distance
-            },
+            |index, node, _| -self.bound(index, node, q),
             |slot, now| {
                 let part = self.part(slot);
                 let index = self.index(part);
@@ -263,10 +288,7 @@ impl SweptMoves {
         let Some(tree) = &self.tree else { return };
         tree.search(
             -reach,
-            |index, node, _| {
-                let view = self.view(index, node, q);
-                view.slack - view.distance
-            },
+            |index, node, _| -self.bound(index, node, q),
             |slot, now| {
                 let part = self.part(slot);
                 if let Some(found) = below(&self.solid, self.motion(part), q, part.range, reach) {
@@ -278,9 +300,9 @@ impl SweptMoves {
     }
 }
 
-impl Lean {
+impl Summary {
     #[inline(always)]
-    fn wide(&self) -> (Vector3, f64) {
-        (Vector3::from(self.axis.map(f64::from)), f64::from(self.chord))
+    fn axis(&self) -> Vector3 {
+        Vector3::from(self.axis.map(f64::from))
     }
 }

@@ -8,6 +8,7 @@
 //! each stretch in place of one constant, and steps of a cubic where the distance is smooth).
 
 use super::Nearest;
+use crate::geometry::{Point3, Vector3};
 
 /// How far above the true one a least value may lie, mm. Less costs samples; more shows in what depends on
 /// it to 1e-9.
@@ -17,40 +18,51 @@ const TOLERANCE: f64 = 1e-10;
 const USUALLY: usize = 24;
 
 /// Stretches shorter than this share of a move are not divided: their samples differ by rounding.
-const SHORTEST: f64 = 1e-13;
+pub(crate) const SHORTEST: f64 = 1e-13;
 
 /// The distance at one time.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sample {
-    pub(super) t: f64,
-    pub(super) value: f64,
+pub(crate) struct Sample {
+    pub(crate) t: f64,
+    pub(crate) value: f64,
     /// By time.
-    pub(super) slope: f64,
+    pub(crate) slope: f64,
     /// Second derivative along the supporting plane.
-    pub(super) bend: f64,
+    pub(crate) bend: f64,
 }
 
-/// A distance as a function of time.
-pub(super) trait Curve {
-    /// Value, slope and bend.
-    fn sample(&self, t: f64) -> Sample;
+/// The distance at one place and time, with its gradient by place.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Look {
+    pub(crate) sample: Sample,
+    /// Of unit length, or shorter where it could point to several sides.
+    pub(crate) gradient: Vector3,
+}
+
+/// A convex solid on its way.
+pub(crate) trait Moving {
+    /// Distance, slope and bend by time, and gradient by place.
+    fn look(&self, q: &Point3, t: f64) -> Look;
 
     /// Bounds on the size of the bend, and of its change by time, within a range.
-    fn bends(&self, range: [f64; 2]) -> [f64; 2];
+    fn bends(&self, q: &Point3, range: [f64; 2]) -> [f64; 2];
+
+    /// How fast its directions turn, rad for the whole move.
+    fn turn(&self) -> f64;
 }
 
 /// A stretch between two samples.
 #[derive(Clone, Copy)]
-struct Stretch {
-    a: Sample,
-    b: Sample,
+pub(crate) struct Stretch {
+    pub(crate) a: Sample,
+    pub(crate) b: Sample,
     /// Whether the last division made it much shorter.
-    quick: bool,
+    pub(crate) quick: bool,
 }
 
 impl Stretch {
     /// Lower bound in the stretch and where it is reached.
-    fn bound(&self, [bend, jerk]: [f64; 2]) -> (f64, f64) {
+    pub(crate) fn bound(&self, [bend, jerk]: [f64; 2]) -> (f64, f64) {
         let (a, b) = (&self.a, &self.b);
         let width = b.t - a.t;
         let bend = bend.min((-a.bend).max(-b.bend).max(0.0) + jerk * width / 3.0);
@@ -65,7 +77,7 @@ impl Stretch {
     }
 
     /// Where to look next: the lowest place of a cubic, or where the bounds cross.
-    fn next(&self, crossing: f64) -> f64 {
+    pub(crate) fn next(&self, crossing: f64) -> f64 {
         let (a, b) = (&self.a, &self.b);
         let width = b.t - a.t;
         if self.quick && a.slope < 0.0 && b.slope > 0.0 {
@@ -82,10 +94,11 @@ impl Stretch {
 }
 
 /// The least value in `range` and when, if it is less than `limit`.
-pub(super) fn least(curve: &impl Curve, [from, to]: [f64; 2], limit: f64) -> Option<Nearest> {
-    let bends = curve.bends([from, to]);
+pub(super) fn least(moving: &impl Moving, q: &Point3, [from, to]: [f64; 2], limit: f64) -> Option<Nearest> {
+    let bends = moving.bends(q, [from, to]);
+    let sample = |t: f64| moving.look(q, t).sample;
     // A look from the middle leaves out most.
-    let middle = curve.sample(0.5 * (from + to));
+    let middle = sample(0.5 * (from + to));
     let half = 0.5 * (to - from);
     if middle.value - half * (middle.slope.abs() + 0.5 * half * bends[0]) >= limit {
         return None;
@@ -97,16 +110,17 @@ pub(super) fn least(curve: &impl Curve, [from, to]: [f64; 2], limit: f64) -> Opt
         }
         sample
     };
-    let [a, b, middle] = [curve.sample(from), curve.sample(to), middle].map(|s| take(s, &mut best));
+    let [a, b, middle] = [sample(from), sample(to), middle].map(|s| take(s, &mut best));
     let mut waiting = Vec::with_capacity(USUALLY);
     waiting.extend([Stretch { a, b: middle, quick: true }, Stretch { a: middle, b, quick: true }]);
     while let Some(stretch) = waiting.pop() {
         let (bound, crossing) = stretch.bound(bends);
         let width = stretch.b.t - stretch.a.t;
-        if bound > best.distance - TOLERANCE || width < SHORTEST {
+        // No number comes of places that are none.
+        if bound > best.distance - TOLERANCE || width < SHORTEST || bound.is_nan() {
             continue;
         }
-        let between = take(curve.sample(stretch.next(crossing)), &mut best);
+        let between = take(sample(stretch.next(crossing)), &mut best);
         let quick = |width_now: f64| width_now < 0.5 * width || !stretch.quick;
         let left = Stretch { b: between, quick: quick(between.t - stretch.a.t), ..stretch };
         let right = Stretch { a: between, quick: quick(stretch.b.t - between.t), ..stretch };

@@ -9,17 +9,17 @@ use crate::toolpath::{Move, MoveKind, Toolpath};
 /// Time steps of the brute force.
 const STEPS: usize = 10_000;
 
-pub(super) fn axis(rng: &mut Rng, widest: f64) -> Vector3 {
+pub(crate) fn axis(rng: &mut Rng, widest: f64) -> Vector3 {
     let (lean, around) = (rng.within(0.0, widest), rng.within(0.0, std::f64::consts::TAU));
     Vector3::new(lean.sin() * around.cos(), lean.sin() * around.sin(), lean.cos())
 }
 
-pub(super) fn within(rng: &mut Rng, size: f64) -> Point3 {
+pub(crate) fn within(rng: &mut Rng, size: f64) -> Point3 {
     Point3::from([0, 1, 2].map(|_| rng.within(-size, size)))
 }
 
 /// Moves of every sort: `kind` picks one.
-pub(super) fn some_move(rng: &mut Rng, kind: usize) -> (ClPoint, ClPoint) {
+pub(crate) fn some_move(rng: &mut Rng, kind: usize) -> (ClPoint, ClPoint) {
     let from = ClPoint { tip: within(rng, 3.0), axis: axis(rng, 1.0) };
     let near = from.tip + within(rng, 0.4).coords;
     let slightly = (from.axis + within(rng, 0.05).coords).normalize();
@@ -106,7 +106,7 @@ fn opposite_axes_are_refused() {
     assert!(SweptMoves::new(&solid, &path, |_| false).unwrap().is_empty());
 }
 
-pub(super) fn path_of(start: ClPoint, to: &[ClPoint]) -> Toolpath {
+pub(crate) fn path_of(start: ClPoint, to: &[ClPoint]) -> Toolpath {
     let moves = to.iter().map(|&to| Move { to, kind: MoveKind::Cut, feed_rate: 1000.0, pass: 0 });
     Toolpath { start, moves: moves.collect() }
 }

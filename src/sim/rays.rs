@@ -1,0 +1,233 @@
+//! How far the cut surface is from a place along its normal, for any tool axis: the engine of normal rays.
+//!
+//! Enters: a path, the tool as a solid, and places with unit normals, mm. Leaves: for each the lowest
+//! `s` in `[−inward, outward]` at which `P + s n` lies within the swept volume, the move that does it and
+//! when. That is the deviation of the cut surface at the place: below zero a gouge, above zero what was
+//! left.
+//!
+//! All moves but rapids cut; a rapid within the part is a collision, which [`Rays::of_rapids`] finds.
+//!
+//! The place runs down the normal as moves are found that reach lower. Of each box of the tree over the
+//! moves, and of each move, it is only asked whether it may reach lower still: along the normal too the
+//! distance from a convex piece of the tool lies above its supporting plane. Nothing is sampled: where no
+//! bound says so, no move is left out.
+
+mod lowest;
+#[cfg(test)]
+mod tests;
+
+use std::cell::Cell;
+
+use super::solid::{OppositeAxes, SweptMoves};
+use crate::cutter::Solid;
+use crate::geometry::{Node, Point3, Vector3};
+use crate::monitor::{Cancelled, Monitor, check};
+use crate::parallel;
+use crate::toolpath::{Move, MoveKind, Toolpath};
+use lowest::{Ray, Support};
+
+/// Moves that reach equally low within this, mm, are equal: the end of one move and the begin of the next
+/// are the same tool, but for rounding.
+const EQUAL: f64 = 1e-9;
+
+/// Rays that one worker takes at a time, and between two questions whether to go on. Each begins with the
+/// move that was found by the one before, which more of them in a row gain from; fewer leave no worker idle.
+const CHUNK: usize = 512;
+
+/// Where a ray meets the swept volume lowest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RayHit {
+    /// Place along the normal, mm; −inward where the ray begins inside of the swept volume.
+    pub s: f64,
+    /// Index of the move in the path, the first of those that reach as low within 1e-9 mm.
+    pub index: u32,
+    /// When on that move, from 0 to 1.
+    pub t: f64,
+}
+
+/// Why there are no rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum RaysError {
+    /// A move turns the axis to its opposite.
+    #[error(transparent)]
+    Opposite(#[from] OppositeAxes),
+    /// The monitor stopped it.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// The moves of a path, ready to be met by rays.
+///
+/// # Tolerance
+/// `s` is right to 1e-9 mm over the sine of the angle at which the ray meets the swept volume.
+#[derive(Debug, Clone)]
+pub struct Rays {
+    moves: SweptMoves,
+}
+
+/// What was found so far by one ray.
+#[derive(Debug, Clone, Copy)]
+struct Found {
+    /// The lowest place; the upper end of the range while there is none.
+    lowest: f64,
+    /// The first move that reaches as low, and the slot in which it stands.
+    by: Option<(RayHit, usize)>,
+}
+
+impl Found {
+    /// Up to where the move `index` counts: one before that which was found counts when it is equal, one
+    /// after it when it is lower.
+    fn limit(&self, index: u32) -> f64 {
+        match &self.by {
+            None => self.lowest,
+            Some((hit, _)) if index < hit.index => self.lowest + EQUAL,
+            Some(_) => self.lowest - EQUAL,
+        }
+    }
+
+    /// Up to where some move counts.
+    fn highest(&self) -> f64 {
+        self.limit(0)
+    }
+}
+
+impl Rays {
+    /// Of all moves of `path` but rapids.
+    ///
+    /// # Errors
+    /// [`RaysError::Opposite`] when one turns the axis to its opposite; [`RaysError::Cancelled`].
+    pub fn new(path: &Toolpath, solid: &Solid, monitor: &dyn Monitor) -> Result<Self, RaysError> {
+        Self::of(path, solid, |m| m.kind != MoveKind::Rapid, monitor)
+    }
+
+    /// Of the rapids of `path` alone: where they reach below the surface, the tool runs into the part.
+    ///
+    /// # Errors
+    /// As [`Rays::new`].
+    pub fn of_rapids(path: &Toolpath, solid: &Solid, monitor: &dyn Monitor) -> Result<Self, RaysError> {
+        Self::of(path, solid, |m| m.kind == MoveKind::Rapid, monitor)
+    }
+
+    fn of(
+        path: &Toolpath,
+        solid: &Solid,
+        chosen: impl Fn(&Move) -> bool,
+        monitor: &dyn Monitor,
+    ) -> Result<Self, RaysError> {
+        check(monitor)?;
+        let moves = SweptMoves::new(solid, path, chosen)?;
+        check(monitor)?;
+        Ok(Self { moves })
+    }
+
+    /// The moves.
+    pub fn moves(&self) -> &SweptMoves {
+        &self.moves
+    }
+
+    /// The lowest `s` from `−inward` to `outward` at which `point + s·normal` lies in the swept volume; the
+    /// normal is of unit length, both limits are mm and not negative. `None` where there is none.
+    pub fn deviation(&self, point: &Point3, normal: &Vector3, inward: f64, outward: f64) -> Option<RayHit> {
+        self.lowest(point, normal, [-inward, outward], None).map(|(hit, _)| hit)
+    }
+
+    /// As [`Rays::deviation`] for many places at once, on all threads; the same bits for any number of them.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn deviations(
+        &self,
+        points: &[Point3],
+        normals: &[Vector3],
+        inward: f64,
+        outward: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Option<RayHit>>, Cancelled> {
+        let count = points.len().min(normals.len());
+        monitor.start("rays", count as u64);
+        let chunks = parallel::try_map(count.div_ceil(CHUNK), |k| {
+            check(monitor)?;
+            let range = k * CHUNK..((k + 1) * CHUNK).min(count);
+            let mut seed = None;
+            let of_one = |i: usize| {
+                let found = self.lowest(&points[i], &normals[i], [-inward, outward], seed);
+                seed = found.map(|(_, slot)| slot).or(seed);
+                found.map(|(hit, _)| hit)
+            };
+            let hits: Vec<Option<RayHit>> = range.clone().map(of_one).collect();
+            monitor.advance(range.len() as u64);
+            Ok(hits)
+        })?;
+        Ok(chunks.into_iter().flatten().collect())
+    }
+
+    /// The lowest hit and the slot of the tree in which it was found, beginning with what stands in the
+    /// slot `seed`.
+    fn lowest(
+        &self,
+        point: &Point3,
+        normal: &Vector3,
+        [low, high]: [f64; 2],
+        seed: Option<usize>,
+    ) -> Option<(RayHit, usize)> {
+        let tree = self.moves.tree()?;
+        let ray = Ray { point: *point, normal: *normal, low, high };
+        let found = Cell::new(Found { lowest: high, by: None });
+        let visit = |slot: usize| {
+            let (part, now) = (self.moves.part(slot), found.get());
+            let index = self.moves.index(part);
+            if let Some((s, t)) = ray.lowest_of(&self.moves, part, now.limit(index)) {
+                let lowest = s.min(now.lowest);
+                found.set(Found { lowest, by: Some((RayHit { s, index, t }, slot)) });
+            }
+        };
+        if let Some(slot) = seed {
+            visit(slot);
+        }
+        tree.search(
+            (-found.get().highest()).next_down(),
+            |index, node, _| {
+                let limit = found.get().limit(self.moves.first_in(index));
+                -self.reach(&ray, index, node, limit)
+            },
+            |slot, _| {
+                if Some(slot) != seed {
+                    visit(slot);
+                }
+                -found.get().highest()
+            },
+        );
+        let Found { lowest, by } = found.get();
+        by.map(|(hit, slot)| (RayHit { s: lowest, ..hit }, slot))
+    }
+
+    /// The lowest place of the ray up to `limit` that the tools of a node may reach; infinite if none.
+    #[inline]
+    fn reach(&self, ray: &Ray, index: usize, node: &Node, limit: f64) -> f64 {
+        if limit < ray.low {
+            return f64::INFINITY;
+        }
+        let s = if limit < ray.high { limit } else { ray.first() };
+        let q = ray.at(s);
+        let solid = self.moves.solid();
+        let of_piece = |piece: usize| {
+            let view = self.moves.view(index, node, piece, &q);
+            let mut support = Support {
+                s,
+                value: view.distance - view.moved - view.leaned,
+                rise: ray.normal.dot(&view.gradient),
+                lean: view.chord,
+            };
+            // What turns about the middle of a ball does not move it.
+            let climb = ray.normal.dot(&view.axis);
+            let [down, up] = [ray.low - s, limit - s];
+            let below = view.height + (down * (climb + view.chord)).max(down * (climb - view.chord)) < 0.0
+                && view.height + up * (climb + view.chord) < 0.0;
+            if below && solid.ball().is_some() {
+                (support.value, support.lean) = (view.distance - view.moved, 0.0);
+            }
+            support.reach([ray.low, limit])
+        };
+        (0..solid.pieces()).map(of_piece).fold(f64::INFINITY, f64::min)
+    }
+}

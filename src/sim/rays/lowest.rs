@@ -1,0 +1,274 @@
+//! The lowest place of one ray that one part of a move reaches.
+//!
+//! The distance D(s, t) from the tool is a function of the place along the ray and of the time. A look at
+//! one (s, t) bounds it everywhere else, by the supporting plane of the tool as it stands then; how the
+//! tool turns meanwhile loosens the bound. Wherever a look at the limit falls inside of the tool, the limit
+//! goes down to where the ray enters it at that time (Newton's method on a convex function), and the search
+//! over time goes on from there: it ends when no stretch of time may reach below the limit.
+
+use crate::cutter::Solid;
+use crate::geometry::{Point3, Vector3};
+use crate::sim::solid::{Look, Motion, Moving, Part, SHORTEST, Stretch, SweptMoves};
+
+/// How far inside of the tool a lower place may be missed, mm. Less costs looks.
+const TOLERANCE: f64 = 1e-11;
+
+/// The entry into the tool is found to this distance from it, mm: some units of rounding.
+const TOUCHING: f64 = 1e-13;
+
+/// Steps of Newton's method, which needs three to eight; corners and grazing rays more.
+const MAX_STEPS: usize = 60;
+
+/// Ranges of the ray shorter than this, mm, are not divided.
+const SHORTEST_RANGE: f64 = 1e-10;
+
+/// Stretches that wait at once, but for odd moves.
+const USUALLY: usize = 16;
+
+/// A ray and the range that is looked at, mm.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ray {
+    pub(super) point: Point3,
+    pub(super) normal: Vector3,
+    pub(super) low: f64,
+    pub(super) high: f64,
+}
+
+/// A lower bound on the distance along a ray: `value + rise (s' − s) − lean |s' − s|`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Support {
+    pub(super) s: f64,
+    pub(super) value: f64,
+    pub(super) rise: f64,
+    pub(super) lean: f64,
+}
+
+impl Support {
+    /// The lowest place in the range at which the bound is zero or less; infinite if there is none.
+    #[inline]
+    pub(super) fn reach(&self, [low, high]: [f64; 2]) -> f64 {
+        // By how much the bound grows for each mm downward, and upward.
+        let (down, up) = (-self.rise - self.lean, self.rise - self.lean);
+        if self.value > 0.0 {
+            if self.value + down * (self.s - low) <= 0.0 {
+                return low;
+            }
+            let above = if up < 0.0 { self.s - self.value / up } else { f64::INFINITY };
+            return if above <= high { above } else { f64::INFINITY };
+        }
+        if down > 0.0 { (self.s + self.value / down).max(low) } else { low }
+    }
+}
+
+/// A look at the tool from a place of the ray.
+#[derive(Clone, Copy)]
+struct Seen {
+    s: f64,
+    look: Look,
+    rise: f64,
+}
+
+/// A stretch of time and the lower end of the range of the ray that is open in it; `top` is the upper end,
+/// unless the limit is lower by now.
+#[derive(Clone, Copy)]
+struct Open {
+    a: Seen,
+    b: Seen,
+    low: f64,
+    top: f64,
+    quick: bool,
+}
+
+impl Ray {
+    #[inline(always)]
+    pub(super) fn at(&self, s: f64) -> Point3 {
+        self.point + self.normal * s
+    }
+
+    /// Where to look first: at the surface itself.
+    #[inline(always)]
+    pub(super) fn first(&self) -> f64 {
+        0f64.clamp(self.low, self.high)
+    }
+
+    /// The lowest place up to `limit` that is reached in a part of a move, and when; `None` if there is
+    /// none.
+    pub(super) fn lowest_of(&self, moves: &SweptMoves, part: &Part, limit: f64) -> Option<(f64, f64)> {
+        if limit < self.low {
+            return None;
+        }
+        let (solid, motion) = (moves.solid(), moves.motion(part));
+        let mut best = None;
+        let mut now = limit;
+        for piece in 0..solid.pieces() {
+            if let Some(found) = self.lowest_of_piece(solid, motion, piece, part.range, now) {
+                now = found.0;
+                best = Some(found);
+            }
+        }
+        best
+    }
+
+    fn lowest_of_piece(
+        &self,
+        solid: &Solid,
+        motion: &Motion,
+        piece: usize,
+        range: [f64; 2],
+        limit: f64,
+    ) -> Option<(f64, f64)> {
+        match motion.ball(solid, &[self.at(self.low), self.at(limit)], range) {
+            Some(ball) => Search::new(self, ball, range, limit).run(),
+            None => Search::new(self, motion.piece(solid, piece), range, limit).run(),
+        }
+    }
+}
+
+/// The search over time.
+struct Search<'a, M> {
+    ray: &'a Ray,
+    moving: M,
+    range: [f64; 2],
+    /// Bounds on the bend and its change, at any place of the ray.
+    bends: [f64; 2],
+    limit: f64,
+    /// When the limit is reached; no number unless a move reaches it.
+    at: f64,
+}
+
+impl<'a, M: Moving> Search<'a, M> {
+    fn new(ray: &'a Ray, moving: M, range: [f64; 2], limit: f64) -> Self {
+        let ends = [ray.low, limit].map(|s| moving.bends(&ray.at(s), range));
+        let bends = [0, 1].map(|k| ends[0][k].max(ends[1][k]));
+        Self { ray, moving, range, bends, limit, at: f64::NAN }
+    }
+
+    #[inline(always)]
+    fn look(&self, s: f64, t: f64) -> Seen {
+        let look = self.moving.look(&self.ray.at(s), t);
+        Seen { s, look, rise: look.gradient.dot(&self.ray.normal) }
+    }
+
+    fn run(mut self) -> Option<(f64, f64)> {
+        let [from, to] = self.range;
+        let half = 0.5 * (to - from);
+        let first = if self.limit < self.ray.high { self.limit } else { self.ray.first() };
+        let middle = self.look(first, from + half);
+        let sample = &middle.look.sample;
+        let bend = self.bends[0].min((-sample.bend).max(0.0) + self.bends[1] * half / 3.0);
+        let support = Support {
+            s: first,
+            value: sample.value - half * (sample.slope.abs() + 0.5 * half * bend),
+            rise: middle.rise,
+            lean: self.moving.turn() * half,
+        };
+        let reach = support.reach([self.ray.low, self.limit]);
+        if reach > self.limit - TOLERANCE || support.value.is_nan() {
+            return None;
+        }
+        let middle = self.enter(middle);
+        let a = self.look(self.limit, from);
+        let a = self.enter(a);
+        let b = self.look(self.limit, to);
+        let b = self.enter(b);
+        let (low, top) = (self.ray.low, self.limit);
+        let mut open = Vec::with_capacity(USUALLY);
+        open.push(Open { a, b: middle, low, top, quick: true });
+        open.push(Open { a: middle, b, low, top, quick: true });
+        while let Some(stretch) = open.pop() {
+            self.divide(&stretch, &mut open);
+        }
+        (!self.at.is_nan()).then_some((self.limit, self.at))
+    }
+
+    /// Leaves out a stretch that cannot reach below the limit, or divides it in two.
+    fn divide(&mut self, open: &Open, waiting: &mut Vec<Open>) {
+        let top = self.limit.min(open.top);
+        if top <= open.low {
+            return;
+        }
+        let width = open.b.look.sample.t - open.a.look.sample.t;
+        let turn = self.moving.turn();
+        let stretch = Stretch {
+            a: open.a.from(top, turn, 1.0).look.sample,
+            b: open.b.from(top, turn, -1.0).look.sample,
+            quick: open.quick,
+        };
+        let (bound, crossing) = stretch.bound(self.bends);
+        // By how much the distance may be less further down, where the tool's side faces downward.
+        let fall = (open.a.rise.max(open.b.rise) + turn * width).max(0.0) * (top - open.low);
+        // No number comes of places that are none.
+        if bound - fall > -TOLERANCE || width < SHORTEST || bound.is_nan() {
+            return;
+        }
+        if bound > -TOLERANCE && top - open.low > SHORTEST_RANGE {
+            let middle = 0.5 * (top + open.low);
+            let mut again = |t: f64| {
+                let seen = self.look(middle, t);
+                self.enter(seen)
+            };
+            let (a, b) = (again(open.a.look.sample.t), again(open.b.look.sample.t));
+            waiting.push(Open { low: middle, top, ..*open });
+            waiting.push(Open { a, b, top: middle, ..*open });
+            return;
+        }
+        if bound > -TOLERANCE {
+            return;
+        }
+        let seen = self.look(top, stretch.next(crossing));
+        let between = self.enter(seen);
+        let sample = &between.look.sample;
+        let quick = |now: f64| now < 0.5 * width || !open.quick;
+        let left = Open { b: between, quick: quick(sample.t - stretch.a.t), ..*open };
+        let right = Open { a: between, quick: quick(stretch.b.t - sample.t), ..*open };
+        waiting.extend(if sample.slope > 0.0 { [right, left] } else { [left, right] });
+    }
+
+    /// From a look that falls inside of the tool down the ray to where that begins, which is the limit from
+    /// then on; other looks stay as they are.
+    ///
+    /// Along the ray the distance is convex. From the inside a tangent leads beyond the entry, from where
+    /// Newton's steps lead up to it without passing.
+    fn enter(&mut self, seen: Seen) -> Seen {
+        let t = seen.look.sample.t;
+        if seen.look.sample.value > 0.0 || seen.s > self.limit {
+            return seen;
+        }
+        let low = self.ray.low;
+        let beyond = if seen.rise < 0.0 { seen.s - seen.look.sample.value / seen.rise } else { low };
+        let (mut now, mut inside) = (self.look(beyond.max(low), t), seen);
+        for _ in 0..MAX_STEPS {
+            let value = now.look.sample.value;
+            if value <= TOUCHING {
+                break;
+            }
+            let newton = now.s - value / now.rise;
+            if newton > now.s && newton < inside.s {
+                now = self.look(newton, t);
+                continue;
+            }
+            // Only rounding leads here: halve what lies between inside and outside.
+            let between = self.look(0.5 * (now.s + inside.s), t);
+            if between.s <= now.s || between.s >= inside.s {
+                now = inside;
+                break;
+            }
+            *(if between.look.sample.value > TOUCHING { &mut now } else { &mut inside }) = between;
+        }
+        (self.limit, self.at) = (now.s, t);
+        now
+    }
+}
+
+impl Seen {
+    /// As it bounds what would be seen from another place of the ray, at times after (`side` = 1) or before
+    /// (−1).
+    fn from(&self, s: f64, turn: f64, side: f64) -> Self {
+        let (by, mut seen) = (s - self.s, *self);
+        let sample = &mut seen.look.sample;
+        sample.value += self.rise * by;
+        sample.slope -= side * turn * by.abs();
+        seen.s = s;
+        seen
+    }
+}
