@@ -131,6 +131,17 @@ impl Rays {
         self.lowest(point, normal, [-inward, outward], None).map(|(hit, _)| hit)
     }
 
+    /// As [`Rays::deviation`], beginning with what was found nearby; tells where it was found.
+    pub(crate) fn deviation_near(
+        &self,
+        point: &Point3,
+        normal: &Vector3,
+        [inward, outward]: [f64; 2],
+        seed: Option<usize>,
+    ) -> Option<(RayHit, usize)> {
+        self.lowest(point, normal, [-inward, outward], seed)
+    }
+
     /// As [`Rays::deviation`] for many places at once, on all threads; the same bits for any number of them.
     ///
     /// # Errors
