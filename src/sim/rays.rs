@@ -18,7 +18,7 @@ mod tests;
 
 use std::cell::Cell;
 
-use super::solid::{OppositeAxes, SweptMoves};
+use super::solid::{Moving, OppositeAxes, SweptMoves, below};
 use crate::cutter::Solid;
 use crate::geometry::{Node, Point3, Vector3};
 use crate::monitor::{Cancelled, Monitor, check};
@@ -29,6 +29,14 @@ use lowest::{Ray, Support};
 /// Moves that reach equally low within this, mm, are equal: the end of one move and the begin of the next
 /// are the same tool, but for rounding.
 const EQUAL: f64 = 1e-9;
+
+/// How far before the hit the normal is asked for, mm. Less is lost in rounding; more is off where the
+/// surface is bent.
+const BEFORE: f64 = 1e-6;
+
+/// How far around the nearest time its closer value is looked for, and how often what is left is halved.
+const AROUND: f64 = 1e-3;
+const HALVINGS: usize = 40;
 
 /// Rays that one worker takes at a time, and between two questions whether to go on. Each begins with the
 /// move that was found by the one before, which more of them in a row gain from; fewer leave no worker idle.
@@ -140,6 +148,33 @@ impl Rays {
         seed: Option<usize>,
     ) -> Option<(RayHit, usize)> {
         self.lowest(point, normal, [-inward, outward], seed)
+    }
+
+    /// The unit normal of the cut surface, out of what stands and into the swept volume, where the ray of
+    /// `point` and `normal` ended with `hit`; `None` where that is none of its hits.
+    ///
+    /// # Tolerance
+    /// It is that of the distance from the swept move a nanometre before the hit, and off by as much over
+    /// the radius at which the surface is bent there. So it also holds where a sharp edge cuts, at which the
+    /// tool by itself has many normals.
+    pub fn cut_normal(&self, point: &Point3, normal: &Vector3, hit: &RayHit) -> Option<Vector3> {
+        let motion = self.moves.motion_of(hit.index)?;
+        let q = point + normal * (hit.s - BEFORE);
+        let solid = self.moves.solid();
+        let t = below(solid, motion, &q, [0.0, 1.0], f64::INFINITY)?.t;
+        let distance = |piece: &usize| motion.piece(solid, *piece).look(&q, t).sample.value;
+        let piece = (0..solid.pieces()).min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+        let look = |t: f64| motion.piece(solid, piece).look(&q, t);
+        // The least distance is flat in time, its slope is not: that tells the time much closer.
+        let [mut early, mut late] = [t - AROUND, t + AROUND].map(|t| t.clamp(0.0, 1.0));
+        if look(early).sample.slope > 0.0 || look(late).sample.slope < 0.0 {
+            return (-look(t).gradient).try_normalize(0.5);
+        }
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (early + late);
+            *(if look(middle).sample.slope < 0.0 { &mut early } else { &mut late }) = middle;
+        }
+        (-look(0.5 * (early + late)).gradient).try_normalize(0.5)
     }
 
     /// As [`Rays::deviation`] for many places at once, on all threads; the same bits for any number of them.

@@ -209,6 +209,11 @@ impl SweptMoves {
         &self.motions[part.chosen as usize]
     }
 
+    /// The move with that index in the path, if it was chosen.
+    pub(crate) fn motion_of(&self, index: u32) -> Option<&Motion> {
+        self.indices.binary_search(&index).ok().map(|k| &self.motions[k])
+    }
+
     /// The index in the path of the move of a part.
     pub(crate) fn index(&self, part: &Part) -> u32 {
         self.indices[part.chosen as usize]

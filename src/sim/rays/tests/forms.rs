@@ -33,12 +33,17 @@ fn a_ball_that_stands_still_is_a_sphere() {
         let n = (at.axis + within(&mut rng, 0.4).coords).normalize();
         let p = centre + within(&mut rng, 2.0).coords - n * 6.0;
         let got = rays.deviation(&p, &n, 0.0, 20.0);
-        let Some(expected) = into_ball(&p, &n, &centre, 3.0) else { continue };
+        let Some(expected) = into_ball(&p, &n, &centre, 3.0) else {
+            continue;
+        };
         if (p + n * expected - centre).dot(&at.axis) > 0.0 {
             continue;
         }
         hits += 1;
-        assert!((got.unwrap().s - expected).abs() < CLOSE, "{got:?} {expected}");
+        let got = got.unwrap();
+        assert!((got.s - expected).abs() < CLOSE, "{got:?} {expected}");
+        let inward = (centre - (p + n * expected)).normalize();
+        assert!((rays.cut_normal(&p, &n, &got).unwrap() - inward).norm() < 1e-6);
     }
     assert!(hits > 150, "{hits}");
 }
@@ -110,8 +115,13 @@ fn a_tilted_flat_end_leaves_an_ellipse() {
             let y = 0.31 * f64::from(k);
             let expected = 0.25 - sin * (9.0 - y * y).sqrt();
             for n in [Vector3::z(), Vector3::new(0.02, 0.0, 1.0).normalize()] {
-                let got = lowest(&flat, [0.7, y, 0.0], n) * n.z;
-                assert!((got - expected).abs() < CLOSE, "{degrees} {y}: {got} {expected}");
+                let p = Point3::new(0.7, y, 0.0);
+                let hit = flat.deviation(&p, &n, 20.0, 20.0).unwrap();
+                assert!((hit.s * n.z - expected).abs() < CLOSE, "{degrees} {y}: {hit:?} {expected}");
+                // An edge cuts: the normal is that of the ellipse.
+                let up = Vector3::new(0.0, -sin * y / (9.0 - y * y).sqrt(), 1.0).normalize();
+                let got = flat.cut_normal(&p, &n, &hit).unwrap();
+                assert!((got - up).norm() < 3e-5, "{degrees} {y}: {got:?} {up:?}");
             }
             // The corner's middle: half axes 2 and 2 sin λ, cos λ above the tip; its normal at angle φ
             // leads to the surface.
