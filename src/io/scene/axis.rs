@@ -69,7 +69,12 @@ fn unit<T>(table: &Section<'_>, [x, y, z]: [f64; 3], at: &Located<T>) -> Result<
 }
 
 fn curve(table: &Section<'_>, key: &str) -> Result<Option<Vec<Point3>>, SceneError> {
-    let Some(rows) = table.rows::<3>(key, "one point, or the points of a curve, as `[x, y, z]`")? else {
+    let Some(rows) = table.rows::<3>(
+        key,
+        "points of three numbers",
+        "write one point, or the points of a curve, as `[[x, y, z], ...]`",
+    )?
+    else {
         return Ok(None);
     };
     if rows.value.is_empty() {
@@ -80,7 +85,12 @@ fn curve(table: &Section<'_>, key: &str) -> Result<Option<Vec<Point3>>, SceneErr
 }
 
 fn guides(table: &Section<'_>) -> Result<Option<Vec<(Point3, Vector3)>>, SceneError> {
-    let Some(rows) = table.rows::<6>("between", "places with their axes as `[x, y, z, i, j, k]`")? else {
+    let Some(rows) = table.rows::<6>(
+        "between",
+        "rows of six numbers",
+        "write places with their axes as `[[x, y, z, i, j, k], ...]`",
+    )?
+    else {
         return Ok(None);
     };
     if rows.value.is_empty() {

@@ -334,18 +334,24 @@ impl<'a> Section<'a> {
         key: &str,
         entry: &Spanned<DeValue<'a>>,
     ) -> Result<Located<Vec<Point2>>, SceneError> {
-        let rows = self.row_list(key, entry, "points as `[x, y]`")?;
+        let rows = self.row_list(
+            key,
+            entry,
+            "points of two numbers",
+            "write points as `[x, y]`, between brackets and commas",
+        )?;
         Ok(Located { value: rows.value.into_iter().map(Point2::from).collect(), span: rows.span })
     }
 
     /// Rows of as many numbers, `[[…], …]`, none of them beyond what coordinates may be; `None` when the key is not there.
-    /// `what` completes the sentence "write … between brackets and commas".
+    /// `what` completes the sentence "must be …".
     pub fn rows<const N: usize>(
         &self,
         key: &str,
         what: &str,
+        cure: &str,
     ) -> Result<Option<Located<Vec<[f64; N]>>>, SceneError> {
-        self.entry(key).map(|entry| self.row_list(key, entry, what)).transpose()
+        self.entry(key).map(|entry| self.row_list(key, entry, what, cure)).transpose()
     }
 
     fn row_list<const N: usize>(
@@ -353,12 +359,12 @@ impl<'a> Section<'a> {
         key: &str,
         entry: &Spanned<DeValue<'a>>,
         what: &str,
+        cure: &str,
     ) -> Result<Located<Vec<[f64; N]>>, SceneError> {
-        let cure = format!("write {what}, between brackets and commas");
         let DeValue::Array(list) = entry.get_ref() else {
-            return Err(self.wrong_type(key, "a list of lists of numbers", entry, &cure));
+            return Err(self.wrong_type(key, &format!("a list of {what}"), entry, cure));
         };
-        let value = list.iter().map(|item| self.row(key, item, &cure)).collect::<Result<_, _>>()?;
+        let value = list.iter().map(|item| self.row(key, item, what, cure)).collect::<Result<_, _>>()?;
         Ok(Located { value, span: entry.span() })
     }
 
@@ -366,27 +372,22 @@ impl<'a> Section<'a> {
         &self,
         key: &str,
         item: &Spanned<DeValue<'a>>,
+        what: &str,
         cure: &str,
     ) -> Result<[f64; N], SceneError> {
-        let DeValue::Array(numbers) = item.get_ref() else {
-            return Err(self.wrong_type(key, &format!("lists of {N} numbers"), item, cure));
-        };
+        let wrong = || self.wrong_type(key, what, item, cure);
+        let DeValue::Array(numbers) = item.get_ref() else { return Err(wrong()) };
         let row: Vec<f64> = numbers
             .iter()
             .map(|number| Ok(self.in_range(key, number, &COORDINATE, "")?.value))
             .collect::<Result<_, SceneError>>()?;
-        let wrong = |row: Vec<f64>| {
-            let message =
-                format!("`{key}` in {} needs {N} numbers here, and here are {}", self.title, row.len());
-            self.error(&item.span(), message, cure)
-        };
-        <[f64; N]>::try_from(row).map_err(wrong)
+        <[f64; N]>::try_from(row).map_err(|_| wrong())
     }
 
     /// A vector `[x, y, z]`; `None` when the key is not there.
     pub fn vector(&self, key: &str) -> Result<Option<Located<[f64; 3]>>, SceneError> {
         let Some(entry) = self.entry(key) else { return Ok(None) };
-        let value = self.row(key, entry, "write three numbers: `[0, 0.5, 1]`")?;
+        let value = self.row(key, entry, "a list of three numbers", "write `[0, 0.5, 1]`")?;
         Ok(Some(Located { value, span: entry.span() }))
     }
 

@@ -127,7 +127,8 @@ fn a_dome_has_the_scallops_of_a_circle_also_where_it_is_steep() {
         };
         (0..=240).map(at).collect::<Vec<_>>()
     };
-    let rings: Vec<Vec<Point3>> = (0..27).map(ring).collect();
+    // One ring more, below the equator, would let the shank cut the dome.
+    let rings: Vec<Vec<Point3>> = (0..26).map(ring).collect();
     let (path, ball) = (path(&rings), Cutter::ball(2.0 * RADIUS).unwrap());
     let solid = Solid::of_cutter(&ball, None);
     let rays = Rays::new(&path, &solid, &Silent).unwrap();
@@ -140,7 +141,7 @@ fn a_dome_has_the_scallops_of_a_circle_also_where_it_is_steep() {
     // Chords of 240 a turn lie up to 1.1 µm inside the greatest ring.
     assert!((p50 - exact).abs() < 1.5e-3 && (max - exact).abs() < 2e-3, "{p50} {max} {exact}");
     assert!(measured.gouge.max_depth_mm < 1.3e-3, "{:?}", measured.gouge);
-    let length: f64 = (1..27).map(|k| std::f64::consts::TAU * rho * (step * k as f64).sin()).sum();
+    let length: f64 = (1..26).map(|k| std::f64::consts::TAU * rho * (step * k as f64).sin()).sum();
     assert!(
         (measured.scallop.ridge_length_mm / length - 1.0).abs() < 0.02,
         "{length} {:?}",
