@@ -18,6 +18,8 @@ mod defects;
 mod directions;
 #[path = "all/feed_directions.rs"]
 mod feed_directions;
+#[path = "all/five_axes.rs"]
+mod five_axes;
 #[cfg(target_os = "linux")]
 #[path = "all/memory.rs"]
 mod memory;

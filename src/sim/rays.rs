@@ -139,6 +139,17 @@ impl Rays {
         self.lowest(point, normal, [-inward, outward], None).map(|(hit, _)| hit)
     }
 
+    /// As [`Rays::deviation`], beginning with what was found nearby; tells where it was found.
+    pub(crate) fn deviation_near(
+        &self,
+        point: &Point3,
+        normal: &Vector3,
+        [inward, outward]: [f64; 2],
+        seed: Option<usize>,
+    ) -> Option<(RayHit, usize)> {
+        self.lowest(point, normal, [-inward, outward], seed)
+    }
+
     /// The unit normal of the cut surface, out of what stands and into the swept volume, where the ray of
     /// `point` and `normal` ended with `hit`; `None` where that is none of its hits.
     ///

@@ -4,9 +4,9 @@
 use std::path::{Path, PathBuf};
 
 use millstream::geometry::TriangleMesh;
-use serde_json::{Value, json};
+use serde_json::Value;
 
-use crate::support::{height_mesh, number, run_scene, write_stl};
+use crate::support::{height_mesh, number, patch, run_scene, write_stl};
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/compare")
@@ -23,28 +23,6 @@ fn gaussians(bumps: &[[f64; 4]]) -> impl Fn(f64, f64) -> f64 {
         };
         bumps.iter().map(bump).sum()
     }
-}
-
-/// A bicubic patch whose control points stand where a surface has them at the averages of its knots.
-fn patch([nu, nv]: [usize; 2], surface: impl Fn(f64, f64) -> [f64; 3]) -> Value {
-    let knots = |n: usize| -> Vec<f64> {
-        let inner = (1..n - 3).map(|k| k as f64 / (n - 3) as f64);
-        [0.0; 4].into_iter().chain(inner).chain([1.0; 4]).collect()
-    };
-    let averages = |n: usize| -> Vec<f64> {
-        knots(n)[1..].windows(3).take(n).map(|w| w.iter().sum::<f64>() / 3.0).collect()
-    };
-    let rounded = |p: [f64; 3]| p.map(|c| (c * 1e3).round() / 1e3);
-    let points: Vec<Vec<[f64; 3]>> = averages(nu)
-        .iter()
-        .map(|&u| averages(nv).iter().map(|&v| rounded(surface(u, v))).collect())
-        .collect();
-    json!({
-        "unit": "mm",
-        "patches": [{
-            "degree_u": 3, "degree_v": 3, "knots_u": knots(nu), "knots_v": knots(nv), "control_points": points,
-        }],
-    })
 }
 
 fn bumps() -> Value {

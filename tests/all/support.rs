@@ -10,7 +10,7 @@ use millstream::monitor::Silent;
 use millstream::part::{Part, Patch};
 use millstream::sim::{Grid, ZMap, cut_reference};
 use millstream::toolpath::{Joining, PlanSettings, Step, Strategy, Toolpath, plan};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 pub const LIMITS: Limits = Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chord: 0.001 };
 
@@ -124,4 +124,26 @@ pub fn run_scene(scene: &Path) -> (i32, Value) {
 
 pub fn number(value: &Value, pointer: &str) -> f64 {
     value.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("{pointer} in {value}"))
+}
+
+/// A bicubic patch whose control points stand where a surface has them at the averages of its knots.
+pub fn patch([nu, nv]: [usize; 2], surface: impl Fn(f64, f64) -> [f64; 3]) -> Value {
+    let knots = |n: usize| -> Vec<f64> {
+        let inner = (1..n - 3).map(|k| k as f64 / (n - 3) as f64);
+        [0.0; 4].into_iter().chain(inner).chain([1.0; 4]).collect()
+    };
+    let averages = |n: usize| -> Vec<f64> {
+        knots(n)[1..].windows(3).take(n).map(|w| w.iter().sum::<f64>() / 3.0).collect()
+    };
+    let rounded = |p: [f64; 3]| p.map(|c| (c * 1e3).round() / 1e3);
+    let points: Vec<Vec<[f64; 3]>> = averages(nu)
+        .iter()
+        .map(|&u| averages(nv).iter().map(|&v| rounded(surface(u, v))).collect())
+        .collect();
+    json!({
+        "unit": "mm",
+        "patches": [{
+            "degree_u": 3, "degree_v": 3, "knots_u": knots(nu), "knots_v": knots(nv), "control_points": points,
+        }],
+    })
 }

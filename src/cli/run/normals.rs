@@ -23,6 +23,9 @@ use crate::toolpath::{Tilting, plan, plan_tilted};
 /// Bytes a place of the net: place, hit, triangles with their crossings, and the map; 480 were counted.
 const BYTES_PER_PLACE: u64 = 600;
 
+/// Distance of the places over that of cells where the program chooses: three places from pass to pass.
+const PLACES_OVER_CELLS: f64 = 2.0;
+
 /// Material is looked for this many uncut tolerances above the design, and no less far than the cutter's radius; cuts as
 /// far below it as that radius, so that the far side of a thin part counts for nothing.
 const REACH_OVER_UNCUT: f64 = 4.0;
@@ -47,7 +50,9 @@ impl Job<'_> {
         if scene.machine.slow_corners {
             planned.path = slow_corners(&planned.path, &scene.machine);
         }
-        let spacing = scene.simulation.cell;
+        // Deviations are exact at the places, and ridges are found between them, so that fewer do than cells.
+        let wider = if scene.simulation.cell_is_auto { PLACES_OVER_CELLS } else { 1.0 };
+        let spacing = wider * scene.simulation.cell;
         self.check_places(spacing, planned.path.len())?;
         let begun = Instant::now();
         let solid = Solid::of_cutter(&scene.cutter, scene.holder.as_ref());
@@ -85,7 +90,7 @@ impl Job<'_> {
             region.line = lines.get(region.move_index as usize).copied().unwrap_or_default();
         }
         let surface_mesh = self.write_normal_mesh(request, &map, outputs)?;
-        let page = self.write_normal_maps(request, &map, &measured, outputs)?;
+        let page = self.write_normal_maps(request, &map, &measured, spacing, outputs)?;
         let result = self.result(request, &planned, None, measured, None, simulation, surface_mesh);
         Ok((result, page))
     }
@@ -141,13 +146,21 @@ impl Job<'_> {
         request: &ToolpathRequest,
         map: &NormalMap,
         measured: &Measurement,
+        spacing: f64,
         outputs: &Outputs,
     ) -> Result<ToolpathPage, CliError> {
         let mut page = Vec::new();
         if map.grids.is_empty() {
-            let (grid, values) = plan_view(map, self.scene.simulation.cell);
-            page =
-                self.write_normal_picture(request, "deviation.png", "plan view", &grid, &values, outputs)?;
+            let (grid, values) = plan_view(map, spacing);
+            page = self.write_normal_picture(
+                request,
+                "deviation.png",
+                "plan view",
+                spacing,
+                &grid,
+                &values,
+                outputs,
+            )?;
         }
         for (k, patch) in map.grids.iter().enumerate() {
             let number = if map.grids.len() > 1 { format!("-{}", k + 1) } else { String::new() };
@@ -160,6 +173,7 @@ impl Job<'_> {
                 request,
                 &name,
                 "over u (right) and v (up)",
+                spacing,
                 &grid,
                 &values,
                 outputs,
@@ -183,14 +197,15 @@ impl Job<'_> {
         request: &ToolpathRequest,
         name: &str,
         view: &str,
+        spacing: f64,
         grid: &Grid,
         values: &[f32],
         outputs: &Outputs,
     ) -> Result<Vec<u8>, CliError> {
         let scene = self.scene;
         let title = format!("Deviation, {}", request.name);
-        let subtitle = format!("{} · {view} · every {} mm · engine rays", scene.title, scene.simulation.cell);
-        let cell = format!("{} mm", scene.simulation.cell);
+        let cell = format!("{spacing} mm");
+        let subtitle = format!("{} · {view} · every {cell} · engine rays", scene.title);
         let notes = [("Title", scene.title.as_str()), ("Scene", &scene.source.name), ("Cell", &cell)];
         let name = format!("{}/{name}", request.folder);
         let words = MapWords { title: &title, subtitle: &subtitle, marks: &[] };

@@ -5,10 +5,10 @@
 //!
 //! Deviations are exact at the places. A ridge stands between two neighbouring places that different tracks
 //! cut; it is found on the line between them where both cut equally high, from the heights and slopes at the
-//! places (both cuts are concave there toward the design, so that their tangents meet below the ridge and the
-//! search converges). Its length is that of the way from crossing to crossing through the triangles of the net.
-//! Where more may stand or lie between the places than was found, triangles are divided until the asked bound
-//! holds or [`MOST_DIVIDED`] of them are.
+//! places. Its length is that of the way from crossing to crossing through the triangles of the net.
+//! Where more may stand or lie between the places than was found, by the slope of the cut there, triangles are
+//! divided until the asked bound holds or [`MOST_DIVIDED`] of them are. A track that no place saw is seen all the
+//! same: the contacts of every move are places too.
 //!
 //! A place above the uncut tolerance is uncut here, also where it is half of a tall scallop.
 
@@ -46,13 +46,15 @@ pub struct NormalHit {
     pub by: u32,
     /// Unit normal of the cut surface, away from the material.
     pub normal: Vector3,
+    /// Where the engine may begin to look beside this place.
+    pub seed: usize,
 }
 
 /// An engine that tells where lines along normals meet the cut surface.
 pub trait AlongNormal: Sync {
     /// The lowest place that was cut on the line through `point` along the unit `normal`; `None` where nothing was
-    /// within [`AlongNormal::reach`].
-    fn hit(&self, point: &Point3, normal: &Vector3) -> Option<NormalHit>;
+    /// within [`AlongNormal::reach`]. What was cut nearby, if anything is known, only makes it faster.
+    fn hit(&self, point: &Point3, normal: &Vector3, near: Option<&NormalHit>) -> Option<NormalHit>;
 
     /// How far outward is looked, mm.
     fn reach(&self) -> f64;
@@ -174,8 +176,8 @@ struct Inspection<'a> {
     finder: Finder<'a>,
     limits: &'a Limits,
     spacing: f64,
-    /// A dip between places whose moves no place saw is at most the square of their distance over this, mm.
-    dip: f64,
+    /// Radius with which the cutter bends, about, mm.
+    radius: f64,
 }
 
 /// Measures what `engine` tells of the cut by `path` at places `spacing` mm apart, looking closer until the error bounds
@@ -195,27 +197,40 @@ pub fn measure_along_normals(
 ) -> Result<(Measurement, NormalMap), Cancelled> {
     let net = Net::over(part, spacing);
     let tracks = Tracks::new(path, cutter);
-    let finder = Finder { part, engine, tracks: &tracks };
-    // An arc of radius r that passes between two places e apart dips e²/8r below the line between them.
-    let dip = 8.0 * if cutter.corner_radius() > 0.0 { cutter.corner_radius() } else { cutter.radius() };
-    let inspection = Inspection { part, engine, finder, limits, spacing, dip };
-    monitor.start("measuring along normals", net.places.len() as u64);
-    let samples = crate::parallel::try_map(net.places.len(), |k| {
-        if k % 256 == 0 {
-            monitor::check(monitor)?;
-            monitor.advance(256.min((net.places.len() - k) as u64));
-        }
-        Ok(inspection.sample(net.places[k]))
+    let corner = cutter.corner_radius();
+    let radius = if corner > 0.0 { corner } else { cutter.radius() };
+    let finder = Finder { part, engine, tracks: &tracks, radius };
+    let inspection = Inspection { part, engine, finder, limits, spacing, radius };
+    let samples = in_runs("measuring along normals", net.places.len(), monitor, |range| {
+        let mut near = None;
+        let of_one = |place: &Place| {
+            let sample = inspection.sample(*place, near.as_ref());
+            near = sample.hit.or(near);
+            sample
+        };
+        net.places[range].iter().map(of_one).collect()
     })?;
-    monitor.start("measuring ridges", net.triangles.len() as u64);
-    let of_triangle = crate::parallel::try_map(net.triangles.len(), |k| {
-        if k % 256 == 0 {
-            monitor::check(monitor)?;
-            monitor.advance(256.min((net.triangles.len() - k) as u64));
-        }
-        Ok(inspection.crossings(&net.triangles[k].map(|v| samples[v as usize])))
+    let sides = sides(&net);
+    let on_sides = in_runs("measuring ridges", sides.len(), monitor, |range| {
+        sides[range].iter().map(|side| inspection.on_side(&side.map(|k| samples[k as usize]))).collect()
+    })?;
+    let of_triangle = in_runs("joining ridges", net.triangles.len(), monitor, |range| {
+        let of_one = |t: &[u32; 3]| {
+            let side = |k: usize| [t[k].min(t[(k + 1) % 3]), t[k].max(t[(k + 1) % 3])];
+            let found =
+                (0..3).filter_map(|k| sides.binary_search(&side(k)).ok()).flat_map(|k| on_sides[k].clone());
+            with_lengths(found.collect())
+        };
+        net.triangles[range].iter().map(of_one).collect()
+    })?;
+    let contacts = in_runs("measuring contacts", path.len(), monitor, |range| {
+        range
+            .flat_map(|k| contacts_of(part, cutter, path, k, spacing))
+            .map(|p| inspection.sample(p, None))
+            .collect()
     })?;
     let mut greatest = Greatest::default();
+    contacts.iter().for_each(|sample| greatest.look_at(sample, engine.reach()));
     samples.iter().for_each(|sample| greatest.look_at(sample, engine.reach()));
     of_triangle.iter().flatten().for_each(|crossing| greatest.look_at_ridge(crossing));
     let ridge_samples: Vec<[f32; 2]> =
@@ -267,35 +282,22 @@ pub fn measure_along_normals(
 }
 
 impl Inspection<'_> {
-    fn sample(&self, place: Place) -> Sample {
-        Sample { place, hit: self.engine.hit(&place.point, &place.normal) }
+    fn sample(&self, place: Place, near: Option<&NormalHit>) -> Sample {
+        Sample { place, hit: self.engine.hit(&place.point, &place.normal, near) }
     }
 
-    /// The ridges that cross the sides of a triangle, with half their ways through it.
-    fn crossings(&self, corners: &[Sample; 3]) -> Vec<Crossing> {
+    /// The ridges that cross the side between two places.
+    fn on_side(&self, [a, b]: &[Sample; 2]) -> Vec<Crossing> {
         let mut found = Vec::new();
-        for k in 0..3 {
-            let (a, b) = (corners[k], corners[(k + 1) % 3]);
-            if let (Some(x), Some(y)) = (a.hit, b.hit) {
-                self.finder.between((&a.place, x), (&b.place, y), &mut found);
-            }
+        if let (Some(x), Some(y)) = (a.hit, b.hit) {
+            self.finder.between((&a.place, x), (&b.place, y), &mut found);
         }
-        // Half the way to the other crossing of the same two passes; where ridges meet, to the middle of all.
-        let middle = |chosen: &dyn Fn(&Crossing) -> bool| {
-            let (sum, count) = found
-                .iter()
-                .filter(|c| chosen(c))
-                .fold((Vector3::zeros(), 0), |(sum, n), c| (sum + c.at.coords, n + 1));
-            (sum / f64::from(count.max(1)), count)
-        };
-        let length = |c: &Crossing| {
-            let (own, count) = middle(&|other| other.passes == c.passes);
-            let to = if count == 2 { own } else { middle(&|_| true).0 };
-            (c.at.coords - to).norm()
-        };
-        let lengths: Vec<f64> = found.iter().map(length).collect();
-        found.iter_mut().zip(lengths).for_each(|(c, length)| c.length = length);
         found
+    }
+
+    /// The ridges that cross the sides of a triangle.
+    fn crossings(&self, corners: &[Sample; 3]) -> Vec<Crossing> {
+        with_lengths((0..3).flat_map(|k| self.on_side(&[corners[k], corners[(k + 1) % 3]])).collect())
     }
 
     /// How much any figure may exceed the greatest ones in a triangle.
@@ -309,7 +311,7 @@ impl Inspection<'_> {
             let Some(hit) = sample.hit else { continue };
             // A cut of radius r that meets the design at the slope s goes no deeper than about s²r below that.
             let slope = sample.slope();
-            let deeper = (slope * far).min(slope * slope * self.dip / 8.0) + longest * longest / self.dip;
+            let deeper = (slope * far).min(slope * slope * self.radius);
             more = more.max(-hit.deviation + deeper - greatest.depth);
             if hit.deviation > self.limits.uncut {
                 more = more.max(hit.deviation + slope * far - greatest.height);
@@ -362,7 +364,9 @@ impl Inspection<'_> {
 
     /// The four triangles of one, and what they hold.
     fn divided(&self, [a, b, c]: &[Sample; 3]) -> Vec<([Sample; 3], Closer)> {
-        let middle = |p: &Sample, q: &Sample| self.sample(p.place.towards(&q.place, 0.5, self.part));
+        let middle = |p: &Sample, q: &Sample| {
+            self.sample(p.place.towards(&q.place, 0.5, self.part), p.hit.or(q.hit).as_ref())
+        };
         let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
         let parts = [[*a, ab, ca], [ab, *b, bc], [ca, bc, *c], [ab, bc, ca]];
         parts
@@ -419,6 +423,77 @@ impl Inspection<'_> {
         figures.regions.truncate(LISTED_REGIONS);
         figures
     }
+}
+
+/// Work on runs of neighbours, so that each can begin where the one before was found; in the order of the whole.
+fn in_runs<T: Send>(
+    what: &str,
+    count: usize,
+    monitor: &dyn Monitor,
+    of_run: impl Fn(std::ops::Range<usize>) -> Vec<T> + Sync,
+) -> Result<Vec<T>, Cancelled> {
+    const RUN: usize = 256;
+    monitor.start(what, count as u64);
+    let runs = crate::parallel::try_map(count.div_ceil(RUN), |k| {
+        monitor::check(monitor)?;
+        let range = k * RUN..((k + 1) * RUN).min(count);
+        let done = range.len() as u64;
+        let found = of_run(range);
+        monitor.advance(done);
+        Ok(found)
+    })?;
+    Ok(runs.into_iter().flatten().collect())
+}
+
+/// The sides of all triangles, each once and from the lesser index, in order.
+fn sides(net: &Net) -> Vec<[u32; 2]> {
+    let of = |t: &[u32; 3]| {
+        (0..3).map(|k| [t[k], t[(k + 1) % 3]]).map(|[a, b]| [a.min(b), a.max(b)]).collect::<Vec<_>>()
+    };
+    let mut sides: Vec<[u32; 2]> = net.triangles.iter().flat_map(of).collect();
+    sides.sort_unstable();
+    sides.dedup();
+    sides
+}
+
+/// Crossings of one triangle with half the way to the other crossing of the same two passes; where ridges meet, to the
+/// middle of all.
+fn with_lengths(mut found: Vec<Crossing>) -> Vec<Crossing> {
+    let middle = |chosen: &dyn Fn(&Crossing) -> bool| {
+        let add = |(sum, n): (Vector3, u32), c: &Crossing| (sum + c.at.coords, n + 1);
+        let (sum, count) = found.iter().filter(|c| chosen(c)).fold((Vector3::zeros(), 0), add);
+        (sum / f64::from(count.max(1)), count)
+    };
+    let length = |c: &Crossing| {
+        let (own, count) = middle(&|other| other.passes == c.passes);
+        (c.at.coords - if count == 2 { own } else { middle(&|_| true).0 }).norm()
+    };
+    let lengths: Vec<f64> = found.iter().map(length).collect();
+    found.iter_mut().zip(lengths).for_each(|(c, length)| c.length = length);
+    found
+}
+
+/// Rounds in which the place where a tilted cutter touches is found: each takes the normal of the one before.
+const CONTACT_ROUNDS: usize = 4;
+
+/// Where a cutting move touches the part, at its middle and its end; nothing where it is farther off than `spacing`.
+fn contacts_of(part: &Part, cutter: &Cutter, path: &Toolpath, k: usize, spacing: f64) -> Vec<Place> {
+    let step = &path.moves[k];
+    if !step.kind.is_on_surface() {
+        return Vec::new();
+    }
+    let from = path.location_before(k);
+    let contact = |t: f64| {
+        let at = from.towards(&step.to, t);
+        let mut foot = part.closest_point(&(at.tip + at.axis * cutter.profile().centre_z)).0;
+        let mut off = f64::INFINITY;
+        for _ in 0..CONTACT_ROUNDS {
+            let contact = at.tip - cutter.contact_to_tip_along(&foot.normal, &at.axis);
+            (foot, off) = part.closest_point(&contact);
+        }
+        (off.abs() <= spacing).then(|| Place::at_foot(&foot))
+    };
+    [0.5, 1.0].into_iter().filter_map(contact).collect()
 }
 
 /// Area that each place stands for, mm²: a third of the triangles around.

@@ -4,7 +4,7 @@
 //! exact and in even steps of the parameters, on meshes on the facets; and a way to ask for places in between. mm.
 
 use crate::geometry::{Point3, Vector3};
-use crate::part::{Part, PatchPoint};
+use crate::part::{Part, PatchPoint, SurfacePoint};
 
 /// Where a place is on the part.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,6 +55,12 @@ impl Place {
             Site::Facet { triangle, point } => (point, part.mesh().normal(triangle as usize)),
         };
         Self { site, point, normal }
+    }
+
+    /// The foot of a place on the part.
+    pub fn at_foot(foot: &SurfacePoint) -> Self {
+        let facet = Site::Facet { triangle: foot.triangle, point: foot.point };
+        Self { site: foot.at.map_or(facet, Site::Patch), point: foot.point, normal: foot.normal }
     }
 
     /// The place at the share `t` of the way to another of the same triangle.

@@ -6,14 +6,16 @@ use super::{AlongNormal, NormalHit};
 use crate::geometry::{Point3, Vector3};
 use crate::part::Part;
 
-/// A crossing is found when the tangents of both cuts meet within this of it, mm.
-const MEETING: f64 = 1e-8;
+/// A crossing is found when both tracks were seen within this share of the side from each other: what the tangents then
+/// miss is of the order of its square.
+const CLOSE: f64 = 1e-3;
 
-/// Steps of the search for one crossing; tangents halve the way at least, and mostly square the error.
-const MOST_STEPS: usize = 48;
+/// Looks are taken this share of the side before and beyond where the crossing should be, so that both tracks are seen.
+const ASIDE: f64 = 2e-4;
 
-/// A way shorter than this share of the side holds one crossing.
-const SHORTEST: f64 = 1e-7;
+/// Looks of the search for one crossing; of these so many by tangents, the others halve the way.
+const MOST_LOOKS: usize = 32;
+const BY_TANGENTS: usize = 8;
 
 /// Tracks between tracks: at most this deep.
 const MOST_DEPTH: usize = 8;
@@ -37,6 +39,8 @@ pub(super) struct Finder<'a> {
     pub part: &'a Part,
     pub engine: &'a dyn AlongNormal,
     pub tracks: &'a Tracks<'a>,
+    /// Radius with which the cutter bends across the feed, about, mm.
+    pub radius: f64,
 }
 
 /// A cut on the way: share of the way, place, and hit.
@@ -70,27 +74,37 @@ impl Finder<'_> {
         if !self.tracks.apart(a.hit.by, b.hit.by) {
             return;
         }
-        let side = (to.point - from.point).norm();
-        for _ in 0..MOST_STEPS {
-            // How the heights go on from both ends, as far as their slopes tell.
-            let way = (b.place.point - a.place.point) / (b.t - a.t);
-            let [fa, fb] =
-                [a, b].map(|end| -end.hit.normal.dot(&way) / end.hit.normal.dot(&end.place.normal).max(1e-9));
-            let rest = b.t - a.t;
-            let meeting = (b.hit.deviation - fb * rest - a.hit.deviation) / (fa - fb);
-            let lowest = b.hit.deviation.max(a.hit.deviation);
-            let height = a.hit.deviation + fa * meeting;
-            if rest * side < SHORTEST * side.max(1e-3) || (height - lowest).abs() < MEETING && rest < 1e-3 {
+        // Cuts bend away from the design as the cutter's arc does; what is seen corrects that.
+        let mut bend = (to.point - from.point).norm_squared() / self.radius;
+        let mut aside = -ASIDE;
+        for look in 0..MOST_LOOKS {
+            if b.t - a.t < CLOSE {
                 break;
             }
-            let inside = meeting > 0.05 * rest && meeting < 0.95 * rest;
-            let t = if inside { a.t + meeting } else { 0.5 * (a.t + b.t) };
-            let place = from.towards(to, t, self.part);
-            let Some(hit) = self.engine.hit(&place.point, &place.normal) else { return };
-            let here = End { t, place, hit };
+            let rest = b.t - a.t;
+            let [x, _] = meeting(&a, &b, bend);
+            let ahead = x + aside;
+            let by_tangents = look < BY_TANGENTS && ahead > 0.0 && ahead < rest;
+            let ahead = if by_tangents { ahead } else { 0.5 * rest };
+            let place = from.towards(to, a.t + ahead, self.part);
+            let near = if ahead < 0.5 * rest { &a.hit } else { &b.hit };
+            let Some(hit) = self.engine.hit(&place.point, &place.normal, Some(near)) else { return };
+            let here = End { t: a.t + ahead, place, hit };
+            // How far beside the parabola of its track it lies tells how the track bends.
+            let bent = |end: &End, way: f64, sense: f64| {
+                let slope = sense * rise_over(end, &a, &b);
+                (2.0 * (hit.deviation - end.hit.deviation - slope * way) / (way * way))
+                    .clamp(0.0, 16.0 * bend)
+            };
             match (self.tracks.apart(a.hit.by, hit.by), self.tracks.apart(hit.by, b.hit.by)) {
-                (false, _) => a = here,
-                (true, false) => b = here,
+                (false, _) => {
+                    bend = bent(&a, ahead, 1.0).max(1e-3 * bend);
+                    (a, aside) = (here, ASIDE);
+                }
+                (true, false) => {
+                    bend = bent(&b, rest - ahead, -1.0).max(1e-3 * bend);
+                    (b, aside) = (here, -ASIDE);
+                }
                 (true, true) if depth > 0 => {
                     self.search(from, to, [a, here], depth - 1, found);
                     return self.search(from, to, [here, b], depth - 1, found);
@@ -98,15 +112,35 @@ impl Finder<'_> {
                 (true, true) => return,
             }
         }
-        let top = if a.hit.deviation > b.hit.deviation { a } else { b };
+        let [x, height] = meeting(&a, &b, bend);
+        let (rest, top) = (b.t - a.t, a.hit.deviation.max(b.hit.deviation));
+        let steepest = rise_over(&a, &a, &b).abs().max(rise_over(&b, &a, &b).abs());
+        // Beside a wall one track ends: the ridge is the higher edge.
+        let smooth = x >= 0.0 && x <= rest && (height - top).abs() <= steepest * rest + 1e-9;
+        let place = from.towards(to, if smooth { a.t + x } else { 0.5 * (a.t + b.t) }, self.part);
+        let height = if smooth { height } else { top };
         let along: Vector3 = a.hit.normal.cross(&b.hit.normal);
-        let rise = along.try_normalize(1e-12).map_or(0.0, |t| t.dot(&top.place.normal).abs());
         found.push(Crossing {
-            height: top.hit.deviation,
-            at: top.place.point + top.place.normal * top.hit.deviation,
-            rise,
+            height,
+            at: place.point + place.normal * height,
+            rise: along.try_normalize(1e-12).map_or(0.0, |t| t.dot(&place.normal).abs()),
             length: 0.0,
             passes: self.tracks.passes(a.hit.by, b.hit.by),
         });
     }
+}
+
+/// How fast the cut at an end rises along the way from `a` to `b`, mm a whole side.
+fn rise_over(end: &End, a: &End, b: &End) -> f64 {
+    let way = (b.place.point - a.place.point) / (b.t - a.t);
+    -end.hit.normal.dot(&way) / end.hit.normal.dot(&end.place.normal).max(1e-9)
+}
+
+/// Where after `a`, and how high, two parabolas of the same bend meet that leave the ends with the slopes of their cuts.
+fn meeting(a: &End, b: &End, bend: f64) -> [f64; 2] {
+    let rest = b.t - a.t;
+    let [fa, fb] = [a, b].map(|end| rise_over(end, a, b));
+    let x =
+        (b.hit.deviation - a.hit.deviation - fb * rest + 0.5 * bend * rest * rest) / (fa - fb + bend * rest);
+    [x, a.hit.deviation + fa * x + 0.5 * bend * x * x]
 }

@@ -21,12 +21,18 @@ pub struct SweptVolume<'a> {
 }
 
 impl AlongNormal for SweptVolume<'_> {
-    fn hit(&self, point: &Point3, normal: &Vector3) -> Option<NormalHit> {
-        let hit = self.rays.deviation(point, normal, self.inward, self.outward)?;
-        let to = &self.path.moves[hit.index as usize].to;
-        let at = self.path.location_before(hit.index as usize).towards(to, hit.t);
-        let foot = self.solid.foot(&at.tip, &at.axis, &(point + normal * hit.s));
-        Some(NormalHit { deviation: hit.s, by: hit.index, normal: -foot.gradient })
+    fn hit(&self, point: &Point3, normal: &Vector3, near: Option<&NormalHit>) -> Option<NormalHit> {
+        let seed = near.map(|hit| hit.seed);
+        let (hit, seed) = self.rays.deviation_near(point, normal, [self.inward, self.outward], seed)?;
+        let cut = if self.solid.ball().is_some() {
+            let to = &self.path.moves[hit.index as usize].to;
+            let at = self.path.location_before(hit.index as usize).towards(to, hit.t);
+            -self.solid.foot(&at.tip, &at.axis, &(point + normal * hit.s)).gradient
+        } else {
+            // Where an edge cuts, the tool by itself has no normal.
+            self.rays.cut_normal(point, normal, &hit)?
+        };
+        Some(NormalHit { deviation: hit.s, by: hit.index, normal: cut, seed })
     }
 
     fn reach(&self) -> f64 {

@@ -1,7 +1,9 @@
 use super::*;
+use crate::cutter::Solid;
 use crate::geometry::samples;
 use crate::monitor::Silent;
 use crate::part::Patch;
+use crate::sim::Rays;
 use crate::toolpath::{ClPoint, Move, MoveKind, ball_scallop_height, distance_to_segment};
 
 const RADIUS: f64 = 3.0;
@@ -10,7 +12,7 @@ const RADIUS: f64 = 3.0;
 struct BruteForce<'a>(&'a Toolpath);
 
 impl AlongNormal for BruteForce<'_> {
-    fn hit(&self, point: &Point3, normal: &Vector3) -> Option<NormalHit> {
+    fn hit(&self, point: &Point3, normal: &Vector3, _: Option<&NormalHit>) -> Option<NormalHit> {
         let up = Vector3::z() * RADIUS;
         let mut best: Option<NormalHit> = None;
         for (k, (from, to, step)) in self.0.segments().enumerate() {
@@ -25,7 +27,7 @@ impl AlongNormal for BruteForce<'_> {
                     let at = point + normal * s;
                     let t = ((at - a).dot(&(b - a)) / (b - a).norm_squared()).clamp(0.0, 1.0);
                     let inward = (a + (b - a) * t - at) / RADIUS;
-                    best = Some(NormalHit { deviation: s, by: k as u32, normal: inward });
+                    best = Some(NormalHit { deviation: s, by: k as u32, normal: inward, seed: 0 });
                     break;
                 }
                 s += d;
@@ -126,7 +128,13 @@ fn a_dome_has_the_scallops_of_a_circle_also_where_it_is_steep() {
         (0..=240).map(at).collect::<Vec<_>>()
     };
     let rings: Vec<Vec<Point3>> = (0..27).map(ring).collect();
-    let (measured, map) = measured(&part, &path(&rings), 0.6);
+    let (path, ball) = (path(&rings), Cutter::ball(2.0 * RADIUS).unwrap());
+    let solid = Solid::of_cutter(&ball, None);
+    let rays = Rays::new(&path, &solid, &Silent).unwrap();
+    let cut = SweptVolume { rays: &rays, path: &path, solid: &solid, inward: 1.0, outward: 1.0 };
+    let limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.001 };
+    let (measured, map) =
+        measure_along_normals(&part, &ball, &path, &cut, 0.25, &limits, 5e-4, &Silent).unwrap();
     let exact = ball_scallop_height(RADIUS, -1.0 / rho, step * rho).unwrap();
     let (max, p50) = (measured.scallop.max_mm.unwrap(), measured.scallop.p50_mm.unwrap());
     // Chords of 240 a turn lie up to 1.1 µm inside the greatest ring.

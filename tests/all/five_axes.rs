@@ -1,0 +1,81 @@
+//! Five axes: the scenes that ship (`scenes/five_axes`), and what their reports must say.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::support::{number, patch, run_scene};
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/five_axes")
+}
+
+/// A cap of a ball of radius 20, 22 mm square: 51 degrees steep at its corners.
+fn dome() -> Value {
+    patch([14, 14], |u, v| {
+        let (x, y) = (22.0 * u - 11.0, 22.0 * v - 11.0);
+        [x, y, (400.0 - x * x - y * y).sqrt() - 20.0]
+    })
+}
+
+/// 28 mm wide and 30 mm deep, with walls of up to 83 degrees.
+fn trough() -> Value {
+    patch([24, 4], |u, v| {
+        let s = 2.0 * u - 1.0;
+        [14.0 * s, 20.0 * v, 30.0 * s.powi(4)]
+    })
+}
+
+/// From 20 degrees beside the top of a cylinder of radius 15 to 30 degrees below its side.
+fn lip() -> Value {
+    patch([16, 4], |u, v| {
+        let angle = (120.0 - 100.0 * u).to_radians();
+        [15.0 * angle.sin(), 20.0 * v, 15.0 * angle.cos()]
+    })
+}
+
+/// Each part of a scene is what its generator makes; `MILLSTREAM_BLESS=1` writes them anew.
+#[test]
+fn parts_are_those_of_their_generators() {
+    for (name, part) in [("dome", dome()), ("trough", trough()), ("lip", lip())] {
+        let path = folder().join(name).with_extension("json");
+        if std::env::var_os("MILLSTREAM_BLESS").is_some() {
+            std::fs::write(&path, part.to_string() + "\n").unwrap();
+        }
+        let shipped: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+        assert_eq!(shipped, part, "{name}");
+    }
+}
+
+/// Nothing uncut, no gouge over 5 µm, at most 1 % of the ridges over the target of 10 µm.
+fn is_good(path: &Value) {
+    let name = &path["name"];
+    assert!(number(path, "/scallop/over_target_fraction") <= 0.01, "{name}: {:#}", path["scallop"]);
+    assert!(number(path, "/scallop/max_mm") <= 0.0125, "{name}: {:#}", path["scallop"]);
+    assert!(number(path, "/gouge/max_depth_mm") <= 0.005, "{name}: {:#}", path["gouge"]);
+    assert_eq!(number(path, "/uncut/area_mm2"), 0.0, "{name}: {:#}", path["uncut"]);
+}
+
+#[test]
+fn a_lead_makes_passes_on_a_dome_wider() {
+    let (_, report) = run_scene(&folder().join("dome.toml"));
+    let [upright, lead] = [0, 1].map(|k| &report["toolpaths"][k]);
+    assert_eq!(
+        (&upright["simulation"]["engine"], &lead["simulation"]["engine"]),
+        (&"zmap".into(), &"rays".into())
+    );
+    is_good(lead);
+    let length = |path: &Value| number(path, "/path/cutting_length_mm");
+    assert!(length(lead) < 0.7 * length(upright), "{} {}", length(lead), length(upright));
+}
+
+#[test]
+fn a_lip_is_cut_from_the_side_below_its_widest_place() {
+    let (_, report) = run_scene(&folder().join("lip.toml"));
+    for path in report["toolpaths"].as_array().unwrap() {
+        is_good(path);
+        // The area of 100 degrees of the cylinder.
+        let area = 15.0 * 100f64.to_radians() * 20.0;
+        assert!((number(path, "/deviation/area_mm2") / area - 1.0).abs() < 0.01, "{:#}", path["deviation"]);
+    }
+}
