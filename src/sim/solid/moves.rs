@@ -291,8 +291,8 @@ impl SweptMoves {
         best
     }
 
-    /// Calls `visit` for every move that may come within `reach` mm of `q`, in any order and perhaps more
-    /// than once: its index, with a lower bound on its distance.
+    /// Calls `visit` for every move that comes nearer to `q` than `reach` mm, with its index and how near, in
+    /// any order; more than once for a move that stands in the tree in parts, with how near each comes.
     pub fn near(&self, q: &Point3, reach: f64, mut visit: impl FnMut(u32, f64)) {
         let Some(tree) = &self.tree else { return };
         tree.search(
