@@ -254,26 +254,33 @@ impl Rays {
             return f64::INFINITY;
         }
         let s = if limit < ray.high { limit } else { ray.first() };
-        let q = ray.at(s);
-        let solid = self.moves.solid();
-        let of_piece = |piece: usize| {
-            let view = self.moves.view(index, node, piece, &q);
-            let mut support = Support {
-                s,
-                value: view.distance - view.moved - view.leaned,
-                rise: ray.normal.dot(&view.gradient),
-                lean: view.chord,
-            };
-            // What turns about the middle of a ball does not move it.
-            let climb = ray.normal.dot(&view.axis);
-            let [down, up] = [ray.low - s, limit - s];
-            let below = view.height + (down * (climb + view.chord)).max(down * (climb - view.chord)) < 0.0
-                && view.height + up * (climb + view.chord) < 0.0;
-            if below && solid.ball().is_some() {
-                (support.value, support.lean) = (view.distance - view.moved, 0.0);
-            }
-            support.reach([ray.low, limit])
-        };
-        (0..solid.pieces()).map(of_piece).fold(f64::INFINITY, f64::min)
+        let range = [ray.low, limit];
+        let of_piece = |piece: usize| self.support(ray, index, node, piece, s, range).reach(range);
+        (0..self.moves.solid().pieces()).map(of_piece).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Lower bound along the ray, within a range of it, on the distance from a piece of all tools of a node,
+    /// by a look from the place `s`.
+    #[inline]
+    fn support(
+        &self,
+        ray: &Ray,
+        index: usize,
+        node: &Node,
+        piece: usize,
+        s: f64,
+        [low, high]: [f64; 2],
+    ) -> Support {
+        let view = self.moves.view(index, node, piece, &ray.at(s));
+        let rise = ray.normal.dot(&view.gradient);
+        // What turns about the middle of a ball does not move it.
+        let climb = ray.normal.dot(&view.axis);
+        let [down, up] = [low - s, high - s];
+        let below = view.height + (down * (climb + view.chord)).max(down * (climb - view.chord)) < 0.0
+            && view.height + up * (climb + view.chord) < 0.0;
+        if below && self.moves.solid().ball().is_some() {
+            return Support { s, value: view.distance - view.moved, rise, lean: view.rounding };
+        }
+        Support { s, value: view.distance - view.moved - view.leaned, rise, lean: view.chord }
     }
 }

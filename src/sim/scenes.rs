@@ -45,7 +45,7 @@ pub fn cutters() -> Vec<Cutter> {
 
 /// A path of cutting moves through the given tips; the first one is the start.
 pub fn path_through(tips: impl IntoIterator<Item = Point3>) -> Toolpath {
-    let mut tips = tips.into_iter().map(|tip| ClPoint::upright(tip));
+    let mut tips = tips.into_iter().map(ClPoint::upright);
     let start = tips.next().unwrap();
     let moves = tips.map(|to| Move { to, kind: MoveKind::Cut, feed_rate: 1000.0, pass: 0 }).collect();
     Toolpath { start, moves }

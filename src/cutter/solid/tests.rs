@@ -172,6 +172,9 @@ fn in_space_the_axis_may_lean() {
     let cutter = Cutter::ball(6.0).unwrap();
     let solid = Solid::of_cutter(&cutter, None);
     assert_eq!((solid.ball(), solid.pivot()), (Some(3.0), 3.0));
+    // A holder may be nearer than the ball, and a short ball ends near.
+    assert_eq!(Solid::of_tool(&cutter, &holder(12.0)).ball(), None);
+    assert_eq!(Solid::of_cutter(&cutter, Some(&holder(5.0))).ball(), None);
     let (tip, axis) = (Point3::new(1.0, 2.0, 3.0), Vector3::new(0.48, -0.6, 0.64));
     let centre = tip + axis * 3.0;
     for (x, y, z) in [(3.0, 1.0, -4.0), (-2.0, 0.5, -1.0), (0.5, 0.5, -0.1)] {

@@ -225,6 +225,16 @@ impl BoxTree {
         self.nodes.at(index)
     }
 
+    /// All slots below box `index`, for tests.
+    #[cfg(test)]
+    pub(crate) fn slots_below(&self, index: usize) -> Vec<usize> {
+        let (first, count) = self.node(index).slots_or_children();
+        if count > 0 {
+            return (first..first + count).collect();
+        }
+        [first, first + 1].iter().flat_map(|&child| self.slots_below(child)).collect()
+    }
+
     /// The same tree around other boxes, one for each slot.
     pub(crate) fn refitted(&self, slots: &[Extent]) -> Self {
         let mut nodes: Vec<Node> = (0..self.nodes.len()).map(|i| *self.nodes.at(i)).collect();

@@ -221,3 +221,46 @@ fn places_that_are_no_numbers_meet_nothing() {
         }
     }
 }
+
+#[test]
+fn boxes_bound_the_distance_from_all_tools_in_them() {
+    let mut rng = Rng::new(43);
+    let (mut nearest, mut balls) = (f64::INFINITY, 0);
+    for (c, cutter) in cutters().iter().enumerate() {
+        let solid = Solid::of_cutter(cutter, None);
+        // Axes that differ little, and by up to a radian, and such that turn about a point.
+        let widest = if c % 2 == 0 { 0.02 } else { 1.0 };
+        let place = |k: usize, rng: &mut Rng| {
+            let axis = axis(rng, widest);
+            let tip = Point3::new(0.2 * k as f64, rng.within(0.0, 0.3), rng.within(0.0, 0.3));
+            let about = Point3::new(4.0, 0.0, 0.0) - axis * solid.pivot();
+            ClPoint { tip: if c % 3 == 0 { about } else { tip }, axis }
+        };
+        let to: Vec<ClPoint> = (0..40).map(|k| place(k, &mut rng)).collect();
+        let rays = Rays::new(&path_of(to[0], &to[1..]), &solid, &Silent).unwrap();
+        let (moves, tree) = (rays.moves(), rays.moves().tree().unwrap());
+        for index in (0..tree.nodes_len()).filter(|&index| index != 1) {
+            let node = tree.node(index);
+            let slots = tree.slots_below(index);
+            for _ in 0..6 {
+                let point = Point3::new(rng.within(0.0, 8.0), rng.within(-2.0, 2.0), rng.within(-2.0, 1.0));
+                let (low, high) = (rng.within(-3.0, 0.0), rng.within(0.0, 3.0));
+                let ray = Ray { point, normal: axis(&mut rng, 1.0), low, high };
+                let support = rays.support(&ray, index, node, 0, rng.within(low, high), [low, high]);
+                balls += usize::from(support.lean < 1e-6);
+                for &slot in &slots {
+                    let part = moves.part(slot);
+                    let t = rng.within(part.range[0], part.range[1]);
+                    let s = rng.within(low, high);
+                    let pose = moves.motion(part).at(t);
+                    let distance = solid.distance(&pose.tip, &pose.axis, &ray.at(s));
+                    let by = s - support.s;
+                    let bound = support.value + support.rise * by - support.lean * by.abs();
+                    assert!(distance > bound - 1e-9, "cutter {c} node {index}: {distance} {bound}");
+                    nearest = nearest.min(distance - bound);
+                }
+            }
+        }
+    }
+    assert!(nearest < 1e-2 && balls > 20, "bounds that are never near bound nothing: {nearest} {balls}");
+}

@@ -70,6 +70,8 @@ pub(crate) struct NodeView {
     pub(crate) leaned: f64,
     /// How far directions seen from another tool may be turned, as the length of a chord.
     pub(crate) chord: f64,
+    /// What of that is rounding.
+    pub(crate) rounding: f64,
     /// Axis of the tool in the middle.
     pub(crate) axis: Vector3,
     /// Greatest height of the place above the pivot of any of the tools.
@@ -239,15 +241,17 @@ impl SweptMoves {
         let radial = if rho > 0.0 { foot.gradient[0] / rho } else { 0.0 };
         let gradient = outward * radial + axis * foot.gradient[1];
         let mut moved = gradient.x.abs() * half[0] + gradient.y.abs() * half[1] + gradient.z.abs() * half[2];
-        let (mut leaned, mut height) = (0.0, along);
+        let (mut leaned, mut height, mut rounding) = (0.0, along, 0.0);
         if chord > 0.0 {
+            rounding = ROUNDING;
             let reach = away.norm() + Vector3::from(half).norm();
             leaned = chord * reach;
-            moved += ROUNDING * reach;
-            height += leaned + ROUNDING * reach;
+            moved += rounding * reach;
+            height += (chord + rounding) * reach;
         }
         height += axis.x.abs() * half[0] + axis.y.abs() * half[1] + axis.z.abs() * half[2];
-        NodeView { distance: foot.distance, gradient, moved, leaned, chord, axis, height }
+        let chord = chord + rounding;
+        NodeView { distance: foot.distance, gradient, moved, leaned, chord, rounding, axis, height }
     }
 
     /// Lower bound on the distance of `q` from the tools of node `index`.
@@ -287,8 +291,8 @@ impl SweptMoves {
         best
     }
 
-    /// Calls `visit` for every move that may come within `reach` mm of `q`, in any order and perhaps more
-    /// than once: its index, with a lower bound on its distance.
+    /// Calls `visit` for every move that comes nearer to `q` than `reach` mm, with its index and how near, in
+    /// any order; more than once for a move that stands in the tree in parts, with how near each comes.
     pub fn near(&self, q: &Point3, reach: f64, mut visit: impl FnMut(u32, f64)) {
         let Some(tree) = &self.tree else { return };
         tree.search(
@@ -309,5 +313,32 @@ impl Summary {
     #[inline(always)]
     fn axis(&self) -> Vector3 {
         Vector3::from(self.axis.map(f64::from))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{path_of, some_move};
+    use super::*;
+    use crate::cutter::Cutter;
+    use crate::sim::scenes::Rng;
+
+    #[test]
+    fn boxes_hold_the_track_of_the_pivot() {
+        let mut rng = Rng::new(47);
+        let solid = Solid::of_cutter(&Cutter::ball(6.0).unwrap(), None);
+        for kind in 0..64 {
+            let (from, to) = some_move(&mut rng, kind);
+            let moves = SweptMoves::new(&solid, &path_of(from, &[to]), |_| true).unwrap();
+            let parts = moves.slots.iter().map(|part| part.range[1] - part.range[0]).sum::<f64>();
+            assert!((parts - 1.0).abs() < 1e-12);
+            for part in &moves.slots {
+                for k in 0..=20 {
+                    let t = part.range[0] + (part.range[1] - part.range[0]) * f64::from(k) / 20.0;
+                    let pose = from.towards(&to, t);
+                    assert!(moves.extent(part).holds(&(pose.tip + pose.axis * 3.0)), "{from:?} {to:?} {t}");
+                }
+            }
+        }
     }
 }
