@@ -47,6 +47,17 @@ pub enum CliError {
         /// What the planner said.
         reason: PlanError,
     },
+    /// The machine cannot run a toolpath.
+    #[error("{scene}: the machine cannot run the toolpath \"{name}\": {reason}")]
+    #[diagnostic(help("change [machine.kinematics] or that [[toolpath]] in the scene"))]
+    Machine {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// Name of the toolpath.
+        name: String,
+        /// Why not.
+        reason: String,
+    },
     /// The engine does not know tilted cutters.
     #[error(
         "{scene}: the toolpath \"{name}\" tilts the cutter, and the engine `{engine}` knows upright ones only"

@@ -9,6 +9,7 @@ mod error;
 mod load;
 mod outputs;
 mod pocket;
+mod program;
 mod progress;
 mod run;
 

@@ -10,10 +10,11 @@ use super::error::CliError;
 use super::load::load_part;
 use super::outputs::Outputs;
 use super::pocket::{limit_feed_by, load_pocket, pocket_figures};
+use super::program::write_gcode;
 use super::progress::Progress;
 use crate::geometry::Aabb;
 use crate::io::scene::{Engine, PartSource, Scene, ToolpathRequest, auto_cell};
-use crate::io::{ProgramHeader, apt_cl, exr, gcode, ply_write, png, stl_write};
+use crate::io::{ProgramHeader, apt_cl, exr, ply_write, png, stl_write};
 use crate::machine::{machining_time, slow_corners};
 use crate::metrology::{Asked, Measurement, RemovalFigures, measure, path_figures, removal_figures};
 use crate::monitor::{self, Monitor as _};
@@ -394,7 +395,7 @@ impl<'a> Job<'a> {
         };
         let file = |name: &str| format!("{}/{name}", request.folder);
         outputs.file(&file("toolpath.cls"), |out| apt_cl::write(out, path, cutter, &header))?;
-        outputs.file(&file("toolpath.nc"), |out| gcode::write(out, path, cutter, &header))
+        write_gcode(self.scene, &request.name, path, &header, outputs, &file("toolpath.nc"))
     }
 
     /// Writes height.exr and the pictures; leaves what the page shows.

@@ -4,6 +4,12 @@
 //! There is no O-number, because controls disagree about what an O-word is, no tool change and no length
 //! offset: the tip is taken to be where the program says. Rapids are simulated as straight lines; a
 //! control whose G0 runs each axis at its own speed strays from them.
+//!
+//! [`write_five_axis`] writes programs for machines with two rotary axes.
+
+mod five_axis;
+
+pub use five_axis::{FiveAxisPost, Style, write_five_axis};
 
 use super::program_text::{ProgramHeader, describe, number, rounded};
 use crate::cutter::Cutter;
@@ -15,7 +21,8 @@ use std::io::{self, Write};
 /// For each move of the path the line of the program, counted from 1, on which it is reached.
 pub type MoveLines = Vec<u32>;
 
-/// Writes the program and tells the line of each move. A move that rounds to where the tip already is
+/// Writes the program of a path whose tool axis is z throughout ([`Toolpath::is_upright`]; any other needs
+/// [`write_five_axis`], and where no machine is given, cutter locations only) and tells the line of each move. A move that rounds to where the tip already is
 /// has no line of its own: it gets the line that brought the tip there.
 ///
 /// Coordinates and feeds are rounded to four decimals, so each stands within 0.05 µm of the path. Before
@@ -23,13 +30,16 @@ pub type MoveLines = Vec<u32>;
 /// after the last one it rises again.
 ///
 /// # Errors
-/// Whatever the writer returns.
+/// Whatever the writer returns; a path with a tilted tool.
 pub fn write(
     writer: &mut dyn Write,
     path: &Toolpath,
     cutter: &Cutter,
     header: &ProgramHeader,
 ) -> io::Result<MoveLines> {
+    if !path.is_upright() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "three axes cannot tilt the tool"));
+    }
     let mut program = Program { writer, lines: 0, tip: [None; 3], rapid: None, feed: None };
     let start = path.start.tip;
     let top = path.moves.iter().map(|m| m.to.tip.z).fold(start.z, f64::max);

@@ -34,7 +34,17 @@ pub(super) fn rounded(value: f64) -> f64 {
 /// A number with four decimals, trailing zeros left out but for one: a control may read a number
 /// without a decimal point as micrometres.
 pub(super) fn number(value: f64) -> String {
-    let mut text = format!("{:.DECIMALS$}", rounded(value) / 10f64.powi(DECIMALS as i32));
+    shortened(format!("{:.DECIMALS$}", rounded(value) / 10f64.powi(DECIMALS as i32)))
+}
+
+/// [`number`] with other decimals.
+pub(super) fn number_to(value: f64, decimals: usize) -> String {
+    let power = 10f64.powi(decimals as i32);
+    // Adding zero turns a negative one round.
+    shortened(format!("{:.decimals$}", (value * power).round() / power + 0.0))
+}
+
+fn shortened(mut text: String) -> String {
     while text.ends_with('0') && !text.ends_with(".0") {
         text.pop();
     }

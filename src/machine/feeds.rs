@@ -28,7 +28,7 @@ const SECONDS_PER_MINUTE: f64 = 60.0;
 /// way does as well, but for points put in on straight moves. A path for which no time can be told comes
 /// back unchanged.
 pub fn slow_corners(path: &Toolpath, machine: &Machine) -> Toolpath {
-    let Some(blocks) = profile(path, machine) else { return path.clone() };
+    let Some(blocks) = profile(path, machine, &[]) else { return path.clone() };
     let mut moves = Vec::with_capacity(path.len());
     let mut next = blocks.iter().enumerate().peekable();
     for (k, step) in path.moves.iter().enumerate() {

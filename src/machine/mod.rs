@@ -1,10 +1,11 @@
-//! The machine: speed and acceleration limits, machining time.
+//! The machine: speed and acceleration limits, machining time, five-axis kinematics.
 
 mod feeds;
+pub mod kinematics;
 mod time;
 
 pub use feeds::slow_corners;
-pub use time::machining_time;
+pub use time::{machining_time, machining_time_turning};
 
 /// Limits of the machine's motion.
 #[derive(Debug, Clone, Copy, PartialEq)]

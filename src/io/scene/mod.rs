@@ -9,6 +9,7 @@ mod classic;
 mod direction;
 mod error;
 mod formula;
+mod kinematics;
 mod pocket;
 mod read;
 mod section;
@@ -21,6 +22,7 @@ use std::path::{Path, PathBuf};
 
 pub use axis::AxisRequest;
 pub use error::{Finding, SceneError, SceneText};
+pub use kinematics::FiveAxis;
 pub use pocket::OutlineSource;
 pub use write::complete_toml;
 
@@ -261,6 +263,8 @@ pub struct Scene {
     pub simulation: Simulation,
     /// On what.
     pub machine: Machine,
+    /// Its rotary axes; `None` for a machine of three axes, or where none is named.
+    pub five_axis: Option<FiveAxis>,
     /// Height of rapid moves above stock, mm.
     pub clearance: f64,
     /// The toolpaths, in the order of the scene; at least one.

@@ -13,7 +13,7 @@ use super::{
     DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, Engine, MeshFormat, NamedFile, OutlineSource, PartSource, Scene,
     Simulation, Stock, ToolpathRequest, auto_cell, default_error_bound,
 };
-use super::{axis, classic, direction, formula, pocket};
+use super::{axis, classic, direction, formula, kinematics, pocket};
 use crate::cutter::{AptWord, AptWords, Cutter, CutterError, CutterShape, Holder, HolderSection};
 use crate::field::{KnotRule, MAX_DENSE, Solver};
 use crate::geometry::AnalyticSurface;
@@ -90,7 +90,9 @@ impl Scene {
         let holder = read_holder(&root, &cutter)?;
         let tolerance = read_tolerance(&root.section("tolerance")?)?;
         let mut simulation = read_simulation(&root.section("simulation")?, &cutter, &tolerance)?;
-        let (machine, clearance) = read_machine(&root.section("machine")?)?;
+        let section = root.section("machine")?;
+        let (machine, clearance) = read_machine(&section)?;
+        let five_axis = kinematics::read(&section)?;
         let toolpaths = read_toolpaths(&root, &folder, &tolerance, &cutter)?;
         check_pocket_strategies(&root, &part, &toolpaths)?;
         if simulation.cell_is_auto {
@@ -107,6 +109,7 @@ impl Scene {
             tolerance,
             simulation,
             machine,
+            five_axis,
             clearance,
             toolpaths,
         })
@@ -401,7 +404,15 @@ fn read_simulation(
 
 fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
     section.only(
-        &["rapid_rate", "acceleration", "junction_deviation", "jerk", "slow_corners", "clearance"],
+        &[
+            "rapid_rate",
+            "acceleration",
+            "junction_deviation",
+            "jerk",
+            "slow_corners",
+            "clearance",
+            kinematics::KEY,
+        ],
         &[],
         "[machine]",
     )?;

@@ -292,18 +292,27 @@ impl<'a> Section<'a> {
 
     /// `[from, to]` with `from < to`, which must be there.
     pub fn required_interval(&self, key: &str) -> Result<[f64; 2], SceneError> {
-        let example = "[0.0, 100.0]";
-        let entry = self.entry(key).ok_or_else(|| self.missing(key, example))?;
-        let cure = format!("write two numbers, the lesser first, such as `{key} = {example}`");
+        self.interval(key, COORDINATE, " mm")?.ok_or_else(|| self.missing(key, INTERVAL))
+    }
+
+    /// `[from, to]` with `from < to` within `range`; `None` when the key is not there.
+    pub fn interval(
+        &self,
+        key: &str,
+        range: RangeInclusive<f64>,
+        unit: &str,
+    ) -> Result<Option<[f64; 2]>, SceneError> {
+        let Some(entry) = self.entry(key) else { return Ok(None) };
+        let cure = format!("write two numbers, the lesser first, such as `{key} = {INTERVAL}`");
         let DeValue::Array(list) = entry.get_ref() else {
             return Err(self.wrong_type(key, "a list of two numbers", entry, &cure));
         };
         let numbers: Vec<f64> = list
             .iter()
-            .map(|item| Ok(self.in_range(key, item, &COORDINATE, " mm")?.value))
+            .map(|item| Ok(self.in_range(key, item, &range, unit)?.value))
             .collect::<Result<_, _>>()?;
         match numbers[..] {
-            [from, to] if from < to => Ok([from, to]),
+            [from, to] if from < to => Ok(Some([from, to])),
             _ => Err(self.error(
                 &entry.span(),
                 format!("`{key}` in {} must run from a lesser to a greater number", self.title),
@@ -399,6 +408,9 @@ impl<'a> Section<'a> {
         Some(Section { source: self.source, title, span: entry.span(), table: Some(table) })
     }
 }
+
+/// An interval as messages show it.
+const INTERVAL: &str = "[0.0, 100.0]";
 
 /// Lengths that make sense, mm: below a nanometre f64 geometry at a metre's distance is noise.
 pub(super) const LENGTH: RangeInclusive<f64> = 1e-6..=1e4;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{PartSource, Scene, ToolpathRequest, axis, classic, direction, formula, pocket};
+use super::{PartSource, Scene, ToolpathRequest, axis, classic, direction, formula, kinematics, pocket};
 use crate::cutter::{Cutter, CutterShape};
 use crate::toolpath::{Links, Step, Strategy, StreamMethod, longest_link};
 
@@ -64,6 +64,7 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     writeln!(out, "jerk = {}  # mm/s3", number(scene.machine.jerk))?;
     writeln!(out, "slow_corners = {}  # feeds of sharp bends in the program", scene.machine.slow_corners)?;
     writeln!(out, "clearance = {}  # mm of rapid moves above stock", number(scene.clearance))?;
+    kinematics::write(out, scene.five_axis.as_ref())?;
     scene.toolpaths.iter().try_for_each(|request| {
         writeln!(out, "\n[[toolpath]]")?;
         writeln!(out, "name = {}", text(&request.name))?;

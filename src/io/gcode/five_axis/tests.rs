@@ -1,0 +1,301 @@
+//! Programs followed word by word, and the words by forward kinematics.
+
+use super::*;
+use crate::machine::kinematics::{DEFAULT_ROTARY_RATE, PRESETS, RotaryAxis, follow, preset};
+use crate::toolpath::Move;
+
+const HEADER: ProgramHeader = ProgramHeader { name: String::new(), spindle_speed: None };
+
+/// What is in force after a line: the words X Y Z and of both rotary axes, rapid or not, F.
+#[derive(Debug, Clone, Copy)]
+struct State {
+    words: [f64; 5],
+    rapid: bool,
+    inverse: bool,
+    tip_kept: bool,
+    feed: f64,
+}
+
+/// Follows the modal words, as a control would.
+fn states(text: &str, letters: [char; 5]) -> Vec<State> {
+    let mut state =
+        State { words: [f64::NAN; 5], rapid: false, inverse: false, tip_kept: false, feed: f64::NAN };
+    let mut states = Vec::new();
+    for line in text.lines() {
+        let machine = line.contains("G53");
+        let mut feed = false;
+        for word in line.split_whitespace().filter(|_| !line.starts_with(['(', '%'])) {
+            let letter = word.chars().next().unwrap();
+            let value: f64 = word[1..].parse().unwrap();
+            match (letter, word) {
+                (_, "G93") => state.inverse = true,
+                (_, "G94") => state.inverse = false,
+                (_, "G43.4") => {
+                    state.tip_kept = true;
+                    state.words[..3].fill(f64::NAN);
+                }
+                (_, "G49") => state.tip_kept = false,
+                ('G', _) if value < 2.0 => state.rapid = value == 0.0,
+                ('F', _) => (state.feed, feed) = (value, true),
+                _ => {
+                    if let Some(k) = letters.iter().position(|l| *l == letter) {
+                        state.words[k] = if machine { f64::NAN } else { value };
+                    }
+                }
+            }
+        }
+        let moves = !line.starts_with(['(', '%', 'M', 'S']) && line.contains(letters) && !machine;
+        assert!(!(moves && !state.rapid && state.inverse) || feed, "an inverse time on each line: {line}");
+        states.push(state);
+    }
+    states
+}
+
+fn machine(name: &str) -> Kinematics {
+    let [mut first, mut second] = preset(name).unwrap();
+    let place = |axis: &mut RotaryAxis, table: [f64; 3], head: [f64; 3]| {
+        axis.point = Point3::from(if axis.side == Side::Table { table } else { head });
+    };
+    place(&mut first, [250.0, 200.0, -400.0], [0.0, 3.0, 120.0]);
+    place(&mut second, [250.0, 203.0, -350.0], [0.0, 0.0, 110.0]);
+    Kinematics::new(first, second, 140.0, Point3::new(230.0, 215.0, -300.0), [None; 3]).unwrap()
+}
+
+/// Rapids over, cuts that tilt, a turn on the spot, rapids back; within a cone that all machines reach.
+fn path() -> Toolpath {
+    let mut rng = crate::sim::scenes::Rng::new(11);
+    let mut at = |z: f64| {
+        let tip = Point3::new(rng.within(-40.0, 40.0), rng.within(-40.0, 40.0), z);
+        let axis = Vector3::new(rng.within(-0.5, 0.5), rng.within(-0.5, 0.5), 1.0).normalize();
+        ClPoint { tip, axis }
+    };
+    let start = at(60.0);
+    let step = |to, kind, feed_rate| Move { to, kind, feed_rate, pass: 0 };
+    let mut moves = vec![step(at(61.0), MoveKind::Rapid, 0.0)];
+    for _ in 0..6 {
+        let over = at(60.0);
+        let down = ClPoint { tip: over.tip - over.axis * 40.0, ..over };
+        moves.extend([step(over, MoveKind::Rapid, 0.0), step(down, MoveKind::Plunge, 300.0)]);
+        let mut end = down;
+        for _ in 0..4 {
+            end = ClPoint { axis: at(0.0).axis, tip: at(20.0).tip };
+            moves.push(step(end, MoveKind::Cut, 1500.0));
+        }
+        end.axis = at(0.0).axis;
+        moves.push(step(end, MoveKind::Cut, 1500.0));
+        moves.push(step(ClPoint { tip: end.tip + end.axis * 50.0, ..end }, MoveKind::Retract, 1500.0));
+        moves.push(step(ClPoint::upright(end.tip + end.axis * 50.0), MoveKind::Rapid, 0.0));
+    }
+    Toolpath { start, moves }
+}
+
+fn program(path: &Toolpath, kinematics: &Kinematics, style: Style) -> (String, MoveLines, JointPath) {
+    program_following(path, kinematics, style, &style.following(0.002, 50.0))
+}
+
+fn program_following(
+    path: &Toolpath,
+    kinematics: &Kinematics,
+    style: Style,
+    following: &Following,
+) -> (String, MoveLines, JointPath) {
+    let joints = follow(kinematics, path, following).unwrap();
+    let post = FiveAxisPost { kinematics, joints: &joints, style, rapid_rate: 15_000.0 };
+    let mut bytes = Vec::new();
+    let lines = write_five_axis(&mut bytes, path, &post, &Cutter::ball(6.0).unwrap(), &HEADER).unwrap();
+    (String::from_utf8(bytes).unwrap(), lines, joints)
+}
+
+/// The joints of a line of words.
+fn joints_of(kinematics: &Kinematics, words: &[f64; 5]) -> Joints {
+    let nose = Vector3::new(0.0, 0.0, kinematics.gauge_length());
+    let linear = Vector3::from_column_slice(&words[..3]) + kinematics.workpiece_zero().coords + nose;
+    Joints { linear, rotary: [words[3].to_radians(), words[4].to_radians()] }
+}
+
+#[test]
+fn reading_back_gives_the_locations() {
+    let path = path();
+    for name in PRESETS {
+        let kinematics = machine(name);
+        for style in [Style::Tcp, Style::Full] {
+            let (text, lines, joints) = program(&path, &kinematics, style);
+            assert!(joints.report.obstacle().is_none(), "{name}");
+            let states = states(&text, kinematics.letters());
+            assert_eq!(lines.len(), path.len());
+            for (k, step) in path.moves.iter().enumerate() {
+                let state = states[lines[k] as usize - 1];
+                assert_eq!((state.tip_kept, state.inverse), (style == Style::Tcp, style == Style::Full));
+                let at = kinematics.forward(&joints_of(&kinematics, &state.words));
+                let tip = match style {
+                    Style::Tcp => Point3::from(Vector3::from_column_slice(&state.words[..3])),
+                    Style::Full => at.tip,
+                };
+                // Half of the last decimal on three axes; angles turn the lengths of the machine, 600 mm, besides.
+                assert!(
+                    (tip - step.to.tip).norm() < 0.9e-4 + 1.3e-4,
+                    "{name} move {k}: {tip} {}",
+                    step.to.tip
+                );
+                assert!((at.axis - step.to.axis).norm() < 3e-7, "{name} move {k}");
+            }
+        }
+    }
+}
+
+/// Between lines of a full program the joints move evenly: the tip stays on its line, the feed is kept.
+#[test]
+fn full_programs_keep_tip_and_feed() {
+    let path = path();
+    for name in ["ac-table", "bc-head", "nutating-head-c-table", "nutating-table"] {
+        let kinematics = machine(name);
+        let (text, lines, joints) = program(&path, &kinematics, Style::Full);
+        let states = states(&text, kinematics.letters());
+        let first = states.iter().rposition(|s| s.words.iter().any(|w| w.is_nan())).unwrap();
+        assert!(first > text.lines().count() - 5, "only the end is unknown");
+        // From the end of the first move on: its begin is the approach.
+        let (mut k, mut from) = (1, path.moves[0].to);
+        let mut times = vec![0.0; path.len()];
+        for at in lines[0] as usize - 1..lines[path.len() - 1] as usize - 1 {
+            let ends = [at, at + 1].map(|line| joints_of(&kinematics, &states[line].words));
+            for s in [0.25, 0.5, 0.75] {
+                let linear = ends[0].linear.lerp(&ends[1].linear, s);
+                let rotary = [0, 1].map(|k| ends[0].rotary[k] + s * (ends[1].rotary[k] - ends[0].rotary[k]));
+                let tip = kinematics.forward(&Joints { linear, rotary }).tip;
+                let (a, b) = (from.tip, path.moves[k].to.tip);
+                let along = ((tip - a).dot(&(b - a)) / (b - a).norm_squared().max(1e-30)).clamp(0.0, 1.0);
+                assert!((tip - (a + (b - a) * along)).norm() < 0.002 + 3e-4, "{name} line {at}");
+            }
+            if !states[at + 1].rapid {
+                times[k] += 60.0 / states[at + 1].feed;
+            }
+            if lines[k] as usize == at + 2 {
+                (from, k) = (path.moves[k].to, k + 1);
+            }
+        }
+        let turning = joints.turning_times(&kinematics, path.len());
+        for (k, step) in path.moves.iter().enumerate().skip(1) {
+            let length = (step.to.tip - path.start_of(k)).norm();
+            let rate = if step.kind == MoveKind::Rapid { 15_000.0 } else { step.feed_rate };
+            let least = (60.0 * length / rate).max(turning[k]);
+            if times[k] > 0.0 {
+                assert!(times[k] > least * (1.0 - 2e-3) - 1e-3, "{name} move {k} {} {least}", times[k]);
+                assert!(times[k] < (60.0 * length / rate + turning[k]) * (1.0 + 2e-3) + 1e-2, "{name} {k}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_short_program_in_both_styles() {
+    let [first, second] = preset("bc-table").unwrap();
+    let kinematics = Kinematics::new(first, second, 100.0, Point3::origin(), [None; 3]).unwrap();
+    let level = Vector3::new(0.6, 0.0, 0.8);
+    let at = |x: f64, z: f64| ClPoint { tip: Point3::new(x, 0.0, z), axis: level };
+    let step = |to, kind| Move { to, kind, feed_rate: 500.0, pass: 0 };
+    let mut moves = vec![step(at(0.0, 0.0), MoveKind::Plunge), step(at(8.0, 0.0), MoveKind::Cut)];
+    moves.push(step(ClPoint { axis: Vector3::z(), ..at(8.0, 0.0) }, MoveKind::Cut));
+    moves.push(step(ClPoint::upright(Point3::new(8.0, 0.0, 20.0)), MoveKind::Rapid));
+    let path = Toolpath { start: at(6.0, 8.0), moves };
+    // So coarse that no points are put in.
+    let coarse = Following { tip: 1.0, axis: 1.0 };
+    let (text, lines, _) = program_following(&path, &kinematics, Style::Tcp, &coarse);
+    // The table's z, (0.6, 0, 0.8) in the workpiece, reaches (8, 0, 20) at 20.8; the start lies at 10.
+    let expected = "\
+%
+()
+(BALL END D=6.0)
+(MM, DEGREES, C IN THE TABLE, B IN THE TABLE)
+(TIP OF THE CUTTER IN THE WORKPIECE)
+G17 G21 G40 G49 G80 G90 G94
+G53 G0 Z0.0
+B36.8699 C0.0
+G43.4 H1
+X12.48 Y0.0 Z16.64
+X6.0 Z8.0
+G1 X0.0 Z0.0 F500.0
+X8.0
+B0.0 F10800.0
+G0 Z20.0
+G49
+G53 G0 Z0.0
+M30
+%
+";
+    assert_eq!(text, expected);
+    assert_eq!(lines, [12, 13, 14, 15]);
+    let (text, ..) = program_following(&path, &kinematics, Style::Full, &coarse);
+    // Along the turned table: x' = 0.8 x − 0.6 z, z' = 0.6 x + 0.8 z.
+    // 36.8699° at 10800 a minute: 292.9219 times a minute.
+    let expected = "\
+(LINEAR AXES FROM THE WORKPIECE ZERO WITH ROTARY AXES AT ZERO)
+(WORKPIECE ZERO IN MACHINE COORDINATES X0.0 Y0.0 Z0.0)
+G17 G21 G40 G49 G80 G90 G93
+G53 G0 Z0.0
+B36.8699 C0.0
+X0.0 Y0.0
+Z20.8
+Z10.0
+G1 Z0.0 F50.0
+X6.4 Z4.8 F62.5
+X8.0 Z0.0 B0.0 F292.9219
+G0 Z20.0
+G53 G0 Z0.0
+G94
+M30
+%
+";
+    assert!(text.ends_with(expected), "{text}");
+    assert_eq!(DEFAULT_ROTARY_RATE, std::f64::consts::PI);
+}
+
+#[test]
+fn no_program_is_made_of_joints_that_must_not_be() {
+    let [first, second] = preset("ac-table").unwrap();
+    let upward = RotaryAxis { limits: Some([-0.1, 0.1]), ..second };
+    let kinematics = Kinematics::new(first, upward, 100.0, Point3::origin(), [None; 3]).unwrap();
+    let path = path();
+    let write = |style: Style, kinematics: &Kinematics, following: &Following| {
+        let joints = follow(kinematics, &path, following).unwrap();
+        let post = FiveAxisPost { kinematics, joints: &joints, style, rapid_rate: 15_000.0 };
+        write_five_axis(&mut Vec::new(), &path, &post, &Cutter::ball(6.0).unwrap(), &HEADER)
+    };
+    let kept = Style::Tcp.following(0.001, 50.0);
+    let error = write(Style::Tcp, &kinematics, &kept).unwrap_err();
+    assert!(error.to_string().contains("beyond its limit"), "{error}");
+    let free = Kinematics::by_name("ac-table").unwrap();
+    assert!(write(Style::Tcp, &free, &kept).is_ok());
+    assert!(write(Style::Full, &free, &kept).is_err());
+    let mut bytes = Vec::new();
+    assert!(
+        super::super::write(&mut bytes, &path, &Cutter::ball(6.0).unwrap(), &HEADER).is_err()
+            && bytes.is_empty()
+    );
+}
+
+/// A rewind in clear air rises, turns and comes down to where it left.
+#[test]
+fn a_rewind_is_made_at_the_top() {
+    let kinematics = Kinematics::by_name("bc-head").unwrap();
+    let at = |azimuth: f64| ClPoint {
+        tip: Point3::new(10.0, 20.0, 30.0 + azimuth),
+        axis: Vector3::new(azimuth.cos(), azimuth.sin(), 1.0).normalize(),
+    };
+    let moves = (1..=90).map(|k| {
+        let kind = if k % 10 < 2 { MoveKind::Rapid } else { MoveKind::Cut };
+        Move { to: at(0.2 * f64::from(k)), kind, feed_rate: 900.0, pass: 0 }
+    });
+    let path = Toolpath { start: at(0.0), moves: moves.collect() };
+    for style in [Style::Tcp, Style::Full] {
+        let (text, lines, joints) = program(&path, &kinematics, style);
+        assert!(!joints.report.rewinds.is_empty());
+        let rises = text.lines().filter(|line| *line == "G53 G0 Z0.0").count();
+        assert_eq!(rises, 2 + joints.report.rewinds.len());
+        let states = states(&text, kinematics.letters());
+        for (k, step) in path.moves.iter().enumerate() {
+            let words = states[lines[k] as usize - 1].words;
+            let axis = kinematics.tool_axis([words[3].to_radians(), words[4].to_radians()]);
+            assert!((axis - step.to.axis).norm() < 3e-7, "move {k}");
+        }
+    }
+}

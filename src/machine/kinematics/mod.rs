@@ -1,0 +1,336 @@
+//! Five-axis machines: three linear axes and two rotary ones, both in the head, both in the table, or one in
+//! each. Enters: the tool's location in the workpiece; leaves: the five joints, and the other way round.
+//!
+//! Frames. Machine coordinates are those of the linear axes as the machine shows them: the place of the spindle
+//! nose with the head's rotary axes at zero. The workpiece lies in the table with its axes along the
+//! machine's while the table stands at zero. Lengths in mm, angles in rad.
+//!
+//! Sense. A rotary joint counts as if the tool turned against the workpiece, right-handed about its direction
+//! (ISO 841): a table turns the other way. For a machine that counts otherwise, turn the direction round.
+//!
+//! Order. The *first* rotary axis is the one nearer to the workpiece, the *second* the one nearer to the
+//! cutter. So in all three families the tool axis is a = R₁(θ₁) R₂(θ₂) z, and the first axis is free
+//! where a is parallel to its direction (the singular poses).
+
+mod angles;
+mod choice;
+mod error;
+mod follow;
+mod presets;
+mod refine;
+mod report;
+#[cfg(test)]
+mod tests;
+
+pub use error::KinematicsError;
+pub use follow::{Following, JointLocation, JointPath, PathError, Turn, follow};
+pub use presets::{DEFAULT_GAUGE_LENGTH, DEFAULT_ROTARY_RATE, PRESETS, preset};
+pub(crate) use report::turning_time;
+pub use report::{JointReport, LimitViolation, Obstacle, Rewind, SINGULAR_ANGLE, SingularPose};
+
+use angles::Triangle;
+
+use crate::geometry::{Point3, Vector3};
+use crate::toolpath::ClPoint;
+
+/// Rotary axes that stand closer to parallel than this, rad, cannot turn the tool in two ways; nor can a
+/// second axis as close to the spindle. Nearer ones would magnify rounding beyond 1e-9.
+const LEAST_ANGLE: f64 = 1e-3;
+
+/// Lengths from this on are no machine's, mm.
+const GREATEST: f64 = 1.0e5;
+
+/// Angles from this on are no limit of a joint, rad.
+const GREATEST_ANGLE: f64 = 25.0 * std::f64::consts::TAU;
+
+/// Limits closer than this, mm or rad, leave a joint no room.
+const LEAST_ROOM: f64 = 1e-3;
+
+/// Where a rotary axis sits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// It turns the spindle.
+    Head,
+    /// It turns the workpiece.
+    Table,
+}
+
+/// A rotary axis with all joints at zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RotaryAxis {
+    /// Its letter in programs: `A`, `B` or `C`.
+    pub letter: char,
+    /// Its direction; any length but zero.
+    pub direction: Vector3,
+    /// A point that it runs through, mm: of a table in machine coordinates, of a head from the spindle nose.
+    pub point: Point3,
+    /// In head or table.
+    pub side: Side,
+    /// Least and greatest angle, rad; `None` turns without end.
+    pub limits: Option<[f64; 2]>,
+    /// Fastest turning, rad/s.
+    pub rate: f64,
+}
+
+/// A five-axis machine, checked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Kinematics {
+    axes: [RotaryAxis; 2],
+    /// From the spindle nose to the tip, mm.
+    gauge_length: f64,
+    /// Workpiece zero with the table at zero, machine coordinates.
+    workpiece_zero: Point3,
+    /// Least and greatest X, Y and Z, mm.
+    travel: [Option<[f64; 2]>; 3],
+    triangle: Triangle,
+}
+
+/// Values of the five joints.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Joints {
+    /// X, Y, Z: machine coordinates, mm.
+    pub linear: Vector3,
+    /// First and second rotary axis, rad.
+    pub rotary: [f64; 2],
+}
+
+/// The two ways to a location.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Inverse {
+    /// Joints with rotary angles from −π to π. Both are the same where the two ways meet.
+    pub solutions: [Joints; 2],
+    /// True where the first rotary axis is free: any angle of it serves, zero is given.
+    pub free: bool,
+}
+
+/// What turns or shifts the tool on the way from its own frame to the workpiece's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Stage {
+    /// By rotary axis 0 or 1.
+    Turn(usize),
+    /// By the linear axes.
+    Shift,
+}
+
+/// `v` turned by `angle`, rad, about the unit vector `about`.
+fn turned(v: &Vector3, about: &Vector3, angle: f64) -> Vector3 {
+    let (sin, cos) = angle.sin_cos();
+    // 1 − cos by the half angle keeps its digits.
+    let versed = 2.0 * (0.5 * angle).sin().powi(2);
+    v * cos + about.cross(v) * sin + about * (about.dot(v) * versed)
+}
+
+impl Kinematics {
+    /// A machine of the rotary axes `first` (next to the workpiece) and `second` (next to the cutter), in mm:
+    /// `gauge_length` from the spindle nose to the tip, the workpiece's zero in machine coordinates with the
+    /// table at zero, and the `travel` of X, Y and Z, each from least to greatest, in machine coordinates.
+    ///
+    /// # Errors
+    /// [`KinematicsError`] for what is no number, for parallel axes, for a second axis along the spindle, and
+    /// for limits in the wrong order.
+    pub fn new(
+        first: RotaryAxis,
+        second: RotaryAxis,
+        gauge_length: f64,
+        workpiece_zero: Point3,
+        travel: [Option<[f64; 2]>; 3],
+    ) -> Result<Self, KinematicsError> {
+        let letters = [first.letter, second.letter];
+        if letters[0] == letters[1] || letters.iter().any(|letter| !"ABC".contains(*letter)) {
+            return Err(KinematicsError::Letters { letters });
+        }
+        if (first.side, second.side) == (Side::Head, Side::Table) {
+            return Err(KinematicsError::Order { letter: letters[0] });
+        }
+        let mut axes = [first, second];
+        for axis in &mut axes {
+            let letter = axis.letter;
+            // By the greatest component first: squares of tiny or huge ones would vanish or overflow.
+            let scaled = axis.direction / axis.direction.amax();
+            axis.direction = scaled.normalize();
+            if !axis.direction.iter().all(|c| c.is_finite()) {
+                return Err(KinematicsError::Direction { letter });
+            }
+            check_limits(letter, axis.limits, GREATEST_ANGLE)?;
+            axis.point.iter().try_for_each(|c| number("a coordinate of a point of a rotary axis", *c))?;
+            if !(axis.rate > 0.0 && axis.rate.is_finite()) {
+                let (what, expected) = ("a rotary rate", "a positive number");
+                return Err(KinematicsError::Number { what, value: axis.rate, expected });
+            }
+        }
+        let [u, v] = axes.map(|axis| axis.direction);
+        if u.cross(&v).norm() <= LEAST_ANGLE {
+            return Err(KinematicsError::Parallel { letters });
+        }
+        if v.cross(&Vector3::z()).norm() <= LEAST_ANGLE {
+            return Err(KinematicsError::AlongSpindle { letter: letters[1] });
+        }
+        number("the gauge length", gauge_length)?;
+        workpiece_zero.iter().try_for_each(|c| number("a coordinate of the workpiece's zero", *c))?;
+        for (joint, limits) in ['X', 'Y', 'Z'].into_iter().zip(travel) {
+            check_limits(joint, limits, GREATEST)?;
+        }
+        Ok(Self { axes, gauge_length, workpiece_zero, travel, triangle: Triangle::new(u, v) })
+    }
+
+    /// First and second rotary axis; directions are unit vectors.
+    pub fn axes(&self) -> &[RotaryAxis; 2] {
+        &self.axes
+    }
+
+    /// From the spindle nose to the tip, mm.
+    pub fn gauge_length(&self) -> f64 {
+        self.gauge_length
+    }
+
+    /// The workpiece's zero with the table at zero, machine coordinates, mm.
+    pub fn workpiece_zero(&self) -> Point3 {
+        self.workpiece_zero
+    }
+
+    /// Least and greatest X, Y and Z, machine coordinates, mm.
+    pub fn travel(&self) -> &[Option<[f64; 2]>; 3] {
+        &self.travel
+    }
+
+    /// The letters of the five joints.
+    pub fn letters(&self) -> [char; 5] {
+        ['X', 'Y', 'Z', self.axes[0].letter, self.axes[1].letter]
+    }
+
+    /// Limits of the five joints, mm and rad.
+    pub fn limits(&self) -> [Option<[f64; 2]>; 5] {
+        let [x, y, z] = self.travel;
+        [x, y, z, self.axes[0].limits, self.axes[1].limits]
+    }
+
+    /// True when an axis of this side is there.
+    pub fn has(&self, side: Side) -> bool {
+        self.axes.iter().any(|axis| axis.side == side)
+    }
+
+    /// Least and greatest angle, rad, between tool axis and direction of the first axis.
+    pub fn reach(&self) -> [f64; 2] {
+        self.triangle.reach()
+    }
+
+    /// From the tool to the workpiece.
+    fn stages(&self) -> [Stage; 3] {
+        match self.axes.map(|axis| axis.side) {
+            [Side::Table, Side::Table] => [Stage::Shift, Stage::Turn(1), Stage::Turn(0)],
+            [Side::Table, Side::Head] => [Stage::Turn(1), Stage::Shift, Stage::Turn(0)],
+            [Side::Head, _] => [Stage::Turn(1), Stage::Turn(0), Stage::Shift],
+        }
+    }
+
+    /// The tip from the spindle nose with the head at zero.
+    fn tip_from_nose(&self) -> Vector3 {
+        Vector3::new(0.0, 0.0, -self.gauge_length)
+    }
+
+    /// A point turned by one rotary axis.
+    fn turn(&self, axis: usize, point: Vector3, angle: f64) -> Vector3 {
+        let RotaryAxis { direction, point: through, .. } = &self.axes[axis];
+        turned(&(point - through.coords), direction, angle) + through.coords
+    }
+
+    /// The tool axis in the workpiece.
+    pub fn tool_axis(&self, rotary: [f64; 2]) -> Vector3 {
+        let [u, v] = self.axes.map(|axis| axis.direction);
+        turned(&turned(&Vector3::z(), &v, rotary[1]), &u, rotary[0])
+    }
+
+    /// Where the machine's z points in the workpiece.
+    pub fn upward(&self, rotary: [f64; 2]) -> Vector3 {
+        (0..2).rev().fold(Vector3::z(), |up, k| match self.axes[k].side {
+            Side::Table => turned(&up, &self.axes[k].direction, rotary[k]),
+            Side::Head => up,
+        })
+    }
+
+    /// The location, in the workpiece, that the joints bring the tool to.
+    pub fn forward(&self, joints: &Joints) -> ClPoint {
+        let tip = self.stages().into_iter().fold(self.tip_from_nose(), |x, stage| match stage {
+            Stage::Turn(axis) => self.turn(axis, x, joints.rotary[axis]),
+            Stage::Shift => x + joints.linear,
+        });
+        ClPoint { tip: Point3::from(tip - self.workpiece_zero.coords), axis: self.tool_axis(joints.rotary) }
+    }
+
+    /// The joints that bring the tip to a point of the workpiece with the rotary axes at these angles.
+    pub fn place(&self, tip: Point3, rotary: [f64; 2]) -> Joints {
+        let (mut table, mut head) = (tip.coords + self.workpiece_zero.coords, self.tip_from_nose());
+        for k in [0, 1] {
+            if self.axes[k].side == Side::Table {
+                table = self.turn(k, table, -rotary[k]);
+            }
+        }
+        for k in [1, 0] {
+            if self.axes[k].side == Side::Head {
+                head = self.turn(k, head, rotary[k]);
+            }
+        }
+        Joints { linear: table - head, rotary }
+    }
+
+    /// The ways to a location, whatever the limits; `None` where the rotary axes cannot reach the tool axis.
+    ///
+    /// # Tolerance
+    /// [`Kinematics::forward`] gives the location again within 1e-9 (mm within a metre of the axes).
+    pub fn inverse(&self, to: &ClPoint) -> Option<Inverse> {
+        let solved = self.triangle.solve(&to.axis)?;
+        let free = solved.from_pole < angles::SLACK;
+        let solutions = [1.0, -1.0].map(|side| {
+            let [first, second] = self.triangle.angles(solved.azimuth, &solved, side);
+            let rotary = [if free { 0.0 } else { folded(first) }, folded(second)];
+            self.place(to.tip, rotary)
+        });
+        Some(Inverse { solutions, free })
+    }
+
+    /// The same pose with each rotary joint brought within its limits by whole turns, nearest to zero; `None`
+    /// where a joint, linear ones included, has no place there.
+    pub fn within_limits(&self, joints: &Joints) -> Option<Joints> {
+        let mut wound = *joints;
+        for (angle, axis) in wound.rotary.iter_mut().zip(&self.axes) {
+            if let Some(limits) = axis.limits {
+                let turns = choice::turns_within(*angle, limits)?;
+                let nearest = turns.min_by(|a, b| {
+                    let size = |n: &i32| (*angle + f64::from(*n) * std::f64::consts::TAU).abs();
+                    size(a).total_cmp(&size(b))
+                })?;
+                *angle += f64::from(nearest) * std::f64::consts::TAU;
+            }
+        }
+        let fits = |(value, limits): (&f64, &Option<[f64; 2]>)| {
+            limits.is_none_or(|[least, greatest]| (least..=greatest).contains(value))
+        };
+        wound.linear.iter().zip(&self.travel).all(fits).then_some(wound)
+    }
+}
+
+impl Joints {
+    /// X, Y, Z and both rotary axes, mm and rad.
+    pub fn values(&self) -> [f64; 5] {
+        [self.linear.x, self.linear.y, self.linear.z, self.rotary[0], self.rotary[1]]
+    }
+}
+
+/// An angle brought into −π..=π by whole turns.
+fn folded(angle: f64) -> f64 {
+    angle - std::f64::consts::TAU * (angle / std::f64::consts::TAU).round()
+}
+
+fn number(what: &'static str, value: f64) -> Result<(), KinematicsError> {
+    let expected = "a number of mm, below 100 m";
+    if value.abs() < GREATEST { Ok(()) } else { Err(KinematicsError::Number { what, value, expected }) }
+}
+
+fn check_limits(joint: char, limits: Option<[f64; 2]>, most: f64) -> Result<(), KinematicsError> {
+    match limits {
+        Some([least, greatest]) if !(-most <= least && least + LEAST_ROOM < greatest && greatest <= most) => {
+            Err(KinematicsError::Limits { joint })
+        }
+        _ => Ok(()),
+    }
+}

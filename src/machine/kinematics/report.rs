@@ -1,0 +1,189 @@
+//! What a machine has to do for a path: ranges, turning, singular poses, rewinds, limits, time.
+
+use super::angles::angle_between;
+use super::choice::LIMIT_SLACK;
+use super::follow::{JointPath, passes};
+use super::{Joints, Kinematics};
+use crate::geometry::Vector3;
+use crate::toolpath::Toolpath;
+use std::f64::consts::PI;
+
+/// Within this angle of a singular pose the first rotary axis turns by nearly half a turn while the tool hardly
+/// tilts: such places are told, rad (1°).
+pub const SINGULAR_ANGLE: f64 = PI / 180.0;
+
+/// A place where the tool axis comes close to the first rotary axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SingularPose {
+    /// Move in which it comes closest.
+    pub step: usize,
+    /// How close, rad.
+    pub angle: f64,
+}
+
+/// A turn for which the tool has to leave the part.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rewind {
+    /// The move that follows it.
+    pub step: usize,
+    /// By how much the rotary joints turn, rad.
+    pub turn: [f64; 2],
+    /// True between two rapid moves, where programs can rise for it.
+    pub clear: bool,
+}
+
+/// A joint out of its limits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LimitViolation {
+    /// Move in which it is farthest out.
+    pub step: usize,
+    /// The joint's letter.
+    pub joint: char,
+    /// Its value there, mm or rad.
+    pub value: f64,
+    /// The limit that it is beyond.
+    pub limit: f64,
+}
+
+/// What a machine has to do for a path.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct JointReport {
+    /// Least and greatest value of each joint, mm and rad.
+    pub ranges: [[f64; 2]; 5],
+    /// How far both rotary joints turn in all, rad.
+    pub rotary_travel: [f64; 2],
+    /// Points put in on moves.
+    pub inserted: usize,
+    /// Places within [`SINGULAR_ANGLE`] of a singular pose; moves in a row are one.
+    pub singular: Vec<SingularPose>,
+    /// Turns that leave the path.
+    pub rewinds: Vec<Rewind>,
+    /// Joints out of their limits, each row of locations once.
+    pub violations: Vec<LimitViolation>,
+}
+
+/// What forbids a program.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum Obstacle {
+    /// A joint would have to leave its limits.
+    #[error("move {} needs {} at {value:.3}, beyond its limit {limit:.3} (mm or degrees): set the part up otherwise, or widen the limits if the machine allows it", violation.step, violation.joint,
+        value = violation.shown(violation.value), limit = violation.shown(violation.limit))]
+    Limit {
+        /// The first of them.
+        violation: LimitViolation,
+    },
+    /// The joints would have to unwind while the tool is at the part.
+    #[error("before move {} the rotary joints have to unwind while the tool is at the part: widen their limits if the machine allows it, or divide the toolpath there", rewind.step)]
+    Rewind {
+        /// The first of them.
+        rewind: Rewind,
+    },
+}
+
+impl LimitViolation {
+    /// A value of the joint in mm or degrees.
+    pub fn shown(&self, value: f64) -> f64 {
+        if "XYZ".contains(self.joint) { value } else { value.to_degrees() }
+    }
+}
+
+/// Places where the tool axis comes within [`SINGULAR_ANGLE`] of the first rotary axis.
+pub(super) fn singular(kinematics: &Kinematics, path: &Toolpath) -> Vec<SingularPose> {
+    let pole = kinematics.triangle.pole;
+    let from_pole = |axis: &Vector3| {
+        let angle = angle_between(axis, &pole);
+        angle.min(PI - angle)
+    };
+    let mut places: Vec<SingularPose> = Vec::new();
+    let mut last = None;
+    for (step, next) in path.moves.iter().enumerate() {
+        let (from, to) = (path.location_before(step).axis, next.to.axis);
+        let between = passes(&from, &to, &pole).map_or(PI, |(_, _, off)| off);
+        let angle = from_pole(&from).min(from_pole(&to)).min(between);
+        if angle > SINGULAR_ANGLE {
+            continue;
+        }
+        match places.last_mut() {
+            Some(place) if last == step.checked_sub(1) && last.is_some() => {
+                if angle < place.angle {
+                    *place = SingularPose { step, angle };
+                }
+            }
+            _ => places.push(SingularPose { step, angle }),
+        }
+        last = Some(step);
+    }
+    places
+}
+
+impl JointPath {
+    /// Ranges, travel and limits.
+    pub(super) fn measure(&mut self, kinematics: &Kinematics) {
+        let (limits, letters) = (kinematics.limits(), kinematics.letters());
+        let report = &mut self.report;
+        report.ranges = self.start.values().map(|value| [value; 2]);
+        let mut last = self.start;
+        // Of each joint the violation that the row of locations before has made.
+        let mut open: [Option<usize>; 5] = [None; 5];
+        let start = (self.start, 0);
+        for (joints, step) in [start].into_iter().chain(self.locations.iter().map(|l| (l.joints, l.step))) {
+            for k in [0, 1] {
+                report.rotary_travel[k] += (joints.rotary[k] - last.rotary[k]).abs();
+            }
+            last = joints;
+            for (k, value) in joints.values().into_iter().enumerate() {
+                let range = &mut report.ranges[k];
+                *range = [range[0].min(value), range[1].max(value)];
+                let beyond = limits[k].and_then(|[least, greatest]| {
+                    let limit = if value < least { least } else { greatest };
+                    ((value - value.clamp(least, greatest)).abs() > LIMIT_SLACK).then_some(limit)
+                });
+                let Some(limit) = beyond else {
+                    open[k] = None;
+                    continue;
+                };
+                let found = LimitViolation { step, joint: letters[k], value, limit };
+                match open[k] {
+                    None => {
+                        open[k] = Some(report.violations.len());
+                        report.violations.push(found);
+                    }
+                    Some(at) => {
+                        let worst = &mut report.violations[at];
+                        if (value - limit).abs() > (worst.value - worst.limit).abs() {
+                            *worst = found;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// The least time of each of the path's `moves` moves by the rates of the rotary joints, s.
+    pub fn turning_times(&self, kinematics: &Kinematics, moves: usize) -> Vec<f64> {
+        let mut times = vec![0.0; moves];
+        let mut last = self.start;
+        for location in &self.locations {
+            if let Some(time) = times.get_mut(location.step) {
+                *time += turning_time(kinematics, &last, &location.joints);
+            }
+            last = location.joints;
+        }
+        times
+    }
+}
+
+/// The least time between two sets of joints by the rates of the rotary ones, s.
+pub(crate) fn turning_time(kinematics: &Kinematics, from: &Joints, to: &Joints) -> f64 {
+    let time = |k: usize| (to.rotary[k] - from.rotary[k]).abs() / kinematics.axes()[k].rate;
+    time(0).max(time(1))
+}
+
+impl JointReport {
+    /// What forbids to make a program: the first joint out of its limits or the first rewind at the part.
+    pub fn obstacle(&self) -> Option<Obstacle> {
+        let limit = self.violations.first().map(|violation| Obstacle::Limit { violation: *violation });
+        let rewind = self.rewinds.iter().find(|rewind| !rewind.clear);
+        limit.or(rewind.map(|rewind| Obstacle::Rewind { rewind: *rewind }))
+    }
+}
