@@ -10,20 +10,21 @@ use super::error::CliError;
 use super::load::load_part;
 use super::outputs::Outputs;
 use super::pocket::{limit_feed_by, load_pocket, pocket_figures};
-use super::program::write_gcode;
+use super::program;
 use super::progress::Progress;
 use crate::geometry::Aabb;
 use crate::io::scene::{Engine, PartSource, Scene, ToolpathRequest, auto_cell};
 use crate::io::{ProgramHeader, apt_cl, exr, ply_write, png, stl_write};
-use crate::machine::{machining_time, slow_corners};
+use crate::machine::kinematics::{JointPath, JointReport};
+use crate::machine::slow_corners;
 use crate::metrology::{Asked, Measurement, RemovalFigures, measure, path_figures, removal_figures};
 use crate::monitor::{self, Monitor as _};
 use crate::parallel;
 use crate::part::Part;
 use crate::report::{
-    FieldFigures, HIGHEST_RIDGE, Histogram, MAX_TRIANGLES, MapSize, MapWords, Picture, RunReport,
-    ShortestFigures, SimulationFigures, SurfaceMeshFigures, ToolpathPage, ToolpathResult, Verdict, collision,
-    deviation_colours, deviation_picture, field_picture, height_picture, holder_note, html_page,
+    FieldFigures, HIGHEST_RIDGE, Histogram, MAX_TRIANGLES, MachineFigures, MapSize, MapWords, Picture,
+    RunReport, ShortestFigures, SimulationFigures, SurfaceMeshFigures, ToolpathPage, ToolpathResult, Verdict,
+    collision, deviation_colours, deviation_picture, field_picture, height_picture, holder_note, html_page,
     interval_picture, marks, rapid_violation, result_table, surface_mesh, violations, wall_violation,
 };
 use crate::sim::{Grid, GridError, ZMap, cut, cut_in_order, cut_reference, holder_collisions};
@@ -265,6 +266,7 @@ impl<'a> Job<'a> {
         if scene.machine.slow_corners {
             planned.path = slow_corners(&planned.path, &scene.machine);
         }
+        let joints = program::joints(scene, &request.name, &planned.path)?;
         let (grid, note) =
             lay_out_for(scene, &self.part, &self.grid, &planned.path).map_err(CliError::grid(scene))?;
         let begun = Instant::now();
@@ -305,7 +307,7 @@ impl<'a> Job<'a> {
         monitor::check(monitor)?;
         monitor.start("writing results", 0);
         outputs.folder(&request.folder)?;
-        let programs = || self.write_programs(request, &planned, outputs);
+        let programs = || self.write_programs(request, &planned, joints.as_ref(), outputs);
         let maps = || self.write_maps(request, &planned, &cut, &measured, outputs);
         let mesh = || self.write_mesh(request, &planned.path, &cut, &measured, outputs);
         let (surface_mesh, (page, lines)) = parallel::join(mesh, || parallel::join(maps, programs));
@@ -316,7 +318,16 @@ impl<'a> Job<'a> {
         for contact in removal.iter_mut().flat_map(|removal| &mut removal.rapid_contacts) {
             contact.line = lines.get(contact.move_index as usize).copied().unwrap_or_default();
         }
-        let mut result = self.result(request, &planned, note, measured, removal, simulation, surface_mesh);
+        let mut result = self.result(
+            request,
+            &planned,
+            joints.as_ref(),
+            note,
+            measured,
+            removal,
+            simulation,
+            surface_mesh,
+        );
         if let Some((pocket, strategy)) = milled {
             let figures =
                 pocket_figures(scene, pocket, strategy, request.step, &planned.path, &cut, self.top, engaged);
@@ -340,6 +351,7 @@ impl<'a> Job<'a> {
         &self,
         request: &ToolpathRequest,
         planned: &Plan,
+        joints: Option<&JointPath>,
         note: Option<String>,
         measured: Measurement,
         removal: Option<RemovalFigures>,
@@ -349,7 +361,7 @@ impl<'a> Job<'a> {
         let rapid = removal.as_ref().and_then(rapid_violation);
         let violations: Vec<_> =
             rapid.into_iter().chain(violations(&measured, &self.scene.tolerance)).collect();
-        let time = machining_time(&planned.path, &self.scene.machine);
+        let time = program::time(self.scene, &planned.path, joints);
         let path = path_figures(&planned.path, time);
         ToolpathResult {
             name: request.name.clone(),
@@ -364,12 +376,16 @@ impl<'a> Job<'a> {
                 .chain(&measured.refined.note)
                 .chain(&planned.notes)
                 .cloned()
+                .chain(joints.and_then(|joints| machine_note(&joints.report)))
                 .collect(),
             path,
             shortest: planned
                 .shortest
                 .and_then(|shortest| ShortestFigures::new(&shortest, path.cutting_length_mm)),
             field: planned.field.as_ref().map(FieldFigures::new),
+            machine: joints
+                .zip(self.scene.five_axis.as_ref())
+                .map(|(joints, five_axis)| MachineFigures::new(&five_axis.kinematics, &joints.report)),
             scallop: measured.scallop,
             gouge: measured.gouge,
             uncut: measured.uncut,
@@ -386,6 +402,7 @@ impl<'a> Job<'a> {
         &self,
         request: &ToolpathRequest,
         planned: &Plan,
+        joints: Option<&JointPath>,
         outputs: &Outputs,
     ) -> Result<Vec<u32>, CliError> {
         let (path, cutter) = (&planned.path, &self.scene.cutter);
@@ -395,7 +412,7 @@ impl<'a> Job<'a> {
         };
         let file = |name: &str| format!("{}/{name}", request.folder);
         outputs.file(&file("toolpath.cls"), |out| apt_cl::write(out, path, cutter, &header))?;
-        write_gcode(self.scene, &request.name, path, &header, outputs, &file("toolpath.nc"))
+        program::write_gcode(self.scene, path, joints, &header, outputs, &file("toolpath.nc"))
     }
 
     /// Writes height.exr and the pictures; leaves what the page shows.
@@ -511,6 +528,17 @@ impl<'a> Job<'a> {
         let tolerance_mm = mesh.as_ref().map_or(tolerance, |m| m.tolerance);
         Ok(SurfaceMeshFigures { triangles: triangles.len(), tolerance_mm })
     }
+}
+
+/// What the user should know of how the machine moves.
+fn machine_note(report: &JointReport) -> Option<String> {
+    let (poses, rewinds) = (report.singular.len(), report.rewinds.len());
+    (poses + rewinds > 0).then(|| {
+        format!(
+            "the rotary joints come within a degree of a singular pose {poses} times, and unwind {rewinds} times \
+             between passes"
+        )
+    })
 }
 
 #[cfg(test)]

@@ -71,6 +71,7 @@ pub fn toolpath(name: &str, machining_time_s: f64, gouge: f64) -> ToolpathResult
         },
         shortest: None,
         field: None,
+        machine: None,
         scallop: measured.scallop,
         gouge: measured.gouge,
         uncut: measured.uncut,

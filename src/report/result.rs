@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::verdict::{Verdict, Violation};
+use crate::machine::kinematics::{JointReport, Kinematics};
 use crate::metrology::{
     DeviationFigures, GougeFigures, Limits, PathFigures, PocketFigures, RemovalFigures, ScallopFigures,
     UncutFigures,
@@ -41,6 +42,48 @@ pub struct SurfaceMeshFigures {
     pub tolerance_mm: f64,
 }
 
+/// The way of one joint.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct JointRange {
+    /// Its letter.
+    pub joint: char,
+    /// Least and greatest value, mm, or degrees of a rotary joint.
+    pub range: [f64; 2],
+}
+
+/// How the joints of a five-axis machine move along a path.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MachineFigures {
+    /// X, Y, Z and the two rotary joints.
+    pub joints: Vec<JointRange>,
+    /// How far each of the rotary joints turns in all.
+    pub rotary_travel_deg: [f64; 2],
+    /// Places where the tool axis comes within a degree of the first rotary axis.
+    pub singular_poses: usize,
+    /// Turns for which the tool leaves the part.
+    pub rewinds: usize,
+    /// Locations put in to keep the tool within the chord tolerance.
+    pub inserted_locations: usize,
+}
+
+impl MachineFigures {
+    /// Of the joints along a path.
+    pub fn new(kinematics: &Kinematics, report: &JointReport) -> Self {
+        let ranges = kinematics.letters().into_iter().zip(report.ranges);
+        let shown = |(k, (joint, range)): (usize, (char, [f64; 2]))| JointRange {
+            joint,
+            range: if k < 3 { range } else { range.map(f64::to_degrees) },
+        };
+        Self {
+            joints: ranges.enumerate().map(shown).collect(),
+            rotary_travel_deg: report.rotary_travel.map(f64::to_degrees),
+            singular_poses: report.singular.len(),
+            rewinds: report.rewinds.len(),
+            inserted_locations: report.inserted,
+        }
+    }
+}
+
 /// All that is reported of one toolpath, in the order of report.json.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ToolpathResult {
@@ -64,6 +107,9 @@ pub struct ToolpathResult {
     /// What it was planned by, for a streamline.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub field: Option<FieldFigures>,
+    /// How the machine's joints move, on a machine of five axes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub machine: Option<MachineFigures>,
     /// Scallops.
     pub scallop: ScallopFigures,
     /// Gouges.

@@ -6,6 +6,7 @@ use std::time::Instant;
 use super::{BYTES_PER_MOVE, Job, MIB, part_bytes};
 use crate::cli::error::CliError;
 use crate::cli::outputs::Outputs;
+use crate::cli::program;
 use crate::cutter::Solid;
 use crate::geometry::Point2;
 use crate::io::scene::ToolpathRequest;
@@ -50,6 +51,7 @@ impl Job<'_> {
         if scene.machine.slow_corners {
             planned.path = slow_corners(&planned.path, &scene.machine);
         }
+        let joints = program::joints(scene, &request.name, &planned.path)?;
         // Deviations are exact at the places, and ridges are found between them, so that fewer do than cells.
         let wider = if scene.simulation.cell_is_auto { PLACES_OVER_CELLS } else { 1.0 };
         let spacing = wider * scene.simulation.cell;
@@ -85,13 +87,14 @@ impl Job<'_> {
         monitor::check(monitor)?;
         monitor.start("writing results", 0);
         outputs.folder(&request.folder)?;
-        let lines = self.write_programs(request, &planned, outputs)?;
+        let lines = self.write_programs(request, &planned, joints.as_ref(), outputs)?;
         for region in &mut measured.gouge.regions {
             region.line = lines.get(region.move_index as usize).copied().unwrap_or_default();
         }
         let surface_mesh = self.write_normal_mesh(request, &map, outputs)?;
         let page = self.write_normal_maps(request, &map, &measured, spacing, outputs)?;
-        let result = self.result(request, &planned, None, measured, None, simulation, surface_mesh);
+        let result =
+            self.result(request, &planned, joints.as_ref(), None, measured, None, simulation, surface_mesh);
         Ok((result, page))
     }
 
