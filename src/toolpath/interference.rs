@@ -2,19 +2,30 @@
 //!
 //! Enters: the tool as a [`Solid`] of convex pieces, its location, and meshes with their search trees, mm. Leaves: the
 //! nearest place of the meshes with its signed distance from the tool, for one location ([`Obstacle::clearance`]) or
-//! a whole move ([`Obstacle::clear`]), and passes repaired by tilting, lifting or leaving contacts out.
+//! a whole move ([`Obstacle::swept_clearance`]), and passes repaired by tilting, lifting or leaving contacts out.
 //!
 //! The surface itself counts, be it closed or not: the distance of the place that lies deepest in the tool, or nearest to
 //! it. A tool wholly inside of a closed mesh touches none of its surface; it got there through it.
 
+mod checks;
+mod lead;
 mod piece;
+mod repair;
+mod sweep;
 #[cfg(test)]
 mod tests;
 
 use super::ClPoint;
 use crate::cutter::Solid;
 use crate::geometry::{Bvh, Node, Point3, TriangleMesh};
-use piece::{Piece, middle};
+pub use checks::{Check, Interference, Shortfall};
+pub use lead::local_gouge_free_lead;
+use piece::Piece;
+#[cfg(test)]
+use piece::middle;
+pub use repair::{RepairSummary, Unreachable};
+pub(super) use repair::{Repaired, repair};
+pub use sweep::SweptClearance;
 
 /// A mesh that a tool may run into.
 #[derive(Debug, Clone, Copy)]
@@ -68,15 +79,19 @@ impl<'a> Obstacle<'a> {
         })
     }
 
-    fn nearest(&self, piece: &Piece, limit: f64, best: &mut Option<Clearance>) {
+    /// Puts in `best` what is nearer than that, or than `limit`; tells whether there is such a place.
+    fn nearest(&self, piece: &Piece, limit: f64, best: &mut Option<Clearance>) -> bool {
         let start = best.as_ref().map_or(limit, |b| b.distance);
+        let mut found = false;
         self.bvh.tree().search(-start, farthest(piece), |slot, now| {
             let triangle = self.bvh.triangle_in(slot);
             let Some(place) = piece.nearest_on(&self.mesh.corners(triangle), -now) else { return now };
             *best =
                 Some(Clearance { distance: place.distance, place: place.point, triangle: triangle as u32 });
+            found = true;
             -place.distance
         });
+        found
     }
 }
 

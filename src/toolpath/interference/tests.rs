@@ -4,6 +4,9 @@ use super::*;
 use crate::cutter::{AptWords, Cutter, Holder, HolderSection};
 use crate::geometry::Vector3;
 
+mod repair;
+mod sweep;
+
 /// Deterministic numbers (xorshift64*, Vigna 2016).
 pub(super) struct Numbers(pub(super) u64);
 
