@@ -2,7 +2,8 @@
 
 use super::{Clearance, Obstacle};
 use crate::cutter::Solid;
-use crate::toolpath::ClPoint;
+use crate::parallel;
+use crate::toolpath::{ClPoint, Move, Toolpath};
 
 /// A solid that keeps its distance from an obstacle: a cutter from the part and from fixtures, a holder from both.
 #[derive(Debug, Clone, Copy)]
@@ -85,6 +86,20 @@ impl Interference<'_> {
             Some(Shortfall { depth, check: k, t: hit.t, nearest: hit.nearest })
         };
         worst(self.checks.iter().enumerate().filter_map(one))
+    }
+
+    /// The moves of a path, of those that `chosen` picks, on which a check fails, with the one that fails by most.
+    pub fn on_path(
+        &self,
+        path: &Toolpath,
+        chosen: impl Fn(&Move) -> bool + Sync + Send,
+    ) -> Vec<(usize, Shortfall)> {
+        let failed = parallel::map(path.len(), |k| {
+            let to = &path.moves[k];
+            let missing = chosen(to).then(|| self.on_move(&path.location_before(k), &to.to)).flatten()?;
+            Some((k, missing))
+        });
+        failed.into_iter().flatten().collect()
     }
 }
 

@@ -318,7 +318,7 @@ impl RepairSummary {
     }
 
     /// Takes in what was changed on another pass.
-    pub fn add(&mut self, other: Self) {
+    pub fn add(&mut self, other: &Self) {
         self.tilted += other.tilted;
         self.greatest_tilt = self.greatest_tilt.max(other.greatest_tilt);
         self.lifted += other.lifted;
@@ -326,7 +326,7 @@ impl RepairSummary {
             self.greatest_lift = other.greatest_lift;
         }
         self.added += other.added;
-        self.unreachable.extend(other.unreachable);
+        self.unreachable.extend(&other.unreachable);
     }
 
     /// In words, for whoever reads the report; nothing where nothing was changed.
