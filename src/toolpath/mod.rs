@@ -9,6 +9,7 @@ mod contour_spiral;
 mod drop;
 mod feed;
 mod halving;
+mod interference;
 mod iso_scallop;
 mod level_passes;
 mod link;
@@ -34,6 +35,10 @@ mod zigzag;
 pub use arc::{ARC_SHARE, Arc, ArcError, Plane};
 pub use chord::distance_to_segment;
 pub use drop::{Drop, DropCutter, GridDrop, PlanGrid};
+pub use interference::{
+    Check, Clearance, Interference, Obstacle, RepairSummary, Shortfall, SweptClearance, Unreachable,
+    local_gouge_free_lead,
+};
 pub use link::{Joining, LONGEST_LINK, Links, longest_link};
 pub use path::{CcPoint, ClPoint, Move, MoveKind, Toolpath};
 pub use plan::{

@@ -9,7 +9,7 @@
 use super::chord::{Watch, Waypoint, reduced_indices, sample_within_chord};
 use super::plan::PlanError;
 use super::tool_axis::{AxisError, ToolAxis, location};
-use super::{CcPoint, ClPoint};
+use super::{CcPoint, ClPoint, Interference};
 use crate::cutter::Cutter;
 use crate::geometry::{Point3, Vector3};
 use crate::monitor::{Cancelled, Monitor};
@@ -32,6 +32,8 @@ pub struct Tilting<'a> {
     pub axis: &'a ToolAxis,
     /// The axis turns by no more than this along a pass, rad a mm of contact; `None` leaves the rule alone.
     pub most_turning: Option<f64>,
+    /// What the tool must keep away from; passes are repaired where it does not.
+    pub interference: Option<&'a Interference<'a>>,
 }
 
 /// Passes of a tilted cutter, not yet joined.
@@ -245,13 +247,28 @@ pub(super) fn limit_turning(pass: &mut [Touch], cutter: &Cutter, rate: f64) -> b
     !turns_too_fast(&axes)
 }
 
-/// The locations that a pass needs to stay within `tolerance` of it, mm.
+/// The locations that a pass needs to stay within `tolerance` of it, mm, and clear of what is to be kept away from, as far as
+/// its own moves are.
 pub(super) fn thinned(
     pass: &[Touch],
     tolerance: f64,
+    keep: Option<&Interference>,
     monitor: &dyn Monitor,
 ) -> Result<Vec<ClPoint>, Cancelled> {
-    let kept = reduced_indices(pass, tolerance, &mut Watch::new(monitor))?;
+    let mut watch = Watch::new(monitor);
+    let mut waiting = reduced_indices(pass, tolerance, &mut watch)?;
+    waiting.reverse();
+    let mut kept: Vec<usize> = waiting.pop().into_iter().collect();
+    while let (Some(&from), Some(&to)) = (kept.last(), waiting.last()) {
+        watch.step()?;
+        let clear = |keep: &Interference| keep.on_move(&pass[from].at, &pass[to].at).is_none();
+        if to - from < 2 || keep.is_none_or(clear) {
+            kept.push(to);
+            waiting.pop();
+        } else {
+            waiting.push((from + to) / 2);
+        }
+    }
     Ok(kept.into_iter().map(|k| pass[k].at).collect())
 }
 
@@ -271,7 +288,7 @@ mod tests {
         for (cutter, lead) in [(Cutter::ball(6.0).unwrap(), 0.2), (Cutter::bull(6.0, 1.0).unwrap(), 0.1)] {
             let rule = ToolAxis::LeadTilt { lead, tilt: 0.05 };
             let touches = along(&arc, [0.0, 1.5], &cutter, &rule, 1e-3, &Silent).unwrap();
-            let kept = thinned(&touches, 6e-4, &Silent).unwrap();
+            let kept = thinned(&touches, 6e-4, None, &Silent).unwrap();
             assert!(kept.len() < 90 && kept.len() * 2 < touches.len(), "{} of {}", kept.len(), touches.len());
             // The circle of the arc's centres comes as near to the cylinder as the arc's radius.
             let profile = *cutter.profile();

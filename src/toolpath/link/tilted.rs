@@ -4,9 +4,12 @@
 //! the other. Between two passes the cutter retreats along its own axis, which frees it whatever it leans
 //! against, and goes over at rapid rate: straight where that is free, else around a sphere that holds part
 //! and stock, on which every place of the cutter is outside while its axis points away from the middle.
+//! Where the tool is to keep away from something, passes are repaired first, and what it comes too near to in between is
+//! noted.
 
+use super::super::interference::{Repaired, repair};
 use super::super::tilted::{TiltedPasses, Tilting, Touch, limit_turning, reversed, thinned};
-use super::super::{ClPoint, Move, MoveKind, PlanError, PlanSettings, Toolpath};
+use super::super::{ClPoint, Interference, Move, MoveKind, PlanError, PlanSettings, RepairSummary, Toolpath};
 use super::order::{Visit, is_closed, order};
 use super::{Links, Rates, longest_link};
 use crate::cutter::Cutter;
@@ -48,9 +51,16 @@ pub fn join_tilted(
         let mut pass =
             visited(&passes[visits[k].pass], &contacts[visits[k].pass], &visits[k], cutter, tilting)?;
         let even = tilting.most_turning.is_none_or(|rate| limit_turning(&mut pass, cutter, rate));
-        Ok::<_, PlanError>((thinned(&pass, tolerance, monitor)?, even))
+        let keep = tilting.interference;
+        let Repaired { passes, summary } = match keep {
+            Some(keep) => repair(&pass, cutter, keep, tilting.most_turning, monitor)?,
+            None => Repaired { passes: vec![pass], summary: RepairSummary::default() },
+        };
+        let long = passes.iter().filter(|pass| pass.len() >= 2);
+        let thin = long.map(|pass| thinned(pass, tolerance, keep, monitor)).collect::<Result<Vec<_>, _>>()?;
+        Ok::<_, PlanError>((thin, summary, even))
     })?;
-    let uneven = turned.iter().filter(|(_, even)| !even).count();
+    let uneven = turned.iter().filter(|(_, _, even)| !even).count();
     if uneven > 0 {
         notes.push(format!(
             "on {uneven} passes the axis turns faster than asked: they are too short for their turns"
@@ -58,12 +68,33 @@ pub fn join_tilted(
     }
     let mut program =
         Program { settings, sphere: Sphere::around(part, settings), start: None, moves: Vec::new() };
-    for (k, (pass, _)) in turned.iter().enumerate() {
+    let mut summary = RepairSummary::default();
+    turned.iter().for_each(|(_, one, _)| summary.add(one));
+    notes.extend(summary.notes());
+    for (k, pass) in turned.iter().flat_map(|(passes, ..)| passes).enumerate() {
         monitor::check(monitor)?;
         program.reach(k as u32, &pass[0]);
         pass[1..].iter().for_each(|to| program.push(*to, MoveKind::Cut, settings.feed_rate, k as u32));
     }
-    Ok(program.finish())
+    let path = program.finish();
+    notes.extend(tilting.interference.and_then(|keep| too_near_between(keep, &path)));
+    Ok(path)
+}
+
+/// What the tool comes too near to between passes, in words.
+fn too_near_between(keep: &Interference, path: &Toolpath) -> Option<String> {
+    let found = keep.on_path(path, |to| !to.kind.is_on_surface());
+    let (_, worst) = found.iter().max_by(|a, b| a.1.depth.total_cmp(&b.1.depth))?;
+    let p = worst.nearest.place;
+    Some(format!(
+        "{} moves between passes come nearer to part or fixtures than asked; {:.3} mm are missing at ({:.3}, {:.3}, {:.3}): \
+         lean the tool otherwise there, or clear the way",
+        found.len(),
+        worst.depth,
+        p.x,
+        p.y,
+        p.z
+    ))
 }
 
 /// A pass as it is visited.

@@ -1,0 +1,124 @@
+//! Poses of a tool along passes over a wave of a million triangles, each asked for cutter and holder. The table gives
+//! poses per second.
+
+use divan::Bencher;
+use divan::counter::ItemsCount;
+use millstream::cutter::{Cutter, Holder, HolderSection, Solid};
+use millstream::geometry::{Bvh, Point3, TriangleMesh, Vector3};
+use millstream::parallel;
+use millstream::toolpath::{CcPoint, Check, ClPoint, Interference, Obstacle, location};
+
+fn main() {
+    divan::main();
+}
+
+/// Quads a side: 2 × 708² triangles.
+const QUADS: u32 = 708;
+/// Side of the part, mm.
+const SIZE: f64 = 100.0;
+/// Passes, and poses on each.
+const PASSES: usize = 100;
+const POSES: usize = 1000;
+/// Lean of the axis forward from the normal, rad.
+const LEAD: f64 = 0.15;
+
+fn height(x: f64, y: f64) -> f64 {
+    4.0 * (0.1 * x).sin() * (0.08 * y).cos()
+}
+
+fn normal(x: f64, y: f64) -> Vector3 {
+    let (dx, dy) = (0.4 * (0.1 * x).cos() * (0.08 * y).cos(), -0.32 * (0.1 * x).sin() * (0.08 * y).sin());
+    Vector3::new(-dx, -dy, 1.0).normalize()
+}
+
+fn wave() -> (TriangleMesh, Bvh) {
+    let vertex = |i: u32| {
+        let at = |k: u32| SIZE * f64::from(k) / f64::from(QUADS);
+        let (x, y) = (at(i % (QUADS + 1)), at(i / (QUADS + 1)));
+        Point3::new(x, y, height(x, y))
+    };
+    let vertices = (0..(QUADS + 1) * (QUADS + 1)).map(vertex).collect();
+    let quads = (0..QUADS * QUADS).map(|q| (q / QUADS) * (QUADS + 1) + q % QUADS);
+    let triangles = quads.flat_map(|a| [[a, a + 1, a + QUADS + 2], [a, a + QUADS + 2, a + QUADS + 1]]);
+    let (mesh, _) = TriangleMesh::new(vertices, triangles.collect()).expect("a height field is a mesh");
+    let bvh = Bvh::new(&mesh);
+    (mesh, bvh)
+}
+
+fn holder() -> Holder {
+    let section = |diameter, top_diameter, length| HolderSection { diameter, top_diameter, length };
+    let sections = vec![section(6.0, 6.0, 20.0), section(16.0, 24.0, 15.0), section(40.0, 40.0, 30.0)];
+    Holder::new(10.0, sections).expect("valid dimensions")
+}
+
+fn cutter(name: &str) -> Cutter {
+    match name {
+        "ball" => Cutter::ball(6.0),
+        "flat" => Cutter::flat(6.0),
+        _ => Cutter::bull(6.0, 1.0),
+    }
+    .expect("valid dimensions")
+}
+
+fn poses(cutter: &Cutter) -> Vec<ClPoint> {
+    let pose = |k: usize| {
+        let at = |k: usize, n: usize| SIZE * (k as f64 + 0.5) / n as f64;
+        let (x, y) = (at(k % POSES, POSES), at(k / POSES, PASSES));
+        let normal = normal(x, y);
+        let forward = Vector3::new(normal.z, 0.0, -normal.x).normalize();
+        let axis = normal * LEAD.cos() + forward * LEAD.sin();
+        location(cutter, &CcPoint { point: Point3::new(x, y, height(x, y)), normal }, &axis)
+    };
+    (0..PASSES * POSES).map(pose).collect()
+}
+
+struct Tool {
+    edges: Solid,
+    held: Solid,
+}
+
+fn tool(cutter: &Cutter) -> Tool {
+    Tool { edges: Solid::of_cutter(cutter, Some(&holder())), held: Solid::of_holder(&holder()) }
+}
+
+/// Whether the cutter stays out by a micrometre and the holder 1 mm away, on all threads.
+#[divan::bench(args = ["ball", "flat", "bull"], sample_count = 3)]
+fn checked(bencher: Bencher, name: &str) {
+    let (mesh, bvh) = wave();
+    let cutter = cutter(name);
+    let (tool, poses, obstacle) = (tool(&cutter), poses(&cutter), Obstacle::new(&mesh, &bvh));
+    let check = |solid, needed| Check { solid, obstacle, needed };
+    let checks = vec![check(&tool.edges, -0.001), check(&tool.held, 1.0)];
+    let keep = Interference { checks, greatest_tilt: 0.0, greatest_lift: 0.0 };
+    bencher.counter(ItemsCount::new(poses.len())).bench_local(|| {
+        parallel::map(poses.len(), |k| keep.is_clear(&poses[k])).iter().filter(|&&c| c).count()
+    });
+}
+
+/// The exact clearance of the cutter and of the holder, however far, on all threads.
+#[divan::bench(args = ["ball", "flat", "bull"], sample_count = 3)]
+fn measured(bencher: Bencher, name: &str) {
+    let (mesh, bvh) = wave();
+    let cutter = cutter(name);
+    let (tool, poses, obstacle) = (tool(&cutter), poses(&cutter), Obstacle::new(&mesh, &bvh));
+    let least = |solid, at| obstacle.clearance(solid, at, f64::INFINITY).map_or(0.0, |c| c.distance);
+    bencher.counter(ItemsCount::new(poses.len())).bench_local(|| {
+        parallel::map(poses.len(), |k| least(&tool.edges, &poses[k]).min(least(&tool.held, &poses[k])))
+    });
+}
+
+/// The moves between the poses of a pass, on all threads.
+#[divan::bench(args = ["ball", "flat", "bull"], sample_count = 3)]
+fn moves(bencher: Bencher, name: &str) {
+    let (mesh, bvh) = wave();
+    let cutter = cutter(name);
+    let (tool, poses, obstacle) = (tool(&cutter), poses(&cutter), Obstacle::new(&mesh, &bvh));
+    let check = |solid, needed| Check { solid, obstacle, needed };
+    let checks = vec![check(&tool.edges, -0.001), check(&tool.held, 1.0)];
+    let keep = Interference { checks, greatest_tilt: 0.0, greatest_lift: 0.0 };
+    let starts: Vec<usize> = (0..poses.len()).filter(|k| (k + 1) % POSES != 0).collect();
+    bencher.counter(ItemsCount::new(starts.len())).bench_local(|| {
+        let clear = |&k: &usize| keep.on_move(&poses[k], &poses[k + 1]).is_none();
+        parallel::map(starts.len(), |i| clear(&starts[i])).iter().filter(|&&c| c).count()
+    });
+}
