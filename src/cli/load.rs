@@ -28,18 +28,31 @@ pub fn load_part(scene: &Scene) -> Result<(Part, Vec<String>), CliError> {
             Ok((seen_from_above(part).map_err(|e| refused(scene, file, e))?, Vec::new()))
         }
         PartSource::Mesh { file, format, scale, .. } => {
-            let read = match format {
-                MeshFormat::Stl => stl::read(&file.path),
-                MeshFormat::Obj => obj::read(&file.path),
-            };
-            let (mesh, repairs) = read.map_err(|e| refused(scene, file, e))?;
-            let mesh = in_mm(mesh, *scale).map_err(|e| refused(scene, file, e))?;
-            let notes =
-                if repairs.is_clean() { Vec::new() } else { vec![format!("{}: {repairs}", file.written)] };
+            let (mesh, notes) = load_mesh(scene, file, *format, *scale)?;
             let part = seen_from_above(Part::from_mesh(mesh)).map_err(|e| refused(scene, file, e))?;
             Ok((part, notes))
         }
     }
+}
+
+/// Reads a mesh, in mm. The notes tell what was mended to make it usable.
+///
+/// # Errors
+/// [`CliError`]: the file's fault, shown at its name in the scene.
+pub fn load_mesh(
+    scene: &Scene,
+    file: &NamedFile,
+    format: MeshFormat,
+    scale: f64,
+) -> Result<(TriangleMesh, Vec<String>), CliError> {
+    let read = match format {
+        MeshFormat::Stl => stl::read(&file.path),
+        MeshFormat::Obj => obj::read(&file.path),
+    };
+    let (mesh, repairs) = read.map_err(|e| refused(scene, file, e))?;
+    let mesh = in_mm(mesh, scale).map_err(|e| refused(scene, file, e))?;
+    let notes = if repairs.is_clean() { Vec::new() } else { vec![format!("{}: {repairs}", file.written)] };
+    Ok((mesh, notes))
 }
 
 /// A part that has an area in the plan view, which alone can be milled along z.
@@ -72,7 +85,7 @@ fn of_patches(patches: Vec<Patch>) -> Result<Part, PartError> {
 fn refused(scene: &Scene, file: &NamedFile, fault: impl std::fmt::Display) -> SceneError {
     scene.source.error(
         file.span.clone(),
-        format!("the part's file cannot be used: {fault}"),
+        format!("the file cannot be used: {fault}"),
         "mend that file or name another one",
     )
 }

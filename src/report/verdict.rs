@@ -20,6 +20,7 @@ use super::map::MapMark;
 use super::table::{micrometres, with_bound};
 use crate::metrology::{Limits, Measurement, PocketFigures, RemovalFigures};
 use crate::sim::HolderClearance;
+use crate::toolpath::Shortfall;
 
 /// The highest ridge may exceed the scallop tolerance by this factor. Less fails plans for single
 /// points of a few per cent; more lets visible ridges pass.
@@ -104,6 +105,25 @@ pub fn collision(holder: &HolderClearance, lines: &[u32]) -> Option<Violation> {
         worst.move_index,
         lines.get(worst.move_index as usize).copied().unwrap_or_default(),
         match holder.collisions.len() {
+            1 => String::new(),
+            2 => ", and on one more move".to_owned(),
+            n => format!(", and on {} more moves", n - 1),
+        }
+    );
+    Some(Violation { what: "collision", limit_mm: 0.0, measured_mm: worst.depth, text })
+}
+
+/// The violation that a tool touches what it should not: moves, what is missing there, and what of the tool it is; `lines`
+/// are those of the moves in the program, if there is one.
+pub fn tool_collision(found: &[(usize, Shortfall, &str)], lines: &[u32]) -> Option<Violation> {
+    let (index, worst, what) = found.iter().reduce(|a, b| if b.1.depth > a.1.depth { b } else { a })?;
+    let at = worst.nearest.place;
+    let line = lines.get(*index).map_or_else(String::new, |line| format!(", toolpath.nc line {line}"));
+    let text = format!(
+        "{what} runs {:.3} mm into part or fixture at {}, move {index}{line}{}",
+        worst.depth,
+        place(at.into()),
+        match found.len() {
             1 => String::new(),
             2 => ", and on one more move".to_owned(),
             n => format!(", and on {} more moves", n - 1),

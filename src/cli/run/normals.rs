@@ -5,21 +5,22 @@ use std::time::Instant;
 
 use super::{BYTES_PER_MOVE, Job, MIB, part_bytes};
 use crate::cli::error::CliError;
+use crate::cli::load::load_mesh;
 use crate::cli::outputs::Outputs;
 use crate::cli::program;
 use crate::cutter::Solid;
-use crate::geometry::Point2;
-use crate::io::scene::ToolpathRequest;
+use crate::geometry::{Bvh, Point2, TriangleMesh};
+use crate::io::scene::{Fixture, Scene, ToolpathRequest};
 use crate::io::{exr, ply_write, png, stl_write};
 use crate::machine::slow_corners;
 use crate::metrology::{Measurement, NormalMap, PatchGrid, SweptVolume, measure_along_normals, net_places};
 use crate::monitor::{self, Monitor as _};
 use crate::report::{
     HIGHEST_RIDGE, Histogram, MapSize, MapWords, SimulationFigures, SurfaceMeshFigures, ToolpathPage,
-    ToolpathResult, deviation_colours, deviation_picture,
+    ToolpathResult, Violation, deviation_colours, deviation_picture, tool_collision,
 };
 use crate::sim::{Grid, Rays};
-use crate::toolpath::{Tilting, plan, plan_tilted};
+use crate::toolpath::{Check, Interference, Move, MoveKind, Obstacle, Tilting, Toolpath, plan, plan_tilted};
 
 /// Bytes a place of the net: place, hit, triangles with their crossings, and the map; 480 were counted.
 const BYTES_PER_PLACE: u64 = 600;
@@ -31,6 +32,20 @@ const PLACES_OVER_CELLS: f64 = 2.0;
 /// far below it as that radius, so that the far side of a thin part counts for nothing.
 const REACH_OVER_UNCUT: f64 = 4.0;
 
+/// The solids of a tool.
+struct Tool {
+    cutter: Solid,
+    /// Shank and holder.
+    holder: Option<Solid>,
+}
+
+impl Tool {
+    fn of(scene: &Scene) -> Self {
+        let cutter = Solid::of_cutter(&scene.cutter, scene.holder.as_ref());
+        Self { cutter, holder: scene.holder.as_ref().map(Solid::of_holder) }
+    }
+}
+
 impl Job<'_> {
     /// Plans one toolpath, measures it along the normals and writes its folder.
     pub(super) fn along_normals(
@@ -40,9 +55,13 @@ impl Job<'_> {
     ) -> Result<(ToolpathResult, ToolpathPage), CliError> {
         let (scene, monitor) = (self.scene, self.progress);
         let settings = self.settings(request);
+        let fixtures = self.fixtures()?;
+        let tool = Tool::of(scene);
         let planned = match &request.axis {
             Some(axis) => {
-                let tilting = Tilting { axis: &axis.rule, most_turning: axis.most_turning };
+                let keep = self.keep_clear(&tool, &fixtures);
+                let tilting =
+                    Tilting { axis: &axis.rule, most_turning: axis.most_turning, interference: Some(&keep) };
                 plan_tilted(&self.part, &scene.cutter, &request.strategy, &tilting, &settings, monitor)
             }
             None => plan(&self.part, &scene.cutter, &request.strategy, &settings, monitor),
@@ -57,11 +76,11 @@ impl Job<'_> {
         let spacing = wider * scene.simulation.cell;
         self.check_places(spacing, planned.path.len())?;
         let begun = Instant::now();
-        let solid = Solid::of_cutter(&scene.cutter, scene.holder.as_ref());
+        let solid = &tool.cutter;
         let reach = (REACH_OVER_UNCUT * scene.tolerance.uncut).max(scene.cutter.radius());
-        let rays = Rays::new(&planned.path, &solid, monitor).map_err(CliError::rays(scene, &request.name))?;
+        let rays = Rays::new(&planned.path, solid, monitor).map_err(CliError::rays(scene, &request.name))?;
         let inward = scene.cutter.radius();
-        let cut = SweptVolume { rays: &rays, path: &planned.path, solid: &solid, inward, outward: reach };
+        let cut = SweptVolume { rays: &rays, path: &planned.path, solid, inward, outward: reach };
         let asked = scene.simulation.error_bound;
         let (mut measured, map) = measure_along_normals(
             &self.part,
@@ -93,9 +112,78 @@ impl Job<'_> {
         }
         let surface_mesh = self.write_normal_mesh(request, &map, outputs)?;
         let page = self.write_normal_maps(request, &map, &measured, spacing, outputs)?;
-        let result =
+        let mut result =
             self.result(request, &planned, joints.as_ref(), None, measured, None, simulation, surface_mesh);
+        monitor.start("looking for collisions", 0);
+        if let Some(violation) = self.collision(&tool, &fixtures, &planned.path, &lines) {
+            result.violations.insert(0, violation);
+            result.verdict = Verdict::Fail;
+        }
         Ok((result, page))
+    }
+
+    /// The meshes that are not to be touched.
+    fn fixtures(&self) -> Result<Vec<(TriangleMesh, Bvh)>, CliError> {
+        let load = |fixture: &Fixture| {
+            let (mesh, _) = load_mesh(self.scene, &fixture.file, fixture.format, fixture.scale)?;
+            let bvh = Bvh::new(&mesh);
+            Ok((mesh, bvh))
+        };
+        self.scene.keep_clear.fixtures.iter().map(load).collect()
+    }
+
+    /// What the planner keeps the tool away from: shank and holder from all, the cutter from fixtures, and from cutting
+    /// deeper into the part than half the gouge tolerance and what the part's triangles are off its surface.
+    fn keep_clear<'a>(&'a self, tool: &'a Tool, fixtures: &'a [(TriangleMesh, Bvh)]) -> Interference<'a> {
+        let keep = &self.scene.keep_clear;
+        let part = Obstacle::new(self.part.mesh(), self.part.bvh());
+        let depth = 0.5 * self.scene.tolerance.gouge + self.part.mesh_deviation();
+        let mut checks = vec![Check { solid: &tool.cutter, obstacle: part, needed: -depth }];
+        checks.extend(tool.holder.as_ref().map(|solid| Check {
+            solid,
+            obstacle: part,
+            needed: keep.clearance,
+        }));
+        for (mesh, bvh) in fixtures {
+            let obstacle = Obstacle::new(mesh, bvh);
+            let solids = std::iter::once(&tool.cutter).chain(&tool.holder);
+            checks.extend(solids.map(|solid| Check { solid, obstacle, needed: keep.clearance }));
+        }
+        Interference { checks, greatest_tilt: keep.greatest_tilt, greatest_lift: keep.greatest_lift }
+    }
+
+    /// The violation that shank or holder touch the part or a fixture, the cutter a fixture, or the cutter the part while it
+    /// is not cutting. Asked of the finished path, whatever its planner thought.
+    fn collision(
+        &self,
+        tool: &Tool,
+        fixtures: &[(TriangleMesh, Bvh)],
+        path: &Toolpath,
+        lines: &[u32],
+    ) -> Option<Violation> {
+        let part = Obstacle::new(self.part.mesh(), self.part.bvh());
+        let slack = -(self.scene.tolerance.gouge + self.part.mesh_deviation());
+        let obstacles: Vec<Obstacle> = fixtures.iter().map(|(mesh, bvh)| Obstacle::new(mesh, bvh)).collect();
+        let check = |solid, obstacle, needed| Check { solid, obstacle, needed };
+        let mut always: Vec<Check> =
+            tool.holder.iter().map(|solid| check(solid, part, -self.part.mesh_deviation())).collect();
+        for &obstacle in &obstacles {
+            always.extend(
+                std::iter::once(&tool.cutter).chain(&tool.holder).map(|solid| check(solid, obstacle, 0.0)),
+            );
+        }
+        let names = |always: &Check| {
+            if std::ptr::eq(always.solid, &tool.cutter) { "the cutter" } else { "the holder" }
+        };
+        let with = |checks: Vec<Check<'_>>, chosen: &(dyn Fn(&Move) -> bool + Sync)| {
+            let whose: Vec<&str> = checks.iter().map(names).collect();
+            let keep = Interference { checks, greatest_tilt: 0.0, greatest_lift: 0.0 };
+            let found = keep.on_path(path, chosen);
+            found.into_iter().map(|(k, hit)| (k, hit, whose[hit.check])).collect::<Vec<_>>()
+        };
+        let mut found = with(always, &|_| true);
+        found.extend(with(vec![check(&tool.cutter, part, slack)], &|to| to.kind == MoveKind::Rapid));
+        tool_collision(&found, lines)
     }
 
     /// Refuses places that do not fit into the memory.

@@ -9,6 +9,7 @@ mod classic;
 mod direction;
 mod error;
 mod formula;
+mod interference;
 mod kinematics;
 mod pocket;
 mod read;
@@ -22,6 +23,7 @@ use std::path::{Path, PathBuf};
 
 pub use axis::AxisRequest;
 pub use error::{Finding, SceneError, SceneText};
+pub use interference::{Fixture, KeepClear};
 pub use kinematics::FiveAxis;
 pub use pocket::OutlineSource;
 pub use write::complete_toml;
@@ -267,6 +269,8 @@ pub struct Scene {
     pub five_axis: Option<FiveAxis>,
     /// Height of rapid moves above stock, mm.
     pub clearance: f64,
+    /// What tilted tools keep away from.
+    pub keep_clear: KeepClear,
     /// The toolpaths, in the order of the scene; at least one.
     pub toolpaths: Vec<ToolpathRequest>,
 }

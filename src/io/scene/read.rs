@@ -13,7 +13,7 @@ use super::{
     DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, Engine, MeshFormat, NamedFile, OutlineSource, PartSource, Scene,
     Simulation, Stock, ToolpathRequest, auto_cell, default_error_bound,
 };
-use super::{axis, classic, direction, formula, kinematics, pocket};
+use super::{axis, classic, direction, formula, interference, kinematics, pocket};
 use crate::cutter::{AptWord, AptWords, Cutter, CutterError, CutterShape, Holder, HolderSection};
 use crate::field::{KnotRule, MAX_DENSE, Solver};
 use crate::geometry::AnalyticSurface;
@@ -75,7 +75,19 @@ impl Scene {
         })?;
         let root = Section::root(&source, table.get_ref());
         root.only(
-            &["title", "part", "stock", "cutter", "holder", "tolerance", "simulation", "machine", "toolpath"],
+            &[
+                "title",
+                "part",
+                "stock",
+                "cutter",
+                "holder",
+                "tolerance",
+                "simulation",
+                "machine",
+                "interference",
+                "fixture",
+                "toolpath",
+            ],
             &[],
             "a scene",
         )?;
@@ -91,6 +103,7 @@ impl Scene {
         let tolerance = read_tolerance(&root.section("tolerance")?)?;
         let mut simulation = read_simulation(&root.section("simulation")?, &cutter, &tolerance)?;
         let section = root.section("machine")?;
+        let keep_clear = interference::read(&root, &folder)?;
         let (machine, clearance) = read_machine(&section)?;
         let five_axis = kinematics::read(&section)?;
         let toolpaths = read_toolpaths(&root, &folder, &tolerance, &cutter)?;
@@ -111,6 +124,7 @@ impl Scene {
             machine,
             five_axis,
             clearance,
+            keep_clear,
             toolpaths,
         })
     }
@@ -136,17 +150,25 @@ impl Scene {
 
     /// Refuses a file that is not there or cannot be opened, pointing at its name in the scene.
     fn check_files(&self) -> Result<(), SceneError> {
-        let Some(file) = self.part_file() else { return Ok(()) };
-        let reason = match std::fs::metadata(&file.path) {
-            Ok(found) if found.is_dir() => "it is a folder".to_owned(),
-            Ok(_) => match std::fs::File::open(&file.path) {
-                Ok(_) => return Ok(()),
-                Err(e) => e.to_string(),
+        let fixtures = self.keep_clear.fixtures.iter().map(|fixture| ("fixture", &fixture.file));
+        self.part_file().map(|file| ("part", file)).into_iter().chain(fixtures).try_for_each(
+            |(whose, file)| {
+                let reason = match std::fs::metadata(&file.path) {
+                    Ok(found) if found.is_dir() => "it is a folder".to_owned(),
+                    Ok(_) => match std::fs::File::open(&file.path) {
+                        Ok(_) => return Ok(()),
+                        Err(e) => e.to_string(),
+                    },
+                    Err(e) => e.to_string(),
+                };
+                let message = format!("cannot read the {whose}'s file {}: {reason}", file.path.display());
+                Err(self.source.error(
+                    file.span.clone(),
+                    message,
+                    "relative paths start from the scene's folder",
+                ))
             },
-            Err(e) => e.to_string(),
-        };
-        let message = format!("cannot read the part's file {}: {reason}", file.path.display());
-        Err(self.source.error(file.span.clone(), message, "relative paths start from the scene's folder"))
+        )
     }
 }
 
@@ -168,30 +190,8 @@ fn read_part(part: &Section<'_>, folder: &Path) -> Result<PartSource, SceneError
     match part.word("surface", &words)? {
         None => {
             part.only(&["file", "unit"], &all_keys, "a part from a mesh file (it has no `surface`)")?;
-            let file = part.required_text("file", "part.stl")?;
-            let unit_words = UNITS.map(|(word, _)| word);
-            let unit = part.word("unit", &unit_words)?.map_or("mm", |u| u.value);
-            let scale = UNITS.iter().find(|(word, _)| *word == unit).map_or(1.0, |(_, scale)| *scale);
-            let extension = Path::new(file.value).extension().map(|e| e.to_string_lossy().to_lowercase());
-            let format = match extension.as_deref() {
-                Some("stl") => MeshFormat::Stl,
-                Some("obj") => MeshFormat::Obj,
-                Some("json") => {
-                    return Err(part.error(
-                        &file.span,
-                        "a part from a .json file needs to say what it holds",
-                        "add `surface = \"nurbs\"`",
-                    ));
-                }
-                _ => {
-                    return Err(part.error(
-                        &file.span,
-                        format!("\"{}\" is no kind of part file that can be read", file.value),
-                        "name a file that ends in .stl or .obj",
-                    ));
-                }
-            };
-            Ok(PartSource::Mesh { file: named(file), format, unit, scale })
+            let (file, format, unit, scale) = read_mesh_file(part, folder, "part.stl")?;
+            Ok(PartSource::Mesh { file, format, unit, scale })
         }
         Some(word) if word.value == pocket::SURFACE => pocket::read_source(part, &UNITS, named),
         Some(word) if word.value == "nurbs" => {
@@ -210,6 +210,38 @@ fn read_part(part: &Section<'_>, folder: &Path) -> Result<PartSource, SceneError
             Ok(PartSource::Formula { surface })
         }
     }
+}
+
+/// A mesh file with its kind, unit and that unit in mm.
+pub(super) fn read_mesh_file(
+    section: &Section<'_>,
+    folder: &Path,
+    example: &str,
+) -> Result<(NamedFile, MeshFormat, &'static str, f64), SceneError> {
+    let file = section.required_text("file", example)?;
+    let unit_words = UNITS.map(|(word, _)| word);
+    let unit = section.word("unit", &unit_words)?.map_or("mm", |u| u.value);
+    let scale = UNITS.iter().find(|(word, _)| *word == unit).map_or(1.0, |(_, scale)| *scale);
+    let extension = Path::new(file.value).extension().map(|e| e.to_string_lossy().to_lowercase());
+    let format = match extension.as_deref() {
+        Some("stl") => MeshFormat::Stl,
+        Some("obj") => MeshFormat::Obj,
+        Some("json") => {
+            return Err(section.error(
+                &file.span,
+                "a .json file needs to say what it holds",
+                "add `surface = \"nurbs\"`",
+            ));
+        }
+        _ => {
+            return Err(section.error(
+                &file.span,
+                format!("\"{}\" is no kind of part file that can be read", file.value),
+                "name a file that ends in .stl or .obj",
+            ));
+        }
+    };
+    Ok((NamedFile::beside(folder, file.value, file.span), format, unit, scale))
 }
 
 fn read_stock(stock: &Section<'_>, part: &PartSource, cutter: &Cutter) -> Result<Stock, SceneError> {

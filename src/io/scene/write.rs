@@ -2,7 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::{PartSource, Scene, ToolpathRequest, axis, classic, direction, formula, kinematics, pocket};
+use super::{
+    PartSource, Scene, ToolpathRequest, axis, classic, direction, formula, interference, kinematics, pocket,
+};
 use crate::cutter::{Cutter, CutterShape};
 use crate::toolpath::{Links, Step, Strategy, StreamMethod, longest_link};
 
@@ -65,6 +67,9 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     writeln!(out, "slow_corners = {}  # feeds of sharp bends in the program", scene.machine.slow_corners)?;
     writeln!(out, "clearance = {}  # mm of rapid moves above stock", number(scene.clearance))?;
     kinematics::write(out, scene.five_axis.as_ref())?;
+    if !scene.keep_clear.fixtures.is_empty() || scene.toolpaths.iter().any(|request| request.axis.is_some()) {
+        interference::write(out, &scene.keep_clear)?;
+    }
     scene.toolpaths.iter().try_for_each(|request| {
         writeln!(out, "\n[[toolpath]]")?;
         writeln!(out, "name = {}", text(&request.name))?;
