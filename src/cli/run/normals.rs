@@ -17,7 +17,7 @@ use crate::metrology::{Measurement, NormalMap, PatchGrid, SweptVolume, measure_a
 use crate::monitor::{self, Monitor as _};
 use crate::report::{
     HIGHEST_RIDGE, Histogram, MapSize, MapWords, SimulationFigures, SurfaceMeshFigures, ToolpathPage,
-    ToolpathResult, Violation, deviation_colours, deviation_picture, tool_collision,
+    ToolpathResult, Verdict, Violation, deviation_colours, deviation_picture, tool_collision,
 };
 use crate::sim::{Grid, Rays};
 use crate::toolpath::{Check, Interference, Move, MoveKind, Obstacle, Tilting, Toolpath, plan, plan_tilted};
