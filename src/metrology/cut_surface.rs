@@ -8,7 +8,7 @@
 
 use crate::geometry::{Point3, Vector3};
 use crate::sim::{Envelope, NOT_CUT, ZMap};
-use crate::toolpath::{MoveKind, Toolpath};
+use crate::toolpath::Toolpath;
 
 /// A point of the cut surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -157,11 +157,6 @@ impl<'a> CutSurface<'a> {
         let length2 = along.norm_squared();
         let t = if length2 > 0.0 { ((tip - from).dot(&along) / length2).clamp(0.0, 1.0) } else { 0.0 };
         from + along * t
-    }
-
-    /// True for a link between two passes.
-    pub fn is_link(&self, by: u32) -> bool {
-        self.path.moves.get(by as usize).is_some_and(|m| m.kind == MoveKind::Link)
     }
 
     /// The pass that a cut point belongs to; `None` on stock.

@@ -5,6 +5,7 @@
 //! lowest only between the ends are found on the way.
 
 use super::cut_surface::{CutPoint, CutSurface};
+use super::tracks::Tracks;
 use crate::cutter::Cutter;
 use crate::geometry::Point2;
 use crate::sim::NOT_CUT;
@@ -12,10 +13,6 @@ use crate::toolpath::Toolpath;
 
 /// Two heights that differ by more than this, mm, do not meet.
 const MEETING: f64 = 1e-6;
-
-/// Two moves of one pass that lie farther apart along the path than this many cutter radii are
-/// neighbouring turns of a spiral or loop, not neighbouring chords.
-const SAME_TRACK: f64 = 4.0;
 
 /// Ridges inside ridges (a pass that shows only between the ends): at most this deep.
 const MOST_DEPTH: usize = 8;
@@ -43,10 +40,7 @@ pub(crate) struct Meeting {
 /// Finds meetings on a cut surface.
 pub(crate) struct Meetings<'a> {
     surface: &'a CutSurface<'a>,
-    /// Distance along the path to the end of each move, mm.
-    along: Vec<f64>,
-    /// Moves of one pass farther apart along the path than this are of two tracks, mm.
-    same_track: f64,
+    tracks: Tracks<'a>,
     /// Height of flat stock whose rim counts as a ridge, mm.
     stock: Option<f64>,
 }
@@ -54,28 +48,16 @@ pub(crate) struct Meetings<'a> {
 impl<'a> Meetings<'a> {
     /// On the surface that `path` has cut. With a height of `stock` the line along which a cut meets
     /// flat stock counts too.
-    pub fn new(surface: &'a CutSurface<'a>, cutter: &Cutter, path: &Toolpath, stock: Option<f64>) -> Self {
-        let mut length = 0.0;
-        let along = path
-            .segments()
-            .map(|(from, to, _)| {
-                length += (to - from).norm();
-                length
-            })
-            .collect();
-        Self { surface, along, same_track: SAME_TRACK * cutter.radius(), stock }
+    pub fn new(surface: &'a CutSurface<'a>, cutter: &Cutter, path: &'a Toolpath, stock: Option<f64>) -> Self {
+        Self { surface, tracks: Tracks::new(path, cutter), stock }
     }
 
     /// True when two moves belong to neighbouring tracks rather than to one.
     pub fn apart(&self, a: u32, b: u32) -> bool {
-        match (self.surface.pass(a), self.surface.pass(b)) {
-            (Some(p), Some(q)) => {
-                // A link goes on from the end of one pass to the start of the next without an edge between.
-                let other_pass = p != q && !self.surface.is_link(a) && !self.surface.is_link(b);
-                other_pass || (self.along[a as usize] - self.along[b as usize]).abs() > self.same_track
-            }
-            _ => a != b && self.stock.is_some(),
+        if a == NOT_CUT || b == NOT_CUT {
+            return a != b && self.stock.is_some();
         }
+        self.tracks.apart(a, b)
     }
 
     /// Hands to `found` the meetings between `a`, lowest at the share `ta` of the line `at`, and `b`,

@@ -19,6 +19,7 @@ mod refine;
 mod regions;
 mod removal;
 mod ridges;
+mod tracks;
 mod unseen;
 
 pub use along_normals::{

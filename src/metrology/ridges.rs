@@ -156,7 +156,7 @@ impl<'a> RidgeFinder<'a> {
         surface: &'a CutSurface<'a>,
         part: &'a Part,
         cutter: &'a Cutter,
-        path: &Toolpath,
+        path: &'a Toolpath,
         limits: &'a Limits,
     ) -> Self {
         let meetings = Meetings::new(surface, cutter, path, None);

@@ -84,7 +84,12 @@ fn a_lip_is_cut_from_the_side_below_its_widest_place() {
 fn a_holder_that_leans_away_from_the_walls_is_clear_of_them() {
     let (code, report) = run_scene(&folder().join("trough.toml"));
     let [upright, leaning] = [0, 1].map(|k| &report["toolpaths"][k]);
-    assert_eq!((code, &upright["violations"][0]["what"]), (1, &"collision".into()), "{:#}", upright["violations"]);
+    assert_eq!(
+        (code, &upright["violations"][0]["what"]),
+        (1, &"collision".into()),
+        "{:#}",
+        upright["violations"]
+    );
     assert!(number(upright, "/violations/0/measured_mm") > 1.0);
     assert_eq!(leaning["verdict"], "pass", "{:#}", leaning["violations"]);
     is_good(leaning);

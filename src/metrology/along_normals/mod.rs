@@ -12,30 +12,29 @@
 //!
 //! A place above the uncut tolerance is uncut here, also where it is half of a tall scallop.
 
+mod closer;
 mod net;
+mod regions;
 mod ridges;
 mod swept_volume;
 #[cfg(test)]
 mod tests;
-mod tracks;
 
-use std::collections::{BinaryHeap, HashMap};
-
-use super::figures::{
-    DeviationFigures, GougeFigures, GougeRegion, Limits, Measurement, UncutFigures, UncutRegion,
-};
+use super::figures::{Limits, Measurement};
 use super::refine::Refined;
 use super::ridges::{Highest, NUMERICAL_FLOOR, scallop_figures};
+use super::tracks::Tracks;
 use crate::cutter::Cutter;
 use crate::geometry::{Point3, Vector3};
 use crate::monitor::{self, Cancelled, Monitor};
 use crate::part::Part;
 use crate::toolpath::Toolpath;
+use closer::Greatest;
 use net::{Net, Place};
 pub use net::{PatchGrid, net_places};
+use regions::{areas, deviation_figures};
 use ridges::{Crossing, Finder};
 pub use swept_volume::SweptVolume;
-use tracks::Tracks;
 
 /// The cut surface where the normal of a design point meets it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,15 +76,6 @@ pub struct NormalMap {
     pub grids: Vec<PatchGrid>,
 }
 
-/// Triangles that are divided at most in search of extremes. Each asks for some ten places.
-const MOST_DIVIDED: usize = 20_000;
-
-/// A triangle is divided at most so often in a row.
-const MOST_DEPTH: u32 = 12;
-
-/// Regions listed one by one in the figures; the rest is counted.
-const LISTED_REGIONS: usize = 20;
-
 /// A place and the cut there.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
@@ -101,73 +91,6 @@ impl Sample {
             if cos > 0.0 { (1.0 / (cos * cos) - 1.0).max(0.0).sqrt() } else { f64::INFINITY }
         })
     }
-}
-
-/// A triangle with what may be found in it, by promise.
-struct Open {
-    /// How much any figure may exceed what was known when it was opened, mm.
-    promise: f64,
-    samples: [Sample; 3],
-    depth: u32,
-}
-
-impl PartialEq for Open {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Open {}
-
-impl PartialOrd for Open {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Open {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        let place = |open: &Self| open.samples[0].place.point;
-        let (a, b) = (place(self), place(other));
-        self.promise
-            .total_cmp(&other.promise)
-            .then(b.x.total_cmp(&a.x))
-            .then(b.y.total_cmp(&a.y))
-            .then(b.z.total_cmp(&a.z))
-            .then(other.depth.cmp(&self.depth))
-    }
-}
-
-/// The greatest figures found so far.
-#[derive(Debug, Clone, Copy, Default)]
-struct Greatest {
-    depth: f64,
-    deepest: Option<(Point3, u32)>,
-    height: f64,
-    ridge: Option<(f64, Point3)>,
-}
-
-impl Greatest {
-    fn look_at(&mut self, sample: &Sample, reach: f64) {
-        match sample.hit {
-            Some(hit) if -hit.deviation > self.depth => {
-                (self.depth, self.deepest) = (-hit.deviation, Some((sample.place.point, hit.by)));
-            }
-            hit => self.height = self.height.max(hit.map_or(reach, |hit| hit.deviation)),
-        }
-    }
-
-    fn look_at_ridge(&mut self, crossing: &Crossing) {
-        if self.ridge.is_none_or(|(height, _)| crossing.height > height) {
-            self.ridge = Some((crossing.height, crossing.at));
-        }
-    }
-}
-
-/// What one triangle holds besides its corners.
-struct Closer {
-    middles: [Sample; 3],
-    crossings: Vec<Crossing>,
 }
 
 struct Inspection<'a> {
@@ -299,130 +222,6 @@ impl Inspection<'_> {
     fn crossings(&self, corners: &[Sample; 3]) -> Vec<Crossing> {
         with_lengths((0..3).flat_map(|k| self.on_side(&[corners[k], corners[(k + 1) % 3]])).collect())
     }
-
-    /// How much any figure may exceed the greatest ones in a triangle.
-    fn promise(&self, samples: &[Sample; 3], crossings: &[Crossing], greatest: &Greatest) -> f64 {
-        let points = samples.map(|sample| sample.place.point);
-        let longest = (0..3).map(|k| (points[(k + 1) % 3] - points[k]).norm()).fold(0.0, f64::max);
-        // No place of a triangle is farther than this from its nearest corner.
-        let far = longest / 3f64.sqrt();
-        let mut more = f64::NEG_INFINITY;
-        for sample in samples {
-            let Some(hit) = sample.hit else { continue };
-            // A cut of radius r that meets the design at the slope s goes no deeper than about s²r below that.
-            let slope = sample.slope();
-            let deeper = (slope * far).min(slope * slope * self.radius);
-            more = more.max(-hit.deviation + deeper - greatest.depth);
-            if hit.deviation > self.limits.uncut {
-                more = more.max(hit.deviation + slope * far - greatest.height);
-            }
-        }
-        let highest = greatest.ridge.map_or(0.0, |(height, _)| height);
-        crossings.iter().fold(more, |more, c| more.max(c.height + c.rise * longest - highest))
-    }
-
-    /// Divides triangles, the most promising ones first. Returns what may still exceed the figures, mm.
-    fn search<'b>(
-        &self,
-        triangles: impl Iterator<Item = ([Sample; 3], &'b [Crossing])>,
-        greatest: &mut Greatest,
-        asked: f64,
-        monitor: &dyn Monitor,
-    ) -> Result<f64, Cancelled> {
-        const BATCH: usize = 64;
-        monitor.start("looking closer", 0);
-        let enough = asked.max(NUMERICAL_FLOOR);
-        let (mut heap, mut divided, mut left) = (BinaryHeap::new(), 0, 0.0f64);
-        // What promises little is not kept, but counts.
-        let mut keep = |samples: [Sample; 3], crossings: &[Crossing], depth: u32, greatest: &Greatest| {
-            let promise = self.promise(&samples, crossings, greatest);
-            if promise <= enough || depth == MOST_DEPTH {
-                left = left.max(promise);
-                return None;
-            }
-            Some(Open { promise, samples, depth })
-        };
-        for (samples, crossings) in triangles {
-            heap.extend(keep(samples, crossings, 0, greatest));
-        }
-        // Promises were made against lesser figures than are known later, so that they are never too small.
-        while divided < MOST_DIVIDED && !heap.is_empty() {
-            monitor::check(monitor)?;
-            let batch: Vec<Open> = std::iter::from_fn(|| heap.pop()).take(BATCH).collect();
-            divided += batch.len();
-            let closer = crate::parallel::map(batch.len(), |k| self.divided(&batch[k].samples));
-            for (open, parts) in batch.iter().zip(closer) {
-                for (samples, Closer { middles, crossings }) in parts {
-                    middles.iter().for_each(|sample| greatest.look_at(sample, self.engine.reach()));
-                    crossings.iter().for_each(|crossing| greatest.look_at_ridge(crossing));
-                    heap.extend(keep(samples, &crossings, open.depth + 1, greatest));
-                }
-            }
-        }
-        Ok(heap.peek().map_or(left, |open| open.promise.max(left)))
-    }
-
-    /// The four triangles of one, and what they hold.
-    fn divided(&self, [a, b, c]: &[Sample; 3]) -> Vec<([Sample; 3], Closer)> {
-        let middle = |p: &Sample, q: &Sample| {
-            self.sample(p.place.towards(&q.place, 0.5, self.part), p.hit.or(q.hit).as_ref())
-        };
-        let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
-        let parts = [[*a, ab, ca], [ab, *b, bc], [ca, bc, *c], [ab, bc, ca]];
-        parts
-            .map(|samples| (samples, Closer { middles: [ab, bc, ca], crossings: self.crossings(&samples) }))
-            .into()
-    }
-
-    fn gouges(&self, net: &Net, samples: &[Sample], areas: &[f64]) -> GougeFigures {
-        let depth = |k: u32| samples[k as usize].hit.map_or(0.0, |hit| -hit.deviation);
-        let mut figures = GougeFigures::default();
-        for region in connected(net, self.spacing, &|k| depth(k) > self.limits.gouge) {
-            let Some(&deepest) = region.iter().max_by(|a, b| depth(**a).total_cmp(&depth(**b))) else {
-                continue;
-            };
-            let sample = &samples[deepest as usize];
-            let area_mm2 = region.iter().map(|&k| areas[k as usize]).sum();
-            figures.area_mm2 += area_mm2;
-            figures.regions.push(GougeRegion {
-                depth_mm: depth(deepest),
-                area_mm2,
-                at_mm: sample.place.point.into(),
-                move_index: sample.hit.map_or(0, |hit| hit.by),
-                line: 0,
-            });
-        }
-        figures.region_count = figures.regions.len();
-        figures.regions.sort_by(|a, b| b.depth_mm.total_cmp(&a.depth_mm));
-        figures.regions.truncate(LISTED_REGIONS);
-        figures
-    }
-
-    fn uncut(&self, net: &Net, samples: &[Sample], areas: &[f64]) -> UncutFigures {
-        let reach = self.engine.reach();
-        let height = |k: u32| samples[k as usize].hit.map_or(reach, |hit| hit.deviation);
-        let mut figures = UncutFigures::default();
-        for region in connected(net, self.spacing, &|k| height(k) > self.limits.uncut) {
-            let Some(&highest) = region.iter().max_by(|a, b| height(**a).total_cmp(&height(**b))) else {
-                continue;
-            };
-            let area_mm2: f64 = region.iter().map(|&k| areas[k as usize]).sum();
-            let volume_mm3 = region.iter().map(|&k| areas[k as usize] * height(k)).sum::<f64>();
-            figures.area_mm2 += area_mm2;
-            figures.volume_mm3 += volume_mm3;
-            figures.regions.push(UncutRegion {
-                height_mm: height(highest),
-                area_mm2,
-                volume_mm3,
-                at_mm: samples[highest as usize].place.point.into(),
-            });
-        }
-        figures.fraction = figures.area_mm2 / areas.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-        figures.region_count = figures.regions.len();
-        figures.regions.sort_by(|a, b| b.height_mm.total_cmp(&a.height_mm));
-        figures.regions.truncate(LISTED_REGIONS);
-        figures
-    }
 }
 
 /// Work on runs of neighbours, so that each can begin where the one before was found; in the order of the whole.
@@ -494,70 +293,4 @@ fn contacts_of(part: &Part, cutter: &Cutter, path: &Toolpath, k: usize, spacing:
         (off.abs() <= spacing).then(|| Place::at_foot(&foot))
     };
     [0.5, 1.0].into_iter().filter_map(contact).collect()
-}
-
-/// Area that each place stands for, mm²: a third of the triangles around.
-fn areas(net: &Net) -> Vec<f64> {
-    let mut areas = vec![0.0; net.places.len()];
-    for t in &net.triangles {
-        let [a, b, c] = t.map(|k| net.places[k as usize].point);
-        let third = (b - a).cross(&(c - a)).norm() / 6.0;
-        t.iter().for_each(|&k| areas[k as usize] += third);
-    }
-    areas
-}
-
-fn deviation_figures(samples: &[Sample], areas: &[f64]) -> DeviationFigures {
-    let mut figures = DeviationFigures { samples: samples.len(), ..Default::default() };
-    let (mut least, mut greatest, mut squares) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
-    for (hit, area) in samples.iter().zip(areas).filter_map(|(sample, area)| Some((sample.hit?, area))) {
-        (least, greatest) = (least.min(hit.deviation), greatest.max(hit.deviation));
-        squares += area * hit.deviation * hit.deviation;
-        figures.area_mm2 += area;
-    }
-    if figures.area_mm2 > 0.0 {
-        (figures.min_mm, figures.max_mm) = (least, greatest);
-        figures.rms_mm = (squares / figures.area_mm2).sqrt();
-    }
-    figures
-}
-
-/// The regions of places for which `inside` holds: places closer than `spacing` mm that face the same way belong together,
-/// across the borders of facets and patches too. Each in the order of its places, regions in that of their first one.
-fn connected(net: &Net, spacing: f64, inside: &dyn Fn(u32) -> bool) -> Vec<Vec<u32>> {
-    let marked: Vec<u32> = (0..net.places.len() as u32).filter(|&k| inside(k)).collect();
-    let cell = |k: u32| (net.places[k as usize].point.coords / spacing).map(|x| x.floor() as i64);
-    let mut cells: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
-    for (m, &k) in marked.iter().enumerate() {
-        cells.entry(cell(k).into()).or_default().push(m);
-    }
-    let near = |m: usize| {
-        let (here, place) = (cell(marked[m]), &net.places[marked[m] as usize]);
-        let around = (0..27).map(|n| [here.x + n % 3 - 1, here.y + n / 3 % 3 - 1, here.z + n / 9 - 1]);
-        let others = around.filter_map(|at| cells.get(&at)).flatten().copied();
-        let joined = |&o: &usize| {
-            let other = &net.places[marked[o] as usize];
-            (other.point - place.point).norm() <= spacing && other.normal.dot(&place.normal) > 0.0
-        };
-        others.filter(joined).collect::<Vec<usize>>()
-    };
-    let mut seen = vec![false; marked.len()];
-    let mut regions = Vec::new();
-    for start in 0..marked.len() {
-        if std::mem::replace(&mut seen[start], true) {
-            continue;
-        }
-        let (mut region, mut next) = (vec![start], 0);
-        while next < region.len() {
-            for other in near(region[next]) {
-                if !std::mem::replace(&mut seen[other], true) {
-                    region.push(other);
-                }
-            }
-            next += 1;
-        }
-        region.sort_unstable();
-        regions.push(region.into_iter().map(|m| marked[m]).collect());
-    }
-    regions
 }

@@ -1,9 +1,9 @@
 //! Ridges between places: where the cuts of two tracks are equally high on the way from one place to another.
 
 use super::net::Place;
-use super::tracks::Tracks;
 use super::{AlongNormal, NormalHit};
 use crate::geometry::{Point3, Vector3};
+use crate::metrology::tracks::Tracks;
 use crate::part::Part;
 
 /// A crossing is found when both tracks were seen within this share of the side from each other: what the tangents then

@@ -8,7 +8,7 @@ use crate::toolpath::{MoveKind, Toolpath};
 const SAME_TRACK: f64 = 4.0;
 
 /// The passes of a path and the way along it.
-pub(super) struct Tracks<'a> {
+pub(crate) struct Tracks<'a> {
     path: &'a Toolpath,
     /// Distance along the path to the end of each move, mm.
     along: Vec<f64>,

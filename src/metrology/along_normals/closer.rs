@@ -1,0 +1,161 @@
+//! Looks closer where more may stand or lie between the places than was found there.
+//!
+//! Enters: triangles with what was cut at their corners and the ridges that cross them. Leaves: the greatest figures, and
+//! how much they may still be exceeded by. mm.
+
+use std::collections::BinaryHeap;
+
+use super::ridges::Crossing;
+use super::{Inspection, Sample};
+use crate::geometry::Point3;
+use crate::metrology::ridges::NUMERICAL_FLOOR;
+use crate::monitor::{self, Cancelled, Monitor};
+
+/// Triangles that are divided at most in search of extremes. Each asks for some ten places.
+const MOST_DIVIDED: usize = 20_000;
+
+/// A triangle is divided at most so often in a row.
+const MOST_DEPTH: u32 = 12;
+
+/// A triangle with what may be found in it, by promise.
+struct Open {
+    /// How much any figure may exceed what was known when it was opened, mm.
+    promise: f64,
+    samples: [Sample; 3],
+    depth: u32,
+}
+
+impl PartialEq for Open {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Open {}
+
+impl PartialOrd for Open {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Open {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        let place = |open: &Self| open.samples[0].place.point;
+        let (a, b) = (place(self), place(other));
+        self.promise
+            .total_cmp(&other.promise)
+            .then(b.x.total_cmp(&a.x))
+            .then(b.y.total_cmp(&a.y))
+            .then(b.z.total_cmp(&a.z))
+            .then(other.depth.cmp(&self.depth))
+    }
+}
+
+/// The greatest figures found so far.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Greatest {
+    pub depth: f64,
+    pub deepest: Option<(Point3, u32)>,
+    pub height: f64,
+    pub ridge: Option<(f64, Point3)>,
+}
+
+impl Greatest {
+    pub fn look_at(&mut self, sample: &Sample, reach: f64) {
+        match sample.hit {
+            Some(hit) if -hit.deviation > self.depth => {
+                (self.depth, self.deepest) = (-hit.deviation, Some((sample.place.point, hit.by)));
+            }
+            hit => self.height = self.height.max(hit.map_or(reach, |hit| hit.deviation)),
+        }
+    }
+
+    pub fn look_at_ridge(&mut self, crossing: &Crossing) {
+        if self.ridge.is_none_or(|(height, _)| crossing.height > height) {
+            self.ridge = Some((crossing.height, crossing.at));
+        }
+    }
+}
+
+/// What one triangle holds besides its corners.
+struct Closer {
+    middles: [Sample; 3],
+    crossings: Vec<Crossing>,
+}
+
+impl Inspection<'_> {
+    /// How much any figure may exceed the greatest ones in a triangle.
+    fn promise(&self, samples: &[Sample; 3], crossings: &[Crossing], greatest: &Greatest) -> f64 {
+        let points = samples.map(|sample| sample.place.point);
+        let longest = (0..3).map(|k| (points[(k + 1) % 3] - points[k]).norm()).fold(0.0, f64::max);
+        // No place of a triangle is farther than this from its nearest corner.
+        let far = longest / 3f64.sqrt();
+        let mut more = f64::NEG_INFINITY;
+        for sample in samples {
+            let Some(hit) = sample.hit else { continue };
+            // A cut of radius r that meets the design at the slope s goes no deeper than about s²r below that.
+            let slope = sample.slope();
+            let deeper = (slope * far).min(slope * slope * self.radius);
+            more = more.max(-hit.deviation + deeper - greatest.depth);
+            if hit.deviation > self.limits.uncut {
+                more = more.max(hit.deviation + slope * far - greatest.height);
+            }
+        }
+        let highest = greatest.ridge.map_or(0.0, |(height, _)| height);
+        crossings.iter().fold(more, |more, c| more.max(c.height + c.rise * longest - highest))
+    }
+
+    /// Divides triangles, the most promising ones first. Returns what may still exceed the figures, mm.
+    pub fn search<'b>(
+        &self,
+        triangles: impl Iterator<Item = ([Sample; 3], &'b [Crossing])>,
+        greatest: &mut Greatest,
+        asked: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<f64, Cancelled> {
+        const BATCH: usize = 64;
+        monitor.start("looking closer", 0);
+        let enough = asked.max(NUMERICAL_FLOOR);
+        let (mut heap, mut divided, mut left) = (BinaryHeap::new(), 0, 0.0f64);
+        // What promises little is not kept, but counts.
+        let mut keep = |samples: [Sample; 3], crossings: &[Crossing], depth: u32, greatest: &Greatest| {
+            let promise = self.promise(&samples, crossings, greatest);
+            if promise <= enough || depth == MOST_DEPTH {
+                left = left.max(promise);
+                return None;
+            }
+            Some(Open { promise, samples, depth })
+        };
+        for (samples, crossings) in triangles {
+            heap.extend(keep(samples, crossings, 0, greatest));
+        }
+        // Promises were made against lesser figures than are known later, so that they are never too small.
+        while divided < MOST_DIVIDED && !heap.is_empty() {
+            monitor::check(monitor)?;
+            let batch: Vec<Open> = std::iter::from_fn(|| heap.pop()).take(BATCH).collect();
+            divided += batch.len();
+            let closer = crate::parallel::map(batch.len(), |k| self.divided(&batch[k].samples));
+            for (open, parts) in batch.iter().zip(closer) {
+                for (samples, Closer { middles, crossings }) in parts {
+                    middles.iter().for_each(|sample| greatest.look_at(sample, self.engine.reach()));
+                    crossings.iter().for_each(|crossing| greatest.look_at_ridge(crossing));
+                    heap.extend(keep(samples, &crossings, open.depth + 1, greatest));
+                }
+            }
+        }
+        Ok(heap.peek().map_or(left, |open| open.promise.max(left)))
+    }
+
+    /// The four triangles of one, and what they hold.
+    fn divided(&self, [a, b, c]: &[Sample; 3]) -> Vec<([Sample; 3], Closer)> {
+        let middle = |p: &Sample, q: &Sample| {
+            self.sample(p.place.towards(&q.place, 0.5, self.part), p.hit.or(q.hit).as_ref())
+        };
+        let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
+        let parts = [[*a, ab, ca], [ab, *b, bc], [ca, bc, *c], [ab, bc, ca]];
+        parts
+            .map(|samples| (samples, Closer { middles: [ab, bc, ca], crossings: self.crossings(&samples) }))
+            .into()
+    }
+}
