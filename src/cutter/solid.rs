@@ -170,6 +170,20 @@ impl Outline {
         }
         self.edges[by].foot(p, best.0, best.1)
     }
+
+    /// How far it reaches in a direction.
+    fn support(&self, u: Pair) -> f64 {
+        let reach = |edge: &Edge| {
+            let bulges =
+                edge.radius > 0.0 && cross(edge.normals[0], u) >= 0.0 && cross(u, edge.normals[1]) >= 0.0;
+            if bulges {
+                dot(edge.centre, u) + edge.radius * u[0].hypot(u[1])
+            } else {
+                dot(edge.from, u).max(dot(edge.to, u))
+            }
+        };
+        self.edges.iter().map(reach).fold(f64::NEG_INFINITY, f64::max)
+    }
 }
 
 /// A cutter, a holder, or both: convex pieces stacked along the axis.
@@ -317,6 +331,13 @@ impl Solid {
     #[inline]
     pub fn piece_foot(&self, piece: usize, rho: f64, z: f64) -> OutlineFoot {
         self.pieces.get(piece).unwrap_or(&self.outline).foot(rho, z)
+    }
+
+    /// How far one of its convex pieces reaches from the tip along a unit vector with the parts `across >= 0` square to
+    /// the axis and `along` it, mm: its support function.
+    #[inline]
+    pub fn piece_support(&self, piece: usize, across: f64, along: f64) -> f64 {
+        self.pieces.get(piece).unwrap_or(&self.outline).support([across, along])
     }
 
     /// Signed distance, mm, of `q` from the solid with its tip at `tip` and its unit axis, from the tip to

@@ -192,3 +192,26 @@ fn in_space_the_axis_may_lean() {
     assert!((inside.distance + 3.0).abs() < 1e-14 && inside.gradient.dot(&axis).abs() < 1e-14);
     assert!((inside.gradient.norm() - 1.0).abs() < 1e-14);
 }
+
+#[test]
+fn the_reach_is_that_of_the_farthest_place() {
+    for cutter in cutters() {
+        let tool = Solid::of_tool(&cutter, &holder(2.0));
+        for piece in 0..tool.pieces() {
+            for k in 0..=180 {
+                let (along, across) =
+                    (f64::from(k) * 1f64.to_radians() - 0.5 * std::f64::consts::PI).sin_cos();
+                let reach = tool.piece_support(piece, across, along);
+                // Signed distances are at least what a place lies beyond; far out they are no more.
+                for [rho, z] in places() {
+                    assert!(
+                        tool.piece_foot(piece, rho, z).distance > rho * across + z * along - reach - 1e-12
+                    );
+                }
+                let far = 1e7;
+                let away = tool.piece_foot(piece, far * across, far * along).distance;
+                assert!((far - reach - away).abs() < 1e-4, "{piece} {k}: {reach} {}", far - away);
+            }
+        }
+    }
+}

@@ -65,11 +65,30 @@ impl Piece<'_> {
         Sample { distance: foot.distance, gradient: outward * radial + axis * foot.gradient[1] }
     }
 
+    /// The piece lies within this of the tip along the unit vector `u`.
+    pub(super) fn support(&self, u: &Vector3) -> f64 {
+        let along = u.dot(&self.at.axis);
+        self.solid.piece_support(self.index, (u - self.at.axis * along).norm(), along)
+    }
+
+    /// The unit normal of a triangle, toward the side from which the piece can be farther away, and the signed distance of
+    /// its plane from the piece: no place of the triangle is nearer. Unlike a gradient it is good beside sharp edges too.
+    pub(super) fn off_plane(&self, corners: &[Point3; 3]) -> (Vector3, f64) {
+        let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).normalize();
+        let off = |u: Vector3| (u, u.dot(&(corners[0] - self.at.tip)) - self.support(&u));
+        let (one, other) = (off(normal), off(-normal));
+        if one.1 > other.1 { one } else { other }
+    }
+
     /// The nearest place of a triangle, if it is nearer than `limit`.
     pub(super) fn nearest_on(&self, corners: &[Point3; 3], limit: f64) -> Option<Place> {
         let centre = middle(corners);
         let inside = self.sample(&centre);
         if inside.distance + least_rise(&inside.gradient, &centre, corners) >= limit {
+            return None;
+        }
+        let (normal, off) = self.off_plane(corners);
+        if off >= limit {
             return None;
         }
         let mut best = Nearest { distance: limit, point: None };
@@ -85,11 +104,11 @@ impl Piece<'_> {
         if corners.iter().zip(&samples).any(settled) {
             return best.place();
         }
-        let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).normalize();
         let sides = [0, 1, 2].map(|k| corners[(k + 1) % 3] - corners[k]);
         let mut beyond = [true; 3];
         if let Some(place) = self.lowest_of_plane(corners, &normal) {
-            beyond = [0, 1, 2].map(|k| normal.dot(&sides[k].cross(&(place.point - corners[k]))) < 0.0);
+            let inward = sides[0].cross(&sides[1]);
+            beyond = [0, 1, 2].map(|k| inward.dot(&sides[k].cross(&(place.point - corners[k]))) < 0.0);
             if beyond == [false; 3] {
                 best.take(&place.point, place.distance);
                 return best.place();

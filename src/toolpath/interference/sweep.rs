@@ -10,6 +10,7 @@ use super::{Clearance, Obstacle};
 use crate::cutter::Solid;
 use crate::geometry::{Node, Point3, Vector3};
 use crate::toolpath::ClPoint;
+use std::collections::VecDeque;
 
 /// A move counts as clear when nothing comes nearer than what is needed less this, mm. Less costs time where a tool slides
 /// along a surface at just the distance that is needed.
@@ -17,6 +18,10 @@ const RESOLUTION: f64 = 1e-5;
 
 /// The worst of a move is found to this share of what is missing.
 const SHARE: f64 = 0.01;
+
+/// Stretches of a move that are looked at once a place that is too near is known. A tool that ploughs along below the surface
+/// is as deep at most times as it ever can be, and to tell the deepest would take for ever.
+const MOST_LOOKS: usize = 100;
 
 /// Axes are opposite when this close to it, rad.
 const OPPOSITE: f64 = 1e-6;
@@ -44,9 +49,9 @@ impl Obstacle<'_> {
     /// The nearest place of the mesh on a move of a tool ([`ClPoint::towards`]), if it is nearer than `needed` (finite), mm.
     ///
     /// # Tolerance
-    /// What is told comes as near as told. `None` proves that nothing comes nearer than `needed` less 1e-5 mm; no
-    /// other time is nearer than the one told by more than that or a hundredth of what is missing. A turn of the axis to
-    /// its opposite is not told which way it goes: nearer than anything.
+    /// What is told comes as near as told. `None` proves that nothing comes nearer than `needed` less 1e-5 mm. No other time is
+    /// nearer than the one told by more than that or a hundredth of what is missing, unless it takes more than a hundred
+    /// looks to find it: then it is the worst of these. Which way an axis turns to its opposite is not told: nearer than anything.
     pub fn swept_clearance(
         &self,
         solid: &Solid,
@@ -64,8 +69,13 @@ impl Obstacle<'_> {
         let way = to.tip - from.tip;
         let mut worst: Option<SweptClearance> = None;
         for index in 0..solid.pieces() {
-            let mut waiting = vec![[0.0, 1.0]];
-            while let Some([a, b]) = waiting.pop() {
+            let mut waiting = VecDeque::from([[0.0, 1.0]]);
+            let mut looks = 0;
+            while let Some([a, b]) = waiting.pop_front() {
+                looks += usize::from(worst.is_some());
+                if looks > MOST_LOOKS {
+                    break;
+                }
                 let t = 0.5 * (a + b);
                 let piece = Piece { solid, index, at: from.towards(to, t) };
                 let limit = worst.map_or(needed, |w| w.nearest.distance);
@@ -82,7 +92,7 @@ impl Obstacle<'_> {
                         worst = nearest.map(|nearest| SweptClearance { t, nearest });
                     }
                 }
-                waiting.extend([[t, b], [a, t]]);
+                waiting.extend([[a, t], [t, b]]);
             }
         }
         worst
@@ -128,6 +138,13 @@ impl Stretch<'_> {
     fn may_come_nearer(&self, corners: &[Point3; 3], limit: f64) -> bool {
         let centre = middle(corners);
         let sample = self.piece.sample(&centre);
+        if sample.distance < limit {
+            return true;
+        }
+        let (normal, off) = self.piece.off_plane(corners);
+        if off - corners.iter().map(|c| self.moved(&normal, c, 0.0)).fold(0.0, f64::max) >= limit {
+            return false;
+        }
         let (mut least, mut falls, mut most) = (f64::INFINITY, 0.0f64, 0.0f64);
         for corner in corners {
             let rise = sample.gradient.dot(&(corner - centre));

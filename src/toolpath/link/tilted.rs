@@ -208,3 +208,6 @@ impl Program<'_> {
         Toolpath { start: self.start.unwrap_or(origin), moves: self.moves }
     }
 }
+
+#[cfg(test)]
+mod tests;

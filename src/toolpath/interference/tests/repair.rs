@@ -20,14 +20,13 @@ fn cavity(half: [f64; 2], depth: f64) -> (TriangleMesh, Bvh) {
 }
 
 struct Tool {
-    cutter: Cutter,
     edges: Solid,
     held: Solid,
 }
 
 fn tool(cutter: Cutter) -> Tool {
     let holder = holder(10.0);
-    Tool { cutter, edges: Solid::of_cutter(&cutter, Some(&holder)), held: Solid::of_holder(&holder) }
+    Tool { edges: Solid::of_cutter(&cutter, Some(&holder)), held: Solid::of_holder(&holder) }
 }
 
 const NEEDED: f64 = 0.5;
