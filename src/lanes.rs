@@ -19,6 +19,30 @@ pub fn dispatch<R>(work: impl FnOnce() -> R) -> R {
     pulp::Arch::new().dispatch(Work(work))
 }
 
+/// Lanes of the lists that vector loops choose from.
+pub const LANES: usize = 16;
+
+/// One bit for each lane that is true, the first one lowest.
+#[inline(always)]
+pub fn bits(lanes: &[bool; LANES]) -> u32 {
+    // An instruction for it keeps what fills the lanes from being taken apart into sixteen scalars.
+    #[cfg(target_arch = "x86_64")]
+    if let Some(sse2) = pulp::core_arch::x86::Sse2::try_new() {
+        let mut signs = [0i8; LANES];
+        for lane in 0..LANES {
+            signs[lane] = if lanes[lane] { -1 } else { 0 };
+        }
+        return sse2._mm_movemask_epi8(pulp::cast(signs)) as u32;
+    }
+    let lanes = std::hint::black_box(lanes);
+    // The product moves the lowest bits of eight bytes side by side to the top.
+    let eight = |k: usize| {
+        let bytes = u64::from_le_bytes(std::array::from_fn(|b| u8::from(lanes[k + b])));
+        (bytes.wrapping_mul(0x0102_0408_1020_4080) >> 56) as u32
+    };
+    eight(0) | eight(8) << 8
+}
+
 /// The number type of a vector loop: f32 where its rounding is far below what is asked, else f64.
 pub trait Real:
     Copy
@@ -35,6 +59,8 @@ pub trait Real:
     fn of(x: f64) -> Self;
     /// Exactly this number.
     fn wide(self) -> f64;
+    /// The sum with a number that f32 holds exactly, rounded once.
+    fn plus(self, x: f64) -> f32;
     /// Square root; NaN of a negative number.
     fn sqrt(self) -> Self;
     /// Without its sign.
@@ -65,6 +91,10 @@ impl Real for f32 {
         f64::from(self)
     }
     #[inline(always)]
+    fn plus(self, x: f64) -> f32 {
+        self + x as f32
+    }
+    #[inline(always)]
     fn sqrt(self) -> Self {
         f32::sqrt(self)
     }
@@ -78,6 +108,10 @@ impl Real for f64 {
     #[inline(always)]
     fn wide(self) -> f64 {
         self
+    }
+    #[inline(always)]
+    fn plus(self, x: f64) -> f32 {
+        (self + x) as f32
     }
     #[inline(always)]
     fn sqrt(self) -> Self {

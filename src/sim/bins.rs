@@ -160,18 +160,20 @@ impl Piece {
         // Counted into the slot after next, so that one running sum leaves in slot b + 1 the place
         // where bin b begins; filling then moves it to where bin b ends.
         let mut starts = vec![0usize; bins + 2];
-        for k in range.clone() {
-            layout.visit(radius, path.start_of(k), path.moves[k].to.tip, |b| starts[b + 2] += 1);
+        let mut visits = Vec::with_capacity(4 * range.len());
+        for k in range {
+            layout.visit(radius, path.start_of(k), path.moves[k].to.tip, |b| {
+                starts[b + 2] += 1;
+                visits.push((b, k as u32));
+            });
         }
         for b in 2..starts.len() {
             starts[b] += starts[b - 1];
         }
-        let mut moves = vec![0u32; starts[bins + 1]];
-        for k in range {
-            layout.visit(radius, path.start_of(k), path.moves[k].to.tip, |b| {
-                moves[starts[b + 1]] = k as u32;
-                starts[b + 1] += 1;
-            });
+        let mut moves = vec![0u32; visits.len()];
+        for (b, k) in visits {
+            moves[starts[b + 1]] = k;
+            starts[b + 1] += 1;
         }
         Self { starts, moves }
     }

@@ -17,6 +17,7 @@
 //! plunges, moves of no length and moves beside the stock have convex heights too.
 
 mod choose;
+mod leaf;
 mod local;
 #[cfg(test)]
 mod tests;
@@ -24,11 +25,11 @@ mod tests;
 use super::bins::MoveBins;
 use super::form::{Family, Form};
 use super::sweep::{self, Ball, Flat, LocalMove, Rounded, Sweep};
-use super::swept::swept_height;
 use super::tiles::{TileCells, tiles};
 use super::track::Track;
 use super::{Grid, NOT_CUT, ZMap, cut_reference};
 use crate::cutter::Cutter;
+use crate::geometry::Point3;
 use crate::lanes::{self, Real};
 use crate::monitor::{Cancelled, Monitor, check};
 use crate::parallel;
@@ -164,19 +165,36 @@ impl Job<'_> {
         Ok((stock, total))
     }
 
+    /// The tip's places where a move starts and ends.
+    fn ends(&self, k: u32) -> (Point3, Point3) {
+        (self.path.start_of(k as usize), self.path.moves[k as usize].to.tip)
+    }
+
     fn cut_tile(&self, grid: &Grid, cells: &mut TileCells<'_>, moves: &[u32]) -> Work {
         let (radius, half) = (self.form.radius, 0.5 * (self.side as f64) * grid.cell);
         let extent = radius + half * std::f64::consts::SQRT_2;
-        let tracks: Vec<Track> = moves.iter().map(|&k| track(self.path, k)).collect();
         let low = grid.centre(cells.i0, cells.j0);
         let high = grid.centre(cells.i0 + cells.nx() - 1, cells.j0 + cells.rows.len() - 1);
         let (x, y) = (0.5 * (low.x + high.x), 0.5 * (low.y + high.y));
-        let lowest_tip = |track: &Track| {
+        let tracks: Vec<(Track, bool)> = moves
+            .iter()
+            .map(|&k| {
+                let (from, to) = self.ends(k);
+                (Track::new(from, to), Track::falls(from, to))
+            })
+            .collect();
+        let lowest_tip = |(track, _): &(Track, bool)| {
             let (along, _) = track.along_across(x, y);
             track.tip((along - extent).max(0.0).min(track.length))
         };
         let z = tracks.iter().map(lowest_tip).fold(f64::INFINITY, f64::min);
-        let frame = Frame { x, y, z: if z.is_finite() { z } else { 0.0 }, reach: 2.0 * extent };
+        // A height in f32 that is known to f32, so that heights are added to it in one rounding.
+        let z = f64::from(if z.is_finite() { z as f32 } else { 0.0 });
+        let frame = Frame { x, y, z, reach: 2.0 * extent };
+        // As long as no leaf says otherwise; and what leaves find in the cache they write sooner.
+        for (_, cut_by) in &mut cells.rows {
+            cut_by.fill(NOT_CUT);
+        }
         let tops = lanes::dispatch(
             #[inline(always)]
             || leaf_tops(cells, self.side),
@@ -211,10 +229,9 @@ impl Job<'_> {
         let Tile { cells: tile, moves, tracks, frame, tops } = tile;
         let mut levels = vec![Level::new()];
         levels[0].moves.reset(moves.len());
-        for (n, (&k, track)) in moves.iter().zip(tracks).enumerate() {
+        for (n, (&k, (track, falling))) in moves.iter().zip(tracks).enumerate() {
             let (local, bound_only) = LocalMove::new(track, &frame);
-            let falling = Track::falls(self.path.start_of(k as usize), self.path.moves[k as usize].to.tip);
-            levels[0].moves.put(n, &local, Name::new(k, bound_only, falling));
+            levels[0].moves.put(n, &local, Name::new(k, bound_only, *falling));
         }
         let mut worker = Worker {
             job: self,
@@ -238,15 +255,11 @@ impl Job<'_> {
 struct Tile<'a, 'b> {
     cells: &'a mut TileCells<'b>,
     moves: &'a [u32],
-    /// Those of the moves.
-    tracks: &'a [Track],
+    /// Those of the moves, and whether they are passed downwards.
+    tracks: &'a [(Track, bool)],
     frame: Frame,
     /// The highest stock in each leaf.
     tops: Vec<f32>,
-}
-
-fn track(path: &Toolpath, k: u32) -> Track {
-    Track::new(path.start_of(k as usize), path.moves[k as usize].to.tip)
 }
 
 /// The highest height in each leaf of a tile, `[side / LEAF][side / LEAF]`.
@@ -254,19 +267,18 @@ fn track(path: &Toolpath, k: u32) -> Track {
 fn leaf_tops(tile: &TileCells<'_>, side: usize) -> Vec<f32> {
     let leaves = side / LEAF;
     let mut tops = vec![f32::NEG_INFINITY; leaves * leaves];
+    let mut columns = vec![f32::NEG_INFINITY; side];
     for (tops, rows) in tops.chunks_mut(leaves).zip(tile.rows.chunks(LEAF)) {
-        for (k, top) in tops.iter_mut().enumerate() {
-            // One maximum for each column.
-            let mut columns = [f32::NEG_INFINITY; LEAF];
-            for (heights, _) in rows {
-                let mut cells = [f32::NEG_INFINITY; LEAF];
-                let n = heights.len().saturating_sub(k * LEAF).min(LEAF);
-                copy_row::<LEAF, _>(&mut cells, heights.get(k * LEAF..).unwrap_or(&[]), n);
-                for c in 0..LEAF {
-                    columns[c] = if cells[c] > columns[c] { cells[c] } else { columns[c] };
-                }
+        columns.fill(f32::NEG_INFINITY);
+        for (heights, _) in rows {
+            for (column, &height) in columns.iter_mut().zip(heights.iter()) {
+                *column = height.larger(*column);
             }
-            *top = columns.into_iter().fold(f32::NEG_INFINITY, |a, b| if a > b { a } else { b });
+        }
+        for (top, columns) in tops.iter_mut().zip(columns.chunks_exact(LEAF)) {
+            for &column in columns {
+                *top = column.larger(*top);
+            }
         }
     }
     tops
@@ -359,10 +371,9 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
             let Some([nx, ny]) = self.inside([i, j], side) else { continue };
             let kept = self.levels[level].kept[q];
             if kept == 0 {
-                for (_, cut_by) in &mut self.tile.rows[j..j + ny] {
-                    cut_by[i..i + nx].fill(NOT_CUT);
-                }
-            } else if side == PART {
+                continue;
+            }
+            if side == PART {
                 self.leaf::<PART, PART_CELLS>(self.part_cells, [level, q], [i, j], [nx, ny]);
             } else if side == LEAF && kept <= CROWDED {
                 self.leaf::<LEAF, LEAF_CELLS>(self.cells, [level, q], [i, j], [nx, ny]);
@@ -407,7 +418,7 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
         let Level { moves, chosen, kept } = &mut self.levels[level];
         let margin = T::of(self.job.margin);
         self.work.tests += (moves.len() * Q) as u64;
-        *kept = self.chooser.choose(&self.sweep, moves, &places, &stocks, margin, chosen);
+        *kept = self.chooser.choose(&self.sweep, moves, &places, &stocks, margin, side > PART, chosen);
     }
 
     /// Marks all of the level's moves for each square.
@@ -447,97 +458,5 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
             }
         }
         T::of(f64::from(top) - self.frame.z)
-    }
-
-    /// Cuts the cells of a leaf of `N` × `N` = `CELLS` cells with all moves of a level.
-    #[inline(always)]
-    fn leaf<const N: usize, const CELLS: usize>(
-        &mut self,
-        [x, y]: [[T; CELLS]; 2],
-        [level, q]: [usize; 2],
-        [i, j]: [usize; 2],
-        [nx, ny]: [usize; 2],
-    ) {
-        let infinite = T::of(f64::INFINITY);
-        let first = self.square_at([i, j], [1, 1]);
-        // Through arrays of a fixed length: loops over those become vector code. Read long before they are needed:
-        // vectors of what was just written in parts have to wait for it.
-        let mut stored = [f32::NEG_INFINITY; CELLS];
-        for (row, (heights, _)) in self.tile.rows[j..j + ny].iter().enumerate() {
-            copy_row::<N, _>(&mut stored[row * N..], &heights[i..], nx);
-        }
-        let mut height = [infinite; CELLS];
-        let mut doubt = [infinite; CELLS];
-        let mut by = [NOT_CUT; CELLS];
-        let mut second_look = false;
-        self.work.evaluations += (self.levels[level].kept[q] * nx * ny) as u64;
-        for (chunk, lane) in self.levels[level].chosen_by(q) {
-            let (m, name) = (chunk.lane(lane), chunk.name(lane));
-            second_look |= name.bound_only();
-            let index = name.index();
-            let (along, across) = m.along_across(first.x, first.y);
-            for c in 0..CELLS {
-                let a = along + (x[c] * m.ux + y[c] * m.uy);
-                let w = across + (y[c] * m.ux - x[c] * m.uy);
-                let (h, d) = self.sweep.height(&m, a, w);
-                let lower = h < height[c];
-                height[c] = h.smaller(height[c]);
-                by[c] = if lower { index } else { by[c] };
-                doubt[c] = d.smaller(doubt[c]);
-            }
-        }
-        for c in 0..CELLS {
-            second_look |= (doubt[c] <= height[c]) & (doubt[c] < infinite);
-        }
-        if second_look {
-            self.leaf_again([level, q], [i, j], [nx, ny]);
-            return;
-        }
-        for c in 0..CELLS {
-            let cut = (height[c].wide() + self.frame.z) as f32;
-            let lower = cut < stored[c];
-            stored[c] = if lower { cut } else { stored[c] };
-            by[c] = if lower { by[c] } else { NOT_CUT };
-        }
-        for (row, (heights, cut_by)) in self.tile.rows[j..j + ny].iter_mut().enumerate() {
-            copy_row::<N, _>(&mut heights[i..], &stored[row * N..], nx);
-            copy_row::<N, _>(&mut cut_by[i..], &by[row * N..], nx);
-        }
-    }
-
-    /// As [`Self::leaf`], by the closed forms of the reference engine in f64.
-    fn leaf_again(&mut self, [level, q]: [usize; 2], [i, j]: [usize; 2], [nx, ny]: [usize; 2]) {
-        self.work.second_looks += (nx * ny) as u64;
-        let tracks: Vec<(u32, Track)> = self.levels[level]
-            .chosen_by(q)
-            .map(|(chunk, lane)| chunk.name(lane).index())
-            .map(|index| (index, track(self.job.path, index)))
-            .collect();
-        for dj in 0..ny {
-            for di in 0..nx {
-                let p = self.grid.centre(self.tile.i0 + i + di, self.tile.j0 + j + dj);
-                let mut lowest = (f64::INFINITY, NOT_CUT);
-                for (index, track) in &tracks {
-                    let h = swept_height(&self.job.form, track, p.x, p.y);
-                    if h < lowest.0 {
-                        lowest = (h, *index);
-                    }
-                }
-                let (heights, cut_by) = &mut self.tile.rows[j + dj];
-                let h = lowest.0 as f32;
-                let lower = h < heights[i + di];
-                heights[i + di] = if lower { h } else { heights[i + di] };
-                cut_by[i + di] = if lower { lowest.1 } else { NOT_CUT };
-            }
-        }
-    }
-}
-
-/// The first `n` cells of a row of a leaf; nearly always all of them, in one move.
-#[inline(always)]
-fn copy_row<const N: usize, V: Copy>(to: &mut [V], from: &[V], n: usize) {
-    match (n, to.first_chunk_mut::<N>(), from.first_chunk::<N>()) {
-        (n, Some(to), Some(from)) if n == N => *to = *from,
-        _ => to[..n].copy_from_slice(&from[..n]),
     }
 }

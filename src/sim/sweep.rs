@@ -56,6 +56,13 @@ impl<T: Real> LocalMove<T> {
         let (dx, dy) = (x - self.x, y - self.y);
         (dx * self.ux + dy * self.uy, dy * self.ux - dx * self.uy)
     }
+
+    /// Square of the distance from the track in the plan view.
+    #[inline(always)]
+    pub fn distance2(&self, along: T, across: T) -> T {
+        let ahead = along - clamp(along, self.low, self.high);
+        ahead * ahead + across * across
+    }
 }
 
 /// Height and slopes of a plane at a point: along the track and across it.
@@ -82,6 +89,18 @@ pub(super) trait Sweep<T: Real>: Copy + Sync {
     /// Height of the sweep at a point, infinite or NaN where it does not pass, and whether that may be
     /// wrong by more than the rounding limit that this was made for.
     fn height(&self, m: &LocalMove<T>, along: T, across: T) -> (T, Doubt<T>);
+
+    /// Whether [`Sweep::inner_height`] holds within a distance of a point.
+    #[inline(always)]
+    fn surrounds(&self, _: &LocalMove<T>, _along: T, _across: T, _within: T) -> bool {
+        false
+    }
+
+    /// As [`Sweep::height`], far enough from the rim that there is no doubt.
+    #[inline(always)]
+    fn inner_height(&self, m: &LocalMove<T>, along: T, across: T) -> T {
+        self.height(m, along, across).0
+    }
 
     /// As [`Sweep::height`], at many points: `[blocks][N]` of each.
     #[inline(always)]
@@ -230,6 +249,20 @@ impl<T: Real> Sweep<T> for Ball<T> {
         let lowest = centre - self.rim.sqrt() * stretch2;
         (centre - depth2.sqrt() * stand.stretch, if near_rim { lowest } else { infinite })
     }
+
+    /// Where the ball stands at the lower end, its depth is at least `q cos φ`.
+    #[inline(always)]
+    fn surrounds(&self, m: &LocalMove<T>, along: T, across: T, within: T) -> bool {
+        inner_margin(self.radius, m.distance2(along, across), within) > self.rim * m.sec * m.sec
+    }
+
+    #[inline(always)]
+    fn inner_height(&self, m: &LocalMove<T>, along: T, across: T) -> T {
+        let chord2 = (self.radius - across) * (self.radius + across);
+        let stand = Stand::new(m, along, chord2);
+        let depth2 = chord2 - stand.ahead * stand.ahead;
+        (m.z + self.radius) + m.slope * stand.place - depth2.sqrt() * stand.stretch
+    }
 }
 
 /// Where on the axis of a ball's sweep a point is best looked at, so that one root gives the height.
@@ -274,6 +307,13 @@ fn is_behind<T: Real>(m: &LocalMove<T>, ahead: T, chord2: T) -> bool {
 fn margin<T: Real>(m: &LocalMove<T>, along: T, chord2: T) -> T {
     let off = along - clamp(along, m.low, m.high);
     chord2 - off * off
+}
+
+/// No more than the least [`margin`] within a distance of a point of given squared distance from the track, unless
+/// negative: `(d + within)² <= d² + (2 radius + within) within` where d is no more than the radius.
+#[inline(always)]
+fn inner_margin<T: Real>(radius: T, distance2: T, within: T) -> T {
+    radius * radius - distance2 - (radius + radius + within) * within
 }
 
 /// A flat end.
@@ -342,6 +382,19 @@ impl<T: Real> Sweep<T> for Flat<T> {
         let steep = inside & (half_chord < self.rim * m.slope) & (place > m.low);
         let lowest = tip - if steep { m.slope * self.shift } else { T::of(0.0) };
         (if inside { tip } else { infinite }, if at_edge | steep { lowest } else { infinite })
+    }
+
+    #[inline(always)]
+    fn surrounds(&self, m: &LocalMove<T>, along: T, across: T, within: T) -> bool {
+        let margin = inner_margin(self.radius, m.distance2(along, across), within);
+        let rim = self.rim * m.slope;
+        (margin > self.edge) & (margin > rim * rim)
+    }
+
+    #[inline(always)]
+    fn inner_height(&self, m: &LocalMove<T>, along: T, across: T) -> T {
+        let half_chord = ((self.radius - across) * (self.radius + across)).sqrt();
+        m.z + m.slope * clamp(along - half_chord, m.low, m.high)
     }
 }
 

@@ -3,8 +3,8 @@
 //! Enters: a list of moves and up to four squares. Leaves: one bit for each move and square. Squares are
 //! worked on side by side, because each step of one waits for the step before it.
 
-use super::local::{Chunk, LANES, MoveList};
-use crate::lanes::Real;
+use super::local::{Chunk, MoveList};
+use crate::lanes::{LANES, Real, bits};
 use crate::sim::sweep::{LocalMove, Sweep};
 
 /// Most squares that choose together.
@@ -45,11 +45,8 @@ impl<T: Real> Planes<T> {
     }
 }
 
-/// Most moves that are compared each with each. Comparing more costs more than it saves.
-const MOST_JUDGES: usize = 2 * LANES;
-
 /// So few moves go down to the leaves without further tests.
-pub(super) const FEW: usize = 3;
+pub(super) const FEW: usize = 4;
 
 /// Room to choose in, kept from one call to the next.
 pub(super) struct Chooser<T> {
@@ -63,7 +60,8 @@ impl<T: Real> Chooser<T> {
     }
 
     /// Marks for each square those of `all` that may be lowest somewhere in it and below its stock, and
-    /// counts them. `margin` is added to every bound.
+    /// counts them. `margin` is added to every bound; `judging` compares the marked moves of a short list each with
+    /// each.
     #[inline(always)]
     pub fn choose<S: Sweep<T>, const Q: usize>(
         &mut self,
@@ -72,6 +70,7 @@ impl<T: Real> Chooser<T> {
         squares: &[Square<T>; Q],
         stocks: &[T; Q],
         margin: T,
+        judging: bool,
         chosen: &mut Vec<[u32; SQUARES]>,
     ) -> [usize; SQUARES] {
         let chunks = all.chunks();
@@ -80,20 +79,26 @@ impl<T: Real> Chooser<T> {
             self.neighbours.resize(chunks.len(), [Neighbours::default(); SQUARES]);
         }
         let infinite = T::of(f64::INFINITY);
+        let (mut within, mut reach2) = ([T::of(0.0); Q], [T::of(0.0); Q]);
+        for q in 0..Q {
+            let half = half_diagonal(&squares[q]);
+            let (inner, outer) = (sweep.radius() - half, sweep.radius() + half);
+            within[q] = if inner > T::of(0.0) { inner * inner } else { T::of(-1.0) };
+            reach2[q] = outer * outer;
+        }
         let mut best = [Best { least: [infinite; LANES], chunk: [0; LANES] }; Q];
         for (k, (chunk, (planes, neighbours))) in
             chunks.iter().zip(self.planes.iter_mut().zip(&mut self.neighbours)).enumerate()
         {
             let followed = followed(chunk, chunks.get(k + 1));
             for q in 0..Q {
-                (planes[q], neighbours[q]) = planes_of(sweep, chunk, &squares[q], followed, k, &mut best[q]);
+                (planes[q], neighbours[q]) =
+                    planes_of(sweep, chunk, &squares[q], within[q], followed, k, &mut best[q]);
             }
         }
-        let (mut places, mut reach2) = ([None; Q], [T::of(0.0); Q]);
+        let mut places = [None; Q];
         for q in 0..Q {
             places[q] = best[q].place();
-            let reach = sweep.radius() + half_diagonal(&squares[q]);
-            reach2[q] = reach * reach;
         }
         let ceilings = ceilings(sweep, all, &places, squares);
         chosen.clear();
@@ -104,13 +109,12 @@ impl<T: Real> Chooser<T> {
         {
             let mut marks = [0; SQUARES];
             for q in 0..Q {
-                let mut keep = [0; LANES];
+                let mut keep = [false; LANES];
                 for lane in 0..LANES {
                     let corners = planes[q].corners(lane, &squares[q], margin);
                     let above = at_or_above(corners, ceilings[q]);
                     let lowest = corners[0].smaller(corners[1]).smaller(corners[2].smaller(corners[3]));
-                    keep[lane] =
-                        u8::from(!above & (lowest < stocks[q]) & (planes[q].away[lane] <= reach2[q]));
+                    keep[lane] = !above & (lowest < stocks[q]) & (planes[q].away[lane] <= reach2[q]);
                 }
                 let own = neighbours[q];
                 let of_best = places[q].filter(|[chunk, _]| *chunk == k).map_or(0, |[_, lane]| 1 << lane);
@@ -120,10 +124,12 @@ impl<T: Real> Chooser<T> {
             }
             chosen.push(marks);
         }
-        if all.len() <= MOST_JUDGES {
+        // More of them cost more than they save.
+        if let (true, [chunk], [planes, ..], [chosen]) = (judging, chunks, &self.planes[..], &mut chosen[..])
+        {
             for q in 0..Q {
                 if kept[q] > FEW {
-                    kept[q] = judge(sweep, all, q, &self.planes, chosen, &squares[q], margin);
+                    kept[q] = judge(sweep, chunk, &planes[q], &mut chosen[q], &squares[q], margin);
                 }
             }
         }
@@ -134,13 +140,6 @@ impl<T: Real> Chooser<T> {
 #[inline(always)]
 fn half_diagonal<T: Real>(square: &Square<T>) -> T {
     (square.half_x * square.half_x + square.half_y * square.half_y).sqrt()
-}
-
-/// Squared distance from the track within which a move passes all of a square.
-#[inline(always)]
-fn covered_within<T: Real, S: Sweep<T>>(sweep: &S, square: &Square<T>) -> T {
-    let within = sweep.radius() - half_diagonal(square);
-    if within > T::of(0.0) { within * within } else { T::of(-1.0) }
 }
 
 /// The lowest of the moves that pass all of a square, lane by lane.
@@ -225,9 +224,9 @@ fn followed<T: Real>(chunk: &Chunk<T>, next: Option<&Chunk<T>>) -> u32 {
         following[lane] = chunk.name(lane + 1).index();
     }
     following[LANES - 1] = next.map_or(u32::MAX, |next| next.name(0).index());
-    let mut followed = [0; LANES];
+    let mut followed = [false; LANES];
     for lane in 0..LANES {
-        followed[lane] = u8::from(following[lane] == chunk.name(lane).index() + 1);
+        followed[lane] = following[lane] == chunk.name(lane).index() + 1;
     }
     bits(&followed)
 }
@@ -247,51 +246,41 @@ fn at_or_above<T: Real>(a: [T; 4], b: [T; 4]) -> bool {
     (a[0] >= b[0]) & (a[1] >= b[1]) & (a[2] >= b[2]) & (a[3] >= b[3])
 }
 
-/// Compares few chosen moves each with each, leaves those that none of the others makes useless, and
-/// counts them.
+/// Compares the chosen moves of one chunk each with each, leaves those that none of the others makes useless,
+/// and counts them.
 #[inline(always)]
 fn judge<T: Real, S: Sweep<T>>(
     sweep: &S,
-    list: &MoveList<T>,
-    q: usize,
-    planes: &[[Planes<T>; SQUARES]],
-    chosen: &mut [[u32; SQUARES]],
+    chunk: &Chunk<T>,
+    planes: &Planes<T>,
+    chosen: &mut u32,
     square: &Square<T>,
     margin: T,
 ) -> usize {
-    const CHUNKS: usize = MOST_JUDGES / LANES;
-    let zero = [[T::of(0.0); LANES]; 4];
-    let (mut floor, mut height) = ([zero; CHUNKS], [zero; CHUNKS]);
-    for (k, (chunk, planes)) in list.chunks().iter().zip(planes).enumerate().take(CHUNKS) {
+    let (mut floor, mut height) = ([[T::of(0.0); LANES]; 4], [[T::of(0.0); LANES]; 4]);
+    for lane in 0..LANES {
+        let floors = planes.corners(lane, square, margin);
+        let heights = corners(sweep, &chunk.lane(lane), square);
+        let unsure = chunk.name(lane).bound_only();
+        for c in 0..4 {
+            floor[c][lane] = floors[c];
+            height[c][lane] = if unsure { T::of(f64::INFINITY) } else { heights[c] };
+        }
+    }
+    for judge in ones(*chosen) {
+        // One that is useless itself lies above another that judges as strictly.
+        if *chosen & (1 << judge) == 0 {
+            continue;
+        }
+        let ceiling = [height[0][judge], height[1][judge], height[2][judge], height[3][judge]];
+        let mut above = [false; LANES];
         for lane in 0..LANES {
-            let floors = planes[q].corners(lane, square, margin);
-            let heights = corners(sweep, &chunk.lane(lane), square);
-            let unsure = chunk.name(lane).bound_only();
-            for c in 0..4 {
-                floor[k][c][lane] = floors[c];
-                height[k][c][lane] = if unsure { T::of(f64::INFINITY) } else { heights[c] };
-            }
+            above[lane] =
+                at_or_above([floor[0][lane], floor[1][lane], floor[2][lane], floor[3][lane]], ceiling);
         }
+        *chosen &= !bits(&above) | 1 << judge;
     }
-    for b in 0..chosen.len().min(CHUNKS) {
-        for lane in ones(chosen[b][q]) {
-            // One that is useless itself lies above another that judges as strictly.
-            if chosen[b][q] & (1 << lane) == 0 {
-                continue;
-            }
-            let [h0, h1, h2, h3] = &height[b];
-            let ceiling = [h0[lane], h1[lane], h2[lane], h3[lane]];
-            for (k, (chosen, [f0, f1, f2, f3])) in chosen.iter_mut().zip(&floor).enumerate() {
-                let mut above = [0; LANES];
-                for lane in 0..LANES {
-                    above[lane] = u8::from(at_or_above([f0[lane], f1[lane], f2[lane], f3[lane]], ceiling));
-                }
-                let own = if k == b { 1 << lane } else { 0 };
-                chosen[q] &= !bits(&above) | own;
-            }
-        }
-    }
-    chosen.iter().map(|chosen| chosen[q].count_ones() as usize).sum()
+    chosen.count_ones() as usize
 }
 
 /// The least number and its lane. By halves of fixed length, which stay in registers.
@@ -308,40 +297,27 @@ fn least_of<T: Real>(numbers: &[T; LANES]) -> (T, usize) {
         two[k] = four[k].smaller(four[k + 2]);
     }
     let least = two[0].smaller(two[1]);
-    let mut lanes = [0; LANES];
+    let mut lanes = [false; LANES];
     for lane in 0..LANES {
-        lanes[lane] = u8::from(numbers[lane] <= least);
+        lanes[lane] = numbers[lane] <= least;
     }
     (least, bits(&lanes).trailing_zeros() as usize % LANES)
 }
 
-/// One bit for each lane: lanes are 0 or 1.
-#[inline(always)]
-fn bits(lanes: &[u8; LANES]) -> u32 {
-    // Kept in memory, or what fills the lanes is taken apart into sixteen scalars.
-    let lanes = std::hint::black_box(lanes);
-    // The product moves the lowest bits of eight bytes side by side to the top.
-    let eight = |k: usize| {
-        let bytes = u64::from_le_bytes(std::array::from_fn(|b| lanes[k + b]));
-        (bytes.wrapping_mul(0x0102_0408_1020_4080) >> 56) as u32
-    };
-    eight(0) | eight(8) << 8
-}
-
 /// The planes of chunk `k`, and what its moves have to do with their neighbours; the lowest that pass all of the
-/// square enter `best`. All in one loop: short ones do not become vector code.
+/// square, the distance from their track being no more than the root of `within`, enter `best`. All in one loop: short ones do not become vector code.
 #[inline(always)]
 fn planes_of<T: Real, S: Sweep<T>>(
     sweep: &S,
     chunk: &Chunk<T>,
     square: &Square<T>,
+    within: T,
     followed: u32,
     k: usize,
     best: &mut Best<T>,
 ) -> (Planes<T>, Neighbours) {
-    let within = covered_within(sweep, square);
     let mut planes = Planes::none();
-    let (mut at_start, mut at_end) = ([0; LANES], [0; LANES]);
+    let (mut at_start, mut at_end) = ([false; LANES], [false; LANES]);
     for lane in 0..LANES {
         let m = chunk.lane(lane);
         let (along, across) = m.along_across(square.x, square.y);
@@ -366,8 +342,8 @@ fn planes_of<T: Real, S: Sweep<T>>(
         best.chunk[lane] = if lowest { k as u32 } else { best.chunk[lane] };
         // A plunge has both ends in one place, and only the lower one cuts.
         let counts = !name.bound_only() & (m.low < m.high);
-        at_start[lane] = u8::from(counts & if name.falling() { upper } else { lower });
-        at_end[lane] = u8::from(counts & if name.falling() { lower } else { upper });
+        at_start[lane] = counts & if name.falling() { upper } else { lower };
+        at_end[lane] = counts & if name.falling() { lower } else { upper };
     }
     (planes, Neighbours { at_start: bits(&at_start), at_end: bits(&at_end), followed })
 }
