@@ -466,7 +466,7 @@ impl<'a> Job<'a> {
         let (fields, intervals) =
             (format!("Feed directions, {}", request.name), format!("Interval of passes, {}", request.name));
         let marks = marks(measured, &scene.tolerance);
-        let words = |title, marks| MapWords { title, subtitle: &subtitle, marks };
+        let words = |title, marks| MapWords { title, subtitle: &subtitle, marks, axes: ["x", "y"] };
         let (deviation_png, height_png) = parallel::join(
             || {
                 both("deviation.png", &|size| {

@@ -234,7 +234,8 @@ mod tests {
     use crate::geometry::{Point2, Point3, Vector2};
     use crate::toolpath::FeedSample;
 
-    const WORDS: MapWords<'_> = MapWords { title: "a title", subtitle: "a subtitle", marks: &[] };
+    const WORDS: MapWords<'_> =
+        MapWords { title: "a title", subtitle: "a subtitle", marks: &[], axes: ["x", "y"] };
 
     /// A pass along x at `y`, with this interval, 0.5 mm allowed.
     fn pass(y: f64, interval: Option<f64>) -> Vec<PassPoint> {

@@ -63,6 +63,8 @@ pub struct MapWords<'a> {
     pub subtitle: &'a str,
     /// Places to be ringed.
     pub marks: &'a [MapMark],
+    /// What runs right and up: `x` and `y`, or the parameters of a patch laid flat.
+    pub axes: [&'a str; 2],
 }
 
 /// A place on a map, ringed and named.
@@ -306,7 +308,7 @@ pub(super) fn draw(
     imageops::replace(&mut page.pixels, &pixels, LEFT as i64, TOP as i64);
     over(&mut page);
     page.frame(LEFT as i64, TOP as i64, width as i64, height as i64, FAINT_INK);
-    draw_axes(&mut page, grid, map);
+    draw_axes(&mut page, grid, map, words.axes);
     draw_marks(&mut page, grid, map, words.marks);
     draw_bar(&mut page, map, height);
     (page, [(LEFT + width.max(MIN_WIDTH) + 28) as i64, TOP as i64 + 24])
@@ -329,7 +331,7 @@ fn draw_marks(page: &mut Picture, grid: &Grid, map: &Pooled, marks: &[MapMark]) 
 }
 
 /// Round positions in mm along the bottom and the left side.
-fn draw_axes(page: &mut Picture, grid: &Grid, map: &Pooled) {
+fn draw_axes(page: &mut Picture, grid: &Grid, map: &Pooled, [right, up]: [&str; 2]) {
     let (width, height) = ((map.width * map.magnify) as i64, (map.height * map.magnify) as i64);
     let (left, bottom) = (LEFT as i64, TOP as i64 + height);
     // Cells reach half a cell beyond their centres.
@@ -349,8 +351,8 @@ fn draw_axes(page: &mut Picture, grid: &Grid, map: &Pooled) {
         page.fill(left - 7, bottom - 1 - at.min(height - 1), 6, 1, FAINT_INK);
         page.text(left - 11, bottom - 9 - at, &text, TextSize::Small, Align::Right, INK);
     }
-    page.text(left + width, bottom + 30, "x mm", TextSize::Small, Align::Right, FAINT_INK);
-    page.text(left - 11, TOP as i64 - 28, "y mm", TextSize::Small, Align::Right, FAINT_INK);
+    page.text(left + width, bottom + 30, &format!("{right} mm"), TextSize::Small, Align::Right, FAINT_INK);
+    page.text(left - 11, TOP as i64 - 28, &format!("{up} mm"), TextSize::Small, Align::Right, FAINT_INK);
 }
 
 /// A bar of a round length, about a fifth of the map.
@@ -415,7 +417,8 @@ mod tests {
     use super::*;
 
     const LIMITS: Limits = Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chord: 0.001 };
-    const WORDS: MapWords<'_> = MapWords { title: "a title", subtitle: "a subtitle", marks: &[] };
+    const WORDS: MapWords<'_> =
+        MapWords { title: "a title", subtitle: "a subtitle", marks: &[], axes: ["x", "y"] };
 
     fn grid(nx: usize, ny: usize) -> Grid {
         Grid { origin: Point2::new(0.5, 0.5), cell: 1.0, nx, ny }

@@ -246,7 +246,7 @@ impl Job<'_> {
             page = self.write_normal_picture(
                 request,
                 "deviation.png",
-                "plan view",
+                ["x", "y"],
                 spacing,
                 &grid,
                 &values,
@@ -260,15 +260,8 @@ impl Job<'_> {
             outputs.file(&name, |out| out.write_all(&bytes))?;
             let (grid, values) = unrolled(map, patch);
             let name = format!("deviation{number}.png");
-            let picture = self.write_normal_picture(
-                request,
-                &name,
-                "over u (right) and v (up)",
-                spacing,
-                &grid,
-                &values,
-                outputs,
-            )?;
+            let picture =
+                self.write_normal_picture(request, &name, ["u", "v"], spacing, &grid, &values, outputs)?;
             if k == 0 {
                 page = picture;
             }
@@ -287,7 +280,7 @@ impl Job<'_> {
         &self,
         request: &ToolpathRequest,
         name: &str,
-        view: &str,
+        axes: [&str; 2],
         spacing: f64,
         grid: &Grid,
         values: &[f32],
@@ -296,10 +289,11 @@ impl Job<'_> {
         let scene = self.scene;
         let title = format!("Deviation, {}", request.name);
         let cell = format!("{spacing} mm");
-        let subtitle = format!("{} · {view} · every {cell} · engine rays", scene.title);
+        let subtitle =
+            format!("{} · along {} and {} · every {cell} · engine rays", scene.title, axes[0], axes[1]);
         let notes = [("Title", scene.title.as_str()), ("Scene", &scene.source.name), ("Cell", &cell)];
         let name = format!("{}/{name}", request.folder);
-        let words = MapWords { title: &title, subtitle: &subtitle, marks: &[] };
+        let words = MapWords { title: &title, subtitle: &subtitle, marks: &[], axes };
         let encode = |size| {
             let picture = deviation_picture(grid, values, &scene.tolerance, &words, size);
             png::encode(&picture, &notes).map_err(CliError::output(Path::new(&name)))
