@@ -126,3 +126,62 @@ pub(super) fn write(out: &mut String, request: Option<&AxisRequest>) -> fmt::Res
         most_turning.map_or_else(String::new, |rate| format!(", turning = {}", number(rate.to_degrees())));
     writeln!(out, "axis = {{ {rule}{turning} }}  # degrees, mm")
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::io::scene::{Scene, complete_toml};
+    use crate::toolpath::ToolAxis;
+
+    fn scene(axis: &str) -> String {
+        format!(
+            "[part]\nsurface = \"plane\"\nx = [0, 8]\ny = [0, 6]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n\
+             [[toolpath]]\nstrategy = \"zigzag\"\naxis = {axis}\n"
+        )
+    }
+
+    #[test]
+    fn axes_are_read_and_written_back() {
+        for axis in [
+            "\"normal\"",
+            "\"upright\"",
+            "{ lead = 15 }",
+            "{ tilt = -5, turning = 2 }",
+            "{ fixed = [0, 3, 4] }",
+            "{ toward = [[0, 0, 80]] }",
+            "{ away = [[0, 0, -80], [0, 10, -80]] }",
+            "{ between = [[0, 0, 0, 0, 0, 1], [50, 0, 0, 0.6, 0, 0.8]] }",
+        ] {
+            let read = Scene::parse("a.toml", scene(axis)).unwrap();
+            let again = Scene::parse("a.toml", complete_toml(&read)).unwrap();
+            let [a, b] = [&read, &again].map(|scene| scene.toolpaths[0].axis.clone());
+            let text = |axis| format!("{axis:.9?}");
+            assert_eq!(text(&a), text(&b), "{axis}");
+        }
+        let fixed = Scene::parse("a.toml", scene("{ fixed = [0, 3, 4] }")).unwrap();
+        let rule = &fixed.toolpaths[0].axis.as_ref().unwrap().rule;
+        assert!(matches!(rule, ToolAxis::Fixed(axis) if (axis.y - 0.6).abs() < 1e-15));
+    }
+
+    #[test]
+    fn axes_that_say_nothing_are_refused_with_a_cure() {
+        for (axis, word) in [
+            ("\"tilted\"", "cannot be"),
+            ("{}", "one rule"),
+            ("{ turning = 3 }", "one rule"),
+            ("{ lead = 10, fixed = [0, 0, 1] }", "only one"),
+            ("{ lead = 85 }", "from -80 to 80"),
+            ("{ lead = nan }", "NaN"),
+            ("{ fixed = [0, 0, 0] }", "no length"),
+            ("{ fixed = [0, 0] }", "three numbers"),
+            ("{ toward = [] }", "no point"),
+            ("{ away = [[0, 0]] }", "three numbers"),
+            ("{ between = [[0, 0, 0, 0, 0, 0]] }", "no length"),
+            ("{ between = [] }", "no place"),
+            ("{ leed = 3 }", "unknown key `leed`"),
+            ("{ lead = 3 }\nsmoothing = true", "not smoothed"),
+        ] {
+            let error = Scene::parse("a.toml", scene(axis)).unwrap_err().to_string();
+            assert!(error.contains(word), "{axis}: {error}");
+        }
+    }
+}
