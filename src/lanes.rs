@@ -34,6 +34,13 @@ pub fn bits(lanes: &[bool; LANES]) -> u32 {
         }
         return sse2._mm_movemask_epi8(pulp::cast(signs)) as u32;
     }
+    packed(lanes)
+}
+
+/// As [`bits`], for any machine.
+#[inline(always)]
+fn packed(lanes: &[bool; LANES]) -> u32 {
+    // Kept in memory, for the same reason.
     let lanes = std::hint::black_box(lanes);
     // The product moves the lowest bits of eight bytes side by side to the top.
     let eight = |k: usize| {
@@ -57,8 +64,6 @@ pub trait Real:
 {
     /// The nearest number of this type.
     fn of(x: f64) -> Self;
-    /// Exactly this number.
-    fn wide(self) -> f64;
     /// The sum with a number that f32 holds exactly, rounded once.
     fn plus(self, x: f64) -> f32;
     /// Square root; NaN of a negative number.
@@ -87,10 +92,6 @@ impl Real for f32 {
         x as f32
     }
     #[inline(always)]
-    fn wide(self) -> f64 {
-        f64::from(self)
-    }
-    #[inline(always)]
     fn plus(self, x: f64) -> f32 {
         self + x as f32
     }
@@ -106,15 +107,24 @@ impl Real for f64 {
         x
     }
     #[inline(always)]
-    fn wide(self) -> f64 {
-        self
-    }
-    #[inline(always)]
     fn plus(self, x: f64) -> f32 {
         (self + x) as f32
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
         f64::sqrt(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_lane_has_its_bit() {
+        for number in 0..1u32 << LANES {
+            let lanes = std::array::from_fn(|lane| number & (1 << lane) != 0);
+            assert_eq!((bits(&lanes), packed(&lanes)), (number, number));
+        }
     }
 }

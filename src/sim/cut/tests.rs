@@ -12,8 +12,8 @@ const PROMISED: f32 = 1e-5;
 /// Raised by a micrometre the bound drops moves that are needed.
 #[test]
 fn a_bound_tightened_by_a_micrometre_is_wrong() {
-    let path = wave_path(2.0, 0.3, 0.2);
-    // Small cells: in large leaves the bound is wide.
+    // Short moves: lists of a few go down without tests. Small cells: in large leaves the bound is wide.
+    let path = wave_path(2.0, 0.3, 0.05);
     let stock = ZMap::block(square_grid(2.0, 0.005), 5.0);
     for cutter in cutters().into_iter().take(6) {
         compare(&stock, &cutter, &path);
