@@ -227,9 +227,14 @@ mod tests {
     #[test]
     fn passes_around_a_half_cylinder_are_eight_half_circles_long() {
         let (part, cutter) = (half_cylinder(), Cutter::ball(10.0).unwrap());
-        let settings =
-            PassSettings { step: Step::Scallop(0.05), sampling: 0.5, chord_tolerance: 1e-3, smoothing: None };
-        let chart = &Chart::all(&part, &cutter).unwrap()[0];
+        let settings = PassSettings {
+            step: Step::Scallop(0.05),
+            sampling: 0.5,
+            chord_tolerance: 1e-3,
+            smoothing: None,
+            axis: None,
+        };
+        let chart = &Chart::all(&part, &cutter, None).unwrap()[0];
         let border = vec![vec![[0.0, 0.0], [1.0, 0.0]]];
         let field = arrival(chart, &cutter, settings.step, &border, false, &Silent).unwrap();
         let field = ScalarField::Grid(field);
@@ -238,8 +243,8 @@ mod tests {
         let range = tracer.range();
         let interval = (8.0f64 * 0.05 * 5.0).sqrt();
         assert!((range[1] - range[0] - 10.0 / interval).abs() < 0.01, "{range:?}");
-        let places = places_of(chart, &cutter, &field, &settings);
-        let levels = place_levels(&places, range, Placing::Shortest, &mut Vec::new());
+        let allowed = places_of(chart, &cutter, &field, &settings);
+        let levels = place_levels(&allowed, range, Placing::Shortest, &mut Vec::new());
         assert_eq!(levels.len(), 8);
         let length = |points: &[[f64; 2]]| {
             let at = |[u, v]: [f64; 2]| chart.jet(u, v).p;
