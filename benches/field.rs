@@ -1,9 +1,15 @@
-//! Stream functions on one thread: B-spline fits of 200 × 200 samples to 40 × 40 coefficients by each
-//! solver, differences, and Poisson's equation on 500 × 500 cells, flat and on a wave.
+//! Stream functions: B-spline fits of 200 × 200 samples to 40 × 40 coefficients by each solver, differences, and
+//! Poisson's equation on 500 × 500 cells, flat and on a wave, on one thread; directions, ψ and all passes on a mesh of
+//! 500,000 triangles on every thread that `RAYON_NUM_THREADS` allows.
 
 use divan::Bencher;
-use millstream::field::{Solver, StreamSample, fit_by_differences, fit_stream_function, solve_poisson};
-use millstream::geometry::KnotVector;
+use millstream::field::mesh::{
+    FieldMesh, Held, MeshLevels, flows, orient_lines, slope, smooth_lines, solve_stream,
+};
+use millstream::field::{
+    DIRECTION_WEIGHT, Solver, StreamSample, fit_by_differences, fit_stream_function, solve_poisson,
+};
+use millstream::geometry::{KnotVector, Point3};
 
 fn main() {
     divan::main();
@@ -71,4 +77,30 @@ fn poisson_500(bencher: Bencher, surface: &str) {
         })
         .collect();
     bencher.bench_local(|| solve_poisson([[0.0, 1.0]; 2], [N; 2], &metric, &vectors));
+}
+
+/// A wave of 2 × 500² triangles: the smooth field of lines up its slope, ψ, 250 levels.
+#[divan::bench(sample_count = 3)]
+fn mesh_500_000(bencher: Bencher) {
+    const N: u32 = 500;
+    let point = |i: u32| {
+        let (x, y) = (f64::from(i % (N + 1)) / 5.0, f64::from(i / (N + 1)) / 5.0);
+        Point3::new(x, y, 4.0 * (0.2 * x).sin() * (0.15 * y).cos())
+    };
+    let points = (0..(N + 1) * (N + 1)).map(point).collect();
+    let corners = (0..N * N).map(|q| (q / N) * (N + 1) + q % N);
+    let triangles = corners.flat_map(|a| [[a, a + 1, a + N + 2], [a, a + N + 2, a + N + 1]]).collect();
+    let mesh = FieldMesh::new(points, triangles, None).expect("a height field is a mesh");
+    bencher.bench_local(|| {
+        let mut lines = smooth_lines(&mesh, &slope(&mesh, true), &[], 3.0).expect("the mesh slopes");
+        orient_lines(&mesh, &mut lines);
+        let count = mesh.points().len();
+        let flows = flows(&mesh, &lines, &vec![2.5; count], &vec![1.0; count]);
+        let psi = solve_stream(&mesh, &flows, DIRECTION_WEIGHT, &Held::default())
+            .expect("lines determine it")
+            .values;
+        let levels = MeshLevels::new(&mesh, &psi).expect("a value for each vertex");
+        let [lo, hi] = levels.range();
+        (0..250).map(|k| levels.curves(lo + (hi - lo) * (f64::from(k) + 0.5) / 250.0).len()).sum::<usize>()
+    });
 }

@@ -103,25 +103,13 @@ fn in_series(speed: f64, feed: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::fixture::{machine, path};
     use super::super::machining_time;
     use super::*;
     use crate::geometry::Point3;
     use proptest::prelude::*;
 
-    const MACHINE: Machine = Machine {
-        rapid_rate: 12_000.0,
-        acceleration: 1000.0,
-        junction_deviation: 0.01,
-        jerk: 50_000.0,
-        slow_corners: true,
-    };
-
-    fn path(tips: impl IntoIterator<Item = [f64; 3]>) -> Toolpath {
-        let mut tips = tips.into_iter().map(|t| ClPoint::upright(Point3::from(t)));
-        let start = tips.next().unwrap();
-        let moves = tips.map(|to| Move { to, kind: MoveKind::Cut, feed_rate: 6000.0, pass: 0 }).collect();
-        Toolpath { start, moves }
-    }
+    const MACHINE: Machine = machine(50_000.0);
 
     #[test]
     fn a_right_angle_is_run_at_its_own_feed() {

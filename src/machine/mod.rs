@@ -84,3 +84,29 @@ mod tests {
         assert!(Machine { jerk: -1.0, ..machine }.check().is_err());
     }
 }
+
+/// What both are tested with.
+#[cfg(test)]
+mod fixture {
+    use super::Machine;
+    use crate::geometry::Point3;
+    use crate::toolpath::{ClPoint, Move, MoveKind, Toolpath};
+
+    pub const fn machine(jerk: f64) -> Machine {
+        Machine {
+            rapid_rate: 12_000.0,
+            acceleration: 1000.0,
+            junction_deviation: 0.01,
+            jerk,
+            slow_corners: true,
+        }
+    }
+
+    /// Cuts at 6000 mm/min = 100 mm/s, which takes 5 mm and 0.1 s to reach.
+    pub fn path(tips: impl IntoIterator<Item = [f64; 3]>) -> Toolpath {
+        let mut tips = tips.into_iter().map(|t| ClPoint::upright(Point3::from(t)));
+        let start = tips.next().unwrap();
+        let moves = tips.map(|to| Move { to, kind: MoveKind::Cut, feed_rate: 6000.0, pass: 0 }).collect();
+        Toolpath { start, moves }
+    }
+}

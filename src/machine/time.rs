@@ -179,26 +179,11 @@ fn block_time(block: &Block, acceleration: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::fixture::{machine, path};
     use super::*;
-    use crate::geometry::Point3;
-    use crate::toolpath::ClPoint;
     use approx::assert_relative_eq;
 
-    const MACHINE: Machine = Machine {
-        rapid_rate: 12_000.0,
-        acceleration: 1000.0,
-        junction_deviation: 0.01,
-        jerk: 1e12,
-        slow_corners: true,
-    };
-
-    /// Cuts at 6000 mm/min = 100 mm/s, which takes 5 mm and 0.1 s to reach.
-    fn path(tips: impl IntoIterator<Item = [f64; 3]>) -> Toolpath {
-        let mut tips = tips.into_iter().map(|t| ClPoint::upright(Point3::from(t)));
-        let start = tips.next().unwrap();
-        let moves = tips.map(|to| Move { to, kind: MoveKind::Cut, feed_rate: 6000.0, pass: 0 }).collect();
-        Toolpath { start, moves }
-    }
+    const MACHINE: Machine = machine(1e12);
 
     fn time(tips: impl IntoIterator<Item = [f64; 3]>) -> f64 {
         machining_time(&path(tips), &MACHINE)

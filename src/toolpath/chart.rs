@@ -253,9 +253,14 @@ impl<'a> Chart<'a> {
     }
 
     /// Least and greatest `x·e` over the plan views of all places where the cutter's axis can be when
-    /// the cutter touches the chart. On a mesh the triangles themselves answer:
+    /// the cutter touches one of the charts. On a mesh the triangles themselves answer:
     /// the fitted surface has no creases.
-    pub fn extent_of_axes(&self, part: &Part, cutter: &Cutter, e: &Vector2) -> [f64; 2] {
+    pub fn extent_of_axes(charts: &[Self], part: &Part, cutter: &Cutter, e: &Vector2) -> [f64; 2] {
+        let all = charts.iter().map(|chart| chart.extent_of_own_axes(part, cutter, e));
+        all.fold([f64::INFINITY, f64::NEG_INFINITY], |a, b| [a[0].min(b[0]), a[1].max(b[1])])
+    }
+
+    fn extent_of_own_axes(&self, part: &Part, cutter: &Cutter, e: &Vector2) -> [f64; 2] {
         const N: usize = 200;
         let [[u0, u1], [v0, v1]] = self.domain;
         let at = |lo: f64, hi: f64, k: usize| lo + (hi - lo) * k as f64 / N as f64;

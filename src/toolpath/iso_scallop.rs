@@ -201,3 +201,61 @@ pub(super) fn predicted_length(
     };
     cell * places.iter().filter_map(at).sum::<f64>()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::spacing::{Placing, place_levels, places_of};
+    use super::*;
+    use crate::field::LevelTracer;
+    use crate::geometry::{NurbsSurface, Point3};
+    use crate::monitor::Silent;
+    use crate::part::Patch;
+    use std::f64::consts::{FRAC_1_SQRT_2, PI};
+
+    /// A half cylinder of radius 5 and length 10 along y; u runs around it.
+    fn half_cylinder() -> Part {
+        let around = [[5.0, 0.0], [5.0, 5.0], [0.0, 5.0], [-5.0, 5.0], [-5.0, 0.0]];
+        let net = around.map(|[x, z]| [0.0, 10.0].map(|y| Point3::new(x, y, z)).to_vec());
+        let weights = [1.0, FRAC_1_SQRT_2, 1.0, FRAC_1_SQRT_2, 1.0].map(|w| vec![w; 2]);
+        let knots = vec![0.0, 0.0, 0.0, 0.5, 0.5, 1.0, 1.0, 1.0];
+        let surface = NurbsSurface::new(2, 1, knots, vec![0.0, 0.0, 1.0, 1.0], &net, Some(&weights)).unwrap();
+        Part::from_patches(vec![Patch::Nurbs(surface)], 0.005).unwrap()
+    }
+
+    /// Passes around it lie `√(8 h r)` apart, as on a plane: with h = 0.05 a ball of radius 5 takes 10/1.414 = 7.07 of
+    /// them, and whole passes are eight half circles (so are those of any ball from 3.91 to 5.10).
+    #[test]
+    fn passes_around_a_half_cylinder_are_eight_half_circles_long() {
+        let (part, cutter) = (half_cylinder(), Cutter::ball(10.0).unwrap());
+        let settings = PassSettings {
+            step: Step::Scallop(0.05),
+            sampling: 0.5,
+            chord_tolerance: 1e-3,
+            smoothing: None,
+            axis: None,
+        };
+        let chart = &Chart::all(&part, &cutter, None).unwrap()[0];
+        let border = vec![vec![[0.0, 0.0], [1.0, 0.0]]];
+        let field = arrival(chart, &cutter, settings.step, &border, false, &Silent).unwrap();
+        let field = ScalarField::Grid(field);
+        let metric = |u: f64, v: f64| chart.jet(u, v).first_form();
+        let tracer = LevelTracer::new(&field, &metric, chart.domain, [0.0; 2], 120, 0.1);
+        let range = tracer.range();
+        let interval = (8.0f64 * 0.05 * 5.0).sqrt();
+        assert!((range[1] - range[0] - 10.0 / interval).abs() < 0.01, "{range:?}");
+        let allowed = places_of(chart, &cutter, &field, &settings);
+        let levels = place_levels(&allowed, range, Placing::Shortest, &mut Vec::new());
+        assert_eq!(levels.len(), 8);
+        let length = |points: &[[f64; 2]]| {
+            let at = |[u, v]: [f64; 2]| chart.jet(u, v).p;
+            points.windows(2).map(|w| (at(w[1]) - at(w[0])).norm()).sum::<f64>()
+        };
+        let curves = levels.iter().flat_map(|&level| tracer.curves(level));
+        let total: f64 = curves.map(|curve| length(&curve.points)).sum();
+        println!("{total:.3} mm");
+        assert!((total / (8.0 * 5.0 * PI) - 1.0).abs() < 0.01, "{total}");
+        // Not rounded to whole passes, and of the ball's centre, which runs along circles of twice the radius.
+        let exact = predicted_length(&places(chart, LENGTH_SAMPLES), &cutter, settings.step, &field);
+        assert!((exact / (2.0 * 50.0 * PI / interval) - 1.0).abs() < 0.01, "{exact}");
+    }
+}

@@ -19,9 +19,9 @@ const STARTS: usize = 6;
 /// unevenness that vertices do not see.
 const DAMPING: f64 = 0.2;
 
-/// Where a pass bends by the radius of the cutter, it counts as longer by this share: less leaves sharp bends, which linear
-/// elements do not mind, more keeps passes from where strips are wide.
-const BEND: f64 = 0.03;
+/// Where a pass bends by the radius of the cutter, it counts as longer by this share. Less leaves bends, which linear
+/// elements do not mind; on three patches a tenth of it makes passes 1 % shorter that turn by a third more.
+const BEND: f64 = 0.3;
 
 /// The strip beyond borders counts this share of its area: ψ goes on in it as it comes.
 const STRIP_SHARE: f64 = 0.02;

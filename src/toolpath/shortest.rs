@@ -12,7 +12,7 @@
 
 use std::f64::consts::PI;
 
-use super::chart::Chart;
+use super::chart::{Chart, ChartPoint};
 use super::feed;
 use super::iso_scallop::{front_at, on_chart, places};
 use super::level_passes::along_levels;
@@ -47,6 +47,10 @@ const FRONT_NODES: usize = 41;
 const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
 const DEGREE: usize = 3;
+
+/// Where a pass bends by the radius of the cutter, it counts as longer by this share: on a twisted patch passes turn by a
+/// third less, and are shorter, since fewer minima are left to end in. Thrice as much loses 0.7 % on a wave.
+const BEND: f64 = 0.1;
 
 /// Places a side, and directions over half a turn, of the shortest possible length. With twice as many it changes by
 /// less than 0.1 % on the shipped parts.
@@ -169,6 +173,7 @@ struct Net {
     knots: [KnotVector; 2],
     sites: Vec<Site>,
     gradients: Gradients,
+    roughness: Roughness,
 }
 
 impl Search<'_> {
@@ -188,8 +193,7 @@ impl Search<'_> {
         self.monitor.start("searching directions", (STARTS + BORDERS.len() + counts.len()) as u64);
         let finest = self.net(longest, sides).ok_or_else(unfit)?;
         let minimise = |net: &Net, start: Vec<f64>, rounds: Rounds| {
-            let found =
-                minimise(&net.sites, &net.gradients, &Roughness::default(), start, rounds, self.monitor);
+            let found = minimise(&net.sites, &net.gradients, &net.roughness, start, rounds, self.monitor);
             self.monitor.advance(1);
             found
         };
@@ -271,17 +275,32 @@ impl Search<'_> {
         let nu = knots_u.control_count();
         let mut gradients = Gradients::new(nu * knots_v.control_count());
         let mut kept = Vec::with_capacity(sites.len());
+        let mut roughness = Roughness::default();
+        let (area, passes) = sites.iter().flatten().fold((0.0, 0.0), |(area, passes), (_, _, site)| {
+            (area + site.area, passes + site.area * site.front.mean_slowness())
+        });
+        let bend = BEND * self.cutter.radius().powi(2) * area / passes;
         for (u, v, site) in sites.into_iter().flatten() {
-            let (i, [bu, su, _]) = knots_u.basis_derivatives(u, 1);
-            let (j, [bv, sv, _]) = knots_v.basis_derivatives(v, 1);
+            let (i, [bu, su, tu]) = knots_u.basis_derivatives(u, 2);
+            let (j, [bv, sv, tv]) = knots_v.basis_derivatives(v, 2);
             let terms = (0..=DEGREE).flat_map(|b| (0..=DEGREE).map(move |a| (a, b)));
-            gradients.push(
-                &site,
-                terms.map(|(a, b)| (((j + b) * nu + i + a) as u32, [su[a] * bv[b], bu[a] * sv[b]])),
-            );
+            let derivatives = |(a, b): (usize, usize)| {
+                let second = [tu[a] * bv[b], su[a] * sv[b], bu[a] * tv[b]];
+                (((j + b) * nu + i + a) as u32, [su[a] * bv[b], bu[a] * sv[b]], second)
+            };
+            let terms: Vec<_> = terms.map(derivatives).collect();
+            gradients.push(&site, terms.iter().map(|&(k, first, _)| (k, first)));
+            if let Some(components) =
+                self.chart.at(u, v).filter(|_| site.area > 0.0).and_then(|p| hessian(&p))
+            {
+                for (share, [first, second]) in components {
+                    let row = terms.iter().map(|(k, d1, d2)| (*k, dot(&first, d1) + dot(&second, d2)));
+                    roughness.push(bend * site.area * share, row.collect());
+                }
+            }
             kept.push(site);
         }
-        Some(Net { knots: [knots_u, knots_v], sites: kept, gradients })
+        Some(Net { knots: [knots_u, knots_v], sites: kept, gradients, roughness })
     }
 
     /// Coefficients of the front that starts at the border where the parameter (0: u, 1: v) is least (0) or greatest (1).
@@ -335,6 +354,24 @@ impl Search<'_> {
         let along_v = |t: f64| passes * sides[1] * sin * t;
         shares[1].iter().flat_map(|&v| shares[0].iter().map(move |&u| along_u(u) + along_v(v))).collect()
     }
+}
+
+/// What the second derivatives along two tangents square to each other take of a function's first and second derivatives by
+/// the parameters, less those of the surface itself: a share of the sum of their squares, and the factors.
+fn hessian(p: &ChartPoint) -> Option<[(f64, [Vec<f64>; 2]); 3]> {
+    let e1 = p.jet.du.try_normalize(1e-300)?;
+    let (a, b) = (p.jet.pull_back(&e1)?, p.jet.pull_back(&p.normal.cross(&e1))?);
+    let own = [p.jet.pull_back(&p.jet.duu)?, p.jet.pull_back(&p.jet.duv)?, p.jet.pull_back(&p.jet.dvv)?];
+    let along = |x: (f64, f64), y: (f64, f64)| {
+        let second = vec![x.0 * y.0, x.0 * y.1 + x.1 * y.0, x.1 * y.1];
+        let first = [own.map(|o| o.0), own.map(|o| o.1)].map(|o| -dot(&second, &o));
+        [first.to_vec(), second]
+    };
+    Some([(1.0, along(a, a)), (1.0, along(b, b)), (2.0, along(a, b))])
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 impl Net {

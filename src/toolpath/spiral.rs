@@ -43,11 +43,7 @@ pub fn passes(
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
     let charts = Chart::all(part, cutter, settings.axis)?;
-    let extent = |e: Vector2| {
-        let all = charts.iter().map(|chart| chart.extent_of_axes(part, cutter, &e));
-        all.fold([f64::INFINITY, f64::NEG_INFINITY], |a, b| [a[0].min(b[0]), a[1].max(b[1])])
-    };
-    let (x, y) = (extent(Vector2::x()), extent(Vector2::y()));
+    let [x, y] = [Vector2::x(), Vector2::y()].map(|e| Chart::extent_of_axes(&charts, part, cutter, &e));
     let middle = Vector2::new(0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]));
     let reach = 0.5 * (x[1] - x[0]).hypot(y[1] - y[0]);
     let mut notes = Vec::new();

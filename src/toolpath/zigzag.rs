@@ -50,10 +50,7 @@ pub fn passes(
         Step::Scallop(h) => safe_stepover(&charts, cutter, angle, h, &mut notes),
     };
     let (along, across) = (Vector2::new(angle.cos(), angle.sin()), Vector2::new(-angle.sin(), angle.cos()));
-    let extent = |e: &Vector2| {
-        let all = charts.iter().map(|c| c.extent_of_axes(part, cutter, e));
-        all.fold([f64::INFINITY, f64::NEG_INFINITY], |a, b| [a[0].min(b[0]), a[1].max(b[1])])
-    };
+    let extent = |e: &Vector2| Chart::extent_of_axes(&charts, part, cutter, e);
     let (from_to, sides) = (extent(&along), extent(&across));
     let count = ((sides[1] - sides[0]) / stepover - 1e-9).ceil().max(1.0) as usize;
     // A stepover that the user asked for is kept exactly, and the passes stand in the middle.

@@ -7,11 +7,7 @@
 
 use std::collections::HashMap;
 
-use crate::geometry::{Aabb, Point3};
-
-/// What is left of a polygon after cutting off an ear must have this share of the polygon's area, or
-/// the rest would be a line.
-const LEAST_REST: f64 = 1e-6;
+use crate::geometry::{Aabb, Point3, Vector3};
 
 /// Border edges in the cells of a coarse grid.
 struct Sides {
@@ -137,29 +133,32 @@ fn root(head: &[u32], mut v: u32) -> u32 {
     v
 }
 
-/// Cuts a polygon, convex but for rounding, into triangles, the best-shaped ears first.
+/// Cuts a polygon, nearly convex, into triangles: next always the ear that leaves both itself and the rest in the best
+/// shape. An ear over a whole side would leave the vertices on that side as a sliver, which may even face down.
 fn cut_ears(points: &[Point3], mut polygon: Vec<u32>, out: &mut Vec<[u32; 3]>) {
-    let area = |polygon: &[u32]| {
-        let p = |k: usize| points[polygon[k] as usize];
-        let sum: crate::geometry::Vector3 =
-            (1..polygon.len() - 1).map(|k| (p(k) - p(0)).cross(&(p(k + 1) - p(0)))).sum();
-        sum.norm()
+    let p = |v: u32| points[v as usize];
+    let doubled_area = |polygon: &[u32]| -> Vector3 {
+        let fan = polygon[1..].windows(2);
+        fan.map(|w| (p(w[0]) - p(polygon[0])).cross(&(p(w[1]) - p(polygon[0])))).sum()
     };
-    let whole = area(&polygon);
+    let facing = doubled_area(&polygon);
+    // Area over the square of the longest side, negative where it faces away.
+    let shape = |polygon: &[u32]| {
+        let sides = polygon.iter().zip(polygon.iter().cycle().skip(1));
+        let longest2 = sides.map(|(&a, &b)| (p(b) - p(a)).norm_squared()).fold(0.0, f64::max);
+        doubled_area(polygon).dot(&facing) / longest2
+    };
     while polygon.len() > 3 {
         let n = polygon.len();
+        let ear = |k: usize| [polygon[(k + n - 1) % n], polygon[k], polygon[(k + 1) % n]];
         let quality = |k: usize| {
-            let ear = [polygon[(k + n - 1) % n], polygon[k], polygon[(k + 1) % n]];
             let mut rest = polygon.clone();
             rest.remove(k);
-            let [a, b, c] = ear.map(|i| points[i as usize]);
-            let longest2 = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
-            let shape = area(&ear) / longest2;
-            if area(&rest) > LEAST_REST * whole { shape } else { -1.0 }
+            shape(&ear(k)).min(shape(&rest))
         };
         let best = (0..n).map(|k| (quality(k), k)).max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
         let Some((_, k)) = best else { return };
-        out.push([polygon[(k + n - 1) % n], polygon[k], polygon[(k + 1) % n]]);
+        out.push(ear(k));
         polygon.remove(k);
     }
     out.push([polygon[0], polygon[1], polygon[2]]);

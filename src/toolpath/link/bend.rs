@@ -29,6 +29,10 @@ const MOST_ROLL: f64 = 2.0;
 /// loop, for a plain bend between them would be a hairpin.
 const NARROW: f64 = 0.5;
 
+/// Turns between ends of which one lies ahead are tried this share of the way beside each other: wide first, and narrower
+/// where that would roll too far over the border.
+const SHARES_BESIDE: [f64; 3] = [1.0, 0.5, 0.25];
+
 /// Tangents at the ends of a loop, in intervals. Half as long, the loop is hardly wider than a hairpin.
 const LOOP_TANGENT: f64 = 2.0;
 
@@ -158,9 +162,11 @@ impl Bends<'_> {
         let tangent = (TANGENT * span.norm()).min(LONGEST_TANGENT * self.interval);
         let plain = Cubic::new([from.tip.xy(), to.tip.xy()], [from.feed * tangent, to.feed * tangent]);
         let Some(out) = (from.feed - to.feed).try_normalize(0.5) else { return vec![vec![plain]] };
-        let beside = span - out * span.dot(&out);
+        let ahead = span.dot(&out);
+        let beside = span - out * ahead;
         if beside.norm() >= NARROW * self.interval {
-            return vec![vec![plain]];
+            let turns = SHARES_BESIDE.map(|share| self.turn_beside(from, to, ahead, share));
+            return turns.into_iter().chain([vec![plain]]).collect();
         }
         // Out to the far point of a loop, across it, and back.
         let across = Vector2::new(out.y, -out.x);
@@ -170,6 +176,24 @@ impl Bends<'_> {
         let first = Cubic::new([from.tip.xy(), far], [from.feed * wide, at_far]);
         let second = Cubic::new([far, to.tip.xy()], [at_far, to.feed * wide]);
         vec![vec![first, second], vec![plain]]
+    }
+
+    /// A turn between ends with opposite feeds, of which the second lies `ahead` of the first: on along the feed until the
+    /// farther end is reached, and a bend between places this share of the way beside each other that the ends are. One
+    /// bend all the way would be a hairpin.
+    fn turn_beside(&self, from: &End, to: &End, ahead: f64, share: f64) -> Vec<Cubic> {
+        let (start, end) = (from.tip.xy(), to.tip.xy());
+        let turn = |places: [Point2; 2]| {
+            let tangent = (TANGENT * (places[1] - places[0]).norm()).min(LONGEST_TANGENT * self.interval);
+            Cubic::new(places, [from.feed * tangent, to.feed * tangent])
+        };
+        if ahead > 0.0 {
+            let near = end + (start + from.feed * ahead - end) * share;
+            vec![Cubic::new([start, near], [from.feed * ahead; 2]), turn([near, end])]
+        } else {
+            let near = start + (end + to.feed * ahead - start) * share;
+            vec![turn([start, near]), Cubic::new([near, end], [to.feed * -ahead; 2])]
+        }
     }
 
     /// The moves along some cubics that follow each other.

@@ -134,21 +134,24 @@ fn sheets_cut_differently_are_sewn_without_gaps() {
         let place = |p: &[f64; 2]| Point3::new(x0 + p[0] + bulge(p[1]) + shift, p[1], 0.1 * p[1] * p[1]);
         (points.iter().map(place).collect::<Vec<_>>(), triangles)
     };
-    let (mut points, mut triangles) = sheet(6, 30, 0.0, 0.0);
-    let (others, their) = sheet(5, 43, 1.0, 0.3 * gap);
-    let apart = points.len() as u32;
-    points.extend(others);
-    triangles.extend(their.iter().map(|t| t.map(|v| v + apart)));
-    let loose = FieldMesh::new(points.clone(), triangles.clone(), None).unwrap();
-    assert_eq!((loose.loops().len(), loose.pieces().1), (2, 2));
-    let (points, triangles) = weld(&points, &triangles, gap);
-    let sewn = FieldMesh::new(points, triangles, None).unwrap();
-    assert_eq!((sewn.loops().len(), sewn.pieces().1), (1, 1));
-    assert!((area(&sewn) - area(&loose)).abs() < 1e-3);
-    assert!((0..sewn.triangles().len()).all(|t| sewn.area_vector(t).z > 0.0), "none is turned over");
-    // Too small a distance leaves them apart.
-    let again = weld(loose.points(), loose.triangles(), 1e-6);
-    assert_eq!(FieldMesh::new(again.0, again.1, None).unwrap().pieces().1, 2);
+    // Up to two, and five, vertices on each side of the coarser one.
+    for ny in [43, 151] {
+        let (mut points, mut triangles) = sheet(6, 30, 0.0, 0.0);
+        let (others, their) = sheet(5, ny, 1.0, 0.3 * gap);
+        let apart = points.len() as u32;
+        points.extend(others);
+        triangles.extend(their.iter().map(|t| t.map(|v| v + apart)));
+        let loose = FieldMesh::new(points.clone(), triangles.clone(), None).unwrap();
+        assert_eq!((loose.loops().len(), loose.pieces().1), (2, 2));
+        let (points, triangles) = weld(&points, &triangles, gap);
+        let sewn = FieldMesh::new(points, triangles, None).unwrap();
+        assert_eq!((sewn.loops().len(), sewn.pieces().1), (1, 1));
+        assert!((area(&sewn) - area(&loose)).abs() < 1e-3);
+        assert!((0..sewn.triangles().len()).all(|t| sewn.area_vector(t).z > 0.0), "none is turned over");
+        // Too small a distance leaves them apart.
+        let again = weld(loose.points(), loose.triangles(), 1e-6);
+        assert_eq!(FieldMesh::new(again.0, again.1, None).unwrap().pieces().1, 2);
+    }
 }
 
 #[test]
