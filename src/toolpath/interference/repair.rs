@@ -243,12 +243,12 @@ impl Repairing<'_> {
         Ok(())
     }
 
-    /// `to`, with its axis turned towards that of `from` where that is tilted more and too far off.
+    /// `to`, with its axis turned towards that of `from` where that is tilted no less, within a ring, and too far off.
     fn led_over(&self, from: &Placed, to: &Placed, rate: f64) -> Placed {
         let (a, b) = (from.touch.at, to.touch.at);
         let turn = a.axis.cross(&b.axis).norm().atan2(a.axis.dot(&b.axis));
         let most = rate * (to.touch.contact.point - from.touch.contact.point).norm();
-        if from.tilt() <= to.tilt() || turn <= most {
+        if from.tilt() + RING < to.tilt() || from.tilt() == 0.0 || turn <= most {
             return *to;
         }
         let axis = a.towards(&b, most / turn).axis;

@@ -162,6 +162,29 @@ fn what_stands_between_two_contacts_is_passed_by() {
 }
 
 #[test]
+fn the_axis_is_led_over_to_where_it_must_lean() {
+    let cutter = Cutter::ball(6.0).unwrap();
+    let (part, tool) = (cavity([60.0, 60.0], 1.0), tool(cutter));
+    let mut keep = keep(&tool, &part);
+    // A wall that begins half way along the pass.
+    let (wall, wall_tree) = block([25.0, 0.0, 0.0], [27.0, 60.0, 40.0]);
+    keep.checks.push(Check { solid: &tool.held, obstacle: Obstacle::new(&wall, &wall_tree), needed: NEEDED });
+    let pass = along_floor(&cutter, 20.0, (0..161).map(|k| 0.25 * f64::from(k) - 30.0));
+    let fastest = |turning: Option<f64>| {
+        let Repaired { passes, summary } = repair(&pass, &cutter, &keep, turning, &Silent).unwrap();
+        assert_eq!((passes.len(), summary.unreachable.len(), summary.lifted), (1, 0, 0), "{summary:?}");
+        moves_are_clear(&keep, &passes);
+        assert_eq!(passes[0][0], pass[0], "far from the wall nothing changes");
+        let rate = |w: &[Touch]| {
+            (w[1].at.axis - w[0].at.axis).norm() / (w[1].contact.point - w[0].contact.point).norm()
+        };
+        passes[0].windows(2).map(rate).fold(0.0, f64::max)
+    };
+    assert!(fastest(Some(1e3)) > 0.03, "{}", fastest(Some(1e3)));
+    assert!(fastest(Some(0.015)) < 0.0151, "{}", fastest(Some(0.015)));
+}
+
+#[test]
 fn the_rear_of_a_flat_leaves_bowls_and_troughs_at_the_lead_of_their_curvature() {
     const RADIUS: f64 = 20.0;
     let depth = |square: f64| RADIUS - (RADIUS * RADIUS - square).sqrt();

@@ -13,10 +13,10 @@ fn plate() -> Part {
     Part::from_patches(vec![Patch::Analytic(surface)], 0.002).unwrap()
 }
 
-/// A wall 40 mm high, 2 mm beside the plate.
+/// A wall 40 mm high, 6 mm beside the plate: a ball of 6 mm that keeps 0.5 mm away reaches all of it.
 fn wall() -> TriangleMesh {
     let vertices = [[-20.0, 0.0], [40.0, 0.0], [40.0, 40.0], [-20.0, 40.0]];
-    let vertices = vertices.map(|[y, z]| Point3::new(22.0, y, z)).to_vec();
+    let vertices = vertices.map(|[y, z]| Point3::new(26.0, y, z)).to_vec();
     TriangleMesh::new(vertices, vec![[0, 1, 2], [0, 2, 3]]).unwrap().0
 }
 
@@ -67,7 +67,8 @@ fn beside_a_wall_the_axis_leans_away_and_every_cut_is_clear() {
             [a.min(c.x), b.max(c.x)]
         })
     };
-    assert_eq!(centres(&plan), centres(&upright));
+    let [a, b] = [centres(&plan), centres(&upright)];
+    assert!((a[0] - b[0]).abs() < 1e-9 && (a[1] - b[1]).abs() < 1e-9, "{a:?} {b:?}");
     let cut = plan.path.moves.iter().filter(|m| cuts(m)).count();
     assert!(cut < 1000, "{cut} moves");
 }
