@@ -18,6 +18,7 @@ mod sweep;
 mod swept;
 mod tiles;
 mod track;
+mod voxel;
 mod zmap;
 
 pub use bins::MoveBins;
@@ -29,4 +30,5 @@ pub use in_order::{ENGAGED, MoveRemoval, RapidContact, Removal, cut_in_order, cu
 pub use reference::cut_reference;
 pub use solid::{Nearest, OppositeAxes, SweptHit, SweptMoves, SweptSolid};
 pub use swept::SweptMove;
+pub use voxel::{Axis, StockMesh, VoxelEngine, VoxelError, VoxelSample, VoxelStock, VoxelSurface, Voxels};
 pub use zmap::{NOT_CUT, ZMap};
