@@ -19,6 +19,7 @@ mod sweep;
 mod swept;
 mod tiles;
 mod track;
+mod voxel;
 mod zmap;
 
 pub use bins::MoveBins;
@@ -31,4 +32,5 @@ pub use rays::{RayHit, Rays, RaysError};
 pub use reference::cut_reference;
 pub use solid::{Nearest, OppositeAxes, SweptHit, SweptMoves, SweptSolid};
 pub use swept::SweptMove;
+pub use voxel::{Axis, StockMesh, VoxelEngine, VoxelError, VoxelSample, VoxelStock, VoxelSurface, Voxels};
 pub use zmap::{NOT_CUT, ZMap};
