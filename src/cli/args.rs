@@ -99,7 +99,7 @@ mod tests {
             "--cell inf",
             "--cell -1",
             "--threads 0",
-            "--engine rays",
+            "--engine lathe",
             "--nonsense",
         ] {
             let error = parse(&format!("millstream run a.toml {bad}")).unwrap_err();

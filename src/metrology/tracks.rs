@@ -1,6 +1,7 @@
 //! Which moves belong to neighbouring tracks rather than to one.
 
 use crate::cutter::Cutter;
+use crate::geometry::Point3;
 use crate::toolpath::{MoveKind, Toolpath};
 
 /// Two moves of one pass that lie farther apart along the path than this many cutter radii are
@@ -12,21 +13,31 @@ pub(crate) struct Tracks<'a> {
     path: &'a Toolpath,
     /// Distance along the path to the end of each move, mm.
     along: Vec<f64>,
+    /// Length of each pass that ends where it began, mm.
+    closed: Vec<Option<f64>>,
     /// Moves of one pass farther apart than this are of two tracks, mm.
     same_track: f64,
 }
 
 impl<'a> Tracks<'a> {
     pub fn new(path: &'a Toolpath, cutter: &Cutter) -> Self {
-        let mut length = 0.0;
-        let along = path
-            .segments()
-            .map(|(from, to, _)| {
-                length += (to - from).norm();
-                length
-            })
-            .collect();
-        Self { path, along, same_track: SAME_TRACK * cutter.radius() }
+        let mut along = Vec::with_capacity(path.len());
+        let (mut length, mut closed) = (0.0, vec![None; path.passes()]);
+        // Where the pass of the moves so far began to cut: the way to there, and the place.
+        let mut begun: Option<(u32, f64, Point3)> = None;
+        for (from, to, step) in path.segments() {
+            if step.kind == MoveKind::Cut {
+                let (_, start, place) = *match &mut begun {
+                    Some(begun) if begun.0 == step.pass => begun,
+                    begun => begun.insert((step.pass, length, from)),
+                };
+                let round = length + (to - from).norm() - start;
+                closed[step.pass as usize] = (place == to && round > 0.0).then_some(round);
+            }
+            length += (to - from).norm();
+            along.push(length);
+        }
+        Self { path, along, closed, same_track: SAME_TRACK * cutter.radius() }
     }
 
     /// The passes of two moves, in order.
@@ -39,7 +50,10 @@ impl<'a> Tracks<'a> {
     pub fn apart(&self, a: u32, b: u32) -> bool {
         let [x, y] = [a, b].map(|k| &self.path.moves[k as usize]);
         let linked = x.kind == MoveKind::Link || y.kind == MoveKind::Link;
-        let far = (self.along[a as usize] - self.along[b as usize]).abs() > self.same_track;
+        let way = (self.along[a as usize] - self.along[b as usize]).abs();
+        // The end of a closed pass goes on in its start.
+        let round = self.closed[x.pass as usize].filter(|_| x.pass == y.pass);
+        let far = round.map_or(way, |round| way.min((round - way).abs())) > self.same_track;
         (x.pass != y.pass && !linked) || far
     }
 }

@@ -332,7 +332,7 @@ mod tests {
             (table(c, "{ nane = \"A\" }"), "unknown key `nane`", "`name`", "nane"),
             (table(c, &axis("[0, 0.0, -0.0]")), "no length", "not all zero", "[0, 0.0, -0.0]"),
             (table(c, &axis("[nan, 0, 1]")), "must be a number", "write", "nan"),
-            (table(c, &axis("[1, 0]")), "needs 3 numbers", "three numbers", "[1, 0]"),
+            (table(c, &axis("[1, 0]")), "a list of three numbers", "three numbers", "[1, 0]"),
             (table(c, &axis("[0, 0, 3]")), "are parallel", "different directions", "second"),
             (table(c, c), "called C and C", "each letter once", "second"),
             (table(&axis("[1, 0, 0]"), c), "parallel to the spindle", "exchange first and second", "second"),

@@ -396,7 +396,7 @@ impl<'a> Section<'a> {
     /// A vector `[x, y, z]`; `None` when the key is not there.
     pub fn vector(&self, key: &str) -> Result<Option<Located<[f64; 3]>>, SceneError> {
         let Some(entry) = self.entry(key) else { return Ok(None) };
-        let value = self.row(key, entry, "a list of three numbers", "write `[0, 0.5, 1]`")?;
+        let value = self.row(key, entry, "a list of three numbers", "write three numbers: `[0, 0.5, 1]`")?;
         Ok(Some(Located { value, span: entry.span() }))
     }
 
