@@ -117,7 +117,7 @@ fn moves(bencher: Bencher, name: &str) {
     let checks = vec![check(&tool.edges, -0.001), check(&tool.held, 1.0)];
     let keep = Interference { checks, greatest_tilt: 0.0, greatest_lift: 0.0 };
     let starts: Vec<usize> =
-        (0..poses.len()).filter(|k| (k + 1) % POSES != 0 && k / POSES % 10 == 0).collect();
+        (0..poses.len()).filter(|k| (k + 1) % POSES != 0 && (k / POSES).is_multiple_of(10)).collect();
     bencher.counter(ItemsCount::new(starts.len())).bench_local(|| {
         let clear = |&k: &usize| keep.on_move(&poses[k], &poses[k + 1]).is_none();
         parallel::map(starts.len(), |i| clear(&starts[i])).iter().filter(|&&c| c).count()

@@ -8,6 +8,9 @@ use crate::toolpath::{MoveKind, Toolpath};
 /// neighbouring turns of a spiral or loop, not neighbouring chords.
 const SAME_TRACK: f64 = 4.0;
 
+/// A pass that ends this near to where it began is closed, mm: rounding of coordinates.
+const SAME_PLACE: f64 = 1e-9;
+
 /// The passes of a path and the way along it.
 pub(crate) struct Tracks<'a> {
     path: &'a Toolpath,
@@ -32,7 +35,8 @@ impl<'a> Tracks<'a> {
                     begun => begun.insert((step.pass, length, from)),
                 };
                 let round = length + (to - from).norm() - start;
-                closed[step.pass as usize] = (place == to && round > 0.0).then_some(round);
+                closed[step.pass as usize] =
+                    ((place - to).norm() <= SAME_PLACE && round > 0.0).then_some(round);
             }
             length += (to - from).norm();
             along.push(length);

@@ -154,7 +154,7 @@ fn a_tool_with_its_holder_cuts_as_one() {
 fn octahedron(middle: Point3, size: f64) -> VoxelStock {
     let corner = |k: usize| {
         let mut at = middle;
-        at[k / 2] += if k % 2 == 0 { size } else { -size };
+        at[k / 2] += if k.is_multiple_of(2) { size } else { -size };
         at
     };
     let mut triangles = Vec::new();
