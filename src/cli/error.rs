@@ -8,7 +8,7 @@ use crate::io::scene::{Engine, Scene, SceneError};
 use crate::monitor::Cancelled;
 use crate::part::PartError;
 use crate::report::ReportError;
-use crate::sim::{GridError, OppositeAxes, RaysError};
+use crate::sim::{GridError, OppositeAxes, RaysError, VoxelError};
 use crate::toolpath::PlanError;
 
 /// Why a command could not be done.
@@ -81,6 +81,17 @@ pub enum CliError {
         name: String,
         /// What is wrong with its moves.
         reason: OppositeAxes,
+    },
+    /// The solid cannot be cut into voxels.
+    #[error("{scene}: the solid of the toolpath \"{name}\" cannot be cut: {reason}")]
+    #[diagnostic(help("write another `voxel`, or a greater `memory_mib`, in [simulation]"))]
+    Voxels {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// Name of the toolpath.
+        name: String,
+        /// What is wrong.
+        reason: VoxelError,
     },
     /// The places along the normals take more memory than allowed.
     #[error(
@@ -156,6 +167,14 @@ impl CliError {
             RaysError::Opposite(reason) => {
                 Self::Turn { scene: scene.source.name.clone(), name: name.to_owned(), reason }
             }
+        }
+    }
+
+    /// For solids that do not fit.
+    pub fn voxels(scene: &Scene, name: &str, reason: VoxelError) -> Self {
+        match reason {
+            VoxelError::Cancelled(_) => Self::Interrupted,
+            reason => Self::Voxels { scene: scene.source.name.clone(), name: name.to_owned(), reason },
         }
     }
 

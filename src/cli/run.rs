@@ -1,6 +1,7 @@
 //! `millstream run`: scene → part → for each toolpath plan, cut, measure → results.
 
 mod normals;
+mod solid;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -318,6 +319,7 @@ impl<'a> Job<'a> {
         for contact in removal.iter_mut().flat_map(|removal| &mut removal.rapid_contacts) {
             contact.line = lines.get(contact.move_index as usize).copied().unwrap_or_default();
         }
+        let solid = self.write_solid(request, &planned.path, outputs)?;
         let mut result = self.result(
             request,
             &planned,
@@ -328,6 +330,7 @@ impl<'a> Job<'a> {
             simulation,
             surface_mesh,
         );
+        result.solid = solid;
         if let Some((pocket, strategy)) = milled {
             let figures =
                 pocket_figures(scene, pocket, strategy, request.step, &planned.path, &cut, self.top, engaged);
@@ -392,6 +395,7 @@ impl<'a> Job<'a> {
             deviation: measured.deviation,
             removal,
             pocket: None,
+            solid: None,
             simulation,
             surface_mesh,
         }
@@ -584,6 +588,22 @@ mod tests {
         let error = (measured["max_mm"].as_f64().unwrap() - closed_form).abs();
         assert!(error <= measured["error_bound_mm"].as_f64().unwrap() + 1e-9, "{error}");
         assert!(std::fs::read_to_string(out.join("report.html")).unwrap().contains("PASS"));
+    }
+
+    /// Two engines on one path: the z-map in the order of the program, and voxels.
+    #[test]
+    fn voxels_lose_the_volume_that_the_z_map_does() {
+        let home = tempfile::tempdir().unwrap();
+        let options = options(home.path(), &PLATE.replace("cell = 0.1\n", "cell = 0.05\nvoxel = 0.1\n"), 2);
+        run(&options, &Progress::quiet()).unwrap();
+        let out = options.out.unwrap();
+        let json: serde_json::Value =
+            serde_json::from_str(&std::fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
+        let [a, b] = ["/toolpaths/0/removal/volume_mm3", "/toolpaths/0/solid/removed_mm3"]
+            .map(|figure| json.pointer(figure).and_then(serde_json::Value::as_f64).unwrap());
+        assert!((a / b - 1.0).abs() < 2e-3, "{a} {b}");
+        let (mesh, _) = crate::io::stl::read(&out.join("zigzag/solid.stl")).unwrap();
+        assert!(mesh.is_closed());
     }
 
     #[test]

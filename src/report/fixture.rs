@@ -78,6 +78,7 @@ pub fn toolpath(name: &str, machining_time_s: f64, gouge: f64) -> ToolpathResult
         deviation: measured.deviation,
         removal: None,
         pocket: None,
+        solid: None,
         simulation: SimulationFigures {
             engine: "reference",
             cell_mm: 0.05,

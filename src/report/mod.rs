@@ -21,7 +21,7 @@ pub use html::{ToolpathPage, html_page};
 pub use map::{MapMark, MapSize, MapWords, deviation_colours, deviation_picture, height_picture};
 pub use result::{
     FieldFigures, JointRange, MachineFigures, ReportError, RunReport, ShortestFigures, SimulationFigures,
-    SurfaceMeshFigures, ToleranceFigures, ToolpathResult,
+    SolidFigures, SurfaceMeshFigures, ToleranceFigures, ToolpathResult,
 };
 pub use surface_mesh::{MAX_TRIANGLES, SurfaceMesh, VertexPlace, surface_mesh};
 pub use table::{conclusion, result_table};

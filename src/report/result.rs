@@ -84,6 +84,21 @@ impl MachineFigures {
     }
 }
 
+/// The solid that is left of a block, by voxels.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SolidFigures {
+    /// Pitch of the voxels.
+    pub voxel_mm: f64,
+    /// Bricks of 8³ voxels that the surface passes.
+    pub bricks: usize,
+    /// Volume that is left.
+    pub volume_mm3: f64,
+    /// Volume that was cut away.
+    pub removed_mm3: f64,
+    /// Triangles of solid.stl.
+    pub triangles: usize,
+}
+
 /// All that is reported of one toolpath, in the order of report.json.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ToolpathResult {
@@ -124,6 +139,9 @@ pub struct ToolpathResult {
     /// Walls and engagement, if the part is a pocket.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pocket: Option<PocketFigures>,
+    /// What is left of the block, if the scene asks for voxels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub solid: Option<SolidFigures>,
     /// How it was cut.
     pub simulation: SimulationFigures,
     /// The machined part as triangles.

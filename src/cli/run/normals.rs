@@ -76,11 +76,11 @@ impl Job<'_> {
         let spacing = wider * scene.simulation.cell;
         self.check_places(spacing, planned.path.len())?;
         let begun = Instant::now();
-        let solid = &tool.cutter;
+        let cutter = &tool.cutter;
         let reach = (REACH_OVER_UNCUT * scene.tolerance.uncut).max(scene.cutter.radius());
-        let rays = Rays::new(&planned.path, solid, monitor).map_err(CliError::rays(scene, &request.name))?;
+        let rays = Rays::new(&planned.path, cutter, monitor).map_err(CliError::rays(scene, &request.name))?;
         let inward = scene.cutter.radius();
-        let cut = SweptVolume { rays: &rays, path: &planned.path, solid, inward, outward: reach };
+        let cut = SweptVolume { rays: &rays, path: &planned.path, solid: cutter, inward, outward: reach };
         let asked = scene.simulation.error_bound;
         let (mut measured, map) = measure_along_normals(
             &self.part,
@@ -112,8 +112,10 @@ impl Job<'_> {
         }
         let surface_mesh = self.write_normal_mesh(request, &map, outputs)?;
         let page = self.write_normal_maps(request, &map, &measured, spacing, outputs)?;
+        let solid = self.write_solid(request, &planned.path, outputs)?;
         let mut result =
             self.result(request, &planned, joints.as_ref(), None, measured, None, simulation, surface_mesh);
+        result.solid = solid;
         monitor.start("looking for collisions", 0);
         if let Some(violation) = self.collision(&tool, &fixtures, &planned.path, &lines) {
             result.violations.insert(0, violation);

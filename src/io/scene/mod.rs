@@ -211,6 +211,8 @@ pub struct Simulation {
     pub removal: bool,
     /// Error bound that is asked of the highest scallop, the deepest gouge and the highest uncut place, mm.
     pub error_bound: f64,
+    /// Voxel of the solid that is left, mm, where it is asked for.
+    pub voxel: Option<f64>,
 }
 
 /// One toolpath to plan.

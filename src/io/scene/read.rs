@@ -421,7 +421,11 @@ fn read_simulation(
     cutter: &Cutter,
     limits: &Limits,
 ) -> Result<Simulation, SceneError> {
-    section.only(&["cell", "memory_mib", "engine", "removal", "error_bound"], &[], "[simulation]")?;
+    section.only(
+        &["cell", "memory_mib", "engine", "removal", "error_bound", "voxel"],
+        &[],
+        "[simulation]",
+    )?;
     let cell = section.length_or_word("cell", "auto")?;
     let engine = section.word("engine", &Engine::WORDS)?.and_then(|word| Engine::from_word(word.value));
     Ok(Simulation {
@@ -431,6 +435,7 @@ fn read_simulation(
         engine: engine.unwrap_or(Engine::Auto),
         removal: section.flag("removal")?.unwrap_or(DEFAULT_REMOVAL),
         error_bound: section.length("error_bound")?.map_or_else(|| default_error_bound(limits), |v| v.value),
+        voxel: section.length("voxel")?.map(|v| v.value),
     })
 }
 

@@ -55,6 +55,9 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
         "error_bound = {}  # mm, asked of the highest scallop, deepest gouge and highest uncut place",
         number(scene.simulation.error_bound)
     )?;
+    if let Some(voxel) = scene.simulation.voxel {
+        writeln!(out, "voxel = {}  # mm, of the solid that is left, in solid.stl", number(voxel))?;
+    }
     writeln!(out, "\n[machine]")?;
     writeln!(out, "rapid_rate = {}  # mm/min", number(scene.machine.rapid_rate))?;
     writeln!(out, "acceleration = {}  # mm/s2", number(scene.machine.acceleration))?;
