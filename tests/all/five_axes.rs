@@ -94,3 +94,38 @@ fn a_holder_that_leans_away_from_the_walls_is_clear_of_them() {
     assert_eq!(leaning["verdict"], "pass", "{:#}", leaning["violations"]);
     is_good(leaning);
 }
+
+/// The same upright path under two engines that share no code: heights on a grid, and rays along normals.
+#[test]
+fn rays_measure_what_the_z_map_does() {
+    let home = tempfile::tempdir().unwrap();
+    let measured = |engine: &str| {
+        let scene = format!(
+            "[part]\nsurface = \"wave\"\namplitude = 1.5\nwavelength_x = 14\nwavelength_y = 18\nx = [0, 12]\ny = [0, 12]\n\
+             [cutter]\nshape = \"bull\"\ndiameter = 6\ncorner_radius = 1.5\n\
+             [simulation]\ncell = 0.05\nengine = \"{engine}\"\n[[toolpath]]\nstrategy = \"iso-parametric\"\n"
+        );
+        let path = home.path().join(format!("{engine}.toml"));
+        std::fs::write(&path, scene).unwrap();
+        let (_, report) = run_scene(&path);
+        report["toolpaths"][0].clone()
+    };
+    let [map, rays] = ["zmap", "rays"].map(measured);
+    let both = |figure: &str| [number(&map, figure), number(&rays, figure)];
+    let within = |figure: &str, bound: &str| {
+        let ([a, b], [x, y]) = (both(figure), both(bound));
+        assert!((a - b).abs() <= x + y, "{figure}: {a} ± {x}, {b} ± {y}");
+    };
+    within("/scallop/max_mm", "/scallop/error_bound_mm");
+    within("/gouge/max_depth_mm", "/gouge/error_bound_mm");
+    for (figure, share) in [
+        ("/scallop/p50_mm", 0.02),
+        ("/scallop/p95_mm", 0.02),
+        ("/scallop/ridge_length_mm", 0.02),
+        ("/deviation/area_mm2", 0.01),
+        ("/deviation/rms_mm", 0.02),
+    ] {
+        let [a, b] = both(figure);
+        assert!((a / b - 1.0).abs() < share, "{figure}: {a} {b}");
+    }
+}
