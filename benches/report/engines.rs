@@ -22,12 +22,13 @@ const PATCH: [f64; 2] = [40.0, 60.0];
 const AROUND: [f64; 2] = [PATCH[0] - RADIUS - 1.0, PATCH[1] + RADIUS + 1.0];
 
 /// Cutter, cell and chord, mm.
-const SCENES: [(&str, f64, f64); 7] = [
+const SCENES: [(&str, f64, f64); 8] = [
     ("ball", 0.05, 0.2),
     ("ball", 0.05, 1.0),
     ("ball", 0.02, 0.2),
     ("ball", 0.02, 1.0),
     ("flat", 0.05, 0.2),
+    ("flat", 0.02, 0.2),
     ("bull", 0.05, 0.2),
     ("taper", 0.05, 0.2),
 ];
