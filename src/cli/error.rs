@@ -71,6 +71,15 @@ pub enum CliError {
         /// The engine.
         engine: &'static str,
     },
+    /// Pockets have no normals to be measured along.
+    #[error("{scene}: the toolpath \"{name}\" mills a pocket, and the engine `rays` measures surfaces")]
+    #[diagnostic(help("write `engine = \"zmap\"` or \"auto\" in [simulation], or delete `--engine`"))]
+    PocketByRays {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// Name of the toolpath.
+        name: String,
+    },
     /// A tilted path cannot be simulated.
     #[error("{scene}: the toolpath \"{name}\" cannot be simulated: {reason}")]
     #[diagnostic(help("change the `axis` of that [[toolpath]]"))]

@@ -252,6 +252,10 @@ impl<'a> Job<'a> {
         monitor::check(monitor)?;
         let engine = scene.simulation.engine.for_path(request.axis.is_some());
         if engine == Engine::Rays {
+            if self.pocket.is_some() {
+                let (scene, name) = (scene.source.name.clone(), request.name.clone());
+                return Err(CliError::PocketByRays { scene, name });
+            }
             return self.along_normals(request, outputs);
         }
         if request.axis.is_some() {
@@ -602,8 +606,22 @@ mod tests {
         let [a, b] = ["/toolpaths/0/removal/volume_mm3", "/toolpaths/0/solid/removed_mm3"]
             .map(|figure| json.pointer(figure).and_then(serde_json::Value::as_f64).unwrap());
         assert!((a / b - 1.0).abs() < 2e-3, "{a} {b}");
+        let bounds =
+            ["/toolpaths/0/removal/volume_error_bound_mm3", "/toolpaths/0/solid/removed_error_bound_mm3"]
+                .map(|bound| json.pointer(bound).and_then(serde_json::Value::as_f64).unwrap());
+        assert!((a - b).abs() <= bounds[0] + bounds[1], "{a} {b} {bounds:?}");
+        assert!(bounds[1] < 0.02 * b, "{b} {bounds:?}");
         let (mesh, _) = crate::io::stl::read(&out.join("zigzag/solid.stl")).unwrap();
         assert!(mesh.is_closed());
+    }
+
+    #[test]
+    fn pockets_are_not_measured_by_rays() {
+        let home = tempfile::tempdir().unwrap();
+        let pocket = "[part]\nsurface = \"pocket\"\noutline = [[0, 0], [30, 0], [30, 20], [0, 20]]\ndepth = 2\n[cutter]\n\
+            shape = \"flat\"\ndiameter = 6\n[simulation]\nengine = \"rays\"\n[[toolpath]]\nstrategy = \"pocket-offset\"\n";
+        let error = run(&options(home.path(), pocket, 1), &Progress::quiet()).unwrap_err();
+        assert!(matches!(error, CliError::PocketByRays { .. }), "{error}");
     }
 
     #[test]

@@ -83,7 +83,7 @@ pub struct GougeRegion {
     /// The move that cut there, counted from 0.
     #[serde(rename = "move")]
     pub move_index: u32,
-    /// Its line in toolpath.nc, counted from 1.
+    /// Its line in toolpath.nc, counted from 1; 0 where there is no such program.
     pub line: u32,
 }
 

@@ -93,8 +93,12 @@ pub struct SolidFigures {
     pub bricks: usize,
     /// Volume that is left.
     pub volume_mm3: f64,
+    /// How much it differs from that by voxels twice as large: three times its error, which falls with their square.
+    pub volume_error_bound_mm3: f64,
     /// Volume that was cut away.
     pub removed_mm3: f64,
+    /// As the bound of the volume that is left.
+    pub removed_error_bound_mm3: f64,
     /// Triangles of solid.stl.
     pub triangles: usize,
 }

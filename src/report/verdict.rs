@@ -120,7 +120,7 @@ pub fn tool_collision(found: &[(usize, Shortfall, &str)], lines: &[u32]) -> Opti
     let at = worst.nearest.place;
     let line = lines.get(*index).map_or_else(String::new, |line| format!(", toolpath.nc line {line}"));
     let text = format!(
-        "{what} runs {:.3} mm into part or fixture at {}, move {index}{line}{}",
+        "{what} runs at least {:.3} mm into part or fixture at {}, move {index}{line}{}",
         worst.depth,
         place(at.into()),
         match found.len() {
@@ -177,12 +177,11 @@ fn gouge(measured: &Measurement, limits: &Limits) -> Option<Violation> {
         micrometres(Some(limits.gouge))
     );
     if let Some(worst) = figures.regions.first() {
-        text += &format!(
-            " at {}, move {}, toolpath.nc line {}",
-            place(worst.at_mm),
-            worst.move_index,
-            worst.line
-        );
+        text += &format!(" at {}, move {}", place(worst.at_mm), worst.move_index);
+        // Paths that tilt the tool have no program where the scene names no machine for it.
+        if worst.line > 0 {
+            text += &format!(", toolpath.nc line {}", worst.line);
+        }
         text += &others(figures.region_count);
     }
     Some(Violation { what: "gouge", limit_mm: limits.gouge, measured_mm: figures.max_depth_mm, text })

@@ -9,7 +9,7 @@ use crate::io::scene::ToolpathRequest;
 use crate::io::stl_write;
 use crate::report::SolidFigures;
 use crate::sim::{VoxelEngine, VoxelStock};
-use crate::toolpath::Toolpath;
+use crate::toolpath::{ClPoint, Toolpath};
 
 impl Job<'_> {
     /// Cuts the part's block into voxels where the scene asks for it, and writes solid.stl.
@@ -39,27 +39,23 @@ impl Job<'_> {
             stl_write::write(out, &places, &surface.triangles)
         })?;
         // Square edges cost the voxels' volume a little, before and after alike.
-        let before = engine_volume(&stock, &tool, voxel, left, self).map_err(refused)?;
-        let volume_mm3 = voxels.volume();
+        let uncut = Toolpath { start: ClPoint::upright(max), moves: Vec::new() };
+        let block = VoxelEngine::new(&stock, &tool, &uncut).map_err(refused)?;
+        let whole = |voxel| Ok::<f64, CliError>(block.cut(voxel, left, monitor).map_err(refused)?.volume());
+        let (volume_mm3, bricks) = (voxels.volume(), voxels.bricks());
+        drop(voxels);
+        let coarse = 2.0 * voxel;
+        let coarse_volume = engine.cut(coarse, left, monitor).map_err(refused)?.volume();
+        let removed_mm3 = whole(voxel)? - volume_mm3;
+        let coarse_removed = whole(coarse)? - coarse_volume;
         Ok(Some(SolidFigures {
             voxel_mm: voxel,
-            bricks: voxels.bricks(),
+            bricks,
             volume_mm3,
-            removed_mm3: before - volume_mm3,
+            volume_error_bound_mm3: (volume_mm3 - coarse_volume).abs(),
+            removed_mm3,
+            removed_error_bound_mm3: (removed_mm3 - coarse_removed).abs(),
             triangles: surface.triangles.len(),
         }))
     }
-}
-
-/// Volume of the stock by the same voxels before it is cut, mm³.
-fn engine_volume(
-    stock: &VoxelStock,
-    tool: &Solid,
-    voxel: f64,
-    memory: u64,
-    job: &Job<'_>,
-) -> Result<f64, crate::sim::VoxelError> {
-    let start = crate::toolpath::ClPoint::upright(stock.bounds().max);
-    let uncut = VoxelEngine::new(stock, tool, &Toolpath { start, moves: Vec::new() })?;
-    Ok(uncut.cut(voxel, memory, job.progress)?.volume())
 }
