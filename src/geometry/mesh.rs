@@ -26,6 +26,15 @@ pub struct TriangleMesh {
 /// Stands for "no triangle" in neighbour lists.
 const NONE: u32 = u32::MAX;
 
+/// Which side of a mesh is outside.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outside {
+    /// Away from the volume of a closed mesh, above an open one.
+    Found,
+    /// The one from which triangles run counter-clockwise as given, or most of those that hang together do.
+    Given,
+}
+
 /// What was changed to make a mesh usable.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct RepairNotes {
@@ -171,10 +180,10 @@ impl TriangleMesh {
     /// # Errors
     /// See [`MeshError`].
     pub fn new(vertices: Vec<Point3>, triangles: Vec<[u32; 3]>) -> Result<(Self, RepairNotes), MeshError> {
-        Self::with_sources(vertices, triangles).map(|(mesh, notes, _)| (mesh, notes))
+        Self::with_sources(vertices, triangles, Outside::Found).map(|(mesh, notes, _)| (mesh, notes))
     }
 
-    /// As [`TriangleMesh::new`], and tells where each corner comes from: for every triangle of the
+    /// As [`TriangleMesh::new`] with the outside found or given, and tells where each corner comes from: for every triangle of the
     /// mesh, the indices into the given `vertices` of its corners, in the mesh's order. Whoever
     /// keeps parameters per vertex finds them this way after merging, dropping and turning.
     ///
@@ -183,8 +192,9 @@ impl TriangleMesh {
     pub fn with_sources(
         vertices: Vec<Point3>,
         triangles: Vec<[u32; 3]>,
+        outside: Outside,
     ) -> Result<(Self, RepairNotes, Vec<[u32; 3]>), MeshError> {
-        repair::repair(vertices, triangles)
+        repair::repair(vertices, triangles, outside)
     }
 
     /// Vertices, mm.

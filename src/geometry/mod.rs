@@ -19,7 +19,7 @@ pub use bspline::{KnotError, KnotVector, MAX_BASIS, MAX_DEGREE};
 pub(crate) use bvh::{BoxTree, Extent, Feature, Node, Paired, round_down, round_up};
 pub use bvh::{Bvh, MeshFoot, VerticalHit};
 pub use jet::{Jet2, PrincipalCurvatures};
-pub use mesh::{MeshError, RepairNotes, TriangleMesh};
+pub use mesh::{MeshError, Outside, RepairNotes, TriangleMesh};
 pub use nurbs::{MAX_WEIGHT, NurbsError, NurbsSurface};
 pub use region::{MAX_OUTLINE_POINTS, Piece, Region, RegionError, inside_curve, signed_area};
 pub(crate) use segment_grid::foot;

@@ -2,8 +2,8 @@
 
 use super::{Part, Patch};
 use crate::geometry::{
-    Aabb, Bvh, MAX_TRIANGLES, MeshError, Point3, RepairNotes, TessellateError, Tessellation, TriangleMesh,
-    Vector3, tessellate,
+    Aabb, Bvh, MAX_TRIANGLES, MeshError, Outside, Point3, RepairNotes, TessellateError, Tessellation,
+    TriangleMesh, Vector3, tessellate,
 };
 
 /// The search mesh's tolerance unless another is asked for, mm: Newton's method starts well from
@@ -91,6 +91,25 @@ impl Part {
     /// # Errors
     /// See [`PartError`].
     pub fn from_patches(patches: Vec<Patch>, tessellation_tolerance: f64) -> Result<Self, PartError> {
+        Self::of_patches(patches, tessellation_tolerance, Outside::Found)
+    }
+
+    /// As [`Part::from_patches`] for patches whose `du × dv` points outward, wherever that is.
+    ///
+    /// # Errors
+    /// See [`PartError`].
+    pub fn from_oriented_patches(
+        patches: Vec<Patch>,
+        tessellation_tolerance: f64,
+    ) -> Result<Self, PartError> {
+        Self::of_patches(patches, tessellation_tolerance, Outside::Given)
+    }
+
+    fn of_patches(
+        patches: Vec<Patch>,
+        tessellation_tolerance: f64,
+        outside: Outside,
+    ) -> Result<Self, PartError> {
         if patches.is_empty() {
             return Err(PartError::NoPatches);
         }
@@ -99,12 +118,12 @@ impl Part {
             let [us, vs] = p.kept_lines();
             let t = tessellate(&|u, v| p.jet(u, v), [&us, &vs], tessellation_tolerance)
                 .map_err(|source| PartError::Patch { patch, source })?;
-            all.add(t);
+            all.add(t, outside);
             if all.triangles.len() > MAX_TRIANGLES {
                 return Err(PartError::TooManyTriangles(all.triangles.len()));
             }
         }
-        let (mesh, repairs, sources) = TriangleMesh::with_sources(all.vertices, all.triangles)?;
+        let (mesh, repairs, sources) = TriangleMesh::with_sources(all.vertices, all.triangles, outside)?;
         let corners: Vec<[[f64; 2]; 3]> =
             sources.iter().map(|c| c.map(|i| all.parameters[i as usize])).collect();
         let patch_of = |c: &[u32; 3]| all.first_vertex.partition_point(|&first| first <= c[0]) - 1;
@@ -129,7 +148,7 @@ impl Part {
     }
 }
 
-/// The tessellations of all patches, one after the other, each facing up.
+/// The tessellations of all patches, one after the other, each facing up where its outside is not given.
 #[derive(Default)]
 struct Gathered {
     vertices: Vec<Point3>,
@@ -142,7 +161,7 @@ struct Gathered {
 }
 
 impl Gathered {
-    fn add(&mut self, t: Tessellation) {
+    fn add(&mut self, t: Tessellation, outside: Outside) {
         let first = self.vertices.len() as u32;
         let doubled_area: Vector3 = t
             .triangles
@@ -152,7 +171,7 @@ impl Gathered {
                 (b - a).cross(&(c - a))
             })
             .sum();
-        let up = doubled_area.z >= 0.0;
+        let up = outside == Outside::Given || doubled_area.z >= 0.0;
         let turn = |[a, b, c]: [u32; 3]| if up { [a, b, c] } else { [a, c, b] };
         self.first_vertex.push(first);
         self.triangles.extend(t.triangles.into_iter().map(|c| turn(c).map(|i| i + first)));

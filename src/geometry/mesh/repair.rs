@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-use super::{MeshError, NONE, RepairNotes, TriangleMesh};
+use super::{MeshError, NONE, Outside, RepairNotes, TriangleMesh};
 use crate::geometry::{Aabb, MAX_COORDINATE, Point3, Vector3};
 
 /// A triangle counts as degenerate where twice its area is below this share of its longest side
@@ -25,7 +25,11 @@ const MAX_TRIANGLES: usize = (u32::MAX / 3) as usize;
 type Repaired = (TriangleMesh, RepairNotes, Vec<[u32; 3]>);
 
 /// See [`TriangleMesh::with_sources`].
-pub(super) fn repair(vertices: Vec<Point3>, triangles: Vec<[u32; 3]>) -> Result<Repaired, MeshError> {
+pub(super) fn repair(
+    vertices: Vec<Point3>,
+    triangles: Vec<[u32; 3]>,
+    outside: Outside,
+) -> Result<Repaired, MeshError> {
     check(&vertices, &triangles)?;
     let mut notes = RepairNotes::default();
     let (vertices, new_index) = merge(&vertices, &triangles, &mut notes);
@@ -56,7 +60,7 @@ pub(super) fn repair(vertices: Vec<Point3>, triangles: Vec<[u32; 3]>) -> Result<
     if !consistent {
         notes.flipped_triangles = orient(&vertices, &mut soup, &mut neighbours)?;
     }
-    if faces_wrong_way(&vertices, &soup.faces, &neighbours) {
+    if outside == Outside::Found && faces_wrong_way(&vertices, &soup.faces, &neighbours) {
         (0..soup.faces.len()).for_each(|t| soup.flip(t, &mut neighbours));
         notes.turned_over = true;
     }

@@ -41,7 +41,8 @@ fn consistent(mesh: &TriangleMesh) -> bool {
 #[test]
 fn a_clean_mesh_keeps_its_numbering() {
     let (vertices, triangles) = cube();
-    let (mesh, notes, sources) = TriangleMesh::with_sources(vertices.clone(), triangles.clone()).unwrap();
+    let (mesh, notes, sources) =
+        TriangleMesh::with_sources(vertices.clone(), triangles.clone(), Outside::Found).unwrap();
     assert_eq!((mesh.vertices(), mesh.triangles()), (&vertices[..], &triangles[..]));
     assert_eq!(sources, triangles);
     assert_eq!(notes.to_string(), "no repairs");
@@ -80,7 +81,8 @@ fn single_triangles_are_turned_to_agree_and_sources_follow() {
     for t in [1, 4, 7, 8] {
         triangles[t].swap(0, 1);
     }
-    let (mesh, notes, sources) = TriangleMesh::with_sources(vertices.clone(), triangles).unwrap();
+    let (mesh, notes, sources) =
+        TriangleMesh::with_sources(vertices.clone(), triangles, Outside::Found).unwrap();
     assert_eq!((notes.flipped_triangles, notes.turned_over), (4, false));
     assert!(consistent(&mesh));
     assert!((volume(&mesh) - 1.0).abs() < 1e-15);
