@@ -42,6 +42,7 @@ pub struct Chart<'a> {
 enum Source<'a> {
     Patch { part: &'a Part, patch: u32 },
     Heights(NurbsSurface),
+    Surface(&'a NurbsSurface),
 }
 
 /// A point of a chart with all that planning needs.
@@ -170,6 +171,11 @@ impl<'a> Chart<'a> {
         Self { source: Source::Patch { part, patch }, domain, sign, axis }
     }
 
+    /// A surface that is no patch of the part; `du × dv` points outward.
+    pub fn of_surface(surface: &'a NurbsSurface, axis: Option<&'a ToolAxis>) -> Self {
+        Self { source: Source::Surface(surface), domain: surface.domain(), sign: 1.0, axis }
+    }
+
     fn of_mesh(part: &'a Part, cutter: &Cutter, axis: Option<&'a ToolAxis>) -> Result<Self, PlanError> {
         let bounds = part.bounds();
         let domain = [[bounds.min.x, bounds.max.x], [bounds.min.y, bounds.max.y]];
@@ -205,6 +211,7 @@ impl<'a> Chart<'a> {
         let mut jet = match &self.source {
             Source::Patch { part, patch } => part.patches()[*patch as usize].jet(inner_u, inner_v),
             Source::Heights(surface) => surface.jet(inner_u, inner_v),
+            Source::Surface(surface) => surface.jet(inner_u, inner_v),
         };
         jet.p += jet.du * (u - inner_u) + jet.dv * (v - inner_v);
         jet

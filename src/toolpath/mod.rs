@@ -16,6 +16,7 @@ mod link;
 mod mesh_passes;
 mod mesh_shortest;
 mod mesh_surface;
+mod offset_surface;
 mod path;
 mod plan;
 mod plan_curve;
@@ -42,8 +43,8 @@ pub use interference::{
 pub use link::{Joining, LONGEST_LINK, Links, longest_link};
 pub use path::{CcPoint, ClPoint, Move, MoveKind, Toolpath};
 pub use plan::{
-    Along, FeedDirection, FrontStart, LevelSteps, Plan, PlanError, PlanSettings, Step, Strategy,
-    StreamMethod, plan, plan_tilted,
+    Along, FeedDirection, FrontStart, LevelSteps, OffsetAlong, OffsetDrive, Plan, PlanError, PlanSettings,
+    Step, Strategy, StreamMethod, plan, plan_tilted,
 };
 pub use planned_field::{FeedSample, PassPoint, PlannedField};
 pub use pocket::{

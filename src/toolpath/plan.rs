@@ -14,13 +14,13 @@ use super::strip::strip_width;
 use super::tilted::{self, TiltedPasses, Tilting, Touch};
 use super::tool_axis::{AxisError, ToolAxis};
 use super::{
-    PocketStrategy, Toolpath, contour_spiral, iso_scallop, mesh_passes, mesh_surface, shortest, spiral,
-    streamline, waterline, zigzag,
+    PocketStrategy, Toolpath, contour_spiral, iso_scallop, mesh_passes, mesh_surface, offset_surface,
+    shortest, spiral, streamline, waterline, zigzag,
 };
 use crate::cutter::{Cutter, CutterShape};
 use crate::field::mesh::Sense;
 use crate::field::{KnotRule, LineField, Solver};
-use crate::geometry::{Point2, Point3, TriangleMesh};
+use crate::geometry::{NurbsSurface, Point2, Point3, TriangleMesh};
 use crate::monitor::{Cancelled, Monitor};
 use crate::part::Part;
 
@@ -121,6 +121,31 @@ pub enum FrontStart {
     Line([[f64; 2]; 2]),
 }
 
+/// How passes run on an offset surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum OffsetAlong {
+    /// u grows along a pass: along the sections of a blade.
+    U,
+    /// v grows along a pass: across the sections, from hub to tip.
+    V,
+    /// One spiral, u growing along it, on surfaces that close along u.
+    Spiral,
+    /// Vertical planes in this direction of the plan view, rad from x: on meshes, which have no parameters.
+    Angle(f64),
+}
+
+/// Which offset surface the ball's centre rides on.
+#[derive(Debug, Clone, PartialEq)]
+pub enum OffsetDrive {
+    /// The part's own, everywhere the radius off along the normal.
+    Exact,
+    /// Sections offset in their planes, and lofted. It lies too near wherever the surface leans out of these planes; whoever
+    /// has the sections puts [`OffsetDrive::Given`] in its place.
+    InPlane,
+    /// These surfaces, `du × dv` away from the part.
+    Given(Arc<Vec<NurbsSurface>>),
+}
+
 /// A way to cover the part with passes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Strategy {
@@ -173,6 +198,13 @@ pub enum Strategy {
         /// A direction to keep to, and how much dearer a mm of pass square to it is, in mm: 0 leaves all freedom, a great
         /// number none.
         toward: Option<(FeedDirection, f64)>,
+    },
+    /// A ball whose centre rides on an offset surface.
+    OffsetSurface {
+        /// How passes run.
+        along: OffsetAlong,
+        /// On what.
+        drive: OffsetDrive,
     },
     /// Level curves of a stream function fitted to feed directions.
     Streamline {
@@ -543,6 +575,9 @@ fn passes(
         }
         Strategy::Spiral => (spiral::passes(part, cutter, &pass, monitor)?, true),
         Strategy::ContourSpiral => (contour_spiral::passes(part, cutter, &pass, monitor)?, true),
+        Strategy::OffsetSurface { along, drive } => {
+            (offset_surface::passes(part, cutter, *along, drive, &pass, monitor)?, true)
+        }
         Strategy::ShortestStreamline { toward } => {
             let toward = toward.as_ref().map(|(direction, dearer)| (direction, *dearer));
             let passes = if mesh_surface::wants_mesh(part, cutter) {

@@ -1,17 +1,19 @@
-//! The classical strategies of a scene: zigzag, iso-parametric, iso-scallop, waterline, spiral.
+//! The classical strategies of a scene: zigzag, iso-parametric, iso-scallop, waterline, spiral, offset
+//! surfaces.
 
 use std::fmt::{self, Write as _};
 
 use super::error::SceneError;
 use super::section::Section;
 use super::write::number;
-use crate::toolpath::{Along, FrontStart, LevelSteps, Strategy};
+use crate::toolpath::{Along, FrontStart, LevelSteps, OffsetAlong, OffsetDrive, Strategy};
 
 /// Their words.
-pub(super) const WORDS: [&str; 5] = ["zigzag", "iso-parametric", "iso-scallop", "waterline", "spiral"];
+pub(super) const WORDS: [&str; 6] =
+    ["zigzag", "iso-parametric", "iso-scallop", "waterline", "spiral", "offset-surface"];
 
 /// All keys that one of them has.
-pub(super) const KEYS: [&str; 6] = ["angle", "one_way", "along", "step", "start", "kind"];
+pub(super) const KEYS: [&str; 7] = ["angle", "one_way", "along", "step", "start", "kind", "offset"];
 
 /// Words for `step` where levels are parameters, and where they are heights.
 const STEPS: [(&str, LevelSteps); 3] =
@@ -43,6 +45,7 @@ pub(super) fn keys(word: &str) -> Option<&'static [&'static str]> {
         "iso-scallop" => &["start"],
         "waterline" => &["step"],
         "spiral" => &["kind"],
+        "offset-surface" => &["along", "angle", "offset"],
         _ => return None,
     })
 }
@@ -68,6 +71,7 @@ pub(super) fn read(word: &str, section: &Section<'_>) -> Result<Option<Strategy>
             Some("contour") => Strategy::ContourSpiral,
             _ => Strategy::Spiral,
         },
+        "offset-surface" => read_offset_surface(section)?,
         _ => return Ok(None),
     }))
 }
@@ -87,6 +91,27 @@ fn read_zigzag(section: &Section<'_>) -> Result<Strategy, SceneError> {
     }
     let angle = section.number("angle", -360.0..=360.0, " degrees")?;
     Ok(Strategy::Zigzag { angle: angle.map_or(0.0, |v| v.value.to_radians()), one_way })
+}
+
+fn read_offset_surface(section: &Section<'_>) -> Result<Strategy, SceneError> {
+    let drive = match section.word("offset", &["normal", "in-plane"])?.map(|word| word.value) {
+        Some("in-plane") => OffsetDrive::InPlane,
+        _ => OffsetDrive::Exact,
+    };
+    let angle = section.number("angle", -360.0..=360.0, " degrees")?;
+    let along = match section.word("along", &["u", "v", "spiral"])?.map(|word| word.value) {
+        Some(_) if angle.is_some() => {
+            return Err(section.error(
+                &section.key_span("angle"),
+                "passes run along a parameter or at an angle, not both",
+                "delete `angle` on patches and blades, `along` on meshes",
+            ));
+        }
+        Some("v") => OffsetAlong::V,
+        Some("spiral") => OffsetAlong::Spiral,
+        _ => angle.map_or(OffsetAlong::U, |angle| OffsetAlong::Angle(angle.value.to_radians())),
+    };
+    Ok(Strategy::OffsetSurface { along, drive })
 }
 
 fn read_start(section: &Section<'_>) -> Result<FrontStart, SceneError> {
@@ -115,6 +140,7 @@ pub(super) fn name(strategy: &Strategy) -> Option<&'static str> {
         Strategy::IsoScallop { .. } => "iso-scallop",
         Strategy::Waterline { .. } => "waterline",
         Strategy::Spiral | Strategy::ContourSpiral => "spiral",
+        Strategy::OffsetSurface { .. } => "offset-surface",
         Strategy::Pocket(_) | Strategy::ShortestStreamline { .. } | Strategy::Streamline { .. } => {
             return None;
         }
@@ -154,6 +180,18 @@ pub(super) fn write(out: &mut String, strategy: &Strategy) -> fmt::Result {
         Strategy::Waterline { steps } => writeln!(out, "step = \"{}\"", word(&HEIGHT_STEPS, steps)),
         Strategy::Spiral => writeln!(out, "kind = \"plan\""),
         Strategy::ContourSpiral => writeln!(out, "kind = \"contour\""),
+        Strategy::OffsetSurface { along, ref drive } => {
+            match along {
+                OffsetAlong::U => writeln!(out, "along = \"u\"")?,
+                OffsetAlong::V => writeln!(out, "along = \"v\"")?,
+                OffsetAlong::Spiral => writeln!(out, "along = \"spiral\"")?,
+                OffsetAlong::Angle(angle) => {
+                    writeln!(out, "angle = {}  # degrees from the x axis", number(angle.to_degrees()))?;
+                }
+            }
+            let exact = *drive == OffsetDrive::Exact;
+            writeln!(out, "offset = \"{}\"", if exact { "normal" } else { "in-plane" })
+        }
         Strategy::Pocket(_) | Strategy::ShortestStreamline { .. } | Strategy::Streamline { .. } => Ok(()),
     }
 }
