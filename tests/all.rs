@@ -4,6 +4,8 @@
 mod analytic;
 #[path = "all/bad_input.rs"]
 mod bad_input;
+#[path = "all/blades.rs"]
+mod blades;
 #[path = "all/classic.rs"]
 mod classic;
 #[path = "all/cli.rs"]

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::error::CliError;
-use super::load::load_part;
+use super::load::{Loaded, load_part};
 use super::run::lay_out_before_planning;
 use crate::io::scene::{Scene, complete_toml};
 
@@ -14,7 +14,7 @@ use crate::io::scene::{Scene, complete_toml};
 /// [`CliError`] when the scene could not be run.
 pub fn check(path: &Path) -> Result<String, CliError> {
     let mut scene = Scene::read(path)?;
-    let (part, notes) = load_part(&scene)?;
+    let Loaded { part, notes, .. } = load_part(&scene)?;
     let (grid, note) = lay_out_before_planning(&scene, &part).map_err(CliError::grid(&scene))?;
     scene.simulation.cell = grid.cell;
     let (bounds, size) = (part.bounds(), part.bounds().size());

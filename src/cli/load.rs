@@ -1,38 +1,70 @@
 //! The part of a scene, from its file or its formula.
 
+use nalgebra::{Translation3, UnitQuaternion};
+
 use super::error::CliError;
 use super::pocket::{floor_part, pocket_of};
-use crate::geometry::{MeshError, TriangleMesh};
-use crate::io::scene::{MeshFormat, NamedFile, PartSource, Scene, SceneError};
-use crate::io::{nurbs_json, obj, stl};
+use crate::geometry::{Blade, BladeSettings, Isometry3, MeshError, TriangleMesh};
+use crate::io::scene::{BladeRequest, MeshFormat, NamedFile, PartSource, Scene, SceneError};
+use crate::io::{nurbs_json, obj, section_table, stl};
 use crate::part::{Part, PartError, Patch, default_tessellation_tolerance};
 
-/// Loads the part. The notes tell what was mended to make it usable.
+/// A part as its scene describes it.
+pub struct Loaded {
+    /// What is made.
+    pub part: Part,
+    /// The sections that it comes from, if it is a blade.
+    pub blade: Option<Blade>,
+    /// What was mended to make it usable.
+    pub notes: Vec<String>,
+}
+
+/// Loads the part.
 ///
 /// # Errors
 /// [`CliError`] when the part is refused; a file's fault is shown at its name in the scene.
-pub fn load_part(scene: &Scene) -> Result<(Part, Vec<String>), CliError> {
-    match &scene.part {
+pub fn load_part(scene: &Scene) -> Result<Loaded, CliError> {
+    let (part, notes) = match &scene.part {
+        PartSource::Blade(request) => return load_blade(scene, request),
         PartSource::Pocket { outline, depth } => {
             let (pocket, notes) = pocket_of(scene, outline, *depth)?;
-            Ok((floor_part(scene, &pocket)?, notes))
+            (floor_part(scene, &pocket)?, notes)
         }
         PartSource::Formula { surface } => {
             let part = of_patches(vec![Patch::Analytic(*surface)]).map_err(CliError::part(scene))?;
-            Ok((part, Vec::new()))
+            (part, Vec::new())
         }
         PartSource::Nurbs { file } => {
             let patches = nurbs_json::read(&file.path).map_err(|e| refused(scene, file, e))?;
             let part = of_patches(patches.into_iter().map(Patch::Nurbs).collect())
                 .map_err(|e| refused(scene, file, e))?;
-            Ok((seen_from_above(part).map_err(|e| refused(scene, file, e))?, Vec::new()))
+            (seen_from_above(part).map_err(|e| refused(scene, file, e))?, Vec::new())
         }
         PartSource::Mesh { file, format, scale, .. } => {
             let (mesh, notes) = load_mesh(scene, file, *format, *scale)?;
             let part = seen_from_above(Part::from_mesh(mesh)).map_err(|e| refused(scene, file, e))?;
-            Ok((part, notes))
+            (part, notes)
         }
-    }
+    };
+    Ok(Loaded { part, blade: None, notes })
+}
+
+fn load_blade(scene: &Scene, request: &BladeRequest) -> Result<Loaded, CliError> {
+    let file = &request.file;
+    let sections = section_table::read(&file.path).map_err(|e| refused(scene, file, e))?;
+    let [x, y, z] = request.rotate;
+    let settings = BladeSettings {
+        side: request.side,
+        pitch: request.pitch,
+        placed: Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_euler_angles(x, y, z)),
+        fairing: request.fairing,
+    };
+    let blade = Blade::new(&sections, &settings).map_err(|e| refused(scene, file, e))?;
+    let patches: Vec<Patch> = blade.surfaces.iter().cloned().map(Patch::Nurbs).collect();
+    let tolerance = default_tessellation_tolerance(&patches);
+    let part = Part::from_oriented_patches(patches, tolerance).map_err(|e| refused(scene, file, e))?;
+    let notes = blade.notes();
+    Ok(Loaded { part, blade: Some(blade), notes })
 }
 
 /// Reads a mesh, in mm. The notes tell what was mended to make it usable.

@@ -8,12 +8,12 @@ use std::time::Instant;
 
 use super::args::{Cell, RunOptions};
 use super::error::CliError;
-use super::load::load_part;
+use super::load::{Loaded, load_part};
 use super::outputs::Outputs;
 use super::pocket::{limit_feed_by, load_pocket, pocket_figures};
 use super::program;
 use super::progress::Progress;
-use crate::geometry::Aabb;
+use crate::geometry::{Aabb, Blade};
 use crate::io::scene::{Engine, PartSource, Scene, ToolpathRequest, auto_cell};
 use crate::io::{ProgramHeader, apt_cl, exr, ply_write, png, stl_write};
 use crate::machine::kinematics::{JointPath, JointReport};
@@ -25,11 +25,14 @@ use crate::part::Part;
 use crate::report::{
     FieldFigures, HIGHEST_RIDGE, Histogram, MAX_TRIANGLES, MachineFigures, MapSize, MapWords, Picture,
     RunReport, ShortestFigures, SimulationFigures, SurfaceMeshFigures, ToolpathPage, ToolpathResult, Verdict,
-    collision, deviation_colours, deviation_picture, field_picture, height_picture, holder_note, html_page,
-    interval_picture, marks, rapid_violation, result_table, surface_mesh, violations, wall_violation,
+    collision, comb_picture, deviation_colours, deviation_picture, field_picture, height_picture,
+    holder_note, html_page, interval_picture, marks, rapid_violation, result_table, surface_mesh, violations,
+    wall_violation,
 };
 use crate::sim::{Grid, GridError, ZMap, cut, cut_in_order, cut_reference, holder_collisions};
-use crate::toolpath::{Plan, PlanSettings, Pocket, Toolpath, plan, plan_pocket};
+use crate::toolpath::{
+    OffsetDrive, Plan, PlanError, PlanSettings, Pocket, Strategy, Toolpath, plan, plan_pocket,
+};
 
 /// Bytes a cell that a run takes at its peak: stock and winning moves 8, deviations 12, ridges 16 where
 /// every cell has one, the mesh of the surface and height.exr the rest. The peak resident memory of
@@ -113,6 +116,9 @@ fn run_scene(options: &RunOptions, progress: &Progress) -> Result<RunOutcome, Cl
         results.push(result);
         pages.push(page);
     }
+    if let Some(blade) = &job.blade {
+        write_combs(blade, &outputs)?;
+    }
     let name = options.scene.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let report =
         RunReport::new(name, sha256(&scene.source.text), scene.title.clone(), &scene.tolerance, results);
@@ -124,6 +130,22 @@ fn run_scene(options: &RunOptions, progress: &Progress) -> Result<RunOutcome, Cl
     outputs.publish()?;
     let text = format!("{}Results: {}\n", result_table(&report), target.display());
     Ok(RunOutcome { text, verdict: report.verdict })
+}
+
+/// Writes the curvature combs of a blade's sections into the folder `sections`.
+fn write_combs(blade: &Blade, outputs: &Outputs) -> Result<(), CliError> {
+    outputs.folder("sections")?;
+    let mut number = 0;
+    for (k, section) in blade.sections.iter().enumerate() {
+        let above = k.checked_sub(1).is_none_or(|k| blade.sections[k].height < section.height);
+        number += usize::from(above);
+        let title = format!("Section {number}, {}, height {} mm", section.curve, section.height);
+        let picture =
+            comb_picture(&title, &section.spline, section.faired.as_ref().map(|faired| &faired.spline));
+        let name = format!("sections/{number:02}-{}.svg", section.curve.to_string().replace(' ', "-"));
+        outputs.file(&name, |out| out.write_all(picture.as_bytes()))?;
+    }
+    Ok(())
 }
 
 /// `out/NAME` in the working folder.
@@ -209,6 +231,8 @@ struct Job<'a> {
     scene: &'a Scene,
     progress: &'a Progress,
     part: Part,
+    /// The sections that the part comes from, if it is a blade.
+    blade: Option<Blade>,
     /// What the part is the floor of, if it is a pocket.
     pocket: Option<Pocket>,
     /// The cells, and what is to be said about them, if a path leaves memory for them.
@@ -221,12 +245,12 @@ struct Job<'a> {
 impl<'a> Job<'a> {
     fn new(scene: &'a Scene, progress: &'a Progress) -> Result<Self, CliError> {
         monitor::check(progress)?;
-        let (part, notes) = load_part(scene)?;
+        let Loaded { part, blade, notes } = load_part(scene)?;
         let pocket = load_pocket(scene)?;
         let grid = lay_out_before_planning(scene, &part).map_err(CliError::grid(scene))?;
         let face = if pocket.is_some() { 0.0 } else { part.bounds().max.z };
         let top = face + scene.stock.allowance;
-        Ok(Self { scene, progress, part, pocket, grid, top, notes })
+        Ok(Self { scene, progress, part, blade, pocket, grid, top, notes })
     }
 
     fn settings(&self, request: &ToolpathRequest) -> PlanSettings {
@@ -240,6 +264,20 @@ impl<'a> Job<'a> {
             rapid_rate: self.scene.machine.rapid_rate,
             joining: request.joining,
         }
+    }
+
+    /// The strategy of a toolpath, with the offset surfaces that it rides on where these come from sections.
+    fn strategy(&self, request: &ToolpathRequest) -> Result<Strategy, CliError> {
+        let (Strategy::OffsetSurface { along, drive: OffsetDrive::InPlane }, Some(blade)) =
+            (&request.strategy, &self.blade)
+        else {
+            return Ok(request.strategy.clone());
+        };
+        let surfaces = blade.offset_in_planes(self.scene.cutter.radius()).map_err(|e| {
+            let reason = PlanError::NotApplicable { strategy: "offset-surface", reason: e.to_string() };
+            CliError::plan(self.scene, &request.name, reason)
+        })?;
+        Ok(Strategy::OffsetSurface { along: *along, drive: OffsetDrive::on(surfaces) })
     }
 
     /// Plans, cuts and measures one toolpath and writes its folder.
@@ -265,7 +303,7 @@ impl<'a> Job<'a> {
         let milled = self.pocket.as_ref().zip(request.strategy.pocket());
         let mut planned = match milled {
             Some((pocket, strategy)) => plan_pocket(pocket, &scene.cutter, strategy, &settings, monitor),
-            None => plan(&self.part, &scene.cutter, &request.strategy, &settings, monitor),
+            None => plan(&self.part, &scene.cutter, &self.strategy(request)?, &settings, monitor),
         }
         .map_err(|reason| CliError::plan(scene, &request.name, reason))?;
         if scene.machine.slow_corners {
@@ -708,7 +746,7 @@ mod tests {
             let text = PLATE.replace("[simulation]\ncell = 0.1\n", simulation).replace("[0, 8]", "[0, 800]");
             Scene::parse("plate.toml", text).unwrap()
         };
-        let (part, _) = load_part(&scene("")).unwrap();
+        let part = load_part(&scene("")).unwrap().part;
         let lay_out_of = |scene: &Scene| lay_out_before_planning(scene, &part);
         let (grid, note) = lay_out_of(&scene("[simulation]\nmemory_mib = 2\n")).unwrap();
         assert!(grid.cell > 0.05 && grid.len() * BYTES_PER_CELL <= 2 << 20);

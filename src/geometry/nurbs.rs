@@ -7,7 +7,7 @@
 //! that of the side toward greater parameters.
 
 use super::bspline::{KnotError, KnotVector, MAX_BASIS};
-use super::{Aabb, Jet2, MAX_COORDINATE, Point3, Vector3};
+use super::{Aabb, Isometry3, Jet2, MAX_COORDINATE, Point3, Vector3};
 
 /// Weights must lie between the inverse of this and this. Beyond, a control point is either
 /// without influence or swallows its neighbours to the last digit, and products overflow.
@@ -117,6 +117,16 @@ impl NurbsSurface {
             }
         }
         Ok(Self { u, v, net })
+    }
+
+    /// The surface put elsewhere.
+    #[must_use]
+    pub fn moved(&self, to: &Isometry3) -> Self {
+        let moved = |&[x, y, z, w]: &[f64; 4]| {
+            let p = to.rotation * Vector3::new(x, y, z) + to.translation.vector * w;
+            [p.x, p.y, p.z, w]
+        };
+        Self { u: self.u.clone(), v: self.v.clone(), net: self.net.iter().map(moved).collect() }
     }
 
     /// Parameter range `[[u0, u1], [v0, v1]]`.

@@ -8,7 +8,7 @@ use i_overlay::mesh::float::outline::offset::OutlineOffset;
 use i_overlay::mesh::float::style::{LineJoin, OutlineStyle};
 use i_overlay::mesh::math::MathMode;
 
-use super::{Point2, SegmentGrid};
+use super::{CurveSegment, Point2, SegmentGrid};
 
 /// Most points of all outlines together. Fields, offsets and searches grow with them; a drawing with more
 /// is noise.
@@ -327,8 +327,8 @@ impl Region {
     }
 }
 
-/// Refuses curves that cross or touch themselves or each other.
-fn check_crossings(curves: &[Vec<Point2>]) -> Result<(), RegionError> {
+/// Where closed curves first cross or touch themselves or each other: the two sides and the place.
+pub(crate) fn first_crossing(curves: &[Vec<Point2>]) -> Option<(CurveSegment, CurveSegment, Point2)> {
     let grid = SegmentGrid::of_curves(curves.iter().map(Vec::as_slice));
     let mut found: Option<(u32, u32, Point2)> = None;
     for (k, s) in grid.segments().iter().enumerate() {
@@ -357,9 +357,13 @@ fn check_crossings(curves: &[Vec<Point2>]) -> Result<(), RegionError> {
             break;
         }
     }
-    let Some((a, b, at)) = found else { return Ok(()) };
-    let of = |k: u32| grid.segments()[k as usize].curve as usize;
-    let pair = [of(a), of(b)];
+    found.map(|(a, b, at)| (grid.segments()[a as usize], grid.segments()[b as usize], at))
+}
+
+/// Refuses curves that cross or touch themselves or each other.
+fn check_crossings(curves: &[Vec<Point2>]) -> Result<(), RegionError> {
+    let Some((a, b, at)) = first_crossing(curves) else { return Ok(()) };
+    let pair = [a.curve as usize, b.curve as usize];
     if pair[0] == pair[1] {
         return Err(RegionError::SelfCrossing { curve: pair[0], at });
     }

@@ -13,6 +13,7 @@ mod cut_surface;
 mod figures;
 mod inspection;
 mod meetings;
+mod offset_distance;
 mod path;
 mod pocket;
 mod refine;
@@ -31,6 +32,7 @@ pub use figures::{
     UncutFigures, UncutRegion,
 };
 pub(crate) use meetings::Meetings;
+pub use offset_distance::{OffsetDistance, measure_offset};
 pub use path::path_figures;
 pub use pocket::{PocketFigures, wall_gouge_of_cells, wall_gouge_of_moves};
 pub use refine::{Asked, Refined};

@@ -2,6 +2,7 @@
 //! rasters; writing them to files is the business of [`crate::io`] and [`crate::cli`].
 
 mod canvas;
+mod comb;
 mod field_map;
 #[cfg(test)]
 mod fixture;
@@ -15,6 +16,7 @@ mod table;
 mod verdict;
 
 pub use canvas::Picture;
+pub use comb::comb_picture;
 pub use field_map::{field_picture, interval_picture};
 pub use histogram::Histogram;
 pub use html::{ToolpathPage, html_page};

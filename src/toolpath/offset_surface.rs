@@ -35,6 +35,10 @@ const SAMPLES: usize = 160;
 /// Places along a parameter line by which its length is measured.
 const LENGTH_SAMPLES: usize = 64;
 
+/// Lines run on beyond open borders by this share of the interval, on the surface's tangent planes: where they do not meet
+/// the border squarely, one side of the strip would end before it.
+const OVERRUN: f64 = 0.3;
+
 /// Ends of a line nearer than this, mm, are one place of a closed one.
 const SEAM: f64 = 1e-7;
 
@@ -187,6 +191,13 @@ impl Rider<'_> {
         Ok(passes)
     }
 
+    /// Whether the line at a level ends where it begins.
+    fn is_closed_at(&self, level: f64) -> bool {
+        let [ends, _] = self.ranges();
+        let ends = ends.map(|end| self.ride(self.at(end, level)).map(|ride| ride.centre));
+        matches!(ends, [Some(a), Some(b)] if (a - b).norm() <= SEAM)
+    }
+
     fn levels(&self, placing: Placing) -> Result<(Vec<f64>, Vec<String>), PlanError> {
         let places: Vec<Place> =
             self.chart.grid(SAMPLES).filter_map(|uv| self.place(uv)).map(|(place, _)| place).collect();
@@ -201,11 +212,7 @@ impl Rider<'_> {
     /// One spiral: a turn along the first level, then from level to level with every turn, then a turn along the last.
     fn spiral(&self) -> Result<Passes, PlanError> {
         let [[u0, u1], [v0, v1]] = self.ranges();
-        let open = |v: f64| {
-            let ends = [u0, u1].map(|u| self.ride(self.at(u, v)).map(|ride| ride.centre));
-            !matches!(ends, [Some(a), Some(b)] if (a - b).norm() <= SEAM)
-        };
-        if [v0, 0.5 * (v0 + v1), v1].into_iter().any(open) {
+        if ![v0, 0.5 * (v0 + v1), v1].into_iter().all(|v| self.is_closed_at(v)) {
             return Err(refused(
                 "a spiral needs a surface that closes along u, as around a blade; write `side = \"around\"` in [part], or \
                  `along = \"u\"`",
@@ -300,6 +307,15 @@ impl LevelSource for Rider<'_> {
     /// The parameter line at a level, its points about a sampling distance apart.
     fn curves(&self, level: f64) -> Vec<Track<[f64; 2]>> {
         let [[a, b], _] = self.ranges();
+        let beyond = |end: f64| {
+            let [u, v] = self.at(end, level);
+            let speed =
+                self.chart.at(u, v).map(|p| if self.along == Along::U { p.jet.du } else { p.jet.dv }.norm());
+            let interval = self.place([u, v]).map(|(_, width)| width);
+            interval.zip(speed).map_or(0.0, |(w, speed)| OVERRUN * w / speed.max(f64::MIN_POSITIVE))
+        };
+        let more = if self.is_closed_at(level) { [0.0; 2] } else { [a, b].map(beyond) };
+        let [a, b] = [a - more[0], b + more[1]];
         let steps = (self.line_length(level) / self.settings.sampling).ceil().max(2.0) as usize;
         let points = (0..=steps).map(|k| self.at(a + (b - a) * k as f64 / steps as f64, level)).collect();
         vec![Track { points, closed: false }]

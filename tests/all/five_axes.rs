@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::support::{number, patch, run_scene};
+use crate::support::{is_good, number, patch, run_scene};
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/five_axes")
@@ -45,15 +45,6 @@ fn parts_are_those_of_their_generators() {
         let shipped: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
         assert_eq!(shipped, part, "{name}");
     }
-}
-
-/// Nothing uncut, no gouge over 5 µm, at most 1 % of the ridges over the target of 10 µm.
-fn is_good(path: &Value) {
-    let name = &path["name"];
-    assert!(number(path, "/scallop/over_target_fraction") <= 0.01, "{name}: {:#}", path["scallop"]);
-    assert!(number(path, "/scallop/max_mm") <= 0.0125, "{name}: {:#}", path["scallop"]);
-    assert!(number(path, "/gouge/max_depth_mm") <= 0.005, "{name}: {:#}", path["gouge"]);
-    assert_eq!(number(path, "/uncut/area_mm2"), 0.0, "{name}: {:#}", path["uncut"]);
 }
 
 #[test]

@@ -57,14 +57,15 @@ impl Job<'_> {
         let settings = self.settings(request);
         let fixtures = self.fixtures()?;
         let tool = Tool::of(scene);
+        let strategy = self.strategy(request)?;
         let planned = match &request.axis {
             Some(axis) => {
                 let keep = self.keep_clear(&tool, &fixtures);
                 let tilting =
                     Tilting { axis: &axis.rule, most_turning: axis.most_turning, interference: Some(&keep) };
-                plan_tilted(&self.part, &scene.cutter, &request.strategy, &tilting, &settings, monitor)
+                plan_tilted(&self.part, &scene.cutter, &strategy, &tilting, &settings, monitor)
             }
-            None => plan(&self.part, &scene.cutter, &request.strategy, &settings, monitor),
+            None => plan(&self.part, &scene.cutter, &strategy, &settings, monitor),
         };
         let mut planned = planned.map_err(|reason| CliError::plan(scene, &request.name, reason))?;
         if scene.machine.slow_corners {
@@ -80,7 +81,9 @@ impl Job<'_> {
         let reach = (REACH_OVER_UNCUT * scene.tolerance.uncut).max(scene.cutter.radius());
         let rays = Rays::new(&planned.path, cutter, monitor).map_err(CliError::rays(scene, &request.name))?;
         let inward = scene.cutter.radius();
-        let cut = SweptVolume { rays: &rays, path: &planned.path, solid: cutter, inward, outward: reach };
+        let part = &self.part;
+        let cut =
+            SweptVolume { part, rays: &rays, path: &planned.path, solid: cutter, inward, outward: reach };
         let asked = scene.simulation.error_bound;
         let (mut measured, map) = measure_along_normals(
             &self.part,

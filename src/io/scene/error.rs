@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use miette::{Diagnostic, NamedSource, SourceSpan};
+use toml::Spanned;
+use toml::de::DeTable;
 
 /// The bytes of a scene as text, with the name under which messages speak of it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -19,6 +21,22 @@ impl SceneText {
     /// A scene of this name and text.
     pub fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
         Self { name: name.into(), text: Arc::new(text.into()) }
+    }
+
+    /// The text as a tree of values with their places.
+    ///
+    /// # Errors
+    /// [`SceneError::Invalid`] where it is no TOML.
+    pub(in crate::io) fn table(&self) -> Result<Spanned<DeTable<'_>>, SceneError> {
+        DeTable::parse(&self.text).map_err(|e| {
+            let end = self.text.len();
+            let message = e.message().trim().replace('\n', ", ");
+            self.error(
+                e.span().unwrap_or(end..end),
+                format!("not valid TOML: {message}"),
+                "see https://toml.io for how TOML is written",
+            )
+        })
     }
 
     /// An error that points at `span` (bytes of the text).
@@ -130,7 +148,7 @@ impl SceneError {
 }
 
 /// Of `words`, the one that `wrong` was most likely meant to be.
-pub(super) fn nearest<'a>(wrong: &str, words: &[&'a str]) -> Option<&'a str> {
+pub(in crate::io) fn nearest<'a>(wrong: &str, words: &[&'a str]) -> Option<&'a str> {
     /// Below this likeness (0 to 1) a suggestion confuses more than it helps.
     const LIKENESS: f64 = 0.6;
     let wrong = wrong.to_lowercase();
@@ -143,7 +161,7 @@ pub(super) fn nearest<'a>(wrong: &str, words: &[&'a str]) -> Option<&'a str> {
 }
 
 /// `a, b or c`, each in backquotes.
-pub(super) fn listed(words: &[&str]) -> String {
+pub(in crate::io) fn listed(words: &[&str]) -> String {
     let quoted: Vec<String> = words.iter().map(|w| format!("`{w}`")).collect();
     match quoted.split_last() {
         None => "nothing".to_owned(),

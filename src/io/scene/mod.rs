@@ -5,6 +5,7 @@
 //! every refusal can point at the very key or value: tagged enums of serde only know the table.
 
 mod axis;
+mod blade;
 mod classic;
 mod direction;
 mod error;
@@ -13,7 +14,7 @@ mod interference;
 mod kinematics;
 mod pocket;
 mod read;
-mod section;
+pub(in crate::io) mod section;
 #[cfg(test)]
 mod tests;
 mod write;
@@ -22,7 +23,9 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 pub use axis::AxisRequest;
+pub use blade::BladeRequest;
 pub use error::{Finding, SceneError, SceneText};
+pub(in crate::io) use error::{listed, nearest};
 pub use interference::{Fixture, KeepClear};
 pub use kinematics::FiveAxis;
 pub use pocket::OutlineSource;
@@ -119,6 +122,8 @@ pub enum PartSource {
         /// The file.
         file: NamedFile,
     },
+    /// A blade from its sections.
+    Blade(BladeRequest),
     /// A surface by formula over a rectangle.
     Formula {
         /// The formula with its parameters and its rectangle.

@@ -13,7 +13,7 @@ use super::{
     DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, Engine, MeshFormat, NamedFile, OutlineSource, PartSource, Scene,
     Simulation, Stock, ToolpathRequest, auto_cell, default_error_bound,
 };
-use super::{axis, classic, direction, formula, interference, kinematics, pocket};
+use super::{axis, blade, classic, direction, formula, interference, kinematics, pocket};
 use crate::cutter::{AptWord, AptWords, Cutter, CutterError, CutterShape, Holder, HolderSection};
 use crate::field::{KnotRule, MAX_DENSE, Solver};
 use crate::geometry::AnalyticSurface;
@@ -134,6 +134,7 @@ impl Scene {
         match &self.part {
             PartSource::Mesh { file, .. } | PartSource::Nurbs { file } => Some(file),
             PartSource::Pocket { outline: OutlineSource::File { file, .. }, .. } => Some(file),
+            PartSource::Blade(blade) => Some(&blade.file),
             PartSource::Pocket { .. } | PartSource::Formula { .. } => None,
         }
     }
@@ -175,18 +176,25 @@ impl Scene {
 fn read_part(part: &Section<'_>, folder: &Path) -> Result<PartSource, SceneError> {
     let mut words = vec!["nurbs", pocket::SURFACE];
     words.extend(formula::names());
-    let mut all_keys = vec!["surface", "file", "unit", "x", "y"];
+    let mut all_keys = vec!["surface", "file", "unit", "x", "y", blade::KEY];
+    all_keys.extend(blade::KEYS);
     all_keys.extend(formula::all_keys());
     all_keys.extend(pocket::PART_KEYS);
+    let named = |file: Located<&str>| NamedFile::beside(folder, file.value, file.span);
+    if part.has(blade::KEY) {
+        let keys: Vec<&str> = [blade::KEY].into_iter().chain(blade::KEYS).collect();
+        part.only(&keys, &all_keys, "a part from sections")?;
+        return blade::read(part, named);
+    }
     if !part.has("surface") && !part.has("file") {
         part.only(&all_keys, &[], "a part")?;
         return Err(part.error(
             part.header(),
             "the scene does not say which part to make",
-            "add a table [part] with `file = \"part.stl\"`, or with `surface = \"wave\"` and its parameters",
+            "add a table [part] with `file = \"part.stl\"`, with `sections = \"blade.txt\"`, or with `surface = \"wave\"` and \
+             its parameters",
         ));
     }
-    let named = |file: Located<&str>| NamedFile::beside(folder, file.value, file.span);
     match part.word("surface", &words)? {
         None => {
             part.only(&["file", "unit"], &all_keys, "a part from a mesh file (it has no `surface`)")?;

@@ -10,14 +10,14 @@ use crate::geometry::Point2;
 
 /// A value and where it stands in the text.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Located<T> {
+pub(in crate::io) struct Located<T> {
     pub value: T,
     pub span: Range<usize>,
 }
 
 /// One table of a scene, the text it stands in and what messages call it.
 #[derive(Debug, Clone)]
-pub(super) struct Section<'a> {
+pub(in crate::io) struct Section<'a> {
     source: &'a SceneText,
     /// As the user would write it: `[cutter]`.
     title: String,
@@ -51,7 +51,12 @@ fn as_number(value: &DeValue<'_>) -> Option<f64> {
 impl<'a> Section<'a> {
     /// The whole scene.
     pub fn root(source: &'a SceneText, table: &'a DeTable<'a>) -> Self {
-        Self { source, title: "the scene".to_owned(), span: 0..0, table: Some(table) }
+        Self::whole(source, table, "the scene")
+    }
+
+    /// A whole text that messages call `title`.
+    pub fn whole(source: &'a SceneText, table: &'a DeTable<'a>, title: &str) -> Self {
+        Self { source, title: title.to_owned(), span: 0..0, table: Some(table) }
     }
 
     /// An error at a place of this scene.
@@ -400,6 +405,11 @@ impl<'a> Section<'a> {
         Ok(Some(Located { value, span: entry.span() }))
     }
 
+    /// Two numbers `[x, y]`; `None` when the key is not there.
+    pub fn pair(&self, key: &str, cure: &str) -> Result<Option<[f64; 2]>, SceneError> {
+        self.entry(key).map(|entry| self.row(key, entry, "a list of two numbers", cure)).transpose()
+    }
+
     /// The table written in place as the value of `key`, if it is one.
     pub fn inline(&self, key: &str) -> Option<Section<'a>> {
         let entry = self.entry(key)?;
@@ -413,8 +423,8 @@ impl<'a> Section<'a> {
 const INTERVAL: &str = "[0.0, 100.0]";
 
 /// Lengths that make sense, mm: below a nanometre f64 geometry at a metre's distance is noise.
-pub(super) const LENGTH: RangeInclusive<f64> = 1e-6..=1e4;
+pub(in crate::io) const LENGTH: RangeInclusive<f64> = 1e-6..=1e4;
 
 /// Coordinates that make sense, mm.
-pub(super) const COORDINATE: RangeInclusive<f64> =
+pub(in crate::io) const COORDINATE: RangeInclusive<f64> =
     -crate::geometry::MAX_COORDINATE..=crate::geometry::MAX_COORDINATE;

@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 
 use super::{
-    PartSource, Scene, ToolpathRequest, axis, classic, direction, formula, interference, kinematics, pocket,
+    PartSource, Scene, ToolpathRequest, axis, blade, classic, direction, formula, interference, kinematics,
+    pocket,
 };
 use crate::cutter::{Cutter, CutterShape};
 use crate::toolpath::{Links, Step, Strategy, StreamMethod, longest_link};
@@ -96,6 +97,7 @@ fn write_part(out: &mut String, part: &PartSource) -> std::fmt::Result {
             writeln!(out, "unit = {}", text(unit))
         }
         PartSource::Pocket { outline, depth } => pocket::write_source(out, outline, *depth),
+        PartSource::Blade(request) => blade::write(out, request),
         PartSource::Nurbs { file } => {
             writeln!(out, "surface = \"nurbs\"")?;
             writeln!(out, "file = {}", text(&file.written))

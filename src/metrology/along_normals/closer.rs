@@ -97,13 +97,15 @@ impl Inspection<'_> {
             // A cut of radius r that meets the design at the slope s goes no deeper than about s²r below that.
             let slope = sample.slope();
             let deeper = (slope * far).min(slope * slope * self.radius);
-            more = more.max(-hit.deviation + deeper - greatest.depth);
+            // Nothing counts as deeper or higher than is looked, however steep a cut is.
+            more = more.max((-hit.deviation + deeper).min(self.engine.depth()) - greatest.depth);
             if hit.deviation > self.limits.uncut {
-                more = more.max(hit.deviation + slope * far - greatest.height);
+                more = more.max((hit.deviation + slope * far).min(self.engine.reach()) - greatest.height);
             }
         }
         let highest = greatest.ridge.map_or(0.0, |(height, _)| height);
-        crossings.iter().fold(more, |more, c| more.max(c.height + c.rise * longest - highest))
+        let possible = |c: &Crossing| (c.height + c.rise * longest).min(self.engine.reach().max(c.height));
+        crossings.iter().fold(more, |more, c| more.max(possible(c) - highest))
     }
 
     /// Divides triangles, the most promising ones first. Returns what may still exceed the figures, mm.

@@ -57,6 +57,9 @@ pub trait AlongNormal: Sync {
 
     /// How far outward is looked, mm.
     fn reach(&self) -> f64;
+
+    /// How far inward is looked, mm.
+    fn depth(&self) -> f64;
 }
 
 /// Deviations at all places of a net.

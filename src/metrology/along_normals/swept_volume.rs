@@ -3,11 +3,22 @@
 use super::{AlongNormal, NormalHit};
 use crate::cutter::Solid;
 use crate::geometry::{Point3, Vector3};
+use crate::part::Part;
 use crate::sim::Rays;
 use crate::toolpath::Toolpath;
 
+/// Cuts are first looked for so far below the design, mm. What reaches deeper is asked whether it comes from the far side
+/// of a thin part: chords cut less deep, and where the part is as thin as that it ends. Looking deep at once would find
+/// all the moves along the far side, and tell which of them is the first in the program.
+const NEAR: f64 = 0.1;
+
+/// Rounds in which the ball that fits under a place shrinks; each leaves a small part of what is too large.
+const SHRINKING: usize = 30;
+
 /// What a path cuts, along normals of the design.
 pub struct SweptVolume<'a> {
+    /// The part that is cut.
+    pub part: &'a Part,
     /// The moves that cut.
     pub rays: &'a Rays,
     /// The path that they are of.
@@ -23,7 +34,14 @@ pub struct SweptVolume<'a> {
 impl AlongNormal for SweptVolume<'_> {
     fn hit(&self, point: &Point3, normal: &Vector3, near: Option<&NormalHit>) -> Option<NormalHit> {
         let seed = near.map(|hit| hit.seed);
-        let (hit, seed) = self.rays.deviation_near(point, normal, [self.inward, self.outward], seed)?;
+        let look = |inward| self.rays.deviation_near(point, normal, [inward, self.outward], seed);
+        let near = NEAR.min(self.inward);
+        let mut found = look(near)?;
+        if found.0.s <= -near {
+            // What the far side of a thin part has lost is no loss of this one.
+            found = look(ball_beneath(self.part, point, normal, self.inward))?;
+        }
+        let (hit, seed) = found;
         let cut = if self.solid.ball().is_some() {
             let to = &self.path.moves[hit.index as usize].to;
             let at = self.path.location_before(hit.index as usize).towards(to, hit.t);
@@ -37,5 +55,53 @@ impl AlongNormal for SweptVolume<'_> {
 
     fn reach(&self) -> f64 {
         self.outward
+    }
+
+    fn depth(&self) -> f64 {
+        self.inward
+    }
+}
+
+/// Radius of the greatest ball, `most` at most, mm, that touches the part in `point` from inside: half the thickness
+/// there, or the radius of a sharp bend (Ma, Bae & Choi, "3D medial axis point approximation using nearest neighbors and
+/// the normal field", 2012).
+fn ball_beneath(part: &Part, point: &Point3, normal: &Vector3, most: f64) -> f64 {
+    let near = part.mesh_deviation() + 1e-6;
+    let mut radius = most;
+    for _ in 0..SHRINKING {
+        let centre = point - normal * radius;
+        let foot = part.bvh().closest_point(part.mesh(), &centre);
+        let way = point - foot.point;
+        let along = way.dot(normal);
+        if foot.signed_distance.abs() >= radius - 2.0 * near || along <= 0.0 {
+            break;
+        }
+        radius = (0.5 * way.norm_squared() / along).min(radius);
+    }
+    radius
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::TriangleMesh;
+
+    #[test]
+    fn the_ball_beneath_is_half_a_slab_or_the_whole_depth() {
+        // A slab 2 mm thick; thick ground beside it is asked on its own.
+        let slab = |thick: f64| {
+            let corner = |i: u32| {
+                Point3::new(20.0 * f64::from(i & 1), 20.0 * f64::from(i >> 1 & 1), thick * f64::from(i >> 2))
+            };
+            let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+            let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+            Part::from_mesh(TriangleMesh::new((0..8).map(corner).collect(), triangles).unwrap().0)
+        };
+        let at =
+            |thick: f64, x: f64| ball_beneath(&slab(thick), &Point3::new(x, 10.0, thick), &Vector3::z(), 3.0);
+        assert!((at(2.0, 10.0) - 1.0).abs() < 1e-4);
+        assert!((at(20.0, 10.0) - 3.0).abs() < 1e-12);
+        // Beside the wall at x = 0 the ball touches that instead.
+        assert!((at(20.0, 0.5) - 0.5).abs() < 1e-4);
     }
 }

@@ -39,6 +39,10 @@ impl AlongNormal for BruteForce<'_> {
     fn reach(&self) -> f64 {
         0.5
     }
+
+    fn depth(&self) -> f64 {
+        1.0
+    }
 }
 
 /// A path through the tips of each pass.
@@ -132,7 +136,7 @@ fn a_dome_has_the_scallops_of_a_circle_also_where_it_is_steep() {
     let (path, ball) = (path(&rings), Cutter::ball(2.0 * RADIUS).unwrap());
     let solid = Solid::of_cutter(&ball, None);
     let rays = Rays::new(&path, &solid, &Silent).unwrap();
-    let cut = SweptVolume { rays: &rays, path: &path, solid: &solid, inward: 1.0, outward: 1.0 };
+    let cut = SweptVolume { part: &part, rays: &rays, path: &path, solid: &solid, inward: 1.0, outward: 1.0 };
     let limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.001 };
     let (measured, map) =
         measure_along_normals(&part, &ball, &path, &cut, 0.25, &limits, 5e-4, &Silent).unwrap();

@@ -1,0 +1,81 @@
+//! Blades and offset surfaces: the scenes that ship (`scenes/blades`), and what their reports must say.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::support::{is_good, number, patch, run_scene};
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/blades")
+}
+
+/// Hollow across with a radius of 8 mm up to 70 degrees, its bottom a wave of 4 mm over 60 mm.
+fn duct() -> Value {
+    patch([18, 24], |u, v| {
+        let angle = (140.0 * u - 70.0).to_radians();
+        let bottom = 4.0 * (std::f64::consts::TAU * v).sin();
+        [8.0 * angle.sin(), 60.0 * v, bottom - 8.0 * angle.cos()]
+    })
+}
+
+/// The duct is what its generator makes; `MILLSTREAM_BLESS=1` writes it anew.
+#[test]
+fn the_duct_is_that_of_its_generator() {
+    let path = folder().join("duct.json");
+    if std::env::var_os("MILLSTREAM_BLESS").is_some() {
+        std::fs::write(&path, duct().to_string() + "\n").unwrap();
+    }
+    let shipped: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+    assert_eq!(shipped, duct());
+}
+
+/// Runs a scene all of whose toolpaths must be good and clear of collisions.
+fn all_good(name: &str) -> Vec<Value> {
+    let (_, report) = run_scene(&folder().join(name));
+    let paths = report["toolpaths"].as_array().unwrap().clone();
+    for path in &paths {
+        is_good(path);
+        let violations = path["violations"].to_string();
+        assert!(!violations.contains("holder") && !violations.contains("cutter"), "{violations}");
+    }
+    paths
+}
+
+#[test]
+fn a_twisted_blade_is_cut_on_both_sides() {
+    assert_eq!(all_good("twisted.toml").len(), 2);
+}
+
+#[test]
+fn a_spiral_around_the_blade_never_leaves_it() {
+    let paths = all_good("around.toml");
+    assert_eq!(number(&paths[0], "/path/passes"), 1.0);
+}
+
+#[test]
+fn the_sides_of_a_passage_are_cut_clear_of_both_blades() {
+    all_good("passage.toml");
+}
+
+#[test]
+fn a_rotor_blade_comes_from_a_faired_section_table() {
+    let paths = all_good("rotor.toml");
+    assert!(paths[0]["notes"].to_string().contains("section curves were faired"), "{}", paths[0]["notes"]);
+}
+
+#[test]
+fn a_duct_is_cut_upright_and_leaning() {
+    all_good("duct.toml");
+}
+
+/// Every strategy holds the target on the blade, but sections offset in their planes: these lie too near where the
+/// blade leans, and gouge by as much.
+#[test]
+fn strategies_compare_on_one_blade() {
+    let (_, report) = run_scene(&folder().join("compare.toml"));
+    let paths = report["toolpaths"].as_array().unwrap();
+    paths[..5].iter().for_each(is_good);
+    let in_plane = number(&paths[5], "/gouge/max_depth_mm");
+    assert!(in_plane > 0.01, "{in_plane}");
+}
