@@ -1,6 +1,7 @@
 //! Cutter contacts, cutter locations, moves and the strategies that plan them. Knows nothing of how
 //! stock is stored.
 
+mod across;
 mod arc;
 mod border;
 mod chart;

@@ -519,11 +519,12 @@ pub fn plan_tilted(
 ) -> Result<Plan, PlanError> {
     let (planned, both_ways) = passes(part, cutter, strategy, Some(tilting.axis), settings, monitor)?;
     let Passes { passes, touches, mut notes, field, contacts } = planned;
-    let touches = if touches.is_empty() && !passes.is_empty() {
+    let mut touches = if touches.is_empty() && !passes.is_empty() {
         tilted::around_centres(&passes, part, cutter, tilting.axis, settings.chord_tolerance, monitor)?
     } else {
         TiltedPasses::located(touches, settings.chord_tolerance)
     };
+    touches.smoothing = settings.joining.smoothing.then_some(SAMPLING_OVER_RADIUS * cutter.radius());
     let path = join_tilted(touches, both_ways, part, cutter, tilting, settings, &mut notes, monitor)?;
     Ok(Plan::new(path, notes, field, &contacts, strategy))
 }
@@ -546,7 +547,8 @@ fn passes(
         stepover => stepover,
     };
     let sampling = SAMPLING_OVER_RADIUS * cutter.radius();
-    let smoothing = settings.joining.smoothing.then_some(sampling);
+    // A tilted cutter's passes are smoothed once they are tilted.
+    let smoothing = (settings.joining.smoothing && axis.is_none()).then_some(sampling);
     let pass = PassSettings { step, sampling, chord_tolerance: settings.chord_tolerance, smoothing, axis };
     check_extent(part, cutter, &pass)?;
     // A tilted cutter follows the level curves of the plan coordinate instead of being dropped.

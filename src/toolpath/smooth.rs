@@ -11,8 +11,11 @@
 //! Spreading puts the points beside the curve: a chord between points on it lies on one side of it by its
 //! whole sagitta, between points as far on the other side by half of it, so that chords can be √2 times
 //! as long. Every input point is held against the move that passes it, whatever smoothing did.
+//!
+//! Of a tilted cutter the centres of its arc are smoothed and spread; each keeps the axis that it has.
 
-use super::chord::{Side, Watch, distance_to_segment, moved_aside, reduce, reduced_indices};
+use super::chord::{Side, Watch, Waypoint, moved_aside, reduce, reduced_indices};
+use super::tilted::Touch;
 use crate::geometry::{Point3, Vector3};
 use crate::monitor::Cancelled;
 
@@ -29,6 +32,10 @@ const ROUNDS: usize = 12;
 /// Sagitta of a chord over the tolerance before its ends are moved aside by half of it. Two would leave
 /// nothing for curvature that changes from chord to chord, and chords that then fail are halved.
 const SAGITTA: f64 = 1.8;
+
+/// The same of tilted cutters, of which the one with the fewest points is taken: what turning adds to a sagitta, on a move and
+/// between axes, lies on one side of it.
+const SAGITTAS_TILTED: [f64; 3] = [SAGITTA, 1.5, 1.2];
 
 /// Rounds in which chords that do not hold are divided; what remains then is thinned without spreading.
 const DIVISIONS: usize = 8;
@@ -48,7 +55,41 @@ pub fn smooth_and_spread(
         return Ok(points.to_vec());
     }
     let smoothed = smoothed(points, WAVE * sampling, SHARE * tolerance, watch)?;
-    spread(points, &smoothed, tolerance, watch)
+    match spread(points, &smoothed, &|_, p| p, &|_, _| true, SAGITTA, tolerance, watch)? {
+        Some(spread) => Ok(spread),
+        None => reduce(points, tolerance, watch),
+    }
+}
+
+/// As [`smooth_and_spread`], for a tilted cutter; `None` where that fails, or where moves would not be `clear`.
+///
+/// # Errors
+/// [`Cancelled`] when the watch says so.
+pub fn smooth_and_spread_tilted(
+    pass: &[Touch],
+    sampling: f64,
+    tolerance: f64,
+    clear: &dyn Fn(&Touch, &Touch) -> bool,
+    watch: &mut Watch<'_>,
+) -> Result<Option<Vec<Touch>>, Cancelled> {
+    if pass.len() < 3 {
+        return Ok(None);
+    }
+    let centres: Vec<Point3> = pass.iter().map(Touch::centre).collect();
+    let smoothed = smoothed(&centres, WAVE * sampling, SHARE * tolerance, watch)?;
+    let last = pass.len() - 1;
+    let place = |k: usize, centre: Point3| match k {
+        // Without rounding.
+        0 => pass[0],
+        k if k == last => pass[last],
+        k => pass[k].around(centre),
+    };
+    let mut fewest: Option<Vec<Touch>> = None;
+    for sagitta in SAGITTAS_TILTED {
+        let found = spread(pass, &smoothed, &place, clear, sagitta, tolerance, watch)?;
+        fewest = [fewest, found].into_iter().flatten().min_by_key(Vec::len);
+    }
+    Ok(fewest)
 }
 
 /// Values at its knots of the smoothing spline that suppresses waves shorter than `wave` (mm) and stays
@@ -146,26 +187,32 @@ fn moves_of_spline(points: &[Point3], steps: &[f64], slack: &[f64], lambda: f64)
     moved
 }
 
-/// Fewer points along `curve`, each moved aside by half the sagittas beside it, whose moves stay within
-/// `tolerance` of all `points`. Both lists have the same length.
-fn spread(
-    points: &[Point3],
+/// Fewer points along `curve`, `sagitta` tolerances apart and each moved aside by half the sagittas beside it, whose moves are `clear` and stay within
+/// `tolerance` of all `points`; `None` where they do not. `place` puts the point of an index on a place of the curve. Both
+/// lists have the same length.
+fn spread<P: Waypoint>(
+    points: &[P],
     curve: &[Point3],
+    place: &dyn Fn(usize, Point3) -> P,
+    clear: &dyn Fn(&P, &P) -> bool,
+    sagitta: f64,
     tolerance: f64,
     watch: &mut Watch<'_>,
-) -> Result<Vec<Point3>, Cancelled> {
+) -> Result<Option<Vec<P>>, Cancelled> {
+    let on_curve: Vec<P> = curve.iter().enumerate().map(|(k, p)| place(k, *p)).collect();
     // What smoothing has used up.
-    let used = points.iter().zip(curve).map(|(p, q)| (p - q).norm()).fold(0.0, f64::max);
-    let mut knots = reduced_indices(curve, SAGITTA * (tolerance - used), watch)?;
+    let used = points.iter().zip(&on_curve).map(|(p, q)| p.stray(q, q)).fold(0.0, f64::max);
+    let mut knots = reduced_indices(&on_curve, sagitta * (tolerance - used), watch)?;
     for _ in 0..DIVISIONS {
-        let tips = moved_aside(curve, &knots, Side::Greater, tolerance - used);
+        let aside = moved_aside(curve, &knots, Side::Greater, tolerance - used);
+        let tips: Vec<P> = knots.iter().zip(aside).map(|(&k, p)| place(k, p)).collect();
         let fails = |k: usize| {
             let held = &points[knots[k]..=knots[k + 1]];
-            held.iter().any(|p| distance_to_segment(p, &tips[k], &tips[k + 1]) > tolerance)
+            held.iter().any(|p| p.stray(&tips[k], &tips[k + 1]) > tolerance) || !clear(&tips[k], &tips[k + 1])
         };
         let failing: Vec<usize> = (0..knots.len() - 1).filter(|&k| fails(k)).collect();
         if failing.is_empty() {
-            return Ok(tips);
+            return Ok(Some(tips));
         }
         watch.step()?;
         let further = failing.iter().map(|&k| (knots[k] + knots[k + 1]) / 2);
@@ -176,11 +223,12 @@ fn spread(
         knots.extend(further);
         knots.sort_unstable();
     }
-    reduce(points, tolerance, watch)
+    Ok(None)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::chord::distance_to_segment;
     use super::*;
     use crate::monitor::Silent;
     use proptest::prelude::*;

@@ -8,6 +8,7 @@
 
 use super::chord::{Watch, Waypoint, reduced_indices, sample_within_chord};
 use super::plan::PlanError;
+use super::smooth::smooth_and_spread_tilted;
 use super::tool_axis::{AxisError, ToolAxis, location};
 use super::{CcPoint, ClPoint, Interference};
 use crate::cutter::Cutter;
@@ -23,7 +24,15 @@ const AROUND_CENTRES_SHARE: f64 = 0.3;
 
 /// The axis turns by no more than this in one move, rad: controls interpolate rotary axes, not the axis itself, and the
 /// holder swings in between.
-const GREATEST_TURN: f64 = 0.1;
+pub(super) const GREATEST_TURN: f64 = 0.1;
+
+/// An axis that was turned away from its rule stays this far above the surface, as a sine.
+pub(super) const ABOVE_SURFACE: f64 = 0.02;
+
+/// How far samples of a located pass may stray, mm.
+pub(super) fn located_sampling(chord_tolerance: f64) -> f64 {
+    SAMPLING_SHARE * chord_tolerance
+}
 
 /// How a cutter is tilted.
 #[derive(Debug, Clone, Copy)]
@@ -32,6 +41,8 @@ pub struct Tilting<'a> {
     pub axis: &'a ToolAxis,
     /// The axis turns by no more than this along a pass, rad a mm of contact; `None` leaves the rule alone.
     pub most_turning: Option<f64>,
+    /// From pass to pass it turns by no more than this, rad a mm between neighbouring contacts.
+    pub most_turning_across: Option<f64>,
     /// What the tool must keep away from; passes are repaired where it does not.
     pub interference: Option<&'a Interference<'a>>,
 }
@@ -42,12 +53,14 @@ pub(super) struct TiltedPasses {
     pub passes: Vec<Vec<Touch>>,
     /// How far moves may stray from the touches, mm.
     pub tolerance: f64,
+    /// The sampling distance, mm, by which passes are smoothed; `None` leaves them as they are.
+    pub smoothing: Option<f64>,
 }
 
 impl TiltedPasses {
     /// Passes that were located by their contacts.
     pub fn located(passes: Vec<Vec<Touch>>, chord_tolerance: f64) -> Self {
-        Self { passes, tolerance: LOCATED_SHARE * chord_tolerance }
+        Self { passes, tolerance: LOCATED_SHARE * chord_tolerance, smoothing: None }
     }
 }
 
@@ -77,6 +90,16 @@ impl Touch {
         let profile = cutter.profile();
         let (height, reach) = (profile.centre_z, profile.centre_x.abs());
         Self { contact, feed, at: location(cutter, &contact, &axis), height, reach }
+    }
+
+    /// The centre of the arc's circle, on the axis.
+    pub fn centre(&self) -> Point3 {
+        on_axis(&self.at, self.height)
+    }
+
+    /// With the same axis and another centre.
+    pub fn around(&self, centre: Point3) -> Self {
+        Self { at: ClPoint { tip: centre - self.at.axis * self.height, axis: self.at.axis }, ..*self }
     }
 
     /// The same place fed the other way.
@@ -142,7 +165,7 @@ pub(super) fn along(
             }
         }
     };
-    let fine = SAMPLING_SHARE * chord_tolerance;
+    let fine = located_sampling(chord_tolerance);
     let touches = sample_within_chord(s0, s1, 1.0, fine, &mut locate, &mut Watch::new(monitor))?;
     refused.map_or(Ok(touches), |error| Err(PlanError::Axis(error)))
 }
@@ -200,7 +223,7 @@ pub(super) fn around_centres(
         monitor.advance(1);
         Ok::<_, PlanError>(touches)
     })?;
-    Ok(TiltedPasses { passes, tolerance: AROUND_CENTRES_SHARE * chord_tolerance })
+    Ok(TiltedPasses { passes, tolerance: AROUND_CENTRES_SHARE * chord_tolerance, smoothing: None })
 }
 
 /// The pass fed the other way round: the axis follows the feed where the rule says so.
@@ -245,6 +268,25 @@ pub(super) fn limit_turning(pass: &mut [Touch], cutter: &Cutter, rate: f64) -> b
         }
     }
     !turns_too_fast(&axes)
+}
+
+/// The locations that a pass needs to stay within `tolerance` of it, mm, and clear of what is to be kept away from, as far as
+/// its own moves are; smoothed and spread by `smoothing`, mm, where that is asked for and clear too.
+pub(super) fn located(
+    pass: &[Touch],
+    tolerance: f64,
+    smoothing: Option<f64>,
+    keep: Option<&Interference>,
+    monitor: &dyn Monitor,
+) -> Result<Vec<ClPoint>, Cancelled> {
+    let clear = |a: &Touch, b: &Touch| keep.is_none_or(|keep| keep.on_move(&a.at, &b.at).is_none());
+    if let Some(sampling) = smoothing
+        && let Some(spread) =
+            smooth_and_spread_tilted(pass, sampling, tolerance, &clear, &mut Watch::new(monitor))?
+    {
+        return Ok(spread.into_iter().map(|touch| touch.at).collect());
+    }
+    thinned(pass, tolerance, keep, monitor)
 }
 
 /// The locations that a pass needs to stay within `tolerance` of it, mm, and clear of what is to be kept away from, as far as
@@ -342,5 +384,22 @@ mod tests {
             pass.iter()
                 .all(|t| (t.at.tip + t.at.axis * 3.0 - t.contact.point - Vector3::z() * 3.0).norm() < 1e-12)
         );
+    }
+
+    #[test]
+    fn smoothed_passes_need_fewer_moves_and_hold_the_tolerance() {
+        for (cutter, tilt) in [(Cutter::ball(6.0).unwrap(), 0.0), (Cutter::bull(6.0, 1.0).unwrap(), 0.05)] {
+            let rule = ToolAxis::LeadTilt { lead: 0.2, tilt };
+            let touches = along(&arc, [0.0, 1.5], &cutter, &rule, 1e-3, &Silent).unwrap();
+            let plain = located(&touches, 6e-4, None, None, &Silent).unwrap();
+            let spread = located(&touches, 6e-4, Some(0.45), None, &Silent).unwrap();
+            assert!(spread.len() * 5 < plain.len() * 4, "{} of {}", spread.len(), plain.len());
+            assert_eq!((spread.first(), spread.last()), (plain.first(), plain.last()));
+            let ends: Vec<Touch> = spread.iter().map(|at| Touch { at: *at, ..touches[0] }).collect();
+            for touch in &touches {
+                let stray = ends.windows(2).map(|w| touch.stray(&w[0], &w[1])).fold(f64::INFINITY, f64::min);
+                assert!(stray <= 6e-4 * (1.0 + 1e-9), "{stray}");
+            }
+        }
     }
 }

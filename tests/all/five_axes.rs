@@ -47,6 +47,12 @@ fn parts_are_those_of_their_generators() {
     }
 }
 
+/// From pass to pass the tool stays near: around the part, the air is 0.6 to 3 times as long as all passes.
+fn stays_near(path: &Value) {
+    let [air, cutting] = ["/path/air_length_mm", "/path/cutting_length_mm"].map(|key| number(path, key));
+    assert!(air < 0.35 * cutting, "{}: {air} mm of air for {cutting} mm cut", path["name"]);
+}
+
 #[test]
 fn a_lead_makes_passes_on_a_dome_wider() {
     let (_, report) = run_scene(&folder().join("dome.toml"));
@@ -56,6 +62,7 @@ fn a_lead_makes_passes_on_a_dome_wider() {
         (&"zmap".into(), &"rays".into())
     );
     is_good(lead);
+    stays_near(lead);
     let length = |path: &Value| number(path, "/path/cutting_length_mm");
     assert!(length(lead) < 0.7 * length(upright), "{} {}", length(lead), length(upright));
 }
@@ -65,6 +72,7 @@ fn a_lip_is_cut_from_the_side_below_its_widest_place() {
     let (_, report) = run_scene(&folder().join("lip.toml"));
     for path in report["toolpaths"].as_array().unwrap() {
         is_good(path);
+        stays_near(path);
         // The area of 100 degrees of the cylinder.
         let area = 15.0 * 100f64.to_radians() * 20.0;
         assert!((number(path, "/deviation/area_mm2") / area - 1.0).abs() < 0.01, "{:#}", path["deviation"]);
@@ -84,6 +92,7 @@ fn a_holder_that_leans_away_from_the_walls_is_clear_of_them() {
     assert!(number(upright, "/violations/0/measured_mm") > 1.0);
     assert_eq!(leaning["verdict"], "pass", "{:#}", leaning["violations"]);
     is_good(leaning);
+    stays_near(leaning);
 }
 
 /// The same upright path under two engines that share no code: heights on a grid, and rays along normals.

@@ -61,8 +61,12 @@ impl Job<'_> {
         let planned = match &request.axis {
             Some(axis) => {
                 let keep = self.keep_clear(&tool, &fixtures);
-                let tilting =
-                    Tilting { axis: &axis.rule, most_turning: axis.most_turning, interference: Some(&keep) };
+                let tilting = Tilting {
+                    axis: &axis.rule,
+                    most_turning: axis.most_turning,
+                    most_turning_across: axis.most_turning_across,
+                    interference: Some(&keep),
+                };
                 plan_tilted(&self.part, &scene.cutter, &strategy, &tilting, &settings, monitor)
             }
             None => plan(&self.part, &scene.cutter, &strategy, &settings, monitor),

@@ -24,6 +24,8 @@ pub struct AxisRequest {
     pub rule: ToolAxis,
     /// The axis turns by no more than this along a pass, rad a mm of contact.
     pub most_turning: Option<f64>,
+    /// From pass to pass it turns by no more than this, rad a mm between neighbouring contacts.
+    pub most_turning_across: Option<f64>,
 }
 
 /// Reads the axis of a toolpath; `None` for an upright one.
@@ -32,9 +34,17 @@ pub(super) fn read(section: &Section<'_>) -> Result<Option<AxisRequest>, SceneEr
         let normal = ToolAxis::LeadTilt { lead: 0.0, tilt: 0.0 };
         let word = section.word(KEY, &["upright", "normal"])?;
         let leaning = word.filter(|word| word.value == "normal");
-        return Ok(leaning.map(|_| AxisRequest { rule: normal, most_turning: None }));
+        return Ok(leaning.map(|_| AxisRequest {
+            rule: normal,
+            most_turning: None,
+            most_turning_across: None,
+        }));
     };
-    table.only(&["lead", "tilt", "fixed", "toward", "away", "between", "turning"], &[], "`axis`")?;
+    table.only(
+        &["lead", "tilt", "fixed", "toward", "away", "between", "turning", "turning_across"],
+        &[],
+        "`axis`",
+    )?;
     let [lead, tilt] = ["lead", "tilt"].map(|key| table.number(key, LEAN, " degrees"));
     let (lead, tilt) = (lead?, tilt?);
     let rules = [
@@ -55,8 +65,12 @@ pub(super) fn read(section: &Section<'_>) -> Result<Option<AxisRequest>, SceneEr
                     `{ away = [[0, 0, -80]] }` or `{ between = [[0, 0, 0, 0, 0, 1], [50, 0, 0, 0.3, 0, 1]] }`";
         return Err(section.error(&section.key_span(KEY), message, cure));
     };
-    let most_turning = table.number("turning", TURNING, " degrees a mm")?.map(|rate| rate.value.to_radians());
-    Ok(Some(AxisRequest { rule, most_turning }))
+    let rate = |key: &str| {
+        let rate = table.number(key, TURNING, " degrees a mm")?;
+        Ok::<_, SceneError>(rate.map(|rate| rate.value.to_radians()))
+    };
+    let (most_turning, most_turning_across) = (rate("turning")?, rate("turning_across")?);
+    Ok(Some(AxisRequest { rule, most_turning, most_turning_across }))
 }
 
 /// The unit vector of three numbers.
@@ -103,7 +117,7 @@ fn guides(table: &Section<'_>) -> Result<Option<Vec<(Point3, Vector3)>>, SceneEr
 
 /// Writes the axis as scenes spell it.
 pub(super) fn write(out: &mut String, request: Option<&AxisRequest>) -> fmt::Result {
-    let Some(AxisRequest { rule, most_turning }) = request else {
+    let Some(AxisRequest { rule, most_turning, most_turning_across }) = request else {
         return writeln!(out, "axis = \"upright\"");
     };
     let list =
@@ -122,9 +136,11 @@ pub(super) fn write(out: &mut String, request: Option<&AxisRequest>) -> fmt::Res
             format!("between = {}", lists(guides.iter().map(row).collect()))
         }
     };
-    let turning =
-        most_turning.map_or_else(String::new, |rate| format!(", turning = {}", number(rate.to_degrees())));
-    writeln!(out, "axis = {{ {rule}{turning} }}  # degrees, mm")
+    let turning = |key: &str, rate: &Option<f64>| {
+        rate.map_or_else(String::new, |rate| format!(", {key} = {}", number(rate.to_degrees())))
+    };
+    let (along, across) = (turning("turning", most_turning), turning("turning_across", most_turning_across));
+    writeln!(out, "axis = {{ {rule}{along}{across} }}  # degrees, mm")
 }
 
 #[cfg(test)]
@@ -146,6 +162,7 @@ mod tests {
             "\"upright\"",
             "{ lead = 15 }",
             "{ tilt = -5, turning = 2 }",
+            "{ away = [[0, 0, -80]], turning = 2, turning_across = 4.5 }",
             "{ fixed = [0, 3, 4] }",
             "{ toward = [[0, 0, 80]] }",
             "{ away = [[0, 0, -80], [0, 10, -80]] }",
@@ -171,6 +188,7 @@ mod tests {
             ("{ lead = 10, fixed = [0, 0, 1] }", "only one"),
             ("{ lead = 85 }", "from -80 to 80"),
             ("{ lead = nan }", "NaN"),
+            ("{ lead = 3, turning_across = 0 }", "degrees a mm"),
             ("{ fixed = [0, 0, 0] }", "no length"),
             ("{ fixed = [0, 0] }", "three numbers"),
             ("{ toward = [] }", "no point"),
@@ -178,7 +196,6 @@ mod tests {
             ("{ between = [[0, 0, 0, 0, 0, 0]] }", "no length"),
             ("{ between = [] }", "no place"),
             ("{ leed = 3 }", "unknown key `leed`"),
-            ("{ lead = 3 }\nsmoothing = true", "not smoothed"),
         ] {
             let error = Scene::parse("a.toml", scene(axis)).unwrap_err().to_string();
             assert!(error.contains(word), "{axis}: {error}");

@@ -586,13 +586,6 @@ fn named_request(
     })?;
     let joining = if strategy.pocket().is_some() { Joining::default() } else { read_joining(section)? };
     let axis = if strategy.pocket().is_some() { None } else { axis::read(section)? };
-    if axis.is_some() && joining.smoothing {
-        return Err(section.error(
-            &section.key_span("smoothing"),
-            "points of passes with a tilting axis are not smoothed",
-            "delete `smoothing`; `turning` in `axis` evens out the axis",
-        ));
-    }
     Ok(ToolpathRequest { name, folder: own_folder, strategy, step, directions, joining, axis })
 }
 

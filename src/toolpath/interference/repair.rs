@@ -4,7 +4,7 @@
 //! takes, in one pass or in several where a stretch cannot be reached, and what was changed. Moves between the touches that
 //! leave are clear.
 
-use super::super::tilted::Touch;
+use super::super::tilted::{ABOVE_SURFACE, Touch};
 use super::super::tool_axis::location;
 use super::{Interference, Shortfall};
 use crate::cutter::Cutter;
@@ -21,9 +21,6 @@ const AROUND: usize = 36;
 
 /// Halvings of what lies between two rings: to a hundredth of a degree.
 const HALVINGS: u32 = 8;
-
-/// An axis stays this far above the surface, as a sine.
-const ABOVE_SURFACE: f64 = 0.02;
 
 /// Weight of the angle to the axis before, against that of the tilt.
 const CONTINUITY: f64 = 0.2;

@@ -23,7 +23,7 @@ const LONGEST_TANGENT: f64 = 4.0;
 /// A link may roll over the border of the part by this many intervals: one for the pass itself, one
 /// for the bend. A greater roll would cut the edges of a solid part, a smaller one forbids turns at
 /// borders that passes meet at an angle.
-const MOST_ROLL: f64 = 2.0;
+pub const MOST_ROLL: f64 = 2.0;
 
 /// Ends with opposite feeds that lie beside each other by less than this many intervals are joined by a
 /// loop, for a plain bend between them would be a hairpin.
@@ -37,7 +37,7 @@ const SHARES_BESIDE: [f64; 3] = [1.0, 0.5, 0.25];
 const LOOP_TANGENT: f64 = 2.0;
 
 /// First sampling distance along a bend, in intervals.
-const SAMPLING: f64 = 0.25;
+pub const SAMPLING: f64 = 0.25;
 
 /// Share of the chord tolerance that sampling may use; thinning uses the rest.
 const SAMPLING_SHARE: f64 = 0.4;
@@ -102,8 +102,8 @@ impl End {
     }
 }
 
-/// A cubic of the plan view over the parameters 0 to 1.
-struct Cubic {
+/// A cubic of a plane over the parameters 0 to 1.
+pub struct Cubic {
     ends: [Point2; 2],
     tangents: [Vector2; 2],
 }
@@ -113,7 +113,7 @@ impl Cubic {
         Self { ends, tangents }
     }
 
-    fn at(&self, t: f64) -> Point2 {
+    pub fn at(&self, t: f64) -> Point2 {
         let (t2, t3) = (t * t, t * t * t);
         let [a, b] = self.tangents;
         self.ends[0]
@@ -122,10 +122,57 @@ impl Cubic {
             + b * (t3 - t2)
     }
 
+    /// Along the cubic, of no unit length.
+    pub fn along(&self, t: f64) -> Vector2 {
+        let [a, b] = self.tangents;
+        let chord = self.ends[1] - self.ends[0];
+        chord * (6.0 * t * (1.0 - t)) + a * ((1.0 - t) * (1.0 - 3.0 * t)) + b * (t * (3.0 * t - 2.0))
+    }
+
     /// Length of sixteen chords, which is near enough to refuse what is too long.
-    fn length(&self) -> f64 {
+    pub fn length(&self) -> f64 {
         let at = |k: u32| self.at(f64::from(k) / 16.0);
         (0..16).map(|k| (at(k + 1) - at(k)).norm()).sum()
+    }
+}
+
+/// The bends worth trying between two ends, the best one first; passes lie an interval apart, mm.
+pub fn curves(interval: f64, from: &End, to: &End) -> Vec<Vec<Cubic>> {
+    let span = (to.tip - from.tip).xy();
+    let tangent = (TANGENT * span.norm()).min(LONGEST_TANGENT * interval);
+    let plain = Cubic::new([from.tip.xy(), to.tip.xy()], [from.feed * tangent, to.feed * tangent]);
+    let Some(out) = (from.feed - to.feed).try_normalize(0.5) else { return vec![vec![plain]] };
+    let ahead = span.dot(&out);
+    let beside = span - out * ahead;
+    if beside.norm() >= NARROW * interval {
+        let turns = SHARES_BESIDE.map(|share| turn_beside(interval, from, to, ahead, share));
+        return turns.into_iter().chain([vec![plain]]).collect();
+    }
+    // Out to the far point of a loop, across it, and back.
+    let across = Vector2::new(out.y, -out.x);
+    let across = if across.dot(&span) < 0.0 { -across } else { across };
+    let far = from.tip.xy() + beside * 0.5 + out * (span.dot(&out).max(0.0) + interval);
+    let (wide, at_far) = (LOOP_TANGENT * interval, across * interval);
+    let first = Cubic::new([from.tip.xy(), far], [from.feed * wide, at_far]);
+    let second = Cubic::new([far, to.tip.xy()], [at_far, to.feed * wide]);
+    vec![vec![first, second], vec![plain]]
+}
+
+/// A turn between ends with opposite feeds, of which the second lies `ahead` of the first: on along the feed until the
+/// farther end is reached, and a bend between places this share of the way beside each other that the ends are. One
+/// bend all the way would be a hairpin.
+fn turn_beside(interval: f64, from: &End, to: &End, ahead: f64, share: f64) -> Vec<Cubic> {
+    let (start, end) = (from.tip.xy(), to.tip.xy());
+    let turn = |places: [Point2; 2]| {
+        let tangent = (TANGENT * (places[1] - places[0]).norm()).min(LONGEST_TANGENT * interval);
+        Cubic::new(places, [from.feed * tangent, to.feed * tangent])
+    };
+    if ahead > 0.0 {
+        let near = end + (start + from.feed * ahead - end) * share;
+        vec![Cubic::new([start, near], [from.feed * ahead; 2]), turn([near, end])]
+    } else {
+        let near = start + (end + to.feed * ahead - start) * share;
+        vec![turn([start, near]), Cubic::new([near, end], [to.feed * -ahead; 2])]
     }
 }
 
@@ -148,52 +195,12 @@ impl Bends<'_> {
         if span.norm() > self.longest || span.xy().norm() == 0.0 {
             return Ok(None);
         }
-        for curve in self.curves(from, to) {
+        for curve in curves(self.interval, from, to) {
             if let Some(moves) = self.follow(&curve, from, to, monitor)? {
                 return Ok(Some(moves));
             }
         }
         Ok(None)
-    }
-
-    /// The bends worth trying, the best one first.
-    fn curves(&self, from: &End, to: &End) -> Vec<Vec<Cubic>> {
-        let span = (to.tip - from.tip).xy();
-        let tangent = (TANGENT * span.norm()).min(LONGEST_TANGENT * self.interval);
-        let plain = Cubic::new([from.tip.xy(), to.tip.xy()], [from.feed * tangent, to.feed * tangent]);
-        let Some(out) = (from.feed - to.feed).try_normalize(0.5) else { return vec![vec![plain]] };
-        let ahead = span.dot(&out);
-        let beside = span - out * ahead;
-        if beside.norm() >= NARROW * self.interval {
-            let turns = SHARES_BESIDE.map(|share| self.turn_beside(from, to, ahead, share));
-            return turns.into_iter().chain([vec![plain]]).collect();
-        }
-        // Out to the far point of a loop, across it, and back.
-        let across = Vector2::new(out.y, -out.x);
-        let across = if across.dot(&span) < 0.0 { -across } else { across };
-        let far = from.tip.xy() + beside * 0.5 + out * (span.dot(&out).max(0.0) + self.interval);
-        let (wide, at_far) = (LOOP_TANGENT * self.interval, across * self.interval);
-        let first = Cubic::new([from.tip.xy(), far], [from.feed * wide, at_far]);
-        let second = Cubic::new([far, to.tip.xy()], [at_far, to.feed * wide]);
-        vec![vec![first, second], vec![plain]]
-    }
-
-    /// A turn between ends with opposite feeds, of which the second lies `ahead` of the first: on along the feed until the
-    /// farther end is reached, and a bend between places this share of the way beside each other that the ends are. One
-    /// bend all the way would be a hairpin.
-    fn turn_beside(&self, from: &End, to: &End, ahead: f64, share: f64) -> Vec<Cubic> {
-        let (start, end) = (from.tip.xy(), to.tip.xy());
-        let turn = |places: [Point2; 2]| {
-            let tangent = (TANGENT * (places[1] - places[0]).norm()).min(LONGEST_TANGENT * self.interval);
-            Cubic::new(places, [from.feed * tangent, to.feed * tangent])
-        };
-        if ahead > 0.0 {
-            let near = end + (start + from.feed * ahead - end) * share;
-            vec![Cubic::new([start, near], [from.feed * ahead; 2]), turn([near, end])]
-        } else {
-            let near = start + (end + to.feed * ahead - start) * share;
-            vec![turn([start, near]), Cubic::new([near, end], [to.feed * -ahead; 2])]
-        }
     }
 
     /// The moves along some cubics that follow each other.

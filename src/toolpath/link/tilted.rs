@@ -1,25 +1,27 @@
 //! Joins the passes of a tilted cutter into one program.
 //!
 //! Enters: passes as touches of the cutter, mm. Leaves: a program that feeds along every pass from one end to
-//! the other. Between two passes the cutter retreats along its own axis, which frees it whatever it leans
-//! against, and goes over at rapid rate: straight where that is free, else around a sphere that holds part
-//! and stock, on which every place of the cutter is outside while its axis points away from the middle.
-//! Where the tool is to keep away from something, passes are repaired first, and what it comes too near to in between is
-//! noted.
+//! the other, and goes from one to the next by the quickest way that is clear: on the surface, a little off it, over the block
+//! of part and stock, or around a sphere ([`ways`]). Where the tool is to keep away from something, passes are repaired first,
+//! and what it comes too near to in between, where no way is clear, is noted.
 
+mod bent;
+mod ways;
+
+use super::super::across;
 use super::super::interference::{Repaired, repair};
-use super::super::tilted::{TiltedPasses, Tilting, Touch, limit_turning, reversed, thinned};
-use super::super::{ClPoint, Interference, Move, MoveKind, PlanError, PlanSettings, RepairSummary, Toolpath};
+use super::super::tilted::{TiltedPasses, Tilting, Touch, limit_turning, located, reversed};
+use super::super::{
+    Check, ClPoint, Interference, Move, MoveKind, Obstacle, PlanError, PlanSettings, RepairSummary, Toolpath,
+};
 use super::order::{Visit, is_closed, order};
-use super::{Links, Rates, longest_link};
-use crate::cutter::Cutter;
-use crate::geometry::{Point3, Vector3};
+use super::{Links, Rates, longest_link, plane_interval};
+use crate::cutter::{Cutter, Solid};
+use crate::geometry::Point3;
 use crate::monitor::{self, Monitor};
 use crate::part::Part;
-
-/// The way around the sphere is divided into turns of this angle, rad, and the sphere is as much larger as its chords cut
-/// off: `1/cos` of half of it.
-const SPHERE_STEP: f64 = 0.15;
+use bent::Bent;
+use ways::{Block, Step, Ways};
 
 /// Joins passes; see the module.
 ///
@@ -35,50 +37,145 @@ pub fn join_tilted(
     notes: &mut Vec<String>,
     monitor: &dyn Monitor,
 ) -> Result<Toolpath, PlanError> {
-    let TiltedPasses { passes, tolerance } = passes;
+    let TiltedPasses { passes, tolerance, smoothing } = passes;
     let passes: Vec<Vec<Touch>> = passes.into_iter().filter(|p| p.len() >= 2).collect();
     monitor.start("joining passes", 0);
     let contacts: Vec<Vec<Point3>> =
         passes.iter().map(|pass| pass.iter().map(|touch| touch.contact.point).collect()).collect();
-    let rates = Rates::of(settings, &contacts);
-    let longest = match settings.joining.links {
-        Links::Surface => longest_link(&settings.joining, cutter, settings.step),
-        Links::Retract => 0.0,
+    // Without anything to keep away from, ways still keep the cutter out of the part.
+    let alone = Solid::of_cutter(cutter, None);
+    let depth = settings.chord_tolerance + part.mesh_deviation();
+    let obstacle = Obstacle::new(part.mesh(), part.bvh());
+    let cutter_alone = Interference {
+        checks: vec![Check { solid: &alone, obstacle, needed: -depth }],
+        ..Interference::default()
     };
-    let visits = order(&contacts, both_ways, &|distance| rates.between(distance, longest));
+    let touching = tilting.interference.unwrap_or(&cutter_alone);
+    let bent = (settings.joining.links == Links::Surface).then(|| Bent {
+        part,
+        cutter,
+        tilting,
+        touching,
+        interval: plane_interval(cutter, settings.step),
+        longest: longest_link(&settings.joining, cutter, settings.step),
+        chord_tolerance: settings.chord_tolerance,
+        thinning: tolerance,
+    });
+    let block = Block::of(part, settings);
+    let ways = Ways::new(part, cutter, settings, Rates::of(settings, &contacts), &block, touching, bent);
+    let visits = order(&contacts, both_ways, &|distance| ways.cost(distance));
     monitor::check(monitor)?;
-    let turned = crate::parallel::try_map(visits.len(), |k| {
-        let mut pass =
-            visited(&passes[visits[k].pass], &contacts[visits[k].pass], &visits[k], cutter, tilting)?;
-        let even = tilting.most_turning.is_none_or(|rate| limit_turning(&mut pass, cutter, rate));
-        let keep = tilting.interference;
-        let Repaired { passes, summary } = match keep {
-            Some(keep) => repair(&pass, cutter, keep, tilting.most_turning, monitor)?,
-            None => Repaired { passes: vec![pass], summary: RepairSummary::default() },
-        };
-        let long = passes.iter().filter(|pass| pass.len() >= 2);
-        let thin = long.map(|pass| thinned(pass, tolerance, keep, monitor)).collect::<Result<Vec<_>, _>>()?;
-        Ok::<_, PlanError>((thin, summary, even))
+    let turned =
+        |k: usize| visited(&passes[visits[k].pass], &contacts[visits[k].pass], &visits[k], cutter, tilting);
+    let turned = crate::parallel::try_map(visits.len(), turned)?;
+    let passes = cleared(turned, cutter, tilting, plane_interval(cutter, settings.step), notes, monitor)?;
+    let pieces = crate::parallel::try_map(passes.len(), |k| {
+        Piece::of(&passes[k], tolerance, smoothing, tilting.interference, monitor)
     })?;
-    let uneven = turned.iter().filter(|(_, _, even)| !even).count();
+    let between = crate::parallel::try_map(pieces.len().saturating_sub(1), |k| {
+        ways.between(&pieces[k].ends[1], &pieces[k + 1].ends[0], monitor)
+    })?;
+    let path = program(&pieces, &between, &ways, settings);
+    notes.extend(tilting.interference.and_then(|keep| too_near_between(keep, &path)));
+    Ok(path)
+}
+
+/// The passes, `interval` mm apart, with axes evened out as far as is asked for, and so that the tool stays clear.
+fn cleared(
+    passes: Vec<Vec<Touch>>,
+    cutter: &Cutter,
+    tilting: &Tilting,
+    interval: f64,
+    notes: &mut Vec<String>,
+    monitor: &dyn Monitor,
+) -> Result<Vec<Vec<Touch>>, PlanError> {
+    let evened = crate::parallel::try_map(passes.len(), |k| {
+        let mut pass = passes[k].clone();
+        let even = tilting.most_turning.is_none_or(|rate| limit_turning(&mut pass, cutter, rate));
+        Ok::<_, PlanError>((repaired(pass, cutter, tilting, monitor)?, even))
+    })?;
+    let uneven = evened.iter().filter(|(_, even)| !even).count();
     if uneven > 0 {
         notes.push(format!(
             "on {uneven} passes the axis turns faster than asked: they are too short for their turns"
         ));
     }
-    let mut program =
-        Program { settings, sphere: Sphere::around(part, settings), start: None, moves: Vec::new() };
     let mut summary = RepairSummary::default();
-    turned.iter().for_each(|(_, one, _)| summary.add(one));
-    notes.extend(summary.notes());
-    for (k, pass) in turned.iter().flat_map(|(passes, ..)| passes).enumerate() {
-        monitor::check(monitor)?;
-        program.reach(k as u32, &pass[0]);
-        pass[1..].iter().for_each(|to| program.push(*to, MoveKind::Cut, settings.feed_rate, k as u32));
+    evened.iter().for_each(|(one, _)| summary.add(&one.summary));
+    let mut passes: Vec<_> = evened.into_iter().flat_map(|(one, _)| one.passes).collect();
+    if let Some(across) = tilting.most_turning_across {
+        let rates = across::Rates { across, along: tilting.most_turning };
+        let left = across::even_out(&mut passes, cutter, rates, interval, tilting.interference, monitor)?;
+        notes.extend(left.map(|left| left.note(across)));
+        // The touches are clear; moves between them may be no longer.
+        let again = |k: usize| repaired(passes[k].clone(), cutter, tilting, monitor);
+        let again = crate::parallel::try_map(passes.len(), again)?;
+        again.iter().for_each(|one| summary.add(&one.summary));
+        passes = again.into_iter().flat_map(|one| one.passes).collect();
     }
-    let path = program.finish();
-    notes.extend(tilting.interference.and_then(|keep| too_near_between(keep, &path)));
-    Ok(path)
+    notes.extend(summary.notes());
+    passes.retain(|pass| pass.len() >= 2);
+    Ok(passes)
+}
+
+/// A pass on which the tool stays clear.
+fn repaired(
+    pass: Vec<Touch>,
+    cutter: &Cutter,
+    tilting: &Tilting,
+    monitor: &dyn Monitor,
+) -> Result<Repaired, PlanError> {
+    Ok(match tilting.interference {
+        Some(keep) => repair(&pass, cutter, keep, tilting.most_turning, monitor)?,
+        None => Repaired { passes: vec![pass], summary: RepairSummary::default() },
+    })
+}
+
+/// A pass, or a piece of one.
+struct Piece {
+    /// Its moves' ends.
+    at: Vec<ClPoint>,
+    /// The touches at which it begins and ends.
+    ends: [Touch; 2],
+}
+
+impl Piece {
+    fn of(
+        pass: &[Touch],
+        tolerance: f64,
+        smoothing: Option<f64>,
+        keep: Option<&Interference>,
+        monitor: &dyn Monitor,
+    ) -> Result<Self, PlanError> {
+        let ends = [pass[0], pass[pass.len() - 1]];
+        Ok(Self { at: located(pass, tolerance, smoothing, keep, monitor)?, ends })
+    }
+}
+
+/// All pieces one after the other.
+fn program(pieces: &[Piece], between: &[Vec<Step>], ways: &Ways, settings: &PlanSettings) -> Toolpath {
+    let (Some(first), Some(last)) = (pieces.first(), pieces.last()) else {
+        return Toolpath { start: ways.above(), moves: Vec::new() };
+    };
+    let mut moves = Vec::new();
+    let mut push = |to: ClPoint, kind: MoveKind, pass: usize| {
+        let feed_rate = match kind {
+            MoveKind::Rapid => 0.0,
+            MoveKind::Plunge => settings.plunge_rate,
+            MoveKind::Cut | MoveKind::Link | MoveKind::Retract => settings.feed_rate,
+        };
+        moves.push(Move { to, kind, feed_rate, pass: pass as u32 });
+    };
+    let start = ways.outside(&first.at[0]);
+    ways.into(&start, &first.at[0]).into_iter().for_each(|(to, kind)| push(to, kind, 0));
+    for (k, piece) in pieces.iter().enumerate() {
+        if let Some(way) = k.checked_sub(1).and_then(|k| between.get(k)) {
+            way.iter().for_each(|(to, kind)| push(*to, *kind, k));
+        }
+        piece.at[1..].iter().for_each(|to| push(*to, MoveKind::Cut, k));
+    }
+    push(ways.outside(&last.ends[1].at), MoveKind::Retract, pieces.len() - 1);
+    Toolpath { start, moves }
 }
 
 /// What the tool comes too near to between passes, in words.
@@ -118,95 +215,6 @@ fn visited(
         return Ok(reversed(pass, cutter, tilting.axis)?);
     }
     Ok(pass.iter().rev().map(Touch::fed_back).collect())
-}
-
-/// A sphere that holds part and stock.
-struct Sphere {
-    centre: Point3,
-    radius: f64,
-}
-
-impl Sphere {
-    fn around(part: &Part, settings: &PlanSettings) -> Self {
-        let bounds = part.bounds();
-        let top = settings.stock_top.max(bounds.max.z);
-        let (low, high) = (bounds.min, Point3::new(bounds.max.x, bounds.max.y, top));
-        let least = 0.5 * (high - low).norm() + settings.clearance;
-        Self { centre: nalgebra::center(&low, &high), radius: least / (0.5 * SPHERE_STEP).cos() }
-    }
-
-    /// Where a cutter that retreats along its axis leaves the sphere.
-    fn exit(&self, from: &ClPoint) -> ClPoint {
-        let (off, axis) = (from.tip - self.centre, from.axis);
-        let along = off.dot(&axis);
-        let inside = along * along - off.norm_squared() + self.radius * self.radius;
-        let way = if inside > 0.0 { inside.sqrt() - along } else { 0.0 };
-        ClPoint { tip: from.tip + axis * way.max(0.0), axis }
-    }
-
-    /// The way from one place outside to another around the sphere, its end included.
-    fn around_to(&self, from: &ClPoint, to: &ClPoint) -> Vec<ClPoint> {
-        let [a, b] = [from, to].map(|at| (at.tip - self.centre).normalize());
-        let angle = a.cross(&b).norm().atan2(a.dot(&b));
-        // Opposite places are joined over the top.
-        let side =
-            [Vector3::z(), Vector3::x()].into_iter().find(|v| a.cross(v).norm() > 0.1).unwrap_or_default();
-        let square = (b - a * a.dot(&b)).try_normalize(1e-6).unwrap_or((side - a * a.dot(&side)).normalize());
-        let count = (angle / SPHERE_STEP).ceil().max(1.0) as usize;
-        let at = |k: usize| {
-            let t = k as f64 / count as f64;
-            let radial = a * (t * angle).cos() + square * (t * angle).sin();
-            ClPoint { tip: self.centre + radial * self.radius, axis: from.towards(to, t).axis }
-        };
-        (1..count).map(at).chain(std::iter::once(*to)).collect()
-    }
-}
-
-/// A program in the making.
-struct Program<'a> {
-    settings: &'a PlanSettings,
-    sphere: Sphere,
-    start: Option<ClPoint>,
-    moves: Vec<Move>,
-}
-
-impl Program<'_> {
-    fn push(&mut self, to: ClPoint, kind: MoveKind, feed_rate: f64, pass: u32) {
-        self.moves.push(Move { to, kind, feed_rate, pass });
-    }
-
-    /// Brings the cutter to where a pass begins: out along its axis, around, and in along the axis there.
-    fn reach(&mut self, pass: u32, to: &ClPoint) {
-        let (outside, before) = (self.sphere.exit(to), self.moves.last().map(|m| m.to));
-        if let Some(from) = before {
-            let exit = self.sphere.exit(&from);
-            self.push(self.off(&from, &exit), MoveKind::Retract, self.settings.feed_rate, pass);
-            self.push(exit, MoveKind::Rapid, 0.0, pass);
-            for at in self.sphere.around_to(&exit, &outside) {
-                self.push(at, MoveKind::Rapid, 0.0, pass);
-            }
-        } else {
-            self.start = Some(outside);
-        }
-        let near = self.off(to, &outside);
-        self.push(near, MoveKind::Rapid, 0.0, pass);
-        self.push(*to, MoveKind::Plunge, self.settings.plunge_rate, pass);
-    }
-
-    /// The clearance off a place towards one outside on its axis, or that place if it is nearer.
-    fn off(&self, at: &ClPoint, outside: &ClPoint) -> ClPoint {
-        let way = (outside.tip - at.tip).norm().min(self.settings.clearance);
-        ClPoint { tip: at.tip + at.axis * way, axis: at.axis }
-    }
-
-    fn finish(mut self) -> Toolpath {
-        let origin = ClPoint::upright(self.sphere.centre + Vector3::z() * self.sphere.radius);
-        if let Some(last) = self.moves.last().copied() {
-            let exit = self.sphere.exit(&last.to);
-            self.push(exit, MoveKind::Retract, self.settings.feed_rate, last.pass);
-        }
-        Toolpath { start: self.start.unwrap_or(origin), moves: self.moves }
-    }
 }
 
 #[cfg(test)]

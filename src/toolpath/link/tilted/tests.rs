@@ -1,8 +1,8 @@
-//! A plate beside a wall that the holder must not touch.
+//! A plate beside a wall that the holder must not touch, and ways between passes.
 
 use super::*;
 use crate::cutter::{Holder, HolderSection, Solid};
-use crate::geometry::{AnalyticShape, AnalyticSurface, Bvh, TriangleMesh};
+use crate::geometry::{AnalyticShape, AnalyticSurface, Bvh, TriangleMesh, Vector3};
 use crate::monitor::Silent;
 use crate::part::Patch;
 use crate::toolpath::{Check, Joining, Obstacle, Step, Strategy, ToolAxis, plan_tilted};
@@ -49,7 +49,7 @@ fn beside_a_wall_the_axis_leans_away_and_every_cut_is_clear() {
     let strategy = Strategy::Zigzag { angle: 0.0, one_way: false };
     let planned = |interference| {
         let upright = ToolAxis::Fixed(Vector3::z());
-        let tilting = Tilting { axis: &upright, most_turning: None, interference };
+        let tilting = Tilting { axis: &upright, most_turning: None, most_turning_across: None, interference };
         plan_tilted(&part, &cutter, &strategy, &tilting, &settings, &Silent).unwrap()
     };
     let cuts = |to: &Move| to.kind.is_on_surface();
@@ -71,4 +71,158 @@ fn beside_a_wall_the_axis_leans_away_and_every_cut_is_clear() {
     assert!((a[0] - b[0]).abs() < 1e-9 && (a[1] - b[1]).abs() < 1e-9, "{a:?} {b:?}");
     let cut = plan.path.moves.iter().filter(|m| cuts(m)).count();
     assert!(cut < 1000, "{cut} moves");
+}
+
+fn settings(links: Links) -> PlanSettings {
+    PlanSettings {
+        step: Step::Stepover(1.0),
+        chord_tolerance: 0.005,
+        clearance: 2.0,
+        stock_top: 1.0,
+        feed_rate: 1000.0,
+        plunge_rate: 300.0,
+        rapid_rate: 15_000.0,
+        joining: Joining { links, ..Joining::default() },
+    }
+}
+
+/// A hollow of radius 30.
+fn hollow() -> Part {
+    let azimuth = std::f64::consts::FRAC_PI_2;
+    let shape = AnalyticShape::Cylinder { height: 0.0, radius: 30.0, azimuth, concave: true };
+    let surface = AnalyticSurface::new(shape, [[-8.0, 8.0], [0.0, 12.0]]).unwrap();
+    Part::from_patches(vec![Patch::Analytic(surface)], 0.002).unwrap()
+}
+
+fn air(path: &Toolpath) -> f64 {
+    path.segments().filter(|(.., m)| !m.kind.is_on_surface()).map(|(a, b, _)| (b - a).norm()).sum()
+}
+
+#[test]
+fn neighbouring_passes_are_joined_nearby_and_clear() {
+    for (part, cutter) in
+        [(plate(), Cutter::bull(6.0, 1.0)), (hollow(), Cutter::ball(6.0)), (hollow(), Cutter::bull(6.0, 1.0))]
+    {
+        let cutter = cutter.unwrap();
+        let solid = Solid::of_cutter(&cutter, None);
+        let obstacle = Obstacle::new(part.mesh(), part.bvh());
+        let keep = Interference {
+            checks: vec![Check { solid: &solid, obstacle, needed: -0.005 - part.mesh_deviation() }],
+            greatest_tilt: 0.5,
+            greatest_lift: 0.0,
+        };
+        let axis = ToolAxis::LeadTilt { lead: 0.2, tilt: 0.0 };
+        let tilting =
+            Tilting { axis: &axis, most_turning: None, most_turning_across: None, interference: Some(&keep) };
+        let strategy = Strategy::Zigzag { angle: 0.0, one_way: false };
+        let planned =
+            |links| plan_tilted(&part, &cutter, &strategy, &tilting, &settings(links), &Silent).unwrap();
+        let [bent, aloft] = [Links::Surface, Links::Retract].map(planned);
+        for plan in [&bent, &aloft] {
+            assert_eq!(plan.notes, Vec::<String>::new());
+            assert!(keep.on_path(&plan.path, |_| true).is_empty());
+            // In at the first pass; nothing else is as quick as staying near.
+            assert_eq!(plan.path.moves.iter().filter(|m| m.kind == MoveKind::Rapid).count(), 1);
+        }
+        let passes = aloft.path.passes();
+        assert!(passes > 5 && air(&aloft.path) < 40.0 + 6.0 * passes as f64, "{}", air(&aloft.path));
+        // A bull that leans the other way afterwards is turned around sooner aloft.
+        if cutter.shape() == crate::cutter::CutterShape::Ball {
+            let count = |kind| bent.path.moves.iter().filter(|m| m.kind == kind).count();
+            assert_eq!((count(MoveKind::Plunge), count(MoveKind::Retract)), (1, 1), "all by links");
+        }
+        // Aloft the cutter stays off the part.
+        let off = aloft.path.moves.windows(2).filter(|w| w.iter().all(|m| m.kind == MoveKind::Retract));
+        for (w, t) in off.flat_map(|w| [0.0, 0.5, 1.0].map(|t| (w, t))) {
+            assert!(!obstacle.is_nearer(&solid, &w[0].to.towards(&w[1].to, t), 0.2 - 2e-5));
+        }
+    }
+}
+
+#[test]
+fn the_lead_of_a_bull_goes_with_the_feed_around_a_link() {
+    let (part, cutter) = (plate(), Cutter::bull(6.0, 1.0).unwrap());
+    let solid = Solid::of_cutter(&cutter, None);
+    let obstacle = Obstacle::new(part.mesh(), part.bvh());
+    let keep = Interference {
+        checks: vec![Check { solid: &solid, obstacle, needed: -0.01 }],
+        ..Interference::default()
+    };
+    let axis = ToolAxis::LeadTilt { lead: 0.2, tilt: 0.1 };
+    let tilting =
+        Tilting { axis: &axis, most_turning: None, most_turning_across: None, interference: Some(&keep) };
+    let bent = Bent {
+        part: &part,
+        cutter: &cutter,
+        tilting: &tilting,
+        touching: &keep,
+        interval: 1.0,
+        longest: 10.0,
+        chord_tolerance: 0.005,
+        thinning: 0.003,
+    };
+    let touch = |y: f64, feed: f64| {
+        let contact = crate::toolpath::CcPoint { point: Point3::new(20.0, y, 0.0), normal: Vector3::z() };
+        Touch::by(&axis, &cutter, contact, Vector3::x() * feed).unwrap()
+    };
+    let (from, to) = (touch(10.0, 1.0), touch(11.0, -1.0));
+    let link = bent.link(&from, &to, &Silent).unwrap().unwrap();
+    assert_eq!(link.last(), Some(&to.at));
+    for at in &link {
+        assert!((at.axis.z - from.at.axis.z).abs() < 1e-9, "{}", at.axis.z);
+        let nearest = obstacle.clearance(&solid, at, 1.0).map(|near| near.distance);
+        assert!(nearest.is_none_or(|d| d > -1e-9), "{nearest:?}");
+    }
+    // Faster than is asked for, it is none.
+    let slow = Tilting { most_turning: Some(0.1), ..tilting };
+    assert_eq!(Bent { tilting: &slow, ..bent }.link(&from, &to, &Silent).unwrap(), None);
+}
+
+#[test]
+fn a_wall_between_two_passes_is_gone_over() {
+    let (part, cutter) = (plate(), Cutter::ball(6.0).unwrap());
+    let vertices = [[0.0, 0.0], [20.0, 0.0], [20.0, 8.0], [0.0, 8.0]];
+    let vertices = vertices.map(|[y, z]| Point3::new(10.0, y, z)).to_vec();
+    let wall = TriangleMesh::new(vertices, vec![[0, 1, 2], [0, 2, 3]]).unwrap().0;
+    let (tree, solid) = (Bvh::new(&wall), Solid::of_cutter(&cutter, None));
+    let check = |obstacle, needed| Check { solid: &solid, obstacle, needed };
+    let keep = Interference {
+        checks: vec![
+            check(Obstacle::new(part.mesh(), part.bvh()), -0.01),
+            check(Obstacle::new(&wall, &tree), 0.5),
+        ],
+        ..Interference::default()
+    };
+    let settings = PlanSettings { stock_top: 10.0, ..settings(Links::Surface) };
+    let axis = ToolAxis::Fixed(Vector3::new(0.1, 0.0, 1.0).normalize());
+    let tilting =
+        Tilting { axis: &axis, most_turning: None, most_turning_across: None, interference: Some(&keep) };
+    let bent = Bent {
+        part: &part,
+        cutter: &cutter,
+        tilting: &tilting,
+        touching: &keep,
+        interval: 1.0,
+        longest: 100.0,
+        chord_tolerance: 0.005,
+        thinning: 0.003,
+    };
+    let block = Block::of(&part, &settings);
+    let ways = Ways::new(&part, &cutter, &settings, Rates::of(&settings, &[]), &block, &keep, Some(bent));
+    let touch = |x: f64, feed: f64| {
+        let contact = crate::toolpath::CcPoint { point: Point3::new(x, 10.0, 0.0), normal: Vector3::z() };
+        Touch::by(&axis, &cutter, contact, Vector3::x() * feed).unwrap()
+    };
+    let (from, to) = (touch(4.0, 1.0), touch(16.0, 1.0));
+    let moves = ways.between(&from, &to, &Silent).unwrap();
+    let mut at = from.at;
+    for (to, kind) in &moves {
+        assert!(keep.on_move(&at, to).is_none() && *kind != MoveKind::Link, "{kind:?}");
+        at = *to;
+    }
+    assert_eq!(at, to.at);
+    assert!(moves.iter().any(|(to, _)| to.tip.z > 8.5));
+    // On one side of the wall the surface is quickest.
+    let beside = ways.between(&from, &touch(5.0, -1.0), &Silent).unwrap();
+    assert!(beside.iter().all(|(_, kind)| *kind == MoveKind::Link));
 }

@@ -1,0 +1,365 @@
+//! Ways of a tilted cutter between two places where it touches, and the quickest of those that are clear.
+//!
+//! - On the surface ([`bent`](super::bent)), fed, where links on the surface are asked for.
+//! - Aloft: along the axis until the tool is clear, straight over while the axis turns evenly, and down along the axis there;
+//!   all fed, since stock may stand.
+//! - Over the block that holds part and stock: out along the axis, straight over or over the top of the block, and in. What
+//!   is outside of the block is run at rapid rate.
+//! - Around a sphere that holds the block, on which every place of the cutter is outside while its axis points away from the
+//!   middle.
+//!
+//! All but the last are proved clear, move by move, of all that the tool is to keep away from; the last is taken where it is
+//! the quickest and clear too, or where nothing else is. Times are length over rate.
+
+use super::super::super::interference::Check;
+use super::super::super::tilted::{GREATEST_TURN, Touch};
+use super::super::super::{ClPoint, Interference, MoveKind, Obstacle, PlanSettings};
+use super::super::Rates;
+use super::bent::Bent;
+use crate::cutter::{Cutter, Solid};
+use crate::geometry::{Aabb, Bvh, Point3, TriangleMesh, Vector3};
+use crate::monitor::{Cancelled, Monitor};
+use crate::part::Part;
+
+/// The way around the sphere is divided into turns of this angle, rad, and the sphere is as much larger as its chords cut
+/// off: `1/cos` of half of it.
+const SPHERE_STEP: f64 = 0.15;
+
+/// Distance that a cutter keeps from the part aloft, mm. Less may scratch where machines overshoot; more makes ways longer.
+const ALOFT: f64 = 0.2;
+
+/// Halvings by which the height of a way aloft is told, of the last doubling.
+const HALVINGS: usize = 3;
+
+/// Places asked for the side of the part on which a way aloft runs.
+const PLACES: usize = 8;
+
+/// Steps that the tool takes at most until it is outside of the block.
+const MOST_STEPS: usize = 100;
+
+/// Least step of these, mm.
+const LEAST_STEP: f64 = 0.1;
+
+/// A move to a place, and what it is for.
+pub type Step = (ClPoint, MoveKind);
+
+/// Part and stock as a block, with all that lies within the clearance of it.
+pub struct Block {
+    bounds: Aabb,
+    mesh: Option<(TriangleMesh, Bvh)>,
+}
+
+impl Block {
+    /// The block of a part and its stock.
+    pub fn of(part: &Part, settings: &PlanSettings) -> Self {
+        let mut bounds = part.bounds();
+        bounds.max.z = bounds.max.z.max(settings.stock_top);
+        let around = Vector3::repeat(settings.clearance);
+        let grown = Aabb { min: bounds.min - around, max: bounds.max + around };
+        let pick = |i: usize, c: usize| if i >> c & 1 == 1 { grown.max[c] } else { grown.min[c] };
+        let vertices = (0..8).map(|i| Point3::new(pick(i, 0), pick(i, 1), pick(i, 2))).collect();
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        let mesh = TriangleMesh::new(vertices, triangles).ok().map(|(mesh, _)| {
+            let bvh = Bvh::new(&mesh);
+            (mesh, bvh)
+        });
+        Self { bounds: grown, mesh }
+    }
+
+    /// How far a tip goes along its axis until it leaves the block.
+    fn exit(&self, from: &ClPoint) -> f64 {
+        let along = |c: usize| {
+            let (p, a) = (from.tip[c], from.axis[c]);
+            let side = if a > 0.0 { self.bounds.max[c] } else { self.bounds.min[c] };
+            if a == 0.0 { f64::INFINITY } else { (side - p) / a }
+        };
+        (0..3).map(along).fold(f64::INFINITY, f64::min).max(0.0)
+    }
+}
+
+/// What the ways between passes are chosen from.
+pub struct Ways<'a> {
+    part: &'a Part,
+    settings: &'a PlanSettings,
+    rates: Rates,
+    /// Height of the middle of what cuts over the tip, mm.
+    middle: f64,
+    block: &'a Block,
+    sphere: Sphere,
+    bent: Option<Bent<'a>>,
+    /// What the tool keeps away from while the cutter touches, while it goes over, and outside of the block.
+    touching: &'a Interference<'a>,
+    aloft: Interference<'a>,
+    outside: Interference<'a>,
+}
+
+impl<'a> Ways<'a> {
+    /// Ways with links on the surface by `bent`, or without.
+    pub fn new(
+        part: &'a Part,
+        cutter: &Cutter,
+        settings: &'a PlanSettings,
+        rates: Rates,
+        block: &'a Block,
+        touching: &'a Interference<'a>,
+        bent: Option<Bent<'a>>,
+    ) -> Self {
+        let higher = |check: &Check<'a>| Check {
+            // A cutter that may cut in does not aloft.
+            needed: if check.needed < 0.0 { ALOFT } else { check.needed },
+            ..*check
+        };
+        let aloft =
+            Interference { checks: touching.checks.iter().map(higher).collect(), ..Default::default() };
+        let mut outside = aloft.clone();
+        if let Some((mesh, bvh)) = &block.mesh {
+            let mut solids: Vec<&Solid> = Vec::new();
+            for check in &touching.checks {
+                if !solids.iter().any(|solid| std::ptr::eq(*solid, check.solid)) {
+                    solids.push(check.solid);
+                }
+            }
+            let obstacle = Obstacle::new(mesh, bvh);
+            outside.checks.extend(solids.into_iter().map(|solid| Check { solid, obstacle, needed: 0.0 }));
+        }
+        let sphere = Sphere::around(part, settings);
+        let middle = cutter.profile().centre_z;
+        Self { part, settings, rates, middle, block, sphere, bent, touching, aloft, outside }
+    }
+
+    /// About what it takes to go on at a distance, s: no less the farther it is.
+    pub fn cost(&self, distance: f64) -> f64 {
+        let clearance = self.settings.clearance;
+        let around = (2.0 * self.sphere.radius + distance) / self.rates.rapid
+            + clearance / self.rates.feed
+            + clearance / self.rates.plunge;
+        let aloft = (ALOFT + distance) / self.rates.feed + ALOFT / self.rates.plunge;
+        let longest = self.bent.as_ref().map_or(0.0, |bent| bent.longest);
+        let bent = distance * super::super::BEND;
+        let bent = if bent > longest { f64::INFINITY } else { bent / self.rates.feed };
+        around.min(aloft).min(bent)
+    }
+
+    /// The quickest way that is clear from the end of a pass to the start of the next.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn between(&self, from: &Touch, to: &Touch, monitor: &dyn Monitor) -> Result<Vec<Step>, Cancelled> {
+        let around = self.around(&from.at, &to.at);
+        let clear = self.is_clear(&from.at, &around, self.touching);
+        let mut best = (clear, self.time(&from.at, &around), around);
+        let mut take = |way: Option<Vec<Step>>| {
+            if let Some(way) = way {
+                let time = self.time(&from.at, &way);
+                if !best.0 || time < best.1 {
+                    best = (true, time, way);
+                }
+            }
+            if best.0 { best.1 } else { f64::INFINITY }
+        };
+        let quickest = take(self.over_block(&from.at, &to.at));
+        let quickest = take(self.aloft(&from.at, &to.at, quickest));
+        crate::monitor::check(monitor)?;
+        if let Some(bent) = &self.bent
+            && (to.contact.point - from.contact.point).norm() / self.rates.feed < quickest
+        {
+            let link = bent.link(from, to, monitor)?;
+            take(link.map(|link| link.into_iter().map(|at| (at, MoveKind::Link)).collect()));
+        }
+        Ok(best.2)
+    }
+
+    /// Where the tool stands outside of all before its first pass, or after its last.
+    pub fn outside(&self, at: &ClPoint) -> ClPoint {
+        self.sphere.exit(at)
+    }
+
+    /// Above all, upright.
+    pub fn above(&self) -> ClPoint {
+        ClPoint::upright(self.sphere.centre + Vector3::z() * self.sphere.radius)
+    }
+
+    /// In from outside.
+    pub fn into(&self, outside: &ClPoint, to: &ClPoint) -> Vec<Step> {
+        vec![(self.off(to, outside), MoveKind::Rapid), (*to, MoveKind::Plunge)]
+    }
+
+    /// Length over rate, s.
+    fn time(&self, from: &ClPoint, way: &[Step]) -> f64 {
+        let mut at = from.tip;
+        let one = |(to, kind): &Step| {
+            let length = (to.tip - std::mem::replace(&mut at, to.tip)).norm();
+            length
+                / match kind {
+                    MoveKind::Rapid => self.rates.rapid,
+                    MoveKind::Plunge => self.rates.plunge,
+                    MoveKind::Cut | MoveKind::Link | MoveKind::Retract => self.rates.feed,
+                }
+        };
+        way.iter().map(one).sum()
+    }
+
+    fn is_clear(&self, from: &ClPoint, way: &[Step], keep: &Interference) -> bool {
+        let mut at = from;
+        way.iter().all(|(to, _)| keep.on_move(std::mem::replace(&mut at, to), to).is_none())
+    }
+
+    /// Up by as much as the way over takes to be clear, over and down, if that is quicker than `quickest`, s.
+    fn aloft(&self, from: &ClPoint, to: &ClPoint, quickest: f64) -> Option<Vec<Step>> {
+        let up = |at: &ClPoint, by: f64| ClPoint { tip: at.tip + at.axis * by, axis: at.axis };
+        let way = |height: f64| {
+            let (a, b) = (up(from, height), up(to, height));
+            let mut moves = vec![(a, MoveKind::Retract)];
+            moves.extend(evenly(&a, &b).into_iter().map(|at| (at, MoveKind::Retract)));
+            moves.push((*to, MoveKind::Plunge));
+            moves
+        };
+        let clear = |moves: &[Step]| {
+            let last = moves.len() - 1;
+            self.keeps_its_side(&moves[..last])
+                && self.is_clear(from, &moves[..1], self.touching)
+                && self.is_clear(&moves[0].0, &moves[1..last], &self.aloft)
+                && self.is_clear(&moves[last - 1].0, &moves[last..], self.touching)
+        };
+        // A cutter that leans keeps less off the part than it goes along its axis.
+        let (mut low, mut high) = (0.0, ALOFT);
+        let mut found = loop {
+            let moves = way(high);
+            if high > self.sphere.radius || self.time(from, &moves) >= quickest {
+                return None;
+            }
+            if clear(&moves) {
+                break moves;
+            }
+            (low, high) = (high, 2.0 * high);
+        };
+        for _ in 0..if low > 0.0 { HALVINGS } else { 0 } {
+            let middle = 0.5 * (low + high);
+            let moves = way(middle);
+            if clear(&moves) {
+                (found, high) = (moves, middle);
+            } else {
+                low = middle;
+            }
+        }
+        Some(found)
+    }
+
+    /// Whether what cuts runs on the outer side of the part all along, also beside its border, where no surface is met.
+    fn keeps_its_side(&self, moves: &[Step]) -> bool {
+        let outer = |at: &ClPoint| self.part.closest_point(&(at.tip + at.axis * self.middle)).1 >= 0.0;
+        let (Some((a, _)), Some((b, _))) = (moves.first(), moves.last()) else { return true };
+        (0..=PLACES).all(|k| outer(&a.towards(b, k as f64 / PLACES as f64)))
+    }
+
+    /// Out of the block, over, and in again.
+    fn over_block(&self, from: &ClPoint, to: &ClPoint) -> Option<Vec<Step>> {
+        let (a, b) = (self.out(from)?, self.out(to)?);
+        let (out, near) = (self.off(from, &a), self.off(to, &b));
+        let legs = [(out, MoveKind::Retract), (a, MoveKind::Rapid)];
+        let down = [(near, MoveKind::Rapid), (*to, MoveKind::Plunge)];
+        if !self.is_clear(from, &legs, self.touching) || !self.is_clear(&b, &down, self.touching) {
+            return None;
+        }
+        let top = a.tip.z.max(b.tip.z).max(self.block.bounds.max.z);
+        let raised = |at: &ClPoint| ClPoint { tip: Point3::new(at.tip.x, at.tip.y, top), axis: at.axis };
+        let rapid = |at: ClPoint| (at, MoveKind::Rapid);
+        let straight: Vec<_> = evenly(&a, &b).into_iter().map(rapid).collect();
+        let (above_a, above_b) = (raised(&a), raised(&b));
+        let mut over = vec![rapid(above_a)];
+        over.extend(evenly(&above_a, &above_b).into_iter().map(rapid));
+        over.push(rapid(b));
+        let free = [straight, over].into_iter().find(|way| self.is_clear(&a, way, &self.outside))?;
+        let moves = legs.into_iter().chain(free).chain(down);
+        // Places that are raised by nothing take no move.
+        let mut at = *from;
+        Some(moves.filter(|(to, _)| std::mem::replace(&mut at, *to) != *to).collect())
+    }
+
+    /// Where the whole tool is outside of the block on its axis.
+    fn out(&self, from: &ClPoint) -> Option<ClPoint> {
+        self.block.mesh.as_ref()?;
+        let most = (self.sphere.exit(from).tip - from.tip).norm();
+        let mut way = self.block.exit(from);
+        for _ in 0..MOST_STEPS {
+            let at = ClPoint { tip: from.tip + from.axis * way, axis: from.axis };
+            let Some(missing) = self.outside.shortfall(&at) else { return Some(at) };
+            way += missing.depth.max(LEAST_STEP);
+            if way > most {
+                return None;
+            }
+        }
+        None
+    }
+
+    /// Out along the axis, around the sphere, and in along the axis there.
+    fn around(&self, from: &ClPoint, to: &ClPoint) -> Vec<Step> {
+        let (a, b) = (self.sphere.exit(from), self.sphere.exit(to));
+        let mut moves = vec![(self.off(from, &a), MoveKind::Retract), (a, MoveKind::Rapid)];
+        moves.extend(self.sphere.around_to(&a, &b).into_iter().map(|at| (at, MoveKind::Rapid)));
+        moves.extend(self.into(&b, to));
+        moves
+    }
+
+    /// The clearance off a place towards one outside on its axis, or that place if it is nearer.
+    fn off(&self, at: &ClPoint, outside: &ClPoint) -> ClPoint {
+        let way = (outside.tip - at.tip).norm().min(self.settings.clearance);
+        ClPoint { tip: at.tip + at.axis * way, axis: at.axis }
+    }
+}
+
+/// A straight move in pieces in which the axis turns little, its end included.
+fn evenly(from: &ClPoint, to: &ClPoint) -> Vec<ClPoint> {
+    let count = turns(from, to);
+    let at = |k: usize| from.towards(to, k as f64 / count as f64);
+    (1..count).map(at).chain(std::iter::once(*to)).collect()
+}
+
+/// Moves in which the axis turns little.
+fn turns(from: &ClPoint, to: &ClPoint) -> usize {
+    let turn = from.axis.cross(&to.axis).norm().atan2(from.axis.dot(&to.axis));
+    (turn / GREATEST_TURN).ceil().max(1.0) as usize
+}
+
+/// A sphere that holds part and stock.
+struct Sphere {
+    centre: Point3,
+    radius: f64,
+}
+
+impl Sphere {
+    fn around(part: &Part, settings: &PlanSettings) -> Self {
+        let bounds = part.bounds();
+        let top = settings.stock_top.max(bounds.max.z);
+        let (low, high) = (bounds.min, Point3::new(bounds.max.x, bounds.max.y, top));
+        let least = 0.5 * (high - low).norm() + settings.clearance;
+        Self { centre: nalgebra::center(&low, &high), radius: least / (0.5 * SPHERE_STEP).cos() }
+    }
+
+    /// Where a cutter that retreats along its axis leaves the sphere.
+    fn exit(&self, from: &ClPoint) -> ClPoint {
+        let (off, axis) = (from.tip - self.centre, from.axis);
+        let along = off.dot(&axis);
+        let inside = along * along - off.norm_squared() + self.radius * self.radius;
+        let way = if inside > 0.0 { inside.sqrt() - along } else { 0.0 };
+        ClPoint { tip: from.tip + axis * way.max(0.0), axis }
+    }
+
+    /// The way from one place outside to another around the sphere, its end included.
+    fn around_to(&self, from: &ClPoint, to: &ClPoint) -> Vec<ClPoint> {
+        let [a, b] = [from, to].map(|at| (at.tip - self.centre).normalize());
+        let angle = a.cross(&b).norm().atan2(a.dot(&b));
+        // Opposite places are joined over the top.
+        let side =
+            [Vector3::z(), Vector3::x()].into_iter().find(|v| a.cross(v).norm() > 0.1).unwrap_or_default();
+        let square = (b - a * a.dot(&b)).try_normalize(1e-6).unwrap_or((side - a * a.dot(&side)).normalize());
+        let count = ((angle / SPHERE_STEP).ceil().max(1.0) as usize).max(turns(from, to));
+        let at = |k: usize| {
+            let t = k as f64 / count as f64;
+            let radial = a * (t * angle).cos() + square * (t * angle).sin();
+            ClPoint { tip: self.centre + radial * self.radius, axis: from.towards(to, t).axis }
+        };
+        (1..count).map(at).chain(std::iter::once(*to)).collect()
+    }
+}
