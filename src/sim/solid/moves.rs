@@ -28,6 +28,10 @@ const LEAF: u32 = 2;
 /// Relative rounding of an axis that is kept in f32.
 const ROUNDING: f64 = 4.0 * f32::EPSILON as f64;
 
+/// Axes that differ from their mean by this chord or less lie in a convex cone (half a right angle to each side is the
+/// chord of 1.41).
+const WIDEST_CONE: f64 = 1.4;
+
 /// A place nearest to one of many moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SweptHit {
@@ -237,6 +241,12 @@ impl SweptMoves {
         let along = away.dot(&axis);
         let outward = away - axis * along;
         let rho = outward.norm();
+        if let Some(radius) = self.solid.ball()
+            && chord > 0.0
+            && chord < WIDEST_CONE
+        {
+            return in_cone(radius, &away, [rho, along], &axis, chord + ROUNDING, half);
+        }
         let foot = self.solid.piece_foot(piece, rho, along + self.solid.pivot());
         let radial = if rho > 0.0 { foot.gradient[0] / rho } else { 0.0 };
         let gradient = outward * radial + axis * foot.gradient[1];
@@ -306,6 +316,40 @@ impl SweptMoves {
                 now
             },
         );
+    }
+}
+
+/// How near ball ends may be whose axes differ from `axis` by a chord or less and that stand in a box of half sides `half`,
+/// seen from its middle: all of them lie within the radius of a cone around that axis, which is convex. `away` is the way
+/// from the middle to the place, `rho` across the axis and `along` it.
+#[inline]
+fn in_cone(
+    radius: f64,
+    away: &Vector3,
+    [rho, along]: [f64; 2],
+    axis: &Vector3,
+    chord: f64,
+    half: [f64; 3],
+) -> NodeView {
+    let (sin, cos) = (chord * (1.0 - 0.25 * chord * chord).sqrt(), 1.0 - 0.5 * chord * chord);
+    let (distance, gradient) = if rho * sin + along * cos <= 0.0 {
+        // The tip of the cone is nearest.
+        let far = away.norm();
+        (far, if far > 0.0 { away / far } else { Vector3::zeros() })
+    } else {
+        let outward = if rho > 0.0 { (away - axis * along) / rho } else { Vector3::zeros() };
+        (rho * cos - along * sin, outward * cos - axis * sin)
+    };
+    let moved = gradient.x.abs() * half[0] + gradient.y.abs() * half[1] + gradient.z.abs() * half[2];
+    NodeView {
+        distance: distance - radius,
+        gradient,
+        moved: moved + ROUNDING * away.norm(),
+        leaned: 0.0,
+        chord: 0.0,
+        rounding: 0.0,
+        axis: *axis,
+        height: f64::INFINITY,
     }
 }
 
