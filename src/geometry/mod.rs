@@ -6,6 +6,7 @@ mod bspline;
 mod bvh;
 mod jet;
 mod mesh;
+mod mesh_offset;
 mod nurbs;
 mod region;
 #[cfg(test)]
@@ -20,6 +21,7 @@ pub(crate) use bvh::{BoxTree, Extent, Feature, Node, Paired, round_down, round_u
 pub use bvh::{Bvh, MeshFoot, VerticalHit};
 pub use jet::{Jet2, PrincipalCurvatures};
 pub use mesh::{MeshError, Outside, RepairNotes, TriangleMesh};
+pub use mesh_offset::{LevelSet, LevelSetFoot, MeshOffset, OffsetError, OffsetSettings, Valley};
 pub use nurbs::{MAX_WEIGHT, NurbsError, NurbsSurface};
 pub use region::{MAX_OUTLINE_POINTS, Piece, Region, RegionError, inside_curve, signed_area};
 pub(crate) use segment_grid::foot;

@@ -16,6 +16,7 @@ mod link;
 mod mesh_passes;
 mod mesh_shortest;
 mod mesh_surface;
+mod offset_mesh;
 mod path;
 mod plan;
 mod plan_curve;
@@ -43,7 +44,7 @@ pub use link::{Joining, LONGEST_LINK, Links, longest_link};
 pub use path::{CcPoint, ClPoint, Move, MoveKind, Toolpath};
 pub use plan::{
     Along, FeedDirection, FrontStart, LevelSteps, Plan, PlanError, PlanSettings, Step, Strategy,
-    StreamMethod, plan, plan_tilted,
+    StreamMethod, plan, plan_on_offset_mesh, plan_tilted,
 };
 pub use planned_field::{FeedSample, PassPoint, PlannedField};
 pub use pocket::{

@@ -496,6 +496,34 @@ pub fn plan_tilted(
     Ok(Plan::new(path, notes, field, &contacts, strategy))
 }
 
+/// Plans the path of an upright ball whose centre runs over the offset surface of the part's mesh.
+///
+/// # Errors
+/// See [`PlanError`].
+pub fn plan_on_offset_mesh(
+    part: &Part,
+    cutter: &Cutter,
+    angle: f64,
+    settings: &PlanSettings,
+    monitor: &dyn Monitor,
+) -> Result<Plan, PlanError> {
+    let sampling = SAMPLING_OVER_RADIUS * cutter.radius();
+    let step = match settings.step {
+        Step::Scallop(h) => {
+            let facets = if part.patches().is_empty() { facet_height(part.mesh()) } else { 0.0 };
+            let less = CHORD_SHARE * settings.chord_tolerance + facets;
+            Step::Scallop((h - less).max(LEAST_SHARE_OF_TARGET * h))
+        }
+        stepover => stepover,
+    };
+    let chord_tolerance = settings.chord_tolerance;
+    let pass = PassSettings { step, sampling, chord_tolerance, smoothing: None, axis: None };
+    let Passes { passes, notes, field, contacts, .. } =
+        super::offset_mesh::passes(part, cutter, angle, &pass, monitor)?;
+    let path = join(passes, true, part, cutter, settings, monitor)?;
+    Ok(Plan::new(path, notes, field, &contacts, &Strategy::Spiral))
+}
+
 /// The passes of a strategy, not yet joined, and whether they may be fed both ways.
 fn passes(
     part: &Part,
