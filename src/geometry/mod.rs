@@ -12,6 +12,7 @@ mod interpolate;
 mod jet;
 mod loft;
 mod mesh;
+mod mesh_offset;
 mod nurbs;
 mod patch_offset;
 mod region;
@@ -36,6 +37,7 @@ pub use fairing::{
 pub use jet::{Jet2, PrincipalCurvatures};
 pub use loft::{Loft, LoftError, LoftSection, loft, loft_of_offsets};
 pub use mesh::{MeshError, Outside, RepairNotes, TriangleMesh};
+pub use mesh_offset::{LevelSet, LevelSetFoot, MeshOffset, OffsetError, OffsetSettings, Valley};
 pub use nurbs::{MAX_WEIGHT, NurbsError, NurbsSurface};
 pub use patch_offset::{
     FittedOffset, OffsetJet, OffsetSurface, PatchOffsetError, SingularPlace, unit_normal,

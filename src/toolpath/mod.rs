@@ -17,6 +17,7 @@ mod link;
 mod mesh_passes;
 mod mesh_shortest;
 mod mesh_surface;
+mod offset_mesh;
 mod offset_surface;
 mod path;
 mod plan;

@@ -14,8 +14,8 @@ use super::strip::strip_width;
 use super::tilted::{self, TiltedPasses, Tilting, Touch};
 use super::tool_axis::{AxisError, ToolAxis};
 use super::{
-    PocketStrategy, Toolpath, contour_spiral, iso_scallop, mesh_passes, mesh_surface, offset_surface,
-    shortest, spiral, streamline, waterline, zigzag,
+    PocketStrategy, Toolpath, contour_spiral, iso_scallop, mesh_passes, mesh_surface, offset_mesh,
+    offset_surface, shortest, spiral, streamline, waterline, zigzag,
 };
 use crate::cutter::{Cutter, CutterShape};
 use crate::field::mesh::Sense;
@@ -577,6 +577,9 @@ fn passes(
         }
         Strategy::Spiral => (spiral::passes(part, cutter, &pass, monitor)?, true),
         Strategy::ContourSpiral => (contour_spiral::passes(part, cutter, &pass, monitor)?, true),
+        Strategy::OffsetSurface { along: OffsetAlong::Angle(angle), .. } => {
+            (offset_mesh::passes(part, cutter, *angle, &pass, monitor)?, true)
+        }
         Strategy::OffsetSurface { along, drive } => {
             (offset_surface::passes(part, cutter, *along, drive, &pass, monitor)?, true)
         }
