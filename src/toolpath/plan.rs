@@ -585,7 +585,7 @@ fn passes(
         }
         Strategy::ShortestStreamline { toward } => {
             let toward = toward.as_ref().map(|(direction, dearer)| (direction, *dearer));
-            let passes = if mesh_surface::wants_mesh(part, cutter) {
+            let passes = if levels.is_none() && mesh_surface::wants_mesh(part, cutter) {
                 mesh_passes::on_mesh(part, cutter, Aim::Shortest(toward), &pass, monitor)?
             } else {
                 shortest::passes(part, cutter, toward, &pass, monitor)?
@@ -594,7 +594,9 @@ fn passes(
         }
         Strategy::Streamline { direction, method, .. }
             if *method == StreamMethod::Elements
-                || (*method == StreamMethod::Automatic && mesh_surface::wants_mesh(part, cutter)) =>
+                || (*method == StreamMethod::Automatic
+                    && levels.is_none()
+                    && mesh_surface::wants_mesh(part, cutter)) =>
         {
             (mesh_passes::on_mesh(part, cutter, Aim::Fitted(direction), &pass, monitor)?, true)
         }
