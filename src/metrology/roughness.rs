@@ -80,7 +80,7 @@ pub struct RoughnessFigures {
     pub reason: Option<String>,
 }
 
-/// The roughness across the feed of what `engine` tells of the cut by `path`; cuts as deep as its reach, or deeper, count for
+/// The roughness across the feed of what `engine` tells of the cut by `path`; cuts as deep as it looks, or deeper, count for
 /// nothing. `interval` is about how far passes are apart,
 /// mm: the measured area over the cutting length.
 ///
@@ -225,7 +225,7 @@ impl Profiler<'_> {
         let foot = self.part.closest_point(target).0;
         let hit = self.engine.hit(&foot.point, &foot.normal, near)?;
         // What begins within the cut was cut from another side of the part.
-        if hit.deviation <= -self.engine.reach() * (1.0 - 1e-9) {
+        if hit.deviation <= -self.engine.depth() * (1.0 - 1e-9) {
             return None;
         }
         Some(Station { along, point: foot.point, normal: foot.normal, hit })

@@ -158,7 +158,7 @@ impl Job<'_> {
         measured: &Measurement,
     ) -> Result<RoughnessFigures, CliError> {
         let reach = REACH_OVER_UNCUT * self.scene.tolerance.uncut;
-        let cut = SweptVolume { rays, path, solid, inward: reach, outward: reach };
+        let cut = SweptVolume { part: &self.part, rays, path, solid, inward: reach, outward: reach };
         // About how far passes are apart.
         let interval = measured.deviation.area_mm2 / path_figures(path, 0.0).cutting_length_mm;
         Ok(roughness(&self.part, &self.scene.cutter, path, &cut, interval, self.progress)?)

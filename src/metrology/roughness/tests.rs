@@ -25,7 +25,7 @@ fn of(part: &Part, path: &Toolpath, interval: f64) -> RoughnessFigures {
     let ball = Cutter::ball(2.0 * RADIUS).unwrap();
     let solid = Solid::of_cutter(&ball, None);
     let rays = Rays::new(path, &solid, &Silent).unwrap();
-    let cut = SweptVolume { rays: &rays, path, solid: &solid, inward: 1.0, outward: 1.0 };
+    let cut = SweptVolume { part, rays: &rays, path, solid: &solid, inward: 1.0, outward: 1.0 };
     roughness(part, &ball, path, &cut, interval, &Silent).unwrap()
 }
 
