@@ -27,6 +27,8 @@ mod five_axes;
 mod memory;
 #[path = "all/refined.rs"]
 mod refined;
+#[path = "all/scallop.rs"]
+mod scallop;
 #[path = "all/scenes.rs"]
 mod scenes;
 #[path = "all/support.rs"]

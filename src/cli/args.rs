@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+use crate::cutter::Cutter;
 use crate::io::scene::Engine;
+use crate::toolpath::scallop::DEFAULT_DEGREE;
 
 /// Plans milling paths, cuts the part in a simulator, measures the cut surface and gives a verdict.
 ///
@@ -25,6 +27,8 @@ pub enum Command {
     Run(RunOptions),
     /// Read and validate a scene, and print it with every default in effect.
     Check(CheckOptions),
+    /// Answer scallop height from step and step from scallop height, for a section or a part's place.
+    Scallop(Box<ScallopOptions>),
 }
 
 /// How to run a scene.
@@ -54,6 +58,71 @@ pub struct RunOptions {
 pub struct CheckOptions {
     /// The scene, a TOML file.
     pub scene: PathBuf,
+}
+
+/// What scallop is asked about. Lengths in mm.
+#[derive(Debug, Args)]
+pub struct ScallopOptions {
+    /// The cutter: ball:DIAMETER, flat:DIAMETER, bull:DIAMETER:CORNER_RADIUS or
+    /// taper:TIP_DIAMETER:CORNER_RADIUS:HALF_ANGLE:SHANK_DIAMETER.
+    #[arg(long, value_name = "CUTTER")]
+    pub cutter: Cutter,
+    /// Distance of passes along the surface: answers the scallop height.
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, required_unless_present_any = ["scallop", "table"])]
+    pub step: Option<f64>,
+    /// Scallop height: answers the step.
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, conflicts_with = "step")]
+    pub scallop: Option<f64>,
+    /// Radius of a convex section across the feed [default: flat].
+    #[arg(long, value_name = "MM", conflicts_with_all = ["concave", "part"])]
+    pub convex: Option<f64>,
+    /// Radius of a concave section across the feed.
+    #[arg(long, value_name = "MM", conflicts_with = "part")]
+    pub concave: Option<f64>,
+    /// A part (.stl, .obj, or NURBS patches in .json) whose curvature is taken at a place.
+    #[arg(long, value_name = "FILE", requires = "at")]
+    pub part: Option<PathBuf>,
+    /// The place on the part: X,Y (seen from above) or X,Y,Z (the nearest point).
+    #[arg(long, value_name = "X,Y[,Z]", requires = "part", allow_hyphen_values = true, value_parser = place)]
+    pub at: Option<Place>,
+    /// Feed direction there in the plan view, degrees from x.
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub direction: f64,
+    /// Lead of the tool axis from the surface normal, degrees, for cutters that are no ball [default: the normal
+    /// without a part, upright on a part].
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
+    pub lead: Option<f64>,
+    /// Print what the second-order formula and a polynomial section cost, over curvature and step.
+    #[arg(long, conflicts_with_all = ["step", "scallop", "part", "convex", "concave"])]
+    pub table: bool,
+    /// Degree of the table's polynomial.
+    #[arg(long, value_name = "DEGREE", default_value_t = DEFAULT_DEGREE)]
+    pub degree: usize,
+    /// Angle by which the table's neighbouring passes spread, degrees.
+    #[arg(long, value_name = "DEGREES", default_value_t = 5.0)]
+    pub spread: f64,
+}
+
+/// Two or three coordinates, mm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Place(Vec<f64>);
+
+impl std::ops::Deref for Place {
+    type Target = [f64];
+
+    fn deref(&self) -> &[f64] {
+        &self.0
+    }
+}
+
+fn place(text: &str) -> Result<Place, String> {
+    let number =
+        |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.abs() <= crate::geometry::MAX_COORDINATE);
+    let numbers: Option<Vec<f64>> = text.split(',').map(number).collect();
+    numbers
+        .filter(|n| matches!(n.len(), 2 | 3))
+        .map(Place)
+        .ok_or_else(|| "give two or three coordinates in mm, such as 12.5,-3 or 12.5,-3,4".to_owned())
 }
 
 /// Pitch of the cells.

@@ -10,6 +10,7 @@ use crate::part::PartError;
 use crate::report::ReportError;
 use crate::sim::{GridError, OppositeAxes, RaysError, VoxelError};
 use crate::toolpath::PlanError;
+use crate::toolpath::scallop::ScallopError;
 
 /// Why a command could not be done.
 #[derive(Debug, thiserror::Error, Diagnostic)]
@@ -120,6 +121,21 @@ pub enum CliError {
         allowed_mib: u32,
         /// Spacing that fits, mm.
         fitting: f64,
+    },
+    /// No scallop follows from what was asked.
+    #[error("no scallop can be calculated: {0}")]
+    #[diagnostic(help("`millstream scallop --help` tells what can be asked"))]
+    Scallop(ScallopError),
+    /// The part that `scallop` was to look at is none.
+    #[error("{}: {reason}", file.display())]
+    #[diagnostic(help("{cure}"))]
+    ScallopPart {
+        /// Its file.
+        file: PathBuf,
+        /// What is wrong.
+        reason: String,
+        /// What mends it.
+        cure: String,
     },
     /// A result could not be written.
     #[error("cannot write {}: {reason}", path.display())]

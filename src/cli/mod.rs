@@ -12,6 +12,7 @@ mod pocket;
 mod program;
 mod progress;
 mod run;
+mod scallop;
 
 use std::io::Write as _;
 use std::process::ExitCode;
@@ -65,5 +66,6 @@ fn execute(command: &Command, progress: &Progress) -> Result<(String, Verdict), 
             Ok((report.text, report.verdict))
         }
         Command::Check(options) => Ok((check::check(&options.scene)?, Verdict::Pass)),
+        Command::Scallop(options) => Ok((scallop::scallop(options)?, Verdict::Pass)),
     }
 }

@@ -18,7 +18,9 @@ use crate::io::scene::{Engine, PartSource, Scene, ToolpathRequest, auto_cell};
 use crate::io::{ProgramHeader, apt_cl, exr, ply_write, png, stl_write};
 use crate::machine::kinematics::{JointPath, JointReport};
 use crate::machine::slow_corners;
-use crate::metrology::{Asked, Measurement, RemovalFigures, measure, path_figures, removal_figures};
+use crate::metrology::{
+    Asked, Measurement, PAIRS_HEADER, RemovalFigures, measure, path_figures, removal_figures,
+};
 use crate::monitor::{self, Monitor as _};
 use crate::parallel;
 use crate::part::Part;
@@ -336,6 +338,10 @@ impl<'a> Job<'a> {
             measure(&self.part, &scene.cutter, &planned.path, &cut, &scene.tolerance, &asked, monitor)?;
         let check = |holder| holder_collisions(&cut, holder, &planned.path, monitor);
         let held = scene.holder.as_ref().map(check).transpose()?;
+        let roughness = match milled {
+            None => Some(self.roughness(request, &planned.path, &measured)?),
+            Some(_) => None,
+        };
         let simulation = SimulationFigures {
             engine: engine.name(),
             cell_mm: grid.cell,
@@ -353,6 +359,7 @@ impl<'a> Job<'a> {
         let programs = || self.write_programs(request, &planned, joints.as_ref(), outputs);
         let maps = || self.write_maps(request, &planned, &cut, &measured, outputs);
         let mesh = || self.write_mesh(request, &planned.path, &cut, &measured, outputs);
+        self.write_pairs(request, &measured, outputs)?;
         let (surface_mesh, (page, lines)) = parallel::join(mesh, || parallel::join(maps, programs));
         let (surface_mesh, page, lines) = (surface_mesh?, page?, lines?);
         for region in &mut measured.gouge.regions {
@@ -373,6 +380,7 @@ impl<'a> Job<'a> {
             surface_mesh,
         );
         result.solid = solid;
+        result.roughness = roughness;
         if let Some((pocket, strategy)) = milled {
             let figures =
                 pocket_figures(scene, pocket, strategy, request.step, &planned.path, &cut, self.top, engaged);
@@ -432,6 +440,8 @@ impl<'a> Job<'a> {
                 .zip(self.scene.five_axis.as_ref())
                 .map(|(joints, five_axis)| MachineFigures::new(&five_axis.kinematics, &joints.report)),
             scallop: measured.scallop,
+            scallop_pairs: measured.pairs,
+            roughness: None,
             gouge: measured.gouge,
             uncut: measured.uncut,
             deviation: measured.deviation,
@@ -459,6 +469,19 @@ impl<'a> Job<'a> {
         let file = |name: &str| format!("{}/{name}", request.folder);
         outputs.file(&file("toolpath.cls"), |out| apt_cl::write(out, path, cutter, &header))?;
         program::write_gcode(self.scene, path, joints, &header, outputs, &file("toolpath.nc"))
+    }
+
+    /// Writes scallop_pairs.csv.
+    fn write_pairs(
+        &self,
+        request: &ToolpathRequest,
+        measured: &Measurement,
+        outputs: &Outputs,
+    ) -> Result<(), CliError> {
+        outputs.file(&format!("{}/scallop_pairs.csv", request.folder), |out| {
+            writeln!(out, "{PAIRS_HEADER}")?;
+            measured.pairs.pairs.iter().try_for_each(|pair| writeln!(out, "{}", pair.csv()))
+        })
     }
 
     /// Writes height.exr and the pictures; leaves what the page shows.
@@ -592,7 +615,7 @@ mod tests {
     use super::*;
 
     /// What every toolpath's folder holds.
-    const FILES: [&str; 7] = [
+    const FILES: [&str; 8] = [
         "deviation.png",
         "height.png",
         "height.exr",
@@ -600,6 +623,7 @@ mod tests {
         "toolpath.cls",
         "machined.stl",
         "machined.ply",
+        "scallop_pairs.csv",
     ];
 
     const PLATE: &str = "[part]\nsurface = \"plane\"\nx = [0, 8]\ny = [0, 6]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n\

@@ -3,6 +3,7 @@
 
 use serde::Serialize;
 
+use super::pairs::PairFigures;
 use super::refine::Refined;
 
 /// What is tolerated, mm, all positive.
@@ -164,6 +165,8 @@ pub struct Measurement {
     pub deviation_map: Vec<f32>,
     /// Height and weight (ridge length, mm) of every ridge sample.
     pub ridge_samples: Vec<[f32; 2]>,
+    /// Scallops of pairs of passes, calculated beside measured.
+    pub pairs: PairFigures,
     /// How the figures were refined.
     pub refined: Refined,
 }

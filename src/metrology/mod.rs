@@ -14,12 +14,14 @@ mod figures;
 mod inspection;
 mod meetings;
 mod offset_distance;
+mod pairs;
 mod path;
 mod pocket;
 mod refine;
 mod regions;
 mod removal;
 mod ridges;
+mod roughness;
 mod tracks;
 mod unseen;
 
@@ -33,10 +35,12 @@ pub use figures::{
 };
 pub(crate) use meetings::Meetings;
 pub use offset_distance::{OffsetDistance, measure_offset};
+pub use pairs::{MOST_PAIRS, PAIRS_HEADER, PairFigures, ScallopPair};
 pub use path::path_figures;
 pub use pocket::{PocketFigures, wall_gouge_of_cells, wall_gouge_of_moves};
 pub use refine::{Asked, Refined};
 pub use removal::{RapidContactFigures, RemovalFigures, removal_figures};
+pub use roughness::{RoughnessFigures, roughness};
 
 use crate::cutter::Cutter;
 use crate::geometry::Point3;
@@ -74,12 +78,14 @@ pub fn measure(
     let highest_ridge = found.ridges.highest_sample();
     let lean = found.least_lean;
     let hidden = found.ridges.hidden.clone();
+    let pairs = pairs::pair_figures(part, cutter, path, &found.ridges.pairs, monitor)?;
     let mut measured = Measurement {
         scallop: scallop_figures(&found.ridges.samples, found.highest, limits),
         gouge: found.gouge,
         uncut: found.uncut,
         deviation: found.deviation,
         ridge_samples: found.ridges.samples,
+        pairs,
         deviation_map: found.deviation_map,
         refined: Refined::default(),
     };

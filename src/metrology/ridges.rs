@@ -14,6 +14,7 @@
 use super::cut_surface::CutSurface;
 use super::figures::{Limits, ScallopFigures};
 use super::meetings::{Meeting, Meetings};
+use super::pairs::{PairTally, RidgeCrossing};
 use crate::cutter::Cutter;
 use crate::geometry::{Point2, Point3, Vector2};
 use crate::monitor::{self, Cancelled, Monitor};
@@ -56,6 +57,8 @@ pub(super) struct Ridges {
     candidates: Vec<RidgeSample>,
     /// Places between centres where more stands than the cells saw.
     pub hidden: Vec<Hidden>,
+    /// The ridges of each pair of passes.
+    pub pairs: PairTally,
 }
 
 /// A place between centres where more stands than the cells around saw.
@@ -76,6 +79,7 @@ impl Ridges {
             samples: samples.iter().map(|s| [s.height as f32, s.length as f32]).collect(),
             candidates: highest.into_iter().chain(others).copied().collect(),
             hidden,
+            pairs: PairTally::default(),
         }
     }
 
@@ -122,6 +126,7 @@ pub(super) struct RidgeFinder<'a> {
     pub cutter: &'a Cutter,
     pub limits: &'a Limits,
     meetings: Meetings<'a>,
+    path: &'a Toolpath,
 }
 
 /// A line between two neighbouring centres: from the cell `from`, along x or along y.
@@ -160,7 +165,7 @@ impl<'a> RidgeFinder<'a> {
         limits: &'a Limits,
     ) -> Self {
         let meetings = Meetings::new(surface, cutter, path, None);
-        Self { surface, part, cutter, limits, meetings }
+        Self { surface, part, cutter, limits, meetings, path }
     }
 
     /// All ridges, row by row. `deviation` is that of a cell, mm, NaN where it is not measured.
@@ -198,7 +203,7 @@ impl<'a> RidgeFinder<'a> {
                 }
             }
             monitor.advance(1);
-            Ok(Ridges::of_row(&samples, hidden))
+            Ok(Ridges { pairs: self.pairs(&samples), ..Ridges::of_row(&samples, hidden) })
         })?;
         let mut ridges = Ridges {
             samples: Vec::with_capacity(rows.iter().map(|r| r.samples.len()).sum()),
@@ -208,8 +213,25 @@ impl<'a> RidgeFinder<'a> {
             ridges.samples.extend(row.samples);
             ridges.candidates.extend(row.candidates);
             ridges.hidden.extend(row.hidden);
+            ridges.pairs.append(row.pairs);
         }
         Ok(ridges)
+    }
+
+    /// The samples by the passes that meet; those on every so many lines of either family are to be calculated too.
+    fn pairs(&self, samples: &[RidgeSample]) -> PairTally {
+        let grid = &self.surface.cut.grid;
+        let one_in = PairTally::one_in(self.cutter, grid.cell);
+        let mut tally = PairTally::default();
+        for sample in samples {
+            let (cell, along_x) = sample.from;
+            let line = if along_x { cell as usize / grid.nx } else { cell as usize % grid.nx };
+            let RidgeSample { at, height, length, moves, .. } = *sample;
+            let passes = moves.map(|k| self.path.moves[k as usize].pass);
+            let passes = [passes[0].min(passes[1]), passes[0].max(passes[1])];
+            tally.add(passes, RidgeCrossing { at, height, length, moves }, line.is_multiple_of(one_in));
+        }
+        tally
     }
 
     /// Adds the ridges on a line between `a`, lowest at its share `ta`, and `b`, lowest at `tb`, and what

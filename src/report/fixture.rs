@@ -2,8 +2,8 @@
 
 use super::{RunReport, SimulationFigures, SurfaceMeshFigures, ToolpathResult, Verdict, violations};
 use crate::metrology::{
-    DeviationFigures, GougeFigures, GougeRegion, Limits, Measurement, PathFigures, Refined, ScallopFigures,
-    UncutFigures,
+    DeviationFigures, GougeFigures, GougeRegion, Limits, Measurement, PairFigures, PathFigures, Refined,
+    RoughnessFigures, ScallopFigures, ScallopPair, UncutFigures,
 };
 
 pub const LIMITS: Limits = Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chord: 0.001 };
@@ -43,6 +43,10 @@ pub fn measurement(gouge: f64) -> Measurement {
         },
         deviation_map: Vec::new(),
         ridge_samples: Vec::new(),
+        pairs: PairFigures {
+            reason: Some("no ridge stands between passes on the part".into()),
+            ..PairFigures::default()
+        },
         refined: Refined::default(),
     }
 }
@@ -73,6 +77,8 @@ pub fn toolpath(name: &str, machining_time_s: f64, gouge: f64) -> ToolpathResult
         field: None,
         machine: None,
         scallop: measured.scallop,
+        scallop_pairs: measured.pairs,
+        roughness: None,
         gouge: measured.gouge,
         uncut: measured.uncut,
         deviation: measured.deviation,
@@ -94,8 +100,52 @@ pub fn toolpath(name: &str, machining_time_s: f64, gouge: f64) -> ToolpathResult
     }
 }
 
+/// Two passes that are parallel and meet in a ridge.
+fn pairs() -> PairFigures {
+    let pair = ScallopPair {
+        passes: [3, 4],
+        crossings: 400,
+        ridge_length_mm: 40.0,
+        measured_mean_mm: 0.0071,
+        measured_max_mm: 0.0105,
+        calculated_places: 80,
+        parallel: true,
+        calculated_mean_mm: Some(0.00709),
+        calculated_max_mm: Some(0.01049),
+        section_mean_mm: Some(0.00705),
+        calculated_over_measured: Some(0.9986),
+        greatest_difference_mm: Some(0.00001),
+    };
+    PairFigures {
+        pair_count: 1,
+        parallel_count: 1,
+        calculated_over_measured: Some(0.9986),
+        parallel_calculated_over_measured: Some(0.9986),
+        parallel_greatest_mean_difference: Some(0.0014),
+        parallel_greatest_difference_mm: Some(0.00001),
+        parallel_section_over_measured: Some(0.993),
+        error_bound_mm: Some(1e-9),
+        reason: None,
+        pairs: vec![pair],
+    }
+}
+
 /// A zigzag that gouges and a streamline that does not.
 pub fn report() -> RunReport {
-    let toolpaths = vec![toolpath("zigzag", 402.0, 0.032), toolpath("streamline", 385.0, 0.001)];
+    let mut toolpaths = vec![toolpath("zigzag", 402.0, 0.032), toolpath("streamline", 385.0, 0.001)];
+    toolpaths[0].scallop_pairs = pairs();
+    toolpaths[0].roughness = Some(RoughnessFigures {
+        ra_mm: Some(0.0018),
+        rz_mm: Some(0.0071),
+        ra_max_mm: Some(0.0026),
+        rz_max_mm: Some(0.0101),
+        rz_max_at_mm: Some([3.0, 4.0, 0.5]),
+        error_bound_mm: Some(0.00002),
+        profiles: 22,
+        intervals_per_sampling_length: [2, 3],
+        sampling_length_mm: Some(1.5),
+        samples_per_interval: 24,
+        reason: None,
+    });
     RunReport::new("wave.toml".into(), "0123abcd".into(), "Wave".into(), &LIMITS, toolpaths)
 }

@@ -159,6 +159,18 @@ fn meanings() -> Markup {
              between cells, so the greatest deviation is a little below the highest scallop.",
         ),
         (
+            "roughness",
+            "Ra and Rz of profiles of the deviation across the feed, at places spread over the part; the mean line is the \
+             mean of each sampling length, one to three path intervals, five of which make a profile. Its ± is how far \
+             off a profile's figures may be; how they differ over the part is not in it.",
+        ),
+        (
+            "calculated",
+            "The scallop that two neighbouring passes of a ball should leave by the finished path and the design alone, \
+             beside the measured one at the same places (scallop_pairs.csv has every pair). Passes are parallel where \
+             their directions differ by no more than a degree.",
+        ),
+        (
             "removal",
             "What the moves take from the stock in the order of the program, at the programmed feed. The rate \
              is the mean over a few cells of travel; engagement is how high the cutter meets stock and how \
@@ -274,6 +286,7 @@ fn figures(t: &ToolpathResult) -> Markup {
         ),
         ("deviation, root mean square", format!("{} µm", micrometres(Some(deviation.rms_mm)))),
     ];
+    rows.extend(calculated_rows(t));
     if let Some(f) = &t.field {
         rows.push(("singular points of the feed", f.singular_point_count.to_string()));
         if let Some(i) = &f.interval_over_allowed {
@@ -332,6 +345,48 @@ fn figures(t: &ToolpathResult) -> Markup {
     html! { dl.grid { @for (name, value) in &rows { div { dt { (name) } dd { (value) } } } } }
 }
 
+/// Roughness, and what scallops were calculated to be.
+fn calculated_rows(t: &ToolpathResult) -> Vec<(&'static str, String)> {
+    let mut rows = Vec::new();
+    if let Some(r) = &t.roughness {
+        rows.push((
+            "roughness Ra, Rz across the feed",
+            format!(
+                "{}, {} µm",
+                with_bound(r.ra_mm, r.error_bound_mm),
+                with_bound(r.rz_mm, r.error_bound_mm)
+            ),
+        ));
+    }
+    let pairs = &t.scallop_pairs;
+    let share = |ratio: Option<f64>| ratio.map_or("-".to_owned(), |r| format!("{:.2} %", 100.0 * r));
+    if pairs.calculated_over_measured.is_some() {
+        rows.push((
+            "pairs of passes, parallel ones",
+            format!("{}, {}", pairs.pair_count, pairs.parallel_count),
+        ));
+        rows.push((
+            "scallop calculated over measured",
+            format!(
+                "{}, parallel {}",
+                share(pairs.calculated_over_measured),
+                share(pairs.parallel_calculated_over_measured)
+            ),
+        ));
+    }
+    if pairs.parallel_greatest_difference_mm.is_some() {
+        rows.push((
+            "greatest difference of parallel pairs",
+            format!(
+                "{} µm, means {}",
+                micrometres(pairs.parallel_greatest_difference_mm),
+                share(pairs.parallel_greatest_mean_difference)
+            ),
+        ));
+    }
+    rows
+}
+
 fn regions(t: &ToolpathResult) -> Markup {
     html! {
         @if !t.gouge.regions.is_empty() {
@@ -382,7 +437,7 @@ fn method(t: &ToolpathResult) -> Markup {
             "Files: toolpath.nc (the program), toolpath.cls (cutter locations), height.exr (height, deviation and move of every cell), machined.stl and machined.ply (the part as cut, the latter coloured by deviation; "
             (t.surface_mesh.triangles) " triangles within " (bound(t.surface_mesh.tolerance_mm)) " µm of the cells"
             @if t.surface_mesh.tolerance_mm > t.scallop.target_mm { ": too coarse for ridges of the target's height; height.exr has them" }
-            "), deviation.png and height.png" @if t.field.is_some() { ", field.png and interval.png" } " (larger than here)."
+            "), scallop_pairs.csv (calculated and measured scallops of each pair of passes), deviation.png and height.png" @if t.field.is_some() { ", field.png and interval.png" } " (larger than here)."
         }
     }
 }

@@ -5,8 +5,8 @@ use serde::Serialize;
 use super::verdict::{Verdict, Violation};
 use crate::machine::kinematics::{JointReport, Kinematics};
 use crate::metrology::{
-    DeviationFigures, GougeFigures, Limits, PathFigures, PocketFigures, RemovalFigures, ScallopFigures,
-    UncutFigures,
+    DeviationFigures, GougeFigures, Limits, PairFigures, PathFigures, PocketFigures, RemovalFigures,
+    RoughnessFigures, ScallopFigures, UncutFigures,
 };
 use crate::toolpath::{PassPoint, PlannedField, ShortestPossible};
 
@@ -131,6 +131,11 @@ pub struct ToolpathResult {
     pub machine: Option<MachineFigures>,
     /// Scallops.
     pub scallop: ScallopFigures,
+    /// Scallops of pairs of passes, calculated beside measured.
+    pub scallop_pairs: PairFigures,
+    /// Roughness across the feed; not of pockets.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub roughness: Option<RoughnessFigures>,
     /// Gouges.
     pub gouge: GougeFigures,
     /// Uncut material.

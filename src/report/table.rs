@@ -138,6 +138,14 @@ fn write_table(out: &mut String, report: &RunReport) -> std::fmt::Result {
         )?;
         efficiencies.iter().try_for_each(|text| sentence(out, text))?;
     }
+    let roughness: Vec<String> = report.toolpaths.iter().filter_map(roughness).collect();
+    if !roughness.is_empty() {
+        writeln!(
+            out,
+            "\nRoughness across the feed, µm, and what parallel passes should leave over what was measured"
+        )?;
+        roughness.iter().try_for_each(|text| sentence(out, text))?;
+    }
     for t in report.toolpaths.iter().filter(|t| !t.violations.is_empty()) {
         writeln!(out, "\n{} violates:", t.name)?;
         t.violations.iter().try_for_each(|violation| sentence(out, &violation.text))?;
@@ -151,6 +159,19 @@ fn write_table(out: &mut String, report: &RunReport) -> std::fmt::Result {
         }
     }
     writeln!(out, "\n{}", conclusion(report))
+}
+
+/// Roughness, and the share of the measured scallop that was calculated where passes are parallel.
+fn roughness(t: &ToolpathResult) -> Option<String> {
+    let r = t.roughness.as_ref()?;
+    let heights = format!(
+        "Ra {}, Rz {}",
+        with_bound(Some(r.ra_mm?), r.error_bound_mm),
+        with_bound(r.rz_mm, r.error_bound_mm)
+    );
+    let share = t.scallop_pairs.parallel_calculated_over_measured;
+    let scallop = share.map_or_else(String::new, |share| format!("; scallops {:.2} %", 100.0 * share));
+    Some(format!("{heights}{scallop}: {}", t.name))
 }
 
 /// What a path could be shorter by.

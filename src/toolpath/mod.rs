@@ -24,6 +24,7 @@ mod plan;
 mod plan_curve;
 mod planned_field;
 mod pocket;
+pub mod scallop;
 mod shortest;
 mod smooth;
 mod spacing;
@@ -52,7 +53,8 @@ pub use planned_field::{FeedSample, PassPoint, PlannedField};
 pub use pocket::{
     Engagement, Flow, Pattern, Pocket, PocketStrategy, engagement, engagement_angle, limit_feed, plan_pocket,
 };
+pub use scallop::ball_scallop_height;
 pub use shortest::{ShortestPossible, shortest_possible};
-pub use strip::{ball_scallop_height, strip_width, strip_width_at};
+pub use strip::{strip_width, strip_width_at};
 pub use tilted::Tilting;
 pub use tool_axis::{AxisError, ToolAxis, location};

@@ -66,39 +66,10 @@ pub fn strip_width(cutter: f64, surface: f64, h: f64, radius: f64) -> (f64, bool
     if width > widest { (widest, too_concave) } else { (width, false) }
 }
 
-/// Exact scallop height, mm, of a ball of radius `r` between two passes an arc length `s` apart on
-/// a circular section of curvature `kappa` (1/mm, positive concave):
-/// `h = σ((ρ + σr) cos(s/2ρ) − ρ) − √(r² − (ρ + σr)² sin²(s/2ρ))`, σ = 1 convex, −1 concave.
-/// `None` when the ball does not reach across or does not fit.
-pub fn ball_scallop_height(r: f64, kappa: f64, s: f64) -> Option<f64> {
-    // Flatter than this, ρ cancels more digits than the section's bend is worth.
-    if kappa.abs() * r < 1e-9 {
-        let inside = r * r - 0.25 * s * s;
-        return (inside >= 0.0).then(|| r - inside.sqrt());
-    }
-    let (rho, sigma) = (1.0 / kappa.abs(), -kappa.signum());
-    let centre_radius = rho + sigma * r;
-    let half_angle = 0.5 * s / rho;
-    let inside = r * r - (centre_radius * half_angle.sin()).powi(2);
-    (centre_radius > 0.0 && inside >= 0.0)
-        .then(|| sigma * (centre_radius * half_angle.cos() - rho) - inside.sqrt())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn scallop_heights_on_planes_and_circles() {
-        let h = |r, k, s| ball_scallop_height(r, k, s).unwrap();
-        assert!((h(5.0, 0.0, 1.0) - 0.0250628).abs() < 5e-8);
-        assert!((h(3.0, 0.0, 0.5) - 0.0104348).abs() < 5e-8);
-        assert!((h(5.0, -1.0 / 50.0, 0.6026618) - 0.01).abs() < 1e-8);
-        assert!((h(5.0, 1.0 / 50.0, 0.6664011) - 0.01).abs() < 1e-8);
-        assert!((h(5.0, 1e-8, 1.0) - h(5.0, 0.0, 1.0)).abs() < 1e-7, "the plane is the limit");
-        assert_eq!(ball_scallop_height(5.0, 0.25, 1.0), None, "a ball of 5 does not fit a radius of 4");
-        assert_eq!(ball_scallop_height(5.0, 0.0, 11.0), None, "the ball does not reach across");
-    }
+    use crate::toolpath::ball_scallop_height;
 
     #[test]
     fn strip_width_inverts_the_scallop_height_to_second_order() {

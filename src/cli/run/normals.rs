@@ -13,7 +13,10 @@ use crate::geometry::{Bvh, Point2, TriangleMesh};
 use crate::io::scene::{Fixture, Scene, ToolpathRequest};
 use crate::io::{exr, ply_write, png, stl_write};
 use crate::machine::slow_corners;
-use crate::metrology::{Measurement, NormalMap, PatchGrid, SweptVolume, measure_along_normals, net_places};
+use crate::metrology::{
+    Measurement, NormalMap, PatchGrid, RoughnessFigures, SweptVolume, measure_along_normals, net_places,
+    path_figures, roughness,
+};
 use crate::monitor::{self, Monitor as _};
 use crate::report::{
     HIGHEST_RIDGE, Histogram, MapSize, MapWords, SimulationFigures, SurfaceMeshFigures, ToolpathPage,
@@ -99,6 +102,7 @@ impl Job<'_> {
             asked,
             monitor,
         )?;
+        let roughness = self.roughness_by(&rays, cutter, &planned.path, &measured)?;
         let simulation = SimulationFigures {
             engine: "rays",
             cell_mm: spacing,
@@ -117,18 +121,47 @@ impl Job<'_> {
         for region in &mut measured.gouge.regions {
             region.line = lines.get(region.move_index as usize).copied().unwrap_or_default();
         }
+        self.write_pairs(request, &measured, outputs)?;
         let surface_mesh = self.write_normal_mesh(request, &map, outputs)?;
         let page = self.write_normal_maps(request, &map, &measured, spacing, outputs)?;
         let solid = self.write_solid(request, &planned.path, outputs)?;
         let mut result =
             self.result(request, &planned, joints.as_ref(), None, measured, None, simulation, surface_mesh);
         result.solid = solid;
+        result.roughness = Some(roughness);
         monitor.start("looking for collisions", 0);
         if let Some(violation) = self.collision(&tool, &fixtures, &planned.path, &lines) {
             result.violations.insert(0, violation);
             result.verdict = Verdict::Fail;
         }
         Ok((result, page))
+    }
+
+    /// The roughness of an upright path, by rays along the normals.
+    pub(super) fn roughness(
+        &self,
+        request: &ToolpathRequest,
+        path: &Toolpath,
+        measured: &Measurement,
+    ) -> Result<RoughnessFigures, CliError> {
+        let (scene, monitor) = (self.scene, self.progress);
+        let solid = Solid::of_cutter(&scene.cutter, None);
+        let rays = Rays::new(path, &solid, monitor).map_err(CliError::rays(scene, &request.name))?;
+        self.roughness_by(&rays, &solid, path, measured)
+    }
+
+    fn roughness_by(
+        &self,
+        rays: &Rays,
+        solid: &Solid,
+        path: &Toolpath,
+        measured: &Measurement,
+    ) -> Result<RoughnessFigures, CliError> {
+        let reach = REACH_OVER_UNCUT * self.scene.tolerance.uncut;
+        let cut = SweptVolume { part: &self.part, rays, path, solid, inward: reach, outward: reach };
+        // About how far passes are apart.
+        let interval = measured.deviation.area_mm2 / path_figures(path, 0.0).cutting_length_mm;
+        Ok(roughness(&self.part, &self.scene.cutter, path, &cut, interval, self.progress)?)
     }
 
     /// The meshes that are not to be touched.

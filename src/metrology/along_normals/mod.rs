@@ -21,6 +21,7 @@ mod swept_volume;
 mod tests;
 
 use super::figures::{Limits, Measurement};
+use super::pairs::{PairTally, RidgeCrossing, pair_figures};
 use super::refine::Refined;
 use super::ridges::{Highest, NUMERICAL_FLOOR, scallop_figures};
 use super::tracks::Tracks;
@@ -159,6 +160,7 @@ pub fn measure_along_normals(
     contacts.iter().for_each(|sample| greatest.look_at(sample, engine.reach()));
     samples.iter().for_each(|sample| greatest.look_at(sample, engine.reach()));
     of_triangle.iter().flatten().for_each(|crossing| greatest.look_at_ridge(crossing));
+    let pairs = pair_figures(part, cutter, path, &tally(&of_triangle, cutter, spacing), monitor)?;
     let ridge_samples: Vec<[f32; 2]> =
         of_triangle.iter().flatten().map(|c| [c.height as f32, c.length as f32]).collect();
     let shares = areas(&net);
@@ -202,6 +204,7 @@ pub fn measure_along_normals(
         deviation,
         deviation_map: deviations,
         ridge_samples,
+        pairs,
         refined: Refined { note, ..Refined::default() },
     };
     Ok((measured, map))
@@ -256,6 +259,18 @@ fn sides(net: &Net) -> Vec<[u32; 2]> {
     sides.sort_unstable();
     sides.dedup();
     sides
+}
+
+/// Crossings by the passes that meet, every so many of each pair to be calculated too.
+fn tally(of_triangle: &[Vec<Crossing>], cutter: &Cutter, spacing: f64) -> PairTally {
+    let one_in = PairTally::one_in(cutter, spacing);
+    let mut tally = PairTally::default();
+    for c in of_triangle.iter().flatten() {
+        let crossing = RidgeCrossing { at: c.at, height: c.height, length: c.length, moves: c.moves };
+        let chosen = tally.count(c.passes).is_multiple_of(one_in);
+        tally.add(c.passes, crossing, chosen);
+    }
+    tally
 }
 
 /// Crossings of one triangle with half the way to the other crossing of the same two passes; where ridges meet, to the

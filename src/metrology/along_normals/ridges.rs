@@ -33,6 +33,8 @@ pub(super) struct Crossing {
     pub length: f64,
     /// The two passes that meet, the first one first.
     pub passes: [u32; 2],
+    /// The moves that meet.
+    pub moves: [u32; 2],
 }
 
 pub(super) struct Finder<'a> {
@@ -126,6 +128,7 @@ impl Finder<'_> {
             rise: along.try_normalize(1e-12).map_or(0.0, |t| t.dot(&place.normal).abs()),
             length: 0.0,
             passes: self.tracks.passes(a.hit.by, b.hit.by),
+            moves: [a.hit.by, b.hit.by],
         });
     }
 }
