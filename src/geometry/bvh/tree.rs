@@ -136,8 +136,10 @@ const STACK: usize = 64;
 /// A box around what belongs to one slot: its least and its greatest corner.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Extent {
-    min: [f32; 3],
-    max: [f32; 3],
+    /// Least corner, mm.
+    pub(crate) min: [f32; 3],
+    /// Greatest corner, mm.
+    pub(crate) max: [f32; 3],
 }
 
 impl Extent {

@@ -134,10 +134,26 @@ impl SweptMoves {
             return;
         }
         let boxes = parallel::map(parts.len(), |k| self.extent(&parts[k]));
-        let (tree, order) = BoxTree::around(&boxes, LEAF);
+        let (tree, order) = BoxTree::around(&self.apart_by_axis(&parts, &boxes), LEAF);
+        let tree = tree.refitted(&order.iter().map(|&k| boxes[k as usize]).collect::<Vec<_>>());
         self.slots = order.iter().map(|&k| parts[k as usize]).collect();
         self.summaries = self.summaries_of(&tree);
         self.tree = Some(tree);
+    }
+
+    /// The boxes as the tree is built over: tools that lean quite differently far apart, so that they do not share nodes
+    /// until its top. Such neighbours (passes fed forth and back with a lead, both sides of a blade) would leave each
+    /// other's boxes without a common axis to speak of.
+    fn apart_by_axis(&self, parts: &[Part], boxes: &[Extent]) -> Vec<Extent> {
+        let whole = boxes.iter().fold(Extent::NOTHING, |all, one| all.with(one));
+        let apart = 2.0 * (whole.max[0] - whole.min[0]) + self.solid.radius() as f32;
+        let moved = |k: usize| {
+            let Extent { mut min, mut max } = boxes[k];
+            let by = apart * cell_of(&self.lean(&parts[k]).0) as f32;
+            (min[0], max[0]) = (min[0] + by, max[0] + by);
+            Extent { min, max }
+        };
+        parallel::map(parts.len(), moved)
     }
 
     /// The box around the track of the pivot in one part. On an arc it lies off the chord by no more than
@@ -317,6 +333,14 @@ impl SweptMoves {
             },
         );
     }
+}
+
+/// Which of 54 equal cells on the faces of a cube an axis points to.
+fn cell_of(axis: &Vector3) -> usize {
+    let face = axis.iamax();
+    let beside = [1, 2].map(|k| axis[(face + k) % 3] / axis[face].abs());
+    let third = |x: f64| ((1.5 * x).round().clamp(-1.0, 1.0) + 1.0) as usize;
+    (2 * face + usize::from(axis[face] < 0.0)) * 9 + 3 * third(beside[0]) + third(beside[1])
 }
 
 /// How near ball ends may be whose axes differ from `axis` by a chord or less and that stand in a box of half sides `half`,
