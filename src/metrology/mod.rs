@@ -74,11 +74,11 @@ pub fn measure(
     let surface = CutSurface::new(Envelope::new(cutter, path), cut, path);
     let bound = asked.error_bound;
     let inspection = Inspection { part, cutter, limits, asked: bound, surface: &surface, grid: cut.grid };
-    let found = inspect(&inspection, path, 0.0, monitor)?;
+    let mut found = inspect(&inspection, path, 0.0, monitor)?;
     let highest_ridge = found.ridges.highest_sample();
     let lean = found.least_lean;
     let hidden = found.ridges.hidden.clone();
-    let pairs = pairs::pair_figures(part, cutter, path, &found.ridges.pairs, monitor)?;
+    let pairs = pairs::pair_figures(part, cutter, path, std::mem::take(&mut found.ridges.pairs), monitor)?;
     let mut measured = Measurement {
         scallop: scallop_figures(&found.ridges.samples, found.highest, limits),
         gouge: found.gouge,

@@ -29,6 +29,9 @@ use calculator::{Calculated, Calculator};
 /// changes.
 const PLACES_OVER_RADIUS: f64 = 1.0 / 6.0;
 
+/// At least so many crossings for one that is calculated: more of them cost memory where passes are a cell apart.
+const LEAST_ONE_IN: usize = 8;
+
 /// A pair is parallel when it is so at this share of its places; a few stand at ends, corners and links. Figures of parallel
 /// pairs leave those out.
 const MOSTLY: f64 = 0.9;
@@ -64,13 +67,41 @@ struct Measured {
 pub(super) struct PairTally {
     pairs: BTreeMap<[u32; 2], Measured>,
     /// Where heights will be calculated.
-    chosen: Vec<([u32; 2], RidgeCrossing)>,
+    chosen: Vec<Chosen>,
+}
+
+/// A crossing as it is kept: where passes are one cell apart, every cell has one. Rounding moves the place by 0.1 µm at most
+/// on parts of a metre, and the height by a ten-millionth.
+#[derive(Debug, Clone, Copy)]
+struct Chosen {
+    at: [f32; 3],
+    height: f32,
+    length: f32,
+    moves: [u32; 2],
+}
+
+impl From<RidgeCrossing> for Chosen {
+    fn from(c: RidgeCrossing) -> Self {
+        Self {
+            at: c.at.coords.map(|x| x as f32).into(),
+            height: c.height as f32,
+            length: c.length as f32,
+            moves: c.moves,
+        }
+    }
+}
+
+impl From<Chosen> for RidgeCrossing {
+    fn from(c: Chosen) -> Self {
+        let [x, y, z] = c.at.map(f64::from);
+        Self { at: Point3::new(x, y, z), height: c.height.into(), length: c.length.into(), moves: c.moves }
+    }
 }
 
 impl PairTally {
     /// How many crossings, `spacing` mm apart along a ridge, there are for one that is calculated.
     pub fn one_in(cutter: &Cutter, spacing: f64) -> usize {
-        ((PLACES_OVER_RADIUS * cutter.radius() / spacing).round() as usize).max(1)
+        ((PLACES_OVER_RADIUS * cutter.radius() / spacing).round() as usize).max(LEAST_ONE_IN)
     }
 
     /// Number of crossings of a pair so far.
@@ -88,7 +119,7 @@ impl PairTally {
         };
         self.pairs.entry(passes).or_default().join(&one);
         if chosen {
-            self.chosen.push((passes, crossing));
+            self.chosen.push(crossing.into());
         }
     }
 
@@ -187,13 +218,13 @@ pub(super) fn pair_figures(
     part: &Part,
     cutter: &Cutter,
     path: &Toolpath,
-    tally: &PairTally,
+    mut tally: PairTally,
     monitor: &dyn Monitor,
 ) -> Result<PairFigures, Cancelled> {
     let ball = cutter.profile().is_ball();
-    let mut places = if ball { tally.chosen.clone() } else { Vec::new() };
+    let mut places = if ball { std::mem::take(&mut tally.chosen) } else { Vec::new() };
     if ball {
-        places.extend(tally.pairs.iter().filter_map(|(passes, pair)| Some((*passes, pair.highest?))));
+        places.extend(tally.pairs.values().filter_map(|pair| Some(Chosen::from(pair.highest?))));
     }
     let calculator = Calculator::new(part, cutter, path);
     monitor.start("calculating scallops", places.len() as u64);
@@ -201,17 +232,19 @@ pub(super) fn pair_figures(
         monitor::check(monitor)?;
         let run = &places[k * CHUNK..((k + 1) * CHUNK).min(places.len())];
         monitor.advance(run.len() as u64);
-        Ok(run.iter().map(|(_, crossing)| calculator.at(crossing)).collect::<Vec<_>>())
+        Ok(run.iter().map(|chosen| calculator.at(&(*chosen).into())).collect::<Vec<_>>())
     })?;
     let mut of_pair: BTreeMap<[u32; 2], [Sums; 2]> = BTreeMap::new();
     let mut bound = FLOOR;
-    for ((passes, crossing), calculated) in places.iter().zip(found.into_iter().flatten()) {
+    for (chosen, calculated) in places.into_iter().zip(found.into_iter().flatten()) {
         if let Some(calculated) = calculated {
             bound = bound.max(calculated.unsettled + FLOOR);
-            let [all, parallel] = of_pair.entry(*passes).or_default();
-            all.add(crossing, &calculated);
+            let [a, b] = chosen.moves.map(|k| path.moves[k as usize].pass);
+            let [all, parallel] = of_pair.entry([a.min(b), a.max(b)]).or_default();
+            let crossing = chosen.into();
+            all.add(&crossing, &calculated);
             if calculated.parallel {
-                parallel.add(crossing, &calculated);
+                parallel.add(&crossing, &calculated);
             }
         }
     }

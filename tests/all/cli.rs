@@ -9,12 +9,13 @@ use serde_json::Value;
 use crate::command::{PLATE, entries, millstream};
 
 /// Files of every toolpath.
-const TOOLPATH_FILES: [&str; 7] = [
+const TOOLPATH_FILES: [&str; 8] = [
     "deviation.png",
     "height.exr",
     "height.png",
     "machined.ply",
     "machined.stl",
+    "scallop_pairs.csv",
     "toolpath.cls",
     "toolpath.nc",
 ];

@@ -160,7 +160,7 @@ pub fn measure_along_normals(
     contacts.iter().for_each(|sample| greatest.look_at(sample, engine.reach()));
     samples.iter().for_each(|sample| greatest.look_at(sample, engine.reach()));
     of_triangle.iter().flatten().for_each(|crossing| greatest.look_at_ridge(crossing));
-    let pairs = pair_figures(part, cutter, path, &tally(&of_triangle, cutter, spacing), monitor)?;
+    let pairs = pair_figures(part, cutter, path, tally(&of_triangle, cutter, spacing), monitor)?;
     let ridge_samples: Vec<[f32; 2]> =
         of_triangle.iter().flatten().map(|c| [c.height as f32, c.length as f32]).collect();
     let shares = areas(&net);
