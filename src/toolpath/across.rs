@@ -102,7 +102,10 @@ pub(super) fn even_out(
     for round in 0..ROUNDS {
         for _ in 0..MOST_SWEEPS {
             monitor::check(monitor)?;
-            let drawn = pairs.iter().fold(false, |drawn, pair| pair.draw_together(&mut axes, &held) || drawn);
+            let mut drawn = false;
+            for pair in &pairs {
+                drawn |= pair.draw_together(&mut axes, &held);
+            }
             pairs.reverse();
             if !drawn {
                 break;

@@ -152,7 +152,8 @@ fn pieces(offset: &MeshOffset) -> Result<Vec<FieldMesh>, MeshFieldError> {
     let whole = FieldMesh::new(offset.vertices.clone(), offset.triangles.clone(), None)?;
     let (piece, count) = whole.pieces();
     let mut number = vec![u32::MAX; offset.vertices.len()];
-    let mut parts: Vec<(Vec<Point3>, Vec<[u32; 3]>, Vec<Vector3>)> = vec![Default::default(); count];
+    type Piece = (Vec<Point3>, Vec<[u32; 3]>, Vec<Vector3>);
+    let mut parts: Vec<Piece> = vec![Default::default(); count];
     for corners in whole.triangles() {
         let (points, triangles, normals) = &mut parts[piece[corners[0] as usize] as usize];
         triangles.push(corners.map(|v| {

@@ -237,7 +237,7 @@ fn check(mesh: &TriangleMesh, settings: &OffsetSettings) -> Result<(), OffsetErr
     if !(valley > 0.0 && valley < std::f64::consts::PI) {
         return setting("the valley angle", "between 0 and half a turn", valley);
     }
-    if !(memory > 0.0) {
+    if memory.is_nan() || memory <= 0.0 {
         return setting("the memory", "more than 0 bytes", memory);
     }
     Ok(())
