@@ -109,14 +109,16 @@ fn a_passage_has_the_sides_that_face_each_other() {
 
 #[test]
 fn a_sharp_trailing_edge_has_sides_but_no_way_around() {
-    // Two arcs that meet at 45 degrees at x = 10; round at x = -10.
+    // A wedge from x = 10 that goes over into half an ellipse, round at x = -10.
     let lens = |height: f64| {
-        let upper = (0..30).map(|k| {
-            let x = 10.0 - f64::from(k) * 0.7;
-            Point2::new(x, 2.0 * (1.0 - (x / 10.0).powi(2)).max(0.0).powf(0.5).min(0.2 * (10.0 - x)))
+        let wedge = (0..10).map(|k| Point2::new(10.0 - f64::from(k), 0.2 * f64::from(k)));
+        let round = (0..=12).map(|k| {
+            let t = std::f64::consts::FRAC_PI_2 * (1.0 + f64::from(k) / 12.0);
+            Point2::new(10.0 * t.cos(), 2.0 * t.sin())
         });
+        let upper = wedge.chain(round);
         let points: Vec<Point2> = upper.collect();
-        let lower = points[1..].iter().rev().map(|p| Point2::new(p.x, -p.y));
+        let lower = points[1..points.len() - 1].iter().rev().map(|p| Point2::new(p.x, -p.y));
         let outline: Vec<Point2> = points.iter().copied().chain(lower).collect();
         assert!(signed_area(&outline) > 0.0);
         Section { height, outline: Outline::Closed(outline) }
