@@ -140,7 +140,7 @@ pub enum OffsetDrive {
     /// The part's own, everywhere the radius off along the normal.
     Exact,
     /// Sections offset in their planes, and lofted. It lies too near wherever the surface leans out of these planes; whoever
-    /// has the sections puts [`OffsetDrive::Given`] in its place.
+    /// has the sections puts [`OffsetDrive::Given`] in its place. A tilted tool that keeps clear leaves such places out.
     InPlane,
     /// These surfaces, `du × dv` away from the part.
     Given(Arc<Vec<NurbsSurface>>),
