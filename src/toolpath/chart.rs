@@ -28,6 +28,33 @@ const SAMPLES_PER_CONTROL: usize = 3;
 /// only where the mesh has holes.
 const SMOOTHNESS: f64 = 1e-6;
 
+/// Rounds in which an interval and the curvature over it are made to agree.
+const INTERVAL_ROUNDS: usize = 2;
+
+/// An interval is no less than this share of what its middle allows: at sharper edges further passes are put in.
+const LEAST_INTERVAL: f64 = 0.25;
+
+/// Height, mm, of the ridge between contacts `width` apart, where the cutter is `gap(s)` more curved than the surface, 1/mm,
+/// s from the middle. From either contact the cutter rises over the surface by the integral of the way left times that;
+/// the ridge stands where both have risen equally.
+fn ridge_between(width: f64, gap: impl Fn(f64) -> f64) -> f64 {
+    // Gauss's three places over each half.
+    let (far, weights) = (0.6_f64.sqrt(), [5.0 / 18.0, 4.0 / 9.0, 5.0 / 18.0]);
+    let half = 0.5 * width;
+    let half_of = |sign: f64| {
+        let parts = [1.0 - far, 1.0, 1.0 + far].into_iter().zip(weights).map(|(x, weight)| {
+            let s = 0.5 * x * half;
+            let g = weight * half * gap(sign * s);
+            (g * s, g)
+        });
+        parts.fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1))
+    };
+    let ((rise_a, slope_a), (rise_b, slope_b)) = (half_of(-1.0), half_of(1.0));
+    let slopes = slope_a + slope_b;
+    let s = if slopes > 0.0 { ((rise_b - rise_a) / slopes).clamp(-half, half) } else { 0.0 };
+    rise_a + slope_a * s + 0.5 * gap(0.5 * s) * s * s
+}
+
 /// A smooth surface to plan on.
 pub struct Chart<'a> {
     source: Source<'a>,
@@ -126,6 +153,21 @@ impl ChartPoint<'_> {
         }
     }
 
+    /// How much more the cutter is curved than the surface across the feed `t`, 1/mm.
+    fn gap_across(&self, cutter: &Cutter, t: &Vector3) -> f64 {
+        let across = self.normal.cross(t);
+        let [n, b] = self.in_tool_frame(t, across);
+        cutter.normal_curvature(&n, &b) - self.curvature_along(&across)
+    }
+
+    /// The normal and a vector in the frame of the cutter that is fed along `t`.
+    fn in_tool_frame(&self, t: &Vector3, v: Vector3) -> [Vector3; 2] {
+        let contact = CcPoint { point: self.jet.p, normal: self.normal };
+        // A place without an axis is refused where it is cut.
+        let axis = self.axis.and_then(|rule| rule.at(&contact, t).ok());
+        [self.normal, v].map(|v| axis.map_or(v, |axis| in_tool_frame(&axis, &v)))
+    }
+
     /// Distance on the surface that neighbouring passes with unit feed tangent `t` may have, mm,
     /// and whether the surface is too concave for the formula.
     pub fn strip_width(&self, cutter: &Cutter, t: &Vector3, step: Step) -> (f64, bool) {
@@ -133,10 +175,7 @@ impl ChartPoint<'_> {
             Step::Stepover(width) => (width, false),
             Step::Scallop(h) => {
                 let b = self.normal.cross(t);
-                let contact = CcPoint { point: self.jet.p, normal: self.normal };
-                // A place without an axis is refused where it is cut.
-                let axis = self.axis.and_then(|rule| rule.at(&contact, t).ok());
-                let [n, across] = [self.normal, b].map(|v| axis.map_or(v, |axis| in_tool_frame(&axis, &v)));
+                let [n, across] = self.in_tool_frame(t, b);
                 strip_width_at(cutter, &n, &across, self.curvature_along(&b), h)
             }
         }
@@ -189,6 +228,33 @@ impl<'a> Chart<'a> {
         };
         let surface = fit_heights(part, domain, knots_u, knots_v)?;
         Ok(Self { source: Source::Heights(surface), domain, sign: 1.0, axis })
+    }
+
+    /// [`ChartPoint::strip_width`] for passes on both sides of a place, with the curvature of all that lies between them: at
+    /// an edge, or where a blend begins, it is another one half an interval away.
+    pub fn interval(&self, p: &ChartPoint, cutter: &Cutter, t: &Vector3, step: Step) -> (f64, bool) {
+        let (at_place, limited) = p.strip_width(cutter, t, step);
+        let across = p.normal.cross(t);
+        let (Step::Scallop(_), Some((du, dv))) = (step, p.jet.pull_back(&across)) else {
+            return (at_place, limited);
+        };
+        let own = p.gap_across(cutter, t);
+        if !own.is_finite() || own <= 0.0 {
+            return (at_place, limited);
+        }
+        let gap_at = |s: f64| {
+            let beside = self.at(p.at[0] + s * du, p.at[1] + s * dv);
+            beside.map_or(own, |q| own + p.curvature_along(&across) - q.curvature_along(&across))
+        };
+        let mut width = at_place;
+        for _ in 0..INTERVAL_ROUNDS {
+            let ridge = ridge_between(width, gap_at);
+            let even = own * width * width / 8.0;
+            // Where the surface between is too concave, the place itself decides.
+            let share = if ridge > 0.0 { (even / ridge).sqrt() } else { 1.0 };
+            width = at_place * share.clamp(LEAST_INTERVAL, 1.0);
+        }
+        (width, limited)
     }
 
     /// The surface at a parameter; `None` where the parametrisation is degenerate.

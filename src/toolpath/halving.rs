@@ -133,6 +133,27 @@ pub(super) fn along_and_between<S: LevelSource>(
     Ok(all)
 }
 
+/// Appends passes along the stretches of a level that need one, with their overlap.
+pub(super) fn along_needed<S: LevelSource>(
+    source: &S,
+    level: f64,
+    needed: &dyn Fn(&S::Place) -> bool,
+    sampling: f64,
+    passes: &mut Passes,
+    monitor: &dyn Monitor,
+) -> Result<(), PlanError> {
+    let filler = Filler { source, sampling, monitor };
+    for curve in source.curves(level) {
+        let (curve, runs) = filler.stretches(curve, |k, points| {
+            needed(&points[k]).then(|| source.allowed(&points[k]).map(|allowed| allowed.width)).flatten()
+        });
+        for run in runs {
+            filler.add(&curve, level, Some(run), passes)?;
+        }
+    }
+    Ok(())
+}
+
 /// A range of ψ between two passes; at an open end stands the end of the range, not a pass.
 #[derive(Debug, Clone, Copy)]
 struct Gap {
@@ -204,15 +225,26 @@ impl<S: LevelSource> Filler<'_, S> {
 
     /// The runs of a curve (first and last point) on which an interval of ψ is wider on the surface
     /// than allowed, with their overlap. A closed curve is turned to begin outside of any run.
-    fn needed(&self, mut curve: Track<S::Place>, interval: f64) -> (Track<S::Place>, Vec<[usize; 2]>) {
+    fn needed(&self, curve: Track<S::Place>, interval: f64) -> (Track<S::Place>, Vec<[usize; 2]>) {
+        let closed = curve.closed;
+        self.stretches(curve, |k, points| {
+            let n = points.len();
+            let next = &points[if closed { (k + 1) % n } else { (k + 1).min(n - 1) }];
+            let Allowed { step, width } = self.source.least_allowed(&points[k], next)?;
+            (interval > step * (1.0 + INTERVAL_SLACK)).then_some(width)
+        })
+    }
+
+    /// The runs of a curve (first and last point) for whose points `width` gives an interval, mm, with their overlap. A
+    /// closed curve is turned to begin outside of any run.
+    fn stretches(
+        &self,
+        mut curve: Track<S::Place>,
+        width: impl Fn(usize, &[S::Place]) -> Option<f64>,
+    ) -> (Track<S::Place>, Vec<[usize; 2]>) {
         let n = curve.points.len();
-        let too_wide = |k: usize| {
-            let next = &curve.points[if curve.closed { (k + 1) % n } else { (k + 1).min(n - 1) }];
-            let Allowed { step, width } = self.source.least_allowed(&curve.points[k], next)?;
-            let reach = (OVERLAP * width / self.sampling).ceil() as usize;
-            (interval > step * (1.0 + INTERVAL_SLACK)).then_some(reach)
-        };
-        let mut reach: Vec<Option<usize>> = (0..n).map(too_wide).collect();
+        let in_points = |width: f64| (OVERLAP * width / self.sampling).ceil() as usize;
+        let mut reach: Vec<Option<usize>> = (0..n).map(|k| width(k, &curve.points).map(in_points)).collect();
         if curve.closed
             && let Some(calm) = reach.iter().position(Option::is_none)
         {

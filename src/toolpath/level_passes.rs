@@ -3,7 +3,6 @@
 //! Curves are traced a little beyond the chart, on its continuation, and every place of the cutter comes
 //! from dropping it onto the part. Which levels and stretches are cut is decided in `halving`.
 
-use super::CcPoint;
 use super::chart::Chart;
 use super::drop::{Beside, DropCutter};
 use super::halving::{Allowed, LevelSource, Track, along_and_between};
@@ -11,6 +10,7 @@ use super::plan::{PassSettings, Passes, PlanError};
 use super::planned_field::{Contact, PlannedField};
 use super::spacing::{Placing, level_tangent, place_levels, places_of};
 use super::tilted::{self, Touch};
+use super::{CcPoint, Step, gaps};
 use crate::cutter::Cutter;
 use crate::field::{LevelCurve, LevelTracer, ScalarField, surface_gradient_length};
 use crate::geometry::Point3;
@@ -78,6 +78,13 @@ pub(super) fn along_levels_placed(
     let drop = DropCutter::new(part, cutter);
     let guide = Guide { tracer: &tracer, chart, cutter, field, drop, settings, monitor };
     let mut passes = along_and_between(&guide, &levels, range, settings.sampling, monitor)?;
+    if let Step::Scallop(height) = settings.step {
+        let lengths = [height, settings.sampling];
+        let further = gaps::close(&guide, chart, cutter, field, lengths, &mut passes, monitor)?;
+        if further > 0 {
+            notes.push(format!("{further} short passes close gaps where the passes bend around or end"));
+        }
+    }
     passes.notes.splice(0..0, notes);
     passes.field = PlannedField::of_levels(part, cutter, chart, field);
     Ok(passes)
@@ -223,7 +230,7 @@ impl LevelSource for Guide<'_> {
         let t = level_tangent(&p, self.field, [u, v])?;
         let [_, psi_u, psi_v] = self.field.value_and_gradient(u, v);
         let gradient = surface_gradient_length(p.jet.first_form(), psi_u, psi_v);
-        let (width, _) = p.strip_width(self.cutter, &t, self.settings.step);
+        let (width, _) = self.chart.interval(&p, self.cutter, &t, self.settings.step);
         Some(Allowed { step: gradient * width, width })
     }
 
@@ -231,9 +238,15 @@ impl LevelSource for Guide<'_> {
         let contact = |&[u, v]: &[f64; 2]| {
             let p = self.chart.at(u, v)?;
             let t = level_tangent(&p, self.field, [u, v])?;
-            let (allowed, _) = p.strip_width(self.cutter, &t, self.settings.step);
+            let (allowed, _) = self.chart.interval(&p, self.cutter, &t, self.settings.step);
             let across = p.normal.cross(&t);
-            Some(Contact { at: p.jet.p, across, allowed, inside: self.chart.holds([u, v]) })
+            Some(Contact {
+                at: p.jet.p,
+                across,
+                allowed,
+                inside: self.chart.holds([u, v]),
+                parameters: Some([u, v]),
+            })
         };
         curve.along(run).filter_map(contact).collect()
     }

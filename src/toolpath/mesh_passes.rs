@@ -448,7 +448,13 @@ impl LevelSource for MeshGuide<'_> {
             let normal = self.normal(&spot.at);
             let across = (gradient - normal * normal.dot(&gradient)).try_normalize(1e-300)?;
             let inside = (spot.at.triangle as usize) < self.surface.own_triangles;
-            Some(Contact { at: spot.at.position, across, allowed: spot.allowed.width, inside })
+            Some(Contact {
+                at: spot.at.position,
+                across,
+                allowed: spot.allowed.width,
+                inside,
+                parameters: None,
+            })
         };
         curve.along(run).filter_map(contact).collect()
     }

@@ -9,6 +9,7 @@ mod chord;
 mod contour_spiral;
 mod drop;
 mod feed;
+mod gaps;
 mod halving;
 mod interference;
 mod iso_scallop;

@@ -584,7 +584,7 @@ impl LevelSource for Guide<'_> {
             let gradient = self.mixed(&spot.at, self.levels.gradients());
             let across = (gradient - spot.away * spot.away.dot(&gradient)).try_normalize(1e-300)?;
             let at = spot.at.position - spot.away * self.rider.level.distance();
-            Some(Contact { at, across, allowed: spot.allowed?.width, inside: true })
+            Some(Contact { at, across, allowed: spot.allowed?.width, inside: true, parameters: None })
         };
         curve.along(run).filter_map(contact).collect()
     }

@@ -352,7 +352,7 @@ impl LevelSource for Rider<'_> {
             let ride = self.ride(uv)?;
             let (_, allowed) = self.place(uv)?;
             let across = ride.contact.normal.cross(&ride.feed);
-            Some(Contact { at: ride.contact.point, across, allowed, inside: true })
+            Some(Contact { at: ride.contact.point, across, allowed, inside: true, parameters: None })
         };
         curve.along(run).filter_map(contact).collect()
     }

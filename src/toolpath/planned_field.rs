@@ -95,6 +95,8 @@ pub(super) struct Contact {
     /// Allowed interval, mm.
     pub allowed: f64,
     pub inside: bool,
+    /// Its parameters on a chart.
+    pub parameters: Option<[f64; 2]>,
 }
 
 impl PlannedField {
@@ -319,7 +321,9 @@ mod tests {
         let at = |k: i32| Point3::new(0.4 * f64::from(k), y, 0.5 * y);
         // The surface rises by half along y.
         let across = Vector3::new(0.0, 1.0, 0.5).normalize();
-        (0..=25).map(|k| Contact { at: at(k), across, allowed: 0.5, inside: true }).collect()
+        (0..=25)
+            .map(|k| Contact { at: at(k), across, allowed: 0.5, inside: true, parameters: None })
+            .collect()
     }
 
     #[test]
@@ -356,7 +360,13 @@ mod tests {
         let at = |k: usize| {
             let (sin, cos) = (std::f64::consts::TAU * k as f64 / n as f64).sin_cos();
             let across = Vector3::new(cos, sin, 0.0);
-            Contact { at: Point3::origin() + across * radius, across, allowed: 1.0, inside: true }
+            Contact {
+                at: Point3::origin() + across * radius,
+                across,
+                allowed: 1.0,
+                inside: true,
+                parameters: None,
+            }
         };
         let mut field = PlannedField::default();
         field.measure(&[(0..=n).map(at).collect()]);

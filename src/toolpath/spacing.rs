@@ -75,7 +75,7 @@ pub(super) fn places_of(
         let [psi, psi_u, psi_v] = field.value_and_gradient(u, v);
         let (e, f, g) = p.jet.first_form();
         let gradient = surface_gradient_length((e, f, g), psi_u, psi_v);
-        let (width, too_concave) = p.strip_width(cutter, &t, settings.step);
+        let (width, too_concave) = chart.interval(&p, cutter, &t, settings.step);
         let area = (e * g - f * f).max(0.0).sqrt();
         Some(Place { psi, step: width * gradient, length: area * gradient, too_concave })
     };

@@ -6,7 +6,7 @@
 //! so its strays count: that of the arc's centre height on the axis, and the turn of the axis times the
 //! distance of the arc from it, which is none for a ball.
 
-use super::chord::{Watch, Waypoint, reduced_indices, sample_within_chord};
+use super::chord::{Side, Watch, Waypoint, moved_aside, reduced_indices, sample_within_chord};
 use super::plan::PlanError;
 use super::smooth::smooth_and_spread_tilted;
 use super::tool_axis::{AxisError, ToolAxis, location};
@@ -290,26 +290,32 @@ pub(super) fn located(
 }
 
 /// The locations that a pass needs to stay within `tolerance` of it, mm, and clear of what is to be kept away from, as far as
-/// its own moves are.
+/// its own moves are. The pass runs on both sides of the moves where they are clear so, too.
 pub(super) fn thinned(
     pass: &[Touch],
     tolerance: f64,
     keep: Option<&Interference>,
     monitor: &dyn Monitor,
 ) -> Result<Vec<ClPoint>, Cancelled> {
+    let clear = |a: &ClPoint, b: &ClPoint| keep.is_none_or(|keep| keep.on_move(a, b).is_none());
     let mut watch = Watch::new(monitor);
     let mut waiting = reduced_indices(pass, tolerance, &mut watch)?;
     waiting.reverse();
     let mut kept: Vec<usize> = waiting.pop().into_iter().collect();
     while let (Some(&from), Some(&to)) = (kept.last(), waiting.last()) {
         watch.step()?;
-        let clear = |keep: &Interference| keep.on_move(&pass[from].at, &pass[to].at).is_none();
-        if to - from < 2 || keep.is_none_or(clear) {
+        if to - from < 2 || clear(&pass[from].at, &pass[to].at) {
             kept.push(to);
             waiting.pop();
         } else {
             waiting.push((from + to) / 2);
         }
+    }
+    let centres: Vec<Point3> = pass.iter().map(Touch::centre).collect();
+    let aside = moved_aside(&centres, &kept, Side::Lesser, tolerance);
+    let beside: Vec<ClPoint> = kept.iter().zip(aside).map(|(&k, p)| pass[k].around(p).at).collect();
+    if beside.windows(2).all(|ends| clear(&ends[0], &ends[1])) {
+        return Ok(beside);
     }
     Ok(kept.into_iter().map(|k| pass[k].at).collect())
 }
