@@ -20,7 +20,7 @@ use crate::geometry::{Point2, Point3, Vector2};
 use crate::monitor::{self, Cancelled, Monitor};
 use crate::part::{Part, SurfacePoint};
 use crate::sim::Grid;
-use crate::toolpath::Toolpath;
+use crate::toolpath::{Toolpath, distance_to_segment};
 
 /// One crossing of a ridge with a grid line.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -253,7 +253,8 @@ impl<'a> RidgeFinder<'a> {
     fn sample(&self, line: &GridLine, meeting: Meeting, hidden: &mut Vec<Hidden>) -> Option<RidgeSample> {
         let Meeting { at: q, z, moves, .. } = meeting;
         let at = Point3::new(q.x, q.y, z);
-        let (foot, height) = self.part.closest_point(&at);
+        let (foot, distance) = self.part.closest_point(&at);
+        let height = if self.ends_at(&foot) { (at - foot.point).dot(&foot.normal) } else { distance };
         let [m, n] = moves.map(|by| self.surface.normal(by, q.x, q.y));
         if height > self.limits.uncut && !self.is_scallop(moves, &foot) {
             hidden.push(Hidden::Ridge(q, height));
@@ -327,6 +328,19 @@ impl<'a> RidgeFinder<'a> {
 }
 
 impl RidgeFinder<'_> {
+    /// True where the part ends at `foot`. What stands over its border leans out over it where the border slopes; it is
+    /// as high as it stands along the normal there. Seams between patches are no ends.
+    fn ends_at(&self, foot: &SurfacePoint) -> bool {
+        if let Some(at) = foot.at {
+            return self.part.patches().len() == 1 && self.part.is_at_patch_end(at);
+        }
+        let mesh = self.part.mesh();
+        let corners = mesh.corners(foot.triangle as usize);
+        (0..3)
+            .filter(|&k| mesh.neighbour(foot.triangle as usize, k).is_none())
+            .any(|k| distance_to_segment(&foot.point, &corners[k], &corners[(k + 1) % 3]) <= NUMERICAL_FLOOR)
+    }
+
     /// True when a high ridge over `foot` stands between passes that came down to the design on its
     /// sides: one of them touches it, and not much farther away than the passes lie apart. Else it
     /// stands in a hollow that the cutter does not fit, and is material that no pass reached.

@@ -59,6 +59,10 @@ pub struct Part {
     repairs: RepairNotes,
 }
 
+/// A parameter within this share of its range from an end is at the end: a thousand times f64's rounding, a millionth of a
+/// cutter.
+const PATCH_END: f64 = 1e-10;
+
 /// Points nearer than this, mm, are the same point of a closed seam.
 const SEAM: f64 = 1.0e-9;
 
@@ -122,6 +126,19 @@ impl Part {
         let (point, normal) = self.point_and_normal(at);
         let triangle = self.bvh.closest_point(&self.mesh, &point).triangle;
         SurfacePoint { point, normal, at: Some(at), triangle }
+    }
+
+    /// True where a patch ends: within 1e-10 of its parameter range from the end of one.
+    ///
+    /// # Panics
+    /// When there is no such patch.
+    pub fn is_at_patch_end(&self, at: PatchPoint) -> bool {
+        let domain = self.patches[at.patch as usize].domain();
+        let ends = |x: f64, [lo, hi]: [f64; 2]| {
+            let near = PATCH_END * (hi - lo);
+            x <= lo + near || x >= hi - near
+        };
+        ends(at.u, domain[0]) || ends(at.v, domain[1])
     }
 
     /// Principal curvatures, positive where the part is concave toward its outward normal; `None`

@@ -97,12 +97,7 @@ impl<'a> Border<'a> {
     /// True when `contact` lies on the border.
     pub fn holds(&self, contact: &SurfacePoint) -> bool {
         if let Some(at) = contact.at {
-            let domain = self.part.patches()[at.patch as usize].domain();
-            let ends = |x: f64, [lo, hi]: [f64; 2]| {
-                let near = ON_BORDER * (hi - lo);
-                x <= lo + near || x >= hi - near
-            };
-            return ends(at.u, domain[0]) || ends(at.v, domain[1]);
+            return self.part.is_at_patch_end(at);
         }
         let near = |[a, b]: &[Point3; 2]| distance_to_segment(&contact.point, a, b) <= self.tolerance;
         self.edges.get(&contact.triangle).is_some_and(|edges| edges.iter().any(near))

@@ -404,3 +404,61 @@ fn greville(knots: &KnotVector) -> Vec<f64> {
     let p = knots.degree();
     (0..knots.control_count()).map(|i| knots.knots()[i + 1..=i + p].iter().sum::<f64>() / p as f64).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    /// On both sides of a step of curvature, from 0.2 to 1 more than the surface's, contacts 2 apart: the ridge stands a third
+    /// beside the middle and 2/9 high.
+    #[test]
+    fn ridges_over_a_step_of_curvature_stand_where_both_sides_meet() {
+        let step = |s: f64| if s < 0.0 { 0.2 } else { 1.0 };
+        assert_relative_eq!(ridge_between(2.0, step), 2.0 / 9.0, epsilon = 1e-12);
+        assert_relative_eq!(ridge_between(2.0, |s| step(-s)), 2.0 / 9.0, epsilon = 1e-12);
+        assert_relative_eq!(ridge_between(1.5, |_| 0.4), 0.4 * 1.5 * 1.5 / 8.0, epsilon = 1e-15);
+    }
+
+    /// A profile across y: level, then an arc of radius 1 that begins at a knot of the curve.
+    fn rounded_edge() -> NurbsSurface {
+        let weight = std::f64::consts::FRAC_1_SQRT_2;
+        let profile = [
+            ([-6.0, 0.0], 1.0),
+            ([-3.0, 0.0], 1.0),
+            ([0.0, 0.0], 1.0),
+            ([1.0, 0.0], weight),
+            ([1.0, -1.0], 1.0),
+        ];
+        let net: Vec<Vec<Point3>> =
+            profile.iter().map(|([x, z], _)| [0.0, 10.0].map(|y| Point3::new(*x, y, *z)).to_vec()).collect();
+        let weights: Vec<Vec<f64>> = profile.iter().map(|(_, w)| vec![*w; 2]).collect();
+        let knots = vec![0.0, 0.0, 0.0, 0.5, 0.5, 1.0, 1.0, 1.0];
+        NurbsSurface::new(2, 1, knots, vec![0.0, 0.0, 1.0, 1.0], &net, Some(&weights)).unwrap()
+    }
+
+    /// Far from an edge the interval is what the place allows; beside the edge, on level ground, it is less, so that the ridge
+    /// between contacts on the plane and on the arc is as high as asked.
+    #[test]
+    fn intervals_are_narrower_where_an_edge_begins_within_them() {
+        let surface = rounded_edge();
+        let (chart, cutter, h) = (Chart::of_surface(&surface, None), Cutter::ball(6.0).unwrap(), 0.01);
+        let at_x = |x: f64| {
+            // On the level half x falls with the square of the way to the edge's knot, or evenly.
+            let (mut a, mut b) = (0.0, 0.5);
+            for _ in 0..60 {
+                let middle = 0.5 * (a + b);
+                *(if chart.jet(middle, 0.5).p.x < x { &mut a } else { &mut b }) = middle;
+            }
+            chart.at(a, 0.5).unwrap()
+        };
+        let feed = Vector3::y();
+        let [far, near] = [at_x(-3.0), at_x(-0.02)];
+        let plane = far.strip_width(&cutter, &feed, Step::Scallop(h)).0;
+        assert_relative_eq!(chart.interval(&far, &cutter, &feed, Step::Scallop(h)).0, plane, epsilon = 1e-9);
+        let width = chart.interval(&near, &cutter, &feed, Step::Scallop(h)).0;
+        let gap = |s: f64| if s < 0.02 { 1.0 / 3.0 } else { 1.0 / 3.0 + 1.0 };
+        let ridge = ridge_between(width, gap).max(ridge_between(width, |s| gap(-s)));
+        assert!(width < 0.8 * plane && ridge < 1.15 * h && ridge > 0.8 * h, "{width} of {plane}: {ridge}");
+    }
+}

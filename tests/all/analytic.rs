@@ -1,6 +1,6 @@
 //! Measured figures against closed forms, and how they converge with the cell.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use millstream::cutter::Cutter;
 use millstream::field::{KnotRule, Solver};
@@ -72,6 +72,18 @@ fn cylinders_follow_the_exact_row() {
         assert!(off(p50, exact) < 5e-3, "{p50} {exact}");
         assert!(off(m.scallop.max_mm.unwrap(), exact) < 5e-3);
     }
+}
+
+/// Ridges up a slope lean out over its upper border; they are no higher there than elsewhere.
+#[test]
+fn ridges_up_a_slope_are_as_high_at_its_border_as_inside() {
+    let (r, s) = (3.0, 1.0);
+    let shape = AnalyticShape::Inclined { height: 0.0, angle: FRAC_PI_4, azimuth: 0.0 };
+    let part = formula(shape, [0.0, 4.0], [0.0, 4.0]);
+    let m = plan_and_measure(&part, &Cutter::ball(2.0 * r).unwrap(), ZIGZAG, Step::Stepover(s), 0.05);
+    let exact = ball_scallop_height(r, 0.0, s).unwrap();
+    let max = m.scallop.max_mm.unwrap();
+    assert!(off(max, exact) < 2e-3, "{max} {exact}");
 }
 
 #[test]

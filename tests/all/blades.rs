@@ -77,18 +77,13 @@ fn a_duct_is_cut_upright_and_leaning() {
     all_good("duct.toml");
 }
 
-/// Nothing is left uncut and nothing gouged by any strategy; lines along the sections hold the target too. Sections offset
-/// in their planes lie too near where the blade leans: what would gouge is left out, which the report tells.
+/// Every strategy holds the target, leaves nothing uncut and gouges nothing. Sections offset in their planes lie too near where the blade leans: what would gouge is left out, which the report tells.
 #[test]
 fn strategies_compare_on_one_side_of_a_blade() {
     let (_, report) = run_scene(&folder().join("compare.toml"));
     let paths = report["toolpaths"].as_array().unwrap();
-    for path in &paths[..5] {
-        assert_eq!(number(path, "/uncut/area_mm2"), 0.0, "{}: {:#}", path["name"], path["uncut"]);
-        assert!(number(path, "/gouge/max_depth_mm") <= 0.005, "{}: {:#}", path["name"], path["gouge"]);
-    }
+    paths[..5].iter().for_each(is_good);
     let named = |name: &str| paths.iter().find(|path| path["name"] == name).unwrap();
-    ["iso-parametric", "offset-surface"].into_iter().for_each(|name| is_good(named(name)));
     let in_planes = named("offset in planes");
     assert_eq!(in_planes["verdict"], "fail");
     assert!(in_planes["notes"].to_string().contains("cannot be reached"), "{}", in_planes["notes"]);
