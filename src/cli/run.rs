@@ -1,6 +1,7 @@
 //! `millstream run`: scene → part → for each toolpath plan, cut, measure → results.
 
 mod normals;
+mod offset;
 mod solid;
 
 use std::path::{Path, PathBuf};
@@ -302,10 +303,11 @@ impl<'a> Job<'a> {
             return Err(CliError::engine(scene, &request.name, engine));
         }
         let settings = self.settings(request);
+        let strategy = self.strategy(request)?;
         let milled = self.pocket.as_ref().zip(request.strategy.pocket());
         let mut planned = match milled {
             Some((pocket, strategy)) => plan_pocket(pocket, &scene.cutter, strategy, &settings, monitor),
-            None => plan(&self.part, &scene.cutter, &self.strategy(request)?, &settings, monitor),
+            None => plan(&self.part, &scene.cutter, &strategy, &settings, monitor),
         }
         .map_err(|reason| CliError::plan(scene, &request.name, reason))?;
         if scene.machine.slow_corners {
@@ -381,6 +383,7 @@ impl<'a> Job<'a> {
         );
         result.solid = solid;
         result.roughness = roughness;
+        self.add_offset(&strategy, &mut result);
         if let Some((pocket, strategy)) = milled {
             let figures =
                 pocket_figures(scene, pocket, strategy, request.step, &planned.path, &cut, self.top, engaged);
@@ -445,9 +448,11 @@ impl<'a> Job<'a> {
             gouge: measured.gouge,
             uncut: measured.uncut,
             deviation: measured.deviation,
+            sections: Vec::new(),
             removal,
             pocket: None,
             solid: None,
+            offset: None,
             simulation,
             surface_mesh,
         }

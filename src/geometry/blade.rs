@@ -153,6 +153,8 @@ pub struct Blade {
     /// The splines through the table's points.
     pub sections: Vec<BladeSection>,
     curves: Vec<Curves>,
+    /// v of each section on the surfaces through each of the curves.
+    parameters: Vec<Vec<f64>>,
     /// For each surface its curves and where it is put.
     places: Vec<(usize, Isometry3)>,
 }
@@ -172,7 +174,18 @@ impl Blade {
         let places = places(&curves, &lofts, settings)?;
         let surfaces = places.iter().map(|(k, place)| lofts[*k].surface.moved(place)).collect();
         let error_mm = lofts.iter().map(|loft| loft.error_mm).fold(0.0, f64::max);
-        Ok(Self { surfaces, error_mm, sections: laid, curves, places })
+        let parameters = lofts.into_iter().map(|loft| loft.section_parameters).collect();
+        Ok(Self { surfaces, error_mm, sections: laid, curves, parameters, places })
+    }
+
+    /// Heights of the sections, mm.
+    pub fn heights(&self) -> &[f64] {
+        self.curves.first().map_or(&[], |curves| &curves.heights)
+    }
+
+    /// v of each section on each of [`Blade::surfaces`].
+    pub fn section_parameters(&self) -> Vec<&[f64]> {
+        self.places.iter().map(|(k, _)| self.parameters[*k].as_slice()).collect()
     }
 
     /// What fairing did, in words.

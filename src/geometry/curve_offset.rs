@@ -171,6 +171,19 @@ pub fn offset_curve(
     distance: f64,
     tolerance: f64,
 ) -> Result<CurveOffset, CurveOffsetError> {
+    offset_curve_broken(curve, distance, tolerance, &[])
+}
+
+/// As [`offset_curve`], with stretches that also end at the parameters `breaks` of the curve, as if corners were there.
+///
+/// # Errors
+/// As [`offset_curve`].
+pub(super) fn offset_curve_broken(
+    curve: &CubicSpline,
+    distance: f64,
+    tolerance: f64,
+    breaks: &[f64],
+) -> Result<CurveOffset, CurveOffsetError> {
     if distance.is_nan() || distance.abs() > MAX_COORDINATE {
         return Err(CurveOffsetError::Distance(distance));
     }
@@ -186,6 +199,7 @@ pub fn offset_curve(
     let mut error_mm = 0.0;
     let mut pieces = Vec::new();
     for chain in trim::chains(&offset, intervals, tolerance) {
+        let chain = chain.broken_at(breaks, curve.domain());
         let (piece, error) = stretch::piece(&offset, &places, &chain, tolerance)?;
         error_mm = f64::max(error_mm, error);
         pieces.extend(piece);

@@ -10,14 +10,17 @@
 //! Closed sections make one patch that is C² across its seam, with knots that are not clamped. `du × dv` lies
 //! to the right of the sections' sense: outward when they run counter-clockwise.
 
+mod offsets;
 #[cfg(test)]
 mod tests;
+
+pub use offsets::loft_of_offsets;
 
 use super::curve_offset::distance_from;
 use super::interpolate::{Axis, interpolate};
 use super::{
-    ArcLength, CubicSpline, CurveOffset, CurveOffsetError, KnotError, MAX_COORDINATE, NurbsError,
-    NurbsSurface, Point2, Point3, offset_curve, signed_area,
+    ArcLength, CubicSpline, CurveOffsetError, KnotError, MAX_COORDINATE, NurbsError, NurbsSurface, Point2,
+    Point3, signed_area,
 };
 
 /// Spans along the sections at first.
@@ -129,20 +132,33 @@ pub enum LoftError {
         /// Why.
         source: CurveOffsetError,
     },
-    /// The offset of a section falls apart, or has other corners than the first.
+    /// The offset of a section falls apart.
     #[error(
-        "the offset of section {section} has {pieces} pieces with {stretches} smooth stretches, that of section 0 \
-         has one with {expected}, or only one of them a corner: the distance is beyond a concave radius of some \
-         sections; use a smaller cutter or leave those sections out"
+        "the offset of section {section} (height {height} mm) falls into {pieces} pieces, since the ball does not pass \
+         between them; use a smaller cutter or leave that section out"
     )]
     Parted {
         /// Which.
         section: usize,
+        /// Its height, mm.
+        height: f64,
         /// Its pieces.
         pieces: usize,
-        /// Stretches of its first piece.
-        stretches: usize,
-        /// Stretches of section 0.
+    },
+    /// Corners of offsets do not correspond to each other.
+    #[error(
+        "the corners at which the offset of section {section} (height {height} mm) is trimmed lie elsewhere than those of \
+         the sections beside it: {found} smooth stretches where {expected} were to be joined; use a smaller cutter, put \
+         sections closer together there, or leave that section out"
+    )]
+    Corners {
+        /// The first that does not fit.
+        section: usize,
+        /// Its height, mm.
+        height: f64,
+        /// Its smooth stretches, broken where its neighbours have corners.
+        found: usize,
+        /// Stretches that all sections should have.
         expected: usize,
     },
     /// The knots would coincide.
@@ -215,50 +231,6 @@ pub fn loft(sections: &[LoftSection], tolerance: f64) -> Result<Loft, LoftError>
     }
     let Stray { error: reached, section, share, .. } = worst;
     Err(LoftError::NotReached { tolerance, reached, section, share })
-}
-
-/// Offsets each section in its own plane by `distance`, mm, positive to the left of its sense, and lofts what
-/// is left: one surface for each smooth stretch that all of them have.
-///
-/// Its true distance from the surface of the sections is `distance · cos φ`, φ the angle between that
-/// surface's normal and the sections' plane; the true offset is [`super::OffsetSurface`].
-///
-/// # Errors
-/// See [`LoftError`].
-///
-/// # Tolerance
-/// Half of `tolerance` goes to the offset curves, half to the loft.
-pub fn loft_of_offsets(
-    sections: &[LoftSection],
-    distance: f64,
-    tolerance: f64,
-) -> Result<Vec<Loft>, LoftError> {
-    check(sections, tolerance)?;
-    let half = 0.5 * tolerance;
-    let offset = |section: usize| {
-        offset_curve(sections[section].curve, distance, half)
-            .map_err(|source| LoftError::Offset { section, source })
-    };
-    // The error of the lowest section, whatever the number of threads.
-    let offsets: Vec<CurveOffset> =
-        crate::parallel::map(sections.len(), offset).into_iter().collect::<Result<_, _>>()?;
-    let stretches = |o: &CurveOffset| o.pieces.first().map_or(0, |p| p.stretches.len());
-    let expected = stretches(&offsets[0]);
-    let is_ring =
-        |o: &CurveOffset| o.pieces.first().is_some_and(|p| p.stretches.iter().all(CubicSpline::is_closed));
-    let ring = is_ring(&offsets[0]);
-    let differs = |o: &CurveOffset| o.pieces.len() != 1 || stretches(o) != expected || is_ring(o) != ring;
-    if let Some(section) = offsets.iter().position(differs) {
-        let o = &offsets[section];
-        return Err(LoftError::Parted { section, pieces: o.pieces.len(), stretches: stretches(o), expected });
-    }
-    let surface = |k: usize| {
-        let moved = offsets.iter().zip(sections);
-        let moved: Vec<LoftSection> =
-            moved.map(|(o, s)| LoftSection { curve: &o.pieces[0].stretches[k], height: s.height }).collect();
-        loft(&moved, half)
-    };
-    (0..expected).map(surface).collect()
 }
 
 fn check(sections: &[LoftSection], tolerance: f64) -> Result<(), LoftError> {

@@ -11,6 +11,7 @@ mod fairing;
 mod interpolate;
 mod jet;
 mod loft;
+mod meeting;
 mod mesh;
 mod mesh_offset;
 mod nurbs;
@@ -36,6 +37,7 @@ pub use fairing::{
 };
 pub use jet::{Jet2, PrincipalCurvatures};
 pub use loft::{Loft, LoftError, LoftSection, loft, loft_of_offsets};
+pub(crate) use meeting::{Plane, into_cube, meeting};
 pub use mesh::{MeshError, Outside, RepairNotes, TriangleMesh};
 pub use mesh_offset::{LevelSet, LevelSetFoot, MeshOffset, OffsetError, OffsetSettings, Valley};
 pub use nurbs::{MAX_WEIGHT, NurbsError, NurbsSurface};

@@ -11,6 +11,8 @@ mod along_normals;
 mod closer;
 mod cut_surface;
 mod figures;
+#[cfg(test)]
+mod flat_scene;
 mod inspection;
 mod meetings;
 mod offset_distance;
@@ -22,6 +24,7 @@ mod regions;
 mod removal;
 mod ridges;
 mod roughness;
+mod sections;
 mod tracks;
 mod unseen;
 
@@ -34,13 +37,16 @@ pub use figures::{
     UncutFigures, UncutRegion,
 };
 pub(crate) use meetings::Meetings;
-pub use offset_distance::{OffsetDistance, measure_offset};
+pub use offset_distance::{
+    OffsetDistance, OffsetFigures, OffsetPoints, SingularPlaceFigures, measure_offset, offset_figures,
+};
 pub use pairs::{MOST_PAIRS, PAIRS_HEADER, PairFigures, ScallopPair};
 pub use path::path_figures;
 pub use pocket::{PocketFigures, wall_gouge_of_cells, wall_gouge_of_moves};
 pub use refine::{Asked, Refined};
 pub use removal::{RapidContactFigures, RemovalFigures, removal_figures};
 pub use roughness::{RoughnessFigures, roughness};
+pub use sections::{SectionFigures, section_figures};
 
 use crate::cutter::Cutter;
 use crate::geometry::Point3;

@@ -117,6 +117,14 @@ impl Part {
         (jet.p, patch.normal_of(&jet, at.u, at.v) * self.signs[at.patch as usize])
     }
 
+    /// +1 where the outward normal of a patch is on the side of `du × dv`, −1 where on the other.
+    ///
+    /// # Panics
+    /// When there is no such patch.
+    pub fn outward_sign(&self, patch: usize) -> f64 {
+        self.signs[patch]
+    }
+
     /// As [`Part::point_and_normal`], with the triangle of the mesh that lies there (which takes a
     /// search).
     ///

@@ -1,11 +1,6 @@
 //! One parametric patch of a part, whatever it is made of.
 
-use crate::geometry::{AnalyticSurface, Jet2, NurbsSurface, Point3, Vector3};
-
-/// Shares of the parameter range by which a point without a normal (a pole) is moved toward the
-/// middle of the patch to borrow one there, in the order in which they are tried. Greater borrows
-/// from farther away; less meets the same degeneracy again.
-const BORROW: [f64; 3] = [1.0e-7, 1.0e-5, 1.0e-3];
+use crate::geometry::{AnalyticSurface, Jet2, NurbsSurface, Point3, Vector3, unit_normal};
 
 /// A parametric patch.
 #[derive(Debug, Clone, PartialEq)]
@@ -86,10 +81,7 @@ impl Patch {
     }
 }
 
-/// Normal of a jet at `[u, v]`; at a pole that of the surface close by; up where there is none.
+/// Normal of a jet at `[u, v]`; at a pole its limit, or that of the surface close by; up where there is none.
 pub(super) fn normal_of(surface: &NurbsSurface, jet: &Jet2, [u, v]: [f64; 2]) -> Vector3 {
-    let [u_middle, v_middle] = surface.domain().map(|[lo, hi]| 0.5 * (lo + hi));
-    let borrowed =
-        || BORROW.iter().find_map(|&t| surface.jet(u + t * (u_middle - u), v + t * (v_middle - v)).normal());
-    jet.normal().or_else(borrowed).unwrap_or_else(Vector3::z)
+    jet.normal().or_else(|| unit_normal(surface, u, v)).unwrap_or_else(Vector3::z)
 }

@@ -82,9 +82,11 @@ pub fn toolpath(name: &str, machining_time_s: f64, gouge: f64) -> ToolpathResult
         gouge: measured.gouge,
         uncut: measured.uncut,
         deviation: measured.deviation,
+        sections: Vec::new(),
         removal: None,
         pocket: None,
         solid: None,
+        offset: None,
         simulation: SimulationFigures {
             engine: "reference",
             cell_mm: 0.05,

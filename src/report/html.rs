@@ -203,6 +203,7 @@ fn toolpath_section(t: &ToolpathResult, page: &ToolpathPage) -> Markup {
                 figcaption { "Deviation of the cut surface along the design normal. Red stands above the design, blue below; each side of the key has its own scale and ends at its limit, rounded up. Grey is off the part. Where several cells share a pixel, the worst of them shows. " (ringed(t)) }
             }
             (regions(t))
+            (sections(t))
             figure {
                 @if let Some(histogram) = &page.histogram {
                     (PreEscaped(histogram.svg()))
@@ -287,6 +288,7 @@ fn figures(t: &ToolpathResult) -> Markup {
         ("deviation, root mean square", format!("{} µm", micrometres(Some(deviation.rms_mm)))),
     ];
     rows.extend(calculated_rows(t));
+    rows.extend(offset_rows(t));
     if let Some(f) = &t.field {
         rows.push(("singular points of the feed", f.singular_point_count.to_string()));
         if let Some(i) = &f.interval_over_allowed {
@@ -387,6 +389,19 @@ fn calculated_rows(t: &ToolpathResult) -> Vec<(&'static str, String)> {
     rows
 }
 
+/// The offset surface that the ball's centre rides on.
+fn offset_rows(t: &ToolpathResult) -> Vec<(&'static str, String)> {
+    let Some(offset) = &t.offset else { return Vec::new() };
+    let distance = offset.distance.map_or("-".to_owned(), |d| {
+        let bound = bound(d.error_bound_mm);
+        format!("{:.4} to {:.4} mm ± {bound} µm, asked {} mm", d.least_mm, d.greatest_mm, offset.asked_mm)
+    });
+    vec![
+        ("offset surface off the design", distance),
+        ("places as hollow as the ball", offset.singular_place_count.to_string()),
+    ]
+}
+
 fn regions(t: &ToolpathResult) -> Markup {
     html! {
         @if !t.gouge.regions.is_empty() {
@@ -406,6 +421,25 @@ fn regions(t: &ToolpathResult) -> Markup {
                 thead { tr { th { "ring" } th { "height µm" } th { "area mm²" } th { "volume mm³" } th { "at mm" } } }
                 tbody { @for (k, r) in (1..).zip(&t.uncut.regions) {
                     tr { th { "U" (k) } td { (micrometres(Some(r.height_mm))) } td { (format!("{:.4}", r.area_mm2)) } td { (format!("{:.4}", r.volume_mm3)) } td { (place(r.at_mm)) } }
+                } }
+            }
+        }
+    }
+}
+
+/// Deviation at a blade's sections.
+fn sections(t: &ToolpathResult) -> Markup {
+    html! {
+        @if !t.sections.is_empty() {
+            h3 { "Deviation at the sections" }
+            p.faint { "At the row of places nearest to each section, along the normals of the design." }
+            table.figures {
+                thead { tr { th { "height mm" } th { "from µm" } th { "to µm" } th { "mean µm" } th { "places" } } }
+                tbody { @for s in &t.sections {
+                    tr {
+                        td { (s.height_mm) } td { (micrometres(Some(s.min_mm))) } td { (micrometres(Some(s.max_mm))) }
+                        td { (micrometres(Some(s.mean_mm))) } td { (s.places) }
+                    }
                 } }
             }
         }

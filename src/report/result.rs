@@ -5,8 +5,8 @@ use serde::Serialize;
 use super::verdict::{Verdict, Violation};
 use crate::machine::kinematics::{JointReport, Kinematics};
 use crate::metrology::{
-    DeviationFigures, GougeFigures, Limits, PairFigures, PathFigures, PocketFigures, RemovalFigures,
-    RoughnessFigures, ScallopFigures, UncutFigures,
+    DeviationFigures, GougeFigures, Limits, OffsetFigures, PairFigures, PathFigures, PocketFigures,
+    RemovalFigures, RoughnessFigures, ScallopFigures, SectionFigures, UncutFigures,
 };
 use crate::toolpath::{PassPoint, PlannedField, ShortestPossible};
 
@@ -142,6 +142,9 @@ pub struct ToolpathResult {
     pub uncut: UncutFigures,
     /// Deviation in all.
     pub deviation: DeviationFigures,
+    /// Deviation at the sections of a blade, where it is measured along its normals.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sections: Vec<SectionFigures>,
     /// What each move removed, if the scene asks for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub removal: Option<RemovalFigures>,
@@ -151,6 +154,9 @@ pub struct ToolpathResult {
     /// What is left of the block, if the scene asks for voxels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub solid: Option<SolidFigures>,
+    /// The offset surface that the ball's centre rides on, for a path along one on patches.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub offset: Option<OffsetFigures>,
     /// How it was cut.
     pub simulation: SimulationFigures,
     /// The machined part as triangles.

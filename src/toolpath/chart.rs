@@ -12,7 +12,7 @@ use crate::cutter::Cutter;
 use crate::field::mesh::{blend_lines, slope_at};
 use crate::field::{GridField, NormalEquations, SamplePlane};
 use crate::geometry::{Jet2, KnotVector, NurbsSurface, Point3, Vector2, Vector3};
-use crate::part::{Part, PatchPoint};
+use crate::part::Part;
 
 /// Control points of a height surface lie this share of the cutter's radius apart. Finer follows
 /// the facets of a mesh instead of its shape; coarser misses curvature that the cutter feels.
@@ -196,17 +196,7 @@ impl<'a> Chart<'a> {
 
     fn of_patch(part: &'a Part, k: usize, axis: Option<&'a ToolAxis>) -> Self {
         let (patch, domain) = (k as u32, part.patches()[k].domain());
-        let at = |t: f64| (0..2).map(move |c| domain[c][0] + t * (domain[c][1] - domain[c][0]));
-        // Any place with a normal tells which way the patch is turned.
-        let sign = [0.5, 0.37, 0.71, 0.13]
-            .into_iter()
-            .find_map(|t| {
-                let uv: Vec<f64> = at(t).collect();
-                let inherent = part.patches()[k].jet(uv[0], uv[1]).normal()?;
-                let outward = part.surface_point(PatchPoint { patch, u: uv[0], v: uv[1] }).normal;
-                Some(if inherent.dot(&outward) < 0.0 { -1.0 } else { 1.0 })
-            })
-            .unwrap_or(1.0);
+        let sign = part.outward_sign(k);
         Self { source: Source::Patch { part, patch }, domain, sign, axis }
     }
 

@@ -94,10 +94,25 @@ fn stepped() -> TriangleMesh {
     TriangleMesh::new(vertices, triangles).unwrap().0
 }
 
+/// Slope of the pan's walls, rad.
+const PAN_SLOPE: f64 = 20.0 * std::f64::consts::PI / 180.0;
+
+/// A floor of 16 × 12 mm between four walls, 4 mm wide in the plan view, that rise from it at 20 degrees.
+fn pan() -> TriangleMesh {
+    let corner =
+        |x: f64, y: f64, z: f64| [[-x, -y], [x, -y], [x, y], [-x, y]].map(|[x, y]| Point3::new(x, y, z));
+    let vertices = [corner(8.0, 6.0, 0.0), corner(12.0, 10.0, 4.0 * PAN_SLOPE.tan())].concat();
+    let wall = |k: u32| [[k, k + 4, (k + 1) % 4 + 4], [k, (k + 1) % 4 + 4, (k + 1) % 4]];
+    let triangles = [[0, 1, 2], [0, 2, 3]].into_iter().chain((0..4).flat_map(wall)).collect();
+    TriangleMesh::new(vertices, triangles).unwrap().0
+}
+
 /// Each part of a scene is what its generator makes; `MILLSTREAM_BLESS=1` writes them anew.
 #[test]
 fn mesh_parts_are_those_of_their_generators() {
-    for (name, mesh) in [("relief.stl", relief()), ("groove.stl", groove()), ("stepped.stl", stepped())] {
+    let parts =
+        [("relief.stl", relief()), ("groove.stl", groove()), ("stepped.stl", stepped()), ("pan.stl", pan())];
+    for (name, mesh) in parts {
         let path = scene(name);
         if std::env::var_os("MILLSTREAM_BLESS").is_some() {
             let triangles: Vec<[Point3; 3]> = (0..mesh.triangles().len()).map(|t| mesh.corners(t)).collect();
@@ -160,6 +175,36 @@ fn the_other_parts_are_good() {
         assert_eq!(status, 0, "{name}");
         assert_good(name, &report);
     }
+}
+
+/// The ball touches both sides of each crease, at r tan(δ/2) beside it, δ the angle between the sides' normals; there the
+/// crease stands r (1 − √(1 − tan²(δ/2))) below it along either normal.
+#[test]
+fn creases_of_a_mesh_have_passes_of_their_own() {
+    let (status, report) = run("pan.toml");
+    assert_eq!(status, 0);
+    assert_good("pan", &report);
+    let toolpath = &report["toolpaths"][0];
+    assert!(toolpath["notes"].to_string().contains("run along creases"), "{}", toolpath["notes"]);
+    // The steepest ones lie between walls: their normals' product is cos² of the slope.
+    let between = PAN_SLOPE.cos().powi(2).acos();
+    let left = 1.25 * (1.0 - (1.0 - (0.5 * between).tan().powi(2)).sqrt());
+    let highest = number(toolpath, "/deviation/max_mm");
+    assert!((highest - left).abs() < 5e-4, "{highest} {left}");
+}
+
+/// A hole whose rim has slivers folded under it: the ball does not climb into it, and the target is held everywhere.
+#[test]
+fn an_offset_surface_ends_at_the_rim_of_a_hole() {
+    let home = tempfile::tempdir().unwrap();
+    std::fs::copy(scene("stepped.stl"), home.path().join("stepped.stl")).unwrap();
+    let text = std::fs::read_to_string(scene("stepped.toml")).unwrap();
+    let head = &text[..text.find("[[toolpath]]").unwrap()];
+    let path = home.path().join("rim.toml");
+    std::fs::write(&path, format!("{head}[[toolpath]]\nstrategy = \"offset-surface\"\nangle = 0\n")).unwrap();
+    let (status, report) = run_scene(&path);
+    assert_eq!(status, 0, "{:#}", report["toolpaths"][0]["violations"]);
+    assert_good("rim", &report);
 }
 
 #[test]

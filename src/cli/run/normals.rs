@@ -15,7 +15,7 @@ use crate::io::{exr, ply_write, png, stl_write};
 use crate::machine::slow_corners;
 use crate::metrology::{
     Measurement, NormalMap, PatchGrid, RoughnessFigures, SweptVolume, measure_along_normals, net_places,
-    path_figures, roughness,
+    path_figures, roughness, section_figures,
 };
 use crate::monitor::{self, Monitor as _};
 use crate::report::{
@@ -129,6 +129,10 @@ impl Job<'_> {
             self.result(request, &planned, joints.as_ref(), None, measured, None, simulation, surface_mesh);
         result.solid = solid;
         result.roughness = Some(roughness);
+        if let Some(blade) = &self.blade {
+            result.sections = section_figures(&map, blade.heights(), &blade.section_parameters());
+        }
+        self.add_offset(&strategy, &mut result);
         monitor.start("looking for collisions", 0);
         if let Some(violation) = self.collision(&tool, &fixtures, &planned.path, &lines) {
             result.violations.insert(0, violation);

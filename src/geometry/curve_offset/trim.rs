@@ -38,6 +38,29 @@ pub(super) struct Chain {
     pub whole: bool,
 }
 
+impl Chain {
+    /// The same with ranges that end at further parameters of the curve, in `[start, end]`, as well.
+    pub(super) fn broken_at(mut self, breaks: &[f64], [start, end]: [f64; 2]) -> Self {
+        let mut breaks = breaks.to_vec();
+        breaks.sort_by(f64::total_cmp);
+        let (Some(&first), true) = (breaks.first(), !self.ranges.is_empty()) else { return self };
+        if self.whole {
+            self.whole = false;
+            self.ranges = vec![[first, first + (end - start)]];
+        }
+        // Ranges may run on beyond the end of a period.
+        let again: Vec<f64> = breaks.iter().map(|t| t + (end - start)).collect();
+        breaks.extend(again);
+        let parts = |[from, to]: [f64; 2]| {
+            let inside = breaks.iter().copied().filter(move |t| *t > from && *t < to);
+            let ends: Vec<f64> = std::iter::once(from).chain(inside).chain([to]).collect();
+            ends.windows(2).map(|w| [w[0], w[1]]).collect::<Vec<_>>()
+        };
+        self.ranges = self.ranges.iter().copied().flat_map(parts).collect();
+        self
+    }
+}
+
 fn is_clear(offset: &Offset, walls: &Walls, t: f64) -> bool {
     let reach = offset.distance.abs();
     walls.is_clear(&offset.point(t), reach - CLEAR * (1.0 + reach))

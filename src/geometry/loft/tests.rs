@@ -123,20 +123,100 @@ fn offsets_of_sections_are_lofted() {
     }
     // Inside beyond the least radius (25/12) every section has two corners, and two surfaces stand for it.
     assert_eq!(loft_of_offsets(&sections, 3.0, 1e-3).unwrap().len(), 2);
-    // Where only some have them there is no common surface.
-    let round = closed(oval(8.0, 8.0, 0.0, Vector2::zeros()));
-    let mut mixed = sections.clone();
-    mixed[2].curve = &round;
-    let error = loft_of_offsets(&mixed, 3.0, 1e-3).unwrap_err();
-    assert!(
-        matches!(error, LoftError::Parted { section: 2, pieces: 1, stretches: 1, expected: 2 }),
-        "{error}"
-    );
     let error = loft_of_offsets(&sections, 5.5, 1e-3).unwrap_err();
     assert!(
         matches!(error, LoftError::Offset { section: 0, source: CurveOffsetError::Eaten { .. } }),
         "{error}"
     );
+}
+
+/// Greatest difference from `distance`, mm, of places of surfaces at the heights of sections from their curves.
+fn off_distance(lofts: &[Loft], sections: &[LoftSection], distance: f64) -> f64 {
+    let mut greatest: f64 = 0.0;
+    for (k, section) in sections.iter().enumerate() {
+        let outline: Vec<Point2> =
+            section.curve.within_chord(1e-6).iter().map(|&t| section.curve.point(t)).collect();
+        let nearest = |p: Point2| {
+            let to_side = |w: &[Point2]| {
+                let d = w[1] - w[0];
+                (p - (w[0] + d * ((p - w[0]).dot(&d) / d.norm_squared()).clamp(0.0, 1.0))).norm()
+            };
+            outline.windows(2).map(to_side).fold(f64::INFINITY, f64::min)
+        };
+        for loft in lofts {
+            let v = loft.section_parameters[k];
+            let at = |i: u32| loft.surface.point(f64::from(i) / 100.0, v).xy();
+            greatest = (0..=100).map(|i| (nearest(at(i)) - distance).abs()).fold(greatest, f64::max);
+        }
+    }
+    greatest
+}
+
+#[test]
+fn corners_that_only_some_sections_have_fade_out_in_the_others() {
+    // Offset inward beyond the least radius of the ovals (25/12 mm), which rounder ones are not.
+    let oval_of = |b: f64, turn: f64| closed(oval(12.0, b, turn, Vector2::zeros()));
+    for halves in [[5.0, 5.0, 8.0, 5.0], [9.0, 5.0, 5.0, 9.0], [9.0, 9.0, 9.0, 5.0]] {
+        let curves: Vec<CubicSpline> =
+            halves.iter().zip([0.0, 0.1, 0.2, 0.3]).map(|(b, turn)| oval_of(*b, turn)).collect();
+        let sections = stacked(&curves, &[0.0, 5.0, 10.0, 15.0]);
+        let lofts = loft_of_offsets(&sections, 3.0, 1e-3).unwrap();
+        assert_eq!(lofts.len(), 2, "{halves:?}");
+        let off = off_distance(&lofts, &sections, 3.0);
+        assert!(off < 1.5e-3, "{halves:?}: {off}");
+        // The surfaces join at the heights of the sections, all around.
+        for k in 0..4 {
+            let [a, b] = [0, 1].map(|i: usize| (&lofts[i].surface, lofts[i].section_parameters[k]));
+            for (from, to) in [(a, b), (b, a)] {
+                let gap = (from.0.point(1.0, from.1) - to.0.point(0.0, to.1)).norm();
+                assert!(gap < 2e-3, "{halves:?} {k}: {gap}");
+            }
+        }
+    }
+}
+
+#[test]
+fn open_sections_break_where_their_neighbours_have_corners() {
+    // A hollow whose least radius falls from section to section.
+    let hollow = |depth: f64| {
+        let at = |k: u32| -10.0 + f64::from(k) / 4.0;
+        open((0..=80).map(|k| Point2::new(at(k), depth * (at(k) / 2.0).tanh().powi(2))).collect())
+    };
+    let curves: Vec<CubicSpline> = [0.5, 1.0, 3.0, 6.0].map(hollow).to_vec();
+    let sections = stacked(&curves, &[0.0, 4.0, 8.0, 12.0]);
+    let radius = |c: &CubicSpline| {
+        (0..=400).map(|k| c.curvature(c.domain()[1] * f64::from(k) / 400.0)).fold(0.0, f64::max).recip()
+    };
+    assert!(radius(&curves[1]) > 1.5 && radius(&curves[2]) < 1.5);
+    let lofts = loft_of_offsets(&sections, 1.5, 1e-3).unwrap();
+    assert_eq!(lofts.len(), 2);
+    assert!(off_distance(&lofts, &sections, 1.5) < 1.5e-3);
+    // The break lies at the lowest place, as the corners do.
+    assert!(lofts[0].surface.point(1.0, 0.0).x.abs() < 0.05);
+}
+
+#[test]
+fn offsets_that_fall_apart_or_have_foreign_corners_are_named() {
+    // Two rooms with a neck of 2 mm between them.
+    let neck = |narrow: f64| {
+        let at = |k: u32| std::f64::consts::TAU * f64::from(k) / 160.0;
+        let half = |x: f64| 6.0 - narrow * (-(x / 3.0).powi(2)).exp();
+        closed(
+            (0..160).map(at).map(|t| Point2::new(14.0 * t.cos(), half(14.0 * t.cos()) * t.sin())).collect(),
+        )
+    };
+    let curves = [0.0, 5.0].map(neck);
+    let error = loft_of_offsets(&stacked(&curves, &[0.0, 5.0]), 2.0, 1e-3).unwrap_err();
+    assert!(matches!(error, LoftError::Parted { section: 1, pieces: 2, .. }), "{error}");
+    assert!(error.to_string().contains("section 1 (height 5 mm) falls into 2 pieces"), "{error}");
+    // Hollows at the two ends of their lengths, in turn: columns would meet.
+    let hollow = |middle: f64| {
+        let at = |k: u32| f64::from(k) / 8.0;
+        open((0..=160).map(|k| Point2::new(at(k), 4.0 * ((at(k) - middle) / 1.5).tanh().powi(2))).collect())
+    };
+    let curves = [4.0, 16.0, 4.0].map(hollow);
+    let lofts = loft_of_offsets(&stacked(&curves, &[0.0, 5.0, 10.0]), 1.5, 1e-3).unwrap();
+    assert_eq!(lofts.len(), 3, "each hollow is a column of its own");
 }
 
 #[test]

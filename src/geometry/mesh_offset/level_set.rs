@@ -1,6 +1,9 @@
 //! The places at one distance from a mesh, as seen from any place near them.
 
-use crate::geometry::{Bvh, MeshFoot, Point3, TriangleMesh, Vector3};
+use std::collections::HashMap;
+
+use super::contour::shape;
+use crate::geometry::{Bvh, MeshFoot, Plane, Point3, TriangleMesh, Vector3};
 
 /// Places are on the level set within this share of their coordinates, or of a mm.
 const PRECISION: f64 = 1e-14;
@@ -8,13 +11,35 @@ const PRECISION: f64 = 1e-14;
 /// Steps of the search along a line at most; each halves its bracket at least every other time.
 const LINE_STEPS: usize = 90;
 
+/// The sheet ends where its triangles turn back with a cosine between their normals below this: slivers that are folded
+/// over along a border hide it. Greater would take sharp convex edges for borders, less leaves slivers that are folded a
+/// little less.
+const FOLD: f64 = -0.85;
+
+/// A triangle whose height is less than this share of its longest side is a sliver; which way it is folded is chance.
+const SLIVER: f64 = 0.05;
+
 /// All places whose distance from a mesh is `distance`.
 #[derive(Debug, Clone)]
 pub struct LevelSet<'a> {
     mesh: &'a TriangleMesh,
     bvh: &'a Bvh,
     distance: f64,
-    on_border: Vec<bool>,
+    /// Of vertices on borders the sum of the area vectors around, in which slivers do not count.
+    at_border: HashMap<u32, Vector3>,
+}
+
+/// Whether the sheet ends at side `k` of triangle `t`: at a border, and where a wedge or a sliver turns back.
+fn ends_at(mesh: &TriangleMesh, t: usize, k: usize) -> bool {
+    let Some(other) = mesh.neighbour(t, k) else { return true };
+    if mesh.normal(t).dot(&mesh.normal(other)) >= FOLD {
+        return false;
+    }
+    let ends = [k, (k + 1) % 3].map(|k| mesh.triangles()[t][k]);
+    let beyond = (0..3).find(|&c| !ends.contains(&mesh.triangles()[other][c])).unwrap_or(0);
+    let [here, there] = [t, other].map(|t| mesh.corners(t));
+    let is_convex = mesh.normal(t).dot(&(there[beyond] - here[k])) <= 0.0;
+    is_convex || shape(here).min(shape(there)) < SLIVER
 }
 
 /// The nearest point of the mesh to a place.
@@ -34,26 +59,25 @@ pub struct LevelSetFoot {
     pub on_border: bool,
 }
 
-/// A tangent plane of the level set.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Plane {
-    /// A place on it.
-    pub point: Point3,
-    /// Unit normal, toward greater distance.
-    pub normal: Vector3,
-}
-
 impl<'a> LevelSet<'a> {
     /// The level set of a mesh with its search tree; `distance` > 0, mm.
     pub fn new(mesh: &'a TriangleMesh, bvh: &'a Bvh, distance: f64) -> Self {
-        let mut on_border = vec![false; mesh.vertices().len()];
+        let mut at_border = HashMap::new();
         for (t, corners) in mesh.triangles().iter().enumerate() {
-            for k in (0..3).filter(|&k| mesh.neighbour(t, k).is_none()) {
-                on_border[corners[k] as usize] = true;
-                on_border[corners[(k + 1) % 3] as usize] = true;
+            for k in (0..3).filter(|&k| ends_at(mesh, t, k)) {
+                at_border.insert(corners[k], Vector3::zeros());
+                at_border.insert(corners[(k + 1) % 3], Vector3::zeros());
             }
         }
-        Self { mesh, bvh, distance, on_border }
+        for (t, corners) in mesh.triangles().iter().enumerate() {
+            for corner in corners {
+                if let Some(sum) = at_border.get_mut(corner) {
+                    let [a, b, c] = mesh.corners(t);
+                    *sum += (b - a).cross(&(c - a));
+                }
+            }
+        }
+        Self { mesh, bvh, distance, at_border }
     }
 
     /// The mesh.
@@ -71,24 +95,37 @@ impl<'a> LevelSet<'a> {
         let near = self.bvh.closest_point(self.mesh, x);
         let distance = near.signed_distance.abs();
         let direction = (x - near.point).try_normalize(f64::MIN_POSITIVE).unwrap_or(near.normal);
-        let on_border = self.is_on_border(&near);
+        let border = self.border_normal(&near);
+        let on_border = border.is_some();
         LevelSetFoot {
             point: near.point,
             direction,
-            normal: near.normal,
+            normal: border.unwrap_or(near.normal),
             distance,
             triangle: near.triangle,
             on_border,
         }
     }
 
-    fn is_on_border(&self, near: &MeshFoot) -> bool {
+    /// The normal of the sheet that ends at a foot; `None` where none does.
+    fn border_normal(&self, near: &MeshFoot) -> Option<Vector3> {
         let t = near.triangle as usize;
         let corners = self.mesh.triangles()[t];
         if let Some(k) = (0..3).find(|&k| near.barycentric[k] == 1.0) {
-            return self.on_border[corners[k] as usize];
+            let sum = self.at_border.get(&corners[k])?;
+            return Some(sum.try_normalize(0.0).unwrap_or(near.normal));
         }
-        (0..3).any(|k| near.barycentric[(k + 2) % 3] == 0.0 && self.mesh.neighbour(t, k).is_none())
+        let side = (0..3).find(|&k| near.barycentric[(k + 2) % 3] == 0.0)?;
+        // Most sides are told by their ends.
+        if !self.at_border.contains_key(&corners[side]) || !ends_at(self.mesh, t, side) {
+            return None;
+        }
+        let area = |t: usize| {
+            let [a, b, c] = self.mesh.corners(t);
+            (b - a).cross(&(c - a)).norm()
+        };
+        let other = self.mesh.neighbour(t, side).filter(|&other| area(other) > area(t));
+        Some(self.mesh.normal(other.unwrap_or(t)))
     }
 
     /// How much farther than `distance` a place is from the mesh, mm.

@@ -1,8 +1,7 @@
 //! The vertex of a piece of the level set in a cell.
 
-use super::level_set::{LevelSet, Plane};
-use crate::geometry::{Point3, Vector3};
-use nalgebra::Matrix3;
+use super::level_set::LevelSet;
+use crate::geometry::{Plane, Point3, Vector3, into_cube};
 
 /// Planes whose normals spread less than the square root of this, rad, are one plane.
 const FLAT: f64 = 1e-6;
@@ -146,32 +145,7 @@ fn nearest_of(level: &LevelSet, point: &Point3, planes: &[Plane]) -> Point3 {
 
 /// The place in a cell that is nearest to all planes, of which there is at least one.
 fn meeting(planes: &[Plane], around: &Around) -> Point3 {
-    let count = planes.len() as f64;
-    let mean = Point3::from(planes.iter().map(|p| p.point.coords).sum::<Vector3>() / count);
-    let (mut matrix, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    for Plane { point, normal } in planes {
-        matrix += normal * normal.transpose();
-        right += normal * normal.dot(&(point - mean));
-    }
-    let eigen = matrix.symmetric_eigen();
-    let mut order = [0, 1, 2];
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-    let greatest = eigen.eigenvalues[order[0]];
-    let rank = order.iter().filter(|&&k| eigen.eigenvalues[k] > FLAT * greatest).count();
-    for rank in (1..=rank).rev() {
-        let step: Vector3 = order[..rank]
-            .iter()
-            .map(|&k| {
-                let axis = eigen.eigenvectors.column(k).into_owned();
-                axis * (axis.dot(&right) / eigen.eigenvalues[k])
-            })
-            .sum();
-        let place = mean + step;
-        // Planes that meet elsewhere say nothing of this cell.
-        if around.may_hold(&place) {
-            return place;
-        }
-    }
-    let limit = Vector3::from_element(around.half);
-    mean.sup(&(around.centre - limit)).inf(&(around.centre + limit))
+    // Planes that meet elsewhere say nothing of this cell.
+    let found = crate::geometry::meeting(planes, FLAT, |place| around.may_hold(place));
+    if found.rank > 0 { found.place } else { into_cube(&found.mean, &around.centre, around.half) }
 }

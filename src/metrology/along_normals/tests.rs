@@ -1,10 +1,11 @@
+use super::super::flat_scene::{path, plane};
 use super::*;
 use crate::cutter::Solid;
 use crate::geometry::samples;
 use crate::monitor::Silent;
 use crate::part::Patch;
 use crate::sim::Rays;
-use crate::toolpath::{ClPoint, Move, MoveKind, ball_scallop_height, distance_to_segment};
+use crate::toolpath::{MoveKind, ball_scallop_height, distance_to_segment};
 
 const RADIUS: f64 = 3.0;
 
@@ -45,29 +46,10 @@ impl AlongNormal for BruteForce<'_> {
     }
 }
 
-/// A path through the tips of each pass.
-fn path(passes: &[Vec<Point3>]) -> Toolpath {
-    let mut moves = Vec::new();
-    for (pass, tips) in passes.iter().enumerate() {
-        for (k, tip) in tips.iter().enumerate() {
-            let kind = if k == 0 { MoveKind::Rapid } else { MoveKind::Cut };
-            moves.push(Move { to: ClPoint::upright(*tip), kind, feed_rate: 1000.0, pass: pass as u32 });
-        }
-    }
-    // Rapids are not cut here.
-    Toolpath { start: ClPoint::upright(passes[0][0]), moves }
-}
-
 fn measured(part: &Part, path: &Toolpath, spacing: f64) -> (Measurement, NormalMap) {
     let limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.001 };
     let ball = Cutter::ball(2.0 * RADIUS).unwrap();
     measure_along_normals(part, &ball, path, &BruteForce(path), spacing, &limits, 1e-4, &Silent).unwrap()
-}
-
-fn plane() -> Part {
-    let corners = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 3.0, 0.0], [4.0, 3.0, 0.0]];
-    let corners = corners.map(Point3::from).to_vec();
-    Part::from_mesh(crate::geometry::TriangleMesh::new(corners, vec![[0, 1, 2], [1, 3, 2]]).unwrap().0)
 }
 
 /// Passes along x, half a mm apart, the third one `lower` by so much.
@@ -81,7 +63,7 @@ fn passes(lower: f64) -> Vec<Vec<Point3>> {
 #[test]
 fn a_plane_has_the_scallops_of_the_closed_form_whatever_the_spacing() {
     for spacing in [0.17, 0.31] {
-        let (measured, map) = measured(&plane(), &path(&passes(0.0)), spacing);
+        let (measured, map) = measured(&plane([4.0, 3.0]), &path(&passes(0.0)), spacing);
         let exact = RADIUS - (RADIUS * RADIUS - 0.0625).sqrt();
         let scallop = &measured.scallop;
         let (max, p50) = (scallop.max_mm.unwrap(), scallop.p50_mm.unwrap());
@@ -96,7 +78,7 @@ fn a_plane_has_the_scallops_of_the_closed_form_whatever_the_spacing() {
 
 #[test]
 fn a_gouge_is_found_with_its_depth_area_and_move() {
-    let (measured, _) = measured(&plane(), &path(&passes(0.03)), 0.1);
+    let (measured, _) = measured(&plane([4.0, 3.0]), &path(&passes(0.03)), 0.1);
     let gouge = &measured.gouge;
     assert!((gouge.max_depth_mm - 0.03).abs() <= gouge.error_bound_mm, "{gouge:?}");
     assert!((gouge.max_depth_mm - 0.03).abs() < 1e-4 && gouge.error_bound_mm < 1e-3, "{gouge:?}");
@@ -110,7 +92,7 @@ fn a_gouge_is_found_with_its_depth_area_and_move() {
 fn a_missing_pass_is_uncut() {
     let mut missing = passes(0.0);
     missing.drain(2..5);
-    let (measured, _) = measured(&plane(), &path(&missing), 0.1);
+    let (measured, _) = measured(&plane([4.0, 3.0]), &path(&missing), 0.1);
     let exact = RADIUS - (RADIUS * RADIUS - 1.0).sqrt();
     assert!((measured.uncut.max_height_mm - exact).abs() < 1e-3, "{:?}", measured.uncut);
     assert_eq!(measured.uncut.region_count, 1);

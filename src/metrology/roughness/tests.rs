@@ -1,25 +1,13 @@
+use super::super::flat_scene::{path, plane};
 use super::*;
 use crate::cutter::Solid;
-use crate::geometry::{TriangleMesh, samples};
+use crate::geometry::samples;
 use crate::metrology::SweptVolume;
 use crate::monitor::Silent;
 use crate::part::Patch;
 use crate::sim::Rays;
-use crate::toolpath::{ClPoint, Move, MoveKind};
 
 const RADIUS: f64 = 3.0;
-
-/// A path through the tips of each pass.
-fn path(passes: &[Vec<Point3>]) -> Toolpath {
-    let mut moves = Vec::new();
-    for (pass, tips) in passes.iter().enumerate() {
-        for (k, tip) in tips.iter().enumerate() {
-            let kind = if k == 0 { MoveKind::Rapid } else { MoveKind::Cut };
-            moves.push(Move { to: ClPoint::upright(*tip), kind, feed_rate: 1000.0, pass: pass as u32 });
-        }
-    }
-    Toolpath { start: ClPoint::upright(passes[0][0]), moves }
-}
 
 fn of(part: &Part, path: &Toolpath, interval: f64) -> RoughnessFigures {
     let ball = Cutter::ball(2.0 * RADIUS).unwrap();
@@ -27,12 +15,6 @@ fn of(part: &Part, path: &Toolpath, interval: f64) -> RoughnessFigures {
     let rays = Rays::new(path, &solid, &Silent).unwrap();
     let cut = SweptVolume { part, rays: &rays, path, solid: &solid, inward: 1.0, outward: 1.0 };
     roughness(part, &ball, path, &cut, interval, &Silent).unwrap()
-}
-
-fn plane(size: f64) -> Part {
-    let corners = [[0.0, 0.0, 0.0], [size, 0.0, 0.0], [0.0, size, 0.0], [size, size, 0.0]];
-    let corners = corners.map(Point3::from).to_vec();
-    Part::from_mesh(TriangleMesh::new(corners, vec![[0, 1, 2], [1, 3, 2]]).unwrap().0)
 }
 
 /// Passes along x, `step` apart, every second one `lower` than the others.
@@ -59,7 +41,7 @@ fn circle(step: f64) -> [f64; 2] {
 #[test]
 fn a_plane_has_the_roughness_of_the_circle_and_nearly_of_the_parabola() {
     for step in [0.3, 0.5] {
-        let figures = of(&plane(12.0), &straight(step, 45, 0.0), 1.3 * step);
+        let figures = of(&plane([12.0; 2]), &straight(step, 45, 0.0), 1.3 * step);
         let [ra, rz] = circle(step);
         assert!((figures.ra_mm.unwrap() - ra).abs() <= figures.error_bound_mm.unwrap(), "{figures:?} {ra}");
         assert!((figures.rz_mm.unwrap() - rz).abs() <= figures.error_bound_mm.unwrap(), "{figures:?} {rz}");
@@ -76,7 +58,7 @@ fn a_plane_has_the_roughness_of_the_circle_and_nearly_of_the_parabola() {
 #[test]
 fn passes_of_uneven_height_are_in_the_figures() {
     let (step, lower) = (0.5f64, 0.004);
-    let figures = of(&plane(16.0), &straight(step, 40, lower), step);
+    let figures = of(&plane([16.0; 2]), &straight(step, 40, lower), step);
     // Between a pass and a lower one the ridge stands nearer to the higher.
     let aside = lower * RADIUS / step;
     let ridge = RADIUS - (RADIUS * RADIUS - (0.5 * step - aside).powi(2)).sqrt();
@@ -106,8 +88,8 @@ fn across_rings_of_a_dome_it_is_that_of_the_circular_section() {
 
 #[test]
 fn without_five_intervals_there_is_a_reason() {
-    let figures = of(&plane(1.2), &straight(0.5, 10, 0.0), 0.5);
+    let figures = of(&plane([1.2; 2]), &straight(0.5, 10, 0.0), 0.5);
     assert!(figures.ra_mm.is_none() && figures.reason.unwrap().contains("five path intervals"));
-    let none = of(&plane(1.2), &straight(0.5, 10, 0.0), f64::NAN);
+    let none = of(&plane([1.2; 2]), &straight(0.5, 10, 0.0), f64::NAN);
     assert!(none.reason.is_some() && none.profiles == 0);
 }

@@ -7,9 +7,9 @@
 
 use super::bricks::{Bricks, Placed, slot_of};
 use super::cells::{Cells, Corners};
-use super::vertex::{Plane, vertex};
+use super::vertex::vertex;
 use super::{VoxelEngine, Voxels, crossed, offset};
-use crate::geometry::{Point3, Vector3};
+use crate::geometry::{Plane, Point3, Vector3};
 use crate::monitor::{Cancelled, Monitor, check};
 use crate::parallel;
 use crate::sim::NOT_CUT;

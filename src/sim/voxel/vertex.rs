@@ -1,59 +1,26 @@
-//! The vertex of a cell: the place nearest to all tangent planes of the surface in it (T. Ju, F. Losasso,
-//! S. Schaefer and J. Warren, "Dual contouring of Hermite data", 2002).
+//! The vertex of a cell: the place nearest to all tangent planes of the surface in it.
 
-use crate::geometry::{Point3, Vector3};
-use nalgebra::Matrix3;
+use crate::geometry::{Plane, Point3, into_cube, meeting};
 
 /// Planes whose normals spread less than the square root of this, rad, are one plane. Greater wears shallow
 /// ridges down, less lets rounding move vertices along the surface.
 const FLAT: f64 = 1e-5;
 
-/// A tangent plane of the surface.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Plane {
-    /// A place on it.
-    pub(super) point: Point3,
-    /// Unit normal.
-    pub(super) normal: Vector3,
-}
-
 /// The place within the cube of half side `half` around `centre` that is nearest to all planes, of which
 /// there is at least one, and whether they meet in a ridge or a corner there.
 pub(super) fn vertex(planes: &[Plane], centre: &Point3, half: f64) -> (Point3, bool) {
-    let count = planes.len() as f64;
-    let mean = Point3::from(planes.iter().map(|p| p.point.coords).sum::<Vector3>() / count);
-    let (mut matrix, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    for Plane { point, normal } in planes {
-        matrix += normal * normal.transpose();
-        right += normal * normal.dot(&(point - mean));
+    // Planes that meet elsewhere say nothing of this cell.
+    let found = meeting(planes, FLAT, |place| (place - centre).amax() <= half);
+    if found.rank > 0 {
+        return (found.place, found.rank > 1);
     }
-    let eigen = matrix.symmetric_eigen();
-    let mut order = [0, 1, 2];
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-    let greatest = eigen.eigenvalues[order[0]];
-    let rank = order.iter().filter(|&&k| eigen.eigenvalues[k] > FLAT * greatest).count();
-    let mut place = mean;
-    for rank in (1..=rank).rev() {
-        let step: Vector3 = order[..rank]
-            .iter()
-            .map(|&k| {
-                let axis = eigen.eigenvectors.column(k).into_owned();
-                axis * (axis.dot(&right) / eigen.eigenvalues[k])
-            })
-            .sum();
-        place = mean + step;
-        // Planes that meet elsewhere say nothing of this cell.
-        if (place - centre).amax() <= half {
-            return (place, rank > 1);
-        }
-    }
-    let limit = Vector3::from_element(half);
-    (place.sup(&(centre - limit)).inf(&(centre + limit)), false)
+    (into_cube(&found.place, centre, half), false)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Vector3;
 
     fn plane(point: [f64; 3], normal: [f64; 3]) -> Plane {
         Plane { point: point.into(), normal: Vector3::from(normal).normalize() }
