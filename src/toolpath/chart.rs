@@ -191,6 +191,11 @@ impl<'a> Chart<'a> {
         Ok(Self { source: Source::Heights(surface), domain, sign: 1.0, axis })
     }
 
+    /// Whether it was fitted to a mesh, on which it does not lie.
+    pub fn is_fitted(&self) -> bool {
+        matches!(self.source, Source::Heights(_))
+    }
+
     /// The surface at a parameter; `None` where the parametrisation is degenerate.
     pub fn at(&self, u: f64, v: f64) -> Option<ChartPoint<'a>> {
         let jet = self.jet(u, v);
