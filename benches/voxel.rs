@@ -74,9 +74,9 @@ fn volume(bencher: Bencher) {
 }
 
 #[divan::bench(sample_count = 1)]
-fn removed_by_move(bencher: Bencher) {
+fn removal(bencher: Bencher) {
     let (stock, path) = (block(), path("three"));
     let solid = Solid::of_cutter(&cutter("ball"), None);
     let engine = VoxelEngine::new(&stock, &solid, &path).expect("no axis turns around");
-    bencher.bench(|| engine.removed_by_move(VOXEL, &Silent).expect("never cancelled"));
+    bencher.bench(|| engine.removal(VOXEL, &Silent).expect("never cancelled"));
 }

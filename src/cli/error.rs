@@ -73,9 +73,11 @@ pub enum CliError {
         engine: &'static str,
     },
     /// Pockets have no normals to be measured along.
-    #[error("{scene}: the toolpath \"{name}\" mills a pocket, and the engine `rays` measures surfaces")]
+    #[error(
+        "{scene}: the toolpath \"{name}\" mills a pocket, and the engines `rays` and `voxel` measure surfaces"
+    )]
     #[diagnostic(help("write `engine = \"zmap\"` or \"auto\" in [simulation], or delete `--engine`"))]
-    PocketByRays {
+    PocketAlongNormals {
         /// The scene, as its messages call it.
         scene: String,
         /// Name of the toolpath.

@@ -2,6 +2,7 @@
 
 mod normals;
 mod offset;
+mod removal;
 mod solid;
 
 use std::path::{Path, PathBuf};
@@ -292,12 +293,12 @@ impl<'a> Job<'a> {
         let (scene, monitor) = (self.scene, self.progress);
         monitor::check(monitor)?;
         let engine = scene.simulation.engine.for_path(request.axis.is_some());
-        if engine == Engine::Rays {
+        if matches!(engine, Engine::Rays | Engine::Voxel) {
             if self.pocket.is_some() {
                 let (scene, name) = (scene.source.name.clone(), request.name.clone());
-                return Err(CliError::PocketByRays { scene, name });
+                return Err(CliError::PocketAlongNormals { scene, name });
             }
-            return self.along_normals(request, outputs);
+            return self.along_normals(request, engine, outputs);
         }
         if request.axis.is_some() {
             return Err(CliError::engine(scene, &request.name, engine));
@@ -688,7 +689,7 @@ mod tests {
         let pocket = "[part]\nsurface = \"pocket\"\noutline = [[0, 0], [30, 0], [30, 20], [0, 20]]\ndepth = 2\n[cutter]\n\
             shape = \"flat\"\ndiameter = 6\n[simulation]\nengine = \"rays\"\n[[toolpath]]\nstrategy = \"pocket-offset\"\n";
         let error = run(&options(home.path(), pocket, 1), &Progress::quiet()).unwrap_err();
-        assert!(matches!(error, CliError::PocketByRays { .. }), "{error}");
+        assert!(matches!(error, CliError::PocketAlongNormals { .. }), "{error}");
     }
 
     #[test]

@@ -251,6 +251,11 @@ impl Solid {
         Self::stacked(None, holder.cutting_length(), &slants(holder))
     }
 
+    /// The sections of shank and holder, each by itself and convex, the lowest first.
+    pub fn of_sections(holder: &Holder) -> Vec<Self> {
+        slants(holder).into_iter().map(|slant| Self::stacked(None, slant[0][1], &[slant])).collect()
+    }
+
     /// Cutter, shank and holder in one.
     pub fn of_tool(cutter: &Cutter, holder: &Holder) -> Self {
         Self::stacked(Some(cutter), holder.cutting_length(), &slants(holder))
@@ -317,6 +322,26 @@ impl Solid {
     /// Largest distance from the axis, mm.
     pub fn radius(&self) -> f64 {
         self.radius
+    }
+
+    /// The least radius with which it is bent outward below its top, mm; 0 with a sharp edge or a point.
+    pub fn sharpest(&self) -> f64 {
+        let edges = &self.outline.edges;
+        let apart = |a: Pair, b: Pair| cross(a, b).abs() > 1e-9 || dot(a, b) < 0.0;
+        let point = edges.first().is_some_and(|edge| apart(edge.normals[0], [0.0, -1.0]));
+        // The last edge is the top.
+        let below = &edges[..edges.len().saturating_sub(1)];
+        let sharp = below.windows(2).any(|w| apart(w[0].normals[1], w[1].normals[0]));
+        if point || sharp {
+            return 0.0;
+        }
+        // A side that leans is bent by no less than its distance from the axis.
+        let radius = |edge: &Edge| match edge.radius {
+            r if r > 0.0 => r,
+            _ if edge.normals[0][0] > 0.0 => edge.from[0],
+            _ => f64::INFINITY,
+        };
+        below.iter().map(radius).fold(f64::INFINITY, f64::min)
     }
 
     /// Signed distance at distance `rho >= 0` from the axis and height `z` above the tip, with its

@@ -29,7 +29,8 @@ mod tracks;
 mod unseen;
 
 pub use along_normals::{
-    AlongNormal, NormalHit, NormalMap, PatchGrid, SweptVolume, measure_along_normals, net_places,
+    AlongNormal, FirstCut, NormalHit, NormalMap, PatchGrid, RaysCut, SweptVolume, VoxelCut,
+    measure_along_normals, net_places,
 };
 pub(crate) use cut_surface::CutSurface;
 pub use figures::{
@@ -44,7 +45,7 @@ pub use pairs::{MOST_PAIRS, PAIRS_HEADER, PairFigures, ScallopPair};
 pub use path::path_figures;
 pub use pocket::{PocketFigures, wall_gouge_of_cells, wall_gouge_of_moves};
 pub use refine::{Asked, Refined};
-pub use removal::{RapidContactFigures, RemovalFigures, removal_figures};
+pub use removal::{RapidContactFigures, RemovalFigures, removal_figures, voxel_removal_figures};
 pub use roughness::{RoughnessFigures, roughness};
 pub use sections::{SectionFigures, section_figures};
 

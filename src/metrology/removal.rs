@@ -1,12 +1,13 @@
 //! Figures of what a program removes on its way: volume, rate, engagement, rapid moves in stock.
 //!
-//! Enters: the path and what the in-order engine found for each of its moves. Leaves: the figures of
-//! report.json, in mm, mm³ and mm³/min. Rates are at the programmed feed; where the machine is slower
+//! Enters: the path and what an engine that keeps the order of the program found for each of its moves: the z-map of
+//! upright tools, or voxels. Leaves: the figures of report.json, in mm, mm³ and mm³/min. Rates are at the programmed feed; where the machine is slower
 //! than that, at corners and in short moves, they are lower.
 
 use serde::Serialize;
 
-use crate::sim::{MoveRemoval, Removal};
+use crate::geometry::Vector3;
+use crate::sim::{MoveRemoval, RapidContact, Removal, VoxelRemoval};
 use crate::toolpath::{MoveKind, Toolpath};
 
 /// Rates are means over consecutive feed moves of at least so many cells of travel. Fewer let the
@@ -24,15 +25,17 @@ pub struct RapidContactFigures {
     pub move_index: u32,
     /// Its line in toolpath.nc, counted from 1.
     pub line: u32,
-    /// The cell that the cutter touched first, and the height of stock there.
+    /// The cell that the cutter touched first, and the height of stock there; by voxels the voxel.
     pub at_mm: [f64; 3],
-    /// Greatest height that the move removed at a cell.
+    /// Greatest height that the move removed at a cell; by voxels at least how far below the surface that stood it cut.
     pub depth_mm: f64,
 }
 
 /// What a program removes. Rates and engagement are those of feed moves.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct RemovalFigures {
+    /// Pitch of the cells or voxels.
+    pub cell_mm: f64,
     /// Volume of stock removed by all moves.
     pub volume_mm3: f64,
     /// Bound of its error.
@@ -47,14 +50,15 @@ pub struct RemovalFigures {
     pub max_material_removal_rate_error_bound_mm3_min: f64,
     /// The move that ends the stretch with the greatest rate, counted from 0.
     pub max_material_removal_rate_move: u32,
-    /// Greatest height above the tip at which the cutter met stock, at cell centres.
+    /// Greatest height above the tip, along the tool axis, at which the cutter met stock, at the centres of cells or voxels.
     pub max_axial_engagement_mm: f64,
     /// Greatest extent of what one move cut, across its direction; moves along the axis left out.
     pub max_radial_engagement_mm: f64,
     /// Bound of its error, lips thinner than a cell left out.
     pub max_radial_engagement_error_bound_mm: f64,
-    /// Greatest difference at a cell between the heights of the two engines, which work apart.
-    pub engine_difference_mm: f64,
+    /// Greatest difference at a cell between the heights of the two engines, which work apart; not by voxels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub engine_difference_mm: Option<f64>,
     /// Rapid moves that touched stock, the first ones.
     pub rapid_contacts: Vec<RapidContactFigures>,
     /// Number of rapid moves that touched stock, listed or not.
@@ -71,19 +75,40 @@ struct Stretch {
     last: u32,
 }
 
+/// What an engine found, by cells or voxels of a pitch, mm.
+struct Found<'a> {
+    moves: &'a [MoveRemoval],
+    contacts: &'a [RapidContact],
+    volume_bound: f64,
+    pitch: f64,
+}
+
 /// The figures of a removal along `path`; `final_height` is what the other engine left, mm, cell by
 /// cell.
 pub fn removal_figures(path: &Toolpath, removal: &Removal, final_height: &[f32]) -> RemovalFigures {
+    let Removal { stock, moves, rapid_contacts, volume_bound } = removal;
+    let pitch = stock.grid.cell;
+    let found = Found { moves, contacts: rapid_contacts, volume_bound: *volume_bound, pitch };
+    let apart = |(a, b): (&f32, &f32)| f64::from((a - b).abs());
+    let difference = stock.height.iter().zip(final_height).map(apart).fold(0.0, f64::max);
+    RemovalFigures { engine_difference_mm: Some(difference), ..figures(path, &found) }
+}
+
+/// The figures of a removal along `path` by voxels of `voxel` mm, whatever the tool axis.
+pub fn voxel_removal_figures(path: &Toolpath, removal: &VoxelRemoval, voxel: f64) -> RemovalFigures {
+    let VoxelRemoval { moves, rapid_contacts, volume_bound } = removal;
+    figures(path, &Found { moves, contacts: rapid_contacts, volume_bound: *volume_bound, pitch: voxel })
+}
+
+fn figures(path: &Toolpath, found: &Found<'_>) -> RemovalFigures {
     let mut figures = RemovalFigures {
-        volume_mm3: removal.volume(),
-        volume_error_bound_mm3: removal.volume_bound,
-        rapid_contact_count: removal.rapid_contacts.len(),
+        cell_mm: found.pitch,
+        volume_mm3: found.moves.iter().map(|m| m.volume).sum(),
+        volume_error_bound_mm3: found.volume_bound,
+        rapid_contact_count: found.contacts.len(),
         ..RemovalFigures::default()
     };
-    let apart = |(a, b): (&f32, &f32)| f64::from((a - b).abs());
-    figures.engine_difference_mm =
-        removal.stock.height.iter().zip(final_height).map(apart).fold(0.0, f64::max);
-    let listed = removal.rapid_contacts.iter().take(LISTED_CONTACTS);
+    let listed = found.contacts.iter().take(LISTED_CONTACTS);
     figures.rapid_contacts = listed
         .map(|c| RapidContactFigures {
             move_index: c.move_index,
@@ -92,30 +117,31 @@ pub fn removal_figures(path: &Toolpath, removal: &Removal, final_height: &[f32])
             depth_mm: c.depth,
         })
         .collect();
-    engagement(&mut figures, path, &removal.moves);
-    rates(&mut figures, path, removal);
+    engagement(&mut figures, path, found.moves);
+    rates(&mut figures, path, found);
     figures
 }
 
 fn engagement(figures: &mut RemovalFigures, path: &Toolpath, moves: &[MoveRemoval]) {
-    for ((from, to, m), removed) in path.segments().zip(moves) {
+    for ((k, (from, to, m)), removed) in path.segments().enumerate().zip(moves) {
         if m.kind == MoveKind::Rapid {
             continue;
         }
         figures.max_axial_engagement_mm = figures.max_axial_engagement_mm.max(removed.axial);
-        if from.xy() != to.xy() && removed.radial > figures.max_radial_engagement_mm {
+        let across = (to - from).cross(&path.location_before(k).axis);
+        if across != Vector3::zeros() && removed.radial > figures.max_radial_engagement_mm {
             figures.max_radial_engagement_mm = removed.radial;
             figures.max_radial_engagement_error_bound_mm = removed.radial_bound;
         }
     }
 }
 
-fn rates(figures: &mut RemovalFigures, path: &Toolpath, removal: &Removal) {
-    let least = STRETCH_CELLS * removal.stock.grid.cell;
+fn rates(figures: &mut RemovalFigures, path: &Toolpath, found: &Found<'_>) {
+    let least = STRETCH_CELLS * found.pitch;
     let (mut volume, mut minutes) = (0.0, 0.0);
     let mut stretches: Vec<Stretch> = Vec::new();
     let mut stretch = Stretch::default();
-    for ((k, (from, to, m)), removed) in path.segments().enumerate().zip(&removal.moves) {
+    for ((k, (from, to, m)), removed) in path.segments().enumerate().zip(found.moves) {
         if m.kind == MoveKind::Rapid || m.feed_rate.is_nan() || m.feed_rate <= 0.0 {
             stretch = Stretch::default();
             continue;
@@ -197,7 +223,7 @@ mod tests {
         assert_eq!(figures.max_axial_engagement_mm, 2.0);
         let off = (figures.max_radial_engagement_mm - 6.0).abs();
         assert!(off <= figures.max_radial_engagement_error_bound_mm, "{figures:?}");
-        assert_eq!((figures.rapid_contact_count, figures.engine_difference_mm), (0, 0.0));
+        assert_eq!((figures.rapid_contact_count, figures.engine_difference_mm), (0, Some(0.0)));
     }
 
     #[test]

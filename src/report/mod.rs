@@ -28,6 +28,6 @@ pub use result::{
 pub use surface_mesh::{MAX_TRIANGLES, SurfaceMesh, VertexPlace, surface_mesh};
 pub use table::{conclusion, result_table};
 pub use verdict::{
-    HIGHEST_RIDGE, Verdict, Violation, collision, holder_note, marks, place, rapid_violation, tool_collision,
-    violations, wall_violation,
+    HIGHEST_RIDGE, Verdict, Violation, collision, holder_note, marks, place, rapid_violation,
+    standing_collision, standing_note, tool_collision, violations, wall_violation,
 };

@@ -10,7 +10,8 @@
 //!   best of plans.
 //! - gouge: the greatest depth stays within the gouge tolerance.
 //! - rapid: no rapid move touches stock, where the scene asks for what each move removes.
-//! - collision: shank and holder touch nothing that stands when all is cut.
+//! - collision: shank and holder touch nothing that stands when all is cut; of tilted tools, nothing that stands when they
+//!   come.
 //! - wall: nothing is cut beyond a pocket's outline by more than the gouge tolerance.
 //! - uncut: no place stands higher than the uncut tolerance.
 
@@ -19,7 +20,7 @@ use serde::Serialize;
 use super::map::MapMark;
 use super::table::{micrometres, with_bound};
 use crate::metrology::{Limits, Measurement, PocketFigures, RemovalFigures};
-use crate::sim::HolderClearance;
+use crate::sim::{HolderClearance, StandingHits};
 use crate::toolpath::Shortfall;
 
 /// The highest ridge may exceed the scallop tolerance by this factor. Less fails plans for single
@@ -59,6 +60,19 @@ pub struct Violation {
     pub text: String,
 }
 
+/// The line of a move, where there is a program.
+fn program_line(index: u32, lines: &[u32]) -> String {
+    lines.get(index as usize).map_or_else(String::new, |line| format!(", toolpath.nc line {line}"))
+}
+
+fn more_moves(count: usize) -> String {
+    match count {
+        0 | 1 => String::new(),
+        2 => ", and on one more move".to_owned(),
+        n => format!(", and on {} more moves", n - 1),
+    }
+}
+
 /// A place as reports write it.
 pub fn place(at: [f64; 3]) -> String {
     format!("x {:.3} y {:.3} z {:.3}", at[0], at[1], at[2])
@@ -79,12 +93,15 @@ pub fn rapid_violation(removal: &RemovalFigures) -> Option<Violation> {
     let first = removal.rapid_contacts.first()?;
     let deepest = removal.rapid_contacts.iter().map(|c| c.depth_mm).fold(0.0, f64::max);
     let mut text = format!(
-        "a rapid move touches stock, {:.3} mm deep, at {}, move {}, toolpath.nc line {}",
+        "a rapid move touches stock, {:.3} mm deep, at {}, move {}",
         first.depth_mm,
         place(first.at_mm),
-        first.move_index,
-        first.line
+        first.move_index
     );
+    // Paths that tilt the tool have no program where the scene names no machine for it.
+    if first.line > 0 {
+        text += &format!(", toolpath.nc line {}", first.line);
+    }
     match removal.rapid_contact_count {
         0 | 1 => {}
         2 => text += ", and one more rapid move does",
@@ -104,13 +121,39 @@ pub fn collision(holder: &HolderClearance, lines: &[u32]) -> Option<Violation> {
         place([worst.at.x, worst.at.y, worst.at.z]),
         worst.move_index,
         lines.get(worst.move_index as usize).copied().unwrap_or_default(),
-        match holder.collisions.len() {
-            1 => String::new(),
-            2 => ", and on one more move".to_owned(),
-            n => format!(", and on {} more moves", n - 1),
-        }
+        more_moves(holder.collisions.len())
     );
     Some(Violation { what: "collision", limit_mm: 0.0, measured_mm: worst.depth, text })
+}
+
+/// The violation that shank or holder run into stock that still stands, by voxels of `voxel` mm; `lines` are those of the
+/// moves in the program, if there is one.
+pub fn standing_collision(hits: &StandingHits, voxel: f64, lines: &[u32]) -> Option<Violation> {
+    let worst = hits.worst.as_ref()?;
+    let text = format!(
+        "section {} of the holder runs at least {:.3} mm into stock that still stands at {}, move {}{}{} (voxels of {:.3} mm)",
+        worst.section + 1,
+        worst.depth,
+        place(worst.at.into()),
+        worst.move_index,
+        program_line(worst.move_index, lines),
+        more_moves(hits.moves.len()),
+        voxel
+    );
+    Some(Violation { what: "collision", limit_mm: 0.0, measured_mm: worst.depth, text })
+}
+
+/// What else is to be said about a holder that was held against standing stock.
+pub fn standing_note(hits: &StandingHits, voxel: f64) -> String {
+    if hits.worst.is_some() {
+        return "shank and holder meet stock that still stands; rough the block first, or take a longer cutter or a \
+                slimmer holder"
+            .to_owned();
+    }
+    format!(
+        "shank and holder stay clear of what still stands when they come; less than {:.3} mm across would not be seen",
+        3f64.sqrt() * voxel
+    )
 }
 
 /// The violation that a tool touches what it should not: moves, what is missing there, and what of the tool it is; `lines`
@@ -118,16 +161,12 @@ pub fn collision(holder: &HolderClearance, lines: &[u32]) -> Option<Violation> {
 pub fn tool_collision(found: &[(usize, Shortfall, &str)], lines: &[u32]) -> Option<Violation> {
     let (index, worst, what) = found.iter().reduce(|a, b| if b.1.depth > a.1.depth { b } else { a })?;
     let at = worst.nearest.place;
-    let line = lines.get(*index).map_or_else(String::new, |line| format!(", toolpath.nc line {line}"));
     let text = format!(
-        "{what} runs at least {:.3} mm into part or fixture at {}, move {index}{line}{}",
+        "{what} runs at least {:.3} mm into part or fixture at {}, move {index}{}{}",
         worst.depth,
         place(at.into()),
-        match found.len() {
-            1 => String::new(),
-            2 => ", and on one more move".to_owned(),
-            n => format!(", and on {} more moves", n - 1),
-        }
+        program_line(*index as u32, lines),
+        more_moves(found.len())
     );
     Some(Violation { what: "collision", limit_mm: 0.0, measured_mm: worst.depth, text })
 }
@@ -341,6 +380,22 @@ mod tests {
         (holder.collisions, holder.lowest, holder.uncertain) = (vec![], 1.5, 0);
         assert_eq!(collision(&holder, &[]), None);
         assert_eq!(holder_note(&holder), "shank and holder stay 1.500 ± 0.100 mm above the finished stock");
+    }
+
+    #[test]
+    fn a_holder_in_standing_stock_is_told_with_its_place_and_line() {
+        let at = crate::geometry::Point3::new(1.0, 2.0, 3.0);
+        let worst = crate::sim::HolderHit { move_index: 2, section: 1, at, depth: 0.75 };
+        let hits = StandingHits { moves: vec![2, 5, 9], worst: Some(worst) };
+        let found = standing_collision(&hits, 0.3, &[4, 5, 6]).unwrap();
+        assert_eq!((found.what, found.measured_mm), ("collision", 0.75));
+        let expected = "section 2 of the holder runs at least 0.750 mm into stock that still stands at x 1.000 y 2.000 z \
+                        3.000, move 2, toolpath.nc line 6, and on 2 more moves (voxels of 0.300 mm)";
+        assert_eq!(found.text, expected);
+        assert!(standing_note(&hits, 0.3).contains("rough the block first"));
+        let clear = StandingHits::default();
+        assert_eq!(standing_collision(&clear, 0.3, &[]), None);
+        assert!(standing_note(&clear, 0.3).contains("less than 0.520 mm across"));
     }
 
     #[test]

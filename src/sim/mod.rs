@@ -32,5 +32,8 @@ pub use rays::{RayHit, Rays, RaysError};
 pub use reference::cut_reference;
 pub use solid::{Nearest, OppositeAxes, SweptHit, SweptMoves, SweptSolid};
 pub use swept::SweptMove;
-pub use voxel::{Axis, StockMesh, VoxelEngine, VoxelError, VoxelSample, VoxelStock, VoxelSurface, Voxels};
+pub use voxel::{
+    Axis, HolderHit, LineExit, StandingHits, StockMesh, VoxelEngine, VoxelError, VoxelRemoval, VoxelSample,
+    VoxelStock, VoxelSurface, Voxels,
+};
 pub use zmap::{NOT_CUT, ZMap};

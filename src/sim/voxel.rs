@@ -2,8 +2,8 @@
 //!
 //! Enters: stock (a box, a round bar, a closed mesh), the tool as a [`Solid`] and a path. Leaves: the signed
 //! distance from the surface of the remaining material at the samples near it, each with the move that is
-//! nearest there; from those its volume, its heights and its surface as a closed triangle mesh, and how much
-//! each move removes in the order of the program.
+//! nearest there; from those its volume, its heights, its surface as a closed triangle mesh and where a line leaves it; how
+//! much each move removes in the order of the program, and whether a holder runs into what still stands.
 //!
 //! The material is the stock less all that the tool sweeps, so its distance is the greater of that of the
 //! stock and the negative of that of the swept volume: exact in sign and at the surface, elsewhere no greater
@@ -16,9 +16,12 @@ mod capsule;
 mod cells;
 mod divide;
 mod leaf;
+mod line;
 mod moves;
+mod octree;
 mod removal;
 mod slide;
+mod standing;
 mod stock;
 mod surface;
 #[cfg(test)]
@@ -30,11 +33,14 @@ use crate::cutter::Solid;
 use crate::geometry::{Point3, Vector3};
 use crate::monitor::{Cancelled, Monitor, check};
 use crate::parallel;
-use crate::toolpath::Toolpath;
+use crate::toolpath::{MoveKind, Toolpath};
 use bricks::{BRICK, Block, Brick, Bricks, Lattice, STEPS, slot_of};
 use cells::Cells;
 use divide::{Divider, Found};
+pub use line::LineExit;
 use moves::Parts;
+pub use removal::VoxelRemoval;
+pub use standing::{HolderHit, StandingHits};
 use std::sync::atomic::{AtomicU64, Ordering};
 pub use stock::{Axis, StockMesh, VoxelStock};
 pub use surface::VoxelSurface;
@@ -115,6 +121,8 @@ const MIB: u64 = 1 << 20;
 pub struct VoxelEngine<'a> {
     stock: &'a VoxelStock,
     parts: Parts,
+    /// Which moves are rapid ones.
+    rapids: Vec<bool>,
 }
 
 impl<'a> VoxelEngine<'a> {
@@ -126,7 +134,8 @@ impl<'a> VoxelEngine<'a> {
         if !stock.is_valid() {
             return Err(VoxelError::Stock);
         }
-        Ok(Self { stock, parts: Parts::new(solid, path)? })
+        let rapids = path.moves.iter().map(|m| m.kind == MoveKind::Rapid).collect();
+        Ok(Self { stock, parts: Parts::new(solid, path)?, rapids })
     }
 
     fn lattice(&self, voxel: f64) -> Result<Option<Lattice>, VoxelError> {

@@ -247,6 +247,11 @@ impl<'a> Chart<'a> {
         (width, limited)
     }
 
+    /// Whether it was fitted to a mesh, on which it does not lie.
+    pub fn is_fitted(&self) -> bool {
+        matches!(self.source, Source::Heights(_))
+    }
+
     /// The surface at a parameter; `None` where the parametrisation is degenerate.
     pub fn at(&self, u: f64, v: f64) -> Option<ChartPoint<'a>> {
         let jet = self.jet(u, v);

@@ -70,10 +70,11 @@ fn on_chart(
     let tracer = LevelTracer::new(&field, &metric, chart.domain, [0.0; 2], TRACE_CELLS, settings.sampling);
     let levels = Levels::trace(&tracer, [0.5 * (u0 + u1), v0])?;
     let spiral = Spiral { tracer: &tracer, levels, chart, cutter, field: &field, settings };
-    let drop = DropCutter::new(part, cutter);
+    let dropped = settings.dropped(cutter);
+    let drop = DropCutter::new(part, dropped);
     let tip = |[u, v]: [f64; 2]| {
         let p = chart.at(u, v)?;
-        let axis = p.jet.p.xy() + cutter.axis_offset(&p.normal);
+        let axis = p.jet.p.xy() + dropped.axis_offset(&p.normal);
         drop.at(axis.x, axis.y).map(|d| Point3::new(axis.x, axis.y, d.tip_z))
     };
     let moves = |points: &[[f64; 2]]| -> Result<Vec<Point3>, Cancelled> {

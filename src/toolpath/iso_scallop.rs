@@ -233,6 +233,7 @@ mod tests {
             chord_tolerance: 1e-3,
             smoothing: None,
             axis: None,
+            probe: None,
         };
         let chart = &Chart::all(&part, &cutter, None).unwrap()[0];
         let border = vec![vec![[0.0, 0.0], [1.0, 0.0]]];

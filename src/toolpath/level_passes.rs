@@ -75,8 +75,9 @@ pub(super) fn along_levels_placed(
     let range = tracer.range();
     let places = places_of(chart, cutter, field, settings);
     let levels = place_levels(&places, range, placing, &mut notes);
-    let drop = DropCutter::new(part, cutter);
-    let guide = Guide { tracer: &tracer, chart, cutter, field, drop, settings, monitor };
+    let dropped = settings.dropped(cutter);
+    let drop = DropCutter::new(part, dropped);
+    let guide = Guide { tracer: &tracer, chart, cutter, dropped, field, drop, settings, monitor };
     let mut passes = along_and_between(&guide, &levels, range, settings.sampling, monitor)?;
     if let Step::Scallop(height) = settings.step {
         let lengths = [height, settings.sampling];
@@ -113,6 +114,8 @@ struct Guide<'a> {
     tracer: &'a LevelTracer<'a>,
     chart: &'a Chart<'a>,
     cutter: &'a Cutter,
+    /// What is dropped in its stead.
+    dropped: &'a Cutter,
     field: &'a ScalarField,
     drop: DropCutter<'a>,
     settings: &'a PassSettings<'a>,
@@ -124,7 +127,7 @@ impl Guide<'_> {
     /// normal, then dropped, so that it is held off by any other place of the part.
     fn tip(&self, [u, v]: [f64; 2], beside: &mut Beside) -> Option<Point3> {
         let p = self.chart.at(u, v)?;
-        let axis = p.jet.p.xy() + self.cutter.axis_offset(&p.normal);
+        let axis = p.jet.p.xy() + self.dropped.axis_offset(&p.normal);
         self.drop.at_beside(axis.x, axis.y, beside).map(|d| Point3::new(axis.x, axis.y, d.tip_z))
     }
 
@@ -291,6 +294,10 @@ impl LevelSource for Guide<'_> {
         let (Some(rule), Some((points, run))) = (self.settings.axis, points_of(curve, run)) else {
             return Ok(None);
         };
+        if self.chart.is_fitted() {
+            // The mesh itself tells where it is touched.
+            return Ok(None);
+        }
         let at = |s: f64| self.on_level(&points, level, s);
         let Some(stretches) = self.useful_stretches(&at, run, curve.closed) else { return Ok(None) };
         let contact = |s: f64| {

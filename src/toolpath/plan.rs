@@ -17,7 +17,7 @@ use super::{
     PocketStrategy, Toolpath, contour_spiral, iso_scallop, mesh_passes, mesh_surface, offset_mesh,
     offset_surface, shortest, spiral, streamline, waterline, zigzag,
 };
-use crate::cutter::{Cutter, CutterShape};
+use crate::cutter::Cutter;
 use crate::field::mesh::Sense;
 use crate::field::{KnotRule, LineField, Solver};
 use crate::geometry::{NurbsSurface, Point2, Point3, TriangleMesh};
@@ -353,6 +353,8 @@ pub(super) struct PassSettings<'a> {
     pub smoothing: Option<f64>,
     /// How the cutter is tilted; upright without it.
     pub axis: Option<&'a ToolAxis>,
+    /// The ball that is dropped in its stead where a tilted cutter, no ball itself, is located by the contacts of that.
+    pub probe: Option<&'a Cutter>,
 }
 
 /// Shares of the chord tolerance that sampling and point reduction may use. Together they leave a part of it: ridges stand
@@ -360,7 +362,15 @@ pub(super) struct PassSettings<'a> {
 const SAMPLING_SHARE: f64 = 0.1;
 const REDUCTION_SHARE: f64 = 0.4;
 
-impl PassSettings<'_> {
+impl<'a> PassSettings<'a> {
+    /// The cutter that is dropped.
+    pub fn dropped<'b>(&self, cutter: &'b Cutter) -> &'b Cutter
+    where
+        'a: 'b,
+    {
+        self.probe.unwrap_or(cutter)
+    }
+
     /// Straight moves along `locate` over `[s0, s1]` within the chord tolerance.
     ///
     /// # Errors
@@ -505,10 +515,10 @@ pub fn plan(
 ///
 /// On patches the cutter is located by its contact, on level curves of the strategy's function. A ball cutter's centre
 /// stands where it does upright, so that on meshes, and with strategies that drop the cutter, the upright path is tilted
-/// around it.
+/// around it. Other cutters are located there by the contacts of a ball that is dropped in their stead.
 ///
 /// # Errors
-/// See [`PlanError`]; also where other cutters than balls would have to be dropped.
+/// See [`PlanError`].
 pub fn plan_tilted(
     part: &Part,
     cutter: &Cutter,
@@ -520,7 +530,9 @@ pub fn plan_tilted(
     let (planned, both_ways) = passes(part, cutter, strategy, Some(tilting.axis), settings, monitor)?;
     let Passes { passes, touches, mut notes, field, contacts } = planned;
     let mut touches = if touches.is_empty() && !passes.is_empty() {
-        tilted::around_centres(&passes, part, cutter, tilting.axis, settings.chord_tolerance, monitor)?
+        let dropped = tilted::probe(cutter).unwrap_or_else(|| cutter.clone());
+        let dropped = tilted::Dropped { passes: &passes, ball: &dropped };
+        tilted::around_centres(&dropped, part, cutter, tilting.axis, settings.chord_tolerance, monitor)?
     } else {
         TiltedPasses::located(touches, settings.chord_tolerance)
     };
@@ -549,7 +561,9 @@ fn passes(
     let sampling = SAMPLING_OVER_RADIUS * cutter.radius();
     // A tilted cutter's passes are smoothed once they are tilted.
     let smoothing = (settings.joining.smoothing && axis.is_none()).then_some(sampling);
-    let pass = PassSettings { step, sampling, chord_tolerance: settings.chord_tolerance, smoothing, axis };
+    let probe = axis.and_then(|_| tilted::probe(cutter));
+    let (chord_tolerance, probe) = (settings.chord_tolerance, probe.as_ref());
+    let pass = PassSettings { step, sampling, chord_tolerance, smoothing, axis, probe };
     check_extent(part, cutter, &pass)?;
     // A tilted cutter follows the level curves of the plan coordinate instead of being dropped.
     let levels = axis.filter(|_| !part.patches().is_empty());
@@ -585,7 +599,7 @@ fn passes(
         }
         Strategy::ShortestStreamline { toward } => {
             let toward = toward.as_ref().map(|(direction, dearer)| (direction, *dearer));
-            let passes = if levels.is_none() && mesh_surface::wants_mesh(part, cutter) {
+            let passes = if levels.is_none() && probe.is_none() && mesh_surface::wants_mesh(part, cutter) {
                 mesh_passes::on_mesh(part, cutter, Aim::Shortest(toward), &pass, monitor)?
             } else {
                 shortest::passes(part, cutter, toward, &pass, monitor)?
@@ -596,8 +610,13 @@ fn passes(
             if *method == StreamMethod::Elements
                 || (*method == StreamMethod::Automatic
                     && levels.is_none()
+                    && probe.is_none()
                     && mesh_surface::wants_mesh(part, cutter)) =>
         {
+            if probe.is_some() {
+                let reason = "its passes by elements are spaced for an upright cutter; use a ball, or another `method`";
+                return Err(PlanError::NotApplicable { strategy: "streamline", reason: reason.to_owned() });
+            }
             (mesh_passes::on_mesh(part, cutter, Aim::Fitted(direction), &pass, monitor)?, true)
         }
         Strategy::Streamline { direction, control_points, method, solver } => {
@@ -605,10 +624,5 @@ fn passes(
             (streamline::streamline(part, cutter, direction, &fitting, &pass, monitor)?, true)
         }
     };
-    if axis.is_some() && passes.touches.is_empty() && cutter.shape() != CutterShape::Ball {
-        let reason = "it drops the cutter, and only a ball can be tilted where it was dropped; use a ball, or a part of \
-                      patches with iso-parametric, iso-scallop, streamline, waterline or zigzag passes";
-        return Err(PlanError::NotApplicable { strategy: "this tool axis", reason: reason.to_owned() });
-    }
     Ok((passes, both_ways))
 }

@@ -43,13 +43,14 @@ pub fn passes(
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
     let charts = Chart::all(part, cutter, settings.axis)?;
-    let [x, y] = [Vector2::x(), Vector2::y()].map(|e| Chart::extent_of_axes(&charts, part, cutter, &e));
+    let dropped = settings.dropped(cutter);
+    let [x, y] = [Vector2::x(), Vector2::y()].map(|e| Chart::extent_of_axes(&charts, part, dropped, &e));
     let middle = Vector2::new(0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]));
     let reach = 0.5 * (x[1] - x[0]).hypot(y[1] - y[0]);
     let mut notes = Vec::new();
     let pitches = match settings.step {
         Step::Stepover(s) => vec![s; RINGS],
-        Step::Scallop(h) => pitches(&charts, cutter, middle, reach, h, &mut notes),
+        Step::Scallop(h) => pitches(&charts, [cutter, dropped], middle, reach, h, &mut notes),
     };
     let widest = pitches.iter().copied().fold(0.0, f64::max);
     let layout = layout(&pitches, reach, LAYOUT_SHARE * settings.sampling);
@@ -60,8 +61,8 @@ pub fn passes(
         let (angle, radius) = (a.angle + t * (b.angle - a.angle), a.radius + t * (b.radius - a.radius));
         middle + Vector2::new(angle.cos(), angle.sin()) * radius
     };
-    let (drop, border) = (DropCutter::new(part, cutter), Border::of(part));
-    let curves = PlanCurves { drop, border, cutter, overrun: widest, settings, monitor };
+    let (drop, border) = (DropCutter::new(part, dropped), Border::of(part));
+    let curves = PlanCurves { drop, border, cutter: dropped, overrun: widest, settings, monitor };
     monitor.start("planning spiral", 1);
     monitor::check(monitor)?;
     let passes = curves.pieces(&curve, [0.0, layout[layout.len() - 1].s])?;
@@ -75,10 +76,10 @@ pub fn passes(
     Ok(Passes { passes, notes, ..Passes::default() })
 }
 
-/// The pitch of each ring.
+/// The pitch of each ring, for a cutter and what is dropped in its stead.
 fn pitches(
     charts: &[Chart],
-    cutter: &Cutter,
+    [cutter, dropped]: [&Cutter; 2],
     middle: Vector2,
     reach: f64,
     h: f64,
@@ -88,12 +89,12 @@ fn pitches(
     let mut least: Vec<Option<f64>> = vec![None; RINGS];
     for chart in charts {
         for p in chart.grid(SAMPLES).filter_map(|[u, v]| chart.at(u, v)) {
-            let arm = p.jet.p.coords.xy() + cutter.axis_offset(&p.normal) - middle;
+            let arm = p.jet.p.coords.xy() + dropped.axis_offset(&p.normal) - middle;
             let outward = arm.y.atan2(arm.x);
             let turns = if arm.norm() < MIDDLE * plane { MIDDLE_DIRECTIONS } else { 1 };
             let feeds = (0..turns).map(|k| outward + FRAC_PI_2 + TAU * k as f64 / turns as f64);
             let ring = ((arm.norm() / reach * RINGS as f64) as usize).min(RINGS - 1);
-            for stepover in feeds.filter_map(|feed| stepover_at(&p, cutter, feed, h)) {
+            for stepover in feeds.filter_map(|feed| stepover_at(&p, [cutter, dropped], feed, h)) {
                 least[ring] = Some(least[ring].map_or(stepover, |known| known.min(stepover)));
             }
         }

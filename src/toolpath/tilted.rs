@@ -6,12 +6,13 @@
 //! so its strays count: that of the arc's centre height on the axis, and the turn of the axis times the
 //! distance of the arc from it, which is none for a ball.
 
+use super::border::Border;
 use super::chord::{Side, Watch, Waypoint, moved_aside, reduced_indices, sample_within_chord};
 use super::plan::PlanError;
 use super::smooth::smooth_and_spread_tilted;
 use super::tool_axis::{AxisError, ToolAxis, location};
 use super::{CcPoint, ClPoint, Interference};
-use crate::cutter::Cutter;
+use crate::cutter::{Cutter, CutterShape};
 use crate::geometry::{Point3, Vector3};
 use crate::monitor::{Cancelled, Monitor};
 use crate::part::Part;
@@ -170,21 +171,55 @@ pub(super) fn along(
     refused.map_or(Ok(touches), |error| Err(PlanError::Axis(error)))
 }
 
-/// Passes of a ball that was dropped upright, tilted around its centre. `tips` are those of the upright ball.
+/// The radius of a probe is that of the cutter's corner, but no less than this share of its own: where facets meet, the
+/// normal turns over an arc of that radius; what is more hollow it does not reach into.
+const PROBE_OVER_RADIUS: f64 = 0.25;
+
+/// The ball that is dropped to find where a cutter touches; `None` for a ball.
+pub(super) fn probe(cutter: &Cutter) -> Option<Cutter> {
+    let radius = cutter.corner_radius().max(PROBE_OVER_RADIUS * cutter.radius());
+    let other = cutter.shape() != CutterShape::Ball;
+    other.then(|| Cutter::ball(2.0 * radius).ok()).flatten()
+}
+
+/// Passes of a ball that was dropped upright: its tips along each.
+pub(super) struct Dropped<'a> {
+    pub passes: &'a [Vec<Point3>],
+    pub ball: &'a Cutter,
+}
+
+impl Dropped<'_> {
+    /// Where the ball touches while its centre is there. Beside the part's border the plane goes on on which the border lies,
+    /// for all but a ball that cuts itself.
+    fn contact(&self, part: &Part, border: Option<&Border<'_>>, centre: &Point3) -> Option<CcPoint> {
+        let foot = part.closest_point(centre).0;
+        let normal = (centre - foot.point).try_normalize(1e-9)?;
+        match border.filter(|border| border.holds(&foot)) {
+            Some(_) => {
+                let off = (centre - foot.point).dot(&foot.normal);
+                Some(CcPoint { point: centre - foot.normal * off, normal: foot.normal })
+            }
+            None => Some(CcPoint { point: centre - normal * self.ball.radius(), normal }),
+        }
+    }
+}
+
+/// A cutter tilted where a ball that was dropped upright touches: around its centre, if it is that ball itself.
 ///
 /// # Errors
 /// [`PlanError::Axis`] where the rule gives no axis, or [`Cancelled`].
 pub(super) fn around_centres(
-    passes: &[Vec<Point3>],
+    dropped: &Dropped<'_>,
     part: &Part,
     cutter: &Cutter,
     rule: &ToolAxis,
     chord_tolerance: f64,
     monitor: &dyn Monitor,
 ) -> Result<TiltedPasses, PlanError> {
+    let passes = dropped.passes;
     monitor.start("tilting the cutter", passes.len() as u64);
-    let radius = cutter.radius();
-    let up = Vector3::z() * radius;
+    let up = Vector3::z() * dropped.ball.radius();
+    let border = (cutter.shape() != CutterShape::Ball).then(|| Border::of(part));
     let passes = crate::parallel::try_map(passes.len(), |k| {
         let tips = &passes[k];
         let last = tips.len() - 1;
@@ -212,12 +247,9 @@ pub(super) fn around_centres(
             let k = (s as usize).min(last.checked_sub(1)?);
             let t = s - k as f64;
             let centre = tips[k] + (tips[k + 1] - tips[k]) * t + up;
-            let normal = (centre - part.closest_point(&centre).0.point).try_normalize(1e-9)?;
+            let contact = dropped.contact(part, border.as_ref(), &centre)?;
             let (a, b) = (feed_at(k)?, feed_at(k + 1)?);
-            Some((
-                CcPoint { point: centre - normal * radius, normal },
-                (a * (1.0 - t) + b * t).try_normalize(1e-12)?,
-            ))
+            Some((contact, (a * (1.0 - t) + b * t).try_normalize(1e-12)?))
         };
         let touches = along(&contact, [0.0, last as f64], cutter, rule, chord_tolerance, monitor)?;
         monitor.advance(1);

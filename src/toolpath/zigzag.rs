@@ -47,10 +47,11 @@ pub fn passes(
     let mut notes = Vec::new();
     let stepover = match settings.step {
         Step::Stepover(s) => s,
-        Step::Scallop(h) => safe_stepover(&charts, cutter, angle, h, &mut notes),
+        Step::Scallop(h) => safe_stepover(&charts, [cutter, settings.dropped(cutter)], angle, h, &mut notes),
     };
     let (along, across) = (Vector2::new(angle.cos(), angle.sin()), Vector2::new(-angle.sin(), angle.cos()));
-    let extent = |e: &Vector2| Chart::extent_of_axes(&charts, part, cutter, e);
+    let dropped = settings.dropped(cutter);
+    let extent = |e: &Vector2| Chart::extent_of_axes(&charts, part, dropped, e);
     let (from_to, sides) = (extent(&along), extent(&across));
     let count = ((sides[1] - sides[0]) / stepover - 1e-9).ceil().max(1.0) as usize;
     // A stepover that the user asked for is kept exactly, and the passes stand in the middle.
@@ -59,8 +60,8 @@ pub fn passes(
         Step::Scallop(_) => (sides[1] - sides[0]) / count as f64,
     };
     let middle = 0.5 * (sides[0] + sides[1]);
-    let (drop, border) = (DropCutter::new(part, cutter), Border::of(part));
-    let curves = PlanCurves { drop, border, cutter, overrun: pitch, settings, monitor };
+    let (drop, border) = (DropCutter::new(part, dropped), Border::of(part));
+    let curves = PlanCurves { drop, border, cutter: dropped, overrun: pitch, settings, monitor };
     monitor.start("planning zigzag", count as u64);
     let lines = crate::parallel::try_map(count, |k| {
         monitor::check(monitor)?;
@@ -106,7 +107,7 @@ pub fn best(
         let stepover = match settings.step {
             Step::Stepover(s) => s,
             Step::Scallop(h) => {
-                let least = least_stepover(&places, cutter, angle(k), h);
+                let least = least_stepover(&places, [cutter, settings.dropped(cutter)], angle(k), h);
                 if least.is_finite() {
                     least.max(least_over_plane(cutter, h))
                 } else {
@@ -119,7 +120,8 @@ pub fn best(
             let t = p.tangent_at(angle(k))?;
             let e = Vector2::new(-angle(k).sin(), angle(k).cos());
             let b = p.normal.cross(&t);
-            let (along, across) = (p.offset_ratio(cutter, &t), p.offset_ratio(cutter, &b));
+            let dropped = settings.dropped(cutter);
+            let (along, across) = (p.offset_ratio(dropped, &t), p.offset_ratio(dropped, &b));
             Some(area * along * across * b.xy().dot(&e).abs())
         });
         (covered.sum::<f64>() / stepover, k)
@@ -164,24 +166,36 @@ pub(super) fn least_over_plane(cutter: &Cutter, h: f64) -> f64 {
 }
 
 /// The plan-view stepover, mm, that a place allows for passes in the direction `angle`; `None` where none is asked for,
-/// since the cutter hardly fits: one pass serves the whole hollow, though the formula asks for ever closer ones.
-pub(super) fn stepover_at(p: &ChartPoint, cutter: &Cutter, angle: f64, h: f64) -> Option<f64> {
+/// since the cutter hardly fits: one pass serves the whole hollow, though the formula asks for ever closer ones. Of both
+/// cutters the first one cuts, the second one is dropped.
+pub(super) fn stepover_at(
+    p: &ChartPoint,
+    [cutter, dropped]: [&Cutter; 2],
+    angle: f64,
+    h: f64,
+) -> Option<f64> {
     let e = Vector2::new(-angle.sin(), angle.cos());
     let t = p.tangent_at(angle)?;
     let (width, too_concave) = p.strip_width(cutter, &t, Step::Scallop(h));
-    let bend = 1.0 - p.curvature_along(&p.normal.cross(&t)) * cutter.corner_radius();
+    let bend = 1.0 - p.curvature_along(&p.normal.cross(&t)) * dropped.corner_radius();
     let lean = (1.0 - p.normal.xy().dot(&e).powi(2)).max(0.0).sqrt();
     (bend > 0.0 && !too_concave).then_some(width * bend * lean)
 }
 
-fn least_stepover(places: &[(ChartPoint, f64)], cutter: &Cutter, angle: f64, h: f64) -> f64 {
-    places.iter().filter_map(|(p, _)| stepover_at(p, cutter, angle, h)).fold(f64::INFINITY, f64::min)
+fn least_stepover(places: &[(ChartPoint, f64)], cutters: [&Cutter; 2], angle: f64, h: f64) -> f64 {
+    places.iter().filter_map(|(p, _)| stepover_at(p, cutters, angle, h)).fold(f64::INFINITY, f64::min)
 }
 
 /// The greatest stepover that keeps the scallop everywhere.
-fn safe_stepover(charts: &[Chart], cutter: &Cutter, angle: f64, h: f64, notes: &mut Vec<String>) -> f64 {
-    let least = least_stepover(&places(charts), cutter, angle, h);
-    let floor = least_over_plane(cutter, h);
+fn safe_stepover(
+    charts: &[Chart],
+    cutters: [&Cutter; 2],
+    angle: f64,
+    h: f64,
+    notes: &mut Vec<String>,
+) -> f64 {
+    let least = least_stepover(&places(charts), cutters, angle, h);
+    let floor = least_over_plane(cutters[0], h);
     if least.is_finite() && least >= floor {
         return least;
     }

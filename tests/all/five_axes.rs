@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::support::{is_good, number, patch, run_scene};
+use crate::support::{height_mesh, is_good, number, patch, run_scene, write_stl};
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/five_axes")
@@ -63,6 +63,7 @@ fn a_lead_makes_passes_on_a_dome_wider() {
     );
     is_good(lead);
     stays_near(lead);
+    takes_its_part_of_the_block(lead);
     let length = |path: &Value| number(path, "/path/cutting_length_mm");
     assert!(length(lead) < 0.7 * length(upright), "{} {}", length(lead), length(upright));
 }
@@ -73,6 +74,7 @@ fn a_lip_is_cut_from_the_side_below_its_widest_place() {
     for path in report["toolpaths"].as_array().unwrap() {
         is_good(path);
         stays_near(path);
+        takes_its_part_of_the_block(path);
         // The area of 100 degrees of the cylinder.
         let area = 15.0 * 100f64.to_radians() * 20.0;
         assert!((number(path, "/deviation/area_mm2") / area - 1.0).abs() < 0.01, "{:#}", path["deviation"]);
@@ -93,11 +95,75 @@ fn a_holder_that_leans_away_from_the_walls_is_clear_of_them() {
     assert_eq!(leaning["verdict"], "pass", "{:#}", leaning["violations"]);
     is_good(leaning);
     stays_near(leaning);
+    takes_its_part_of_the_block(leaning);
+    let notes = leaning["notes"].to_string();
+    assert!(notes.contains("stay clear of what still stands"), "{notes}");
 }
 
-/// The same upright path under two engines that share no code: heights on a grid, and rays along normals.
+/// The same from the full block: the holder goes where the passes to come have yet to make way.
 #[test]
-fn rays_measure_what_the_z_map_does() {
+fn a_holder_in_stock_that_still_stands_is_a_collision() {
+    let home = tempfile::tempdir().unwrap();
+    let scene = std::fs::read_to_string(folder().join("trough.toml")).unwrap();
+    let (head, toolpaths) = scene.split_once("[[toolpath]]").unwrap();
+    let (_, leaning) = toolpaths.split_once("[[toolpath]]").unwrap();
+    assert!(head.contains("roughed = "));
+    let whole: String =
+        head.lines().filter(|line| !line.starts_with("roughed")).map(|l| l.to_owned() + "\n").collect();
+    std::fs::copy(folder().join("trough.json"), home.path().join("trough.json")).unwrap();
+    let path = home.path().join("trough.toml");
+    std::fs::write(&path, format!("{whole}[[toolpath]]{leaning}")).unwrap();
+    let (code, report) = run_scene(&path);
+    let violation = &report["toolpaths"][0]["violations"][0];
+    assert_eq!((code, &violation["what"]), (1, &"collision".into()), "{violation:#}");
+    assert!(violation["text"].as_str().unwrap().contains("into stock that still stands at"), "{violation}");
+}
+
+/// A bull nose end mill that leads by five degrees, on a patch and on its triangles.
+#[test]
+fn a_lead_on_triangles_leaves_what_it_leaves_on_their_patch() {
+    let home = tempfile::tempdir().unwrap();
+    let n = 64;
+    let mesh = height_mesh(n, [22.0, 22.0], |x, y| {
+        let (x, y) = (x - 11.0, y - 11.0);
+        (400.0 - x * x - y * y).sqrt() - 20.0
+    });
+    let corners: Vec<_> = (0..mesh.triangles().len()).map(|t| mesh.corners(t)).collect();
+    write_stl(&home.path().join("dome.stl"), &corners);
+    std::fs::write(home.path().join("dome.json"), dome().to_string()).unwrap();
+    let run = |part: &str| {
+        let scene = format!(
+            "[part]\n{part}\n[cutter]\nshape = \"bull\"\ndiameter = 10\ncorner_radius = 2\n\
+             [simulation]\ncell = 0.2\n[[toolpath]]\nstrategy = \"zigzag\"\naxis = {{ lead = 5 }}\n"
+        );
+        let path = home.path().join("dome.toml");
+        std::fs::write(&path, scene).unwrap();
+        run_scene(&path).1["toolpaths"][0].clone()
+    };
+    let [patch, mesh] = ["surface = \"nurbs\"\nfile = \"dome.json\"", "file = \"dome.stl\""].map(run);
+    for path in [&patch, &mesh] {
+        is_good(path);
+        assert_eq!(path["simulation"]["engine"], "rays");
+    }
+    // One stepover serves the whole mesh, but as for a lead: upright it would be less than half of that.
+    let length = |path: &Value| number(path, "/path/cutting_length_mm");
+    assert!(length(&mesh) < 1.4 * length(&patch), "{} {}", length(&mesh), length(&patch));
+    assert!(number(&mesh, "/scallop/max_mm") > 0.004, "{:#}", mesh["scallop"]);
+}
+
+/// What the moves take adds up to less than the block, and no rapid takes any.
+fn takes_its_part_of_the_block(path: &Value) {
+    let (volume, bound) =
+        (number(path, "/removal/volume_mm3"), number(path, "/removal/volume_error_bound_mm3"));
+    assert!(volume > 100.0 && bound < 0.05 * volume, "{:#}", path["removal"]);
+    assert_eq!(number(path, "/removal/rapid_contact_count"), 0.0, "{:#}", path["removal"]);
+    let rate = number(path, "/removal/max_material_removal_rate_mm3_min");
+    assert!(rate > number(path, "/removal/mean_material_removal_rate_mm3_min"), "{:#}", path["removal"]);
+}
+
+/// The same upright path under three engines: heights on a grid, rays along normals, and voxels.
+#[test]
+fn rays_and_voxels_measure_what_the_z_map_does() {
     let home = tempfile::tempdir().unwrap();
     let measured = |engine: &str| {
         let scene = format!(
@@ -110,14 +176,20 @@ fn rays_measure_what_the_z_map_does() {
         let (_, report) = run_scene(&path);
         report["toolpaths"][0].clone()
     };
-    let [map, rays] = ["zmap", "rays"].map(measured);
+    let [map, rays, voxels] = ["zmap", "rays", "voxel"].map(measured);
     let both = |figure: &str| [number(&map, figure), number(&rays, figure)];
-    let within = |figure: &str, bound: &str| {
-        let ([a, b], [x, y]) = (both(figure), both(bound));
-        assert!((a - b).abs() <= x + y, "{figure}: {a} ± {x}, {b} ± {y}");
-    };
-    within("/scallop/max_mm", "/scallop/error_bound_mm");
-    within("/gouge/max_depth_mm", "/gouge/error_bound_mm");
+    for other in [&rays, &voxels] {
+        let within = |figure: &str, bound: &str| {
+            let [a, b] = [&map, other].map(|path| number(path, figure));
+            let [x, y] = [&map, other].map(|path| number(path, bound));
+            assert!((a - b).abs() <= x + y, "{figure}: {a} ± {x}, {b} ± {y}");
+        };
+        within("/scallop/max_mm", "/scallop/error_bound_mm");
+        within("/gouge/max_depth_mm", "/gouge/error_bound_mm");
+        within("/uncut/max_height_mm", "/uncut/error_bound_mm");
+        within("/removal/volume_mm3", "/removal/volume_error_bound_mm3");
+    }
+    assert_eq!(voxels["simulation"]["engine"], "voxel");
     for (figure, share) in [
         ("/scallop/p50_mm", 1e-3),
         ("/scallop/p95_mm", 1e-3),

@@ -3,26 +3,27 @@
 use std::path::Path;
 use std::time::Instant;
 
+use super::removal::Held;
 use super::{BYTES_PER_MOVE, Job, MIB, part_bytes};
 use crate::cli::error::CliError;
 use crate::cli::load::load_mesh;
 use crate::cli::outputs::Outputs;
 use crate::cli::program;
 use crate::cutter::Solid;
-use crate::geometry::{Bvh, Point2, TriangleMesh};
-use crate::io::scene::{Fixture, Scene, ToolpathRequest};
+use crate::geometry::{Aabb, Bvh, Point2, TriangleMesh, Vector3};
+use crate::io::scene::{Engine, Fixture, Scene, ToolpathRequest};
 use crate::io::{exr, ply_write, png, stl_write};
 use crate::machine::slow_corners;
 use crate::metrology::{
-    Measurement, NormalMap, PatchGrid, RoughnessFigures, SweptVolume, measure_along_normals, net_places,
-    path_figures, roughness, section_figures,
+    FirstCut, Measurement, NormalMap, PatchGrid, RaysCut, RoughnessFigures, SweptVolume, VoxelCut,
+    measure_along_normals, net_places, path_figures, roughness, section_figures,
 };
 use crate::monitor::{self, Monitor as _};
 use crate::report::{
     HIGHEST_RIDGE, Histogram, MapSize, MapWords, SimulationFigures, SurfaceMeshFigures, ToolpathPage,
     ToolpathResult, Verdict, Violation, deviation_colours, deviation_picture, tool_collision,
 };
-use crate::sim::{Grid, Rays};
+use crate::sim::{Grid, Rays, VoxelEngine, VoxelStock, Voxels};
 use crate::toolpath::{Check, Interference, Move, MoveKind, Obstacle, Tilting, Toolpath, plan, plan_tilted};
 
 /// Bytes a place of the net: place, hit, triangles with their crossings, and the map; 480 were counted.
@@ -34,6 +35,9 @@ const PLACES_OVER_CELLS: f64 = 2.0;
 /// Material is looked for this many uncut tolerances above the design, and no less far than the cutter's radius; cuts as
 /// far below it as that radius, so that the far side of a thin part counts for nothing.
 const REACH_OVER_UNCUT: f64 = 4.0;
+
+/// By how much space for voxels is larger than it need be, mm: then none of its own surface is met.
+const BEYOND: f64 = 1.0;
 
 /// The solids of a tool.
 struct Tool {
@@ -50,10 +54,11 @@ impl Tool {
 }
 
 impl Job<'_> {
-    /// Plans one toolpath, measures it along the normals and writes its folder.
+    /// Plans one toolpath, measures it along the normals by rays or voxels and writes its folder.
     pub(super) fn along_normals(
         &self,
         request: &ToolpathRequest,
+        engine: Engine,
         outputs: &Outputs,
     ) -> Result<(ToolpathResult, ToolpathPage), CliError> {
         let (scene, monitor) = (self.scene, self.progress);
@@ -88,9 +93,15 @@ impl Job<'_> {
         let reach = (REACH_OVER_UNCUT * scene.tolerance.uncut).max(scene.cutter.radius());
         let rays = Rays::new(&planned.path, cutter, monitor).map_err(CliError::rays(scene, &request.name))?;
         let inward = scene.cutter.radius();
-        let part = &self.part;
-        let cut =
-            SweptVolume { part, rays: &rays, path: &planned.path, solid: cutter, inward, outward: reach };
+        let space = self.space(inward.max(reach));
+        let voxels = match engine {
+            Engine::Voxel => Some(self.voxels(request, &space, cutter, &planned.path, spacing)?),
+            _ => None,
+        };
+        let by_rays = RaysCut { rays: &rays, path: &planned.path, solid: cutter };
+        let by_voxels = voxels.as_ref().map(|(engine, voxels)| VoxelCut { engine, voxels });
+        let first: &dyn FirstCut = by_voxels.as_ref().map_or(&by_rays, |cut| cut);
+        let cut = SweptVolume { part: &self.part, cut: first, inward, outward: reach };
         let asked = scene.simulation.error_bound;
         let (mut measured, map) = measure_along_normals(
             &self.part,
@@ -103,13 +114,14 @@ impl Job<'_> {
             monitor,
         )?;
         let roughness = self.roughness_by(&rays, cutter, &planned.path, &measured)?;
+        let in_order = self.in_order(request, &planned.path)?;
         let simulation = SimulationFigures {
-            engine: "rays",
+            engine: engine.name(),
             cell_mm: spacing,
             cells: map.points.len(),
             error_bound_asked_mm: asked,
             refined_rectangles: 0,
-            finest_cell_mm: spacing,
+            finest_cell_mm: voxels.as_ref().map_or(spacing, |(_, voxels)| voxels.voxel()),
             moves: planned.path.len(),
             wall_s: begun.elapsed().as_secs_f64(),
             threads: rayon::current_num_threads(),
@@ -121,12 +133,21 @@ impl Job<'_> {
         for region in &mut measured.gouge.regions {
             region.line = lines.get(region.move_index as usize).copied().unwrap_or_default();
         }
+        let (removal, held) = in_order.map(|found| found.in_program(&lines)).unzip();
         self.write_pairs(request, &measured, outputs)?;
         let surface_mesh = self.write_normal_mesh(request, &map, outputs)?;
-        let page = self.write_normal_maps(request, &map, &measured, spacing, outputs)?;
+        let page = self.write_normal_maps(request, engine, &map, &measured, spacing, outputs)?;
         let solid = self.write_solid(request, &planned.path, outputs)?;
-        let mut result =
-            self.result(request, &planned, joints.as_ref(), None, measured, None, simulation, surface_mesh);
+        let mut result = self.result(
+            request,
+            &planned,
+            joints.as_ref(),
+            None,
+            measured,
+            removal,
+            simulation,
+            surface_mesh,
+        );
         result.solid = solid;
         result.roughness = Some(roughness);
         if let Some(blade) = &self.blade {
@@ -134,11 +155,41 @@ impl Job<'_> {
         }
         self.add_offset(&strategy, &mut result);
         monitor.start("looking for collisions", 0);
-        if let Some(violation) = self.collision(&tool, &fixtures, &planned.path, &lines) {
+        let Held { note, violation } = held.unwrap_or_default();
+        result.notes.extend(note);
+        for violation in violation.into_iter().chain(self.collision(&tool, &fixtures, &planned.path, &lines))
+        {
             result.violations.insert(0, violation);
             result.verdict = Verdict::Fail;
         }
         Ok((result, page))
+    }
+
+    /// More than the part by `reach` all around, so that what a normal leaves is what was cut.
+    fn space(&self, reach: f64) -> VoxelStock {
+        let Aabb { min, max } = self.part.bounds();
+        let around = Vector3::repeat(reach + BEYOND);
+        VoxelStock::Box(Aabb { min: min - around, max: max + around })
+    }
+
+    /// What a path leaves of `space` where places `spacing` mm apart take their memory too.
+    fn voxels<'a>(
+        &self,
+        request: &ToolpathRequest,
+        space: &'a VoxelStock,
+        cutter: &Solid,
+        path: &Toolpath,
+        spacing: f64,
+    ) -> Result<(VoxelEngine<'a>, Voxels), CliError> {
+        let scene = self.scene;
+        let refused = |reason| CliError::voxels(scene, &request.name, reason);
+        let voxel = scene.simulation.voxel.unwrap_or(scene.simulation.cell);
+        let places = net_places(&self.part, spacing) * BYTES_PER_PLACE as f64;
+        let besides = part_bytes(&self.part) + (path.len() * BYTES_PER_MOVE) as u64 + places as u64;
+        let left = (u64::from(scene.simulation.memory_mib) * MIB).saturating_sub(besides);
+        let engine = VoxelEngine::new(space, cutter, path).map_err(refused)?;
+        let voxels = engine.cut(voxel, left, self.progress).map_err(refused)?;
+        Ok((engine, voxels))
     }
 
     /// The roughness of an upright path, by rays along the normals.
@@ -162,7 +213,8 @@ impl Job<'_> {
         measured: &Measurement,
     ) -> Result<RoughnessFigures, CliError> {
         let reach = REACH_OVER_UNCUT * self.scene.tolerance.uncut;
-        let cut = SweptVolume { part: &self.part, rays, path, solid, inward: reach, outward: reach };
+        let by_rays = RaysCut { rays, path, solid };
+        let cut = SweptVolume { part: &self.part, cut: &by_rays, inward: reach, outward: reach };
         // About how far passes are apart.
         let interval = measured.deviation.area_mm2 / path_figures(path, 0.0).cutting_length_mm;
         Ok(roughness(&self.part, &self.scene.cutter, path, &cut, interval, self.progress)?)
@@ -281,6 +333,7 @@ impl Job<'_> {
     fn write_normal_maps(
         &self,
         request: &ToolpathRequest,
+        engine: Engine,
         map: &NormalMap,
         measured: &Measurement,
         spacing: f64,
@@ -291,6 +344,7 @@ impl Job<'_> {
             let (grid, values) = plan_view(map, spacing);
             page = self.write_normal_picture(
                 request,
+                engine,
                 "deviation.png",
                 ["x", "y"],
                 spacing,
@@ -306,8 +360,16 @@ impl Job<'_> {
             outputs.file(&name, |out| out.write_all(&bytes))?;
             let (grid, values) = unrolled(map, patch);
             let name = format!("deviation{number}.png");
-            let picture =
-                self.write_normal_picture(request, &name, ["u", "v"], spacing, &grid, &values, outputs)?;
+            let picture = self.write_normal_picture(
+                request,
+                engine,
+                &name,
+                ["u", "v"],
+                spacing,
+                &grid,
+                &values,
+                outputs,
+            )?;
             if k == 0 {
                 page = picture;
             }
@@ -325,6 +387,7 @@ impl Job<'_> {
     fn write_normal_picture(
         &self,
         request: &ToolpathRequest,
+        engine: Engine,
         name: &str,
         axes: [&str; 2],
         spacing: f64,
@@ -335,8 +398,13 @@ impl Job<'_> {
         let scene = self.scene;
         let title = format!("Deviation, {}", request.name);
         let cell = format!("{spacing} mm");
-        let subtitle =
-            format!("{} · along {} and {} · every {cell} · engine rays", scene.title, axes[0], axes[1]);
+        let subtitle = format!(
+            "{} · along {} and {} · every {cell} · engine {}",
+            scene.title,
+            axes[0],
+            axes[1],
+            engine.name()
+        );
         let notes = [("Title", scene.title.as_str()), ("Scene", &scene.source.name), ("Cell", &cell)];
         let name = format!("{}/{name}", request.folder);
         let words = MapWords { title: &title, subtitle: &subtitle, marks: &[], axes };

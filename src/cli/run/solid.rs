@@ -1,14 +1,13 @@
 //! The solid that a path leaves of a block, by voxels: any cutter axis, undercuts included.
 
-use super::{BASE, Job, MIB, part_bytes};
+use super::{Job, MIB, part_bytes};
 use crate::cli::error::CliError;
 use crate::cli::outputs::Outputs;
 use crate::cutter::Solid;
-use crate::geometry::Aabb;
 use crate::io::scene::ToolpathRequest;
 use crate::io::stl_write;
 use crate::report::SolidFigures;
-use crate::sim::{VoxelEngine, VoxelStock};
+use crate::sim::VoxelEngine;
 use crate::toolpath::{ClPoint, Toolpath};
 
 impl Job<'_> {
@@ -22,11 +21,7 @@ impl Job<'_> {
         let (scene, monitor) = (self.scene, self.progress);
         let Some(voxel) = scene.simulation.voxel else { return Ok(None) };
         let refused = |reason| CliError::voxels(scene, &request.name, reason);
-        let Aabb { mut min, mut max } = self.part.bounds();
-        let margin = scene.stock.margin;
-        (min.x, min.y, min.z) = (min.x - margin, min.y - margin, min.z - BASE);
-        (max.x, max.y, max.z) = (max.x + margin, max.y + margin, self.top);
-        let stock = VoxelStock::Box(Aabb { min, max });
+        let stock = self.voxel_stock();
         let tool = Solid::of_cutter(&scene.cutter, scene.holder.as_ref());
         let memory = u64::from(scene.simulation.memory_mib) * MIB;
         let engine = VoxelEngine::new(&stock, &tool, path).map_err(refused)?;
@@ -39,9 +34,10 @@ impl Job<'_> {
             stl_write::write(out, &places, &surface.triangles)
         })?;
         // Square edges cost the voxels' volume a little, before and after alike.
-        let uncut = Toolpath { start: ClPoint::upright(max), moves: Vec::new() };
-        let block = VoxelEngine::new(&stock, &tool, &uncut).map_err(refused)?;
-        let whole = |voxel| Ok::<f64, CliError>(block.cut(voxel, left, monitor).map_err(refused)?.volume());
+        let uncut = Toolpath { start: ClPoint::upright(stock.bounds().max), moves: Vec::new() };
+        let untouched = VoxelEngine::new(&stock, &tool, &uncut).map_err(refused)?;
+        let whole =
+            |voxel| Ok::<f64, CliError>(untouched.cut(voxel, left, monitor).map_err(refused)?.volume());
         let (volume_mm3, bricks) = (voxels.volume(), voxels.bricks());
         drop(voxels);
         let coarse = 2.0 * voxel;

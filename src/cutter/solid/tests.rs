@@ -215,3 +215,13 @@ fn the_reach_is_that_of_the_farthest_place() {
         }
     }
 }
+
+#[test]
+fn the_sharpest_bend_is_that_of_the_corner_or_an_edge() {
+    let sharpest = |cutter: Cutter| Solid::of_cutter(&cutter, None).sharpest();
+    assert_eq!(sharpest(Cutter::ball(6.0).unwrap()), 3.0);
+    assert_eq!(sharpest(Cutter::bull(6.0, 1.0).unwrap()), 1.0);
+    assert_eq!(sharpest(Cutter::flat(6.0).unwrap()), 0.0);
+    // Where its cone ends it has an edge.
+    assert_eq!(sharpest(Cutter::taper(2.0, 0.5, 0.1, 8.0).unwrap()), 0.0);
+}

@@ -145,6 +145,8 @@ pub struct Stock {
     pub allowance: f64,
     /// Growth of the part's rectangle on all four sides, mm.
     pub margin: f64,
+    /// How much stands over the part's surface where the block was roughed before, mm; for voxels.
+    pub roughed: Option<f64>,
 }
 
 /// Speeds of the cutter.
@@ -169,15 +171,18 @@ pub enum Engine {
     Reference,
     /// The swept volume along the normals of the design surface; any cutter axis, any shape.
     Rays,
+    /// What is left as voxels, along the normals of the design surface; any cutter axis, any shape.
+    Voxel,
 }
 
 impl Engine {
     /// The words that a scene and the command line accept.
-    pub const WORDS: [&'static str; 4] = ["auto", "zmap", "reference", "rays"];
+    pub const WORDS: [&'static str; 5] = ["auto", "zmap", "reference", "rays", "voxel"];
 
     /// The engine that a word stands for.
     pub fn from_word(word: &str) -> Option<Self> {
-        [Self::Auto, Self::ZMap, Self::Reference, Self::Rays].into_iter().find(|engine| engine.name() == word)
+        let all = [Self::Auto, Self::ZMap, Self::Reference, Self::Rays, Self::Voxel];
+        all.into_iter().find(|engine| engine.name() == word)
     }
 
     /// Its word.
@@ -187,6 +192,7 @@ impl Engine {
             Self::ZMap => Self::WORDS[1],
             Self::Reference => Self::WORDS[2],
             Self::Rays => Self::WORDS[3],
+            Self::Voxel => Self::WORDS[4],
         }
     }
 

@@ -253,7 +253,7 @@ pub(super) fn read_mesh_file(
 }
 
 fn read_stock(stock: &Section<'_>, part: &PartSource, cutter: &Cutter) -> Result<Stock, SceneError> {
-    stock.only(&["allowance", "margin"], &[], "[stock]")?;
+    stock.only(&["allowance", "margin", "roughed"], &[], "[stock]")?;
     // Zero is meant in both: stock may end at the part's top and at its rim.
     let length = |key| stock.number(key, 0.0..=*LENGTH.end(), " mm");
     // A pocket is milled into a finished face, and what is cut beside it has to be seen.
@@ -262,6 +262,7 @@ fn read_stock(stock: &Section<'_>, part: &PartSource, cutter: &Cutter) -> Result
     Ok(Stock {
         allowance: length("allowance")?.map_or(top, |v| v.value),
         margin: length("margin")?.map_or(around, |v| v.value),
+        roughed: length("roughed")?.map(|v| v.value),
     })
 }
 

@@ -34,6 +34,13 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     writeln!(out, "\n[stock]")?;
     writeln!(out, "allowance = {}  # mm above the part's highest point", number(scene.stock.allowance))?;
     writeln!(out, "margin = {}  # mm around the part in the plan view", number(scene.stock.margin))?;
+    if let Some(roughed) = scene.stock.roughed {
+        writeln!(
+            out,
+            "roughed = {}  # mm that stand over the part, for tilted tools and voxels",
+            number(roughed)
+        )?;
+    }
     write_cutter(out, scene)?;
     write_holder(out, scene)?;
     let limits = &scene.tolerance;

@@ -57,23 +57,34 @@ impl Ord for Open {
 pub(super) struct Greatest {
     pub depth: f64,
     pub deepest: Option<(Point3, u32)>,
+    /// What the depth may be where it is uncertain.
+    pub possible_depth: f64,
     pub height: f64,
-    pub ridge: Option<(f64, Point3)>,
+    /// How much lower the highest place may be.
+    pub lower: f64,
+    /// The highest ridge, where it is, and how much lower it may be.
+    pub ridge: Option<(f64, Point3, f64)>,
 }
 
 impl Greatest {
     pub fn look_at(&mut self, sample: &Sample, reach: f64) {
-        match sample.hit {
-            Some(hit) if -hit.deviation > self.depth => {
-                (self.depth, self.deepest) = (-hit.deviation, Some((sample.place.point, hit.by)));
+        let Some(hit) = sample.hit else {
+            if reach > self.height {
+                (self.height, self.lower) = (reach, 0.0);
             }
-            hit => self.height = self.height.max(hit.map_or(reach, |hit| hit.deviation)),
+            return;
+        };
+        self.possible_depth = self.possible_depth.max(hit.uncertain - hit.deviation);
+        if -hit.deviation > self.depth {
+            (self.depth, self.deepest) = (-hit.deviation, Some((sample.place.point, hit.by)));
+        } else if hit.deviation > self.height {
+            (self.height, self.lower) = (hit.deviation, hit.uncertain);
         }
     }
 
     pub fn look_at_ridge(&mut self, crossing: &Crossing) {
-        if self.ridge.is_none_or(|(height, _)| crossing.height > height) {
-            self.ridge = Some((crossing.height, crossing.at));
+        if self.ridge.is_none_or(|(height, ..)| crossing.height > height) {
+            self.ridge = Some((crossing.height, crossing.at, crossing.uncertain));
         }
     }
 }
@@ -103,7 +114,7 @@ impl Inspection<'_> {
                 more = more.max((hit.deviation + slope * far).min(self.engine.reach()) - greatest.height);
             }
         }
-        let highest = greatest.ridge.map_or(0.0, |(height, _)| height);
+        let highest = greatest.ridge.map_or(0.0, |(height, ..)| height);
         let possible = |c: &Crossing| (c.height + c.rise * longest).min(self.engine.reach().max(c.height));
         crossings.iter().fold(more, |more, c| more.max(possible(c) - highest))
     }

@@ -10,6 +10,9 @@
 //! divided until the asked bound holds or [`MOST_DIVIDED`] of them are. A track that no place saw is seen all the
 //! same: the contacts of every move are places too.
 //!
+//! Engines by samples may miss what cuts between them: each place has a bound on how much deeper it may be cut
+//! ([`NormalHit::uncertain`]), which goes into the bounds of the figures.
+//!
 //! A place above the uncut tolerance is uncut here, also where it is half of a tall scallop.
 
 mod closer;
@@ -35,7 +38,7 @@ use net::{Net, Place};
 pub use net::{PatchGrid, net_places};
 use regions::{areas, deviation_figures};
 use ridges::{Crossing, Finder};
-pub use swept_volume::SweptVolume;
+pub use swept_volume::{FirstCut, RaysCut, SweptVolume, VoxelCut};
 
 /// The cut surface where the normal of a design point meets it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,6 +51,8 @@ pub struct NormalHit {
     pub normal: Vector3,
     /// Where the engine may begin to look beside this place.
     pub seed: usize,
+    /// How much deeper than it was found the cut may be, mm.
+    pub uncertain: f64,
 }
 
 /// An engine that tells where lines along normals meet the cut surface.
@@ -174,15 +179,19 @@ pub fn measure_along_normals(
         .map(|(t, crossings)| (t.map(|v| samples[v as usize]), &crossings[..]));
     let left = inspection.search(triangles, &mut greatest, asked, monitor)?;
     gouge.max_depth_mm = greatest.depth;
-    gouge.error_bound_mm = left.max(0.0) + NUMERICAL_FLOOR;
+    gouge.error_bound_mm =
+        left.max(0.0) + (greatest.possible_depth - greatest.depth).max(0.0) + NUMERICAL_FLOOR;
     if let (Some(first), Some((at, by))) = (gouge.regions.first_mut(), greatest.deepest) {
         (first.depth_mm, first.at_mm, first.move_index) = (greatest.depth, at.into(), by);
     }
     if uncut.region_count > 0 {
         uncut.max_height_mm = greatest.height;
     }
-    uncut.error_bound_mm = left.max(0.0) + NUMERICAL_FLOOR;
-    let highest = greatest.ridge.map(|(height, at)| Highest { height, at, possible: height + left.max(0.0) });
+    uncut.error_bound_mm = left.max(0.0) + greatest.lower + NUMERICAL_FLOOR;
+    let highest = greatest.ridge.map(|(height, at, lower)| {
+        // What is uncertain may be lower only, but a bound stands to both sides.
+        Highest { height, at, possible: height + left.max(0.0) + lower }
+    });
     let note = (left > asked).then(|| {
         format!("between the places on the normals {:.1} µm more may stand or lie than was found; a smaller cell helps", 1e3 * left)
     });

@@ -35,6 +35,8 @@ pub(super) struct Crossing {
     pub passes: [u32; 2],
     /// The moves that meet.
     pub moves: [u32; 2],
+    /// How much lower it may be, mm.
+    pub uncertain: f64,
 }
 
 pub(super) struct Finder<'a> {
@@ -131,6 +133,7 @@ impl Finder<'_> {
             length: 0.0,
             passes: self.tracks.passes(a.hit.by, b.hit.by),
             moves: [a.hit.by, b.hit.by],
+            uncertain: a.hit.uncertain.max(b.hit.uncertain),
         });
     }
 }

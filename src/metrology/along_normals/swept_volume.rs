@@ -1,10 +1,10 @@
-//! The cut as the volume that the tool swept.
+//! The cut as the volume that the tool swept, whatever engine tells where a line meets it.
 
 use super::{AlongNormal, NormalHit};
 use crate::cutter::Solid;
 use crate::geometry::{Point3, Vector3};
 use crate::part::Part;
-use crate::sim::Rays;
+use crate::sim::{Rays, VoxelEngine, Voxels};
 use crate::toolpath::Toolpath;
 
 /// Cuts are first looked for so far below the design, mm. What reaches deeper is asked whether it comes from the far side
@@ -15,33 +15,40 @@ const NEAR: f64 = 0.1;
 /// Rounds in which the ball that fits under a place shrinks; each leaves a small part of what is too large.
 const SHRINKING: usize = 30;
 
-/// What a path cuts, along normals of the design.
-pub struct SweptVolume<'a> {
-    /// The part that is cut.
-    pub part: &'a Part,
+/// An engine that tells where a line first meets what was cut.
+pub trait FirstCut: Sync {
+    /// The lowest place of the line through `point` along the unit `normal`, within a range, that was cut; the begin of the
+    /// range where all is cut away there. A place that was cut nearby may make it faster.
+    fn first_cut(
+        &self,
+        point: &Point3,
+        normal: &Vector3,
+        range: [f64; 2],
+        near: Option<&NormalHit>,
+    ) -> Option<NormalHit>;
+}
+
+/// The moves themselves; rapids do not cut.
+pub struct RaysCut<'a> {
     /// The moves that cut.
     pub rays: &'a Rays,
     /// The path that they are of.
     pub path: &'a Toolpath,
     /// The tool.
     pub solid: &'a Solid,
-    /// How far below the design is looked, mm: deeper cuts count as so deep.
-    pub inward: f64,
-    /// How far above it, mm.
-    pub outward: f64,
 }
 
-impl AlongNormal for SweptVolume<'_> {
-    fn hit(&self, point: &Point3, normal: &Vector3, near: Option<&NormalHit>) -> Option<NormalHit> {
+impl FirstCut for RaysCut<'_> {
+    fn first_cut(
+        &self,
+        point: &Point3,
+        normal: &Vector3,
+        range: [f64; 2],
+        near: Option<&NormalHit>,
+    ) -> Option<NormalHit> {
+        let [low, high] = range;
         let seed = near.map(|hit| hit.seed);
-        let look = |inward| self.rays.deviation_near(point, normal, [inward, self.outward], seed);
-        let near = NEAR.min(self.inward);
-        let mut found = look(near)?;
-        if found.0.s <= -near {
-            // What the far side of a thin part has lost is no loss of this one.
-            found = look(ball_beneath(self.part, point, normal, self.inward))?;
-        }
-        let (hit, seed) = found;
+        let (hit, seed) = self.rays.deviation_near(point, normal, [-low, high], seed)?;
         let cut = if self.solid.ball().is_some() {
             let to = &self.path.moves[hit.index as usize].to;
             let at = self.path.location_before(hit.index as usize).towards(to, hit.t);
@@ -50,7 +57,54 @@ impl AlongNormal for SweptVolume<'_> {
             // Where an edge cuts, the tool by itself has no normal.
             self.rays.cut_normal(point, normal, &hit)?
         };
-        Some(NormalHit { deviation: hit.s, by: hit.index, normal: cut, seed })
+        Some(NormalHit { deviation: hit.s, by: hit.index, normal: cut, seed, uncertain: 0.0 })
+    }
+}
+
+/// What the moves left of stock that is larger than the part all around; rapids cut, too.
+pub struct VoxelCut<'a> {
+    /// The moves and the stock.
+    pub engine: &'a VoxelEngine<'a>,
+    /// What is left.
+    pub voxels: &'a Voxels,
+}
+
+impl FirstCut for VoxelCut<'_> {
+    fn first_cut(
+        &self,
+        point: &Point3,
+        normal: &Vector3,
+        range: [f64; 2],
+        _: Option<&NormalHit>,
+    ) -> Option<NormalHit> {
+        let exit = self.engine.first_exit(self.voxels, point, normal, range)?;
+        let (deviation, by, uncertain) = (exit.s, exit.index, exit.uncertain);
+        Some(NormalHit { deviation, by, normal: exit.normal, seed: 0, uncertain })
+    }
+}
+
+/// What a path cuts, along normals of the design.
+pub struct SweptVolume<'a> {
+    /// The part that is cut.
+    pub part: &'a Part,
+    /// What tells where the cut is.
+    pub cut: &'a dyn FirstCut,
+    /// How far below the design is looked, mm: deeper cuts count as so deep.
+    pub inward: f64,
+    /// How far above it, mm.
+    pub outward: f64,
+}
+
+impl AlongNormal for SweptVolume<'_> {
+    fn hit(&self, point: &Point3, normal: &Vector3, near: Option<&NormalHit>) -> Option<NormalHit> {
+        let look = |inward: f64| self.cut.first_cut(point, normal, [-inward, self.outward], near);
+        let close = NEAR.min(self.inward);
+        let found = look(close)?;
+        if found.deviation > -close {
+            return Some(found);
+        }
+        // What the far side of a thin part has lost is no loss of this one.
+        look(ball_beneath(self.part, point, normal, self.inward))
     }
 
     fn reach(&self) -> f64 {

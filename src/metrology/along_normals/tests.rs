@@ -4,8 +4,8 @@ use crate::cutter::Solid;
 use crate::geometry::samples;
 use crate::monitor::Silent;
 use crate::part::Patch;
-use crate::sim::Rays;
-use crate::toolpath::{MoveKind, ball_scallop_height, distance_to_segment};
+use crate::sim::{Rays, VoxelEngine, VoxelStock};
+use crate::toolpath::{ClPoint, Move, MoveKind, ball_scallop_height, distance_to_segment};
 
 const RADIUS: f64 = 3.0;
 
@@ -28,7 +28,13 @@ impl AlongNormal for BruteForce<'_> {
                     let at = point + normal * s;
                     let t = ((at - a).dot(&(b - a)) / (b - a).norm_squared()).clamp(0.0, 1.0);
                     let inward = (a + (b - a) * t - at) / RADIUS;
-                    best = Some(NormalHit { deviation: s, by: k as u32, normal: inward, seed: 0 });
+                    best = Some(NormalHit {
+                        deviation: s,
+                        by: k as u32,
+                        normal: inward,
+                        seed: 0,
+                        uncertain: 0.0,
+                    });
                     break;
                 }
                 s += d;
@@ -118,7 +124,8 @@ fn a_dome_has_the_scallops_of_a_circle_also_where_it_is_steep() {
     let (path, ball) = (path(&rings), Cutter::ball(2.0 * RADIUS).unwrap());
     let solid = Solid::of_cutter(&ball, None);
     let rays = Rays::new(&path, &solid, &Silent).unwrap();
-    let cut = SweptVolume { part: &part, rays: &rays, path: &path, solid: &solid, inward: 1.0, outward: 1.0 };
+    let by_rays = RaysCut { rays: &rays, path: &path, solid: &solid };
+    let cut = SweptVolume { part: &part, cut: &by_rays, inward: 1.0, outward: 1.0 };
     let limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.001 };
     let (measured, map) =
         measure_along_normals(&part, &ball, &path, &cut, 0.25, &limits, 5e-4, &Silent).unwrap();
@@ -134,4 +141,87 @@ fn a_dome_has_the_scallops_of_a_circle_also_where_it_is_steep() {
         measured.scallop
     );
     assert_eq!(map.grids.len(), 1);
+}
+
+/// The figures by rays and by voxels of the same moves, all of which cut.
+fn by_both(
+    part: &Part,
+    cutter: &Cutter,
+    locations: &[Vec<ClPoint>],
+    voxel: f64,
+) -> [(Measurement, NormalMap); 2] {
+    let step = |pass: usize, to: ClPoint| Move { to, kind: MoveKind::Cut, feed_rate: 1e3, pass: pass as u32 };
+    let moves = locations.iter().enumerate().flat_map(|(k, pass)| pass.iter().map(move |&at| step(k, at)));
+    let path = Toolpath { start: locations[0][0], moves: moves.collect() };
+    let solid = Solid::of_cutter(cutter, None);
+    let reach = 0.6;
+    let crate::geometry::Aabb { min, max } = part.bounds();
+    let around = Vector3::repeat(reach + 1.0);
+    let space = VoxelStock::Box(crate::geometry::Aabb { min: min - around, max: max + around });
+    let engine = VoxelEngine::new(&space, &solid, &path).unwrap();
+    let voxels = engine.cut(voxel, 1 << 30, &Silent).unwrap();
+    let rays = Rays::new(&path, &solid, &Silent).unwrap();
+    let by_rays = RaysCut { rays: &rays, path: &path, solid: &solid };
+    let by_voxels = VoxelCut { engine: &engine, voxels: &voxels };
+    let limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.001 };
+    let cuts: [&dyn FirstCut; 2] = [&by_rays, &by_voxels];
+    cuts.map(|cut| {
+        let cut = SweptVolume { part, cut, inward: reach, outward: reach };
+        measure_along_normals(part, cutter, &path, &cut, 0.4, &limits, 1e-3, &Silent).unwrap()
+    })
+}
+
+/// Rays and voxels of a path agree within what both say they may be off, and nearly everywhere far closer.
+fn agree(part: &Part, cutter: &Cutter, locations: &[Vec<ClPoint>], voxel: f64, most: f64) {
+    let [(rays, at), (voxels, by_voxels)] = by_both(part, cutter, locations, voxel);
+    let scallop = |m: &Measurement| (m.scallop.max_mm.unwrap(), m.scallop.error_bound_mm.unwrap());
+    let gouge = |m: &Measurement| (m.gouge.max_depth_mm, m.gouge.error_bound_mm);
+    let uncut = |m: &Measurement| (m.uncut.max_height_mm, m.uncut.error_bound_mm);
+    for figure in [&scallop as &dyn Fn(&Measurement) -> (f64, f64), &gouge, &uncut] {
+        let (a, b) = (figure(&rays), figure(&voxels));
+        assert!((a.0 - b.0).abs() <= a.1 + b.1 && b.1 < most, "{a:?} {b:?}");
+    }
+    let pairs = || at.deviations.iter().zip(&by_voxels.deviations);
+    assert!(pairs().all(|(a, b)| a.is_nan() == b.is_nan()));
+    let mut off: Vec<f32> = pairs().filter(|(a, _)| !a.is_nan()).map(|(a, b)| (a - b).abs()).collect();
+    off.sort_by(f32::total_cmp);
+    let at = |share: f64| off[((off.len() - 1) as f64 * share) as usize];
+    assert!(off.len() > 200 && at(0.9) < 2e-5 && f64::from(at(1.0)) < most, "{} {}", at(0.9), at(1.0));
+}
+
+#[test]
+fn voxels_measure_what_rays_do_upright_and_tilted() {
+    let rho = 6.0;
+    let dome =
+        Part::from_patches(vec![Patch::Nurbs(samples::hemisphere(Point3::origin(), rho))], 0.01).unwrap();
+    let (ball, step) = (Cutter::ball(2.0 * RADIUS).unwrap(), 0.1f64);
+    let rings = |lean: f64| {
+        let ring = |k: usize| {
+            let polar = 0.5 * step + step * k as f64;
+            let at = |n: usize| {
+                let turn = std::f64::consts::TAU * n as f64 / 120.0;
+                let normal = Vector3::new(polar.sin() * turn.cos(), polar.sin() * turn.sin(), polar.cos());
+                let axis = (Vector3::z() * (1.0 - lean) + normal * lean).normalize();
+                ClPoint { tip: Point3::from(normal * (rho + RADIUS)) - axis * RADIUS, axis }
+            };
+            (0..=120).map(at).collect()
+        };
+        (0..16).map(ring).collect::<Vec<Vec<ClPoint>>>()
+    };
+    for lean in [0.0, 0.6] {
+        agree(&dome, &ball, &rings(lean), 0.12, 0.02);
+    }
+    // A bull that leads by five degrees, one pass too deep and one left out.
+    let (bull, lead) = (Cutter::bull(6.0, 1.0).unwrap(), 5f64.to_radians());
+    let axis = Vector3::new(lead.sin(), 0.0, lead.cos());
+    let pass = |k: usize| {
+        let normal = if k == 2 { -0.02 } else { 0.0 };
+        let at = |x: f64| {
+            let contact = Point3::new(x, 0.9 * k as f64 - 1.0, normal);
+            ClPoint { tip: contact + bull.contact_to_tip_along(&Vector3::z(), &axis), axis }
+        };
+        [-3.0, 7.0].map(at).to_vec()
+    };
+    let passes: Vec<Vec<ClPoint>> = (0..7).filter(|&k| k != 4).map(pass).collect();
+    agree(&plane(), &bull, &passes, 0.1, 0.02);
 }

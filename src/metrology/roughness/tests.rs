@@ -2,7 +2,7 @@ use super::super::flat_scene::{path, plane};
 use super::*;
 use crate::cutter::Solid;
 use crate::geometry::samples;
-use crate::metrology::SweptVolume;
+use crate::metrology::{RaysCut, SweptVolume};
 use crate::monitor::Silent;
 use crate::part::Patch;
 use crate::sim::Rays;
@@ -13,7 +13,8 @@ fn of(part: &Part, path: &Toolpath, interval: f64) -> RoughnessFigures {
     let ball = Cutter::ball(2.0 * RADIUS).unwrap();
     let solid = Solid::of_cutter(&ball, None);
     let rays = Rays::new(path, &solid, &Silent).unwrap();
-    let cut = SweptVolume { part, rays: &rays, path, solid: &solid, inward: 1.0, outward: 1.0 };
+    let by_rays = RaysCut { rays: &rays, path, solid: &solid };
+    let cut = SweptVolume { part, cut: &by_rays, inward: 1.0, outward: 1.0 };
     roughness(part, &ball, path, &cut, interval, &Silent).unwrap()
 }
 

@@ -149,6 +149,31 @@ impl Parts {
         below(&self.solid, &self.motions[index as usize], q, [0.0, 1.0], limit)
     }
 
+    /// One move of the path.
+    pub(super) fn motion(&self, index: u32) -> &Motion {
+        &self.motions[index as usize]
+    }
+
+    /// When on a move, from 0 to 1, the tool first comes within `near` of `q`, found to `tolerance` mm by stepping over
+    /// times in which it cannot; 1 where it never does.
+    pub(super) fn first_within(&self, index: u32, q: &Point3, near: f64, tolerance: f64, most: usize) -> f64 {
+        let motion = &self.motions[index as usize];
+        let (begin, end) = (motion.at(0.0), motion.at(1.0));
+        // No place of the tool nearer to q than now is moves faster than that.
+        let arm = (q - begin.tip).norm().max((q - end.tip).norm());
+        let pace = (end.tip - begin.tip).norm() + turn(motion) * arm;
+        let mut t = 0.0;
+        for _ in 0..most {
+            let pose = motion.at(t);
+            let away = self.solid.distance(&pose.tip, &pose.axis, q) - near;
+            if away <= 0.0 || t >= 1.0 || pace == 0.0 {
+                break;
+            }
+            t = (t + away.max(tolerance) / pace).min(1.0);
+        }
+        t
+    }
+
     /// Outward normal of the tool on a move at time `t`, at the place nearest to `q`.
     pub(super) fn normal(&self, index: u32, q: &Point3, t: f64) -> Vector3 {
         let pose = self.motions[index as usize].at(t);

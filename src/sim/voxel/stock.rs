@@ -1,4 +1,4 @@
-//! What there is before the first cut: boxes, round bars, closed meshes.
+//! What there is before the first cut: boxes, round bars, closed meshes, and blocks roughed to some distance from a part.
 
 use crate::geometry::{Aabb, Bvh, Point3, TriangleMesh, Vector3};
 
@@ -31,9 +31,18 @@ pub enum VoxelStock {
     },
     /// A casting or forging: see [`VoxelStock::from_mesh`].
     Mesh(Box<StockMesh>),
+    /// What an earlier cutter left of a block: see [`VoxelStock::roughed`].
+    Roughed {
+        /// The block.
+        block: Aabb,
+        /// The surface that was roughed.
+        part: Box<StockMesh>,
+        /// How much stands over it, mm.
+        over: f64,
+    },
 }
 
-/// A closed mesh with its search tree.
+/// A mesh with its search tree.
 #[derive(Debug)]
 pub struct StockMesh {
     mesh: TriangleMesh,
@@ -45,6 +54,12 @@ impl VoxelStock {
     pub fn from_mesh(mesh: TriangleMesh) -> Option<Self> {
         let closed = mesh.is_closed();
         closed.then(|| Self::Mesh(Box::new(StockMesh { tree: Bvh::new(&mesh), mesh })))
+    }
+
+    /// A block that was roughed to `over` mm from the outer side of a part's surface. Beside an open surface its borders'
+    /// planes go on.
+    pub fn roughed(block: Aabb, part: TriangleMesh, over: f64) -> Self {
+        Self::Roughed { block, part: Box::new(StockMesh { tree: Bvh::new(&part), mesh: part }), over }
     }
 
     /// The box around it.
@@ -59,6 +74,7 @@ impl VoxelStock {
                 Aabb { min: base - around, max: end + around }
             }
             Self::Mesh(stock) => stock.mesh.bounds(),
+            Self::Roughed { block, .. } => *block,
         }
     }
 
@@ -68,9 +84,10 @@ impl VoxelStock {
         (0..3).all(|i| min[i] < max[i] && min[i].is_finite() && max[i].is_finite())
     }
 
-    /// Volume, mm³.
-    pub fn volume(&self) -> f64 {
-        match self {
+    /// Volume, mm³; `None` of a roughed block, which no closed form tells.
+    pub fn volume(&self) -> Option<f64> {
+        Some(match self {
+            Self::Roughed { .. } => return None,
             Self::Box(bounds) => bounds.size().product(),
             Self::Cylinder { radius, length, .. } => std::f64::consts::PI * radius * radius * length,
             Self::Mesh(stock) => {
@@ -79,12 +96,18 @@ impl VoxelStock {
                 let corners = (0..stock.mesh.triangles().len()).map(|t| stock.mesh.corners(t));
                 corners.map(|[a, b, c]| (a - near).dot(&(b - near).cross(&(c - near))) / 6.0).sum()
             }
-        }
+        })
     }
 
-    /// Signed distance, mm, below zero inside, and its unit gradient: exact.
+    /// Signed distance, mm, below zero inside, and its unit gradient: exact; of a roughed block the greater of those of the
+    /// block and of the surface, no greater than the true one.
     pub fn foot(&self, q: &Point3) -> (f64, Vector3) {
         match self {
+            Self::Roughed { block, part, over } => {
+                let (of_block, of_part) = (Self::Box(*block).foot(q), part.foot(q));
+                let of_part = (of_part.0 - over, of_part.1);
+                if of_block.0 > of_part.0 { of_block } else { of_part }
+            }
             Self::Box(bounds) => {
                 let middle = bounds.min + bounds.size() * 0.5;
                 let away = q - middle;
@@ -120,12 +143,16 @@ impl VoxelStock {
                     _ => (end, up),
                 }
             }
-            Self::Mesh(stock) => {
-                let foot = stock.tree.closest_point(&stock.mesh, q);
-                let distance = foot.signed_distance;
-                let gradient = (q - foot.point) / distance;
-                (distance, if distance.abs() > 1e-9 { gradient } else { foot.normal })
-            }
+            Self::Mesh(stock) => stock.foot(q),
         }
+    }
+}
+
+impl StockMesh {
+    fn foot(&self, q: &Point3) -> (f64, Vector3) {
+        let foot = self.tree.closest_point(&self.mesh, q);
+        let distance = foot.signed_distance;
+        let gradient = (q - foot.point) / distance;
+        (distance, if distance.abs() > 1e-9 { gradient } else { foot.normal })
     }
 }

@@ -37,12 +37,12 @@ struct Vertices {
 }
 
 /// The surface as seen from a place near it.
-struct Foot {
+pub(super) struct Foot {
     at: Point3,
     /// Signed distance of the material, and its gradient.
-    distance: f64,
-    normal: Vector3,
-    cut_by: u32,
+    pub(super) distance: f64,
+    pub(super) normal: Vector3,
+    pub(super) cut_by: u32,
 }
 
 impl Foot {
@@ -138,7 +138,7 @@ impl VoxelEngine<'_> {
             for (plane, foot) in planes.iter_mut().zip(&mut movers) {
                 if foot.cut_by != NOT_CUT {
                     let q = place + (foot.at - place) * CLOSER;
-                    *foot = self.foot(&q, [foot.cut_by; 2]);
+                    *foot = self.foot(&q, &[foot.cut_by]);
                     *plane = foot.plane();
                 }
             }
@@ -155,7 +155,7 @@ impl VoxelEngine<'_> {
         let outward = values[0] < 0.0;
         let mut range = [0.0, 1.0];
         let mut share = values[0] / (values[0] - values[1]);
-        let mut foot = self.foot(&(ends[0] + (ends[1] - ends[0]) * share), cut_by);
+        let mut foot = self.foot(&(ends[0] + (ends[1] - ends[0]) * share), &cut_by);
         // At an edge of the tool or the stock interpolation may land before another face.
         for _ in 0..HALVINGS {
             if foot.distance.abs() <= NEAR * length {
@@ -163,16 +163,17 @@ impl VoxelEngine<'_> {
             }
             range[usize::from((foot.distance < 0.0) != outward)] = share;
             share = 0.5 * (range[0] + range[1]);
-            foot = self.foot(&(ends[0] + (ends[1] - ends[0]) * share), cut_by);
+            foot = self.foot(&(ends[0] + (ends[1] - ends[0]) * share), &cut_by);
         }
         foot
     }
 
-    /// Signed distance of the material near two samples, its gradient, and which move it comes from.
-    fn foot(&self, q: &Point3, cut_by: [u32; 2]) -> Foot {
+    /// Signed distance of the material near samples that are cut by these moves, its gradient, and which of them it comes
+    /// from.
+    pub(super) fn foot(&self, q: &Point3, cut_by: &[u32]) -> Foot {
         let mut nearest: Option<(f64, f64, u32)> = None;
-        for (k, index) in cut_by.into_iter().enumerate() {
-            if index == NOT_CUT || (k == 1 && index == cut_by[0]) {
+        for (k, &index) in cut_by.iter().enumerate() {
+            if index == NOT_CUT || cut_by[..k].contains(&index) {
                 continue;
             }
             let limit = nearest.map_or(f64::INFINITY, |n| n.0);

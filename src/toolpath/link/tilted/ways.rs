@@ -3,10 +3,12 @@
 //! - On the surface ([`bent`](super::bent)), fed, where links on the surface are asked for.
 //! - Aloft: along the axis until the tool is clear, straight over while the axis turns evenly, and down along the axis there;
 //!   all fed, since stock may stand.
-//! - Over the block that holds part and stock: out along the axis, straight over or over the top of the block, and in. What
-//!   is outside of the block is run at rapid rate.
+//! - Over the block that holds part and stock: out along the axis, straight over or over the top of the block, and in.
 //! - Around a sphere that holds the block, on which every place of the cutter is outside while its axis points away from the
 //!   middle.
+//!
+//! The way out along the axis, which the cutter has come free of, and what is outside of the block are run at rapid rate. In the
+//! block the tool comes in at the feed, for stock may stand where it comes.
 //!
 //! All but the last are proved clear, move by move, of all that the tool is to keep away from; the last is taken where it is
 //! the quickest and clear too, or where nothing else is. Times are length over rate.
@@ -180,9 +182,21 @@ impl<'a> Ways<'a> {
         ClPoint::upright(self.sphere.centre + Vector3::z() * self.sphere.radius)
     }
 
-    /// In from outside.
+    /// In to the first place from outside along the axis.
     pub fn into(&self, outside: &ClPoint, to: &ClPoint) -> Vec<Step> {
-        vec![(self.off(to, outside), MoveKind::Rapid), (*to, MoveKind::Plunge)]
+        self.to_block(outside, to).into_iter().chain([(*to, MoveKind::Plunge)]).collect()
+    }
+
+    /// In along the axis to where neighbouring passes have been: at the feed, the last of it as into the full.
+    fn down(&self, outside: &ClPoint, to: &ClPoint) -> Vec<Step> {
+        let off = (self.off(to, outside), MoveKind::Retract);
+        self.to_block(outside, to).into_iter().chain([off, (*to, MoveKind::Plunge)]).collect()
+    }
+
+    /// From outside along the axis to where the block begins, if that is any nearer.
+    fn to_block(&self, outside: &ClPoint, to: &ClPoint) -> Option<Step> {
+        let nearer = |at: &ClPoint| (at.tip - to.tip).norm() < (outside.tip - to.tip).norm();
+        self.out(to).filter(nearer).map(|at| (at, MoveKind::Rapid))
     }
 
     /// Length over rate, s.
@@ -256,9 +270,9 @@ impl<'a> Ways<'a> {
     /// Out of the block, over, and in again.
     fn over_block(&self, from: &ClPoint, to: &ClPoint) -> Option<Vec<Step>> {
         let (a, b) = (self.out(from)?, self.out(to)?);
-        let (out, near) = (self.off(from, &a), self.off(to, &b));
+        let out = self.off(from, &a);
         let legs = [(out, MoveKind::Retract), (a, MoveKind::Rapid)];
-        let down = [(near, MoveKind::Rapid), (*to, MoveKind::Plunge)];
+        let down = self.down(&b, to);
         if !self.is_clear(from, &legs, self.touching) || !self.is_clear(&b, &down, self.touching) {
             return None;
         }
@@ -298,7 +312,7 @@ impl<'a> Ways<'a> {
         let (a, b) = (self.sphere.exit(from), self.sphere.exit(to));
         let mut moves = vec![(self.off(from, &a), MoveKind::Retract), (a, MoveKind::Rapid)];
         moves.extend(self.sphere.around_to(&a, &b).into_iter().map(|at| (at, MoveKind::Rapid)));
-        moves.extend(self.into(&b, to));
+        moves.extend(self.down(&b, to));
         moves
     }
 
