@@ -16,6 +16,7 @@ fn planned(part: &Part, angle: f64) -> Passes {
         chord_tolerance: 1e-3,
         smoothing: None,
         axis: None,
+        probe: None,
     };
     passes(part, &Cutter::ball(2.0 * RADIUS).unwrap(), angle, &settings, &Silent).unwrap()
 }
@@ -129,6 +130,7 @@ fn other_cutters_and_no_place_for_the_ball_are_refused() {
         chord_tolerance: 1e-3,
         smoothing: None,
         axis: None,
+        probe: None,
     };
     let refused = passes(&part, &Cutter::flat(6.0).unwrap(), 0.0, &settings, &Silent).unwrap_err();
     assert!(refused.to_string().contains("use a ball"), "{refused}");
