@@ -30,7 +30,8 @@ fuzz_target!(|bytes: &[u8]| {
 });
 
 fn make_blade(sections: &Sections) {
-    let points: usize = sections.sections().iter().flat_map(|s| s.outline.curves()).map(|(_, p)| p.len()).sum();
+    let points: usize =
+        sections.sections().iter().flat_map(|s| s.outline.curves()).map(|(_, p)| p.len()).sum();
     if sections.sections().len() > MADE_SECTIONS || points > MADE_POINTS {
         return;
     }
