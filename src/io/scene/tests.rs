@@ -157,7 +157,9 @@ fn the_complete_scene_reads_back_as_itself() {
     let all = surfaces.iter().map(|s| with(formula, s));
     let sections = "[[holder.section]]\ndiameter = 6\nlength = 12\n[[holder.section]]\ndiameter = 27\ntop_diameter = 32\nlength = 30";
     let held = with("[tolerance]", &format!("[holder]\ncutting_length = 9.5\n{sections}\n[tolerance]"));
-    let all = all.chain([VALID.to_owned(), taper, tangent, barrel, drill, held]);
+    let roughed =
+        with("[tolerance]", "[stock]\nroughed = 0.25\n[simulation]\nengine = \"voxel\"\n[tolerance]");
+    let all = all.chain([VALID.to_owned(), taper, tangent, barrel, drill, held, roughed]);
     for text in all {
         let first = Scene::parse("wave.toml", text).unwrap();
         let complete = complete_toml(&first);
@@ -166,6 +168,7 @@ fn the_complete_scene_reads_back_as_itself() {
         assert_eq!(complete_toml(&second), complete);
         assert_eq!(second.cutter, first.cutter);
         assert_eq!(second.holder, first.holder);
+        assert_eq!((second.stock, second.simulation.engine), (first.stock, first.simulation.engine));
         assert_eq!(second.tolerance, first.tolerance);
         assert_eq!(second.toolpaths, first.toolpaths);
         assert_eq!(second.part, first.part);

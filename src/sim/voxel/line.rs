@@ -24,6 +24,9 @@ const MOST_BACK: usize = 40;
 const MOST_LOOKS: usize = 30;
 const REACHED: f64 = 1e-9;
 
+/// Where so much is left, mm, there is no material within a voxel.
+const UNREACHED: f64 = 1e-6;
+
 /// The cut surface's normal is taken this far inside of the material, in voxels: an edge of the tool has many itself.
 const BENEATH: f64 = 0.01;
 
@@ -93,12 +96,18 @@ impl VoxelEngine<'_> {
         loop {
             if let Some(around) = voxels.around(&at(s)) {
                 if around.distance >= 0.0 {
-                    let Some((before, distance)) = inside else {
-                        let foot = self.foot(&at(s), &around.cut_by);
-                        return self.exit_at(voxels, point, normal, low, foot.cut_by);
+                    let (guess, known) = match inside {
+                        Some((before, distance)) => {
+                            let share: f64 = distance / (distance - around.distance);
+                            (before + share * (s - before), true)
+                        }
+                        // The material may end on the way from where no samples are kept.
+                        None => (s - 0.5 * step, false),
                     };
-                    let share: f64 = distance / (distance - around.distance);
-                    return self.exit_near(voxels, point, normal, before + share * (s - before));
+                    let here = voxels.around(&at(guess)).map_or(around.cut_by, |around| around.cut_by);
+                    let (exit, foot) = self.root(point, normal, guess, voxels.voxel(), &here);
+                    let begun = !known && (s == low || foot.distance > UNREACHED);
+                    return self.exit_at(voxels, point, normal, if begun { low } else { exit }, foot.cut_by);
                 }
                 inside = Some((s, around.distance));
             }
@@ -109,13 +118,11 @@ impl VoxelEngine<'_> {
         }
     }
 
-    /// The exit near where interpolation puts it.
-    fn exit_near(&self, voxels: &Voxels, point: &Point3, normal: &Vector3, guess: f64) -> Option<LineExit> {
-        let around = voxels.around(&(point + normal * guess))?;
-        let pitch = voxels.voxel();
+    /// Where a line leaves what these moves leave, within a voxel of a guess, and how the material lies there.
+    fn root(&self, point: &Point3, normal: &Vector3, guess: f64, pitch: f64, cut_by: &[u32]) -> (f64, Foot) {
         let (mut low, mut high) = (guess - pitch, guess + pitch);
         let mut s = guess;
-        let mut foot = self.foot(&(point + normal * s), &around.cut_by);
+        let mut foot = self.foot(&(point + normal * s), cut_by);
         for _ in 0..MOST_LOOKS {
             if foot.distance.abs() < REACHED {
                 break;
@@ -123,9 +130,9 @@ impl VoxelEngine<'_> {
             *(if foot.distance < 0.0 { &mut low } else { &mut high }) = s;
             let newton = s - foot.distance / foot.normal.dot(normal);
             s = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-            foot = self.foot(&(point + normal * s), &around.cut_by);
+            foot = self.foot(&(point + normal * s), cut_by);
         }
-        self.exit_at(voxels, point, normal, s, foot.cut_by)
+        (s, foot)
     }
 
     fn exit_at(

@@ -199,7 +199,11 @@ impl VoxelEngine<'_> {
         }
         let deepest = |mut places: Vec<(f64, Point3)>, index: u32| {
             places.sort_by(|a, b| b.0.total_cmp(&a.0));
-            let of = |(_, q): &(f64, Point3)| self.standing(q, index);
+            // Where the place itself is not reached, the nearest one that is lies that much less deep.
+            let short = |q: &Point3| {
+                self.parts.of_move(index, q, f64::INFINITY).map_or(0.0, |at| at.distance.max(0.0))
+            };
+            let of = |(_, q): &(f64, Point3)| self.standing(q, index) - short(q);
             places.iter().take(MOST_PLACES).map(of).fold(moves[index as usize].depth, f64::max)
         };
         let rapid_contacts = parallel::map(rapids.len(), |k| {
