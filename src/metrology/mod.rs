@@ -10,6 +10,7 @@
 mod along_normals;
 mod closer;
 mod cut_surface;
+mod engagement;
 mod figures;
 mod inspection;
 mod meetings;
@@ -29,6 +30,7 @@ pub use along_normals::{
     AlongNormal, NormalHit, NormalMap, PatchGrid, SweptVolume, measure_along_normals, net_places,
 };
 pub(crate) use cut_surface::CutSurface;
+pub use engagement::{ContactArcs, contact_arcs};
 pub use figures::{
     DeviationFigures, GougeFigures, GougeRegion, Limits, Measurement, PathFigures, ScallopFigures,
     UncutFigures, UncutRegion,

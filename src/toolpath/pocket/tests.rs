@@ -200,11 +200,11 @@ fn feeds_fall_where_more_of_the_cutter_cuts() {
         start: crate::toolpath::ClPoint::upright(Point3::origin()),
         moves: vec![to(10.0), to(20.0), to(30.0)],
     };
-    let widths = [1.0, 6.0, 1.0];
-    let figures = engagement(&path, &widths, 3.0, PI / 2.0);
+    let angles = [1.0, PI, 1.0];
+    let figures = engagement(&path, &angles, PI / 2.0);
     assert_eq!((figures.max, figures.p95, figures.max_move), (PI, PI, 1));
     assert!((figures.over_limit - 1.0 / 3.0).abs() < 1e-12);
-    limit_feed(&mut path, &widths, 3.0, PI / 2.0);
+    limit_feed(&mut path, &angles, PI / 2.0);
     let feeds: Vec<f64> = path.moves.iter().map(|m| m.feed_rate).collect();
     assert_eq!(feeds, [1000.0, 500.0, 1000.0]);
 }
