@@ -180,9 +180,11 @@ fn chord(ends: &[Point2; 2], radius: f64, y: f64) -> Option<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Point3;
+    use crate::geometry::{Point3, Region};
     use crate::monitor::Silent;
-    use crate::toolpath::{ClPoint, Move};
+    use crate::toolpath::{
+        ClPoint, Flow, Joining, Move, Pattern, PlanSettings, Pocket, PocketStrategy, Step, plan_pocket,
+    };
 
     /// The path through `places` at z = -2 in stock up to 0, after a plunge to the first of them.
     fn through(places: &[(f64, f64)]) -> Toolpath {
@@ -266,6 +268,66 @@ mod tests {
         let rho = first + width;
         let exact = (1.0 - (width * (rho + 3.0) - 0.5 * width * width) / (rho * 3.0)).acos();
         (500..700).for_each(|k| check(&found, k, exact));
+    }
+
+    /// Pockets whose passes are bounded, with sharp corners, a neck, an island: nothing above the limit but
+    /// by a few degrees, at any step down; plain passes are slots somewhere.
+    #[test]
+    fn bounded_passes_keep_to_their_engagement() {
+        let points = |c: &[(f64, f64)]| c.iter().map(|&(x, y)| Point2::new(x, y)).collect::<Vec<_>>();
+        let square = points(&[(0., 0.), (18., 0.), (18., 18.), (0., 18.)]);
+        let island = points(&[(7., 8.), (9., 8.), (9., 10.), (7., 10.)]);
+        let neck = points(&[
+            (0., 0.),
+            (12., 0.),
+            (12., 3.),
+            (17., 3.),
+            (17., 10.),
+            (12., 10.),
+            (12., 12.),
+            (0., 12.),
+        ]);
+        let (flow, offset) =
+            (Pattern::Flow(Flow { smoothing: Some(3.0), spiral: false }), Pattern::Offset { spiral: false });
+        for (curves, pattern, limit) in [
+            (vec![square.clone()], flow, 60.0f64),
+            (vec![neck], offset, 75.0),
+            (vec![square, island], offset, 60.0),
+        ] {
+            let pocket = Pocket { region: Region::nested(curves).unwrap().0, depth: 3.0 };
+            let greatest = |engagement: Option<f64>| {
+                let found = plan(&pocket, pattern, engagement);
+                let arcs = contact_arcs(&found, &Cutter::flat(5.0).unwrap(), 0.0, &Silent).unwrap();
+                let cut = found.moves.iter().zip(&arcs.of_moves).filter(|(m, _)| m.kind == MoveKind::Cut);
+                cut.map(|(_, arc)| *arc).fold(0.0, f64::max)
+            };
+            let (bounded, plain) = (greatest(Some(limit.to_radians())), greatest(None));
+            assert!(bounded <= (limit + 5.0).to_radians(), "{pattern:?}: {}", bounded.to_degrees());
+            assert!(plain > (limit + 30.0).to_radians(), "{pattern:?}: {}", plain.to_degrees());
+        }
+    }
+
+    fn plan(pocket: &Pocket, pattern: Pattern, engagement: Option<f64>) -> Toolpath {
+        let strategy = PocketStrategy {
+            pattern,
+            stepdown: Some(1.5),
+            floor_allowance: 0.0,
+            wall_allowance: 0.0,
+            ramp_angle: 0.1,
+            helix_radius: None,
+            engagement,
+        };
+        let settings = PlanSettings {
+            step: Step::Stepover(2.0),
+            chord_tolerance: 0.005,
+            clearance: 2.0,
+            stock_top: 0.0,
+            feed_rate: 1000.0,
+            plunge_rate: 300.0,
+            rapid_rate: 5000.0,
+            joining: Joining::default(),
+        };
+        plan_pocket(pocket, &Cutter::flat(5.0).unwrap(), &strategy, &settings, &Silent).unwrap().path
     }
 
     /// What the cells say of the ground is what the engine's stock says.
