@@ -1,14 +1,13 @@
 //! A scene's pocket: its region from a drawing or the scene's points, and the floor that is measured.
 
 use super::error::CliError;
-use crate::cutter::Cutter;
 use crate::field::fill;
 use crate::geometry::{Point3, Region, TriangleMesh};
 use crate::io::outline::{self, OutlineOptions};
 use crate::io::scene::{OutlineSource, PartSource, Scene, SceneError};
-use crate::metrology::{PocketFigures, wall_gouge_of_cells, wall_gouge_of_moves};
+use crate::metrology::{ContactArcs, PocketFigures, wall_gouge_of_cells, wall_gouge_of_moves};
 use crate::part::Part;
-use crate::sim::{Removal, ZMap};
+use crate::sim::ZMap;
 use crate::toolpath::{Engagement, Pocket, PocketStrategy, Step, Toolpath, engagement, limit_feed};
 
 /// Share of the chord tolerance that drawings are flattened to; the passes have the rest.
@@ -88,20 +87,19 @@ pub fn floor_part(scene: &Scene, pocket: &Pocket) -> Result<Part, CliError> {
     Ok(Part::from_mesh(mesh))
 }
 
-/// Lowers the feed where a simulation saw more of the cutter in stock than the strategy allows. Leaves the
-/// engagement of the passes.
+/// Lowers the feed where more of the cutter was measured in stock than the strategy allows. Leaves the
+/// engagement of the passes, and the bound of its greatest angle, rad.
 pub fn limit_feed_by(
     path: &mut Toolpath,
-    removed: &Removal,
-    cutter: &Cutter,
+    arcs: &ContactArcs,
     strategy: &PocketStrategy,
     step: Step,
-) -> Engagement {
-    let widths: Vec<f64> = removed.moves.iter().map(|m| m.radial).collect();
-    let limit = strategy.engagement_limit(step, cutter.radius());
-    let found = engagement(path, &widths, cutter.radius(), limit);
-    limit_feed(path, &widths, cutter.radius(), limit);
-    found
+    radius: f64,
+) -> (Engagement, f64) {
+    let limit = strategy.engagement_limit(step, radius);
+    let found = engagement(path, &arcs.of_moves, limit);
+    limit_feed(path, &arcs.of_moves, limit);
+    (found, arcs.bound(found.max))
 }
 
 /// What is measured of a pocket besides its floor. `top` is the height of the stock, mm.
@@ -113,12 +111,11 @@ pub fn pocket_figures(
     path: &Toolpath,
     cut: &ZMap,
     top: f64,
-    engaged: Option<Engagement>,
+    (engaged, engagement_bound): (Engagement, f64),
 ) -> PocketFigures {
     let cutter = &scene.cutter;
     let (wall_gouge_mm, wall_gouge_move) = wall_gouge_of_moves(&pocket.region, cutter, path, top);
     let (of_cells, area) = wall_gouge_of_cells(&pocket.region, cut, top);
-    let engaged = engaged.unwrap_or_default();
     PocketFigures {
         area_mm2: pocket.region.area(),
         unreachable_area_mm2: pocket.rest_area(cutter),
@@ -130,6 +127,8 @@ pub fn pocket_figures(
         wall_gouge_of_cells_error_bound_mm: std::f64::consts::FRAC_1_SQRT_2 * cut.grid.cell,
         wall_gouge_area_mm2: area,
         max_engagement_deg: engaged.max.to_degrees(),
+        max_engagement_error_bound_deg: engagement_bound.to_degrees(),
+        max_engagement_move: engaged.max_move,
         p95_engagement_deg: engaged.p95.to_degrees(),
         engagement_limit_deg: strategy.engagement_limit(step, cutter.radius()).to_degrees(),
         over_engagement_limit_fraction: engaged.over_limit,

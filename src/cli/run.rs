@@ -21,7 +21,7 @@ use crate::io::{ProgramHeader, apt_cl, exr, ply_write, png, stl_write};
 use crate::machine::kinematics::{JointPath, JointReport};
 use crate::machine::slow_corners;
 use crate::metrology::{
-    Asked, Measurement, PAIRS_HEADER, RemovalFigures, measure, path_figures, removal_figures,
+    Asked, Measurement, PAIRS_HEADER, RemovalFigures, contact_arcs, measure, path_figures, removal_figures,
 };
 use crate::monitor::{self, Monitor as _};
 use crate::parallel;
@@ -35,7 +35,7 @@ use crate::report::{
 };
 use crate::sim::{Grid, GridError, ZMap, cut, cut_in_order, cut_reference, holder_collisions};
 use crate::toolpath::{
-    OffsetDrive, Plan, PlanError, PlanSettings, Pocket, Strategy, Toolpath, plan, plan_pocket,
+    Engagement, OffsetDrive, Plan, PlanError, PlanSettings, Pocket, Strategy, Toolpath, plan, plan_pocket,
 };
 
 /// Bytes a cell that a run takes at its peak: stock and winning moves 8, deviations 12, ridges 16 where
@@ -323,14 +323,16 @@ impl<'a> Job<'a> {
             Engine::Reference => cut_reference(&stock, &scene.cutter, &planned.path, monitor)?,
             _ => cut(stock, &scene.cutter, &planned.path, monitor)?,
         };
-        let (mut removal, mut engaged) = (None, None);
+        let mut engaged = (Engagement::default(), 0.0);
+        if let Some((_, strategy)) = milled {
+            let arcs = contact_arcs(&planned.path, &scene.cutter, self.top, monitor)?;
+            let radius = scene.cutter.radius();
+            engaged = limit_feed_by(&mut planned.path, &arcs, strategy, request.step, radius);
+        }
+        let mut removal = None;
         if scene.simulation.removal {
             let stock = ZMap::block(grid, self.top);
             let removed = cut_in_order(stock, &scene.cutter, &planned.path, monitor)?;
-            if let Some((_, strategy)) = milled {
-                engaged =
-                    Some(limit_feed_by(&mut planned.path, &removed, &scene.cutter, strategy, request.step));
-            }
             removal = Some(removal_figures(&planned.path, &removed, &cut.height));
         }
         let besides = part_bytes(&self.part) + (planned.path.len() * BYTES_PER_MOVE) as u64;

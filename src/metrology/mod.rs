@@ -10,6 +10,7 @@
 mod along_normals;
 mod closer;
 mod cut_surface;
+mod engagement;
 mod figures;
 #[cfg(test)]
 mod flat_scene;
@@ -33,6 +34,7 @@ pub use along_normals::{
     measure_along_normals, net_places,
 };
 pub(crate) use cut_surface::CutSurface;
+pub use engagement::{ContactArcs, contact_arcs};
 pub use figures::{
     DeviationFigures, GougeFigures, GougeRegion, Limits, Measurement, PathFigures, ScallopFigures,
     UncutFigures, UncutRegion,

@@ -38,12 +38,15 @@ pub struct PocketFigures {
     pub wall_gouge_of_cells_error_bound_mm: f64,
     /// Area of the cut cells beyond the outline.
     pub wall_gouge_area_mm2: f64,
-    /// Greatest angle of the cutter in stock along passes, ways down left out; 0 where the scene does not
-    /// ask for what moves remove.
+    /// Greatest angle of the cutter's circumference in stock along passes, ways down left out.
     pub max_engagement_deg: f64,
+    /// Bound of its error beside a straight wall: layers thinner than two cells are not seen.
+    pub max_engagement_error_bound_deg: f64,
+    /// The move with the greatest angle, counted from 0.
+    pub max_engagement_move: u32,
     /// 95 % of the cutting length have less.
     pub p95_engagement_deg: f64,
-    /// Angle above which the feed falls.
+    /// Angle that passes are planned within, if one was asked for; above it the feed falls.
     pub engagement_limit_deg: f64,
     /// Share of the cutting length above it.
     pub over_engagement_limit_fraction: f64,

@@ -327,7 +327,10 @@ fn figures(t: &ToolpathResult) -> Markup {
             ("stepover", format!("{:.3} mm", p.stepover_mm)),
             (
                 "engagement, greatest and 95 %",
-                format!("{:.0}, {:.0} degrees", p.max_engagement_deg, p.p95_engagement_deg),
+                format!(
+                    "{:.0} ± {:.0}, {:.0} degrees",
+                    p.max_engagement_deg, p.max_engagement_error_bound_deg, p.p95_engagement_deg
+                ),
             ),
             (
                 "above the limit",

@@ -83,7 +83,7 @@ pub(super) fn program(
     let mut writer = Writer { settings, moves: Vec::new(), at: None, start: None, pass: 0 };
     let mut above = settings.stock_top;
     for floor in floors(depth, strategy) {
-        for run in runs.iter().filter(|run| run.points.len() > 1) {
+        for run in runs.iter().filter(|run| !run.points.is_empty()) {
             let way = way_down(run, above, floor, strategy, settings.chord_tolerance);
             let first = way[0];
             let (over, near) = (Point3::new(first.x, first.y, safe), (first.z + ABOVE).min(safe));
@@ -145,6 +145,10 @@ fn way_down(
             let z = above - drop * (gone / (times * length)).min(1.0);
             tips.push(Point3::new(w[1].x, w[1].y, z));
         }
+    }
+    if matches!(run.entry, Entry::Helix { .. }) {
+        // What the slope left.
+        tips.extend(once.iter().map(|p| Point3::new(p.x, p.y, floor)));
     }
     tips.push(Point3::new(begin.x, begin.y, floor));
     tips.dedup();

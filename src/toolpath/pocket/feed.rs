@@ -1,16 +1,12 @@
 //! The feed where more of the cutter is in stock than is good for it.
 //!
-//! Enters: a program and the width across each move that it cuts, as a simulation found it. Leaves: the
-//! same moves with feeds reduced, and figures of the engagement.
+//! Enters: a program and the angle of the circumference in stock on each move, as it was measured. Leaves:
+//! the same moves with feeds reduced, and figures of the engagement.
 
 use crate::toolpath::{MoveKind, Toolpath};
 
 /// The feed never falls below this share: rubbing wears a cutter more than load does.
 pub const LEAST_SHARE: f64 = 0.3;
-
-/// A move counts with those this far before it and after it, over the cutter's radius: of a move shorter
-/// than a cell little is seen.
-const WINDOW: f64 = 0.15;
 
 /// Angle of the cutter's circumference in stock, rad, when it cuts `width` mm beside cleared ground; π in a
 /// slot.
@@ -31,42 +27,8 @@ pub struct Engagement {
     pub max_move: u32,
 }
 
-/// Engagement angle of every move, rad, the greatest within a little way before and after it.
-fn angles(path: &Toolpath, widths: &[f64], radius: f64) -> Vec<f64> {
-    let lengths: Vec<f64> = path.segments().map(|(a, b, _)| (b - a).norm()).collect();
-    let cuts = |k: usize| path.moves[k].kind == MoveKind::Cut;
-    let own = |k: usize| engagement_angle(widths.get(k).copied().unwrap_or(0.0), radius);
-    (0..path.len())
-        .map(|k| {
-            if !cuts(k) {
-                return 0.0;
-            }
-            let mut angle = own(k);
-            let (mut back, mut gone) = (k, 0.0);
-            while back > 0 && cuts(back - 1) && gone < WINDOW * radius {
-                back -= 1;
-                gone += lengths[back];
-                if gone < WINDOW * radius {
-                    angle = angle.max(own(back));
-                }
-            }
-            let (mut on, mut gone) = (k, 0.0);
-            while on + 1 < path.len() && cuts(on + 1) && gone < WINDOW * radius {
-                on += 1;
-                gone += lengths[on];
-                if gone < WINDOW * radius {
-                    angle = angle.max(own(on));
-                }
-            }
-            angle
-        })
-        .collect()
-}
-
-/// Figures of the passes' engagement. `widths` are the extents of what each move cuts across its
-/// direction, mm.
-pub fn engagement(path: &Toolpath, widths: &[f64], radius: f64, limit: f64) -> Engagement {
-    let angles = angles(path, widths, radius);
+/// Figures of the passes' engagement. `angles` are those of each move, rad.
+pub fn engagement(path: &Toolpath, angles: &[f64], limit: f64) -> Engagement {
     let mut figures = Engagement::default();
     let mut all: Vec<(f64, f64)> = Vec::new();
     for (k, (a, b, m)) in path.segments().enumerate() {
@@ -95,11 +57,10 @@ pub fn engagement(path: &Toolpath, widths: &[f64], radius: f64, limit: f64) -> E
     figures
 }
 
-/// Reduces the feed of cutting moves whose engagement is above `limit`, rad, in proportion, down to
-/// `LEAST_SHARE`.
-pub fn limit_feed(path: &mut Toolpath, widths: &[f64], radius: f64, limit: f64) {
-    let angles = angles(path, widths, radius);
-    for (m, angle) in path.moves.iter_mut().zip(angles) {
+/// Reduces the feed of cutting moves whose engagement (`angles`, rad) is above `limit`, rad, in
+/// proportion, down to [`LEAST_SHARE`].
+pub fn limit_feed(path: &mut Toolpath, angles: &[f64], limit: f64) {
+    for (m, &angle) in path.moves.iter_mut().zip(angles) {
         if m.kind == MoveKind::Cut && angle > limit {
             m.feed_rate *= (limit / angle).max(LEAST_SHARE);
         }

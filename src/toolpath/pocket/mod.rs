@@ -4,8 +4,11 @@
 //! drawn in by the cutter's radius. Passes there are level curves of a flow that follows walls and islands
 //! (or offsets of them, or parallel lines), cut from the inside outwards, so that only the first pass of
 //! each nest is a slot; each nest is entered by a helix where there is room, else by a ramp along its first
-//! pass. The design's frame: z = 0 is the upper face, the floor lies at minus the depth; mm.
+//! pass. Where an engagement is asked for, passes that turn toward the stock lie closer, and loops clear
+//! first passes, corners and necks (`bounded`). The design's frame: z = 0 is the upper face, the floor lies at minus the depth; mm.
 
+mod bounded;
+mod cleared;
 mod descend;
 mod feed;
 mod lines;
@@ -13,15 +16,18 @@ mod nest;
 mod route;
 #[cfg(test)]
 mod tests;
+mod turning;
 
+use cleared::Cleared;
 pub use feed::{Engagement, engagement, engagement_angle, limit_feed};
 use nest::NestError;
 use route::{Entry, Run};
+use turning::Turning;
 
 use super::{Plan, PlanError, PlanSettings, Step};
 use crate::cutter::{Cutter, CutterShape};
 use crate::geometry::{Piece, Region, SegmentGrid};
-use crate::monitor::{self, Monitor};
+use crate::monitor::{self, Cancelled, Monitor};
 
 /// A pocket to mill.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,9 +81,10 @@ pub struct PocketStrategy {
     /// Radius of the helix of the cutter's centre, mm; `None`: 0.8 of the cutter's radius, which leaves no
     /// core.
     pub helix_radius: Option<f64>,
-    /// Most of the cutter's circumference in stock at full feed, rad; where more is, the feed falls in
-    /// proportion. It bounds the stepover, and a flow's passes then lie within it everywhere. `None`: a
-    /// quarter more than the stepover has in straight passes.
+    /// Most of the cutter's circumference in stock, rad. It bounds the stepover, and passes of flows and
+    /// offsets are planned within it everywhere but on ways down. Where more is all the same, the feed
+    /// falls in proportion. `None`: passes are not bounded, and the feed falls above a quarter more than
+    /// the stepover has in straight passes.
     pub engagement: Option<f64>,
 }
 
@@ -116,6 +123,20 @@ impl PocketStrategy {
             Step::Scallop(_) => 0.8 * radius,
         };
         self.engagement.map_or(asked, |angle| asked.min(radius * (1.0 - angle.cos())))
+    }
+
+    /// Angle of the cutter in stock, rad, that passes are planned within, if they are: lines of a zigzag have
+    /// stock on either side in turns, and loops on one side only would not do.
+    fn bounded(&self) -> Option<f64> {
+        /// Planned for less by this, rad, which is what sides of polylines, films and the parts in which
+        /// angles are told apart add.
+        const SPARE: f64 = 0.05;
+        match self.pattern {
+            Pattern::Flow(_) | Pattern::Offset { .. } => {
+                self.engagement.filter(|angle| *angle < std::f64::consts::PI).map(|angle| angle - SPARE)
+            }
+            Pattern::Zigzag { .. } => None,
+        }
     }
 
     /// Angle of the cutter in stock, rad, above which the feed falls.
@@ -192,7 +213,7 @@ pub fn plan_pocket(
             for wall in piece.curves() {
                 let mut around = wall.to_vec();
                 around.push(wall[0]);
-                runs.push(Run { entry: Entry::Ramp(around.clone()), points: around });
+                runs.push(Run::within(piece, Entry::Ramp(around.clone()), around));
             }
         }
     }
@@ -207,11 +228,39 @@ pub fn plan_pocket(
         "{rest:.3} mm² of {:.1} mm² lie in corners that no position of the cutter reaches",
         pocket.region.area()
     ));
+    if let Some(limit) = strategy.bounded() {
+        let bounds = Turning { limit, radius };
+        bound_runs(&mut runs, pocket, bounds, &mut notes, monitor)?;
+    }
     for run in &mut runs {
         run.points = descend::shortened(&run.points, chords, MOVE_OVER_RADIUS * radius);
     }
     let path = descend::program(&runs, pocket.depth, strategy, settings);
     Ok(Plan { path, notes, shortest: None, field: None })
+}
+
+/// Puts loops into the runs where more of the circumference than the limit would stand in stock.
+fn bound_runs(
+    runs: &mut [Run],
+    pocket: &Pocket,
+    bounds: Turning,
+    notes: &mut Vec<String>,
+    monitor: &dyn Monitor,
+) -> Result<(), Cancelled> {
+    let Some(around) = pocket.region.bounds() else { return Ok(()) };
+    let mut ground = Cleared::new(around, bounds.radius);
+    let (mut loops, mut above) = (0, 0.0);
+    for run in runs {
+        let did = bounded::bound(run, &mut ground, bounds, monitor)?;
+        (loops, above) = (loops + did.loops, above + did.above);
+    }
+    notes.push(format!("{loops} loops in each step down bound the engagement"));
+    if above > 0.0 {
+        notes.push(format!(
+            "{above:.2} mm of each step down are above the engagement for want of room beside the pass; the feed falls there"
+        ));
+    }
+    Ok(())
 }
 
 fn piece_runs(
@@ -229,15 +278,17 @@ fn piece_runs(
     let radius = cutter.radius();
     let flat = cutter.flat_radius();
     let reach = if flat > 0.0 { REACH * flat } else { step };
+    let turning = strategy.bounded().map(|limit| Turning { limit, radius });
+    let spacing = turning
+        .map_or(nest::Spacing::lenient(step, reach), |turning| nest::Spacing::bounded(step, reach, turning));
     let (nest, spiral) = match strategy.pattern {
         Pattern::Zigzag { angle } => return Ok(lines::runs(piece, angle, step)),
-        Pattern::Offset { spiral } => (nest::offsets(piece, step, reach, monitor).map_err(failed)?, spiral),
+        Pattern::Offset { spiral } => {
+            (nest::offsets(piece, &spacing, reach, monitor).map_err(failed)?, spiral)
+        }
         Pattern::Flow(flow) => {
-            let strict = strategy.engagement.is_some();
-            let spacing =
-                if strict { nest::Spacing::strict(step) } else { nest::Spacing::lenient(step, reach) };
             let (nest, sigma) = nest::flow(piece, &flow, spacing, reach, monitor).map_err(failed)?;
-            let plain = nest::offsets(piece, step, reach, monitor).map_err(failed)?.length();
+            let plain = nest::offsets(piece, &spacing, reach, monitor).map_err(failed)?.length();
             notes.push(format!(
                 "the flow is smoothed over {sigma:.2} mm; its passes are {:.1} mm long, offsets of the walls would be {plain:.1} mm",
                 nest.length()
@@ -247,7 +298,8 @@ fn piece_runs(
     };
     let walls = SegmentGrid::of_curves(piece.curves());
     let helix = strategy.helix_radius.unwrap_or(HELIX_OVER_RADIUS * radius);
+    let leads = if turning.is_some() { route::LONG_LEADS } else { route::LEADS };
     let settings =
-        route::RouteSettings { helix: [helix, LEAST_HELIX * radius], spiral, spacing: SPACING * step };
+        route::RouteSettings { helix: [helix, LEAST_HELIX * radius], spiral, spacing: SPACING * step, leads };
     Ok(route::runs(&nest, &walls, &settings))
 }

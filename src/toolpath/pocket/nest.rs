@@ -5,6 +5,7 @@
 //! stepover to cut at most: every place of a curve is within it of the next curve inwards.
 
 use super::Flow;
+use super::turning::{Turning, curvatures};
 use crate::field::{PlanarError, PlanarMesh};
 use crate::geometry::{CurveSegment, Piece, Point2, Region, SegmentGrid};
 use crate::monitor::{self, Cancelled, Monitor};
@@ -41,18 +42,60 @@ pub struct Spacing {
     /// In corners, and at the ends of long nests, it may be this far, mm. Where it would be farther,
     /// stretches of curves between are inserted.
     pub farthest: f64,
+    /// What bounds the engagement, if anything does: passes that turn toward the stock cut less.
+    pub turning: Option<Turning>,
 }
 
 impl Spacing {
-    /// The stepover everywhere: more passes, and none has more to cut.
+    /// By the engagement everywhere: more passes, and none has more to cut but in corners.
+    pub fn bounded(step: f64, reach: f64, turning: Turning) -> Self {
+        Self { turning: Some(turning), ..Self::lenient(step, reach) }
+    }
+
+    /// The stepover everywhere.
+    #[cfg(test)]
     pub fn strict(step: f64) -> Self {
-        Self { step, farthest: step }
+        Self { step, farthest: step, turning: None }
     }
 
     /// Up to twice the stepover, as long as discs of the radius `reach` along both curves leave nothing
     /// between.
     pub fn lenient(step: f64, reach: f64) -> Self {
-        Self { step, farthest: (2.0 * step).min(2.0 * REACH_SHARE * reach).max(step) }
+        Self { step, farthest: (2.0 * step).min(2.0 * REACH_SHARE * reach).max(step), turning: None }
+    }
+}
+
+/// Share of offsets whose turns are left to loops, and the least distance of offsets over the stepover.
+const SHARP_SHARE: f64 = 0.5;
+const LEAST_STEP: f64 = 0.4;
+
+/// Inner offsets turn with this radius over the cutter's at least where the engagement is bounded.
+const ROUND_CORNERS: f64 = 0.5;
+
+impl Spacing {
+    /// How far the next offset may be from curves: the stepover of all but their sharpest turns, mm.
+    fn next(&self, curves: &[Piece]) -> f64 {
+        if self.turning.is_none() {
+            return self.step;
+        }
+        let mut steps: Vec<f64> = curves.iter().flat_map(|piece| self.steps(piece)).collect();
+        steps.sort_by(f64::total_cmp);
+        let most = (SHARP_SHARE * steps.len() as f64) as usize;
+        steps.get(most).map_or(self.step, |s| s.max(LEAST_STEP * self.step))
+    }
+
+    /// What each place of the subdivided curves may have to the next one inwards, mm.
+    fn steps(&self, curves: &Piece) -> Vec<f64> {
+        let spacing = SUBDIVISION * self.step;
+        let Some(turning) = self.turning else { return vec![self.step; subdivided(curves, spacing).len()] };
+        let of_curve = |curve: &[Point2]| {
+            let single = Piece { outer: curve.to_vec(), islands: Vec::new() };
+            let points = subdivided(&single, spacing);
+            let steps =
+                curvatures(&points, 0.5 * turning.radius).into_iter().map(|k| turning.step(k).min(self.step));
+            steps.collect::<Vec<f64>>()
+        };
+        curves.curves().flat_map(of_curve).collect()
     }
 }
 
@@ -62,6 +105,9 @@ const REACH_SHARE: f64 = 0.9;
 /// Share of a curve from which the next one may be farther than the stepover. More makes fewer closed
 /// curves and more inserted stretches, each of which costs a link.
 const FAR_SHARE: f64 = 0.2;
+
+/// The same where the engagement is bounded: each such place costs loops.
+const FAR_SHARE_BOUNDED: f64 = 0.1;
 
 /// No place of a curve is farther from the next than this many stepovers, whatever is inserted: side arms
 /// of a pocket have closed curves of their own.
@@ -118,13 +164,24 @@ pub fn closed_length(curve: &[Point2]) -> f64 {
     (0..curve.len()).map(|k| (curve[(k + 1) % curve.len()] - curve[k]).norm()).sum()
 }
 
-/// Offsets of the walls, `step` apart; discs of the radius `reach` along the innermost ones leave nothing.
-pub fn offsets(piece: &Piece, step: f64, reach: f64, monitor: &dyn Monitor) -> Result<Nest, NestError> {
+/// Offsets of the walls, the stepover apart; discs of the radius `reach` along the innermost ones leave
+/// nothing. Where the engagement is bounded, inner ones have round corners and turning ones lie closer.
+pub fn offsets(
+    piece: &Piece,
+    spacing: &Spacing,
+    reach: f64,
+    monitor: &dyn Monitor,
+) -> Result<Nest, NestError> {
+    let step = spacing.step;
     let mut levels = vec![vec![piece.clone()]];
     let whole = Region { pieces: vec![piece.clone()] };
+    let mut distance = 0.0;
     loop {
         monitor::check(monitor)?;
-        let inner = whole.inset(step * levels.len() as f64).pieces;
+        distance += levels.last().map_or(step, |level| spacing.next(level));
+        let round = spacing.turning.map_or(0.0, |t| ROUND_CORNERS * t.radius);
+        let inner = whole.inset(distance + round).grown(round).pieces;
+        let inner = if inner.is_empty() { whole.inset(distance).pieces } else { inner };
         if inner.is_empty() {
             break;
         }
@@ -250,15 +307,17 @@ impl Job<'_> {
             return Ok(nest);
         }
         let probes = subdivided(&nest.curves, SUBDIVISION * self.spacing.step);
+        let steps = self.spacing.steps(&nest.curves);
+        let far_share = if self.spacing.turning.is_some() { FAR_SHARE_BOUNDED } else { FAR_SHARE };
         let near_enough = |level: f64| {
             let inner = self.curves_at(level, &triangles);
             let grid = SegmentGrid::of_curves(inner.iter().map(Vec::as_slice));
             let (mut far, mut farthest) = (0usize, 0.0f64);
-            for d in probes.iter().map(|p| grid.distance(p)) {
-                far += usize::from(d > self.spacing.step);
+            for (d, step) in probes.iter().map(|p| grid.distance(p)).zip(&steps) {
+                far += usize::from(d > *step);
                 farthest = farthest.max(d);
             }
-            far as f64 <= FAR_SHARE * probes.len() as f64 && farthest <= FARTHEST_STEPS * self.spacing.step
+            far as f64 <= far_share * probes.len() as f64 && farthest <= FARTHEST_STEPS * self.spacing.step
         };
         let (mut lo, mut hi) = (level, top);
         for _ in 0..HALVINGS {
@@ -287,7 +346,7 @@ impl Job<'_> {
     /// Stretches of levels between `outer` and `inner` where the curves at `inner` are too far from the
     /// places `probes` at `outer`; the innermost first.
     fn between(&self, probes: &[Point2], outer: f64, inner: f64, triangles: &[u32]) -> Vec<Vec<Point2>> {
-        let Spacing { step, farthest } = self.spacing;
+        let Spacing { step, farthest, .. } = self.spacing;
         let inside = self.curves_at(inner, triangles);
         let inside = SegmentGrid::of_curves(inside.iter().map(Vec::as_slice));
         let mut far: Vec<Point2> = probes.iter().filter(|p| inside.distance(p) > farthest).copied().collect();

@@ -19,12 +19,15 @@ const LONGEST_HANDLE: f64 = 4.0;
 const LEAST_PLACES: f64 = 48.0;
 
 /// A link meets the next curve this many times its length of gap farther on.
-const LEADS: [f64; 3] = [2.5, 1.5, 0.8];
+pub(super) const LEADS: [f64; 3] = [2.5, 1.5, 0.8];
+
+/// The same where the engagement is bounded: a link at an angle to the pass beside it cuts as much more.
+pub(super) const LONG_LEADS: [f64; 3] = [7.0, 4.0, 2.0];
 
 /// How a run gets down to its depth.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Entry {
-    /// A helix about a centre; the run goes on from its circle's point at angle 0.
+    /// A helix about a centre and once around at depth; the run goes on from its circle's point at angle 0.
     Helix {
         /// Its axis.
         centre: Point2,
@@ -35,6 +38,15 @@ pub enum Entry {
     Ramp(Vec<Point2>),
 }
 
+/// The curves that a stretch of a run goes along or lies within.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Room {
+    /// Its first point in the run.
+    pub first: usize,
+    /// The curves.
+    pub within: Piece,
+}
+
 /// From an entry to a retract.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
@@ -42,6 +54,40 @@ pub struct Run {
     pub entry: Entry,
     /// The way at depth.
     pub points: Vec<Point2>,
+    /// What its stretches lie within, from the first on.
+    pub rooms: Vec<Room>,
+}
+
+impl Run {
+    /// A run that has yet to go anywhere.
+    fn new(entry: Entry) -> Self {
+        Self { entry, points: Vec::new(), rooms: Vec::new() }
+    }
+
+    /// A run within one piece.
+    pub fn within(piece: &Piece, entry: Entry, points: Vec<Point2>) -> Self {
+        Self { entry, points, rooms: vec![Room { first: 0, within: piece.clone() }] }
+    }
+
+    /// Where it ends so far, and in which direction.
+    fn end(&self) -> Option<(Point2, Vector2)> {
+        let n = self.points.len();
+        let end = *self.points.last()?;
+        match (&self.entry, n.checked_sub(2)) {
+            (_, Some(before)) => Some((end, direction(&self.points[before], &end))),
+            (Entry::Helix { centre, .. }, None) => {
+                let out = direction(centre, &end);
+                Some((end, Vector2::new(-out.y, out.x)))
+            }
+            (Entry::Ramp(_), None) => None,
+        }
+    }
+
+    /// What comes from here on lies within `piece`.
+    fn enter(&mut self, piece: &Piece) {
+        let first = self.points.len().saturating_sub(1);
+        self.rooms.push(Room { first, within: piece.clone() });
+    }
 }
 
 /// What routes need to know.
@@ -53,12 +99,14 @@ pub struct RouteSettings {
     pub spiral: bool,
     /// Longest side of the spiral's polyline, mm.
     pub spacing: f64,
+    /// Leads of links, the first that stays inside is taken.
+    pub leads: [f64; 3],
 }
 
 /// All runs of a nest.
 pub fn runs(nest: &Nest, walls: &SegmentGrid, settings: &RouteSettings) -> Vec<Run> {
-    let mut route = Route { walls, settings, runs: Vec::new(), last: None };
-    route.visit(nest);
+    let mut route = Route { walls, settings, runs: Vec::new(), bore: None, last: None };
+    route.visit(nest, &nest.curves);
     route.finish_spiral();
     route.runs
 }
@@ -67,6 +115,8 @@ struct Route<'a> {
     walls: &'a SegmentGrid,
     settings: &'a RouteSettings,
     runs: Vec<Run>,
+    /// The circle of the last helix.
+    bore: Option<(Point2, f64)>,
     /// The closed curve at whose beginning the last run stands, while it can be spiralled on.
     last: Option<Vec<Point2>>,
 }
@@ -102,7 +152,7 @@ fn direction(a: &Point2, b: &Point2) -> Vector2 {
 }
 
 /// A cubic from `a` along `u` to `b` along `v`, ends left out.
-fn bend(a: Point2, u: Vector2, b: Point2, v: Vector2, longest: f64) -> Vec<Point2> {
+pub(super) fn bend(a: Point2, u: Vector2, b: Point2, v: Vector2, longest: f64) -> Vec<Point2> {
     let handle = (0.4 * (b - a).norm()).min(longest);
     let (c, d) = (a + u * handle, b - v * handle);
     (1..LINK_PIECES)
@@ -120,14 +170,17 @@ fn bend(a: Point2, u: Vector2, b: Point2, v: Vector2, longest: f64) -> Vec<Point
 }
 
 impl Route<'_> {
-    fn visit(&mut self, nest: &Nest) {
+    /// `outer` are the curves around those of the nest.
+    fn visit(&mut self, nest: &Nest, outer: &Piece) {
+        // Within the innermost curves there may be no room for loops.
+        let room = if nest.inner.is_empty() { outer } else { &nest.curves };
         if nest.inner.is_empty() {
-            self.enter(nest);
+            self.enter(nest, room);
         } else {
             let mut inner: Vec<&Nest> = nest.inner.iter().collect();
             // The one with most passes last: it leads on without a retract.
             inner.sort_by(|a, b| a.length().total_cmp(&b.length()));
-            inner.into_iter().for_each(|n| self.visit(n));
+            inner.into_iter().for_each(|n| self.visit(n, &nest.curves));
             if nest.inner.len() > 1 {
                 self.finish_spiral();
             }
@@ -136,8 +189,12 @@ impl Route<'_> {
             self.finish_spiral();
             nest.between.iter().for_each(|stretch| self.stretch(stretch, &nest.curves));
         }
+        let bored = |p: &Point2| self.bore.is_some_and(|(centre, radius)| (p - centre).norm() <= radius);
+        if nest.curves.curves().flatten().all(bored) {
+            return;
+        }
         let single = nest.curves.islands.is_empty() && nest.inner.len() <= 1;
-        if self.settings.spiral && single && self.turn(&nest.curves) {
+        if self.settings.spiral && single && self.turn(&nest.curves, room) {
             return;
         }
         self.finish_spiral();
@@ -147,7 +204,7 @@ impl Route<'_> {
             let away = |curve: &[Point2]| end.map_or(0.0, |e| SegmentGrid::of_curves([curve]).distance(&e));
             let nearest = (0..left.len()).min_by(|a, b| away(left[*a]).total_cmp(&away(left[*b])));
             let curve = left.remove(nearest.unwrap_or(0));
-            self.curve(curve, &nest.curves, &nest.seed);
+            self.curve(curve, &nest.curves, room, &nest.seed);
         }
     }
 
@@ -156,19 +213,19 @@ impl Route<'_> {
     }
 
     /// Begins a run at the seed by a helix, if there is room for one.
-    fn enter(&mut self, nest: &Nest) {
+    fn enter(&mut self, nest: &Nest, room: &Piece) {
         self.finish_spiral();
         let [wanted, least] = self.settings.helix;
         let radius = wanted.min(self.walls.distance(&nest.seed));
         if radius < least {
             // The first curve is ramped along: `curve` sees a run without points.
-            self.runs.push(Run { entry: Entry::Ramp(Vec::new()), points: Vec::new() });
+            self.runs.push(Run::new(Entry::Ramp(Vec::new())));
             return;
         }
+        self.bore = Some((nest.seed, radius));
         let circle = circle(&nest.seed, radius, self.settings.spacing);
-        let mut points = circle.clone();
-        points.push(circle[0]);
-        self.runs.push(Run { entry: Entry::Helix { centre: nest.seed, radius }, points });
+        let entry = Entry::Helix { centre: nest.seed, radius };
+        self.runs.push(Run::within(room, entry, vec![circle[0]]));
         if self.settings.spiral {
             self.last = Some(circle);
         }
@@ -178,7 +235,7 @@ impl Route<'_> {
     fn finish_spiral(&mut self) {
         let (Some(curve), Some(run)) = (self.last.take(), self.runs.last_mut()) else { return };
         // The circle of a helix has been gone around.
-        if run.points.len() > curve.len() + 1 {
+        if run.points.len() > 1 {
             run.points.extend(curve.iter().skip(1));
             run.points.push(curve[0]);
         }
@@ -186,7 +243,7 @@ impl Route<'_> {
 
     /// One turn of a spiral, from the last curve to that of `nest`; false where there is none, or where
     /// it would leave the curve.
-    fn turn(&mut self, nest: &Piece) -> bool {
+    fn turn(&mut self, nest: &Piece, room: &Piece) -> bool {
         let (Some(inner), Some(run)) = (&self.last, self.runs.last_mut()) else { return false };
         let outer = begun_near(&nest.outer, &inner[0], 0.0);
         let turn = spiral_turn(inner, &outer, self.settings.spacing);
@@ -199,28 +256,28 @@ impl Route<'_> {
             }
             before = *p;
         }
+        run.enter(room);
         run.points.extend(turn);
         self.last = Some(outer);
         true
     }
 
     /// Links to a closed curve within `inside` and goes around it.
-    fn curve(&mut self, curve: &[Point2], inside: &Piece, seed: &Point2) {
+    fn curve(&mut self, curve: &[Point2], inside: &Piece, room: &Piece, seed: &Point2) {
         let fresh = self.runs.last().is_none_or(|run| run.points.is_empty());
         if fresh {
             let closed = begun_near(curve, seed, 0.0);
-            self.ramp(closed);
+            self.ramp(closed, room);
             return;
         }
         let Some(run) = self.runs.last_mut() else { return };
-        let n = run.points.len();
-        let (end, before) = (run.points[n - 1], run.points[n.saturating_sub(2)]);
-        let along = direction(&before, &end);
+        run.enter(room);
+        let Some((end, along)) = run.end() else { return };
         let gap = SegmentGrid::of_curves([curve]).distance(&end);
         let border = SegmentGrid::of_curves(inside.curves());
         // A link cuts nothing but what lies within the curve; on the curve itself it may be by rounding.
         let within = |p: &Point2| inside.contains(p) || border.distance(p) < 1e-6;
-        for lead in LEADS {
+        for lead in self.settings.leads {
             let closed = begun_near(curve, &end, lead * gap);
             let onward = direction(&closed[0], &closed[1 % closed.len()]);
             let link = bend(end, along, closed[0], onward, LONGEST_HANDLE * self.settings.spacing);
@@ -235,36 +292,36 @@ impl Route<'_> {
         if straight.clone().all(|p| within(&p)) {
             go_around(run, closed);
         } else {
-            self.ramp(closed);
+            self.ramp(closed, room);
         }
     }
 
     /// Goes along an open stretch: linked straight over ground that is cut, or else by a run of its own.
     fn stretch(&mut self, stretch: &[Point2], inside: &Piece) {
         let linked = self.runs.last_mut().and_then(|run| {
-            let n = run.points.len();
-            let (end, before) = (*run.points.last()?, *run.points.get(n.checked_sub(2)?)?);
+            let (end, along) = run.end()?;
             let onward = direction(&stretch[0], &stretch[1]);
             let handle = LONGEST_HANDLE * self.settings.spacing;
-            let link = bend(end, direction(&before, &end), stretch[0], onward, handle);
-            link.iter()
-                .all(|p| inside.contains(p))
-                .then(|| run.points.extend(link.into_iter().chain(stretch.iter().copied())))
+            let link = bend(end, along, stretch[0], onward, handle);
+            link.iter().all(|p| inside.contains(p)).then(|| {
+                run.enter(inside);
+                run.points.extend(link.into_iter().chain(stretch.iter().copied()));
+            })
         });
         if linked.is_none() {
             let way = stretch.iter().chain(stretch.iter().rev().skip(1)).copied().collect();
-            self.runs.push(Run { entry: Entry::Ramp(way), points: stretch.to_vec() });
+            self.runs.push(Run::within(inside, Entry::Ramp(way), stretch.to_vec()));
         }
     }
 
     /// A run that ramps along a closed curve and then goes around it.
-    fn ramp(&mut self, closed: Vec<Point2>) {
+    fn ramp(&mut self, closed: Vec<Point2>, inside: &Piece) {
         if self.runs.last().is_some_and(|run| run.points.is_empty()) {
             self.runs.pop();
         }
         let mut way = closed.clone();
         way.push(closed[0]);
-        let mut run = Run { entry: Entry::Ramp(way), points: Vec::new() };
+        let mut run = Run::within(inside, Entry::Ramp(way), Vec::new());
         go_around(&mut run, closed);
         self.runs.push(run);
     }

@@ -72,8 +72,11 @@ fn programs_keep_to_the_pocket_and_clear_it() {
     for pocket in [with_island(), pocket(vec![rectangle(0.0, 0.0, 30.0, 30.0)]), pocket(vec![dumbbell])] {
         let walls = SegmentGrid::of_curves(pocket.region.curves());
         let floor = pocket.reachable_floor(&cutter).inset(0.02);
-        for pattern in patterns() {
-            let plan = plan_pocket(&pocket, &cutter, &strategy(pattern), &settings(), &Silent).unwrap();
+        let bounded = |pattern| (pattern, Some(70f64.to_radians()));
+        let all = patterns().map(|pattern| (pattern, None)).into_iter();
+        for (pattern, engagement) in all.chain([bounded(patterns()[0]), bounded(patterns()[2])]) {
+            let strategy = PocketStrategy { engagement, ..strategy(pattern) };
+            let plan = plan_pocket(&pocket, &cutter, &strategy, &settings(), &Silent).unwrap();
             let mut segments = Vec::new();
             for (a, b, m) in plan.path.segments() {
                 let what = format!("{pattern:?} {a} {b} {:?}", m.kind);
@@ -91,7 +94,7 @@ fn programs_keep_to_the_pocket_and_clear_it() {
                     let slope = (a.z - b.z) / (b.xy() - a.xy()).norm();
                     assert!(slope <= 3f64.to_radians().tan() * 1.001, "{what}: {slope}");
                 }
-                if m.kind == MoveKind::Cut && a.z == -6.0 && b.z == -6.0 {
+                if a.z == -6.0 && b.z == -6.0 {
                     segments.push(crate::geometry::CurveSegment {
                         ends: [a.xy(), b.xy()],
                         curve: 0,
@@ -111,7 +114,10 @@ fn programs_keep_to_the_pocket_and_clear_it() {
                     }
                 }
             }
-            assert!(farthest <= 3.0, "{pattern:?}: a place is {farthest} from the nearest pass");
+            assert!(
+                farthest <= 3.0,
+                "{pattern:?}, {engagement:?}: a place is {farthest} from the nearest pass"
+            );
             let lowest = plan.path.moves.iter().map(|m| m.to.tip.z).fold(0.0, f64::min);
             assert_eq!(lowest, -6.0);
         }
@@ -200,11 +206,11 @@ fn feeds_fall_where_more_of_the_cutter_cuts() {
         start: crate::toolpath::ClPoint::upright(Point3::origin()),
         moves: vec![to(10.0), to(20.0), to(30.0)],
     };
-    let widths = [1.0, 6.0, 1.0];
-    let figures = engagement(&path, &widths, 3.0, PI / 2.0);
+    let angles = [1.0, PI, 1.0];
+    let figures = engagement(&path, &angles, PI / 2.0);
     assert_eq!((figures.max, figures.p95, figures.max_move), (PI, PI, 1));
     assert!((figures.over_limit - 1.0 / 3.0).abs() < 1e-12);
-    limit_feed(&mut path, &widths, 3.0, PI / 2.0);
+    limit_feed(&mut path, &angles, PI / 2.0);
     let feeds: Vec<f64> = path.moves.iter().map(|m| m.feed_rate).collect();
     assert_eq!(feeds, [1000.0, 500.0, 1000.0]);
 }

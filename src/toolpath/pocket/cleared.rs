@@ -1,0 +1,195 @@
+//! What the cutter has cleared in the plan view, and how much of its circumference stands in stock.
+//!
+//! Enters: places of the cutter's centre, one after the other. Leaves: at any further place and heading the
+//! angle of the front half of the circumference that meets stock. The ground cleared is the union of the
+//! discs about those places, in closed form; mm, rad.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use crate::geometry::{Point2, Vector2};
+
+/// Stock thinner than this share of the radius counts as none: where the cutter passes along ground that
+/// it has cut before, chords and rounding leave films that load nothing. More would hide real stock: beside
+/// a straight pass an angle `a` is seen smaller by up to `FILM / sin a`.
+pub(super) const FILM: f64 = 0.004;
+
+/// Parts of the front half circle that are told apart.
+const PARTS: usize = 192;
+
+/// No more buckets than this along a side.
+const MAX_SIDE: f64 = 1024.0;
+
+/// Ground cleared by a disc.
+pub(super) struct Cleared {
+    radius: f64,
+    origin: Point2,
+    bucket: f64,
+    side: [usize; 2],
+    buckets: Vec<Vec<u32>>,
+    discs: Vec<Point2>,
+}
+
+impl Cleared {
+    /// Nothing cleared; places will lie between `bounds` (beyond them only the speed suffers).
+    pub fn new([lo, hi]: [Point2; 2], radius: f64) -> Self {
+        let size = hi - lo;
+        let bucket = radius.max(size.x.max(size.y) / MAX_SIDE);
+        let side = [size.x, size.y].map(|s| (s / bucket).floor() as usize + 1);
+        let buckets = vec![Vec::new(); side[0] * side[1]];
+        Self { radius, origin: lo, bucket, side, buckets, discs: Vec::new() }
+    }
+
+    /// How many places there are.
+    pub fn len(&self) -> usize {
+        self.discs.len()
+    }
+
+    fn column(&self, axis: usize, at: f64) -> usize {
+        ((at / self.bucket).floor().max(0.0) as usize).min(self.side[axis] - 1)
+    }
+
+    fn bucket_of(&self, p: &Point2) -> usize {
+        let at = p - self.origin;
+        self.column(1, at.y) * self.side[0] + self.column(0, at.x)
+    }
+
+    /// Clears the disc about a place.
+    pub fn add(&mut self, p: Point2) {
+        let bucket = self.bucket_of(&p);
+        self.buckets[bucket].push(self.discs.len() as u32);
+        self.discs.push(p);
+    }
+
+    /// Takes back all but the first `count` places.
+    pub fn truncate(&mut self, count: usize) {
+        while self.discs.len() > count {
+            if let Some(p) = self.discs.pop() {
+                let bucket = self.bucket_of(&p);
+                self.buckets[bucket].pop();
+            }
+        }
+    }
+
+    /// Angle of the front half of the circumference in stock at `centre` with the unit vector `heading`,
+    /// rad. Films are left out but beside the places from `fresh` on: the chip of the move itself begins as
+    /// thin as one.
+    pub fn arc(&self, centre: &Point2, heading: &Vector2, fresh: usize) -> f64 {
+        let r = self.radius;
+        let mut standing = Arc::FRONT;
+        let reach = Vector2::new(2.0, 2.0) * (r * (1.0 + FILM));
+        let (lo, hi) = (centre - reach - self.origin, centre + reach - self.origin);
+        for j in self.column(1, lo.y)..=self.column(1, hi.y) {
+            for i in self.column(0, lo.x)..=self.column(0, hi.x) {
+                for &k in &self.buckets[j * self.side[0] + i] {
+                    let grown = if (k as usize) < fresh { r * (1.0 + FILM) } else { r };
+                    let to = self.discs[k as usize] - centre;
+                    let square = to.norm_squared();
+                    if square >= (r + grown).powi(2) {
+                        continue;
+                    }
+                    let away = square.sqrt();
+                    let cos = (r * r + square - grown * grown) / (2.0 * r * away);
+                    if cos <= -1.0 || away <= grown - r {
+                        return 0.0;
+                    }
+                    let half = cos.min(1.0).acos();
+                    let towards = heading.perp(&to).atan2(heading.dot(&to));
+                    standing.clear(towards - half, towards + half);
+                    if standing.is_empty() {
+                        return 0.0;
+                    }
+                }
+            }
+        }
+        standing.angle()
+    }
+}
+
+/// Parts of the front half circle, from the right to the left.
+struct Arc([u64; PARTS / 64]);
+
+impl Arc {
+    const FRONT: Self = Self([u64::MAX; PARTS / 64]);
+
+    /// Clears the parts whose middles lie between two angles from the heading, less than a turn apart.
+    fn clear(&mut self, from: f64, to: f64) {
+        const PART: f64 = PI / PARTS as f64;
+        for turn in [-TAU, 0.0, TAU] {
+            let (a, b) = ((from + turn + FRAC_PI_2) / PART - 0.5, (to + turn + FRAC_PI_2) / PART - 0.5);
+            if b < 0.0 || a > (PARTS - 1) as f64 {
+                continue;
+            }
+            let (first, last) = (a.ceil().max(0.0) as usize, (b.floor() as usize).min(PARTS - 1));
+            for word in first / 64..=last / 64 {
+                let low = first.saturating_sub(64 * word).min(64);
+                let high = (last + 1).saturating_sub(64 * word).min(64);
+                if low < high {
+                    self.0[word] &= !((u64::MAX >> (64 - (high - low))) << low);
+                }
+            }
+        }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.0.iter().all(|w| *w == 0)
+    }
+
+    fn angle(&self) -> f64 {
+        let parts: u32 = self.0.iter().map(|w| w.count_ones()).sum();
+        PI * f64::from(parts) / PARTS as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cleared(places: impl IntoIterator<Item = Point2>) -> Cleared {
+        let mut cleared = Cleared::new([Point2::new(-20.0, -20.0), Point2::new(20.0, 20.0)], 3.0);
+        places.into_iter().for_each(|p| cleared.add(p));
+        cleared
+    }
+
+    fn line(from: Point2, to: Point2) -> Vec<Point2> {
+        (0..=400).map(|k| from + (to - from) * (f64::from(k) / 400.0)).collect()
+    }
+
+    /// A slot, a stepover beside a straight pass, a loop around a loop, and the foot of a corner.
+    #[test]
+    fn angles_are_those_of_closed_forms() {
+        let x = Vector2::new(1.0, 0.0);
+        let near = |found: f64, exact: f64| {
+            let film = 3.0 * FILM / (3.0 * exact.sin().max(0.3));
+            assert!(
+                found <= exact + PI / PARTS as f64 && found > exact - film - PI / PARTS as f64,
+                "{found} {exact}"
+            );
+        };
+        let slot = cleared(line(Point2::new(-15.0, 0.0), Point2::new(0.0, 0.0)));
+        assert!(slot.arc(&Point2::new(0.05, 0.0), &x, 0) > PI - 0.04);
+        for width in [0.5f64, 1.5, 3.0, 4.5] {
+            let beside = cleared(line(Point2::new(-15.0, width), Point2::new(15.0, width)));
+            near(beside.arc(&Point2::new(0.0, 0.0), &x, usize::MAX), (1.0 - width / 3.0).acos());
+        }
+        // The cleared disc of radius 3 + 2, and a place at 2.3 from its middle, going around it.
+        let ring = (0..600).map(|k| TAU * f64::from(k) / 600.0);
+        let ring = cleared(ring.map(|a| Point2::new(a.cos(), a.sin()) * 2.0));
+        let (rho, width) = (2.3f64, 0.3f64);
+        let exact = (1.0 - (width * (rho + 3.0) - 0.5 * width * width) / (rho * 3.0)).acos();
+        near(ring.arc(&Point2::new(0.0, -2.3), &x, usize::MAX), exact);
+        // A place that is cleared already, and one that is not.
+        assert_eq!(ring.arc(&Point2::new(0.5, 0.5), &x, usize::MAX), 0.0);
+        assert_eq!(ring.arc(&Point2::new(12.0, 0.5), &x, usize::MAX), PI);
+    }
+
+    #[test]
+    fn places_are_taken_back() {
+        let mut ground = cleared(line(Point2::new(-15.0, 1.0), Point2::new(15.0, 1.0)));
+        let (at, x) = (Point2::new(0.0, 0.0), Vector2::new(1.0, 0.0));
+        let (count, before) = (ground.len(), ground.arc(&at, &x, usize::MAX));
+        ground.add(Point2::new(1.0, -0.5));
+        assert!(ground.arc(&at, &x, usize::MAX) < before);
+        ground.truncate(count);
+        assert_eq!(ground.arc(&at, &x, usize::MAX), before);
+    }
+}
