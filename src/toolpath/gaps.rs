@@ -23,6 +23,10 @@ use crate::monitor::{self, Monitor};
 /// the scallop height. Halving has closed what is more than 2 % too wide where ψ is even.
 const SLACK: f64 = 0.03;
 
+/// A gap is worth passes where it opens by this share: 6 % are 12 % of the scallop height. Where less is open straight
+/// distances and the field's own error tell as much.
+const WORTH: f64 = 0.06;
+
 /// From a contact, places are looked at across the feed, this share of the interval apart, until one is served.
 const MARCH: f64 = 0.25;
 const MOST_MARCHES: usize = 8;
@@ -65,12 +69,12 @@ pub(super) fn close<S: LevelSource<Place = [f64; 2]>>(
         places.sort_by(|a, b| b.openness.total_cmp(&a.openness));
         for gap in places {
             monitor::check(monitor)?;
-            if !gaps.is_open(gap.at) {
+            if !gaps.opens_beyond(gap.at, WORTH) {
                 continue;
             }
             let level = field.value_and_gradient(gap.at[0], gap.at[1])[0];
             let before = passes.contacts.len();
-            let needed = |place: &[f64; 2]| gaps.is_open(*place);
+            let needed = |place: &[f64; 2]| gaps.opens_beyond(*place, SLACK);
             along_needed(source, level, &needed, sampling, passes, monitor)?;
             for k in before..passes.contacts.len() {
                 gaps.insert(&passes.contacts[k]);
@@ -147,8 +151,8 @@ impl Gaps<'_, '_> {
         Some(2.0 * toward.norm() / interval)
     }
 
-    fn is_open(&self, at: [f64; 2]) -> bool {
-        self.openness(at).is_some_and(|openness| openness > 1.0 + SLACK)
+    fn opens_beyond(&self, at: [f64; 2], share: f64) -> bool {
+        self.openness(at).is_some_and(|openness| openness > 1.0 + share)
     }
 
     /// The widest places on both sides of a contact that no pass serves.

@@ -7,14 +7,15 @@
 //! interpolated distance is that, all is material for certain. A tool with a sharp edge is nearer to each corner than the way
 //! there, √3/2 p at most.
 
-use super::bricks::STEPS;
+use super::bricks::{Lattice, STEPS};
 use super::surface::Foot;
 use super::{VoxelEngine, Voxels};
 use crate::geometry::{Point3, Vector3};
 use crate::sim::NOT_CUT;
 
-/// Steps along the line, in voxels, until the samples say that it has left the material.
-const STEP: f64 = 0.5;
+/// A cell is looked at this share of the line's way through it from both of its ends, and in the middle: on its faces the
+/// samples of one cell say what those of the next do, so that a cell with the surface cannot be stepped over.
+const FROM_ENDS: f64 = 1e-6;
 
 /// Steps back to where all is material, in voxels, and how many there are at most.
 const BACK: f64 = 0.125;
@@ -76,6 +77,28 @@ impl Voxels {
     }
 }
 
+/// Where the line `point + s normal` is looked at from `low` to `high`: at both limits, and in every cell that it passes.
+fn looks_in_cells(
+    lattice: &Lattice,
+    point: &Point3,
+    normal: &Vector3,
+    [low, high]: [f64; 2],
+) -> impl Iterator<Item = f64> {
+    let (from, along) = ((point - lattice.origin) / lattice.pitch, normal / lattice.pitch);
+    let mut crossings = vec![low, high];
+    for i in (0..3).filter(|&i| along[i] != 0.0) {
+        let ends = [low, high].map(|s| from[i] + along[i] * s);
+        let (first, last) = (ends[0].min(ends[1]).ceil() as i64, ends[0].max(ends[1]).floor() as i64);
+        crossings.extend((first..=last).map(|plane| ((plane as f64 - from[i]) / along[i]).clamp(low, high)));
+    }
+    crossings.sort_by(f64::total_cmp);
+    let within = (1..crossings.len()).flat_map(move |k| {
+        let [a, b] = [crossings[k - 1], crossings[k]];
+        [FROM_ENDS, 0.5, 1.0 - FROM_ENDS].map(|share| a + share * (b - a))
+    });
+    std::iter::once(low).chain(within).chain(std::iter::once(high))
+}
+
 impl VoxelEngine<'_> {
     /// The first place at which the line `point + s normal`, from `low` up to `high`, leaves what [`VoxelEngine::cut`] of the
     /// same engine has left through a cut; `low` where it is outside from the beginning. `None` where it does not, or
@@ -90,32 +113,29 @@ impl VoxelEngine<'_> {
         normal: &Vector3,
         [low, high]: [f64; 2],
     ) -> Option<LineExit> {
-        let step = STEP * voxels.voxel();
         let at = |s: f64| point + normal * s;
-        let (mut s, mut inside) = (low, None);
-        loop {
-            if let Some(around) = voxels.around(&at(s)) {
-                if around.distance >= 0.0 {
-                    let (guess, known) = match inside {
-                        Some((before, distance)) => {
-                            let share: f64 = distance / (distance - around.distance);
-                            (before + share * (s - before), true)
-                        }
-                        // The material may end on the way from where no samples are kept.
-                        None => (s - 0.5 * step, false),
-                    };
-                    let here = voxels.around(&at(guess)).map_or(around.cut_by, |around| around.cut_by);
-                    let (exit, foot) = self.root(point, normal, guess, voxels.voxel(), &here);
-                    let begun = !known && (s == low || foot.distance > UNREACHED);
-                    return self.exit_at(voxels, point, normal, if begun { low } else { exit }, foot.cut_by);
-                }
+        let looks = looks_in_cells(&voxels.bricks.lattice, point, normal, [low, high]);
+        let mut inside = None;
+        for s in looks {
+            let Some(around) = voxels.around(&at(s)) else { continue };
+            if around.distance < 0.0 {
                 inside = Some((s, around.distance));
+                continue;
             }
-            if s >= high {
-                return None;
-            }
-            s = (s + step).min(high);
+            let (guess, known) = match inside {
+                Some((before, distance)) => {
+                    let share: f64 = distance / (distance - around.distance);
+                    (before + share * (s - before), true)
+                }
+                // The material may end on the way from where no samples are kept.
+                None => (s, false),
+            };
+            let here = voxels.around(&at(guess)).map_or(around.cut_by, |around| around.cut_by);
+            let (exit, foot) = self.root(point, normal, guess, voxels.voxel(), &here);
+            let begun = !known && (s == low || foot.distance > UNREACHED);
+            return self.exit_at(voxels, point, normal, if begun { low } else { exit }, foot.cut_by);
         }
+        None
     }
 
     /// Where a line leaves what these moves leave, within a voxel of a guess, and how the material lies there.
