@@ -58,7 +58,7 @@ const FIT: f64 = 0.002;
 pub(super) struct Bounding {
     /// Number of loops.
     pub loops: usize,
-    /// Length of the way that is above the limit for want of room, mm.
+    /// Length of the way that is above the limit since no loop could be put in, mm.
     pub above: f64,
 }
 

@@ -257,7 +257,7 @@ fn bound_runs(
     notes.push(format!("{loops} loops in each step down bound the engagement"));
     if above > 0.0 {
         notes.push(format!(
-            "{above:.2} mm of each step down are above the engagement for want of room beside the pass; the feed falls there"
+            "{above:.2} mm of each step down are above the engagement, where no loop could be put in; the feed falls there"
         ));
     }
     Ok(())
