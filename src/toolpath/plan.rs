@@ -530,7 +530,7 @@ pub fn plan_tilted(
     let (planned, both_ways) = passes(part, cutter, strategy, Some(tilting.axis), settings, monitor)?;
     let Passes { passes, touches, mut notes, field, contacts } = planned;
     let mut touches = if touches.is_empty() && !passes.is_empty() {
-        let dropped = tilted::probe(cutter).unwrap_or_else(|| cutter.clone());
+        let dropped = tilted::probe(cutter).unwrap_or(*cutter);
         let dropped = tilted::Dropped { passes: &passes, ball: &dropped };
         tilted::around_centres(&dropped, part, cutter, tilting.axis, settings.chord_tolerance, monitor)?
     } else {

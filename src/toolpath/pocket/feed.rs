@@ -58,7 +58,7 @@ pub fn engagement(path: &Toolpath, angles: &[f64], limit: f64) -> Engagement {
 }
 
 /// Reduces the feed of cutting moves whose engagement (`angles`, rad) is above `limit`, rad, in
-/// proportion, down to [`LEAST_SHARE`].
+/// proportion, down to three tenths.
 pub fn limit_feed(path: &mut Toolpath, angles: &[f64], limit: f64) {
     for (m, &angle) in path.moves.iter_mut().zip(angles) {
         if m.kind == MoveKind::Cut && angle > limit {
