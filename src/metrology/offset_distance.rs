@@ -146,7 +146,7 @@ impl Gauge<'_> {
 /// inside of the part.
 ///
 /// # Tolerance
-/// See [`OffsetDistance::error_bound`].
+/// See [`OffsetDistance::error_bound_mm`].
 pub fn measure_offset(
     surfaces: &[OffsetPoints],
     design: &Part,

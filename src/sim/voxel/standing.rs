@@ -85,7 +85,7 @@ impl VoxelEngine<'_> {
     /// [`VoxelError::Cancelled`].
     ///
     /// # Tolerance
-    /// What is told is true to 1e-5 mm, and deeper than [`SHALLOWEST`]; what is wider than √3 voxels in all
+    /// What is told is true to 1e-5 mm, and deeper than 0.01 mm; what is wider than √3 voxels in all
     /// directions is told.
     pub fn holder_in_stock(
         &self,
