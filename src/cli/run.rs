@@ -45,6 +45,9 @@ use crate::toolpath::{
 /// promised to spare; too great a one refuses grids that would fit.
 const BYTES_PER_CELL: usize = 80;
 
+/// Bytes a cell while a path has been cut and nothing measured yet.
+const BYTES_PER_CUT_CELL: usize = 8;
+
 /// Bytes a triangle of the part while it is read: its file, corners, neighbours, search tree; 345 were
 /// measured on an STL file of 880 000.
 const BYTES_PER_TRIANGLE: usize = 350;
@@ -323,9 +326,12 @@ impl<'a> Job<'a> {
             Engine::Reference => cut_reference(&stock, &scene.cutter, &planned.path, monitor)?,
             _ => cut(stock, &scene.cutter, &planned.path, monitor)?,
         };
+        let besides = part_bytes(&self.part) + (planned.path.len() * BYTES_PER_MOVE) as u64;
+        let memory = (u64::from(scene.simulation.memory_mib) * MIB).saturating_sub(besides);
         let mut engaged = (Engagement::default(), 0.0);
         if let Some((_, strategy)) = milled {
-            let arcs = contact_arcs(&planned.path, &scene.cutter, self.top, monitor)?;
+            let left = memory.saturating_sub((grid.len() * BYTES_PER_CUT_CELL) as u64);
+            let arcs = contact_arcs(&planned.path, &scene.cutter, self.top, left, monitor)?;
             let radius = scene.cutter.radius();
             engaged = limit_feed_by(&mut planned.path, &arcs, strategy, request.step, radius);
         }
@@ -335,8 +341,6 @@ impl<'a> Job<'a> {
             let removed = cut_in_order(stock, &scene.cutter, &planned.path, monitor)?;
             removal = Some(removal_figures(&planned.path, &removed, &cut.height));
         }
-        let besides = part_bytes(&self.part) + (planned.path.len() * BYTES_PER_MOVE) as u64;
-        let memory = (u64::from(scene.simulation.memory_mib) * MIB).saturating_sub(besides);
         let most_cells = (memory as usize / BYTES_PER_CELL).saturating_sub(grid.len());
         let asked = Asked { error_bound: scene.simulation.error_bound, stock_top: self.top, most_cells };
         let mut measured =

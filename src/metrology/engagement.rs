@@ -16,8 +16,14 @@ use crate::toolpath::{MoveKind, Toolpath};
 /// Cells a radius. More see thinner layers, and cost memory as their square.
 const CELLS_A_RADIUS: f64 = 60.0;
 
-/// Most cells, 8 bytes each; larger pockets have larger ones, and a larger bound.
+/// Most cells; larger pockets have larger ones, and a larger bound.
 const MAX_CELLS: f64 = 4.0e7;
+
+/// Fewest cells, however little memory there is.
+const MIN_CELLS: f64 = 1.0e4;
+
+/// Lowest height and when it was reached.
+const BYTES_PER_CELL: u64 = 8;
 
 /// The circumference is looked at this many cells inside of itself: more than half a diagonal, so that a
 /// wall beside it is never seen.
@@ -55,7 +61,8 @@ struct Ground {
     when: Vec<f32>,
 }
 
-/// The angles along `path` in a stock whose flat top is at `top`, mm.
+/// The angles along `path` in a stock whose flat top is at `top`, mm. The cells take no more than `memory` bytes; fewer of
+/// them are larger, and the bound says so.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -67,12 +74,13 @@ pub fn contact_arcs(
     path: &Toolpath,
     cutter: &Cutter,
     top: f64,
+    memory: u64,
     monitor: &dyn Monitor,
 ) -> Result<ContactArcs, Cancelled> {
     /// Moves between two questions to the monitor.
     const MOVES: usize = 4096;
     let radius = cutter.radius();
-    let mut ground = Ground::around(path, radius, top);
+    let mut ground = Ground::around(path, radius, top, memory);
     let unseen_layer = (INSIDE + std::f64::consts::FRAC_1_SQRT_2) * ground.cell / radius;
     // The own chip is as thin as one likes beside the cutter: what was cut so shortly before counts.
     let fresh = radius * (2.5 * INSIDE * ground.cell / radius).sqrt();
@@ -101,7 +109,7 @@ pub fn contact_arcs(
 }
 
 impl Ground {
-    fn around(path: &Toolpath, radius: f64, top: f64) -> Self {
+    fn around(path: &Toolpath, radius: f64, top: f64, memory: u64) -> Self {
         let first = path.start.tip.xy();
         let (lo, hi) = path
             .moves
@@ -110,7 +118,8 @@ impl Ground {
         let reach = Vector2::new(radius, radius) * 1.05;
         let (lo, hi) = (lo - reach, hi + reach);
         let size = hi - lo;
-        let cell = (radius / CELLS_A_RADIUS).max((size.x * size.y / MAX_CELLS).sqrt());
+        let most = ((memory / BYTES_PER_CELL) as f64).clamp(MIN_CELLS, MAX_CELLS);
+        let cell = (radius / CELLS_A_RADIUS).max((size.x * size.y / most).sqrt());
         let (nx, ny) = ((size.x / cell).ceil() as usize + 1, (size.y / cell).ceil() as usize + 1);
         let lowest = vec![top as f32; nx * ny];
         Self { origin: lo, cell, nx, ny, lowest, when: vec![f32::NEG_INFINITY; nx * ny] }
@@ -200,7 +209,7 @@ mod tests {
     }
 
     fn arcs(places: &[(f64, f64)]) -> ContactArcs {
-        contact_arcs(&through(places), &Cutter::flat(6.0).unwrap(), 0.0, &Silent).unwrap()
+        contact_arcs(&through(places), &Cutter::flat(6.0).unwrap(), 0.0, u64::MAX, &Silent).unwrap()
     }
 
     fn check(found: &ContactArcs, k: usize, exact: f64) {
@@ -297,7 +306,7 @@ mod tests {
             let pocket = Pocket { region: Region::nested(curves).unwrap().0, depth: 3.0 };
             let greatest = |engagement: Option<f64>| {
                 let found = plan(&pocket, pattern, engagement);
-                let arcs = contact_arcs(&found, &Cutter::flat(5.0).unwrap(), 0.0, &Silent).unwrap();
+                let arcs = contact_arcs(&found, &Cutter::flat(5.0).unwrap(), 0.0, u64::MAX, &Silent).unwrap();
                 let cut = found.moves.iter().zip(&arcs.of_moves).filter(|(m, _)| m.kind == MoveKind::Cut);
                 cut.map(|(_, arc)| *arc).fold(0.0, f64::max)
             };
@@ -330,11 +339,24 @@ mod tests {
         plan_pocket(pocket, &Cutter::flat(5.0).unwrap(), &strategy, &settings, &Silent).unwrap().path
     }
 
+    #[test]
+    fn less_memory_is_told_by_the_bound() {
+        let path = through(&[(-10.0, 0.0), (40.0, 0.0), (39.0, 1.5), (10.0, 1.5)]);
+        let arcs = |memory| contact_arcs(&path, &Cutter::flat(6.0).unwrap(), 0.0, memory, &Silent).unwrap();
+        let (fine, coarse) = (arcs(u64::MAX), arcs(0));
+        assert!(coarse.unseen_layer > 3.0 * fine.unseen_layer);
+        let exact = 0.5f64.acos();
+        for found in [&fine, &coarse] {
+            let (angle, bound) = (found.of_moves[3], found.bound(exact));
+            assert!((angle - exact).abs() <= bound + PI / PLACES as f64, "{angle} of {exact}, {bound}");
+        }
+    }
+
     /// What the cells say of the ground is what the engine's stock says.
     #[test]
     fn cells_are_lowered_as_by_the_engine() {
         let path = through(&[(0.0, 0.0), (7.0, 2.0), (3.0, 9.0), (3.0, 4.0)]);
-        let mut ground = Ground::around(&path, 3.0, 0.0);
+        let mut ground = Ground::around(&path, 3.0, 0.0, u64::MAX);
         for (a, b, _) in path.segments() {
             ground.lower([a.xy(), b.xy()], 3.0, a.z.max(b.z), 0.0);
             ground.lower([b.xy(), b.xy()], 3.0, b.z, 0.0);

@@ -21,18 +21,22 @@ pub struct SectionFigures {
     pub max_mm: f64,
     /// Mean deviation.
     pub mean_mm: f64,
+    /// Farthest that a row of places read lies from the section, along the surface.
+    pub row_off_mm: f64,
 }
 
 /// Deviation at sections of these heights, mm, which lie at `parameters[patch][section]` of v on the patches of the map.
 /// Sections at which nothing was measured are left out.
 pub fn section_figures(map: &NormalMap, heights: &[f64], parameters: &[&[f64]]) -> Vec<SectionFigures> {
     let of = |(section, &height_mm): (usize, &f64)| {
+        let mut row_off_mm = 0.0f64;
         let rows = map.grids.iter().zip(parameters).flat_map(|(grid, v)| {
             let [nu, nv] = grid.counts;
             let [lo, hi] = grid.domain[1];
-            let share = (v[section] - lo) / (hi - lo);
-            let row = (share * (nv - 1) as f64).round().clamp(0.0, (nv - 1) as f64) as usize;
-            &map.deviations[grid.first + row * nu..][..nu]
+            let exact = (v[section] - lo) / (hi - lo) * (nv - 1) as f64;
+            let row = exact.round().clamp(0.0, (nv - 1) as f64);
+            row_off_mm = row_off_mm.max((exact - row).abs() * grid.pitch[1]);
+            &map.deviations[grid.first + row as usize * nu..][..nu]
         });
         let measured: Vec<f64> = rows.map(|d| f64::from(*d)).filter(|d| !d.is_nan()).collect();
         let places = measured.len();
@@ -42,6 +46,7 @@ pub fn section_figures(map: &NormalMap, heights: &[f64], parameters: &[&[f64]]) 
             min_mm: measured.iter().copied().fold(f64::INFINITY, f64::min),
             max_mm: measured.iter().copied().fold(f64::NEG_INFINITY, f64::max),
             mean_mm: measured.iter().sum::<f64>() / places as f64,
+            row_off_mm,
         })
     };
     heights.iter().enumerate().filter_map(of).collect()
@@ -87,5 +92,7 @@ mod tests {
         );
         assert!(near(found[1].min_mm, 0.5) && near(found[1].max_mm, 0.51) && near(found[1].height_mm, 5.0));
         assert!(near(found[2].mean_mm, 1.01));
+        // 3.04 lies at row 2.08 of the first patch, at 5.2 of the second.
+        assert_eq!(found.iter().map(|f| (f.row_off_mm * 1e6).round()).collect::<Vec<_>>(), [0.0, 2e5, 0.0]);
     }
 }

@@ -437,11 +437,11 @@ fn sections(t: &ToolpathResult) -> Markup {
             h3 { "Deviation at the sections" }
             p.faint { "At the row of places nearest to each section, along the normals of the design." }
             table.figures {
-                thead { tr { th { "height mm" } th { "from µm" } th { "to µm" } th { "mean µm" } th { "places" } } }
+                thead { tr { th { "height mm" } th { "from µm" } th { "to µm" } th { "mean µm" } th { "places" } th { "rows off it, mm" } } }
                 tbody { @for s in &t.sections {
                     tr {
                         td { (s.height_mm) } td { (micrometres(Some(s.min_mm))) } td { (micrometres(Some(s.max_mm))) }
-                        td { (micrometres(Some(s.mean_mm))) } td { (s.places) }
+                        td { (micrometres(Some(s.mean_mm))) } td { (s.places) } td { (format!("{:.3}", s.row_off_mm)) }
                     }
                 } }
             }

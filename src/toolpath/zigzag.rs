@@ -45,12 +45,12 @@ pub fn passes(
 ) -> Result<Passes, PlanError> {
     let charts = Chart::all(part, cutter, settings.axis)?;
     let mut notes = Vec::new();
+    let dropped = settings.dropped(cutter);
     let stepover = match settings.step {
         Step::Stepover(s) => s,
-        Step::Scallop(h) => safe_stepover(&charts, [cutter, settings.dropped(cutter)], angle, h, &mut notes),
+        Step::Scallop(h) => safe_stepover(&charts, [cutter, dropped], angle, h, &mut notes),
     };
     let (along, across) = (Vector2::new(angle.cos(), angle.sin()), Vector2::new(-angle.sin(), angle.cos()));
-    let dropped = settings.dropped(cutter);
     let extent = |e: &Vector2| Chart::extent_of_axes(&charts, part, dropped, e);
     let (from_to, sides) = (extent(&along), extent(&across));
     let count = ((sides[1] - sides[0]) / stepover - 1e-9).ceil().max(1.0) as usize;
@@ -103,11 +103,12 @@ pub fn best(
     let charts = Chart::all(part, cutter, settings.axis)?;
     let places = places(&charts);
     let angle = |k: usize| std::f64::consts::PI * k as f64 / ANGLES as f64;
+    let dropped = settings.dropped(cutter);
     let mut predicted: Vec<(f64, usize)> = crate::parallel::map(ANGLES, |k| {
         let stepover = match settings.step {
             Step::Stepover(s) => s,
             Step::Scallop(h) => {
-                let least = least_stepover(&places, [cutter, settings.dropped(cutter)], angle(k), h);
+                let least = least_stepover(&places, [cutter, dropped], angle(k), h);
                 if least.is_finite() {
                     least.max(least_over_plane(cutter, h))
                 } else {
@@ -120,7 +121,6 @@ pub fn best(
             let t = p.tangent_at(angle(k))?;
             let e = Vector2::new(-angle(k).sin(), angle(k).cos());
             let b = p.normal.cross(&t);
-            let dropped = settings.dropped(cutter);
             let (along, across) = (p.offset_ratio(dropped, &t), p.offset_ratio(dropped, &b));
             Some(area * along * across * b.xy().dot(&e).abs())
         });

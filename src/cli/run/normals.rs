@@ -114,7 +114,19 @@ impl Job<'_> {
             monitor,
         )?;
         let roughness = self.roughness_by(&rays, cutter, &planned.path, &measured)?;
+        monitor::check(monitor)?;
+        monitor.start("writing results", 0);
+        outputs.folder(&request.folder)?;
+        let lines = self.write_programs(request, &planned, joints.as_ref(), outputs)?;
+        for region in &mut measured.gouge.regions {
+            region.line = lines.get(region.move_index as usize).copied().unwrap_or_default();
+        }
+        self.write_pairs(request, &measured, outputs)?;
+        let surface_mesh = self.write_normal_mesh(request, &map, outputs)?;
+        let page = self.write_normal_maps(request, engine, &map, &measured, spacing, outputs)?;
+        let solid = self.write_solid(request, &planned.path, outputs)?;
         let in_order = self.in_order(request, &planned.path)?;
+        let (removal, held) = in_order.map(|found| found.in_program(&lines)).unzip();
         let simulation = SimulationFigures {
             engine: engine.name(),
             cell_mm: spacing,
@@ -126,18 +138,6 @@ impl Job<'_> {
             wall_s: begun.elapsed().as_secs_f64(),
             threads: rayon::current_num_threads(),
         };
-        monitor::check(monitor)?;
-        monitor.start("writing results", 0);
-        outputs.folder(&request.folder)?;
-        let lines = self.write_programs(request, &planned, joints.as_ref(), outputs)?;
-        for region in &mut measured.gouge.regions {
-            region.line = lines.get(region.move_index as usize).copied().unwrap_or_default();
-        }
-        let (removal, held) = in_order.map(|found| found.in_program(&lines)).unzip();
-        self.write_pairs(request, &measured, outputs)?;
-        let surface_mesh = self.write_normal_mesh(request, &map, outputs)?;
-        let page = self.write_normal_maps(request, engine, &map, &measured, spacing, outputs)?;
-        let solid = self.write_solid(request, &planned.path, outputs)?;
         let mut result = self.result(
             request,
             &planned,

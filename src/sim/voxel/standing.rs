@@ -98,7 +98,8 @@ impl VoxelEngine<'_> {
             return Err(VoxelError::Voxel(voxel));
         };
         let mut all: Vec<(f64, HolderHit)> = Vec::new();
-        for (section, solid) in Solid::of_sections(holder).iter().enumerate() {
+        let sections = Solid::of_sections(holder);
+        for (section, solid) in sections.iter().enumerate() {
             check(monitor)?;
             let search = Search { engine: self, holder: Parts::new(solid, path)?, lattice };
             let hits = descend(&search, search.whole(), "looking for the holder in the stock", monitor)?;
@@ -112,7 +113,6 @@ impl VoxelEngine<'_> {
         moves.dedup();
         all.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.move_index.cmp(&b.1.move_index)));
         all.truncate(MOST_PLACES);
-        let sections = Solid::of_sections(holder);
         let depths = parallel::try_map(all.len(), |k| {
             check(monitor)?;
             let HolderHit { move_index, section, at, .. } = all[k].1;

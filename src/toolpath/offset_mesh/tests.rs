@@ -6,19 +6,20 @@ use std::f64::consts::FRAC_PI_2;
 const RADIUS: f64 = 3.0;
 const TARGET: f64 = 0.02;
 
+const SETTINGS: PassSettings = PassSettings {
+    step: Step::Scallop(TARGET),
+    sampling: 0.5,
+    chord_tolerance: 1e-3,
+    smoothing: None,
+    axis: None,
+    probe: None,
+};
+
 /// Points are put half way to where chords of 1 µm cut short.
 const SHORT: f64 = 5e-4;
 
 fn planned(part: &Part, angle: f64) -> Passes {
-    let settings = PassSettings {
-        step: Step::Scallop(TARGET),
-        sampling: 0.5,
-        chord_tolerance: 1e-3,
-        smoothing: None,
-        axis: None,
-        probe: None,
-    };
-    passes(part, &Cutter::ball(2.0 * RADIUS).unwrap(), angle, &settings, &Silent).unwrap()
+    passes(part, &Cutter::ball(2.0 * RADIUS).unwrap(), angle, &SETTINGS, &Silent).unwrap()
 }
 
 /// A mesh over a grid of the plan view.
@@ -124,14 +125,6 @@ fn over_a_cap_the_centre_runs_on_the_larger_sphere() {
 #[test]
 fn other_cutters_and_no_place_for_the_ball_are_refused() {
     let part = ground(&[0.0, 4.0], &[0.0, 4.0], |_, _| 0.0);
-    let settings = PassSettings {
-        step: Step::Scallop(TARGET),
-        sampling: 0.5,
-        chord_tolerance: 1e-3,
-        smoothing: None,
-        axis: None,
-        probe: None,
-    };
-    let refused = passes(&part, &Cutter::flat(6.0).unwrap(), 0.0, &settings, &Silent).unwrap_err();
+    let refused = passes(&part, &Cutter::flat(6.0).unwrap(), 0.0, &SETTINGS, &Silent).unwrap_err();
     assert!(refused.to_string().contains("use a ball"), "{refused}");
 }
