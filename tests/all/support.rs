@@ -155,4 +155,8 @@ pub fn is_good(path: &Value) {
     assert!(number(path, "/scallop/max_mm") <= 0.0125, "{name}: {:#}", path["scallop"]);
     assert!(number(path, "/gouge/max_depth_mm") <= 0.005, "{name}: {:#}", path["gouge"]);
     assert_eq!(number(path, "/uncut/area_mm2"), 0.0, "{name}: {:#}", path["uncut"]);
+    // Where passes are parallel, every pair's calculated scallop is what was measured.
+    if let Some(off) = path["scallop_pairs"]["parallel_greatest_mean_difference"].as_f64() {
+        assert!(off <= 0.01, "{name}: {off}");
+    }
 }

@@ -21,6 +21,12 @@ const SETTLED: f64 = 1e-10;
 /// Balls that meet at a smaller angle than this, as a sine, do not tell where.
 const LEAST_SINE: f64 = 1e-4;
 
+/// Rounds in which the nearest ball on a bowed way is found, the share of a move below which it is, and how far beside a share
+/// the slope and bend of the way are taken.
+const BOWED_ROUNDS: usize = 12;
+const BOWED_SETTLED: f64 = 1e-9;
+const BESIDE: f64 = 1e-4;
+
 /// Moves that turn by more than this, as a cosine (30°), make a corner, not a bend.
 const CORNER: f64 = 0.866;
 
@@ -97,6 +103,11 @@ impl<'a> Calculator<'a> {
             at += across * x + up * y;
             let unsettled = x.hypot(y);
             if unsettled < SETTLED {
+                // Balls that all but stand in one place meet in a ridge that ends elsewhere.
+                let apart = (balls[1].centre - balls[0].centre).norm();
+                if (at - crossing.at).norm() > apart {
+                    return None;
+                }
                 let (height, section) = (self.part.closest_point(&at).1, self.on_section(&balls));
                 return Some(Calculated { height, section, parallel, unsettled });
             }
@@ -129,23 +140,25 @@ impl<'a> Calculator<'a> {
     fn nearest(&self, k: u32, q: &Point3) -> Nearest {
         let mut k = k as usize;
         let (mut here, mut share) = self.on_move(k, q);
-        // Each step comes nearer, so that it ends.
-        while let Some(next) = self.beyond(k, share) {
-            let (centre, t) = self.on_move(next, q);
-            if (centre - q).norm() >= (here - q).norm() {
-                break;
-            }
+        // Each step comes nearer, so that it ends. On the hollow side of a bent track both chords of a corner have a nearest
+        // place of their own.
+        let nearer = |k: usize, here: &Point3| {
+            let around = [self.beyond(k, true), self.beyond(k, false)].into_iter().flatten();
+            let found = around.map(|next| (next, self.on_move(next, q)));
+            let nearest = found.min_by(|a, b| (a.1.0 - q).norm().total_cmp(&(b.1.0 - q).norm()));
+            nearest.filter(|(_, (centre, _))| (centre - q).norm() < (here - q).norm())
+        };
+        while let Some((next, (centre, t))) = nearer(k, &here) {
             (k, here, share) = (next, centre, t);
         }
         Nearest { centre: here, along: self.along(k, share) }
     }
 
-    /// The move of the same track beyond the end at which a share stands, past those that do not move the ball.
-    fn beyond(&self, k: usize, share: f64) -> Option<usize> {
+    /// The move of the same track after a move or before it, past those that do not move the ball.
+    fn beyond(&self, k: usize, after: bool) -> Option<usize> {
         let mut next = k;
         loop {
-            let onward =
-                if share >= 1.0 { next + 1 } else { next.checked_sub(1).filter(|_| share <= 0.0)? };
+            let onward = if after { next + 1 } else { next.checked_sub(1)? };
             if !self.goes_on(next, onward) {
                 return None;
             }
@@ -185,8 +198,8 @@ impl<'a> Calculator<'a> {
         mean(k.checked_sub(1)) * (1.0 - share) + mean(Some(k + 1)) * share
     }
 
-    /// The ball nearest to `q` on a move, and its share of the move. Where the axis turns its way bows; the share is then found
-    /// anew from where it was found before.
+    /// The ball nearest to `q` on a move, and its share of the move. Where the axis turns the way bows; the share is then found
+    /// by Newton's method, begun on the chord.
     fn on_move(&self, k: usize, q: &Point3) -> (Point3, f64) {
         let (from, to) = (self.path.location_before(k), self.path.moves[k].to);
         let (a, way) = (self.ball(&from), self.way(k));
@@ -198,10 +211,63 @@ impl<'a> Calculator<'a> {
         if from.axis == to.axis {
             return (a + way * share, share);
         }
-        for _ in 0..2 {
-            let here = self.ball(&from.towards(&to, share));
-            share = (share + (q - here).dot(&way) / length).clamp(0.0, 1.0);
+        let ball = |t: f64| self.ball(&from.towards(&to, t));
+        for _ in 0..BOWED_ROUNDS {
+            let [before, here, after] = [-BESIDE, 0.0, BESIDE].map(|d| ball(share + d));
+            let slope = (after - before) / (2.0 * BESIDE);
+            let bend = ((after - here) - (here - before)) / BESIDE.powi(2);
+            let curving = slope.norm_squared() - (q - here).dot(&bend);
+            // Beyond the middle of the bow's circle Newton's method would go away from the nearest place.
+            let step = (q - here).dot(&slope) / if curving > 0.0 { curving } else { length };
+            let next = (share + step).clamp(0.0, 1.0);
+            let done = (next - share).abs() < BOWED_SETTLED;
+            share = next;
+            if done {
+                break;
+            }
         }
-        (self.ball(&from.towards(&to, share)), share)
+        (ball(share), share)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{AnalyticShape, AnalyticSurface};
+    use crate::part::Patch;
+    use crate::toolpath::Move;
+
+    /// A ball that rolls around an edge, its axis turning by `turn` rad a move: the nearest ball is that of the finest look at
+    /// all moves, from whichever move near it the search begins, inside the bow and outside of it.
+    #[test]
+    fn the_nearest_ball_of_turning_moves_is_found() {
+        let surface = AnalyticSurface::new(AnalyticShape::Plane { height: 0.0 }, [[-9.0, 9.0]; 2]).unwrap();
+        let part = Part::from_patches(vec![Patch::Analytic(surface)], 0.01).unwrap();
+        for turn in [0.03f64, 0.1, 0.3] {
+            let at = |k: i32| {
+                let angle = turn * f64::from(k);
+                let axis = Vector3::new(angle.sin(), 0.02 * f64::from(k), angle.cos()).normalize();
+                // The tip stays close, so that the centre's way is nearly a circle.
+                ClPoint { tip: Point3::new(0.01 * f64::from(k), 0.05 * f64::from(k), 0.0), axis }
+            };
+            let move_to = |k| Move { to: at(k), kind: MoveKind::Cut, feed_rate: 1000.0, pass: 0 };
+            let path = Toolpath { start: at(-4), moves: (-3..=4).map(move_to).collect() };
+            let calculator = Calculator::new(&part, &Cutter::ball(6.0).unwrap(), &path);
+            let ball =
+                |k: usize, t: f64| calculator.ball(&path.location_before(k).towards(&path.moves[k].to, t));
+            for k in 3..5 {
+                for (along, out) in [(0.1, -2.9), (0.5, -3.0), (0.8, -3.1), (0.4, 2.0), (0.97, -1.0)] {
+                    let centre = ball(k, along);
+                    let q = centre + at(k as i32 - 4).axis * out;
+                    let looks =
+                        (0..path.len()).flat_map(|k| (0..=20_000).map(move |t| (k, f64::from(t) / 20_000.0)));
+                    let least = looks.map(|(k, t)| (ball(k, t) - q).norm()).fold(f64::INFINITY, f64::min);
+                    for from in k - 1..=k + 1 {
+                        let found = (calculator.nearest(from as u32, &q).centre - q).norm();
+                        assert!((found - least).abs() < 1e-9, "{turn} {k} {along} {out}: {found} {least}");
+                    }
+                }
+            }
+        }
     }
 }
