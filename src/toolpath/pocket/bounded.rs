@@ -1,18 +1,20 @@
 //! Runs whose engagement is bounded: loops where more of the cutter would stand in stock than is allowed.
 //!
-//! Enters: a run, the curves that its centre stays within, the ground cleared before it. Leaves: the same
-//! way with loops put in (trochoidal milling). A loop touches the way from its left, the side that climb
-//! milling clears first: a circle, in corners and necks the largest that fits, followed as far as it cuts
-//! and left by a bend back over cleared ground. The way between two loops is the longest whose loop keeps to
-//! the limit. Every place is asked for the angle of the circumference in stock before the cutter goes there
-//! ([`Cleared`]); mm, rad.
+//! Enters: a run, the room of its centre, the ground cleared before it. Leaves: the same way with loops put
+//! in (trochoidal milling). A loop touches the way from its left, the side that climb milling clears first
+//! (lines back and forth: from the side of the rows to come): a circle, in corners and necks the largest that
+//! fits, followed as far as it cuts and left by a bend back over cleared ground. The way between two loops is
+//! the longest whose loop keeps to the limit. Loops grow from cleared ground: a run that would begin in stock
+//! is opened by a helix where there is room. Every place is asked for the angle of the circumference in stock
+//! before the cutter goes there ([`Cleared`]); mm, rad.
 
 use std::f64::consts::{PI, TAU};
 
 use super::cleared::Cleared;
-use super::route::{Entry, Room, Run, bend, circle};
+use super::route::{Entry, Run, bend, circle};
 use super::turning::Turning;
-use crate::geometry::{Piece, Point2, SegmentGrid, Vector2};
+use super::way::{Room, Way, fitting};
+use crate::geometry::{Point2, Vector2};
 use crate::monitor::{Cancelled, Monitor, check};
 
 /// Places of the way are this share of the radius apart: the chip between two is seen, and the cusp between
@@ -26,7 +28,7 @@ const FINEST: f64 = 0.005;
 const GREATEST: f64 = 0.75;
 
 /// Least loop over the cutter's radius. What stays in a square corner after it is a film.
-const LEAST: f64 = 0.006;
+pub(super) const LEAST: f64 = 0.006;
 
 /// Loops are tried by this ratio: the growth of loops around each other is about half as much more.
 const SHRINK: f64 = 0.87;
@@ -44,28 +46,102 @@ const WORTH: f64 = 0.4;
 const FRESH: f64 = 0.5;
 
 /// Sides of loops over the radius, and their number at least.
-const SIDE: f64 = 0.12;
-const LEAST_SIDES: f64 = 24.0;
+const SIDE: f64 = 0.08;
+const LEAST_SIDES: f64 = 36.0;
 
 /// Bisections for the length between two loops.
 const HALVINGS: u32 = 5;
 
-/// A circle may be this share of the radius less than one that fits.
-const FIT: f64 = 0.002;
-
 /// What bounding did.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Bounding {
     /// Number of loops.
     pub loops: usize,
-    /// Length of the way that is above the limit since no loop could be put in, mm.
-    pub above: f64,
+    /// Stretches of the way that are above the limit since no loop could be put in: where each begins, and
+    /// its length, mm.
+    pub above: Vec<(Point2, f64)>,
+}
+
+/// On which side of the way loops are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Sides {
+    /// On the left, the cleared one of passes that climb; on the right where there is none.
+    Left,
+    /// Of lines back and forth, whose cleared ground is on each side in turns, toward the rows to come, which
+    /// this unit vector across them points to: there the next link needs room. Of links and walls on
+    /// either.
+    Toward(Vector2),
+}
+
+impl Sides {
+    /// Groups of sides, 1 for the left and -1 for the right, where the way has this direction: a later group
+    /// serves where there is no loop on those of the one before.
+    fn of(self, heading: &Vector2) -> &'static [&'static [f64]] {
+        /// Sine of what is no line any more.
+        const ALONG: f64 = 0.01;
+        match self {
+            Self::Toward(across) if heading.dot(&across).abs() > ALONG => &[&[1.0, -1.0]],
+            Self::Toward(across) if heading.perp(&across) < 0.0 => &[&[-1.0], &[1.0]],
+            _ => &[&[1.0], &[-1.0]],
+        }
+    }
+}
+
+/// What runs are bounded by.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rules {
+    /// The limit, and the cutter's radius.
+    pub bounds: Turning,
+    /// Where loops may be.
+    pub sides: Sides,
+    /// Radius that a helix should have, and the least that is worth one, mm.
+    pub helix: [f64; 2],
+}
+
+/// Where a ramp would begin in stock, which leaves a slot to begin with, a helix that touches the way takes
+/// its place, if there is room for one: at the way's beginning, else from the first place that has room on,
+/// and back from there.
+fn open(run: &mut Run, room: &Room, cleared: &Cleared, rules: &Rules) {
+    /// Where the helix may be so small, over the one wanted, the way is not gone on for a greater one.
+    const ENOUGH: f64 = 0.75;
+    /// Places that are asked are this share of the radius apart.
+    const APART: f64 = 0.25;
+    let radius = rules.bounds.radius;
+    let way = Way::new(&run.points);
+    let Some(heading) = way.heading(0.0) else { return };
+    let (Entry::Ramp(_), true) =
+        (&run.entry, cleared.arc(&way.at(0.0), &heading, usize::MAX) > rules.bounds.limit)
+    else {
+        return;
+    };
+    let [wanted, least] = rules.helix;
+    let mut best: Option<(f64, Point2, f64)> = None;
+    for k in 0..=(way.total() / (APART * radius)) as usize {
+        let s = k as f64 * APART * radius;
+        for side in [1.0, -1.0] {
+            let fits = fitting(&way, room, radius, s, wanted, side);
+            if let Some((centre, rho, _)) = fits.filter(|f| f.1 >= least && best.is_none_or(|b| f.1 > b.2)) {
+                best = Some((s, centre, rho));
+            }
+        }
+        if best.is_some_and(|b| b.2 >= ENOUGH * wanted) {
+            break;
+        }
+    }
+    let Some((s, centre, rho)) = best else { return };
+    let begin = way.at(s);
+    if s > 0.0 {
+        let back = way.corners_between(0.0, s).iter().rev().copied();
+        run.points = std::iter::once(begin).chain(back).chain(way.points.iter().copied()).collect();
+    }
+    let out = begin - centre;
+    run.entry = Entry::Helix { centre, radius: rho, begin: out.y.atan2(out.x) };
 }
 
 /// Clears what a helix does at depth. What a ramp leaves below its slope is stock.
 fn enter(run: &Run, cleared: &mut Cleared, radius: f64) {
-    if let Entry::Helix { centre, radius: turn } = &run.entry {
-        circle(centre, *turn, STEP * radius).into_iter().for_each(|p| cleared.add(p));
+    if let Entry::Helix { centre, radius: turn, begin } = &run.entry {
+        circle(centre, *turn, *begin, STEP * radius).into_iter().for_each(|p| cleared.add(p));
     }
 }
 
@@ -76,97 +152,33 @@ fn enter(run: &Run, cleared: &mut Cleared, radius: f64) {
 /// [`Cancelled`] when the monitor says so.
 pub(super) fn bound(
     run: &mut Run,
+    room: &Room,
     cleared: &mut Cleared,
-    bounds: Turning,
+    rules: &Rules,
     monitor: &dyn Monitor,
 ) -> Result<Bounding, Cancelled> {
+    let bounds = rules.bounds;
+    open(run, room, cleared, rules);
     enter(run, cleared, bounds.radius);
     if run.points.len() < 2 {
         return Ok(Bounding::default());
     }
     let way = Way::new(&run.points);
-    let begins = lengths(&run.points);
-    let walls = |room: &Room| SegmentGrid::of_curves(room.within.curves());
-    let rooms = run.rooms.iter().map(|room| (begins[room.first], &room.within, walls(room))).collect();
     let mut walker = Walker {
         way,
-        rooms,
+        room,
         cleared,
         bounds,
+        sides: rules.sides,
         radius: bounds.radius,
         out: Vec::new(),
         marks: Vec::new(),
+        above_to: f64::NEG_INFINITY,
         did: Bounding::default(),
     };
     walker.go(monitor)?;
     run.points = walker.out;
     Ok(walker.did)
-}
-
-/// Length of a polyline up to each of its points.
-fn lengths(points: &[Point2]) -> Vec<f64> {
-    let mut lengths = vec![0.0];
-    for w in points.windows(2) {
-        lengths.push(lengths[lengths.len() - 1] + (w[1] - w[0]).norm());
-    }
-    lengths
-}
-
-/// A polyline by its length.
-struct Way {
-    points: Vec<Point2>,
-    lengths: Vec<f64>,
-}
-
-impl Way {
-    fn new(points: &[Point2]) -> Self {
-        let mut points = points.to_vec();
-        points.dedup();
-        let lengths = lengths(&points);
-        Self { points, lengths }
-    }
-
-    fn total(&self) -> f64 {
-        self.lengths[self.lengths.len() - 1]
-    }
-
-    /// The side that ends at or after `s`.
-    fn side(&self, s: f64) -> usize {
-        self.lengths.partition_point(|l| *l < s).clamp(1, (self.points.len() - 1).max(1)) - 1
-    }
-
-    fn at(&self, s: f64) -> Point2 {
-        let k = self.side(s);
-        let Some(&b) = self.points.get(k + 1) else { return self.points[k] };
-        let (a, long) = (self.points[k], self.lengths[k + 1] - self.lengths[k]);
-        a + (b - a) * ((s - self.lengths[k]) / long).clamp(0.0, 1.0)
-    }
-
-    /// The direction in which the way comes to `s`.
-    fn heading(&self, s: f64) -> Option<Vector2> {
-        let side = self.side(s);
-        (self.points.get(side + 1)? - self.points[side]).try_normalize(0.0)
-    }
-
-    /// The points of the polyline between two places.
-    fn corners_between(&self, from: f64, to: f64) -> &[Point2] {
-        let first = self.lengths.partition_point(|l| *l <= from);
-        &self.points[first..self.lengths.partition_point(|l| *l < to).max(first)]
-    }
-
-    /// The next corner after `s` at which the way turns sharply, or its end.
-    fn corner_after(&self, s: f64) -> f64 {
-        /// Cosine of what is sharp.
-        const SHARP: f64 = 0.98;
-        let first = self.lengths.partition_point(|l| *l <= s);
-        for k in first..self.points.len() - 1 {
-            let (a, b) = (self.points[k] - self.points[k - 1], self.points[k + 1] - self.points[k]);
-            if a.dot(&b) < SHARP * a.norm() * b.norm() {
-                return self.lengths[k];
-            }
-        }
-        self.total()
-    }
 }
 
 /// A state that can be returned to.
@@ -180,6 +192,8 @@ struct Mark {
 /// A loop that keeps to the limit.
 struct Loop {
     radius: f64,
+    /// 1 on the left of the way, counter-clockwise, -1 on its right, clockwise.
+    side: f64,
     centre: Point2,
     places: Vec<Point2>,
     /// It cuts nothing.
@@ -190,19 +204,21 @@ impl Loop {
     /// Its direction at one of its places.
     fn tangent(&self, at: &Point2) -> Vector2 {
         let out = (at - self.centre) / self.radius;
-        Vector2::new(-out.y, out.x)
+        Vector2::new(-out.y, out.x) * self.side
     }
 }
 
 struct Walker<'a> {
     way: Way,
-    /// From which length on, what the centre stays within, and its sides.
-    rooms: Vec<(f64, &'a Piece, SegmentGrid)>,
+    room: &'a Room<'a>,
     cleared: &'a mut Cleared,
     bounds: Turning,
+    sides: Sides,
     radius: f64,
     out: Vec<Point2>,
     marks: Vec<Mark>,
+    /// Where the last stretch above the limit ends.
+    above_to: f64,
     did: Bounding,
 }
 
@@ -235,9 +251,7 @@ impl Walker<'_> {
                 }
                 None => {
                     let on = (s + STEP * self.radius).min(total);
-                    if reach < on {
-                        self.did.above += on - reach;
-                    }
+                    self.tell_above(reach, on);
                     s = self.walk(s, on.max(reach), true);
                     here = 0.0;
                 }
@@ -291,6 +305,19 @@ impl Walker<'_> {
         s
     }
 
+    /// Notes the stretch from `s` to `on` if more than a film is above the limit at its end.
+    fn tell_above(&mut self, s: f64, on: f64) {
+        let Some(heading) = self.way.heading(on).filter(|_| s < on) else { return };
+        if self.cleared.arc(&self.way.at(on), &heading, usize::MAX) <= self.bounds.limit {
+            return;
+        }
+        match self.did.above.last_mut() {
+            Some((_, length)) if s - self.above_to < STEP * self.radius => *length += on - s,
+            _ => self.did.above.push((self.way.at(s), on - s)),
+        }
+        self.above_to = on;
+    }
+
     /// Angle in stock where the way comes to `s`.
     fn arc_at(&self, s: f64) -> f64 {
         let Some(heading) = self.way.heading(s) else { return 0.0 };
@@ -302,6 +329,12 @@ impl Walker<'_> {
     /// The next loop: how far on along the way, at most `reach`, and the loop. `here` is the radius of the
     /// last one at `s` itself.
     fn next_loop(&self, s: f64, reach: f64, here: f64) -> Option<(f64, Loop)> {
+        let heading = self.way.heading(s)?;
+        self.sides.of(&heading).iter().find_map(|sides| self.loop_on(sides, s, reach, here))
+    }
+
+    /// The next loop on one of `sides`.
+    fn loop_on(&self, sides: &[f64], s: f64, reach: f64, here: f64) -> Option<(f64, Loop)> {
         /// Loops around the last one are at least so much greater.
         const GROWTH: f64 = 1.03;
         let mut around: Option<Loop> = None;
@@ -309,16 +342,17 @@ impl Walker<'_> {
         while rho >= LEAST * self.radius {
             let could = self.bounds.ring_step(rho);
             let worth = (WORTH * could).min(reach - s);
-            let first = self.loop_at(s + worth, rho);
-            match first {
-                Some(found) if worth > 0.0 => {
-                    return Some(self.farthest(s, worth, reach - s, could, rho, found));
+            for &side in sides {
+                match self.loop_at(s + worth, rho, side) {
+                    Some(found) if worth > 0.0 && (!found.empty || side == sides[sides.len() - 1]) => {
+                        return Some(self.farthest(s, worth, reach - s, could, rho, found));
+                    }
+                    _ if around.is_none() => {
+                        let grown = |l: &Loop| l.radius > GROWTH * here && !l.empty;
+                        around = self.loop_at(s, rho, side).filter(grown);
+                    }
+                    _ => {}
                 }
-                _ if around.is_none() => {
-                    let grown = |l: &Loop| l.radius > GROWTH * here && !l.empty;
-                    around = self.loop_at(s, rho).filter(grown);
-                }
-                _ => {}
             }
             rho *= SHRINK;
         }
@@ -330,7 +364,7 @@ impl Walker<'_> {
         let (mut lo, mut hi, mut best) = (lo, most, known);
         let mut next = could.min(most);
         for _ in 0..HALVINGS {
-            match self.loop_at(s + next, rho) {
+            match self.loop_at(s + next, rho, best.side) {
                 Some(found) => (lo, best) = (next, found),
                 None => hi = next,
             }
@@ -343,46 +377,18 @@ impl Walker<'_> {
         (s + lo, best)
     }
 
-    /// The greatest circle up to the radius `rho` that touches the way at `s` from its left and fits in.
-    fn fitting(&self, s: f64, rho: f64) -> Option<(Point2, f64, Vector2)> {
-        let at = self.way.at(s);
-        let heading = self.way.heading(s)?;
-        let left = Vector2::new(-heading.y, heading.x);
-        let (_, within, walls) = self.rooms.iter().rev().find(|room| room.0 < s || room.0 == 0.0)?;
-        /// Each shrinks the circle to the wall that it crosses; a few suffice.
-        const SHRINKS: usize = 40;
-        let mut rho = rho;
-        for _ in 0..SHRINKS {
-            let centre = at + left * rho;
-            let nearest = walls.nearest(&centre)?;
-            if nearest.distance >= rho - FIT * self.radius {
-                let inside = within.contains(&centre);
-                return inside.then_some((centre, rho.min(nearest.distance), left));
-            }
-            let ends = walls.segments()[nearest.segment as usize].ends;
-            let to = ends[0] + (ends[1] - ends[0]) * nearest.share - at;
-            let across = to.dot(&left);
-            if across <= 0.0 {
-                return None;
-            }
-            rho = rho.min(0.5 * to.norm_squared() / across) * (1.0 - 1e-9);
-            if rho < LEAST * self.radius {
-                return None;
-            }
-        }
-        None
-    }
-
     /// The loop of the radius `rho` (less where there is no room) at `s`, if it keeps to the limit.
-    fn loop_at(&self, s: f64, rho: f64) -> Option<Loop> {
-        let (centre, rho, left) = self.fitting(s, rho)?;
+    fn loop_at(&self, s: f64, rho: f64, side: f64) -> Option<Loop> {
+        let (centre, rho, inwards) = fitting(&self.way, self.room, self.radius, s, rho, side)?;
         let sides = (TAU * rho / (SIDE * self.radius)).ceil().max(LEAST_SIDES) as usize;
-        let begin = left.y.atan2(left.x) + PI;
-        let mut found = Loop { radius: rho, centre, places: Vec::new(), empty: true };
+        let begin = inwards.y.atan2(inwards.x) + PI;
+        let mut found = Loop { radius: rho, side, centre, places: Vec::new(), empty: true };
         for k in 0..=sides {
-            let (sin, cos) = (begin + TAU * k as f64 / sides as f64).sin_cos();
-            let at = centre + Vector2::new(cos, sin) * rho;
-            let arc = self.cleared.arc(&at, &Vector2::new(-sin, cos), usize::MAX);
+            let turn = begin + side * TAU * k as f64 / sides as f64;
+            let at = centre + Vector2::new(turn.cos(), turn.sin()) * rho;
+            // That of the side that ends here: it looks farther outwards than the tangent.
+            let (sin, cos) = (turn - side * PI / sides as f64).sin_cos();
+            let arc = self.cleared.arc(&at, &(Vector2::new(-sin, cos) * side), usize::MAX);
             if arc > self.bounds.limit {
                 return None;
             }

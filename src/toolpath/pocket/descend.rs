@@ -29,15 +29,24 @@ pub(super) fn floors(depth: f64, strategy: &PocketStrategy) -> Vec<f64> {
     floors
 }
 
-/// A polyline with fewer points (within `tolerance`), none farther apart than `longest`.
-pub(super) fn shortened(points: &[Point2], tolerance: f64, longest: f64) -> Vec<Point2> {
+/// A polyline with fewer points (within `tolerance`), none farther apart than `longest`, none of whose
+/// sides turns from one that it stands for by more than `turn`, rad: what is ahead of the cutter stays so.
+pub(super) fn shortened(points: &[Point2], tolerance: f64, longest: f64, turn: f64) -> Vec<Point2> {
     const MAX_SKIP: usize = 200;
+    let least = turn.cos() - ROUNDING;
     let Some(&first) = points.first() else { return Vec::new() };
     let mut out = vec![first];
     let mut from = 0;
     while from + 1 < points.len() {
-        let fits =
-            |to: usize| (from + 1..to).all(|k| foot(&points[k], &[points[from], points[to]]).1 <= tolerance);
+        let fits = |to: usize| {
+            let side = points[to] - points[from];
+            let along = |k: usize| {
+                let old = points[k + 1] - points[k];
+                old.dot(&side) >= least * old.norm() * side.norm()
+            };
+            (from + 1..to).all(|k| foot(&points[k], &[points[from], points[to]]).1 <= tolerance)
+                && (from..to).all(along)
+        };
         let mut to = from + 1;
         while to + 1 < points.len() && to - from < MAX_SKIP && fits(to + 1) {
             to += 1;
@@ -123,10 +132,10 @@ fn way_down(
     let begin = run.points[0];
     let plunge = vec![Point3::new(begin.x, begin.y, above), Point3::new(begin.x, begin.y, floor)];
     let once: Vec<Point2> = match &run.entry {
-        Entry::Helix { centre, radius } => {
+        Entry::Helix { centre, radius, begin } => {
             // Chords within the share of the tolerance that arcs have everywhere.
             let spacing = (8.0 * radius * ARC_SHARE * chord_tolerance).sqrt();
-            let mut turn = circle(centre, *radius, spacing);
+            let mut turn = circle(centre, *radius, *begin, spacing);
             turn.push(turn[0]);
             turn
         }

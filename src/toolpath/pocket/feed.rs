@@ -44,7 +44,8 @@ pub fn engagement(path: &Toolpath, angles: &[f64], limit: f64) -> Engagement {
     if whole <= 0.0 {
         return figures;
     }
-    figures.over_limit = all.iter().filter(|a| a.0 > limit).map(|a| a.1).sum::<f64>() / whole;
+    // An empty sum is -0.
+    figures.over_limit = all.iter().filter(|a| a.0 > limit).map(|a| a.1).fold(0.0, |a, b| a + b) / whole;
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut below = 0.0;
     for (angle, length) in all {

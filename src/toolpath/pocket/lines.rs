@@ -49,7 +49,7 @@ pub fn runs(piece: &Piece, angle: f64, step: f64) -> Vec<Run> {
             Some(run) if end.is_some_and(|e| (e - closed[0]).norm() < 1e-6) => {
                 run.points.extend(around.into_iter().skip(1))
             }
-            _ => runs.push(Run::within(piece, Entry::Ramp(around.clone()), around)),
+            _ => runs.push(Run { entry: Entry::Ramp(around.clone()), points: around }),
         }
     }
     runs
@@ -80,7 +80,7 @@ fn chained(mut lines: Vec<Line>, piece: &Piece, spacing: f64) -> Vec<Run> {
             let first = (0..lines.len()).min_by_key(|k| lines[*k].row).unwrap_or(0);
             let line = lines.remove(first);
             let way = vec![line.ends[0], line.ends[1], line.ends[0]];
-            runs.push(Run::within(piece, Entry::Ramp(way), line.ends.to_vec()));
+            runs.push(Run { entry: Entry::Ramp(way), points: line.ends.to_vec() });
             at = Some((line.row, line.ends[1]));
         }
     }

@@ -4,8 +4,8 @@
 //! drawn in by the cutter's radius. Passes there are level curves of a flow that follows walls and islands
 //! (or offsets of them, or parallel lines), cut from the inside outwards, so that only the first pass of
 //! each nest is a slot; each nest is entered by a helix where there is room, else by a ramp along its first
-//! pass. Where an engagement is asked for, passes that turn toward the stock lie closer, and loops clear
-//! first passes, corners and necks (`bounded`). The design's frame: z = 0 is the upper face, the floor lies at minus the depth; mm.
+//! pass. Where an engagement is asked for, passes that turn toward the stock lie closer, loops clear first
+//! passes, corners and necks, and a helix opens every run that would begin in stock (`bounded`). The design's frame: z = 0 is the upper face, the floor lies at minus the depth; mm.
 
 mod bounded;
 mod cleared;
@@ -17,6 +17,7 @@ mod route;
 #[cfg(test)]
 mod tests;
 mod turning;
+mod way;
 
 use cleared::Cleared;
 pub use feed::{Engagement, engagement, engagement_angle, limit_feed};
@@ -26,7 +27,7 @@ use turning::Turning;
 
 use super::{Plan, PlanError, PlanSettings, Step};
 use crate::cutter::{Cutter, CutterShape};
-use crate::geometry::{Piece, Region, SegmentGrid};
+use crate::geometry::{Piece, Point2, Region, SegmentGrid, Vector2};
 use crate::monitor::{self, Cancelled, Monitor};
 
 /// A pocket to mill.
@@ -81,8 +82,8 @@ pub struct PocketStrategy {
     /// Radius of the helix of the cutter's centre, mm; `None`: 0.8 of the cutter's radius, which leaves no
     /// core.
     pub helix_radius: Option<f64>,
-    /// Most of the cutter's circumference in stock, rad. It bounds the stepover, and passes of flows and
-    /// offsets are planned within it everywhere but on ways down. Where more is all the same, the feed
+    /// Most of the cutter's circumference in stock, rad. It bounds the stepover, and passes are planned
+    /// within it everywhere but on ways down and in slots without room. Where more is all the same, the feed
     /// falls in proportion. `None`: passes are not bounded, and the feed falls above a quarter more than
     /// the stepover has in straight passes.
     pub engagement: Option<f64>,
@@ -99,6 +100,10 @@ const REACH: f64 = 0.95;
 
 /// Longest move over the cutter's radius: feeds and engagement belong to moves.
 const MOVE_OVER_RADIUS: f64 = 0.5;
+
+/// Sides that are left out turn from the one instead by this much at most where the engagement is bounded,
+/// rad: it adds to the angle ahead.
+const MOST_TURN: f64 = 0.03;
 
 /// Sides of spirals and links over the stepover.
 const SPACING: f64 = 0.25;
@@ -125,18 +130,17 @@ impl PocketStrategy {
         self.engagement.map_or(asked, |angle| asked.min(radius * (1.0 - angle.cos())))
     }
 
-    /// Angle of the cutter in stock, rad, that passes are planned within, if they are: lines of a zigzag have
-    /// stock on either side in turns, and loops on one side only would not do.
+    /// Angle of the cutter in stock, rad, that passes are planned within, if they are.
     fn bounded(&self) -> Option<f64> {
         /// Planned for less by this, rad, which is what sides of polylines, films and the parts in which
         /// angles are told apart add.
-        const SPARE: f64 = 0.05;
-        match self.pattern {
-            Pattern::Flow(_) | Pattern::Offset { .. } => {
-                self.engagement.filter(|angle| *angle < std::f64::consts::PI).map(|angle| angle - SPARE)
-            }
-            Pattern::Zigzag { .. } => None,
-        }
+        const SPARE: f64 = 0.03;
+        self.engagement.filter(|angle| *angle < std::f64::consts::PI).map(|angle| angle - SPARE)
+    }
+
+    /// Radius that a helix should have, and the least that is worth one, mm.
+    fn helix(&self, radius: f64) -> [f64; 2] {
+        [self.helix_radius.unwrap_or(HELIX_OVER_RADIUS * radius), LEAST_HELIX * radius]
     }
 
     /// Angle of the cutter in stock, rad, above which the feed falls.
@@ -203,18 +207,19 @@ pub fn plan_pocket(
         );
     }
     let step = strategy.stepover(settings.step, radius);
-    let mut runs = Vec::new();
+    let mut groups: Vec<(&Piece, Vec<Run>)> = Vec::new();
     for piece in &rough.pieces {
         monitor::check(monitor)?;
-        runs.extend(piece_runs(piece, cutter, strategy, step, &mut notes, monitor)?);
+        groups.push((piece, piece_runs(piece, cutter, strategy, step, &mut notes, monitor)?));
     }
     if strategy.wall_allowance > 0.0 {
         for piece in &walls_at.pieces {
-            for wall in piece.curves() {
+            let around = |wall: &[Point2]| {
                 let mut around = wall.to_vec();
                 around.push(wall[0]);
-                runs.push(Run::within(piece, Entry::Ramp(around.clone()), around));
-            }
+                Run { entry: Entry::Ramp(around.clone()), points: around }
+            };
+            groups.push((piece, piece.curves().map(around).collect()));
         }
     }
     if walls_at.pieces.len() > 1 {
@@ -230,10 +235,17 @@ pub fn plan_pocket(
     ));
     if let Some(limit) = strategy.bounded() {
         let bounds = Turning { limit, radius };
-        bound_runs(&mut runs, pocket, bounds, &mut notes, monitor)?;
+        let sides = match strategy.pattern {
+            Pattern::Zigzag { angle } => bounded::Sides::Toward(Vector2::new(-angle.sin(), angle.cos())),
+            Pattern::Flow(_) | Pattern::Offset { .. } => bounded::Sides::Left,
+        };
+        let rules = bounded::Rules { bounds, sides, helix: strategy.helix(radius) };
+        bound_runs(&mut groups, pocket, &rules, &mut notes, monitor)?;
     }
+    let mut runs: Vec<Run> = groups.into_iter().flat_map(|group| group.1).collect();
+    let turn = strategy.bounded().map_or(std::f64::consts::PI, |_| MOST_TURN);
     for run in &mut runs {
-        run.points = descend::shortened(&run.points, chords, MOVE_OVER_RADIUS * radius);
+        run.points = descend::shortened(&run.points, chords, MOVE_OVER_RADIUS * radius, turn);
     }
     let path = descend::program(&runs, pocket.depth, strategy, settings);
     Ok(Plan { path, notes, shortest: None, field: None })
@@ -241,23 +253,29 @@ pub fn plan_pocket(
 
 /// Puts loops into the runs where more of the circumference than the limit would stand in stock.
 fn bound_runs(
-    runs: &mut [Run],
+    groups: &mut [(&Piece, Vec<Run>)],
     pocket: &Pocket,
-    bounds: Turning,
+    rules: &bounded::Rules,
     notes: &mut Vec<String>,
     monitor: &dyn Monitor,
 ) -> Result<(), Cancelled> {
     let Some(around) = pocket.region.bounds() else { return Ok(()) };
-    let mut ground = Cleared::new(around, bounds.radius);
-    let (mut loops, mut above) = (0, 0.0);
-    for run in runs {
-        let did = bounded::bound(run, &mut ground, bounds, monitor)?;
-        (loops, above) = (loops + did.loops, above + did.above);
+    let mut ground = Cleared::new(around, rules.bounds.radius);
+    let (mut loops, mut above) = (0, Vec::new());
+    for (piece, runs) in groups {
+        let room = way::Room::new(piece);
+        for run in runs {
+            let did = bounded::bound(run, &room, &mut ground, rules, monitor)?;
+            loops += did.loops;
+            above.extend(did.above);
+        }
     }
     notes.push(format!("{loops} loops in each step down bound the engagement"));
-    if above > 0.0 {
+    if let Some((place, longest)) = above.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
+        let all: f64 = above.iter().map(|stretch| stretch.1).sum();
         notes.push(format!(
-            "{above:.2} mm of each step down are above the engagement, where no loop could be put in; the feed falls there"
+            "{all:.2} mm of each step down are above the engagement, where no loop could be put in (the longest stretch, {longest:.2} mm, begins at {:.2}, {:.2}); the feed falls there",
+            place.x, place.y
         ));
     }
     Ok(())
@@ -282,7 +300,10 @@ fn piece_runs(
     let spacing = turning
         .map_or(nest::Spacing::lenient(step, reach), |turning| nest::Spacing::bounded(step, reach, turning));
     let (nest, spiral) = match strategy.pattern {
-        Pattern::Zigzag { angle } => return Ok(lines::runs(piece, angle, step)),
+        Pattern::Zigzag { angle } => {
+            let step = turning.map_or(step, |turning| step.min(turning.step(0.0)));
+            return Ok(lines::runs(piece, angle, step));
+        }
         Pattern::Offset { spiral } => {
             (nest::offsets(piece, &spacing, reach, monitor).map_err(failed)?, spiral)
         }
@@ -297,9 +318,8 @@ fn piece_runs(
         }
     };
     let walls = SegmentGrid::of_curves(piece.curves());
-    let helix = strategy.helix_radius.unwrap_or(HELIX_OVER_RADIUS * radius);
     let leads = if turning.is_some() { route::LONG_LEADS } else { route::LEADS };
     let settings =
-        route::RouteSettings { helix: [helix, LEAST_HELIX * radius], spiral, spacing: SPACING * step, leads };
+        route::RouteSettings { helix: strategy.helix(radius), spiral, spacing: SPACING * step, leads };
     Ok(route::runs(&nest, &walls, &settings))
 }

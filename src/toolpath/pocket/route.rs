@@ -27,24 +27,17 @@ pub(super) const LONG_LEADS: [f64; 3] = [7.0, 4.0, 2.0];
 /// How a run gets down to its depth.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Entry {
-    /// A helix about a centre and once around at depth; the run goes on from its circle's point at angle 0.
+    /// A helix about a centre and once around at depth; the run goes on from the circle's point at `begin`.
     Helix {
         /// Its axis.
         centre: Point2,
         /// Its radius, mm.
         radius: f64,
+        /// Angle of the point on its circle where it begins and ends, rad.
+        begin: f64,
     },
     /// Back and forth, or around: a way in the plane that ends where the run begins.
     Ramp(Vec<Point2>),
-}
-
-/// The curves that a stretch of a run goes along or lies within.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Room {
-    /// Its first point in the run.
-    pub first: usize,
-    /// The curves.
-    pub within: Piece,
 }
 
 /// From an entry to a retract.
@@ -54,19 +47,12 @@ pub struct Run {
     pub entry: Entry,
     /// The way at depth.
     pub points: Vec<Point2>,
-    /// What its stretches lie within, from the first on.
-    pub rooms: Vec<Room>,
 }
 
 impl Run {
     /// A run that has yet to go anywhere.
     fn new(entry: Entry) -> Self {
-        Self { entry, points: Vec::new(), rooms: Vec::new() }
-    }
-
-    /// A run within one piece.
-    pub fn within(piece: &Piece, entry: Entry, points: Vec<Point2>) -> Self {
-        Self { entry, points, rooms: vec![Room { first: 0, within: piece.clone() }] }
+        Self { entry, points: Vec::new() }
     }
 
     /// Where it ends so far, and in which direction.
@@ -81,12 +67,6 @@ impl Run {
             }
             (Entry::Ramp(_), None) => None,
         }
-    }
-
-    /// What comes from here on lies within `piece`.
-    fn enter(&mut self, piece: &Piece) {
-        let first = self.points.len().saturating_sub(1);
-        self.rooms.push(Room { first, within: piece.clone() });
     }
 }
 
@@ -106,7 +86,7 @@ pub struct RouteSettings {
 /// All runs of a nest.
 pub fn runs(nest: &Nest, walls: &SegmentGrid, settings: &RouteSettings) -> Vec<Run> {
     let mut route = Route { walls, settings, runs: Vec::new(), bore: None, last: None };
-    route.visit(nest, &nest.curves);
+    route.visit(nest);
     route.finish_spiral();
     route.runs
 }
@@ -170,17 +150,14 @@ pub(super) fn bend(a: Point2, u: Vector2, b: Point2, v: Vector2, longest: f64) -
 }
 
 impl Route<'_> {
-    /// `outer` are the curves around those of the nest.
-    fn visit(&mut self, nest: &Nest, outer: &Piece) {
-        // Within the innermost curves there may be no room for loops.
-        let room = if nest.inner.is_empty() { outer } else { &nest.curves };
+    fn visit(&mut self, nest: &Nest) {
         if nest.inner.is_empty() {
-            self.enter(nest, room);
+            self.enter(nest);
         } else {
             let mut inner: Vec<&Nest> = nest.inner.iter().collect();
             // The one with most passes last: it leads on without a retract.
             inner.sort_by(|a, b| a.length().total_cmp(&b.length()));
-            inner.into_iter().for_each(|n| self.visit(n, &nest.curves));
+            inner.into_iter().for_each(|n| self.visit(n));
             if nest.inner.len() > 1 {
                 self.finish_spiral();
             }
@@ -194,7 +171,7 @@ impl Route<'_> {
             return;
         }
         let single = nest.curves.islands.is_empty() && nest.inner.len() <= 1;
-        if self.settings.spiral && single && self.turn(&nest.curves, room) {
+        if self.settings.spiral && single && self.turn(&nest.curves) {
             return;
         }
         self.finish_spiral();
@@ -204,7 +181,7 @@ impl Route<'_> {
             let away = |curve: &[Point2]| end.map_or(0.0, |e| SegmentGrid::of_curves([curve]).distance(&e));
             let nearest = (0..left.len()).min_by(|a, b| away(left[*a]).total_cmp(&away(left[*b])));
             let curve = left.remove(nearest.unwrap_or(0));
-            self.curve(curve, &nest.curves, room, &nest.seed);
+            self.curve(curve, &nest.curves, &nest.seed);
         }
     }
 
@@ -213,7 +190,7 @@ impl Route<'_> {
     }
 
     /// Begins a run at the seed by a helix, if there is room for one.
-    fn enter(&mut self, nest: &Nest, room: &Piece) {
+    fn enter(&mut self, nest: &Nest) {
         self.finish_spiral();
         let [wanted, least] = self.settings.helix;
         let radius = wanted.min(self.walls.distance(&nest.seed));
@@ -223,9 +200,9 @@ impl Route<'_> {
             return;
         }
         self.bore = Some((nest.seed, radius));
-        let circle = circle(&nest.seed, radius, self.settings.spacing);
-        let entry = Entry::Helix { centre: nest.seed, radius };
-        self.runs.push(Run::within(room, entry, vec![circle[0]]));
+        let circle = circle(&nest.seed, radius, 0.0, self.settings.spacing);
+        let entry = Entry::Helix { centre: nest.seed, radius, begin: 0.0 };
+        self.runs.push(Run { entry, points: vec![circle[0]] });
         if self.settings.spiral {
             self.last = Some(circle);
         }
@@ -243,7 +220,7 @@ impl Route<'_> {
 
     /// One turn of a spiral, from the last curve to that of `nest`; false where there is none, or where
     /// it would leave the curve.
-    fn turn(&mut self, nest: &Piece, room: &Piece) -> bool {
+    fn turn(&mut self, nest: &Piece) -> bool {
         let (Some(inner), Some(run)) = (&self.last, self.runs.last_mut()) else { return false };
         let outer = begun_near(&nest.outer, &inner[0], 0.0);
         let turn = spiral_turn(inner, &outer, self.settings.spacing);
@@ -256,22 +233,20 @@ impl Route<'_> {
             }
             before = *p;
         }
-        run.enter(room);
         run.points.extend(turn);
         self.last = Some(outer);
         true
     }
 
     /// Links to a closed curve within `inside` and goes around it.
-    fn curve(&mut self, curve: &[Point2], inside: &Piece, room: &Piece, seed: &Point2) {
+    fn curve(&mut self, curve: &[Point2], inside: &Piece, seed: &Point2) {
         let fresh = self.runs.last().is_none_or(|run| run.points.is_empty());
         if fresh {
             let closed = begun_near(curve, seed, 0.0);
-            self.ramp(closed, room);
+            self.ramp(closed);
             return;
         }
         let Some(run) = self.runs.last_mut() else { return };
-        run.enter(room);
         let Some((end, along)) = run.end() else { return };
         let gap = SegmentGrid::of_curves([curve]).distance(&end);
         let border = SegmentGrid::of_curves(inside.curves());
@@ -292,7 +267,7 @@ impl Route<'_> {
         if straight.clone().all(|p| within(&p)) {
             go_around(run, closed);
         } else {
-            self.ramp(closed, room);
+            self.ramp(closed);
         }
     }
 
@@ -304,24 +279,23 @@ impl Route<'_> {
             let handle = LONGEST_HANDLE * self.settings.spacing;
             let link = bend(end, along, stretch[0], onward, handle);
             link.iter().all(|p| inside.contains(p)).then(|| {
-                run.enter(inside);
                 run.points.extend(link.into_iter().chain(stretch.iter().copied()));
             })
         });
         if linked.is_none() {
             let way = stretch.iter().chain(stretch.iter().rev().skip(1)).copied().collect();
-            self.runs.push(Run::within(inside, Entry::Ramp(way), stretch.to_vec()));
+            self.runs.push(Run { entry: Entry::Ramp(way), points: stretch.to_vec() });
         }
     }
 
     /// A run that ramps along a closed curve and then goes around it.
-    fn ramp(&mut self, closed: Vec<Point2>, inside: &Piece) {
+    fn ramp(&mut self, closed: Vec<Point2>) {
         if self.runs.last().is_some_and(|run| run.points.is_empty()) {
             self.runs.pop();
         }
         let mut way = closed.clone();
         way.push(closed[0]);
-        let mut run = Run::within(inside, Entry::Ramp(way), Vec::new());
+        let mut run = Run::new(Entry::Ramp(way));
         go_around(&mut run, closed);
         self.runs.push(run);
     }
@@ -333,12 +307,12 @@ fn go_around(run: &mut Run, closed: Vec<Point2>) {
     run.points.push(first);
 }
 
-/// A circle, counter-clockwise from angle 0.
-pub(super) fn circle(centre: &Point2, radius: f64, spacing: f64) -> Vec<Point2> {
+/// A circle, counter-clockwise from the angle `begin`, rad.
+pub(super) fn circle(centre: &Point2, radius: f64, begin: f64, spacing: f64) -> Vec<Point2> {
     /// A circle has at least so many corners.
     const LEAST: f64 = 48.0;
     let n = (TAU * radius / spacing).ceil().max(LEAST);
-    let at = |k: usize| TAU * k as f64 / n;
+    let at = |k: usize| begin + TAU * k as f64 / n;
     (0..n as usize).map(|k| centre + Vector2::new(at(k).cos(), at(k).sin()) * radius).collect()
 }
 

@@ -74,7 +74,7 @@ fn programs_keep_to_the_pocket_and_clear_it() {
         let floor = pocket.reachable_floor(&cutter).inset(0.02);
         let bounded = |pattern| (pattern, Some(70f64.to_radians()));
         let all = patterns().map(|pattern| (pattern, None)).into_iter();
-        for (pattern, engagement) in all.chain([bounded(patterns()[0]), bounded(patterns()[2])]) {
+        for (pattern, engagement) in all.chain([0, 2, 4].map(|k| bounded(patterns()[k]))) {
             let strategy = PocketStrategy { engagement, ..strategy(pattern) };
             let plan = plan_pocket(&pocket, &cutter, &strategy, &settings(), &Silent).unwrap();
             let mut segments = Vec::new();
@@ -192,6 +192,20 @@ fn steps_go_down_evenly_and_the_floor_has_its_own() {
     assert_eq!(descend::floors(6.0, &s), [-5.5, -6.0]);
 }
 
+/// A circle of a twentieth of a mm whose thinning by the tolerance alone would leave sides that look aside.
+#[test]
+fn shortened_ways_keep_their_heading() {
+    let circle: Vec<Point2> = route::circle(&Point2::origin(), 0.05, 0.0, 1e-3);
+    let turn = |points: &[Point2]| {
+        let side = |k: usize| points[k + 1] - points[k];
+        (2..points.len()).map(|k| side(k - 1).angle(&side(k - 2))).fold(0.0, f64::max)
+    };
+    let sides = descend::shortened(&circle, 0.0025, 1.0, PI);
+    assert!(turn(&sides) > 0.4);
+    let sides = descend::shortened(&circle, 0.0025, 1.0, 0.03);
+    assert!(turn(&sides) < 0.085 && sides.len() < circle.len() / 2, "{} {}", turn(&sides), sides.len());
+}
+
 #[test]
 fn feeds_fall_where_more_of_the_cutter_cuts() {
     assert!((engagement_angle(3.0, 3.0) - PI / 2.0).abs() < 1e-15);
@@ -210,6 +224,7 @@ fn feeds_fall_where_more_of_the_cutter_cuts() {
     let figures = engagement(&path, &angles, PI / 2.0);
     assert_eq!((figures.max, figures.p95, figures.max_move), (PI, PI, 1));
     assert!((figures.over_limit - 1.0 / 3.0).abs() < 1e-12);
+    assert!(engagement(&path, &angles, PI).over_limit.is_sign_positive(), "no -0 % in reports");
     limit_feed(&mut path, &angles, PI / 2.0);
     let feeds: Vec<f64> = path.moves.iter().map(|m| m.feed_rate).collect();
     assert_eq!(feeds, [1000.0, 500.0, 1000.0]);
