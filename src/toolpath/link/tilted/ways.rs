@@ -4,8 +4,8 @@
 //! - Aloft: along the axis until the tool is clear, straight over while the axis turns evenly, and down along the axis there;
 //!   all fed, since stock may stand.
 //! - Over the block that holds part and stock: out along the axis, straight over or over the top of the block, and in.
-//! - Around a sphere that holds the block, on which every place of the cutter is outside while its axis points away from the
-//!   middle.
+//! - Around a sphere that holds the block, and is larger by the tool's greatest radius: with the tip on it every place of the
+//!   tool is outside of the block while its axis points away from the middle.
 //!
 //! The way out along the axis, which the cutter has come free of, and what is outside of the block are run at rapid rate. In the
 //! block the tool comes in at the feed, for stock may stand where it comes.
@@ -125,7 +125,8 @@ impl<'a> Ways<'a> {
             let obstacle = Obstacle::new(mesh, bvh);
             outside.checks.extend(solids.into_iter().map(|solid| Check { solid, obstacle, needed: 0.0 }));
         }
-        let sphere = Sphere::around(part, settings);
+        let radii = touching.checks.iter().map(|check| check.solid.radius());
+        let sphere = Sphere::around(part, settings, radii.fold(cutter.radius(), f64::max));
         let middle = cutter.profile().centre_z;
         Self { part, settings, rates, middle, block, sphere, bent, touching, aloft, outside }
     }
@@ -336,19 +337,21 @@ fn turns(from: &ClPoint, to: &ClPoint) -> usize {
     (turn / GREATEST_TURN).ceil().max(1.0) as usize
 }
 
-/// A sphere that holds part and stock.
+/// A sphere around part and stock, on which a tool that points away from its middle touches neither.
 struct Sphere {
     centre: Point3,
     radius: f64,
 }
 
 impl Sphere {
-    fn around(part: &Part, settings: &PlanSettings) -> Self {
+    /// For a tool of this greatest radius, mm.
+    fn around(part: &Part, settings: &PlanSettings, tool: f64) -> Self {
         let bounds = part.bounds();
         let top = settings.stock_top.max(bounds.max.z);
         let (low, high) = (bounds.min, Point3::new(bounds.max.x, bounds.max.y, top));
         let least = 0.5 * (high - low).norm() + settings.clearance;
-        Self { centre: nalgebra::center(&low, &high), radius: least / (0.5 * SPHERE_STEP).cos() }
+        let radius = (least + tool) / (0.5 * SPHERE_STEP).cos();
+        Self { centre: nalgebra::center(&low, &high), radius }
     }
 
     /// Where a cutter that retreats along its axis leaves the sphere.
@@ -375,5 +378,56 @@ impl Sphere {
             ClPoint { tip: self.centre + radial * self.radius, axis: from.towards(to, t).axis }
         };
         (1..count).map(at).chain(std::iter::once(*to)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cutter::{Holder, HolderSection};
+    use crate::geometry::{AnalyticShape, AnalyticSurface};
+    use crate::part::Patch;
+    use crate::toolpath::{Joining, Step};
+
+    /// A bull nose with a wide holder, its tip on the sphere and on the chords around it, its axis square to the radius at most.
+    #[test]
+    fn on_the_sphere_no_tool_that_points_away_touches_the_block() {
+        let plane = AnalyticSurface::new(AnalyticShape::Plane { height: 0.0 }, [[-6.0, 14.0], [0.0, 9.0]]);
+        let part = Part::from_patches(vec![Patch::Analytic(plane.unwrap())], 0.01).unwrap();
+        let settings = PlanSettings {
+            step: Step::Stepover(1.0),
+            chord_tolerance: 0.005,
+            clearance: 0.5,
+            stock_top: 4.0,
+            feed_rate: 1000.0,
+            plunge_rate: 300.0,
+            rapid_rate: 15_000.0,
+            joining: Joining::default(),
+        };
+        let section = HolderSection { diameter: 30.0, top_diameter: 30.0, length: 40.0 };
+        let tool =
+            Solid::of_tool(&Cutter::bull(10.0, 2.0).unwrap(), &Holder::new(4.0, vec![section]).unwrap());
+        let sphere = Sphere::around(&part, &settings, tool.radius());
+        let bounds = Block::of(&part, &PlanSettings { clearance: 0.0, ..settings }).bounds;
+        let corners = (0..8).map(|i| {
+            let pick = |c: usize| if i >> c & 1 == 1 { bounds.max[c] } else { bounds.min[c] };
+            Point3::new(pick(0), pick(1), pick(2))
+        });
+        let corners: Vec<Point3> = corners.collect();
+        for k in 0..200 {
+            let (turn, height) = (f64::from(k) * 2.4, -0.99 + 1.98 * f64::from(k) / 199.0);
+            let flat = (1.0f64 - height * height).sqrt();
+            let radial = Vector3::new(flat * turn.cos(), flat * turn.sin(), height);
+            let across = radial.cross(&Vector3::new(0.3, 0.5, 0.8)).normalize();
+            for lean in [0.0, 0.4, 0.9, 1.5] {
+                let axis = radial * f64::cos(lean) + across * f64::sin(lean);
+                // The middle of a chord of the way around lies deepest.
+                let tip = sphere.centre + radial * (sphere.radius * (0.5 * SPHERE_STEP).cos());
+                for q in &corners {
+                    let distance = tool.distance(&tip, &axis, q);
+                    assert!(distance >= settings.clearance - 1e-9, "{k} {lean} {q}: {distance}");
+                }
+            }
+        }
     }
 }
