@@ -115,6 +115,12 @@ impl Budget {
 
 const MIB: u64 = 1 << 20;
 
+/// A first look at what voxels take has so many along the stock's longest side.
+const COARSE: f64 = 64.0;
+
+/// Voxels that seem to take so many times the memory are tried all the same.
+const DOUBTFUL: f64 = 4.0;
+
 /// Stock and moves made ready for voxels of any size: about 350 bytes a move that does not turn, 240 for each
 /// further fiftieth of a radian of one that does.
 #[derive(Debug)]
@@ -161,23 +167,28 @@ impl<'a> VoxelEngine<'a> {
         let Some(left) = memory.checked_sub(moves).filter(|left| *left > size_of::<Brick>() as u64) else {
             return Err(VoxelError::Path { needed_mib: moves.div_ceil(MIB), allowed_mib: memory / MIB });
         };
-        let (mut pitch, mut done) = (voxel, self.try_cut(voxel, left, monitor)?);
-        while done.is_none() {
-            // What coarser voxels take tells how many there would be.
-            pitch *= 2.0;
-            done = self.try_cut(pitch, left, monitor)?;
-        }
-        match done {
-            Some(voxels) if pitch == voxel && voxels.bytes <= left => Ok(voxels),
-            coarse => {
-                let taken = coarse.map_or(0, |voxels| voxels.bytes) as f64;
-                let needed = taken * (pitch / voxel).powi(2) + moves as f64;
-                Err(VoxelError::Memory {
+        self.lattice(voxel)?;
+        // What coarser voxels take tells how much finer ones would: far too fine ones are not tried.
+        let doublings = (self.stock.bounds().size().max() / (COARSE * voxel)).log2().ceil().max(0.0);
+        let mut pitch = voxel * doublings.exp2();
+        loop {
+            let taken = match self.try_cut(pitch, left, monitor)? {
+                Some(voxels) if pitch == voxel && voxels.bytes <= left => return Ok(voxels),
+                Some(voxels) => voxels.bytes as f64,
+                None => return Err(VoxelError::Voxel(voxel)),
+            };
+            let (finer, left) = (taken * (pitch / voxel).powi(2), left as f64);
+            if pitch > voxel && finer <= DOUBTFUL * left {
+                pitch = voxel;
+            } else if pitch > voxel && 4.0 * taken <= left {
+                pitch *= 0.5;
+            } else {
+                return Err(VoxelError::Memory {
                     voxel,
-                    needed_mib: (needed / MIB as f64).ceil() as u64,
+                    needed_mib: ((finer + moves as f64) / MIB as f64).ceil() as u64,
                     allowed_mib: memory / MIB,
-                    fitting: fitting(pitch, taken / left as f64),
-                })
+                    fitting: fitting(pitch, taken / left),
+                });
             }
         }
     }
