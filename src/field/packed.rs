@@ -15,7 +15,8 @@
 //! Passes are packed where `|∇ψ| = s`. A front has that everywhere (see [`super::eikonal`]) and pays for it by kinks and by
 //! the directions that its start leaves; here a little of the distance is given up where better directions are worth more.
 //!
-//! Functions that may bend sharply from place to place take a [`Roughness`] as well.
+//! Functions that may bend sharply from place to place take a [`Roughness`] as well; ends of passes at borders may have a
+//! price ([`minimise_priced`]), and `c` may hold one of turning.
 //!
 //! Method: a shortfall `x = (s/|∇ψ| − 1)₊` counts as `c |∇ψ| (1 + x + ρ x²)` (as if the passes were as dense as they must be,
 //! and a penalty); ρ grows in rounds, each minimised by L-BFGS (Nocedal 1980), preconditioned by the equations of
@@ -538,7 +539,8 @@ mod tests {
         assert!(widest(&problem, &found) < 0.01);
     }
 
-    /// Aslant a pass is a little cheaper, but there are more of them: which of both is taken depends on what an end costs.
+    /// Aslant a pass is a little cheaper, but there are more of them: ends that cost much leave no more than there are along a
+    /// side, or fewer, since passes bend to close.
     #[test]
     fn a_price_for_each_end_leaves_fewer_passes() {
         let (sites, gradients) = square(|_, _, _| 0.05, [1.0, 0.0, -0.1], true);
@@ -549,7 +551,7 @@ mod tests {
             found.unwrap().unwrap().passes
         };
         let [free, dear] = [passes(0.0), passes(0.3)];
-        assert!(free > 26.0 && free < 28.5 && dear < 22.0 && dear > 19.0, "{free} {dear}");
+        assert!(free > 26.0 && free < 28.5 && dear < 22.0, "{free} {dear}");
     }
 
     /// Of directions that are equally good inside, passes that meet the borders squarely are shorter: they end at two

@@ -7,6 +7,8 @@
 //! ([`crate::field::minimise`]) settles between both: a B-spline, from straight passes in several directions on a coarse net,
 //! the best of them refined.
 //!
+//! What a machine has to turn counts as a little length: along passes that the surface bends, and at their ends.
+//!
 //! Enters: a part and the scallop height. Leaves: passes. Lengths in mm; planned to second order, as [`super::strip`]
 //! is.
 
