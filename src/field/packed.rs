@@ -15,7 +15,8 @@
 //! Passes are packed where `|∇ψ| = s`. A front has that everywhere (see [`super::eikonal`]) and pays for it by kinks and by
 //! the directions that its start leaves; here a little of the distance is given up where better directions are worth more.
 //!
-//! Functions that may bend sharply from place to place take a [`Roughness`] as well.
+//! Functions that may bend sharply from place to place take a [`Roughness`] as well; ends of passes at borders may have a
+//! price ([`minimise_priced`]), and `c` may hold one of turning.
 //!
 //! Method: a shortfall `x = (s/|∇ψ| − 1)₊` counts as `c |∇ψ| (1 + x + ρ x²)` (as if the passes were as dense as they must be,
 //! and a penalty); ρ grows in rounds, each minimised by L-BFGS (Nocedal 1980), preconditioned by the equations of
@@ -68,6 +69,8 @@ pub struct Site {
     pub front: Front,
     /// Cost of a mm of pass, `[m, c, s]` of `m + c cos 2θ + s sin 2θ`, θ the direction across it in the frame of `front`.
     pub cost: [f64; 3],
+    /// What of that is no length, but a price of turning.
+    pub turning: [f64; 3],
     /// On a border: the vector along it that the place stands for, mm, in the frame of `front`.
     pub border: Option<[f64; 2]>,
 }
@@ -130,6 +133,10 @@ pub struct Packed {
     pub cost: f64,
     /// That of their ends at borders.
     pub ends: f64,
+    /// What of the cost is the price of turning.
+    pub turning: f64,
+    /// Passes, each by its two ends at borders.
+    pub passes: f64,
     /// Share of the cost where they would.
     pub short: f64,
 }
@@ -155,7 +162,23 @@ pub fn minimise(
     rounds: Rounds,
     monitor: &dyn Monitor,
 ) -> Result<Option<Packed>, Cancelled> {
-    let problem = Problem { sites, gradients, roughness };
+    minimise_priced(sites, gradients, roughness, 0.0, start, rounds, monitor)
+}
+
+/// [`minimise`] where each end of a pass at a border costs `end` more, mm.
+///
+/// # Errors
+/// As [`minimise`].
+pub fn minimise_priced(
+    sites: &[Site],
+    gradients: &Gradients,
+    roughness: &Roughness,
+    end: f64,
+    start: Vec<f64>,
+    rounds: Rounds,
+    monitor: &dyn Monitor,
+) -> Result<Option<Packed>, Cancelled> {
+    let problem = Problem { sites, gradients, roughness, end };
     let Some(mut factor) = problem.stiffness().filter(|_| start.len() == gradients.coefficients) else {
         return Ok(None);
     };
@@ -164,18 +187,20 @@ pub fn minimise(
     for &penalty in if rounds == Rounds::First { first } else { last } {
         problem.descend(&mut factor, penalty, &mut x, monitor)?;
     }
-    let (mut cost, mut ends, mut short) = (0.0, 0.0, 0.0);
+    let (mut cost, mut ends, mut turning, mut passes, mut short) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for (k, site) in sites.iter().enumerate() {
         let q = gradients.at(k, &x);
         let (length, shortfall) = site.length_and_shortfall(q);
         let norm = q[0].hypot(q[1]).max(f64::MIN_POSITIVE);
         ends += site.ends([q[0] / norm, q[1] / norm]).0;
+        passes += site.border.map_or(0.0, |along| 0.5 * (along[0] * q[0] + along[1] * q[1]).abs());
+        turning += site.area * Site::by_direction(site.turning, q, norm * norm).0 * norm;
         let doubled = shortfall > DOUBLED;
         cost += if doubled { 2.0 * length } else { length };
         short += if doubled { length } else { 0.0 };
     }
     let sound = cost.is_finite() && x.iter().all(|x| x.is_finite());
-    Ok(sound.then(|| Packed { coefficients: x, cost, ends, short: short / cost }))
+    Ok(sound.then(|| Packed { coefficients: x, cost, ends, turning, passes, short: short / cost }))
 }
 
 impl Site {
@@ -186,12 +211,16 @@ impl Site {
     }
 
     /// Cost for each unit of length in the direction of `q`, and its derivative by the angle.
-    fn cost_at(&self, [q1, q2]: [f64; 2], norm2: f64) -> (f64, f64) {
-        let [mean, cosine, sine] = self.cost;
+    fn cost_at(&self, q: [f64; 2], norm2: f64) -> (f64, f64) {
+        let (cost, turn) = Self::by_direction(self.cost, q, norm2);
+        let least = LEAST_COST * self.cost[0].abs();
+        if cost > least { (cost, turn) } else { (least, 0.0) }
+    }
+
+    /// The value of `[m, c, s]` in the direction of a gradient, and its derivative by the angle.
+    fn by_direction([mean, cosine, sine]: [f64; 3], [q1, q2]: [f64; 2], norm2: f64) -> (f64, f64) {
         let (cos, sin) = ((q1 * q1 - q2 * q2) / norm2, 2.0 * q1 * q2 / norm2);
-        let cost = mean + cosine * cos + sine * sin;
-        let least = LEAST_COST * mean.abs();
-        if cost > least { (cost, 2.0 * (sine * cos - cosine * sin)) } else { (least, 0.0) }
+        (mean + cosine * cos + sine * sin, 2.0 * (sine * cos - cosine * sin))
     }
 
     fn length_and_shortfall(&self, q: [f64; 2]) -> (f64, f64) {
@@ -213,8 +242,20 @@ impl Site {
         (0.5 * (smooth - SQUARE * length), if smooth > 0.0 { 0.5 * parallel * turn / smooth } else { 0.0 })
     }
 
-    /// What a gradient costs with the penalty, and the derivatives of that by its components.
-    fn charge(&self, q: [f64; 2], penalty: f64) -> (f64, [f64; 2]) {
+    /// How many passes end at a border for each 1/mm of a gradient in the direction of `unit`, and the derivative of that
+    /// by the angle.
+    fn count(&self, unit: [f64; 2]) -> (f64, f64) {
+        let Some([along, across]) = self.border else { return (0.0, 0.0) };
+        let length = along.hypot(across);
+        let parallel = along * unit[1] - across * unit[0];
+        let met = along * unit[0] + across * unit[1];
+        let smooth = met.hypot(SQUARE * length);
+        (smooth - SQUARE * length, if smooth > 0.0 { -met * parallel / smooth } else { 0.0 })
+    }
+
+    /// What a gradient costs with the penalty and a price of each end at a border, and the derivatives of that by its
+    /// components.
+    fn charge(&self, q: [f64; 2], penalty: f64, end: f64) -> (f64, [f64; 2]) {
         let norm2 = (q[0] * q[0] + q[1] * q[1]).max(f64::MIN_POSITIVE);
         let norm = norm2.sqrt();
         let (cost, cost_turn) = self.cost_at(q, norm2);
@@ -232,7 +273,9 @@ impl Site {
         };
         let unit = [q[0] / norm, q[1] / norm];
         let (ends, ends_turn) = self.ends(unit);
-        let (by_norm, turn) = (self.area * by_norm, (self.area * by_angle + ends_turn) / norm);
+        let (count, count_turn) = self.count(unit);
+        let (ends, ends_turn) = (ends + end * norm * count, ends_turn + end * norm * count_turn);
+        let (by_norm, turn) = (self.area * by_norm + end * count, (self.area * by_angle + ends_turn) / norm);
         let by = [by_norm * unit[0] - turn * unit[1], by_norm * unit[1] + turn * unit[0]];
         (self.area * value + ends, by)
     }
@@ -242,6 +285,7 @@ struct Problem<'a> {
     sites: &'a [Site],
     gradients: &'a Gradients,
     roughness: &'a Roughness,
+    end: f64,
 }
 
 /// Sites that one worker looks at.
@@ -253,7 +297,8 @@ impl Problem<'_> {
         let pieces = parallel::map(self.sites.len().div_ceil(SITES_A_PIECE), |piece| {
             let first = piece * SITES_A_PIECE;
             let sites = &self.sites[first..(first + SITES_A_PIECE).min(self.sites.len())];
-            let charge = |(k, site): (usize, &Site)| site.charge(self.gradients.at(first + k, x), penalty);
+            let charge =
+                |(k, site): (usize, &Site)| site.charge(self.gradients.at(first + k, x), penalty, self.end);
             sites.iter().enumerate().map(charge).collect::<Vec<_>>()
         });
         by.fill(0.0);
@@ -410,7 +455,7 @@ mod tests {
         let mut push = |i: usize, j: usize, s: f64, t: f64, area: f64, border: Option<[f64; 2]>| {
             let (x, y) = ((i as f64 + s) * h, (j as f64 + t) * h);
             let front = Front::new((1.0, 0.0, 1.0), |b| speed(x, y, b)).unwrap();
-            let site = Site { area, stiff_area: area, front, cost, border };
+            let site = Site { area, stiff_area: area, front, cost, turning: [0.0; 3], border };
             let corner = (j * (CELLS + 1) + i) as u32;
             let above = corner + CELLS as u32 + 1;
             let slopes = [
@@ -494,6 +539,21 @@ mod tests {
         assert!(widest(&problem, &found) < 0.01);
     }
 
+    /// Aslant a pass is a little cheaper, but there are more of them: ends that cost much leave no more than there are along a
+    /// side, or fewer, since passes bend to close.
+    #[test]
+    fn a_price_for_each_end_leaves_fewer_passes() {
+        let (sites, gradients) = square(|_, _, _| 0.05, [1.0, 0.0, -0.1], true);
+        let passes = |end: f64| {
+            let rough = Roughness::default();
+            let start = straight(0.7, 20.0);
+            let found = minimise_priced(&sites, &gradients, &rough, end, start, Rounds::First, &Silent);
+            found.unwrap().unwrap().passes
+        };
+        let [free, dear] = [passes(0.0), passes(0.3)];
+        assert!(free > 26.0 && free < 28.5 && dear < 22.0, "{free} {dear}");
+    }
+
     /// Of directions that are equally good inside, passes that meet the borders squarely are shorter: they end at two
     /// of four sides, and the other two see them parallel.
     #[test]
@@ -535,19 +595,20 @@ mod tests {
                 stiff_area: 2.0,
                 front: Front::new((1.3, 0.2, 0.9), speed).unwrap(),
                 cost: [1.0, swing * 0.5, sine],
+                turning: [0.0; 3],
                 border: border.then_some([0.4, -0.7]),
             };
             let q = [norm * angle.cos(), norm * angle.sin()];
             // The second derivative jumps where the interval is the allowed one.
             let (_, short) = site.length_and_shortfall(q);
             prop_assume!(short.abs() > 1e-3);
-            let (_, by) = site.charge(q, 30.0);
+            let (_, by) = site.charge(q, 30.0, 0.7);
             for c in 0..2 {
                 let h = 1e-6;
                 let at = |s: f64| {
                     let mut moved = q;
                     moved[c] += s * h;
-                    site.charge(moved, 30.0).0
+                    site.charge(moved, 30.0, 0.7).0
                 };
                 let numeric = (at(1.0) - at(-1.0)) / (2.0 * h);
                 prop_assert!((numeric - by[c]).abs() < 1e-4 * (1.0 + by[c].abs()), "{numeric} {}", by[c]);

@@ -14,9 +14,11 @@ use crate::field::{GridField, NormalEquations, SamplePlane};
 use crate::geometry::{Jet2, KnotVector, NurbsSurface, Point3, Vector2, Vector3};
 use crate::part::Part;
 
-/// Control points of a height surface lie this share of the cutter's radius apart. Finer follows
-/// the facets of a mesh instead of its shape; coarser misses curvature that the cutter feels.
-const CONTROL_PITCH_OVER_RADIUS: f64 = 0.5;
+/// Control points of a height surface lie so many facets apart, and no less and no more than these shares of the cutter's
+/// radius. Finer follows the facets of a mesh instead of its shape; coarser misses curvature that the cutter feels: where
+/// bumps are as wide as the cutter, half a radius misses a tenth of it, and intervals are a few per cent too wide.
+const FACETS_A_CONTROL: f64 = 5.0;
+const CONTROL_PITCH_OVER_RADIUS: [f64; 2] = [0.25, 0.5];
 
 /// Most control points a side of a height surface; bounds time and memory of the fit.
 const MAX_CONTROLS: usize = 140;
@@ -208,7 +210,11 @@ impl<'a> Chart<'a> {
     fn of_mesh(part: &'a Part, cutter: &Cutter, axis: Option<&'a ToolAxis>) -> Result<Self, PlanError> {
         let bounds = part.bounds();
         let domain = [[bounds.min.x, bounds.max.x], [bounds.min.y, bounds.max.y]];
-        let pitch = CONTROL_PITCH_OVER_RADIUS * cutter.radius();
+        // Two facets to a square.
+        let area = (domain[0][1] - domain[0][0]) * (domain[1][1] - domain[1][0]);
+        let facet = (2.0 * area / part.mesh().triangles().len().max(1) as f64).sqrt();
+        let [least, most] = CONTROL_PITCH_OVER_RADIUS.map(|share| share * cutter.radius());
+        let pitch = (FACETS_A_CONTROL * facet).clamp(least, most);
         let knots = domain.map(|range| {
             let controls = ((range[1] - range[0]) / pitch).ceil().clamp(5.0, MAX_CONTROLS as f64);
             KnotVector::clamped_uniform(3, controls as usize, range)
@@ -403,6 +409,7 @@ fn greville(knots: &KnotVector) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::TriangleMesh;
     use approx::assert_relative_eq;
 
     /// On both sides of a step of curvature, from 0.2 to 1 more than the surface's, contacts 2 apart: the ridge stands a third
@@ -455,5 +462,27 @@ mod tests {
         let gap = |s: f64| if s < 0.02 { 1.0 / 3.0 } else { 1.0 / 3.0 + 1.0 };
         let ridge = ridge_between(width, gap).max(ridge_between(width, |s| gap(-s)));
         assert!(width < 0.8 * plane && ridge < 1.15 * h && ridge > 0.8 * h, "{width} of {plane}: {ridge}");
+    }
+
+    /// On a bump hardly wider than the cutter the fitted surface has the curvature of what the facets are chords of, within
+    /// a share of the cutter's own that makes intervals wider by less than half that share.
+    #[test]
+    fn a_surface_fitted_to_fine_facets_is_curved_as_what_they_are_chords_of() {
+        const CELLS: usize = 60;
+        let height = |x: f64, y: f64| 2.1 * (-((x - 12.0).powi(2) + (y - 12.0).powi(2)) / 90.0).exp();
+        let at = |k: usize| 24.0 * k as f64 / CELLS as f64;
+        let side = CELLS + 1;
+        let corners = (0..side * side).map(|k| (at(k % side), at(k / side)));
+        let corners = corners.map(|(x, y)| Point3::new(x, y, height(x, y))).collect();
+        let triangles = (0..CELLS * CELLS).flat_map(|k| {
+            let a = (k / CELLS * side + k % CELLS) as u32;
+            let [b, c] = [a + 1, a + side as u32];
+            [[a, b, c + 1], [a, c + 1, c]]
+        });
+        let (mesh, _) = TriangleMesh::new(corners, triangles.collect()).unwrap();
+        let (part, cutter) = (Part::from_mesh(mesh), Cutter::ball(16.0).unwrap());
+        let chart = &Chart::all(&part, &cutter, None).unwrap()[0];
+        let top = chart.at(12.0, 12.0).unwrap().curvature_along(&Vector3::x());
+        assert!((top + 2.0 * 2.1 / 90.0).abs() < 0.01 / 8.0, "{top}");
     }
 }

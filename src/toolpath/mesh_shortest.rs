@@ -157,6 +157,16 @@ impl Place<'_> {
             });
             1.0 - bend.along(&feed) * self.cutter.corner_radius() + away
         });
-        Some((Site { area, stiff_area: 0.0, front, cost: Site::harmonic(costs), border: None }, [e1, e2]))
+        Some((
+            Site {
+                area,
+                stiff_area: 0.0,
+                front,
+                cost: Site::harmonic(costs),
+                turning: [0.0; 3],
+                border: None,
+            },
+            [e1, e2],
+        ))
     }
 }

@@ -432,16 +432,18 @@ const SAMPLING_OVER_RADIUS: f64 = 0.15;
 const CHORD_SHARE: f64 = 0.26;
 
 /// On a mesh it is planned for less by what facets stand off the smooth surface, too: the height that this share of
-/// them (by area) stays below. Facets at sharper angles than this, rad, are edges of the part.
-const FACETS: f64 = 0.6;
+/// them (by area) stays below, on elements, whose curvature is that of the facets around, and on a fitted surface. Facets
+/// at sharper angles than this, rad, are edges of the part.
+const FACETS_ON_ELEMENTS: f64 = 0.6;
+const FACETS: f64 = 0.2;
 const SHARPEST_FACETS: f64 = 0.3;
 
 /// But it is not planned for less than this share of itself.
 const LEAST_SHARE_OF_TARGET: f64 = 0.5;
 
 /// How far facets stand off the smooth surface that they are chords of, mm: where two meet at the angle δ, each is as wide
-/// as its neighbours and has a sagitta of an eighth of δ times the width.
-fn facet_height(mesh: &TriangleMesh) -> f64 {
+/// as its neighbours and has a sagitta of an eighth of δ times the width; the one that a share of them stays below.
+fn facet_height(mesh: &TriangleMesh, share: f64) -> f64 {
     let mut facets: Vec<(f64, f64)> = Vec::new();
     let area = |t: usize| {
         let [a, b, c] = mesh.corners(t);
@@ -459,7 +461,7 @@ fn facet_height(mesh: &TriangleMesh) -> f64 {
         }
     }
     facets.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut left = FACETS * facets.iter().map(|(_, area)| area).sum::<f64>();
+    let mut left = share * facets.iter().map(|(_, area)| area).sum::<f64>();
     let reached = facets.iter().find(|(_, area)| {
         left -= area;
         left <= 0.0
@@ -550,9 +552,21 @@ fn passes(
     settings: &PlanSettings,
     monitor: &dyn Monitor,
 ) -> Result<(Passes, bool), PlanError> {
+    // A tilted cutter follows the level curves of the plan coordinate instead of being dropped.
+    let levels = axis.filter(|_| !part.patches().is_empty());
+    let probe = axis.and_then(|_| tilted::probe(cutter));
+    let wants_mesh = || levels.is_none() && probe.is_none() && mesh_surface::wants_mesh(part, cutter);
+    let on_elements = match strategy {
+        Strategy::ShortestStreamline { .. } => wants_mesh(),
+        Strategy::Streamline { method: StreamMethod::Automatic, .. } => wants_mesh(),
+        Strategy::Streamline { method, .. } => *method == StreamMethod::Elements,
+        _ => false,
+    };
     let step = match settings.step {
         Step::Scallop(h) => {
-            let facets = if part.patches().is_empty() { facet_height(part.mesh()) } else { 0.0 };
+            let fitted = !on_elements && !matches!(strategy, Strategy::OffsetSurface { .. });
+            let share = if fitted { FACETS } else { FACETS_ON_ELEMENTS };
+            let facets = if part.patches().is_empty() { facet_height(part.mesh(), share) } else { 0.0 };
             let less = CHORD_SHARE * settings.chord_tolerance + facets;
             Step::Scallop((h - less).max(LEAST_SHARE_OF_TARGET * h))
         }
@@ -561,12 +575,9 @@ fn passes(
     let sampling = SAMPLING_OVER_RADIUS * cutter.radius();
     // A tilted cutter's passes are smoothed once they are tilted.
     let smoothing = (settings.joining.smoothing && axis.is_none()).then_some(sampling);
-    let probe = axis.and_then(|_| tilted::probe(cutter));
     let (chord_tolerance, probe) = (settings.chord_tolerance, probe.as_ref());
     let pass = PassSettings { step, sampling, chord_tolerance, smoothing, axis, probe };
     check_extent(part, cutter, &pass)?;
-    // A tilted cutter follows the level curves of the plan coordinate instead of being dropped.
-    let levels = axis.filter(|_| !part.patches().is_empty());
     let (passes, both_ways) = match strategy {
         Strategy::Pocket(pocket) => {
             let reason = "it mills pockets, and the part is none".to_owned();
@@ -599,20 +610,14 @@ fn passes(
         }
         Strategy::ShortestStreamline { toward } => {
             let toward = toward.as_ref().map(|(direction, dearer)| (direction, *dearer));
-            let passes = if levels.is_none() && probe.is_none() && mesh_surface::wants_mesh(part, cutter) {
+            let passes = if on_elements {
                 mesh_passes::on_mesh(part, cutter, Aim::Shortest(toward), &pass, monitor)?
             } else {
                 shortest::passes(part, cutter, toward, &pass, monitor)?
             };
             (passes, true)
         }
-        Strategy::Streamline { direction, method, .. }
-            if *method == StreamMethod::Elements
-                || (*method == StreamMethod::Automatic
-                    && levels.is_none()
-                    && probe.is_none()
-                    && mesh_surface::wants_mesh(part, cutter)) =>
-        {
+        Strategy::Streamline { direction, .. } if on_elements => {
             if probe.is_some() {
                 let reason = "its passes by elements are spaced for an upright cutter; use a ball, or another `method`";
                 return Err(PlanError::NotApplicable { strategy: "streamline", reason: reason.to_owned() });

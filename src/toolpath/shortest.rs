@@ -7,6 +7,8 @@
 //! ([`crate::field::minimise`]) settles between both: a B-spline, from straight passes in several directions on a coarse net,
 //! the best of them refined.
 //!
+//! What a machine has to turn counts as a little length: along passes that the surface bends, and at their ends.
+//!
 //! Enters: a part and the scallop height. Leaves: passes. Lengths in mm; planned to second order, as [`super::strip`]
 //! is.
 
@@ -20,7 +22,7 @@ use super::plan::{FeedDirection, FrontStart, PassSettings, Passes, PlanError, St
 use crate::cutter::Cutter;
 use crate::field::{
     Gradients, NormalEquations, Packed, Roughness, Rounds, ScalarField, ScalarSpline, Site, Start, eikonal,
-    minimise,
+    minimise_priced,
 };
 use crate::geometry::{KnotVector, Vector3};
 use crate::monitor::{Cancelled, Monitor};
@@ -48,9 +50,24 @@ const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
 const DEGREE: usize = 3;
 
-/// Where a pass bends by the radius of the cutter, it counts as longer by this share: on a twisted patch passes turn by a
-/// third less, and are shorter, since fewer minima are left to end in. Thrice as much loses 0.7 % on a wave.
-const BEND: f64 = 0.1;
+/// Where a pass bends by the radius of the cutter, it counts as longer by this share. Without it passes on a twisted patch
+/// turn by half as much again, and are longer, since there are more minima to end in.
+const BEND: f64 = 0.25;
+
+/// What a rad counts for that passes turn by since the surface is bent along them, in radii of the cutter.
+const TURN: f64 = 0.78;
+
+/// Directions over half a turn by which the curvature along them is told.
+const CURVED: usize = 12;
+
+/// What an end of a pass counts, in radii of the cutter: half of the link to the next pass and its turn.
+const END: f64 = 0.28;
+
+/// A number of passes is drawn in to a whole one by a greater price of ends, first by this factor, so often corrected; it
+/// shall end within this share of a pass below, or a little above, which levels allow for.
+const DEARER: f64 = 1.25;
+const PRICES: usize = 4;
+const WHOLE: [f64; 2] = [0.3, 0.1];
 
 /// Places a side, and directions over half a turn, of the shortest possible length. With twice as many it changes by
 /// less than 0.1 % on the shipped parts.
@@ -192,8 +209,9 @@ impl Search<'_> {
         };
         self.monitor.start("searching directions", (STARTS + BORDERS.len() + counts.len()) as u64);
         let finest = self.net(longest, sides).ok_or_else(unfit)?;
+        let end = END * self.cutter.radius();
         let minimise = |net: &Net, start: Vec<f64>, rounds: Rounds| {
-            let found = minimise(&net.sites, &net.gradients, &net.roughness, start, rounds, self.monitor);
+            let found = self.minimise(net, start, end, rounds);
             self.monitor.advance(1);
             found
         };
@@ -202,8 +220,9 @@ impl Search<'_> {
         let straight = parallel::try_map(STARTS, |k| {
             minimise(&net, self.straight(&net, sides, PI * k as f64 / STARTS as f64), Rounds::First)
         })?;
+        let priced = |f: &Packed| f.cost + f.ends + 2.0 * end * f.passes;
         let shortest = |found: Vec<Option<Packed>>| {
-            found.into_iter().flatten().min_by(|a, b| (a.cost + a.ends).total_cmp(&(b.cost + b.ends)))
+            found.into_iter().flatten().min_by(|a, b| priced(a).total_cmp(&priced(b)))
         };
         let mut best = shortest(straight).ok_or_else(unfit)?;
         while let Some(count) = counts.pop() {
@@ -219,17 +238,60 @@ impl Search<'_> {
             let found = start.map(|start| minimise(&finest, start, Rounds::Last)).transpose()?;
             Ok::<_, Cancelled>(found.flatten())
         })?;
-        let found: Vec<Packed> = fronts.into_iter().chain([best]).flatten().collect();
+        let mut found: Vec<Packed> = fronts.into_iter().chain([best]).flatten().collect();
         // Passes along a whole border have no ends there, which the cost of ends does not know: the best without them
         // is planned too.
         let least = |cost: &dyn Fn(&Packed) -> f64| {
             (0..found.len()).min_by(|&a, &b| cost(&found[a]).total_cmp(&cost(&found[b])))
         };
-        let best = [least(&|f| f.cost + f.ends), least(&|f| f.cost)];
+        let best = [least(&priced), least(&|f| f.cost)];
         let mut chosen: Vec<usize> = best.into_iter().flatten().collect();
         chosen.dedup();
-        let spline = |k: usize| Some((finest.spline(&found[k])?, found[k].cost + found[k].ends));
+        for k in chosen.clone() {
+            if let Some(drawn) = self.drawn_in(&finest, &found[k], end)? {
+                chosen.push(found.len());
+                found.push(drawn);
+            }
+        }
+        let length = |f: &Packed| f.cost - f.turning + f.ends;
+        let spline = |k: usize| Some((finest.spline(&found[k])?, length(&found[k])));
         Ok(chosen.into_iter().filter_map(spline).collect())
+    }
+
+    /// Minimises from `start`, where each end of a pass costs `end`, mm.
+    fn minimise(
+        &self,
+        net: &Net,
+        start: Vec<f64>,
+        end: f64,
+        rounds: Rounds,
+    ) -> Result<Option<Packed>, Cancelled> {
+        minimise_priced(&net.sites, &net.gradients, &net.roughness, end, start, rounds, self.monitor)
+    }
+
+    /// A function like the one found, of a whole number of passes: what is left over would be another pass. `None` where
+    /// nothing is, or where it does not give way.
+    fn drawn_in(&self, net: &Net, found: &Packed, end: f64) -> Result<Option<Packed>, Cancelled> {
+        let whole = found.passes.floor();
+        let [below, above] = WHOLE;
+        if whole < 1.0 || found.passes - whole <= above {
+            return Ok(None);
+        }
+        let (mut last, mut price) = ((end, found.passes), DEARER * end);
+        for _ in 0..PRICES {
+            let Some(next) = self.minimise(net, found.coefficients.clone(), price, Rounds::Last)? else {
+                break;
+            };
+            if next.passes <= whole + above && next.passes > whole - below {
+                return Ok(Some(next));
+            }
+            let slope = (next.passes - last.1) / (price - last.0);
+            let wanted = price + (whole - next.passes) / slope;
+            last = (price, next.passes);
+            let grown = if slope < 0.0 { wanted.clamp(0.5 * price, 2.0 * price) } else { 1.5 * price };
+            price = if grown == price { DEARER * price } else { grown };
+        }
+        Ok(None)
     }
 
     /// Lengths of the chart through its middle, along u and v, mm.
@@ -335,10 +397,20 @@ impl Search<'_> {
                 wanted.map_or(0.0, |(direction, dearer)| dearer * (1.0 - feed.dot(&direction).powi(2)));
             1.0 - p.curvature_along(&feed) * self.cutter.corner_radius() + away
         });
-        let cost = Site::harmonic(costs);
+        let mut cost = Site::harmonic(costs);
+        let mut turning = [0.0; 3];
+        for k in 0..CURVED {
+            let angle = PI * k as f64 / CURVED as f64;
+            let [du, dv] = front.vector(angle);
+            let feed = (p.jet.du * du + p.jet.dv * dv).cross(&p.normal);
+            let price = TURN * self.cutter.radius() * p.curvature_along(&feed).abs() / CURVED as f64;
+            let (sin, cos) = (2.0 * angle).sin_cos();
+            turning = [turning[0] + price, turning[1] + 2.0 * price * cos, turning[2] + 2.0 * price * sin];
+        }
+        (0..3).for_each(|k| cost[k] += turning[k]);
         let border = (along != [0.0; 2]).then(|| front.components(along));
         let area = area * (e * g - f * f).max(0.0).sqrt();
-        Some(Site { area, stiff_area: area, front, cost, border })
+        Some(Site { area, stiff_area: area, front, cost, turning, border })
     }
 
     /// Coefficients of ψ for straight passes, as dense on the whole as the strips ask for.
@@ -391,5 +463,42 @@ impl Net {
             }
         }
         equations.solve(false).ok().map(|spline| spline.coefficients().to_vec())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{NurbsSurface, Point3};
+    use crate::monitor::Silent;
+
+    /// `z = 0.03 x y` over 20 × 17 mm.
+    fn saddle() -> NurbsSurface {
+        let at = |i: usize, side: f64| side * (i as f64 / 3.0 - 0.5);
+        let point =
+            |i: usize, j: usize| Point3::new(at(i, 20.0), at(j, 17.0), 0.03 * at(i, 20.0) * at(j, 17.0));
+        let net: Vec<Vec<Point3>> = (0..4).map(|i| (0..4).map(|j| point(i, j)).collect()).collect();
+        let knots = vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
+        NurbsSurface::new(3, 3, knots.clone(), knots, &net, None).unwrap()
+    }
+
+    /// What is left over of the last pass is drawn in, for less than that pass would cost.
+    #[test]
+    fn a_number_of_passes_is_drawn_in_to_a_whole_one() {
+        let (surface, cutter) = (saddle(), Cutter::ball(18.0).unwrap());
+        let chart = Chart::of_surface(&surface, None);
+        let step = Step::Scallop(0.01);
+        let search = Search { chart: &chart, cutter: &cutter, step, toward: None, monitor: &Silent };
+        let net = search.net(8.0, search.sides()).unwrap();
+        let start = search.straight(&net, search.sides(), 0.25 * PI);
+        let end = END * cutter.radius();
+        let first = search.minimise(&net, start, end, Rounds::First).unwrap().unwrap();
+        let found = search.minimise(&net, first.coefficients, end, Rounds::Last).unwrap().unwrap();
+        let drawn = search.drawn_in(&net, &found, end).unwrap().unwrap();
+        let (passes, whole) = (found.passes, drawn.passes);
+        assert!(whole <= passes.floor() + WHOLE[1] && whole > passes.floor() - WHOLE[0], "{passes} {whole}");
+        let pass = found.cost / passes;
+        assert!(drawn.cost < found.cost + 0.5 * pass, "{} {} {pass}", drawn.cost, found.cost);
+        assert!(drawn.short < 0.01);
     }
 }

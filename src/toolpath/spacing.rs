@@ -169,7 +169,7 @@ fn spread(steps: &[f64], [lo, hi]: [f64; 2]) -> Vec<f64> {
         sums.push(sums[sums.len() - 1] + width / step);
     }
     let total = sums[steps.len()];
-    let passes = (total - 1e-9).ceil().max(1.0);
+    let passes = ((1.0 - TOLERATED) * total).ceil().max(1.0);
     let mut window = 0;
     (0..passes as usize)
         .map(|k| {

@@ -104,8 +104,7 @@ fn parts_are_those_of_their_generators() {
 }
 
 /// On each of the eight surfaces: nothing uncut, no gouge, at most 1 % of the ridges over the target and none above
-/// 1.1 times it; at least 92 % of the shortest possible path (91.5 % on the mesh, whose facets take their share of the
-/// target); and no longer than the best zigzag and iso-scallop.
+/// 1.1 times it; at least 92 % of the shortest possible path; and no longer than the best zigzag and iso-scallop.
 #[test]
 fn streamlines_are_the_shortest_of_all_on_eight_surfaces() {
     let mut told =
@@ -124,7 +123,7 @@ fn streamlines_are_the_shortest_of_all_on_eight_surfaces() {
             100.0 * over
         );
         let good = [
-            possible >= if name == "relief" { 0.915 } else { 0.92 },
+            possible >= 0.92,
             over <= 0.01,
             highest <= 1.1,
             of(2, "uncut/area_mm2") == 0.0,
@@ -153,9 +152,6 @@ fn joined_on_the_surface(name: &str) -> String {
 }
 
 /// All turning of passes and of the links between them, and turns by more than 30 degrees, against the best zigzag's.
-/// Streamlines turn less on seven surfaces. On the twisted patch the shortest directions alone turn by 109 rad in normal
-/// sections and zigzag's passes by 84; streamlines held to straighter directions turned by 429 in all at 92.8 % of the
-/// possible length, zigzag by 423.
 #[test]
 fn streamlines_turn_less_than_zigzag() {
     let mut told = String::from(
@@ -169,8 +165,7 @@ fn streamlines_turn_less_than_zigzag() {
         let of = |what: &str| [0, 1].map(|k| number(&report, &format!("/toolpaths/{k}/path/{what}")));
         let ([zigzag, streamline], sharp) = (of("total_turning_rad"), of("sharp_turns"));
         told += &format!("{name:<16}{zigzag:21.0}{streamline:12.0}{:21}{:12}\n", sharp[0], sharp[1]);
-        let most = if name == "twisted" { 1.08 * zigzag } else { zigzag };
-        if streamline > most || sharp[1] > sharp[0] {
+        if streamline > zigzag || sharp[1] > sharp[0] {
             failed.push(name);
         }
     }
