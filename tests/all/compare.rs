@@ -172,3 +172,24 @@ fn streamlines_turn_less_than_zigzag() {
     println!("{told}");
     assert!(failed.is_empty(), "{told}\n{failed:?}");
 }
+
+/// Smoothed passes have fewer points, and their ridges hold the target as well.
+#[test]
+fn smoothed_streamlines_hold_the_target() {
+    let scene = std::fs::read_to_string(folder().join("saddle.toml")).unwrap();
+    let (head, _) = scene.split_once("[[toolpath]]").unwrap();
+    let head = head.replace("cell = 0.1", "cell = 0.2");
+    let toolpath = |smoothing: bool| {
+        format!(
+            "[[toolpath]]\nname = \"{smoothing}\"\nstrategy = \"streamline\"\ndirection = \"shortest\"\nsmoothing = {smoothing}\n"
+        )
+    };
+    let file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
+    std::fs::write(file.path(), head + &toolpath(false) + &toolpath(true)).unwrap();
+    let (_, report) = run_scene(file.path());
+    let of = |what: &str| [0, 1].map(|k| number(&report, &format!("/toolpaths/{k}/{what}")));
+    let (over, highest) = (of("scallop/over_target_fraction"), of("scallop/max_mm"));
+    assert!(over[1] <= 0.01 && highest[1] <= 0.011, "{over:?} {highest:?}");
+    let (moves, length) = (of("simulation/moves"), of("path/cutting_length_mm"));
+    assert!(moves[1] < 0.7 * moves[0] && length[1] < 1.03 * length[0], "{moves:?} {length:?}");
+}
