@@ -65,8 +65,10 @@ pub struct RoughnessFigures {
     pub rz_max_mm: Option<f64>,
     /// Where the profile with the greatest Rz was begun.
     pub rz_max_at_mm: Option<[f64; 3]>,
-    /// Bound of the error with which a profile's figures were evaluated. How they differ over the part is not in it.
+    /// Bound of the error with which the means were evaluated. How profiles differ over the part is not in it.
     pub error_bound_mm: Option<f64>,
+    /// The same of the greatest of the profiles' figures.
+    pub max_error_bound_mm: Option<f64>,
     /// Profiles evaluated.
     pub profiles: usize,
     /// Least and greatest number of path intervals in a sampling length.
@@ -127,7 +129,8 @@ fn figures(profiles: &[Profile]) -> RoughnessFigures {
         ra_max_mm: most(&|p| p.ra),
         rz_max_mm: most(&|p| p.rz),
         rz_max_at_mm: highest.map(|p| p.begun.into()),
-        error_bound_mm: most(&|p| p.bound),
+        error_bound_mm: mean(&|p| p.bound),
+        max_error_bound_mm: most(&|p| p.bound),
         profiles: count,
         intervals_per_sampling_length: [
             profiles.iter().map(|p| p.intervals).min().unwrap_or(0),

@@ -143,6 +143,7 @@ pub fn report() -> RunReport {
         rz_max_mm: Some(0.0101),
         rz_max_at_mm: Some([3.0, 4.0, 0.5]),
         error_bound_mm: Some(0.00002),
+        max_error_bound_mm: Some(0.00004),
         profiles: 22,
         intervals_per_sampling_length: [2, 3],
         sampling_length_mm: Some(1.5),

@@ -47,6 +47,7 @@ fn a_plane_has_the_roughness_of_the_circle_and_nearly_of_the_parabola() {
         assert!((figures.ra_mm.unwrap() - ra).abs() <= figures.error_bound_mm.unwrap(), "{figures:?} {ra}");
         assert!((figures.rz_mm.unwrap() - rz).abs() <= figures.error_bound_mm.unwrap(), "{figures:?} {rz}");
         assert!(figures.error_bound_mm.unwrap() < 1e-3 * rz, "{figures:?}");
+        assert!(figures.max_error_bound_mm >= figures.error_bound_mm, "{figures:?}");
         assert!((ra / (4.0 * rz / (9.0 * 3f64.sqrt())) - 1.0).abs() < 0.01);
         assert!(figures.profiles > 15, "{figures:?}");
         let intervals = figures.intervals_per_sampling_length;
