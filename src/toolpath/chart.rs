@@ -4,6 +4,7 @@
 //! surface z(x, y) is fitted to it; directions and distances of passes come from that surface,
 //! while heights of cutter locations always come from dropping the cutter on the mesh itself.
 
+use super::mesh_surface;
 use super::plan::PlanError;
 use super::strip::strip_width_at;
 use super::tool_axis::{ToolAxis, in_tool_frame};
@@ -15,8 +16,9 @@ use crate::geometry::{Jet2, KnotVector, NurbsSurface, Point3, Vector2, Vector3};
 use crate::part::Part;
 
 /// Control points of a height surface lie so many facets apart, and no less and no more than these shares of the cutter's
-/// radius. Finer follows the facets of a mesh instead of its shape; coarser misses curvature that the cutter feels: where
-/// bumps are as wide as the cutter, half a radius misses a tenth of it, and intervals are a few per cent too wide.
+/// radius. Finer follows the facets of a mesh instead of its shape, and swings beside steps, so that meshes that have any take
+/// the greatest; coarser misses curvature that the cutter feels: where bumps are as wide as the cutter, half a radius misses
+/// a tenth of it, and intervals are a few per cent too wide.
 const FACETS_A_CONTROL: f64 = 5.0;
 const CONTROL_PITCH_OVER_RADIUS: [f64; 2] = [0.25, 0.5];
 
@@ -214,7 +216,8 @@ impl<'a> Chart<'a> {
         let area = (domain[0][1] - domain[0][0]) * (domain[1][1] - domain[1][0]);
         let facet = (2.0 * area / part.mesh().triangles().len().max(1) as f64).sqrt();
         let [least, most] = CONTROL_PITCH_OVER_RADIUS.map(|share| share * cutter.radius());
-        let pitch = (FACETS_A_CONTROL * facet).clamp(least, most);
+        let stepped = mesh_surface::wants_mesh(part, cutter);
+        let pitch = if stepped { most } else { (FACETS_A_CONTROL * facet).clamp(least, most) };
         let knots = domain.map(|range| {
             let controls = ((range[1] - range[0]) / pitch).ceil().clamp(5.0, MAX_CONTROLS as f64);
             KnotVector::clamped_uniform(3, controls as usize, range)

@@ -442,12 +442,14 @@ const SMOOTHED_CHORD_SHARE: f64 = 0.5;
 const SMOOTHED_SHARE: f64 = 0.78;
 
 /// On a mesh it is planned for less by what facets stand off the smooth surface, too: on elements, whose curvature is that of
-/// the facets around, by the height that this share of them (by area) stays below. On a fitted surface by the height that
-/// nearly all stay below, less a share of the target: ridges cross facets at any height, and all passes do not leave all of
-/// the target. Facets at sharper angles than the last, rad, are edges of the part.
+/// the facets around, and on meshes with steps, by the height that this share of them (by area) stays below. On surfaces
+/// fitted to smooth meshes by the height that nearly all stay below, less a share of the target, and by no more than another
+/// share: ridges cross facets at any height, and not all passes leave all of the target. Facets at sharper angles than the
+/// last, rad, are edges of the part.
 const FACETS_ON_ELEMENTS: f64 = 0.6;
 const FACETS: f64 = 0.95;
 const FACETS_LESS: f64 = 0.055;
+const MOST_FACETS: f64 = 0.09;
 const SHARPEST_FACETS: f64 = 0.3;
 
 /// But it is not planned for less than this share of itself.
@@ -576,11 +578,13 @@ fn passes(
     };
     let step = match settings.step {
         Step::Scallop(h) => {
-            let fitted = !on_elements && !matches!(strategy, Strategy::OffsetSurface { .. });
+            let fitted = !on_elements
+                && !matches!(strategy, Strategy::OffsetSurface { .. })
+                && !mesh_surface::wants_mesh(part, cutter);
             let height =
                 |share| if part.patches().is_empty() { facet_height(part.mesh(), share) } else { 0.0 };
             let facets = match fitted {
-                true => (height(FACETS) - FACETS_LESS * h).max(0.0),
+                true => (height(FACETS) - FACETS_LESS * h).clamp(0.0, MOST_FACETS * h),
                 false => height(FACETS_ON_ELEMENTS),
             };
             let chords = if settings.joining.smoothing { SMOOTHED_CHORD_SHARE } else { CHORD_SHARE };
