@@ -171,25 +171,27 @@ impl<'a> VoxelEngine<'a> {
         // What coarser voxels take tells how much finer ones would: far too fine ones are not tried.
         let doublings = (self.stock.bounds().size().max() / (COARSE * voxel)).log2().ceil().max(0.0);
         let mut pitch = voxel * doublings.exp2();
+        let (mut counted, mut taken) = (pitch, 0.0);
         loop {
-            let taken = match self.try_cut(pitch, left, monitor)? {
-                Some(voxels) if pitch == voxel && voxels.bytes <= left => return Ok(voxels),
-                Some(voxels) => voxels.bytes as f64,
-                None => return Err(VoxelError::Voxel(voxel)),
-            };
-            let (finer, left) = (taken * (pitch / voxel).powi(2), left as f64);
-            if pitch > voxel && finer <= DOUBTFUL * left {
-                pitch = voxel;
-            } else if pitch > voxel && 4.0 * taken <= left {
-                pitch *= 0.5;
-            } else {
+            // Where they are too many to be counted, the last ones that were tell.
+            let found = self.try_cut(pitch, left, monitor)?;
+            let too_many = found.is_none();
+            if let Some(voxels) = found {
+                if pitch == voxel && voxels.bytes <= left {
+                    return Ok(voxels);
+                }
+                (counted, taken) = (pitch, voxels.bytes as f64);
+            }
+            let (finer, left) = (taken * (counted / voxel).powi(2), left as f64);
+            if too_many || pitch == voxel || finer > DOUBTFUL * left && 4.0 * taken > left {
                 return Err(VoxelError::Memory {
                     voxel,
                     needed_mib: ((finer + moves as f64) / MIB as f64).ceil() as u64,
                     allowed_mib: memory / MIB,
-                    fitting: fitting(pitch, taken / left),
+                    fitting: fitting(counted, taken / left),
                 });
             }
+            pitch = if finer <= DOUBTFUL * left { voxel } else { 0.5 * pitch };
         }
     }
 

@@ -455,6 +455,15 @@ const SHARPEST_FACETS: f64 = 0.3;
 /// But it is not planned for less than this share of itself.
 const LEAST_SHARE_OF_TARGET: f64 = 0.5;
 
+/// What the facets of a mesh, planned on a surface fitted to it or on itself, take of a scallop target, mm.
+fn facet_charge(mesh: &TriangleMesh, fitted: bool, target: f64) -> f64 {
+    if fitted {
+        (facet_height(mesh, FACETS) - FACETS_LESS * target).max(0.0).min(MOST_FACETS * target)
+    } else {
+        facet_height(mesh, FACETS_ON_ELEMENTS)
+    }
+}
+
 /// How far facets stand off the smooth surface that they are chords of, mm: where two meet at the angle δ, each is as wide
 /// as its neighbours and has a sagitta of an eighth of δ times the width; the one that a share of them stays below.
 fn facet_height(mesh: &TriangleMesh, share: f64) -> f64 {
@@ -581,12 +590,7 @@ fn passes(
             let fitted = !on_elements
                 && !matches!(strategy, Strategy::OffsetSurface { .. })
                 && !mesh_surface::wants_mesh(part, cutter);
-            let height =
-                |share| if part.patches().is_empty() { facet_height(part.mesh(), share) } else { 0.0 };
-            let facets = match fitted {
-                true => (height(FACETS) - FACETS_LESS * h).clamp(0.0, MOST_FACETS * h),
-                false => height(FACETS_ON_ELEMENTS),
-            };
+            let facets = if part.patches().is_empty() { facet_charge(part.mesh(), fitted, h) } else { 0.0 };
             let chords = if settings.joining.smoothing { SMOOTHED_CHORD_SHARE } else { CHORD_SHARE };
             let less = chords * settings.chord_tolerance + facets;
             Step::Scallop((h - less).max(LEAST_SHARE_OF_TARGET * h))

@@ -73,8 +73,8 @@ impl<'a> Calculator<'a> {
     }
 
     /// The height of the ridge in the section across both tracks through the place of the design below a crossing: where the
-    /// balls of both tracks come as near as their radius. `None` where they do not meet, or a move meets that is
-    /// not of a pass: a link, a plunge, a lift.
+    /// balls of both tracks come as near as their radius. `None` where they do not meet, where they meet in
+    /// another ridge than was crossed, or a move meets that is not of a pass: a link, a plunge, a lift.
     pub fn at(&self, crossing: &RidgeCrossing) -> Option<Calculated> {
         if crossing.moves.iter().any(|k| self.path.moves[*k as usize].kind != MoveKind::Cut) {
             return None;
