@@ -6,9 +6,7 @@ use divan::Bencher;
 use millstream::field::mesh::{
     FieldMesh, Held, MeshLevels, flows, orient_lines, slope, smooth_lines, solve_stream,
 };
-use millstream::field::{
-    DIRECTION_WEIGHT, Solver, StreamSample, fit_by_differences, fit_stream_function, solve_poisson,
-};
+use millstream::field::{DIRECTION_WEIGHT, Solver, StreamSample, fit_by_differences, fit_stream_function};
 use millstream::geometry::{KnotVector, Point3};
 
 fn main() {
@@ -54,29 +52,6 @@ fn differences(bencher: Bencher, cells: usize) {
     let samples: Vec<_> = samples(cells).into_iter().map(Some).collect();
     bencher
         .bench_local(|| fit_by_differences(&samples, [[0.0, 1.0]; 2], [cells; 2], Solver::ConjugateGradient));
-}
-
-/// On a flat (cosine transform) and on a wave with slopes up to 50° (multigrid).
-#[divan::bench(args = ["flat", "wave"], sample_count = 10)]
-fn poisson_500(bencher: Bencher, surface: &str) {
-    const N: usize = 500;
-    let slope = if surface == "wave" { 1.2 } else { 0.0 };
-    let at = |k: usize| ((k % (N + 1)) as f64 / N as f64, (k / (N + 1)) as f64 / N as f64);
-    let nodes = (N + 1) * (N + 1);
-    let metric: Vec<_> = (0..nodes)
-        .map(|k| {
-            let (u, v) = at(k);
-            let (zu, zv) = (slope * (6.0 * u).cos(), slope * (5.0 * v).sin());
-            (1.0 + zu * zu, zu * zv, 1.0 + zv * zv)
-        })
-        .collect();
-    let vectors: Vec<_> = (0..nodes)
-        .map(|k| {
-            let (u, v) = at(k);
-            [(3.0 * v).sin() + 1.0, (2.0 * u).cos()]
-        })
-        .collect();
-    bencher.bench_local(|| solve_poisson([[0.0, 1.0]; 2], [N; 2], &metric, &vectors));
 }
 
 /// A wave of 2 × 500² triangles: the smooth field of lines up its slope, ψ, 250 levels.

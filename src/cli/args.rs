@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::cutter::Cutter;
-use crate::io::scene::Engine;
-use crate::toolpath::scallop::DEFAULT_DEGREE;
+use cutter::Cutter;
+use scallop::DEFAULT_DEGREE;
+use scene::Engine;
 
 /// Plans milling paths, cuts the part in a simulator, measures the cut surface and gives a verdict.
 ///
@@ -116,8 +116,7 @@ impl std::ops::Deref for Place {
 }
 
 fn place(text: &str) -> Result<Place, String> {
-    let number =
-        |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.abs() <= crate::geometry::MAX_COORDINATE);
+    let number = |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.abs() <= geometry::MAX_COORDINATE);
     let numbers: Option<Vec<f64>> = text.split(',').map(number).collect();
     numbers
         .filter(|n| matches!(n.len(), 2 | 3))

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::error::CliError;
 use super::load::{Loaded, load_part};
 use super::run::lay_out_before_planning;
-use crate::io::scene::{Scene, complete_toml};
+use scene::{Scene, complete_toml};
 
 /// What `check` prints: the complete scene, which can be run again, after what was found in
 /// comments.

@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme};
 
-use crate::io::scene::{Engine, Scene, SceneError};
-use crate::monitor::Cancelled;
-use crate::part::PartError;
-use crate::report::ReportError;
-use crate::sim::{GridError, OppositeAxes, RaysError, VoxelError};
-use crate::toolpath::PlanError;
-use crate::toolpath::scallop::ScallopError;
+use part::PartError;
+use report::ReportError;
+use scallop::ScallopError;
+use scene::{Engine, Scene, SceneError};
+use sim::{GridError, OppositeAxes, RaysError, VoxelError};
+use toolpath::PlanError;
+use work::monitor::Cancelled;
 
 /// Why a command could not be done.
 #[derive(Debug, thiserror::Error, Diagnostic)]

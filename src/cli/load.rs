@@ -4,10 +4,11 @@ use nalgebra::{Translation3, UnitQuaternion};
 
 use super::error::CliError;
 use super::pocket::{floor_part, pocket_of};
-use crate::geometry::{Blade, BladeSettings, Isometry3, MeshError, TriangleMesh};
-use crate::io::scene::{BladeRequest, MeshFormat, NamedFile, PartSource, Scene, SceneError};
-use crate::io::{nurbs_json, obj, section_table, stl};
-use crate::part::{Part, PartError, Patch, default_tessellation_tolerance};
+use blade::{Blade, BladeSettings};
+use geometry::{Isometry3, MeshError, TriangleMesh};
+use io::{nurbs_json, obj, section_table, stl};
+use part::{Part, PartError, Patch, default_tessellation_tolerance};
+use scene::{BladeRequest, MeshFormat, NamedFile, PartSource, Scene, SceneError};
 
 /// A part as its scene describes it.
 pub struct Loaded {

@@ -1,14 +1,16 @@
 //! A scene's pocket: its region from a drawing or the scene's points, and the floor that is measured.
 
 use super::error::CliError;
-use crate::field::fill;
-use crate::geometry::{Point3, Region, TriangleMesh};
-use crate::io::outline::{self, OutlineOptions};
-use crate::io::scene::{OutlineSource, PartSource, Scene, SceneError};
-use crate::metrology::{ContactArcs, PocketFigures, wall_gouge_of_cells, wall_gouge_of_moves};
-use crate::part::Part;
-use crate::sim::ZMap;
-use crate::toolpath::{Engagement, Pocket, PocketStrategy, Step, Toolpath, engagement, limit_feed};
+use field::fill;
+use geometry::{Point3, Region, TriangleMesh};
+use io::outline;
+use io::outline::OutlineOptions;
+use metrology::{ContactArcs, PocketFigures, wall_gouge_of_cells, wall_gouge_of_moves};
+use motion::Toolpath;
+use part::Part;
+use scene::{OutlineSource, PartSource, Scene, SceneError};
+use sim::ZMap;
+use toolpath::{Engagement, Pocket, PocketStrategy, Step, engagement, limit_feed};
 
 /// Share of the chord tolerance that drawings are flattened to; the passes have the rest.
 const FLATTEN_SHARE: f64 = 0.5;

@@ -2,12 +2,13 @@
 
 use super::error::CliError;
 use super::outputs::Outputs;
-use crate::io::ProgramHeader;
-use crate::io::gcode::{self, FiveAxisPost, MoveLines};
-use crate::io::scene::Scene;
-use crate::machine::kinematics::{JointPath, follow};
-use crate::machine::machining_time_turning;
-use crate::toolpath::Toolpath;
+use io::ProgramHeader;
+use io::gcode;
+use io::gcode::{FiveAxisPost, MoveLines};
+use machine::kinematics::{JointPath, follow};
+use machine::machining_time_turning;
+use motion::Toolpath;
+use scene::Scene;
 
 /// The path in the joints of the scene's five-axis machine, as its programs need it; `None` without one. The cutter, up to
 /// its holder, stays within the chord tolerance of its motion between locations.

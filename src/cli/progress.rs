@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::monitor::Monitor;
+use work::monitor::Monitor;
 
 /// True when people read stderr.
 pub fn stderr_is_terminal() -> bool {

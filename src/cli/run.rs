@@ -15,28 +15,29 @@ use super::outputs::Outputs;
 use super::pocket::{limit_feed_by, load_pocket, pocket_figures};
 use super::program;
 use super::progress::Progress;
-use crate::geometry::{Aabb, Blade};
-use crate::io::scene::{Engine, PartSource, Scene, ToolpathRequest, auto_cell};
-use crate::io::{ProgramHeader, apt_cl, exr, ply_write, png, stl_write};
-use crate::machine::kinematics::{JointPath, JointReport};
-use crate::machine::slow_corners;
-use crate::metrology::{
+use blade::Blade;
+use geometry::Aabb;
+use io::{ProgramHeader, apt_cl, exr, ply_write, png, stl_write};
+use machine::kinematics::{JointPath, JointReport};
+use machine::slow_corners;
+use metrology::{
     Asked, Measurement, PAIRS_HEADER, RemovalFigures, contact_arcs, measure, path_figures, removal_figures,
 };
-use crate::monitor::{self, Monitor as _};
-use crate::parallel;
-use crate::part::Part;
-use crate::report::{
+use motion::Toolpath;
+use part::Part;
+use report::{
     FieldFigures, HIGHEST_RIDGE, Histogram, MAX_TRIANGLES, MachineFigures, MapSize, MapWords, Picture,
     RunReport, ShortestFigures, SimulationFigures, SurfaceMeshFigures, ToolpathPage, ToolpathResult, Verdict,
     collision, comb_picture, deviation_colours, deviation_picture, field_picture, height_picture,
     holder_note, html_page, interval_picture, marks, rapid_violation, result_table, surface_mesh, violations,
     wall_violation,
 };
-use crate::sim::{Grid, GridError, ZMap, cut, cut_in_order, cut_reference, holder_collisions};
-use crate::toolpath::{
-    Engagement, OffsetDrive, Plan, PlanError, PlanSettings, Pocket, Strategy, Toolpath, plan, plan_pocket,
-};
+use scene::{Engine, PartSource, Scene, ToolpathRequest, auto_cell};
+use sim::{Grid, GridError, ZMap, cut, cut_in_order, cut_reference, holder_collisions};
+use toolpath::{Engagement, OffsetDrive, Plan, PlanError, PlanSettings, Pocket, Strategy, plan, plan_pocket};
+use work::monitor;
+use work::monitor::Monitor as _;
+use work::parallel;
 
 /// Bytes a cell that a run takes at its peak: stock and winning moves 8, deviations 12, ridges 16 where
 /// every cell has one, the mesh of the surface and height.exr the rest. The peak resident memory of
@@ -685,7 +686,7 @@ mod tests {
                 .map(|bound| json.pointer(bound).and_then(serde_json::Value::as_f64).unwrap());
         assert!((a - b).abs() <= bounds[0] + bounds[1], "{a} {b} {bounds:?}");
         assert!(bounds[1] < 0.02 * b, "{b} {bounds:?}");
-        let (mesh, _) = crate::io::stl::read(&out.join("zigzag/solid.stl")).unwrap();
+        let (mesh, _) = io::stl::read(&out.join("zigzag/solid.stl")).unwrap();
         assert!(mesh.is_closed());
     }
 

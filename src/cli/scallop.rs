@@ -6,11 +6,11 @@ use std::path::Path;
 
 use super::args::ScallopOptions;
 use super::error::CliError;
-use crate::cutter::Cutter;
-use crate::geometry::{Point3, Vector3};
-use crate::io::{nurbs_json, obj, stl};
-use crate::part::{Part, Patch, SurfacePoint, default_tessellation_tolerance};
-use crate::toolpath::scallop::{BallSection, ScallopError, SurfaceCurvature, compare, effective_radius};
+use cutter::Cutter;
+use geometry::{Point3, Vector3};
+use io::{nurbs_json, obj, stl};
+use part::{Part, Patch, SurfacePoint, default_tessellation_tolerance};
+use scallop::{BallSection, ScallopError, SurfaceCurvature, compare, effective_radius};
 
 /// Curvatures of the table times the cutter's radius, positive concave.
 const TABLE_BENDS: [f64; 7] = [-1.0, -1.0 / 3.0, -0.1, 0.0, 0.1, 1.0 / 3.0, 0.6];
@@ -288,7 +288,7 @@ mod tests {
     #[test]
     fn a_place_of_a_part_has_its_own_curvature() {
         let home = tempfile::tempdir().unwrap();
-        let dome = crate::geometry::samples::hemisphere(Point3::origin(), 20.0);
+        let dome = geometry::samples::hemisphere(Point3::origin(), 20.0);
         let file = home.path().join("dome.json");
         std::fs::write(&file, nurbs_json::to_text(&[dome])).unwrap();
         let at = |place: &str| {

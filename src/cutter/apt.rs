@@ -256,8 +256,8 @@ fn touching(word: AptWord, [e, f]: [f64; 2]) -> String {
     format!("leave it away, or write {}, for a corner that touches bottom and side", shown(value))
 }
 
-#[cfg(test)]
 impl AptWords {
+    #[doc(hidden)]
     /// Profiles of up to 3 mm of radius with every piece, with edges and without; angles in degrees.
     pub fn examples() -> Vec<Self> {
         let words = |d: f64, r: f64, centre: Option<[f64; 2]>, alpha: f64, beta: f64, length: f64| {

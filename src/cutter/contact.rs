@@ -2,7 +2,7 @@
 //! there. mm, outward unit normals.
 
 use super::Cutter;
-use crate::geometry::{Vector2, Vector3};
+use geometry::{Vector2, Vector3};
 
 /// Slope (sine) below which ground counts as nearly level for a cutter with a flat. Less lets the path
 /// swerve by the flat's radius at every change of a gentle slope; more leaves its contact inside the
@@ -111,7 +111,7 @@ impl Cutter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cutter::AptWords;
+    use crate::AptWords;
 
     #[test]
     fn the_curvature_is_that_of_a_torus() {

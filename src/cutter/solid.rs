@@ -10,7 +10,7 @@
 //! place is that of the mean normal at its nearest point, also where that is a corner.
 
 use super::{Cutter, Holder, Profile};
-use crate::geometry::{Point3, Vector3};
+use geometry::{Point3, Vector3};
 
 /// A cutter without a holder is this many diameters long above its cutting profile. More makes tools
 /// hit what no tool would reach; less lets walls stand in the air above the tool.

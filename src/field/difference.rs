@@ -1,24 +1,18 @@
-//! Finite differences on an even grid: stream functions from directions, and Poisson's equation on a
-//! surface.
+//! Stream functions from directions by finite differences on an even grid.
 //!
-//! Enters: what is asked of ∇ψ in each cell, in parameters with the metric of the surface. Leaves: the
-//! least-squares ψ at the nodes, as a [`GridField`]; of second order in the size h of the cells in the
-//! mean, h² log(1/h) in the corners of the rectangle (measured). Natural
-//! boundary conditions come by themselves, since the discrete energy itself is made least; the open
-//! constant is fixed by a mean of 0.
+//! Enters: what is asked of ∇ψ in each cell, in parameters. Leaves: the least-squares ψ at the nodes, as a [`GridField`]; of
+//! second order in the size h of the cells in the mean, h² log(1/h) in the corners of the rectangle. Natural boundary
+//! conditions come by themselves, since the discrete energy itself is made least; the open constant is fixed by a mean of 0.
 //!
-//! The stream function is that of `field::fit`, `∫ q [α (t·∇ψ)² + (b·∇ψ − g)²] dA`; each sample speaks
-//! for one cell. Poisson's equation `Δ_S φ = ∇·V` makes `∫ |∇_S φ − V|² dA` least, with the first
-//! fundamental form given at the nodes.
+//! The stream function is that of `field::fit`, `∫ q [α (t·∇ψ)² + (b·∇ψ − g)²] dA`; each sample speaks for one cell.
 //!
-//! Solvers: a cosine transform where the tensor is the same in all cells and has no mixed term; CG
-//! with a multigrid cycle otherwise; sparse Cholesky and GMRES to compare.
+//! Solvers: CG with a multigrid cycle; sparse Cholesky and GMRES to compare.
 
-use super::cosine::solve_even;
 use super::fit::{FieldError, StreamSample, checked_sums, refuse_constant};
 use super::grid::GridField;
 use super::multigrid::{Edges, Multigrid, Tensor};
-use super::solve::{self, Columns, SolveReport, Solver};
+use super::solve::{Columns, SolveReport, Solver};
+use crate::solve;
 
 /// CG on a grid ends at this residual over the right side, in the norm of the preconditioner. What is
 /// left is far below the error of the differences; less costs an iteration a decade.
@@ -108,62 +102,6 @@ pub fn fit_by_differences(
     Ok(GridFit { psi, angle_rms: (angle / weights).sqrt(), report })
 }
 
-/// φ with `∫ |∇_S φ − V|² dA` least: `Δ_S φ = ∇·V` with natural boundary conditions. `metric` holds the
-/// first fundamental form `(E, F, G)` at the nodes of `cells[0]` × `cells[1]` cells over `domain`,
-/// `[cells[1] + 1][cells[0] + 1]`, row-major, and `vectors` the components of V in parameters
-/// (`V = V_u ∂S/∂u + V_v ∂S/∂v`) at the same nodes.
-///
-/// # Errors
-/// [`FieldError`] where something is not finite, a metric is degenerate, V is 0 (or without
-/// divergence and normal to the border), or sizes do not fit.
-///
-/// # Tolerance
-/// Second order in the size of the cells.
-pub fn solve_poisson(
-    domain: [[f64; 2]; 2],
-    cells: [usize; 2],
-    metric: &[(f64, f64, f64)],
-    vectors: &[[f64; 2]],
-) -> Result<GridSolution, FieldError> {
-    let nodes = cells.map(|n| n.saturating_add(1));
-    check_grid(domain, cells, metric.len(), nodes[0].saturating_mul(nodes[1]))?;
-    check_grid(domain, cells, vectors.len(), nodes[0].saturating_mul(nodes[1]))?;
-    let size = [0, 1].map(|c| (domain[c][1] - domain[c][0]) / cells[c] as f64);
-    let mut at_nodes = Vec::with_capacity(metric.len());
-    for (k, (&(e, f, g), v)) in metric.iter().zip(vectors).enumerate() {
-        let area = (e * g - f * f).sqrt();
-        if !(area > 0.0 && area.is_finite() && v[0].is_finite() && v[1].is_finite()) {
-            let (i, j) = (k % nodes[0], k / nodes[0]);
-            return Err(FieldError::Invalid(format!(
-                "the metric or the vector at node ({i}, {j}) has no use"
-            )));
-        }
-        let square = e * v[0] * v[0] + 2.0 * f * v[0] * v[1] + g * v[1] * v[1];
-        at_nodes.push([g / area, -f / area, e / area, area * v[0], area * v[1], area * square]);
-    }
-    let count = cells[0] * cells[1];
-    let (mut tensors, mut fluxes, mut asked) = (Vec::with_capacity(count), Vec::with_capacity(count), 0.0);
-    for j in 0..cells[1] {
-        for i in 0..cells[0] {
-            let k = j * nodes[0] + i;
-            let corners = [k, k + 1, k + nodes[0], k + nodes[0] + 1].map(|k| &at_nodes[k]);
-            let mean = |c: usize| 0.25 * corners.iter().map(|corner| corner[c]).sum::<f64>();
-            let [size_u, size_v] = size;
-            tensors.push([
-                mean(0) / (size_u * size_u),
-                mean(1) / (size_u * size_v),
-                mean(2) / (size_v * size_v),
-            ]);
-            fluxes.push([mean(3) / size_u, mean(4) / size_v]);
-            asked += mean(5);
-        }
-    }
-    if asked == 0.0 {
-        return Err(FieldError::Trivial("the vectors to follow are 0".into()));
-    }
-    Equations { domain, cells, tensors, fluxes, asked }.solve(Solver::ConjugateGradient)
-}
-
 fn check_grid(
     domain: [[f64; 2]; 2],
     cells: [usize; 2],
@@ -205,9 +143,6 @@ impl Equations {
         let ones = [vec![1.0; nu], vec![1.0; nv]];
         let edges = Edges::new(&self.tensors, [&ones[0], &ones[1]]);
         let rhs = self.right_side(&edges);
-        let first = self.tensors[0];
-        let even =
-            first[1] == 0.0 && first[0] > 0.0 && first[2] > 0.0 && self.tensors.iter().all(|t| *t == first);
         let unknowns = (nu + 1) * (nv + 1);
         let (x, method, rank, iterations) = match solver {
             Solver::Cholesky => (self.cholesky(&edges, &rhs)?, "cholesky", Some(unknowns - 1), None),
@@ -216,9 +151,6 @@ impl Equations {
                     edges.diagonal().iter().map(|&d| if d > 0.0 { 1.0 / d } else { 0.0 }).collect();
                 let solution = solve::gmres(|x, y| edges.apply(x, y), &inverse, &rhs);
                 (solution.x, "gmres", None, solution.iterations)
-            }
-            _ if even => {
-                (solve_even(&edges, [first[0], first[2]], &rhs), "cosine transform", Some(unknowns - 1), None)
             }
             _ => {
                 let mut cycle = Multigrid::new(&edges, &self.tensors);
@@ -323,7 +255,7 @@ fn relative_residual(edges: &Edges<f64>, x: &[f64], rhs: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::{LevelTracer, ScalarField};
+    use crate::{LevelTracer, ScalarField};
 
     const SOLVERS: [Solver; 3] = [Solver::ConjugateGradient, Solver::Cholesky, Solver::Gmres];
 
@@ -421,54 +353,6 @@ mod tests {
         }
     }
 
-    /// φ = cos(πu) cos(2πv) has no flux through the border of the unit square.
-    #[test]
-    fn poisson_on_a_flat_and_on_a_wave_is_of_second_order() {
-        use std::f64::consts::PI;
-        let phi = |u: f64, v: f64| (PI * u).cos() * (2.0 * PI * v).cos() + u;
-        for (amplitude, method) in [(0.0, "cosine transform"), (0.7, "cg with multigrid")] {
-            let errors = [[12, 13], [24, 26], [48, 52]].map(|n: [usize; 2]| {
-                let at =
-                    |k: usize| ((k % (n[0] + 1)) as f64 / n[0] as f64, (k / (n[0] + 1)) as f64 / n[1] as f64);
-                let count = (n[0] + 1) * (n[1] + 1);
-                // On the surface z = amplitude · sin(2u + v), V is the surface gradient of φ.
-                let metric = |u: f64, v: f64| {
-                    let slope = amplitude * (2.0 * u + v).cos();
-                    let (zu, zv) = (2.0 * slope, slope);
-                    (1.0 + zu * zu, zu * zv, 1.0 + zv * zv)
-                };
-                let vector = |u: f64, v: f64| {
-                    let (e, f, g) = metric(u, v);
-                    let pu = -PI * (PI * u).sin() * (2.0 * PI * v).cos() + 1.0;
-                    let pv = -2.0 * PI * (PI * u).cos() * (2.0 * PI * v).sin();
-                    let d = e * g - f * f;
-                    [(g * pu - f * pv) / d, (e * pv - f * pu) / d]
-                };
-                let metrics: Vec<_> = (0..count).map(|k| metric(at(k).0, at(k).1)).collect();
-                let vectors: Vec<_> = (0..count).map(|k| vector(at(k).0, at(k).1)).collect();
-                let solution = solve_poisson([[0.0, 1.0]; 2], n, &metrics, &vectors).unwrap();
-                assert_eq!(solution.report.method, method);
-                error(&solution.psi, phi)
-            });
-            println!("{method}: {errors:?}");
-            assert!(errors[2] < 5e-3 && (errors[0] / errors[2]).log2() / 2.0 > 1.85, "{errors:?}");
-        }
-    }
-
-    #[test]
-    fn the_cosine_transform_solves_the_discrete_equations_of_any_size() {
-        for n in [[2, 2], [7, 12], [31, 16], [40, 25]] {
-            let (nu, nv) = (n[0], n[1]);
-            let nodes = (nu + 1) * (nv + 1);
-            let metric = vec![(2.0, 0.0, 0.3); nodes];
-            let vectors: Vec<[f64; 2]> =
-                (0..nodes).map(|k| [(k as f64 * 0.7).sin(), (k as f64 * 1.3).cos()]).collect();
-            let report = solve_poisson([[0.0, 3.0], [0.0, 1.0]], n, &metric, &vectors).unwrap().report;
-            assert_eq!(report.method, "cosine transform");
-            assert!(report.residual < 1e-13, "{report}");
-        }
-    }
-
     #[test]
     fn levels_are_traced_on_a_grid() {
         let fit = fit_by_differences(
@@ -510,11 +394,5 @@ mod tests {
             let error = fit_by_differences(&good, DOMAIN, n, solver).unwrap_err();
             assert!(error.to_string().contains("cholesky, cg or gmres"), "{error}");
         }
-        let flat = vec![(1.0, 0.0, 1.0); 81];
-        let vectors = vec![[0.0; 2]; 81];
-        assert!(matches!(solve_poisson(DOMAIN, n, &flat, &vectors), Err(FieldError::Trivial(_))));
-        let degenerate = vec![(1.0, 1.0, 1.0); 81];
-        let error = solve_poisson(DOMAIN, n, &degenerate, &[[1.0, 0.0]; 81]).unwrap_err();
-        assert!(error.to_string().contains("node (0, 0)"), "{error}");
     }
 }

@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::f64::consts::TAU;
 
-use crate::geometry::Vector3;
+use geometry::Vector3;
 
 /// A candidate for orientation: how surely it follows its already oriented neighbour.
 struct Candidate {

@@ -23,7 +23,8 @@ mod tests;
 pub use front::Front;
 
 use super::GridField;
-use crate::monitor::{self, Cancelled, Monitor};
+use work::monitor;
+use work::monitor::{Cancelled, Monitor};
 
 /// Rounds of four sweeps at most, for each of the two orders. Some ten are enough unless characteristics wind.
 const MOST_ROUNDS: usize = 60;
@@ -107,7 +108,7 @@ pub fn eikonal(
     let pitch = [0, 1].map(|c| (domain[c][1] - domain[c][0]) / (nodes[c] - 1) as f64);
     let at = |i: usize, j: usize| [domain[0][0] + pitch[0] * i as f64, domain[1][0] + pitch[1] * j as f64];
     let fronts =
-        crate::parallel::map(nv, |j| (0..nu).map(|i| front(at(i, j)[0], at(i, j)[1])).collect::<Vec<_>>());
+        work::parallel::map(nv, |j| (0..nu).map(|i| front(at(i, j)[0], at(i, j)[1])).collect::<Vec<_>>());
     let fronts = filled(fronts.into_iter().flatten().collect(), nu)?;
     let mut sweeper = Sweeper {
         origin: [domain[0][0], domain[1][0]],

@@ -19,8 +19,9 @@
 //! ([`Solver`]); every result is checked by its true residual.
 
 use super::scalar::ScalarSpline;
-use super::solve::{self, Columns, Rows, Solution, SolveReport, Solver};
-use crate::geometry::{KnotVector, MAX_BASIS};
+use super::solve::{Columns, Rows, Solution, SolveReport, Solver};
+use crate::solve;
+use geometry::{KnotVector, MAX_BASIS};
 
 /// Weight of following the direction over matching the density, α above. Greater keeps passes along
 /// the wanted directions at uneven distances; less bends them to keep their distances even. On a wave

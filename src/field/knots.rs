@@ -5,7 +5,7 @@
 //! Leaves: a clamped [`KnotVector`] over the range. Source: Piegl & Tiller, The NURBS Book (1997),
 //! eq. 9.68 and 9.69, with c = (m + 1)/(n − p + 1) for m + 1 samples and n + 1 control points.
 
-use crate::geometry::{KnotError, KnotVector};
+use geometry::{KnotError, KnotVector};
 
 /// How knots are placed along a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

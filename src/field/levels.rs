@@ -328,7 +328,7 @@ mod tests {
     use super::super::fit::NormalEquations;
     use super::super::scalar::Axis;
     use super::*;
-    use crate::geometry::KnotVector;
+    use geometry::KnotVector;
 
     const SQUARE: [[f64; 2]; 2] = [[-1.0, 1.0], [-1.0, 1.0]];
 

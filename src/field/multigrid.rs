@@ -13,7 +13,7 @@
 //! kept until couplings are alike. A cycle smooths twice before and twice after, by the two steps of
 //! the Chebyshev polynomial over the rough part of the spectrum (Adams et al. 2003).
 
-use crate::lanes;
+use work::lanes;
 
 /// A tensor of a cell, `[K_uu, K_uv, K_vv]`.
 pub(super) type Tensor = [f64; 3];

@@ -28,8 +28,9 @@
 
 use super::eikonal::Front;
 use super::sparse::{Entry, Factor};
-use crate::monitor::{self, Cancelled, Monitor};
-use crate::parallel;
+use work::monitor;
+use work::monitor::{Cancelled, Monitor};
+use work::parallel;
 
 /// ρ of each round. The last leaves shortfalls of about a thousandth.
 const PENALTIES: [f64; 4] = [3.0, 30.0, 300.0, 3000.0];
@@ -437,8 +438,8 @@ fn add(to: &mut [f64], what: &[f64], times: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::monitor::Silent;
     use proptest::prelude::*;
+    use work::monitor::Silent;
 
     /// Cells a side of the unit square.
     const CELLS: usize = 12;

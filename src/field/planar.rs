@@ -16,7 +16,7 @@ use std::collections::HashMap;
 use spade::{AngleLimit, ConstrainedDelaunayTriangulation, RefinementParameters, Triangulation as _};
 
 use super::sparse::{Entry, solve};
-use crate::geometry::{Piece, Point2};
+use geometry::{Piece, Point2};
 
 /// Least angle that refinement aims at, degrees. Below 20.7 it is proven to end; greater ones make more
 /// triangles and no better levels.
@@ -289,7 +289,7 @@ impl PlanarMesh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::signed_area;
+    use geometry::signed_area;
     use std::f64::consts::TAU;
 
     fn circle(r: f64, n: usize, clockwise: bool) -> Vec<Point2> {

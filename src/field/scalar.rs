@@ -2,7 +2,7 @@
 //! coordinates.
 
 use super::grid::GridField;
-use crate::geometry::KnotVector;
+use geometry::KnotVector;
 
 /// A tensor-product B-spline function `Σ c_ij N_i(u) N_j(v)`.
 #[derive(Debug, Clone, PartialEq)]

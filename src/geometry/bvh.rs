@@ -11,7 +11,7 @@ mod tree;
 mod vertical;
 
 use super::{Point3, TriangleMesh, Vector3};
-pub(crate) use tree::{BoxTree, Extent, Node, Paired, round_down, round_up};
+pub use tree::{BoxTree, Extent, Node, Paired, round_down, round_up};
 
 /// Bounding volume hierarchy over the triangles of one mesh.
 ///
@@ -54,7 +54,7 @@ pub struct VerticalHit {
 
 /// Part of a triangle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Feature {
+pub enum Feature {
     /// Its inside.
     Face,
     /// The side from corner `k` to corner `k + 1`, without its ends.
@@ -77,7 +77,7 @@ impl Bvh {
     pub fn new(mesh: &TriangleMesh) -> Self {
         let bounds = mesh.bounds();
         let margin = MARGIN * bounds.min.coords.amax().max(bounds.max.coords.amax());
-        let boxes: Vec<Extent> = crate::parallel::map(mesh.triangles().len(), |t| {
+        let boxes: Vec<Extent> = work::parallel::map(mesh.triangles().len(), |t| {
             let b = super::Aabb::of(&mesh.corners(t));
             Extent::new(b.min.coords.map(|x| x - margin).into(), b.max.coords.map(|x| x + margin).into())
         });
@@ -86,27 +86,27 @@ impl Bvh {
     }
 
     /// The boxes around the triangles.
-    pub(crate) fn tree(&self) -> &BoxTree {
+    pub fn tree(&self) -> &BoxTree {
         &self.tree
     }
 
     /// Number of slots; each holds one triangle.
-    pub(crate) fn slots(&self) -> usize {
+    pub fn slots(&self) -> usize {
         self.triangles.len()
     }
 
     /// The triangle in a slot.
-    pub(crate) fn triangle_in(&self, slot: usize) -> usize {
+    pub fn triangle_in(&self, slot: usize) -> usize {
         self.triangles[slot] as usize
     }
 
     /// One more than the greatest index of a box; even.
-    pub(crate) fn boxes(&self) -> usize {
+    pub fn boxes(&self) -> usize {
         self.tree.nodes.len()
     }
 
     /// Box `index` and the slots in it, if there are at most `limit`.
-    pub(crate) fn few_slots_in(&self, index: usize, limit: usize) -> Option<(&Node, Vec<usize>)> {
+    pub fn few_slots_in(&self, index: usize, limit: usize) -> Option<(&Node, Vec<usize>)> {
         let mut slots = Vec::new();
         let mut waiting = vec![index];
         while let Some(i) = waiting.pop() {
@@ -126,7 +126,7 @@ impl Bvh {
 
     /// Outward unit normal at a part of triangle `t`: of the face, the mean of both faces at a
     /// side, the angle-weighted mean at a corner.
-    pub(crate) fn normal_at(&self, mesh: &TriangleMesh, t: usize, feature: Feature) -> Vector3 {
+    pub fn normal_at(&self, mesh: &TriangleMesh, t: usize, feature: Feature) -> Vector3 {
         nearest::normal_at(mesh, &self.vertex_normals, t, feature)
     }
 }

@@ -61,7 +61,7 @@ enum System {
 }
 
 /// One direction of a net to interpolate: knots, and the parameters of the points.
-pub(super) struct Axis {
+pub struct Axis {
     knots: KnotVector,
     sites: Vec<f64>,
     system: System,
@@ -69,7 +69,7 @@ pub(super) struct Axis {
 
 impl Axis {
     /// Points at Greville's averages of any knots, which every spline space can interpolate.
-    pub(super) fn at_averages(knots: KnotVector) -> Option<Self> {
+    pub fn at_averages(knots: KnotVector) -> Option<Self> {
         let sites = knots.averages().map(|u| knots.clamp(u)).collect();
         Self::clamped(knots, sites)
     }
@@ -78,7 +78,7 @@ impl Axis {
     ///
     /// # Errors
     /// See [`KnotError`]; sites that coincide make knots coincide.
-    pub(super) fn averaging(degree: usize, sites: &[f64]) -> Result<Self, KnotError> {
+    pub fn averaging(degree: usize, sites: &[f64]) -> Result<Self, KnotError> {
         let n = sites.len();
         if n <= degree {
             return Err(KnotError::TooFewControls { degree, controls: n });
@@ -114,7 +114,7 @@ impl Axis {
     ///
     /// # Errors
     /// See [`KnotError`].
-    pub(super) fn periodic(sites: &[f64]) -> Result<Self, KnotError> {
+    pub fn periodic(sites: &[f64]) -> Result<Self, KnotError> {
         let n = sites.len().saturating_sub(1);
         let few = KnotError::TooFewControls { degree: 3, controls: n };
         if n < 4 {
@@ -153,7 +153,7 @@ impl Axis {
     }
 
     /// Parameters of the points.
-    pub(super) fn sites(&self) -> &[f64] {
+    pub fn sites(&self) -> &[f64] {
         &self.sites
     }
 
@@ -182,7 +182,7 @@ impl Axis {
 ///
 /// # Errors
 /// See [`NurbsError`]: a control point may lie beyond the greatest coordinate.
-pub(super) fn interpolate(u: &Axis, v: &Axis, points: &[Vec<Point3>]) -> Result<NurbsSurface, NurbsError> {
+pub fn interpolate(u: &Axis, v: &Axis, points: &[Vec<Point3>]) -> Result<NurbsSurface, NurbsError> {
     let columns: Vec<Vec<Vector3>> = (0..v.sites.len())
         .map(|j| u.control_points(points.iter().map(|row| row[j].coords).collect()))
         .collect();

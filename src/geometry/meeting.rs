@@ -9,7 +9,7 @@ use nalgebra::Matrix3;
 
 /// A plane.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Plane {
+pub struct Plane {
     /// A place on it.
     pub point: Point3,
     /// Unit normal.
@@ -18,7 +18,7 @@ pub(crate) struct Plane {
 
 /// Where planes meet.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Meeting {
+pub struct Meeting {
     /// The place.
     pub place: Point3,
     /// In how many directions the planes hold it: 1 on a plane, 2 on a line, 3 in a corner; 0 where no place may be taken, which
@@ -31,7 +31,7 @@ pub(crate) struct Meeting {
 /// The place nearest to all planes among those that `may_hold` takes: with fewer directions held where more lead elsewhere.
 /// Eigenvalues below the share `flat` of the greatest do not count: normals that spread by less than its square root, rad, are
 /// one.
-pub(crate) fn meeting(planes: &[Plane], flat: f64, may_hold: impl Fn(&Point3) -> bool) -> Meeting {
+pub fn meeting(planes: &[Plane], flat: f64, may_hold: impl Fn(&Point3) -> bool) -> Meeting {
     let count = planes.len() as f64;
     let mean = Point3::from(planes.iter().map(|p| p.point.coords).sum::<Vector3>() / count);
     let (mut matrix, mut right) = (Matrix3::zeros(), Vector3::zeros());
@@ -62,7 +62,7 @@ pub(crate) fn meeting(planes: &[Plane], flat: f64, may_hold: impl Fn(&Point3) ->
 }
 
 /// The place of a cube of half side `half` around `centre` that is nearest to `place`.
-pub(crate) fn into_cube(place: &Point3, centre: &Point3, half: f64) -> Point3 {
+pub fn into_cube(place: &Point3, centre: &Point3, half: f64) -> Point3 {
     let limit = Vector3::from_element(half);
     place.sup(&(centre - limit)).inf(&(centre + limit))
 }

@@ -328,7 +328,7 @@ impl Region {
 }
 
 /// Where closed curves first cross or touch themselves or each other: the two sides and the place.
-pub(crate) fn first_crossing(curves: &[Vec<Point2>]) -> Option<(CurveSegment, CurveSegment, Point2)> {
+pub fn first_crossing(curves: &[Vec<Point2>]) -> Option<(CurveSegment, CurveSegment, Point2)> {
     let grid = SegmentGrid::of_curves(curves.iter().map(Vec::as_slice));
     let mut found: Option<(u32, u32, Point2)> = None;
     for (k, s) in grid.segments().iter().enumerate() {

@@ -34,7 +34,7 @@ fn build(ku: Vec<f64>, kv: Vec<f64>, net: Vec<Vec<(Point3, f64)>>, degree_v: usi
 
 /// The upper half of a sphere about `centre`: u runs around from x, v from the equator (0) to the
 /// pole (1), where the patch is degenerate; the seam u = 0, 4 is closed.
-pub(crate) fn hemisphere(centre: Point3, radius: f64) -> NurbsSurface {
+pub fn hemisphere(centre: Point3, radius: f64) -> NurbsSurface {
     let net = CIRCLE.iter().map(|&[x, y, w]| {
         let meridian = [(1.0, 0.0, 1.0), (1.0, 1.0, FRAC_1_SQRT_2), (0.0, 1.0, 1.0)];
         let lift = |&(s, z, w2): &(f64, f64, f64)| {
@@ -47,7 +47,7 @@ pub(crate) fn hemisphere(centre: Point3, radius: f64) -> NurbsSurface {
 
 /// Half a cylinder about the y axis, 0 <= y <= length, top at z = radius: u runs over the arc from
 /// +x over the top to −x (0 to 2), v along the axis (0 to 1).
-pub(crate) fn half_cylinder(radius: f64, length: f64) -> NurbsSurface {
+pub fn half_cylinder(radius: f64, length: f64) -> NurbsSurface {
     let net = CIRCLE[..5].iter().map(|&[x, z, w]| {
         let at = |y: f64| (Point3::new(radius * x, y, radius * z), w);
         vec![at(0.0), at(length)]
@@ -57,7 +57,7 @@ pub(crate) fn half_cylinder(radius: f64, length: f64) -> NurbsSurface {
 
 /// A gently waved bicubic patch over about 60 × 60 mm, 7 × 6 control points, with the given
 /// weights repeated over the net.
-pub(crate) fn bicubic(weights: &[f64]) -> NurbsSurface {
+pub fn bicubic(weights: &[f64]) -> NurbsSurface {
     let knots = |n: usize| super::KnotVector::clamped_uniform(3, n, [0.0, 1.0]).unwrap().knots().to_vec();
     let points: Vec<Vec<Point3>> = (0..7)
         .map(|i| {
@@ -75,7 +75,7 @@ pub(crate) fn bicubic(weights: &[f64]) -> NurbsSurface {
 /// The patch of scenes/ridge.json: a winding ridge between two winding valleys over 60 × 60 mm.
 /// Bicubic, 16 × 16 control points, parameter lines that wind as well; control points to 0.001 mm, so
 /// that the file does not depend on the last digit of anyone's sine.
-pub(crate) fn ridge() -> NurbsSurface {
+pub fn ridge() -> NurbsSurface {
     const SIDE: f64 = 60.0;
     const COUNT: usize = 16;
     let knots = super::KnotVector::clamped_uniform(3, COUNT, [0.0, 1.0]).unwrap();
@@ -98,7 +98,7 @@ pub(crate) fn ridge() -> NurbsSurface {
 /// The patches of scenes/joined.json: three side by side with tangent planes in common along their borders, cut into spans and
 /// parametrised differently. About 54 × 36 mm; control points to 0.001 mm,
 /// but for those that follow from a neighbour's.
-pub(crate) fn joined() -> Vec<NurbsSurface> {
+pub fn joined() -> Vec<NurbsSurface> {
     let round = |c: f64| (c * 1000.0).round() / 1000.0 + 0.0;
     let height = |x: f64, y: f64| 2.6 * (0.16 * x + 0.5).sin() * (0.13 * y).cos() + 0.04 * x;
     // Control columns of each patch by their distance along x; the first two of a later patch follow

@@ -2,7 +2,7 @@
 //!
 //! Enters: closed curves as polylines. Leaves: distances in f64, exact but for rounding.
 
-use super::Point2;
+use super::{Point2, Point3, Vector3};
 
 /// Segments a bucket aimed at on average. More make a query scan longer lists, fewer more empty buckets.
 const SEGMENTS_A_BUCKET: f64 = 1.0;
@@ -185,8 +185,16 @@ impl SegmentGrid {
     }
 }
 
+/// Distance from `p` to the segment `a`–`b`, mm.
+pub fn distance_to_segment(p: &Point3, a: &Point3, b: &Point3) -> f64 {
+    let d: Vector3 = b - a;
+    let length2 = d.norm_squared();
+    let t = if length2 > 0.0 { ((p - a).dot(&d) / length2).clamp(0.0, 1.0) } else { 0.0 };
+    (p - (a + d * t)).norm()
+}
+
 /// Where on a segment the foot of `p` is (0 to 1), and how far away.
-pub(crate) fn foot(p: &Point2, ends: &[Point2; 2]) -> (f64, f64) {
+pub fn foot(p: &Point2, ends: &[Point2; 2]) -> (f64, f64) {
     let d = ends[1] - ends[0];
     let length2 = d.norm_squared();
     let t = if length2 > 0.0 { ((p - ends[0]).dot(&d) / length2).clamp(0.0, 1.0) } else { 0.0 };

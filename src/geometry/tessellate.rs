@@ -12,7 +12,7 @@
 //! straight edge cuts off, the whole curvature of the border counts and not its normal part alone.
 
 use super::{Jet2, Point3, Vector3};
-use crate::parallel;
+use work::parallel;
 
 /// Greatest number of triangles of one tessellation. More costs gigabytes and seconds where a
 /// somewhat coarser search mesh would serve as well; fewer refuses large parts.

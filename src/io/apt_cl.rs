@@ -1,8 +1,8 @@
 //! Writes a toolpath as cutter locations in APT text (ISO 3592, ISO 4343). mm, mm/min, degrees.
 
 use super::program_text::{ProgramHeader, describe, number, number_to};
-use crate::cutter::{Cutter, CutterShape};
-use crate::toolpath::{ClPoint, MoveKind, Toolpath};
+use cutter::{Cutter, CutterShape};
+use motion::{ClPoint, MoveKind, Toolpath};
 use std::io::{self, Write};
 
 /// Decimals of the tool axis. With seven the axis is off by 8.7e-8 at most (√3/2 of the last one), which moves
@@ -78,9 +78,9 @@ fn cutter_words(cutter: &Cutter) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cutter::AptWords;
-    use crate::geometry::Vector3;
-    use crate::io::program_text::tests::{example, random};
+    use crate::program_text::tests::{example, random};
+    use cutter::AptWords;
+    use geometry::Vector3;
 
     fn text(path: &Toolpath, cutter: &Cutter, header: &ProgramHeader) -> String {
         let mut bytes = Vec::new();
@@ -129,7 +129,7 @@ FINI
     #[test]
     fn reading_back_gives_the_axes() {
         let mut path = random(300);
-        let mut rng = crate::sim::scenes::Rng::new(8);
+        let mut rng = sim::scenes::Rng::new(8);
         for step in &mut path.moves {
             step.to.axis = Vector3::from_fn(|_, _| rng.within(-1.0, 1.0)).normalize();
         }

@@ -16,7 +16,7 @@
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use crate::field::{LineField, LineSample, SamplePlane};
+use field::{LineField, LineSample, SamplePlane};
 
 /// Greatest file that is read, bytes: a million samples.
 pub const MAX_BYTES: u64 = 64 << 20;
@@ -135,7 +135,7 @@ fn sample(fields: &[&str]) -> Result<LineSample, String> {
         }
     }
     let [x, y, tx, ty, weight] = numbers;
-    if x.abs().max(y.abs()) > crate::geometry::MAX_COORDINATE {
+    if x.abs().max(y.abs()) > geometry::MAX_COORDINATE {
         return Err(format!("the place ({x}, {y}) is farther than a kilometre; check its unit"));
     }
     let length = tx.hypot(ty);

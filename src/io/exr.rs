@@ -13,8 +13,8 @@ use exr::prelude::{
     SpecificChannels, Text, Vec2, WritableImage,
 };
 
-use crate::metrology::{NormalMap, PatchGrid};
-use crate::sim::{Grid, ZMap};
+use metrology::{NormalMap, PatchGrid};
+use sim::{Grid, ZMap};
 
 /// ZIP by lines. On the maps of the shipped scenes ZIP over 16 lines took half as long again for files
 /// 7 to 24 % smaller, PIZ took as long as that for files no smaller, and run lengths saved nothing.
@@ -94,15 +94,15 @@ fn description(grid: &Grid) -> String {
         grid.cell,
         grid.origin.x,
         grid.origin.y,
-        crate::sim::NOT_CUT
+        sim::NOT_CUT
     )
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Point2;
     use exr::prelude::{FlatSamples, ReadChannels, ReadLayers};
+    use geometry::Point2;
 
     #[test]
     fn maps_come_back_bit_for_bit_with_cell_and_origin() {

@@ -12,9 +12,9 @@ mod five_axis;
 pub use five_axis::{FiveAxisPost, Style, write_five_axis};
 
 use super::program_text::{ProgramHeader, describe, number, rounded};
-use crate::cutter::Cutter;
-use crate::geometry::Point3;
-use crate::toolpath::{MoveKind, Toolpath};
+use cutter::Cutter;
+use geometry::Point3;
+use motion::{MoveKind, Toolpath};
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
@@ -126,7 +126,7 @@ impl Program<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::program_text::tests::{example, random};
+    use crate::program_text::tests::{example, random};
 
     fn text(path: &Toolpath, header: &ProgramHeader) -> (String, MoveLines) {
         let mut bytes = Vec::new();

@@ -3,7 +3,7 @@
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use crate::geometry::{MAX_COORDINATE, MeshError, RepairNotes, TriangleMesh};
+use geometry::{MAX_COORDINATE, MeshError, RepairNotes, TriangleMesh};
 
 /// Greatest file that is read, bytes. Twenty million triangles in binary STL; reading it takes about
 /// six times as much memory.
@@ -205,13 +205,13 @@ pub(super) mod tests {
 
     /// Changes to a valid file: bytes overwritten, a piece cut out, a piece doubled.
     #[derive(Debug, Clone)]
-    pub(in crate::io) enum Damage {
+    pub(crate) enum Damage {
         Overwrite(prop::sample::Index, u8),
         Cut(prop::sample::Index, prop::sample::Index),
         Double(prop::sample::Index, prop::sample::Index),
     }
 
-    pub(in crate::io) fn damages() -> impl Strategy<Value = Vec<Damage>> {
+    pub(crate) fn damages() -> impl Strategy<Value = Vec<Damage>> {
         let index = any::<prop::sample::Index>;
         let one = prop_oneof![
             (index(), any::<u8>()).prop_map(|(i, b)| Damage::Overwrite(i, b)),
@@ -221,7 +221,7 @@ pub(super) mod tests {
         prop::collection::vec(one, 1..5)
     }
 
-    pub(in crate::io) fn damaged(mut bytes: Vec<u8>, damages: &[Damage]) -> Vec<u8> {
+    pub(crate) fn damaged(mut bytes: Vec<u8>, damages: &[Damage]) -> Vec<u8> {
         for damage in damages {
             if bytes.is_empty() {
                 break;
@@ -245,7 +245,7 @@ pub(super) mod tests {
     }
 
     /// Never a panic; a mesh of finite numbers, or a message that says something.
-    pub(in crate::io) fn holds_up(parse: fn(&[u8]) -> Parsed, bytes: &[u8]) {
+    pub(crate) fn holds_up(parse: fn(&[u8]) -> Parsed, bytes: &[u8]) {
         match parse(bytes) {
             Ok((mesh, _)) => {
                 assert!(!mesh.triangles().is_empty());

@@ -15,7 +15,7 @@
 //! give the patch's keys beside `unit`. Unknown keys are refused. JSON has no NaN or infinity, and
 //! numbers beyond f64 (1e999) are refused.
 
-use crate::geometry::{NurbsError, NurbsSurface, Point3};
+use geometry::{NurbsError, NurbsSurface, Point3};
 use serde::Deserialize;
 use std::fmt::Write as _;
 use std::io::Read as _;

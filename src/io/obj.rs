@@ -11,8 +11,9 @@ mod tests;
 
 use std::path::Path;
 
-use super::mesh_file::{self, MeshFileError, MeshReadError, Place, number, unexpected};
-use crate::geometry::{Point3, RepairNotes, TriangleMesh};
+use super::mesh_file::{MeshFileError, MeshReadError, Place, number, unexpected};
+use crate::mesh_file;
+use geometry::{Point3, RepairNotes, TriangleMesh};
 
 /// Most corners of a face. Cutting a face takes time with their square, at worst with their cube.
 const MAX_CORNERS: usize = 2_000;

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use image::RgbImage;
 
-use crate::report::Picture;
+use report::Picture;
 
 /// Most colours of a palette.
 const PALETTE: usize = 256;

@@ -1,6 +1,6 @@
 //! What the two program writers share: the header's data and the way numbers and names are written.
 
-use crate::cutter::{Cutter, CutterShape};
+use cutter::{Cutter, CutterShape};
 
 /// Decimals of every coordinate: rounding moves a point by at most 0.05 µm along each axis.
 const DECIMALS: usize = 4;
@@ -75,8 +75,8 @@ pub(super) fn describe(cutter: &Cutter) -> String {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::geometry::Point3;
-    use crate::toolpath::{ClPoint, Move, MoveKind, Toolpath};
+    use geometry::Point3;
+    use motion::{ClPoint, Move, MoveKind, Toolpath};
 
     /// Over, down, along (and once to where it is already), up, up at rapid rate.
     pub fn example() -> Toolpath {
@@ -95,7 +95,7 @@ pub(super) mod tests {
 
     /// Moves of all kinds and feeds; one axis, two, three or none of them changes.
     pub fn random(moves: usize) -> Toolpath {
-        let mut rng = crate::sim::scenes::Rng::new(5);
+        let mut rng = sim::scenes::Rng::new(5);
         let mut tip = Point3::new(1.0, 2.0, 50.0);
         let start = ClPoint::upright(tip);
         let kinds = [MoveKind::Rapid, MoveKind::Plunge, MoveKind::Cut, MoveKind::Retract];

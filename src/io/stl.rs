@@ -13,8 +13,9 @@ mod tests;
 
 use std::path::Path;
 
-use super::mesh_file::{self, MeshFileError, MeshReadError, Parsed, Place, coordinate, number, unexpected};
-use crate::geometry::{Point3, RepairNotes, TriangleMesh};
+use super::mesh_file::{MeshFileError, MeshReadError, Parsed, Place, coordinate, number, unexpected};
+use crate::mesh_file;
+use geometry::{Point3, RepairNotes, TriangleMesh};
 
 /// Bytes before the first triangle.
 const HEADER: usize = 84;

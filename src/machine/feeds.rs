@@ -9,7 +9,7 @@
 
 use super::Machine;
 use super::time::{Block, profile};
-use crate::toolpath::{ClPoint, Move, MoveKind, Toolpath};
+use motion::{ClPoint, Move, MoveKind, Toolpath};
 
 /// Each feed of the series over the next lower one. Closer feeds make more F words, wider ones leave more
 /// of the braking to the control.
@@ -106,7 +106,7 @@ mod tests {
     use super::super::fixture::{machine, path};
     use super::super::machining_time;
     use super::*;
-    use crate::geometry::Point3;
+    use geometry::Point3;
     use proptest::prelude::*;
 
     const MACHINE: Machine = machine(50_000.0);

@@ -22,8 +22,8 @@
 //! the single axes and the control's block rate are not modelled: real machines take somewhat longer.
 
 use super::Machine;
-use crate::geometry::Vector3;
-use crate::toolpath::{Move, MoveKind, Toolpath};
+use geometry::Vector3;
+use motion::{Move, MoveKind, Toolpath};
 
 const SECONDS_PER_MINUTE: f64 = 60.0;
 

@@ -9,7 +9,7 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use super::ridges::NUMERICAL_FLOOR;
-use crate::geometry::Point2;
+use geometry::Point2;
 
 /// A square of the plan.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -97,7 +97,7 @@ pub(super) fn greatest(
             break;
         }
         spent += 4 * batch.len();
-        let quarters = crate::parallel::map(4 * batch.len(), |k| {
+        let quarters = work::parallel::map(4 * batch.len(), |k| {
             let (square, side) = (&batch[k / 4], |up: bool| if up { 0.5 } else { -0.5 });
             let half = 0.5 * square.half;
             let centre = Point2::new(

@@ -6,13 +6,13 @@
 //! on it does not depend on the grid, except that a move which is lowest nowhere on a cell centre
 //! nor next to one that is would be missed.
 
-use crate::geometry::{Point3, Vector3};
-use crate::sim::{Envelope, NOT_CUT, ZMap};
-use crate::toolpath::Toolpath;
+use geometry::{Point3, Vector3};
+use motion::Toolpath;
+use sim::{Envelope, NOT_CUT, ZMap};
 
 /// A point of the cut surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct CutPoint {
+pub struct CutPoint {
     /// Height, mm.
     pub z: f64,
     /// The move that cut it, or [`NOT_CUT`] where stock still stands.
@@ -20,7 +20,7 @@ pub(crate) struct CutPoint {
 }
 
 /// Up to nine different moves around a cell.
-pub(crate) struct Winners {
+pub struct Winners {
     moves: [u32; 9],
     len: usize,
     /// Height of stock that no move touched, if any cell around is such; infinite otherwise.
@@ -37,7 +37,7 @@ impl Winners {
 }
 
 /// A z-map together with the moves that made it.
-pub(crate) struct CutSurface<'a> {
+pub struct CutSurface<'a> {
     /// Closed-form heights of the moves.
     pub envelope: Envelope,
     /// Heights and winners at cell centres.
@@ -167,7 +167,7 @@ impl<'a> CutSurface<'a> {
 
 /// Where the line from a design point along its normal meets the cut surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Deviation {
+pub struct Deviation {
     /// Signed distance, mm: positive excess, negative gouge.
     pub distance: f64,
     /// Sine of the angle between the two surfaces there: how fast the distance changes sideways.

@@ -7,11 +7,12 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use crate::cutter::Cutter;
-use crate::geometry::{Point2, Vector2};
-use crate::monitor::{self, Cancelled, Monitor};
-use crate::sim::ENGAGED;
-use crate::toolpath::{MoveKind, Toolpath};
+use cutter::Cutter;
+use geometry::{Point2, Vector2};
+use motion::{MoveKind, Toolpath};
+use sim::ENGAGED;
+use work::monitor;
+use work::monitor::{Cancelled, Monitor};
 
 /// Cells a radius. More see thinner layers, and cost memory as their square.
 const CELLS_A_RADIUS: f64 = 60.0;
@@ -189,11 +190,10 @@ fn chord(ends: &[Point2; 2], radius: f64, y: f64) -> Option<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Point3, Region};
-    use crate::monitor::Silent;
-    use crate::toolpath::{
-        ClPoint, Flow, Joining, Move, Pattern, Plan, PlanSettings, Pocket, PocketStrategy, Step, plan_pocket,
-    };
+    use geometry::{Point3, Region};
+    use motion::{ClPoint, Move};
+    use toolpath::{Flow, Joining, Pattern, Plan, PlanSettings, Pocket, PocketStrategy, Step, plan_pocket};
+    use work::monitor::Silent;
 
     /// The path through `places` at z = -2 in stock up to 0, after a plunge to the first of them.
     fn through(places: &[(f64, f64)]) -> Toolpath {
@@ -285,7 +285,7 @@ mod tests {
 
     /// The shipped drawing.
     fn bracket() -> Region {
-        use crate::io::outline::{OutlineFormat, OutlineOptions, parse};
+        use io::outline::{OutlineFormat, OutlineOptions, parse};
         let drawing = include_bytes!("../../scenes/bracket.svg");
         let options = OutlineOptions { chord_tolerance: 0.0025, scale: None, layer: Some("pocket".into()) };
         parse(drawing, OutlineFormat::Svg, &options).unwrap().region
@@ -417,9 +417,9 @@ mod tests {
             ground.lower([b.xy(), b.xy()], 3.0, b.z, 0.0);
         }
         let centre = ground.origin + Vector2::new(0.5, 0.5) * ground.cell;
-        let grid = crate::sim::Grid { origin: centre, cell: ground.cell, nx: ground.nx, ny: ground.ny };
-        let stock = crate::sim::ZMap::block(grid, 0.0);
-        let cut = crate::sim::cut(stock, &Cutter::flat(6.0).unwrap(), &path, &Silent).unwrap();
+        let grid = sim::Grid { origin: centre, cell: ground.cell, nx: ground.nx, ny: ground.ny };
+        let stock = sim::ZMap::block(grid, 0.0);
+        let cut = sim::cut(stock, &Cutter::flat(6.0).unwrap(), &path, &Silent).unwrap();
         let differ = ground.lowest.iter().zip(&cut.height).filter(|(a, b)| (*a - *b).abs() > 1e-6).count();
         assert!(differ <= 2, "{differ} cells differ: only those on the rim to the last bits may");
     }

@@ -1,8 +1,8 @@
 //! What tests of measurements along normals share.
 
-use crate::geometry::{Point3, TriangleMesh};
-use crate::part::Part;
-use crate::toolpath::{ClPoint, Move, MoveKind, Toolpath};
+use geometry::{Point3, TriangleMesh};
+use motion::{ClPoint, Move, MoveKind, Toolpath};
+use part::Part;
 
 /// A path of an upright cutter through the tips of each pass, with a rapid to each.
 pub(super) fn path(passes: &[Vec<Point3>]) -> Toolpath {

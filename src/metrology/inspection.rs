@@ -4,16 +4,18 @@
 //! or below every cell centre, and the figures of what lies below and above the design, each with the
 //! bound of its error. mm.
 
-use super::closer::{self, Square, Value};
+use super::closer::{Square, Value};
 use super::cut_surface::{CutSurface, Deviation};
 use super::figures::{DeviationFigures, GougeFigures, GougeRegion, Limits, UncutFigures, UncutRegion};
 use super::regions::connected;
 use super::ridges::NUMERICAL_FLOOR;
-use crate::cutter::Cutter;
-use crate::geometry::{Point2, Point3};
-use crate::monitor::{self, Cancelled, Monitor};
-use crate::part::Part;
-use crate::sim::{Grid, NOT_CUT};
+use crate::closer;
+use cutter::Cutter;
+use geometry::{Point2, Point3};
+use part::Part;
+use sim::{Grid, NOT_CUT};
+use work::monitor;
+use work::monitor::{Cancelled, Monitor};
 
 /// Regions listed one by one in the figures; the rest is counted.
 const LISTED_REGIONS: usize = 20;
@@ -75,7 +77,7 @@ impl Inspection<'_> {
             let rows = first.saturating_sub(1)..(first + samples.len() / nx + 1).min(self.grid.ny);
             let origin = self.grid.centre(0, rows.start);
             let design = self.part.sample_grid(origin, self.grid.cell, nx, rows.len(), &Within(monitor))?;
-            crate::parallel::for_each_chunk(samples, nx, |j, row| {
+            work::parallel::for_each_chunk(samples, nx, |j, row| {
                 if monitor.cancelled() {
                     return;
                 }

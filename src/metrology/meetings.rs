@@ -6,10 +6,10 @@
 
 use super::cut_surface::{CutPoint, CutSurface};
 use super::tracks::Tracks;
-use crate::cutter::Cutter;
-use crate::geometry::Point2;
-use crate::sim::NOT_CUT;
-use crate::toolpath::Toolpath;
+use cutter::Cutter;
+use geometry::Point2;
+use motion::Toolpath;
+use sim::NOT_CUT;
 
 /// Two heights that differ by more than this, mm, do not meet.
 const MEETING: f64 = 1e-6;
@@ -26,7 +26,7 @@ const EDGE: f64 = 1e-6;
 
 /// A place where two cuts are equally high and none is lower.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Meeting {
+pub struct Meeting {
     /// Share of the line.
     pub t: f64,
     /// Where, mm.
@@ -38,7 +38,7 @@ pub(crate) struct Meeting {
 }
 
 /// Finds meetings on a cut surface.
-pub(crate) struct Meetings<'a> {
+pub struct Meetings<'a> {
     surface: &'a CutSurface<'a>,
     tracks: Tracks<'a>,
     /// Height of flat stock whose rim counts as a ridge, mm.

@@ -11,9 +11,10 @@
 
 use serde::Serialize;
 
-use crate::geometry::{NurbsSurface, OffsetSurface, Point3};
-use crate::parallel;
-use crate::part::{Part, Patch, PatchPoint};
+use geometry::{NurbsSurface, Point3};
+use offset::OffsetSurface;
+use part::{Part, Patch, PatchPoint};
+use work::parallel;
 
 /// Greatest angle, rad, between the way to the nearest point and the normal there; beyond, the nearest point
 /// lies on a border or a crease.
@@ -260,7 +261,7 @@ fn singular_places(part: &Part, radius: f64) -> Vec<SingularPlaceFigures> {
         let Patch::Nurbs(surface) = patch else { return Vec::new() };
         let outward = part.outward_sign(k);
         let Ok(offset) = OffsetSurface::new(surface, outward * radius) else { return Vec::new() };
-        let figures = |place: &crate::geometry::SingularPlace| SingularPlaceFigures {
+        let figures = |place: &offset::SingularPlace| SingularPlaceFigures {
             patch: k + 1,
             u: place.at[0],
             v: place.at[1],
@@ -278,7 +279,8 @@ fn singular_places(part: &Part, radius: f64) -> Vec<SingularPlaceFigures> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{CubicSpline, LoftSection, Point2, loft, loft_of_offsets};
+    use blade::{LoftSection, loft, loft_of_offsets};
+    use geometry::{CubicSpline, Point2};
     use std::f64::consts::TAU;
 
     /// Circles of a cone of half angle 20°, as closed splines.

@@ -18,12 +18,13 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::cutter::Cutter;
-use crate::geometry::Point3;
-use crate::monitor::{self, Cancelled, Monitor};
-use crate::part::Part;
-use crate::toolpath::Toolpath;
 use calculator::{Calculated, Calculator};
+use cutter::Cutter;
+use geometry::Point3;
+use motion::Toolpath;
+use part::Part;
+use work::monitor;
+use work::monitor::{Cancelled, Monitor};
 
 /// Calculated places along a ridge are this share of the ball's radius apart. More cost time, fewer miss how a ridge
 /// changes.
@@ -228,7 +229,7 @@ pub(super) fn pair_figures(
     }
     let calculator = Calculator::new(part, cutter, path);
     monitor.start("calculating scallops", places.len() as u64);
-    let found = crate::parallel::try_map(places.len().div_ceil(CHUNK), |k| {
+    let found = work::parallel::try_map(places.len().div_ceil(CHUNK), |k| {
         monitor::check(monitor)?;
         let run = &places[k * CHUNK..((k + 1) * CHUNK).min(places.len())];
         monitor.advance(run.len() as u64);

@@ -5,7 +5,7 @@
 //! that chords do not add to the figure; facets of a mesh part that the chord tolerance resolves do.
 
 use super::figures::PathFigures;
-use crate::toolpath::{MoveKind, Toolpath};
+use motion::{MoveKind, Toolpath};
 
 /// A turn sharper than this makes the machine brake, rad.
 const SHARP_TURN: f64 = std::f64::consts::PI / 6.0;
@@ -51,8 +51,8 @@ pub fn path_figures(path: &Toolpath, machining_time_s: f64) -> PathFigures {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Point3;
-    use crate::toolpath::{ClPoint, Move};
+    use geometry::Point3;
+    use motion::{ClPoint, Move};
     use std::f64::consts::{FRAC_PI_2, PI};
 
     fn to(x: f64, y: f64, z: f64, kind: MoveKind, pass: u32) -> Move {

@@ -6,11 +6,11 @@
 
 use serde::Serialize;
 
-use crate::cutter::Cutter;
-use crate::geometry::{Point2, Region, SegmentGrid, Vector2, foot};
-use crate::parallel;
-use crate::sim::ZMap;
-use crate::toolpath::Toolpath;
+use cutter::Cutter;
+use geometry::{Point2, Region, SegmentGrid, Vector2, foot};
+use motion::Toolpath;
+use sim::ZMap;
+use work::parallel;
 
 /// A cell counts as cut when it lies lower than the stock's top by more than this, mm: stored heights
 /// round.
@@ -129,10 +129,10 @@ pub fn wall_gouge_of_cells(region: &Region, cut: &ZMap, top: f64) -> (f64, f64) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Point3;
-    use crate::monitor::Silent;
-    use crate::sim::{Grid, cut};
-    use crate::toolpath::{ClPoint, Move, MoveKind};
+    use geometry::Point3;
+    use motion::{ClPoint, Move, MoveKind};
+    use sim::{Grid, cut};
+    use work::monitor::Silent;
 
     /// A straight pass planted nearer to the wall than the radius, and one right through it.
     #[test]

@@ -16,10 +16,11 @@ use super::inspection::{Inspection, Within};
 use super::ridges::{Hidden, NUMERICAL_FLOOR};
 use super::unseen::{Dip, unseen_depth};
 use super::{Inspected, inspect};
-use crate::geometry::Point2;
-use crate::monitor::{self, Cancelled, Monitor};
-use crate::sim::{Envelope, Grid, ZMap, cut};
-use crate::toolpath::Toolpath;
+use geometry::Point2;
+use motion::Toolpath;
+use sim::{Envelope, Grid, ZMap, cut};
+use work::monitor;
+use work::monitor::{Cancelled, Monitor};
 
 /// Cells of the grid along the side of a rectangle. More are cut for nothing around a place; fewer share
 /// less of what each rectangle costs, which grows with the moves of the path.
@@ -204,7 +205,7 @@ impl Refinement<'_> {
             }
             let cell = grid.cell / parts as f64;
             let corner = 0.5 * (grid.cell - cell);
-            let origin = grid.centre(i0, j0) - crate::geometry::Vector2::new(corner, corner);
+            let origin = grid.centre(i0, j0) - geometry::Vector2::new(corner, corner);
             let fine = Grid { origin, cell, nx, ny };
             let (found, hidden) = self.measure(fine, monitor)?;
             refined.finest_cell = refined.finest_cell.min(cell);

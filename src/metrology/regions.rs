@@ -1,6 +1,6 @@
 //! Connected regions of cells.
 
-use crate::sim::Grid;
+use sim::Grid;
 
 /// The 8-connected regions of cells for which `inside` holds, each a list of cell indices in the
 /// order in which they were reached; regions in the order of their first cell.
@@ -36,7 +36,7 @@ pub(super) fn connected(grid: &Grid, inside: &dyn Fn(usize) -> bool) -> Vec<Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Point2;
+    use geometry::Point2;
 
     #[test]
     fn regions_join_over_corners_and_stay_apart_over_gaps() {

@@ -6,9 +6,9 @@
 
 use serde::Serialize;
 
-use crate::geometry::Vector3;
-use crate::sim::{MoveRemoval, RapidContact, Removal, VoxelRemoval};
-use crate::toolpath::{MoveKind, Toolpath};
+use geometry::Vector3;
+use motion::{MoveKind, Toolpath};
+use sim::{MoveRemoval, RapidContact, Removal, VoxelRemoval};
 
 /// Rates are means over consecutive feed moves of at least so many cells of travel. Fewer let the
 /// cells show that a steep cutter clears at a time; more smooth true peaks away.
@@ -188,11 +188,11 @@ fn rates(figures: &mut RemovalFigures, path: &Toolpath, found: &Found<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cutter::Cutter;
-    use crate::geometry::{Point2, Point3};
-    use crate::monitor::Silent;
-    use crate::sim::{Grid, ZMap, cut_in_order};
-    use crate::toolpath::{ClPoint, Move};
+    use cutter::Cutter;
+    use geometry::{Point2, Point3};
+    use motion::{ClPoint, Move};
+    use sim::{Grid, ZMap, cut_in_order};
+    use work::monitor::Silent;
 
     /// A flat end of 6 mm in a slot 2 mm deep at 600 mm/min, in moves of 1 mm, with rapids about it.
     fn slot(rapid_height: f64) -> (Toolpath, RemovalFigures) {

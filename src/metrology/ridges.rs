@@ -15,12 +15,14 @@ use super::cut_surface::CutSurface;
 use super::figures::{Limits, ScallopFigures};
 use super::meetings::{Meeting, Meetings};
 use super::pairs::{PairTally, RidgeCrossing};
-use crate::cutter::Cutter;
-use crate::geometry::{Point2, Point3, Vector2};
-use crate::monitor::{self, Cancelled, Monitor};
-use crate::part::{Part, SurfacePoint};
-use crate::sim::Grid;
-use crate::toolpath::{Toolpath, distance_to_segment};
+use cutter::Cutter;
+use geometry::distance_to_segment;
+use geometry::{Point2, Point3, Vector2};
+use motion::Toolpath;
+use part::{Part, SurfacePoint};
+use sim::Grid;
+use work::monitor;
+use work::monitor::{Cancelled, Monitor};
 
 /// One crossing of a ridge with a grid line.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -178,7 +180,7 @@ impl<'a> RidgeFinder<'a> {
         let on_part = |k: usize| !deviation(k).is_nan();
         let low = |k: usize| f64::from(deviation(k)) <= self.limits.uncut;
         monitor.start("measuring ridges", grid.ny as u64);
-        let rows = crate::parallel::try_map(grid.ny, |j| {
+        let rows = work::parallel::try_map(grid.ny, |j| {
             monitor::check(monitor)?;
             let (mut samples, mut hidden) = (Vec::new(), Vec::new());
             for i in 0..grid.nx {
@@ -291,7 +293,7 @@ impl<'a> RidgeFinder<'a> {
         let mut open: Vec<&RidgeSample> = samples.iter().filter(|s| s.might_rise_above(first)).collect();
         let mut lines = CLOSER_LINES;
         while !open.is_empty() {
-            let closer = crate::parallel::map(open.len(), |k| self.closer(open[k], lines));
+            let closer = work::parallel::map(open.len(), |k| self.closer(open[k], lines));
             for sample in closer.iter().flatten() {
                 if sample.height > highest.height {
                     (highest.height, highest.at) = (sample.height, sample.at);

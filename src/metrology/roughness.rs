@@ -18,11 +18,12 @@ use serde::Serialize;
 use super::along_normals::{AlongNormal, NormalHit};
 use super::ridges::NUMERICAL_FLOOR;
 use super::tracks::Tracks;
-use crate::cutter::Cutter;
-use crate::geometry::{Point3, Vector3};
-use crate::monitor::{self, Cancelled, Monitor};
-use crate::part::Part;
-use crate::toolpath::Toolpath;
+use cutter::Cutter;
+use geometry::{Point3, Vector3};
+use motion::Toolpath;
+use part::Part;
+use work::monitor;
+use work::monitor::{Cancelled, Monitor};
 
 /// Profiles over the part. More tell more of a part whose roughness changes, and take longer.
 const PROFILES: usize = 24;
@@ -107,7 +108,7 @@ pub fn roughness(
     let profiler = Profiler { part, path, engine, tracks: &tracks, step };
     monitor.start("measuring roughness", PROFILES as u64);
     let places = places(part, PROFILES);
-    let found = crate::parallel::try_map(places.len(), |k| {
+    let found = work::parallel::try_map(places.len(), |k| {
         monitor::check(monitor)?;
         let profile = profiler.profile(&places[k]);
         monitor.advance(1);

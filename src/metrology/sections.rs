@@ -55,7 +55,7 @@ pub fn section_figures(map: &NormalMap, heights: &[f64], parameters: &[&[f64]]) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::metrology::PatchGrid;
+    use crate::PatchGrid;
 
     #[test]
     fn each_section_takes_the_rows_nearest_to_it_of_all_patches() {

@@ -1,8 +1,8 @@
 //! Which moves belong to neighbouring tracks rather than to one.
 
-use crate::cutter::Cutter;
-use crate::geometry::Point3;
-use crate::toolpath::{MoveKind, Toolpath};
+use cutter::Cutter;
+use geometry::Point3;
+use motion::{MoveKind, Toolpath};
 
 /// Two moves of one pass that lie farther apart along the path than this many cutter radii are
 /// neighbouring turns of a spiral or loop, not neighbouring chords.

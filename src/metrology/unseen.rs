@@ -3,11 +3,12 @@
 //! Enters: part, cutter, path, and the pitch of the cells. Leaves: how deep such a dip may be at most, and,
 //! where that is too much, the places of moves that stand deeper in the design than what the cells saw. mm.
 
-use crate::cutter::Cutter;
-use crate::geometry::{Point2, Point3};
-use crate::monitor::{self, Cancelled, Monitor};
-use crate::part::Part;
-use crate::toolpath::Toolpath;
+use cutter::Cutter;
+use geometry::{Point2, Point3};
+use motion::Toolpath;
+use part::Part;
+use work::monitor;
+use work::monitor::{Cancelled, Monitor};
 
 /// Most places looked at along one move: longer moves at a wider pitch. 3 µs each.
 const MOST_ON_A_MOVE: f64 = 1e5;
@@ -50,7 +51,7 @@ pub(super) fn dips(
     monitor: &dyn Monitor,
 ) -> Result<Vec<Dip>, Cancelled> {
     let bounds = part.bounds();
-    let deepest = crate::parallel::try_map(path.len(), |k| {
+    let deepest = work::parallel::try_map(path.len(), |k| {
         monitor::check(monitor)?;
         let (from, to) = (path.start_of(k), path.moves[k].to.tip);
         if from.z.min(to.z) > bounds.max.z {
@@ -95,10 +96,10 @@ fn dip_at(part: &Part, cutter: &Cutter, tip: &Point3) -> Option<Dip> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{AnalyticShape, AnalyticSurface};
-    use crate::monitor::Silent;
-    use crate::part::Patch;
-    use crate::sim::scenes::path_through;
+    use geometry::{AnalyticShape, AnalyticSurface};
+    use part::Patch;
+    use sim::scenes::path_through;
+    use work::monitor::Silent;
 
     #[test]
     fn the_deepest_place_of_a_move_is_that_of_its_cutter() {

@@ -1,6 +1,6 @@
 //! One parametric patch of a part, whatever it is made of.
 
-use crate::geometry::{AnalyticSurface, Jet2, NurbsSurface, Point3, Vector3, unit_normal};
+use geometry::{AnalyticSurface, Jet2, NurbsSurface, Point3, Vector3, normal_at};
 
 /// A parametric patch.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,7 +81,7 @@ impl Patch {
     }
 }
 
-/// Normal of a jet at `[u, v]`; at a pole its limit, or that of the surface close by; up where there is none.
-pub(super) fn normal_of(surface: &NurbsSurface, jet: &Jet2, [u, v]: [f64; 2]) -> Vector3 {
-    jet.normal().or_else(|| unit_normal(surface, u, v)).unwrap_or_else(Vector3::z)
+/// Normal of a jet at parameters; at a pole its limit, or that of the surface close by; up where there is none.
+pub(super) fn normal_of(surface: &NurbsSurface, jet: &Jet2, at: [f64; 2]) -> Vector3 {
+    normal_at(surface, jet, at).unwrap_or_else(Vector3::z)
 }

@@ -3,7 +3,7 @@
 
 use super::Patch;
 use super::patch::normal_of;
-use crate::geometry::{AnalyticSurface, Jet2, NurbsSurface, Point3, Vector3};
+use geometry::{AnalyticSurface, Jet2, NurbsSurface, Point3, Vector3};
 
 /// Newton steps at most. Regular points take two to five; the rest is for starts beside poles,
 /// silhouettes and centres of curvature.

@@ -6,9 +6,9 @@
 //! triangle order, so any number of threads gives the same bits.
 
 use super::{Part, ROUNDING, refine};
-use crate::geometry::{Point2, Point3, Vector3};
-use crate::monitor::{Cancelled, Monitor, check};
-use crate::parallel;
+use geometry::{Point2, Point3, Vector3};
+use work::monitor::{Cancelled, Monitor, check};
+use work::parallel;
 
 /// In [`GridSample::triangle`]: the cell's centre is off the part.
 pub const OFF_PART: u32 = u32::MAX;

@@ -1,8 +1,8 @@
 use super::*;
-use crate::geometry::{AnalyticShape, AnalyticSurface, NurbsSurface, Point2, samples};
-use crate::monitor::{Cancelled, Monitor, Silent};
 use approx::assert_relative_eq;
+use geometry::{AnalyticShape, AnalyticSurface, NurbsSurface, Point2, samples};
 use proptest::prelude::*;
+use work::monitor::{Cancelled, Monitor, Silent};
 
 fn nurbs_part(s: NurbsSurface, tolerance: f64) -> Part {
     Part::from_patches(vec![Patch::Nurbs(s)], tolerance).unwrap()

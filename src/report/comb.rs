@@ -12,7 +12,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::ops::Range;
 
 use super::scale::{plain, round_up, ticks};
-use crate::geometry::{CubicSpline, Point2, Vector2};
+use geometry::{CubicSpline, Point2, Vector2};
 
 /// Width of the drawing; the page shows it at half of that, since the backend rounds to whole units.
 const WIDTH: f64 = 1440.0;

@@ -4,9 +4,9 @@
 use super::canvas::{Align, FAINT_INK, INK, PAPER, Picture, Rgb, Strokes, TextSize, distance_to_segment_2d};
 use super::map::{Key, MapSize, MapWords, OFF_PART, Pooled, Pooling, diverging, draw, labelled, pool};
 use super::scale::Unit;
-use crate::field::mesh::SingularPoint;
-use crate::sim::Grid;
-use crate::toolpath::{PassPoint, PlannedField};
+use field::mesh::SingularPoint;
+use field::{PassPoint, PlannedField};
+use sim::Grid;
 
 /// Colours of levels of ψ, and of singular points of positive and of negative index.
 const LEVEL: Rgb = [150, 190, 226];
@@ -231,8 +231,8 @@ fn lines(page: &mut Picture, grid: &Grid, map: &Pooled, field: &PlannedField) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Point2, Point3, Vector2};
-    use crate::toolpath::FeedSample;
+    use field::FeedSample;
+    use geometry::{Point2, Point3, Vector2};
 
     const WORDS: MapWords<'_> =
         MapWords { title: "a title", subtitle: "a subtitle", marks: &[], axes: ["x", "y"] };

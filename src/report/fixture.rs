@@ -1,7 +1,7 @@
 //! A small made-up measurement for the tests of this folder.
 
 use super::{RunReport, SimulationFigures, SurfaceMeshFigures, ToolpathResult, Verdict, violations};
-use crate::metrology::{
+use metrology::{
     DeviationFigures, GougeFigures, GougeRegion, Limits, Measurement, PairFigures, PathFigures, Refined,
     RoughnessFigures, ScallopFigures, ScallopPair, UncutFigures,
 };

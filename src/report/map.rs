@@ -5,9 +5,9 @@ use image::imageops::{self, FilterType};
 
 use super::canvas::{Align, FAINT_INK, INK, PAPER, Picture, Rgb, TextSize, shortened};
 use super::scale::{Unit, plain, round_down, round_up, ticks};
-use crate::geometry::{Point2, Vector2};
-use crate::metrology::Limits;
-use crate::sim::Grid;
+use geometry::{Point2, Vector2};
+use metrology::Limits;
+use sim::Grid;
 
 /// Colours of a key, an odd number so that its middle is one of them. Fewer show as bands; many more,
 /// and the picture with its letters no longer fits into a palette of 256, which doubles its bytes.
@@ -123,7 +123,7 @@ pub(super) fn pool(grid: &Grid, values: &[f32], pooling: Pooling, size: MapSize)
         });
         pooled(cells.map(|k| values[k]).filter(|v| v.is_finite()), pooling)
     };
-    let values = crate::parallel::map(width * height, one);
+    let values = work::parallel::map(width * height, one);
     Pooled { width, height, magnify, values, pixel: grid.cell * block as f64 / magnify as f64 }
 }
 

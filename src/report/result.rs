@@ -3,12 +3,12 @@
 use serde::Serialize;
 
 use super::verdict::{Verdict, Violation};
-use crate::machine::kinematics::{JointReport, Kinematics};
-use crate::metrology::{
+use field::{PassPoint, PlannedField, ShortestPossible};
+use machine::kinematics::{JointReport, Kinematics};
+use metrology::{
     DeviationFigures, GougeFigures, Limits, OffsetFigures, PairFigures, PathFigures, PocketFigures,
     RemovalFigures, RoughnessFigures, ScallopFigures, SectionFigures, UncutFigures,
 };
-use crate::toolpath::{PassPoint, PlannedField, ShortestPossible};
 
 /// How a toolpath was cut.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -238,7 +238,7 @@ impl FieldFigures {
         let interval_over_allowed = (|| {
             Some(IntervalFigures { p5: at(0.05)?, p50: at(0.5)?, p95: at(0.95)?, max: *ratios.last()? })
         })();
-        let point = |s: &crate::field::mesh::SingularPoint| SingularPointFigures {
+        let point = |s: &field::mesh::SingularPoint| SingularPointFigures {
             at_mm: s.position.into(),
             index: 0.5 * f64::from(s.half_turns),
         };

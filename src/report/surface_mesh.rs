@@ -15,13 +15,13 @@ mod tests;
 
 use std::collections::HashMap;
 
-use crate::cutter::Cutter;
-use crate::geometry::Point3;
-use crate::part::Part;
-use crate::sim::ZMap;
-use crate::toolpath::Toolpath;
+use cutter::Cutter;
+use geometry::Point3;
+use motion::Toolpath;
 use network::{Network, Scratch};
+use part::Part;
 use ridge_points::RidgePoints;
+use sim::ZMap;
 use split::Corner;
 
 /// More triangles than this and the tolerance is grown: programs that view STL files grow slow, and a
@@ -72,7 +72,7 @@ impl SurfaceMesh {
     /// Signed deviation from the design surface at every vertex, mm: that of `map` (a value a cell) at
     /// cell centres, the distance from `part` on ridges; NaN off the part and at the bottom.
     pub fn deviations(&self, part: &Part, map: &[f32]) -> Vec<f32> {
-        crate::parallel::map(self.vertices.len(), |k| match self.places[k] {
+        work::parallel::map(self.vertices.len(), |k| match self.places[k] {
             VertexPlace::Cell(cell) => map[cell as usize],
             VertexPlace::Bottom => f32::NAN,
             VertexPlace::Ridge => {

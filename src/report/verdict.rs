@@ -19,9 +19,9 @@ use serde::Serialize;
 
 use super::map::MapMark;
 use super::table::{micrometres, with_bound};
-use crate::metrology::{Limits, Measurement, PocketFigures, RemovalFigures};
-use crate::sim::{HolderClearance, StandingHits};
-use crate::toolpath::Shortfall;
+use collision::Shortfall;
+use metrology::{Limits, Measurement, PocketFigures, RemovalFigures};
+use sim::{HolderClearance, StandingHits};
 
 /// The highest ridge may exceed the scallop tolerance by this factor. Less fails plans for single
 /// points of a few per cent; more lets visible ridges pass.
@@ -299,8 +299,8 @@ fn others(region_count: usize) -> String {
 mod tests {
     use super::super::fixture::{LIMITS, measurement};
     use super::*;
-    use crate::metrology::UncutRegion;
-    use crate::sim::Collision;
+    use metrology::UncutRegion;
+    use sim::Collision;
 
     #[test]
     fn a_limit_is_violated_above_it_and_not_at_it() {
@@ -346,7 +346,7 @@ mod tests {
 
     #[test]
     fn the_first_rapid_in_stock_is_told_with_its_line() {
-        use crate::metrology::RapidContactFigures;
+        use metrology::RapidContactFigures;
         assert_eq!(rapid_violation(&RemovalFigures::default()), None);
         let contact =
             |depth_mm| RapidContactFigures { move_index: 7, line: 12, at_mm: [1.0, 2.0, 3.0], depth_mm };
@@ -361,7 +361,7 @@ mod tests {
 
     #[test]
     fn a_collision_names_section_move_and_line() {
-        let at = crate::geometry::Point3::new(1.0, 2.0, 3.0);
+        let at = geometry::Point3::new(1.0, 2.0, 3.0);
         let one = Collision { move_index: 4, section: 1, at, depth: 0.5, error_bound: 0.1 };
         let collisions = vec![one, Collision { move_index: 6, depth: 2.25, ..one }];
         let mut holder = HolderClearance {
@@ -384,8 +384,8 @@ mod tests {
 
     #[test]
     fn a_holder_in_standing_stock_is_told_with_its_place_and_line() {
-        let at = crate::geometry::Point3::new(1.0, 2.0, 3.0);
-        let worst = crate::sim::HolderHit { move_index: 2, section: 1, at, depth: 0.75 };
+        let at = geometry::Point3::new(1.0, 2.0, 3.0);
+        let worst = sim::HolderHit { move_index: 2, section: 1, at, depth: 0.75 };
         let hits = StandingHits { moves: vec![2, 5, 9], worst: Some(worst) };
         let found = standing_collision(&hits, 0.3, &[4, 5, 6]).unwrap();
         assert_eq!((found.what, found.measured_mm), ("collision", 0.75));

@@ -2,9 +2,9 @@
 //! ascending list of the moves that may cut there.
 
 use super::Grid;
-use crate::geometry::Point3;
-use crate::parallel;
-use crate::toolpath::Toolpath;
+use geometry::Point3;
+use motion::Toolpath;
+use work::parallel;
 
 /// Moves that one worker sorts into bins at a time. Fewer cost a table of bins each; more leave
 /// workers idle on short paths.
@@ -186,8 +186,8 @@ impl Piece {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Point2;
-    use crate::sim::scenes::path_through;
+    use crate::scenes::path_through;
+    use geometry::Point2;
     use proptest::prelude::*;
 
     fn distance(x: f64, y: f64, a: Point3, b: Point3) -> f64 {
@@ -226,7 +226,7 @@ mod tests {
     #[test]
     fn chunks_join_in_order() {
         let grid = Grid { origin: Point2::new(0.5, 0.5), cell: 1.0, nx: 20, ny: 12 };
-        let mut rng = crate::sim::scenes::Rng::new(4);
+        let mut rng = crate::scenes::Rng::new(4);
         let tips = (0..150_000).map(|_| Point3::new(rng.within(-2.0, 22.0), rng.within(-2.0, 14.0), 0.0));
         let near = |tip: Point3, k: usize| Point3::new(tip.x + 0.01 * (k % 7) as f64, tip.y, 0.0);
         let path = path_through(tips.enumerate().flat_map(|(k, tip)| [tip, near(tip, k)]).take(150_000));

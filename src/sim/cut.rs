@@ -24,18 +24,20 @@ mod tests;
 
 use super::bins::MoveBins;
 use super::form::{Family, Form};
-use super::sweep::{self, Ball, Flat, LocalMove, Rounded, Sweep};
+use super::sweep::{Ball, Flat, LocalMove, Rounded, Sweep};
 use super::tiles::{TileCells, tiles};
 use super::track::Track;
 use super::{Grid, NOT_CUT, ZMap, cut_reference};
-use crate::cutter::Cutter;
-use crate::geometry::Point3;
-use crate::lanes::{self, Real};
-use crate::monitor::{Cancelled, Monitor, check};
-use crate::parallel;
-use crate::toolpath::Toolpath;
+use crate::sweep;
 use choose::{Chooser, FEW, SQUARES, Square, ones};
+use cutter::Cutter;
+use geometry::Point3;
 use local::{Chunk, Frame, MoveList, Name};
+use motion::Toolpath;
+use work::lanes;
+use work::lanes::Real;
+use work::monitor::{Cancelled, Monitor, check};
+use work::parallel;
 
 /// Cells along the side of a leaf. Smaller leaves keep fewer moves and ask for them more often.
 const LEAF: usize = 8;

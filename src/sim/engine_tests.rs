@@ -3,12 +3,12 @@
 
 use super::scenes::{Rng, cutters, path_through, random_path, square_grid, wave_path};
 use super::{Grid, NOT_CUT, ZMap, cut, cut_reference};
-use crate::cutter::Cutter;
-use crate::geometry::{Point2, Point3};
-use crate::monitor::{Cancelled, Monitor, Silent};
-use crate::toolpath::{MoveKind, Toolpath};
+use cutter::Cutter;
+use geometry::{Point2, Point3};
+use motion::{MoveKind, Toolpath};
 use proptest::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
+use work::monitor::{Cancelled, Monitor, Silent};
 
 /// An engine and what it promises.
 struct Engine {

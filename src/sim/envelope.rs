@@ -3,10 +3,10 @@
 use super::form::{Family, Form};
 use super::swept::{ball_height, swept_height, swept_height_and_normal};
 use super::track::Track;
-use crate::cutter::Cutter;
-use crate::geometry::Vector3;
-use crate::parallel;
-use crate::toolpath::Toolpath;
+use cutter::Cutter;
+use geometry::Vector3;
+use motion::Toolpath;
+use work::parallel;
 
 /// All moves of a path, ready to be evaluated one by one: 64 bytes a move. mm.
 #[derive(Debug, Clone)]
@@ -71,9 +71,9 @@ impl Envelope {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Point3;
-    use crate::sim::SweptMove;
-    use crate::sim::scenes::{Rng, cutters, random_path};
+    use crate::SweptMove;
+    use crate::scenes::{Rng, cutters, random_path};
+    use geometry::Point3;
 
     #[test]
     fn the_envelope_is_the_lowest_of_the_swept_moves() {
@@ -103,7 +103,7 @@ mod tests {
     #[test]
     fn of_equal_moves_the_first_wins() {
         let cutter = Cutter::flat(6.0).unwrap();
-        let path = crate::sim::scenes::path_through([0.0, 1.0, 2.0].map(|x| Point3::new(x, 0.0, 0.0)));
+        let path = crate::scenes::path_through([0.0, 1.0, 2.0].map(|x| Point3::new(x, 0.0, 0.0)));
         assert_eq!(Envelope::new(&cutter, &path).lowest(1.0, 0.5, &[1, 0]), Some((0.0, 0)));
     }
 }

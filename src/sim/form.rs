@@ -1,7 +1,7 @@
 //! The cutter's profile prepared for sweeping, and which formula sweeps it. The profile itself is
 //! defined by [`Cutter`]. mm.
 
-use crate::cutter::{Cutter, Profile};
+use cutter::{Cutter, Profile};
 
 /// Which formula sweeps the profile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! A regular grid of cells over a rectangle of the plane, mm.
 
-use crate::geometry::{Aabb, Point2};
+use geometry::{Aabb, Point2};
 
 /// Cell centres `(x0 + i·cell, y0 + j·cell)` for `i < nx`, `j < ny`; arrays over a grid are
 /// `[ny][nx]`, row-major.
@@ -135,7 +135,7 @@ impl Grid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Point3;
+    use geometry::Point3;
 
     #[test]
     fn the_cell_that_is_said_to_fit_does_fit() {

@@ -15,11 +15,11 @@ use super::ZMap;
 use super::form::Form;
 use super::swept::swept_height;
 use super::track::{Track, larger, smaller};
-use crate::cutter::Holder;
-use crate::geometry::{Point2, Point3, Vector3};
-use crate::monitor::{Cancelled, Monitor, check};
-use crate::parallel;
-use crate::toolpath::Toolpath;
+use cutter::Holder;
+use geometry::{Point2, Point3, Vector3};
+use motion::Toolpath;
+use work::monitor::{Cancelled, Monitor, check};
+use work::parallel;
 
 /// Squares of one level of the pyramid along the side of one of the next. Two asks for more levels,
 /// eight bounds more loosely.
@@ -327,10 +327,10 @@ impl Pyramid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cutter::{Cutter, HolderSection};
-    use crate::monitor::Silent;
-    use crate::sim::scenes::{Rng, path_through, random_path, square_grid};
-    use crate::sim::{SweptMove, cut_reference};
+    use crate::scenes::{Rng, path_through, random_path, square_grid};
+    use crate::{SweptMove, cut_reference};
+    use cutter::{Cutter, HolderSection};
+    use work::monitor::Silent;
 
     fn holder() -> Holder {
         let section = |diameter, top_diameter, length| HolderSection { diameter, top_diameter, length };

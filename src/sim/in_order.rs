@@ -24,15 +24,15 @@ use super::bins::MoveBins;
 use super::form::Form;
 use super::track::Track;
 use super::{Grid, NOT_CUT, ZMap};
-use crate::cutter::Cutter;
-use crate::geometry::Point3;
-use crate::monitor::{Cancelled, Monitor, check};
-use crate::parallel;
-use crate::toolpath::Toolpath;
+use cutter::Cutter;
+use geometry::Point3;
 use leaf::Tally;
+use motion::Toolpath;
 #[doc(hidden)]
 pub use plain::cut_in_order_plain;
 use tile::{SIDE, Tile};
+use work::monitor::{Cancelled, Monitor, check};
+use work::parallel;
 
 /// A cell counts as engaged by a move that lowers it by more than this, mm. Below the rounding of a
 /// stored height (0.06 µm at a metre) moves that meet on one surface would seem to cut each other's

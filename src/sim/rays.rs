@@ -19,12 +19,12 @@ mod tests;
 use std::cell::Cell;
 
 use super::solid::{Moving, OppositeAxes, SweptMoves, below};
-use crate::cutter::Solid;
-use crate::geometry::{Node, Point3, Vector3};
-use crate::monitor::{Cancelled, Monitor, check};
-use crate::parallel;
-use crate::toolpath::{Move, MoveKind, Toolpath};
+use cutter::Solid;
+use geometry::{Node, Point3, Vector3};
 use lowest::{Ray, Support};
+use motion::{Move, MoveKind, Toolpath};
+use work::monitor::{Cancelled, Monitor, check};
+use work::parallel;
 
 /// Moves that reach equally low within this, mm, are equal: the end of one move and the begin of the next
 /// are the same tool, but for rounding.
@@ -140,7 +140,7 @@ impl Rays {
     }
 
     /// As [`Rays::deviation`], beginning with what was found nearby; tells where it was found.
-    pub(crate) fn deviation_near(
+    pub fn deviation_near(
         &self,
         point: &Point3,
         normal: &Vector3,

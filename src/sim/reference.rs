@@ -17,11 +17,11 @@ use super::swept::{ball_height, flat_height, rounded_height_below};
 use super::tiles::{TileCells, tiles};
 use super::track::{Track, larger, smaller};
 use super::{Grid, NOT_CUT, ZMap};
-use crate::cutter::Cutter;
-use crate::geometry::Point2;
-use crate::monitor::{Cancelled, Monitor, check};
-use crate::parallel;
-use crate::toolpath::Toolpath;
+use cutter::Cutter;
+use geometry::Point2;
+use motion::Toolpath;
+use work::monitor::{Cancelled, Monitor, check};
+use work::parallel;
 
 /// Cells along the side of a block. Larger blocks bound the moves more loosely, smaller ones spend
 /// more on bounds than on cells.

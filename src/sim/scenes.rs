@@ -1,9 +1,9 @@
 //! Cutters, paths and random numbers that the tests of this stage share.
 
 use super::Grid;
-use crate::cutter::{AptWords, Cutter};
-use crate::geometry::{Point2, Point3};
-use crate::toolpath::{ClPoint, Move, MoveKind, Toolpath};
+use cutter::{AptWords, Cutter};
+use geometry::{Point2, Point3};
+use motion::{ClPoint, Move, MoveKind, Toolpath};
 
 /// Steele and Vigna's SplitMix64: the same numbers on every machine.
 pub struct Rng(u64);

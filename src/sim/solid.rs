@@ -10,20 +10,20 @@
 //! bends therefore bound the distance from below at all other times, which both the tree and the search
 //! for the nearest time rest on.
 
-mod motion;
 mod moves;
 mod search;
 #[cfg(test)]
 pub(crate) mod tests;
+mod turning;
 
-use crate::cutter::Solid;
-use crate::geometry::Point3;
-use crate::toolpath::ClPoint;
-pub(crate) use motion::Motion;
+use cutter::Solid;
+use geometry::Point3;
+use motion::ClPoint;
 pub(crate) use moves::Part;
 pub use moves::{SweptHit, SweptMoves};
 use search::least;
 pub(crate) use search::{Look, Moving, SHORTEST, Stretch};
+pub use turning::Motion;
 
 /// A move turns the axis to its very opposite, so that nobody can tell which way round.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

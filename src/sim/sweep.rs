@@ -18,7 +18,7 @@ mod tests;
 
 use super::form::Form;
 use super::track::Track;
-use crate::lanes::Real;
+use work::lanes::Real;
 
 /// One straight move of the tip, seen from a point on the line of its track. In f32 that is the point next to the
 /// middle of a tile: all numbers that matter are then no larger than the cutter and the tile.

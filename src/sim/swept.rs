@@ -14,8 +14,8 @@ pub(super) mod tests;
 
 use super::form::{Family, Form};
 use super::track::{Track, larger, smaller};
-use crate::cutter::Cutter;
-use crate::geometry::{Point3, Vector3};
+use cutter::Cutter;
+use geometry::{Point3, Vector3};
 
 /// The volume that a cutter sweeps along one straight move, seen from above: its lower envelope.
 ///

@@ -1,7 +1,7 @@
 //! A straight move of the tip in the frame in which all swept cutters are evaluated: how far
 //! along, how far across, and how steeply it rises. mm.
 
-use crate::geometry::Point3;
+use geometry::Point3;
 
 /// Moves shorter than this in the plan view, mm, count as plunges: only their lower end cuts. When
 /// it grows, the plan-view travel of steep ramps is neglected; far below 1e-12 the slope of a

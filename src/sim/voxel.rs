@@ -29,21 +29,21 @@ mod tests;
 mod vertex;
 
 use super::solid::OppositeAxes;
-use crate::cutter::Solid;
-use crate::geometry::{Point3, Vector3};
-use crate::monitor::{Cancelled, Monitor, check};
-use crate::parallel;
-use crate::toolpath::{MoveKind, Toolpath};
 use bricks::{BRICK, Block, Brick, Bricks, Lattice, STEPS, slot_of};
 use cells::Cells;
+use cutter::Solid;
 use divide::{Divider, Found};
+use geometry::{Point3, Vector3};
 pub use line::LineExit;
+use motion::{MoveKind, Toolpath};
 use moves::Parts;
 pub use removal::VoxelRemoval;
 pub use standing::{HolderHit, StandingHits};
 use std::sync::atomic::{AtomicU64, Ordering};
 pub use stock::{Axis, StockMesh, VoxelStock};
 pub use surface::VoxelSurface;
+use work::monitor::{Cancelled, Monitor, check};
+use work::parallel;
 
 /// Why voxels could not be cut.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -132,7 +132,7 @@ pub struct VoxelEngine<'a> {
 }
 
 impl<'a> VoxelEngine<'a> {
-    /// Prepares the moves of `path`, coordinates up to [`MAX_COORDINATE`](crate::geometry::MAX_COORDINATE).
+    /// Prepares the moves of `path`, coordinates up to [`MAX_COORDINATE`](geometry::MAX_COORDINATE).
     ///
     /// # Errors
     /// [`VoxelError::Stock`], [`VoxelError::Axes`].

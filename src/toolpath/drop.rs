@@ -19,11 +19,11 @@ mod roof;
 mod tests;
 mod touch;
 
-use crate::cutter::Cutter;
-use crate::geometry::{BoxTree, Bvh, Extent, Feature, Jet2, Node, Paired, TriangleMesh};
-use crate::part::{Part, PatchPoint, SurfacePoint};
+use cutter::Cutter;
+use geometry::{BoxTree, Bvh, Extent, Feature, Jet2, Node, Paired, TriangleMesh};
 use grid::Parts;
 pub use grid::{GridDrop, PlanGrid};
+use part::{Part, PatchPoint, SurfacePoint};
 use refine::{Hill, Peak};
 use roof::Roof;
 use touch::{Carries, Facet, Profile, Touch};
@@ -101,7 +101,7 @@ const BESIDE_SLACK: f64 = 1e-6;
 
 /// Where the last of a row of drops came to rest.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Beside(Option<usize>);
+pub(crate) struct Beside(Option<usize>);
 
 impl<'a> DropCutter<'a> {
     /// Prepares: takes about 0.4 s for a million triangles, as long as a hundred thousand drops.
@@ -124,7 +124,7 @@ impl<'a> DropCutter<'a> {
         let search =
             exact.map_or(profile, |(_, deviation)| Profile::of(cutter, DEVIATION_MARGIN * deviation));
         let domains = if exact.is_none() { domain::domains(mesh, &search) } else { Vec::new() };
-        let facets = crate::parallel::map(bvh.slots(), |slot| {
+        let facets = work::parallel::map(bvh.slots(), |slot| {
             let t = bvh.triangle_in(slot);
             let carries = domains.get(t).map_or(Carries::ALL, domain::Domain::carries);
             Facet::new(mesh.corners(t), &mesh.normal(t), carries, &search)
@@ -159,7 +159,7 @@ impl<'a> DropCutter<'a> {
 
     /// As [`DropCutter::at`], quicker where the last drop was nearby: the triangle that the cutter rested
     /// on then tells how high it stands at the least.
-    pub(super) fn at_beside(&self, x: f64, y: f64, beside: &mut Beside) -> Option<Drop> {
+    pub(crate) fn at_beside(&self, x: f64, y: f64, beside: &mut Beside) -> Option<Drop> {
         if !(x.is_finite() && y.is_finite()) {
             return None;
         }
@@ -287,7 +287,7 @@ impl<'a> DropCutter<'a> {
 
 /// A roof for each box of the tree.
 fn roofs(mesh: &TriangleMesh, bvh: &Bvh, profile: &Profile) -> Vec<Roof> {
-    crate::parallel::map(bvh.boxes(), |index| {
+    work::parallel::map(bvh.boxes(), |index| {
         bvh.few_slots_in(index, roof::MOST_BELOW).map_or(Roof::NONE, |(node, slots)| {
             let below: Vec<_> = slots.iter().map(|&s| mesh.corners(bvh.triangle_in(s))).collect();
             Roof::over(node, &below, profile)

@@ -2,27 +2,32 @@
 
 use std::sync::Arc;
 
-use super::chord::{Watch, reduce, sample_within_chord};
+use super::PocketStrategy;
 use super::link::{Joining, join, join_tilted};
-use super::mesh_passes::Aim;
-use super::planned_field::{Contact, PlannedField};
-use super::shortest::{ShortestPossible, shortest_possible};
-use super::smooth::smooth_and_spread;
-use super::spacing::Placing;
-use super::streamline::Fitting;
-use super::strip::strip_width;
-use super::tilted::{self, TiltedPasses, Tilting, Touch};
-use super::tool_axis::{AxisError, ToolAxis};
-use super::{
-    PocketStrategy, Toolpath, contour_spiral, iso_scallop, mesh_passes, mesh_surface, offset_mesh,
-    offset_surface, shortest, spiral, streamline, waterline, zigzag,
+use crate::levels::planned_field::{self, Contact};
+use crate::levels::spacing::Placing;
+use crate::moves::chord::{Watch, reduce, sample_within_chord};
+use crate::moves::smooth::smooth_and_spread;
+use crate::strategies::mesh_passes::Aim;
+use crate::strategies::shortest::shortest_possible;
+use crate::strategies::streamline::Fitting;
+use crate::strategies::{
+    contour_spiral, iso_scallop, mesh_passes, offset_mesh, offset_surface, shortest, spiral, streamline,
+    waterline, zigzag,
 };
-use crate::cutter::Cutter;
-use crate::field::mesh::Sense;
-use crate::field::{KnotRule, LineField, Solver};
-use crate::geometry::{NurbsSurface, Point2, Point3, TriangleMesh};
-use crate::monitor::{Cancelled, Monitor};
-use crate::part::Part;
+use crate::surface::mesh_surface;
+use crate::tilt::tilted;
+use crate::tilt::tilted::{TiltedPasses, Tilting, Touch};
+use cutter::Cutter;
+use field::mesh::Sense;
+use field::{KnotRule, LineField, Solver};
+use field::{PlannedField, ShortestPossible};
+use geometry::{NurbsSurface, Point2, Point3, TriangleMesh};
+use motion::Toolpath;
+use motion::{AxisError, ToolAxis};
+use part::Part;
+use scallop::strip_width;
+use work::monitor::{Cancelled, Monitor};
 
 /// How far neighbouring passes lie apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -314,7 +319,7 @@ impl Plan {
         let by_streamlines =
             matches!(strategy, Strategy::Streamline { .. } | Strategy::ShortestStreamline { .. });
         let field = by_streamlines.then(|| {
-            field.measure(contacts);
+            planned_field::measure(&mut field, contacts);
             field
         });
         if path.is_empty() {
@@ -335,14 +340,14 @@ impl LevelSteps {
 }
 
 impl PlanError {
-    pub(super) fn mesh(reason: &str) -> Self {
+    pub(crate) fn mesh(reason: &str) -> Self {
         Self::NoFit(reason.to_owned())
     }
 }
 
 /// What every pass needs.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct PassSettings<'a> {
+pub(crate) struct PassSettings<'a> {
     /// Distance of passes, already less what the chords may add.
     pub step: Step,
     /// First sampling distance along a pass, mm.
@@ -397,7 +402,7 @@ impl<'a> PassSettings<'a> {
 
 /// Planned passes, not yet joined, and remarks for the user.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Passes {
+pub(crate) struct Passes {
     /// Tip positions of each pass.
     pub passes: Vec<Vec<Point3>>,
     /// Where a tilted cutter touches along each pass, whose tips then count for nothing; empty for an upright one.

@@ -5,26 +5,29 @@ use std::time::Instant;
 
 use super::removal::Held;
 use super::{BYTES_PER_MOVE, Job, MIB, part_bytes};
-use crate::cli::error::CliError;
-use crate::cli::load::load_mesh;
-use crate::cli::outputs::Outputs;
-use crate::cli::program;
-use crate::cutter::Solid;
-use crate::geometry::{Aabb, Bvh, Point2, TriangleMesh, Vector3};
-use crate::io::scene::{Engine, Fixture, Scene, ToolpathRequest};
-use crate::io::{exr, ply_write, png, stl_write};
-use crate::machine::slow_corners;
-use crate::metrology::{
+use crate::error::CliError;
+use crate::load::load_mesh;
+use crate::outputs::Outputs;
+use crate::program;
+use collision::{Check, Interference, Obstacle};
+use cutter::Solid;
+use geometry::{Aabb, Bvh, Point2, TriangleMesh, Vector3};
+use io::{exr, ply_write, png, stl_write};
+use machine::slow_corners;
+use metrology::{
     FirstCut, Measurement, NormalMap, PatchGrid, RaysCut, RoughnessFigures, SweptVolume, VoxelCut,
     measure_along_normals, net_places, path_figures, roughness, section_figures,
 };
-use crate::monitor::{self, Monitor as _};
-use crate::report::{
+use motion::{Move, MoveKind, Toolpath};
+use report::{
     HIGHEST_RIDGE, Histogram, MapSize, MapWords, SimulationFigures, SurfaceMeshFigures, ToolpathPage,
     ToolpathResult, Verdict, Violation, deviation_colours, deviation_picture, tool_collision,
 };
-use crate::sim::{Grid, Rays, VoxelEngine, VoxelStock, Voxels};
-use crate::toolpath::{Check, Interference, Move, MoveKind, Obstacle, Tilting, Toolpath, plan, plan_tilted};
+use scene::{Engine, Fixture, Scene, ToolpathRequest};
+use sim::{Grid, Rays, VoxelEngine, VoxelStock, Voxels};
+use toolpath::{Tilting, plan, plan_tilted};
+use work::monitor;
+use work::monitor::Monitor as _;
 
 /// Bytes a place of the net: place, hit, triangles with their crossings, and the map; 480 were counted.
 const BYTES_PER_PLACE: u64 = 600;
@@ -316,7 +319,7 @@ impl Job<'_> {
             let deviation = if map.deviations[k].is_nan() { 0.0 } else { f64::from(map.deviations[k]) };
             (map.points[k] + map.normals[k] * deviation).coords.map(|c| c as f32).into()
         };
-        let places: Vec<[f32; 3]> = crate::parallel::map(map.points.len(), moved);
+        let places: Vec<[f32; 3]> = work::parallel::map(map.points.len(), moved);
         outputs.file(&format!("{}/machined.stl", request.folder), |out| {
             stl_write::write(out, &places, &map.triangles)
         })?;
@@ -431,7 +434,7 @@ fn unrolled(map: &NormalMap, patch: &PatchGrid) -> (Grid, Vec<f32>) {
 
 /// The places seen from above, of those in one cell the one farthest from the design.
 fn plan_view(map: &NormalMap, cell: f64) -> (Grid, Vec<f32>) {
-    let bounds = crate::geometry::Aabb::of(&map.points);
+    let bounds = geometry::Aabb::of(&map.points);
     let size = bounds.size();
     let (nx, ny) = ((size.x / cell) as usize + 1, (size.y / cell) as usize + 1);
     let grid = Grid { origin: bounds.min.xy(), cell, nx, ny };

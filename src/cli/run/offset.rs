@@ -1,10 +1,10 @@
 //! The offset surface that a path's ball rides on: what it is off the part, as figures and in words.
 
 use super::Job;
-use crate::metrology::{OffsetFigures, offset_figures};
-use crate::monitor::Monitor as _;
-use crate::report::{ToolpathResult, place};
-use crate::toolpath::{OffsetAlong, OffsetDrive, Strategy};
+use metrology::{OffsetFigures, offset_figures};
+use report::{ToolpathResult, place};
+use toolpath::{OffsetAlong, OffsetDrive, Strategy};
+use work::monitor::Monitor as _;
 
 /// Distances that are off by less than this, mm, are as asked.
 const AS_ASKED: f64 = 1.0e-6;
@@ -70,8 +70,8 @@ fn notes(figures: &OffsetFigures) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::super::run;
-    use crate::cli::args::RunOptions;
-    use crate::cli::progress::Progress;
+    use crate::args::RunOptions;
+    use crate::progress::Progress;
 
     /// Runs a suction side that leans by 20 degrees out of its sections' planes, straight or hollow; its `offset` and notes.
     fn offset_of(side: &dyn Fn(f64) -> f64, offset: &str, diameter: f64) -> (serde_json::Value, String) {

@@ -2,14 +2,14 @@
 //! cutter axis.
 
 use super::{BASE, Job, stock_area};
-use crate::cli::error::CliError;
-use crate::cutter::Solid;
-use crate::geometry::Aabb;
-use crate::io::scene::ToolpathRequest;
-use crate::metrology::{RemovalFigures, voxel_removal_figures};
-use crate::report::{Violation, standing_collision, standing_note};
-use crate::sim::{StandingHits, VoxelEngine, VoxelStock};
-use crate::toolpath::Toolpath;
+use crate::error::CliError;
+use cutter::Solid;
+use geometry::Aabb;
+use metrology::{RemovalFigures, voxel_removal_figures};
+use motion::Toolpath;
+use report::{Violation, standing_collision, standing_note};
+use scene::ToolpathRequest;
+use sim::{StandingHits, VoxelEngine, VoxelStock};
 
 /// Voxels in the block where the program chooses: more take longer than planning and measuring do, fewer leave engagement
 /// and rates rough.

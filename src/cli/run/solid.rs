@@ -1,14 +1,14 @@
 //! The solid that a path leaves of a block, by voxels: any cutter axis, undercuts included.
 
 use super::{Job, MIB, part_bytes};
-use crate::cli::error::CliError;
-use crate::cli::outputs::Outputs;
-use crate::cutter::Solid;
-use crate::io::scene::ToolpathRequest;
-use crate::io::stl_write;
-use crate::report::SolidFigures;
-use crate::sim::VoxelEngine;
-use crate::toolpath::{ClPoint, Toolpath};
+use crate::error::CliError;
+use crate::outputs::Outputs;
+use cutter::Solid;
+use io::stl_write;
+use motion::{ClPoint, Toolpath};
+use report::SolidFigures;
+use scene::ToolpathRequest;
+use sim::VoxelEngine;
 
 impl Job<'_> {
     /// Cuts the part's block into voxels where the scene asks for it, and writes solid.stl.

@@ -1,7 +1,7 @@
 //! The signed distance against brute force over the outline, and what any distance must keep.
 
 use super::*;
-use crate::cutter::{AptWords, HolderSection};
+use crate::{AptWords, HolderSection};
 
 fn cutters() -> Vec<Cutter> {
     let taper = |corner: f64| Cutter::taper(2.0, corner, 10f64.to_radians(), 5.0).unwrap();

@@ -86,23 +86,23 @@ impl Front {
     }
 
     /// Components of a gradient in the orthonormal frame, from its derivatives by the parameters.
-    pub(crate) fn covector(&self, [du, dv]: [f64; 2]) -> [f64; 2] {
+    pub fn covector(&self, [du, dv]: [f64; 2]) -> [f64; 2] {
         [self.frame[0] * du, self.frame[1] * du + self.frame[2] * dv]
     }
 
     /// The parameters of the unit vector at an angle in the orthonormal frame.
-    pub(crate) fn vector(&self, angle: f64) -> [f64; 2] {
+    pub fn vector(&self, angle: f64) -> [f64; 2] {
         let (sin, cos) = angle.sin_cos();
         [self.frame[0] * cos + self.frame[1] * sin, self.frame[2] * sin]
     }
 
     /// The slowness of the mean square over all directions.
-    pub(crate) fn mean_slowness(&self) -> f64 {
+    pub fn mean_slowness(&self) -> f64 {
         self.mean.sqrt()
     }
 
     /// s² of the direction of `q`, and its derivative by the angle.
-    pub(crate) fn square(&self, [q1, q2]: [f64; 2]) -> (f64, f64) {
+    pub fn square(&self, [q1, q2]: [f64; 2]) -> (f64, f64) {
         let norm2 = q1 * q1 + q2 * q2;
         let (cos, sin) =
             if norm2 > 0.0 { ((q1 * q1 - q2 * q2) / norm2, 2.0 * q1 * q2 / norm2) } else { (1.0, 0.0) };
@@ -126,7 +126,7 @@ impl Front {
     }
 
     /// Components in the orthonormal frame of the vector with the parameters `[du, dv]`.
-    pub(crate) fn components(&self, [du, dv]: [f64; 2]) -> [f64; 2] {
+    pub fn components(&self, [du, dv]: [f64; 2]) -> [f64; 2] {
         let x2 = dv / self.frame[2];
         [(du - self.frame[1] * x2) / self.frame[0], x2]
     }

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use proptest::prelude::*;
 
 use super::*;
-use crate::monitor::Silent;
+use work::monitor::Silent;
 
 const SQUARE: [[f64; 2]; 2] = [[-1.0, 1.0], [-1.0, 1.0]];
 

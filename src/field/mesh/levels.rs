@@ -8,7 +8,7 @@
 //! edges of length ℓ.
 
 use super::{FieldMesh, vertex_gradients};
-use crate::geometry::{Point3, Vector3};
+use geometry::{Point3, Vector3};
 
 /// Parts of the range of values that keep lists of their triangles. More find a level's triangles
 /// with fewer looks and take memory.

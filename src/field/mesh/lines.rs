@@ -15,9 +15,9 @@ use faer::c64;
 
 use super::surface::turned;
 use super::{FieldMesh, Flow, MeshFieldError};
-use crate::field::direction::orient_along;
-use crate::field::sparse::{Entry, solve};
-use crate::geometry::{Point3, Vector3};
+use crate::direction::orient_along;
+use crate::sparse::{Entry, solve};
+use geometry::{Point3, Vector3};
 
 /// An edge couples its ends at least as if the angles opposite to it had this cotangent. Obtuse pairs
 /// have less, or negative ones, with which the field may turn more sharply between them than anywhere.

@@ -7,8 +7,8 @@
 
 use super::FieldMesh;
 use super::surface::turned;
-use crate::geometry::Vector3;
-use crate::parallel;
+use geometry::Vector3;
+use work::parallel;
 
 /// Vertices that one worker handles at a time.
 const CHUNK: usize = 1024;

@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 
 use super::{Bend, MeshFieldError, Sheets};
-use crate::geometry::{Point3, Vector3};
+use geometry::{Point3, Vector3};
 
 /// Greatest number of triangles of a refined mesh: what a machine of 8 GB factorises in seconds.
 const MAX_TRIANGLES: usize = 2_000_000;

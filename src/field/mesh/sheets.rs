@@ -8,8 +8,8 @@
 //! Refining a mesh interpolates what stands in its wedges, so that curvature is that of the vertices
 //! that the file gave and not that of their flat facets.
 
-use crate::geometry::{Point3, Vector3};
-use crate::parallel;
+use geometry::{Point3, Vector3};
+use work::parallel;
 
 use super::FieldMesh;
 use super::recover::Samples;

@@ -2,8 +2,8 @@
 //! smoothed ([`super::smooth_lines`]) or blended with others ([`super::blend`]).
 
 use super::{FieldMesh, Wanted};
-use crate::geometry::{Point2, Vector3};
-use crate::parallel;
+use geometry::{Point2, Vector3};
+use work::parallel;
 
 /// A border that turns by more than this at a vertex, nearly back, has no direction there, rad.
 const CUSP: f64 = 2.6;

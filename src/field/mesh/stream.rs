@@ -14,8 +14,8 @@
 //! answer is checked by its true residual. Values converge with the square of the edges' length.
 
 use super::{FieldMesh, MeshFieldError};
-use crate::field::sparse::{Entry, solve};
-use crate::geometry::Vector3;
+use crate::sparse::{Entry, solve};
+use geometry::Vector3;
 
 /// Greatest residual, relative to the terms of the equations, that counts as solved.
 const RESIDUAL_LIMIT: f64 = 1e-8;

@@ -3,7 +3,7 @@
 //! Enters: points (mm) and triangles that are counter-clockwise seen from outside. Leaves: the mesh
 //! with all that fields ask it, or why it cannot carry one.
 
-use crate::geometry::{Point3, TriangleMesh, Vector3};
+use geometry::{Point3, TriangleMesh, Vector3};
 
 /// Stands for "no triangle" in neighbour lists.
 const NONE: u32 = u32::MAX;

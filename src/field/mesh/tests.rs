@@ -5,7 +5,7 @@ mod making;
 mod stream;
 
 use super::*;
-use crate::geometry::{Point2, Point3, Vector3};
+use geometry::{Point2, Point3, Vector3};
 
 /// A grid of `nx` × `ny` squares over `[0, 1]²` with inner vertices shifted at random, each square cut
 /// by one or the other diagonal, squares whose centre `hole` holds left out.

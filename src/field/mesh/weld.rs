@@ -7,7 +7,7 @@
 
 use std::collections::HashMap;
 
-use crate::geometry::{Aabb, Point3, Vector3};
+use geometry::{Aabb, Point3, Vector3};
 
 /// Border edges in the cells of a coarse grid.
 struct Sides {

@@ -5,7 +5,7 @@
 //! every closed mesh. On an open mesh a query beyond the border gets the side of the border's face.
 
 use super::{Bvh, Feature, MeshFoot};
-use crate::geometry::{Point3, TriangleMesh, Vector3};
+use crate::{Point3, TriangleMesh, Vector3};
 
 /// The nearest point of one triangle.
 pub(super) struct Foot {

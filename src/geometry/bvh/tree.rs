@@ -12,12 +12,12 @@ use std::time::Duration;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::{Boundable, BvhBuildParams};
 
-use crate::geometry::Point3;
+use crate::Point3;
 
 /// Values of up to 32 bytes, two in each cache line: what belongs to the two children of one node
 /// then comes with one access to memory, and those accesses are most of what a query costs.
 #[derive(Debug, Clone)]
-pub(crate) struct Paired<T>(Vec<Pair<T>>);
+pub struct Paired<T>(Vec<Pair<T>>);
 
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
@@ -25,24 +25,24 @@ struct Pair<T>([T; 2]);
 
 impl<T: Copy> Paired<T> {
     /// From an even number of values; a last odd one is left out.
-    pub(crate) fn from_values(values: &[T]) -> Self {
+    pub fn from_values(values: &[T]) -> Self {
         Self(values.chunks_exact(2).map(|pair| Pair([pair[0], pair[1]])).collect())
     }
 
     /// Value `i`.
-    pub(crate) fn at(&self, i: usize) -> &T {
+    pub fn at(&self, i: usize) -> &T {
         &self.0[i / 2].0[i % 2]
     }
 
     /// Number of values; even.
-    pub(crate) fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         2 * self.0.len()
     }
 }
 
 /// A box of the tree: 32 bytes.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Node {
+pub struct Node {
     pub(super) min: [f32; 3],
     /// Number of triangles; 0 for an inner node.
     pub(super) count: u32,
@@ -62,7 +62,7 @@ impl Node {
     }
 
     /// Squared distance from `(x, y)` to the box in the plan view, mm²; 0 inside.
-    pub(crate) fn plan_distance_squared(&self, x: f64, y: f64) -> f64 {
+    pub fn plan_distance_squared(&self, x: f64, y: f64) -> f64 {
         let dx = self.gap(0, x);
         let dy = self.gap(1, y);
         dx * dx + dy * dy
@@ -80,19 +80,19 @@ impl Node {
     }
 
     /// Middle of the box in the plan view, mm.
-    pub(crate) fn plan_centre(&self) -> [f64; 2] {
+    pub fn plan_centre(&self) -> [f64; 2] {
         [0, 1].map(|axis| 0.5 * (f64::from(self.min[axis]) + f64::from(self.max[axis])))
     }
 
     /// Whether the box holds `(x, y)` in the plan view.
     #[inline]
-    pub(crate) fn holds(&self, x: f64, y: f64) -> bool {
+    pub fn holds(&self, x: f64, y: f64) -> bool {
         self.meets([x, y], [x, y])
     }
 
     /// Whether the box and the rectangle from `low` to `high` have a point in common in the plan view.
     #[inline]
-    pub(crate) fn meets(&self, low: [f64; 2], high: [f64; 2]) -> bool {
+    pub fn meets(&self, low: [f64; 2], high: [f64; 2]) -> bool {
         // Four comparisons without a branch: which of them fails is never predictable.
         (f64::from(self.min[0]) <= high[0])
             & (f64::from(self.min[1]) <= high[1])
@@ -101,31 +101,31 @@ impl Node {
     }
 
     /// Middle of the box and half its sides, mm.
-    pub(crate) fn middle(&self) -> (Point3, [f64; 3]) {
+    pub fn middle(&self) -> (Point3, [f64; 3]) {
         let half =
             |axis: usize, sign: f64| 0.5 * (f64::from(self.max[axis]) + sign * f64::from(self.min[axis]));
         (Point3::from([0, 1, 2].map(|axis| half(axis, 1.0))), [0, 1, 2].map(|axis| half(axis, -1.0)))
     }
 
     /// First slot and number of slots of a leaf, or first of an inner node's two children and 0.
-    pub(crate) fn slots_or_children(&self) -> (usize, usize) {
+    pub fn slots_or_children(&self) -> (usize, usize) {
         (self.first as usize, self.count as usize)
     }
 
     /// Upper end of the box, mm.
-    pub(crate) fn top(&self) -> f64 {
+    pub fn top(&self) -> f64 {
         f64::from(self.max[2])
     }
 }
 
 /// The greatest f32 that is not above `x`.
-pub(crate) fn round_down(x: f64) -> f32 {
+pub fn round_down(x: f64) -> f32 {
     let near = x as f32;
     if f64::from(near) > x { near.next_down() } else { near }
 }
 
 /// The least f32 that is not below `x`.
-pub(crate) fn round_up(x: f64) -> f32 {
+pub fn round_up(x: f64) -> f32 {
     -round_down(-x)
 }
 
@@ -135,35 +135,35 @@ const STACK: usize = 64;
 
 /// A box around what belongs to one slot: its least and its greatest corner.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Extent {
+pub struct Extent {
     /// Least corner, mm.
-    pub(crate) min: [f32; 3],
+    pub min: [f32; 3],
     /// Greatest corner, mm.
-    pub(crate) max: [f32; 3],
+    pub max: [f32; 3],
 }
 
 impl Extent {
     /// Holds nothing.
-    pub(crate) const NOTHING: Self = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
+    pub const NOTHING: Self = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
 
     /// From `min` to `max`, mm, rounded outward.
-    pub(crate) fn new(min: [f64; 3], max: [f64; 3]) -> Self {
+    pub fn new(min: [f64; 3], max: [f64; 3]) -> Self {
         Self { min: min.map(round_down), max: max.map(round_up) }
     }
 
     /// Its least and its greatest corner in the plan view, mm.
-    pub(crate) fn plan(&self) -> [[f32; 2]; 2] {
+    pub fn plan(&self) -> [[f32; 2]; 2] {
         [self.min, self.max].map(|[x, y, _]| [x, y])
     }
 
     /// Whether it holds a point.
     #[cfg(test)]
-    pub(crate) fn holds(&self, p: &Point3) -> bool {
+    pub fn holds(&self, p: &Point3) -> bool {
         (0..3).all(|i| f64::from(self.min[i]) <= p[i] && p[i] <= f64::from(self.max[i]))
     }
 
     /// The box around both.
-    pub(crate) fn with(&self, other: &Self) -> Self {
+    pub fn with(&self, other: &Self) -> Self {
         let pick = |i: usize| (self.min[i].min(other.min[i]), self.max[i].max(other.max[i]));
         let [x, y, z] = [0, 1, 2].map(pick);
         Self { min: [x.0, y.0, z.0], max: [x.1, y.1, z.1] }
@@ -178,7 +178,7 @@ impl Boundable for Extent {
 
 /// Boxes around boxes around slots.
 #[derive(Debug, Clone)]
-pub(crate) struct BoxTree {
+pub struct BoxTree {
     /// The root at 0, nothing of use at 1, then the children of inner nodes side by side, after
     /// their parent.
     pub(super) nodes: Paired<Node>,
@@ -190,7 +190,7 @@ impl BoxTree {
     ///
     /// Nodes and slots are in the order of a depth-first walk: what a query visits one after the other
     /// then lies close together in memory, which is most of what a scattered query costs.
-    pub(crate) fn around(boxes: &[Extent], leaf: u32) -> (Self, Vec<u32>) {
+    pub fn around(boxes: &[Extent], leaf: u32) -> (Self, Vec<u32>) {
         let parameters = BvhBuildParams { max_prims_per_leaf: leaf, ..BvhBuildParams::medium_build() };
         let tree = build_bvh2(boxes, parameters, &mut Duration::default());
         let copy = |index: usize| {
@@ -218,18 +218,18 @@ impl BoxTree {
     }
 
     /// One more than the greatest index of a box; even.
-    pub(crate) fn nodes_len(&self) -> usize {
+    pub fn nodes_len(&self) -> usize {
         self.nodes.len()
     }
 
     /// Box `index`.
-    pub(crate) fn node(&self, index: usize) -> &Node {
+    pub fn node(&self, index: usize) -> &Node {
         self.nodes.at(index)
     }
 
     /// All slots below box `index`, for tests.
     #[cfg(test)]
-    pub(crate) fn slots_below(&self, index: usize) -> Vec<usize> {
+    pub fn slots_below(&self, index: usize) -> Vec<usize> {
         let (first, count) = self.node(index).slots_or_children();
         if count > 0 {
             return (first..first + count).collect();
@@ -238,7 +238,7 @@ impl BoxTree {
     }
 
     /// The same tree around other boxes, one for each slot.
-    pub(crate) fn refitted(&self, slots: &[Extent]) -> Self {
+    pub fn refitted(&self, slots: &[Extent]) -> Self {
         let mut nodes: Vec<Node> = (0..self.nodes.len()).map(|i| *self.nodes.at(i)).collect();
         for i in (0..nodes.len()).rev() {
             let (first, count) = (nodes[i].first as usize, nodes[i].count as usize);
@@ -256,7 +256,7 @@ impl BoxTree {
     /// exceeds the best value so far, the most promising first, and calls `visit(slot, best)`
     /// there, which returns the best value from then on. Starts with `best`; allocates nothing in
     /// trees of usual depth.
-    pub(crate) fn search(
+    pub fn search(
         &self,
         mut best: f64,
         bound: impl Fn(usize, &Node, f64) -> f64,

@@ -5,7 +5,7 @@
 
 use super::orient::left_of;
 use super::{Bvh, VerticalHit};
-use crate::geometry::{Point3, TriangleMesh};
+use crate::{Point3, TriangleMesh};
 
 impl Bvh {
     /// The highest meeting of the vertical line at `(x, y)` with the mesh; `None` where it passes

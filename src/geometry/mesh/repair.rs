@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
 use super::{MeshError, NONE, Outside, RepairNotes, TriangleMesh};
-use crate::geometry::{Aabb, MAX_COORDINATE, Point3, Vector3};
+use crate::{Aabb, MAX_COORDINATE, Point3, Vector3};
 
 /// A triangle counts as degenerate where twice its area is below this share of its longest side
 /// squared: the rounding error of the cross product itself, so that the normal of what is kept

@@ -1,5 +1,5 @@
 use super::*;
-use crate::geometry::MAX_COORDINATE;
+use crate::MAX_COORDINATE;
 
 type Soup = (Vec<Point3>, Vec<[u32; 3]>);
 

@@ -17,12 +17,12 @@
 
 use super::super::program_text::{ProgramHeader, describe, number, number_to};
 use super::MoveLines;
-use crate::cutter::Cutter;
-use crate::geometry::{Point3, Vector3};
-use crate::machine::kinematics::{
+use cutter::Cutter;
+use geometry::{Point3, Vector3};
+use machine::kinematics::{
     Following, JointLocation, JointPath, Joints, Kinematics, Side, Turn, turning_time,
 };
-use crate::toolpath::{ClPoint, MoveKind, Toolpath};
+use motion::{ClPoint, MoveKind, Toolpath};
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
@@ -85,7 +85,7 @@ pub struct FiveAxisPost<'a> {
 ///
 /// # Errors
 /// Whatever the writer returns; joints that no program may be made of
-/// ([`crate::machine::kinematics::JointReport::obstacle`]), and joints that let the tip stray in [`Style::Full`].
+/// ([`machine::kinematics::JointReport::obstacle`]), and joints that let the tip stray in [`Style::Full`].
 pub fn write_five_axis(
     writer: &mut dyn Write,
     path: &Toolpath,

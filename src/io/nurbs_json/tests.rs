@@ -1,6 +1,6 @@
 use super::*;
-use crate::geometry::samples;
 use approx::assert_relative_eq;
+use geometry::samples;
 use proptest::prelude::*;
 
 const PATCH: &str = r#""degree_u": 1, "degree_v": 1, "knots_u": [0, 0, 1, 1], "knots_v": [0, 0, 2, 2],

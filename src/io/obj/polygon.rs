@@ -1,6 +1,6 @@
 //! Cutting a polygon in space into triangles.
 
-use crate::geometry::{Point3, Vector3};
+use geometry::{Point3, Vector3};
 
 /// Cuts the polygon into triangles that cover it once and face its way, and adds them to
 /// `triangles`. `corners` is used up.

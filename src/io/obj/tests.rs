@@ -1,5 +1,5 @@
 use super::*;
-use crate::io::mesh_file::tests::{damaged, damages, holds_up};
+use crate::mesh_file::tests::{damaged, damages, holds_up};
 use proptest::prelude::*;
 
 const CUBE: &str = "# a cube\nmtllib none.mtl\no cube\n\

@@ -1,7 +1,7 @@
 //! Open polylines joined to closed ones where their ends meet within [`JOIN_TOLERANCE`].
 
 use super::{Drawn, JOIN_TOLERANCE, OutlineError};
-use crate::geometry::Point2;
+use geometry::Point2;
 
 /// Gaps below this, mm, are rounding of the file and not worth a note.
 const ROUNDING: f64 = 1.0e-6;

@@ -1,6 +1,6 @@
 //! Curves of drawings as chords within a tolerance, mm.
 
-use crate::geometry::{Point2, foot};
+use geometry::{Point2, foot};
 
 /// A chord is halved at most so often: cusps would be halved without end.
 const MAX_HALVINGS: u32 = 24;
@@ -51,7 +51,7 @@ fn halve(
 /// first point.
 pub fn ellipse(
     centre: Point2,
-    axes: [crate::geometry::Vector2; 2],
+    axes: [geometry::Vector2; 2],
     from: f64,
     to: f64,
     tolerance: f64,

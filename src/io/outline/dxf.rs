@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 use super::curve::{Spline, ellipse};
 use super::{Drawn, OutlineError, OutlineOptions};
-use crate::geometry::{Point2, Vector2};
+use geometry::{Point2, Vector2};
 
 /// Most vertices of one entity.
 const MAX_VERTICES: usize = 1_000_000;

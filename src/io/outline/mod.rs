@@ -14,7 +14,7 @@ mod tests;
 
 use std::path::Path;
 
-use crate::geometry::{Point2, Region, RegionError};
+use geometry::{Point2, Region, RegionError};
 
 /// Ends of open chains that lie no farther apart are joined, mm. Drawings are exact to four decimals as a
 /// rule; much more would close gaps that were meant, or join neighbours.

@@ -13,7 +13,7 @@ use svgtypes::{Length, LengthUnit, PathParser, PathSegment, PointsParser, Transf
 
 use super::curve::{ellipse, flatten};
 use super::{Drawn, OutlineError, OutlineOptions};
-use crate::geometry::{Point2, Vector2};
+use geometry::{Point2, Vector2};
 
 /// Deepest nesting of elements that is followed.
 const MAX_DEPTH: usize = 64;

@@ -52,7 +52,7 @@
 //!
 //! Between stations quantities follow monotone cubics; see [`GeneratedBlade`].
 
-mod blade;
+mod generated;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -61,12 +61,12 @@ mod write;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-pub use blade::parse_blade;
+pub use generated::parse_blade;
 pub use table::{SectionTableError, parse_table};
 pub use write::write_table;
 
-use crate::geometry::sections::{GenerateError, GeneratedBlade, Sections};
-use crate::io::scene::{SceneError, SceneText};
+use crate::located::{SceneError, SceneText};
+use blade::sections::{GenerateError, GeneratedBlade, Sections};
 
 /// Greatest file that is read, bytes: the most points that are allowed take a third of it.
 pub const MAX_BYTES: u64 = 32 << 20;

@@ -1,9 +1,9 @@
 //! Tables of points: see [`section_table`](super).
 
 use super::UNITS;
-use crate::geometry::sections::{LeadingEnd, Outline, Section, SectionCurve, SectionError, Sections};
-use crate::geometry::{MAX_COORDINATE, Point2};
-use crate::io::scene::{listed, nearest};
+use crate::located::{listed, nearest};
+use blade::sections::{LeadingEnd, Outline, Section, SectionCurve, SectionError, Sections};
+use geometry::{MAX_COORDINATE, Point2};
 
 /// z of a point may differ from its section's height by this share of the height (of a mm near 0): what files
 /// with seven digits leave.

@@ -1,8 +1,8 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::geometry::Point2;
-use crate::geometry::sections::{LeadingEnd, Outline, Stacking, TrailingEdge};
+use blade::sections::{LeadingEnd, Outline, Stacking, TrailingEdge};
+use geometry::Point2;
 
 const TABLE: &str = "\
 # a wedge

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::table::LEADING;
-use crate::geometry::sections::{SectionCurve, Sections};
+use blade::sections::{SectionCurve, Sections};
 
 /// A table of these sections, mm. `title` becomes a comment. With `decimals` points are rounded to as many
 /// (heights never); without, every number is written so that it is read back bit for bit.

@@ -1,6 +1,6 @@
 use super::*;
-use crate::geometry::MeshError;
-use crate::io::mesh_file::tests::{damaged, damages, holds_up};
+use crate::mesh_file::tests::{damaged, damages, holds_up};
+use geometry::MeshError;
 use proptest::prelude::*;
 
 const TETRAHEDRON: [[[f32; 3]; 3]; 4] = [
@@ -60,7 +60,7 @@ fn binary_and_text_give_the_same_mesh() {
 fn what_is_written_is_read_back() {
     let vertices = [[0.0f32, 0.0, 0.0], [30.5, 0.0, 0.1], [0.0, 20.25, 0.7], [31.0, 21.0, -3.0]];
     let mut bytes = Vec::new();
-    crate::io::stl_write::write(&mut bytes, &vertices, &[[0, 1, 2], [2, 1, 3]]).unwrap();
+    crate::stl_write::write(&mut bytes, &vertices, &[[0, 1, 2], [2, 1, 3]]).unwrap();
     let (mesh, _) = parse(&bytes).unwrap();
     assert_eq!(mesh.triangles(), [[0, 1, 2], [2, 1, 3]]);
     assert_eq!(mesh.vertices()[1], Point3::new(30.5, 0.0, f64::from(0.1f32)));

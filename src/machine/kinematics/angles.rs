@@ -6,7 +6,7 @@
 //! sides (half-angle formula, exact for small and for great angles alike), and θ₂ = θ₂₀ ± Θ, with θ₂₀ where b is
 //! nearest to u₁. The angle ψ at u₁ then tells how far R₁ has to turn: θ₁ = azimuth(a) ± ψ.
 
-use crate::geometry::Vector3;
+use geometry::Vector3;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// How far beyond reach, rad, a tool axis may be by rounding; it is then taken at the edge. Also where

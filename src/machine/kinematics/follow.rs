@@ -2,12 +2,14 @@
 //! where straight joints would lead the tool astray, and a report of what the machine has to do.
 
 use super::angles::angle_between;
-use super::choice::{self, State, Stop};
+use super::choice::{State, Stop};
 use super::refine::{Course, refine};
-use super::report::{self, JointReport, Rewind};
+use super::report::{JointReport, Rewind};
 use super::{Joints, Kinematics};
-use crate::geometry::Vector3;
-use crate::toolpath::{ClPoint, MoveKind, Toolpath};
+use crate::kinematics::choice;
+use crate::kinematics::report;
+use geometry::Vector3;
+use motion::{ClPoint, MoveKind, Toolpath};
 
 /// A tool axis this near to the first rotary axis, rad, is taken to be along it: the end of a cutter of 100 mm
 /// is off by 0.1 µm, less than programs are rounded.

@@ -25,13 +25,13 @@ mod tests;
 pub use error::KinematicsError;
 pub use follow::{Following, JointLocation, JointPath, PathError, Turn, follow};
 pub use presets::{DEFAULT_GAUGE_LENGTH, DEFAULT_ROTARY_RATE, PRESETS, preset};
-pub(crate) use report::turning_time;
+pub use report::turning_time;
 pub use report::{JointReport, LimitViolation, Obstacle, Rewind, SINGULAR_ANGLE, SingularPose};
 
 use angles::Triangle;
 
-use crate::geometry::{Point3, Vector3};
-use crate::toolpath::ClPoint;
+use geometry::{Point3, Vector3};
+use motion::ClPoint;
 
 /// Rotary axes that stand closer to parallel than this, rad, cannot turn the tool in two ways; nor can a
 /// second axis as close to the spindle. Nearer ones would magnify rounding beyond 1e-9.

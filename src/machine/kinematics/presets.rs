@@ -2,7 +2,7 @@
 //! workpiece, as builders name them: an A–C table is a C table on an A trunnion.
 
 use super::{Kinematics, RotaryAxis, Side};
-use crate::geometry::{Point3, Vector3};
+use geometry::{Point3, Vector3};
 use std::f64::consts::TAU;
 
 /// From the spindle nose to the tip where nothing else is said, mm: a mid-sized cutter in its holder.

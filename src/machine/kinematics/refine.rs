@@ -9,7 +9,7 @@
 //! points.
 
 use super::{Joints, Kinematics, RotaryAxis, Stage};
-use crate::geometry::Vector3;
+use geometry::Vector3;
 
 /// A place in the middle of a piece with two derivatives by the share, and bounds on the lengths of the place
 /// and of three derivatives over the whole piece.

@@ -4,8 +4,8 @@ use super::angles::angle_between;
 use super::choice::LIMIT_SLACK;
 use super::follow::{JointPath, passes};
 use super::{Joints, Kinematics};
-use crate::geometry::Vector3;
-use crate::toolpath::Toolpath;
+use geometry::Vector3;
+use motion::Toolpath;
 use std::f64::consts::PI;
 
 /// Within this angle of a singular pose the first rotary axis turns by nearly half a turn while the tool hardly
@@ -174,7 +174,7 @@ impl JointPath {
 }
 
 /// The least time between two sets of joints by the rates of the rotary ones, s.
-pub(crate) fn turning_time(kinematics: &Kinematics, from: &Joints, to: &Joints) -> f64 {
+pub fn turning_time(kinematics: &Kinematics, from: &Joints, to: &Joints) -> f64 {
     let time = |k: usize| (to.rotary[k] - from.rotary[k]).abs() / kinematics.axes()[k].rate;
     time(0).max(time(1))
 }

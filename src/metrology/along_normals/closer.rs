@@ -7,9 +7,10 @@ use std::collections::BinaryHeap;
 
 use super::ridges::Crossing;
 use super::{Inspection, Sample};
-use crate::geometry::Point3;
-use crate::metrology::ridges::NUMERICAL_FLOOR;
-use crate::monitor::{self, Cancelled, Monitor};
+use crate::ridges::NUMERICAL_FLOOR;
+use geometry::Point3;
+use work::monitor;
+use work::monitor::{Cancelled, Monitor};
 
 /// Triangles that are divided at most in search of extremes. Each asks for some ten places.
 const MOST_DIVIDED: usize = 20_000;
@@ -148,7 +149,7 @@ impl Inspection<'_> {
             monitor::check(monitor)?;
             let batch: Vec<Open> = std::iter::from_fn(|| heap.pop()).take(BATCH).collect();
             divided += batch.len();
-            let closer = crate::parallel::map(batch.len(), |k| self.divided(&batch[k].samples));
+            let closer = work::parallel::map(batch.len(), |k| self.divided(&batch[k].samples));
             for (open, parts) in batch.iter().zip(closer) {
                 for (samples, Closer { middles, crossings }) in parts {
                     middles.iter().for_each(|sample| greatest.look_at(sample, self.engine.reach()));

@@ -28,17 +28,18 @@ use super::pairs::{PairTally, RidgeCrossing, pair_figures};
 use super::refine::Refined;
 use super::ridges::{Highest, NUMERICAL_FLOOR, scallop_figures};
 use super::tracks::Tracks;
-use crate::cutter::Cutter;
-use crate::geometry::{Point3, Vector3};
-use crate::monitor::{self, Cancelled, Monitor};
-use crate::part::Part;
-use crate::toolpath::Toolpath;
 use closer::Greatest;
+use cutter::Cutter;
+use geometry::{Point3, Vector3};
+use motion::Toolpath;
 use net::{Net, Place};
 pub use net::{PatchGrid, net_places};
+use part::Part;
 use regions::{areas, deviation_figures};
 use ridges::{Crossing, Finder};
 pub use swept_volume::{FirstCut, RaysCut, SweptVolume, VoxelCut};
+use work::monitor;
+use work::monitor::{Cancelled, Monitor};
 
 /// The cut surface where the normal of a design point meets it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -248,7 +249,7 @@ fn in_runs<T: Send>(
 ) -> Result<Vec<T>, Cancelled> {
     const RUN: usize = 256;
     monitor.start(what, count as u64);
-    let runs = crate::parallel::try_map(count.div_ceil(RUN), |k| {
+    let runs = work::parallel::try_map(count.div_ceil(RUN), |k| {
         monitor::check(monitor)?;
         let range = k * RUN..((k + 1) * RUN).min(count);
         let done = range.len() as u64;

@@ -3,8 +3,8 @@
 //! Enters: the part and a distance. Leaves: points and outward unit normals no farther apart than that, on patches
 //! exact and in even steps of the parameters, on meshes on the facets; and a way to ask for places in between. mm.
 
-use crate::geometry::{Point3, Vector3};
-use crate::part::{Part, PatchPoint, SurfacePoint};
+use geometry::{Point3, Vector3};
+use part::{Part, PatchPoint, SurfacePoint};
 
 /// Where a place is on the part.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -139,7 +139,7 @@ impl Net {
         let (first, counts) = (self.places.len(), steps.map(|n| n + 1));
         let at =
             |c: usize, n: usize| domain[c][0] + (domain[c][1] - domain[c][0]) * n as f64 / steps[c] as f64;
-        let rows = crate::parallel::map(counts[1], |j| {
+        let rows = work::parallel::map(counts[1], |j| {
             let site = |i: usize| Site::Patch(PatchPoint { patch: k as u32, u: at(0, i), v: at(1, j) });
             (0..counts[0]).map(|i| Place::on(part, site(i))).collect::<Vec<_>>()
         });
@@ -174,8 +174,8 @@ impl Net {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{TriangleMesh, samples};
-    use crate::part::Patch;
+    use geometry::{TriangleMesh, samples};
+    use part::Patch;
 
     fn area(net: &Net) -> f64 {
         let of = |t: &[u32; 3]| {

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::net::Net;
 use super::{Inspection, Sample};
-use crate::metrology::figures::{DeviationFigures, GougeFigures, GougeRegion, UncutFigures, UncutRegion};
+use crate::figures::{DeviationFigures, GougeFigures, GougeRegion, UncutFigures, UncutRegion};
 
 /// Regions listed one by one in the figures; the rest is counted.
 const LISTED_REGIONS: usize = 20;

@@ -2,9 +2,9 @@
 
 use super::net::Place;
 use super::{AlongNormal, NormalHit};
-use crate::geometry::{Point3, Vector3};
-use crate::metrology::tracks::Tracks;
-use crate::part::Part;
+use crate::tracks::Tracks;
+use geometry::{Point3, Vector3};
+use part::Part;
 
 /// A crossing is found when both tracks were seen within this share of the side from each other: what the tangents then
 /// miss is of the order of its square.

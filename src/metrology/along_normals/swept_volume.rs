@@ -1,11 +1,11 @@
 //! The cut as the volume that the tool swept, whatever engine tells where a line meets it.
 
 use super::{AlongNormal, NormalHit};
-use crate::cutter::Solid;
-use crate::geometry::{Point3, Vector3};
-use crate::part::Part;
-use crate::sim::{Rays, VoxelEngine, Voxels};
-use crate::toolpath::Toolpath;
+use cutter::Solid;
+use geometry::{Point3, Vector3};
+use motion::Toolpath;
+use part::Part;
+use sim::{Rays, VoxelEngine, Voxels};
 
 /// Cuts are first looked for so far below the design, mm. What reaches deeper is asked whether it comes from the far side
 /// of a thin part: chords cut less deep, and where the part is as thin as that it ends. Looking deep at once would find
@@ -138,7 +138,7 @@ fn ball_beneath(part: &Part, point: &Point3, normal: &Vector3, most: f64) -> f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::TriangleMesh;
+    use geometry::TriangleMesh;
 
     #[test]
     fn the_ball_beneath_is_half_a_slab_or_the_whole_depth() {

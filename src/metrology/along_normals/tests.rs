@@ -1,11 +1,13 @@
 use super::super::flat_scene::{path, plane};
 use super::*;
-use crate::cutter::Solid;
-use crate::geometry::samples;
-use crate::monitor::Silent;
-use crate::part::Patch;
-use crate::sim::{Rays, VoxelEngine, VoxelStock};
-use crate::toolpath::{ClPoint, Move, MoveKind, ball_scallop_height, distance_to_segment};
+use cutter::Solid;
+use geometry::distance_to_segment;
+use geometry::samples;
+use motion::{ClPoint, Move, MoveKind};
+use part::Patch;
+use scallop::ball_scallop_height;
+use sim::{Rays, VoxelEngine, VoxelStock};
+use work::monitor::Silent;
 
 const RADIUS: f64 = 3.0;
 
@@ -155,9 +157,9 @@ fn by_both(
     let path = Toolpath { start: locations[0][0], moves: moves.collect() };
     let solid = Solid::of_cutter(cutter, None);
     let reach = 0.6;
-    let crate::geometry::Aabb { min, max } = part.bounds();
+    let geometry::Aabb { min, max } = part.bounds();
     let around = Vector3::repeat(reach + 1.0);
-    let space = VoxelStock::Box(crate::geometry::Aabb { min: min - around, max: max + around });
+    let space = VoxelStock::Box(geometry::Aabb { min: min - around, max: max + around });
     let engine = VoxelEngine::new(&space, &solid, &path).unwrap();
     let voxels = engine.cut(voxel, 1 << 30, &Silent).unwrap();
     let rays = Rays::new(&path, &solid, &Silent).unwrap();

@@ -1,11 +1,11 @@
 //! What a ridge should be by the finished path and the design alone.
 
 use super::RidgeCrossing;
-use crate::cutter::Cutter;
-use crate::geometry::{Point3, Vector3};
-use crate::part::Part;
-use crate::toolpath::scallop::{BallSection, SurfaceCurvature, ridge_between};
-use crate::toolpath::{ClPoint, MoveKind, Toolpath};
+use cutter::Cutter;
+use geometry::{Point3, Vector3};
+use motion::{ClPoint, MoveKind, Toolpath};
+use part::Part;
+use scallop::{BallSection, SurfaceCurvature, ridge_between};
 
 /// Tracks are parallel where their directions differ by no more than this, as a sine (1°): a section across one of them
 /// then sees the other as a circle to 0.02 % of the height.
@@ -233,9 +233,9 @@ impl<'a> Calculator<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{AnalyticShape, AnalyticSurface};
-    use crate::part::Patch;
-    use crate::toolpath::Move;
+    use geometry::{AnalyticShape, AnalyticSurface};
+    use motion::Move;
+    use part::Patch;
 
     /// A ball that rolls around an edge, its axis turning by `turn` rad a move: the nearest ball is that of the finest look at
     /// all moves, from whichever move near it the search begins, inside the bow and outside of it.

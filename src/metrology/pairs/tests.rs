@@ -1,11 +1,11 @@
 use super::*;
-use crate::geometry::{AnalyticShape, AnalyticSurface, Vector2, Vector3};
-use crate::metrology::{Asked, Limits, Measurement, measure};
-use crate::monitor::Silent;
-use crate::part::Patch;
-use crate::sim::{Grid, ZMap, cut_reference};
-use crate::toolpath::scallop::BallSection;
-use crate::toolpath::{ClPoint, Move, MoveKind};
+use crate::{Asked, Limits, Measurement, measure};
+use geometry::{AnalyticShape, AnalyticSurface, Vector2, Vector3};
+use motion::{ClPoint, Move, MoveKind};
+use part::Patch;
+use scallop::BallSection;
+use sim::{Grid, ZMap, cut_reference};
+use work::monitor::Silent;
 
 const LIMITS: Limits = Limits { scallop: 0.01, gouge: 0.005, uncut: 0.05, chord: 0.001 };
 

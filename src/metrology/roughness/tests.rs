@@ -1,11 +1,11 @@
 use super::super::flat_scene::{path, plane};
 use super::*;
-use crate::cutter::Solid;
-use crate::geometry::samples;
-use crate::metrology::{RaysCut, SweptVolume};
-use crate::monitor::Silent;
-use crate::part::Patch;
-use crate::sim::Rays;
+use crate::{RaysCut, SweptVolume};
+use cutter::Solid;
+use geometry::samples;
+use part::Patch;
+use sim::Rays;
+use work::monitor::Silent;
 
 const RADIUS: f64 = 3.0;
 
@@ -82,7 +82,7 @@ fn across_rings_of_a_dome_it_is_that_of_the_circular_section() {
         (0..=720).map(at).collect::<Vec<_>>()
     };
     let figures = of(&part, &path(&(0..31).map(ring).collect::<Vec<_>>()), step * rho);
-    let exact = crate::toolpath::ball_scallop_height(RADIUS, -1.0 / rho, step * rho).unwrap();
+    let exact = scallop::ball_scallop_height(RADIUS, -1.0 / rho, step * rho).unwrap();
     // 720 chords a turn lie up to 0.13 µm inside.
     assert!((figures.rz_mm.unwrap() - exact).abs() < 2e-4, "{figures:?} {exact}");
     assert!((figures.ra_mm.unwrap() / (4.0 * exact / (9.0 * 3f64.sqrt())) - 1.0).abs() < 0.02, "{figures:?}");

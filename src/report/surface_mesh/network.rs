@@ -15,7 +15,7 @@ use std::cmp::Ordering;
 use super::Node;
 use super::ridge_points::{Line, RidgePoints};
 use super::split::{Corner, split};
-use crate::sim::ZMap;
+use sim::ZMap;
 
 /// Side of the squares from which halving starts, cells (a power of two). Greater squares allow
 /// greater triangles on flat ground, but more of the last row of squares hangs over the border.
@@ -101,7 +101,7 @@ impl<'a> Network<'a> {
     ) {
         let rows: Vec<usize> = (first..self.height).step_by(row_step).collect();
         let this = &*self;
-        let found = crate::parallel::map(rows.len(), |k| {
+        let found = work::parallel::map(rows.len(), |k| {
             let mut scratch = Scratch::default();
             let columns = (start(k, rows[k])..this.width).step_by(size);
             columns.map(|x| this.bound_at((x, rows[k]), size, &mut scratch)).collect::<Vec<(f32, u8)>>()

@@ -5,10 +5,10 @@
 //! closed-form cuts at their meeting, mm; places are shares of a line, from its left or lower end.
 
 use super::Node;
-use crate::cutter::Cutter;
-use crate::metrology::{CutSurface, Meetings};
-use crate::sim::{Envelope, NOT_CUT, ZMap};
-use crate::toolpath::Toolpath;
+use cutter::Cutter;
+use metrology::{CutSurface, Meetings};
+use motion::Toolpath;
+use sim::{Envelope, NOT_CUT, ZMap};
 
 /// Ridge points keep this share of a line from its ends and from each other, so that no triangle is
 /// too thin for coordinates of f32. It moves a point sideways by no more than this share of a cell.
@@ -99,7 +99,7 @@ impl RidgePoints {
         let surface = CutSurface::new(Envelope::new(cutter, path), cut, path);
         let meetings = Meetings::new(&surface, cutter, path, flat_stock(cut));
         let grid = &cut.grid;
-        let rows = crate::parallel::map(grid.ny, |j| {
+        let rows = work::parallel::map(grid.ny, |j| {
             let mut row: Vec<RidgePoint> = Vec::new();
             for key in 0..FAMILIES * grid.nx as u32 {
                 let (a, b) = Line::of(key % FAMILIES).ends(((key / FAMILIES) as usize, j));

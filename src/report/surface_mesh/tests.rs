@@ -3,11 +3,11 @@
 use std::collections::HashMap;
 
 use super::*;
-use crate::geometry::{Point2, Point3};
-use crate::monitor::Silent;
-use crate::sim::scenes::{Rng, cutters, path_through, random_path};
-use crate::sim::{Envelope, Grid, cut_reference};
-use crate::toolpath::Move;
+use geometry::{Point2, Point3};
+use motion::Move;
+use sim::scenes::{Rng, cutters, path_through, random_path};
+use sim::{Envelope, Grid, cut_reference};
+use work::monitor::Silent;
 
 fn map(nx: usize, ny: usize, height: impl Fn(f64, f64) -> f64) -> ZMap {
     let grid = Grid { origin: Point2::new(-3.0, 2.0), cell: 0.1, nx, ny };
@@ -146,8 +146,8 @@ fn oblique_passes(cell: f64) -> (ZMap, Cutter, Toolpath, impl Fn(f64, f64) -> f6
         for tip in
             [at(-30.0, across, 20.0), at(-30.0, across, 0.0), at(30.0, across, 0.0), at(30.0, across, 20.0)]
         {
-            let kind = crate::toolpath::MoveKind::Cut;
-            let to = crate::toolpath::ClPoint::upright(tip);
+            let kind = motion::MoveKind::Cut;
+            let to = motion::ClPoint::upright(tip);
             path.moves.push(Move { to, kind, feed_rate: 1000.0, pass: (pass + 20) as u32 });
         }
     }

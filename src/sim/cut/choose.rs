@@ -4,8 +4,8 @@
 //! worked on side by side, because each step of one waits for the step before it.
 
 use super::local::{Chunk, MoveList};
-use crate::lanes::{LANES, Real, bits};
-use crate::sim::sweep::{LocalMove, Sweep};
+use crate::sweep::{LocalMove, Sweep};
+use work::lanes::{LANES, Real, bits};
 
 /// Most squares that choose together.
 pub(super) const SQUARES: usize = 4;

@@ -5,11 +5,11 @@
 use super::choose::{Square, ones};
 use super::local::Chunk;
 use super::{Level, Worker};
-use crate::lanes::{LANES, Real, bits};
-use crate::sim::NOT_CUT;
-use crate::sim::sweep::Sweep;
-use crate::sim::swept::swept_height;
-use crate::sim::track::Track;
+use crate::NOT_CUT;
+use crate::sweep::Sweep;
+use crate::swept::swept_height;
+use crate::track::Track;
+use work::lanes::{LANES, Real, bits};
 
 impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
     /// Cuts the cells of a leaf of `N` × `N` = `CELLS` cells with all moves of a level.

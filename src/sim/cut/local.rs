@@ -1,8 +1,8 @@
 //! Moves in the coordinates of one tile, many side by side, for vector loops. mm.
 
-use crate::lanes::{LANES, Real};
-use crate::sim::sweep::LocalMove;
-use crate::sim::track::Track;
+use crate::sweep::LocalMove;
+use crate::track::Track;
+use work::lanes::{LANES, Real};
 
 /// Slope from which a move counts as steep. Along steep moves the rounding of the place is magnified by
 /// the slope; they are kept as the level move at their lowest tip, which bounds them from below, and

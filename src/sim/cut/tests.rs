@@ -2,9 +2,9 @@
 //! tested in `sim/engine_tests.rs`.
 
 use super::*;
-use crate::geometry::{Point2, Point3};
-use crate::monitor::Silent;
-use crate::sim::scenes::{Rng, cutters, path_through, random_path, square_grid, wave_path};
+use crate::scenes::{Rng, cutters, path_through, random_path, square_grid, wave_path};
+use geometry::{Point2, Point3};
+use work::monitor::Silent;
 
 /// What the engine promises against the reference, mm.
 const PROMISED: f32 = 1e-5;
@@ -35,7 +35,7 @@ fn farthest(a: &ZMap, b: &ZMap) -> f32 {
 fn compare(stock: &ZMap, cutter: &Cutter, path: &Toolpath) {
     let expected = cut_reference(stock, cutter, path, &Silent).unwrap();
     let got = cut(stock.clone(), cutter, path, &Silent).unwrap();
-    let envelope = crate::sim::Envelope::new(cutter, path);
+    let envelope = crate::Envelope::new(cutter, path);
     for k in 0..got.height.len() {
         let (height, by) = (got.height[k], got.cut_by[k]);
         let place = || {

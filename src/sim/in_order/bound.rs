@@ -1,9 +1,9 @@
 //! Planes that bound: one above all heights of a node, one below the cut of a move
 //! ([`Sweep::plane`]). mm.
 
-use crate::sim::form::Form;
-use crate::sim::sweep::{LocalMove, Sweep};
-use crate::sim::track::{Track, larger, smaller};
+use crate::form::Form;
+use crate::sweep::{LocalMove, Sweep};
+use crate::track::{Track, larger, smaller};
 
 /// Children of a node, four by four.
 pub(super) const CHILDREN: usize = 16;

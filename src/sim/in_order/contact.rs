@@ -1,8 +1,8 @@
 //! When a cutter on its way first touches the stock of a cell. mm.
 
-use crate::geometry::Point3;
-use crate::sim::form::Form;
-use crate::sim::track::{larger, smaller};
+use crate::form::Form;
+use crate::track::{larger, smaller};
+use geometry::Point3;
 
 /// Steps of each of the two searches: to 1e-12 of the move (a golden section gains 0.2 decimal digits
 /// a step). Fewer would show in the place; more is below rounding.

@@ -2,9 +2,9 @@
 
 use super::bound::Bound;
 use super::leaf::{CELLS, LEAF};
-use crate::sim::sweep::Sweep;
-use crate::sim::swept::swept_height_at;
-use crate::sim::track::Track;
+use crate::sweep::Sweep;
+use crate::swept::swept_height_at;
+use crate::track::Track;
 use pulp::Simd;
 
 /// Cells for which the place on the track is looked for at once. Fewer are not worth a vector loop.

@@ -3,8 +3,8 @@
 use super::bound::Bound;
 use super::heights::Cells;
 use super::{ENGAGED, MoveRemoval};
-use crate::sim::sweep::Sweep;
-use crate::sim::track::{Track, larger, smaller};
+use crate::sweep::Sweep;
+use crate::track::{Track, larger, smaller};
 use pulp::Simd;
 
 /// Cells along the side of a leaf: a row is one vector of f64 on the widest machines. Larger leaves

@@ -3,11 +3,11 @@
 
 use super::leaf::Tally;
 use super::{Found, Job, Removal, Slices, cut_by_tiles};
-use crate::cutter::Cutter;
-use crate::monitor::{Cancelled, Monitor};
-use crate::sim::ZMap;
-use crate::sim::swept::swept_height;
-use crate::toolpath::Toolpath;
+use crate::ZMap;
+use crate::swept::swept_height;
+use cutter::Cutter;
+use motion::Toolpath;
+use work::monitor::{Cancelled, Monitor};
 
 /// As [`cut_in_order`](super::cut_in_order), by a plain loop over cells and without
 /// [`Removal::rapid_contacts`].

@@ -2,13 +2,13 @@
 //! of removal must satisfy.
 
 use super::*;
-use crate::geometry::{Point2, Vector3};
-use crate::monitor::Silent;
-use crate::sim::cut_reference;
-use crate::sim::scenes::{Rng, cutters, path_through, random_path, square_grid, wave_path};
-use crate::sim::swept::swept_height;
-use crate::toolpath::MoveKind;
+use crate::cut_reference;
+use crate::scenes::{Rng, cutters, path_through, random_path, square_grid, wave_path};
+use crate::swept::swept_height;
+use geometry::{Point2, Vector3};
+use motion::MoveKind;
 use proptest::prelude::*;
+use work::monitor::Silent;
 
 fn cut(stock: &ZMap, cutter: &Cutter, path: &Toolpath) -> Removal {
     cut_in_order(stock.clone(), cutter, path, &Silent).unwrap()

@@ -5,13 +5,13 @@ use super::bound::{Bound, CHILDREN, Ceiling, Ceilings};
 use super::contact::{first_touch, reach};
 use super::leaf::{LEAF, Lanes, Leaf, UNTOUCHED};
 use super::{ENGAGED, Found, Job, RapidContact, Slices};
-use crate::geometry::Point3;
-use crate::monitor::{Cancelled, check};
-use crate::sim::form::{Family, Form};
-use crate::sim::sweep::{Ball, Flat, Rounded, Sweep};
-use crate::sim::track::{Track, larger};
-use crate::toolpath::MoveKind;
+use crate::form::{Family, Form};
+use crate::sweep::{Ball, Flat, Rounded, Sweep};
+use crate::track::{Track, larger};
+use geometry::Point3;
+use motion::MoveKind;
 use pulp::Simd;
+use work::monitor::{Cancelled, check};
 
 /// Cells along the side of a node.
 const NODE: usize = 4 * LEAF;

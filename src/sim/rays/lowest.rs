@@ -6,9 +6,9 @@
 //! goes down to where the ray enters it at that time (Newton's method on a convex function), and the search
 //! over time goes on from there: it ends when no stretch of time may reach below the limit.
 
-use crate::cutter::Solid;
-use crate::geometry::{Point3, Vector3};
-use crate::sim::solid::{Look, Motion, Moving, Part, SHORTEST, Stretch, SweptMoves};
+use crate::solid::{Look, Motion, Moving, Part, SHORTEST, Stretch, SweptMoves};
+use cutter::Solid;
+use geometry::{Point3, Vector3};
 
 /// How far inside of the tool a lower place may be missed, mm. Less costs looks.
 const TOLERANCE: f64 = 1e-11;

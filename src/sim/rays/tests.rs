@@ -3,11 +3,11 @@
 mod forms;
 
 use super::*;
-use crate::cutter::{Cutter, Holder, HolderSection};
-use crate::monitor::Silent;
-use crate::sim::scenes::{Rng, cutters};
-use crate::sim::solid::tests::{axis, path_of, some_move, within};
-use crate::toolpath::ClPoint;
+use crate::scenes::{Rng, cutters};
+use crate::solid::tests::{axis, path_of, some_move, within};
+use cutter::{Cutter, Holder, HolderSection};
+use motion::ClPoint;
+use work::monitor::Silent;
 
 fn alone(cutter: &Cutter, path: &Toolpath) -> Rays {
     Rays::new(path, &Solid::of_cutter(cutter, None), &Silent).unwrap()

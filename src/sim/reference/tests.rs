@@ -2,10 +2,10 @@
 //! `sim/engine_tests.rs`.
 
 use super::*;
-use crate::monitor::Silent;
-use crate::sim::Grid;
-use crate::sim::scenes::{Rng, cutters, random_path, square_grid, wave_path};
-use crate::sim::swept::tests::brute_height;
+use crate::Grid;
+use crate::scenes::{Rng, cutters, random_path, square_grid, wave_path};
+use crate::swept::tests::brute_height;
+use work::monitor::Silent;
 
 fn cut(stock: &ZMap, cutter: &Cutter, path: &Toolpath) -> ZMap {
     cut_reference(stock, cutter, path, &Silent).unwrap()
@@ -85,7 +85,7 @@ fn blocks_leave_out_no_move_that_matters() {
         let path = wave_path(8.0, 0.8, 0.7);
         let stock = ZMap::block(square_grid(8.0, 0.05), 5.0);
         let got = cut(&stock, &cutter, &path);
-        let envelope = crate::sim::Envelope::new(&cutter, &path);
+        let envelope = crate::Envelope::new(&cutter, &path);
         let all: Vec<u32> = (0..path.len() as u32).collect();
         for k in 0..stock.grid.len() {
             let p = stock.grid.centre(k % stock.grid.nx, k / stock.grid.nx);

@@ -7,10 +7,10 @@
 //! by how far a leaning axis moves the place as seen from the tool.
 
 use super::{Motion, Nearest, OppositeAxes, below};
-use crate::cutter::Solid;
-use crate::geometry::{BoxTree, Extent, MAX_COORDINATE, Node, Paired, Point3, Vector3, round_up};
-use crate::parallel;
-use crate::toolpath::{Move, Toolpath};
+use cutter::Solid;
+use geometry::{BoxTree, Extent, MAX_COORDINATE, Node, Paired, Point3, Vector3, round_up};
+use motion::{Move, Toolpath};
+use work::parallel;
 
 /// A part of a move is at most this many radii of the tool long. Longer ones have large boxes; shorter
 /// ones fill the tree.
@@ -388,8 +388,8 @@ impl Summary {
 mod tests {
     use super::super::tests::{path_of, some_move};
     use super::*;
-    use crate::cutter::Cutter;
-    use crate::sim::scenes::Rng;
+    use crate::scenes::Rng;
+    use cutter::Cutter;
 
     #[test]
     fn boxes_hold_the_track_of_the_pivot() {

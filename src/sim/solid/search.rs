@@ -8,7 +8,7 @@
 //! each stretch in place of one constant, and steps of a cubic where the distance is smooth).
 
 use super::Nearest;
-use crate::geometry::{Point3, Vector3};
+use geometry::{Point3, Vector3};
 
 /// How far above the true one a least value may lie, mm. Less costs samples; more shows in what depends on
 /// it to 1e-9.

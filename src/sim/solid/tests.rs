@@ -1,10 +1,10 @@
 //! Distances from swept tools against brute force over time, and the tree against all moves.
 
 use super::*;
-use crate::cutter::{Cutter, Holder, HolderSection};
-use crate::geometry::Vector3;
-use crate::sim::scenes::{Rng, cutters};
-use crate::toolpath::{Move, MoveKind, Toolpath};
+use crate::scenes::{Rng, cutters};
+use cutter::{Cutter, Holder, HolderSection};
+use geometry::Vector3;
+use motion::{Move, MoveKind, Toolpath};
 
 /// Time steps of the brute force.
 const STEPS: usize = 10_000;

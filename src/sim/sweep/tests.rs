@@ -1,9 +1,9 @@
 //! The sweeps of all families against the closed forms of the reference, at samples.
 
 use super::*;
-use crate::sim::form::Family;
-use crate::sim::scenes::{Rng, cutters, random_path};
-use crate::sim::swept::swept_height;
+use crate::form::Family;
+use crate::scenes::{Rng, cutters, random_path};
+use crate::swept::swept_height;
 
 /// A point up to `by` beside a point of the track, in x and in y.
 fn near(track: &Track, rng: &mut Rng, by: f64) -> (f64, f64) {

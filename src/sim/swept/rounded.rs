@@ -2,11 +2,11 @@
 //!
 //! With a = s − σ the distance of the point ahead of the axis, w across, ρ = √(a² + w²), and m >= 0
 //! the slope of the track, the lowest cut is where m = f′(ρ)·a/ρ, or at the end of the track, or
-//! where the cutter ends. The profile itself finds that place ([`Profile::ahead`](crate::cutter::Profile::ahead)).
+//! where the cutter ends. The profile itself finds that place ([`Profile::ahead`](cutter::Profile::ahead)).
 
 use super::{Part, Touch};
-use crate::sim::form::Form;
-use crate::sim::track::Track;
+use crate::form::Form;
+use crate::track::Track;
 
 /// The lowest cut of the form at the point `along` and `across` the track.
 pub(super) fn touch(form: &Form, track: &Track, along: f64, across: f64) -> Option<Touch> {

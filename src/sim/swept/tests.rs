@@ -2,7 +2,7 @@
 //! profile as the cutter gives it.
 
 use super::*;
-use crate::sim::scenes::{Rng, cutters, random_path};
+use crate::scenes::{Rng, cutters, random_path};
 use approx::assert_abs_diff_eq;
 
 /// Least of `f` over `low..high`, `f` convex (infinite outside of an interval that `inside`

@@ -1,8 +1,8 @@
 //! Where samples stand: bricks of 8 × 8 × 8, in blocks of 8 × 8 × 8 bricks, where the surface passes.
 
 use super::divide::Cube;
-use crate::geometry::{Aabb, Point3, Vector3};
-use crate::sim::NOT_CUT;
+use crate::NOT_CUT;
+use geometry::{Aabb, Point3, Vector3};
 use std::collections::HashMap;
 
 /// Samples along the side of a brick.

@@ -3,7 +3,7 @@
 //! All lengths are local to a small cube, so that rounding stays below 2e-7 of the ball's radius.
 
 use super::moves::{Part, Parts};
-use crate::geometry::{Point3, Vector3};
+use geometry::{Point3, Vector3};
 
 /// Samples at once: 4 × 4 × 4.
 pub(super) const LANES: usize = 64;

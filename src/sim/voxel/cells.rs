@@ -1,7 +1,7 @@
 //! The cells of a brick: the cubes between eight samples, of which the least stands in the brick.
 
 use super::bricks::{BRICK, Bricks, Placed, SAMPLES, slot_of};
-use crate::sim::NOT_CUT;
+use crate::NOT_CUT;
 
 /// Samples along the side of a brick and its upper neighbours' first layer.
 const WIDE: usize = BRICK as usize + 1;

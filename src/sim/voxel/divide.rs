@@ -5,9 +5,9 @@ use super::bricks::{BLOCK, BRICK, Block, Lattice};
 use super::leaf::Leaf;
 use super::moves::{Parts, Tangent, corner};
 use super::{Budget, VoxelStock};
-use crate::geometry::Point3;
-use crate::monitor::{Cancelled, Monitor, check};
-use crate::parallel;
+use geometry::Point3;
+use work::monitor::{Cancelled, Monitor, check};
+use work::parallel;
 
 /// Rounding of what bounds rest on, mm: distances are least over a move to 1e-9.
 const SURE: f64 = 1e-8;

@@ -4,9 +4,9 @@ use super::bricks::{BAND, BRICK, Block, Brick, SAMPLES, STEPS};
 use super::capsule::{Kernel, LANES, Lanes};
 use super::divide::{Cube, Divider, Scratch};
 use super::moves::Tangent;
-use crate::geometry::{Point3, Vector3};
-use crate::lanes;
-use crate::sim::NOT_CUT;
+use crate::NOT_CUT;
+use geometry::{Point3, Vector3};
+use work::lanes;
 
 /// Samples along the side of what is worked out at once.
 const SIDE: u32 = 4;

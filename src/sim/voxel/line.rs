@@ -10,8 +10,8 @@
 use super::bricks::{Lattice, STEPS};
 use super::surface::Foot;
 use super::{VoxelEngine, Voxels};
-use crate::geometry::{Point3, Vector3};
-use crate::sim::NOT_CUT;
+use crate::NOT_CUT;
+use geometry::{Point3, Vector3};
 
 /// A cell is looked at this share of the line's way through it from both of its ends, and in the middle: on its faces the
 /// samples of one cell say what those of the next do, so that a cell with the surface cannot be stepped over.

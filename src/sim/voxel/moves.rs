@@ -10,11 +10,11 @@
 //! pieces is not convex: there a distance changes by no more than the place moves.
 
 use super::slide::{StandIn, slide};
-use crate::cutter::Solid;
-use crate::geometry::{Point3, Vector3};
-use crate::parallel;
-use crate::sim::solid::{Motion, Nearest, OppositeAxes, below};
-use crate::toolpath::Toolpath;
+use crate::solid::{Motion, Nearest, OppositeAxes, below};
+use cutter::Solid;
+use geometry::{Point3, Vector3};
+use motion::Toolpath;
+use work::parallel;
 
 /// How far the middle of a turning ball may run beside the chord that stands for it, mm. More shows in
 /// distances; less makes more parts.

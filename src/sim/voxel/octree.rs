@@ -3,8 +3,8 @@
 
 use super::bricks::BLOCK;
 use super::divide::Cube;
-use crate::monitor::{Cancelled, Monitor, check};
-use crate::parallel;
+use work::monitor::{Cancelled, Monitor, check};
+use work::parallel;
 
 /// Samples along the side of the least cube.
 pub(super) const SIDE: u32 = 4;

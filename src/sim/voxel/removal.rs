@@ -11,13 +11,13 @@ use super::divide::Cube;
 use super::moves::{Part, Tangent, corner};
 use super::octree::{Descent, SIDE, descend};
 use super::{VoxelEngine, VoxelError};
-use crate::geometry::{Point3, Vector3};
-use crate::lanes;
-use crate::monitor::{Monitor, check};
-use crate::parallel;
-use crate::sim::solid::Motion;
-use crate::sim::{ENGAGED, MoveRemoval, RapidContact};
+use crate::solid::Motion;
+use crate::{ENGAGED, MoveRemoval, RapidContact};
+use geometry::{Point3, Vector3};
 use std::collections::BTreeMap;
+use work::lanes;
+use work::monitor::{Monitor, check};
+use work::parallel;
 
 /// By how much a voxel's share may be off where a plane crosses it, in voxels: 0.0478 for one square to the diagonal at a
 /// quarter of a voxel from the middle, 0.0429 square to that of a face, none along the faces. Edges, a tenth of voxel² for

@@ -4,8 +4,8 @@
 //! time have a mean that does not depend on time: a plane below the distance from all that is swept.
 
 use super::moves::Tangent;
-use crate::cutter::Solid;
-use crate::geometry::{Point3, Vector3};
+use cutter::Solid;
+use geometry::{Point3, Vector3};
 
 /// Looks at one move at most; convergence takes a few.
 const MOST_LOOKS: usize = 60;
@@ -137,9 +137,9 @@ pub(super) fn slide(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::SweptSolid;
-    use crate::sim::scenes::{Rng, cutters};
-    use crate::toolpath::ClPoint;
+    use crate::SweptSolid;
+    use crate::scenes::{Rng, cutters};
+    use motion::ClPoint;
 
     #[test]
     fn distances_are_exact_and_planes_lie_below() {

@@ -10,12 +10,12 @@ use super::divide::Cube;
 use super::moves::Parts;
 use super::octree::{Descent, SIDE, descend};
 use super::{VoxelEngine, VoxelError};
-use crate::cutter::{Holder, Solid};
-use crate::geometry::{Point3, Vector3};
-use crate::monitor::{Monitor, check};
-use crate::parallel;
-use crate::toolpath::Toolpath;
+use cutter::{Holder, Solid};
+use geometry::{Point3, Vector3};
+use motion::Toolpath;
 use std::collections::BTreeMap;
+use work::monitor::{Monitor, check};
+use work::parallel;
 
 /// What is shallower than this, mm, is no collision. Less finds the cusps that a shank as wide as its cutter rubs along;
 /// more misses true ones.
@@ -117,11 +117,8 @@ impl VoxelEngine<'_> {
             check(monitor)?;
             let HolderHit { move_index, section, at, .. } = all[k].1;
             let to = &path.moves[move_index as usize].to;
-            let swept = crate::sim::SweptSolid::new(
-                &sections[section],
-                &path.location_before(move_index as usize),
-                to,
-            );
+            let swept =
+                crate::SweptSolid::new(&sections[section], &path.location_before(move_index as usize), to);
             let inside = swept.map_or(0.0, |swept| -swept.distance(&at).distance);
             Ok::<_, VoxelError>(2.0 * inside.min(self.standing(&at, move_index)))
         })?;

@@ -1,6 +1,6 @@
 //! What there is before the first cut: boxes, round bars, closed meshes, and blocks roughed to some distance from a part.
 
-use crate::geometry::{Aabb, Bvh, Point3, TriangleMesh, Vector3};
+use geometry::{Aabb, Bvh, Point3, TriangleMesh, Vector3};
 
 /// An axis of coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

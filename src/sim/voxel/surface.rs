@@ -9,10 +9,10 @@ use super::bricks::{Bricks, Placed, slot_of};
 use super::cells::{Cells, Corners};
 use super::vertex::vertex;
 use super::{VoxelEngine, Voxels, crossed, offset};
-use crate::geometry::{Plane, Point3, Vector3};
-use crate::monitor::{Cancelled, Monitor, check};
-use crate::parallel;
-use crate::sim::NOT_CUT;
+use crate::NOT_CUT;
+use geometry::{Plane, Point3, Vector3};
+use work::monitor::{Cancelled, Monitor, check};
+use work::parallel;
 
 /// The machined surface.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -6,13 +6,13 @@ mod removal;
 mod standing;
 
 use super::*;
-use crate::cutter::Cutter;
-use crate::geometry::Aabb;
-use crate::monitor::Silent;
-use crate::sim::scenes::{Rng, cutters, path_through, random_path, wave_path};
-use crate::sim::{NOT_CUT, SweptSolid, ZMap};
-use crate::toolpath::{ClPoint, Move, MoveKind};
+use crate::scenes::{Rng, cutters, path_through, random_path, wave_path};
+use crate::{NOT_CUT, SweptSolid, ZMap};
+use cutter::Cutter;
+use geometry::Aabb;
+use motion::{ClPoint, Move, MoveKind};
 use std::f64::consts::PI;
+use work::monitor::Silent;
 
 /// More than any test takes.
 const MEMORY: u64 = 1 << 30;
@@ -122,7 +122,7 @@ fn distances_are_those_of_brute_force() {
 
 #[test]
 fn a_tool_with_its_holder_cuts_as_one() {
-    use crate::cutter::{Holder, HolderSection};
+    use cutter::{Holder, HolderSection};
     let mut rng = Rng::new(9);
     let sections = vec![
         HolderSection { diameter: 2.0, top_diameter: 2.0, length: 2.0 },
@@ -164,7 +164,7 @@ fn octahedron(middle: Point3, size: f64) -> VoxelStock {
             triangles.push(if x == 0 { [x, y, z] } else { [x, z, y] });
         }
     }
-    let (mesh, _) = crate::geometry::TriangleMesh::new((0..6).map(corner).collect(), triangles).unwrap();
+    let (mesh, _) = geometry::TriangleMesh::new((0..6).map(corner).collect(), triangles).unwrap();
     VoxelStock::from_mesh(mesh).unwrap()
 }
 
@@ -195,7 +195,7 @@ fn stock_is_as_large_as_it_should_be() {
 fn a_roughed_block_ends_where_it_was_roughed() {
     // A slope 5 mm high over 10, roughed to 0.7; at the back the block's own top cuts it off.
     let corners = [[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], [10.0, 10.0, 5.0], [0.0, 10.0, 5.0]].map(Point3::from);
-    let (mesh, _) = crate::geometry::TriangleMesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+    let (mesh, _) = geometry::TriangleMesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]]).unwrap();
     let around = Aabb { min: Point3::new(0.0, 0.0, -2.0), max: Point3::new(10.0, 10.0, 5.0) };
     let stock = VoxelStock::roughed(around, mesh, 0.7);
     let over = 0.7 * 1.25f64.sqrt();

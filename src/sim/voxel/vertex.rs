@@ -1,6 +1,6 @@
 //! The vertex of a cell: the place nearest to all tangent planes of the surface in it.
 
-use crate::geometry::{Plane, Point3, into_cube, meeting};
+use geometry::{Plane, Point3, into_cube, meeting};
 
 /// Planes whose normals spread less than the square root of this, rad, are one plane. Greater wears shallow
 /// ridges down, less lets rounding move vertices along the surface.
@@ -20,7 +20,7 @@ pub(super) fn vertex(planes: &[Plane], centre: &Point3, half: f64) -> (Point3, b
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vector3;
+    use geometry::Vector3;
 
     fn plane(point: [f64; 3], normal: [f64; 3]) -> Plane {
         Plane { point: point.into(), normal: Vector3::from(normal).normalize() }

@@ -25,7 +25,7 @@
 //! gradients on both sides would have to lie on both sides of the profile's.
 
 use super::touch::{Carries, LEVEL, Profile};
-use crate::geometry::{Aabb, Extent, Feature, Point3, TriangleMesh, Vector3};
+use geometry::{Aabb, Extent, Feature, Point3, TriangleMesh, Vector3};
 
 /// Faces steeper than this (z of the unit normal) do not count as lying on a side of their edges:
 /// on which one may be rounding. Greater makes domains larger.
@@ -381,9 +381,9 @@ impl Corners {
 pub(super) fn domains(mesh: &TriangleMesh, profile: &Profile) -> Vec<Domain> {
     let bounds = mesh.bounds();
     let margin = MARGIN * bounds.min.coords.amax().max(bounds.max.coords.amax()).max(profile.radius);
-    let faces = crate::parallel::map(mesh.triangles().len(), |t| Face::new(&mesh.corners(t)));
+    let faces = work::parallel::map(mesh.triangles().len(), |t| Face::new(&mesh.corners(t)));
     let survey = Survey { mesh, profile, faces };
     let corners = Corners::new(mesh);
-    let vertices = crate::parallel::map(mesh.vertices().len(), |v| survey.vertex(corners.of(v)));
-    crate::parallel::map(mesh.triangles().len(), |t| survey.triangle(t, &corners, &vertices, margin))
+    let vertices = work::parallel::map(mesh.vertices().len(), |v| survey.vertex(corners.of(v)));
+    work::parallel::map(mesh.triangles().len(), |t| survey.triangle(t, &corners, &vertices, margin))
 }

@@ -7,8 +7,8 @@
 //! that domain. Each tile is worked out by itself, so the number of threads changes no bit.
 
 use super::{Cull, DropCutter};
-use crate::geometry::{BoxTree, Extent, Feature};
-use crate::lanes;
+use geometry::{BoxTree, Extent, Feature};
+use work::lanes;
 
 /// Points of a grid in the plan view.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,7 +79,7 @@ impl DropCutter<'_> {
         let mut drops = vec![GridDrop::NOTHING; nx * ny];
         match &self.cull {
             Cull::Domains { tree, parts } if self.below_tile(grid) <= MOST_BELOW => {
-                crate::parallel::for_each_chunk(&mut drops, TILE * nx, |band, rows| {
+                work::parallel::for_each_chunk(&mut drops, TILE * nx, |band, rows| {
                     for i in (0..nx).step_by(TILE) {
                         let mut tile = Tile::new(grid, [i, TILE * band]);
                         tile.drop_onto(self, tree, parts);
@@ -95,7 +95,7 @@ impl DropCutter<'_> {
                     }
                 });
             }
-            _ => crate::parallel::for_each_chunk(&mut drops, nx, |j, row| {
+            _ => work::parallel::for_each_chunk(&mut drops, nx, |j, row| {
                 for (i, drop) in row.iter_mut().enumerate() {
                     let [x, y] = grid.point(i, j);
                     if let Some(found) = self.at(x, y) {

@@ -8,7 +8,7 @@
 //! it is taken only as far as `F` grows.
 
 use super::touch::Profile;
-use crate::geometry::Jet2;
+use geometry::Jet2;
 
 /// How the profile's height depends on the distance from the axis, as one smooth piece.
 #[derive(Debug, Clone, Copy)]
@@ -293,7 +293,7 @@ impl<'s, J: Fn(f64, f64) -> Jet2> Hill<'s, J> {
         let rho = d[0].hypot(d[1]);
         let [height, a, b] = self.law.height(rho.min(self.radius));
         let slope = [plan_dot(d, &jet.du), plan_dot(d, &jet.dv)];
-        let flat = |p: &crate::geometry::Vector3, q: &crate::geometry::Vector3| p.x * q.x + p.y * q.y;
+        let flat = |p: &geometry::Vector3, q: &geometry::Vector3| p.x * q.x + p.y * q.y;
         let bend = [
             flat(&jet.du, &jet.du) + plan_dot(d, &jet.duu),
             flat(&jet.du, &jet.dv) + plan_dot(d, &jet.duv),
@@ -343,7 +343,7 @@ impl<'s, J: Fn(f64, f64) -> Jet2> Hill<'s, J> {
     }
 }
 
-fn plan_dot(d: [f64; 2], v: &crate::geometry::Vector3) -> f64 {
+fn plan_dot(d: [f64; 2], v: &geometry::Vector3) -> f64 {
     d[0] * v.x + d[1] * v.y
 }
 

@@ -5,7 +5,7 @@
 //! on what is below that plane and inside the box has a closed form again.
 
 use super::touch::{Profile, Rest, gap};
-use crate::geometry::{Node, Point3, Vector3, round_down, round_up};
+use geometry::{Node, Point3, Vector3, round_down, round_up};
 
 /// Boxes with more triangles than this get no roof. More takes longer to prepare, and no plane fits
 /// a large piece of surface closely.

@@ -1,7 +1,7 @@
 use super::touch::Profile;
 use super::*;
-use crate::cutter::AptWords;
-use crate::geometry::{Point3, Vector3};
+use cutter::AptWords;
+use geometry::{Point3, Vector3};
 
 mod exact;
 mod grid;

@@ -6,8 +6,9 @@
 //! triangle lies on a side that separates the two. (The contacts known as facet, edge and vertex
 //! contact since Bobrow 1985.)
 
-use crate::cutter::{self, Cutter};
-use crate::geometry::{Feature, Point3, Vector3};
+use cutter;
+use cutter::Cutter;
+use geometry::{Feature, Point3, Vector3};
 
 /// The profile of [`Cutter`] with its constants worked out, since a drop evaluates it some hundred
 /// times; optionally grown on all sides.

@@ -7,11 +7,12 @@
 //! way between two turns becomes straight. Heights come from dropping the cutter, so that a link can
 //! never cut deeper into the part than its chords, and never raises what stands beside it.
 
-use super::super::chord::{Watch, reduce, sample_within_chord};
-use super::super::{DropCutter, border::Border};
-use crate::cutter::Cutter;
-use crate::geometry::{Point2, Point3, Vector2};
-use crate::monitor::{Cancelled, Monitor};
+use super::super::DropCutter;
+use crate::moves::chord::{Watch, reduce, sample_within_chord};
+use crate::surface::border::Border;
+use cutter::Cutter;
+use geometry::{Point2, Point3, Vector2};
+use work::monitor::{Cancelled, Monitor};
 
 /// Length of the tangents at both ends over the distance of the ends: 2 makes a half circle's bulge,
 /// half the distance. Less makes turns tighter, more drives them farther over the border.

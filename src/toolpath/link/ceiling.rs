@@ -7,8 +7,8 @@
 //! stock that stands on it, whatever its size. Wherever no move has been, also beside the part, stock is
 //! taken to stand up to the top: how far it reaches beyond the part is not for the planner to guess.
 
-use crate::cutter::Cutter;
-use crate::geometry::{Point2, Point3, Vector2};
+use cutter::Cutter;
+use geometry::{Point2, Point3, Vector2};
 
 /// Squares across a cutter's radius. The bound lies above the stock by what the profile rises over the
 /// diagonal of a square: with fewer squares rapids stay higher than they have to, more cost time.

@@ -19,17 +19,20 @@ mod order;
 mod tests;
 mod tilted;
 
-use super::border::Border;
-use super::chord::distance_to_segment;
-use super::{ClPoint, DropCutter, Move, MoveKind, PlanSettings, Step, Toolpath, strip_width};
-use crate::cutter::Cutter;
-use crate::geometry::{Point2, Point3, Vector2};
-use crate::monitor::{self, Cancelled, Monitor};
-use crate::part::Part;
+use super::{DropCutter, PlanSettings, Step};
+use crate::surface::border::Border;
 use bend::{Bends, End};
 use ceiling::Ceiling;
+use cutter::Cutter;
+use geometry::distance_to_segment;
+use geometry::{Point2, Point3, Vector2};
+use motion::{ClPoint, Move, MoveKind, Toolpath};
 use order::{Visit, is_closed, order};
-pub(super) use tilted::join_tilted;
+use part::Part;
+use scallop::strip_width;
+pub(crate) use tilted::join_tilted;
+use work::monitor;
+use work::monitor::{Cancelled, Monitor};
 
 /// How the end of a pass and the start of the next are joined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -116,7 +119,7 @@ pub fn join(
             longest,
             chord_tolerance: settings.chord_tolerance,
         };
-        links = crate::parallel::try_map(passes.len() - 1, |k| {
+        links = work::parallel::try_map(passes.len() - 1, |k| {
             bends.link(&End::last(&passes[k]), &End::first(&passes[k + 1]), monitor)
         })?;
     }

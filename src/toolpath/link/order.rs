@@ -9,7 +9,7 @@
 //! J. L. Bentley, "Fast algorithms for geometric traveling salesman problems", 1992). The steps and
 //! their order depend on nothing but the passes, so the result is the same every time.
 
-use crate::geometry::{Point2, Point3};
+use geometry::{Point2, Point3};
 
 /// A visit of a pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,7 +72,7 @@ pub fn is_closed(pass: &[Point3]) -> bool {
 }
 
 /// From end to nearest end.
-pub(super) fn nearest_ends(passes: &[Vec<Point3>], closed: &[bool], both_ways: bool) -> Vec<Visit> {
+pub(crate) fn nearest_ends(passes: &[Vec<Point3>], closed: &[bool], both_ways: bool) -> Vec<Visit> {
     let mut doors = Vec::new();
     for (pass, points) in passes.iter().enumerate() {
         let last = points.len() - 1;
@@ -273,7 +273,7 @@ impl<'a> Tour<'a> {
             }
             list
         };
-        crate::parallel::map(self.passes.len(), near)
+        work::parallel::map(self.passes.len(), near)
     }
 
     fn reverse(&mut self, from: usize, to: usize) {

@@ -1,10 +1,10 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::geometry::{AnalyticShape, AnalyticSurface, TriangleMesh};
-use crate::monitor::Silent;
-use crate::part::Patch;
-use crate::sim::{Grid, ZMap, cut_in_order};
+use geometry::{AnalyticShape, AnalyticSurface, TriangleMesh};
+use part::Patch;
+use sim::{Grid, ZMap, cut_in_order};
+use work::monitor::Silent;
 
 const TOP: f64 = 7.0;
 
@@ -183,7 +183,7 @@ fn retracts_stay_low_where_all_around_is_cut() {
 /// Sloped moves at random: a tool at the free height touches nothing of what they left.
 #[test]
 fn nothing_stands_above_the_free_height() {
-    let mut rng = crate::sim::scenes::Rng::new(3);
+    let mut rng = sim::scenes::Rng::new(3);
     for cutter in
         [Cutter::ball(6.0), Cutter::flat(5.0), Cutter::bull(6.0, 1.0), Cutter::taper(2.0, 1.0, 0.3, 6.0)]
     {
@@ -263,7 +263,7 @@ fn air(passes: &[Vec<Point3>], visits: &[Visit]) -> f64 {
 }
 
 fn random_passes(n: usize, seed: u64) -> Vec<Vec<Point3>> {
-    let mut rng = crate::sim::scenes::Rng::new(seed);
+    let mut rng = sim::scenes::Rng::new(seed);
     (0..n)
         .map(|_| {
             let (x, y) = (rng.within(0.0, 100.0), rng.within(0.0, 100.0));

@@ -8,20 +8,21 @@
 mod bent;
 mod ways;
 
-use super::super::across;
-use super::super::interference::{Repaired, repair};
-use super::super::tilted::{TiltedPasses, Tilting, Touch, limit_turning, located, reversed};
-use super::super::{
-    Check, ClPoint, Interference, Move, MoveKind, Obstacle, PlanError, PlanSettings, RepairSummary, Toolpath,
-};
 use super::order::{Visit, is_closed, order};
 use super::{Links, Rates, longest_link, plane_interval};
-use crate::cutter::{Cutter, Solid};
-use crate::geometry::Point3;
-use crate::monitor::{self, Monitor};
-use crate::part::Part;
+use crate::tilt::across;
+use crate::tilt::repair::{Repaired, repair};
+use crate::tilt::tilted::{TiltedPasses, Tilting, Touch, limit_turning, located, reversed};
+use crate::{PlanError, PlanSettings, RepairSummary};
 use bent::Bent;
+use collision::{Check, Interference, Obstacle};
+use cutter::{Cutter, Solid};
+use geometry::Point3;
+use motion::{ClPoint, Move, MoveKind, Toolpath};
+use part::Part;
 use ways::{Block, Step, Ways};
+use work::monitor;
+use work::monitor::Monitor;
 
 /// Joins passes; see the module.
 ///
@@ -67,12 +68,12 @@ pub fn join_tilted(
     monitor::check(monitor)?;
     let turned =
         |k: usize| visited(&passes[visits[k].pass], &contacts[visits[k].pass], &visits[k], cutter, tilting);
-    let turned = crate::parallel::try_map(visits.len(), turned)?;
+    let turned = work::parallel::try_map(visits.len(), turned)?;
     let passes = cleared(turned, cutter, tilting, plane_interval(cutter, settings.step), notes, monitor)?;
-    let pieces = crate::parallel::try_map(passes.len(), |k| {
+    let pieces = work::parallel::try_map(passes.len(), |k| {
         Piece::of(&passes[k], tolerance, smoothing, tilting.interference, monitor)
     })?;
-    let between = crate::parallel::try_map(pieces.len().saturating_sub(1), |k| {
+    let between = work::parallel::try_map(pieces.len().saturating_sub(1), |k| {
         ways.between(&pieces[k].ends[1], &pieces[k + 1].ends[0], monitor)
     })?;
     let path = program(&pieces, &between, &ways, settings);
@@ -89,7 +90,7 @@ fn cleared(
     notes: &mut Vec<String>,
     monitor: &dyn Monitor,
 ) -> Result<Vec<Vec<Touch>>, PlanError> {
-    let evened = crate::parallel::try_map(passes.len(), |k| {
+    let evened = work::parallel::try_map(passes.len(), |k| {
         let mut pass = passes[k].clone();
         let even = tilting.most_turning.is_none_or(|rate| limit_turning(&mut pass, cutter, rate));
         Ok::<_, PlanError>((repaired(pass, cutter, tilting, monitor)?, even))
@@ -109,7 +110,7 @@ fn cleared(
         notes.extend(left.map(|left| left.note(across)));
         // The touches are clear; moves between them may be no longer.
         let again = |k: usize| repaired(passes[k].clone(), cutter, tilting, monitor);
-        let again = crate::parallel::try_map(passes.len(), again)?;
+        let again = work::parallel::try_map(passes.len(), again)?;
         again.iter().for_each(|one| summary.add(&one.summary));
         passes = again.into_iter().flat_map(|one| one.passes).collect();
     }

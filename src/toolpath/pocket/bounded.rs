@@ -14,8 +14,8 @@ use super::cleared::Cleared;
 use super::route::{Entry, Run, bend, circle};
 use super::turning::Turning;
 use super::way::{Room, Way, fitting};
-use crate::geometry::{Point2, Vector2};
-use crate::monitor::{Cancelled, Monitor, check};
+use geometry::{Point2, Vector2};
+use work::monitor::{Cancelled, Monitor, check};
 
 /// Places of the way are this share of the radius apart: the chip between two is seen, and the cusp between
 /// their discs is a tenth of a film.

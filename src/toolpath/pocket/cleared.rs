@@ -6,7 +6,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use crate::geometry::{Point2, Vector2};
+use geometry::{Point2, Vector2};
 
 /// Stock thinner than this share of the radius counts as none: where the cutter passes along ground that
 /// it has cut before, chords and rounding leave films that load nothing. More would hide real stock: beside

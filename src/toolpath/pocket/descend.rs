@@ -2,8 +2,13 @@
 
 use super::route::circle;
 use super::{Entry, PocketStrategy, Run};
-use crate::geometry::{Point2, Point3, foot};
-use crate::toolpath::{ARC_SHARE, ClPoint, Move, MoveKind, PlanSettings, Toolpath};
+use crate::PlanSettings;
+use geometry::{Point2, Point3, foot};
+use motion::{ClPoint, Move, MoveKind, Toolpath};
+
+/// Share of the chord tolerance that the chords of a helix may use, when the rest is left to what is done with the moves
+/// afterwards. Greater shares make fewer moves.
+const ARC_SHARE: f64 = 0.5;
 
 /// A way down begins this far above the stock that is left, mm: rapids end there.
 const ABOVE: f64 = 0.5;
@@ -133,7 +138,6 @@ fn way_down(
     let plunge = vec![Point3::new(begin.x, begin.y, above), Point3::new(begin.x, begin.y, floor)];
     let once: Vec<Point2> = match &run.entry {
         Entry::Helix { centre, radius, begin } => {
-            // Chords within the share of the tolerance that arcs have everywhere.
             let spacing = (8.0 * radius * ARC_SHARE * chord_tolerance).sqrt();
             let mut turn = circle(centre, *radius, *begin, spacing);
             turn.push(turn[0]);

@@ -3,7 +3,7 @@
 //! Enters: a program and the angle of the circumference in stock on each move, as it was measured. Leaves:
 //! the same moves with feeds reduced, and figures of the engagement.
 
-use crate::toolpath::{MoveKind, Toolpath};
+use motion::{MoveKind, Toolpath};
 
 /// The feed never falls below this share: rubbing wears a cutter more than load does.
 pub const LEAST_SHARE: f64 = 0.3;

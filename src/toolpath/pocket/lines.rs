@@ -1,7 +1,7 @@
 //! Zigzag over a plane piece: parallel lines, joined along the walls, then once around each wall.
 
 use super::route::{Entry, Run, begun_near};
-use crate::geometry::{Piece, Point2, SegmentGrid, Vector2};
+use geometry::{Piece, Point2, SegmentGrid, Vector2};
 
 /// One line within the piece.
 #[derive(Debug, Clone, Copy)]

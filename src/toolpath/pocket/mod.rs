@@ -26,9 +26,10 @@ use route::{Entry, Run};
 use turning::Turning;
 
 use super::{Plan, PlanError, PlanSettings, Step};
-use crate::cutter::{Cutter, CutterShape};
-use crate::geometry::{Piece, Point2, Region, SegmentGrid, Vector2};
-use crate::monitor::{self, Cancelled, Monitor};
+use cutter::{Cutter, CutterShape};
+use geometry::{Piece, Point2, Region, SegmentGrid, Vector2};
+use work::monitor;
+use work::monitor::{Cancelled, Monitor};
 
 /// A pocket to mill.
 #[derive(Debug, Clone, PartialEq)]

@@ -6,9 +6,10 @@
 
 use super::Flow;
 use super::turning::{Turning, curvatures};
-use crate::field::{PlanarError, PlanarMesh};
-use crate::geometry::{CurveSegment, Piece, Point2, Region, SegmentGrid};
-use crate::monitor::{self, Cancelled, Monitor};
+use field::{PlanarError, PlanarMesh};
+use geometry::{CurveSegment, Piece, Point2, Region, SegmentGrid};
+use work::monitor;
+use work::monitor::{Cancelled, Monitor};
 
 /// Side of the triangles over the stepover. Finer ones place levels better and cost time as their square.
 const EDGE_OVER_STEP: f64 = 0.35;
@@ -408,7 +409,7 @@ fn piece_of(loops: Vec<Vec<Point2>>, least: f64) -> Option<Piece> {
     let mut piece = Piece::default();
     let mut greatest = 0.0;
     for curve in loops.into_iter().filter(|c| closed_length(c) > least) {
-        let area = crate::geometry::signed_area(&curve);
+        let area = geometry::signed_area(&curve);
         if area > greatest {
             greatest = area;
             piece.outer = curve;
@@ -441,7 +442,7 @@ pub fn thinned(curve: &[Point2], tolerance: f64) -> Vec<Point2> {
     while from < n {
         let fits = |to: usize| {
             let ends = [curve[from], curve[to % n]];
-            (from + 1..to).all(|k| crate::geometry::foot(&curve[k], &ends).1 <= tolerance)
+            (from + 1..to).all(|k| geometry::foot(&curve[k], &ends).1 <= tolerance)
         };
         let mut to = from + 1;
         while to < n && to - from < MAX_SKIP && fits(to + 1) {

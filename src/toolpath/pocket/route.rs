@@ -7,7 +7,7 @@
 use std::f64::consts::TAU;
 
 use super::nest::Nest;
-use crate::geometry::{Piece, Point2, SegmentGrid, Vector2};
+use geometry::{Piece, Point2, SegmentGrid, Vector2};
 
 /// Chords of links and helices.
 const LINK_PIECES: usize = 16;

@@ -1,8 +1,9 @@
 use super::*;
-use crate::geometry::{Point2, Point3};
-use crate::monitor::Silent;
-use crate::toolpath::{Joining, MoveKind};
+use crate::Joining;
+use geometry::{Point2, Point3};
+use motion::MoveKind;
 use std::f64::consts::PI;
+use work::monitor::Silent;
 
 fn rectangle(x0: f64, y0: f64, x1: f64, y1: f64) -> Vec<Point2> {
     [(x0, y0), (x1, y0), (x1, y1), (x0, y1)].map(|(x, y)| Point2::new(x, y)).to_vec()
@@ -95,11 +96,7 @@ fn programs_keep_to_the_pocket_and_clear_it() {
                     assert!(slope <= 3f64.to_radians().tan() * 1.001, "{what}: {slope}");
                 }
                 if a.z == -6.0 && b.z == -6.0 {
-                    segments.push(crate::geometry::CurveSegment {
-                        ends: [a.xy(), b.xy()],
-                        curve: 0,
-                        index: 0,
-                    });
+                    segments.push(geometry::CurveSegment { ends: [a.xy(), b.xy()], curve: 0, index: 0 });
                 }
             }
             let passes = SegmentGrid::new(segments);
@@ -141,7 +138,7 @@ fn neighbouring_passes_lie_within_the_stepover() {
             let closed = nest.inner.iter().flat_map(|n| n.curves.curves());
             let mut sides = SegmentGrid::of_curves(closed).segments().to_vec();
             for w in nest.between.iter().flat_map(|s| s.windows(2)) {
-                sides.push(crate::geometry::CurveSegment { ends: [w[0], w[1]], curve: 0, index: 0 });
+                sides.push(geometry::CurveSegment { ends: [w[0], w[1]], curve: 0, index: 0 });
             }
             let inner = SegmentGrid::new(sides);
             for p in nest.curves.curves().flatten() {
@@ -210,14 +207,14 @@ fn shortened_ways_keep_their_heading() {
 fn feeds_fall_where_more_of_the_cutter_cuts() {
     assert!((engagement_angle(3.0, 3.0) - PI / 2.0).abs() < 1e-15);
     assert_eq!(engagement_angle(6.0, 3.0), PI);
-    let to = |x: f64| crate::toolpath::Move {
-        to: crate::toolpath::ClPoint::upright(Point3::new(x, 0.0, 0.0)),
+    let to = |x: f64| motion::Move {
+        to: motion::ClPoint::upright(Point3::new(x, 0.0, 0.0)),
         kind: MoveKind::Cut,
         feed_rate: 1000.0,
         pass: 0,
     };
-    let mut path = crate::toolpath::Toolpath {
-        start: crate::toolpath::ClPoint::upright(Point3::origin()),
+    let mut path = motion::Toolpath {
+        start: motion::ClPoint::upright(Point3::origin()),
         moves: vec![to(10.0), to(20.0), to(30.0)],
     };
     let angles = [1.0, PI, 1.0];

@@ -4,7 +4,7 @@
 //! pass. Leaves: how far the pass may be from the one before; mm, rad.
 
 use super::nest::closed_length;
-use crate::geometry::Point2;
+use geometry::Point2;
 
 /// What passes may have in stock.
 #[derive(Debug, Clone, Copy, PartialEq)]

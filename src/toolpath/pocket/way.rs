@@ -1,7 +1,7 @@
 //! A way of the cutter's centre by its length, and the circles that touch it and fit into its room; mm.
 
 use super::bounded::LEAST;
-use crate::geometry::{Piece, Point2, SegmentGrid, Vector2};
+use geometry::{Piece, Point2, SegmentGrid, Vector2};
 
 /// A circle may be this share of the radius less than one that fits.
 const FIT: f64 = 0.002;

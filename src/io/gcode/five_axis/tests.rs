@@ -1,8 +1,8 @@
 //! Programs followed word by word, and the words by forward kinematics.
 
 use super::*;
-use crate::machine::kinematics::{DEFAULT_ROTARY_RATE, PRESETS, RotaryAxis, follow, preset};
-use crate::toolpath::Move;
+use machine::kinematics::{DEFAULT_ROTARY_RATE, PRESETS, RotaryAxis, follow, preset};
+use motion::Move;
 
 const HEADER: ProgramHeader = ProgramHeader { name: String::new(), spindle_speed: None };
 
@@ -63,7 +63,7 @@ fn machine(name: &str) -> Kinematics {
 
 /// Rapids over, cuts that tilt, a turn on the spot, rapids back; within a cone that all machines reach.
 fn path() -> Toolpath {
-    let mut rng = crate::sim::scenes::Rng::new(11);
+    let mut rng = sim::scenes::Rng::new(11);
     let mut at = |z: f64| {
         let tip = Point3::new(rng.within(-40.0, 40.0), rng.within(-40.0, 40.0), z);
         let axis = Vector3::new(rng.within(-0.5, 0.5), rng.within(-0.5, 0.5), 1.0).normalize();

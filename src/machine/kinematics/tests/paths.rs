@@ -1,7 +1,7 @@
 //! Paths in joints: sampled against the true motion, choices against brute force.
 
 use super::*;
-use crate::toolpath::{Move, MoveKind, Toolpath};
+use motion::{Move, MoveKind, Toolpath};
 
 /// A path of cuts through tilted locations.
 fn path(stations: impl IntoIterator<Item = ([f64; 3], [f64; 3])>) -> Toolpath {
@@ -187,7 +187,7 @@ fn limits_that_cannot_be_kept_are_told() {
 #[test]
 fn no_other_choice_turns_less() {
     let machine = Kinematics::by_name("bc-head").unwrap();
-    let mut rng = crate::sim::scenes::Rng::new(3);
+    let mut rng = sim::scenes::Rng::new(3);
     for _ in 0..20 {
         let stations: Vec<_> =
             (0..5).map(|_| ([0.0; 3], tilted(rng.within(0.05, 1.0), rng.within(-PI, PI)))).collect();

@@ -1,7 +1,7 @@
 //! Heights against the closed forms and engines for upright tools.
 
 use super::*;
-use crate::sim::{Envelope, cut_reference};
+use crate::{Envelope, cut_reference};
 
 /// Distances of heights from the envelope at places inside of a square, in rising order.
 fn errors(cutter: &Cutter, path: &Toolpath, size: f64, voxel: f64) -> Vec<f64> {
@@ -57,7 +57,7 @@ fn flat_floors_and_faces_are_exact() {
         assert!((got - z).abs() < 2e-5, "{got} at {x} {y}");
     }
     assert_eq!(voxels.height(11.0, 1.0), None);
-    let ground = ZMap::block(crate::sim::scenes::square_grid(8.0, 0.5), 5.0);
+    let ground = ZMap::block(crate::scenes::square_grid(8.0, 0.5), 5.0);
     let cut = cut_reference(&ground, &Cutter::flat(6.0).unwrap(), &path, &Silent).unwrap();
     let grid = &cut.grid;
     for (k, h) in cut.height.iter().enumerate() {

@@ -1,8 +1,8 @@
 //! Volumes by move: against closed forms and the engine that keeps the order of upright tools.
 
 use super::*;
-use crate::geometry::Point2;
-use crate::sim::{Grid, cut_in_order};
+use crate::{Grid, cut_in_order};
+use geometry::Point2;
 
 #[test]
 fn the_sum_is_what_is_missing() {

@@ -1,7 +1,7 @@
 //! The holder against what still stands: planted collisions, the order of moves, and brute force.
 
 use super::*;
-use crate::cutter::{Holder, HolderSection};
+use cutter::{Holder, HolderSection};
 use std::collections::BTreeSet;
 
 fn holder(cutting_length: f64, diameters: &[f64]) -> Holder {

@@ -1,7 +1,7 @@
 //! Drops onto exact surfaces, against searches that know no contact conditions.
 
 use super::*;
-use crate::geometry::Jet2;
+use geometry::Jet2;
 
 /// A graph `z(x, y)` with its derivatives `[z, zx, zy, zxx, zxy, zyy]`, over a rectangle, searched
 /// through a coarse mesh.

@@ -5,14 +5,15 @@
 //! link; where it follows the feed, and the cutter is no ball, it keeps its lead and tilt and so leads the contact around
 //! the cutter, which would leap from one side to the other of a flat end if the axis went through the normal.
 
-use super::super::super::chord::{Watch, sample_within_chord};
-use super::super::super::tilted::{ABOVE_SURFACE, Tilting, Touch, located_sampling, thinned};
-use super::super::super::{CcPoint, ClPoint, Interference};
 use super::super::bend::{Cubic, End, MOST_ROLL, SAMPLING, curves};
-use crate::cutter::{Cutter, CutterShape};
-use crate::geometry::{Point2, Point3, Vector3};
-use crate::monitor::{Cancelled, Monitor};
-use crate::part::Part;
+use crate::moves::chord::{Watch, sample_within_chord};
+use crate::tilt::tilted::{ABOVE_SURFACE, Tilting, Touch, located_sampling, thinned};
+use collision::Interference;
+use cutter::{Cutter, CutterShape};
+use geometry::{Point2, Point3, Vector3};
+use motion::{CcPoint, ClPoint};
+use part::Part;
+use work::monitor::{Cancelled, Monitor};
 
 /// Chords by which the length along a bend is told; the axis turns as evenly as they do.
 const CHORDS: usize = 32;

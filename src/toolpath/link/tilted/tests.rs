@@ -1,11 +1,13 @@
 //! A plate beside a wall that the holder must not touch, and ways between passes.
 
 use super::*;
-use crate::cutter::{Holder, HolderSection, Solid};
-use crate::geometry::{AnalyticShape, AnalyticSurface, Bvh, TriangleMesh, Vector3};
-use crate::monitor::Silent;
-use crate::part::Patch;
-use crate::toolpath::{Check, Joining, Obstacle, Step, Strategy, ToolAxis, plan_tilted};
+use crate::{Joining, Step, Strategy, plan_tilted};
+use collision::{Check, Obstacle};
+use cutter::{Holder, HolderSection, Solid};
+use geometry::{AnalyticShape, AnalyticSurface, Bvh, TriangleMesh, Vector3};
+use motion::ToolAxis;
+use part::Patch;
+use work::monitor::Silent;
 
 fn plate() -> Part {
     let surface =
@@ -60,7 +62,7 @@ fn beside_a_wall_the_axis_leans_away_and_every_cut_is_clear() {
     let tilted = |note: &String| note.contains("contacts the axis is tilted by up to");
     assert!(plan.notes.iter().any(tilted), "{:?}", plan.notes);
     // The ball stays where it was: over the plate, all along it.
-    let centres = |plan: &crate::toolpath::Plan| {
+    let centres = |plan: &crate::Plan| {
         let middle = plan.path.moves.iter().filter(|m| cuts(m)).map(|m| m.to.tip + m.to.axis * 3.0);
         middle.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], c| {
             assert!((c.z - 3.0).abs() < 1e-9, "{c}");
@@ -127,7 +129,7 @@ fn neighbouring_passes_are_joined_nearby_and_clear() {
         let passes = aloft.path.passes();
         assert!(passes > 5 && air(&aloft.path) < 40.0 + 6.0 * passes as f64, "{}", air(&aloft.path));
         // A bull that leans the other way afterwards is turned around sooner aloft.
-        if cutter.shape() == crate::cutter::CutterShape::Ball {
+        if cutter.shape() == cutter::CutterShape::Ball {
             let count = |kind| bent.path.moves.iter().filter(|m| m.kind == kind).count();
             assert_eq!((count(MoveKind::Plunge), count(MoveKind::Retract)), (1, 1), "all by links");
         }
@@ -162,7 +164,7 @@ fn the_lead_of_a_bull_goes_with_the_feed_around_a_link() {
         thinning: 0.003,
     };
     let touch = |y: f64, feed: f64| {
-        let contact = crate::toolpath::CcPoint { point: Point3::new(20.0, y, 0.0), normal: Vector3::z() };
+        let contact = motion::CcPoint { point: Point3::new(20.0, y, 0.0), normal: Vector3::z() };
         Touch::by(&axis, &cutter, contact, Vector3::x() * feed).unwrap()
     };
     let (from, to) = (touch(10.0, 1.0), touch(11.0, -1.0));
@@ -210,7 +212,7 @@ fn a_wall_between_two_passes_is_gone_over() {
     let block = Block::of(&part, &settings);
     let ways = Ways::new(&part, &cutter, &settings, Rates::of(&settings, &[]), &block, &keep, Some(bent));
     let touch = |x: f64, feed: f64| {
-        let contact = crate::toolpath::CcPoint { point: Point3::new(x, 10.0, 0.0), normal: Vector3::z() };
+        let contact = motion::CcPoint { point: Point3::new(x, 10.0, 0.0), normal: Vector3::z() };
         Touch::by(&axis, &cutter, contact, Vector3::x() * feed).unwrap()
     };
     let (from, to) = (touch(4.0, 1.0), touch(16.0, 1.0));

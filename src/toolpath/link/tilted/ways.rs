@@ -13,15 +13,17 @@
 //! All but the last are proved clear, move by move, of all that the tool is to keep away from; the last is taken where it is
 //! the quickest and clear too, or where nothing else is. Times are length over rate.
 
-use super::super::super::interference::Check;
-use super::super::super::tilted::{GREATEST_TURN, Touch};
-use super::super::super::{ClPoint, Interference, MoveKind, Obstacle, PlanSettings};
 use super::super::Rates;
 use super::bent::Bent;
-use crate::cutter::{Cutter, Solid};
-use crate::geometry::{Aabb, Bvh, Point3, TriangleMesh, Vector3};
-use crate::monitor::{Cancelled, Monitor};
-use crate::part::Part;
+use crate::PlanSettings;
+use crate::tilt::tilted::{GREATEST_TURN, Touch};
+use collision::Check;
+use collision::{Interference, Obstacle};
+use cutter::{Cutter, Solid};
+use geometry::{Aabb, Bvh, Point3, TriangleMesh, Vector3};
+use motion::{ClPoint, MoveKind};
+use part::Part;
+use work::monitor::{Cancelled, Monitor};
 
 /// The way around the sphere is divided into turns of this angle, rad, and the sphere is as much larger as its chords cut
 /// off: `1/cos` of half of it.
@@ -163,7 +165,7 @@ impl<'a> Ways<'a> {
         };
         let quickest = take(self.over_block(&from.at, &to.at));
         let quickest = take(self.aloft(&from.at, &to.at, quickest));
-        crate::monitor::check(monitor)?;
+        work::monitor::check(monitor)?;
         if let Some(bent) = &self.bent
             && (to.contact.point - from.contact.point).norm() / self.rates.feed < quickest
         {
@@ -384,10 +386,10 @@ impl Sphere {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cutter::{Holder, HolderSection};
-    use crate::geometry::{AnalyticShape, AnalyticSurface};
-    use crate::part::Patch;
-    use crate::toolpath::{Joining, Step};
+    use crate::{Joining, Step};
+    use cutter::{Holder, HolderSection};
+    use geometry::{AnalyticShape, AnalyticSurface};
+    use part::Patch;
 
     /// A bull nose with a wide holder, its tip on the sphere and on the chords around it, its axis square to the radius at most.
     #[test]

@@ -1,0 +1,103 @@
+//! Where a tool touches what it should not: the part away from the contact, neighbours, fixtures.
+//!
+//! Enters: the tool as a [`Solid`] of convex pieces, its location, and meshes with their search trees, mm. Leaves: the
+//! nearest place of the meshes with its signed distance from the tool, for one location ([`Obstacle::clearance`]) or
+//! a whole move ([`Obstacle::swept_clearance`]).
+//!
+//! The surface itself counts, be it closed or not: the distance of the place that lies deepest in the tool, or nearest to
+//! it. A tool wholly inside of a closed mesh touches none of its surface; it got there through it.
+
+mod checks;
+mod piece;
+#[doc(hidden)]
+pub mod samples;
+mod sweep;
+#[cfg(test)]
+mod tests;
+
+pub use checks::{Check, Interference, Shortfall};
+use cutter::Solid;
+use geometry::{Bvh, Node, Point3, TriangleMesh};
+use motion::ClPoint;
+use piece::Piece;
+#[cfg(test)]
+use piece::middle;
+pub use sweep::SweptClearance;
+
+/// A mesh that a tool may run into.
+#[derive(Debug, Clone, Copy)]
+pub struct Obstacle<'a> {
+    mesh: &'a TriangleMesh,
+    bvh: &'a Bvh,
+}
+
+/// The place of a mesh that is nearest to a tool, or deepest in it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clearance {
+    /// Signed distance of the place from the tool, mm; negative inside.
+    pub distance: f64,
+    /// The place, on the mesh.
+    pub place: Point3,
+    /// Triangle it lies on.
+    pub triangle: u32,
+}
+
+impl<'a> Obstacle<'a> {
+    /// A mesh with its own search tree.
+    pub fn new(mesh: &'a TriangleMesh, bvh: &'a Bvh) -> Self {
+        Self { mesh, bvh }
+    }
+
+    /// The nearest place of the mesh, if it is nearer than `limit`, mm, to a tool standing at `at`.
+    ///
+    /// # Tolerance
+    /// The distance is the least of the whole mesh to 1e-9 mm. Inside of a solid of several pieces it is the depth in
+    /// the piece in which a place lies deepest; what adjoining pieces add to it is not counted.
+    pub fn clearance(&self, solid: &Solid, at: &ClPoint, limit: f64) -> Option<Clearance> {
+        let mut best = None;
+        for index in 0..solid.pieces() {
+            let piece = Piece { solid, index, at: *at };
+            self.nearest(&piece, limit, &mut best);
+        }
+        best
+    }
+
+    /// Whether the mesh comes nearer than `limit`, mm: as [`Obstacle::clearance`], but ends at the first such place.
+    pub fn is_nearer(&self, solid: &Solid, at: &ClPoint, limit: f64) -> bool {
+        (0..solid.pieces()).any(|index| {
+            let piece = Piece { solid, index, at: *at };
+            let mut found = false;
+            self.bvh.tree().search(-limit, farthest(&piece), |slot, now| {
+                let corners = self.mesh.corners(self.bvh.triangle_in(slot));
+                found |= piece.nearest_on(&corners, limit).is_some();
+                if found { f64::INFINITY } else { now }
+            });
+            found
+        })
+    }
+
+    /// Puts in `best` what is nearer than that, or than `limit`; tells whether there is such a place.
+    fn nearest(&self, piece: &Piece, limit: f64, best: &mut Option<Clearance>) -> bool {
+        let start = best.as_ref().map_or(limit, |b| b.distance);
+        let mut found = false;
+        self.bvh.tree().search(-start, farthest(piece), |slot, now| {
+            let triangle = self.bvh.triangle_in(slot);
+            let Some(place) = piece.nearest_on(&self.mesh.corners(triangle), -now) else { return now };
+            *best =
+                Some(Clearance { distance: place.distance, place: place.point, triangle: triangle as u32 });
+            found = true;
+            -place.distance
+        });
+        found
+    }
+}
+
+/// Minus a lower bound on the distance of a box: what the supporting plane at its middle leaves over its sides.
+fn farthest(piece: &Piece) -> impl Fn(usize, &Node, f64) -> f64 {
+    |_, node, _| {
+        let (middle, half) = node.middle();
+        let sample = piece.sample(&middle);
+        let g = sample.gradient;
+        g.x.abs() * half[0] + g.y.abs() * half[1] + g.z.abs() * half[2] - sample.distance
+    }
+}

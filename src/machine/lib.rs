@@ -1,0 +1,112 @@
+//! The machine: speed and acceleration limits, machining time, five-axis kinematics.
+
+mod feeds;
+pub mod kinematics;
+mod time;
+
+pub use feeds::slow_corners;
+pub use time::{machining_time, machining_time_turning};
+
+/// Limits of the machine's motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Machine {
+    /// Rapid rate, mm/min.
+    pub rapid_rate: f64,
+    /// Acceleration along the path and across it, mm/s².
+    pub acceleration: f64,
+    /// How far the control may round a corner, mm: it sets the speed at corners.
+    pub junction_deviation: f64,
+    /// How fast acceleration may change, mm/s³: it sets the speed where curvature changes suddenly.
+    pub jerk: f64,
+    /// Whether programs have the feeds at which corners and bends can be run.
+    pub slow_corners: bool,
+}
+
+impl Default for Machine {
+    /// A mid-sized vertical machining centre: rapids of 15 m/min, 0.3 g, and corners rounded by
+    /// 0.01 mm, the usual setting of controls for finishing (also grbl's); jerk as such machines are set
+    /// for finishing, 50 m/s³.
+    fn default() -> Self {
+        Self {
+            rapid_rate: 15_000.0,
+            acceleration: 3000.0,
+            junction_deviation: 0.01,
+            jerk: 50_000.0,
+            slow_corners: true,
+        }
+    }
+}
+
+/// Why a machine's limits were refused.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("the machine's {what} is {value}; it must be a positive number of {unit}")]
+pub struct MachineError {
+    /// Which limit.
+    pub what: &'static str,
+    /// What was given.
+    pub value: f64,
+    /// Its unit.
+    pub unit: &'static str,
+}
+
+impl Machine {
+    /// Refuses limits with which no time could be told.
+    ///
+    /// # Errors
+    /// [`MachineError`] unless all limits are positive and finite.
+    pub fn check(&self) -> Result<(), MachineError> {
+        let limits = [
+            ("rapid rate", self.rapid_rate, "mm/min"),
+            ("acceleration", self.acceleration, "mm/s²"),
+            ("junction deviation", self.junction_deviation, "mm"),
+            ("jerk", self.jerk, "mm/s³"),
+        ];
+        match limits.into_iter().find(|(_, value, _)| !(*value > 0.0 && value.is_finite())) {
+            Some((what, value, unit)) => Err(MachineError { what, value, unit }),
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_are_checked() {
+        let machine = Machine::default();
+        assert_eq!(machine.check(), Ok(()));
+        let error = Machine { acceleration: 0.0, ..machine }.check().unwrap_err();
+        let message = "the machine's acceleration is 0; it must be a positive number of mm/s²";
+        assert_eq!(error.to_string(), message);
+        assert!(Machine { rapid_rate: f64::NAN, ..machine }.check().is_err());
+        assert!(Machine { junction_deviation: f64::INFINITY, ..machine }.check().is_err());
+        assert!(Machine { jerk: -1.0, ..machine }.check().is_err());
+    }
+}
+
+/// What both are tested with.
+#[cfg(test)]
+mod fixture {
+    use super::Machine;
+    use geometry::Point3;
+    use motion::{ClPoint, Move, MoveKind, Toolpath};
+
+    pub const fn machine(jerk: f64) -> Machine {
+        Machine {
+            rapid_rate: 12_000.0,
+            acceleration: 1000.0,
+            junction_deviation: 0.01,
+            jerk,
+            slow_corners: true,
+        }
+    }
+
+    /// Cuts at 6000 mm/min = 100 mm/s, which takes 5 mm and 0.1 s to reach.
+    pub fn path(tips: impl IntoIterator<Item = [f64; 3]>) -> Toolpath {
+        let mut tips = tips.into_iter().map(|t| ClPoint::upright(Point3::from(t)));
+        let start = tips.next().unwrap();
+        let moves = tips.map(|to| Move { to, kind: MoveKind::Cut, feed_rate: 6000.0, pass: 0 }).collect();
+        Toolpath { start, moves }
+    }
+}

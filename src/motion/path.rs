@@ -1,0 +1,145 @@
+//! The words of a path: contact, location, move, toolpath. mm; feed in mm/min.
+
+use geometry::{Point3, Vector3};
+
+/// Cutter contact: where the cutter touches the design surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CcPoint {
+    /// Contact point, mm.
+    pub point: Point3,
+    /// Outward unit normal of the design surface there.
+    pub normal: Vector3,
+}
+
+/// Cutter location: the tip of the cutter, always, and the tool axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClPoint {
+    /// Tip, mm.
+    pub tip: Point3,
+    /// Tool axis, a unit vector from the tip to the holder.
+    pub axis: Vector3,
+}
+
+impl ClPoint {
+    /// With the tool axis along z.
+    pub fn upright(tip: Point3) -> Self {
+        Self { tip, axis: Vector3::z() }
+    }
+
+    /// The location at the share `t` of a move from here to `to`: the tip runs straight, the axis turns at
+    /// an even rate in the plane of both axes, as controls that follow the tip move them.
+    pub fn towards(&self, to: &Self, t: f64) -> Self {
+        let tip = self.tip + (to.tip - self.tip) * t;
+        // The angle by both sine and cosine, exact for small and for large ones.
+        let (sin, cos) = (self.axis.cross(&to.axis).norm(), self.axis.dot(&to.axis));
+        if sin == 0.0 {
+            return Self { tip, axis: if t < 0.5 { self.axis } else { to.axis } };
+        }
+        let angle = sin.atan2(cos);
+        let axis = (self.axis * ((1.0 - t) * angle).sin() + to.axis * (t * angle).sin()) / sin;
+        Self { tip, axis: axis.normalize() }
+    }
+}
+
+/// What a move is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MoveKind {
+    /// Positioning at rapid speed (G0); must not touch stock.
+    Rapid,
+    /// Feeding down to the start of a pass.
+    Plunge,
+    /// Cutting along a pass.
+    Cut,
+    /// Feeding along the surface from the end of a pass to the start of the next.
+    Link,
+    /// Feeding up from the end of a pass, over beside the part to the next, and in the block toward its start.
+    Retract,
+}
+
+impl MoveKind {
+    /// True for moves that feed along the surface.
+    pub fn is_on_surface(self) -> bool {
+        matches!(self, Self::Cut | Self::Link)
+    }
+}
+
+/// A straight move of the tip to a new location; the axis turns evenly meanwhile.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Move {
+    /// Where the move ends.
+    pub to: ClPoint,
+    /// What it is for.
+    pub kind: MoveKind,
+    /// Feed rate, mm/min; ignored for [`MoveKind::Rapid`].
+    pub feed_rate: f64,
+    /// The pass it belongs to, counted from 0 in program order; rapids and links belong to the
+    /// pass that they lead to.
+    pub pass: u32,
+}
+
+/// A program for one cutter: a start and the moves from there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Toolpath {
+    /// Where the tip is before the first move.
+    pub start: ClPoint,
+    /// The moves, in program order; a move's index is its name in maps and reports.
+    pub moves: Vec<Move>,
+}
+
+impl Toolpath {
+    /// Number of moves.
+    pub fn len(&self) -> usize {
+        self.moves.len()
+    }
+
+    /// True without moves.
+    pub fn is_empty(&self) -> bool {
+        self.moves.is_empty()
+    }
+
+    /// Where move `k` begins.
+    pub fn start_of(&self, k: usize) -> Point3 {
+        if k == 0 { self.start.tip } else { self.moves[k - 1].to.tip }
+    }
+
+    /// The location where move `k` begins.
+    pub fn location_before(&self, k: usize) -> ClPoint {
+        if k == 0 { self.start } else { self.moves[k - 1].to }
+    }
+
+    /// True when the tool axis stands along z all the time.
+    pub fn is_upright(&self) -> bool {
+        std::iter::once(&self.start).chain(self.moves.iter().map(|m| &m.to)).all(|to| to.axis == Vector3::z())
+    }
+
+    /// Start, end and move of every move, in program order.
+    pub fn segments(&self) -> impl ExactSizeIterator<Item = (Point3, Point3, &Move)> {
+        self.moves.iter().enumerate().map(|(k, m)| (self.start_of(k), m.to.tip, m))
+    }
+
+    /// One more than the greatest pass number; 0 without moves.
+    pub fn passes(&self) -> usize {
+        self.moves.iter().map(|m| m.pass as usize + 1).max().unwrap_or(0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_axis_turns_evenly() {
+        let tilted = |angle: f64| Vector3::new(angle.sin(), 0.0, angle.cos());
+        for whole in [1e-9, 0.3, 2.9] {
+            let from = ClPoint::upright(Point3::new(1.0, 2.0, 3.0));
+            let to = ClPoint { tip: Point3::new(3.0, 2.0, 3.0), axis: tilted(whole) };
+            for t in [0.0, 0.25, 0.5, 1.0] {
+                let at = from.towards(&to, t);
+                assert!((at.axis - tilted(t * whole)).norm() < 1e-15, "{whole} {t}");
+                assert!((at.tip.x - 1.0 - 2.0 * t).abs() < 1e-15);
+            }
+        }
+        let still = ClPoint::upright(Point3::origin());
+        assert_eq!(still.towards(&ClPoint::upright(Point3::new(1.0, 0.0, 0.0)), 0.3).axis, Vector3::z());
+    }
+}

@@ -1,0 +1,33 @@
+//! The tables, pictures and pages that people read. Enters: figures and maps. Leaves: texts and
+//! rasters; writing them to files is the business of [`io`] and [`cli`].
+
+mod canvas;
+mod comb;
+mod field_map;
+#[cfg(test)]
+mod fixture;
+mod histogram;
+mod html;
+mod map;
+mod result;
+mod scale;
+mod surface_mesh;
+mod table;
+mod verdict;
+
+pub use canvas::Picture;
+pub use comb::comb_picture;
+pub use field_map::{field_picture, interval_picture};
+pub use histogram::Histogram;
+pub use html::{ToolpathPage, html_page};
+pub use map::{MapMark, MapSize, MapWords, deviation_colours, deviation_picture, height_picture};
+pub use result::{
+    FieldFigures, JointRange, MachineFigures, ReportError, RunReport, ShortestFigures, SimulationFigures,
+    SolidFigures, SurfaceMeshFigures, ToleranceFigures, ToolpathResult,
+};
+pub use surface_mesh::{MAX_TRIANGLES, SurfaceMesh, VertexPlace, surface_mesh};
+pub use table::{conclusion, result_table};
+pub use verdict::{
+    HIGHEST_RIDGE, Verdict, Violation, collision, holder_note, marks, place, rapid_violation,
+    standing_collision, standing_note, tool_collision, violations, wall_violation,
+};

@@ -1,0 +1,391 @@
+//! The rotary axes of a machine in a scene: a name, or a table `[machine.kinematics]`.
+
+use std::fmt::{self, Write as _};
+
+use super::write::{number, text};
+use geometry::{Point3, Vector3};
+use io::gcode::Style;
+use io::located::SceneError;
+use io::located::{Located, Section};
+use machine::kinematics::{
+    DEFAULT_GAUGE_LENGTH, DEFAULT_ROTARY_RATE, Kinematics, KinematicsError, PRESETS, RotaryAxis, Side, preset,
+};
+
+/// The key of the rotary axes of a machine.
+pub(super) const KEY: &str = "kinematics";
+
+/// The word for a machine of three axes.
+const NONE: &str = "none";
+
+/// Limits of rotary axes, degrees: twenty turns.
+const LIMITS: std::ops::RangeInclusive<f64> = -7200.0..=7200.0;
+
+/// Rotary rates that make sense, degrees/min.
+const RATE: std::ops::RangeInclusive<f64> = 1.0..=1e7;
+
+/// Coordinates of machines, mm.
+const PLACE: std::ops::RangeInclusive<f64> = -99_999.0..=99_999.0;
+
+/// rad/s of a degree a minute.
+const DEGREE_A_MINUTE: f64 = std::f64::consts::PI / 180.0 / 60.0;
+
+const SIDES: [&str; 2] = ["head", "table"];
+
+/// A five-axis machine and how programs for it are written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FiveAxis {
+    /// The machine.
+    pub kinematics: Kinematics,
+    /// How programs are written.
+    pub post: Style,
+    /// Directions of the rotary axes as the scene has them, of any length.
+    directions: [Vector3; 2],
+}
+
+/// Reads the rotary axes of `[machine]`; `None` for a machine of three axes.
+pub(super) fn read(machine: &Section<'_>) -> Result<Option<FiveAxis>, SceneError> {
+    let words: Vec<&str> = [NONE].into_iter().chain(PRESETS).collect();
+    let Some(table) = machine.inline(KEY) else {
+        let Some(word) = machine.word(KEY, &words)?.filter(|word| word.value != NONE) else {
+            return Ok(None);
+        };
+        let made = preset(word.value).map(|axes| {
+            let kinematics =
+                Kinematics::new(axes[0], axes[1], DEFAULT_GAUGE_LENGTH, Point3::origin(), [None; 3]);
+            kinematics.map(|kinematics| FiveAxis {
+                kinematics,
+                post: Style::Tcp,
+                directions: axes.map(|axis| axis.direction),
+            })
+        });
+        return made.transpose().map_err(|e| machine.error(&word.span, e.to_string(), e.cure()));
+    };
+    table.only(
+        &["preset", "post", "first", "second", "gauge_length", "workpiece_zero", "x", "y", "z"],
+        &[],
+        "`kinematics`",
+    )?;
+    let named = table.word("preset", &PRESETS)?.and_then(|word| preset(word.value));
+    let first = read_axis(&table, "first", named.map(|axes| axes[0]))?;
+    let second = read_axis(&table, "second", named.map(|axes| axes[1]))?;
+    let post = table.word("post", &Style::WORDS)?.and_then(|word| Style::from_word(word.value));
+    let post = post.unwrap_or(Style::Tcp);
+    let gauge_length = table.number("gauge_length", 0.0..=*PLACE.end(), " mm")?;
+    let workpiece_zero = place(&table, "workpiece_zero")?;
+    let has = |side| [&first, &second].iter().any(|axis| axis.side == side);
+    // Linear axes follow from them: a guess would be cut into the part.
+    if post == Style::Full {
+        let asked = |missing: bool, key: &str, example: &str, why: &str| {
+            let message = format!("`post = \"full\"` needs `{key}`: {why}");
+            if missing {
+                Err(table.error(&table.key_span("post"), message, format!("add `{key} = {example}`")))
+            } else {
+                Ok(())
+            }
+        };
+        let of_head = "the head swings the tip round its axes";
+        asked(gauge_length.is_none() && has(Side::Head), "gauge_length", "150.0", of_head)?;
+        let of_table = "the table swings the workpiece round its axes";
+        asked(workpiece_zero.is_none() && has(Side::Table), "workpiece_zero", "[0.0, 0.0, 0.0]", of_table)?;
+    }
+    let travel = ["x", "y", "z"].map(|key| table.interval(key, PLACE, " mm"));
+    let [x, y, z] = travel;
+    let kinematics = Kinematics::new(
+        first,
+        second,
+        gauge_length.map_or(DEFAULT_GAUGE_LENGTH, |length| length.value),
+        workpiece_zero.map_or(Point3::origin(), |zero| Point3::from(zero.value)),
+        [x?, y?, z?],
+    );
+    let kinematics = kinematics.map_err(|e| refused(&table, first.letter, &e))?;
+    Ok(Some(FiveAxis { kinematics, post, directions: [first, second].map(|axis| axis.direction) }))
+}
+
+/// A refusal of the machine at the axis that it is about.
+fn refused(table: &Section<'_>, first: char, error: &KinematicsError) -> SceneError {
+    let of = |letter: char| if letter == first { "first" } else { "second" };
+    let key = match error {
+        KinematicsError::Direction { letter } | KinematicsError::Order { letter } => of(*letter),
+        KinematicsError::Limits { joint } => of(*joint),
+        KinematicsError::Letters { .. }
+        | KinematicsError::Parallel { .. }
+        | KinematicsError::AlongSpindle { .. }
+        | KinematicsError::Number { .. } => "second",
+    };
+    table.error(&table.key_span(key), error.to_string(), error.cure())
+}
+
+/// An axis, completed from that of the preset.
+fn read_axis(table: &Section<'_>, key: &str, named: Option<RotaryAxis>) -> Result<RotaryAxis, SceneError> {
+    let example = "{ name = \"C\", side = \"table\", direction = [0, 0, 1] }";
+    let Some(section) = table.inline(key) else {
+        return match named {
+            Some(axis) if !table.has(key) => Ok(axis),
+            _ => Err(table.error(
+                &table.key_span(key),
+                format!("`kinematics` needs `{key}` as a table, or a `preset`"),
+                format!("write `{key} = {example}`, or `preset = \"ac-table\"`"),
+            )),
+        };
+    };
+    section.only(&["name", "side", "direction", "point", "limits", "rate"], &[], "a rotary axis")?;
+    let names = ["A", "B", "C"];
+    let word = |key: &str, words: &[&'static str], has_default: bool| {
+        if has_default { section.word(key, words) } else { section.required_word(key, words).map(Some) }
+    };
+    let name = word("name", &names, named.is_some())?.and_then(|word| word.value.chars().next());
+    let side = word("side", &SIDES, named.is_some())?;
+    let direction = section.vector("direction")?;
+    if direction.is_none() && named.is_none() {
+        let message = format!("`{key}` has no `direction`");
+        return Err(section.error(section.header(), message, "add `direction = [0, 0, 1]`"));
+    }
+    if let Some(direction) = direction.as_ref().filter(|v| v.value.iter().all(|c| *c == 0.0)) {
+        let message = "a direction of no length is none";
+        return Err(section.error(
+            &direction.span,
+            message,
+            "write three numbers, not all zero: `[0, 0, 1]`",
+        ));
+    }
+    let limits = if section.is_text("limits") {
+        section.word("limits", &[NONE])?;
+        None
+    } else {
+        let given = section.interval("limits", LIMITS, " degrees")?;
+        given.map(|limits| limits.map(f64::to_radians)).or(named.and_then(|axis| axis.limits))
+    };
+    let rate = section.number("rate", RATE, " degrees/min")?;
+    let base = named.unwrap_or(RotaryAxis {
+        letter: 'A',
+        direction: Vector3::zeros(),
+        point: Point3::origin(),
+        side: Side::Table,
+        limits: None,
+        rate: DEFAULT_ROTARY_RATE,
+    });
+    Ok(RotaryAxis {
+        letter: name.unwrap_or(base.letter),
+        direction: direction.map_or(base.direction, |v| Vector3::from(v.value)),
+        point: place(&section, "point")?.map_or(base.point, |p| Point3::from(p.value)),
+        side: side.map_or(base.side, |word| if word.value == SIDES[0] { Side::Head } else { Side::Table }),
+        limits,
+        rate: rate.map_or(base.rate, |rate| rate.value * DEGREE_A_MINUTE),
+    })
+}
+
+/// Three coordinates that a machine can have.
+fn place(section: &Section<'_>, key: &str) -> Result<Option<Located<[f64; 3]>>, SceneError> {
+    let Some(place) = section.vector(key)? else { return Ok(None) };
+    if place.value.iter().all(|c| PLACE.contains(c)) {
+        return Ok(Some(place));
+    }
+    let message = format!("`{key}` lies farther out than any machine reaches");
+    let cure = format!("write mm from {} to {}", PLACE.start(), PLACE.end());
+    Err(section.error(&place.span, message, cure))
+}
+
+/// Writes the machine as scenes spell it, after all other keys of `[machine]`.
+pub(super) fn write(out: &mut String, five_axis: Option<&FiveAxis>) -> fmt::Result {
+    let Some(FiveAxis { kinematics, post, directions }) = five_axis else {
+        return writeln!(out, "{KEY} = {}  # three axes", text(NONE));
+    };
+    writeln!(out, "\n[machine.{KEY}]  # mm, degrees")?;
+    writeln!(out, "post = {}  # who moves the linear axes along with the rotary ones", text(post.name()))?;
+    let list =
+        |numbers: &[f64]| format!("[{}]", numbers.iter().map(|x| number(*x)).collect::<Vec<_>>().join(", "));
+    for (key, (axis, direction)) in
+        ["first", "second"].into_iter().zip(kinematics.axes().iter().zip(directions))
+    {
+        let side = if axis.side == Side::Head { SIDES[0] } else { SIDES[1] };
+        let limits = axis.limits.map_or_else(|| text(NONE), |limits| list(&limits.map(f64::to_degrees)));
+        let (direction, point) = (list(direction.as_slice()), list(axis.point.coords.as_slice()));
+        writeln!(
+            out,
+            "{key} = {{ name = {}, side = {}, direction = {direction}, point = {point}, limits = {limits}, rate = {} }}",
+            text(&axis.letter.to_string()),
+            text(side),
+            number(axis.rate / DEGREE_A_MINUTE),
+        )?;
+    }
+    writeln!(out, "gauge_length = {}  # spindle nose to tip", number(kinematics.gauge_length()))?;
+    let zero = list(kinematics.workpiece_zero().coords.as_slice());
+    writeln!(out, "workpiece_zero = {zero}  # in machine coordinates, table at zero")?;
+    for (key, limits) in ["x", "y", "z"].into_iter().zip(kinematics.travel()) {
+        if let Some(limits) = limits {
+            writeln!(out, "{key} = {}", list(limits))?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Scene, SceneText, complete_toml};
+
+    const SCENE: &str = "[part]\nsurface = \"plane\"\nx = [0, 9]\ny = [0, 9]\n[cutter]\nshape = \"ball\"\n\
+                         diameter = 6\n[[toolpath]]\nstrategy = \"zigzag\"\n[machine]\n";
+
+    fn parse(machine: &str) -> Result<Scene, SceneError> {
+        Scene::parse("plane.toml", format!("{SCENE}{machine}"))
+    }
+
+    /// What is wrong, the cure, and the text at the place.
+    fn refused(machine: &str) -> (String, String, String) {
+        let text = format!("{SCENE}{machine}");
+        match parse(machine) {
+            Err(SceneError::Invalid(finding)) => {
+                let source = SceneText::new("", text.as_str());
+                let (line, column) = source.line_and_column(finding.at.offset());
+                let place = text.lines().nth(line - 1).unwrap()[column - 1..].to_owned();
+                (finding.message.clone(), finding.cure.clone(), place)
+            }
+            other => panic!("{machine}: {other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_machine_by_name_or_word_by_word() {
+        assert_eq!(parse("").unwrap().five_axis, None);
+        assert_eq!(parse("kinematics = \"none\"").unwrap().five_axis, None);
+        for name in PRESETS {
+            let five_axis = parse(&format!("kinematics = \"{name}\"")).unwrap().five_axis.unwrap();
+            assert_eq!(Some(five_axis.kinematics), Kinematics::by_name(name), "{name}");
+            assert_eq!(five_axis.post, Style::Tcp);
+        }
+        let table = "[machine.kinematics]\npost = \"full\"\ngauge_length = 120\nz = [-500, 0]\n\
+                     first = { name = \"B\", side = \"head\", direction = [0, -2, 0], limits = [-90, 400], rate = 3600 }\n\
+                     second = { name = \"A\", side = \"head\", direction = [1, 0, 1], point = [0, 0, 80] }\n";
+        let made = parse(table).unwrap().five_axis.unwrap();
+        let [first, second] = *made.kinematics.axes();
+        assert_eq!((first.letter, first.side, first.direction), ('B', Side::Head, -Vector3::y()));
+        assert!((first.rate - std::f64::consts::PI / 3.0).abs() < 1e-12);
+        let [least, greatest] = first.limits.unwrap();
+        assert!((least + 90f64.to_radians()).abs() + (greatest - 400f64.to_radians()).abs() < 1e-12);
+        assert_eq!((second.letter, second.limits, second.point.z), ('A', None, 80.0));
+        assert_eq!((made.post, made.kinematics.gauge_length()), (Style::Full, 120.0));
+        assert_eq!(made.kinematics.travel()[2], Some([-500.0, 0.0]));
+    }
+
+    #[test]
+    fn a_preset_is_completed() {
+        let text = "kinematics = { preset = \"ac-table\", second = { point = [1, 2, 3], limits = [-30, 110] }, \
+                    first = { limits = \"none\" }, workpiece_zero = [4, 5, 6], post = \"full\" }";
+        let made = parse(text).unwrap().five_axis.unwrap();
+        let [first, second] = *made.kinematics.axes();
+        assert_eq!((second.letter, second.direction, second.point.z), ('A', Vector3::x(), 3.0));
+        assert!((second.limits.unwrap()[1] - 110f64.to_radians()).abs() < 1e-12);
+        assert_eq!((first.limits, made.kinematics.workpiece_zero().x), (None, 4.0));
+    }
+
+    #[test]
+    fn the_complete_machine_reads_back_as_itself() {
+        let any = "[machine.kinematics]\nx = [-1, 2.5]\nfirst = { name = \"C\", side = \"table\", \
+                   direction = [0.1, 0.3, 1], limits = [-7200, 7200] }\nsecond = { name = \"B\", side = \"head\", \
+                   direction = [0.123456789012345, 1, 0.7], point = [1, 2, 3.3], rate = 1e7, limits = [-0.1, 33.3] }\n";
+        let named = PRESETS.iter().map(|name| format!("kinematics = \"{name}\"\n"));
+        for text in named.chain([any.to_owned(), String::new()]) {
+            let complete = complete_toml(&parse(&text).unwrap());
+            let again =
+                Scene::parse("plane.toml", complete.clone()).unwrap_or_else(|e| panic!("{e}\n{complete}"));
+            assert_eq!(complete_toml(&again), complete);
+        }
+    }
+
+    /// The example of the README.
+    #[test]
+    fn a_table_with_a_trunnion_off_its_centre() {
+        let readme = include_str!("../../../README.md");
+        let table = readme.split("```toml\n").find(|text| text.starts_with("[machine.kinematics]")).unwrap();
+        let made = parse(table.split("```").next().unwrap()).unwrap().five_axis.unwrap();
+        assert_eq!(made.kinematics.axes()[1].point, Point3::new(250.0, 203.0, -350.0));
+        assert_eq!((made.post, made.kinematics.workpiece_zero().z), (Style::Full, -300.0));
+        assert!(PRESETS.iter().all(|name| readme.contains(&format!("`{name}`"))));
+    }
+
+    #[test]
+    fn what_is_no_machine_is_refused_where_it_stands() {
+        let axis = |direction: &str| format!("{{ name = \"A\", side = \"table\", direction = {direction} }}");
+        let table =
+            |first: &str, second: &str| format!("[machine.kinematics]\nfirst = {first}\nsecond = {second}\n");
+        let c = "{ name = \"C\", side = \"table\", direction = [0, 0, 1] }";
+        let cases = [
+            ("kinematics = \"ac-tabel\"".to_owned(), "cannot be", "`ac-table`", "\"ac-tabel\""),
+            ("kinematics = 5".to_owned(), "must be a text", "quotes", "5"),
+            ("kinematic = \"ac-table\"".to_owned(), "unknown key", "`kinematics`", "kinematic"),
+            ("[machine.kinematics]\n".to_owned(), "needs `first`", "preset", "[machine.kinematics]"),
+            (
+                "[machine.kinematics]\npreset = \"ac-table\"\nfirst = 3".to_owned(),
+                "needs `first`",
+                "write",
+                "first",
+            ),
+            (
+                table(c, "{ name = \"A\", side = \"table\" }"),
+                "no `direction`",
+                "add `direction",
+                "{ name = \"A\"",
+            ),
+            (table(c, "{ name = \"A\", direction = [1, 0, 0] }"), "no `side`", "add `side", "{ name = \"A\""),
+            (table(c, "{ side = \"head\", direction = [1, 0, 0] }"), "no `name`", "add `name", "{ side"),
+            (table(c, "{ nane = \"A\" }"), "unknown key `nane`", "`name`", "nane"),
+            (table(c, &axis("[0, 0.0, -0.0]")), "no length", "not all zero", "[0, 0.0, -0.0]"),
+            (table(c, &axis("[nan, 0, 1]")), "must be a number", "write", "nan"),
+            (table(c, &axis("[1, 0]")), "a list of three numbers", "three numbers", "[1, 0]"),
+            (table(c, &axis("[0, 0, 3]")), "are parallel", "different directions", "second"),
+            (table(c, c), "called C and C", "each letter once", "second"),
+            (table(&axis("[1, 0, 0]"), c), "parallel to the spindle", "exchange first and second", "second"),
+            (
+                table(&c.replace("table", "head"), &axis("[1, 0, 0]")),
+                "comes before the table's",
+                "exchange",
+                "first",
+            ),
+            (
+                table(c, &axis("[1, 0, 0], limits = [30, -30]")),
+                "from a lesser to a greater",
+                "the lesser first",
+                "[30, -30]",
+            ),
+            (table(c, &axis("[1, 0, 0], limits = [30, inf]")), "must be a number", "write", "inf"),
+            (table(c, &axis("[1, 0, 0], limits = [30, 30.00001]")), "no room", "lesser limit", "second"),
+            (table(c, &axis("[1, 0, 0], limits = \"no\"")), "cannot be \"no\"", "`none`", "\"no\""),
+            (table(c, &axis("[1, 0, 0], rate = 0")), "must be a number from 1", "write", "0 }"),
+            (table(c, &axis("[1, 0, 0], point = [0, 0, 2e5]")), "farther out", "write mm", "[0, 0, 2e5]"),
+            (
+                "kinematics = { preset = \"ac-table\", post = \"full\" }".to_owned(),
+                "needs `workpiece_zero`",
+                "add `workpiece_zero",
+                "post",
+            ),
+            (
+                "kinematics = { preset = \"bc-head\", post = \"full\" }".to_owned(),
+                "needs `gauge_length`",
+                "add `gauge_length",
+                "post",
+            ),
+            (
+                "kinematics = { preset = \"bc-head\", post = \"ful\" }".to_owned(),
+                "cannot be",
+                "`full`",
+                "\"ful\"",
+            ),
+            (
+                "kinematics = { preset = \"bc-head\", x = [3, 1] }".to_owned(),
+                "from a lesser",
+                "lesser",
+                "[3, 1]",
+            ),
+        ];
+        let wrong: Vec<String> = cases
+            .iter()
+            .filter_map(|(text, message, cure, place)| {
+                let found = refused(text);
+                let right = found.0.contains(message) && found.1.contains(cure) && found.2.starts_with(place);
+                (!right).then(|| format!("{text}: {found:?}\n"))
+            })
+            .collect();
+        assert!(wrong.is_empty(), "{}", wrong.concat());
+    }
+}

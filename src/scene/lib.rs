@@ -1,0 +1,311 @@
+//! The scene: what a user asks for, in TOML. Enters: a file. Leaves: a [`Scene`], in which every
+//! value is checked, every default filled in, lengths are in mm and angles in rad.
+//!
+//! The text is read as a tree of values with their places (not by derived deserialisation), so that
+//! every refusal can point at the very key or value: tagged enums of serde only know the table.
+
+mod axis;
+mod blade;
+mod classic;
+mod direction;
+mod formula;
+mod interference;
+mod kinematics;
+mod pocket;
+mod read;
+#[cfg(test)]
+mod tests;
+mod write;
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+pub use axis::AxisRequest;
+pub use blade::BladeRequest;
+pub use interference::{Fixture, KeepClear};
+pub use io::located::{Finding, SceneError, SceneText};
+pub use kinematics::FiveAxis;
+pub use pocket::OutlineSource;
+pub use write::complete_toml;
+
+use cutter::{Cutter, Holder};
+use geometry::AnalyticSurface;
+use machine::Machine;
+use metrology::Limits;
+use toolpath::{Joining, Step, Strategy};
+
+/// Default allowance of stock above the part's highest point, mm.
+pub const DEFAULT_ALLOWANCE: f64 = 1.0;
+/// Default margin of stock around the part in the plan view, mm. Cells off the part measure
+/// nothing, so that any margin costs time and memory only.
+pub const DEFAULT_MARGIN: f64 = 0.0;
+/// Default tolerances, mm: scallop, gouge, uncut, chord (finishing of moulds and dies).
+pub const DEFAULT_LIMITS: Limits = Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chord: 0.001 };
+/// Default spindle speed, rev/min; written into programs, measures nothing.
+pub const DEFAULT_SPINDLE_SPEED: f64 = 12000.0;
+/// Default feed along passes, mm/min.
+pub const DEFAULT_FEED_RATE: f64 = 1000.0;
+/// Default feed down to a pass, mm/min.
+pub const DEFAULT_PLUNGE_RATE: f64 = 300.0;
+/// Default height of rapid moves above stock, mm.
+pub const DEFAULT_CLEARANCE: f64 = 2.0;
+/// Default memory for one simulation, MiB.
+pub const DEFAULT_MEMORY_MIB: u32 = 2048;
+/// Whether to find out what each move removes by default: a tenth of the time of a run on the wave.
+pub const DEFAULT_REMOVAL: bool = true;
+/// The error bound asked by default is the least tolerance that is measured against over this: what is left
+/// open then decides no verdict but the closest. A greater one costs time along crests.
+pub const ERROR_BOUNDS_A_TOLERANCE: f64 = 10.0;
+
+/// No smaller error bound is asked by default, mm: root finding leaves a nanometre in any case.
+const LEAST_ERROR_BOUND: f64 = 1e-6;
+
+/// The error bound, mm, that is asked when the scene asks for none.
+pub fn default_error_bound(limits: &Limits) -> f64 {
+    (limits.scallop.min(limits.gouge).min(limits.uncut) / ERROR_BOUNDS_A_TOLERANCE).max(LEAST_ERROR_BOUND)
+}
+
+/// Default control points a side of a streamline's stream function. More follow finer changes of
+/// the feed direction and cost time as their cube; fewer smooth them away.
+pub const DEFAULT_CONTROL_POINTS: usize = 24;
+
+/// Default degree of a streamline's stream function: smooth to the curvature of passes.
+pub const DEFAULT_DEGREE: usize = 3;
+
+/// A file that the scene names, and where in the scene it does.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NamedFile {
+    /// As the scene has it.
+    pub written: String,
+    /// From the scene's folder.
+    pub path: PathBuf,
+    /// Bytes of the scene's text.
+    pub span: Range<usize>,
+}
+
+impl NamedFile {
+    /// The file that a scene in `folder` names.
+    fn beside(folder: &Path, written: &str, span: Range<usize>) -> Self {
+        // Joining an absolute path gives that path.
+        Self { written: written.to_owned(), path: folder.join(written), span }
+    }
+}
+
+/// Kind of a mesh file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MeshFormat {
+    /// STL, binary or text.
+    Stl,
+    /// Wavefront OBJ.
+    Obj,
+}
+
+/// Where the part comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PartSource {
+    /// A triangle mesh.
+    Mesh {
+        /// The file.
+        file: NamedFile,
+        /// Its kind, from its extension.
+        format: MeshFormat,
+        /// Name of the unit of its coordinates.
+        unit: &'static str,
+        /// That unit in mm.
+        scale: f64,
+    },
+    /// A NURBS patch in a JSON file.
+    Nurbs {
+        /// The file.
+        file: NamedFile,
+    },
+    /// A blade from its sections.
+    Blade(BladeRequest),
+    /// A surface by formula over a rectangle.
+    Formula {
+        /// The formula with its parameters and its rectangle.
+        surface: AnalyticSurface,
+    },
+    /// A pocket: a plane region with islands, cut down to a level floor.
+    Pocket {
+        /// Its outlines.
+        outline: OutlineSource,
+        /// How far its floor lies below z = 0, mm.
+        depth: f64,
+    },
+}
+
+/// Stock around the part.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stock {
+    /// Height of the flat top above the part's highest point, mm.
+    pub allowance: f64,
+    /// Growth of the part's rectangle on all four sides, mm.
+    pub margin: f64,
+    /// How much stands over the part's surface where the block was roughed before, mm; for voxels.
+    pub roughed: Option<f64>,
+}
+
+/// Speeds of the cutter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CuttingData {
+    /// Spindle speed, rev/min.
+    pub spindle_speed: f64,
+    /// Feed along passes, mm/min.
+    pub feed_rate: f64,
+    /// Feed down to a pass, mm/min.
+    pub plunge_rate: f64,
+}
+
+/// Which engine cuts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Engine {
+    /// The z-map for upright cutters, normal rays for tilted ones.
+    Auto,
+    /// Heights over the plan view by branch and bound, within 0.01 µm of the reference; upright cutters only.
+    ZMap,
+    /// Every cell under every move that can reach it, in closed form in f64; upright cutters only.
+    Reference,
+    /// The swept volume along the normals of the design surface; any cutter axis, any shape.
+    Rays,
+    /// What is left as voxels, along the normals of the design surface; any cutter axis, any shape.
+    Voxel,
+}
+
+impl Engine {
+    /// The words that a scene and the command line accept.
+    pub const WORDS: [&'static str; 5] = ["auto", "zmap", "reference", "rays", "voxel"];
+
+    /// The engine that a word stands for.
+    pub fn from_word(word: &str) -> Option<Self> {
+        let all = [Self::Auto, Self::ZMap, Self::Reference, Self::Rays, Self::Voxel];
+        all.into_iter().find(|engine| engine.name() == word)
+    }
+
+    /// Its word.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => Self::WORDS[0],
+            Self::ZMap => Self::WORDS[1],
+            Self::Reference => Self::WORDS[2],
+            Self::Rays => Self::WORDS[3],
+            Self::Voxel => Self::WORDS[4],
+        }
+    }
+
+    /// The engine that cuts a path, upright or tilted.
+    pub fn for_path(self, tilted: bool) -> Self {
+        match (self, tilted) {
+            (Self::Auto, true) => Self::Rays,
+            (Self::Auto, false) => Self::ZMap,
+            (engine, _) => engine,
+        }
+    }
+}
+
+/// How the stock is simulated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Simulation {
+    /// Pitch of the cells, mm.
+    pub cell: f64,
+    /// True when the scene leaves the cell to the program (`"auto"`, or no word about it), which may
+    /// then make it coarser to fit into the memory.
+    pub cell_is_auto: bool,
+    /// Memory that one simulation may take, MiB.
+    pub memory_mib: u32,
+    /// Which engine cuts.
+    pub engine: Engine,
+    /// Whether the stock is also cut in the order of the program, for what each move removes.
+    pub removal: bool,
+    /// Error bound that is asked of the highest scallop, the deepest gouge and the highest uncut place, mm.
+    pub error_bound: f64,
+    /// Voxel of the solid that is left, mm, where it is asked for.
+    pub voxel: Option<f64>,
+}
+
+/// One toolpath to plan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ToolpathRequest {
+    /// What the user calls it; unique in the scene.
+    pub name: String,
+    /// Folder of its files; unique in the scene, a plain file name everywhere.
+    pub folder: String,
+    /// How to plan it.
+    pub strategy: Strategy,
+    /// How far its passes lie apart.
+    pub step: Step,
+    /// The files of its feed directions, in the order of the scene; [`Scene::read`] reads them into the strategy.
+    pub directions: Vec<NamedFile>,
+    /// How its passes are smoothed and joined.
+    pub joining: Joining,
+    /// How its axis is tilted; `None` for an upright one.
+    pub axis: Option<AxisRequest>,
+}
+
+impl ToolpathRequest {
+    /// The strategy's name as scenes spell it.
+    pub fn strategy_name(&self) -> &'static str {
+        match &self.strategy {
+            Strategy::Pocket(strategy) => strategy.name(),
+            strategy => classic::name(strategy).unwrap_or("streamline"),
+        }
+    }
+}
+
+/// A checked scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scene {
+    /// The text it was read from.
+    pub source: SceneText,
+    /// What the user calls it (the file's name without extension by default).
+    pub title: String,
+    /// What is to be made.
+    pub part: PartSource,
+    /// What it is made from.
+    pub stock: Stock,
+    /// With what.
+    pub cutter: Cutter,
+    /// What holds it; `None` leaves collisions of shank and holder unchecked.
+    pub holder: Option<Holder>,
+    /// How fast.
+    pub cutting: CuttingData,
+    /// What is tolerated.
+    pub tolerance: Limits,
+    /// How it is simulated.
+    pub simulation: Simulation,
+    /// On what.
+    pub machine: Machine,
+    /// Its rotary axes; `None` for a machine of three axes, or where none is named.
+    pub five_axis: Option<FiveAxis>,
+    /// Height of rapid moves above stock, mm.
+    pub clearance: f64,
+    /// What tilted tools keep away from.
+    pub keep_clear: KeepClear,
+    /// The toolpaths, in the order of the scene; at least one.
+    pub toolpaths: Vec<ToolpathRequest>,
+}
+
+/// The cell that suits a cutter and the steps of its toolpaths: six cells between passes and thirty a
+/// radius (sixty for a flat, whose edge is sharp), rounded down to 1, 2 or 5 times a power of ten. A
+/// ball of 6 mm gets 0.05 mm at a scallop of 10 µm. With fewer cells between passes a narrow pass may
+/// be lowest on none of them, and the error bounds grow; more cost memory and time as their square.
+pub fn auto_cell(cutter: &Cutter, toolpaths: &[ToolpathRequest]) -> f64 {
+    const CELLS_A_PASS: f64 = 6.0;
+    const CELLS_A_RADIUS: f64 = 30.0;
+    let corner = cutter.corner_radius();
+    let coarsest = cutter.radius() / if corner > 0.0 { CELLS_A_RADIUS } else { 2.0 * CELLS_A_RADIUS };
+    let exact = toolpaths.iter().fold(coarsest, |cell, request| match request.step {
+        Step::Stepover(width) => cell.min(width / CELLS_A_PASS),
+        // The strip of a corner of radius r on a plane is √(8rh) wide; a flat has none.
+        Step::Scallop(height) if corner > 0.0 => cell.min((8.0 * corner * height).sqrt() / CELLS_A_PASS),
+        Step::Scallop(_) => cell,
+    });
+    // Finer than scenes may ask for is finer than heights are resolved.
+    let exact = exact.max(*io::located::LENGTH.start());
+    let exponent = exact.log10().floor() as i32;
+    let power = 10f64.powi(exponent);
+    // A hair of rounding must not turn 0.05 into 0.02.
+    let digit = [5.0, 2.0].into_iter().find(|d| d * power <= exact * (1.0 + 1e-9)).unwrap_or(1.0);
+    // Divide rather than multiply by 0.01: 5/100 is the number that a user writes as 0.05.
+    if exponent < 0 { digit / 10f64.powi(-exponent) } else { digit * power }
+}

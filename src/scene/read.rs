@@ -1,0 +1,753 @@
+//! From text to a checked scene.
+
+use std::io::Read as _;
+use std::path::Path;
+
+use toml::de::DeTable;
+
+use super::{
+    CuttingData, DEFAULT_ALLOWANCE, DEFAULT_CLEARANCE, DEFAULT_CONTROL_POINTS, DEFAULT_DEGREE,
+    DEFAULT_FEED_RATE, DEFAULT_LIMITS, DEFAULT_MARGIN, DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE,
+    DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, Engine, MeshFormat, NamedFile, OutlineSource, PartSource, Scene,
+    Simulation, Stock, ToolpathRequest, auto_cell, default_error_bound,
+};
+use super::{axis, blade, classic, direction, formula, interference, kinematics, pocket};
+use cutter::{AptWord, AptWords, Cutter, CutterError, CutterShape, Holder, HolderSection};
+use field::{KnotRule, MAX_DENSE, Solver};
+use geometry::AnalyticSurface;
+use io::located::{COORDINATE, LENGTH, Located, Section};
+use io::located::{SceneError, SceneText};
+use machine::Machine;
+use metrology::Limits;
+use toolpath::{Joining, Links, Step, Strategy, StreamMethod};
+
+/// Largest scene that is read, bytes. A scene is a page of text; a larger file is a mistake.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// Units that a mesh may be in, and each in mm.
+const UNITS: [(&str, f64); 5] = [("mm", 1.0), ("cm", 10.0), ("m", 1000.0), ("inch", 25.4), ("um", 0.001)];
+
+/// Feeds and speeds that make sense.
+const RATE: std::ops::RangeInclusive<f64> = 0.001..=1e6;
+
+/// Jerks that make sense, mm/s³.
+const JERK: std::ops::RangeInclusive<f64> = 1.0..=1e12;
+
+impl Scene {
+    /// Reads and checks a scene file. Files that it names are looked for beside it.
+    ///
+    /// # Errors
+    /// [`SceneError`] when the file cannot be read or anything in it is wrong.
+    pub fn read(path: &Path) -> Result<Self, SceneError> {
+        let unreadable = |reason: String| SceneError::unreadable(path, reason);
+        let file = std::fs::File::open(path).map_err(|e| unreadable(e.to_string()))?;
+        let mut bytes = Vec::new();
+        file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(|e| unreadable(e.to_string()))?;
+        if bytes.len() as u64 > MAX_BYTES {
+            return Err(unreadable(format!("it is larger than {MAX_BYTES} bytes, too large for a scene")));
+        }
+        let text = String::from_utf8(bytes).map_err(|e| {
+            let line =
+                e.as_bytes()[..e.utf8_error().valid_up_to()].iter().filter(|b| **b == b'\n').count() + 1;
+            unreadable(format!("line {line} is not UTF-8 text"))
+        })?;
+        let mut scene = Self::parse(&path.to_string_lossy(), text)?;
+        scene.check_files()?;
+        scene.load_directions()?;
+        Ok(scene)
+    }
+
+    /// Checks a scene's text. `name` is what messages call it, and relative paths start from its
+    /// folder. Touches no file.
+    ///
+    /// # Errors
+    /// [`SceneError::Invalid`] for the first thing that is wrong.
+    pub fn parse(name: &str, text: impl Into<String>) -> Result<Self, SceneError> {
+        let source = SceneText::new(name, text);
+        let table = DeTable::parse(&source.text).map_err(|e| {
+            let end = source.text.len();
+            let message = e.message().trim().replace('\n', ", ");
+            source.error(
+                e.span().unwrap_or(end..end),
+                format!("not valid TOML: {message}"),
+                "see https://toml.io for how TOML is written",
+            )
+        })?;
+        let root = Section::root(&source, table.get_ref());
+        root.only(
+            &[
+                "title",
+                "part",
+                "stock",
+                "cutter",
+                "holder",
+                "tolerance",
+                "simulation",
+                "machine",
+                "interference",
+                "fixture",
+                "toolpath",
+            ],
+            &[],
+            "a scene",
+        )?;
+        let title = match root.text("title")? {
+            Some(title) => title.value.to_owned(),
+            None => Path::new(name).file_stem().map_or("scene".into(), |s| s.to_string_lossy().into_owned()),
+        };
+        let folder = Path::new(name).parent().unwrap_or(Path::new("")).to_owned();
+        let part = read_part(&root.section("part")?, &folder)?;
+        let (cutter, cutting) = read_cutter(&root.section("cutter")?)?;
+        let stock = read_stock(&root.section("stock")?, &part, &cutter)?;
+        let holder = read_holder(&root, &cutter)?;
+        let tolerance = read_tolerance(&root.section("tolerance")?)?;
+        let mut simulation = read_simulation(&root.section("simulation")?, &cutter, &tolerance)?;
+        let section = root.section("machine")?;
+        let keep_clear = interference::read(&root, &folder)?;
+        let (machine, clearance) = read_machine(&section)?;
+        let five_axis = kinematics::read(&section)?;
+        let toolpaths = read_toolpaths(&root, &folder, &tolerance, &cutter)?;
+        check_pocket_strategies(&root, &part, &toolpaths)?;
+        if simulation.cell_is_auto {
+            simulation.cell = auto_cell(&cutter, &toolpaths);
+        }
+        Ok(Self {
+            source: source.clone(),
+            title,
+            part,
+            stock,
+            cutter,
+            holder,
+            cutting,
+            tolerance,
+            simulation,
+            machine,
+            five_axis,
+            clearance,
+            keep_clear,
+            toolpaths,
+        })
+    }
+
+    /// The file that the part comes from, if it comes from one.
+    pub fn part_file(&self) -> Option<&NamedFile> {
+        match &self.part {
+            PartSource::Mesh { file, .. } | PartSource::Nurbs { file } => Some(file),
+            PartSource::Pocket { outline: OutlineSource::File { file, .. }, .. } => Some(file),
+            PartSource::Blade(blade) => Some(&blade.file),
+            PartSource::Pocket { .. } | PartSource::Formula { .. } => None,
+        }
+    }
+
+    /// Reads the files of feed directions into the strategies that follow them.
+    fn load_directions(&mut self) -> Result<(), SceneError> {
+        for request in &mut self.toolpaths {
+            if let Strategy::Streamline { direction, .. } = &mut request.strategy {
+                direction::load(direction, &mut request.directions.iter(), &self.source)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses a file that is not there or cannot be opened, pointing at its name in the scene.
+    fn check_files(&self) -> Result<(), SceneError> {
+        let fixtures = self.keep_clear.fixtures.iter().map(|fixture| ("fixture", &fixture.file));
+        self.part_file().map(|file| ("part", file)).into_iter().chain(fixtures).try_for_each(
+            |(whose, file)| {
+                let reason = match std::fs::metadata(&file.path) {
+                    Ok(found) if found.is_dir() => "it is a folder".to_owned(),
+                    Ok(_) => match std::fs::File::open(&file.path) {
+                        Ok(_) => return Ok(()),
+                        Err(e) => e.to_string(),
+                    },
+                    Err(e) => e.to_string(),
+                };
+                let message = format!("cannot read the {whose}'s file {}: {reason}", file.path.display());
+                Err(self.source.error(
+                    file.span.clone(),
+                    message,
+                    "relative paths start from the scene's folder",
+                ))
+            },
+        )
+    }
+}
+
+fn read_part(part: &Section<'_>, folder: &Path) -> Result<PartSource, SceneError> {
+    let mut words = vec!["nurbs", pocket::SURFACE];
+    words.extend(formula::names());
+    let mut all_keys = vec!["surface", "file", "unit", "x", "y", blade::KEY];
+    all_keys.extend(blade::KEYS);
+    all_keys.extend(formula::all_keys());
+    all_keys.extend(pocket::PART_KEYS);
+    let named = |file: Located<&str>| NamedFile::beside(folder, file.value, file.span);
+    if part.has(blade::KEY) {
+        let keys: Vec<&str> = [blade::KEY].into_iter().chain(blade::KEYS).collect();
+        part.only(&keys, &all_keys, "a part from sections")?;
+        return blade::read(part, named);
+    }
+    if !part.has("surface") && !part.has("file") {
+        part.only(&all_keys, &[], "a part")?;
+        return Err(part.error(
+            part.header(),
+            "the scene does not say which part to make",
+            "add a table [part] with `file = \"part.stl\"`, with `sections = \"blade.txt\"`, or with `surface = \"wave\"` and \
+             its parameters",
+        ));
+    }
+    match part.word("surface", &words)? {
+        None => {
+            part.only(&["file", "unit"], &all_keys, "a part from a mesh file (it has no `surface`)")?;
+            let (file, format, unit, scale) = read_mesh_file(part, folder, "part.stl")?;
+            Ok(PartSource::Mesh { file, format, unit, scale })
+        }
+        Some(word) if word.value == pocket::SURFACE => pocket::read_source(part, &UNITS, named),
+        Some(word) if word.value == "nurbs" => {
+            part.only(&["surface", "file"], &all_keys, "surface = \"nurbs\"")?;
+            Ok(PartSource::Nurbs { file: named(part.required_text("file", "wave.json")?) })
+        }
+        Some(word) => {
+            let mut keys = vec!["surface", "x", "y"];
+            keys.extend(formula::keys(word.value));
+            part.only(&keys, &all_keys, &format!("surface = \"{}\"", word.value))?;
+            let (x, y) = (part.required_interval("x")?, part.required_interval("y")?);
+            let shape = formula::read(part, word.value)?;
+            let surface = AnalyticSurface::new(shape, [x, y]).map_err(|e| {
+                part.error(&word.span, e.to_string(), "change the shape's parameters, or `x` and `y`")
+            })?;
+            Ok(PartSource::Formula { surface })
+        }
+    }
+}
+
+/// A mesh file with its kind, unit and that unit in mm.
+pub(super) fn read_mesh_file(
+    section: &Section<'_>,
+    folder: &Path,
+    example: &str,
+) -> Result<(NamedFile, MeshFormat, &'static str, f64), SceneError> {
+    let file = section.required_text("file", example)?;
+    let unit_words = UNITS.map(|(word, _)| word);
+    let unit = section.word("unit", &unit_words)?.map_or("mm", |u| u.value);
+    let scale = UNITS.iter().find(|(word, _)| *word == unit).map_or(1.0, |(_, scale)| *scale);
+    let extension = Path::new(file.value).extension().map(|e| e.to_string_lossy().to_lowercase());
+    let format = match extension.as_deref() {
+        Some("stl") => MeshFormat::Stl,
+        Some("obj") => MeshFormat::Obj,
+        Some("json") => {
+            return Err(section.error(
+                &file.span,
+                "a .json file needs to say what it holds",
+                "add `surface = \"nurbs\"`",
+            ));
+        }
+        _ => {
+            return Err(section.error(
+                &file.span,
+                format!("\"{}\" is no kind of part file that can be read", file.value),
+                "name a file that ends in .stl or .obj",
+            ));
+        }
+    };
+    Ok((NamedFile::beside(folder, file.value, file.span), format, unit, scale))
+}
+
+fn read_stock(stock: &Section<'_>, part: &PartSource, cutter: &Cutter) -> Result<Stock, SceneError> {
+    stock.only(&["allowance", "margin", "roughed"], &[], "[stock]")?;
+    // Zero is meant in both: stock may end at the part's top and at its rim.
+    let length = |key| stock.number(key, 0.0..=*LENGTH.end(), " mm");
+    // A pocket is milled into a finished face, and what is cut beside it has to be seen.
+    let pocket = matches!(part, PartSource::Pocket { .. });
+    let (top, around) = if pocket { (0.0, cutter.radius()) } else { (DEFAULT_ALLOWANCE, DEFAULT_MARGIN) };
+    Ok(Stock {
+        allowance: length("allowance")?.map_or(top, |v| v.value),
+        margin: length("margin")?.map_or(around, |v| v.value),
+        roughed: length("roughed")?.map(|v| v.value),
+    })
+}
+
+fn read_cutter(section: &Section<'_>) -> Result<(Cutter, CuttingData), SceneError> {
+    const SPEEDS: [&str; 3] = ["spindle_speed", "feed_rate", "plunge_rate"];
+    const SHAPES: [&str; 10] = [
+        "diameter",
+        "corner_radius",
+        "half_angle",
+        "tip_diameter",
+        "shank_diameter",
+        "corner_x",
+        "corner_z",
+        "tip_angle",
+        "side_angle",
+        "length",
+    ];
+    let all: Vec<&str> = ["shape"].into_iter().chain(SHAPES).chain(SPEEDS).collect();
+    if !section.has("shape") {
+        section.only(&all, &[], "a cutter")?;
+    }
+    let shape = section.required_word("shape", &["ball", "flat", "bull", "taper", "apt"])?;
+    let own: &[&str] = match shape.value {
+        "bull" => &["diameter", "corner_radius"],
+        "taper" => &["tip_diameter", "corner_radius", "half_angle", "shank_diameter"],
+        "apt" => &["diameter", "corner_radius", "corner_x", "corner_z", "tip_angle", "side_angle", "length"],
+        _ => &["diameter"],
+    };
+    let keys: Vec<&str> = ["shape"].iter().chain(own).chain(&SPEEDS).copied().collect();
+    section.only(&keys, &all, &format!("shape = \"{}\"", shape.value))?;
+    // The cutter's own refusals speak of whole dimensions; point at the key that they are about.
+    let (made, blamed) = match shape.value {
+        "ball" => (Cutter::ball(section.required_length("diameter", 6.0)?.value), "diameter"),
+        "flat" => (Cutter::flat(section.required_length("diameter", 6.0)?.value), "diameter"),
+        "bull" => {
+            let diameter = section.required_length("diameter", 6.0)?.value;
+            (Cutter::bull(diameter, section.required_length("corner_radius", 1.0)?.value), "corner_radius")
+        }
+        "apt" => (read_apt(section)?, "shape"),
+        _ => read_taper(section)?,
+    };
+    let cutter = made.map_err(|e| {
+        let (key, cure) = match &e {
+            CutterError::Apt(refusal) => (apt_key(refusal.word), refusal.cure.clone()),
+            _ => (blamed, format!("change `{blamed}`")),
+        };
+        let span = section.key_span(if section.has(key) { key } else { "shape" });
+        section.error(&span, e.to_string(), format!("`{key}`: {cure}"))
+    })?;
+    let rate =
+        |key, default| Ok::<f64, SceneError>(section.number(key, RATE, "")?.map_or(default, |v| v.value));
+    let cutting = CuttingData {
+        spindle_speed: rate("spindle_speed", DEFAULT_SPINDLE_SPEED)?,
+        feed_rate: rate("feed_rate", DEFAULT_FEED_RATE)?,
+        plunge_rate: rate("plunge_rate", DEFAULT_PLUNGE_RATE)?,
+    };
+    Ok((cutter, cutting))
+}
+
+/// The cutter of seven words; a corner whose place is left away touches bottom and side.
+fn read_apt(section: &Section<'_>) -> Result<Result<Cutter, CutterError>, SceneError> {
+    let angle = |key| {
+        // Angles below zero are read, so that the refusal can say what they would mean.
+        let angle = section.number(key, -80.0..=79.99, " degrees")?;
+        Ok::<f64, SceneError>(angle.map_or(0.0, |v| v.value.to_radians()))
+    };
+    let place = |key| Ok::<_, SceneError>(section.number(key, COORDINATE, " mm")?.map(|v| v.value));
+    let words = AptWords {
+        diameter: section.required_length("diameter", 6.0)?.value,
+        corner_radius: section.number("corner_radius", 0.0..=*LENGTH.end(), " mm")?.map_or(0.0, |v| v.value),
+        corner_x: 0.0,
+        corner_z: 0.0,
+        tip_angle: angle("tip_angle")?,
+        side_angle: angle("side_angle")?,
+        length: section.required_length("length", 20.0)?.value,
+    };
+    let words = words.with_centre(place("corner_x")?, place("corner_z")?);
+    Ok(Cutter::apt(&words).map_err(CutterError::Apt))
+}
+
+/// The key that stands for a word.
+fn apt_key(word: AptWord) -> &'static str {
+    match word {
+        AptWord::Diameter => "diameter",
+        AptWord::CornerRadius => "corner_radius",
+        AptWord::CornerX => "corner_x",
+        AptWord::CornerZ => "corner_z",
+        AptWord::TipAngle => "tip_angle",
+        AptWord::SideAngle => "side_angle",
+        AptWord::Length => "length",
+    }
+}
+
+fn read_taper(section: &Section<'_>) -> Result<(Result<Cutter, CutterError>, &'static str), SceneError> {
+    let tip = section.required_length("tip_diameter", 2.0)?.value;
+    // A tapered ball unless said otherwise.
+    let corner = section.number("corner_radius", 0.0..=*LENGTH.end(), " mm")?.map_or(0.5 * tip, |v| v.value);
+    let angle = section.required_number("half_angle", 0.01..=79.99, " degrees", 5.0)?.value;
+    let shank = section.required_length("shank_diameter", 6.0)?.value;
+    let blamed = if corner > 0.5 * tip { "corner_radius" } else { "shank_diameter" };
+    Ok((Cutter::taper(tip, corner, angle.to_radians(), shank), blamed))
+}
+
+/// What holds the cutter, if the scene says so.
+fn read_holder(root: &Section<'_>, cutter: &Cutter) -> Result<Option<Holder>, SceneError> {
+    if !root.has("holder") {
+        return Ok(None);
+    }
+    let holder = root.section("holder")?;
+    holder.only(&["cutting_length", "section"], &[], "[holder]")?;
+    let length = match (holder.length("cutting_length")?, cutter.shape()) {
+        (None, CutterShape::Apt) => cutter.words().length,
+        (None, _) => holder.required_length("cutting_length", 20.0)?.value,
+        (Some(length), _) if length.value < cutter.side_height() => {
+            let message = format!(
+                "the cutting length of {} mm ends below the cutter's full radius, at {:.4} mm",
+                length.value,
+                cutter.side_height()
+            );
+            return Err(holder.error(
+                &length.span,
+                message,
+                "write how far the cutting edges reach up from the tip",
+            ));
+        }
+        (Some(length), _) => length.value,
+    };
+    let sections: Vec<HolderSection> = holder
+        .sections("section")?
+        .iter()
+        .map(|section| {
+            section.only(&["diameter", "top_diameter", "length"], &[], "a section of the holder")?;
+            let diameter = section.required_length("diameter", 32.0)?.value;
+            let top_diameter = section.length("top_diameter")?.map_or(diameter, |v| v.value);
+            Ok(HolderSection {
+                diameter,
+                top_diameter,
+                length: section.required_length("length", 40.0)?.value,
+            })
+        })
+        .collect::<Result<_, SceneError>>()?;
+    Holder::new(length, sections).map(Some).map_err(|e| {
+        holder.error(
+            holder.header(),
+            e.to_string(),
+            "add `[[holder.section]]` with `diameter` and `length` for shank and holder, the lowest first",
+        )
+    })
+}
+
+fn read_tolerance(section: &Section<'_>) -> Result<Limits, SceneError> {
+    section.only(&["scallop", "gouge", "uncut", "chord"], &[], "[tolerance]")?;
+    let length = |key, default| Ok::<f64, SceneError>(section.length(key)?.map_or(default, |v| v.value));
+    Ok(Limits {
+        scallop: length("scallop", DEFAULT_LIMITS.scallop)?,
+        gouge: length("gouge", DEFAULT_LIMITS.gouge)?,
+        uncut: length("uncut", DEFAULT_LIMITS.uncut)?,
+        chord: length("chord", DEFAULT_LIMITS.chord)?,
+    })
+}
+
+/// An automatic cell is that of the cutter alone until the toolpaths are known.
+fn read_simulation(
+    section: &Section<'_>,
+    cutter: &Cutter,
+    limits: &Limits,
+) -> Result<Simulation, SceneError> {
+    section.only(
+        &["cell", "memory_mib", "engine", "removal", "error_bound", "voxel"],
+        &[],
+        "[simulation]",
+    )?;
+    let cell = section.length_or_word("cell", "auto")?;
+    let engine = section.word("engine", &Engine::WORDS)?.and_then(|word| Engine::from_word(word.value));
+    Ok(Simulation {
+        cell: cell.unwrap_or_else(|| auto_cell(cutter, &[])),
+        cell_is_auto: cell.is_none(),
+        memory_mib: section.count("memory_mib", 1..=1 << 20)?.unwrap_or(DEFAULT_MEMORY_MIB),
+        engine: engine.unwrap_or(Engine::Auto),
+        removal: section.flag("removal")?.unwrap_or(DEFAULT_REMOVAL),
+        error_bound: section.length("error_bound")?.map_or_else(|| default_error_bound(limits), |v| v.value),
+        voxel: section.length("voxel")?.map(|v| v.value),
+    })
+}
+
+fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
+    section.only(
+        &[
+            "rapid_rate",
+            "acceleration",
+            "junction_deviation",
+            "jerk",
+            "slow_corners",
+            "clearance",
+            kinematics::KEY,
+        ],
+        &[],
+        "[machine]",
+    )?;
+    let default = Machine::default();
+    let number =
+        |key, default| Ok::<f64, SceneError>(section.number(key, RATE, "")?.map_or(default, |v| v.value));
+    let machine = Machine {
+        rapid_rate: number("rapid_rate", default.rapid_rate)?,
+        acceleration: number("acceleration", default.acceleration)?,
+        junction_deviation: section
+            .length("junction_deviation")?
+            .map_or(default.junction_deviation, |v| v.value),
+        jerk: section.number("jerk", JERK, " mm/s3")?.map_or(default.jerk, |v| v.value),
+        slow_corners: section.flag("slow_corners")?.unwrap_or(default.slow_corners),
+    };
+    Ok((machine, section.length("clearance")?.map_or(DEFAULT_CLEARANCE, |v| v.value)))
+}
+
+fn read_toolpaths(
+    root: &Section<'_>,
+    folder: &Path,
+    limits: &Limits,
+    cutter: &Cutter,
+) -> Result<Vec<ToolpathRequest>, SceneError> {
+    let sections = root.sections("toolpath")?;
+    if sections.is_empty() {
+        return Err(root.error(
+            &root.key_span("toolpath"),
+            "the scene has no toolpath",
+            "add a table [[toolpath]] with `strategy = \"zigzag\"`",
+        ));
+    }
+    let mut requests: Vec<ToolpathRequest> = Vec::with_capacity(sections.len());
+    for section in &sections {
+        let request = read_toolpath(section, folder, limits, cutter)?;
+        if let Some(other) = requests.iter().find(|other| other.folder == request.folder) {
+            let place = if section.has("name") { section.key_span("name") } else { section.header().clone() };
+            let message = if other.name == request.name {
+                format!("two toolpaths are called \"{}\"", request.name)
+            } else {
+                format!(
+                    "the toolpaths \"{}\" and \"{}\" would share the folder {}",
+                    other.name, request.name, request.folder
+                )
+            };
+            return Err(section.error(
+                &place,
+                message,
+                format!("give this one another name, such as `name = \"{}-2\"`", request.folder),
+            ));
+        }
+        requests.push(request);
+    }
+    Ok(requests)
+}
+
+/// Keys of all toolpaths but pockets'.
+const COMMON: [&str; 8] =
+    ["name", "strategy", "stepover", "scallop", "links", "longest_link", "smoothing", axis::KEY];
+
+/// How much dearer passes square to a wanted direction may be made.
+const FOLLOW: std::ops::RangeInclusive<f64> = 0.0..=1000.0;
+
+/// Keys of streamlines.
+const STREAMLINE: [&str; 10] = [
+    "follow",
+    direction::KEYS[0],
+    direction::KEYS[1],
+    direction::KEYS[2],
+    direction::KEYS[3],
+    "control_points",
+    "method",
+    "degree",
+    "knots",
+    "solver",
+];
+
+fn read_toolpath(
+    section: &Section<'_>,
+    folder: &Path,
+    limits: &Limits,
+    cutter: &Cutter,
+) -> Result<ToolpathRequest, SceneError> {
+    let all: Vec<&str> =
+        COMMON.into_iter().chain(classic::KEYS).chain(STREAMLINE).chain(pocket::ALL_KEYS).collect();
+    if !section.has("strategy") {
+        section.only(&all, &[], "a toolpath")?;
+    }
+    let words: Vec<&'static str> =
+        classic::WORDS.into_iter().chain(["streamline"]).chain(pocket::STRATEGIES).collect();
+    let word = section.required_word("strategy", &words)?;
+    if pocket::STRATEGIES.contains(&word.value) {
+        let (strategy, step) = pocket::read_strategy(section, word.value, cutter.radius())?;
+        return named_request(section, &word, Strategy::Pocket(strategy), step, Vec::new());
+    }
+    let own = classic::keys(word.value).unwrap_or(&STREAMLINE);
+    let keys: Vec<&str> = COMMON.iter().chain(own).copied().collect();
+    section.only(&keys, &all, &format!("strategy = \"{}\"", word.value))?;
+    let mut directions = Vec::new();
+    let strategy = match classic::read(word.value, section)? {
+        Some(strategy) => strategy,
+        None => read_streamline(section, folder, &mut directions)?,
+    };
+    let step = read_step(section, limits, cutter)?;
+    named_request(section, &word, strategy, step, directions)
+}
+
+/// A request with its name and the name of its folder.
+fn named_request(
+    section: &Section<'_>,
+    word: &Located<&str>,
+    strategy: Strategy,
+    step: Step,
+    directions: Vec<NamedFile>,
+) -> Result<ToolpathRequest, SceneError> {
+    let (name, span) = match section.text("name")? {
+        Some(name) => (name.value.to_owned(), name.span),
+        None => (word.value.to_owned(), word.span.clone()),
+    };
+    let own_folder = folder_name(&name).ok_or_else(|| {
+        section.error(
+            &span,
+            format!("\"{name}\" cannot name a toolpath"),
+            "use up to 64 characters, at least one of them a letter or a digit of the Latin alphabet",
+        )
+    })?;
+    let joining = if strategy.pocket().is_some() { Joining::default() } else { read_joining(section)? };
+    let axis = if strategy.pocket().is_some() { None } else { axis::read(section)? };
+    Ok(ToolpathRequest { name, folder: own_folder, strategy, step, directions, joining, axis })
+}
+
+/// How passes are smoothed and joined.
+fn read_joining(section: &Section<'_>) -> Result<Joining, SceneError> {
+    let default = Joining::default();
+    let links = match section.word("links", &["surface", "retract"])?.map(|word| word.value) {
+        Some("surface") => Links::Surface,
+        Some(_) => Links::Retract,
+        None => default.links,
+    };
+    let longest_link = section.length_or_word("longest_link", "auto")?;
+    if links == Links::Retract && longest_link.is_some() {
+        return Err(section.error(
+            &section.key_span("longest_link"),
+            "`longest_link` does not apply to links = \"retract\"",
+            "delete one of the two",
+        ));
+    }
+    let smoothing = section.flag("smoothing")?.unwrap_or(default.smoothing);
+    Ok(Joining { links, longest_link, smoothing })
+}
+
+/// Pockets are milled by their own strategies, and nothing else is.
+fn check_pocket_strategies(
+    root: &Section<'_>,
+    part: &PartSource,
+    toolpaths: &[ToolpathRequest],
+) -> Result<(), SceneError> {
+    let pocket = matches!(part, PartSource::Pocket { .. });
+    let strange = |t: &&ToolpathRequest| matches!(t.strategy, Strategy::Pocket(_)) != pocket;
+    let Some(wrong) = toolpaths.iter().find(strange) else { return Ok(()) };
+    let message = format!(
+        "strategy = \"{}\" does not mill {}",
+        wrong.strategy_name(),
+        if pocket { "a pocket" } else { "anything but a pocket" }
+    );
+    let cure = if pocket {
+        "use one of pocket-flow, pocket-offset, pocket-zigzag"
+    } else {
+        "use one of zigzag, iso-parametric, streamline, or `surface = \"pocket\"` in [part]"
+    };
+    Err(root.error(&root.key_span("toolpath"), message, cure))
+}
+
+fn read_streamline(
+    section: &Section<'_>,
+    folder: &Path,
+    files: &mut Vec<NamedFile>,
+) -> Result<Strategy, SceneError> {
+    let shortest = |keys: &[&'static str], what: &str| {
+        let keys: Vec<&str> = COMMON.into_iter().chain(keys.iter().copied()).collect();
+        section.only(&keys, &STREAMLINE, what)
+    };
+    let Some(direction) = direction::read(section, folder, files)? else {
+        shortest(&["direction"], "direction = \"shortest\"")?;
+        return Ok(Strategy::ShortestStreamline { toward: None });
+    };
+    if let Some(dearer) = section.number("follow", FOLLOW, "")? {
+        let keys: Vec<&str> = direction::KEYS.into_iter().chain(["follow"]).collect();
+        shortest(&keys, "`follow`, which leaves no method to choose")?;
+        return Ok(Strategy::ShortestStreamline { toward: Some((direction, dearer.value)) });
+    }
+    let control_points =
+        section.count("control_points", 4..=200)?.map_or(DEFAULT_CONTROL_POINTS, |n| n as usize);
+    let (method, solver) = read_stream_method(section, control_points)?;
+    Ok(Strategy::Streamline { direction, control_points, method, solver })
+}
+
+fn read_stream_method(
+    section: &Section<'_>,
+    control_points: usize,
+) -> Result<(StreamMethod, Solver), SceneError> {
+    let method = section.word("method", &["auto", "bspline", "differences", "elements"])?.map(|m| m.value);
+    let degree = section.count("degree", 2..=5)?.map(|degree| degree as usize);
+    let rule = section.word("knots", &KnotRule::WORDS)?.and_then(|word| KnotRule::from_word(word.value));
+    let chosen = section.word("solver", &Solver::WORDS)?;
+    let solver = chosen.as_ref().and_then(|word| Solver::from_word(word.value));
+    let refuse =
+        |key: &str, message: String, cure: &str| Err(section.error(&section.key_span(key), message, cure));
+    if method == Some("elements") {
+        if let Some(key) = ["degree", "knots", "solver"].into_iter().find(|key| section.has(key)) {
+            let message = format!("`{key}` does not apply to finite elements, which `method` asks for");
+            return refuse(key, message, "delete it, or write `method = \"bspline\"`");
+        }
+        return Ok((StreamMethod::Elements, Solver::Cholesky));
+    }
+    if method == Some("differences") {
+        if let Some(key) = ["degree", "knots"].into_iter().find(|key| section.has(key)) {
+            let message = format!("`{key}` belongs to B-splines, and `method` is \"differences\"");
+            return refuse(key, message, "delete it, or write `method = \"bspline\"`");
+        }
+        if matches!(solver, Some(Solver::Qr | Solver::MinimumNorm)) {
+            let message = "differences have no rectangular system, which this solver takes".to_owned();
+            return refuse("solver", message, "write `solver = \"cg\"`, \"cholesky\" or \"gmres\"");
+        }
+        return Ok((StreamMethod::Differences, solver.unwrap_or(Solver::ConjugateGradient)));
+    }
+    let degree = degree.unwrap_or(DEFAULT_DEGREE);
+    if control_points <= degree {
+        let message = format!("{control_points} control points a side are too few for degree {degree}");
+        return refuse(
+            if section.has("degree") { "degree" } else { "control_points" },
+            message,
+            "write at least one control point more than the degree",
+        );
+    }
+    if solver == Some(Solver::MinimumNorm) && control_points.pow(2) > MAX_DENSE {
+        let message = format!(
+            "the minimum-norm solver takes at most {MAX_DENSE} coefficients, and {control_points} control points a \
+             side make {}",
+            control_points.pow(2)
+        );
+        return refuse("solver", message, "write `control_points = 24` or fewer, or another solver");
+    }
+    let spline = StreamMethod::BSpline { degree, knots: rule.unwrap_or_default() };
+    let asked = method == Some("bspline") || ["degree", "knots", "solver"].iter().any(|key| section.has(key));
+    let method = if asked { spline } else { StreamMethod::Automatic };
+    Ok((method, solver.unwrap_or(Solver::Cholesky)))
+}
+
+/// The step of one toolpath: its own stepover or scallop, or else the scene's scallop.
+fn read_step(section: &Section<'_>, limits: &Limits, cutter: &Cutter) -> Result<Step, SceneError> {
+    match (section.length("stepover")?, section.length("scallop")?) {
+        (Some(_), Some(scallop)) => Err(section.error(
+            &scallop.span,
+            "a toolpath has either `stepover` or `scallop`",
+            "delete one of the two",
+        )),
+        (Some(stepover), None) if stepover.value > 2.0 * cutter.radius() => {
+            let message = format!(
+                "`stepover` is {} mm, wider than the cutter's diameter of {} mm",
+                stepover.value,
+                2.0 * cutter.radius()
+            );
+            Err(section.error(
+                &stepover.span,
+                message,
+                "write a stepover below the diameter, or delete it to step by scallop height",
+            ))
+        }
+        (Some(stepover), None) => Ok(Step::Stepover(stepover.value)),
+        (None, Some(scallop)) => Ok(Step::Scallop(scallop.value)),
+        (None, None) => Ok(Step::Scallop(limits.scallop)),
+    }
+}
+
+/// A folder's name for a toolpath's name: lower case, and every run of other characters than
+/// letters, digits and `_` becomes one `-`. `None` when nothing is left or it is too long.
+fn folder_name(name: &str) -> Option<String> {
+    /// File systems take 255 bytes a name; tables become unreadable long before.
+    const MAX_CHARACTERS: usize = 64;
+    let mut folder = String::new();
+    for c in name.chars() {
+        if c.is_ascii_alphanumeric() || c == '_' {
+            folder.push(c.to_ascii_lowercase());
+        } else if !folder.is_empty() && !folder.ends_with('-') {
+            folder.push('-');
+        }
+    }
+    let folder = folder.trim_end_matches('-').to_owned();
+    let printable = name.chars().count() <= MAX_CHARACTERS && !name.chars().any(char::is_control);
+    (printable && folder.chars().any(|c| c.is_ascii_alphanumeric())).then_some(folder)
+}

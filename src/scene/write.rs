@@ -1,0 +1,230 @@
+//! From a checked scene back to TOML with every default written out.
+
+use std::fmt::Write as _;
+
+use super::{
+    PartSource, Scene, ToolpathRequest, axis, blade, classic, direction, formula, interference, kinematics,
+    pocket,
+};
+use cutter::{Cutter, CutterShape};
+use toolpath::{Links, Step, Strategy, StreamMethod, longest_link};
+
+/// A number as TOML takes it, rounded to 12 digits so that an angle that went through radians comes
+/// back as it was written.
+pub(super) fn number(value: f64) -> String {
+    let rounded: f64 = format!("{value:.11e}").parse().unwrap_or(value);
+    format!("{rounded:?}")
+}
+
+pub(super) fn text(value: &str) -> String {
+    toml::Value::String(value.to_owned()).to_string()
+}
+
+/// The whole scene as TOML, every default in effect included. Reading it gives the same scene
+/// again; relative paths still start from the scene's folder.
+pub fn complete_toml(scene: &Scene) -> String {
+    let mut out = String::new();
+    write_all(&mut out, scene).expect("writing into a string cannot fail");
+    out
+}
+
+fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
+    writeln!(out, "title = {}\n", text(&scene.title))?;
+    write_part(out, &scene.part)?;
+    writeln!(out, "\n[stock]")?;
+    writeln!(out, "allowance = {}  # mm above the part's highest point", number(scene.stock.allowance))?;
+    writeln!(out, "margin = {}  # mm around the part in the plan view", number(scene.stock.margin))?;
+    if let Some(roughed) = scene.stock.roughed {
+        writeln!(
+            out,
+            "roughed = {}  # mm that stand over the part, for tilted tools and voxels",
+            number(roughed)
+        )?;
+    }
+    write_cutter(out, scene)?;
+    write_holder(out, scene)?;
+    let limits = &scene.tolerance;
+    writeln!(out, "\n[tolerance]  # mm")?;
+    writeln!(
+        out,
+        "scallop = {}  # 95 % of the ridge length stay below it, the highest ridge below 1.25 times",
+        number(limits.scallop)
+    )?;
+    writeln!(out, "gouge = {}", number(limits.gouge))?;
+    writeln!(out, "uncut = {}", number(limits.uncut))?;
+    writeln!(out, "chord = {}", number(limits.chord))?;
+    writeln!(out, "\n[simulation]")?;
+    writeln!(out, "cell = {}  # mm", number(scene.simulation.cell))?;
+    writeln!(out, "memory_mib = {}", scene.simulation.memory_mib)?;
+    writeln!(out, "engine = {}", text(scene.simulation.engine.name()))?;
+    writeln!(out, "removal = {}  # what each move removes, and rapids in stock", scene.simulation.removal)?;
+    writeln!(
+        out,
+        "error_bound = {}  # mm, asked of the highest scallop, deepest gouge and highest uncut place",
+        number(scene.simulation.error_bound)
+    )?;
+    if let Some(voxel) = scene.simulation.voxel {
+        writeln!(out, "voxel = {}  # mm, of the solid that is left, in solid.stl", number(voxel))?;
+    }
+    writeln!(out, "\n[machine]")?;
+    writeln!(out, "rapid_rate = {}  # mm/min", number(scene.machine.rapid_rate))?;
+    writeln!(out, "acceleration = {}  # mm/s2", number(scene.machine.acceleration))?;
+    writeln!(
+        out,
+        "junction_deviation = {}  # mm by which the control rounds corners",
+        number(scene.machine.junction_deviation)
+    )?;
+    writeln!(out, "jerk = {}  # mm/s3", number(scene.machine.jerk))?;
+    writeln!(out, "slow_corners = {}  # feeds of sharp bends in the program", scene.machine.slow_corners)?;
+    writeln!(out, "clearance = {}  # mm of rapid moves above stock", number(scene.clearance))?;
+    kinematics::write(out, scene.five_axis.as_ref())?;
+    if !scene.keep_clear.fixtures.is_empty() || scene.toolpaths.iter().any(|request| request.axis.is_some()) {
+        interference::write(out, &scene.keep_clear)?;
+    }
+    scene.toolpaths.iter().try_for_each(|request| {
+        writeln!(out, "\n[[toolpath]]")?;
+        writeln!(out, "name = {}", text(&request.name))?;
+        writeln!(out, "strategy = {}", text(request.strategy_name()))?;
+        write_strategy(out, request)?;
+        match request.step {
+            Step::Scallop(height) => {
+                writeln!(out, "scallop = {}  # mm, steps are planned for it", number(height))?;
+            }
+            Step::Stepover(width) => writeln!(out, "stepover = {}  # mm", number(width))?,
+        }
+        write_joining(out, request, scene)
+    })
+}
+
+fn write_part(out: &mut String, part: &PartSource) -> std::fmt::Result {
+    writeln!(out, "[part]")?;
+    match part {
+        PartSource::Mesh { file, unit, .. } => {
+            writeln!(out, "file = {}", text(&file.written))?;
+            writeln!(out, "unit = {}", text(unit))
+        }
+        PartSource::Pocket { outline, depth } => pocket::write_source(out, outline, *depth),
+        PartSource::Blade(request) => blade::write(out, request),
+        PartSource::Nurbs { file } => {
+            writeln!(out, "surface = \"nurbs\"")?;
+            writeln!(out, "file = {}", text(&file.written))
+        }
+        PartSource::Formula { surface } => {
+            let ([x, y], (name, parameters)) = (surface.domain(), formula::describe(surface.shape()));
+            writeln!(out, "surface = {}", text(name))?;
+            for (key, value) in parameters {
+                match value {
+                    formula::Value::Number(value) => writeln!(out, "{key} = {}", number(value))?,
+                    formula::Value::Flag(value) => writeln!(out, "{key} = {value}")?,
+                }
+            }
+            writeln!(out, "x = [{}, {}]  # mm", number(x[0]), number(x[1]))?;
+            writeln!(out, "y = [{}, {}]  # mm", number(y[0]), number(y[1]))
+        }
+    }
+}
+
+fn write_cutter(out: &mut String, scene: &Scene) -> std::fmt::Result {
+    writeln!(out, "\n[cutter]  # mm, degrees")?;
+    let cutter: &Cutter = &scene.cutter;
+    let diameter = 2.0 * cutter.radius();
+    match cutter.shape() {
+        CutterShape::Ball => writeln!(out, "shape = \"ball\"\ndiameter = {}", number(diameter))?,
+        CutterShape::Flat => writeln!(out, "shape = \"flat\"\ndiameter = {}", number(diameter))?,
+        CutterShape::Bull => {
+            writeln!(out, "shape = \"bull\"\ndiameter = {}", number(diameter))?;
+            writeln!(out, "corner_radius = {}", number(cutter.corner_radius()))?;
+        }
+        CutterShape::Taper => {
+            let tip = 2.0 * (cutter.flat_radius() + cutter.corner_radius());
+            writeln!(out, "shape = \"taper\"\ntip_diameter = {}", number(tip))?;
+            writeln!(out, "corner_radius = {}", number(cutter.corner_radius()))?;
+            writeln!(out, "half_angle = {}", number(cutter.half_angle().to_degrees()))?;
+            writeln!(out, "shank_diameter = {}", number(diameter))?;
+        }
+        CutterShape::Apt => {
+            let w = cutter.words();
+            writeln!(
+                out,
+                "shape = \"apt\"\ndiameter = {}  # where bottom and side cross",
+                number(w.diameter)
+            )?;
+            writeln!(out, "corner_radius = {}", number(w.corner_radius))?;
+            writeln!(out, "corner_x = {}  # centre of the corner from the axis", number(w.corner_x))?;
+            writeln!(out, "corner_z = {}  # and above the tip", number(w.corner_z))?;
+            writeln!(out, "tip_angle = {}  # of the bottom from level", number(w.tip_angle.to_degrees()))?;
+            writeln!(out, "side_angle = {}  # of the side from the axis", number(w.side_angle.to_degrees()))?;
+            writeln!(out, "length = {}", number(w.length))?;
+        }
+    }
+    writeln!(out, "spindle_speed = {}  # rev/min", number(scene.cutting.spindle_speed))?;
+    writeln!(out, "feed_rate = {}  # mm/min", number(scene.cutting.feed_rate))?;
+    writeln!(out, "plunge_rate = {}  # mm/min", number(scene.cutting.plunge_rate))
+}
+
+fn write_holder(out: &mut String, scene: &Scene) -> std::fmt::Result {
+    let Some(holder) = &scene.holder else { return Ok(()) };
+    writeln!(out, "\n[holder]  # mm")?;
+    writeln!(out, "cutting_length = {}  # the lowest section begins there", number(holder.cutting_length()))?;
+    holder.sections().iter().try_for_each(|section| {
+        writeln!(out, "\n[[holder.section]]")?;
+        writeln!(out, "diameter = {}", number(section.diameter))?;
+        writeln!(out, "top_diameter = {}", number(section.top_diameter))?;
+        writeln!(out, "length = {}", number(section.length))
+    })
+}
+
+fn write_joining(out: &mut String, request: &ToolpathRequest, scene: &Scene) -> std::fmt::Result {
+    if request.strategy.pocket().is_some() {
+        return Ok(());
+    }
+    let joining = &request.joining;
+    match joining.links {
+        Links::Surface => {
+            writeln!(out, "links = \"surface\"  # where that is quicker than \"retract\"")?;
+            let longest = number(longest_link(joining, &scene.cutter, request.step));
+            match joining.longest_link {
+                Some(_) => writeln!(out, "longest_link = {longest}  # mm")?,
+                None => writeln!(out, "longest_link = \"auto\"  # {longest} mm")?,
+            }
+        }
+        Links::Retract => writeln!(out, "links = \"retract\"")?,
+    }
+    writeln!(
+        out,
+        "smoothing = {}  # of the points of a pass, within the chord tolerance",
+        joining.smoothing
+    )?;
+    axis::write(out, request.axis.as_ref())
+}
+
+fn write_strategy(out: &mut String, request: &ToolpathRequest) -> std::fmt::Result {
+    match &request.strategy {
+        Strategy::Pocket(strategy) => pocket::write_strategy(out, strategy),
+        Strategy::ShortestStreamline { toward: None } => writeln!(out, "direction = \"shortest\""),
+        Strategy::ShortestStreamline { toward: Some((toward, dearer)) } => {
+            direction::write(out, toward, &mut request.directions.iter(), "\n")?;
+            writeln!(out, "\nfollow = {}  # mm more for each mm of pass square to it", number(*dearer))
+        }
+        Strategy::Streamline { direction, control_points, method, solver } => {
+            direction::write(out, direction, &mut request.directions.iter(), "\n")?;
+            writeln!(out)?;
+            writeln!(out, "control_points = {control_points}")?;
+            match method {
+                StreamMethod::Automatic => return writeln!(out, "method = \"auto\""),
+                StreamMethod::Elements => return writeln!(out, "method = \"elements\""),
+                StreamMethod::Differences => {
+                    writeln!(
+                        out,
+                        "method = \"differences\"  # on three cells for each control point and side"
+                    )?;
+                }
+                StreamMethod::BSpline { degree, knots } => {
+                    writeln!(out, "method = \"bspline\"\ndegree = {degree}\nknots = {}", text(knots.name()))?;
+                }
+            }
+            writeln!(out, "solver = {}", text(solver.name()))
+        }
+        classic_strategy => classic::write(out, classic_strategy),
+    }
+}

@@ -1,0 +1,39 @@
+//! Stock, the swept cutter, and the engines that cut. Sees stock, cutter and moves only: neither
+//! strategies nor the design part.
+
+mod bins;
+mod cut;
+#[cfg(test)]
+mod engine_tests;
+mod envelope;
+mod form;
+mod grid;
+mod holder;
+mod in_order;
+mod rays;
+mod reference;
+#[doc(hidden)]
+pub mod scenes;
+mod solid;
+mod sweep;
+mod swept;
+mod tiles;
+mod track;
+mod voxel;
+mod zmap;
+
+pub use bins::MoveBins;
+pub use cut::{Work, cut, cut_all_candidates, cut_counted};
+pub use envelope::Envelope;
+pub use grid::{Grid, GridError};
+pub use holder::{Collision, HolderClearance, holder_collisions};
+pub use in_order::{ENGAGED, MoveRemoval, RapidContact, Removal, cut_in_order, cut_in_order_plain};
+pub use rays::{RayHit, Rays, RaysError};
+pub use reference::cut_reference;
+pub use solid::{Nearest, OppositeAxes, SweptHit, SweptMoves, SweptSolid};
+pub use swept::SweptMove;
+pub use voxel::{
+    Axis, HolderHit, LineExit, StandingHits, StockMesh, VoxelEngine, VoxelError, VoxelRemoval, VoxelSample,
+    VoxelStock, VoxelSurface, Voxels,
+};
+pub use zmap::{NOT_CUT, ZMap};

@@ -1,0 +1,178 @@
+//! Gaps between passes on a chart that halving intervals of ψ does not find.
+//!
+//! Enters: the contacts of planned passes. Leaves: further short passes along levels of ψ, until no place lies farther
+//! from every contact than half the interval that is allowed there. Halving looks at one level between two others and
+//! takes ψ to rise evenly; around a fold, an extremum or a kink of ψ, and over the tip of a finger of levels, it does not.
+//!
+//! Distances are straight ones in space, mm; of strips that are narrow against the part's radii they are those on the
+//! surface. Only what lies beside a pass is looked at, across it: a part without any pass nearby has no gaps.
+
+use std::collections::HashMap;
+
+use super::halving::{LevelSource, along_needed};
+use super::planned_field::Contact;
+use crate::Step;
+use crate::plan::{Passes, PlanError};
+use crate::surface::chart::Chart;
+use cutter::Cutter;
+use field::ScalarField;
+use geometry::Point3;
+use work::monitor;
+use work::monitor::Monitor;
+
+/// A place is open where the nearest contact is farther away than half the allowed interval by this share: 3 % are 6 % of
+/// the scallop height. Halving has closed what is more than 2 % too wide where ψ is even.
+const SLACK: f64 = 0.03;
+
+/// A gap is worth passes where it opens by this share: 6 % are 12 % of the scallop height. Where less is open straight
+/// distances and the field's own error tell as much.
+const WORTH: f64 = 0.06;
+
+/// From a contact, places are looked at across the feed, this share of the interval apart, until one is served.
+const MARCH: f64 = 0.25;
+const MOST_MARCHES: usize = 8;
+
+/// Contacts are looked for up to this share of the widest interval away: whoever is farther serves no place.
+const FARTHEST: f64 = 0.6;
+
+/// New passes may leave gaps of their own; so often they are looked for.
+const ROUNDS: usize = 4;
+
+/// Appends passes of `source` along levels of `field` where the others leave gaps, and tells how many.
+///
+/// # Errors
+/// When cancelled, or where a pass cannot be located.
+pub(crate) fn close<S: LevelSource<Place = [f64; 2]>>(
+    source: &S,
+    chart: &Chart,
+    cutter: &Cutter,
+    field: &ScalarField,
+    [height, sampling]: [f64; 2],
+    passes: &mut Passes,
+    monitor: &dyn Monitor,
+) -> Result<usize, PlanError> {
+    let allowed = passes.contacts.iter().flatten().map(|contact| contact.allowed);
+    let reach = FARTHEST * allowed.fold(0.0, f64::max);
+    if reach <= 0.0 {
+        return Ok(0);
+    }
+    let mut gaps = Gaps { chart, cutter, height, reach, cubes: HashMap::new() };
+    let (planned, mut looked_at) = (passes.contacts.len(), 0);
+    for _ in 0..ROUNDS {
+        let fresh = &passes.contacts[looked_at..];
+        looked_at = passes.contacts.len();
+        fresh.iter().for_each(|pass| gaps.insert(pass));
+        let found = work::parallel::try_map(fresh.len(), |k| {
+            monitor::check(monitor)?;
+            Ok::<_, PlanError>(fresh[k].iter().flat_map(|contact| gaps.beside(contact)).collect::<Vec<_>>())
+        })?;
+        let mut places: Vec<Gap> = found.into_iter().flatten().collect();
+        places.sort_by(|a, b| b.openness.total_cmp(&a.openness));
+        for gap in places {
+            monitor::check(monitor)?;
+            if !gaps.opens_beyond(gap.at, WORTH) {
+                continue;
+            }
+            let level = field.value_and_gradient(gap.at[0], gap.at[1])[0];
+            let before = passes.contacts.len();
+            let needed = |place: &[f64; 2]| gaps.opens_beyond(*place, SLACK);
+            along_needed(source, level, &needed, sampling, passes, monitor)?;
+            for k in before..passes.contacts.len() {
+                gaps.insert(&passes.contacts[k]);
+            }
+        }
+        if passes.contacts.len() == looked_at {
+            break;
+        }
+    }
+    Ok(passes.contacts.len() - planned)
+}
+
+/// A place that no pass serves.
+struct Gap {
+    /// Its parameters.
+    at: [f64; 2],
+    /// Distance of the nearest contact over half the allowed interval.
+    openness: f64,
+}
+
+/// Stretches of contacts in cubes.
+struct Gaps<'a, 'b> {
+    chart: &'a Chart<'b>,
+    cutter: &'a Cutter,
+    /// The scallop height, mm.
+    height: f64,
+    /// Side of a cube, and how far contacts are looked for, mm.
+    reach: f64,
+    cubes: HashMap<[i64; 3], Vec<[Point3; 2]>>,
+}
+
+impl Gaps<'_, '_> {
+    fn cube(&self, p: &Point3) -> [i64; 3] {
+        [p.x, p.y, p.z].map(|x| (x / self.reach).floor() as i64)
+    }
+
+    /// Adds the stretches of a pass.
+    fn insert(&mut self, pass: &[Contact]) {
+        for ends in pass.windows(2).map(|w| [w[0].at, w[1].at]) {
+            let corners = [ends[0].inf(&ends[1]), ends[0].sup(&ends[1])].map(|p| self.cube(&p));
+            let [lo, hi] = corners;
+            for i in lo[0]..=hi[0] {
+                for j in lo[1]..=hi[1] {
+                    for k in lo[2]..=hi[2] {
+                        self.cubes.entry([i, j, k]).or_default().push(ends);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The place of a pass nearest to a point, within reach.
+    fn nearest(&self, p: &Point3) -> Option<Point3> {
+        let home = self.cube(p);
+        let around = (0..27).filter_map(|k| {
+            self.cubes.get(&[home[0] + k % 3 - 1, home[1] + k / 3 % 3 - 1, home[2] + k / 9 - 1])
+        });
+        let on = around.flatten().map(|[a, b]| {
+            let d = b - a;
+            let t = (p - a).dot(&d) / d.norm_squared().max(f64::MIN_POSITIVE);
+            a + d * t.clamp(0.0, 1.0)
+        });
+        on.min_by(|a, b| (a - p).norm_squared().total_cmp(&(b - p).norm_squared()))
+    }
+
+    /// Distance of the nearest contact over half the interval that is allowed toward it; `None` where the chart has no
+    /// normal.
+    fn openness(&self, at: [f64; 2]) -> Option<f64> {
+        let p = self.chart.at(at[0], at[1])?;
+        let Some(nearest) = self.nearest(&p.jet.p) else { return Some(f64::INFINITY) };
+        let toward = nearest - p.jet.p;
+        let Some(feed) = p.normal.cross(&toward).try_normalize(1e-12) else { return Some(0.0) };
+        let (interval, _) = self.chart.interval(&p, self.cutter, &feed, Step::Scallop(self.height));
+        Some(2.0 * toward.norm() / interval)
+    }
+
+    fn opens_beyond(&self, at: [f64; 2], share: f64) -> bool {
+        self.openness(at).is_some_and(|openness| openness > 1.0 + share)
+    }
+
+    /// The widest places on both sides of a contact that no pass serves.
+    fn beside(&self, contact: &Contact) -> Vec<Gap> {
+        let Some(at) = contact.parameters.filter(|_| contact.inside) else { return Vec::new() };
+        let across = self.chart.jet(at[0], at[1]).pull_back(&contact.across);
+        let Some((du, dv)) = across else { return Vec::new() };
+        let widest = |side: f64| {
+            let place = |k: usize| {
+                let s = side * contact.allowed * (0.5 * (1.0 + 2.0 * SLACK) + MARCH * k as f64);
+                [at[0] + s * du, at[1] + s * dv]
+            };
+            let open = (0..MOST_MARCHES).map(place).take_while(|&at| self.chart.holds(at));
+            let open = open.map_while(|at| {
+                let openness = self.openness(at)?;
+                (openness > 1.0 + SLACK).then_some(Gap { at, openness })
+            });
+            open.max_by(|a, b| a.openness.total_cmp(&b.openness))
+        };
+        [1.0, -1.0].into_iter().filter_map(widest).collect()
+    }
+}

@@ -1,0 +1,343 @@
+//! Passes along the level curves of a scalar field ψ on a chart.
+//!
+//! Curves are traced a little beyond the chart, on its continuation, and every place of the cutter comes
+//! from dropping it onto the part. Which levels and stretches are cut is decided in `halving`.
+
+use super::gaps;
+use super::halving::{Allowed, LevelSource, Track, along_and_between};
+use super::planned_field::{self, Contact};
+use super::spacing::{Placing, level_tangent, place_levels, places_of};
+use crate::Step;
+use crate::drop::{Beside, DropCutter};
+use crate::plan::{PassSettings, Passes, PlanError};
+use crate::surface::chart::Chart;
+use crate::tilt::tilted;
+use crate::tilt::tilted::Touch;
+use cutter::Cutter;
+use field::PlannedField;
+use field::{LevelCurve, LevelTracer, ScalarField, surface_gradient_length};
+use geometry::Point3;
+use motion::CcPoint;
+use part::Part;
+use work::monitor::{Cancelled, Monitor};
+
+/// Grid cells a side on which level curves are found.
+const TRACE_CELLS: usize = 240;
+
+/// Passes are traced beyond the border by this share of their interval: a little more than the half
+/// that a pass outside the border still has to serve inside it.
+const BORDER_SHARE: f64 = 0.6;
+
+/// The margin is never more than this share of the chart; it would be where a parametrisation
+/// degenerates.
+const MOST_MARGIN: f64 = 0.1;
+
+/// Places a side at which the margin is computed.
+const MARGIN_SAMPLES: usize = 24;
+
+/// A point between two traced ones may be this many sampling distances off the line between them.
+const MOST_STRAY: f64 = 0.25;
+
+/// Places looked at for kinks from one point of a curve to the next.
+const PARTS_OF_KINKS: usize = 4;
+
+/// Places looked at between two points outside of the chart.
+const PARTS_OUTSIDE: usize = 8;
+
+/// Places beyond a border are tried this far apart, in sampling distances.
+const OVERRUN_STEP: f64 = 0.05;
+
+/// How closely the crossing of a border is placed, in sampling distances.
+const BORDER_PRECISION: f64 = 1e-6;
+
+/// Places levels, traces them and turns them into passes.
+pub(crate) fn along_levels(
+    part: &Part,
+    cutter: &Cutter,
+    chart: &Chart,
+    field: &ScalarField,
+    settings: &PassSettings,
+    monitor: &dyn Monitor,
+) -> Result<Passes, PlanError> {
+    along_levels_placed(part, cutter, chart, field, Placing::Shortest, settings, monitor)
+}
+
+/// [`along_levels`] with levels placed in a given way.
+pub(crate) fn along_levels_placed(
+    part: &Part,
+    cutter: &Cutter,
+    chart: &Chart,
+    field: &ScalarField,
+    placing: Placing,
+    settings: &PassSettings,
+    monitor: &dyn Monitor,
+) -> Result<Passes, PlanError> {
+    let metric = |u: f64, v: f64| chart.jet(u, v).first_form();
+    let margins = margins(chart, cutter, field, settings);
+    let tracer = LevelTracer::new(field, &metric, chart.domain, margins, TRACE_CELLS, settings.sampling);
+    let mut notes = Vec::new();
+    let range = tracer.range();
+    let places = places_of(chart, cutter, field, settings);
+    let levels = place_levels(&places, range, placing, &mut notes);
+    let dropped = settings.dropped(cutter);
+    let drop = DropCutter::new(part, dropped);
+    let guide = Guide { tracer: &tracer, chart, cutter, dropped, field, drop, settings, monitor };
+    let mut passes = along_and_between(&guide, &levels, range, settings.sampling, monitor)?;
+    if let Step::Scallop(height) = settings.step {
+        let lengths = [height, settings.sampling];
+        let further = gaps::close(&guide, chart, cutter, field, lengths, &mut passes, monitor)?;
+        if further > 0 {
+            notes.push(format!("{further} short passes close gaps where the passes bend around or end"));
+        }
+    }
+    passes.notes.splice(0..0, notes);
+    passes.field = planned_field::of_levels(part, cutter, chart, field);
+    Ok(passes)
+}
+
+/// How far beyond the chart passes are traced, in parameters: the width over which a pass outside
+/// the border still serves the strip inside it.
+fn margins(chart: &Chart, cutter: &Cutter, field: &ScalarField, settings: &PassSettings) -> [f64; 2] {
+    let (mut width, mut speed, mut places) = (0.0, [0.0; 2], 0.0);
+    for [u, v] in chart.grid(MARGIN_SAMPLES) {
+        let Some(p) = chart.at(u, v) else { continue };
+        if let Some(t) = level_tangent(&p, field, [u, v]) {
+            width += p.strip_width(cutter, &t, settings.step).0;
+            speed = [speed[0] + p.jet.du.norm(), speed[1] + p.jet.dv.norm()];
+            places += 1.0;
+        }
+    }
+    [0, 1].map(|c| {
+        let range = chart.domain[c][1] - chart.domain[c][0];
+        if places == 0.0 { 0.0 } else { (BORDER_SHARE * width / speed[c]).min(MOST_MARGIN * range) }
+    })
+}
+
+/// Turns level curves into passes.
+struct Guide<'a> {
+    tracer: &'a LevelTracer<'a>,
+    chart: &'a Chart<'a>,
+    cutter: &'a Cutter,
+    /// What is dropped in its stead.
+    dropped: &'a Cutter,
+    field: &'a ScalarField,
+    drop: DropCutter<'a>,
+    settings: &'a PassSettings<'a>,
+    monitor: &'a dyn Monitor,
+}
+
+impl Guide<'_> {
+    /// Where the tip is when the cutter touches the chart at `(u, v)`: put there by the chart's
+    /// normal, then dropped, so that it is held off by any other place of the part.
+    fn tip(&self, [u, v]: [f64; 2], beside: &mut Beside) -> Option<Point3> {
+        let p = self.chart.at(u, v)?;
+        let axis = p.jet.p.xy() + self.dropped.axis_offset(&p.normal);
+        self.drop.at_beside(axis.x, axis.y, beside).map(|d| Point3::new(axis.x, axis.y, d.tip_z))
+    }
+
+    /// The stretches of a curve inside and outside of the chart, in order.
+    fn stretches(&self, at: &dyn Fn(f64) -> [f64; 2], first: usize, last: usize) -> Vec<Stretch> {
+        let inside = |s: f64| self.chart.holds(at(s));
+        let start = first as f64;
+        let mut stretches = vec![Stretch { inside: inside(start), from: start, to: start }];
+        let mut places: Vec<f64> = Vec::new();
+        for k in first..last {
+            // Outside more of them, so that no corner of the chart is missed.
+            let parts = if inside(k as f64) || inside((k + 1) as f64) { 1 } else { PARTS_OUTSIDE };
+            places.extend((1..=parts).map(|part| k as f64 + part as f64 / parts as f64));
+        }
+        for s in places {
+            let now = inside(s);
+            let n = stretches.len();
+            let current = &mut stretches[n - 1];
+            if now == current.inside {
+                current.to = s;
+                continue;
+            }
+            let (mut same, mut other) = (current.to, s);
+            while other - same > BORDER_PRECISION {
+                let middle = 0.5 * (same + other);
+                *(if inside(middle) == current.inside { &mut same } else { &mut other }) = middle;
+            }
+            current.to = same;
+            stretches.push(Stretch { inside: now, from: same, to: s });
+        }
+        stretches.retain(|s| s.to - s.from > BORDER_PRECISION);
+        stretches
+    }
+
+    /// Cuts stretches outside of the chart at both ends back to what is of use.
+    fn shorten_ends(&self, stretches: &mut Vec<Stretch>, at: &dyn Fn(f64) -> [f64; 2]) {
+        // The farthest place, from the border on, whose strip still lies on the chart.
+        let useful = |from: f64, to: f64| {
+            let steps = ((to - from).abs() / OVERRUN_STEP).ceil().max(1.0) as usize;
+            let place = |k: usize| from + (to - from) * k as f64 / steps as f64;
+            place((1..=steps).find(|&k| !self.serves(at(place(k)))).unwrap_or(steps))
+        };
+        if let Some(first) = stretches.first_mut().filter(|s| !s.inside) {
+            first.from = useful(first.to, first.from);
+        }
+        if let Some(end) = stretches.last_mut().filter(|s| !s.inside) {
+            end.to = useful(end.from, end.to);
+        }
+        stretches.retain(|s| s.to - s.from > BORDER_PRECISION);
+    }
+
+    /// The place at `s`, which counts traced points one sampling distance apart, pulled onto the level.
+    fn on_level(&self, points: &[[f64; 2]], level: f64, s: f64) -> [f64; 2] {
+        let k = (s as usize).min(points.len() - 2);
+        let t = s - k as f64;
+        let [a, b] = [points[k], points[k + 1]];
+        let between = [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])];
+        let q = self.tracer.onto_level(between, level);
+        // Near a singular point the level may be found on another branch.
+        let strayed = self.tracer.distance(between, q) > MOST_STRAY * self.settings.sampling;
+        if strayed { between } else { q }
+    }
+
+    /// The stretches of a run that are worth cutting; `None` where all of it lies outside.
+    fn useful_stretches(
+        &self,
+        at: &dyn Fn(f64) -> [f64; 2],
+        [first, end]: [usize; 2],
+        closed: bool,
+    ) -> Option<Vec<Stretch>> {
+        let mut stretches = self.stretches(at, first, end);
+        if !closed {
+            self.shorten_ends(&mut stretches, at);
+        }
+        stretches.iter().any(|s| s.inside).then_some(stretches)
+    }
+
+    /// Whether half an interval to either side of a place outside lies the chart.
+    fn serves(&self, p: [f64; 2]) -> bool {
+        let beside = || {
+            let (here, [du, dv]) = (self.chart.at(p[0], p[1])?, self.tracer.direction(p)?);
+            let feed = (here.jet.du * du + here.jet.dv * dv).try_normalize(1e-300)?;
+            let interval = here.strip_width(self.cutter, &feed, self.settings.step).0;
+            let (du, dv) = here.jet.pull_back(&here.normal.cross(&feed))?;
+            Some([0.5 * interval * du, 0.5 * interval * dv])
+        };
+        beside().is_some_and(|[du, dv]| {
+            self.chart.holds([p[0] + du, p[1] + dv]) || self.chart.holds([p[0] - du, p[1] - dv])
+        })
+    }
+}
+
+impl LevelSource for Guide<'_> {
+    type Place = [f64; 2];
+
+    fn curves(&self, level: f64) -> Vec<Track<[f64; 2]>> {
+        let track = |curve: LevelCurve| Track { points: curve.points, closed: curve.closed };
+        self.tracer.curves(level).into_iter().map(track).collect()
+    }
+
+    fn allowed(&self, &[u, v]: &[f64; 2]) -> Option<Allowed> {
+        let p = self.chart.at(u, v)?;
+        let t = level_tangent(&p, self.field, [u, v])?;
+        let [_, psi_u, psi_v] = self.field.value_and_gradient(u, v);
+        let gradient = surface_gradient_length(p.jet.first_form(), psi_u, psi_v);
+        let (width, _) = self.chart.interval(&p, self.cutter, &t, self.settings.step);
+        Some(Allowed { step: gradient * width, width })
+    }
+
+    fn contacts(&self, curve: &Track<[f64; 2]>, run: Option<[usize; 2]>) -> Vec<Contact> {
+        let contact = |&[u, v]: &[f64; 2]| {
+            let p = self.chart.at(u, v)?;
+            let t = level_tangent(&p, self.field, [u, v])?;
+            let (allowed, _) = self.chart.interval(&p, self.cutter, &t, self.settings.step);
+            let across = p.normal.cross(&t);
+            Some(Contact {
+                at: p.jet.p,
+                across,
+                allowed,
+                inside: self.chart.holds([u, v]),
+                parameters: Some([u, v]),
+            })
+        };
+        curve.along(run).filter_map(contact).collect()
+    }
+
+    fn least_allowed(&self, from: &[f64; 2], to: &[f64; 2]) -> Option<Allowed> {
+        let part = |k: usize| {
+            let t = k as f64 / PARTS_OF_KINKS as f64;
+            self.allowed(&[from[0] + t * (to[0] - from[0]), from[1] + t * (to[1] - from[1])])
+        };
+        (0..PARTS_OF_KINKS).filter_map(part).min_by(|a, b| a.step.total_cmp(&b.step))
+    }
+
+    /// The pass along a curve, or along a run of its points; `None` where it does not touch the
+    /// chart.
+    fn pass(
+        &self,
+        curve: &Track<[f64; 2]>,
+        level: f64,
+        run: Option<[usize; 2]>,
+    ) -> Result<Option<Vec<Point3>>, Cancelled> {
+        let Some((points, run)) = points_of(curve, run) else { return Ok(None) };
+        let at = |s: f64| self.on_level(&points, level, s);
+        let Some(stretches) = self.useful_stretches(&at, run, curve.closed) else { return Ok(None) };
+        let settings = PassSettings { sampling: 1.0, ..*self.settings };
+        let mut tips: Vec<Point3> = Vec::new();
+        for stretch in stretches {
+            let mut beside = Beside::default();
+            let mut tip = |s| self.tip(at(s), &mut beside);
+            let moves = settings.moves(stretch.from, stretch.to, &mut tip, self.monitor)?;
+            let joined = usize::from(!tips.is_empty());
+            tips.extend(moves.into_iter().skip(joined));
+        }
+        Ok(Some(tips))
+    }
+
+    fn touches(
+        &self,
+        curve: &Track<[f64; 2]>,
+        level: f64,
+        run: Option<[usize; 2]>,
+    ) -> Result<Option<Vec<Touch>>, PlanError> {
+        let (Some(rule), Some((points, run))) = (self.settings.axis, points_of(curve, run)) else {
+            return Ok(None);
+        };
+        if self.chart.is_fitted() {
+            // The mesh itself tells where it is touched.
+            return Ok(None);
+        }
+        let at = |s: f64| self.on_level(&points, level, s);
+        let Some(stretches) = self.useful_stretches(&at, run, curve.closed) else { return Ok(None) };
+        let contact = |s: f64| {
+            let [u, v] = at(s);
+            let p = self.chart.at(u, v)?;
+            let feed = level_tangent(&p, self.field, [u, v])?;
+            Some((CcPoint { point: p.jet.p, normal: p.normal }, feed))
+        };
+        let mut touches: Vec<Touch> = Vec::new();
+        let tolerance = self.settings.chord_tolerance;
+        for stretch in stretches {
+            let ends = [stretch.from, stretch.to];
+            let more = tilted::along(&contact, ends, self.cutter, rule, tolerance, self.monitor)?;
+            let joined = usize::from(!touches.is_empty());
+            touches.extend(more.into_iter().skip(joined));
+        }
+        Ok((touches.len() > 1).then_some(touches))
+    }
+}
+
+/// The points of a curve, the first one again at the end of a closed one, and the run that is asked for; `None` for a
+/// run of nothing.
+fn points_of(curve: &Track<[f64; 2]>, run: Option<[usize; 2]>) -> Option<(Vec<[f64; 2]>, [usize; 2])> {
+    let mut points = curve.points.clone();
+    if curve.closed {
+        points.push(points[0]);
+    }
+    let last = points.len() - 1;
+    let [first, end] = run.map_or([0, last], |[a, b]| [a, if curve.closed { last } else { b }]);
+    (end > first).then_some((points, [first, end]))
+}
+
+/// A stretch of a level curve that lies inside or outside of the chart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Stretch {
+    inside: bool,
+    from: f64,
+    to: f64,
+}

@@ -1,0 +1,306 @@
+//! Turns a curve of cutter locations into straight moves within a chord tolerance.
+
+use geometry::{Point3, Vector3, distance_to_segment};
+use work::monitor;
+use work::monitor::{Cancelled, Monitor};
+
+/// Steps of work (drops of the cutter, points thinned) between two questions whether to go on. A
+/// question costs next to nothing; at ten times as many a cancelled plan would still end within
+/// tenths of a second, and a rough surface takes ten times as long for each of them.
+const STEPS_BETWEEN_QUESTIONS: u32 = 256;
+
+/// Asks a monitor now and then whether to go on, from inside of a pass.
+pub struct Watch<'a> {
+    monitor: &'a dyn Monitor,
+    steps: u32,
+}
+
+impl<'a> Watch<'a> {
+    /// For the work of one pass.
+    pub fn new(monitor: &'a dyn Monitor) -> Self {
+        Self { monitor, steps: 0 }
+    }
+
+    /// Counts one step, and asks after every so many.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn step(&mut self) -> Result<(), Cancelled> {
+        self.steps += 1;
+        if self.steps < STEPS_BETWEEN_QUESTIONS {
+            return Ok(());
+        }
+        self.steps = 0;
+        monitor::check(self.monitor)
+    }
+}
+
+/// Two samples of a pass are never closer than this share of the first sampling interval: where the
+/// exact path has a kink, halving would never end. At 2⁻¹² of a quarter of a millimetre the kink is
+/// placed to 0.06 µm.
+const MAX_HALVINGS: u32 = 12;
+
+/// A place of a cutter on its way.
+pub trait Waypoint: Copy {
+    /// How far this place lies off the move between two others, mm.
+    fn stray(&self, from: &Self, to: &Self) -> f64;
+
+    /// Whether the cutter need not move from here to another place.
+    fn is_at(&self, other: &Self) -> bool;
+}
+
+impl Waypoint for Point3 {
+    fn stray(&self, from: &Self, to: &Self) -> f64 {
+        distance_to_segment(self, from, to)
+    }
+
+    fn is_at(&self, other: &Self) -> bool {
+        self == other
+    }
+}
+
+/// Samples `locate` over `[s0, s1]` so that the straight moves between samples stay within
+/// `tolerance` (mm) of the exact curve.
+///
+/// `locate(s)` gives the cutter location at parameter `s`, `None` where there is none: samples before
+/// the first location and after the next gap are left out. The first samples are `step` apart in `s`.
+/// Each interval is tested at its middle and its quarters, and halved until all three hold.
+///
+/// # Errors
+/// [`Cancelled`] when the watch says so.
+///
+/// # Tolerance
+/// A curve whose curvature changes sign more than four times within one final interval could slip
+/// between the tests; `step` should be well below the radius of the cutter.
+pub fn sample_within_chord<P: Waypoint>(
+    s0: f64,
+    s1: f64,
+    step: f64,
+    tolerance: f64,
+    locate: &mut dyn FnMut(f64) -> Option<P>,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<P>, Cancelled> {
+    let count = ((s1 - s0) / step).ceil().max(1.0) as usize;
+    let at = |k: usize| s0 + (s1 - s0) * k as f64 / count as f64;
+    let mut start = 0;
+    let first = loop {
+        if start > count {
+            return Ok(Vec::new());
+        }
+        watch.step()?;
+        match locate(at(start)) {
+            Some(first) => break first,
+            None => start += 1,
+        }
+    };
+    let mut points = vec![first];
+    let mut a = (at(start), first);
+    for k in start + 1..=count {
+        let s = at(k);
+        let Some(p) = locate(s) else { break };
+        halve(a, (s, p), tolerance, MAX_HALVINGS, locate, watch, &mut points)?;
+        a = (s, p);
+    }
+    Ok(points)
+}
+
+/// Appends the samples after `a` up to and with `b`.
+fn halve<P: Waypoint>(
+    a: (f64, P),
+    b: (f64, P),
+    tolerance: f64,
+    halvings: u32,
+    locate: &mut dyn FnMut(f64) -> Option<P>,
+    watch: &mut Watch<'_>,
+    out: &mut Vec<P>,
+) -> Result<(), Cancelled> {
+    watch.step()?;
+    let s = |t: f64| a.0 + (b.0 - a.0) * t;
+    let off = |p: &Option<P>| p.is_some_and(|p| p.stray(&a.1, &b.1) > tolerance);
+    let middle = locate(s(0.5));
+    let split = halvings > 0 && (off(&middle) || off(&locate(s(0.25))) || off(&locate(s(0.75))));
+    if let (true, Some(middle)) = (split, middle) {
+        let middle = (s(0.5), middle);
+        halve(a, middle, tolerance, halvings - 1, locate, watch, out)?;
+        halve(middle, b, tolerance, halvings - 1, locate, watch, out)?;
+    } else if !b.1.is_at(&a.1) {
+        out.push(b.1);
+    }
+    Ok(())
+}
+
+/// No straight move skips more points than this: it bounds the cost on long straight passes, and a
+/// pass of n points keeps n/400 at worst where one move would do.
+const MAX_SKIP: usize = 400;
+
+/// Drops points that the rest does without, and moves those that are left aside so that the curve runs on both
+/// sides of the moves: within `tolerance`, and half of it where the curve bends evenly. The ends stay.
+///
+/// # Errors
+/// [`Cancelled`] when the watch says so.
+pub fn reduce(points: &[Point3], tolerance: f64, watch: &mut Watch<'_>) -> Result<Vec<Point3>, Cancelled> {
+    Ok(moved_aside(points, &reduced_indices(points, tolerance, watch)?, Side::Lesser, tolerance))
+}
+
+/// Indices of the points that the rest does without least: from each the longest straight move that stays within
+/// `tolerance` of all points that it skips. The ends stay.
+///
+/// # Errors
+/// [`Cancelled`] when the watch says so.
+pub fn reduced_indices<P: Waypoint>(
+    points: &[P],
+    tolerance: f64,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<usize>, Cancelled> {
+    if points.is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut kept = vec![0];
+    let mut from = 0;
+    while from + 1 < points.len() {
+        let fits =
+            |to: usize| points[from + 1..to].iter().all(|p| p.stray(&points[from], &points[to]) <= tolerance);
+        watch.step()?;
+        let mut to = from + 1;
+        while to + 1 < points.len() && to - from < MAX_SKIP && fits(to + 1) {
+            to += 1;
+        }
+        kept.push(to);
+        from = to;
+    }
+    Ok(kept)
+}
+
+/// By which of its two sides a point is moved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// The straighter one; where the curve bends both ways not at all. Straight moves stay where they are.
+    Lesser,
+    /// The more bent one, by the mean of both where the curve bends both ways. What is beside it must be checked.
+    Greater,
+}
+
+/// The points at `knots`, each moved by half the sagitta of one of its sides, at most by the tolerance. The ends stay.
+pub fn moved_aside(curve: &[Point3], knots: &[usize], side: Side, tolerance: f64) -> Vec<Point3> {
+    let half_sagitta = |k: usize| {
+        let (a, b) = (curve[knots[k]], curve[knots[k + 1]]);
+        let off = |p: &Point3| {
+            let d = b - a;
+            let t = ((p - a).dot(&d) / d.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            p - (a + d * t)
+        };
+        let between = &curve[knots[k]..=knots[k + 1]];
+        let far = |e: &Vector3| e.norm_squared();
+        let most =
+            between.iter().map(off).fold(Vector3::zeros(), |m, e| if far(&e) > far(&m) { e } else { m });
+        if far(&most) == 0.0 {
+            return most;
+        }
+        // A chord that the curve crosses is off on both sides already.
+        let least = between.iter().map(|p| off(p).dot(&most) / far(&most)).fold(0.0, f64::min);
+        most * (0.5 * (1.0 + least))
+    };
+    let halves: Vec<Vector3> = (0..knots.len().saturating_sub(1)).map(half_sagitta).collect();
+    let aside = |k: usize| {
+        let (a, b) = (halves[k - 1], halves[k]);
+        let (lesser, greater) = if a.norm_squared() < b.norm_squared() { (a, b) } else { (b, a) };
+        let by = match (side, a.dot(&b) > 0.0) {
+            (Side::Lesser, true) => lesser,
+            (Side::Lesser, false) => Vector3::zeros(),
+            (Side::Greater, true) => greater,
+            (Side::Greater, false) => 0.5 * (a + b),
+        };
+        curve[knots[k]] + by * (tolerance / by.norm().max(f64::MIN_POSITIVE)).min(1.0)
+    };
+    let last = knots.len().saturating_sub(1);
+    (0..knots.len()).map(|k| if k == 0 || k == last { curve[knots[k]] } else { aside(k) }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicU32, Ordering};
+    use work::monitor::Silent;
+
+    /// Says stop at the given question and all that follow.
+    struct StopAt(AtomicU32);
+
+    impl Monitor for StopAt {
+        fn cancelled(&self) -> bool {
+            self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1)).is_err()
+        }
+    }
+
+    fn circle(s: f64) -> Option<Point3> {
+        Some(Point3::new(10.0 * s.cos(), 10.0 * s.sin(), 0.0))
+    }
+
+    #[test]
+    fn chords_of_a_circle_hold_the_tolerance_and_no_more() {
+        let tolerance = 1e-3;
+        let points =
+            sample_within_chord(0.0, 3.0, 0.5, tolerance, &mut circle, &mut Watch::new(&Silent)).unwrap();
+        for pair in points.windows(2) {
+            let chord = (pair[1] - pair[0]).norm();
+            let sagitta = 10.0 - (100.0 - 0.25 * chord * chord).sqrt();
+            assert!(sagitta <= tolerance, "{sagitta}");
+            assert!(sagitta >= tolerance / 8.0, "halving loses at most a factor of four: {sagitta}");
+        }
+        let ideal = 30.0 / (8.0 * tolerance * 10.0f64).sqrt();
+        assert!((points.len() as f64) < 2.0 * ideal + 2.0);
+    }
+
+    #[test]
+    fn a_kink_ends_after_finitely_many_halvings() {
+        let kink = &mut |s: f64| Some(Point3::new(s, (s - 0.3).abs(), 0.0));
+        let points = sample_within_chord(0.0, 1.0, 1.0, 1e-9, kink, &mut Watch::new(&Silent)).unwrap();
+        assert!(points.len() < 40, "{}", points.len());
+        assert!(points.iter().any(|p| (p.x - 0.3).abs() < 1e-3));
+    }
+
+    #[test]
+    fn reduction_keeps_ends_and_tolerance() {
+        let dense: Vec<Point3> = (0..=1000).map(|k| circle(0.003 * k as f64).unwrap()).collect();
+        let kept = reduce(&dense, 1e-3, &mut Watch::new(&Silent)).unwrap();
+        assert_eq!(kept.first(), dense.first());
+        assert_eq!(kept.last(), dense.last());
+        assert!(kept.len() < 120, "{}", kept.len());
+        for p in &dense {
+            let d = kept.windows(2).map(|w| distance_to_segment(p, &w[0], &w[1])).fold(f64::MAX, f64::min);
+            assert!(d <= 1e-3 + 1e-12);
+        }
+        let line: Vec<Point3> = (0..50).map(|k| Point3::new(k as f64, 0.0, 1.0)).collect();
+        assert_eq!(reduce(&line, 1e-9, &mut Watch::new(&Silent)).unwrap().len(), 2);
+    }
+
+    /// A path so rough that it would take billions of places ends soon after the user asks for it,
+    /// also where nothing is located at all, and also while points are thinned.
+    #[test]
+    fn a_pass_is_left_half_way_when_asked() {
+        for questions in [0, 1, 7] {
+            let mut located = 0u32;
+            let mut rough = |s: f64| {
+                located += 1;
+                Some(Point3::new(s, (1e9 * s).sin(), 0.0))
+            };
+            let stop = StopAt(AtomicU32::new(questions));
+            let got = sample_within_chord(0.0, 1e6, 1.0, 1e-9, &mut rough, &mut Watch::new(&stop));
+            assert_eq!(got, Err(Cancelled));
+            // Up to four places a step.
+            assert!(located <= 4 * STEPS_BETWEEN_QUESTIONS * (questions + 1), "{located} for {questions}");
+        }
+        let mut located = 0u32;
+        let mut nowhere = |_| {
+            located += 1;
+            None::<Point3>
+        };
+        let stop = StopAt(AtomicU32::new(2));
+        let got = sample_within_chord(0.0, 1e9, 1.0, 1e-9, &mut nowhere, &mut Watch::new(&stop));
+        assert_eq!((got, located), (Err(Cancelled), 3 * STEPS_BETWEEN_QUESTIONS - 1));
+        let rough: Vec<Point3> =
+            (0..10_000).map(|k| Point3::new(f64::from(k), f64::from(k % 2), 0.0)).collect();
+        let stop = StopAt(AtomicU32::new(3));
+        assert_eq!(reduce(&rough, 1e-3, &mut Watch::new(&stop)), Err(Cancelled));
+        assert_eq!(stop.0.into_inner(), 0, "asked until it said stop");
+    }
+}

@@ -1,0 +1,262 @@
+//! Iso-scallop passes: each exactly one strip width from the one before, measured on the surface across the feed.
+//!
+//! A front starts on a curve and moves by the strip width of its place and direction while φ grows by one
+//! (`speed |∇φ| = 1`, see [`field::eikonal`]); levels of φ one apart are the passes. The path is as long as
+//! `∫ (1 − κ r) dA/w(across)`, κ the curvature along the feed, so the start curve decides the directions and with them the length.
+//!
+//! Limits: behind the ends of a start curve on the border, and where fronts meet, passes turn sharply; further short passes
+//! are put in there.
+
+use crate::levels::level_passes::along_levels;
+use crate::levels::spacing::level_tangent;
+use crate::plan::{FrontStart, PassSettings, Passes, PlanError};
+use crate::surface::chart::{Chart, ChartPoint};
+use crate::{Along, Step};
+use cutter::Cutter;
+use field::{EikonalError, Front, GridField, ScalarField, Start, eikonal, surface_gradient_length};
+use part::Part;
+use scallop::strip_width;
+use work::monitor::Monitor;
+
+/// Nodes of the front's grid lie this share of the cutter's radius apart: features that a cutter fits into are wider.
+/// Coarser grids blur the strip's width, finer ones cost time.
+const PITCH_OVER_RADIUS: f64 = 0.2;
+
+/// Where fronts meet, nodes lie this share of the strip on a plane apart: with fewer the corners of neighbouring passes
+/// wander by more than further passes make up for.
+const PITCH_OVER_STRIP: f64 = 0.4;
+
+/// Bounds of the nodes a side. The error of φ falls with the square of the pitch; the time grows with its inverse square.
+const NODES: [usize; 2] = [81, 401];
+
+/// Places a side at which a path's length is predicted, and a side's length is measured.
+const LENGTH_SAMPLES: usize = 120;
+
+/// How many of the starts with the least predicted length are planned; the prediction leaves out further passes.
+const PLANNED: usize = 2;
+
+/// Plans passes from a start curve.
+pub fn passes(
+    part: &Part,
+    cutter: &Cutter,
+    start: FrontStart,
+    settings: &PassSettings,
+    monitor: &dyn Monitor,
+) -> Result<Passes, PlanError> {
+    let mut all = Passes::default();
+    for chart in Chart::all(part, cutter, settings.axis)? {
+        all.append(on_chart(part, cutter, &chart, start, f64::INFINITY, settings, monitor)?);
+    }
+    Ok(all)
+}
+
+/// Plans passes over one chart; none from starts that promise a path longer than `worth`, mm.
+pub(crate) fn on_chart(
+    part: &Part,
+    cutter: &Cutter,
+    chart: &Chart,
+    start: FrontStart,
+    worth: f64,
+    settings: &PassSettings,
+    monitor: &dyn Monitor,
+) -> Result<Passes, PlanError> {
+    let mut tried = Vec::new();
+    let places = places(chart, LENGTH_SAMPLES);
+    for (name, curves) in starts(chart, start) {
+        let signed = matches!(start, FrontStart::Line(_));
+        let field = arrival(chart, cutter, settings.step, &curves, signed, monitor)?;
+        let field = ScalarField::Grid(field);
+        tried.push((predicted_length(&places, cutter, settings.step, &field), name, field));
+    }
+    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let searched = tried.len();
+    let mut planned = Vec::new();
+    for (length, name, field) in tried.into_iter().take(PLANNED).filter(|(length, ..)| *length < worth) {
+        planned.push((along_levels(part, cutter, chart, &field, settings, monitor)?, name, length));
+    }
+    planned.sort_by(|a, b| a.0.length().total_cmp(&b.0.length()));
+    let Some((mut best, name, length)) = planned.into_iter().next() else { return Ok(Passes::default()) };
+    best.notes.push(format!(
+        "passes start {name}{}: {:.0} mm planned, {length:.0} mm predicted",
+        if searched > 1 { ", the best of four borders" } else { "" },
+        best.length()
+    ));
+    Ok(best)
+}
+
+/// The start curves to try, each with its name.
+fn starts(chart: &Chart, start: FrontStart) -> Vec<(&'static str, Vec<Vec<[f64; 2]>>)> {
+    let [[u0, u1], [v0, v1]] = chart.domain;
+    let border = |constant: Along, greatest: bool| match (constant, greatest) {
+        (Along::U, false) => ("at the border of least u", vec![vec![[u0, v0], [u0, v1]]]),
+        (Along::U, true) => ("at the border of greatest u", vec![vec![[u1, v0], [u1, v1]]]),
+        (Along::V, false) => ("at the border of least v", vec![vec![[u0, v0], [u1, v0]]]),
+        (Along::V, true) => ("at the border of greatest v", vec![vec![[u0, v1], [u1, v1]]]),
+    };
+    match start {
+        FrontStart::BestBorder => [(Along::U, false), (Along::U, true), (Along::V, false), (Along::V, true)]
+            .map(|(constant, greatest)| border(constant, greatest))
+            .to_vec(),
+        FrontStart::Border { constant, greatest } => vec![border(constant, greatest)],
+        FrontStart::AllBorders => {
+            vec![("at all borders", vec![vec![[u0, v0], [u1, v0], [u1, v1], [u0, v1], [u0, v0]]])]
+        }
+        FrontStart::Line([a, b]) => {
+            let at = |t: f64| {
+                let share = [0, 1].map(|c| a[c] + t * (b[c] - a[c]));
+                [u0 + share[0] * (u1 - u0), v0 + share[1] * (v1 - v0)]
+            };
+            // Continued until it is beyond the unit square on both sides.
+            let reach = 4.0 / (b[0] - a[0]).hypot(b[1] - a[1]).max(1e-9);
+            vec![("on a line", vec![vec![at(-reach), at(1.0 + reach)]])]
+        }
+    }
+}
+
+/// φ of the front from curves in parameters, a unit for each strip width.
+///
+/// # Errors
+/// When cancelled, or when no front can move over the chart.
+pub(crate) fn arrival(
+    chart: &Chart,
+    cutter: &Cutter,
+    step: Step,
+    curves: &[Vec<[f64; 2]>],
+    signed: bool,
+    monitor: &dyn Monitor,
+) -> Result<GridField, PlanError> {
+    let front = |u, v| front_at(chart, cutter, step, u, v);
+    // A closed curve sends out fronts that meet, and so do several curves.
+    let meets = curves.len() > 1 || curves.iter().any(|curve| curve.first() == curve.last());
+    let pitch = PITCH_OVER_RADIUS * cutter.radius();
+    let strip = match step {
+        Step::Scallop(h) => strip_width(1.0 / cutter.radius(), 0.0, h, cutter.radius()).0,
+        Step::Stepover(width) => width,
+    };
+    let nodes = nodes(chart, if meets { pitch.min(PITCH_OVER_STRIP * strip) } else { pitch });
+    let arrival = eikonal(chart.domain, nodes, &front, &Start { curves, signed }, monitor);
+    arrival.map(|arrival| arrival.field).map_err(|error| match error {
+        EikonalError::Cancelled(cancelled) => PlanError::Cancelled(cancelled),
+        other => PlanError::NotApplicable { strategy: "iso-scallop", reason: other.to_string() },
+    })
+}
+
+/// Metric and speed at a place of a chart: a front moves by the strip's width.
+pub(crate) fn front_at(chart: &Chart, cutter: &Cutter, step: Step, u: f64, v: f64) -> Option<Front> {
+    let p = chart.at(u, v)?;
+    Front::new(p.jet.first_form(), |[du, dv]| {
+        let across = p.jet.du * du + p.jet.dv * dv;
+        p.strip_width(cutter, &across.cross(&p.normal), step).0
+    })
+}
+
+/// Nodes along u and v, `pitch` mm apart on the longest of some parameter lines.
+fn nodes(chart: &Chart, pitch: f64) -> [usize; 2] {
+    let longest = |along_u: bool| {
+        let [a, b] = if along_u { chart.domain } else { [chart.domain[1], chart.domain[0]] };
+        let at = |[lo, hi]: [f64; 2], t: f64| lo + t * (hi - lo);
+        let point = |s: f64, t: f64| {
+            let (x, y) = (at(a, s), at(b, t));
+            if along_u { chart.jet(x, y).p } else { chart.jet(y, x).p }
+        };
+        let n = LENGTH_SAMPLES;
+        let step =
+            |k: usize, t: f64| (point((k + 1) as f64 / n as f64, t) - point(k as f64 / n as f64, t)).norm();
+        let line = |t: f64| (0..n).map(|k| step(k, t)).sum::<f64>();
+        [0.0, 0.25, 0.5, 0.75, 1.0].into_iter().map(line).fold(0.0, f64::max)
+    };
+    [true, false].map(|along_u| {
+        let wanted = longest(along_u) / pitch;
+        (wanted.ceil() as usize + 1).clamp(NODES[0], NODES[1])
+    })
+}
+
+/// The places of an even grid of `n` × `n` on a chart, and the area in parameters that each stands for.
+pub(crate) fn places<'a>(chart: &Chart<'a>, n: usize) -> (Vec<([f64; 2], ChartPoint<'a>)>, f64) {
+    let [[u0, u1], [v0, v1]] = chart.domain;
+    let places = chart.grid(n).filter_map(|uv| Some((uv, chart.at(uv[0], uv[1])?))).collect();
+    (places, (u1 - u0) * (v1 - v0) / (n * n) as f64)
+}
+
+/// Where levels one apart lie farther from each other than the strip by more than this share, which they do along kinks
+/// of a front, further passes will be put in. Less takes the error of coarse grids for kinks.
+const KINK: f64 = 0.05;
+
+/// Length, mm, of the cutter's way along level curves one apart: `∫ |∇φ| (1 − κ r) dA`, κ the curvature along them; twice
+/// that along kinks.
+pub(crate) fn predicted_length(
+    (places, cell): &(Vec<([f64; 2], ChartPoint)>, f64),
+    cutter: &Cutter,
+    step: Step,
+    field: &ScalarField,
+) -> f64 {
+    let at = |(uv, p): &([f64; 2], ChartPoint)| {
+        let (e, f, g) = p.jet.first_form();
+        let [_, phi_u, phi_v] = field.value_and_gradient(uv[0], uv[1]);
+        let gradient = surface_gradient_length((e, f, g), phi_u, phi_v);
+        let tangent = level_tangent(p, field, *uv)?;
+        let (width, _) = p.strip_width(cutter, &tangent, step);
+        let passes = if gradient * width * (1.0 + KINK) < 1.0 { 2.0 } else { 1.0 };
+        Some(passes * (e * g - f * f).max(0.0).sqrt() * gradient * p.offset_ratio(cutter, &tangent))
+    };
+    cell * places.iter().filter_map(at).sum::<f64>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::levels::spacing::{Placing, place_levels, places_of};
+    use field::LevelTracer;
+    use geometry::{NurbsSurface, Point3};
+    use part::Patch;
+    use std::f64::consts::{FRAC_1_SQRT_2, PI};
+    use work::monitor::Silent;
+
+    /// A half cylinder of radius 5 and length 10 along y; u runs around it.
+    fn half_cylinder() -> Part {
+        let around = [[5.0, 0.0], [5.0, 5.0], [0.0, 5.0], [-5.0, 5.0], [-5.0, 0.0]];
+        let net = around.map(|[x, z]| [0.0, 10.0].map(|y| Point3::new(x, y, z)).to_vec());
+        let weights = [1.0, FRAC_1_SQRT_2, 1.0, FRAC_1_SQRT_2, 1.0].map(|w| vec![w; 2]);
+        let knots = vec![0.0, 0.0, 0.0, 0.5, 0.5, 1.0, 1.0, 1.0];
+        let surface = NurbsSurface::new(2, 1, knots, vec![0.0, 0.0, 1.0, 1.0], &net, Some(&weights)).unwrap();
+        Part::from_patches(vec![Patch::Nurbs(surface)], 0.005).unwrap()
+    }
+
+    /// Passes around it lie `√(8 h r)` apart, as on a plane: with h = 0.05 a ball of radius 5 takes 10/1.414 = 7.07 of
+    /// them, and whole passes are eight half circles (so are those of any ball from 3.91 to 5.10).
+    #[test]
+    fn passes_around_a_half_cylinder_are_eight_half_circles_long() {
+        let (part, cutter) = (half_cylinder(), Cutter::ball(10.0).unwrap());
+        let settings = PassSettings {
+            step: Step::Scallop(0.05),
+            sampling: 0.5,
+            chord_tolerance: 1e-3,
+            smoothing: None,
+            axis: None,
+            probe: None,
+        };
+        let chart = &Chart::all(&part, &cutter, None).unwrap()[0];
+        let border = vec![vec![[0.0, 0.0], [1.0, 0.0]]];
+        let field = arrival(chart, &cutter, settings.step, &border, false, &Silent).unwrap();
+        let field = ScalarField::Grid(field);
+        let metric = |u: f64, v: f64| chart.jet(u, v).first_form();
+        let tracer = LevelTracer::new(&field, &metric, chart.domain, [0.0; 2], 120, 0.1);
+        let range = tracer.range();
+        let interval = (8.0f64 * 0.05 * 5.0).sqrt();
+        assert!((range[1] - range[0] - 10.0 / interval).abs() < 0.01, "{range:?}");
+        let allowed = places_of(chart, &cutter, &field, &settings);
+        let levels = place_levels(&allowed, range, Placing::Shortest, &mut Vec::new());
+        assert_eq!(levels.len(), 8);
+        let length = |points: &[[f64; 2]]| {
+            let at = |[u, v]: [f64; 2]| chart.jet(u, v).p;
+            points.windows(2).map(|w| (at(w[1]) - at(w[0])).norm()).sum::<f64>()
+        };
+        let curves = levels.iter().flat_map(|&level| tracer.curves(level));
+        let total: f64 = curves.map(|curve| length(&curve.points)).sum();
+        println!("{total:.3} mm");
+        assert!((total / (8.0 * 5.0 * PI) - 1.0).abs() < 0.01, "{total}");
+        // Not rounded to whole passes, and of the ball's centre, which runs along circles of twice the radius.
+        let exact = predicted_length(&places(chart, LENGTH_SAMPLES), &cutter, settings.step, &field);
+        assert!((exact / (2.0 * 50.0 * PI / interval) - 1.0).abs() < 0.01, "{exact}");
+    }
+}

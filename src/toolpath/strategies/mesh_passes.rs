@@ -1,0 +1,508 @@
+//! Passes along the level curves of a stream function on a mesh: open STL surfaces with holes and
+//! steps, several patches as one surface.
+//!
+//! Enters: the part and a feed direction. Leaves: passes. The field stands on the part's mesh
+//! (`mesh_surface`); a level curve is a chain of straight pieces through its triangles, evened out and
+//! run through by a smooth curve of the places of the cutter's axis; every height comes from dropping
+//! the cutter there, so that the mesh decides where passes run, never how deep.
+
+use super::mesh_shortest::shortest_stream;
+use super::shortest::shortest_note;
+use crate::drop::DropCutter;
+use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between};
+use crate::levels::planned_field::{self, Contact};
+use crate::levels::spacing::{Place, Placing, place_levels};
+use crate::plan::{PassSettings, Passes, PlanError};
+use crate::surface::border::useful_overrun;
+use crate::surface::feed;
+use crate::surface::feed::SMOOTHING_OVER_RADIUS;
+use crate::surface::mesh_surface::{MeshSurface, Piece, not_applicable, reachable};
+use crate::{FeedDirection, Step};
+use cutter::Cutter;
+use field::DIRECTION_WEIGHT;
+use field::mesh::{
+    Bend, Held, Line, MeshCurve, MeshFieldError, MeshLevels, MeshPoint, flows, orient_lines, smooth_lines,
+    solve_stream,
+};
+use geometry::{Point2, Point3, Vector2, Vector3};
+use part::Part;
+use scallop::strip_width_at;
+use work::monitor::{Cancelled, Monitor};
+
+/// Two places of the axis nearer than this, mm, are one: rounding.
+const SAME_AXIS: f64 = 1e-9;
+
+/// Steep places of less area together, mm², are not told of: splinters where facets meet.
+const LEAST_TOLD: f64 = 0.05;
+
+/// The strip beyond borders is this share of an interval wide, as on charts.
+const BORDER_SHARE: f64 = 0.6;
+
+/// Part of a direction's weight that does not depend on how much the direction matters.
+const LEAST_WEIGHT: f64 = 0.02;
+
+/// Evening out moves a pass by at most this share of its interval; the scallop grows by twice that
+/// share twice over where two neighbours move apart.
+const MOST_MOVED: f64 = 0.02;
+
+/// Times that a curve is evened out.
+const EVENINGS: usize = 2;
+
+/// Weights of five neighbours that keep every parabola (Savitzky and Golay 1964).
+const EVEN: [f64; 5] = [-3.0 / 35.0, 12.0 / 35.0, 17.0 / 35.0, 12.0 / 35.0, -3.0 / 35.0];
+
+/// What the stream function shall do.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Aim<'a> {
+    /// Follow a direction.
+    Fitted(&'a FeedDirection),
+    /// Make the path shortest; with a direction and how much dearer passes square to it are.
+    Shortest(Option<(&'a FeedDirection, f64)>),
+}
+
+/// Passes along the level curves of a stream function over everything of the part that is reached from
+/// above.
+pub(crate) fn on_mesh(
+    part: &Part,
+    cutter: &Cutter,
+    aim: Aim,
+    settings: &PassSettings,
+    monitor: &dyn Monitor,
+) -> Result<Passes, PlanError> {
+    let flat = match settings.step {
+        Step::Stepover(width) => width,
+        Step::Scallop(h) => strip_width_at(cutter, &Vector3::z(), &Vector3::x(), 0.0, h).0,
+    };
+    let parameters: Vec<_> = match part.patches() {
+        // u and v of a mesh are its x and y.
+        [] => [part.bounds()].map(|b| [[b.min.x, b.max.x], [b.min.y, b.max.y]]).to_vec(),
+        patches => patches.iter().map(|patch| patch.domain()).collect(),
+    };
+    if let Aim::Fitted(direction) | Aim::Shortest(Some((direction, _))) = aim {
+        feed::check(direction, part, &parameters)?;
+    }
+    let reached = reachable(part, cutter, flat)?;
+    let mut all = Passes::default();
+    if reached.steep_area >= LEAST_TOLD {
+        all.notes.push(format!(
+            "{:.1} mm² of the surface are steeper than 80 degrees; passes go around them and touch them only where the \
+             cutter leans against them",
+            reached.steep_area
+        ));
+    }
+    for piece in &reached.pieces {
+        let surface = MeshSurface::with_margin(piece, BORDER_SHARE * flat)?;
+        all.append(on_piece(part, cutter, aim, piece, &surface, settings, monitor)?);
+    }
+    Ok(all)
+}
+
+fn on_piece(
+    part: &Part,
+    cutter: &Cutter,
+    aim: Aim,
+    piece: &Piece,
+    surface: &MeshSurface,
+    settings: &PassSettings,
+    monitor: &dyn Monitor,
+) -> Result<Passes, PlanError> {
+    let refused = |e: MeshFieldError| not_applicable(&e.to_string());
+    // Notes and field, to which passes come later.
+    let mut all = Passes::default();
+    let (values, predicted) = match aim {
+        Aim::Fitted(direction) => {
+            (along_direction(part, cutter, direction, piece, surface, settings, &mut all)?, None)
+        }
+        Aim::Shortest(toward) => {
+            let lines = toward.map(|(direction, dearer)| {
+                let (lines, matters) = feed_lines(part, cutter, direction, piece, surface, &mut all)?;
+                let pull = |(line, matters): (&Line, &f64)| (line.direction, dearer * matters);
+                Ok::<_, PlanError>(lines.iter().zip(&matters).map(pull).collect::<Vec<_>>())
+            });
+            let toward = lines.transpose()?;
+            let found = shortest_stream(surface, cutter, settings.step, toward.as_deref(), monitor)?;
+            let found =
+                found.ok_or_else(|| not_applicable("no stream function of least length was found"))?;
+            (found.coefficients, toward.is_none().then_some(found.cost))
+        }
+    };
+    let levels = MeshLevels::new(&surface.mesh, &values).map_err(refused)?;
+    let own_values = values.iter().zip(&surface.origin).enumerate();
+    let own_values = own_values.filter(|&(v, (_, &origin))| origin as usize == v).map(|(_, (psi, _))| *psi);
+    let range = own_values.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], x| [lo.min(x), hi.max(x)]);
+    let drop = DropCutter::new(part, cutter);
+    let guide = MeshGuide { surface, levels, cutter, drop, settings, monitor };
+    let places = guide.places(&values);
+    let placed = place_levels(&places, range, Placing::Shortest, &mut all.notes);
+    planned_field::set_mesh_levels(&mut all.field, &guide.levels, range, surface.own_triangles);
+    if matches!(aim, Aim::Shortest(None)) {
+        planned_field::set_mesh_feed(
+            &mut all.field,
+            part,
+            cutter,
+            &level_lines(surface, &guide.levels),
+            surface,
+        );
+    }
+    all.append(along_and_between(&guide, &placed, range, settings.sampling, monitor)?);
+    all.notes.extend(predicted.map(|predicted| shortest_note(&all, predicted)));
+    Ok(all)
+}
+
+/// The directions of levels at the vertices.
+fn level_lines(surface: &MeshSurface, levels: &MeshLevels<'_>) -> Vec<Line> {
+    let mesh = &surface.mesh;
+    let line = |(v, gradient): (usize, &Vector3)| {
+        let along = gradient.cross(&mesh.normals()[v]).try_normalize(1e-300);
+        Line { direction: along.unwrap_or(mesh.frame(v)[0]), agreement: f64::from(along.is_some()) }
+    };
+    levels.gradients().iter().enumerate().map(line).collect()
+}
+
+/// ψ at the vertices whose levels follow feed directions.
+fn along_direction(
+    part: &Part,
+    cutter: &Cutter,
+    direction: &FeedDirection,
+    piece: &Piece,
+    surface: &MeshSurface,
+    settings: &PassSettings,
+    all: &mut Passes,
+) -> Result<Vec<f64>, PlanError> {
+    let refused = |e: MeshFieldError| not_applicable(&e.to_string());
+    let mesh = &surface.mesh;
+    let (lines, matters) = feed_lines(part, cutter, direction, piece, surface, all)?;
+    let widths =
+        |v: usize, b: &Vector3| width_at(cutter, &mesh.normals()[v], b, &surface.bends[v], settings.step);
+    let count = mesh.points().len();
+    let own = |v: usize| surface.origin[v] as usize;
+    let across = |v: usize| mesh.normals()[v].cross(&lines[v].direction);
+    let density: Vec<f64> = (0..count).map(|v| 1.0 / widths(own(v), &across(own(v))).0).collect();
+    let weight: Vec<f64> = (0..count).map(|v| matters[own(v)] + LEAST_WEIGHT).collect();
+    let flows = flows(mesh, &lines, &density, &weight);
+    let stream = solve_stream(mesh, &flows, DIRECTION_WEIGHT, &Held::default()).map_err(refused)?;
+    all.notes.push(format!(
+        "the stream function follows the feed directions within {:.2} degrees (root mean square)",
+        stream.angle_rms.to_degrees()
+    ));
+    Ok(stream.values)
+}
+
+/// Strip width across the feed, and whether it had to be limited.
+pub(crate) fn width_at(cutter: &Cutter, n: &Vector3, b: &Vector3, bend: &Bend, step: Step) -> (f64, bool) {
+    match step {
+        Step::Stepover(width) => (width, false),
+        Step::Scallop(h) => strip_width_at(cutter, n, b, bend.along(b), h),
+    }
+}
+
+/// The smooth, oriented field of feed directions, and how much they matter at each vertex (0 to 1, or to the weight of
+/// samples).
+fn feed_lines(
+    part: &Part,
+    cutter: &Cutter,
+    direction: &FeedDirection,
+    piece: &Piece,
+    surface: &MeshSurface,
+    passes: &mut Passes,
+) -> Result<(Vec<Line>, Vec<f64>), PlanError> {
+    let refused = |e: MeshFieldError| not_applicable(&e.to_string());
+    let mesh = &surface.mesh;
+    let mut wanted = feed::on_mesh(part, cutter, direction, piece, surface).map_err(refused)?;
+    let matters = wanted.iter().map(|w| w.map_or(0.0, |(_, matters)| matters)).collect();
+    // Beyond the border the field goes on as it comes.
+    for v in 0..wanted.len() {
+        if surface.origin[v] as usize != v {
+            wanted[v] = None;
+        }
+    }
+    if wanted.iter().all(Option::is_none) {
+        return Err(feed::nowhere(direction, piece.mesh.points().iter().copied()));
+    }
+    let smoothing = SMOOTHING_OVER_RADIUS * cutter.radius();
+    let mut lines = smooth_lines(mesh, &wanted, &[], smoothing).map_err(refused)?;
+    orient_lines(mesh, &mut lines);
+    planned_field::set_mesh_feed(&mut passes.field, part, cutter, &lines, surface);
+    passes.notes.extend(planned_field::singular_note(&passes.field));
+    Ok((lines, matters))
+}
+
+/// A place of a level curve.
+#[derive(Debug, Clone, Copy)]
+struct Spot {
+    /// On the mesh.
+    at: MeshPoint,
+    /// Plan view of the cutter's axis.
+    axis: Point2,
+    /// What neighbouring passes may do here.
+    allowed: Allowed,
+}
+
+/// A point of a level curve before it is evened out.
+#[derive(Debug, Clone, Copy)]
+struct Knot {
+    /// On the mesh.
+    contact: Point3,
+    axis: Point2,
+    /// Distance along the curve, mm: of the contact or of the axis, whichever moves farther.
+    s: f64,
+    /// In which triangle the stretch after it lies.
+    triangle: u32,
+}
+
+impl Knot {
+    /// The knot after this one, at the next place of contact and axis.
+    fn next(&self, contact: Point3, axis: Point2, triangle: u32) -> Self {
+        let s = self.s + (contact - self.contact).norm().max((axis - self.axis).norm());
+        Self { contact, axis, s, triangle }
+    }
+}
+
+/// Turns level curves on a mesh into passes.
+struct MeshGuide<'a> {
+    surface: &'a MeshSurface,
+    levels: MeshLevels<'a>,
+    cutter: &'a Cutter,
+    drop: DropCutter<'a>,
+    settings: &'a PassSettings<'a>,
+    monitor: &'a dyn Monitor,
+}
+
+impl MeshGuide<'_> {
+    /// What each of the part's own triangles allows.
+    fn places(&self, psi: &[f64]) -> Vec<Place> {
+        let mesh = &self.surface.mesh;
+        let place = |t: usize| {
+            let third = MeshPoint { triangle: t as u32, weights: [1.0 / 3.0; 3], position: Point3::origin() };
+            let (allowed, too_concave) = self.allowed_at(&third)?;
+            let gradient = allowed.step / allowed.width;
+            let mean = mesh.triangles()[t].iter().map(|&v| psi[v as usize]).sum::<f64>() / 3.0;
+            Some(Place { psi: mean, step: allowed.step, length: mesh.area(t) * gradient, too_concave })
+        };
+        (0..self.surface.own_triangles).filter_map(place).collect()
+    }
+
+    fn mixed(&self, p: &MeshPoint, of: &[Vector3]) -> Vector3 {
+        let corners = self.surface.mesh.triangles()[p.triangle as usize];
+        (0..3).map(|k| of[corners[k] as usize] * p.weights[k]).sum()
+    }
+
+    fn normal(&self, p: &MeshPoint) -> Vector3 {
+        let corners = &self.surface.corner_normals[p.triangle as usize];
+        let mixed: Vector3 = (0..3).map(|k| corners[k] * p.weights[k]).sum();
+        mixed.try_normalize(1e-9).unwrap_or_else(Vector3::z)
+    }
+
+    /// Step and width at a point, and whether the surface is too concave there.
+    fn allowed_at(&self, p: &MeshPoint) -> Option<(Allowed, bool)> {
+        let normal = self.normal(p);
+        let gradient = self.mixed(p, self.levels.gradients());
+        let gradient = gradient - normal * normal.dot(&gradient);
+        let across = gradient.try_normalize(1e-300)?;
+        let corners = self.surface.mesh.triangles()[p.triangle as usize];
+        let mut bend = Bend::default();
+        (0..3).for_each(|k| bend.add(&self.surface.bends[corners[k] as usize], p.weights[k]));
+        let (width, too_concave) = width_at(self.cutter, &normal, &across, &bend, self.settings.step);
+        Some((Allowed { step: gradient.norm() * width, width }, too_concave))
+    }
+
+    /// The knots of a curve, less what runs beyond the border without use; nothing when none of it lies
+    /// on the part.
+    fn knots(&self, curve: &MeshCurve) -> Vec<Knot> {
+        let mut knots: Vec<Knot> = Vec::with_capacity(curve.points.len() + 1);
+        // Index of each point's last knot.
+        let mut knot_of = Vec::with_capacity(curve.points.len() + 1);
+        let closing = curve.closed.then(|| curve.points[0]);
+        for p in curve.points.iter().copied().chain(closing) {
+            let axis = |p: &MeshPoint| {
+                Point2::from(p.position.coords.xy() + self.cutter.axis_offset(&self.normal(p)))
+            };
+            // Where the stretch before it ends; at a crease the cutter then rolls over the edge.
+            if let Some(&last) = knots.last() {
+                let end = axis(&self.in_triangle(last.triangle, p.position));
+                knots.push(last.next(p.position, end, last.triangle));
+            }
+            let here = axis(&p);
+            let knot = Knot { contact: p.position, axis: here, s: 0.0, triangle: p.triangle };
+            let knot = knots.last().map_or(knot, |last| last.next(p.position, here, p.triangle));
+            if let Some(last) = knots
+                .last_mut()
+                .filter(|last| (last.axis - here).norm() < SAME_AXIS && last.contact == p.position)
+            {
+                *last = Knot { s: last.s, ..knot };
+            } else {
+                knots.push(knot);
+            }
+            knot_of.push(knots.len() - 1);
+        }
+        // A stretch belongs to the point before it; the last point of an open curve has none.
+        let stretches = &curve.points[..curve.points.len() - usize::from(!curve.closed)];
+        let own = |p: &MeshPoint| (p.triangle as usize) < self.surface.own_triangles;
+        let (Some(first), Some(last)) = (stretches.iter().position(own), stretches.iter().rposition(own))
+        else {
+            return Vec::new();
+        };
+        if curve.closed {
+            return knots;
+        }
+        let (before, after) = (first.checked_sub(1).map(|k| stretches[k]), stretches.get(last + 1));
+        let [start, end] = [
+            knots[knot_of[first]].s - self.overrun(&curve.points[first], before.as_ref()),
+            knots[knot_of[last + 1]].s + self.overrun(&curve.points[last + 1], after),
+        ];
+        let at = |s: f64| {
+            let k = knots.partition_point(|k| k.s <= s).clamp(1, knots.len() - 1);
+            let (a, b) = (&knots[k - 1], &knots[k]);
+            let t = if b.s > a.s { ((s - a.s) / (b.s - a.s)).clamp(0.0, 1.0) } else { 0.0 };
+            let axis = a.axis + (b.axis - a.axis) * t;
+            Knot { contact: a.contact + (b.contact - a.contact) * t, axis, s: s.clamp(a.s, b.s), ..*a }
+        };
+        let mut trimmed = vec![at(start)];
+        trimmed.extend(knots.iter().filter(|k| k.s > start && k.s < end));
+        trimmed.push(at(end));
+        trimmed
+    }
+
+    /// How far a pass that crosses the border at `p` is worth running on, mm; `beyond` is the point
+    /// that begins the stretch beyond the border, if there is one.
+    fn overrun(&self, p: &MeshPoint, beyond: Option<&MeshPoint>) -> f64 {
+        let strip = beyond.and_then(|b| (b.triangle as usize).checked_sub(self.surface.own_triangles));
+        let (Some(border), Some((allowed, _))) =
+            (strip.and_then(|t| self.surface.border.get(t)), self.allowed_at(p))
+        else {
+            return 0.0;
+        };
+        let Some(across) = self.mixed(p, self.levels.gradients()).try_normalize(1e-300) else { return 0.0 };
+        // The feed is square to the gradient, so the angles to the border trade places.
+        let (along, square) = (across.cross(border).norm(), across.dot(border).abs());
+        useful_overrun(along / square.max(1e-9)) * allowed.width
+    }
+
+    /// The curve at even distances, evened out.
+    fn track(&self, curve: &MeshCurve) -> Option<Track<Spot>> {
+        let knots = self.knots(curve);
+        let (from, to) = (knots.first()?.s, knots.last()?.s);
+        if to <= from {
+            return None;
+        }
+        let count =
+            ((to - from) / self.settings.sampling).ceil().max(if curve.closed { 5.0 } else { 1.0 }) as usize;
+        let points = if curve.closed { count } else { count + 1 };
+        let mut k = 0;
+        let mut spots = Vec::with_capacity(points);
+        for n in 0..points {
+            let s = from + (to - from) * n as f64 / count as f64;
+            while k + 2 < knots.len() && knots[k + 1].s < s {
+                k += 1;
+            }
+            let (a, b) = (&knots[k], &knots[k + 1]);
+            let t = if b.s > a.s { ((s - a.s) / (b.s - a.s)).clamp(0.0, 1.0) } else { 0.0 };
+            let contact = a.contact + (b.contact - a.contact) * t;
+            let at = self.in_triangle(a.triangle, contact);
+            let allowed = self.allowed_at(&at).map(|(allowed, _)| allowed);
+            let nowhere = Allowed { step: f64::INFINITY, width: self.settings.sampling };
+            spots.push(Spot {
+                at,
+                axis: a.axis + (b.axis - a.axis) * t,
+                allowed: allowed.unwrap_or(nowhere),
+            });
+        }
+        even_out(&mut spots, curve.closed);
+        Some(Track { points: spots, closed: curve.closed })
+    }
+
+    fn in_triangle(&self, t: u32, position: Point3) -> MeshPoint {
+        let mesh = &self.surface.mesh;
+        let (corners, hats) = (mesh.corners(t as usize), mesh.hat_gradients(t as usize));
+        let weights = [0, 1, 2].map(|k| (1.0 + hats[k].dot(&(position - corners[k]))).clamp(0.0, 1.0));
+        MeshPoint { triangle: t, weights, position }
+    }
+}
+
+/// Takes the wiggle of linear elements out of a curve, within bounds; the ends of open ones stay.
+fn even_out(spots: &mut [Spot], closed: bool) {
+    let n = spots.len();
+    if n < 5 {
+        return;
+    }
+    let before: Vec<Point2> = spots.iter().map(|s| s.axis).collect();
+    for _ in 0..EVENINGS {
+        let old: Vec<Point2> = spots.iter().map(|s| s.axis).collect();
+        let inner = if closed { 0..n } else { 2..n - 2 };
+        for k in inner {
+            let mean: Vector2 = (0..5).map(|j| old[(k + n + j - 2) % n].coords * EVEN[j]).sum();
+            let off = Point2::from(mean) - before[k];
+            let most = MOST_MOVED * spots[k].allowed.width;
+            spots[k].axis = before[k] + off * (most / off.norm().max(most));
+        }
+    }
+}
+
+impl LevelSource for MeshGuide<'_> {
+    type Place = Spot;
+
+    fn curves(&self, level: f64) -> Vec<Track<Spot>> {
+        self.levels.curves(level).iter().filter_map(|curve| self.track(curve)).collect()
+    }
+
+    fn allowed(&self, spot: &Spot) -> Option<Allowed> {
+        Some(spot.allowed)
+    }
+
+    fn contacts(&self, curve: &Track<Spot>, run: Option<[usize; 2]>) -> Vec<Contact> {
+        let contact = |spot: &Spot| {
+            let gradient = self.mixed(&spot.at, self.levels.gradients());
+            let normal = self.normal(&spot.at);
+            let across = (gradient - normal * normal.dot(&gradient)).try_normalize(1e-300)?;
+            let inside = (spot.at.triangle as usize) < self.surface.own_triangles;
+            Some(Contact {
+                at: spot.at.position,
+                across,
+                allowed: spot.allowed.width,
+                inside,
+                parameters: None,
+            })
+        };
+        curve.along(run).filter_map(contact).collect()
+    }
+
+    fn pass(
+        &self,
+        curve: &Track<Spot>,
+        _: f64,
+        run: Option<[usize; 2]>,
+    ) -> Result<Option<Vec<Point3>>, Cancelled> {
+        let mut axes: Vec<Point2> = curve.points.iter().map(|s| s.axis).collect();
+        if curve.closed {
+            axes.push(axes[0]);
+        }
+        let last = axes.len() - 1;
+        let [first, end] = run.map_or([0, last], |[a, b]| [a, if curve.closed { last } else { b }]);
+        if end <= first {
+            return Ok(None);
+        }
+        let before = |k: usize| match k {
+            0 if curve.closed => axes[last - 1],
+            0 => axes[0] + (axes[0] - axes[1]),
+            k => axes[k - 1],
+        };
+        let after = |k: usize| match k {
+            k if k < last => axes[k + 1],
+            _ if curve.closed => axes[1],
+            _ => axes[last] + (axes[last] - axes[last - 1]),
+        };
+        // A smooth curve through the places of the axis (Catmull and Rom 1974).
+        let mut tip = |s: f64| {
+            let k = (s as usize).min(last - 1);
+            let t = s - k as f64;
+            let (p, q) = (axes[k], axes[k + 1]);
+            let (m, l) = ((q - before(k)) * 0.5, (after(k + 1) - p) * 0.5);
+            let d = q - p;
+            let at = p + (m + ((d * 3.0 - m * 2.0 - l) + (m + l - d * 2.0) * t) * t) * t;
+            self.drop.at(at.x, at.y).map(|drop| Point3::new(at.x, at.y, drop.tip_z))
+        };
+        let settings = PassSettings { sampling: 1.0, ..*self.settings };
+        let moves = settings.moves(first as f64, end as f64, &mut tip, self.monitor)?;
+        Ok((moves.len() > 1).then_some(moves))
+    }
+}

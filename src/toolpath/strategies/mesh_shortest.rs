@@ -1,0 +1,172 @@
+//! The stream function with the shortest path on a mesh: as `shortest`, by linear elements.
+
+use std::f64::consts::PI;
+
+use super::mesh_passes::width_at;
+use crate::plan::Step;
+use crate::surface::mesh_surface::MeshSurface;
+use cutter::Cutter;
+use field::mesh::{Bend, gradient_terms};
+use field::{Front, Gradients, Packed, Roughness, Rounds, Site, minimise};
+use geometry::Vector3;
+use work::monitor::{Cancelled, Monitor};
+use work::parallel;
+
+/// Straight passes to start from, over half a turn.
+const STARTS: usize = 6;
+
+/// Intervals are judged by the gradients at vertices, as passes see them; those of triangles count by this share, for the
+/// unevenness that vertices do not see.
+const DAMPING: f64 = 0.2;
+
+/// Where a pass bends by the radius of the cutter, it counts as longer by this share. Less leaves bends, which linear
+/// elements do not mind; on three patches a tenth of it makes passes 1 % shorter that turn by a third more.
+const BEND: f64 = 0.3;
+
+/// The strip beyond borders counts this share of its area: ψ goes on in it as it comes.
+const STRIP_SHARE: f64 = 0.02;
+
+/// ψ at the vertices, and what its passes cost; `None` where no passes can be planned. `toward` has at each vertex a
+/// direction and how much dearer passes square to it are.
+///
+/// # Errors
+/// [`Cancelled`] when the monitor says so.
+pub(crate) fn shortest_stream(
+    surface: &MeshSurface,
+    cutter: &Cutter,
+    step: Step,
+    toward: Option<&[(Vector3, f64)]>,
+    monitor: &dyn Monitor,
+) -> Result<Option<Packed>, Cancelled> {
+    let mesh = &surface.mesh;
+    let (own, count) = (surface.own_triangles, mesh.points().len());
+    let share = |t: usize| if t < own { mesh.area(t) } else { STRIP_SHARE * mesh.area(t) };
+    let mut around = vec![0.0; count];
+    for (t, corners) in mesh.triangles().iter().enumerate() {
+        corners.iter().for_each(|&v| around[v as usize] += share(t) / 3.0);
+    }
+    let place = Place { surface, cutter, step, toward };
+    let sites = parallel::map(count + mesh.triangles().len(), |k| match k.checked_sub(count) {
+        None => place.at_vertex(k, (1.0 - DAMPING) * around[k]),
+        Some(t) => place.on_triangle(t, DAMPING * share(t)),
+    });
+    let recovered = gradient_terms(mesh);
+    let mut gradients = Gradients::new(count);
+    let mut kept = Vec::with_capacity(sites.len());
+    for (k, site) in sites.into_iter().enumerate() {
+        let Some((mut site, [e1, e2])) = site else { continue };
+        let flat = |(v, gradient): (u32, Vector3)| (v, [gradient.dot(&e1), gradient.dot(&e2)]);
+        match k.checked_sub(count) {
+            None => gradients.push(&site, recovered[k].iter().copied().map(flat)),
+            Some(t) => {
+                site.stiff_area = share(t);
+                let hats = mesh.triangles()[t].into_iter().zip(mesh.hat_gradients(t));
+                gradients.push(&site, hats.map(flat));
+            }
+        }
+        kept.push(site);
+    }
+    let area: f64 = kept.iter().map(|site| site.area).sum();
+    let density = kept.iter().map(|site| site.area * site.front.mean_slowness()).sum::<f64>() / area;
+    let roughness = roughness(surface, cutter, density);
+    monitor.start("searching directions", STARTS as u64 + 1);
+    let minimise = |start: Vec<f64>, rounds: Rounds| {
+        let found = minimise(&kept, &gradients, &roughness, start, rounds, monitor);
+        monitor.advance(1);
+        found
+    };
+    let straight = parallel::try_map(STARTS, |k| {
+        let (sin, cos) = (PI * k as f64 / STARTS as f64).sin_cos();
+        let start = mesh.points().iter().map(|p| density * (cos * p.x + sin * p.y)).collect();
+        minimise(start, Rounds::First)
+    })?;
+    let best = straight.into_iter().flatten().min_by(|a, b| a.cost.total_cmp(&b.cost));
+    best.map_or(Ok(None), |best| minimise(best.coefficients, Rounds::Last))
+}
+
+/// About `BEND ∫ r² |∇∇ψ|² dA/|∇ψ|`, from the jumps of the gradient at edges.
+fn roughness(surface: &MeshSurface, cutter: &Cutter, density: f64) -> Roughness {
+    let mesh = &surface.mesh;
+    let mut roughness = Roughness::default();
+    for t in 0..mesh.triangles().len() {
+        for k in 0..3 {
+            let Some(n) = mesh.neighbour(t, k).filter(|&n| n > t) else { continue };
+            let corners = mesh.corners(t);
+            let edge = corners[(k + 1) % 3] - corners[k];
+            let mut terms: Vec<(u32, f64)> = Vec::with_capacity(6);
+            for (t, edge) in [(t, edge), (n, -edge)] {
+                let Some(outward) = edge.cross(&mesh.area_vector(t)).try_normalize(1e-300) else { continue };
+                let hats = mesh.triangles()[t].into_iter().zip(mesh.hat_gradients(t));
+                terms.extend(hats.map(|(v, gradient)| (v, gradient.dot(&outward))));
+            }
+            // A jump over the edge's share of both triangles, whose thirds are about as wide as the edge's distance from
+            // their middles.
+            let area = (mesh.area(t) + mesh.area(n)) / 3.0;
+            let weight = BEND * cutter.radius().powi(2) / density * edge.norm_squared() / area;
+            roughness.push(weight, terms);
+        }
+    }
+    roughness
+}
+
+/// What passes may do and cost at places of a surface.
+struct Place<'a> {
+    surface: &'a MeshSurface,
+    cutter: &'a Cutter,
+    step: Step,
+    toward: Option<&'a [(Vector3, f64)]>,
+}
+
+impl Place<'_> {
+    fn at_vertex(&self, v: usize, area: f64) -> Option<(Site, [Vector3; 2])> {
+        let surface = self.surface;
+        let bend = &surface.bends[surface.origin[v] as usize];
+        self.site(&surface.mesh.normals()[v], surface.mesh.frame(v), bend, v, area)
+    }
+
+    fn on_triangle(&self, t: usize, area: f64) -> Option<(Site, [Vector3; 2])> {
+        let mesh = &self.surface.mesh;
+        let normal = mesh.area_vector(t).try_normalize(1e-300)?;
+        let [a, b, _] = mesh.corners(t);
+        let e1 = (b - a).try_normalize(1e-300)?;
+        let mut bend = Bend::default();
+        for v in mesh.triangles()[t] {
+            bend.add(&self.surface.bends[self.surface.origin[v as usize] as usize], 1.0 / 3.0);
+        }
+        self.site(&normal, [e1, normal.cross(&e1)], &bend, mesh.triangles()[t][0] as usize, area)
+    }
+
+    /// With the direction wanted at a vertex; and the two tangents that its components are of.
+    fn site(
+        &self,
+        normal: &Vector3,
+        [e1, e2]: [Vector3; 2],
+        bend: &Bend,
+        vertex: usize,
+        area: f64,
+    ) -> Option<(Site, [Vector3; 2])> {
+        let width = |[x, y]: [f64; 2]| width_at(self.cutter, normal, &(e1 * x + e2 * y), bend, self.step).0;
+        let front = Front::new((1.0, 0.0, 1.0), width)?;
+        // Across the passes at three angles; the feed is square to them.
+        let costs = [0, 1, 2].map(|k| {
+            let (sin, cos) = (PI * f64::from(k) / 3.0).sin_cos();
+            let feed = e2 * cos - e1 * sin;
+            let away = self.toward.map_or(0.0, |toward| {
+                let (direction, dearer) = toward[vertex];
+                dearer * (1.0 - feed.dot(&direction).powi(2))
+            });
+            1.0 - bend.along(&feed) * self.cutter.corner_radius() + away
+        });
+        Some((
+            Site {
+                area,
+                stiff_area: 0.0,
+                front,
+                cost: Site::harmonic(costs),
+                turning: [0.0; 3],
+                border: None,
+            },
+            [e1, e2],
+        ))
+    }
+}

@@ -1,0 +1,88 @@
+//! Waterline passes: curves on which the cutter keeps its height.
+//!
+//! The height of the tip while the cutter touches the chart is a scalar function of the parameters; its level curves are
+//! the contours of the part's offset surface. Heights are placed either a constant step apart or by the slope; where the
+//! part is flatter than the steps serve, further passes follow contours halfway between. The cutter is dropped on the part
+//! along each, so that other places of the part hold it off.
+//!
+//! Limits: level ground has no contours; how much of the part is too level for the passes is said in a note.
+
+use crate::levels::level_passes::along_levels_placed;
+use crate::levels::spacing::{Placing, level_tangent};
+use crate::plan::{PassSettings, Passes, PlanError};
+use crate::surface::chart::Chart;
+use cutter::Cutter;
+use field::{GridField, ScalarField, surface_gradient_length};
+use part::Part;
+use work::monitor::Monitor;
+
+/// Cells a side on which heights are sampled. The contours between nodes err with the third power of a cell.
+const CELLS: usize = 240;
+
+/// A part whose cutter heights span less than this, mm, has no contours worth following.
+const LEAST_SPAN: f64 = 1e-3;
+
+/// Places a side at which the slope is compared with the passes.
+const SLOPE_SAMPLES: usize = 120;
+
+/// Contours closer together than this share of what the mean slope asks for are not reached by halving: the place counts
+/// as level.
+const LEVEL_SHARE: f64 = 1.0 / 64.0;
+
+/// Plans passes along contours.
+pub fn passes(
+    part: &Part,
+    cutter: &Cutter,
+    placing: Placing,
+    settings: &PassSettings,
+    monitor: &dyn Monitor,
+) -> Result<Passes, PlanError> {
+    let mut all = Passes::default();
+    for chart in Chart::all(part, cutter, settings.axis)? {
+        let field = ScalarField::Grid(heights(&chart, cutter)?);
+        let level = level_share(&chart, cutter, &field, settings);
+        all.append(along_levels_placed(part, cutter, &chart, &field, placing, settings, monitor)?);
+        if level > 0.0 {
+            all.notes.push(format!(
+                "{:.1} % of the surface are so level that contours hardly cover them; another strategy suits them better",
+                100.0 * level
+            ));
+        }
+    }
+    Ok(all)
+}
+
+/// Height of the tip over the chart.
+fn heights(chart: &Chart, cutter: &Cutter) -> Result<GridField, PlanError> {
+    let field = chart.sampled(CELLS, "waterline", |u, v| {
+        // Where the parametrisation is degenerate the surface's own height serves.
+        let Some(p) = chart.at(u, v) else { return chart.jet(u, v).p.z };
+        let reach = cutter.axis_offset(&p.normal).norm();
+        p.jet.p.z - cutter.height(reach.min(cutter.radius())).unwrap_or(0.0)
+    })?;
+    let nodes = (0..=CELLS).flat_map(|j| (0..=CELLS).map(move |i| (i, j))).map(|(i, j)| field.node(i, j));
+    let [low, high] = nodes.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], z| [lo.min(z), hi.max(z)]);
+    if high - low < LEAST_SPAN {
+        let reason = "it is level, so that there are no contours; zigzag suits it".to_owned();
+        return Err(PlanError::NotApplicable { strategy: "waterline", reason });
+    }
+    Ok(field)
+}
+
+/// Share of the chart's area on which the step of height that a strip allows is less than [`LEVEL_SHARE`] of the mean one.
+fn level_share(chart: &Chart, cutter: &Cutter, field: &ScalarField, settings: &PassSettings) -> f64 {
+    let place = |[u, v]: [f64; 2]| {
+        let p = chart.at(u, v)?;
+        let (e, f, g) = p.jet.first_form();
+        let [_, z_u, z_v] = field.value_and_gradient(u, v);
+        let gradient = surface_gradient_length((e, f, g), z_u, z_v);
+        let t = level_tangent(&p, field, [u, v]);
+        let width = t.map_or(0.0, |t| p.strip_width(cutter, &t, settings.step).0);
+        Some((width * gradient, (e * g - f * f).max(0.0).sqrt()))
+    };
+    let places: Vec<(f64, f64)> = chart.grid(SLOPE_SAMPLES).filter_map(place).collect();
+    let area: f64 = places.iter().map(|(_, area)| area).sum();
+    let mean = places.iter().map(|(step, area)| step * area).sum::<f64>() / area;
+    let level: f64 = places.iter().filter(|(step, _)| *step < LEVEL_SHARE * mean).map(|(_, area)| area).sum();
+    level / area
+}

@@ -1,0 +1,210 @@
+//! Zigzag: passes in parallel vertical planes, the cutter dropped on the part along each.
+//!
+//! One stepover serves the whole part, so it is that of the worst place. Passes a plan-view
+//! distance Δ apart lie `Δ/√(1 − (n·e)²)` apart on the surface of the cutter's centres, `e` the
+//! plan direction across the feed; that surface is the part's offset, where lengths across the
+//! feed are `1 − κ r` times those on the part.
+
+use crate::Step;
+use crate::drop::DropCutter;
+use crate::levels::level_passes::along_levels_placed;
+use crate::levels::spacing::Placing;
+use crate::plan::{PassSettings, Passes, PlanError};
+use crate::surface::border::Border;
+use crate::surface::chart::{Chart, ChartPoint};
+use crate::surface::plan_curve::PlanCurves;
+use cutter::Cutter;
+use field::ScalarField;
+use geometry::Vector2;
+use part::Part;
+use work::monitor;
+use work::monitor::Monitor;
+
+/// The stepover is never planned below this share of that on a horizontal plane: a steep wall
+/// would otherwise ask for endless passes over the whole part. What is left there is measured.
+const LEAST_OVER_PLANE: f64 = 0.1;
+
+/// Places a side of each chart at which the stepover is computed.
+const STEPOVER_SAMPLES: usize = 160;
+
+/// Angles over half a turn whose length is predicted. Between two of them a length changes by a few per cent at most.
+const ANGLES: usize = 36;
+
+/// Cells a side on which the plan coordinate of a patch is sampled.
+const CELLS: usize = 240;
+
+/// How many of the angles with the least predicted length are planned; the prediction errs by a few per cent.
+const PLANNED: usize = 3;
+
+/// Plans passes in the direction `angle` (rad from x).
+pub fn passes(
+    part: &Part,
+    cutter: &Cutter,
+    angle: f64,
+    settings: &PassSettings,
+    monitor: &dyn Monitor,
+) -> Result<Passes, PlanError> {
+    let charts = Chart::all(part, cutter, settings.axis)?;
+    let mut notes = Vec::new();
+    let dropped = settings.dropped(cutter);
+    let stepover = match settings.step {
+        Step::Stepover(s) => s,
+        Step::Scallop(h) => safe_stepover(&charts, [cutter, dropped], angle, h, &mut notes),
+    };
+    let (along, across) = (Vector2::new(angle.cos(), angle.sin()), Vector2::new(-angle.sin(), angle.cos()));
+    let extent = |e: &Vector2| Chart::extent_of_axes(&charts, part, dropped, e);
+    let (from_to, sides) = (extent(&along), extent(&across));
+    let count = ((sides[1] - sides[0]) / stepover - 1e-9).ceil().max(1.0) as usize;
+    // A stepover that the user asked for is kept exactly, and the passes stand in the middle.
+    let pitch = match settings.step {
+        Step::Stepover(s) => s,
+        Step::Scallop(_) => (sides[1] - sides[0]) / count as f64,
+    };
+    let middle = 0.5 * (sides[0] + sides[1]);
+    let (drop, border) = (DropCutter::new(part, dropped), Border::of(part));
+    let curves = PlanCurves { drop, border, cutter: dropped, overrun: pitch, settings, monitor };
+    monitor.start("planning zigzag", count as u64);
+    let lines = work::parallel::try_map(count, |k| {
+        monitor::check(monitor)?;
+        let offset = middle + (k as f64 - 0.5 * (count as f64 - 1.0)) * pitch;
+        let line = |s: f64| along * s + across * offset;
+        let pieces = curves.pieces(&line, [from_to[0] - pitch, from_to[1] + pitch])?;
+        monitor.advance(1);
+        Ok::<_, PlanError>(pieces)
+    })?;
+    Ok(Passes { passes: lines.into_iter().flatten().collect(), notes, ..Passes::default() })
+}
+
+/// Plans passes of a tilted cutter: its contacts stand in parallel vertical planes, one distance apart on each patch.
+pub fn on_levels(
+    part: &Part,
+    cutter: &Cutter,
+    angle: f64,
+    settings: &PassSettings,
+    monitor: &dyn Monitor,
+) -> Result<Passes, PlanError> {
+    let across = Vector2::new(-angle.sin(), angle.cos());
+    let mut all = Passes::default();
+    for chart in Chart::all(part, cutter, settings.axis)? {
+        let field = chart.sampled(CELLS, "zigzag", |u, v| chart.jet(u, v).p.coords.xy().dot(&across))?;
+        let field = ScalarField::Grid(field);
+        all.append(along_levels_placed(part, cutter, &chart, &field, Placing::OneStep, settings, monitor)?);
+    }
+    Ok(all)
+}
+
+/// Plans passes in the direction with the shortest path. Angles over half a turn are compared by the predicted length
+/// (surface along the feed over the stepover), and the best are planned.
+pub fn best(
+    part: &Part,
+    cutter: &Cutter,
+    settings: &PassSettings,
+    monitor: &dyn Monitor,
+) -> Result<Passes, PlanError> {
+    let charts = Chart::all(part, cutter, settings.axis)?;
+    let places = places(&charts);
+    let angle = |k: usize| std::f64::consts::PI * k as f64 / ANGLES as f64;
+    let dropped = settings.dropped(cutter);
+    let mut predicted: Vec<(f64, usize)> = work::parallel::map(ANGLES, |k| {
+        let stepover = match settings.step {
+            Step::Stepover(s) => s,
+            Step::Scallop(h) => {
+                let least = least_stepover(&places, [cutter, dropped], angle(k), h);
+                if least.is_finite() {
+                    least.max(least_over_plane(cutter, h))
+                } else {
+                    least_over_plane(cutter, h)
+                }
+            }
+        };
+        let covered = places.iter().filter_map(|(p, area)| {
+            // The way of the corner's centre over one place: its length along the feed, and its width in the plan view.
+            let t = p.tangent_at(angle(k))?;
+            let e = Vector2::new(-angle(k).sin(), angle(k).cos());
+            let b = p.normal.cross(&t);
+            let (along, across) = (p.offset_ratio(dropped, &t), p.offset_ratio(dropped, &b));
+            Some(area * along * across * b.xy().dot(&e).abs())
+        });
+        (covered.sum::<f64>() / stepover, k)
+    });
+    predicted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut planned = Vec::new();
+    for &(_, k) in &predicted[..PLANNED] {
+        monitor::check(monitor)?;
+        planned.push((passes(part, cutter, angle(k), settings, monitor)?, k));
+    }
+    let lengths: Vec<f64> = planned.iter().map(|(passes, _)| passes.length()).collect();
+    let shortest = (0..lengths.len()).min_by(|&a, &b| lengths[a].total_cmp(&lengths[b])).unwrap_or(0);
+    let (mut best, k) = planned.swap_remove(shortest);
+    best.notes.push(format!(
+        "{:.0} degrees is the best angle of {ANGLES}: {:.0} mm of passes planned ({:.0} predicted; {:.0} at the worst angle)",
+        angle(k).to_degrees(),
+        lengths[shortest],
+        predicted.iter().find(|p| p.1 == k).map_or(0.0, |p| p.0),
+        predicted[ANGLES - 1].0
+    ));
+    Ok(best)
+}
+
+/// Points of all charts, and the area that each stands for, mm².
+fn places<'a>(charts: &[Chart<'a>]) -> Vec<(ChartPoint<'a>, f64)> {
+    let of = |chart: &Chart<'a>| {
+        let [[u0, u1], [v0, v1]] = chart.domain;
+        let cell = (u1 - u0) * (v1 - v0) / (STEPOVER_SAMPLES * STEPOVER_SAMPLES) as f64;
+        let point = |[u, v]: [f64; 2]| {
+            let p = chart.at(u, v)?;
+            let (e, f, g) = p.jet.first_form();
+            Some((p, cell * (e * g - f * f).max(0.0).sqrt()))
+        };
+        chart.grid(STEPOVER_SAMPLES).filter_map(point).collect::<Vec<_>>()
+    };
+    charts.iter().flat_map(of).collect()
+}
+
+/// The least stepover ever planned, mm.
+pub(crate) fn least_over_plane(cutter: &Cutter, h: f64) -> f64 {
+    LEAST_OVER_PLANE * (8.0 * h * cutter.radius()).sqrt()
+}
+
+/// The plan-view stepover, mm, that a place allows for passes in the direction `angle`; `None` where none is asked for,
+/// since the cutter hardly fits: one pass serves the whole hollow, though the formula asks for ever closer ones. Of both
+/// cutters the first one cuts, the second one is dropped.
+pub(crate) fn stepover_at(
+    p: &ChartPoint,
+    [cutter, dropped]: [&Cutter; 2],
+    angle: f64,
+    h: f64,
+) -> Option<f64> {
+    let e = Vector2::new(-angle.sin(), angle.cos());
+    let t = p.tangent_at(angle)?;
+    let (width, too_concave) = p.strip_width(cutter, &t, Step::Scallop(h));
+    let bend = 1.0 - p.curvature_along(&p.normal.cross(&t)) * dropped.corner_radius();
+    let lean = (1.0 - p.normal.xy().dot(&e).powi(2)).max(0.0).sqrt();
+    (bend > 0.0 && !too_concave).then_some(width * bend * lean)
+}
+
+fn least_stepover(places: &[(ChartPoint, f64)], cutters: [&Cutter; 2], angle: f64, h: f64) -> f64 {
+    places.iter().filter_map(|(p, _)| stepover_at(p, cutters, angle, h)).fold(f64::INFINITY, f64::min)
+}
+
+/// The greatest stepover that keeps the scallop everywhere.
+fn safe_stepover(
+    charts: &[Chart],
+    cutters: [&Cutter; 2],
+    angle: f64,
+    h: f64,
+    notes: &mut Vec<String>,
+) -> f64 {
+    let least = least_stepover(&places(charts), cutters, angle, h);
+    let floor = least_over_plane(cutters[0], h);
+    if least.is_finite() && least >= floor {
+        return least;
+    }
+    notes.push(format!(
+        "the steepest places would need a stepover of {:.4} mm; {floor:.4} mm is used, and scallops there may exceed the \
+         target (another angle, or a streamline path, helps)",
+        if least.is_finite() { least } else { 0.0 },
+    ));
+    floor
+}
+// x

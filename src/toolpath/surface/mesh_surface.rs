@@ -1,0 +1,363 @@
+//! The part as planners on a mesh see it: one surface over all patches or facets, with its normals and
+//! curvature, less what the cutter cannot reach from above, and a strip beyond its borders.
+//!
+//! Patches are sewn together along common borders and asked for their exact normals and curvature; on a
+//! mesh both are fitted to the vertices of each smooth sheet. Heights of cutter locations come from
+//! dropping the cutter on the part itself, as always.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use crate::plan::PlanError;
+use cutter::Cutter;
+use field::mesh::{Bend, FieldMesh, MeshFieldError, Refined, Sheets, weld};
+use geometry::{Point3, Vector3};
+use part::Part;
+
+/// Edges of the mesh that carries the fields are at most this share of the cutter's radius. Longer ones
+/// smooth what the cutter feels; shorter ones cost time as their inverse square.
+const EDGE_OVER_RADIUS: f64 = 0.25;
+
+/// Edges are longer than that where a part would take more triangles than this.
+const MOST_TRIANGLES: f64 = 400_000.0;
+
+/// Curvature on a mesh is that of the vertices within this share of the cutter's radius.
+const FIT_OVER_RADIUS: f64 = 0.5;
+
+/// Borders of patches nearer than this many times the tessellation's deviation are one. Twice the
+/// deviation lies between two tessellations of the same curve; models leave gaps as well.
+const WELD_OVER_DEVIATION: f64 = 4.0;
+
+/// Steeper places than this, from the level, are left to strategies that go down walls, as the cosine
+/// (80°): passes along the surface would lie nearly on top of each other in the plan view.
+const STEEPEST_COSINE: f64 = 0.173_648;
+
+/// A place is covered where the part stands over it by more than this share of the cutter's radius.
+const COVERED_OVER_RADIUS: f64 = 0.01;
+
+/// Triangles that meet at a sharper angle than this have a crease between them, as its cosine (30°).
+const CREASE_COSINE: f64 = 0.866;
+
+/// A mesh has steps when its creases are longer together than this many radii of the cutter: fewer are
+/// the slips of a tessellation.
+const CREASES_OVER_RADIUS: f64 = 2.0;
+
+/// Beside a sharp edge the surface counts as this many times as convex as the cutter, falling to nothing
+/// [`SHARPENED_INTERVALS`] away from it: half an interval away it is three times, which halves the interval.
+const SHARPENED_OVER_CUTTER: f64 = 4.5;
+/// See [`SHARPENED_OVER_CUTTER`].
+const SHARPENED_INTERVALS: f64 = 1.5;
+
+/// Triangles of a tessellation lower than this many times its deviation do not tell of creases.
+const LEAST_HEIGHT_OVER_DEVIATION: f64 = 10.0;
+
+/// A strip's outer corner is at most this many widths away from the border's.
+const LONGEST_MITER: f64 = 2.0;
+
+/// The surface that fields stand on, with a strip beyond its borders.
+pub(crate) struct MeshSurface {
+    /// All triangles, those of the strip last.
+    pub mesh: FieldMesh,
+    /// Curvature at the vertices.
+    pub bends: Vec<Bend>,
+    /// Normals at the corners of each triangle, of its own side of any crease.
+    pub corner_normals: Vec<[Vector3; 3]>,
+    /// Triangles before this one are the part's own.
+    pub own_triangles: usize,
+    /// For every vertex of the strip the vertex of the part that it continues; itself for those of
+    /// the part.
+    pub origin: Vec<u32>,
+    /// Direction of the border at each triangle of the strip.
+    pub border: Vec<Vector3>,
+}
+
+/// A connected piece of a surface.
+pub(crate) struct Piece {
+    /// Its triangles, with the mean normals at vertices.
+    pub mesh: FieldMesh,
+    /// Curvature at the vertices.
+    pub bends: Vec<Bend>,
+    /// Normals at the corners of each triangle, of its own side of any crease.
+    pub corner_normals: Vec<[Vector3; 3]>,
+}
+
+/// What of a part can be planned from above, and what cannot.
+pub(crate) struct Reachable {
+    /// Connected pieces.
+    pub pieces: Vec<Piece>,
+    /// Area that is too steep, mm².
+    pub steep_area: f64,
+}
+
+/// True where a part is better planned on its mesh: several patches, which charts would plan one by one
+/// with seams between them; a mesh with holes or in pieces, over which a height surface would go on in
+/// the air; a mesh with sharp creases, which a height surface rounds over half a radius each way.
+pub(crate) fn wants_mesh(part: &Part, cutter: &Cutter) -> bool {
+    if !part.patches().is_empty() {
+        return part.patches().len() > 1;
+    }
+    let mesh = part.mesh();
+    let up: Vec<bool> = (0..mesh.triangles().len()).map(|t| mesh.normal(t).z > STEEPEST_COSINE).collect();
+    let mut creases = 0.0;
+    for t in (0..up.len()).filter(|&t| up[t]) {
+        for k in 0..3 {
+            if let Some(n) = mesh
+                .neighbour(t, k)
+                .filter(|&n| !up[n] || mesh.normal(t).dot(&mesh.normal(n)) < CREASE_COSINE)
+            {
+                let corners = mesh.corners(t);
+                creases += (corners[(k + 1) % 3] - corners[k]).norm() * if up[n] { 0.5 } else { 1.0 };
+            }
+        }
+    }
+    let facing: Vec<[u32; 3]> = (0..up.len()).filter(|&t| up[t]).map(|t| mesh.triangles()[t]).collect();
+    let holes = compacted(mesh.vertices(), &facing, None).is_ok_and(|(m, _)| m.loops().len() > 1);
+    holes || creases > CREASES_OVER_RADIUS * cutter.radius()
+}
+
+/// Everything of a part that passes along the surface can reach; `interval` (mm) is their distance on
+/// level ground.
+///
+/// # Errors
+/// When the part's triangles do not make a surface, or nothing of it faces up.
+pub(crate) fn reachable(part: &Part, cutter: &Cutter, interval: f64) -> Result<Reachable, PlanError> {
+    let refused = |e: MeshFieldError| not_applicable(&e.to_string());
+    let mesh = part.mesh();
+    let (points, triangles) = if part.patches().len() > 1 {
+        weld(mesh.vertices(), mesh.triangles(), WELD_OVER_DEVIATION * part.mesh_deviation())
+    } else {
+        (mesh.vertices().to_vec(), mesh.triangles().to_vec())
+    };
+    let whole = FieldMesh::new(points, triangles, None).map_err(refused)?;
+    let area: f64 = (0..whole.triangles().len()).map(|t| whole.area(t)).sum();
+    // An equilateral triangle of edge l has 0.43 l², those of a split mesh about half of it.
+    let edge = (EDGE_OVER_RADIUS * cutter.radius()).max((area / (0.22 * MOST_TRIANGLES)).sqrt());
+    let sheets = Sheets::of(&whole, FIT_OVER_RADIUS * cutter.radius());
+    let mut refined =
+        Refined { points: whole.points().to_vec(), triangles: whole.triangles().to_vec(), sheets };
+    refined.refine(edge).map_err(refused)?;
+    let (mut normals, mut bends) = refined.at_points();
+    if !part.patches().is_empty() {
+        exact(part, &refined.points, &mut normals, &mut bends);
+    }
+    let creases = refined.creases(LEAST_HEIGHT_OVER_DEVIATION * part.mesh_deviation());
+    let corner_normals = refined.corner_normals(&normals, &creases);
+    sharpen(&refined, &creases, &normals, &mut bends, cutter, interval);
+    let highest_above = COVERED_OVER_RADIUS * cutter.radius() + 2.0 * part.mesh_deviation();
+    let state = work::parallel::map(refined.triangles.len(), |t| {
+        let [a, b, c] = refined.triangles[t].map(|i| refined.points[i as usize]);
+        let normal = (b - a).cross(&(c - a));
+        let centre = (a.coords + b.coords + c.coords) / 3.0;
+        let slope = normal.z / normal.norm();
+        if slope <= 0.0 {
+            return State::Below;
+        }
+        let roof = part.bvh().highest_at(part.mesh(), centre.x, centre.y);
+        match roof {
+            Some(hit) if hit.z > centre.z + highest_above => State::Below,
+            _ if slope < STEEPEST_COSINE => State::Steep(0.5 * normal.norm()),
+            _ => State::Open,
+        }
+    });
+    let steep_area = state.iter().map(|s| if let State::Steep(area) = s { *area } else { 0.0 }).sum();
+    let kept: Vec<usize> = (0..state.len()).filter(|&t| matches!(state[t], State::Open)).collect();
+    let open: Vec<[u32; 3]> = kept.iter().map(|&t| refined.triangles[t]).collect();
+    let corner_normals: Vec<[Vector3; 3]> = kept.iter().map(|&t| corner_normals[t]).collect();
+    if open.is_empty() {
+        return Err(not_applicable("no part of it faces up at less than 80 degrees"));
+    }
+    let (all, kept) = compacted(&refined.points, &open, Some(&normals)).map_err(refused)?;
+    let bends: Vec<Bend> = kept.iter().map(|&v| bends[v as usize]).collect();
+    let (piece, count) = all.pieces();
+    let mut of_piece: Vec<Vec<usize>> = vec![Vec::new(); count];
+    for (t, corners) in all.triangles().iter().enumerate() {
+        of_piece[piece[corners[0] as usize] as usize].push(t);
+    }
+    let pieces = of_piece
+        .iter()
+        .map(|own| {
+            let triangles: Vec<[u32; 3]> = own.iter().map(|&t| all.triangles()[t]).collect();
+            let (mesh, kept) = compacted(all.points(), &triangles, Some(all.normals()))?;
+            Ok(Piece {
+                mesh,
+                bends: kept.iter().map(|&v| bends[v as usize]).collect(),
+                corner_normals: own.iter().map(|&t| corner_normals[t]).collect(),
+            })
+        })
+        .collect::<Result<Vec<_>, MeshFieldError>>()
+        .map_err(refused)?;
+    Ok(Reachable { pieces, steep_area })
+}
+
+/// Gives sharp edges the curvature that halves the interval across them. Passes on both sides of an edge
+/// do not reach over it: each has to leave no more than the scallop up to the edge, so the last of them
+/// must be within half an interval of it, wherever the other one is.
+fn sharpen(
+    refined: &Refined,
+    creases: &[([u32; 2], bool)],
+    normals: &[Vector3],
+    bends: &mut [Bend],
+    cutter: &Cutter,
+    interval: f64,
+) {
+    let mut edge_at: Vec<Option<Vector3>> = vec![None; normals.len()];
+    let mut open = BinaryHeap::new();
+    for ([a, b], _) in creases.iter().filter(|c| c.1) {
+        let (a, b) = (*a, *b);
+        let along = refined.points[b as usize] - refined.points[a as usize];
+        for v in [a, b] {
+            edge_at[v as usize] = Some(along);
+            open.push((Reverse(0u64), v, v));
+        }
+    }
+    if open.is_empty() {
+        return;
+    }
+    let mut next: Vec<Vec<u32>> = vec![Vec::new(); normals.len()];
+    for t in &refined.triangles {
+        for k in 0..3 {
+            next[t[k] as usize].push(t[(k + 1) % 3]);
+            next[t[(k + 1) % 3] as usize].push(t[k]);
+        }
+    }
+    let reach = SHARPENED_INTERVALS * interval;
+    let mut done = vec![false; normals.len()];
+    // Distances are not negative, so that their bits are in their order.
+    while let Some((Reverse(bits), v, from)) = open.pop() {
+        if std::mem::replace(&mut done[v as usize], true) {
+            continue;
+        }
+        let distance = f64::from_bits(bits);
+        let Some(along) = edge_at[from as usize] else { continue };
+        let across = normals[v as usize].cross(&along).try_normalize(0.0);
+        let curvature = -SHARPENED_OVER_CUTTER / cutter.radius() * (1.0 - distance / reach);
+        if let Some(across) = across {
+            bends[v as usize].add(&Bend::new(&across, &across, [curvature, 0.0, 0.0]), 1.0);
+        }
+        for &w in &next[v as usize] {
+            let distance = distance + (refined.points[w as usize] - refined.points[v as usize]).norm();
+            if distance < reach && !done[w as usize] {
+                open.push((Reverse(distance.to_bits()), w, from));
+            }
+        }
+    }
+}
+
+/// What can be done about a triangle from above.
+#[derive(Clone, Copy)]
+enum State {
+    Open,
+    Steep(f64),
+    Below,
+}
+
+/// Exact normals and curvature from the patches.
+fn exact(part: &Part, points: &[Point3], normals: &mut [Vector3], bends: &mut [Bend]) {
+    let found = work::parallel::map(points.len(), |v| {
+        let (foot, _) = part.closest_point(&points[v]);
+        let at = foot.at?;
+        let bend =
+            part.curvature(at).map(|k| Bend::new(&k.min_direction, &k.max_direction, [k.min, 0.0, k.max]));
+        Some((foot.normal, bend))
+    });
+    for (v, found) in found.into_iter().enumerate() {
+        if let Some((normal, bend)) = found {
+            normals[v] = normal;
+            bends[v] = bend.unwrap_or(bends[v]);
+        }
+    }
+}
+
+/// A mesh of some of the triangles over points, and for each of its vertices the point it is.
+fn compacted(
+    points: &[Point3],
+    triangles: &[[u32; 3]],
+    normals: Option<&[Vector3]>,
+) -> Result<(FieldMesh, Vec<u32>), MeshFieldError> {
+    let mut number = vec![u32::MAX; points.len()];
+    let mut kept: Vec<u32> = Vec::new();
+    let mut own = triangles.to_vec();
+    for v in own.iter_mut().flatten() {
+        if number[*v as usize] == u32::MAX {
+            number[*v as usize] = kept.len() as u32;
+            kept.push(*v);
+        }
+        *v = number[*v as usize];
+    }
+    let places = kept.iter().map(|&v| points[v as usize]).collect();
+    let normals = normals.map(|n| kept.iter().map(|&v| n[v as usize]).collect());
+    Ok((FieldMesh::new(places, own, normals)?, kept))
+}
+
+impl MeshSurface {
+    /// A piece and a strip of the given width (mm) beyond its borders, in the surface's tangent planes:
+    /// passes outside the border serve the strip inside it.
+    ///
+    /// # Errors
+    /// When strip and piece do not make a surface.
+    pub fn with_margin(piece: &Piece, width: f64) -> Result<Self, PlanError> {
+        let Piece { mesh: piece, bends, corner_normals } = piece;
+        let mut corner_normals = corner_normals.clone();
+        let (mut points, mut triangles) = (piece.points().to_vec(), piece.triangles().to_vec());
+        let (mut normals, mut bends) = (piece.normals().to_vec(), bends.clone());
+        let mut origin: Vec<u32> = (0..points.len() as u32).collect();
+        let mut border = Vec::new();
+        for ring in piece.loops() {
+            let n = ring.len();
+            let at = |k: usize| piece.points()[ring[k % n] as usize];
+            // The surface lies to the left of each border edge, so out is to the right.
+            let out = |k: usize| {
+                let normal = &piece.normals()[ring[k % n] as usize];
+                (at(k + 1) - at(k)).cross(normal).try_normalize(0.0).unwrap_or_else(Vector3::zeros)
+            };
+            let outer: Vec<(Point3, Vector3)> = (0..n)
+                .map(|k| {
+                    let (before, after) = (out(k + n - 1), out(k));
+                    let middle = (before + after).try_normalize(1e-6).unwrap_or(after);
+                    let miter = (1.0 / middle.dot(&after).max(1e-6)).min(LONGEST_MITER);
+                    (at(k) + middle * (width * miter), middle)
+                })
+                .collect();
+            // Only what lies flat beside the border: where a border turns in more sharply than the strip
+            // is wide, the strip is left out.
+            let sound = |t: [Point3; 3], normal: &Vector3| {
+                let double = (t[1] - t[0]).cross(&(t[2] - t[0]));
+                let longest = (t[1] - t[0]).norm().max((t[2] - t[1]).norm()).max((t[0] - t[2]).norm());
+                double.dot(normal) > 1e-3 * width.min(longest) * longest
+            };
+            let mut number = vec![u32::MAX; n];
+            for k in 0..n {
+                let l = (k + 1) % n;
+                let (a, b) = (ring[k], ring[l]);
+                let normal = &piece.normals()[a as usize];
+                let (p, q) = (outer[k].0, outer[l].0);
+                if !sound([at(l), at(k), p], normal) || !sound([at(l), p, q], normal) {
+                    continue;
+                }
+                for m in [k, l] {
+                    if number[m] == u32::MAX {
+                        let v = ring[m] as usize;
+                        number[m] = points.len() as u32;
+                        points.push(outer[m].0);
+                        normals.push(piece.normals()[v]);
+                        bends.push(bends[v]);
+                        origin.push(v as u32);
+                    }
+                }
+                triangles.extend([[b, a, number[k]], [b, number[k], number[l]]]);
+                let [from, to] = [a, b].map(|v| piece.normals()[v as usize]);
+                corner_normals.extend([[to, from, from], [to, from, to]]);
+                let along = (at(l) - at(k)).normalize();
+                border.extend([along, along]);
+            }
+        }
+        let own_triangles = piece.triangles().len();
+        let mesh =
+            FieldMesh::new(points, triangles, Some(normals)).map_err(|e| not_applicable(&e.to_string()))?;
+        Ok(Self { mesh, bends, corner_normals, own_triangles, origin, border })
+    }
+}
+
+pub(crate) fn not_applicable(reason: &str) -> PlanError {
+    PlanError::NotApplicable { strategy: "streamline", reason: reason.to_owned() }
+}

@@ -1,0 +1,172 @@
+//! Curves of the plan view as passes: the cutter dropped on the part along each.
+//!
+//! Enters: a curve `s → (x, y)` of the cutter's axis, about one mm a unit. Leaves: tip positions of the runs on which the
+//! cutter touches surface, and rolls over the part's border no farther than is of use.
+
+use super::border::Border;
+use crate::drop::{Drop, DropCutter};
+use crate::moves::chord::Watch;
+use crate::plan::PassSettings;
+use cutter::Cutter;
+use geometry::{Point3, Vector2};
+use work::monitor::{Cancelled, Monitor};
+
+/// How closely the end of a pass is placed, mm. A pointed cutter has dropped by as much of it as its point is steep,
+/// and the pass runs straight to there.
+const END_PRECISION: f64 = 1e-9;
+
+/// Shorter stretches are left out, mm.
+const LEAST_STRETCH: f64 = 1e-6;
+
+/// First sampling distance of rolls as a share of that on surface.
+const ROLLING_SAMPLING: f64 = 0.1;
+
+/// Places of a roll at the end of a pass that are looked at.
+const ROLL_STEPS: usize = 24;
+
+/// Where the axis is at `s`.
+pub(crate) type Curve<'a> = &'a (dyn Fn(f64) -> Vector2 + Sync);
+
+/// How the cutter stands on the part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Contact {
+    /// It touches surface.
+    Inside,
+    /// It touches the border and has rolled over it by no more than the overrun.
+    Rolling,
+    /// It has rolled farther, or does not touch the part.
+    Off,
+}
+
+/// Turns curves of the plan view into passes.
+pub(crate) struct PlanCurves<'a> {
+    pub drop: DropCutter<'a>,
+    pub border: Border<'a>,
+    pub cutter: &'a Cutter,
+    /// How far a pass may roll on over the border, mm.
+    pub overrun: f64,
+    pub settings: &'a PassSettings<'a>,
+    pub monitor: &'a dyn Monitor,
+}
+
+impl PlanCurves<'_> {
+    fn drop_at(&self, curve: Curve<'_>, s: f64) -> Option<(Vector2, Drop)> {
+        let xy = curve(s);
+        self.drop.at(xy.x, xy.y).map(|d| (xy, d))
+    }
+
+    fn tip(&self, curve: Curve<'_>, s: f64) -> Option<Point3> {
+        self.drop_at(curve, s).map(|(xy, d)| Point3::new(xy.x, xy.y, d.tip_z))
+    }
+
+    /// How far the cutter has rolled over the border at `s`; `None` off the part.
+    fn rolled(&self, curve: Curve<'_>, s: f64) -> Option<f64> {
+        let (xy, drop) = self.drop_at(curve, s)?;
+        if !self.border.holds(&drop.contact) {
+            return Some(0.0);
+        }
+        Some(self.border.rolled(self.cutter, &xy.into(), &drop.contact))
+    }
+
+    /// How the cutter stands at `s`.
+    fn contact(&self, curve: Curve<'_>, s: f64) -> Contact {
+        match self.rolled(curve, s) {
+            Some(rolled) if rolled <= END_PRECISION => Contact::Inside,
+            Some(rolled) if rolled <= self.overrun => Contact::Rolling,
+            _ => Contact::Off,
+        }
+    }
+
+    /// The runs of a curve over `[s0, s1]` (`s` in mm) on which the cutter cuts surface, as moves. Each run is made
+    /// of stretches inside the part and stretches that roll along its border.
+    pub fn pieces(&self, curve: Curve<'_>, [s0, s1]: [f64; 2]) -> Result<Vec<Vec<Point3>>, Cancelled> {
+        let count = ((s1 - s0) / self.settings.sampling).ceil().max(1.0) as usize;
+        let at = |k: usize| s0 + (s1 - s0) * k as f64 / count as f64;
+        let mut stretches: Vec<(Contact, f64, f64)> = Vec::new();
+        let mut before = (s0, self.contact(curve, s0));
+        let mut start = s0;
+        let mut watch = Watch::new(self.monitor);
+        for k in 1..=count {
+            watch.step()?;
+            let s = at(k);
+            let now = self.contact(curve, s);
+            // Several changes may lie between two samples; each is located in turn.
+            while before.1 != now {
+                watch.step()?;
+                let (end, next) = self.change(curve, before, s);
+                stretches.push((before.1, start, end));
+                (before, start) = ((next, self.contact(curve, next)), next);
+            }
+            before = (s, now);
+        }
+        stretches.push((before.1, start, s1));
+        let runs = stretches.split_mut(|(contact, ..)| *contact == Contact::Off);
+        let pieces = runs.map(|run| {
+            self.shorten_ends(curve, run);
+            self.moves(curve, run)
+        });
+        pieces.filter(|points| points.as_ref().map_or(true, |points| points.len() >= 2)).collect()
+    }
+
+    /// Cuts the rolls at both ends of a run back to what is of use.
+    fn shorten_ends(&self, curve: Curve<'_>, run: &mut [(Contact, f64, f64)]) {
+        let useful = |from: f64, end: f64| {
+            let place = |k: usize| from + (end - from) * k as f64 / ROLL_STEPS as f64;
+            place((1..=ROLL_STEPS).find(|&k| !self.serves(curve, place(k))).unwrap_or(ROLL_STEPS))
+        };
+        if let [(Contact::Rolling, a, b)] = run {
+            // Beside the part all along.
+            let place = |k: usize| *a + (*b - *a) * k as f64 / ROLL_STEPS as f64;
+            if !(1..ROLL_STEPS).any(|k| self.serves(curve, place(k))) {
+                *b = *a;
+            }
+            return;
+        }
+        if let Some((Contact::Rolling, a, b)) = run.first_mut() {
+            *a = useful(*b, *a);
+        }
+        if let Some((Contact::Rolling, a, b)) = run.last_mut() {
+            *b = useful(*a, *b);
+        }
+    }
+
+    /// Whether half an interval to either side of where the cutter would touch, had the surface gone on, the part lies.
+    fn serves(&self, curve: Curve<'_>, s: f64) -> bool {
+        let Some((xy, drop)) = self.drop_at(curve, s) else { return false };
+        let contact = drop.contact.point.xy() + self.border.roll(self.cutter, &xy.into(), &drop.contact).xy();
+        let along = (curve(s + LEAST_STRETCH) - curve(s - LEAST_STRETCH)) / (2.0 * LEAST_STRETCH);
+        let across = Vector2::new(-along.y, along.x) * (0.5 * self.overrun);
+        [across, -across].iter().any(|beside| self.border.under(&(contact + beside)))
+    }
+
+    fn moves(&self, curve: Curve<'_>, run: &[(Contact, f64, f64)]) -> Result<Vec<Point3>, Cancelled> {
+        let mut points: Vec<Point3> = Vec::new();
+        for &(contact, a, b) in run.iter().filter(|(_, a, b)| b - a > LEAST_STRETCH) {
+            // Rolling over corners of the border the cutter rises and falls within less than it does on surface.
+            let share = if contact == Contact::Rolling { ROLLING_SAMPLING } else { 1.0 };
+            let settings = PassSettings { sampling: share * self.settings.sampling, ..*self.settings };
+            let stretch = settings.moves(a, b, &mut |s| self.tip(curve, s), self.monitor)?;
+            let joined = usize::from(!points.is_empty());
+            points.extend(stretch.into_iter().skip(joined));
+        }
+        Ok(points)
+    }
+
+    /// Where the contact changes from what it is at `before` on the way to `s`: the last place that
+    /// is as before, and the first known one that is not.
+    fn change(&self, curve: Curve<'_>, before: (f64, Contact), s: f64) -> (f64, f64) {
+        let (mut same, mut other) = (before.0, s);
+        while other - same > 0.5 * END_PRECISION {
+            let middle = 0.5 * (same + other);
+            if middle <= same || middle >= other {
+                break;
+            }
+            if self.contact(curve, middle) == before.1 {
+                same = middle;
+            } else {
+                other = middle;
+            }
+        }
+        (same, other)
+    }
+}

@@ -1,0 +1,363 @@
+//! Passes on which the tool stays clear: tilted, else lifted, else left out.
+//!
+//! Enters: the touches of a pass, what the tool must keep away from, mm, rad. Leaves: the touches, changed no more than it
+//! takes, in one pass or in several where a stretch cannot be reached, and what was changed. Moves between the touches that
+//! leave are clear.
+
+use super::tilted::{ABOVE_SURFACE, Touch};
+use collision::{Interference, Shortfall};
+use cutter::Cutter;
+use geometry::{Point3, Vector3};
+use motion::location;
+use motion::{CcPoint, ClPoint};
+use std::f64::consts::TAU;
+use work::monitor;
+use work::monitor::{Cancelled, Monitor};
+
+/// Rings of tilted axes are this far apart, rad. A gap through which the tool fits may lie between two wider ones.
+const RING: f64 = 0.05;
+
+/// Axes tried on each ring.
+const AROUND: usize = 36;
+
+/// Halvings of what lies between two rings: to a hundredth of a degree.
+const HALVINGS: u32 = 8;
+
+/// Weight of the angle to the axis before, against that of the tilt.
+const CONTINUITY: f64 = 0.2;
+
+/// Neighbours of tilted contacts lead over by no more than this, rad a mm, where nothing else is asked for.
+const RAMP: f64 = 0.05;
+
+/// Least step of a lift, mm.
+const LEAST_LIFT: f64 = 1e-3;
+
+/// Moves that are not clear are halved at most so many times before the pass is left there.
+const MOST_HALVINGS: u32 = 6;
+
+/// A place that the tool cannot reach.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unreachable {
+    /// The contact, mm.
+    pub place: Point3,
+    /// How much is missing there with the axis of the rule, mm.
+    pub depth: f64,
+}
+
+/// What was changed so that the tool stays clear.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct RepairSummary {
+    /// Contacts whose axis was tilted.
+    pub tilted: usize,
+    /// By how much at most, rad.
+    pub greatest_tilt: f64,
+    /// Contacts from which the tool was lifted.
+    pub lifted: usize,
+    /// By how much at most, mm, and where.
+    pub greatest_lift: Option<(f64, Point3)>,
+    /// Points put in between contacts.
+    pub added: usize,
+    /// Places left out.
+    pub unreachable: Vec<Unreachable>,
+}
+
+/// A pass in the pieces that are left of it, and what was changed.
+pub struct Repaired {
+    pub passes: Vec<Vec<Touch>>,
+    pub summary: RepairSummary,
+}
+
+/// A touch with the axis of its rule.
+#[derive(Clone, Copy)]
+struct Placed {
+    touch: Touch,
+    rule: Vector3,
+}
+
+/// Repairs a pass. Beside tilted contacts the axis turns by no more than `turning`, rad a mm of contact, where that is clear.
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn repair(
+    pass: &[Touch],
+    cutter: &Cutter,
+    keep: &Interference,
+    turning: Option<f64>,
+    monitor: &dyn Monitor,
+) -> Result<Repaired, Cancelled> {
+    let mut repairing =
+        Repairing { cutter, keep, before: None, summary: RepairSummary::default(), passes: Vec::new() };
+    let mut run = Vec::new();
+    for touch in pass {
+        monitor::check(monitor)?;
+        match repairing.place(touch) {
+            Ok(placed) => run.push(placed),
+            Err(missing) => {
+                repairing.summary.leave_out(touch.contact.point, missing.depth);
+                repairing.finish(std::mem::take(&mut run), turning, monitor)?;
+            }
+        }
+    }
+    repairing.finish(run, turning, monitor)?;
+    Ok(Repaired { passes: repairing.passes, summary: repairing.summary })
+}
+
+struct Repairing<'a> {
+    cutter: &'a Cutter,
+    keep: &'a Interference<'a>,
+    /// The axis of the touch before, if that was tilted.
+    before: Option<Vector3>,
+    summary: RepairSummary,
+    passes: Vec<Vec<Touch>>,
+}
+
+impl Repairing<'_> {
+    /// The touch where it is clear, or what is missing.
+    fn place(&mut self, touch: &Touch) -> Result<Placed, Shortfall> {
+        let rule = touch.at.axis;
+        let Some(missing) = self.keep.shortfall(&touch.at) else {
+            self.before = None;
+            return Ok(Placed { touch: *touch, rule });
+        };
+        let tilted = [true, false].iter().find_map(|&spare| self.tilt(touch, spare));
+        self.before = tilted;
+        if let Some(axis) = tilted {
+            return Ok(Placed { touch: Touch::along(axis, self.cutter, touch.contact, touch.feed), rule });
+        }
+        let lift = self.lift(touch).ok_or(missing)?;
+        self.summary.lift(lift, touch.contact.point);
+        let contact = CcPoint { point: touch.contact.point + touch.contact.normal * lift, ..touch.contact };
+        Ok(Placed { touch: Touch::along(rule, self.cutter, contact, touch.feed), rule })
+    }
+
+    fn at(&self, contact: &CcPoint, axis: &Vector3) -> ClPoint {
+        location(self.cutter, contact, axis)
+    }
+
+    /// The axis nearest to the rule's at which the tool is clear, near to that before where there is a choice.
+    fn tilt(&self, touch: &Touch, spare: bool) -> Option<Vector3> {
+        let (rule, contact) = (touch.at.axis, touch.contact);
+        let across = if rule.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
+        let x = rule.cross(&across).normalize();
+        let y = rule.cross(&x);
+        let axis =
+            |tilt: f64, around: f64| rule * tilt.cos() + (x * around.cos() + y * around.sin()) * tilt.sin();
+        let clear = |tilt: f64, around: f64| {
+            let axis = axis(tilt, around);
+            axis.dot(&contact.normal) > ABOVE_SURFACE && self.keep.holds(&self.at(&contact, &axis), spare)
+        };
+        let least = |mut low: f64, mut high: f64, around: f64| {
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (low + high);
+                *(if clear(middle, around) { &mut high } else { &mut low }) = middle;
+            }
+            high
+        };
+        let greatest = self.keep.greatest_tilt;
+        let mut first = 0.0;
+        if let Some(before) = self.before {
+            let tilt = rule.cross(&before).norm().atan2(rule.dot(&before));
+            let around = before.dot(&y).atan2(before.dot(&x));
+            first = around;
+            let step = TAU / AROUND as f64;
+            let follow = |around: f64| {
+                let rings = (0..=(0.5 * tilt / RING).ceil() as u32 + 1)
+                    .map(|k| (tilt + RING * f64::from(k)).min(greatest));
+                let found = rings.into_iter().find(|&tilt| clear(tilt, around))?;
+                Some((least(if found > tilt { found - RING } else { 0.0 }, found, around), around))
+            };
+            let beside = [0.0, 0.5 * step, -0.5 * step].into_iter().filter_map(|by| follow(around + by));
+            if let Some((tilt, around)) = beside.min_by(|a, b| a.0.total_cmp(&b.0)) {
+                return Some(axis(tilt, around));
+            }
+        }
+        let rings = (greatest / RING).ceil() as u32;
+        for ring in 1..=rings {
+            let tilt = (RING * f64::from(ring)).min(greatest);
+            let rank = |around: f64| {
+                let tilt = least(RING * f64::from(ring - 1), tilt, around);
+                let axis = axis(tilt, around);
+                (tilt + CONTINUITY * self.before.map_or(0.0, |before| (axis - before).norm()), axis)
+            };
+            let arounds = (0..AROUND).map(|k| first + TAU * k as f64 / AROUND as f64);
+            let ranked = arounds.filter(|&around| clear(tilt, around)).map(rank);
+            if let Some((_, axis)) = ranked.min_by(|a, b| a.0.total_cmp(&b.0)) {
+                return Some(axis);
+            }
+        }
+        None
+    }
+
+    /// How far the tool must go along the normal. What is missing shrinks no faster than the tool goes, so that it steps by
+    /// that without passing by a place that is clear.
+    fn lift(&self, touch: &Touch) -> Option<f64> {
+        let mut lift = 0.0;
+        while lift <= self.keep.greatest_lift {
+            let tip = touch.at.tip + touch.contact.normal * lift;
+            let Some(missing) = self.keep.missing(&ClPoint { tip, ..touch.at }, true) else {
+                return Some(lift);
+            };
+            lift += missing.depth.max(LEAST_LIFT);
+        }
+        None
+    }
+
+    /// Leads the axis over beside tilted contacts, and joins what is left of a pass by moves that are clear.
+    fn finish(
+        &mut self,
+        mut run: Vec<Placed>,
+        turning: Option<f64>,
+        monitor: &dyn Monitor,
+    ) -> Result<(), Cancelled> {
+        self.before = None;
+        let rate = turning.unwrap_or(RAMP);
+        for k in 1..run.len() {
+            run[k] = self.led_over(&run[k - 1], &run[k], rate);
+        }
+        for k in (1..run.len()).rev() {
+            run[k - 1] = self.led_over(&run[k], &run[k - 1], rate);
+        }
+        for placed in &run {
+            self.summary.tilt(placed.tilt());
+        }
+        let mut piece: Vec<Touch> = run.iter().take(1).map(|placed| placed.touch).collect();
+        for pair in run.windows(2) {
+            monitor::check(monitor)?;
+            let mut between = Vec::new();
+            match self.join(&pair[0], &pair[1], MOST_HALVINGS, &mut between) {
+                Ok(()) => {
+                    self.summary.added += between.len() - 1;
+                    piece.append(&mut between);
+                }
+                Err(unreachable) => {
+                    self.summary.unreachable.push(unreachable);
+                    self.passes.push(std::mem::replace(&mut piece, vec![pair[1].touch]));
+                }
+            }
+        }
+        if !piece.is_empty() {
+            self.passes.push(piece);
+        }
+        Ok(())
+    }
+
+    /// `to`, with its axis turned towards that of `from` where that is tilted no less, within a ring, and too far off.
+    fn led_over(&self, from: &Placed, to: &Placed, rate: f64) -> Placed {
+        let (a, b) = (from.touch.at, to.touch.at);
+        let turn = a.axis.cross(&b.axis).norm().atan2(a.axis.dot(&b.axis));
+        let most = rate * (to.touch.contact.point - from.touch.contact.point).norm();
+        if from.tilt() + RING < to.tilt() || from.tilt() == 0.0 || turn <= most {
+            return *to;
+        }
+        let axis = a.towards(&b, most / turn).axis;
+        let above = axis.dot(&to.touch.contact.normal) > ABOVE_SURFACE;
+        let touch = Touch::along(axis, self.cutter, to.touch.contact, to.touch.feed);
+        if above && self.keep.is_clear(&touch.at) { Placed { touch, ..*to } } else { *to }
+    }
+
+    /// The touches after `a` up to and with `b`, with clear moves between them.
+    fn join(
+        &mut self,
+        a: &Placed,
+        b: &Placed,
+        halvings: u32,
+        out: &mut Vec<Touch>,
+    ) -> Result<(), Unreachable> {
+        let Some(missing) = self.keep.on_move(&a.touch.at, &b.touch.at) else {
+            out.push(b.touch);
+            return Ok(());
+        };
+        let there = Unreachable {
+            place: nalgebra::center(&a.touch.contact.point, &b.touch.contact.point),
+            depth: missing.depth,
+        };
+        let (Some(between), 1..) = (between(&a.touch, &b.touch, self.cutter), halvings) else {
+            return Err(there);
+        };
+        self.before = Some(a.touch.at.axis);
+        let middle = self.place(&between).map_err(|_| there)?;
+        self.join(a, &middle, halvings - 1, out)?;
+        self.join(&middle, b, halvings - 1, out)
+    }
+}
+
+/// A touch half way.
+fn between(a: &Touch, b: &Touch, cutter: &Cutter) -> Option<Touch> {
+    let normal = (a.contact.normal + b.contact.normal).try_normalize(1e-9)?;
+    let feed = (a.feed + b.feed).try_normalize(1e-9).unwrap_or(a.feed);
+    let axis = a.at.towards(&b.at, 0.5).axis;
+    let contact = CcPoint { point: nalgebra::center(&a.contact.point, &b.contact.point), normal };
+    (axis.dot(&normal) > ABOVE_SURFACE).then(|| Touch::along(axis, cutter, contact, feed))
+}
+
+impl Placed {
+    /// Angle from the rule, rad.
+    fn tilt(&self) -> f64 {
+        let axis = self.touch.at.axis;
+        self.rule.cross(&axis).norm().atan2(self.rule.dot(&axis))
+    }
+}
+
+impl RepairSummary {
+    fn tilt(&mut self, by: f64) {
+        self.tilted += usize::from(by > 0.0);
+        self.greatest_tilt = self.greatest_tilt.max(by);
+    }
+
+    fn lift(&mut self, by: f64, place: Point3) {
+        self.lifted += 1;
+        if self.greatest_lift.is_none_or(|(most, _)| by > most) {
+            self.greatest_lift = Some((by, place));
+        }
+    }
+
+    fn leave_out(&mut self, place: Point3, depth: f64) {
+        self.unreachable.push(Unreachable { place, depth });
+    }
+
+    /// Takes in what was changed on another pass.
+    pub fn add(&mut self, other: &Self) {
+        self.tilted += other.tilted;
+        self.greatest_tilt = self.greatest_tilt.max(other.greatest_tilt);
+        self.lifted += other.lifted;
+        if other.greatest_lift.map(|l| l.0) > self.greatest_lift.map(|l| l.0) {
+            self.greatest_lift = other.greatest_lift;
+        }
+        self.added += other.added;
+        self.unreachable.extend(&other.unreachable);
+    }
+
+    /// In words, for whoever reads the report; nothing where nothing was changed.
+    pub fn notes(&self) -> Vec<String> {
+        let at = |p: &Point3| format!("({:.3}, {:.3}, {:.3})", p.x, p.y, p.z);
+        let mut notes = Vec::new();
+        if self.tilted > 0 {
+            notes.push(format!(
+                "at {} contacts the axis is tilted by up to {:.1} degrees so that the tool stays clear",
+                self.tilted,
+                self.greatest_tilt.to_degrees()
+            ));
+        }
+        if let Some((by, place)) = &self.greatest_lift {
+            notes.push(format!(
+                "at {} contacts no tilt keeps the tool clear: it is lifted by up to {by:.3} mm, most at {}, and leaves \
+                 that much standing",
+                self.lifted,
+                at(place)
+            ));
+        }
+        if let Some(worst) = self.unreachable.iter().max_by(|a, b| a.depth.total_cmp(&b.depth)) {
+            notes.push(format!(
+                "{} places cannot be reached without a collision and are left out; {:.3} mm are missing at {}: take a \
+                 longer or thinner tool, or allow more tilt",
+                self.unreachable.len(),
+                worst.depth,
+                at(&worst.place)
+            ));
+        }
+        notes
+    }
+}
+
+#[cfg(test)]
+mod tests;
