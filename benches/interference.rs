@@ -3,10 +3,11 @@
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
+use millstream::collision::{Check, Interference, Obstacle};
 use millstream::cutter::{Cutter, Holder, HolderSection, Solid};
 use millstream::geometry::{Bvh, Point3, TriangleMesh, Vector3};
+use millstream::motion::{CcPoint, ClPoint, location};
 use millstream::parallel;
-use millstream::toolpath::{CcPoint, Check, ClPoint, Interference, Obstacle, location};
 
 fn main() {
     divan::main();

@@ -7,8 +7,8 @@ use divan::counter::ItemsCount;
 use millstream::cutter::{Cutter, CutterShape, Solid};
 use millstream::geometry::{Point3, Vector3};
 use millstream::monitor::Silent;
+use millstream::motion::{ClPoint, Move, MoveKind, Toolpath};
 use millstream::sim::Rays;
-use millstream::toolpath::{ClPoint, Move, MoveKind, Toolpath};
 
 /// Side of the part, mm.
 const SIDE: f64 = 100.0;

@@ -7,8 +7,8 @@ use divan::counter::ItemsCount;
 use millstream::cutter::Solid;
 use millstream::geometry::{Aabb, Point3, Vector3};
 use millstream::monitor::Silent;
+use millstream::motion::{ClPoint, Toolpath};
 use millstream::sim::{VoxelEngine, VoxelStock};
-use millstream::toolpath::{ClPoint, Toolpath};
 
 #[allow(dead_code)]
 #[path = "common/wave.rs"]

@@ -2,8 +2,8 @@
 
 use millstream::cutter::Cutter;
 use millstream::geometry::{Point2, Point3};
+use millstream::motion::{ClPoint, Move, MoveKind, Toolpath};
 use millstream::sim::{Grid, ZMap};
-use millstream::toolpath::{ClPoint, Move, MoveKind, Toolpath};
 
 /// Radius of every cutter here.
 pub const RADIUS: f64 = 3.0;

@@ -7,11 +7,11 @@ use super::wave::{RADIUS, block, cutter, wave};
 use super::{Plan, Section};
 use millstream::cutter::Cutter;
 use millstream::monitor::Silent;
+use millstream::motion::Toolpath;
 use millstream::sim::{MoveBins, SweptMove, Work, ZMap};
 use millstream::sim::{
     cut, cut_all_candidates, cut_counted, cut_in_order, cut_in_order_plain, cut_reference,
 };
-use millstream::toolpath::Toolpath;
 
 /// Distance between passes, mm.
 const STEPOVER: f64 = 0.3;

@@ -5,8 +5,8 @@ use super::table::{Column, Table};
 use super::wave::{block, cutter, wave};
 use super::{Plan, Section};
 use millstream::monitor::Silent;
+use millstream::motion::{Move, Toolpath};
 use millstream::sim::cut;
-use millstream::toolpath::{Move, Toolpath};
 use std::hint::black_box;
 
 /// Makes this program a process that only cuts; a number of cells a side follows.

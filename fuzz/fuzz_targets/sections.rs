@@ -4,9 +4,10 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use millstream::geometry::sections::Sections;
-use millstream::geometry::{Blade, BladeSettings, BladeSide, FairingMethod, Isometry3};
-use millstream::io::scene::SceneText;
+use millstream::blade::sections::Sections;
+use millstream::blade::{Blade, BladeSettings, BladeSide, FairingMethod};
+use millstream::geometry::Isometry3;
+use millstream::scene::SceneText;
 use millstream::io::section_table::{parse_blade, parse_table, write_table};
 
 /// Sections and points beyond these are not made into blades, so that the fuzzer spends its time on readers.

@@ -1,7 +1,7 @@
 //! Meshes, holders, cutters and numbers that tests share.
 #![allow(missing_docs, clippy::unwrap_used)]
 
-use cutter::{AptWords, Cutter, Holder, HolderSection};
+use cutter::{AptWords, Cutter, Holder, HolderSection, Solid};
 use geometry::{Bvh, Point3, TriangleMesh, Vector3};
 
 /// Deterministic numbers (xorshift64*, Vigna 2016).
@@ -67,4 +67,19 @@ pub fn cutters() -> Vec<Cutter> {
     let named = [Cutter::ball(6.0), Cutter::flat(6.0), Cutter::bull(6.0, 1.0)].map(Result::unwrap);
     let apt = AptWords::examples().into_iter().map(|words| Cutter::apt(&words).unwrap());
     named.into_iter().chain([taper(1.0), taper(0.3), taper(0.0)]).chain(apt).collect()
+}
+
+pub fn solids() -> Vec<Solid> {
+    let of = |cutter: &Cutter| {
+        [
+            Solid::of_cutter(cutter, None),
+            Solid::of_cutter(cutter, Some(&holder(4.0))),
+            Solid::of_tool(cutter, &holder(9.0)),
+        ]
+    };
+    cutters().iter().flat_map(of).chain([Solid::of_holder(&holder(3.0))]).collect()
+}
+
+pub fn close(a: f64, b: f64) {
+    assert!((a - b).abs() < 1e-9, "{a} {b}");
 }

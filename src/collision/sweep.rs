@@ -166,3 +166,6 @@ impl Stretch<'_> {
         self.may_come_nearer(&[a, half, c], limit) || self.may_come_nearer(&[half, b, c], limit)
     }
 }
+
+#[cfg(test)]
+mod tests;

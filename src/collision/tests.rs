@@ -5,28 +5,11 @@ use super::*;
 use cutter::{Cutter, Holder, HolderSection};
 use geometry::Vector3;
 
-mod sweep;
-
-fn solids() -> Vec<Solid> {
-    let of = |cutter: &Cutter| {
-        [
-            Solid::of_cutter(cutter, None),
-            Solid::of_cutter(cutter, Some(&holder(4.0))),
-            Solid::of_tool(cutter, &holder(9.0)),
-        ]
-    };
-    cutters().iter().flat_map(of).chain([Solid::of_holder(&holder(3.0))]).collect()
-}
-
 /// The least over a solid's pieces.
 fn distance(solid: &Solid, at: &ClPoint, q: &Point3) -> f64 {
     (0..solid.pieces())
         .map(|index| Piece { solid, index, at: *at }.sample(q).distance)
         .fold(f64::INFINITY, f64::min)
-}
-
-fn close(a: f64, b: f64) {
-    assert!((a - b).abs() < 1e-9, "{a} {b}");
 }
 
 #[test]

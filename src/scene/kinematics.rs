@@ -296,7 +296,7 @@ mod tests {
     /// The example of the README.
     #[test]
     fn a_table_with_a_trunnion_off_its_centre() {
-        let readme = include_str!("../../../README.md");
+        let readme = include_str!("../../README.md");
         let table = readme.split("```toml\n").find(|text| text.starts_with("[machine.kinematics]")).unwrap();
         let made = parse(table.split("```").next().unwrap()).unwrap().five_axis.unwrap();
         assert_eq!(made.kinematics.axes()[1].point, Point3::new(250.0, 203.0, -350.0));

@@ -5,7 +5,8 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use millstream::cutter::Cutter;
 use millstream::field::{KnotRule, Solver};
 use millstream::geometry::AnalyticShape;
-use millstream::toolpath::{Along, FeedDirection, Step, Strategy, StreamMethod, ball_scallop_height};
+use millstream::scallop::ball_scallop_height;
+use millstream::toolpath::{Along, FeedDirection, Step, Strategy, StreamMethod};
 
 use crate::support::{formula, off, plan_and_measure};
 

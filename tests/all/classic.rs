@@ -5,10 +5,9 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use millstream::cutter::Cutter;
 use millstream::geometry::AnalyticShape;
 use millstream::monitor::Silent;
+use millstream::motion::{MoveKind, Toolpath};
 use millstream::part::Part;
-use millstream::toolpath::{
-    Along, FrontStart, LevelSteps, MoveKind, Plan, PlanError, Step, Strategy, Toolpath, plan,
-};
+use millstream::toolpath::{Along, FrontStart, LevelSteps, Plan, PlanError, Step, Strategy, plan};
 
 use crate::support::{LIMITS, cut_and_measure, formula, off, settings};
 

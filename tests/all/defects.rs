@@ -3,7 +3,8 @@
 use millstream::cutter::Cutter;
 use millstream::geometry::{AnalyticShape, Point3};
 use millstream::metrology::Limits;
-use millstream::toolpath::{ClPoint, Move, MoveKind, Step, Strategy, Toolpath};
+use millstream::motion::{ClPoint, Move, MoveKind, Toolpath};
+use millstream::toolpath::{Step, Strategy};
 
 use crate::support::{ASKED, LIMITS, cut_and_measure, formula, mesh, off, plan_and_measure, settings};
 

@@ -4,14 +4,14 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
 use millstream::cutter::Cutter;
+use millstream::field::PlannedField;
 use millstream::field::mesh::Sense;
 use millstream::field::{KnotRule, LineField, LineSample, SamplePlane, Solver};
 use millstream::geometry::{AnalyticShape, Point2, Point3};
 use millstream::monitor::Silent;
+use millstream::motion::{MoveKind, Toolpath};
 use millstream::part::Part;
-use millstream::toolpath::{
-    FeedDirection, MoveKind, PlanError, PlannedField, Step, Strategy, StreamMethod, Toolpath, plan,
-};
+use millstream::toolpath::{FeedDirection, PlanError, Step, Strategy, StreamMethod, plan};
 
 use crate::command::{PLATE, millstream};
 use crate::support::{formula, mesh, settings};

@@ -4,9 +4,9 @@ use millstream::cutter::Cutter;
 use millstream::geometry::{AnalyticShape, Point3};
 use millstream::metrology::{Asked, Limits, Measurement, measure};
 use millstream::monitor::Silent;
+use millstream::motion::{ClPoint, Move, MoveKind, Toolpath};
 use millstream::part::Part;
 use millstream::sim::{Grid, ZMap, cut};
-use millstream::toolpath::{ClPoint, Move, MoveKind, Toolpath};
 
 use crate::support::{LIMITS, formula};
 

@@ -7,9 +7,10 @@ use millstream::cutter::Cutter;
 use millstream::geometry::{AnalyticShape, AnalyticSurface, Point3, TriangleMesh};
 use millstream::metrology::{Asked, Limits, Measurement, measure};
 use millstream::monitor::Silent;
+use millstream::motion::Toolpath;
 use millstream::part::{Part, Patch};
 use millstream::sim::{Grid, ZMap, cut_reference};
-use millstream::toolpath::{Joining, PlanSettings, Step, Strategy, Toolpath, plan};
+use millstream::toolpath::{Joining, PlanSettings, Step, Strategy, plan};
 use serde_json::{Value, json};
 
 pub const LIMITS: Limits = Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chord: 0.001 };

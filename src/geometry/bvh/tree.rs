@@ -157,7 +157,6 @@ impl Extent {
     }
 
     /// Whether it holds a point.
-    #[cfg(test)]
     pub fn holds(&self, p: &Point3) -> bool {
         (0..3).all(|i| f64::from(self.min[i]) <= p[i] && p[i] <= f64::from(self.max[i]))
     }
@@ -228,7 +227,6 @@ impl BoxTree {
     }
 
     /// All slots below box `index`, for tests.
-    #[cfg(test)]
     pub fn slots_below(&self, index: usize) -> Vec<usize> {
         let (first, count) = self.node(index).slots_or_children();
         if count > 0 {

@@ -95,7 +95,7 @@ fn files_are_named() {
 /// and are parametrised differently.
 #[test]
 fn the_joined_scene_is_what_its_generator_makes() {
-    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/joined.json"));
+    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/joined.json"));
     let made = samples::joined();
     if std::env::var_os("MILLSTREAM_BLESS").is_some() {
         std::fs::write(path, to_text(&made)).unwrap();
@@ -117,7 +117,7 @@ fn the_joined_scene_is_what_its_generator_makes() {
 /// `MILLSTREAM_BLESS=1 cargo test --release --lib ridge`.
 #[test]
 fn the_ridge_scene_is_what_its_generator_makes() {
-    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/ridge.json"));
+    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/ridge.json"));
     let made = [samples::ridge()];
     if std::env::var_os("MILLSTREAM_BLESS").is_some() {
         std::fs::write(path, to_text(&made)).unwrap();

@@ -252,7 +252,7 @@ fn files_are_read_by_their_extension() {
 
 #[test]
 fn shipped_blades_are_read() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/blades");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/blades");
     for (name, leading, trailing) in [("rotor.txt", 0.4, 0.25), ("sections.toml", 0.3, 0.4)] {
         let sections = read(&folder.join(name)).unwrap();
         assert_eq!(sections.sections().len(), 12);

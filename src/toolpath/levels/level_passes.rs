@@ -14,7 +14,6 @@ use crate::surface::chart::Chart;
 use crate::tilt::tilted;
 use crate::tilt::tilted::Touch;
 use cutter::Cutter;
-use field::PlannedField;
 use field::{LevelCurve, LevelTracer, ScalarField, surface_gradient_length};
 use geometry::Point3;
 use motion::CcPoint;

@@ -11,7 +11,7 @@ use crate::surface::mesh_surface::MeshSurface;
 use cutter::Cutter;
 use field::mesh::{Line, MeshLevels, SingularPoint, merge_singular_points, singular_points};
 use field::{FeedSample, LevelTracer, PassPoint, PlannedField, ScalarField, grid_turns};
-use geometry::{CurveSegment, Point2, Point3, SegmentGrid, Vector2, Vector3};
+use geometry::{CurveSegment, Point2, Point3, SegmentGrid, Vector3};
 use part::Part;
 
 /// About as many directions are handed out over a part.
@@ -284,7 +284,7 @@ mod tests {
     fn the_farther_neighbour_counts_on_the_surface() {
         let slant = 1.25f64.sqrt();
         let mut field = PlannedField::default();
-        field.measure(&[line(0.0), line(0.4), line(1.0), line(9.0)]);
+        measure(&mut field, &[line(0.0), line(0.4), line(1.0), line(9.0)]);
         for (pass, interval) in
             [(0, Some(0.4 * slant)), (1, Some(0.6 * slant)), (2, Some(0.6 * slant)), (3, None)]
         {
@@ -299,7 +299,7 @@ mod tests {
     #[test]
     fn a_short_pass_is_a_neighbour_where_it_runs() {
         let mut field = PlannedField::default();
-        field.measure(&[line(0.0), line(0.4)[5..15].to_vec(), line(0.8)]);
+        measure(&mut field, &[line(0.0), line(0.4)[5..15].to_vec(), line(0.8)]);
         let slant = 1.25f64.sqrt();
         let intervals: Vec<f64> = field.passes[0].iter().map(|p| p.interval.unwrap() / slant).collect();
         for (k, interval) in intervals.iter().enumerate() {
@@ -323,7 +323,7 @@ mod tests {
             }
         };
         let mut field = PlannedField::default();
-        field.measure(&[(0..=n).map(at).collect()]);
+        measure(&mut field, &[(0..=n).map(at).collect()]);
         let point = field.passes[0][7];
         assert!((point.interval.unwrap() - 2.0 * radius).abs() < 0.01, "{point:?}");
     }

@@ -228,8 +228,8 @@ fn spread<P: Waypoint>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::chord::distance_to_segment;
     use super::*;
+    use geometry::distance_to_segment;
     use proptest::prelude::*;
     use work::monitor::Silent;
 

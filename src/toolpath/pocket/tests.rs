@@ -1,3 +1,5 @@
+mod engagement;
+
 use super::*;
 use crate::Joining;
 use geometry::{Point2, Point3};

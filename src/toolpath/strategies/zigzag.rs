@@ -207,4 +207,3 @@ fn safe_stepover(
     ));
     floor
 }
-// x

@@ -1,6 +1,10 @@
 //! Moves against planted collisions and dense samples of the time.
 
-use super::*;
+use crate::samples::*;
+use crate::*;
+use cutter::{Cutter, Holder, HolderSection, Solid};
+use geometry::{Point3, Vector3};
+use motion::ClPoint;
 
 /// A cylinder of 24 mm from 30 to 60 mm above the tip.
 fn spindle() -> Solid {

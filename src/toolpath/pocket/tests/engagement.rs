@@ -1,0 +1,116 @@
+//! The engagement of planned passes, as metrology measures it on cells.
+
+use cutter::Cutter;
+use geometry::{Point2, Region};
+use metrology::contact_arcs;
+use motion::MoveKind;
+use work::monitor::Silent;
+
+use crate::{Flow, Joining, Pattern, Plan, PlanSettings, Pocket, PocketStrategy, Step, plan_pocket};
+
+fn points(c: &[(f64, f64)]) -> Vec<Point2> {
+    c.iter().map(|&(x, y)| Point2::new(x, y)).collect()
+}
+
+/// The shipped drawing.
+fn bracket() -> Region {
+    use io::outline::{OutlineFormat, OutlineOptions, parse};
+    let drawing = include_bytes!("../../../../scenes/bracket.svg");
+    let options = OutlineOptions { chord_tolerance: 0.0025, scale: None, layer: Some("pocket".into()) };
+    parse(drawing, OutlineFormat::Svg, &options).unwrap().region
+}
+
+/// Pockets whose passes are bounded, with sharp corners, a neck, islands: nothing above the limit but by
+/// what the measurement is unsure of, at any step down; plain passes are slots somewhere.
+#[test]
+fn bounded_passes_keep_to_their_engagement() {
+    let region = |curves: &[Vec<Point2>]| Region::nested(curves.to_vec()).unwrap().0;
+    let square = points(&[(0., 0.), (18., 0.), (18., 18.), (0., 18.)]);
+    let island = points(&[(7., 8.), (9., 8.), (9., 10.), (7., 10.)]);
+    let neck =
+        points(&[(0., 0.), (12., 0.), (12., 3.), (17., 3.), (17., 10.), (12., 10.), (12., 12.), (0., 12.)]);
+    let flow = |smoothing| Pattern::Flow(Flow { smoothing, spiral: false });
+    let (offset, zigzag) = (Pattern::Offset { spiral: false }, Pattern::Zigzag { angle: 0.0 });
+    let with_island = region(&[square.clone(), island]);
+    for (region, diameter, pattern, limit) in [
+        (region(&[square]), 5.0, flow(Some(3.0)), 60.0f64),
+        (region(std::slice::from_ref(&neck)), 5.0, flow(Some(3.0)), 60.0),
+        (region(&[neck]), 5.0, offset, 75.0),
+        (with_island.clone(), 5.0, offset, 60.0),
+        (with_island, 5.0, zigzag, 60.0),
+        (bracket(), 6.0, flow(None), 80.0),
+        (bracket(), 6.0, offset, 80.0),
+    ] {
+        let pocket = Pocket { region, depth: 3.0 };
+        let greatest = |engagement: Option<f64>| {
+            let found = plan(&pocket, diameter, pattern, engagement).path;
+            let arcs =
+                contact_arcs(&found, &Cutter::flat(diameter).unwrap(), 0.0, u64::MAX, &Silent).unwrap();
+            let cut = found.moves.iter().zip(&arcs.of_moves).filter(|(m, _)| m.kind == MoveKind::Cut);
+            (cut.map(|(_, arc)| *arc).fold(0.0, f64::max), arcs.bound(limit.to_radians()))
+        };
+        let ((bounded, bound), (plain, _)) = (greatest(Some(limit.to_radians())), greatest(None));
+        assert!(bound < 3f64.to_radians());
+        assert!(bounded <= limit.to_radians() + bound, "{pattern:?}: {}", bounded.to_degrees());
+        assert!(plain > (limit + 30.0).to_radians(), "{pattern:?}: {}", plain.to_degrees());
+    }
+}
+
+/// Two squares joined by a neck that has no room beside the cutter: there, and nowhere else, it is in a
+/// slot, and place and length are told.
+#[test]
+fn a_neck_as_wide_as_the_cutter_is_told() {
+    let (left, right, low, high) = (14.0, 24.0, 4.49, 9.51);
+    let outline = points(&[
+        (0., 0.),
+        (left, 0.),
+        (left, low),
+        (right, low),
+        (right, 0.),
+        (38., 0.),
+        (38., 14.),
+        (right, 14.),
+        (right, high),
+        (left, high),
+        (left, 14.),
+        (0., 14.),
+    ]);
+    let pocket = Pocket { region: Region::nested(vec![outline]).unwrap().0, depth: 1.5 };
+    let limit = 60f64.to_radians();
+    let found = plan(&pocket, 5.0, Pattern::Offset { spiral: false }, Some(limit));
+    let arcs = contact_arcs(&found.path, &Cutter::flat(5.0).unwrap(), 0.0, u64::MAX, &Silent).unwrap();
+    let mut above = 0.0;
+    for ((a, b, m), arc) in found.path.segments().zip(&arcs.of_moves) {
+        if m.kind == MoveKind::Cut && *arc > limit + arcs.bound(limit) {
+            assert!([a.x, b.x].iter().all(|x| (left - 0.5..right + 0.5).contains(x)), "{a} {b}");
+            above += (b - a).norm();
+        }
+    }
+    let note = found.notes.iter().find(|n| n.contains("above the engagement")).unwrap();
+    let told: f64 = note.split(' ').next().unwrap().parse().unwrap();
+    assert!((9.0..11.0).contains(&above) && (told - above).abs() < 0.7, "{above}: {note}");
+    assert!(note.contains("begins at 13.") || note.contains("begins at 24."), "{note}");
+}
+
+fn plan(pocket: &Pocket, diameter: f64, pattern: Pattern, engagement: Option<f64>) -> Plan {
+    let strategy = PocketStrategy {
+        pattern,
+        stepdown: Some(1.5),
+        floor_allowance: 0.0,
+        wall_allowance: 0.0,
+        ramp_angle: 0.1,
+        helix_radius: None,
+        engagement,
+    };
+    let settings = PlanSettings {
+        step: Step::Stepover(2.0),
+        chord_tolerance: 0.005,
+        clearance: 2.0,
+        stock_top: 0.0,
+        feed_rate: 1000.0,
+        plunge_rate: 300.0,
+        rapid_rate: 5000.0,
+        joining: Joining::default(),
+    };
+    plan_pocket(pocket, &Cutter::flat(diameter).unwrap(), &strategy, &settings, &Silent).unwrap()
+}
