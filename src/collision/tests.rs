@@ -2,7 +2,7 @@
 
 use super::samples::*;
 use super::*;
-use cutter::{Cutter, Holder, HolderSection};
+use cutter::Cutter;
 use geometry::Vector3;
 
 /// The least over a solid's pieces.

@@ -5,7 +5,6 @@ pub mod atomic;
 pub mod direction_table;
 pub mod exr;
 pub mod gcode;
-pub mod located;
 mod mesh_file;
 pub mod nurbs_json;
 pub mod obj;

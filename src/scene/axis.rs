@@ -4,8 +4,8 @@ use std::fmt::{self, Write as _};
 
 use super::write::number;
 use geometry::{Point3, Vector3};
-use io::located::SceneError;
-use io::located::{Located, Section};
+use keys::SceneError;
+use keys::{Located, Section};
 use motion::ToolAxis;
 
 /// The key of the axis of a toolpath.

@@ -6,8 +6,8 @@ use super::write::{number, text};
 use super::{NamedFile, PartSource};
 use blade::{BladeSide, FairingMethod, JUMP_REMOVING_STEP};
 use geometry::Vector3;
-use io::located::SceneError;
-use io::located::{LENGTH, Located, Section};
+use keys::SceneError;
+use keys::{LENGTH, Located, Section};
 
 /// The key of a section table.
 pub(super) const KEY: &str = "sections";

@@ -4,8 +4,8 @@
 use std::fmt::{self, Write as _};
 
 use super::write::number;
-use io::located::SceneError;
-use io::located::Section;
+use keys::SceneError;
+use keys::Section;
 use toolpath::{Along, FrontStart, LevelSteps, OffsetAlong, OffsetDrive, Strategy};
 
 /// Their words.

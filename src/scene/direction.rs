@@ -9,8 +9,8 @@ use super::write::{number, text};
 use field::mesh::Sense;
 use field::{LineField, LineSample, SamplePlane};
 use io::direction_table;
-use io::located::Section;
-use io::located::{SceneError, SceneText};
+use keys::Section;
+use keys::{SceneError, SceneText};
 use toolpath::{Along, FeedDirection};
 
 /// The keys of a direction, where it is the value of the first of them.

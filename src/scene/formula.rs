@@ -2,8 +2,8 @@
 //! written. Angles are degrees here and rad in [`AnalyticShape`].
 
 use geometry::AnalyticShape;
-use io::located::SceneError;
-use io::located::{COORDINATE, LENGTH, Section};
+use keys::SceneError;
+use keys::{COORDINATE, LENGTH, Section};
 
 /// Each surface with the keys of its own (besides `surface`, `x` and `y`).
 const SURFACES: [(&str, &[&str]); 7] = [

@@ -6,8 +6,8 @@ use std::path::Path;
 use super::read::read_mesh_file;
 use super::write::{number, text};
 use super::{MeshFormat, NamedFile};
-use io::located::SceneError;
-use io::located::{LENGTH, Section};
+use keys::SceneError;
+use keys::{LENGTH, Section};
 
 /// Default distance of shank and holder from part and fixtures, mm.
 const DEFAULT_CLEARANCE: f64 = 0.5;

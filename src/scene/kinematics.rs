@@ -5,8 +5,8 @@ use std::fmt::{self, Write as _};
 use super::write::{number, text};
 use geometry::{Point3, Vector3};
 use io::gcode::Style;
-use io::located::SceneError;
-use io::located::{Located, Section};
+use keys::SceneError;
+use keys::{Located, Section};
 use machine::kinematics::{
     DEFAULT_GAUGE_LENGTH, DEFAULT_ROTARY_RATE, Kinematics, KinematicsError, PRESETS, RotaryAxis, Side, preset,
 };

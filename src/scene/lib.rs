@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 pub use axis::AxisRequest;
 pub use blade::BladeRequest;
 pub use interference::{Fixture, KeepClear};
-pub use io::located::{Finding, SceneError, SceneText};
+pub use keys::{Finding, SceneError, SceneText};
 pub use kinematics::FiveAxis;
 pub use pocket::OutlineSource;
 pub use write::complete_toml;
@@ -301,7 +301,7 @@ pub fn auto_cell(cutter: &Cutter, toolpaths: &[ToolpathRequest]) -> f64 {
         Step::Scallop(_) => cell,
     });
     // Finer than scenes may ask for is finer than heights are resolved.
-    let exact = exact.max(*io::located::LENGTH.start());
+    let exact = exact.max(*keys::LENGTH.start());
     let exponent = exact.log10().floor() as i32;
     let power = 10f64.powi(exponent);
     // A hair of rounding must not turn 0.05 into 0.02.

@@ -6,9 +6,9 @@ use std::path::Path;
 use super::write::{number, text};
 use super::{NamedFile, PartSource};
 use geometry::{Point2, Region, RegionError};
-use io::located::SceneError;
-use io::located::{LENGTH, Section};
 use io::outline::OutlineFormat;
+use keys::SceneError;
+use keys::{LENGTH, Section};
 use toolpath::{Flow, Pattern, PocketStrategy, Step};
 
 /// The word for `surface`.
@@ -64,7 +64,7 @@ pub enum OutlineSource {
 pub(super) fn read_source(
     part: &Section<'_>,
     units: &[(&'static str, f64)],
-    named: impl Fn(io::located::Located<&str>) -> NamedFile,
+    named: impl Fn(keys::Located<&str>) -> NamedFile,
 ) -> Result<PartSource, SceneError> {
     let from_points = part.has("outline") && !part.has("file");
     let keys: &[&str] = if from_points {

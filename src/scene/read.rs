@@ -15,8 +15,8 @@ use super::{axis, blade, classic, direction, formula, interference, kinematics, 
 use cutter::{AptWord, AptWords, Cutter, CutterError, CutterShape, Holder, HolderSection};
 use field::{KnotRule, MAX_DENSE, Solver};
 use geometry::AnalyticSurface;
-use io::located::{COORDINATE, LENGTH, Located, Section};
-use io::located::{SceneError, SceneText};
+use keys::{COORDINATE, LENGTH, Located, Section};
+use keys::{SceneError, SceneText};
 use machine::Machine;
 use metrology::Limits;
 use toolpath::{Joining, Links, Step, Strategy, StreamMethod};

@@ -1,12 +1,12 @@
 //! Generated blades in TOML: see [`section_table`](super).
 
 use super::UNITS;
-use crate::located::{LENGTH, Section};
-use crate::located::{SceneError, SceneText};
 use blade::sections::{
     GeneratedBlade, MAX_GENERATED_POINTS, MAX_GENERATED_SECTIONS, NacaDigits, Stacking, Station, TrailingEdge,
 };
 use geometry::{MAX_COORDINATE, Vector2};
+use keys::{LENGTH, Section};
+use keys::{SceneError, SceneText};
 
 /// Sections that are generated where none are asked for.
 const DEFAULT_SECTIONS: usize = 12;

@@ -65,8 +65,8 @@ pub use generated::parse_blade;
 pub use table::{SectionTableError, parse_table};
 pub use write::write_table;
 
-use crate::located::{SceneError, SceneText};
 use blade::sections::{GenerateError, GeneratedBlade, Sections};
+use keys::{SceneError, SceneText};
 
 /// Greatest file that is read, bytes: the most points that are allowed take a third of it.
 pub const MAX_BYTES: u64 = 32 << 20;

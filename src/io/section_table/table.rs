@@ -1,9 +1,9 @@
 //! Tables of points: see [`section_table`](super).
 
 use super::UNITS;
-use crate::located::{listed, nearest};
 use blade::sections::{LeadingEnd, Outline, Section, SectionCurve, SectionError, Sections};
 use geometry::{MAX_COORDINATE, Point2};
+use keys::{listed, nearest};
 
 /// z of a point may differ from its section's height by this share of the height (of a mm near 0): what files
 /// with seven digits leave.
