@@ -3,6 +3,6 @@
 
 pub use work::{monitor, parallel};
 pub use {
-    blade, cli, collision, cutter, field, geometry, io, keys, machine, metrology, motion, offset, part,
+    blade, cli, collision, cutter, field, geometry, io, job, keys, machine, metrology, motion, offset, part,
     report, scallop, scene, sim, toolpath, work,
 };

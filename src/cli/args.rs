@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use cutter::Cutter;
 use scallop::DEFAULT_DEGREE;
-use scene::Engine;
+use scene::EngineChoice;
 
 /// Plans milling paths, cuts the part in a simulator, measures the cut surface and gives a verdict.
 ///
@@ -49,8 +50,8 @@ pub struct RunOptions {
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     pub memory: Option<u32>,
     /// Engine that cuts, instead of the scene's.
-    #[arg(long, value_name = "ENGINE", value_parser = clap::builder::PossibleValuesParser::new(Engine::WORDS))]
-    pub engine: Option<String>,
+    #[arg(long, value_name = "ENGINE", value_parser = engine_words())]
+    pub engine: Option<EngineChoice>,
 }
 
 /// What to check.
@@ -144,6 +145,12 @@ fn cell(text: &str) -> Result<Cell, String> {
         .filter(|v| CELL.contains(v))
         .map(Cell::Mm)
         .ok_or_else(|| "give a positive number of millimetres, such as 0.05, or auto".to_owned())
+}
+
+/// The words of all engines.
+fn engine_words() -> impl TypedValueParser<Value = EngineChoice> {
+    PossibleValuesParser::new(EngineChoice::words())
+        .map(|word| EngineChoice::from_word(&word).unwrap_or_default())
 }
 
 #[cfg(test)]

@@ -3,9 +3,8 @@
 use std::path::Path;
 
 use super::error::CliError;
-use super::load::{Loaded, load_part};
-use super::run::lay_out_before_planning;
-use scene::{Scene, complete_toml};
+use job::Session;
+use scene::complete_toml;
 
 /// What `check` prints: the complete scene, which can be run again, after what was found in
 /// comments.
@@ -13,9 +12,7 @@ use scene::{Scene, complete_toml};
 /// # Errors
 /// [`CliError`] when the scene could not be run.
 pub fn check(path: &Path) -> Result<String, CliError> {
-    let mut scene = Scene::read(path)?;
-    let Loaded { part, notes, .. } = load_part(&scene)?;
-    let (grid, note) = lay_out_before_planning(&scene, &part).map_err(CliError::grid(&scene))?;
+    let Session { mut scene, part, cells: (grid, note), notes, .. } = Session::open(path)?;
     scene.simulation.cell = grid.cell;
     let (bounds, size) = (part.bounds(), part.bounds().size());
     let mut found = vec![format!("{} is valid. Every default in effect:", path.display())];

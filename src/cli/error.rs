@@ -4,126 +4,18 @@ use std::path::{Path, PathBuf};
 
 use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme};
 
-use part::PartError;
-use report::ReportError;
+use job::JobError;
 use scallop::ScallopError;
-use scene::{Engine, Scene, SceneError};
-use sim::{GridError, OppositeAxes, RaysError, VoxelError};
-use toolpath::PlanError;
+use scene::SceneError;
 use work::monitor::Cancelled;
 
 /// Why a command could not be done.
 #[derive(Debug, thiserror::Error, Diagnostic)]
 pub enum CliError {
-    /// The scene, or a file that it names, cannot be used.
+    /// The job could not be done.
     #[error(transparent)]
     #[diagnostic(transparent)]
-    Scene(#[from] SceneError),
-    /// The part's surface cannot be searched.
-    #[error("{scene}: the part cannot be used: {reason}")]
-    #[diagnostic(help("change [part] in the scene"))]
-    Part {
-        /// The scene, as its messages call it.
-        scene: String,
-        /// What is wrong with the surface.
-        reason: PartError,
-    },
-    /// No grid could be laid out.
-    #[error("{scene}: the stock cannot be simulated: {reason}")]
-    #[diagnostic(help("choose another `cell` or `memory_mib` in [simulation], or `--cell`"))]
-    Grid {
-        /// The scene, as its messages call it.
-        scene: String,
-        /// What is wrong with the grid.
-        reason: GridError,
-    },
-    /// A toolpath could not be planned.
-    #[error("{scene}: the toolpath \"{name}\" could not be planned: {reason}")]
-    #[diagnostic(help("change or delete that [[toolpath]] in the scene"))]
-    Plan {
-        /// The scene, as its messages call it.
-        scene: String,
-        /// Name of the toolpath.
-        name: String,
-        /// What the planner said.
-        reason: PlanError,
-    },
-    /// The machine cannot run a toolpath.
-    #[error("{scene}: the machine cannot run the toolpath \"{name}\": {reason}")]
-    #[diagnostic(help("change [machine.kinematics] or that [[toolpath]] in the scene"))]
-    Machine {
-        /// The scene, as its messages call it.
-        scene: String,
-        /// Name of the toolpath.
-        name: String,
-        /// Why not.
-        reason: String,
-    },
-    /// The engine does not know tilted cutters.
-    #[error(
-        "{scene}: the toolpath \"{name}\" tilts the cutter, and the engine `{engine}` knows upright ones only"
-    )]
-    #[diagnostic(help("write `engine = \"rays\"` or \"auto\" in [simulation], or delete `--engine`"))]
-    Engine {
-        /// The scene, as its messages call it.
-        scene: String,
-        /// Name of the toolpath.
-        name: String,
-        /// The engine.
-        engine: &'static str,
-    },
-    /// Pockets have no normals to be measured along.
-    #[error(
-        "{scene}: the toolpath \"{name}\" mills a pocket, and the engines `rays` and `voxel` measure surfaces"
-    )]
-    #[diagnostic(help("write `engine = \"zmap\"` or \"auto\" in [simulation], or delete `--engine`"))]
-    PocketAlongNormals {
-        /// The scene, as its messages call it.
-        scene: String,
-        /// Name of the toolpath.
-        name: String,
-    },
-    /// A tilted path cannot be simulated.
-    #[error("{scene}: the toolpath \"{name}\" cannot be simulated: {reason}")]
-    #[diagnostic(help("change the `axis` of that [[toolpath]]"))]
-    Turn {
-        /// The scene, as its messages call it.
-        scene: String,
-        /// Name of the toolpath.
-        name: String,
-        /// What is wrong with its moves.
-        reason: OppositeAxes,
-    },
-    /// The solid cannot be cut into voxels.
-    #[error("{scene}: the solid of the toolpath \"{name}\" cannot be cut: {reason}")]
-    #[diagnostic(help("write another `voxel`, or a greater `memory_mib`, in [simulation]"))]
-    Voxels {
-        /// The scene, as its messages call it.
-        scene: String,
-        /// Name of the toolpath.
-        name: String,
-        /// What is wrong.
-        reason: VoxelError,
-    },
-    /// The places along the normals take more memory than allowed.
-    #[error(
-        "{scene}: places {spacing} mm apart on the part need {needed_mib} MiB, and {allowed_mib} MiB are allowed"
-    )]
-    #[diagnostic(help(
-        "write `cell = {fitting}` or a greater one, or a greater `memory_mib`, in [simulation]"
-    ))]
-    Places {
-        /// The scene, as its messages call it.
-        scene: String,
-        /// What was asked for, mm.
-        spacing: f64,
-        /// What the run would need.
-        needed_mib: u64,
-        /// What it may take.
-        allowed_mib: u32,
-        /// Spacing that fits, mm.
-        fitting: f64,
-    },
+    Job(JobError),
     /// No scallop follows from what was asked.
     #[error("no scallop can be calculated: {0}")]
     #[diagnostic(help("`millstream scallop --help` tells what can be asked"))]
@@ -148,9 +40,6 @@ pub enum CliError {
         /// What the system said.
         reason: String,
     },
-    /// A figure cannot stand in the report.
-    #[error(transparent)]
-    Report(#[from] ReportError),
     /// The threads could not be started.
     #[error("cannot start the threads: {0}")]
     #[diagnostic(help("ask for fewer with --threads"))]
@@ -166,51 +55,25 @@ impl From<Cancelled> for CliError {
     }
 }
 
+impl From<JobError> for CliError {
+    fn from(error: JobError) -> Self {
+        match error {
+            JobError::Cancelled(_) => Self::Interrupted,
+            other => Self::Job(other),
+        }
+    }
+}
+
+impl From<SceneError> for CliError {
+    fn from(error: SceneError) -> Self {
+        Self::Job(error.into())
+    }
+}
+
 impl CliError {
     /// For results that could not be written: `map_err(CliError::output(path))`.
     pub fn output(path: &Path) -> impl Fn(std::io::Error) -> Self + use<'_> {
         |error| Self::Output { path: path.to_owned(), reason: error.to_string() }
-    }
-
-    /// For parts that a scene's formula does not make: `map_err(CliError::part(scene))`.
-    pub fn part(scene: &Scene) -> impl Fn(PartError) -> Self + use<'_> {
-        |reason| Self::Part { scene: scene.source.name.clone(), reason }
-    }
-
-    /// For grids that do not fit: `map_err(CliError::grid(scene))`.
-    pub fn grid(scene: &Scene) -> impl Fn(GridError) -> Self + use<'_> {
-        |reason| Self::Grid { scene: scene.source.name.clone(), reason }
-    }
-
-    /// For an engine that does not know tilted cutters.
-    pub fn engine(scene: &Scene, name: &str, engine: Engine) -> Self {
-        Self::Engine { scene: scene.source.name.clone(), name: name.to_owned(), engine: engine.name() }
-    }
-
-    /// For paths with turns that no engine knows: `map_err(CliError::rays(scene, name))`.
-    pub fn rays(scene: &Scene, name: &str) -> impl Fn(RaysError) -> Self {
-        |reason| match reason {
-            RaysError::Cancelled(_) => Self::Interrupted,
-            RaysError::Opposite(reason) => {
-                Self::Turn { scene: scene.source.name.clone(), name: name.to_owned(), reason }
-            }
-        }
-    }
-
-    /// For solids that do not fit.
-    pub fn voxels(scene: &Scene, name: &str, reason: VoxelError) -> Self {
-        match reason {
-            VoxelError::Cancelled(_) => Self::Interrupted,
-            reason => Self::Voxels { scene: scene.source.name.clone(), name: name.to_owned(), reason },
-        }
-    }
-
-    /// A planner's error, told with the toolpath's name.
-    pub fn plan(scene: &Scene, name: &str, reason: PlanError) -> Self {
-        match reason {
-            PlanError::Cancelled(_) => Self::Interrupted,
-            reason => Self::Plan { scene: scene.source.name.clone(), name: name.to_owned(), reason },
-        }
     }
 }
 
@@ -229,9 +92,11 @@ pub fn render(error: &CliError, colour: bool) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use scene::Scene;
+    use sim::GridError;
 
     fn message(text: &str) -> String {
-        render(&CliError::Scene(Scene::parse("scenes/wave.toml", text).unwrap_err()), false)
+        render(&CliError::from(Scene::parse("scenes/wave.toml", text).unwrap_err()), false)
     }
 
     #[test]
@@ -254,7 +119,7 @@ mod tests {
     fn errors_without_a_place_name_the_cure() {
         insta::assert_snapshot!(render(&CliError::Interrupted, false));
         insta::assert_snapshot!(render(
-            &CliError::Grid { scene: "plate.toml".into(), reason: GridError::Cell(-1.0) },
+            &CliError::Job(JobError::Grid { scene: "plate.toml".into(), reason: GridError::Cell(-1.0) }),
             false
         ));
     }

@@ -6,10 +6,7 @@
 mod args;
 mod check;
 mod error;
-mod load;
 mod outputs;
-mod pocket;
-mod program;
 mod progress;
 mod run;
 mod scallop;

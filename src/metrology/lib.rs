@@ -11,6 +11,7 @@ mod along_normals;
 mod closer;
 mod cut_surface;
 mod engagement;
+mod engines;
 mod figures;
 #[cfg(test)]
 mod flat_scene;
@@ -35,6 +36,10 @@ pub use along_normals::{
 };
 pub use cut_surface::CutSurface;
 pub use engagement::{ContactArcs, contact_arcs};
+pub use engines::{
+    Budget, ENGINES, Engine, EngineChoice, EngineError, LaidOut, MIB, Measured, REACH_OVER_UNCUT, Simulation,
+    Task, View,
+};
 pub use figures::{
     DeviationFigures, GougeFigures, GougeRegion, Limits, Measurement, PathFigures, ScallopFigures,
     UncutFigures, UncutRegion,

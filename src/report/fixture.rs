@@ -1,19 +1,28 @@
-//! A small made-up measurement for the tests of this folder.
+//! A small made-up report for the tests of this folder.
 
-use super::{RunReport, SimulationFigures, SurfaceMeshFigures, ToolpathResult, Verdict, violations};
+use super::{
+    Figure, FigureTable, RunReport, SimulationFigures, SurfaceMeshFigures, ToolpathResult, Verdict, Violation,
+};
 use metrology::{
-    DeviationFigures, GougeFigures, GougeRegion, Limits, Measurement, PairFigures, PathFigures, Refined,
-    RoughnessFigures, ScallopFigures, ScallopPair, UncutFigures,
+    DeviationFigures, GougeFigures, GougeRegion, Limits, PathFigures, ScallopFigures, UncutFigures,
 };
 
 pub const LIMITS: Limits = Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chord: 0.001 };
 
+/// The core figures of one toolpath.
+struct Measured {
+    scallop: ScallopFigures,
+    gouge: GougeFigures,
+    uncut: UncutFigures,
+    deviation: DeviationFigures,
+}
+
 /// A clean surface but for one gouge of the given depth, mm.
-pub fn measurement(gouge: f64) -> Measurement {
+fn measurement(gouge: f64) -> Measured {
     let at_mm = [12.5, 7.25, -1.0 - gouge];
     let region = GougeRegion { depth_mm: gouge, area_mm2: 0.25, at_mm, move_index: 1234, line: 1240 };
     let regions = if gouge > LIMITS.gouge { vec![region] } else { Vec::new() };
-    Measurement {
+    Measured {
         scallop: ScallopFigures {
             target_mm: LIMITS.scallop,
             max_mm: Some(0.0105),
@@ -41,19 +50,12 @@ pub fn measurement(gouge: f64) -> Measurement {
             rms_mm: 0.005,
             area_mm2: 1200.0,
         },
-        deviation_map: Vec::new(),
-        ridge_samples: Vec::new(),
-        pairs: PairFigures {
-            reason: Some("no ridge stands between passes on the part".into()),
-            ..PairFigures::default()
-        },
-        refined: Refined::default(),
     }
 }
 
 pub fn toolpath(name: &str, machining_time_s: f64, gouge: f64) -> ToolpathResult {
     let measured = measurement(gouge);
-    let violations = violations(&measured, &LIMITS);
+    let violations = measured.gouge.regions.iter().map(|_| violation()).collect::<Vec<_>>();
     ToolpathResult {
         name: name.to_owned(),
         strategy: "zigzag".to_owned(),
@@ -73,20 +75,11 @@ pub fn toolpath(name: &str, machining_time_s: f64, gouge: f64) -> ToolpathResult
             sharp_turns: 2,
             machining_time_s,
         },
-        shortest: None,
-        field: None,
-        machine: None,
         scallop: measured.scallop,
-        scallop_pairs: measured.pairs,
-        roughness: None,
         gouge: measured.gouge,
         uncut: measured.uncut,
         deviation: measured.deviation,
-        sections: Vec::new(),
-        removal: None,
-        pocket: None,
-        solid: None,
-        offset: None,
+        figures: Vec::new(),
         simulation: SimulationFigures {
             engine: "reference",
             cell_mm: 0.05,
@@ -102,53 +95,37 @@ pub fn toolpath(name: &str, machining_time_s: f64, gouge: f64) -> ToolpathResult
     }
 }
 
-/// Two passes that are parallel and meet in a ridge.
-fn pairs() -> PairFigures {
-    let pair = ScallopPair {
-        passes: [3, 4],
-        crossings: 400,
-        ridge_length_mm: 40.0,
-        measured_mean_mm: 0.0071,
-        measured_max_mm: 0.0105,
-        calculated_places: 80,
-        parallel: true,
-        calculated_mean_mm: Some(0.00709),
-        calculated_max_mm: Some(0.01049),
-        section_mean_mm: Some(0.00705),
-        calculated_over_measured: Some(0.9986),
-        greatest_difference_mm: Some(0.00001),
+/// As the rule tells it.
+fn violation() -> Violation {
+    let text = "gouge 32.0 ± 0.50 µm deep (limit 5.00) at x 12.500 y 7.250 z -1.032, move 1234, toolpath.nc line 1240";
+    Violation { what: "gouge", limit_mm: LIMITS.gouge, measured_mm: 0.032, text: text.to_owned() }
+}
+
+/// A figure with all that one can have.
+fn figure() -> Figure {
+    let table = FigureTable {
+        title: "Sections",
+        caption: "One row a section.",
+        columns: vec!["height mm", "mean µm"],
+        rows: vec![vec!["5".to_owned(), "0.25".to_owned()]],
     };
-    PairFigures {
-        pair_count: 1,
-        parallel_count: 1,
-        calculated_over_measured: Some(0.9986),
-        parallel_calculated_over_measured: Some(0.9986),
-        parallel_greatest_mean_difference: Some(0.0014),
-        parallel_greatest_difference_mm: Some(0.00001),
-        parallel_section_over_measured: Some(0.993),
-        error_bound_mm: Some(1e-9),
-        reason: None,
-        pairs: vec![pair],
+    Figure {
+        key: "roughness",
+        value: serde_json::json!({ "ra_mm": 0.0018, "rz_mm": 0.0071, "profiles": 22 }),
+        rows: vec![("roughness Ra, Rz across the feed", "1.80 ± 0.02, 7.10 ± 0.02 µm".to_owned())],
+        meaning: Some(("roughness", "Ra and Rz of profiles of the deviation across the feed.")),
+        sentence: Some((
+            "Roughness across the feed, µm",
+            "Ra 1.80 ± 0.02, Rz 7.10 ± 0.02: zigzag".to_owned(),
+        )),
+        table: Some(table),
+        files: Vec::new(),
     }
 }
 
 /// A zigzag that gouges and a streamline that does not.
 pub fn report() -> RunReport {
     let mut toolpaths = vec![toolpath("zigzag", 402.0, 0.032), toolpath("streamline", 385.0, 0.001)];
-    toolpaths[0].scallop_pairs = pairs();
-    toolpaths[0].roughness = Some(RoughnessFigures {
-        ra_mm: Some(0.0018),
-        rz_mm: Some(0.0071),
-        ra_max_mm: Some(0.0026),
-        rz_max_mm: Some(0.0101),
-        rz_max_at_mm: Some([3.0, 4.0, 0.5]),
-        error_bound_mm: Some(0.00002),
-        max_error_bound_mm: Some(0.00004),
-        profiles: 22,
-        intervals_per_sampling_length: [2, 3],
-        sampling_length_mm: Some(1.5),
-        samples_per_interval: 24,
-        reason: None,
-    });
+    toolpaths[0].figures.push(figure());
     RunReport::new("wave.toml".into(), "0123abcd".into(), "Wave".into(), &LIMITS, toolpaths)
 }

@@ -35,7 +35,7 @@ pub fn html_page(report: &RunReport, pages: &[ToolpathPage], scene: &str) -> Str
         }
         section { h2 { "Comparison" } (comparison(report)) (tolerances(report)) }
         @for (toolpath, page) in report.toolpaths.iter().zip(pages) { (toolpath_section(toolpath, page)) }
-        section id="figures" { h2 { "What the figures mean" } (meanings()) }
+        section id="figures" { h2 { "What the figures mean" } (meanings(report)) }
         section {
             h2 { "Scene" }
             p.faint { "SHA-256 " code { (report.scene_sha256) } }
@@ -126,10 +126,9 @@ fn tolerances(report: &RunReport) -> Markup {
     }
 }
 
-/// What each figure is and what the ± behind it bounds. The same for every run: whoever reads the
-/// page may never have seen the program.
-fn meanings() -> Markup {
-    let rows = [
+/// What each figure is and what the ± behind it bounds: whoever reads the page may never have seen the program.
+fn meanings(report: &RunReport) -> Markup {
+    let mut rows = vec![
         (
             "±",
             "Bound of the figure's own error: the true value differs by no more. A limit counts as violated \
@@ -159,29 +158,16 @@ fn meanings() -> Markup {
              between cells, so the greatest deviation is a little below the highest scallop.",
         ),
         (
-            "roughness",
-            "Ra and Rz of profiles of the deviation across the feed, at places spread over the part; the mean line is the \
-             mean of each sampling length, one to three path intervals, five of which make a profile. Its ± is how far \
-             off a profile's figures may be; how they differ over the part is not in it.",
-        ),
-        (
-            "calculated",
-            "The scallop that two neighbouring passes of a ball should leave by the finished path and the design alone, \
-             beside the measured one at the same places (scallop_pairs.csv has every pair). Passes are parallel where \
-             their directions differ by no more than a degree.",
-        ),
-        (
-            "removal",
-            "What the moves take from the stock in the order of the program, at the programmed feed. The rate \
-             is the mean over a few cells of travel; engagement is how high the cutter meets stock and how \
-             wide a move cuts. No rapid move may touch stock.",
-        ),
-        (
             "time",
             "All moves at their feeds, as far as the machine's acceleration and cornering allow. Jerk and the \
              control's own limits are not in it: machines take somewhat longer.",
         ),
     ];
+    for meaning in report.toolpaths.iter().flat_map(|t| &t.figures).filter_map(|figure| figure.meaning) {
+        if !rows.contains(&meaning) {
+            rows.push(meaning);
+        }
+    }
     html! { dl.words { @for (word, meaning) in rows { dt { (word) } dd { (meaning) } } } }
 }
 
@@ -203,7 +189,7 @@ fn toolpath_section(t: &ToolpathResult, page: &ToolpathPage) -> Markup {
                 figcaption { "Deviation of the cut surface along the design normal. Red stands above the design, blue below; each side of the key has its own scale and ends at its limit, rounded up. Grey is off the part. Where several cells share a pixel, the worst of them shows. " (ringed(t)) }
             }
             (regions(t))
-            (sections(t))
+            (tables(t))
             figure {
                 @if let Some(histogram) = &page.histogram {
                     (PreEscaped(histogram.svg()))
@@ -219,7 +205,7 @@ fn toolpath_section(t: &ToolpathResult, page: &ToolpathPage) -> Markup {
                 }
             }
             @if let Some([field, interval]) = &page.field_pngs { (planned(t, field, interval)) }
-            (method(t))
+            (method(t, page.field_pngs.is_some()))
         }
     }
 }
@@ -261,12 +247,6 @@ fn figures(t: &ToolpathResult) -> Markup {
             "length of links, air length",
             format!("{:.1} mm, {:.1} mm", path.link_length_mm, path.air_length_mm),
         ),
-        (
-            "shortest possible cutting length",
-            t.shortest.map_or("-".to_owned(), |s| {
-                format!("{:.1} mm ({:.1} % of this path)", s.cutting_length_mm, 100.0 * s.efficiency)
-            }),
-        ),
         ("passes, cutter locations", format!("{}, {}", path.passes, path.cl_points)),
         ("links on the surface, retracts", format!("{}, {}", path.surface_links, path.retracts)),
         (
@@ -287,122 +267,8 @@ fn figures(t: &ToolpathResult) -> Markup {
         ),
         ("deviation, root mean square", format!("{} µm", micrometres(Some(deviation.rms_mm)))),
     ];
-    rows.extend(calculated_rows(t));
-    rows.extend(offset_rows(t));
-    if let Some(f) = &t.field {
-        rows.push(("singular points of the feed", f.singular_point_count.to_string()));
-        if let Some(i) = &f.interval_over_allowed {
-            let [p5, p50, p95, max] = [i.p5, i.p50, i.p95, i.max].map(|r| format!("{:.0}", 100.0 * r));
-            rows.push((
-                "interval planned, % of allowed",
-                format!("{p5}, {p50}, {p95} (5, 50, 95 %), widest {max}"),
-            ));
-        }
-    }
-    if let Some(r) = &t.removal {
-        rows.extend([
-            ("volume removed", format!("{:.0} ± {:.0} mm³", r.volume_mm3, r.volume_error_bound_mm3)),
-            (
-                "removal rate, greatest",
-                format!(
-                    "{:.0} ± {:.0} mm³/min",
-                    r.max_material_removal_rate_mm3_min, r.max_material_removal_rate_error_bound_mm3_min
-                ),
-            ),
-            (
-                "removal rate, 95 % and mean",
-                format!(
-                    "{:.0}, {:.0} mm³/min",
-                    r.p95_material_removal_rate_mm3_min, r.mean_material_removal_rate_mm3_min
-                ),
-            ),
-            (
-                "engagement, axial and radial",
-                format!("{:.2}, {:.2} mm", r.max_axial_engagement_mm, r.max_radial_engagement_mm),
-            ),
-        ]);
-    }
-    if let Some(p) = &t.pocket {
-        rows.extend([
-            ("stepover", format!("{:.3} mm", p.stepover_mm)),
-            (
-                "engagement, greatest and 95 %",
-                format!(
-                    "{:.0} ± {:.0}, {:.0} degrees",
-                    p.max_engagement_deg, p.max_engagement_error_bound_deg, p.p95_engagement_deg
-                ),
-            ),
-            (
-                "above the limit",
-                format!(
-                    "{:.1} % of the length above {:.0} degrees",
-                    100.0 * p.over_engagement_limit_fraction,
-                    p.engagement_limit_deg
-                ),
-            ),
-            ("cut beyond the walls", {
-                let bound = Some(p.wall_gouge_error_bound_mm);
-                format!("{} µm", with_bound(Some(p.wall_gouge_mm), bound))
-            }),
-            ("out of reach in corners", format!("{:.3} mm²", p.unreachable_area_mm2)),
-        ]);
-    }
+    rows.extend(t.figures.iter().flat_map(|figure| figure.rows.iter().cloned()));
     html! { dl.grid { @for (name, value) in &rows { div { dt { (name) } dd { (value) } } } } }
-}
-
-/// Roughness, and what scallops were calculated to be.
-fn calculated_rows(t: &ToolpathResult) -> Vec<(&'static str, String)> {
-    let mut rows = Vec::new();
-    if let Some(r) = &t.roughness {
-        rows.push((
-            "roughness Ra, Rz across the feed",
-            format!(
-                "{}, {} µm",
-                with_bound(r.ra_mm, r.error_bound_mm),
-                with_bound(r.rz_mm, r.error_bound_mm)
-            ),
-        ));
-    }
-    let pairs = &t.scallop_pairs;
-    let share = |ratio: Option<f64>| ratio.map_or("-".to_owned(), |r| format!("{:.2} %", 100.0 * r));
-    if pairs.calculated_over_measured.is_some() {
-        rows.push((
-            "pairs of passes, parallel ones",
-            format!("{}, {}", pairs.pair_count, pairs.parallel_count),
-        ));
-        rows.push((
-            "scallop calculated over measured",
-            format!(
-                "{}, parallel {}",
-                share(pairs.calculated_over_measured),
-                share(pairs.parallel_calculated_over_measured)
-            ),
-        ));
-    }
-    if pairs.parallel_greatest_difference_mm.is_some() {
-        rows.push((
-            "greatest difference of parallel pairs",
-            format!(
-                "{} µm, means {}",
-                micrometres(pairs.parallel_greatest_difference_mm),
-                share(pairs.parallel_greatest_mean_difference)
-            ),
-        ));
-    }
-    rows
-}
-
-/// The offset surface that the ball's centre rides on.
-fn offset_rows(t: &ToolpathResult) -> Vec<(&'static str, String)> {
-    let Some(offset) = &t.offset else { return Vec::new() };
-    let distance = offset.distance.map_or("-".to_owned(), |d| {
-        let bound = bound(d.error_bound_mm);
-        format!("{:.4} to {:.4} mm ± {bound} µm, asked {} mm", d.least_mm, d.greatest_mm, offset.asked_mm)
-    });
-    vec![
-        ("offset surface off the design", distance),
-        ("places as hollow as the ball", offset.singular_place_count.to_string()),
-    ]
 }
 
 fn regions(t: &ToolpathResult) -> Markup {
@@ -430,20 +296,15 @@ fn regions(t: &ToolpathResult) -> Markup {
     }
 }
 
-/// Deviation at a blade's sections.
-fn sections(t: &ToolpathResult) -> Markup {
+/// The tables of further figures.
+fn tables(t: &ToolpathResult) -> Markup {
     html! {
-        @if !t.sections.is_empty() {
-            h3 { "Deviation at the sections" }
-            p.faint { "At the row of places nearest to each section, along the normals of the design." }
+        @for table in t.figures.iter().filter_map(|figure| figure.table.as_ref()) {
+            h3 { (table.title) }
+            p.faint { (table.caption) }
             table.figures {
-                thead { tr { th { "height mm" } th { "from µm" } th { "to µm" } th { "mean µm" } th { "places" } th { "rows off it, mm" } } }
-                tbody { @for s in &t.sections {
-                    tr {
-                        td { (s.height_mm) } td { (micrometres(Some(s.min_mm))) } td { (micrometres(Some(s.max_mm))) }
-                        td { (micrometres(Some(s.mean_mm))) } td { (s.places) } td { (format!("{:.3}", s.row_off_mm)) }
-                    }
-                } }
+                thead { tr { @for name in &table.columns { th { (name) } } } }
+                tbody { @for row in &table.rows { tr { @for text in row { td { (text) } } } } }
             }
         }
     }
@@ -457,7 +318,7 @@ fn shown(listed: usize, found: usize) -> String {
     }
 }
 
-fn method(t: &ToolpathResult) -> Markup {
+fn method(t: &ToolpathResult, field: bool) -> Markup {
     let s = &t.simulation;
     html! {
         h3 { "How it was measured" }
@@ -474,7 +335,7 @@ fn method(t: &ToolpathResult) -> Markup {
             "Files: toolpath.nc (the program), toolpath.cls (cutter locations), height.exr (height, deviation and move of every cell), machined.stl and machined.ply (the part as cut, the latter coloured by deviation; "
             (t.surface_mesh.triangles) " triangles within " (bound(t.surface_mesh.tolerance_mm)) " µm of the cells"
             @if t.surface_mesh.tolerance_mm > t.scallop.target_mm { ": too coarse for ridges of the target's height; height.exr has them" }
-            "), scallop_pairs.csv (calculated and measured scallops of each pair of passes), deviation.png and height.png" @if t.field.is_some() { ", field.png and interval.png" } " (larger than here)."
+            "), scallop_pairs.csv (calculated and measured scallops of each pair of passes), deviation.png and height.png" @if field { ", field.png and interval.png" } " (larger than here)."
         }
     }
 }

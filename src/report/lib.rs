@@ -4,6 +4,7 @@
 mod canvas;
 mod comb;
 mod field_map;
+mod figure;
 #[cfg(test)]
 mod fixture;
 mod histogram;
@@ -18,16 +19,13 @@ mod verdict;
 pub use canvas::Picture;
 pub use comb::comb_picture;
 pub use field_map::{field_picture, interval_picture};
+pub use figure::{Figure, FigureFile, FigureTable, FileContent};
 pub use histogram::Histogram;
 pub use html::{ToolpathPage, html_page};
 pub use map::{MapMark, MapSize, MapWords, deviation_colours, deviation_picture, height_picture};
 pub use result::{
-    FieldFigures, JointRange, MachineFigures, ReportError, RunReport, ShortestFigures, SimulationFigures,
-    SolidFigures, SurfaceMeshFigures, ToleranceFigures, ToolpathResult,
+    ReportError, RunReport, SimulationFigures, SurfaceMeshFigures, ToleranceFigures, ToolpathResult,
 };
 pub use surface_mesh::{MAX_TRIANGLES, SurfaceMesh, VertexPlace, surface_mesh};
-pub use table::{conclusion, result_table};
-pub use verdict::{
-    HIGHEST_RIDGE, Verdict, Violation, collision, holder_note, marks, place, rapid_violation,
-    standing_collision, standing_note, tool_collision, violations, wall_violation,
-};
+pub use table::{bound, conclusion, micrometres, result_table, with_bound};
+pub use verdict::{HIGHEST_RIDGE, Verdict, Violation, place};

@@ -130,22 +130,7 @@ fn write_table(out: &mut String, report: &RunReport) -> std::fmt::Result {
     row(out, ["", "", "mm", "", "µm", "µm", "µm", "%", "mm²", "µm", ""])?;
     writeln!(out, "{}", "-".repeat(WIDTH))?;
     report.toolpaths.iter().try_for_each(|t| toolpath_row(out, t))?;
-    let efficiencies: Vec<String> = report.toolpaths.iter().filter_map(efficiency).collect();
-    if !efficiencies.is_empty() {
-        writeln!(
-            out,
-            "\nNo path below the scallop target can be shorter (widest strips, to second order) than"
-        )?;
-        efficiencies.iter().try_for_each(|text| sentence(out, text))?;
-    }
-    let roughness: Vec<String> = report.toolpaths.iter().filter_map(roughness).collect();
-    if !roughness.is_empty() {
-        writeln!(
-            out,
-            "\nRoughness across the feed, µm, and what parallel passes should leave over what was measured"
-        )?;
-        roughness.iter().try_for_each(|text| sentence(out, text))?;
-    }
+    write_sentences(out, report)?;
     for t in report.toolpaths.iter().filter(|t| !t.violations.is_empty()) {
         writeln!(out, "\n{} violates:", t.name)?;
         t.violations.iter().try_for_each(|violation| sentence(out, &violation.text))?;
@@ -161,23 +146,19 @@ fn write_table(out: &mut String, report: &RunReport) -> std::fmt::Result {
     writeln!(out, "\n{}", conclusion(report))
 }
 
-/// Roughness, and the share of the measured scallop that was calculated where passes are parallel.
-fn roughness(t: &ToolpathResult) -> Option<String> {
-    let r = t.roughness.as_ref()?;
-    let heights = format!(
-        "Ra {}, Rz {}",
-        with_bound(Some(r.ra_mm?), r.error_bound_mm),
-        with_bound(r.rz_mm, r.error_bound_mm)
-    );
-    let share = t.scallop_pairs.parallel_calculated_over_measured;
-    let scallop = share.map_or_else(String::new, |share| format!("; scallops {:.2} %", 100.0 * share));
-    Some(format!("{heights}{scallop}: {}", t.name))
-}
-
-/// What a path could be shorter by.
-fn efficiency(t: &ToolpathResult) -> Option<String> {
-    let shortest = t.shortest?;
-    Some(format!("{:.0} mm: {:.1} % of {}", shortest.cutting_length_mm, 100.0 * shortest.efficiency, t.name))
+/// The sentences of all figures, under their headings.
+fn write_sentences(out: &mut String, report: &RunReport) -> std::fmt::Result {
+    let sentences = || report.toolpaths.iter().flat_map(|t| &t.figures).filter_map(|f| f.sentence.as_ref());
+    let mut headings: Vec<&str> = Vec::new();
+    for (heading, _) in sentences() {
+        if !headings.contains(heading) {
+            headings.push(heading);
+        }
+    }
+    headings.into_iter().try_for_each(|heading| {
+        writeln!(out, "\n{heading}")?;
+        sentences().filter(|(other, _)| *other == heading).try_for_each(|(_, text)| sentence(out, text))
+    })
 }
 
 /// The outcome in a sentence.

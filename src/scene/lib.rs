@@ -32,6 +32,7 @@ use cutter::{Cutter, Holder};
 use geometry::AnalyticSurface;
 use machine::Machine;
 use metrology::Limits;
+pub use metrology::{EngineChoice, Simulation};
 use toolpath::{Joining, Step, Strategy};
 
 /// Default allowance of stock above the part's highest point, mm.
@@ -155,72 +156,6 @@ pub struct CuttingData {
     pub feed_rate: f64,
     /// Feed down to a pass, mm/min.
     pub plunge_rate: f64,
-}
-
-/// Which engine cuts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Engine {
-    /// The z-map for upright cutters, normal rays for tilted ones.
-    Auto,
-    /// Heights over the plan view by branch and bound, within 0.01 µm of the reference; upright cutters only.
-    ZMap,
-    /// Every cell under every move that can reach it, in closed form in f64; upright cutters only.
-    Reference,
-    /// The swept volume along the normals of the design surface; any cutter axis, any shape.
-    Rays,
-    /// What is left as voxels, along the normals of the design surface; any cutter axis, any shape.
-    Voxel,
-}
-
-impl Engine {
-    /// The words that a scene and the command line accept.
-    pub const WORDS: [&'static str; 5] = ["auto", "zmap", "reference", "rays", "voxel"];
-
-    /// The engine that a word stands for.
-    pub fn from_word(word: &str) -> Option<Self> {
-        let all = [Self::Auto, Self::ZMap, Self::Reference, Self::Rays, Self::Voxel];
-        all.into_iter().find(|engine| engine.name() == word)
-    }
-
-    /// Its word.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Auto => Self::WORDS[0],
-            Self::ZMap => Self::WORDS[1],
-            Self::Reference => Self::WORDS[2],
-            Self::Rays => Self::WORDS[3],
-            Self::Voxel => Self::WORDS[4],
-        }
-    }
-
-    /// The engine that cuts a path, upright or tilted.
-    pub fn for_path(self, tilted: bool) -> Self {
-        match (self, tilted) {
-            (Self::Auto, true) => Self::Rays,
-            (Self::Auto, false) => Self::ZMap,
-            (engine, _) => engine,
-        }
-    }
-}
-
-/// How the stock is simulated.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Simulation {
-    /// Pitch of the cells, mm.
-    pub cell: f64,
-    /// True when the scene leaves the cell to the program (`"auto"`, or no word about it), which may
-    /// then make it coarser to fit into the memory.
-    pub cell_is_auto: bool,
-    /// Memory that one simulation may take, MiB.
-    pub memory_mib: u32,
-    /// Which engine cuts.
-    pub engine: Engine,
-    /// Whether the stock is also cut in the order of the program, for what each move removes.
-    pub removal: bool,
-    /// Error bound that is asked of the highest scallop, the deepest gouge and the highest uncut place, mm.
-    pub error_bound: f64,
-    /// Voxel of the solid that is left, mm, where it is asked for.
-    pub voxel: Option<f64>,
 }
 
 /// One toolpath to plan.

@@ -8,8 +8,8 @@ use toml::de::DeTable;
 use super::{
     CuttingData, DEFAULT_ALLOWANCE, DEFAULT_CLEARANCE, DEFAULT_CONTROL_POINTS, DEFAULT_DEGREE,
     DEFAULT_FEED_RATE, DEFAULT_LIMITS, DEFAULT_MARGIN, DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE,
-    DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, Engine, MeshFormat, NamedFile, OutlineSource, PartSource, Scene,
-    Simulation, Stock, ToolpathRequest, auto_cell, default_error_bound,
+    DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, EngineChoice, MeshFormat, NamedFile, OutlineSource, PartSource,
+    Scene, Simulation, Stock, ToolpathRequest, auto_cell, default_error_bound,
 };
 use super::{axis, blade, classic, direction, formula, interference, kinematics, pocket};
 use cutter::{AptWord, AptWords, Cutter, CutterError, CutterShape, Holder, HolderSection};
@@ -436,12 +436,13 @@ fn read_simulation(
         "[simulation]",
     )?;
     let cell = section.length_or_word("cell", "auto")?;
-    let engine = section.word("engine", &Engine::WORDS)?.and_then(|word| Engine::from_word(word.value));
+    let engine =
+        section.word("engine", &EngineChoice::words())?.and_then(|word| EngineChoice::from_word(word.value));
     Ok(Simulation {
         cell: cell.unwrap_or_else(|| auto_cell(cutter, &[])),
         cell_is_auto: cell.is_none(),
         memory_mib: section.count("memory_mib", 1..=1 << 20)?.unwrap_or(DEFAULT_MEMORY_MIB),
-        engine: engine.unwrap_or(Engine::Auto),
+        engine: engine.unwrap_or_default(),
         removal: section.flag("removal")?.unwrap_or(DEFAULT_REMOVAL),
         error_bound: section.length("error_bound")?.map_or_else(|| default_error_bound(limits), |v| v.value),
         voxel: section.length("voxel")?.map(|v| v.value),

@@ -56,7 +56,7 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     writeln!(out, "\n[simulation]")?;
     writeln!(out, "cell = {}  # mm", number(scene.simulation.cell))?;
     writeln!(out, "memory_mib = {}", scene.simulation.memory_mib)?;
-    writeln!(out, "engine = {}", text(scene.simulation.engine.name()))?;
+    writeln!(out, "engine = {}", text(scene.simulation.engine.word()))?;
     writeln!(out, "removal = {}  # what each move removes, and rapids in stock", scene.simulation.removal)?;
     writeln!(
         out,

@@ -18,6 +18,11 @@ pub fn map<T: Send>(n: usize, f: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
     (0..n).into_par_iter().map(f).collect()
 }
 
+/// Threads of the pool in which the call runs.
+pub fn threads() -> usize {
+    rayon::current_num_threads()
+}
+
 /// The results of two pieces of work of different kinds, done at the same time where a thread is
 /// free.
 pub fn join<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {

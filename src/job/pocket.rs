@@ -1,6 +1,6 @@
 //! A scene's pocket: its region from a drawing or the scene's points, and the floor that is measured.
 
-use super::error::CliError;
+use super::JobError;
 use field::fill;
 use geometry::{Point3, Region, TriangleMesh};
 use io::outline;
@@ -65,8 +65,8 @@ pub fn pocket_of(
 /// The part that is measured: the floor that the scene's cutter can reach, as far as its passes come.
 ///
 /// # Errors
-/// [`CliError`] when the cutter fits nowhere.
-pub fn floor_part(scene: &Scene, pocket: &Pocket) -> Result<Part, CliError> {
+/// [`JobError`] when the cutter fits nowhere.
+pub fn floor_part(scene: &Scene, pocket: &Pocket) -> Result<Part, JobError> {
     let clear = CHORDS_FROM_WALLS * scene.tolerance.chord + RADIUS_FROM_WALLS * scene.cutter.radius();
     let floor = pocket.reachable_floor(&scene.cutter).inset(clear);
     if floor.is_empty() {
@@ -113,7 +113,7 @@ pub fn pocket_figures(
     path: &Toolpath,
     cut: &ZMap,
     top: f64,
-    (engaged, engagement_bound): (Engagement, f64),
+    (engaged, engagement_bound): &(Engagement, f64),
 ) -> PocketFigures {
     let cutter = &scene.cutter;
     let (wall_gouge_mm, wall_gouge_move) = wall_gouge_of_moves(&pocket.region, cutter, path, top);

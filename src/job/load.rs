@@ -2,7 +2,7 @@
 
 use nalgebra::{Translation3, UnitQuaternion};
 
-use super::error::CliError;
+use super::JobError;
 use super::pocket::{floor_part, pocket_of};
 use blade::{Blade, BladeSettings};
 use geometry::{Isometry3, MeshError, TriangleMesh};
@@ -23,8 +23,8 @@ pub struct Loaded {
 /// Loads the part.
 ///
 /// # Errors
-/// [`CliError`] when the part is refused; a file's fault is shown at its name in the scene.
-pub fn load_part(scene: &Scene) -> Result<Loaded, CliError> {
+/// [`JobError`] when the part is refused; a file's fault is shown at its name in the scene.
+pub fn load_part(scene: &Scene) -> Result<Loaded, JobError> {
     let (part, notes) = match &scene.part {
         PartSource::Blade(request) => return load_blade(scene, request),
         PartSource::Pocket { outline, depth } => {
@@ -32,7 +32,7 @@ pub fn load_part(scene: &Scene) -> Result<Loaded, CliError> {
             (floor_part(scene, &pocket)?, notes)
         }
         PartSource::Formula { surface } => {
-            let part = of_patches(vec![Patch::Analytic(*surface)]).map_err(CliError::part(scene))?;
+            let part = of_patches(vec![Patch::Analytic(*surface)]).map_err(JobError::part(scene))?;
             (part, Vec::new())
         }
         PartSource::Nurbs { file } => {
@@ -50,7 +50,7 @@ pub fn load_part(scene: &Scene) -> Result<Loaded, CliError> {
     Ok(Loaded { part, blade: None, notes })
 }
 
-fn load_blade(scene: &Scene, request: &BladeRequest) -> Result<Loaded, CliError> {
+fn load_blade(scene: &Scene, request: &BladeRequest) -> Result<Loaded, JobError> {
     let file = &request.file;
     let sections = section_table::read(&file.path).map_err(|e| refused(scene, file, e))?;
     let [x, y, z] = request.rotate;
@@ -71,13 +71,13 @@ fn load_blade(scene: &Scene, request: &BladeRequest) -> Result<Loaded, CliError>
 /// Reads a mesh, in mm. The notes tell what was mended to make it usable.
 ///
 /// # Errors
-/// [`CliError`]: the file's fault, shown at its name in the scene.
+/// [`JobError`]: the file's fault, shown at its name in the scene.
 pub fn load_mesh(
     scene: &Scene,
     file: &NamedFile,
     format: MeshFormat,
     scale: f64,
-) -> Result<(TriangleMesh, Vec<String>), CliError> {
+) -> Result<(TriangleMesh, Vec<String>), JobError> {
     let read = match format {
         MeshFormat::Stl => stl::read(&file.path),
         MeshFormat::Obj => obj::read(&file.path),

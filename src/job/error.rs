@@ -1,0 +1,168 @@
+//! Why a job could not be done.
+
+use miette::Diagnostic;
+
+use metrology::EngineError;
+use part::PartError;
+use report::ReportError;
+use scene::{Scene, SceneError};
+use sim::{GridError, OppositeAxes, VoxelError};
+use toolpath::PlanError;
+use work::monitor::Cancelled;
+
+/// Why a job could not be done; each tells what, where, and the cure.
+#[derive(Debug, thiserror::Error, Diagnostic)]
+pub enum JobError {
+    /// The scene, or a file that it names, cannot be used.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Scene(#[from] SceneError),
+    /// The part's surface cannot be searched.
+    #[error("{scene}: the part cannot be used: {reason}")]
+    #[diagnostic(help("change [part] in the scene"))]
+    Part {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// What is wrong with the surface.
+        reason: PartError,
+    },
+    /// No grid could be laid out.
+    #[error("{scene}: the stock cannot be simulated: {reason}")]
+    #[diagnostic(help("choose another `cell` or `memory_mib` in [simulation], or `--cell`"))]
+    Grid {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// What is wrong with the grid.
+        reason: GridError,
+    },
+    /// A toolpath could not be planned.
+    #[error("{scene}: the toolpath \"{name}\" could not be planned: {reason}")]
+    #[diagnostic(help("change or delete that [[toolpath]] in the scene"))]
+    Plan {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// Name of the toolpath.
+        name: String,
+        /// What the planner said.
+        reason: PlanError,
+    },
+    /// The machine cannot run a toolpath.
+    #[error("{scene}: the machine cannot run the toolpath \"{name}\": {reason}")]
+    #[diagnostic(help("change [machine.kinematics] or that [[toolpath]] in the scene"))]
+    Machine {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// Name of the toolpath.
+        name: String,
+        /// Why not.
+        reason: String,
+    },
+    /// The engine does not know tilted cutters.
+    #[error(
+        "{scene}: the toolpath \"{name}\" tilts the cutter, and the engine `{engine}` knows upright ones only"
+    )]
+    #[diagnostic(help("write `engine = \"rays\"` or \"auto\" in [simulation], or delete `--engine`"))]
+    Upright {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// Name of the toolpath.
+        name: String,
+        /// The engine.
+        engine: &'static str,
+    },
+    /// Pockets have no normals to be measured along.
+    #[error(
+        "{scene}: the toolpath \"{name}\" mills a pocket, and the engines `rays` and `voxel` measure surfaces"
+    )]
+    #[diagnostic(help("write `engine = \"zmap\"` or \"auto\" in [simulation], or delete `--engine`"))]
+    PocketAlongNormals {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// Name of the toolpath.
+        name: String,
+    },
+    /// A tilted path cannot be simulated.
+    #[error("{scene}: the toolpath \"{name}\" cannot be simulated: {reason}")]
+    #[diagnostic(help("change the `axis` of that [[toolpath]]"))]
+    Turn {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// Name of the toolpath.
+        name: String,
+        /// What is wrong with its moves.
+        reason: OppositeAxes,
+    },
+    /// The solid cannot be cut into voxels.
+    #[error("{scene}: the solid of the toolpath \"{name}\" cannot be cut: {reason}")]
+    #[diagnostic(help("write another `voxel`, or a greater `memory_mib`, in [simulation]"))]
+    Voxels {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// Name of the toolpath.
+        name: String,
+        /// What is wrong.
+        reason: VoxelError,
+    },
+    /// The places along the normals take more memory than allowed.
+    #[error(
+        "{scene}: places {spacing} mm apart on the part need {needed_mib} MiB, and {allowed_mib} MiB are allowed"
+    )]
+    #[diagnostic(help(
+        "write `cell = {fitting}` or a greater one, or a greater `memory_mib`, in [simulation]"
+    ))]
+    Places {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// What was asked for, mm.
+        spacing: f64,
+        /// What the run would need.
+        needed_mib: u64,
+        /// What it may take.
+        allowed_mib: u32,
+        /// Spacing that fits, mm.
+        fitting: f64,
+    },
+    /// The program could not be put into words.
+    #[error("the program cannot be written: {0}")]
+    Program(String),
+    /// A figure cannot stand in the report.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    /// The user asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl JobError {
+    /// For parts that a scene's formula does not make: `map_err(JobError::part(scene))`.
+    pub(crate) fn part(scene: &Scene) -> impl Fn(PartError) -> Self + use<'_> {
+        |reason| Self::Part { scene: scene.source.name.clone(), reason }
+    }
+
+    /// For grids that do not fit: `map_err(JobError::grid(scene))`.
+    pub(crate) fn grid(scene: &Scene) -> impl Fn(GridError) -> Self + use<'_> {
+        |reason| Self::Grid { scene: scene.source.name.clone(), reason }
+    }
+
+    /// An engine's error, told with the toolpath's name.
+    pub(crate) fn engine(scene: &Scene, name: &str, reason: EngineError) -> Self {
+        let (scene, name) = (scene.source.name.clone(), name.to_owned());
+        match reason {
+            EngineError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            EngineError::Grid(reason) => Self::Grid { scene, reason },
+            EngineError::Turn(reason) => Self::Turn { scene, name, reason },
+            EngineError::Voxels(reason) => Self::Voxels { scene, name, reason },
+            EngineError::Places { spacing, needed_mib, allowed_mib, fitting } => {
+                Self::Places { scene, spacing, needed_mib, allowed_mib, fitting }
+            }
+        }
+    }
+
+    /// A planner's error, told with the toolpath's name.
+    pub(crate) fn plan(scene: &Scene, name: &str, reason: PlanError) -> Self {
+        match reason {
+            PlanError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            reason => Self::Plan { scene: scene.source.name.clone(), name: name.to_owned(), reason },
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! The figures of a toolpath beside scallop, gouge, uncut and deviation. Each is one file, which finds its numbers, tells
+//! them in words, and says what they violate; a new one is one file and one line in [`FIGURES`].
+
+mod field;
+mod holder;
+mod machine;
+mod offset;
+mod pairs;
+mod pocket;
+mod removal;
+mod roughness;
+mod sections;
+mod shortest;
+mod solid;
+mod tool_contact;
+
+use serde::Serialize;
+use serde_json::Value;
+
+use report::{Figure, FigureFile, ReportError, Violation};
+use work::monitor::{self, Monitor};
+
+use super::JobError;
+use super::run::{Finding, Run};
+
+/// All figures, in the order of report.json.
+const FIGURES: [fn(&Run<'_>, &dyn Monitor) -> Result<Finding, JobError>; 12] = [
+    shortest::find,
+    field::find,
+    machine::find,
+    pairs::find,
+    roughness::find,
+    sections::find,
+    removal::find,
+    pocket::find,
+    solid::find,
+    offset::find,
+    tool_contact::find,
+    holder::find,
+];
+
+/// What all figures found.
+#[derive(Debug, Default)]
+pub(crate) struct Found {
+    pub figures: Vec<Figure>,
+    pub notes: Vec<String>,
+    pub violations: Vec<Violation>,
+    pub files: Vec<FigureFile>,
+}
+
+/// Finds all figures of a toolpath.
+pub(crate) fn all(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Found, JobError> {
+    let mut found = Found::default();
+    for find in FIGURES {
+        monitor::check(monitor)?;
+        let Finding { figure, notes, violations } = find(run, monitor)?;
+        found.notes.extend(notes);
+        found.violations.extend(violations);
+        if let Some(mut figure) = figure {
+            found.files.append(&mut figure.files);
+            found.figures.push(figure);
+        }
+    }
+    Ok(found)
+}
+
+/// Numbers as report.json has them.
+fn value(figures: &impl Serialize) -> Result<Value, JobError> {
+    serde_json::to_value(figures).map_err(|e| ReportError::Json(e.to_string()).into())
+}
+
+/// A share as per cent with two digits.
+fn share(ratio: Option<f64>) -> String {
+    ratio.map_or("-".to_owned(), |r| format!("{:.2} %", 100.0 * r))
+}
+
+/// On how many moves more than the one that was told.
+fn more_moves(moves: usize) -> String {
+    match moves {
+        0 | 1 => String::new(),
+        2 => ", and on one more move".to_owned(),
+        n => format!(", and on {} more moves", n - 1),
+    }
+}

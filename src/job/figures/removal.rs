@@ -1,0 +1,115 @@
+//! What the moves take from the stock in the order of the program, and rapid moves in stock.
+
+use cutter::Solid;
+use metrology::{RemovalFigures, View, removal_figures, voxel_removal_figures};
+use report::{Figure, Violation, place};
+use sim::{VoxelEngine, VoxelStock, ZMap, cut_in_order};
+use work::monitor::Monitor;
+
+use super::value;
+use crate::JobError;
+use crate::run::{Finding, Run};
+
+/// What the word means.
+const MEANING: (&str, &str) = (
+    "removal",
+    "What the moves take from the stock in the order of the program, at the programmed feed. The rate \
+     is the mean over a few cells of travel; engagement is how high the cutter meets stock and how \
+     wide a move cuts. No rapid move may touch stock.",
+);
+
+/// Voxels in the block where the program chooses: more take longer than planning and measuring do, fewer leave engagement
+/// and rates rough.
+const VOXELS: f64 = 1e6;
+
+/// Where the scene asks for it.
+pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
+    if !run.scene().simulation.removal {
+        return Ok(Finding::default());
+    }
+    let mut r = match run.view() {
+        View::Heights(cut) => {
+            let stock = ZMap::block(cut.grid, run.session.top);
+            let removed = cut_in_order(stock, &run.scene().cutter, run.path(), monitor)?;
+            removal_figures(run.path(), &removed, &cut.height)
+        }
+        View::Normals { .. } => by_voxels(run, monitor)?,
+    };
+    for contact in &mut r.rapid_contacts {
+        contact.line = run.line(contact.move_index);
+    }
+    let violations = rapid_violation(&r).into_iter().collect();
+    let (greatest, bound) =
+        (r.max_material_removal_rate_mm3_min, r.max_material_removal_rate_error_bound_mm3_min);
+    let (most, mean) = (r.p95_material_removal_rate_mm3_min, r.mean_material_removal_rate_mm3_min);
+    let rows = vec![
+        ("volume removed", format!("{:.0} ± {:.0} mm³", r.volume_mm3, r.volume_error_bound_mm3)),
+        ("removal rate, greatest", format!("{greatest:.0} ± {bound:.0} mm³/min")),
+        ("removal rate, 95 % and mean", format!("{most:.0}, {mean:.0} mm³/min")),
+        (
+            "engagement, axial and radial",
+            format!("{:.2}, {:.2} mm", r.max_axial_engagement_mm, r.max_radial_engagement_mm),
+        ),
+    ];
+    let figure =
+        Figure { key: "removal", value: value(&r)?, rows, meaning: Some(MEANING), ..Figure::default() };
+    Ok(Finding { figure: Some(figure), violations, ..Finding::default() })
+}
+
+/// The voxel of removal in order, mm.
+pub(super) fn voxel_in_order(run: &Run<'_>, stock: &VoxelStock) -> f64 {
+    let about = || (stock.bounds().size().product() / VOXELS).cbrt();
+    run.scene().simulation.voxel.unwrap_or_else(about)
+}
+
+fn by_voxels(run: &Run<'_>, monitor: &dyn Monitor) -> Result<RemovalFigures, JobError> {
+    let (scene, stock) = (run.scene(), run.session.voxel_stock());
+    let voxel = voxel_in_order(run, &stock);
+    let cutter = Solid::of_cutter(&scene.cutter, scene.holder.as_ref());
+    let engine = VoxelEngine::new(&stock, &cutter, run.path()).map_err(run.voxels())?;
+    let removed = engine.removal(voxel, monitor).map_err(run.voxels())?;
+    Ok(voxel_removal_figures(run.path(), &removed, voxel))
+}
+
+/// The violation of rapid moves that touched stock, told of the first of them: on a machine it is the
+/// one that breaks the cutter.
+fn rapid_violation(removal: &RemovalFigures) -> Option<Violation> {
+    let first = removal.rapid_contacts.first()?;
+    let deepest = removal.rapid_contacts.iter().map(|c| c.depth_mm).fold(0.0, f64::max);
+    let mut text = format!(
+        "a rapid move touches stock, {:.3} mm deep, at {}, move {}",
+        first.depth_mm,
+        place(first.at_mm),
+        first.move_index
+    );
+    // Paths that tilt the tool have no program where the scene names no machine for it.
+    if first.line > 0 {
+        text += &format!(", toolpath.nc line {}", first.line);
+    }
+    match removal.rapid_contact_count {
+        0 | 1 => {}
+        2 => text += ", and one more rapid move does",
+        n => text += &format!(", and {} more rapid moves do", n - 1),
+    }
+    Some(Violation { what: "rapid", limit_mm: 0.0, measured_mm: deepest, text })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_rapid_in_stock_is_told_with_its_line() {
+        use metrology::RapidContactFigures;
+        assert_eq!(rapid_violation(&RemovalFigures::default()), None);
+        let contact =
+            |depth_mm| RapidContactFigures { move_index: 7, line: 12, at_mm: [1.0, 2.0, 3.0], depth_mm };
+        let rapid_contacts = vec![contact(0.25), contact(1.5)];
+        let removal = RemovalFigures { rapid_contacts, rapid_contact_count: 3, ..Default::default() };
+        let found = rapid_violation(&removal).unwrap();
+        assert_eq!((found.what, found.measured_mm), ("rapid", 1.5));
+        let place =
+            "0.250 mm deep, at x 1.000 y 2.000 z 3.000, move 7, toolpath.nc line 12, and 2 more rapid";
+        assert!(found.text.contains(place), "{}", found.text);
+    }
+}

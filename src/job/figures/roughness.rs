@@ -1,0 +1,67 @@
+//! Roughness across the feed.
+
+use cutter::Solid;
+use metrology::{REACH_OVER_UNCUT, RaysCut, RoughnessFigures, SweptVolume, View, path_figures, roughness};
+use report::{Figure, with_bound};
+use sim::Rays;
+use work::monitor::Monitor;
+
+use super::{share, value};
+use crate::JobError;
+use crate::run::{Finding, Run};
+
+/// What the word means.
+const MEANING: (&str, &str) = (
+    "roughness",
+    "Ra and Rz of profiles of the deviation across the feed, at places spread over the part; the mean line is the \
+     mean of each sampling length, one to three path intervals, five of which make a profile. Its ± is how far \
+     off a profile's figures may be; how they differ over the part is not in it.",
+);
+
+/// Not of pockets.
+pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
+    if run.session.pocket.is_some() {
+        return Ok(Finding::default());
+    }
+    let r = match run.view() {
+        View::Normals { rays, solid, .. } => measure(run, rays, solid, monitor)?,
+        View::Heights(_) => {
+            let solid = Solid::of_cutter(&run.scene().cutter, None);
+            let rays = Rays::new(run.path(), &solid, monitor)
+                .map_err(|reason| JobError::engine(run.scene(), &run.request.name, reason.into()))?;
+            measure(run, &rays, &solid, monitor)?
+        }
+    };
+    let [ra, rz] = [r.ra_mm, r.rz_mm].map(|height| with_bound(height, r.error_bound_mm));
+    let figure = Figure {
+        key: "roughness",
+        value: value(&r)?,
+        rows: vec![("roughness Ra, Rz across the feed", format!("{ra}, {rz} µm"))],
+        meaning: Some(MEANING),
+        sentence: r.ra_mm.map(|_| sentence(run, &ra, &rz)),
+        ..Figure::default()
+    };
+    Ok(Finding { figure: Some(figure), ..Finding::default() })
+}
+
+fn sentence(run: &Run<'_>, ra: &str, rz: &str) -> (&'static str, String) {
+    let ratio = run.measurement().pairs.parallel_calculated_over_measured;
+    let scallop =
+        ratio.map_or_else(String::new, |_| format!("; predicted / measured scallop {}", share(ratio)));
+    ("Roughness across the feed, µm", format!("Ra {ra}, Rz {rz}{scallop}: {}", run.request.name))
+}
+
+fn measure(
+    run: &Run<'_>,
+    rays: &Rays,
+    solid: &Solid,
+    monitor: &dyn Monitor,
+) -> Result<RoughnessFigures, JobError> {
+    let (scene, path) = (run.scene(), run.path());
+    let reach = REACH_OVER_UNCUT * scene.tolerance.uncut;
+    let by_rays = RaysCut { rays, path, solid };
+    let cut = SweptVolume { part: run.part(), cut: &by_rays, inward: reach, outward: reach };
+    // About how far passes are apart.
+    let interval = run.measurement().deviation.area_mm2 / path_figures(path, 0.0).cutting_length_mm;
+    Ok(roughness(run.part(), &scene.cutter, path, &cut, interval, monitor)?)
+}

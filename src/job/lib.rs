@@ -1,0 +1,23 @@
+//! A job: a scene in, plain report data out. Nothing is written and nothing is printed here.
+//!
+//! One way leads through it for every engine and for pockets: plan, cut, measure, find further figures, judge. A figure of
+//! the report is one file in `figures` and one line in their list; the rule by which a toolpath passes stands in `judge`.
+
+mod error;
+mod figures;
+mod judge;
+mod load;
+mod machined;
+mod outcome;
+mod planned;
+mod pocket;
+mod run;
+mod session;
+mod tool;
+
+pub use error::JobError;
+pub use judge::marks;
+pub use load::{Loaded, load_part};
+pub use machined::Machined;
+pub use outcome::Outcome;
+pub use session::{Session, stock_area};

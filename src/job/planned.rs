@@ -1,0 +1,193 @@
+//! Planning one toolpath: strategy, tilts, feeds, joints, program.
+
+use io::ProgramHeader;
+use io::gcode::{self, FiveAxisPost, MoveLines};
+use machine::kinematics::{JointPath, follow};
+use machine::{machining_time_turning, slow_corners};
+use metrology::contact_arcs;
+use motion::Toolpath;
+use scene::{Scene, ToolpathRequest};
+use toolpath::{
+    Engagement, OffsetDrive, Plan, PlanError, PlanSettings, Strategy, Tilting, plan, plan_pocket, plan_tilted,
+};
+use work::monitor::Monitor;
+
+use super::pocket::limit_feed_by;
+use super::tool::{FixtureMesh, Tool};
+use super::{JobError, Session};
+
+/// A planned toolpath as the machine runs it.
+#[derive(Debug)]
+pub(crate) struct Planned {
+    /// The path and what its planner says.
+    pub plan: Plan,
+    /// The strategy, with the surfaces that it rides on.
+    pub strategy: Strategy,
+    /// The path in the joints of a five-axis machine.
+    pub joints: Option<JointPath>,
+    /// The line of each move in the program; empty where there is none.
+    pub lines: MoveLines,
+    /// Engagement in a pocket, and the bound of its greatest angle, rad.
+    pub engaged: Option<(Engagement, f64)>,
+}
+
+impl Planned {
+    /// Time that the scene's machine takes, s.
+    pub fn time(&self, scene: &Scene) -> f64 {
+        let turning =
+            self.joints.as_ref().zip(scene.five_axis.as_ref()).map_or_else(Vec::new, |(joints, machine)| {
+                joints.turning_times(&machine.kinematics, self.plan.path.len())
+            });
+        machining_time_turning(&self.plan.path, &scene.machine, &turning)
+    }
+}
+
+impl Session {
+    /// Plans one toolpath.
+    pub(crate) fn plan(
+        &self,
+        request: &ToolpathRequest,
+        tool: &Tool,
+        fixtures: &[FixtureMesh],
+        monitor: &dyn Monitor,
+    ) -> Result<Planned, JobError> {
+        let scene = &self.scene;
+        let strategy = self.strategy(request)?;
+        let mut plan =
+            self.path(request, &strategy, tool, fixtures, monitor).map_err(|e| self.refused(request, e))?;
+        if scene.machine.slow_corners {
+            plan.path = slow_corners(&plan.path, &scene.machine);
+        }
+        let joints = joints(scene, &request.name, &plan.path)?;
+        let engaged = self.limit_feed(request, &mut plan.path, monitor)?;
+        let lines = lines(scene, &plan.path, joints.as_ref())?;
+        Ok(Planned { plan, strategy, joints, lines, engaged })
+    }
+
+    fn path(
+        &self,
+        request: &ToolpathRequest,
+        strategy: &Strategy,
+        tool: &Tool,
+        fixtures: &[FixtureMesh],
+        monitor: &dyn Monitor,
+    ) -> Result<Plan, PlanError> {
+        let (cutter, settings) = (&self.scene.cutter, self.settings(request));
+        if let (Some(pocket), Some(strategy)) = (&self.pocket, strategy.pocket()) {
+            return plan_pocket(pocket, cutter, strategy, &settings, monitor);
+        }
+        let Some(axis) = &request.axis else { return plan(&self.part, cutter, strategy, &settings, monitor) };
+        let keep = tool.keep_clear(&self.scene, &self.part, fixtures);
+        let tilting = Tilting {
+            axis: &axis.rule,
+            most_turning: axis.most_turning,
+            most_turning_across: axis.most_turning_across,
+            interference: Some(&keep),
+        };
+        plan_tilted(&self.part, cutter, strategy, &tilting, &settings, monitor)
+    }
+
+    fn settings(&self, request: &ToolpathRequest) -> PlanSettings {
+        PlanSettings {
+            step: request.step,
+            chord_tolerance: self.scene.tolerance.chord,
+            clearance: self.scene.clearance,
+            stock_top: self.top,
+            feed_rate: self.scene.cutting.feed_rate,
+            plunge_rate: self.scene.cutting.plunge_rate,
+            rapid_rate: self.scene.machine.rapid_rate,
+            joining: request.joining,
+        }
+    }
+
+    /// The strategy of a toolpath, with the offset surfaces that it rides on where these come from sections.
+    fn strategy(&self, request: &ToolpathRequest) -> Result<Strategy, JobError> {
+        let (Strategy::OffsetSurface { along, drive: OffsetDrive::InPlane }, Some(blade)) =
+            (&request.strategy, &self.blade)
+        else {
+            return Ok(request.strategy.clone());
+        };
+        let surfaces = blade.offset_in_planes(self.scene.cutter.radius()).map_err(|e| {
+            self.refused(
+                request,
+                PlanError::NotApplicable { strategy: "offset-surface", reason: e.to_string() },
+            )
+        })?;
+        Ok(Strategy::OffsetSurface { along: *along, drive: OffsetDrive::on(surfaces) })
+    }
+
+    fn refused(&self, request: &ToolpathRequest, reason: PlanError) -> JobError {
+        JobError::plan(&self.scene, &request.name, reason)
+    }
+
+    /// Measures the engagement of a pocket's passes and lowers the feed where it is above the strategy's limit.
+    fn limit_feed(
+        &self,
+        request: &ToolpathRequest,
+        path: &mut Toolpath,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<(Engagement, f64)>, JobError> {
+        let (Some(_), Some(strategy)) = (&self.pocket, request.strategy.pocket()) else { return Ok(None) };
+        let (scene, budget) = (&self.scene, self.budget());
+        let cells = budget
+            .grid_for(path.len(), &self.area(), &scene.simulation, &self.cells)
+            .map_err(JobError::grid(scene))?;
+        let left = budget.left_beside(path.len(), &cells.0);
+        let arcs = contact_arcs(path, &scene.cutter, self.top, left, monitor)?;
+        Ok(Some(limit_feed_by(path, &arcs, strategy, request.step, scene.cutter.radius())))
+    }
+}
+
+/// The path in the joints of the scene's five-axis machine, as its programs need it; `None` without one. The cutter, up to
+/// its holder, stays within the chord tolerance of its motion between locations.
+fn joints(scene: &Scene, name: &str, path: &Toolpath) -> Result<Option<JointPath>, JobError> {
+    let Some(five_axis) = &scene.five_axis else { return Ok(None) };
+    let length = scene.holder.as_ref().map_or(scene.cutter.words().length, |holder| holder.cutting_length());
+    let following = five_axis.post.following(scene.tolerance.chord, length.max(scene.cutter.radius()));
+    let refused =
+        |reason| JobError::Machine { scene: scene.source.name.clone(), name: name.to_owned(), reason };
+    let joints = follow(&five_axis.kinematics, path, &following).map_err(|e| refused(e.to_string()))?;
+    match joints.report.obstacle() {
+        Some(obstacle) => Err(refused(obstacle.to_string())),
+        None => Ok(Some(joints)),
+    }
+}
+
+/// The line of each move in its program. A path that tilts the tool has no program where the scene names no machine.
+fn lines(scene: &Scene, path: &Toolpath, joints: Option<&JointPath>) -> Result<MoveLines, JobError> {
+    let written = write_program(&mut std::io::sink(), scene, path, joints, &header(scene, ""));
+    written.map_err(|error| JobError::Program(error.to_string()))
+}
+
+/// The header of a toolpath's program.
+pub(crate) fn header(scene: &Scene, name: &str) -> ProgramHeader {
+    ProgramHeader {
+        name: format!("{} - {name}", scene.title),
+        spindle_speed: Some(scene.cutting.spindle_speed),
+    }
+}
+
+/// Writes a path as G-code; tells the line of each move. A path that tilts the tool has no program, and no lines, where the
+/// scene names no machine for it.
+pub(crate) fn write_program(
+    out: &mut dyn std::io::Write,
+    scene: &Scene,
+    path: &Toolpath,
+    joints: Option<&JointPath>,
+    header: &ProgramHeader,
+) -> std::io::Result<MoveLines> {
+    let Some((five_axis, joints)) = scene.five_axis.as_ref().zip(joints) else {
+        return if path.is_upright() {
+            gcode::write(out, path, &scene.cutter, header)
+        } else {
+            Ok(MoveLines::new())
+        };
+    };
+    let post = FiveAxisPost {
+        kinematics: &five_axis.kinematics,
+        joints,
+        style: five_axis.post,
+        rapid_rate: scene.machine.rapid_rate,
+    };
+    gcode::write_five_axis(out, path, &post, &scene.cutter, header)
+}

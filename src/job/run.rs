@@ -1,0 +1,82 @@
+//! One toolpath at work: what its figures are found from.
+
+use metrology::{Budget, Measured, Measurement, View};
+use motion::Toolpath;
+use part::Part;
+use report::Violation;
+use scene::{Scene, ToolpathRequest};
+
+use super::planned::Planned;
+use super::tool::{FixtureMesh, Tool};
+use super::{JobError, Session};
+
+/// One toolpath that was planned, cut and measured.
+pub(crate) struct Run<'a> {
+    /// What all toolpaths of the scene share.
+    pub session: &'a Session,
+    /// What was asked for.
+    pub request: &'a ToolpathRequest,
+    /// What was planned.
+    pub planned: &'a Planned,
+    /// What was measured.
+    pub measured: &'a Measured,
+    /// The tool.
+    pub tool: &'a Tool,
+    /// What it must not touch, where the engine knows tools that lean.
+    pub fixtures: &'a [FixtureMesh],
+}
+
+impl Run<'_> {
+    pub fn scene(&self) -> &Scene {
+        &self.session.scene
+    }
+
+    pub fn part(&self) -> &Part {
+        &self.session.part
+    }
+
+    pub fn path(&self) -> &Toolpath {
+        &self.planned.plan.path
+    }
+
+    pub fn measurement(&self) -> &Measurement {
+        &self.measured.measurement
+    }
+
+    pub fn view(&self) -> &View {
+        &self.measured.view
+    }
+
+    pub fn budget(&self) -> Budget {
+        self.session.budget()
+    }
+
+    /// The line of toolpath.nc that a move stands in; 0 where there is no program.
+    pub fn line(&self, move_index: u32) -> u32 {
+        self.planned.lines.get(move_index as usize).copied().unwrap_or_default()
+    }
+
+    /// `, toolpath.nc line N`, where there is a program.
+    pub fn program_line(&self, move_index: u32) -> String {
+        match self.planned.lines.get(move_index as usize) {
+            Some(line) => format!(", toolpath.nc line {line}"),
+            None => String::new(),
+        }
+    }
+
+    /// For voxels that do not fit.
+    pub fn voxels(&self) -> impl Fn(sim::VoxelError) -> JobError {
+        |reason| JobError::engine(self.scene(), &self.request.name, reason.into())
+    }
+}
+
+/// What a figure found: itself, and what is to be said.
+#[derive(Debug, Default)]
+pub(crate) struct Finding {
+    /// The figure, where there is one.
+    pub figure: Option<report::Figure>,
+    /// Notes on the toolpath.
+    pub notes: Vec<String>,
+    /// What it violates.
+    pub violations: Vec<Violation>,
+}

@@ -1,0 +1,291 @@
+//! A scene with its part, ready to run its toolpaths.
+
+use std::path::Path;
+use std::time::Instant;
+
+use blade::Blade;
+use geometry::{Aabb, Bvh};
+use io::ProgramHeader;
+use metrology::{Budget, Engine, LaidOut, Task, path_figures};
+use motion::Toolpath;
+use part::Part;
+use report::{RunReport, SimulationFigures, ToolpathResult};
+use scene::{Fixture, PartSource, Scene, ToolpathRequest};
+use sim::VoxelStock;
+use toolpath::Pocket;
+use work::monitor::{self, Monitor};
+
+use super::load::{Loaded, load_mesh, load_part};
+use super::machined::BASE;
+use super::planned::{self, Planned};
+use super::pocket::load_pocket;
+use super::run::Run;
+use super::tool::{FixtureMesh, Tool};
+use super::{JobError, Machined, Outcome, figures, judge};
+
+/// A scene with its part: what all its toolpaths share.
+#[derive(Debug)]
+pub struct Session {
+    /// What was asked for.
+    pub scene: Scene,
+    /// What is to be made.
+    pub part: Part,
+    /// The sections that the part comes from, if it is a blade.
+    pub blade: Option<Blade>,
+    /// What the part is the floor of, if it is a pocket.
+    pub pocket: Option<Pocket>,
+    /// The cells over the stock before there is a path, and what is to be said about them.
+    pub cells: LaidOut,
+    /// Height of the stock's flat top, mm.
+    pub top: f64,
+    /// What was mended to make the part usable.
+    pub notes: Vec<String>,
+}
+
+/// The rectangle to simulate: the part's, grown by the stock's margin.
+pub fn stock_area(scene: &Scene, part: &Part) -> Aabb {
+    let mut area = part.bounds();
+    let mut margin = scene.stock.margin;
+    if matches!(scene.part, PartSource::Pocket { .. }) {
+        // The measured floor ends where the flat of the cutter's bottom does.
+        margin += scene.cutter.radius() - scene.cutter.flat_radius();
+    }
+    (area.min.x, area.min.y) = (area.min.x - margin, area.min.y - margin);
+    (area.max.x, area.max.y) = (area.max.x + margin, area.max.y + margin);
+    area
+}
+
+impl Session {
+    /// Reads a scene file and loads its part.
+    ///
+    /// # Errors
+    /// [`JobError`] when scene or part cannot be used.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, JobError> {
+        Self::new(Scene::read(path.as_ref())?)
+    }
+
+    /// Loads the part of a scene.
+    ///
+    /// # Errors
+    /// [`JobError`] when the part cannot be used, or its cells do not fit into the memory.
+    pub fn new(scene: Scene) -> Result<Self, JobError> {
+        let Loaded { part, blade, notes } = load_part(&scene)?;
+        let pocket = load_pocket(&scene)?;
+        let budget = Budget::new(&part, scene.simulation.memory_mib);
+        let cells = budget
+            .grid_before_planning(&stock_area(&scene, &part), &scene.simulation)
+            .map_err(JobError::grid(&scene))?;
+        let face = if pocket.is_some() { 0.0 } else { part.bounds().max.z };
+        let top = face + scene.stock.allowance;
+        Ok(Self { scene, part, blade, pocket, cells, top, notes })
+    }
+
+    /// Runs all toolpaths. Maps, paths and meshes are dropped; [`Session::toolpath`] leaves them.
+    ///
+    /// # Errors
+    /// [`JobError`] of the first toolpath that cannot be run.
+    pub fn run(&self, monitor: &dyn Monitor) -> Result<RunReport, JobError> {
+        let results = self.scene.toolpaths.iter().map(|request| Ok(self.toolpath(request, monitor)?.result));
+        Ok(self.report(results.collect::<Result<_, JobError>>()?))
+    }
+
+    /// The report of the scene's toolpaths.
+    pub fn report(&self, toolpaths: Vec<ToolpathResult>) -> RunReport {
+        let source = &self.scene.source;
+        let name = Path::new(&source.name).file_name();
+        let name = name.map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        let title = self.scene.title.clone();
+        RunReport::new(name, sha256(&source.text), title, &self.scene.tolerance, toolpaths)
+    }
+
+    /// Plans, cuts, measures and judges one toolpath.
+    ///
+    /// # Errors
+    /// [`JobError`]
+    pub fn toolpath(&self, request: &ToolpathRequest, monitor: &dyn Monitor) -> Result<Outcome, JobError> {
+        monitor::check(monitor)?;
+        let scene = &self.scene;
+        let engine = self.engine(request)?;
+        let tool = Tool::of(scene);
+        let fixtures = if engine.tilts() { self.fixtures()? } else { Vec::new() };
+        let planned = self.plan(request, &tool, &fixtures, monitor)?;
+        let begun = Instant::now();
+        let task = self.task(&planned.plan.path);
+        let mut measured = engine
+            .measure(&task, monitor)
+            .map_err(|reason| JobError::engine(scene, &request.name, reason))?;
+        for region in &mut measured.measurement.gouge.regions {
+            region.line = planned.lines.get(region.move_index as usize).copied().unwrap_or_default();
+        }
+        let run = Run {
+            session: self,
+            request,
+            planned: &planned,
+            measured: &measured,
+            tool: &tool,
+            fixtures: &fixtures,
+        };
+        let found = figures::all(&run, monitor)?;
+        let machined = Machined::new(self, &planned.plan.path, &measured.view, &measured.measurement);
+        let simulation = SimulationFigures {
+            engine: engine.word(),
+            cell_mm: measured.cell,
+            cells: measured.cells,
+            error_bound_asked_mm: scene.simulation.error_bound,
+            refined_rectangles: measured.refined_rectangles,
+            finest_cell_mm: measured.finest_cell,
+            moves: planned.plan.path.len(),
+            wall_s: begun.elapsed().as_secs_f64(),
+            threads: work::parallel::threads(),
+        };
+        let (verdict, violations) = judge::judge(&measured.measurement, &scene.tolerance, found.violations);
+        let measurement = &measured.measurement;
+        let result = ToolpathResult {
+            name: request.name.clone(),
+            strategy: request.strategy_name().to_owned(),
+            folder: request.folder.clone(),
+            verdict,
+            violations,
+            notes: self.notes_on(&planned, &measured, found.notes),
+            path: path_figures(&planned.plan.path, planned.time(scene)),
+            scallop: measurement.scallop.clone(),
+            gouge: measurement.gouge.clone(),
+            uncut: measurement.uncut.clone(),
+            deviation: measurement.deviation,
+            figures: found.figures,
+            simulation,
+            surface_mesh: machined.figures(),
+        };
+        let Planned { plan, joints, .. } = planned;
+        Ok(Outcome {
+            result,
+            path: plan.path,
+            joints,
+            field: plan.field,
+            measurement: measured.measurement,
+            view: measured.view,
+            machined,
+            files: found.files,
+        })
+    }
+
+    /// The notes on a toolpath: on the part, the cells, the measurement, the plan, and of its figures.
+    fn notes_on(
+        &self,
+        planned: &Planned,
+        measured: &metrology::Measured,
+        figures: Vec<String>,
+    ) -> Vec<String> {
+        let first = self.notes.iter().chain(&measured.note).chain(&measured.measurement.refined.note);
+        first.chain(&planned.plan.notes).cloned().chain(figures).collect()
+    }
+
+    /// The engine of a toolpath.
+    fn engine(&self, request: &ToolpathRequest) -> Result<&'static dyn Engine, JobError> {
+        let (scene, name) = (&self.scene, &request.name);
+        let engine = scene.simulation.engine.for_path(request.axis.is_some());
+        if self.pocket.is_some() && !engine.measures_pockets() {
+            return Err(JobError::PocketAlongNormals {
+                scene: scene.source.name.clone(),
+                name: name.clone(),
+            });
+        }
+        if request.axis.is_some() && !engine.tilts() {
+            let engine = engine.word();
+            return Err(JobError::Upright { scene: scene.source.name.clone(), name: name.clone(), engine });
+        }
+        Ok(engine)
+    }
+
+    fn task<'a>(&'a self, path: &'a Toolpath) -> Task<'a> {
+        Task {
+            part: &self.part,
+            cutter: &self.scene.cutter,
+            holder: self.scene.holder.as_ref(),
+            path,
+            top: self.top,
+            area: self.area(),
+            cells: &self.cells,
+            limits: &self.scene.tolerance,
+            simulation: &self.scene.simulation,
+            budget: self.budget(),
+        }
+    }
+
+    /// What a simulation may take.
+    pub(crate) fn budget(&self) -> Budget {
+        Budget::new(&self.part, self.scene.simulation.memory_mib)
+    }
+
+    /// The rectangle to simulate.
+    pub fn area(&self) -> Aabb {
+        stock_area(&self.scene, &self.part)
+    }
+
+    /// The meshes that are not to be touched.
+    fn fixtures(&self) -> Result<Vec<FixtureMesh>, JobError> {
+        let load = |fixture: &Fixture| {
+            let (mesh, _) = load_mesh(&self.scene, &fixture.file, fixture.format, fixture.scale)?;
+            let bvh = Bvh::new(&mesh);
+            Ok((mesh, bvh))
+        };
+        self.scene.keep_clear.fixtures.iter().map(load).collect()
+    }
+
+    /// The block that the part is cut from, as far as it was roughed before.
+    pub(crate) fn voxel_stock(&self) -> VoxelStock {
+        let Aabb { mut min, mut max } = self.area();
+        (min.z, max.z) = (min.z - BASE, self.top);
+        let block = Aabb { min, max };
+        match self.scene.stock.roughed {
+            Some(over) => VoxelStock::roughed(block, self.part.mesh().clone(), over),
+            None => VoxelStock::Box(block),
+        }
+    }
+
+    /// The header of a toolpath's programs.
+    pub fn header(&self, name: &str) -> ProgramHeader {
+        planned::header(&self.scene, name)
+    }
+
+    /// Writes the program of an outcome as G-code: nothing where the tool leans and the scene names no machine for it.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn write_program(&self, out: &mut dyn std::io::Write, outcome: &Outcome) -> std::io::Result<()> {
+        let header = self.header(&outcome.result.name);
+        planned::write_program(out, &self.scene, &outcome.path, outcome.joints.as_ref(), &header).map(drop)
+    }
+
+    /// Whether an outcome has a program.
+    pub fn has_program(&self, outcome: &Outcome) -> bool {
+        outcome.path.is_upright() || outcome.joints.is_some()
+    }
+}
+
+fn sha256(text: &str) -> String {
+    use sha2::Digest as _;
+    sha2::Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sim::GridError;
+
+    #[test]
+    fn a_chosen_cell_is_kept_or_refused_and_a_default_one_grows() {
+        let session = |simulation: &str| {
+            let text = format!(
+                "[part]\nsurface = \"plane\"\nx = [0, 800]\ny = [0, 6]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n\
+                 [simulation]\nmemory_mib = 2\n{simulation}[[toolpath]]\nstrategy = \"zigzag\"\nstepover = 0.5\n"
+            );
+            Session::new(Scene::parse("plate.toml", text).unwrap())
+        };
+        let (grid, note) = session("").unwrap().cells;
+        assert!(grid.cell > 0.05 && grid.len() * 80 <= 2 << 20);
+        assert!(note.unwrap().contains("instead of 0.05 mm, to fit into 2 MiB"));
+        let refused = session("cell = 0.05\n").unwrap_err();
+        assert!(matches!(refused, JobError::Grid { reason: GridError::Memory { .. }, .. }), "{refused}");
+    }
+}

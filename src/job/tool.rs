@@ -1,0 +1,47 @@
+//! The tool as a solid, and what it must keep away from.
+
+use collision::{Check, Interference, Obstacle};
+use cutter::Solid;
+use geometry::{Bvh, TriangleMesh};
+use part::Part;
+use scene::Scene;
+
+/// A mesh that is not to be touched, with its search tree.
+pub(crate) type FixtureMesh = (TriangleMesh, Bvh);
+
+/// The solids of a tool.
+pub(crate) struct Tool {
+    /// The cutter up to its holder.
+    pub cutter: Solid,
+    /// Shank and holder.
+    pub holder: Option<Solid>,
+}
+
+impl Tool {
+    /// The tool of a scene.
+    pub fn of(scene: &Scene) -> Self {
+        let cutter = Solid::of_cutter(&scene.cutter, scene.holder.as_ref());
+        Self { cutter, holder: scene.holder.as_ref().map(Solid::of_holder) }
+    }
+
+    /// What the planner keeps the tool away from: shank and holder from all, the cutter from fixtures, and from cutting
+    /// deeper into the part than half the gouge tolerance and what the part's triangles are off its surface.
+    pub fn keep_clear<'a>(
+        &'a self,
+        scene: &Scene,
+        part: &'a Part,
+        fixtures: &'a [FixtureMesh],
+    ) -> Interference<'a> {
+        let keep = &scene.keep_clear;
+        let obstacle = Obstacle::new(part.mesh(), part.bvh());
+        let depth = 0.5 * scene.tolerance.gouge + part.mesh_deviation();
+        let clear = |solid, obstacle| Check { solid, obstacle, needed: keep.clearance };
+        let mut checks = vec![Check { solid: &self.cutter, obstacle, needed: -depth }];
+        checks.extend(self.holder.as_ref().map(|solid| clear(solid, obstacle)));
+        for (mesh, bvh) in fixtures {
+            let solids = std::iter::once(&self.cutter).chain(&self.holder);
+            checks.extend(solids.map(|solid| clear(solid, Obstacle::new(mesh, bvh))));
+        }
+        Interference { checks, greatest_tilt: keep.greatest_tilt, greatest_lift: keep.greatest_lift }
+    }
+}

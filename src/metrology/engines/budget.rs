@@ -1,0 +1,114 @@
+//! The memory that a simulation may take, and the cells that fit into it.
+
+use geometry::Aabb;
+use part::Part;
+use sim::{Grid, GridError};
+
+use super::Simulation;
+
+/// Bytes in a MiB.
+pub const MIB: u64 = 1 << 20;
+
+/// Bytes a cell that a run takes at its peak: stock and winning moves 8, deviations 12, ridges 16 where
+/// every cell has one, the mesh of the surface and height.exr the rest. Too small a figure lets a run exhaust the machine
+/// that the scene's `memory_mib` promised to spare; too great a one refuses grids that would fit.
+const BYTES_PER_CELL: usize = 80;
+
+/// Bytes a cell while a path has been cut and nothing measured yet.
+const BYTES_PER_CUT_CELL: usize = 8;
+
+/// Bytes a triangle of the part while it is read: its file, corners, neighbours, search tree.
+const BYTES_PER_TRIANGLE: usize = 350;
+
+/// Bytes a move: the move itself, its prepared form, and its places in the engine's lists.
+const BYTES_PER_MOVE: usize = 240;
+
+/// One part in so many of the memory is kept for the path before there is one. If a path takes more,
+/// the cells are laid out again; a smaller share refuses fewer grids that would fit.
+const PATH_SHARE: u64 = 16;
+
+/// What a run may take, and what its part takes of that.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Budget {
+    /// Memory allowed, MiB.
+    pub memory_mib: u32,
+    /// What the part takes, bytes.
+    pub part_bytes: u64,
+}
+
+/// Cells over a stock, and what is to be said about them.
+pub type LaidOut = (Grid, Option<String>);
+
+impl Budget {
+    /// Of a part under the memory that a scene allows.
+    pub fn new(part: &Part, memory_mib: u32) -> Self {
+        Self { memory_mib, part_bytes: (part.mesh().triangles().len() * BYTES_PER_TRIANGLE) as u64 }
+    }
+
+    /// All of it, bytes.
+    pub fn memory(&self) -> u64 {
+        u64::from(self.memory_mib) * MIB
+    }
+
+    /// What part and path take, bytes.
+    pub fn besides(&self, moves: usize) -> u64 {
+        self.part_bytes + (moves * BYTES_PER_MOVE) as u64
+    }
+
+    /// What part and path leave, bytes.
+    pub fn left(&self, moves: usize) -> u64 {
+        self.memory().saturating_sub(self.besides(moves))
+    }
+
+    /// What is left beside a grid that was cut and not yet measured, bytes.
+    pub fn left_beside(&self, moves: usize, grid: &Grid) -> u64 {
+        self.left(moves).saturating_sub((grid.len() * BYTES_PER_CUT_CELL) as u64)
+    }
+
+    /// Cells that may be added to a grid.
+    pub fn more_cells(&self, moves: usize, grid: &Grid) -> usize {
+        (self.left(moves) as usize / BYTES_PER_CELL).saturating_sub(grid.len())
+    }
+
+    /// The grid over `area` before any toolpath is known: a share of the memory is kept for those. With it a note where the
+    /// automatic cell had to grow to fit into the memory; a cell that the user chose is never changed.
+    ///
+    /// # Errors
+    /// [`GridError`] when the grid does not fit.
+    pub fn grid_before_planning(&self, area: &Aabb, simulation: &Simulation) -> Result<LaidOut, GridError> {
+        self.grid(area, simulation, self.part_bytes + self.memory() / PATH_SHARE)
+    }
+
+    /// The grid for a path of so many moves; the first grid stays where it fits.
+    ///
+    /// # Errors
+    /// [`GridError`] when the grid does not fit.
+    pub fn grid_for(
+        &self,
+        moves: usize,
+        area: &Aabb,
+        simulation: &Simulation,
+        first: &LaidOut,
+    ) -> Result<LaidOut, GridError> {
+        if (first.0.len() * BYTES_PER_CELL) as u64 + self.besides(moves) <= self.memory() {
+            return Ok(first.clone());
+        }
+        self.grid(area, simulation, self.besides(moves))
+    }
+
+    fn grid(&self, area: &Aabb, simulation: &Simulation, besides: u64) -> Result<LaidOut, GridError> {
+        let memory = self.memory().saturating_sub(besides);
+        let cell = simulation.cell;
+        match Grid::covering(area, cell, BYTES_PER_CELL, memory) {
+            Ok(grid) => Ok((grid, None)),
+            Err(GridError::Memory { fitting, .. }) if simulation.cell_is_auto => {
+                let grid = Grid::covering(area, fitting, BYTES_PER_CELL, memory)?;
+                let allowed = self.memory_mib;
+                let note =
+                    format!("the cell is {fitting} mm instead of {cell} mm, to fit into {allowed} MiB");
+                Ok((grid, Some(note)))
+            }
+            Err(error) => Err(error),
+        }
+    }
+}

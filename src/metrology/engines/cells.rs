@@ -1,0 +1,63 @@
+//! Engines on cells over the plan view, for upright cutters.
+
+use cutter::Cutter;
+use motion::Toolpath;
+use sim::{ZMap, cut, cut_reference};
+use work::monitor::{Cancelled, Monitor};
+
+use super::{Engine, EngineError, Measured, Task, View};
+use crate::{Asked, measure};
+
+/// An engine on cells.
+pub(super) struct Cells {
+    word: &'static str,
+    help: &'static str,
+    cut: fn(ZMap, &Cutter, &Toolpath, &dyn Monitor) -> Result<ZMap, Cancelled>,
+}
+
+/// Heights over the plan view by branch and bound.
+pub(super) const ZMAP: Cells =
+    Cells { word: "zmap", help: "heights over the plan view, by branch and bound; upright cutters", cut };
+
+/// Every cell under every move that can reach it, in closed form in f64.
+pub(super) const REFERENCE: Cells = Cells {
+    word: "reference",
+    help: "every cell under every move, in closed form; upright cutters, slow",
+    cut: |stock, cutter, path, monitor| cut_reference(&stock, cutter, path, monitor),
+};
+
+impl Engine for Cells {
+    fn word(&self) -> &'static str {
+        self.word
+    }
+
+    fn help(&self) -> &'static str {
+        self.help
+    }
+
+    fn tilts(&self) -> bool {
+        false
+    }
+
+    fn measures_pockets(&self) -> bool {
+        true
+    }
+
+    fn measure(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Measured, EngineError> {
+        let path = task.path;
+        let (grid, note) = task.budget.grid_for(path.len(), &task.area, task.simulation, task.cells)?;
+        let cut = (self.cut)(ZMap::block(grid, task.top), task.cutter, path, monitor)?;
+        let most_cells = task.budget.more_cells(path.len(), &grid);
+        let asked = Asked { error_bound: task.simulation.error_bound, stock_top: task.top, most_cells };
+        let measurement = measure(task.part, task.cutter, path, &cut, task.limits, &asked, monitor)?;
+        Ok(Measured {
+            cell: grid.cell,
+            cells: grid.len(),
+            refined_rectangles: measurement.refined.rectangles,
+            finest_cell: measurement.refined.finest_cell,
+            measurement,
+            view: View::Heights(cut),
+            note,
+        })
+    }
+}

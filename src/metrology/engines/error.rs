@@ -1,0 +1,51 @@
+//! Why an engine could not cut or measure.
+
+use sim::{GridError, OppositeAxes, RaysError, VoxelError};
+use work::monitor::Cancelled;
+
+/// Why an engine could not cut or measure.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum EngineError {
+    /// The user asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// The grid does not fit.
+    #[error(transparent)]
+    Grid(#[from] GridError),
+    /// A move turns the tool axis by half a turn.
+    #[error(transparent)]
+    Turn(OppositeAxes),
+    /// The voxels do not fit, or have no use.
+    #[error(transparent)]
+    Voxels(VoxelError),
+    /// The places along the normals take more memory than allowed.
+    #[error("places {spacing} mm apart on the part need {needed_mib} MiB, and {allowed_mib} MiB are allowed")]
+    Places {
+        /// What was asked for, mm.
+        spacing: f64,
+        /// What the run would need.
+        needed_mib: u64,
+        /// What it may take.
+        allowed_mib: u32,
+        /// Spacing that fits, mm.
+        fitting: f64,
+    },
+}
+
+impl From<RaysError> for EngineError {
+    fn from(error: RaysError) -> Self {
+        match error {
+            RaysError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            RaysError::Opposite(axes) => Self::Turn(axes),
+        }
+    }
+}
+
+impl From<VoxelError> for EngineError {
+    fn from(error: VoxelError) -> Self {
+        match error {
+            VoxelError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            other => Self::Voxels(other),
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! Engines along the normals of the design, for any cutter axis and any shape.
+
+use cutter::Solid;
+use geometry::{Aabb, Vector3};
+use sim::{Rays, VoxelEngine, VoxelStock, Voxels};
+use work::monitor::Monitor;
+
+use super::budget::MIB;
+use super::{Engine, EngineError, Measured, Task, View};
+use crate::{FirstCut, RaysCut, SweptVolume, VoxelCut, measure_along_normals, net_places};
+
+/// Bytes a place of the net: place, hit, triangles with their crossings, and the map.
+const BYTES_PER_PLACE: u64 = 600;
+
+/// Distance of the places over that of cells where the program chooses: three places from pass to pass.
+const PLACES_OVER_CELLS: f64 = 2.0;
+
+/// Material is looked for this many uncut tolerances above the design, and no less far than the cutter's radius; cuts as
+/// far below it as that radius, so that the far side of a thin part counts for nothing.
+pub const REACH_OVER_UNCUT: f64 = 4.0;
+
+/// By how much space for voxels is larger than it need be, mm: then none of its own surface is met.
+const BEYOND: f64 = 1.0;
+
+/// An engine along normals.
+pub(super) struct Normals {
+    word: &'static str,
+    help: &'static str,
+    by_voxels: bool,
+}
+
+/// The swept volume itself.
+pub(super) const RAYS: Normals =
+    Normals { word: "rays", help: "the swept volume along the normals; any cutter axis", by_voxels: false };
+
+/// What is left as voxels.
+pub(super) const VOXEL: Normals =
+    Normals { word: "voxel", help: "voxels along the normals; any cutter axis", by_voxels: true };
+
+impl Engine for Normals {
+    fn word(&self) -> &'static str {
+        self.word
+    }
+
+    fn help(&self) -> &'static str {
+        self.help
+    }
+
+    fn tilts(&self) -> bool {
+        true
+    }
+
+    fn measures_pockets(&self) -> bool {
+        false
+    }
+
+    fn measure(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Measured, EngineError> {
+        let (part, path, cutter) = (task.part, task.path, task.cutter);
+        let solid = Solid::of_cutter(cutter, task.holder);
+        // Deviations are exact at the places, and ridges are found between them, so that fewer do than cells.
+        let wider = if task.simulation.cell_is_auto { PLACES_OVER_CELLS } else { 1.0 };
+        let spacing = wider * task.simulation.cell;
+        check_places(task, spacing)?;
+        let reach = (REACH_OVER_UNCUT * task.limits.uncut).max(cutter.radius());
+        let rays = Rays::new(path, &solid, monitor)?;
+        let inward = cutter.radius();
+        let space = space(task, inward.max(reach));
+        let voxels =
+            self.by_voxels.then(|| cut_voxels(task, &space, &solid, spacing, monitor)).transpose()?;
+        let by_rays = RaysCut { rays: &rays, path, solid: &solid };
+        let by_voxels = voxels.as_ref().map(|(engine, voxels)| VoxelCut { engine, voxels });
+        let first: &dyn FirstCut = by_voxels.as_ref().map_or(&by_rays, |cut| cut);
+        let cut = SweptVolume { part, cut: first, inward, outward: reach };
+        let asked = task.simulation.error_bound;
+        let (measurement, map) =
+            measure_along_normals(part, cutter, path, &cut, spacing, task.limits, asked, monitor)?;
+        let finest_cell = voxels.as_ref().map_or(spacing, |(_, voxels)| voxels.voxel());
+        Ok(Measured {
+            measurement,
+            cell: spacing,
+            cells: map.points.len(),
+            refined_rectangles: 0,
+            finest_cell,
+            view: View::Normals { map, spacing, rays, solid },
+            note: None,
+        })
+    }
+}
+
+/// More than the part by `reach` all around, so that what a normal leaves is what was cut.
+fn space(task: &Task<'_>, reach: f64) -> VoxelStock {
+    let Aabb { min, max } = task.part.bounds();
+    let around = Vector3::repeat(reach + BEYOND);
+    VoxelStock::Box(Aabb { min: min - around, max: max + around })
+}
+
+/// What a path leaves of `space` where places `spacing` mm apart take their memory too.
+fn cut_voxels<'a>(
+    task: &Task<'_>,
+    space: &'a VoxelStock,
+    solid: &Solid,
+    spacing: f64,
+    monitor: &dyn Monitor,
+) -> Result<(VoxelEngine<'a>, Voxels), EngineError> {
+    let voxel = task.simulation.voxel.unwrap_or(task.simulation.cell);
+    let places = (net_places(task.part, spacing) * BYTES_PER_PLACE as f64) as u64;
+    let left = task.budget.left(task.path.len()).saturating_sub(places);
+    let engine = VoxelEngine::new(space, solid, task.path)?;
+    let voxels = engine.cut(voxel, left, monitor)?;
+    Ok((engine, voxels))
+}
+
+/// Refuses places that do not fit into the memory.
+fn check_places(task: &Task<'_>, spacing: f64) -> Result<(), EngineError> {
+    let (budget, moves) = (&task.budget, task.path.len());
+    let needed = net_places(task.part, spacing) * BYTES_PER_PLACE as f64;
+    let left = budget.left(moves) as f64;
+    if needed <= left {
+        return Ok(());
+    }
+    // Places grow as the square of what their distance shrinks; two digits, rounded up.
+    let exact = spacing * (needed / left.max(1.0)).sqrt();
+    let digit = 10f64.powf(exact.log10().floor() - 1.0);
+    Err(EngineError::Places {
+        spacing,
+        needed_mib: (needed as u64 + budget.besides(moves)).div_ceil(MIB),
+        allowed_mib: budget.memory_mib,
+        fitting: (exact / digit).ceil() * digit,
+    })
+}

@@ -1,0 +1,92 @@
+//! What an engine is given, and what it leaves.
+
+use cutter::{Cutter, Holder, Solid};
+use geometry::Aabb;
+use motion::Toolpath;
+use part::Part;
+use sim::{Rays, ZMap};
+
+use super::{Budget, EngineChoice, LaidOut};
+use crate::{Limits, Measurement, NormalMap};
+
+/// How the stock is simulated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Simulation {
+    /// Pitch of the cells, mm.
+    pub cell: f64,
+    /// True when the scene leaves the cell to the program (`"auto"`, or no word about it), which may
+    /// then make it coarser to fit into the memory.
+    pub cell_is_auto: bool,
+    /// Memory that one simulation may take, MiB.
+    pub memory_mib: u32,
+    /// Which engine cuts.
+    pub engine: EngineChoice,
+    /// Whether the stock is also cut in the order of the program, for what each move removes.
+    pub removal: bool,
+    /// Error bound that is asked of the highest scallop, the deepest gouge and the highest uncut place, mm.
+    pub error_bound: f64,
+    /// Voxel of the solid that is left, mm, where it is asked for.
+    pub voxel: Option<f64>,
+}
+
+/// A path to cut and a part to measure against.
+#[derive(Debug, Clone, Copy)]
+pub struct Task<'a> {
+    /// What is to be made.
+    pub part: &'a Part,
+    /// What cuts.
+    pub cutter: &'a Cutter,
+    /// What holds it; it ends the cutter's edges.
+    pub holder: Option<&'a Holder>,
+    /// How it moves.
+    pub path: &'a Toolpath,
+    /// Height of the stock's flat top, mm.
+    pub top: f64,
+    /// The rectangle of the stock.
+    pub area: Aabb,
+    /// The cells over it that were laid out before there was a path.
+    pub cells: &'a LaidOut,
+    /// What is tolerated.
+    pub limits: &'a Limits,
+    /// How it is simulated.
+    pub simulation: &'a Simulation,
+    /// What it may take.
+    pub budget: Budget,
+}
+
+/// What figures and pictures are drawn from.
+#[derive(Debug)]
+pub enum View {
+    /// Heights over the plan view.
+    Heights(ZMap),
+    /// Places of the design and the deviation along their normals.
+    Normals {
+        /// The places.
+        map: NormalMap,
+        /// Their distance, mm.
+        spacing: f64,
+        /// The swept volume of the path.
+        rays: Rays,
+        /// The cutter that swept it.
+        solid: Solid,
+    },
+}
+
+/// What an engine leaves.
+#[derive(Debug)]
+pub struct Measured {
+    /// The figures.
+    pub measurement: Measurement,
+    /// What they were found in.
+    pub view: View,
+    /// Pitch of the cells, or distance of the places, mm.
+    pub cell: f64,
+    /// Number of cells or places.
+    pub cells: usize,
+    /// Rectangles that were cut and measured anew on finer cells.
+    pub refined_rectangles: usize,
+    /// Pitch of the finest cells, mm.
+    pub finest_cell: f64,
+    /// What is to be said about the cells.
+    pub note: Option<String>,
+}
