@@ -2,7 +2,7 @@
 
 use super::{RunReport, SimulationFigures, SurfaceMeshFigures, ToolpathResult, Verdict, violations};
 use metrology::{
-    DeviationFigures, GougeFigures, GougeRegion, Limits, Measurement, PairFigures, PathFigures, Refined,
+    CloserLook, DeviationFigures, GougeFigures, GougeRegion, Limits, Measurement, PairFigures, PathFigures,
     RoughnessFigures, ScallopFigures, ScallopPair, UncutFigures,
 };
 
@@ -47,7 +47,7 @@ pub fn measurement(gouge: f64) -> Measurement {
             reason: Some("no ridge stands between passes on the part".into()),
             ..PairFigures::default()
         },
-        refined: Refined::default(),
+        refined: CloserLook::default(),
     }
 }
 
