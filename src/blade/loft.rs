@@ -17,9 +17,9 @@ mod tests;
 pub use offsets::loft_of_offsets;
 
 use geometry::{
-    ArcLength, CubicSpline, KnotError, MAX_COORDINATE, NurbsError, NurbsSurface, Point2, Point3, signed_area,
+    ArcLength, CubicSpline, InterpolationAxis, KnotError, MAX_COORDINATE, NurbsError, NurbsSurface, Point2,
+    Point3, interpolate, signed_area,
 };
-use geometry::{Axis, interpolate};
 use offset::CurveOffsetError;
 use offset::curve_offset::distance_from;
 
@@ -327,7 +327,11 @@ impl Skin<'_> {
 
     /// The surface through the points at `shares` (0 and 1 among them), and v of each section.
     fn through(&self, shares: &[f64]) -> Result<(NurbsSurface, Vec<f64>), LoftError> {
-        let u = if self.closed { Axis::periodic(shares)? } else { Axis::averaging(3, shares)? };
+        let u = if self.closed {
+            InterpolationAxis::periodic(shares)?
+        } else {
+            InterpolationAxis::averaging(3, shares)?
+        };
         let columns = work::parallel::map(self.sections.len(), |k| {
             let z = self.sections[k].height;
             let lift = |share: &f64| self.at(k, *share).coords.push(z).into();
@@ -344,7 +348,7 @@ impl Skin<'_> {
             }))
             .collect();
         let parameters: Vec<f64> = sums.iter().map(|s| s / sum).collect();
-        let v = Axis::averaging(3.min(parameters.len() - 1), &parameters)?;
+        let v = InterpolationAxis::averaging(3.min(parameters.len() - 1), &parameters)?;
         let points: Vec<Vec<Point3>> =
             (0..u.sites().len()).map(|i| columns.iter().map(|c| c[i]).collect()).collect();
         Ok((interpolate(&u, &v, &points)?, parameters))

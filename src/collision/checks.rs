@@ -69,6 +69,7 @@ impl Interference<'_> {
         self.missing(at, false)
     }
 
+    /// As [`Interference::shortfall`], with something to spare if asked for.
     pub fn missing(&self, at: &ClPoint, spare: bool) -> Option<Shortfall> {
         let one = |(k, check): (usize, &Check)| {
             let limit = check.limit(spare);

@@ -4,8 +4,8 @@
 //! nearest place of the meshes with its signed distance from the tool, for one location ([`Obstacle::clearance`]) or
 //! a whole move ([`Obstacle::swept_clearance`]).
 //!
-//! The surface itself counts, be it closed or not: the distance of the place that lies deepest in the tool, or nearest to
-//! it. A tool wholly inside of a closed mesh touches none of its surface; it got there through it.
+//! Limits: only the surface of a mesh counts, closed or not. A tool wholly inside a closed mesh touches none of it; it
+//! reached that position through the surface, and the move that did so is reported.
 
 mod checks;
 mod piece;
@@ -19,7 +19,7 @@ pub use checks::{Check, Interference, Shortfall};
 use cutter::Solid;
 use geometry::{Bvh, Node, Point3, TriangleMesh};
 use motion::ClPoint;
-use piece::Piece;
+use piece::ToolPiece;
 #[cfg(test)]
 use piece::middle;
 pub use sweep::SweptClearance;
@@ -56,7 +56,7 @@ impl<'a> Obstacle<'a> {
     pub fn clearance(&self, solid: &Solid, at: &ClPoint, limit: f64) -> Option<Clearance> {
         let mut best = None;
         for index in 0..solid.pieces() {
-            let piece = Piece { solid, index, at: *at };
+            let piece = ToolPiece { solid, index, at: *at };
             self.nearest(&piece, limit, &mut best);
         }
         best
@@ -65,7 +65,7 @@ impl<'a> Obstacle<'a> {
     /// Whether the mesh comes nearer than `limit`, mm: as [`Obstacle::clearance`], but ends at the first such place.
     pub fn is_nearer(&self, solid: &Solid, at: &ClPoint, limit: f64) -> bool {
         (0..solid.pieces()).any(|index| {
-            let piece = Piece { solid, index, at: *at };
+            let piece = ToolPiece { solid, index, at: *at };
             let mut found = false;
             self.bvh.tree().search(-limit, farthest(&piece), |slot, now| {
                 let corners = self.mesh.corners(self.bvh.triangle_in(slot));
@@ -77,7 +77,7 @@ impl<'a> Obstacle<'a> {
     }
 
     /// Puts in `best` what is nearer than that, or than `limit`; tells whether there is such a place.
-    fn nearest(&self, piece: &Piece, limit: f64, best: &mut Option<Clearance>) -> bool {
+    fn nearest(&self, piece: &ToolPiece, limit: f64, best: &mut Option<Clearance>) -> bool {
         let start = best.as_ref().map_or(limit, |b| b.distance);
         let mut found = false;
         self.bvh.tree().search(-start, farthest(piece), |slot, now| {
@@ -93,7 +93,7 @@ impl<'a> Obstacle<'a> {
 }
 
 /// Minus a lower bound on the distance of a box: what the supporting plane at its middle leaves over its sides.
-fn farthest(piece: &Piece) -> impl Fn(usize, &Node, f64) -> f64 {
+fn farthest(piece: &ToolPiece) -> impl Fn(usize, &Node, f64) -> f64 {
     |_, node, _| {
         let (middle, half) = node.middle();
         let sample = piece.sample(&middle);

@@ -23,7 +23,7 @@ const SQUARE: f64 = 1e-12;
 
 /// One convex piece of a tool at a location.
 #[derive(Clone, Copy)]
-pub struct Piece<'a> {
+pub struct ToolPiece<'a> {
     pub solid: &'a Solid,
     pub index: usize,
     pub at: ClPoint,
@@ -38,7 +38,7 @@ pub struct Sample {
 
 /// A place with its distance.
 #[derive(Clone, Copy)]
-pub struct Place {
+pub struct NearPlace {
     pub point: Point3,
     pub distance: f64,
 }
@@ -51,7 +51,7 @@ struct OnLine {
     slope: f64,
 }
 
-impl Piece<'_> {
+impl ToolPiece<'_> {
     #[inline]
     pub fn sample(&self, q: &Point3) -> Sample {
         let axis = &self.at.axis;
@@ -81,7 +81,7 @@ impl Piece<'_> {
     }
 
     /// The nearest place of a triangle, if it is nearer than `limit`.
-    pub fn nearest_on(&self, corners: &[Point3; 3], limit: f64) -> Option<Place> {
+    pub fn nearest_on(&self, corners: &[Point3; 3], limit: f64) -> Option<NearPlace> {
         let centre = middle(corners);
         let inside = self.sample(&centre);
         if inside.distance + least_rise(&inside.gradient, &centre, corners) >= limit {
@@ -131,7 +131,7 @@ impl Piece<'_> {
 
     /// The nearest place of a triangle's plane, if that lies no farther along the plane of symmetry than the
     /// triangle.
-    fn lowest_of_plane(&self, corners: &[Point3; 3], normal: &Vector3) -> Option<Place> {
+    fn lowest_of_plane(&self, corners: &[Point3; 3], normal: &Vector3) -> Option<NearPlace> {
         let (tip, axis) = (self.at.tip, self.at.axis);
         let origin = tip - normal * (tip - corners[0]).dot(normal);
         let along = (axis - normal * axis.dot(normal))
@@ -148,7 +148,7 @@ impl Piece<'_> {
             return None;
         }
         let low = self.least_along(&origin, &along, a, b, f64::INFINITY);
-        Some(Place { point: origin + along * low.s, distance: low.distance })
+        Some(NearPlace { point: origin + along * low.s, distance: low.distance })
     }
 
     fn on_line(&self, origin: &Point3, along: &Vector3, s: f64) -> OnLine {
@@ -216,8 +216,8 @@ impl Nearest {
         }
     }
 
-    fn place(&self) -> Option<Place> {
-        self.point.map(|point| Place { point, distance: self.distance })
+    fn place(&self) -> Option<NearPlace> {
+        self.point.map(|point| NearPlace { point, distance: self.distance })
     }
 }
 

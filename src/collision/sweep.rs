@@ -5,7 +5,7 @@
 //! distance of all places of a box, or of a triangle, over a stretch of time from below: a surface that the tool slides
 //! along is no nearer for that, since it moves along the plane. Stretches that this does not settle are halved.
 
-use super::piece::{Piece, middle};
+use super::piece::{ToolPiece, middle};
 use super::{Clearance, Obstacle};
 use cutter::Solid;
 use geometry::{Node, Point3, Vector3};
@@ -37,7 +37,7 @@ pub struct SweptClearance {
 
 /// A piece in the middle of a stretch of a move.
 struct Stretch<'a> {
-    piece: Piece<'a>,
+    piece: ToolPiece<'a>,
     /// Way of the tip and turn of the axis over the whole move, mm and rad.
     way: Vector3,
     spin: Vector3,
@@ -77,7 +77,7 @@ impl Obstacle<'_> {
                     break;
                 }
                 let t = 0.5 * (a + b);
-                let piece = Piece { solid, index, at: from.towards(to, t) };
+                let piece = ToolPiece { solid, index, at: from.towards(to, t) };
                 let limit = worst.map_or(needed, |w| w.nearest.distance);
                 let enough = limit - (SHARE * (needed - limit)).max(RESOLUTION);
                 if !self.may_come_nearer(&Stretch { piece, way, spin, half: 0.5 * (b - a) }, enough) {
@@ -86,7 +86,7 @@ impl Obstacle<'_> {
                 // Both ends are where a tool that runs into something is deepest.
                 let ends = if [a, b] == [0.0, 1.0] { &[0.0, 1.0][..] } else { &[] };
                 for &t in [t].iter().chain(ends) {
-                    let piece = Piece { at: from.towards(to, t), ..piece };
+                    let piece = ToolPiece { at: from.towards(to, t), ..piece };
                     let mut nearest = worst.map(|w| w.nearest);
                     if self.nearest(&piece, needed, &mut nearest) {
                         worst = nearest.map(|nearest| SweptClearance { t, nearest });

@@ -8,7 +8,7 @@ use geometry::Vector3;
 /// The least over a solid's pieces.
 fn distance(solid: &Solid, at: &ClPoint, q: &Point3) -> f64 {
     (0..solid.pieces())
-        .map(|index| Piece { solid, index, at: *at }.sample(q).distance)
+        .map(|index| ToolPiece { solid, index, at: *at }.sample(q).distance)
         .fold(f64::INFINITY, f64::min)
 }
 
@@ -132,7 +132,7 @@ fn a_mesh_is_the_least_of_its_triangles() {
         let solid = &solids[round % solids.len()];
         let at = ClPoint { tip: numbers.point(12.0), axis: numbers.direction() };
         let one = |t: usize, index: usize| {
-            Piece { solid, index, at }.nearest_on(&field.corners(t), f64::INFINITY).unwrap().distance
+            ToolPiece { solid, index, at }.nearest_on(&field.corners(t), f64::INFINITY).unwrap().distance
         };
         let all = (0..field.triangles().len()).flat_map(|t| (0..solid.pieces()).map(move |k| (t, k)));
         let least = all.map(|(t, k)| one(t, k)).fold(f64::INFINITY, f64::min);

@@ -4,7 +4,7 @@
 //! second order in the size h of the cells in the mean, h² log(1/h) in the corners of the rectangle. Natural boundary
 //! conditions come by themselves, since the discrete energy itself is made least; the open constant is fixed by a mean of 0.
 //!
-//! The stream function is that of `field::fit`, `∫ q [α (t·∇ψ)² + (b·∇ψ − g)²] dA`; each sample speaks for one cell.
+//! The stream function is that of the `fit` module, `∫ q [α (t·∇ψ)² + (b·∇ψ − g)²] dA`; each sample speaks for one cell.
 //!
 //! Solvers: CG with a multigrid cycle; sparse Cholesky and GMRES to compare.
 

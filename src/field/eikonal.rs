@@ -23,8 +23,7 @@ mod tests;
 pub use front::Front;
 
 use super::GridField;
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// Rounds of four sweeps at most, for each of the two orders. Some ten are enough unless characteristics wind.
 const MOST_ROUNDS: usize = 60;

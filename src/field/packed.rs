@@ -28,8 +28,7 @@
 
 use super::eikonal::Front;
 use super::sparse::{Entry, Factor};
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 use work::parallel;
 
 /// ρ of each round. The last leaves shortfalls of about a thousandth.

@@ -2,7 +2,7 @@
 //!
 //! Enters: normal equations (symmetric, positive semi-definite) or the rectangular system itself.
 //! Leaves: the coefficients and a [`SolveReport`]. All solvers give the same function within
-//! 1e-7 of its range where the system determines it (`tests` of `field::fit`).
+//! 1e-7 of its range where the system determines it (tests of the `fit` module).
 //!
 //! The constant of a stream function is open, so systems have rank ≤ n − 1. Direct solvers pin one
 //! coefficient; CG and GMRES run on the singular but consistent equations, and the dense singular

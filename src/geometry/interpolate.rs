@@ -61,13 +61,13 @@ enum System {
 }
 
 /// One direction of a net to interpolate: knots, and the parameters of the points.
-pub struct Axis {
+pub struct InterpolationAxis {
     knots: KnotVector,
     sites: Vec<f64>,
     system: System,
 }
 
-impl Axis {
+impl InterpolationAxis {
     /// Points at Greville's averages of any knots, which every spline space can interpolate.
     pub fn at_averages(knots: KnotVector) -> Option<Self> {
         let sites = knots.averages().map(|u| knots.clamp(u)).collect();
@@ -182,7 +182,11 @@ impl Axis {
 ///
 /// # Errors
 /// See [`NurbsError`]: a control point may lie beyond the greatest coordinate.
-pub fn interpolate(u: &Axis, v: &Axis, points: &[Vec<Point3>]) -> Result<NurbsSurface, NurbsError> {
+pub fn interpolate(
+    u: &InterpolationAxis,
+    v: &InterpolationAxis,
+    points: &[Vec<Point3>],
+) -> Result<NurbsSurface, NurbsError> {
     let columns: Vec<Vec<Vector3>> = (0..v.sites.len())
         .map(|j| u.control_points(points.iter().map(|row| row[j].coords).collect()))
         .collect();
@@ -192,7 +196,7 @@ pub fn interpolate(u: &Axis, v: &Axis, points: &[Vec<Point3>]) -> Result<NurbsSu
             row.into_iter().map(Point3::from).collect()
         })
         .collect();
-    let knots = |axis: &Axis| axis.knots.knots().to_vec();
+    let knots = |axis: &InterpolationAxis| axis.knots.knots().to_vec();
     NurbsSurface::new(u.knots.degree(), v.knots.degree(), knots(u), knots(v), &net, None)
 }
 
@@ -220,9 +224,9 @@ mod tests {
                 let k = 3 * (i * vs.len() + j);
                 Point3::new(seed[k], seed[k + 1], seed[k + 2])
             };
-            let v = Axis::averaging(3.min(vs.len() - 1), &vs).unwrap();
+            let v = InterpolationAxis::averaging(3.min(vs.len() - 1), &vs).unwrap();
             for closed in [false, true] {
-                let u = if closed { Axis::periodic(&us).unwrap() } else { Axis::averaging(3, &us).unwrap() };
+                let u = if closed { InterpolationAxis::periodic(&us).unwrap() } else { InterpolationAxis::averaging(3, &us).unwrap() };
                 let points: Vec<Vec<Point3>> =
                     (0..u.sites().len()).map(|i| (0..vs.len()).map(|j| point(i, j)).collect()).collect();
                 let s = interpolate(&u, &v, &points).unwrap();
@@ -246,8 +250,9 @@ mod tests {
     #[test]
     fn averages_of_repeated_knots_interpolate() {
         let knots = vec![0., 0., 0., 0., 1., 1., 1.5, 2., 2., 2., 3., 3., 3., 3.];
-        let u = Axis::at_averages(KnotVector::new(3, knots, 10).unwrap()).unwrap();
-        let v = Axis::at_averages(KnotVector::clamped_uniform(1, 2, [0.0, 1.0]).unwrap()).unwrap();
+        let u = InterpolationAxis::at_averages(KnotVector::new(3, knots, 10).unwrap()).unwrap();
+        let v =
+            InterpolationAxis::at_averages(KnotVector::clamped_uniform(1, 2, [0.0, 1.0]).unwrap()).unwrap();
         let points: Vec<Vec<Point3>> = u
             .sites()
             .iter()
@@ -263,10 +268,10 @@ mod tests {
 
     #[test]
     fn too_few_or_equal_sites_are_refused() {
-        assert!(Axis::averaging(3, &[0.0, 1.0, 2.0]).is_err());
-        assert!(Axis::averaging(1, &[0.0, 1.0, 1.0, 2.0]).is_err());
-        assert!(Axis::periodic(&[0.0, 1.0, 2.0, 3.0]).is_err());
-        assert!(Axis::periodic(&[0.0, 1.0, 1.0, 1.0, 1.0, 3.0]).is_err());
-        assert!(Axis::averaging(2, &[0.0, f64::NAN, 2.0, 3.0]).is_err());
+        assert!(InterpolationAxis::averaging(3, &[0.0, 1.0, 2.0]).is_err());
+        assert!(InterpolationAxis::averaging(1, &[0.0, 1.0, 1.0, 2.0]).is_err());
+        assert!(InterpolationAxis::periodic(&[0.0, 1.0, 2.0, 3.0]).is_err());
+        assert!(InterpolationAxis::periodic(&[0.0, 1.0, 1.0, 1.0, 1.0, 3.0]).is_err());
+        assert!(InterpolationAxis::averaging(2, &[0.0, f64::NAN, 2.0, 3.0]).is_err());
     }
 }

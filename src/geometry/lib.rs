@@ -1,9 +1,16 @@
-//! Points, surfaces, triangle meshes and their search tree. Knows nothing of cutters.
+//! Points, curves, surfaces, triangle meshes and their search trees, plane regions. Knows nothing of cutters.
+//!
+//! Enters: control points, knots, formulas, triangles or outlines. Leaves: checked shapes that give places, derivatives,
+//! nearest points and tessellations. Lengths in mm, angles in rad, f64 throughout; boxes of search trees are f32, rounded
+//! outward.
+//!
+//! Limits: coordinates up to [`MAX_COORDINATE`]. Shapes out of range are refused by the error type of each shape.
 
 mod aabb;
 mod analytic;
 mod bspline;
 mod bvh;
+mod coordinates;
 mod cubic_spline;
 mod interpolate;
 mod jet;
@@ -20,31 +27,15 @@ mod tessellate;
 pub use aabb::Aabb;
 pub use analytic::{AnalyticError, AnalyticShape, AnalyticSurface, HeightJet, MAX_SLOPE};
 pub use bspline::{KnotError, KnotVector, MAX_BASIS, MAX_DEGREE};
-pub use bvh::{BoxTree, Extent, Feature, Node, Paired, round_down, round_up};
-pub use bvh::{Bvh, MeshFoot, VerticalHit};
+pub use bvh::{BoxTree, Bvh, Extent, Feature, MeshFoot, Node, Paired, VerticalHit, round_down, round_up};
+pub use coordinates::{Isometry3, MAX_COORDINATE, Point2, Point3, Vector2, Vector3};
 pub use cubic_spline::{ArcLength, CubicSpline, SplineError};
-pub use interpolate::{Axis, interpolate};
+pub use interpolate::{InterpolationAxis, interpolate};
 pub use jet::{Jet2, PrincipalCurvatures};
 pub use meeting::{Plane, into_cube, meeting};
 pub use mesh::{MeshError, Outside, RepairNotes, TriangleMesh};
 pub use normal::{inward, normal_at, unit_normal};
 pub use nurbs::{MAX_WEIGHT, NurbsError, NurbsSurface};
-pub use region::first_crossing;
-pub use region::{MAX_OUTLINE_POINTS, Piece, Region, RegionError, inside_curve, signed_area};
+pub use region::{MAX_OUTLINE_POINTS, Piece, Region, RegionError, first_crossing, inside_curve, signed_area};
 pub use segment_grid::{CurveSegment, NearestSegment, SegmentGrid, distance_to_segment, foot};
 pub use tessellate::{MAX_TRIANGLES, TessellateError, Tessellation, tessellate};
-
-/// A point, mm.
-pub type Point3 = nalgebra::Point3<f64>;
-/// A point of the plane, mm.
-pub type Point2 = nalgebra::Point2<f64>;
-/// A vector, mm.
-pub type Vector3 = nalgebra::Vector3<f64>;
-/// A motion of space.
-pub type Isometry3 = nalgebra::Isometry3<f64>;
-/// A vector of the plane, mm.
-pub type Vector2 = nalgebra::Vector2<f64>;
-
-/// Largest coordinate that any part, path or stock may have, mm (one kilometre). Beyond it f64
-/// still resolves 1e-10 mm, but f32 boxes and heights no longer resolve a micrometre.
-pub const MAX_COORDINATE: f64 = 1.0e6;

@@ -1,4 +1,8 @@
 //! The machine: speed and acceleration limits, machining time, five-axis kinematics.
+//!
+//! Enters: a path and the limits of a machine. Leaves: the time it takes, reduced feeds at corners, and the joint positions
+//! of five-axis machines ([`kinematics`]). Lengths in mm, rates in mm/min, accelerations in mm/s², times in s, joint angles
+//! in rad.
 
 mod feeds;
 pub mod kinematics;

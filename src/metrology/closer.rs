@@ -8,7 +8,7 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use super::ridges::NUMERICAL_FLOOR;
+use super::figures::NUMERICAL_FLOOR;
 use geometry::Point2;
 
 /// A square of the plan.
@@ -48,7 +48,7 @@ const OFF_PART_SHARE: f64 = 1.0 / 16.0;
 
 /// What a search found.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Found {
+pub(super) struct BoundedGreatest {
     /// The greatest value and its place, where it exceeds what was known.
     pub greatest: Option<(f64, Point2)>,
     /// No value is greater by more than [`NUMERICAL_FLOOR`], mm.
@@ -83,7 +83,7 @@ pub(super) fn greatest(
     known: f64,
     asked: f64,
     at: &(dyn Fn(Point2, f64) -> Option<Value> + Sync),
-) -> Found {
+) -> BoundedGreatest {
     let least = squares.first().map_or(0.0, |s| s.half * OFF_PART_SHARE);
     let mut open = BinaryHeap::from(squares);
     let (mut best, mut place, mut spent) = (known, None, 0);
@@ -131,7 +131,7 @@ pub(super) fn greatest(
         open.extend(quarters.into_iter().filter_map(|q| q.1).filter(|s| s.possible > best + NUMERICAL_FLOOR));
     }
     let possible = open.peek().map_or(best, |s| s.possible.max(best));
-    Found { greatest: place.map(|place| (best, place)), possible }
+    BoundedGreatest { greatest: place.map(|place| (best, place)), possible }
 }
 
 #[cfg(test)]
@@ -139,7 +139,12 @@ mod tests {
     use super::*;
 
     /// Squares of side 1 over [0, n]², with values and slopes of `f`.
-    fn search(n: u32, known: f64, asked: f64, f: &(dyn Fn(Point2) -> Option<(f64, f64)> + Sync)) -> Found {
+    fn search(
+        n: u32,
+        known: f64,
+        asked: f64,
+        f: &(dyn Fn(Point2) -> Option<(f64, f64)> + Sync),
+    ) -> BoundedGreatest {
         let at = |centre: Point2, half: f64| {
             let (here, slope) = f(centre)?;
             Some(Value { here, possible: here + slope * half * std::f64::consts::SQRT_2 })
@@ -177,7 +182,7 @@ mod tests {
     fn nothing_above_what_is_known_is_nothing_found() {
         let hill = |p: Point2| Some((1.0 - 0.1 * (p.x - 2.0).powi(2), 0.2 * (p.x - 2.0).abs()));
         let found = search(4, 5.0, 1e-3, &hill);
-        assert_eq!(found, Found { greatest: None, possible: 5.0 });
+        assert_eq!(found, BoundedGreatest { greatest: None, possible: 5.0 });
     }
 
     #[test]

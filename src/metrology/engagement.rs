@@ -11,8 +11,7 @@ use cutter::Cutter;
 use geometry::{Point2, Vector2};
 use motion::{MoveKind, Toolpath};
 use sim::ENGAGED;
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// Cells a radius. More see thinner layers, and cost memory as their square.
 const CELLS_A_RADIUS: f64 = 60.0;

@@ -4,7 +4,9 @@
 use serde::Serialize;
 
 use super::pairs::PairFigures;
-use super::refine::Refined;
+
+/// Numerical floor of every bound, mm: root finding and the design surface's own evaluation.
+pub(crate) const NUMERICAL_FLOOR: f64 = 1e-6;
 
 /// What is tolerated, mm, all positive.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -168,5 +170,16 @@ pub struct Measurement {
     /// Scallops of pairs of passes, calculated beside measured.
     pub pairs: PairFigures,
     /// How the figures were refined.
-    pub refined: Refined,
+    pub refined: CloserLook,
+}
+
+/// How a measurement was refined.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct CloserLook {
+    /// Rectangles cut anew.
+    pub rectangles: usize,
+    /// Pitch of the finest cells, mm.
+    pub finest_cell: f64,
+    /// Which bounds remain above the asked one.
+    pub note: Option<String>,
 }

@@ -6,16 +6,16 @@
 
 use super::closer::{Square, Value};
 use super::cut_surface::{CutSurface, Deviation};
-use super::figures::{DeviationFigures, GougeFigures, GougeRegion, Limits, UncutFigures, UncutRegion};
+use super::figures::{
+    DeviationFigures, GougeFigures, GougeRegion, Limits, NUMERICAL_FLOOR, UncutFigures, UncutRegion,
+};
 use super::regions::connected;
-use super::ridges::NUMERICAL_FLOOR;
 use crate::closer;
 use cutter::Cutter;
 use geometry::{Point2, Point3};
 use part::Part;
 use sim::{Grid, NOT_CUT};
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// Regions listed one by one in the figures; the rest is counted.
 const LISTED_REGIONS: usize = 20;
@@ -179,7 +179,7 @@ impl Inspection<'_> {
         known: f64,
         sample: &dyn Fn(usize) -> Sample,
         value: &(dyn Fn(&Deviation, f64, f64) -> Value + Sync),
-    ) -> closer::Found {
+    ) -> closer::BoundedGreatest {
         let half = 0.5 * self.grid.cell;
         let mut open: Vec<Square> = cells
             .filter_map(|k| {

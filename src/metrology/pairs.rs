@@ -5,7 +5,7 @@
 //!
 //! At a place of the design below a crossing stands the section across both tracks. There the place is found from which the
 //! nearest ball centres of both tracks on the finished path are a radius away, begun where the two nearest balls meet
-//! (`toolpath::scallop::ridge_between`); its distance from the design is the calculated height. No planner's prediction
+//! ([`scallop::ridge_between`]); its distance from the design is the calculated height. No planner's prediction
 //! enters, and nothing of the cut surface but which two moves meet near which place. Beside it stands the height on a
 //! circular section: the chord between the contacts, and the design's curvature across the feed. It takes the balls to touch
 //! the design, so that it knows nothing of chords, and takes the passes to be parallel.
@@ -23,8 +23,7 @@ use cutter::Cutter;
 use geometry::Point3;
 use motion::Toolpath;
 use part::Part;
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// Calculated places along a ridge are this share of the ball's radius apart. More cost time, fewer miss how a ridge
 /// changes.

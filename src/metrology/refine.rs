@@ -11,16 +11,16 @@
 
 use std::collections::BTreeMap;
 
-use super::figures::Measurement;
+use super::cut_surface::CutSurface;
+use super::figures::{CloserLook, Measurement, NUMERICAL_FLOOR};
+use super::inspected::{Inspected, inspect};
 use super::inspection::{Inspection, Within};
-use super::ridges::{Hidden, NUMERICAL_FLOOR};
+use super::ridges::Hidden;
 use super::unseen::{Dip, unseen_depth};
-use super::{Inspected, inspect};
 use geometry::Point2;
 use motion::Toolpath;
 use sim::{Envelope, Grid, ZMap, cut};
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// Cells of the grid along the side of a rectangle. More are cut for nothing around a place; fewer share
 /// less of what each rectangle costs, which grows with the moves of the path.
@@ -44,17 +44,6 @@ pub struct Asked {
     pub most_cells: usize,
 }
 
-/// How a measurement was refined.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Refined {
-    /// Rectangles cut anew.
-    pub rectangles: usize,
-    /// Pitch of the finest cells, mm.
-    pub finest_cell: f64,
-    /// Which bounds remain above the asked one.
-    pub note: Option<String>,
-}
-
 /// What a rectangle may hold, mm.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Suspicion {
@@ -68,7 +57,7 @@ struct Suspicion {
 
 /// The greatest heights and depths so far, and what they may be at most, mm.
 #[derive(Debug, Clone, Copy)]
-struct Greatest {
+struct GreatestSoFar {
     height: f64,
     possible_height: f64,
     depth: f64,
@@ -94,11 +83,11 @@ impl Refinement<'_> {
         dips: &[Dip],
         measured: &mut Measurement,
         monitor: &dyn Monitor,
-    ) -> Result<Refined, Cancelled> {
+    ) -> Result<CloserLook, Cancelled> {
         let bound = self.asked.error_bound;
-        let mut refined = Refined { finest_cell: self.coarse.grid.cell, ..Refined::default() };
+        let mut refined = CloserLook { finest_cell: self.coarse.grid.cell, ..CloserLook::default() };
         let scallop = measured.scallop.max_mm.unwrap_or(0.0);
-        let mut greatest = Greatest {
+        let mut greatest = GreatestSoFar {
             height: measured.uncut.max_height_mm,
             possible_height: measured.uncut.max_height_mm + measured.uncut.error_bound_mm - NUMERICAL_FLOOR,
             depth: measured.gouge.max_depth_mm,
@@ -138,7 +127,7 @@ impl Refinement<'_> {
     }
 
     /// True where a rectangle of cells of `cell` mm (0 before it is cut) may hold more than is known.
-    fn open(&self, suspicion: &Suspicion, greatest: &Greatest, cell: f64) -> bool {
+    fn open(&self, suspicion: &Suspicion, greatest: &GreatestSoFar, cell: f64) -> bool {
         let asked = self.asked.error_bound;
         let seen = cell > 0.0 && unseen_depth(self.coarse.cutter, cell, 1.0) <= asked;
         let depth = if seen { suspicion.depth } else { suspicion.deeper };
@@ -187,8 +176,8 @@ impl Refinement<'_> {
         [tj, ti]: [usize; 2],
         suspicion: Suspicion,
         measured: &mut Measurement,
-        greatest: &mut Greatest,
-        refined: &mut Refined,
+        greatest: &mut GreatestSoFar,
+        refined: &mut CloserLook,
         monitor: &dyn Monitor,
     ) -> Result<(), Cancelled> {
         let grid = &self.coarse.grid;
@@ -209,7 +198,7 @@ impl Refinement<'_> {
             let fine = Grid { origin, cell, nx, ny };
             let (found, hidden) = self.measure(fine, monitor)?;
             refined.finest_cell = refined.finest_cell.min(cell);
-            let now = Greatest {
+            let now = GreatestSoFar {
                 height: greatest.height.max(found.uncut.max_height_mm),
                 depth: greatest.depth.max(found.gouge.max_depth_mm),
                 ..*greatest
@@ -267,7 +256,7 @@ impl Refinement<'_> {
         let stock = ZMap::block(fine, self.asked.stock_top);
         let cut = cut(stock, coarse.cutter, self.path, &within)?;
         let envelope: Envelope = coarse.surface.envelope.clone();
-        let surface = super::CutSurface::new(envelope, &cut, self.path);
+        let surface = CutSurface::new(envelope, &cut, self.path);
         let inspection = Inspection { surface: &surface, grid: fine, ..*coarse };
         let found = inspect(&inspection, self.path, self.highest_ridge, &within)?;
         let hidden = found.ridges.hidden.iter().map(|place| self.height(place).1).fold(0.0, f64::max);
@@ -275,7 +264,7 @@ impl Refinement<'_> {
     }
 }
 
-impl Greatest {
+impl GreatestSoFar {
     fn merge(&mut self, found: &Inspected) {
         let (uncut, gouge) = (&found.uncut, &found.gouge);
         self.height = self.height.max(uncut.max_height_mm);

@@ -76,7 +76,7 @@ struct Stretch {
 }
 
 /// What an engine found, by cells or voxels of a pitch, mm.
-struct Found<'a> {
+struct RemovalRecord<'a> {
     moves: &'a [MoveRemoval],
     contacts: &'a [RapidContact],
     volume_bound: f64,
@@ -88,7 +88,7 @@ struct Found<'a> {
 pub fn removal_figures(path: &Toolpath, removal: &Removal, final_height: &[f32]) -> RemovalFigures {
     let Removal { stock, moves, rapid_contacts, volume_bound } = removal;
     let pitch = stock.grid.cell;
-    let found = Found { moves, contacts: rapid_contacts, volume_bound: *volume_bound, pitch };
+    let found = RemovalRecord { moves, contacts: rapid_contacts, volume_bound: *volume_bound, pitch };
     let apart = |(a, b): (&f32, &f32)| f64::from((a - b).abs());
     let difference = stock.height.iter().zip(final_height).map(apart).fold(0.0, f64::max);
     RemovalFigures { engine_difference_mm: Some(difference), ..figures(path, &found) }
@@ -97,10 +97,13 @@ pub fn removal_figures(path: &Toolpath, removal: &Removal, final_height: &[f32])
 /// The figures of a removal along `path` by voxels of `voxel` mm, whatever the tool axis.
 pub fn voxel_removal_figures(path: &Toolpath, removal: &VoxelRemoval, voxel: f64) -> RemovalFigures {
     let VoxelRemoval { moves, rapid_contacts, volume_bound } = removal;
-    figures(path, &Found { moves, contacts: rapid_contacts, volume_bound: *volume_bound, pitch: voxel })
+    figures(
+        path,
+        &RemovalRecord { moves, contacts: rapid_contacts, volume_bound: *volume_bound, pitch: voxel },
+    )
 }
 
-fn figures(path: &Toolpath, found: &Found<'_>) -> RemovalFigures {
+fn figures(path: &Toolpath, found: &RemovalRecord<'_>) -> RemovalFigures {
     let mut figures = RemovalFigures {
         cell_mm: found.pitch,
         volume_mm3: found.moves.iter().map(|m| m.volume).sum(),
@@ -136,7 +139,7 @@ fn engagement(figures: &mut RemovalFigures, path: &Toolpath, moves: &[MoveRemova
     }
 }
 
-fn rates(figures: &mut RemovalFigures, path: &Toolpath, found: &Found<'_>) {
+fn rates(figures: &mut RemovalFigures, path: &Toolpath, found: &RemovalRecord<'_>) {
     let least = STRETCH_CELLS * found.pitch;
     let (mut volume, mut minutes) = (0.0, 0.0);
     let mut stretches: Vec<Stretch> = Vec::new();

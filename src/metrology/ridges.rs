@@ -12,17 +12,15 @@
 //! rise.
 
 use super::cut_surface::CutSurface;
-use super::figures::{Limits, ScallopFigures};
+use super::figures::{Limits, NUMERICAL_FLOOR, ScallopFigures};
 use super::meetings::{Meeting, Meetings};
 use super::pairs::{PairTally, RidgeCrossing};
 use cutter::Cutter;
-use geometry::distance_to_segment;
-use geometry::{Point2, Point3, Vector2};
+use geometry::{Point2, Point3, Vector2, distance_to_segment};
 use motion::Toolpath;
 use part::{Part, SurfacePoint};
 use sim::Grid;
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// One crossing of a ridge with a grid line.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -118,9 +116,6 @@ const SQUARE_ENOUGH: f64 = 0.7;
 /// A pass serves a ridge when it touches the design within this many distances of the two passes.
 /// On a plane it is half of one; in a hollow of radius 4/3 of the cutter's, two.
 const FARTHEST_CONTACT: f64 = 2.0;
-
-/// Numerical floor of every bound, mm: root finding and the design surface's own evaluation.
-pub(super) const NUMERICAL_FLOOR: f64 = 1e-6;
 
 pub(super) struct RidgeFinder<'a> {
     pub surface: &'a CutSurface<'a>,

@@ -16,14 +16,13 @@
 use serde::Serialize;
 
 use super::along_normals::{AlongNormal, NormalHit};
-use super::ridges::NUMERICAL_FLOOR;
+use super::figures::NUMERICAL_FLOOR;
 use super::tracks::Tracks;
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
 use motion::Toolpath;
 use part::Part;
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// Profiles over the part. More tell more of a part whose roughness changes, and take longer.
 const PROFILES: usize = 24;

@@ -7,8 +7,7 @@ use cutter::Cutter;
 use geometry::{Point2, Point3};
 use motion::Toolpath;
 use part::Part;
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// Most places looked at along one move: longer moves at a wider pitch. 3 µs each.
 const MOST_ON_A_MOVE: f64 = 1e5;

@@ -1,6 +1,10 @@
-//! Where a cutter stands and how it moves: contacts, locations, tool axes, moves, paths. Everything that cuts, measures or
-//! drives a machine stands on these words; none of them knows how a path was planned. mm; feed in mm/min; axes are unit
-//! vectors from the tip to the holder.
+//! Where a cutter is and how it moves: contacts, locations, tool axes, moves, paths.
+//!
+//! Enters: contacts with unit normals, or tip positions with axes. Leaves: a [`Toolpath`] of moves. What cuts, measures or
+//! drives a machine depends on these types; none of them knows how a path was planned.
+//!
+//! Lengths in mm, feed in mm/min, tilt in rad. A location is that of the tip; an axis is a unit vector from the tip to the
+//! holder.
 
 mod path;
 mod tool_axis;

@@ -1,5 +1,10 @@
-//! Offsets: of plane curves, of NURBS patches and of triangle meshes. Enters: a curve or a surface and a distance, mm.
-//! Leaves: what lies that far off it, and where there is no such place.
+//! Offsets of plane curves, of NURBS patches and of triangle meshes.
+//!
+//! Enters: a curve or a surface and a distance, mm, with a tolerance. Leaves: a curve or a surface at that distance, its
+//! greatest error, and the places where no such offset exists because the shape curves too tightly.
+//!
+//! Limits: the offset of a curve is trimmed against itself. The offset of a patch is not; its singular places are reported.
+//! The offset of a mesh loses pieces that are narrower than its cells.
 
 pub mod curve_offset;
 mod mesh_offset;

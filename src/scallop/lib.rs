@@ -1,7 +1,7 @@
 //! Scallops by calculation: what a ridge between two passes of a ball will be, before anything is cut.
 //!
 //! Enters: the cutter's radius, the curvature of the surface across the feed, and a step or a height; or the contacts of
-//! two passes. Leaves: the exact height and the exact step, and what two common short cuts make of them: the
+//! two passes. Leaves: the exact height and the exact step, and what two common simplifications make of them: the
 //! second-order formula by which passes are planned, and a polynomial fitted to the section across the feed. Lengths
 //! mm, curvature 1/mm, positive where the surface is concave toward its outward normal.
 //!
@@ -11,103 +11,17 @@
 mod comparison;
 mod contacts;
 mod effective;
+mod error;
 mod place;
 mod section;
 mod section_fit;
 mod strip;
 
 pub use comparison::{Comparison, compare};
-pub use contacts::{Ridge, ridge_between, ridge_of_contacts};
+pub use contacts::{Ridge, ridge_between};
 pub use effective::effective_radius;
+pub use error::ScallopError;
 pub use place::SurfaceCurvature;
 pub use section::{BallSection, ScallopStep, ball_scallop_height};
 pub use section_fit::{DEFAULT_DEGREE, MAX_DEGREE, SectionFit, SectionFrame, fit_section};
 pub use strip::{strip_width, strip_width_at};
-
-/// Why no scallop could be calculated.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ScallopError {
-    /// A number is not finite or out of its range.
-    #[error("{what} is {value}; it must be {wanted}")]
-    Range {
-        /// Which number.
-        what: &'static str,
-        /// What was given.
-        value: f64,
-        /// What it must be.
-        wanted: &'static str,
-    },
-    /// The ball does not fit: the machinable limit.
-    #[error(
-        "a ball of radius {ball} mm does not fit into a concave section of radius {section} mm: the machinable limit; \
-         use a ball of less than {diameter} mm diameter"
-    )]
-    DoesNotFit {
-        /// Radius of the ball, mm.
-        ball: f64,
-        /// Radius of the section, mm.
-        section: f64,
-        /// Twice that.
-        diameter: f64,
-    },
-    /// The two passes leave untouched material between them.
-    #[error(
-        "passes {step} mm apart leave material that no pass touches: a ball of radius {ball} mm reaches across \
-         {greatest} mm there; choose a smaller step"
-    )]
-    Step {
-        /// The step along the surface, mm.
-        step: f64,
-        /// Radius of the ball, mm.
-        ball: f64,
-        /// The widest step that leaves a ridge and nothing else, mm.
-        greatest: f64,
-    },
-    /// No step leaves so high a ridge.
-    #[error(
-        "no step leaves a scallop of {height} mm there: the highest that a ball of radius {ball} mm leaves is \
-         {greatest} mm; ask for less"
-    )]
-    Height {
-        /// The height, mm.
-        height: f64,
-        /// Radius of the ball, mm.
-        ball: f64,
-        /// The highest possible, mm.
-        greatest: f64,
-    },
-    /// The cutter has no circle to calculate with.
-    #[error("{0}")]
-    Cutter(String),
-    /// The polynomial cannot be fitted.
-    #[error(
-        "a polynomial of degree {degree} needs contacts at {needed} or more distances across the feed, and {given} were given"
-    )]
-    Fit {
-        /// Degree of the polynomial.
-        degree: usize,
-        /// Distinct abscissae that it needs.
-        needed: usize,
-        /// How many there are.
-        given: usize,
-    },
-    /// The two envelope circles do not meet.
-    #[error(
-        "the two contacts are {distance} mm apart across the feed, and circles of radius {ball} mm do not meet; take nearer ones"
-    )]
-    Apart {
-        /// Distance of the circles' centres, mm.
-        distance: f64,
-        /// Radius of the ball, mm.
-        ball: f64,
-    },
-}
-
-/// `value`, if it is finite and above zero.
-fn positive(what: &'static str, value: f64) -> Result<f64, ScallopError> {
-    if value > 0.0 && value <= geometry::MAX_COORDINATE {
-        Ok(value)
-    } else {
-        Err(ScallopError::Range { what, value, wanted: "a positive number of mm, a million at most" })
-    }
-}

@@ -12,7 +12,8 @@
 //! convex and concave sections. It is the same as `h = σ[(ρ+σr)cos(θ/2) − ρ] − √(r² − (ρ+σr)² sin²(θ/2))`, which loses
 //! as many digits as ρ is longer than h.
 
-use super::{ScallopError, positive};
+use super::ScallopError;
+use super::error::positive;
 
 /// Sections of less curvature times radius than this share below one count as not fitting: the ball's centres would
 /// then all stand in one place.

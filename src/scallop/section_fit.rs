@@ -42,12 +42,6 @@ pub struct SectionFrame {
 }
 
 impl SectionFrame {
-    /// At `contact`, across `feed`, which need be neither unit nor quite tangent; `None` when it is along the normal.
-    pub fn across_feed(contact: &CcPoint, feed: &Vector3) -> Option<Self> {
-        let across = contact.normal.cross(feed).try_normalize(1e-12)?;
-        Some(Self { origin: contact.point, across, up: contact.normal })
-    }
-
     /// A point seen along the feed, mm: across, and up.
     pub fn project(&self, p: &Point3) -> Point2 {
         Point2::from(self.project_vector(&(p - self.origin)))
@@ -138,7 +132,7 @@ impl SectionFit {
     /// # Errors
     /// [`ScallopError::Apart`] where the circles do not meet, or a contact's normal lies along the feed.
     pub fn scallop(&self, contacts: &[CcPoint; 2], r: f64) -> Result<f64, ScallopError> {
-        super::positive("the radius of the ball", r)?;
+        super::error::positive("the radius of the ball", r)?;
         let centre = |c: &CcPoint| {
             let up = self.frame.project_vector(&c.normal).try_normalize(1e-9)?;
             Some(self.frame.project(&c.point) + up * r)
@@ -176,9 +170,15 @@ mod tests {
         (first..first + count).map(at).collect()
     }
 
+    /// The plane across a feed along x.
+    fn across_x(contact: &CcPoint) -> SectionFrame {
+        let across = contact.normal.cross(&Vector3::x()).normalize();
+        SectionFrame { origin: contact.point, across, up: contact.normal }
+    }
+
     fn scallop(k: f64, arc: f64, r: f64, degree: usize) -> f64 {
         let contacts = passes(k, arc, -2, 6);
-        let frame = SectionFrame::across_feed(&contacts[2], &Vector3::x()).unwrap();
+        let frame = across_x(&contacts[2]);
         fit_section(frame, &contacts, degree).unwrap().scallop(&[contacts[2], contacts[3]], r).unwrap()
     }
 
@@ -203,7 +203,7 @@ mod tests {
     #[test]
     fn contacts_that_do_not_tell_are_refused() {
         let contacts = passes(0.02, 0.6, -1, 4);
-        let frame = SectionFrame::across_feed(&contacts[1], &Vector3::x()).unwrap();
+        let frame = across_x(&contacts[1]);
         let error = fit_section(frame, &contacts, 4).unwrap_err().to_string();
         assert!(error.contains("at 5 or more distances") && error.contains("4 were given"), "{error}");
         let twice: Vec<CcPoint> = contacts.iter().chain(&contacts).copied().collect();
@@ -216,7 +216,6 @@ mod tests {
         assert!(
             fit.scallop(&[contacts[1], contacts[2]], 0.2).unwrap_err().to_string().contains("do not meet")
         );
-        assert!(SectionFrame::across_feed(&contacts[1], &contacts[1].normal).is_none());
     }
 
     #[test]

@@ -34,8 +34,7 @@ use cutter::Cutter;
 use geometry::Point3;
 use local::{Chunk, Frame, MoveList, Name};
 use motion::Toolpath;
-use work::lanes;
-use work::lanes::Real;
+use work::lanes::{self, Real};
 use work::monitor::{Cancelled, Monitor, check};
 use work::parallel;
 
@@ -96,7 +95,7 @@ pub fn cut_counted(
         return Ok((cut_reference(&stock, cutter, path, monitor)?, Work::default()));
     }
     let side = tile_side(form.radius, stock.grid.cell);
-    Job { form, path, side, bounded: true, margin: 0.0 }.run(stock, monitor)
+    UnorderedCut { form, path, side, bounded: true, margin: 0.0 }.run(stock, monitor)
 }
 
 /// As [`cut_counted`] without any bound: every move that reaches a tile is evaluated at each of its cells,
@@ -113,7 +112,7 @@ pub fn cut_all_candidates(
 ) -> Result<(ZMap, Work), Cancelled> {
     let form = Form::new(cutter);
     let side = tile_side(form.radius, stock.grid.cell).min(CANDIDATES_TILE);
-    Job { form, path, side, bounded: false, margin: 0.0 }.run(stock, monitor)
+    UnorderedCut { form, path, side, bounded: false, margin: 0.0 }.run(stock, monitor)
 }
 
 fn tile_side(radius: f64, cell: f64) -> usize {
@@ -136,7 +135,7 @@ pub struct Work {
     pub second_looks: u64,
 }
 
-struct Job<'a> {
+struct UnorderedCut<'a> {
     form: Form,
     path: &'a Toolpath,
     side: usize,
@@ -146,7 +145,7 @@ struct Job<'a> {
     margin: f64,
 }
 
-impl Job<'_> {
+impl UnorderedCut<'_> {
     fn run(&self, mut stock: ZMap, monitor: &dyn Monitor) -> Result<(ZMap, Work), Cancelled> {
         let grid = stock.grid;
         let bins = MoveBins::new(&grid, self.side, self.form.radius, self.path);
@@ -205,30 +204,28 @@ impl Job<'_> {
         let shallow = f64::from(top) - frame.z <= DEEPEST;
         let (form, blur) = (&self.form, sweep::blur(extent));
         let share = sweep::rim_share(extent).filter(|_| shallow);
-        let tile = Tile { cells, moves, tracks: &tracks, frame, tops };
-        lanes::dispatch(
-            #[inline(always)]
-            || match (form.family, share) {
-                (Family::Ball, Some(share)) => self.cut_with::<f32, _>(Ball::new(radius, share), grid, tile),
-                (Family::Ball, None) => self.cut_with::<f64, _>(Ball::new(radius, 0.0), grid, tile),
-                (Family::Flat, Some(_)) => self.cut_with::<f32, _>(Flat::new(radius, blur), grid, tile),
-                (Family::Flat, None) => self.cut_with::<f64, _>(Flat::new(radius, 0.0), grid, tile),
-                (Family::Rounded, Some(_)) if form.has_cones() => {
-                    self.cut_with::<f32, _>(Rounded::<_, true>::new(form, blur), grid, tile)
-                }
-                (Family::Rounded, Some(_)) => {
-                    self.cut_with::<f32, _>(Rounded::<_, false>::new(form, blur), grid, tile)
-                }
-                (Family::Rounded, None) => {
-                    self.cut_with::<f64, _>(Rounded::<_, true>::new(form, 0.0), grid, tile)
-                }
-            },
-        )
+        let tile = TileTask { cells, moves, tracks: &tracks, frame, tops };
+        match (form.family, share) {
+            (Family::Ball, Some(share)) => self.cut_with::<f32, _>(Ball::new(radius, share), grid, tile),
+            (Family::Ball, None) => self.cut_with::<f64, _>(Ball::new(radius, 0.0), grid, tile),
+            (Family::Flat, Some(_)) => self.cut_with::<f32, _>(Flat::new(radius, blur), grid, tile),
+            (Family::Flat, None) => self.cut_with::<f64, _>(Flat::new(radius, 0.0), grid, tile),
+            (Family::Rounded, Some(_)) if form.has_cones() => {
+                self.cut_with::<f32, _>(Rounded::<_, true>::new(form, blur), grid, tile)
+            }
+            (Family::Rounded, Some(_)) => {
+                self.cut_with::<f32, _>(Rounded::<_, false>::new(form, blur), grid, tile)
+            }
+            (Family::Rounded, None) => {
+                self.cut_with::<f64, _>(Rounded::<_, true>::new(form, 0.0), grid, tile)
+            }
+        }
     }
 
-    #[inline(always)]
-    fn cut_with<T: Real, S: Sweep<T>>(&self, sweep: S, grid: &Grid, tile: Tile<'_, '_>) -> Work {
-        let Tile { cells: tile, moves, tracks, frame, tops } = tile;
+    /// Plain code that goes from square to square. Vector code begins below it, where a call costs little beside the
+    /// work: at each leaf and at each choice ([`lanes::dispatch`]).
+    fn cut_with<T: Real, S: Sweep<T>>(&self, sweep: S, grid: &Grid, tile: TileTask<'_, '_>) -> Work {
+        let TileTask { cells: tile, moves, tracks, frame, tops } = tile;
         let mut levels = vec![Level::new()];
         levels[0].moves.reset(moves.len());
         for (n, (&k, (track, falling))) in moves.iter().zip(tracks).enumerate() {
@@ -241,8 +238,8 @@ impl Job<'_> {
             grid,
             tile,
             frame,
-            cells: offsets(LEAF, grid.cell),
-            part_cells: offsets(PART, grid.cell),
+            cells: &offsets(LEAF, grid.cell),
+            part_cells: &offsets(PART, grid.cell),
             tops,
             levels,
             chooser: Chooser::new(),
@@ -254,7 +251,7 @@ impl Job<'_> {
 }
 
 /// What a tile is cut with.
-struct Tile<'a, 'b> {
+struct TileTask<'a, 'b> {
     cells: &'a mut TileCells<'b>,
     moves: &'a [u32],
     /// Those of the moves, and whether they are passed downwards.
@@ -317,14 +314,14 @@ impl<T: Real> Level<T> {
 }
 
 struct Worker<'a, 'b, T, S> {
-    job: &'a Job<'a>,
+    job: &'a UnorderedCut<'a>,
     sweep: S,
     grid: &'a Grid,
     tile: &'a mut TileCells<'b>,
     frame: Frame,
     /// Places of the cells of a leaf from its first one, and those of a part of a leaf.
-    cells: [[T; LEAF_CELLS]; 2],
-    part_cells: [[T; PART_CELLS]; 2],
+    cells: &'a [[T; LEAF_CELLS]; 2],
+    part_cells: &'a [[T; PART_CELLS]; 2],
     /// The highest stock in each leaf.
     tops: Vec<f32>,
     /// The moves left at each level of squares.
@@ -349,7 +346,6 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
     }
 
     /// Cuts all of the tile with the moves of the first level.
-    #[inline(always)]
     fn whole(&mut self, side: usize) {
         if !self.job.bounded {
             self.choose_all(0);
@@ -362,8 +358,8 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
             return;
         }
         self.choose::<1>(0, [[0, 0]], side);
-        // A recursion that is all inlined: an explicit stack of squares, each with the level whose moves
-        // it chose from and its place among the squares that chose together.
+        // A stack of squares, each with the level whose moves it chose from and its place among the squares that
+        // chose together.
         let mut waiting = [(0usize, 0usize, [0usize; 2], 0usize); 64];
         waiting[0] = (0, 0, [0, 0], side);
         let mut count = 1;
@@ -400,13 +396,20 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
     }
 
     /// Marks for each of some squares those of the level's moves that may be lowest somewhere in it.
-    #[inline(always)]
     fn choose<const Q: usize>(&mut self, level: usize, squares: [[usize; 2]; Q], side: usize) {
         if self.levels[level].moves.len() <= FEW {
             // So few cost less at every cell than telling them apart.
             self.choose_all(level);
             return;
         }
+        lanes::dispatch(
+            #[inline(always)]
+            || self.choose_among_many(level, squares, side),
+        );
+    }
+
+    #[inline(always)]
+    fn choose_among_many<const Q: usize>(&mut self, level: usize, squares: [[usize; 2]; Q], side: usize) {
         let Some(first) = self.inside(squares[0], side) else { return };
         // Squares outside choose as the first one does, which always has cells, and are left out later.
         let first = self.square_at(squares[0], first);
@@ -424,7 +427,6 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
     }
 
     /// Marks all of the level's moves for each square.
-    #[inline(always)]
     fn choose_all(&mut self, level: usize) {
         let Level { moves, chosen, kept } = &mut self.levels[level];
         chosen.clear();
@@ -433,7 +435,6 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
     }
 
     /// Leaves the moves that a square chose from a level in the one below.
-    #[inline(always)]
     fn hand_down(&mut self, level: usize, q: usize) {
         if level + 1 == self.levels.len() {
             self.levels.push(Level::new());

@@ -91,7 +91,7 @@ pub fn holder_collisions(
         Ok::<_, Cancelled>(found)
     })?;
     let mut all =
-        Found { lowest: Lowest::NONE, certain: f64::INFINITY, collisions: Vec::new(), uncertain: 0 };
+        ChunkClearance { lowest: Lowest::NONE, certain: f64::INFINITY, collisions: Vec::new(), uncertain: 0 };
     for mut chunk in found {
         if chunk.lowest.clearance < all.lowest.clearance {
             all.lowest = chunk.lowest;
@@ -126,7 +126,7 @@ impl Lowest {
 }
 
 /// What a run of moves yields.
-struct Found {
+struct ChunkClearance {
     lowest: Lowest,
     /// No clearance, also between centres, is less than this.
     certain: f64,
@@ -160,9 +160,13 @@ impl Checks {
         moves: std::ops::Range<usize>,
         path: &Toolpath,
         monitor: &dyn Monitor,
-    ) -> Result<Found, Cancelled> {
-        let mut found =
-            Found { lowest: Lowest::NONE, certain: f64::INFINITY, collisions: Vec::new(), uncertain: 0 };
+    ) -> Result<ChunkClearance, Cancelled> {
+        let mut found = ChunkClearance {
+            lowest: Lowest::NONE,
+            certain: f64::INFINITY,
+            collisions: Vec::new(),
+            uncertain: 0,
+        };
         for k in moves {
             if k % MOVES_BETWEEN_QUESTIONS == 0 {
                 check(monitor)?;
@@ -172,7 +176,7 @@ impl Checks {
         Ok(found)
     }
 
-    fn one(&self, k: usize, from: Point3, to: Point3, found: &mut Found) {
+    fn one(&self, k: usize, from: Point3, to: Point3, found: &mut ChunkClearance) {
         let move_index = k as u32;
         // Below the least so far, or below zero, where each move counts for itself.
         let sweep = |pyramid: &Pyramid, sections: &[(f64, Form)], limit: f64| {

@@ -131,13 +131,13 @@ pub fn cut_in_order(
 }
 
 /// What all tiles of a cut share.
-struct Job<'a> {
+struct OrderedCut<'a> {
     form: Form,
     path: &'a Toolpath,
     monitor: &'a dyn Monitor,
 }
 
-impl Job<'_> {
+impl OrderedCut<'_> {
     fn track(&self, index: u32) -> Track {
         let k = index as usize;
         Track::new(self.path.start_of(k), self.path.moves[k].to.tip)
@@ -156,7 +156,7 @@ struct Slices<'a> {
 
 /// What the moves of one tile removed, in the order of the program.
 #[derive(Default)]
-struct Found {
+struct TileRecord {
     tallies: Vec<(u32, Tally)>,
     contacts: Vec<RapidContact>,
 }
@@ -168,16 +168,16 @@ fn cut_by_tiles(
     path: &Toolpath,
     monitor: &dyn Monitor,
     side: usize,
-    cut: impl Fn(&Job, &mut Slices, &[u32]) -> Result<Found, Cancelled> + Sync + Send,
+    cut: impl Fn(&OrderedCut, &mut Slices, &[u32]) -> Result<TileRecord, Cancelled> + Sync + Send,
 ) -> Result<Removal, Cancelled> {
     check(monitor)?;
-    let job = Job { form: Form::new(cutter), path, monitor };
+    let job = OrderedCut { form: Form::new(cutter), path, monitor };
     let bins = MoveBins::new(&stock.grid, side, job.form.radius, path);
     monitor.start("cutting in order", (bins.nx() * bins.ny()) as u64);
     let before = variation(&stock);
     stock.cut_by.fill(NOT_CUT);
-    let mut tiles: Vec<(Slices, Found)> =
-        slices(&mut stock, side).into_iter().map(|s| (s, Found::default())).collect();
+    let mut tiles: Vec<(Slices, TileRecord)> =
+        slices(&mut stock, side).into_iter().map(|s| (s, TileRecord::default())).collect();
     parallel::try_for_each(&mut tiles, |k, (slices, found)| {
         check(monitor)?;
         let moves = bins.of_bin(k % bins.nx(), k / bins.nx());
@@ -187,7 +187,7 @@ fn cut_by_tiles(
         monitor.advance(1);
         Ok(())
     })?;
-    let found: Vec<Found> = tiles.into_iter().map(|(_, found)| found).collect();
+    let found: Vec<TileRecord> = tiles.into_iter().map(|(_, found)| found).collect();
     let (moves, rapid_contacts) = join(found, &job, stock.grid.cell);
     let volume_bound = 0.5 * stock.grid.cell.powi(2) * (before + variation(&stock));
     Ok(Removal { stock, moves, rapid_contacts, volume_bound })
@@ -232,7 +232,7 @@ fn variation(map: &ZMap) -> f64 {
     rows.into_iter().sum()
 }
 
-fn join(found: Vec<Found>, job: &Job, cell: f64) -> (Vec<MoveRemoval>, Vec<RapidContact>) {
+fn join(found: Vec<TileRecord>, job: &OrderedCut, cell: f64) -> (Vec<MoveRemoval>, Vec<RapidContact>) {
     let mut tallies = vec![Tally::NOTHING; job.path.len()];
     let mut contacts: Vec<RapidContact> = Vec::new();
     for tile in found {

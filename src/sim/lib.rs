@@ -1,5 +1,10 @@
-//! Stock, the swept cutter, and the engines that cut. Sees stock, cutter and moves only: neither
-//! strategies nor the design part.
+//! Stock, the swept cutter, and the engines that cut: on heights, along normals, and on voxels.
+//!
+//! Enters: stock, a cutter or a solid tool, and moves. Leaves: the stock after the moves, the move that cut each place, and
+//! what each move removes. Lengths in mm, volumes in mm³, z up. This crate sees neither strategies nor the design part.
+//!
+//! Limits: engines on heights ([`cut`], [`cut_in_order`]) need an upright tool. Tilted tools are cut by [`VoxelEngine`] and
+//! [`Rays`]. Results depend neither on the number of threads nor on the vector unit.
 
 mod bins;
 mod cut;
@@ -33,7 +38,7 @@ pub use reference::cut_reference;
 pub use solid::{Nearest, OppositeAxes, SweptHit, SweptMoves, SweptSolid};
 pub use swept::SweptMove;
 pub use voxel::{
-    Axis, HolderHit, LineExit, StandingHits, StockMesh, VoxelEngine, VoxelError, VoxelRemoval, VoxelSample,
-    VoxelStock, VoxelSurface, Voxels,
+    BarAxis, HolderHit, LineExit, StandingHits, StockMesh, VoxelEngine, VoxelError, VoxelRemoval,
+    VoxelSample, VoxelStock, VoxelSurface, Voxels,
 };
 pub use zmap::{NOT_CUT, ZMap};

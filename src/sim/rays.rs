@@ -5,7 +5,7 @@
 //! when. That is the deviation of the cut surface at the place: below zero a gouge, above zero what was
 //! left.
 //!
-//! All moves but rapids cut; a rapid within the part is a collision, which [`Rays::of_rapids`] finds.
+//! All moves but rapids cut; a rapid within the part is a collision, which the other engines report.
 //!
 //! The place runs down the normal as moves are found that reach lower. Of each box of the tree over the
 //! moves, and of each move, it is only asked whether it may reach lower still: along the normal too the
@@ -22,7 +22,7 @@ use super::solid::{Moving, OppositeAxes, SweptMoves, below};
 use cutter::Solid;
 use geometry::{Node, Point3, Vector3};
 use lowest::{Ray, Support};
-use motion::{Move, MoveKind, Toolpath};
+use motion::{MoveKind, Toolpath};
 use work::monitor::{Cancelled, Monitor, check};
 use work::parallel;
 
@@ -75,14 +75,14 @@ pub struct Rays {
 
 /// What was found so far by one ray.
 #[derive(Debug, Clone, Copy)]
-struct Found {
+struct LowestHit {
     /// The lowest place; the upper end of the range while there is none.
     lowest: f64,
     /// The first move that reaches as low, and the slot in which it stands.
     by: Option<(RayHit, usize)>,
 }
 
-impl Found {
+impl LowestHit {
     /// Up to where the move `index` counts: one before that which was found counts when it is equal, one
     /// after it when it is lower.
     fn limit(&self, index: u32) -> f64 {
@@ -105,25 +105,8 @@ impl Rays {
     /// # Errors
     /// [`RaysError::Opposite`] when one turns the axis to its opposite; [`RaysError::Cancelled`].
     pub fn new(path: &Toolpath, solid: &Solid, monitor: &dyn Monitor) -> Result<Self, RaysError> {
-        Self::of(path, solid, |m| m.kind != MoveKind::Rapid, monitor)
-    }
-
-    /// Of the rapids of `path` alone: where they reach below the surface, the tool runs into the part.
-    ///
-    /// # Errors
-    /// As [`Rays::new`].
-    pub fn of_rapids(path: &Toolpath, solid: &Solid, monitor: &dyn Monitor) -> Result<Self, RaysError> {
-        Self::of(path, solid, |m| m.kind == MoveKind::Rapid, monitor)
-    }
-
-    fn of(
-        path: &Toolpath,
-        solid: &Solid,
-        chosen: impl Fn(&Move) -> bool,
-        monitor: &dyn Monitor,
-    ) -> Result<Self, RaysError> {
         check(monitor)?;
-        let moves = SweptMoves::new(solid, path, chosen)?;
+        let moves = SweptMoves::new(solid, path, |m| m.kind != MoveKind::Rapid)?;
         check(monitor)?;
         Ok(Self { moves })
     }
@@ -218,13 +201,13 @@ impl Rays {
     ) -> Option<(RayHit, usize)> {
         let tree = self.moves.tree()?;
         let ray = Ray { point: *point, normal: *normal, low, high };
-        let found = Cell::new(Found { lowest: high, by: None });
+        let found = Cell::new(LowestHit { lowest: high, by: None });
         let visit = |slot: usize| {
             let (part, now) = (self.moves.part(slot), found.get());
             let index = self.moves.index(part);
             if let Some((s, t)) = ray.lowest_of(&self.moves, part, now.limit(index)) {
                 let lowest = s.min(now.lowest);
-                found.set(Found { lowest, by: Some((RayHit { s, index, t }, slot)) });
+                found.set(LowestHit { lowest, by: Some((RayHit { s, index, t }, slot)) });
             }
         };
         if let Some(slot) = seed {
@@ -243,7 +226,7 @@ impl Rays {
                 -found.get().highest()
             },
         );
-        let Found { lowest, by } = found.get();
+        let LowestHit { lowest, by } = found.get();
         by.map(|(hit, slot)| (RayHit { s: lowest, ..hit }, slot))
     }
 

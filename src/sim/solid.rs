@@ -19,7 +19,7 @@ mod turning;
 use cutter::Solid;
 use geometry::Point3;
 use motion::ClPoint;
-pub(crate) use moves::Part;
+pub(crate) use moves::MovePart;
 pub use moves::{SweptHit, SweptMoves};
 use search::least;
 pub(crate) use search::{Look, Moving, SHORTEST, Stretch};

@@ -40,12 +40,12 @@ struct Touch {
     along: f64,
     across: f64,
     /// What of the cutter made the cut.
-    by: Part,
+    by: TouchedBy,
 }
 
 /// The part of a cutter that makes the lowest cut, with the slope of the profile there.
 #[derive(Debug, Clone, Copy)]
-enum Part {
+enum TouchedBy {
     /// The rotating profile where it rises by this angle (sine and cosine).
     Profile(f64, f64),
     /// A sharp edge of this radius, as the cutter climbs past: the profile is less steep than the
@@ -128,12 +128,12 @@ impl Touch {
     /// z = slope·(s − √(R² − w²)), the trace of the rear half of a climbing circle.
     fn normal(&self, track: &Track) -> Vector3 {
         let (along, across, up) = match self.by {
-            Part::Profile(sine, cosine) => {
+            TouchedBy::Profile(sine, cosine) => {
                 let rho = (self.along * self.along + self.across * self.across).sqrt();
                 let level = if rho > 0.0 { sine / rho } else { 0.0 };
                 (level * self.along, level * self.across, cosine)
             }
-            Part::Edge(radius) => {
+            TouchedBy::Edge(radius) => {
                 let steep = track.slope * radius;
                 let size = steep.hypot(self.along);
                 if size == 0.0 {
@@ -193,7 +193,7 @@ fn ball_touch(track: &Track, radius: f64, along: f64, across: f64) -> Option<Tou
     let place = ball_place(track, radius, along, across);
     let ahead = along - place.sigma;
     let rho = (ahead * ahead + across * across).sqrt();
-    let by = Part::Profile(rho / radius, place.depth / radius);
+    let by = TouchedBy::Profile(rho / radius, place.depth / radius);
     place.inside.then(|| Touch {
         height: ball_height(track, radius, along, across),
         along: ahead,
@@ -217,9 +217,9 @@ fn flat_touch(track: &Track, radius: f64, along: f64, across: f64) -> Option<Tou
     let height = flat_height(track, radius, along, across);
     let half_chord = larger((radius - across) * (radius + across), 0.0).sqrt();
     let touch = if along > half_chord {
-        Touch { height, along: half_chord, across, by: Part::Edge(radius) }
+        Touch { height, along: half_chord, across, by: TouchedBy::Edge(radius) }
     } else {
-        Touch { height, along, across, by: Part::Profile(0.0, 1.0) }
+        Touch { height, along, across, by: TouchedBy::Profile(0.0, 1.0) }
     };
     (height < f64::INFINITY).then_some(touch)
 }

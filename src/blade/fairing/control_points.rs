@@ -5,8 +5,7 @@
 
 use super::FairingError;
 use super::relaxation::{Unknown, jump_changes};
-use geometry::CubicSpline;
-use geometry::KnotVector;
+use geometry::{CubicSpline, KnotVector};
 
 /// Shares of a point below this are rounding.
 const LEAST_SHARE: f64 = 1e-12;

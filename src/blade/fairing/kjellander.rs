@@ -9,24 +9,16 @@
 //! P* = \[ P₋/a³ + P₊/b³ + ½ (P₋′/a² − P₊′/b²) + ½ P′ (1/a² − 1/b²) \] / S
 //!
 //! (tangents of the interpolating spline), which is ½ (P₋ + P₊) + ¼ (P₋′ − P₊′) for a = b = 1, and the jump
-//! at the point is 12 S (P − P*): that is how P* is found here.
+//! at the point is 12 S (P − P*): the way to P* is found from the jump here.
 
 use super::FairingError;
 use super::relaxation::{Unknown, jump_changes};
 use geometry::CubicSpline;
-use geometry::Point2;
 
 /// Step, as a multiple of the way to P*, after which the jump of a point is gone once the spline is
 /// interpolated again: exact far from the ends where points lie evenly. After a step of 1 the tangents have
 /// given way, and 40.192 % of the jump is left.
 pub const JUMP_REMOVING_STEP: f64 = 1.672_03;
-
-/// Kjellander's place P* for point `k`, mm, which is the point itself next to and at the ends of open
-/// splines; `None` if there is no such point.
-pub fn kjellander_place(spline: &CubicSpline, k: usize) -> Option<Point2> {
-    let (point, jump) = (spline.points().get(k)?, spline.third_jumps().get(k).copied()?);
-    Some(point - jump / (12.0 * stiffness(spline, k)))
-}
 
 /// S at point `k`, 1 over the parameter's cube.
 fn stiffness(spline: &CubicSpline, k: usize) -> f64 {

@@ -26,7 +26,7 @@ mod relaxation;
 #[cfg(test)]
 mod tests;
 
-pub use kjellander::{JUMP_REMOVING_STEP, kjellander_place};
+pub use kjellander::JUMP_REMOVING_STEP;
 
 use geometry::{CubicSpline, KnotError, SplineError, Vector2};
 use relaxation::{Relaxation, State, Unknown};
@@ -40,7 +40,7 @@ const MOST_STEP: f64 = 2.0 * JUMP_REMOVING_STEP;
 /// What moves, and where to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FairingMethod {
-    /// The point of the greatest jump goes `step` times the way to Kjellander's place ([`kjellander_place`]):
+    /// The point of the greatest jump goes `step` times the way to the place P* that Kjellander gives it:
     /// 1 as published, [`JUMP_REMOVING_STEP`] so that its jump vanishes; above 0 and below twice that. The
     /// points next to the ends of open curves have no jump and stay too.
     Kjellander {

@@ -4,8 +4,7 @@
 //! derivative, which are linear in the points (parameters stay), so that a move changes those near it by
 //! known amounts.
 
-use geometry::Point2;
-use geometry::{CubicSpline, SplineError, Vector2};
+use geometry::{CubicSpline, Point2, SplineError, Vector2};
 
 /// Points to each side of a moved one within which it is felt: jumps further away change by (2 − √3)²⁰ of it
 /// where points lie evenly, and 2⁻²⁰ at most. The interpolation after each round brings back what is left

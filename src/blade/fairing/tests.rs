@@ -152,13 +152,11 @@ proptest! {
         let spline = CubicSpline::open(t.clone(), points.clone()).unwrap();
         for k in 1..t.len() - 1 {
             let place = place_by_formula(&spline, k);
-            prop_assert!((place - kjellander_place(&spline, k).unwrap()).norm() < 1e-11);
             let stiffness = (t[k] - t[k - 1]).powi(-3) + (t[k + 1] - t[k]).powi(-3);
             let jump = spline.third_jumps()[k];
             let expected = (points[k] - place) * (12.0 * stiffness);
             prop_assert!((jump - expected).norm() < 1e-10 * (1.0 + jump.norm()));
         }
-        prop_assert_eq!(kjellander_place(&spline, t.len()), None);
     }
 
     #[test]
@@ -211,7 +209,7 @@ fn left_after(step: f64, closed: bool) -> f64 {
     let before = make(t.clone(), points.clone()).unwrap();
     let uniform =
         nalgebra::center(&points[29], &points[31]) + (before.tangents()[29] - before.tangents()[31]) * 0.25;
-    let place = kjellander_place(&before, 30).unwrap();
+    let place = place_by_formula(&before, 30);
     assert!((place - uniform).norm() < 1e-12);
     let mut moved = points.clone();
     moved[30] += (place - points[30]) * step;

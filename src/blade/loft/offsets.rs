@@ -93,7 +93,7 @@ fn corner_shares(offset: &OffsetPiece, arc: &ArcLength, section: &LoftSection) -
 
 /// A corner, or what corresponds to it, on one section.
 #[derive(Clone, Copy)]
-struct Place {
+struct CornerPlace {
     /// Share of the length; on closed sections counted on over the start.
     share: f64,
     /// Whether the offset has a corner there.
@@ -103,7 +103,7 @@ struct Place {
 /// Corners that correspond to each other across all sections.
 struct Columns {
     /// `[column][section]`, along the sections.
-    places: Vec<Vec<Place>>,
+    places: Vec<Vec<CornerPlace>>,
     closed: bool,
 }
 
@@ -139,7 +139,8 @@ impl Columns {
             }
         }
         let heights: Vec<f64> = sections.iter().map(|s| s.height).collect();
-        let mut places: Vec<Vec<Place>> = columns.iter().map(|column| filled(column, &heights)).collect();
+        let mut places: Vec<Vec<CornerPlace>> =
+            columns.iter().map(|column| filled(column, &heights)).collect();
         places.sort_by(|a, b| a[0].share.total_cmp(&b[0].share));
         Self { places, closed }
     }
@@ -202,11 +203,11 @@ impl Columns {
 }
 
 /// A column with a place on every section: between two corners by height, beyond them as the nearest.
-fn filled(column: &[Option<f64>], heights: &[f64]) -> Vec<Place> {
+fn filled(column: &[Option<f64>], heights: &[f64]) -> Vec<CornerPlace> {
     let known = |k: &usize| column[*k].map(|share| (heights[*k], share));
-    let at = |section: usize| -> Place {
+    let at = |section: usize| -> CornerPlace {
         if let Some(share) = column[section] {
-            return Place { share, found: true };
+            return CornerPlace { share, found: true };
         }
         let below = (0..section).rev().find_map(|k| known(&k));
         let above = (section + 1..column.len()).find_map(|k| known(&k));
@@ -215,7 +216,7 @@ fn filled(column: &[Option<f64>], heights: &[f64]) -> Vec<Place> {
             (Some((_, share)), None) | (None, Some((_, share))) => share,
             (None, None) => 0.5,
         };
-        Place { share, found: false }
+        CornerPlace { share, found: false }
     };
     (0..column.len()).map(at).collect()
 }

@@ -130,12 +130,6 @@ impl NacaProfile {
         [5.0 * self.thickness * height, 5.0 * self.thickness * slope]
     }
 
-    /// Radius of the nose: 1.1019 t².
-    pub fn leading_radius(&self) -> f64 {
-        let factor = 5.0 * self.thickness * THICKNESS[0];
-        0.5 * factor * factor
-    }
-
     /// Point of the upper or the lower side over the place `x` (0 to 1) of the camber line.
     pub fn point(&self, x: f64, upper: bool) -> Point2 {
         let [y, slope, _] = self.camber(x);

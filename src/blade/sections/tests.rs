@@ -195,8 +195,10 @@ fn four_digit_profiles_have_their_tabled_ordinates() {
         assert!((at.y * 100.0 - y).abs() < 6e-4, "{x}: {} {y}", at.y * 100.0);
         assert_eq!(naca("0012").point(x / 100.0, false).y, -at.y);
     }
-    assert!((naca("0012").leading_radius() * 100.0 - 1.58).abs() < 0.01);
-    assert!((naca("0012").leading_radius() - 1.1019 * 0.12 * 0.12).abs() < 1e-6);
+    // Radius of the nose, 1.1019 t²: y²/2x at its very end.
+    let nose = naca("0012").half_thickness(1e-14)[0].powi(2) / 2e-14;
+    assert!((nose * 100.0 - 1.58).abs() < 0.01);
+    assert!((nose - 1.1019 * 0.12 * 0.12).abs() < 1e-6);
     // Thickest at 30 % of the chord: 12 %.
     let [half, slope] = naca("0012").half_thickness(0.3);
     assert!((2.0 * half - 0.12).abs() < 5e-5 && slope.abs() < 1e-3);

@@ -168,11 +168,6 @@ impl FieldMesh {
         &self.loops
     }
 
-    /// True where a vertex lies on a border.
-    pub fn is_border(&self, v: usize) -> bool {
-        self.on_border[v]
-    }
-
     /// The corners of triangle `t`.
     pub fn corners(&self, t: usize) -> [Point3; 3] {
         self.triangles[t].map(|i| self.points[i as usize])

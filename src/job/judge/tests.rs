@@ -2,7 +2,7 @@
 
 use super::*;
 use metrology::{
-    DeviationFigures, GougeFigures, GougeRegion, PairFigures, Refined, ScallopFigures, UncutFigures,
+    DeviationFigures, GougeFigures, GougeRegion, PairFigures, CloserLook, ScallopFigures, UncutFigures,
     UncutRegion,
 };
 
@@ -51,7 +51,7 @@ fn measurement(gouge: f64) -> Measurement {
             reason: Some("no ridge stands between passes on the part".into()),
             ..PairFigures::default()
         },
-        refined: Refined::default(),
+        refined: CloserLook::default(),
     }
 }
 

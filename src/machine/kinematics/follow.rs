@@ -6,8 +6,7 @@ use super::choice::{State, Stop};
 use super::refine::{Course, refine};
 use super::report::{JointReport, Rewind};
 use super::{Joints, Kinematics};
-use crate::kinematics::choice;
-use crate::kinematics::report;
+use crate::kinematics::{choice, report};
 use geometry::Vector3;
 use motion::{ClPoint, MoveKind, Toolpath};
 

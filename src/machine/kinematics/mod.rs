@@ -25,8 +25,7 @@ mod tests;
 pub use error::KinematicsError;
 pub use follow::{Following, JointLocation, JointPath, PathError, Turn, follow};
 pub use presets::{DEFAULT_GAUGE_LENGTH, DEFAULT_ROTARY_RATE, PRESETS, preset};
-pub use report::turning_time;
-pub use report::{JointReport, LimitViolation, Obstacle, Rewind, SINGULAR_ANGLE, SingularPose};
+pub use report::{JointReport, LimitViolation, Obstacle, Rewind, SINGULAR_ANGLE, SingularPose, turning_time};
 
 use angles::Triangle;
 
@@ -286,26 +285,6 @@ impl Kinematics {
             self.place(to.tip, rotary)
         });
         Some(Inverse { solutions, free })
-    }
-
-    /// The same pose with each rotary joint brought within its limits by whole turns, nearest to zero; `None`
-    /// where a joint, linear ones included, has no place there.
-    pub fn within_limits(&self, joints: &Joints) -> Option<Joints> {
-        let mut wound = *joints;
-        for (angle, axis) in wound.rotary.iter_mut().zip(&self.axes) {
-            if let Some(limits) = axis.limits {
-                let turns = choice::turns_within(*angle, limits)?;
-                let nearest = turns.min_by(|a, b| {
-                    let size = |n: &i32| (*angle + f64::from(*n) * std::f64::consts::TAU).abs();
-                    size(a).total_cmp(&size(b))
-                })?;
-                *angle += f64::from(nearest) * std::f64::consts::TAU;
-            }
-        }
-        let fits = |(value, limits): (&f64, &Option<[f64; 2]>)| {
-            limits.is_none_or(|[least, greatest]| (least..=greatest).contains(value))
-        };
-        wound.linear.iter().zip(&self.travel).all(fits).then_some(wound)
     }
 }
 

@@ -25,9 +25,9 @@ const Z: [f64; 3] = [0.0, 0.0, 1.0];
 const NUTATING: [f64; 3] = [0.0, 1.0, 1.0];
 
 /// Letter, direction, side and limits, rad.
-type Axis = (char, [f64; 3], Side, Option<[f64; 2]>);
+type PresetAxis = (char, [f64; 3], Side, Option<[f64; 2]>);
 
-const MACHINES: [(&str, Axis, Axis); 13] = [
+const MACHINES: [(&str, PresetAxis, PresetAxis); 13] = [
     ("ab-head", ('A', X, Side::Head, TILTING), ('B', Y, Side::Head, TILTING)),
     ("ac-head", ('C', Z, Side::Head, CABLED), ('A', X, Side::Head, TILTING)),
     ("bc-head", ('C', Z, Side::Head, CABLED), ('B', Y, Side::Head, TILTING)),

@@ -189,20 +189,6 @@ fn a_fork_head_moves_its_pivot_over_the_tip() {
 }
 
 #[test]
-fn limits_choose_among_whole_turns() {
-    let machine = Kinematics::by_name("ac-head").unwrap();
-    let joints = Joints { linear: Vector3::zeros(), rotary: [1.9 * TAU, 0.1] };
-    let wound = machine.within_limits(&joints).unwrap();
-    assert!((wound.rotary[0] + 0.1 * TAU).abs() < 1e-12, "{wound:?}");
-    assert!(machine.within_limits(&Joints { rotary: [0.0, 2.2], ..joints }).is_none());
-    let [first, second] = *machine.axes();
-    let travel = [Some([-10.0, 10.0]), None, None];
-    let small = Kinematics::new(first, second, 0.0, Point3::origin(), travel).unwrap();
-    assert!(small.within_limits(&Joints { linear: Vector3::x() * 11.0, rotary: [0.0; 2] }).is_none());
-    assert!(small.within_limits(&Joints { linear: Vector3::x() * 9.0, rotary: [0.0; 2] }).is_some());
-}
-
-#[test]
 fn what_is_no_machine_is_refused_with_a_cure() {
     let [first, second] = preset("ac-table").unwrap();
     let make = |first, second| Kinematics::new(first, second, 100.0, Point3::origin(), [None; 3]);

@@ -6,11 +6,10 @@
 use std::collections::BinaryHeap;
 
 use super::ridges::Crossing;
-use super::{Inspection, Sample};
-use crate::ridges::NUMERICAL_FLOOR;
+use super::{NormalInspection, Sample};
+use crate::figures::NUMERICAL_FLOOR;
 use geometry::Point3;
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// Triangles that are divided at most in search of extremes. Each asks for some ten places.
 const MOST_DIVIDED: usize = 20_000;
@@ -96,7 +95,7 @@ struct Closer {
     crossings: Vec<Crossing>,
 }
 
-impl Inspection<'_> {
+impl NormalInspection<'_> {
     /// How much any figure may exceed the greatest ones in a triangle.
     fn promise(&self, samples: &[Sample; 3], crossings: &[Crossing], greatest: &Greatest) -> f64 {
         let points = samples.map(|sample| sample.place.point);

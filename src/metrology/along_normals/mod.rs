@@ -23,23 +23,21 @@ mod swept_volume;
 #[cfg(test)]
 mod tests;
 
-use super::figures::{Limits, Measurement};
+use super::figures::{CloserLook, Limits, Measurement, NUMERICAL_FLOOR};
 use super::pairs::{PairTally, RidgeCrossing, pair_figures};
-use super::refine::Refined;
-use super::ridges::{Highest, NUMERICAL_FLOOR, scallop_figures};
+use super::ridges::{Highest, scallop_figures};
 use super::tracks::Tracks;
 use closer::Greatest;
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
 use motion::Toolpath;
-use net::{Net, Place};
+use net::{Net, NetPlace};
 pub use net::{PatchGrid, net_places};
 use part::Part;
 use regions::{areas, deviation_figures};
 use ridges::{Crossing, Finder};
 pub use swept_volume::{FirstCut, RaysCut, SweptVolume, VoxelCut};
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// The cut surface where the normal of a design point meets it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,7 +87,7 @@ pub struct NormalMap {
 /// A place and the cut there.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
-    place: Place,
+    place: NetPlace,
     hit: Option<NormalHit>,
 }
 
@@ -103,7 +101,7 @@ impl Sample {
     }
 }
 
-struct Inspection<'a> {
+struct NormalInspection<'a> {
     part: &'a Part,
     engine: &'a dyn AlongNormal,
     finder: Finder<'a>,
@@ -133,10 +131,10 @@ pub fn measure_along_normals(
     let corner = cutter.corner_radius();
     let radius = if corner > 0.0 { corner } else { cutter.radius() };
     let finder = Finder { part, engine, tracks: &tracks, radius };
-    let inspection = Inspection { part, engine, finder, limits, spacing, radius };
+    let inspection = NormalInspection { part, engine, finder, limits, spacing, radius };
     let samples = in_runs("measuring along normals", net.places.len(), monitor, |range| {
         let mut near = None;
-        let of_one = |place: &Place| {
+        let of_one = |place: &NetPlace| {
             let sample = inspection.sample(*place, near.as_ref());
             near = sample.hit.or(near);
             sample
@@ -215,13 +213,13 @@ pub fn measure_along_normals(
         deviation_map: deviations,
         ridge_samples,
         pairs,
-        refined: Refined { note, ..Refined::default() },
+        refined: CloserLook { note, ..CloserLook::default() },
     };
     Ok((measured, map))
 }
 
-impl Inspection<'_> {
-    fn sample(&self, place: Place, near: Option<&NormalHit>) -> Sample {
+impl NormalInspection<'_> {
+    fn sample(&self, place: NetPlace, near: Option<&NormalHit>) -> Sample {
         Sample { place, hit: self.engine.hit(&place.point, &place.normal, near) }
     }
 
@@ -304,7 +302,7 @@ fn with_lengths(mut found: Vec<Crossing>) -> Vec<Crossing> {
 const CONTACT_ROUNDS: usize = 4;
 
 /// Where a cutting move touches the part, at its middle and its end; nothing where it is farther off than `spacing`.
-fn contacts_of(part: &Part, cutter: &Cutter, path: &Toolpath, k: usize, spacing: f64) -> Vec<Place> {
+fn contacts_of(part: &Part, cutter: &Cutter, path: &Toolpath, k: usize, spacing: f64) -> Vec<NetPlace> {
     let step = &path.moves[k];
     if !step.kind.is_on_surface() {
         return Vec::new();
@@ -318,7 +316,7 @@ fn contacts_of(part: &Part, cutter: &Cutter, path: &Toolpath, k: usize, spacing:
             let contact = at.tip - cutter.contact_to_tip_along(&foot.normal, &at.axis);
             (foot, off) = part.closest_point(&contact);
         }
-        (off.abs() <= spacing).then(|| Place::at_foot(&foot))
+        (off.abs() <= spacing).then(|| NetPlace::at_foot(&foot))
     };
     [0.5, 1.0].into_iter().filter_map(contact).collect()
 }

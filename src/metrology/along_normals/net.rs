@@ -17,7 +17,7 @@ pub(super) enum Site {
 
 /// A place of the design surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Place {
+pub(super) struct NetPlace {
     pub site: Site,
     pub point: Point3,
     /// Outward unit normal.
@@ -39,7 +39,7 @@ pub struct PatchGrid {
 
 /// Places and the triangles between them.
 pub(super) struct Net {
-    pub places: Vec<Place>,
+    pub places: Vec<NetPlace>,
     pub triangles: Vec<[u32; 3]>,
     /// One grid a patch; none on meshes.
     pub grids: Vec<PatchGrid>,
@@ -48,7 +48,7 @@ pub(super) struct Net {
 /// Places along the sides of a patch by which its steps are chosen.
 const SIDE_SAMPLES: usize = 32;
 
-impl Place {
+impl NetPlace {
     fn on(part: &Part, site: Site) -> Self {
         let (point, normal) = match site {
             Site::Patch(at) => part.point_and_normal(at),
@@ -141,7 +141,7 @@ impl Net {
             |c: usize, n: usize| domain[c][0] + (domain[c][1] - domain[c][0]) * n as f64 / steps[c] as f64;
         let rows = work::parallel::map(counts[1], |j| {
             let site = |i: usize| Site::Patch(PatchPoint { patch: k as u32, u: at(0, i), v: at(1, j) });
-            (0..counts[0]).map(|i| Place::on(part, site(i))).collect::<Vec<_>>()
+            (0..counts[0]).map(|i| NetPlace::on(part, site(i))).collect::<Vec<_>>()
         });
         self.places.extend(rows.into_iter().flatten());
         let index = |i: usize, j: usize| (first + j * counts[0] + i) as u32;
@@ -158,7 +158,7 @@ impl Net {
         let (e, f) = (corners[1] - corners[0], corners[2] - corners[0]);
         for (i, j) in (0..=n).flat_map(|j| (0..=n - j).map(move |i| (i, j))) {
             let point = corners[0] + (e * i as f64 + f * j as f64) / n as f64;
-            self.places.push(Place::on(part, Site::Facet { triangle: t as u32, point }));
+            self.places.push(NetPlace::on(part, Site::Facet { triangle: t as u32, point }));
         }
         // Rows get shorter by one place each.
         let index = |i: usize, j: usize| first + (j * (n + 1) - j * (j.max(1) - 1) / 2 + i) as u32;

@@ -3,13 +3,13 @@
 use std::collections::HashMap;
 
 use super::net::Net;
-use super::{Inspection, Sample};
+use super::{NormalInspection, Sample};
 use crate::figures::{DeviationFigures, GougeFigures, GougeRegion, UncutFigures, UncutRegion};
 
 /// Regions listed one by one in the figures; the rest is counted.
 const LISTED_REGIONS: usize = 20;
 
-impl Inspection<'_> {
+impl NormalInspection<'_> {
     pub fn gouges(&self, net: &Net, samples: &[Sample], areas: &[f64]) -> GougeFigures {
         let depth = |k: u32| samples[k as usize].hit.map_or(0.0, |hit| -hit.deviation);
         let mut figures = GougeFigures::default();

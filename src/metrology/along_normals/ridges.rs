@@ -1,6 +1,6 @@
 //! Ridges between places: where the cuts of two tracks are equally high on the way from one place to another.
 
-use super::net::Place;
+use super::net::NetPlace;
 use super::{AlongNormal, NormalHit};
 use crate::tracks::Tracks;
 use geometry::{Point3, Vector3};
@@ -51,7 +51,7 @@ pub(super) struct Finder<'a> {
 #[derive(Clone, Copy)]
 struct End {
     t: f64,
-    place: Place,
+    place: NetPlace,
     hit: NormalHit,
 }
 
@@ -59,8 +59,8 @@ impl Finder<'_> {
     /// Appends the ridges between two places with what was cut there.
     pub fn between(
         &self,
-        (from, a): (&Place, NormalHit),
-        (to, b): (&Place, NormalHit),
+        (from, a): (&NetPlace, NormalHit),
+        (to, b): (&NetPlace, NormalHit),
         found: &mut Vec<Crossing>,
     ) {
         let ends = [End { t: 0.0, place: *from, hit: a }, End { t: 1.0, place: *to, hit: b }];
@@ -69,8 +69,8 @@ impl Finder<'_> {
 
     fn search(
         &self,
-        from: &Place,
-        to: &Place,
+        from: &NetPlace,
+        to: &NetPlace,
         [mut a, mut b]: [End; 2],
         depth: usize,
         found: &mut Vec<Crossing>,

@@ -1,8 +1,7 @@
 use super::super::flat_scene::{path, plane};
 use super::*;
 use cutter::Solid;
-use geometry::distance_to_segment;
-use geometry::samples;
+use geometry::{distance_to_segment, samples};
 use motion::{ClPoint, Move, MoveKind};
 use part::Patch;
 use scallop::ball_scallop_height;

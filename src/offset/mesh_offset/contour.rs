@@ -7,6 +7,7 @@
 use super::OffsetError;
 use super::bricks::{Brick, Bricks, CORNERS, SIDE, cell_number, cell_place, corner_index, corners_of};
 use super::level_set::LevelSet;
+use super::triangle::shape;
 use super::vertex::{Around, Vertex, vertex};
 use geometry::{Point3, Vector3};
 use work::monitor::{Monitor, check};
@@ -244,12 +245,6 @@ impl Net<'_> {
         };
         worst([0, 1, 2], [0, 2, 3]) >= worst([0, 1, 3], [1, 2, 3])
     }
-}
-
-/// Twice the area over the square of the longest side: 0 for none, 0.87 for an equilateral triangle.
-pub(super) fn shape([a, b, c]: [Point3; 3]) -> f64 {
-    let longest = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
-    if longest > 0.0 { (b - a).cross(&(c - a)).norm() / longest } else { 0.0 }
 }
 
 /// Greatest difference between the distance from the mesh and that of the level set in the middles of triangles and edges,

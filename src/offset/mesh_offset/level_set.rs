@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::contour::shape;
+use super::triangle::shape;
 use geometry::{Bvh, MeshFoot, Plane, Point3, TriangleMesh, Vector3};
 
 /// Places are on the level set within this share of their coordinates, or of a mm.

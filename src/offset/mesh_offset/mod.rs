@@ -19,116 +19,24 @@
 
 mod bricks;
 mod contour;
+mod error;
 mod level_set;
+mod settings;
 #[cfg(test)]
 mod tests;
+mod triangle;
 mod trim;
 mod valleys;
 mod vertex;
 
+pub use error::OffsetError;
 pub use level_set::{LevelSet, LevelSetFoot};
+pub use settings::OffsetSettings;
 pub use valleys::Valley;
 
 use bricks::Bricks;
-use geometry::{Bvh, MAX_COORDINATE, MeshError, Point3, TriangleMesh};
-use work::monitor::{Cancelled, Monitor};
-
-/// What an offset is asked for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OffsetSettings {
-    /// Distance from the mesh, mm, > 0.
-    pub distance: f64,
-    /// Side of a cell, mm; at most a quarter of the distance.
-    pub cell: f64,
-    /// How far beyond a border the surface goes on, mm of the way of a ball that rolls over it; 0 or more.
-    pub margin: f64,
-    /// Two feet whose directions differ by more than this make a valley, rad.
-    pub valley: f64,
-    /// Most memory that the work may take, bytes.
-    pub memory: f64,
-}
-
-/// Cells are at most this share of the distance: between the two sides of a sheet there must be a few.
-const WIDEST_CELL: f64 = 0.25;
-
-/// Cells are at least this share of the mesh's greatest coordinate or of the distance: their numbers fit 20 bits.
-const NARROWEST_CELL: f64 = 1e-6;
-
-impl OffsetSettings {
-    /// Settings for which a mesh of a smooth level set strays by about `tolerance`, mm, from it where a convex edge is
-    /// rounded: an edge as long as √2 cells is `cell²/(4d)` off.
-    pub fn within(distance: f64, tolerance: f64) -> Self {
-        let cell = (2.0 * distance * tolerance).sqrt().min(WIDEST_CELL * distance);
-        Self { distance, cell, margin: 0.0, valley: 0.01, memory: 2e9 }
-    }
-}
-
-/// Why there is no offset surface.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum OffsetError {
-    /// Stopped by the user.
-    #[error(transparent)]
-    Cancelled(#[from] Cancelled),
-    /// The distance is of no use.
-    #[error("the offset distance must be a positive number of mm up to {MAX_COORDINATE}, and is {0}")]
-    Distance(f64),
-    /// The cell does not suit the distance.
-    #[error(
-        "cells for an offset by {distance} mm must have sides from {least:.3e} to {most} mm, and not {cell}"
-    )]
-    Cell {
-        /// Distance, mm.
-        distance: f64,
-        /// Side given, mm.
-        cell: f64,
-        /// Least side, mm.
-        least: f64,
-        /// Greatest side, mm.
-        most: f64,
-    },
-    /// Margin or valley angle is no number of its range.
-    #[error("{what} of an offset must be {range}, and is {value}")]
-    Setting {
-        /// Which.
-        what: &'static str,
-        /// What it may be.
-        range: &'static str,
-        /// What it is.
-        value: f64,
-    },
-    /// It would take too much memory.
-    #[error(
-        "the offset surface in cells of {cell} mm would take about {needed:.0} MB and {allowed:.0} MB are allowed; \
-         cells of {fitting:.3} mm would fit"
-    )]
-    Memory {
-        /// Side given, mm.
-        cell: f64,
-        /// Estimated memory, MB.
-        needed: f64,
-        /// Allowed memory, MB.
-        allowed: f64,
-        /// A side that fits, mm.
-        fitting: f64,
-    },
-    /// No place outward of the mesh is that far from it.
-    #[error(
-        "no place on the outward side of the mesh is {distance} mm away from it with its foot inside of the surface: a \
-         ball of that radius fits nowhere, or the mesh faces the wrong way"
-    )]
-    Empty {
-        /// Distance, mm.
-        distance: f64,
-    },
-    /// The triangles do not make a surface.
-    #[error("the offset surface in cells of {cell} mm is no surface ({reason}); use other cells")]
-    NoSurface {
-        /// Side, mm.
-        cell: f64,
-        /// What is wrong.
-        reason: MeshError,
-    },
-}
+use geometry::{Bvh, Point3, TriangleMesh};
+use work::monitor::Monitor;
 
 /// The offset surface of a mesh.
 #[derive(Debug, Clone, PartialEq)]
@@ -163,7 +71,7 @@ impl MeshOffset {
         settings: &OffsetSettings,
         monitor: &dyn Monitor,
     ) -> Result<Self, OffsetError> {
-        check(mesh, settings)?;
+        settings.check(mesh)?;
         let level = LevelSet::new(mesh, bvh, settings.distance);
         let bricks = Bricks::around(&level, settings, monitor)?;
         let contour = contour::contour(&level, &bricks, monitor)?;
@@ -218,27 +126,3 @@ impl MeshOffset {
 
 /// How often cells are halved for a tolerance.
 const MOST_HALVINGS: i32 = 3;
-
-fn check(mesh: &TriangleMesh, settings: &OffsetSettings) -> Result<(), OffsetError> {
-    let OffsetSettings { distance, cell, margin, valley, memory } = *settings;
-    if !(distance > 0.0 && distance <= MAX_COORDINATE) {
-        return Err(OffsetError::Distance(distance));
-    }
-    let bounds = mesh.bounds();
-    let largest = bounds.min.coords.amax().max(bounds.max.coords.amax()).max(distance);
-    let (least, most) = (NARROWEST_CELL * largest, WIDEST_CELL * distance);
-    if !(cell >= least && cell <= most) {
-        return Err(OffsetError::Cell { distance, cell, least, most });
-    }
-    let setting = |what, range, value| Err(OffsetError::Setting { what, range, value });
-    if !(margin >= 0.0 && margin.is_finite()) {
-        return setting("the margin", "0 mm or more", margin);
-    }
-    if !(valley > 0.0 && valley < std::f64::consts::PI) {
-        return setting("the valley angle", "between 0 and half a turn", valley);
-    }
-    if memory.is_nan() || memory <= 0.0 {
-        return setting("the memory", "more than 0 bytes", memory);
-    }
-    Ok(())
-}

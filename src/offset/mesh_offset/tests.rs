@@ -1,7 +1,7 @@
 use super::*;
 use geometry::Vector3;
 use proptest::prelude::*;
-use work::monitor::Silent;
+use work::monitor::{Cancelled, Silent};
 
 fn mesh(points: &[[f64; 3]], triangles: &[[u32; 3]]) -> (TriangleMesh, Bvh) {
     let points = points.iter().map(|p| Point3::from(*p)).collect();

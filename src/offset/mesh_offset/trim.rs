@@ -3,8 +3,9 @@
 use std::collections::HashMap;
 
 use super::OffsetError;
-use super::contour::{Contour, shape};
+use super::contour::Contour;
 use super::level_set::LevelSet;
+use super::triangle::shape;
 use geometry::Point3;
 use work::monitor::{Monitor, check};
 use work::parallel;

@@ -1,8 +1,7 @@
 //! Creases of a patch: knot lines along which its normal jumps, and the offset is torn or crosses itself.
 
 use super::OffsetSurface;
-use geometry::unit_normal;
-use geometry::{KnotVector, Vector3};
+use geometry::{KnotVector, Vector3, unit_normal};
 
 /// Places looked at in each span along a knot line.
 const LOOKS: usize = 8;

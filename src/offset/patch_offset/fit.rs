@@ -7,8 +7,7 @@
 
 use super::crease::{continuity, creases};
 use super::{OffsetSurface, PatchOffsetError};
-use geometry::{Axis, interpolate};
-use geometry::{KnotVector, NurbsSurface, Point3};
+use geometry::{InterpolationAxis, KnotVector, NurbsSurface, Point3, interpolate};
 use work::parallel;
 
 /// Pieces into which each span of the patch is divided at first.
@@ -201,10 +200,10 @@ impl Window<'_> {
     }
 }
 
-fn axis(nodes: &Nodes) -> Option<Axis> {
+fn axis(nodes: &Nodes) -> Option<InterpolationAxis> {
     let knots: Vec<f64> = nodes.iter().flat_map(|&(t, times)| std::iter::repeat_n(t, times)).collect();
     let controls = knots.len().checked_sub(4)?;
-    Axis::at_averages(KnotVector::new(3, knots, controls).ok()?)
+    InterpolationAxis::at_averages(KnotVector::new(3, knots, controls).ok()?)
 }
 
 /// The places of each piece at which errors are looked at.

@@ -2,8 +2,7 @@
 
 use super::OffsetSurface;
 use super::crease::creases;
-use geometry::inward;
-use geometry::{Jet2, KnotVector, Point3};
+use geometry::{Jet2, KnotVector, Point3, inward};
 use work::parallel;
 
 /// Places in each span of knots along a parameter, its two ends among them. Fewer miss narrow places; more

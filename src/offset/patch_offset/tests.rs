@@ -1,7 +1,6 @@
 use super::*;
 use approx::assert_relative_eq;
-use geometry::samples;
-use geometry::unit_normal;
+use geometry::{samples, unit_normal};
 use proptest::prelude::*;
 
 /// `z = f(x) + g(y)` for quartics over ±half, exactly, as a Bézier patch of degree 4.

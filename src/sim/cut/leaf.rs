@@ -9,14 +9,27 @@ use crate::NOT_CUT;
 use crate::sweep::Sweep;
 use crate::swept::swept_height;
 use crate::track::Track;
-use work::lanes::{LANES, Real, bits};
+use work::lanes::{self, LANES, Real, bits};
 
 impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
     /// Cuts the cells of a leaf of `N` × `N` = `CELLS` cells with all moves of a level.
-    #[inline(always)]
     pub(super) fn leaf<const N: usize, const CELLS: usize>(
         &mut self,
-        [x, y]: [[T; CELLS]; 2],
+        cells: &[[T; CELLS]; 2],
+        chosen: [usize; 2],
+        at: [usize; 2],
+        size: [usize; 2],
+    ) {
+        lanes::dispatch(
+            #[inline(always)]
+            || self.leaf_in_lanes::<N, CELLS>(cells, chosen, at, size),
+        );
+    }
+
+    #[inline(always)]
+    fn leaf_in_lanes<const N: usize, const CELLS: usize>(
+        &mut self,
+        [x, y]: &[[T; CELLS]; 2],
         [level, q]: [usize; 2],
         [i, j]: [usize; 2],
         [nx, ny]: [usize; 2],

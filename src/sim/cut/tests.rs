@@ -1,5 +1,5 @@
 //! The engine against the reference. What every engine must keep is
-//! tested in `sim/engine_tests.rs`.
+//! tested in `engine_tests`.
 
 use super::*;
 use crate::scenes::{Rng, cutters, path_through, random_path, square_grid, wave_path};
@@ -19,7 +19,7 @@ fn a_bound_tightened_by_a_micrometre_is_wrong() {
         compare(&stock, &cutter, &path);
         let exact = cut_reference(&stock, &cutter, &path, &Silent).unwrap();
         let with = |margin: f64| {
-            let job = Job { form: Form::new(&cutter), path: &path, side: 64, bounded: true, margin };
+            let job = UnorderedCut { form: Form::new(&cutter), path: &path, side: 64, bounded: true, margin };
             farthest(&job.run(stock.clone(), &Silent).unwrap().0, &exact)
         };
         assert!(with(0.0) <= PROMISED, "{cutter:?} {}", with(0.0));

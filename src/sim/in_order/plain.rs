@@ -2,7 +2,7 @@
 //! meets. What the fast one is tested and timed against.
 
 use super::leaf::Tally;
-use super::{Found, Job, Removal, Slices, cut_by_tiles};
+use super::{OrderedCut, Removal, Slices, TileRecord, cut_by_tiles};
 use crate::ZMap;
 use crate::swept::swept_height;
 use cutter::Cutter;
@@ -24,8 +24,8 @@ pub fn cut_in_order_plain(
     cut_by_tiles(stock, cutter, path, monitor, super::SIDE, |job, slices, moves| Ok(cut(job, slices, moves)))
 }
 
-fn cut(job: &Job, slices: &mut Slices, moves: &[u32]) -> Found {
-    let mut found = Found::default();
+fn cut(job: &OrderedCut, slices: &mut Slices, moves: &[u32]) -> TileRecord {
+    let mut found = TileRecord::default();
     for &index in moves {
         let (k, track) = (index as usize, job.track(index));
         let (from, to) = (job.path.start_of(k), job.path.moves[k].to.tip);

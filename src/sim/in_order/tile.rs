@@ -4,7 +4,7 @@
 use super::bound::{Bound, CHILDREN, Ceiling, Ceilings};
 use super::contact::{first_touch, reach};
 use super::leaf::{LEAF, Lanes, Leaf, UNTOUCHED};
-use super::{ENGAGED, Found, Job, RapidContact, Slices};
+use super::{ENGAGED, OrderedCut, RapidContact, Slices, TileRecord};
 use crate::form::{Family, Form};
 use crate::sweep::{Ball, Flat, Rounded, Sweep};
 use crate::track::{Track, larger};
@@ -91,7 +91,12 @@ impl Tile {
     }
 
     /// Runs through `moves` and writes the cells back.
-    pub fn cut(mut self, job: &Job, slices: &mut Slices, moves: &[u32]) -> Result<Found, Cancelled> {
+    pub fn cut(
+        mut self,
+        job: &OrderedCut,
+        slices: &mut Slices,
+        moves: &[u32],
+    ) -> Result<TileRecord, Cancelled> {
         let arch = pulp::Arch::new();
         let (form, tile) = (&job.form, &mut self);
         let found = match form.family {
@@ -113,10 +118,10 @@ impl Tile {
         &mut self,
         simd: S,
         sweep: W,
-        job: &Job,
+        job: &OrderedCut,
         moves: &[u32],
-    ) -> Result<Found, Cancelled> {
-        let mut found = Found::default();
+    ) -> Result<TileRecord, Cancelled> {
+        let mut found = TileRecord::default();
         for run in moves.chunks(MOVES_A_CHECK) {
             check(job.monitor)?;
             for &index in run {
@@ -209,12 +214,12 @@ impl Tile {
 struct Run<'a, 'b, W> {
     sweep: W,
     tile: &'a mut Tile,
-    job: &'a Job<'b>,
+    job: &'a OrderedCut<'b>,
     moves: &'a [u32],
 }
 
 impl<W: Sweep<f64>> pulp::WithSimd for Run<'_, '_, W> {
-    type Output = Result<Found, Cancelled>;
+    type Output = Result<TileRecord, Cancelled>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {

@@ -6,7 +6,7 @@
 //! goes down to where the ray enters it at that time (Newton's method on a convex function), and the search
 //! over time goes on from there: it ends when no stretch of time may reach below the limit.
 
-use crate::solid::{Look, Motion, Moving, Part, SHORTEST, Stretch, SweptMoves};
+use crate::solid::{Look, Motion, MovePart, Moving, SHORTEST, Stretch, SweptMoves};
 use cutter::Solid;
 use geometry::{Point3, Vector3};
 
@@ -93,7 +93,7 @@ impl Ray {
 
     /// The lowest place up to `limit` that is reached in a part of a move, and when; `None` if there is
     /// none.
-    pub(super) fn lowest_of(&self, moves: &SweptMoves, part: &Part, limit: f64) -> Option<(f64, f64)> {
+    pub(super) fn lowest_of(&self, moves: &SweptMoves, part: &MovePart, limit: f64) -> Option<(f64, f64)> {
         if limit < self.low {
             return None;
         }

@@ -1,5 +1,5 @@
 //! The engine against a plain double loop. What every engine must keep is tested in
-//! `sim/engine_tests.rs`.
+//! `engine_tests`.
 
 use super::*;
 use crate::Grid;

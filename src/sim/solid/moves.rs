@@ -54,7 +54,7 @@ struct Summary {
 
 /// A part of a move, in one slot of the tree.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Part {
+pub(crate) struct MovePart {
     /// Which of the chosen moves.
     pub(crate) chosen: u32,
     /// From when to when.
@@ -92,7 +92,7 @@ pub struct SweptMoves {
     /// Nothing without moves.
     tree: Option<BoxTree>,
     summaries: Paired<Summary>,
-    slots: Vec<Part>,
+    slots: Vec<MovePart>,
 }
 
 impl SweptMoves {
@@ -127,9 +127,9 @@ impl SweptMoves {
         let of_move = |(k, m): (usize, &Motion)| {
             let n = count(m);
             let at = move |i: u32| f64::from(i) / f64::from(n);
-            (0..n).map(move |i| Part { chosen: k as u32, range: [at(i), at(i + 1)] })
+            (0..n).map(move |i| MovePart { chosen: k as u32, range: [at(i), at(i + 1)] })
         };
-        let parts: Vec<Part> = self.motions.iter().enumerate().flat_map(of_move).collect();
+        let parts: Vec<MovePart> = self.motions.iter().enumerate().flat_map(of_move).collect();
         if parts.is_empty() {
             return;
         }
@@ -144,7 +144,7 @@ impl SweptMoves {
     /// The boxes as the tree is built over: tools that lean quite differently far apart, so that they do not share nodes
     /// until its top. Such neighbours (passes fed forth and back with a lead, both sides of a blade) would leave each
     /// other's boxes without a common axis to speak of.
-    fn apart_by_axis(&self, parts: &[Part], boxes: &[Extent]) -> Vec<Extent> {
+    fn apart_by_axis(&self, parts: &[MovePart], boxes: &[Extent]) -> Vec<Extent> {
         let whole = boxes.iter().fold(Extent::NOTHING, |all, one| all.with(one));
         let apart = 2.0 * (whole.max[0] - whole.min[0]) + self.solid.radius() as f32;
         let moved = |k: usize| {
@@ -158,7 +158,7 @@ impl SweptMoves {
 
     /// The box around the track of the pivot in one part. On an arc it lies off the chord by no more than
     /// pivot·(1 − cos(θ/2)), θ the turn of the part.
-    fn extent(&self, part: &Part) -> Extent {
+    fn extent(&self, part: &MovePart) -> Extent {
         let motion = self.motion(part);
         let pivot = self.solid.pivot();
         let [a, b] = part.range.map(|t| {
@@ -195,7 +195,7 @@ impl SweptMoves {
     }
 
     /// The axis in the middle of a part, the chord to those at its ends, and its move.
-    fn lean(&self, part: &Part) -> (Vector3, f64, u32) {
+    fn lean(&self, part: &MovePart) -> (Vector3, f64, u32) {
         let (motion, [from, to]) = (self.motion(part), part.range);
         let chord = 2.0 * (0.25 * motion.turn * (to - from)).sin();
         (motion.at(0.5 * (from + to)).axis, chord, self.index(part))
@@ -222,12 +222,12 @@ impl SweptMoves {
     }
 
     /// What stands in a slot of the tree.
-    pub(crate) fn part(&self, slot: usize) -> &Part {
+    pub(crate) fn part(&self, slot: usize) -> &MovePart {
         &self.slots[slot]
     }
 
     /// The move of a part.
-    pub(crate) fn motion(&self, part: &Part) -> &Motion {
+    pub(crate) fn motion(&self, part: &MovePart) -> &Motion {
         &self.motions[part.chosen as usize]
     }
 
@@ -237,7 +237,7 @@ impl SweptMoves {
     }
 
     /// The index in the path of the move of a part.
-    pub(crate) fn index(&self, part: &Part) -> u32 {
+    pub(crate) fn index(&self, part: &MovePart) -> u32 {
         self.indices[part.chosen as usize]
     }
 

@@ -4,7 +4,7 @@
 //! the slope of the track, the lowest cut is where m = f′(ρ)·a/ρ, or at the end of the track, or
 //! where the cutter ends. The profile itself finds that place ([`Profile::ahead`](cutter::Profile::ahead)).
 
-use super::{Part, Touch};
+use super::{Touch, TouchedBy};
 use crate::form::Form;
 use crate::track::Track;
 
@@ -43,7 +43,7 @@ fn at_place(form: &Form, track: &Track, ahead: f64, across: f64, sigma: f64) -> 
     }
     let (sine, cosine) = form.steepness(rho);
     let height = track.tip(sigma) + form.height(rho);
-    Some(Touch { height, along: ahead, across, by: Part::Profile(sine, cosine) })
+    Some(Touch { height, along: ahead, across, by: TouchedBy::Profile(sine, cosine) })
 }
 
 /// True when the cutter at the lower end reaches the point and moving on lifts it faster than the
@@ -63,9 +63,9 @@ fn on_track(form: &Form, track: &Track, along: f64, across: f64) -> Option<Touch
     let by = edge.map_or_else(
         || {
             let (sine, cosine) = form.steepness(rho);
-            Part::Profile(sine, cosine)
+            TouchedBy::Profile(sine, cosine)
         },
-        Part::Edge,
+        TouchedBy::Edge,
     );
     Some(Touch { height: track.tip(sigma) + form.height(rho), along: ahead, across, by })
 }

@@ -1,6 +1,6 @@
 //! Where samples stand: bricks of 8 × 8 × 8, in blocks of 8 × 8 × 8 bricks, where the surface passes.
 
-use super::divide::Cube;
+use super::cube::Cube;
 use crate::NOT_CUT;
 use geometry::{Aabb, Point3, Vector3};
 use std::collections::HashMap;
@@ -164,4 +164,9 @@ impl Bricks {
 pub(super) fn slot_of(at: [u32; 3]) -> usize {
     let [x, y, z] = at.map(|x| (x % BRICK) as usize);
     x + 8 * (y + 8 * z)
+}
+
+/// The way from the least sample of a brick to one of its samples, in samples.
+pub(super) fn offset(slot: usize) -> Vector3 {
+    Vector3::new((slot % 8) as f64, (slot / 8 % 8) as f64, (slot / 64) as f64)
 }

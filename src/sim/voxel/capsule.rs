@@ -2,7 +2,7 @@
 //!
 //! All lengths are local to a small cube, so that rounding stays below 2e-7 of the ball's radius.
 
-use super::moves::{Part, Parts};
+use super::moves::{MotionPart, MotionParts};
 use geometry::{Point3, Vector3};
 
 /// Samples at once: 4 × 4 × 4.
@@ -55,7 +55,13 @@ fn unit(v: Vector3) -> (Vector3, f64) {
 
 impl Kernel {
     /// `None` where within `reach` of `centre` more than the ball and its shank counts.
-    pub(super) fn new(parts: &Parts, part: &Part, index: u32, centre: &Point3, reach: f64) -> Option<Self> {
+    pub(super) fn new(
+        parts: &MotionParts,
+        part: &MotionPart,
+        index: u32,
+        centre: &Point3,
+        reach: f64,
+    ) -> Option<Self> {
         parts.solid.ball()?;
         let below = parts.is_below(part, centre, reach);
         if !below && !parts.is_strip(part, centre, reach) {

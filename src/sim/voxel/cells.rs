@@ -107,6 +107,11 @@ fn negative_share(mut values: [f64; 4]) -> f64 {
     }
 }
 
+/// The cells of a brick in which the surface passes.
+pub(super) fn crossed(cells: &Cells) -> impl Iterator<Item = (usize, Corners)> {
+    (0..SAMPLES).filter_map(|cell| cells.crossed(cell).map(|corners| (cell, corners)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

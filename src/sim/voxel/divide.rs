@@ -2,9 +2,11 @@
 //! hands on only those moves that may come nearest somewhere in it.
 
 use super::bricks::{BLOCK, BRICK, Block, Lattice};
+use super::budget::Budget;
+use super::cube::Cube;
 use super::leaf::Leaf;
-use super::moves::{Parts, Tangent, corner};
-use super::{Budget, VoxelStock};
+use super::moves::{MotionParts, Tangent, corner};
+use super::stock::VoxelStock;
 use geometry::Point3;
 use work::monitor::{Cancelled, Monitor, check};
 use work::parallel;
@@ -12,15 +14,8 @@ use work::parallel;
 /// Rounding of what bounds rest on, mm: distances are least over a move to 1e-9.
 const SURE: f64 = 1e-8;
 
-/// A cube with `n` samples a side, the least of them at `low`.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Cube {
-    pub(super) low: [u32; 3],
-    pub(super) n: u32,
-}
-
 /// A cube, the parts that may be nearest in it, and whether the stock's own surface is near.
-struct Divided {
+struct CubeAndParts {
     cube: Cube,
     parts: Vec<u32>,
     stock: bool,
@@ -36,14 +31,14 @@ pub(super) struct Seen {
 
 /// What all cubes share.
 pub(super) struct Divider<'a> {
-    pub(super) parts: &'a Parts,
+    pub(super) parts: &'a MotionParts,
     pub(super) stock: &'a VoxelStock,
     pub(super) lattice: Lattice,
     pub(super) budget: &'a Budget,
 }
 
 /// What was found below the top.
-pub(super) struct Found {
+pub(super) struct Divided {
     pub(super) blocks: Vec<Block>,
     /// Samples inside the material that no brick holds.
     pub(super) inside: u64,
@@ -58,26 +53,19 @@ pub(super) struct Scratch {
     pub(super) leaf: Leaf,
 }
 
-impl Cube {
-    pub(super) fn children(self) -> impl Iterator<Item = Self> {
-        let n = self.n / 2;
-        (0..8).map(move |k| Self {
-            low: std::array::from_fn(|i| self.low[i] + if k >> i & 1 == 1 { n } else { 0 }),
-            n,
-        })
-    }
-}
-
 impl Divider<'_> {
     /// All blocks in which the surface passes; `None` where they are far too many.
     ///
     /// # Errors
     /// [`Cancelled`].
-    pub(super) fn run(&self, monitor: &dyn Monitor) -> Result<Option<Found>, Cancelled> {
+    pub(super) fn run(&self, monitor: &dyn Monitor) -> Result<Option<Divided>, Cancelled> {
         let mut inside = 0;
         let whole = Cube { low: [0; 3], n: self.lattice.side() };
-        let mut level =
-            vec![Divided { cube: whole, parts: (0..self.parts.all.len() as u32).collect(), stock: true }];
+        let mut level = vec![CubeAndParts {
+            cube: whole,
+            parts: (0..self.parts.all.len() as u32).collect(),
+            stock: true,
+        }];
         while level.first().is_some_and(|d| d.cube.n > BLOCK) {
             check(monitor)?;
             let divided = parallel::map(level.len(), |k| self.children(&level[k]));
@@ -98,12 +86,12 @@ impl Divider<'_> {
             Ok(block)
         })?;
         inside += blocks.iter().map(|block| block.inside).sum::<u64>();
-        Ok(Some(Found { blocks, inside }))
+        Ok(Some(Divided { blocks, inside }))
     }
 
     /// The eight parts of a cube in which the surface may pass, and the samples inside the material in the
     /// others.
-    fn children(&self, parent: &Divided) -> (Vec<Divided>, u64) {
+    fn children(&self, parent: &CubeAndParts) -> (Vec<CubeAndParts>, u64) {
         let (mut children, mut inside) = (Vec::new(), 0);
         let mut scratch = Scratch::default();
         for cube in parent.cube.children() {
@@ -112,13 +100,13 @@ impl Divider<'_> {
             if seen.high < -SURE {
                 inside += u64::from(cube.n).pow(3);
             } else if seen.low <= SURE {
-                children.push(Divided { cube, parts, stock: seen.stock });
+                children.push(CubeAndParts { cube, parts, stock: seen.stock });
             }
         }
         (children, inside)
     }
 
-    fn divide(&self, parent: &Divided, scratch: &mut Scratch, block: &mut Block) {
+    fn divide(&self, parent: &CubeAndParts, scratch: &mut Scratch, block: &mut Block) {
         for cube in parent.cube.children() {
             let mut parts = scratch.lists.pop().unwrap_or_default();
             let seen = self.look_at(&cube, parent, scratch, &mut parts);
@@ -131,7 +119,7 @@ impl Divider<'_> {
                     leaf.store(self, &cube, block);
                     scratch.leaf = leaf;
                 } else {
-                    let child = Divided { cube, parts, stock: seen.stock };
+                    let child = CubeAndParts { cube, parts, stock: seen.stock };
                     self.divide(&child, scratch, block);
                     parts = child.parts;
                 }
@@ -141,7 +129,13 @@ impl Divider<'_> {
     }
 
     /// As [`Divider::look`], at all samples of a cube and those around it, which cells at its border share.
-    fn look_at(&self, cube: &Cube, parent: &Divided, scratch: &mut Scratch, kept: &mut Vec<u32>) -> Seen {
+    fn look_at(
+        &self,
+        cube: &Cube,
+        parent: &CubeAndParts,
+        scratch: &mut Scratch,
+        kept: &mut Vec<u32>,
+    ) -> Seen {
         let centre = self.lattice.centre(cube);
         let half = 0.5 * f64::from(cube.n + 1) * self.lattice.pitch;
         self.look(&centre, half, SURE, &parent.parts, parent.stock, scratch, kept)

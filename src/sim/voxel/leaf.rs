@@ -2,7 +2,8 @@
 
 use super::bricks::{BAND, BRICK, Block, Brick, SAMPLES, STEPS};
 use super::capsule::{Kernel, LANES, Lanes};
-use super::divide::{Cube, Divider, Scratch};
+use super::cube::Cube;
+use super::divide::{Divider, Scratch};
 use super::moves::Tangent;
 use crate::NOT_CUT;
 use geometry::{Point3, Vector3};

@@ -8,8 +8,9 @@
 //! there, √3/2 p at most.
 
 use super::bricks::{Lattice, STEPS};
+use super::engine::VoxelEngine;
 use super::surface::Foot;
-use super::{VoxelEngine, Voxels};
+use super::voxels::Voxels;
 use crate::NOT_CUT;
 use geometry::{Point3, Vector3};
 

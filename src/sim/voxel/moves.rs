@@ -34,7 +34,7 @@ const MAX_PARTS: f64 = 1000.0;
 
 /// A move, or a part of one that turns.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Part {
+pub(super) struct MotionPart {
     /// Index of the move in the path.
     pub(super) index: u32,
     /// From when to when on that move.
@@ -65,9 +65,9 @@ pub(super) struct Tangent {
 
 /// All moves of a path.
 #[derive(Debug)]
-pub(super) struct Parts {
+pub(super) struct MotionParts {
     pub(super) solid: Solid,
-    pub(super) all: Vec<Part>,
+    pub(super) all: Vec<MotionPart>,
     /// Of the moves of the path.
     motions: Vec<Motion>,
 }
@@ -78,7 +78,7 @@ struct Strip {
     away: Vector3,
 }
 
-impl Part {
+impl MotionPart {
     /// A tool with the mean axis that sees `q` run along the chord of the curve along which the tool does,
     /// and by how much distances differ within `reach` of `q`.
     fn seen_from(&self, q: &Point3, reach: f64) -> (StandIn, f64) {
@@ -97,7 +97,7 @@ impl Part {
     }
 }
 
-impl Parts {
+impl MotionParts {
     pub(super) fn new(solid: &Solid, path: &Toolpath) -> Result<Self, OppositeAxes> {
         let motions = parallel::try_map(path.len(), |index| {
             Motion::new(&path.location_before(index), &path.moves[index].to).ok_or(OppositeAxes { index })
@@ -118,7 +118,7 @@ impl Parts {
                 let [start, end] = [a, b].map(|at| at.tip + at.axis * pivot);
                 let bulge = 0.5 * pivot * half_turn * half_turn;
                 let about = a.axis.cross(&b.axis).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
-                Part {
+                MotionPart {
                     index: index as u32,
                     range,
                     tip: a.tip,
@@ -181,7 +181,7 @@ impl Parts {
     }
 
     /// Signed distance from a part where it is below `limit`; ball ends as exact as their chords.
-    pub(super) fn distance(&self, part: &Part, q: &Point3, limit: f64) -> Option<f64> {
+    pub(super) fn distance(&self, part: &MotionPart, q: &Point3, limit: f64) -> Option<f64> {
         if part.half_turn == 0.0
             && let Some((strip, radius)) = self.strip(&part.plain, q)
         {
@@ -195,10 +195,10 @@ impl Parts {
         below(&self.solid, motion, q, part.range, limit).map(|found| found.distance)
     }
 
-    /// By how much distances from [`Part::plain`] differ within `reach` of `q`, where it is good enough to
+    /// By how much distances from [`MotionPart::plain`] differ within `reach` of `q`, where it is good enough to
     /// stand in for the part.
     #[inline]
-    fn plain_slack(&self, part: &Part, q: &Point3, reach: f64) -> Option<f64> {
+    fn plain_slack(&self, part: &MotionPart, q: &Point3, reach: f64) -> Option<f64> {
         if part.half_turn == 0.0 {
             return Some(0.0);
         }
@@ -207,7 +207,7 @@ impl Parts {
 
     /// Whether all places within `reach` of `q` lie below the middle of the ball, so that the part sweeps a
     /// capsule for them.
-    pub(super) fn is_below(&self, part: &Part, q: &Point3, reach: f64) -> bool {
+    pub(super) fn is_below(&self, part: &MotionPart, q: &Point3, reach: f64) -> bool {
         let away = q - part.plain.start;
         let (a, b) = (away.dot(&part.plain.axis), (away - part.plain.way).dot(&part.plain.axis));
         let higher = if a > b { a } else { b };
@@ -220,7 +220,7 @@ impl Parts {
     }
 
     /// The same for the flat top, whether the shank's end is farther than its side.
-    pub(super) fn is_strip(&self, part: &Part, q: &Point3, reach: f64) -> bool {
+    pub(super) fn is_strip(&self, part: &MotionPart, q: &Point3, reach: f64) -> bool {
         let Some(radius) = self.solid.ball() else { return false };
         if part.half_turn > 0.0 || !self.solid.is_convex() {
             return false;
@@ -257,7 +257,7 @@ impl Parts {
 
     /// The distance of the stand-in from `q`, and what bounds it, where it may be below `limit` for the part.
     #[inline]
-    pub(super) fn tangent(&self, part: &Part, q: &Point3, reach: f64, limit: f64) -> Option<Tangent> {
+    pub(super) fn tangent(&self, part: &MotionPart, q: &Point3, reach: f64, limit: f64) -> Option<Tangent> {
         match self.plain_slack(part, q, reach) {
             Some(slack) => self.tangent_of(part, &part.plain, slack, q, reach, limit),
             None => {
@@ -270,7 +270,7 @@ impl Parts {
     #[inline(always)]
     fn tangent_of(
         &self,
-        part: &Part,
+        part: &MotionPart,
         tool: &StandIn,
         slack: f64,
         q: &Point3,
@@ -299,7 +299,7 @@ impl Parts {
 
     /// Upper bounds on the distance at the eight corners of a cube around `centre`, such that in between
     /// their greatest is one.
-    pub(super) fn corners(&self, part: &Part, t: &Tangent, centre: &Point3, half: f64) -> [f64; 8] {
+    pub(super) fn corners(&self, part: &MotionPart, t: &Tangent, centre: &Point3, half: f64) -> [f64; 8] {
         if !self.solid.is_convex() {
             return [t.distance + t.slack; 8];
         }
@@ -319,7 +319,7 @@ impl Parts {
     }
 
     /// Start and way of the ball's middle, its axis and its radius.
-    pub(super) fn track(&self, part: &Part) -> (Point3, Vector3, Vector3) {
+    pub(super) fn track(&self, part: &MotionPart) -> (Point3, Vector3, Vector3) {
         (part.plain.start, part.plain.way, part.plain.axis)
     }
 }

@@ -2,7 +2,7 @@
 //! as something in it is open.
 
 use super::bricks::BLOCK;
-use super::divide::Cube;
+use super::cube::Cube;
 use work::monitor::{Cancelled, Monitor, check};
 use work::parallel;
 
@@ -12,18 +12,18 @@ pub(super) const SIDE: u32 = 4;
 /// What is asked.
 pub(super) trait Descent: Sync {
     /// A cube with what may matter in it.
-    type Piece: Send + Sync;
+    type Node: Send + Sync;
     /// What is known so far.
-    type Found: Send + Default;
+    type Tally: Send + Default;
 
     /// Its cube.
-    fn cube(piece: &Self::Piece) -> Cube;
+    fn cube(piece: &Self::Node) -> Cube;
     /// The parts of a cube in which something is open; what is known of the others is put down.
-    fn children(&self, parent: &Self::Piece, found: &mut Self::Found) -> Vec<Self::Piece>;
+    fn children(&self, parent: &Self::Node, found: &mut Self::Tally) -> Vec<Self::Node>;
     /// Puts down all samples of a cube of [`SIDE`].
-    fn leaf(&self, piece: &Self::Piece, found: &mut Self::Found);
+    fn leaf(&self, piece: &Self::Node, found: &mut Self::Tally);
     /// Adds what was found elsewhere.
-    fn add(total: &mut Self::Found, found: Self::Found);
+    fn add(total: &mut Self::Tally, found: Self::Tally);
 }
 
 /// Walks down from `whole`; the same result for any number of threads.
@@ -32,16 +32,16 @@ pub(super) trait Descent: Sync {
 /// [`Cancelled`].
 pub(super) fn descend<D: Descent>(
     descent: &D,
-    whole: D::Piece,
+    whole: D::Node,
     name: &str,
     monitor: &dyn Monitor,
-) -> Result<D::Found, Cancelled> {
+) -> Result<D::Tally, Cancelled> {
     let mut level = vec![whole];
-    let mut total = D::Found::default();
+    let mut total = D::Tally::default();
     while level.first().is_some_and(|piece| D::cube(piece).n > BLOCK) {
         check(monitor)?;
         let divided = parallel::map(level.len(), |k| {
-            let mut found = D::Found::default();
+            let mut found = D::Tally::default();
             (descent.children(&level[k], &mut found), found)
         });
         level.clear();
@@ -53,7 +53,7 @@ pub(super) fn descend<D: Descent>(
     monitor.start(name, level.len() as u64);
     let blocks = parallel::try_map(level.len(), |k| {
         check(monitor)?;
-        let mut found = D::Found::default();
+        let mut found = D::Tally::default();
         divide(descent, &level[k], &mut found);
         monitor.advance(1);
         Ok(found)
@@ -62,7 +62,7 @@ pub(super) fn descend<D: Descent>(
     Ok(total)
 }
 
-fn divide<D: Descent>(descent: &D, piece: &D::Piece, found: &mut D::Found) {
+fn divide<D: Descent>(descent: &D, piece: &D::Node, found: &mut D::Tally) {
     for child in descent.children(piece, found) {
         if D::cube(&child).n == SIDE {
             descent.leaf(&child, found);

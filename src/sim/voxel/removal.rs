@@ -7,17 +7,17 @@
 
 use super::bricks::Lattice;
 use super::capsule::{Kernel, LANES, Lanes};
-use super::divide::Cube;
-use super::moves::{Part, Tangent, corner};
+use super::cube::Cube;
+use super::engine::VoxelEngine;
+use super::error::VoxelError;
+use super::moves::{MotionPart, Tangent, corner};
 use super::octree::{Descent, SIDE, descend};
-use super::{VoxelEngine, VoxelError};
 use crate::solid::Motion;
 use crate::{ENGAGED, MoveRemoval, RapidContact};
 use geometry::{Point3, Vector3};
 use std::collections::BTreeMap;
-use work::lanes;
 use work::monitor::{Monitor, check};
-use work::parallel;
+use work::{lanes, parallel};
 
 /// By how much a voxel's share may be off where a plane crosses it, in voxels: 0.0478 for one square to the diagonal at a
 /// quarter of a voxel from the middle, 0.0429 square to that of a face, none along the faces. Edges, a tenth of voxel² for
@@ -78,7 +78,7 @@ struct Taken {
 }
 
 /// A cube with the parts that take something in it, in order.
-struct Piece {
+struct RemovalCube {
     cube: Cube,
     parts: Vec<u32>,
     /// How they look from the middle of a least cube.
@@ -181,7 +181,7 @@ impl VoxelEngine<'_> {
         let Some(lattice) = self.lattice(voxel)? else {
             return Err(VoxelError::Voxel(voxel));
         };
-        let whole = Piece {
+        let whole = RemovalCube {
             cube: Cube { low: [0; 3], n: lattice.side() },
             parts: (0..self.parts.all.len() as u32).collect(),
             tangents: Vec::new(),
@@ -224,16 +224,16 @@ impl VoxelEngine<'_> {
 }
 
 impl Descent for Remover<'_> {
-    type Piece = Piece;
-    type Found = Taken;
+    type Node = RemovalCube;
+    type Tally = Taken;
 
-    fn cube(piece: &Piece) -> Cube {
+    fn cube(piece: &RemovalCube) -> Cube {
         piece.cube
     }
 
     /// The parts of a cube in which more than one move, or the stock's surface, has a say; what a single one
     /// takes whole is put down.
-    fn children(&self, parent: &Piece, taken: &mut Taken) -> Vec<Piece> {
+    fn children(&self, parent: &RemovalCube, taken: &mut Taken) -> Vec<RemovalCube> {
         let engine = self.engine;
         let half_voxel = 0.5 * self.lattice.pitch;
         let mut children = Vec::new();
@@ -267,13 +267,13 @@ impl Descent for Remover<'_> {
             if parts.len() == 1 && covered && !stock {
                 self.take_whole(&cube, &centre, half, parts[0], taken);
             } else if !parts.is_empty() {
-                children.push(Piece { cube, parts, tangents, stock });
+                children.push(RemovalCube { cube, parts, tangents, stock });
             }
         }
         children
     }
 
-    fn leaf(&self, piece: &Piece, taken: &mut Taken) {
+    fn leaf(&self, piece: &RemovalCube, taken: &mut Taken) {
         let (engine, pitch) = (self.engine, self.lattice.pitch);
         let centre = self.lattice.centre(&piece.cube);
         let half = 0.5 * f64::from(SIDE - 1) * pitch;
@@ -372,7 +372,7 @@ impl Remover<'_> {
     /// The share of each voxel that a part leaves, where something is left.
     fn shares(
         &self,
-        part: &Part,
+        part: &MotionPart,
         index: u32,
         tangent: &Tangent,
         centre: &Point3,

@@ -6,10 +6,11 @@
 //! of √3 voxels across, a sample lies in it.
 
 use super::bricks::Lattice;
-use super::divide::Cube;
-use super::moves::Parts;
+use super::cube::Cube;
+use super::engine::VoxelEngine;
+use super::error::VoxelError;
+use super::moves::MotionParts;
 use super::octree::{Descent, SIDE, descend};
-use super::{VoxelEngine, VoxelError};
 use cutter::{Holder, Solid};
 use geometry::{Point3, Vector3};
 use motion::Toolpath;
@@ -56,7 +57,7 @@ pub struct StandingHits {
 type Hits = BTreeMap<u32, Vec<(f64, Point3)>>;
 
 /// A cube with the parts of holder and cutter that come near, in order.
-struct Piece {
+struct StandingCube {
     cube: Cube,
     holder: Vec<u32>,
     cutter: Vec<u32>,
@@ -65,7 +66,7 @@ struct Piece {
 
 struct Search<'a> {
     engine: &'a VoxelEngine<'a>,
-    holder: Parts,
+    holder: MotionParts,
     lattice: Lattice,
 }
 
@@ -101,7 +102,7 @@ impl VoxelEngine<'_> {
         let sections = Solid::of_sections(holder);
         for (section, solid) in sections.iter().enumerate() {
             check(monitor)?;
-            let search = Search { engine: self, holder: Parts::new(solid, path)?, lattice };
+            let search = Search { engine: self, holder: MotionParts::new(solid, path)?, lattice };
             let hits = descend(&search, search.whole(), "looking for the holder in the stock", monitor)?;
             all.extend(hits.into_iter().flat_map(|(move_index, places)| {
                 let hit = move |at| HolderHit { move_index, section, at, depth: 0.0 };
@@ -129,15 +130,15 @@ impl VoxelEngine<'_> {
 }
 
 impl Search<'_> {
-    fn whole(&self) -> Piece {
-        let all = |parts: &Parts| (0..parts.all.len() as u32).collect();
+    fn whole(&self) -> StandingCube {
+        let all = |parts: &MotionParts| (0..parts.all.len() as u32).collect();
         let cube = Cube { low: [0; 3], n: self.lattice.side() };
-        Piece { cube, holder: all(&self.holder), cutter: all(&self.engine.parts), stock: true }
+        StandingCube { cube, holder: all(&self.holder), cutter: all(&self.engine.parts), stock: true }
     }
 
     /// Those of the listed parts, up to move `last`, that come closer than `limit` to a place of a cube, up to the first
     /// that does so everywhere.
-    fn near(parts: &Parts, listed: &[u32], centre: &Point3, half: f64, limit: f64, last: u32) -> Near {
+    fn near(parts: &MotionParts, listed: &[u32], centre: &Point3, half: f64, limit: f64, last: u32) -> Near {
         let reach = half * 3f64.sqrt();
         let mut near = Near { parts: Vec::new(), covered: false };
         for &k in listed {
@@ -173,7 +174,7 @@ impl Search<'_> {
                 continue;
             }
             // On the same move the earlier one has it.
-            let when = |parts: &Parts, near: f64| parts.first_within(index, q, near, TOUCH, MOST_LOOKS);
+            let when = |parts: &MotionParts, near: f64| parts.first_within(index, q, near, TOUCH, MOST_LOOKS);
             if part.index < index || when(theirs, SHALLOWEST) <= when(mine, -SHALLOWEST) {
                 return None;
             }
@@ -190,14 +191,14 @@ impl Search<'_> {
 }
 
 impl Descent for Search<'_> {
-    type Piece = Piece;
-    type Found = Hits;
+    type Node = StandingCube;
+    type Tally = Hits;
 
-    fn cube(piece: &Piece) -> Cube {
+    fn cube(piece: &StandingCube) -> Cube {
         piece.cube
     }
 
-    fn children(&self, parent: &Piece, hits: &mut Hits) -> Vec<Piece> {
+    fn children(&self, parent: &StandingCube, hits: &mut Hits) -> Vec<StandingCube> {
         let mut children = Vec::new();
         for cube in parent.cube.children() {
             let centre = self.lattice.centre(&cube);
@@ -224,13 +225,13 @@ impl Descent for Search<'_> {
             if mine.len() == 1 && holder.covered && cutter.parts.is_empty() && !stock {
                 Self::put(hits, last, reach.min(-self.engine.stock.foot(&centre).0), centre);
             } else {
-                children.push(Piece { cube, holder: mine, cutter: cutter.parts, stock });
+                children.push(StandingCube { cube, holder: mine, cutter: cutter.parts, stock });
             }
         }
         children
     }
 
-    fn leaf(&self, piece: &Piece, hits: &mut Hits) {
+    fn leaf(&self, piece: &StandingCube, hits: &mut Hits) {
         let pitch = self.lattice.pitch;
         let low = self.lattice.place(piece.cube.low);
         for k in 0..SIDE.pow(3) {

@@ -4,7 +4,7 @@ use geometry::{Aabb, Bvh, Point3, TriangleMesh, Vector3};
 
 /// An axis of coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Axis {
+pub enum BarAxis {
     /// Along x.
     X,
     /// Along y.
@@ -23,7 +23,7 @@ pub enum VoxelStock {
         /// Middle of one end.
         base: Point3,
         /// Which way it runs from there.
-        axis: Axis,
+        axis: BarAxis,
         /// Radius, mm.
         radius: f64,
         /// Length, mm.

@@ -5,10 +5,11 @@
 //! that an even number of triangles meets at every edge of the mesh. Vertices lie on the exact tangent
 //! planes of the tool, which keeps ridges sharp.
 
-use super::bricks::{Bricks, Placed, slot_of};
-use super::cells::{Cells, Corners};
+use super::bricks::{Bricks, Placed, offset, slot_of};
+use super::cells::{Cells, Corners, crossed};
+use super::engine::VoxelEngine;
 use super::vertex::vertex;
-use super::{VoxelEngine, Voxels, crossed, offset};
+use super::voxels::Voxels;
 use crate::NOT_CUT;
 use geometry::{Plane, Point3, Vector3};
 use work::monitor::{Cancelled, Monitor, check};

@@ -5,14 +5,16 @@ mod mesh;
 mod removal;
 mod standing;
 
+use super::bricks::STEPS;
 use super::*;
 use crate::scenes::{Rng, cutters, path_through, random_path, wave_path};
 use crate::{NOT_CUT, SweptSolid, ZMap};
-use cutter::Cutter;
-use geometry::Aabb;
-use motion::{ClPoint, Move, MoveKind};
+use cutter::{Cutter, Solid};
+use geometry::{Aabb, Point3, Vector3};
+use motion::{ClPoint, Move, MoveKind, Toolpath};
 use std::f64::consts::PI;
-use work::monitor::Silent;
+use std::sync::atomic::{AtomicU64, Ordering};
+use work::monitor::{Cancelled, Monitor, Silent};
 
 /// More than any test takes.
 const MEMORY: u64 = 1 << 30;
@@ -107,7 +109,7 @@ fn distances_are_those_of_brute_force() {
             0 => block([1.0, 0.0, 1.0], [9.0, 9.5, 8.0]),
             1 => VoxelStock::Cylinder {
                 base: Point3::new(0.5, 5.0, 5.0),
-                axis: Axis::X,
+                axis: BarAxis::X,
                 radius: 4.0,
                 length: 9.0,
             },
@@ -176,7 +178,7 @@ fn stock_is_as_large_as_it_should_be() {
         (block([-1.0, 2.0, 3.0], [9.0, 8.0, 7.3]), 10.0 * 6.0 * 4.3),
         (octahedron(Point3::new(1.0, 2.0, 3.0), 5.0), 4.0 / 3.0 * 125.0),
     ];
-    let bars = [Axis::X, Axis::Y, Axis::Z].map(|axis| VoxelStock::Cylinder {
+    let bars = [BarAxis::X, BarAxis::Y, BarAxis::Z].map(|axis| VoxelStock::Cylinder {
         base: Point3::new(1.0, 2.0, 3.0),
         axis,
         radius: 4.0,

@@ -1,0 +1,44 @@
+//! What one grid of the cut stock shows of deviations, ridges, gouges and uncut places. mm.
+
+use super::figures::{DeviationFigures, GougeFigures, UncutFigures};
+use super::inspection::Inspection;
+use super::ridges::{Highest, RidgeFinder, Ridges};
+use motion::Toolpath;
+use work::monitor::{Cancelled, Monitor};
+
+/// What one grid shows.
+pub(super) struct Inspected {
+    pub deviation: DeviationFigures,
+    /// `[ny][nx]`, mm; NaN off the part.
+    pub deviation_map: Vec<f32>,
+    pub ridges: Ridges,
+    pub highest: Option<Highest>,
+    pub gouge: GougeFigures,
+    pub uncut: UncutFigures,
+    /// Least vertical part of the design's normal.
+    pub least_lean: f64,
+}
+
+/// Inspects one grid; `highest_ridge` is that of the surroundings, mm.
+pub(super) fn inspect(
+    inspection: &Inspection<'_>,
+    path: &Toolpath,
+    highest_ridge: f64,
+    monitor: &dyn Monitor,
+) -> Result<Inspected, Cancelled> {
+    let samples = inspection.samples(monitor)?;
+    let finder =
+        RidgeFinder::new(inspection.surface, inspection.part, inspection.cutter, path, inspection.limits);
+    let ridges = finder.find(&|k| samples[k].deviation, monitor)?;
+    let deviation = inspection.deviation_figures(&samples);
+    let highest_ridge = highest_ridge.max(ridges.highest_sample());
+    Ok(Inspected {
+        highest: finder.highest(&ridges, inspection.asked),
+        ridges,
+        gouge: inspection.gouges(&samples),
+        uncut: inspection.uncut(&samples, highest_ridge, deviation.area_mm2),
+        deviation,
+        least_lean: samples.iter().map(|s| f64::from(s.lean)).fold(1.0, f64::min),
+        deviation_map: samples.into_iter().map(|s| s.deviation).collect(),
+    })
+}

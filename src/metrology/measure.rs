@@ -1,0 +1,90 @@
+//! The figures of a cut on heights: the stock's own grid first, then a closer look where something may hide. mm.
+
+use super::cut_surface::CutSurface;
+use super::figures::{CloserLook, Limits, Measurement};
+use super::inspected::inspect;
+use super::inspection::Inspection;
+use super::pairs::pair_figures;
+use super::refine::{Asked, Refinement};
+use super::ridges::scallop_figures;
+use super::unseen::{dips, unseen_depth};
+use cutter::Cutter;
+use geometry::Point3;
+use motion::Toolpath;
+use part::Part;
+use sim::{Envelope, ZMap};
+use work::monitor::{Cancelled, Monitor};
+
+/// The least vertical part of the design's normal that dips between centres are thought of with.
+const LEAST_LEAN: f64 = 0.2;
+
+/// Measures `cut`, the stock after `path`, against `part`, looking closer until the error bounds of the
+/// greatest scallop, gouge and uncut height are the asked ones. Where they do not come down to that, a note
+/// in [`Measurement::refined`] says so.
+///
+/// # Errors
+/// [`Cancelled`] when the monitor says so.
+pub fn measure(
+    part: &Part,
+    cutter: &Cutter,
+    path: &Toolpath,
+    cut: &ZMap,
+    limits: &Limits,
+    asked: &Asked,
+    monitor: &dyn Monitor,
+) -> Result<Measurement, Cancelled> {
+    let surface = CutSurface::new(Envelope::new(cutter, path), cut, path);
+    let bound = asked.error_bound;
+    let inspection = Inspection { part, cutter, limits, asked: bound, surface: &surface, grid: cut.grid };
+    let mut found = inspect(&inspection, path, 0.0, monitor)?;
+    let highest_ridge = found.ridges.highest_sample();
+    let lean = found.least_lean;
+    let hidden = found.ridges.hidden.clone();
+    let pairs = pair_figures(part, cutter, path, std::mem::take(&mut found.ridges.pairs), monitor)?;
+    let mut measured = Measurement {
+        scallop: scallop_figures(&found.ridges.samples, found.highest, limits),
+        gouge: found.gouge,
+        uncut: found.uncut,
+        deviation: found.deviation,
+        ridge_samples: found.ridges.samples,
+        pairs,
+        deviation_map: found.deviation_map,
+        refined: CloserLook::default(),
+    };
+    let mut hiding = Vec::new();
+    if unseen_depth(cutter, cut.grid.cell, lean.max(LEAST_LEAN)) > bound {
+        let known = measured.gouge.max_depth_mm + bound;
+        hiding = dips(part, cutter, path, cut.grid.cell, known, monitor)?;
+    }
+    let refinement = Refinement { coarse: &inspection, path, asked, highest_ridge };
+    measured.refined = refinement.run(&hidden, &hiding, &mut measured, monitor)?;
+    doubt(&mut measured, &surface, part, path, asked);
+    Ok(measured)
+}
+
+/// Where a move that no cell saw cuts the highest scallop or uncut place away, the figure is too great by
+/// an unknown amount: its bound becomes the figure itself. All moves are asked at the two places.
+fn doubt(measured: &mut Measurement, surface: &CutSurface<'_>, part: &Part, path: &Toolpath, asked: &Asked) {
+    let all: Vec<u32> = (0..path.len() as u32).collect();
+    let cut_away = |at: &Point3| {
+        surface.envelope.lowest(at.x, at.y, &all).is_some_and(|(z, _)| z < at.z - asked.error_bound)
+    };
+    let (scallop, uncut) = (&mut measured.scallop, &mut measured.uncut);
+    let mut doubtful = false;
+    if scallop.max_at_mm.is_some_and(|at| cut_away(&at.into())) {
+        scallop.error_bound_mm = scallop.error_bound_mm.zip(scallop.max_mm).map(|(b, m)| b.max(m));
+        doubtful = true;
+    }
+    let highest = uncut.regions.first().and_then(|r| Some((r, part.highest_at(r.at_mm[0], r.at_mm[1])?)));
+    if highest.is_some_and(|(r, design)| cut_away(&(design.point + design.normal * r.height_mm))) {
+        uncut.error_bound_mm = uncut.error_bound_mm.max(uncut.max_height_mm);
+        doubtful = true;
+    }
+    if doubtful {
+        measured.refined.note = Some(
+            "moves between the centres of cells cut lower than what was measured there; passes so close need a \
+             cell of a third of their distance"
+                .into(),
+        );
+    }
+}
