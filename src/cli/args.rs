@@ -63,9 +63,8 @@ pub struct CheckOptions {
 /// What scallop is asked about. Lengths in mm.
 #[derive(Debug, Args)]
 pub struct ScallopOptions {
-    /// The cutter: ball:DIAMETER, flat:DIAMETER, bull:DIAMETER:CORNER_RADIUS or
-    /// taper:TIP_DIAMETER:CORNER_RADIUS:HALF_ANGLE:SHANK_DIAMETER.
-    #[arg(long, value_name = "CUTTER")]
+    /// The cutter, in one of the short forms of its families.
+    #[arg(long, value_name = "CUTTER", help = format!("The cutter: {}", cutter::short_forms()))]
     pub cutter: Cutter,
     /// Distance of passes along the surface: answers the scallop height.
     #[arg(long, value_name = "MM", allow_negative_numbers = true, required_unless_present_any = ["scallop", "table"])]

@@ -12,10 +12,10 @@ use super::{
     Simulation, Stock, ToolpathRequest, auto_cell, default_error_bound,
 };
 use super::{axis, blade, classic, direction, formula, interference, kinematics, pocket};
-use cutter::{AptWord, AptWords, Cutter, CutterError, CutterShape, Holder, HolderSection};
+use cutter::{Cutter, Holder, HolderSection};
 use field::{KnotRule, MAX_DENSE, Solver};
 use geometry::AnalyticSurface;
-use keys::{COORDINATE, LENGTH, Located, Section};
+use keys::{LENGTH, Located, Section};
 use keys::{SceneError, SceneText};
 use machine::Machine;
 use metrology::Limits;
@@ -268,50 +268,7 @@ fn read_stock(stock: &Section<'_>, part: &PartSource, cutter: &Cutter) -> Result
 
 fn read_cutter(section: &Section<'_>) -> Result<(Cutter, CuttingData), SceneError> {
     const SPEEDS: [&str; 3] = ["spindle_speed", "feed_rate", "plunge_rate"];
-    const SHAPES: [&str; 10] = [
-        "diameter",
-        "corner_radius",
-        "half_angle",
-        "tip_diameter",
-        "shank_diameter",
-        "corner_x",
-        "corner_z",
-        "tip_angle",
-        "side_angle",
-        "length",
-    ];
-    let all: Vec<&str> = ["shape"].into_iter().chain(SHAPES).chain(SPEEDS).collect();
-    if !section.has("shape") {
-        section.only(&all, &[], "a cutter")?;
-    }
-    let shape = section.required_word("shape", &["ball", "flat", "bull", "taper", "apt"])?;
-    let own: &[&str] = match shape.value {
-        "bull" => &["diameter", "corner_radius"],
-        "taper" => &["tip_diameter", "corner_radius", "half_angle", "shank_diameter"],
-        "apt" => &["diameter", "corner_radius", "corner_x", "corner_z", "tip_angle", "side_angle", "length"],
-        _ => &["diameter"],
-    };
-    let keys: Vec<&str> = ["shape"].iter().chain(own).chain(&SPEEDS).copied().collect();
-    section.only(&keys, &all, &format!("shape = \"{}\"", shape.value))?;
-    // The cutter's own refusals speak of whole dimensions; point at the key that they are about.
-    let (made, blamed) = match shape.value {
-        "ball" => (Cutter::ball(section.required_length("diameter", 6.0)?.value), "diameter"),
-        "flat" => (Cutter::flat(section.required_length("diameter", 6.0)?.value), "diameter"),
-        "bull" => {
-            let diameter = section.required_length("diameter", 6.0)?.value;
-            (Cutter::bull(diameter, section.required_length("corner_radius", 1.0)?.value), "corner_radius")
-        }
-        "apt" => (read_apt(section)?, "shape"),
-        _ => read_taper(section)?,
-    };
-    let cutter = made.map_err(|e| {
-        let (key, cure) = match &e {
-            CutterError::Apt(refusal) => (apt_key(refusal.word), refusal.cure.clone()),
-            _ => (blamed, format!("change `{blamed}`")),
-        };
-        let span = section.key_span(if section.has(key) { key } else { "shape" });
-        section.error(&span, e.to_string(), format!("`{key}`: {cure}"))
-    })?;
+    let cutter = Cutter::read(section, &SPEEDS)?;
     let rate =
         |key, default| Ok::<f64, SceneError>(section.number(key, RATE, "")?.map_or(default, |v| v.value));
     let cutting = CuttingData {
@@ -322,50 +279,6 @@ fn read_cutter(section: &Section<'_>) -> Result<(Cutter, CuttingData), SceneErro
     Ok((cutter, cutting))
 }
 
-/// The cutter of seven words; a corner whose place is left away touches bottom and side.
-fn read_apt(section: &Section<'_>) -> Result<Result<Cutter, CutterError>, SceneError> {
-    let angle = |key| {
-        // Angles below zero are read, so that the refusal can say what they would mean.
-        let angle = section.number(key, -80.0..=79.99, " degrees")?;
-        Ok::<f64, SceneError>(angle.map_or(0.0, |v| v.value.to_radians()))
-    };
-    let place = |key| Ok::<_, SceneError>(section.number(key, COORDINATE, " mm")?.map(|v| v.value));
-    let words = AptWords {
-        diameter: section.required_length("diameter", 6.0)?.value,
-        corner_radius: section.number("corner_radius", 0.0..=*LENGTH.end(), " mm")?.map_or(0.0, |v| v.value),
-        corner_x: 0.0,
-        corner_z: 0.0,
-        tip_angle: angle("tip_angle")?,
-        side_angle: angle("side_angle")?,
-        length: section.required_length("length", 20.0)?.value,
-    };
-    let words = words.with_centre(place("corner_x")?, place("corner_z")?);
-    Ok(Cutter::apt(&words).map_err(CutterError::Apt))
-}
-
-/// The key that stands for a word.
-fn apt_key(word: AptWord) -> &'static str {
-    match word {
-        AptWord::Diameter => "diameter",
-        AptWord::CornerRadius => "corner_radius",
-        AptWord::CornerX => "corner_x",
-        AptWord::CornerZ => "corner_z",
-        AptWord::TipAngle => "tip_angle",
-        AptWord::SideAngle => "side_angle",
-        AptWord::Length => "length",
-    }
-}
-
-fn read_taper(section: &Section<'_>) -> Result<(Result<Cutter, CutterError>, &'static str), SceneError> {
-    let tip = section.required_length("tip_diameter", 2.0)?.value;
-    // A tapered ball unless said otherwise.
-    let corner = section.number("corner_radius", 0.0..=*LENGTH.end(), " mm")?.map_or(0.5 * tip, |v| v.value);
-    let angle = section.required_number("half_angle", 0.01..=79.99, " degrees", 5.0)?.value;
-    let shank = section.required_length("shank_diameter", 6.0)?.value;
-    let blamed = if corner > 0.5 * tip { "corner_radius" } else { "shank_diameter" };
-    Ok((Cutter::taper(tip, corner, angle.to_radians(), shank), blamed))
-}
-
 /// What holds the cutter, if the scene says so.
 fn read_holder(root: &Section<'_>, cutter: &Cutter) -> Result<Option<Holder>, SceneError> {
     if !root.has("holder") {
@@ -373,9 +286,9 @@ fn read_holder(root: &Section<'_>, cutter: &Cutter) -> Result<Option<Holder>, Sc
     }
     let holder = root.section("holder")?;
     holder.only(&["cutting_length", "section"], &[], "[holder]")?;
-    let length = match (holder.length("cutting_length")?, cutter.shape()) {
-        (None, CutterShape::Apt) => cutter.words().length,
-        (None, _) => holder.required_length("cutting_length", 20.0)?.value,
+    let length = match (holder.length("cutting_length")?, cutter.stated_length()) {
+        (None, Some(length)) => length,
+        (None, None) => holder.required_length("cutting_length", 20.0)?.value,
         (Some(length), _) if length.value < cutter.side_height() => {
             let message = format!(
                 "the cutting length of {} mm ends below the cutter's full radius, at {:.4} mm",

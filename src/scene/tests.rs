@@ -5,7 +5,6 @@ use proptest::prelude::*;
 use std::sync::Arc;
 
 use super::*;
-use cutter::CutterShape;
 use field::mesh::Sense;
 use field::{KnotRule, Solver};
 use geometry::Point2;
@@ -63,7 +62,7 @@ fn with(old: &str, new: &str) -> String {
 fn a_scene_becomes_typed_values_in_mm_and_rad() {
     let scene = Scene::parse("folder/wave.toml", VALID).unwrap();
     assert_eq!(scene.title, "Wave, zigzag against streamlines");
-    assert_eq!((scene.cutter.shape(), scene.cutter.radius()), (CutterShape::Ball, 3.0));
+    assert_eq!((scene.cutter.is_ball(), scene.cutter.radius()), (true, 3.0));
     assert_eq!(scene.tolerance, Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chord: 0.001 });
     assert_eq!((scene.simulation.cell, scene.simulation.cell_is_auto), (0.05, true));
     assert_eq!(scene.simulation.memory_mib, 2048);
