@@ -78,8 +78,10 @@ pub struct ScallopOptions {
     /// Radius of a concave section across the feed.
     #[arg(long, value_name = "MM", conflicts_with = "part")]
     pub concave: Option<f64>,
-    /// A part (.stl, .obj, or NURBS patches in .json) whose curvature is taken at a place.
-    #[arg(long, value_name = "FILE", requires = "at")]
+    /// A part whose curvature is taken at a place.
+    #[arg(long, value_name = "FILE", requires = "at", help = format!(
+        "A part ({}, or NURBS patches in .json) whose curvature is taken at a place", io::mesh_extensions().join(", ")
+    ))]
     pub part: Option<PathBuf>,
     /// The place on the part: X,Y (seen from above) or X,Y,Z (the nearest point).
     #[arg(long, value_name = "X,Y[,Z]", requires = "part", allow_hyphen_values = true, value_parser = place)]

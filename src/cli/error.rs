@@ -4,10 +4,9 @@ use std::path::{Path, PathBuf};
 
 use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme};
 
-use part::PartError;
 use report::ReportError;
 use scallop::ScallopError;
-use scene::{Engine, Scene, SceneError};
+use scene::{Engine, LoadError, Scene, SceneError};
 use sim::{GridError, OppositeAxes, RaysError, VoxelError};
 use toolpath::PlanError;
 use work::monitor::Cancelled;
@@ -19,15 +18,10 @@ pub enum CliError {
     #[error(transparent)]
     #[diagnostic(transparent)]
     Scene(#[from] SceneError),
-    /// The part's surface cannot be searched.
-    #[error("{scene}: the part cannot be used: {reason}")]
-    #[diagnostic(help("change [part] in the scene"))]
-    Part {
-        /// The scene, as its messages call it.
-        scene: String,
-        /// What is wrong with the surface.
-        reason: PartError,
-    },
+    /// The part of the scene cannot be used.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Part(#[from] LoadError),
     /// No grid could be laid out.
     #[error("{scene}: the stock cannot be simulated: {reason}")]
     #[diagnostic(help("choose another `cell` or `memory_mib` in [simulation], or `--cell`"))]
@@ -170,11 +164,6 @@ impl CliError {
     /// For results that could not be written: `map_err(CliError::output(path))`.
     pub fn output(path: &Path) -> impl Fn(std::io::Error) -> Self + use<'_> {
         |error| Self::Output { path: path.to_owned(), reason: error.to_string() }
-    }
-
-    /// For parts that a scene's formula does not make: `map_err(CliError::part(scene))`.
-    pub fn part(scene: &Scene) -> impl Fn(PartError) -> Self + use<'_> {
-        |reason| Self::Part { scene: scene.source.name.clone(), reason }
     }
 
     /// For grids that do not fit: `map_err(CliError::grid(scene))`.

@@ -3,18 +3,15 @@
 use std::io::Read as _;
 use std::path::Path;
 
-use toml::de::DeTable;
-
 use super::{
     CuttingData, DEFAULT_ALLOWANCE, DEFAULT_CLEARANCE, DEFAULT_CONTROL_POINTS, DEFAULT_DEGREE,
     DEFAULT_FEED_RATE, DEFAULT_LIMITS, DEFAULT_MARGIN, DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE,
-    DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, Engine, MeshFormat, NamedFile, OutlineSource, PartSource, Scene,
-    Simulation, Stock, ToolpathRequest, auto_cell, default_error_bound,
+    DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, Engine, NamedFile, PartSource, Scene, Simulation, Stock,
+    ToolpathRequest, auto_cell, default_error_bound,
 };
-use super::{axis, blade, classic, direction, formula, interference, kinematics, pocket};
+use super::{axis, classic, direction, interference, kinematics, part, pocket};
 use cutter::{Cutter, Holder, HolderSection};
 use field::{KnotRule, MAX_DENSE, Solver};
-use geometry::AnalyticSurface;
 use keys::{LENGTH, Located, Section};
 use keys::{SceneError, SceneText};
 use machine::Machine;
@@ -23,9 +20,6 @@ use toolpath::{Joining, Links, Step, Strategy, StreamMethod};
 
 /// Largest scene that is read, bytes. A scene is a page of text; a larger file is a mistake.
 const MAX_BYTES: u64 = 1 << 20;
-
-/// Units that a mesh may be in, and each in mm.
-const UNITS: [(&str, f64); 5] = [("mm", 1.0), ("cm", 10.0), ("m", 1000.0), ("inch", 25.4), ("um", 0.001)];
 
 /// Feeds and speeds that make sense.
 const RATE: std::ops::RangeInclusive<f64> = 0.001..=1e6;
@@ -64,15 +58,7 @@ impl Scene {
     /// [`SceneError::Invalid`] for the first thing that is wrong.
     pub fn parse(name: &str, text: impl Into<String>) -> Result<Self, SceneError> {
         let source = SceneText::new(name, text);
-        let table = DeTable::parse(&source.text).map_err(|e| {
-            let end = source.text.len();
-            let message = e.message().trim().replace('\n', ", ");
-            source.error(
-                e.span().unwrap_or(end..end),
-                format!("not valid TOML: {message}"),
-                "see https://toml.io for how TOML is written",
-            )
-        })?;
+        let table = source.table()?;
         let root = Section::root(&source, table.get_ref());
         root.only(
             &[
@@ -96,7 +82,7 @@ impl Scene {
             None => Path::new(name).file_stem().map_or("scene".into(), |s| s.to_string_lossy().into_owned()),
         };
         let folder = Path::new(name).parent().unwrap_or(Path::new("")).to_owned();
-        let part = read_part(&root.section("part")?, &folder)?;
+        let part = part::read(&root.section("part")?, &folder)?;
         let (cutter, cutting) = read_cutter(&root.section("cutter")?)?;
         let stock = read_stock(&root.section("stock")?, &part, &cutter)?;
         let holder = read_holder(&root, &cutter)?;
@@ -131,12 +117,7 @@ impl Scene {
 
     /// The file that the part comes from, if it comes from one.
     pub fn part_file(&self) -> Option<&NamedFile> {
-        match &self.part {
-            PartSource::Mesh { file, .. } | PartSource::Nurbs { file } => Some(file),
-            PartSource::Pocket { outline: OutlineSource::File { file, .. }, .. } => Some(file),
-            PartSource::Blade(blade) => Some(&blade.file),
-            PartSource::Pocket { .. } | PartSource::Formula { .. } => None,
-        }
+        self.part.file()
     }
 
     /// Reads the files of feed directions into the strategies that follow them.
@@ -171,85 +152,6 @@ impl Scene {
             },
         )
     }
-}
-
-fn read_part(part: &Section<'_>, folder: &Path) -> Result<PartSource, SceneError> {
-    let mut words = vec!["nurbs", pocket::SURFACE];
-    words.extend(formula::names());
-    let mut all_keys = vec!["surface", "file", "unit", "x", "y", blade::KEY];
-    all_keys.extend(blade::KEYS);
-    all_keys.extend(formula::all_keys());
-    all_keys.extend(pocket::PART_KEYS);
-    let named = |file: Located<&str>| NamedFile::beside(folder, file.value, file.span);
-    if part.has(blade::KEY) {
-        let keys: Vec<&str> = [blade::KEY].into_iter().chain(blade::KEYS).collect();
-        part.only(&keys, &all_keys, "a part from sections")?;
-        return blade::read(part, named);
-    }
-    if !part.has("surface") && !part.has("file") {
-        part.only(&all_keys, &[], "a part")?;
-        return Err(part.error(
-            part.header(),
-            "the scene does not say which part to make",
-            "add a table [part] with `file = \"part.stl\"`, with `sections = \"blade.txt\"`, or with `surface = \"wave\"` and \
-             its parameters",
-        ));
-    }
-    match part.word("surface", &words)? {
-        None => {
-            part.only(&["file", "unit"], &all_keys, "a part from a mesh file (it has no `surface`)")?;
-            let (file, format, unit, scale) = read_mesh_file(part, folder, "part.stl")?;
-            Ok(PartSource::Mesh { file, format, unit, scale })
-        }
-        Some(word) if word.value == pocket::SURFACE => pocket::read_source(part, &UNITS, named),
-        Some(word) if word.value == "nurbs" => {
-            part.only(&["surface", "file"], &all_keys, "surface = \"nurbs\"")?;
-            Ok(PartSource::Nurbs { file: named(part.required_text("file", "wave.json")?) })
-        }
-        Some(word) => {
-            let mut keys = vec!["surface", "x", "y"];
-            keys.extend(formula::keys(word.value));
-            part.only(&keys, &all_keys, &format!("surface = \"{}\"", word.value))?;
-            let (x, y) = (part.required_interval("x")?, part.required_interval("y")?);
-            let shape = formula::read(part, word.value)?;
-            let surface = AnalyticSurface::new(shape, [x, y]).map_err(|e| {
-                part.error(&word.span, e.to_string(), "change the shape's parameters, or `x` and `y`")
-            })?;
-            Ok(PartSource::Formula { surface })
-        }
-    }
-}
-
-/// A mesh file with its kind, unit and that unit in mm.
-pub(super) fn read_mesh_file(
-    section: &Section<'_>,
-    folder: &Path,
-    example: &str,
-) -> Result<(NamedFile, MeshFormat, &'static str, f64), SceneError> {
-    let file = section.required_text("file", example)?;
-    let unit_words = UNITS.map(|(word, _)| word);
-    let unit = section.word("unit", &unit_words)?.map_or("mm", |u| u.value);
-    let scale = UNITS.iter().find(|(word, _)| *word == unit).map_or(1.0, |(_, scale)| *scale);
-    let extension = Path::new(file.value).extension().map(|e| e.to_string_lossy().to_lowercase());
-    let format = match extension.as_deref() {
-        Some("stl") => MeshFormat::Stl,
-        Some("obj") => MeshFormat::Obj,
-        Some("json") => {
-            return Err(section.error(
-                &file.span,
-                "a .json file needs to say what it holds",
-                "add `surface = \"nurbs\"`",
-            ));
-        }
-        _ => {
-            return Err(section.error(
-                &file.span,
-                format!("\"{}\" is no kind of part file that can be read", file.value),
-                "name a file that ends in .stl or .obj",
-            ));
-        }
-    };
-    Ok((NamedFile::beside(folder, file.value, file.span), format, unit, scale))
 }
 
 fn read_stock(stock: &Section<'_>, part: &PartSource, cutter: &Cutter) -> Result<Stock, SceneError> {

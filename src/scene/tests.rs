@@ -127,9 +127,9 @@ fn classical_strategies_are_read_and_written_back() {
 fn files_are_looked_for_beside_the_scene() {
     let text = "[part]\nfile = \"a/wave.STL\"\nunit = \"inch\"\n[cutter]\nshape=\"flat\"\ndiameter=6\n[[toolpath]]\nstrategy=\"zigzag\"";
     let scene = Scene::parse("folder/wave.toml", text).unwrap();
-    let PartSource::Mesh { file, format, scale, .. } = &scene.part else { panic!() };
+    let PartSource::Mesh(MeshFile { file, format, scale, .. }) = &scene.part else { panic!() };
     assert_eq!(file.path, std::path::Path::new("folder").join("a/wave.STL"));
-    assert_eq!((*format, *scale), (MeshFormat::Stl, 25.4));
+    assert_eq!((format.word, *scale), ("STL", 25.4));
     assert_eq!(scene.title, "wave", "the file's name is the title by default");
 }
 

@@ -2,10 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{
-    PartSource, Scene, ToolpathRequest, axis, blade, classic, direction, formula, interference, kinematics,
-    pocket,
-};
+use super::{Scene, ToolpathRequest, axis, classic, direction, interference, kinematics, part, pocket};
 pub(super) use keys::{toml_number as number, toml_string as text};
 use toolpath::{Links, Step, Strategy, StreamMethod, longest_link};
 
@@ -19,7 +16,7 @@ pub fn complete_toml(scene: &Scene) -> String {
 
 fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     writeln!(out, "title = {}\n", text(&scene.title))?;
-    write_part(out, &scene.part)?;
+    part::write(out, &scene.part)?;
     writeln!(out, "\n[stock]")?;
     writeln!(out, "allowance = {}  # mm above the part's highest point", number(scene.stock.allowance))?;
     writeln!(out, "margin = {}  # mm around the part in the plan view", number(scene.stock.margin))?;
@@ -83,34 +80,6 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
         }
         write_joining(out, request, scene)
     })
-}
-
-fn write_part(out: &mut String, part: &PartSource) -> std::fmt::Result {
-    writeln!(out, "[part]")?;
-    match part {
-        PartSource::Mesh { file, unit, .. } => {
-            writeln!(out, "file = {}", text(&file.written))?;
-            writeln!(out, "unit = {}", text(unit))
-        }
-        PartSource::Pocket { outline, depth } => pocket::write_source(out, outline, *depth),
-        PartSource::Blade(request) => blade::write(out, request),
-        PartSource::Nurbs { file } => {
-            writeln!(out, "surface = \"nurbs\"")?;
-            writeln!(out, "file = {}", text(&file.written))
-        }
-        PartSource::Formula { surface } => {
-            let ([x, y], (name, parameters)) = (surface.domain(), formula::describe(surface.shape()));
-            writeln!(out, "surface = {}", text(name))?;
-            for (key, value) in parameters {
-                match value {
-                    formula::Value::Number(value) => writeln!(out, "{key} = {}", number(value))?,
-                    formula::Value::Flag(value) => writeln!(out, "{key} = {value}")?,
-                }
-            }
-            writeln!(out, "x = [{}, {}]  # mm", number(x[0]), number(x[1]))?;
-            writeln!(out, "y = [{}, {}]  # mm", number(y[0]), number(y[1]))
-        }
-    }
 }
 
 fn write_cutter(out: &mut String, scene: &Scene) -> std::fmt::Result {
