@@ -4,7 +4,7 @@
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use millstream::cutter::{Cutter, CutterShape, Solid};
+use millstream::cutter::{Cutter, Solid};
 use millstream::geometry::{Point3, Vector3};
 use millstream::monitor::Silent;
 use millstream::motion::{ClPoint, Move, MoveKind, Toolpath};
@@ -24,7 +24,7 @@ fn main() {
 /// A place of `z = 2 sin(x/8) cos(y/10)`, its normal and the way along x; of the level for a flat end,
 /// where hundreds of moves are equally low.
 fn surface(cutter: &Cutter, x: f64, y: f64) -> (Point3, Vector3, Vector3) {
-    if cutter.shape() == CutterShape::Flat {
+    if cutter.is_flat() {
         return (Point3::new(x, y, 0.0), Vector3::z(), Vector3::x());
     }
     let slope = [0.25 * (x / 8.0).cos() * (y / 10.0).cos(), -0.2 * (x / 8.0).sin() * (y / 10.0).sin()];

@@ -14,6 +14,8 @@ mod cli;
 mod command;
 #[path = "all/compare.rs"]
 mod compare;
+#[path = "all/cutters.rs"]
+mod cutters;
 #[path = "all/defects.rs"]
 mod defects;
 #[path = "all/directions.rs"]

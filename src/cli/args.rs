@@ -64,9 +64,8 @@ pub struct CheckOptions {
 /// What scallop is asked about. Lengths in mm.
 #[derive(Debug, Args)]
 pub struct ScallopOptions {
-    /// The cutter: ball:DIAMETER, flat:DIAMETER, bull:DIAMETER:CORNER_RADIUS or
-    /// taper:TIP_DIAMETER:CORNER_RADIUS:HALF_ANGLE:SHANK_DIAMETER.
-    #[arg(long, value_name = "CUTTER")]
+    /// The cutter, in one of the short forms of its families.
+    #[arg(long, value_name = "CUTTER", help = format!("The cutter: {}", cutter::short_forms()))]
     pub cutter: Cutter,
     /// Distance of passes along the surface: answers the scallop height.
     #[arg(long, value_name = "MM", allow_negative_numbers = true, required_unless_present_any = ["scallop", "table"])]
@@ -80,8 +79,10 @@ pub struct ScallopOptions {
     /// Radius of a concave section across the feed.
     #[arg(long, value_name = "MM", conflicts_with = "part")]
     pub concave: Option<f64>,
-    /// A part (.stl, .obj, or NURBS patches in .json) whose curvature is taken at a place.
-    #[arg(long, value_name = "FILE", requires = "at")]
+    /// A part whose curvature is taken at a place.
+    #[arg(long, value_name = "FILE", requires = "at", help = format!(
+        "A part ({}, or NURBS patches in .json) whose curvature is taken at a place", io::mesh_extensions().join(", ")
+    ))]
     pub part: Option<PathBuf>,
     /// The place on the part: X,Y (seen from above) or X,Y,Z (the nearest point).
     #[arg(long, value_name = "X,Y[,Z]", requires = "part", allow_hyphen_values = true, value_parser = place)]

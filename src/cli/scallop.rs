@@ -8,7 +8,7 @@ use super::args::ScallopOptions;
 use super::error::CliError;
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
-use io::{nurbs_json, obj, stl};
+use io::{MeshFormat, nurbs_json};
 use part::{Part, Patch, SurfacePoint, default_tessellation_tolerance};
 use scallop::{BallSection, ScallopError, SurfaceCurvature, compare, effective_radius};
 
@@ -114,21 +114,15 @@ fn load(file: &Path) -> Result<Part, CliError> {
     let unread = |e: &dyn std::fmt::Display| {
         refuse(format!("it cannot be used: {e}"), "mend that file or name another one")
     };
-    let extension = file.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-    match extension.as_str() {
-        "stl" => stl::read(file).map(|(mesh, _)| Part::from_mesh(mesh)).map_err(|e| unread(&e)),
-        "obj" => obj::read(file).map(|(mesh, _)| Part::from_mesh(mesh)).map_err(|e| unread(&e)),
-        "json" => {
-            let patches: Vec<Patch> =
-                nurbs_json::read(file).map_err(|e| unread(&e))?.into_iter().map(Patch::Nurbs).collect();
-            let tolerance = default_tessellation_tolerance(&patches);
-            Part::from_patches(patches, tolerance).map_err(|e| unread(&e))
-        }
-        other => Err(refuse(
-            format!("\".{other}\" is no part that can be read"),
-            "name an .stl, .obj or NURBS .json file",
-        )),
+    if io::extension(file).as_deref() == Some("json") {
+        let patches: Vec<Patch> =
+            nurbs_json::read(file).map_err(|e| unread(&e))?.into_iter().map(Patch::Nurbs).collect();
+        let tolerance = default_tessellation_tolerance(&patches);
+        return Part::from_patches(patches, tolerance).map_err(|e| unread(&e));
     }
+    let format = MeshFormat::of(file)
+        .map_err(|e| refuse(format!("{e}, .json"), "name a mesh file or NURBS patches in a .json file"))?;
+    format.read(file).map(|(mesh, _)| Part::from_mesh(mesh)).map_err(|e| unread(&e))
 }
 
 /// The surface point that is meant by `x,y` or `x,y,z`.

@@ -1,14 +1,15 @@
-//! The seven words of an APT cutter, `CUTTER/d,r,e,f,α,β,h` (ISO 4343): from words to a profile, and
+//! Any profile of a bottom cone, an arc and a side cone, from the seven words of APT ([`AptWords`]), and
 //! which words make none. mm, rad.
 //!
-//! The bottom runs from the tip at the angle α above the plane of the tip, the side at the angle β
-//! from the axis up to the height h; d is twice the distance from the axis at which the two, carried
-//! on, cross. The corner is a circle of radius r around the point `(e, f)`, distance from the axis and
-//! height above the tip. What lies inside all three is the cutter, so the profile is convex by the
-//! way it is made; words are refused where one of the three would have no part in it.
+//! What lies inside bottom, corner and side is the cutter, so the profile is convex by the way it is
+//! made; words are refused where one of the three would have no part in it.
 
+use keys::{COORDINATE, LENGTH};
+
+use super::apt_words::{AptError, AptWord, AptWords, refused, shown};
+use super::body::{Cutter, CutterError};
+use super::family::{CutterKey, Family, Given};
 use super::profile::{Incline, Profile};
-use super::{Cutter, CutterShape};
 
 /// Circle and line whose distance is off by no more than this, mm, are taken to touch: programs have
 /// four decimals. More turns shallow edges into smooth corners; less refuses cutters that were read
@@ -18,155 +19,53 @@ const TOUCH: f64 = 2.0e-4;
 /// Two ends of the arc may be out of order by this angle, rad, of rounding.
 const SAME_ANGLE: f64 = 1.0e-9;
 
-/// Angles from this on leave so flat or so thin a cone that its other end is kilometres away, degrees.
-const GREATEST_ANGLE: f64 = 80.0;
+/// The seven words. A corner whose place is left away touches bottom and side.
+pub(super) const FAMILY: Family = Family {
+    word: "apt",
+    title: "APT",
+    keys: &[
+        CutterKey::length("diameter", "D", 6.0, |c| c.words().diameter).noted("where bottom and side cross"),
+        CutterKey::number("corner_radius", "R", 0.0..=*LENGTH.end(), |c| c.corner_radius()),
+        CutterKey::number("corner_x", "E", COORDINATE, |c| c.words().corner_x)
+            .noted("centre of the corner from the axis"),
+        CutterKey::number("corner_z", "F", COORDINATE, |c| c.words().corner_z).noted("and above the tip"),
+        // Angles below zero are read, so that the refusal can say what they would mean.
+        CutterKey::angle("tip_angle", "A", -80.0..=79.99, |c| c.words().tip_angle)
+            .noted("of the bottom from level"),
+        CutterKey::angle("side_angle", "B", -80.0..=79.99, |c| c.words().side_angle)
+            .noted("of the side from the axis"),
+        CutterKey::length("length", "H", 20.0, |c| c.words().length),
+    ],
+    example: None,
+    make,
+    blame,
+};
 
-/// Lengths from this on are no cutter's, mm.
-const GREATEST_LENGTH: f64 = 1.0e4;
-
-/// The seven words: mm and rad.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AptWords {
-    /// d: twice the distance from the axis at which bottom and side, carried on, cross.
-    pub diameter: f64,
-    /// r: radius of the corner.
-    pub corner_radius: f64,
-    /// e: distance of the corner's centre from the axis.
-    pub corner_x: f64,
-    /// f: height of the corner's centre above the tip.
-    pub corner_z: f64,
-    /// α: angle of the bottom above the plane of the tip.
-    pub tip_angle: f64,
-    /// β: angle between axis and side.
-    pub side_angle: f64,
-    /// h: height of the cutter above its tip.
-    pub length: f64,
+fn make(given: &Given<'_>) -> Result<Cutter, CutterError> {
+    let words = AptWords {
+        diameter: given.value("diameter"),
+        corner_radius: given.optional("corner_radius").unwrap_or(0.0),
+        corner_x: 0.0,
+        corner_z: 0.0,
+        tip_angle: given.optional("tip_angle").unwrap_or(0.0),
+        side_angle: given.optional("side_angle").unwrap_or(0.0),
+        length: given.value("length"),
+    };
+    let words = words.with_centre(given.optional("corner_x"), given.optional("corner_z"));
+    Ok(Cutter::apt(&words)?)
 }
 
-/// One of the seven words.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AptWord {
-    /// d.
-    Diameter,
-    /// r.
-    CornerRadius,
-    /// e.
-    CornerX,
-    /// f.
-    CornerZ,
-    /// α.
-    TipAngle,
-    /// β.
-    SideAngle,
-    /// h.
-    Length,
-}
-
-/// Why seven words make no cutter.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{reason}")]
-pub struct AptError {
-    /// The word to change.
-    pub word: AptWord,
-    /// What is wrong.
-    pub reason: String,
-    /// What would cure it.
-    pub cure: String,
-}
-
-fn refused<T>(word: AptWord, reason: impl Into<String>, cure: impl Into<String>) -> Result<T, AptError> {
-    Err(AptError { word, reason: reason.into(), cure: cure.into() })
-}
-
-/// A length or an angle in a message: four decimals, as programs have.
-fn shown(value: f64) -> f64 {
-    (value * 1e4).round() / 1e4
-}
-
-impl AptWords {
-    /// The centre `(e, f)` of the corner that touches bottom and side, whatever centre is given.
-    pub fn tangent_centre(&self) -> [f64; 2] {
-        let (sin, cos) = self.tip_angle.sin_cos();
-        let (sin_side, cos_side) = self.side_angle.sin_cos();
-        let r = self.corner_radius;
-        let e = if self.tip_angle == 0.0 && self.side_angle == 0.0 {
-            0.5 * self.diameter - r
-        } else {
-            (self.foot() * cos_side + r * sin_side / cos - r) / (cos_side - sin_side * sin / cos)
-        };
-        [e, (r + e * sin) / cos]
-    }
-
-    /// With a corner around the given centre; a coordinate that is left away is the one at which the
-    /// circle touches the side (e) or the bottom (f).
-    pub fn with_centre(mut self, e: Option<f64>, f: Option<f64>) -> Self {
-        let (tip, side, r) = (self.tip_angle, self.side_angle, self.corner_radius);
-        [self.corner_x, self.corner_z] = match (e, f) {
-            (None, None) => self.tangent_centre(),
-            (Some(e), None) => [e, (r + e * tip.sin()) / tip.cos()],
-            (None, Some(f)) => [self.foot() + (f * side.sin() - r) / side.cos(), f],
-            (Some(e), Some(f)) => [e, f],
-        };
-        self
-    }
-
-    /// Distance from the axis at which the side, carried on, meets the plane of the tip.
-    fn foot(&self) -> f64 {
-        0.5 * self.diameter * (1.0 - self.tip_angle.tan() * self.side_angle.tan())
-    }
-
-    fn check_ranges(&self) -> Result<(), AptError> {
-        use AptWord::{CornerRadius, CornerX, CornerZ, Diameter, Length, SideAngle, TipAngle};
-        let lengths = [
-            (Diameter, "diameter", self.diameter, f64::MIN_POSITIVE),
-            (CornerRadius, "corner radius", self.corner_radius, 0.0),
-            (CornerX, "place of the corner's centre along x", self.corner_x, -GREATEST_LENGTH),
-            (CornerZ, "place of the corner's centre along z", self.corner_z, -GREATEST_LENGTH),
-            (Length, "length", self.length, 0.0),
-        ];
-        for (word, what, value, least) in lengths {
-            if !(value >= least && value < GREATEST_LENGTH) {
-                return refused(
-                    word,
-                    format!("the {what} is {value} mm"),
-                    "write a length that a cutter can have",
-                );
-            }
-        }
-        let angles = [
-            (
-                TipAngle,
-                "tip",
-                self.tip_angle,
-                "falls toward the axis: a hollow end, which leaves a cone in the middle",
-            ),
-            (
-                SideAngle,
-                "side",
-                self.side_angle,
-                "leans inward: an undercut, which a vertical axis cannot use",
-            ),
-        ];
-        for (word, what, angle, below) in angles {
-            let degrees = shown(angle.to_degrees());
-            if angle < 0.0 {
-                let reason = format!("with a {what} angle of {degrees} degrees the profile {below}");
-                return refused(word, reason, "write an angle of 0 or more");
-            }
-            if angle.is_nan() || angle.to_degrees() >= GREATEST_ANGLE {
-                let reason = format!("the {what} angle is {degrees} degrees");
-                return refused(word, reason, format!("write an angle below {GREATEST_ANGLE} degrees"));
-            }
-        }
-        let sum = (self.tip_angle + self.side_angle).to_degrees();
-        if sum > 90.0 - 1e-6 {
-            let reason = format!(
-                "tip angle and side angle make {} degrees: the bottom is steeper than the side",
-                shown(sum)
-            );
-            return refused(TipAngle, reason, "write angles that make less than 90 degrees together");
-        }
-        Ok(())
+/// The key that stands for the word to change.
+fn blame(error: &CutterError) -> &'static str {
+    let CutterError::Apt(refusal) = error else { return "shape" };
+    match refusal.word {
+        AptWord::Diameter => "diameter",
+        AptWord::CornerRadius => "corner_radius",
+        AptWord::CornerX => "corner_x",
+        AptWord::CornerZ => "corner_z",
+        AptWord::TipAngle => "tip_angle",
+        AptWord::SideAngle => "side_angle",
+        AptWord::Length => "length",
     }
 }
 
@@ -246,7 +145,7 @@ impl Cutter {
             profile.arc_end = radius;
         }
         profile.radius = radius.max(profile.arc_end);
-        Ok(Self::new(CutterShape::Apt, words, profile))
+        Ok(Self::new(FAMILY.word, words, profile))
     }
 }
 
@@ -254,45 +153,6 @@ impl Cutter {
 fn touching(word: AptWord, [e, f]: [f64; 2]) -> String {
     let value = if word == AptWord::CornerX { e } else { f };
     format!("leave it away, or write {}, for a corner that touches bottom and side", shown(value))
-}
-
-impl AptWords {
-    #[doc(hidden)]
-    /// Profiles of up to 3 mm of radius with every piece, with edges and without; angles in degrees.
-    pub fn examples() -> Vec<Self> {
-        let words = |d: f64, r: f64, centre: Option<[f64; 2]>, alpha: f64, beta: f64, length: f64| {
-            let mut words = Self {
-                diameter: d,
-                corner_radius: r,
-                corner_x: 0.0,
-                corner_z: 0.0,
-                tip_angle: alpha.to_radians(),
-                side_angle: beta.to_radians(),
-                length,
-            };
-            [words.corner_x, words.corner_z] = centre.unwrap_or_else(|| words.tangent_centre());
-            words
-        };
-        let barrel = 20f64;
-        vec![
-            // A bull nose with a cone below and a cone above, all tangent.
-            words(4.0, 0.8, None, 12.0, 20.0, 3.4),
-            // A drill point, an engraver's point and a chamfer mill.
-            words(6.0, 0.0, None, 31.0, 0.0, 5.0),
-            words(0.2, 0.0, None, 0.0, 20.0, 7.0),
-            words(3.0, 0.0, None, 10.0, 35.0, 2.0),
-            // A rounded point.
-            words(1.5, 0.5, None, 15.0, 40.0, 2.4),
-            // A barrel: a flat tip, an edge, an arc of 20 mm that ends upright.
-            words(6.0, barrel, Some([3.0 - barrel, 6.0]), 0.0, 0.0, 8.0),
-            // A barrel that ends in an edge against a leaning side, over a conical bottom.
-            words(4.0, 6.0, Some([-2.7, 5.0]), 5.0, 15.0, 5.0),
-            // A lens: an arc of 5 mm through the tip that ends in an edge at 3 mm.
-            words(6.0, 5.0, Some([0.0, 5.0]), 0.0, 0.0, 4.0),
-            // A bull nose whose circle dips below the bottom and beyond the side: two edges.
-            words(6.0, 1.2, Some([2.0, 1.0]), 0.0, 0.0, 4.0),
-        ]
-    }
 }
 
 #[cfg(test)]

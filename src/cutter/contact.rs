@@ -1,7 +1,7 @@
 //! How a cutter with a vertical axis touches a surface: where its axis stands, and how it is curved
 //! there. mm, outward unit normals.
 
-use super::Cutter;
+use super::body::Cutter;
 use geometry::{Vector2, Vector3};
 
 /// Slope (sine) below which ground counts as nearly level for a cutter with a flat. Less lets the path

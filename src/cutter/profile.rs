@@ -149,9 +149,13 @@ impl Profile {
         grown
     }
 
-    /// True when the arc runs from the axis to a vertical side.
+    /// True for a hemisphere under a cylinder: the arc runs from the axis to the largest radius.
     pub fn is_ball(&self) -> bool {
-        self.centre_x == 0.0 && self.bottom_end == 0.0 && self.radius == self.corner && !self.bottom_edge
+        self.centre_x == 0.0
+            && self.bottom_end == 0.0
+            && self.radius == self.corner
+            && self.arc_end == self.radius
+            && !self.bottom_edge
     }
 
     /// True without arc and cones.
@@ -209,6 +213,12 @@ impl Profile {
     /// which may be missing): no point, no barrel, and no edge but where there is no arc at all.
     pub fn is_plain(&self) -> bool {
         self.bottom.sin == 0.0 && self.centre_x >= 0.0 && !self.bottom_edge && !self.side_edge
+    }
+
+    /// True for a level bottom under a cylinder, with an arc between them that touches both or without one:
+    /// a ball, a flat end, a bull nose.
+    pub fn is_end_mill(&self) -> bool {
+        self.is_plain() && self.arc_end == self.radius
     }
 
     /// How far from the axis the profile touches a plane that rises by the angle of that sine: the

@@ -9,7 +9,9 @@
 //! asked of its outline: lines and an arc from the tip outward, up, and back to the axis. The side of a
 //! place is that of the mean normal at its nearest point, also where that is a corner.
 
-use super::{Cutter, Holder, Profile};
+use super::body::Cutter;
+use super::holder::{Holder, HolderSection};
+use super::profile::Profile;
 use geometry::{Point3, Vector3};
 
 /// A cutter without a holder is this many diameters long above its cutting profile. More makes tools
@@ -389,7 +391,7 @@ impl Solid {
 /// Begin and end of the side of each section.
 fn slants(holder: &Holder) -> Vec<[Pair; 2]> {
     let mut at = holder.cutting_length();
-    let slant = |s: &super::HolderSection| {
+    let slant = |s: &HolderSection| {
         let low = [0.5 * s.diameter, at];
         at += s.length;
         [low, [0.5 * s.top_diameter, at]]

@@ -1,25 +1,13 @@
 //! A cutter in one word, as the command line takes it: `ball:6`, `flat:6`, `bull:10:2`, `taper:2:1:5:6`.
 
-use super::{Cutter, CutterError};
-
-/// The words, and what stands behind each of them.
-const WORDS: [(&str, &str); 4] = [
-    ("ball", "ball:DIAMETER, such as ball:6"),
-    ("flat", "flat:DIAMETER, such as flat:6"),
-    ("bull", "bull:DIAMETER:CORNER_RADIUS, such as bull:10:2"),
-    (
-        "taper",
-        "taper:TIP_DIAMETER:CORNER_RADIUS:HALF_ANGLE:SHANK_DIAMETER, mm and degrees, such as taper:2:1:5:6",
-    ),
-];
+use super::body::{Cutter, CutterError};
+use super::families::{FAMILIES, short_forms};
 
 /// Why a word names no cutter.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CutterWordError {
     /// The shape is none.
-    #[error(
-        "\"{0}\" is no shape of a cutter; write ball:DIAMETER, flat:DIAMETER, bull:DIAMETER:CORNER_RADIUS or taper:…"
-    )]
+    #[error("\"{0}\" is no shape of a cutter; write {forms}", forms = short_forms())]
     Shape(String),
     /// Too few or too many numbers.
     #[error("{word} takes {wanted} numbers and {given} were given; write {usage}")]
@@ -31,7 +19,7 @@ pub enum CutterWordError {
         /// Numbers that stand there.
         given: usize,
         /// How it is written.
-        usage: &'static str,
+        usage: String,
     },
     /// Something between colons is no number.
     #[error("\"{text}\" is not a number; write {usage}")]
@@ -39,7 +27,7 @@ pub enum CutterWordError {
         /// What stands there.
         text: String,
         /// How the cutter is written.
-        usage: &'static str,
+        usage: String,
     },
     /// The numbers make no cutter.
     #[error(transparent)]
@@ -49,27 +37,26 @@ pub enum CutterWordError {
 impl std::str::FromStr for Cutter {
     type Err = CutterWordError;
 
-    /// A cutter from its word: `ball:DIAMETER`, `flat:DIAMETER`, `bull:DIAMETER:CORNER_RADIUS` or
-    /// `taper:TIP_DIAMETER:CORNER_RADIUS:HALF_ANGLE:SHANK_DIAMETER`; mm, and degrees for the half angle.
+    /// A cutter from the short form of its family ([`short_forms`]): a word and a number for each key, mm
+    /// and degrees.
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let mut parts = text.trim().split(':');
         let shape = parts.next().unwrap_or_default();
-        let known = WORDS.into_iter().find(|(word, _)| *word == shape);
-        let (word, usage) = known.ok_or_else(|| CutterWordError::Shape(shape.to_owned()))?;
+        let known = FAMILIES.iter().filter_map(|family| Some((family, family.usage()?)));
+        let (family, usage) = known
+            .into_iter()
+            .find(|(family, _)| family.word == shape)
+            .ok_or_else(|| CutterWordError::Shape(shape.to_owned()))?;
         let number = |text: &str| {
-            text.trim().parse::<f64>().map_err(|_| CutterWordError::Number { text: text.to_owned(), usage })
+            let refused = |_| CutterWordError::Number { text: text.to_owned(), usage: usage.clone() };
+            text.trim().parse::<f64>().map(Some).map_err(refused)
         };
-        let numbers: Vec<f64> = parts.map(number).collect::<Result<_, _>>()?;
-        let count = |wanted| CutterWordError::Count { word, wanted, given: numbers.len(), usage };
-        Ok(match (word, &numbers[..]) {
-            ("ball", [diameter]) => Self::ball(*diameter)?,
-            ("flat", [diameter]) => Self::flat(*diameter)?,
-            ("bull", [diameter, corner]) => Self::bull(*diameter, *corner)?,
-            ("taper", [tip, corner, angle, shank]) => Self::taper(*tip, *corner, angle.to_radians(), *shank)?,
-            ("taper", _) => return Err(count(4)),
-            ("bull", _) => return Err(count(2)),
-            _ => return Err(count(1)),
-        })
+        let values: Vec<Option<f64>> = parts.map(number).collect::<Result<_, _>>()?;
+        let (wanted, given) = (family.keys.len(), values.len());
+        if given != wanted {
+            return Err(CutterWordError::Count { word: family.word, wanted, given, usage });
+        }
+        Ok(family.cutter(&values)?)
     }
 }
 

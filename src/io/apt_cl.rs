@@ -1,7 +1,7 @@
 //! Writes a toolpath as cutter locations in APT text (ISO 3592, ISO 4343). mm, mm/min, degrees.
 
 use super::program_text::{ProgramHeader, describe, number, number_to};
-use cutter::{Cutter, CutterShape};
+use cutter::Cutter;
 use motion::{ClPoint, MoveKind, Toolpath};
 use std::io::{self, Write};
 
@@ -63,16 +63,13 @@ fn location(at: &ClPoint, upright: bool) -> String {
 /// circle, α the angle of the bottom, β that between side and axis, h the height of the cutter.
 fn cutter_words(cutter: &Cutter) -> String {
     let w = cutter.words();
-    match cutter.shape() {
-        CutterShape::Ball | CutterShape::Flat | CutterShape::Bull => {
-            format!("{},{}", number(w.diameter), number(w.corner_radius))
-        }
-        CutterShape::Taper | CutterShape::Apt => {
-            let (tip, side) = (w.tip_angle.to_degrees(), w.side_angle.to_degrees());
-            let words = [w.diameter, w.corner_radius, w.corner_x, w.corner_z, tip, side, w.length];
-            words.map(number).join(",")
-        }
+    // A length that was stated has its place only among all seven.
+    if cutter.is_end_mill() && cutter.stated_length().is_none() {
+        return format!("{},{}", number(w.diameter), number(w.corner_radius));
     }
+    let (tip, side) = (w.tip_angle.to_degrees(), w.side_angle.to_degrees());
+    let words = [w.diameter, w.corner_radius, w.corner_x, w.corner_z, tip, side, w.length];
+    words.map(number).join(",")
 }
 
 #[cfg(test)]

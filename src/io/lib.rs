@@ -6,6 +6,7 @@ pub mod direction_table;
 pub mod exr;
 pub mod gcode;
 mod mesh_file;
+mod mesh_formats;
 pub mod nurbs_json;
 pub mod obj;
 pub mod outline;
@@ -16,5 +17,6 @@ pub mod section_table;
 pub mod stl;
 pub mod stl_write;
 
-pub use mesh_file::{MAX_BYTES as MAX_MESH_FILE_BYTES, MeshFileError, MeshReadError, Place};
+pub use mesh_file::{FilePlace, MAX_BYTES as MAX_MESH_FILE_BYTES, MeshFileError, MeshFormat, MeshReadError};
+pub use mesh_formats::{MESH_FORMATS, UnknownMeshFormat, extension, mesh_extensions};
 pub use program_text::ProgramHeader;

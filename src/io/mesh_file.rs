@@ -14,14 +14,14 @@ const LONGEST_QUOTE: usize = 40;
 
 /// Where in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
+pub enum FilePlace {
     /// Byte offset, from 0.
     Byte(usize),
     /// Line, from 1.
     Line(usize),
 }
 
-impl std::fmt::Display for Place {
+impl std::fmt::Display for FilePlace {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Byte(offset) => write!(f, "byte {offset}"),
@@ -63,7 +63,7 @@ pub enum MeshFileError {
     #[error("{place}: {expected} is missing; the file was cut off or damaged: export or copy it again")]
     Missing {
         /// Where.
-        place: Place,
+        place: FilePlace,
         /// What is missing.
         expected: &'static str,
     },
@@ -71,7 +71,7 @@ pub enum MeshFileError {
     #[error("{place}: {expected} should stand here, not \"{found}\"; {cure}")]
     Unexpected {
         /// Where.
-        place: Place,
+        place: FilePlace,
         /// What would be right.
         expected: &'static str,
         /// What was found, shortened.
@@ -86,7 +86,7 @@ pub enum MeshFileError {
     )]
     Coordinate {
         /// Where.
-        place: Place,
+        place: FilePlace,
         /// The value.
         value: f64,
     },
@@ -94,7 +94,7 @@ pub enum MeshFileError {
     #[error("{place}: the face refers to vertex {index}, but {vertices} vertices stand above it")]
     NoSuchVertex {
         /// Where.
-        place: Place,
+        place: FilePlace,
         /// The index as written.
         index: i64,
         /// Vertices given so far.
@@ -106,7 +106,7 @@ pub enum MeshFileError {
     )]
     TooManyCorners {
         /// Where.
-        place: Place,
+        place: FilePlace,
         /// How many.
         corners: usize,
         /// How many are allowed.
@@ -144,6 +144,37 @@ pub enum MeshReadError {
     },
 }
 
+/// A format of mesh files.
+pub struct MeshFormat {
+    /// What it is called.
+    pub word: &'static str,
+    /// The extensions of its files, lower case.
+    pub extensions: &'static [&'static str],
+    pub(super) parse: fn(&[u8]) -> Parsed,
+}
+
+impl MeshFormat {
+    /// Reads a file of this format, whatever its extension.
+    ///
+    /// # Errors
+    /// [`MeshReadError`] when it cannot be read or holds no mesh.
+    pub fn read(&self, path: &Path) -> Result<(TriangleMesh, RepairNotes), MeshReadError> {
+        read(path, self.parse)
+    }
+}
+
+impl PartialEq for MeshFormat {
+    fn eq(&self, other: &Self) -> bool {
+        self.word == other.word
+    }
+}
+
+impl std::fmt::Debug for MeshFormat {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.word)
+    }
+}
+
 /// A mesh with what was changed to make it one, or why it is none.
 pub(super) type Parsed = Result<(TriangleMesh, RepairNotes), MeshFileError>;
 
@@ -163,12 +194,12 @@ pub(super) fn read(
 }
 
 /// A coordinate, if it is one.
-pub(super) fn coordinate(value: f64, place: Place) -> Result<f64, MeshFileError> {
+pub(super) fn coordinate(value: f64, place: FilePlace) -> Result<f64, MeshFileError> {
     if value.abs() <= MAX_COORDINATE { Ok(value) } else { Err(MeshFileError::Coordinate { place, value }) }
 }
 
 /// A number written in a text file.
-pub(super) fn number(word: &[u8], place: Place) -> Result<f64, MeshFileError> {
+pub(super) fn number(word: &[u8], place: FilePlace) -> Result<f64, MeshFileError> {
     let parsed = std::str::from_utf8(word).ok().and_then(|w| w.parse().ok());
     let value = parsed.ok_or_else(|| {
         let cure = if word.contains(&b',') {
@@ -186,7 +217,7 @@ pub(super) fn unexpected(
     word: &[u8],
     expected: &'static str,
     cure: &'static str,
-    place: Place,
+    place: FilePlace,
 ) -> MeshFileError {
     let text = String::from_utf8_lossy(&word[..word.len().min(4 * LONGEST_QUOTE)]);
     let printable = |c: char| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c };

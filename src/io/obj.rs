@@ -11,9 +11,12 @@ mod tests;
 
 use std::path::Path;
 
-use super::mesh_file::{MeshFileError, MeshReadError, Place, number, unexpected};
+use super::mesh_file::{FilePlace, MeshFileError, MeshFormat, MeshReadError, number, unexpected};
 use crate::mesh_file;
 use geometry::{Point3, RepairNotes, TriangleMesh};
+
+/// Wavefront OBJ.
+pub(super) const FORMAT: MeshFormat = MeshFormat { word: "OBJ", extensions: &["obj"], parse };
 
 /// Most corners of a face. Cutting a face takes time with their square, at worst with their cube.
 const MAX_CORNERS: usize = 2_000;
@@ -53,7 +56,7 @@ pub fn parse(bytes: &[u8]) -> Result<(TriangleMesh, RepairNotes), MeshFileError>
                 None => break,
             }
         }
-        file.statement(&statement, Place::Line(k + 1))?;
+        file.statement(&statement, FilePlace::Line(k + 1))?;
     }
     Ok(TriangleMesh::new(file.vertices, file.triangles)?)
 }
@@ -68,7 +71,7 @@ struct File {
 }
 
 impl File {
-    fn statement(&mut self, line: &[u8], place: Place) -> Result<(), MeshFileError> {
+    fn statement(&mut self, line: &[u8], place: FilePlace) -> Result<(), MeshFileError> {
         let line = line.split(|&b| b == b'#').next().unwrap_or_default();
         let mut words = line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
         match words.next() {
@@ -85,7 +88,7 @@ impl File {
     fn vertex<'a>(
         &mut self,
         mut words: impl Iterator<Item = &'a [u8]>,
-        place: Place,
+        place: FilePlace,
     ) -> Result<(), MeshFileError> {
         let mut point = [0.0; 3];
         for x in &mut point {
@@ -97,7 +100,11 @@ impl File {
     }
 
     /// Corners as `v`, `v/vt`, `v//vn` or `v/vt/vn`; only the vertex counts.
-    fn face<'a>(&mut self, words: impl Iterator<Item = &'a [u8]>, place: Place) -> Result<(), MeshFileError> {
+    fn face<'a>(
+        &mut self,
+        words: impl Iterator<Item = &'a [u8]>,
+        place: FilePlace,
+    ) -> Result<(), MeshFileError> {
         self.corners.clear();
         for word in words {
             let corner = self.corner(word, place)?;
@@ -115,7 +122,7 @@ impl File {
     }
 
     /// The vertex of one corner: counted from 1, or back from the last one when negative.
-    fn corner(&self, word: &[u8], place: Place) -> Result<u32, MeshFileError> {
+    fn corner(&self, word: &[u8], place: FilePlace) -> Result<u32, MeshFileError> {
         let digits = word.split(|&b| b == b'/').next().unwrap_or_default();
         let index: i64 = std::str::from_utf8(digits)
             .ok()

@@ -1,6 +1,6 @@
 //! What the two program writers share: the header's data and the way numbers and names are written.
 
-use cutter::{Cutter, CutterShape};
+use cutter::{Cutter, CutterKey};
 
 /// Decimals of every coordinate: rounding moves a point by at most 0.05 µm along each axis.
 const DECIMALS: usize = 4;
@@ -51,25 +51,12 @@ fn shortened(mut text: String) -> String {
     text
 }
 
-/// The cutter in words.
+/// The cutter in the words of the family that it was made as.
 pub(super) fn describe(cutter: &Cutter) -> String {
-    let (diameter, corner) = (number(2.0 * cutter.radius()), number(cutter.corner_radius()));
-    match cutter.shape() {
-        CutterShape::Ball => format!("BALL END D={diameter}"),
-        CutterShape::Flat => format!("FLAT END D={diameter}"),
-        CutterShape::Bull => format!("BULL NOSE D={diameter} R={corner}"),
-        CutterShape::Taper => {
-            let angle = number(cutter.half_angle().to_degrees());
-            let tip = number(2.0 * (cutter.flat_radius() + cutter.corner_radius()));
-            format!("TAPER TIP D={tip} R={corner} HALF ANGLE={angle} SHANK D={diameter}")
-        }
-        CutterShape::Apt => {
-            let w = cutter.words();
-            let [d, e, f, length] = [w.diameter, w.corner_x, w.corner_z, w.length].map(number);
-            let [tip, side] = [w.tip_angle, w.side_angle].map(|angle| number(angle.to_degrees()));
-            format!("APT D={d} R={corner} E={e} F={f} A={tip} B={side} H={length}")
-        }
-    }
+    let family = cutter.family();
+    let dimension = |key: &CutterKey| format!("{}={}", key.label, number(key.of(cutter)));
+    let dimensions: Vec<String> = family.keys.iter().map(dimension).collect();
+    format!("{} {}", family.title, dimensions.join(" "))
 }
 
 #[cfg(test)]

@@ -13,9 +13,14 @@ mod tests;
 
 use std::path::Path;
 
-use super::mesh_file::{MeshFileError, MeshReadError, Parsed, Place, coordinate, number, unexpected};
+use super::mesh_file::{
+    FilePlace, MeshFileError, MeshFormat, MeshReadError, Parsed, coordinate, number, unexpected,
+};
 use crate::mesh_file;
 use geometry::{Point3, RepairNotes, TriangleMesh};
+
+/// STL, binary or text.
+pub(super) const FORMAT: MeshFormat = MeshFormat { word: "STL", extensions: &["stl"], parse };
 
 /// Bytes before the first triangle.
 const HEADER: usize = 84;
@@ -75,7 +80,7 @@ fn binary(bytes: &[u8], declared: u32) -> Result<Vec<Point3>, MeshFileError> {
         let mut numbers = [0.0; 9];
         for (k, field) in record[NORMAL..NORMAL + 36].chunks_exact(4).enumerate() {
             let value = f32::from_le_bytes([field[0], field[1], field[2], field[3]]);
-            let place = Place::Byte(HEADER + t * RECORD + NORMAL + 4 * k);
+            let place = FilePlace::Byte(HEADER + t * RECORD + NORMAL + 4 * k);
             numbers[k] = coordinate(f64::from(value), place)?;
         }
         corners.extend(numbers.chunks_exact(3).map(Point3::from_slice));
@@ -122,8 +127,8 @@ impl<'a> Words<'a> {
         self.rest = &self.rest[end..];
     }
 
-    fn place(&self) -> Place {
-        Place::Line(self.line)
+    fn place(&self) -> FilePlace {
+        FilePlace::Line(self.line)
     }
 
     fn required(&mut self, expected: &'static str) -> Result<&'a [u8], MeshFileError> {

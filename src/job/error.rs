@@ -3,9 +3,8 @@
 use miette::Diagnostic;
 
 use metrology::EngineError;
-use part::PartError;
 use report::ReportError;
-use scene::{Scene, SceneError};
+use scene::{LoadError, Scene, SceneError};
 use sim::{GridError, OppositeAxes, VoxelError};
 use toolpath::PlanError;
 use work::monitor::Cancelled;
@@ -17,15 +16,10 @@ pub enum JobError {
     #[error(transparent)]
     #[diagnostic(transparent)]
     Scene(#[from] SceneError),
-    /// The part's surface cannot be searched.
-    #[error("{scene}: the part cannot be used: {reason}")]
-    #[diagnostic(help("change [part] in the scene"))]
-    Part {
-        /// The scene, as its messages call it.
-        scene: String,
-        /// What is wrong with the surface.
-        reason: PartError,
-    },
+    /// The part of the scene cannot be used.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Part(#[from] LoadError),
     /// No grid could be laid out.
     #[error("{scene}: the stock cannot be simulated: {reason}")]
     #[diagnostic(help("choose another `cell` or `memory_mib` in [simulation], or `--cell`"))]
@@ -134,11 +128,6 @@ pub enum JobError {
 }
 
 impl JobError {
-    /// For parts that a scene's formula does not make: `map_err(JobError::part(scene))`.
-    pub(crate) fn part(scene: &Scene) -> impl Fn(PartError) -> Self + use<'_> {
-        |reason| Self::Part { scene: scene.source.name.clone(), reason }
-    }
-
     /// For grids that do not fit: `map_err(JobError::grid(scene))`.
     pub(crate) fn grid(scene: &Scene) -> impl Fn(GridError) -> Self + use<'_> {
         |reason| Self::Grid { scene: scene.source.name.clone(), reason }

@@ -6,7 +6,6 @@
 mod error;
 mod figures;
 mod judge;
-mod load;
 mod machined;
 mod outcome;
 mod planned;
@@ -17,7 +16,6 @@ mod tool;
 
 pub use error::JobError;
 pub use judge::marks;
-pub use load::{Loaded, load_part};
 pub use machined::Machined;
 pub use outcome::Outcome;
 pub use session::{Session, stock_area};

@@ -10,15 +10,13 @@ use metrology::{Budget, Engine, LaidOut, Task, path_figures};
 use motion::Toolpath;
 use part::Part;
 use report::{RunReport, SimulationFigures, ToolpathResult};
-use scene::{Fixture, PartSource, Scene, ToolpathRequest};
+use scene::{Fixture, Loaded, PartSource, Scene, ToolpathRequest, load_mesh, load_part, load_pocket};
 use sim::VoxelStock;
 use toolpath::Pocket;
 use work::monitor::{self, Monitor};
 
-use super::load::{Loaded, load_mesh, load_part};
 use super::machined::BASE;
 use super::planned::{self, Planned};
-use super::pocket::load_pocket;
 use super::run::Run;
 use super::tool::{FixtureMesh, Tool};
 use super::{JobError, Machined, Outcome, figures, judge};

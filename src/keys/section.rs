@@ -11,7 +11,9 @@ use geometry::Point2;
 /// A value and where it stands in the text.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Located<T> {
+    /// The value.
     pub value: T,
+    /// Bytes of the text.
     pub span: Range<usize>,
 }
 

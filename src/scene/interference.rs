@@ -3,11 +3,9 @@
 use std::fmt::{self, Write as _};
 use std::path::Path;
 
-use super::read::read_mesh_file;
-use super::write::{number, text};
-use super::{MeshFormat, NamedFile};
-use keys::SceneError;
-use keys::{LENGTH, Section};
+use super::part::MeshFile;
+use keys::toml_number as number;
+use keys::{LENGTH, SceneError, Section};
 
 /// Default distance of shank and holder from part and fixtures, mm.
 const DEFAULT_CLEARANCE: f64 = 0.5;
@@ -16,17 +14,7 @@ const DEFAULT_CLEARANCE: f64 = 0.5;
 const DEFAULT_TILT: f64 = 45.0;
 
 /// A mesh that is not to be touched: a neighbouring part, a vise.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Fixture {
-    /// The file.
-    pub file: NamedFile,
-    /// Its kind, from its extension.
-    pub format: MeshFormat,
-    /// Name of the unit of its coordinates.
-    pub unit: &'static str,
-    /// That unit in mm.
-    pub scale: f64,
-}
+pub type Fixture = MeshFile;
 
 /// How tilted tools are kept clear.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,8 +39,7 @@ pub(super) fn read(root: &Section<'_>, folder: &Path) -> Result<KeepClear, Scene
     let length = 0.0..=*LENGTH.end();
     let fixture = |section: &Section<'_>| {
         section.only(&["file", "unit"], &[], "a fixture")?;
-        let (file, format, unit, scale) = read_mesh_file(section, folder, "vise.stl")?;
-        Ok(Fixture { file, format, unit, scale })
+        MeshFile::of_table(section, folder, "vise.stl")
     };
     Ok(KeepClear {
         clearance: number("clearance", length.clone(), " mm", DEFAULT_CLEARANCE)?,
@@ -74,7 +61,6 @@ pub(super) fn write(out: &mut String, keep: &KeepClear) -> fmt::Result {
     writeln!(out, "lift = {}  # mm by which contacts may be lifted", number(keep.greatest_lift))?;
     keep.fixtures.iter().try_for_each(|fixture| {
         writeln!(out, "\n[[fixture]]")?;
-        writeln!(out, "file = {}", text(&fixture.file.written))?;
-        writeln!(out, "unit = {}", text(fixture.unit))
+        fixture.write_keys(out)
     })
 }

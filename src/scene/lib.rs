@@ -5,31 +5,32 @@
 //! every refusal can point at the very key or value: tagged enums of serde only know the table.
 
 mod axis;
-mod blade;
 mod classic;
 mod direction;
-mod formula;
 mod interference;
 mod kinematics;
+mod load;
+mod named_file;
+mod part;
 mod pocket;
 mod read;
 #[cfg(test)]
 mod tests;
 mod write;
 
-use std::ops::Range;
-use std::path::{Path, PathBuf};
-
 pub use axis::AxisRequest;
-pub use blade::BladeRequest;
 pub use interference::{Fixture, KeepClear};
 pub use keys::{Finding, SceneError, SceneText};
 pub use kinematics::FiveAxis;
-pub use pocket::OutlineSource;
+pub use load::{load_mesh, load_part, load_pocket};
+pub use named_file::NamedFile;
+pub use part::{
+    BladeRequest, FLATTEN_SHARE, FormulaSource, LoadError, Loaded, MeshFile, NurbsSource, OutlineSource,
+    PartSource, PocketSource,
+};
 pub use write::complete_toml;
 
 use cutter::{Cutter, Holder};
-use geometry::AnalyticSurface;
 use machine::Machine;
 use metrology::Limits;
 pub use metrology::{EngineChoice, Simulation};
@@ -72,69 +73,6 @@ pub const DEFAULT_CONTROL_POINTS: usize = 24;
 
 /// Default degree of a streamline's stream function: smooth to the curvature of passes.
 pub const DEFAULT_DEGREE: usize = 3;
-
-/// A file that the scene names, and where in the scene it does.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct NamedFile {
-    /// As the scene has it.
-    pub written: String,
-    /// From the scene's folder.
-    pub path: PathBuf,
-    /// Bytes of the scene's text.
-    pub span: Range<usize>,
-}
-
-impl NamedFile {
-    /// The file that a scene in `folder` names.
-    fn beside(folder: &Path, written: &str, span: Range<usize>) -> Self {
-        // Joining an absolute path gives that path.
-        Self { written: written.to_owned(), path: folder.join(written), span }
-    }
-}
-
-/// Kind of a mesh file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum MeshFormat {
-    /// STL, binary or text.
-    Stl,
-    /// Wavefront OBJ.
-    Obj,
-}
-
-/// Where the part comes from.
-#[derive(Debug, Clone, PartialEq)]
-pub enum PartSource {
-    /// A triangle mesh.
-    Mesh {
-        /// The file.
-        file: NamedFile,
-        /// Its kind, from its extension.
-        format: MeshFormat,
-        /// Name of the unit of its coordinates.
-        unit: &'static str,
-        /// That unit in mm.
-        scale: f64,
-    },
-    /// A NURBS patch in a JSON file.
-    Nurbs {
-        /// The file.
-        file: NamedFile,
-    },
-    /// A blade from its sections.
-    Blade(BladeRequest),
-    /// A surface by formula over a rectangle.
-    Formula {
-        /// The formula with its parameters and its rectangle.
-        surface: AnalyticSurface,
-    },
-    /// A pocket: a plane region with islands, cut down to a level floor.
-    Pocket {
-        /// Its outlines.
-        outline: OutlineSource,
-        /// How far its floor lies below z = 0, mm.
-        depth: f64,
-    },
-}
 
 /// Stock around the part.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,19 +3,16 @@
 use std::io::Read as _;
 use std::path::Path;
 
-use toml::de::DeTable;
-
 use super::{
     CuttingData, DEFAULT_ALLOWANCE, DEFAULT_CLEARANCE, DEFAULT_CONTROL_POINTS, DEFAULT_DEGREE,
     DEFAULT_FEED_RATE, DEFAULT_LIMITS, DEFAULT_MARGIN, DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE,
-    DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, EngineChoice, MeshFormat, NamedFile, OutlineSource, PartSource,
-    Scene, Simulation, Stock, ToolpathRequest, auto_cell, default_error_bound,
+    DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, EngineChoice, NamedFile, PartSource, Scene, Simulation, Stock,
+    ToolpathRequest, auto_cell, default_error_bound,
 };
-use super::{axis, blade, classic, direction, formula, interference, kinematics, pocket};
-use cutter::{AptWord, AptWords, Cutter, CutterError, CutterShape, Holder, HolderSection};
+use super::{axis, classic, direction, interference, kinematics, part, pocket};
+use cutter::{Cutter, Holder, HolderSection};
 use field::{KnotRule, MAX_DENSE, Solver};
-use geometry::AnalyticSurface;
-use keys::{COORDINATE, LENGTH, Located, Section};
+use keys::{LENGTH, Located, Section};
 use keys::{SceneError, SceneText};
 use machine::Machine;
 use metrology::Limits;
@@ -23,9 +20,6 @@ use toolpath::{Joining, Links, Step, Strategy, StreamMethod};
 
 /// Largest scene that is read, bytes. A scene is a page of text; a larger file is a mistake.
 const MAX_BYTES: u64 = 1 << 20;
-
-/// Units that a mesh may be in, and each in mm.
-const UNITS: [(&str, f64); 5] = [("mm", 1.0), ("cm", 10.0), ("m", 1000.0), ("inch", 25.4), ("um", 0.001)];
 
 /// Feeds and speeds that make sense.
 const RATE: std::ops::RangeInclusive<f64> = 0.001..=1e6;
@@ -64,15 +58,7 @@ impl Scene {
     /// [`SceneError::Invalid`] for the first thing that is wrong.
     pub fn parse(name: &str, text: impl Into<String>) -> Result<Self, SceneError> {
         let source = SceneText::new(name, text);
-        let table = DeTable::parse(&source.text).map_err(|e| {
-            let end = source.text.len();
-            let message = e.message().trim().replace('\n', ", ");
-            source.error(
-                e.span().unwrap_or(end..end),
-                format!("not valid TOML: {message}"),
-                "see https://toml.io for how TOML is written",
-            )
-        })?;
+        let table = source.table()?;
         let root = Section::root(&source, table.get_ref());
         root.only(
             &[
@@ -96,7 +82,7 @@ impl Scene {
             None => Path::new(name).file_stem().map_or("scene".into(), |s| s.to_string_lossy().into_owned()),
         };
         let folder = Path::new(name).parent().unwrap_or(Path::new("")).to_owned();
-        let part = read_part(&root.section("part")?, &folder)?;
+        let part = part::read(&root.section("part")?, &folder)?;
         let (cutter, cutting) = read_cutter(&root.section("cutter")?)?;
         let stock = read_stock(&root.section("stock")?, &part, &cutter)?;
         let holder = read_holder(&root, &cutter)?;
@@ -131,12 +117,7 @@ impl Scene {
 
     /// The file that the part comes from, if it comes from one.
     pub fn part_file(&self) -> Option<&NamedFile> {
-        match &self.part {
-            PartSource::Mesh { file, .. } | PartSource::Nurbs { file } => Some(file),
-            PartSource::Pocket { outline: OutlineSource::File { file, .. }, .. } => Some(file),
-            PartSource::Blade(blade) => Some(&blade.file),
-            PartSource::Pocket { .. } | PartSource::Formula { .. } => None,
-        }
+        self.part.file()
     }
 
     /// Reads the files of feed directions into the strategies that follow them.
@@ -173,85 +154,6 @@ impl Scene {
     }
 }
 
-fn read_part(part: &Section<'_>, folder: &Path) -> Result<PartSource, SceneError> {
-    let mut words = vec!["nurbs", pocket::SURFACE];
-    words.extend(formula::names());
-    let mut all_keys = vec!["surface", "file", "unit", "x", "y", blade::KEY];
-    all_keys.extend(blade::KEYS);
-    all_keys.extend(formula::all_keys());
-    all_keys.extend(pocket::PART_KEYS);
-    let named = |file: Located<&str>| NamedFile::beside(folder, file.value, file.span);
-    if part.has(blade::KEY) {
-        let keys: Vec<&str> = [blade::KEY].into_iter().chain(blade::KEYS).collect();
-        part.only(&keys, &all_keys, "a part from sections")?;
-        return blade::read(part, named);
-    }
-    if !part.has("surface") && !part.has("file") {
-        part.only(&all_keys, &[], "a part")?;
-        return Err(part.error(
-            part.header(),
-            "the scene does not say which part to make",
-            "add a table [part] with `file = \"part.stl\"`, with `sections = \"blade.txt\"`, or with `surface = \"wave\"` and \
-             its parameters",
-        ));
-    }
-    match part.word("surface", &words)? {
-        None => {
-            part.only(&["file", "unit"], &all_keys, "a part from a mesh file (it has no `surface`)")?;
-            let (file, format, unit, scale) = read_mesh_file(part, folder, "part.stl")?;
-            Ok(PartSource::Mesh { file, format, unit, scale })
-        }
-        Some(word) if word.value == pocket::SURFACE => pocket::read_source(part, &UNITS, named),
-        Some(word) if word.value == "nurbs" => {
-            part.only(&["surface", "file"], &all_keys, "surface = \"nurbs\"")?;
-            Ok(PartSource::Nurbs { file: named(part.required_text("file", "wave.json")?) })
-        }
-        Some(word) => {
-            let mut keys = vec!["surface", "x", "y"];
-            keys.extend(formula::keys(word.value));
-            part.only(&keys, &all_keys, &format!("surface = \"{}\"", word.value))?;
-            let (x, y) = (part.required_interval("x")?, part.required_interval("y")?);
-            let shape = formula::read(part, word.value)?;
-            let surface = AnalyticSurface::new(shape, [x, y]).map_err(|e| {
-                part.error(&word.span, e.to_string(), "change the shape's parameters, or `x` and `y`")
-            })?;
-            Ok(PartSource::Formula { surface })
-        }
-    }
-}
-
-/// A mesh file with its kind, unit and that unit in mm.
-pub(super) fn read_mesh_file(
-    section: &Section<'_>,
-    folder: &Path,
-    example: &str,
-) -> Result<(NamedFile, MeshFormat, &'static str, f64), SceneError> {
-    let file = section.required_text("file", example)?;
-    let unit_words = UNITS.map(|(word, _)| word);
-    let unit = section.word("unit", &unit_words)?.map_or("mm", |u| u.value);
-    let scale = UNITS.iter().find(|(word, _)| *word == unit).map_or(1.0, |(_, scale)| *scale);
-    let extension = Path::new(file.value).extension().map(|e| e.to_string_lossy().to_lowercase());
-    let format = match extension.as_deref() {
-        Some("stl") => MeshFormat::Stl,
-        Some("obj") => MeshFormat::Obj,
-        Some("json") => {
-            return Err(section.error(
-                &file.span,
-                "a .json file needs to say what it holds",
-                "add `surface = \"nurbs\"`",
-            ));
-        }
-        _ => {
-            return Err(section.error(
-                &file.span,
-                format!("\"{}\" is no kind of part file that can be read", file.value),
-                "name a file that ends in .stl or .obj",
-            ));
-        }
-    };
-    Ok((NamedFile::beside(folder, file.value, file.span), format, unit, scale))
-}
-
 fn read_stock(stock: &Section<'_>, part: &PartSource, cutter: &Cutter) -> Result<Stock, SceneError> {
     stock.only(&["allowance", "margin", "roughed"], &[], "[stock]")?;
     // Zero is meant in both: stock may end at the part's top and at its rim.
@@ -268,50 +170,7 @@ fn read_stock(stock: &Section<'_>, part: &PartSource, cutter: &Cutter) -> Result
 
 fn read_cutter(section: &Section<'_>) -> Result<(Cutter, CuttingData), SceneError> {
     const SPEEDS: [&str; 3] = ["spindle_speed", "feed_rate", "plunge_rate"];
-    const SHAPES: [&str; 10] = [
-        "diameter",
-        "corner_radius",
-        "half_angle",
-        "tip_diameter",
-        "shank_diameter",
-        "corner_x",
-        "corner_z",
-        "tip_angle",
-        "side_angle",
-        "length",
-    ];
-    let all: Vec<&str> = ["shape"].into_iter().chain(SHAPES).chain(SPEEDS).collect();
-    if !section.has("shape") {
-        section.only(&all, &[], "a cutter")?;
-    }
-    let shape = section.required_word("shape", &["ball", "flat", "bull", "taper", "apt"])?;
-    let own: &[&str] = match shape.value {
-        "bull" => &["diameter", "corner_radius"],
-        "taper" => &["tip_diameter", "corner_radius", "half_angle", "shank_diameter"],
-        "apt" => &["diameter", "corner_radius", "corner_x", "corner_z", "tip_angle", "side_angle", "length"],
-        _ => &["diameter"],
-    };
-    let keys: Vec<&str> = ["shape"].iter().chain(own).chain(&SPEEDS).copied().collect();
-    section.only(&keys, &all, &format!("shape = \"{}\"", shape.value))?;
-    // The cutter's own refusals speak of whole dimensions; point at the key that they are about.
-    let (made, blamed) = match shape.value {
-        "ball" => (Cutter::ball(section.required_length("diameter", 6.0)?.value), "diameter"),
-        "flat" => (Cutter::flat(section.required_length("diameter", 6.0)?.value), "diameter"),
-        "bull" => {
-            let diameter = section.required_length("diameter", 6.0)?.value;
-            (Cutter::bull(diameter, section.required_length("corner_radius", 1.0)?.value), "corner_radius")
-        }
-        "apt" => (read_apt(section)?, "shape"),
-        _ => read_taper(section)?,
-    };
-    let cutter = made.map_err(|e| {
-        let (key, cure) = match &e {
-            CutterError::Apt(refusal) => (apt_key(refusal.word), refusal.cure.clone()),
-            _ => (blamed, format!("change `{blamed}`")),
-        };
-        let span = section.key_span(if section.has(key) { key } else { "shape" });
-        section.error(&span, e.to_string(), format!("`{key}`: {cure}"))
-    })?;
+    let cutter = Cutter::read(section, &SPEEDS)?;
     let rate =
         |key, default| Ok::<f64, SceneError>(section.number(key, RATE, "")?.map_or(default, |v| v.value));
     let cutting = CuttingData {
@@ -322,50 +181,6 @@ fn read_cutter(section: &Section<'_>) -> Result<(Cutter, CuttingData), SceneErro
     Ok((cutter, cutting))
 }
 
-/// The cutter of seven words; a corner whose place is left away touches bottom and side.
-fn read_apt(section: &Section<'_>) -> Result<Result<Cutter, CutterError>, SceneError> {
-    let angle = |key| {
-        // Angles below zero are read, so that the refusal can say what they would mean.
-        let angle = section.number(key, -80.0..=79.99, " degrees")?;
-        Ok::<f64, SceneError>(angle.map_or(0.0, |v| v.value.to_radians()))
-    };
-    let place = |key| Ok::<_, SceneError>(section.number(key, COORDINATE, " mm")?.map(|v| v.value));
-    let words = AptWords {
-        diameter: section.required_length("diameter", 6.0)?.value,
-        corner_radius: section.number("corner_radius", 0.0..=*LENGTH.end(), " mm")?.map_or(0.0, |v| v.value),
-        corner_x: 0.0,
-        corner_z: 0.0,
-        tip_angle: angle("tip_angle")?,
-        side_angle: angle("side_angle")?,
-        length: section.required_length("length", 20.0)?.value,
-    };
-    let words = words.with_centre(place("corner_x")?, place("corner_z")?);
-    Ok(Cutter::apt(&words).map_err(CutterError::Apt))
-}
-
-/// The key that stands for a word.
-fn apt_key(word: AptWord) -> &'static str {
-    match word {
-        AptWord::Diameter => "diameter",
-        AptWord::CornerRadius => "corner_radius",
-        AptWord::CornerX => "corner_x",
-        AptWord::CornerZ => "corner_z",
-        AptWord::TipAngle => "tip_angle",
-        AptWord::SideAngle => "side_angle",
-        AptWord::Length => "length",
-    }
-}
-
-fn read_taper(section: &Section<'_>) -> Result<(Result<Cutter, CutterError>, &'static str), SceneError> {
-    let tip = section.required_length("tip_diameter", 2.0)?.value;
-    // A tapered ball unless said otherwise.
-    let corner = section.number("corner_radius", 0.0..=*LENGTH.end(), " mm")?.map_or(0.5 * tip, |v| v.value);
-    let angle = section.required_number("half_angle", 0.01..=79.99, " degrees", 5.0)?.value;
-    let shank = section.required_length("shank_diameter", 6.0)?.value;
-    let blamed = if corner > 0.5 * tip { "corner_radius" } else { "shank_diameter" };
-    Ok((Cutter::taper(tip, corner, angle.to_radians(), shank), blamed))
-}
-
 /// What holds the cutter, if the scene says so.
 fn read_holder(root: &Section<'_>, cutter: &Cutter) -> Result<Option<Holder>, SceneError> {
     if !root.has("holder") {
@@ -373,9 +188,9 @@ fn read_holder(root: &Section<'_>, cutter: &Cutter) -> Result<Option<Holder>, Sc
     }
     let holder = root.section("holder")?;
     holder.only(&["cutting_length", "section"], &[], "[holder]")?;
-    let length = match (holder.length("cutting_length")?, cutter.shape()) {
-        (None, CutterShape::Apt) => cutter.words().length,
-        (None, _) => holder.required_length("cutting_length", 20.0)?.value,
+    let length = match (holder.length("cutting_length")?, cutter.stated_length()) {
+        (None, Some(length)) => length,
+        (None, None) => holder.required_length("cutting_length", 20.0)?.value,
         (Some(length), _) if length.value < cutter.side_height() => {
             let message = format!(
                 "the cutting length of {} mm ends below the cutter's full radius, at {:.4} mm",

@@ -5,7 +5,6 @@ use proptest::prelude::*;
 use std::sync::Arc;
 
 use super::*;
-use cutter::CutterShape;
 use field::mesh::Sense;
 use field::{KnotRule, Solver};
 use geometry::Point2;
@@ -63,7 +62,7 @@ fn with(old: &str, new: &str) -> String {
 fn a_scene_becomes_typed_values_in_mm_and_rad() {
     let scene = Scene::parse("folder/wave.toml", VALID).unwrap();
     assert_eq!(scene.title, "Wave, zigzag against streamlines");
-    assert_eq!((scene.cutter.shape(), scene.cutter.radius()), (CutterShape::Ball, 3.0));
+    assert_eq!((scene.cutter.is_ball(), scene.cutter.radius()), (true, 3.0));
     assert_eq!(scene.tolerance, Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chord: 0.001 });
     assert_eq!((scene.simulation.cell, scene.simulation.cell_is_auto), (0.05, true));
     assert_eq!(scene.simulation.memory_mib, 2048);
@@ -128,9 +127,9 @@ fn classical_strategies_are_read_and_written_back() {
 fn files_are_looked_for_beside_the_scene() {
     let text = "[part]\nfile = \"a/wave.STL\"\nunit = \"inch\"\n[cutter]\nshape=\"flat\"\ndiameter=6\n[[toolpath]]\nstrategy=\"zigzag\"";
     let scene = Scene::parse("folder/wave.toml", text).unwrap();
-    let PartSource::Mesh { file, format, scale, .. } = &scene.part else { panic!() };
+    let PartSource::Mesh(MeshFile { file, format, scale, .. }) = &scene.part else { panic!() };
     assert_eq!(file.path, std::path::Path::new("folder").join("a/wave.STL"));
-    assert_eq!((*format, *scale), (MeshFormat::Stl, 25.4));
+    assert_eq!((format.word, *scale), ("STL", 25.4));
     assert_eq!(scene.title, "wave", "the file's name is the title by default");
 }
 

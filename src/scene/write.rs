@@ -2,23 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::{
-    PartSource, Scene, ToolpathRequest, axis, blade, classic, direction, formula, interference, kinematics,
-    pocket,
-};
-use cutter::{Cutter, CutterShape};
+use super::{Scene, ToolpathRequest, axis, classic, direction, interference, kinematics, part, pocket};
+pub(super) use keys::{toml_number as number, toml_string as text};
 use toolpath::{Links, Step, Strategy, StreamMethod, longest_link};
-
-/// A number as TOML takes it, rounded to 12 digits so that an angle that went through radians comes
-/// back as it was written.
-pub(super) fn number(value: f64) -> String {
-    let rounded: f64 = format!("{value:.11e}").parse().unwrap_or(value);
-    format!("{rounded:?}")
-}
-
-pub(super) fn text(value: &str) -> String {
-    toml::Value::String(value.to_owned()).to_string()
-}
 
 /// The whole scene as TOML, every default in effect included. Reading it gives the same scene
 /// again; relative paths still start from the scene's folder.
@@ -30,7 +16,7 @@ pub fn complete_toml(scene: &Scene) -> String {
 
 fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     writeln!(out, "title = {}\n", text(&scene.title))?;
-    write_part(out, &scene.part)?;
+    part::write(out, &scene.part)?;
     writeln!(out, "\n[stock]")?;
     writeln!(out, "allowance = {}  # mm above the part's highest point", number(scene.stock.allowance))?;
     writeln!(out, "margin = {}  # mm around the part in the plan view", number(scene.stock.margin))?;
@@ -96,67 +82,9 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     })
 }
 
-fn write_part(out: &mut String, part: &PartSource) -> std::fmt::Result {
-    writeln!(out, "[part]")?;
-    match part {
-        PartSource::Mesh { file, unit, .. } => {
-            writeln!(out, "file = {}", text(&file.written))?;
-            writeln!(out, "unit = {}", text(unit))
-        }
-        PartSource::Pocket { outline, depth } => pocket::write_source(out, outline, *depth),
-        PartSource::Blade(request) => blade::write(out, request),
-        PartSource::Nurbs { file } => {
-            writeln!(out, "surface = \"nurbs\"")?;
-            writeln!(out, "file = {}", text(&file.written))
-        }
-        PartSource::Formula { surface } => {
-            let ([x, y], (name, parameters)) = (surface.domain(), formula::describe(surface.shape()));
-            writeln!(out, "surface = {}", text(name))?;
-            for (key, value) in parameters {
-                match value {
-                    formula::Value::Number(value) => writeln!(out, "{key} = {}", number(value))?,
-                    formula::Value::Flag(value) => writeln!(out, "{key} = {value}")?,
-                }
-            }
-            writeln!(out, "x = [{}, {}]  # mm", number(x[0]), number(x[1]))?;
-            writeln!(out, "y = [{}, {}]  # mm", number(y[0]), number(y[1]))
-        }
-    }
-}
-
 fn write_cutter(out: &mut String, scene: &Scene) -> std::fmt::Result {
     writeln!(out, "\n[cutter]  # mm, degrees")?;
-    let cutter: &Cutter = &scene.cutter;
-    let diameter = 2.0 * cutter.radius();
-    match cutter.shape() {
-        CutterShape::Ball => writeln!(out, "shape = \"ball\"\ndiameter = {}", number(diameter))?,
-        CutterShape::Flat => writeln!(out, "shape = \"flat\"\ndiameter = {}", number(diameter))?,
-        CutterShape::Bull => {
-            writeln!(out, "shape = \"bull\"\ndiameter = {}", number(diameter))?;
-            writeln!(out, "corner_radius = {}", number(cutter.corner_radius()))?;
-        }
-        CutterShape::Taper => {
-            let tip = 2.0 * (cutter.flat_radius() + cutter.corner_radius());
-            writeln!(out, "shape = \"taper\"\ntip_diameter = {}", number(tip))?;
-            writeln!(out, "corner_radius = {}", number(cutter.corner_radius()))?;
-            writeln!(out, "half_angle = {}", number(cutter.half_angle().to_degrees()))?;
-            writeln!(out, "shank_diameter = {}", number(diameter))?;
-        }
-        CutterShape::Apt => {
-            let w = cutter.words();
-            writeln!(
-                out,
-                "shape = \"apt\"\ndiameter = {}  # where bottom and side cross",
-                number(w.diameter)
-            )?;
-            writeln!(out, "corner_radius = {}", number(w.corner_radius))?;
-            writeln!(out, "corner_x = {}  # centre of the corner from the axis", number(w.corner_x))?;
-            writeln!(out, "corner_z = {}  # and above the tip", number(w.corner_z))?;
-            writeln!(out, "tip_angle = {}  # of the bottom from level", number(w.tip_angle.to_degrees()))?;
-            writeln!(out, "side_angle = {}  # of the side from the axis", number(w.side_angle.to_degrees()))?;
-            writeln!(out, "length = {}", number(w.length))?;
-        }
-    }
+    scene.cutter.write(out)?;
     writeln!(out, "spindle_speed = {}  # rev/min", number(scene.cutting.spindle_speed))?;
     writeln!(out, "feed_rate = {}  # mm/min", number(scene.cutting.feed_rate))?;
     writeln!(out, "plunge_rate = {}  # mm/min", number(scene.cutting.plunge_rate))

@@ -26,7 +26,7 @@ use route::{Entry, Run};
 use turning::Turning;
 
 use super::{Plan, PlanError, PlanSettings, Step};
-use cutter::{Cutter, CutterShape};
+use cutter::Cutter;
 use geometry::{Piece, Point2, Region, SegmentGrid, Vector2};
 use work::monitor;
 use work::monitor::{Cancelled, Monitor};
@@ -181,7 +181,7 @@ pub fn plan_pocket(
     monitor: &dyn Monitor,
 ) -> Result<Plan, PlanError> {
     let refuse = |reason: String| PlanError::NotApplicable { strategy: strategy.name(), reason };
-    if !matches!(cutter.shape(), CutterShape::Flat | CutterShape::Bull | CutterShape::Ball) {
+    if !cutter.is_end_mill() {
         return Err(refuse("its walls are vertical; use a flat, bull or ball cutter".into()));
     }
     let radius = cutter.radius();

@@ -28,7 +28,7 @@ use crate::levels::spacing::{Placing, place_levels};
 use crate::plan::{PassSettings, Passes, PlanError};
 use crate::tilt::tilted;
 use crate::tilt::tilted::Touch;
-use cutter::{Cutter, CutterShape};
+use cutter::Cutter;
 use field::DIRECTION_WEIGHT;
 use field::mesh::{
     FieldMesh, Held, MeshFieldError, MeshLevels, fixed_angle, flows, orient_lines, smooth_lines,
@@ -91,7 +91,7 @@ pub(crate) fn passes(
     settings: &PassSettings,
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
-    if cutter.shape() != CutterShape::Ball {
+    if !cutter.is_ball() {
         return Err(refused("only a ball's centre runs on one offset surface; use a ball"));
     }
     let radius = cutter.radius();

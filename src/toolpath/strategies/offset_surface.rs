@@ -20,7 +20,7 @@ use crate::surface::chart::{Chart, ChartPoint};
 use crate::tilt::tilted;
 use crate::tilt::tilted::Touch;
 use crate::{Along, OffsetAlong, OffsetDrive, Step};
-use cutter::{Cutter, CutterShape};
+use cutter::Cutter;
 use field::surface_gradient_length;
 use geometry::{NurbsSurface, Point3, Vector3};
 use motion::CcPoint;
@@ -53,7 +53,7 @@ pub(crate) fn passes(
     settings: &PassSettings,
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
-    if cutter.shape() != CutterShape::Ball {
+    if !cutter.is_ball() {
         return Err(refused("the centre of a ball rides on the offset surface; use a ball cutter"));
     }
     if part.patches().is_empty() && *drive == OffsetDrive::Exact {

@@ -11,7 +11,7 @@ use crate::moves::smooth::smooth_and_spread_tilted;
 use crate::plan::PlanError;
 use crate::surface::border::Border;
 use collision::Interference;
-use cutter::{Cutter, CutterShape};
+use cutter::Cutter;
 use geometry::{Point3, Vector3};
 use motion::{AxisError, ToolAxis, location};
 use motion::{CcPoint, ClPoint};
@@ -179,7 +179,7 @@ const PROBE_OVER_RADIUS: f64 = 0.25;
 /// The ball that is dropped to find where a cutter touches; `None` for a ball.
 pub(crate) fn probe(cutter: &Cutter) -> Option<Cutter> {
     let radius = cutter.corner_radius().max(PROBE_OVER_RADIUS * cutter.radius());
-    let other = cutter.shape() != CutterShape::Ball;
+    let other = !cutter.is_ball();
     other.then(|| Cutter::ball(2.0 * radius).ok()).flatten()
 }
 
@@ -220,7 +220,7 @@ pub(crate) fn around_centres(
     let passes = dropped.passes;
     monitor.start("tilting the cutter", passes.len() as u64);
     let up = Vector3::z() * dropped.ball.radius();
-    let border = (cutter.shape() != CutterShape::Ball).then(|| Border::of(part));
+    let border = (!cutter.is_ball()).then(|| Border::of(part));
     let passes = work::parallel::try_map(passes.len(), |k| {
         let tips = &passes[k];
         let last = tips.len() - 1;

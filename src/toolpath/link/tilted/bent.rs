@@ -9,7 +9,7 @@ use super::super::bend::{Cubic, End, MOST_ROLL, SAMPLING, curves};
 use crate::moves::chord::{Watch, sample_within_chord};
 use crate::tilt::tilted::{ABOVE_SURFACE, Tilting, Touch, located_sampling, thinned};
 use collision::Interference;
-use cutter::{Cutter, CutterShape};
+use cutter::Cutter;
 use geometry::{Point2, Point3, Vector3};
 use motion::{CcPoint, ClPoint};
 use part::Part;
@@ -111,7 +111,7 @@ impl Bent<'_> {
     }
 
     fn turning(&self, from: &Touch, to: &Touch) -> Turning {
-        if self.cutter.shape() != CutterShape::Ball
+        if !self.cutter.is_ball()
             && self.tilting.axis.follows_feed()
             && let (Some(a), Some(b)) = (Lean::of(from), Lean::of(to))
         {

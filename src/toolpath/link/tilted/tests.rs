@@ -129,7 +129,7 @@ fn neighbouring_passes_are_joined_nearby_and_clear() {
         let passes = aloft.path.passes();
         assert!(passes > 5 && air(&aloft.path) < 40.0 + 6.0 * passes as f64, "{}", air(&aloft.path));
         // A bull that leans the other way afterwards is turned around sooner aloft.
-        if cutter.shape() == cutter::CutterShape::Ball {
+        if cutter.is_ball() {
             let count = |kind| bent.path.moves.iter().filter(|m| m.kind == kind).count();
             assert_eq!((count(MoveKind::Plunge), count(MoveKind::Retract)), (1, 1), "all by links");
         }

@@ -1,9 +1,13 @@
 //! Surfaces by formula in a scene: which words and keys each shape has, and how they are read and
 //! written. Angles are degrees here and rad in [`AnalyticShape`].
 
-use geometry::AnalyticShape;
-use keys::SceneError;
-use keys::{COORDINATE, LENGTH, Section};
+use std::fmt::{self, Write as _};
+
+use geometry::{AnalyticShape, AnalyticSurface};
+use keys::{COORDINATE, LENGTH, SceneError, Section, toml_number, toml_string};
+use part::Patch;
+
+use super::source::{LoadError, Loaded, Loading, PartTable, Source, of_patches};
 
 /// Each surface with the keys of its own (besides `surface`, `x` and `y`).
 const SURFACES: [(&str, &[&str]); 7] = [
@@ -16,26 +20,18 @@ const SURFACES: [(&str, &[&str]); 7] = [
     ("pit_and_crest", &["scale"]),
 ];
 
-/// Words for `surface`.
-pub(super) fn names() -> impl Iterator<Item = &'static str> {
-    SURFACES.iter().map(|(name, _)| *name)
-}
-
-/// Keys of one surface.
-pub(super) fn keys(surface: &str) -> impl Iterator<Item = &'static str> {
-    SURFACES.iter().filter(move |(name, _)| *name == surface).flat_map(|(_, keys)| keys.iter().copied())
-}
-
-/// Keys of all surfaces.
-pub(super) fn all_keys() -> impl Iterator<Item = &'static str> {
-    SURFACES.iter().flat_map(|(_, keys)| keys.iter().copied())
+/// A surface by formula.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FormulaSource {
+    /// The formula with its parameters and its rectangle.
+    pub surface: AnalyticSurface,
 }
 
 /// Radii that a formula may have, mm. Beyond a kilometre a plane is meant.
 const RADIUS: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
 
-/// Reads the shape called `surface`, one of [`names`].
-pub(super) fn read(part: &Section<'_>, surface: &str) -> Result<AnalyticShape, SceneError> {
+/// Reads the shape called `surface`, one of [`SURFACES`].
+fn read_shape(part: &Section<'_>, surface: &str) -> Result<AnalyticShape, SceneError> {
     let height = || Ok::<f64, SceneError>(part.number("height", COORDINATE, " mm")?.map_or(0.0, |v| v.value));
     let azimuth = || {
         let azimuth = part.number("azimuth", -360.0..=360.0, " degrees")?;
@@ -75,7 +71,7 @@ pub(super) fn read(part: &Section<'_>, surface: &str) -> Result<AnalyticShape, S
 
 /// A parameter's value in a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Value {
+enum Value {
     /// A length, an angle in degrees, a factor.
     Number(f64),
     /// `true` or `false`.
@@ -83,7 +79,7 @@ pub(super) enum Value {
 }
 
 /// The word for a shape and its parameters as a scene has them.
-pub(super) fn describe(shape: &AnalyticShape) -> (&'static str, Vec<(&'static str, Value)>) {
+fn describe(shape: &AnalyticShape) -> (&'static str, Vec<(&'static str, Value)>) {
     use Value::{Flag, Number};
     let degrees = |angle: f64| Number(angle.to_degrees());
     match *shape {
@@ -115,5 +111,49 @@ pub(super) fn describe(shape: &AnalyticShape) -> (&'static str, Vec<(&'static st
             ("wave", keys)
         }
         AnalyticShape::PitAndCrest { scale } => ("pit_and_crest", vec![("scale", Number(scale))]),
+    }
+}
+
+impl Source for FormulaSource {
+    const EXAMPLE: Option<&'static str> = Some("surface = \"wave\"");
+
+    fn surfaces() -> Vec<&'static str> {
+        SURFACES.iter().map(|(name, _)| *name).collect()
+    }
+
+    fn keys() -> Vec<&'static str> {
+        ["x", "y"].into_iter().chain(SURFACES.iter().flat_map(|(_, keys)| keys.iter().copied())).collect()
+    }
+
+    fn read(table: &PartTable<'_>) -> Result<Self, SceneError> {
+        let (part, word) = (table.table, table.surface()?);
+        let own = SURFACES.iter().filter(|(name, _)| *name == word.value).flat_map(|(_, keys)| keys.iter());
+        let keys: Vec<&str> = ["surface", "x", "y"].iter().chain(own).copied().collect();
+        table.only(&keys, &format!("surface = \"{}\"", word.value))?;
+        let (x, y) = (part.required_interval("x")?, part.required_interval("y")?);
+        let shape = read_shape(part, word.value)?;
+        let surface = AnalyticSurface::new(shape, [x, y]).map_err(|e| {
+            part.error(&word.span, e.to_string(), "change the shape's parameters, or `x` and `y`")
+        })?;
+        Ok(Self { surface })
+    }
+
+    fn write(&self, out: &mut String) -> fmt::Result {
+        let ([x, y], (name, parameters)) = (self.surface.domain(), describe(self.surface.shape()));
+        writeln!(out, "surface = {}", toml_string(name))?;
+        for (key, value) in parameters {
+            match value {
+                Value::Number(value) => writeln!(out, "{key} = {}", toml_number(value))?,
+                Value::Flag(value) => writeln!(out, "{key} = {value}")?,
+            }
+        }
+        writeln!(out, "x = [{}, {}]  # mm", toml_number(x[0]), toml_number(x[1]))?;
+        writeln!(out, "y = [{}, {}]  # mm", toml_number(y[0]), toml_number(y[1]))
+    }
+
+    fn load(&self, job: &Loading<'_>) -> Result<Loaded, LoadError> {
+        let part = of_patches(vec![Patch::Analytic(self.surface)])
+            .map_err(|reason| LoadError::Part { scene: job.source.name.clone(), reason })?;
+        Ok(part.into())
     }
 }

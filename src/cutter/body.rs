@@ -1,23 +1,8 @@
-//! The cutters by name: what is given for each, and the profile that it makes. Lengths in mm, angles
-//! in rad. Any other profile is made from the seven words of APT ([`Cutter::apt`]).
+//! A rotating cutter: its profile, the seven words that describe it, and what is asked of both. Lengths in
+//! mm, angles in rad.
 
-use super::apt::{AptError, AptWords};
+use super::apt_words::{AptError, AptWords};
 use super::profile::{Incline, Profile};
-
-/// Which family a cutter was made as; the profile itself no longer depends on it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CutterShape {
-    /// Ball end: the corner radius is half the diameter.
-    Ball,
-    /// Flat end: no corner radius.
-    Flat,
-    /// Bull nose: a corner radius less than half the diameter.
-    Bull,
-    /// Tapered ball or bull: a conical side.
-    Taper,
-    /// Any profile of a bottom cone, an arc and a side cone, by the seven words of APT.
-    Apt,
-}
 
 /// Why no cutter could be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -52,23 +37,30 @@ pub enum CutterError {
 /// A rotating cutter. Always valid once made.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cutter {
-    shape: CutterShape,
+    family: &'static str,
     words: AptWords,
     profile: Profile,
 }
 
-fn positive(what: &'static str, value: f64) -> Result<f64, CutterError> {
+pub(super) fn positive(what: &'static str, value: f64) -> Result<f64, CutterError> {
     if value > 0.0 && value < 1.0e4 { Ok(value) } else { Err(CutterError::Length { what, value }) }
 }
 
 impl Cutter {
-    pub(super) fn new(shape: CutterShape, words: AptWords, profile: Profile) -> Self {
-        Self { shape, words, profile }
+    /// A cutter of the family of that word.
+    pub(super) fn new(family: &'static str, words: AptWords, profile: Profile) -> Self {
+        Self { family, words, profile }
     }
 
     /// A disc of radius `flat`, an arc of radius `corner`, and a side at `half_angle` from the axis
     /// up to `radius`.
-    fn rounded(shape: CutterShape, flat: f64, corner: f64, half_angle: f64, radius: f64) -> Self {
+    pub(super) fn rounded(
+        family: &'static str,
+        flat: f64,
+        corner: f64,
+        half_angle: f64,
+        radius: f64,
+    ) -> Self {
         let side = Incline::from_axis(half_angle);
         let profile = Profile::tangent(Incline::LEVEL, [flat, corner], corner, side, radius);
         let words = AptWords {
@@ -80,79 +72,33 @@ impl Cutter {
             side_angle: half_angle,
             length: profile.height(radius),
         };
-        Self { shape, words, profile }
+        Self { family, words, profile }
     }
 
-    /// A ball end of the given diameter (DC), mm.
-    ///
-    /// # Errors
-    /// [`CutterError::Length`] unless the diameter is positive and finite.
-    pub fn ball(diameter: f64) -> Result<Self, CutterError> {
-        let radius = 0.5 * positive("diameter", diameter)?;
-        Ok(Self::rounded(CutterShape::Ball, 0.0, radius, 0.0, radius))
-    }
-
-    /// A flat end of the given diameter (DC), mm.
-    ///
-    /// # Errors
-    /// [`CutterError::Length`] unless the diameter is positive and finite.
-    pub fn flat(diameter: f64) -> Result<Self, CutterError> {
-        let radius = 0.5 * positive("diameter", diameter)?;
-        Ok(Self::rounded(CutterShape::Flat, radius, 0.0, 0.0, radius))
-    }
-
-    /// A bull nose of the given diameter (DC) and corner radius (RE), mm.
-    ///
-    /// # Errors
-    /// When a dimension is not positive or the corner radius exceeds half of the diameter.
-    pub fn bull(diameter: f64, corner_radius: f64) -> Result<Self, CutterError> {
-        let radius = 0.5 * positive("diameter", diameter)?;
-        let corner_radius = positive("corner radius", corner_radius)?;
-        if corner_radius > radius {
-            return Err(CutterError::CornerRadius { corner_radius, half: radius });
-        }
-        Ok(Self::rounded(CutterShape::Bull, radius - corner_radius, corner_radius, 0.0, radius))
-    }
-
-    /// A conical cutter: `tip_diameter` is the diameter where arc and cone would meet the tip
-    /// plane if the corner were a full ball or bull end (a ball of that diameter when
-    /// `corner_radius` is half of it), `half_angle` is between axis and side, and the cone runs up
-    /// to `shank_diameter`.
-    ///
-    /// # Errors
-    /// When a dimension is not positive, the corner radius exceeds half of the tip diameter, the
-    /// angle is not within 0–80°, or the shank is not wider than the tip.
-    pub fn taper(
-        tip_diameter: f64,
-        corner_radius: f64,
-        half_angle: f64,
-        shank_diameter: f64,
-    ) -> Result<Self, CutterError> {
-        let half = 0.5 * positive("tip diameter", tip_diameter)?;
-        let radius = 0.5 * positive("shank diameter", shank_diameter)?;
-        if !(0.0..=half).contains(&corner_radius) {
-            return Err(CutterError::CornerRadius { corner_radius, half });
-        }
-        if !(half_angle > 0.0 && half_angle < 80f64.to_radians()) {
-            return Err(CutterError::HalfAngle { degrees: half_angle.to_degrees() });
-        }
-        if radius < half {
-            return Err(CutterError::Length {
-                what: "shank diameter less tip diameter",
-                value: 2.0 * (radius - half),
-            });
-        }
-        Ok(Self::rounded(CutterShape::Taper, half - corner_radius, corner_radius, half_angle, radius))
-    }
-
-    /// The family the cutter was made as.
-    pub fn shape(&self) -> CutterShape {
-        self.shape
+    /// The word of the family that the cutter was made as. The profile does not depend on it.
+    pub(super) fn family_word(&self) -> &'static str {
+        self.family
     }
 
     /// Its profile.
     pub fn profile(&self) -> &Profile {
         &self.profile
+    }
+
+    /// True for a hemisphere under a cylinder ([`Profile::is_ball`]), whatever family it was made as.
+    pub fn is_ball(&self) -> bool {
+        self.profile.is_ball()
+    }
+
+    /// True for a disc under a cylinder ([`Profile::is_flat`]).
+    pub fn is_flat(&self) -> bool {
+        self.profile.is_flat()
+    }
+
+    /// True for a level bottom under a cylinder, with or without an arc between them
+    /// ([`Profile::is_end_mill`]).
+    pub fn is_end_mill(&self) -> bool {
+        self.profile.is_end_mill()
     }
 
     /// Its seven words. Where a length was not given it is that of the profile below the cylinder.

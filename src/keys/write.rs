@@ -1,0 +1,13 @@
+//! Values as TOML spells them.
+
+/// A number as TOML takes it, rounded to 12 digits so that an angle that went through radians comes
+/// back as it was written.
+pub fn toml_number(value: f64) -> String {
+    let rounded: f64 = format!("{value:.11e}").parse().unwrap_or(value);
+    format!("{rounded:?}")
+}
+
+/// A string between quotes.
+pub fn toml_string(value: &str) -> String {
+    toml::Value::String(value.to_owned()).to_string()
+}

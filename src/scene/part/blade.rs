@@ -1,0 +1,141 @@
+//! A blade as the part of a scene: its section table, and what is made of it.
+
+use std::fmt::{self, Write as _};
+
+use blade::{Blade, BladeSettings, BladeSide, FairingMethod, JUMP_REMOVING_STEP};
+use geometry::{Isometry3, Vector3};
+use io::section_table;
+use keys::{LENGTH, SceneError, Section, toml_number, toml_string};
+use nalgebra::{Translation3, UnitQuaternion};
+use part::{Part, Patch, default_tessellation_tolerance};
+
+use super::source::{LoadError, Loaded, Loading, PartTable, Source};
+use crate::named_file::NamedFile;
+
+/// The key of a section table.
+const KEY: &str = "sections";
+
+/// Words for `side`.
+const SIDES: [(&str, BladeSide); 5] = [
+    ("both", BladeSide::Both),
+    ("pressure", BladeSide::Pressure),
+    ("suction", BladeSide::Suction),
+    ("around", BladeSide::Around),
+    ("passage", BladeSide::Passage),
+];
+
+/// Words for the method of fairing.
+const METHODS: [(&str, FairingMethod); 3] = [
+    ("kjellander", FairingMethod::Kjellander { step: JUMP_REMOVING_STEP }),
+    ("control-points", FairingMethod::ControlPoints),
+    ("energy", FairingMethod::Energy),
+];
+
+/// What is made of a section table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BladeRequest {
+    /// The table.
+    pub file: NamedFile,
+    /// Which surfaces are milled.
+    pub side: BladeSide,
+    /// Turns of the whole part about x, then y, then z, rad.
+    pub rotate: [f64; 3],
+    /// Where a second, equal blade stands, mm, before the part is turned.
+    pub pitch: Option<Vector3>,
+    /// How section points are faired, and how far one may be moved, mm.
+    pub fairing: Option<(FairingMethod, f64)>,
+}
+
+fn read_fairing(table: &Section<'_>) -> Result<(FairingMethod, f64), SceneError> {
+    table.only(&["method", "tolerance"], &[], "`fairing`")?;
+    let method = table.required_word("method", &METHODS.map(|(word, _)| word))?;
+    let method = METHODS.iter().find(|(word, _)| *word == method.value).unwrap_or(&METHODS[0]).1;
+    let tolerance = table.required_number("tolerance", LENGTH, " mm", 0.05)?.value;
+    Ok((method, tolerance))
+}
+
+impl Source for BladeRequest {
+    const KEY: Option<&'static str> = Some(KEY);
+    const EXAMPLE: Option<&'static str> = Some("sections = \"blade.txt\"");
+
+    fn keys() -> Vec<&'static str> {
+        vec![KEY, "side", "rotate", "pitch", "fairing"]
+    }
+
+    fn read(table: &PartTable<'_>) -> Result<Self, SceneError> {
+        table.only(&Self::keys(), "a part from sections")?;
+        let part = table.table;
+        let file = table.named(part.required_text(KEY, "blade.txt")?);
+        let words = SIDES.map(|(word, _)| word);
+        let word = part.word("side", &words)?;
+        let side = word.as_ref().and_then(|word| SIDES.iter().find(|(name, _)| *name == word.value));
+        let side = side.map_or(BladeSide::Both, |(_, side)| *side);
+        let rotate = part.vector("rotate")?.map_or([0.0; 3], |v| v.value.map(f64::to_radians));
+        let pitch = part.vector("pitch")?;
+        if pitch.is_none() && side == BladeSide::Passage {
+            return Err(part.error(
+                &part.key_span("side"),
+                "a passage lies between two blades, and there is one",
+                "add `pitch = [0, 20, 0]`: where the second blade stands, mm from the first",
+            ));
+        }
+        if let Some(zero) = pitch.as_ref().filter(|v| v.value.iter().all(|x| *x == 0.0)) {
+            return Err(part.error(
+                &zero.span,
+                "the second blade would stand in the first",
+                "write a pitch in mm",
+            ));
+        }
+        let fairing = part.inline("fairing").map(|table| read_fairing(&table)).transpose()?;
+        if fairing.is_none() && part.has("fairing") {
+            part.word("fairing", &["none"])?;
+        }
+        let pitch = pitch.map(|v| Vector3::from(v.value));
+        Ok(Self { file, side, rotate, pitch, fairing })
+    }
+
+    fn write(&self, out: &mut String) -> fmt::Result {
+        writeln!(out, "{KEY} = {}", toml_string(&self.file.written))?;
+        let side = SIDES.iter().find(|(_, side)| *side == self.side).map_or("both", |(word, _)| word);
+        writeln!(out, "side = \"{side}\"")?;
+        let list = |v: [f64; 3]| format!("[{}]", v.map(toml_number).join(", "));
+        writeln!(out, "rotate = {}  # degrees about x, y, z", list(self.rotate.map(f64::to_degrees)))?;
+        if let Some(pitch) = self.pitch {
+            writeln!(out, "pitch = {}  # mm to the second blade", list(pitch.into()))?;
+        }
+        match self.fairing {
+            Some((method, tolerance)) => writeln!(
+                out,
+                "fairing = {{ method = \"{}\", tolerance = {} }}  # mm that a point may move",
+                METHODS.iter().find(|(_, m)| *m == method).map_or("kjellander", |(word, _)| word),
+                toml_number(tolerance)
+            ),
+            None => writeln!(out, "fairing = \"none\""),
+        }
+    }
+
+    fn file(&self) -> Option<&NamedFile> {
+        Some(&self.file)
+    }
+
+    fn load(&self, job: &Loading<'_>) -> Result<Loaded, LoadError> {
+        let file = &self.file;
+        let sections = section_table::read(&file.path).map_err(|e| job.refused(file, e))?;
+        let [x, y, z] = self.rotate;
+        let settings = BladeSettings {
+            side: self.side,
+            pitch: self.pitch,
+            placed: Isometry3::from_parts(
+                Translation3::identity(),
+                UnitQuaternion::from_euler_angles(x, y, z),
+            ),
+            fairing: self.fairing,
+        };
+        let blade = Blade::new(&sections, &settings).map_err(|e| job.refused(file, e))?;
+        let patches: Vec<Patch> = blade.surfaces.iter().cloned().map(Patch::Nurbs).collect();
+        let tolerance = default_tessellation_tolerance(&patches);
+        let part = Part::from_oriented_patches(patches, tolerance).map_err(|e| job.refused(file, e))?;
+        let notes = blade.notes();
+        Ok(Loaded { part, blade: Some(blade), notes })
+    }
+}

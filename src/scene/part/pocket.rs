@@ -1,0 +1,302 @@
+//! A pocket as the part of a scene: its region from a drawing or from points, and the floor that is
+//! measured.
+
+use std::fmt::{self, Write as _};
+use std::path::Path;
+
+use field::fill;
+use geometry::{Point2, Point3, Region, RegionError, TriangleMesh};
+use io::outline::{self, OutlineFormat, OutlineOptions};
+use keys::{SceneError, Section, toml_number, toml_string};
+use part::Part;
+use toolpath::Pocket;
+
+use super::mesh::UNITS;
+use super::source::{LoadError, Loaded, Loading, PartTable, Source};
+use crate::named_file::NamedFile;
+
+/// The word for `surface`.
+const SURFACE: &str = "pocket";
+
+/// Share of the chord tolerance that drawings are flattened to; the passes have the rest.
+pub const FLATTEN_SHARE: f64 = 0.5;
+
+/// The floor is measured up to this many chord tolerances from its walls, where chords of the last pass
+/// leave as much ...
+const CHORDS_FROM_WALLS: f64 = 2.0;
+
+/// ... and to this share of the cutter's radius, by which offsets keep to the safe side.
+const RADIUS_FROM_WALLS: f64 = 5.0e-4;
+
+/// Where the outlines of a pocket come from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum OutlineSource {
+    /// A drawing.
+    File {
+        /// The file.
+        file: NamedFile,
+        /// Its kind, from its extension.
+        format: OutlineFormat,
+        /// Name of the unit of its coordinates and that in mm; `None`: as the file says.
+        unit: Option<(&'static str, f64)>,
+        /// The layer, id or label that is wanted.
+        layer: Option<String>,
+    },
+    /// Points in the scene, mm: the outline first, then the islands. Checked.
+    Points {
+        /// The curves.
+        curves: Vec<Vec<Point2>>,
+    },
+}
+
+/// A plane region with islands, cut down to a level floor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PocketSource {
+    /// Its outlines.
+    pub outline: OutlineSource,
+    /// How far its floor lies below z = 0, mm.
+    pub depth: f64,
+}
+
+impl Source for PocketSource {
+    const EXTENSIONS: &'static [&'static str] = &["dxf", "svg"];
+
+    fn surfaces() -> Vec<&'static str> {
+        vec![SURFACE]
+    }
+
+    fn keys() -> Vec<&'static str> {
+        vec!["file", "unit", "layer", "outline", "islands", "depth"]
+    }
+
+    fn read(table: &PartTable<'_>) -> Result<Self, SceneError> {
+        let part = table.table;
+        let from_points = part.has("outline") && !part.has("file");
+        let (keys, what): (&[&str], _) = if from_points {
+            (&["surface", "outline", "islands", "depth"], "a pocket from points")
+        } else {
+            (&["surface", "file", "unit", "layer", "depth"], "a pocket from a drawing")
+        };
+        table.only(keys, what)?;
+        let depth = part.required_length("depth", 6.0)?.value;
+        let outline = if from_points { read_points(part)? } else { read_drawing(table)? };
+        Ok(Self { outline, depth })
+    }
+
+    fn write(&self, out: &mut String) -> fmt::Result {
+        writeln!(out, "surface = \"{SURFACE}\"")?;
+        match &self.outline {
+            OutlineSource::File { file, unit, layer, .. } => {
+                writeln!(out, "file = {}", toml_string(&file.written))?;
+                if let Some((unit, _)) = unit {
+                    writeln!(out, "unit = {}", toml_string(unit))?;
+                }
+                if let Some(layer) = layer {
+                    writeln!(out, "layer = {}", toml_string(layer))?;
+                }
+            }
+            OutlineSource::Points { curves } => {
+                let point = |p: &Point2| format!("[{}, {}]", toml_number(p.x), toml_number(p.y));
+                let list =
+                    |c: &Vec<Point2>| format!("[{}]", c.iter().map(point).collect::<Vec<_>>().join(", "));
+                writeln!(out, "outline = {}  # mm", list(&curves[0]))?;
+                let islands: Vec<String> = curves[1..].iter().map(list).collect();
+                writeln!(out, "islands = [{}]", islands.join(", "))?;
+            }
+        }
+        writeln!(out, "depth = {}  # mm below z = 0", toml_number(self.depth))
+    }
+
+    fn file(&self) -> Option<&NamedFile> {
+        match &self.outline {
+            OutlineSource::File { file, .. } => Some(file),
+            OutlineSource::Points { .. } => None,
+        }
+    }
+
+    /// The floor that the cutter can reach, as far as its passes come.
+    fn load(&self, job: &Loading<'_>) -> Result<Loaded, LoadError> {
+        let (pocket, notes) = self.pocket(job)?;
+        Ok(Loaded { part: self.floor(&pocket, job)?, blade: None, notes })
+    }
+}
+
+fn read_points(part: &Section<'_>) -> Result<OutlineSource, SceneError> {
+    let outline = part.points("outline")?;
+    let mut spans = vec![outline.span];
+    let mut curves = vec![outline.value];
+    for island in part.curves("islands")? {
+        spans.push(island.span);
+        curves.push(island.value);
+    }
+    check(part, &curves, &spans)?;
+    Ok(OutlineSource::Points { curves })
+}
+
+fn read_drawing(table: &PartTable<'_>) -> Result<OutlineSource, SceneError> {
+    let part = table.table;
+    let file = part.required_text("file", "pocket.dxf")?;
+    let format = match io::extension(Path::new(file.value)).as_deref() {
+        Some("dxf") => OutlineFormat::Dxf,
+        Some("svg") => OutlineFormat::Svg,
+        _ => {
+            return Err(part.error(
+                &file.span,
+                format!("\"{}\" is no drawing that can be read. Supported: .dxf, .svg", file.value),
+                "name a file that ends in .dxf or .svg, or write `outline = [[x, y], ...]`",
+            ));
+        }
+    };
+    let words: Vec<&'static str> = UNITS.iter().map(|u| u.0).collect();
+    let unit = part.word("unit", &words)?.and_then(|word| UNITS.iter().find(|u| u.0 == word.value).copied());
+    let layer = part.text("layer")?.map(|l| l.value.to_owned());
+    Ok(OutlineSource::File { file: table.named(file), format, unit, layer })
+}
+
+/// Refuses points that bound no region, at the list that is wrong.
+fn check(
+    part: &Section<'_>,
+    curves: &[Vec<Point2>],
+    spans: &[std::ops::Range<usize>],
+) -> Result<(), SceneError> {
+    let name = |k: usize| if k == 0 { "the outline".to_owned() } else { format!("island {k}") };
+    match Region::nested(curves.to_vec()) {
+        Ok((_, depths)) => {
+            let wrong = depths.iter().enumerate().position(|(k, d)| *d != usize::from(k > 0));
+            let Some(k) = wrong else { return Ok(()) };
+            let message = match depths[k] {
+                0 => format!("{} lies outside of the outline", name(k)),
+                _ if k == 0 => "the outline lies inside of an island".to_owned(),
+                _ => format!("{} lies inside of another island", name(k)),
+            };
+            Err(part.error(&spans[k], message, "islands lie inside of the outline and apart from each other"))
+        }
+        Err(e) => {
+            let (k, message) = match e {
+                RegionError::Crossing { curves: [a, b], at } => {
+                    (b, format!("{} and {} meet at x {:.4} y {:.4}", name(a), name(b), at.x, at.y))
+                }
+                RegionError::Duplicate { curves: [a, b] } => {
+                    (b, format!("{} and {} are the same", name(a), name(b)))
+                }
+                RegionError::Coordinate { curve, .. }
+                | RegionError::NoArea { curve }
+                | RegionError::SelfCrossing { curve, .. } => (curve, format!("{}: {e}", name(curve))),
+                RegionError::Empty | RegionError::TooManyPoints(_) => (0, e.to_string()),
+            };
+            Err(part.error(
+                &spans[k],
+                message,
+                "write the corners in order, each once: `[[0, 0], [60, 0], [60, 40]]`",
+            ))
+        }
+    }
+}
+
+impl PocketSource {
+    /// The pocket, and what is to be said about its drawing.
+    ///
+    /// # Errors
+    /// [`SceneError::Invalid`] when the drawing is refused, at its name in the scene.
+    pub(crate) fn pocket(&self, job: &Loading<'_>) -> Result<(Pocket, Vec<String>), SceneError> {
+        let (region, notes) = match &self.outline {
+            OutlineSource::File { file, format, unit, layer } => {
+                let options = OutlineOptions {
+                    chord_tolerance: FLATTEN_SHARE * job.chord_tolerance,
+                    scale: unit.map(|u| u.1),
+                    layer: layer.clone(),
+                };
+                let read = outline::read(&file.path, *format, &options).map_err(|e| {
+                    let message = format!("the pocket's drawing cannot be used: {}: {e}", file.written);
+                    job.source.error(file.span.clone(), message, "mend that file or name another one")
+                })?;
+                let notes = read.notes.iter().map(|note| format!("{}: {note}", file.written)).collect();
+                (read.region, notes)
+            }
+            OutlineSource::Points { curves } => {
+                let region = Region::nested(curves.clone()).map_err(|e| self.refused(job, &e.to_string()))?.0;
+                (region, Vec::new())
+            }
+        };
+        Ok((Pocket { region, depth: self.depth }, notes))
+    }
+
+    fn floor(&self, pocket: &Pocket, job: &Loading<'_>) -> Result<Part, SceneError> {
+        let radius = job.cutter.radius();
+        let clear = CHORDS_FROM_WALLS * job.chord_tolerance + RADIUS_FROM_WALLS * radius;
+        let floor = pocket.reachable_floor(job.cutter).inset(clear);
+        if floor.is_empty() {
+            let largest = pocket.region.largest_disc(0.005).map_or(0.0, |d| 2.0 * d.1);
+            let message = format!(
+                "the cutter of {} mm fits nowhere in the pocket; the largest that would has {:.2} mm",
+                2.0 * radius,
+                (100.0 * largest).floor() / 100.0
+            );
+            return Err(self.refused(job, &message));
+        }
+        let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+        for piece in &floor.pieces {
+            let (points, corners) = fill(piece).map_err(|e| self.refused(job, &e.to_string()))?;
+            let first = vertices.len() as u32;
+            vertices.extend(points.iter().map(|p| Point3::new(p.x, p.y, -pocket.depth)));
+            triangles.extend(corners.iter().map(|t| t.map(|v| first + v)));
+        }
+        let (mesh, _) =
+            TriangleMesh::new(vertices, triangles).map_err(|e| self.refused(job, &e.to_string()))?;
+        Ok(Part::from_mesh(mesh))
+    }
+
+    fn refused(&self, job: &Loading<'_>, what: &str) -> SceneError {
+        let span = self.file().map_or(0..0, |file| file.span.clone());
+        job.source.error(span, what.to_owned(), "change the pocket's outline or the cutter")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Scene, complete_toml};
+
+    const TRAY: &str = "[part]\nsurface = \"pocket\"\noutline = [[0, 0], [60, 0], [60, 40], [0, 40]]\n\
+        islands = [[[20, 10], [30, 10], [30, 20]]]\ndepth = 5\n[cutter]\nshape = \"flat\"\ndiameter = 6\n\
+        [[toolpath]]\nstrategy = \"pocket-flow\"\nspiral = true\nengagement = 80\n[[toolpath]]\nstrategy = \"pocket-zigzag\"\nangle = 20\n";
+
+    fn refusal(from: &str, to: &str) -> String {
+        assert!(TRAY.contains(from));
+        Scene::parse("tray.toml", TRAY.replace(from, to)).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_pocket_is_read_and_written_again() {
+        let scene = Scene::parse("tray.toml", TRAY).unwrap();
+        assert_eq!((scene.stock.allowance, scene.stock.margin), (0.0, 3.0));
+        let text = complete_toml(&scene);
+        let again = Scene::parse("tray.toml", text.clone()).unwrap();
+        assert_eq!((&again.part, &again.toolpaths), (&scene.part, &scene.toolpaths), "{text}");
+        assert_eq!(complete_toml(&again), text);
+    }
+
+    #[test]
+    fn wrong_pockets_are_refused_with_the_reason() {
+        for (from, to, words) in [
+            ("[60, 40], [0, 40]", "[0, 40], [60, 40]", "the outline: it crosses itself at x 30"),
+            ("[30, 20]", "[80, 20]", "meet at"),
+            (
+                "[[20, 10], [30, 10], [30, 20]]",
+                "[[80, 10], [90, 10], [90, 20]]",
+                "island 1 lies outside of the outline",
+            ),
+            ("[[20, 10], [30, 10], [30, 20]]", "[[20, 10], [30, 10]]", "island 1: it encloses no area"),
+            ("[[20, 10], [30, 10], [30, 20]]", "[[0, 0], [60, 0], [60, 40], [0, 40]]", "are the same"),
+            ("[30, 20]", "[30, nan]", "NaN"),
+            ("[30, 20]", "[30, 1e9]", "1000000000"),
+            ("[30, 20]", "[30, 20, 5]", "points of two numbers"),
+            ("outline = [[0, 0], [60, 0], [60, 40], [0, 40]]", "file = \"a.png\"", "islands"),
+            ("pocket-zigzag\"\nangle = 20", "zigzag\"", "does not mill a pocket"),
+            ("angle = 20", "spiral = true", "does not apply"),
+            ("spiral = true", "stepover = 6", "more than 0.95"),
+        ] {
+            let text = refusal(from, to);
+            assert!(text.contains(words), "{to}: {text}");
+        }
+    }
+}

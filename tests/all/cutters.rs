@@ -1,0 +1,83 @@
+//! One cutter under the words of several families: what it plans, cuts and measures is a matter of its profile.
+
+use millstream::cutter::{AptWords, Cutter};
+use millstream::geometry::{Aabb, AnalyticShape, AnalyticSurface, Point3};
+use millstream::metrology::{Asked, Limits, measure};
+use millstream::motion::{ToolAxis, Toolpath};
+use millstream::part::{Part, Patch};
+use millstream::sim::{Grid, ZMap, cut};
+use millstream::toolpath::{
+    Joining, OffsetAlong, OffsetDrive, PlanSettings, Step, Strategy, Tilting, plan, plan_tilted,
+};
+use millstream::work::monitor::Silent;
+
+/// A ball of 6 mm as `ball`, as `bull` with its radius at the corner, and by the seven words.
+fn balls() -> [Cutter; 3] {
+    let words = AptWords {
+        diameter: 6.0,
+        corner_radius: 3.0,
+        corner_x: 0.0,
+        corner_z: 3.0,
+        tip_angle: 0.0,
+        side_angle: 0.0,
+        length: 20.0,
+    };
+    [Cutter::ball(6.0).unwrap(), Cutter::bull(6.0, 3.0).unwrap(), Cutter::apt(&words).unwrap()]
+}
+
+/// A hollow of radius 30 mm.
+fn hollow() -> Part {
+    let shape = AnalyticShape::Cylinder { height: 0.0, radius: 30.0, azimuth: 0.3, concave: true };
+    let surface = AnalyticSurface::new(shape, [[-6.0, 6.0], [0.0, 8.0]]).unwrap();
+    Part::from_patches(vec![Patch::Analytic(surface)], 0.002).unwrap()
+}
+
+fn settings(part: &Part) -> PlanSettings {
+    PlanSettings {
+        step: Step::Scallop(0.02),
+        chord_tolerance: 0.002,
+        clearance: 2.0,
+        stock_top: part.bounds().max.z + 1.0,
+        feed_rate: 1000.0,
+        plunge_rate: 300.0,
+        rapid_rate: 15_000.0,
+        joining: Joining::default(),
+    }
+}
+
+/// Asserts that all three plan the same moves; leaves those of the first.
+fn same(of: impl Fn(&Cutter) -> Toolpath) -> Toolpath {
+    let [ball, bull, apt] = balls().map(|cutter| of(&cutter));
+    assert!(!ball.moves.is_empty());
+    assert_eq!(bull, ball);
+    assert_eq!(apt, ball);
+    ball
+}
+
+#[test]
+fn a_ball_by_any_name_plans_cuts_and_measures_the_same() {
+    let part = hollow();
+    let settings = settings(&part);
+    let zigzag = Strategy::Zigzag { angle: 0.4, one_way: false };
+    let offset = Strategy::OffsetSurface { along: OffsetAlong::U, drive: OffsetDrive::Exact };
+    let upright =
+        |strategy| same(|cutter: &Cutter| plan(&part, cutter, strategy, &settings, &Silent).unwrap().path);
+    upright(&offset);
+    let path = upright(&zigzag);
+    let axis = ToolAxis::LeadTilt { lead: 0.2, tilt: 0.1 };
+    let tilting = Tilting { axis: &axis, most_turning: None, most_turning_across: None, interference: None };
+    same(|cutter| plan_tilted(&part, cutter, &zigzag, &tilting, &settings, &Silent).unwrap().path);
+
+    let area = Aabb { min: Point3::new(-6.0, 0.0, 0.0), max: Point3::new(6.0, 8.0, 0.0) };
+    let grid = Grid::covering(&area, 0.1, 80, 1 << 30).unwrap();
+    let stock = || ZMap::block(grid, settings.stock_top);
+    let limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.002 };
+    let asked = Asked { error_bound: 0.0005, stock_top: settings.stock_top, most_cells: 1 << 22 };
+    let of = |cutter: &Cutter| {
+        let cut = cut(stock(), cutter, &path, &Silent).unwrap();
+        let measured = measure(&part, cutter, &path, &cut, &limits, &asked, &Silent).unwrap();
+        (cut.height, format!("{:?} {:?}", measured.scallop, measured.gouge))
+    };
+    let [ball, bull, apt] = balls().map(|cutter| of(&cutter));
+    assert!(bull == ball && apt == ball);
+}
