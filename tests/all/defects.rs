@@ -120,7 +120,7 @@ fn a_rapid_through_the_part_is_a_gouge() {
 #[test]
 fn flat_and_bull_ends_cover_a_hill() {
     let shape = AnalyticShape::Cylinder { height: 0.0, radius: 60.0, azimuth: 0.0, concave: false };
-    let part = formula(shape, [0.0, 20.0], [-10.0, 10.0]);
+    let part = formula(shape, [0.0, 10.0], [-5.0, 5.0]);
     for cutter in [Cutter::flat(6.0).unwrap(), Cutter::bull(6.0, 1.0).unwrap()] {
         for angle in [0.0, std::f64::consts::FRAC_PI_2] {
             let zigzag = Strategy::Zigzag { angle, one_way: false };

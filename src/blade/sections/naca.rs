@@ -88,6 +88,8 @@ impl NacaDigits {
 pub struct NacaProfile {
     camber: f64,
     position: f64,
+    /// Where the camber line changes from one parabola to the other.
+    change: f64,
     thickness: f64,
     fourth: f64,
 }
@@ -106,7 +108,20 @@ impl NacaProfile {
         if !(0.0..=0.1).contains(&camber) || (camber > 0.0 && !(0.05..=0.95).contains(&position)) {
             return Err(ProfileError::Camber { camber, position });
         }
-        Ok(Self { camber, position, thickness, fourth: if closed { CLOSED } else { OPEN } })
+        let fourth = if closed { CLOSED } else { OPEN };
+        Ok(Self { camber, position, change: position, thickness, fourth })
+    }
+
+    /// The profile with the parabola ahead of the greatest camber, or that behind it, for the whole camber
+    /// line. The camber line's curvature jumps from one to the other, and both sides have a corner there; those
+    /// of this profile have none.
+    pub(super) fn continued(&self, ahead: bool) -> Self {
+        Self { change: if ahead { f64::INFINITY } else { f64::NEG_INFINITY }, ..*self }
+    }
+
+    /// Whether a place is ahead of the greatest camber.
+    pub(super) fn is_ahead(&self, x: f64) -> bool {
+        x < self.position
     }
 
     /// Height of the camber line at `x` with its first and second derivative.
@@ -115,7 +130,7 @@ impl NacaProfile {
         if m == 0.0 {
             return [0.0; 3];
         }
-        let ahead = x < p;
+        let ahead = x < self.change;
         let k = if ahead { m / (p * p) } else { m / ((1.0 - p) * (1.0 - p)) };
         let constant = if ahead { 0.0 } else { 1.0 - 2.0 * p };
         [k * (constant + 2.0 * p * x - x * x), k * 2.0 * (p - x), -2.0 * k]

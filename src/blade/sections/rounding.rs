@@ -25,11 +25,17 @@ const STEP: f64 = 0.25;
 /// Steps of the iteration; each gains a digit or more.
 const MAX_STEPS: usize = 60;
 
+/// Easings that are tried on either side of one without an arc. With more of them one is found nearer.
+const OTHER_EASINGS: u32 = 100;
+
+/// Where four-digit profiles are thickest.
+const THICKEST: f64 = 0.3;
+
 /// An arc behind a profile; shares of the chord.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct TailArc {
     pub radius: f64,
-    easing: f64,
+    pub easing: f64,
     /// Where it takes over from the upper and the lower side, as places on the camber line.
     pub touches: [f64; 2],
     /// Its beginning on the lower side, and its direction there, rad.
@@ -42,21 +48,42 @@ pub(super) struct TailArc {
 impl TailArc {
     /// The arc of `radius` and `easing` (0 to 1 rad) of a profile whose trailing edge is closed; `None` when
     /// the radius is more than [`GREATEST_RADIUS`] of the half thickness.
+    ///
+    /// Both sides have a corner at the greatest camber. The arcs of some easings would be tangent to a side
+    /// neither ahead of its corner nor behind it; the nearest easing that has an arc is then taken.
     pub fn of(profile: &NacaProfile, radius: f64, easing: f64) -> Option<Self> {
-        /// Where four-digit profiles are thickest.
-        const THICKEST: f64 = 0.3;
         if radius.is_nan() || radius <= 0.0 || radius > GREATEST_RADIUS * profile.half_thickness(THICKEST)[0]
         {
             return None;
         }
-        let first = fall(|x| profile.half_thickness(x)[0] - radius, THICKEST, 1.0);
+        let further = (1..=OTHER_EASINGS).map(|k| f64::from(k) / f64::from(OTHER_EASINGS));
+        let nearest_first = further.flat_map(|share| [easing * (1.0 - share), easing + share * EASING]);
+        std::iter::once(easing).chain(nearest_first).find_map(|easing| Self::tangent(profile, radius, easing))
+    }
+
+    /// The arc of a radius and exactly an easing.
+    ///
+    /// Steps across a corner of a side may go to and fro for ever although there is an arc on one side of it.
+    /// Each stretch between the corners is therefore tried alone, continued beyond its corner without one.
+    fn tangent(profile: &NacaProfile, radius: f64, easing: f64) -> Option<Self> {
+        let alone = |stretches: [bool; 2]| {
+            let arc = Self::search(&stretches.map(|ahead| profile.continued(ahead)), radius, easing)?;
+            (arc.touches.map(|x| profile.is_ahead(x)) == stretches).then_some(arc)
+        };
+        let stretches = [[false, false], [false, true], [true, false], [true, true]];
+        Self::search(&[*profile; 2], radius, easing).or_else(|| stretches.into_iter().find_map(alone))
+    }
+
+    /// The arc of the upper side of one profile and the lower side of another, both of the same thickness.
+    fn search(profile: &[NacaProfile; 2], radius: f64, easing: f64) -> Option<Self> {
+        let first = fall(|x| profile[0].half_thickness(x)[0] - radius, THICKEST, 1.0);
         let mut arc = Self::between(profile, radius, easing, [first, first]);
         for _ in 0..MAX_STEPS {
             let [upper, lower] = arc.touches;
             let gap = arc.gap(profile);
             // The arc hardly changes while its ends move along the sides, so that their tangents give the
             // step.
-            let (t, s) = (profile.tangent(upper, true), profile.tangent(lower, false));
+            let (t, s) = (profile[0].tangent(upper, true), profile[1].tangent(lower, false));
             let across = t.perp(&s);
             let step = [s.perp(&gap) / across, t.perp(&gap) / across];
             let next = [upper + step[0], lower + step[1]];
@@ -73,18 +100,18 @@ impl TailArc {
 
     /// The arc that leaves the lower side at a place and turns as far as the upper side's direction at
     /// another.
-    fn between(profile: &NacaProfile, radius: f64, easing: f64, touches: [f64; 2]) -> Self {
-        let (upper, lower) = (-profile.tangent(touches[0], true), profile.tangent(touches[1], false));
+    fn between(profile: &[NacaProfile; 2], radius: f64, easing: f64, touches: [f64; 2]) -> Self {
+        let (upper, lower) = (-profile[0].tangent(touches[0], true), profile[1].tangent(touches[1], false));
         let heading = lower.y.atan2(lower.x);
         let sweep = (upper.y.atan2(upper.x) - heading).rem_euclid(std::f64::consts::TAU);
-        let start = profile.point(touches[1], false);
+        let start = profile[1].point(touches[1], false);
         // Both easings together turn by no more than the arc.
         Self { radius, easing: easing.min(0.5 * sweep), touches, start, heading, sweep }
     }
 
     /// From the end of the arc to the upper side.
-    fn gap(&self, profile: &NacaProfile) -> Vector2 {
-        profile.point(self.touches[0], true) - self.at(self.length())
+    fn gap(&self, profile: &[NacaProfile; 2]) -> Vector2 {
+        profile[0].point(self.touches[0], true) - self.at(self.length())
     }
 
     /// Lengths at which easing ends and begins again, and at the end.
