@@ -1,5 +1,5 @@
-//! The `millstream` command; all of it lives in [`millstream::cli`].
+//! The `millstream` command; all of it lives in the crate `cli`.
 
 fn main() -> std::process::ExitCode {
-    millstream::cli::main()
+    cli::main()
 }

@@ -2,7 +2,7 @@
 
 use super::*;
 use metrology::{
-    DeviationFigures, GougeFigures, GougeRegion, PairFigures, CloserLook, ScallopFigures, UncutFigures,
+    CloserLook, DeviationFigures, GougeFigures, GougeRegion, PairFigures, ScallopFigures, UncutFigures,
     UncutRegion,
 };
 
