@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let (x, y) = (low.x + share * size.x, low.y + share * size.y);
         match drop.at(x, y) {
             Some(rest) => {
-                println!("x {x:7.3} y {y:7.3}: tip at z {:.4}, contact {}", rest.z, rest.contact.point)
+                println!("x {x:7.3} y {y:7.3}: tip at z {:.4}, contact {}", rest.tip_z, rest.contact.point)
             }
             None => println!("x {x:7.3} y {y:7.3}: the cutter misses the part"),
         }
