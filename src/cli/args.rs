@@ -86,7 +86,7 @@ pub struct ScallopOptions {
     pub part: Option<PathBuf>,
     /// The place on the part: X,Y (seen from above) or X,Y,Z (the nearest point).
     #[arg(long, value_name = "X,Y[,Z]", requires = "part", allow_hyphen_values = true, value_parser = place)]
-    pub at: Option<Place>,
+    pub at: Option<Coordinates>,
     /// Feed direction there in the plan view, degrees from x.
     #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true)]
     pub direction: f64,
@@ -107,9 +107,9 @@ pub struct ScallopOptions {
 
 /// Two or three coordinates, mm.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Place(Vec<f64>);
+pub struct Coordinates(Vec<f64>);
 
-impl std::ops::Deref for Place {
+impl std::ops::Deref for Coordinates {
     type Target = [f64];
 
     fn deref(&self) -> &[f64] {
@@ -117,12 +117,12 @@ impl std::ops::Deref for Place {
     }
 }
 
-fn place(text: &str) -> Result<Place, String> {
+fn place(text: &str) -> Result<Coordinates, String> {
     let number = |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.abs() <= geometry::MAX_COORDINATE);
     let numbers: Option<Vec<f64>> = text.split(',').map(number).collect();
     numbers
         .filter(|n| matches!(n.len(), 2 | 3))
-        .map(Place)
+        .map(Coordinates)
         .ok_or_else(|| "give two or three coordinates in mm, such as 12.5,-3 or 12.5,-3,4".to_owned())
 }
 

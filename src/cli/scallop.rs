@@ -19,7 +19,7 @@ const TABLE_BENDS: [f64; 7] = [-1.0, -1.0 / 3.0, -0.1, 0.0, 0.1, 1.0 / 3.0, 0.6]
 const TABLE_STEPS: [f64; 4] = [0.05, 0.1, 0.2, 0.4];
 
 /// The section that is asked about.
-struct Section {
+struct CrossSection {
     /// Radius that the cutter shows across the feed, mm.
     radius: f64,
     /// 1/mm, positive concave.
@@ -53,7 +53,7 @@ fn axis(lead: Option<f64>, feed: &Vector3, normal: &Vector3, upright: &Vector3) 
     lead.map_or(*upright, |degrees| normal * degrees.to_radians().cos() + feed * degrees.to_radians().sin())
 }
 
-fn by_radius(options: &ScallopOptions) -> Result<Section, CliError> {
+fn by_radius(options: &ScallopOptions) -> Result<CrossSection, CliError> {
     let radius = options.convex.or(options.concave);
     if let Some(value) = radius.filter(|r| !(*r > 0.0 && r.is_finite())) {
         let wanted = "a positive number of mm; leave it out for a plane";
@@ -67,10 +67,10 @@ fn by_radius(options: &ScallopOptions) -> Result<Section, CliError> {
     let (feed, normal) = (Vector3::x(), Vector3::z());
     let axis = axis(options.lead, &feed, &normal, &normal);
     let radius = effective_radius(&options.cutter, &axis, &normal, &Vector3::y()).map_err(refused)?;
-    Ok(Section { radius, curvature, notes: Vec::new() })
+    Ok(CrossSection { radius, curvature, notes: Vec::new() })
 }
 
-fn at_place(options: &ScallopOptions, file: &Path) -> Result<Section, CliError> {
+fn at_place(options: &ScallopOptions, file: &Path) -> Result<CrossSection, CliError> {
     let part = load(file)?;
     let at = found(&part, file, options.at.as_deref().unwrap_or_default())?;
     let turn = options.direction.to_radians();
@@ -102,7 +102,7 @@ fn at_place(options: &ScallopOptions, file: &Path) -> Result<Section, CliError> 
             0.5 * options.cutter.radius()
         ));
     }
-    Ok(Section { radius, curvature, notes })
+    Ok(CrossSection { radius, curvature, notes })
 }
 
 fn load(file: &Path) -> Result<Part, CliError> {
@@ -173,7 +173,11 @@ fn height(mm: f64) -> String {
     format!("{} mm ({:.3} µm)", digits(mm), 1e3 * mm)
 }
 
-fn answer(options: &ScallopOptions, section: &Section, ball: &BallSection) -> Result<String, ScallopError> {
+fn answer(
+    options: &ScallopOptions,
+    section: &CrossSection,
+    ball: &BallSection,
+) -> Result<String, ScallopError> {
     let mut lines = vec![format!(
         "Cutter of diameter {} mm, radius {} mm across the feed; {}",
         digits(2.0 * options.cutter.radius()),

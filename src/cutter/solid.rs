@@ -22,39 +22,39 @@ const DIAMETERS_ABOVE: f64 = 5.0;
 const SHORTEST: f64 = 1e-12;
 
 /// Place or direction in the half plane: ρ and z.
-type Pair = [f64; 2];
+type RhoZ = [f64; 2];
 
-fn dot(a: Pair, b: Pair) -> f64 {
+fn dot(a: RhoZ, b: RhoZ) -> f64 {
     a[0] * b[0] + a[1] * b[1]
 }
 
-fn cross(a: Pair, b: Pair) -> f64 {
+fn cross(a: RhoZ, b: RhoZ) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }
 
-fn less(a: Pair, b: Pair) -> Pair {
+fn less(a: RhoZ, b: RhoZ) -> RhoZ {
     [a[0] - b[0], a[1] - b[1]]
 }
 
-fn unit(a: Pair) -> Pair {
+fn unit(a: RhoZ) -> RhoZ {
     let size = a[0].hypot(a[1]);
     [a[0] / size, a[1] / size]
 }
 
 /// A line or an arc of an outline, with the inside on its left.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Edge {
-    from: Pair,
-    to: Pair,
+struct OutlineEdge {
+    from: RhoZ,
+    to: RhoZ,
     /// From its begin to its end, of unit length.
-    along: Pair,
+    along: RhoZ,
     length: f64,
     /// Outward normals where it begins and ends; a line has two equal ones.
-    normals: [Pair; 2],
+    normals: [RhoZ; 2],
     /// Sums of the normals of the edges that meet where it begins and ends.
-    corners: [Pair; 2],
+    corners: [RhoZ; 2],
     /// Centre and radius of an arc that bulges outward by less than half a circle; radius 0: a line.
-    centre: Pair,
+    centre: RhoZ,
     radius: f64,
 }
 
@@ -78,8 +78,8 @@ pub struct SolidFoot {
     pub point: Point3,
 }
 
-impl Edge {
-    fn line(from: Pair, to: Pair) -> Self {
+impl OutlineEdge {
+    fn line(from: RhoZ, to: RhoZ) -> Self {
         let along = less(to, from);
         let length = along[0].hypot(along[1]);
         let along = [along[0] / length, along[1] / length];
@@ -87,7 +87,7 @@ impl Edge {
         Self { from, to, along, length, normals, corners: normals, centre: from, radius: 0.0 }
     }
 
-    fn arc(from: Pair, to: Pair, centre: Pair, radius: f64) -> Self {
+    fn arc(from: RhoZ, to: RhoZ, centre: RhoZ, radius: f64) -> Self {
         let normals = [unit(less(from, centre)), unit(less(to, centre))];
         Self { normals, corners: normals, centre, radius, ..Self::line(from, to) }
     }
@@ -95,7 +95,7 @@ impl Edge {
     /// Distance to the nearest point of this edge, with its sign if that point is none of the ends, and
     /// which end it is otherwise.
     #[inline(always)]
-    fn nearest(&self, p: Pair) -> (f64, Option<usize>) {
+    fn nearest(&self, p: RhoZ) -> (f64, Option<usize>) {
         let a = less(p, self.from);
         if self.radius > 0.0 {
             let d = less(p, self.centre);
@@ -117,7 +117,7 @@ impl Edge {
         (dot(a, self.normals[0]), None)
     }
 
-    fn foot(&self, p: Pair, distance: f64, end: Option<usize>) -> OutlineFoot {
+    fn foot(&self, p: RhoZ, distance: f64, end: Option<usize>) -> OutlineFoot {
         let Some(end) = end else {
             if self.radius == 0.0 {
                 return OutlineFoot { distance, gradient: self.normals[0] };
@@ -141,14 +141,14 @@ impl Edge {
 /// A closed outline from the axis back to the axis.
 #[derive(Debug, Clone, PartialEq)]
 struct Outline {
-    edges: Vec<Edge>,
+    edges: Vec<OutlineEdge>,
 }
 
 impl Outline {
     /// Leaves out edges without length, and tells the others which normals meet at their ends. At the
     /// axis an edge meets its own mirror image.
-    fn new(edges: impl IntoIterator<Item = Edge>) -> Self {
-        let mut edges: Vec<Edge> = edges.into_iter().filter(|e| e.length > SHORTEST).collect();
+    fn new(edges: impl IntoIterator<Item = OutlineEdge>) -> Self {
+        let mut edges: Vec<OutlineEdge> = edges.into_iter().filter(|e| e.length > SHORTEST).collect();
         let count = edges.len();
         for k in 0..count {
             let [begin, end] = edges[k].normals;
@@ -174,8 +174,8 @@ impl Outline {
     }
 
     /// How far it reaches in a direction.
-    fn support(&self, u: Pair) -> f64 {
-        let reach = |edge: &Edge| {
+    fn support(&self, u: RhoZ) -> f64 {
+        let reach = |edge: &OutlineEdge| {
             let bulges =
                 edge.radius > 0.0 && cross(edge.normals[0], u) >= 0.0 && cross(u, edge.normals[1]) >= 0.0;
             if bulges {
@@ -203,7 +203,7 @@ pub struct Solid {
 }
 
 /// The cutter's edges from the tip to the given height.
-fn cutter_edges(profile: &Profile, length: f64) -> Vec<Edge> {
+fn cutter_edges(profile: &Profile, length: f64) -> Vec<OutlineEdge> {
     let tip = [0.0, profile.tip];
     let centre = [profile.centre_x, profile.centre_z];
     let at = |rho: f64| [rho, profile.height(rho)];
@@ -225,7 +225,11 @@ fn cutter_edges(profile: &Profile, length: f64) -> Vec<Edge> {
             [last[0] + (to[0] - last[0]) * (length - last[1]) / (to[1] - last[1]), length]
         };
         if less(to, last) != [0.0; 2] {
-            edges.push(if arc { Edge::arc(last, to, centre, profile.corner) } else { Edge::line(last, to) });
+            edges.push(if arc {
+                OutlineEdge::arc(last, to, centre, profile.corner)
+            } else {
+                OutlineEdge::line(last, to)
+            });
         }
         last = to;
         if cut {
@@ -236,8 +240,8 @@ fn cutter_edges(profile: &Profile, length: f64) -> Vec<Edge> {
 }
 
 /// Lines through the given places.
-fn lines(places: &[Pair]) -> impl Iterator<Item = Edge> + '_ {
-    places.windows(2).filter(|w| w[0] != w[1]).map(|w| Edge::line(w[0], w[1]))
+fn lines(places: &[RhoZ]) -> impl Iterator<Item = OutlineEdge> + '_ {
+    places.windows(2).filter(|w| w[0] != w[1]).map(|w| OutlineEdge::line(w[0], w[1]))
 }
 
 impl Solid {
@@ -263,7 +267,7 @@ impl Solid {
         Self::stacked(Some(cutter), holder.cutting_length(), &slants(holder))
     }
 
-    fn stacked(cutter: Option<&Cutter>, cutting_length: f64, sections: &[[Pair; 2]]) -> Self {
+    fn stacked(cutter: Option<&Cutter>, cutting_length: f64, sections: &[[RhoZ; 2]]) -> Self {
         let mut whole = cutter.map_or(vec![], |c| cutter_edges(c.profile(), cutting_length));
         let mut pieces = Vec::new();
         let mut last = whole.last().map_or([0.0, cutting_length], |edge| edge.to);
@@ -329,7 +333,7 @@ impl Solid {
     /// The least radius with which it is bent outward below its top, mm; 0 with a sharp edge or a point.
     pub fn sharpest(&self) -> f64 {
         let edges = &self.outline.edges;
-        let apart = |a: Pair, b: Pair| cross(a, b).abs() > 1e-9 || dot(a, b) < 0.0;
+        let apart = |a: RhoZ, b: RhoZ| cross(a, b).abs() > 1e-9 || dot(a, b) < 0.0;
         let point = edges.first().is_some_and(|edge| apart(edge.normals[0], [0.0, -1.0]));
         // The last edge is the top.
         let below = &edges[..edges.len().saturating_sub(1)];
@@ -338,7 +342,7 @@ impl Solid {
             return 0.0;
         }
         // A side that leans is bent by no less than its distance from the axis.
-        let radius = |edge: &Edge| match edge.radius {
+        let radius = |edge: &OutlineEdge| match edge.radius {
             r if r > 0.0 => r,
             _ if edge.normals[0][0] > 0.0 => edge.from[0],
             _ => f64::INFINITY,
@@ -389,7 +393,7 @@ impl Solid {
 }
 
 /// Begin and end of the side of each section.
-fn slants(holder: &Holder) -> Vec<[Pair; 2]> {
+fn slants(holder: &Holder) -> Vec<[RhoZ; 2]> {
     let mut at = holder.cutting_length();
     let slant = |s: &HolderSection| {
         let low = [0.5 * s.diameter, at];

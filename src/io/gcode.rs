@@ -40,7 +40,7 @@ pub fn write(
     if !path.is_upright() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "three axes cannot tilt the tool"));
     }
-    let mut program = Program { writer, lines: 0, tip: [None; 3], rapid: None, feed: None };
+    let mut program = ThreeAxisProgram { writer, lines: 0, tip: [None; 3], rapid: None, feed: None };
     let start = path.start.tip;
     let top = path.moves.iter().map(|m| m.to.tip.z).fold(start.z, f64::max);
     program.line("%")?;
@@ -70,7 +70,7 @@ pub fn write(
 }
 
 /// A program in the making, and what its last lines have left in force.
-struct Program<'a> {
+struct ThreeAxisProgram<'a> {
     writer: &'a mut dyn Write,
     lines: u32,
     /// In the units of [`rounded`].
@@ -79,7 +79,7 @@ struct Program<'a> {
     feed: Option<f64>,
 }
 
-impl Program<'_> {
+impl ThreeAxisProgram<'_> {
     fn line(&mut self, text: &str) -> io::Result<()> {
         self.lines += 1;
         writeln!(self.writer, "{text}")

@@ -28,10 +28,10 @@ pub struct Section<'a> {
     table: Option<&'a DeTable<'a>>,
 }
 
-/// What a refused value is called: `a text`, `a whole number`, …
+/// What a refused value is called: `a string`, `a whole number`, …
 fn kind(value: &DeValue<'_>) -> &'static str {
     match value {
-        DeValue::String(_) => "a text",
+        DeValue::String(_) => "a string",
         DeValue::Integer(_) => "a whole number",
         DeValue::Float(_) => "a number",
         DeValue::Boolean(_) => "true or false",
@@ -39,6 +39,17 @@ fn kind(value: &DeValue<'_>) -> &'static str {
         DeValue::Array(_) => "a list",
         DeValue::Table(_) => "a table",
     }
+}
+
+/// `a number in mm (1e-6 to 10000)`.
+fn number_in(range: &RangeInclusive<f64>, unit: &str) -> String {
+    // Digits that can be counted at a glance, or an exponent.
+    let shown = |x: f64| {
+        let long = x != 0.0 && !(1e-3..1e7).contains(&x.abs());
+        if long { format!("{x:e}") } else { x.to_string() }
+    };
+    let unit = if unit.is_empty() { String::new() } else { format!(" in{unit}") };
+    format!("a number{unit} ({} to {})", shown(*range.start()), shown(*range.end()))
 }
 
 fn as_number(value: &DeValue<'_>) -> Option<f64> {
@@ -85,7 +96,7 @@ impl<'a> Section<'a> {
         self.entry(key).is_some()
     }
 
-    /// True when the key's value is a text.
+    /// True when the key's value is a string.
     pub fn is_text(&self, key: &str) -> bool {
         self.entry(key).is_some_and(|entry| matches!(entry.get_ref(), DeValue::String(_)))
     }
@@ -141,7 +152,7 @@ impl<'a> Section<'a> {
                 table: Some(table),
             }),
             other => {
-                let message = format!("`{key}` needs tables, and here is {}", kind(other));
+                let message = format!("`{key}`: expected tables, found {}", kind(other));
                 Err(self.error(&item.span(), message, cure.clone()))
             }
         };
@@ -151,7 +162,7 @@ impl<'a> Section<'a> {
     fn wrong_type(&self, key: &str, expected: &str, found: &Spanned<DeValue<'_>>, cure: &str) -> SceneError {
         self.error(
             &found.span(),
-            format!("`{key}` in {} must be {expected}, and here is {}", self.title, kind(found.get_ref())),
+            format!("`{key}` in {}: expected {expected}, found {}", self.title, kind(found.get_ref())),
             cure,
         )
     }
@@ -168,7 +179,7 @@ impl<'a> Section<'a> {
         self.error(&self.span, message, cure)
     }
 
-    /// A text that is not empty and has no control characters: it is printed, and stands in programs.
+    /// A string that is not empty and has no control characters: it is printed, and stands in programs.
     pub fn text(&self, key: &str) -> Result<Option<Located<&'a str>>, SceneError> {
         let Some(entry) = self.entry(key) else { return Ok(None) };
         match entry.get_ref() {
@@ -183,11 +194,11 @@ impl<'a> Section<'a> {
                 "write it in one line of letters",
             )),
             DeValue::String(text) => Ok(Some(Located { value: text, span: entry.span() })),
-            _ => Err(self.wrong_type(key, "a text", entry, "write it between double quotes")),
+            _ => Err(self.wrong_type(key, "a string", entry, "write it between double quotes")),
         }
     }
 
-    /// A text that must be there.
+    /// A string that must be there.
     pub fn required_text(&self, key: &str, example: &str) -> Result<Located<&'a str>, SceneError> {
         self.text(key)?.ok_or_else(|| self.missing(key, &format!("\"{example}\"")))
     }
@@ -234,7 +245,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// A finite number within `range`; `unit` completes the sentence "from 0 to 80 degrees".
+    /// A finite number within `range`; `unit` stands after a number, with the space before it: ` mm`.
     pub fn number(
         &self,
         key: &str,
@@ -252,14 +263,13 @@ impl<'a> Section<'a> {
         range: &RangeInclusive<f64>,
         unit: &str,
     ) -> Result<Located<f64>, SceneError> {
-        let (least, greatest) = (range.start(), range.end());
-        let expected = format!("a number from {least} to {greatest}{unit}");
+        let expected = number_in(range, unit);
         let Some(value) = as_number(entry.get_ref()) else {
             return Err(self.wrong_type(key, &expected, entry, "write digits without quotes or unit"));
         };
         // NaN and infinities, which TOML can write, lie in no range.
         if !range.contains(&value) {
-            let message = format!("`{key}` in {} is {value}; it must be {expected}", self.title);
+            let message = format!("`{key}` in {} is {value}; expected {expected}", self.title);
             return Err(self.error(&entry.span(), message, format!("write {expected}")));
         }
         Ok(Located { value, span: entry.span() })
@@ -291,7 +301,7 @@ impl<'a> Section<'a> {
         let limits = f64::from(*range.start())..=f64::from(*range.end());
         let Some(number) = self.number(key, limits, "")? else { return Ok(None) };
         if number.value.fract() != 0.0 {
-            let message = format!("`{key}` in {} is {}; it must be a whole number", self.title, number.value);
+            let message = format!("`{key}` in {} is {}; expected a whole number", self.title, number.value);
             return Err(self.error(&number.span, message, format!("write {}", number.value.round())));
         }
         Ok(Some(number.value as u32))
@@ -360,7 +370,7 @@ impl<'a> Section<'a> {
     }
 
     /// Rows of as many numbers, `[[…], …]`, none of them beyond what coordinates may be; `None` when the key is not there.
-    /// `what` completes the sentence "must be …".
+    /// `what` completes the sentence "expected …".
     pub fn rows<const N: usize>(
         &self,
         key: &str,

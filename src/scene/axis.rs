@@ -185,7 +185,7 @@ mod tests {
             ("{}", "one rule"),
             ("{ turning = 3 }", "one rule"),
             ("{ lead = 10, fixed = [0, 0, 1] }", "only one"),
-            ("{ lead = 85 }", "from -80 to 80"),
+            ("{ lead = 85 }", "(-80 to 80)"),
             ("{ lead = nan }", "NaN"),
             ("{ lead = 3, turning_across = 0 }", "degrees a mm"),
             ("{ fixed = [0, 0, 0] }", "no length"),

@@ -311,7 +311,7 @@ mod tests {
         let c = "{ name = \"C\", side = \"table\", direction = [0, 0, 1] }";
         let cases = [
             ("kinematics = \"ac-tabel\"".to_owned(), "cannot be", "`ac-table`", "\"ac-tabel\""),
-            ("kinematics = 5".to_owned(), "must be a text", "quotes", "5"),
+            ("kinematics = 5".to_owned(), "expected a string", "quotes", "5"),
             ("kinematic = \"ac-table\"".to_owned(), "unknown key", "`kinematics`", "kinematic"),
             ("[machine.kinematics]\n".to_owned(), "needs `first`", "preset", "[machine.kinematics]"),
             (
@@ -330,7 +330,7 @@ mod tests {
             (table(c, "{ side = \"head\", direction = [1, 0, 0] }"), "no `name`", "add `name", "{ side"),
             (table(c, "{ nane = \"A\" }"), "unknown key `nane`", "`name`", "nane"),
             (table(c, &axis("[0, 0.0, -0.0]")), "no length", "not all zero", "[0, 0.0, -0.0]"),
-            (table(c, &axis("[nan, 0, 1]")), "must be a number", "write", "nan"),
+            (table(c, &axis("[nan, 0, 1]")), "expected a number", "write", "nan"),
             (table(c, &axis("[1, 0]")), "a list of three numbers", "three numbers", "[1, 0]"),
             (table(c, &axis("[0, 0, 3]")), "are parallel", "different directions", "second"),
             (table(c, c), "called C and C", "each letter once", "second"),
@@ -347,10 +347,15 @@ mod tests {
                 "the lesser first",
                 "[30, -30]",
             ),
-            (table(c, &axis("[1, 0, 0], limits = [30, inf]")), "must be a number", "write", "inf"),
+            (table(c, &axis("[1, 0, 0], limits = [30, inf]")), "expected a number", "write", "inf"),
             (table(c, &axis("[1, 0, 0], limits = [30, 30.00001]")), "no room", "lesser limit", "second"),
             (table(c, &axis("[1, 0, 0], limits = \"no\"")), "cannot be \"no\"", "`none`", "\"no\""),
-            (table(c, &axis("[1, 0, 0], rate = 0")), "must be a number from 1", "write", "0 }"),
+            (
+                table(c, &axis("[1, 0, 0], rate = 0")),
+                "expected a number in degrees/min (1 to",
+                "write",
+                "0 }",
+            ),
             (table(c, &axis("[1, 0, 0], point = [0, 0, 2e5]")), "farther out", "write mm", "[0, 0, 2e5]"),
             (
                 "kinematics = { preset = \"ac-table\", post = \"full\" }".to_owned(),

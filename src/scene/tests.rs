@@ -270,16 +270,13 @@ fn numbers_out_of_range_are_refused_where_they_stand() {
         refused(&with("stepover = 0.3", &format!("stepover = {value}")));
     }
     let (message, _, _) = refused(&with("diameter = 6.0", "diameter = \"6\""));
-    assert_eq!(
-        message,
-        "`diameter` in [cutter] must be a number from 0.000001 to 10000 mm, and here is a text"
-    );
+    assert_eq!(message, "`diameter` in [cutter]: expected a number in mm (1e-6 to 10000), found a string");
     let (message, _, _) = refused(&with("x = [0, 60.0]", "x = [60, 0]"));
     assert_eq!(message, "`x` in [part] must run from a lesser to a greater number");
     refused(&with("x = [0, 60.0]", "x = [0, nan]"));
     refused(&with("x = [0, 60.0]", "x = [0]"));
     let (message, ..) = refused(&with("direction = { angle = 12.5 }", "control_points = 4.5"));
-    assert_eq!(message, "`control_points` in [[toolpath]] number 4 is 4.5; it must be a whole number");
+    assert_eq!(message, "`control_points` in [[toolpath]] number 4 is 4.5; expected a whole number");
     let (message, cure, _) = refused(&with("stepover = 0.3", "stepover = 7"));
     assert!(message.contains("wider than the cutter's diameter"), "{message} {cure}");
 }
@@ -487,7 +484,7 @@ fn feed_directions_that_say_nothing_are_refused() {
         ("direction = \"guide\"\nguides = [[[1, 2], [1, 2]]]", "has no length"),
         ("direction = \"guide\"\nguides = [[[1, 2]]]", "has no length"),
         ("direction = \"guide\"\nguides = [[1, 2]]", "points of two numbers"),
-        ("direction = \"guide\"\nguides = [[[1, 2], [3, nan]]]", "a number from"),
+        ("direction = \"guide\"\nguides = [[[1, 2], [3, nan]]]", "a number"),
         ("direction = \"steepest\"\nguides = [[[0, 1], [50, 2]]]", "nothing follows"),
         ("direction = \"contour\"\nacross = true", "a sense of no curve"),
         ("direction = \"border\"\nacross = 1", "true or false"),
@@ -501,10 +498,7 @@ fn feed_directions_that_say_nothing_are_refused() {
         ("direction = { blend = \"u\" }", "a list of tables"),
         ("direction = { blend = [{ direction = \"u\" }, { weight = 2 }] }", "has no `direction`"),
         ("direction = { blend = [{ direction = \"u\" }, { direction = \"shortest\" }] }", "cannot be"),
-        (
-            "direction = { blend = [{ direction = \"u\" }, { direction = \"v\", weight = 0 }] }",
-            "a number from",
-        ),
+        ("direction = { blend = [{ direction = \"u\" }, { direction = \"v\", weight = 0 }] }", "a number"),
         (
             "direction = { blend = [{ direction = \"u\" }, { direction = \"v\", wait = 1 }] }",
             "unknown key `wait`",
@@ -530,8 +524,8 @@ fn methods_that_do_not_go_together_are_refused() {
         ("method = \"differences\"\nsolver = \"qr\"", "no rectangular system"),
         ("method = \"volumes\"", "cannot be"),
         ("method = \"elements\"\ndegree = 3", "does not apply to finite elements"),
-        ("degree = 1", "from 2 to 5"),
-        ("degree = 6", "from 2 to 5"),
+        ("degree = 1", "(2 to 5)"),
+        ("degree = 6", "(2 to 5)"),
         ("degree = 5\ncontrol_points = 5", "too few for degree 5"),
         ("solver = \"minimum-norm\"\ncontrol_points = 25", "at most 600 coefficients"),
         ("solver = \"lu\"", "cannot be"),

@@ -99,16 +99,16 @@ fn scenes_that_are_no_scenes() {
 #[test]
 fn values_that_no_scene_may_have() {
     let numbers: &[(&str, &str)] = &[
-        ("nan", "from 0.000001 to 10000 mm"),
-        ("inf", "from 0.000001 to 10000 mm"),
-        ("-inf", "from 0.000001 to 10000 mm"),
-        ("1e999", "from 0.000001 to 10000 mm"),
-        ("1e12", "from 0.000001 to 10000 mm"),
-        ("1e-300", "from 0.000001 to 10000 mm"),
-        ("0", "from 0.000001 to 10000 mm"),
-        ("-6", "from 0.000001 to 10000 mm"),
+        ("nan", "in mm (1e-6 to 10000)"),
+        ("inf", "in mm (1e-6 to 10000)"),
+        ("-inf", "in mm (1e-6 to 10000)"),
+        ("1e999", "in mm (1e-6 to 10000)"),
+        ("1e12", "in mm (1e-6 to 10000)"),
+        ("1e-300", "in mm (1e-6 to 10000)"),
+        ("0", "in mm (1e-6 to 10000)"),
+        ("-6", "in mm (1e-6 to 10000)"),
         ("\"6\"", "without quotes"),
-        ("[6]", "here is a list"),
+        ("[6]", "found a list"),
         ("true", "true or false"),
         ("99999999999999999999999", "`diameter`"),
     ];
@@ -130,11 +130,11 @@ fn values_that_no_scene_may_have() {
     edit_is_refused("x = [0, 8]", "x = §[0, 4, 8]", &["`x`", "two numbers"]);
     edit_is_refused("x = [0, 8]", "x = §8", &["`x`", "two numbers"]);
     edit_is_refused("x = [0, 8]", "x = [0, §nan]", &["`x`"]);
-    edit_is_refused("x = [0, 8]", "x = [0, §1e7]", &["`x`", "1000000 mm"]);
+    edit_is_refused("x = [0, 8]", "x = [0, §1e7]", &["`x`", "1000000"]);
     edit_is_refused("x = [0, 8]", "x = [0, §\"8\"]", &["`x`"]);
     edit_is_refused("stepover = 0.5", "angle = §\"30\"", &["`angle`"]);
     edit_is_refused("\"ball\"\n", "\"ball\"\nfeed_rate = §0\n", &["`feed_rate`"]);
-    edit_is_refused("title = \"Plate\"", "title = §3", &["`title`", "a text"]);
+    edit_is_refused("title = \"Plate\"", "title = §3", &["`title`", "a string"]);
     edit_is_refused("title = \"Plate\"", "title = §\"a\\u001b[31mb\"", &["control character"]);
     edit_is_refused("title = \"Plate\"", "title = §\"a\\nb\"", &["line break"]);
     edit_is_refused("title = \"Plate\"", "title = §\"\"", &["`title` is empty"]);

@@ -52,9 +52,9 @@ fn radius_at(cutter: Option<&Cutter>, holder: Option<&Holder>, length: f64, z: f
     Some(low)
 }
 
-fn surface(cutter: Option<&Cutter>, holder: Option<&Holder>, length: f64, step: f64) -> Vec<Pair> {
+fn surface(cutter: Option<&Cutter>, holder: Option<&Holder>, length: f64, step: f64) -> Vec<RhoZ> {
     let mut places = Vec::new();
-    let steps = |places: &mut Vec<Pair>, a: Pair, b: Pair| {
+    let steps = |places: &mut Vec<RhoZ>, a: RhoZ, b: RhoZ| {
         let n = ((b[0] - a[0]).hypot(b[1] - a[1]) / step).ceil() as i32;
         places.extend((0..=n).map(|k| {
             let t = f64::from(k) / f64::from(n.max(1));
@@ -94,7 +94,7 @@ fn surface(cutter: Option<&Cutter>, holder: Option<&Holder>, length: f64, step: 
 }
 
 /// A lattice that does not fall on edges.
-fn places() -> impl Iterator<Item = Pair> {
+fn places() -> impl Iterator<Item = RhoZ> {
     (0..20).flat_map(|i| (0..40).map(move |j| [0.0137 + 0.43 * f64::from(i), -2.0 + 0.559 * f64::from(j)]))
 }
 

@@ -100,7 +100,7 @@ pub fn write_five_axis(
     if post.style == Style::Full && !post.joints.following.tip.is_finite() {
         return refuse("the joints keep no tolerance at the tip".to_owned());
     }
-    let mut program = Program::new(writer, post, path);
+    let mut program = FiveAxisProgram::new(writer, post, path);
     program.head(cutter, header)?;
     let start = post.joints.start;
     program.approach(&start, path.start.tip)?;
@@ -122,7 +122,7 @@ pub fn write_five_axis(
 }
 
 /// A program in the making, and what its last lines have left in force.
-struct Program<'a> {
+struct FiveAxisProgram<'a> {
     writer: &'a mut dyn Write,
     post: &'a FiveAxisPost<'a>,
     /// All tips of the path.
@@ -136,7 +136,7 @@ struct Program<'a> {
     at: Option<(Joints, Point3)>,
 }
 
-impl<'a> Program<'a> {
+impl<'a> FiveAxisProgram<'a> {
     fn new(writer: &'a mut dyn Write, post: &'a FiveAxisPost<'a>, path: &Toolpath) -> Self {
         let locations = std::iter::once(&path.start).chain(path.moves.iter().map(|m| &m.to));
         let tips = locations.map(|at: &ClPoint| at.tip).collect();

@@ -19,7 +19,7 @@ const UNITS: [(i64, f64); 8] =
     [(1, 25.4), (2, 304.8), (4, 1.0), (5, 10.0), (6, 1000.0), (8, 25.4e-6), (9, 0.0254), (13, 0.001)];
 
 #[derive(Debug, Clone)]
-struct Pair<'a> {
+struct CodePair<'a> {
     code: i32,
     value: &'a str,
     line: usize,
@@ -29,7 +29,7 @@ struct Pair<'a> {
 struct Entity<'a> {
     name: &'a str,
     line: usize,
-    pairs: &'a [Pair<'a>],
+    pairs: &'a [CodePair<'a>],
 }
 
 impl Entity<'_> {
@@ -41,7 +41,7 @@ impl Entity<'_> {
         OutlineError::at(self.line, format!("{}: {what}", self.name))
     }
 
-    fn parse(&self, pair: &Pair<'_>) -> Result<f64, OutlineError> {
+    fn parse(&self, pair: &CodePair<'_>) -> Result<f64, OutlineError> {
         let value: f64 = pair.value.parse().map_err(|_| {
             OutlineError::at(pair.line, format!("{}: \"{}\" is not a number", self.name, pair.value))
         })?;
@@ -85,7 +85,7 @@ impl Entity<'_> {
     }
 }
 
-fn pairs(text: &str) -> Result<Vec<Pair<'_>>, OutlineError> {
+fn pairs(text: &str) -> Result<Vec<CodePair<'_>>, OutlineError> {
     let mut lines = text.lines().enumerate();
     let mut all = Vec::new();
     while let Some((k, code)) = lines.next() {
@@ -104,7 +104,7 @@ fn pairs(text: &str) -> Result<Vec<Pair<'_>>, OutlineError> {
         let Some((_, value)) = lines.next() else {
             return Err(OutlineError::at(k + 1, "the file ends in the middle of a group"));
         };
-        all.push(Pair { code, value: value.trim(), line: k + 1 });
+        all.push(CodePair { code, value: value.trim(), line: k + 1 });
     }
     Ok(all)
 }
@@ -180,7 +180,7 @@ pub fn parse(
     Ok(drawn)
 }
 
-fn header_unit(pairs: &[Pair<'_>]) -> Result<Option<f64>, OutlineError> {
+fn header_unit(pairs: &[CodePair<'_>]) -> Result<Option<f64>, OutlineError> {
     let Some(k) = pairs.iter().position(|p| p.code == 9 && p.value == "$INSUNITS") else { return Ok(None) };
     let Some(pair) = pairs.get(k + 1) else { return Ok(None) };
     let code: i64 =
@@ -197,8 +197,8 @@ fn header_unit(pairs: &[Pair<'_>]) -> Result<Option<f64>, OutlineError> {
     })
 }
 
-fn entities<'a>(pairs: &'a [Pair<'a>]) -> Result<Vec<Entity<'a>>, OutlineError> {
-    let is = |p: &Pair<'_>, code: i32, value: &str| p.code == code && p.value == value;
+fn entities<'a>(pairs: &'a [CodePair<'a>]) -> Result<Vec<Entity<'a>>, OutlineError> {
+    let is = |p: &CodePair<'_>, code: i32, value: &str| p.code == code && p.value == value;
     let Some(from) = pairs.windows(2).position(|w| is(&w[0], 0, "SECTION") && is(&w[1], 2, "ENTITIES"))
     else {
         return Err(OutlineError::new("it has no section ENTITIES"));

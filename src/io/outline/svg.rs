@@ -22,7 +22,7 @@ const MAX_DEPTH: usize = 64;
 const PIXEL: f64 = 25.4 / 96.0;
 
 /// Points, and whether the last is joined to the first.
-type Curve = (Vec<Point2>, bool);
+type Polyline = (Vec<Point2>, bool);
 
 /// From the drawing's own coordinates to mm, y up.
 #[derive(Debug, Clone, Copy)]
@@ -238,7 +238,12 @@ impl Reader<'_> {
     }
 
     /// The curves of an element; `None` for kinds that are no outlines.
-    fn shape(&self, node: &Node<'_, '_>, name: &str, map: &Map) -> Result<Option<Vec<Curve>>, OutlineError> {
+    fn shape(
+        &self,
+        node: &Node<'_, '_>,
+        name: &str,
+        map: &Map,
+    ) -> Result<Option<Vec<Polyline>>, OutlineError> {
         let or = |key: &str, default: f64| Ok::<f64, OutlineError>(user(node, key)?.unwrap_or(default));
         let needed = |key: &str| user(node, key)?.ok_or_else(|| fault(node, format!("{key} is missing")));
         let positive = |key: &str| match needed(key)? {
@@ -301,8 +306,8 @@ impl Reader<'_> {
         Ok(Some(curves))
     }
 
-    fn path(&self, node: &Node<'_, '_>, map: &Map) -> Result<Vec<Curve>, OutlineError> {
-        let mut curves: Vec<Curve> = Vec::new();
+    fn path(&self, node: &Node<'_, '_>, map: &Map) -> Result<Vec<Polyline>, OutlineError> {
+        let mut curves: Vec<Polyline> = Vec::new();
         let (mut at, mut start) = ([0.0; 2], [0.0; 2]);
         // The control point that a smooth curve mirrors, if the last segment had one of its kind.
         let (mut cubic, mut quadratic): (Option<[f64; 2]>, Option<[f64; 2]>) = (None, None);

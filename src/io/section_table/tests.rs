@@ -211,12 +211,12 @@ fn faults_of_blades_name_line_column_and_cure() {
         "blade.toml:9:1: unknown key `angel` in [[station]] number 1; did you mean `angle`?",
     );
     at("\"6412\"", "\"6012\"", "blade.toml:7:8: \"6012\" has camber at no place");
-    at("\"6412\"", "6412", "blade.toml:7:8: `naca` in [[station]] number 1 must be a text");
+    at("\"6412\"", "6412", "blade.toml:7:8: `naca` in [[station]] number 1: expected a string, found");
     at("chord = 40\n", "", "blade.toml:5:1: [[station]] number 1 has no `chord`; add `chord = 40.0`");
     at("chord = 40", "chord = -40", "blade.toml:8:9: `chord` in [[station]] number 1 is -40");
     at("height = 60", "height = 0", "blade.toml:12:1: the station at height 0 is no higher");
     at("0.09", "0.9", "blade.toml:16:13: `thickness` in [[station]] number 2 is 0.9");
-    at("[1, 2.5]", "[1]", "blade.toml:17:8: `lean` in [[station]] number 2 must be a list of two numbers");
+    at("[1, 2.5]", "[1]", "blade.toml:17:8: `lean` in [[station]] number 2: expected a list of two numbers");
     at("{ radius = 0.3 }", "\"sharp\"", "blade.toml:3:17: `trailing_edge` in the blade cannot be \"sharp\"");
     at("{ radius = 0.3 }", "0.3", "blade.toml:3:1: `trailing_edge` of the blade is neither");
     at("radius", "radios", "blade.toml:3:19: unknown key `radios` in `trailing_edge` of the blade");

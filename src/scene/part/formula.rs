@@ -71,7 +71,7 @@ fn read_shape(part: &Section<'_>, surface: &str) -> Result<AnalyticShape, SceneE
 
 /// A parameter's value in a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Value {
+enum Parameter {
     /// A length, an angle in degrees, a factor.
     Number(f64),
     /// `true` or `false`.
@@ -79,8 +79,8 @@ enum Value {
 }
 
 /// The word for a shape and its parameters as a scene has them.
-fn describe(shape: &AnalyticShape) -> (&'static str, Vec<(&'static str, Value)>) {
-    use Value::{Flag, Number};
+fn describe(shape: &AnalyticShape) -> (&'static str, Vec<(&'static str, Parameter)>) {
+    use Parameter::{Flag, Number};
     let degrees = |angle: f64| Number(angle.to_degrees());
     match *shape {
         AnalyticShape::Plane { height } => ("plane", vec![("height", Number(height))]),
@@ -143,8 +143,8 @@ impl Source for FormulaSource {
         writeln!(out, "surface = {}", toml_string(name))?;
         for (key, value) in parameters {
             match value {
-                Value::Number(value) => writeln!(out, "{key} = {}", toml_number(value))?,
-                Value::Flag(value) => writeln!(out, "{key} = {value}")?,
+                Parameter::Number(value) => writeln!(out, "{key} = {}", toml_number(value))?,
+                Parameter::Flag(value) => writeln!(out, "{key} = {value}")?,
             }
         }
         writeln!(out, "x = [{}, {}]  # mm", toml_number(x[0]), toml_number(x[1]))?;
