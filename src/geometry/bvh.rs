@@ -102,7 +102,7 @@ impl Bvh {
 
     /// One more than the greatest index of a box; even.
     pub fn boxes(&self) -> usize {
-        self.tree.nodes.len()
+        self.tree.nodes.count()
     }
 
     /// Box `index` and the slots in it, if there are at most `limit`.

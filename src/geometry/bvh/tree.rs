@@ -35,7 +35,7 @@ impl<T: Copy> Paired<T> {
     }
 
     /// Number of values; even.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         2 * self.0.len()
     }
 }
@@ -218,7 +218,7 @@ impl BoxTree {
 
     /// One more than the greatest index of a box; even.
     pub fn nodes_len(&self) -> usize {
-        self.nodes.len()
+        self.nodes.count()
     }
 
     /// Box `index`.
@@ -237,7 +237,7 @@ impl BoxTree {
 
     /// The same tree around other boxes, one for each slot.
     pub fn refitted(&self, slots: &[Extent]) -> Self {
-        let mut nodes: Vec<Node> = (0..self.nodes.len()).map(|i| *self.nodes.at(i)).collect();
+        let mut nodes: Vec<Node> = (0..self.nodes.count()).map(|i| *self.nodes.at(i)).collect();
         for i in (0..nodes.len()).rev() {
             let (first, count) = (nodes[i].first as usize, nodes[i].count as usize);
             let extent = if count > 0 {
