@@ -9,7 +9,7 @@ use millstream::sim::{Grid, ZMap, cut};
 use millstream::toolpath::{
     Joining, OffsetAlong, OffsetDrive, PlanSettings, Step, Strategy, Tilting, plan, plan_tilted,
 };
-use millstream::work::monitor::Silent;
+use millstream::monitor::Silent;
 
 /// A ball of 6 mm as `ball`, as `bull` with its radius at the corner, and by the seven words.
 fn balls() -> [Cutter; 3] {
