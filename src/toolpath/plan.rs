@@ -1,155 +1,30 @@
 //! What a strategy is asked for, and the one entrance to all strategies.
 
-use std::sync::Arc;
-
-use super::PocketStrategy;
-use super::link::{Joining, join, join_tilted};
-use crate::levels::planned_field::{self, Contact};
-use crate::levels::spacing::Placing;
-use crate::moves::chord::{Watch, reduce, sample_within_chord};
-use crate::moves::smooth::smooth_and_spread;
+use crate::levels::planned_field;
+use crate::levels::spacing::LevelSteps;
+use crate::link::{join, join_tilted};
+use crate::pocket::PocketStrategy;
+use crate::strategies::iso_scallop::FrontStart;
 use crate::strategies::mesh_passes::Aim;
+use crate::strategies::offset_surface::{OffsetAlong, OffsetDrive};
 use crate::strategies::shortest::shortest_possible;
-use crate::strategies::streamline::Fitting;
+use crate::strategies::streamline::{Fitting, StreamMethod};
 use crate::strategies::{
     contour_spiral, iso_scallop, mesh_passes, offset_mesh, offset_surface, shortest, spiral, streamline,
     waterline, zigzag,
 };
 use crate::surface::mesh_surface;
-use crate::tilt::tilted;
-use crate::tilt::tilted::{TiltedPasses, Tilting, Touch};
+use crate::tilt::tilted::{self, TiltedPasses, Tilting};
+use crate::vocabulary::{
+    Along, Contact, FeedDirection, PassSettings, Passes, PlanError, PlanSettings, SAMPLING_OVER_RADIUS, Step,
+};
 use cutter::Cutter;
-use field::mesh::Sense;
-use field::{KnotRule, LineField, Solver};
-use field::{PlannedField, ShortestPossible};
-use geometry::{NurbsSurface, Point2, Point3, TriangleMesh};
-use motion::Toolpath;
-use motion::{AxisError, ToolAxis};
+use field::{PlannedField, ShortestPossible, Solver};
+use geometry::TriangleMesh;
+use motion::{ToolAxis, Toolpath};
 use part::Part;
 use scallop::strip_width;
-use work::monitor::{Cancelled, Monitor};
-
-/// How far neighbouring passes lie apart.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Step {
-    /// So that the scallop stays below this height, mm.
-    Scallop(f64),
-    /// This stepover, mm (measured as the strategy steps: in the plan view for zigzag, on the
-    /// surface for the others).
-    Stepover(f64),
-}
-
-/// Which parameter a pass follows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Along {
-    /// u grows along a pass, v is constant.
-    U,
-    /// v grows along a pass, u is constant.
-    V,
-}
-
-/// Where the feed direction of a streamline comes from.
-#[derive(Debug, Clone, PartialEq)]
-pub enum FeedDirection {
-    /// Along a parameter of the patch (x and y of a mesh part).
-    Parameter(Along),
-    /// A fixed angle from the x axis in the plan view, rad.
-    Angle(f64),
-    /// Across the widest strip, from the principal curvatures.
-    WidestStrip,
-    /// Up the slope of the surface; none on level ground.
-    Steepest,
-    /// Level along the surface, square to the slope; none on level ground.
-    Contour,
-    /// As sampled at places of the plan view, or of the parameters of each patch.
-    Samples(Arc<LineField>),
-    /// From curves of the plan view; between and beyond them the smoothest field that they allow.
-    Guides {
-        /// Polylines of at least two different points, mm.
-        curves: Arc<Vec<Vec<Point2>>>,
-        /// Along or across them.
-        sense: Sense,
-    },
-    /// From the borders of the part, of each patch where patches are planned one by one; inside, the smoothest field
-    /// that they allow.
-    Border(Sense),
-    /// The mean of directions as lines (of their doubled angles in the tangent plane) by positive weights, each times how
-    /// much its direction matters at the place.
-    Blend(Vec<(FeedDirection, f64)>),
-}
-
-/// How a stream function is fitted to feed directions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StreamMethod {
-    /// A tensor-product B-spline by least squares.
-    BSpline {
-        /// Its degree, 2 to 5.
-        degree: usize,
-        /// How its knots are placed.
-        knots: KnotRule,
-    },
-    /// Finite differences on a grid.
-    Differences,
-    /// Finite elements on the part's mesh: all patches as one surface, holes and steps as they are.
-    Elements,
-    /// Elements for parts of several patches and for meshes that no height surface follows; else a cubic B-spline on
-    /// uniform knots.
-    Automatic,
-}
-
-/// How levels step from pass to pass.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LevelSteps {
-    /// As wide as makes the passes, with further short ones where the step is too wide, shortest in all.
-    Shortest,
-    /// The same step throughout, the one with the shortest passes in all.
-    Constant,
-    /// Each step the least that the pass before and the next one allow at any of their places.
-    Least,
-}
-
-/// Where a front starts whose levels are passes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum FrontStart {
-    /// The border from which the path is shortest.
-    BestBorder,
-    /// Where a parameter is least or greatest.
-    Border {
-        /// The parameter that is constant there.
-        constant: Along,
-        /// Its greatest value, not its least.
-        greatest: bool,
-    },
-    /// All four borders at once: passes run around.
-    AllBorders,
-    /// A straight line in shares of the parameters' ranges (0 to 1), to both sides; it is continued to the borders.
-    Line([[f64; 2]; 2]),
-}
-
-/// How passes run on an offset surface.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum OffsetAlong {
-    /// u grows along a pass: along the sections of a blade.
-    U,
-    /// v grows along a pass: across the sections, from hub to tip.
-    V,
-    /// One spiral, u growing along it, on surfaces that close along u.
-    Spiral,
-    /// Vertical planes in this direction of the plan view, rad from x: on meshes, which have no parameters.
-    Angle(f64),
-}
-
-/// Which offset surface the ball's centre rides on.
-#[derive(Debug, Clone, PartialEq)]
-pub enum OffsetDrive {
-    /// The part's own, everywhere the radius off along the normal.
-    Exact,
-    /// Sections offset in their planes, and lofted. It lies too near wherever the surface leans out of these planes; whoever
-    /// has the sections puts [`OffsetDrive::Given`] in its place. A tilted tool that keeps clear leaves such places out.
-    InPlane,
-    /// These surfaces, `du × dv` away from the part.
-    Given(Arc<Vec<NurbsSurface>>),
-}
+use work::monitor::Monitor;
 
 /// A way to cover the part with passes.
 #[derive(Debug, Clone, PartialEq)]
@@ -237,64 +112,6 @@ impl Strategy {
     }
 }
 
-/// What every strategy needs to know besides part and cutter.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PlanSettings {
-    /// Distance of passes.
-    pub step: Step,
-    /// Largest distance between the straight moves and the exact path, mm.
-    pub chord_tolerance: f64,
-    /// Height of rapid moves above the highest point of part and stock, mm.
-    pub clearance: f64,
-    /// Highest point of the stock, mm.
-    pub stock_top: f64,
-    /// Feed along passes, mm/min.
-    pub feed_rate: f64,
-    /// Feed down to a pass, mm/min.
-    pub plunge_rate: f64,
-    /// Rapid rate, mm/min; it decides between links on the surface and retracts.
-    pub rapid_rate: f64,
-    /// How passes are smoothed and joined.
-    pub joining: Joining,
-}
-
-/// Why no path could be planned.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum PlanError {
-    /// Stopped by the user.
-    #[error(transparent)]
-    Cancelled(#[from] Cancelled),
-    /// The strategy does not apply to this part.
-    #[error("{strategy} cannot plan this part: {reason}")]
-    NotApplicable {
-        /// Strategy's name.
-        strategy: &'static str,
-        /// Why, and what would help.
-        reason: String,
-    },
-    /// No smooth surface, which directions and distances of passes come from, could be fitted to a mesh.
-    #[error(
-        "no smooth surface could be fitted to the mesh ({0}); export a part that is more than a sliver seen from above"
-    )]
-    NoFit(String),
-    /// The rule gives no tool axis at a place.
-    #[error(transparent)]
-    Axis(#[from] AxisError),
-    /// The passes lie so close on so large a part that planning them would take days or all memory.
-    #[error(
-        "passes {step} mm apart over {x} x {y} mm would be too many; set a greater `stepover` or `scallop`, \
-         and check the units of the part"
-    )]
-    TooMany {
-        /// Greatest distance of passes that the settings allow, mm.
-        step: f64,
-        /// Size of the part along x, mm.
-        x: f64,
-        /// Size of the part along y, mm.
-        y: f64,
-    },
-}
-
 /// A planned path and what the planner has to say about it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
@@ -329,122 +146,12 @@ impl Plan {
     }
 }
 
-impl LevelSteps {
-    fn placing(self) -> Placing {
-        match self {
-            Self::Shortest => Placing::Shortest,
-            Self::Constant => Placing::OneStep,
-            Self::Least => Placing::Least,
-        }
-    }
-}
-
-impl PlanError {
-    pub(crate) fn mesh(reason: &str) -> Self {
-        Self::NoFit(reason.to_owned())
-    }
-}
-
-/// What every pass needs.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct PassSettings<'a> {
-    /// Distance of passes, already less what the chords may add.
-    pub step: Step,
-    /// First sampling distance along a pass, mm.
-    pub sampling: f64,
-    /// Chord tolerance, mm.
-    pub chord_tolerance: f64,
-    /// The sampling distance, mm, by which passes are smoothed; `None` leaves them as they are.
-    pub smoothing: Option<f64>,
-    /// How the cutter is tilted; upright without it.
-    pub axis: Option<&'a ToolAxis>,
-    /// The ball that is dropped in its stead where a tilted cutter, no ball itself, is located by the contacts of that.
-    pub probe: Option<&'a Cutter>,
-}
-
-/// Shares of the chord tolerance that sampling and point reduction may use. Together they leave a part of it: ridges stand
-/// between chords of two passes, and passes lie the closer the more chords may raise them.
-const SAMPLING_SHARE: f64 = 0.1;
-const REDUCTION_SHARE: f64 = 0.4;
-
-impl<'a> PassSettings<'a> {
-    /// The cutter that is dropped.
-    pub fn dropped<'b>(&self, cutter: &'b Cutter) -> &'b Cutter
-    where
-        'a: 'b,
-    {
-        self.probe.unwrap_or(cutter)
-    }
-
-    /// Straight moves along `locate` over `[s0, s1]` within the chord tolerance.
-    ///
-    /// # Errors
-    /// [`Cancelled`] when the monitor says so, which is asked every few hundred places.
-    pub fn moves(
-        &self,
-        s0: f64,
-        s1: f64,
-        locate: &mut dyn FnMut(f64) -> Option<Point3>,
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<Point3>, Cancelled> {
-        let fine = SAMPLING_SHARE * self.chord_tolerance;
-        let mut watch = Watch::new(monitor);
-        let points = sample_within_chord(s0, s1, self.sampling, fine, locate, &mut watch)?;
-        match self.smoothing {
-            Some(sampling) => {
-                let share = if let Step::Scallop(_) = self.step { SMOOTHED_SHARE } else { 1.0 };
-                smooth_and_spread(&points, sampling, share * (self.chord_tolerance - fine), &mut watch)
-            }
-            None => reduce(&points, REDUCTION_SHARE * self.chord_tolerance, &mut watch),
-        }
-    }
-}
-
-/// Planned passes, not yet joined, and remarks for the user.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Passes {
-    /// Tip positions of each pass.
-    pub passes: Vec<Vec<Point3>>,
-    /// Where a tilted cutter touches along each pass, whose tips then count for nothing; empty for an upright one.
-    pub touches: Vec<Vec<Touch>>,
-    /// Remarks.
-    pub notes: Vec<String>,
-    /// What they were planned by, where they are levels of a function.
-    pub field: PlannedField,
-    /// Where the cutter touches along each pass, in no order, where they are levels of a function.
-    pub contacts: Vec<Vec<Contact>>,
-}
-
-impl Passes {
-    /// Length of all passes, mm.
-    pub fn length(&self) -> f64 {
-        self.passes.iter().flat_map(|pass| pass.windows(2)).map(|w| (w[1] - w[0]).norm()).sum()
-    }
-
-    /// Appends the passes and remarks of another piece of the part.
-    pub fn append(&mut self, other: Self) {
-        self.passes.extend(other.passes);
-        self.touches.extend(other.touches);
-        self.notes.extend(other.notes);
-        self.field.append(other.field);
-        self.contacts.extend(other.contacts);
-    }
-}
-
-/// First sampling distance along a pass as a share of the cutter's radius: features narrower than
-/// that could hide between two samples of a pass.
-const SAMPLING_OVER_RADIUS: f64 = 0.15;
-
 /// A scallop target is planned for less this share of the chord tolerance. A chord may raise a ridge by half of it, but
 /// ridges stand between chords of two passes, whose greatest deviations seldom meet.
 const CHORD_SHARE: f64 = 0.26;
 
 /// The same of smoothed passes, whose points and chords stray farther.
 const SMOOTHED_CHORD_SHARE: f64 = 0.5;
-
-/// Where passes are spaced for a scallop, smoothing takes this share of the chord tolerance. With all of it there are 15 % fewer
-/// points, but 2 % of the ridges of a saddle stand over the target.
-const SMOOTHED_SHARE: f64 = 0.78;
 
 /// On a mesh it is planned for less by what facets stand off the smooth surface, too: on elements, whose curvature is that of
 /// the facets around, and on meshes with steps, by the height that this share of them (by area) stays below. On surfaces
@@ -619,17 +326,16 @@ fn passes(
         Strategy::Zigzag { angle, one_way } => {
             (zigzag::passes(part, cutter, *angle, &pass, monitor)?, !one_way)
         }
-        Strategy::IsoParametric { along } => {
-            (streamline::iso_parametric(part, cutter, Some(*along), Placing::Shortest, &pass, monitor)?, true)
-        }
+        Strategy::IsoParametric { along } => (
+            streamline::iso_parametric(part, cutter, Some(*along), LevelSteps::Shortest, &pass, monitor)?,
+            true,
+        ),
         Strategy::BestZigzag { one_way } => (zigzag::best(part, cutter, &pass, monitor)?, !one_way),
         Strategy::IsoParametricSteps { along, steps } => {
-            (streamline::iso_parametric(part, cutter, *along, steps.placing(), &pass, monitor)?, true)
+            (streamline::iso_parametric(part, cutter, *along, *steps, &pass, monitor)?, true)
         }
         Strategy::IsoScallop { start } => (iso_scallop::passes(part, cutter, *start, &pass, monitor)?, true),
-        Strategy::Waterline { steps } => {
-            (waterline::passes(part, cutter, steps.placing(), &pass, monitor)?, true)
-        }
+        Strategy::Waterline { steps } => (waterline::passes(part, cutter, *steps, &pass, monitor)?, true),
         Strategy::Spiral => (spiral::passes(part, cutter, &pass, monitor)?, true),
         Strategy::ContourSpiral => (contour_spiral::passes(part, cutter, &pass, monitor)?, true),
         Strategy::OffsetSurface { along: OffsetAlong::Angle(angle), .. } => {

@@ -3,16 +3,14 @@
 //! Curves are traced a little beyond the chart, on its continuation, and every place of the cutter comes
 //! from dropping it onto the part. Which levels and stretches are cut is decided in `halving`.
 
-use super::gaps;
 use super::halving::{Allowed, LevelSource, Track, along_and_between};
-use super::planned_field::{self, Contact};
-use super::spacing::{Placing, level_tangent, place_levels, places_of};
-use crate::Step;
+use super::spacing::{LevelSteps, level_tangent, place_levels, places_of};
+use super::{gaps, planned_field};
 use crate::drop::{Beside, DropCutter};
-use crate::plan::{PassSettings, Passes, PlanError};
+use crate::moves::touch::Touch;
 use crate::surface::chart::Chart;
 use crate::tilt::tilted;
-use crate::tilt::tilted::Touch;
+use crate::vocabulary::{Contact, PassSettings, Passes, PlanError, Step};
 use cutter::Cutter;
 use field::{LevelCurve, LevelTracer, ScalarField, surface_gradient_length};
 use geometry::Point3;
@@ -58,7 +56,7 @@ pub(crate) fn along_levels(
     settings: &PassSettings,
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
-    along_levels_placed(part, cutter, chart, field, Placing::Shortest, settings, monitor)
+    along_levels_placed(part, cutter, chart, field, LevelSteps::Shortest, settings, monitor)
 }
 
 /// [`along_levels`] with levels placed in a given way.
@@ -67,7 +65,7 @@ pub(crate) fn along_levels_placed(
     cutter: &Cutter,
     chart: &Chart,
     field: &ScalarField,
-    placing: Placing,
+    placing: LevelSteps,
     settings: &PassSettings,
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {

@@ -4,12 +4,12 @@
 //! step of `w·|∇ψ|` is allowed. A pass meets places that allow much and places that allow little. A
 //! step for the least of them serves all, and wastes length wherever more is allowed; a greater step
 //! needs further passes, at halves and quarters of the interval, along the places that allow less.
-//! For every part of the range of ψ the step is chosen that makes the sum of both shortest. (Placing
+//! For every part of the range of ψ the step is chosen that makes the sum of both shortest. (LevelSteps
 //! each pass at the least step of the one before, as streamline paths were first planned, is the
 //! choice of the least step throughout.)
 
-use crate::plan::PassSettings;
 use crate::surface::chart::{Chart, ChartPoint};
+use crate::vocabulary::PassSettings;
 use cutter::Cutter;
 use field::{ScalarField, surface_gradient_length};
 use geometry::Vector3;
@@ -51,14 +51,14 @@ pub(crate) struct Place {
     pub too_concave: bool,
 }
 
-/// How the levels of whole passes are placed.
+/// How levels step from pass to pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Placing {
-    /// Each part of the range with the step that makes the passes shortest in all.
+pub enum LevelSteps {
+    /// As wide as makes the passes, with further short ones where the step is too wide, shortest in all.
     Shortest,
-    /// One step for the whole range, the one that makes the passes shortest in all.
-    OneStep,
-    /// Each at the least step that the one before allows.
+    /// The same step throughout, the one with the shortest passes in all.
+    Constant,
+    /// Each step the least that the pass before and the next one allow at any of their places.
     Least,
 }
 
@@ -86,13 +86,13 @@ pub(crate) fn places_of(
 pub(crate) fn place_levels(
     places: &[Place],
     [lo, hi]: [f64; 2],
-    placing: Placing,
+    placing: LevelSteps,
     notes: &mut Vec<String>,
 ) -> Vec<f64> {
     let count_of_windows = match placing {
-        Placing::Shortest => WINDOWS,
-        Placing::OneStep => 1,
-        Placing::Least => SAMPLES,
+        LevelSteps::Shortest => WINDOWS,
+        LevelSteps::Constant => 1,
+        LevelSteps::Least => SAMPLES,
     };
     if hi <= lo {
         return vec![lo];
@@ -113,7 +113,7 @@ pub(crate) fn place_levels(
     let mut all: Vec<f64> = windows.iter().flatten().map(|p| p.step).collect();
     all.sort_by(f64::total_cmp);
     let least = LEAST_OVER_MEDIAN * all.get(all.len() / 2).copied().unwrap_or(hi - lo);
-    if placing == Placing::Least {
+    if placing == LevelSteps::Least {
         let least_of = |places: &Vec<Place>| places.iter().map(|p| p.step.max(least)).min_by(f64::total_cmp);
         let steps: Vec<Option<f64>> = windows.iter().map(least_of).collect();
         return one_after_the_other(&filled(&steps, hi - lo), [lo, hi]);

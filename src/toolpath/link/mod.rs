@@ -19,46 +19,19 @@ mod order;
 mod tests;
 mod tilted;
 
-use super::{DropCutter, PlanSettings, Step};
+use super::DropCutter;
 use crate::surface::border::Border;
+use crate::vocabulary::{Joining, Links, PlanSettings, Step};
 use bend::{Bends, End};
 use ceiling::Ceiling;
 use cutter::Cutter;
-use geometry::distance_to_segment;
-use geometry::{Point2, Point3, Vector2};
+use geometry::{Point2, Point3, Vector2, distance_to_segment};
 use motion::{ClPoint, Move, MoveKind, Toolpath};
 use order::{Visit, is_closed, order};
 use part::Part;
 use scallop::strip_width;
 pub(crate) use tilted::join_tilted;
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
-
-/// How the end of a pass and the start of the next are joined.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Links {
-    /// Along the surface where that is quicker, else by a retract.
-    Surface,
-    /// By retracts only.
-    Retract,
-}
-
-/// How passes become a program.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Joining {
-    /// What joins them.
-    pub links: Links,
-    /// No link on the surface is longer, mm; `None` takes [`LONGEST_LINK`] intervals.
-    pub longest_link: Option<f64>,
-    /// Whether the points of each pass are smoothed and spread within the chord tolerance.
-    pub smoothing: bool,
-}
-
-impl Default for Joining {
-    fn default() -> Self {
-        Self { links: Links::Retract, longest_link: None, smoothing: false }
-    }
-}
+use work::monitor::{self, Cancelled, Monitor};
 
 /// Longest link on the surface, in intervals between passes on a plane, unless another is asked for. It
 /// reaches the next pass along borders that passes meet at six degrees or more; longer ones leave traces

@@ -9,11 +9,13 @@ mod bent;
 mod ways;
 
 use super::order::{Visit, is_closed, order};
-use super::{Links, Rates, longest_link, plane_interval};
+use super::{Rates, longest_link, plane_interval};
+use crate::RepairSummary;
+use crate::moves::touch::Touch;
 use crate::tilt::across;
 use crate::tilt::repair::{Repaired, repair};
-use crate::tilt::tilted::{TiltedPasses, Tilting, Touch, limit_turning, located, reversed};
-use crate::{PlanError, PlanSettings, RepairSummary};
+use crate::tilt::tilted::{TiltedPasses, Tilting, limit_turning, located, reversed};
+use crate::vocabulary::{Links, PlanError, PlanSettings};
 use bent::Bent;
 use collision::{Check, Interference, Obstacle};
 use cutter::{Cutter, Solid};
@@ -21,8 +23,7 @@ use geometry::Point3;
 use motion::{ClPoint, Move, MoveKind, Toolpath};
 use part::Part;
 use ways::{Block, Step, Ways};
-use work::monitor;
-use work::monitor::Monitor;
+use work::monitor::{self, Monitor};
 
 /// Joins passes; see the module.
 ///

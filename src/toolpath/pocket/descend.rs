@@ -2,7 +2,7 @@
 
 use super::route::circle;
 use super::{Entry, PocketStrategy, Run};
-use crate::PlanSettings;
+use crate::vocabulary::PlanSettings;
 use geometry::{Point2, Point3, foot};
 use motion::{ClPoint, Move, MoveKind, Toolpath};
 

@@ -25,11 +25,11 @@ use nest::NestError;
 use route::{Entry, Run};
 use turning::Turning;
 
-use super::{Plan, PlanError, PlanSettings, Step};
+use super::Plan;
+use crate::vocabulary::{PlanError, PlanSettings, Step};
 use cutter::{Cutter, CutterShape};
 use geometry::{Piece, Point2, Region, SegmentGrid, Vector2};
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// A pocket to mill.
 #[derive(Debug, Clone, PartialEq)]

@@ -8,8 +8,7 @@ use super::Flow;
 use super::turning::{Turning, curvatures};
 use field::{PlanarError, PlanarMesh};
 use geometry::{CurveSegment, Piece, Point2, Region, SegmentGrid};
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// Side of the triangles over the stepover. Finer ones place levels better and cost time as their square.
 const EDGE_OVER_STEP: f64 = 0.35;

@@ -10,14 +10,13 @@
 use super::iso_scallop::arrival;
 use crate::drop::DropCutter;
 use crate::levels::spacing::level_tangent;
-use crate::plan::{PassSettings, Passes, PlanError};
 use crate::surface::chart::Chart;
+use crate::vocabulary::{PassSettings, Passes, PlanError};
 use cutter::Cutter;
 use field::{LevelTracer, ScalarField, surface_gradient_length};
 use geometry::Point3;
 use part::Part;
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// Grid cells a side on which levels are found.
 const TRACE_CELLS: usize = 240;

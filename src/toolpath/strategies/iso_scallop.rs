@@ -9,9 +9,8 @@
 
 use crate::levels::level_passes::along_levels;
 use crate::levels::spacing::level_tangent;
-use crate::plan::{FrontStart, PassSettings, Passes, PlanError};
 use crate::surface::chart::{Chart, ChartPoint};
-use crate::{Along, Step};
+use crate::vocabulary::{Along, PassSettings, Passes, PlanError, Step};
 use cutter::Cutter;
 use field::{EikonalError, Front, GridField, ScalarField, Start, eikonal, surface_gradient_length};
 use part::Part;
@@ -34,6 +33,24 @@ const LENGTH_SAMPLES: usize = 120;
 
 /// How many of the starts with the least predicted length are planned; the prediction leaves out further passes.
 const PLANNED: usize = 2;
+
+/// Where a front starts whose levels are passes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum FrontStart {
+    /// The border from which the path is shortest.
+    BestBorder,
+    /// Where a parameter is least or greatest.
+    Border {
+        /// The parameter that is constant there.
+        constant: Along,
+        /// Its greatest value, not its least.
+        greatest: bool,
+    },
+    /// All four borders at once: passes run around.
+    AllBorders,
+    /// A straight line in shares of the parameters' ranges (0 to 1), to both sides; it is continued to the borders.
+    Line([[f64; 2]; 2]),
+}
 
 /// Plans passes from a start curve.
 pub fn passes(
@@ -205,7 +222,7 @@ pub(crate) fn predicted_length(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::levels::spacing::{Placing, place_levels, places_of};
+    use crate::levels::spacing::{LevelSteps, place_levels, places_of};
     use field::LevelTracer;
     use geometry::{NurbsSurface, Point3};
     use part::Patch;
@@ -245,7 +262,7 @@ mod tests {
         let interval = (8.0f64 * 0.05 * 5.0).sqrt();
         assert!((range[1] - range[0] - 10.0 / interval).abs() < 0.01, "{range:?}");
         let allowed = places_of(chart, &cutter, &field, &settings);
-        let levels = place_levels(&allowed, range, Placing::Shortest, &mut Vec::new());
+        let levels = place_levels(&allowed, range, LevelSteps::Shortest, &mut Vec::new());
         assert_eq!(levels.len(), 8);
         let length = |points: &[[f64; 2]]| {
             let at = |[u, v]: [f64; 2]| chart.jet(u, v).p;

@@ -10,14 +10,12 @@ use super::mesh_shortest::shortest_stream;
 use super::shortest::shortest_note;
 use crate::drop::DropCutter;
 use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between};
-use crate::levels::planned_field::{self, Contact};
-use crate::levels::spacing::{Place, Placing, place_levels};
-use crate::plan::{PassSettings, Passes, PlanError};
+use crate::levels::planned_field;
+use crate::levels::spacing::{LevelSteps, Place, place_levels};
 use crate::surface::border::useful_overrun;
-use crate::surface::feed;
-use crate::surface::feed::SMOOTHING_OVER_RADIUS;
+use crate::surface::feed::{self, SMOOTHING_OVER_RADIUS};
 use crate::surface::mesh_surface::{MeshSurface, Piece, not_applicable, reachable};
-use crate::{FeedDirection, Step};
+use crate::vocabulary::{Contact, FeedDirection, PassSettings, Passes, PlanError, Step};
 use cutter::Cutter;
 use field::DIRECTION_WEIGHT;
 use field::mesh::{
@@ -133,7 +131,7 @@ fn on_piece(
     let drop = DropCutter::new(part, cutter);
     let guide = MeshGuide { surface, levels, cutter, drop, settings, monitor };
     let places = guide.places(&values);
-    let placed = place_levels(&places, range, Placing::Shortest, &mut all.notes);
+    let placed = place_levels(&places, range, LevelSteps::Shortest, &mut all.notes);
     planned_field::set_mesh_levels(&mut all.field, &guide.levels, range, surface.own_triangles);
     if matches!(aim, Aim::Shortest(None)) {
         planned_field::set_mesh_feed(

@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use super::mesh_passes::width_at;
-use crate::plan::Step;
 use crate::surface::mesh_surface::MeshSurface;
+use crate::vocabulary::Step;
 use cutter::Cutter;
 use field::mesh::{Bend, gradient_terms};
 use field::{Front, Gradients, Packed, Roughness, Rounds, Site, minimise};

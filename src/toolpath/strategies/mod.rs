@@ -1,4 +1,5 @@
-//! The strategies: each a way to cover a part with passes.
+//! The strategies, one file each: its parameters, its keys in a scene, its planner. Enters: part, cutter and pass settings.
+//! Leaves: passes, not yet joined.
 
 pub mod contour_spiral;
 pub mod iso_scallop;

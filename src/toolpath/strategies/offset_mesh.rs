@@ -21,13 +21,12 @@ mod guide;
 #[cfg(test)]
 mod tests;
 
-use crate::Step;
 use crate::drop::DropCutter;
 use crate::levels::halving::along_and_between;
-use crate::levels::spacing::{Placing, place_levels};
-use crate::plan::{PassSettings, Passes, PlanError};
+use crate::levels::spacing::{LevelSteps, place_levels};
+use crate::moves::touch::Touch;
 use crate::tilt::tilted;
-use crate::tilt::tilted::Touch;
+use crate::vocabulary::{PassSettings, Passes, PlanError, Step};
 use cutter::{Cutter, CutterShape};
 use field::DIRECTION_WEIGHT;
 use field::mesh::{
@@ -322,7 +321,8 @@ impl Rider<'_> {
         let gradients = triangle_gradients(mesh, &stream.values);
         let guide = Guide { rider: self, mesh, levels, gradients, widths, reached };
         let mut passes = Passes::default();
-        let placed = place_levels(&guide.places(&stream.values), range, Placing::Shortest, &mut passes.notes);
+        let placed =
+            place_levels(&guide.places(&stream.values), range, LevelSteps::Shortest, &mut passes.notes);
         passes.append(along_and_between(&guide, &placed, range, self.settings.sampling, self.monitor)?);
         Ok((passes, missed))
     }

@@ -13,13 +13,11 @@ use std::sync::Arc;
 
 use crate::drop::{Beside, DropCutter};
 use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between};
-use crate::levels::planned_field::Contact;
-use crate::levels::spacing::{Place, Placing, place_levels};
-use crate::plan::{PassSettings, Passes, PlanError};
+use crate::levels::spacing::{LevelSteps, Place, place_levels};
+use crate::moves::touch::Touch;
 use crate::surface::chart::{Chart, ChartPoint};
 use crate::tilt::tilted;
-use crate::tilt::tilted::Touch;
-use crate::{Along, OffsetAlong, OffsetDrive, Step};
+use crate::vocabulary::{Along, Contact, PassSettings, Passes, PlanError, Step};
 use cutter::{Cutter, CutterShape};
 use field::surface_gradient_length;
 use geometry::{NurbsSurface, Point3, Vector3};
@@ -43,6 +41,31 @@ const OVERRUN: f64 = 0.3;
 
 /// Ends of a line nearer than this, mm, are one place of a closed one.
 const SEAM: f64 = 1e-7;
+
+/// How passes run on an offset surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum OffsetAlong {
+    /// u grows along a pass: along the sections of a blade.
+    U,
+    /// v grows along a pass: across the sections, from hub to tip.
+    V,
+    /// One spiral, u growing along it, on surfaces that close along u.
+    Spiral,
+    /// Vertical planes in this direction of the plan view, rad from x: on meshes, which have no parameters.
+    Angle(f64),
+}
+
+/// Which offset surface the ball's centre rides on.
+#[derive(Debug, Clone, PartialEq)]
+pub enum OffsetDrive {
+    /// The part's own, everywhere the radius off along the normal.
+    Exact,
+    /// Sections offset in their planes, and lofted. It lies too near wherever the surface leans out of these planes; whoever
+    /// has the sections puts [`OffsetDrive::Given`] in its place. A tilted tool that keeps clear leaves such places out.
+    InPlane,
+    /// These surfaces, `du × dv` away from the part.
+    Given(Arc<Vec<NurbsSurface>>),
+}
 
 /// Plans passes on the offset surfaces of all patches.
 pub(crate) fn passes(
@@ -186,7 +209,7 @@ impl Rider<'_> {
 
     /// Passes along parameter lines.
     fn lines(&self) -> Result<Passes, PlanError> {
-        let (levels, notes) = self.levels(Placing::Shortest)?;
+        let (levels, notes) = self.levels(LevelSteps::Shortest)?;
         let [_, range] = self.ranges();
         let mut passes = along_and_between(self, &levels, range, self.settings.sampling, self.monitor)?;
         passes.notes.splice(0..0, notes);
@@ -200,7 +223,7 @@ impl Rider<'_> {
         matches!(ends, [Some(a), Some(b)] if (a - b).norm() <= SEAM)
     }
 
-    fn levels(&self, placing: Placing) -> Result<(Vec<f64>, Vec<String>), PlanError> {
+    fn levels(&self, placing: LevelSteps) -> Result<(Vec<f64>, Vec<String>), PlanError> {
         let places: Vec<Place> =
             self.chart.grid(SAMPLES).filter_map(|uv| self.place(uv)).map(|(place, _)| place).collect();
         if places.is_empty() {
@@ -220,7 +243,7 @@ impl Rider<'_> {
                  `along = \"u\"`",
             ));
         }
-        let (levels, notes) = self.levels(Placing::Least)?;
+        let (levels, notes) = self.levels(LevelSteps::Least)?;
         let turn = levels.iter().map(|&v| self.line_length(v)).fold(0.0, f64::max);
         let steps = (turn / self.settings.sampling).ceil().max(4.0);
         let last = levels.len() as f64;

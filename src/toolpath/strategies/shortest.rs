@@ -17,9 +17,10 @@ use std::f64::consts::PI;
 use super::iso_scallop::{front_at, on_chart, places};
 use crate::levels::level_passes::along_levels;
 use crate::levels::planned_field;
-use crate::plan::{FeedDirection, FrontStart, PassSettings, Passes, PlanError, Step};
+use crate::strategies::iso_scallop::FrontStart;
 use crate::surface::chart::{Chart, ChartPoint};
 use crate::surface::feed;
+use crate::vocabulary::{FeedDirection, PassSettings, Passes, PlanError, Step};
 use cutter::Cutter;
 use field::{
     Gradients, NormalEquations, Packed, Roughness, Rounds, ScalarField, ScalarSpline, ShortestPossible, Site,

@@ -6,17 +6,15 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::zigzag::{least_over_plane, stepover_at};
-use crate::Step;
 use crate::drop::DropCutter;
-use crate::plan::{PassSettings, Passes, PlanError};
 use crate::surface::border::Border;
 use crate::surface::chart::Chart;
 use crate::surface::plan_curve::PlanCurves;
+use crate::vocabulary::{PassSettings, Passes, PlanError, Step};
 use cutter::Cutter;
 use geometry::Vector2;
 use part::Part;
-use work::monitor;
-use work::monitor::Monitor;
+use work::monitor::{self, Monitor};
 
 /// Places a side of each chart at which the pitch is computed.
 const SAMPLES: usize = 160;

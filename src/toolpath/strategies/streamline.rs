@@ -3,14 +3,12 @@
 
 use crate::levels::level_passes::{along_levels, along_levels_placed};
 use crate::levels::planned_field;
-use crate::levels::spacing::Placing;
-use crate::plan::{PassSettings, Passes, PlanError};
+use crate::levels::spacing::LevelSteps;
 use crate::surface::chart::{Chart, ChartPoint};
 use crate::surface::feed;
 use crate::surface::mesh_surface::not_applicable;
-use crate::{Along, FeedDirection, StreamMethod};
+use crate::vocabulary::{Along, FeedDirection, PassSettings, Passes, PlanError};
 use cutter::Cutter;
-use field;
 use field::{
     Axis, FieldError, KnotRule, ScalarField, Solver, StreamSample, averaged_knots, equal_shares,
     fit_by_differences, fit_stream_function, weighted_knots,
@@ -32,7 +30,7 @@ pub fn iso_parametric(
     part: &Part,
     cutter: &Cutter,
     along: Option<Along>,
-    placing: Placing,
+    placing: LevelSteps,
     settings: &PassSettings,
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
@@ -55,7 +53,7 @@ fn iso_parametric_along(
     part: &Part,
     cutter: &Cutter,
     along: Along,
-    placing: Placing,
+    placing: LevelSteps,
     settings: &PassSettings,
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
@@ -68,6 +66,25 @@ fn iso_parametric_along(
         all.append(along_levels_placed(part, cutter, &chart, &field, placing, settings, monitor)?);
     }
     Ok(all)
+}
+
+/// How a stream function is fitted to feed directions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StreamMethod {
+    /// A tensor-product B-spline by least squares.
+    BSpline {
+        /// Its degree, 2 to 5.
+        degree: usize,
+        /// How its knots are placed.
+        knots: KnotRule,
+    },
+    /// Finite differences on a grid.
+    Differences,
+    /// Finite elements on the part's mesh: all patches as one surface, holes and steps as they are.
+    Elements,
+    /// Elements for parts of several patches and for meshes that no height surface follows; else a cubic B-spline on
+    /// uniform knots.
+    Automatic,
 }
 
 /// How a stream function is fitted, and to how many coefficients.

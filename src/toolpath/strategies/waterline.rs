@@ -8,9 +8,9 @@
 //! Limits: level ground has no contours; how much of the part is too level for the passes is said in a note.
 
 use crate::levels::level_passes::along_levels_placed;
-use crate::levels::spacing::{Placing, level_tangent};
-use crate::plan::{PassSettings, Passes, PlanError};
+use crate::levels::spacing::{LevelSteps, level_tangent};
 use crate::surface::chart::Chart;
+use crate::vocabulary::{PassSettings, Passes, PlanError};
 use cutter::Cutter;
 use field::{GridField, ScalarField, surface_gradient_length};
 use part::Part;
@@ -33,7 +33,7 @@ const LEVEL_SHARE: f64 = 1.0 / 64.0;
 pub fn passes(
     part: &Part,
     cutter: &Cutter,
-    placing: Placing,
+    placing: LevelSteps,
     settings: &PassSettings,
     monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {

@@ -5,20 +5,18 @@
 //! plan direction across the feed; that surface is the part's offset, where lengths across the
 //! feed are `1 − κ r` times those on the part.
 
-use crate::Step;
 use crate::drop::DropCutter;
 use crate::levels::level_passes::along_levels_placed;
-use crate::levels::spacing::Placing;
-use crate::plan::{PassSettings, Passes, PlanError};
+use crate::levels::spacing::LevelSteps;
 use crate::surface::border::Border;
 use crate::surface::chart::{Chart, ChartPoint};
 use crate::surface::plan_curve::PlanCurves;
+use crate::vocabulary::{PassSettings, Passes, PlanError, Step};
 use cutter::Cutter;
 use field::ScalarField;
 use geometry::Vector2;
 use part::Part;
-use work::monitor;
-use work::monitor::Monitor;
+use work::monitor::{self, Monitor};
 
 /// The stepover is never planned below this share of that on a horizontal plane: a steep wall
 /// would otherwise ask for endless passes over the whole part. What is left there is measured.
@@ -88,7 +86,15 @@ pub fn on_levels(
     for chart in Chart::all(part, cutter, settings.axis)? {
         let field = chart.sampled(CELLS, "zigzag", |u, v| chart.jet(u, v).p.coords.xy().dot(&across))?;
         let field = ScalarField::Grid(field);
-        all.append(along_levels_placed(part, cutter, &chart, &field, Placing::OneStep, settings, monitor)?);
+        all.append(along_levels_placed(
+            part,
+            cutter,
+            &chart,
+            &field,
+            LevelSteps::Constant,
+            settings,
+            monitor,
+        )?);
     }
     Ok(all)
 }

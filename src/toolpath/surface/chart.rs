@@ -5,14 +5,12 @@
 //! while heights of cutter locations always come from dropping the cutter on the mesh itself.
 
 use super::mesh_surface;
-use crate::plan::PlanError;
-use crate::{Along, FeedDirection, Step};
+use crate::vocabulary::{Along, FeedDirection, PlanError, Step};
 use cutter::Cutter;
 use field::mesh::{blend_lines, slope_at};
 use field::{GridField, NormalEquations, SamplePlane};
 use geometry::{Jet2, KnotVector, NurbsSurface, Point3, Vector2, Vector3};
-use motion::CcPoint;
-use motion::{ToolAxis, in_tool_frame};
+use motion::{CcPoint, ToolAxis, in_tool_frame};
 use part::Part;
 use scallop::strip_width_at;
 

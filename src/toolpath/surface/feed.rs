@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use super::chart::Chart;
 use super::mesh_surface::{MeshSurface, Piece, not_applicable};
-use crate::plan::{Along, FeedDirection, PlanError};
+use crate::vocabulary::{Along, FeedDirection, PlanError};
 use cutter::Cutter;
 use field::mesh::{
     FieldMesh, Line, MeshFieldError, Wanted, blend, borders, fixed_angle, guides, slope, smooth_lines,

@@ -6,7 +6,7 @@
 use super::border::Border;
 use crate::drop::{Drop, DropCutter};
 use crate::moves::chord::Watch;
-use crate::plan::PassSettings;
+use crate::vocabulary::PassSettings;
 use cutter::Cutter;
 use geometry::{Point3, Vector2};
 use work::monitor::{Cancelled, Monitor};

@@ -9,12 +9,12 @@
 
 use std::collections::HashMap;
 
-use super::tilted::{ABOVE_SURFACE, Touch};
+use super::tilted::ABOVE_SURFACE;
+use crate::moves::touch::Touch;
 use collision::Interference;
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// Sweeps over all pairs. What a sweep leaves shrinks the slower the more passes lie between.
 const MOST_SWEEPS: usize = 1000;

@@ -1,7 +1,8 @@
 //! A plate beside a wall that the holder must not touch, and ways between passes.
 
 use super::*;
-use crate::{Joining, Step, Strategy, plan_tilted};
+use crate::vocabulary::{Joining, Step};
+use crate::{Strategy, plan_tilted};
 use collision::{Check, Obstacle};
 use cutter::{Holder, HolderSection, Solid};
 use geometry::{AnalyticShape, AnalyticSurface, Bvh, TriangleMesh, Vector3};

@@ -13,12 +13,11 @@
 //! All but the last are proved clear, move by move, of all that the tool is to keep away from; the last is taken where it is
 //! the quickest and clear too, or where nothing else is. Times are length over rate.
 
-use super::super::Rates;
 use super::bent::Bent;
-use crate::PlanSettings;
-use crate::tilt::tilted::{GREATEST_TURN, Touch};
-use collision::Check;
-use collision::{Interference, Obstacle};
+use crate::link::Rates;
+use crate::moves::touch::{GREATEST_TURN, Touch};
+use crate::vocabulary::PlanSettings;
+use collision::{Check, Interference, Obstacle};
 use cutter::{Cutter, Solid};
 use geometry::{Aabb, Bvh, Point3, TriangleMesh, Vector3};
 use motion::{ClPoint, MoveKind};
@@ -386,7 +385,7 @@ impl Sphere {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Joining, Step};
+    use crate::vocabulary::{Joining, Step};
     use cutter::{Holder, HolderSection};
     use geometry::{AnalyticShape, AnalyticSurface};
     use part::Patch;

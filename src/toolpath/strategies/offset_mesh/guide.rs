@@ -2,10 +2,9 @@
 
 use super::{Rider, runs};
 use crate::levels::halving::{Allowed, LevelSource, Track};
-use crate::levels::planned_field::Contact;
 use crate::levels::spacing::Place;
-use crate::plan::{Passes, PlanError};
-use crate::tilt::tilted::Touch;
+use crate::moves::touch::Touch;
+use crate::vocabulary::{Contact, Passes, PlanError};
 use field::mesh::{FieldMesh, MeshCurve, MeshLevels, MeshPoint};
 use geometry::{Point3, Vector3};
 use work::monitor::Cancelled;

@@ -1,0 +1,14 @@
+//! The words in which passes are asked for and handed over: settings, feed directions, passes, refusals. Every room of the
+//! planner speaks them; they know none of the rooms that cover a surface.
+
+mod error;
+mod feed_direction;
+mod pass_settings;
+mod passes;
+mod settings;
+
+pub use error::PlanError;
+pub use feed_direction::{Along, FeedDirection};
+pub(crate) use pass_settings::{PassSettings, SAMPLING_OVER_RADIUS};
+pub(crate) use passes::{Contact, Passes};
+pub use settings::{Joining, Links, PlanSettings, Step};
