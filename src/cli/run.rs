@@ -34,7 +34,10 @@ use report::{
 };
 use scene::{Engine, PartSource, Scene, ToolpathRequest, auto_cell};
 use sim::{Grid, GridError, ZMap, cut, cut_in_order, cut_reference, holder_collisions};
-use toolpath::{Engagement, OffsetDrive, Plan, PlanError, PlanSettings, Pocket, Strategy, plan, plan_pocket};
+use toolpath::{
+    Engagement, OffsetDrive, OffsetSurface, Plan, PlanError, PlanSettings, Pocket, PocketStrategy, Strategy,
+    plan, plan_pocket,
+};
 use work::monitor;
 use work::monitor::Monitor as _;
 use work::parallel;
@@ -275,9 +278,9 @@ impl<'a> Job<'a> {
     }
 
     /// The strategy of a toolpath, with the offset surfaces that it rides on where these come from sections.
-    fn strategy(&self, request: &ToolpathRequest) -> Result<Strategy, CliError> {
-        let (Strategy::OffsetSurface { along, drive: OffsetDrive::InPlane }, Some(blade)) =
-            (&request.strategy, &self.blade)
+    fn strategy(&self, request: &ToolpathRequest) -> Result<Box<dyn Strategy>, CliError> {
+        let asked = request.strategy.downcast_ref::<OffsetSurface>();
+        let (Some(OffsetSurface { along, drive: OffsetDrive::InPlane }), Some(blade)) = (asked, &self.blade)
         else {
             return Ok(request.strategy.clone());
         };
@@ -285,7 +288,7 @@ impl<'a> Job<'a> {
             let reason = PlanError::NotApplicable { strategy: "offset-surface", reason: e.to_string() };
             CliError::plan(self.scene, &request.name, reason)
         })?;
-        Ok(Strategy::OffsetSurface { along: *along, drive: OffsetDrive::on(surfaces) })
+        Ok(Box::new(OffsetSurface { along: *along, drive: OffsetDrive::on(surfaces) }))
     }
 
     /// Plans, cuts and measures one toolpath and writes its folder.
@@ -309,10 +312,10 @@ impl<'a> Job<'a> {
         }
         let settings = self.settings(request);
         let strategy = self.strategy(request)?;
-        let milled = self.pocket.as_ref().zip(request.strategy.pocket());
+        let milled = self.pocket.as_ref().zip(request.strategy.downcast_ref::<PocketStrategy>());
         let mut planned = match milled {
             Some((pocket, strategy)) => plan_pocket(pocket, &scene.cutter, strategy, &settings, monitor),
-            None => plan(&self.part, &scene.cutter, &strategy, &settings, monitor),
+            None => plan(&self.part, &scene.cutter, &*strategy, &settings, monitor),
         }
         .map_err(|reason| CliError::plan(scene, &request.name, reason))?;
         if scene.machine.slow_corners {
@@ -391,7 +394,7 @@ impl<'a> Job<'a> {
         );
         result.solid = solid;
         result.roughness = roughness;
-        self.add_offset(&strategy, &mut result);
+        self.add_offset(&*strategy, &mut result);
         if let Some((pocket, strategy)) = milled {
             let figures =
                 pocket_figures(scene, pocket, strategy, request.step, &planned.path, &cut, self.top, engaged);

@@ -2,6 +2,8 @@
 
 mod error;
 mod section;
+mod write;
 
 pub use error::{Finding, SceneError, SceneText, listed, nearest, suggestion};
 pub use section::{COORDINATE, LENGTH, Located, Section};
+pub use write::{toml_number, toml_string, word_of};

@@ -2,10 +2,9 @@
 
 use std::fmt::{self, Write as _};
 
-use super::write::number;
 use geometry::{Point3, Vector3};
-use keys::SceneError;
-use keys::{Located, Section};
+use keys::toml_number as number;
+use keys::{Located, SceneError, Section};
 use motion::ToolAxis;
 
 /// The key of the axis of a toolpath.

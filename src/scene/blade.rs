@@ -2,12 +2,12 @@
 
 use std::fmt::{self, Write as _};
 
-use super::write::{number, text};
 use super::{NamedFile, PartSource};
 use blade::{BladeSide, FairingMethod, JUMP_REMOVING_STEP};
 use geometry::Vector3;
 use keys::SceneError;
 use keys::{LENGTH, Located, Section};
+use keys::{toml_number as number, toml_string as text};
 
 /// The key of a section table.
 pub(super) const KEY: &str = "sections";

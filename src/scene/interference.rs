@@ -4,10 +4,10 @@ use std::fmt::{self, Write as _};
 use std::path::Path;
 
 use super::read::read_mesh_file;
-use super::write::{number, text};
 use super::{MeshFormat, NamedFile};
 use keys::SceneError;
 use keys::{LENGTH, Section};
+use keys::{toml_number as number, toml_string as text};
 
 /// Default distance of shank and holder from part and fixtures, mm.
 const DEFAULT_CLEARANCE: f64 = 0.5;

@@ -2,11 +2,11 @@
 
 use std::fmt::{self, Write as _};
 
-use super::write::{number, text};
 use geometry::{Point3, Vector3};
 use io::gcode::Style;
 use keys::SceneError;
 use keys::{Located, Section};
+use keys::{toml_number as number, toml_string as text};
 use machine::kinematics::{
     DEFAULT_GAUGE_LENGTH, DEFAULT_ROTARY_RATE, Kinematics, KinematicsError, PRESETS, RotaryAxis, Side, preset,
 };

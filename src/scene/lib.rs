@@ -6,7 +6,6 @@
 
 mod axis;
 mod blade;
-mod classic;
 mod direction;
 mod formula;
 mod interference;
@@ -64,13 +63,6 @@ const LEAST_ERROR_BOUND: f64 = 1e-6;
 pub fn default_error_bound(limits: &Limits) -> f64 {
     (limits.scallop.min(limits.gouge).min(limits.uncut) / ERROR_BOUNDS_A_TOLERANCE).max(LEAST_ERROR_BOUND)
 }
-
-/// Default control points a side of a streamline's stream function. More follow finer changes of
-/// the feed direction and cost time as their cube; fewer smooth them away.
-pub const DEFAULT_CONTROL_POINTS: usize = 24;
-
-/// Default degree of a streamline's stream function: smooth to the curvature of passes.
-pub const DEFAULT_DEGREE: usize = 3;
 
 /// A file that the scene names, and where in the scene it does.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -231,7 +223,7 @@ pub struct ToolpathRequest {
     /// Folder of its files; unique in the scene, a plain file name everywhere.
     pub folder: String,
     /// How to plan it.
-    pub strategy: Strategy,
+    pub strategy: Box<dyn Strategy>,
     /// How far its passes lie apart.
     pub step: Step,
     /// The files of its feed directions, in the order of the scene; [`Scene::read`] reads them into the strategy.
@@ -245,10 +237,7 @@ pub struct ToolpathRequest {
 impl ToolpathRequest {
     /// The strategy's name as scenes spell it.
     pub fn strategy_name(&self) -> &'static str {
-        match &self.strategy {
-            Strategy::Pocket(strategy) => strategy.name(),
-            strategy => classic::name(strategy).unwrap_or("streamline"),
-        }
+        self.strategy.word()
     }
 }
 

@@ -78,9 +78,9 @@ impl Job<'_> {
                     most_turning_across: axis.most_turning_across,
                     interference: Some(&keep),
                 };
-                plan_tilted(&self.part, &scene.cutter, &strategy, &tilting, &settings, monitor)
+                plan_tilted(&self.part, &scene.cutter, &*strategy, &tilting, &settings, monitor)
             }
-            None => plan(&self.part, &scene.cutter, &strategy, &settings, monitor),
+            None => plan(&self.part, &scene.cutter, &*strategy, &settings, monitor),
         };
         let mut planned = planned.map_err(|reason| CliError::plan(scene, &request.name, reason))?;
         if scene.machine.slow_corners {
@@ -156,7 +156,7 @@ impl Job<'_> {
         if let Some(blade) = &self.blade {
             result.sections = section_figures(&map, blade.heights(), &blade.section_parameters());
         }
-        self.add_offset(&strategy, &mut result);
+        self.add_offset(&*strategy, &mut result);
         monitor.start("looking for collisions", 0);
         let Held { note, violation } = held.unwrap_or_default();
         result.notes.extend(note);

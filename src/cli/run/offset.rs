@@ -3,7 +3,7 @@
 use super::Job;
 use metrology::{OffsetFigures, offset_figures};
 use report::{ToolpathResult, place};
-use toolpath::{OffsetAlong, OffsetDrive, Strategy};
+use toolpath::{OffsetAlong, OffsetDrive, OffsetSurface, Strategy};
 use work::monitor::Monitor as _;
 
 /// Distances that are off by less than this, mm, are as asked.
@@ -12,8 +12,8 @@ const AS_ASKED: f64 = 1.0e-6;
 impl Job<'_> {
     /// Adds the offset surface of a path along one to its result. A mesh has none: there passes are put on the level set
     /// of its distance, place by place.
-    pub(super) fn add_offset(&self, strategy: &Strategy, result: &mut ToolpathResult) {
-        let Strategy::OffsetSurface { along, drive } = strategy else { return };
+    pub(super) fn add_offset(&self, strategy: &dyn Strategy, result: &mut ToolpathResult) {
+        let Some(OffsetSurface { along, drive }) = strategy.downcast_ref() else { return };
         if matches!(along, OffsetAlong::Angle(_)) {
             return;
         }

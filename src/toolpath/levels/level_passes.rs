@@ -10,12 +10,11 @@ use crate::drop::{Beside, DropCutter};
 use crate::moves::touch::Touch;
 use crate::surface::chart::Chart;
 use crate::tilt::tilted;
-use crate::vocabulary::{Contact, PassSettings, Passes, PlanError, Step};
+use crate::vocabulary::{Contact, PassSettings, Passes, PlanError, Step, Task};
 use cutter::Cutter;
 use field::{LevelCurve, LevelTracer, ScalarField, surface_gradient_length};
 use geometry::Point3;
 use motion::CcPoint;
-use part::Part;
 use work::monitor::{Cancelled, Monitor};
 
 /// Grid cells a side on which level curves are found.
@@ -48,27 +47,18 @@ const OVERRUN_STEP: f64 = 0.05;
 const BORDER_PRECISION: f64 = 1e-6;
 
 /// Places levels, traces them and turns them into passes.
-pub(crate) fn along_levels(
-    part: &Part,
-    cutter: &Cutter,
-    chart: &Chart,
-    field: &ScalarField,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
-) -> Result<Passes, PlanError> {
-    along_levels_placed(part, cutter, chart, field, LevelSteps::Shortest, settings, monitor)
+pub(crate) fn along_levels(task: &Task<'_>, chart: &Chart, field: &ScalarField) -> Result<Passes, PlanError> {
+    along_levels_placed(task, chart, field, LevelSteps::Shortest)
 }
 
 /// [`along_levels`] with levels placed in a given way.
 pub(crate) fn along_levels_placed(
-    part: &Part,
-    cutter: &Cutter,
+    task: &Task<'_>,
     chart: &Chart,
     field: &ScalarField,
     placing: LevelSteps,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
+    let Task { part, cutter, ref settings, monitor, .. } = *task;
     let metric = |u: f64, v: f64| chart.jet(u, v).first_form();
     let margins = margins(chart, cutter, field, settings);
     let tracer = LevelTracer::new(field, &metric, chart.domain, margins, TRACE_CELLS, settings.sampling);
@@ -76,7 +66,7 @@ pub(crate) fn along_levels_placed(
     let range = tracer.range();
     let places = places_of(chart, cutter, field, settings);
     let levels = place_levels(&places, range, placing, &mut notes);
-    let dropped = settings.dropped(cutter);
+    let dropped = task.dropped();
     let drop = DropCutter::new(part, dropped);
     let guide = Guide { tracer: &tracer, chart, cutter, dropped, field, drop, settings, monitor };
     let mut passes = along_and_between(&guide, &levels, range, settings.sampling, monitor)?;

@@ -21,17 +21,16 @@ mod tilted;
 
 use super::DropCutter;
 use crate::surface::border::Border;
-use crate::vocabulary::{Joining, Links, PlanSettings, Step};
+use crate::vocabulary::{Joining, Links, PlanSettings, Setup, Step};
 use bend::{Bends, End};
 use ceiling::Ceiling;
 use cutter::Cutter;
 use geometry::{Point2, Point3, Vector2, distance_to_segment};
 use motion::{ClPoint, Move, MoveKind, Toolpath};
 use order::{Visit, is_closed, order};
-use part::Part;
 use scallop::strip_width;
 pub(crate) use tilted::join_tilted;
-use work::monitor::{self, Cancelled, Monitor};
+use work::monitor::{self, Cancelled};
 
 /// Longest link on the surface, in intervals between passes on a plane, unless another is asked for. It
 /// reaches the next pass along borders that passes meet at six degrees or more; longer ones leave traces
@@ -63,14 +62,12 @@ fn plane_interval(cutter: &Cutter, step: Step) -> f64 {
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
-pub fn join(
+pub(crate) fn join(
     passes: Vec<Vec<Point3>>,
     both_ways: bool,
-    part: &Part,
-    cutter: &Cutter,
-    settings: &PlanSettings,
-    monitor: &dyn Monitor,
+    setup: &Setup<'_>,
 ) -> Result<Toolpath, Cancelled> {
+    let Setup { part, cutter, settings, monitor } = *setup;
     let passes: Vec<Vec<Point3>> = passes.into_iter().filter(|p| p.len() >= 2).collect();
     monitor.start("joining passes", 0);
     let rates = Rates::of(settings, &passes);

@@ -15,13 +15,12 @@ use crate::moves::touch::Touch;
 use crate::tilt::across;
 use crate::tilt::repair::{Repaired, repair};
 use crate::tilt::tilted::{TiltedPasses, Tilting, limit_turning, located, reversed};
-use crate::vocabulary::{Links, PlanError, PlanSettings};
+use crate::vocabulary::{Links, PlanError, PlanSettings, Setup};
 use bent::Bent;
 use collision::{Check, Interference, Obstacle};
 use cutter::{Cutter, Solid};
 use geometry::Point3;
 use motion::{ClPoint, Move, MoveKind, Toolpath};
-use part::Part;
 use ways::{Block, Step, Ways};
 use work::monitor::{self, Monitor};
 
@@ -29,16 +28,14 @@ use work::monitor::{self, Monitor};
 ///
 /// # Errors
 /// [`PlanError::Axis`] where the rule gives no axis for a pass fed the other way round, or cancelled.
-pub fn join_tilted(
+pub(crate) fn join_tilted(
     passes: TiltedPasses,
     both_ways: bool,
-    part: &Part,
-    cutter: &Cutter,
     tilting: &Tilting,
-    settings: &PlanSettings,
+    setup: &Setup<'_>,
     notes: &mut Vec<String>,
-    monitor: &dyn Monitor,
 ) -> Result<Toolpath, PlanError> {
+    let Setup { part, cutter, settings, monitor } = *setup;
     let TiltedPasses { passes, tolerance, smoothing } = passes;
     let passes: Vec<Vec<Touch>> = passes.into_iter().filter(|p| p.len() >= 2).collect();
     monitor.start("joining passes", 0);

@@ -11,7 +11,7 @@ pub(crate) const GREATEST_TURN: f64 = 0.1;
 
 /// A cutter touching the part.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Touch {
+pub struct Touch {
     /// Where it touches.
     pub contact: CcPoint,
     /// Unit feed direction.

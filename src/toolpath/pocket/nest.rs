@@ -4,7 +4,7 @@
 //! level, and within them the nests of the next. Cut from the innermost to the wall, each pass has the
 //! stepover to cut at most: every place of a curve is within it of the next curve inwards.
 
-use super::Flow;
+use super::strategy::Flow;
 use super::turning::{Turning, curvatures};
 use field::{PlanarError, PlanarMesh};
 use geometry::{CurveSegment, Piece, Point2, Region, SegmentGrid};

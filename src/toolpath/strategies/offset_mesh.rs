@@ -26,7 +26,7 @@ use crate::levels::halving::along_and_between;
 use crate::levels::spacing::{LevelSteps, place_levels};
 use crate::moves::touch::Touch;
 use crate::tilt::tilted;
-use crate::vocabulary::{PassSettings, Passes, PlanError, Step};
+use crate::vocabulary::{PassSettings, Passes, PlanError, Step, Task};
 use cutter::{Cutter, CutterShape};
 use field::DIRECTION_WEIGHT;
 use field::mesh::{
@@ -83,13 +83,8 @@ const SMOOTHING_OVER_RADIUS: f64 = 0.5;
 const NAME: &str = "offset-surface";
 
 /// Passes over the offset surface in the direction `angle`, rad from x in the plan view.
-pub(crate) fn passes(
-    part: &Part,
-    cutter: &Cutter,
-    angle: f64,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
-) -> Result<Passes, PlanError> {
+pub(crate) fn passes(task: &Task<'_>, angle: f64) -> Result<Passes, PlanError> {
+    let Task { part, cutter, ref settings, monitor, .. } = *task;
     if cutter.shape() != CutterShape::Ball {
         return Err(refused("only a ball's centre runs on one offset surface; use a ball"));
     }

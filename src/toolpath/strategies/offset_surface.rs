@@ -9,25 +9,26 @@
 //! the feed; on the offset surface itself that curvature is `κ/(1 − κ r)` (FORMULAS of parallel surfaces, e.g. do Carmo
 //! 1976, §3.5 exercise 11), which is how a surface of another origin is planned on.
 
+use std::fmt::{self, Write as _};
 use std::sync::Arc;
 
+use super::offset_mesh;
 use crate::drop::{Beside, DropCutter};
 use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between};
 use crate::levels::spacing::{LevelSteps, Place, place_levels};
 use crate::moves::touch::Touch;
 use crate::surface::chart::{Chart, ChartPoint};
 use crate::tilt::tilted;
-use crate::vocabulary::{Along, Contact, PassSettings, Passes, PlanError, Step};
+use crate::vocabulary::{
+    Along, Contact, Definition, PartKind, PassSettings, Passes, PlanError, Reading, Step, Strategy, Task,
+};
 use cutter::{Cutter, CutterShape};
 use field::surface_gradient_length;
 use geometry::{NurbsSurface, Point3, Vector3};
+use keys::{SceneError, toml_number};
 use motion::CcPoint;
-use part::Part;
 use scallop::strip_width;
 use work::monitor::{Cancelled, Monitor};
-
-/// The strategy's name.
-pub(crate) const NAME: &str = "offset-surface";
 
 /// Places a side at which steps between passes are computed.
 const SAMPLES: usize = 160;
@@ -67,15 +68,83 @@ pub enum OffsetDrive {
     Given(Arc<Vec<NurbsSurface>>),
 }
 
+/// A ball whose centre rides on an offset surface.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OffsetSurface {
+    /// How passes run.
+    pub along: OffsetAlong,
+    /// On what.
+    pub drive: OffsetDrive,
+}
+
+/// Words for `along`.
+const ALONG: [(&str, OffsetAlong); 3] =
+    [("u", OffsetAlong::U), ("v", OffsetAlong::V), ("spiral", OffsetAlong::Spiral)];
+
+/// How scenes speak of it.
+pub(crate) static DEFINITION: Definition = Definition {
+    word: "offset-surface",
+    help: "the centre of a ball rides on an offset of the part: along a parameter, as a spiral, or at an angle over a mesh",
+    part: PartKind::Surface,
+    keys: &["along", "angle", "offset"],
+    read,
+};
+
+fn read(from: &mut Reading<'_>) -> Result<Box<dyn Strategy>, SceneError> {
+    let section = from.section;
+    let drive = match section.word("offset", &["normal", "in-plane"])?.map(|word| word.value) {
+        Some("in-plane") => OffsetDrive::InPlane,
+        _ => OffsetDrive::Exact,
+    };
+    let angle = section.number("angle", -360.0..=360.0, " degrees")?;
+    let along = section.choice("along", &ALONG)?;
+    let along = match angle {
+        Some(_) if section.has("along") => {
+            return Err(section.error(
+                &section.key_span("angle"),
+                "passes run along a parameter or at an angle, not both",
+                "delete `angle` on patches and blades, `along` on meshes",
+            ));
+        }
+        Some(angle) => OffsetAlong::Angle(angle.value.to_radians()),
+        None => along,
+    };
+    Ok(Box::new(OffsetSurface { along, drive }))
+}
+
+impl Strategy for OffsetSurface {
+    fn definition(&self) -> &'static Definition {
+        &DEFINITION
+    }
+
+    fn write(&self, out: &mut String) -> fmt::Result {
+        match self.along {
+            OffsetAlong::U => writeln!(out, "along = \"u\"")?,
+            OffsetAlong::V => writeln!(out, "along = \"v\"")?,
+            OffsetAlong::Spiral => writeln!(out, "along = \"spiral\"")?,
+            OffsetAlong::Angle(angle) => {
+                writeln!(out, "angle = {}  # degrees from the x axis", toml_number(angle.to_degrees()))?;
+            }
+        }
+        let exact = self.drive == OffsetDrive::Exact;
+        writeln!(out, "offset = \"{}\"", if exact { "normal" } else { "in-plane" })
+    }
+
+    fn passes(&self, task: &Task<'_>) -> Result<Passes, PlanError> {
+        match self.along {
+            OffsetAlong::Angle(angle) => offset_mesh::passes(task, angle),
+            along => passes(task, along, &self.drive),
+        }
+    }
+
+    fn on_facets(&self, _task: &Task<'_>) -> bool {
+        true
+    }
+}
+
 /// Plans passes on the offset surfaces of all patches.
-pub(crate) fn passes(
-    part: &Part,
-    cutter: &Cutter,
-    along: OffsetAlong,
-    drive: &OffsetDrive,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
-) -> Result<Passes, PlanError> {
+fn passes(task: &Task<'_>, along: OffsetAlong, drive: &OffsetDrive) -> Result<Passes, PlanError> {
+    let Task { part, cutter, ref settings, monitor, .. } = *task;
     if cutter.shape() != CutterShape::Ball {
         return Err(refused("the centre of a ball rides on the offset surface; use a ball cutter"));
     }
@@ -107,7 +176,7 @@ pub(crate) fn passes(
 }
 
 fn refused(reason: &str) -> PlanError {
-    PlanError::NotApplicable { strategy: NAME, reason: reason.to_owned() }
+    PlanError::NotApplicable { strategy: DEFINITION.word, reason: reason.to_owned() }
 }
 
 impl OffsetAlong {

@@ -4,17 +4,19 @@
 //! the same. Where it leaves the part it is cut into pieces.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
+use std::fmt::{self, Write as _};
 
+use super::contour_spiral;
 use super::zigzag::{least_over_plane, stepover_at};
 use crate::drop::DropCutter;
 use crate::surface::border::Border;
 use crate::surface::chart::Chart;
 use crate::surface::plan_curve::PlanCurves;
-use crate::vocabulary::{PassSettings, Passes, PlanError, Step};
+use crate::vocabulary::{Definition, PartKind, Passes, PlanError, Step, Strategy, Task};
 use cutter::Cutter;
 use geometry::Vector2;
-use part::Part;
-use work::monitor::{self, Monitor};
+use keys::word_of;
+use work::monitor;
 
 /// Places a side of each chart at which the pitch is computed.
 const SAMPLES: usize = 160;
@@ -34,15 +36,51 @@ const LAYOUT_SHARE: f64 = 0.5;
 /// A step turns by this much at most, rad.
 const MOST_TURN: f64 = 0.1;
 
+/// One spiral.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Spiral {
+    /// From the middle of the plan view outward, its pitch that of the tightest place of each turn. Where it leaves the part
+    /// it is cut into pieces.
+    Plan,
+    /// From the border to the middle between the passes of an iso-scallop path from all borders, without a retract; further
+    /// short passes where its turns have corners. For parts whose front closes in one point.
+    Contour,
+}
+
+/// Words for `kind`.
+const KINDS: [(&str, Spiral); 2] = [("plan", Spiral::Plan), ("contour", Spiral::Contour)];
+
+/// How scenes speak of it.
+pub(crate) static DEFINITION: Definition = Definition {
+    word: "spiral",
+    help: "one spiral, in the plan view or between the contours of the border",
+    part: PartKind::Surface,
+    keys: &["kind"],
+    read: |from| Ok(Box::new(from.section.choice("kind", &KINDS)?)),
+};
+
+impl Strategy for Spiral {
+    fn definition(&self) -> &'static Definition {
+        &DEFINITION
+    }
+
+    fn write(&self, out: &mut String) -> fmt::Result {
+        writeln!(out, "kind = \"{}\"", word_of(&KINDS, self))
+    }
+
+    fn passes(&self, task: &Task<'_>) -> Result<Passes, PlanError> {
+        match self {
+            Self::Plan => passes(task),
+            Self::Contour => contour_spiral::passes(task),
+        }
+    }
+}
+
 /// Plans the spiral.
-pub fn passes(
-    part: &Part,
-    cutter: &Cutter,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
-) -> Result<Passes, PlanError> {
+fn passes(task: &Task<'_>) -> Result<Passes, PlanError> {
+    let Task { part, cutter, ref settings, monitor, .. } = *task;
     let charts = Chart::all(part, cutter, settings.axis)?;
-    let dropped = settings.dropped(cutter);
+    let dropped = task.dropped();
     let [x, y] = [Vector2::x(), Vector2::y()].map(|e| Chart::extent_of_axes(&charts, part, dropped, &e));
     let middle = Vector2::new(0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]));
     let reach = 0.5 * (x[1] - x[0]).hypot(y[1] - y[0]);

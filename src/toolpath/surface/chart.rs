@@ -135,7 +135,7 @@ impl ChartPoint<'_> {
             }
             FeedDirection::Steepest => slope_at(&self.normal, true),
             FeedDirection::Contour => slope_at(&self.normal, false),
-            FeedDirection::Samples(samples) => {
+            FeedDirection::Samples(samples) | FeedDirection::File { samples: Some(samples), .. } => {
                 let (line, sure) = samples.at(self.sampled_at(samples.plane()))?;
                 let t = match samples.plane() {
                     SamplePlane::Plan => self.tangent_over(line)?,
@@ -143,6 +143,7 @@ impl ChartPoint<'_> {
                 };
                 Some((t, sure))
             }
+            FeedDirection::File { samples: None, .. } => None,
             FeedDirection::Blend(parts) => {
                 let e1 = unit(&self.jet.du)?;
                 let lines = parts.iter().filter_map(|(part, weight)| {

@@ -10,7 +10,7 @@ use crate::moves::chord::{Side, Watch, moved_aside, reduced_indices, sample_with
 use crate::moves::smooth::smooth_and_spread_tilted;
 use crate::moves::touch::Touch;
 use crate::surface::border::Border;
-use crate::vocabulary::PlanError;
+use crate::vocabulary::{PlanError, Setup};
 use collision::Interference;
 use cutter::{Cutter, CutterShape};
 use geometry::{Point3, Vector3};
@@ -136,12 +136,11 @@ impl Dropped<'_> {
 /// [`PlanError::Axis`] where the rule gives no axis, or [`Cancelled`].
 pub(crate) fn around_centres(
     dropped: &Dropped<'_>,
-    part: &Part,
-    cutter: &Cutter,
     rule: &ToolAxis,
-    chord_tolerance: f64,
-    monitor: &dyn Monitor,
+    setup: &Setup<'_>,
 ) -> Result<TiltedPasses, PlanError> {
+    let Setup { part, cutter, monitor, .. } = *setup;
+    let chord_tolerance = setup.settings.chord_tolerance;
     let passes = dropped.passes;
     monitor.start("tilting the cutter", passes.len() as u64);
     let up = Vector3::z() * dropped.ball.radius();

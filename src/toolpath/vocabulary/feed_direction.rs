@@ -30,6 +30,13 @@ pub enum FeedDirection {
     Contour,
     /// As sampled at places of the plan view, or of the parameters of each patch.
     Samples(Arc<LineField>),
+    /// As sampled in a file.
+    File {
+        /// The file as a scene names it.
+        name: String,
+        /// What it holds; `None` until it is read.
+        samples: Option<Arc<LineField>>,
+    },
     /// From curves of the plan view; between and beyond them the smoothest field that they allow.
     Guides {
         /// Polylines of at least two different points, mm.
@@ -43,4 +50,15 @@ pub enum FeedDirection {
     /// The mean of directions as lines (of their doubled angles in the tangent plane) by positive weights, each times how
     /// much its direction matters at the place.
     Blend(Vec<(FeedDirection, f64)>),
+}
+
+impl FeedDirection {
+    /// What files of directions hold, in the order in which a scene names them; to be read into.
+    pub fn files_mut(&mut self) -> Vec<&mut Option<Arc<LineField>>> {
+        match self {
+            Self::File { samples, .. } => vec![samples],
+            Self::Blend(parts) => parts.iter_mut().flat_map(|(part, _)| part.files_mut()).collect(),
+            _ => Vec::new(),
+        }
+    }
 }

@@ -6,9 +6,15 @@ mod feed_direction;
 mod pass_settings;
 mod passes;
 mod settings;
+mod strategy;
+mod task;
 
 pub use error::PlanError;
 pub use feed_direction::{Along, FeedDirection};
-pub(crate) use pass_settings::{PassSettings, SAMPLING_OVER_RADIUS};
-pub(crate) use passes::{Contact, Passes};
+pub use pass_settings::PassSettings;
+pub(crate) use pass_settings::SAMPLING_OVER_RADIUS;
+pub use passes::{Contact, Passes};
 pub use settings::{Joining, Links, PlanSettings, Step};
+pub use strategy::{Definition, PartKind, Reading, Strategy};
+pub(crate) use task::Setup;
+pub use task::Task;

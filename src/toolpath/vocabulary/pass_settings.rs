@@ -23,7 +23,7 @@ const SMOOTHED_SHARE: f64 = 0.78;
 
 /// What every pass needs.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct PassSettings<'a> {
+pub struct PassSettings<'a> {
     /// Distance of passes, already less what the chords may add.
     pub step: Step,
     /// First sampling distance along a pass, mm.

@@ -6,7 +6,7 @@ use geometry::{Point3, Vector3};
 
 /// Planned passes, not yet joined, and remarks for the user.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Passes {
+pub struct Passes {
     /// Tip positions of each pass.
     pub passes: Vec<Vec<Point3>>,
     /// Where a tilted cutter touches along each pass, whose tips then count for nothing; empty for an upright one.
@@ -37,7 +37,7 @@ impl Passes {
 
 /// A place of a pass as the planner has it.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Contact {
+pub struct Contact {
     pub at: Point3,
     /// Unit tangent across the feed.
     pub across: Vector3,

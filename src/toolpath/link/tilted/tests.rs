@@ -2,12 +2,12 @@
 
 use super::*;
 use crate::vocabulary::{Joining, Step};
-use crate::{Strategy, plan_tilted};
+use crate::{Zigzag, plan_tilted};
 use collision::{Check, Obstacle};
 use cutter::{Holder, HolderSection, Solid};
 use geometry::{AnalyticShape, AnalyticSurface, Bvh, TriangleMesh, Vector3};
 use motion::ToolAxis;
-use part::Patch;
+use part::{Part, Patch};
 use work::monitor::Silent;
 
 fn plate() -> Part {
@@ -49,7 +49,7 @@ fn beside_a_wall_the_axis_leans_away_and_every_cut_is_clear() {
         rapid_rate: 15_000.0,
         joining: Joining::default(),
     };
-    let strategy = Strategy::Zigzag { angle: 0.0, one_way: false };
+    let strategy = Zigzag::at(0.0);
     let planned = |interference| {
         let upright = ToolAxis::Fixed(Vector3::z());
         let tilting = Tilting { axis: &upright, most_turning: None, most_turning_across: None, interference };
@@ -117,7 +117,7 @@ fn neighbouring_passes_are_joined_nearby_and_clear() {
         let axis = ToolAxis::LeadTilt { lead: 0.2, tilt: 0.0 };
         let tilting =
             Tilting { axis: &axis, most_turning: None, most_turning_across: None, interference: Some(&keep) };
-        let strategy = Strategy::Zigzag { angle: 0.0, one_way: false };
+        let strategy = Zigzag::at(0.0);
         let planned =
             |links| plan_tilted(&part, &cutter, &strategy, &tilting, &settings(links), &Silent).unwrap();
         let [bent, aloft] = [Links::Surface, Links::Retract].map(planned);
