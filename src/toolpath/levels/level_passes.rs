@@ -68,7 +68,7 @@ pub(crate) fn along_levels_placed(
     let levels = place_levels(&places, range, placing, &mut notes);
     let dropped = task.dropped();
     let drop = DropCutter::new(part, dropped);
-    let guide = Guide { tracer: &tracer, chart, cutter, dropped, field, drop, settings, monitor };
+    let guide = ChartGuide { tracer: &tracer, chart, cutter, dropped, field, drop, settings, monitor };
     let mut passes = along_and_between(&guide, &levels, range, settings.sampling, monitor)?;
     if let Step::Scallop(height) = settings.step {
         let lengths = [height, settings.sampling];
@@ -101,7 +101,7 @@ fn margins(chart: &Chart, cutter: &Cutter, field: &ScalarField, settings: &PassS
 }
 
 /// Turns level curves into passes.
-struct Guide<'a> {
+struct ChartGuide<'a> {
     tracer: &'a LevelTracer<'a>,
     chart: &'a Chart<'a>,
     cutter: &'a Cutter,
@@ -113,7 +113,7 @@ struct Guide<'a> {
     monitor: &'a dyn Monitor,
 }
 
-impl Guide<'_> {
+impl ChartGuide<'_> {
     /// Where the tip is when the cutter touches the chart at `(u, v)`: put there by the chart's
     /// normal, then dropped, so that it is held off by any other place of the part.
     fn tip(&self, [u, v]: [f64; 2], beside: &mut Beside) -> Option<Point3> {
@@ -211,7 +211,7 @@ impl Guide<'_> {
     }
 }
 
-impl LevelSource for Guide<'_> {
+impl LevelSource for ChartGuide<'_> {
     type Place = [f64; 2];
 
     fn curves(&self, level: f64) -> Vec<Track<[f64; 2]>> {

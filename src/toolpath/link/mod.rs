@@ -70,7 +70,7 @@ pub(crate) fn join(
     let Setup { part, cutter, settings, monitor } = *setup;
     let passes: Vec<Vec<Point3>> = passes.into_iter().filter(|p| p.len() >= 2).collect();
     monitor.start("joining passes", 0);
-    let rates = Rates::of(settings, &passes);
+    let rates = Speeds::of(settings, &passes);
     let longest = match settings.joining.links {
         Links::Surface => longest_link(&settings.joining, cutter, settings.step),
         Links::Retract => 0.0,
@@ -105,7 +105,7 @@ pub(crate) fn join(
 
 /// Speeds of moves between passes, mm/s.
 #[derive(Debug, Clone, Copy)]
-struct Rates {
+struct Speeds {
     feed: f64,
     plunge: f64,
     rapid: f64,
@@ -116,7 +116,7 @@ struct Rates {
 /// Length of a bend over the distance of its ends: that of a half circle.
 const BEND: f64 = std::f64::consts::FRAC_PI_2;
 
-impl Rates {
+impl Speeds {
     fn of(settings: &PlanSettings, passes: &[Vec<Point3>]) -> Self {
         let [feed, plunge, rapid] =
             [settings.feed_rate, settings.plunge_rate, settings.rapid_rate].map(|rate| rate / 60.0);
@@ -203,7 +203,7 @@ fn begun_ahead(mut points: Vec<Point3>, from: &End, both_ways: bool) -> Vec<Poin
 /// A program in the making.
 struct Program<'a> {
     settings: &'a PlanSettings,
-    rates: Rates,
+    rates: Speeds,
     ceiling: Ceiling<'a>,
     start: Option<Point3>,
     moves: Vec<Move>,
@@ -212,7 +212,7 @@ struct Program<'a> {
 }
 
 impl<'a> Program<'a> {
-    fn new(passes: &[Vec<Point3>], cutter: &'a Cutter, settings: &'a PlanSettings, rates: Rates) -> Self {
+    fn new(passes: &[Vec<Point3>], cutter: &'a Cutter, settings: &'a PlanSettings, rates: Speeds) -> Self {
         let mut low = Point2::new(f64::INFINITY, f64::INFINITY);
         let mut high = -low;
         for p in passes.iter().flatten() {

@@ -11,7 +11,7 @@ use super::shortest::shortest_note;
 use crate::drop::DropCutter;
 use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between};
 use crate::levels::planned_field;
-use crate::levels::spacing::{LevelSteps, Place, place_levels};
+use crate::levels::spacing::{AllowedStep, LevelSteps, place_levels};
 use crate::surface::border::useful_overrun;
 use crate::surface::feed::{self, SMOOTHING_OVER_RADIUS};
 use crate::surface::mesh_surface::{MeshSurface, Piece, not_applicable, reachable};
@@ -252,14 +252,14 @@ struct MeshGuide<'a> {
 
 impl MeshGuide<'_> {
     /// What each of the part's own triangles allows.
-    fn places(&self, psi: &[f64]) -> Vec<Place> {
+    fn places(&self, psi: &[f64]) -> Vec<AllowedStep> {
         let mesh = &self.surface.mesh;
         let place = |t: usize| {
             let third = MeshPoint { triangle: t as u32, weights: [1.0 / 3.0; 3], position: Point3::origin() };
             let (allowed, too_concave) = self.allowed_at(&third)?;
             let gradient = allowed.step / allowed.width;
             let mean = mesh.triangles()[t].iter().map(|&v| psi[v as usize]).sum::<f64>() / 3.0;
-            Some(Place { psi: mean, step: allowed.step, length: mesh.area(t) * gradient, too_concave })
+            Some(AllowedStep { psi: mean, step: allowed.step, length: mesh.area(t) * gradient, too_concave })
         };
         (0..self.surface.own_triangles).filter_map(place).collect()
     }

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use super::offset_mesh;
 use crate::drop::{Beside, DropCutter};
 use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between};
-use crate::levels::spacing::{LevelSteps, Place, place_levels};
+use crate::levels::spacing::{AllowedStep, LevelSteps, place_levels};
 use crate::moves::touch::Touch;
 use crate::surface::chart::{Chart, ChartPoint};
 use crate::tilt::tilted;
@@ -166,7 +166,7 @@ fn passes(task: &Task<'_>, along: OffsetAlong, drive: &OffsetDrive) -> Result<Pa
     for chart in &charts {
         let exact = matches!(drive, OffsetDrive::Exact);
         let drop = (exact && settings.axis.is_none()).then(|| DropCutter::new(part, cutter));
-        let rider = Rider { chart, cutter, exact, drop, along: along.parameter(), settings, monitor };
+        let rider = PatchRider { chart, cutter, exact, drop, along: along.parameter(), settings, monitor };
         all.append(match along {
             OffsetAlong::Spiral => rider.spiral()?,
             _ => rider.lines()?,
@@ -197,7 +197,7 @@ impl OffsetDrive {
 }
 
 /// Lays passes on one offset surface.
-struct Rider<'a> {
+struct PatchRider<'a> {
     /// The patch, or the offset surface itself.
     chart: &'a Chart<'a>,
     cutter: &'a Cutter,
@@ -218,7 +218,7 @@ struct Ride {
     feed: Vector3,
 }
 
-impl Rider<'_> {
+impl PatchRider<'_> {
     /// Ranges of the parameter along passes and of the one across.
     fn ranges(&self) -> [[f64; 2]; 2] {
         let [u, v] = self.chart.domain;
@@ -243,7 +243,7 @@ impl Rider<'_> {
     }
 
     /// What a place allows, as one of the places by which levels are placed.
-    fn place(&self, [u, v]: [f64; 2]) -> Option<(Place, f64)> {
+    fn place(&self, [u, v]: [f64; 2]) -> Option<(AllowedStep, f64)> {
         let p = self.chart.at(u, v)?;
         let feed = self.feed(&p)?;
         let (e, f, g) = p.jet.first_form();
@@ -257,7 +257,10 @@ impl Rider<'_> {
             self.width_between_centres(&p, &feed)
         };
         let area = (e * g - f * f).max(0.0).sqrt();
-        Some((Place { psi: level, step: width * gradient, length: area * gradient, too_concave }, width))
+        Some((
+            AllowedStep { psi: level, step: width * gradient, length: area * gradient, too_concave },
+            width,
+        ))
     }
 
     /// The distance that centres may have across the feed on an offset surface of another origin, mm, and whether the
@@ -293,7 +296,7 @@ impl Rider<'_> {
     }
 
     fn levels(&self, placing: LevelSteps) -> Result<(Vec<f64>, Vec<String>), PlanError> {
-        let places: Vec<Place> =
+        let places: Vec<AllowedStep> =
             self.chart.grid(SAMPLES).filter_map(|uv| self.place(uv)).map(|(place, _)| place).collect();
         if places.is_empty() {
             return Err(refused("the offset surface has no area; check the part"));
@@ -395,7 +398,7 @@ fn close<P: Copy>(pass: &mut [P], place: impl Fn(&P) -> Point3) {
     }
 }
 
-impl LevelSource for Rider<'_> {
+impl LevelSource for PatchRider<'_> {
     type Place = [f64; 2];
 
     /// The parameter line at a level, its points about a sampling distance apart.

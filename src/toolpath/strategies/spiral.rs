@@ -155,7 +155,7 @@ fn pitches(
 
 /// A place of the spiral.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Knot {
+struct SpiralKnot {
     /// Length from the middle, mm.
     s: f64,
     angle: f64,
@@ -163,7 +163,7 @@ struct Knot {
 }
 
 /// The spiral from the middle to one pitch beyond `reach`, in steps of about `step` mm.
-fn layout(pitches: &[f64], reach: f64, step: f64) -> Vec<Knot> {
+fn layout(pitches: &[f64], reach: f64, step: f64) -> Vec<SpiralKnot> {
     let pitch = |radius: f64| {
         // Linear between the middles of rings.
         let x = (radius / reach * pitches.len() as f64 - 0.5).clamp(0.0, (pitches.len() - 1) as f64);
@@ -171,16 +171,16 @@ fn layout(pitches: &[f64], reach: f64, step: f64) -> Vec<Knot> {
         let t = x - k as f64;
         pitches[k] * (1.0 - t) + pitches[(k + 1).min(pitches.len() - 1)] * t
     };
-    let mut knots = vec![Knot { s: 0.0, angle: 0.0, radius: 0.0 }];
+    let mut knots = vec![SpiralKnot { s: 0.0, angle: 0.0, radius: 0.0 }];
     loop {
-        let Knot { s, angle, radius } = knots[knots.len() - 1];
+        let SpiralKnot { s, angle, radius } = knots[knots.len() - 1];
         if radius > reach + pitch(reach) {
             return knots;
         }
         let turn = (step / radius.max(1e-9)).min(MOST_TURN);
         let grown = radius + pitch(radius) * turn / TAU;
         let length = (turn * 0.5 * (radius + grown)).hypot(grown - radius);
-        knots.push(Knot { s: s + length, angle: angle + turn, radius: grown });
+        knots.push(SpiralKnot { s: s + length, angle: angle + turn, radius: grown });
     }
 }
 

@@ -253,7 +253,7 @@ fn on_charts(task: &Task<'_>, asked: &Streamline) -> Result<Passes, PlanError> {
 }
 
 /// Feed directions and how much they matter on an even grid of a chart, oriented alike.
-struct Wanted {
+struct FeedGrid {
     /// Places a side.
     side: usize,
     lines: Vec<Option<(Vector3, f64)>>,
@@ -266,7 +266,7 @@ fn stream_function(
     direction: &FeedDirection,
     asked: &Streamline,
     settings: &PassSettings,
-) -> Result<(ScalarField, Vec<String>, Wanted), PlanError> {
+) -> Result<(ScalarField, Vec<String>, FeedGrid), PlanError> {
     let n = asked.control_points * SAMPLES_PER_CONTROL;
     let places: Vec<[f64; 2]> = chart.grid(n).collect();
     let points: Vec<_> = places.iter().map(|&[u, v]| chart.at(u, v)).collect();
@@ -316,7 +316,7 @@ fn stream_function(
         ),
         format!("the stream function is {method}, solved by {report}"),
     ];
-    Ok((psi, notes, Wanted { side: n, lines }))
+    Ok((psi, notes, FeedGrid { side: n, lines }))
 }
 
 /// Knots of both parameters by a rule. What the rule weighs along one parameter is the mean over the
