@@ -8,7 +8,8 @@ use metrology::contact_arcs;
 use motion::Toolpath;
 use scene::{Scene, ToolpathRequest};
 use toolpath::{
-    Engagement, OffsetDrive, Plan, PlanError, PlanSettings, Strategy, Tilting, plan, plan_pocket, plan_tilted,
+    Engagement, OffsetDrive, OffsetSurface, Plan, PlanError, PlanSettings, PocketStrategy, Strategy, Tilting,
+    plan, plan_pocket, plan_tilted,
 };
 use work::monitor::Monitor;
 
@@ -22,7 +23,7 @@ pub(crate) struct Planned {
     /// The path and what its planner says.
     pub plan: Plan,
     /// The strategy, with the surfaces that it rides on.
-    pub strategy: Strategy,
+    pub strategy: Box<dyn Strategy>,
     /// The path in the joints of a five-axis machine.
     pub joints: Option<JointPath>,
     /// The line of each move in the program; empty where there is none.
@@ -54,7 +55,7 @@ impl Session {
         let scene = &self.scene;
         let strategy = self.strategy(request)?;
         let mut plan =
-            self.path(request, &strategy, tool, fixtures, monitor).map_err(|e| self.refused(request, e))?;
+            self.path(request, &*strategy, tool, fixtures, monitor).map_err(|e| self.refused(request, e))?;
         if scene.machine.slow_corners {
             plan.path = slow_corners(&plan.path, &scene.machine);
         }
@@ -67,13 +68,13 @@ impl Session {
     fn path(
         &self,
         request: &ToolpathRequest,
-        strategy: &Strategy,
+        strategy: &dyn Strategy,
         tool: &Tool,
         fixtures: &[FixtureMesh],
         monitor: &dyn Monitor,
     ) -> Result<Plan, PlanError> {
         let (cutter, settings) = (&self.scene.cutter, self.settings(request));
-        if let (Some(pocket), Some(strategy)) = (&self.pocket, strategy.pocket()) {
+        if let (Some(pocket), Some(strategy)) = (&self.pocket, strategy.downcast_ref::<PocketStrategy>()) {
             return plan_pocket(pocket, cutter, strategy, &settings, monitor);
         }
         let Some(axis) = &request.axis else { return plan(&self.part, cutter, strategy, &settings, monitor) };
@@ -101,9 +102,9 @@ impl Session {
     }
 
     /// The strategy of a toolpath, with the offset surfaces that it rides on where these come from sections.
-    fn strategy(&self, request: &ToolpathRequest) -> Result<Strategy, JobError> {
-        let (Strategy::OffsetSurface { along, drive: OffsetDrive::InPlane }, Some(blade)) =
-            (&request.strategy, &self.blade)
+    fn strategy(&self, request: &ToolpathRequest) -> Result<Box<dyn Strategy>, JobError> {
+        let asked = request.strategy.downcast_ref::<OffsetSurface>();
+        let (Some(OffsetSurface { along, drive: OffsetDrive::InPlane }), Some(blade)) = (asked, &self.blade)
         else {
             return Ok(request.strategy.clone());
         };
@@ -113,7 +114,7 @@ impl Session {
                 PlanError::NotApplicable { strategy: "offset-surface", reason: e.to_string() },
             )
         })?;
-        Ok(Strategy::OffsetSurface { along: *along, drive: OffsetDrive::on(surfaces) })
+        Ok(Box::new(OffsetSurface { along: *along, drive: OffsetDrive::on(surfaces) }))
     }
 
     fn refused(&self, request: &ToolpathRequest, reason: PlanError) -> JobError {
@@ -127,7 +128,10 @@ impl Session {
         path: &mut Toolpath,
         monitor: &dyn Monitor,
     ) -> Result<Option<(Engagement, f64)>, JobError> {
-        let (Some(_), Some(strategy)) = (&self.pocket, request.strategy.pocket()) else { return Ok(None) };
+        let (Some(_), Some(strategy)) = (&self.pocket, request.strategy.downcast_ref::<PocketStrategy>())
+        else {
+            return Ok(None);
+        };
         let (scene, budget) = (&self.scene, self.budget());
         let cells = budget
             .grid_for(path.len(), &self.area(), &scene.simulation, &self.cells)

@@ -6,4 +6,4 @@ mod write;
 
 pub use error::{Finding, SceneError, SceneText, listed, nearest, suggestion};
 pub use section::{COORDINATE, LENGTH, Located, Section};
-pub use write::{toml_number, toml_string};
+pub use write::{toml_number, toml_string, word_of};

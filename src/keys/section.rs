@@ -228,6 +228,13 @@ impl<'a> Section<'a> {
         self.word(key, words)?.ok_or_else(|| self.missing(key, &format!("\"{}\"", words[0])))
     }
 
+    /// The value that a word stands for; the first one without the key.
+    pub fn choice<T: Copy>(&self, key: &str, values: &[(&'static str, T)]) -> Result<T, SceneError> {
+        let words: Vec<&'static str> = values.iter().map(|(word, _)| *word).collect();
+        let word = self.word(key, &words)?.map_or(words[0], |word| word.value);
+        Ok(values.iter().find(|(other, _)| *other == word).unwrap_or(&values[0]).1)
+    }
+
     /// A length, or `None` for that word or nothing.
     pub fn length_or_word(&self, key: &str, word: &'static str) -> Result<Option<f64>, SceneError> {
         if self.is_text(key) {

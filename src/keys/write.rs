@@ -11,3 +11,8 @@ pub fn toml_number(value: f64) -> String {
 pub fn toml_string(value: &str) -> String {
     toml::Value::String(value.to_owned()).to_string()
 }
+
+/// The word that stands for a value in a list of words and values; the first one where none does.
+pub fn word_of<T: PartialEq>(values: &[(&'static str, T)], value: &T) -> &'static str {
+    values.iter().find(|(_, other)| other == value).map_or(values[0].0, |(word, _)| word)
+}

@@ -5,14 +5,12 @@
 //! every refusal can point at the very key or value: tagged enums of serde only know the table.
 
 mod axis;
-mod classic;
 mod direction;
 mod interference;
 mod kinematics;
 mod load;
 mod named_file;
 mod part;
-mod pocket;
 mod read;
 #[cfg(test)]
 mod tests;
@@ -67,13 +65,6 @@ pub fn default_error_bound(limits: &Limits) -> f64 {
     (limits.scallop.min(limits.gouge).min(limits.uncut) / ERROR_BOUNDS_A_TOLERANCE).max(LEAST_ERROR_BOUND)
 }
 
-/// Default control points a side of a streamline's stream function. More follow finer changes of
-/// the feed direction and cost time as their cube; fewer smooth them away.
-pub const DEFAULT_CONTROL_POINTS: usize = 24;
-
-/// Default degree of a streamline's stream function: smooth to the curvature of passes.
-pub const DEFAULT_DEGREE: usize = 3;
-
 /// Stock around the part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stock {
@@ -104,7 +95,7 @@ pub struct ToolpathRequest {
     /// Folder of its files; unique in the scene, a plain file name everywhere.
     pub folder: String,
     /// How to plan it.
-    pub strategy: Strategy,
+    pub strategy: Box<dyn Strategy>,
     /// How far its passes lie apart.
     pub step: Step,
     /// The files of its feed directions, in the order of the scene; [`Scene::read`] reads them into the strategy.
@@ -118,10 +109,7 @@ pub struct ToolpathRequest {
 impl ToolpathRequest {
     /// The strategy's name as scenes spell it.
     pub fn strategy_name(&self) -> &'static str {
-        match &self.strategy {
-            Strategy::Pocket(strategy) => strategy.name(),
-            strategy => classic::name(strategy).unwrap_or("streamline"),
-        }
+        self.strategy.word()
     }
 }
 

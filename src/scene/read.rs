@@ -4,19 +4,16 @@ use std::io::Read as _;
 use std::path::Path;
 
 use super::{
-    CuttingData, DEFAULT_ALLOWANCE, DEFAULT_CLEARANCE, DEFAULT_CONTROL_POINTS, DEFAULT_DEGREE,
-    DEFAULT_FEED_RATE, DEFAULT_LIMITS, DEFAULT_MARGIN, DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE,
-    DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, EngineChoice, NamedFile, PartSource, Scene, Simulation, Stock,
-    ToolpathRequest, auto_cell, default_error_bound,
+    CuttingData, DEFAULT_ALLOWANCE, DEFAULT_CLEARANCE, DEFAULT_FEED_RATE, DEFAULT_LIMITS, DEFAULT_MARGIN,
+    DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE, DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, EngineChoice, NamedFile,
+    PartSource, Scene, Simulation, Stock, ToolpathRequest, auto_cell, default_error_bound,
 };
-use super::{axis, classic, direction, interference, kinematics, part, pocket};
+use super::{axis, direction, interference, kinematics, part};
 use cutter::{Cutter, Holder, HolderSection};
-use field::{KnotRule, MAX_DENSE, Solver};
-use keys::{LENGTH, Located, Section};
-use keys::{SceneError, SceneText};
+use keys::{LENGTH, Located, SceneError, SceneText, Section};
 use machine::Machine;
 use metrology::Limits;
-use toolpath::{Joining, Links, Step, Strategy, StreamMethod};
+use toolpath::{Joining, Links, PartKind, Step, read_pocket_step, read_strategy, words_for};
 
 /// Largest scene that is read, bytes. A scene is a page of text; a larger file is a mistake.
 const MAX_BYTES: u64 = 1 << 20;
@@ -123,9 +120,7 @@ impl Scene {
     /// Reads the files of feed directions into the strategies that follow them.
     fn load_directions(&mut self) -> Result<(), SceneError> {
         for request in &mut self.toolpaths {
-            if let Strategy::Streamline { direction, .. } = &mut request.strategy {
-                direction::load(direction, &mut request.directions.iter(), &self.source)?;
-            }
+            direction::load(request, &self.source)?;
         }
         Ok(())
     }
@@ -331,79 +326,41 @@ fn read_toolpaths(
     Ok(requests)
 }
 
-/// Keys of all toolpaths but pockets'.
-const COMMON: [&str; 8] =
-    ["name", "strategy", "stepover", "scallop", "links", "longest_link", "smoothing", axis::KEY];
-
-/// How much dearer passes square to a wanted direction may be made.
-const FOLLOW: std::ops::RangeInclusive<f64> = 0.0..=1000.0;
-
-/// Keys of streamlines.
-const STREAMLINE: [&str; 10] = [
-    "follow",
-    direction::KEYS[0],
-    direction::KEYS[1],
-    direction::KEYS[2],
-    direction::KEYS[3],
-    "control_points",
-    "method",
-    "degree",
-    "knots",
-    "solver",
-];
-
 fn read_toolpath(
     section: &Section<'_>,
     folder: &Path,
     limits: &Limits,
     cutter: &Cutter,
 ) -> Result<ToolpathRequest, SceneError> {
-    let all: Vec<&str> =
-        COMMON.into_iter().chain(classic::KEYS).chain(STREAMLINE).chain(pocket::ALL_KEYS).collect();
-    if !section.has("strategy") {
-        section.only(&all, &[], "a toolpath")?;
-    }
-    let words: Vec<&'static str> =
-        classic::WORDS.into_iter().chain(["streamline"]).chain(pocket::STRATEGIES).collect();
-    let word = section.required_word("strategy", &words)?;
-    if pocket::STRATEGIES.contains(&word.value) {
-        let (strategy, step) = pocket::read_strategy(section, word.value, cutter.radius())?;
-        return named_request(section, &word, Strategy::Pocket(strategy), step, Vec::new());
-    }
-    let own = classic::keys(word.value).unwrap_or(&STREAMLINE);
-    let keys: Vec<&str> = COMMON.iter().chain(own).copied().collect();
-    section.only(&keys, &all, &format!("strategy = \"{}\"", word.value))?;
-    let mut directions = Vec::new();
-    let strategy = match classic::read(word.value, section)? {
-        Some(strategy) => strategy,
-        None => read_streamline(section, folder, &mut directions)?,
+    let read = read_strategy(section, cutter.radius())?;
+    let surface = read.strategy.definition().part == PartKind::Surface;
+    let step = if surface {
+        read_step(section, limits, cutter)?
+    } else {
+        read_pocket_step(section, cutter.radius())?
     };
-    let step = read_step(section, limits, cutter)?;
-    named_request(section, &word, strategy, step, directions)
+    let (name, own_folder) = read_name(section, &read.word)?;
+    let (joining, axis) =
+        if surface { (read_joining(section)?, axis::read(section)?) } else { (Joining::default(), None) };
+    let named = |file: Located<String>| NamedFile::beside(folder, &file.value, file.span);
+    let directions = read.tables.into_iter().map(named).collect();
+    Ok(ToolpathRequest { name, folder: own_folder, strategy: read.strategy, step, directions, joining, axis })
 }
 
-/// A request with its name and the name of its folder.
-fn named_request(
-    section: &Section<'_>,
-    word: &Located<&str>,
-    strategy: Strategy,
-    step: Step,
-    directions: Vec<NamedFile>,
-) -> Result<ToolpathRequest, SceneError> {
+/// The name of a toolpath, by default its strategy's word, and the name of its folder.
+fn read_name(section: &Section<'_>, word: &Located<&str>) -> Result<(String, String), SceneError> {
     let (name, span) = match section.text("name")? {
         Some(name) => (name.value.to_owned(), name.span),
         None => (word.value.to_owned(), word.span.clone()),
     };
-    let own_folder = folder_name(&name).ok_or_else(|| {
+    let folder = folder_name(&name).ok_or_else(|| {
         section.error(
             &span,
             format!("\"{name}\" cannot name a toolpath"),
             "use up to 64 characters, at least one of them a letter or a digit of the Latin alphabet",
         )
     })?;
-    let joining = if strategy.pocket().is_some() { Joining::default() } else { read_joining(section)? };
-    let axis = if strategy.pocket().is_some() { None } else { axis::read(section)? };
-    Ok(ToolpathRequest { name, folder: own_folder, strategy, step, directions, joining, axis })
+    Ok((name, folder))
 }
 
 /// How passes are smoothed and joined.
@@ -432,96 +389,18 @@ fn check_pocket_strategies(
     part: &PartSource,
     toolpaths: &[ToolpathRequest],
 ) -> Result<(), SceneError> {
-    let pocket = matches!(part, PartSource::Pocket { .. });
-    let strange = |t: &&ToolpathRequest| matches!(t.strategy, Strategy::Pocket(_)) != pocket;
+    let (kind, what) = match part {
+        PartSource::Pocket { .. } => (PartKind::Pocket, "a pocket"),
+        _ => (PartKind::Surface, "anything but a pocket"),
+    };
+    let strange = |request: &&ToolpathRequest| request.strategy.definition().part != kind;
     let Some(wrong) = toolpaths.iter().find(strange) else { return Ok(()) };
-    let message = format!(
-        "strategy = \"{}\" does not mill {}",
-        wrong.strategy_name(),
-        if pocket { "a pocket" } else { "anything but a pocket" }
-    );
-    let cure = if pocket {
-        "use one of pocket-flow, pocket-offset, pocket-zigzag"
-    } else {
-        "use one of zigzag, iso-parametric, streamline, or `surface = \"pocket\"` in [part]"
+    let message = format!("strategy = \"{}\" does not mill {what}", wrong.strategy_name());
+    let cure = match kind {
+        PartKind::Pocket => format!("use one of {}", words_for(kind)),
+        PartKind::Surface => format!("use one of {}, or `surface = \"pocket\"` in [part]", words_for(kind)),
     };
     Err(root.error(&root.key_span("toolpath"), message, cure))
-}
-
-fn read_streamline(
-    section: &Section<'_>,
-    folder: &Path,
-    files: &mut Vec<NamedFile>,
-) -> Result<Strategy, SceneError> {
-    let shortest = |keys: &[&'static str], what: &str| {
-        let keys: Vec<&str> = COMMON.into_iter().chain(keys.iter().copied()).collect();
-        section.only(&keys, &STREAMLINE, what)
-    };
-    let Some(direction) = direction::read(section, folder, files)? else {
-        shortest(&["direction"], "direction = \"shortest\"")?;
-        return Ok(Strategy::ShortestStreamline { toward: None });
-    };
-    if let Some(dearer) = section.number("follow", FOLLOW, "")? {
-        let keys: Vec<&str> = direction::KEYS.into_iter().chain(["follow"]).collect();
-        shortest(&keys, "`follow`, which leaves no method to choose")?;
-        return Ok(Strategy::ShortestStreamline { toward: Some((direction, dearer.value)) });
-    }
-    let control_points =
-        section.count("control_points", 4..=200)?.map_or(DEFAULT_CONTROL_POINTS, |n| n as usize);
-    let (method, solver) = read_stream_method(section, control_points)?;
-    Ok(Strategy::Streamline { direction, control_points, method, solver })
-}
-
-fn read_stream_method(
-    section: &Section<'_>,
-    control_points: usize,
-) -> Result<(StreamMethod, Solver), SceneError> {
-    let method = section.word("method", &["auto", "bspline", "differences", "elements"])?.map(|m| m.value);
-    let degree = section.count("degree", 2..=5)?.map(|degree| degree as usize);
-    let rule = section.word("knots", &KnotRule::WORDS)?.and_then(|word| KnotRule::from_word(word.value));
-    let chosen = section.word("solver", &Solver::WORDS)?;
-    let solver = chosen.as_ref().and_then(|word| Solver::from_word(word.value));
-    let refuse =
-        |key: &str, message: String, cure: &str| Err(section.error(&section.key_span(key), message, cure));
-    if method == Some("elements") {
-        if let Some(key) = ["degree", "knots", "solver"].into_iter().find(|key| section.has(key)) {
-            let message = format!("`{key}` does not apply to finite elements, which `method` asks for");
-            return refuse(key, message, "delete it, or write `method = \"bspline\"`");
-        }
-        return Ok((StreamMethod::Elements, Solver::Cholesky));
-    }
-    if method == Some("differences") {
-        if let Some(key) = ["degree", "knots"].into_iter().find(|key| section.has(key)) {
-            let message = format!("`{key}` belongs to B-splines, and `method` is \"differences\"");
-            return refuse(key, message, "delete it, or write `method = \"bspline\"`");
-        }
-        if matches!(solver, Some(Solver::Qr | Solver::MinimumNorm)) {
-            let message = "differences have no rectangular system, which this solver takes".to_owned();
-            return refuse("solver", message, "write `solver = \"cg\"`, \"cholesky\" or \"gmres\"");
-        }
-        return Ok((StreamMethod::Differences, solver.unwrap_or(Solver::ConjugateGradient)));
-    }
-    let degree = degree.unwrap_or(DEFAULT_DEGREE);
-    if control_points <= degree {
-        let message = format!("{control_points} control points a side are too few for degree {degree}");
-        return refuse(
-            if section.has("degree") { "degree" } else { "control_points" },
-            message,
-            "write at least one control point more than the degree",
-        );
-    }
-    if solver == Some(Solver::MinimumNorm) && control_points.pow(2) > MAX_DENSE {
-        let message = format!(
-            "the minimum-norm solver takes at most {MAX_DENSE} coefficients, and {control_points} control points a \
-             side make {}",
-            control_points.pow(2)
-        );
-        return refuse("solver", message, "write `control_points = 24` or fewer, or another solver");
-    }
-    let spline = StreamMethod::BSpline { degree, knots: rule.unwrap_or_default() };
-    let asked = method == Some("bspline") || ["degree", "knots", "solver"].iter().any(|key| section.has(key));
-    let method = if asked { spline } else { StreamMethod::Automatic };
-    Ok((method, solver.unwrap_or(Solver::Cholesky)))
 }
 
 /// The step of one toolpath: its own stepover or scallop, or else the scene's scallop.

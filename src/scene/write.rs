@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::{Scene, ToolpathRequest, axis, classic, direction, interference, kinematics, part, pocket};
-pub(super) use keys::{toml_number as number, toml_string as text};
-use toolpath::{Links, Step, Strategy, StreamMethod, longest_link};
+use super::{Scene, ToolpathRequest, axis, interference, kinematics, part};
+use keys::{toml_number as number, toml_string as text};
+use toolpath::{Links, PartKind, Step, longest_link};
 
 /// The whole scene as TOML, every default in effect included. Reading it gives the same scene
 /// again; relative paths still start from the scene's folder.
@@ -71,7 +71,7 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
         writeln!(out, "\n[[toolpath]]")?;
         writeln!(out, "name = {}", text(&request.name))?;
         writeln!(out, "strategy = {}", text(request.strategy_name()))?;
-        write_strategy(out, request)?;
+        request.strategy.write(out)?;
         match request.step {
             Step::Scallop(height) => {
                 writeln!(out, "scallop = {}  # mm, steps are planned for it", number(height))?;
@@ -103,7 +103,7 @@ fn write_holder(out: &mut String, scene: &Scene) -> std::fmt::Result {
 }
 
 fn write_joining(out: &mut String, request: &ToolpathRequest, scene: &Scene) -> std::fmt::Result {
-    if request.strategy.pocket().is_some() {
+    if request.strategy.definition().part == PartKind::Pocket {
         return Ok(());
     }
     let joining = &request.joining;
@@ -124,35 +124,4 @@ fn write_joining(out: &mut String, request: &ToolpathRequest, scene: &Scene) -> 
         joining.smoothing
     )?;
     axis::write(out, request.axis.as_ref())
-}
-
-fn write_strategy(out: &mut String, request: &ToolpathRequest) -> std::fmt::Result {
-    match &request.strategy {
-        Strategy::Pocket(strategy) => pocket::write_strategy(out, strategy),
-        Strategy::ShortestStreamline { toward: None } => writeln!(out, "direction = \"shortest\""),
-        Strategy::ShortestStreamline { toward: Some((toward, dearer)) } => {
-            direction::write(out, toward, &mut request.directions.iter(), "\n")?;
-            writeln!(out, "\nfollow = {}  # mm more for each mm of pass square to it", number(*dearer))
-        }
-        Strategy::Streamline { direction, control_points, method, solver } => {
-            direction::write(out, direction, &mut request.directions.iter(), "\n")?;
-            writeln!(out)?;
-            writeln!(out, "control_points = {control_points}")?;
-            match method {
-                StreamMethod::Automatic => return writeln!(out, "method = \"auto\""),
-                StreamMethod::Elements => return writeln!(out, "method = \"elements\""),
-                StreamMethod::Differences => {
-                    writeln!(
-                        out,
-                        "method = \"differences\"  # on three cells for each control point and side"
-                    )?;
-                }
-                StreamMethod::BSpline { degree, knots } => {
-                    writeln!(out, "method = \"bspline\"\ndegree = {degree}\nknots = {}", text(knots.name()))?;
-                }
-            }
-            writeln!(out, "solver = {}", text(solver.name()))
-        }
-        classic_strategy => classic::write(out, classic_strategy),
-    }
 }

@@ -235,7 +235,7 @@ impl<'a> DropCutter<'a> {
     /// the triangles on which the grown cutter rests at `z*` or above, and any point of `S` that is
     /// found gives a lower bound of `z*`.
     fn on_surface(&self, surface: &dyn ExactSurface, first: &Landing) -> Option<Drop> {
-        let mut found = Found { best: None, known: [((0, 0), [0.0; 2]); REMEMBERED], len: 0 };
+        let mut found = Refinement { best: None, known: [((0, 0), [0.0; 2]); REMEMBERED], len: 0 };
         self.refine(surface, first, &mut found);
         let (x, y) = (first.x, first.y);
         self.search(found.height(), x, y, |slot, floor| {
@@ -264,7 +264,7 @@ impl<'a> DropCutter<'a> {
     }
 
     /// Climbs to the maximum on the exact surface that is reached from the contact on a triangle.
-    fn refine(&self, surface: &dyn ExactSurface, landing: &Landing, found: &mut Found) {
+    fn refine(&self, surface: &dyn ExactSurface, landing: &Landing, found: &mut Refinement) {
         let Landing { x, y, slot, touch } = landing;
         let triangle = self.bvh.triangle_in(*slot);
         let Some(corners) = surface.corner_parameters(triangle) else {
@@ -305,7 +305,7 @@ struct Landing {
 }
 
 /// What the refinement has found so far in one drop.
-struct Found {
+struct Refinement {
     /// Triangle, patch and contact.
     best: Option<(usize, u32, Peak)>,
     /// Patch, number of the profile's piece, and parameters of maxima.
@@ -313,7 +313,7 @@ struct Found {
     len: usize,
 }
 
-impl Found {
+impl Refinement {
     fn height(&self) -> f64 {
         self.best.as_ref().map_or(f64::NEG_INFINITY, |b| b.2.tip_z)
     }

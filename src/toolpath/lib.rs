@@ -2,6 +2,7 @@
 //! stock is stored.
 
 mod drop;
+mod facets;
 mod levels;
 mod link;
 mod moves;
@@ -10,16 +11,28 @@ mod pocket;
 mod strategies;
 mod surface;
 mod tilt;
+mod vocabulary;
 
-pub use crate::strategies::shortest::shortest_possible;
-pub use crate::tilt::repair::{RepairSummary, Unreachable};
-pub use crate::tilt::tilted::Tilting;
 pub use drop::{Drop, DropCutter, GridDrop, PlanGrid};
-pub use link::{Joining, LONGEST_LINK, Links, longest_link};
-pub use plan::{
-    Along, FeedDirection, FrontStart, LevelSteps, OffsetAlong, OffsetDrive, Plan, PlanError, PlanSettings,
-    Step, Strategy, StreamMethod, plan, plan_tilted,
-};
+pub use levels::spacing::LevelSteps;
+pub use link::{LONGEST_LINK, longest_link};
+pub use plan::{Plan, plan, plan_tilted};
 pub use pocket::{
     Engagement, Flow, Pattern, Pocket, PocketStrategy, engagement, engagement_angle, limit_feed, plan_pocket,
+    read_pocket_step,
+};
+pub use strategies::iso_parametric::IsoParametric;
+pub use strategies::iso_scallop::{FrontStart, IsoScallop};
+pub use strategies::offset_surface::{OffsetAlong, OffsetDrive, OffsetSurface};
+pub use strategies::shortest::{ShortestStreamline, shortest_possible};
+pub use strategies::spiral::Spiral;
+pub use strategies::streamline::{DEFAULT_CONTROL_POINTS, DEFAULT_DEGREE, StreamMethod, Streamline};
+pub use strategies::waterline::Waterline;
+pub use strategies::zigzag::{Zigzag, ZigzagAngle};
+pub use strategies::{STRATEGIES, StrategyRead, read_strategy, words_for};
+pub use tilt::repair::{RepairSummary, Unreachable};
+pub use tilt::tilted::Tilting;
+pub use vocabulary::{
+    Along, Definition, FeedDirection, Joining, Links, PartKind, PlanError, PlanSettings, Reading, Step,
+    Strategy,
 };

@@ -1,299 +1,22 @@
 //! What a strategy is asked for, and the one entrance to all strategies.
 
-use std::sync::Arc;
-
-use super::PocketStrategy;
-use super::link::{Joining, join, join_tilted};
-use crate::levels::planned_field::{self, Contact};
-use crate::levels::spacing::Placing;
-use crate::moves::chord::{Watch, reduce, sample_within_chord};
-use crate::moves::smooth::smooth_and_spread;
-use crate::strategies::mesh_passes::Aim;
+use crate::facets::facet_charge;
+use crate::levels::planned_field;
+use crate::link::{join, join_tilted};
 use crate::strategies::shortest::shortest_possible;
-use crate::strategies::streamline::Fitting;
-use crate::strategies::{
-    contour_spiral, iso_scallop, mesh_passes, offset_mesh, offset_surface, shortest, spiral, streamline,
-    waterline, zigzag,
-};
+use crate::strategies::words_for;
 use crate::surface::mesh_surface;
-use crate::tilt::tilted;
-use crate::tilt::tilted::{TiltedPasses, Tilting, Touch};
+use crate::tilt::tilted::{self, TiltedPasses, Tilting};
+use crate::vocabulary::{
+    Contact, PartKind, PassSettings, Passes, PlanError, PlanSettings, SAMPLING_OVER_RADIUS, Setup, Step,
+    Strategy, Task,
+};
 use cutter::Cutter;
-use field::mesh::Sense;
-use field::{KnotRule, LineField, Solver};
 use field::{PlannedField, ShortestPossible};
-use geometry::{NurbsSurface, Point2, Point3, TriangleMesh};
-use motion::Toolpath;
-use motion::{AxisError, ToolAxis};
+use motion::{ToolAxis, Toolpath};
 use part::Part;
 use scallop::strip_width;
-use work::monitor::{Cancelled, Monitor};
-
-/// How far neighbouring passes lie apart.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Step {
-    /// So that the scallop stays below this height, mm.
-    Scallop(f64),
-    /// This stepover, mm (measured as the strategy steps: in the plan view for zigzag, on the
-    /// surface for the others).
-    Stepover(f64),
-}
-
-/// Which parameter a pass follows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Along {
-    /// u grows along a pass, v is constant.
-    U,
-    /// v grows along a pass, u is constant.
-    V,
-}
-
-/// Where the feed direction of a streamline comes from.
-#[derive(Debug, Clone, PartialEq)]
-pub enum FeedDirection {
-    /// Along a parameter of the patch (x and y of a mesh part).
-    Parameter(Along),
-    /// A fixed angle from the x axis in the plan view, rad.
-    Angle(f64),
-    /// Across the widest strip, from the principal curvatures.
-    WidestStrip,
-    /// Up the slope of the surface; none on level ground.
-    Steepest,
-    /// Level along the surface, square to the slope; none on level ground.
-    Contour,
-    /// As sampled at places of the plan view, or of the parameters of each patch.
-    Samples(Arc<LineField>),
-    /// From curves of the plan view; between and beyond them the smoothest field that they allow.
-    Guides {
-        /// Polylines of at least two different points, mm.
-        curves: Arc<Vec<Vec<Point2>>>,
-        /// Along or across them.
-        sense: Sense,
-    },
-    /// From the borders of the part, of each patch where patches are planned one by one; inside, the smoothest field
-    /// that they allow.
-    Border(Sense),
-    /// The mean of directions as lines (of their doubled angles in the tangent plane) by positive weights, each times how
-    /// much its direction matters at the place.
-    Blend(Vec<(FeedDirection, f64)>),
-}
-
-/// How a stream function is fitted to feed directions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StreamMethod {
-    /// A tensor-product B-spline by least squares.
-    BSpline {
-        /// Its degree, 2 to 5.
-        degree: usize,
-        /// How its knots are placed.
-        knots: KnotRule,
-    },
-    /// Finite differences on a grid.
-    Differences,
-    /// Finite elements on the part's mesh: all patches as one surface, holes and steps as they are.
-    Elements,
-    /// Elements for parts of several patches and for meshes that no height surface follows; else a cubic B-spline on
-    /// uniform knots.
-    Automatic,
-}
-
-/// How levels step from pass to pass.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LevelSteps {
-    /// As wide as makes the passes, with further short ones where the step is too wide, shortest in all.
-    Shortest,
-    /// The same step throughout, the one with the shortest passes in all.
-    Constant,
-    /// Each step the least that the pass before and the next one allow at any of their places.
-    Least,
-}
-
-/// Where a front starts whose levels are passes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum FrontStart {
-    /// The border from which the path is shortest.
-    BestBorder,
-    /// Where a parameter is least or greatest.
-    Border {
-        /// The parameter that is constant there.
-        constant: Along,
-        /// Its greatest value, not its least.
-        greatest: bool,
-    },
-    /// All four borders at once: passes run around.
-    AllBorders,
-    /// A straight line in shares of the parameters' ranges (0 to 1), to both sides; it is continued to the borders.
-    Line([[f64; 2]; 2]),
-}
-
-/// How passes run on an offset surface.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum OffsetAlong {
-    /// u grows along a pass: along the sections of a blade.
-    U,
-    /// v grows along a pass: across the sections, from hub to tip.
-    V,
-    /// One spiral, u growing along it, on surfaces that close along u.
-    Spiral,
-    /// Vertical planes in this direction of the plan view, rad from x: on meshes, which have no parameters.
-    Angle(f64),
-}
-
-/// Which offset surface the ball's centre rides on.
-#[derive(Debug, Clone, PartialEq)]
-pub enum OffsetDrive {
-    /// The part's own, everywhere the radius off along the normal.
-    Exact,
-    /// Sections offset in their planes, and lofted. It lies too near wherever the surface leans out of these planes; whoever
-    /// has the sections puts [`OffsetDrive::Given`] in its place. A tilted tool that keeps clear leaves such places out.
-    InPlane,
-    /// These surfaces, `du × dv` away from the part.
-    Given(Arc<Vec<NurbsSurface>>),
-}
-
-/// A way to cover the part with passes.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Strategy {
-    /// Parallel vertical planes.
-    Zigzag {
-        /// Direction of the passes from the x axis in the plan view, rad.
-        angle: f64,
-        /// Cut in one direction only.
-        one_way: bool,
-    },
-    /// Lines of constant parameter.
-    IsoParametric {
-        /// Which parameter grows along a pass.
-        along: Along,
-    },
-    /// Parallel vertical planes in the direction with the shortest path: searched over half a turn by the predicted
-    /// length, the best few planned.
-    BestZigzag {
-        /// Cut in one direction only.
-        one_way: bool,
-    },
-    /// Lines of constant parameter, one direction or the shorter of both, and a choice of steps.
-    IsoParametricSteps {
-        /// Which parameter grows along a pass; the better one without it.
-        along: Option<Along>,
-        /// How the parameter steps from pass to pass.
-        steps: LevelSteps,
-    },
-    /// Each pass at exactly the strip's width from the one before, measured on the surface across the feed: level curves
-    /// of the arrival of a front that starts on a curve and moves by the strip's width.
-    IsoScallop {
-        /// Where the first pass is.
-        start: FrontStart,
-    },
-    /// Curves of constant height of the cutter. Where the part is nearly level they lie far apart: further passes fill in
-    /// as far as six halvings reach.
-    Waterline {
-        /// How the height steps from pass to pass.
-        steps: LevelSteps,
-    },
-    /// One spiral from the middle of the plan view outward, its pitch that of the tightest place of each turn. Where it
-    /// leaves the part it is cut into pieces.
-    Spiral,
-    /// One spiral from the border to the middle between the passes of an iso-scallop path from all borders, without a
-    /// retract; further short passes where its turns have corners. For parts whose front closes in one point.
-    ContourSpiral,
-    /// Streamlines of the feed directions with the shortest path: each one strip from the next, their first curve
-    /// searched.
-    ShortestStreamline {
-        /// A direction to keep to, and how much dearer a mm of pass square to it is, in mm: 0 leaves all freedom, a great
-        /// number none.
-        toward: Option<(FeedDirection, f64)>,
-    },
-    /// A ball whose centre rides on an offset surface.
-    OffsetSurface {
-        /// How passes run.
-        along: OffsetAlong,
-        /// On what.
-        drive: OffsetDrive,
-    },
-    /// Level curves of a stream function fitted to feed directions.
-    Streamline {
-        /// The feed directions.
-        direction: FeedDirection,
-        /// Control points a side of the stream function's B-spline; differences have three cells for
-        /// each.
-        control_points: usize,
-        /// How the stream function is fitted.
-        method: StreamMethod,
-        /// What solves its equations.
-        solver: Solver,
-    },
-    /// A pocket's passes; planned by [`plan_pocket`](super::plan_pocket).
-    Pocket(PocketStrategy),
-}
-
-impl Strategy {
-    /// The strategy as one for pockets.
-    pub fn pocket(&self) -> Option<&PocketStrategy> {
-        match self {
-            Self::Pocket(strategy) => Some(strategy),
-            _ => None,
-        }
-    }
-}
-
-/// What every strategy needs to know besides part and cutter.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PlanSettings {
-    /// Distance of passes.
-    pub step: Step,
-    /// Largest distance between the straight moves and the exact path, mm.
-    pub chord_tolerance: f64,
-    /// Height of rapid moves above the highest point of part and stock, mm.
-    pub clearance: f64,
-    /// Highest point of the stock, mm.
-    pub stock_top: f64,
-    /// Feed along passes, mm/min.
-    pub feed_rate: f64,
-    /// Feed down to a pass, mm/min.
-    pub plunge_rate: f64,
-    /// Rapid rate, mm/min; it decides between links on the surface and retracts.
-    pub rapid_rate: f64,
-    /// How passes are smoothed and joined.
-    pub joining: Joining,
-}
-
-/// Why no path could be planned.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum PlanError {
-    /// Stopped by the user.
-    #[error(transparent)]
-    Cancelled(#[from] Cancelled),
-    /// The strategy does not apply to this part.
-    #[error("{strategy} cannot plan this part: {reason}")]
-    NotApplicable {
-        /// Strategy's name.
-        strategy: &'static str,
-        /// Why, and what would help.
-        reason: String,
-    },
-    /// No smooth surface, which directions and distances of passes come from, could be fitted to a mesh.
-    #[error(
-        "no smooth surface could be fitted to the mesh ({0}); export a part that is more than a sliver seen from above"
-    )]
-    NoFit(String),
-    /// The rule gives no tool axis at a place.
-    #[error(transparent)]
-    Axis(#[from] AxisError),
-    /// The passes lie so close on so large a part that planning them would take days or all memory.
-    #[error(
-        "passes {step} mm apart over {x} x {y} mm would be too many; set a greater `stepover` or `scallop`, \
-         and check the units of the part"
-    )]
-    TooMany {
-        /// Greatest distance of passes that the settings allow, mm.
-        step: f64,
-        /// Size of the part along x, mm.
-        x: f64,
-        /// Size of the part along y, mm.
-        y: f64,
-    },
-}
+use work::monitor::Monitor;
 
 /// A planned path and what the planner has to say about it.
 #[derive(Debug, Clone, PartialEq)]
@@ -314,11 +37,9 @@ impl Plan {
         mut notes: Vec<String>,
         mut field: PlannedField,
         contacts: &[Vec<Contact>],
-        strategy: &Strategy,
+        strategy: &dyn Strategy,
     ) -> Self {
-        let by_streamlines =
-            matches!(strategy, Strategy::Streamline { .. } | Strategy::ShortestStreamline { .. });
-        let field = by_streamlines.then(|| {
+        let field = strategy.shows_field().then(|| {
             planned_field::measure(&mut field, contacts);
             field
         });
@@ -329,112 +50,6 @@ impl Plan {
     }
 }
 
-impl LevelSteps {
-    fn placing(self) -> Placing {
-        match self {
-            Self::Shortest => Placing::Shortest,
-            Self::Constant => Placing::OneStep,
-            Self::Least => Placing::Least,
-        }
-    }
-}
-
-impl PlanError {
-    pub(crate) fn mesh(reason: &str) -> Self {
-        Self::NoFit(reason.to_owned())
-    }
-}
-
-/// What every pass needs.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct PassSettings<'a> {
-    /// Distance of passes, already less what the chords may add.
-    pub step: Step,
-    /// First sampling distance along a pass, mm.
-    pub sampling: f64,
-    /// Chord tolerance, mm.
-    pub chord_tolerance: f64,
-    /// The sampling distance, mm, by which passes are smoothed; `None` leaves them as they are.
-    pub smoothing: Option<f64>,
-    /// How the cutter is tilted; upright without it.
-    pub axis: Option<&'a ToolAxis>,
-    /// The ball that is dropped in its stead where a tilted cutter, no ball itself, is located by the contacts of that.
-    pub probe: Option<&'a Cutter>,
-}
-
-/// Shares of the chord tolerance that sampling and point reduction may use. Together they leave a part of it: ridges stand
-/// between chords of two passes, and passes lie the closer the more chords may raise them.
-const SAMPLING_SHARE: f64 = 0.1;
-const REDUCTION_SHARE: f64 = 0.4;
-
-impl<'a> PassSettings<'a> {
-    /// The cutter that is dropped.
-    pub fn dropped<'b>(&self, cutter: &'b Cutter) -> &'b Cutter
-    where
-        'a: 'b,
-    {
-        self.probe.unwrap_or(cutter)
-    }
-
-    /// Straight moves along `locate` over `[s0, s1]` within the chord tolerance.
-    ///
-    /// # Errors
-    /// [`Cancelled`] when the monitor says so, which is asked every few hundred places.
-    pub fn moves(
-        &self,
-        s0: f64,
-        s1: f64,
-        locate: &mut dyn FnMut(f64) -> Option<Point3>,
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<Point3>, Cancelled> {
-        let fine = SAMPLING_SHARE * self.chord_tolerance;
-        let mut watch = Watch::new(monitor);
-        let points = sample_within_chord(s0, s1, self.sampling, fine, locate, &mut watch)?;
-        match self.smoothing {
-            Some(sampling) => {
-                let share = if let Step::Scallop(_) = self.step { SMOOTHED_SHARE } else { 1.0 };
-                smooth_and_spread(&points, sampling, share * (self.chord_tolerance - fine), &mut watch)
-            }
-            None => reduce(&points, REDUCTION_SHARE * self.chord_tolerance, &mut watch),
-        }
-    }
-}
-
-/// Planned passes, not yet joined, and remarks for the user.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Passes {
-    /// Tip positions of each pass.
-    pub passes: Vec<Vec<Point3>>,
-    /// Where a tilted cutter touches along each pass, whose tips then count for nothing; empty for an upright one.
-    pub touches: Vec<Vec<Touch>>,
-    /// Remarks.
-    pub notes: Vec<String>,
-    /// What they were planned by, where they are levels of a function.
-    pub field: PlannedField,
-    /// Where the cutter touches along each pass, in no order, where they are levels of a function.
-    pub contacts: Vec<Vec<Contact>>,
-}
-
-impl Passes {
-    /// Length of all passes, mm.
-    pub fn length(&self) -> f64 {
-        self.passes.iter().flat_map(|pass| pass.windows(2)).map(|w| (w[1] - w[0]).norm()).sum()
-    }
-
-    /// Appends the passes and remarks of another piece of the part.
-    pub fn append(&mut self, other: Self) {
-        self.passes.extend(other.passes);
-        self.touches.extend(other.touches);
-        self.notes.extend(other.notes);
-        self.field.append(other.field);
-        self.contacts.extend(other.contacts);
-    }
-}
-
-/// First sampling distance along a pass as a share of the cutter's radius: features narrower than
-/// that could hide between two samples of a pass.
-const SAMPLING_OVER_RADIUS: f64 = 0.15;
-
 /// A scallop target is planned for less this share of the chord tolerance. A chord may raise a ridge by half of it, but
 /// ridges stand between chords of two passes, whose greatest deviations seldom meet.
 const CHORD_SHARE: f64 = 0.26;
@@ -442,60 +57,8 @@ const CHORD_SHARE: f64 = 0.26;
 /// The same of smoothed passes, whose points and chords stray farther.
 const SMOOTHED_CHORD_SHARE: f64 = 0.5;
 
-/// Where passes are spaced for a scallop, smoothing takes this share of the chord tolerance. With all of it there are 15 % fewer
-/// points, but 2 % of the ridges of a saddle stand over the target.
-const SMOOTHED_SHARE: f64 = 0.78;
-
-/// On a mesh it is planned for less by what facets stand off the smooth surface, too: on elements, whose curvature is that of
-/// the facets around, and on meshes with steps, by the height that this share of them (by area) stays below. On surfaces
-/// fitted to smooth meshes by the height that nearly all stay below, less a share of the target, and by no more than another
-/// share: ridges cross facets at any height, and not all passes leave all of the target. Facets at sharper angles than the
-/// last, rad, are edges of the part.
-const FACETS_ON_ELEMENTS: f64 = 0.6;
-const FACETS: f64 = 0.95;
-const FACETS_LESS: f64 = 0.055;
-const MOST_FACETS: f64 = 0.09;
-const SHARPEST_FACETS: f64 = 0.3;
-
 /// But it is not planned for less than this share of itself.
 const LEAST_SHARE_OF_TARGET: f64 = 0.5;
-
-/// What the facets of a mesh, planned on a surface fitted to it or on itself, take of a scallop target, mm.
-fn facet_charge(mesh: &TriangleMesh, fitted: bool, target: f64) -> f64 {
-    if fitted {
-        (facet_height(mesh, FACETS) - FACETS_LESS * target).max(0.0).min(MOST_FACETS * target)
-    } else {
-        facet_height(mesh, FACETS_ON_ELEMENTS)
-    }
-}
-
-/// How far facets stand off the smooth surface that they are chords of, mm: where two meet at the angle δ, each is as wide
-/// as its neighbours and has a sagitta of an eighth of δ times the width; the one that a share of them stays below.
-fn facet_height(mesh: &TriangleMesh, share: f64) -> f64 {
-    let mut facets: Vec<(f64, f64)> = Vec::new();
-    let area = |t: usize| {
-        let [a, b, c] = mesh.corners(t);
-        0.5 * (b - a).cross(&(c - a)).norm()
-    };
-    for t in 0..mesh.triangles().len() {
-        for k in 0..3 {
-            let Some(n) = mesh.neighbour(t, k).filter(|&n| n > t) else { continue };
-            let corners = mesh.corners(t);
-            let (edge, both) = ((corners[(k + 1) % 3] - corners[k]).norm(), area(t) + area(n));
-            let angle = mesh.normal(t).cross(&mesh.normal(n)).norm();
-            if angle < SHARPEST_FACETS && edge > 0.0 {
-                facets.push((0.125 * angle * both / edge, both));
-            }
-        }
-    }
-    facets.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut left = share * facets.iter().map(|(_, area)| area).sum::<f64>();
-    let reached = facets.iter().find(|(_, area)| {
-        left -= area;
-        left <= 0.0
-    });
-    reached.map_or(0.0, |(height, _)| *height)
-}
 
 /// Most passes that are planned: ten times what a part of ten metres takes at 0.1 mm. More of them
 /// take up memory without end.
@@ -506,14 +69,14 @@ const MAX_SAMPLES: f64 = 1e9;
 
 /// Refuses what would never end. Counts no pass too many: steps are taken as great as any strategy
 /// plans them.
-fn check_extent(part: &Part, cutter: &Cutter, pass: &PassSettings) -> Result<(), PlanError> {
-    let step = match pass.step {
+fn check_extent(task: &Task<'_>) -> Result<(), PlanError> {
+    let step = match task.settings.step {
         // As wide as the strip may be where cutter and surface fit each other.
-        Step::Scallop(h) => strip_width(0.0, 0.0, h, cutter.radius()).0,
+        Step::Scallop(h) => strip_width(0.0, 0.0, h, task.cutter.radius()).0,
         Step::Stepover(s) => s,
     };
-    let size = part.bounds().size();
-    let samples = size.x / step * (size.y / pass.sampling);
+    let size = task.part.bounds().size();
+    let samples = size.x / step * (size.y / task.settings.sampling);
     if size.x.max(size.y) > MAX_PASSES * step || samples > MAX_SAMPLES {
         return Err(PlanError::TooMany { step, x: size.x, y: size.y });
     }
@@ -527,13 +90,13 @@ fn check_extent(part: &Part, cutter: &Cutter, pass: &PassSettings) -> Result<(),
 pub fn plan(
     part: &Part,
     cutter: &Cutter,
-    strategy: &Strategy,
+    strategy: &dyn Strategy,
     settings: &PlanSettings,
     monitor: &dyn Monitor,
 ) -> Result<Plan, PlanError> {
-    let (planned, both_ways) = passes(part, cutter, strategy, None, settings, monitor)?;
-    let Passes { passes, notes, field, contacts, .. } = planned;
-    let path = join(passes, both_ways, part, cutter, settings, monitor)?;
+    let setup = Setup { part, cutter, settings, monitor };
+    let Passes { passes, notes, field, contacts, .. } = passes(&setup, strategy, None)?;
+    let path = join(passes, strategy.both_ways(), &setup)?;
     let mut plan = Plan::new(path, notes, field, &contacts, strategy);
     if let Step::Scallop(h) = settings.step {
         plan.shortest = Some(shortest_possible(part, cutter, h)?);
@@ -552,112 +115,59 @@ pub fn plan(
 pub fn plan_tilted(
     part: &Part,
     cutter: &Cutter,
-    strategy: &Strategy,
+    strategy: &dyn Strategy,
     tilting: &Tilting,
     settings: &PlanSettings,
     monitor: &dyn Monitor,
 ) -> Result<Plan, PlanError> {
-    let (planned, both_ways) = passes(part, cutter, strategy, Some(tilting.axis), settings, monitor)?;
-    let Passes { passes, touches, mut notes, field, contacts } = planned;
+    let setup = Setup { part, cutter, settings, monitor };
+    let Passes { passes, touches, mut notes, field, contacts } =
+        passes(&setup, strategy, Some(tilting.axis))?;
     let mut touches = if touches.is_empty() && !passes.is_empty() {
         let dropped = tilted::probe(cutter).unwrap_or(*cutter);
         let dropped = tilted::Dropped { passes: &passes, ball: &dropped };
-        tilted::around_centres(&dropped, part, cutter, tilting.axis, settings.chord_tolerance, monitor)?
+        tilted::around_centres(&dropped, tilting.axis, &setup)?
     } else {
         TiltedPasses::located(touches, settings.chord_tolerance)
     };
     touches.smoothing = settings.joining.smoothing.then_some(SAMPLING_OVER_RADIUS * cutter.radius());
-    let path = join_tilted(touches, both_ways, part, cutter, tilting, settings, &mut notes, monitor)?;
+    let path = join_tilted(touches, strategy.both_ways(), tilting, &setup, &mut notes)?;
     Ok(Plan::new(path, notes, field, &contacts, strategy))
 }
 
-/// The passes of a strategy, not yet joined, and whether they may be fed both ways.
-fn passes(
-    part: &Part,
-    cutter: &Cutter,
-    strategy: &Strategy,
-    axis: Option<&ToolAxis>,
-    settings: &PlanSettings,
-    monitor: &dyn Monitor,
-) -> Result<(Passes, bool), PlanError> {
-    // A tilted cutter follows the level curves of the plan coordinate instead of being dropped.
-    let levels = axis.filter(|_| !part.patches().is_empty());
-    let probe = axis.and_then(|_| tilted::probe(cutter));
-    let wants_mesh = || levels.is_none() && probe.is_none() && mesh_surface::wants_mesh(part, cutter);
-    let on_elements = match strategy {
-        Strategy::ShortestStreamline { .. } => wants_mesh(),
-        Strategy::Streamline { method: StreamMethod::Automatic, .. } => wants_mesh(),
-        Strategy::Streamline { method, .. } => *method == StreamMethod::Elements,
-        _ => false,
-    };
-    let step = match settings.step {
-        Step::Scallop(h) => {
-            let fitted = !on_elements
-                && !matches!(strategy, Strategy::OffsetSurface { .. })
-                && !mesh_surface::wants_mesh(part, cutter);
-            let facets = if part.patches().is_empty() { facet_charge(part.mesh(), fitted, h) } else { 0.0 };
-            let chords = if settings.joining.smoothing { SMOOTHED_CHORD_SHARE } else { CHORD_SHARE };
-            let less = chords * settings.chord_tolerance + facets;
-            Step::Scallop((h - less).max(LEAST_SHARE_OF_TARGET * h))
-        }
-        stepover => stepover,
-    };
+/// The passes of a strategy, not yet joined.
+fn passes(setup: &Setup<'_>, strategy: &dyn Strategy, axis: Option<&ToolAxis>) -> Result<Passes, PlanError> {
+    let Setup { part, cutter, settings, monitor } = *setup;
+    let definition = strategy.definition();
+    if definition.part != PartKind::Surface {
+        let reason = format!("it mills pockets; use one of {}", words_for(PartKind::Surface));
+        return Err(PlanError::NotApplicable { strategy: definition.word, reason });
+    }
     let sampling = SAMPLING_OVER_RADIUS * cutter.radius();
-    // A tilted cutter's passes are smoothed once they are tilted.
-    let smoothing = (settings.joining.smoothing && axis.is_none()).then_some(sampling);
-    let (chord_tolerance, probe) = (settings.chord_tolerance, probe.as_ref());
-    let pass = PassSettings { step, sampling, chord_tolerance, smoothing, axis, probe };
-    check_extent(part, cutter, &pass)?;
-    let (passes, both_ways) = match strategy {
-        Strategy::Pocket(pocket) => {
-            let reason = "it mills pockets, and the part is none".to_owned();
-            return Err(PlanError::NotApplicable { strategy: pocket.name(), reason });
-        }
-        Strategy::Zigzag { angle, one_way } if levels.is_some() => {
-            (zigzag::on_levels(part, cutter, *angle, &pass, monitor)?, !one_way)
-        }
-        Strategy::Zigzag { angle, one_way } => {
-            (zigzag::passes(part, cutter, *angle, &pass, monitor)?, !one_way)
-        }
-        Strategy::IsoParametric { along } => {
-            (streamline::iso_parametric(part, cutter, Some(*along), Placing::Shortest, &pass, monitor)?, true)
-        }
-        Strategy::BestZigzag { one_way } => (zigzag::best(part, cutter, &pass, monitor)?, !one_way),
-        Strategy::IsoParametricSteps { along, steps } => {
-            (streamline::iso_parametric(part, cutter, *along, steps.placing(), &pass, monitor)?, true)
-        }
-        Strategy::IsoScallop { start } => (iso_scallop::passes(part, cutter, *start, &pass, monitor)?, true),
-        Strategy::Waterline { steps } => {
-            (waterline::passes(part, cutter, steps.placing(), &pass, monitor)?, true)
-        }
-        Strategy::Spiral => (spiral::passes(part, cutter, &pass, monitor)?, true),
-        Strategy::ContourSpiral => (contour_spiral::passes(part, cutter, &pass, monitor)?, true),
-        Strategy::OffsetSurface { along: OffsetAlong::Angle(angle), .. } => {
-            (offset_mesh::passes(part, cutter, *angle, &pass, monitor)?, true)
-        }
-        Strategy::OffsetSurface { along, drive } => {
-            (offset_surface::passes(part, cutter, *along, drive, &pass, monitor)?, true)
-        }
-        Strategy::ShortestStreamline { toward } => {
-            let toward = toward.as_ref().map(|(direction, dearer)| (direction, *dearer));
-            let passes = if on_elements {
-                mesh_passes::on_mesh(part, cutter, Aim::Shortest(toward), &pass, monitor)?
-            } else {
-                shortest::passes(part, cutter, toward, &pass, monitor)?
-            };
-            (passes, true)
-        }
-        Strategy::Streamline { direction, .. } if on_elements => {
-            if probe.is_some() {
-                let reason = "its passes by elements are spaced for an upright cutter; use a ball, or another `method`";
-                return Err(PlanError::NotApplicable { strategy: "streamline", reason: reason.to_owned() });
-            }
-            (mesh_passes::on_mesh(part, cutter, Aim::Fitted(direction), &pass, monitor)?, true)
-        }
-        Strategy::Streamline { direction, control_points, method, solver } => {
-            let fitting = Fitting { controls: *control_points, method: *method, solver: *solver };
-            (streamline::streamline(part, cutter, direction, &fitting, &pass, monitor)?, true)
-        }
+    let probe = axis.and_then(|_| tilted::probe(cutter));
+    let pass = PassSettings {
+        step: settings.step,
+        sampling,
+        chord_tolerance: settings.chord_tolerance,
+        // A tilted cutter's passes are smoothed once they are tilted.
+        smoothing: (settings.joining.smoothing && axis.is_none()).then_some(sampling),
+        axis,
+        probe: probe.as_ref(),
     };
-    Ok((passes, both_ways))
+    let wants_mesh = mesh_surface::wants_mesh(part, cutter);
+    let mut task = Task { part, cutter, settings: pass, wants_mesh, monitor };
+    task.settings.step = charged_step(&task, strategy, settings);
+    check_extent(&task)?;
+    strategy.passes(&task)
+}
+
+/// The distance of passes less what chords and facets take of a scallop target.
+fn charged_step(task: &Task<'_>, strategy: &dyn Strategy, settings: &PlanSettings) -> Step {
+    let Step::Scallop(h) = settings.step else { return settings.step };
+    let fitted = !strategy.on_facets(task) && !task.wants_mesh;
+    let smooth = !task.part.patches().is_empty();
+    let facets = if smooth { 0.0 } else { facet_charge(task.part.mesh(), fitted, h) };
+    let chords = if settings.joining.smoothing { SMOOTHED_CHORD_SHARE } else { CHORD_SHARE };
+    let less = chords * settings.chord_tolerance + facets;
+    Step::Scallop((h - less).max(LEAST_SHARE_OF_TARGET * h))
 }

@@ -6,11 +6,13 @@ use millstream::cutter::Cutter;
 use millstream::field::{KnotRule, Solver};
 use millstream::geometry::AnalyticShape;
 use millstream::scallop::ball_scallop_height;
-use millstream::toolpath::{Along, FeedDirection, Step, Strategy, StreamMethod};
+use millstream::toolpath::{
+    Along, FeedDirection, IsoParametric, Step, Strategy, StreamMethod, Streamline, Zigzag,
+};
 
 use crate::support::{formula, off, plan_and_measure};
 
-const ZIGZAG: Strategy = Strategy::Zigzag { angle: 0.0, one_way: false };
+const ZIGZAG: Zigzag = Zigzag::at(0.0);
 
 fn plane_scallop(r: f64, s: f64) -> f64 {
     r - (r * r - 0.25 * s * s).sqrt()
@@ -24,7 +26,7 @@ fn the_scallop_of_a_plane_does_not_depend_on_the_cell() {
         let exact = plane_scallop(0.5 * diameter, s);
         assert!(off(exact, printed) < 1e-5);
         for cell in [0.05, 0.1, 0.2] {
-            let m = plan_and_measure(&part, &cutter, ZIGZAG, Step::Stepover(s), cell);
+            let m = plan_and_measure(&part, &cutter, &ZIGZAG, Step::Stepover(s), cell);
             let [max, p50] = [m.scallop.max_mm.unwrap(), m.scallop.p50_mm.unwrap()];
             println!(
                 "plane r={} s={s} cell={cell}: max {max:.7} p50 {p50:.7} exact {exact:.7}",
@@ -42,8 +44,8 @@ fn the_ridge_length_of_a_plane_is_that_of_its_ridges_at_any_angle() {
     let part = formula(AnalyticShape::Plane { height: 0.0 }, [0.0, 20.0], [0.0, 20.0]);
     let cutter = Cutter::ball(6.0).unwrap();
     for angle in [0.0, 0.4, FRAC_PI_2] {
-        let strategy = Strategy::Zigzag { angle, one_way: false };
-        let m = plan_and_measure(&part, &cutter, strategy, Step::Stepover(0.5), 0.1);
+        let strategy = Zigzag::at(angle);
+        let m = plan_and_measure(&part, &cutter, &strategy, Step::Stepover(0.5), 0.1);
         // Parallel ridges 0.5 apart cover an area of 400 mm² with 800 mm; half a pitch is open at
         // each side.
         assert!(off(m.scallop.ridge_length_mm, 800.0) < 0.04, "{angle}: {}", m.scallop.ridge_length_mm);
@@ -58,8 +60,8 @@ fn cylinders_follow_the_exact_row() {
         let shape = AnalyticShape::Cylinder { height: 0.0, radius: rho, azimuth: FRAC_PI_2, concave };
         let part = formula(shape, [-10.0, 10.0], [0.0, 10.0]);
         // Passes along the axis, which is y: isoparametric with v growing, spaced on the surface.
-        let strategy = Strategy::IsoParametric { along: Along::V };
-        let m = plan_and_measure(&part, &cutter, strategy, Step::Stepover(s), 0.05);
+        let strategy = IsoParametric::along(Along::V);
+        let m = plan_and_measure(&part, &cutter, &strategy, Step::Stepover(s), 0.05);
         // Levels share the width evenly, so the true arc between passes is a little less than s.
         let arc = 2.0 * rho * (10.0 / rho).asin();
         let interval = arc / (arc / s).ceil();
@@ -81,7 +83,7 @@ fn ridges_up_a_slope_are_as_high_at_its_border_as_inside() {
     let (r, s) = (3.0, 1.0);
     let shape = AnalyticShape::Inclined { height: 0.0, angle: FRAC_PI_4, azimuth: 0.0 };
     let part = formula(shape, [0.0, 4.0], [0.0, 4.0]);
-    let m = plan_and_measure(&part, &Cutter::ball(2.0 * r).unwrap(), ZIGZAG, Step::Stepover(s), 0.05);
+    let m = plan_and_measure(&part, &Cutter::ball(2.0 * r).unwrap(), &ZIGZAG, Step::Stepover(s), 0.05);
     let exact = ball_scallop_height(r, 0.0, s).unwrap();
     let max = m.scallop.max_mm.unwrap();
     assert!(off(max, exact) < 2e-3, "{max} {exact}");
@@ -98,12 +100,12 @@ fn a_scallop_target_holds_on_every_smooth_test_surface() {
         ("saddle", AnalyticShape::Saddle { radius_concave: 20.0, radius_convex: 15.0 }),
         ("wave", AnalyticShape::Wave { amplitude: 1.0, wavelength_x: 20.0, wavelength_y: None }),
     ];
-    let strategies = [
-        ("zigzag", ZIGZAG),
-        ("iso-parametric", Strategy::IsoParametric { along: Along::U }),
+    let strategies: [(&str, &dyn Strategy); 3] = [
+        ("zigzag", &ZIGZAG),
+        ("iso-parametric", &IsoParametric::along(Along::U)),
         (
             "streamline",
-            Strategy::Streamline {
+            &Streamline {
                 direction: FeedDirection::Angle(0.5),
                 control_points: 16,
                 method: StreamMethod::BSpline { degree: 3, knots: KnotRule::Uniform },
@@ -113,7 +115,7 @@ fn a_scallop_target_holds_on_every_smooth_test_surface() {
     ];
     for (shape_name, shape) in shapes {
         let part = formula(shape, x, y);
-        for (name, strategy) in strategies.clone() {
+        for (name, strategy) in strategies {
             let m = plan_and_measure(&part, &cutter, strategy, Step::Scallop(0.010), 0.1);
             let [max, over] = [m.scallop.max_mm.unwrap(), m.scallop.over_target_fraction.unwrap()];
             println!(
@@ -137,9 +139,9 @@ fn figures_of_a_curved_part_stay_within_their_bounds_as_the_cell_shrinks() {
     let shape = AnalyticShape::Wave { amplitude: 1.0, wavelength_x: 20.0, wavelength_y: Some(25.0) };
     let part = formula(shape, [0.0, 15.0], [0.0, 15.0]);
     let cutter = Cutter::ball(6.0).unwrap();
-    let strategy = Strategy::Zigzag { angle: 0.3, one_way: false };
+    let strategy = Zigzag::at(0.3);
     let figures = [0.2, 0.1, 0.05, 0.025].map(|cell| {
-        let m = plan_and_measure(&part, &cutter, strategy.clone(), Step::Stepover(0.5), cell);
+        let m = plan_and_measure(&part, &cutter, &strategy, Step::Stepover(0.5), cell);
         let s = &m.scallop;
         (
             s.max_mm.unwrap(),

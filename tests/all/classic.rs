@@ -7,14 +7,17 @@ use millstream::geometry::AnalyticShape;
 use millstream::monitor::Silent;
 use millstream::motion::{MoveKind, Toolpath};
 use millstream::part::Part;
-use millstream::toolpath::{Along, FrontStart, LevelSteps, Plan, PlanError, Step, Strategy, plan};
+use millstream::toolpath::{
+    Along, FrontStart, IsoParametric, IsoScallop, LevelSteps, Plan, PlanError, Spiral, Step, Strategy,
+    Waterline, Zigzag, ZigzagAngle, plan,
+};
 
 use crate::support::{LIMITS, cut_and_measure, formula, off, settings};
 
 const TARGET: Step = Step::Scallop(0.010);
 
-fn planned(part: &Part, strategy: Strategy) -> Plan {
-    plan(part, &Cutter::ball(6.0).unwrap(), &strategy, &settings(part, TARGET), &Silent).unwrap()
+fn planned(part: &Part, strategy: &dyn Strategy) -> Plan {
+    plan(part, &Cutter::ball(6.0).unwrap(), strategy, &settings(part, TARGET), &Silent).unwrap()
 }
 
 fn cutting_length(path: &Toolpath) -> f64 {
@@ -34,22 +37,19 @@ fn wave() -> Part {
     formula(shape, [0.0, 16.0], [0.0, 16.0])
 }
 
-const OPEN: [(&str, Strategy); 5] = [
-    ("best zigzag", Strategy::BestZigzag { one_way: false }),
-    ("iso-parametric, better way", Strategy::IsoParametricSteps { along: None, steps: LevelSteps::Shortest }),
-    (
-        "iso-parametric, least",
-        Strategy::IsoParametricSteps { along: Some(Along::V), steps: LevelSteps::Least },
-    ),
-    ("iso-scallop", Strategy::IsoScallop { start: FrontStart::BestBorder }),
-    ("iso-scallop, line", Strategy::IsoScallop { start: FrontStart::Line([[0.4, 0.0], [0.6, 1.0]]) }),
+const OPEN: [(&str, &dyn Strategy); 5] = [
+    ("best zigzag", &Zigzag { angle: ZigzagAngle::Best, one_way: false }),
+    ("iso-parametric, better way", &IsoParametric { along: None, steps: LevelSteps::Shortest }),
+    ("iso-parametric, least", &IsoParametric { along: Some(Along::V), steps: LevelSteps::Least }),
+    ("iso-scallop", &IsoScallop { start: FrontStart::BestBorder }),
+    ("iso-scallop, line", &IsoScallop { start: FrontStart::Line([[0.4, 0.0], [0.6, 1.0]]) }),
 ];
 
 /// Passes that run around have corners; a few of their ridges are higher, none is uncut.
-const AROUND: [(&str, Strategy); 3] = [
-    ("iso-scallop, all borders", Strategy::IsoScallop { start: FrontStart::AllBorders }),
-    ("spiral", Strategy::Spiral),
-    ("contour spiral", Strategy::ContourSpiral),
+const AROUND: [(&str, &dyn Strategy); 3] = [
+    ("iso-scallop, all borders", &IsoScallop { start: FrontStart::AllBorders }),
+    ("spiral", &Spiral::Plan),
+    ("contour spiral", &Spiral::Contour),
 ];
 
 #[test]
@@ -80,13 +80,13 @@ fn every_classical_strategy_holds_the_scallop_and_leaves_nothing_uncut() {
 fn the_best_zigzag_is_as_short_as_the_best_of_many_planned() {
     let shape = AnalyticShape::Cylinder { height: 0.0, radius: 12.0, azimuth: 0.6, concave: false };
     let part = formula(shape, [-6.0, 6.0], [-6.0, 6.0]);
-    let best = cutting_length(&planned(&part, Strategy::BestZigzag { one_way: false }).path);
+    let best = cutting_length(&planned(&part, &Zigzag { angle: ZigzagAngle::Best, one_way: false }).path);
     for k in 0..9 {
         let angle = PI * f64::from(k) / 9.0;
-        let other = cutting_length(&planned(&part, Strategy::Zigzag { angle, one_way: false }).path);
+        let other = cutting_length(&planned(&part, &Zigzag::at(angle)).path);
         assert!(best <= 1.02 * other, "{best} against {other} at {angle}");
     }
-    let one_way = planned(&part, Strategy::BestZigzag { one_way: true }).path;
+    let one_way = planned(&part, &Zigzag { angle: ZigzagAngle::Best, one_way: true }).path;
     assert!(off(cutting_length(&one_way), best) < 0.01);
 }
 
@@ -96,7 +96,7 @@ fn iso_scallop_passes_on_a_cylinder_are_those_of_its_arc() {
     let shape = AnalyticShape::Cylinder { height: 0.0, radius: rho, azimuth: FRAC_PI_2, concave: false };
     let part = formula(shape, [-half, half], [0.0, 12.0]);
     let start = FrontStart::Border { constant: Along::U, greatest: false };
-    let path = planned(&part, Strategy::IsoScallop { start }).path;
+    let path = planned(&part, &IsoScallop { start }).path;
     let (arc, h) = (2.0 * rho * (half / rho).asin(), 0.010 - 0.26 * LIMITS.chord);
     let exact = arc / (8.0 * h / (1.0 / r + 1.0 / rho)).sqrt();
     let passes = path.passes() as f64;
@@ -107,7 +107,7 @@ fn iso_scallop_passes_on_a_cylinder_are_those_of_its_arc() {
 #[test]
 fn iso_scallop_takes_the_shortest_of_the_borders() {
     let part = saddle();
-    let length = |start| cutting_length(&planned(&part, Strategy::IsoScallop { start }).path);
+    let length = |start| cutting_length(&planned(&part, &IsoScallop { start }).path);
     let best = length(FrontStart::BestBorder);
     for constant in [Along::U, Along::V] {
         for greatest in [false, true] {
@@ -121,7 +121,7 @@ fn iso_scallop_takes_the_shortest_of_the_borders() {
 fn waterlines_keep_their_height() {
     let part = dome();
     for steps in [LevelSteps::Constant, LevelSteps::Shortest] {
-        let path = planned(&part, Strategy::Waterline { steps }).path;
+        let path = planned(&part, &Waterline { steps }).path;
         let mut range = vec![[f64::INFINITY, f64::NEG_INFINITY]; path.passes()];
         for (a, b, m) in path.segments().filter(|(.., m)| m.kind == MoveKind::Cut) {
             let [lo, hi] = &mut range[m.pass as usize];
@@ -140,7 +140,7 @@ fn waterlines_keep_their_height() {
 #[test]
 fn the_contour_spiral_is_one_pass_and_a_few_short_ones() {
     let part = formula(AnalyticShape::Plane { height: 0.0 }, [0.0, 20.0], [0.0, 20.0]);
-    let path = planned(&part, Strategy::ContourSpiral).path;
+    let path = planned(&part, &Spiral::Contour).path;
     let mut lengths = vec![0.0; path.passes()];
     for (a, b, m) in path.segments().filter(|(.., m)| m.kind == MoveKind::Cut) {
         lengths[m.pass as usize] += (b - a).norm();
@@ -158,7 +158,7 @@ fn the_contour_spiral_is_one_pass_and_a_few_short_ones() {
 #[test]
 fn strategies_say_where_they_do_not_apply() {
     let part = formula(AnalyticShape::Plane { height: 0.0 }, [0.0, 20.0], [0.0, 20.0]);
-    let strategy = Strategy::Waterline { steps: LevelSteps::Shortest };
+    let strategy = Waterline { steps: LevelSteps::Shortest };
     let cutter = Cutter::ball(6.0).unwrap();
     let refused = plan(&part, &cutter, &strategy, &settings(&part, TARGET), &Silent);
     let Err(PlanError::NotApplicable { strategy: "waterline", reason }) = refused else {

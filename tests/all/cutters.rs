@@ -3,13 +3,14 @@
 use millstream::cutter::{AptWords, Cutter};
 use millstream::geometry::{Aabb, AnalyticShape, AnalyticSurface, Point3};
 use millstream::metrology::{Asked, Limits, measure};
+use millstream::monitor::Silent;
 use millstream::motion::{ToolAxis, Toolpath};
 use millstream::part::{Part, Patch};
 use millstream::sim::{Grid, ZMap, cut};
 use millstream::toolpath::{
-    Joining, OffsetAlong, OffsetDrive, PlanSettings, Step, Strategy, Tilting, plan, plan_tilted,
+    Joining, OffsetAlong, OffsetDrive, OffsetSurface, PlanSettings, Step, Strategy, Tilting, Zigzag,
+    ZigzagAngle, plan, plan_tilted,
 };
-use millstream::monitor::Silent;
 
 /// A ball of 6 mm as `ball`, as `bull` with its radius at the corner, and by the seven words.
 fn balls() -> [Cutter; 3] {
@@ -58,10 +59,11 @@ fn same(of: impl Fn(&Cutter) -> Toolpath) -> Toolpath {
 fn a_ball_by_any_name_plans_cuts_and_measures_the_same() {
     let part = hollow();
     let settings = settings(&part);
-    let zigzag = Strategy::Zigzag { angle: 0.4, one_way: false };
-    let offset = Strategy::OffsetSurface { along: OffsetAlong::U, drive: OffsetDrive::Exact };
-    let upright =
-        |strategy| same(|cutter: &Cutter| plan(&part, cutter, strategy, &settings, &Silent).unwrap().path);
+    let zigzag = Zigzag::at(0.4);
+    let offset = OffsetSurface { along: OffsetAlong::U, drive: OffsetDrive::Exact };
+    let upright = |strategy: &dyn Strategy| {
+        same(|cutter: &Cutter| plan(&part, cutter, strategy, &settings, &Silent).unwrap().path)
+    };
     upright(&offset);
     let path = upright(&zigzag);
     let axis = ToolAxis::LeadTilt { lead: 0.2, tilt: 0.1 };

@@ -4,7 +4,7 @@ use millstream::cutter::Cutter;
 use millstream::geometry::{AnalyticShape, Point3};
 use millstream::metrology::Limits;
 use millstream::motion::{ClPoint, Move, MoveKind, Toolpath};
-use millstream::toolpath::{Step, Strategy};
+use millstream::toolpath::{Step, Zigzag};
 
 use crate::support::{ASKED, LIMITS, cut_and_measure, formula, mesh, off, plan_and_measure, settings};
 
@@ -23,10 +23,10 @@ fn a_ball_leaves_the_corner_of_a_groove_uncut_as_geometry_says() {
     let (angle, r, length) = (30f64.to_radians(), 3.0, 12.0);
     let part = groove(angle, 6.0, length);
     let cutter = Cutter::ball(2.0 * r).unwrap();
-    let along = Strategy::Zigzag { angle: std::f64::consts::FRAC_PI_2, one_way: false };
+    let along = Zigzag::at(std::f64::consts::FRAC_PI_2);
     let cell = 0.05;
     // 75 passes over the 9 mm between the walls' ends, so that one runs in the corner itself.
-    let m = plan_and_measure(&part, &cutter, along, Step::Stepover(0.12), cell);
+    let m = plan_and_measure(&part, &cutter, &along, Step::Stepover(0.12), cell);
     // The ball touches each wall at r·tan(angle) from the corner; a wall point at distance d from
     // the corner sees the cut at r − √(r² − (contact − d)²) along its normal.
     let contact = r * angle.tan();
@@ -52,9 +52,9 @@ fn a_ball_leaves_the_corner_of_a_groove_uncut_as_geometry_says() {
 fn a_missing_pass_is_uncut_and_a_tall_scallop_is_not() {
     let part = formula(AnalyticShape::Plane { height: 0.0 }, [0.0, 20.0], [0.0, 20.0]);
     let cutter = Cutter::ball(6.0).unwrap();
-    let zigzag = Strategy::Zigzag { angle: 0.0, one_way: false };
+    let zigzag = Zigzag::at(0.0);
     // A stepover of 2 mm leaves scallops of 0.17 mm: high, yet each is a scallop.
-    let m = plan_and_measure(&part, &cutter, zigzag.clone(), Step::Stepover(2.0), 0.1);
+    let m = plan_and_measure(&part, &cutter, &zigzag, Step::Stepover(2.0), 0.1);
     assert!(off(m.scallop.max_mm.unwrap(), 3.0 - 8f64.sqrt()) < 1e-6);
     assert_eq!(m.uncut.region_count, 0, "{:?}", m.uncut.regions);
     // Without every pass that reaches y > 12 the rest is uncut.
@@ -123,8 +123,8 @@ fn flat_and_bull_ends_cover_a_hill() {
     let part = formula(shape, [0.0, 10.0], [-5.0, 5.0]);
     for cutter in [Cutter::flat(6.0).unwrap(), Cutter::bull(6.0, 1.0).unwrap()] {
         for angle in [0.0, std::f64::consts::FRAC_PI_2] {
-            let zigzag = Strategy::Zigzag { angle, one_way: false };
-            let m = plan_and_measure(&part, &cutter, zigzag, Step::Stepover(0.5), 0.1);
+            let zigzag = Zigzag::at(angle);
+            let m = plan_and_measure(&part, &cutter, &zigzag, Step::Stepover(0.5), 0.1);
             assert_eq!(m.uncut.region_count, 0, "{cutter:?} at {angle}: {:?}", m.uncut.regions);
             assert!(m.gouge.max_depth_mm < 0.0011, "{cutter:?} at {angle}: {}", m.gouge.max_depth_mm);
         }
@@ -135,10 +135,10 @@ fn flat_and_bull_ends_cover_a_hill() {
 fn ridges_in_a_corner_that_no_pass_reached_are_no_scallops() {
     let part = groove(30f64.to_radians(), 6.0, 12.0);
     let cutter = Cutter::ball(6.0).unwrap();
-    let along = Strategy::Zigzag { angle: std::f64::consts::FRAC_PI_2, one_way: false };
+    let along = Zigzag::at(std::f64::consts::FRAC_PI_2);
     // An even number of passes, so that two of them leave a ridge right over the corner.
     for stepover in [0.1, 0.3, 0.5] {
-        let m = plan_and_measure(&part, &cutter, along.clone(), Step::Stepover(stepover), 0.05);
+        let m = plan_and_measure(&part, &cutter, &along, Step::Stepover(stepover), 0.05);
         let interval = stepover / 30f64.to_radians().cos();
         let exact = 3.0 - (9.0 - 0.25 * interval * interval).sqrt();
         assert!(off(m.scallop.max_mm.unwrap(), exact) < 1e-3, "{stepover}: {:?} {exact}", m.scallop);

@@ -8,7 +8,7 @@ use millstream::field::{KnotRule, Solver};
 use millstream::geometry::AnalyticShape;
 use millstream::io::direction_table;
 use millstream::monitor::Silent;
-use millstream::toolpath::{FeedDirection, Plan, Step, Strategy, StreamMethod, plan};
+use millstream::toolpath::{FeedDirection, Plan, Step, StreamMethod, Streamline, plan};
 
 use crate::command::{PLATE, millstream};
 use crate::support::{LIMITS, cut_and_measure, formula, settings};
@@ -48,7 +48,7 @@ fn sampled_circles_are_followed_by_every_method_and_solver() {
         (StreamMethod::Differences, Solver::Cholesky),
     ] {
         let direction = FeedDirection::Samples(samples.clone());
-        let strategy = Strategy::Streamline { direction, control_points: 12, method, solver };
+        let strategy = Streamline { direction, control_points: 12, method, solver };
         let plan = plan(&part, &cutter, &strategy, &settings(&part, Step::Stepover(0.6)), &Silent).unwrap();
         assert!(plan.notes.iter().any(|n| n.contains(", residual ")), "{:?}", plan.notes);
         println!("{method:?} {solver:?}: {:?}", plan.notes);
@@ -83,7 +83,7 @@ fn a_table_outside_of_the_part_or_of_the_wrong_kind_is_refused() {
     let part = formula(AnalyticShape::Plane { height: 0.0 }, [0.0, 30.0], [0.0, 20.0]);
     let cutter = Cutter::ball(6.0).unwrap();
     let samples = direction_table::parse(b"x y tx ty\n100 100 1 0\n110 100 1 0\n").unwrap();
-    let strategy = Strategy::Streamline {
+    let strategy = Streamline {
         direction: FeedDirection::Samples(Arc::new(samples)),
         control_points: 8,
         method: StreamMethod::Differences,

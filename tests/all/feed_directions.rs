@@ -11,7 +11,9 @@ use millstream::geometry::{AnalyticShape, Point2, Point3};
 use millstream::monitor::Silent;
 use millstream::motion::{MoveKind, Toolpath};
 use millstream::part::Part;
-use millstream::toolpath::{FeedDirection, PlanError, Step, Strategy, StreamMethod, plan};
+use millstream::toolpath::{
+    FeedDirection, PlanError, ShortestStreamline, Step, StreamMethod, Streamline, plan,
+};
 
 use crate::command::{PLATE, millstream};
 use crate::support::{formula, mesh, settings};
@@ -30,13 +32,13 @@ fn planned(
     direction: &FeedDirection,
     (method, solver): (StreamMethod, Solver),
 ) -> Result<Toolpath, PlanError> {
-    let strategy = Strategy::Streamline { direction: direction.clone(), control_points: 12, method, solver };
+    let strategy = Streamline { direction: direction.clone(), control_points: 12, method, solver };
     let cutter = Cutter::ball(6.0).unwrap();
     plan(part, &cutter, &strategy, &settings(part, Step::Stepover(0.6)), &Silent).map(|plan| plan.path)
 }
 
 fn fields(part: &Part, direction: FeedDirection, (method, solver): (StreamMethod, Solver)) -> PlannedField {
-    let strategy = Strategy::Streamline { direction, control_points: 24, method, solver };
+    let strategy = Streamline { direction, control_points: 24, method, solver };
     let cutter = Cutter::ball(6.0).unwrap();
     plan(part, &cutter, &strategy, &settings(part, Step::Stepover(0.6)), &Silent).unwrap().field.unwrap()
 }
@@ -314,7 +316,7 @@ fn passes_keep_to_a_direction_as_far_as_it_is_worth() {
     let cutter = Cutter::ball(12.0).unwrap();
     for part in [patch, holed] {
         let run = |toward: Option<(FeedDirection, f64)>| {
-            let strategy = Strategy::ShortestStreamline { toward };
+            let strategy = ShortestStreamline { toward };
             plan(&part, &cutter, &strategy, &settings(&part, Step::Scallop(0.01)), &Silent).unwrap().path
         };
         let length = |path: &Toolpath| -> f64 {

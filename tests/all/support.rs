@@ -62,11 +62,11 @@ pub fn cut_and_measure(
 pub fn plan_and_measure(
     part: &Part,
     cutter: &Cutter,
-    strategy: Strategy,
+    strategy: &dyn Strategy,
     step: Step,
     cell: f64,
 ) -> Measurement {
-    let plan = plan(part, cutter, &strategy, &settings(part, step), &Silent).unwrap();
+    let plan = plan(part, cutter, strategy, &settings(part, step), &Silent).unwrap();
     cut_and_measure(part, cutter, &plan.path, cell, &LIMITS)
 }
 

@@ -2,7 +2,7 @@
 
 use metrology::{OffsetFigures, offset_figures};
 use report::{Figure, bound, place};
-use toolpath::{OffsetAlong, OffsetDrive, Strategy};
+use toolpath::{OffsetAlong, OffsetDrive, OffsetSurface};
 use work::monitor::Monitor;
 
 use super::value;
@@ -15,7 +15,7 @@ const AS_ASKED: f64 = 1.0e-6;
 /// Of a path along an offset surface. A mesh has none: there passes are put on the level set of its distance, place by
 /// place.
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
-    let Strategy::OffsetSurface { along, drive } = &run.planned.strategy else {
+    let Some(OffsetSurface { along, drive }) = run.planned.strategy.downcast_ref() else {
         return Ok(Finding::default());
     };
     if matches!(along, OffsetAlong::Angle(_)) {

@@ -2,6 +2,7 @@
 
 use metrology::{PocketFigures, View};
 use report::{Figure, Violation, micrometres, with_bound};
+use toolpath::PocketStrategy;
 use work::monitor::Monitor;
 
 use super::value;
@@ -10,7 +11,9 @@ use crate::pocket::pocket_figures;
 use crate::run::{Finding, Run};
 
 pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> {
-    let (Some(pocket), Some(strategy)) = (&run.session.pocket, run.request.strategy.pocket()) else {
+    let (Some(pocket), Some(strategy)) =
+        (&run.session.pocket, run.request.strategy.downcast_ref::<PocketStrategy>())
+    else {
         return Ok(Finding::default());
     };
     let (View::Heights(cut), Some(engaged)) = (run.view(), &run.planned.engaged) else {

@@ -10,15 +10,12 @@
 use std::collections::HashMap;
 
 use super::halving::{LevelSource, along_needed};
-use super::planned_field::Contact;
-use crate::Step;
-use crate::plan::{Passes, PlanError};
 use crate::surface::chart::Chart;
+use crate::vocabulary::{Contact, Passes, PlanError, Step};
 use cutter::Cutter;
 use field::ScalarField;
 use geometry::Point3;
-use work::monitor;
-use work::monitor::Monitor;
+use work::monitor::{self, Monitor};
 
 /// A place is open where the nearest contact is farther away than half the allowed interval by this share: 3 % are 6 % of
 /// the scallop height. Halving has closed what is more than 2 % too wide where ψ is even.

@@ -4,12 +4,10 @@
 //! a smaller interval than the levels leave, further passes are put halfway between them, only
 //! along the stretches that need one, and between those again.
 
-use super::planned_field::Contact;
-use crate::plan::{Passes, PlanError};
-use crate::tilt::tilted::Touch;
+use crate::moves::touch::Touch;
+use crate::vocabulary::{Contact, Passes, PlanError};
 use geometry::Point3;
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// How often the interval between two levels may be halved by further passes. Six times is a
 /// sixty-fourth; only singular points of the field ask for more, and are measured.

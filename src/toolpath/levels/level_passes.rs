@@ -3,21 +3,18 @@
 //! Curves are traced a little beyond the chart, on its continuation, and every place of the cutter comes
 //! from dropping it onto the part. Which levels and stretches are cut is decided in `halving`.
 
-use super::gaps;
 use super::halving::{Allowed, LevelSource, Track, along_and_between};
-use super::planned_field::{self, Contact};
-use super::spacing::{Placing, level_tangent, place_levels, places_of};
-use crate::Step;
+use super::spacing::{LevelSteps, level_tangent, place_levels, places_of};
+use super::{gaps, planned_field};
 use crate::drop::{Beside, DropCutter};
-use crate::plan::{PassSettings, Passes, PlanError};
+use crate::moves::touch::Touch;
 use crate::surface::chart::Chart;
 use crate::tilt::tilted;
-use crate::tilt::tilted::Touch;
+use crate::vocabulary::{Contact, PassSettings, Passes, PlanError, Step, Task};
 use cutter::Cutter;
 use field::{LevelCurve, LevelTracer, ScalarField, surface_gradient_length};
 use geometry::Point3;
 use motion::CcPoint;
-use part::Part;
 use work::monitor::{Cancelled, Monitor};
 
 /// Grid cells a side on which level curves are found.
@@ -50,27 +47,18 @@ const OVERRUN_STEP: f64 = 0.05;
 const BORDER_PRECISION: f64 = 1e-6;
 
 /// Places levels, traces them and turns them into passes.
-pub(crate) fn along_levels(
-    part: &Part,
-    cutter: &Cutter,
-    chart: &Chart,
-    field: &ScalarField,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
-) -> Result<Passes, PlanError> {
-    along_levels_placed(part, cutter, chart, field, Placing::Shortest, settings, monitor)
+pub(crate) fn along_levels(task: &Task<'_>, chart: &Chart, field: &ScalarField) -> Result<Passes, PlanError> {
+    along_levels_placed(task, chart, field, LevelSteps::Shortest)
 }
 
 /// [`along_levels`] with levels placed in a given way.
 pub(crate) fn along_levels_placed(
-    part: &Part,
-    cutter: &Cutter,
+    task: &Task<'_>,
     chart: &Chart,
     field: &ScalarField,
-    placing: Placing,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
+    placing: LevelSteps,
 ) -> Result<Passes, PlanError> {
+    let Task { part, cutter, ref settings, monitor, .. } = *task;
     let metric = |u: f64, v: f64| chart.jet(u, v).first_form();
     let margins = margins(chart, cutter, field, settings);
     let tracer = LevelTracer::new(field, &metric, chart.domain, margins, TRACE_CELLS, settings.sampling);
@@ -78,9 +66,9 @@ pub(crate) fn along_levels_placed(
     let range = tracer.range();
     let places = places_of(chart, cutter, field, settings);
     let levels = place_levels(&places, range, placing, &mut notes);
-    let dropped = settings.dropped(cutter);
+    let dropped = task.dropped();
     let drop = DropCutter::new(part, dropped);
-    let guide = Guide { tracer: &tracer, chart, cutter, dropped, field, drop, settings, monitor };
+    let guide = ChartGuide { tracer: &tracer, chart, cutter, dropped, field, drop, settings, monitor };
     let mut passes = along_and_between(&guide, &levels, range, settings.sampling, monitor)?;
     if let Step::Scallop(height) = settings.step {
         let lengths = [height, settings.sampling];
@@ -113,7 +101,7 @@ fn margins(chart: &Chart, cutter: &Cutter, field: &ScalarField, settings: &PassS
 }
 
 /// Turns level curves into passes.
-struct Guide<'a> {
+struct ChartGuide<'a> {
     tracer: &'a LevelTracer<'a>,
     chart: &'a Chart<'a>,
     cutter: &'a Cutter,
@@ -125,7 +113,7 @@ struct Guide<'a> {
     monitor: &'a dyn Monitor,
 }
 
-impl Guide<'_> {
+impl ChartGuide<'_> {
     /// Where the tip is when the cutter touches the chart at `(u, v)`: put there by the chart's
     /// normal, then dropped, so that it is held off by any other place of the part.
     fn tip(&self, [u, v]: [f64; 2], beside: &mut Beside) -> Option<Point3> {
@@ -223,7 +211,7 @@ impl Guide<'_> {
     }
 }
 
-impl LevelSource for Guide<'_> {
+impl LevelSource for ChartGuide<'_> {
     type Place = [f64; 2];
 
     fn curves(&self, level: f64) -> Vec<Track<[f64; 2]>> {

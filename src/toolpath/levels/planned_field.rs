@@ -3,6 +3,7 @@
 //!
 //! Enters: the field of each chart or piece, and the contacts of the passes. Leaves: plan-view samples, mm.
 
+use crate::vocabulary::Contact;
 use std::collections::BTreeMap;
 
 use super::spacing::level_tangent;
@@ -43,19 +44,6 @@ const FARTHEST: f64 = 2.5;
 
 /// Passes nearer than this, mm, have met.
 const MET: f64 = 1e-6;
-
-/// A place of a pass as the planner has it.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Contact {
-    pub at: Point3,
-    /// Unit tangent across the feed.
-    pub across: Vector3,
-    /// Allowed interval, mm.
-    pub allowed: f64,
-    pub inside: bool,
-    /// Its parameters on a chart.
-    pub parameters: Option<[f64; 2]>,
-}
 
 /// The field of a function on a chart: its levels, and the directions along them.
 pub(crate) fn of_levels(part: &Part, cutter: &Cutter, chart: &Chart, field: &ScalarField) -> PlannedField {

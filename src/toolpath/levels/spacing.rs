@@ -4,12 +4,12 @@
 //! step of `w·|∇ψ|` is allowed. A pass meets places that allow much and places that allow little. A
 //! step for the least of them serves all, and wastes length wherever more is allowed; a greater step
 //! needs further passes, at halves and quarters of the interval, along the places that allow less.
-//! For every part of the range of ψ the step is chosen that makes the sum of both shortest. (Placing
+//! For every part of the range of ψ the step is chosen that makes the sum of both shortest. (LevelSteps
 //! each pass at the least step of the one before, as streamline paths were first planned, is the
 //! choice of the least step throughout.)
 
-use crate::plan::PassSettings;
 use crate::surface::chart::{Chart, ChartPoint};
+use crate::vocabulary::PassSettings;
 use cutter::Cutter;
 use field::{ScalarField, surface_gradient_length};
 use geometry::Vector3;
@@ -41,7 +41,7 @@ pub(crate) fn level_tangent(p: &ChartPoint, field: &ScalarField, [u, v]: [f64; 2
 
 /// What a place allows.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Place {
+pub(crate) struct AllowedStep {
     pub psi: f64,
     /// The allowed step of ψ.
     pub step: f64,
@@ -51,14 +51,14 @@ pub(crate) struct Place {
     pub too_concave: bool,
 }
 
-/// How the levels of whole passes are placed.
+/// How levels step from pass to pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Placing {
-    /// Each part of the range with the step that makes the passes shortest in all.
+pub enum LevelSteps {
+    /// As wide as makes the passes, with further short ones where the step is too wide, shortest in all.
     Shortest,
-    /// One step for the whole range, the one that makes the passes shortest in all.
-    OneStep,
-    /// Each at the least step that the one before allows.
+    /// The same step throughout, the one with the shortest passes in all.
+    Constant,
+    /// Each step the least that the pass before and the next one allow at any of their places.
     Least,
 }
 
@@ -68,7 +68,7 @@ pub(crate) fn places_of(
     cutter: &Cutter,
     field: &ScalarField,
     settings: &PassSettings,
-) -> Vec<Place> {
+) -> Vec<AllowedStep> {
     let at = |[u, v]: [f64; 2]| {
         let p = chart.at(u, v)?;
         let t = level_tangent(&p, field, [u, v])?;
@@ -77,27 +77,27 @@ pub(crate) fn places_of(
         let gradient = surface_gradient_length((e, f, g), psi_u, psi_v);
         let (width, too_concave) = chart.interval(&p, cutter, &t, settings.step);
         let area = (e * g - f * f).max(0.0).sqrt();
-        Some(Place { psi, step: width * gradient, length: area * gradient, too_concave })
+        Some(AllowedStep { psi, step: width * gradient, length: area * gradient, too_concave })
     };
     chart.grid(SAMPLES).filter_map(at).collect()
 }
 
 /// The levels of all whole passes, ascending.
 pub(crate) fn place_levels(
-    places: &[Place],
+    places: &[AllowedStep],
     [lo, hi]: [f64; 2],
-    placing: Placing,
+    placing: LevelSteps,
     notes: &mut Vec<String>,
 ) -> Vec<f64> {
     let count_of_windows = match placing {
-        Placing::Shortest => WINDOWS,
-        Placing::OneStep => 1,
-        Placing::Least => SAMPLES,
+        LevelSteps::Shortest => WINDOWS,
+        LevelSteps::Constant => 1,
+        LevelSteps::Least => SAMPLES,
     };
     if hi <= lo {
         return vec![lo];
     }
-    let mut windows: Vec<Vec<Place>> = vec![Vec::new(); count_of_windows];
+    let mut windows: Vec<Vec<AllowedStep>> = vec![Vec::new(); count_of_windows];
     for place in places {
         let share = (place.psi - lo) / (hi - lo);
         let window = (share * count_of_windows as f64).clamp(0.0, count_of_windows as f64 - 1.0) as usize;
@@ -113,8 +113,9 @@ pub(crate) fn place_levels(
     let mut all: Vec<f64> = windows.iter().flatten().map(|p| p.step).collect();
     all.sort_by(f64::total_cmp);
     let least = LEAST_OVER_MEDIAN * all.get(all.len() / 2).copied().unwrap_or(hi - lo);
-    if placing == Placing::Least {
-        let least_of = |places: &Vec<Place>| places.iter().map(|p| p.step.max(least)).min_by(f64::total_cmp);
+    if placing == LevelSteps::Least {
+        let least_of =
+            |places: &Vec<AllowedStep>| places.iter().map(|p| p.step.max(least)).min_by(f64::total_cmp);
         let steps: Vec<Option<f64>> = windows.iter().map(least_of).collect();
         return one_after_the_other(&filled(&steps, hi - lo), [lo, hi]);
     }
@@ -123,7 +124,7 @@ pub(crate) fn place_levels(
 }
 
 /// The step with the shortest passes for places that share a window; `None` for none.
-fn shortest(places: &[Place], least: f64) -> Option<f64> {
+fn shortest(places: &[AllowedStep], least: f64) -> Option<f64> {
     let mut ordered = places.to_vec();
     ordered.sort_by(|a, b| a.step.total_cmp(&b.step).then(a.psi.total_cmp(&b.psi)));
     let total: f64 = ordered.iter().map(|p| p.length).sum();
@@ -204,8 +205,8 @@ fn one_after_the_other(steps: &[f64], [lo, hi]: [f64; 2]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    fn place(step: f64, length: f64) -> Place {
-        Place { psi: 0.0, step, length, too_concave: false }
+    fn place(step: f64, length: f64) -> AllowedStep {
+        AllowedStep { psi: 0.0, step, length, too_concave: false }
     }
 
     #[test]
@@ -213,7 +214,7 @@ mod tests {
         let mut places = vec![place(1.0, 1.0); 98];
         places.extend([place(0.2, 1.0); 2]);
         assert_eq!(shortest(&places, 1e-3), Some(1.0));
-        let half: Vec<Place> = (0..100).map(|k| place(if k < 50 { 0.9 } else { 1.0 }, 1.0)).collect();
+        let half: Vec<AllowedStep> = (0..100).map(|k| place(if k < 50 { 0.9 } else { 1.0 }, 1.0)).collect();
         assert_eq!(shortest(&half, 1e-3), Some(0.9));
         assert_eq!(shortest(&[], 1e-3), None);
     }

@@ -7,7 +7,7 @@
 //! way between two turns becomes straight. Heights come from dropping the cutter, so that a link can
 //! never cut deeper into the part than its chords, and never raises what stands beside it.
 
-use super::super::DropCutter;
+use crate::DropCutter;
 use crate::moves::chord::{Watch, reduce, sample_within_chord};
 use crate::surface::border::Border;
 use cutter::Cutter;

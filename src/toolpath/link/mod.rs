@@ -19,46 +19,18 @@ mod order;
 mod tests;
 mod tilted;
 
-use super::{DropCutter, PlanSettings, Step};
+use super::DropCutter;
 use crate::surface::border::Border;
+use crate::vocabulary::{Joining, Links, PlanSettings, Setup, Step};
 use bend::{Bends, End};
 use ceiling::Ceiling;
 use cutter::Cutter;
-use geometry::distance_to_segment;
-use geometry::{Point2, Point3, Vector2};
+use geometry::{Point2, Point3, Vector2, distance_to_segment};
 use motion::{ClPoint, Move, MoveKind, Toolpath};
 use order::{Visit, is_closed, order};
-use part::Part;
 use scallop::strip_width;
 pub(crate) use tilted::join_tilted;
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
-
-/// How the end of a pass and the start of the next are joined.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Links {
-    /// Along the surface where that is quicker, else by a retract.
-    Surface,
-    /// By retracts only.
-    Retract,
-}
-
-/// How passes become a program.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Joining {
-    /// What joins them.
-    pub links: Links,
-    /// No link on the surface is longer, mm; `None` takes [`LONGEST_LINK`] intervals.
-    pub longest_link: Option<f64>,
-    /// Whether the points of each pass are smoothed and spread within the chord tolerance.
-    pub smoothing: bool,
-}
-
-impl Default for Joining {
-    fn default() -> Self {
-        Self { links: Links::Retract, longest_link: None, smoothing: false }
-    }
-}
+use work::monitor::{self, Cancelled};
 
 /// Longest link on the surface, in intervals between passes on a plane, unless another is asked for. It
 /// reaches the next pass along borders that passes meet at six degrees or more; longer ones leave traces
@@ -90,17 +62,15 @@ fn plane_interval(cutter: &Cutter, step: Step) -> f64 {
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
-pub fn join(
+pub(crate) fn join(
     passes: Vec<Vec<Point3>>,
     both_ways: bool,
-    part: &Part,
-    cutter: &Cutter,
-    settings: &PlanSettings,
-    monitor: &dyn Monitor,
+    setup: &Setup<'_>,
 ) -> Result<Toolpath, Cancelled> {
+    let Setup { part, cutter, settings, monitor } = *setup;
     let passes: Vec<Vec<Point3>> = passes.into_iter().filter(|p| p.len() >= 2).collect();
     monitor.start("joining passes", 0);
-    let rates = Rates::of(settings, &passes);
+    let rates = Speeds::of(settings, &passes);
     let longest = match settings.joining.links {
         Links::Surface => longest_link(&settings.joining, cutter, settings.step),
         Links::Retract => 0.0,
@@ -135,7 +105,7 @@ pub fn join(
 
 /// Speeds of moves between passes, mm/s.
 #[derive(Debug, Clone, Copy)]
-struct Rates {
+struct Speeds {
     feed: f64,
     plunge: f64,
     rapid: f64,
@@ -146,7 +116,7 @@ struct Rates {
 /// Length of a bend over the distance of its ends: that of a half circle.
 const BEND: f64 = std::f64::consts::FRAC_PI_2;
 
-impl Rates {
+impl Speeds {
     fn of(settings: &PlanSettings, passes: &[Vec<Point3>]) -> Self {
         let [feed, plunge, rapid] =
             [settings.feed_rate, settings.plunge_rate, settings.rapid_rate].map(|rate| rate / 60.0);
@@ -233,7 +203,7 @@ fn begun_ahead(mut points: Vec<Point3>, from: &End, both_ways: bool) -> Vec<Poin
 /// A program in the making.
 struct Program<'a> {
     settings: &'a PlanSettings,
-    rates: Rates,
+    rates: Speeds,
     ceiling: Ceiling<'a>,
     start: Option<Point3>,
     moves: Vec<Move>,
@@ -242,7 +212,7 @@ struct Program<'a> {
 }
 
 impl<'a> Program<'a> {
-    fn new(passes: &[Vec<Point3>], cutter: &'a Cutter, settings: &'a PlanSettings, rates: Rates) -> Self {
+    fn new(passes: &[Vec<Point3>], cutter: &'a Cutter, settings: &'a PlanSettings, rates: Speeds) -> Self {
         let mut low = Point2::new(f64::INFINITY, f64::INFINITY);
         let mut high = -low;
         for p in passes.iter().flatten() {

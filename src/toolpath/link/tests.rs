@@ -2,7 +2,7 @@ use proptest::prelude::*;
 
 use super::*;
 use geometry::{AnalyticShape, AnalyticSurface, TriangleMesh};
-use part::Patch;
+use part::{Part, Patch};
 use sim::{Grid, ZMap, cut_in_order};
 use work::monitor::Silent;
 
@@ -42,9 +42,14 @@ fn line(a: [f64; 2], b: [f64; 2]) -> Vec<Point3> {
     vec![Point3::new(a[0], a[1], 0.0), Point3::new(b[0], b[1], 0.0)]
 }
 
-fn joined(part: &Part, passes: &[Vec<Point3>], both_ways: bool, links: Links) -> Toolpath {
+fn join_with(passes: &[Vec<Point3>], both_ways: bool, part: &Part, settings: &PlanSettings) -> Toolpath {
     let cutter = Cutter::ball(6.0).unwrap();
-    join(passes.to_vec(), both_ways, part, &cutter, &settings(links), &Silent).unwrap()
+    let setup = Setup { part, cutter: &cutter, settings, monitor: &Silent };
+    join(passes.to_vec(), both_ways, &setup).unwrap()
+}
+
+fn joined(part: &Part, passes: &[Vec<Point3>], both_ways: bool, links: Links) -> Toolpath {
+    join_with(passes, both_ways, part, &settings(links))
 }
 
 fn count(path: &Toolpath, kind: MoveKind) -> usize {
@@ -150,14 +155,13 @@ fn a_wall_between_two_ends_forces_a_retract() {
     let passes = [line([2.0, 10.0], [6.45, 10.0]), line([13.55, 10.0], [18.0, 10.0])];
     let mut longer = settings(Links::Surface);
     longer.joining.longest_link = Some(8.0);
-    let cutter = Cutter::ball(6.0).unwrap();
-    let path = join(passes.to_vec(), true, &part, &cutter, &longer, &Silent).unwrap();
+    let path = join_with(&passes, true, &part, &longer);
     assert_eq!(count(&path, MoveKind::Link), 0, "over the wall it is longer than 8 mm");
     let over = path.segments().filter(|(.., m)| m.kind == MoveKind::Rapid).map(|(_, to, _)| to.z);
     assert!(over.fold(0.0, f64::max) >= 7.0);
     assert_eq!(rapids_in_stock(&path), 0);
     // Without the wall the same passes are linked.
-    let path = join(passes.to_vec(), true, &plate(), &cutter, &longer, &Silent).unwrap();
+    let path = join_with(&passes, true, &plate(), &longer);
     assert!(count(&path, MoveKind::Link) > 0 && count(&path, MoveKind::Rapid) == 0);
 }
 

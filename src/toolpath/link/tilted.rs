@@ -9,35 +9,33 @@ mod bent;
 mod ways;
 
 use super::order::{Visit, is_closed, order};
-use super::{Links, Rates, longest_link, plane_interval};
+use super::{Speeds, longest_link, plane_interval};
+use crate::RepairSummary;
+use crate::moves::touch::Touch;
 use crate::tilt::across;
 use crate::tilt::repair::{Repaired, repair};
-use crate::tilt::tilted::{TiltedPasses, Tilting, Touch, limit_turning, located, reversed};
-use crate::{PlanError, PlanSettings, RepairSummary};
+use crate::tilt::tilted::{TiltedPasses, Tilting, limit_turning, located, reversed};
+use crate::vocabulary::{Links, PlanError, PlanSettings, Setup};
 use bent::Bent;
 use collision::{Check, Interference, Obstacle};
 use cutter::{Cutter, Solid};
 use geometry::Point3;
 use motion::{ClPoint, Move, MoveKind, Toolpath};
-use part::Part;
-use ways::{Block, Step, Ways};
-use work::monitor;
-use work::monitor::Monitor;
+use ways::{Block, Leg, Ways};
+use work::monitor::{self, Monitor};
 
 /// Joins passes; see the module.
 ///
 /// # Errors
 /// [`PlanError::Axis`] where the rule gives no axis for a pass fed the other way round, or cancelled.
-pub fn join_tilted(
+pub(crate) fn join_tilted(
     passes: TiltedPasses,
     both_ways: bool,
-    part: &Part,
-    cutter: &Cutter,
     tilting: &Tilting,
-    settings: &PlanSettings,
+    setup: &Setup<'_>,
     notes: &mut Vec<String>,
-    monitor: &dyn Monitor,
 ) -> Result<Toolpath, PlanError> {
+    let Setup { part, cutter, settings, monitor } = *setup;
     let TiltedPasses { passes, tolerance, smoothing } = passes;
     let passes: Vec<Vec<Touch>> = passes.into_iter().filter(|p| p.len() >= 2).collect();
     monitor.start("joining passes", 0);
@@ -63,7 +61,7 @@ pub fn join_tilted(
         thinning: tolerance,
     });
     let block = Block::of(part, settings);
-    let ways = Ways::new(part, cutter, settings, Rates::of(settings, &contacts), &block, touching, bent);
+    let ways = Ways::new(part, cutter, settings, Speeds::of(settings, &contacts), &block, touching, bent);
     let visits = order(&contacts, both_ways, &|distance| ways.cost(distance));
     monitor::check(monitor)?;
     let turned =
@@ -71,7 +69,7 @@ pub fn join_tilted(
     let turned = work::parallel::try_map(visits.len(), turned)?;
     let passes = cleared(turned, cutter, tilting, plane_interval(cutter, settings.step), notes, monitor)?;
     let pieces = work::parallel::try_map(passes.len(), |k| {
-        Piece::of(&passes[k], tolerance, smoothing, tilting.interference, monitor)
+        LocatedPass::of(&passes[k], tolerance, smoothing, tilting.interference, monitor)
     })?;
     let between = work::parallel::try_map(pieces.len().saturating_sub(1), |k| {
         ways.between(&pieces[k].ends[1], &pieces[k + 1].ends[0], monitor)
@@ -105,7 +103,7 @@ fn cleared(
     evened.iter().for_each(|(one, _)| summary.add(&one.summary));
     let mut passes: Vec<_> = evened.into_iter().flat_map(|(one, _)| one.passes).collect();
     if let Some(across) = tilting.most_turning_across {
-        let rates = across::Rates { across, along: tilting.most_turning };
+        let rates = across::TurningRates { across, along: tilting.most_turning };
         let left = across::even_out(&mut passes, cutter, rates, interval, tilting.interference, monitor)?;
         notes.extend(left.map(|left| left.note(across)));
         // The touches are clear; moves between them may be no longer.
@@ -133,14 +131,14 @@ fn repaired(
 }
 
 /// A pass, or a piece of one.
-struct Piece {
+struct LocatedPass {
     /// Its moves' ends.
     at: Vec<ClPoint>,
     /// The touches at which it begins and ends.
     ends: [Touch; 2],
 }
 
-impl Piece {
+impl LocatedPass {
     fn of(
         pass: &[Touch],
         tolerance: f64,
@@ -154,7 +152,7 @@ impl Piece {
 }
 
 /// All pieces one after the other.
-fn program(pieces: &[Piece], between: &[Vec<Step>], ways: &Ways, settings: &PlanSettings) -> Toolpath {
+fn program(pieces: &[LocatedPass], between: &[Vec<Leg>], ways: &Ways, settings: &PlanSettings) -> Toolpath {
     let (Some(first), Some(last)) = (pieces.first(), pieces.last()) else {
         return Toolpath { start: ways.above(), moves: Vec::new() };
     };

@@ -1,8 +1,7 @@
 //! Turns a curve of cutter locations into straight moves within a chord tolerance.
 
 use geometry::{Point3, Vector3, distance_to_segment};
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// Steps of work (drops of the cutter, points thinned) between two questions whether to go on. A
 /// question costs next to nothing; at ten times as many a cancelled plan would still end within

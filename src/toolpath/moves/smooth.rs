@@ -15,7 +15,7 @@
 //! Of a tilted cutter the centres of its arc are smoothed and spread; each keeps the axis that it has.
 
 use super::chord::{Side, Watch, Waypoint, moved_aside, reduce, reduced_indices};
-use crate::tilt::tilted::Touch;
+use crate::moves::touch::Touch;
 use geometry::{Point3, Vector3};
 use work::monitor::Cancelled;
 

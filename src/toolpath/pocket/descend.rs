@@ -1,8 +1,9 @@
 //! Runs in the plane made into a program: step by step down, with helices and ramps.
 
 use super::route::circle;
-use super::{Entry, PocketStrategy, Run};
-use crate::PlanSettings;
+use super::route::{Entry, Run};
+use super::strategy::PocketStrategy;
+use crate::vocabulary::PlanSettings;
 use geometry::{Point2, Point3, foot};
 use motion::{ClPoint, Move, MoveKind, Toolpath};
 

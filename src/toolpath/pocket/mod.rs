@@ -14,6 +14,7 @@ mod feed;
 mod lines;
 mod nest;
 mod route;
+pub(crate) mod strategy;
 #[cfg(test)]
 mod tests;
 mod turning;
@@ -23,13 +24,14 @@ use cleared::Cleared;
 pub use feed::{Engagement, engagement, engagement_angle, limit_feed};
 use nest::NestError;
 use route::{Entry, Run};
+pub use strategy::{Flow, Pattern, PocketStrategy, read_pocket_step};
 use turning::Turning;
 
-use super::{Plan, PlanError, PlanSettings, Step};
+use crate::plan::Plan;
+use crate::vocabulary::{PlanError, PlanSettings, Strategy};
 use cutter::Cutter;
 use geometry::{Piece, Point2, Region, SegmentGrid, Vector2};
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// A pocket to mill.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,62 +41,6 @@ pub struct Pocket {
     /// How far the floor lies below z = 0, mm.
     pub depth: f64,
 }
-
-/// How a flow is made.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Flow {
-    /// Length over which the distance from the walls is smoothed, mm; `None`: that of four with the
-    /// shortest passes.
-    pub smoothing: Option<f64>,
-    /// One spiral where passes are nested around one place.
-    pub spiral: bool,
-}
-
-/// The passes of one step down.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Pattern {
-    /// Level curves of a flow that follows the walls.
-    Flow(Flow),
-    /// Offsets of the walls.
-    Offset {
-        /// One spiral where passes are nested around one place.
-        spiral: bool,
-    },
-    /// Parallel lines.
-    Zigzag {
-        /// Their angle from the x axis, rad.
-        angle: f64,
-    },
-}
-
-/// How a pocket is milled.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PocketStrategy {
-    /// The passes.
-    pub pattern: Pattern,
-    /// Largest step down, mm; `None`: all of the depth at once.
-    pub stepdown: Option<f64>,
-    /// Left for a last step over the floor, mm; 0 for none.
-    pub floor_allowance: f64,
-    /// Left at the walls for a last pass along them, mm; 0 for none.
-    pub wall_allowance: f64,
-    /// Steepest way down, rad from level.
-    pub ramp_angle: f64,
-    /// Radius of the helix of the cutter's centre, mm; `None`: 0.8 of the cutter's radius, which leaves no
-    /// core.
-    pub helix_radius: Option<f64>,
-    /// Most of the cutter's circumference in stock, rad. It bounds the stepover, and passes are planned
-    /// within it everywhere but on ways down and in slots without room. Where more is all the same, the feed
-    /// falls in proportion. `None`: passes are not bounded, and the feed falls above a quarter more than
-    /// the stepover has in straight passes.
-    pub engagement: Option<f64>,
-}
-
-/// Helix radius over the cutter's radius when none is asked for. Above 1 a core would stand.
-const HELIX_OVER_RADIUS: f64 = 0.8;
-
-/// The least helix that is worth one, over the cutter's radius: a smaller one is a plunge.
-const LEAST_HELIX: f64 = 0.2;
 
 /// Share of the flat bottom's radius that innermost passes may lie from what they have to clear.
 const REACH: f64 = 0.95;
@@ -111,48 +57,6 @@ const SPACING: f64 = 0.25;
 
 /// Precision of the largest cutter that an error names, mm.
 const DISC_PRECISION: f64 = 0.005;
-
-impl PocketStrategy {
-    /// Name as scenes spell it.
-    pub fn name(&self) -> &'static str {
-        match self.pattern {
-            Pattern::Flow(_) => "pocket-flow",
-            Pattern::Offset { .. } => "pocket-offset",
-            Pattern::Zigzag { .. } => "pocket-zigzag",
-        }
-    }
-
-    /// The stepover, mm: the one asked for, or less where the engagement asks for it.
-    pub fn stepover(&self, step: Step, radius: f64) -> f64 {
-        let asked = match step {
-            Step::Stepover(s) => s,
-            Step::Scallop(_) => 0.8 * radius,
-        };
-        self.engagement.map_or(asked, |angle| asked.min(radius * (1.0 - angle.cos())))
-    }
-
-    /// Angle of the cutter in stock, rad, that passes are planned within, if they are.
-    fn bounded(&self) -> Option<f64> {
-        /// Planned for less by this, rad, which is what sides of polylines, films and the parts in which
-        /// angles are told apart add.
-        const SPARE: f64 = 0.03;
-        self.engagement.filter(|angle| *angle < std::f64::consts::PI).map(|angle| angle - SPARE)
-    }
-
-    /// Radius that a helix should have, and the least that is worth one, mm.
-    fn helix(&self, radius: f64) -> [f64; 2] {
-        [self.helix_radius.unwrap_or(HELIX_OVER_RADIUS * radius), LEAST_HELIX * radius]
-    }
-
-    /// Angle of the cutter in stock, rad, above which the feed falls.
-    pub fn engagement_limit(&self, step: Step, radius: f64) -> f64 {
-        /// Curved passes and links have a little more than straight ones; a feed that falls there is
-        /// restless.
-        const SLACK: f64 = 1.25;
-        let straight = engagement_angle(self.stepover(step, radius), radius);
-        self.engagement.unwrap_or(SLACK * straight).clamp(0.01, std::f64::consts::PI)
-    }
-}
 
 impl Pocket {
     /// The floor that a cutter can reach: the region that the flat of its bottom sweeps.
@@ -180,7 +84,7 @@ pub fn plan_pocket(
     settings: &PlanSettings,
     monitor: &dyn Monitor,
 ) -> Result<Plan, PlanError> {
-    let refuse = |reason: String| PlanError::NotApplicable { strategy: strategy.name(), reason };
+    let refuse = |reason: String| PlanError::NotApplicable { strategy: strategy.definition().word, reason };
     if !cutter.is_end_mill() {
         return Err(refuse("its walls are vertical; use a flat, bull or ball cutter".into()));
     }
@@ -292,7 +196,7 @@ fn piece_runs(
 ) -> Result<Vec<Run>, PlanError> {
     let failed = |e: NestError| match e {
         NestError::Cancelled(c) => PlanError::Cancelled(c),
-        e => PlanError::NotApplicable { strategy: strategy.name(), reason: e.to_string() },
+        e => PlanError::NotApplicable { strategy: strategy.definition().word, reason: e.to_string() },
     };
     let radius = cutter.radius();
     let flat = cutter.flat_radius();

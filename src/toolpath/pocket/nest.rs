@@ -4,12 +4,11 @@
 //! level, and within them the nests of the next. Cut from the innermost to the wall, each pass has the
 //! stepover to cut at most: every place of a curve is within it of the next curve inwards.
 
-use super::Flow;
+use super::strategy::Flow;
 use super::turning::{Turning, curvatures};
 use field::{PlanarError, PlanarMesh};
 use geometry::{CurveSegment, Piece, Point2, Region, SegmentGrid};
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// Side of the triangles over the stepover. Finer ones place levels better and cost time as their square.
 const EDGE_OVER_STEP: f64 = 0.35;
@@ -263,12 +262,12 @@ impl FlowField {
     ) -> Result<Nest, NestError> {
         let psi = self.mesh.flow(sigma.max(EDGES_A_SIGMA * EDGE_OVER_STEP * spacing.step), self.deepest)?;
         let all = (0..self.mesh.triangles().len() as u32).collect();
-        let job = Job { mesh: &self.mesh, psi: &psi, spacing, reach, monitor };
-        job.within(piece.clone(), 0.0, all, 0)
+        let nesting = Nesting { mesh: &self.mesh, psi: &psi, spacing, reach, monitor };
+        nesting.within(piece.clone(), 0.0, all, 0)
     }
 }
 
-struct Job<'a> {
+struct Nesting<'a> {
     mesh: &'a PlanarMesh,
     psi: &'a [f64],
     spacing: Spacing,
@@ -276,7 +275,7 @@ struct Job<'a> {
     monitor: &'a dyn Monitor,
 }
 
-impl Job<'_> {
+impl Nesting<'_> {
     /// The nest of `curves`, which are at `level`; `triangles` are those that reach above it inside.
     fn within(
         &self,

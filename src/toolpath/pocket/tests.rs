@@ -1,7 +1,7 @@
 mod engagement;
 
 use super::*;
-use crate::Joining;
+use crate::vocabulary::{Joining, Step};
 use geometry::{Point2, Point3};
 use motion::MoveKind;
 use std::f64::consts::PI;

@@ -10,14 +10,12 @@
 use super::iso_scallop::arrival;
 use crate::drop::DropCutter;
 use crate::levels::spacing::level_tangent;
-use crate::plan::{PassSettings, Passes, PlanError};
 use crate::surface::chart::Chart;
+use crate::vocabulary::{PassSettings, Passes, PlanError, Task};
 use cutter::Cutter;
 use field::{LevelTracer, ScalarField, surface_gradient_length};
 use geometry::Point3;
-use part::Part;
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled};
 
 /// Grid cells a side on which levels are found.
 const TRACE_CELLS: usize = 240;
@@ -43,26 +41,17 @@ const OVERLAP: f64 = 1.0;
 const MOST_STRAY: f64 = 1.0;
 
 /// Plans one spiral on each patch.
-pub fn passes(
-    part: &Part,
-    cutter: &Cutter,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
-) -> Result<Passes, PlanError> {
+pub fn passes(task: &Task<'_>) -> Result<Passes, PlanError> {
+    let Task { part, cutter, ref settings, .. } = *task;
     let mut all = Passes::default();
     for chart in Chart::all(part, cutter, settings.axis)? {
-        all.append(on_chart(part, cutter, &chart, settings, monitor)?);
+        all.append(on_chart(task, &chart)?);
     }
     Ok(all)
 }
 
-fn on_chart(
-    part: &Part,
-    cutter: &Cutter,
-    chart: &Chart,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
-) -> Result<Passes, PlanError> {
+fn on_chart(task: &Task<'_>, chart: &Chart) -> Result<Passes, PlanError> {
+    let Task { part, cutter, ref settings, monitor, .. } = *task;
     let [[u0, u1], [v0, v1]] = chart.domain;
     let border = vec![[u0, v0], [u1, v0], [u1, v1], [u0, v1], [u0, v0]];
     let field = arrival(chart, cutter, settings.step, &[border], false, monitor)?;
@@ -71,7 +60,7 @@ fn on_chart(
     let tracer = LevelTracer::new(&field, &metric, chart.domain, [0.0; 2], TRACE_CELLS, settings.sampling);
     let levels = Levels::trace(&tracer, [0.5 * (u0 + u1), v0])?;
     let spiral = Spiral { tracer: &tracer, levels, chart, cutter, field: &field, settings };
-    let dropped = settings.dropped(cutter);
+    let dropped = task.dropped();
     let drop = DropCutter::new(part, dropped);
     let tip = |[u, v]: [f64; 2]| {
         let p = chart.at(u, v)?;

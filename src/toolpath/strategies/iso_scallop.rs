@@ -7,14 +7,15 @@
 //! Limits: behind the ends of a start curve on the border, and where fronts meet, passes turn sharply; further short passes
 //! are put in there.
 
+use std::fmt::{self, Write as _};
+
 use crate::levels::level_passes::along_levels;
 use crate::levels::spacing::level_tangent;
-use crate::plan::{FrontStart, PassSettings, Passes, PlanError};
 use crate::surface::chart::{Chart, ChartPoint};
-use crate::{Along, Step};
+use crate::vocabulary::{Along, Definition, PartKind, Passes, PlanError, Reading, Step, Strategy, Task};
 use cutter::Cutter;
 use field::{EikonalError, Front, GridField, ScalarField, Start, eikonal, surface_gradient_length};
-use part::Part;
+use keys::{SceneError, toml_number, word_of};
 use scallop::strip_width;
 use work::monitor::Monitor;
 
@@ -35,31 +36,106 @@ const LENGTH_SAMPLES: usize = 120;
 /// How many of the starts with the least predicted length are planned; the prediction leaves out further passes.
 const PLANNED: usize = 2;
 
-/// Plans passes from a start curve.
-pub fn passes(
-    part: &Part,
-    cutter: &Cutter,
-    start: FrontStart,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
-) -> Result<Passes, PlanError> {
-    let mut all = Passes::default();
-    for chart in Chart::all(part, cutter, settings.axis)? {
-        all.append(on_chart(part, cutter, &chart, start, f64::INFINITY, settings, monitor)?);
+/// Where a front starts whose levels are passes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum FrontStart {
+    /// The border from which the path is shortest.
+    BestBorder,
+    /// Where a parameter is least or greatest.
+    Border {
+        /// The parameter that is constant there.
+        constant: Along,
+        /// Its greatest value, not its least.
+        greatest: bool,
+    },
+    /// All four borders at once: passes run around.
+    AllBorders,
+    /// A straight line in shares of the parameters' ranges (0 to 1), to both sides; it is continued to the borders.
+    Line([[f64; 2]; 2]),
+}
+
+/// Each pass at exactly the strip's width from the one before, measured on the surface across the feed: level curves of the
+/// arrival of a front that starts on a curve and moves by the strip's width.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct IsoScallop {
+    /// Where the first pass is.
+    pub start: FrontStart,
+}
+
+/// Words for `start`.
+const STARTS: [(&str, FrontStart); 6] = [
+    ("best", FrontStart::BestBorder),
+    ("u-min", FrontStart::Border { constant: Along::U, greatest: false }),
+    ("u-max", FrontStart::Border { constant: Along::U, greatest: true }),
+    ("v-min", FrontStart::Border { constant: Along::V, greatest: false }),
+    ("v-max", FrontStart::Border { constant: Along::V, greatest: true }),
+    ("all", FrontStart::AllBorders),
+];
+
+/// Keys of the line that a front starts on, in shares of the parameters' ranges.
+const LINE: [&str; 4] = ["from_u", "from_v", "to_u", "to_v"];
+
+/// Ends of a line closer than this share of the parameters' ranges give it no direction.
+const LEAST_LINE: f64 = 1e-6;
+
+/// How scenes speak of it.
+pub(crate) static DEFINITION: Definition = Definition {
+    word: "iso-scallop",
+    help: "each pass one strip's width from the one before, from a border or a line",
+    part: PartKind::Surface,
+    keys: &["start"],
+    read: |from| Ok(Box::new(IsoScallop { start: read_start(from)? })),
+};
+
+fn read_start(from: &Reading<'_>) -> Result<FrontStart, SceneError> {
+    let section = from.section;
+    let Some(table) = section.inline("start") else { return section.choice("start", &STARTS) };
+    table.only(&LINE, &[], "a line to start from")?;
+    let mut line = [0.0; 4];
+    for (x, (key, example)) in line.iter_mut().zip(LINE.into_iter().zip([0.5, 0.0, 0.5, 1.0])) {
+        *x = table.required_number(key, 0.0..=1.0, " (share of the parameter's range)", example)?.value;
     }
-    Ok(all)
+    let [a, b, c, d] = line;
+    if (c - a).hypot(d - b) < LEAST_LINE {
+        return Err(section.error(
+            table.header(),
+            "the line to start from begins and ends at the same place",
+            "give it two places, such as `start = { from_u = 0.5, from_v = 0.0, to_u = 0.5, to_v = 1.0 }`",
+        ));
+    }
+    Ok(FrontStart::Line([[a, b], [c, d]]))
+}
+
+impl Strategy for IsoScallop {
+    fn definition(&self) -> &'static Definition {
+        &DEFINITION
+    }
+
+    fn write(&self, out: &mut String) -> fmt::Result {
+        let FrontStart::Line(line) = self.start else {
+            return writeln!(out, "start = \"{}\"", word_of(&STARTS, &self.start));
+        };
+        let places = LINE.iter().zip(line.concat()).map(|(key, x)| format!("{key} = {}", toml_number(x)));
+        writeln!(out, "start = {{ {} }}", places.collect::<Vec<_>>().join(", "))
+    }
+
+    fn passes(&self, task: &Task<'_>) -> Result<Passes, PlanError> {
+        let mut all = Passes::default();
+        for chart in Chart::all(task.part, task.cutter, task.settings.axis)? {
+            all.append(on_chart(task, &chart, self.start, f64::INFINITY)?);
+        }
+        Ok(all)
+    }
 }
 
 /// Plans passes over one chart; none from starts that promise a path longer than `worth`, mm.
 pub(crate) fn on_chart(
-    part: &Part,
-    cutter: &Cutter,
+    task: &Task<'_>,
     chart: &Chart,
     start: FrontStart,
     worth: f64,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
 ) -> Result<Passes, PlanError> {
+    let Task { cutter, ref settings, monitor, .. } = *task;
     let mut tried = Vec::new();
     let places = places(chart, LENGTH_SAMPLES);
     for (name, curves) in starts(chart, start) {
@@ -72,7 +148,7 @@ pub(crate) fn on_chart(
     let searched = tried.len();
     let mut planned = Vec::new();
     for (length, name, field) in tried.into_iter().take(PLANNED).filter(|(length, ..)| *length < worth) {
-        planned.push((along_levels(part, cutter, chart, &field, settings, monitor)?, name, length));
+        planned.push((along_levels(task, chart, &field)?, name, length));
     }
     planned.sort_by(|a, b| a.0.length().total_cmp(&b.0.length()));
     let Some((mut best, name, length)) = planned.into_iter().next() else { return Ok(Passes::default()) };
@@ -205,10 +281,11 @@ pub(crate) fn predicted_length(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::levels::spacing::{Placing, place_levels, places_of};
+    use crate::levels::spacing::{LevelSteps, place_levels, places_of};
+    use crate::vocabulary::PassSettings;
     use field::LevelTracer;
     use geometry::{NurbsSurface, Point3};
-    use part::Patch;
+    use part::{Part, Patch};
     use std::f64::consts::{FRAC_1_SQRT_2, PI};
     use work::monitor::Silent;
 
@@ -245,7 +322,7 @@ mod tests {
         let interval = (8.0f64 * 0.05 * 5.0).sqrt();
         assert!((range[1] - range[0] - 10.0 / interval).abs() < 0.01, "{range:?}");
         let allowed = places_of(chart, &cutter, &field, &settings);
-        let levels = place_levels(&allowed, range, Placing::Shortest, &mut Vec::new());
+        let levels = place_levels(&allowed, range, LevelSteps::Shortest, &mut Vec::new());
         assert_eq!(levels.len(), 8);
         let length = |points: &[[f64; 2]]| {
             let at = |[u, v]: [f64; 2]| chart.jet(u, v).p;

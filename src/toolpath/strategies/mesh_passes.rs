@@ -10,14 +10,12 @@ use super::mesh_shortest::shortest_stream;
 use super::shortest::shortest_note;
 use crate::drop::DropCutter;
 use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between};
-use crate::levels::planned_field::{self, Contact};
-use crate::levels::spacing::{Place, Placing, place_levels};
-use crate::plan::{PassSettings, Passes, PlanError};
+use crate::levels::planned_field;
+use crate::levels::spacing::{AllowedStep, LevelSteps, place_levels};
 use crate::surface::border::useful_overrun;
-use crate::surface::feed;
-use crate::surface::feed::SMOOTHING_OVER_RADIUS;
+use crate::surface::feed::{self, SMOOTHING_OVER_RADIUS};
 use crate::surface::mesh_surface::{MeshSurface, Piece, not_applicable, reachable};
-use crate::{FeedDirection, Step};
+use crate::vocabulary::{Contact, FeedDirection, PassSettings, Passes, PlanError, Step, Task};
 use cutter::Cutter;
 use field::DIRECTION_WEIGHT;
 use field::mesh::{
@@ -25,7 +23,6 @@ use field::mesh::{
     solve_stream,
 };
 use geometry::{Point2, Point3, Vector2, Vector3};
-use part::Part;
 use scallop::strip_width_at;
 use work::monitor::{Cancelled, Monitor};
 
@@ -62,13 +59,8 @@ pub(crate) enum Aim<'a> {
 
 /// Passes along the level curves of a stream function over everything of the part that is reached from
 /// above.
-pub(crate) fn on_mesh(
-    part: &Part,
-    cutter: &Cutter,
-    aim: Aim,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
-) -> Result<Passes, PlanError> {
+pub(crate) fn on_mesh(task: &Task<'_>, aim: Aim) -> Result<Passes, PlanError> {
+    let Task { part, cutter, ref settings, .. } = *task;
     let flat = match settings.step {
         Step::Stepover(width) => width,
         Step::Scallop(h) => strip_width_at(cutter, &Vector3::z(), &Vector3::x(), 0.0, h).0,
@@ -92,30 +84,21 @@ pub(crate) fn on_mesh(
     }
     for piece in &reached.pieces {
         let surface = MeshSurface::with_margin(piece, BORDER_SHARE * flat)?;
-        all.append(on_piece(part, cutter, aim, piece, &surface, settings, monitor)?);
+        all.append(on_piece(task, aim, piece, &surface)?);
     }
     Ok(all)
 }
 
-fn on_piece(
-    part: &Part,
-    cutter: &Cutter,
-    aim: Aim,
-    piece: &Piece,
-    surface: &MeshSurface,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
-) -> Result<Passes, PlanError> {
+fn on_piece(task: &Task<'_>, aim: Aim, piece: &Piece, surface: &MeshSurface) -> Result<Passes, PlanError> {
+    let Task { part, cutter, ref settings, monitor, .. } = *task;
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     // Notes and field, to which passes come later.
     let mut all = Passes::default();
     let (values, predicted) = match aim {
-        Aim::Fitted(direction) => {
-            (along_direction(part, cutter, direction, piece, surface, settings, &mut all)?, None)
-        }
+        Aim::Fitted(direction) => (along_direction(task, direction, piece, surface, &mut all)?, None),
         Aim::Shortest(toward) => {
             let lines = toward.map(|(direction, dearer)| {
-                let (lines, matters) = feed_lines(part, cutter, direction, piece, surface, &mut all)?;
+                let (lines, matters) = feed_lines(task, direction, piece, surface, &mut all)?;
                 let pull = |(line, matters): (&Line, &f64)| (line.direction, dearer * matters);
                 Ok::<_, PlanError>(lines.iter().zip(&matters).map(pull).collect::<Vec<_>>())
             });
@@ -133,7 +116,7 @@ fn on_piece(
     let drop = DropCutter::new(part, cutter);
     let guide = MeshGuide { surface, levels, cutter, drop, settings, monitor };
     let places = guide.places(&values);
-    let placed = place_levels(&places, range, Placing::Shortest, &mut all.notes);
+    let placed = place_levels(&places, range, LevelSteps::Shortest, &mut all.notes);
     planned_field::set_mesh_levels(&mut all.field, &guide.levels, range, surface.own_triangles);
     if matches!(aim, Aim::Shortest(None)) {
         planned_field::set_mesh_feed(
@@ -161,17 +144,16 @@ fn level_lines(surface: &MeshSurface, levels: &MeshLevels<'_>) -> Vec<Line> {
 
 /// ψ at the vertices whose levels follow feed directions.
 fn along_direction(
-    part: &Part,
-    cutter: &Cutter,
+    task: &Task<'_>,
     direction: &FeedDirection,
     piece: &Piece,
     surface: &MeshSurface,
-    settings: &PassSettings,
     all: &mut Passes,
 ) -> Result<Vec<f64>, PlanError> {
+    let Task { cutter, ref settings, .. } = *task;
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     let mesh = &surface.mesh;
-    let (lines, matters) = feed_lines(part, cutter, direction, piece, surface, all)?;
+    let (lines, matters) = feed_lines(task, direction, piece, surface, all)?;
     let widths =
         |v: usize, b: &Vector3| width_at(cutter, &mesh.normals()[v], b, &surface.bends[v], settings.step);
     let count = mesh.points().len();
@@ -199,13 +181,13 @@ pub(crate) fn width_at(cutter: &Cutter, n: &Vector3, b: &Vector3, bend: &Bend, s
 /// The smooth, oriented field of feed directions, and how much they matter at each vertex (0 to 1, or to the weight of
 /// samples).
 fn feed_lines(
-    part: &Part,
-    cutter: &Cutter,
+    task: &Task<'_>,
     direction: &FeedDirection,
     piece: &Piece,
     surface: &MeshSurface,
     passes: &mut Passes,
 ) -> Result<(Vec<Line>, Vec<f64>), PlanError> {
+    let Task { part, cutter, .. } = *task;
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     let mesh = &surface.mesh;
     let mut wanted = feed::on_mesh(part, cutter, direction, piece, surface).map_err(refused)?;
@@ -270,14 +252,14 @@ struct MeshGuide<'a> {
 
 impl MeshGuide<'_> {
     /// What each of the part's own triangles allows.
-    fn places(&self, psi: &[f64]) -> Vec<Place> {
+    fn places(&self, psi: &[f64]) -> Vec<AllowedStep> {
         let mesh = &self.surface.mesh;
         let place = |t: usize| {
             let third = MeshPoint { triangle: t as u32, weights: [1.0 / 3.0; 3], position: Point3::origin() };
             let (allowed, too_concave) = self.allowed_at(&third)?;
             let gradient = allowed.step / allowed.width;
             let mean = mesh.triangles()[t].iter().map(|&v| psi[v as usize]).sum::<f64>() / 3.0;
-            Some(Place { psi: mean, step: allowed.step, length: mesh.area(t) * gradient, too_concave })
+            Some(AllowedStep { psi: mean, step: allowed.step, length: mesh.area(t) * gradient, too_concave })
         };
         (0..self.surface.own_triangles).filter_map(place).collect()
     }

@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use super::mesh_passes::width_at;
-use crate::plan::Step;
 use crate::surface::mesh_surface::MeshSurface;
+use crate::vocabulary::Step;
 use cutter::Cutter;
 use field::mesh::{Bend, gradient_terms};
 use field::{Front, Gradients, Packed, Roughness, Rounds, Site, minimise};
@@ -45,10 +45,10 @@ pub(crate) fn shortest_stream(
     for (t, corners) in mesh.triangles().iter().enumerate() {
         corners.iter().for_each(|&v| around[v as usize] += share(t) / 3.0);
     }
-    let place = Place { surface, cutter, step, toward };
+    let pricing = Pricing { surface, cutter, step, toward };
     let sites = parallel::map(count + mesh.triangles().len(), |k| match k.checked_sub(count) {
-        None => place.at_vertex(k, (1.0 - DAMPING) * around[k]),
-        Some(t) => place.on_triangle(t, DAMPING * share(t)),
+        None => pricing.at_vertex(k, (1.0 - DAMPING) * around[k]),
+        Some(t) => pricing.on_triangle(t, DAMPING * share(t)),
     });
     let recovered = gradient_terms(mesh);
     let mut gradients = Gradients::new(count);
@@ -110,14 +110,14 @@ fn roughness(surface: &MeshSurface, cutter: &Cutter, density: f64) -> Roughness 
 }
 
 /// What passes may do and cost at places of a surface.
-struct Place<'a> {
+struct Pricing<'a> {
     surface: &'a MeshSurface,
     cutter: &'a Cutter,
     step: Step,
     toward: Option<&'a [(Vector3, f64)]>,
 }
 
-impl Place<'_> {
+impl Pricing<'_> {
     fn at_vertex(&self, v: usize, area: f64) -> Option<(Site, [Vector3; 2])> {
         let surface = self.surface;
         let bend = &surface.bends[surface.origin[v] as usize];

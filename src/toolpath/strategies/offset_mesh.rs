@@ -21,13 +21,12 @@ mod guide;
 #[cfg(test)]
 mod tests;
 
-use crate::Step;
 use crate::drop::DropCutter;
 use crate::levels::halving::along_and_between;
-use crate::levels::spacing::{Placing, place_levels};
-use crate::plan::{PassSettings, Passes, PlanError};
+use crate::levels::spacing::{LevelSteps, place_levels};
+use crate::moves::touch::Touch;
 use crate::tilt::tilted;
-use crate::tilt::tilted::Touch;
+use crate::vocabulary::{PassSettings, Passes, PlanError, Step, Task};
 use cutter::Cutter;
 use field::DIRECTION_WEIGHT;
 use field::mesh::{
@@ -35,7 +34,7 @@ use field::mesh::{
     solve_stream, triangle_gradients,
 };
 use geometry::{Point3, Vector3};
-use guide::Guide;
+use guide::OffsetGuide;
 use motion::CcPoint;
 use offset::{LevelSet, MeshOffset, OffsetError, OffsetSettings, Valley};
 use part::Part;
@@ -84,13 +83,8 @@ const SMOOTHING_OVER_RADIUS: f64 = 0.5;
 const NAME: &str = "offset-surface";
 
 /// Passes over the offset surface in the direction `angle`, rad from x in the plan view.
-pub(crate) fn passes(
-    part: &Part,
-    cutter: &Cutter,
-    angle: f64,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
-) -> Result<Passes, PlanError> {
+pub(crate) fn passes(task: &Task<'_>, angle: f64) -> Result<Passes, PlanError> {
+    let Task { part, cutter, ref settings, monitor, .. } = *task;
     if !cutter.is_ball() {
         return Err(refused("only a ball's centre runs on one offset surface; use a ball"));
     }
@@ -102,7 +96,7 @@ pub(crate) fn passes(
     let (offset, meshes) = offset_pieces(part, radius, BORDER_SHARE * flat, monitor)?;
     let level = LevelSet::new(part.mesh(), part.bvh(), radius);
     let drop = settings.axis.is_none().then(|| DropCutter::new(part, cutter));
-    let rider = Rider { part, cutter, level, drop, settings, flat, pencils: pencils(&offset), monitor };
+    let rider = MeshRider { part, cutter, level, drop, settings, flat, pencils: pencils(&offset), monitor };
     let mut all = Passes::default();
     let mut missed = 0.0;
     for mesh in &meshes {
@@ -155,8 +149,8 @@ fn pieces(offset: &MeshOffset) -> Result<Vec<FieldMesh>, MeshFieldError> {
     let whole = FieldMesh::new(offset.vertices.clone(), offset.triangles.clone(), None)?;
     let (piece, count) = whole.pieces();
     let mut number = vec![u32::MAX; offset.vertices.len()];
-    type Piece = (Vec<Point3>, Vec<[u32; 3]>, Vec<Vector3>);
-    let mut parts: Vec<Piece> = vec![Default::default(); count];
+    type Raw = (Vec<Point3>, Vec<[u32; 3]>, Vec<Vector3>);
+    let mut parts: Vec<Raw> = vec![Default::default(); count];
     for corners in whole.triangles() {
         let (points, triangles, normals) = &mut parts[piece[corners[0] as usize] as usize];
         triangles.push(corners.map(|v| {
@@ -181,7 +175,7 @@ fn pencils(offset: &MeshOffset) -> Vec<Valley> {
 }
 
 /// Lets the centre of a ball run on the offset surface of a part.
-struct Rider<'a> {
+struct MeshRider<'a> {
     part: &'a Part,
     cutter: &'a Cutter,
     level: LevelSet<'a>,
@@ -194,7 +188,7 @@ struct Rider<'a> {
     monitor: &'a dyn Monitor,
 }
 
-impl Rider<'_> {
+impl MeshRider<'_> {
     /// The centre on the line from a place near the offset surface along `away`.
     fn centre(&self, x: &Point3, away: &Vector3) -> Option<Point3> {
         let mut centre = self.level.on_line(x, away, self.level.distance())?;
@@ -320,9 +314,10 @@ impl Rider<'_> {
         let levels = MeshLevels::new(mesh, &stream.values).map_err(failed)?;
         let range = levels.range();
         let gradients = triangle_gradients(mesh, &stream.values);
-        let guide = Guide { rider: self, mesh, levels, gradients, widths, reached };
+        let guide = OffsetGuide { rider: self, mesh, levels, gradients, widths, reached };
         let mut passes = Passes::default();
-        let placed = place_levels(&guide.places(&stream.values), range, Placing::Shortest, &mut passes.notes);
+        let placed =
+            place_levels(&guide.places(&stream.values), range, LevelSteps::Shortest, &mut passes.notes);
         passes.append(along_and_between(&guide, &placed, range, self.settings.sampling, self.monitor)?);
         Ok((passes, missed))
     }

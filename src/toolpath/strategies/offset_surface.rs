@@ -9,27 +9,26 @@
 //! the feed; on the offset surface itself that curvature is `κ/(1 − κ r)` (FORMULAS of parallel surfaces, e.g. do Carmo
 //! 1976, §3.5 exercise 11), which is how a surface of another origin is planned on.
 
+use std::fmt::{self, Write as _};
 use std::sync::Arc;
 
+use super::offset_mesh;
 use crate::drop::{Beside, DropCutter};
 use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between};
-use crate::levels::planned_field::Contact;
-use crate::levels::spacing::{Place, Placing, place_levels};
-use crate::plan::{PassSettings, Passes, PlanError};
+use crate::levels::spacing::{AllowedStep, LevelSteps, place_levels};
+use crate::moves::touch::Touch;
 use crate::surface::chart::{Chart, ChartPoint};
 use crate::tilt::tilted;
-use crate::tilt::tilted::Touch;
-use crate::{Along, OffsetAlong, OffsetDrive, Step};
+use crate::vocabulary::{
+    Along, Contact, Definition, PartKind, PassSettings, Passes, PlanError, Reading, Step, Strategy, Task,
+};
 use cutter::Cutter;
 use field::surface_gradient_length;
 use geometry::{NurbsSurface, Point3, Vector3};
+use keys::{SceneError, toml_number};
 use motion::CcPoint;
-use part::Part;
 use scallop::strip_width;
 use work::monitor::{Cancelled, Monitor};
-
-/// The strategy's name.
-pub(crate) const NAME: &str = "offset-surface";
 
 /// Places a side at which steps between passes are computed.
 const SAMPLES: usize = 160;
@@ -44,15 +43,108 @@ const OVERRUN: f64 = 0.3;
 /// Ends of a line nearer than this, mm, are one place of a closed one.
 const SEAM: f64 = 1e-7;
 
+/// How passes run on an offset surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum OffsetAlong {
+    /// u grows along a pass: along the sections of a blade.
+    U,
+    /// v grows along a pass: across the sections, from hub to tip.
+    V,
+    /// One spiral, u growing along it, on surfaces that close along u.
+    Spiral,
+    /// Vertical planes in this direction of the plan view, rad from x: on meshes, which have no parameters.
+    Angle(f64),
+}
+
+/// Which offset surface the ball's centre rides on.
+#[derive(Debug, Clone, PartialEq)]
+pub enum OffsetDrive {
+    /// The part's own, everywhere the radius off along the normal.
+    Exact,
+    /// Sections offset in their planes, and lofted. It lies too near wherever the surface leans out of these planes; whoever
+    /// has the sections puts [`OffsetDrive::Given`] in its place. A tilted tool that keeps clear leaves such places out.
+    InPlane,
+    /// These surfaces, `du × dv` away from the part.
+    Given(Arc<Vec<NurbsSurface>>),
+}
+
+/// A ball whose centre rides on an offset surface.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OffsetSurface {
+    /// How passes run.
+    pub along: OffsetAlong,
+    /// On what.
+    pub drive: OffsetDrive,
+}
+
+/// Words for `along`.
+const ALONG: [(&str, OffsetAlong); 3] =
+    [("u", OffsetAlong::U), ("v", OffsetAlong::V), ("spiral", OffsetAlong::Spiral)];
+
+/// How scenes speak of it.
+pub(crate) static DEFINITION: Definition = Definition {
+    word: "offset-surface",
+    help: "the centre of a ball rides on an offset of the part: along a parameter, as a spiral, or at an angle over a mesh",
+    part: PartKind::Surface,
+    keys: &["along", "angle", "offset"],
+    read,
+};
+
+fn read(from: &mut Reading<'_>) -> Result<Box<dyn Strategy>, SceneError> {
+    let section = from.section;
+    let drive = match section.word("offset", &["normal", "in-plane"])?.map(|word| word.value) {
+        Some("in-plane") => OffsetDrive::InPlane,
+        _ => OffsetDrive::Exact,
+    };
+    let angle = section.number("angle", -360.0..=360.0, " degrees")?;
+    let along = section.choice("along", &ALONG)?;
+    let along = match angle {
+        Some(_) if section.has("along") => {
+            return Err(section.error(
+                &section.key_span("angle"),
+                "passes run along a parameter or at an angle, not both",
+                "delete `angle` on patches and blades, `along` on meshes",
+            ));
+        }
+        Some(angle) => OffsetAlong::Angle(angle.value.to_radians()),
+        None => along,
+    };
+    Ok(Box::new(OffsetSurface { along, drive }))
+}
+
+impl Strategy for OffsetSurface {
+    fn definition(&self) -> &'static Definition {
+        &DEFINITION
+    }
+
+    fn write(&self, out: &mut String) -> fmt::Result {
+        match self.along {
+            OffsetAlong::U => writeln!(out, "along = \"u\"")?,
+            OffsetAlong::V => writeln!(out, "along = \"v\"")?,
+            OffsetAlong::Spiral => writeln!(out, "along = \"spiral\"")?,
+            OffsetAlong::Angle(angle) => {
+                writeln!(out, "angle = {}  # degrees from the x axis", toml_number(angle.to_degrees()))?;
+            }
+        }
+        let exact = self.drive == OffsetDrive::Exact;
+        writeln!(out, "offset = \"{}\"", if exact { "normal" } else { "in-plane" })
+    }
+
+    fn passes(&self, task: &Task<'_>) -> Result<Passes, PlanError> {
+        match self.along {
+            OffsetAlong::Angle(angle) => offset_mesh::passes(task, angle),
+            along => passes(task, along, &self.drive),
+        }
+    }
+
+    fn on_facets(&self, _task: &Task<'_>) -> bool {
+        true
+    }
+}
+
 /// Plans passes on the offset surfaces of all patches.
-pub(crate) fn passes(
-    part: &Part,
-    cutter: &Cutter,
-    along: OffsetAlong,
-    drive: &OffsetDrive,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
-) -> Result<Passes, PlanError> {
+fn passes(task: &Task<'_>, along: OffsetAlong, drive: &OffsetDrive) -> Result<Passes, PlanError> {
+    let Task { part, cutter, ref settings, monitor, .. } = *task;
     if !cutter.is_ball() {
         return Err(refused("the centre of a ball rides on the offset surface; use a ball cutter"));
     }
@@ -74,7 +166,7 @@ pub(crate) fn passes(
     for chart in &charts {
         let exact = matches!(drive, OffsetDrive::Exact);
         let drop = (exact && settings.axis.is_none()).then(|| DropCutter::new(part, cutter));
-        let rider = Rider { chart, cutter, exact, drop, along: along.parameter(), settings, monitor };
+        let rider = PatchRider { chart, cutter, exact, drop, along: along.parameter(), settings, monitor };
         all.append(match along {
             OffsetAlong::Spiral => rider.spiral()?,
             _ => rider.lines()?,
@@ -84,7 +176,7 @@ pub(crate) fn passes(
 }
 
 fn refused(reason: &str) -> PlanError {
-    PlanError::NotApplicable { strategy: NAME, reason: reason.to_owned() }
+    PlanError::NotApplicable { strategy: DEFINITION.word, reason: reason.to_owned() }
 }
 
 impl OffsetAlong {
@@ -105,7 +197,7 @@ impl OffsetDrive {
 }
 
 /// Lays passes on one offset surface.
-struct Rider<'a> {
+struct PatchRider<'a> {
     /// The patch, or the offset surface itself.
     chart: &'a Chart<'a>,
     cutter: &'a Cutter,
@@ -126,7 +218,7 @@ struct Ride {
     feed: Vector3,
 }
 
-impl Rider<'_> {
+impl PatchRider<'_> {
     /// Ranges of the parameter along passes and of the one across.
     fn ranges(&self) -> [[f64; 2]; 2] {
         let [u, v] = self.chart.domain;
@@ -151,7 +243,7 @@ impl Rider<'_> {
     }
 
     /// What a place allows, as one of the places by which levels are placed.
-    fn place(&self, [u, v]: [f64; 2]) -> Option<(Place, f64)> {
+    fn place(&self, [u, v]: [f64; 2]) -> Option<(AllowedStep, f64)> {
         let p = self.chart.at(u, v)?;
         let feed = self.feed(&p)?;
         let (e, f, g) = p.jet.first_form();
@@ -165,7 +257,10 @@ impl Rider<'_> {
             self.width_between_centres(&p, &feed)
         };
         let area = (e * g - f * f).max(0.0).sqrt();
-        Some((Place { psi: level, step: width * gradient, length: area * gradient, too_concave }, width))
+        Some((
+            AllowedStep { psi: level, step: width * gradient, length: area * gradient, too_concave },
+            width,
+        ))
     }
 
     /// The distance that centres may have across the feed on an offset surface of another origin, mm, and whether the
@@ -186,7 +281,7 @@ impl Rider<'_> {
 
     /// Passes along parameter lines.
     fn lines(&self) -> Result<Passes, PlanError> {
-        let (levels, notes) = self.levels(Placing::Shortest)?;
+        let (levels, notes) = self.levels(LevelSteps::Shortest)?;
         let [_, range] = self.ranges();
         let mut passes = along_and_between(self, &levels, range, self.settings.sampling, self.monitor)?;
         passes.notes.splice(0..0, notes);
@@ -200,8 +295,8 @@ impl Rider<'_> {
         matches!(ends, [Some(a), Some(b)] if (a - b).norm() <= SEAM)
     }
 
-    fn levels(&self, placing: Placing) -> Result<(Vec<f64>, Vec<String>), PlanError> {
-        let places: Vec<Place> =
+    fn levels(&self, placing: LevelSteps) -> Result<(Vec<f64>, Vec<String>), PlanError> {
+        let places: Vec<AllowedStep> =
             self.chart.grid(SAMPLES).filter_map(|uv| self.place(uv)).map(|(place, _)| place).collect();
         if places.is_empty() {
             return Err(refused("the offset surface has no area; check the part"));
@@ -220,7 +315,7 @@ impl Rider<'_> {
                  `along = \"u\"`",
             ));
         }
-        let (levels, notes) = self.levels(Placing::Least)?;
+        let (levels, notes) = self.levels(LevelSteps::Least)?;
         let turn = levels.iter().map(|&v| self.line_length(v)).fold(0.0, f64::max);
         let steps = (turn / self.settings.sampling).ceil().max(4.0);
         let last = levels.len() as f64;
@@ -303,7 +398,7 @@ fn close<P: Copy>(pass: &mut [P], place: impl Fn(&P) -> Point3) {
     }
 }
 
-impl LevelSource for Rider<'_> {
+impl LevelSource for PatchRider<'_> {
     type Place = [f64; 2];
 
     /// The parameter line at a level, its points about a sampling distance apart.

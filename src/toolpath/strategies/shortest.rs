@@ -13,19 +13,24 @@
 //! is.
 
 use std::f64::consts::PI;
+use std::fmt::{self, Write as _};
 
+use super::direction_keys;
 use super::iso_scallop::{front_at, on_chart, places};
+use super::mesh_passes::{self, Aim};
 use crate::levels::level_passes::along_levels;
 use crate::levels::planned_field;
-use crate::plan::{FeedDirection, FrontStart, PassSettings, Passes, PlanError, Step};
+use crate::strategies::iso_scallop::FrontStart;
 use crate::surface::chart::{Chart, ChartPoint};
 use crate::surface::feed;
+use crate::vocabulary::{Definition, FeedDirection, Passes, PlanError, Step, Strategy, Task};
 use cutter::Cutter;
 use field::{
     Gradients, NormalEquations, Packed, Roughness, Rounds, ScalarField, ScalarSpline, ShortestPossible, Site,
     Start, eikonal, minimise_priced,
 };
 use geometry::{KnotVector, Vector3};
+use keys::toml_number;
 use part::Part;
 use work::monitor::{Cancelled, Monitor};
 use work::parallel;
@@ -108,14 +113,50 @@ pub fn shortest_possible(part: &Part, cutter: &Cutter, h: f64) -> Result<Shortes
     Ok(sum)
 }
 
+/// Streamlines of the feed directions with the shortest path: each one strip from the next, their first curve searched.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShortestStreamline {
+    /// A direction to keep to, and how much dearer a mm of pass square to it is, in mm: 0 leaves all freedom, a great number
+    /// none.
+    pub toward: Option<(FeedDirection, f64)>,
+}
+
+impl Strategy for ShortestStreamline {
+    fn definition(&self) -> &'static Definition {
+        &super::streamline::DEFINITION
+    }
+
+    fn write(&self, out: &mut String) -> fmt::Result {
+        let Some((toward, dearer)) = &self.toward else { return writeln!(out, "direction = \"shortest\"") };
+        direction_keys::write(out, toward, "\n")?;
+        writeln!(out, "\nfollow = {}  # mm more for each mm of pass square to it", toml_number(*dearer))
+    }
+
+    fn passes(&self, task: &Task<'_>) -> Result<Passes, PlanError> {
+        let toward = self.toward.as_ref().map(|(direction, dearer)| (direction, *dearer));
+        if self.on_facets(task) {
+            mesh_passes::on_mesh(task, Aim::Shortest(toward))
+        } else {
+            passes(task, toward)
+        }
+    }
+
+    fn on_facets(&self, task: &Task<'_>) -> bool {
+        task.plans_on_mesh()
+    }
+
+    fn shows_field(&self) -> bool {
+        true
+    }
+
+    fn direction_mut(&mut self) -> Option<&mut FeedDirection> {
+        self.toward.as_mut().map(|(direction, _)| direction)
+    }
+}
+
 /// Plans passes along the stream function with the shortest path.
-pub(crate) fn passes(
-    part: &Part,
-    cutter: &Cutter,
-    toward: Option<(&FeedDirection, f64)>,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
-) -> Result<Passes, PlanError> {
+fn passes(task: &Task<'_>, toward: Option<(&FeedDirection, f64)>) -> Result<Passes, PlanError> {
+    let Task { part, cutter, ref settings, monitor, .. } = *task;
     let charts = Chart::all(part, cutter, settings.axis)?;
     if let Some((direction, _)) = toward {
         let parameters: Vec<_> = charts.iter().map(|chart| chart.domain).collect();
@@ -132,7 +173,7 @@ pub(crate) fn passes(
         let mut all_planned = Vec::new();
         for (spline, promised) in search.run()? {
             let field = ScalarField::Spline(spline);
-            all_planned.push((along_levels(part, cutter, &chart, &field, settings, monitor)?, promised));
+            all_planned.push((along_levels(task, &chart, &field)?, promised));
         }
         all_planned.sort_by(|(a, _), (b, _)| a.length().total_cmp(&b.length()));
         let Some((mut planned, promised)) = all_planned.into_iter().next() else { continue };
@@ -146,7 +187,7 @@ pub(crate) fn passes(
         planned.notes.push(shortest_note(&planned, promised));
         // A front whose passes run along two whole borders, or are packed without any slack, may still be shorter.
         let worth = planned.length();
-        match on_chart(part, cutter, &chart, FrontStart::BestBorder, worth, settings, monitor) {
+        match on_chart(task, &chart, FrontStart::BestBorder, worth) {
             Ok(front) if !front.passes.is_empty() && front.length() < worth => planned = front,
             Err(PlanError::Cancelled(cancelled)) => return Err(cancelled.into()),
             _ => {}

@@ -4,19 +4,19 @@
 //! the same. Where it leaves the part it is cut into pieces.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
+use std::fmt::{self, Write as _};
 
+use super::contour_spiral;
 use super::zigzag::{least_over_plane, stepover_at};
-use crate::Step;
 use crate::drop::DropCutter;
-use crate::plan::{PassSettings, Passes, PlanError};
 use crate::surface::border::Border;
 use crate::surface::chart::Chart;
 use crate::surface::plan_curve::PlanCurves;
+use crate::vocabulary::{Definition, PartKind, Passes, PlanError, Step, Strategy, Task};
 use cutter::Cutter;
 use geometry::Vector2;
-use part::Part;
+use keys::word_of;
 use work::monitor;
-use work::monitor::Monitor;
 
 /// Places a side of each chart at which the pitch is computed.
 const SAMPLES: usize = 160;
@@ -36,15 +36,51 @@ const LAYOUT_SHARE: f64 = 0.5;
 /// A step turns by this much at most, rad.
 const MOST_TURN: f64 = 0.1;
 
+/// One spiral.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Spiral {
+    /// From the middle of the plan view outward, its pitch that of the tightest place of each turn. Where it leaves the part
+    /// it is cut into pieces.
+    Plan,
+    /// From the border to the middle between the passes of an iso-scallop path from all borders, without a retract; further
+    /// short passes where its turns have corners. For parts whose front closes in one point.
+    Contour,
+}
+
+/// Words for `kind`.
+const KINDS: [(&str, Spiral); 2] = [("plan", Spiral::Plan), ("contour", Spiral::Contour)];
+
+/// How scenes speak of it.
+pub(crate) static DEFINITION: Definition = Definition {
+    word: "spiral",
+    help: "one spiral, in the plan view or between the contours of the border",
+    part: PartKind::Surface,
+    keys: &["kind"],
+    read: |from| Ok(Box::new(from.section.choice("kind", &KINDS)?)),
+};
+
+impl Strategy for Spiral {
+    fn definition(&self) -> &'static Definition {
+        &DEFINITION
+    }
+
+    fn write(&self, out: &mut String) -> fmt::Result {
+        writeln!(out, "kind = \"{}\"", word_of(&KINDS, self))
+    }
+
+    fn passes(&self, task: &Task<'_>) -> Result<Passes, PlanError> {
+        match self {
+            Self::Plan => passes(task),
+            Self::Contour => contour_spiral::passes(task),
+        }
+    }
+}
+
 /// Plans the spiral.
-pub fn passes(
-    part: &Part,
-    cutter: &Cutter,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
-) -> Result<Passes, PlanError> {
+fn passes(task: &Task<'_>) -> Result<Passes, PlanError> {
+    let Task { part, cutter, ref settings, monitor, .. } = *task;
     let charts = Chart::all(part, cutter, settings.axis)?;
-    let dropped = settings.dropped(cutter);
+    let dropped = task.dropped();
     let [x, y] = [Vector2::x(), Vector2::y()].map(|e| Chart::extent_of_axes(&charts, part, dropped, &e));
     let middle = Vector2::new(0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]));
     let reach = 0.5 * (x[1] - x[0]).hypot(y[1] - y[0]);
@@ -119,7 +155,7 @@ fn pitches(
 
 /// A place of the spiral.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Knot {
+struct SpiralKnot {
     /// Length from the middle, mm.
     s: f64,
     angle: f64,
@@ -127,7 +163,7 @@ struct Knot {
 }
 
 /// The spiral from the middle to one pitch beyond `reach`, in steps of about `step` mm.
-fn layout(pitches: &[f64], reach: f64, step: f64) -> Vec<Knot> {
+fn layout(pitches: &[f64], reach: f64, step: f64) -> Vec<SpiralKnot> {
     let pitch = |radius: f64| {
         // Linear between the middles of rings.
         let x = (radius / reach * pitches.len() as f64 - 0.5).clamp(0.0, (pitches.len() - 1) as f64);
@@ -135,16 +171,16 @@ fn layout(pitches: &[f64], reach: f64, step: f64) -> Vec<Knot> {
         let t = x - k as f64;
         pitches[k] * (1.0 - t) + pitches[(k + 1).min(pitches.len() - 1)] * t
     };
-    let mut knots = vec![Knot { s: 0.0, angle: 0.0, radius: 0.0 }];
+    let mut knots = vec![SpiralKnot { s: 0.0, angle: 0.0, radius: 0.0 }];
     loop {
-        let Knot { s, angle, radius } = knots[knots.len() - 1];
+        let SpiralKnot { s, angle, radius } = knots[knots.len() - 1];
         if radius > reach + pitch(reach) {
             return knots;
         }
         let turn = (step / radius.max(1e-9)).min(MOST_TURN);
         let grown = radius + pitch(radius) * turn / TAU;
         let length = (turn * 0.5 * (radius + grown)).hypot(grown - radius);
-        knots.push(Knot { s: s + length, angle: angle + turn, radius: grown });
+        knots.push(SpiralKnot { s: s + length, angle: angle + turn, radius: grown });
     }
 }
 

@@ -7,14 +7,15 @@
 //!
 //! Limits: level ground has no contours; how much of the part is too level for the passes is said in a note.
 
+use std::fmt::{self, Write as _};
+
 use crate::levels::level_passes::along_levels_placed;
-use crate::levels::spacing::{Placing, level_tangent};
-use crate::plan::{PassSettings, Passes, PlanError};
+use crate::levels::spacing::{LevelSteps, level_tangent};
 use crate::surface::chart::Chart;
+use crate::vocabulary::{Definition, PartKind, PassSettings, Passes, PlanError, Strategy, Task};
 use cutter::Cutter;
 use field::{GridField, ScalarField, surface_gradient_length};
-use part::Part;
-use work::monitor::Monitor;
+use keys::word_of;
 
 /// Cells a side on which heights are sampled. The contours between nodes err with the third power of a cell.
 const CELLS: usize = 240;
@@ -29,27 +30,52 @@ const SLOPE_SAMPLES: usize = 120;
 /// as level.
 const LEVEL_SHARE: f64 = 1.0 / 64.0;
 
-/// Plans passes along contours.
-pub fn passes(
-    part: &Part,
-    cutter: &Cutter,
-    placing: Placing,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
-) -> Result<Passes, PlanError> {
-    let mut all = Passes::default();
-    for chart in Chart::all(part, cutter, settings.axis)? {
-        let field = ScalarField::Grid(heights(&chart, cutter)?);
-        let level = level_share(&chart, cutter, &field, settings);
-        all.append(along_levels_placed(part, cutter, &chart, &field, placing, settings, monitor)?);
-        if level > 0.0 {
-            all.notes.push(format!(
-                "{:.1} % of the surface are so level that contours hardly cover them; another strategy suits them better",
-                100.0 * level
-            ));
-        }
+/// Curves of constant height of the cutter. Where the part is nearly level they lie far apart: further passes fill in as far
+/// as six halvings reach.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Waterline {
+    /// How the height steps from pass to pass.
+    pub steps: LevelSteps,
+}
+
+/// Words for `step`.
+const STEPS: [(&str, LevelSteps); 2] =
+    [("adaptive", LevelSteps::Shortest), ("constant", LevelSteps::Constant)];
+
+/// How scenes speak of it.
+pub(crate) static DEFINITION: Definition = Definition {
+    word: "waterline",
+    help: "curves of constant height of the cutter",
+    part: PartKind::Surface,
+    keys: &["step"],
+    read: |from| Ok(Box::new(Waterline { steps: from.section.choice("step", &STEPS)? })),
+};
+
+impl Strategy for Waterline {
+    fn definition(&self) -> &'static Definition {
+        &DEFINITION
     }
-    Ok(all)
+
+    fn write(&self, out: &mut String) -> fmt::Result {
+        writeln!(out, "step = \"{}\"", word_of(&STEPS, &self.steps))
+    }
+
+    fn passes(&self, task: &Task<'_>) -> Result<Passes, PlanError> {
+        let Task { part, cutter, ref settings, .. } = *task;
+        let mut all = Passes::default();
+        for chart in Chart::all(part, cutter, settings.axis)? {
+            let field = ScalarField::Grid(heights(&chart, cutter)?);
+            let level = level_share(&chart, cutter, &field, settings);
+            all.append(along_levels_placed(task, &chart, &field, self.steps)?);
+            if level > 0.0 {
+                all.notes.push(format!(
+                    "{:.1} % of the surface are so level that contours hardly cover them; another strategy suits them better",
+                    100.0 * level
+                ));
+            }
+        }
+        Ok(all)
+    }
 }
 
 /// Height of the tip over the chart.

@@ -5,20 +5,20 @@
 //! plan direction across the feed; that surface is the part's offset, where lengths across the
 //! feed are `1 − κ r` times those on the part.
 
-use crate::Step;
+use std::fmt::{self, Write as _};
+
 use crate::drop::DropCutter;
 use crate::levels::level_passes::along_levels_placed;
-use crate::levels::spacing::Placing;
-use crate::plan::{PassSettings, Passes, PlanError};
+use crate::levels::spacing::LevelSteps;
 use crate::surface::border::Border;
 use crate::surface::chart::{Chart, ChartPoint};
 use crate::surface::plan_curve::PlanCurves;
+use crate::vocabulary::{Definition, PartKind, Passes, PlanError, Reading, Step, Strategy, Task};
 use cutter::Cutter;
 use field::ScalarField;
 use geometry::Vector2;
-use part::Part;
+use keys::{SceneError, toml_number};
 use work::monitor;
-use work::monitor::Monitor;
 
 /// The stepover is never planned below this share of that on a horizontal plane: a steep wall
 /// would otherwise ask for endless passes over the whole part. What is left there is measured.
@@ -36,17 +36,86 @@ const CELLS: usize = 240;
 /// How many of the angles with the least predicted length are planned; the prediction errs by a few per cent.
 const PLANNED: usize = 3;
 
+/// Passes in parallel vertical planes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Zigzag {
+    /// Their direction in the plan view.
+    pub angle: ZigzagAngle,
+    /// Cut in one direction only.
+    pub one_way: bool,
+}
+
+/// In which direction zigzag passes run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ZigzagAngle {
+    /// This far from the x axis, rad.
+    Given(f64),
+    /// The one with the shortest path: searched over half a turn by the predicted length, the best few planned.
+    Best,
+}
+
+impl Zigzag {
+    /// Passes `angle` from the x axis (rad), fed both ways.
+    pub const fn at(angle: f64) -> Self {
+        Self { angle: ZigzagAngle::Given(angle), one_way: false }
+    }
+}
+
+/// How scenes speak of it.
+pub(crate) static DEFINITION: Definition = Definition {
+    word: "zigzag",
+    help: "parallel vertical planes at an angle, or at the angle with the shortest path",
+    part: PartKind::Surface,
+    keys: &["angle", "one_way"],
+    read,
+};
+
+fn read(from: &mut Reading<'_>) -> Result<Box<dyn Strategy>, SceneError> {
+    let one_way = from.section.flag("one_way")?.unwrap_or(false);
+    if from.section.is_text("angle") {
+        from.section.word("angle", &["best"])?;
+        return Ok(Box::new(Zigzag { angle: ZigzagAngle::Best, one_way }));
+    }
+    let angle = from.section.number("angle", -360.0..=360.0, " degrees")?;
+    let angle = ZigzagAngle::Given(angle.map_or(0.0, |v| v.value.to_radians()));
+    Ok(Box::new(Zigzag { angle, one_way }))
+}
+
+impl Strategy for Zigzag {
+    fn definition(&self) -> &'static Definition {
+        &DEFINITION
+    }
+
+    fn write(&self, out: &mut String) -> fmt::Result {
+        match self.angle {
+            ZigzagAngle::Given(angle) => {
+                writeln!(out, "angle = {}  # degrees from the x axis", toml_number(angle.to_degrees()))?;
+            }
+            ZigzagAngle::Best => writeln!(out, "angle = \"best\"  # searched")?,
+        }
+        writeln!(out, "one_way = {}", self.one_way)
+    }
+
+    fn passes(&self, task: &Task<'_>) -> Result<Passes, PlanError> {
+        match self.angle {
+            // Patches under a tilted cutter: it follows the levels of a coordinate, and is not dropped.
+            ZigzagAngle::Given(angle) if task.follows_contacts() => on_levels(task, angle),
+            ZigzagAngle::Given(angle) => passes(task, angle),
+            ZigzagAngle::Best => best(task),
+        }
+    }
+
+    fn both_ways(&self) -> bool {
+        !self.one_way
+    }
+}
+
 /// Plans passes in the direction `angle` (rad from x).
-pub fn passes(
-    part: &Part,
-    cutter: &Cutter,
-    angle: f64,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
-) -> Result<Passes, PlanError> {
+fn passes(task: &Task<'_>, angle: f64) -> Result<Passes, PlanError> {
+    let Task { part, cutter, ref settings, monitor, .. } = *task;
     let charts = Chart::all(part, cutter, settings.axis)?;
     let mut notes = Vec::new();
-    let dropped = settings.dropped(cutter);
+    let dropped = task.dropped();
     let stepover = match settings.step {
         Step::Stepover(s) => s,
         Step::Scallop(h) => safe_stepover(&charts, [cutter, dropped], angle, h, &mut notes),
@@ -76,35 +145,26 @@ pub fn passes(
 }
 
 /// Plans passes of a tilted cutter: its contacts stand in parallel vertical planes, one distance apart on each patch.
-pub fn on_levels(
-    part: &Part,
-    cutter: &Cutter,
-    angle: f64,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
-) -> Result<Passes, PlanError> {
+fn on_levels(task: &Task<'_>, angle: f64) -> Result<Passes, PlanError> {
+    let Task { part, cutter, ref settings, .. } = *task;
     let across = Vector2::new(-angle.sin(), angle.cos());
     let mut all = Passes::default();
     for chart in Chart::all(part, cutter, settings.axis)? {
         let field = chart.sampled(CELLS, "zigzag", |u, v| chart.jet(u, v).p.coords.xy().dot(&across))?;
         let field = ScalarField::Grid(field);
-        all.append(along_levels_placed(part, cutter, &chart, &field, Placing::OneStep, settings, monitor)?);
+        all.append(along_levels_placed(task, &chart, &field, LevelSteps::Constant)?);
     }
     Ok(all)
 }
 
 /// Plans passes in the direction with the shortest path. Angles over half a turn are compared by the predicted length
 /// (surface along the feed over the stepover), and the best are planned.
-pub fn best(
-    part: &Part,
-    cutter: &Cutter,
-    settings: &PassSettings,
-    monitor: &dyn Monitor,
-) -> Result<Passes, PlanError> {
+fn best(task: &Task<'_>) -> Result<Passes, PlanError> {
+    let Task { part, cutter, ref settings, monitor, .. } = *task;
     let charts = Chart::all(part, cutter, settings.axis)?;
     let places = places(&charts);
     let angle = |k: usize| std::f64::consts::PI * k as f64 / ANGLES as f64;
-    let dropped = settings.dropped(cutter);
+    let dropped = task.dropped();
     let mut predicted: Vec<(f64, usize)> = work::parallel::map(ANGLES, |k| {
         let stepover = match settings.step {
             Step::Stepover(s) => s,
@@ -131,7 +191,7 @@ pub fn best(
     let mut planned = Vec::new();
     for &(_, k) in &predicted[..PLANNED] {
         monitor::check(monitor)?;
-        planned.push((passes(part, cutter, angle(k), settings, monitor)?, k));
+        planned.push((passes(task, angle(k))?, k));
     }
     let lengths: Vec<f64> = planned.iter().map(|(passes, _)| passes.length()).collect();
     let shortest = (0..lengths.len()).min_by(|&a, &b| lengths[a].total_cmp(&lengths[b])).unwrap_or(0);

@@ -4,8 +4,7 @@
 use std::collections::HashMap;
 
 use cutter::Cutter;
-use geometry::distance_to_segment;
-use geometry::{Point2, Point3, Vector3};
+use geometry::{Point2, Point3, Vector3, distance_to_segment};
 use part::{Part, SurfacePoint};
 
 /// Contacts within this share of the part's size of its border lie on it: a thousand times f64's

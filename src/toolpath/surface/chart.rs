@@ -5,14 +5,12 @@
 //! while heights of cutter locations always come from dropping the cutter on the mesh itself.
 
 use super::mesh_surface;
-use crate::plan::PlanError;
-use crate::{Along, FeedDirection, Step};
+use crate::vocabulary::{Along, FeedDirection, PlanError, Step};
 use cutter::Cutter;
 use field::mesh::{blend_lines, slope_at};
 use field::{GridField, NormalEquations, SamplePlane};
 use geometry::{Jet2, KnotVector, NurbsSurface, Point3, Vector2, Vector3};
-use motion::CcPoint;
-use motion::{ToolAxis, in_tool_frame};
+use motion::{CcPoint, ToolAxis, in_tool_frame};
 use part::Part;
 use scallop::strip_width_at;
 
@@ -137,7 +135,7 @@ impl ChartPoint<'_> {
             }
             FeedDirection::Steepest => slope_at(&self.normal, true),
             FeedDirection::Contour => slope_at(&self.normal, false),
-            FeedDirection::Samples(samples) => {
+            FeedDirection::Samples(samples) | FeedDirection::File { samples: Some(samples), .. } => {
                 let (line, sure) = samples.at(self.sampled_at(samples.plane()))?;
                 let t = match samples.plane() {
                     SamplePlane::Plan => self.tangent_over(line)?,
@@ -145,6 +143,7 @@ impl ChartPoint<'_> {
                 };
                 Some((t, sure))
             }
+            FeedDirection::File { samples: None, .. } => None,
             FeedDirection::Blend(parts) => {
                 let e1 = unit(&self.jet.du)?;
                 let lines = parts.iter().filter_map(|(part, weight)| {

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use super::chart::Chart;
 use super::mesh_surface::{MeshSurface, Piece, not_applicable};
-use crate::plan::{Along, FeedDirection, PlanError};
+use crate::vocabulary::{Along, FeedDirection, PlanError};
 use cutter::Cutter;
 use field::mesh::{
     FieldMesh, Line, MeshFieldError, Wanted, blend, borders, fixed_angle, guides, slope, smooth_lines,
@@ -46,7 +46,7 @@ pub(crate) fn check(
     let b = part.bounds();
     let rectangle = [[b.min.x, b.max.x], [b.min.y, b.max.y]];
     match direction {
-        FeedDirection::Samples(samples) => {
+        FeedDirection::Samples(samples) | FeedDirection::File { samples: Some(samples), .. } => {
             let (names, inside) = match samples.plane() {
                 SamplePlane::Plan => (["x", "y"], samples.count_inside(rectangle) > 0),
                 SamplePlane::Parameters => {
@@ -67,6 +67,9 @@ pub(crate) fn check(
             let bounds = [[all.min.x, all.max.x], [all.min.y, all.max.y]];
             let what = format!("{} guide curves", curves.len());
             Err(outside(&what, ["x", "y"], bounds, "check their unit and origin"))
+        }
+        FeedDirection::File { name, samples: None } => {
+            Err(not_applicable(&format!("its directions in {name} were not read")))
         }
         FeedDirection::Blend(parts) => {
             parts.iter().try_for_each(|(part_of, _)| check(part_of, part, domains))
@@ -229,7 +232,10 @@ pub(crate) fn on_mesh(
             .collect(),
         FeedDirection::Steepest => slope(mesh, true),
         FeedDirection::Contour => slope(mesh, false),
-        FeedDirection::Samples(samples) => sampled(part, mesh, samples),
+        FeedDirection::Samples(samples) | FeedDirection::File { samples: Some(samples), .. } => {
+            sampled(part, mesh, samples)
+        }
+        FeedDirection::File { samples: None, .. } => vec![None; mesh.points().len()],
         FeedDirection::Guides { .. } | FeedDirection::Border(_) => {
             // The border is the part's own, not that of the strip around it; the piece's vertices come first.
             let mut wanted = beside_curves(direction, &piece.mesh, cutter);

@@ -8,7 +8,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use crate::plan::PlanError;
+use crate::vocabulary::PlanError;
 use cutter::Cutter;
 use field::mesh::{Bend, FieldMesh, MeshFieldError, Refined, Sheets, weld};
 use geometry::{Point3, Vector3};

@@ -1,4 +1,5 @@
-//! The part as planners see it: charts with strips and feed directions.
+//! The part as strategies see it. Enters: patches or a mesh. Leaves: charts with normals, curvatures and strip widths at every
+//! parameter; pieces of mesh that are reached from above; borders; feed directions; curves of the plan view.
 
 pub mod border;
 pub mod chart;

@@ -6,7 +6,7 @@
 use super::border::Border;
 use crate::drop::{Drop, DropCutter};
 use crate::moves::chord::Watch;
-use crate::plan::PassSettings;
+use crate::vocabulary::PassSettings;
 use cutter::Cutter;
 use geometry::{Point3, Vector2};
 use work::monitor::{Cancelled, Monitor};
@@ -29,7 +29,7 @@ pub(crate) type Curve<'a> = &'a (dyn Fn(f64) -> Vector2 + Sync);
 
 /// How the cutter stands on the part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Contact {
+enum Footing {
     /// It touches surface.
     Inside,
     /// It touches the border and has rolled over it by no more than the overrun.
@@ -69,11 +69,11 @@ impl PlanCurves<'_> {
     }
 
     /// How the cutter stands at `s`.
-    fn contact(&self, curve: Curve<'_>, s: f64) -> Contact {
+    fn contact(&self, curve: Curve<'_>, s: f64) -> Footing {
         match self.rolled(curve, s) {
-            Some(rolled) if rolled <= END_PRECISION => Contact::Inside,
-            Some(rolled) if rolled <= self.overrun => Contact::Rolling,
-            _ => Contact::Off,
+            Some(rolled) if rolled <= END_PRECISION => Footing::Inside,
+            Some(rolled) if rolled <= self.overrun => Footing::Rolling,
+            _ => Footing::Off,
         }
     }
 
@@ -82,7 +82,7 @@ impl PlanCurves<'_> {
     pub fn pieces(&self, curve: Curve<'_>, [s0, s1]: [f64; 2]) -> Result<Vec<Vec<Point3>>, Cancelled> {
         let count = ((s1 - s0) / self.settings.sampling).ceil().max(1.0) as usize;
         let at = |k: usize| s0 + (s1 - s0) * k as f64 / count as f64;
-        let mut stretches: Vec<(Contact, f64, f64)> = Vec::new();
+        let mut stretches: Vec<(Footing, f64, f64)> = Vec::new();
         let mut before = (s0, self.contact(curve, s0));
         let mut start = s0;
         let mut watch = Watch::new(self.monitor);
@@ -100,7 +100,7 @@ impl PlanCurves<'_> {
             before = (s, now);
         }
         stretches.push((before.1, start, s1));
-        let runs = stretches.split_mut(|(contact, ..)| *contact == Contact::Off);
+        let runs = stretches.split_mut(|(contact, ..)| *contact == Footing::Off);
         let pieces = runs.map(|run| {
             self.shorten_ends(curve, run);
             self.moves(curve, run)
@@ -109,12 +109,12 @@ impl PlanCurves<'_> {
     }
 
     /// Cuts the rolls at both ends of a run back to what is of use.
-    fn shorten_ends(&self, curve: Curve<'_>, run: &mut [(Contact, f64, f64)]) {
+    fn shorten_ends(&self, curve: Curve<'_>, run: &mut [(Footing, f64, f64)]) {
         let useful = |from: f64, end: f64| {
             let place = |k: usize| from + (end - from) * k as f64 / ROLL_STEPS as f64;
             place((1..=ROLL_STEPS).find(|&k| !self.serves(curve, place(k))).unwrap_or(ROLL_STEPS))
         };
-        if let [(Contact::Rolling, a, b)] = run {
+        if let [(Footing::Rolling, a, b)] = run {
             // Beside the part all along.
             let place = |k: usize| *a + (*b - *a) * k as f64 / ROLL_STEPS as f64;
             if !(1..ROLL_STEPS).any(|k| self.serves(curve, place(k))) {
@@ -122,10 +122,10 @@ impl PlanCurves<'_> {
             }
             return;
         }
-        if let Some((Contact::Rolling, a, b)) = run.first_mut() {
+        if let Some((Footing::Rolling, a, b)) = run.first_mut() {
             *a = useful(*b, *a);
         }
-        if let Some((Contact::Rolling, a, b)) = run.last_mut() {
+        if let Some((Footing::Rolling, a, b)) = run.last_mut() {
             *b = useful(*a, *b);
         }
     }
@@ -139,11 +139,11 @@ impl PlanCurves<'_> {
         [across, -across].iter().any(|beside| self.border.under(&(contact + beside)))
     }
 
-    fn moves(&self, curve: Curve<'_>, run: &[(Contact, f64, f64)]) -> Result<Vec<Point3>, Cancelled> {
+    fn moves(&self, curve: Curve<'_>, run: &[(Footing, f64, f64)]) -> Result<Vec<Point3>, Cancelled> {
         let mut points: Vec<Point3> = Vec::new();
         for &(contact, a, b) in run.iter().filter(|(_, a, b)| b - a > LEAST_STRETCH) {
             // Rolling over corners of the border the cutter rises and falls within less than it does on surface.
-            let share = if contact == Contact::Rolling { ROLLING_SAMPLING } else { 1.0 };
+            let share = if contact == Footing::Rolling { ROLLING_SAMPLING } else { 1.0 };
             let settings = PassSettings { sampling: share * self.settings.sampling, ..*self.settings };
             let stretch = settings.moves(a, b, &mut |s| self.tip(curve, s), self.monitor)?;
             let joined = usize::from(!points.is_empty());
@@ -154,7 +154,7 @@ impl PlanCurves<'_> {
 
     /// Where the contact changes from what it is at `before` on the way to `s`: the last place that
     /// is as before, and the first known one that is not.
-    fn change(&self, curve: Curve<'_>, before: (f64, Contact), s: f64) -> (f64, f64) {
+    fn change(&self, curve: Curve<'_>, before: (f64, Footing), s: f64) -> (f64, f64) {
         let (mut same, mut other) = (before.0, s);
         while other - same > 0.5 * END_PRECISION {
             let middle = 0.5 * (same + other);

@@ -9,12 +9,12 @@
 
 use std::collections::HashMap;
 
-use super::tilted::{ABOVE_SURFACE, Touch};
+use super::tilted::ABOVE_SURFACE;
+use crate::moves::touch::Touch;
 use collision::Interference;
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// Sweeps over all pairs. What a sweep leaves shrinks the slower the more passes lie between.
 const MOST_SWEEPS: usize = 1000;
@@ -34,7 +34,7 @@ const BESIDE: f64 = 2.0;
 
 /// How fast axes may turn, rad a mm of contact.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Rates {
+pub(crate) struct TurningRates {
     /// From pass to pass.
     pub across: f64,
     /// Along a pass.
@@ -82,7 +82,7 @@ struct Pair {
 pub(crate) fn even_out(
     passes: &mut [Vec<Touch>],
     cutter: &Cutter,
-    rates: Rates,
+    rates: TurningRates,
     interval: f64,
     keep: Option<&Interference>,
     monitor: &dyn Monitor,
@@ -279,8 +279,8 @@ mod tests {
         (0..24).map(|y| (0..30).map(|x| touch(x, y)).collect()).collect()
     }
 
-    fn rates(across: f64) -> Rates {
-        Rates { across, along: None }
+    fn rates(across: f64) -> TurningRates {
+        TurningRates { across, along: None }
     }
 
     #[test]

@@ -4,15 +4,14 @@
 //! takes, in one pass or in several where a stretch cannot be reached, and what was changed. Moves between the touches that
 //! leave are clear.
 
-use super::tilted::{ABOVE_SURFACE, Touch};
+use super::tilted::ABOVE_SURFACE;
+use crate::moves::touch::Touch;
 use collision::{Interference, Shortfall};
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
-use motion::location;
-use motion::{CcPoint, ClPoint};
+use motion::{CcPoint, ClPoint, location};
 use std::f64::consts::TAU;
-use work::monitor;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// Rings of tilted axes are this far apart, rad. A gap through which the tool fits may lie between two wider ones.
 const RING: f64 = 0.05;

@@ -6,15 +6,15 @@
 //! so its strays count: that of the arc's centre height on the axis, and the turn of the axis times the
 //! distance of the arc from it, which is none for a ball.
 
-use crate::moves::chord::{Side, Watch, Waypoint, moved_aside, reduced_indices, sample_within_chord};
+use crate::moves::chord::{Side, Watch, moved_aside, reduced_indices, sample_within_chord};
 use crate::moves::smooth::smooth_and_spread_tilted;
-use crate::plan::PlanError;
+use crate::moves::touch::Touch;
 use crate::surface::border::Border;
+use crate::vocabulary::{PlanError, Setup};
 use collision::Interference;
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
-use motion::{AxisError, ToolAxis, location};
-use motion::{CcPoint, ClPoint};
+use motion::{AxisError, CcPoint, ClPoint, ToolAxis};
 use part::Part;
 use work::monitor::{Cancelled, Monitor};
 
@@ -23,10 +23,6 @@ use work::monitor::{Cancelled, Monitor};
 const SAMPLING_SHARE: f64 = 0.1;
 const LOCATED_SHARE: f64 = 0.7;
 const AROUND_CENTRES_SHARE: f64 = 0.3;
-
-/// The axis turns by no more than this in one move, rad: controls interpolate rotary axes, not the axis itself, and the
-/// holder swings in between.
-pub(crate) const GREATEST_TURN: f64 = 0.1;
 
 /// An axis that was turned away from its rule stays this far above the surface, as a sine.
 pub(crate) const ABOVE_SURFACE: f64 = 0.02;
@@ -63,77 +59,6 @@ impl TiltedPasses {
     /// Passes that were located by their contacts.
     pub fn located(passes: Vec<Vec<Touch>>, chord_tolerance: f64) -> Self {
         Self { passes, tolerance: LOCATED_SHARE * chord_tolerance, smoothing: None }
-    }
-}
-
-/// A cutter touching the part.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Touch {
-    /// Where it touches.
-    pub contact: CcPoint,
-    /// Unit feed direction.
-    pub feed: Vector3,
-    /// Where the cutter is.
-    pub at: ClPoint,
-    /// Height of the arc's centre above the tip, mm.
-    height: f64,
-    /// Distance of the arc's centre from the axis, mm.
-    reach: f64,
-}
-
-impl Touch {
-    /// A cutter that touches `contact` with its axis by a rule.
-    pub fn by(rule: &ToolAxis, cutter: &Cutter, contact: CcPoint, feed: Vector3) -> Result<Self, AxisError> {
-        Ok(Self::along(rule.at(&contact, &feed)?, cutter, contact, feed))
-    }
-
-    /// A cutter that touches `contact` with its axis along a unit vector.
-    pub fn along(axis: Vector3, cutter: &Cutter, contact: CcPoint, feed: Vector3) -> Self {
-        let profile = cutter.profile();
-        let (height, reach) = (profile.centre_z, profile.centre_x.abs());
-        Self { contact, feed, at: location(cutter, &contact, &axis), height, reach }
-    }
-
-    /// The centre of the arc's circle, on the axis.
-    pub fn centre(&self) -> Point3 {
-        on_axis(&self.at, self.height)
-    }
-
-    /// With the same axis and another centre.
-    pub fn around(&self, centre: Point3) -> Self {
-        Self { at: ClPoint { tip: centre - self.at.axis * self.height, axis: self.at.axis }, ..*self }
-    }
-
-    /// The same place fed the other way.
-    pub fn fed_back(&self) -> Self {
-        Self { feed: -self.feed, ..*self }
-    }
-}
-
-/// A point on the axis of a location.
-fn on_axis(at: &ClPoint, height: f64) -> Point3 {
-    at.tip + at.axis * height
-}
-
-impl Waypoint for Touch {
-    fn stray(&self, from: &Self, to: &Self) -> f64 {
-        if from.at.axis.dot(&to.at.axis) < GREATEST_TURN.cos() {
-            return f64::INFINITY;
-        }
-        let [a, b, c] = [from, to, self].map(|touch| on_axis(&touch.at, self.height));
-        let (d, turn) = (b - a, to.at.axis - from.at.axis);
-        // On the spot the turn tells how far the move has come.
-        let t = if d.norm_squared() > turn.norm_squared() * f64::EPSILON {
-            (c - a).dot(&d) / d.norm_squared()
-        } else {
-            (self.at.axis - from.at.axis).dot(&turn) / turn.norm_squared().max(f64::MIN_POSITIVE)
-        };
-        let there = from.at.towards(&to.at, t.clamp(0.0, 1.0));
-        (c - on_axis(&there, self.height)).norm() + self.reach * (self.at.axis - there.axis).norm()
-    }
-
-    fn is_at(&self, other: &Self) -> bool {
-        self.at == other.at
     }
 }
 
@@ -211,12 +136,11 @@ impl Dropped<'_> {
 /// [`PlanError::Axis`] where the rule gives no axis, or [`Cancelled`].
 pub(crate) fn around_centres(
     dropped: &Dropped<'_>,
-    part: &Part,
-    cutter: &Cutter,
     rule: &ToolAxis,
-    chord_tolerance: f64,
-    monitor: &dyn Monitor,
+    setup: &Setup<'_>,
 ) -> Result<TiltedPasses, PlanError> {
+    let Setup { part, cutter, monitor, .. } = *setup;
+    let chord_tolerance = setup.settings.chord_tolerance;
     let passes = dropped.passes;
     monitor.start("tilting the cutter", passes.len() as u64);
     let up = Vector3::z() * dropped.ball.radius();
@@ -356,6 +280,7 @@ pub(crate) fn thinned(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::moves::chord::Waypoint;
     use work::monitor::Silent;
 
     /// Around a cylinder of radius 10 along y.
@@ -434,7 +359,7 @@ mod tests {
             let spread = located(&touches, 6e-4, Some(0.45), None, &Silent).unwrap();
             assert!(spread.len() * 5 < plain.len() * 4, "{} of {}", spread.len(), plain.len());
             assert_eq!((spread.first(), spread.last()), (plain.first(), plain.last()));
-            let ends: Vec<Touch> = spread.iter().map(|at| Touch { at: *at, ..touches[0] }).collect();
+            let ends: Vec<Touch> = spread.iter().map(|at| touches[0].located(*at)).collect();
             for touch in &touches {
                 let stray = ends.windows(2).map(|w| touch.stray(&w[0], &w[1])).fold(f64::INFINITY, f64::min);
                 assert!(stray <= 6e-4 * (1.0 + 1e-9), "{stray}");

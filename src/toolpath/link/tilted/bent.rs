@@ -5,9 +5,10 @@
 //! link; where it follows the feed, and the cutter is no ball, it keeps its lead and tilt and so leads the contact around
 //! the cutter, which would leap from one side to the other of a flat end if the axis went through the normal.
 
-use super::super::bend::{Cubic, End, MOST_ROLL, SAMPLING, curves};
+use crate::link::bend::{Cubic, End, MOST_ROLL, SAMPLING, curves};
 use crate::moves::chord::{Watch, sample_within_chord};
-use crate::tilt::tilted::{ABOVE_SURFACE, Tilting, Touch, located_sampling, thinned};
+use crate::moves::touch::Touch;
+use crate::tilt::tilted::{ABOVE_SURFACE, Tilting, located_sampling, thinned};
 use collision::Interference;
 use cutter::Cutter;
 use geometry::{Point2, Point3, Vector3};

@@ -1,12 +1,13 @@
 //! A plate beside a wall that the holder must not touch, and ways between passes.
 
 use super::*;
-use crate::{Joining, Step, Strategy, plan_tilted};
+use crate::vocabulary::{Joining, Step};
+use crate::{Zigzag, plan_tilted};
 use collision::{Check, Obstacle};
 use cutter::{Holder, HolderSection, Solid};
 use geometry::{AnalyticShape, AnalyticSurface, Bvh, TriangleMesh, Vector3};
 use motion::ToolAxis;
-use part::Patch;
+use part::{Part, Patch};
 use work::monitor::Silent;
 
 fn plate() -> Part {
@@ -48,7 +49,7 @@ fn beside_a_wall_the_axis_leans_away_and_every_cut_is_clear() {
         rapid_rate: 15_000.0,
         joining: Joining::default(),
     };
-    let strategy = Strategy::Zigzag { angle: 0.0, one_way: false };
+    let strategy = Zigzag::at(0.0);
     let planned = |interference| {
         let upright = ToolAxis::Fixed(Vector3::z());
         let tilting = Tilting { axis: &upright, most_turning: None, most_turning_across: None, interference };
@@ -116,7 +117,7 @@ fn neighbouring_passes_are_joined_nearby_and_clear() {
         let axis = ToolAxis::LeadTilt { lead: 0.2, tilt: 0.0 };
         let tilting =
             Tilting { axis: &axis, most_turning: None, most_turning_across: None, interference: Some(&keep) };
-        let strategy = Strategy::Zigzag { angle: 0.0, one_way: false };
+        let strategy = Zigzag::at(0.0);
         let planned =
             |links| plan_tilted(&part, &cutter, &strategy, &tilting, &settings(links), &Silent).unwrap();
         let [bent, aloft] = [Links::Surface, Links::Retract].map(planned);
@@ -210,7 +211,7 @@ fn a_wall_between_two_passes_is_gone_over() {
         thinning: 0.003,
     };
     let block = Block::of(&part, &settings);
-    let ways = Ways::new(&part, &cutter, &settings, Rates::of(&settings, &[]), &block, &keep, Some(bent));
+    let ways = Ways::new(&part, &cutter, &settings, Speeds::of(&settings, &[]), &block, &keep, Some(bent));
     let touch = |x: f64, feed: f64| {
         let contact = motion::CcPoint { point: Point3::new(x, 10.0, 0.0), normal: Vector3::z() };
         Touch::by(&axis, &cutter, contact, Vector3::x() * feed).unwrap()

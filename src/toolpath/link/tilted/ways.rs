@@ -13,12 +13,11 @@
 //! All but the last are proved clear, move by move, of all that the tool is to keep away from; the last is taken where it is
 //! the quickest and clear too, or where nothing else is. Times are length over rate.
 
-use super::super::Rates;
 use super::bent::Bent;
-use crate::PlanSettings;
-use crate::tilt::tilted::{GREATEST_TURN, Touch};
-use collision::Check;
-use collision::{Interference, Obstacle};
+use crate::link::Speeds;
+use crate::moves::touch::{GREATEST_TURN, Touch};
+use crate::vocabulary::PlanSettings;
+use collision::{Check, Interference, Obstacle};
 use cutter::{Cutter, Solid};
 use geometry::{Aabb, Bvh, Point3, TriangleMesh, Vector3};
 use motion::{ClPoint, MoveKind};
@@ -45,7 +44,7 @@ const MOST_STEPS: usize = 100;
 const LEAST_STEP: f64 = 0.1;
 
 /// A move to a place, and what it is for.
-pub type Step = (ClPoint, MoveKind);
+pub type Leg = (ClPoint, MoveKind);
 
 /// Part and stock as a block, with all that lies within the clearance of it.
 pub struct Block {
@@ -86,7 +85,7 @@ impl Block {
 pub struct Ways<'a> {
     part: &'a Part,
     settings: &'a PlanSettings,
-    rates: Rates,
+    rates: Speeds,
     /// Height of the middle of what cuts over the tip, mm.
     middle: f64,
     block: &'a Block,
@@ -104,7 +103,7 @@ impl<'a> Ways<'a> {
         part: &'a Part,
         cutter: &Cutter,
         settings: &'a PlanSettings,
-        rates: Rates,
+        rates: Speeds,
         block: &'a Block,
         touching: &'a Interference<'a>,
         bent: Option<Bent<'a>>,
@@ -150,11 +149,11 @@ impl<'a> Ways<'a> {
     ///
     /// # Errors
     /// [`Cancelled`] when the monitor says so.
-    pub fn between(&self, from: &Touch, to: &Touch, monitor: &dyn Monitor) -> Result<Vec<Step>, Cancelled> {
+    pub fn between(&self, from: &Touch, to: &Touch, monitor: &dyn Monitor) -> Result<Vec<Leg>, Cancelled> {
         let around = self.around(&from.at, &to.at);
         let clear = self.is_clear(&from.at, &around, self.touching);
         let mut best = (clear, self.time(&from.at, &around), around);
-        let mut take = |way: Option<Vec<Step>>| {
+        let mut take = |way: Option<Vec<Leg>>| {
             if let Some(way) = way {
                 let time = self.time(&from.at, &way);
                 if !best.0 || time < best.1 {
@@ -186,26 +185,26 @@ impl<'a> Ways<'a> {
     }
 
     /// In to the first place from outside along the axis.
-    pub fn into(&self, outside: &ClPoint, to: &ClPoint) -> Vec<Step> {
+    pub fn into(&self, outside: &ClPoint, to: &ClPoint) -> Vec<Leg> {
         self.to_block(outside, to).into_iter().chain([(*to, MoveKind::Plunge)]).collect()
     }
 
     /// In along the axis to where neighbouring passes have been: at the feed, the last of it as into the full.
-    fn down(&self, outside: &ClPoint, to: &ClPoint) -> Vec<Step> {
+    fn down(&self, outside: &ClPoint, to: &ClPoint) -> Vec<Leg> {
         let off = (self.off(to, outside), MoveKind::Retract);
         self.to_block(outside, to).into_iter().chain([off, (*to, MoveKind::Plunge)]).collect()
     }
 
     /// From outside along the axis to where the block begins, if that is any nearer.
-    fn to_block(&self, outside: &ClPoint, to: &ClPoint) -> Option<Step> {
+    fn to_block(&self, outside: &ClPoint, to: &ClPoint) -> Option<Leg> {
         let nearer = |at: &ClPoint| (at.tip - to.tip).norm() < (outside.tip - to.tip).norm();
         self.out(to).filter(nearer).map(|at| (at, MoveKind::Rapid))
     }
 
     /// Length over rate, s.
-    fn time(&self, from: &ClPoint, way: &[Step]) -> f64 {
+    fn time(&self, from: &ClPoint, way: &[Leg]) -> f64 {
         let mut at = from.tip;
-        let one = |(to, kind): &Step| {
+        let one = |(to, kind): &Leg| {
             let length = (to.tip - std::mem::replace(&mut at, to.tip)).norm();
             length
                 / match kind {
@@ -217,13 +216,13 @@ impl<'a> Ways<'a> {
         way.iter().map(one).sum()
     }
 
-    fn is_clear(&self, from: &ClPoint, way: &[Step], keep: &Interference) -> bool {
+    fn is_clear(&self, from: &ClPoint, way: &[Leg], keep: &Interference) -> bool {
         let mut at = from;
         way.iter().all(|(to, _)| keep.on_move(std::mem::replace(&mut at, to), to).is_none())
     }
 
     /// Up by as much as the way over takes to be clear, over and down, if that is quicker than `quickest`, s.
-    fn aloft(&self, from: &ClPoint, to: &ClPoint, quickest: f64) -> Option<Vec<Step>> {
+    fn aloft(&self, from: &ClPoint, to: &ClPoint, quickest: f64) -> Option<Vec<Leg>> {
         let up = |at: &ClPoint, by: f64| ClPoint { tip: at.tip + at.axis * by, axis: at.axis };
         let way = |height: f64| {
             let (a, b) = (up(from, height), up(to, height));
@@ -232,7 +231,7 @@ impl<'a> Ways<'a> {
             moves.push((*to, MoveKind::Plunge));
             moves
         };
-        let clear = |moves: &[Step]| {
+        let clear = |moves: &[Leg]| {
             let last = moves.len() - 1;
             self.keeps_its_side(&moves[..last])
                 && self.is_clear(from, &moves[..1], self.touching)
@@ -264,14 +263,14 @@ impl<'a> Ways<'a> {
     }
 
     /// Whether what cuts runs on the outer side of the part all along, also beside its border, where no surface is met.
-    fn keeps_its_side(&self, moves: &[Step]) -> bool {
+    fn keeps_its_side(&self, moves: &[Leg]) -> bool {
         let outer = |at: &ClPoint| self.part.closest_point(&(at.tip + at.axis * self.middle)).1 >= 0.0;
         let (Some((a, _)), Some((b, _))) = (moves.first(), moves.last()) else { return true };
         (0..=PLACES).all(|k| outer(&a.towards(b, k as f64 / PLACES as f64)))
     }
 
     /// Out of the block, over, and in again.
-    fn over_block(&self, from: &ClPoint, to: &ClPoint) -> Option<Vec<Step>> {
+    fn over_block(&self, from: &ClPoint, to: &ClPoint) -> Option<Vec<Leg>> {
         let (a, b) = (self.out(from)?, self.out(to)?);
         let out = self.off(from, &a);
         let legs = [(out, MoveKind::Retract), (a, MoveKind::Rapid)];
@@ -311,7 +310,7 @@ impl<'a> Ways<'a> {
     }
 
     /// Out along the axis, around the sphere, and in along the axis there.
-    fn around(&self, from: &ClPoint, to: &ClPoint) -> Vec<Step> {
+    fn around(&self, from: &ClPoint, to: &ClPoint) -> Vec<Leg> {
         let (a, b) = (self.sphere.exit(from), self.sphere.exit(to));
         let mut moves = vec![(self.off(from, &a), MoveKind::Retract), (a, MoveKind::Rapid)];
         moves.extend(self.sphere.around_to(&a, &b).into_iter().map(|at| (at, MoveKind::Rapid)));
@@ -386,7 +385,7 @@ impl Sphere {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Joining, Step};
+    use crate::vocabulary::{Joining, Step};
     use cutter::{Holder, HolderSection};
     use geometry::{AnalyticShape, AnalyticSurface};
     use part::Patch;

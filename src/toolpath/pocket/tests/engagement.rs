@@ -6,7 +6,8 @@ use metrology::contact_arcs;
 use motion::MoveKind;
 use work::monitor::Silent;
 
-use crate::{Flow, Joining, Pattern, Plan, PlanSettings, Pocket, PocketStrategy, Step, plan_pocket};
+use crate::vocabulary::{Joining, PlanSettings, Step};
+use crate::{Flow, Pattern, Plan, Pocket, PocketStrategy, plan_pocket};
 
 fn points(c: &[(f64, f64)]) -> Vec<Point2> {
     c.iter().map(|&(x, y)| Point2::new(x, y)).collect()

@@ -1,11 +1,10 @@
 //! Level curves on one piece of the offset surface, as passes of the ball's centre.
 
-use super::{Rider, runs};
+use super::{MeshRider, runs};
 use crate::levels::halving::{Allowed, LevelSource, Track};
-use crate::levels::planned_field::Contact;
-use crate::levels::spacing::Place;
-use crate::plan::{Passes, PlanError};
-use crate::tilt::tilted::Touch;
+use crate::levels::spacing::AllowedStep;
+use crate::moves::touch::Touch;
+use crate::vocabulary::{Contact, Passes, PlanError};
 use field::mesh::{FieldMesh, MeshCurve, MeshLevels, MeshPoint};
 use geometry::{Point3, Vector3};
 use work::monitor::Cancelled;
@@ -22,8 +21,8 @@ pub(crate) struct Spot {
 }
 
 /// Level curves on one piece of the offset surface.
-pub(crate) struct Guide<'a> {
-    pub rider: &'a Rider<'a>,
+pub(crate) struct OffsetGuide<'a> {
+    pub rider: &'a MeshRider<'a>,
     pub mesh: &'a FieldMesh,
     pub levels: MeshLevels<'a>,
     /// Of the stream function, on each triangle.
@@ -34,9 +33,9 @@ pub(crate) struct Guide<'a> {
     pub reached: Vec<bool>,
 }
 
-impl Guide<'_> {
+impl OffsetGuide<'_> {
     /// What the places of the mesh allow, `psi` at its vertices.
-    pub fn places(&self, psi: &[f64]) -> Vec<Place> {
+    pub fn places(&self, psi: &[f64]) -> Vec<AllowedStep> {
         let place = |t: usize| {
             let corners = self.mesh.triangles()[t].map(|v| v as usize);
             let middle =
@@ -44,7 +43,7 @@ impl Guide<'_> {
             let allowed = self.allowed_at(&middle).filter(|_| corners.iter().any(|&v| self.reached[v]))?;
             let mean = corners.iter().map(|&v| psi[v]).sum::<f64>() / 3.0;
             let length = self.mesh.area(t) * allowed.step / allowed.width;
-            Some(Place { psi: mean, step: allowed.step, length, too_concave: false })
+            Some(AllowedStep { psi: mean, step: allowed.step, length, too_concave: false })
         };
         (0..self.mesh.triangles().len()).filter_map(place).collect()
     }
@@ -138,7 +137,7 @@ impl Guide<'_> {
     }
 }
 
-impl LevelSource for Guide<'_> {
+impl LevelSource for OffsetGuide<'_> {
     type Place = Spot;
 
     fn curves(&self, level: f64) -> Vec<Track<Spot>> {

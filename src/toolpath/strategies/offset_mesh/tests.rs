@@ -19,7 +19,11 @@ const SETTINGS: PassSettings = PassSettings {
 const SHORT: f64 = 5e-4;
 
 fn planned(part: &Part, angle: f64) -> Passes {
-    passes(part, &Cutter::ball(2.0 * RADIUS).unwrap(), angle, &SETTINGS, &Silent).unwrap()
+    passes(&task(part, &Cutter::ball(2.0 * RADIUS).unwrap()), angle).unwrap()
+}
+
+fn task<'a>(part: &'a Part, cutter: &'a Cutter) -> Task<'a> {
+    Task { part, cutter, settings: SETTINGS, wants_mesh: false, monitor: &Silent }
 }
 
 /// A mesh over a grid of the plan view.
@@ -125,6 +129,6 @@ fn over_a_cap_the_centre_runs_on_the_larger_sphere() {
 #[test]
 fn other_cutters_and_no_place_for_the_ball_are_refused() {
     let part = ground(&[0.0, 4.0], &[0.0, 4.0], |_, _| 0.0);
-    let refused = passes(&part, &Cutter::flat(6.0).unwrap(), 0.0, &SETTINGS, &Silent).unwrap_err();
+    let refused = passes(&task(&part, &Cutter::flat(6.0).unwrap()), 0.0).unwrap_err();
     assert!(refused.to_string().contains("use a ball"), "{refused}");
 }

@@ -1,7 +1,7 @@
 //! Repairs in cavities, slots and bowls.
 
 use super::*;
-use crate::tilt::tilted::Touch;
+use crate::moves::touch::Touch;
 use collision::samples::*;
 use collision::{Check, Obstacle};
 use cutter::Solid;

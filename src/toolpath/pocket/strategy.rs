@@ -1,0 +1,260 @@
+//! The strategies of pockets: what they are asked for, and how scenes spell it.
+
+use std::fmt::{self, Write as _};
+
+use super::feed::engagement_angle;
+use crate::vocabulary::{Definition, PartKind, Passes, PlanError, Reading, Step, Strategy, Task};
+use keys::{LENGTH, SceneError, Section, toml_number};
+
+/// How a flow is made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Flow {
+    /// Length over which the distance from the walls is smoothed, mm; `None`: that of four with the
+    /// shortest passes.
+    pub smoothing: Option<f64>,
+    /// One spiral where passes are nested around one place.
+    pub spiral: bool,
+}
+
+/// The passes of one step down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Pattern {
+    /// Level curves of a flow that follows the walls.
+    Flow(Flow),
+    /// Offsets of the walls.
+    Offset {
+        /// One spiral where passes are nested around one place.
+        spiral: bool,
+    },
+    /// Parallel lines.
+    Zigzag {
+        /// Their angle from the x axis, rad.
+        angle: f64,
+    },
+}
+
+/// How a pocket is milled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PocketStrategy {
+    /// The passes.
+    pub pattern: Pattern,
+    /// Largest step down, mm; `None`: all of the depth at once.
+    pub stepdown: Option<f64>,
+    /// Left for a last step over the floor, mm; 0 for none.
+    pub floor_allowance: f64,
+    /// Left at the walls for a last pass along them, mm; 0 for none.
+    pub wall_allowance: f64,
+    /// Steepest way down, rad from level.
+    pub ramp_angle: f64,
+    /// Radius of the helix of the cutter's centre, mm; `None`: 0.8 of the cutter's radius, which leaves no
+    /// core.
+    pub helix_radius: Option<f64>,
+    /// Most of the cutter's circumference in stock, rad. It bounds the stepover, and passes are planned
+    /// within it everywhere but on ways down and in slots without room. Where more is all the same, the feed
+    /// falls in proportion. `None`: passes are not bounded, and the feed falls above a quarter more than
+    /// the stepover has in straight passes.
+    pub engagement: Option<f64>,
+}
+
+/// Helix radius over the cutter's radius when none is asked for. Above 1 a core would stand.
+const HELIX_OVER_RADIUS: f64 = 0.8;
+
+/// The least helix that is worth one, over the cutter's radius: a smaller one is a plunge.
+const LEAST_HELIX: f64 = 0.2;
+
+/// Stepover over the cutter's diameter by default: 78 degrees of engagement.
+const STEPOVER_OVER_DIAMETER: f64 = 0.4;
+
+/// Stepdown over the cutter's diameter by default.
+const STEPDOWN_OVER_DIAMETER: f64 = 0.5;
+
+/// Ramp angle by default, degrees: what most end mills take in steel and all in aluminium.
+const RAMP_ANGLE: f64 = 3.0;
+
+/// How scenes speak of a flow.
+pub(crate) static FLOW: Definition = Definition {
+    word: "pocket-flow",
+    help: "a pocket along a flow that follows its walls and islands",
+    part: PartKind::Pocket,
+    keys: &[
+        "stepdown",
+        "floor_allowance",
+        "wall_allowance",
+        "ramp_angle",
+        "helix_radius",
+        "engagement",
+        "spiral",
+        "smoothing",
+    ],
+    read: |from| {
+        let flow = Flow { smoothing: length(from.section, "smoothing")?, spiral: spiral(from.section)? };
+        read(from, Pattern::Flow(flow))
+    },
+};
+
+/// How scenes speak of offsets.
+pub(crate) static OFFSET: Definition = Definition {
+    word: "pocket-offset",
+    help: "a pocket along offsets of its walls",
+    part: PartKind::Pocket,
+    keys: &[
+        "stepdown",
+        "floor_allowance",
+        "wall_allowance",
+        "ramp_angle",
+        "helix_radius",
+        "engagement",
+        "spiral",
+    ],
+    read: |from| {
+        let spiral = spiral(from.section)?;
+        read(from, Pattern::Offset { spiral })
+    },
+};
+
+/// How scenes speak of parallel lines.
+pub(crate) static ZIGZAG: Definition = Definition {
+    word: "pocket-zigzag",
+    help: "a pocket in parallel lines",
+    part: PartKind::Pocket,
+    keys: &[
+        "stepdown",
+        "floor_allowance",
+        "wall_allowance",
+        "ramp_angle",
+        "helix_radius",
+        "engagement",
+        "angle",
+    ],
+    read: |from| {
+        let angle = from.section.number("angle", -360.0..=360.0, " degrees")?;
+        read(from, Pattern::Zigzag { angle: angle.map_or(0.0, |v| v.value.to_radians()) })
+    },
+};
+
+fn length(section: &Section<'_>, key: &str) -> Result<Option<f64>, SceneError> {
+    Ok(section.length(key)?.map(|v| v.value))
+}
+
+fn spiral(section: &Section<'_>) -> Result<bool, SceneError> {
+    Ok(section.flag("spiral")?.unwrap_or(false))
+}
+
+/// The keys of all three.
+fn read(from: &Reading<'_>, pattern: Pattern) -> Result<Box<dyn Strategy>, SceneError> {
+    let section = from.section;
+    let allowance = |key| {
+        Ok::<f64, SceneError>(section.number(key, 0.0..=*LENGTH.end(), " mm")?.map_or(0.0, |v| v.value))
+    };
+    let radians = |angle: f64| angle.to_radians();
+    let stepdown = length(section, "stepdown")?;
+    Ok(Box::new(PocketStrategy {
+        pattern,
+        stepdown: Some(stepdown.unwrap_or(2.0 * STEPDOWN_OVER_DIAMETER * from.cutter_radius)),
+        floor_allowance: allowance("floor_allowance")?,
+        wall_allowance: allowance("wall_allowance")?,
+        ramp_angle: radians(
+            section.number("ramp_angle", 0.1..=45.0, " degrees")?.map_or(RAMP_ANGLE, |v| v.value),
+        ),
+        helix_radius: length(section, "helix_radius")?,
+        engagement: section.number("engagement", 10.0..=180.0, " degrees")?.map(|v| radians(v.value)),
+    }))
+}
+
+/// The stepover of a pocket's toolpath.
+///
+/// # Errors
+/// A stepover that leaves material between passes.
+pub fn read_pocket_step(section: &Section<'_>, radius: f64) -> Result<Step, SceneError> {
+    let step = match section.length("stepover")? {
+        Some(step) if step.value > 1.9 * radius => {
+            let message = format!(
+                "`stepover` is {} mm, more than 0.95 of the cutter's diameter of {} mm",
+                step.value,
+                2.0 * radius
+            );
+            return Err(section.error(&step.span, message, "write less, or material stays between passes"));
+        }
+        Some(step) => step.value,
+        // Rounded, so that it reads back as it was written.
+        None => (2.0 * STEPOVER_OVER_DIAMETER * radius * 1e6).round() / 1e6,
+    };
+    Ok(Step::Stepover(step))
+}
+
+impl Strategy for PocketStrategy {
+    fn definition(&self) -> &'static Definition {
+        match self.pattern {
+            Pattern::Flow(_) => &FLOW,
+            Pattern::Offset { .. } => &OFFSET,
+            Pattern::Zigzag { .. } => &ZIGZAG,
+        }
+    }
+
+    fn write(&self, out: &mut String) -> fmt::Result {
+        match self.pattern {
+            Pattern::Flow(flow) => {
+                writeln!(out, "spiral = {}", flow.spiral)?;
+                if let Some(smoothing) = flow.smoothing {
+                    writeln!(out, "smoothing = {}  # mm", toml_number(smoothing))?;
+                }
+            }
+            Pattern::Offset { spiral } => writeln!(out, "spiral = {spiral}")?,
+            Pattern::Zigzag { angle } => {
+                writeln!(out, "angle = {}  # degrees from the x axis", toml_number(angle.to_degrees()))?
+            }
+        }
+        if let Some(stepdown) = self.stepdown {
+            writeln!(out, "stepdown = {}  # mm", toml_number(stepdown))?;
+        }
+        writeln!(out, "floor_allowance = {}  # mm, left for a last step", toml_number(self.floor_allowance))?;
+        writeln!(out, "wall_allowance = {}  # mm, left for a last pass", toml_number(self.wall_allowance))?;
+        writeln!(out, "ramp_angle = {}  # degrees", toml_number(self.ramp_angle.to_degrees()))?;
+        if let Some(radius) = self.helix_radius {
+            writeln!(out, "helix_radius = {}  # mm", toml_number(radius))?;
+        }
+        if let Some(angle) = self.engagement {
+            writeln!(out, "engagement = {}  # degrees", toml_number(angle.to_degrees()))?;
+        }
+        Ok(())
+    }
+
+    /// There is no surface in a pocket; [`plan_pocket`](super::plan_pocket) plans one.
+    fn passes(&self, _task: &Task<'_>) -> Result<Passes, PlanError> {
+        let reason = "it mills pockets, and the part is none".to_owned();
+        Err(PlanError::NotApplicable { strategy: self.definition().word, reason })
+    }
+}
+
+impl PocketStrategy {
+    /// The stepover, mm: the one asked for, or less where the engagement asks for it.
+    pub fn stepover(&self, step: Step, radius: f64) -> f64 {
+        let asked = match step {
+            Step::Stepover(s) => s,
+            Step::Scallop(_) => 0.8 * radius,
+        };
+        self.engagement.map_or(asked, |angle| asked.min(radius * (1.0 - angle.cos())))
+    }
+
+    /// Angle of the cutter in stock, rad, that passes are planned within, if they are.
+    pub(super) fn bounded(&self) -> Option<f64> {
+        /// Planned for less by this, rad, which is what sides of polylines, films and the parts in which
+        /// angles are told apart add.
+        const SPARE: f64 = 0.03;
+        self.engagement.filter(|angle| *angle < std::f64::consts::PI).map(|angle| angle - SPARE)
+    }
+
+    /// Radius that a helix should have, and the least that is worth one, mm.
+    pub(super) fn helix(&self, radius: f64) -> [f64; 2] {
+        [self.helix_radius.unwrap_or(HELIX_OVER_RADIUS * radius), LEAST_HELIX * radius]
+    }
+
+    /// Angle of the cutter in stock, rad, above which the feed falls.
+    pub fn engagement_limit(&self, step: Step, radius: f64) -> f64 {
+        /// Curved passes and links have a little more than straight ones; a feed that falls there is
+        /// restless.
+        const SLACK: f64 = 1.25;
+        let straight = engagement_angle(self.stepover(step, radius), radius);
+        self.engagement.unwrap_or(SLACK * straight).clamp(0.01, std::f64::consts::PI)
+    }
+}

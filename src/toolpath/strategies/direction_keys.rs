@@ -1,0 +1,173 @@
+//! Feed directions as scenes spell them: a word, a table in place, or a blend of several.
+
+use std::fmt::{self, Write as _};
+use std::sync::Arc;
+
+use crate::vocabulary::{Along, FeedDirection};
+use field::mesh::Sense;
+use keys::{Located, SceneError, Section, toml_number, toml_string};
+
+/// The keys of a direction, where it is the value of the first of them.
+pub(crate) const KEYS: [&str; 4] = ["direction", "directions", "guides", "across"];
+
+/// Words of directions that can be blended.
+const WORDS: [&str; 8] = ["widest-strip", "steepest", "contour", "u", "v", "guide", "border", "file"];
+
+/// The word of a strategy of its own.
+const SHORTEST: &str = "shortest";
+
+/// Weights of a blend that make sense: below, a direction has no part in it.
+const WEIGHT: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
+
+/// Reads a direction and the files that it names, in order; what these hold is read later. `None` for
+/// the shortest path.
+pub(crate) fn read(
+    section: &Section<'_>,
+    files: &mut Vec<Located<String>>,
+) -> Result<Option<FeedDirection>, SceneError> {
+    let words: Vec<&str> = WORDS.into_iter().chain([SHORTEST]).collect();
+    read_one(section, &words, files)
+}
+
+fn read_one(
+    section: &Section<'_>,
+    words: &[&'static str],
+    files: &mut Vec<Located<String>>,
+) -> Result<Option<FeedDirection>, SceneError> {
+    let (word, direction) = match section.inline("direction") {
+        Some(table) if table.has("blend") => ("", Some(read_blend(&table, files)?)),
+        Some(table) => {
+            table.only(&["angle", "blend"], &[], "a direction")?;
+            let angle = table.required_number("angle", -360.0..=360.0, " degrees", 30.0)?;
+            ("", Some(FeedDirection::Angle(angle.value.to_radians())))
+        }
+        None => {
+            let word = section.word("direction", words)?.map_or(WORDS[0], |word| word.value);
+            (word, read_word(word, section, files)?)
+        }
+    };
+    for (key, wanted, what, cure) in [
+        (
+            "directions",
+            &["file"][..],
+            "a file that nothing reads",
+            "add `direction = \"file\"`, or delete it",
+        ),
+        ("guides", &["guide"], "curves that nothing follows", "add `direction = \"guide\"`, or delete it"),
+        (
+            "across",
+            &["guide", "border"],
+            "a sense of no curve",
+            "write `direction = \"guide\"` or \"border\", or delete it",
+        ),
+    ] {
+        if section.has(key) && !wanted.contains(&word) {
+            return Err(section.error(&section.key_span(key), format!("`{key}` names {what}"), cure));
+        }
+    }
+    Ok(direction)
+}
+
+/// The direction of a word with the keys that belong to it; `None` for the shortest path.
+fn read_word(
+    word: &str,
+    section: &Section<'_>,
+    files: &mut Vec<Located<String>>,
+) -> Result<Option<FeedDirection>, SceneError> {
+    let sense = || Ok(if section.flag("across")?.unwrap_or(false) { Sense::Across } else { Sense::Along });
+    Ok(Some(match word {
+        SHORTEST => return Ok(None),
+        "steepest" => FeedDirection::Steepest,
+        "contour" => FeedDirection::Contour,
+        "u" => FeedDirection::Parameter(Along::U),
+        "v" => FeedDirection::Parameter(Along::V),
+        "guide" => {
+            let cure = "write two or more different points for each curve: \
+                        `guides = [[[0, 0], [50, 10]], [[0, 40], [50, 45]]]`";
+            let curves = section.curves("guides")?;
+            if curves.is_empty() {
+                return Err(section.error(&section.key_span("direction"), "no `guides` to follow", cure));
+            }
+            if let Some(point) = curves.iter().find(|curve| curve.value.windows(2).all(|w| w[0] == w[1])) {
+                return Err(section.error(&point.span, "this guide curve has no length", cure));
+            }
+            let curves = Arc::new(curves.into_iter().map(|curve| curve.value).collect());
+            FeedDirection::Guides { curves, sense: sense()? }
+        }
+        "border" => FeedDirection::Border(sense()?),
+        "file" => {
+            let file = section.required_text("directions", "directions.txt")?;
+            let name = file.value.to_owned();
+            files.push(Located { value: name.clone(), span: file.span });
+            FeedDirection::File { name, samples: None }
+        }
+        _ => FeedDirection::WidestStrip,
+    }))
+}
+
+/// `{ blend = [{ direction = "steepest", weight = 2.0 }, ...] }`.
+fn read_blend(table: &Section<'_>, files: &mut Vec<Located<String>>) -> Result<FeedDirection, SceneError> {
+    table.only(&["blend"], &["angle"], "a blend of directions")?;
+    let keys: Vec<&str> = KEYS.into_iter().chain(["weight"]).collect();
+    let parts = table.sections("blend")?;
+    if parts.len() < 2 {
+        return Err(table.error(
+            &table.key_span("blend"),
+            "a blend takes two directions or more",
+            "write `blend = [{ direction = \"widest-strip\", weight = 2 }, { direction = \"steepest\" }]`",
+        ));
+    }
+    let read_part = |part: &Section<'_>| {
+        part.only(&keys, &[], "a direction of a blend")?;
+        if !part.has("direction") {
+            return part.required_word("direction", &WORDS).map(|_| (FeedDirection::WidestStrip, 0.0));
+        }
+        if part.inline("direction").is_some_and(|inner| inner.has("blend")) {
+            let cure = "give all directions and their weights in one blend";
+            return Err(part.error(&part.key_span("direction"), "a blend cannot be blended again", cure));
+        }
+        // The words leave the shortest path out, so that there is always a direction.
+        let direction = read_one(part, &WORDS, files)?.unwrap_or(FeedDirection::WidestStrip);
+        Ok((direction, part.number("weight", WEIGHT, "")?.map_or(1.0, |weight| weight.value)))
+    };
+    Ok(FeedDirection::Blend(parts.iter().map(read_part).collect::<Result<_, SceneError>>()?))
+}
+
+/// `direction = ...` and the keys that belong to it, joined by `separator`: lines of a toolpath, or entries of a table.
+pub(crate) fn write(out: &mut String, direction: &FeedDirection, separator: &str) -> fmt::Result {
+    let across = |sense: Sense| format!("across = {}", sense == Sense::Across);
+    let word = |out: &mut String, word: &str| write!(out, "direction = \"{word}\"");
+    match direction {
+        FeedDirection::Parameter(Along::U) => word(out, "u"),
+        FeedDirection::Parameter(Along::V) => word(out, "v"),
+        FeedDirection::Angle(angle) => {
+            write!(out, "direction = {{ angle = {} }}", toml_number(angle.to_degrees()))
+        }
+        FeedDirection::WidestStrip => word(out, "widest-strip"),
+        FeedDirection::Steepest => word(out, "steepest"),
+        FeedDirection::Contour => word(out, "contour"),
+        FeedDirection::File { name, .. } => {
+            write!(out, "direction = \"file\"{separator}directions = {}", toml_string(name))
+        }
+        // No scene spells samples that no file holds.
+        FeedDirection::Samples(_) => word(out, "file"),
+        FeedDirection::Guides { curves, sense } => {
+            let points = curves.iter().map(|curve| {
+                let points = curve.iter().map(|p| format!("[{}, {}]", toml_number(p.x), toml_number(p.y)));
+                format!("[{}]", points.collect::<Vec<_>>().join(", "))
+            });
+            let curves = points.collect::<Vec<_>>().join(", ");
+            write!(out, "direction = \"guide\"{separator}guides = [{curves}]{separator}{}", across(*sense))
+        }
+        FeedDirection::Border(sense) => write!(out, "direction = \"border\"{separator}{}", across(*sense)),
+        FeedDirection::Blend(parts) => {
+            write!(out, "direction = {{ blend = [")?;
+            for (k, (part, weight)) in parts.iter().enumerate() {
+                write!(out, "{}{{ ", if k > 0 { ", " } else { "" })?;
+                write(out, part, ", ")?;
+                write!(out, ", weight = {} }}", toml_number(*weight))?;
+            }
+            write!(out, "] }}")
+        }
+    }
+}

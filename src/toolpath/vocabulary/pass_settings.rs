@@ -1,0 +1,72 @@
+//! What every pass needs to know besides part and cutter.
+
+use super::Step;
+use crate::moves::chord::{Watch, reduce, sample_within_chord};
+use crate::moves::smooth::smooth_and_spread;
+use cutter::Cutter;
+use geometry::Point3;
+use motion::ToolAxis;
+use work::monitor::{Cancelled, Monitor};
+
+/// First sampling distance along a pass as a share of the cutter's radius: features narrower than
+/// that could hide between two samples of a pass.
+pub(crate) const SAMPLING_OVER_RADIUS: f64 = 0.15;
+
+/// Shares of the chord tolerance that sampling and point reduction may use. Together they leave a part of it: ridges stand
+/// between chords of two passes, and passes lie the closer the more chords may raise them.
+const SAMPLING_SHARE: f64 = 0.1;
+const REDUCTION_SHARE: f64 = 0.4;
+
+/// Where passes are spaced for a scallop, smoothing takes this share of the chord tolerance. With all of it there are 15 % fewer
+/// points, but 2 % of the ridges of a saddle stand over the target.
+const SMOOTHED_SHARE: f64 = 0.78;
+
+/// What every pass needs.
+#[derive(Debug, Clone, Copy)]
+pub struct PassSettings<'a> {
+    /// Distance of passes, already less what the chords may add.
+    pub step: Step,
+    /// First sampling distance along a pass, mm.
+    pub sampling: f64,
+    /// Chord tolerance, mm.
+    pub chord_tolerance: f64,
+    /// The sampling distance, mm, by which passes are smoothed; `None` leaves them as they are.
+    pub smoothing: Option<f64>,
+    /// How the cutter is tilted; upright without it.
+    pub axis: Option<&'a ToolAxis>,
+    /// The ball that is dropped in its stead where a tilted cutter, no ball itself, is located by the contacts of that.
+    pub probe: Option<&'a Cutter>,
+}
+
+impl<'a> PassSettings<'a> {
+    /// The cutter that is dropped.
+    pub fn dropped<'b>(&self, cutter: &'b Cutter) -> &'b Cutter
+    where
+        'a: 'b,
+    {
+        self.probe.unwrap_or(cutter)
+    }
+
+    /// Straight moves along `locate` over `[s0, s1]` within the chord tolerance.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so, which is asked every few hundred places.
+    pub fn moves(
+        &self,
+        s0: f64,
+        s1: f64,
+        locate: &mut dyn FnMut(f64) -> Option<Point3>,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Point3>, Cancelled> {
+        let fine = SAMPLING_SHARE * self.chord_tolerance;
+        let mut watch = Watch::new(monitor);
+        let points = sample_within_chord(s0, s1, self.sampling, fine, locate, &mut watch)?;
+        match self.smoothing {
+            Some(sampling) => {
+                let share = if let Step::Scallop(_) = self.step { SMOOTHED_SHARE } else { 1.0 };
+                smooth_and_spread(&points, sampling, share * (self.chord_tolerance - fine), &mut watch)
+            }
+            None => reduce(&points, REDUCTION_SHARE * self.chord_tolerance, &mut watch),
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! What every path is planned by: how far passes lie apart, tolerance, heights, rates, and how passes are joined.
+
+/// How far neighbouring passes lie apart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Step {
+    /// So that the scallop stays below this height, mm.
+    Scallop(f64),
+    /// This stepover, mm (measured as the strategy steps: in the plan view for zigzag, on the
+    /// surface for the others).
+    Stepover(f64),
+}
+
+/// How the end of a pass and the start of the next are joined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Links {
+    /// Along the surface where that is quicker, else by a retract.
+    Surface,
+    /// By retracts only.
+    Retract,
+}
+
+/// How passes become a program.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Joining {
+    /// What joins them.
+    pub links: Links,
+    /// No link on the surface is longer, mm; `None` takes [`LONGEST_LINK`](crate::LONGEST_LINK) intervals.
+    pub longest_link: Option<f64>,
+    /// Whether the points of each pass are smoothed and spread within the chord tolerance.
+    pub smoothing: bool,
+}
+
+impl Default for Joining {
+    fn default() -> Self {
+        Self { links: Links::Retract, longest_link: None, smoothing: false }
+    }
+}
+
+/// What every strategy needs to know besides part and cutter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlanSettings {
+    /// Distance of passes.
+    pub step: Step,
+    /// Largest distance between the straight moves and the exact path, mm.
+    pub chord_tolerance: f64,
+    /// Height of rapid moves above the highest point of part and stock, mm.
+    pub clearance: f64,
+    /// Highest point of the stock, mm.
+    pub stock_top: f64,
+    /// Feed along passes, mm/min.
+    pub feed_rate: f64,
+    /// Feed down to a pass, mm/min.
+    pub plunge_rate: f64,
+    /// Rapid rate, mm/min; it decides between links on the surface and retracts.
+    pub rapid_rate: f64,
+    /// How passes are smoothed and joined.
+    pub joining: Joining,
+}
+
+/// The scallop height that passes are planned for by default, mm: what finishing of moulds and dies leaves.
+const SCALLOP: f64 = 0.01;
+
+/// The chord tolerance by default, mm: a tenth of the scallop, so that ridges are those of passes. A greater one shows facets,
+/// a lesser one makes programs longer as its inverse root.
+const CHORD_TOLERANCE: f64 = 0.001;
+
+/// The clearance of rapid moves by default, mm: more than clamps and burrs bring stock out of place, and little air.
+const CLEARANCE: f64 = 2.0;
+
+/// The feed along passes by default, mm/min: one that a ball of 6 mm takes in steel.
+const FEED_RATE: f64 = 1000.0;
+
+/// The feed down to a pass by default, mm/min: a third or less of the feed along it, since the tip of a cutter hardly cuts.
+const PLUNGE_RATE: f64 = 300.0;
+
+/// The rapid rate by default, mm/min: that of a machining centre of today.
+const RAPID_RATE: f64 = 15_000.0;
+
+impl Default for PlanSettings {
+    /// Finishing by scallop height under stock whose highest point is at z = 0: set `stock_top` where stock is higher, or
+    /// rapid moves run through it.
+    fn default() -> Self {
+        Self {
+            step: Step::Scallop(SCALLOP),
+            chord_tolerance: CHORD_TOLERANCE,
+            clearance: CLEARANCE,
+            stock_top: 0.0,
+            feed_rate: FEED_RATE,
+            plunge_rate: PLUNGE_RATE,
+            rapid_rate: RAPID_RATE,
+            joining: Joining::default(),
+        }
+    }
+}
