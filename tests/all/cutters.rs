@@ -8,8 +8,8 @@ use millstream::motion::{ToolAxis, Toolpath};
 use millstream::part::{Part, Patch};
 use millstream::sim::{Grid, ZMap, cut};
 use millstream::toolpath::{
-    Joining, OffsetAlong, OffsetDrive, OffsetSurface, PlanSettings, Step, Strategy, Tilting, Zigzag,
-    ZigzagAngle, plan, plan_tilted,
+    Joining, OffsetAlong, OffsetDrive, OffsetSurface, PlanSettings, Step, Strategy, Tilting, Zigzag, plan,
+    plan_tilted,
 };
 
 /// A ball of 6 mm as `ball`, as `bull` with its radius at the corner, and by the seven words.
