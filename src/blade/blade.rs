@@ -4,6 +4,9 @@
 //! to the highest, `du × dv` outward, mm. A closed outline with round edges is one periodic spline, of which its sides are
 //! stretches; other outlines have a spline for each side. Splines may be faired before surfaces are laid through them,
 //! and offset in their planes (see [`loft_of_offsets`] for what that is worth).
+//!
+//! A blade has no upper side, so its patches keep the outward side that the sections give. Both sides are stretches of one
+//! spline, so that they meet with one tangent.
 
 use super::loft;
 use super::sections::{SectionError, SectionSides, Sections};

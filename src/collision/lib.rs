@@ -4,6 +4,10 @@
 //! nearest place of the meshes with its signed distance from the tool, for one location ([`Obstacle::clearance`]) or
 //! a whole move ([`Obstacle::swept_clearance`]).
 //!
+//! The distance from a convex piece is convex, so its gradient supports it over a box, a triangle and a stretch of a move. A
+//! tool that slides along a surface comes no nearer by its motion: its supporting plane moves along itself. A bound by speed
+//! alone would need far more looks. Cutter and holder are checked apart, because a cutter may cut in by a tolerance.
+//!
 //! Limits: only the surface of a mesh counts, closed or not. A tool wholly inside a closed mesh touches none of it; it
 //! reached that position through the surface, and the move that did so is reported.
 

@@ -15,6 +15,9 @@
 //! Passes are packed where `|∇ψ| = s`. A front has that everywhere (see [`super::eikonal`]) and pays for it by kinks and by
 //! the directions that its start leaves; here a little of the distance is given up where better directions are worth more.
 //!
+//! The cost `c` is the way of the cutter's centre and not that of the contact, since the machine follows the cutter. On a
+//! surface of curvatures ±κ the two prefer opposite directions.
+//!
 //! Functions that may bend sharply from place to place take a [`Roughness`] as well; ends of passes at borders may have a
 //! price ([`minimise_priced`]), and `c` may hold one of turning.
 //!

@@ -8,6 +8,8 @@
 //! coefficient; CG and GMRES run on the singular but consistent equations, and the dense singular
 //! value decomposition takes the solution of least norm. All work runs on the calling thread: at
 //! these sizes threads cost more than they save, and bits do not depend on their number.
+//!
+//! A factorisation that succeeds does not prove full rank. So the true residual of every result is checked.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;

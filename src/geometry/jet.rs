@@ -3,6 +3,8 @@
 //!
 //! Sign of curvature throughout the crate: positive where the surface is concave toward its
 //! normal (the inside of a bowl seen from above), negative where it is convex (a dome).
+//!
+//! With this sign cutter and surface are compared by a plain difference of curvatures.
 
 use super::{Point3, Vector3};
 

@@ -5,6 +5,8 @@
 //! `(w x, w y, w z, w)`; derivatives follow Piegl & Tiller, *The NURBS Book* (1997), A3.6 and
 //! eq. 4.20. Where an inner knot stands `degree` times the patch may have a crease; a jet there is
 //! that of the side toward greater parameters.
+//!
+//! The core is our own, because evaluations must not allocate.
 
 use super::bspline::{KnotError, KnotVector, MAX_BASIS};
 use super::{Aabb, Isometry3, Jet2, MAX_COORDINATE, Point3, Vector3};

@@ -4,6 +4,8 @@
 //! of the move that cut a cell last, 32-bit whole number, 4294967295 where none did. Row 0 of the
 //! picture holds the greatest y, as pictures are looked at. One text attribute, `millstream`, holds
 //! JSON: `cell_mm`, `origin_mm` (centre of the cell at the lower left), `unit`.
+//!
+//! Lines are compressed on the calling thread, because the crate's own threads ignore the thread number that the user asks for.
 
 use std::io::{self, Cursor};
 

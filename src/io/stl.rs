@@ -7,6 +7,8 @@
 //!
 //! A file whose length fits its count is binary whatever its header says: many binary files begin
 //! with "solid". A file that was cut off is refused, never read in part.
+//!
+//! The reader is our own: the common crate silently drops further solids and accepts NaN.
 
 #[cfg(test)]
 mod tests;

@@ -4,6 +4,9 @@
 //! of the circumference in contact with stock. The path is gone through once more, in its order, on cells
 //! that know the lowest height to which the cutter's cylinder has come, and when. Corners of bull cutters
 //! and balls count as cylinders of the same radius; mm, rad. Nothing here knows how a path was planned.
+//!
+//! The angle is measured along the circumference. The extent of a move's cells across its direction is no angle in corners, where
+//! the stock is ahead of the cutter and not beside it.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 

@@ -10,6 +10,9 @@
 //! circular section: the chord between the contacts, and the design's curvature across the feed. It takes the balls to touch
 //! the design, so that it knows nothing of chords, and takes the passes to be parallel.
 //!
+//! Newton's method searches both tracks at once. Letting the ridge and the nearest centres find each other in turn does not
+//! converge: where the design's normal is not square to the tracks, both wander along them.
+//!
 //! Turns of a spiral are one pass: all their ridges are those of a pass with itself.
 
 mod calculator;

@@ -10,6 +10,9 @@
 //! crossing of a line along x, pitch times `|n_x|`, `n` the ridge's plan normal (the sum over both
 //! families of lines gives the length of any curve: `ds = |n_x||dy| + |n_y||dx|`), stretched by its
 //! rise.
+//!
+//! A ridge over a sloping border leans out over it, and its nearest design point lies on the border, farther away than the
+//! ridge is high. There the height is taken along the border's normal.
 
 use super::cut_surface::CutSurface;
 use super::figures::{Limits, NUMERICAL_FLOOR, ScallopFigures};

@@ -11,6 +11,9 @@
 //! − mean line| and Rz the greatest less the least height, each the mean of five sampling lengths in a row, as ISO 4287 (now ISO
 //! 21920-2) has it. Lengths of several intervals leave heights that differ from pass to pass in the figures.
 //!
+//! Profiles are read by rays along the normals, whatever engine cut. Ridges end the intervals, so that sampling lengths hold
+//! whole intervals and no filter is needed.
+//!
 //! Closed forms: a parabola of height h has Ra = 4h/(9√3) and Rz = h.
 
 use serde::Serialize;

@@ -15,6 +15,14 @@
 //! at or above `h_b` at the four corners, j lies at or above b in all of the square, and can go. The same
 //! holds with the level of the stock in place of b. No curvature enters, and no case is left out:
 //! plunges, moves of no length and moves beside the stock have convex heights too.
+//!
+//! # Choices
+//! The bound serves all cutters with one engine. Where the place on the track is at the end of a move in all of a square, the
+//! neighbour in the program cuts as low, and the move goes too: short chords cost little more than long ones.
+//!
+//! Heights in a leaf are f32 in coordinates of the tile. Where their rounding matters (walls, rims, steep tracks, unsettled
+//! places on a torus) the leaf is worked out again in f64. Deep tiles and large cutters are cut in f64 throughout.
+//! Barrels, whose place on the track has no closed form, go through [`cut_reference`](super::cut_reference).
 
 mod choose;
 mod leaf;

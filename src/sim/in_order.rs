@@ -10,6 +10,12 @@
 //! beneath that plane (`bound`). It cuts leaves of 8 × 8 cells (`leaf`), whose heights come from the
 //! vector loops of the engine without order, and from the closed forms of [`SweptMove`](super::SweptMove)
 //! where those leave a doubt (`heights`).
+//!
+//! A move leaves out the places that it cuts from its very start, since the move before cut them. A torus is tried first
+//! where the move ends: most cells of a short move are cut from there, and its slope bounds the height of the others.
+//!
+//! Volumes are differences of stored heights, so that they add up to the stock removed. The bound of the total is half a cell
+//! times the variation of the heights before and after.
 
 mod bound;
 mod contact;

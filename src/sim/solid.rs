@@ -9,6 +9,10 @@
 //! solid is a convex function of the place. Its supporting plane at one time and a bound on how the curve
 //! bends therefore bound the distance from below at all other times, which both the tree and the search
 //! for the nearest time rest on.
+//!
+//! A bound by speed alone would need many more looks. The tree holds the track of one point of the tool and a mean axis. Boxes
+//! around the whole leaning tool would be so large that every place lies in them. A move that turns the axis to its
+//! opposite is refused, since nothing says which way round.
 
 mod moves;
 mod search;

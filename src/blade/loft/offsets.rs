@@ -4,6 +4,9 @@
 //! trimmed. Where only some of the sections have a corner, the others are broken at the corresponding place: at the share of
 //! the section's length (of the curve that is offset) that lies between those of the corners above and below, or the same as
 //! the nearest one. Neighbouring surfaces then share an edge that fades into a smooth line.
+//!
+//! Offset sections stand `d cos φ` off the surface instead of `d`, however many sections there are; φ is the angle between
+//! the surface's normal and the plane of the sections. [`offset::OffsetSurface`] is the true offset.
 
 use super::{LoftError, LoftSection, check, loft};
 use crate::loft::Loft;

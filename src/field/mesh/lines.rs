@@ -10,6 +10,8 @@
 //! neighbours compared by parallel transport (Knöppel, Crane, Pinkall and Schröder, "Globally optimal
 //! direction fields", 2013); oriented like arrows as far as that is possible, and the singular points
 //! at which it is not.
+//!
+//! A singular point of index 1 costs more than two of index ½. So smoothing parts a centre or a source into two.
 
 use faer::c64;
 

@@ -11,6 +11,9 @@
 //! Order. The *first* rotary axis is the one nearer to the workpiece, the *second* the one nearer to the
 //! cutter. So in all three families the tool axis is a = R₁(θ₁) R₂(θ₂) z, and the first axis is free
 //! where a is parallel to its direction (the singular poses).
+//!
+//! Where a move runs through a singular pose a location is put in. The first axis turns there while the tip stays in place.
+//! Machining time knows the rates of the rotary axes, not those of the single linear axes.
 
 mod angles;
 mod choice;

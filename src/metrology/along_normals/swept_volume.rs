@@ -1,4 +1,7 @@
 //! The cut as the volume that the tool swept, whatever engine tells where a line meets it.
+//!
+//! A normal through a thin trailing edge comes out on the far side, where the passes of that side have cut everything. So cuts
+//! are looked for close to the design first. A deeper one counts only as far as a ball fits inside the part.
 
 use super::{AlongNormal, NormalHit};
 use cutter::Solid;

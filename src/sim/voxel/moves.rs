@@ -8,6 +8,9 @@
 //! tools that centre is seen at spots no farther apart than that curve leaves its chord, a place e beside it
 //! by up to half the turn times e more, and a distance differs by no more than that. A solid of several
 //! pieces is not convex: there a distance changes by no more than the place moves.
+//!
+//! The tool that keeps the mean axis slides along a chord, so that the slack is of second order in the turn. With the mean
+//! axis alone it would be of first order. Distances at corners must not be capped: a capped distance is not convex.
 
 use super::slide::{StandIn, slide};
 use crate::solid::{Motion, Nearest, OppositeAxes, below};

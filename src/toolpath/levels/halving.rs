@@ -3,6 +3,8 @@
 //! Whole passes run along levels that `spacing` has placed. Where the surface or the field asks for
 //! a smaller interval than the levels leave, further passes are put halfway between them, only
 //! along the stretches that need one, and between those again.
+//!
+//! Kinks may be narrower than the points of a curve are apart. So the places between two points are checked too.
 
 use crate::moves::touch::Touch;
 use crate::vocabulary::{Contact, Passes, PlanError};

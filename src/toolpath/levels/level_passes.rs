@@ -2,6 +2,8 @@
 //!
 //! Curves are traced a little beyond the chart, on its continuation, and every place of the cutter comes
 //! from dropping it onto the part. Which levels and stretches are cut is decided in `halving`.
+//!
+//! A pass just outside the border serves a strip inside it. So curves go on beyond the border.
 
 use super::halving::{Allowed, LevelSource, Track, along_and_between};
 use super::spacing::{LevelSteps, level_tangent, place_levels, places_of};

@@ -11,6 +11,9 @@
 //!
 //! Times are those of length over rate; what the machine loses in corners is left out, which favours
 //! retracts a little.
+//!
+//! Links on the surface and smoothing are off unless a scene asks for them: bends beside the part change what closed forms
+//! say about its border.
 
 mod bend;
 mod ceiling;

@@ -1,4 +1,7 @@
 //! Turns a curve of cutter locations into straight moves within a chord tolerance.
+//!
+//! Places are sampled more finely than the chord tolerance and then thinned. Corners move half way to where the chords cut
+//! short, so that the curve runs on both sides of its moves. Where one side is straight, nothing moves.
 
 use geometry::{Point3, Vector3, distance_to_segment};
 use work::monitor::{self, Cancelled, Monitor};

@@ -7,6 +7,10 @@
 //! the longest whose loop keeps to the limit. Loops grow from cleared ground: a run that would begin in stock
 //! is opened by a helix where there is room. Every place is asked for the angle of the circumference in stock
 //! before the cutter goes there ([`Cleared`]); mm, rad.
+//!
+//! Loops may be anywhere in the piece and not only within their nest: thin nests leave them no room. A loop cannot grow out
+//! of a single disc, whose far side moves at right angles to its heading; hence the helix. Past the end of a line of a
+//! zigzag the link along the wall goes to the side of its loops and finds ground to begin in.
 
 use std::f64::consts::{PI, TAU};
 

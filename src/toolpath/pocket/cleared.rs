@@ -3,6 +3,9 @@
 //! Enters: places of the cutter's centre, one after the other. Leaves: at any further place and heading the
 //! angle of the front half of the circumference that meets stock. The ground cleared is the union of the
 //! discs about those places, in closed form; mm, rad.
+//!
+//! The heading is that of the straight side that the cutter runs. In a small loop it differs from the circle's by half the
+//! angle between two sides. So thinning keeps the headings.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

@@ -1,4 +1,7 @@
 //! The stream function with the shortest path on a mesh: as `shortest`, by linear elements.
+//!
+//! The gradient of linear elements jumps from triangle to triangle, so ψ is judged by recovered gradients. A little stiffness
+//! keeps it from kinks.
 
 use std::f64::consts::PI;
 

@@ -9,6 +9,13 @@
 //!
 //! What a machine has to turn counts as a little length: along passes that the surface bends, and at their ends.
 //!
+//! Fronts from the four borders are further starts, because each start leads to a minimum of its own. Where an
+//! iso-scallop path is shorter than the best of them, it is taken.
+//!
+//! Stiffness of ψ alone would leave passes where the surface bends most, since the cutter's way is shortest there. It does not
+//! see that each further pass costs half a turn. So turning has a price. The remainder of the last pass is drawn in to a
+//! whole number of passes by a higher price of ends; the shorter of both paths is taken.
+//!
 //! Enters: a part and the scallop height. Leaves: passes. Lengths in mm; planned to second order, as [`super::strip`]
 //! is.
 

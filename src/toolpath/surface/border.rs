@@ -1,5 +1,8 @@
 //! Where the part ends: a cutter that touches its border rolls over an edge instead of cutting a
 //! surface.
+//!
+//! A zigzag pass ends where the cutter has rolled over the border by more than one stepover. Passes that end at the border itself
+//! leave slivers where they meet it at a small angle.
 
 use std::collections::HashMap;
 

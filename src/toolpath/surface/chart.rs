@@ -3,6 +3,8 @@
 //! Patches are planned on as they are. A mesh has no curvature, so a bicubic B-spline height
 //! surface z(x, y) is fitted to it; directions and distances of passes come from that surface,
 //! while heights of cutter locations always come from dropping the cutter on the mesh itself.
+//!
+//! A chart carries the rule for the tool axis, so that every strip is that of the cutter as it leans.
 
 use super::mesh_surface;
 use crate::vocabulary::{Along, FeedDirection, PlanError, Step};

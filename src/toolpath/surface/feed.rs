@@ -3,6 +3,11 @@
 //!
 //! Curves say something beside them only. Elsewhere the field is the smoothest line field that they allow
 //! ([`smooth_lines`]), on a mesh of the part or of the chart.
+//!
+//! At a corner of the border its bisector says in which sense the field turns. Along the mitre inside the corner the
+//! bisector of what both sides want says it. Without them both senses are equally good, and the orientation breaks.
+//!
+//! A blend is the mean of doubled angles, because a direction and its opposite are the same pass.
 
 use std::borrow::Cow;
 use std::sync::Arc;

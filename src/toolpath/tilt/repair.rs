@@ -3,6 +3,13 @@
 //! Enters: the touches of a pass, what the tool must keep away from, mm, rad. Leaves: the touches, changed no more than it
 //! takes, in one pass or in several where a stretch cannot be reached, and what was changed. Moves between the touches that
 //! leave are clear.
+//!
+//! Axes are tried on rings around the rule's axis, the smallest tilt first, and follow the touch before. Each has a little to
+//! spare, so that the moves between them touch nothing. Stock is not considered: between passes the tool feeds beside
+//! the part, or goes outside the block.
+//!
+//! Curvature tells the lead that frees the rear of a flat near the contact only. On the far side of a trough the
+//! distance from the part finds the gouge.
 
 use super::tilted::ABOVE_SURFACE;
 use crate::moves::touch::Touch;

@@ -5,6 +5,12 @@
 //! Between two locations the tip runs straight and the axis turns evenly. What cuts is the cutter's arc,
 //! so its strays count: that of the arc's centre height on the axis, and the turn of the axis times the
 //! distance of the arc from it, which is none for a ball.
+//!
+//! Contacts are kept until the passes are ordered: a lead leans the other way on a pass that is cut backwards.
+//!
+//! Where cutters are dropped, a ball is tilted around its centre, so that every strategy serves five axes. For other
+//! cutters a ball as large as their corner is dropped and gives contact and normal; its normal turns over an edge as the ball
+//! rolls. Beside the border of a mesh its plane goes on, because a flat rolled over an edge would lean out.
 
 use crate::moves::chord::{Side, Watch, moved_aside, reduced_indices, sample_within_chord};
 use crate::moves::smooth::smooth_and_spread_tilted;

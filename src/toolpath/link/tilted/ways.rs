@@ -10,6 +10,9 @@
 //! The way out along the axis, which the cutter has come free of, and what is outside of the block are run at rapid rate. In the
 //! block the tool comes in at the feed, for stock may stand where it comes.
 //!
+//! The height aloft is the least at which the straight way stays clear of the part, on its outer side where there is no surface
+//! to meet.
+//!
 //! All but the last are proved clear, move by move, of all that the tool is to keep away from; the last is taken where it is
 //! the quickest and clear too, or where nothing else is. Times are length over rate.
 
