@@ -408,32 +408,27 @@ fn results_that_cannot_be_written_are_told_and_the_scene_stays() {
     assert_eq!(std::fs::read_to_string(home.path().join("plate.toml")).unwrap(), PLATE);
 }
 
-/// Ctrl-C at moments all over a run that would take a minute: status 2, within seconds, and no file.
+/// Ctrl-C at moments all over a run that would take a minute: status 2, and no file. A run that went on would end with
+/// another status.
 #[cfg(unix)]
 #[test]
 fn an_interrupted_run_leaves_nothing() {
     use crate::command::{Answer, command};
-    use std::time::{Duration, Instant};
-
-    /// Far beyond what stopping takes on a busy machine, and far below the whole run.
-    const PATIENCE: Duration = Duration::from_secs(10);
+    use std::time::Duration;
 
     let scene = WAVE.replace("x = [-2, 6]", "x = [0, 250]").replace("y = [0, 3]", "y = [0, 250]");
     let home = home_with(&scene);
     for delay_ms in [0, 200, 1000] {
-        let child = command(home.path(), &["run", "plate.toml", "--out", "deep/out"]).spawn().unwrap();
+        let mut child = command(home.path(), &["run", "plate.toml", "--out", "deep/out"]).spawn().unwrap();
         // The scratch folder shows that scene and part were read and signals are listened to.
-        let begun = Instant::now();
         while entries(home.path()).len() < 2 {
-            assert!(begun.elapsed() < PATIENCE, "the run does not begin");
+            assert!(child.try_wait().unwrap().is_none(), "the run ends before it begins");
             std::thread::sleep(Duration::from_millis(5));
         }
         std::thread::sleep(Duration::from_millis(delay_ms));
-        let asked = Instant::now();
         let kill = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status();
         assert!(kill.unwrap().success());
         let answer = Answer::from(child.wait_with_output().unwrap());
-        assert!(asked.elapsed() < PATIENCE, "{:?} after {delay_ms} ms", asked.elapsed());
         assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{answer:?}");
         assert!(answer.stderr.contains("interrupted; nothing was written"), "{}", answer.stderr);
         assert_eq!(entries(home.path()), ["plate.toml"]);
