@@ -49,7 +49,7 @@ fn path(cutter: &Cutter, lead: Option<f64>) -> Toolpath {
     let mut moves =
         (0..rows).flat_map(row).map(|to| Move { to, kind: MoveKind::Cut, feed_rate: 1000.0, pass: 0 });
     let start = moves.next().expect("a pass has places").to;
-    Toolpath { start, moves: moves.collect() }
+    Toolpath::new(start, moves.collect())
 }
 
 fn tool(name: &str) -> (Cutter, Option<f64>) {

@@ -21,15 +21,15 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let tip = |x: f64, y: f64, z: f64| ClPoint::upright(Point3::new(x, y, z));
     let to = |x, y, z, kind, pass| Move { to: tip(x, y, z), kind, feed_rate: 1000.0, pass };
-    let path = Toolpath {
-        start: tip(-4.0, 0.0, 5.0),
-        moves: vec![
+    let path = Toolpath::new(
+        tip(-4.0, 0.0, 5.0),
+        vec![
             to(-4.0, 0.0, 0.0, MoveKind::Plunge, 0),
             to(24.0, 0.0, 0.0, MoveKind::Cut, 0),
             to(24.0, 1.0, 0.0, MoveKind::Link, 1),
             to(-4.0, 1.0, 0.0, MoveKind::Cut, 1),
         ],
-    };
+    );
 
     let (cell, memory) = (0.05, 64 << 20);
     let grid = Grid::covering(&part.bounds(), cell, 80, memory)?;

@@ -24,7 +24,7 @@ pub fn wave([low, high]: [f64; 2], stepover: f64, chord: f64) -> Toolpath {
     let mut moves =
         (0..rows).flat_map(pass).map(|to| Move { to, kind: MoveKind::Cut, feed_rate: 1000.0, pass: 0 });
     let start = moves.next().expect("a pass has places").to;
-    Toolpath { start, moves: moves.collect() }
+    Toolpath::new(start, moves.collect())
 }
 
 /// A block over a square, higher than the wave.

@@ -77,7 +77,7 @@ pub(super) mod tests {
             step(at(4.0, 2.5, 2.0), MoveKind::Retract, 1200.0),
             step(at(4.0, 2.5, 10.0), MoveKind::Rapid, 0.0),
         ];
-        Toolpath { start: at(0.0, 0.0, 10.0), moves }
+        Toolpath::new(at(0.0, 0.0, 10.0), moves)
     }
 
     /// Moves of all kinds and feeds; one axis, two, three or none of them changes.
@@ -95,7 +95,7 @@ pub(super) mod tests {
             let feed_rate = if rng.below(2) == 0 { 1200.0 } else { rng.within(1.0, 5000.0) };
             Move { to: ClPoint::upright(tip), kind: kinds[rng.below(4)], feed_rate, pass: 0 }
         });
-        Toolpath { start, moves: moves.collect() }
+        Toolpath::new(start, moves.collect())
     }
 
     #[test]

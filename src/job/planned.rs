@@ -26,8 +26,6 @@ pub(crate) struct Planned {
     pub strategy: Box<dyn Strategy>,
     /// The path in the joints of a five-axis machine.
     pub joints: Option<JointPath>,
-    /// The line of each move in the program; empty where there is none.
-    pub lines: MoveLines,
     /// Engagement in a pocket, and the bound of its greatest angle, rad.
     pub engaged: Option<(Engagement, f64)>,
 }
@@ -61,8 +59,8 @@ impl Session {
         }
         let joints = joints(scene, &request.name, &plan.path)?;
         let engaged = self.limit_feed(request, &mut plan.path, monitor)?;
-        let lines = lines(scene, &plan.path, joints.as_ref())?;
-        Ok(Planned { plan, strategy, joints, lines, engaged })
+        plan.path.origin.lines = lines(scene, &plan.path, joints.as_ref())?;
+        Ok(Planned { plan, strategy, joints, engaged })
     }
 
     fn path(

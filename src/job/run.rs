@@ -53,15 +53,14 @@ impl Run<'_> {
 
     /// The line of toolpath.nc that a move stands in; 0 where there is no program.
     pub fn line(&self, move_index: u32) -> u32 {
-        self.planned.lines.get(move_index as usize).copied().unwrap_or_default()
+        self.path().line_of(move_index as usize).unwrap_or_default()
     }
 
     /// `, toolpath.nc line N`, where there is a program.
     pub fn program_line(&self, move_index: u32) -> String {
-        match self.planned.lines.get(move_index as usize) {
-            Some(line) => format!(", toolpath.nc line {line}"),
-            None => String::new(),
-        }
+        self.path()
+            .line_of(move_index as usize)
+            .map_or_else(String::new, |line| format!(", toolpath.nc line {line}"))
     }
 
     /// For voxels that do not fit.

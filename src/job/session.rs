@@ -113,7 +113,7 @@ impl Session {
             .measure(&task, monitor)
             .map_err(|reason| JobError::engine(scene, &request.name, reason))?;
         for region in &mut measured.measurement.gouge.regions {
-            region.line = planned.lines.get(region.move_index as usize).copied().unwrap_or_default();
+            region.line = planned.plan.path.line_of(region.move_index as usize).unwrap_or_default();
         }
         let run = Run {
             session: self,

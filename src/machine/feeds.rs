@@ -56,7 +56,7 @@ pub fn slow_corners(path: &Toolpath, machine: &Machine) -> Toolpath {
         let ends = [sharp(Some(block), before), sharp(after, after.map(kind))];
         slowed(&mut moves, path.location_before(k), step, block, peak, ends, machine);
     }
-    Toolpath { start: path.start, moves }
+    Toolpath::new(path.start, moves)
 }
 
 /// Appends a move that reaches the speed `peak`, with the squared speeds of its sharp ends.

@@ -111,6 +111,6 @@ mod fixture {
         let mut tips = tips.into_iter().map(|t| ClPoint::upright(Point3::from(t)));
         let start = tips.next().unwrap();
         let moves = tips.map(|to| Move { to, kind: MoveKind::Cut, feed_rate: 6000.0, pass: 0 }).collect();
-        Toolpath { start, moves }
+        Toolpath::new(start, moves)
     }
 }

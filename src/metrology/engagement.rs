@@ -206,7 +206,7 @@ mod tests {
         };
         let mut moves = vec![to(&places[0], MoveKind::Plunge)];
         moves.extend(places[1..].iter().map(|p| to(p, MoveKind::Cut)));
-        Toolpath { start: ClPoint::upright(Point3::new(places[0].0, places[0].1, 5.0)), moves }
+        Toolpath::new(ClPoint::upright(Point3::new(places[0].0, places[0].1, 5.0)), moves)
     }
 
     fn arcs(places: &[(f64, f64)]) -> ContactArcs {

@@ -13,7 +13,7 @@ pub(super) fn path(passes: &[Vec<Point3>]) -> Toolpath {
             moves.push(Move { to: ClPoint::upright(*tip), kind, feed_rate: 1000.0, pass: pass as u32 });
         }
     }
-    Toolpath { start: ClPoint::upright(passes[0][0]), moves }
+    Toolpath::new(ClPoint::upright(passes[0][0]), moves)
 }
 
 /// A level rectangle from the origin, mm.

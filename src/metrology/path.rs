@@ -61,16 +61,16 @@ mod tests {
 
     #[test]
     fn lengths_and_turns_of_a_square_pass() {
-        let path = Toolpath {
-            start: ClPoint::upright(Point3::new(0.0, 0.0, 5.0)),
-            moves: vec![
+        let path = Toolpath::new(
+            ClPoint::upright(Point3::new(0.0, 0.0, 5.0)),
+            vec![
                 to(0.0, 0.0, 0.0, MoveKind::Plunge, 0),
                 to(10.0, 0.0, 0.0, MoveKind::Cut, 0),
                 to(20.0, 1.0, 0.0, MoveKind::Cut, 0),
                 to(20.0, 10.0, 0.0, MoveKind::Cut, 0),
                 to(20.0, 10.0, 5.0, MoveKind::Retract, 0),
             ],
-        };
+        );
         let figures = path_figures(&path, 7.0);
         assert!((figures.cutting_length_mm - (10.0 + 101f64.sqrt() + 9.0)).abs() < 1e-12);
         assert_eq!(figures.air_length_mm, 10.0);
@@ -95,7 +95,7 @@ mod tests {
             to(10.0, 4.0, 0.0, MoveKind::Cut, 2),
             to(10.0, 4.0, 5.0, MoveKind::Rapid, 2),
         ]);
-        let path = Toolpath { start: ClPoint::upright(Point3::new(0.0, 0.0, 5.0)), moves };
+        let path = Toolpath::new(ClPoint::upright(Point3::new(0.0, 0.0, 5.0)), moves);
         let figures = path_figures(&path, 0.0);
         assert_eq!((figures.surface_links, figures.retracts, figures.sharp_turns), (1, 1, 0));
         assert!((figures.total_turning_rad - PI).abs() < 1e-9, "{}", figures.total_turning_rad);

@@ -148,10 +148,10 @@ mod tests {
                 feed_rate: 1.0,
                 pass: 0,
             };
-            let path = Toolpath {
-                start: ClPoint::upright(Point3::new(10.0, 10.0, 5.0)),
-                moves: vec![to(10.0, 10.0, -2.0), to(10.0, y, -2.0), to(x, y, -2.0)],
-            };
+            let path = Toolpath::new(
+                ClPoint::upright(Point3::new(10.0, 10.0, 5.0)),
+                vec![to(10.0, 10.0, -2.0), to(10.0, y, -2.0), to(x, y, -2.0)],
+            );
             let stock = cut(ZMap::block(grid, 0.0), &cutter, &path, &Silent).unwrap();
             let cells = wall_gouge_of_cells(&region, &stock, 0.0);
             (wall_gouge_of_moves(&region, &cutter, &path, 0.0), cells)

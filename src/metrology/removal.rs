@@ -205,7 +205,7 @@ mod tests {
         moves.extend((0..30).map(|k| to(f64::from(k - 4), -2.0, MoveKind::Cut)));
         moves.push(to(25.0, rapid_height, MoveKind::Retract));
         moves.push(to(35.0, rapid_height, MoveKind::Rapid));
-        let path = Toolpath { start: tip(-5.0, 5.0), moves };
+        let path = Toolpath::new(tip(-5.0, 5.0), moves);
         let grid = Grid { origin: Point2::new(0.025, 0.025), cell: 0.05, nx: 800, ny: 400 };
         let stock = ZMap::block(grid, 0.0);
         let removal = cut_in_order(stock, &Cutter::flat(6.0).unwrap(), &path, &Silent).unwrap();

@@ -9,5 +9,5 @@
 mod path;
 mod tool_axis;
 
-pub use path::{CcPoint, ClPoint, Move, MoveKind, Toolpath};
+pub use path::{CcPoint, ClPoint, Move, MoveKind, Origin, Toolpath};
 pub use tool_axis::{AxisError, ToolAxis, in_tool_frame, location};

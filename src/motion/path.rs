@@ -77,6 +77,15 @@ pub struct Move {
     pub pass: u32,
 }
 
+/// Where the moves of a path stand in a program. The pass that a move belongs to is the move's own.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Origin {
+    /// Number of the tool; 0 where no program names one.
+    pub tool: u32,
+    /// The line of each move, counted from 1; empty where there is no program.
+    pub lines: Vec<u32>,
+}
+
 /// A program for one cutter: a start and the moves from there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Toolpath {
@@ -84,9 +93,21 @@ pub struct Toolpath {
     pub start: ClPoint,
     /// The moves, in program order; a move's index is its name in maps and reports.
     pub moves: Vec<Move>,
+    /// Where they stand in a program.
+    pub origin: Origin,
 }
 
 impl Toolpath {
+    /// Moves that stand in no program yet.
+    pub fn new(start: ClPoint, moves: Vec<Move>) -> Self {
+        Self { start, moves, origin: Origin::default() }
+    }
+
+    /// The line of the program that a move stands in; `None` without a program.
+    pub fn line_of(&self, move_index: usize) -> Option<u32> {
+        self.origin.lines.get(move_index).copied()
+    }
+
     /// Number of moves.
     pub fn len(&self) -> usize {
         self.moves.len()

@@ -48,7 +48,7 @@ pub fn path_through(tips: impl IntoIterator<Item = Point3>) -> Toolpath {
     let mut tips = tips.into_iter().map(ClPoint::upright);
     let start = tips.next().unwrap();
     let moves = tips.map(|to| Move { to, kind: MoveKind::Cut, feed_rate: 1000.0, pass: 0 }).collect();
-    Toolpath { start, moves }
+    Toolpath::new(start, moves)
 }
 
 /// Level, gentle, steep and vertical moves and moves of no length, of lengths from 1e-9 to tens of

@@ -85,15 +85,15 @@ fn a_planted_gouge_is_found_with_its_depth_place_and_move() {
         feed_rate: 1000.0,
         pass: 0,
     };
-    let path = Toolpath {
-        start: ClPoint::upright(Point3::new(4.03, 7.01, 5.0)),
-        moves: vec![
+    let path = Toolpath::new(
+        ClPoint::upright(Point3::new(4.03, 7.01, 5.0)),
+        vec![
             at(4.03, 7.01, 0.0, MoveKind::Plunge),
             at(9.0, 7.01, 0.0, MoveKind::Cut),
             at(11.013, 9.537, -0.032, MoveKind::Cut),
             at(13.0, 12.0, 0.0, MoveKind::Cut),
         ],
-    };
+    );
     for cell in [0.05, 0.2] {
         let m = cut_and_measure(&part, &cutter, &path, cell, &Limits { uncut: 10.0, ..LIMITS });
         assert_eq!(m.gouge.region_count, 1);
@@ -111,7 +111,7 @@ fn a_rapid_through_the_part_is_a_gouge() {
     let cutter = Cutter::ball(6.0).unwrap();
     let to = Point3::new(25.0, 10.0, -0.1);
     let rapid = Move { to: ClPoint::upright(to), kind: MoveKind::Rapid, feed_rate: 0.0, pass: 0 };
-    let path = Toolpath { start: ClPoint::upright(Point3::new(-5.0, 10.0, -0.1)), moves: vec![rapid] };
+    let path = Toolpath::new(ClPoint::upright(Point3::new(-5.0, 10.0, -0.1)), vec![rapid]);
     let m = cut_and_measure(&part, &cutter, &path, 0.1, &LIMITS);
     assert!((m.gouge.max_depth_mm - 0.1).abs() < 1e-6);
     assert_eq!(m.gouge.regions[0].move_index, 0);

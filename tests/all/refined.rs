@@ -38,7 +38,7 @@ fn passes(lines: &[f64], dip: Option<(usize, f64)>) -> Toolpath {
         moves.push(to(9.0, 0.0, MoveKind::Cut));
         moves.push(to(9.0, 5.0, MoveKind::Retract));
     }
-    Toolpath { start: tip(-5.0, -5.0, 5.0), moves }
+    Toolpath::new(tip(-5.0, -5.0, 5.0), moves)
 }
 
 /// Centres at the odd multiples of half a cell.

@@ -43,7 +43,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     let vertices: Vec<[f32; 3]> =
         surface.vertices.iter().map(|p| p.coords.map(|c| c as f32).into()).collect();
     // Square edges cost the voxels' volume a little, before and after alike.
-    let uncut = Toolpath { start: ClPoint::upright(stock.bounds().max), moves: Vec::new() };
+    let uncut = Toolpath::new(ClPoint::upright(stock.bounds().max), Vec::new());
     let untouched = VoxelEngine::new(&stock, &tool, &uncut).map_err(run.voxels())?;
     let whole =
         |voxel| Ok::<f64, JobError>(untouched.cut(voxel, left, monitor).map_err(run.voxels())?.volume());

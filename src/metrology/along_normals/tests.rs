@@ -153,7 +153,7 @@ fn by_both(
 ) -> [(Measurement, NormalMap); 2] {
     let step = |pass: usize, to: ClPoint| Move { to, kind: MoveKind::Cut, feed_rate: 1e3, pass: pass as u32 };
     let moves = locations.iter().enumerate().flat_map(|(k, pass)| pass.iter().map(move |&at| step(k, at)));
-    let path = Toolpath { start: locations[0][0], moves: moves.collect() };
+    let path = Toolpath::new(locations[0][0], moves.collect());
     let solid = Solid::of_cutter(cutter, None);
     let reach = 0.6;
     let geometry::Aabb { min, max } = part.bounds();

@@ -251,7 +251,7 @@ mod tests {
                 ClPoint { tip: Point3::new(0.01 * f64::from(k), 0.05 * f64::from(k), 0.0), axis }
             };
             let move_to = |k| Move { to: at(k), kind: MoveKind::Cut, feed_rate: 1000.0, pass: 0 };
-            let path = Toolpath { start: at(-4), moves: (-3..=4).map(move_to).collect() };
+            let path = Toolpath::new(at(-4), (-3..=4).map(move_to).collect());
             let calculator = Calculator::new(&part, &Cutter::ball(6.0).unwrap(), &path);
             let ball =
                 |k: usize, t: f64| calculator.ball(&path.location_before(k).towards(&path.moves[k].to, t));

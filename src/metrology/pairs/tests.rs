@@ -43,7 +43,7 @@ fn path(part: &Part, passes: &[[Vector2; 2]]) -> Toolpath {
             pass: pass as u32,
         }));
     }
-    Toolpath { start: ClPoint::upright(Point3::new(0.0, 0.0, 9.0)), moves }
+    Toolpath::new(ClPoint::upright(Point3::new(0.0, 0.0, 9.0)), moves)
 }
 
 fn measured(part: &Part, cutter: &Cutter, path: &Toolpath) -> Measurement {

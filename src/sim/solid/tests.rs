@@ -108,7 +108,7 @@ fn opposite_axes_are_refused() {
 
 pub(crate) fn path_of(start: ClPoint, to: &[ClPoint]) -> Toolpath {
     let moves = to.iter().map(|&to| Move { to, kind: MoveKind::Cut, feed_rate: 1000.0, pass: 0 });
-    Toolpath { start, moves: moves.collect() }
+    Toolpath::new(start, moves.collect())
 }
 
 #[test]

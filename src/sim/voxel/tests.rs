@@ -29,7 +29,7 @@ fn ball() -> Solid {
 
 fn through(locations: &[ClPoint]) -> Toolpath {
     let moves = locations[1..].iter().map(|&to| Move { to, kind: MoveKind::Cut, feed_rate: 1.0, pass: 0 });
-    Toolpath { start: locations[0], moves: moves.collect() }
+    Toolpath::new(locations[0], moves.collect())
 }
 
 fn axis(rng: &mut Rng, widest: f64) -> Vector3 {

@@ -304,7 +304,7 @@ impl<'a> Program<'a> {
             self.push(tip, MoveKind::Retract, self.settings.feed_rate, last.pass);
         }
         let start = self.start.unwrap_or(Point3::new(0.0, 0.0, safe));
-        Toolpath { start: ClPoint::upright(start), moves: self.moves }
+        Toolpath::new(ClPoint::upright(start), self.moves)
     }
 }
 

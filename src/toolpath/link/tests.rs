@@ -215,7 +215,7 @@ fn nothing_stands_above_the_free_height() {
             moves.push(Move { to: ClPoint::upright(over), kind, feed_rate: 0.0, pass: 0 });
             at = over;
         }
-        let path = Toolpath { start: ClPoint::upright(start), moves };
+        let path = Toolpath::new(ClPoint::upright(start), moves);
         let grid = Grid { origin: Point2::new(-4.0, -4.0), cell: 0.1, nx: 280, ny: 280 };
         let removal = cut_in_order(ZMap::block(grid, TOP), &cutter, &path, &Silent).unwrap();
         assert_eq!(removal.rapid_contacts.first(), None);

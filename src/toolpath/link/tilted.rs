@@ -154,7 +154,7 @@ impl LocatedPass {
 /// All pieces one after the other.
 fn program(pieces: &[LocatedPass], between: &[Vec<Leg>], ways: &Ways, settings: &PlanSettings) -> Toolpath {
     let (Some(first), Some(last)) = (pieces.first(), pieces.last()) else {
-        return Toolpath { start: ways.above(), moves: Vec::new() };
+        return Toolpath::new(ways.above(), Vec::new());
     };
     let mut moves = Vec::new();
     let mut push = |to: ClPoint, kind: MoveKind, pass: usize| {
@@ -174,7 +174,7 @@ fn program(pieces: &[LocatedPass], between: &[Vec<Leg>], ways: &Ways, settings: 
         piece.at[1..].iter().for_each(|to| push(*to, MoveKind::Cut, k));
     }
     push(ways.outside(&last.ends[1].at), MoveKind::Retract, pieces.len() - 1);
-    Toolpath { start, moves }
+    Toolpath::new(start, moves)
 }
 
 /// What the tool comes too near to between passes, in words.

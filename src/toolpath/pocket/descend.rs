@@ -123,7 +123,7 @@ pub(super) fn program(
         above = floor;
     }
     let start = writer.start.unwrap_or(Point3::new(0.0, 0.0, safe));
-    Toolpath { start: ClPoint::upright(start), moves: writer.moves }
+    Toolpath::new(ClPoint::upright(start), writer.moves)
 }
 
 /// Tips from `above` down to where a run begins.

@@ -215,10 +215,8 @@ fn feeds_fall_where_more_of_the_cutter_cuts() {
         feed_rate: 1000.0,
         pass: 0,
     };
-    let mut path = motion::Toolpath {
-        start: motion::ClPoint::upright(Point3::origin()),
-        moves: vec![to(10.0), to(20.0), to(30.0)],
-    };
+    let mut path =
+        motion::Toolpath::new(motion::ClPoint::upright(Point3::origin()), vec![to(10.0), to(20.0), to(30.0)]);
     let angles = [1.0, PI, 1.0];
     let figures = engagement(&path, &angles, PI / 2.0);
     assert_eq!((figures.max, figures.p95, figures.max_move), (PI, PI, 1));

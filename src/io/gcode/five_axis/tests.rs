@@ -86,7 +86,7 @@ fn path() -> Toolpath {
         moves.push(step(ClPoint { tip: end.tip + end.axis * 50.0, ..end }, MoveKind::Retract, 1500.0));
         moves.push(step(ClPoint::upright(end.tip + end.axis * 50.0), MoveKind::Rapid, 0.0));
     }
-    Toolpath { start, moves }
+    Toolpath::new(start, moves)
 }
 
 fn program(path: &Toolpath, kinematics: &Kinematics, style: Style) -> (String, MoveLines, JointPath) {
@@ -196,7 +196,7 @@ fn a_short_program_in_both_styles() {
     let mut moves = vec![step(at(0.0, 0.0), MoveKind::Plunge), step(at(8.0, 0.0), MoveKind::Cut)];
     moves.push(step(ClPoint { axis: Vector3::z(), ..at(8.0, 0.0) }, MoveKind::Cut));
     moves.push(step(ClPoint::upright(Point3::new(8.0, 0.0, 20.0)), MoveKind::Rapid));
-    let path = Toolpath { start: at(6.0, 8.0), moves };
+    let path = Toolpath::new(at(6.0, 8.0), moves);
     // So coarse that no points are put in.
     let coarse = Following { tip: 1.0, axis: 1.0 };
     let (text, lines, _) = program_following(&path, &kinematics, Style::Tcp, &coarse);
@@ -285,7 +285,7 @@ fn a_rewind_is_made_at_the_top() {
         let kind = if k % 10 < 2 { MoveKind::Rapid } else { MoveKind::Cut };
         Move { to: at(0.2 * f64::from(k)), kind, feed_rate: 900.0, pass: 0 }
     });
-    let path = Toolpath { start: at(0.0), moves: moves.collect() };
+    let path = Toolpath::new(at(0.0), moves.collect());
     for style in [Style::Tcp, Style::Full] {
         let (text, lines, joints) = program(&path, &kinematics, style);
         assert!(!joints.report.rewinds.is_empty());

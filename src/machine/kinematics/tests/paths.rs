@@ -12,7 +12,7 @@ fn path(stations: impl IntoIterator<Item = ([f64; 3], [f64; 3])>) -> Toolpath {
     let mut stations = stations.into_iter().map(at);
     let start = stations.next().unwrap();
     let moves = stations.map(|to| Move { to, kind: MoveKind::Cut, feed_rate: 1000.0, pass: 0 }).collect();
-    Toolpath { start, moves }
+    Toolpath::new(start, moves)
 }
 
 fn tilted(tilt: f64, azimuth: f64) -> [f64; 3] {
