@@ -150,7 +150,8 @@ pub(super) fn write_source(out: &mut String, outline: &OutlineSource, depth: f64
 
 #[cfg(test)]
 mod tests {
-    use crate::{Scene, complete_toml};
+    use crate::{Scene, SceneError, complete_toml};
+    use toolpath::{PartKind, STRATEGIES};
 
     const TRAY: &str = "[part]\nsurface = \"pocket\"\noutline = [[0, 0], [60, 0], [60, 40], [0, 40]]\n\
         islands = [[[20, 10], [30, 10], [30, 20]]]\ndepth = 5\n[cutter]\nshape = \"flat\"\ndiameter = 6\n\
@@ -169,6 +170,20 @@ mod tests {
         let again = Scene::parse("tray.toml", text.clone()).unwrap();
         assert_eq!((&again.part, &again.toolpaths), (&scene.part, &scene.toolpaths), "{text}");
         assert_eq!(complete_toml(&again), text);
+    }
+
+    #[test]
+    fn a_strategy_for_other_parts_is_answered_with_all_that_apply() {
+        let cure = |text: String| match Scene::parse("tray.toml", text) {
+            Err(SceneError::Invalid(finding)) => finding.cure.clone(),
+            other => panic!("{other:?}"),
+        };
+        let of = |kind| STRATEGIES.iter().filter(move |strategy| strategy.part == kind);
+        let text = cure(TRAY.replace("pocket-zigzag\"\nangle = 20", "zigzag\""));
+        assert!(of(PartKind::Pocket).all(|strategy| text.contains(strategy.word)), "{text}");
+        let plane = "[part]\nsurface = \"plane\"\nx = [0, 60]\ny = [0, 40]\n";
+        let text = cure(format!("{plane}{}", &TRAY[TRAY.find("[cutter]").unwrap()..]));
+        assert!(of(PartKind::Surface).all(|strategy| text.contains(strategy.word)), "{text}");
     }
 
     #[test]

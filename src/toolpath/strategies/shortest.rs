@@ -9,8 +9,8 @@
 //!
 //! What a machine has to turn counts as a little length: along passes that the surface bends, and at their ends.
 //!
-//! Enters: a part and the scallop height. Leaves: passes. Lengths in mm; planned to second order, as [`super::strip`]
-//! is.
+//! Enters: a part and the scallop height. Leaves: passes. Lengths in mm; planned to second order, as strip widths
+//! are.
 
 use std::f64::consts::PI;
 use std::fmt::{self, Write as _};
