@@ -6,7 +6,6 @@
 //! triangle lies on a side that separates the two. (The contacts known as facet, edge and vertex
 //! contact since Bobrow 1985.)
 
-use cutter;
 use cutter::Cutter;
 use geometry::{Feature, Point3, Vector3};
 
