@@ -45,8 +45,8 @@ impl Tile {
         let axis = |given: &[f64]| {
             let last = given.len() - 1;
             // Extrapolated beyond the grid, so that bounds about a leaf's middle stay true.
-            let at =
-                |k: usize| given.get(k).copied().unwrap_or(given[last] + (k - last) as f64 * slices.cell);
+            let beyond = |k: usize| given[last] + (k - last) as f64 * slices.cell;
+            let at = |k: usize| given.get(k).copied().unwrap_or_else(|| beyond(k));
             std::array::from_fn(|leaf| std::array::from_fn(|k| at(leaf * LEAF + k)))
         };
         let mut tile = Self {
