@@ -6,8 +6,11 @@ use clap::{Args, Parser, Subcommand};
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use cutter::Cutter;
+use io::mesh_extensions;
+use metrology::ENGINES;
 use scallop::DEFAULT_DEGREE;
 use scene::EngineChoice;
+use toolpath::STRATEGIES;
 
 /// Plans milling paths, cuts the part in a simulator, measures the cut surface and gives a verdict.
 ///
@@ -25,6 +28,7 @@ pub struct Arguments {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Plan, cut, measure and report all toolpaths of a scene.
+    #[command(after_help = kinds())]
     Run(RunOptions),
     /// Read and validate a scene, and print it with every default in effect.
     Check(CheckOptions),
@@ -146,6 +150,15 @@ fn cell(text: &str) -> Result<Cell, String> {
         .filter(|v| CELL.contains(v))
         .map(Cell::Mm)
         .ok_or_else(|| "give a positive number of millimetres, such as 0.05, or auto".to_owned())
+}
+
+/// What a scene may ask for, from the lists of strategies, engines and part formats.
+fn kinds() -> String {
+    let line = |(word, help): (&str, &str)| format!("  {word:<16} {help}\n");
+    let strategies: String = STRATEGIES.iter().map(|strategy| line((strategy.word, strategy.help))).collect();
+    let engines: String = ENGINES.iter().map(|engine| line((engine.word(), engine.help()))).collect();
+    let formats = mesh_extensions().join(", ");
+    format!("Strategies of a scene:\n{strategies}\nEngines:\n{engines}\nMesh files: {formats}")
 }
 
 /// The words of all engines.
