@@ -367,6 +367,9 @@ mod tests {
         assert!(refused("--cutter ball:6 --step -1").contains("positive number"));
         assert!(refused("--cutter ball:6 --step 0.5 --convex 0").contains("radius of the section"));
         assert!(refused("--cutter ball:6 --step 0.5 --part none.stl --at 1,2").contains("none.stl"));
-        assert!(refused("--cutter ball:6 --step 0.5 --part none.step --at 1,2").contains("NURBS .json"));
+        assert!(
+            refused("--cutter ball:6 --step 0.5 --part none.step --at 1,2")
+                .contains("NURBS patches in a .json file")
+        );
     }
 }

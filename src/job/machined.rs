@@ -31,7 +31,7 @@ impl Machined {
     pub(crate) fn new(session: &Session, path: &Toolpath, view: &View, measured: &Measurement) -> Self {
         match view {
             View::Heights(cut) => of_heights(session, path, cut, measured),
-            View::Normals { map, .. } => of_normals(map, session.scene.tolerance.scallop),
+            View::Normals(view) => of_normals(&view.map, session.scene.tolerance.scallop),
         }
     }
 

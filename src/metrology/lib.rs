@@ -52,8 +52,8 @@ pub use along_normals::{
 pub use cut_surface::CutSurface;
 pub use engagement::{ContactArcs, contact_arcs};
 pub use engines::{
-    Budget, ENGINES, Engine, EngineChoice, EngineError, LaidOut, MIB, Measured, REACH_OVER_UNCUT, Simulation,
-    Task, View,
+    Budget, ENGINES, Engine, EngineChoice, EngineError, LaidOut, MIB, Measured, NormalView, REACH_OVER_UNCUT,
+    Simulation, Task, View,
 };
 pub use figures::{
     CloserLook, DeviationFigures, GougeFigures, GougeRegion, Limits, Measurement, PathFigures,

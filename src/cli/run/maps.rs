@@ -24,7 +24,7 @@ pub fn maps(session: &Session, outcome: &Outcome, outputs: &Outputs) -> Result<T
     let maps = Maps { session, outcome, outputs };
     let page = match &outcome.view {
         View::Heights(cut) => maps.of_heights(cut)?,
-        View::Normals { map, spacing, .. } => maps.of_normals(map, *spacing)?,
+        View::Normals(view) => maps.of_normals(&view.map, view.spacing)?,
     };
     let scallop = session.scene.tolerance.scallop;
     let histogram = Histogram::new(&outcome.measurement.ridge_samples, scallop, HIGHEST_RIDGE * scallop);

@@ -20,7 +20,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
             let violations = collision(&held, &|k| run.line(k)).into_iter().collect();
             Ok(Finding { notes: vec![note(&held)], violations, ..Finding::default() })
         }
-        View::Normals { .. } if run.scene().simulation.removal => {
+        View::Normals(_) if run.scene().simulation.removal => {
             let stock = run.session.voxel_stock();
             let voxel = voxel_in_order(run, &stock);
             let engine = VoxelEngine::new(&stock, &run.tool.cutter, run.path()).map_err(run.voxels())?;
@@ -28,7 +28,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
             let violations = standing_collision(&hits, voxel, &|k| run.program_line(k)).into_iter().collect();
             Ok(Finding { notes: vec![standing_note(&hits, voxel)], violations, ..Finding::default() })
         }
-        View::Normals { .. } => Ok(Finding::default()),
+        View::Normals(_) => Ok(Finding::default()),
     }
 }
 

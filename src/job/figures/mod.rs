@@ -23,8 +23,11 @@ use work::monitor::{self, Monitor};
 use super::JobError;
 use super::run::{Finding, Run};
 
+/// How a figure is found.
+type Find = fn(&Run<'_>, &dyn Monitor) -> Result<Finding, JobError>;
+
 /// All figures, in the order of report.json.
-const FIGURES: [fn(&Run<'_>, &dyn Monitor) -> Result<Finding, JobError>; 12] = [
+const FIGURES: [Find; 12] = [
     shortest::find,
     field::find,
     machine::find,

@@ -33,7 +33,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
             let removed = cut_in_order(stock, &run.scene().cutter, run.path(), monitor)?;
             removal_figures(run.path(), &removed, &cut.height)
         }
-        View::Normals { .. } => by_voxels(run, monitor)?,
+        View::Normals(_) => by_voxels(run, monitor)?,
     };
     for contact in &mut r.rapid_contacts {
         contact.line = run.line(contact.move_index);

@@ -24,7 +24,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
         return Ok(Finding::default());
     }
     let r = match run.view() {
-        View::Normals { rays, solid, .. } => measure(run, rays, solid, monitor)?,
+        View::Normals(view) => measure(run, &view.rays, &view.solid, monitor)?,
         View::Heights(_) => {
             let solid = Solid::of_cutter(&run.scene().cutter, None);
             let rays = Rays::new(run.path(), &solid, monitor)

@@ -10,10 +10,10 @@ use crate::run::{Finding, Run};
 
 /// Of blades that are measured along their normals.
 pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> {
-    let (View::Normals { map, .. }, Some(blade)) = (run.view(), &run.session.blade) else {
+    let (View::Normals(view), Some(blade)) = (run.view(), &run.session.blade) else {
         return Ok(Finding::default());
     };
-    let sections = section_figures(map, blade.heights(), &blade.section_parameters());
+    let sections = section_figures(&view.map, blade.heights(), &blade.section_parameters());
     if sections.is_empty() {
         return Ok(Finding::default());
     }

@@ -13,7 +13,7 @@ use crate::run::{Finding, Run};
 /// The violation that shank or holder touch the part or a fixture, the cutter a fixture, or the cutter the part while it
 /// is not cutting. Of tools that lean.
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
-    let View::Normals { .. } = run.view() else { return Ok(Finding::default()) };
+    let View::Normals(_) = run.view() else { return Ok(Finding::default()) };
     monitor.start("looking for collisions", 0);
     let (tool, mesh_deviation) = (run.tool, run.part().mesh_deviation());
     let part = Obstacle::new(run.part().mesh(), run.part().bvh());

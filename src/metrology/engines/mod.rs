@@ -14,7 +14,7 @@ pub use budget::{Budget, LaidOut, MIB};
 pub use choice::EngineChoice;
 pub use error::EngineError;
 pub use normals::REACH_OVER_UNCUT;
-pub use task::{Measured, Simulation, Task, View};
+pub use task::{Measured, NormalView, Simulation, Task, View};
 
 use work::monitor::Monitor;
 

@@ -6,7 +6,7 @@ use sim::{Rays, VoxelEngine, VoxelStock, Voxels};
 use work::monitor::Monitor;
 
 use super::budget::MIB;
-use super::{Engine, EngineError, Measured, Task, View};
+use super::{Engine, EngineError, Measured, NormalView, Task, View};
 use crate::{FirstCut, RaysCut, SweptVolume, VoxelCut, measure_along_normals, net_places};
 
 /// Bytes a place of the net: place, hit, triangles with their crossings, and the map.
@@ -81,7 +81,7 @@ impl Engine for Normals {
             cells: map.points.len(),
             refined_rectangles: 0,
             finest_cell,
-            view: View::Normals { map, spacing, rays, solid },
+            view: View::Normals(Box::new(NormalView { map, spacing, rays, solid })),
             note: None,
         })
     }

@@ -60,16 +60,20 @@ pub enum View {
     /// Heights over the plan view.
     Heights(ZMap),
     /// Places of the design and the deviation along their normals.
-    Normals {
-        /// The places.
-        map: NormalMap,
-        /// Their distance, mm.
-        spacing: f64,
-        /// The swept volume of the path.
-        rays: Rays,
-        /// The cutter that swept it.
-        solid: Solid,
-    },
+    Normals(Box<NormalView>),
+}
+
+/// The design's places, measured along their normals.
+#[derive(Debug)]
+pub struct NormalView {
+    /// The places.
+    pub map: NormalMap,
+    /// Their distance, mm.
+    pub spacing: f64,
+    /// The swept volume of the path.
+    pub rays: Rays,
+    /// The cutter that swept it.
+    pub solid: Solid,
 }
 
 /// What an engine leaves.
