@@ -191,7 +191,7 @@ impl CutSurface<'_> {
     /// along `n`. `None` off the grid.
     ///
     /// # Tolerance
-    /// The meeting lies on the closed-form surface to [`MEETING`]. Where the line leaves the grid
+    /// The meeting lies on the closed-form surface to `MEETING`. Where the line leaves the grid
     /// before it meets the surface, the vertical distance times `n.z` stands in for it.
     pub fn along_normal(&self, p: &Point3, n: &Vector3) -> Option<Deviation> {
         let (i, j) = self.cut.grid.cell_at(p.x, p.y)?;

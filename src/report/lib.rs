@@ -1,5 +1,5 @@
 //! The tables, pictures and pages that people read. Enters: figures and maps. Leaves: texts and
-//! rasters; writing them to files is the business of [`io`] and [`cli`].
+//! rasters; writing them to files is the business of `io` and `cli`.
 
 mod canvas;
 mod comb;

@@ -4,7 +4,7 @@
 //! order. Each item goes to exactly one call of the closure, so results never depend on the number of threads. That
 //! number is the one of the rayon pool in which the call runs (`rayon::ThreadPool::install`).
 //!
-//! Items are dealt out in blocks, which idle threads steal one by one. Only [`on_all_threads`] and [`both`] touch rayon,
+//! Items are dealt out in blocks, which idle threads steal one by one. Only `on_all_threads` and `both` touch rayon,
 //! and neither is generic: rayon's trees of jobs are compiled once, not for each closure of the program.
 
 use rayon::prelude::*;

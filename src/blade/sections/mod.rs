@@ -4,7 +4,7 @@
 //! suction side, each from the leading to the trailing edge. A section lies in the plane `z = height`, its
 //! points are x and y. Leaves: [`Sections`], of which every rule of [`Sections::new`] holds, and for each
 //! section the curves that a surface is laid through ([`Sections::sides`]). Sections can be read from tables
-//! ([`io::section_table`](io::section_table)) or generated ([`GeneratedBlade`]).
+//! (`io::section_table`) or generated ([`GeneratedBlade`]).
 
 mod check;
 mod edges;
@@ -126,7 +126,7 @@ impl Sections {
     /// # Errors
     /// [`SectionError`] for the first thing that is wrong: fewer than 2 sections; heights that do not rise;
     /// fewer than [`LEAST_POINTS`] points on a curve; more than [`MAX_POINTS`] in all; coordinates that are
-    /// not finite or beyond [`MAX_COORDINATE`](super::MAX_COORDINATE); points that repeat their neighbour
+    /// not finite or beyond [`MAX_COORDINATE`](geometry::MAX_COORDINATE); points that repeat their neighbour
     /// (within 1e-9 of the section's size); curves that cross or touch themselves or each other; closed
     /// outlines of different senses; sides that run against each other, or otherwise than in the section
     /// before; closed outlines among sides; a section more than 20 times larger or smaller than most; heights
