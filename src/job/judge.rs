@@ -16,6 +16,11 @@ use report::{HIGHEST_RIDGE, MapMark, Verdict, Violation, micrometres, place, wit
 /// Kinds of violations, the gravest first.
 const GRAVITY: [&str; 6] = ["collision", "wall", "rapid", "gouge", "uncut", "scallop"];
 
+/// The rank of a kind of violation; a kind that has none comes after all that have one.
+fn gravity(what: &str) -> usize {
+    GRAVITY.iter().position(|kind| *kind == what).unwrap_or(GRAVITY.len())
+}
+
 /// The verdict on a measured toolpath, and what violates its limits, the gravest kind first. `found` are the violations of
 /// further figures.
 pub(crate) fn judge(
@@ -27,7 +32,7 @@ pub(crate) fn judge(
     violations.extend(gouge(measured, limits));
     violations.extend(uncut(measured, limits));
     violations.extend(scallop(measured, limits));
-    violations.sort_by_key(|violation| GRAVITY.iter().position(|kind| *kind == violation.what));
+    violations.sort_by_key(|violation| gravity(violation.what));
     (if violations.is_empty() { Verdict::Pass } else { Verdict::Fail }, violations)
 }
 
