@@ -21,7 +21,7 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
     let row = |s: &metrology::SectionFigures| {
         let places = s.places.to_string();
         vec![
-            s.height_mm.to_string(),
+            format!("{:.3}", s.height_mm),
             um(s.min_mm),
             um(s.max_mm),
             um(s.mean_mm),
