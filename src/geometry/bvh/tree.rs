@@ -30,6 +30,7 @@ impl<T: Copy> Paired<T> {
     }
 
     /// Value `i`.
+    #[inline]
     pub fn at(&self, i: usize) -> &T {
         &self.0[i / 2].0[i % 2]
     }
@@ -52,6 +53,7 @@ pub struct Node {
 }
 
 /// As `f64::max` for numbers, in one instruction instead of five: the walk does little else.
+#[inline]
 fn greater(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
@@ -62,6 +64,7 @@ impl Node {
     }
 
     /// Squared distance from `(x, y)` to the box in the plan view, mm²; 0 inside.
+    #[inline]
     pub fn plan_distance_squared(&self, x: f64, y: f64) -> f64 {
         let dx = self.gap(0, x);
         let dy = self.gap(1, y);
@@ -74,6 +77,7 @@ impl Node {
         self.plan_distance_squared(q.x, q.y) + dz * dz
     }
 
+    #[inline]
     fn gap(&self, axis: usize, x: f64) -> f64 {
         let (before, beyond) = (f64::from(self.min[axis]) - x, x - f64::from(self.max[axis]));
         greater(greater(before, beyond), 0.0)
@@ -113,6 +117,7 @@ impl Node {
     }
 
     /// Upper end of the box, mm.
+    #[inline]
     pub fn top(&self) -> f64 {
         f64::from(self.max[2])
     }
@@ -254,6 +259,7 @@ impl BoxTree {
     /// exceeds the best value so far, the most promising first, and calls `visit(slot, best)`
     /// there, which returns the best value from then on. Starts with `best`; allocates nothing in
     /// trees of usual depth.
+    #[inline]
     pub fn search(
         &self,
         mut best: f64,
@@ -295,10 +301,12 @@ struct Stack {
 }
 
 impl Stack {
+    #[inline]
     fn new() -> Self {
         Self { near: [(0, 0.0); STACK], len: 0, spilled: Vec::new() }
     }
 
+    #[inline]
     fn push(&mut self, item: (u32, f64)) {
         if self.len < STACK {
             self.near[self.len] = item;
@@ -308,6 +316,7 @@ impl Stack {
         }
     }
 
+    #[inline]
     fn pop(&mut self) -> Option<(u32, f64)> {
         self.spilled.pop().or_else(|| {
             self.len = self.len.checked_sub(1)?;
