@@ -25,7 +25,7 @@ strategy = "iso-scallop"
 fn main() -> Result<(), JobError> {
     let session = Session::new(Scene::parse("saddle.toml", SCENE)?)?;
     let report = session.run(&Silent)?;
-    for toolpath in &report.toolpaths {
+    for toolpath in report.measured() {
         println!(
             "{:12} {:7.1} mm in {:5.1} s, highest scallop {:.4} mm: {}",
             toolpath.name,

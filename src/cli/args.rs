@@ -14,7 +14,7 @@ use toolpath::STRATEGIES;
 
 /// Plans milling paths, cuts the part in a simulator, measures the cut surface and gives a verdict.
 ///
-/// Exit status: 0 ran and every tolerance holds, 1 ran and a tolerance is violated, 2 could not
+/// Exit status: 0 ran and every limit is proven to hold, 1 ran and one is violated or undecided, 2 could not
 /// run.
 #[derive(Debug, Parser)]
 #[command(name = "millstream", version, arg_required_else_help = true)]

@@ -1,6 +1,6 @@
 //! The command line: arguments, progress, messages, exit status.
 //!
-//! Exit status: 0 ran and every tolerance holds, 1 ran and a tolerance of the scene is violated,
+//! Exit status: 0 ran and every limit is proven to hold, 1 ran and a limit is violated or undecided,
 //! 2 could not run (usage, file, scene, interrupted).
 
 mod args;
@@ -22,10 +22,10 @@ use progress::Progress;
 
 use report::Verdict;
 
-/// Ran, and every tolerance holds.
+/// Ran, and every limit is proven to hold.
 const PASSED: u8 = 0;
-/// Ran, and a tolerance is violated.
-const VIOLATED: u8 = 1;
+/// Ran, and a limit is violated or undecided.
+const NOT_PASSED: u8 = 1;
 /// Could not run.
 const COULD_NOT_RUN: u8 = 2;
 
@@ -45,7 +45,7 @@ pub fn main() -> ExitCode {
             progress.finish();
             // A reader that closes the pipe early has read what it wanted.
             let _ = std::io::stdout().lock().write_all(text.as_bytes());
-            ExitCode::from(if verdict == Verdict::Pass { PASSED } else { VIOLATED })
+            ExitCode::from(if verdict == Verdict::Pass { PASSED } else { NOT_PASSED })
         }
         Err(error) => {
             progress.finish();

@@ -49,13 +49,6 @@ impl Progress {
         self.stop.store(true, Ordering::Relaxed);
     }
 
-    /// Names what the next stages belong to.
-    pub fn belongs_to(&self, name: &str) {
-        if let Ok(mut prefix) = self.prefix.lock() {
-            name.clone_into(&mut prefix);
-        }
-    }
-
     /// Wipes the bar away.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
@@ -63,6 +56,12 @@ impl Progress {
 }
 
 impl Monitor for Progress {
+    fn belongs_to(&self, name: &str) {
+        if let Ok(mut prefix) = self.prefix.lock() {
+            name.clone_into(&mut prefix);
+        }
+    }
+
     fn start(&self, stage: &str, steps: u64) {
         /// How often a bar of unknown length moves.
         const BEAT: Duration = Duration::from_millis(120);

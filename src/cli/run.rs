@@ -22,7 +22,7 @@ use super::progress::Progress;
 pub struct RunOutcome {
     /// The result table.
     pub text: String,
-    /// Whether every tolerance holds.
+    /// Whether every limit holds.
     pub verdict: Verdict,
 }
 
@@ -65,17 +65,14 @@ fn run_scene(options: &RunOptions, progress: &Progress) -> Result<RunOutcome, Cl
     let session = Session::new(scene)?;
     let target = options.out.clone().unwrap_or_else(|| default_target(&options.scene));
     let outputs = Outputs::begin(&target)?;
-    let (mut results, mut pages) = (Vec::new(), Vec::new());
-    for request in &session.scene.toolpaths {
-        progress.belongs_to(&request.name);
-        let outcome = session.toolpath(request, progress)?;
-        pages.push(write::toolpath(&session, &outcome, &outputs, progress)?);
-        results.push(outcome.result);
-    }
+    let mut pages = Vec::new();
+    let report = session.run_each(progress, &mut |outcome| {
+        pages.push(write::toolpath(&session, outcome, &outputs, progress)?);
+        Ok::<(), CliError>(())
+    })?;
     if let Some(blade) = &session.blade {
         write::combs(blade, &outputs)?;
     }
-    let report = session.report(results);
     let json = report.to_json().map_err(job::JobError::from)?;
     let page = html_page(&report, &pages, &session.scene.source.text);
     outputs.file("report.html", |out| out.write_all(page.as_bytes()))?;

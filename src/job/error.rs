@@ -147,6 +147,15 @@ impl JobError {
         }
     }
 
+    /// Why a toolpath has no path, if that is what was wrong. Other toolpaths of its scene may have one.
+    pub fn why_not_planned(&self) -> Option<String> {
+        match self {
+            Self::Plan { reason, .. } => Some(reason.to_string()),
+            Self::Machine { reason, .. } => Some(format!("the machine cannot run it: {reason}")),
+            _ => None,
+        }
+    }
+
     /// A planner's error, told with the toolpath's name.
     pub(crate) fn plan(scene: &Scene, name: &str, reason: PlanError) -> Self {
         match reason {

@@ -1,46 +1,35 @@
-//! The rule by which a toolpath passes, and the words for what violates it.
+//! The rule by which a toolpath passes: every figure, with the bound of its error, within its limit.
 //!
-//! A tolerance is violated when the MEASURED figure exceeds the limit; the bound of the figure's error stands beside it. The
-//! limits:
+//! Each limit is a [`Claim`]. It holds where figure and bound lie within it, is violated where the figure less its bound
+//! exceeds it, and is undecided otherwise; coarser cells widen bounds, so they may turn an answer into no answer and never
+//! into the other one. The limits of the measured surface:
 //!
-//! - scallop: 95 % of the ridge length stay below the scallop tolerance, and the highest ridge below [`HIGHEST_RIDGE`] times
-//!   that. A planner steps for the tolerance itself and meets it up to its own discretisation, so that the highest ridge
-//!   would otherwise fail by a hair in the best of plans.
-//! - gouge: the greatest depth stays within the gouge tolerance.
-//! - uncut: no place stands higher than the uncut tolerance.
-//! - what the figures of [`figures`](super::figures) find: rapid moves in stock, collisions, walls of pockets.
+//! - scallop: no ridge and no remnant along a border exceeds the scallop tolerance times the factor that the scene allows,
+//!   and the share of the ridge length that the scene names does not exceed the tolerance itself;
+//! - gouge: no place lies deeper than the gouge tolerance;
+//! - uncut: no other material stands higher than the uncut tolerance.
+//!
+//! What else is limited is claimed by the figures of [`figures`](super::figures).
 
-use metrology::{Limits, Measurement};
-use report::{HIGHEST_RIDGE, MapMark, Verdict, Violation, micrometres, place, with_bound};
+use metrology::{Bounded, Limits, Measurement, ScallopRule};
+use report::{Claim, Gravity, MapMark, Verdict, micrometres, per_cent, place, with_bound};
 
-/// Kinds of violations, the gravest first.
-const GRAVITY: [&str; 6] = ["collision", "wall", "rapid", "gouge", "uncut", "scallop"];
-
-/// The rank of a kind of violation; a kind that has none comes after all that have one.
-fn gravity(what: &str) -> usize {
-    GRAVITY.iter().position(|kind| *kind == what).unwrap_or(GRAVITY.len())
-}
-
-/// The verdict on a measured toolpath, and what violates its limits, the gravest kind first. `found` are the violations of
-/// further figures.
+/// The verdict on a measured toolpath, and its limits, the gravest first. `found` are the claims of further figures.
 pub(crate) fn judge(
     measured: &Measurement,
     limits: &Limits,
-    found: Vec<Violation>,
-) -> (Verdict, Vec<Violation>) {
-    let mut violations = found;
-    violations.extend(gouge(measured, limits));
-    violations.extend(uncut(measured, limits));
-    violations.extend(scallop(measured, limits));
-    violations.sort_by_key(|violation| gravity(violation.what));
-    (if violations.is_empty() { Verdict::Pass } else { Verdict::Fail }, violations)
+    rule: &ScallopRule,
+    found: Vec<Claim>,
+) -> (Verdict, Vec<Claim>) {
+    let mut claims = found;
+    claims.extend([gouge(measured, limits), uncut(measured, limits), highest(measured, limits, rule)]);
+    claims.extend(most(measured, limits, rule));
+    claims.sort_by_key(|claim| std::cmp::Reverse(claim.gravity));
+    (claims.iter().map(Claim::verdict).max().unwrap_or(Verdict::Undecided), claims)
 }
 
-fn gouge(measured: &Measurement, limits: &Limits) -> Option<Violation> {
+fn gouge(measured: &Measurement, limits: &Limits) -> Claim {
     let figures = &measured.gouge;
-    if figures.max_depth_mm <= limits.gouge {
-        return None;
-    }
     let mut text = format!(
         "gouge {} µm deep (limit {})",
         with_bound(Some(figures.max_depth_mm), Some(figures.error_bound_mm)),
@@ -54,55 +43,100 @@ fn gouge(measured: &Measurement, limits: &Limits) -> Option<Violation> {
         }
         text += &others(figures.region_count);
     }
-    Some(Violation { what: "gouge", limit_mm: limits.gouge, measured_mm: figures.max_depth_mm, text })
+    let (depth, bound) = (figures.max_depth_mm, figures.error_bound_mm);
+    Claim { measured: known(measured, depth), ..length("gouge", Gravity::Scrap, limits.gouge, depth, bound) }
+        .told(text)
 }
 
-fn uncut(measured: &Measurement, limits: &Limits) -> Option<Violation> {
+fn uncut(measured: &Measurement, limits: &Limits) -> Claim {
     let figures = &measured.uncut;
-    let worst = figures.regions.first()?;
-    let text = format!(
-        "uncut material {} µm high (limit {}) over {:.3} mm² at {}{}",
-        with_bound(Some(figures.max_height_mm), Some(figures.error_bound_mm)),
-        micrometres(Some(limits.uncut)),
-        figures.area_mm2,
-        place(worst.at_mm),
-        others(figures.region_count)
+    let regions = Bounded::new(figures.max_height_mm, figures.error_bound_mm);
+    let Bounded { max_mm: height, error_bound_mm: bound, .. } = regions.or(&measured.excess.unreached);
+    let mut text = format!(
+        "uncut material {} µm high (limit {})",
+        with_bound(Some(height), Some(bound)),
+        micrometres(Some(limits.uncut))
     );
-    Some(Violation { what: "uncut", limit_mm: limits.uncut, measured_mm: figures.max_height_mm, text })
+    if let Some(worst) = figures.regions.first() {
+        let others = others(figures.region_count);
+        text += &format!(" over {:.3} mm² at {}{others}", figures.area_mm2, place(worst.at_mm));
+    }
+    Claim {
+        measured: known(measured, height),
+        ..length("uncut", Gravity::Finish, limits.uncut, height, bound)
+    }
+    .told(text)
 }
 
-fn scallop(measured: &Measurement, limits: &Limits) -> Vec<Violation> {
+/// The highest ridge or remnant along a border.
+fn highest(measured: &Measurement, limits: &Limits, rule: &ScallopRule) -> Claim {
     let figures = &measured.scallop;
-    let violation = |limit: f64, value: Option<f64>, error: Option<f64>, what: &str, place: String| {
-        let value = value.filter(|value| *value > limit)?;
-        let text = format!(
-            "{what} is {} µm (limit {}){place}",
-            with_bound(Some(value), error),
-            micrometres(Some(limit))
-        );
-        Some(Violation { what: "scallop", limit_mm: limit, measured_mm: value, text })
+    let ridges = figures.max_mm.map(|height| Bounded {
+        at_mm: figures.max_at_mm,
+        ..Bounded::new(height, figures.error_bound_mm.unwrap_or(f64::INFINITY))
+    });
+    let reached = measured.excess.reached;
+    let all = ridges.map_or(reached, |ridges| ridges.or(&reached));
+    let limit = rule.highest * limits.scallop;
+    let what = match ridges {
+        Some(ridges) if ridges.max_mm >= reached.max_mm => "the highest scallop",
+        _ => "the highest scallop or remnant beside a border",
     };
-    let at = figures.max_at_mm.map_or(String::new(), |at| format!(" at {}", place(at)));
-    let highest = violation(
-        HIGHEST_RIDGE * limits.scallop,
-        figures.max_mm,
-        figures.error_bound_mm,
-        "the highest scallop",
-        at,
+    let text = format!(
+        "{what} is {} µm (limit {}){}",
+        with_bound(Some(all.max_mm), Some(all.error_bound_mm)),
+        micrometres(Some(limit)),
+        all.at_mm.map_or(String::new(), |at| format!(" at {}", place(at)))
     );
-    let most = violation(
-        limits.scallop,
-        figures.p95_mm,
-        None,
-        "the scallop height that 95 % of the ridges stay below",
-        String::new(),
+    Claim {
+        measured: known(measured, all.max_mm),
+        ..length("scallop", Gravity::Finish, limit, all.max_mm, all.error_bound_mm)
+    }
+    .told(text)
+}
+
+/// The share of the ridge length above the target, where the scene lets some of it be.
+fn most(measured: &Measurement, limits: &Limits, rule: &ScallopRule) -> Option<Claim> {
+    if rule.share >= 1.0 {
+        return None;
+    }
+    let limit = 1.0 - rule.share;
+    let over = measured.share_above(limits.scallop);
+    let bound = measured.scallop.error_bound_mm.unwrap_or(f64::INFINITY);
+    let [more, less] = [-bound, bound].map(|by| measured.share_above(limits.scallop + by));
+    let error_bound = match (over, more, less) {
+        (Some(over), Some(more), Some(less)) => (more - over).max(over - less),
+        _ => f64::INFINITY,
+    };
+    let text = format!(
+        "{} ± {} % of the ridge length stand above {} µm (limit {} %)",
+        per_cent(over),
+        per_cent(Some(error_bound).filter(|bound| bound.is_finite())),
+        micrometres(Some(limits.scallop)),
+        per_cent(Some(limit))
     );
-    highest.into_iter().chain(most).collect()
+    // Without a ridge none stands above.
+    let (measured, error_bound) = if over.is_none() && measured.excess.reached.at_most() <= limits.scallop {
+        (Some(0.0), 0.0)
+    } else {
+        (over, error_bound)
+    };
+    let share = Claim::length("scallop", Gravity::Finish, limit, 0.0, error_bound).told(text);
+    Some(Claim { unit: "", measured, ..share })
+}
+
+/// A figure of a surface that was measured at all.
+fn known(measured: &Measurement, figure: f64) -> Option<f64> {
+    (measured.deviation.samples > 0).then_some(figure)
+}
+
+fn length(what: &'static str, gravity: Gravity, limit: f64, measured: f64, bound: f64) -> Claim {
+    Claim::length(what, gravity, limit, measured, bound)
 }
 
 /// The gravest places of each kind of violation, named `G1`, `G2` … for gouges, `U1` … for uncut
 /// material, in the order of their lists, and `S` for a scallop that is too high.
-pub fn marks(measured: &Measurement, limits: &Limits) -> Vec<MapMark> {
+pub fn marks(measured: &Measurement, limits: &Limits, rule: &ScallopRule) -> Vec<MapMark> {
     /// More rings of one kind hide the map.
     const MOST: usize = 5;
     let numbered = |letter: char, places: Vec<[f64; 3]>| {
@@ -110,7 +144,7 @@ pub fn marks(measured: &Measurement, limits: &Limits) -> Vec<MapMark> {
             |(k, [x, y, _]): (usize, [f64; 3])| MapMark { at: [x, y], name: format!("{letter}{}", k + 1) };
         places.into_iter().take(MOST).enumerate().map(named).collect::<Vec<_>>()
     };
-    let high = measured.scallop.max_mm.is_some_and(|height| height > HIGHEST_RIDGE * limits.scallop);
+    let high = measured.scallop.max_mm.is_some_and(|height| height > rule.highest * limits.scallop);
     let scallop = measured.scallop.max_at_mm.filter(|_| high);
     let mut marks = numbered('G', measured.gouge.regions.iter().map(|r| r.at_mm).collect());
     marks.extend(numbered('U', measured.uncut.regions.iter().map(|r| r.at_mm).collect()));

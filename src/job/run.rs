@@ -3,7 +3,7 @@
 use metrology::{Budget, Measured, Measurement, View};
 use motion::Toolpath;
 use part::Part;
-use report::Violation;
+use report::Claim;
 use scene::{Scene, ToolpathRequest};
 
 use super::planned::Planned;
@@ -76,6 +76,6 @@ pub(crate) struct Finding {
     pub figure: Option<report::Figure>,
     /// Notes on the toolpath.
     pub notes: Vec<String>,
-    /// What it violates.
-    pub violations: Vec<Violation>,
+    /// The limits that it was held against.
+    pub claims: Vec<Claim>,
 }

@@ -9,7 +9,9 @@ use io::ProgramHeader;
 use metrology::{Budget, Engine, LaidOut, Task, path_figures};
 use motion::Toolpath;
 use part::Part;
-use report::{RunReport, SimulationFigures, ToolpathResult};
+use report::{
+    NotPlanned, RunReport, SimulationFigures, ToleranceFigures, ToolpathReport, ToolpathResult, Verdict,
+};
 use scene::{Fixture, Loaded, PartSource, Scene, ToolpathRequest, load_mesh, load_part, load_pocket};
 use sim::VoxelStock;
 use toolpath::Pocket;
@@ -78,22 +80,53 @@ impl Session {
         Ok(Self { scene, part, blade, pocket, cells, top, notes })
     }
 
-    /// Runs all toolpaths. Maps, paths and meshes are dropped; [`Session::toolpath`] leaves them.
+    /// Runs all toolpaths. Maps, paths and meshes are dropped; [`Session::toolpath`] leaves them. One that cannot be
+    /// planned is a row with its reason, and fails the run.
     ///
     /// # Errors
-    /// [`JobError`] of the first toolpath that cannot be run.
+    /// [`JobError`] of the first toolpath that cannot be run, or if none could be planned.
     pub fn run(&self, monitor: &dyn Monitor) -> Result<RunReport, JobError> {
-        let results = self.scene.toolpaths.iter().map(|request| Ok(self.toolpath(request, monitor)?.result));
-        Ok(self.report(results.collect::<Result<_, JobError>>()?))
+        self.run_each(monitor, &mut |_| Ok::<(), JobError>(()))
+    }
+
+    /// As [`Session::run`]; hands over what each toolpath left.
+    ///
+    /// # Errors
+    /// Those of [`Session::run`] and of `done`.
+    pub fn run_each<E: From<JobError>>(
+        &self,
+        monitor: &dyn Monitor,
+        done: &mut dyn FnMut(&Outcome) -> Result<(), E>,
+    ) -> Result<RunReport, E> {
+        let (mut rows, mut refused) = (Vec::new(), None);
+        for request in &self.scene.toolpaths {
+            monitor.belongs_to(&request.name);
+            match self.toolpath(request, monitor) {
+                Ok(outcome) => {
+                    done(&outcome)?;
+                    rows.push(ToolpathReport::Measured(Box::new(outcome.result)));
+                }
+                Err(error) => {
+                    let Some(reason) = error.why_not_planned() else { return Err(error.into()) };
+                    rows.push(not_planned(request, reason));
+                    refused = refused.or(Some(error));
+                }
+            }
+        }
+        match refused {
+            Some(error) if rows.iter().all(|row| row.measured().is_none()) => Err(error.into()),
+            _ => Ok(self.report(rows)),
+        }
     }
 
     /// The report of the scene's toolpaths.
-    pub fn report(&self, toolpaths: Vec<ToolpathResult>) -> RunReport {
+    fn report(&self, toolpaths: Vec<ToolpathReport>) -> RunReport {
         let source = &self.scene.source;
         let name = Path::new(&source.name).file_name();
         let name = name.map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         let title = self.scene.title.clone();
-        RunReport::new(name, sha256(&source.text), title, &self.scene.tolerance, toolpaths)
+        let tolerance = ToleranceFigures::new(&self.scene.tolerance, &self.scene.scallop_rule);
+        RunReport::new(name, sha256(&source.text), title, tolerance, toolpaths)
     }
 
     /// Plans, cuts, measures and judges one toolpath.
@@ -136,19 +169,21 @@ impl Session {
             wall_s: begun.elapsed().as_secs_f64(),
             threads: work::parallel::threads(),
         };
-        let (verdict, violations) = judge::judge(&measured.measurement, &scene.tolerance, found.violations);
+        let (verdict, claims) =
+            judge::judge(&measured.measurement, &scene.tolerance, &scene.scallop_rule, found.claims);
         let measurement = &measured.measurement;
         let result = ToolpathResult {
             name: request.name.clone(),
             strategy: request.strategy_name().to_owned(),
             folder: request.folder.clone(),
             verdict,
-            violations,
+            claims,
             notes: self.notes_on(&planned, &measured, found.notes),
             path: path_figures(&planned.plan.path, planned.time(scene)),
             scallop: measurement.scallop.clone(),
             gouge: measurement.gouge.clone(),
             uncut: measurement.uncut.clone(),
+            excess: measurement.excess,
             deviation: measurement.deviation,
             figures: found.figures,
             simulation,
@@ -259,6 +294,15 @@ impl Session {
     pub fn has_program(&self, outcome: &Outcome) -> bool {
         outcome.path.is_upright() || outcome.joints.is_some()
     }
+}
+
+fn not_planned(request: &ToolpathRequest, reason: String) -> ToolpathReport {
+    ToolpathReport::NotPlanned(NotPlanned {
+        name: request.name.clone(),
+        strategy: request.strategy_name().to_owned(),
+        verdict: Verdict::NotPlanned,
+        reason,
+    })
 }
 
 fn sha256(text: &str) -> String {

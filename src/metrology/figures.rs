@@ -21,6 +21,21 @@ pub struct Limits {
     pub chord: f64,
 }
 
+/// Which ridges may exceed the scallop target. By default none may.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ScallopRule {
+    /// Share of the ridge length that must not exceed the target, above 0 to 1.
+    pub share: f64,
+    /// The highest ridge must not exceed so many times the target; at least 1.
+    pub highest: f64,
+}
+
+impl Default for ScallopRule {
+    fn default() -> Self {
+        Self { share: 1.0, highest: 1.0 }
+    }
+}
+
 /// Figures of the path itself.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct PathFigures {
@@ -137,6 +152,66 @@ pub struct UncutFigures {
     pub region_count: usize,
 }
 
+/// The highest of some places.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Bounded {
+    /// Greatest height; 0 where nothing stands above the design.
+    pub max_mm: f64,
+    /// No place is higher than that by more.
+    pub error_bound_mm: f64,
+    /// Where it stands, if anything does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_mm: Option<[f64; 3]>,
+}
+
+impl Bounded {
+    /// A height without its place.
+    pub fn new(max_mm: f64, error_bound_mm: f64) -> Self {
+        Self { max_mm, error_bound_mm, at_mm: None }
+    }
+
+    /// No place is higher than this, mm.
+    pub fn at_most(&self) -> f64 {
+        self.max_mm + self.error_bound_mm
+    }
+
+    /// The highest of these places and those; of equals, this one.
+    #[must_use]
+    pub fn or(&self, other: &Self) -> Self {
+        let higher = if other.max_mm > self.max_mm { other } else { self };
+        let error_bound_mm = self.at_most().max(other.at_most()) - higher.max_mm;
+        Self { error_bound_mm, ..*higher }
+    }
+}
+
+/// What the highest material is.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ExcessKind {
+    /// A ridge between two passes that came down to the design, or its flank.
+    #[default]
+    Scallop,
+    /// Between a pass that came down to the design and a border of it.
+    Border,
+    /// Where no pass came down to the design.
+    Uncut,
+}
+
+/// The highest material anywhere on what was judged. Scallops and remnants along borders are reached: they answer to the
+/// scallop tolerance. What no pass came down to answers to the uncut tolerance.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct ExcessFigures {
+    /// The highest of all.
+    #[serde(flatten)]
+    pub highest: Bounded,
+    /// What it is.
+    pub kind: ExcessKind,
+    /// The highest where passes came down to the design.
+    pub reached: Bounded,
+    /// The highest elsewhere.
+    pub unreached: Bounded,
+}
+
 /// Signed deviation over all samples.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct DeviationFigures {
@@ -161,6 +236,8 @@ pub struct Measurement {
     pub gouge: GougeFigures,
     /// Uncut regions.
     pub uncut: UncutFigures,
+    /// The highest material.
+    pub excess: ExcessFigures,
     /// Deviation in all.
     pub deviation: DeviationFigures,
     /// Signed deviation at every cell of the stock's grid, mm, `[ny][nx]`; NaN off the part.
@@ -171,6 +248,18 @@ pub struct Measurement {
     pub pairs: PairFigures,
     /// How the figures were refined.
     pub refined: CloserLook,
+}
+
+impl Measurement {
+    /// Share of the ridge length that stands above a height, mm; `None` without ridges.
+    pub fn share_above(&self, height: f64) -> Option<f64> {
+        let length = |over: f64| -> f64 {
+            let high = self.ridge_samples.iter().filter(|s| f64::from(s[0]) > over);
+            high.fold(0.0, |sum, s| sum + f64::from(s[1]))
+        };
+        let all = length(f64::NEG_INFINITY);
+        (all > 0.0).then(|| length(height) / all)
+    }
 }
 
 /// How a measurement was refined.

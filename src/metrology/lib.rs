@@ -56,8 +56,8 @@ pub use engines::{
     Simulation, Task, View,
 };
 pub use figures::{
-    CloserLook, DeviationFigures, GougeFigures, GougeRegion, Limits, Measurement, PathFigures,
-    ScallopFigures, UncutFigures, UncutRegion,
+    Bounded, CloserLook, DeviationFigures, ExcessFigures, ExcessKind, GougeFigures, GougeRegion, Limits,
+    Measurement, PathFigures, ScallopFigures, ScallopRule, UncutFigures, UncutRegion,
 };
 pub use measure::measure;
 pub use meetings::Meetings;

@@ -1,7 +1,7 @@
 //! The figures of a cut on heights: the stock's own grid first, then a closer look where something may hide. mm.
 
 use super::cut_surface::CutSurface;
-use super::figures::{CloserLook, Limits, Measurement};
+use super::figures::{CloserLook, ExcessFigures, Limits, Measurement};
 use super::inspected::inspect;
 use super::inspection::Inspection;
 use super::pairs::pair_figures;
@@ -45,6 +45,7 @@ pub fn measure(
         scallop: scallop_figures(&found.ridges.samples, found.highest, limits),
         gouge: found.gouge,
         uncut: found.uncut,
+        excess: ExcessFigures::default(),
         deviation: found.deviation,
         ridge_samples: found.ridges.samples,
         pairs,

@@ -1,10 +1,12 @@
 //! A small made-up report for the tests of this folder.
 
 use super::{
-    Figure, FigureTable, RunReport, SimulationFigures, SurfaceMeshFigures, ToolpathResult, Verdict, Violation,
+    Claim, Figure, FigureTable, Gravity, RunReport, SimulationFigures, SurfaceMeshFigures, ToleranceFigures,
+    ToolpathReport, ToolpathResult,
 };
 use metrology::{
-    DeviationFigures, GougeFigures, GougeRegion, Limits, PathFigures, ScallopFigures, UncutFigures,
+    DeviationFigures, ExcessFigures, GougeFigures, GougeRegion, Limits, PathFigures, ScallopFigures,
+    ScallopRule, UncutFigures,
 };
 
 pub const LIMITS: Limits = Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chord: 0.001 };
@@ -55,13 +57,13 @@ fn measurement(gouge: f64) -> Measured {
 
 pub fn toolpath(name: &str, machining_time_s: f64, gouge: f64) -> ToolpathResult {
     let measured = measurement(gouge);
-    let violations = measured.gouge.regions.iter().map(|_| violation()).collect::<Vec<_>>();
+    let claims = vec![depth(gouge)];
     ToolpathResult {
         name: name.to_owned(),
         strategy: "zigzag".to_owned(),
         folder: name.to_owned(),
-        verdict: if violations.is_empty() { Verdict::Pass } else { Verdict::Fail },
-        violations,
+        verdict: claims[0].verdict(),
+        claims,
         notes: vec!["the last step was narrowed".to_owned()],
         path: PathFigures {
             cutting_length_mm: 6012.25,
@@ -78,6 +80,7 @@ pub fn toolpath(name: &str, machining_time_s: f64, gouge: f64) -> ToolpathResult
         scallop: measured.scallop,
         gouge: measured.gouge,
         uncut: measured.uncut,
+        excess: ExcessFigures::default(),
         deviation: measured.deviation,
         figures: Vec::new(),
         simulation: SimulationFigures {
@@ -96,9 +99,16 @@ pub fn toolpath(name: &str, machining_time_s: f64, gouge: f64) -> ToolpathResult
 }
 
 /// As the rule tells it.
-fn violation() -> Violation {
-    let text = "gouge 32.0 ± 0.50 µm deep (limit 5.00) at x 12.500 y 7.250 z -1.032, move 1234, toolpath.nc line 1240";
-    Violation { what: "gouge", limit_mm: LIMITS.gouge, measured_mm: 0.032, text: text.to_owned() }
+fn depth(gouge: f64) -> Claim {
+    let text = format!(
+        "gouge {:.1} ± 0.50 µm deep (limit 5.00) at x 12.500 y 7.250 z -1.032, move 1234, toolpath.nc line 1240",
+        1e3 * gouge
+    );
+    Claim::length("gouge", Gravity::Scrap, LIMITS.gouge, gouge, 0.0005).told(text)
+}
+
+pub fn tolerance() -> ToleranceFigures {
+    ToleranceFigures::new(&LIMITS, &ScallopRule::default())
 }
 
 /// A figure with all that one can have.
@@ -127,5 +137,6 @@ fn figure() -> Figure {
 pub fn report() -> RunReport {
     let mut toolpaths = vec![toolpath("zigzag", 402.0, 0.032), toolpath("streamline", 385.0, 0.001)];
     toolpaths[0].figures.push(figure());
-    RunReport::new("wave.toml".into(), "0123abcd".into(), "Wave".into(), &LIMITS, toolpaths)
+    let toolpaths = toolpaths.into_iter().map(|t| ToolpathReport::Measured(Box::new(t))).collect();
+    RunReport::new("wave.toml".into(), "0123abcd".into(), "Wave".into(), tolerance(), toolpaths)
 }

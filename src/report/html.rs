@@ -4,9 +4,9 @@ use base64::Engine as _;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::histogram::Histogram;
-use super::result::{RunReport, ToolpathResult};
+use super::result::{RunReport, ToolpathReport, ToolpathResult};
 use super::table::{bound, conclusion, duration, micrometres, per_cent, with_bound};
-use super::verdict::{Verdict, place};
+use super::verdict::{Claim, Verdict, place};
 
 /// What the page shows of one toolpath besides its figures.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,18 +23,18 @@ pub struct ToolpathPage {
 
 const STYLE: &str = include_str!("style.css");
 
-/// The whole page. `pages` has one entry for each toolpath of `report`; `scene` is the scene's
+/// The whole page. `pages` has one entry for each toolpath of `report` that was measured; `scene` is the scene's
 /// text.
 pub fn html_page(report: &RunReport, pages: &[ToolpathPage], scene: &str) -> String {
     let body = html! {
         header {
             h1 { (report.title) }
-            p.verdict.(report.verdict.word()) { (verdict_word(report.verdict)) span { (conclusion(report)) } }
+            p.verdict.(class(report.verdict)) { (verdict_word(report.verdict)) span { (conclusion(report)) } }
             (findings(report))
             p.faint { "scene " (report.scene) " · millstream " (report.millstream) }
         }
         section { h2 { "Comparison" } (comparison(report)) (tolerances(report)) }
-        @for (toolpath, page) in report.toolpaths.iter().zip(pages) { (toolpath_section(toolpath, page)) }
+        @for (toolpath, page) in report.measured().zip(pages) { (toolpath_section(toolpath, page)) }
         section id="figures" { h2 { "What the figures mean" } (meanings(report)) }
         section {
             h2 { "Scene" }
@@ -60,25 +60,48 @@ pub fn html_page(report: &RunReport, pages: &[ToolpathPage], scene: &str) -> Str
 fn verdict_word(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Pass => "PASS",
+        Verdict::Undecided => "UNDECIDED",
         Verdict::Fail => "FAIL",
+        Verdict::NotPlanned => "NOT PLANNED",
+    }
+}
+
+/// How a verdict is coloured.
+fn class(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Pass => "pass",
+        Verdict::Undecided => "undecided",
+        Verdict::Fail | Verdict::NotPlanned => "fail",
     }
 }
 
 /// What is wrong, of all toolpaths.
 fn findings(report: &RunReport) -> Markup {
     html! {
-        @if report.verdict == Verdict::Fail {
+        @if report.verdict != Verdict::Pass {
             ul.violations {
-                @for t in &report.toolpaths {
-                    @for violation in &t.violations { li { a href=(format!("#{}", t.folder)) { (t.name) } ": " (violation.text) } }
+                @for toolpath in &report.toolpaths {
+                    @match toolpath {
+                        ToolpathReport::Measured(t) => {
+                            @for claim in not_held(t) {
+                                li.(class(claim.verdict())) { a href=(format!("#{}", t.folder)) { (t.name) } ": " (claim.sentence()) }
+                            }
+                        }
+                        ToolpathReport::NotPlanned(t) => { li.fail { (t.name) " could not be planned: " (t.reason) } }
+                    }
                 }
             }
         }
     }
 }
 
+/// The limits that do not hold, and those of which it is not known.
+fn not_held(t: &ToolpathResult) -> impl Iterator<Item = &Claim> {
+    t.claims_that(Verdict::Fail).chain(t.claims_that(Verdict::Undecided))
+}
+
 fn badge(verdict: Verdict) -> Markup {
-    html! { span.badge.(verdict.word()) { (verdict.word()) } }
+    html! { span.badge.(class(verdict)) { (verdict.word()) } }
 }
 
 fn comparison(report: &RunReport) -> Markup {
@@ -94,7 +117,7 @@ fn comparison(report: &RunReport) -> Markup {
                 }
             }
             tbody {
-                @for t in &report.toolpaths {
+                @for t in report.measured() {
                     tr.best[report.best.as_ref() == Some(&t.name)] {
                         th { a href=(format!("#{}", t.folder)) { (t.name) } }
                         td { (t.path.passes) }
@@ -109,6 +132,11 @@ fn comparison(report: &RunReport) -> Markup {
                         td { (badge(t.verdict)) }
                     }
                 }
+                @for toolpath in &report.toolpaths {
+                    @if let ToolpathReport::NotPlanned(t) = toolpath {
+                        tr { th { (t.name) } td colspan="9" { (t.reason) } td { (badge(t.verdict)) } }
+                    }
+                }
             }
         }
     }
@@ -118,8 +146,9 @@ fn tolerances(report: &RunReport) -> Markup {
     let t = &report.tolerance;
     html! {
         p.faint {
-            "Limits: 95 % of the ridge length stay below " (micrometres(Some(t.scallop_mm)))
-            " µm, the highest ridge below " (micrometres(Some(t.scallop_highest_mm))) " µm; gouges stay within "
+            "Limits: the highest ridge stays within " (micrometres(Some(t.scallop_highest_mm))) " µm"
+            @if t.scallop_share < 1.0 { ", " (per_cent(Some(t.scallop_share))) " % of the ridge length within " (micrometres(Some(t.scallop_mm))) " µm" }
+            "; gouges stay within "
             (micrometres(Some(t.gouge_mm))) " µm, material left standing within " (micrometres(Some(t.uncut_mm)))
             " µm. The path's chords keep " (micrometres(Some(t.chord_mm))) " µm. " a href="#figures" { "What the figures and each ± mean" } "."
         }
@@ -131,9 +160,8 @@ fn meanings(report: &RunReport) -> Markup {
     let mut rows = vec![
         (
             "±",
-            "Bound of the figure's own error: the true value differs by no more. A limit counts as violated \
-             when the figure itself exceeds it; where figure and ± together reach the limit, a smaller cell \
-             tells for sure.",
+            "Bound of the figure's own error: the true value differs by no more. A limit holds where figure plus \
+             bound lie within it, and is violated where figure less bound exceeds it. Anything else is undecided.",
         ),
         (
             "scallop",
@@ -163,7 +191,7 @@ fn meanings(report: &RunReport) -> Markup {
              control's own limits are not in it: machines take somewhat longer.",
         ),
     ];
-    for meaning in report.toolpaths.iter().flat_map(|t| &t.figures).filter_map(|figure| figure.meaning) {
+    for meaning in report.measured().flat_map(|t| &t.figures).filter_map(|figure| figure.meaning) {
         if !rows.contains(&meaning) {
             rows.push(meaning);
         }
@@ -176,8 +204,8 @@ fn toolpath_section(t: &ToolpathResult, page: &ToolpathPage) -> Markup {
         section.toolpath id=(t.folder) {
             h2 { (t.name) " " (badge(t.verdict)) }
             p.faint { "strategy " (t.strategy) " · files in " code { (t.folder) "/" } }
-            @if !t.violations.is_empty() {
-                ul.violations { @for violation in &t.violations { li { (violation.text) } } }
+            @if not_held(t).next().is_some() {
+                ul.violations { @for claim in not_held(t) { li.(class(claim.verdict())) { (claim.sentence()) } } }
             }
             @if !t.notes.is_empty() {
                 h3 { "Notes" }
@@ -227,7 +255,7 @@ fn planned(t: &ToolpathResult, field: &[u8], interval: &[u8]) -> Markup {
 
 /// Explains the rings on the map, if there are any.
 fn ringed(t: &ToolpathResult) -> &'static str {
-    if t.violations.is_empty() {
+    if not_held(t).next().is_none() {
         ""
     } else {
         "Rings mark the worst places: G gouges and U uncut material as numbered below, S the highest scallop if it is too high."

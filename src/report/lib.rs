@@ -24,8 +24,9 @@ pub use histogram::Histogram;
 pub use html::{ToolpathPage, html_page};
 pub use map::{MapMark, MapSize, MapWords, deviation_colours, deviation_picture, height_picture};
 pub use result::{
-    ReportError, RunReport, SimulationFigures, SurfaceMeshFigures, ToleranceFigures, ToolpathResult,
+    NotPlanned, ReportError, RunReport, SimulationFigures, SurfaceMeshFigures, ToleranceFigures,
+    ToolpathReport, ToolpathResult,
 };
 pub use surface_mesh::{MAX_TRIANGLES, SurfaceMesh, VertexPlace, surface_mesh};
-pub use table::{bound, conclusion, micrometres, result_table, with_bound};
-pub use verdict::{HIGHEST_RIDGE, Verdict, Violation, place};
+pub use table::{bound, conclusion, micrometres, per_cent, result_table, with_bound};
+pub use verdict::{Claim, Gravity, Verdict, place};

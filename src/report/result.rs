@@ -1,10 +1,14 @@
 //! What one run found, as reports show it, and report.json.
 
 use serde::Serialize;
+use serde::ser::{SerializeMap as _, Serializer};
 
 use super::figure::{Figure, by_key};
-use super::verdict::{Verdict, Violation};
-use metrology::{DeviationFigures, GougeFigures, Limits, PathFigures, ScallopFigures, UncutFigures};
+use super::verdict::{Claim, Verdict};
+use metrology::{
+    DeviationFigures, ExcessFigures, GougeFigures, Limits, PathFigures, ScallopFigures, ScallopRule,
+    UncutFigures,
+};
 
 /// How a toolpath was cut.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -47,10 +51,12 @@ pub struct ToolpathResult {
     pub strategy: String,
     /// The folder with its files.
     pub folder: String,
-    /// Whether every tolerance holds.
+    /// Whether every limit holds.
     pub verdict: Verdict,
-    /// Those that do not.
-    pub violations: Vec<Violation>,
+    /// Every limit with the figure that was held against it, the gravest first. report.json has them as `violations`,
+    /// `undecided` and `held`.
+    #[serde(flatten, serialize_with = "by_verdict")]
+    pub claims: Vec<Claim>,
     /// What planner and program have to say.
     pub notes: Vec<String>,
     /// The path itself.
@@ -61,6 +67,8 @@ pub struct ToolpathResult {
     pub gouge: GougeFigures,
     /// Uncut material.
     pub uncut: UncutFigures,
+    /// The highest material anywhere.
+    pub excess: ExcessFigures,
     /// Deviation in all.
     pub deviation: DeviationFigures,
     /// All other figures, in the order of their list.
@@ -72,11 +80,71 @@ pub struct ToolpathResult {
     pub surface_mesh: SurfaceMeshFigures,
 }
 
+impl ToolpathResult {
+    /// The limits of which that is the verdict.
+    pub fn claims_that(&self, verdict: Verdict) -> impl Iterator<Item = &Claim> {
+        self.claims.iter().filter(move |claim| claim.verdict() == verdict)
+    }
+}
+
+/// Claims as lists, one for each verdict.
+fn by_verdict<S: Serializer>(claims: &[Claim], serializer: S) -> Result<S::Ok, S::Error> {
+    let of = |verdict| claims.iter().filter(|c| c.verdict() == verdict).collect::<Vec<_>>();
+    let mut map = serializer.serialize_map(Some(3))?;
+    map.serialize_entry("violations", &of(Verdict::Fail))?;
+    map.serialize_entry("undecided", &of(Verdict::Undecided))?;
+    map.serialize_entry("held", &of(Verdict::Pass))?;
+    map.end()
+}
+
+/// A toolpath that could not be planned.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NotPlanned {
+    /// What the user calls it.
+    pub name: String,
+    /// How it was to be planned.
+    pub strategy: String,
+    /// [`Verdict::NotPlanned`].
+    pub verdict: Verdict,
+    /// Why there is no path.
+    pub reason: String,
+}
+
+/// One toolpath of a report.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum ToolpathReport {
+    /// It was planned, cut and measured.
+    Measured(Box<ToolpathResult>),
+    /// It could not be planned.
+    NotPlanned(NotPlanned),
+}
+
+impl ToolpathReport {
+    /// Its verdict.
+    pub fn verdict(&self) -> Verdict {
+        match self {
+            Self::Measured(result) => result.verdict,
+            Self::NotPlanned(missing) => missing.verdict,
+        }
+    }
+
+    /// Its figures, if it was planned.
+    pub fn measured(&self) -> Option<&ToolpathResult> {
+        match self {
+            Self::Measured(result) => Some(result),
+            Self::NotPlanned(_) => None,
+        }
+    }
+}
+
 /// The tolerances of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ToleranceFigures {
-    /// Planning target, and limit that 95 % of the ridges stay below.
+    /// Planning target.
     pub scallop_mm: f64,
+    /// Share of the ridge length that must not exceed the target.
+    pub scallop_share: f64,
     /// Limit of the highest ridge.
     pub scallop_highest_mm: f64,
     /// Limit of depth.
@@ -87,11 +155,13 @@ pub struct ToleranceFigures {
     pub chord_mm: f64,
 }
 
-impl From<&Limits> for ToleranceFigures {
-    fn from(limits: &Limits) -> Self {
+impl ToleranceFigures {
+    /// Of a scene's limits and its rule for ridges.
+    pub fn new(limits: &Limits, rule: &ScallopRule) -> Self {
         Self {
             scallop_mm: limits.scallop,
-            scallop_highest_mm: super::HIGHEST_RIDGE * limits.scallop,
+            scallop_share: rule.share,
+            scallop_highest_mm: rule.highest * limits.scallop,
             gouge_mm: limits.gouge,
             uncut_mm: limits.uncut,
             chord_mm: limits.chord,
@@ -110,7 +180,7 @@ pub struct RunReport {
     pub scene_sha256: String,
     /// What the user calls the scene.
     pub title: String,
-    /// Whether every toolpath passes.
+    /// That of the worst toolpath; one that was not planned fails the run.
     pub verdict: Verdict,
     /// Name of the quickest toolpath that passes.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -118,7 +188,7 @@ pub struct RunReport {
     /// The tolerances.
     pub tolerance: ToleranceFigures,
     /// The toolpaths, in the order of the scene.
-    pub toolpaths: Vec<ToolpathResult>,
+    pub toolpaths: Vec<ToolpathReport>,
 }
 
 /// Why no report.json could be written.
@@ -139,20 +209,24 @@ impl RunReport {
         scene: String,
         scene_sha256: String,
         title: String,
-        limits: &Limits,
-        toolpaths: Vec<ToolpathResult>,
+        tolerance: ToleranceFigures,
+        toolpaths: Vec<ToolpathReport>,
     ) -> Self {
-        let pass = toolpaths.iter().all(|t| t.verdict == Verdict::Pass);
         Self {
             millstream: env!("CARGO_PKG_VERSION"),
             scene,
             scene_sha256,
             title,
-            verdict: if pass { Verdict::Pass } else { Verdict::Fail },
-            best: best(&toolpaths).map(|k| toolpaths[k].name.clone()),
-            tolerance: limits.into(),
+            verdict: Verdict::of_run(toolpaths.iter().map(ToolpathReport::verdict)),
+            best: best(&toolpaths).map(|t| t.name.clone()),
+            tolerance,
             toolpaths,
         }
+    }
+
+    /// The toolpaths that were planned, cut and measured.
+    pub fn measured(&self) -> impl Iterator<Item = &ToolpathResult> {
+        self.toolpaths.iter().filter_map(ToolpathReport::measured)
     }
 
     /// The text of report.json: pretty-printed, keys in fixed order, every number finite, `null`
@@ -171,10 +245,10 @@ impl RunReport {
 }
 
 /// The quickest of those that pass.
-fn best(toolpaths: &[ToolpathResult]) -> Option<usize> {
-    let passing = toolpaths.iter().enumerate().filter(|(_, t)| t.verdict == Verdict::Pass);
-    let time = |t: &ToolpathResult| t.path.machining_time_s;
-    passing.min_by(|a, b| time(a.1).total_cmp(&time(b.1))).map(|(k, _)| k)
+fn best(toolpaths: &[ToolpathReport]) -> Option<&ToolpathResult> {
+    let passing =
+        toolpaths.iter().filter_map(ToolpathReport::measured).filter(|t| t.verdict == Verdict::Pass);
+    passing.min_by(|a, b| a.path.machining_time_s.total_cmp(&b.path.machining_time_s))
 }
 
 fn check_nulls(path: &str, value: &serde_json::Value) -> Result<(), ReportError> {
@@ -199,6 +273,13 @@ mod tests {
     use super::super::fixture;
     use super::*;
 
+    fn edit(report: &mut RunReport, k: usize, change: impl FnOnce(&mut ToolpathResult)) {
+        match &mut report.toolpaths[k] {
+            ToolpathReport::Measured(result) => change(result),
+            ToolpathReport::NotPlanned(missing) => panic!("{missing:?}"),
+        }
+    }
+
     #[test]
     fn the_report_is_written_in_its_fixed_order() {
         let text = fixture::report().to_json().unwrap();
@@ -211,14 +292,14 @@ mod tests {
     fn figures_that_are_not_finite_are_refused_by_name() {
         for bad in [f64::NAN, f64::INFINITY] {
             let mut report = fixture::report();
-            report.toolpaths[1].deviation.rms_mm = bad;
+            edit(&mut report, 1, |t| t.deviation.rms_mm = bad);
             let error = report.to_json().unwrap_err();
             assert_eq!(error, ReportError::NotFinite("report.toolpaths[1].deviation.rms_mm".into()));
         }
         let mut report = fixture::report();
-        report.toolpaths[0].scallop.max_mm = None;
+        edit(&mut report, 0, |t| t.scallop.max_mm = None);
         assert!(report.to_json().is_err(), "null without a reason");
-        report.toolpaths[0].scallop.reason = Some("no ridge".into());
+        edit(&mut report, 0, |t| t.scallop.reason = Some("no ridge".into()));
         assert!(report.to_json().is_ok());
     }
 
@@ -227,9 +308,21 @@ mod tests {
         let report = fixture::report();
         assert_eq!(report.best.as_deref(), Some("streamline"));
         assert_eq!(report.verdict, Verdict::Fail);
-        let slower = fixture::toolpath("slower", 900.0, 0.0);
+        let slower = ToolpathReport::Measured(Box::new(fixture::toolpath("slower", 900.0, 0.0)));
         let both = vec![slower, report.toolpaths[1].clone()];
-        let report = RunReport::new("a".into(), "b".into(), "c".into(), &fixture::LIMITS, both);
+        let report = RunReport::new("a".into(), "b".into(), "c".into(), fixture::tolerance(), both.clone());
         assert_eq!((report.best.as_deref(), report.verdict), (Some("streamline"), Verdict::Pass));
+        let missing = NotPlanned {
+            name: "odd".into(),
+            strategy: "streamline".into(),
+            verdict: Verdict::NotPlanned,
+            reason: "it has no feed direction".into(),
+        };
+        let all = [both, vec![ToolpathReport::NotPlanned(missing)]].concat();
+        let report = RunReport::new("a".into(), "b".into(), "c".into(), fixture::tolerance(), all);
+        assert_eq!((report.best.as_deref(), report.verdict), (Some("streamline"), Verdict::Fail));
+        let read: serde_json::Value = serde_json::from_str(&report.to_json().unwrap()).unwrap();
+        assert_eq!(read["toolpaths"][2]["verdict"], "not planned");
+        assert_eq!(read["toolpaths"][2]["reason"], "it has no feed direction");
     }
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::canvas::shortened;
-use super::result::{RunReport, ToolpathResult};
+use super::result::{NotPlanned, RunReport, ToolpathReport, ToolpathResult};
 use super::scale::plain;
 use super::verdict::Verdict;
 
@@ -60,7 +60,7 @@ pub fn per_cent(share: Option<f64>) -> String {
 fn row(out: &mut String, cells: [&str; 11]) -> std::fmt::Result {
     let [name, passes, length, time, max, p95, p50, over, uncut, gouge, verdict] = cells;
     let line = format!(
-        "{name:<NAME_WIDTH$} {passes:>6} {length:>8} {time:>8} {max:>12} {p95:>6} {p50:>6} {over:>6} {uncut:>7} {gouge:>6}  {verdict}"
+        "{name:<NAME_WIDTH$} {passes:>6} {length:>7} {time:>7} {max:>12} {p95:>5} {p50:>5} {over:>5} {uncut:>6} {gouge:>11}  {verdict}"
     );
     writeln!(out, "{}", line.trim_end())
 }
@@ -79,10 +79,16 @@ fn toolpath_row(out: &mut String, t: &ToolpathResult) -> std::fmt::Result {
             &micrometres(scallop.p50_mm),
             &per_cent(scallop.over_target_fraction),
             &format!("{:.2}", t.uncut.area_mm2),
-            &micrometres(Some(t.gouge.max_depth_mm)),
+            &with_bound(Some(t.gouge.max_depth_mm), Some(t.gouge.error_bound_mm)),
             t.verdict.word(),
         ],
     )
+}
+
+/// What was not planned has a name and a verdict.
+fn missing_row(out: &mut String, t: &NotPlanned) -> std::fmt::Result {
+    let name = shortened(&t.name, NAME_WIDTH);
+    row(out, [&name, "-", "-", "-", "-", "-", "-", "-", "-", "-", t.verdict.word()])
 }
 
 /// Widest line, letters.
@@ -129,13 +135,26 @@ fn write_table(out: &mut String, report: &RunReport) -> std::fmt::Result {
     )?;
     row(out, ["", "", "mm", "", "µm", "µm", "µm", "%", "mm²", "µm", ""])?;
     writeln!(out, "{}", "-".repeat(WIDTH))?;
-    report.toolpaths.iter().try_for_each(|t| toolpath_row(out, t))?;
-    write_sentences(out, report)?;
-    for t in report.toolpaths.iter().filter(|t| !t.violations.is_empty()) {
-        writeln!(out, "\n{} violates:", t.name)?;
-        t.violations.iter().try_for_each(|violation| sentence(out, &violation.text))?;
+    for toolpath in &report.toolpaths {
+        match toolpath {
+            ToolpathReport::Measured(t) => toolpath_row(out, t)?,
+            ToolpathReport::NotPlanned(t) => missing_row(out, t)?,
+        }
     }
-    for t in &report.toolpaths {
+    write_sentences(out, report)?;
+    for toolpath in &report.toolpaths {
+        if let ToolpathReport::NotPlanned(t) = toolpath {
+            writeln!(out, "\n{} could not be planned:", t.name)?;
+            sentence(out, &t.reason)?;
+        }
+    }
+    for (verdict, heading) in [(Verdict::Fail, "violates"), (Verdict::Undecided, "leaves undecided")] {
+        for t in report.measured().filter(|t| t.claims_that(verdict).next().is_some()) {
+            writeln!(out, "\n{} {heading}:", t.name)?;
+            t.claims_that(verdict).try_for_each(|claim| sentence(out, &claim.sentence()))?;
+        }
+    }
+    for t in report.measured() {
         let reason = t.scallop.reason.iter().map(|reason| format!("no scallop height: {reason}"));
         let notes: Vec<String> = t.notes.iter().cloned().chain(reason).collect();
         if !notes.is_empty() {
@@ -148,7 +167,7 @@ fn write_table(out: &mut String, report: &RunReport) -> std::fmt::Result {
 
 /// The sentences of all figures, under their headings.
 fn write_sentences(out: &mut String, report: &RunReport) -> std::fmt::Result {
-    let sentences = || report.toolpaths.iter().flat_map(|t| &t.figures).filter_map(|f| f.sentence.as_ref());
+    let sentences = || report.measured().flat_map(|t| &t.figures).filter_map(|f| f.sentence.as_ref());
     let mut headings: Vec<&str> = Vec::new();
     for (heading, _) in sentences() {
         if !headings.contains(heading) {
@@ -163,15 +182,23 @@ fn write_sentences(out: &mut String, report: &RunReport) -> std::fmt::Result {
 
 /// The outcome in a sentence.
 pub fn conclusion(report: &RunReport) -> String {
-    let passing = report.toolpaths.iter().filter(|t| t.verdict == Verdict::Pass).count();
-    let best = |name: &str| report.toolpaths.iter().find(|t| t.name == name).map(|t| t.path.machining_time_s);
-    match (&report.best, report.toolpaths.len()) {
+    let count = |verdict| report.toolpaths.iter().filter(|t| t.verdict() == verdict).count();
+    let (passing, undecided, all) = (count(Verdict::Pass), count(Verdict::Undecided), report.toolpaths.len());
+    let best = report.measured().find(|t| Some(&t.name) == report.best.as_ref());
+    match (best, all) {
+        (None, 1) if undecided == 1 => {
+            "Undecided: the error bound of a figure reaches across its limit.".to_owned()
+        }
         (None, 1) => "The toolpath violates a tolerance.".to_owned(),
+        (None, _) if undecided > 0 => {
+            format!("No toolpath is proven to hold every tolerance; {undecided} of {all} are undecided.")
+        }
         (None, _) => "No toolpath holds every tolerance.".to_owned(),
         (Some(_), 1) => "Every tolerance holds.".to_owned(),
-        (Some(name), all) => format!(
-            "{passing} of {all} toolpaths hold every tolerance; the quickest of them is {name} ({}).",
-            duration(best(name).unwrap_or_default())
+        (Some(best), all) => format!(
+            "{passing} of {all} toolpaths hold every tolerance. Fastest: {}, {}.",
+            best.name,
+            duration(best.path.machining_time_s)
         ),
     }
 }

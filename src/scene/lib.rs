@@ -30,8 +30,8 @@ pub use write::complete_toml;
 
 use cutter::{Cutter, Holder};
 use machine::Machine;
-use metrology::Limits;
 pub use metrology::{EngineChoice, Simulation};
+use metrology::{Limits, ScallopRule};
 use toolpath::{Joining, Step, Strategy};
 
 /// Default allowance of stock above the part's highest point, mm.
@@ -132,6 +132,8 @@ pub struct Scene {
     pub cutting: CuttingData,
     /// What is tolerated.
     pub tolerance: Limits,
+    /// Which ridges may exceed the scallop tolerance.
+    pub scallop_rule: ScallopRule,
     /// How it is simulated.
     pub simulation: Simulation,
     /// On what.

@@ -12,7 +12,7 @@ use super::{axis, direction, interference, kinematics, part};
 use cutter::{Cutter, Holder, HolderSection};
 use keys::{LENGTH, Located, SceneError, SceneText, Section};
 use machine::Machine;
-use metrology::Limits;
+use metrology::{Limits, ScallopRule};
 use toolpath::{Joining, Links, PartKind, Step, read_pocket_step, read_strategy, words_for};
 
 /// Largest scene that is read, bytes. A scene is a page of text; a larger file is a mistake.
@@ -84,6 +84,7 @@ impl Scene {
         let stock = read_stock(&root.section("stock")?, &part, &cutter)?;
         let holder = read_holder(&root, &cutter)?;
         let tolerance = read_tolerance(&root.section("tolerance")?)?;
+        let scallop_rule = read_scallop_rule(&root.section("tolerance")?)?;
         let mut simulation = read_simulation(&root.section("simulation")?, &cutter, &tolerance)?;
         let section = root.section("machine")?;
         let keep_clear = interference::read(&root, &folder)?;
@@ -103,6 +104,7 @@ impl Scene {
             holder,
             cutting,
             tolerance,
+            scallop_rule,
             simulation,
             machine,
             five_axis,
@@ -224,13 +226,28 @@ fn read_holder(root: &Section<'_>, cutter: &Cutter) -> Result<Option<Holder>, Sc
 }
 
 fn read_tolerance(section: &Section<'_>) -> Result<Limits, SceneError> {
-    section.only(&["scallop", "gouge", "uncut", "chord"], &[], "[tolerance]")?;
+    const KEYS: [&str; 6] = ["scallop", "scallop_share", "scallop_highest", "gouge", "uncut", "chord"];
+    section.only(&KEYS, &[], "[tolerance]")?;
     let length = |key, default| Ok::<f64, SceneError>(section.length(key)?.map_or(default, |v| v.value));
     Ok(Limits {
         scallop: length("scallop", DEFAULT_LIMITS.scallop)?,
         gouge: length("gouge", DEFAULT_LIMITS.gouge)?,
         uncut: length("uncut", DEFAULT_LIMITS.uncut)?,
         chord: length("chord", DEFAULT_LIMITS.chord)?,
+    })
+}
+
+/// Ridges of which less must hold the target are not judged by it; ridges that may be higher neither.
+const LEAST_SHARE: f64 = 0.01;
+const GREATEST_FACTOR: f64 = 100.0;
+
+fn read_scallop_rule(section: &Section<'_>) -> Result<ScallopRule, SceneError> {
+    let strict = ScallopRule::default();
+    let share = section.number("scallop_share", LEAST_SHARE..=1.0, "")?;
+    let highest = section.number("scallop_highest", 1.0..=GREATEST_FACTOR, "")?;
+    Ok(ScallopRule {
+        share: share.map_or(strict.share, |v| v.value),
+        highest: highest.map_or(strict.highest, |v| v.value),
     })
 }
 

@@ -31,11 +31,10 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     write_holder(out, scene)?;
     let limits = &scene.tolerance;
     writeln!(out, "\n[tolerance]  # mm")?;
-    writeln!(
-        out,
-        "scallop = {}  # 95 % of the ridge length stay below it, the highest ridge below 1.25 times",
-        number(limits.scallop)
-    )?;
+    writeln!(out, "scallop = {}  # planned for, and the limit of ridges", number(limits.scallop))?;
+    let rule = &scene.scallop_rule;
+    writeln!(out, "scallop_share = {}  # of the ridge length, must not exceed it", number(rule.share))?;
+    writeln!(out, "scallop_highest = {}  # times it, no ridge may exceed", number(rule.highest))?;
     writeln!(out, "gouge = {}", number(limits.gouge))?;
     writeln!(out, "uncut = {}", number(limits.uncut))?;
     writeln!(out, "chord = {}", number(limits.chord))?;

@@ -7,6 +7,8 @@
 ///
 /// Called from several threads at once; implementations must be cheap.
 pub trait Monitor: Sync {
+    /// The next stages belong to a piece of work of that name.
+    fn belongs_to(&self, _name: &str) {}
     /// A stage begins that will take `steps` steps (0: unknown).
     fn start(&self, _stage: &str, _steps: u64) {}
     /// `steps` more steps of the current stage are done.

@@ -7,8 +7,8 @@ use io::{exr, png};
 use job::{Outcome, Session, marks};
 use metrology::{NormalMap, PatchGrid, View};
 use report::{
-    HIGHEST_RIDGE, Histogram, MapSize, MapWords, Picture, ToolpathPage, deviation_picture, field_picture,
-    height_picture, interval_picture,
+    Histogram, MapSize, MapWords, Picture, ToolpathPage, deviation_picture, field_picture, height_picture,
+    interval_picture,
 };
 use sim::{Grid, ZMap};
 use work::parallel;
@@ -26,8 +26,8 @@ pub fn maps(session: &Session, outcome: &Outcome, outputs: &Outputs) -> Result<T
         View::Heights(cut) => maps.of_heights(cut)?,
         View::Normals(view) => maps.of_normals(&view.map, view.spacing)?,
     };
-    let scallop = session.scene.tolerance.scallop;
-    let histogram = Histogram::new(&outcome.measurement.ridge_samples, scallop, HIGHEST_RIDGE * scallop);
+    let (scallop, rule) = (session.scene.tolerance.scallop, session.scene.scallop_rule);
+    let histogram = Histogram::new(&outcome.measurement.ridge_samples, scallop, rule.highest * scallop);
     Ok(ToolpathPage { histogram, ..page })
 }
 
@@ -81,7 +81,7 @@ impl Maps<'_> {
         let title = |what: &str| format!("{what}, {}", result.name);
         let [deviations, heights, fields, intervals] =
             ["Deviation", "Height", "Feed directions", "Interval of passes"].map(title);
-        let rings = marks(&self.outcome.measurement, &scene.tolerance);
+        let rings = marks(&self.outcome.measurement, &scene.tolerance, &scene.scallop_rule);
         let words = |title, marks| MapWords { title, subtitle: &subtitle, marks, axes: ["x", "y"] };
         let (deviation_png, height_png) = parallel::join(
             || {

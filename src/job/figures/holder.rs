@@ -1,7 +1,7 @@
 //! Shank and holder against the stock.
 
 use metrology::View;
-use report::{Violation, place};
+use report::{Claim, Gravity, place};
 use sim::{HolderClearance, StandingHits, VoxelEngine, holder_collisions};
 use work::monitor::Monitor;
 
@@ -17,24 +17,32 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     match run.view() {
         View::Heights(cut) => {
             let held = holder_collisions(cut, holder, run.path(), monitor)?;
-            let violations = collision(&held, &|k| run.line(k)).into_iter().collect();
-            Ok(Finding { notes: vec![note(&held)], violations, ..Finding::default() })
+            let claims = vec![clear_of_stock(&held, &|k| run.line(k))];
+            Ok(Finding { notes: vec![note(&held)], claims, ..Finding::default() })
         }
         View::Normals(_) if run.scene().simulation.removal => {
             let stock = run.session.voxel_stock();
             let voxel = voxel_in_order(run, &stock);
             let engine = VoxelEngine::new(&stock, &run.tool.cutter, run.path()).map_err(run.voxels())?;
             let hits = engine.holder_in_stock(holder, run.path(), voxel, monitor).map_err(run.voxels())?;
-            let violations = standing_collision(&hits, voxel, &|k| run.program_line(k)).into_iter().collect();
-            Ok(Finding { notes: vec![standing_note(&hits, voxel)], violations, ..Finding::default() })
+            let claims = vec![clear_of_standing(&hits, voxel, &|k| run.program_line(k))];
+            Ok(Finding { notes: vec![standing_note(&hits, voxel)], claims, ..Finding::default() })
         }
         View::Normals(_) => Ok(Finding::default()),
     }
 }
 
-/// The violation that shank or holder meet the finished stock.
-fn collision(holder: &HolderClearance, line: &dyn Fn(u32) -> u32) -> Option<Violation> {
-    let worst = holder.collisions.iter().reduce(|a, b| if b.depth > a.depth { b } else { a })?;
+fn collision(depth: f64, error_bound: f64) -> Claim {
+    Claim::length("collision", Gravity::Crash, 0.0, depth, error_bound)
+}
+
+/// That shank and holder do not meet the finished stock.
+fn clear_of_stock(holder: &HolderClearance, line: &dyn Fn(u32) -> u32) -> Claim {
+    let Some(worst) = holder.collisions.iter().reduce(|a, b| if b.depth > a.depth { b } else { a }) else {
+        let (lowest, bound) =
+            if holder.lowest.is_finite() { (holder.lowest, holder.error_bound) } else { (0.0, 0.0) };
+        return collision(-lowest, bound).told(note(holder));
+    };
     let text = format!(
         "section {} of the holder stands {:.3} ± {:.3} mm deep in the stock at {}, move {}, toolpath.nc line {}{}",
         worst.section + 1,
@@ -45,12 +53,14 @@ fn collision(holder: &HolderClearance, line: &dyn Fn(u32) -> u32) -> Option<Viol
         line(worst.move_index),
         more_moves(holder.collisions.len())
     );
-    Some(Violation { what: "collision", limit_mm: 0.0, measured_mm: worst.depth, text })
+    collision(worst.depth, worst.error_bound).told(text)
 }
 
-/// The violation that shank or holder run into stock that still stands, by voxels of `voxel` mm.
-fn standing_collision(hits: &StandingHits, voxel: f64, line: &dyn Fn(u32) -> String) -> Option<Violation> {
-    let worst = hits.worst.as_ref()?;
+/// That shank and holder do not run into stock that still stands, by voxels of `voxel` mm.
+fn clear_of_standing(hits: &StandingHits, voxel: f64, line: &dyn Fn(u32) -> String) -> Claim {
+    let Some(worst) = hits.worst.as_ref() else {
+        return collision(0.0, 0.0).told(standing_note(hits, voxel));
+    };
     let text = format!(
         "section {} of the holder runs at least {:.3} mm into stock that still stands at {}, move {}{}{} (voxels of {:.3} mm)",
         worst.section + 1,
@@ -61,7 +71,7 @@ fn standing_collision(hits: &StandingHits, voxel: f64, line: &dyn Fn(u32) -> Str
         more_moves(hits.moves.len()),
         voxel
     );
-    Some(Violation { what: "collision", limit_mm: 0.0, measured_mm: worst.depth, text })
+    collision(worst.depth, 0.0).told(text)
 }
 
 /// What else is to be said about a holder that was held against standing stock.
@@ -98,6 +108,7 @@ fn note(holder: &HolderClearance) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use report::Verdict;
     use sim::Collision;
 
     #[test]
@@ -112,14 +123,16 @@ mod tests {
             collisions,
             uncertain: 3,
         };
-        let found = collision(&holder, &|k| k + 10).unwrap();
-        assert_eq!((found.what, found.measured_mm), ("collision", 2.25));
+        let found = clear_of_stock(&holder, &|k| k + 10);
+        assert_eq!((found.what, found.measured, found.verdict()), ("collision", Some(2.25), Verdict::Fail));
         let expected = "section 2 of the holder stands 2.250 ± 0.100 mm deep in the stock at x 1.000 y 2.000 z 3.000, \
                         move 6, toolpath.nc line 16, and on one more move";
         assert_eq!(found.text, expected);
         assert!(note(&holder).contains("on 3 moves only a finer cell"));
         (holder.collisions, holder.lowest, holder.uncertain) = (vec![], 1.5, 0);
-        assert_eq!(collision(&holder, &|_| 0), None);
+        assert_eq!(clear_of_stock(&holder, &|_| 0).verdict(), Verdict::Pass);
+        let near = HolderClearance { lowest: 0.05, ..holder.clone() };
+        assert_eq!(clear_of_stock(&near, &|_| 0).verdict(), Verdict::Undecided);
         assert_eq!(note(&holder), "shank and holder stay 1.500 ± 0.100 mm above the finished stock");
     }
 
@@ -128,14 +141,14 @@ mod tests {
         let at = geometry::Point3::new(1.0, 2.0, 3.0);
         let worst = sim::HolderHit { move_index: 2, section: 1, at, depth: 0.75 };
         let hits = StandingHits { moves: vec![2, 5, 9], worst: Some(worst) };
-        let found = standing_collision(&hits, 0.3, &|k| format!(", toolpath.nc line {}", k + 4)).unwrap();
-        assert_eq!((found.what, found.measured_mm), ("collision", 0.75));
+        let found = clear_of_standing(&hits, 0.3, &|k| format!(", toolpath.nc line {}", k + 4));
+        assert_eq!((found.what, found.measured, found.verdict()), ("collision", Some(0.75), Verdict::Fail));
         let expected = "section 2 of the holder runs at least 0.750 mm into stock that still stands at x 1.000 y 2.000 z \
                         3.000, move 2, toolpath.nc line 6, and on 2 more moves (voxels of 0.300 mm)";
         assert_eq!(found.text, expected);
         assert!(standing_note(&hits, 0.3).contains("rough the block first"));
         let clear = StandingHits::default();
-        assert_eq!(standing_collision(&clear, 0.3, &|_| String::new()), None);
+        assert_eq!(clear_of_standing(&clear, 0.3, &|_| String::new()).verdict(), Verdict::Pass);
         assert!(standing_note(&clear, 0.3).contains("less than 0.520 mm across"));
     }
 }

@@ -1,5 +1,5 @@
 //! The figures of a toolpath beside scallop, gouge, uncut and deviation. Each is one file, which finds its numbers, tells
-//! them in words, and says what they violate; a new one is one file and one line in [`FIGURES`].
+//! them in words, and holds them against their limits; a new one is one file and one line in [`FIGURES`].
 
 mod field;
 mod holder;
@@ -17,7 +17,7 @@ mod tool_contact;
 use serde::Serialize;
 use serde_json::Value;
 
-use report::{Figure, FigureFile, ReportError, Violation};
+use report::{Claim, Figure, FigureFile, ReportError};
 use work::monitor::{self, Monitor};
 
 use super::JobError;
@@ -47,7 +47,7 @@ const FIGURES: [Find; 12] = [
 pub(crate) struct Found {
     pub figures: Vec<Figure>,
     pub notes: Vec<String>,
-    pub violations: Vec<Violation>,
+    pub claims: Vec<Claim>,
     pub files: Vec<FigureFile>,
 }
 
@@ -56,9 +56,9 @@ pub(crate) fn all(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Found, JobErro
     let mut found = Found::default();
     for find in FIGURES {
         monitor::check(monitor)?;
-        let Finding { figure, notes, violations } = find(run, monitor)?;
+        let Finding { figure, notes, claims } = find(run, monitor)?;
         found.notes.extend(notes);
-        found.violations.extend(violations);
+        found.claims.extend(claims);
         if let Some(mut figure) = figure {
             found.files.append(&mut figure.files);
             found.figures.push(figure);

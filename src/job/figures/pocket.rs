@@ -1,7 +1,7 @@
 //! Walls and engagement of a pocket.
 
 use metrology::{PocketFigures, View};
-use report::{Figure, Violation, micrometres, with_bound};
+use report::{Claim, Figure, Gravity, micrometres, with_bound};
 use toolpath::PocketStrategy;
 use work::monitor::Monitor;
 
@@ -21,9 +21,9 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
     };
     let step = run.request.step;
     let p = pocket_figures(run.scene(), pocket, strategy, step, run.path(), cut, run.session.top, engaged);
-    let violations = wall_violation(run, &p).into_iter().collect();
+    let claims = vec![within_walls(run, &p)];
     let figure = Figure { key: "pocket", value: value(&p)?, rows: rows(&p), ..Figure::default() };
-    Ok(Finding { figure: Some(figure), violations, ..Finding::default() })
+    Ok(Finding { figure: Some(figure), claims, ..Finding::default() })
 }
 
 fn rows(p: &PocketFigures) -> Vec<(&'static str, String)> {
@@ -52,19 +52,17 @@ fn rows(p: &PocketFigures) -> Vec<(&'static str, String)> {
     ]
 }
 
-/// The violation that the cutter came beyond a pocket's outline.
-fn wall_violation(run: &Run<'_>, pocket: &PocketFigures) -> Option<Violation> {
+/// That the cutter does not come beyond a pocket's outline.
+fn within_walls(run: &Run<'_>, pocket: &PocketFigures) -> Claim {
     let limit = run.scene().tolerance.gouge;
     let measured = pocket.wall_gouge_mm.max(pocket.wall_gouge_of_cells_mm);
-    if measured <= limit {
-        return None;
-    }
+    let bound = pocket.wall_gouge_error_bound_mm;
     let index = pocket.wall_gouge_move;
     let text = format!(
         "the wall is cut {} µm beyond the outline (limit {}) by move {index}, toolpath.nc line {}",
-        with_bound(Some(measured), Some(pocket.wall_gouge_error_bound_mm)),
+        with_bound(Some(measured), Some(bound)),
         micrometres(Some(limit)),
         run.line(index)
     );
-    Some(Violation { what: "wall", limit_mm: limit, measured_mm: measured, text })
+    Claim::length("wall", Gravity::Scrap, limit, measured, bound).told(text)
 }

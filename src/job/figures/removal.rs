@@ -2,7 +2,7 @@
 
 use cutter::Solid;
 use metrology::{RemovalFigures, View, removal_figures, voxel_removal_figures};
-use report::{Figure, Violation, place};
+use report::{Claim, Figure, Gravity, place};
 use sim::{VoxelEngine, VoxelStock, ZMap, cut_in_order};
 use work::monitor::Monitor;
 
@@ -38,7 +38,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     for contact in &mut r.rapid_contacts {
         contact.line = run.line(contact.move_index);
     }
-    let violations = rapid_violation(&r).into_iter().collect();
+    let claims = vec![no_rapid_in_stock(&r)];
     let (greatest, bound) =
         (r.max_material_removal_rate_mm3_min, r.max_material_removal_rate_error_bound_mm3_min);
     let (most, mean) = (r.p95_material_removal_rate_mm3_min, r.mean_material_removal_rate_mm3_min);
@@ -53,7 +53,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     ];
     let figure =
         Figure { key: "removal", value: value(&r)?, rows, meaning: Some(MEANING), ..Figure::default() };
-    Ok(Finding { figure: Some(figure), violations, ..Finding::default() })
+    Ok(Finding { figure: Some(figure), claims, ..Finding::default() })
 }
 
 /// The voxel of removal in order, mm.
@@ -71,10 +71,12 @@ fn by_voxels(run: &Run<'_>, monitor: &dyn Monitor) -> Result<RemovalFigures, Job
     Ok(voxel_removal_figures(run.path(), &removed, voxel))
 }
 
-/// The violation of rapid moves that touched stock, told of the first of them: on a machine it is the
-/// one that breaks the cutter.
-fn rapid_violation(removal: &RemovalFigures) -> Option<Violation> {
-    let first = removal.rapid_contacts.first()?;
+/// That no rapid move touches stock; told of the first one that does: on a machine it is the one that breaks the cutter.
+fn no_rapid_in_stock(removal: &RemovalFigures) -> Claim {
+    let claim = |depth| Claim::length("rapid", Gravity::Crash, 0.0, depth, 0.0);
+    let Some(first) = removal.rapid_contacts.first() else {
+        return claim(0.0).told("no rapid move touches stock".into());
+    };
     let deepest = removal.rapid_contacts.iter().map(|c| c.depth_mm).fold(0.0, f64::max);
     let mut text = format!(
         "a rapid move touches stock, {:.3} mm deep, at {}, move {}",
@@ -91,7 +93,7 @@ fn rapid_violation(removal: &RemovalFigures) -> Option<Violation> {
         2 => text += ", and one more rapid move does",
         n => text += &format!(", and {} more rapid moves do", n - 1),
     }
-    Some(Violation { what: "rapid", limit_mm: 0.0, measured_mm: deepest, text })
+    claim(deepest).told(text)
 }
 
 #[cfg(test)]
@@ -101,13 +103,14 @@ mod tests {
     #[test]
     fn the_first_rapid_in_stock_is_told_with_its_line() {
         use metrology::RapidContactFigures;
-        assert_eq!(rapid_violation(&RemovalFigures::default()), None);
+        assert_eq!(no_rapid_in_stock(&RemovalFigures::default()).verdict(), report::Verdict::Pass);
         let contact =
             |depth_mm| RapidContactFigures { move_index: 7, line: 12, at_mm: [1.0, 2.0, 3.0], depth_mm };
         let rapid_contacts = vec![contact(0.25), contact(1.5)];
         let removal = RemovalFigures { rapid_contacts, rapid_contact_count: 3, ..Default::default() };
-        let found = rapid_violation(&removal).unwrap();
-        assert_eq!((found.what, found.measured_mm), ("rapid", 1.5));
+        let found = no_rapid_in_stock(&removal);
+        assert_eq!((found.what, found.measured), ("rapid", Some(1.5)));
+        assert_eq!(found.verdict(), report::Verdict::Fail);
         let place =
             "0.250 mm deep, at x 1.000 y 2.000 z 3.000, move 7, toolpath.nc line 12, and 2 more rapid";
         assert!(found.text.contains(place), "{}", found.text);

@@ -3,15 +3,15 @@
 use collision::{Check, Interference, Obstacle, Shortfall};
 use metrology::View;
 use motion::{Move, MoveKind};
-use report::{Violation, place};
+use report::{Claim, Gravity, place};
 use work::monitor::Monitor;
 
 use super::more_moves;
 use crate::JobError;
 use crate::run::{Finding, Run};
 
-/// The violation that shank or holder touch the part or a fixture, the cutter a fixture, or the cutter the part while it
-/// is not cutting. Of tools that lean.
+/// That shank and holder touch neither part nor fixture, the cutter no fixture, nor the part while it is not cutting. Of
+/// tools that lean.
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
     let View::Normals(_) = run.view() else { return Ok(Finding::default()) };
     monitor.start("looking for collisions", 0);
@@ -27,7 +27,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     }
     let mut found = contacts(run, always, &|_| true);
     found.extend(contacts(run, vec![check(&tool.cutter, part, slack)], &|to| to.kind == MoveKind::Rapid));
-    Ok(Finding { violations: violation(&found, run).into_iter().collect(), ..Finding::default() })
+    Ok(Finding { claims: vec![clear(&found, run)], ..Finding::default() })
 }
 
 /// What the chosen moves touch: the move, what is missing there, and what of the tool it is.
@@ -44,8 +44,12 @@ fn contacts<'a>(
     found.into_iter().map(|(k, hit)| (k, hit, whose[hit.check])).collect()
 }
 
-fn violation(found: &[(usize, Shortfall, &str)], run: &Run<'_>) -> Option<Violation> {
-    let (index, worst, what) = found.iter().reduce(|a, b| if b.1.depth > a.1.depth { b } else { a })?;
+fn clear(found: &[(usize, Shortfall, &str)], run: &Run<'_>) -> Claim {
+    let claim = |depth| Claim::length("collision", Gravity::Crash, 0.0, depth, 0.0);
+    let deepest = found.iter().reduce(|a, b| if b.1.depth > a.1.depth { b } else { a });
+    let Some((index, worst, what)) = deepest else {
+        return claim(0.0).told("no part of the tool that does not cut touches part or fixture".into());
+    };
     let at = worst.nearest.place;
     let text = format!(
         "{what} runs at least {:.3} mm into part or fixture at {}, move {index}{}{}",
@@ -54,5 +58,5 @@ fn violation(found: &[(usize, Shortfall, &str)], run: &Run<'_>) -> Option<Violat
         run.program_line(*index as u32),
         more_moves(found.len())
     );
-    Some(Violation { what: "collision", limit_mm: 0.0, measured_mm: worst.depth, text })
+    claim(worst.depth).told(text)
 }

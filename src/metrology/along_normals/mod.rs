@@ -209,6 +209,7 @@ pub fn measure_along_normals(
         scallop,
         gouge,
         uncut,
+        excess: crate::ExcessFigures::default(),
         deviation,
         deviation_map: deviations,
         ridge_samples,
