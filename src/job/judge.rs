@@ -52,11 +52,12 @@ fn uncut(measured: &Measurement, limits: &Limits) -> Claim {
     let figures = &measured.uncut;
     let regions = Bounded::new(figures.max_height_mm, figures.error_bound_mm);
     let Bounded { max_mm: height, error_bound_mm: bound, .. } = regions.or(&measured.excess.unreached);
-    let mut text = format!(
-        "uncut material {} µm high (limit {})",
-        with_bound(Some(height), Some(bound)),
-        micrometres(Some(limits.uncut))
-    );
+    let limit = micrometres(Some(limits.uncut));
+    let mut text = if height > 0.0 {
+        format!("uncut material {} µm high (limit {limit})", with_bound(Some(height), Some(bound)))
+    } else {
+        format!("no uncut material stands higher than {} µm (limit {limit})", micrometres(Some(bound)))
+    };
     if let Some(worst) = figures.regions.first() {
         let others = others(figures.region_count);
         text += &format!(" over {:.3} mm² at {}{others}", figures.area_mm2, place(worst.at_mm));

@@ -85,9 +85,32 @@ pub(super) fn greatest(
     at: &(dyn Fn(Point2, f64) -> Option<Value> + Sync),
 ) -> BoundedGreatest {
     let least = squares.first().map_or(0.0, |s| s.half * OFF_PART_SHARE);
+    let inside = |centre: Point2, half: f64| {
+        // Where the centre lies off the part a corner may not, from which all of the square is twice as far.
+        let corner = |k: usize| {
+            let side = |up: bool| if up { half } else { -half };
+            let corner = Point2::new(centre.x + side(k & 1 != 0), centre.y + side(k & 2 != 0));
+            Some((corner, at(corner, 2.0 * half)?))
+        };
+        let unknown = (centre, Value { here: f64::NEG_INFINITY, possible: f64::INFINITY });
+        let found = at(centre, half).map(|v| (centre, v)).or_else(|| (0..4).find_map(corner));
+        found.or((half > least).then_some(unknown))
+    };
+    search(squares, known, asked, MOST, &inside)
+}
+
+/// As [`greatest`], looking at `most` places. `inside` tells what the square around a centre with a given half side holds,
+/// and at which of its places; `None` where it holds nothing.
+pub(super) fn search(
+    squares: Vec<Square>,
+    known: f64,
+    asked: f64,
+    most: usize,
+    inside: &(dyn Fn(Point2, f64) -> Option<(Point2, Value)> + Sync),
+) -> BoundedGreatest {
     let mut open = BinaryHeap::from(squares);
     let (mut best, mut place, mut spent) = (known, None, 0);
-    while spent < MOST {
+    while spent < most {
         let enough = if spent < CHEAP { NUMERICAL_FLOOR } else { asked.max(NUMERICAL_FLOOR) };
         let mut batch = Vec::with_capacity(BATCH);
         while batch.len() < BATCH && open.peek().is_some_and(|s| s.possible > best + enough) {
@@ -104,31 +127,18 @@ pub(super) fn greatest(
                 square.centre.x + side(k & 1 != 0) * square.half,
                 square.centre.y + side(k & 2 != 0) * square.half,
             );
-            // Where the centre lies off the part a corner may not, from which all of the square is twice as far.
-            let corner = |k: usize| {
-                let corner = Point2::new(
-                    centre.x + 2.0 * side(k & 1 != 0) * half,
-                    centre.y + 2.0 * side(k & 2 != 0) * half,
-                );
-                Some((corner, at(corner, 2.0 * half)?))
-            };
-            let inside = at(centre, half).map(|v| (centre, v)).or_else(|| (0..4).find_map(corner));
-            match inside {
+            inside(centre, half).map(|(place, v)| {
                 // A part of a square promises no more than the whole.
-                Some((place, v)) => {
-                    let possible = v.possible.min(square.possible).max(v.here);
-                    (Some((v.here, place)), Some(Square { possible, centre, half }))
-                }
-                None if half > least => (None, Some(Square { possible: square.possible, centre, half })),
-                None => (None, None),
-            }
+                let possible = v.possible.min(square.possible).max(v.here);
+                (v.here, place, Square { possible, centre, half })
+            })
         });
-        for (here, at) in quarters.iter().filter_map(|(value, _)| *value) {
+        for &(here, at, _) in quarters.iter().flatten() {
             if here > best {
                 (best, place) = (here, Some(at));
             }
         }
-        open.extend(quarters.into_iter().filter_map(|q| q.1).filter(|s| s.possible > best + NUMERICAL_FLOOR));
+        open.extend(quarters.into_iter().flatten().map(|q| q.2).filter(|s| s.possible > best + NUMERICAL_FLOOR));
     }
     let possible = open.peek().map_or(best, |s| s.possible.max(best));
     BoundedGreatest { greatest: place.map(|place| (best, place)), possible }

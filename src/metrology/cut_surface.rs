@@ -28,6 +28,11 @@ pub struct Winners {
 }
 
 impl Winners {
+    /// The moves.
+    pub fn moves(&self) -> &[u32] {
+        &self.moves[..self.len]
+    }
+
     fn push(&mut self, by: u32) {
         if !self.moves[..self.len].contains(&by) && self.len < self.moves.len() {
             self.moves[self.len] = by;
@@ -140,6 +145,14 @@ impl<'a> CutSurface<'a> {
             }
         }
         lowest
+    }
+
+    /// Height of the cut of `by` at `(x, y)`; infinite where the move does not pass.
+    pub fn height(&self, by: u32, x: f64, y: f64) -> f64 {
+        if by == NOT_CUT {
+            return f64::INFINITY;
+        }
+        self.envelope.height(by, x, y).unwrap_or(f64::INFINITY)
     }
 
     /// Upward unit normal of the cut surface made by `by` at `(x, y)`.

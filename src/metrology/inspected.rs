@@ -1,7 +1,7 @@
 //! What one grid of the cut stock shows of deviations, ridges, gouges and uncut places. mm.
 
 use super::figures::{DeviationFigures, GougeFigures, UncutFigures};
-use super::inspection::Inspection;
+use super::inspection::{Inspection, Sample};
 use super::ridges::{Highest, RidgeFinder, Ridges};
 use motion::Toolpath;
 use work::monitor::{Cancelled, Monitor};
@@ -9,8 +9,8 @@ use work::monitor::{Cancelled, Monitor};
 /// What one grid shows.
 pub(super) struct Inspected {
     pub deviation: DeviationFigures,
-    /// `[ny][nx]`, mm; NaN off the part.
-    pub deviation_map: Vec<f32>,
+    /// `[ny][nx]`.
+    pub samples: Vec<Sample>,
     pub ridges: Ridges,
     pub highest: Option<Highest>,
     pub gouge: GougeFigures,
@@ -39,6 +39,6 @@ pub(super) fn inspect(
         uncut: inspection.uncut(&samples, highest_ridge, deviation.area_mm2),
         deviation,
         least_lean: samples.iter().map(|s| f64::from(s.lean)).fold(1.0, f64::min),
-        deviation_map: samples.into_iter().map(|s| s.deviation).collect(),
+        samples,
     })
 }

@@ -13,7 +13,7 @@ use super::regions::connected;
 use crate::closer;
 use cutter::Cutter;
 use geometry::{Point2, Point3};
-use part::Part;
+use part::{Part, SurfaceGrid};
 use sim::{Grid, NOT_CUT};
 use work::monitor::{self, Cancelled, Monitor};
 
@@ -41,6 +41,8 @@ pub(super) struct Sample {
     pub slope: f32,
     /// Vertical part of the design surface's unit normal.
     pub lean: f32,
+    /// Deviation at most anywhere in the cell, mm; see [`Inspection::top`].
+    pub top: f32,
 }
 
 /// Asks the monitor whether to stop, and tells it nothing: for stages within a stage.
@@ -67,7 +69,7 @@ impl Inspection<'_> {
     /// Deviation at the design point over every cell centre.
     pub fn samples(&self, monitor: &dyn Monitor) -> Result<Vec<Sample>, Cancelled> {
         monitor.start("measuring deviation", self.grid.ny as u64);
-        let off = Sample { deviation: f32::NAN, slope: 0.0, lean: 1.0 };
+        let off = Sample { deviation: f32::NAN, slope: 0.0, lean: 1.0, top: f32::NAN };
         let mut samples = vec![off; self.grid.len()];
         let nx = self.grid.nx;
         let band_rows = self.grid.ny.div_ceil(DESIGN_BANDS);
@@ -82,17 +84,19 @@ impl Inspection<'_> {
                     return;
                 }
                 for (i, sample) in row.iter_mut().enumerate() {
-                    let design = design.at(i, first + j - rows.start);
-                    if !design.is_on() {
+                    let row = first + j - rows.start;
+                    let here = design.at(i, row);
+                    if !here.is_on() {
                         continue;
                     }
                     let centre = self.grid.centre(i, first + j);
-                    let p = Point3::new(centre.x, centre.y, design.z);
-                    if let Some(d) = self.surface.along_normal(&p, &design.normal) {
+                    let p = Point3::new(centre.x, centre.y, here.z);
+                    if let Some(d) = self.surface.along_normal(&p, &here.normal) {
                         *sample = Sample {
                             deviation: d.distance as f32,
                             slope: d.slope as f32,
-                            lean: design.normal.z as f32,
+                            lean: here.normal.z as f32,
+                            top: self.top(&design, (i, row), &p, &d) as f32,
                         };
                     }
                 }
@@ -101,6 +105,32 @@ impl Inspection<'_> {
             monitor::check(monitor)?;
         }
         Ok(samples)
+    }
+
+    /// What stands at most in the cell `(i, j)` of a band by the move that cut its centre, and with the normals of the design
+    /// beside it, mm; infinite where these cannot tell.
+    fn top(&self, design: &SurfaceGrid, (i, j): (usize, usize), p: &Point3, cut: &Deviation) -> f64 {
+        let normal = design.at(i, j).normal;
+        // The cut over a place stands aside of it where the normal leans.
+        let high = 2.0 * cut.distance.max(0.0) + 0.25 * self.grid.cell;
+        let half = 0.5 * self.grid.cell + high * normal.xy().norm();
+        let mut top = f64::NEG_INFINITY;
+        for (sx, sy) in [(-half, -half), (half, -half), (-half, half), (half, half)] {
+            let z = self.surface.height(cut.by, p.x + sx, p.y + sy);
+            top = top.max((z - p.z) * normal.z + sx * normal.x + sy * normal.y);
+        }
+        let (mut turned, mut cosine) = (0f64, 1f64);
+        for nj in j.saturating_sub(1)..=(j + 1).min(design.ny - 1) {
+            for ni in i.saturating_sub(1)..=(i + 1).min(design.nx - 1) {
+                let beside = design.at(ni, nj);
+                if beside.is_on() {
+                    turned = turned.max((beside.normal - normal).norm_squared());
+                    cosine = cosine.min(beside.normal.dot(&normal));
+                }
+            }
+        }
+        let top = (top + turned.sqrt() * reach(half, normal.z)) / cosine.max(0.1);
+        if top <= high { top } else { f64::INFINITY }
     }
 
     /// Area of the design surface that a cell stands for, mm².

@@ -25,6 +25,7 @@ mod closer;
 mod cut_surface;
 mod engagement;
 mod engines;
+mod excess;
 mod figures;
 #[cfg(test)]
 mod flat_scene;

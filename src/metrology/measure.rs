@@ -1,6 +1,7 @@
 //! The figures of a cut on heights: the stock's own grid first, then a closer look where something may hide. mm.
 
 use super::cut_surface::CutSurface;
+use super::excess::ExcessSearch;
 use super::figures::{CloserLook, ExcessFigures, Limits, Measurement};
 use super::inspected::inspect;
 use super::inspection::Inspection;
@@ -49,7 +50,7 @@ pub fn measure(
         deviation: found.deviation,
         ridge_samples: found.ridges.samples,
         pairs,
-        deviation_map: found.deviation_map,
+        deviation_map: found.samples.iter().map(|s| s.deviation).collect(),
         refined: CloserLook::default(),
     };
     let mut hiding = Vec::new();
@@ -60,16 +61,23 @@ pub fn measure(
     let refinement = Refinement { coarse: &inspection, path, asked, highest_ridge };
     measured.refined = refinement.run(&hidden, &hiding, &mut measured, monitor)?;
     doubt(&mut measured, &surface, part, path, asked);
+    let all: Vec<u32> = (0..path.len() as u32).collect();
+    let cut_away = |at: &Point3| lowest_of_all(&surface, at, &all) < at.z - asked.error_bound;
+    let search = ExcessSearch { inspection: &inspection, stock_top: asked.stock_top, cut_away: &cut_away };
+    measured.excess = search.run(&found.samples, &measured, monitor)?;
     Ok(measured)
+}
+
+/// Height to which the lowest of all moves cuts above or below a point, mm; infinite where none passes.
+fn lowest_of_all(surface: &CutSurface<'_>, at: &Point3, all: &[u32]) -> f64 {
+    surface.envelope.lowest(at.x, at.y, all).map_or(f64::INFINITY, |(z, _)| z)
 }
 
 /// Where a move that no cell saw cuts the highest scallop or uncut place away, the figure is too great by
 /// an unknown amount: its bound becomes the figure itself. All moves are asked at the two places.
 fn doubt(measured: &mut Measurement, surface: &CutSurface<'_>, part: &Part, path: &Toolpath, asked: &Asked) {
     let all: Vec<u32> = (0..path.len() as u32).collect();
-    let cut_away = |at: &Point3| {
-        surface.envelope.lowest(at.x, at.y, &all).is_some_and(|(z, _)| z < at.z - asked.error_bound)
-    };
+    let cut_away = |at: &Point3| lowest_of_all(surface, at, &all) < at.z - asked.error_bound;
     let (scallop, uncut) = (&mut measured.scallop, &mut measured.uncut);
     let mut doubtful = false;
     if scallop.max_at_mm.is_some_and(|at| cut_away(&at.into())) {

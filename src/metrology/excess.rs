@@ -1,0 +1,230 @@
+//! The highest material anywhere above the design, with a true bound. mm.
+//!
+//! Enters: the cut surface over its grid, and the part. Leaves: the highest place and what may stand at most: in all, where
+//! passes came down to the design, and elsewhere.
+//!
+//! The bound rests on one fact. The surface that an upright convex cutter sweeps along a straight move is a convex
+//! function of x and y wherever it passes. So, over a polygon of the plan:
+//!
+//! - what one move leaves above a plane is greatest at a corner of the polygon;
+//! - so is any mean of moves, by whatever weights;
+//! - the cut is nowhere above the lowest move, so nowhere above such a mean.
+//!
+//! The weights are chosen so that the greatest corner is lowest (the value of a matrix game). On a ridge the slopes of
+//! both passes then cancel, and the bound is off by second order only. The polygons are the part's triangles, each clipped
+//! by a square; so the part's borders and creases are borders of polygons, and nothing beyond them counts. Squares that may
+//! hold more than is known are divided until none does by more than was asked.
+
+mod patch;
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::closer::{Square, Value, search};
+use super::figures::{Bounded, ExcessFigures, ExcessKind, Measurement, NUMERICAL_FLOOR};
+use super::inspection::{Inspection, Sample};
+use geometry::{Node, Point2};
+use patch::{Held, Patches};
+use sim::Grid;
+use work::monitor::{self, Cancelled, Monitor};
+
+/// Squares looked at in search of one figure. Each takes some 10 µs; with fewer, wide bounds stay.
+const MOST: usize = 400_000;
+
+/// A square whose middle is of the other kind is left out once it is this share of a cell.
+const OTHER_KIND_SHARE: f64 = 0.25;
+
+/// What the highest material is sought with.
+pub(super) struct ExcessSearch<'a> {
+    pub inspection: &'a Inspection<'a>,
+    /// Height of the stock's flat top, mm.
+    pub stock_top: f64,
+    /// Whether moves that no cell saw may cut lower at a place; then its height is no figure.
+    pub cut_away: &'a (dyn Fn(&geometry::Point3) -> bool + Sync),
+}
+
+/// Which places count.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Any,
+    Reached,
+    Unreached,
+}
+
+impl ExcessSearch<'_> {
+    /// The figures. `samples` are those of the grid's cells, `measured` what was found so far.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn run(
+        &self,
+        samples: &[Sample],
+        measured: &Measurement,
+        monitor: &dyn Monitor,
+    ) -> Result<ExcessFigures, Cancelled> {
+        let limits = self.inspection.limits;
+        let (scallop, uncut) = (&measured.scallop, &measured.uncut);
+        let ridge = Bounded { at_mm: scallop.max_at_mm, ..Bounded::new(scallop.max_mm.unwrap_or(0.0), 0.0) };
+        let region = uncut.regions.first().map_or(Bounded::default(), |region| Bounded {
+            at_mm: Some(region.at_mm),
+            ..Bounded::new(region.height_mm, 0.0)
+        });
+        let known = if region.max_mm > ridge.max_mm { region } else { ridge };
+        monitor.start("looking for the highest material", 0);
+        let open = self.open(samples, known.max_mm.min(limits.scallop), monitor)?;
+        let highest = self.highest(&open, known, Kind::Any);
+        monitor::check(monitor)?;
+        let (reached, unreached) = if highest.at_most() <= limits.scallop {
+            // Whatever it is, it holds every limit.
+            (highest, Bounded::new(0.0, highest.at_most()))
+        } else {
+            // Below its limit it is of no account.
+            let floor = limits.uncut - self.inspection.asked.max(2.0 * NUMERICAL_FLOOR);
+            let unreached = Bounded { max_mm: region.max_mm.max(floor), ..region };
+            let found = self.highest(&open, unreached, Kind::Unreached);
+            monitor::check(monitor)?;
+            let most = found.at_most();
+            let found = if found.max_mm > unreached.max_mm { found } else { region };
+            let unreached = Bounded { error_bound_mm: (most - found.max_mm).max(0.0), ..found };
+            (self.highest(&open, ridge, Kind::Reached), unreached)
+        };
+        let kind = if unreached.max_mm >= highest.max_mm && unreached.max_mm > 0.0 {
+            ExcessKind::Uncut
+        } else if reached.max_mm > ridge.max_mm + NUMERICAL_FLOOR {
+            ExcessKind::Border
+        } else {
+            ExcessKind::Scallop
+        };
+        Ok(ExcessFigures { highest, kind, reached, unreached })
+    }
+
+    /// The squares of cells that may hold more than `known`, mm: those whose own move leaves more at a corner, those beside
+    /// the part's border, and those whose centre cannot speak for them.
+    fn open(
+        &self,
+        samples: &[Sample],
+        known: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Square>, Cancelled> {
+        let grid = &self.inspection.grid;
+        let fine = self.finer_than_cells(grid);
+        let rows = work::parallel::try_map(grid.ny, |j| {
+            monitor::check(monitor)?;
+            let patches = self.patches();
+            let looked_at = (0..grid.nx).filter(|&i| {
+                let k = grid.index(i, j);
+                let on = !samples[k].deviation.is_nan();
+                if fine[k].load(Ordering::Relaxed) {
+                    return true;
+                }
+                if on { f64::from(samples[k].top) > known } else { beside_part(grid, samples, i, j) }
+            });
+            let squares = looked_at.filter_map(|i| {
+                let (centre, half) = (grid.centre(i, j), 0.5 * grid.cell);
+                match patches.held(centre, half) {
+                    Held::Nothing => None,
+                    Held::Unknown => Some(Square { possible: f64::INFINITY, centre, half }),
+                    Held::Some { possible, .. } => Some(Square { possible, centre, half }),
+                }
+            });
+            Ok(squares.filter(|square| square.possible > known).collect::<Vec<_>>())
+        })?;
+        Ok(rows.into_iter().flatten().collect())
+    }
+
+    fn patches(&self) -> Patches<'_> {
+        Patches { inspection: self.inspection, stock_top: self.stock_top }
+    }
+
+    /// The highest place of a kind in some squares, if it is higher than `known`.
+    fn highest(&self, squares: &[Square], known: Bounded, kind: Kind) -> Bounded {
+        let patches = self.patches();
+        let small = OTHER_KIND_SHARE * 0.5 * self.inspection.grid.cell;
+        let at = |centre: Point2, half: f64| {
+            let unknown = |place| (place, Value { here: f64::NEG_INFINITY, possible: f64::INFINITY });
+            match patches.held(centre, half) {
+                Held::Nothing => None,
+                Held::Unknown => Some(unknown(centre)),
+                Held::Some { possible, place, here, by } => {
+                    let value = Value { here, possible };
+                    if kind == Kind::Any || possible <= known.max_mm {
+                        return Some((place, value));
+                    }
+                    let reached = patches.reached(place, by);
+                    if reached == (kind == Kind::Reached) {
+                        Some((place, value))
+                    } else if half <= small {
+                        None
+                    } else {
+                        Some((place, Value { here: f64::NEG_INFINITY, possible }))
+                    }
+                }
+            }
+        };
+        let open = squares.iter().filter(|square| square.possible > known.max_mm).copied().collect();
+        let found = search(open, known.max_mm, self.inspection.asked, MOST, &at);
+        let mut highest = match found.greatest {
+            Some((height, q)) => {
+                let z = self.inspection.part.highest_at(q.x, q.y).map_or(0.0, |design| design.point.z);
+                Bounded { at_mm: Some([q.x, q.y, z]), ..Bounded::new(height, 0.0) }
+            }
+            None => known,
+        };
+        highest.error_bound_mm = (found.possible - highest.max_mm).max(0.0) + NUMERICAL_FLOOR;
+        let cut_away = |at: [f64; 3]| {
+            let design = self.inspection.part.highest_at(at[0], at[1]);
+            design.is_some_and(|d| (self.cut_away)(&(d.point + d.normal * highest.max_mm)))
+        };
+        if found.greatest.is_some() && highest.at_mm.is_some_and(cut_away) {
+            // Moves that no cell saw cut it away: between nothing and this height all is possible.
+            highest.error_bound_mm = highest.error_bound_mm.max(highest.max_mm);
+        }
+        highest
+    }
+
+    /// The cells in which the part has details that their centres do not show: triangles narrower than two cells that bend
+    /// away from their neighbours, or end.
+    fn finer_than_cells(&self, grid: &Grid) -> Vec<AtomicBool> {
+        /// Neighbours that turn by less, rad, are part of a bend that the cells' normals show.
+        const BENT: f64 = 0.05;
+        let cells: Vec<AtomicBool> = (0..grid.len()).map(|_| AtomicBool::new(false)).collect();
+        let mesh = self.inspection.part.mesh();
+        work::parallel::map(mesh.triangles().len(), |t| {
+            let normal = mesh.normal(t);
+            let [a, b, c] = mesh.corners(t);
+            let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
+            let narrow = (b - a).cross(&(c - a)).norm() < 2.0 * grid.cell * longest;
+            let bent = |k: usize| {
+                mesh.neighbour(t, k).is_none_or(|other| mesh.normal(other).dot(&normal) < BENT.cos())
+            };
+            if !(normal.z > 0.0 && narrow && (0..3).any(bent)) {
+                return;
+            }
+            let low = Point2::new(a.x.min(b.x).min(c.x), a.y.min(b.y).min(c.y));
+            let high = Point2::new(a.x.max(b.x).max(c.x), a.y.max(b.y).max(c.y));
+            let column = |x: f64, n: usize, origin: f64| {
+                (((x - origin) / grid.cell + 0.5).floor().max(0.0) as usize).min(n.saturating_sub(1))
+            };
+            for j in column(low.y, grid.ny, grid.origin.y)..=column(high.y, grid.ny, grid.origin.y) {
+                for i in column(low.x, grid.nx, grid.origin.x)..=column(high.x, grid.nx, grid.origin.x) {
+                    cells[grid.index(i, j)].store(true, Ordering::Relaxed);
+                }
+            }
+        });
+        cells
+    }
+}
+
+/// Whether a cell whose centre is off the part has one beside it that is on it.
+fn beside_part(grid: &Grid, samples: &[Sample], i: usize, j: usize) -> bool {
+    let around = (j.saturating_sub(1)..=(j + 1).min(grid.ny - 1))
+        .flat_map(|j| (i.saturating_sub(1)..=(i + 1).min(grid.nx - 1)).map(move |i| (i, j)));
+    around.into_iter().any(|(i, j)| !samples[grid.index(i, j)].deviation.is_nan())
+}
+
+/// For walks over the part's boxes.
+fn meets(node: &Node, centre: Point2, half: f64) -> bool {
+    node.meets([centre.x - half, centre.y - half], [centre.x + half, centre.y + half])
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,303 @@
+//! What stands at most above the part within one square of the plan.
+
+use super::meets;
+use crate::inspection::Inspection;
+use geometry::{Point2, Point3, Vector2};
+use part::SurfacePoint;
+use sim::NOT_CUT;
+
+/// Triangles of the part that are looked at in one square. One with more of them is divided unseen.
+const MOST_TRIANGLES: usize = 48;
+
+/// Moves that are weighed, the lowest in the middle. With fewer, places where several passes meet take more divisions.
+const MOST_MOVES: usize = 5;
+
+/// Corners of a triangle clipped by a square.
+const MOST_CORNERS: usize = 8;
+
+/// Between its corners a smooth surface may leave a tangent plane by so many times as much as there.
+const BETWEEN_CORNERS: f64 = 1.25;
+
+/// What a square holds.
+pub(super) enum Held {
+    /// No surface that is seen from above.
+    Nothing,
+    /// Too much to tell.
+    Unknown,
+    /// Surface.
+    Some {
+        /// No place in it is higher, mm.
+        possible: f64,
+        /// A place of the surface in it.
+        place: Point2,
+        /// The height there, mm.
+        here: f64,
+        /// The move that cut there.
+        by: u32,
+    },
+}
+
+/// A polygon of the plan with the plane that the design lies on there, or above.
+struct Piece {
+    corners: [Point2; MOST_CORNERS],
+    len: usize,
+    /// On the design, within the polygon.
+    foot: SurfacePoint,
+    /// How far the design may lie below the plane, mm.
+    below: f64,
+    /// Least cosine between normals in the polygon and that of the plane.
+    cosine: f64,
+}
+
+/// Evaluates squares.
+pub(super) struct Patches<'a> {
+    pub inspection: &'a Inspection<'a>,
+    pub stock_top: f64,
+}
+
+impl Patches<'_> {
+    /// What the square around a centre holds.
+    pub fn held(&self, centre: Point2, half: f64) -> Held {
+        let mut triangles = [0usize; MOST_TRIANGLES];
+        let Some(count) = self.triangles(centre, half, &mut triangles) else { return Held::Unknown };
+        let mut held: Option<(f64, Point2, f64, u32)> = None;
+        for &t in &triangles[..count] {
+            let Some(piece) = self.piece(t, centre, half) else { continue };
+            let Some((possible, here, by)) = self.above(&piece) else { return Held::Unknown };
+            let place = Point2::new(piece.foot.point.x, piece.foot.point.y);
+            held = Some(match held {
+                None => (possible, place, here, by),
+                Some((most, at, highest, its)) => {
+                    let (at, highest, its) =
+                        if here > highest { (place, here, by) } else { (at, highest, its) };
+                    (most.max(possible), at, highest, its)
+                }
+            });
+        }
+        held.map_or(Held::Nothing, |(possible, place, here, by)| Held::Some { possible, place, here, by })
+    }
+
+    /// True where the pass that cut a place came down to the design near it.
+    pub fn reached(&self, at: Point2, by: u32) -> bool {
+        let Inspection { part, cutter, surface, limits, .. } = *self.inspection;
+        let Some(design) = part.highest_at(at.x, at.y) else { return false };
+        by != NOT_CUT && {
+            let from_contact = cutter.contact_to_tip(&design.normal);
+            let tip = surface.nearest_tip(by, &(design.point + from_contact));
+            part.closest_point(&(tip - from_contact)).1 <= limits.scallop.min(limits.uncut)
+        }
+    }
+
+    /// Triangles that face up and whose boxes meet the square; `None` if there are too many.
+    fn triangles(&self, centre: Point2, half: f64, found: &mut [usize; MOST_TRIANGLES]) -> Option<usize> {
+        let part = self.inspection.part;
+        let (mesh, bvh) = (part.mesh(), part.bvh());
+        let (mut count, mut waiting) = (0, vec![0]);
+        while let Some(index) = waiting.pop() {
+            let node = bvh.tree().node(index);
+            if !meets(node, centre, half) {
+                continue;
+            }
+            let (first, slots) = node.slots_or_children();
+            if slots == 0 {
+                waiting.extend([first + 1, first]);
+                continue;
+            }
+            for slot in first..first + slots {
+                let t = bvh.triangle_in(slot);
+                if mesh.normal(t).z > 0.0 {
+                    *found.get_mut(count)? = t;
+                    count += 1;
+                }
+            }
+        }
+        Some(count)
+    }
+
+    /// The part of a triangle within the square, where it is seen from above.
+    fn piece(&self, t: usize, centre: Point2, half: f64) -> Option<Piece> {
+        let part = self.inspection.part;
+        let triangle = part.mesh().corners(t);
+        let (corners, len) = clipped(&triangle, centre, half)?;
+        let middle = corners[..len].iter().fold(Point2::origin(), |sum, c| sum + c.coords / len as f64);
+        let normal = part.mesh().normal(t);
+        let height = |q: Point2| {
+            triangle[0].z
+                - (normal.x * (q.x - triangle[0].x) + normal.y * (q.y - triangle[0].y)) / normal.z
+        };
+        let near = 2.0 * part.mesh_deviation() / normal.z.max(1e-3) + 1e-6;
+        let seen = |q: Point2| part.highest_at(q.x, q.y).filter(|foot| foot.point.z - height(q) <= near);
+        // Just inside the corners, where the next triangle does not answer.
+        let inside = |c: &Point2| c + (middle - c) * 1e-3;
+        let foot = seen(middle).or_else(|| corners[..len].iter().find_map(|c| seen(inside(c))))?;
+        let mut piece = Piece { corners, len, foot, below: 0.0, cosine: 1.0 };
+        if part.patches().is_empty() {
+            let point = Point3::new(foot.point.x, foot.point.y, height(Point2::new(foot.point.x, foot.point.y)));
+            piece.foot = SurfacePoint { point, normal, ..foot };
+        } else {
+            piece.bend(part, &inside);
+        }
+        Some(piece)
+    }
+
+    /// What stands above a piece at most, and what stands on its foot, cut by which move; `None` where that cannot be told.
+    fn above(&self, piece: &Piece) -> Option<(f64, f64, u32)> {
+        let surface = self.inspection.surface;
+        let SurfacePoint { point, normal, .. } = &piece.foot;
+        let here = surface.along_normal(point, normal)?;
+        let moves = self.moves(point, here.by);
+        let lean = normal.xy();
+        let mut reach = 2.0 * here.distance.max(0.0) + 1e-4;
+        // The cut over a place stands aside of it by its height times the lean; at most so much was assumed.
+        for _ in 0..4 {
+            let possible = (self.over(piece, &moves, lean * reach) + piece.below) / piece.cosine;
+            if possible <= reach || lean.norm() < 1e-12 {
+                return Some((possible.max(here.distance), here.distance, here.by));
+            }
+            reach = 1.5 * possible;
+        }
+        None
+    }
+
+    /// Moves that are low over a point: any choice gives a bound, the lowest a good one.
+    fn moves(&self, point: &Point3, first: u32) -> Vec<u32> {
+        let surface = self.inspection.surface;
+        let Some((i, j)) = surface.cut.grid.cell_at(point.x, point.y) else { return Vec::new() };
+        let winners = surface.winners(i, j);
+        let all = std::iter::once(first).chain(winners.moves().iter().copied()).filter(|&by| by != NOT_CUT);
+        let mut low: Vec<(f64, u32)> =
+            all.filter_map(|by| Some((surface.envelope.height(by, point.x, point.y)?, by))).collect();
+        low.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        low.dedup_by_key(|m| m.1);
+        low.truncate(MOST_MOVES);
+        low.into_iter().map(|m| m.1).collect()
+    }
+
+    /// Height of the cut above the piece's plane, along its normal, at most: over the polygon and where it comes to when it
+    /// moves by `aside`.
+    fn over(&self, piece: &Piece, moves: &[u32], aside: Vector2) -> f64 {
+        let SurfacePoint { point, normal, .. } = &piece.foot;
+        let mut places = [Point2::origin(); 2 * MOST_CORNERS];
+        let mut count = 0;
+        for corner in &piece.corners[..piece.len] {
+            for shift in [Vector2::zeros(), aside] {
+                (places[count], count) = (corner + shift, count + 1);
+            }
+        }
+        let level = |q: &Point2, z: f64| {
+            (z - point.z) * normal.z + (q.x - point.x) * normal.x + (q.y - point.y) * normal.y
+        };
+        let mut rows = vec![places.map(|q| level(&q, self.stock_top))];
+        for &by in moves {
+            let mut row = [0.0; 2 * MOST_CORNERS];
+            let passes = places[..count].iter().zip(&mut row).all(|(q, value)| {
+                self.inspection.surface.envelope.height(by, q.x, q.y).is_some_and(|z| {
+                    *value = level(q, z);
+                    true
+                })
+            });
+            if passes {
+                rows.push(row);
+            }
+        }
+        least_greatest(&rows, count)
+    }
+}
+
+impl Piece {
+    /// Measures how the design leaves its tangent plane, at the corners just inside.
+    fn bend(&mut self, part: &part::Part, inside: &dyn Fn(&Point2) -> Point2) {
+        let SurfacePoint { point, normal, .. } = self.foot;
+        for corner in &self.corners[..self.len] {
+            let q = inside(corner);
+            let Some(foot) = part.highest_at(q.x, q.y) else { continue };
+            self.below = self.below.max(-BETWEEN_CORNERS * (foot.point - point).dot(&normal));
+            self.cosine = self.cosine.min(foot.normal.dot(&normal)).max(0.1);
+        }
+    }
+}
+
+/// The part of a triangle within a square of the plan (Sutherland and Hodgman 1974); `None` where there is none.
+fn clipped(triangle: &[Point3; 3], centre: Point2, half: f64) -> Option<([Point2; MOST_CORNERS], usize)> {
+    let mut corners = [Point2::origin(); MOST_CORNERS];
+    (0..3).for_each(|k| corners[k] = triangle[k].xy());
+    let mut len = 3;
+    for (axis, sign) in [(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)] {
+        let beyond = |p: &Point2| sign * (p[axis] - centre[axis]) - half;
+        let (before, n) = (corners, len);
+        len = 0;
+        for k in 0..n {
+            let (p, q) = (before[k], before[(k + 1) % n]);
+            let (bp, bq) = (beyond(&p), beyond(&q));
+            if bp <= 0.0 {
+                (corners[len], len) = (p, len + 1);
+            }
+            if (bp < 0.0 && bq > 0.0) || (bp > 0.0 && bq < 0.0) {
+                (corners[len], len) = (p + (q - p) * (bp / (bp - bq)), len + 1);
+            }
+        }
+        if len == 0 {
+            return None;
+        }
+    }
+    let area = |k: usize| {
+        let (a, b) = (corners[k] - corners[0], corners[(k + 1) % len] - corners[0]);
+        a.x * b.y - a.y * b.x
+    };
+    ((0..len).map(area).sum::<f64>().abs() > 0.0).then_some((corners, len))
+}
+
+/// The least, over all weights of the rows, of the greatest of `count` columns in their mean; a little more where the
+/// search stops early. Every mean of rows gives an upper bound of the least row's greatest column.
+pub(super) fn least_greatest<const N: usize>(rows: &[[f64; N]], count: usize) -> f64 {
+    /// Rows that are mixed in, one after the other.
+    const ROUNDS: usize = 6;
+    let greatest = |row: &[f64; N]| row[..count].iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let Some(mut mean) = rows.iter().min_by(|a, b| greatest(a).total_cmp(&greatest(b))).copied() else {
+        return f64::INFINITY;
+    };
+    let mut best = greatest(&mean);
+    for _ in 0..ROUNDS {
+        let mixed = rows.iter().map(|row| (mix(&mean, row, count), row));
+        let Some(((value, share), row)) = mixed.min_by(|a, b| a.0.0.total_cmp(&b.0.0)) else { break };
+        if value >= best - 1e-9 {
+            break;
+        }
+        best = value;
+        (0..count).for_each(|k| mean[k] += share * (row[k] - mean[k]));
+    }
+    best
+}
+
+/// The share of `b` in a mean with `a` that makes its greatest column least, and that column: a convex function of the
+/// share, made of straight lines.
+fn mix<const N: usize>(a: &[f64; N], b: &[f64; N], count: usize) -> (f64, f64) {
+    let line = |share: f64| {
+        let at = |k: usize| a[k] + share * (b[k] - a[k]);
+        (0..count).map(|k| (at(k), b[k] - a[k])).max_by(|x, y| x.0.total_cmp(&y.0)).unwrap_or((f64::INFINITY, 0.0))
+    };
+    let (mut low, mut high) = ((0.0, line(0.0)), (1.0, line(1.0)));
+    let mut best = if low.1.0 <= high.1.0 { (low.1.0, 0.0) } else { (high.1.0, 1.0) };
+    for _ in 0..12 {
+        if low.1.1 >= 0.0 || high.1.1 <= 0.0 {
+            break;
+        }
+        // Where the two straight lines meet.
+        let width: f64 = high.0 - low.0;
+        let share = low.0 + (high.1.0 - high.1.1 * width - low.1.0) / (low.1.1 - high.1.1);
+        if !(share > low.0 && share < high.0) {
+            break;
+        }
+        let found = line(share);
+        if found.0 < best.0 {
+            best = (found.0, share);
+        }
+        if found.1 < 0.0 {
+            low = (share, found);
+        } else {
+            high = (share, found);
+        }
+    }
+    best
+}
+
