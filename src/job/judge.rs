@@ -28,6 +28,11 @@ pub(crate) fn judge(
     (claims.iter().map(Claim::verdict).max().unwrap_or(Verdict::Undecided), claims)
 }
 
+/// Whether a limit of the measured surface is undecided, and none violated.
+pub(crate) fn is_open(measured: &Measurement, limits: &Limits, rule: &ScallopRule) -> bool {
+    judge(measured, limits, rule, Vec::new()).0 == Verdict::Undecided
+}
+
 fn gouge(measured: &Measurement, limits: &Limits) -> Claim {
     let figures = &measured.gouge;
     let mut text = format!(

@@ -6,13 +6,15 @@ use std::time::Instant;
 use blade::Blade;
 use geometry::{Aabb, Bvh};
 use io::ProgramHeader;
-use metrology::{Budget, Engine, LaidOut, Task, path_figures};
+use metrology::{Budget, Engine, EngineError, LaidOut, Measured, Simulation, Task, path_figures};
 use motion::Toolpath;
 use part::Part;
 use report::{
     NotPlanned, RunReport, SimulationFigures, ToleranceFigures, ToolpathReport, ToolpathResult, Verdict,
 };
-use scene::{Fixture, Loaded, PartSource, Scene, ToolpathRequest, load_mesh, load_part, load_pocket};
+use scene::{
+    Fixture, Loaded, PartSource, Scene, ToolpathRequest, auto_cell, load_mesh, load_part, load_pocket,
+};
 use sim::VoxelStock;
 use toolpath::Pocket;
 use work::monitor::{self, Monitor};
@@ -22,6 +24,10 @@ use super::planned::{self, Planned};
 use super::run::Run;
 use super::tool::{FixtureMesh, Tool};
 use super::{JobError, Machined, Outcome, figures, judge};
+
+/// The cell shrinks to this share where a limit is undecided. Nearer to 1 more cuts are made in vain, nearer to 0 more
+/// cells.
+const FINER: f64 = 0.5;
 
 /// A scene with its part: what all its toolpaths share.
 #[derive(Debug)]
@@ -141,10 +147,7 @@ impl Session {
         let fixtures = if engine.tilts() { self.fixtures()? } else { Vec::new() };
         let planned = self.plan(request, &tool, &fixtures, monitor)?;
         let begun = Instant::now();
-        let task = self.task(&planned.plan.path);
-        let mut measured = engine
-            .measure(&task, monitor)
-            .map_err(|reason| JobError::engine(scene, &request.name, reason))?;
+        let mut measured = self.measure(request, engine, &planned.plan.path, monitor)?;
         for region in &mut measured.measurement.gouge.regions {
             region.line = planned.plan.path.line_of(region.move_index as usize).unwrap_or_default();
         }
@@ -202,13 +205,37 @@ impl Session {
         })
     }
 
-    /// The notes on a toolpath: on the part, the cells, the measurement, the plan, and of its figures.
-    fn notes_on(
+    /// Cuts and measures; on finer cells where a limit hangs on that.
+    fn measure(
         &self,
-        planned: &Planned,
-        measured: &metrology::Measured,
-        figures: Vec<String>,
-    ) -> Vec<String> {
+        request: &ToolpathRequest,
+        engine: &dyn Engine,
+        path: &Toolpath,
+        monitor: &dyn Monitor,
+    ) -> Result<Measured, JobError> {
+        let scene = &self.scene;
+        let failed = |reason| JobError::engine(scene, &request.name, reason);
+        let first = self.task(path, &scene.simulation, &self.cells);
+        let mut measured = engine.measure(&first, monitor).map_err(failed)?;
+        let finest = auto_cell(&scene.cutter, &scene.toolpaths);
+        let mut simulation = Simulation { cell_is_auto: false, cell: measured.cell, ..scene.simulation };
+        while simulation.cell > finest
+            && judge::is_open(&measured.measurement, &scene.tolerance, &scene.scallop_rule)
+        {
+            simulation.cell = (FINER * simulation.cell).max(finest);
+            let Ok(cells) = self.budget().grid_before_planning(&self.area(), &simulation) else { break };
+            match engine.measure(&self.task(path, &simulation, &cells), monitor) {
+                Ok(finer) => measured = Measured { note: Some(finer_note(&simulation, scene)), ..finer },
+                Err(EngineError::Cancelled(cancelled)) => return Err(cancelled.into()),
+                // It does not fit into the memory: what was measured stands.
+                Err(_) => break,
+            }
+        }
+        Ok(measured)
+    }
+
+    /// The notes on a toolpath: on the part, the cells, the measurement, the plan, and of its figures.
+    fn notes_on(&self, planned: &Planned, measured: &Measured, figures: Vec<String>) -> Vec<String> {
         let first = self.notes.iter().chain(&measured.note).chain(&measured.measurement.refined.note);
         first.chain(&planned.plan.notes).cloned().chain(figures).collect()
     }
@@ -230,7 +257,7 @@ impl Session {
         Ok(engine)
     }
 
-    fn task<'a>(&'a self, path: &'a Toolpath) -> Task<'a> {
+    fn task<'a>(&'a self, path: &'a Toolpath, simulation: &'a Simulation, cells: &'a LaidOut) -> Task<'a> {
         Task {
             part: &self.part,
             cutter: &self.scene.cutter,
@@ -238,9 +265,9 @@ impl Session {
             path,
             top: self.top,
             area: self.area(),
-            cells: &self.cells,
+            cells,
             limits: &self.scene.tolerance,
-            simulation: &self.scene.simulation,
+            simulation,
             budget: self.budget(),
         }
     }
@@ -294,6 +321,13 @@ impl Session {
     pub fn has_program(&self, outcome: &Outcome) -> bool {
         outcome.path.is_upright() || outcome.joints.is_some()
     }
+}
+
+fn finer_note(simulation: &Simulation, scene: &Scene) -> String {
+    format!(
+        "measured on cells of {} mm instead of {} mm: on those a limit was undecided",
+        simulation.cell, scene.simulation.cell
+    )
 }
 
 fn not_planned(request: &ToolpathRequest, reason: String) -> ToolpathReport {

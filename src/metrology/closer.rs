@@ -138,7 +138,9 @@ pub(super) fn search(
                 (best, place) = (here, Some(at));
             }
         }
-        open.extend(quarters.into_iter().flatten().map(|q| q.2).filter(|s| s.possible > best + NUMERICAL_FLOOR));
+        open.extend(
+            quarters.into_iter().flatten().map(|q| q.2).filter(|s| s.possible > best + NUMERICAL_FLOOR),
+        );
     }
     let possible = open.peek().map_or(best, |s| s.possible.max(best));
     BoundedGreatest { greatest: place.map(|place| (best, place)), possible }

@@ -99,17 +99,12 @@ impl ExcessSearch<'_> {
 
     /// The squares of cells that may hold more than `known`, mm: those whose own move leaves more at a corner, those beside
     /// the part's border, and those whose centre cannot speak for them.
-    fn open(
-        &self,
-        samples: &[Sample],
-        known: f64,
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<Square>, Cancelled> {
+    fn open(&self, samples: &[Sample], known: f64, monitor: &dyn Monitor) -> Result<Vec<Square>, Cancelled> {
         let grid = &self.inspection.grid;
         let fine = self.finer_than_cells(grid);
         let rows = work::parallel::try_map(grid.ny, |j| {
             monitor::check(monitor)?;
-            let patches = self.patches();
+            let patches = self.patches(known);
             let looked_at = (0..grid.nx).filter(|&i| {
                 let k = grid.index(i, j);
                 let on = !samples[k].deviation.is_nan();
@@ -122,7 +117,7 @@ impl ExcessSearch<'_> {
                 let (centre, half) = (grid.centre(i, j), 0.5 * grid.cell);
                 match patches.held(centre, half) {
                     Held::Nothing => None,
-                    Held::Unknown => Some(Square { possible: f64::INFINITY, centre, half }),
+                    Held::Unknown => Some(Square { possible: patches.most(), centre, half }),
                     Held::Some { possible, .. } => Some(Square { possible, centre, half }),
                 }
             });
@@ -131,16 +126,16 @@ impl ExcessSearch<'_> {
         Ok(rows.into_iter().flatten().collect())
     }
 
-    fn patches(&self) -> Patches<'_> {
-        Patches { inspection: self.inspection, stock_top: self.stock_top }
+    fn patches(&self, least: f64) -> Patches<'_> {
+        Patches { inspection: self.inspection, stock_top: self.stock_top, least }
     }
 
     /// The highest place of a kind in some squares, if it is higher than `known`.
     fn highest(&self, squares: &[Square], known: Bounded, kind: Kind) -> Bounded {
-        let patches = self.patches();
+        let patches = self.patches(known.max_mm);
         let small = OTHER_KIND_SHARE * 0.5 * self.inspection.grid.cell;
         let at = |centre: Point2, half: f64| {
-            let unknown = |place| (place, Value { here: f64::NEG_INFINITY, possible: f64::INFINITY });
+            let unknown = |place| (place, Value { here: f64::NEG_INFINITY, possible: patches.most() });
             match patches.held(centre, half) {
                 Held::Nothing => None,
                 Held::Unknown => Some(unknown(centre)),

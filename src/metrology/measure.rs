@@ -65,6 +65,9 @@ pub fn measure(
     let cut_away = |at: &Point3| lowest_of_all(&surface, at, &all) < at.z - asked.error_bound;
     let search = ExcessSearch { inspection: &inspection, stock_top: asked.stock_top, cut_away: &cut_away };
     measured.excess = search.run(&found.samples, &measured, monitor)?;
+    let (highest, unreached) = (measured.excess.highest.max_mm, measured.excess.unreached.max_mm);
+    measured.deviation.max_mm = measured.deviation.max_mm.max(highest);
+    measured.uncut.max_height_mm = measured.uncut.max_height_mm.max(unreached);
     Ok(measured)
 }
 

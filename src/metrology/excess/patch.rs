@@ -15,6 +15,9 @@ const MOST_MOVES: usize = 5;
 /// Corners of a triangle clipped by a square.
 const MOST_CORNERS: usize = 8;
 
+/// How often a greater height is assumed.
+const MOST_REACHES: usize = 6;
+
 /// Between its corners a smooth surface may leave a tangent plane by so many times as much as there.
 const BETWEEN_CORNERS: f64 = 1.25;
 
@@ -53,6 +56,8 @@ struct Piece {
 pub(super) struct Patches<'a> {
     pub inspection: &'a Inspection<'a>,
     pub stock_top: f64,
+    /// Heights up to this, mm, are of no account: what may stand is told at least that high.
+    pub least: f64,
 }
 
 impl Patches<'_> {
@@ -77,15 +82,35 @@ impl Patches<'_> {
         held.map_or(Held::Nothing, |(possible, place, here, by)| Held::Some { possible, place, here, by })
     }
 
-    /// True where the pass that cut a place came down to the design near it.
+    /// Nothing stands higher than this above the design, mm.
+    pub fn most(&self) -> f64 {
+        (self.stock_top - self.inspection.part.bounds().min.z).max(0.0)
+    }
+
+    /// True where the cutter fits, and the pass that cut came down to the design nearby.
     pub fn reached(&self, at: Point2, by: u32) -> bool {
         let Inspection { part, cutter, surface, limits, .. } = *self.inspection;
         let Some(design) = part.highest_at(at.x, at.y) else { return false };
         by != NOT_CUT && {
             let from_contact = cutter.contact_to_tip(&design.normal);
             let tip = surface.nearest_tip(by, &(design.point + from_contact));
-            part.closest_point(&(tip - from_contact)).1 <= limits.scallop.min(limits.uncut)
+            let off = part.closest_point(&(tip - from_contact)).1;
+            off <= limits.scallop.min(limits.uncut) && self.fits(&(design.point + from_contact))
         }
+    }
+
+    /// Whether the cutter with its tip there keeps out of the part, as far as some places around its axis tell.
+    fn fits(&self, tip: &Point3) -> bool {
+        const RINGS: [f64; 4] = [0.25, 0.5, 0.75, 0.97];
+        const AROUND: u32 = 12;
+        let Inspection { part, cutter, limits, .. } = *self.inspection;
+        let clear = |radius: f64, angle: f64| {
+            let q = tip.xy() + Vector2::new(angle.cos(), angle.sin()) * radius;
+            let least = tip.z + cutter.profile().height(radius) + limits.scallop.min(limits.gouge);
+            part.highest_at(q.x, q.y).is_none_or(|design| design.point.z <= least)
+        };
+        let turn = std::f64::consts::TAU / f64::from(AROUND);
+        RINGS.iter().all(|share| (0..AROUND).all(|k| clear(share * cutter.radius(), turn * f64::from(k))))
     }
 
     /// Triangles that face up and whose boxes meet the square; `None` if there are too many.
@@ -122,8 +147,7 @@ impl Patches<'_> {
         let middle = corners[..len].iter().fold(Point2::origin(), |sum, c| sum + c.coords / len as f64);
         let normal = part.mesh().normal(t);
         let height = |q: Point2| {
-            triangle[0].z
-                - (normal.x * (q.x - triangle[0].x) + normal.y * (q.y - triangle[0].y)) / normal.z
+            triangle[0].z - (normal.x * (q.x - triangle[0].x) + normal.y * (q.y - triangle[0].y)) / normal.z
         };
         let near = 2.0 * part.mesh_deviation() / normal.z.max(1e-3) + 1e-6;
         let seen = |q: Point2| part.highest_at(q.x, q.y).filter(|foot| foot.point.z - height(q) <= near);
@@ -132,7 +156,8 @@ impl Patches<'_> {
         let foot = seen(middle).or_else(|| corners[..len].iter().find_map(|c| seen(inside(c))))?;
         let mut piece = Piece { corners, len, foot, below: 0.0, cosine: 1.0 };
         if part.patches().is_empty() {
-            let point = Point3::new(foot.point.x, foot.point.y, height(Point2::new(foot.point.x, foot.point.y)));
+            let point =
+                Point3::new(foot.point.x, foot.point.y, height(Point2::new(foot.point.x, foot.point.y)));
             piece.foot = SurfacePoint { point, normal, ..foot };
         } else {
             piece.bend(part, &inside);
@@ -147,12 +172,15 @@ impl Patches<'_> {
         let here = surface.along_normal(point, normal)?;
         let moves = self.moves(point, here.by);
         let lean = normal.xy();
-        let mut reach = 2.0 * here.distance.max(0.0) + 1e-4;
-        // The cut over a place stands aside of it by its height times the lean; at most so much was assumed.
-        for _ in 0..4 {
-            let possible = (self.over(piece, &moves, lean * reach) + piece.below) / piece.cosine;
+        let least = self.least.max(0.0);
+        let mut reach = 1.2 * here.distance.max(least) + 1e-4;
+        // The cut over a place stands aside of it by its height times the lean: heights from the least one that counts to
+        // the assumed one are looked at, and the latter must be enough.
+        for _ in 0..MOST_REACHES {
+            let above = self.over(piece, &moves, [lean * least, lean * reach]);
+            let possible = (above + piece.below) / piece.cosine;
             if possible <= reach || lean.norm() < 1e-12 {
-                return Some((possible.max(here.distance), here.distance, here.by));
+                return Some((possible.max(here.distance).max(least), here.distance, here.by));
             }
             reach = 1.5 * possible;
         }
@@ -173,14 +201,14 @@ impl Patches<'_> {
         low.into_iter().map(|m| m.1).collect()
     }
 
-    /// Height of the cut above the piece's plane, along its normal, at most: over the polygon and where it comes to when it
-    /// moves by `aside`.
-    fn over(&self, piece: &Piece, moves: &[u32], aside: Vector2) -> f64 {
+    /// Height of the cut above the piece's plane, along its normal, at most: where the polygon comes to when it moves from
+    /// one place aside to the other.
+    fn over(&self, piece: &Piece, moves: &[u32], aside: [Vector2; 2]) -> f64 {
         let SurfacePoint { point, normal, .. } = &piece.foot;
         let mut places = [Point2::origin(); 2 * MOST_CORNERS];
         let mut count = 0;
         for corner in &piece.corners[..piece.len] {
-            for shift in [Vector2::zeros(), aside] {
+            for shift in aside {
                 (places[count], count) = (corner + shift, count + 1);
             }
         }
@@ -274,7 +302,10 @@ pub(super) fn least_greatest<const N: usize>(rows: &[[f64; N]], count: usize) ->
 fn mix<const N: usize>(a: &[f64; N], b: &[f64; N], count: usize) -> (f64, f64) {
     let line = |share: f64| {
         let at = |k: usize| a[k] + share * (b[k] - a[k]);
-        (0..count).map(|k| (at(k), b[k] - a[k])).max_by(|x, y| x.0.total_cmp(&y.0)).unwrap_or((f64::INFINITY, 0.0))
+        (0..count)
+            .map(|k| (at(k), b[k] - a[k]))
+            .max_by(|x, y| x.0.total_cmp(&y.0))
+            .unwrap_or((f64::INFINITY, 0.0))
     };
     let (mut low, mut high) = ((0.0, line(0.0)), (1.0, line(1.0)));
     let mut best = if low.1.0 <= high.1.0 { (low.1.0, 0.0) } else { (high.1.0, 1.0) };
@@ -300,4 +331,3 @@ fn mix<const N: usize>(a: &[f64; N], b: &[f64; N], count: usize) -> (f64, f64) {
     }
     best
 }
-

@@ -1,1 +1,196 @@
-//! Tests.
+//! The bound against brute force: every move at many places.
+
+use super::patch::least_greatest;
+use crate::{Asked, Bounded, ExcessKind, Limits, Measurement, measure};
+use cutter::Cutter;
+use geometry::{AnalyticShape, AnalyticSurface, Point2, Point3, TriangleMesh, Vector2};
+use motion::{ClPoint, Move, MoveKind, Toolpath};
+use part::{Part, Patch};
+use proptest::prelude::*;
+use sim::{Envelope, Grid, ZMap, cut_reference};
+use work::monitor::Silent;
+
+const LIMITS: Limits = Limits { scallop: 0.01, gouge: 0.005, uncut: 0.05, chord: 0.001 };
+
+/// Height of the stock over the part, mm.
+const TOP: f64 = 3.0;
+
+/// Side of the parts, from the origin, mm.
+const SIDE: f64 = 4.0;
+
+fn formula(shape: AnalyticShape) -> Part {
+    let surface = AnalyticSurface::new(shape, [[0.0, SIDE]; 2]).unwrap();
+    Part::from_patches(vec![Patch::Analytic(surface)], 0.001).unwrap()
+}
+
+fn part(k: usize) -> Part {
+    let cylinder =
+        |concave| formula(AnalyticShape::Cylinder { height: 0.0, radius: 15.0, azimuth: 0.4, concave });
+    match k {
+        0 => formula(AnalyticShape::Plane { height: 0.0 }),
+        1 => formula(AnalyticShape::Inclined { height: 0.0, angle: 0.5, azimuth: 0.3 }),
+        2 => cylinder(false),
+        3 => cylinder(true),
+        4 => formula(AnalyticShape::Wave { amplitude: 0.1, wavelength_x: 7.0, wavelength_y: Some(9.0) }),
+        _ => roof(),
+    }
+}
+
+/// Two slopes that meet in a ridge askew, and end at a border askew.
+fn roof() -> Part {
+    let corners = [
+        [0.0, 0.0, 0.0],
+        [SIDE, 0.3, 0.0],
+        [0.0, 1.9, 0.35],
+        [SIDE, 2.4, 0.35],
+        [0.2, SIDE, 0.0],
+        [SIDE, 3.7, 0.05],
+    ];
+    let corners = corners.map(Point3::from).to_vec();
+    let triangles = vec![[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4]];
+    Part::from_mesh(TriangleMesh::new(corners, triangles).unwrap().0)
+}
+
+/// Passes of a cutter that touch the part, or stay over it by `lift`, at an angle to x, from beyond the part to beyond it.
+fn path(part: &Part, cutter: &Cutter, angle: f64, step: f64, lift: f64) -> Toolpath {
+    let (along, across) = (Vector2::new(angle.cos(), angle.sin()), Vector2::new(-angle.sin(), angle.cos()));
+    let middle = Point2::new(0.5 * SIDE, 0.5 * SIDE);
+    let mut moves = Vec::new();
+    let count = (1.5 * SIDE / step) as i32;
+    for pass in -count / 2..=count / 2 {
+        let mut first = true;
+        for k in -30..=30 {
+            let q = middle + across * (step * f64::from(pass)) + along * (0.1 * f64::from(k));
+            let Some(at) = part.highest_at(q.x, q.y) else { continue };
+            let tip = at.point + cutter.contact_to_tip(&at.normal) + at.normal * lift;
+            let kind = if std::mem::take(&mut first) { MoveKind::Rapid } else { MoveKind::Cut };
+            if kind == MoveKind::Rapid {
+                let to = ClPoint::upright(Point3::new(tip.x, tip.y, 9.0));
+                moves.push(Move { to, kind, feed_rate: 1000.0, pass: (pass + count) as u32 });
+            }
+            let to = ClPoint::upright(tip);
+            moves.push(Move { to, kind, feed_rate: 1000.0, pass: (pass + count) as u32 });
+        }
+    }
+    Toolpath::new(ClPoint::upright(Point3::new(0.0, 0.0, 9.0)), moves)
+}
+
+fn measured(part: &Part, cutter: &Cutter, path: &Toolpath, cell: f64) -> Measurement {
+    let grid = Grid::covering(&part.bounds(), cell, 64, 1 << 30).unwrap();
+    let cut = cut_reference(&ZMap::block(grid, TOP), cutter, path, &Silent).unwrap();
+    let asked = Asked { error_bound: 5e-4, stock_top: TOP, most_cells: 1 << 20 };
+    measure(part, cutter, path, &cut, &LIMITS, &asked, &Silent).unwrap()
+}
+
+/// The highest of many places along their normals, every move looked at.
+fn brute(part: &Part, cutter: &Cutter, path: &Toolpath, places: usize) -> f64 {
+    let envelope = Envelope::new(cutter, path);
+    let cutting = |k: &u32| path.moves[*k as usize].kind == MoveKind::Cut;
+    let all: Vec<u32> = (0..path.len() as u32).filter(cutting).collect();
+    let height = |q: &Point3| envelope.lowest(q.x, q.y, &all).map_or(TOP, |(z, _)| z.min(TOP)) - q.z;
+    let bounds = part.bounds();
+    let at = |i: usize, low: f64, high: f64| low + (high - low) * (i as f64 + 1e-6) / (places as f64 + 2e-6);
+    let of_row = |j: usize| {
+        let y = at(j, bounds.min.y, bounds.max.y);
+        let of_place = |i: usize| {
+            let foot = part.highest_at(at(i, bounds.min.x, bounds.max.x), y)?;
+            let (mut low, mut high) = (-0.5, 2.0 * TOP);
+            for _ in 0..40 {
+                let t = 0.5 * (low + high);
+                if height(&(foot.point + foot.normal * t)) > 0.0 { low = t } else { high = t }
+            }
+            Some(low)
+        };
+        (0..=places).filter_map(of_place).fold(0.0, f64::max)
+    };
+    work::parallel::map(places + 1, of_row).into_iter().fold(0.0, f64::max)
+}
+
+fn holds(found: &Bounded, truth: f64) -> bool {
+    truth <= found.at_most() + 1e-9 && truth >= found.max_mm - found.error_bound_mm - 2e-3
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// Nothing stands higher than figure and bound, on any part, by any cutter, with fine cells and coarse ones.
+    #[test]
+    fn nothing_stands_above_the_bound(
+        shape in 0usize..6,
+        tool in 0usize..3,
+        angle in 0.0..3.1f64,
+        step in 0.25..1.2f64,
+        lift in prop_oneof![Just(0.0), 0.0..0.1f64],
+        cell in prop_oneof![Just(0.04), Just(0.1), Just(0.5), Just(2.0)],
+    ) {
+        let part = part(shape);
+        let cutter = [Cutter::ball(6.0), Cutter::bull(6.0, 1.0), Cutter::flat(3.0)][tool].clone().unwrap();
+        let path = path(&part, &cutter, angle, step, lift);
+        let found = measured(&part, &cutter, &path, cell).excess;
+        let truth = brute(&part, &cutter, &path, 120);
+        prop_assert!(holds(&found.highest, truth), "{truth} {found:?}");
+        let all = found.reached.at_most().max(found.unreached.at_most());
+        prop_assert!(all >= truth - 1e-9, "{truth} {found:?}");
+    }
+
+    /// A mean of rows is never below the value of the game, and near it.
+    #[test]
+    fn the_best_mean_of_two_rows_is_found(a in prop::array::uniform4(-1.0..1.0f64), b in prop::array::uniform4(-1.0..1.0f64)) {
+        let greatest = |share: f64| (0..4).map(|k| a[k] + share * (b[k] - a[k])).fold(f64::NEG_INFINITY, f64::max);
+        let brute = (0..=10_000).map(|k| greatest(f64::from(k) * 1e-4)).fold(f64::INFINITY, f64::min);
+        let found = least_greatest(&[a, b], 4);
+        prop_assert!(found <= brute + 1e-9 && found >= brute - 1e-3, "{found} {brute}");
+    }
+}
+
+#[test]
+fn slopes_that_fall_away_from_a_ridge_cancel() {
+    let rows = [[0.9, 1.1, 0.9, 1.1], [1.1, 0.9, 1.1, 0.9], [3.0; 4]];
+    assert!((least_greatest(&rows, 4) - 1.0).abs() < 1e-12);
+    // Three moves that meet in a point.
+    let rows = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let found = least_greatest(&rows, 3);
+    assert!((1.0 / 3.0 - 1e-12..0.45).contains(&found), "{found}");
+}
+
+/// Straight passes over a plane leave ridges of a known height, and more along the border beyond the last one.
+#[test]
+fn a_remnant_along_the_border_is_as_high_as_its_closed_form() {
+    let (part, ball) = (part(0), Cutter::ball(6.0).unwrap());
+    let cut = |lines: &[f64]| {
+        let mut moves = Vec::new();
+        for (pass, &y) in (0..).zip(lines) {
+            let to = |x: f64, z: f64, kind| Move {
+                to: ClPoint::upright(Point3::new(x, y, z)),
+                kind,
+                feed_rate: 1000.0,
+                pass,
+            };
+            moves.extend([
+                to(-4.0, 9.0, MoveKind::Rapid),
+                to(-4.0, 0.0, MoveKind::Plunge),
+                to(8.0, 0.0, MoveKind::Cut),
+                to(8.0, 9.0, MoveKind::Retract),
+            ]);
+        }
+        Toolpath::new(ClPoint::upright(Point3::new(-4.0, 0.0, 9.0)), moves)
+    };
+    let sagitta = |half: f64| 3.0 - (9.0 - half * half).sqrt();
+    let lines: Vec<f64> = (0..9).map(|k| 0.33 + 0.4 * f64::from(k)).collect();
+    let path = cut(&lines);
+    // The last pass is at 3.53, 0.47 from the border; ridges are 0.2 from theirs.
+    for cell in [0.05, 0.3] {
+        let excess = measured(&part, &ball, &path, cell).excess;
+        let (truth, bound) = (sagitta(0.47), excess.highest.error_bound_mm);
+        assert_eq!(excess.kind, ExcessKind::Border, "{excess:?}");
+        assert!((excess.highest.max_mm - truth).abs() <= bound && bound < 6e-4, "{truth} {excess:?}");
+        assert!((excess.highest.at_mm.unwrap()[1] - SIDE).abs() < 0.01, "{excess:?}");
+    }
+    let even: Vec<f64> = (0..11).map(|k| 0.4 * f64::from(k)).collect();
+    let excess = measured(&part, &ball, &cut(&even), 0.05).excess;
+    assert_eq!(excess.kind, ExcessKind::Scallop);
+    assert!(
+        (excess.highest.max_mm - sagitta(0.2)).abs() < 2e-6 && excess.highest.error_bound_mm < 1e-5,
+        "{excess:?}"
+    );
+}
