@@ -267,6 +267,10 @@ impl CutSurface<'_> {
             };
             let m = self.normal(point.by, q.x, q.y);
             let gap = point.z - q.z;
+            // The line left all that was cut around its place: it meets none of it.
+            if !gap.is_finite() {
+                return None;
+            }
             result = Some(Deviation { distance: t, slope: m.cross(n).norm(), by: point.by });
             if gap.abs() < MEETING {
                 break;
@@ -293,5 +297,35 @@ impl CutSurface<'_> {
             t = next;
         }
         result
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cutter::Cutter;
+    use geometry::Point2;
+    use sim::scenes::path_through;
+    use sim::{Grid, cut_reference};
+    use work::monitor::Silent;
+
+    #[test]
+    fn a_line_that_leaves_the_cuts_meets_them_nowhere_and_stays_finite() {
+        let cutter = Cutter::ball(6.0).unwrap();
+        let path = path_through([Point3::new(0.0, 10.0, -2.0), Point3::new(20.0, 10.0, -2.0)]);
+        let grid = Grid { origin: Point2::new(0.5, 0.5), cell: 1.0, nx: 20, ny: 20 };
+        let cut = cut_reference(&ZMap::block(grid, 5.0), &cutter, &path, &Silent).unwrap();
+        let surface = CutSurface::new(Envelope::new(&cutter, &path), &cut, &path);
+        // Sideways, flat and down: no line of these leads up to the cut.
+        for n in [[1.0, 0.0, 0.0], [0.0, 0.999, 0.0447], [0.0, -0.6, -0.8], [0.0, 0.0, -1.0]] {
+            let n = Vector3::from(n).normalize();
+            for (x, y, z) in [(10.0, 10.0, -6.0), (10.0, 10.0, 3.0), (3.2, 12.6, -1.0), (0.4, 9.9, 2.0)] {
+                let found = surface.along_normal(&Point3::new(x, y, z), &n).unwrap();
+                assert!(
+                    found.distance.is_finite() && found.slope.is_finite(),
+                    "{n:?} {x} {y} {z}: {found:?}"
+                );
+            }
+        }
     }
 }

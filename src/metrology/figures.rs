@@ -212,19 +212,41 @@ pub struct ExcessFigures {
     pub unreached: Bounded,
 }
 
-/// Signed deviation over all samples.
+/// Signed deviation over all samples. `None` (and a reason) where nothing was measured.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct DeviationFigures {
     /// Samples taken, one a cell.
     pub samples: usize,
     /// Least (deepest gouge).
-    pub min_mm: f64,
+    pub min_mm: Option<f64>,
     /// Greatest (highest excess).
-    pub max_mm: f64,
+    pub max_mm: Option<f64>,
     /// Root mean square, weighted by area.
-    pub rms_mm: f64,
+    pub rms_mm: Option<f64>,
     /// Area of the design surface that was measured.
     pub area_mm2: f64,
+    /// Why a figure is missing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<&'static str>,
+}
+
+impl DeviationFigures {
+    /// Of deviations, mm, and the areas that they stand for, mm².
+    pub(crate) fn of(measured: impl Iterator<Item = (f64, f64)>) -> Self {
+        let (mut least, mut greatest, mut squares) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
+        let (mut samples, mut area_mm2) = (0, 0.0);
+        for (d, area) in measured {
+            (least, greatest) = (least.min(d), greatest.max(d));
+            squares += area * d * d;
+            area_mm2 += area;
+            samples += 1;
+        }
+        if samples == 0 || area_mm2 <= 0.0 {
+            return Self { samples, reason: Some("no place of the part was measured"), ..Self::default() };
+        }
+        let rms_mm = Some((squares / area_mm2).sqrt());
+        Self { samples, min_mm: Some(least), max_mm: Some(greatest), rms_mm, area_mm2, reason: None }
+    }
 }
 
 /// All that is measured on one cut surface.

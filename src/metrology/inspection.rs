@@ -13,7 +13,7 @@ use super::regions::connected;
 use crate::closer;
 use cutter::Cutter;
 use geometry::{Point2, Point3};
-use part::{Part, SurfaceGrid};
+use part::{Part, SurfaceGrid, SurfacePoint};
 use sim::{Grid, NOT_CUT};
 use work::monitor::{self, Cancelled, Monitor};
 
@@ -31,6 +31,10 @@ const RIDGE_IS_TOP: f64 = 1e-3;
 /// The design surface is sampled in so many bands of rows, one after the other: it takes 40 bytes a
 /// cell, more than all else that is kept. Every band looks at all triangles of the part.
 const DESIGN_BANDS: usize = 8;
+
+/// Where the vertical part of the design's normal is no greater, no upright cutter faces the surface, and a cell says nothing
+/// of it. A greater one leaves drafts of walls unmeasured; below rounding of mesh files, walls pass for slopes.
+pub(crate) const LEAST_FACING: f64 = 1e-3;
 
 /// What is measured at one cell.
 #[derive(Debug, Clone, Copy)]
@@ -86,7 +90,7 @@ impl Inspection<'_> {
                 for (i, sample) in row.iter_mut().enumerate() {
                     let row = first + j - rows.start;
                     let here = design.at(i, row);
-                    if !here.is_on() {
+                    if !here.is_on() || here.normal.z <= LEAST_FACING {
                         continue;
                     }
                     let centre = self.grid.centre(i, first + j);
@@ -135,7 +139,12 @@ impl Inspection<'_> {
 
     /// Area of the design surface that a cell stands for, mm².
     fn area(&self, sample: &Sample) -> f64 {
-        self.grid.cell * self.grid.cell / f64::from(sample.lean).max(1e-3)
+        self.grid.cell * self.grid.cell / f64::from(sample.lean).max(LEAST_FACING)
+    }
+
+    /// The design surface at a place of the plan, where an upright cutter faces it.
+    fn design_at(&self, q: Point2) -> Option<SurfacePoint> {
+        self.part.highest_at(q.x, q.y).filter(|design| design.normal.z > LEAST_FACING)
     }
 
     /// Centre of cell `k`.
@@ -144,21 +153,7 @@ impl Inspection<'_> {
     }
 
     pub fn deviation_figures(&self, samples: &[Sample]) -> DeviationFigures {
-        let mut figures = DeviationFigures { min_mm: f64::MAX, max_mm: f64::MIN, ..Default::default() };
-        let mut squares = 0.0;
-        for (k, d) in measured(samples) {
-            let area = self.area(&samples[k]);
-            figures.samples += 1;
-            figures.min_mm = figures.min_mm.min(d);
-            figures.max_mm = figures.max_mm.max(d);
-            figures.area_mm2 += area;
-            squares += area * d * d;
-        }
-        if figures.samples == 0 {
-            return DeviationFigures::default();
-        }
-        figures.rms_mm = (squares / figures.area_mm2).sqrt();
-        figures
+        DeviationFigures::of(measured(samples).map(|(k, d)| (d, self.area(&samples[k]))))
     }
 
     pub fn gouges(&self, samples: &[Sample]) -> GougeFigures {
@@ -227,7 +222,7 @@ impl Inspection<'_> {
             open.truncate(MOST_SEARCHED);
         }
         let at = |q: Point2, half: f64| {
-            let design = self.part.highest_at(q.x, q.y)?;
+            let design = self.design_at(q)?;
             let d = self.surface.along_normal(&design.point, &design.normal)?;
             Some(value(&d, design.normal.z, half))
         };
@@ -240,7 +235,7 @@ impl Inspection<'_> {
     /// design point, move.
     fn deepest_near(&self, k: usize) -> (f64, Point3, u32) {
         let at = |q: Point2| {
-            let design = self.part.highest_at(q.x, q.y)?;
+            let design = self.design_at(q)?;
             let d = self.surface.along_normal(&design.point, &design.normal)?;
             Some((-d.distance, design.point, d.by))
         };
@@ -264,7 +259,7 @@ impl Inspection<'_> {
     /// True where the pass that cut cell `k` came down to the design.
     fn reached(&self, k: usize) -> bool {
         let (by, centre) = (self.surface.cut.cut_by[k], self.centre(k));
-        let Some(design) = self.part.highest_at(centre.x, centre.y) else { return false };
+        let Some(design) = self.design_at(centre) else { return false };
         by != NOT_CUT && {
             let from_contact = self.cutter.contact_to_tip(&design.normal);
             let tip = self.surface.nearest_tip(by, &(design.point + from_contact));
@@ -334,7 +329,7 @@ impl Inspection<'_> {
 
 /// How far along the design a place in a square of the plan may be from its centre, mm.
 fn reach(half: f64, lean: f64) -> f64 {
-    half * std::f64::consts::SQRT_2 / lean.max(1e-3)
+    half * std::f64::consts::SQRT_2 / lean.max(LEAST_FACING)
 }
 
 /// Cells on the part with their deviation.

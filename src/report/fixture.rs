@@ -47,10 +47,11 @@ fn measurement(gouge: f64) -> Measured {
         uncut: UncutFigures { error_bound_mm: 0.0005, ..UncutFigures::default() },
         deviation: DeviationFigures {
             samples: 4800,
-            min_mm: -gouge,
-            max_mm: 0.0105,
-            rms_mm: 0.005,
+            min_mm: Some(-gouge),
+            max_mm: Some(0.0105),
+            rms_mm: Some(0.005),
             area_mm2: 1200.0,
+            reason: None,
         },
     }
 }

@@ -291,9 +291,9 @@ fn figures(t: &ToolpathResult) -> Markup {
         ("uncut area, volume", format!("{:.3} mm², {:.4} mm³", t.uncut.area_mm2, t.uncut.volume_mm3)),
         (
             "deviation from, to",
-            format!("{} to {} µm", micrometres(Some(deviation.min_mm)), micrometres(Some(deviation.max_mm))),
+            format!("{} to {} µm", micrometres(deviation.min_mm), micrometres(deviation.max_mm)),
         ),
-        ("deviation, root mean square", format!("{} µm", micrometres(Some(deviation.rms_mm)))),
+        ("deviation, root mean square", format!("{} µm", micrometres(deviation.rms_mm))),
     ];
     rows.extend(t.figures.iter().flat_map(|figure| figure.rows.iter().cloned()));
     html! { dl.grid { @for (name, value) in &rows { div { dt { (name) } dd { (value) } } } } }

@@ -292,7 +292,7 @@ mod tests {
     fn figures_that_are_not_finite_are_refused_by_name() {
         for bad in [f64::NAN, f64::INFINITY] {
             let mut report = fixture::report();
-            edit(&mut report, 1, |t| t.deviation.rms_mm = bad);
+            edit(&mut report, 1, |t| t.deviation.rms_mm = Some(bad));
             let error = report.to_json().unwrap_err();
             assert_eq!(error, ReportError::NotFinite("report.toolpaths[1].deviation.rms_mm".into()));
         }

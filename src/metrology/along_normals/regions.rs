@@ -73,18 +73,8 @@ pub(super) fn areas(net: &Net) -> Vec<f64> {
 }
 
 pub(super) fn deviation_figures(samples: &[Sample], areas: &[f64]) -> DeviationFigures {
-    let mut figures = DeviationFigures { samples: samples.len(), ..Default::default() };
-    let (mut least, mut greatest, mut squares) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
-    for (hit, area) in samples.iter().zip(areas).filter_map(|(sample, area)| Some((sample.hit?, area))) {
-        (least, greatest) = (least.min(hit.deviation), greatest.max(hit.deviation));
-        squares += area * hit.deviation * hit.deviation;
-        figures.area_mm2 += area;
-    }
-    if figures.area_mm2 > 0.0 {
-        (figures.min_mm, figures.max_mm) = (least, greatest);
-        figures.rms_mm = (squares / figures.area_mm2).sqrt();
-    }
-    figures
+    let hits = samples.iter().zip(areas).filter_map(|(sample, area)| Some((sample.hit?.deviation, *area)));
+    DeviationFigures { samples: samples.len(), ..DeviationFigures::of(hits) }
 }
 
 /// The regions of places for which `inside` holds: places closer than `spacing` mm that face the same way belong together,
