@@ -26,6 +26,7 @@ mod cut_surface;
 mod engagement;
 mod engines;
 mod excess;
+mod facing;
 mod figures;
 #[cfg(test)]
 mod flat_scene;
@@ -56,6 +57,7 @@ pub use engines::{
     Budget, ENGINES, Engine, EngineChoice, EngineError, LaidOut, MIB, Measured, NormalView, REACH_OVER_UNCUT,
     Simulation, Task, View,
 };
+pub use facing::{Facing, Judged, PlaceKind};
 pub use figures::{
     Bounded, CloserLook, DeviationFigures, ExcessFigures, ExcessKind, GougeFigures, GougeRegion, Limits,
     Measurement, PathFigures, ScallopFigures, ScallopRule, UncutFigures, UncutRegion,

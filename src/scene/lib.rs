@@ -30,7 +30,7 @@ pub use write::complete_toml;
 
 use cutter::{Cutter, Holder};
 use machine::Machine;
-pub use metrology::{EngineChoice, Simulation};
+pub use metrology::{EngineChoice, Judged, Simulation};
 use metrology::{Limits, ScallopRule};
 use toolpath::{Joining, Step, Strategy};
 
@@ -122,6 +122,8 @@ pub struct Scene {
     pub title: String,
     /// What is to be made.
     pub part: PartSource,
+    /// What of it is judged.
+    pub judged: Judged,
     /// What it is made from.
     pub stock: Stock,
     /// With what.

@@ -20,7 +20,8 @@ use std::fmt::{self, Write as _};
 use std::path::Path;
 
 use crate::named_file::NamedFile;
-use keys::{SceneError, Section, listed};
+use keys::{SceneError, Section, listed, toml_string};
+use metrology::Judged;
 use source::{PartTable, Source};
 
 /// What the list says of a source.
@@ -105,13 +106,22 @@ fn words() -> Vec<&'static str> {
 
 /// The keys of all sources, each once.
 fn all_keys() -> Vec<&'static str> {
-    let mut all = vec!["surface"];
+    let mut all = vec!["surface", JUDGE];
     for key in KINDS.iter().flat_map(|kind| (kind.keys)()) {
         if !all.contains(&key) {
             all.push(key);
         }
     }
     all
+}
+
+/// The key for what of the part is judged.
+pub(crate) const JUDGE: &str = "judge";
+
+/// Reads what of the part is judged.
+pub(crate) fn read_judged(part: &Section<'_>) -> Result<Judged, SceneError> {
+    let word = part.word(JUDGE, &Judged::ALL.map(Judged::word))?;
+    Ok(word.and_then(|word| Judged::from_word(word.value)).unwrap_or_default())
 }
 
 /// Reads `[part]`.
@@ -151,7 +161,8 @@ fn check_extension(part: &Section<'_>) -> Result<(), SceneError> {
 }
 
 /// Writes `[part]`.
-pub(crate) fn write(out: &mut String, part: &PartSource) -> fmt::Result {
+pub(crate) fn write(out: &mut String, part: &PartSource, judged: Judged) -> fmt::Result {
     writeln!(out, "[part]")?;
-    part.write_keys(out)
+    part.write_keys(out)?;
+    writeln!(out, "{JUDGE} = {}  # {}", toml_string(judged.word()), judged.meaning())
 }

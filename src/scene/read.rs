@@ -80,6 +80,7 @@ impl Scene {
         };
         let folder = Path::new(name).parent().unwrap_or(Path::new("")).to_owned();
         let part = part::read(&root.section("part")?, &folder)?;
+        let judged = part::read_judged(&root.section("part")?)?;
         let (cutter, cutting) = read_cutter(&root.section("cutter")?)?;
         let stock = read_stock(&root.section("stock")?, &part, &cutter)?;
         let holder = read_holder(&root, &cutter)?;
@@ -99,6 +100,7 @@ impl Scene {
             source: source.clone(),
             title,
             part,
+            judged,
             stock,
             cutter,
             holder,

@@ -16,7 +16,7 @@ pub fn complete_toml(scene: &Scene) -> String {
 
 fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     writeln!(out, "title = {}\n", text(&scene.title))?;
-    part::write(out, &scene.part)?;
+    part::write(out, &scene.part, scene.judged)?;
     writeln!(out, "\n[stock]")?;
     writeln!(out, "allowance = {}  # mm above the part's highest point", number(scene.stock.allowance))?;
     writeln!(out, "margin = {}  # mm around the part in the plan view", number(scene.stock.margin))?;

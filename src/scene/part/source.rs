@@ -8,6 +8,7 @@ use cutter::Cutter;
 use keys::{Located, SceneError, SceneText, Section};
 use part::{Part, PartError, Patch, default_tessellation_tolerance};
 
+use super::JUDGE;
 use crate::named_file::NamedFile;
 
 /// A kind of source. Which one `[part]` means is said by `surface`, or else by the key that it has.
@@ -54,7 +55,8 @@ pub(crate) struct PartTable<'a> {
 impl PartTable<'_> {
     /// Refuses every key but `keys`; those of other sources do not apply to `what`.
     pub fn only(&self, keys: &[&str], what: &str) -> Result<(), SceneError> {
-        self.table.only(keys, self.all_keys, what)
+        let keys: Vec<&str> = keys.iter().copied().chain([JUDGE]).collect();
+        self.table.only(&keys, self.all_keys, what)
     }
 
     /// A file beside the scene.
