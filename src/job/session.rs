@@ -257,7 +257,13 @@ impl Session {
         Ok(engine)
     }
 
-    fn task<'a>(&'a self, path: &'a Toolpath, simulation: &'a Simulation, cells: &'a LaidOut) -> Task<'a> {
+    /// A path to cut and to measure.
+    pub(crate) fn task<'a>(
+        &'a self,
+        path: &'a Toolpath,
+        simulation: &'a Simulation,
+        cells: &'a LaidOut,
+    ) -> Task<'a> {
         Task {
             part: &self.part,
             cutter: &self.scene.cutter,
@@ -269,6 +275,7 @@ impl Session {
             limits: &self.scene.tolerance,
             simulation,
             budget: self.budget(),
+            judged: self.scene.judged,
         }
     }
 

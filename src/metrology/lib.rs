@@ -22,6 +22,7 @@
 
 mod along_normals;
 mod closer;
+mod coverage;
 mod cut_surface;
 mod engagement;
 mod engines;
@@ -51,6 +52,7 @@ pub use along_normals::{
     AlongNormal, FirstCut, NormalHit, NormalMap, PatchGrid, RaysCut, SweptVolume, VoxelCut,
     measure_along_normals, net_places,
 };
+pub use coverage::{AlongTask, CellsSeen, Coverage, CoverageFigures};
 pub use cut_surface::CutSurface;
 pub use engagement::{ContactArcs, contact_arcs};
 pub use engines::{

@@ -66,7 +66,7 @@ pub fn measure(
     let search = ExcessSearch { inspection: &inspection, stock_top: asked.stock_top, cut_away: &cut_away };
     measured.excess = search.run(&found.samples, &measured, monitor)?;
     let (highest, unreached) = (measured.excess.highest.max_mm, measured.excess.unreached.max_mm);
-    measured.deviation.max_mm = measured.deviation.max_mm.max(highest);
+    measured.deviation.max_mm = measured.deviation.max_mm.map(|max| max.max(highest));
     measured.uncut.max_height_mm = measured.uncut.max_height_mm.max(unreached);
     Ok(measured)
 }

@@ -203,6 +203,7 @@ fn toolpath_section(t: &ToolpathResult, page: &ToolpathPage) -> Markup {
     html! {
         section.toolpath id=(t.folder) {
             h2 { (t.name) " " (badge(t.verdict)) }
+            @if !t.scope().is_empty() { p.faint { (verdict_word(t.verdict)) " " (t.scope()) } }
             p.faint { "strategy " (t.strategy) " · files in " code { (t.folder) "/" } }
             @if not_held(t).next().is_some() {
                 ul.violations { @for claim in not_held(t) { li.(class(claim.verdict())) { (claim.sentence()) } } }

@@ -85,6 +85,12 @@ impl ToolpathResult {
     pub fn claims_that(&self, verdict: Verdict) -> impl Iterator<Item = &Claim> {
         self.claims.iter().filter(move |claim| claim.verdict() == verdict)
     }
+
+    /// What share of the surface the verdict covers, in words to stand behind it; empty where that is all of it.
+    pub fn scope(&self) -> &str {
+        let coverage = self.figures.iter().find(|figure| figure.key == "coverage");
+        coverage.and_then(|figure| figure.value.get("scope")?.as_str()).unwrap_or_default()
+    }
 }
 
 /// Claims as lists, one for each verdict.

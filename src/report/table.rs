@@ -194,7 +194,10 @@ pub fn conclusion(report: &RunReport) -> String {
             format!("No toolpath is proven to hold every tolerance; {undecided} of {all} are undecided.")
         }
         (None, _) => "No toolpath holds every tolerance.".to_owned(),
-        (Some(_), 1) => "Every tolerance holds.".to_owned(),
+        (Some(best), 1) => match best.scope() {
+            "" => "Every tolerance holds.".to_owned(),
+            scope => format!("Every tolerance holds {scope}."),
+        },
         (Some(best), all) => format!(
             "{passing} of {all} toolpaths hold every tolerance. Fastest: {}, {}.",
             best.name,

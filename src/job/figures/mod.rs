@@ -1,6 +1,7 @@
 //! The figures of a toolpath beside scallop, gouge, uncut and deviation. Each is one file, which finds its numbers, tells
 //! them in words, and holds them against their limits; a new one is one file and one line in [`FIGURES`].
 
+mod coverage;
 mod field;
 mod holder;
 mod machine;
@@ -27,7 +28,8 @@ use super::run::{Finding, Run};
 type Find = fn(&Run<'_>, &dyn Monitor) -> Result<Finding, JobError>;
 
 /// All figures, in the order of report.json.
-const FIGURES: [Find; 12] = [
+const FIGURES: [Find; 13] = [
+    coverage::find,
     shortest::find,
     field::find,
     machine::find,

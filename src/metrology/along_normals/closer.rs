@@ -6,13 +6,13 @@
 use std::collections::BinaryHeap;
 
 use super::ridges::Crossing;
-use super::{NormalInspection, Sample};
+use super::{AlongNormal, NormalInspection, Sample};
 use crate::figures::NUMERICAL_FLOOR;
 use geometry::Point3;
 use work::monitor::{self, Cancelled, Monitor};
 
 /// Triangles that are divided at most in search of extremes. Each asks for some ten places.
-const MOST_DIVIDED: usize = 20_000;
+pub(super) const MOST_DIVIDED: usize = 20_000;
 
 /// A triangle is divided at most so often in a row.
 const MOST_DEPTH: u32 = 12;
@@ -67,10 +67,11 @@ pub(super) struct Greatest {
 }
 
 impl Greatest {
-    pub fn look_at(&mut self, sample: &Sample, reach: f64) {
+    pub fn look_at(&mut self, sample: &Sample, engine: &dyn AlongNormal) {
         let Some(hit) = sample.hit else {
-            if reach > self.height {
-                (self.height, self.lower) = (reach, 0.0);
+            let standing = sample.height(engine);
+            if standing > self.height {
+                (self.height, self.lower) = (standing, 0.0);
             }
             return;
         };
@@ -144,14 +145,14 @@ impl NormalInspection<'_> {
             heap.extend(keep(samples, crossings, 0, greatest));
         }
         // Promises were made against lesser figures than are known later, so that they are never too small.
-        while divided < MOST_DIVIDED && !heap.is_empty() {
+        while divided < self.most_divided && !heap.is_empty() {
             monitor::check(monitor)?;
             let batch: Vec<Open> = std::iter::from_fn(|| heap.pop()).take(BATCH).collect();
             divided += batch.len();
             let closer = work::parallel::map(batch.len(), |k| self.divided(&batch[k].samples));
             for (open, parts) in batch.iter().zip(closer) {
                 for (samples, Closer { middles, crossings }) in parts {
-                    middles.iter().for_each(|sample| greatest.look_at(sample, self.engine.reach()));
+                    middles.iter().for_each(|sample| greatest.look_at(sample, self.engine));
                     crossings.iter().for_each(|crossing| greatest.look_at_ridge(crossing));
                     heap.extend(keep(samples, &crossings, open.depth + 1, greatest));
                 }

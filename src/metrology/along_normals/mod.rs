@@ -23,19 +23,24 @@ mod swept_volume;
 #[cfg(test)]
 mod tests;
 
-use super::figures::{CloserLook, Limits, Measurement, NUMERICAL_FLOOR};
+use super::facing::{Facing, Judged};
+use super::figures::{
+    Bounded, CloserLook, ExcessFigures, ExcessKind, Limits, Measurement, NUMERICAL_FLOOR, ScallopFigures,
+    UncutFigures,
+};
 use super::pairs::{PairTally, RidgeCrossing, pair_figures};
 use super::ridges::{Highest, scallop_figures};
 use super::tracks::Tracks;
-use closer::Greatest;
+use closer::{Greatest, MOST_DIVIDED};
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
 use motion::Toolpath;
-use net::{Net, NetPlace};
+pub(crate) use net::{Net, NetPlace, Site};
 pub use net::{PatchGrid, net_places};
 use part::Part;
 use regions::{areas, deviation_figures};
 use ridges::{Crossing, Finder};
+pub(crate) use swept_volume::ball_beneath;
 pub use swept_volume::{FirstCut, RaysCut, SweptVolume, VoxelCut};
 use work::monitor::{self, Cancelled, Monitor};
 
@@ -62,6 +67,11 @@ pub trait AlongNormal: Sync {
 
     /// How far outward is looked, mm.
     fn reach(&self) -> f64;
+
+    /// How high material stands at least on the line through `point` along `normal` where nothing was cut, mm.
+    fn standing(&self, _point: &Point3, _normal: &Vector3) -> f64 {
+        self.reach()
+    }
 
     /// How far inward is looked, mm.
     fn depth(&self) -> f64;
@@ -101,6 +111,28 @@ impl Sample {
     }
 }
 
+impl Sample {
+    /// The deviation there; what stands at least where nothing was cut.
+    fn height(&self, engine: &dyn AlongNormal) -> f64 {
+        self.hit.map_or_else(|| engine.standing(&self.place.point, &self.place.normal), |hit| hit.deviation)
+    }
+}
+
+/// What places are measured by, and how closely.
+pub(crate) struct Along<'a> {
+    pub part: &'a Part,
+    pub cutter: &'a Cutter,
+    pub path: &'a Toolpath,
+    pub engine: &'a dyn AlongNormal,
+    pub limits: &'a Limits,
+    /// Distance of the places, mm.
+    pub spacing: f64,
+    /// Error bound that is asked for, mm.
+    pub asked: f64,
+    /// Triangles that are divided at most in search of extremes.
+    pub most_divided: usize,
+}
+
 struct NormalInspection<'a> {
     part: &'a Part,
     engine: &'a dyn AlongNormal,
@@ -109,10 +141,11 @@ struct NormalInspection<'a> {
     spacing: f64,
     /// Radius with which the cutter bends, about, mm.
     radius: f64,
+    most_divided: usize,
 }
 
 /// Measures what `engine` tells of the cut by `path` at places `spacing` mm apart, looking closer until the error bounds
-/// are the asked one, mm.
+/// are the asked one, mm. Figures are those of the judged share of the part, the map is of all of it.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -124,99 +157,133 @@ pub fn measure_along_normals(
     spacing: f64,
     limits: &Limits,
     asked: f64,
+    judged: Option<(&Facing<'_>, Judged)>,
     monitor: &dyn Monitor,
 ) -> Result<(Measurement, NormalMap), Cancelled> {
+    let along = Along { part, cutter, path, engine, limits, spacing, asked, most_divided: MOST_DIVIDED };
+    let keep = |places: &[NetPlace]| match judged {
+        None => vec![true; places.len()],
+        Some((facing, judged)) => {
+            let kinds = facing.kinds(places.len(), |k| (places[k].point, places[k].normal));
+            kinds.into_iter().map(|kind| facing.is_judged(judged, kind)).collect()
+        }
+    };
     let net = Net::over(part, spacing);
-    let tracks = Tracks::new(path, cutter);
-    let corner = cutter.corner_radius();
-    let radius = if corner > 0.0 { corner } else { cutter.radius() };
-    let finder = Finder { part, engine, tracks: &tracks, radius };
-    let inspection = NormalInspection { part, engine, finder, limits, spacing, radius };
-    let samples = in_runs("measuring along normals", net.places.len(), monitor, |range| {
-        let mut near = None;
-        let of_one = |place: &NetPlace| {
-            let sample = inspection.sample(*place, near.as_ref());
-            near = sample.hit.or(near);
-            sample
-        };
-        net.places[range].iter().map(of_one).collect()
-    })?;
-    let sides = sides(&net);
-    let on_sides = in_runs("measuring ridges", sides.len(), monitor, |range| {
-        sides[range].iter().map(|side| inspection.on_side(&side.map(|k| samples[k as usize]))).collect()
-    })?;
-    let of_triangle = in_runs("joining ridges", net.triangles.len(), monitor, |range| {
-        let of_one = |t: &[u32; 3]| {
-            let side = |k: usize| [t[k].min(t[(k + 1) % 3]), t[k].max(t[(k + 1) % 3])];
-            let found =
-                (0..3).filter_map(|k| sides.binary_search(&side(k)).ok()).flat_map(|k| on_sides[k].clone());
-            with_lengths(found.collect())
-        };
-        net.triangles[range].iter().map(of_one).collect()
-    })?;
-    let contacts = in_runs("measuring contacts", path.len(), monitor, |range| {
-        range
-            .flat_map(|k| contacts_of(part, cutter, path, k, spacing))
-            .map(|p| inspection.sample(p, None))
-            .collect()
-    })?;
-    let mut greatest = Greatest::default();
-    contacts.iter().for_each(|sample| greatest.look_at(sample, engine.reach()));
-    samples.iter().for_each(|sample| greatest.look_at(sample, engine.reach()));
-    of_triangle.iter().flatten().for_each(|crossing| greatest.look_at_ridge(crossing));
-    let pairs = pair_figures(part, cutter, path, tally(&of_triangle, cutter, spacing), monitor)?;
-    let ridge_samples: Vec<[f32; 2]> =
-        of_triangle.iter().flatten().map(|c| [c.height as f32, c.length as f32]).collect();
-    let shares = areas(&net);
-    let mut gouge = inspection.gouges(&net, &samples, &shares);
-    let mut uncut = inspection.uncut(&net, &samples, &shares);
-    let deviation = deviation_figures(&samples, &shares);
-    let triangles = net
-        .triangles
-        .iter()
-        .zip(&of_triangle)
-        .map(|(t, crossings)| (t.map(|v| samples[v as usize]), &crossings[..]));
-    let left = inspection.search(triangles, &mut greatest, asked, monitor)?;
-    gouge.max_depth_mm = greatest.depth;
-    gouge.error_bound_mm =
-        left.max(0.0) + (greatest.possible_depth - greatest.depth).max(0.0) + NUMERICAL_FLOOR;
-    if let (Some(first), Some((at, by))) = (gouge.regions.first_mut(), greatest.deepest) {
-        (first.depth_mm, first.at_mm, first.move_index) = (greatest.depth, at.into(), by);
-    }
-    if uncut.region_count > 0 {
-        uncut.max_height_mm = greatest.height;
-    }
-    uncut.error_bound_mm = left.max(0.0) + greatest.lower + NUMERICAL_FLOOR;
-    let highest = greatest.ridge.map(|(height, at, lower)| {
-        // What is uncertain may be lower only, but a bound stands to both sides.
-        Highest { height, at, possible: height + left.max(0.0) + lower }
-    });
-    let note = (left > asked).then(|| {
+    let kept = keep(&net.places);
+    along.measure(net, &kept, &keep, &|_| true, monitor)
+}
+
+impl Along<'_> {
+    /// Measures the places of a net that are `kept`, and of the contacts of the moves that come `near` those to `keep`.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub(crate) fn measure(
+        &self,
+        net: Net,
+        kept: &[bool],
+        keep: &dyn Fn(&[NetPlace]) -> Vec<bool>,
+        near: &(dyn Fn(usize) -> bool + Sync),
+        monitor: &dyn Monitor,
+    ) -> Result<(Measurement, NormalMap), Cancelled> {
+        let Self { part, cutter, path, engine, limits, spacing, asked, most_divided } = *self;
+        let tracks = Tracks::new(path, cutter);
+        let corner = cutter.corner_radius();
+        let radius = if corner > 0.0 { corner } else { cutter.radius() };
+        let finder = Finder { part, engine, tracks: &tracks, radius };
+        let inspection = NormalInspection { part, engine, finder, limits, spacing, radius, most_divided };
+        let samples = in_runs("measuring along normals", net.places.len(), monitor, |range| {
+            let mut near = None;
+            let of_one = |place: &NetPlace| {
+                let sample = inspection.sample(*place, near.as_ref());
+                near = sample.hit.or(near);
+                sample
+            };
+            net.places[range].iter().map(of_one).collect()
+        })?;
+        let triangles: Vec<[u32; 3]> =
+            net.triangles.iter().filter(|t| t.iter().all(|&k| kept[k as usize])).copied().collect();
+        let sides = sides(&triangles);
+        let on_sides = in_runs("measuring ridges", sides.len(), monitor, |range| {
+            sides[range].iter().map(|side| inspection.on_side(&side.map(|k| samples[k as usize]))).collect()
+        })?;
+        let of_triangle = in_runs("joining ridges", triangles.len(), monitor, |range| {
+            let of_one = |t: &[u32; 3]| {
+                let side = |k: usize| [t[k].min(t[(k + 1) % 3]), t[k].max(t[(k + 1) % 3])];
+                let found = (0..3)
+                    .filter_map(|k| sides.binary_search(&side(k)).ok())
+                    .flat_map(|k| on_sides[k].clone());
+                with_lengths(found.collect())
+            };
+            triangles[range].iter().map(of_one).collect()
+        })?;
+        let contacts = in_runs("measuring contacts", path.len(), monitor, |range| {
+            let contacts = |k: &usize| near(*k).then(|| contacts_of(part, cutter, path, *k, spacing));
+            range.filter_map(|k| contacts(&k)).flatten().collect()
+        })?;
+        let kept_contacts = keep(&contacts);
+        let contacts = in_runs("measuring contacts", contacts.len(), monitor, |range| {
+            range.filter(|&k| kept_contacts[k]).map(|k| inspection.sample(contacts[k], None)).collect()
+        })?;
+        let mut greatest = Greatest::default();
+        let judged = || samples.iter().zip(kept).filter(|(_, kept)| **kept).map(|(sample, _)| sample);
+        contacts.iter().chain(judged()).for_each(|sample| greatest.look_at(sample, engine));
+        of_triangle.iter().flatten().for_each(|crossing| greatest.look_at_ridge(crossing));
+        let pairs = pair_figures(part, cutter, path, tally(&of_triangle, cutter, spacing), monitor)?;
+        let ridge_samples: Vec<[f32; 2]> =
+            of_triangle.iter().flatten().map(|c| [c.height as f32, c.length as f32]).collect();
+        let shares = areas(&net);
+        let mut gouge = inspection.gouges(&net, &samples, &shares, kept);
+        let mut uncut = inspection.uncut(&net, &samples, &shares, kept);
+        let deviation = deviation_figures(&samples, &shares, kept);
+        let triangles = triangles
+            .iter()
+            .zip(&of_triangle)
+            .map(|(t, crossings)| (t.map(|v| samples[v as usize]), &crossings[..]));
+        let left = inspection.search(triangles, &mut greatest, asked, monitor)?;
+        gouge.max_depth_mm = greatest.depth;
+        gouge.error_bound_mm =
+            left.max(0.0) + (greatest.possible_depth - greatest.depth).max(0.0) + NUMERICAL_FLOOR;
+        if let (Some(first), Some((at, by))) = (gouge.regions.first_mut(), greatest.deepest) {
+            (first.depth_mm, first.at_mm, first.move_index) = (greatest.depth, at.into(), by);
+        }
+        if uncut.region_count > 0 {
+            uncut.max_height_mm = greatest.height;
+        }
+        uncut.error_bound_mm = left.max(0.0) + greatest.lower + NUMERICAL_FLOOR;
+        let highest = greatest.ridge.map(|(height, at, lower)| {
+            // What is uncertain may be lower only, but a bound stands to both sides.
+            Highest { height, at, possible: height + left.max(0.0) + lower }
+        });
+        let note = (left > asked).then(|| {
         format!("between the places on the normals {:.1} µm more may stand or lie than was found; a smaller cell helps", 1e3 * left)
     });
-    let scallop = scallop_figures(&ridge_samples, highest, limits);
-    let deviations: Vec<f32> =
-        samples.iter().map(|sample| sample.hit.map_or(f32::NAN, |hit| hit.deviation as f32)).collect();
-    let map = NormalMap {
-        points: net.places.iter().map(|place| place.point).collect(),
-        normals: net.places.iter().map(|place| place.normal).collect(),
-        cut_by: samples.iter().map(|sample| sample.hit.map_or(u32::MAX, |hit| hit.by)).collect(),
-        deviations: deviations.clone(),
-        triangles: net.triangles,
-        grids: net.grids,
-    };
-    let measured = Measurement {
-        scallop,
-        gouge,
-        uncut,
-        excess: crate::ExcessFigures::default(),
-        deviation,
-        deviation_map: deviations,
-        ridge_samples,
-        pairs,
-        refined: CloserLook { note, ..CloserLook::default() },
-    };
-    Ok((measured, map))
+        let scallop = scallop_figures(&ridge_samples, highest, limits);
+        let heights = judged().filter_map(|sample| Some((sample.hit?.deviation, sample.place.point)));
+        let excess = excess_figures(heights, &scallop, &uncut, left.max(0.0), limits);
+        let deviations: Vec<f32> =
+            samples.iter().map(|sample| sample.hit.map_or(f32::NAN, |hit| hit.deviation as f32)).collect();
+        let map = NormalMap {
+            points: net.places.iter().map(|place| place.point).collect(),
+            normals: net.places.iter().map(|place| place.normal).collect(),
+            cut_by: samples.iter().map(|sample| sample.hit.map_or(u32::MAX, |hit| hit.by)).collect(),
+            deviations: deviations.clone(),
+            triangles: net.triangles,
+            grids: net.grids,
+        };
+        let measured = Measurement {
+            scallop,
+            gouge,
+            uncut,
+            excess,
+            deviation,
+            deviation_map: deviations,
+            ridge_samples,
+            pairs,
+            refined: CloserLook { note, ..CloserLook::default() },
+        };
+        Ok((measured, map))
+    }
 }
 
 impl NormalInspection<'_> {
@@ -237,6 +304,40 @@ impl NormalInspection<'_> {
     fn crossings(&self, corners: &[Sample; 3]) -> Vec<Crossing> {
         with_lengths((0..3).flat_map(|k| self.on_side(&[corners[k], corners[(k + 1) % 3]])).collect())
     }
+}
+
+/// The highest material: where it stands up to the uncut tolerance, passes came down to the design. `left` is how much more
+/// may stand between the places, mm.
+fn excess_figures(
+    heights: impl Iterator<Item = (f64, Point3)>,
+    scallop: &ScallopFigures,
+    uncut: &UncutFigures,
+    left: f64,
+    limits: &Limits,
+) -> ExcessFigures {
+    let ridge = Bounded {
+        at_mm: scallop.max_at_mm,
+        ..Bounded::new(scallop.max_mm.unwrap_or(0.0), scallop.error_bound_mm.unwrap_or(0.0))
+    };
+    let mut place = Bounded::new(0.0, left + NUMERICAL_FLOOR);
+    for (height, at) in heights.filter(|(height, _)| *height <= limits.uncut) {
+        if height > place.max_mm {
+            (place.max_mm, place.at_mm) = (height, Some(at.into()));
+        }
+    }
+    let unreached = Bounded {
+        at_mm: uncut.regions.first().map(|region| region.at_mm),
+        ..Bounded::new(uncut.max_height_mm, uncut.error_bound_mm)
+    };
+    let reached = ridge.or(&place);
+    let kind = if unreached.max_mm > reached.max_mm {
+        ExcessKind::Uncut
+    } else if place.max_mm > ridge.max_mm + NUMERICAL_FLOOR {
+        ExcessKind::Border
+    } else {
+        ExcessKind::Scallop
+    };
+    ExcessFigures { highest: reached.or(&unreached), kind, reached, unreached }
 }
 
 /// Work on runs of neighbours, so that each can begin where the one before was found; in the order of the whole.
@@ -260,11 +361,11 @@ fn in_runs<T: Send>(
 }
 
 /// The sides of all triangles, each once and from the lesser index, in order.
-fn sides(net: &Net) -> Vec<[u32; 2]> {
+fn sides(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
     let of = |t: &[u32; 3]| {
         (0..3).map(|k| [t[k], t[(k + 1) % 3]]).map(|[a, b]| [a.min(b), a.max(b)]).collect::<Vec<_>>()
     };
-    let mut sides: Vec<[u32; 2]> = net.triangles.iter().flat_map(of).collect();
+    let mut sides: Vec<[u32; 2]> = triangles.iter().flat_map(of).collect();
     sides.sort_unstable();
     sides.dedup();
     sides

@@ -8,7 +8,7 @@ use part::{Part, PatchPoint, SurfacePoint};
 
 /// Where a place is on the part.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Site {
+pub(crate) enum Site {
     /// On a patch, by its parameters.
     Patch(PatchPoint),
     /// On a facet of a mesh.
@@ -17,7 +17,7 @@ pub(super) enum Site {
 
 /// A place of the design surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct NetPlace {
+pub(crate) struct NetPlace {
     pub site: Site,
     pub point: Point3,
     /// Outward unit normal.
@@ -38,7 +38,7 @@ pub struct PatchGrid {
 }
 
 /// Places and the triangles between them.
-pub(super) struct Net {
+pub(crate) struct Net {
     pub places: Vec<NetPlace>,
     pub triangles: Vec<[u32; 3]>,
     /// One grid a patch; none on meshes.

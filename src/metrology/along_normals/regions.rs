@@ -10,10 +10,10 @@ use crate::figures::{DeviationFigures, GougeFigures, GougeRegion, UncutFigures, 
 const LISTED_REGIONS: usize = 20;
 
 impl NormalInspection<'_> {
-    pub fn gouges(&self, net: &Net, samples: &[Sample], areas: &[f64]) -> GougeFigures {
+    pub fn gouges(&self, net: &Net, samples: &[Sample], areas: &[f64], kept: &[bool]) -> GougeFigures {
         let depth = |k: u32| samples[k as usize].hit.map_or(0.0, |hit| -hit.deviation);
         let mut figures = GougeFigures::default();
-        for region in connected(net, self.spacing, &|k| depth(k) > self.limits.gouge) {
+        for region in connected(net, self.spacing, &|k| kept[k as usize] && depth(k) > self.limits.gouge) {
             let Some(&deepest) = region.iter().max_by(|a, b| depth(**a).total_cmp(&depth(**b))) else {
                 continue;
             };
@@ -34,11 +34,10 @@ impl NormalInspection<'_> {
         figures
     }
 
-    pub fn uncut(&self, net: &Net, samples: &[Sample], areas: &[f64]) -> UncutFigures {
-        let reach = self.engine.reach();
-        let height = |k: u32| samples[k as usize].hit.map_or(reach, |hit| hit.deviation);
+    pub fn uncut(&self, net: &Net, samples: &[Sample], areas: &[f64], kept: &[bool]) -> UncutFigures {
+        let height = |k: u32| samples[k as usize].height(self.engine);
         let mut figures = UncutFigures::default();
-        for region in connected(net, self.spacing, &|k| height(k) > self.limits.uncut) {
+        for region in connected(net, self.spacing, &|k| kept[k as usize] && height(k) > self.limits.uncut) {
             let Some(&highest) = region.iter().max_by(|a, b| height(**a).total_cmp(&height(**b))) else {
                 continue;
             };
@@ -53,7 +52,8 @@ impl NormalInspection<'_> {
                 at_mm: samples[highest as usize].place.point.into(),
             });
         }
-        figures.fraction = figures.area_mm2 / areas.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        let all: f64 = areas.iter().zip(kept).filter(|(_, kept)| **kept).map(|(area, _)| area).sum();
+        figures.fraction = figures.area_mm2 / all.max(f64::MIN_POSITIVE);
         figures.region_count = figures.regions.len();
         figures.regions.sort_by(|a, b| b.height_mm.total_cmp(&a.height_mm));
         figures.regions.truncate(LISTED_REGIONS);
@@ -72,9 +72,10 @@ pub(super) fn areas(net: &Net) -> Vec<f64> {
     areas
 }
 
-pub(super) fn deviation_figures(samples: &[Sample], areas: &[f64]) -> DeviationFigures {
-    let hits = samples.iter().zip(areas).filter_map(|(sample, area)| Some((sample.hit?.deviation, *area)));
-    DeviationFigures { samples: samples.len(), ..DeviationFigures::of(hits) }
+pub(super) fn deviation_figures(samples: &[Sample], areas: &[f64], kept: &[bool]) -> DeviationFigures {
+    let judged = || samples.iter().zip(areas).zip(kept).filter(|(_, kept)| **kept).map(|(sample, _)| sample);
+    let hits = judged().filter_map(|(sample, area)| Some((sample.hit?.deviation, *area)));
+    DeviationFigures { samples: judged().count(), ..DeviationFigures::of(hits) }
 }
 
 /// The regions of places for which `inside` holds: places closer than `spacing` mm that face the same way belong together,

@@ -122,7 +122,7 @@ impl AlongNormal for SweptVolume<'_> {
 /// Radius of the greatest ball, `most` at most, mm, that touches the part in `point` from inside: half the thickness
 /// there, or the radius of a sharp bend (Ma, Bae & Choi, "3D medial axis point approximation using nearest neighbors and
 /// the normal field", 2012).
-fn ball_beneath(part: &Part, point: &Point3, normal: &Vector3, most: f64) -> f64 {
+pub(crate) fn ball_beneath(part: &Part, point: &Point3, normal: &Vector3, most: f64) -> f64 {
     let near = part.mesh_deviation() + 1e-6;
     let mut radius = most;
     for _ in 0..SHRINKING {

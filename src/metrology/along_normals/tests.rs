@@ -56,7 +56,8 @@ impl AlongNormal for BruteForce<'_> {
 fn measured(part: &Part, path: &Toolpath, spacing: f64) -> (Measurement, NormalMap) {
     let limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.001 };
     let ball = Cutter::ball(2.0 * RADIUS).unwrap();
-    measure_along_normals(part, &ball, path, &BruteForce(path), spacing, &limits, 1e-4, &Silent).unwrap()
+    measure_along_normals(part, &ball, path, &BruteForce(path), spacing, &limits, 1e-4, None, &Silent)
+        .unwrap()
 }
 
 /// Passes along x, half a mm apart, the third one `lower` by so much.
@@ -129,7 +130,7 @@ fn a_dome_has_the_scallops_of_a_circle_also_where_it_is_steep() {
     let cut = SweptVolume { part: &part, cut: &by_rays, inward: 1.0, outward: 1.0 };
     let limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.001 };
     let (measured, map) =
-        measure_along_normals(&part, &ball, &path, &cut, 0.25, &limits, 5e-4, &Silent).unwrap();
+        measure_along_normals(&part, &ball, &path, &cut, 0.25, &limits, 5e-4, None, &Silent).unwrap();
     let exact = ball_scallop_height(RADIUS, -1.0 / rho, step * rho).unwrap();
     let (max, p50) = (measured.scallop.max_mm.unwrap(), measured.scallop.p50_mm.unwrap());
     // Chords of 240 a turn lie up to 1.1 µm inside the greatest ring.
@@ -168,7 +169,7 @@ fn by_both(
     let cuts: [&dyn FirstCut; 2] = [&by_rays, &by_voxels];
     cuts.map(|cut| {
         let cut = SweptVolume { part, cut, inward: reach, outward: reach };
-        measure_along_normals(part, cutter, &path, &cut, 0.4, &limits, 1e-3, &Silent).unwrap()
+        measure_along_normals(part, cutter, &path, &cut, 0.4, &limits, 1e-3, None, &Silent).unwrap()
     })
 }
 

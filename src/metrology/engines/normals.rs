@@ -72,8 +72,10 @@ impl Engine for Normals {
         let first: &dyn FirstCut = by_voxels.as_ref().map_or(&by_rays, |cut| cut);
         let cut = SweptVolume { part, cut: first, inward, outward: reach };
         let asked = task.simulation.error_bound;
+        let facing = task.facing();
+        let judged = Some((&facing, task.judged));
         let (measurement, map) =
-            measure_along_normals(part, cutter, path, &cut, spacing, task.limits, asked, monitor)?;
+            measure_along_normals(part, cutter, path, &cut, spacing, task.limits, asked, judged, monitor)?;
         let finest_cell = voxels.as_ref().map_or(spacing, |(_, voxels)| voxels.voxel());
         Ok(Measured {
             measurement,

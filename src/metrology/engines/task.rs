@@ -7,7 +7,7 @@ use part::Part;
 use sim::{Rays, ZMap};
 
 use super::{Budget, EngineChoice, LaidOut};
-use crate::{Limits, Measurement, NormalMap};
+use crate::{Facing, Judged, Limits, Measurement, NormalMap};
 
 /// How the stock is simulated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,6 +52,22 @@ pub struct Task<'a> {
     pub simulation: &'a Simulation,
     /// What it may take.
     pub budget: Budget,
+    /// What of the part is judged.
+    pub judged: Judged,
+}
+
+impl<'a> Task<'a> {
+    /// The block that the part is cut from, mm. It ends at the part's lowest place.
+    pub fn block(&self) -> Aabb {
+        let Aabb { mut min, mut max } = self.area;
+        (min.z, max.z) = (self.part.bounds().min.z, self.top);
+        Aabb { min, max }
+    }
+
+    /// What of the part the path's tool can face.
+    pub fn facing(&self) -> Facing<'a> {
+        Facing::new(self.part, self.path, self.block())
+    }
 }
 
 /// What figures and pictures are drawn from.

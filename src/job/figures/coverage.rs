@@ -1,0 +1,186 @@
+//! How much of the surface the verdict covers, and the surface that no cell sees.
+
+use cutter::Solid;
+use metrology::{
+    AlongNormal as _, AlongTask, CellsSeen, Coverage, CoverageFigures, Measurement, REACH_OVER_UNCUT,
+    RaysCut, SweptVolume, View,
+};
+use report::{Claim, Figure, Gravity, micrometres, place};
+use serde::Serialize;
+use sim::Rays;
+use toolpath::Pocket;
+use work::monitor::Monitor;
+
+use super::value;
+use crate::run::{Finding, Run};
+use crate::{JobError, judge};
+
+/// What the word means.
+const MEANING: (&str, &str) = (
+    "coverage",
+    "What share of the part's surface the verdict covers. Cells over the plan view measure what is seen from above and is \
+     not too steep; the rest of what is judged is measured along its normals. Its areas sum up to the whole surface.",
+);
+
+/// The coverage, and what was found on the surface that no cell sees.
+#[derive(Debug, Serialize)]
+struct Value {
+    #[serde(flatten)]
+    areas: CoverageFigures,
+    /// Where cells cut and something is judged that they do not see.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    unseen: Option<Unseen>,
+}
+
+/// What was found along the normals of surface that no cell sees. mm.
+#[derive(Debug, Serialize)]
+struct Unseen {
+    spacing_mm: f64,
+    places: usize,
+    scallop: metrology::ScallopFigures,
+    gouge: metrology::GougeFigures,
+    uncut: metrology::UncutFigures,
+    /// Whether a place was never cut: material then stands at least as high as `uncut` says.
+    never_cut: bool,
+}
+
+/// Of every toolpath.
+pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
+    monitor.start("measuring the coverage", 0);
+    let (areas, unseen) = match &run.session.pocket {
+        Some(pocket) => (of_pocket(run, pocket), None),
+        None => of_part(run, monitor)?,
+    };
+    let mut claims = nothing_judged(&areas).into_iter().collect::<Vec<_>>();
+    claims.extend(unseen.as_ref().map_or_else(Vec::new, |(_, claims)| claims.clone()));
+    let sentence = (!areas.scope.is_empty()).then(|| {
+        ("Coverage", format!("the verdict of {} covers {}", run.request.name, covered(&areas.scope)))
+    });
+    let rows = rows(&areas);
+    let value = value(&Value { areas, unseen: unseen.map(|(unseen, _)| unseen) })?;
+    let figure =
+        Figure { key: "coverage", value, rows, meaning: Some(MEANING), sentence, ..Figure::default() };
+    Ok(Finding { figure: Some(figure), claims, ..Finding::default() })
+}
+
+/// `31 % of the surface …` of `on 31 % of the surface …`.
+fn covered(scope: &str) -> &str {
+    scope.strip_prefix("on ").unwrap_or(scope)
+}
+
+fn of_pocket(run: &Run<'_>, pocket: &Pocket) -> CoverageFigures {
+    let around = |curve: &[geometry::Point2]| -> f64 {
+        (0..curve.len()).map(|k| (curve[(k + 1) % curve.len()] - curve[k]).norm()).sum()
+    };
+    let walls = pocket.depth * pocket.region.curves().map(around).sum::<f64>();
+    let mesh = run.part().mesh();
+    let floor = |t: usize| {
+        let [a, b, c] = mesh.corners(t);
+        0.5 * (b - a).cross(&(c - a)).norm()
+    };
+    let floor = (0..mesh.triangles().len()).map(floor).sum();
+    CoverageFigures::of_pocket(run.scene().judged, floor, pocket.region.area(), walls)
+}
+
+/// The areas, and what was found where no cell sees, with its limits.
+type Covered = (CoverageFigures, Option<(Unseen, Vec<Claim>)>);
+
+fn of_part(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Covered, JobError> {
+    let (scene, part, path) = (run.scene(), run.part(), run.path());
+    let facing = run.session.task(path, &scene.simulation, &run.session.cells).facing();
+    let View::Heights(cut) = run.view() else {
+        return Ok((Coverage::new(part, &facing, scene.judged, None).figures(), None));
+    };
+    let cells = CellsSeen { grid: &cut.grid, deviations: &run.measurement().deviation_map };
+    let coverage = Coverage::new(part, &facing, scene.judged, Some(cells));
+    let areas = coverage.figures();
+    if areas.along_normals_mm2 == 0.0 {
+        return Ok((areas, None));
+    }
+    let solid = Solid::of_cutter(&scene.cutter, scene.holder.as_ref());
+    let rays = Rays::new(path, &solid, monitor)
+        .map_err(|reason| JobError::engine(scene, &run.request.name, reason.into()))?;
+    let by_rays = RaysCut { rays: &rays, path, solid: &solid };
+    let inward = scene.cutter.radius();
+    let outward = (REACH_OVER_UNCUT * scene.tolerance.uncut).max(inward);
+    let swept = SweptVolume { part, cut: &by_rays, inward, outward };
+    let task = AlongTask {
+        cutter: &scene.cutter,
+        path,
+        cut: &swept,
+        limits: &scene.tolerance,
+        asked: scene.simulation.error_bound,
+        finest: run.measured.cell,
+    };
+    let Some((measured, spacing_mm)) = coverage.measure_unseen(&task, monitor)? else {
+        return Ok((areas, None));
+    };
+    let never_cut = measured.uncut.max_height_mm >= swept.reach();
+    let claims = judged(run, &measured, never_cut);
+    let unseen = Unseen {
+        spacing_mm,
+        places: measured.deviation_map.len(),
+        scallop: measured.scallop,
+        gouge: measured.gouge,
+        uncut: measured.uncut,
+        never_cut,
+    };
+    Ok((areas, Some((unseen, claims))))
+}
+
+/// The limits of the surface that no cell sees.
+fn judged(run: &Run<'_>, measured: &Measurement, never_cut: bool) -> Vec<Claim> {
+    let (limits, rule) = (&run.scene().tolerance, &run.scene().scallop_rule);
+    let (_, mut claims) = judge::judge(measured, limits, rule, Vec::new());
+    for claim in &mut claims {
+        if claim.what == "uncut" && never_cut {
+            let at = measured
+                .uncut
+                .regions
+                .first()
+                .map_or_else(String::new, |r| format!(" at {}", place(r.at_mm)));
+            claim.text = format!(
+                "material was never cut over {:.3} mm² and stands at least {} µm high (limit {}){at}",
+                measured.uncut.area_mm2,
+                micrometres(Some(measured.uncut.max_height_mm)),
+                micrometres(Some(limits.uncut)),
+            );
+        }
+        claim.text += ", measured along normals where no cell sees";
+    }
+    claims
+}
+
+/// A verdict on no surface is none.
+fn nothing_judged(areas: &CoverageFigures) -> Option<Claim> {
+    (areas.judged_mm2 <= 0.0).then(|| Claim {
+        what: "coverage",
+        gravity: Gravity::Finish,
+        unit: "",
+        limit: 0.0,
+        measured: None,
+        error_bound: f64::INFINITY,
+        text: "the tool faces nothing of the part's surface".to_owned(),
+        decided_by: "turn the part, or tilt the tool",
+    })
+}
+
+fn rows(areas: &CoverageFigures) -> Vec<(&'static str, String)> {
+    let mm2 = |area: f64| format!("{area:.1} mm²");
+    vec![
+        ("surface, judged", format!("{}, {}", mm2(areas.surface_mm2), mm2(areas.judged_mm2))),
+        (
+            "measured by cells, along normals, by moves",
+            format!(
+                "{}, {}, {}",
+                mm2(areas.by_cells_mm2),
+                mm2(areas.along_normals_mm2),
+                mm2(areas.by_moves_mm2)
+            ),
+        ),
+        (
+            "walls, facing away, hidden: not judged",
+            format!("{}, {}, {}", mm2(areas.walls_mm2), mm2(areas.facing_away_mm2), mm2(areas.hidden_mm2)),
+        ),
+    ]
+}

@@ -1,0 +1,228 @@
+//! How much of a part's surface a verdict covers, and what of it cells cannot see.
+//!
+//! Enters: the part, what its tool can face, and the cells that were measured. Leaves: the area of each kind of surface, a
+//! partition of the whole, and the figures along the normals of what is judged and no cell measures. mm, mm².
+//!
+//! A cell measures a place where the surface is not steeper than [`STEEP`] and where the centre of one of the nine cells
+//! around sees the same sheet of it. All other judged surface is measured along its normals: steep faces, narrow ledges, and, where
+//! the whole surface is judged, walls, undersides, and floors below other surface. What was never cut stands there as far as the
+//! block reaches; the tool's reach is a lower bound of it.
+//!
+//! Areas are sums over small triangles, each of the kind of its middle. The area of all those whose corners are of
+//! another kind is the bound of the error.
+
+mod figures;
+mod near;
+mod pieces;
+mod unseen_cut;
+
+use geometry::{Point2, Point3};
+use sim::Grid;
+use work::monitor::{Cancelled, Monitor};
+
+use super::along_normals::{Along, NetPlace, SweptVolume};
+use super::facing::{Facing, Judged, PlaceKind};
+use super::figures::{Limits, Measurement};
+use cutter::Cutter;
+pub use figures::CoverageFigures;
+use motion::Toolpath;
+use near::Near;
+use part::{Part, Patch, SurfacePoint};
+use pieces::Pieces;
+use unseen_cut::UnseenCut;
+
+/// Where the vertical part of the normal is less, cells lie more than five times as far apart on the surface as in the plan:
+/// too far to see what one pass leaves.
+const STEEP: f64 = 0.2;
+
+/// A cell's centre sees the sheet of a place where it lies within this slope from the place's tangent plane.
+const SAME_SHEET: f64 = 1.0;
+
+/// Triangles in a square of the longest side that is allowed, about: they are halved until no side is longer.
+const TRIANGLES_A_SQUARE: f64 = 3.0;
+
+/// Triangles that a part without small facets is divided into. Fewer leave wide bounds of the areas; each takes some µs.
+const PIECES: f64 = 6_000.0;
+
+/// Triangles along normals for each hundred cells, and at least so many: rays cost far more than cells, and must not cost a run
+/// more than a third.
+const TRIANGLES_A_HUNDRED_CELLS: f64 = 3.0;
+const LEAST_TRIANGLES: f64 = 4_000.0;
+
+/// Share of these triangles that are divided at most in search of extremes.
+const DIVIDED_SHARE: f64 = 0.1;
+
+/// What cells measured.
+#[derive(Debug, Clone, Copy)]
+pub struct CellsSeen<'a> {
+    /// The cells.
+    pub grid: &'a Grid,
+    /// Deviation at each, `[ny][nx]`, mm; NaN where none was measured.
+    pub deviations: &'a [f32],
+}
+
+/// How a path is measured along normals.
+#[derive(Clone, Copy)]
+pub struct AlongTask<'a> {
+    /// What cuts.
+    pub cutter: &'a Cutter,
+    /// How it moves.
+    pub path: &'a Toolpath,
+    /// What tells where a normal meets the cut.
+    pub cut: &'a SweptVolume<'a>,
+    /// What is tolerated.
+    pub limits: &'a Limits,
+    /// Error bound that is asked for, mm.
+    pub asked: f64,
+    /// No places closer than this, mm.
+    pub finest: f64,
+}
+
+/// The surface of a part by what is judged and what measures it.
+pub struct Coverage<'a> {
+    part: &'a Part,
+    facing: &'a Facing<'a>,
+    judged: Judged,
+    pieces: Pieces,
+    kinds: Vec<PlaceKind>,
+    /// Whether cells measure each piece.
+    by_cells: Vec<bool>,
+    /// Area of pieces whose corners are of another kind, mm².
+    mixed: f64,
+    cells: usize,
+}
+
+impl<'a> Coverage<'a> {
+    /// Of a part; without cells all that is judged is measured along normals.
+    pub fn new(part: &'a Part, facing: &'a Facing<'a>, judged: Judged, cells: Option<CellsSeen<'_>>) -> Self {
+        let area: f64 = (0..part.mesh().triangles().len()).map(|t| area(&part.mesh().corners(t))).sum();
+        let pieces = Pieces::of(part, (TRIANGLES_A_SQUARE * area / PIECES).sqrt().max(f64::MIN_POSITIVE));
+        let kinds =
+            facing.kinds(pieces.middles.len(), |t| (pieces.middles[t].point, pieces.middles[t].normal));
+        let by_cells = work::parallel::map(kinds.len(), |t| {
+            kinds[t] == PlaceKind::Facing && cells.is_some_and(|cells| cells.see(part, &pieces.middles[t]))
+        });
+        let mixed = mixed(facing, &pieces, &kinds);
+        let cells = cells.map_or(0, |cells| cells.grid.len());
+        Self { part, facing, judged, pieces, kinds, by_cells, mixed, cells }
+    }
+
+    /// Area of the pieces that `chosen` picks by their kind and whether cells measure them, mm².
+    fn area(&self, chosen: impl Fn(PlaceKind, bool) -> bool) -> f64 {
+        let pieces = self.kinds.iter().zip(&self.by_cells).zip(&self.pieces.areas);
+        pieces
+            .filter(|((kind, by_cells), _)| chosen(**kind, **by_cells))
+            // From 0.0, since an empty sum is -0.0.
+            .fold(0.0, |sum, (_, area)| sum + area)
+    }
+
+    /// The areas.
+    pub fn figures(&self) -> CoverageFigures {
+        let is_judged = |kind| self.facing.is_judged(self.judged, kind);
+        let not_judged = |kind| self.area(|k, _| k == kind && !is_judged(k));
+        CoverageFigures {
+            judge: self.judged,
+            by_cells_mm2: self.area(|_, by_cells| by_cells),
+            along_normals_mm2: self.area(|kind, by_cells| is_judged(kind) && !by_cells),
+            walls_mm2: not_judged(PlaceKind::Wall),
+            facing_away_mm2: not_judged(PlaceKind::FacingAway),
+            hidden_mm2: not_judged(PlaceKind::Hidden),
+            outside_stock_mm2: not_judged(PlaceKind::OutsideStock),
+            error_bound_mm2: self.mixed + self.pieces.area_error,
+            ..CoverageFigures::default()
+        }
+        .summed()
+    }
+
+    /// Measures what is judged and no cell measures; `None` where there is no such surface. Also the distance of the places, mm.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn measure_unseen(
+        &self,
+        task: &AlongTask<'_>,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<(Measurement, f64)>, Cancelled> {
+        let unseen = |t: usize| self.facing.is_judged(self.judged, self.kinds[t]) && !self.by_cells[t];
+        let area: f64 = (0..self.kinds.len()).filter(|t| unseen(*t)).map(|t| self.pieces.areas[t]).sum();
+        if area == 0.0 {
+            return Ok(None);
+        }
+        let triangles = (TRIANGLES_A_HUNDRED_CELLS * self.cells as f64 / 100.0).max(LEAST_TRIANGLES);
+        let spacing = (TRIANGLES_A_SQUARE * area / triangles).sqrt().max(task.finest);
+        let net = self.pieces.chosen(self.part, unseen, spacing);
+        let cut = UnseenCut { cut: task.cut, block: self.facing.block(), facing: self.facing };
+        let along = Along {
+            part: self.part,
+            cutter: task.cutter,
+            path: task.path,
+            engine: &cut,
+            limits: task.limits,
+            spacing,
+            asked: task.asked,
+            most_divided: (DIVIDED_SHARE * net.triangles.len() as f64) as usize,
+        };
+        let near = Near::new(&net.places, spacing + task.cutter.radius());
+        let comes_near = |k: usize| near.is_passed(task.path, k, task.cutter);
+        let all = vec![true; net.places.len()];
+        let (measured, _) =
+            along.measure(net, &all, &|places| self.are_judged(places), &comes_near, monitor)?;
+        Ok(Some((measured, spacing)))
+    }
+
+    /// Which places are judged.
+    fn are_judged(&self, places: &[NetPlace]) -> Vec<bool> {
+        let kinds = self.facing.kinds(places.len(), |k| (places[k].point, places[k].normal));
+        kinds.into_iter().map(|kind| self.facing.is_judged(self.judged, kind)).collect()
+    }
+}
+
+impl CellsSeen<'_> {
+    /// Whether the centre of a cell around a place sees the sheet that it is on.
+    fn see(&self, part: &Part, place: &NetPlace) -> bool {
+        let Some((i, j)) = self.grid.cell_at(place.point.x, place.point.y) else { return false };
+        if place.normal.z < STEEP {
+            return false;
+        }
+        let sees = |i: usize, j: usize| {
+            !self.deviations[self.grid.index(i, j)].is_nan() && on_sheet(part, place, &self.grid.centre(i, j))
+        };
+        let around = |k: usize, n: usize| k.saturating_sub(1)..(k + 2).min(n);
+        sees(i, j) || around(j, self.grid.ny).any(|j| around(i, self.grid.nx).any(|i| sees(i, j)))
+    }
+}
+
+/// Whether cells may see a place of the part's surface: an upright tool faces it.
+fn sees_level(facing: &Facing<'_>, place: &SurfacePoint) -> bool {
+    facing.kinds(1, |_| (place.point, place.normal)) == [PlaceKind::Facing]
+}
+
+/// Whether the topmost surface at a place of the plan is the sheet of `place`.
+fn on_sheet(part: &Part, place: &NetPlace, q: &Point2) -> bool {
+    if let [Patch::Analytic(_)] = part.patches() {
+        return true;
+    }
+    let Some(hit) = part.bvh().highest_at(part.mesh(), q.x, q.y) else { return false };
+    let way = Point3::new(q.x, q.y, hit.z) - place.point;
+    way.dot(&place.normal).abs()
+        <= SAME_SHEET * way.norm() / (1.0 + SAME_SHEET * SAME_SHEET).sqrt() + part.mesh_deviation()
+}
+
+/// Area of the pieces whose corners are not all of their kind, mm².
+fn mixed(facing: &Facing<'_>, pieces: &Pieces, kinds: &[PlaceKind]) -> f64 {
+    if kinds.iter().all(|kind| *kind == kinds[0]) {
+        return 0.0;
+    }
+    let places = &pieces.net.places;
+    let of_corners = facing.kinds(places.len(), |k| (places[k].point, places[k].normal));
+    let other = |t: usize| pieces.net.triangles[t].iter().any(|&k| of_corners[k as usize] != kinds[t]);
+    (0..kinds.len()).filter(|t| other(*t)).map(|t| pieces.areas[t]).sum()
+}
+
+fn area(corners: &[Point3; 3]) -> f64 {
+    let [a, b, c] = corners;
+    0.5 * (b - a).cross(&(c - a)).norm()
+}
+
+#[cfg(test)]
+mod tests;
