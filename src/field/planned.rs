@@ -56,7 +56,7 @@ impl PlannedField {
     }
 }
 
-/// The way that no path can be shorter than, to second order.
+/// The way that no path can be shorter than.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShortestPossible {
     /// Of the cutter's tip: the integral of the least `(1 − κ r)/w` over all directions, mm.

@@ -2,7 +2,7 @@
 //!
 //! Enters: the cutter's radius, the curvature of the surface across the feed, and a step or a height; or the contacts of
 //! two passes. Leaves: the exact height and the exact step, and what two common simplifications make of them: the
-//! second-order formula by which passes are planned, and a polynomial fitted to the section across the feed. Lengths
+//! second-order formula, and a polynomial fitted to the section across the feed. Lengths
 //! mm, curvature 1/mm, positive where the surface is concave toward its outward normal.
 //!
 //! Calculated heights are predictions. Verdicts rest on what is measured on the cut surface; `metrology` puts both side
@@ -15,6 +15,7 @@ mod error;
 mod place;
 mod section;
 mod section_fit;
+mod silhouette;
 mod strip;
 
 pub use comparison::{Comparison, compare};

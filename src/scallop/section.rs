@@ -127,7 +127,7 @@ impl BallSection {
         Ok(self.step_of(height * (2.0 * self.radius - height) / room))
     }
 
-    /// The step to second order, `√(8h/(1/r − κ))`, mm: what passes are planned by.
+    /// The step to second order, `√(8h/(1/r − κ))`, mm: short to print, and too wide where κ is 0.
     pub fn second_order_step(&self, height: f64) -> f64 {
         (8.0 * height * self.radius / self.stretch).sqrt()
     }

@@ -1,17 +1,23 @@
 //! Strip width: how far apart neighbouring passes may lie at a point of the surface so that the
 //! ridge between them stays below a scallop height.
 //!
-//! Cutter and surface are compared in the normal section across the feed. To second order the gap
-//! between them grows as `(κ_cutter − κ_surface) x²/2`, so a ridge of height `h` stands between
-//! passes `w = √(8h / (κ_cutter − κ_surface))` apart. Good for planning only (0.06 % at h = r/500);
-//! what really stands is measured on the cut surface.
+//! Cutter and surface are compared in the normal section across the feed, where the surface counts as a circle of its own
+//! curvature. For a ball the width is then exact ([`BallSection`]). For other cutters it is that of the outline which the
+//! cutter shows along the feed, exact where the feed is straight and the tool turns with the surface: on planes, and along
+//! cylinders under a lead and tilt. A tool that keeps its axis while the surface turns across the feed, and a surface that
+//! bends along the feed, add terms of third order in the width. To second order a ridge of height `h` stands between
+//! passes `√(8h / (κ_cutter − κ_surface))` apart.
+//!
+//! Where the curvature changes over a strip, what really stands is measured on the cut surface.
 
+use super::BallSection;
+use super::silhouette::{Over, Silhouette};
 use cutter::Cutter;
 use geometry::Vector3;
 
 /// The strip is never planned wider than this multiple of the strip on a plane. Where the surface
-/// is nearly as concave as the cutter the formula grows without bound while its error grows too;
-/// a greater value trusts it further than second order carries.
+/// is nearly as concave as the cutter the width grows without bound, and with it the part of the surface over which its
+/// curvature would have to stay the same.
 const WIDEST_OVER_PLANE: f64 = 2.5;
 
 /// Widest share of the cutter's diameter that a strip may take (flat ends on flat ground).
@@ -21,66 +27,76 @@ const WIDEST_OVER_DIAMETER: f64 = 0.8;
 /// less, is left between them.
 const NEARLY_AS_CONCAVE: f64 = 0.25;
 
-/// Width of the strip, mm, that a cutter leaves below the scallop height `h` around a contact with
-/// outward surface normal `n`, across the feed in the tangent direction `b` (both unit), where the
+/// Width of the strip, mm along the surface, that a cutter leaves below the scallop height `h` around a contact with
+/// outward surface normal `n`, across the feed in the tangent direction `b` (both unit, in the frame of the tool), where the
 /// surface has the normal curvature `surface` along `b`; and whether the surface is so concave that
 /// the width had to be limited.
 ///
-/// A sharp edge leaves stairs on a slope: between passes `w` apart up the slope λ they stand
-/// `w sin λ cos λ` high. A point leaves grooves.
+/// # Tolerance
+/// A few rounding errors for a ball; 1e-9 of the width for the outline of another cutter, never more than it.
 pub fn strip_width_at(cutter: &Cutter, n: &Vector3, b: &Vector3, surface: f64, h: f64) -> (f64, bool) {
+    if cutter.is_ball() {
+        return strip_width(1.0 / cutter.radius(), surface, h, cutter.radius());
+    }
+    let widest = widest(h, cutter.radius());
+    // A point has no curvature to compare: it leaves grooves.
     let curvature = cutter.normal_curvature(n, b);
-    if curvature.is_infinite() {
-        return (strip_of_point(cutter, b.z.abs(), h), false);
+    let too_concave = curvature.is_finite() && too_concave(curvature, surface);
+    if surface > 0.0 && curvature <= surface && !cutter.touches_with_edge(n) {
+        return (widest, too_concave);
     }
-    let (width, limited) = strip_width(curvature, surface, h, cutter.radius());
-    if !cutter.touches_with_edge(n) {
-        return (width, limited);
-    }
-    let up_the_slope = b.z.abs();
-    let stairs = if up_the_slope > 0.0 { h / (up_the_slope * n.z.abs().max(1e-3)) } else { f64::INFINITY };
-    (width.min(stairs), limited)
+    let over = Over { curvature: surface, height: h, farthest: widest };
+    let width = Silhouette::new(cutter, *n, *b).width(&over);
+    if width < widest { (width, false) } else { (widest, too_concave) }
 }
 
-/// Width of the strip, mm, below the ridges of height `h` that a pointed tip leaves: V-shaped grooves,
-/// seen across the feed on a section that rises by an angle of sine `rise`.
-fn strip_of_point(cutter: &Cutter, rise: f64, h: f64) -> f64 {
-    let (flank, rise) = (cutter.profile().point().sin.asin(), rise.min(1.0).asin());
-    let cotangent = |angle: f64| 1.0 / angle.max(1e-9).tan();
-    let width = h * (cotangent(flank + rise) + cotangent(flank - rise));
-    width
-        .min(WIDEST_OVER_PLANE * (8.0 * h * cutter.radius()).sqrt())
-        .min(WIDEST_OVER_DIAMETER * 2.0 * cutter.radius())
-}
-
-/// Width of the strip, mm, for scallop height `h` where the cutter has curvature `cutter` and the
-/// surface `surface` across the feed (1/mm, positive concave), limited for a cutter of radius
+/// Width of the strip, mm along the surface, for scallop height `h` where the cutter is a circle of curvature `cutter` and
+/// the surface one of curvature `surface` across the feed (1/mm, positive concave), limited for a cutter of radius
 /// `radius`. The second value is true where the limit acted: the surface is as concave as the
 /// cutter, or more.
 pub fn strip_width(cutter: f64, surface: f64, h: f64, radius: f64) -> (f64, bool) {
-    let plane = (8.0 * h * radius).sqrt();
-    let widest = (WIDEST_OVER_PLANE * plane).min(WIDEST_OVER_DIAMETER * 2.0 * radius);
-    let gap = cutter - surface;
-    let too_concave = surface > 0.0 && gap < NEARLY_AS_CONCAVE * cutter;
-    let width = if gap > 0.0 { (8.0 * h / gap).sqrt() } else { f64::INFINITY };
-    if width > widest { (widest, too_concave) } else { (width, false) }
+    let widest = widest(h, radius);
+    let circle = (cutter > 0.0).then(|| BallSection::new(1.0 / cutter, surface).ok()).flatten();
+    let width = circle.map_or(f64::INFINITY, |circle| {
+        // Where no step leaves so high a ridge, the widest that leaves one serves.
+        circle.step(h).unwrap_or_else(|_| circle.greatest_step()).arc
+    });
+    if width > widest { (widest, too_concave(cutter, surface)) } else { (width, false) }
+}
+
+/// The widest strip that is ever planned, mm.
+fn widest(h: f64, radius: f64) -> f64 {
+    (WIDEST_OVER_PLANE * (8.0 * h * radius).sqrt()).min(WIDEST_OVER_DIAMETER * 2.0 * radius)
+}
+
+fn too_concave(cutter: f64, surface: f64) -> bool {
+    surface > 0.0 && cutter - surface < NEARLY_AS_CONCAVE * cutter
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::section::ball_scallop_height;
+    use cutter::AptWords;
 
     #[test]
-    fn strip_width_inverts_the_scallop_height_to_second_order() {
-        for kappa in [-0.1, -0.02, 0.0, 0.02, 0.1] {
-            let (width, limited) = strip_width(1.0 / 5.0, kappa, 0.01, 5.0);
-            assert!(!limited);
-            let h = ball_scallop_height(5.0, kappa, width).unwrap();
-            assert!((h / 0.01 - 1.0).abs() < 5e-3, "kappa {kappa}: {h}");
+    fn strips_of_balls_have_the_exact_height() {
+        let r = 3.0;
+        let ball = Cutter::ball(2.0 * r).unwrap();
+        for over in [1e-4, 1e-3, 1e-2, 0.05, 0.1] {
+            for bend in [-1.0, -0.3, -0.01, -1e-9, 0.0, 1e-9, 0.01, 0.3, 0.6] {
+                let (kappa, h) = (bend / r, over * r);
+                let (width, limited) = strip_width(1.0 / r, kappa, h, r);
+                let of_ball = strip_width_at(&ball, &Vector3::z(), &Vector3::x(), kappa, h);
+                assert!(!limited && of_ball == (width, false), "{bend} {over}");
+                let real = ball_scallop_height(r, kappa, width).unwrap();
+                assert!((real / h - 1.0).abs() < 1e-9, "{bend} {over}: {real}");
+            }
         }
         assert!(strip_width(0.2, 0.25, 0.01, 5.0).1, "concave beyond the ball: limited, and said so");
         assert!(!strip_width(0.0, 0.0, 0.01, 5.0).1, "a flat end on a plane is limited, but not by the part");
+        let thin = strip_width(1.0 / 3.0, -300.0, 1.0, 3.0).0;
+        assert!(thin > 0.0 && ball_scallop_height(3.0, -300.0, thin).unwrap() < 1.0, "a wire");
     }
 
     #[test]
@@ -90,8 +106,113 @@ mod tests {
         let (n, up) =
             (Vector3::new(-slope.sin(), 0.0, slope.cos()), Vector3::new(slope.cos(), 0.0, slope.sin()));
         let (width, _) = strip_width_at(&flat, &n, &up, 0.0, 0.01);
-        assert!((width * slope.sin() * slope.cos() - 0.01).abs() < 1e-12);
+        assert!((width * slope.sin() * slope.cos() - 0.01).abs() < 1e-11);
+        // Fed up or down the slope it shows an ellipse of half axes R and R sin λ.
         let (along, _) = strip_width_at(&flat, &n, &Vector3::y(), 0.0, 0.01);
-        assert!((along - (8.0 * 0.01 * 3.0 / slope.sin()).sqrt()).abs() < 1e-12);
+        let height = 3.0 * slope.sin() * (1.0 - (1.0 - (0.5 * along / 3.0f64).powi(2)).sqrt());
+        assert!((height / 0.01 - 1.0).abs() < 1e-9, "{height}");
+    }
+
+    #[test]
+    fn a_point_leaves_grooves() {
+        // A drill point upright on ground that rises across the feed less than its flank.
+        let cone = Cutter::apt(&AptWords::examples()[1]).unwrap();
+        let (flank, rise) = (cone.profile().point().sin.asin(), 5f64.to_radians());
+        let (n, b) = (Vector3::new(-rise.sin(), 0.0, rise.cos()), Vector3::new(rise.cos(), 0.0, rise.sin()));
+        let width = strip_width_at(&cone, &n, &b, 0.0, 1e-3).0;
+        let groove = 1e-3 * (1.0 / (flank + rise).tan() + 1.0 / (flank - rise).tan());
+        assert!((width / groove - 1.0).abs() < 1e-9, "{width} {groove}");
+    }
+
+    /// The lower outline of a cutter seen along the feed, by brute force: the hull of many places of its surface, x across
+    /// the feed and y over the contact, from left to right.
+    fn outline(cutter: &Cutter, n: &Vector3, b: &Vector3) -> Vec<[f64; 2]> {
+        const PARTS: usize = 1200;
+        let mut places = Vec::new();
+        let profile = cutter.profile();
+        // The ends of the pieces, and places between; the last is the rim.
+        let between = (0..=PARTS).map(|i| cutter.radius() * i as f64 / PARTS as f64);
+        for rho in [profile.bottom_end, profile.arc_end].into_iter().chain(between) {
+            let z = cutter.height(rho).unwrap();
+            for k in 0..2 * PARTS {
+                let (sin, cos) = (std::f64::consts::PI * k as f64 / PARTS as f64).sin_cos();
+                let p = Vector3::new(rho * cos, rho * sin, z);
+                places.push([p.dot(b), p.dot(n)]);
+                if rho == cutter.radius() {
+                    // The cylinder above.
+                    let p = p + Vector3::z();
+                    places.push([p.dot(b), p.dot(n)]);
+                }
+            }
+        }
+        let low = places.iter().copied().min_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
+        places.retain(|p| p[1] < low[1] + 1.0);
+        places.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let mut hull: Vec<[f64; 2]> = Vec::new();
+        for p in places {
+            while let [.., a, c] = hull[..]
+                && (c[0] - a[0]) * (p[1] - a[1]) <= (p[0] - a[0]) * (c[1] - a[1])
+            {
+                hull.pop();
+            }
+            hull.push(p);
+        }
+        hull.into_iter().map(|p| [p[0] - low[0], p[1] - low[1]]).collect()
+    }
+
+    /// Height of the ridge between passes `width` apart on a surface of curvature `kappa`: where the outlines cross, each
+    /// turned by half of the width about the surface's middle.
+    fn ridge(hull: &[[f64; 2]], width: f64, kappa: f64) -> f64 {
+        // By the way along the surface and the height over it.
+        let polar = |[x, y]: [f64; 2]| {
+            let (dx, dy) = (x * kappa, 1.0 - y * kappa);
+            let over = (2.0 * y - kappa * (x * x + y * y)) / (1.0 + dx.hypot(dy));
+            [if kappa == 0.0 { x } else { dx.atan2(dy) / kappa }, over]
+        };
+        // Straight pieces of the outline are bent seen from a bent surface.
+        const PIECES: usize = 50;
+        let pieces = hull.windows(2).flat_map(|w| {
+            (0..PIECES)
+                .map(|k| k as f64 / PIECES as f64)
+                .map(|t| [0, 1].map(|c| w[0][c] + t * (w[1][c] - w[0][c])))
+        });
+        let hull: Vec<[f64; 2]> = pieces.map(polar).collect();
+        let over = |s: f64| {
+            let k = hull.partition_point(|p| p[0] <= s).clamp(1, hull.len() - 1);
+            let ([s0, h0], [s1, h1]) = (hull[k - 1], hull[k]);
+            h0 + (h1 - h0) * (s - s0) / (s1 - s0)
+        };
+        let (mut a, mut b) = (-width, width);
+        for _ in 0..60 {
+            let middle = 0.5 * (a + b);
+            // The first pass rises to the right of its contact, the next one to the left.
+            *(if over(middle) < over(middle - width) { &mut a } else { &mut b }) = middle;
+        }
+        over(a)
+    }
+
+    #[test]
+    fn strips_of_other_cutters_have_the_height_that_swept_cutters_leave() {
+        let mut examples = vec![Cutter::bull(10.0, 2.0).unwrap(), Cutter::flat(8.0).unwrap()];
+        examples.extend(AptWords::examples().iter().take(5).map(|words| Cutter::apt(words).unwrap()));
+        for cutter in &examples {
+            for (lead, tilt) in [(5.0f64, 0.0f64), (15.0, 10.0), (3.0, -25.0)] {
+                let axis = Vector3::new(lead.to_radians().tan(), tilt.to_radians().tan(), 1.0).normalize();
+                let [n, b] = [Vector3::z(), Vector3::y()].map(|v| motion::in_tool_frame(&axis, &v));
+                let hull = outline(cutter, &n, &b);
+                for (kappa, h) in [(0.0, 0.01), (0.0, 0.1), (-0.03, 0.05), (0.01, 0.05)] {
+                    let (width, limited) = strip_width_at(cutter, &n, &b, kappa, h);
+                    if limited || width >= widest(h, cutter.radius()) {
+                        continue;
+                    }
+                    let real = ridge(&hull, width, kappa);
+                    assert!(
+                        (real / h - 1.0).abs() < 2e-3,
+                        "{:?} {lead} {tilt} {kappa} {h}: {real} {width}",
+                        cutter.words()
+                    );
+                }
+            }
+        }
     }
 }

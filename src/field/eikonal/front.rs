@@ -3,15 +3,15 @@
 //!
 //! A front φ = const moves by `speed(b)` mm while φ grows by one, `b` the unit vector across it. In orthonormal
 //! components q of ∇φ that is `|q|² = s²(q)`, with the slowness `s = 1/speed`. For a ball cutter s² is
-//! `(κ_cutter − κ_surface(b))/8h`, a constant plus a second harmonic of the angle of `b`; what other cutters and
-//! limited strips add to that is kept as a table.
+//! a quadratic in the curvature of the surface along `b`, but for terms of fourth order in the strip's width: a constant plus a
+//! second and a fourth harmonic of the angle of `b`; what other cutters and limited strips add to that is kept as a table.
 
 /// Directions of the table over half a turn (a front and its reverse are equally fast). More follow sudden changes of the
 /// speed closer.
 const DIRECTIONS: usize = 32;
 
 /// What the table adds is left out below this share of s².
-const HARMONIC: f64 = 1e-9;
+const HARMONIC: f64 = 1e-6;
 
 /// With a table the least and greatest slowness lie between its directions; they are widened by this share.
 const BETWEEN_DIRECTIONS: f64 = 0.02;
@@ -30,10 +30,11 @@ const MOST_STEPS: usize = 60;
 pub struct Front {
     /// Components of ∇φ from derivatives: `q1 = frame[0] φ_u`, `q2 = frame[1] φ_u + frame[2] φ_v`.
     frame: [f64; 3],
-    /// s² = mean + cosine cos 2θ + sine sin 2θ + table.
+    /// s² = mean + cosine cos 2θ + sine sin 2θ + fourth[0] cos 4θ + fourth[1] sin 4θ + table.
     mean: f64,
     cosine: f64,
     sine: f64,
+    fourth: [f64; 2],
     /// What remains of s² at angles kπ/[`DIRECTIONS`].
     table: Option<Box<[f64; DIRECTIONS]>>,
     /// Bounds of s².
@@ -67,20 +68,26 @@ impl Front {
             (0..DIRECTIONS).map(|k| squares[k] * wave(2.0 * angle(k))).sum::<f64>() / DIRECTIONS as f64
         };
         let (mean, cosine, sine) = (project(|_| 1.0), 2.0 * project(f64::cos), 2.0 * project(f64::sin));
+        let twice = |wave: fn(f64) -> f64| {
+            2.0 * (0..DIRECTIONS).map(|k| squares[k] * wave(4.0 * angle(k))).sum::<f64>() / DIRECTIONS as f64
+        };
+        let fourth = [twice(f64::cos), twice(f64::sin)];
         let mut rest = squares;
         for (k, rest) in rest.iter_mut().enumerate() {
-            *rest -= mean + cosine * (2.0 * angle(k)).cos() + sine * (2.0 * angle(k)).sin();
+            let ((sin2, cos2), (sin4, cos4)) = ((2.0 * angle(k)).sin_cos(), (4.0 * angle(k)).sin_cos());
+            *rest -= mean + cosine * cos2 + sine * sin2 + fourth[0] * cos4 + fourth[1] * sin4;
         }
         let harmonic = rest.iter().all(|r| r.abs() <= HARMONIC * mean);
         let (least, greatest) = if harmonic {
-            let swing = cosine.hypot(sine);
+            let swing = cosine.hypot(sine) + fourth[0].hypot(fourth[1]);
             (mean - swing, mean + swing)
         } else {
             let bounds = squares.iter().fold([f64::INFINITY, 0.0f64], |[a, b], &s| [a.min(s), b.max(s)]);
             (bounds[0] * (1.0 - BETWEEN_DIRECTIONS), bounds[1] * (1.0 + BETWEEN_DIRECTIONS))
         };
         let table = (!harmonic).then(|| Box::new(rest));
-        let mut front = Self { frame, mean, cosine, sine, table, least, greatest, steepest: [0.0; 2] };
+        let mut front =
+            Self { frame, mean, cosine, sine, fourth, table, least, greatest, steepest: [0.0; 2] };
         front.steepest = [front.latest([1.0, 0.0]), front.latest([0.0, 1.0])];
         Some(front)
     }
@@ -106,8 +113,10 @@ impl Front {
         let norm2 = q1 * q1 + q2 * q2;
         let (cos, sin) =
             if norm2 > 0.0 { ((q1 * q1 - q2 * q2) / norm2, 2.0 * q1 * q2 / norm2) } else { (1.0, 0.0) };
-        let value = self.mean + self.cosine * cos + self.sine * sin;
-        let slope = 2.0 * (self.sine * cos - self.cosine * sin);
+        let (cos4, sin4) = (1.0 - 2.0 * sin * sin, 2.0 * sin * cos);
+        let [even, odd] = self.fourth;
+        let value = self.mean + self.cosine * cos + self.sine * sin + even * cos4 + odd * sin4;
+        let slope = 2.0 * (self.sine * cos - self.cosine * sin) + 4.0 * (odd * cos4 - even * sin4);
         let Some(table) = &self.table else { return (value, slope) };
         let per_angle = DIRECTIONS as f64 / std::f64::consts::PI;
         let x = (q2.atan2(q1) * per_angle).rem_euclid(DIRECTIONS as f64);

@@ -11,8 +11,7 @@ use super::value;
 use crate::JobError;
 use crate::run::{Finding, Run};
 
-/// The length that no path below the scallop height can go under, by the widest strips over all directions, to second
-/// order.
+/// The length that no path below the scallop height can go under, by the widest strips over all directions.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ShortestFigures {
     /// Of the cutter's way, as `path.cutting_length_mm` is.
@@ -51,7 +50,7 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
             format!("{:.1} mm ({per_cent:.1} % of this path)", s.cutting_length_mm),
         )],
         sentence: Some((
-            "Shortest possible cutting length below the scallop target (widest strips, to second order)",
+            "Shortest possible cutting length below the scallop target (widest strips)",
             format!("{:.0} mm: {per_cent:.1} % of {name}", s.cutting_length_mm),
         )),
         ..Figure::default()

@@ -16,7 +16,7 @@
 //! see that each further pass costs half a turn. So turning has a price. The remainder of the last pass is drawn in to a
 //! whole number of passes by a higher price of ends; the shorter of both paths is taken.
 //!
-//! Enters: a part and the scallop height. Leaves: passes. Lengths in mm; planned to second order, as strip widths are.
+//! Enters: a part and the scallop height. Leaves: passes. Lengths in mm.
 
 use std::f64::consts::PI;
 use std::fmt::{self, Write as _};

@@ -238,9 +238,13 @@ pub(crate) fn stepover_at(
     let e = Vector2::new(-angle.sin(), angle.cos());
     let t = p.tangent_at(angle)?;
     let (width, too_concave) = p.strip_width(cutter, &t, Step::Scallop(h));
-    let bend = 1.0 - p.curvature_along(&p.normal.cross(&t)) * dropped.corner_radius();
+    let curvature = p.curvature_along(&p.normal.cross(&t));
+    let bend = 1.0 - curvature * dropped.corner_radius();
+    // Passes lie evenly apart in the plan view: across the chord of the strip, not along it.
+    let half = 0.5 * curvature * width;
+    let chord = if half.abs() < 1e-4 { 1.0 - half * half / 6.0 } else { half.sin() / half };
     let lean = (1.0 - p.normal.xy().dot(&e).powi(2)).max(0.0).sqrt();
-    (bend > 0.0 && !too_concave).then_some(width * bend * lean)
+    (bend > 0.0 && !too_concave).then_some(width * chord * bend * lean)
 }
 
 fn least_stepover(places: &[(ChartPoint, f64)], cutters: [&Cutter; 2], angle: f64, h: f64) -> f64 {

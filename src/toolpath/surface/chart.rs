@@ -181,6 +181,10 @@ impl ChartPoint<'_> {
             Step::Stepover(width) => (width, false),
             Step::Scallop(h) => {
                 let b = self.normal.cross(t);
+                // However a ball leans.
+                if cutter.is_ball() {
+                    return strip_width_at(cutter, &self.normal, &b, self.curvature_along(&b), h);
+                }
                 let [n, across] = self.in_tool_frame(t, b);
                 strip_width_at(cutter, &n, &across, self.curvature_along(&b), h)
             }
