@@ -3,6 +3,7 @@
 //! One way leads through it for every engine and for pockets: plan, cut, measure, find further figures, judge. A figure of
 //! the report is one file in `figures` and one line in their list; the rule by which a toolpath passes stands in `judge`.
 
+mod correction;
 mod error;
 mod figures;
 mod judge;

@@ -1,5 +1,7 @@
 //! Planning one toolpath: strategy, tilts, feeds, joints, program.
 
+use std::sync::Arc;
+
 use io::ProgramHeader;
 use io::gcode::{self, FiveAxisPost, MoveLines};
 use machine::kinematics::{JointPath, follow};
@@ -8,11 +10,12 @@ use metrology::contact_arcs;
 use motion::Toolpath;
 use scene::{Scene, ToolpathRequest};
 use toolpath::{
-    Engagement, OffsetDrive, OffsetSurface, Plan, PlanError, PlanSettings, PocketStrategy, Strategy, Tilting,
-    plan, plan_pocket, plan_tilted,
+    Correction, Engagement, OffsetDrive, OffsetSurface, Plan, PlanError, PlanSettings, PocketStrategy,
+    Strategy, Tilting, plan, plan_pocket, plan_tilted,
 };
 use work::monitor::Monitor;
 
+use super::correction::CorrectionFigures;
 use super::pocket::limit_feed_by;
 use super::tool::{FixtureMesh, Tool};
 use super::{JobError, Session};
@@ -28,6 +31,8 @@ pub(crate) struct Planned {
     pub joints: Option<JointPath>,
     /// Engagement in a pocket, and the bound of its greatest angle, rad.
     pub engaged: Option<(Engagement, f64)>,
+    /// The rounds in which its ridges were measured and corrected.
+    pub correction: Option<CorrectionFigures>,
 }
 
 impl Planned {
@@ -42,40 +47,43 @@ impl Planned {
 }
 
 impl Session {
-    /// Plans one toolpath.
+    /// Plans one toolpath, its passes spaced by what was measured of earlier plans.
     pub(crate) fn plan(
         &self,
         request: &ToolpathRequest,
         tool: &Tool,
         fixtures: &[FixtureMesh],
+        correction: Option<Arc<Correction>>,
         monitor: &dyn Monitor,
     ) -> Result<Planned, JobError> {
         let scene = &self.scene;
         let strategy = self.strategy(request)?;
-        let mut plan =
-            self.path(request, &*strategy, tool, fixtures, monitor).map_err(|e| self.refused(request, e))?;
+        let settings = PlanSettings { correction, ..self.settings(request) };
+        let mut plan = self
+            .path(request, &*strategy, &settings, (tool, fixtures), monitor)
+            .map_err(|e| self.refused(request, e))?;
         if scene.machine.slow_corners {
             plan.path = slow_corners(&plan.path, &scene.machine);
         }
         let joints = joints(scene, &request.name, &plan.path)?;
         let engaged = self.limit_feed(request, &mut plan.path, monitor)?;
         plan.path.origin.lines = lines(scene, &plan.path, joints.as_ref())?;
-        Ok(Planned { plan, strategy, joints, engaged })
+        Ok(Planned { plan, strategy, joints, engaged, correction: None })
     }
 
     fn path(
         &self,
         request: &ToolpathRequest,
         strategy: &dyn Strategy,
-        tool: &Tool,
-        fixtures: &[FixtureMesh],
+        settings: &PlanSettings,
+        (tool, fixtures): (&Tool, &[FixtureMesh]),
         monitor: &dyn Monitor,
     ) -> Result<Plan, PlanError> {
-        let (cutter, settings) = (&self.scene.cutter, self.settings(request));
+        let cutter = &self.scene.cutter;
         if let (Some(pocket), Some(strategy)) = (&self.pocket, strategy.downcast_ref::<PocketStrategy>()) {
-            return plan_pocket(pocket, cutter, strategy, &settings, monitor);
+            return plan_pocket(pocket, cutter, strategy, settings, monitor);
         }
-        let Some(axis) = &request.axis else { return plan(&self.part, cutter, strategy, &settings, monitor) };
+        let Some(axis) = &request.axis else { return plan(&self.part, cutter, strategy, settings, monitor) };
         let keep = tool.keep_clear(&self.scene, &self.part, fixtures);
         let tilting = Tilting {
             axis: &axis.rule,
@@ -83,7 +91,7 @@ impl Session {
             most_turning_across: axis.most_turning_across,
             interference: Some(&keep),
         };
-        plan_tilted(&self.part, cutter, strategy, &tilting, &settings, monitor)
+        plan_tilted(&self.part, cutter, strategy, &tilting, settings, monitor)
     }
 
     fn settings(&self, request: &ToolpathRequest) -> PlanSettings {
@@ -96,6 +104,7 @@ impl Session {
             plunge_rate: self.scene.cutting.plunge_rate,
             rapid_rate: self.scene.machine.rapid_rate,
             joining: request.joining,
+            correction: None,
         }
     }
 

@@ -145,7 +145,7 @@ impl Session {
         let engine = self.engine(request)?;
         let tool = Tool::of(scene);
         let fixtures = if engine.tilts() { self.fixtures()? } else { Vec::new() };
-        let planned = self.plan(request, &tool, &fixtures, monitor)?;
+        let planned = self.plan_in_rounds(request, (&tool, &fixtures), engine, monitor)?;
         let begun = Instant::now();
         let mut measured = self.measure(request, engine, &planned.plan.path, monitor)?;
         for region in &mut measured.measurement.gouge.regions {

@@ -18,6 +18,7 @@ use super::cut_surface::CutSurface;
 use super::figures::{Limits, NUMERICAL_FLOOR, ScallopFigures};
 use super::meetings::{Meeting, Meetings};
 use super::pairs::{PairTally, RidgeCrossing};
+use super::ridge_map::RidgePlace;
 use cutter::Cutter;
 use geometry::{Point2, Point3, Vector2, distance_to_segment};
 use motion::Toolpath;
@@ -62,6 +63,8 @@ pub(super) struct Ridges {
     pub hidden: Vec<Hidden>,
     /// The ridges of each pair of passes.
     pub pairs: PairTally,
+    /// Where each sample stands, where that is kept.
+    pub places: Vec<RidgePlace>,
 }
 
 /// A place between centres where more stands than the cells around saw.
@@ -83,6 +86,7 @@ impl Ridges {
             candidates: highest.into_iter().chain(others).copied().collect(),
             hidden,
             pairs: PairTally::default(),
+            places: Vec::new(),
         }
     }
 
@@ -125,6 +129,8 @@ pub(super) struct RidgeFinder<'a> {
     pub part: &'a Part,
     pub cutter: &'a Cutter,
     pub limits: &'a Limits,
+    /// Whether the places of all samples are kept.
+    pub keeps_places: bool,
     meetings: Meetings<'a>,
     path: &'a Toolpath,
 }
@@ -165,7 +171,7 @@ impl<'a> RidgeFinder<'a> {
         limits: &'a Limits,
     ) -> Self {
         let meetings = Meetings::new(surface, cutter, path, None);
-        Self { surface, part, cutter, limits, meetings, path }
+        Self { surface, part, cutter, limits, keeps_places: false, meetings, path }
     }
 
     /// All ridges, row by row. `deviation` is that of a cell, mm, NaN where it is not measured.
@@ -203,7 +209,9 @@ impl<'a> RidgeFinder<'a> {
                 }
             }
             monitor.advance(1);
-            Ok(Ridges { pairs: self.pairs(&samples), ..Ridges::of_row(&samples, hidden) })
+            let kept = if self.keeps_places { &samples[..] } else { &[] };
+            let places = kept.iter().map(|s| RidgePlace { at: s.at, height: s.height }).collect();
+            Ok(Ridges { pairs: self.pairs(&samples), places, ..Ridges::of_row(&samples, hidden) })
         })?;
         let mut ridges = Ridges {
             samples: Vec::with_capacity(rows.iter().map(|r| r.samples.len()).sum()),
@@ -211,6 +219,7 @@ impl<'a> RidgeFinder<'a> {
         };
         for row in rows {
             ridges.samples.extend(row.samples);
+            ridges.places.extend(row.places);
             ridges.candidates.extend(row.candidates);
             ridges.hidden.extend(row.hidden);
             ridges.pairs.append(row.pairs);

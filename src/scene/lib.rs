@@ -136,6 +136,8 @@ pub struct Scene {
     pub tolerance: Limits,
     /// Which ridges may exceed the scallop tolerance.
     pub scallop_rule: ScallopRule,
+    /// Whether passes planned by a scallop height are corrected by what is measured of them.
+    pub correct: bool,
     /// How it is simulated.
     pub simulation: Simulation,
     /// On what.

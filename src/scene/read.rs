@@ -84,8 +84,10 @@ impl Scene {
         let (cutter, cutting) = read_cutter(&root.section("cutter")?)?;
         let stock = read_stock(&root.section("stock")?, &part, &cutter)?;
         let holder = read_holder(&root, &cutter)?;
-        let tolerance = read_tolerance(&root.section("tolerance")?)?;
-        let scallop_rule = read_scallop_rule(&root.section("tolerance")?)?;
+        let section = root.section("tolerance")?;
+        let tolerance = read_tolerance(&section)?;
+        let scallop_rule = read_scallop_rule(&section)?;
+        let correct = section.flag("correct")?.unwrap_or(true);
         let mut simulation = read_simulation(&root.section("simulation")?, &cutter, &tolerance)?;
         let section = root.section("machine")?;
         let keep_clear = interference::read(&root, &folder)?;
@@ -107,6 +109,7 @@ impl Scene {
             cutting,
             tolerance,
             scallop_rule,
+            correct,
             simulation,
             machine,
             five_axis,
@@ -228,7 +231,8 @@ fn read_holder(root: &Section<'_>, cutter: &Cutter) -> Result<Option<Holder>, Sc
 }
 
 fn read_tolerance(section: &Section<'_>) -> Result<Limits, SceneError> {
-    const KEYS: [&str; 6] = ["scallop", "scallop_share", "scallop_highest", "gouge", "uncut", "chord"];
+    const KEYS: [&str; 7] =
+        ["scallop", "scallop_share", "scallop_highest", "gouge", "uncut", "chord", "correct"];
     section.only(&KEYS, &[], "[tolerance]")?;
     let length = |key, default| Ok::<f64, SceneError>(section.length(key)?.map_or(default, |v| v.value));
     Ok(Limits {

@@ -15,7 +15,7 @@ mod vocabulary;
 
 pub use drop::{Drop, DropCutter, GridDrop, PlanGrid};
 pub use levels::spacing::LevelSteps;
-pub use link::{LONGEST_LINK, longest_link};
+pub use link::{LONGEST_LINK, longest_link, plane_interval};
 pub use plan::{Plan, plan, plan_tilted};
 pub use pocket::{
     Engagement, Flow, Pattern, Pocket, PocketStrategy, engagement, engagement_angle, limit_feed, plan_pocket,
@@ -33,6 +33,6 @@ pub use strategies::{STRATEGIES, StrategyRead, read_strategy, words_for};
 pub use tilt::repair::{RepairSummary, Unreachable};
 pub use tilt::tilted::Tilting;
 pub use vocabulary::{
-    Along, Definition, FeedDirection, Joining, Links, PartKind, PlanError, PlanSettings, Reading, Step,
-    Strategy,
+    Along, Correction, Definition, FeedDirection, Joining, Links, PartKind, PlanError, PlanSettings, Reading,
+    Step, Strategy,
 };

@@ -152,6 +152,7 @@ fn passes(setup: &Setup<'_>, strategy: &dyn Strategy, axis: Option<&ToolAxis>) -
         // A tilted cutter's passes are smoothed once they are tilted.
         smoothing: (settings.joining.smoothing && axis.is_none()).then_some(sampling),
         axis,
+        correction: settings.correction.as_deref(),
         probe: probe.as_ref(),
     };
     let wants_mesh = mesh_surface::wants_mesh(part, cutter);
@@ -161,9 +162,12 @@ fn passes(setup: &Setup<'_>, strategy: &dyn Strategy, axis: Option<&ToolAxis>) -
     strategy.passes(&task)
 }
 
-/// The distance of passes less what chords and facets take of a scallop target.
+/// The distance of passes less what chords and facets take of a scallop target; what is measured and corrected needs none of that.
 fn charged_step(task: &Task<'_>, strategy: &dyn Strategy, settings: &PlanSettings) -> Step {
     let Step::Scallop(h) = settings.step else { return settings.step };
+    if settings.correction.is_some() {
+        return settings.step;
+    }
     let fitted = !strategy.on_facets(task) && !task.wants_mesh;
     let smooth = !task.part.patches().is_empty();
     let facets = if smooth { 0.0 } else { facet_charge(task.part.mesh(), fitted, h) };

@@ -1,6 +1,7 @@
 //! The figures of a toolpath beside scallop, gouge, uncut and deviation. Each is one file, which finds its numbers, tells
 //! them in words, and holds them against their limits; a new one is one file and one line in [`FIGURES`].
 
+mod correction;
 mod coverage;
 mod field;
 mod holder;
@@ -28,9 +29,10 @@ use super::run::{Finding, Run};
 type Find = fn(&Run<'_>, &dyn Monitor) -> Result<Finding, JobError>;
 
 /// All figures, in the order of report.json.
-const FIGURES: [Find; 13] = [
+const FIGURES: [Find; 14] = [
     coverage::find,
     shortest::find,
+    correction::find,
     field::find,
     machine::find,
     pairs::find,

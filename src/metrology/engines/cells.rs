@@ -6,7 +6,8 @@ use sim::{ZMap, cut, cut_reference};
 use work::monitor::{Cancelled, Monitor};
 
 use super::{Engine, EngineError, Measured, Task, View};
-use crate::{Asked, measure};
+use crate::ridge_map::ridge_map;
+use crate::{Asked, RidgeMap, measure};
 
 /// An engine on cells.
 pub(super) struct Cells {
@@ -41,6 +42,18 @@ impl Engine for Cells {
 
     fn measures_pockets(&self) -> bool {
         true
+    }
+
+    fn maps_ridges(&self) -> bool {
+        true
+    }
+
+    fn ridges(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<RidgeMap, EngineError> {
+        let path = task.path;
+        let (grid, _) = task.budget.grid_for(path.len(), &task.area, task.simulation, task.cells)?;
+        let cut = (self.cut)(ZMap::block(grid, task.top), task.cutter, path, monitor)?;
+        let asked = task.simulation.error_bound;
+        Ok(ridge_map(task.part, task.cutter, path, &cut, task.limits, asked, monitor)?)
     }
 
     fn measure(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Measured, EngineError> {

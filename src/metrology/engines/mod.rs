@@ -16,6 +16,7 @@ pub use error::EngineError;
 pub use normals::REACH_OVER_UNCUT;
 pub use task::{Measured, NormalView, Simulation, Task, View};
 
+use crate::RidgeMap;
 use work::monitor::Monitor;
 
 /// A way to cut and to measure.
@@ -28,6 +29,18 @@ pub trait Engine: Sync {
     fn tilts(&self) -> bool;
     /// Whether it measures the floor of a pocket.
     fn measures_pockets(&self) -> bool;
+    /// Whether it tells where ridges stand.
+    fn maps_ridges(&self) -> bool {
+        false
+    }
+    /// Cuts, and measures ridges only, with their places where [`Engine::maps_ridges`].
+    ///
+    /// # Errors
+    /// [`EngineError`].
+    fn ridges(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<RidgeMap, EngineError> {
+        let scallop = self.measure(task, monitor)?.measurement.scallop;
+        Ok(RidgeMap { places: Vec::new(), scallop })
+    }
     /// Cuts and measures.
     ///
     /// # Errors

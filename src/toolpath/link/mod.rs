@@ -53,7 +53,7 @@ pub fn longest_link(joining: &Joining, cutter: &Cutter, step: Step) -> f64 {
 }
 
 /// Interval between passes on a plane, mm.
-fn plane_interval(cutter: &Cutter, step: Step) -> f64 {
+pub fn plane_interval(cutter: &Cutter, step: Step) -> f64 {
     match step {
         Step::Stepover(width) => width,
         Step::Scallop(height) => strip_width(1.0 / cutter.radius(), 0.0, height, cutter.radius()).0,

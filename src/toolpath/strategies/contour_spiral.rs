@@ -44,7 +44,7 @@ const MOST_STRAY: f64 = 1.0;
 pub fn passes(task: &Task<'_>) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, .. } = *task;
     let mut all = Passes::default();
-    for chart in Chart::all(part, cutter, settings.axis)? {
+    for chart in Chart::all(part, cutter, settings.guide())? {
         all.append(on_chart(task, &chart)?);
     }
     Ok(all)

@@ -83,7 +83,7 @@ fn passes_along(task: &Task<'_>, along: Along, placing: LevelSteps) -> Result<Pa
         Along::V => Axis::U,
     });
     let mut all = Passes::default();
-    for chart in Chart::all(part, cutter, settings.axis)? {
+    for chart in Chart::all(part, cutter, settings.guide())? {
         all.append(along_levels_placed(task, &chart, &field, placing)?);
     }
     Ok(all)

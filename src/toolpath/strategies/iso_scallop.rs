@@ -121,7 +121,7 @@ impl Strategy for IsoScallop {
 
     fn passes(&self, task: &Task<'_>) -> Result<Passes, PlanError> {
         let mut all = Passes::default();
-        for chart in Chart::all(task.part, task.cutter, task.settings.axis)? {
+        for chart in Chart::all(task.part, task.cutter, task.settings.guide())? {
             all.append(on_chart(task, &chart, self.start, f64::INFINITY)?);
         }
         Ok(all)
@@ -310,16 +310,17 @@ mod tests {
             chord_tolerance: 1e-3,
             smoothing: None,
             axis: None,
+            correction: None,
             probe: None,
         };
-        let chart = &Chart::all(&part, &cutter, None).unwrap()[0];
+        let chart = &Chart::all(&part, &cutter, crate::vocabulary::Guide::default()).unwrap()[0];
         let border = vec![vec![[0.0, 0.0], [1.0, 0.0]]];
         let field = arrival(chart, &cutter, settings.step, &border, false, &Silent).unwrap();
         let field = ScalarField::Grid(field);
         let metric = |u: f64, v: f64| chart.jet(u, v).first_form();
         let tracer = LevelTracer::new(&field, &metric, chart.domain, [0.0; 2], 120, 0.1);
         let range = tracer.range();
-        let interval = (8.0f64 * 0.05 * 5.0).sqrt();
+        let interval = 2.0 * (2.0f64 * 5.0 * 0.05 - 0.05 * 0.05).sqrt();
         assert!((range[1] - range[0] - 10.0 / interval).abs() < 0.01, "{range:?}");
         let allowed = places_of(chart, &cutter, &field, &settings);
         let levels = place_levels(&allowed, range, LevelSteps::Shortest, &mut Vec::new());

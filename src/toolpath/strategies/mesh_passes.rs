@@ -103,7 +103,7 @@ fn on_piece(task: &Task<'_>, aim: Aim, piece: &Piece, surface: &MeshSurface) -> 
                 Ok::<_, PlanError>(lines.iter().zip(&matters).map(pull).collect::<Vec<_>>())
             });
             let toward = lines.transpose()?;
-            let found = shortest_stream(surface, cutter, settings.step, toward.as_deref(), monitor)?;
+            let found = shortest_stream(surface, cutter, settings, toward.as_deref(), monitor)?;
             let found =
                 found.ok_or_else(|| not_applicable("no stream function of least length was found"))?;
             (found.coefficients, toward.is_none().then_some(found.cost))
@@ -154,12 +154,15 @@ fn along_direction(
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     let mesh = &surface.mesh;
     let (lines, matters) = feed_lines(task, direction, piece, surface, all)?;
-    let widths =
-        |v: usize, b: &Vector3| width_at(cutter, &mesh.normals()[v], b, &surface.bends[v], settings.step);
+    let guide = settings.guide();
+    let width = |v: usize, b: &Vector3| {
+        let (width, _) = width_at(cutter, &mesh.normals()[v], b, &surface.bends[v], settings.step);
+        guide.corrected(width, &mesh.points()[v], settings.step)
+    };
     let count = mesh.points().len();
     let own = |v: usize| surface.origin[v] as usize;
     let across = |v: usize| mesh.normals()[v].cross(&lines[v].direction);
-    let density: Vec<f64> = (0..count).map(|v| 1.0 / widths(own(v), &across(own(v))).0).collect();
+    let density: Vec<f64> = (0..count).map(|v| 1.0 / width(own(v), &across(own(v)))).collect();
     let weight: Vec<f64> = (0..count).map(|v| matters[own(v)] + LEAST_WEIGHT).collect();
     let flows = flows(mesh, &lines, &density, &weight);
     let stream = solve_stream(mesh, &flows, DIRECTION_WEIGHT, &Held::default()).map_err(refused)?;
@@ -275,6 +278,12 @@ impl MeshGuide<'_> {
         mixed.try_normalize(1e-9).unwrap_or_else(Vector3::z)
     }
 
+    /// The place of its weights.
+    fn place(&self, p: &MeshPoint) -> Point3 {
+        let corners = self.surface.mesh.corners(p.triangle as usize);
+        Point3::from((0..3).map(|k| corners[k].coords * p.weights[k]).sum::<Vector3>())
+    }
+
     /// Step and width at a point, and whether the surface is too concave there.
     fn allowed_at(&self, p: &MeshPoint) -> Option<(Allowed, bool)> {
         let normal = self.normal(p);
@@ -284,7 +293,9 @@ impl MeshGuide<'_> {
         let corners = self.surface.mesh.triangles()[p.triangle as usize];
         let mut bend = Bend::default();
         (0..3).for_each(|k| bend.add(&self.surface.bends[corners[k] as usize], p.weights[k]));
-        let (width, too_concave) = width_at(self.cutter, &normal, &across, &bend, self.settings.step);
+        let step = self.settings.step;
+        let (width, too_concave) = width_at(self.cutter, &normal, &across, &bend, step);
+        let width = self.settings.guide().corrected(width, &self.place(p), step);
         Some((Allowed { step: gradient.norm() * width, width }, too_concave))
     }
 

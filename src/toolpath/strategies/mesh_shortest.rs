@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 
 use super::mesh_passes::width_at;
 use crate::surface::mesh_surface::MeshSurface;
-use crate::vocabulary::Step;
+use crate::vocabulary::{Guide, PassSettings, Step};
 use cutter::Cutter;
 use field::mesh::{Bend, gradient_terms};
 use field::{Front, Gradients, Packed, Roughness, Rounds, Site, minimise};
@@ -37,7 +37,7 @@ const STRIP_SHARE: f64 = 0.02;
 pub(crate) fn shortest_stream(
     surface: &MeshSurface,
     cutter: &Cutter,
-    step: Step,
+    settings: &PassSettings<'_>,
     toward: Option<&[(Vector3, f64)]>,
     monitor: &dyn Monitor,
 ) -> Result<Option<Packed>, Cancelled> {
@@ -48,7 +48,7 @@ pub(crate) fn shortest_stream(
     for (t, corners) in mesh.triangles().iter().enumerate() {
         corners.iter().for_each(|&v| around[v as usize] += share(t) / 3.0);
     }
-    let pricing = Pricing { surface, cutter, step, toward };
+    let pricing = Pricing { surface, cutter, step: settings.step, guide: settings.guide(), toward };
     let sites = parallel::map(count + mesh.triangles().len(), |k| match k.checked_sub(count) {
         None => pricing.at_vertex(k, (1.0 - DAMPING) * around[k]),
         Some(t) => pricing.on_triangle(t, DAMPING * share(t)),
@@ -117,6 +117,7 @@ struct Pricing<'a> {
     surface: &'a MeshSurface,
     cutter: &'a Cutter,
     step: Step,
+    guide: Guide<'a>,
     toward: Option<&'a [(Vector3, f64)]>,
 }
 
@@ -148,7 +149,9 @@ impl Pricing<'_> {
         vertex: usize,
         area: f64,
     ) -> Option<(Site, [Vector3; 2])> {
-        let width = |[x, y]: [f64; 2]| width_at(self.cutter, normal, &(e1 * x + e2 * y), bend, self.step).0;
+        let factor = self.guide.corrected(1.0, &self.surface.mesh.points()[vertex], self.step);
+        let width =
+            |[x, y]: [f64; 2]| factor * width_at(self.cutter, normal, &(e1 * x + e2 * y), bend, self.step).0;
         let front = Front::new((1.0, 0.0, 1.0), width)?;
         // Across the passes at three angles; the feed is square to them.
         let costs = [0, 1, 2].map(|k| {

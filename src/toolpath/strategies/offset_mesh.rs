@@ -223,10 +223,11 @@ impl MeshRider<'_> {
     fn interval(&self, x: &Point3, away: &Vector3, across: &Vector3) -> f64 {
         match self.settings.step {
             Step::Stepover(s) => s,
-            Step::Scallop(h) => [1.0, -1.0]
-                .map(|side| self.to_side(x, away, &(across * side), h))
-                .into_iter()
-                .fold(f64::INFINITY, f64::min),
+            Step::Scallop(h) => {
+                let sides = [1.0, -1.0].map(|side| self.to_side(x, away, &(across * side), h));
+                let contact = x - away * self.level.distance();
+                self.settings.guide().corrected(sides[0].min(sides[1]), &contact, self.settings.step)
+            }
         }
     }
 

@@ -152,14 +152,14 @@ fn passes(task: &Task<'_>, along: OffsetAlong, drive: &OffsetDrive) -> Result<Pa
         return Err(refused("a mesh has no parameters; write `angle = 0`"));
     }
     let charts = match drive {
-        OffsetDrive::Exact => Chart::all(part, cutter, settings.axis)?,
+        OffsetDrive::Exact => Chart::all(part, cutter, settings.guide())?,
         OffsetDrive::InPlane => {
             return Err(refused(
                 "sections are offset in their planes, and the part has none; write `offset = \"normal\"`",
             ));
         }
         OffsetDrive::Given(surfaces) => {
-            surfaces.iter().map(|s| Chart::of_surface(s, settings.axis)).collect()
+            surfaces.iter().map(|s| Chart::of_surface(s, settings.guide())).collect()
         }
     };
     let mut all = Passes::default();
@@ -274,6 +274,8 @@ impl PatchRider<'_> {
             Step::Stepover(width) => (width * narrower, false),
             Step::Scallop(h) => {
                 let (width, limited) = strip_width(1.0 / radius, across * narrower, h, radius);
+                let contact = p.jet.p - p.normal * radius;
+                let width = self.settings.guide().corrected(width, &contact, self.settings.step);
                 (width * narrower, limited)
             }
         }

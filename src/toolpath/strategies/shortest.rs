@@ -93,7 +93,7 @@ const DIRECTIONS: usize = 36;
 pub fn shortest_possible(part: &Part, cutter: &Cutter, h: f64) -> Result<ShortestPossible, PlanError> {
     let mut sum = ShortestPossible { cutting_mm: 0.0, contact_mm: 0.0, limited_fraction: 0.0 };
     let mut total = 0.0;
-    for chart in Chart::all(part, cutter, None)? {
+    for chart in Chart::all(part, cutter, crate::vocabulary::Guide::default())? {
         let (places, cell) = places(&chart, PLACES);
         for (_, p) in &places {
             let (e, f, g) = p.jet.first_form();
@@ -163,7 +163,7 @@ impl Strategy for ShortestStreamline {
 /// Plans passes along the stream function with the shortest path.
 fn passes(task: &Task<'_>, toward: Option<(&FeedDirection, f64)>) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, monitor, .. } = *task;
-    let charts = Chart::all(part, cutter, settings.axis)?;
+    let charts = Chart::all(part, cutter, settings.guide())?;
     if let Some((direction, _)) = toward {
         let parameters: Vec<_> = charts.iter().map(|chart| chart.domain).collect();
         feed::check(direction, part, &parameters)?;
@@ -525,7 +525,7 @@ mod tests {
     #[test]
     fn a_number_of_passes_is_drawn_in_to_a_whole_one() {
         let (surface, cutter) = (saddle(), Cutter::ball(18.0).unwrap());
-        let chart = Chart::of_surface(&surface, None);
+        let chart = Chart::of_surface(&surface, crate::vocabulary::Guide::default());
         let step = Step::Scallop(0.01);
         let search = Search { chart: &chart, cutter: &cutter, step, toward: None, monitor: &Silent };
         let net = search.net(8.0, search.sides()).unwrap();

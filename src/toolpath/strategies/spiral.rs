@@ -79,7 +79,7 @@ impl Strategy for Spiral {
 /// Plans the spiral.
 fn passes(task: &Task<'_>) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, monitor, .. } = *task;
-    let charts = Chart::all(part, cutter, settings.axis)?;
+    let charts = Chart::all(part, cutter, settings.guide())?;
     let dropped = task.dropped();
     let [x, y] = [Vector2::x(), Vector2::y()].map(|e| Chart::extent_of_axes(&charts, part, dropped, &e));
     let middle = Vector2::new(0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]));

@@ -226,7 +226,7 @@ impl Strategy for Streamline {
 fn on_charts(task: &Task<'_>, asked: &Streamline) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, .. } = *task;
     let direction = &asked.direction;
-    let charts = Chart::all(part, cutter, settings.axis)?;
+    let charts = Chart::all(part, cutter, settings.guide())?;
     let parameters: Vec<_> = charts.iter().map(|chart| chart.domain).collect();
     feed::check(direction, part, &parameters)?;
     let mut all = Passes::default();

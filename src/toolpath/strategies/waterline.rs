@@ -63,7 +63,7 @@ impl Strategy for Waterline {
     fn passes(&self, task: &Task<'_>) -> Result<Passes, PlanError> {
         let Task { part, cutter, ref settings, .. } = *task;
         let mut all = Passes::default();
-        for chart in Chart::all(part, cutter, settings.axis)? {
+        for chart in Chart::all(part, cutter, settings.guide())? {
             let field = ScalarField::Grid(heights(&chart, cutter)?);
             let level = level_share(&chart, cutter, &field, settings);
             all.append(along_levels_placed(task, &chart, &field, self.steps)?);

@@ -113,7 +113,7 @@ impl Strategy for Zigzag {
 /// Plans passes in the direction `angle` (rad from x).
 fn passes(task: &Task<'_>, angle: f64) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, monitor, .. } = *task;
-    let charts = Chart::all(part, cutter, settings.axis)?;
+    let charts = Chart::all(part, cutter, settings.guide())?;
     let mut notes = Vec::new();
     let dropped = task.dropped();
     let stepover = match settings.step {
@@ -149,7 +149,7 @@ fn on_levels(task: &Task<'_>, angle: f64) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, .. } = *task;
     let across = Vector2::new(-angle.sin(), angle.cos());
     let mut all = Passes::default();
-    for chart in Chart::all(part, cutter, settings.axis)? {
+    for chart in Chart::all(part, cutter, settings.guide())? {
         let field = chart.sampled(CELLS, "zigzag", |u, v| chart.jet(u, v).p.coords.xy().dot(&across))?;
         let field = ScalarField::Grid(field);
         all.append(along_levels_placed(task, &chart, &field, LevelSteps::Constant)?);
@@ -161,7 +161,7 @@ fn on_levels(task: &Task<'_>, angle: f64) -> Result<Passes, PlanError> {
 /// (surface along the feed over the stepover), and the best are planned.
 fn best(task: &Task<'_>) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, monitor, .. } = *task;
-    let charts = Chart::all(part, cutter, settings.axis)?;
+    let charts = Chart::all(part, cutter, settings.guide())?;
     let places = places(&charts);
     let angle = |k: usize| std::f64::consts::PI * k as f64 / ANGLES as f64;
     let dropped = task.dropped();

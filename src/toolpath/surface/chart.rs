@@ -4,15 +4,16 @@
 //! surface z(x, y) is fitted to it; directions and distances of passes come from that surface,
 //! while heights of cutter locations always come from dropping the cutter on the mesh itself.
 //!
-//! A chart carries the rule for the tool axis, so that every strip is that of the cutter as it leans.
+//! A chart carries the rule for the tool axis and the correction of widths, so that every strip is that of the cutter as it
+//! leans and of what was measured.
 
 use super::mesh_surface;
-use crate::vocabulary::{Along, FeedDirection, PlanError, Step};
+use crate::vocabulary::{Along, FeedDirection, Guide, PlanError, Step};
 use cutter::Cutter;
 use field::mesh::{blend_lines, slope_at};
 use field::{GridField, NormalEquations, SamplePlane};
 use geometry::{Jet2, KnotVector, NurbsSurface, Point3, Vector2, Vector3};
-use motion::{CcPoint, ToolAxis, in_tool_frame};
+use motion::{CcPoint, in_tool_frame};
 use part::Part;
 use scallop::strip_width_at;
 
@@ -67,8 +68,8 @@ pub struct Chart<'a> {
     pub domain: [[f64; 2]; 2],
     /// +1 where the parametrisation's normal points outward, −1 where it points inward.
     sign: f64,
-    /// How the cutter is tilted; upright without it.
-    axis: Option<&'a ToolAxis>,
+    /// How the cutter is tilted, and what was measured.
+    guide: Guide<'a>,
 }
 
 enum Source<'a> {
@@ -87,7 +88,7 @@ pub struct ChartPoint<'a> {
     /// Its parameters.
     pub at: [f64; 2],
     sign: f64,
-    axis: Option<&'a ToolAxis>,
+    guide: Guide<'a>,
 }
 
 impl ChartPoint<'_> {
@@ -170,7 +171,7 @@ impl ChartPoint<'_> {
     fn in_tool_frame(&self, t: &Vector3, v: Vector3) -> [Vector3; 2] {
         let contact = CcPoint { point: self.jet.p, normal: self.normal };
         // A place without an axis is refused where it is cut.
-        let axis = self.axis.and_then(|rule| rule.at(&contact, t).ok());
+        let axis = self.guide.axis.and_then(|rule| rule.at(&contact, t).ok());
         [self.normal, v].map(|v| axis.map_or(v, |axis| in_tool_frame(&axis, &v)))
     }
 
@@ -182,11 +183,9 @@ impl ChartPoint<'_> {
             Step::Scallop(h) => {
                 let b = self.normal.cross(t);
                 // However a ball leans.
-                if cutter.is_ball() {
-                    return strip_width_at(cutter, &self.normal, &b, self.curvature_along(&b), h);
-                }
-                let [n, across] = self.in_tool_frame(t, b);
-                strip_width_at(cutter, &n, &across, self.curvature_along(&b), h)
+                let [n, across] = if cutter.is_ball() { [self.normal, b] } else { self.in_tool_frame(t, b) };
+                let (width, limited) = strip_width_at(cutter, &n, &across, self.curvature_along(&b), h);
+                (self.guide.corrected(width, &self.jet.p, step), limited)
             }
         }
     }
@@ -197,25 +196,25 @@ impl<'a> Chart<'a> {
     ///
     /// # Errors
     /// When no height surface can be fitted to a mesh.
-    pub fn all(part: &'a Part, cutter: &Cutter, axis: Option<&'a ToolAxis>) -> Result<Vec<Self>, PlanError> {
+    pub fn all(part: &'a Part, cutter: &Cutter, guide: Guide<'a>) -> Result<Vec<Self>, PlanError> {
         if part.patches().is_empty() {
-            return Ok(vec![Self::of_mesh(part, cutter, axis)?]);
+            return Ok(vec![Self::of_mesh(part, cutter, guide)?]);
         }
-        Ok((0..part.patches().len()).map(|k| Self::of_patch(part, k, axis)).collect())
+        Ok((0..part.patches().len()).map(|k| Self::of_patch(part, k, guide)).collect())
     }
 
-    fn of_patch(part: &'a Part, k: usize, axis: Option<&'a ToolAxis>) -> Self {
+    fn of_patch(part: &'a Part, k: usize, guide: Guide<'a>) -> Self {
         let (patch, domain) = (k as u32, part.patches()[k].domain());
         let sign = part.outward_sign(k);
-        Self { source: Source::Patch { part, patch }, domain, sign, axis }
+        Self { source: Source::Patch { part, patch }, domain, sign, guide }
     }
 
     /// A surface that is no patch of the part; `du × dv` points outward.
-    pub fn of_surface(surface: &'a NurbsSurface, axis: Option<&'a ToolAxis>) -> Self {
-        Self { source: Source::Surface(surface), domain: surface.domain(), sign: 1.0, axis }
+    pub fn of_surface(surface: &'a NurbsSurface, guide: Guide<'a>) -> Self {
+        Self { source: Source::Surface(surface), domain: surface.domain(), sign: 1.0, guide }
     }
 
-    fn of_mesh(part: &'a Part, cutter: &Cutter, axis: Option<&'a ToolAxis>) -> Result<Self, PlanError> {
+    fn of_mesh(part: &'a Part, cutter: &Cutter, guide: Guide<'a>) -> Result<Self, PlanError> {
         let bounds = part.bounds();
         let domain = [[bounds.min.x, bounds.max.x], [bounds.min.y, bounds.max.y]];
         // Two facets to a square.
@@ -232,7 +231,7 @@ impl<'a> Chart<'a> {
             return Err(PlanError::mesh("its plan view has no area"));
         };
         let surface = fit_heights(part, domain, knots_u, knots_v)?;
-        Ok(Self { source: Source::Heights(surface), domain, sign: 1.0, axis })
+        Ok(Self { source: Source::Heights(surface), domain, sign: 1.0, guide })
     }
 
     /// [`ChartPoint::strip_width`] for passes on both sides of a place, with the curvature of all that lies between them: at
@@ -275,7 +274,7 @@ impl<'a> Chart<'a> {
             normal: jet.normal()? * self.sign,
             at: [u, v],
             sign: self.sign,
-            axis: self.axis,
+            guide: self.guide,
         })
     }
 
@@ -453,7 +452,8 @@ mod tests {
     #[test]
     fn intervals_are_narrower_where_an_edge_begins_within_them() {
         let surface = rounded_edge();
-        let (chart, cutter, h) = (Chart::of_surface(&surface, None), Cutter::ball(6.0).unwrap(), 0.01);
+        let (chart, cutter, h) =
+            (Chart::of_surface(&surface, Guide::default()), Cutter::ball(6.0).unwrap(), 0.01);
         let at_x = |x: f64| {
             // On the level half x falls with the square of the way to the edge's knot, or evenly.
             let (mut a, mut b) = (0.0, 0.5);
@@ -490,7 +490,7 @@ mod tests {
         });
         let (mesh, _) = TriangleMesh::new(corners, triangles.collect()).unwrap();
         let (part, cutter) = (Part::from_mesh(mesh), Cutter::ball(16.0).unwrap());
-        let chart = &Chart::all(&part, &cutter, None).unwrap()[0];
+        let chart = &Chart::all(&part, &cutter, Guide::default()).unwrap()[0];
         let top = chart.at(12.0, 12.0).unwrap().curvature_along(&Vector3::x());
         assert!((top + 2.0 * 2.1 / 90.0).abs() < 0.01 / 8.0, "{top}");
     }

@@ -314,7 +314,7 @@ mod tests {
             .flat_map(|k| [(0.0, first), (30.0, last)].map(|(x, a)| stretch(x, 0.5 * f64::from(k), a)));
         let direction = FeedDirection::Guides { curves: Arc::new(sides.collect()), sense: Sense::Along };
         let cutter = Cutter::ball(6.0).unwrap();
-        let chart = Chart::all(&part, &cutter, None).unwrap().remove(0);
+        let chart = Chart::all(&part, &cutter, crate::vocabulary::Guide::default()).unwrap().remove(0);
         let FeedDirection::Samples(field) = on_chart(&direction, &chart, &cutter).unwrap().into_owned()
         else {
             panic!("curves become samples")

@@ -1,6 +1,7 @@
 //! The words in which passes are asked for and handed over: settings, feed directions, passes, refusals. Every room of the
 //! planner speaks them; they know none of the rooms that cover a surface.
 
+mod correction;
 mod error;
 mod feed_direction;
 mod pass_settings;
@@ -9,10 +10,11 @@ mod settings;
 mod strategy;
 mod task;
 
+pub use correction::Correction;
 pub use error::PlanError;
 pub use feed_direction::{Along, FeedDirection};
-pub use pass_settings::PassSettings;
 pub(crate) use pass_settings::SAMPLING_OVER_RADIUS;
+pub use pass_settings::{Guide, PassSettings};
 pub use passes::{Contact, Passes};
 pub use settings::{Joining, Links, PlanSettings, Step};
 pub use strategy::{Definition, PartKind, Reading, Strategy};

@@ -1,6 +1,6 @@
 //! What every pass needs to know besides part and cutter.
 
-use super::Step;
+use super::{Correction, Step};
 use crate::moves::chord::{Watch, reduce, sample_within_chord};
 use crate::moves::smooth::smooth_and_spread;
 use cutter::Cutter;
@@ -21,6 +21,25 @@ const REDUCTION_SHARE: f64 = 0.4;
 /// points, but 2 % of the ridges of a saddle stand over the target.
 const SMOOTHED_SHARE: f64 = 0.78;
 
+/// What the width of a strip goes by besides cutter and surface.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Guide<'a> {
+    /// How the cutter is tilted; upright without it.
+    pub axis: Option<&'a ToolAxis>,
+    /// The factor of every width that is planned by a scallop height; 1 without it.
+    pub correction: Option<&'a Correction>,
+}
+
+impl Guide<'_> {
+    /// A width planned by calculation, with the correction of the place.
+    pub fn corrected(&self, width: f64, at: &Point3, step: Step) -> f64 {
+        match (step, self.correction) {
+            (Step::Scallop(_), Some(correction)) => width * correction.at(at),
+            _ => width,
+        }
+    }
+}
+
 /// What every pass needs.
 #[derive(Debug, Clone, Copy)]
 pub struct PassSettings<'a> {
@@ -34,11 +53,18 @@ pub struct PassSettings<'a> {
     pub smoothing: Option<f64>,
     /// How the cutter is tilted; upright without it.
     pub axis: Option<&'a ToolAxis>,
+    /// By what passes lie wider or narrower than by calculation.
+    pub correction: Option<&'a Correction>,
     /// The ball that is dropped in its stead where a tilted cutter, no ball itself, is located by the contacts of that.
     pub probe: Option<&'a Cutter>,
 }
 
 impl<'a> PassSettings<'a> {
+    /// What widths of strips go by.
+    pub fn guide(&self) -> Guide<'a> {
+        Guide { axis: self.axis, correction: self.correction }
+    }
+
     /// The cutter that is dropped.
     pub fn dropped<'b>(&self, cutter: &'b Cutter) -> &'b Cutter
     where

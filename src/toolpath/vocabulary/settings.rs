@@ -1,5 +1,9 @@
 //! What every path is planned by: how far passes lie apart, tolerance, heights, rates, and how passes are joined.
 
+use std::sync::Arc;
+
+use super::Correction;
+
 /// How far neighbouring passes lie apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Step {
@@ -37,7 +41,7 @@ impl Default for Joining {
 }
 
 /// What every strategy needs to know besides part and cutter.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct PlanSettings {
     /// Distance of passes.
     pub step: Step,
@@ -55,6 +59,9 @@ pub struct PlanSettings {
     pub rapid_rate: f64,
     /// How passes are smoothed and joined.
     pub joining: Joining,
+    /// By what passes spaced for a scallop lie wider or narrower than by calculation. Where ridges are measured and corrected,
+    /// an empty one before the first measurement: nothing of the target is then kept back for chords and facets.
+    pub correction: Option<Arc<Correction>>,
 }
 
 /// The scallop height that passes are planned for by default, mm: what finishing of moulds and dies leaves.
@@ -89,6 +96,7 @@ impl Default for PlanSettings {
             plunge_rate: PLUNGE_RATE,
             rapid_rate: RAPID_RATE,
             joining: Joining::default(),
+            correction: None,
         }
     }
 }

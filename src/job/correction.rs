@@ -1,0 +1,251 @@
+//! The loop: plan, cut, measure the ridges, and plan again with passes nearer to each other where ridges stand above the
+//! target, and farther apart where they need not be so low.
+//!
+//! Enters: a toolpath that is planned by a scallop height. Leaves: the best of a few plans, and what each round found. The
+//! first plan keeps nothing of the target back for chords, facets and smoothing, whose shares no calculation knows; what
+//! they take is measured. A round measures ridges only, on cells as coarse as show every pass. What the toolpath is judged by is
+//! measured anew.
+
+use std::sync::Arc;
+
+use serde::Serialize;
+
+use metrology::{Engine, RidgeMap, Simulation, path_figures};
+use scene::ToolpathRequest;
+use toolpath::{Correction, PartKind, Step, plane_interval};
+use work::monitor::{self, Monitor};
+
+use super::planned::Planned;
+use super::tool::{FixtureMesh, Tool};
+use super::{JobError, Session};
+
+/// Most plans that are made. Each further one costs as much as the first, and mends less.
+const MOST_ROUNDS: usize = 3;
+
+/// Ridges within this share below the target are as high as they should be. What is corrected is aimed at the middle of it,
+/// since points and chords of a new plan lie elsewhere.
+const SLACK: f64 = 0.02;
+
+/// Ridges lower than this share of the target are so because passes lie nearer to each other than planned: a whole number
+/// of them fits, or further ones fill a gap. The width that was planned did not cause that.
+const LEAST_PLANNED: f64 = 0.9;
+
+/// No width is corrected by more than this factor in a round.
+const MOST_NARROWED: f64 = 0.5;
+
+/// Cells from pass to pass while only ridges are measured.
+const CELLS_A_PASS: f64 = 4.0;
+
+/// What a round of the loop found.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(crate) struct CorrectionRound {
+    /// The highest ridge, mm.
+    pub highest_mm: f64,
+    /// Bound of its error.
+    pub error_bound_mm: f64,
+    /// Half of the ridge length is lower, mm.
+    pub median_mm: f64,
+    /// Length of all moves that feed along passes, mm.
+    pub cutting_length_mm: f64,
+    /// Least and greatest factor of the widths that the round was planned with.
+    pub factors: [f64; 2],
+}
+
+/// The rounds of the loop.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct CorrectionFigures {
+    /// What no ridge may exceed, mm.
+    pub target_mm: f64,
+    /// All rounds, in order.
+    pub rounds: Vec<CorrectionRound>,
+    /// The round whose plan was kept, counted from 1.
+    pub kept: usize,
+}
+
+impl CorrectionRound {
+    fn of(map: &RidgeMap, planned: &Planned, correction: &Correction) -> Option<Self> {
+        Some(Self {
+            highest_mm: map.scallop.max_mm?,
+            error_bound_mm: map.scallop.error_bound_mm?,
+            median_mm: map.scallop.p50_mm?,
+            cutting_length_mm: path_figures(&planned.plan.path, 0.0).cutting_length_mm,
+            factors: correction.range(),
+        })
+    }
+
+    fn at_most(&self) -> f64 {
+        self.highest_mm + self.error_bound_mm
+    }
+
+    /// Whether no further round is asked for.
+    fn is_settled(&self, target: f64) -> bool {
+        self.at_most() <= target && self.median_mm >= (1.0 - SLACK) * target
+    }
+
+    /// Whether this round is to be kept instead of another: first what holds the target, then what is shorter; where neither
+    /// holds it, the one with the lower ridge.
+    fn is_better(&self, other: &Self, target: f64) -> bool {
+        match (self.at_most() <= target, other.at_most() <= target) {
+            (true, true) => self.cutting_length_mm < other.cutting_length_mm,
+            (false, false) => self.at_most() < other.at_most(),
+            (holds, _) => holds,
+        }
+    }
+}
+
+impl Session {
+    /// Plans one toolpath, in rounds where its ridges are to be measured and corrected.
+    pub(crate) fn plan_in_rounds(
+        &self,
+        request: &ToolpathRequest,
+        (tool, fixtures): (&Tool, &[FixtureMesh]),
+        engine: &dyn Engine,
+        monitor: &dyn Monitor,
+    ) -> Result<Planned, JobError> {
+        let surface = request.strategy.definition().part == PartKind::Surface;
+        let (Step::Scallop(target), true) =
+            (request.step, self.scene.correct && surface && engine.maps_ridges())
+        else {
+            return self.plan(request, tool, fixtures, None, monitor);
+        };
+        let toplan = (request, tool, fixtures, engine);
+        let mut correction = Arc::new(Correction::default());
+        let (mut best, mut map) = self.round(toplan, &correction, monitor)?;
+        // Without ridges there is nothing to correct.
+        let Some(first) = CorrectionRound::of(&map, &best, &correction) else { return Ok(best) };
+        let (mut rounds, mut kept, mut last) = (vec![first], 0, first);
+        while rounds.len() < MOST_ROUNDS && !last.is_settled(target) {
+            let aim = target - last.error_bound_mm;
+            let next = Arc::new(corrected(&map, &correction, aim, self.interval(target)));
+            if next == correction {
+                break;
+            }
+            let (planned, ridges) = self.round(toplan, &next, monitor)?;
+            let Some(round) = CorrectionRound::of(&ridges, &planned, &next) else { break };
+            if round.is_better(&rounds[kept], target) {
+                (best, kept) = (planned, rounds.len());
+            }
+            rounds.push(round);
+            (map, correction, last) = (ridges, next, round);
+        }
+        best.correction = Some(CorrectionFigures { target_mm: target, rounds, kept: kept + 1 });
+        Ok(best)
+    }
+
+    /// A plan and its ridges.
+    fn round(
+        &self,
+        (request, tool, fixtures, engine): (&ToolpathRequest, &Tool, &[FixtureMesh], &dyn Engine),
+        correction: &Arc<Correction>,
+        monitor: &dyn Monitor,
+    ) -> Result<(Planned, RidgeMap), JobError> {
+        monitor::check(monitor)?;
+        let planned = self.plan(request, tool, fixtures, Some(correction.clone()), monitor)?;
+        let map = self.ridges(request, engine, &planned, monitor)?;
+        Ok((planned, map))
+    }
+
+    /// Interval of passes on a plane, mm.
+    fn interval(&self, target: f64) -> f64 {
+        plane_interval(&self.scene.cutter, Step::Scallop(target))
+    }
+
+    /// The ridges that a plan leaves.
+    fn ridges(
+        &self,
+        request: &ToolpathRequest,
+        engine: &dyn Engine,
+        planned: &Planned,
+        monitor: &dyn Monitor,
+    ) -> Result<RidgeMap, JobError> {
+        let scene = &self.scene;
+        monitor.start("measuring the ridges of a plan", 0);
+        let cell = scene.simulation.cell.max(plane_interval(&scene.cutter, request.step) / CELLS_A_PASS);
+        let simulation = Simulation { cell, cell_is_auto: true, ..scene.simulation };
+        let cells =
+            self.budget().grid_before_planning(&self.area(), &simulation).map_err(JobError::grid(scene))?;
+        let task = self.task(&planned.plan.path, &simulation, &cells);
+        engine.ridges(&task, monitor).map_err(|reason| JobError::engine(scene, &request.name, reason))
+    }
+}
+
+/// The factors of the next round: those of the last one where ridges are as high as they should be; else what takes each to
+/// the middle of the slack, by the square that height and width go together with.
+fn corrected(map: &RidgeMap, last: &Correction, target: f64, interval: f64) -> Correction {
+    let aim = (1.0 - 0.5 * SLACK) * target;
+    let factor = |height: f64| {
+        let wanted = (aim / height).sqrt();
+        let fits = (1.0 - SLACK) * target..=target;
+        if fits.contains(&height) || height < LEAST_PLANNED * target {
+            1.0
+        } else {
+            wanted.max(MOST_NARROWED)
+        }
+    };
+    let places: Vec<_> =
+        map.places.iter().map(|ridge| (ridge.at, last.at(&ridge.at) * factor(ridge.height))).collect();
+    Correction::new(&places, interval)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use geometry::Point3;
+    use metrology::{RidgePlace, ScallopFigures};
+    use scene::Scene;
+    use work::monitor::Silent;
+
+    /// A part of a wave under a ball of 6 mm.
+    const SCENE: &str = "[part]\nsurface = \"wave\"\namplitude = 0.8\nwavelength_x = 25\nwavelength_y = 30\nx = [-8, 8]\ny = [-8, 8]\n[cutter]\nshape = \"ball\"\n\
+                         diameter = 6\n[tolerance]\nscallop = 0.05\nchord = 0.005\n";
+
+    fn planned(correct: bool, toolpath: &str) -> report::ToolpathResult {
+        let text = format!("{SCENE}correct = {correct}\n[[toolpath]]\n{toolpath}\n");
+        let session = Session::new(Scene::parse("bump.toml", text).unwrap()).unwrap();
+        session.toolpath(&session.scene.toolpaths[0], &Silent).unwrap().result
+    }
+
+    fn figure(result: &report::ToolpathResult) -> Option<&serde_json::Value> {
+        result.figures.iter().find(|figure| figure.key == "correction").map(|figure| &figure.value)
+    }
+
+    #[test]
+    fn rounds_bring_ridges_to_the_target() {
+        for toolpath in ["strategy = \"streamline\"", "strategy = \"iso-parametric\""] {
+            let [open, closed] = [false, true].map(|correct| planned(correct, toolpath));
+            assert!(figure(&open).is_none());
+            let rounds = figure(&closed).unwrap()["rounds"].as_array().unwrap();
+            assert!((1..=MOST_ROUNDS).contains(&rounds.len()));
+            let highest = closed.scallop.max_mm.unwrap();
+            assert!(highest <= 0.05, "{toolpath}: {highest} {rounds:?}");
+        }
+        assert!(figure(&planned(true, "strategy = \"zigzag\"\nstepover = 0.5")).is_none());
+    }
+
+    #[test]
+    fn what_holds_the_target_is_better_and_then_what_is_shorter() {
+        let round = |highest_mm: f64, cutting_length_mm: f64| CorrectionRound {
+            highest_mm,
+            error_bound_mm: 0.1,
+            median_mm: 0.9,
+            cutting_length_mm,
+            factors: [1.0; 2],
+        };
+        let better = |a: CorrectionRound, b: CorrectionRound| a.is_better(&b, 1.0);
+        assert!(better(round(0.8, 20.0), round(1.0, 10.0)) && !better(round(1.0, 10.0), round(0.8, 20.0)));
+        assert!(better(round(0.8, 9.0), round(0.7, 10.0)) && better(round(1.1, 20.0), round(1.2, 10.0)));
+    }
+
+    #[test]
+    fn widths_go_with_the_root_of_heights() {
+        let ridges = [(0.0, 1.2), (10.0, 0.99), (20.0, 0.94), (30.0, 0.5)];
+        let places = ridges.map(|(x, height)| RidgePlace { at: Point3::new(x, 0.0, 0.0), height });
+        let map = RidgeMap { places: places.to_vec(), scallop: ScallopFigures::default() };
+        let next = corrected(&map, &Correction::default(), 1.0, 1.0);
+        let found = places.map(|place| next.at(&place.at));
+        let wanted = [(0.99f64 / 1.2).sqrt(), 1.0, (0.99f64 / 0.94).sqrt(), 1.0];
+        assert!(found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
+        let again = corrected(&map, &next, 1.0, 1.0);
+        assert!((again.at(&places[0].at) - wanted[0].powi(2)).abs() < 1e-12);
+    }
+}
