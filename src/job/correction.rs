@@ -41,6 +41,8 @@ const CELLS_A_PASS: f64 = 4.0;
 pub(crate) struct CorrectionRound {
     /// The highest ridge, mm.
     pub highest_mm: f64,
+    /// The highest remnant along a border, mm.
+    pub border_mm: f64,
     /// Bound of its error.
     pub error_bound_mm: f64,
     /// Half of the ridge length is lower, mm.
@@ -66,6 +68,7 @@ impl CorrectionRound {
     fn of(map: &RidgeMap, planned: &Planned, correction: &Correction) -> Option<Self> {
         Some(Self {
             highest_mm: map.scallop.max_mm?,
+            border_mm: map.borders.iter().map(|place| place.height).fold(0.0, f64::max),
             error_bound_mm: map.scallop.error_bound_mm?,
             median_mm: map.scallop.p50_mm?,
             cutting_length_mm: path_figures(&planned.plan.path, 0.0).cutting_length_mm,
@@ -74,7 +77,7 @@ impl CorrectionRound {
     }
 
     fn at_most(&self) -> f64 {
-        self.highest_mm + self.error_bound_mm
+        self.highest_mm.max(self.border_mm) + self.error_bound_mm
     }
 
     /// Whether no further round is asked for.
@@ -182,8 +185,14 @@ fn corrected(map: &RidgeMap, last: &Correction, target: f64, interval: f64) -> C
             wanted.max(MOST_NARROWED)
         }
     };
-    let places: Vec<_> =
-        map.places.iter().map(|ridge| (ridge.at, last.at(&ridge.at) * factor(ridge.height))).collect();
+    // Borders that are lower than need be say nothing of the passes further in.
+    let borders = map.borders.iter().filter(|place| place.height > target);
+    let places: Vec<_> = map
+        .places
+        .iter()
+        .chain(borders)
+        .map(|ridge| (ridge.at, last.at(&ridge.at) * factor(ridge.height)))
+        .collect();
     Correction::new(&places, interval)
 }
 
@@ -226,6 +235,7 @@ mod tests {
     fn what_holds_the_target_is_better_and_then_what_is_shorter() {
         let round = |highest_mm: f64, cutting_length_mm: f64| CorrectionRound {
             highest_mm,
+            border_mm: 0.0,
             error_bound_mm: 0.1,
             median_mm: 0.9,
             cutting_length_mm,
@@ -240,11 +250,14 @@ mod tests {
     fn widths_go_with_the_root_of_heights() {
         let ridges = [(0.0, 1.2), (10.0, 0.99), (20.0, 0.94), (30.0, 0.5)];
         let places = ridges.map(|(x, height)| RidgePlace { at: Point3::new(x, 0.0, 0.0), height });
-        let map = RidgeMap { places: places.to_vec(), scallop: ScallopFigures::default() };
+        let border = RidgePlace { at: Point3::new(40.0, 0.0, 0.0), height: 1.1 };
+        let map =
+            RidgeMap { places: places.to_vec(), borders: vec![border], scallop: ScallopFigures::default() };
         let next = corrected(&map, &Correction::default(), 1.0, 1.0);
         let found = places.map(|place| next.at(&place.at));
         let wanted = [(0.99f64 / 1.2).sqrt(), 1.0, (0.99f64 / 0.94).sqrt(), 1.0];
         assert!(found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
+        assert!((next.at(&border.at) - (0.99f64 / 1.1).sqrt()).abs() < 1e-12);
         let again = corrected(&map, &next, 1.0, 1.0);
         assert!((again.at(&places[0].at) - wanted[0].powi(2)).abs() < 1e-12);
     }

@@ -39,7 +39,7 @@ pub trait Engine: Sync {
     /// [`EngineError`].
     fn ridges(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<RidgeMap, EngineError> {
         let scallop = self.measure(task, monitor)?.measurement.scallop;
-        Ok(RidgeMap { places: Vec::new(), scallop })
+        Ok(RidgeMap { places: Vec::new(), borders: Vec::new(), scallop })
     }
     /// Cuts and measures.
     ///
