@@ -29,14 +29,14 @@ use motion::Toolpath;
 use near::Near;
 use part::{Part, Patch, SurfacePoint};
 use pieces::Pieces;
-use unseen_cut::UnseenCut;
+use unseen_cut::{UnseenCut, lowest_tip};
 
 /// Where the vertical part of the normal is less, cells lie more than five times as far apart on the surface as in the plan:
 /// too far to see what one pass leaves.
 const STEEP: f64 = 0.2;
 
 /// A cell's centre sees the sheet of a place where it lies within this slope from the place's tangent plane.
-const SAME_SHEET: f64 = 1.0;
+const SAME_SHEET: f64 = 0.25;
 
 /// Triangles in a square of the longest side that is allowed, about: they are halved until no side is longer.
 const TRIANGLES_A_SQUARE: f64 = 3.0;
@@ -89,12 +89,12 @@ pub struct Coverage<'a> {
     by_cells: Vec<bool>,
     /// Area of pieces whose corners are of another kind, mm².
     mixed: f64,
-    cells: usize,
+    cells: Option<CellsSeen<'a>>,
 }
 
 impl<'a> Coverage<'a> {
     /// Of a part; without cells all that is judged is measured along normals.
-    pub fn new(part: &'a Part, facing: &'a Facing<'a>, judged: Judged, cells: Option<CellsSeen<'_>>) -> Self {
+    pub fn new(part: &'a Part, facing: &'a Facing<'a>, judged: Judged, cells: Option<CellsSeen<'a>>) -> Self {
         let area: f64 = (0..part.mesh().triangles().len()).map(|t| area(&part.mesh().corners(t))).sum();
         let pieces = Pieces::of(part, (TRIANGLES_A_SQUARE * area / PIECES).sqrt().max(f64::MIN_POSITIVE));
         let kinds =
@@ -103,7 +103,6 @@ impl<'a> Coverage<'a> {
             kinds[t] == PlaceKind::Facing && cells.is_some_and(|cells| cells.see(part, &pieces.middles[t]))
         });
         let mixed = mixed(facing, &pieces, &kinds);
-        let cells = cells.map_or(0, |cells| cells.grid.len());
         Self { part, facing, judged, pieces, kinds, by_cells, mixed, cells }
     }
 
@@ -148,10 +147,13 @@ impl<'a> Coverage<'a> {
         if area == 0.0 {
             return Ok(None);
         }
-        let triangles = (TRIANGLES_A_HUNDRED_CELLS * self.cells as f64 / 100.0).max(LEAST_TRIANGLES);
+        let triangles = (TRIANGLES_A_HUNDRED_CELLS * self.cells.map_or(0, |cells| cells.grid.len()) as f64
+            / 100.0)
+            .max(LEAST_TRIANGLES);
         let spacing = (TRIANGLES_A_SQUARE * area / triangles).sqrt().max(task.finest);
         let net = self.pieces.chosen(self.part, unseen, spacing);
-        let cut = UnseenCut { cut: task.cut, block: self.facing.block(), facing: self.facing };
+        let lowest_tip = lowest_tip(task.path);
+        let cut = UnseenCut { cut: task.cut, block: self.facing.block(), facing: self.facing, lowest_tip };
         let along = Along {
             part: self.part,
             cutter: task.cutter,
@@ -166,14 +168,17 @@ impl<'a> Coverage<'a> {
         let comes_near = |k: usize| near.is_passed(task.path, k, task.cutter);
         let all = vec![true; net.places.len()];
         let (measured, _) =
-            along.measure(net, &all, &|places| self.are_judged(places), &comes_near, monitor)?;
+            along.measure(net, &all, &|places| self.are_unseen(places), &comes_near, monitor)?;
         Ok(Some((measured, spacing)))
     }
 
-    /// Which places are judged.
-    fn are_judged(&self, places: &[NetPlace]) -> Vec<bool> {
+    /// Which places are judged and not measured by cells.
+    fn are_unseen(&self, places: &[NetPlace]) -> Vec<bool> {
         let kinds = self.facing.kinds(places.len(), |k| (places[k].point, places[k].normal));
-        kinds.into_iter().map(|kind| self.facing.is_judged(self.judged, kind)).collect()
+        let seen = |k: usize| {
+            kinds[k] == PlaceKind::Facing && self.cells.is_some_and(|cells| cells.see(self.part, &places[k]))
+        };
+        work::parallel::map(places.len(), |k| self.facing.is_judged(self.judged, kinds[k]) && !seen(k))
     }
 }
 

@@ -8,6 +8,8 @@
 use geometry::{Aabb, Point3, Vector3};
 
 use super::{STEEP, sees_level};
+use motion::{MoveKind, Toolpath};
+
 use crate::along_normals::{AlongNormal, NormalHit, SweptVolume, ball_beneath};
 use crate::facing::Facing;
 use crate::figures::NUMERICAL_FLOOR;
@@ -17,7 +19,7 @@ const BEYOND: f64 = 1e-2;
 const BEYOND_MM: f64 = 1e-5;
 
 /// Places nearer than about this to a convex edge are at the edge, mm. A greater one hides how cuts change beside edges;
-/// a lesser one takes what touches the edge for a cut that may go on.
+/// with a lesser one rays along the edge graze every pass over it, which takes as long as all others.
 const AT_EDGE: f64 = 1e-3;
 
 /// The cut along the normals of surface that no cell sees.
@@ -25,6 +27,15 @@ pub(super) struct UnseenCut<'a> {
     pub cut: &'a SweptVolume<'a>,
     pub block: &'a Aabb,
     pub facing: &'a Facing<'a>,
+    /// No upright tool cuts below this, mm; negative infinity where tools lean.
+    pub lowest_tip: f64,
+}
+
+/// The lowest tip of what cuts, mm: below it no upright tool does.
+pub(super) fn lowest_tip(path: &Toolpath) -> f64 {
+    let cuts = path.segments().filter(|(_, _, step)| step.kind != MoveKind::Rapid);
+    let lowest = cuts.map(|(from, to, _)| from.z.min(to.z)).fold(f64::INFINITY, f64::min);
+    if path.is_upright() { lowest } else { f64::NEG_INFINITY }
 }
 
 impl UnseenCut<'_> {
@@ -37,38 +48,58 @@ impl UnseenCut<'_> {
         along(0).min(along(1)).min(along(2))
     }
 
-    /// A cut into the design, or one that touches it, as far as it belongs to this place.
+    /// Whether a place lies at a convex edge with surface that cells measure.
+    fn is_at_level_edge(&self, point: &Point3, normal: &Vector3) -> bool {
+        let fits = ball_beneath(self.cut.part, point, normal, AT_EDGE);
+        fits < AT_EDGE && self.is_level_beyond(point, normal, fits)
+    }
+
+    /// Whether cells measure the surface on the other side of the medial axis, which is `fits` mm below a place.
+    fn is_level_beyond(&self, point: &Point3, normal: &Vector3, fits: f64) -> bool {
+        let beyond = point - normal * (fits * (1.0 + BEYOND) + BEYOND_MM);
+        let other = self.cut.part.closest_point(&beyond).0;
+        other.normal.z >= STEEP && sees_level(self.facing, &other)
+    }
+
+    /// A cut into the design as far as it belongs to this place.
     fn owned(&self, point: &Point3, normal: &Vector3, hit: NormalHit) -> Option<NormalHit> {
-        let part = self.cut.part;
-        let most = (-hit.deviation).max(AT_EDGE);
-        let fits = ball_beneath(part, point, normal, most);
-        if fits >= most {
+        let fits = ball_beneath(self.cut.part, point, normal, -hit.deviation);
+        if fits >= -hit.deviation {
             return Some(hit);
         }
-        let beyond = point - normal * (fits * (1.0 + BEYOND) + BEYOND_MM);
-        let other = part.closest_point(&beyond).0;
-        let level = other.normal.z >= STEEP && sees_level(self.facing, &other);
-        let reaches_axis = -hit.deviation >= fits - NUMERICAL_FLOOR;
-        let capped = if reaches_axis {
-            self.cut.cut.first_cut(point, normal, [-fits, self.cut.outward], Some(&hit))?
-        } else {
-            hit
-        };
-        let reaches_axis = -capped.deviation >= fits - NUMERICAL_FLOOR;
-        // As deep as the top says, which is measured there. At the very edge the slope of the cut is that against the top.
-        let deviation = if level && reaches_axis { 0.0 } else { capped.deviation };
-        let turned = level && (reaches_axis || fits < AT_EDGE);
-        Some(NormalHit { deviation, normal: if turned { *normal } else { capped.normal }, ..capped })
+        let capped = self.cut.cut.first_cut(point, normal, [-fits, self.cut.outward], Some(&hit))?;
+        if -capped.deviation < fits - NUMERICAL_FLOOR || !self.is_level_beyond(point, normal, fits) {
+            return Some(capped);
+        }
+        // As deep as the top says, which is measured there.
+        Some(NormalHit { deviation: 0.0, normal: *normal, ..capped })
+    }
+
+    /// Whether the line through a place stays below all that cuts.
+    fn is_below_all(&self, point: &Point3, normal: &Vector3) -> bool {
+        let highest = (normal.z * self.cut.outward).max(-normal.z * self.cut.inward);
+        point.z + highest < self.lowest_tip
     }
 }
 
 impl AlongNormal for UnseenCut<'_> {
     fn hit(&self, point: &Point3, normal: &Vector3, near: Option<&NormalHit>) -> Option<NormalHit> {
-        let hit = self.cut.hit(point, normal, near)?;
-        if hit.deviation < NUMERICAL_FLOOR {
-            return self.owned(point, normal, hit);
+        if self.is_below_all(point, normal) {
+            return None;
         }
-        (hit.deviation <= self.way_out(point, normal)).then_some(hit)
+        let fits = ball_beneath(self.cut.part, point, normal, AT_EDGE);
+        let at_edge = fits < AT_EDGE;
+        if at_edge && self.is_level_beyond(point, normal, fits) {
+            return None;
+        }
+        let hit = self.cut.hit(point, normal, near)?;
+        let hit = if hit.deviation < -NUMERICAL_FLOOR {
+            self.owned(point, normal, hit)?
+        } else {
+            Some(hit).filter(|hit| hit.deviation <= self.way_out(point, normal))?
+        };
+        // At the very edge the slope of a cut is that against the surface on the other side.
+        Some(if at_edge { NormalHit { normal: *normal, ..hit } } else { hit })
     }
 
     fn reach(&self) -> f64 {
@@ -76,7 +107,8 @@ impl AlongNormal for UnseenCut<'_> {
     }
 
     fn standing(&self, point: &Point3, normal: &Vector3) -> f64 {
-        self.reach().min(self.way_out(point, normal))
+        // The top that is measured there says what stands at its edge.
+        if self.is_at_level_edge(point, normal) { 0.0 } else { self.reach().min(self.way_out(point, normal)) }
     }
 
     fn depth(&self) -> f64 {
