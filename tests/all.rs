@@ -14,6 +14,8 @@ mod cli;
 mod command;
 #[path = "all/compare.rs"]
 mod compare;
+#[path = "all/coverage.rs"]
+mod coverage;
 #[path = "all/cutters.rs"]
 mod cutters;
 #[path = "all/defects.rs"]

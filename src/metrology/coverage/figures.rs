@@ -88,11 +88,13 @@ impl CoverageFigures {
     }
 }
 
-/// A share as per cent, rounded down to what is never more than it is: 99.96 % is not 100 %.
+/// A share as per cent; what is not all of it is never told as 100 %.
 fn per_cent(share: f64) -> String {
     let percent = 100.0 * share;
-    let step = if (1.0..99.0).contains(&percent) { 1.0 } else { 100.0 };
-    format!("{}", (percent * step).floor() / step)
+    if (1.0..99.0).contains(&percent) {
+        return format!("{percent:.0}");
+    }
+    format!("{}", (percent * 100.0).floor() / 100.0)
 }
 
 /// A number with three digits that matter.
@@ -115,7 +117,7 @@ mod tests {
         };
         let figures = figures.summed();
         assert_eq!(figures.surface_mm2, 3900.0);
-        assert_eq!(figures.scope, "on 30 % of the surface; not judged: walls 1500 mm², facing away 1200 mm²");
+        assert_eq!(figures.scope, "on 31 % of the surface; not judged: walls 1500 mm², facing away 1200 mm²");
         let nearly =
             CoverageFigures { by_cells_mm2: 1000.0, hidden_mm2: 0.04, ..Default::default() }.summed();
         assert_eq!(nearly.scope, "on 99.99 % of the surface; not judged: hidden from above 0.0400 mm²");

@@ -20,7 +20,7 @@ use geometry::{Point2, Point3};
 use sim::Grid;
 use work::monitor::{Cancelled, Monitor};
 
-use super::along_normals::{Along, NetPlace, SweptVolume};
+use super::along_normals::{Along, NetPlace, Site, SweptVolume};
 use super::facing::{Facing, Judged, PlaceKind};
 use super::figures::{Limits, Measurement};
 use cutter::Cutter;
@@ -37,6 +37,9 @@ const STEEP: f64 = 0.2;
 
 /// A cell's centre sees the sheet of a place where it lies within this slope from the place's tangent plane.
 const SAME_SHEET: f64 = 0.25;
+
+/// Normals are the same where one less their product is less than this: rounding.
+const SAME_NORMAL: f64 = 1e-9;
 
 /// Triangles in a square of the longest side that is allowed, about: they are halved until no side is longer.
 const TRIANGLES_A_SQUARE: f64 = 3.0;
@@ -178,7 +181,15 @@ impl<'a> Coverage<'a> {
         let seen = |k: usize| {
             kinds[k] == PlaceKind::Facing && self.cells.is_some_and(|cells| cells.see(self.part, &places[k]))
         };
-        work::parallel::map(places.len(), |k| self.facing.is_judged(self.judged, kinds[k]) && !seen(k))
+        // A contact on an edge of a mesh has a normal between those of its facets, which are measured beside it.
+        let on_facet = |k: usize| match places[k].site {
+            Site::Facet { triangle, .. } => {
+                self.part.mesh().normal(triangle as usize).dot(&places[k].normal) > 1.0 - SAME_NORMAL
+            }
+            Site::Patch(_) => true,
+        };
+        let unseen = |k| self.facing.is_judged(self.judged, kinds[k]) && on_facet(k) && !seen(k);
+        work::parallel::map(places.len(), unseen)
     }
 }
 

@@ -1,0 +1,126 @@
+//! What a verdict covers: surface that upright tools see, walls, undersides, and parts of which nothing is measured.
+
+use millstream::geometry::Point3;
+use serde_json::Value;
+
+use crate::support::{number, run_scene, write_stl};
+
+/// Triangles of the faces of a box, outward.
+fn faces([x0, y0, z0]: [f64; 3], [x1, y1, z1]: [f64; 3]) -> Vec<[Point3; 3]> {
+    let corner = |k: usize| {
+        let pick = |bit: usize, a: f64, b: f64| if k >> bit & 1 == 1 { b } else { a };
+        Point3::new(pick(0, x0, x1), pick(1, y0, y1), pick(2, z0, z1))
+    };
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]].map(|t| t.map(corner))).collect()
+}
+
+/// A web 4 wide and 6 high under a plate of 16 by 4, 10 long: watertight.
+fn tee() -> Vec<[Point3; 3]> {
+    let profile = [[6, 0], [10, 0], [10, 6], [16, 6], [16, 10], [0, 10], [0, 6], [6, 6]];
+    let at = |k: usize, y: f64| Point3::new(f64::from(profile[k][0]), y, f64::from(profile[k][1]));
+    let sides = (0..8)
+        .map(|a| (a, (a + 1) % 8))
+        .flat_map(|(a, b)| [[at(a, 0.0), at(b, 10.0), at(a, 10.0)], [at(a, 0.0), at(b, 0.0), at(b, 10.0)]]);
+    let caps = [[0, 1, 2], [0, 2, 7], [7, 2, 5], [7, 5, 6], [2, 4, 5], [2, 3, 4]];
+    let ends = caps.iter().flat_map(|&[a, b, c]| {
+        [[at(a, 0.0), at(b, 0.0), at(c, 0.0)], [at(a, 10.0), at(c, 10.0), at(b, 10.0)]]
+    });
+    sides.chain(ends).collect()
+}
+
+/// Runs an upright zigzag over some triangles: exit status and the report of the run.
+fn run(triangles: &[[Point3; 3]], part: &str, further: &str) -> (i32, Value) {
+    let folder = tempfile::tempdir().unwrap();
+    write_stl(&folder.path().join("part.stl"), triangles);
+    let scene = folder.path().join("part.toml");
+    let text = format!(
+        "[part]\nfile = \"part.stl\"\n{part}\n[cutter]\nshape = \"ball\"\ndiameter = 6\n{further}\n\
+         [[toolpath]]\nstrategy = \"zigzag\"\nstepover = 0.4\n"
+    );
+    std::fs::write(&scene, text).unwrap();
+    run_scene(&scene)
+}
+
+/// The parts of the surface sum up to the whole.
+fn is_partition(coverage: &Value) {
+    let area = |key: &str| number(coverage, &format!("/{key}_mm2"));
+    let not_judged =
+        ["walls", "facing_away", "hidden", "outside_stock", "out_of_reach"].map(area).iter().sum::<f64>();
+    let measured = ["by_cells", "along_normals", "by_moves"].map(area).iter().sum::<f64>();
+    assert!((area("surface") - area("judged") - not_judged).abs() < 1e-9 * area("surface"), "{coverage:#}");
+    assert!((area("measured") - measured).abs() < 1e-9 && area("judged") == area("measured"), "{coverage:#}");
+}
+
+#[test]
+fn a_tee_passes_on_its_top_and_fails_as_a_whole() {
+    let (exit, report) = run(&tee(), "", "");
+    let path = &report["toolpaths"][0];
+    let coverage = &path["coverage"];
+    is_partition(coverage);
+    let walls = 10.0 * 2.0 * (6.0 + 4.0) + 2.0 * (4.0 * 6.0 + 16.0 * 4.0);
+    assert_eq!((exit, &path["verdict"]), (0, &Value::from("pass")));
+    for (key, exact) in [
+        ("/surface_mm2", 320.0 + walls),
+        ("/judged_mm2", 160.0),
+        ("/walls_mm2", walls),
+        ("/facing_away_mm2", 160.0),
+    ] {
+        assert!((number(coverage, key) - exact).abs() < 1e-3, "{key}: {coverage:#}");
+    }
+    assert_eq!(coverage["scope"], "on 23 % of the surface; not judged: walls 376 mm², facing away 160 mm²");
+
+    let (exit, report) = run(&tee(), "judge = \"all\"", "");
+    let path = &report["toolpaths"][0];
+    is_partition(&path["coverage"]);
+    assert_eq!(exit, 1);
+    let uncut: Vec<&Value> =
+        path["violations"].as_array().unwrap().iter().filter(|v| v["what"] == "uncut").collect();
+    assert_eq!(uncut.len(), 1, "{:#}", path["violations"]);
+    // The tool's radius is looked at; more stands there.
+    assert!((number(uncut[0], "/measured_mm") - 3.0).abs() < 1e-9, "{:#}", uncut[0]);
+    // Both sides of the web and both undersides; the other walls and the bottom end with the block.
+    let area = number(&path["coverage"], "/unseen/uncut/area_mm2");
+    assert!((area - 240.0).abs() < 12.0, "{area}");
+    assert_eq!(path["coverage"]["scope"], "");
+}
+
+#[test]
+fn the_walls_of_a_box_in_a_larger_block_are_uncut_and_hold_without_a_margin() {
+    let block = faces([0.0, 0.0, 0.0], [12.0, 10.0, 5.0]);
+    let (exit, report) = run(&block, "judge = \"all\"", "");
+    assert_eq!(exit, 0, "{:#}", report["toolpaths"][0]["violations"]);
+    let (exit, report) = run(&block, "judge = \"all\"", "[stock]\nmargin = 1.5");
+    let unseen = &report["toolpaths"][0]["coverage"]["unseen"];
+    assert_eq!(exit, 1);
+    assert!((number(unseen, "/uncut/max_height_mm") - 1.5).abs() < 1e-9, "{unseen:#}");
+    assert_eq!(run(&block, "", "[stock]\nmargin = 1.5").0, 0, "walls are not judged by default");
+}
+
+#[test]
+fn a_wave_is_judged_as_a_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("wave.toml");
+    let text = "[part]\nsurface = \"wave\"\namplitude = 1\nwavelength_x = 20\nx = [0, 10]\ny = [0, 10]\n\
+                [cutter]\nshape = \"ball\"\ndiameter = 6\n[[toolpath]]\nstrategy = \"zigzag\"\nstepover = 0.4\n";
+    std::fs::write(&scene, text).unwrap();
+    let (exit, report) = run_scene(&scene);
+    let coverage = &report["toolpaths"][0]["coverage"];
+    is_partition(coverage);
+    assert_eq!((exit, &coverage["scope"]), (0, &Value::from("")));
+    assert_eq!(coverage["by_cells_mm2"], coverage["surface_mm2"]);
+}
+
+#[test]
+fn a_soup_of_triangles_has_finite_figures_and_never_passes() {
+    let mut state = 5u64;
+    let mut random = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        20.0 * (state >> 11) as f64 / (1u64 << 53) as f64
+    };
+    let soup: Vec<[Point3; 3]> =
+        (0..300).map(|_| [0, 1, 2].map(|_| Point3::new(random(), random(), random()))).collect();
+    let (exit, report) = run(&soup, "", "[simulation]\ncell = 1.0\nerror_bound = 0.1");
+    assert_eq!(exit, 1);
+    is_partition(&report["toolpaths"][0]["coverage"]);
+}
