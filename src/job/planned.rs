@@ -6,12 +6,12 @@ use io::ProgramHeader;
 use io::gcode::{self, FiveAxisPost, MoveLines};
 use machine::kinematics::{JointPath, follow};
 use machine::{machining_time_turning, slow_corners};
-use metrology::contact_arcs;
+use metrology::{ContactArcs, finer_contact_arcs};
 use motion::Toolpath;
 use scene::{Scene, ToolpathRequest};
 use toolpath::{
     Correction, Engagement, OffsetDrive, OffsetSurface, Plan, PlanError, PlanSettings, PocketStrategy,
-    Strategy, Tilting, plan, plan_pocket, plan_tilted,
+    Strategy, Tilting, engagement, plan, plan_pocket, plan_tilted,
 };
 use work::monitor::Monitor;
 
@@ -19,6 +19,14 @@ use super::correction::CorrectionFigures;
 use super::pocket::limit_feed_by;
 use super::tool::{FixtureMesh, Tool};
 use super::{JobError, Session};
+
+/// How much finer the engagement is measured where its bound leaves open whether it keeps to its limit. More costs time and
+/// memory as its square.
+const FINER: usize = 4;
+
+/// Share of the turning that was asked for which axes are planned by: moves take the chord of the contact's way, which is
+/// shorter than the way.
+const TURNING_SHARE: f64 = 0.99;
 
 /// A planned toolpath as the machine runs it.
 #[derive(Debug)]
@@ -38,11 +46,18 @@ pub(crate) struct Planned {
 impl Planned {
     /// Time that the scene's machine takes, s.
     pub fn time(&self, scene: &Scene) -> f64 {
-        let turning =
-            self.joints.as_ref().zip(scene.five_axis.as_ref()).map_or_else(Vec::new, |(joints, machine)| {
-                joints.turning_times(&machine.kinematics, self.plan.path.len())
-            });
-        machining_time_turning(&self.plan.path, &scene.machine, &turning)
+        machining_time_turning(&self.plan.path, &scene.machine, &self.turning_times(scene))
+    }
+
+    /// Time that the rotary joints turn for at least, s; 0 on machines without.
+    pub fn turning(&self, scene: &Scene) -> f64 {
+        self.turning_times(scene).iter().sum()
+    }
+
+    fn turning_times(&self, scene: &Scene) -> Vec<f64> {
+        self.joints.as_ref().zip(scene.five_axis.as_ref()).map_or_else(Vec::new, |(joints, machine)| {
+            joints.turning_times(&machine.kinematics, self.plan.path.len())
+        })
     }
 }
 
@@ -87,7 +102,7 @@ impl Session {
         let keep = tool.keep_clear(&self.scene, &self.part, fixtures);
         let tilting = Tilting {
             axis: &axis.rule,
-            most_turning: axis.most_turning,
+            most_turning: axis.most_turning.map(|rate| TURNING_SHARE * rate),
             most_turning_across: axis.most_turning_across,
             interference: Some(&keep),
         };
@@ -144,9 +159,23 @@ impl Session {
             .grid_for(path.len(), &self.area(), &scene.simulation, &self.cells)
             .map_err(JobError::grid(scene))?;
         let left = budget.left_beside(path.len(), &cells.0);
-        let arcs = contact_arcs(path, &scene.cutter, self.top, left, monitor)?;
-        Ok(Some(limit_feed_by(path, &arcs, strategy, request.step, scene.cutter.radius())))
+        let radius = scene.cutter.radius();
+        let measured = |finer| finer_contact_arcs(path, &scene.cutter, self.top, finer, left, monitor);
+        let mut arcs = measured(1)?;
+        if strategy.engagement.is_some()
+            && is_open(&arcs, path, strategy.engagement_limit(request.step, radius))
+        {
+            arcs = measured(FINER)?;
+        }
+        Ok(Some(limit_feed_by(path, &arcs, strategy, request.step, radius)))
     }
+}
+
+/// Whether the bound of the greatest engagement leaves it open on which side of the limit, rad, it lies.
+fn is_open(arcs: &ContactArcs, path: &Toolpath, limit: f64) -> bool {
+    let greatest = engagement(path, &arcs.of_moves, limit).max;
+    let bound = arcs.bound(greatest);
+    greatest - bound <= limit && limit < greatest + bound
 }
 
 /// The path in the joints of the scene's five-axis machine, as its programs need it; `None` without one. The cutter, up to

@@ -22,7 +22,7 @@ pub(crate) struct Run<'a> {
     pub measured: &'a Measured,
     /// The tool.
     pub tool: &'a Tool,
-    /// What it must not touch, where the engine knows tools that lean.
+    /// What it must not touch.
     pub fixtures: &'a [FixtureMesh],
 }
 

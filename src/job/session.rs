@@ -144,7 +144,7 @@ impl Session {
         let scene = &self.scene;
         let engine = self.engine(request)?;
         let tool = Tool::of(scene);
-        let fixtures = if engine.tilts() { self.fixtures()? } else { Vec::new() };
+        let fixtures = self.fixtures()?;
         let planned = self.plan_in_rounds(request, (&tool, &fixtures), engine, monitor)?;
         let begun = Instant::now();
         let mut measured = self.measure(request, engine, &planned.plan.path, monitor)?;

@@ -37,7 +37,8 @@ impl Tool {
         let depth = 0.5 * scene.tolerance.gouge + part.mesh_deviation();
         let clear = |solid, obstacle| Check { solid, obstacle, needed: keep.clearance };
         let mut checks = vec![Check { solid: &self.cutter, obstacle, needed: -depth }];
-        checks.extend(self.holder.as_ref().map(|solid| clear(solid, obstacle)));
+        let off = keep.clearance + part.mesh_deviation();
+        checks.extend(self.holder.as_ref().map(|solid| Check { solid, obstacle, needed: off }));
         for (mesh, bvh) in fixtures {
             let solids = std::iter::once(&self.cutter).chain(&self.holder);
             checks.extend(solids.map(|solid| clear(solid, Obstacle::new(mesh, bvh))));

@@ -5,7 +5,8 @@
 //! controls that look ahead too little and for people who read programs. The speeds are the limits by which
 //! machining time is told ([`super::time`]), rounded up to a series of feeds, so that the words are few and
 //! slow the model down nowhere but at sharp corners. There the last and the first piece of the way, as long
-//! as braking takes, are moves of their own at the corner's speed.
+//! as braking takes, are moves of their own at the corner's speed. Where the tool turns back on its way that speed is zero,
+//! which no word can ask for: none is below [`Machine::creep_feed`], but for feeds that are lower from the start.
 
 use super::Machine;
 use super::time::{Block, profile};
@@ -69,7 +70,11 @@ fn slowed(
     ends: [Option<f64>; 2],
     machine: &Machine,
 ) {
-    let feed = in_series(peak, block.feed) * SECONDS_PER_MINUTE;
+    let word = |speed: f64| {
+        let least = (machine.creep_feed() / SECONDS_PER_MINUTE).min(block.feed);
+        in_series(speed.max(least), block.feed) * SECONDS_PER_MINUTE
+    };
+    let feed = word(peak);
     let feed = if feed < step.feed_rate { feed } else { step.feed_rate };
     // As far as braking from the feed to the corner takes.
     let zone = |corner: f64| (block.feed * block.feed - corner).max(0.0) / (2.0 * machine.acceleration);
@@ -81,13 +86,12 @@ fn slowed(
     if zones[0] + zones[1] >= block.length {
         return push(block.length, feed);
     }
-    let slow = |corner: f64| in_series(corner.sqrt(), block.feed) * SECONDS_PER_MINUTE;
     if let Some(corner) = ends[0] {
-        push(zones[0], slow(corner).min(feed));
+        push(zones[0], word(corner.sqrt()).min(feed));
     }
     push(block.length - zones[1], feed);
     if let Some(corner) = ends[1] {
-        push(block.length, slow(corner).min(feed));
+        push(block.length, word(corner.sqrt()).min(feed));
     }
 }
 
@@ -144,6 +148,26 @@ mod tests {
         let mut words: Vec<f64> = slow.moves.iter().map(|m| m.feed_rate).collect();
         words.dedup();
         assert!(words.len() < 20, "{words:?}");
+    }
+
+    #[test]
+    fn a_way_back_is_run_no_slower_than_the_machine_creeps() {
+        let speck = 3.6e-15;
+        let ways: [&[[f64; 3]]; 3] = [
+            &[[0.0; 3], [30.0, 0.0, 0.0], [0.0; 3]],
+            // What rounding leaves of a move, across the way.
+            &[[0.0; 3], [30.0, 0.0, 0.0], [30.0, speck, 0.0], [60.0, 0.0, 0.0]],
+            &[[0.0; 3], [2e-6, 0.0, 0.0], [0.0; 3], [2e-6, 0.0, 0.0], [9.0, 0.0, 0.0]],
+        ];
+        for way in ways {
+            let path = path(way.iter().copied());
+            let slow = slow_corners(&path, &MACHINE);
+            let least = slow.moves.iter().map(|m| m.feed_rate).fold(f64::INFINITY, f64::min);
+            assert!(least >= MACHINE.creep_feed() * (1.0 - 1e-9), "{least} in {way:?}");
+            // A zone is as long as braking takes: at its word it lasts no longer than that of the sharpest corner by far.
+            let (before, after) = (machining_time(&path, &MACHINE), machining_time(&slow, &MACHINE));
+            assert!(after < before + 10.0 && after >= before * (1.0 - 1e-9), "{before} {after}");
+        }
     }
 
     proptest! {

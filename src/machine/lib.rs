@@ -9,7 +9,7 @@ pub mod kinematics;
 mod time;
 
 pub use feeds::slow_corners;
-pub use time::{machining_time, machining_time_turning};
+pub use time::{at_most, machining_time, machining_time_turning};
 
 /// Limits of the machine's motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,6 +54,12 @@ pub struct MachineError {
 }
 
 impl Machine {
+    /// The feed, mm/min, from which the machine stops within its junction deviation: `√(2·a·δ)`. Programs ask for no less at
+    /// corners, however sharp; what the control still brakes there takes no longer than the corner itself.
+    pub fn creep_feed(&self) -> f64 {
+        60.0 * (2.0 * self.acceleration * self.junction_deviation).sqrt()
+    }
+
     /// Refuses limits with which no time could be told.
     ///
     /// # Errors
@@ -75,6 +81,13 @@ impl Machine {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_machine_stops_from_its_creep_feed_within_the_junction_deviation() {
+        let machine = Machine::default();
+        let speed = machine.creep_feed() / 60.0;
+        assert!((speed * speed / (2.0 * machine.acceleration) - machine.junction_deviation).abs() < 1e-15);
+    }
 
     #[test]
     fn limits_are_checked() {

@@ -27,6 +27,10 @@ use motion::{Move, MoveKind, Toolpath};
 
 const SECONDS_PER_MINUTE: f64 = 60.0;
 
+/// Moves no longer than this, mm, are what rounding leaves of none: programs are written to a ten-thousandth, so that no
+/// control sees them, and the way before them goes on behind them. A greater length would hide bends.
+const NO_MOVE: f64 = 1e-9;
+
 /// A move with a length, in mm and s.
 pub(super) struct Block {
     /// Its index in the path.
@@ -52,7 +56,7 @@ impl Block {
     }
 }
 
-/// Time for the whole path, s. Moves of no length take none. Infinite when a move has no positive feed
+/// Time for the whole path, s. Moves of no length, or of no more than a millionth of a micrometre, take none. Infinite when a move has no positive feed
 /// or `machine` fails its [`Machine::check`].
 ///
 /// # Tolerance
@@ -75,6 +79,17 @@ pub fn machining_time_turning(path: &Toolpath, machine: &Machine, turning: &[f64
     moving + standing
 }
 
+/// Time, s, that no path takes longer than, whose feeds lie between `slowest` and `fastest`, mm/min: from rest to rest each
+/// move takes `l/v + v/a` or less. Rapids go at the rapid rate.
+pub fn at_most(path: &Toolpath, machine: &Machine, [slowest, fastest]: [f64; 2]) -> f64 {
+    let one = |(from, to, step): (geometry::Point3, geometry::Point3, &Move)| {
+        let slowest = if step.kind == MoveKind::Rapid { machine.rapid_rate } else { slowest };
+        let ramps = fastest / (SECONDS_PER_MINUTE * machine.acceleration);
+        (to - from).norm() * SECONDS_PER_MINUTE / slowest + ramps
+    };
+    path.segments().map(one).sum()
+}
+
 /// The moves that have a length, with their speeds; `None` when no time can be told. `turning` as in
 /// [`machining_time_turning`].
 pub(super) fn profile(path: &Toolpath, machine: &Machine, turning: &[f64]) -> Option<Vec<Block>> {
@@ -88,7 +103,7 @@ pub(super) fn profile(path: &Toolpath, machine: &Machine, turning: &[f64]) -> Op
         if !(turning >= 0.0 && turning.is_finite()) {
             return None;
         }
-        if length == 0.0 {
+        if length <= NO_MOVE {
             stood |= turning > 0.0;
             continue;
         }
@@ -205,6 +220,9 @@ mod tests {
     fn nothing_takes_no_time_and_no_feed_takes_for_ever() {
         assert_eq!(time([[1.0; 3]]), 0.0);
         assert_eq!(time([[1.0; 3], [1.0; 3]]), 0.0);
+        // What rounding leaves across a way does not stop the machine.
+        let speck = [[0.0; 3], [50.0, 0.0, 0.0], [50.0, 3.6e-15, 0.0], [100.0, 0.0, 0.0]];
+        assert_relative_eq!(time(speck), 1.1, epsilon = 1e-12);
         let mut standing = path([[0.0; 3], [1.0, 0.0, 0.0]]);
         standing.moves[0].feed_rate = 0.0;
         assert_eq!(machining_time(&standing, &MACHINE), f64::INFINITY);
@@ -257,6 +275,20 @@ mod tests {
             // Between two corners the machine gains a·l/2 of v² and brakes again.
             assert_relative_eq!(got, expected, max_relative = 1.6 / f64::from(chords));
         }
+    }
+
+    #[test]
+    fn no_path_takes_longer_than_from_rest_to_rest_at_the_lowest_feed() {
+        let mut zigzag = path((0..50).map(|k| [f64::from(k % 7), f64::from(k * k % 11), f64::from(k % 3)]));
+        for (k, step) in zigzag.moves.iter_mut().enumerate() {
+            step.feed_rate = 100.0 + 100.0 * k as f64;
+            step.kind = if k % 10 == 0 { MoveKind::Rapid } else { MoveKind::Cut };
+        }
+        let most = at_most(&zigzag, &MACHINE, [100.0, 12_000.0]);
+        assert!(machining_time(&zigzag, &MACHINE) < most);
+        // One long move at the lowest feed takes nearly that.
+        let long = path([[0.0; 3], [1000.0, 0.0, 0.0]]);
+        assert_relative_eq!(at_most(&long, &MACHINE, [6000.0, 6000.0]), machining_time(&long, &MACHINE));
     }
 
     #[test]

@@ -32,7 +32,7 @@ const BYTES_PER_CELL: u64 = 8;
 /// wall beside it is never seen.
 const INSIDE: f64 = 1.0;
 
-/// Places on the front half circle.
+/// Places on the front half circle; so many times more of them where cells are so many times finer.
 const PLACES: usize = 256;
 
 /// The path is gone along by steps of this share of the radius at most.
@@ -45,12 +45,14 @@ pub struct ContactArcs {
     pub of_moves: Vec<f64>,
     /// Layers of stock up to this thickness may not be seen, over the cutter's radius.
     pub unseen_layer: f64,
+    /// Places on the front half of the circumference that were looked at.
+    pub places: usize,
 }
 
 impl ContactArcs {
     /// By how much a measured `angle` beside a straight wall may be off, rad.
     pub fn bound(&self, angle: f64) -> f64 {
-        (angle.cos() - self.unseen_layer).max(-1.0).acos() - angle + PI / PLACES as f64
+        (angle.cos() - self.unseen_layer).max(-1.0).acos() - angle + PI / self.places as f64
     }
 }
 
@@ -62,6 +64,8 @@ struct Ground {
     ny: usize,
     lowest: Vec<f32>,
     when: Vec<f32>,
+    /// Looked at on the front half circle.
+    places: usize,
 }
 
 /// The angles along `path` in a stock whose flat top is at `top`, mm. The cells take no more than `memory` bytes; fewer of
@@ -80,10 +84,25 @@ pub fn contact_arcs(
     memory: u64,
     monitor: &dyn Monitor,
 ) -> Result<ContactArcs, Cancelled> {
+    finer_contact_arcs(path, cutter, top, 1, memory, monitor)
+}
+
+/// As [`contact_arcs`] on cells `finer` times smaller, as far as memory allows: the bound shrinks about as much.
+///
+/// # Errors
+/// [`Cancelled`] when the monitor says so.
+pub fn finer_contact_arcs(
+    path: &Toolpath,
+    cutter: &Cutter,
+    top: f64,
+    finer: usize,
+    memory: u64,
+    monitor: &dyn Monitor,
+) -> Result<ContactArcs, Cancelled> {
     /// Moves between two questions to the monitor.
     const MOVES: usize = 4096;
     let radius = cutter.radius();
-    let mut ground = Ground::around(path, radius, top, memory);
+    let mut ground = Ground::around(path, radius, top, finer, memory);
     let unseen_layer = (INSIDE + std::f64::consts::FRAC_1_SQRT_2) * ground.cell / radius;
     // The own chip is as thin as one likes beside the cutter: what was cut so shortly before counts.
     let fresh = radius * (2.5 * INSIDE * ground.cell / radius).sqrt();
@@ -108,11 +127,11 @@ pub fn contact_arcs(
         }
         ground.lower([b.xy(), b.xy()], radius, b.z, gone);
     }
-    Ok(ContactArcs { of_moves, unseen_layer })
+    Ok(ContactArcs { of_moves, unseen_layer, places: ground.places })
 }
 
 impl Ground {
-    fn around(path: &Toolpath, radius: f64, top: f64, memory: u64) -> Self {
+    fn around(path: &Toolpath, radius: f64, top: f64, finer: usize, memory: u64) -> Self {
         let first = path.start.tip.xy();
         let (lo, hi) = path
             .moves
@@ -122,10 +141,18 @@ impl Ground {
         let (lo, hi) = (lo - reach, hi + reach);
         let size = hi - lo;
         let most = ((memory / BYTES_PER_CELL) as f64).clamp(MIN_CELLS, MAX_CELLS);
-        let cell = (radius / CELLS_A_RADIUS).max((size.x * size.y / most).sqrt());
+        let cell = (radius / (CELLS_A_RADIUS * finer as f64)).max((size.x * size.y / most).sqrt());
         let (nx, ny) = ((size.x / cell).ceil() as usize + 1, (size.y / cell).ceil() as usize + 1);
         let lowest = vec![top as f32; nx * ny];
-        Self { origin: lo, cell, nx, ny, lowest, when: vec![f32::NEG_INFINITY; nx * ny] }
+        Self {
+            origin: lo,
+            cell,
+            nx,
+            ny,
+            lowest,
+            when: vec![f32::NEG_INFINITY; nx * ny],
+            places: PLACES * finer,
+        }
     }
 
     /// Angle in stock above `z` at `centre`; what was cut after `since` still counts.
@@ -139,8 +166,8 @@ impl Ground {
             let k = j.min(self.ny - 1) * self.nx + i.min(self.nx - 1);
             f64::from(self.lowest[k]) > z + ENGAGED || f64::from(self.when[k]) > since
         };
-        let part = PI / PLACES as f64;
-        let count = (0..PLACES).filter(|k| standing((*k as f64 + 0.5) * part - FRAC_PI_2)).count();
+        let part = PI / self.places as f64;
+        let count = (0..self.places).filter(|k| standing((*k as f64 + 0.5) * part - FRAC_PI_2)).count();
         count as f64 * part
     }
 
@@ -215,7 +242,7 @@ mod tests {
 
     fn check(found: &ContactArcs, k: usize, exact: f64) {
         let angle = found.of_moves[k];
-        let part = PI / PLACES as f64;
+        let part = PI / found.places as f64;
         let bound = found.bound(exact.min(angle)) + part;
         assert!((angle - exact).abs() <= bound, "move {k}: {angle} of {exact}, bound {bound}");
     }
@@ -293,11 +320,26 @@ mod tests {
         }
     }
 
+    #[test]
+    fn finer_cells_bound_the_angle_closer() {
+        let path = through(&[(-10.0, 0.0), (40.0, 0.0), (39.0, 1.5), (10.0, 1.5)]);
+        let arcs = |finer| {
+            finer_contact_arcs(&path, &Cutter::flat(6.0).unwrap(), 0.0, finer, u64::MAX, &Silent).unwrap()
+        };
+        let exact = 0.5f64.acos();
+        let [plain, fine] = [1, 4].map(arcs);
+        assert!(fine.bound(exact) < 0.3 * plain.bound(exact));
+        for found in [&plain, &fine] {
+            let part = PI / found.places as f64;
+            assert!((found.of_moves[3] - exact).abs() <= found.bound(exact) + part, "{}", found.of_moves[3]);
+        }
+    }
+
     /// What the cells say of the ground is what the engine's stock says.
     #[test]
     fn cells_are_lowered_as_by_the_engine() {
         let path = through(&[(0.0, 0.0), (7.0, 2.0), (3.0, 9.0), (3.0, 4.0)]);
-        let mut ground = Ground::around(&path, 3.0, 0.0, u64::MAX);
+        let mut ground = Ground::around(&path, 3.0, 0.0, 1, u64::MAX);
         for (a, b, _) in path.segments() {
             ground.lower([a.xy(), b.xy()], 3.0, a.z.max(b.z), 0.0);
             ground.lower([b.xy(), b.xy()], 3.0, b.z, 0.0);

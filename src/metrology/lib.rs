@@ -47,6 +47,7 @@ mod ridges;
 mod roughness;
 mod sections;
 mod tracks;
+mod turning;
 mod unseen;
 
 pub use along_normals::{
@@ -55,7 +56,7 @@ pub use along_normals::{
 };
 pub use coverage::{AlongTask, CellsSeen, Coverage, CoverageFigures};
 pub use cut_surface::CutSurface;
-pub use engagement::{ContactArcs, contact_arcs};
+pub use engagement::{ContactArcs, contact_arcs, finer_contact_arcs};
 pub use engines::{
     Budget, ENGINES, Engine, EngineChoice, EngineError, LaidOut, MIB, Measured, NormalView, REACH_OVER_UNCUT,
     Simulation, Task, View,
@@ -78,3 +79,4 @@ pub use removal::{RapidContactFigures, RemovalFigures, removal_figures, voxel_re
 pub use ridge_map::{RidgeMap, RidgePlace};
 pub use roughness::{RoughnessFigures, roughness};
 pub use sections::{SectionFigures, section_figures};
+pub use turning::{FastestTurn, fastest_turn};

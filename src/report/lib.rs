@@ -28,5 +28,5 @@ pub use result::{
     ToolpathReport, ToolpathResult,
 };
 pub use surface_mesh::{MAX_TRIANGLES, SurfaceMesh, VertexPlace, surface_mesh};
-pub use table::{bound, conclusion, micrometres, per_cent, result_table, with_bound};
+pub use table::{bound, conclusion, duration, micrometres, per_cent, result_table, with_bound};
 pub use verdict::{Claim, Gravity, Verdict, place};

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use ::machine::kinematics::{JointReport, Kinematics};
-use report::Figure;
+use report::{Claim, Figure, Gravity};
 use work::monitor::Monitor;
 
 use super::value;
@@ -62,8 +62,36 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
     Ok(Finding {
         figure: Some(figure),
         notes: note(&joints.report).into_iter().collect(),
-        ..Finding::default()
+        claims: within_travel(&five_axis.kinematics, &joints.report),
     })
+}
+
+/// Beyond a limit by so little, mm or degrees, a joint is at it.
+const ROUNDING: f64 = 1e-6;
+
+/// That the joints keep to their travels: one claim for those of the linear and one for those of the rotary joints that are
+/// limited.
+fn within_travel(kinematics: &Kinematics, report: &JointReport) -> Vec<Claim> {
+    let all = kinematics.letters().into_iter().zip(report.ranges).zip(kinematics.limits()).enumerate();
+    let beyond = all.filter_map(|(k, ((joint, range), limits))| {
+        let [least, greatest] = limits?;
+        let over = (least - range[0]).max(range[1] - greatest);
+        Some((k < 3, joint, if k < 3 { over } else { over.to_degrees() }))
+    });
+    let beyond: Vec<_> = beyond.collect();
+    let worst = |linear: bool| {
+        let of = beyond.iter().filter(|(kind, ..)| *kind == linear);
+        let (_, joint, over) = of.max_by(|a, b| a.2.total_cmp(&b.2))?;
+        let unit = if linear { "mm" } else { "degrees" };
+        let text = if *over <= ROUNDING {
+            format!("joint {joint} comes nearest to its limit, {:.3} {unit} inside of it", (-over).max(0.0))
+        } else {
+            format!("joint {joint} runs {over:.3} {unit} beyond its limit")
+        };
+        let claim = Claim::length("travel", Gravity::Crash, ROUNDING, *over, 0.0).told(text);
+        Some(Claim { unit: if linear { "mm" } else { "deg" }, ..claim })
+    };
+    [true, false].into_iter().filter_map(worst).collect()
 }
 
 /// What the user should know of how the machine moves.

@@ -3,6 +3,7 @@
 
 mod correction;
 mod coverage;
+mod feeds;
 mod field;
 mod holder;
 mod machine;
@@ -15,6 +16,7 @@ mod sections;
 mod shortest;
 mod solid;
 mod tool_contact;
+mod turning;
 
 use serde::Serialize;
 use serde_json::Value;
@@ -29,7 +31,7 @@ use super::run::{Finding, Run};
 type Find = fn(&Run<'_>, &dyn Monitor) -> Result<Finding, JobError>;
 
 /// All figures, in the order of report.json.
-const FIGURES: [Find; 14] = [
+const FIGURES: [Find; 16] = [
     coverage::find,
     shortest::find,
     correction::find,
@@ -44,6 +46,8 @@ const FIGURES: [Find; 14] = [
     offset::find,
     tool_contact::find,
     holder::find,
+    feeds::find,
+    turning::find,
 ];
 
 /// What all figures found.

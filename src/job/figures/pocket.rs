@@ -1,6 +1,7 @@
 //! Walls and engagement of a pocket.
 
 use metrology::{PocketFigures, View};
+use motion::{MoveKind, Toolpath};
 use report::{Claim, Figure, Gravity, micrometres, with_bound};
 use toolpath::PocketStrategy;
 use work::monitor::Monitor;
@@ -21,7 +22,9 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
     };
     let step = run.request.step;
     let p = pocket_figures(run.scene(), pocket, strategy, step, run.path(), cut, run.session.top, engaged);
-    let claims = vec![within_walls(run, &p)];
+    let mut claims = vec![within_walls(run, &p), ramps(run, strategy)];
+    claims.extend(strategy.engagement.map(|limit| engaged_within(run, &p, limit.to_degrees())));
+    claims.extend(strategy.stepdown.map(|limit| steps_down(run.path(), run.session.top, limit)));
     let figure = Figure { key: "pocket", value: value(&p)?, rows: rows(&p), ..Figure::default() };
     Ok(Finding { figure: Some(figure), claims, ..Finding::default() })
 }
@@ -65,4 +68,110 @@ fn within_walls(run: &Run<'_>, pocket: &PocketFigures) -> Claim {
         run.line(index)
     );
     Claim::length("wall", Gravity::Scrap, limit, measured, bound).told(text)
+}
+
+/// That passes keep to the engagement that the scene asks for.
+fn engaged_within(run: &Run<'_>, pocket: &PocketFigures, limit: f64) -> Claim {
+    let (measured, index) = (pocket.max_engagement_deg, pocket.max_engagement_move);
+    // No more of the circumference than the front half can cut.
+    let bound = pocket.max_engagement_error_bound_deg.min(180.0 - measured);
+    let text = format!(
+        "the greatest engagement is {measured:.1} ± {bound:.1} degrees (limit {limit:.1}), at move {index}{}; {:.2} % of the \
+         length are above the limit, at a lower feed",
+        run.program_line(index),
+        100.0 * pocket.over_engagement_limit_fraction
+    );
+    Claim { unit: "deg", ..Claim::length("engagement", Gravity::Scrap, limit, measured, bound) }.told(text)
+}
+
+/// Differences of heights, mm, and of slopes below which they are rounding.
+const ROUNDING: f64 = 1e-6;
+
+/// The levels to which a path cuts, mm, from the highest.
+fn levels(path: &Toolpath) -> Vec<f64> {
+    let cut = path.segments().filter(|(_, _, m)| m.kind == MoveKind::Cut);
+    let mut levels: Vec<f64> = cut.flat_map(|(a, b, _)| [a.z, b.z]).collect();
+    levels.sort_by(|a, b| b.total_cmp(a));
+    levels.dedup_by(|next, last| *last - *next <= ROUNDING);
+    levels
+}
+
+/// That no step goes deeper than the scene allows, from the top of the stock on.
+fn steps_down(path: &Toolpath, top: f64, limit: f64) -> Claim {
+    let mut from = top;
+    let step = |level: f64| std::mem::replace(&mut from, level) - level;
+    let deepest = levels(path).into_iter().map(step).fold(0.0, f64::max);
+    let measured = if deepest <= limit + ROUNDING { deepest.min(limit) } else { deepest };
+    let text = format!("the deepest step down is {deepest:.3} mm (limit {limit:.3})");
+    Claim::length("stepdown", Gravity::Scrap, limit, measured, 0.0).told(text)
+}
+
+/// That no way down through stock is steeper than the scene allows.
+fn ramps(run: &Run<'_>, strategy: &PocketStrategy) -> Claim {
+    let limit = strategy.ramp_angle.to_degrees();
+    let (steepest, index) = steepest(run.path(), run.session.top);
+    let text = match index {
+        None => "no way down cuts".to_owned(),
+        Some(k) => format!(
+            "the steepest way down is {steepest:.2} degrees (limit {limit:.2}), at move {k}{}",
+            run.program_line(k as u32)
+        ),
+    };
+    let measured = if steepest <= limit + ROUNDING { steepest.min(limit) } else { steepest };
+    Claim { unit: "deg", ..Claim::length("ramp", Gravity::Crash, limit, measured, 0.0) }.told(text)
+}
+
+/// The steepest way down below what the level above has cleared, degrees from level, and its move.
+fn steepest(path: &Toolpath, top: f64) -> (f64, Option<usize>) {
+    let levels = levels(path);
+    let mut found = (0.0, None);
+    for (k, (a, b, m)) in path.segments().enumerate() {
+        if m.kind != MoveKind::Plunge || a.z - b.z <= ROUNDING {
+            continue;
+        }
+        let cleared = levels.iter().rev().copied().find(|level| *level > b.z + ROUNDING).unwrap_or(top);
+        let slope = (a.z - b.z).atan2((b - a).xy().norm()).to_degrees();
+        if b.z < cleared.min(top) - ROUNDING && slope > found.0 {
+            found = (slope, Some(k));
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use geometry::Point3;
+    use motion::{ClPoint, Move};
+    use report::Verdict;
+
+    /// Down to -1 by a ramp of 45 degrees, on to -3 by a plunge.
+    fn path() -> Toolpath {
+        let to = |x: f64, z: f64, kind| {
+            let to = ClPoint::upright(Point3::new(x, 0.0, z));
+            Move { to, kind, feed_rate: 100.0, pass: 0 }
+        };
+        let moves = vec![
+            to(0.0, 0.0, MoveKind::Plunge),
+            to(1.0, -1.0, MoveKind::Plunge),
+            to(9.0, -1.0, MoveKind::Cut),
+            to(9.0, -3.0, MoveKind::Plunge),
+            to(0.0, -3.0, MoveKind::Cut),
+        ];
+        Toolpath::new(ClPoint::upright(Point3::new(0.0, 0.0, 5.0)), moves)
+    }
+
+    #[test]
+    fn steps_and_ways_down_are_measured_from_the_path() {
+        let path = path();
+        assert_eq!(levels(&path), [-1.0, -3.0]);
+        let claim = |limit| steps_down(&path, 0.0, limit);
+        assert_eq!((claim(2.0).verdict(), claim(1.9).verdict()), (Verdict::Pass, Verdict::Fail));
+        assert_eq!(claim(1.9).measured, Some(2.0));
+        // The way through air above the stock is no way down.
+        assert_eq!(steepest(&path, 0.0), (90.0, Some(3)));
+        let ramped = Toolpath::new(path.start, path.moves[..3].to_vec());
+        let (slope, index) = steepest(&ramped, 0.0);
+        assert!((slope - 45.0).abs() < 1e-12 && index == Some(1));
+    }
 }

@@ -1,6 +1,7 @@
 //! The finished path against part and fixtures, whatever its planner thought of it.
 
 use collision::{Check, Interference, Obstacle, Shortfall};
+use cutter::Solid;
 use metrology::View;
 use motion::{Move, MoveKind};
 use report::{Claim, Gravity, place};
@@ -10,24 +11,66 @@ use super::more_moves;
 use crate::JobError;
 use crate::run::{Finding, Run};
 
-/// That shank and holder touch neither part nor fixture, the cutter no fixture, nor the part while it is not cutting. Of
-/// tools that lean.
+/// That shank and holder touch neither part nor fixture, the cutter no fixture, nor the part while it is not cutting. How
+/// upright tools meet the part, gouges and holder are measured by.
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
-    let View::Normals(_) = run.view() else { return Ok(Finding::default()) };
+    let leans = matches!(run.view(), View::Normals(_));
+    if !leans && run.fixtures.is_empty() {
+        return Ok(Finding::default());
+    }
     monitor.start("looking for collisions", 0);
+    let mut found = contacts(run, of_fixtures(run), &|_| true);
+    if !leans {
+        return Ok(Finding { claims: vec![clear(&found, run, "fixture")], ..Finding::default() });
+    }
     let (tool, mesh_deviation) = (run.tool, run.part().mesh_deviation());
     let part = Obstacle::new(run.part().mesh(), run.part().bvh());
     let slack = -(run.scene().tolerance.gouge + mesh_deviation);
-    let check = |solid, obstacle, needed| Check { solid, obstacle, needed };
-    let mut always: Vec<Check> =
-        tool.holder.iter().map(|solid| check(solid, part, -mesh_deviation)).collect();
-    for (mesh, bvh) in run.fixtures {
-        let solids = std::iter::once(&tool.cutter).chain(&tool.holder);
-        always.extend(solids.map(|solid| check(solid, Obstacle::new(mesh, bvh), 0.0)));
-    }
-    let mut found = contacts(run, always, &|_| true);
-    found.extend(contacts(run, vec![check(&tool.cutter, part, slack)], &|to| to.kind == MoveKind::Rapid));
-    Ok(Finding { claims: vec![clear(&found, run)], ..Finding::default() })
+    let check = |solid, needed| Check { solid, obstacle: part, needed };
+    let holder = tool.holder.iter().map(|solid| check(solid, -mesh_deviation)).collect();
+    found.extend(contacts(run, holder, &|_| true));
+    found.extend(contacts(run, vec![check(&tool.cutter, slack)], &|to| to.kind == MoveKind::Rapid));
+    let mut claims = vec![clear(&found, run, "part or fixture")];
+    claims.extend(tool.holder.as_ref().map(|holder| kept_away(run, holder)));
+    Ok(Finding { claims, ..Finding::default() })
+}
+
+/// Cutter and holder against all fixtures.
+fn of_fixtures<'a>(run: &Run<'a>) -> Vec<Check<'a>> {
+    let solids = || std::iter::once(&run.tool.cutter).chain(&run.tool.holder);
+    let of_one = |(mesh, bvh)| {
+        let obstacle = Obstacle::new(mesh, bvh);
+        solids().map(move |solid| Check { solid, obstacle, needed: 0.0 })
+    };
+    run.fixtures.iter().map(|(mesh, bvh)| (mesh, bvh)).flat_map(of_one).collect()
+}
+
+/// Differences of distances that the search along moves leaves open, mm.
+const RESOLUTION: f64 = 2e-5;
+
+/// That shank and holder stay as far from part and fixtures as the scene asks for.
+fn kept_away(run: &Run<'_>, holder: &Solid) -> Claim {
+    let (asked, off) = (run.scene().keep_clear.clearance, run.part().mesh_deviation());
+    let part = Obstacle::new(run.part().mesh(), run.part().bvh());
+    // The part itself may stand off its triangles by so much.
+    let mut checks = vec![Check { solid: holder, obstacle: part, needed: asked + off }];
+    let of_fixture = |(mesh, bvh)| Check { solid: holder, obstacle: Obstacle::new(mesh, bvh), needed: asked };
+    checks.extend(run.fixtures.iter().map(|(mesh, bvh)| (mesh, bvh)).map(of_fixture));
+    let found = contacts(run, checks, &|_| true);
+    let missing = |hit: &Shortfall| hit.depth - if hit.check == 0 { off } else { 0.0 };
+    let worst = found.iter().reduce(|a, b| if missing(&b.1) > missing(&a.1) { b } else { a });
+    let claim = |missing, bound| Claim::length("clearance", Gravity::Crash, RESOLUTION, missing, bound);
+    let Some((index, hit, _)) = worst else {
+        return claim(0.0, 0.0).told(format!("shank and holder stay {asked:.3} mm off part and fixtures"));
+    };
+    let (missing, bound) = (missing(hit), if hit.check == 0 { off } else { 0.0 });
+    let text = format!(
+        "shank and holder miss {missing:.4} ± {bound:.4} mm of their clearance of {asked:.3} mm at {}, move {index}{}{}",
+        place(hit.nearest.place.into()),
+        run.program_line(*index as u32),
+        more_moves(found.len())
+    );
+    claim(missing, bound).told(text)
 }
 
 /// What the chosen moves touch: the move, what is missing there, and what of the tool it is.
@@ -44,15 +87,15 @@ fn contacts<'a>(
     found.into_iter().map(|(k, hit)| (k, hit, whose[hit.check])).collect()
 }
 
-fn clear(found: &[(usize, Shortfall, &str)], run: &Run<'_>) -> Claim {
+fn clear(found: &[(usize, Shortfall, &str)], run: &Run<'_>, what_not: &str) -> Claim {
     let claim = |depth| Claim::length("collision", Gravity::Crash, 0.0, depth, 0.0);
     let deepest = found.iter().reduce(|a, b| if b.1.depth > a.1.depth { b } else { a });
     let Some((index, worst, what)) = deepest else {
-        return claim(0.0).told("no part of the tool that does not cut touches part or fixture".into());
+        return claim(0.0).told(format!("no part of the tool that does not cut touches a {what_not}"));
     };
     let at = worst.nearest.place;
     let text = format!(
-        "{what} runs at least {:.3} mm into part or fixture at {}, move {index}{}{}",
+        "{what} runs at least {:.3} mm into {what_not} at {}, move {index}{}{}",
         worst.depth,
         place(at.into()),
         run.program_line(*index as u32),

@@ -31,6 +31,7 @@ use super::figures::{
 use super::pairs::{PairTally, RidgeCrossing, pair_figures};
 use super::ridges::{Highest, scallop_figures};
 use super::tracks::Tracks;
+use super::turning::contact as contact_of;
 use closer::{Greatest, MOST_DIVIDED};
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
@@ -400,9 +401,6 @@ fn with_lengths(mut found: Vec<Crossing>) -> Vec<Crossing> {
     found
 }
 
-/// Rounds in which the place where a tilted cutter touches is found: each takes the normal of the one before.
-const CONTACT_ROUNDS: usize = 4;
-
 /// Where a cutting move touches the part, at its middle and its end; nothing where it is farther off than `spacing`.
 fn contacts_of(part: &Part, cutter: &Cutter, path: &Toolpath, k: usize, spacing: f64) -> Vec<NetPlace> {
     let step = &path.moves[k];
@@ -411,13 +409,7 @@ fn contacts_of(part: &Part, cutter: &Cutter, path: &Toolpath, k: usize, spacing:
     }
     let from = path.location_before(k);
     let contact = |t: f64| {
-        let at = from.towards(&step.to, t);
-        let mut foot = part.closest_point(&(at.tip + at.axis * cutter.profile().centre_z)).0;
-        let mut off = f64::INFINITY;
-        for _ in 0..CONTACT_ROUNDS {
-            let contact = at.tip - cutter.contact_to_tip_along(&foot.normal, &at.axis);
-            (foot, off) = part.closest_point(&contact);
-        }
+        let (foot, off) = contact_of(part, cutter, &from.towards(&step.to, t));
         (off.abs() <= spacing).then(|| NetPlace::at_foot(&foot))
     };
     [0.5, 1.0].into_iter().filter_map(contact).collect()

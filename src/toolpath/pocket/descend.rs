@@ -17,7 +17,7 @@ const ABOVE: f64 = 0.5;
 /// A ramp shorter than this, mm, is a plunge.
 const LEAST_RAMP: f64 = 0.5;
 
-/// Depths below which a difference is rounding, mm.
+/// Depths and ways below which a difference is rounding, mm.
 const ROUNDING: f64 = 1.0e-9;
 
 /// The floors of the steps, mm, from the first to the last.
@@ -40,6 +40,9 @@ pub(super) fn floors(depth: f64, strategy: &PocketStrategy) -> Vec<f64> {
 pub(super) fn shortened(points: &[Point2], tolerance: f64, longest: f64, turn: f64) -> Vec<Point2> {
     const MAX_SKIP: usize = 200;
     let least = turn.cos() - ROUNDING;
+    let mut points = points.to_vec();
+    // Where loops and helices are joined, rounding leaves sides of no length and any direction.
+    points.dedup_by(|next, last| (*next - *last).norm() <= ROUNDING);
     let Some(&first) = points.first() else { return Vec::new() };
     let mut out = vec![first];
     let mut from = 0;
@@ -80,10 +83,11 @@ impl Writer<'_> {
     fn to(&mut self, tip: Point3, kind: MoveKind, feed_rate: f64) {
         if self.start.is_none() {
             self.start = Some(tip);
-        } else if self.at != Some(tip) {
+            self.at = Some(tip);
+        } else if self.at.is_none_or(|at| (tip - at).norm() > ROUNDING) {
             self.moves.push(Move { to: ClPoint::upright(tip), kind, feed_rate, pass: self.pass });
+            self.at = Some(tip);
         }
-        self.at = Some(tip);
     }
 }
 

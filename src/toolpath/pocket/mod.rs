@@ -21,7 +21,7 @@ mod turning;
 mod way;
 
 use cleared::Cleared;
-pub use feed::{Engagement, engagement, engagement_angle, limit_feed};
+pub use feed::{Engagement, LEAST_SHARE, engagement, engagement_angle, limit_feed};
 use nest::NestError;
 use route::{Entry, Run};
 pub use strategy::{Flow, Pattern, PocketStrategy, read_pocket_step};

@@ -45,6 +45,10 @@ fn bounded_passes_keep_to_their_engagement() {
         let pocket = Pocket { region, depth: 3.0 };
         let greatest = |engagement: Option<f64>| {
             let found = plan(&pocket, diameter, pattern, engagement).path;
+            assert!(
+                found.segments().all(|(a, b, _)| (b - a).norm() > 1e-9),
+                "{pattern:?}: a move without length"
+            );
             let arcs =
                 contact_arcs(&found, &Cutter::flat(diameter).unwrap(), 0.0, u64::MAX, &Silent).unwrap();
             let cut = found.moves.iter().zip(&arcs.of_moves).filter(|(m, _)| m.kind == MoveKind::Cut);
