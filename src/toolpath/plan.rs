@@ -162,12 +162,9 @@ fn passes(setup: &Setup<'_>, strategy: &dyn Strategy, axis: Option<&ToolAxis>) -
     strategy.passes(&task)
 }
 
-/// The distance of passes less what chords and facets take of a scallop target; what is measured and corrected needs none of that.
+/// The distance of passes less what chords and facets take of a scallop target.
 fn charged_step(task: &Task<'_>, strategy: &dyn Strategy, settings: &PlanSettings) -> Step {
     let Step::Scallop(h) = settings.step else { return settings.step };
-    if settings.correction.is_some() {
-        return settings.step;
-    }
     let fitted = !strategy.on_facets(task) && !task.wants_mesh;
     let smooth = !task.part.patches().is_empty();
     let facets = if smooth { 0.0 } else { facet_charge(task.part.mesh(), fitted, h) };

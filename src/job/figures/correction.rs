@@ -10,8 +10,8 @@ use crate::run::{Finding, Run};
 /// What the word means.
 const MEANING: (&str, &str) = (
     "correction",
-    "A plan is cut and its ridges are measured. Where they exceed the target, passes are moved together; where they could be \
-     higher, apart. Then the path is planned again, up to three times, and the best plan is kept.",
+    "A plan is cut and its ridges are measured. Where they exceed the target, passes are moved together; where none comes \
+     near it, apart. Then the path is planned again, up to three plans in all, and the best one is kept.",
 );
 
 pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> {

@@ -14,8 +14,10 @@ use geometry::Point3;
 const MOST_COLUMNS: f64 = 4e6;
 
 /// Factors of the distance of passes over a surface.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Correction {
+    /// The factor where nothing was measured, by which all others are multiplied too.
+    everywhere: f64,
     /// Edge of a cube, mm.
     edge: f64,
     /// Least corner of the first cube, mm.
@@ -26,6 +28,13 @@ pub struct Correction {
     begin: Vec<u32>,
     /// Level and factor of each cube, by column and level.
     cubes: Vec<(i32, f64)>,
+}
+
+impl Default for Correction {
+    fn default() -> Self {
+        let (origin, count) = (Point3::origin(), [0; 2]);
+        Self { everywhere: 1.0, edge: 1.0, origin, count, begin: Vec::new(), cubes: Vec::new() }
+    }
 }
 
 impl Correction {
@@ -72,7 +81,7 @@ impl Correction {
     /// The factor at a place.
     pub fn at(&self, p: &Point3) -> f64 {
         if self.cubes.is_empty() {
-            return 1.0;
+            return self.everywhere;
         }
         // From the centre of a cube to that of the next.
         let from = (p - self.origin) / self.edge - geometry::Vector3::repeat(0.5);
@@ -91,16 +100,21 @@ impl Correction {
             }
         }
         // Toward the edge of what was measured it fades to 1.
-        sum + (1.0 - weights)
+        self.everywhere * (sum + (1.0 - weights))
+    }
+
+    /// The same with all factors multiplied by one.
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self { everywhere: factor * self.everywhere, ..self.clone() }
     }
 
     /// Least and greatest factor.
     pub fn range(&self) -> [f64; 2] {
         if self.cubes.is_empty() {
-            return [1.0; 2];
+            return [self.everywhere; 2];
         }
         let factors = self.cubes.iter().map(|(_, factor)| *factor);
-        factors.fold([f64::INFINITY, 0.0], |[a, b], f| [a.min(f), b.max(f)])
+        factors.fold([f64::INFINITY, 0.0], |[a, b], f| [a.min(f), b.max(f)]).map(|f| f * self.everywhere)
     }
 
     fn cube(&self, p: &Point3) -> [i32; 3] {
@@ -145,6 +159,9 @@ mod tests {
         assert_eq!(field.at(&Point3::new(5.0, 20.0, 1.0)), 1.0);
         assert_eq!(field.at(&Point3::new(5.0, 2.0, 9.0)), 1.0);
         assert_eq!(field.range(), [0.9, 1.02]);
+        let wider = field.scaled(1.5);
+        assert!((wider.at(&Point3::new(5.0, 2.0, 1.0)) - 1.35).abs() < 1e-12);
+        assert_eq!(wider.at(&Point3::new(5.0, 20.0, 1.0)), 1.5);
         for (p, factor) in &places {
             assert!(field.at(p) <= factor + 1e-12, "{p} {factor}");
         }

@@ -59,8 +59,7 @@ pub struct PlanSettings {
     pub rapid_rate: f64,
     /// How passes are smoothed and joined.
     pub joining: Joining,
-    /// By what passes spaced for a scallop lie wider or narrower than by calculation. Where ridges are measured and corrected,
-    /// an empty one before the first measurement: nothing of the target is then kept back for chords and facets.
+    /// By what passes spaced for a scallop lie wider or narrower than by calculation.
     pub correction: Option<Arc<Correction>>,
 }
 
