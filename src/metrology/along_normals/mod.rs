@@ -224,7 +224,13 @@ impl Along<'_> {
         })?;
         let kept_contacts = keep(&contacts);
         let contacts = in_runs("measuring contacts", contacts.len(), monitor, |range| {
-            range.filter(|&k| kept_contacts[k]).map(|k| inspection.sample(contacts[k], None)).collect()
+            let mut near = None;
+            let of_one = |k: usize| {
+                let sample = inspection.sample(contacts[k], near.as_ref());
+                near = sample.hit.or(near);
+                sample
+            };
+            range.filter(|&k| kept_contacts[k]).map(of_one).collect()
         })?;
         let mut greatest = Greatest::default();
         let judged = || samples.iter().zip(kept).filter(|(_, kept)| **kept).map(|(sample, _)| sample);

@@ -16,6 +16,8 @@ mod near;
 mod pieces;
 mod unseen_cut;
 
+use std::collections::HashSet;
+
 use geometry::{Point2, Point3};
 use sim::Grid;
 use work::monitor::{Cancelled, Monitor};
@@ -26,7 +28,7 @@ use super::figures::{Limits, Measurement};
 use cutter::Cutter;
 pub use figures::CoverageFigures;
 use motion::Toolpath;
-use near::Near;
+use near::{Near, cube};
 use part::{Part, Patch, SurfacePoint};
 use pieces::Pieces;
 use unseen_cut::{UnseenCut, lowest_tip};
@@ -51,6 +53,10 @@ const PIECES: f64 = 6_000.0;
 /// more than a third.
 const TRIANGLES_A_HUNDRED_CELLS: f64 = 3.0;
 const LEAST_TRIANGLES: f64 = 4_000.0;
+
+/// Contacts of moves are looked at once in cubes of this share of the triangles' sides. A smaller share asks the same place for
+/// every chord of a pass; a greater one misses passes between passes.
+const CONTACT_SHARE: f64 = 0.25;
 
 /// Share of these triangles that are divided at most in search of extremes.
 const DIVIDED_SHARE: f64 = 0.1;
@@ -170,8 +176,9 @@ impl<'a> Coverage<'a> {
         let near = Near::new(&net.places, spacing + task.cutter.radius());
         let comes_near = |k: usize| near.is_passed(task.path, k, task.cutter);
         let all = vec![true; net.places.len()];
-        let (measured, _) =
-            along.measure(net, &all, &|places| self.are_unseen(places), &comes_near, monitor)?;
+        let contacts =
+            |places: &[NetPlace]| thinned(places, self.are_unseen(places), CONTACT_SHARE * spacing);
+        let (measured, _) = along.measure(net, &all, &contacts, &comes_near, monitor)?;
         Ok(Some((measured, spacing)))
     }
 
@@ -222,6 +229,18 @@ fn on_sheet(part: &Part, place: &NetPlace, q: &Point2) -> bool {
     let way = Point3::new(q.x, q.y, hit.z) - place.point;
     way.dot(&place.normal).abs()
         <= SAME_SHEET * way.norm() / (1.0 + SAME_SHEET * SAME_SHEET).sqrt() + part.mesh_deviation()
+}
+
+/// Those of the kept places that are the first of their facet or patch in a cube of a side, mm.
+fn thinned(places: &[NetPlace], kept: Vec<bool>, side: f64) -> Vec<bool> {
+    let mut taken = HashSet::new();
+    let owner = |place: &NetPlace| match place.site {
+        Site::Facet { triangle, .. } => triangle,
+        Site::Patch(at) => at.patch,
+    };
+    let first =
+        |(place, kept): (&NetPlace, bool)| kept && taken.insert((cube(&place.point, side), owner(place)));
+    places.iter().zip(kept).map(first).collect()
 }
 
 /// Area of the pieces whose corners are not all of their kind, mm².

@@ -34,6 +34,7 @@ impl Near {
     }
 }
 
-fn cube(point: &Point3, side: f64) -> [i64; 3] {
+/// The cube of a side, mm, that a point lies in.
+pub(super) fn cube(point: &Point3, side: f64) -> [i64; 3] {
     point.coords.map(|c| (c / side).floor() as i64).into()
 }
