@@ -15,8 +15,7 @@ fn prism(profile: &[[f64; 2]], length: f64, caps: &[[u32; 3]]) -> Part {
     let vertices = at(0.0).chain(at(length)).collect();
     let sides = (0..n).map(|k| (k, (k + 1) % n)).flat_map(|(a, b)| [[a, a + n, b + n], [a, b + n, b]]);
     let ends = caps.iter().flat_map(|&[a, b, c]| [[a, b, c], [a + n, c + n, b + n]]);
-    let (mesh, notes) =
-        TriangleMesh::new(vertices, sides.chain(ends).map(|[a, b, c]| [a, b, c]).collect()).unwrap();
+    let (mesh, notes) = TriangleMesh::new(vertices, sides.chain(ends).collect()).unwrap();
     assert!(mesh.is_closed(), "{notes:?}");
     Part::from_mesh(mesh)
 }
