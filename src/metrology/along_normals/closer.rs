@@ -6,7 +6,7 @@
 use std::collections::BinaryHeap;
 
 use super::ridges::Crossing;
-use super::{AlongNormal, NormalInspection, Sample};
+use super::{NormalInspection, Sample};
 use crate::figures::NUMERICAL_FLOOR;
 use geometry::Point3;
 use work::monitor::{self, Cancelled, Monitor};
@@ -59,28 +59,38 @@ pub(super) struct Greatest {
     pub deepest: Option<(Point3, u32)>,
     /// What the depth may be where it is uncertain.
     pub possible_depth: f64,
-    pub height: f64,
-    /// How much lower the highest place may be.
-    pub lower: f64,
+    /// The highest place that is uncut, with its height, mm, as far as ridges were known when it was found.
+    pub uncut: Option<(f64, Sample)>,
     /// The highest ridge, where it is, and how much lower it may be.
     pub ridge: Option<(f64, Point3, f64)>,
 }
 
 impl Greatest {
-    pub fn look_at(&mut self, sample: &Sample, engine: &dyn AlongNormal) {
-        let Some(hit) = sample.hit else {
-            let standing = sample.height(engine);
-            if standing > self.height {
-                (self.height, self.lower) = (standing, 0.0);
-            }
-            return;
-        };
+    pub fn look_at(&mut self, sample: &Sample) {
+        let Some(hit) = sample.hit else { return };
         self.possible_depth = self.possible_depth.max(hit.uncertain - hit.deviation);
         if -hit.deviation > self.depth {
             (self.depth, self.deepest) = (-hit.deviation, Some((sample.place.point, hit.by)));
-        } else if hit.deviation > self.height {
-            (self.height, self.lower) = (hit.deviation, hit.uncertain);
         }
+    }
+
+    /// As [`Greatest::look_at`], and whether it stands higher than what was known to be uncut.
+    pub fn look_at_height(&mut self, sample: &Sample, inspection: &NormalInspection<'_>) {
+        let height = sample.height(inspection.engine);
+        let higher = height > self.highest_uncut(inspection);
+        if higher && inspection.is_uncut(sample, self.highest_ridge()) {
+            self.uncut = Some((height, *sample));
+        }
+    }
+
+    /// Height of the highest ridge, mm; 0 without one.
+    pub fn highest_ridge(&self) -> f64 {
+        self.ridge.map_or(0.0, |(height, ..)| height)
+    }
+
+    /// What a place must exceed to be the highest that is uncut, mm.
+    fn highest_uncut(&self, inspection: &NormalInspection<'_>) -> f64 {
+        self.uncut.map_or(inspection.limits.uncut, |(height, _)| height)
     }
 
     pub fn look_at_ridge(&mut self, crossing: &Crossing) {
@@ -111,11 +121,13 @@ impl NormalInspection<'_> {
             let deeper = (slope * far).min(slope * slope * self.radius);
             // Nothing counts as deeper or higher than is looked, however steep a cut is.
             more = more.max((-hit.deviation + deeper).min(self.engine.depth()) - greatest.depth);
-            if hit.deviation > self.limits.uncut {
-                more = more.max((hit.deviation + slope * far).min(self.engine.reach()) - greatest.height);
+            // What is part of a scallop rises to its ridge, which promises for itself.
+            if self.is_uncut(sample, greatest.highest_ridge()) {
+                let height = greatest.highest_uncut(self);
+                more = more.max((hit.deviation + slope * far).min(self.engine.reach()) - height);
             }
         }
-        let highest = greatest.ridge.map_or(0.0, |(height, ..)| height);
+        let highest = greatest.highest_ridge();
         let possible = |c: &Crossing| (c.height + c.rise * longest).min(self.engine.reach().max(c.height));
         crossings.iter().fold(more, |more, c| more.max(possible(c) - highest))
     }
@@ -152,8 +164,11 @@ impl NormalInspection<'_> {
             let closer = work::parallel::map(batch.len(), |k| self.divided(&batch[k].samples));
             for (open, parts) in batch.iter().zip(closer) {
                 for (samples, Closer { middles, crossings }) in parts {
-                    middles.iter().for_each(|sample| greatest.look_at(sample, self.engine));
                     crossings.iter().for_each(|crossing| greatest.look_at_ridge(crossing));
+                    for sample in &middles {
+                        greatest.look_at(sample);
+                        greatest.look_at_height(sample, self);
+                    }
                     heap.extend(keep(samples, &crossings, open.depth + 1, greatest));
                 }
             }

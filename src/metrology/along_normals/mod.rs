@@ -13,10 +13,11 @@
 //! Engines by samples may miss what cuts between them: each place has a bound on how much deeper it may be cut
 //! ([`NormalHit::uncertain`]), which goes into the bounds of the figures.
 //!
-//! A place above the uncut tolerance is uncut here, also where it is half of a tall scallop.
+//! What stands above the uncut tolerance is uncut, unless it is a scallop (`reached`).
 
 mod closer;
 mod net;
+mod reached;
 mod regions;
 mod ridges;
 mod swept_volume;
@@ -39,7 +40,7 @@ use motion::Toolpath;
 pub(crate) use net::{Net, NetPlace, Site};
 pub use net::{PatchGrid, net_places};
 use part::Part;
-use regions::{areas, deviation_figures};
+use regions::{Standing, areas, deviation_figures};
 use ridges::{Crossing, Finder};
 pub(crate) use swept_volume::ball_beneath;
 pub use swept_volume::{FirstCut, RaysCut, SweptVolume, VoxelCut};
@@ -136,6 +137,8 @@ pub(crate) struct Along<'a> {
 
 struct NormalInspection<'a> {
     part: &'a Part,
+    cutter: &'a Cutter,
+    path: &'a Toolpath,
     engine: &'a dyn AlongNormal,
     finder: Finder<'a>,
     limits: &'a Limits,
@@ -192,7 +195,8 @@ impl Along<'_> {
         let corner = cutter.corner_radius();
         let radius = if corner > 0.0 { corner } else { cutter.radius() };
         let finder = Finder { part, engine, tracks: &tracks, radius };
-        let inspection = NormalInspection { part, engine, finder, limits, spacing, radius, most_divided };
+        let inspection =
+            NormalInspection { part, cutter, path, engine, finder, limits, spacing, radius, most_divided };
         let samples = in_runs("measuring along normals", net.places.len(), monitor, |range| {
             let mut near = None;
             let of_one = |place: &NetPlace| {
@@ -208,7 +212,7 @@ impl Along<'_> {
         let on_sides = in_runs("measuring ridges", sides.len(), monitor, |range| {
             sides[range].iter().map(|side| inspection.on_side(&side.map(|k| samples[k as usize]))).collect()
         })?;
-        let of_triangle = in_runs("joining ridges", triangles.len(), monitor, |range| {
+        let mut of_triangle = in_runs("joining ridges", triangles.len(), monitor, |range| {
             let of_one = |t: &[u32; 3]| {
                 let side = |k: usize| [t[k].min(t[(k + 1) % 3]), t[k].max(t[(k + 1) % 3])];
                 let found = (0..3)
@@ -232,16 +236,19 @@ impl Along<'_> {
             };
             range.filter(|&k| kept_contacts[k]).map(of_one).collect()
         })?;
+        let hollow = inspection.take_hollows(&mut of_triangle);
         let mut greatest = Greatest::default();
         let judged = || samples.iter().zip(kept).filter(|(_, kept)| **kept).map(|(sample, _)| sample);
-        contacts.iter().chain(judged()).for_each(|sample| greatest.look_at(sample, engine));
         of_triangle.iter().flatten().for_each(|crossing| greatest.look_at_ridge(crossing));
+        for sample in contacts.iter().chain(judged()) {
+            greatest.look_at(sample);
+            greatest.look_at_height(sample, &inspection);
+        }
         let pairs = pair_figures(part, cutter, path, tally(&of_triangle, cutter, spacing), monitor)?;
         let ridge_samples: Vec<[f32; 2]> =
             of_triangle.iter().flatten().map(|c| [c.height as f32, c.length as f32]).collect();
         let shares = areas(&net);
         let mut gouge = inspection.gouges(&net, &samples, &shares, kept);
-        let mut uncut = inspection.uncut(&net, &samples, &shares, kept);
         let deviation = deviation_figures(&samples, &shares, kept);
         let triangles = triangles
             .iter()
@@ -254,10 +261,8 @@ impl Along<'_> {
         if let (Some(first), Some((at, by))) = (gouge.regions.first_mut(), greatest.deepest) {
             (first.depth_mm, first.at_mm, first.move_index) = (greatest.depth, at.into(), by);
         }
-        if uncut.region_count > 0 {
-            uncut.max_height_mm = greatest.height;
-        }
-        uncut.error_bound_mm = left.max(0.0) + greatest.lower + NUMERICAL_FLOOR;
+        let standing = Standing { hollow, greatest: &greatest, left: left.max(0.0) };
+        let uncut = inspection.uncut(&net, &samples, &shares, kept, &standing);
         let highest = greatest.ridge.map(|(height, at, lower)| {
             // What is uncertain may be lower only, but a bound stands to both sides.
             Highest { height, at, possible: height + left.max(0.0) + lower }
@@ -298,6 +303,21 @@ impl NormalInspection<'_> {
         Sample { place, hit: self.engine.hit(&place.point, &place.normal, near) }
     }
 
+    /// Takes the ridges in hollows that the cutter does not fit, which are uncut; the highest of them.
+    fn take_hollows(&self, of_triangle: &mut [Vec<Crossing>]) -> Option<Crossing> {
+        let mut hollow: Option<Crossing> = None;
+        for crossings in of_triangle {
+            crossings.retain(|c| {
+                let scallop = self.is_scallop(c);
+                if !scallop && hollow.is_none_or(|other| c.height > other.height) {
+                    hollow = Some(*c);
+                }
+                scallop
+            });
+        }
+        hollow
+    }
+
     /// The ridges that cross the side between two places.
     fn on_side(&self, [a, b]: &[Sample; 2]) -> Vec<Crossing> {
         let mut found = Vec::new();
@@ -309,7 +329,10 @@ impl NormalInspection<'_> {
 
     /// The ridges that cross the sides of a triangle.
     fn crossings(&self, corners: &[Sample; 3]) -> Vec<Crossing> {
-        with_lengths((0..3).flat_map(|k| self.on_side(&[corners[k], corners[(k + 1) % 3]])).collect())
+        let mut found: Vec<Crossing> =
+            (0..3).flat_map(|k| self.on_side(&[corners[k], corners[(k + 1) % 3]])).collect();
+        found.retain(|crossing| self.is_scallop(crossing));
+        with_lengths(found)
     }
 }
 

@@ -2,12 +2,27 @@
 
 use std::collections::HashMap;
 
+use super::closer::Greatest;
 use super::net::Net;
+use super::ridges::Crossing;
 use super::{NormalInspection, Sample};
-use crate::figures::{DeviationFigures, GougeFigures, GougeRegion, UncutFigures, UncutRegion};
+use crate::figures::{
+    DeviationFigures, GougeFigures, GougeRegion, NUMERICAL_FLOOR, UncutFigures, UncutRegion,
+};
 
 /// Regions listed one by one in the figures; the rest is counted.
 const LISTED_REGIONS: usize = 20;
+
+/// What was found standing between the places.
+#[derive(Clone, Copy)]
+pub(super) struct Standing<'a> {
+    /// The highest ridge that is no scallop.
+    pub hollow: Option<Crossing>,
+    /// The greatest figures.
+    pub greatest: &'a Greatest,
+    /// How much they may be exceeded, mm.
+    pub left: f64,
+}
 
 impl NormalInspection<'_> {
     pub fn gouges(&self, net: &Net, samples: &[Sample], areas: &[f64], kept: &[bool]) -> GougeFigures {
@@ -34,13 +49,26 @@ impl NormalInspection<'_> {
         figures
     }
 
-    pub fn uncut(&self, net: &Net, samples: &[Sample], areas: &[f64], kept: &[bool]) -> UncutFigures {
+    /// What stands above the uncut tolerance and is no scallop.
+    pub fn uncut(
+        &self,
+        net: &Net,
+        samples: &[Sample],
+        areas: &[f64],
+        kept: &[bool],
+        standing: &Standing<'_>,
+    ) -> UncutFigures {
+        let Standing { hollow, greatest, left } = *standing;
+        let ridge = greatest.highest_ridge();
         let height = |k: u32| samples[k as usize].height(self.engine);
         let mut figures = UncutFigures::default();
         for region in connected(net, self.spacing, &|k| kept[k as usize] && height(k) > self.limits.uncut) {
             let Some(&highest) = region.iter().max_by(|a, b| height(**a).total_cmp(&height(**b))) else {
                 continue;
             };
+            if !self.is_uncut(&samples[highest as usize], ridge) {
+                continue;
+            }
             let area_mm2: f64 = region.iter().map(|&k| areas[k as usize]).sum();
             let volume_mm3 = region.iter().map(|&k| areas[k as usize] * height(k)).sum::<f64>();
             figures.area_mm2 += area_mm2;
@@ -52,11 +80,34 @@ impl NormalInspection<'_> {
                 at_mm: samples[highest as usize].place.point.into(),
             });
         }
+        let seen = figures.regions.iter().map(|r| r.height_mm).fold(0.0, f64::max);
+        // A hollow between places that are lower, all of them.
+        if let Some(c) = hollow.filter(|c| c.height > seen) {
+            let (area_mm2, volume_mm3) = (0.0, 0.0);
+            figures.regions.push(UncutRegion {
+                height_mm: c.height,
+                area_mm2,
+                volume_mm3,
+                at_mm: c.at.into(),
+            });
+        }
         let all: f64 = areas.iter().zip(kept).filter(|(_, kept)| **kept).map(|(area, _)| area).sum();
         figures.fraction = figures.area_mm2 / all.max(f64::MIN_POSITIVE);
         figures.region_count = figures.regions.len();
         figures.regions.sort_by(|a, b| b.height_mm.total_cmp(&a.height_mm));
         figures.regions.truncate(LISTED_REGIONS);
+        figures.max_height_mm = figures.regions.first().map_or(0.0, |r| r.height_mm);
+        figures.error_bound_mm = left + NUMERICAL_FLOOR;
+        if let Some((height, sample)) = &greatest.uncut {
+            let more = (height - figures.max_height_mm).max(0.0);
+            if self.is_uncut(sample, ridge) {
+                figures.max_height_mm += more;
+            } else if figures.region_count > 0 {
+                // It is part of a ridge that was found later; what is uncut below it was not looked for.
+                figures.error_bound_mm += more;
+            }
+            figures.error_bound_mm += sample.hit.map_or(0.0, |hit| hit.uncertain);
+        }
         figures
     }
 }

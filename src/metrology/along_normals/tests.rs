@@ -1,7 +1,7 @@
 use super::super::flat_scene::{path, plane};
 use super::*;
 use cutter::Solid;
-use geometry::{distance_to_segment, samples};
+use geometry::{TriangleMesh, distance_to_segment, samples};
 use motion::{ClPoint, Move, MoveKind};
 use part::Patch;
 use scallop::ball_scallop_height;
@@ -96,14 +96,64 @@ fn a_gouge_is_found_with_its_depth_area_and_move() {
     assert!((gouge.area_mm2 / (4.0 * width) - 1.0).abs() < 0.1, "{gouge:?}");
 }
 
+/// Passes along x with tips at these places across, in turns.
+fn along_x(tips: &[[f64; 2]]) -> Vec<Vec<Point3>> {
+    let pass = |(k, [y, z]): (usize, &[f64; 2])| {
+        let ends = if k % 2 == 0 { [-4.0, 8.0] } else { [8.0, -4.0] };
+        ends.map(|x| Point3::new(x, *y, *z)).to_vec()
+    };
+    tips.iter().enumerate().map(pass).collect()
+}
+
+/// A tall scallop is a bad scallop; no place of it is uncut, neither beside a missing pass nor everywhere.
 #[test]
-fn a_missing_pass_is_uncut() {
+fn tall_scallops_are_scallops() {
     let mut missing = passes(0.0);
     missing.drain(2..5);
-    let (measured, _) = measured(&plane([4.0, 3.0]), &path(&missing), 0.1);
-    let exact = RADIUS - (RADIUS * RADIUS - 1.0).sqrt();
-    assert!((measured.uncut.max_height_mm - exact).abs() < 1e-3, "{:?}", measured.uncut);
-    assert_eq!(measured.uncut.region_count, 1);
+    let even: Vec<[f64; 2]> = (0..3).map(|k| [1.5 * f64::from(k), 0.0]).collect();
+    for (passes, apart) in [(missing, 2.0f64), (along_x(&even), 1.5)] {
+        let (measured, _) = measured(&plane([4.0, 3.0]), &path(&passes), 0.1);
+        let exact = RADIUS - (RADIUS * RADIUS - 0.25 * apart * apart).sqrt();
+        assert!(exact > 0.09);
+        let (height, bound) = (measured.scallop.max_mm.unwrap(), measured.scallop.error_bound_mm.unwrap());
+        assert!((height - exact).abs() < 1e-6 && bound < 3e-4, "{height} ± {bound}, {exact}");
+        let uncut = &measured.uncut;
+        assert_eq!((uncut.region_count, uncut.area_mm2, uncut.max_height_mm), (0, 0.0, 0.0), "{uncut:?}");
+        assert!(uncut.error_bound_mm < 1e-3, "{uncut:?}");
+    }
+}
+
+/// Where no pass comes, and along the bottom of a right angle that the ball does not fit.
+#[test]
+fn what_no_pass_came_down_to_is_uncut() {
+    let half: Vec<[f64; 2]> = (0..4).map(|k| [0.5 * f64::from(k), 0.0]).collect();
+    let (bare, _) = measured(&plane([4.0, 6.0]), &path(&along_x(&half)), 0.1);
+    assert_eq!((bare.uncut.region_count, bare.uncut.max_height_mm), (1, 0.5), "{:?}", bare.uncut);
+    // From where the last pass rises above the tolerance on.
+    let width = 4.5 - (RADIUS * RADIUS - (RADIUS - 0.05f64).powi(2)).sqrt();
+    assert!((bare.uncut.area_mm2 / (4.0 * width) - 1.0).abs() < 0.05, "{:?}", bare.uncut);
+
+    let corners = [
+        [0.0, 0.0, 0.0],
+        [4.0, 0.0, 0.0],
+        [0.0, 6.0, 6.0],
+        [4.0, 6.0, 6.0],
+        [0.0, -6.0, 6.0],
+        [4.0, -6.0, 6.0],
+    ];
+    let triangles = vec![[0, 1, 2], [1, 3, 2], [0, 4, 1], [1, 4, 5]];
+    let part = Part::from_mesh(TriangleMesh::new(corners.map(Point3::from).to_vec(), triangles).unwrap().0);
+    // The centre goes down one wall and up the other, half a mm at a time.
+    let bottom = RADIUS * 2f64.sqrt() - RADIUS;
+    let down = |k: i32| f64::from(k.abs()) * 0.5 * 0.5f64.sqrt();
+    let tips: Vec<[f64; 2]> = (-8..=8).map(|k| [down(k).copysign(f64::from(k)), bottom + down(k)]).collect();
+    let (groove, _) = measured(&part, &path(&along_x(&tips)), 0.1);
+    // Along either wall's normal at the bottom, up to the ball that touches both.
+    let exact = RADIUS * (2f64.sqrt() - 1.0);
+    assert!(groove.uncut.max_height_mm > 0.4 && groove.uncut.max_height_mm <= exact * 2f64.sqrt());
+    assert!(groove.uncut.region_count >= 1 && groove.uncut.area_mm2 > 4.0, "{:?}", groove.uncut);
+    let scallop = groove.scallop.max_mm.unwrap();
+    assert!((scallop - (RADIUS - (RADIUS * RADIUS - 0.0625).sqrt())).abs() < 1e-4, "{scallop}");
 }
 
 /// Rings of constant latitude around a dome: sections across the feed are circles.
