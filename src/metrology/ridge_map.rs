@@ -5,7 +5,7 @@ use super::figures::{Limits, ScallopFigures};
 use super::inspection::{Inspection, Sample};
 use super::ridges::{RidgeFinder, scallop_figures};
 use cutter::Cutter;
-use geometry::Point3;
+use geometry::{Point2, Point3, Vector2};
 use motion::Toolpath;
 use part::Part;
 use sim::{Envelope, ZMap};
@@ -25,7 +25,7 @@ pub struct RidgePlace {
 pub struct RidgeMap {
     /// Their places, one where a ridge crosses from a cell to the next.
     pub places: Vec<RidgePlace>,
-    /// What stands along the part's borders, one place a cell, to first order.
+    /// What stands along the part's borders, one place a side of a cell.
     pub borders: Vec<RidgePlace>,
     /// Their figures, with the bound of the highest.
     pub scallop: ScallopFigures,
@@ -53,30 +53,40 @@ pub(super) fn ridge_map(
     Ok(RidgeMap { places, borders: borders(&inspection, &samples), scallop })
 }
 
-/// What stands at the outer side of the cells that lie at the part's border. What is higher than the uncut tolerance is no
+/// What stands at the outer sides of the cells that lie at the part's border. What is higher than the uncut tolerance is no
 /// remnant of a pass.
 fn borders(inspection: &Inspection<'_>, samples: &[Sample]) -> Vec<RidgePlace> {
-    let Inspection { grid, limits, part, .. } = *inspection;
-    let off = |i: Option<usize>, j: Option<usize>| match (i, j) {
-        (Some(i), Some(j)) if i < grid.nx && j < grid.ny => samples[grid.index(i, j)].deviation.is_nan(),
-        _ => true,
+    let Inspection { grid, limits, .. } = *inspection;
+    let on = |i: usize, j: usize| {
+        i < grid.nx && j < grid.ny && !samples[grid.index(i, j)].deviation.is_nan()
     };
-    let place = |k: usize| {
-        let (i, j, sample) = (k % grid.nx, k / grid.nx, &samples[k]);
-        let ends = off(i.checked_sub(1), Some(j))
-            || off(Some(i + 1), Some(j))
-            || off(Some(i), j.checked_sub(1))
-            || off(Some(i), Some(j + 1));
-        if sample.deviation.is_nan() || !ends {
-            return None;
+    let of_row = |j: usize| {
+        let mut found = Vec::new();
+        for i in (0..grid.nx).filter(|&i| on(i, j)) {
+            for (di, dj) in [(-1, 0), (1, 0), (0, -1), (0, 1)] {
+                // Before the first cell there is none: the index wraps around to one far beyond the last.
+                if !on(i.wrapping_add_signed(di), j.wrapping_add_signed(dj)) {
+                    found.extend(inspection.at_side(grid.centre(i, j), [di as f64, dj as f64]));
+                }
+            }
         }
-        let outward = 0.5 * grid.cell / f64::from(sample.lean).max(1e-3);
-        let height = f64::from(sample.deviation) + f64::from(sample.slope) * outward;
-        if height <= 0.0 || height > limits.uncut {
-            return None;
-        }
-        let centre = grid.centre(i, j);
-        Some(RidgePlace { at: part.highest_at(centre.x, centre.y)?.point, height })
+        found
     };
-    (0..samples.len()).filter_map(place).collect()
+    let rows = work::parallel::map(grid.ny, of_row);
+    rows.into_iter().flatten().filter(|p| p.height > 0.0 && p.height <= limits.uncut).collect()
+}
+
+impl Inspection<'_> {
+    /// What stands where the part ends on the way from a centre to the side of its cell.
+    fn at_side(&self, centre: Point2, [x, y]: [f64; 2]) -> Option<RidgePlace> {
+        /// Shares of the way; the border may lie within the cell.
+        const SHARES: [f64; 4] = [0.999, 0.75, 0.5, 0.25];
+        let half = 0.5 * self.grid.cell;
+        SHARES.iter().find_map(|share| {
+            let q = centre + Vector2::new(x, y) * (share * half);
+            let design = self.part.highest_at(q.x, q.y)?;
+            let cut = self.surface.along_normal(&design.point, &design.normal)?;
+            Some(RidgePlace { at: design.point, height: cut.distance })
+        })
+    }
 }
