@@ -74,13 +74,14 @@ impl CorrectionRound {
         })
     }
 
-    fn at_most(&self) -> f64 {
-        self.highest_mm.max(self.border_mm) + self.error_bound_mm
+    /// What is highest, mm. Its bound is that of coarse cells and decides nothing.
+    fn highest(&self) -> f64 {
+        self.highest_mm.max(self.border_mm)
     }
 
     /// Whether no ridge exceeds the target.
     fn holds(&self, target: f64) -> bool {
-        self.at_most() <= target
+        self.highest() <= target
     }
 
     /// Whether this round is to be kept instead of another: first what holds the target, then what is shorter; where neither
@@ -88,7 +89,7 @@ impl CorrectionRound {
     fn is_better(&self, other: &Self, target: f64) -> bool {
         match (self.holds(target), other.holds(target)) {
             (true, true) => self.cutting_length_mm < other.cutting_length_mm,
-            (false, false) => self.at_most() < other.at_most(),
+            (false, false) => self.highest() < other.highest(),
             (holds, _) => holds,
         }
     }
@@ -117,19 +118,15 @@ impl Session {
         let (mut rounds, mut kept) = (vec![first], 0);
         while rounds.len() < MOST_ROUNDS {
             let round = rounds[kept];
-            let slack = round.at_most() < (1.0 - SLACK) * target;
+            let slack = round.highest() < (1.0 - SLACK) * target;
             // Widened once, or narrowed everywhere, what holds the target is good.
             if round.holds(target) && (!slack || rounds.len() > 1) {
                 break;
             }
             let next = if rounds.len() == 1 && !slack {
-                narrowed(
-                    &map,
-                    target - round.error_bound_mm,
-                    plane_interval(&self.scene.cutter, request.step),
-                )
+                narrowed(&map, target, plane_interval(&self.scene.cutter, request.step))
             } else {
-                correction.scaled((aim(target) / round.at_most()).sqrt().max(MOST_NARROWED))
+                correction.scaled((aim(target) / round.highest()).sqrt().max(MOST_NARROWED))
             };
             let (planned, ridges) = self.round(asked, &next, monitor)?;
             let Some(found) = CorrectionRound::of(&ridges, &planned, &next) else { break };

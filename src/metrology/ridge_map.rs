@@ -57,9 +57,7 @@ pub(super) fn ridge_map(
 /// remnant of a pass.
 fn borders(inspection: &Inspection<'_>, samples: &[Sample]) -> Vec<RidgePlace> {
     let Inspection { grid, limits, .. } = *inspection;
-    let on = |i: usize, j: usize| {
-        i < grid.nx && j < grid.ny && !samples[grid.index(i, j)].deviation.is_nan()
-    };
+    let on = |i: usize, j: usize| i < grid.nx && j < grid.ny && !samples[grid.index(i, j)].deviation.is_nan();
     let of_row = |j: usize| {
         let mut found = Vec::new();
         for i in (0..grid.nx).filter(|&i| on(i, j)) {
@@ -79,14 +77,50 @@ fn borders(inspection: &Inspection<'_>, samples: &[Sample]) -> Vec<RidgePlace> {
 impl Inspection<'_> {
     /// What stands where the part ends on the way from a centre to the side of its cell.
     fn at_side(&self, centre: Point2, [x, y]: [f64; 2]) -> Option<RidgePlace> {
-        /// Shares of the way; the border may lie within the cell.
-        const SHARES: [f64; 4] = [0.999, 0.75, 0.5, 0.25];
+        /// Halvings of the way: to a thousandth of a cell.
+        const HALVINGS: i32 = 10;
         let half = 0.5 * self.grid.cell;
-        SHARES.iter().find_map(|share| {
+        let design = |share: f64| {
             let q = centre + Vector2::new(x, y) * (share * half);
-            let design = self.part.highest_at(q.x, q.y)?;
-            let cut = self.surface.along_normal(&design.point, &design.normal)?;
-            Some(RidgePlace { at: design.point, height: cut.distance })
-        })
+            self.part.highest_at(q.x, q.y)
+        };
+        let mut share = 0.0;
+        for halving in 0..=HALVINGS {
+            let farther = share + 0.5f64.powi(halving);
+            share = if farther < 1.0 && design(farther).is_some() { farther } else { share };
+        }
+        let design = design(share)?;
+        let cut = self.surface.along_normal(&design.point, &design.normal)?;
+        Some(RidgePlace { at: design.point, height: cut.distance })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flat_scene::{path, plane};
+    use sim::{Grid, cut_reference};
+    use work::monitor::Silent;
+
+    /// Passes along y, the last of them 0.3 mm from the border.
+    #[test]
+    fn what_stands_along_borders_is_as_high_as_its_closed_form() {
+        let (part, ball) = (plane([4.0, 3.0]), Cutter::ball(6.0).unwrap());
+        let lines = [0.2, 0.6, 1.0, 1.4, 1.8, 2.2, 2.6, 3.0, 3.4, 3.7];
+        let passes: Vec<Vec<Point3>> =
+            lines.iter().map(|&x| [-4.0, 8.0].map(|y| Point3::new(x, y, 0.0)).to_vec()).collect();
+        let path = path(&passes);
+        let grid = Grid::covering(&part.bounds(), 0.13, 64, 1 << 30).unwrap();
+        let cut = cut_reference(&ZMap::block(grid, 1.0), &ball, &path, &Silent).unwrap();
+        let limits = Limits { scallop: 0.01, gouge: 0.005, uncut: 0.05, chord: 0.001 };
+        let map = ridge_map(&part, &ball, &path, &cut, &limits, 1e-4, &Silent).unwrap();
+        let at = |x: f64| {
+            let near =
+                map.borders.iter().filter(|p| (p.at.x - x).abs() < 1e-3 && p.at.y > 0.5 && p.at.y < 2.5);
+            near.map(|p| p.height).fold(0.0, f64::max)
+        };
+        let sagitta = |half: f64| 3.0 - (9.0 - half * half).sqrt();
+        assert!((at(4.0) - sagitta(0.3)).abs() < 1e-4, "{} {}", at(4.0), sagitta(0.3));
+        assert!((at(0.0) - sagitta(0.2)).abs() < 1e-4, "{} {}", at(0.0), sagitta(0.2));
     }
 }
