@@ -74,14 +74,17 @@ impl Session {
         let scene = &self.scene;
         let strategy = self.strategy(request)?;
         let settings = PlanSettings { correction, ..self.settings(request) };
-        let mut plan = self
-            .path(request, &*strategy, &settings, (tool, fixtures), monitor)
-            .map_err(|e| self.refused(request, e))?;
-        if scene.machine.slow_corners {
-            plan.path = slow_corners(&plan.path, &scene.machine);
-        }
+        let planned = |strategy: &dyn Strategy| {
+            let found = self.path(request, strategy, &settings, (tool, fixtures), monitor);
+            let mut plan = found.map_err(|e| self.refused(request, e))?;
+            if scene.machine.slow_corners {
+                plan.path = slow_corners(&plan.path, &scene.machine);
+            }
+            let engaged = self.limit_feed(request, &mut plan.path, monitor)?;
+            Ok::<_, JobError>((plan, engaged))
+        };
+        let (mut plan, engaged) = within_engagement(planned(&*strategy)?, &*strategy, &planned)?;
         let joints = joints(scene, &request.name, &plan.path)?;
-        let engaged = self.limit_feed(request, &mut plan.path, monitor)?;
         plan.path.origin.lines = lines(scene, &plan.path, joints.as_ref())?;
         Ok(Planned { plan, strategy, joints, engaged, correction: None })
     }
@@ -169,6 +172,41 @@ impl Session {
         }
         Ok(Some(limit_feed_by(path, &arcs, strategy, request.step, radius)))
     }
+}
+
+/// A plan of a pocket with the engagement that was measured, and the bound of its greatest angle, rad.
+type Engaged = (Plan, Option<(Engagement, f64)>);
+
+/// Times that a pocket is planned again at most.
+const ROUNDS: usize = 3;
+
+/// The plan, or where its engagement is not proven to keep to the limit of the strategy, one for a lower limit: by as much
+/// as the first was above. It is taken if that helps; in slots without room it does not.
+fn within_engagement(
+    first: Engaged,
+    strategy: &dyn Strategy,
+    planned: &dyn Fn(&dyn Strategy) -> Result<Engaged, JobError>,
+) -> Result<Engaged, JobError> {
+    let asked = strategy.downcast_ref::<PocketStrategy>();
+    let Some((limit, asked)) = asked.and_then(|asked| Some((asked.engagement?, asked))) else {
+        return Ok(first);
+    };
+    let over = |(_, engaged): &Engaged| engaged.map_or(0.0, |(found, bound)| found.max + bound - limit);
+    let (mut best, mut target) = (first, limit);
+    for _ in 0..ROUNDS {
+        let by = over(&best);
+        // No limit below a quarter of the one asked for: the path would grow without end.
+        if by <= 0.0 || target - by < 0.25 * limit {
+            break;
+        }
+        target -= by;
+        let next = planned(&PocketStrategy { engagement: Some(target), ..*asked })?;
+        if over(&next) >= by {
+            break;
+        }
+        best = next;
+    }
+    Ok(best)
 }
 
 /// Whether the bound of the greatest engagement leaves it open on which side of the limit, rad, it lies.

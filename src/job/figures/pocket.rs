@@ -121,17 +121,24 @@ fn ramps(run: &Run<'_>, strategy: &PocketStrategy) -> Claim {
     Claim { unit: "deg", ..Claim::length("ramp", Gravity::Crash, limit, measured, 0.0) }.told(text)
 }
 
-/// The steepest way down below what the level above has cleared, degrees from level, and its move.
+/// The steepest way down below what the level above its pass has cleared, degrees from level, and its move.
 fn steepest(path: &Toolpath, top: f64) -> (f64, Option<usize>) {
     let levels = levels(path);
+    let mut floors = vec![f64::INFINITY; path.passes()];
+    // A helix may be all that a pass is.
+    for m in path.moves.iter().filter(|m| matches!(m.kind, MoveKind::Cut | MoveKind::Plunge)) {
+        let floor = &mut floors[m.pass as usize];
+        *floor = floor.min(m.to.tip.z);
+    }
+    let cleared = |pass: u32| {
+        let above = |level: &f64| *level > floors[pass as usize] + ROUNDING;
+        levels.iter().rev().copied().find(above).unwrap_or(top).min(top)
+    };
     let mut found = (0.0, None);
     for (k, (a, b, m)) in path.segments().enumerate() {
-        if m.kind != MoveKind::Plunge || a.z - b.z <= ROUNDING {
-            continue;
-        }
-        let cleared = levels.iter().rev().copied().find(|level| *level > b.z + ROUNDING).unwrap_or(top);
+        let cuts = || b.z < cleared(m.pass) - ROUNDING;
         let slope = (a.z - b.z).atan2((b - a).xy().norm()).to_degrees();
-        if b.z < cleared.min(top) - ROUNDING && slope > found.0 {
+        if m.kind == MoveKind::Plunge && a.z - b.z > ROUNDING && slope > found.0 && cuts() {
             found = (slope, Some(k));
         }
     }
@@ -145,18 +152,20 @@ mod tests {
     use motion::{ClPoint, Move};
     use report::Verdict;
 
-    /// Down to -1 by a ramp of 45 degrees, on to -3 by a plunge.
+    /// Down to -1 by a ramp of 45 degrees, on to -3 through ground that is cleared to -1, and by a plunge.
     fn path() -> Toolpath {
-        let to = |x: f64, z: f64, kind| {
+        let to = |x: f64, z: f64, kind, pass| {
             let to = ClPoint::upright(Point3::new(x, 0.0, z));
-            Move { to, kind, feed_rate: 100.0, pass: 0 }
+            Move { to, kind, feed_rate: 100.0, pass }
         };
         let moves = vec![
-            to(0.0, 0.0, MoveKind::Plunge),
-            to(1.0, -1.0, MoveKind::Plunge),
-            to(9.0, -1.0, MoveKind::Cut),
-            to(9.0, -3.0, MoveKind::Plunge),
-            to(0.0, -3.0, MoveKind::Cut),
+            to(0.0, 0.0, MoveKind::Plunge, 0),
+            to(1.0, -1.0, MoveKind::Plunge, 0),
+            to(9.0, -1.0, MoveKind::Cut, 0),
+            to(9.0, -0.5, MoveKind::Retract, 0),
+            to(9.0, -1.0, MoveKind::Plunge, 1),
+            to(9.0, -3.0, MoveKind::Plunge, 1),
+            to(0.0, -3.0, MoveKind::Cut, 1),
         ];
         Toolpath::new(ClPoint::upright(Point3::new(0.0, 0.0, 5.0)), moves)
     }
@@ -169,7 +178,7 @@ mod tests {
         assert_eq!((claim(2.0).verdict(), claim(1.9).verdict()), (Verdict::Pass, Verdict::Fail));
         assert_eq!(claim(1.9).measured, Some(2.0));
         // The way through air above the stock is no way down.
-        assert_eq!(steepest(&path, 0.0), (90.0, Some(3)));
+        assert_eq!(steepest(&path, 0.0), (90.0, Some(5)));
         let ramped = Toolpath::new(path.start, path.moves[..3].to_vec());
         let (slope, index) = steepest(&ramped, 0.0);
         assert!((slope - 45.0).abs() < 1e-12 && index == Some(1));
