@@ -18,7 +18,7 @@ use toolpath::{Correction, PartKind, Step, plane_interval};
 use work::monitor::{self, Monitor};
 
 use super::planned::Planned;
-use super::tool::{FixtureMesh, Tool};
+use super::tool::Around;
 use super::{JobError, Session};
 
 /// Most plans that are made. Each further one costs as much as the first, and mends less.
@@ -100,7 +100,7 @@ impl Session {
     pub(crate) fn plan_in_rounds(
         &self,
         request: &ToolpathRequest,
-        (tool, fixtures): (&Tool, &[FixtureMesh]),
+        around: Around<'_>,
         engine: &dyn Engine,
         monitor: &dyn Monitor,
     ) -> Result<Planned, JobError> {
@@ -108,9 +108,9 @@ impl Session {
         let (Step::Scallop(target), true) =
             (request.step, self.scene.correct && surface && engine.maps_ridges())
         else {
-            return self.plan(request, tool, fixtures, None, monitor);
+            return self.plan(request, around, None, monitor);
         };
-        let asked = (request, tool, fixtures, engine);
+        let asked = (request, around, engine);
         let mut correction = Correction::default();
         let (mut best, map) = self.round(asked, &correction, monitor)?;
         // Without ridges there is nothing to correct.
@@ -142,13 +142,13 @@ impl Session {
     /// A plan and its ridges.
     fn round(
         &self,
-        (request, tool, fixtures, engine): (&ToolpathRequest, &Tool, &[FixtureMesh], &dyn Engine),
+        (request, around, engine): (&ToolpathRequest, Around<'_>, &dyn Engine),
         correction: &Correction,
         monitor: &dyn Monitor,
     ) -> Result<(Planned, RidgeMap), JobError> {
         monitor::check(monitor)?;
         let correction = Some(Arc::new(correction.clone()));
-        let planned = self.plan(request, tool, fixtures, correction, monitor)?;
+        let planned = self.plan(request, around, correction, monitor)?;
         let map = self.ridges(request, engine, &planned, monitor)?;
         Ok((planned, map))
     }

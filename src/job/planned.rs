@@ -17,7 +17,7 @@ use work::monitor::Monitor;
 
 use super::correction::CorrectionFigures;
 use super::pocket::limit_feed_by;
-use super::tool::{FixtureMesh, Tool};
+use super::tool::Around;
 use super::{JobError, Session};
 
 /// How much finer the engagement is measured where its bound leaves open whether it keeps to its limit. More costs time and
@@ -66,8 +66,7 @@ impl Session {
     pub(crate) fn plan(
         &self,
         request: &ToolpathRequest,
-        tool: &Tool,
-        fixtures: &[FixtureMesh],
+        around: Around<'_>,
         correction: Option<Arc<Correction>>,
         monitor: &dyn Monitor,
     ) -> Result<Planned, JobError> {
@@ -75,7 +74,7 @@ impl Session {
         let strategy = self.strategy(request)?;
         let settings = PlanSettings { correction, ..self.settings(request) };
         let planned = |strategy: &dyn Strategy| {
-            let found = self.path(request, strategy, &settings, (tool, fixtures), monitor);
+            let found = self.path(request, strategy, &settings, around, monitor);
             let mut plan = found.map_err(|e| self.refused(request, e))?;
             if scene.machine.slow_corners {
                 plan.path = slow_corners(&plan.path, &scene.machine);
@@ -94,7 +93,7 @@ impl Session {
         request: &ToolpathRequest,
         strategy: &dyn Strategy,
         settings: &PlanSettings,
-        (tool, fixtures): (&Tool, &[FixtureMesh]),
+        around: Around<'_>,
         monitor: &dyn Monitor,
     ) -> Result<Plan, PlanError> {
         let cutter = &self.scene.cutter;
@@ -102,7 +101,7 @@ impl Session {
             return plan_pocket(pocket, cutter, strategy, settings, monitor);
         }
         let Some(axis) = &request.axis else { return plan(&self.part, cutter, strategy, settings, monitor) };
-        let keep = tool.keep_clear(&self.scene, &self.part, fixtures);
+        let keep = around.tool.keep_clear(&self.scene, around.near, around.fixtures);
         let tilting = Tilting {
             axis: &axis.rule,
             most_turning: axis.most_turning.map(|rate| TURNING_SHARE * rate),

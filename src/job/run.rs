@@ -7,7 +7,7 @@ use report::Claim;
 use scene::{Scene, ToolpathRequest};
 
 use super::planned::Planned;
-use super::tool::{FixtureMesh, Tool};
+use super::tool::Around;
 use super::{JobError, Session};
 
 /// One toolpath that was planned, cut and measured.
@@ -20,10 +20,8 @@ pub(crate) struct Run<'a> {
     pub planned: &'a Planned,
     /// What was measured.
     pub measured: &'a Measured,
-    /// The tool.
-    pub tool: &'a Tool,
-    /// What it must not touch.
-    pub fixtures: &'a [FixtureMesh],
+    /// The tool, and what it must not touch.
+    pub around: Around<'a>,
 }
 
 impl Run<'_> {

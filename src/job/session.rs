@@ -22,12 +22,15 @@ use work::monitor::{self, Monitor};
 use super::machined::BASE;
 use super::planned::{self, Planned};
 use super::run::Run;
-use super::tool::{FixtureMesh, Tool};
+use super::tool::{Around, FixtureMesh, Tool};
 use super::{JobError, Machined, Outcome, figures, judge};
 
 /// The cell shrinks to this share where a limit is undecided. Nearer to 1 more cuts are made in vain, nearer to 0 more
 /// cells.
 const FINER: f64 = 0.5;
+/// Share of the gouge tolerance that triangles may stand off the patches which tools are kept away from. The plan uses half
+/// of the tolerance for itself, and triangles may stand off to either side. Less takes more triangles.
+const NEAREST_SHARE: f64 = 0.125;
 
 /// A scene with its part: what all its toolpaths share.
 #[derive(Debug)]
@@ -145,20 +148,16 @@ impl Session {
         let engine = self.engine(request)?;
         let tool = Tool::of(scene);
         let fixtures = self.fixtures()?;
-        let planned = self.plan_in_rounds(request, (&tool, &fixtures), engine, monitor)?;
+        let closer = if engine.tilts() { self.closer_part() } else { None };
+        let near = closer.as_ref().unwrap_or(&self.part);
+        let around = Around { tool: &tool, near, fixtures: &fixtures };
+        let planned = self.plan_in_rounds(request, around, engine, monitor)?;
         let begun = Instant::now();
         let mut measured = self.measure(request, engine, &planned.plan.path, monitor)?;
         for region in &mut measured.measurement.gouge.regions {
             region.line = planned.plan.path.line_of(region.move_index as usize).unwrap_or_default();
         }
-        let run = Run {
-            session: self,
-            request,
-            planned: &planned,
-            measured: &measured,
-            tool: &tool,
-            fixtures: &fixtures,
-        };
+        let run = Run { session: self, request, planned: &planned, measured: &measured, around };
         let found = figures::all(&run, monitor)?;
         let machined = Machined::new(self, &planned.plan.path, &measured.view, &measured.measurement);
         let simulation = SimulationFigures {
@@ -299,6 +298,15 @@ impl Session {
         self.scene.keep_clear.fixtures.iter().map(load).collect()
     }
 
+    /// The part with triangles so near to its patches that a tool which is kept off the triangles stays within the gouge
+    /// tolerance of the patches; `None` where the part's own do.
+    fn closer_part(&self) -> Option<Part> {
+        let nearest = NEAREST_SHARE * self.scene.tolerance.gouge;
+        let far = self.part.mesh_deviation() > nearest;
+        // Patches that would take too many triangles keep theirs; the measurement finds what that costs.
+        far.then(|| Part::from_patches(self.part.patches().to_vec(), nearest).ok()).flatten()
+    }
+
     /// The block that the part is cut from, as far as it was roughed before.
     pub(crate) fn voxel_stock(&self) -> VoxelStock {
         let Aabb { mut min, mut max } = self.area();
@@ -370,5 +378,20 @@ mod tests {
         assert!(note.unwrap().contains("instead of 0.05 mm, to fit into 2 MiB"));
         let refused = session("cell = 0.05\n").unwrap_err();
         assert!(matches!(refused, JobError::Grid { reason: GridError::Memory { .. }, .. }), "{refused}");
+    }
+
+    /// What the planner lets the cutter into the triangles, and these into the true surface, is no gouge.
+    #[test]
+    fn tools_are_kept_off_triangles_that_lie_within_the_gouge_tolerance() {
+        let text = "[part]\nsurface = \"cylinder\"\nradius = 400\nx = [-60, 60]\ny = [0, 90]\n[cutter]\nshape = \"ball\"\n\
+                    diameter = 6\n[[toolpath]]\nstrategy = \"zigzag\"\naxis = { lead = 10 }\n";
+        let session = Session::new(Scene::parse("shell.toml", text).unwrap()).unwrap();
+        let gouge = session.scene.tolerance.gouge;
+        let deepest = |part: &Part| {
+            let needed = Tool::of(&session.scene).keep_clear(&session.scene, part, &[]).checks[0].needed;
+            part.mesh_deviation() - needed
+        };
+        let near = session.closer_part().unwrap();
+        assert!(deepest(&session.part) > gouge && deepest(&near) <= 0.75 * gouge * (1.0 + 1e-9));
     }
 }

@@ -46,3 +46,14 @@ impl Tool {
         Interference { checks, greatest_tilt: keep.greatest_tilt, greatest_lift: keep.greatest_lift }
     }
 }
+
+/// A tool and what it must not touch.
+#[derive(Clone, Copy)]
+pub(crate) struct Around<'a> {
+    /// The tool.
+    pub tool: &'a Tool,
+    /// The part with triangles near enough to its surface for the tool to be kept off them.
+    pub near: &'a Part,
+    /// Clamps and the like.
+    pub fixtures: &'a [FixtureMesh],
+}

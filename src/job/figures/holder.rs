@@ -23,7 +23,8 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
         View::Normals(_) if run.scene().simulation.removal => {
             let stock = run.session.voxel_stock();
             let voxel = voxel_in_order(run, &stock);
-            let engine = VoxelEngine::new(&stock, &run.tool.cutter, run.path()).map_err(run.voxels())?;
+            let engine =
+                VoxelEngine::new(&stock, &run.around.tool.cutter, run.path()).map_err(run.voxels())?;
             let hits = engine.holder_in_stock(holder, run.path(), voxel, monitor).map_err(run.voxels())?;
             let claims = vec![clear_of_standing(&hits, voxel, &|k| run.program_line(k))];
             Ok(Finding { notes: vec![standing_note(&hits, voxel)], claims, ..Finding::default() })
