@@ -118,15 +118,15 @@ impl Session {
         let (mut rounds, mut kept) = (vec![first], 0);
         while rounds.len() < MOST_ROUNDS {
             let round = rounds[kept];
-            let slack = round.highest() < (1.0 - SLACK) * target;
-            // Widened once, or narrowed everywhere, what holds the target is good.
-            if round.holds(target) && (!slack || rounds.len() > 1) {
-                break;
-            }
-            let next = if rounds.len() == 1 && !slack {
+            let next = if rounds.len() == 1 && !round.holds(target) {
                 narrowed(&map, target, plane_interval(&self.scene.cutter, request.step))
+            } else if round.highest_mm > target
+                || rounds.len() == 1 && round.highest_mm < (1.0 - SLACK) * target
+            {
+                // Remnants along borders do not go with the width of all passes.
+                correction.scaled((aim(target) / round.highest_mm).sqrt().max(MOST_NARROWED))
             } else {
-                correction.scaled((aim(target) / round.highest()).sqrt().max(MOST_NARROWED))
+                break;
             };
             let (planned, ridges) = self.round(asked, &next, monitor)?;
             let Some(found) = CorrectionRound::of(&ridges, &planned, &next) else { break };
@@ -238,7 +238,7 @@ mod tests {
             factors: [1.0; 2],
         };
         let better = |a: CorrectionRound, b: CorrectionRound| a.is_better(&b, 1.0);
-        assert!(better(round(0.8, 20.0), round(1.0, 10.0)) && !better(round(1.0, 10.0), round(0.8, 20.0)));
+        assert!(better(round(0.8, 20.0), round(1.05, 10.0)) && !better(round(1.05, 10.0), round(0.8, 20.0)));
         assert!(better(round(0.8, 9.0), round(0.7, 10.0)) && better(round(1.1, 20.0), round(1.2, 10.0)));
     }
 

@@ -28,6 +28,11 @@ use super::{JobError, Machined, Outcome, figures, judge};
 /// The cell shrinks to this share where a limit is undecided. Nearer to 1 more cuts are made in vain, nearer to 0 more
 /// cells.
 const FINER: f64 = 0.5;
+
+/// Rounds in which bounds are asked for that are smaller by the square of that, down to a share of the first; the cell may
+/// be the finest already.
+const CLOSER_ROUNDS: usize = 2;
+const CLOSEST_BOUND: f64 = 0.02;
 /// Share of the gouge tolerance that triangles may stand off the patches which tools are kept away from. The plan uses half
 /// of the tolerance for itself, and triangles may stand off to either side. Less takes more triangles.
 const NEAREST_SHARE: f64 = 0.125;
@@ -218,13 +223,18 @@ impl Session {
         let mut measured = engine.measure(&first, monitor).map_err(failed)?;
         let finest = auto_cell(&scene.cutter, &scene.toolpaths);
         let mut simulation = Simulation { cell_is_auto: false, cell: measured.cell, ..scene.simulation };
-        while simulation.cell > finest
+        let (mut rounds, least) = (0, CLOSEST_BOUND * scene.simulation.error_bound);
+        while (simulation.cell > finest || rounds < CLOSER_ROUNDS)
             && judge::is_open(&measured.measurement, &scene.tolerance, &scene.scallop_rule)
         {
-            simulation.cell = (FINER * simulation.cell).max(finest);
+            rounds += 1;
+            simulation.cell = (FINER * simulation.cell).max(finest.min(simulation.cell));
+            simulation.error_bound = (FINER * FINER * simulation.error_bound).max(least);
             let Ok(cells) = self.budget().grid_before_planning(&self.area(), &simulation) else { break };
             match engine.measure(&self.task(path, &simulation, &cells), monitor) {
-                Ok(finer) => measured = Measured { note: Some(finer_note(&simulation, scene)), ..finer },
+                Ok(finer) => {
+                    measured = Measured { note: finer_note(&simulation, scene).or(finer.note), ..finer }
+                }
                 Err(EngineError::Cancelled(cancelled)) => return Err(cancelled.into()),
                 // It does not fit into the memory: what was measured stands.
                 Err(_) => break,
@@ -275,6 +285,7 @@ impl Session {
             simulation,
             budget: self.budget(),
             judged: self.scene.judged,
+            pocket: self.pocket.is_some(),
         }
     }
 
@@ -338,11 +349,13 @@ impl Session {
     }
 }
 
-fn finer_note(simulation: &Simulation, scene: &Scene) -> String {
-    format!(
-        "measured on cells of {} mm instead of {} mm: on those a limit was undecided",
-        simulation.cell, scene.simulation.cell
-    )
+fn finer_note(simulation: &Simulation, scene: &Scene) -> Option<String> {
+    (simulation.cell < scene.simulation.cell).then(|| {
+        format!(
+            "measured on cells of {} mm instead of {} mm: on those a limit was undecided",
+            simulation.cell, scene.simulation.cell
+        )
+    })
 }
 
 fn not_planned(request: &ToolpathRequest, reason: String) -> ToolpathReport {

@@ -130,6 +130,13 @@ impl ExcessSearch<'_> {
         Patches { inspection: self.inspection, stock_top: self.stock_top, least }
     }
 
+    /// How far off the highest place may be, mm: nearer where it is to be told from its limit.
+    fn asked(&self, known: f64, kind: Kind) -> f64 {
+        let Inspection { limits, asked, .. } = *self.inspection;
+        let limit = if kind == Kind::Unreached { limits.uncut } else { limits.scallop };
+        if known < limit { asked.min(0.5 * (limit - known)).max(NUMERICAL_FLOOR) } else { asked }
+    }
+
     /// The highest place of a kind in some squares, if it is higher than `known`.
     fn highest(&self, squares: &[Square], known: Bounded, kind: Kind) -> Bounded {
         let patches = self.patches(known.max_mm);
@@ -156,7 +163,7 @@ impl ExcessSearch<'_> {
             }
         };
         let open = squares.iter().filter(|square| square.possible > known.max_mm).copied().collect();
-        let found = search(open, known.max_mm, self.inspection.asked, MOST, &at);
+        let found = search(open, known.max_mm, self.asked(known.max_mm, kind), MOST, &at);
         let mut highest = match found.greatest {
             Some((height, q)) => {
                 let z = self.inspection.part.highest_at(q.x, q.y).map_or(0.0, |design| design.point.z);

@@ -64,6 +64,10 @@ pub fn measure(
     let all: Vec<u32> = (0..path.len() as u32).collect();
     let cut_away = |at: &Point3| lowest_of_all(&surface, at, &all) < at.z - asked.error_bound;
     let search = ExcessSearch { inspection: &inspection, stock_top: asked.stock_top, cut_away: &cut_away };
+    if !asked.borders {
+        measured.excess = ExcessFigures::of_cells(&measured);
+        return Ok(measured);
+    }
     measured.excess = search.run(&found.samples, &measured, monitor)?;
     let (highest, unreached) = (measured.excess.highest.max_mm, measured.excess.unreached.max_mm);
     measured.deviation.max_mm = measured.deviation.max_mm.map(|max| max.max(highest));

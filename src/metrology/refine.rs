@@ -40,6 +40,8 @@ pub struct Asked {
     pub error_bound: f64,
     /// Height of the stock's flat top before the cut, mm.
     pub stock_top: f64,
+    /// Whether the highest material is looked for up to the part's borders; else on the cells only.
+    pub borders: bool,
     /// Cells that may be held beside those of the stock at a time.
     pub most_cells: usize,
 }

@@ -61,7 +61,12 @@ impl Engine for Cells {
         let (grid, note) = task.budget.grid_for(path.len(), &task.area, task.simulation, task.cells)?;
         let cut = (self.cut)(ZMap::block(grid, task.top), task.cutter, path, monitor)?;
         let most_cells = task.budget.more_cells(path.len(), &grid);
-        let asked = Asked { error_bound: task.simulation.error_bound, stock_top: task.top, most_cells };
+        let asked = Asked {
+            error_bound: task.simulation.error_bound,
+            stock_top: task.top,
+            most_cells,
+            borders: !task.pocket,
+        };
         let measurement = measure(task.part, task.cutter, path, &cut, task.limits, &asked, monitor)?;
         Ok(Measured {
             cell: grid.cell,

@@ -50,6 +50,8 @@ pub struct Task<'a> {
     pub limits: &'a Limits,
     /// How it is simulated.
     pub simulation: &'a Simulation,
+    /// Whether the part is the floor of a pocket, which ends where the cutter's bottom does.
+    pub pocket: bool,
     /// What it may take.
     pub budget: Budget,
     /// What of the part is judged.
