@@ -15,15 +15,15 @@ const CONTACT_ROUNDS: usize = 4;
 /// Axes that differ by less, rad, are the same to rounding.
 const NO_TURN: f64 = 1e-9;
 
-/// The place of the part that a cutter touches, or comes nearest to, and how far it is off.
-pub(super) fn contact(part: &Part, cutter: &Cutter, at: &ClPoint) -> (SurfacePoint, f64) {
+/// The place of the part that a cutter touches, or comes nearest to, how far it is off, and where on the cutter that is.
+pub(super) fn contact(part: &Part, cutter: &Cutter, at: &ClPoint) -> (SurfacePoint, f64, Point3) {
     let mut foot = part.closest_point(&(at.tip + at.axis * cutter.profile().centre_z)).0;
-    let mut off = f64::INFINITY;
+    let (mut off, mut contact) = (f64::INFINITY, at.tip);
     for _ in 0..CONTACT_ROUNDS {
-        let contact = at.tip - cutter.contact_to_tip_along(&foot.normal, &at.axis);
+        contact = at.tip - cutter.contact_to_tip_along(&foot.normal, &at.axis);
         (foot, off) = part.closest_point(&contact);
     }
-    (foot, off)
+    (foot, off, contact)
 }
 
 /// The fastest turn of a path's cutting moves.
@@ -33,7 +33,7 @@ pub struct FastestTurn {
     pub rate: f64,
     /// The move.
     pub move_index: u32,
-    /// Where it ends on the part.
+    /// Where its contact ends.
     pub at: Point3,
 }
 
@@ -57,7 +57,8 @@ pub fn fastest_turn(
         if step.kind != MoveKind::Cut || turn <= NO_TURN {
             return Ok(None);
         }
-        let [a, b] = [from, step.to].map(|at| contact(part, cutter, &at).0.point);
+        // On the cutter: past the part's border it goes on, where the nearest place of the part stands.
+        let [a, b] = [from, step.to].map(|at| contact(part, cutter, &at).2);
         Ok(Some(FastestTurn { rate: turn / (b - a).norm(), move_index: k as u32, at: b }))
     })?;
     Ok(turns.into_iter().flatten().max_by(|a, b| a.rate.total_cmp(&b.rate)))

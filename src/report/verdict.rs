@@ -115,12 +115,15 @@ impl Serialize for Claim {
         map.serialize_entry("what", self.what)?;
         map.serialize_entry("verdict", &self.verdict())?;
         map.serialize_entry(&keyed("limit"), &self.limit)?;
-        map.serialize_entry(&keyed("measured"), &self.measured)?;
-        let bound = self.measured.map(|_| self.error_bound).filter(|bound| bound.is_finite());
+        // Without end, a machining time for one, is no number of a report.
+        let measured = self.measured.filter(|measured| measured.is_finite());
+        map.serialize_entry(&keyed("measured"), &measured)?;
+        let bound = measured.map(|_| self.error_bound).filter(|bound| bound.is_finite());
         map.serialize_entry(&keyed("error_bound"), &bound)?;
         map.serialize_entry("text", &self.sentence())?;
         if bound.is_none() {
-            map.serialize_entry("reason", self.decided_by)?;
+            let endless = self.measured == Some(f64::INFINITY);
+            map.serialize_entry("reason", if endless { "it is not finite" } else { self.decided_by })?;
         }
         map.end()
     }
@@ -179,5 +182,9 @@ mod tests {
         assert_eq!(json["verdict"], "undecided");
         assert!(json["measured_mm"].is_null() && json["reason"].is_string(), "{json}");
         assert_eq!(json["limit_mm"], 0.01);
+        let endless = Claim { measured: Some(f64::INFINITY), ..claim };
+        let json = serde_json::to_value(&endless).unwrap();
+        assert_eq!((&json["verdict"], &json["reason"]), (&"fail".into(), &"it is not finite".into()));
+        assert!(json["measured_mm"].is_null());
     }
 }

@@ -438,7 +438,7 @@ fn contacts_of(part: &Part, cutter: &Cutter, path: &Toolpath, k: usize, spacing:
     }
     let from = path.location_before(k);
     let contact = |t: f64| {
-        let (foot, off) = contact_of(part, cutter, &from.towards(&step.to, t));
+        let (foot, off, _) = contact_of(part, cutter, &from.towards(&step.to, t));
         (off.abs() <= spacing).then(|| NetPlace::at_foot(&foot))
     };
     [0.5, 1.0].into_iter().filter_map(contact).collect()
