@@ -22,9 +22,9 @@ use work::monitor::{Cancelled, Monitor};
 /// Grid cells a side on which level curves are found.
 const TRACE_CELLS: usize = 240;
 
-/// Passes are traced beyond the border by this share of their interval: a little more than the half
-/// that a pass outside the border still has to serve inside it.
-const BORDER_SHARE: f64 = 0.6;
+/// Passes are traced beyond the border by this share of their mean interval. A pass outside the border serves inside it from
+/// half of its own interval, which may be wider than the mean.
+const BORDER_SHARE: f64 = 0.75;
 
 /// The margin is never more than this share of the chart; it would be where a parametrisation
 /// degenerates.
