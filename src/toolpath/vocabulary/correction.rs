@@ -49,7 +49,7 @@ impl Correction {
             values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)])
         };
         let [[x0, x1], [y0, y1], [z0, _]] = [0, 1, 2].map(ends);
-        if places.is_empty() || !(reach > 0.0) {
+        if places.is_empty() || reach.is_nan() || reach <= 0.0 {
             return Self::default();
         }
         let edge = reach
