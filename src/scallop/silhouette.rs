@@ -185,7 +185,7 @@ impl Place {
         let bend = over.curvature * (x * x + y * y);
         let root = slope * slope - 2.0 * bend * lacking;
         let t = 2.0 * lacking / (slope + root.max(0.0).sqrt());
-        (root >= 0.0 && t.is_finite()).then(|| Self { x: self.x + t * x, y: self.y + t * y, bend: 0.0 })
+        (root >= 0.0 && t.is_finite()).then_some(Self { x: self.x + t * x, y: self.y + t * y, bend: 0.0 })
     }
 }
 
