@@ -7,7 +7,7 @@
 //! use millstream::{Session, monitor::Silent};
 //!
 //! let report = Session::open("scenes/plate.toml")?.run(&Silent)?;
-//! for toolpath in &report.toolpaths {
+//! for toolpath in report.measured() {
 //!     println!("{}: {} ({:?} mm)", toolpath.name, toolpath.verdict.word(), toolpath.scallop.max_mm);
 //! }
 //! # assert_eq!(report.verdict, millstream::Verdict::Pass);
@@ -37,7 +37,7 @@
 //! threads.
 
 pub use job::{JobError, Outcome, Session};
-pub use report::{RunReport, ToolpathResult, Verdict};
+pub use report::{RunReport, ToolpathReport, ToolpathResult, Verdict};
 pub use scene::Scene;
 pub use work::{monitor, parallel};
 pub use {
