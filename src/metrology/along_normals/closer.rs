@@ -7,7 +7,7 @@ use std::collections::BinaryHeap;
 
 use super::ridges::Crossing;
 use super::{NormalInspection, Sample};
-use crate::figures::NUMERICAL_FLOOR;
+use crate::figures::{Limits, NUMERICAL_FLOOR};
 use geometry::Point3;
 use work::monitor::{self, Cancelled, Monitor};
 
@@ -17,10 +17,45 @@ pub(super) const MOST_DIVIDED: usize = 20_000;
 /// A triangle is divided at most so often in a row.
 const MOST_DEPTH: u32 = 12;
 
+/// What may be found in a triangle, mm: the greatest depth, the highest uncut place, the highest ridge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Possible {
+    pub depth: f64,
+    pub uncut: f64,
+    pub ridge: f64,
+}
+
+impl Possible {
+    const NOTHING: Self =
+        Self { depth: f64::NEG_INFINITY, uncut: f64::NEG_INFINITY, ridge: f64::NEG_INFINITY };
+
+    fn or(self, other: Self) -> Self {
+        Self {
+            depth: self.depth.max(other.depth),
+            uncut: self.uncut.max(other.uncut),
+            ridge: self.ridge.max(other.ridge),
+        }
+    }
+
+    /// By how much the figures may be exceeded, none by less than nothing, mm.
+    fn beyond(self, greatest: &Greatest, limits: &Limits) -> Self {
+        Self {
+            depth: (self.depth - greatest.depth).max(0.0),
+            uncut: (self.uncut - greatest.highest_uncut(limits)).max(0.0),
+            ridge: (self.ridge - greatest.highest_ridge()).max(0.0),
+        }
+    }
+
+    pub fn greatest(self) -> f64 {
+        self.depth.max(self.uncut).max(self.ridge)
+    }
+}
+
 /// A triangle with what may be found in it, by promise.
 struct Open {
     /// How much any figure may exceed what was known when it was opened, mm.
     promise: f64,
+    possible: Possible,
     samples: [Sample; 3],
     depth: u32,
 }
@@ -77,7 +112,7 @@ impl Greatest {
     /// As [`Greatest::look_at`], and whether it stands higher than what was known to be uncut.
     pub fn look_at_height(&mut self, sample: &Sample, inspection: &NormalInspection<'_>) {
         let height = sample.height(inspection.engine);
-        let higher = height > self.highest_uncut(inspection);
+        let higher = height > self.highest_uncut(inspection.limits);
         if higher && inspection.is_uncut(sample, self.highest_ridge()) {
             self.uncut = Some((height, *sample));
         }
@@ -89,8 +124,8 @@ impl Greatest {
     }
 
     /// What a place must exceed to be the highest that is uncut, mm.
-    fn highest_uncut(&self, inspection: &NormalInspection<'_>) -> f64 {
-        self.uncut.map_or(inspection.limits.uncut, |(height, _)| height)
+    fn highest_uncut(&self, limits: &Limits) -> f64 {
+        self.uncut.map_or(limits.uncut, |(height, _)| height)
     }
 
     pub fn look_at_ridge(&mut self, crossing: &Crossing) {
@@ -107,56 +142,55 @@ struct Closer {
 }
 
 impl NormalInspection<'_> {
-    /// How much any figure may exceed the greatest ones in a triangle.
-    fn promise(&self, samples: &[Sample; 3], crossings: &[Crossing], greatest: &Greatest) -> f64 {
+    /// What may be found in a triangle.
+    fn possible(&self, samples: &[Sample; 3], crossings: &[Crossing], greatest: &Greatest) -> Possible {
         let points = samples.map(|sample| sample.place.point);
         let longest = (0..3).map(|k| (points[(k + 1) % 3] - points[k]).norm()).fold(0.0, f64::max);
         // No place of a triangle is farther than this from its nearest corner.
         let far = longest / 3f64.sqrt();
-        let mut more = f64::NEG_INFINITY;
+        let mut found = Possible::NOTHING;
         for sample in samples {
             let Some(hit) = sample.hit else { continue };
             // A cut of radius r that meets the design at the slope s goes no deeper than about s²r below that.
             let slope = sample.slope();
             let deeper = (slope * far).min(slope * slope * self.radius);
             // Nothing counts as deeper or higher than is looked, however steep a cut is.
-            more = more.max((-hit.deviation + deeper).min(self.engine.depth()) - greatest.depth);
+            found.depth = found.depth.max((-hit.deviation + deeper).min(self.engine.depth()));
             // What is part of a scallop rises to its ridge, which promises for itself.
             if self.is_uncut(sample, greatest.highest_ridge()) {
-                let height = greatest.highest_uncut(self);
-                more = more.max((hit.deviation + slope * far).min(self.engine.reach()) - height);
+                found.uncut = found.uncut.max((hit.deviation + slope * far).min(self.engine.reach()));
             }
         }
-        let highest = greatest.highest_ridge();
-        let possible = |c: &Crossing| (c.height + c.rise * longest).min(self.engine.reach().max(c.height));
-        crossings.iter().fold(more, |more, c| more.max(possible(c) - highest))
+        let ridge = |c: &Crossing| (c.height + c.rise * longest).min(self.engine.reach().max(c.height));
+        found.ridge = crossings.iter().map(ridge).fold(found.ridge, f64::max);
+        found
     }
 
-    /// Divides triangles, the most promising ones first. Returns what may still exceed the figures, mm.
+    /// Divides triangles, the most promising ones first. Returns by how much the figures may still be exceeded, mm.
     pub fn search<'b>(
         &self,
         triangles: impl Iterator<Item = ([Sample; 3], &'b [Crossing])>,
         greatest: &mut Greatest,
         asked: f64,
         monitor: &dyn Monitor,
-    ) -> Result<f64, Cancelled> {
+    ) -> Result<Possible, Cancelled> {
         const BATCH: usize = 64;
         monitor.start("looking closer", 0);
         let enough = asked.max(NUMERICAL_FLOOR);
-        let (mut heap, mut divided, mut left) = (BinaryHeap::new(), 0, 0.0f64);
+        let (mut heap, mut divided, mut closed) = (BinaryHeap::new(), 0, Possible::NOTHING);
         // What promises little is not kept, but counts.
         let mut keep = |samples: [Sample; 3], crossings: &[Crossing], depth: u32, greatest: &Greatest| {
-            let promise = self.promise(&samples, crossings, greatest);
+            let possible = self.possible(&samples, crossings, greatest);
+            let promise = possible.beyond(greatest, self.limits).greatest();
             if promise <= enough || depth == MOST_DEPTH {
-                left = left.max(promise);
+                closed = closed.or(possible);
                 return None;
             }
-            Some(Open { promise, samples, depth })
+            Some(Open { promise, possible, samples, depth })
         };
         for (samples, crossings) in triangles {
             heap.extend(keep(samples, crossings, 0, greatest));
         }
-        // Promises were made against lesser figures than are known later, so that they are never too small.
         while divided < self.most_divided && !heap.is_empty() {
             monitor::check(monitor)?;
             let batch: Vec<Open> = std::iter::from_fn(|| heap.pop()).take(BATCH).collect();
@@ -173,7 +207,8 @@ impl NormalInspection<'_> {
                 }
             }
         }
-        Ok(heap.peek().map_or(left, |open| open.promise.max(left)))
+        let possible = heap.iter().fold(closed, |possible, open| possible.or(open.possible));
+        Ok(possible.beyond(greatest, self.limits))
     }
 
     /// The four triangles of one, and what they hold.

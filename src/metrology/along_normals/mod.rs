@@ -257,22 +257,24 @@ impl Along<'_> {
         let left = inspection.search(triangles, &mut greatest, asked, monitor)?;
         gouge.max_depth_mm = greatest.depth;
         gouge.error_bound_mm =
-            left.max(0.0) + (greatest.possible_depth - greatest.depth).max(0.0) + NUMERICAL_FLOOR;
+            left.depth + (greatest.possible_depth - greatest.depth).max(0.0) + NUMERICAL_FLOOR;
         if let (Some(first), Some((at, by))) = (gouge.regions.first_mut(), greatest.deepest) {
             (first.depth_mm, first.at_mm, first.move_index) = (greatest.depth, at.into(), by);
         }
-        let standing = Standing { hollow, greatest: &greatest, left: left.max(0.0) };
+        let standing = Standing { hollow, greatest: &greatest, left: left.uncut };
         let uncut = inspection.uncut(&net, &samples, &shares, kept, &standing);
         let highest = greatest.ridge.map(|(height, at, lower)| {
             // What is uncertain may be lower only, but a bound stands to both sides.
-            Highest { height, at, possible: height + left.max(0.0) + lower }
+            Highest { height, at, possible: height + left.ridge + lower }
         });
-        let note = (left > asked).then(|| {
-        format!("between the places on the normals {:.1} µm more may stand or lie than was found; a smaller cell helps", 1e3 * left)
-    });
+        let most = left.greatest();
+        let note = (most > asked).then(|| {
+            let most = 1e3 * most;
+            format!("between the places on the normals {most:.1} µm more may stand or lie than was found; a smaller cell helps")
+        });
         let scallop = scallop_figures(&ridge_samples, highest, limits);
         let heights = judged().filter_map(|sample| Some((sample.hit?.deviation, sample.place.point)));
-        let excess = excess_figures(heights, &scallop, &uncut, left.max(0.0), limits);
+        let excess = excess_figures(heights, &scallop, &uncut, left.ridge, limits);
         let deviations: Vec<f32> =
             samples.iter().map(|sample| sample.hit.map_or(f32::NAN, |hit| hit.deviation as f32)).collect();
         let map = NormalMap {

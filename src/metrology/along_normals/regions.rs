@@ -20,7 +20,7 @@ pub(super) struct Standing<'a> {
     pub hollow: Option<Crossing>,
     /// The greatest figures.
     pub greatest: &'a Greatest,
-    /// How much they may be exceeded, mm.
+    /// How much more may be uncut, mm.
     pub left: f64,
 }
 
