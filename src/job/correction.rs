@@ -1,28 +1,33 @@
 //! The loop: plan, cut, measure the ridges, and plan again with passes nearer to each other where ridges stand above the
 //! target, or all farther apart where none comes near it.
 //!
-//! Enters: a toolpath that is planned by a scallop height. Leaves: the best of a few plans, and what each round found. A
-//! round measures ridges only, on cells as coarse as show every pass. What the toolpath is judged by is measured anew.
+//! Enters: a toolpath that is planned by a scallop height. Leaves: the best of a few plans with its measurement, and what each
+//! round found.
 //!
-//! The second plan is narrower where ridges of the first exceed the target. A plan whose function is fitted anew has its
-//! highest ridges elsewhere; so if that does not hold the target either, the third has all widths of the better one in
-//! proportion, which leaves its passes in shape.
+//! The functions whose levels are passes are kept from round to round: only levels are placed anew, narrower around the
+//! places that stood too high. Where an engine tells ridges apart, the first rounds measure no more than those, on cells as
+//! coarse as show every pass. Then all is measured as the verdict is; what still stands above the target then is corrected
+//! as well. Where narrowing does not help, the widths of the whole plan are scaled, which leaves its passes in shape.
 
 use std::sync::Arc;
 
 use serde::Serialize;
 
-use metrology::{Engine, RidgeMap, Simulation, path_figures};
+use geometry::Point3;
+use metrology::{Engine, ExcessKind, Measured, Measurement, RidgeMap, Simulation, path_figures};
 use scene::ToolpathRequest;
-use toolpath::{Correction, PartKind, Step, plane_interval};
+use toolpath::{Correction, Earlier, PartKind, Step, plane_interval};
 use work::monitor::{self, Monitor};
 
 use super::planned::Planned;
 use super::tool::Around;
 use super::{JobError, Session};
 
-/// Most plans that are made. Each further one costs as much as the first, and mends less.
-const MOST_ROUNDS: usize = 3;
+/// Most plans that are made while only ridges are measured.
+const MOST_ROUNDS: usize = 4;
+
+/// Most plans that are made again after all was measured: each costs as much as the whole run without correction.
+const MOST_MEASURED: usize = 2;
 
 /// A plan whose highest ridge is within this share below the target is as wide as it should be. What is corrected is aimed
 /// at the middle of it, since points and chords of a new plan lie elsewhere.
@@ -30,6 +35,9 @@ const SLACK: f64 = 0.02;
 
 /// No width is corrected by more than this factor in a round.
 const MOST_NARROWED: f64 = 0.5;
+
+/// A place whose factor is less than one by more than this was narrowed before.
+const STILL_WIDE: f64 = 1e-6;
 
 /// Cells from pass to pass while only ridges are measured.
 const CELLS_A_PASS: f64 = 4.0;
@@ -62,19 +70,52 @@ pub(crate) struct CorrectionFigures {
     pub kept: usize,
 }
 
-impl CorrectionRound {
-    fn of(map: &RidgeMap, planned: &Planned, correction: &Correction) -> Option<Self> {
-        Some(Self {
+/// What a plan leaves above the design.
+struct Standing {
+    /// As a round tells it, its length and factors aside.
+    round: CorrectionRound,
+    /// Places above the target with their heights, mm.
+    above: Vec<(Point3, f64)>,
+}
+
+impl Standing {
+    /// `None` without ridges: there is nothing to correct.
+    fn of_ridges(map: &RidgeMap, planned: &Planned, factors: [f64; 2]) -> Option<Self> {
+        let round = CorrectionRound {
             highest_mm: map.scallop.max_mm?,
-            border_mm: map.borders.iter().map(|place| place.height).fold(0.0, f64::max),
+            border_mm: map.border,
             error_bound_mm: map.scallop.error_bound_mm?,
             median_mm: map.scallop.p50_mm?,
             cutting_length_mm: path_figures(&planned.plan.path, 0.0).cutting_length_mm,
-            factors: correction.range(),
-        })
+            factors,
+        };
+        let places = map.above.iter().map(|place| (place.at, place.height));
+        // The highest place stands between those that cells show.
+        let highest = map.scallop.max_at_mm.map(|at| (at.into(), round.highest_mm));
+        Some(Self { round, above: places.chain(highest).collect() })
     }
 
-    /// What is highest, mm. Its bound is that of coarse cells and decides nothing.
+    /// `None` without ridges.
+    fn of_all(measured: &Measurement, planned: &Planned, factors: [f64; 2]) -> Option<Self> {
+        let (scallop, reached) = (&measured.scallop, &measured.excess.reached);
+        let on_border = measured.excess.kind == ExcessKind::Border;
+        let round = CorrectionRound {
+            highest_mm: scallop.max_mm?,
+            border_mm: if on_border { reached.max_mm } else { 0.0 },
+            error_bound_mm: reached.error_bound_mm,
+            median_mm: scallop.p50_mm?,
+            cutting_length_mm: path_figures(&planned.plan.path, 0.0).cutting_length_mm,
+            factors,
+        };
+        let places = measured.above.iter().map(|place| (place.at, place.height));
+        let highest = scallop.max_at_mm.map(|at| (at.into(), round.highest_mm));
+        let reached = reached.at_mm.map(|at| (at.into(), reached.max_mm));
+        Some(Self { round, above: places.chain(highest).chain(reached).collect() })
+    }
+}
+
+impl CorrectionRound {
+    /// What is highest, mm.
     fn highest(&self) -> f64 {
         self.highest_mm.max(self.border_mm)
     }
@@ -95,72 +136,91 @@ impl CorrectionRound {
     }
 }
 
+/// The loop over one toolpath.
+struct Corrected<'a> {
+    session: &'a Session,
+    request: &'a ToolpathRequest,
+    around: Around<'a>,
+    engine: &'a dyn Engine,
+    /// What no ridge may exceed, mm.
+    target: f64,
+    /// The best plan, by what widths, and what it leaves.
+    best: Planned,
+    widths: Widths,
+    standing: Standing,
+    rounds: Vec<CorrectionRound>,
+    /// The round of the best plan.
+    kept: usize,
+}
+
 impl Session {
-    /// Plans one toolpath, in rounds where its ridges are to be measured and corrected.
-    pub(crate) fn plan_in_rounds(
+    /// Plans, cuts and measures one toolpath, in rounds where what it leaves is to be corrected.
+    pub(crate) fn plan_and_measure(
         &self,
         request: &ToolpathRequest,
         around: Around<'_>,
         engine: &dyn Engine,
         monitor: &dyn Monitor,
-    ) -> Result<Planned, JobError> {
+    ) -> Result<(Planned, Measured), JobError> {
         let surface = request.strategy.definition().part == PartKind::Surface;
-        let (Step::Scallop(target), true) =
-            (request.step, self.scene.correct && surface && engine.maps_ridges())
-        else {
-            return self.plan(request, around, None, monitor);
+        let target = match request.step {
+            Step::Scallop(target) if self.scene.correct && surface => Some(target),
+            _ => None,
         };
-        let asked = (request, around, engine);
-        let mut correction = Correction::default();
-        let (mut best, map) = self.round(asked, &correction, monitor)?;
-        // Without ridges there is nothing to correct.
-        let Some(first) = CorrectionRound::of(&map, &best, &correction) else { return Ok(best) };
-        let (mut rounds, mut kept) = (vec![first], 0);
-        while rounds.len() < MOST_ROUNDS {
-            let round = rounds[kept];
-            let next = if rounds.len() == 1 && !round.holds(target) {
-                narrowed(&map, target, plane_interval(&self.scene.cutter, request.step))
-            } else if round.highest_mm > target
-                || rounds.len() == 1 && round.highest_mm < (1.0 - SLACK) * target
-            {
-                // Remnants along borders do not go with the width of all passes.
-                correction.scaled((aim(target) / round.highest_mm).sqrt().max(MOST_NARROWED))
-            } else {
-                break;
-            };
-            let (planned, ridges) = self.round(asked, &next, monitor)?;
-            let Some(found) = CorrectionRound::of(&ridges, &planned, &next) else { break };
-            if found.is_better(&round, target) {
-                (best, kept, correction) = (planned, rounds.len(), next);
+        let first = self.plan(request, around, None, monitor)?;
+        let map = match target {
+            Some(_) => self.ridges(request, engine, &first, monitor)?,
+            None => None,
+        };
+        let measure = |planned: &Planned| self.measure(request, engine, &planned.plan.path, monitor);
+        let (measured, standing) = match &map {
+            Some(map) => (None, Standing::of_ridges(map, &first, [1.0; 2])),
+            None => {
+                let measured = measure(&first)?;
+                let standing = target.and_then(|_| Standing::of_all(&measured.measurement, &first, [1.0; 2]));
+                (Some(measured), standing)
             }
-            rounds.push(found);
-        }
+        };
+        let (Some(target), Some(standing)) = (target, standing) else {
+            let measured = measured.map_or_else(|| measure(&first), Ok)?;
+            return Ok((first, measured));
+        };
+        let interval = plane_interval(&self.scene.cutter, request.step);
+        let widths = Widths { places: Vec::new(), everywhere: 1.0, interval };
+        let rounds = vec![standing.round];
+        let mut corrected = Corrected {
+            session: self,
+            request,
+            around,
+            engine,
+            target,
+            best: first,
+            widths,
+            standing,
+            rounds,
+            kept: 0,
+        };
+        let measured = match measured {
+            Some(measured) => measured,
+            None => {
+                corrected.by_ridges(monitor)?;
+                corrected.measure_best(monitor)?
+            }
+        };
+        let measured = corrected.by_measurements(measured, monitor)?;
+        let Corrected { mut best, rounds, kept, .. } = corrected;
         best.correction = Some(CorrectionFigures { target_mm: target, rounds, kept: kept + 1 });
-        Ok(best)
+        Ok((best, measured))
     }
 
-    /// A plan and its ridges.
-    fn round(
-        &self,
-        (request, around, engine): (&ToolpathRequest, Around<'_>, &dyn Engine),
-        correction: &Correction,
-        monitor: &dyn Monitor,
-    ) -> Result<(Planned, RidgeMap), JobError> {
-        monitor::check(monitor)?;
-        let correction = Some(Arc::new(correction.clone()));
-        let planned = self.plan(request, around, correction, monitor)?;
-        let map = self.ridges(request, engine, &planned, monitor)?;
-        Ok((planned, map))
-    }
-
-    /// The ridges that a plan leaves.
+    /// The ridges that a plan leaves; `None` where finding them takes as long as measuring all.
     fn ridges(
         &self,
         request: &ToolpathRequest,
         engine: &dyn Engine,
         planned: &Planned,
         monitor: &dyn Monitor,
-    ) -> Result<RidgeMap, JobError> {
+    ) -> Result<Option<RidgeMap>, JobError> {
         let scene = &self.scene;
         monitor.start("measuring the ridges of a plan", 0);
         let cell = scene.simulation.cell.max(plane_interval(&scene.cutter, request.step) / CELLS_A_PASS);
@@ -172,31 +232,127 @@ impl Session {
     }
 }
 
+impl Corrected<'_> {
+    /// Plans anew while ridges on coarse cells stand above the target, or all below it.
+    fn by_ridges(&mut self, monitor: &dyn Monitor) -> Result<(), JobError> {
+        let mut gives_way = true;
+        while self.rounds.len() < MOST_ROUNDS
+            && let Some(next) = self.next(gives_way)
+        {
+            let (planned, factors) = self.plan(&next, monitor)?;
+            let map = self.session.ridges(self.request, self.engine, &planned, monitor)?;
+            let found = map.and_then(|map| Standing::of_ridges(&map, &planned, factors));
+            let Some(found) = found else { break };
+            gives_way = self.keep_if_better(planned, next, found);
+        }
+        Ok(())
+    }
+
+    /// Plans anew while what the verdict is made of stands above the target.
+    fn by_measurements(&mut self, measured: Measured, monitor: &dyn Monitor) -> Result<Measured, JobError> {
+        let (mut measured, mut gives_way) = (Some(measured), true);
+        for _ in 0..MOST_MEASURED {
+            if self.standing.round.holds(self.target) {
+                break;
+            }
+            let Some(next) = self.next(gives_way) else { break };
+            let (planned, factors) = self.plan(&next, monitor)?;
+            // Two at a time might be more than the memory that the run may take.
+            drop(measured.take());
+            let again = self.session.measure(self.request, self.engine, &planned.plan.path, monitor)?;
+            let found = Standing::of_all(&again.measurement, &planned, factors);
+            gives_way = found.is_some_and(|found| self.keep_if_better(planned, next, found));
+            measured = gives_way.then_some(again);
+        }
+        measured.map_or_else(|| self.measure_best(monitor), Ok)
+    }
+
+    /// The widths to try next: narrower where the best plan stands too high, while that helps; else all in proportion, to which
+    /// remnants along borders do not give way.
+    fn next(&self, gives_way: bool) -> Option<Widths> {
+        let (target, CorrectionRound { highest_mm, .. }) = (self.target, self.standing.round);
+        if !self.standing.round.holds(target) && gives_way {
+            return Some(self.widths.narrowed(&self.standing.above, target));
+        }
+        let low = self.rounds.len() == 1 && highest_mm < (1.0 - SLACK) * target;
+        (highest_mm > target || low)
+            .then(|| self.widths.scaled((aim(target) / highest_mm).sqrt().max(MOST_NARROWED)))
+    }
+
+    /// The plan by given widths, and their least and greatest factors.
+    fn plan(&self, widths: &Widths, monitor: &dyn Monitor) -> Result<(Planned, [f64; 2]), JobError> {
+        monitor::check(monitor)?;
+        let correction = widths.correction();
+        let factors = correction.range();
+        let earlier = Earlier { correction, functions: self.best.plan.functions.clone() };
+        Ok((self.session.plan(self.request, self.around, Some(Arc::new(earlier)), monitor)?, factors))
+    }
+
+    /// Measures all of the best plan.
+    fn measure_best(&mut self, monitor: &dyn Monitor) -> Result<Measured, JobError> {
+        let measured = self.session.measure(self.request, self.engine, &self.best.plan.path, monitor)?;
+        let factors = self.standing.round.factors;
+        if let Some(standing) = Standing::of_all(&measured.measurement, &self.best, factors) {
+            self.rounds[self.kept] = standing.round;
+            self.standing = standing;
+        }
+        Ok(measured)
+    }
+
+    fn keep_if_better(&mut self, planned: Planned, widths: Widths, found: Standing) -> bool {
+        let better = found.round.is_better(&self.standing.round, self.target);
+        self.rounds.push(found.round);
+        if better {
+            (self.best, self.widths, self.standing, self.kept) =
+                (planned, widths, found, self.rounds.len() - 1);
+        }
+        better
+    }
+}
+
 /// The height that corrected ridges are to have, mm.
 fn aim(target: f64) -> f64 {
     (1.0 - 0.5 * SLACK) * target
 }
 
-/// The factors that bring ridges above the target to the middle of the slack: height goes with the square of width.
-fn narrowed(map: &RidgeMap, target: f64, interval: f64) -> Correction {
-    let factor = |height: f64| {
-        if height > target { (aim(target) / height).sqrt().max(MOST_NARROWED) } else { 1.0 }
-    };
-    // The highest place stands between those that cells show.
-    let highest =
-        map.scallop.max_at_mm.zip(map.scallop.max_mm).map(|(at, height)| (at.into(), factor(height)));
-    // Borders that are lower than need be say nothing of the passes further in.
-    let borders = map.borders.iter().filter(|place| place.height > target);
-    let places = map.places.iter().chain(borders).map(|ridge| (ridge.at, factor(ridge.height)));
-    let places: Vec<_> = places.chain(highest).collect();
-    Correction::new(&places, interval)
+/// How much narrower or wider than by calculation passes are planned.
+#[derive(Debug, Clone, PartialEq)]
+struct Widths {
+    /// Places where ridges stood above the target, with their factors.
+    places: Vec<(Point3, f64)>,
+    /// The factor of all places.
+    everywhere: f64,
+    /// How far around a place its factor holds, mm: the interval of passes on a plane.
+    interval: f64,
+}
+
+impl Widths {
+    fn correction(&self) -> Correction {
+        Correction::new(&self.places, self.interval).scaled(self.everywhere)
+    }
+
+    fn scaled(&self, factor: f64) -> Self {
+        Self { everywhere: factor * self.everywhere, ..self.clone() }
+    }
+
+    /// Narrower where ridges and borders stand above the target, so that they come to the middle of the slack: height goes
+    /// with the square of width. A place that was narrowed already and did not give way enough is narrowed by twice as much:
+    /// there passes may lie nearer than they have to, or less than all of the height goes with their width.
+    fn narrowed(&self, standing: &[(Point3, f64)], target: f64) -> Self {
+        let now = Correction::new(&self.places, self.interval);
+        let above = standing.iter().filter(|(_, height)| *height > target);
+        let narrower = above.map(|&(at, height)| {
+            let before = now.at(&at);
+            let power = if before < 1.0 - STILL_WIDE { 1.0 } else { 0.5 };
+            (at, before * (aim(target) / height).powf(power).max(MOST_NARROWED))
+        });
+        Self { places: self.places.iter().copied().chain(narrower).collect(), ..self.clone() }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use geometry::Point3;
-    use metrology::{RidgePlace, ScallopFigures};
     use scene::Scene;
     use work::monitor::Silent;
 
@@ -244,15 +400,16 @@ mod tests {
 
     #[test]
     fn widths_go_with_the_root_of_heights_above_the_target() {
-        let ridges = [(0.0, 1.2), (10.0, 0.99), (20.0, 0.5)];
-        let places = ridges.map(|(x, height)| RidgePlace { at: Point3::new(x, 0.0, 0.0), height });
-        let border = RidgePlace { at: Point3::new(40.0, 0.0, 0.0), height: 1.1 };
-        let map =
-            RidgeMap { places: places.to_vec(), borders: vec![border], scallop: ScallopFigures::default() };
-        let found = narrowed(&map, 1.0, 1.0);
-        assert!((found.at(&border.at) - (0.99f64 / 1.1).sqrt()).abs() < 1e-12);
-        let found = places.map(|place| found.at(&place.at));
-        let wanted = [(0.99f64 / 1.2).sqrt(), 1.0, 1.0];
+        let places = [(0.0, 1.2), (10.0, 0.99), (20.0, 0.5), (40.0, 1.1)];
+        let places = places.map(|(x, height)| (Point3::new(x, 0.0, 0.0), height));
+        let by_calculation = Widths { places: Vec::new(), everywhere: 1.0, interval: 1.0 };
+        let once = by_calculation.narrowed(&places, 1.0);
+        let found = places.map(|(at, _)| once.correction().at(&at));
+        let wanted = [(0.99f64 / 1.2).sqrt(), 1.0, 1.0, (0.99f64 / 1.1).sqrt()];
         assert!(found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
+        // What was narrowed stays so, and is narrowed further where that was not enough.
+        let twice = once.narrowed(&[(places[0].0, 1.1)], 1.0).correction();
+        assert!((twice.at(&places[0].0) - wanted[0] * 0.99 / 1.1).abs() < 1e-12);
+        assert!((twice.at(&places[3].0) - wanted[3]).abs() < 1e-12);
     }
 }

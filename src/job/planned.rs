@@ -10,8 +10,8 @@ use metrology::{ContactArcs, finer_contact_arcs};
 use motion::Toolpath;
 use scene::{Scene, ToolpathRequest};
 use toolpath::{
-    Correction, Engagement, OffsetDrive, OffsetSurface, Plan, PlanError, PlanSettings, PocketStrategy,
-    Strategy, Tilting, engagement, plan, plan_pocket, plan_tilted,
+    Earlier, Engagement, OffsetDrive, OffsetSurface, Plan, PlanError, PlanSettings, PocketStrategy, Strategy,
+    Tilting, engagement, plan, plan_pocket, plan_tilted,
 };
 use work::monitor::Monitor;
 
@@ -62,17 +62,17 @@ impl Planned {
 }
 
 impl Session {
-    /// Plans one toolpath, its passes spaced by what was measured of earlier plans.
+    /// Plans one toolpath, from what an earlier plan left if there is one.
     pub(crate) fn plan(
         &self,
         request: &ToolpathRequest,
         around: Around<'_>,
-        correction: Option<Arc<Correction>>,
+        earlier: Option<Arc<Earlier>>,
         monitor: &dyn Monitor,
     ) -> Result<Planned, JobError> {
         let scene = &self.scene;
         let strategy = self.strategy(request)?;
-        let settings = PlanSettings { correction, ..self.settings(request) };
+        let settings = PlanSettings { earlier, ..self.settings(request) };
         let planned = |strategy: &dyn Strategy| {
             let found = self.path(request, strategy, &settings, around, monitor);
             let mut plan = found.map_err(|e| self.refused(request, e))?;
@@ -121,7 +121,7 @@ impl Session {
             plunge_rate: self.scene.cutting.plunge_rate,
             rapid_rate: self.scene.machine.rapid_rate,
             joining: request.joining,
-            correction: None,
+            earlier: None,
         }
     }
 

@@ -1,7 +1,6 @@
 //! A scene with its part, ready to run its toolpaths.
 
 use std::path::Path;
-use std::time::Instant;
 
 use blade::Blade;
 use geometry::{Aabb, Bvh};
@@ -156,9 +155,7 @@ impl Session {
         let closer = if engine.tilts() { self.closer_part() } else { None };
         let near = closer.as_ref().unwrap_or(&self.part);
         let around = Around { tool: &tool, near, fixtures: &fixtures };
-        let planned = self.plan_in_rounds(request, around, engine, monitor)?;
-        let begun = Instant::now();
-        let mut measured = self.measure(request, engine, &planned.plan.path, monitor)?;
+        let (planned, mut measured) = self.plan_and_measure(request, around, engine, monitor)?;
         for region in &mut measured.measurement.gouge.regions {
             region.line = planned.plan.path.line_of(region.move_index as usize).unwrap_or_default();
         }
@@ -173,7 +170,7 @@ impl Session {
             refined_rectangles: measured.refined_rectangles,
             finest_cell_mm: measured.finest_cell,
             moves: planned.plan.path.len(),
-            wall_s: begun.elapsed().as_secs_f64(),
+            wall_s: measured.wall_s,
             threads: work::parallel::threads(),
         };
         let (verdict, claims) =
@@ -210,7 +207,7 @@ impl Session {
     }
 
     /// Cuts and measures; on finer cells where a limit hangs on that.
-    fn measure(
+    pub(crate) fn measure(
         &self,
         request: &ToolpathRequest,
         engine: &dyn Engine,
@@ -233,7 +230,9 @@ impl Session {
             let Ok(cells) = self.budget().grid_before_planning(&self.area(), &simulation) else { break };
             match engine.measure(&self.task(path, &simulation, &cells), monitor) {
                 Ok(finer) => {
-                    measured = Measured { note: finer_note(&simulation, scene).or(finer.note), ..finer }
+                    let wall_s = measured.wall_s + finer.wall_s;
+                    measured =
+                        Measured { note: finer_note(&simulation, scene).or(finer.note), wall_s, ..finer }
                 }
                 Err(EngineError::Cancelled(cancelled)) => return Err(cancelled.into()),
                 // It does not fit into the memory: what was measured stands.

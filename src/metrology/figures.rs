@@ -4,6 +4,7 @@
 use serde::Serialize;
 
 use super::pairs::PairFigures;
+use super::ridge_map::RidgePlace;
 
 /// Numerical floor of every bound, mm: root finding and the design surface's own evaluation.
 pub(crate) const NUMERICAL_FLOOR: f64 = 1e-6;
@@ -284,6 +285,9 @@ pub struct Measurement {
     pub deviation_map: Vec<f32>,
     /// Height and weight (ridge length, mm) of every ridge sample.
     pub ridge_samples: Vec<[f32; 2]>,
+    /// Places above the scallop limit and within the uncut tolerance, on ridges and along borders: where passes lie too far
+    /// apart.
+    pub above: Vec<RidgePlace>,
     /// Scallops of pairs of passes, calculated beside measured.
     pub pairs: PairFigures,
     /// How the figures were refined.

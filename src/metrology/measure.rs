@@ -7,6 +7,7 @@ use super::inspected::inspect;
 use super::inspection::Inspection;
 use super::pairs::pair_figures;
 use super::refine::{Asked, Refinement};
+use super::ridge_map::borders;
 use super::ridges::scallop_figures;
 use super::unseen::{dips, unseen_depth};
 use cutter::Cutter;
@@ -42,7 +43,12 @@ pub fn measure(
     let lean = found.least_lean;
     let hidden = found.ridges.hidden.clone();
     let pairs = pair_figures(part, cutter, path, std::mem::take(&mut found.ridges.pairs), monitor)?;
+    let mut above = std::mem::take(&mut found.ridges.above);
+    above.extend(
+        borders(&inspection, &found.samples).into_iter().filter(|place| place.height > limits.scallop),
+    );
     let mut measured = Measurement {
+        above,
         scallop: scallop_figures(&found.ridges.samples, found.highest, limits),
         gouge: found.gouge,
         uncut: found.uncut,

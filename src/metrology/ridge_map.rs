@@ -23,10 +23,10 @@ pub struct RidgePlace {
 /// All ridges of a cut surface.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RidgeMap {
-    /// Their places, one where a ridge crosses from a cell to the next.
-    pub places: Vec<RidgePlace>,
-    /// What stands along the part's borders, one place a side of a cell.
-    pub borders: Vec<RidgePlace>,
+    /// Places above the scallop limit: where a ridge crosses from a cell to the next, and sides of cells along the borders.
+    pub above: Vec<RidgePlace>,
+    /// The highest remnant along a border, mm.
+    pub border: f64,
     /// Their figures, with the bound of the highest.
     pub scallop: ScallopFigures,
 }
@@ -45,17 +45,19 @@ pub(super) fn ridge_map(
     let surface = CutSurface::new(Envelope::new(cutter, path), cut, path);
     let inspection = Inspection { part, cutter, limits, asked, surface: &surface, grid: cut.grid };
     let samples = inspection.samples(monitor)?;
-    let mut finder = RidgeFinder::new(&surface, part, cutter, path, limits);
-    finder.keeps_places = true;
+    let finder = RidgeFinder::new(&surface, part, cutter, path, limits);
     let mut ridges = finder.find(&|k| samples[k].deviation, monitor)?;
-    let places = std::mem::take(&mut ridges.places);
+    let mut above = std::mem::take(&mut ridges.above);
     let scallop = scallop_figures(&ridges.samples, finder.highest(&ridges, asked), limits);
-    Ok(RidgeMap { places, borders: borders(&inspection, &samples), scallop })
+    let borders = borders(&inspection, &samples);
+    let border = borders.iter().map(|place| place.height).fold(0.0, f64::max);
+    above.extend(borders.into_iter().filter(|place| place.height > limits.scallop));
+    Ok(RidgeMap { above, border, scallop })
 }
 
 /// What stands at the outer sides of the cells that lie at the part's border. What is higher than the uncut tolerance is no
 /// remnant of a pass.
-fn borders(inspection: &Inspection<'_>, samples: &[Sample]) -> Vec<RidgePlace> {
+pub(super) fn borders(inspection: &Inspection<'_>, samples: &[Sample]) -> Vec<RidgePlace> {
     let Inspection { grid, limits, .. } = *inspection;
     let on = |i: usize, j: usize| i < grid.nx && j < grid.ny && !samples[grid.index(i, j)].deviation.is_nan();
     let of_row = |j: usize| {

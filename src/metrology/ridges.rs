@@ -63,8 +63,8 @@ pub(super) struct Ridges {
     pub hidden: Vec<Hidden>,
     /// The ridges of each pair of passes.
     pub pairs: PairTally,
-    /// Where each sample stands, where that is kept.
-    pub places: Vec<RidgePlace>,
+    /// The samples above the scallop limit.
+    pub above: Vec<RidgePlace>,
 }
 
 /// A place between centres where more stands than the cells around saw.
@@ -86,7 +86,7 @@ impl Ridges {
             candidates: highest.into_iter().chain(others).copied().collect(),
             hidden,
             pairs: PairTally::default(),
-            places: Vec::new(),
+            above: Vec::new(),
         }
     }
 
@@ -129,8 +129,6 @@ pub(super) struct RidgeFinder<'a> {
     pub part: &'a Part,
     pub cutter: &'a Cutter,
     pub limits: &'a Limits,
-    /// Whether the places of all samples are kept.
-    pub keeps_places: bool,
     meetings: Meetings<'a>,
     path: &'a Toolpath,
 }
@@ -171,7 +169,7 @@ impl<'a> RidgeFinder<'a> {
         limits: &'a Limits,
     ) -> Self {
         let meetings = Meetings::new(surface, cutter, path, None);
-        Self { surface, part, cutter, limits, keeps_places: false, meetings, path }
+        Self { surface, part, cutter, limits, meetings, path }
     }
 
     /// All ridges, row by row. `deviation` is that of a cell, mm, NaN where it is not measured.
@@ -209,9 +207,9 @@ impl<'a> RidgeFinder<'a> {
                 }
             }
             monitor.advance(1);
-            let kept = if self.keeps_places { &samples[..] } else { &[] };
-            let places = kept.iter().map(|s| RidgePlace { at: s.at, height: s.height }).collect();
-            Ok(Ridges { pairs: self.pairs(&samples), places, ..Ridges::of_row(&samples, hidden) })
+            let above = samples.iter().filter(|s| s.height > self.limits.scallop);
+            let above = above.map(|s| RidgePlace { at: s.at, height: s.height }).collect();
+            Ok(Ridges { pairs: self.pairs(&samples), above, ..Ridges::of_row(&samples, hidden) })
         })?;
         let mut ridges = Ridges {
             samples: Vec::with_capacity(rows.iter().map(|r| r.samples.len()).sum()),
@@ -219,7 +217,7 @@ impl<'a> RidgeFinder<'a> {
         };
         for row in rows {
             ridges.samples.extend(row.samples);
-            ridges.places.extend(row.places);
+            ridges.above.extend(row.above);
             ridges.candidates.extend(row.candidates);
             ridges.hidden.extend(row.hidden);
             ridges.pairs.append(row.pairs);

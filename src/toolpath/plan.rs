@@ -8,8 +8,8 @@ use crate::strategies::words_for;
 use crate::surface::mesh_surface;
 use crate::tilt::tilted::{self, TiltedPasses, Tilting};
 use crate::vocabulary::{
-    Contact, PartKind, PassSettings, Passes, PlanError, PlanSettings, SAMPLING_OVER_RADIUS, Setup, Step,
-    Strategy, Task,
+    Contact, Levelled, PartKind, PassSettings, Passes, PlanError, PlanSettings, SAMPLING_OVER_RADIUS, Setup,
+    Step, Strategy, Task,
 };
 use cutter::Cutter;
 use field::{PlannedField, ShortestPossible};
@@ -29,6 +29,8 @@ pub struct Plan {
     pub shortest: Option<ShortestPossible>,
     /// What a streamline path was planned by.
     pub field: Option<PlannedField>,
+    /// The functions that its passes are levels of.
+    pub functions: Vec<Levelled>,
 }
 
 impl Plan {
@@ -46,7 +48,7 @@ impl Plan {
         if path.is_empty() {
             notes.push("no pass reaches the part: the program is empty".into());
         }
-        Self { path, notes, shortest: None, field }
+        Self { path, notes, shortest: None, field, functions: Vec::new() }
     }
 }
 
@@ -95,9 +97,9 @@ pub fn plan(
     monitor: &dyn Monitor,
 ) -> Result<Plan, PlanError> {
     let setup = Setup { part, cutter, settings, monitor };
-    let Passes { passes, notes, field, contacts, .. } = passes(&setup, strategy, None)?;
+    let Passes { passes, notes, field, contacts, functions, .. } = passes(&setup, strategy, None)?;
     let path = join(passes, strategy.both_ways(), &setup)?;
-    let mut plan = Plan::new(path, notes, field, &contacts, strategy);
+    let mut plan = Plan { functions, ..Plan::new(path, notes, field, &contacts, strategy) };
     if let Step::Scallop(h) = settings.step {
         plan.shortest = Some(shortest_possible(part, cutter, h)?);
     }
@@ -121,7 +123,7 @@ pub fn plan_tilted(
     monitor: &dyn Monitor,
 ) -> Result<Plan, PlanError> {
     let setup = Setup { part, cutter, settings, monitor };
-    let Passes { passes, touches, mut notes, field, contacts } =
+    let Passes { passes, touches, mut notes, field, contacts, functions } =
         passes(&setup, strategy, Some(tilting.axis))?;
     let mut touches = if touches.is_empty() && !passes.is_empty() {
         let dropped = tilted::probe(cutter).unwrap_or(*cutter);
@@ -132,7 +134,7 @@ pub fn plan_tilted(
     };
     touches.smoothing = settings.joining.smoothing.then_some(SAMPLING_OVER_RADIUS * cutter.radius());
     let path = join_tilted(touches, strategy.both_ways(), tilting, &setup, &mut notes)?;
-    Ok(Plan::new(path, notes, field, &contacts, strategy))
+    Ok(Plan { functions, ..Plan::new(path, notes, field, &contacts, strategy) })
 }
 
 /// The passes of a strategy, not yet joined.
@@ -152,7 +154,7 @@ fn passes(setup: &Setup<'_>, strategy: &dyn Strategy, axis: Option<&ToolAxis>) -
         // A tilted cutter's passes are smoothed once they are tilted.
         smoothing: (settings.joining.smoothing && axis.is_none()).then_some(sampling),
         axis,
-        correction: settings.correction.as_deref(),
+        earlier: settings.earlier.as_deref(),
         probe: probe.as_ref(),
     };
     let wants_mesh = mesh_surface::wants_mesh(part, cutter);

@@ -57,6 +57,7 @@ fn measurement(gouge: f64) -> Measurement {
         },
         deviation_map: Vec::new(),
         ridge_samples: vec![[0.0095, 1.0], [0.007, 99.0]],
+        above: Vec::new(),
         pairs: PairFigures {
             reason: Some("no ridge stands between passes on the part".into()),
             ..PairFigures::default()

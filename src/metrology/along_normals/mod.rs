@@ -30,6 +30,7 @@ use super::figures::{
     UncutFigures,
 };
 use super::pairs::{PairTally, RidgeCrossing, pair_figures};
+use super::ridge_map::RidgePlace;
 use super::ridges::{Highest, scallop_figures};
 use super::tracks::Tracks;
 use super::turning::contact as contact_of;
@@ -285,7 +286,15 @@ impl Along<'_> {
             triangles: net.triangles,
             grids: net.grids,
         };
+        let above = |height: f64| height > limits.scallop && height <= limits.uncut;
+        let ridges = of_triangle.iter().flatten().filter(|c| above(c.height));
+        let ridges = ridges.map(|c| RidgePlace { at: c.at, height: c.height });
+        let places = judged().filter_map(|sample| Some((sample.hit?.deviation, sample.place.point)));
+        let places =
+            places.filter(|(height, _)| above(*height)).map(|(height, at)| RidgePlace { at, height });
+        let above = ridges.chain(places).collect();
         let measured = Measurement {
+            above,
             scallop,
             gouge,
             uncut,

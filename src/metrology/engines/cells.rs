@@ -1,5 +1,7 @@
 //! Engines on cells over the plan view, for upright cutters.
 
+use std::time::Instant;
+
 use cutter::Cutter;
 use motion::Toolpath;
 use sim::{ZMap, cut, cut_reference};
@@ -44,19 +46,16 @@ impl Engine for Cells {
         true
     }
 
-    fn maps_ridges(&self) -> bool {
-        true
-    }
-
-    fn ridges(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<RidgeMap, EngineError> {
+    fn ridges(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Option<RidgeMap>, EngineError> {
         let path = task.path;
         let (grid, _) = task.budget.grid_for(path.len(), &task.area, task.simulation, task.cells)?;
         let cut = (self.cut)(ZMap::block(grid, task.top), task.cutter, path, monitor)?;
         let asked = task.simulation.error_bound;
-        Ok(ridge_map(task.part, task.cutter, path, &cut, task.limits, asked, monitor)?)
+        Ok(Some(ridge_map(task.part, task.cutter, path, &cut, task.limits, asked, monitor)?))
     }
 
     fn measure(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Measured, EngineError> {
+        let begun = Instant::now();
         let path = task.path;
         let (grid, note) = task.budget.grid_for(path.len(), &task.area, task.simulation, task.cells)?;
         let cut = (self.cut)(ZMap::block(grid, task.top), task.cutter, path, monitor)?;
@@ -75,6 +74,7 @@ impl Engine for Cells {
             finest_cell: measurement.refined.finest_cell,
             measurement,
             view: View::Heights(cut),
+            wall_s: begun.elapsed().as_secs_f64(),
             note,
         })
     }

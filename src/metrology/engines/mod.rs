@@ -29,17 +29,12 @@ pub trait Engine: Sync {
     fn tilts(&self) -> bool;
     /// Whether it measures the floor of a pocket.
     fn measures_pockets(&self) -> bool;
-    /// Whether it tells where ridges stand.
-    fn maps_ridges(&self) -> bool {
-        false
-    }
-    /// Cuts, and measures ridges only, with their places where [`Engine::maps_ridges`].
+    /// Cuts, and measures no more than ridges and borders; `None` where that takes as long as all.
     ///
     /// # Errors
     /// [`EngineError`].
-    fn ridges(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<RidgeMap, EngineError> {
-        let scallop = self.measure(task, monitor)?.measurement.scallop;
-        Ok(RidgeMap { places: Vec::new(), borders: Vec::new(), scallop })
+    fn ridges(&self, _task: &Task<'_>, _monitor: &dyn Monitor) -> Result<Option<RidgeMap>, EngineError> {
+        Ok(None)
     }
     /// Cuts and measures.
     ///

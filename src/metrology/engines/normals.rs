@@ -1,5 +1,7 @@
 //! Engines along the normals of the design, for any cutter axis and any shape.
 
+use std::time::Instant;
+
 use cutter::Solid;
 use geometry::{Aabb, Vector3};
 use sim::{Rays, VoxelEngine, VoxelStock, Voxels};
@@ -55,6 +57,7 @@ impl Engine for Normals {
     }
 
     fn measure(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Measured, EngineError> {
+        let begun = Instant::now();
         let (part, path, cutter) = (task.part, task.path, task.cutter);
         let solid = Solid::of_cutter(cutter, task.holder);
         // Deviations are exact at the places, and ridges are found between them, so that fewer do than cells.
@@ -84,6 +87,7 @@ impl Engine for Normals {
             refined_rectangles: 0,
             finest_cell,
             view: View::Normals(Box::new(NormalView { map, spacing, rays, solid })),
+            wall_s: begun.elapsed().as_secs_f64(),
             note: None,
         })
     }

@@ -109,6 +109,8 @@ pub struct Measured {
     pub refined_rectangles: usize,
     /// Pitch of the finest cells, mm.
     pub finest_cell: f64,
+    /// Time that cutting and measuring took, s.
+    pub wall_s: f64,
     /// What is to be said about the cells.
     pub note: Option<String>,
 }

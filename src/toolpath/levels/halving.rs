@@ -15,9 +15,9 @@ use work::monitor::{self, Cancelled, Monitor};
 /// sixty-fourth; only singular points of the field ask for more, and are measured.
 const MOST_HALVINGS: usize = 6;
 
-/// An interval may exceed the allowed one by this share before a further pass is put in: 2 % are
-/// 4 % of the scallop height.
-const INTERVAL_SLACK: f64 = 0.02;
+/// An interval may exceed the allowed one by this share before a further pass is put in: half a per cent is one of the scallop
+/// height. What that leaves above the target is measured and corrected.
+const INTERVAL_SLACK: f64 = 0.005;
 
 /// Further passes reach beyond the stretch that needs them by this many allowed intervals, so that
 /// their ends lie where the interval is wide enough without them.

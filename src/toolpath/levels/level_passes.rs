@@ -12,7 +12,7 @@ use crate::drop::{Beside, DropCutter};
 use crate::moves::touch::Touch;
 use crate::surface::chart::Chart;
 use crate::tilt::tilted;
-use crate::vocabulary::{Contact, PassSettings, Passes, PlanError, Step, Task};
+use crate::vocabulary::{Contact, Levelled, PassSettings, Passes, PlanError, Step, Task};
 use cutter::Cutter;
 use field::{LevelCurve, LevelTracer, ScalarField, surface_gradient_length};
 use geometry::Point3;
@@ -51,6 +51,18 @@ const BORDER_PRECISION: f64 = 1e-6;
 /// Places levels, traces them and turns them into passes.
 pub(crate) fn along_levels(task: &Task<'_>, chart: &Chart, field: &ScalarField) -> Result<Passes, PlanError> {
     along_levels_placed(task, chart, field, LevelSteps::Shortest)
+}
+
+/// [`along_levels`] of a function that an earlier plan left.
+pub(crate) fn along_earlier(
+    task: &Task<'_>,
+    chart: &Chart,
+    field: &ScalarField,
+    levelled: &Levelled,
+) -> Result<Passes, PlanError> {
+    let mut passes = along_levels(task, chart, field)?;
+    levelled.clone().put_with(&mut passes);
+    Ok(passes)
 }
 
 /// [`along_levels`] with levels placed in a given way.

@@ -18,7 +18,7 @@ fn settings(links: Links) -> PlanSettings {
         plunge_rate: 300.0,
         rapid_rate: 15_000.0,
         joining: Joining { links, ..Joining::default() },
-        correction: None,
+        earlier: None,
     }
 }
 

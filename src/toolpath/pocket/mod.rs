@@ -153,7 +153,7 @@ pub fn plan_pocket(
         run.points = descend::shortened(&run.points, chords, MOVE_OVER_RADIUS * radius, turn);
     }
     let path = descend::program(&runs, pocket.depth, strategy, settings);
-    Ok(Plan { path, notes, shortest: None, field: None })
+    Ok(Plan { path, notes, shortest: None, field: None, functions: Vec::new() })
 }
 
 /// Puts loops into the runs where more of the circumference than the limit would stand in stock.

@@ -8,11 +8,14 @@
 //! are put in there.
 
 use std::fmt::{self, Write as _};
+use std::sync::Arc;
 
-use crate::levels::level_passes::along_levels;
+use crate::levels::level_passes::{along_earlier, along_levels};
 use crate::levels::spacing::level_tangent;
 use crate::surface::chart::{Chart, ChartPoint};
-use crate::vocabulary::{Along, Definition, PartKind, Passes, PlanError, Reading, Step, Strategy, Task};
+use crate::vocabulary::{
+    Along, Definition, LevelFunction, Levelled, PartKind, Passes, PlanError, Reading, Step, Strategy, Task,
+};
 use cutter::Cutter;
 use field::{EikonalError, Front, GridField, ScalarField, Start, eikonal, surface_gradient_length};
 use keys::{SceneError, toml_number, word_of};
@@ -121,8 +124,12 @@ impl Strategy for IsoScallop {
 
     fn passes(&self, task: &Task<'_>) -> Result<Passes, PlanError> {
         let mut all = Passes::default();
-        for chart in Chart::all(task.part, task.cutter, task.settings.guide())? {
-            all.append(on_chart(task, &chart, self.start, f64::INFINITY)?);
+        let charts = Chart::all(task.part, task.cutter, task.settings.guide())?;
+        for (k, chart) in charts.iter().enumerate() {
+            all.append(match task.earlier_on_chart(k, charts.len()) {
+                Some((field, levelled)) => along_earlier(task, chart, field, levelled)?,
+                None => on_chart(task, chart, self.start, f64::INFINITY)?,
+            });
         }
         Ok(all)
     }
@@ -148,15 +155,15 @@ pub(crate) fn on_chart(
     let searched = tried.len();
     let mut planned = Vec::new();
     for (length, name, field) in tried.into_iter().take(PLANNED).filter(|(length, ..)| *length < worth) {
-        planned.push((along_levels(task, chart, &field)?, name, length));
+        planned.push((along_levels(task, chart, &field)?, field, name, length));
     }
     planned.sort_by(|a, b| a.0.length().total_cmp(&b.0.length()));
-    let Some((mut best, name, length)) = planned.into_iter().next() else { return Ok(Passes::default()) };
-    best.notes.push(format!(
-        "passes start {name}{}: {:.0} mm planned, {length:.0} mm predicted",
-        if searched > 1 { ", the best of four borders" } else { "" },
-        best.length()
-    ));
+    let Some((mut best, field, name, length)) = planned.into_iter().next() else {
+        return Ok(Passes::default());
+    };
+    let told = format!("passes start {name}{}", if searched > 1 { ", the best of four borders" } else { "" });
+    let function = LevelFunction::Chart(Arc::new(field));
+    Levelled { function, told: Some((told, length)) }.put_with(&mut best);
     Ok(best)
 }
 
@@ -310,7 +317,7 @@ mod tests {
             chord_tolerance: 1e-3,
             smoothing: None,
             axis: None,
-            correction: None,
+            earlier: None,
             probe: None,
         };
         let chart = &Chart::all(&part, &cutter, crate::vocabulary::Guide::default()).unwrap()[0];

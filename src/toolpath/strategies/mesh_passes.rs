@@ -7,7 +7,7 @@
 //! the cutter there, so that the mesh decides where passes run, never how deep.
 
 use super::mesh_shortest::shortest_stream;
-use super::shortest::shortest_note;
+use super::shortest::SHORTEST;
 use crate::drop::DropCutter;
 use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between};
 use crate::levels::planned_field;
@@ -15,7 +15,9 @@ use crate::levels::spacing::{AllowedStep, LevelSteps, place_levels};
 use crate::surface::border::useful_overrun;
 use crate::surface::feed::{self, SMOOTHING_OVER_RADIUS};
 use crate::surface::mesh_surface::{MeshSurface, Piece, not_applicable, reachable};
-use crate::vocabulary::{Contact, FeedDirection, PassSettings, Passes, PlanError, Step, Task};
+use crate::vocabulary::{
+    Contact, FeedDirection, LevelFunction, Levelled, PassSettings, Passes, PlanError, Step, Task,
+};
 use cutter::Cutter;
 use field::DIRECTION_WEIGHT;
 use field::mesh::{
@@ -82,21 +84,35 @@ pub(crate) fn on_mesh(task: &Task<'_>, aim: Aim) -> Result<Passes, PlanError> {
             reached.steep_area
         ));
     }
-    for piece in &reached.pieces {
+    let count = reached.pieces.len();
+    for (k, piece) in reached.pieces.iter().enumerate() {
         let surface = MeshSurface::with_margin(piece, BORDER_SHARE * flat)?;
-        all.append(on_piece(task, aim, piece, &surface)?);
+        all.append(on_piece(task, aim, piece, &surface, task.earlier_on_mesh(k, count))?);
     }
     Ok(all)
 }
 
-fn on_piece(task: &Task<'_>, aim: Aim, piece: &Piece, surface: &MeshSurface) -> Result<Passes, PlanError> {
+fn on_piece(
+    task: &Task<'_>,
+    aim: Aim,
+    piece: &Piece,
+    surface: &MeshSurface,
+    earlier: Option<(&[f64], &Levelled)>,
+) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, monitor, .. } = *task;
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     // Notes and field, to which passes come later.
     let mut all = Passes::default();
-    let (values, predicted) = match aim {
-        Aim::Fitted(direction) => (along_direction(task, direction, piece, surface, &mut all)?, None),
-        Aim::Shortest(toward) => {
+    let levelled = match (aim, earlier) {
+        // A fitted function is solved again, with its notes: that takes little.
+        (Aim::Fitted(direction), _) => {
+            let values = along_direction(task, direction, piece, surface, &mut all)?;
+            Levelled { function: LevelFunction::Mesh(values.into()), told: None }
+        }
+        (Aim::Shortest(_), Some((values, levelled))) if values.len() == surface.mesh.points().len() => {
+            levelled.clone()
+        }
+        (Aim::Shortest(toward), _) => {
             let lines = toward.map(|(direction, dearer)| {
                 let (lines, matters) = feed_lines(task, direction, piece, surface, &mut all)?;
                 let pull = |(line, matters): (&Line, &f64)| (line.direction, dearer * matters);
@@ -106,16 +122,20 @@ fn on_piece(task: &Task<'_>, aim: Aim, piece: &Piece, surface: &MeshSurface) -> 
             let found = shortest_stream(surface, cutter, settings, toward.as_deref(), monitor)?;
             let found =
                 found.ok_or_else(|| not_applicable("no stream function of least length was found"))?;
-            (found.coefficients, toward.is_none().then_some(found.cost))
+            let told = toward.is_none().then(|| (SHORTEST.to_owned(), found.cost));
+            Levelled { function: LevelFunction::Mesh(found.coefficients.into()), told }
         }
     };
-    let levels = MeshLevels::new(&surface.mesh, &values).map_err(refused)?;
+    let LevelFunction::Mesh(values) = &levelled.function else {
+        return Err(not_applicable("an earlier plan was made on a chart"));
+    };
+    let levels = MeshLevels::new(&surface.mesh, values).map_err(refused)?;
     let own_values = values.iter().zip(&surface.origin).enumerate();
     let own_values = own_values.filter(|&(v, (_, &origin))| origin as usize == v).map(|(_, (psi, _))| *psi);
     let range = own_values.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], x| [lo.min(x), hi.max(x)]);
     let drop = DropCutter::new(part, cutter);
     let guide = MeshGuide { surface, levels, cutter, drop, settings, monitor };
-    let places = guide.places(&values);
+    let places = guide.places(values);
     let placed = place_levels(&places, range, LevelSteps::Shortest, &mut all.notes);
     planned_field::set_mesh_levels(&mut all.field, &guide.levels, range, surface.own_triangles);
     if matches!(aim, Aim::Shortest(None)) {
@@ -128,7 +148,7 @@ fn on_piece(task: &Task<'_>, aim: Aim, piece: &Piece, surface: &MeshSurface) -> 
         );
     }
     all.append(along_and_between(&guide, &placed, range, settings.sampling, monitor)?);
-    all.notes.extend(predicted.map(|predicted| shortest_note(&all, predicted)));
+    levelled.put_with(&mut all);
     Ok(all)
 }
 
@@ -154,11 +174,9 @@ fn along_direction(
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     let mesh = &surface.mesh;
     let (lines, matters) = feed_lines(task, direction, piece, surface, all)?;
-    let guide = settings.guide();
-    let width = |v: usize, b: &Vector3| {
-        let (width, _) = width_at(cutter, &mesh.normals()[v], b, &surface.bends[v], settings.step);
-        guide.corrected(width, &mesh.points()[v], settings.step)
-    };
+    // What was measured of an earlier plan moves levels, not the function.
+    let width =
+        |v: usize, b: &Vector3| width_at(cutter, &mesh.normals()[v], b, &surface.bends[v], settings.step).0;
     let count = mesh.points().len();
     let own = |v: usize| surface.origin[v] as usize;
     let across = |v: usize| mesh.normals()[v].cross(&lines[v].direction);

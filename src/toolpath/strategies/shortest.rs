@@ -20,16 +20,19 @@
 
 use std::f64::consts::PI;
 use std::fmt::{self, Write as _};
+use std::sync::Arc;
 
 use super::direction_keys;
 use super::iso_scallop::{front_at, on_chart, places};
 use super::mesh_passes::{self, Aim};
-use crate::levels::level_passes::along_levels;
+use crate::levels::level_passes::{along_earlier, along_levels};
 use crate::levels::planned_field;
 use crate::strategies::iso_scallop::FrontStart;
 use crate::surface::chart::{Chart, ChartPoint};
 use crate::surface::feed;
-use crate::vocabulary::{Definition, FeedDirection, Passes, PlanError, Step, Strategy, Task};
+use crate::vocabulary::{
+    Definition, FeedDirection, LevelFunction, Levelled, Passes, PlanError, Step, Strategy, Task,
+};
 use cutter::Cutter;
 use field::{
     Gradients, NormalEquations, Packed, Roughness, Rounds, ScalarField, ScalarSpline, ShortestPossible, Site,
@@ -162,54 +165,66 @@ impl Strategy for ShortestStreamline {
 
 /// Plans passes along the stream function with the shortest path.
 fn passes(task: &Task<'_>, toward: Option<(&FeedDirection, f64)>) -> Result<Passes, PlanError> {
-    let Task { part, cutter, ref settings, monitor, .. } = *task;
+    let Task { part, cutter, ref settings, .. } = *task;
     let charts = Chart::all(part, cutter, settings.guide())?;
     if let Some((direction, _)) = toward {
         let parameters: Vec<_> = charts.iter().map(|chart| chart.domain).collect();
         feed::check(direction, part, &parameters)?;
     }
     let mut all = Passes::default();
-    for chart in charts {
+    for (k, chart) in charts.iter().enumerate() {
         let toward = match toward {
-            Some((direction, dearer)) => Some((feed::on_chart(direction, &chart, cutter)?, dearer)),
+            Some((direction, dearer)) => Some((feed::on_chart(direction, chart, cutter)?, dearer)),
             None => None,
         };
         let toward = toward.as_ref().map(|(direction, dearer)| (&**direction, *dearer));
-        let search = Search { chart: &chart, cutter, step: settings.step, toward, monitor };
-        let mut all_planned = Vec::new();
-        for (spline, promised) in search.run()? {
-            let field = ScalarField::Spline(spline);
-            all_planned.push((along_levels(task, &chart, &field)?, promised));
-        }
-        all_planned.sort_by(|(a, _), (b, _)| a.length().total_cmp(&b.length()));
-        let Some((mut planned, promised)) = all_planned.into_iter().next() else { continue };
+        let mut planned = match task.earlier_on_chart(k, charts.len()) {
+            Some((field, levelled)) => along_earlier(task, chart, field, levelled)?,
+            None => searched(task, chart, toward)?,
+        };
         if let Some((direction, _)) = toward {
-            planned_field::set_directions(&mut planned.field, part, &chart, |[u, v]| {
+            planned_field::set_directions(&mut planned.field, part, chart, |[u, v]| {
                 chart.at(u, v)?.feed(direction, cutter)
             });
-            all.append(planned);
-            continue;
-        }
-        planned.notes.push(shortest_note(&planned, promised));
-        // A front whose passes run along two whole borders, or are packed without any slack, may still be shorter.
-        let worth = planned.length();
-        match on_chart(task, &chart, FrontStart::BestBorder, worth) {
-            Ok(front) if !front.passes.is_empty() && front.length() < worth => planned = front,
-            Err(PlanError::Cancelled(cancelled)) => return Err(cancelled.into()),
-            _ => {}
         }
         all.append(planned);
     }
     Ok(all)
 }
 
-/// What the user is told of it.
-pub(crate) fn shortest_note(planned: &Passes, predicted: f64) -> String {
-    let length = planned.length();
-    format!(
-        "passes follow the stream function of the shortest path: {length:.0} mm planned, {predicted:.0} mm predicted"
-    )
+/// Passes along the best function of one chart, which is searched.
+fn searched(
+    task: &Task<'_>,
+    chart: &Chart,
+    toward: Option<(&FeedDirection, f64)>,
+) -> Result<Passes, PlanError> {
+    let Task { cutter, ref settings, monitor, .. } = *task;
+    let search = Search { chart, cutter, step: settings.step, toward, monitor };
+    let mut all_planned = Vec::new();
+    for (spline, promised) in search.run()? {
+        let field = ScalarField::Spline(spline);
+        all_planned.push((along_levels(task, chart, &field)?, field, promised));
+    }
+    all_planned.sort_by(|(a, ..), (b, ..)| a.length().total_cmp(&b.length()));
+    let Some((mut planned, field, promised)) = all_planned.into_iter().next() else {
+        return Ok(Passes::default());
+    };
+    let worth = planned.length();
+    let told = toward.is_none().then(|| (SHORTEST.to_owned(), promised));
+    Levelled { function: LevelFunction::Chart(Arc::new(field)), told }.put_with(&mut planned);
+    if toward.is_some() {
+        return Ok(planned);
+    }
+    // A front whose passes run along two whole borders, or are packed without any slack, may still be shorter.
+    match on_chart(task, chart, FrontStart::BestBorder, worth) {
+        Ok(front) if !front.passes.is_empty() && front.length() < worth => Ok(front),
+        Err(PlanError::Cancelled(cancelled)) => Err(cancelled.into()),
+        _ => Ok(planned),
+    }
 }
+
+/// What the user is told of passes along such a function.
+pub(crate) const SHORTEST: &str = "passes follow the stream function of the shortest path";
 
 /// Borders that fronts start from.
 const BORDERS: [(usize, usize); 4] = [(0, 0), (0, 1), (1, 0), (1, 1)];

@@ -11,7 +11,7 @@ use crate::surface::chart::{Chart, ChartPoint};
 use crate::surface::feed;
 use crate::surface::mesh_surface::not_applicable;
 use crate::vocabulary::{
-    Definition, FeedDirection, PartKind, PassSettings, Passes, PlanError, Reading, Strategy, Task,
+    Definition, FeedDirection, Guide, PartKind, PassSettings, Passes, PlanError, Reading, Strategy, Task,
 };
 use cutter::Cutter;
 use field::{
@@ -229,10 +229,12 @@ fn on_charts(task: &Task<'_>, asked: &Streamline) -> Result<Passes, PlanError> {
     let charts = Chart::all(part, cutter, settings.guide())?;
     let parameters: Vec<_> = charts.iter().map(|chart| chart.domain).collect();
     feed::check(direction, part, &parameters)?;
+    // What was measured of an earlier plan moves levels, not the function.
+    let by_calculation = Chart::all(part, cutter, Guide { correction: None, ..settings.guide() })?;
     let mut all = Passes::default();
-    for chart in charts {
+    for (chart, calculated) in charts.into_iter().zip(by_calculation) {
         let direction = feed::on_chart(direction, &chart, cutter)?;
-        let (field, mut notes, wanted) = stream_function(&chart, cutter, &direction, asked, settings)?;
+        let (field, mut notes, wanted) = stream_function(&calculated, cutter, &direction, asked, settings)?;
         let mut passes = along_levels(task, &chart, &field)?;
         let feed = |[u, v]: [f64; 2]| chart.at(u, v)?.feed(&direction, cutter);
         planned_field::set_directions(&mut passes.field, part, &chart, feed);

@@ -8,7 +8,7 @@ use crate::drop::{Drop, DropCutter};
 use crate::moves::chord::Watch;
 use crate::vocabulary::PassSettings;
 use cutter::Cutter;
-use geometry::{Point3, Vector2};
+use geometry::{Point2, Point3, Vector2};
 use work::monitor::{Cancelled, Monitor};
 
 /// How closely the end of a pass is placed, mm. A pointed cutter has dropped by as much of it as its point is steep,
@@ -112,7 +112,13 @@ impl PlanCurves<'_> {
     fn shorten_ends(&self, curve: Curve<'_>, run: &mut [(Footing, f64, f64)]) {
         let useful = |from: f64, end: f64| {
             let place = |k: usize| from + (end - from) * k as f64 / ROLL_STEPS as f64;
-            place((1..=ROLL_STEPS).find(|&k| !self.serves(curve, place(k))).unwrap_or(ROLL_STEPS))
+            // Up to the step after the last that serves.
+            place(
+                (1..=ROLL_STEPS)
+                    .rev()
+                    .find(|&k| self.serves(curve, place(k)))
+                    .map_or(1, |k| (k + 1).min(ROLL_STEPS)),
+            )
         };
         if let [(Footing::Rolling, a, b)] = run {
             // Beside the part all along.
@@ -130,13 +136,27 @@ impl PlanCurves<'_> {
         }
     }
 
-    /// Whether half an interval to either side of where the cutter would touch, had the surface gone on, the part lies.
+    /// Whether the part lies half way from where the cutter touches to where it touches on the pass beside, on either side.
+    /// In a hollow contacts lie farther apart than axes.
     fn serves(&self, curve: Curve<'_>, s: f64) -> bool {
-        let Some((xy, drop)) = self.drop_at(curve, s) else { return false };
-        let contact = drop.contact.point.xy() + self.border.roll(self.cutter, &xy.into(), &drop.contact).xy();
         let along = (curve(s + LEAST_STRETCH) - curve(s - LEAST_STRETCH)) / (2.0 * LEAST_STRETCH);
-        let across = Vector2::new(-along.y, along.x) * (0.5 * self.overrun);
-        [across, -across].iter().any(|beside| self.border.under(&(contact + beside)))
+        let across = Vector2::new(-along.y, along.x) * self.overrun;
+        let Some(here) = self.touched(curve(s)) else { return false };
+        let middle = |beside: Vector2| Some(here + (self.touched(curve(s) + beside)? - here) * 0.5);
+        [across, -across].into_iter().any(|beside| middle(beside).is_some_and(|p| self.border.under(&p)))
+    }
+
+    /// Where the cutter with its axis there touches the part, or would, had the surface gone on over its border.
+    fn touched(&self, axis: Vector2) -> Option<Point2> {
+        let drop = self.drop.at(axis.x, axis.y)?;
+        let contact = drop.contact.point.xy();
+        let on_border = self.border.holds(&drop.contact);
+        let roll = if on_border {
+            self.border.roll(self.cutter, &axis.into(), &drop.contact).xy()
+        } else {
+            Vector2::zeros()
+        };
+        Some(contact + roll)
     }
 
     fn moves(&self, curve: Curve<'_>, run: &[(Footing, f64, f64)]) -> Result<Vec<Point3>, Cancelled> {

@@ -1,6 +1,6 @@
 //! What every pass needs to know besides part and cutter.
 
-use super::{Correction, Step};
+use super::{Correction, Earlier, Step};
 use crate::moves::chord::{Watch, reduce, sample_within_chord};
 use crate::moves::smooth::smooth_and_spread;
 use cutter::Cutter;
@@ -53,8 +53,8 @@ pub struct PassSettings<'a> {
     pub smoothing: Option<f64>,
     /// How the cutter is tilted; upright without it.
     pub axis: Option<&'a ToolAxis>,
-    /// By what passes lie wider or narrower than by calculation.
-    pub correction: Option<&'a Correction>,
+    /// What an earlier plan left.
+    pub earlier: Option<&'a Earlier>,
     /// The ball that is dropped in its stead where a tilted cutter, no ball itself, is located by the contacts of that.
     pub probe: Option<&'a Cutter>,
 }
@@ -62,7 +62,7 @@ pub struct PassSettings<'a> {
 impl<'a> PassSettings<'a> {
     /// What widths of strips go by.
     pub fn guide(&self) -> Guide<'a> {
-        Guide { axis: self.axis, correction: self.correction }
+        Guide { axis: self.axis, correction: self.earlier.map(|earlier| &earlier.correction) }
     }
 
     /// The cutter that is dropped.

@@ -1,7 +1,9 @@
 //! Planned passes, not yet joined.
 
+use std::sync::Arc;
+
 use crate::moves::touch::Touch;
-use field::PlannedField;
+use field::{PlannedField, ScalarField};
 use geometry::{Point3, Vector3};
 
 /// Planned passes, not yet joined, and remarks for the user.
@@ -17,6 +19,38 @@ pub struct Passes {
     pub field: PlannedField,
     /// Where the cutter touches along each pass, in no order, where they are levels of a function.
     pub contacts: Vec<Vec<Contact>>,
+    /// The functions that they are levels of, one for each chart or piece that has passes.
+    pub functions: Vec<Levelled>,
+}
+
+/// A function whose levels are passes, on one chart or piece of the part: kept, so that levels can be placed anew without
+/// another search for it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Levelled {
+    /// The function.
+    pub function: LevelFunction,
+    /// What is told of its passes, and the length that was predicted, mm.
+    pub told: Option<(String, f64)>,
+}
+
+/// A function by its chart's parameters or by the vertices of its piece of mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub enum LevelFunction {
+    /// Over a chart's parameters.
+    Chart(Arc<ScalarField>),
+    /// At the vertices of a piece of mesh.
+    Mesh(Arc<[f64]>),
+}
+
+impl Levelled {
+    /// Puts itself and what is told of it with its passes.
+    pub fn put_with(self, passes: &mut Passes) {
+        if let Some((told, predicted)) = &self.told {
+            let length = passes.length();
+            passes.notes.push(format!("{told}: {length:.0} mm planned, {predicted:.0} mm predicted"));
+        }
+        passes.functions.push(self);
+    }
 }
 
 impl Passes {
@@ -32,6 +66,7 @@ impl Passes {
         self.notes.extend(other.notes);
         self.field.append(other.field);
         self.contacts.extend(other.contacts);
+        self.functions.extend(other.functions);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::Correction;
+use super::{Correction, Levelled};
 
 /// How far neighbouring passes lie apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,8 +59,17 @@ pub struct PlanSettings {
     pub rapid_rate: f64,
     /// How passes are smoothed and joined.
     pub joining: Joining,
+    /// What an earlier plan of the same toolpath left.
+    pub earlier: Option<Arc<Earlier>>,
+}
+
+/// What a plan begins from that is made for the same toolpath once more.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Earlier {
     /// By what passes spaced for a scallop lie wider or narrower than by calculation.
-    pub correction: Option<Arc<Correction>>,
+    pub correction: Correction,
+    /// The functions whose levels are placed anew, one for each chart or piece; all are searched where the number is another.
+    pub functions: Vec<Levelled>,
 }
 
 /// The scallop height that passes are planned for by default, mm: what finishing of moulds and dies leaves.
@@ -95,7 +104,7 @@ impl Default for PlanSettings {
             plunge_rate: PLUNGE_RATE,
             rapid_rate: RAPID_RATE,
             joining: Joining::default(),
-            correction: None,
+            earlier: None,
         }
     }
 }

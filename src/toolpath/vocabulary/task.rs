@@ -1,7 +1,8 @@
 //! What a strategy is asked to cover, with what, and how.
 
-use super::{PassSettings, PlanSettings};
+use super::{LevelFunction, Levelled, PassSettings, PlanSettings};
 use cutter::Cutter;
+use field::ScalarField;
 use part::Part;
 use work::monitor::Monitor;
 
@@ -42,6 +43,28 @@ impl<'a> Task<'a> {
     /// Whether a tilted cutter follows the level curves of a coordinate on patches by its contacts, instead of being dropped.
     pub fn follows_contacts(&self) -> bool {
         self.settings.axis.is_some() && !self.part.patches().is_empty()
+    }
+
+    /// What an earlier plan left of one of so many charts or pieces.
+    fn earlier(&self, k: usize, of: usize) -> Option<&'a Levelled> {
+        self.settings
+            .earlier
+            .filter(|earlier| earlier.functions.len() == of)
+            .map(|earlier| &earlier.functions[k])
+    }
+
+    /// The function of an earlier plan on one of so many charts.
+    pub fn earlier_on_chart(&self, k: usize, of: usize) -> Option<(&'a ScalarField, &'a Levelled)> {
+        let levelled = self.earlier(k, of)?;
+        let LevelFunction::Chart(field) = &levelled.function else { return None };
+        Some((field, levelled))
+    }
+
+    /// The function of an earlier plan on one of so many pieces of mesh.
+    pub fn earlier_on_mesh(&self, k: usize, of: usize) -> Option<(&'a [f64], &'a Levelled)> {
+        let levelled = self.earlier(k, of)?;
+        let LevelFunction::Mesh(values) = &levelled.function else { return None };
+        Some((values, levelled))
     }
 
     /// Whether streamlines are those of the part's mesh, unless they are asked for otherwise.

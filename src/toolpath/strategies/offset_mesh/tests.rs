@@ -12,7 +12,7 @@ const SETTINGS: PassSettings = PassSettings {
     chord_tolerance: 1e-3,
     smoothing: None,
     axis: None,
-    correction: None,
+    earlier: None,
     probe: None,
 };
 
