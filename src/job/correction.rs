@@ -16,7 +16,7 @@ use serde::Serialize;
 use geometry::Point3;
 use metrology::{Engine, ExcessKind, Measured, Measurement, RidgeMap, Simulation, path_figures};
 use scene::ToolpathRequest;
-use toolpath::{Correction, Earlier, PartKind, Step, plane_interval};
+use toolpath::{Correction, Earlier, Step, plane_interval};
 use work::monitor::{self, Monitor};
 
 use super::planned::Planned;
@@ -47,8 +47,8 @@ const CELLS_A_PASS: f64 = 4.0;
 pub(crate) struct CorrectionRound {
     /// The highest ridge, mm.
     pub highest_mm: f64,
-    /// The highest remnant along a border, mm.
-    pub border_mm: f64,
+    /// The highest remnant along a border, mm; `None` where only what is highest of all was sought, and that is a ridge.
+    pub border_mm: Option<f64>,
     /// Bound of its error.
     pub error_bound_mm: f64,
     /// Half of the ridge length is lower, mm.
@@ -83,7 +83,7 @@ impl Standing {
     fn of_ridges(map: &RidgeMap, planned: &Planned, factors: [f64; 2]) -> Option<Self> {
         let round = CorrectionRound {
             highest_mm: map.scallop.max_mm?,
-            border_mm: map.border,
+            border_mm: Some(map.border),
             error_bound_mm: map.scallop.error_bound_mm?,
             median_mm: map.scallop.p50_mm?,
             cutting_length_mm: path_figures(&planned.plan.path, 0.0).cutting_length_mm,
@@ -101,7 +101,7 @@ impl Standing {
         let on_border = measured.excess.kind == ExcessKind::Border;
         let round = CorrectionRound {
             highest_mm: scallop.max_mm?,
-            border_mm: if on_border { reached.max_mm } else { 0.0 },
+            border_mm: on_border.then_some(reached.max_mm),
             error_bound_mm: reached.error_bound_mm,
             median_mm: scallop.p50_mm?,
             cutting_length_mm: path_figures(&planned.plan.path, 0.0).cutting_length_mm,
@@ -116,8 +116,8 @@ impl Standing {
 
 impl CorrectionRound {
     /// What is highest, mm.
-    fn highest(&self) -> f64 {
-        self.highest_mm.max(self.border_mm)
+    pub fn highest(&self) -> f64 {
+        self.border_mm.map_or(self.highest_mm, |border| border.max(self.highest_mm))
     }
 
     /// Whether no ridge exceeds the target.
@@ -162,9 +162,8 @@ impl Session {
         engine: &dyn Engine,
         monitor: &dyn Monitor,
     ) -> Result<(Planned, Measured), JobError> {
-        let surface = request.strategy.definition().part == PartKind::Surface;
         let target = match request.step {
-            Step::Scallop(target) if self.scene.correct && surface => Some(target),
+            Step::Scallop(target) if request.correct => Some(target),
             _ => None,
         };
         let first = self.plan(request, around, None, monitor)?;
@@ -387,7 +386,7 @@ mod tests {
     fn what_holds_the_target_is_better_and_then_what_is_shorter() {
         let round = |highest_mm: f64, cutting_length_mm: f64| CorrectionRound {
             highest_mm,
-            border_mm: 0.0,
+            border_mm: None,
             error_bound_mm: 0.1,
             median_mm: 0.9,
             cutting_length_mm,

@@ -201,19 +201,42 @@ impl ExcessSearch<'_> {
             if !(normal.z > 0.0 && narrow && (0..3).any(bent)) {
                 return;
             }
-            let low = Point2::new(a.x.min(b.x).min(c.x), a.y.min(b.y).min(c.y));
-            let high = Point2::new(a.x.max(b.x).max(c.x), a.y.max(b.y).max(c.y));
             let column = |x: f64, n: usize, origin: f64| {
                 (((x - origin) / grid.cell + 0.5).floor().max(0.0) as usize).min(n.saturating_sub(1))
             };
-            for j in column(low.y, grid.ny, grid.origin.y)..=column(high.y, grid.ny, grid.origin.y) {
-                for i in column(low.x, grid.nx, grid.origin.x)..=column(high.x, grid.nx, grid.origin.x) {
-                    cells[grid.index(i, j)].store(true, Ordering::Relaxed);
+            let row = |y: f64| column(y, grid.ny, grid.origin.y);
+            let corners = [a, b, c].map(|p| p.xy());
+            let [low, high] = ends(&corners, &|p| p.y);
+            for j in row(low)..=row(high) {
+                // Long triangles askew cross few cells of a row.
+                let (centre, half) = (grid.centre(0, j).y, 0.5 * grid.cell);
+                let within = [centre - half, centre + half];
+                let places = (0..3).flat_map(|k| within_band(&corners[k], &corners[(k + 1) % 3], within));
+                let [from, to] = ends(&places.collect::<Vec<_>>(), &|p| p.x);
+                if from <= to {
+                    for i in column(from, grid.nx, grid.origin.x)..=column(to, grid.nx, grid.origin.x) {
+                        cells[grid.index(i, j)].store(true, Ordering::Relaxed);
+                    }
                 }
             }
         });
         cells
     }
+}
+
+/// Least and greatest of a coordinate.
+fn ends(points: &[Point2], of: &dyn Fn(&Point2) -> f64) -> [f64; 2] {
+    points.iter().map(of).fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+}
+
+/// The ends of the part of a side that lies in a band of y; none if no part does.
+fn within_band(a: &Point2, b: &Point2, [low, high]: [f64; 2]) -> Vec<Point2> {
+    let (from, to) = (a.y.min(b.y), a.y.max(b.y));
+    if to < low || from > high {
+        return Vec::new();
+    }
+    let at = |y: f64| if to > from { a + (b - a) * ((y.clamp(from, to) - a.y) / (b.y - a.y)) } else { *a };
+    if to > from { vec![at(low), at(high)] } else { vec![*a, *b] }
 }
 
 /// Whether a cell whose centre is off the part has one beside it that is on it.

@@ -114,11 +114,10 @@ mod tests {
         let path = path(&passes);
         let grid = Grid::covering(&part.bounds(), 0.13, 64, 1 << 30).unwrap();
         let cut = cut_reference(&ZMap::block(grid, 1.0), &ball, &path, &Silent).unwrap();
-        let limits = Limits { scallop: 0.01, gouge: 0.005, uncut: 0.05, chord: 0.001 };
+        let limits = Limits { scallop: 0.005, gouge: 0.005, uncut: 0.05, chord: 0.001 };
         let map = ridge_map(&part, &ball, &path, &cut, &limits, 1e-4, &Silent).unwrap();
         let at = |x: f64| {
-            let near =
-                map.borders.iter().filter(|p| (p.at.x - x).abs() < 1e-3 && p.at.y > 0.5 && p.at.y < 2.5);
+            let near = map.above.iter().filter(|p| (p.at.x - x).abs() < 1e-3 && p.at.y > 0.5 && p.at.y < 2.5);
             near.map(|p| p.height).fold(0.0, f64::max)
         };
         let sagitta = |half: f64| 3.0 - (9.0 - half * half).sqrt();

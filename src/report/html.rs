@@ -7,6 +7,7 @@ use super::histogram::Histogram;
 use super::result::{RunReport, ToolpathReport, ToolpathResult};
 use super::table::{bound, conclusion, duration, micrometres, per_cent, with_bound};
 use super::verdict::{Claim, Verdict, place};
+use metrology::{ExcessFigures, ExcessKind};
 
 /// What the page shows of one toolpath besides its figures.
 #[derive(Debug, Clone, PartialEq)]
@@ -171,6 +172,12 @@ fn meanings(report: &RunReport) -> Markup {
              may rise between two grid lines.",
         ),
         (
+            "highest material",
+            "The highest place above the design anywhere on what is judged, up to its borders. It is a scallop or \
+             part of one, a remnant along a border beyond the last pass, or uncut. Its ± is how much higher any place may \
+             stand.",
+        ),
+        (
             "gouge",
             "How deep the cut goes below the design. Its ± is how much deeper it may go between two \
              measured places.",
@@ -182,8 +189,8 @@ fn meanings(report: &RunReport) -> Markup {
         ),
         (
             "deviation",
-            "Distance from the design to the cut surface at every cell, excess positive. Ridges mostly peak \
-             between cells, so the greatest deviation is a little below the highest scallop.",
+            "Distance from the design to the cut surface at every cell, positive where material stands. Its upper end is \
+             the highest material anywhere, which mostly peaks between cells.",
         ),
         (
             "time",
@@ -267,6 +274,17 @@ fn data_url(png: &[u8]) -> String {
     format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png))
 }
 
+/// The highest material and what it is.
+fn highest_material(excess: &ExcessFigures) -> String {
+    let what = match excess.kind {
+        ExcessKind::Scallop => "a scallop",
+        ExcessKind::Border => "along a border",
+        ExcessKind::Uncut => "uncut",
+    };
+    let highest = &excess.highest;
+    format!("{} µm, {what}", with_bound(Some(highest.max_mm), Some(highest.error_bound_mm)))
+}
+
 fn figures(t: &ToolpathResult) -> Markup {
     let (path, deviation) = (&t.path, &t.deviation);
     let mut rows = vec![
@@ -282,6 +300,7 @@ fn figures(t: &ToolpathResult) -> Markup {
             "total turning, turns above 30°",
             format!("{:.0} rad, {}", path.total_turning_rad, path.sharp_turns),
         ),
+        ("highest material", highest_material(&t.excess)),
         ("highest scallop", format!("{} µm", with_bound(t.scallop.max_mm, t.scallop.error_bound_mm))),
         ("mean scallop height", format!("{} µm", micrometres(t.scallop.mean_mm))),
         ("ridge length", format!("{:.1} mm", t.scallop.ridge_length_mm)),

@@ -100,6 +100,8 @@ pub struct ToolpathRequest {
     pub step: Step,
     /// The files of its feed directions, in the order of the scene; [`Scene::read`] reads them into the strategy.
     pub directions: Vec<NamedFile>,
+    /// Whether passes planned by a scallop height are corrected by what is measured of them.
+    pub correct: bool,
     /// How its passes are smoothed and joined.
     pub joining: Joining,
     /// How its axis is tilted; `None` for an upright one.
@@ -136,8 +138,6 @@ pub struct Scene {
     pub tolerance: Limits,
     /// Which ridges may exceed the scallop tolerance.
     pub scallop_rule: ScallopRule,
-    /// Whether passes planned by a scallop height are corrected by what is measured of them.
-    pub correct: bool,
     /// How it is simulated.
     pub simulation: Simulation,
     /// On what.

@@ -93,7 +93,7 @@ impl Scene {
         let keep_clear = interference::read(&root, &folder)?;
         let (machine, clearance) = read_machine(&section)?;
         let five_axis = kinematics::read(&section)?;
-        let toolpaths = read_toolpaths(&root, &folder, &tolerance, &cutter)?;
+        let toolpaths = read_toolpaths(&root, &folder, &tolerance, correct, &cutter)?;
         check_pocket_strategies(&root, &part, &toolpaths)?;
         if simulation.cell_is_auto {
             simulation.cell = auto_cell(&cutter, &toolpaths);
@@ -109,7 +109,6 @@ impl Scene {
             cutting,
             tolerance,
             scallop_rule,
-            correct,
             simulation,
             machine,
             five_axis,
@@ -315,6 +314,7 @@ fn read_toolpaths(
     root: &Section<'_>,
     folder: &Path,
     limits: &Limits,
+    correct: bool,
     cutter: &Cutter,
 ) -> Result<Vec<ToolpathRequest>, SceneError> {
     let sections = root.sections("toolpath")?;
@@ -327,7 +327,7 @@ fn read_toolpaths(
     }
     let mut requests: Vec<ToolpathRequest> = Vec::with_capacity(sections.len());
     for section in &sections {
-        let request = read_toolpath(section, folder, limits, cutter)?;
+        let request = read_toolpath(section, folder, limits, correct, cutter)?;
         if let Some(other) = requests.iter().find(|other| other.folder == request.folder) {
             let place = if section.has("name") { section.key_span("name") } else { section.header().clone() };
             let message = if other.name == request.name {
@@ -353,6 +353,7 @@ fn read_toolpath(
     section: &Section<'_>,
     folder: &Path,
     limits: &Limits,
+    correct: bool,
     cutter: &Cutter,
 ) -> Result<ToolpathRequest, SceneError> {
     let read = read_strategy(section, cutter.radius())?;
@@ -367,7 +368,17 @@ fn read_toolpath(
         if surface { (read_joining(section)?, axis::read(section)?) } else { (Joining::default(), None) };
     let named = |file: Located<String>| NamedFile::beside(folder, &file.value, file.span);
     let directions = read.tables.into_iter().map(named).collect();
-    Ok(ToolpathRequest { name, folder: own_folder, strategy: read.strategy, step, directions, joining, axis })
+    let correct = if surface { section.flag("correct")?.unwrap_or(correct) } else { false };
+    Ok(ToolpathRequest {
+        name,
+        folder: own_folder,
+        strategy: read.strategy,
+        step,
+        directions,
+        correct,
+        joining,
+        axis,
+    })
 }
 
 /// The name of a toolpath, by default its strategy's word, and the name of its folder.

@@ -38,7 +38,6 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     writeln!(out, "gouge = {}", number(limits.gouge))?;
     writeln!(out, "uncut = {}", number(limits.uncut))?;
     writeln!(out, "chord = {}", number(limits.chord))?;
-    writeln!(out, "correct = {}  # measure the ridges of a plan and plan again", scene.correct)?;
     writeln!(out, "\n[simulation]")?;
     writeln!(out, "cell = {}  # mm", number(scene.simulation.cell))?;
     writeln!(out, "memory_mib = {}", scene.simulation.memory_mib)?;
@@ -106,6 +105,7 @@ fn write_joining(out: &mut String, request: &ToolpathRequest, scene: &Scene) -> 
     if request.strategy.definition().part == PartKind::Pocket {
         return Ok(());
     }
+    writeln!(out, "correct = {}  # by what is measured of a plan", request.correct)?;
     let joining = &request.joining;
     match joining.links {
         Links::Surface => {

@@ -1,46 +1,53 @@
-//! What planning in rounds found: plan, measure the ridges, correct, plan again.
+//! What planning in rounds found: plan, measure, correct, plan again.
 
-use report::Figure;
+use report::{Figure, FigureTable, micrometres, with_bound};
 use work::monitor::Monitor;
 
 use super::value;
 use crate::JobError;
+use crate::correction::CorrectionRound;
 use crate::run::{Finding, Run};
 
 /// What the word means.
 const MEANING: (&str, &str) = (
     "correction",
-    "A plan is cut and its ridges are measured. Where they exceed the target, passes are moved together; where none comes \
-     near it, apart. Then the path is planned again, up to three plans in all, and the best one is kept.",
+    "A plan is cut and measured. Where ridges or borders stand above the target, passes are moved together; where none comes \
+     near it, apart. Then the path is planned again, up to six plans in all, and the best one is kept.",
 );
 
 pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> {
     let Some(correction) = &run.planned.correction else { return Ok(Finding::default()) };
-    let um = |mm: f64| format!("{:.3}", 1e3 * mm);
-    let rounds = correction.rounds.iter().map(|round| {
+    let row = |(k, round): (usize, &CorrectionRound)| {
         let [least, most] = round.factors;
-        format!(
-            "highest {} ± {}, median {} µm, {:.0} mm, widths × {least:.3} to {most:.3}",
-            um(round.highest_mm),
-            um(round.error_bound_mm),
-            um(round.median_mm),
-            round.cutting_length_mm
-        )
-    });
-    const NAMES: [&str; 3] = ["first plan", "second plan", "third plan"];
-    let mut rows: Vec<(&'static str, String)> = NAMES.into_iter().zip(rounds).collect();
-    rows.push(("plan kept", format!("{} of {}", correction.kept, correction.rounds.len())));
-    let heights: Vec<String> = correction.rounds.iter().map(|round| um(round.highest_mm)).collect();
+        vec![
+            format!("{}{}", k + 1, if k + 1 == correction.kept { ", kept" } else { "" }),
+            with_bound(Some(round.highest_mm), Some(round.error_bound_mm)),
+            micrometres(round.border_mm),
+            micrometres(Some(round.median_mm)),
+            format!("{:.0}", round.cutting_length_mm),
+            format!("{least:.3} to {most:.3}"),
+        ]
+    };
+    let table = FigureTable {
+        title: "Plans in turn",
+        caption: "The first plan is by calculation. Each further one has its passes nearer or farther by the factors of the last \
+                  column, from place to place.",
+        columns: vec!["plan", "highest ridge, µm", "border, µm", "median, µm", "length, mm", "widths by"],
+        rows: correction.rounds.iter().enumerate().map(row).collect(),
+    };
+    let heights = correction.rounds.iter().map(|r| with_bound(Some(r.highest()), Some(r.error_bound_mm)));
+    let heights: Vec<String> = heights.collect();
     let name = &run.request.name;
+    let several = heights.len() > 1;
     let figure = Figure {
         key: "correction",
         value: value(correction)?,
-        rows,
-        meaning: Some(MEANING),
-        sentence: (heights.len() > 1).then(|| {
+        meaning: several.then_some(MEANING),
+        sentence: several.then(|| {
             let text = format!("{} µm: {name} (plan {} kept)", heights.join(", "), correction.kept);
-            ("Highest ridge of each plan in turn", text)
+            ("Highest ridge or border of each plan in turn", text)
         }),
+        table: several.then_some(table),
         ..Figure::default()
     };
     Ok(Finding { figure: Some(figure), ..Finding::default() })

@@ -23,9 +23,17 @@ impl PartKind {
     /// Keys that every toolpath over such a part takes, whatever its strategy.
     pub fn common_keys(self) -> &'static [&'static str] {
         match self {
-            Self::Surface => {
-                &["name", "strategy", "stepover", "scallop", "links", "longest_link", "smoothing", "axis"]
-            }
+            Self::Surface => &[
+                "name",
+                "strategy",
+                "stepover",
+                "scallop",
+                "correct",
+                "links",
+                "longest_link",
+                "smoothing",
+                "axis",
+            ],
             Self::Pocket => &["name", "strategy", "stepover"],
         }
     }
