@@ -13,10 +13,11 @@
 //! semicolons; `#` begins a comment; empty lines are passed over. Directions are lines: `1 0` and
 //! `-1 0` are the same, and their length does not matter, but 0 is refused. Places may be scattered.
 
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use field::{LineField, LineSample, SamplePlane};
+
+use crate::regular;
 
 /// Greatest file that is read, bytes: a million samples.
 pub const MAX_BYTES: u64 = 64 << 20;
@@ -64,8 +65,7 @@ pub enum DirectionFileError {
 /// See [`DirectionFileError`].
 pub fn read(path: &Path) -> Result<LineField, DirectionFileError> {
     let io = |source| DirectionFileError::Io { path: path.to_owned(), source };
-    let mut bytes = Vec::new();
-    std::fs::File::open(path).map_err(io)?.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;
+    let bytes = regular::read(path, MAX_BYTES).map_err(io)?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(DirectionFileError::TooLarge { path: path.to_owned() });
     }

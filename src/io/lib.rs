@@ -13,6 +13,7 @@ pub mod outline;
 pub mod ply_write;
 pub mod png;
 mod program_text;
+pub mod regular;
 pub mod section_table;
 pub mod stl;
 pub mod stl_write;

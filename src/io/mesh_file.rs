@@ -1,9 +1,10 @@
 //! What STL and OBJ have in common: reading the bytes, the errors, and where in a file they are.
 
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use geometry::{MAX_COORDINATE, MeshError, RepairNotes, TriangleMesh};
+
+use crate::regular;
 
 /// Greatest file that is read, bytes. Twenty million triangles in binary STL; reading it takes about
 /// six times as much memory.
@@ -184,9 +185,7 @@ pub(super) fn read(
     parse: fn(&[u8]) -> Parsed,
 ) -> Result<(TriangleMesh, RepairNotes), MeshReadError> {
     let io = |source| MeshReadError::Io { path: path.to_owned(), source };
-    let mut bytes = Vec::new();
-    // One byte more than allowed, so that the limit holds for pipes too, whose length is unknown.
-    std::fs::File::open(path).map_err(io)?.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;
+    let bytes = regular::read(path, MAX_BYTES).map_err(io)?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(MeshReadError::TooLarge { path: path.to_owned() });
     }

@@ -18,8 +18,9 @@
 use geometry::{NurbsError, NurbsSurface, Point3};
 use serde::Deserialize;
 use std::fmt::Write as _;
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
+
+use crate::regular;
 
 /// Greatest file that is read, bytes. Text of this length holds about a million control points; more
 /// is a mistake or a mesh in disguise.
@@ -80,9 +81,7 @@ pub enum NurbsFileError {
 /// See [`NurbsFileError`].
 pub fn read(path: &Path) -> Result<Vec<NurbsSurface>, NurbsFileError> {
     let io = |source| NurbsFileError::Io { path: path.to_owned(), source };
-    let mut bytes = Vec::new();
-    // One byte more than allowed, so that the limit holds for pipes too, whose length is unknown.
-    std::fs::File::open(path).map_err(io)?.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;
+    let bytes = regular::read(path, MAX_BYTES).map_err(io)?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(NurbsFileError::TooLarge { path: path.to_owned() });
     }

@@ -1,6 +1,5 @@
 //! From text to a checked scene.
 
-use std::io::Read as _;
 use std::path::Path;
 
 use super::{
@@ -10,6 +9,7 @@ use super::{
 };
 use super::{axis, direction, interference, kinematics, part};
 use cutter::{Cutter, Holder, HolderSection};
+use io::regular;
 use keys::{LENGTH, Located, SceneError, SceneText, Section};
 use machine::Machine;
 use metrology::{Limits, ScallopRule};
@@ -31,9 +31,7 @@ impl Scene {
     /// [`SceneError`] when the file cannot be read or anything in it is wrong.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
         let unreadable = |reason: String| SceneError::unreadable(path, reason);
-        let file = std::fs::File::open(path).map_err(|e| unreadable(e.to_string()))?;
-        let mut bytes = Vec::new();
-        file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(|e| unreadable(e.to_string()))?;
+        let bytes = regular::read(path, MAX_BYTES).map_err(|e| unreadable(e.to_string()))?;
         if bytes.len() as u64 > MAX_BYTES {
             return Err(unreadable(format!("it is larger than {MAX_BYTES} bytes, too large for a scene")));
         }
@@ -136,14 +134,7 @@ impl Scene {
         let fixtures = self.keep_clear.fixtures.iter().map(|fixture| ("fixture", &fixture.file));
         self.part_file().map(|file| ("part", file)).into_iter().chain(fixtures).try_for_each(
             |(whose, file)| {
-                let reason = match std::fs::metadata(&file.path) {
-                    Ok(found) if found.is_dir() => "it is a folder".to_owned(),
-                    Ok(_) => match std::fs::File::open(&file.path) {
-                        Ok(_) => return Ok(()),
-                        Err(e) => e.to_string(),
-                    },
-                    Err(e) => e.to_string(),
-                };
+                let Err(reason) = regular::open(&file.path) else { return Ok(()) };
                 let message = format!("cannot read the {whose}'s file {}: {reason}", file.path.display());
                 Err(self.source.error(
                     file.span.clone(),

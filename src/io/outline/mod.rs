@@ -16,6 +16,8 @@ use std::path::Path;
 
 use geometry::{Point2, Region, RegionError};
 
+use crate::regular;
+
 /// Ends of open chains that lie no farther apart are joined, mm. Drawings are exact to four decimals as a
 /// rule; much more would close gaps that were meant, or join neighbours.
 pub const JOIN_TOLERANCE: f64 = 0.01;
@@ -95,11 +97,7 @@ pub struct Outlines {
 /// # Errors
 /// [`OutlineError`].
 pub fn read(path: &Path, format: OutlineFormat, options: &OutlineOptions) -> Result<Outlines, OutlineError> {
-    use std::io::Read as _;
-    let unreadable = |e: std::io::Error| OutlineError::new(e.to_string());
-    let mut bytes = Vec::new();
-    let file = std::fs::File::open(path).map_err(unreadable)?;
-    file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    let bytes = regular::read(path, MAX_BYTES).map_err(|e| OutlineError::new(e.to_string()))?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(OutlineError::new(format!("it is larger than {} MiB", MAX_BYTES >> 20)));
     }

@@ -58,7 +58,6 @@ mod table;
 mod tests;
 mod write;
 
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 pub use generated::parse_blade;
@@ -67,6 +66,8 @@ pub use write::write_table;
 
 use blade::sections::{GenerateError, GeneratedBlade, Sections};
 use keys::{SceneError, SceneText};
+
+use crate::regular;
 
 /// Greatest file that is read, bytes: the most points that are allowed take a third of it.
 pub const MAX_BYTES: u64 = 32 << 20;
@@ -145,8 +146,7 @@ pub fn read_blade(path: &Path) -> Result<GeneratedBlade, SectionFileError> {
 
 fn bytes(path: &Path) -> Result<Vec<u8>, SectionFileError> {
     let io = |source| SectionFileError::Io { path: path.to_owned(), source };
-    let mut bytes = Vec::new();
-    std::fs::File::open(path).map_err(io)?.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;
+    let bytes = regular::read(path, MAX_BYTES).map_err(io)?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(SectionFileError::TooLarge { path: path.to_owned() });
     }
