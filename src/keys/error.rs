@@ -8,10 +8,12 @@ use miette::{Diagnostic, NamedSource, SourceSpan};
 use toml::Spanned;
 use toml::de::DeTable;
 
+use super::printable::printable;
+
 /// The bytes of a scene as text, with the name under which messages speak of it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SceneText {
-    /// As the user wrote it (usually the path on the command line).
+    /// As the user wrote it (usually the path on the command line), without control characters.
     pub name: String,
     /// The whole text.
     pub text: Arc<String>,
@@ -20,7 +22,7 @@ pub struct SceneText {
 impl SceneText {
     /// A scene of this name and text.
     pub fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
-        Self { name: name.into(), text: Arc::new(text.into()) }
+        Self { name: printable(&name.into()), text: Arc::new(text.into()) }
     }
 
     /// The text as a tree of values with their places.
@@ -97,8 +99,8 @@ impl SceneText {
 fn readable(message: &str) -> String {
     /// In characters.
     const LONGEST: usize = 400;
-    let printable = |c: char| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c };
-    let mut text: String = message.chars().take(LONGEST).map(printable).collect();
+    let start: String = message.chars().take(LONGEST).collect();
+    let mut text = printable(&start);
     if message.chars().nth(LONGEST).is_some() {
         text.push('…');
     }
@@ -126,7 +128,7 @@ pub struct Finding {
 #[derive(Debug, thiserror::Error, Diagnostic)]
 pub enum SceneError {
     /// The file could not be read.
-    #[error("cannot read the scene {}: {reason}", path.display())]
+    #[error("cannot read the scene {}: {reason}", printable(&path.to_string_lossy()))]
     #[diagnostic(help("name an existing TOML file"))]
     Unreadable {
         /// The file.

@@ -18,7 +18,7 @@ mod write;
 
 pub use axis::AxisRequest;
 pub use interference::{Fixture, KeepClear};
-pub use keys::{Finding, SceneError, SceneText};
+pub use keys::{Finding, SceneError, SceneText, printable, printable_lines};
 pub use kinematics::FiveAxis;
 pub use load::{load_mesh, load_part, load_pocket};
 pub use named_file::NamedFile;

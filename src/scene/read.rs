@@ -10,7 +10,7 @@ use super::{
 use super::{axis, direction, interference, kinematics, part};
 use cutter::{Cutter, Holder, HolderSection};
 use io::regular;
-use keys::{LENGTH, Located, SceneError, SceneText, Section};
+use keys::{LENGTH, Located, SceneError, SceneText, Section, printable};
 use machine::Machine;
 use metrology::{Limits, ScallopRule};
 use toolpath::{Joining, Links, PartKind, Step, read_pocket_step, read_strategy, words_for};
@@ -74,7 +74,7 @@ impl Scene {
         )?;
         let title = match root.text("title")? {
             Some(title) => title.value.to_owned(),
-            None => Path::new(name).file_stem().map_or("scene".into(), |s| s.to_string_lossy().into_owned()),
+            None => Path::new(name).file_stem().map_or("scene".into(), |s| printable(&s.to_string_lossy())),
         };
         let folder = Path::new(name).parent().unwrap_or(Path::new("")).to_owned();
         let part = part::read(&root.section("part")?, &folder)?;
