@@ -2,6 +2,7 @@
 
 pub mod apt_cl;
 pub mod atomic;
+pub mod digest;
 pub mod direction_table;
 pub mod exr;
 pub mod gcode;

@@ -14,6 +14,7 @@ mod pocket;
 mod run;
 mod session;
 mod tool;
+mod units;
 
 pub use error::JobError;
 pub use judge::marks;

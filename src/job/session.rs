@@ -5,11 +5,13 @@ use std::path::Path;
 use blade::Blade;
 use geometry::{Aabb, Bvh};
 use io::ProgramHeader;
+use io::digest::{self, Fingerprint};
 use metrology::{Budget, Engine, EngineError, LaidOut, Measured, Simulation, Task, path_figures};
 use motion::Toolpath;
 use part::Part;
 use report::{
-    NotPlanned, RunReport, SimulationFigures, ToleranceFigures, ToolpathReport, ToolpathResult, Verdict,
+    InputFile, NotPlanned, RunReport, SimulationFigures, ToleranceFigures, ToolpathReport, ToolpathResult,
+    Verdict,
 };
 use scene::{
     Fixture, Loaded, PartSource, Scene, ToolpathRequest, auto_cell, load_mesh, load_part, load_pocket,
@@ -22,7 +24,7 @@ use super::machined::BASE;
 use super::planned::{self, Planned};
 use super::run::Run;
 use super::tool::{Around, FixtureMesh, Tool};
-use super::{JobError, Machined, Outcome, figures, judge};
+use super::{JobError, Machined, Outcome, figures, judge, units};
 
 /// The cell shrinks to this share where a limit is undecided. Nearer to 1 more cuts are made in vain, nearer to 0 more
 /// cells.
@@ -53,6 +55,10 @@ pub struct Session {
     pub top: f64,
     /// What was mended to make the part usable.
     pub notes: Vec<String>,
+    /// What is to be said where part and cutter differ in size beyond belief.
+    pub doubt: Option<String>,
+    /// The files that the scene names, as they were read.
+    pub inputs: Vec<InputFile>,
 }
 
 /// The rectangle to simulate: the part's, grown by the stock's margin.
@@ -90,7 +96,9 @@ impl Session {
             .map_err(JobError::grid(&scene))?;
         let face = if pocket.is_some() { 0.0 } else { part.bounds().max.z };
         let top = face + scene.stock.allowance;
-        Ok(Self { scene, part, blade, pocket, cells, top, notes })
+        let doubt = units::doubt(&scene, &part);
+        let inputs = inputs(&scene)?;
+        Ok(Self { scene, part, blade, pocket, cells, top, notes, doubt, inputs })
     }
 
     /// Runs all toolpaths. Maps, paths and meshes are dropped; [`Session::toolpath`] leaves them. One that cannot be
@@ -139,7 +147,9 @@ impl Session {
         let name = name.map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         let title = self.scene.title.clone();
         let tolerance = ToleranceFigures::new(&self.scene.tolerance, &self.scene.scallop_rule);
-        RunReport::new(name, sha256(&source.text), title, tolerance, toolpaths)
+        let sha256 = digest::of_bytes(source.text.as_bytes()).sha256;
+        let report = RunReport::new(name, sha256, title, tolerance, toolpaths);
+        RunReport { inputs: self.inputs.clone(), notes: self.doubt.iter().cloned().collect(), ..report }
     }
 
     /// Plans, cuts, measures and judges one toolpath.
@@ -366,9 +376,20 @@ fn not_planned(request: &ToolpathRequest, reason: String) -> ToolpathReport {
     })
 }
 
-fn sha256(text: &str) -> String {
-    use sha2::Digest as _;
-    sha2::Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect()
+/// The files that a scene names, each once.
+fn inputs(scene: &Scene) -> Result<Vec<InputFile>, JobError> {
+    let mut inputs: Vec<InputFile> = Vec::new();
+    for file in scene.files() {
+        if inputs.iter().any(|input| input.file == file.written) {
+            continue;
+        }
+        let Fingerprint { bytes, sha256 } = digest::of_file(&file.path).map_err(|e| {
+            let message = format!("cannot read {}: {e}", file.written);
+            scene.source.error(file.span.clone(), message, "relative paths start from the scene's folder")
+        })?;
+        inputs.push(InputFile { file: file.written.clone(), bytes, sha256 });
+    }
+    Ok(inputs)
 }
 
 #[cfg(test)]

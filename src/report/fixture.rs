@@ -1,8 +1,8 @@
 //! A small made-up report for the tests of this folder.
 
 use super::{
-    Claim, Figure, FigureTable, Gravity, RunReport, SimulationFigures, SurfaceMeshFigures, ToleranceFigures,
-    ToolpathReport, ToolpathResult,
+    Claim, Figure, FigureTable, Gravity, InputFile, RunReport, SimulationFigures, SurfaceMeshFigures,
+    ToleranceFigures, ToolpathReport, ToolpathResult,
 };
 use metrology::{
     DeviationFigures, ExcessFigures, GougeFigures, GougeRegion, Limits, PathFigures, ScallopFigures,
@@ -139,5 +139,8 @@ pub fn report() -> RunReport {
     let mut toolpaths = vec![toolpath("zigzag", 402.0, 0.032), toolpath("streamline", 385.0, 0.001)];
     toolpaths[0].figures.push(figure());
     let toolpaths = toolpaths.into_iter().map(|t| ToolpathReport::Measured(Box::new(t))).collect();
-    RunReport::new("wave.toml".into(), "0123abcd".into(), "Wave".into(), tolerance(), toolpaths)
+    let report = RunReport::new("wave.toml".into(), "0123abcd".into(), "Wave".into(), tolerance(), toolpaths);
+    let part = InputFile { file: "wave.stl".to_owned(), bytes: 684, sha256: "4567cdef".to_owned() };
+    let note = "The longest side of the part is 0.1 mm, the diameter of the cutter 6 mm.".to_owned();
+    RunReport { inputs: vec![part], notes: vec![note], ..report }
 }

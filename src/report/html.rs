@@ -32,6 +32,7 @@ pub fn html_page(report: &RunReport, pages: &[ToolpathPage], scene: &str) -> Str
             h1 { (report.title) }
             p.verdict.(class(report.verdict)) { (verdict_word(report.verdict)) span { (conclusion(report)) } }
             (findings(report))
+            @if !report.notes.is_empty() { ul { @for note in &report.notes { li { (note) } } } }
             p.faint { "scene " (report.scene) " · millstream " (report.millstream) }
         }
         section { h2 { "Comparison" } (comparison(report)) (tolerances(report)) }
@@ -40,6 +41,7 @@ pub fn html_page(report: &RunReport, pages: &[ToolpathPage], scene: &str) -> Str
         section {
             h2 { "Scene" }
             p.faint { "SHA-256 " code { (report.scene_sha256) } }
+            @for input in &report.inputs { p.faint { (input.file) ", SHA-256 " code { (input.sha256) } } }
             pre { (scene) }
         }
     };

@@ -24,7 +24,7 @@ pub use histogram::Histogram;
 pub use html::{ToolpathPage, html_page};
 pub use map::{MapMark, MapSize, MapWords, deviation_colours, deviation_picture, height_picture};
 pub use result::{
-    NotPlanned, ReportError, RunReport, SimulationFigures, SurfaceMeshFigures, ToleranceFigures,
+    InputFile, NotPlanned, ReportError, RunReport, SimulationFigures, SurfaceMeshFigures, ToleranceFigures,
     ToolpathReport, ToolpathResult,
 };
 pub use surface_mesh::{MAX_TRIANGLES, SurfaceMesh, VertexPlace, surface_mesh};

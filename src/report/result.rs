@@ -175,6 +175,17 @@ impl ToleranceFigures {
     }
 }
 
+/// A file that the scene names, as it was read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct InputFile {
+    /// As the scene has it.
+    pub file: String,
+    /// Its length.
+    pub bytes: u64,
+    /// Its SHA-256, in hexadecimal.
+    pub sha256: String,
+}
+
 /// All that is reported of one run, in the order of report.json.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunReport {
@@ -184,6 +195,8 @@ pub struct RunReport {
     pub scene: String,
     /// Its SHA-256, in hexadecimal.
     pub scene_sha256: String,
+    /// The files that the scene names: of the part, the fixtures, the feed directions.
+    pub inputs: Vec<InputFile>,
     /// What the user calls the scene.
     pub title: String,
     /// That of the worst toolpath; one that was not planned fails the run.
@@ -191,6 +204,8 @@ pub struct RunReport {
     /// Name of the quickest toolpath that passes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best: Option<String>,
+    /// What is to be said of the whole run.
+    pub notes: Vec<String>,
     /// The tolerances.
     pub tolerance: ToleranceFigures,
     /// The toolpaths, in the order of the scene.
@@ -210,7 +225,7 @@ pub enum ReportError {
 }
 
 impl RunReport {
-    /// The report of some toolpaths under one scene.
+    /// The report of some toolpaths under one scene that names no files, without notes.
     pub fn new(
         scene: String,
         scene_sha256: String,
@@ -222,9 +237,11 @@ impl RunReport {
             millstream: env!("CARGO_PKG_VERSION"),
             scene,
             scene_sha256,
+            inputs: Vec::new(),
             title,
             verdict: Verdict::of_run(toolpaths.iter().map(ToolpathReport::verdict)),
             best: best(&toolpaths).map(|t| t.name.clone()),
+            notes: Vec::new(),
             tolerance,
             toolpaths,
         }

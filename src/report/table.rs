@@ -154,6 +154,10 @@ fn write_table(out: &mut String, report: &RunReport) -> std::fmt::Result {
             t.claims_that(verdict).try_for_each(|claim| sentence(out, &claim.sentence()))?;
         }
     }
+    if !report.notes.is_empty() {
+        writeln!(out, "\nNotes:")?;
+        report.notes.iter().try_for_each(|note| sentence(out, note))?;
+    }
     for t in report.measured() {
         let reason = t.scallop.reason.iter().map(|reason| format!("no scallop height: {reason}"));
         let notes: Vec<String> = t.notes.iter().cloned().chain(reason).collect();

@@ -121,6 +121,13 @@ impl Scene {
         self.part.file()
     }
 
+    /// Every file that the scene names: of the part, the fixtures, and the feed directions.
+    pub fn files(&self) -> impl Iterator<Item = &NamedFile> {
+        let fixtures = self.keep_clear.fixtures.iter().map(|fixture| &fixture.file);
+        let directions = self.toolpaths.iter().flat_map(|request| &request.directions);
+        self.part_file().into_iter().chain(fixtures).chain(directions)
+    }
+
     /// Reads the files of feed directions into the strategies that follow them.
     fn load_directions(&mut self) -> Result<(), SceneError> {
         for request in &mut self.toolpaths {
