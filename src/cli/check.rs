@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use super::error::CliError;
+use super::error::{CliError, shown};
 use job::Session;
-use scene::complete_toml;
+use scene::{complete_toml, printable};
 
 /// What `check` prints: the complete scene, which can be run again, after what was found in
 /// comments.
@@ -12,10 +12,10 @@ use scene::complete_toml;
 /// # Errors
 /// [`CliError`] when the scene could not be run.
 pub fn check(path: &Path) -> Result<String, CliError> {
-    let Session { mut scene, part, cells: (grid, note), notes, .. } = Session::open(path)?;
+    let Session { mut scene, part, cells: (grid, note), notes, doubt, .. } = Session::open(path)?;
     scene.simulation.cell = grid.cell;
     let (bounds, size) = (part.bounds(), part.bounds().size());
-    let mut found = vec![format!("{} is valid. Every default in effect:", path.display())];
+    let mut found = vec![format!("{} is valid. Every default in effect:", shown(path))];
     found.push(format!(
         "The part spans {:.3} x {:.3} x {:.3} mm from x {:.3} y {:.3} z {:.3}; {} x {} cells are simulated.",
         size.x, size.y, size.z, bounds.min.x, bounds.min.y, bounds.min.z, grid.nx, grid.ny
@@ -25,11 +25,11 @@ pub fn check(path: &Path) -> Result<String, CliError> {
             "Note: the cell is chosen by the program, from the cutter and the steps of the toolpaths".into(),
         );
     }
-    found.extend(notes.into_iter().chain(note).map(|note| format!("Note: {note}")));
+    found.extend(notes.into_iter().chain(note).chain(doubt).map(|note| format!("Note: {note}")));
     let mut text = String::new();
     for line in found {
         // A line break in a file's name would end the comment.
-        text += &format!("# {}\n", line.replace(char::is_control, " "));
+        text += &format!("# {}\n", printable(&line));
     }
     text.push('\n');
     text += &complete_toml(&scene);

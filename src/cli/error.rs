@@ -6,7 +6,7 @@ use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme};
 
 use job::JobError;
 use scallop::ScallopError;
-use scene::SceneError;
+use scene::{SceneError, printable};
 use work::monitor::Cancelled;
 
 /// Why a command could not be done.
@@ -21,7 +21,7 @@ pub enum CliError {
     #[diagnostic(help("`millstream scallop --help` tells what can be asked"))]
     Scallop(ScallopError),
     /// The part that `scallop` was to look at is none.
-    #[error("{}: {reason}", file.display())]
+    #[error("{}: {}", shown(file), printable(reason))]
     #[diagnostic(help("{cure}"))]
     ScallopPart {
         /// Its file.
@@ -32,7 +32,7 @@ pub enum CliError {
         cure: String,
     },
     /// A result could not be written.
-    #[error("cannot write {}: {reason}", path.display())]
+    #[error("cannot write {}: {}", shown(path), printable(reason))]
     #[diagnostic(help("name another folder with --out"))]
     Output {
         /// The file or folder.
@@ -40,6 +40,19 @@ pub enum CliError {
         /// What the system said.
         reason: String,
     },
+    /// What stands where results go is not ours to replace.
+    #[error("{} is in the way: {reason}; nothing was written", shown(path))]
+    #[diagnostic(help("move it to another place, or name another folder with --out"))]
+    InTheWay {
+        /// The file or folder.
+        path: PathBuf,
+        /// Why it is kept.
+        reason: String,
+    },
+    /// The answer could not be written.
+    #[error("cannot write to standard output: {0}")]
+    #[diagnostic(help("send it to another place; the results of a run are in their folder all the same"))]
+    Stdout(String),
     /// The threads could not be started.
     #[error("cannot start the threads: {0}")]
     #[diagnostic(help("ask for fewer with --threads"))]
@@ -68,6 +81,11 @@ impl From<SceneError> for CliError {
     fn from(error: SceneError) -> Self {
         Self::Job(error.into())
     }
+}
+
+/// A path as a terminal may have it.
+pub fn shown(path: &Path) -> String {
+    printable(&path.to_string_lossy())
 }
 
 impl CliError {

@@ -9,12 +9,12 @@ use std::path::{Path, PathBuf};
 
 use job::Session;
 use report::{Verdict, html_page, result_table};
-use scene::{Scene, auto_cell};
+use scene::{Scene, auto_cell, printable_lines};
 use work::monitor;
 
 use super::args::{Cell, RunOptions};
-use super::error::CliError;
-use super::outputs::Outputs;
+use super::error::{CliError, shown};
+use super::outputs::{Claims, Outputs};
 use super::progress::Progress;
 
 /// What a run hands back to the command line.
@@ -64,7 +64,7 @@ fn run_scene(options: &RunOptions, progress: &Progress) -> Result<RunOutcome, Cl
     monitor::check(progress)?;
     let session = Session::new(scene)?;
     let target = options.out.clone().unwrap_or_else(|| default_target(&options.scene));
-    let outputs = Outputs::begin(&target)?;
+    let outputs = Outputs::begin(&target, &claims(options, &session))?;
     let mut pages = Vec::new();
     let report = session.run_each(progress, &mut |outcome| {
         pages.push(write::toolpath(&session, outcome, &outputs, progress)?);
@@ -74,13 +74,23 @@ fn run_scene(options: &RunOptions, progress: &Progress) -> Result<RunOutcome, Cl
         write::combs(blade, &outputs)?;
     }
     let json = report.to_json().map_err(job::JobError::from)?;
-    let page = html_page(&report, &pages, &session.scene.source.text);
+    let page = printable_lines(&html_page(&report, &pages, &session.scene.source.text));
     outputs.file("report.html", |out| out.write_all(page.as_bytes()))?;
     outputs.file("report.json", |out| out.write_all(json.as_bytes()))?;
     monitor::check(progress)?;
     outputs.publish()?;
-    let text = format!("{}Results: {}\n", result_table(&report), target.display());
+    let text = format!("{}Results: {}\n", result_table(&report), shown(&target));
     Ok(RunOutcome { text, verdict: report.verdict })
+}
+
+/// What the run writes and reads.
+fn claims(options: &RunOptions, session: &Session) -> Claims {
+    let scene = &session.scene;
+    let sections = session.blade.as_ref().map(|_| write::SECTIONS.to_owned());
+    Claims {
+        folders: scene.toolpaths.iter().map(|request| request.folder.clone()).chain(sections).collect(),
+        inputs: scene.files().map(|file| file.path.clone()).chain([options.scene.clone()]).collect(),
+    }
 }
 
 /// `out/NAME` in the working folder.

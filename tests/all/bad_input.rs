@@ -193,7 +193,7 @@ fn toolpaths_that_cannot_be() {
             assert_eq!(entries(home.path()), ["scene.toml"], "{name}");
         } else {
             assert_eq!(entries(home.path()), ["results", "scene.toml"], "{name}");
-            assert_eq!(entries(&home.path().join("results")).len(), 4, "{name}");
+            assert_eq!(entries(&home.path().join("results")).len(), 5, "{name}");
         }
     }
 }

@@ -69,12 +69,15 @@ fn further(outcome: &Outcome, file: &FigureFile, outputs: &Outputs) -> Result<()
     })
 }
 
-/// Writes the curvature combs of a blade's sections into the folder `sections`.
+/// The folder of the curvature combs.
+pub const SECTIONS: &str = "sections";
+
+/// Writes the curvature combs of a blade's sections into the folder [`SECTIONS`].
 ///
 /// # Errors
 /// [`CliError::Output`].
 pub fn combs(blade: &Blade, outputs: &Outputs) -> Result<(), CliError> {
-    outputs.folder("sections")?;
+    outputs.folder(SECTIONS)?;
     let mut number = 0;
     for (k, section) in blade.sections.iter().enumerate() {
         let above = k.checked_sub(1).is_none_or(|k| blade.sections[k].height < section.height);
@@ -82,7 +85,7 @@ pub fn combs(blade: &Blade, outputs: &Outputs) -> Result<(), CliError> {
         let title = format!("Section {number}, {}, height {} mm", section.curve, section.height);
         let picture =
             comb_picture(&title, &section.spline, section.faired.as_ref().map(|faired| &faired.spline));
-        let name = format!("sections/{number:02}-{}.svg", section.curve.to_string().replace(' ', "-"));
+        let name = format!("{SECTIONS}/{number:02}-{}.svg", section.curve.to_string().replace(' ', "-"));
         outputs.file(&name, |out| out.write_all(picture.as_bytes()))?;
     }
     Ok(())
