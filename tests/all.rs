@@ -37,5 +37,7 @@ mod refined;
 mod scallop;
 #[path = "all/scenes.rs"]
 mod scenes;
+#[path = "all/streams.rs"]
+mod streams;
 #[path = "all/support.rs"]
 mod support;

@@ -10,8 +10,9 @@ mod outputs;
 mod progress;
 mod run;
 mod scallop;
+mod signals;
 
-use std::io::Write as _;
+use std::io::{ErrorKind, Write as _};
 use std::process::ExitCode;
 
 use clap::Parser as _;
@@ -21,6 +22,7 @@ use error::CliError;
 use progress::Progress;
 
 use report::Verdict;
+use scene::printable_lines;
 
 /// Ran, and every limit is proven to hold.
 const PASSED: u8 = 0;
@@ -33,26 +35,56 @@ const COULD_NOT_RUN: u8 = 2;
 pub fn main() -> ExitCode {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
-        Err(error) => {
-            // Help and version come this way too; the message itself cannot be told elsewhere.
-            let _ = error.print();
-            return ExitCode::from(if error.use_stderr() { COULD_NOT_RUN } else { PASSED });
-        }
+        Err(error) => return report_usage(&error),
     };
     let progress = Progress::new();
-    match execute(&arguments.command, &progress) {
-        Ok((text, verdict)) => {
-            progress.finish();
-            // A reader that closes the pipe early has read what it wanted.
-            let _ = std::io::stdout().lock().write_all(text.as_bytes());
-            ExitCode::from(if verdict == Verdict::Pass { PASSED } else { NOT_PASSED })
-        }
-        Err(error) => {
-            progress.finish();
-            eprint!("{}", error::render(&error, progress::stderr_is_terminal()));
-            ExitCode::from(COULD_NOT_RUN)
-        }
+    let done = execute(&arguments.command, &progress);
+    progress.finish();
+    let printed = done.and_then(|(text, verdict)| print_answer(&text).map(|()| verdict));
+    ExitCode::from(match printed {
+        Ok(Verdict::Pass) => PASSED,
+        Ok(_) => NOT_PASSED,
+        Err(error) => report_error(&error),
+    })
+}
+
+/// Reports what is wrong with the arguments, or prints the help or the version that they ask for.
+fn report_usage(error: &clap::Error) -> ExitCode {
+    let text = error.render().to_string();
+    let quotes_controls = printable_lines(&text) != text;
+    if error.use_stderr() {
+        // A quoted argument with control characters could bring colours of its own: such a message has none.
+        let _ = if quotes_controls { to_stderr(&text) } else { error.print() };
+        return ExitCode::from(COULD_NOT_RUN);
     }
+    let printed = error.print().and_then(|()| std::io::stdout().flush());
+    ExitCode::from(unless_closed(printed).map_or_else(|error| report_error(&error), |()| PASSED))
+}
+
+/// Writes the answer to stdout.
+fn print_answer(text: &str) -> Result<(), CliError> {
+    let mut out = std::io::stdout().lock();
+    unless_closed(out.write_all(printable_lines(text).as_bytes()).and_then(|()| out.flush()))
+}
+
+/// A reader that closes the pipe early has read what it wanted. Any other failure is an error.
+fn unless_closed(written: std::io::Result<()>) -> Result<(), CliError> {
+    written
+        .or_else(|error| if error.kind() == ErrorKind::BrokenPipe { Ok(()) } else { Err(error) })
+        .map_err(|error| CliError::Stdout(error.to_string()))
+}
+
+/// Reports an error; returns the exit status.
+fn report_error(error: &CliError) -> u8 {
+    let colour = progress::stderr_is_terminal();
+    let text = error::render(error, colour);
+    // Where stderr takes nothing, the exit status alone reports it.
+    let _ = if colour { std::io::stderr().write_all(text.as_bytes()) } else { to_stderr(&text) };
+    COULD_NOT_RUN
+}
+
+fn to_stderr(text: &str) -> std::io::Result<()> {
+    std::io::stderr().write_all(printable_lines(text).as_bytes())
 }
 
 /// Does what was asked; the text is for stdout.

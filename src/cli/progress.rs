@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use super::signals;
 use work::monitor::Monitor;
 
 /// True when people read stderr.
@@ -14,7 +15,7 @@ pub fn stderr_is_terminal() -> bool {
     std::io::stderr().is_terminal()
 }
 
-/// Shows what the stages tell and hands them the user's wish to stop (Ctrl-C, SIGTERM).
+/// Shows what the stages report and hands them the user's wish to stop.
 #[derive(Debug)]
 pub struct Progress {
     stop: Arc<AtomicBool>,
@@ -30,9 +31,7 @@ impl Progress {
             if stderr_is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(0), target);
         let stop = Arc::new(AtomicBool::new(false));
-        let flag = Arc::clone(&stop);
-        // Without a handler the process simply ends at Ctrl-C, and nothing is half-written either.
-        let _ = ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed));
+        signals::listen(&stop, super::COULD_NOT_RUN);
         Self { stop, bar, prefix: Mutex::new(String::new()) }
     }
 

@@ -414,7 +414,7 @@ fn results_that_cannot_be_written_are_told_and_the_scene_stays() {
 #[cfg(unix)]
 #[test]
 fn an_interrupted_run_leaves_nothing() {
-    use crate::command::{Answer, command};
+    use crate::command::{Answer, command, ctrl_c};
     use std::time::Duration;
 
     let scene = WAVE.replace("x = [-2, 6]", "x = [0, 250]").replace("y = [0, 3]", "y = [0, 250]");
@@ -427,7 +427,7 @@ fn an_interrupted_run_leaves_nothing() {
             std::thread::sleep(Duration::from_millis(5));
         }
         std::thread::sleep(Duration::from_millis(delay_ms));
-        let kill = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+        let kill = std::process::Command::new("kill").args([ctrl_c(), &child.id().to_string()]).status();
         assert!(kill.unwrap().success());
         let answer = Answer::from(child.wait_with_output().unwrap());
         assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{answer:?}");

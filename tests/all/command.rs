@@ -48,6 +48,17 @@ pub fn millstream(home: &Path, arguments: &[&str]) -> Answer {
     command(home, arguments).output().expect("the program starts").into()
 }
 
+/// Ctrl-C as `kill` spells it. A shell ignores it for what it starts in the background, tests too, and the program
+/// keeps that; then it is SIGTERM, which means the same.
+#[cfg(unix)]
+pub fn ctrl_c() -> &'static str {
+    let told = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = told.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let ignored = ignored.and_then(|digits| u64::from_str_radix(digits.trim(), 16).ok()).unwrap_or(0);
+    // Signal 2 is the second bit.
+    if ignored & 2 == 0 { "-INT" } else { "-TERM" }
+}
+
 /// Names in a folder, sorted.
 pub fn entries(folder: &Path) -> Vec<String> {
     let list = std::fs::read_dir(folder).unwrap();
