@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use job::Session;
 use report::{Verdict, html_page, result_table};
-use scene::{Scene, auto_cell, printable_lines};
+use scene::{PartSource, Scene, auto_cell, printable_lines};
 use work::monitor;
 
 use super::args::{Cell, RunOptions};
@@ -62,9 +62,9 @@ fn read_scene(options: &RunOptions) -> Result<Scene, CliError> {
 fn run_scene(options: &RunOptions, progress: &Progress) -> Result<RunOutcome, CliError> {
     let scene = read_scene(options)?;
     monitor::check(progress)?;
-    let session = Session::new(scene)?;
     let target = options.out.clone().unwrap_or_else(|| default_target(&options.scene));
-    let outputs = Outputs::begin(&target, &claims(options, &session))?;
+    let outputs = Outputs::begin(&target, &claims(options, &scene))?;
+    let session = Session::new(scene)?;
     let mut pages = Vec::new();
     let report = session.run_each(progress, &mut |outcome| {
         pages.push(write::toolpath(&session, outcome, &outputs, progress)?);
@@ -84,9 +84,8 @@ fn run_scene(options: &RunOptions, progress: &Progress) -> Result<RunOutcome, Cl
 }
 
 /// What the run writes and reads.
-fn claims(options: &RunOptions, session: &Session) -> Claims {
-    let scene = &session.scene;
-    let sections = session.blade.as_ref().map(|_| write::SECTIONS.to_owned());
+fn claims(options: &RunOptions, scene: &Scene) -> Claims {
+    let sections = matches!(scene.part, PartSource::Blade(_)).then(|| write::SECTIONS.to_owned());
     Claims {
         folders: scene.toolpaths.iter().map(|request| request.folder.clone()).chain(sections).collect(),
         inputs: scene.files().map(|file| file.path.clone()).chain([options.scene.clone()]).collect(),

@@ -421,7 +421,7 @@ fn an_interrupted_run_leaves_nothing() {
     let home = home_with(&scene);
     for delay_ms in [0, 200, 1000] {
         let mut child = command(home.path(), &["run", "plate.toml", "--out", "deep/out"]).spawn().unwrap();
-        // The scratch folder shows that scene and part were read and signals are listened to.
+        // The staging folder shows that the scene was read and signals are listened to.
         while entries(home.path()).len() < 2 {
             assert!(child.try_wait().unwrap().is_none(), "the run ends before it begins");
             std::thread::sleep(Duration::from_millis(5));

@@ -97,7 +97,7 @@ impl Disk {
         self.step()?;
         let mut file = fs::File::create(path)?;
         io::Write::write_all(&mut file, text.as_bytes())?;
-        file.sync_all()
+        self.sync_file(&file)
     }
 
     /// Removes a file or a link; none is fine.

@@ -82,16 +82,16 @@ impl Place {
     /// Puts the staged results in the place of `old` ones.
     pub(super) fn publish(&self, old: &[&str]) -> Result<()> {
         self.sync_tree(NEW)?;
-        match self.commit_by_link(old) {
-            Err(error) if error.kind() == ErrorKind::Unsupported => self.commit_by_file(old)?,
-            other => other?,
+        if self.knows_links()? {
+            self.commit_by_link(old)?
+        } else {
+            self.commit_by_file(old)?
         }
         self.settle()
     }
 
-    /// Steps 1 to 3. Refused as unsupported, and nothing changed, where links are not known.
+    /// Steps 1 to 3.
     fn commit_by_link(&self, old: &[&str]) -> Result<()> {
-        self.check_links()?;
         self.keep_old(old)?;
         self.disk.symlink(Path::new(OLD), &self.staged(CURRENT))?;
         self.disk.sync(&self.staging())?;
@@ -102,14 +102,14 @@ impl Place {
     }
 
     /// Tries both kinds of links.
-    fn check_links(&self) -> Result<()> {
+    fn knows_links(&self) -> Result<bool> {
         let next = self.staged(NEXT);
         let made = self.disk.hard_link(&self.staged(ABOUT), &next).and_then(|()| {
             self.disk.remove_file(&next)?;
             self.disk.symlink(Path::new(ABOUT), &next)
         });
         self.disk.remove_file(&next)?;
-        made.map_err(|_| Error::from(ErrorKind::Unsupported))
+        Ok(made.is_ok())
     }
 
     /// Gives the old results second names.
