@@ -149,7 +149,7 @@ impl State<'_> {
         let reason = match self.owned.get(name) {
             Some(Some(_)) => return Ok(()),
             Some(None) => "it was changed since an earlier run wrote it",
-            None => "no earlier run wrote it",
+            None => "millstream.sha256 does not list it as a result of an earlier run",
         };
         Err(in_the_way(self.target.join(name), reason))
     }
