@@ -48,6 +48,7 @@ pub(crate) struct CorrectionRound {
     /// The highest ridge, mm.
     pub highest_mm: f64,
     /// The highest remnant along a border, mm; `None` where only what is highest of all was sought, and that is a ridge.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub border_mm: Option<f64>,
     /// Bound of its error.
     pub error_bound_mm: f64,

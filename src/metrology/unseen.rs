@@ -33,7 +33,7 @@ pub(super) fn unseen_depth(cutter: &Cutter, cell: f64, lean: f64) -> f64 {
 pub(super) struct Dip {
     /// How deep, mm.
     pub depth: f64,
-    /// How deep before the next place looked at, mm (first order).
+    /// How deep since the place looked at before, mm.
     pub possible: f64,
     /// Where.
     pub at: Point2,
@@ -57,22 +57,40 @@ pub(super) fn dips(
             return Ok(None);
         }
         let steps = ((to - from).norm() / pitch).ceil().clamp(2.0, MOST_ON_A_MOVE);
-        let mut before: Option<Dip> = None;
-        let mut deepest: Option<Dip> = None;
-        for step in 0..=steps as usize {
-            let here = dip_at(part, cutter, &(from + (to - from) * (step as f64 / steps)));
-            if let Some(mut dip) = here {
-                let change = before.map_or(0.0, |b| (b.depth - dip.depth).abs());
-                dip.possible = dip.depth.max(before.map_or(dip.depth, |b| b.depth)) + 0.5 * change;
-                if dip.possible > known && deepest.is_none_or(|d| dip.possible > d.possible) {
-                    deepest = Some(dip);
-                }
-            }
-            before = here;
-        }
+        let along: Vec<Option<Dip>> = (0..=steps as usize)
+            .map(|step| dip_at(part, cutter, &(from + (to - from) * (step as f64 / steps))))
+            .collect();
+        let dips = (0..along.len()).filter_map(|k| {
+            let here = along[k]?;
+            Some(Dip { possible: here.depth.max(before(&along, k)), ..here })
+        });
+        let deepest = dips
+            .filter(|dip| dip.possible > known)
+            .max_by(|a, b| a.possible.total_cmp(&b.possible).then(b.depth.total_cmp(&a.depth)));
         Ok(deepest)
     })?;
     Ok(deepest.into_iter().flatten().collect())
+}
+
+/// How deep the cutter stands at most between a place and the one before, mm.
+///
+/// A kink of the depth between two places shows in the second differences around: in those at both places together in full,
+/// and it rises above the chord by no more than a quarter of that. At the end of a move only one of them is known, and it
+/// rises by no more than that. What bends evenly rises by less.
+fn before(along: &[Option<Dip>], k: usize) -> f64 {
+    let depth = |k: Option<usize>| along.get(k?).copied().flatten().map(|dip| dip.depth);
+    let (Some(here), Some(last)) = (depth(Some(k)), depth(k.checked_sub(1))) else { return f64::NEG_INFINITY };
+    let bend = |a: Option<f64>, b: f64, c: Option<f64>| Some((a? - 2.0 * b + c?).abs());
+    let bends = [
+        bend(depth(k.checked_sub(2)), last, Some(here)),
+        bend(Some(last), here, depth(Some(k + 1))),
+    ];
+    let rise = match bends {
+        [Some(a), Some(b)] => 0.25 * (a + b),
+        [Some(bend), None] | [None, Some(bend)] => bend,
+        [None, None] => 0.5 * (here - last).abs(),
+    };
+    here.max(last) + rise
 }
 
 /// How deep the cutter with its tip at `tip` stands in the design where it touches; `None` off the part.
@@ -113,6 +131,22 @@ mod tests {
         assert!(found.len() == 1 && (found[0].depth - 0.25).abs() < 1e-9, "{found:?}");
         assert!((found[0].at - Point2::new(9.0, 11.0)).norm() < 1e-6);
         assert!(dips(&part, &cutter, &path, 0.1, 0.4, &Silent).unwrap().is_empty());
+    }
+
+    /// Depths along a move that plunges to just the surface, and of one that passes over a crest between two places.
+    #[test]
+    fn a_straight_plunge_is_no_deeper_than_its_end_and_a_kink_no_higher_than_told() {
+        let dips = |depths: &dyn Fn(f64) -> f64| -> Vec<Option<Dip>> {
+            let of = |k: i32| depths(0.1 * f64::from(k));
+            (0..9).map(|k| Some(Dip { depth: of(k), possible: of(k), at: Point2::origin() })).collect()
+        };
+        let plunge = dips(&|s| s - 0.8);
+        assert!((1..9).all(|k| (before(&plunge, k) - plunge[k].unwrap().depth).abs() < 1e-12));
+        for crest in [0.02, 0.06, 0.15, 0.37, 0.41, 0.73, 0.79] {
+            let along = dips(&|s| -2.0 * (s - crest).abs());
+            let told = (1..9).map(|k| before(&along, k)).fold(f64::NEG_INFINITY, f64::max);
+            assert!((0.0..0.2).contains(&told), "{crest} {told}");
+        }
     }
 
     #[test]
