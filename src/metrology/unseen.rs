@@ -79,12 +79,11 @@ pub(super) fn dips(
 /// rises by no more than that. What bends evenly rises by less.
 fn before(along: &[Option<Dip>], k: usize) -> f64 {
     let depth = |k: Option<usize>| along.get(k?).copied().flatten().map(|dip| dip.depth);
-    let (Some(here), Some(last)) = (depth(Some(k)), depth(k.checked_sub(1))) else { return f64::NEG_INFINITY };
+    let (Some(here), Some(last)) = (depth(Some(k)), depth(k.checked_sub(1))) else {
+        return f64::NEG_INFINITY;
+    };
     let bend = |a: Option<f64>, b: f64, c: Option<f64>| Some((a? - 2.0 * b + c?).abs());
-    let bends = [
-        bend(depth(k.checked_sub(2)), last, Some(here)),
-        bend(Some(last), here, depth(Some(k + 1))),
-    ];
+    let bends = [bend(depth(k.checked_sub(2)), last, Some(here)), bend(Some(last), here, depth(Some(k + 1)))];
     let rise = match bends {
         [Some(a), Some(b)] => 0.25 * (a + b),
         [Some(bend), None] | [None, Some(bend)] => bend,
