@@ -33,6 +33,10 @@ const MOST_MEASURED: usize = 2;
 /// at the middle of it, since points and chords of a new plan lie elsewhere.
 const SLACK: f64 = 0.02;
 
+/// The same where all has to be measured to see whether a wider plan holds. With less, whole measurements are spent on a few
+/// per cent of length.
+const MEASURED_SLACK: f64 = 0.2;
+
 /// No width is corrected by more than this factor in a round.
 const MOST_NARROWED: f64 = 0.5;
 
@@ -127,11 +131,13 @@ impl CorrectionRound {
     }
 
     /// Whether this round is to be kept instead of another: first what holds the target, then what is shorter; where neither
-    /// holds it, the one with the lower ridge.
+    /// holds it, the one with the lower ridge, unless that costs more length than narrowing everything would.
     fn is_better(&self, other: &Self, target: f64) -> bool {
+        // Height goes with the square of width, and length with its inverse.
+        let at_that_cost = |round: &Self| round.highest() * round.cutting_length_mm.powi(2);
         match (self.holds(target), other.holds(target)) {
             (true, true) => self.cutting_length_mm < other.cutting_length_mm,
-            (false, false) => self.highest() < other.highest(),
+            (false, false) => self.highest() < other.highest() && at_that_cost(self) <= at_that_cost(other),
             (holds, _) => holds,
         }
     }
@@ -237,7 +243,7 @@ impl Corrected<'_> {
     fn by_ridges(&mut self, monitor: &dyn Monitor) -> Result<(), JobError> {
         let mut gives_way = true;
         while self.rounds.len() < MOST_ROUNDS
-            && let Some(next) = self.next(gives_way)
+            && let Some(next) = self.next(gives_way, SLACK)
         {
             let (planned, factors) = self.plan(&next, monitor)?;
             let map = self.session.ridges(self.request, self.engine, &planned, monitor)?;
@@ -252,10 +258,7 @@ impl Corrected<'_> {
     fn by_measurements(&mut self, measured: Measured, monitor: &dyn Monitor) -> Result<Measured, JobError> {
         let (mut measured, mut gives_way) = (Some(measured), true);
         for _ in 0..MOST_MEASURED {
-            if self.standing.round.holds(self.target) {
-                break;
-            }
-            let Some(next) = self.next(gives_way) else { break };
+            let Some(next) = self.next(gives_way, MEASURED_SLACK) else { break };
             let (planned, factors) = self.plan(&next, monitor)?;
             // Two at a time might be more than the memory that the run may take.
             drop(measured.take());
@@ -268,15 +271,19 @@ impl Corrected<'_> {
     }
 
     /// The widths to try next: narrower where the best plan stands too high, while that helps; else all in proportion, to which
-    /// remnants along borders do not give way.
-    fn next(&self, gives_way: bool) -> Option<Widths> {
-        let (target, CorrectionRound { highest_mm, .. }) = (self.target, self.standing.round);
-        if !self.standing.round.holds(target) && gives_way {
-            return Some(self.widths.narrowed(&self.standing.above, target));
+    /// remnants along borders do not give way. `None` where it holds the target and comes within `slack` of it, or wider ones
+    /// did not.
+    fn next(&self, gives_way: bool, slack: f64) -> Option<Widths> {
+        let (target, round) = (self.target, &self.standing.round);
+        let scaled = |height: f64| self.widths.scaled((aim(target) / height).sqrt().max(MOST_NARROWED));
+        if round.holds(target) {
+            let low = gives_way && round.highest() < (1.0 - slack) * target;
+            low.then(|| scaled(round.highest()))
+        } else if gives_way {
+            Some(self.widths.narrowed(&self.standing.above, target))
+        } else {
+            (round.highest_mm > target).then(|| scaled(round.highest_mm))
         }
-        let low = self.rounds.len() == 1 && highest_mm < (1.0 - SLACK) * target;
-        (highest_mm > target || low)
-            .then(|| self.widths.scaled((aim(target) / highest_mm).sqrt().max(MOST_NARROWED)))
     }
 
     /// The plan by given widths, and their least and greatest factors.
@@ -395,7 +402,8 @@ mod tests {
         };
         let better = |a: CorrectionRound, b: CorrectionRound| a.is_better(&b, 1.0);
         assert!(better(round(0.8, 20.0), round(1.05, 10.0)) && !better(round(1.05, 10.0), round(0.8, 20.0)));
-        assert!(better(round(0.8, 9.0), round(0.7, 10.0)) && better(round(1.1, 20.0), round(1.2, 10.0)));
+        assert!(better(round(0.8, 9.0), round(0.7, 10.0)) && better(round(1.1, 10.4), round(1.2, 10.0)));
+        assert!(!better(round(1.1, 20.0), round(1.2, 10.0)));
     }
 
     #[test]

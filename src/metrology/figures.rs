@@ -91,11 +91,11 @@ pub struct ScallopFigures {
 }
 
 /// A connected place deeper than the gouge tolerance.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct GougeRegion {
     /// Greatest depth.
     pub depth_mm: f64,
-    /// Area on the design surface.
+    /// Area on the design surface; 0 between the centres of cells.
     pub area_mm2: f64,
     /// Where the greatest depth is.
     pub at_mm: [f64; 3],

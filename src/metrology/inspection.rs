@@ -160,7 +160,6 @@ impl Inspection<'_> {
         let deep = |k: usize| f64::from(samples[k].deviation) < -self.limits.gouge;
         let mut figures = GougeFigures { error_bound_mm: NUMERICAL_FLOOR, ..Default::default() };
         let regions = connected(&self.grid, &deep);
-        figures.region_count = regions.len();
         for region in &regions {
             let area: f64 = region.iter().map(|&k| self.area(&samples[k as usize])).sum();
             figures.area_mm2 += area;
@@ -174,10 +173,8 @@ impl Inspection<'_> {
                 line: 0,
             });
         }
-        figures.regions.sort_by(|a, b| b.depth_mm.total_cmp(&a.depth_mm));
-        figures.regions.truncate(LISTED_REGIONS);
         let deepest = measured(samples).map(|(_, d)| -d).fold(0.0, f64::max);
-        let listed = figures.regions.first().map_or(0.0, |r| r.depth_mm);
+        let listed = figures.regions.iter().map(|r| r.depth_mm).fold(0.0, f64::max);
         figures.max_depth_mm = deepest.max(listed);
         let cells = measured(samples).map(|(k, _)| k);
         let found = self.between_centres(cells, figures.max_depth_mm, &|k| samples[k], &|d, lean, half| {
@@ -185,6 +182,21 @@ impl Inspection<'_> {
         });
         figures.max_depth_mm = found.greatest.map_or(figures.max_depth_mm, |(depth, _)| depth);
         figures.error_bound_mm += found.possible - figures.max_depth_mm;
+        if let Some((depth, q)) = found.greatest.filter(|(depth, _)| *depth > self.limits.gouge) {
+            let cell = self.grid.cell_at(q.x, q.y).map(|(i, j)| self.grid.index(i, j) as u32);
+            let of_cells = cell.and_then(|cell| regions.iter().position(|region| region.contains(&cell)));
+            let k = of_cells.unwrap_or_else(|| {
+                // Between the centres of cells, none of which is so deep.
+                figures.regions.push(GougeRegion::default());
+                figures.regions.len() - 1
+            });
+            if let (Some((_, at, move_index)), Some(region)) = (self.depth_at(q), figures.regions.get_mut(k)) {
+                *region = GougeRegion { depth_mm: depth, at_mm: at.into(), move_index, ..*region };
+            }
+        }
+        figures.region_count = figures.regions.len();
+        figures.regions.sort_by(|a, b| b.depth_mm.total_cmp(&a.depth_mm));
+        figures.regions.truncate(LISTED_REGIONS);
         figures
     }
 
@@ -231,14 +243,17 @@ impl Inspection<'_> {
         found
     }
 
+    /// Depth at a place of the plan, its design point, and the move that cut it.
+    fn depth_at(&self, q: Point2) -> Option<(f64, Point3, u32)> {
+        let design = self.design_at(q)?;
+        let d = self.surface.along_normal(&design.point, &design.normal)?;
+        Some((-d.distance, design.point, d.by))
+    }
+
     /// The deepest place within a cell of cell `k`, by compass search on the exact surfaces: depth,
     /// design point, move.
     fn deepest_near(&self, k: usize) -> (f64, Point3, u32) {
-        let at = |q: Point2| {
-            let design = self.design_at(q)?;
-            let d = self.surface.along_normal(&design.point, &design.normal)?;
-            Some((-d.distance, design.point, d.by))
-        };
+        let at = |q: Point2| self.depth_at(q);
         let mut centre = self.centre(k);
         let Some(mut best) = at(centre) else { return (0.0, Point3::new(centre.x, centre.y, 0.0), 0) };
         let mut step = 0.5 * self.grid.cell;

@@ -239,6 +239,13 @@ impl Refinement<'_> {
         if found.gouge.max_depth_mm > gouge.max_depth_mm {
             gouge.max_depth_mm = found.gouge.max_depth_mm;
             if let (Some(region), false) = (found.gouge.regions.first(), deep) {
+                // What the search between the centres found here was a part of it.
+                let here = |at: &[f64; 3]| {
+                    grid.cell_at(at[0], at[1]).is_some_and(|(i, j)| (i0..i1).contains(&i) && (j0..j1).contains(&j))
+                };
+                let before = gouge.regions.len();
+                gouge.regions.retain(|known| known.area_mm2 > 0.0 || !here(&known.at_mm));
+                gouge.region_count -= before - gouge.regions.len();
                 gouge.area_mm2 += region.area_mm2;
                 gouge.region_count += 1;
                 gouge.regions.push(*region);

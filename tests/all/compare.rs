@@ -168,12 +168,13 @@ fn streamlines_are_the_shortest_of_all_on_eight_surfaces() {
     assert!(failed.is_empty(), "{table}\n{}", failed.join("\n"));
 }
 
-/// The scene with zigzag and shortest streamlines only, their passes joined on the surface; with cells that are coarse, for
-/// turns are those of the moves.
+/// The scene with zigzag and shortest streamlines only, their passes joined on the surface, as first planned and with cells
+/// that are coarse: turns are those of the moves.
 fn joined_on_the_surface(name: &str) -> String {
     let scene = scene(name);
     let (head, _) = scene.split_once("[[toolpath]]").unwrap();
     let head = head.replace("cell = 0.1", "cell = 0.5\nerror_bound = 1.0");
+    let head = head.replace("[tolerance]", "[tolerance]\ncorrect = false");
     let toolpath = |keys: &str| format!("[[toolpath]]\n{keys}\nlinks = \"surface\"\n");
     let zigzag = toolpath("strategy = \"zigzag\"\nangle = \"best\"");
     head + &zigzag + &toolpath("strategy = \"streamline\"\ndirection = \"shortest\"")
