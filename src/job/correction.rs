@@ -131,13 +131,11 @@ impl CorrectionRound {
     }
 
     /// Whether this round is to be kept instead of another: first what holds the target, then what is shorter; where neither
-    /// holds it, the one with the lower ridge, unless that costs more length than narrowing everything would.
+    /// holds it, the one with the lower ridge.
     fn is_better(&self, other: &Self, target: f64) -> bool {
-        // Height goes with the square of width, and length with its inverse.
-        let at_that_cost = |round: &Self| round.highest() * round.cutting_length_mm.powi(2);
         match (self.holds(target), other.holds(target)) {
             (true, true) => self.cutting_length_mm < other.cutting_length_mm,
-            (false, false) => self.highest() < other.highest() && at_that_cost(self) <= at_that_cost(other),
+            (false, false) => self.highest() < other.highest(),
             (holds, _) => holds,
         }
     }
@@ -219,7 +217,7 @@ impl Session {
         Ok((best, measured))
     }
 
-    /// The ridges that a plan leaves; `None` where finding them takes as long as measuring all.
+    /// The ridges that a plan leaves; `None` where finding them takes as long as measuring all, or coarse cells cannot tell.
     fn ridges(
         &self,
         request: &ToolpathRequest,
@@ -241,48 +239,51 @@ impl Session {
 impl Corrected<'_> {
     /// Plans anew while ridges on coarse cells stand above the target, or all below it.
     fn by_ridges(&mut self, monitor: &dyn Monitor) -> Result<(), JobError> {
-        let mut gives_way = true;
+        let mut in_vain = 0;
         while self.rounds.len() < MOST_ROUNDS
-            && let Some(next) = self.next(gives_way, SLACK)
+            && let Some(next) = self.next(in_vain, SLACK)
         {
             let (planned, factors) = self.plan(&next, monitor)?;
             let map = self.session.ridges(self.request, self.engine, &planned, monitor)?;
             let found = map.and_then(|map| Standing::of_ridges(&map, &planned, factors));
             let Some(found) = found else { break };
-            gives_way = self.keep_if_better(planned, next, found);
+            in_vain = if self.keep_if_better(planned, next, found) { 0 } else { in_vain + 1 };
         }
         Ok(())
     }
 
     /// Plans anew while what the verdict is made of stands above the target.
     fn by_measurements(&mut self, measured: Measured, monitor: &dyn Monitor) -> Result<Measured, JobError> {
-        let (mut measured, mut gives_way) = (Some(measured), true);
+        let (mut measured, mut in_vain) = (Some(measured), 0);
         for _ in 0..MOST_MEASURED {
-            let Some(next) = self.next(gives_way, MEASURED_SLACK) else { break };
+            let Some(next) = self.next(in_vain, MEASURED_SLACK) else { break };
             let (planned, factors) = self.plan(&next, monitor)?;
             // Two at a time might be more than the memory that the run may take.
             drop(measured.take());
             let again = self.session.measure(self.request, self.engine, &planned.plan.path, monitor)?;
             let found = Standing::of_all(&again.measurement, &planned, factors);
-            gives_way = found.is_some_and(|found| self.keep_if_better(planned, next, found));
-            measured = gives_way.then_some(again);
+            if found.is_some_and(|found| self.keep_if_better(planned, next, found)) {
+                (measured, in_vain) = (Some(again), 0);
+            } else {
+                in_vain += 1;
+            }
         }
         measured.map_or_else(|| self.measure_best(monitor), Ok)
     }
 
     /// The widths to try next: narrower where the best plan stands too high, while that helps; else all in proportion, to which
-    /// remnants along borders do not give way. `None` where it holds the target and comes within `slack` of it, or wider ones
-    /// did not.
-    fn next(&self, gives_way: bool, slack: f64) -> Option<Widths> {
+    /// remnants along borders do not give way. `None` where it holds the target and comes within `slack` of it, or what there
+    /// is was tried `in_vain`.
+    fn next(&self, in_vain: usize, slack: f64) -> Option<Widths> {
         let (target, round) = (self.target, &self.standing.round);
         let scaled = |height: f64| self.widths.scaled((aim(target) / height).sqrt().max(MOST_NARROWED));
         if round.holds(target) {
-            let low = gives_way && round.highest() < (1.0 - slack) * target;
+            let low = in_vain == 0 && round.highest() < (1.0 - slack) * target;
             low.then(|| scaled(round.highest()))
-        } else if gives_way {
+        } else if in_vain == 0 {
             Some(self.widths.narrowed(&self.standing.above, target))
         } else {
-            (round.highest_mm > target).then(|| scaled(round.highest_mm))
+            (in_vain == 1 && round.highest_mm > target).then(|| scaled(round.highest_mm))
         }
     }
 
@@ -402,8 +403,7 @@ mod tests {
         };
         let better = |a: CorrectionRound, b: CorrectionRound| a.is_better(&b, 1.0);
         assert!(better(round(0.8, 20.0), round(1.05, 10.0)) && !better(round(1.05, 10.0), round(0.8, 20.0)));
-        assert!(better(round(0.8, 9.0), round(0.7, 10.0)) && better(round(1.1, 10.4), round(1.2, 10.0)));
-        assert!(!better(round(1.1, 20.0), round(1.2, 10.0)));
+        assert!(better(round(0.8, 9.0), round(0.7, 10.0)) && better(round(1.1, 20.0), round(1.2, 10.0)));
     }
 
     #[test]

@@ -82,7 +82,7 @@ pub fn measure(
 }
 
 /// Height to which the lowest of all moves cuts above or below a point, mm; infinite where none passes.
-fn lowest_of_all(surface: &CutSurface<'_>, at: &Point3, all: &[u32]) -> f64 {
+pub(super) fn lowest_of_all(surface: &CutSurface<'_>, at: &Point3, all: &[u32]) -> f64 {
     surface.envelope.lowest(at.x, at.y, all).map_or(f64::INFINITY, |(z, _)| z)
 }
 

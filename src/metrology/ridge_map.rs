@@ -3,6 +3,7 @@
 use super::cut_surface::CutSurface;
 use super::figures::{Limits, ScallopFigures};
 use super::inspection::{Inspection, Sample};
+use super::measure::lowest_of_all;
 use super::ridges::{RidgeFinder, scallop_figures};
 use cutter::Cutter;
 use geometry::{Point2, Point3, Vector2};
@@ -32,7 +33,7 @@ pub struct RidgeMap {
 }
 
 /// The ridges of `cut`, the stock after `path`; the highest is looked at closer until its bound is `asked` mm, if it comes
-/// down to that.
+/// down to that. `None` where cells are too coarse for it: a move that none of them saw cuts the highest place away.
 pub(super) fn ridge_map(
     part: &Part,
     cutter: &Cutter,
@@ -41,7 +42,7 @@ pub(super) fn ridge_map(
     limits: &Limits,
     asked: f64,
     monitor: &dyn Monitor,
-) -> Result<RidgeMap, Cancelled> {
+) -> Result<Option<RidgeMap>, Cancelled> {
     let surface = CutSurface::new(Envelope::new(cutter, path), cut, path);
     let inspection = Inspection { part, cutter, limits, asked, surface: &surface, grid: cut.grid };
     let samples = inspection.samples(monitor)?;
@@ -50,9 +51,16 @@ pub(super) fn ridge_map(
     let mut above = std::mem::take(&mut ridges.above);
     let scallop = scallop_figures(&ridges.samples, finder.highest(&ridges, asked), limits);
     let borders = borders(&inspection, &samples);
-    let border = borders.iter().map(|place| place.height).fold(0.0, f64::max);
+    let of_borders = borders.iter().max_by(|a, b| a.height.total_cmp(&b.height)).copied();
     above.extend(borders.into_iter().filter(|place| place.height > limits.scallop));
-    Ok(RidgeMap { above, border, scallop })
+    let top_of = |place: RidgePlace| {
+        let design = part.highest_at(place.at.x, place.at.y)?;
+        Some(design.point + design.normal * place.height)
+    };
+    let all: Vec<u32> = (0..path.len() as u32).collect();
+    let mut tops = scallop.max_at_mm.map(Point3::from).into_iter().chain(of_borders.and_then(top_of));
+    let seen = tops.all(|top| lowest_of_all(&surface, &top, &all) >= top.z - asked);
+    Ok(seen.then(|| RidgeMap { above, border: of_borders.map_or(0.0, |place| place.height), scallop }))
 }
 
 /// What stands at the outer sides of the cells that lie at the part's border. What is higher than the uncut tolerance is no
@@ -115,7 +123,7 @@ mod tests {
         let grid = Grid::covering(&part.bounds(), 0.13, 64, 1 << 30).unwrap();
         let cut = cut_reference(&ZMap::block(grid, 1.0), &ball, &path, &Silent).unwrap();
         let limits = Limits { scallop: 0.005, gouge: 0.005, uncut: 0.05, chord: 0.001 };
-        let map = ridge_map(&part, &ball, &path, &cut, &limits, 1e-4, &Silent).unwrap();
+        let map = ridge_map(&part, &ball, &path, &cut, &limits, 1e-4, &Silent).unwrap().unwrap();
         let at = |x: f64| {
             let near = map.above.iter().filter(|p| (p.at.x - x).abs() < 1e-3 && p.at.y > 0.5 && p.at.y < 2.5);
             near.map(|p| p.height).fold(0.0, f64::max)

@@ -51,7 +51,7 @@ impl Engine for Cells {
         let (grid, _) = task.budget.grid_for(path.len(), &task.area, task.simulation, task.cells)?;
         let cut = (self.cut)(ZMap::block(grid, task.top), task.cutter, path, monitor)?;
         let asked = task.simulation.error_bound;
-        Ok(Some(ridge_map(task.part, task.cutter, path, &cut, task.limits, asked, monitor)?))
+        Ok(ridge_map(task.part, task.cutter, path, &cut, task.limits, asked, monitor)?)
     }
 
     fn measure(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Measured, EngineError> {

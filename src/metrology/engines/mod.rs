@@ -29,7 +29,8 @@ pub trait Engine: Sync {
     fn tilts(&self) -> bool;
     /// Whether it measures the floor of a pocket.
     fn measures_pockets(&self) -> bool;
-    /// Cuts, and measures no more than ridges and borders; `None` where that takes as long as all.
+    /// Cuts, and measures no more than ridges and borders; `None` where that takes as long as all, or
+    /// the cells are too coarse to tell.
     ///
     /// # Errors
     /// [`EngineError`].
