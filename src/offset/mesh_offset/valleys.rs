@@ -30,6 +30,15 @@ impl Valley {
         let sides = self.points.windows(2).map(|w| (w[1] - w[0]).norm());
         sides.sum::<f64>() + closing.map_or(0.0, |(a, b)| (a - b).norm())
     }
+
+    /// Whether a place lies on the line, within `off` mm.
+    fn holds(&self, place: &Point3, off: f64) -> bool {
+        self.points.windows(2).any(|w| {
+            let (side, to) = (w[1] - w[0], place - w[0]);
+            let share = (to.dot(&side) / side.norm_squared().max(1e-300)).clamp(0.0, 1.0);
+            (to - side * share).norm_squared() <= off * off
+        })
+    }
 }
 
 /// All valleys of more than `least` rad.
@@ -41,7 +50,7 @@ pub(super) fn valleys(level: &LevelSet, contour: &Contour, settings: &OffsetSett
         ends.iter().for_each(|v| at.entry(*v).or_default().push(k));
     }
     let mut used = vec![false; sides.len()];
-    let mut valleys = Vec::new();
+    let mut valleys: Vec<Valley> = Vec::new();
     // From ends and forks first; what is left are rings.
     let forks = at.iter().filter(|(_, sides)| sides.len() != 2).map(|(v, _)| *v);
     for start in forks.chain(at.keys().copied()) {
@@ -68,6 +77,11 @@ pub(super) fn valleys(level: &LevelSet, contour: &Contour, settings: &OffsetSett
             let angles = line.iter().map(|&v| contour.angles[v as usize]);
             let angles = angles.fold([f64::INFINITY, 0.0], |[lo, hi], a: f64| [lo.min(a), hi.max(a)]);
             let mut points: Vec<Point3> = line.iter().map(|&v| contour.vertices[v as usize]).collect();
+            // Contours may tell a valley in pieces; the first one was run on along all of it.
+            let known = |p: &Point3| valleys.iter().any(|v| v.holds(p, LEAST_REACH * settings.cell));
+            if points.iter().all(known) {
+                continue;
+            }
             for end in [start, line[line.len() - 1]] {
                 points.reverse();
                 if !closed && at[&end].len() == 1 {

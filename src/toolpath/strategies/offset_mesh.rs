@@ -73,6 +73,9 @@ const ASIDE: f64 = 1e-6;
 const CENTRINGS: usize = 8;
 const CENTRED: f64 = 1e-10;
 
+/// How far before and after a place the feed is told by, in points of a pass; the first that tells it.
+const NEAR: [f64; 4] = [0.05, 0.5, 2.0, 8.0];
+
 /// Pieces of the offset smaller than this share of a square interval are left out.
 const LEAST_PIECE: f64 = 0.5;
 
@@ -339,8 +342,11 @@ impl MeshRider<'_> {
         if let Some(rule) = self.settings.axis {
             let contact = |s: f64| {
                 let (centre, away) = place(s)?;
-                let (before, after) = (place((s - 0.05).max(s0))?.0, place((s + 0.05).min(s1))?.0);
-                self.touch(centre, away, after - before)
+                // Where valleys meet, places beside each other are all the same.
+                NEAR.iter().find_map(|near| {
+                    let (before, after) = (place((s - near).max(s0))?.0, place((s + near).min(s1))?.0);
+                    self.touch(centre, away, after - before)
+                })
             };
             let touches: Vec<Touch> = tilted::along(
                 &contact,
