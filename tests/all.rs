@@ -29,6 +29,8 @@ mod five_axes;
 #[cfg(target_os = "linux")]
 #[path = "all/memory.rs"]
 mod memory;
+#[path = "all/nightly.rs"]
+mod nightly;
 #[path = "all/outputs.rs"]
 mod outputs;
 #[path = "all/refined.rs"]

@@ -8,6 +8,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use cutter::Cutter;
 use io::mesh_extensions;
 use metrology::ENGINES;
+use nightly::Shard;
 use scallop::DEFAULT_DEGREE;
 use scene::EngineChoice;
 use toolpath::STRATEGIES;
@@ -30,6 +31,9 @@ pub enum Command {
     /// Plan, cut, measure and report all toolpaths of a scene.
     #[command(after_help = kinds())]
     Run(RunOptions),
+    /// Run many scenes, compare their figures with a baseline, and report what got worse.
+    #[command(after_help = NIGHTLY_HELP)]
+    Nightly(Box<NightlyOptions>),
     /// Read and validate a scene, and print it with every default in effect.
     Check(CheckOptions),
     /// Answer scallop height from step and step from scallop height, for a section or a part's place.
@@ -56,6 +60,55 @@ pub struct RunOptions {
     /// Engine that cuts, instead of the scene's.
     #[arg(long, value_name = "ENGINE", value_parser = engine_words())]
     pub engine: Option<EngineChoice>,
+    /// End when standard input closes, as it does when the program that started this one dies.
+    #[arg(long, hide = true)]
+    pub until_stdin_closes: bool,
+}
+
+const NIGHTLY_HELP: &str = "Each scene runs as a process of its own. One that fails, hangs or takes too much memory costs no other. After a \
+kill, the same command continues with the scenes that have not finished.\n\n\
+Exit status: 0 nothing got worse, 1 something did, 2 could not run.";
+
+/// Which scenes to run, and what to compare them with.
+#[derive(Debug, Args)]
+pub struct NightlyOptions {
+    /// Scenes, and folders that are searched for scenes; with --merge, the folders of the shards' results.
+    #[arg(required = true, value_name = "SCENES")]
+    pub paths: Vec<PathBuf>,
+    /// Where the results go.
+    #[arg(long, value_name = "DIR", default_value = "out/nightly")]
+    pub out: PathBuf,
+    /// The nightly.json of an earlier nightly.
+    #[arg(long, value_name = "FILE")]
+    pub baseline: Option<PathBuf>,
+    /// The file that this nightly is appended to, and that trend lines come from.
+    #[arg(long, value_name = "FILE")]
+    pub history: Option<PathBuf>,
+    /// What counts as worse, a TOML file.
+    #[arg(long, value_name = "FILE")]
+    pub rules: Option<PathBuf>,
+    /// Scenes that run at the same time [default: all cores].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub jobs: Option<u16>,
+    /// Memory that all scenes together may take, MiB [default: four fifths of what is free].
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    pub memory: Option<u32>,
+    /// Time after which a scene is stopped, s.
+    #[arg(long, value_name = "S", default_value_t = 1800, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub time_limit: u32,
+    /// Run scenes again that have finished already.
+    #[arg(long)]
+    pub fresh: bool,
+    /// Run part i of n of the scenes; --merge puts the parts together.
+    #[arg(long, value_name = "I/N", conflicts_with = "history")]
+    pub shard: Option<Shard>,
+    /// Merge the results of all shards.
+    #[arg(long, conflicts_with_all = ["shard", "jobs", "memory", "time_limit", "fresh"])]
+    pub merge: bool,
+    /// Submit N shards and their merge to Slurm; sbatch reads SBATCH_PARTITION and the like.
+    #[arg(long, value_name = "N", conflicts_with_all = ["shard", "merge"],
+        value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub slurm: Option<u16>,
 }
 
 /// What to check.
@@ -195,6 +248,16 @@ mod tests {
             assert!(error.use_stderr() && error.exit_code() == 2, "{bad}");
         }
         assert!(!parse("millstream --version").unwrap_err().use_stderr());
+    }
+
+    #[test]
+    fn a_nightly_is_run_or_merged() {
+        assert!(parse("millstream nightly scenes --shard 1/2 --jobs 2 --baseline a --rules b").is_ok());
+        assert!(parse("millstream nightly a b --merge --history c --out d").is_ok());
+        for bad in ["", "a --shard 3/2", "a --shard 1/2 --history h", "a --merge --shard 1/2", "a --slurm 0"]
+        {
+            assert!(parse(&format!("millstream nightly {bad}")).is_err(), "{bad}");
+        }
     }
 
     #[test]

@@ -57,6 +57,19 @@ pub enum CliError {
     #[error("cannot start the threads: {0}")]
     #[diagnostic(help("ask for fewer with --threads"))]
     Threads(String),
+    /// A nightly cannot begin or cannot use what it was given.
+    #[error("{}", printable(what))]
+    #[diagnostic(help("{cure}"))]
+    Nightly {
+        /// What is wrong, and where.
+        what: String,
+        /// What mends it.
+        cure: String,
+    },
+    /// The user asked a nightly to stop.
+    #[error("interrupted; the scenes that had finished are kept")]
+    #[diagnostic(help("the same command continues with the others"))]
+    NightlyInterrupted,
     /// The user asked to stop.
     #[error("interrupted; nothing was written")]
     Interrupted,
@@ -89,6 +102,11 @@ pub fn shown(path: &Path) -> String {
 }
 
 impl CliError {
+    /// What a nightly cannot use.
+    pub fn nightly(what: impl Into<String>, cure: impl Into<String>) -> Self {
+        Self::Nightly { what: what.into(), cure: cure.into() }
+    }
+
     /// For results that could not be written: `map_err(CliError::output(path))`.
     pub fn output(path: &Path) -> impl Fn(std::io::Error) -> Self + use<'_> {
         |error| Self::Output { path: path.to_owned(), reason: error.to_string() }

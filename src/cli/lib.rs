@@ -6,6 +6,7 @@
 mod args;
 mod check;
 mod error;
+mod nightly;
 mod outputs;
 mod progress;
 mod run;
@@ -91,10 +92,14 @@ fn to_stderr(text: &str) -> std::io::Result<()> {
 fn execute(command: &Command, progress: &Progress) -> Result<(String, Verdict), CliError> {
     match command {
         Command::Run(options) => {
+            if options.until_stdin_closes {
+                signals::end_with_stdin(COULD_NOT_RUN);
+            }
             let report = run::run(options, progress)?;
             Ok((report.text, report.verdict))
         }
         Command::Check(options) => Ok((check::check(&options.scene)?, Verdict::Pass)),
+        Command::Nightly(options) => nightly::nightly(options, progress),
         Command::Scallop(options) => Ok((scallop::scallop(options)?, Verdict::Pass)),
     }
 }

@@ -88,6 +88,18 @@ fn lock(target: &Path) -> Result<Option<fs::File>, CliError> {
     }
 }
 
+/// Waits until no run writes to a folder, but not for long: a run whose nightly was killed ends by itself.
+pub fn wait_until_free(target: &Path) {
+    const TIMES: usize = 100;
+    const PAUSE: std::time::Duration = std::time::Duration::from_millis(50);
+    for _ in 0..TIMES {
+        if lock(target).is_ok() {
+            return;
+        }
+        std::thread::sleep(PAUSE);
+    }
+}
+
 impl Outputs {
     /// Makes `target` and its parents if need be, puts in order what a killed run left there, and makes the staging
     /// folder.

@@ -1,6 +1,6 @@
 //! Progress on stderr while it is a terminal, and the wish to stop.
 
-use std::io::IsTerminal as _;
+use std::io::{IsTerminal as _, Write as _};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -8,6 +8,7 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::signals;
+use scene::printable_lines;
 use work::monitor::Monitor;
 
 /// True when people read stderr.
@@ -46,6 +47,17 @@ impl Progress {
     #[cfg(test)]
     pub fn stop(&self) {
         self.stop.store(true, Ordering::Relaxed);
+    }
+
+    /// Writes a line to stderr, above the bar.
+    pub fn line(&self, text: &str) {
+        let text = printable_lines(text);
+        if self.bar.is_hidden() {
+            // Where stderr takes nothing, nobody reads it.
+            let _ = writeln!(std::io::stderr(), "{text}");
+        } else {
+            self.bar.println(text);
+        }
     }
 
     /// Wipes the bar away.

@@ -87,6 +87,7 @@ fn run_scene(options: &RunOptions, progress: &Progress) -> Result<RunOutcome, Cl
 fn claims(options: &RunOptions, scene: &Scene) -> Claims {
     let sections = matches!(scene.part, PartSource::Blade(_)).then(|| write::SECTIONS.to_owned());
     Claims {
+        files: &["report.html", "report.json"],
         folders: scene.toolpaths.iter().map(|request| request.folder.clone()).chain(sections).collect(),
         inputs: scene.files().map(|file| file.path.clone()).chain([options.scene.clone()]).collect(),
     }

@@ -52,6 +52,15 @@ pub fn listen(stop: &Arc<AtomicBool>, status: u8) {
     });
 }
 
+/// Exits with `status` when standard input closes: whoever holds its other end has died, killed perhaps.
+pub fn end_with_stdin(status: u8) {
+    std::thread::spawn(move || {
+        // An error means as much as the end.
+        let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+        std::process::exit(i32::from(status));
+    });
+}
+
 #[cfg(all(test, unix))]
 mod tests {
     use super::*;

@@ -287,6 +287,15 @@ impl<'a> Section<'a> {
         self.number(key, LENGTH, " mm")
     }
 
+    /// Positive lengths, mm, as `[0.4, 0.2]`; none when the key is not there.
+    pub fn lengths(&self, key: &str) -> Result<Vec<f64>, SceneError> {
+        let Some(entry) = self.entry(key) else { return Ok(Vec::new()) };
+        let DeValue::Array(list) = entry.get_ref() else {
+            return Err(self.wrong_type(key, "a list of lengths", entry, "write `[0.4, 0.2]`, in mm"));
+        };
+        list.iter().map(|item| Ok(self.in_range(key, item, &LENGTH, " mm")?.value)).collect()
+    }
+
     /// A positive length, mm, that must be there.
     pub fn required_length(&self, key: &str, example: f64) -> Result<Located<f64>, SceneError> {
         self.length(key)?.ok_or_else(|| self.missing(key, &format!("{example:?}")))

@@ -190,7 +190,8 @@ impl Inspection<'_> {
                 figures.regions.push(GougeRegion::default());
                 figures.regions.len() - 1
             });
-            if let (Some((_, at, move_index)), Some(region)) = (self.depth_at(q), figures.regions.get_mut(k)) {
+            if let (Some((_, at, move_index)), Some(region)) = (self.depth_at(q), figures.regions.get_mut(k))
+            {
                 *region = GougeRegion { depth_mm: depth, at_mm: at.into(), move_index, ..*region };
             }
         }

@@ -21,16 +21,15 @@ pub(super) const LIST: &str = "millstream.sha256";
 /// Its first line.
 const HEADER: &str = "# Millstream wrote these files. The next run replaces those that are unchanged.";
 
-/// The files of every run beside its folders.
-const FILES: [&str; 3] = ["report.html", "report.json", LIST];
-
 /// Longest list that is read, bytes: room for ten thousand toolpaths.
 const LONGEST_LIST: u64 = 16 << 20;
 
 /// What a run is going to write and what it reads.
 #[derive(Debug, Clone, Default)]
 pub struct Claims {
-    /// Folders that hold nothing but results, beside [`FILES`].
+    /// Files in the folder of the results.
+    pub files: &'static [&'static str],
+    /// Folders in it that hold nothing but results.
     pub folders: Vec<String>,
     /// What the run reads.
     pub inputs: Vec<PathBuf>,
@@ -94,7 +93,7 @@ fn in_the_way(path: PathBuf, reason: impl Into<String>) -> CliError {
 pub(super) fn check(target: &Path, claims: &Claims) -> Result<Vec<Owned>, CliError> {
     let owned = owned(target)?;
     let state = State { target, owned: &owned };
-    for file in FILES {
+    for &file in claims.files.iter().chain([&LIST]) {
         if fs::symlink_metadata(target.join(file)).is_ok() {
             state.file(file)?;
         }
@@ -187,7 +186,8 @@ fn no_input_is_lost(
         let Ok(path) = fs::canonicalize(input) else { continue };
         let Ok(inside) = path.strip_prefix(&target) else { continue };
         let folders = claims.folders.iter().map(String::as_str).chain([STAGING]);
-        let replaced = FILES.into_iter().chain(owned.keys().map(String::as_str)).chain(folders);
+        let replaced =
+            claims.files.iter().copied().chain([LIST]).chain(owned.keys().map(String::as_str)).chain(folders);
         // A path begins with itself.
         if replaced.into_iter().any(|name| inside.starts_with(name)) {
             return Err(in_the_way(input.clone(), "this run reads it, and its results would replace it"));

@@ -16,7 +16,7 @@
 //!
 //! Where the file system knows no links (FAT, Windows), a file `commit` takes the place of `current`. It names the old
 //! files that are to go; once it is there, the new ones are moved over the old ones, and a later run completes that. A
-//! kill in between leaves no report.json: it goes first and comes last.
+//! kill in between leaves no report.json (of a nightly, no nightly.json): it goes first and comes last.
 
 use std::fs;
 use std::io::{Error, ErrorKind, Result};
@@ -37,8 +37,8 @@ const CURRENT: &str = "current";
 const NEXT: &str = "next";
 /// The names of the old results that are to go, one a line, where there are no links.
 const COMMIT: &str = "commit";
-/// What no reader may find before all else is there.
-const LAST: &str = "report.json";
+/// What no reader may find before all else is there: the figures of a run, and those of a nightly.
+const LAST: [&str; 2] = ["report.json", "nightly.json"];
 
 /// What says that a staging folder is one.
 const ABOUT: &str = "about.txt";
@@ -207,9 +207,15 @@ impl Place {
         let gone: Vec<PathBuf> =
             fs::read_to_string(self.staged(COMMIT))?.lines().map(PathBuf::from).collect();
         let mut new = Tree::below(&self.staged(NEW))?.files;
-        new.sort_by_key(|name| name == Path::new(LAST));
+        let is_last = |name: &PathBuf| LAST.iter().any(|last| Path::new(last) == name);
+        new.sort_by_key(is_last);
         if !new.is_empty() {
-            self.disk.remove_file(&self.target.join(LAST))?;
+            LAST.iter().try_for_each(|last| {
+                if new.iter().any(|name| name == Path::new(last)) {
+                    self.disk.remove_file(&self.target.join(last))?;
+                }
+                Ok::<(), Error>(())
+            })?;
         }
         for name in &gone {
             self.disk.remove_file(&self.target.join(name))?;

@@ -13,7 +13,11 @@ fn entries(folder: &Path) -> Vec<String> {
 }
 
 fn claims(folders: &[&str]) -> Claims {
-    Claims { folders: folders.iter().map(|&folder| folder.to_owned()).collect(), inputs: Vec::new() }
+    Claims {
+        files: &["report.html", "report.json"],
+        folders: folders.iter().map(|&folder| folder.to_owned()).collect(),
+        inputs: Vec::new(),
+    }
 }
 
 /// Fills the folders `folders`, each with a file of this text and one named by it.

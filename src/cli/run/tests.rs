@@ -24,7 +24,15 @@ fn options(folder: &Path, scene: &str, threads: u16) -> RunOptions {
     let path = folder.join("plate.toml");
     std::fs::write(&path, scene).unwrap();
     let out = Some(folder.join(format!("out{threads}")));
-    RunOptions { scene: path, out, threads: Some(threads), cell: None, memory: None, engine: None }
+    RunOptions {
+        scene: path,
+        out,
+        threads: Some(threads),
+        cell: None,
+        memory: None,
+        engine: None,
+        until_stdin_closes: false,
+    }
 }
 
 #[test]

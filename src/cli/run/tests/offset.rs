@@ -29,7 +29,15 @@ fn offset_of(side: &dyn Fn(f64) -> f64, offset: &str, diameter: f64) -> (serde_j
     );
     std::fs::write(&scene, text).unwrap();
     let out = Some(home.path().join("out"));
-    let options = RunOptions { scene, out, threads: Some(2), cell: None, memory: None, engine: None };
+    let options = RunOptions {
+        scene,
+        out,
+        threads: Some(2),
+        cell: None,
+        memory: None,
+        engine: None,
+        until_stdin_closes: false,
+    };
     run(&options, &Progress::quiet()).unwrap();
     let json = std::fs::read_to_string(home.path().join("out/report.json")).unwrap();
     let report: serde_json::Value = serde_json::from_str(&json).unwrap();

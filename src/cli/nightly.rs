@@ -1,0 +1,161 @@
+//! `millstream nightly`: many scenes, each a process of its own; what got worse; the pages that show it.
+//!
+//! The folder of the results has, beside the pages, `scenes` with the results of each scene and `finished` with a record of
+//! each scene that has finished. A record names the digest of all that its figures follow from. By it a later run knows
+//! what need not be run again.
+
+mod child;
+mod history;
+mod merge;
+mod plan;
+mod pool;
+mod scenes;
+mod slurm;
+
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use ::nightly::{
+    Comparison, History, Night, Results, Rules, compare, date_of, html_page, junit, markdown, summary,
+};
+use io::{digest, regular};
+use report::Verdict;
+use scene::{EngineChoice, printable_lines};
+
+use super::args::NightlyOptions;
+use super::error::{CliError, shown};
+use super::outputs::{Claims, Outputs};
+use super::progress::Progress;
+use plan::Plan;
+
+/// Largest file of results or rules that is read, bytes.
+const MAX_BYTES: u64 = 256 << 20;
+
+/// The figures of a nightly.
+const FIGURES: &str = "nightly.json";
+
+/// Runs or merges a nightly and writes its pages; the text is for stdout, the verdict fails where something got worse.
+///
+/// # Errors
+/// [`CliError`]. Scenes that had finished are kept.
+pub fn nightly(options: &NightlyOptions, progress: &Progress) -> Result<(String, Verdict), CliError> {
+    if let Some(shards) = options.slurm {
+        return Ok((slurm::submit(options, shards, Path::new("sbatch"))?, Verdict::Pass));
+    }
+    let rules = options.rules.as_deref().map_or_else(|| Ok(Rules::default()), read_rules)?;
+    let baseline = options.baseline.as_deref().map(read_results).transpose()?;
+    let merged = options.merge.then(|| merge::read(&options.paths)).transpose()?;
+    let plan = match merged {
+        Some(_) => Plan::default(),
+        None => Plan::new(options, &rules, baseline.as_ref())?,
+    };
+    let outputs = Outputs::begin(&options.out, &claims(options, &plan))?;
+    let results = match merged {
+        Some(shards) => merge::merge(shards, &options.out)?,
+        None => {
+            let scenes = scenes::run(options, &plan, progress)?;
+            Results::new(env!("CARGO_PKG_VERSION"), date_of(now()), options.shard, scenes)
+        }
+    };
+    let history = match &options.history {
+        Some(path) => history::append(path, &Night::of(&results, id(&results)?))?,
+        None => History::default(),
+    };
+    let comparison = compare(&results, baseline.as_ref(), &rules);
+    write(&results, baseline.as_ref(), &comparison, &history, &rules, &outputs)?;
+    outputs.publish()?;
+    let verdict = if comparison.worse.is_empty() { Verdict::Pass } else { Verdict::Fail };
+    Ok((summary_text(&results, &comparison, &options.out), verdict))
+}
+
+/// Seconds since 1970.
+fn now() -> u64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs())
+}
+
+/// What the nightly writes and reads.
+fn claims(options: &NightlyOptions, plan: &Plan) -> Claims {
+    let shards = options.paths.iter().filter(|_| options.merge).map(|folder| folder.join(FIGURES));
+    let named = [&options.baseline, &options.rules, &options.history].into_iter().flatten().cloned();
+    let scenes = plan.cases.iter().map(|planned| planned.path.clone());
+    Claims {
+        files: &["report.html", "report.md", FIGURES, "junit.xml"],
+        folders: Vec::new(),
+        inputs: named.chain(shards).chain(scenes).collect(),
+    }
+}
+
+fn write(
+    results: &Results,
+    baseline: Option<&Results>,
+    comparison: &Comparison,
+    history: &History,
+    rules: &Rules,
+    outputs: &Outputs,
+) -> Result<(), CliError> {
+    let file = |name: &str, text: String| outputs.file(name, |out| out.write_all(text.as_bytes()));
+    let page = html_page(results, baseline, comparison, history, rules);
+    file("report.html", printable_lines(&page))?;
+    file("report.md", printable_lines(&markdown(results, baseline, comparison)))?;
+    file("junit.xml", junit(results, comparison))?;
+    file(FIGURES, results.to_json().map_err(|e| CliError::nightly(e.to_string(), "report this error"))?)
+}
+
+/// What tells a nightly from all others: its figures and times.
+fn id(results: &Results) -> Result<String, CliError> {
+    let mut dateless = results.clone();
+    dateless.date.clear();
+    let text = dateless.to_json().map_err(|e| CliError::nightly(e.to_string(), "report this error"))?;
+    Ok(digest::of_bytes(text.as_bytes()).sha256)
+}
+
+fn summary_text(results: &Results, comparison: &Comparison, out: &Path) -> String {
+    let mut lines = vec![summary(results, comparison)];
+    lines.extend(comparison.worse.iter().map(|worse| format!("  {}: {}", worse.place(), worse.text)));
+    lines.push(format!("Results: {}", shown(out)));
+    lines.join("\n") + "\n"
+}
+
+/// A file as text.
+fn read_text(path: &Path) -> Result<String, CliError> {
+    let unusable = |reason: String| {
+        CliError::nightly(format!("cannot read {}: {reason}", path.display()), "name a file that is there")
+    };
+    let bytes = regular::read(path, MAX_BYTES).map_err(|e| unusable(e.to_string()))?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(unusable(format!("it is larger than {MAX_BYTES} bytes")));
+    }
+    String::from_utf8(bytes).map_err(|_| unusable("it is not UTF-8 text".into()))
+}
+
+fn read_rules(path: &Path) -> Result<Rules, CliError> {
+    let engines = EngineChoice::words();
+    Ok(Rules::parse(&path.to_string_lossy(), &read_text(path)?, &engines)?)
+}
+
+/// Reads a nightly.json.
+fn read_results(path: &Path) -> Result<Results, CliError> {
+    Results::from_json(&read_text(path)?).map_err(|reason| {
+        let what = format!("{} cannot be used: {reason}", path.display());
+        CliError::nightly(what, "name the nightly.json of an earlier nightly")
+    })
+}
+
+/// The file of this program, which runs the scenes.
+fn program() -> Result<PathBuf, CliError> {
+    std::env::current_exe().map_err(|e| {
+        let cure = "run it from where it is installed";
+        CliError::nightly(format!("cannot find the program's own file: {e}"), cure)
+    })
+}
+
+/// A path from the folder of the results, with slashes.
+fn with_slashes(path: &Path) -> String {
+    let parts: Vec<_> = path.components().map(|part| part.as_os_str().to_string_lossy()).collect();
+    parts.join("/")
+}
+
+/// The folder of a scene's results, from the folder of the nightly's.
+fn scene_folder(key: &str) -> PathBuf {
+    Path::new("scenes").join(key)
+}
