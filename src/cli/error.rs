@@ -57,6 +57,16 @@ pub enum CliError {
     #[error("cannot start the threads: {0}")]
     #[diagnostic(help("ask for fewer with --threads"))]
     Threads(String),
+    /// The run takes more memory than the scene allows.
+    #[error("the run needs more than the {allowed_mib} MiB of memory that it may take; nothing was written")]
+    #[diagnostic(help(
+        "write a greater `memory_mib` in [simulation] (or --memory), a greater `cell` or `stepover`, or make the part \
+         coarser or smaller"
+    ))]
+    Memory {
+        /// What the scene allows.
+        allowed_mib: u64,
+    },
     /// The user asked to stop.
     #[error("interrupted; nothing was written")]
     Interrupted,

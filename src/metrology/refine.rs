@@ -241,7 +241,8 @@ impl Refinement<'_> {
             if let (Some(region), false) = (found.gouge.regions.first(), deep) {
                 // What the search between the centres found here was a part of it.
                 let here = |at: &[f64; 3]| {
-                    grid.cell_at(at[0], at[1]).is_some_and(|(i, j)| (i0..i1).contains(&i) && (j0..j1).contains(&j))
+                    grid.cell_at(at[0], at[1])
+                        .is_some_and(|(i, j)| (i0..i1).contains(&i) && (j0..j1).contains(&j))
                 };
                 let before = gouge.regions.len();
                 gouge.regions.retain(|known| known.area_mm2 > 0.0 || !here(&known.at_mm));
