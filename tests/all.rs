@@ -26,6 +26,8 @@ mod directions;
 mod feed_directions;
 #[path = "all/five_axes.rs"]
 mod five_axes;
+#[path = "all/fuzz.rs"]
+mod fuzz;
 #[cfg(target_os = "linux")]
 #[path = "all/memory.rs"]
 mod memory;
@@ -39,6 +41,8 @@ mod refined;
 mod scallop;
 #[path = "all/scenes.rs"]
 mod scenes;
+#[path = "all/soups.rs"]
+mod soups;
 #[path = "all/streams.rs"]
 mod streams;
 #[path = "all/support.rs"]

@@ -3,16 +3,20 @@
 use std::path::Path;
 
 use super::error::{CliError, shown};
+use super::progress::Progress;
 use job::Session;
-use scene::{complete_toml, printable};
+use scene::{Scene, complete_toml, printable};
 
 /// What `check` prints: the complete scene, which can be run again, after what was found in
 /// comments.
 ///
 /// # Errors
 /// [`CliError`] when the scene could not be run.
-pub fn check(path: &Path) -> Result<String, CliError> {
-    let Session { mut scene, part, cells: (grid, note), notes, doubt, .. } = Session::open(path)?;
+pub fn check(path: &Path, progress: &Progress) -> Result<String, CliError> {
+    let scene = Scene::read(path)?;
+    progress.watched().allow_memory(scene.simulation.memory_mib, work::parallel::threads());
+    let session = Session::load(scene, progress)?;
+    let Session { mut scene, part, cells: (grid, note), notes, doubt, .. } = session;
     scene.simulation.cell = grid.cell;
     let (bounds, size) = (part.bounds(), part.bounds().size());
     let mut found = vec![format!("{} is valid. Every default in effect:", shown(path))];

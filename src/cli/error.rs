@@ -70,6 +70,16 @@ pub enum CliError {
     #[error("interrupted; the scenes that had finished are kept")]
     #[diagnostic(help("the same command continues with the others"))]
     NightlyInterrupted,
+    /// The run takes more memory than the scene allows.
+    #[error("the run needs more than the {allowed_mib} MiB of memory that it may take; nothing was written")]
+    #[diagnostic(help(
+        "write a greater `memory_mib` in [simulation] (or --memory), a greater `cell` or `stepover`, or make the part \
+         coarser or smaller"
+    ))]
+    Memory {
+        /// What the scene allows.
+        allowed_mib: u64,
+    },
     /// The user asked to stop.
     #[error("interrupted; nothing was written")]
     Interrupted,

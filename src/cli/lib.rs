@@ -12,6 +12,7 @@ mod progress;
 mod run;
 mod scallop;
 mod signals;
+mod watch;
 
 use std::io::{ErrorKind, Write as _};
 use std::process::ExitCode;
@@ -39,7 +40,10 @@ pub fn main() -> ExitCode {
         Err(error) => return report_usage(&error),
     };
     let progress = Progress::new();
-    let done = execute(&arguments.command, &progress);
+    let done = execute(&arguments.command, &progress).map_err(|error| match error {
+        CliError::Interrupted => progress.watched().reason(),
+        other => other,
+    });
     progress.finish();
     let printed = done.and_then(|(text, verdict)| print_answer(&text).map(|()| verdict));
     ExitCode::from(match printed {
@@ -98,7 +102,7 @@ fn execute(command: &Command, progress: &Progress) -> Result<(String, Verdict), 
             let report = run::run(options, progress)?;
             Ok((report.text, report.verdict))
         }
-        Command::Check(options) => Ok((check::check(&options.scene)?, Verdict::Pass)),
+        Command::Check(options) => Ok((check::check(&options.scene, progress)?, Verdict::Pass)),
         Command::Nightly(options) => nightly::nightly(options, progress),
         Command::Scallop(options) => Ok((scallop::scallop(options)?, Verdict::Pass)),
     }

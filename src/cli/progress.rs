@@ -1,13 +1,14 @@
 //! Progress on stderr while it is a terminal, and the wish to stop.
 
 use std::io::{IsTerminal as _, Write as _};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::signals;
+use super::watch::{self, Watched};
 use scene::printable_lines;
 use work::monitor::Monitor;
 
@@ -19,7 +20,7 @@ pub fn stderr_is_terminal() -> bool {
 /// Shows what the stages report and hands them the user's wish to stop.
 #[derive(Debug)]
 pub struct Progress {
-    stop: Arc<AtomicBool>,
+    watched: Arc<Watched>,
     bar: ProgressBar,
     /// The toolpath at work, before the stage's name.
     prefix: Mutex<String>,
@@ -31,22 +32,27 @@ impl Progress {
         let target =
             if stderr_is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(0), target);
-        let stop = Arc::new(AtomicBool::new(false));
-        signals::listen(&stop, super::COULD_NOT_RUN);
-        Self { stop, bar, prefix: Mutex::new(String::new()) }
+        let watched = Arc::<Watched>::default();
+        signals::listen(&watched.stop, super::COULD_NOT_RUN);
+        watch::begin(&watched, &bar);
+        Self { watched, bar, prefix: Mutex::new(String::new()) }
     }
 
     /// Shows nothing and hears no signal.
     #[cfg(test)]
     pub fn quiet() -> Self {
-        let stop = Arc::new(AtomicBool::new(false));
-        Self { stop, bar: ProgressBar::hidden(), prefix: Mutex::new(String::new()) }
+        Self { watched: Arc::default(), bar: ProgressBar::hidden(), prefix: Mutex::new(String::new()) }
     }
 
     /// As if the user had asked to stop.
     #[cfg(test)]
     pub fn stop(&self) {
-        self.stop.store(true, Ordering::Relaxed);
+        self.watched.stop.store(true, Ordering::Relaxed);
+    }
+
+    /// What the run and its watch know of each other.
+    pub fn watched(&self) -> &Watched {
+        &self.watched
     }
 
     /// Writes a line to stderr, above the bar.
@@ -95,6 +101,6 @@ impl Monitor for Progress {
     }
 
     fn cancelled(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
+        self.watched.stop.load(Ordering::Relaxed)
     }
 }

@@ -64,7 +64,8 @@ fn run_scene(options: &RunOptions, progress: &Progress) -> Result<RunOutcome, Cl
     monitor::check(progress)?;
     let target = options.out.clone().unwrap_or_else(|| default_target(&options.scene));
     let outputs = Outputs::begin(&target, &claims(options, &scene))?;
-    let session = Session::new(scene)?;
+    progress.watched().allow_memory(scene.simulation.memory_mib, work::parallel::threads());
+    let session = Session::load(scene, progress)?;
     let mut pages = Vec::new();
     let report = session.run_each(progress, &mut |outcome| {
         pages.push(write::toolpath(&session, outcome, &outputs, progress)?);
@@ -78,6 +79,7 @@ fn run_scene(options: &RunOptions, progress: &Progress) -> Result<RunOutcome, Cl
     outputs.file("report.html", |out| out.write_all(page.as_bytes()))?;
     outputs.file("report.json", |out| out.write_all(json.as_bytes()))?;
     monitor::check(progress)?;
+    progress.watched().commit();
     outputs.publish()?;
     let text = format!("{}Results: {}\n", result_table(&report), shown(&target));
     Ok(RunOutcome { text, verdict: report.verdict })

@@ -14,13 +14,16 @@ use super::{Aabb, Point3, Vector3};
 
 /// A checked triangle mesh: every index in range, every coordinate finite and within
 /// [`super::MAX_COORDINATE`], no degenerate and no duplicate triangle, at most two triangles at an
-/// edge, orientation consistent across edges. Open borders are allowed.
+/// edge, orientation consistent across edges. Open borders are allowed. [`TriangleMesh::opened`] makes one of triangles that are no
+/// surface: more of them may meet at edges, where each of them ends.
 #[derive(Debug, Clone)]
 pub struct TriangleMesh {
     vertices: Vec<Point3>,
     triangles: Vec<[u32; 3]>,
     neighbours: Vec<[u32; 3]>,
     bounds: Aabb,
+    /// The first edge that was left open because no surface runs on there, as its refusal.
+    junction: Option<Box<MeshError>>,
 }
 
 /// Stands for "no triangle" in neighbour lists.
@@ -35,6 +38,13 @@ pub enum Outside {
     Given,
 }
 
+/// What becomes of edges at which triangles make no surface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Junctions {
+    Refused,
+    Opened,
+}
+
 /// What was changed to make a mesh usable.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct RepairNotes {
@@ -47,6 +57,8 @@ pub struct RepairNotes {
     pub dropped_duplicates: usize,
     /// Triangles turned over so that they agree with their neighbours.
     pub flipped_triangles: usize,
+    /// Edges left open because more than two triangles meet there, or two that cannot face the same side.
+    pub opened_edges: usize,
     /// The whole mesh was turned over: it was inside out, or an open surface facing down.
     pub turned_over: bool,
 }
@@ -70,6 +82,13 @@ impl std::fmt::Display for RepairNotes {
         count(self.dropped_degenerate, "dropped", "triangle", "triangles", " without area");
         count(self.dropped_duplicates, "dropped", "duplicate triangle", "duplicate triangles", "");
         count(self.flipped_triangles, "turned over", "triangle", "triangles", " against the rest");
+        count(
+            self.opened_edges,
+            "left",
+            "edge",
+            "edges",
+            " open where more than two triangles meet, or two that cannot face the same side",
+        );
         if self.turned_over {
             done.push("turned the whole mesh over, because it faced the wrong way".to_owned());
         }
@@ -194,7 +213,26 @@ impl TriangleMesh {
         triangles: Vec<[u32; 3]>,
         outside: Outside,
     ) -> Result<(Self, RepairNotes, Vec<[u32; 3]>), MeshError> {
-        repair::repair(vertices, triangles, outside)
+        repair::repair(vertices, triangles, outside, Junctions::Refused)
+    }
+
+    /// As [`TriangleMesh::new`] for meshes that need not be a surface: an edge where more than two triangles meet, or two
+    /// that cannot face the same side, is left open, as a border of each of them. Open pieces then each face upward. Heights
+    /// and distances are those of all triangles; what is inside may be unknown.
+    ///
+    /// # Errors
+    /// See [`MeshError`]; neither [`MeshError::NonManifoldEdge`] nor [`MeshError::NotOrientable`].
+    pub fn opened(vertices: Vec<Point3>, triangles: Vec<[u32; 3]>) -> Result<(Self, RepairNotes), MeshError> {
+        let repaired = repair::repair(vertices, triangles, Outside::Found, Junctions::Opened);
+        repaired.map(|(mesh, notes, _)| (mesh, notes))
+    }
+
+    /// For what needs a surface with two sides.
+    ///
+    /// # Errors
+    /// The first of the edges that were left open, as [`TriangleMesh::new`] refuses it.
+    pub fn surface(&self) -> Result<(), &MeshError> {
+        self.junction.as_deref().map_or(Ok(()), Err)
     }
 
     /// Vertices, mm.
@@ -237,7 +275,7 @@ impl TriangleMesh {
     /// [`MeshError::Empty`] when nothing with an area is left of it.
     pub fn scaled(&self, factor: f64) -> Result<Self, MeshError> {
         let vertices = self.vertices.iter().map(|p| p * factor).collect();
-        Self::new(vertices, self.triangles.clone()).map(|(mesh, _)| mesh)
+        Self::opened(vertices, self.triangles.clone()).map(|(mesh, _)| mesh)
     }
 
     /// Bounds of all vertices.

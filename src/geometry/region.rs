@@ -9,6 +9,7 @@ use i_overlay::mesh::float::style::{LineJoin, OutlineStyle};
 use i_overlay::mesh::math::MathMode;
 
 use super::{CurveSegment, Point2, SegmentGrid};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// Most points of all outlines together. Fields, offsets and searches grow with them; a drawing with more
 /// is noise.
@@ -17,6 +18,9 @@ pub const MAX_OUTLINE_POINTS: usize = 200_000;
 /// Chords of round corners of an offset span at most this angle, rad, and at least the crate's least
 /// angle of 0.01 π. Their sagitta is r·δ²/8, 0.4 µm on a radius of 3 mm.
 const ROUND_STEP: f64 = 0.032;
+
+/// Offsets of fewer points than this take milliseconds and are not done aside.
+const SOON_OFFSET: usize = 500;
 
 /// Pieces and islands with less area than this share of the square of the offset are rounding, not shape.
 const LEAST_AREA: f64 = 1.0e-9;
@@ -105,6 +109,15 @@ pub fn inside_curve(curve: &[Point2], p: &Point2) -> bool {
     inside
 }
 
+/// Least and greatest coordinates of a curve that has points.
+fn plan_box(curve: &[Point2]) -> [Point2; 2] {
+    curve.iter().fold([curve[0]; 2], |[lo, hi], p| [lo.inf(p), hi.sup(p)])
+}
+
+fn in_box([lo, hi]: &[Point2; 2], p: &Point2) -> bool {
+    lo.x <= p.x && p.x <= hi.x && lo.y <= p.y && p.y <= hi.y
+}
+
 /// Where two segments meet, if they do.
 fn meeting(a: &[Point2; 2], b: &[Point2; 2]) -> Option<Point2> {
     let (d, e) = (a[1] - a[0], b[1] - b[0]);
@@ -186,9 +199,12 @@ impl Region {
         if let Some(curve) = curves.iter().position(|c| signed_area(c) <= 0.0) {
             return Err(RegionError::NoArea { curve });
         }
-        let inside = |a: usize, b: usize| a != b && inside_curve(&curves[b], &curves[a][0]);
+        let boxes: Vec<[Point2; 2]> = curves.iter().map(|curve| plan_box(curve)).collect();
+        let inside = |a: usize, b: usize| {
+            a != b && in_box(&boxes[b], &curves[a][0]) && inside_curve(&curves[b], &curves[a][0])
+        };
         let depth: Vec<usize> =
-            (0..curves.len()).map(|a| (0..curves.len()).filter(|&b| inside(a, b)).count()).collect();
+            work::parallel::map(curves.len(), |a| (0..curves.len()).filter(|&b| inside(a, b)).count());
         let mut region = Self::default();
         let mut piece_of = vec![usize::MAX; curves.len()];
         for (k, curve) in curves.iter().enumerate().filter(|(k, _)| depth[*k].is_multiple_of(2)) {
@@ -249,6 +265,31 @@ impl Region {
         self.offset(distance)
     }
 
+    /// As [`Region::inset`], and the monitor is asked while it lasts.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn watched_inset(&self, distance: f64, monitor: &dyn Monitor) -> Result<Self, Cancelled> {
+        self.watched_offset(-distance, monitor)
+    }
+
+    /// As [`Region::grown`], and the monitor is asked while it lasts.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn watched_grown(&self, distance: f64, monitor: &dyn Monitor) -> Result<Self, Cancelled> {
+        self.watched_offset(distance, monitor)
+    }
+
+    fn watched_offset(&self, distance: f64, monitor: &dyn Monitor) -> Result<Self, Cancelled> {
+        if self.curves().map(<[Point2]>::len).sum::<usize>() < SOON_OFFSET {
+            monitor::check(monitor)?;
+            return Ok(self.offset(distance));
+        }
+        let region = self.clone();
+        work::aside::run(monitor, move || region.offset(distance))
+    }
+
     fn offset(&self, distance: f64) -> Self {
         if distance == 0.0 || self.is_empty() {
             return self.clone();
@@ -289,10 +330,17 @@ impl Region {
     }
 
     /// The largest disc inside: its centre and its radius, mm, within `precision`. `None` without pieces.
-    pub fn largest_disc(&self, precision: f64) -> Option<(Point2, f64)> {
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn largest_disc(
+        &self,
+        precision: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<(Point2, f64)>, Cancelled> {
         /// Squares that are looked at at most; a good answer is found long before.
         const MAX_SQUARES: usize = 20_000;
-        let [lo, hi] = self.bounds()?;
+        let Some([lo, hi]) = self.bounds() else { return Ok(None) };
         let walls = SegmentGrid::of_curves(self.curves());
         let signed = |p: &Point2| if self.contains(p) { walls.distance(p) } else { -walls.distance(p) };
         let half = 0.5 * (hi - lo).amax() / 8.0;
@@ -312,6 +360,7 @@ impl Region {
         }
         let mut best = (lo, f64::NEG_INFINITY);
         for _ in 0..MAX_SQUARES {
+            monitor::check(monitor)?;
             let Some((could, d, centre, half)) = queue.pop() else { break };
             if d > best.1 {
                 best = (centre, d);
@@ -323,7 +372,7 @@ impl Region {
                 push(&mut queue, centre + super::Vector2::new(x, y) * half, 0.5 * half);
             }
         }
-        Some(best)
+        Ok(Some(best))
     }
 }
 
@@ -384,6 +433,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
     use std::f64::consts::PI;
+    use work::monitor::Silent;
 
     fn rectangle(x0: f64, y0: f64, x1: f64, y1: f64) -> Vec<Point2> {
         [(x0, y0), (x1, y0), (x1, y1), (x0, y1)].map(|(x, y)| Point2::new(x, y)).to_vec()
@@ -422,10 +472,10 @@ mod tests {
         assert_eq!(r.inset(1.9).pieces.len(), 1);
         assert_eq!(r.inset(2.1).pieces.len(), 2);
         assert!(r.inset(10.5).is_empty());
-        let (_, radius) = r.largest_disc(1e-4).unwrap();
+        let (_, radius) = r.largest_disc(1e-4, &Silent).unwrap().unwrap();
         assert!((radius - 10.0).abs() < 0.41, "a disc may lean into the bridge: {radius}");
         let square = region(vec![rectangle(1.0, 2.0, 7.0, 8.0)]);
-        let (centre, radius) = square.largest_disc(1e-6).unwrap();
+        let (centre, radius) = square.largest_disc(1e-6, &Silent).unwrap().unwrap();
         assert!((radius - 3.0).abs() < 1e-5 && (centre - Point2::new(4.0, 5.0)).norm() < 1e-4);
     }
 

@@ -19,6 +19,8 @@ pub mod section_table;
 pub mod stl;
 pub mod stl_write;
 
-pub use mesh_file::{FilePlace, MAX_BYTES as MAX_MESH_FILE_BYTES, MeshFileError, MeshFormat, MeshReadError};
+pub use mesh_file::{
+    FilePlace, MAX_BYTES as MAX_MESH_FILE_BYTES, MeshFileError, MeshFormat, MeshLimits, MeshReadError,
+};
 pub use mesh_formats::{MESH_FORMATS, UnknownMeshFormat, extension, mesh_extensions};
 pub use program_text::ProgramHeader;

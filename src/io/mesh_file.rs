@@ -130,10 +130,24 @@ pub enum MeshReadError {
         source: std::io::Error,
     },
     /// The file is too large.
-    #[error("{} is greater than {} MiB; export the part coarser", path.display(), MAX_BYTES >> 20)]
+    #[error("{} is {mib} MiB large, and at most {} MiB are read; export the part coarser", path.display(), most >> 20)]
     TooLarge {
         /// The file.
         path: PathBuf,
+        /// Its size.
+        mib: u64,
+        /// Bytes that may be read.
+        most: u64,
+    },
+    /// The file holds too many triangles.
+    #[error("{} has {triangles} triangles, and at most {most} are read; export the part coarser", path.display())]
+    TooManyTriangles {
+        /// The file.
+        path: PathBuf,
+        /// Triangles in it.
+        triangles: usize,
+        /// Triangles that may be read.
+        most: usize,
     },
     /// The content is no mesh.
     #[error("{}: {source}", path.display())]
@@ -152,6 +166,23 @@ pub struct MeshFormat {
     /// The extensions of its files, lower case.
     pub extensions: &'static [&'static str],
     pub(super) parse: fn(&[u8]) -> Parsed,
+    /// Triangles that a file has at least, counted in a glance.
+    pub(super) count: fn(&[u8]) -> usize,
+}
+
+/// What is read of a mesh file at most.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MeshLimits {
+    /// Its size.
+    pub bytes: u64,
+    /// Its triangles.
+    pub triangles: usize,
+}
+
+impl Default for MeshLimits {
+    fn default() -> Self {
+        Self { bytes: MAX_BYTES, triangles: usize::MAX }
+    }
 }
 
 impl MeshFormat {
@@ -160,7 +191,28 @@ impl MeshFormat {
     /// # Errors
     /// [`MeshReadError`] when it cannot be read or holds no mesh.
     pub fn read(&self, path: &Path) -> Result<(TriangleMesh, RepairNotes), MeshReadError> {
-        read(path, self.parse)
+        self.read_within(path, &MeshLimits::default())
+    }
+
+    /// As [`MeshFormat::read`] within limits, which are checked before any memory is taken for what is beyond them.
+    ///
+    /// # Errors
+    /// [`MeshReadError`] when it cannot be read, holds no mesh, or is beyond the limits.
+    pub fn read_within(
+        &self,
+        path: &Path,
+        limits: &MeshLimits,
+    ) -> Result<(TriangleMesh, RepairNotes), MeshReadError> {
+        let bytes = bytes_of(path, limits.bytes)?;
+        let triangles = (self.count)(&bytes);
+        if triangles > limits.triangles {
+            return Err(MeshReadError::TooManyTriangles {
+                path: path.to_owned(),
+                triangles,
+                most: limits.triangles,
+            });
+        }
+        (self.parse)(&bytes).map_err(|source| MeshReadError::Content { path: path.to_owned(), source })
     }
 }
 
@@ -179,17 +231,18 @@ impl std::fmt::Debug for MeshFormat {
 /// A mesh with what was changed to make it one, or why it is none.
 pub(super) type Parsed = Result<(TriangleMesh, RepairNotes), MeshFileError>;
 
-/// Reads a file and hands its bytes to `parse`.
-pub(super) fn read(
-    path: &Path,
-    parse: fn(&[u8]) -> Parsed,
-) -> Result<(TriangleMesh, RepairNotes), MeshReadError> {
+/// The bytes of a file of at most `most`.
+fn bytes_of(path: &Path, most: u64) -> Result<Vec<u8>, MeshReadError> {
     let io = |source| MeshReadError::Io { path: path.to_owned(), source };
-    let bytes = regular::read(path, MAX_BYTES).map_err(io)?;
-    if bytes.len() as u64 > MAX_BYTES {
-        return Err(MeshReadError::TooLarge { path: path.to_owned() });
+    let too_large =
+        |bytes: u64| MeshReadError::TooLarge { path: path.to_owned(), mib: bytes.div_ceil(1 << 20), most };
+    let size = regular::open(path).and_then(|file| file.metadata()).map_err(io)?.len();
+    if size > most {
+        return Err(too_large(size));
     }
-    parse(&bytes).map_err(|source| MeshReadError::Content { path: path.to_owned(), source })
+    // It may have grown meanwhile.
+    let bytes = regular::read(path, most).map_err(io)?;
+    if bytes.len() as u64 > most { Err(too_large(bytes.len() as u64)) } else { Ok(bytes) }
 }
 
 /// A coordinate, if it is one.

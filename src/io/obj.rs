@@ -15,11 +15,10 @@ mod tests;
 use std::path::Path;
 
 use super::mesh_file::{FilePlace, MeshFileError, MeshFormat, MeshReadError, number, unexpected};
-use crate::mesh_file;
 use geometry::{Point3, RepairNotes, TriangleMesh};
 
 /// Wavefront OBJ.
-pub(super) const FORMAT: MeshFormat = MeshFormat { word: "OBJ", extensions: &["obj"], parse };
+pub(super) const FORMAT: MeshFormat = MeshFormat { word: "OBJ", extensions: &["obj"], parse, count: faces };
 
 /// Most corners of a face. Cutting a face takes time with their square, at worst with their cube.
 const MAX_CORNERS: usize = 2_000;
@@ -32,7 +31,7 @@ const FREE_FORM: [&[u8]; 4] = [b"surf", b"curv", b"curv2", b"bzp"];
 /// # Errors
 /// See [`MeshReadError`].
 pub fn read(path: &Path) -> Result<(TriangleMesh, RepairNotes), MeshReadError> {
-    mesh_file::read(path, parse)
+    FORMAT.read(path)
 }
 
 /// Reads the bytes of a file.
@@ -61,7 +60,12 @@ pub fn parse(bytes: &[u8]) -> Result<(TriangleMesh, RepairNotes), MeshFileError>
         }
         file.statement(&statement, FilePlace::Line(k + 1))?;
     }
-    Ok(TriangleMesh::new(file.vertices, file.triangles)?)
+    Ok(TriangleMesh::opened(file.vertices, file.triangles)?)
+}
+
+/// The faces of a file, each of which gives a triangle or more.
+fn faces(bytes: &[u8]) -> usize {
+    bytes.split(|&b| b == b'\n').filter(|line| line.trim_ascii_start().starts_with(b"f ")).count()
 }
 
 /// What was read so far.

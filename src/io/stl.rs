@@ -18,11 +18,11 @@ use std::path::Path;
 use super::mesh_file::{
     FilePlace, MeshFileError, MeshFormat, MeshReadError, Parsed, coordinate, number, unexpected,
 };
-use crate::mesh_file;
 use geometry::{Point3, RepairNotes, TriangleMesh};
 
 /// STL, binary or text.
-pub(super) const FORMAT: MeshFormat = MeshFormat { word: "STL", extensions: &["stl"], parse };
+pub(super) const FORMAT: MeshFormat =
+    MeshFormat { word: "STL", extensions: &["stl"], parse, count: triangles };
 
 /// Bytes before the first triangle.
 const HEADER: usize = 84;
@@ -39,7 +39,7 @@ const EXPORT_AGAIN: &str =
 /// # Errors
 /// See [`MeshReadError`].
 pub fn read(path: &Path) -> Result<(TriangleMesh, RepairNotes), MeshReadError> {
-    mesh_file::read(path, parse)
+    FORMAT.read(path)
 }
 
 /// Reads the bytes of a file.
@@ -57,6 +57,19 @@ pub fn parse(bytes: &[u8]) -> Result<(TriangleMesh, RepairNotes), MeshFileError>
         None => return Err(MeshFileError::TooShort { bytes: bytes.len() }),
     };
     soup(corners)
+}
+
+/// The triangles that a file has if it is whole.
+fn triangles(bytes: &[u8]) -> usize {
+    match count(bytes) {
+        Some((declared, expected)) if expected == bytes.len() as u64 => declared as usize,
+        _ => {
+            const END: &[u8] = b"endfacet";
+            let begins =
+                |k: usize| bytes[k..].get(..END.len()).is_some_and(|word| word.eq_ignore_ascii_case(END));
+            (0..bytes.len()).filter(|&k| matches!(bytes[k], b'e' | b'E') && begins(k)).count()
+        }
+    }
 }
 
 /// The triangles that a binary file states, and its length if that is true.
@@ -93,7 +106,7 @@ fn binary(bytes: &[u8], declared: u32) -> Result<Vec<Point3>, MeshFileError> {
 /// A mesh from triangles that each state their own corners.
 fn soup(corners: Vec<Point3>) -> Parsed {
     let triangles = (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
-    Ok(TriangleMesh::new(corners, triangles)?)
+    Ok(TriangleMesh::opened(corners, triangles)?)
 }
 
 /// The words of a text with the lines they stand in.

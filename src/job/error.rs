@@ -2,6 +2,7 @@
 
 use miette::Diagnostic;
 
+use geometry::MeshError;
 use metrology::EngineError;
 use report::ReportError;
 use scene::{LoadError, Scene, SceneError};
@@ -63,6 +64,22 @@ pub enum JobError {
         name: String,
         /// The engine.
         engine: &'static str,
+    },
+    /// What is measured along normals needs a surface with two sides.
+    #[error(
+        "{scene}: the toolpath \"{name}\" cannot be measured along normals, because the part is no surface. {reason}"
+    )]
+    #[diagnostic(help(
+        "write `engine = \"zmap\"` or \"auto\" in [simulation] and delete `axis` in the [[toolpath]]: upright cutters need \
+         no surface"
+    ))]
+    NoSurface {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// Name of the toolpath.
+        name: String,
+        /// Where it is none.
+        reason: Box<MeshError>,
     },
     /// Pockets have no normals to be measured along.
     #[error(

@@ -5,6 +5,7 @@ use motion::Toolpath;
 use scene::{FLATTEN_SHARE, Scene};
 use sim::ZMap;
 use toolpath::{Engagement, Pocket, PocketStrategy, Step, engagement, limit_feed};
+use work::monitor::{Cancelled, Monitor};
 
 /// Lowers the feed where more of the cutter was measured in stock than the strategy allows. Leaves the
 /// engagement of the passes, and the bound of its greatest angle, rad.
@@ -22,6 +23,9 @@ pub fn limit_feed_by(
 }
 
 /// What is measured of a pocket besides its floor. `top` is the height of the stock, mm.
+///
+/// # Errors
+/// [`Cancelled`] when the monitor says so.
 pub fn pocket_figures(
     scene: &Scene,
     pocket: &Pocket,
@@ -31,13 +35,14 @@ pub fn pocket_figures(
     cut: &ZMap,
     top: f64,
     (engaged, engagement_bound): &(Engagement, f64),
-) -> PocketFigures {
+    monitor: &dyn Monitor,
+) -> Result<PocketFigures, Cancelled> {
     let cutter = &scene.cutter;
-    let (wall_gouge_mm, wall_gouge_move) = wall_gouge_of_moves(&pocket.region, cutter, path, top);
-    let (of_cells, area) = wall_gouge_of_cells(&pocket.region, cut, top);
-    PocketFigures {
+    let (wall_gouge_mm, wall_gouge_move) = wall_gouge_of_moves(&pocket.region, cutter, path, top, monitor)?;
+    let (of_cells, area) = wall_gouge_of_cells(&pocket.region, cut, top, monitor)?;
+    Ok(PocketFigures {
         area_mm2: pocket.region.area(),
-        unreachable_area_mm2: pocket.rest_area(cutter),
+        unreachable_area_mm2: pocket.rest_area(cutter, monitor)?,
         stepover_mm: strategy.stepover(step, cutter.radius()),
         wall_gouge_mm,
         wall_gouge_error_bound_mm: FLATTEN_SHARE * scene.tolerance.chord,
@@ -51,5 +56,5 @@ pub fn pocket_figures(
         p95_engagement_deg: engaged.p95.to_degrees(),
         engagement_limit_deg: strategy.engagement_limit(step, cutter.radius()).to_degrees(),
         over_engagement_limit_fraction: engaged.over_limit,
-    }
+    })
 }

@@ -13,12 +13,11 @@ use report::{
     InputFile, NotPlanned, RunReport, SimulationFigures, ToleranceFigures, ToolpathReport, ToolpathResult,
     Verdict,
 };
-use scene::{
-    Fixture, Loaded, PartSource, Scene, ToolpathRequest, auto_cell, load_mesh, load_part, load_pocket,
-};
+use scene::{Fixture, Loaded, PartSource, Scene, ToolpathRequest, auto_cell, load_mesh, load_part};
 use sim::VoxelStock;
 use toolpath::Pocket;
-use work::monitor::{self, Monitor};
+use work::aside;
+use work::monitor::{self, Cancelled, Monitor, Silent};
 
 use super::machined::BASE;
 use super::planned::{self, Planned};
@@ -88,8 +87,21 @@ impl Session {
     /// # Errors
     /// [`JobError`] when the part cannot be used, or its cells do not fit into the memory.
     pub fn new(scene: Scene) -> Result<Self, JobError> {
-        let Loaded { part, blade, notes } = load_part(&scene)?;
-        let pocket = load_pocket(&scene)?;
+        Self::load(scene, &Silent)
+    }
+
+    /// As [`Session::new`], and the monitor is asked while it lasts.
+    ///
+    /// # Errors
+    /// Those of [`Session::new`], and [`JobError::Cancelled`] when the monitor says so.
+    pub fn load(scene: Scene, monitor: &dyn Monitor) -> Result<Self, JobError> {
+        monitor.start("reading the part", 0);
+        // Readers, triangulations and search trees ask nobody.
+        aside::run(monitor, move || Self::read(scene))?
+    }
+
+    fn read(scene: Scene) -> Result<Self, JobError> {
+        let Loaded { part, blade, pocket, notes } = load_part(&scene)?;
         let budget = Budget::new(&part, scene.simulation.memory_mib);
         let cells = budget
             .grid_before_planning(&stock_area(&scene, &part), &scene.simulation)
@@ -161,8 +173,8 @@ impl Session {
         let scene = &self.scene;
         let engine = self.engine(request)?;
         let tool = Tool::of(scene);
-        let fixtures = self.fixtures()?;
-        let closer = if engine.tilts() { self.closer_part() } else { None };
+        let fixtures = self.fixtures(monitor)?;
+        let closer = if engine.tilts() { self.closer_part(monitor)? } else { None };
         let near = closer.as_ref().unwrap_or(&self.part);
         let around = Around { tool: &tool, near, fixtures: &fixtures };
         let (planned, mut measured) = self.plan_and_measure(request, around, engine, monitor)?;
@@ -272,6 +284,12 @@ impl Session {
             let engine = engine.word();
             return Err(JobError::Upright { scene: scene.source.name.clone(), name: name.clone(), engine });
         }
+        if engine.tilts()
+            && let Err(reason) = self.part.mesh().surface()
+        {
+            let (scene, reason) = (scene.source.name.clone(), Box::new(reason.clone()));
+            return Err(JobError::NoSurface { scene, name: name.clone(), reason });
+        }
         Ok(engine)
     }
 
@@ -309,22 +327,31 @@ impl Session {
     }
 
     /// The meshes that are not to be touched.
-    fn fixtures(&self) -> Result<Vec<FixtureMesh>, JobError> {
-        let load = |fixture: &Fixture| {
-            let (mesh, _) = load_mesh(&self.scene, &fixture.file, fixture.format, fixture.scale)?;
-            let bvh = Bvh::new(&mesh);
-            Ok((mesh, bvh))
-        };
-        self.scene.keep_clear.fixtures.iter().map(load).collect()
+    fn fixtures(&self, monitor: &dyn Monitor) -> Result<Vec<FixtureMesh>, JobError> {
+        if self.scene.keep_clear.fixtures.is_empty() {
+            return Ok(Vec::new());
+        }
+        let scene = self.scene.clone();
+        aside::run(monitor, move || {
+            let load = |fixture: &Fixture| {
+                let (mesh, _) = load_mesh(&scene, &fixture.file, fixture.format, fixture.scale)?;
+                let bvh = Bvh::new(&mesh);
+                Ok((mesh, bvh))
+            };
+            scene.keep_clear.fixtures.iter().map(load).collect()
+        })?
     }
 
     /// The part with triangles so near to its patches that a tool which is kept off the triangles stays within the gouge
     /// tolerance of the patches; `None` where the part's own do.
-    fn closer_part(&self) -> Option<Part> {
+    fn closer_part(&self, monitor: &dyn Monitor) -> Result<Option<Part>, Cancelled> {
         let nearest = NEAREST_SHARE * self.scene.tolerance.gouge;
-        let far = self.part.mesh_deviation() > nearest;
+        if self.part.mesh_deviation() <= nearest {
+            return Ok(None);
+        }
+        let patches = self.part.patches().to_vec();
         // Patches that would take too many triangles keep theirs; the measurement finds what that costs.
-        far.then(|| Part::from_patches(self.part.patches().to_vec(), nearest).ok()).flatten()
+        aside::run(monitor, move || Part::from_patches(patches, nearest).ok())
     }
 
     /// The block that the part is cut from, as far as it was roughed before.
@@ -424,7 +451,7 @@ mod tests {
             let needed = Tool::of(&session.scene).keep_clear(&session.scene, part, &[]).checks[0].needed;
             part.mesh_deviation() - needed
         };
-        let near = session.closer_part().unwrap();
+        let near = session.closer_part(&Silent).unwrap().unwrap();
         assert!(deepest(&session.part) > gouge && deepest(&near) <= 0.75 * gouge * (1.0 + 1e-9));
     }
 }

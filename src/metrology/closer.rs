@@ -10,6 +10,7 @@ use std::collections::BinaryHeap;
 
 use super::figures::NUMERICAL_FLOOR;
 use geometry::Point2;
+use work::monitor::{self, Cancelled, Monitor};
 
 /// A square of the plan.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -78,12 +79,16 @@ impl PartialOrd for Square {
 /// # Tolerance
 /// `possible` exceeds the greater of `known` and the value found by no more than `asked` unless [`MOST`]
 /// places did not suffice. It is as right as the bounds that `at` gives.
+///
+/// # Errors
+/// [`Cancelled`] when the monitor says so.
 pub(super) fn greatest(
     squares: Vec<Square>,
     known: f64,
     asked: f64,
     at: &(dyn Fn(Point2, f64) -> Option<Value> + Sync),
-) -> BoundedGreatest {
+    monitor: &dyn Monitor,
+) -> Result<BoundedGreatest, Cancelled> {
     let least = squares.first().map_or(0.0, |s| s.half * OFF_PART_SHARE);
     let inside = |centre: Point2, half: f64| {
         // Where the centre lies off the part a corner may not, from which all of the square is twice as far.
@@ -96,7 +101,7 @@ pub(super) fn greatest(
         let found = at(centre, half).map(|v| (centre, v)).or_else(|| (0..4).find_map(corner));
         found.or((half > least).then_some(unknown))
     };
-    search(squares, known, asked, MOST, &inside)
+    search(squares, known, asked, MOST, &inside, monitor)
 }
 
 /// As [`greatest`], looking at `most` places. `inside` tells what the square around a centre with a given half side holds,
@@ -107,7 +112,8 @@ pub(super) fn search(
     asked: f64,
     most: usize,
     inside: &(dyn Fn(Point2, f64) -> Option<(Point2, Value)> + Sync),
-) -> BoundedGreatest {
+    monitor: &dyn Monitor,
+) -> Result<BoundedGreatest, Cancelled> {
     let mut open = BinaryHeap::from(squares);
     let (mut best, mut place, mut spent) = (known, None, 0);
     while spent < most {
@@ -120,19 +126,20 @@ pub(super) fn search(
             break;
         }
         spent += 4 * batch.len();
-        let quarters = work::parallel::map(4 * batch.len(), |k| {
+        let quarters = work::parallel::try_map(4 * batch.len(), |k| {
+            monitor::check(monitor)?;
             let (square, side) = (&batch[k / 4], |up: bool| if up { 0.5 } else { -0.5 });
             let half = 0.5 * square.half;
             let centre = Point2::new(
                 square.centre.x + side(k & 1 != 0) * square.half,
                 square.centre.y + side(k & 2 != 0) * square.half,
             );
-            inside(centre, half).map(|(place, v)| {
+            Ok(inside(centre, half).map(|(place, v)| {
                 // A part of a square promises no more than the whole.
                 let possible = v.possible.min(square.possible).max(v.here);
                 (v.here, place, Square { possible, centre, half })
-            })
-        });
+            }))
+        })?;
         for &(here, at, _) in quarters.iter().flatten() {
             if here > best {
                 (best, place) = (here, Some(at));
@@ -143,12 +150,13 @@ pub(super) fn search(
         );
     }
     let possible = open.peek().map_or(best, |s| s.possible.max(best));
-    BoundedGreatest { greatest: place.map(|place| (best, place)), possible }
+    Ok(BoundedGreatest { greatest: place.map(|place| (best, place)), possible })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use work::monitor::Silent;
 
     /// Squares of side 1 over [0, n]², with values and slopes of `f`.
     fn search(
@@ -164,7 +172,7 @@ mod tests {
         let centres = (0..n * n).map(|k| Point2::new(f64::from(k % n) + 0.5, f64::from(k / n) + 0.5));
         let squares = centres
             .filter_map(|centre| at(centre, 0.5).map(|v| Square { possible: v.possible, centre, half: 0.5 }));
-        greatest(squares.collect(), known, asked, &at)
+        greatest(squares.collect(), known, asked, &at, &Silent).unwrap()
     }
 
     #[test]
@@ -206,7 +214,7 @@ mod tests {
             let (here, slope) = cliff(centre)?;
             Some(Value { here, possible: here + 1.5 * slope * half })
         };
-        let value = greatest(squares, 0.0, 1e-3, &at).greatest.unwrap().0;
+        let value = greatest(squares, 0.0, 1e-3, &at, &Silent).unwrap().greatest.unwrap().0;
         assert!((2.93 - 2e-3..=2.93).contains(&value), "{value}");
     }
 }

@@ -71,7 +71,7 @@ impl ExcessSearch<'_> {
         let known = if region.max_mm > ridge.max_mm { region } else { ridge };
         monitor.start("looking for the highest material", 0);
         let open = self.open(samples, known.max_mm.min(limits.scallop), monitor)?;
-        let highest = self.highest(&open, known, Kind::Any);
+        let highest = self.highest(&open, known, Kind::Any, monitor)?;
         monitor::check(monitor)?;
         let (reached, unreached) = if highest.at_most() <= limits.scallop {
             // Whatever it is, it holds every limit.
@@ -80,12 +80,12 @@ impl ExcessSearch<'_> {
             // Below its limit it is of no account.
             let floor = limits.uncut - self.inspection.asked.max(2.0 * NUMERICAL_FLOOR);
             let unreached = Bounded { max_mm: region.max_mm.max(floor), ..region };
-            let found = self.highest(&open, unreached, Kind::Unreached);
+            let found = self.highest(&open, unreached, Kind::Unreached, monitor)?;
             monitor::check(monitor)?;
             let most = found.at_most();
             let found = if found.max_mm > unreached.max_mm { found } else { region };
             let unreached = Bounded { error_bound_mm: (most - found.max_mm).max(0.0), ..found };
-            (self.highest(&open, ridge, Kind::Reached), unreached)
+            (self.highest(&open, ridge, Kind::Reached, monitor)?, unreached)
         };
         let kind = if unreached.max_mm >= highest.max_mm && unreached.max_mm > 0.0 {
             ExcessKind::Uncut
@@ -138,7 +138,13 @@ impl ExcessSearch<'_> {
     }
 
     /// The highest place of a kind in some squares, if it is higher than `known`.
-    fn highest(&self, squares: &[Square], known: Bounded, kind: Kind) -> Bounded {
+    fn highest(
+        &self,
+        squares: &[Square],
+        known: Bounded,
+        kind: Kind,
+        monitor: &dyn Monitor,
+    ) -> Result<Bounded, Cancelled> {
         let patches = self.patches(known.max_mm);
         let small = OTHER_KIND_SHARE * 0.5 * self.inspection.grid.cell;
         let at = |centre: Point2, half: f64| {
@@ -163,7 +169,7 @@ impl ExcessSearch<'_> {
             }
         };
         let open = squares.iter().filter(|square| square.possible > known.max_mm).copied().collect();
-        let found = search(open, known.max_mm, self.asked(known.max_mm, kind), MOST, &at);
+        let found = search(open, known.max_mm, self.asked(known.max_mm, kind), MOST, &at, monitor)?;
         let mut highest = match found.greatest {
             Some((height, q)) => {
                 let z = self.inspection.part.highest_at(q.x, q.y).map_or(0.0, |design| design.point.z);
@@ -180,7 +186,7 @@ impl ExcessSearch<'_> {
             // Moves that no cell saw cut it away: between nothing and this height all is possible.
             highest.error_bound_mm = highest.error_bound_mm.max(highest.max_mm);
         }
-        highest
+        Ok(highest)
     }
 
     /// The cells in which the part has details that their centres do not show: triangles narrower than two cells that bend

@@ -84,6 +84,8 @@ pub struct Facing<'a> {
     block: Aabb,
     /// Whether surface may lie over surface.
     overlaps: bool,
+    /// Whether the triangles make no surface: then their sides mean little.
+    soup: bool,
 }
 
 impl<'a> Facing<'a> {
@@ -92,7 +94,7 @@ impl<'a> Facing<'a> {
         let axes = if path.is_upright() { Vec::new() } else { axes(path) };
         // A single surface over a rectangle lies over itself nowhere.
         let overlaps = !matches!(part.patches(), [part::Patch::Analytic(_)]);
-        Self { part, axes, block, overlaps }
+        Self { part, axes, block, overlaps, soup: part.mesh().surface().is_err() }
     }
 
     /// Whether all axes are upright.
@@ -138,6 +140,10 @@ impl<'a> Facing<'a> {
         }
         if self.axes.is_empty() {
             return match normal.z {
+                // The tool meets the back of it. No cell measures that, and to leave it out would pass what nobody saw.
+                z if z < -LEAST_FACING && self.soup && !self.is_covered(point, -near / z) => {
+                    PlaceKind::Facing
+                }
                 z if z < -LEAST_FACING => PlaceKind::FacingAway,
                 z if z <= LEAST_FACING => PlaceKind::Wall,
                 z if self.is_covered(point, near / z) => PlaceKind::Hidden,

@@ -35,8 +35,8 @@ pub(super) fn inspect(
     Ok(Inspected {
         highest: finder.highest(&ridges, inspection.asked),
         ridges,
-        gouge: inspection.gouges(&samples),
-        uncut: inspection.uncut(&samples, highest_ridge, deviation.area_mm2),
+        gouge: inspection.gouges(&samples, monitor)?,
+        uncut: inspection.uncut(&samples, highest_ridge, deviation.area_mm2, monitor)?,
         deviation,
         least_lean: samples.iter().map(|s| f64::from(s.lean)).fold(1.0, f64::min),
         samples,

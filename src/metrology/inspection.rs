@@ -84,10 +84,11 @@ impl Inspection<'_> {
             let origin = self.grid.centre(0, rows.start);
             let design = self.part.sample_grid(origin, self.grid.cell, nx, rows.len(), &Within(monitor))?;
             work::parallel::for_each_chunk(samples, nx, |j, row| {
-                if monitor.cancelled() {
-                    return;
-                }
                 for (i, sample) in row.iter_mut().enumerate() {
+                    // Beside walls one cell may take milliseconds.
+                    if monitor.cancelled() {
+                        return;
+                    }
                     let row = first + j - rows.start;
                     let here = design.at(i, row);
                     if !here.is_on() || here.normal.z <= LEAST_FACING {
@@ -156,7 +157,11 @@ impl Inspection<'_> {
         DeviationFigures::of(measured(samples).map(|(k, d)| (d, self.area(&samples[k]))))
     }
 
-    pub fn gouges(&self, samples: &[Sample]) -> GougeFigures {
+    /// Gouges, and how deep one may be between centres.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn gouges(&self, samples: &[Sample], monitor: &dyn Monitor) -> Result<GougeFigures, Cancelled> {
         let deep = |k: usize| f64::from(samples[k].deviation) < -self.limits.gouge;
         let mut figures = GougeFigures { error_bound_mm: NUMERICAL_FLOOR, ..Default::default() };
         let regions = connected(&self.grid, &deep);
@@ -177,9 +182,8 @@ impl Inspection<'_> {
         let listed = figures.regions.iter().map(|r| r.depth_mm).fold(0.0, f64::max);
         figures.max_depth_mm = deepest.max(listed);
         let cells = measured(samples).map(|(k, _)| k);
-        let found = self.between_centres(cells, figures.max_depth_mm, &|k| samples[k], &|d, lean, half| {
-            self.depth(d, lean, half)
-        });
+        let value = |d: &Deviation, lean: f64, half: f64| self.depth(d, lean, half);
+        let found = self.between_centres(cells, figures.max_depth_mm, &|k| samples[k], &value, monitor)?;
         figures.max_depth_mm = found.greatest.map_or(figures.max_depth_mm, |(depth, _)| depth);
         figures.error_bound_mm += found.possible - figures.max_depth_mm;
         if let Some((depth, q)) = found.greatest.filter(|(depth, _)| *depth > self.limits.gouge) {
@@ -198,7 +202,7 @@ impl Inspection<'_> {
         figures.region_count = figures.regions.len();
         figures.regions.sort_by(|a, b| b.depth_mm.total_cmp(&a.depth_mm));
         figures.regions.truncate(LISTED_REGIONS);
-        figures
+        Ok(figures)
     }
 
     /// Depth at a centre, and at most in the square with half side `half` around it. Beside the centre a
@@ -217,7 +221,8 @@ impl Inspection<'_> {
         known: f64,
         sample: &dyn Fn(usize) -> Sample,
         value: &(dyn Fn(&Deviation, f64, f64) -> Value + Sync),
-    ) -> closer::BoundedGreatest {
+        monitor: &dyn Monitor,
+    ) -> Result<closer::BoundedGreatest, Cancelled> {
         let half = 0.5 * self.grid.cell;
         let mut open: Vec<Square> = cells
             .filter_map(|k| {
@@ -239,9 +244,9 @@ impl Inspection<'_> {
             let d = self.surface.along_normal(&design.point, &design.normal)?;
             Some(value(&d, design.normal.z, half))
         };
-        let mut found = closer::greatest(open, known, self.asked, &at);
+        let mut found = closer::greatest(open, known, self.asked, &at, monitor)?;
         found.possible = found.possible.max(others);
-        found
+        Ok(found)
     }
 
     /// Depth at a place of the plan, its design point, and the move that cut it.
@@ -284,7 +289,16 @@ impl Inspection<'_> {
     }
 
     /// What stands above the uncut tolerance and is no scallop, `highest_ridge` being the highest of those.
-    pub fn uncut(&self, samples: &[Sample], highest_ridge: f64, measured_area: f64) -> UncutFigures {
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn uncut(
+        &self,
+        samples: &[Sample],
+        highest_ridge: f64,
+        measured_area: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<UncutFigures, Cancelled> {
         let high = |k: usize| f64::from(samples[k].deviation) > self.limits.uncut;
         let mut figures = UncutFigures { error_bound_mm: NUMERICAL_FLOOR, ..Default::default() };
         let mut cells = Vec::new();
@@ -318,10 +332,11 @@ impl Inspection<'_> {
         }
         let known = of_cells.iter().map(|r| r.height_mm).fold(0.0, f64::max);
         let all = cells.iter().flatten().map(|&k| k as usize);
-        let found = self.between_centres(all, known, &|k| samples[k], &|d, lean, half| Value {
+        let value = |d: &Deviation, lean: f64, half: f64| Value {
             here: d.distance,
             possible: d.distance + d.slope * reach(half, lean),
-        });
+        };
+        let found = self.between_centres(all, known, &|k| samples[k], &value, monitor)?;
         if let Some((height, q)) = found.greatest {
             let cell = self.grid.cell_at(q.x, q.y).map(|(i, j)| self.grid.index(i, j) as u32);
             let holds = |k: &usize| cell.is_some_and(|cell| cells[*k].contains(&cell));
@@ -339,7 +354,7 @@ impl Inspection<'_> {
         figures.max_height_mm = figures.regions.first().map_or(0.0, |r| r.height_mm);
         figures.regions.truncate(LISTED_REGIONS);
         figures.fraction = if measured_area > 0.0 { figures.area_mm2 / measured_area } else { 0.0 };
-        figures
+        Ok(figures)
     }
 }
 

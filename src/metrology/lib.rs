@@ -58,8 +58,8 @@ pub use coverage::{AlongTask, CellsSeen, Coverage, CoverageFigures};
 pub use cut_surface::CutSurface;
 pub use engagement::{ContactArcs, contact_arcs, finer_contact_arcs};
 pub use engines::{
-    Budget, ENGINES, Engine, EngineChoice, EngineError, LaidOut, MIB, Measured, NormalView, REACH_OVER_UNCUT,
-    Simulation, Task, View,
+    BYTES_PER_TRIANGLE, Budget, ENGINES, Engine, EngineChoice, EngineError, LaidOut, MIB, Measured,
+    NormalView, REACH_OVER_UNCUT, Simulation, Task, View,
 };
 pub use facing::{Facing, Judged, PlaceKind};
 pub use figures::{

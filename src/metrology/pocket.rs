@@ -10,6 +10,7 @@ use cutter::Cutter;
 use geometry::{Point2, Region, SegmentGrid, Vector2, foot};
 use motion::Toolpath;
 use sim::ZMap;
+use work::monitor::{self, Cancelled, Monitor};
 use work::parallel;
 
 /// A cell counts as cut when it lies lower than the stock's top by more than this, mm: stored heights
@@ -66,18 +67,28 @@ fn segment_distance(a: &[Point2; 2], b: &[Point2; 2]) -> f64 {
 }
 
 /// How far beyond the outline the cutter came, and on which move: every move below `top`, mm.
-pub fn wall_gouge_of_moves(region: &Region, cutter: &Cutter, path: &Toolpath, top: f64) -> (f64, u32) {
+///
+/// # Errors
+/// [`Cancelled`] when the monitor says so.
+pub fn wall_gouge_of_moves(
+    region: &Region,
+    cutter: &Cutter,
+    path: &Toolpath,
+    top: f64,
+    monitor: &dyn Monitor,
+) -> Result<(f64, u32), Cancelled> {
     let walls = SegmentGrid::of_curves(region.curves());
     let r = cutter.radius();
-    let depths = parallel::map(path.len(), |k| {
+    let depths = parallel::try_map(path.len(), |k| {
+        monitor::check(monitor)?;
         let (a, b) = (path.start_of(k), path.moves[k].to.tip);
         if a.z.min(b.z) >= top {
-            return 0.0;
+            return Ok(0.0);
         }
         let ends = [a.xy(), b.xy()];
         let beyond = ends.map(|end| if region.contains(&end) { 0.0 } else { walls.distance(&end) });
         if beyond[0].max(beyond[1]) > 0.0 {
-            return r + beyond[0].max(beyond[1]);
+            return Ok(r + beyond[0].max(beyond[1]));
         }
         let reach = Vector2::new(r, r);
         let around = [ends[0].inf(&ends[1]) - reach, ends[0].sup(&ends[1]) + reach];
@@ -85,19 +96,28 @@ pub fn wall_gouge_of_moves(region: &Region, cutter: &Cutter, path: &Toolpath, to
         walls.near(&around, |s| {
             nearest = nearest.min(segment_distance(&ends, &walls.segments()[s as usize].ends));
         });
-        r - nearest
-    });
+        Ok(r - nearest)
+    })?;
     let worst =
         depths.iter().enumerate().fold((0.0, 0), |w, (k, d)| if *d > w.0 { (*d, k as u32) } else { w });
     // What rounding leaves is none.
-    if worst.0 < 1e-9 { (0.0, 0) } else { worst }
+    Ok(if worst.0 < 1e-9 { (0.0, 0) } else { worst })
 }
 
 /// Farthest centre of a cut cell outside of the region and the area of all such cells, mm and mm².
-pub fn wall_gouge_of_cells(region: &Region, cut: &ZMap, top: f64) -> (f64, f64) {
+///
+/// # Errors
+/// [`Cancelled`] when the monitor says so.
+pub fn wall_gouge_of_cells(
+    region: &Region,
+    cut: &ZMap,
+    top: f64,
+    monitor: &dyn Monitor,
+) -> Result<(f64, f64), Cancelled> {
     let walls = SegmentGrid::of_curves(region.curves());
     let grid = &cut.grid;
-    let rows = parallel::map(grid.ny, |j| {
+    let rows = parallel::try_map(grid.ny, |j| {
+        monitor::check(monitor)?;
         let y = grid.centre(0, j).y;
         let mut crossings: Vec<f64> = walls
             .segments()
@@ -119,11 +139,11 @@ pub fn wall_gouge_of_cells(region: &Region, cut: &ZMap, top: f64) -> (f64, f64) 
                 count += 1;
             }
         }
-        (farthest, count)
-    });
+        Ok((farthest, count))
+    })?;
     let farthest = rows.iter().map(|r| r.0).fold(0.0, f64::max);
     let count: usize = rows.iter().map(|r| r.1).sum();
-    (farthest, count as f64 * grid.cell * grid.cell)
+    Ok((farthest, count as f64 * grid.cell * grid.cell))
 }
 
 #[cfg(test)]
@@ -153,8 +173,8 @@ mod tests {
                 vec![to(10.0, 10.0, -2.0), to(10.0, y, -2.0), to(x, y, -2.0)],
             );
             let stock = cut(ZMap::block(grid, 0.0), &cutter, &path, &Silent).unwrap();
-            let cells = wall_gouge_of_cells(&region, &stock, 0.0);
-            (wall_gouge_of_moves(&region, &cutter, &path, 0.0), cells)
+            let cells = wall_gouge_of_cells(&region, &stock, 0.0, &Silent).unwrap();
+            (wall_gouge_of_moves(&region, &cutter, &path, 0.0, &Silent).unwrap(), cells)
         };
         assert_eq!(measured(3.0, 27.0), ((0.0, 0), (0.0, 0.0)));
         let ((exact, _), (cells, area)) = measured(2.8, 20.0);

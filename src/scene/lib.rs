@@ -20,7 +20,7 @@ pub use axis::AxisRequest;
 pub use interference::{Fixture, KeepClear};
 pub use keys::{Finding, SceneError, SceneText, printable, printable_lines};
 pub use kinematics::FiveAxis;
-pub use load::{load_mesh, load_part, load_pocket};
+pub use load::{load_mesh, load_part};
 pub use named_file::NamedFile;
 pub use part::{
     BladeRequest, FLATTEN_SHARE, FormulaSource, LoadError, Loaded, MeshFile, NurbsSource, OutlineSource,

@@ -10,7 +10,8 @@ mod source;
 
 pub use blade::BladeRequest;
 pub use formula::FormulaSource;
-pub use mesh::{MeshFile, read_mesh};
+pub use mesh::MeshFile;
+pub(crate) use mesh::read_mesh;
 pub use nurbs::NurbsSource;
 pub use pocket::{FLATTEN_SHARE, OutlineSource, PocketSource};
 pub(crate) use source::Loading;
@@ -87,16 +88,6 @@ part_sources! {
     Pocket(PocketSource),
     /// A surface by formula over a rectangle.
     Formula(FormulaSource),
-}
-
-impl PartSource {
-    /// The pocket, if it is one.
-    pub fn pocket(&self) -> Option<&PocketSource> {
-        match self {
-            Self::Pocket(pocket) => Some(pocket),
-            _ => None,
-        }
-    }
 }
 
 /// The values of `surface`.

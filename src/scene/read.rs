@@ -190,7 +190,8 @@ fn read_holder(root: &Section<'_>, cutter: &Cutter) -> Result<Option<Holder>, Sc
     let length = match (holder.length("cutting_length")?, cutter.stated_length()) {
         (None, Some(length)) => length,
         (None, None) => holder.required_length("cutting_length", 20.0)?.value,
-        (Some(length), _) if length.value < cutter.side_height() => {
+        // The cutter's own length is its side height within rounding, and is written as the default.
+        (Some(length), stated) if length.value < cutter.side_height() && stated != Some(length.value) => {
             let message = format!(
                 "the cutting length of {} mm ends below the cutter's full radius, at {:.4} mm",
                 length.value,

@@ -27,6 +27,7 @@ use part::{Part, PatchPoint, SurfacePoint};
 use refine::{Hill, Peak};
 use roof::Roof;
 use touch::{Carries, Facet, Profile, Touch};
+use work::monitor::{self, Cancelled, Monitor, Silent};
 
 /// Where a cutter dropped along -z comes to rest on a part.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -104,13 +105,21 @@ const BESIDE_SLACK: f64 = 1e-6;
 pub(crate) struct Beside(Option<usize>);
 
 impl<'a> DropCutter<'a> {
-    /// Prepares: takes about 0.4 s for a million triangles, as long as a hundred thousand drops.
+    /// Prepares: takes seconds for a million triangles, as long as a hundred thousand drops.
     pub fn new(part: &'a Part, cutter: &Cutter) -> Self {
-        if part.patches().is_empty() {
-            Self::over(part.mesh(), part.bvh(), cutter, None)
-        } else {
-            Self::over(part.mesh(), part.bvh(), cutter, Some((part, part.mesh_deviation())))
+        match Self::watched(part, cutter, &Silent) {
+            Ok(drop) => drop,
+            Err(Cancelled) => unreachable!("nobody asked to stop"),
         }
+    }
+
+    /// As [`DropCutter::new`], and the monitor is asked while it lasts.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn watched(part: &'a Part, cutter: &Cutter, monitor: &dyn Monitor) -> Result<Self, Cancelled> {
+        let exact = (!part.patches().is_empty()).then(|| (part as _, part.mesh_deviation()));
+        Self::over(part.mesh(), part.bvh(), cutter, exact, monitor)
     }
 
     /// Prepares for a mesh, or for the surface that it approximates within a deviation.
@@ -119,20 +128,23 @@ impl<'a> DropCutter<'a> {
         bvh: &'a Bvh,
         cutter: &Cutter,
         exact: Option<(&'a dyn ExactSurface, f64)>,
-    ) -> Self {
+        monitor: &dyn Monitor,
+    ) -> Result<Self, Cancelled> {
         let profile = Profile::of(cutter, 0.0);
         let search =
             exact.map_or(profile, |(_, deviation)| Profile::of(cutter, DEVIATION_MARGIN * deviation));
-        let domains = if exact.is_none() { domain::domains(mesh, &search) } else { Vec::new() };
-        let facets = work::parallel::map(bvh.slots(), |slot| {
+        let domains = if exact.is_none() { domain::domains(mesh, &search, monitor)? } else { Vec::new() };
+        let facets = work::parallel::try_map(bvh.slots(), |slot| {
+            monitor::check(monitor)?;
             let t = bvh.triangle_in(slot);
             let carries = domains.get(t).map_or(Carries::ALL, domain::Domain::carries);
-            Facet::new(mesh.corners(t), &mesh.normal(t), carries, &search)
-        });
+            Ok(Facet::new(mesh.corners(t), &mesh.normal(t), carries, &search))
+        })?;
         let cull = if exact.is_none() {
             let in_slot = |slot: usize| &domains[bvh.triangle_in(slot)];
             let around = |slot| in_slot(slot).parts().fold(Extent::NOTHING, |all, part| all.with(&part.1));
             let extents: Vec<Extent> = (0..bvh.slots()).map(around).collect();
+            monitor::check(monitor)?;
             let mut slot_of = vec![0u32; bvh.slots()];
             (0..bvh.slots()).for_each(|slot| slot_of[bvh.triangle_in(slot)] = slot as u32);
             let slot_of = &slot_of;
@@ -146,9 +158,10 @@ impl<'a> DropCutter<'a> {
             });
             Cull::Domains { tree: bvh.tree().refitted(&extents), parts }
         } else {
-            Cull::Roofs(Paired::from_values(&roofs(mesh, bvh, &search)))
+            Cull::Roofs(Paired::from_values(&roofs(mesh, bvh, &search, monitor)?))
         };
-        Self { mesh, bvh, exact: exact.map(|(surface, _)| surface), profile, search, facets, cull }
+        monitor::check(monitor)?;
+        Ok(Self { mesh, bvh, exact: exact.map(|(surface, _)| surface), profile, search, facets, cull })
     }
 
     /// Highest tip position over `(x, y)` at which the cutter touches the part without cutting into
@@ -286,12 +299,18 @@ impl<'a> DropCutter<'a> {
 }
 
 /// A roof for each box of the tree.
-fn roofs(mesh: &TriangleMesh, bvh: &Bvh, profile: &Profile) -> Vec<Roof> {
-    work::parallel::map(bvh.boxes(), |index| {
-        bvh.few_slots_in(index, roof::MOST_BELOW).map_or(Roof::NONE, |(node, slots)| {
+fn roofs(
+    mesh: &TriangleMesh,
+    bvh: &Bvh,
+    profile: &Profile,
+    monitor: &dyn Monitor,
+) -> Result<Vec<Roof>, Cancelled> {
+    work::parallel::try_map(bvh.boxes(), |index| {
+        monitor::check(monitor)?;
+        Ok(bvh.few_slots_in(index, roof::MOST_BELOW).map_or(Roof::NONE, |(node, slots)| {
             let below: Vec<_> = slots.iter().map(|&s| mesh.corners(bvh.triangle_in(s))).collect();
             Roof::over(node, &below, profile)
-        })
+        }))
     })
 }
 

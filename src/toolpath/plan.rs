@@ -122,6 +122,10 @@ pub fn plan_tilted(
     settings: &PlanSettings,
     monitor: &dyn Monitor,
 ) -> Result<Plan, PlanError> {
+    part.mesh().surface().map_err(|e| PlanError::NotApplicable {
+        strategy: strategy.definition().word,
+        reason: format!("a cutter that tilts needs a surface with two sides. {e}"),
+    })?;
     let setup = Setup { part, cutter, settings, monitor };
     let Passes { passes, touches, mut notes, field, contacts, functions } =
         passes(&setup, strategy, Some(tilting.axis))?;

@@ -435,3 +435,51 @@ fn an_interrupted_run_leaves_nothing() {
         assert_eq!(entries(home.path()), ["plate.toml"]);
     }
 }
+
+/// Ctrl-C while an outline with 2000 islands is read, which takes far longer than the answer.
+#[cfg(target_os = "linux")]
+#[test]
+fn check_and_run_can_be_interrupted_while_the_part_is_read() {
+    use crate::command::{Answer, command, ctrl_c};
+    use std::fmt::Write as _;
+    use std::time::Duration;
+
+    let square = |x: f64, y: f64, s: f64| {
+        format!("[[{x}, {y}], [{}, {y}], [{}, {}], [{x}, {}]]", x + s, x + s, y + s, y + s)
+    };
+    let mut islands = String::new();
+    for k in 0..2025 {
+        write!(islands, "{}, ", square(f64::from(k % 45) * 6.0 + 5.0, f64::from(k / 45) * 6.0 + 5.0, 2.0))
+            .unwrap();
+    }
+    let scene = format!(
+        "[part]\nsurface = \"pocket\"\noutline = {}\nislands = [{islands}]\ndepth = 2\n[cutter]\nshape = \"flat\"\n\
+         diameter = 3\n[[toolpath]]\nstrategy = \"pocket-flow\"\n",
+        square(0.0, 0.0, 274.0)
+    );
+    let home = home_with(&scene);
+    for arguments in [vec!["check", "plate.toml"], vec!["run", "plate.toml", "--out", "out"]] {
+        let mut child = command(home.path(), &arguments).spawn().unwrap();
+        let catches = |signals: u64| signals & 0b100_0000_0000_0010 == 0b100_0000_0000_0010;
+        while !catches(caught_signals(child.id())) {
+            assert!(child.try_wait().unwrap().is_none(), "it ends before it listens to signals");
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        std::thread::sleep(Duration::from_millis(300));
+        let kill = std::process::Command::new("kill").args([ctrl_c(), &child.id().to_string()]).status();
+        assert!(kill.unwrap().success());
+        let answer = Answer::from(child.wait_with_output().unwrap());
+        assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{answer:?}");
+        assert!(answer.stderr.contains("interrupted; nothing was written"), "{}", answer.stderr);
+        assert_eq!(entries(home.path()), ["plate.toml"]);
+    }
+}
+
+/// The signals that a process handles, a bit each, or ignores: a shell lets what it starts in the background ignore Ctrl-C.
+#[cfg(target_os = "linux")]
+fn caught_signals(process: u32) -> u64 {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    let lines =
+        status.lines().filter_map(|l| l.strip_prefix("SigCgt:").or_else(|| l.strip_prefix("SigIgn:")));
+    lines.filter_map(|digits| u64::from_str_radix(digits.trim(), 16).ok()).fold(0, |all, some| all | some)
+}

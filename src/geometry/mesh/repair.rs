@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-use super::{MeshError, NONE, Outside, RepairNotes, TriangleMesh};
+use super::{Junctions, MeshError, NONE, Outside, RepairNotes, TriangleMesh};
 use crate::{Aabb, MAX_COORDINATE, Point3, Vector3};
 
 /// A triangle counts as degenerate where twice its area is below this share of its longest side
@@ -29,6 +29,7 @@ pub(super) fn repair(
     vertices: Vec<Point3>,
     triangles: Vec<[u32; 3]>,
     outside: Outside,
+    junctions: Junctions,
 ) -> Result<Repaired, MeshError> {
     check(&vertices, &triangles)?;
     let mut notes = RepairNotes::default();
@@ -55,19 +56,45 @@ pub(super) fn repair(
         notes.dropped_duplicates = before - soup.faces.len();
         sides = Sides::of(vertices.len(), &soup.faces);
     }
-    let (mut neighbours, consistent) = sides.pair_up(&vertices, &soup)?;
+    let mut opened = Opened { junctions, edges: 0, first: None };
+    let (mut neighbours, consistent) = sides.pair_up(&vertices, &soup, &mut opened)?;
     drop(sides);
     if !consistent {
-        notes.flipped_triangles = orient(&vertices, &mut soup, &mut neighbours)?;
+        notes.flipped_triangles = orient(&vertices, &mut soup, &mut neighbours, &mut opened)?;
     }
-    if outside == Outside::Found && faces_wrong_way(&vertices, &soup.faces, &neighbours) {
+    notes.opened_edges = opened.edges;
+    if outside == Outside::Found && opened.edges > 0 {
+        notes.flipped_triangles += face_pieces(&vertices, &mut soup, &mut neighbours);
+    } else if outside == Outside::Found
+        && faces_wrong_way(&vertices, soup.faces.iter(), is_closed(&neighbours))
+    {
         (0..soup.faces.len()).for_each(|t| soup.flip(t, &mut neighbours));
         notes.turned_over = true;
     }
     let vertices = drop_unused(vertices, &mut soup.faces);
     let bounds = Aabb::of(&vertices);
-    let mesh = TriangleMesh { vertices, triangles: soup.faces, neighbours, bounds };
+    let junction = opened.first.map(Box::new);
+    let mesh = TriangleMesh { vertices, triangles: soup.faces, neighbours, bounds, junction };
     Ok((mesh, notes, soup.sources))
+}
+
+/// Edges at which triangles make no surface.
+struct Opened {
+    junctions: Junctions,
+    edges: usize,
+    first: Option<MeshError>,
+}
+
+impl Opened {
+    /// Leaves an edge open, or refuses it.
+    fn note(&mut self, refusal: MeshError) -> Result<(), MeshError> {
+        if self.junctions == Junctions::Refused {
+            return Err(refusal);
+        }
+        self.edges += 1;
+        self.first.get_or_insert(refusal);
+        Ok(())
+    }
 }
 
 /// Triangles on their way through the repair.
@@ -272,7 +299,12 @@ impl Sides {
     }
 
     /// The neighbours of every triangle, and whether all of them agree in orientation.
-    fn pair_up(&self, vertices: &[Point3], soup: &Soup) -> Result<(Vec<[u32; 3]>, bool), MeshError> {
+    fn pair_up(
+        &self,
+        vertices: &[Point3],
+        soup: &Soup,
+        opened: &mut Opened,
+    ) -> Result<(Vec<[u32; 3]>, bool), MeshError> {
         let mut neighbours = vec![[NONE; 3]; soup.faces.len()];
         let mut consistent = true;
         let parts = |side: Side| (side.slot as usize / 3, side.slot as usize % 3);
@@ -288,12 +320,12 @@ impl Sides {
                 more => {
                     let mut triangles = [more[0], more[1], more[2]].map(|s| soup.origin[parts(s).0] as usize);
                     triangles.sort_unstable();
-                    return Err(MeshError::NonManifoldEdge {
+                    opened.note(MeshError::NonManifoldEdge {
                         triangles,
                         count: more.len(),
                         from: coordinates(&vertices[low as usize]),
                         to: coordinates(&vertices[more[0].other as usize]),
-                    });
+                    })?;
                 }
             }
         }
@@ -303,7 +335,12 @@ impl Sides {
 
 /// Turns triangles over until all neighbours agree; in each connected piece the majority stays.
 /// Returns how many were turned.
-fn orient(vertices: &[Point3], soup: &mut Soup, neighbours: &mut [[u32; 3]]) -> Result<usize, MeshError> {
+fn orient(
+    vertices: &[Point3],
+    soup: &mut Soup,
+    neighbours: &mut [[u32; 3]],
+    opened: &mut Opened,
+) -> Result<usize, MeshError> {
     let n = soup.faces.len();
     let mut turned: Vec<Option<bool>> = vec![None; n];
     let mut flipped = 0;
@@ -329,11 +366,20 @@ fn orient(vertices: &[Point3], soup: &mut Soup, neighbours: &mut [[u32; 3]]) -> 
                     turned[other] = wanted;
                     piece.push(other);
                 } else if turned[other] != wanted {
-                    return Err(MeshError::NotOrientable {
+                    opened.note(MeshError::NotOrientable {
                         triangles: [t, other].map(|t| soup.origin[t] as usize),
                         from: coordinates(&vertices[from as usize]),
                         to: coordinates(&vertices[to as usize]),
-                    });
+                    })?;
+                    neighbours[t][k] = NONE;
+                    let ends = [from, to];
+                    let same = |j: &usize| {
+                        let side = [soup.faces[other][*j], soup.faces[other][(j + 1) % 3]];
+                        side.iter().all(|v| ends.contains(v))
+                    };
+                    if let Some(j) = (0..3).find(same) {
+                        neighbours[other][j] = NONE;
+                    }
                 }
             }
         }
@@ -347,10 +393,45 @@ fn orient(vertices: &[Point3], soup: &mut Soup, neighbours: &mut [[u32; 3]]) -> 
     Ok(flipped)
 }
 
-/// True for a closed mesh that is inside out and for an open one that faces down. Pieces keep
+/// Turns over each open piece that faces down or is inside out; leaves closed ones. Returns how many triangles were turned.
+fn face_pieces(vertices: &[Point3], soup: &mut Soup, neighbours: &mut [[u32; 3]]) -> usize {
+    let mut seen = vec![false; soup.faces.len()];
+    let mut turned = 0;
+    for seed in 0..soup.faces.len() {
+        if std::mem::replace(&mut seen[seed], true) {
+            continue;
+        }
+        let mut piece = vec![seed];
+        let mut next = 0;
+        while let Some(&t) = piece.get(next) {
+            next += 1;
+            for n in neighbours[t].into_iter().filter(|&n| n != NONE).map(|n| n as usize) {
+                if !std::mem::replace(&mut seen[n], true) {
+                    piece.push(n);
+                }
+            }
+        }
+        let closed = piece.iter().all(|&t| neighbours[t].iter().all(|&n| n != NONE));
+        if !closed && faces_wrong_way(vertices, piece.iter().map(|&t| &soup.faces[t]), false) {
+            piece.iter().for_each(|&t| soup.flip(t, neighbours));
+            turned += piece.len();
+        }
+    }
+    turned
+}
+
+fn is_closed(neighbours: &[[u32; 3]]) -> bool {
+    neighbours.iter().flatten().all(|&n| n != NONE)
+}
+
+/// True for closed triangles that are inside out and for open ones that face down. Pieces keep
 /// their orientation relative to each other: a cavity stays a cavity.
-fn faces_wrong_way(vertices: &[Point3], faces: &[[u32; 3]], neighbours: &[[u32; 3]]) -> bool {
-    let bounds = Aabb::of(faces.iter().flatten().map(|&i| &vertices[i as usize]));
+fn faces_wrong_way<'a>(
+    vertices: &[Point3],
+    faces: impl Iterator<Item = &'a [u32; 3]> + Clone,
+    closed: bool,
+) -> bool {
+    let bounds = Aabb::of(faces.clone().flatten().map(|&i| &vertices[i as usize]));
     let centre = bounds.min + 0.5 * bounds.size();
     let (mut upward, mut area, mut volume) = (0.0, 0.0, 0.0);
     for face in faces {
@@ -360,7 +441,6 @@ fn faces_wrong_way(vertices: &[Point3], faces: &[[u32; 3]], neighbours: &[[u32; 
         area += 0.5 * cross.norm();
         volume += cross.dot(&a) / 6.0;
     }
-    let closed = neighbours.iter().flatten().all(|&n| n != NONE);
     if closed || upward.abs() < NEARLY_CLOSED * area {
         volume < -NO_VOLUME * area * bounds.diagonal()
     } else {

@@ -173,8 +173,7 @@ fn what_cannot_be_repaired_is_refused_with_its_place() {
     );
 }
 
-#[test]
-fn a_moebius_strip_is_refused() {
+fn moebius() -> Soup {
     const N: u32 = 12;
     let mut vertices = Vec::new();
     for i in 0..N {
@@ -191,6 +190,12 @@ fn a_moebius_strip_is_refused() {
         let (c, d) = if i + 1 < N { (a + 2, b + 2) } else { (1, 0) };
         triangles.extend([[a, b, c], [b, d, c]]);
     }
+    (vertices, triangles)
+}
+
+#[test]
+fn a_moebius_strip_is_refused() {
+    let (vertices, triangles) = moebius();
     let refused = TriangleMesh::new(vertices, triangles).unwrap_err();
     assert!(matches!(refused, MeshError::NotOrientable { .. }), "{refused}");
     assert!(refused.to_string().contains("one-sided"));
@@ -204,4 +209,31 @@ fn many_triangles_at_one_edge_take_no_quadratic_time() {
     let triangles = (0..100_000).map(|i| [0, 1, i + 2]).collect();
     let refused = TriangleMesh::new(vertices, triangles).unwrap_err();
     assert!(matches!(refused, MeshError::NonManifoldEdge { count: 100_000, triangles: [0, 1, 2], .. }));
+}
+
+/// A level square with a fin below one of its inner edges.
+#[test]
+fn three_triangles_at_an_edge_make_no_surface_but_a_soup() {
+    let points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0), (0.5, 0.5, -1.0)];
+    let vertices: Vec<Point3> = points.into_iter().map(|(x, y, z)| Point3::new(x, y, z)).collect();
+    // The second faces down.
+    let triangles = vec![[0, 1, 2], [0, 3, 2], [0, 2, 4]];
+    let refused = TriangleMesh::new(vertices.clone(), triangles.clone()).unwrap_err();
+    let (soup, notes) = TriangleMesh::opened(vertices, triangles).unwrap();
+    assert_eq!((soup.surface(), notes.opened_edges), (Err(&refused), 1));
+    assert!(consistent(&soup) && (0..3).all(|t| (0..3).all(|k| soup.neighbour(t, k).is_none())));
+    assert!((0..2).all(|t| soup.normal(t).z == 1.0), "both are turned to face up");
+    assert!(notes.to_string().contains("left 1 edge open"), "{notes}");
+    assert!(soup.scaled(2.0).unwrap().surface().is_err());
+    let (clean, notes) = TriangleMesh::opened(cube().0, cube().1).unwrap();
+    assert_eq!((clean.surface(), notes), (Ok(()), RepairNotes::default()));
+}
+
+#[test]
+fn a_moebius_strip_is_cut_open_once() {
+    let (vertices, triangles) = moebius();
+    let (soup, notes) = TriangleMesh::opened(vertices, triangles).unwrap();
+    assert!(consistent(&soup) && !soup.is_closed());
+    assert_eq!(notes.opened_edges, 1);
+    assert!(matches!(soup.surface(), Err(MeshError::NotOrientable { .. })));
 }

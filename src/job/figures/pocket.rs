@@ -11,7 +11,7 @@ use crate::JobError;
 use crate::pocket::pocket_figures;
 use crate::run::{Finding, Run};
 
-pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> {
+pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
     let (Some(pocket), Some(strategy)) =
         (&run.session.pocket, run.request.strategy.downcast_ref::<PocketStrategy>())
     else {
@@ -21,7 +21,8 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
         return Ok(Finding::default());
     };
     let step = run.request.step;
-    let p = pocket_figures(run.scene(), pocket, strategy, step, run.path(), cut, run.session.top, engaged);
+    let (path, top) = (run.path(), run.session.top);
+    let p = pocket_figures(run.scene(), pocket, strategy, step, path, cut, top, engaged, monitor)?;
     let mut claims = vec![within_walls(run, &p), ramps(run, strategy)];
     claims.extend(strategy.engagement.map(|limit| engaged_within(run, &p, limit.to_degrees())));
     claims.extend(strategy.stepdown.map(|limit| steps_down(run.path(), run.session.top, limit)));

@@ -17,8 +17,10 @@ const BYTES_PER_CELL: usize = 80;
 /// Bytes a cell while a path has been cut and nothing measured yet.
 const BYTES_PER_CUT_CELL: usize = 8;
 
-/// Bytes a triangle of the part while it is read: its file, corners, neighbours, search tree.
-const BYTES_PER_TRIANGLE: usize = 350;
+/// Bytes a triangle of the part at a run's peak: its corners, neighbours and search tree, and what drops the cutter on it.
+/// Reading the file takes half of that. Too small a figure lets a run exhaust the machine; too great a one refuses meshes
+/// that would fit.
+pub const BYTES_PER_TRIANGLE: u64 = 780;
 
 /// Bytes a move: the move itself, its prepared form, and its places in the engine's lists.
 const BYTES_PER_MOVE: usize = 240;
@@ -42,7 +44,7 @@ pub type LaidOut = (Grid, Option<String>);
 impl Budget {
     /// Of a part under the memory that a scene allows.
     pub fn new(part: &Part, memory_mib: u32) -> Self {
-        Self { memory_mib, part_bytes: (part.mesh().triangles().len() * BYTES_PER_TRIANGLE) as u64 }
+        Self { memory_mib, part_bytes: part.mesh().triangles().len() as u64 * BYTES_PER_TRIANGLE }
     }
 
     /// All of it, bytes.

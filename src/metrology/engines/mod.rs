@@ -10,7 +10,7 @@ mod error;
 mod normals;
 mod task;
 
-pub use budget::{Budget, LaidOut, MIB};
+pub use budget::{BYTES_PER_TRIANGLE, Budget, LaidOut, MIB};
 pub use choice::EngineChoice;
 pub use error::EngineError;
 pub use normals::REACH_OVER_UNCUT;

@@ -136,6 +136,6 @@ impl Source for BladeRequest {
         let tolerance = default_tessellation_tolerance(&patches);
         let part = Part::from_oriented_patches(patches, tolerance).map_err(|e| job.refused(file, e))?;
         let notes = blade.notes();
-        Ok(Loaded { part, blade: Some(blade), notes })
+        Ok(Loaded { blade: Some(blade), notes, ..Loaded::from(part) })
     }
 }

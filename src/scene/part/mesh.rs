@@ -4,11 +4,12 @@ use std::fmt::{self, Write as _};
 use std::path::Path;
 
 use geometry::{MeshError, TriangleMesh};
-use io::{MeshFormat, mesh_extensions};
-use keys::{SceneError, SceneText, Section, toml_string};
+use io::{MAX_MESH_FILE_BYTES, MeshFormat, MeshLimits, MeshReadError, mesh_extensions};
+use keys::{SceneError, Section, toml_string};
+use metrology::{BYTES_PER_TRIANGLE, MIB};
 use part::Part;
 
-use super::source::{LoadError, Loaded, Loading, PartTable, Source, file_refused, seen_from_above};
+use super::source::{LoadError, Loaded, Loading, PartTable, Source, seen_from_above};
 use crate::named_file::NamedFile;
 
 /// Units that a file may be in, and each in mm.
@@ -52,17 +53,41 @@ impl MeshFile {
 /// Reads a mesh, in mm. The notes say what was mended to make it usable.
 ///
 /// # Errors
-/// [`SceneError::Invalid`]: the file's fault, shown at its name in the scene.
-pub fn read_mesh(
-    source: &SceneText,
+/// [`SceneError::Invalid`]: the file's fault, shown at its name in the scene; also where the mesh takes more memory than the
+/// run may take, which is known before it is made.
+pub(crate) fn read_mesh(
+    job: &Loading<'_>,
     file: &NamedFile,
     format: &MeshFormat,
     scale: f64,
 ) -> Result<(TriangleMesh, Vec<String>), SceneError> {
-    let (mesh, repairs) = format.read(&file.path).map_err(|e| file_refused(source, file, e))?;
-    let mesh = in_mm(mesh, scale).map_err(|e| file_refused(source, file, e))?;
+    let limits = limits(job.memory_mib);
+    let (mesh, repairs) = format.read_within(&file.path, &limits).map_err(|e| match e {
+        MeshReadError::TooLarge { mib, .. } if limits.bytes < MAX_MESH_FILE_BYTES => {
+            too_little_memory(job, file, mib)
+        }
+        MeshReadError::TooManyTriangles { triangles, .. } => {
+            too_little_memory(job, file, (triangles as u64 * BYTES_PER_TRIANGLE).div_ceil(MIB))
+        }
+        other => job.refused(file, other),
+    })?;
+    let mesh = in_mm(mesh, scale).map_err(|e| job.refused(file, e))?;
     let notes = if repairs.is_clean() { Vec::new() } else { vec![format!("{}: {repairs}", file.written)] };
     Ok((mesh, notes))
+}
+
+/// What a mesh file may hold under a run's memory.
+fn limits(memory_mib: u32) -> MeshLimits {
+    let memory = u64::from(memory_mib) * MIB;
+    MeshLimits { bytes: memory.min(MAX_MESH_FILE_BYTES), triangles: (memory / BYTES_PER_TRIANGLE) as usize }
+}
+
+fn too_little_memory(job: &Loading<'_>, file: &NamedFile, needed_mib: u64) -> SceneError {
+    job.source.error(
+        file.span.clone(),
+        format!("the mesh needs about {needed_mib} MiB, and the run may take {} MiB", job.memory_mib),
+        "write a greater `memory_mib` in [simulation] (or --memory), or export the part coarser",
+    )
 }
 
 /// A mesh whose unit is `scale` mm.
@@ -70,8 +95,7 @@ fn in_mm(mesh: TriangleMesh, scale: f64) -> Result<TriangleMesh, MeshError> {
     if scale == 1.0 {
         return Ok(mesh);
     }
-    let vertices = mesh.vertices().iter().map(|p| p * scale).collect();
-    TriangleMesh::new(vertices, mesh.triangles().to_vec()).map(|(mesh, _)| mesh)
+    mesh.scaled(scale)
 }
 
 impl Source for MeshFile {
@@ -96,8 +120,8 @@ impl Source for MeshFile {
     }
 
     fn load(&self, job: &Loading<'_>) -> Result<Loaded, LoadError> {
-        let (mesh, notes) = read_mesh(job.source, &self.file, self.format, self.scale)?;
+        let (mesh, notes) = read_mesh(job, &self.file, self.format, self.scale)?;
         let part = seen_from_above(Part::from_mesh(mesh)).map_err(|e| job.refused(&self.file, e))?;
-        Ok(Loaded { part, blade: None, notes })
+        Ok(Loaded { notes, ..Loaded::from(part) })
     }
 }

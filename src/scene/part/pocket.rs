@@ -10,6 +10,7 @@ use io::outline::{self, OutlineFormat, OutlineOptions};
 use keys::{SceneError, Section, toml_number, toml_string};
 use part::Part;
 use toolpath::Pocket;
+use work::monitor::Silent;
 
 use super::mesh::UNITS;
 use super::source::{LoadError, Loaded, Loading, PartTable, Source};
@@ -117,7 +118,8 @@ impl Source for PocketSource {
     /// The floor that the cutter can reach, as far as its passes come.
     fn load(&self, job: &Loading<'_>) -> Result<Loaded, LoadError> {
         let (pocket, notes) = self.pocket(job)?;
-        Ok(Loaded { part: self.floor(&pocket, job)?, blade: None, notes })
+        let part = self.floor(&pocket, job)?;
+        Ok(Loaded { pocket: Some(pocket), notes, ..Loaded::from(part) })
     }
 }
 
@@ -198,7 +200,7 @@ impl PocketSource {
     ///
     /// # Errors
     /// [`SceneError::Invalid`] when the drawing is refused, at its name in the scene.
-    pub(crate) fn pocket(&self, job: &Loading<'_>) -> Result<(Pocket, Vec<String>), SceneError> {
+    fn pocket(&self, job: &Loading<'_>) -> Result<(Pocket, Vec<String>), SceneError> {
         let (region, notes) = match &self.outline {
             OutlineSource::File { file, format, unit, layer } => {
                 let options = OutlineOptions {
@@ -226,7 +228,8 @@ impl PocketSource {
         let clear = CHORDS_FROM_WALLS * job.chord_tolerance + RADIUS_FROM_WALLS * radius;
         let floor = pocket.reachable_floor(job.cutter).inset(clear);
         if floor.is_empty() {
-            let largest = pocket.region.largest_disc(0.005).map_or(0.0, |d| 2.0 * d.1);
+            let largest =
+                pocket.region.largest_disc(0.005, &Silent).ok().flatten().map_or(0.0, |d| 2.0 * d.1);
             let message = format!(
                 "the cutter of {} mm fits nowhere in the pocket; the largest that would has {:.2} mm",
                 2.0 * radius,

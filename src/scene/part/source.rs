@@ -7,6 +7,7 @@ use blade::Blade;
 use cutter::Cutter;
 use keys::{Located, SceneError, SceneText, Section};
 use part::{Part, PartError, Patch, default_tessellation_tolerance};
+use toolpath::Pocket;
 
 use super::JUDGE;
 use crate::named_file::NamedFile;
@@ -77,6 +78,8 @@ pub(crate) struct Loading<'a> {
     pub cutter: &'a Cutter,
     /// mm.
     pub chord_tolerance: f64,
+    /// Memory that the run may take.
+    pub memory_mib: u32,
 }
 
 impl Loading<'_> {
@@ -102,13 +105,15 @@ pub struct Loaded {
     pub part: Part,
     /// The sections that it comes from, if it is a blade.
     pub blade: Option<Blade>,
+    /// What it is the floor of, if it is a pocket.
+    pub pocket: Option<Pocket>,
     /// What was mended to make it usable.
     pub notes: Vec<String>,
 }
 
 impl From<Part> for Loaded {
     fn from(part: Part) -> Self {
-        Self { part, blade: None, notes: Vec::new() }
+        Self { part, blade: None, pocket: None, notes: Vec::new() }
     }
 }
 

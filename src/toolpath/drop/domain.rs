@@ -26,6 +26,7 @@
 
 use super::touch::{Carries, LEVEL, Profile};
 use geometry::{Aabb, Extent, Feature, Point3, TriangleMesh, Vector3};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// Faces steeper than this (z of the unit normal) do not count as lying on a side of their edges:
 /// on which one may be rounding. Greater makes domains larger.
@@ -378,12 +379,26 @@ impl Corners {
 }
 
 /// The domain of every triangle.
-pub(super) fn domains(mesh: &TriangleMesh, profile: &Profile) -> Vec<Domain> {
+///
+/// # Errors
+/// [`Cancelled`] when the monitor says so.
+pub(super) fn domains(
+    mesh: &TriangleMesh,
+    profile: &Profile,
+    monitor: &dyn Monitor,
+) -> Result<Vec<Domain>, Cancelled> {
     let bounds = mesh.bounds();
     let margin = MARGIN * bounds.min.coords.amax().max(bounds.max.coords.amax()).max(profile.radius);
     let faces = work::parallel::map(mesh.triangles().len(), |t| Face::new(&mesh.corners(t)));
     let survey = Survey { mesh, profile, faces };
+    monitor::check(monitor)?;
     let corners = Corners::new(mesh);
-    let vertices = work::parallel::map(mesh.vertices().len(), |v| survey.vertex(corners.of(v)));
-    work::parallel::map(mesh.triangles().len(), |t| survey.triangle(t, &corners, &vertices, margin))
+    let vertices = work::parallel::try_map(mesh.vertices().len(), |v| {
+        monitor::check(monitor)?;
+        Ok(survey.vertex(corners.of(v)))
+    })?;
+    work::parallel::try_map(mesh.triangles().len(), |t| {
+        monitor::check(monitor)?;
+        Ok(survey.triangle(t, &corners, &vertices, margin))
+    })
 }

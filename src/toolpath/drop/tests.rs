@@ -155,7 +155,7 @@ fn rest_by_brute_force(mesh: &TriangleMesh, cutter: &Cutter, x: f64, y: f64) -> 
 }
 
 fn dropper<'a>(mesh: &'a TriangleMesh, bvh: &'a Bvh, cutter: &Cutter) -> DropCutter<'a> {
-    DropCutter::over(mesh, bvh, cutter, None)
+    DropCutter::over(mesh, bvh, cutter, None, &work::monitor::Silent).unwrap()
 }
 
 #[test]

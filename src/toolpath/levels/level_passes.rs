@@ -81,7 +81,7 @@ pub(crate) fn along_levels_placed(
     let places = places_of(chart, cutter, field, settings);
     let levels = place_levels(&places, range, placing, &mut notes);
     let dropped = task.dropped();
-    let drop = DropCutter::new(part, dropped);
+    let drop = DropCutter::watched(part, dropped, monitor)?;
     let guide = ChartGuide { tracer: &tracer, chart, cutter, dropped, field, drop, settings, monitor };
     let mut passes = along_and_between(&guide, &levels, range, settings.sampling, monitor)?;
     if let Step::Scallop(height) = settings.step {

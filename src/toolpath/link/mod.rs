@@ -85,7 +85,7 @@ pub(crate) fn join(
     let mut links: Vec<Option<Vec<Point3>>> = Vec::new();
     if longest > 0.0 && passes.len() > 1 {
         let bends = Bends {
-            drop: DropCutter::new(part, cutter),
+            drop: DropCutter::watched(part, cutter, monitor)?,
             border: Border::of(part),
             cutter,
             interval: plane_interval(cutter, settings.step),

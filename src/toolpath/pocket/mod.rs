@@ -66,9 +66,13 @@ impl Pocket {
 
     /// Area of the region that no position of the cutter sweeps, mm²: what stays in sharp corners. Over a
     /// square corner it is `r² (1 − π/4)`.
-    pub fn rest_area(&self, cutter: &Cutter) -> f64 {
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn rest_area(&self, cutter: &Cutter, monitor: &dyn Monitor) -> Result<f64, Cancelled> {
         let r = cutter.radius();
-        (self.region.area() - self.region.inset(r).grown(r).area()).max(0.0)
+        let swept = self.region.watched_inset(r, monitor)?.watched_grown(r, monitor)?;
+        Ok((self.region.area() - swept.area()).max(0.0))
     }
 }
 
@@ -91,9 +95,9 @@ pub fn plan_pocket(
     let radius = cutter.radius();
     // Half of the chord tolerance is for chords, which may come as much nearer to the walls.
     let chords = 0.5 * settings.chord_tolerance;
-    let walls_at = pocket.region.inset(radius + chords);
+    let walls_at = pocket.region.watched_inset(radius + chords, monitor)?;
     if walls_at.is_empty() {
-        let largest = pocket.region.largest_disc(DISC_PRECISION).map_or(0.0, |d| 2.0 * d.1);
+        let largest = pocket.region.largest_disc(DISC_PRECISION, monitor)?.map_or(0.0, |d| 2.0 * d.1);
         return Err(refuse(format!(
             "a cutter of {} mm fits nowhere in the outline; the largest that would is {:.2} mm",
             2.0 * radius,
@@ -101,7 +105,7 @@ pub fn plan_pocket(
         )));
     }
     let rough = if strategy.wall_allowance > 0.0 {
-        pocket.region.inset(radius + chords + strategy.wall_allowance)
+        pocket.region.watched_inset(radius + chords + strategy.wall_allowance, monitor)?
     } else {
         walls_at.clone()
     };
@@ -133,7 +137,7 @@ pub fn plan_pocket(
             walls_at.pieces.len()
         ));
     }
-    let rest = pocket.rest_area(cutter);
+    let rest = pocket.rest_area(cutter, monitor)?;
     notes.push(format!(
         "{rest:.3} mm² of {:.1} mm² lie in corners that no position of the cutter reaches",
         pocket.region.area()

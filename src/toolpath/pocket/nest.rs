@@ -8,6 +8,8 @@ use super::strategy::Flow;
 use super::turning::{Turning, curvatures};
 use field::{PlanarError, PlanarMesh};
 use geometry::{CurveSegment, Piece, Point2, Region, SegmentGrid};
+use std::sync::Arc;
+use work::aside;
 use work::monitor::{self, Cancelled, Monitor};
 
 /// Side of the triangles over the stepover. Finer ones place levels better and cost time as their square.
@@ -180,8 +182,8 @@ pub fn offsets(
         monitor::check(monitor)?;
         distance += levels.last().map_or(step, |level| spacing.next(level));
         let round = spacing.turning.map_or(0.0, |t| ROUND_CORNERS * t.radius);
-        let inner = whole.inset(distance + round).grown(round).pieces;
-        let inner = if inner.is_empty() { whole.inset(distance).pieces } else { inner };
+        let inner = whole.watched_inset(distance + round, monitor)?.watched_grown(round, monitor)?.pieces;
+        let inner = if inner.is_empty() { whole.watched_inset(distance, monitor)?.pieces } else { inner };
         if inner.is_empty() {
             break;
         }
@@ -204,7 +206,7 @@ pub fn offsets(
         }
         for nest in outer.iter_mut().filter(|nest| nest.inner.is_empty()) {
             let region = Region { pieces: vec![nest.curves.clone()] };
-            let (seed, _) = region.largest_disc(0.02 * step).unwrap_or((nest.curves.outer[0], 0.0));
+            let (seed, _) = region.largest_disc(0.02 * step, monitor)?.unwrap_or((nest.curves.outer[0], 0.0));
             nest.seed = seed;
         }
         inner = outer;
@@ -220,7 +222,7 @@ pub fn offsets(
 
 /// A flow on a piece and its mesh.
 pub struct FlowField {
-    mesh: PlanarMesh,
+    mesh: Arc<PlanarMesh>,
     deepest: f64,
 }
 
@@ -229,18 +231,19 @@ impl FlowField {
     ///
     /// # Errors
     /// [`NestError`].
-    pub fn new(piece: &Piece, step: f64) -> Result<Self, NestError> {
+    pub fn new(piece: &Piece, step: f64, monitor: &dyn Monitor) -> Result<Self, NestError> {
         let thin = |c: &[Point2]| thinned(c, WALL_SHARE * step);
         let curves: Vec<Vec<Point2>> = piece.curves().map(thin).collect();
         let plain = Piece { outer: curves[0].clone(), islands: curves[1..].to_vec() };
         // Thinning may make walls touch that nearly do; the exact ones do not.
-        let mesh = match Region::nested(curves) {
-            Ok(_) => PlanarMesh::new(&plain, EDGE_OVER_STEP * step)?,
-            Err(_) => PlanarMesh::new(piece, EDGE_OVER_STEP * step)?,
-        };
+        let exact = piece.clone();
+        let mesh = aside::run(monitor, move || {
+            let filled = if Region::nested(curves).is_ok() { plain } else { exact };
+            PlanarMesh::new(&filled, EDGE_OVER_STEP * step)
+        })??;
         let region = Region { pieces: vec![piece.clone()] };
-        let deepest = region.largest_disc(0.05 * step).map_or(0.0, |d| d.1);
-        Ok(Self { mesh, deepest })
+        let deepest = region.largest_disc(0.05 * step, monitor)?.map_or(0.0, |d| d.1);
+        Ok(Self { mesh: Arc::new(mesh), deepest })
     }
 
     /// Radius of the largest disc in the piece, mm.
@@ -260,7 +263,9 @@ impl FlowField {
         reach: f64,
         monitor: &dyn Monitor,
     ) -> Result<Nest, NestError> {
-        let psi = self.mesh.flow(sigma.max(EDGES_A_SIGMA * EDGE_OVER_STEP * spacing.step), self.deepest)?;
+        let (mesh, deepest) = (Arc::clone(&self.mesh), self.deepest);
+        let sigma = sigma.max(EDGES_A_SIGMA * EDGE_OVER_STEP * spacing.step);
+        let psi = aside::run(monitor, move || mesh.flow(sigma, deepest))??;
         let all = (0..self.mesh.triangles().len() as u32).collect();
         let nesting = Nesting { mesh: &self.mesh, psi: &psi, spacing, reach, monitor };
         nesting.within(piece.clone(), 0.0, all, 0)
@@ -321,13 +326,14 @@ impl Nesting<'_> {
         };
         let (mut lo, mut hi) = (level, top);
         for _ in 0..HALVINGS {
+            monitor::check(self.monitor)?;
             let middle = 0.5 * (lo + hi);
             if near_enough(middle) { lo = middle } else { hi = middle }
         }
         // Where not even the next curve is near enough (a wall's sharp corner on a coarse mesh) go on by a
         // little rather than not at all.
         let next = lo.max(level + LEAST_RISE * (top - level));
-        nest.between = self.between(&probes, level, next, &triangles);
+        nest.between = self.between(&probes, level, next, &triangles)?;
         for set in self.mesh.above(self.psi, next, &triangles) {
             let loops = self.mesh.level_curves(self.psi, next, &set);
             let Some(curves) = piece_of(loops, POINT_SHARE * self.spacing.step) else { continue };
@@ -345,7 +351,13 @@ impl Nesting<'_> {
 
     /// Stretches of levels between `outer` and `inner` where the curves at `inner` are too far from the
     /// places `probes` at `outer`; the innermost first.
-    fn between(&self, probes: &[Point2], outer: f64, inner: f64, triangles: &[u32]) -> Vec<Vec<Point2>> {
+    fn between(
+        &self,
+        probes: &[Point2],
+        outer: f64,
+        inner: f64,
+        triangles: &[u32],
+    ) -> Result<Vec<Vec<Point2>>, Cancelled> {
         let Spacing { step, farthest, .. } = self.spacing;
         let inside = self.curves_at(inner, triangles);
         let inside = SegmentGrid::of_curves(inside.iter().map(Vec::as_slice));
@@ -355,6 +367,7 @@ impl Nesting<'_> {
         while !far.is_empty() && layers.len() < MOST_INSERTED {
             let (mut lo, mut hi) = (level, inner);
             for _ in 0..HALVINGS {
+                monitor::check(self.monitor)?;
                 let middle = 0.5 * (lo + hi);
                 let curves = self.curves_at(middle, triangles);
                 let grid = SegmentGrid::of_curves(curves.iter().map(Vec::as_slice));
@@ -376,7 +389,7 @@ impl Nesting<'_> {
             far = layer.iter().flatten().filter(|p| inside.distance(p) > farthest).copied().collect();
             layers.push(layer);
         }
-        layers.into_iter().rev().flatten().collect()
+        Ok(layers.into_iter().rev().flatten().collect())
     }
 }
 
@@ -469,7 +482,7 @@ pub fn flow(
 ) -> Result<(Nest, f64), NestError> {
     /// Smoothing lengths that are tried, over the radius of the largest disc.
     const SHARES: [f64; 4] = [0.08, 0.16, 0.32, 0.64];
-    let field = FlowField::new(piece, spacing.step)?;
+    let field = FlowField::new(piece, spacing.step, monitor)?;
     if let Some(sigma) = flow.smoothing {
         return Ok((field.nest(piece, sigma, spacing, reach, monitor)?, sigma));
     }

@@ -61,7 +61,7 @@ fn on_chart(task: &Task<'_>, chart: &Chart) -> Result<Passes, PlanError> {
     let levels = Levels::trace(&tracer, [0.5 * (u0 + u1), v0])?;
     let spiral = Spiral { tracer: &tracer, levels, chart, cutter, field: &field, settings };
     let dropped = task.dropped();
-    let drop = DropCutter::new(part, dropped);
+    let drop = DropCutter::watched(part, dropped, monitor)?;
     let tip = |[u, v]: [f64; 2]| {
         let p = chart.at(u, v)?;
         let axis = p.jet.p.xy() + dropped.axis_offset(&p.normal);

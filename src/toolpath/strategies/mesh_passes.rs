@@ -133,7 +133,7 @@ fn on_piece(
     let own_values = values.iter().zip(&surface.origin).enumerate();
     let own_values = own_values.filter(|&(v, (_, &origin))| origin as usize == v).map(|(_, (psi, _))| *psi);
     let range = own_values.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], x| [lo.min(x), hi.max(x)]);
-    let drop = DropCutter::new(part, cutter);
+    let drop = DropCutter::watched(part, cutter, monitor)?;
     let guide = MeshGuide { surface, levels, cutter, drop, settings, monitor };
     let places = guide.places(values);
     let placed = place_levels(&places, range, LevelSteps::Shortest, &mut all.notes);

@@ -98,7 +98,7 @@ pub(crate) fn passes(task: &Task<'_>, angle: f64) -> Result<Passes, PlanError> {
     };
     let (offset, meshes) = offset_pieces(part, radius, BORDER_SHARE * flat, monitor)?;
     let level = LevelSet::new(part.mesh(), part.bvh(), radius);
-    let drop = settings.axis.is_none().then(|| DropCutter::new(part, cutter));
+    let drop = settings.axis.is_none().then(|| DropCutter::watched(part, cutter, monitor)).transpose()?;
     let rider = MeshRider { part, cutter, level, drop, settings, flat, pencils: pencils(&offset), monitor };
     let mut all = Passes::default();
     let mut missed = 0.0;
@@ -131,6 +131,7 @@ fn offset_pieces(
     margin: f64,
     monitor: &dyn Monitor,
 ) -> Result<(MeshOffset, Vec<FieldMesh>), PlanError> {
+    part.mesh().surface().map_err(|e| refused(&e.to_string()))?;
     let mut last = None;
     for k in 0..CELLS_TRIED {
         let cell = CELL_OVER_RADIUS * radius * LESS_CELL.powi(k);

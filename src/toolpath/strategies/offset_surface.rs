@@ -165,7 +165,8 @@ fn passes(task: &Task<'_>, along: OffsetAlong, drive: &OffsetDrive) -> Result<Pa
     let mut all = Passes::default();
     for chart in &charts {
         let exact = matches!(drive, OffsetDrive::Exact);
-        let drop = (exact && settings.axis.is_none()).then(|| DropCutter::new(part, cutter));
+        let drop = (exact && settings.axis.is_none()).then(|| DropCutter::watched(part, cutter, monitor));
+        let drop = drop.transpose()?;
         let rider = PatchRider { chart, cutter, exact, drop, along: along.parameter(), settings, monitor };
         all.append(match along {
             OffsetAlong::Spiral => rider.spiral()?,

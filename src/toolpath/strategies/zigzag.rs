@@ -130,7 +130,7 @@ fn passes(task: &Task<'_>, angle: f64) -> Result<Passes, PlanError> {
         Step::Scallop(_) => (sides[1] - sides[0]) / count as f64,
     };
     let middle = 0.5 * (sides[0] + sides[1]);
-    let (drop, border) = (DropCutter::new(part, dropped), Border::of(part));
+    let (drop, border) = (DropCutter::watched(part, dropped, monitor)?, Border::of(part));
     let curves = PlanCurves { drop, border, cutter: dropped, overrun: pitch, settings, monitor };
     monitor.start("planning zigzag", count as u64);
     let lines = work::parallel::try_map(count, |k| {

@@ -174,7 +174,9 @@ fn compare<F: Fn(f64, f64) -> [f64; 6] + Sync>(
     let bvh = Bvh::new(&graph.mesh);
     let deviation = graph.deviation();
     for cutter in cutters() {
-        let drops = DropCutter::over(&graph.mesh, &bvh, &cutter, Some((graph, deviation)));
+        let drops =
+            DropCutter::over(&graph.mesh, &bvh, &cutter, Some((graph, deviation)), &work::monitor::Silent)
+                .unwrap();
         let on_mesh = dropper(&graph.mesh, &bvh, &cutter);
         let (mut mesh_error, mut beside) = (0.0f64, Beside::default());
         for &[x, y] in places {
@@ -206,7 +208,14 @@ fn a_ball_on_a_sphere_is_a_greater_sphere() {
     let graph = Graph::new(16, [[-0.35, 0.35], [-0.4, 0.4]], cap);
     let bvh = Bvh::new(&graph.mesh);
     let cutter = Cutter::ball(6.0).unwrap();
-    let drops = DropCutter::over(&graph.mesh, &bvh, &cutter, Some((&graph, graph.deviation())));
+    let drops = DropCutter::over(
+        &graph.mesh,
+        &bvh,
+        &cutter,
+        Some((&graph, graph.deviation())),
+        &work::monitor::Silent,
+    )
+    .unwrap();
     for (x, y) in [(0.0, 0.0), (1.0, 2.0), (-7.0, 3.0), (6.0, -6.0), (0.1, 9.0)] {
         let drop = drops.at(x, y).unwrap();
         let centre: f64 = ((R + 3.0f64).powi(2) - x * x - y * y).sqrt();
@@ -276,11 +285,25 @@ fn flat_ground_takes_any_cutter() {
     let (bvh, level_bvh) = (Bvh::new(&graph.mesh), Bvh::new(&level.mesh));
     for cutter in cutters() {
         for deviation in [0.0, 1e-3] {
-            let drops = DropCutter::over(&graph.mesh, &bvh, &cutter, Some((&graph, deviation)));
+            let drops = DropCutter::over(
+                &graph.mesh,
+                &bvh,
+                &cutter,
+                Some((&graph, deviation)),
+                &work::monitor::Silent,
+            )
+            .unwrap();
             let on_mesh = dropper(&graph.mesh, &bvh, &cutter).at(1.0, 2.0).unwrap();
             let drop = drops.at(1.0, 2.0).unwrap();
             assert!((drop.tip_z - on_mesh.tip_z).abs() < 1e-12, "{cutter:?}");
-            let drops = DropCutter::over(&level.mesh, &level_bvh, &cutter, Some((&level, deviation)));
+            let drops = DropCutter::over(
+                &level.mesh,
+                &level_bvh,
+                &cutter,
+                Some((&level, deviation)),
+                &work::monitor::Silent,
+            )
+            .unwrap();
             assert!((drops.at(1.0, 2.0).unwrap().tip_z - 1.0).abs() < 1e-14);
         }
     }

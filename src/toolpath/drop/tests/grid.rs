@@ -93,7 +93,7 @@ fn domains_reach_to_the_normals_of_all_faces_around() {
     let ball = Cutter::ball(6.0).unwrap();
     let profile = Profile::of(&ball, 0.0);
     for (name, mesh) in meshes().into_iter().take(5) {
-        let domains = domain::domains(&mesh, &profile);
+        let domains = domain::domains(&mesh, &profile, &work::monitor::Silent).unwrap();
         let tip = |p: &Point3, n: &Vector3| p + (n - Vector3::z()) * ball.radius();
         let mut around = vec![Vec::new(); mesh.vertices().len()];
         for (t, face) in mesh.triangles().iter().enumerate() {

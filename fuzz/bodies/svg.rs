@@ -1,0 +1,8 @@
+//! Any bytes as an SVG drawing: a message, or a region that can be offset.
+
+use super::outline;
+use millstream::io::outline::OutlineFormat;
+
+pub fn check(bytes: &[u8]) {
+    outline::check(bytes, OutlineFormat::Svg);
+}

@@ -1,0 +1,139 @@
+//! A thread that ends what does not answer: a run that was asked to stop, and one that takes more memory than it may.
+//!
+//! Long work asks its monitor whether to go on, and answers within milliseconds. What has to hold whatever the work does is
+//! held here: the process ends soon after a signal, and its memory stays within what the scene allows. Estimates refuse most
+//! runs before they begin; this is for those that no estimate covers. Only memory that the process wrote counts: the system
+//! takes back the pages of the program's own file when it needs them. It is known on Linux only.
+
+use std::process::exit;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use indicatif::ProgressBar;
+
+use super::error::CliError;
+
+/// How often memory and wishes are looked at. Longer lets a run take more memory unseen; each look takes some 20 µs.
+const LOOK: Duration = Duration::from_millis(5);
+
+/// A run that has not answered after this time is ended. Longer is felt as hanging; shorter ends work that would have put
+/// its scratch files away.
+const ANSWER: Duration = Duration::from_millis(700);
+
+/// What the program takes beside the memory that a scene allows, MiB: its stacks, its tables, and what its allocator keeps;
+/// and what the allocator keeps for each further thread. Less stops small runs, more lets a run exceed what was allowed.
+const BESIDES: u64 = 12;
+const A_THREAD: u64 = 1;
+
+const MIB: u64 = 1 << 20;
+
+/// What the run and its watch know of each other.
+#[derive(Debug, Default)]
+pub struct Watched {
+    /// The wish to stop: the user's, or the watch's.
+    pub stop: Arc<AtomicBool>,
+    /// Memory that the scene allows, MiB; 0 for any.
+    allowed_mib: AtomicU64,
+    /// Memory that the process may take, bytes.
+    most: AtomicU64,
+    too_much: AtomicBool,
+    /// The results are on their way to their place: nothing ends the process any more but a second signal.
+    committed: AtomicBool,
+}
+
+impl Watched {
+    /// From now on the process may take what a scene allows.
+    pub fn allow_memory(&self, mib: u32, threads: usize) {
+        let besides = BESIDES + A_THREAD * (threads as u64).saturating_sub(1);
+        self.allowed_mib.store(mib.into(), Ordering::Relaxed);
+        self.most.store((u64::from(mib) + besides) * MIB, Ordering::Relaxed);
+    }
+
+    /// From now on the run is not ended for being slow.
+    pub fn commit(&self) {
+        self.committed.store(true, Ordering::Relaxed);
+    }
+
+    /// Why the run was stopped.
+    pub fn reason(&self) -> CliError {
+        let allowed_mib = self.allowed_mib.load(Ordering::Relaxed);
+        if self.too_much.load(Ordering::Relaxed) {
+            CliError::Memory { allowed_mib }
+        } else {
+            CliError::Interrupted
+        }
+    }
+
+    /// Whether the process takes more than it may.
+    fn takes_too_much(&self, written: u64) -> bool {
+        let most = self.most.load(Ordering::Relaxed);
+        most > 0 && written > most
+    }
+}
+
+/// Begins to watch.
+pub fn begin(watched: &Arc<Watched>, bar: &ProgressBar) {
+    let (watched, bar) = (Arc::clone(watched), bar.clone());
+    // Without the thread, the work's own answers are all there is.
+    let _ = std::thread::Builder::new().name("watch".into()).spawn(move || watch(&watched, &bar));
+}
+
+fn watch(watched: &Watched, bar: &ProgressBar) {
+    let mut asked: Option<Instant> = None;
+    loop {
+        std::thread::sleep(LOOK);
+        if watched.committed.load(Ordering::Relaxed) {
+            return;
+        }
+        if !watched.too_much.load(Ordering::Relaxed)
+            && written().is_some_and(|now| watched.takes_too_much(now))
+        {
+            watched.too_much.store(true, Ordering::Relaxed);
+            watched.stop.store(true, Ordering::Relaxed);
+        }
+        if !watched.stop.load(Ordering::Relaxed) {
+            continue;
+        }
+        if asked.get_or_insert_with(Instant::now).elapsed() > ANSWER {
+            bar.finish_and_clear();
+            // The next run puts away what this one leaves.
+            exit(super::report_error(&watched.reason()).into());
+        }
+    }
+}
+
+/// Memory that the process has written to and holds now, bytes.
+fn written() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    written_of(&status)
+}
+
+fn written_of(status: &str) -> Option<u64> {
+    let line = status.lines().find_map(|line| line.strip_prefix("RssAnon:"))?;
+    Some(1024 * line.split_whitespace().next()?.parse::<u64>().ok()?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_memory_of_the_process_is_read() {
+        assert_eq!(written_of("Name:\tx\nRssAnon:\t    2048 kB\n"), Some(2 * MIB));
+        assert_eq!(written_of("Name:\tx\n"), None);
+    }
+
+    #[test]
+    fn a_run_may_take_what_is_allowed_and_what_the_program_takes() {
+        let watched = Watched::default();
+        assert!(!watched.takes_too_much(u64::MAX));
+        watched.allow_memory(100, 1);
+        assert!(!watched.takes_too_much(112 * MIB) && watched.takes_too_much(112 * MIB + 1));
+        watched.allow_memory(100, 4);
+        assert!(!watched.takes_too_much(115 * MIB) && watched.takes_too_much(115 * MIB + 1));
+        assert!(matches!(watched.reason(), CliError::Interrupted));
+        watched.too_much.store(true, Ordering::Relaxed);
+        assert!(matches!(watched.reason(), CliError::Memory { allowed_mib: 100 }));
+    }
+}

@@ -1,0 +1,70 @@
+//! Meshes that are no surface: upright cutters plan on them and measure them, what needs two sides refuses them, and what
+//! nobody saw is never passed.
+
+use std::path::Path;
+
+use millstream::geometry::Point3;
+
+use crate::command::{Answer, millstream};
+use crate::support::write_stl;
+
+const SCENE: &str = "[part]\nfile = \"part.stl\"\n[cutter]\nshape = \"ball\"\ndiameter = 6\n[tolerance]\nscallop = 0.011\n\
+                     [simulation]\ncell = 0.1\n[[toolpath]]\nstrategy = \"zigzag\"\nstepover = 0.5\n";
+
+fn quad(a: [f64; 3], b: [f64; 3], c: [f64; 3], d: [f64; 3]) -> [[Point3; 3]; 2] {
+    let [a, b, c, d] = [a, b, c, d].map(Point3::from);
+    [[a, b, c], [a, c, d]]
+}
+
+/// A level plate of 8 x 6 mm in two halves, with a fin below the edge between them.
+fn plate_with_a_fin() -> Vec<[Point3; 3]> {
+    let halves = [(0.0, 4.0), (4.0, 8.0)];
+    let half = |(x0, x1)| quad([x0, 0.0, 0.0], [x1, 0.0, 0.0], [x1, 6.0, 0.0], [x0, 6.0, 0.0]);
+    let fin = quad([4.0, 0.0, 0.0], [4.0, 6.0, 0.0], [4.0, 6.0, -2.0], [4.0, 0.0, -2.0]);
+    halves.into_iter().flat_map(half).chain(fin).collect()
+}
+
+/// A box whose triangles face inward.
+fn inside_out([x0, x1]: [f64; 2], [y0, y1]: [f64; 2], [z0, z1]: [f64; 2]) -> Vec<[Point3; 3]> {
+    let corner = |i: usize| [[x0, x1][i & 1], [y0, y1][i >> 1 & 1], [z0, z1][i >> 2]];
+    let outward = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    outward.into_iter().flat_map(|[a, b, c, d]| quad(corner(d), corner(c), corner(b), corner(a))).collect()
+}
+
+fn run(home: &Path, triangles: &[[Point3; 3]], scene: &str, arguments: &[&str]) -> Answer {
+    write_stl(&home.join("part.stl"), triangles);
+    std::fs::write(home.join("scene.toml"), scene).unwrap();
+    millstream(home, &[&["run", "scene.toml", "--out", "out"], arguments].concat())
+}
+
+#[test]
+fn upright_cutters_plan_and_measure_where_three_triangles_meet() {
+    let home = tempfile::tempdir().unwrap();
+    let answer = run(home.path(), &plate_with_a_fin(), SCENE, &[]);
+    assert_eq!(answer.code, Some(0), "{answer:?}");
+    let report = std::fs::read_to_string(home.path().join("out/report.json")).unwrap();
+    assert!(report.contains("left 1 edge open where more than two triangles meet"), "{report}");
+}
+
+#[test]
+fn what_needs_two_sides_says_so() {
+    let home = tempfile::tempdir().unwrap();
+    let tilted = format!("{SCENE}axis = {{ lead = 10 }}\n");
+    for (scene, arguments) in [(tilted.as_str(), vec![]), (SCENE, vec!["--engine", "rays"])] {
+        let answer = run(home.path(), &plate_with_a_fin(), scene, &arguments);
+        assert_ne!(answer.code, Some(0), "{answer:?}");
+        let said = format!("{}{}", answer.stdout, answer.stderr);
+        let said = said.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+        assert!(said.contains("3 triangles") && said.contains("the part is no surface"), "{said}");
+    }
+}
+
+/// The box stands on the plate; its top faces down. No cell measures that, so that the whole does not pass.
+#[test]
+fn a_soup_seen_from_its_back_does_not_pass() {
+    let home = tempfile::tempdir().unwrap();
+    let mut triangles = plate_with_a_fin();
+    triangles.extend(inside_out([1.0, 3.0], [1.0, 5.0], [0.5, 1.5]));
+    let answer = run(home.path(), &triangles, SCENE, &[]);
+    assert_eq!(answer.code, Some(1), "{answer:?}");
+}
