@@ -151,9 +151,10 @@ fn a_lead_on_triangles_leaves_what_it_leaves_on_their_patch() {
         number(&mesh, "/gouge/max_depth_mm") <= 0.005 && number(&mesh, "/uncut/area_mm2") == 0.0,
         "{mesh:#}"
     );
-    // One stepover serves the whole mesh, but as for a lead: upright it would be less than half of that.
+    // One stepover serves the whole mesh, and what stands in a corner narrows it; but as for a lead: upright it would be less
+    // than half of that.
     let length = |path: &Value| number(path, "/path/cutting_length_mm");
-    assert!(length(&mesh) < 1.4 * length(&patch), "{} {}", length(&mesh), length(&patch));
+    assert!(length(&mesh) < 1.7 * length(&patch), "{} {}", length(&mesh), length(&patch));
     assert!(number(&mesh, "/scallop/max_mm") > 0.004, "{:#}", mesh["scallop"]);
 }
 

@@ -58,13 +58,13 @@ pub(crate) trait LevelSource: Sync {
         self.allowed(from)
     }
 
-    /// The pass along a curve, or along a run of its points; `None` where there is nothing to cut.
+    /// The pass along a curve, or along a run of its points, in pieces between places where the cutter touches nothing.
     fn pass(
         &self,
         curve: &Track<Self::Place>,
         level: f64,
         run: Option<[usize; 2]>,
-    ) -> Result<Option<Vec<Point3>>, Cancelled>;
+    ) -> Result<Vec<Vec<Point3>>, Cancelled>;
 
     /// The pass of a tilted cutter along a curve, or along a run of its points; `None` where there is nothing to cut, or
     /// the cutter stands upright.
@@ -199,9 +199,12 @@ impl<S: LevelSource> Filler<'_, S> {
             passes.passes.push(touches.iter().map(|touch| touch.contact.point).collect());
             passes.touches.push(touches);
             passes.contacts.push(self.source.contacts(curve, run));
-        } else if let Some(pass) = self.source.pass(curve, level, run)? {
-            passes.passes.push(pass);
-            passes.contacts.push(self.source.contacts(curve, run));
+            return Ok(());
+        }
+        for (k, piece) in self.source.pass(curve, level, run)?.into_iter().enumerate() {
+            passes.passes.push(piece);
+            // Those of the whole curve, once.
+            passes.contacts.push(if k == 0 { self.source.contacts(curve, run) } else { Vec::new() });
         }
         Ok(())
     }

@@ -267,27 +267,31 @@ impl LevelSource for ChartGuide<'_> {
         (0..PARTS_OF_KINKS).filter_map(part).min_by(|a, b| a.step.total_cmp(&b.step))
     }
 
-    /// The pass along a curve, or along a run of its points; `None` where it does not touch the
-    /// chart.
     fn pass(
         &self,
         curve: &Track<[f64; 2]>,
         level: f64,
         run: Option<[usize; 2]>,
-    ) -> Result<Option<Vec<Point3>>, Cancelled> {
-        let Some((points, run)) = points_of(curve, run) else { return Ok(None) };
+    ) -> Result<Vec<Vec<Point3>>, Cancelled> {
+        let Some((points, run)) = points_of(curve, run) else { return Ok(Vec::new()) };
         let at = |s: f64| self.on_level(&points, level, s);
-        let Some(stretches) = self.useful_stretches(&at, run, curve.closed) else { return Ok(None) };
+        let Some(stretches) = self.useful_stretches(&at, run, curve.closed) else { return Ok(Vec::new()) };
         let settings = PassSettings { sampling: 1.0, ..*self.settings };
-        let mut tips: Vec<Point3> = Vec::new();
+        let mut pieces: Vec<Vec<Point3>> = Vec::new();
         for stretch in stretches {
             let mut beside = Beside::default();
             let mut tip = |s| self.tip(at(s), &mut beside);
             let moves = settings.moves(stretch.from, stretch.to, &mut tip, self.monitor)?;
-            let joined = usize::from(!tips.is_empty());
-            tips.extend(moves.into_iter().skip(joined));
+            // Beyond the border the cutter may touch nothing for a while: no move leads from one side of that to the other.
+            let ends = pieces.last().and_then(|piece| piece.last()).zip(moves.first());
+            let joined = ends.is_some_and(|(a, b)| (a - b).norm() <= settings.chord_tolerance);
+            match pieces.last_mut() {
+                Some(piece) if joined => piece.extend(moves.into_iter().skip(1)),
+                _ => pieces.push(moves),
+            }
         }
-        Ok(Some(tips))
+        pieces.retain(|piece| piece.len() > 1);
+        Ok(pieces)
     }
 
     fn touches(

@@ -482,7 +482,7 @@ impl LevelSource for MeshGuide<'_> {
         curve: &Track<Spot>,
         _: f64,
         run: Option<[usize; 2]>,
-    ) -> Result<Option<Vec<Point3>>, Cancelled> {
+    ) -> Result<Vec<Vec<Point3>>, Cancelled> {
         let mut axes: Vec<Point2> = curve.points.iter().map(|s| s.axis).collect();
         if curve.closed {
             axes.push(axes[0]);
@@ -490,7 +490,7 @@ impl LevelSource for MeshGuide<'_> {
         let last = axes.len() - 1;
         let [first, end] = run.map_or([0, last], |[a, b]| [a, if curve.closed { last } else { b }]);
         if end <= first {
-            return Ok(None);
+            return Ok(Vec::new());
         }
         let before = |k: usize| match k {
             0 if curve.closed => axes[last - 1],
@@ -514,6 +514,6 @@ impl LevelSource for MeshGuide<'_> {
         };
         let settings = PassSettings { sampling: 1.0, ..*self.settings };
         let moves = settings.moves(first as f64, end as f64, &mut tip, self.monitor)?;
-        Ok((moves.len() > 1).then_some(moves))
+        Ok(if moves.len() > 1 { vec![moves] } else { Vec::new() })
     }
 }

@@ -431,10 +431,10 @@ impl LevelSource for PatchRider<'_> {
         curve: &Track<[f64; 2]>,
         _level: f64,
         run: Option<[usize; 2]>,
-    ) -> Result<Option<Vec<Point3>>, Cancelled> {
+    ) -> Result<Vec<Vec<Point3>>, Cancelled> {
         let (at, end) = along_track(curve, run);
         let tips = self.tips_along(&at, end)?;
-        Ok((tips.len() > 1).then_some(tips))
+        Ok(if tips.len() > 1 { vec![tips] } else { Vec::new() })
     }
 
     fn touches(

@@ -87,12 +87,15 @@ impl<'a> PassSettings<'a> {
         let fine = SAMPLING_SHARE * self.chord_tolerance;
         let mut watch = Watch::new(monitor);
         let points = sample_within_chord(s0, s1, self.sampling, fine, locate, &mut watch)?;
-        match self.smoothing {
+        let mut moves = match self.smoothing {
             Some(sampling) => {
                 let share = if let Step::Scallop(_) = self.step { SMOOTHED_SHARE } else { 1.0 };
                 smooth_and_spread(&points, sampling, share * (self.chord_tolerance - fine), &mut watch)
             }
             None => reduce(&points, REDUCTION_SHARE * self.chord_tolerance, &mut watch),
-        }
+        }?;
+        // Thousands of passes are kept, each of far fewer places than were sampled.
+        moves.shrink_to_fit();
+        Ok(moves)
     }
 }

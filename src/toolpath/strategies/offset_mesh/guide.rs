@@ -153,9 +153,9 @@ impl LevelSource for OffsetGuide<'_> {
         curve: &Track<Spot>,
         _: f64,
         run: Option<[usize; 2]>,
-    ) -> Result<Option<Vec<Point3>>, Cancelled> {
+    ) -> Result<Vec<Vec<Point3>>, Cancelled> {
         match self.along(curve, run) {
-            Ok(mut found) => Ok(found.passes.pop()),
+            Ok(found) => Ok(found.passes),
             Err(_) => Err(Cancelled),
         }
     }
