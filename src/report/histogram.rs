@@ -123,15 +123,17 @@ impl Histogram {
             [(0.0, 0.0)].into_iter().chain(ends),
             SUM.stroke_width(4),
         ))?;
-        let marks = [
-            (format!("target {} ", micrometres(Some(self.target))), self.target, PASS, HPos::Right),
-            (
-                format!(" limit of the highest {}", micrometres(Some(self.limit))),
-                self.limit,
-                FAIL,
-                HPos::Left,
-            ),
-        ];
+        let target = (format!("target {} ", micrometres(Some(self.target))), self.target, PASS, HPos::Right);
+        let limit = (
+            format!(" limit of the highest {}", micrometres(Some(self.limit))),
+            self.limit,
+            FAIL,
+            HPos::Left,
+        );
+        // One line where the target is the limit.
+        let both =
+            (format!("target and limit {}", micrometres(Some(self.limit))), self.limit, FAIL, HPos::Center);
+        let marks = if self.limit > self.target { vec![target, limit] } else { vec![both] };
         for (words, at, colour, end) in marks {
             let line = [(at, 0.0), (at, tallest)];
             chart.draw_series(DashedLineSeries::new(line, 10, 6, colour.stroke_width(3)))?;

@@ -1,6 +1,6 @@
 //! Work that cannot be asked to stop, done aside so that whoever waits for it can.
 //!
-//! Enters: a closure that owns what it needs. Leaves: its result, or [`Cancelled`] within [`LOOK`] of the monitor's wish.
+//! Enters: a closure that owns what it needs. Leaves: its result, or [`Cancelled`] some 20 ms after the monitor's wish.
 //! Triangulations, offsets of outlines, search trees and sparse factors come from crates that ask nobody. A cancelled
 //! closure runs on until it ends, and its result is dropped: a program that goes on has less of the machine meanwhile.
 
