@@ -240,25 +240,28 @@ impl Session {
         let failed = |reason| JobError::engine(scene, &request.name, reason);
         let first = self.task(path, &scene.simulation, &self.cells);
         let mut measured = engine.measure(&first, monitor).map_err(failed)?;
-        let finest = auto_cell(&scene.cutter, &scene.toolpaths);
+        let mut finest = auto_cell(&scene.cutter, &scene.toolpaths);
         let mut simulation = Simulation { cell_is_auto: false, cell: measured.cell, ..scene.simulation };
         let (mut rounds, least) = (0, CLOSEST_BOUND * scene.simulation.error_bound);
         while (simulation.cell > finest || rounds < CLOSER_ROUNDS)
             && judge::is_open(&measured.measurement, &scene.tolerance, &scene.scallop_rule)
         {
             rounds += 1;
-            simulation.cell = (FINER * simulation.cell).max(finest.min(simulation.cell));
+            let before = simulation.cell;
+            simulation.cell = (FINER * before).max(finest.min(before));
             simulation.error_bound = (FINER * FINER * simulation.error_bound).max(least);
-            let Ok(cells) = self.budget().grid_before_planning(&self.area(), &simulation) else { break };
-            match engine.measure(&self.task(path, &simulation, &cells), monitor) {
-                Ok(finer) => {
+            let cells = self.budget().grid_before_planning(&self.area(), &simulation);
+            let finer = cells.map(|cells| engine.measure(&self.task(path, &simulation, &cells), monitor));
+            match finer {
+                Ok(Ok(finer)) => {
                     let wall_s = measured.wall_s + finer.wall_s;
                     measured =
                         Measured { note: finer_note(&simulation, scene).or(finer.note), wall_s, ..finer }
                 }
-                Err(EngineError::Cancelled(cancelled)) => return Err(cancelled.into()),
-                // It does not fit into the memory: what was measured stands.
-                Err(_) => break,
+                Ok(Err(EngineError::Cancelled(cancelled))) => return Err(cancelled.into()),
+                // Finer cells do not fit into the memory; smaller bounds on the same ones may be enough.
+                _ if simulation.cell < before => (simulation.cell, finest) = (before, before),
+                _ => break,
             }
         }
         Ok(measured)
