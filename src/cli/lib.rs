@@ -12,6 +12,7 @@ mod progress;
 mod run;
 mod scallop;
 mod signals;
+mod system;
 mod watch;
 
 use std::io::{ErrorKind, Write as _};

@@ -28,8 +28,7 @@ pub fn listen(stop: &Arc<AtomicBool>, status: u8) {
 /// elsewhere none counts as ignored.
 #[cfg(unix)]
 fn ignored() -> u64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    mask(&status).unwrap_or(0)
+    mask(&super::system::text("self/status")).unwrap_or(0)
 }
 
 #[cfg(unix)]

@@ -54,8 +54,9 @@ pub(crate) struct CorrectionRound {
     /// The highest remnant along a border, mm; `None` where only what is highest of all was sought, and that is a ridge.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub border_mm: Option<f64>,
-    /// Bound of its error.
-    pub error_bound_mm: f64,
+    /// Bound of the error of the higher one of both; `None` where it is a border that was looked at in places only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_bound_mm: Option<f64>,
     /// Half of the ridge length is lower, mm.
     pub median_mm: f64,
     /// Length of all moves that feed along passes, mm.
@@ -86,10 +87,11 @@ struct Standing {
 impl Standing {
     /// `None` without ridges: there is nothing to correct.
     fn of_ridges(map: &RidgeMap, planned: &Planned, factors: [f64; 2]) -> Option<Self> {
+        let highest_ridge = map.scallop.max_mm?;
         let round = CorrectionRound {
-            highest_mm: map.scallop.max_mm?,
+            highest_mm: highest_ridge,
             border_mm: Some(map.border),
-            error_bound_mm: map.scallop.error_bound_mm?,
+            error_bound_mm: map.scallop.error_bound_mm.filter(|_| highest_ridge >= map.border),
             median_mm: map.scallop.p50_mm?,
             cutting_length_mm: path_figures(&planned.plan.path, 0.0).cutting_length_mm,
             factors,
@@ -107,7 +109,7 @@ impl Standing {
         let round = CorrectionRound {
             highest_mm: scallop.max_mm?,
             border_mm: on_border.then_some(reached.max_mm),
-            error_bound_mm: reached.error_bound_mm,
+            error_bound_mm: Some(reached.error_bound_mm),
             median_mm: scallop.p50_mm?,
             cutting_length_mm: path_figures(&planned.plan.path, 0.0).cutting_length_mm,
             factors,
@@ -123,6 +125,11 @@ impl CorrectionRound {
     /// What is highest, mm.
     pub fn highest(&self) -> f64 {
         self.border_mm.map_or(self.highest_mm, |border| border.max(self.highest_mm))
+    }
+
+    /// Whether a remnant along a border is higher than every ridge.
+    pub fn is_on_border(&self) -> bool {
+        self.border_mm.is_some_and(|border| border > self.highest_mm)
     }
 
     /// Whether no ridge exceeds the target.
@@ -396,7 +403,7 @@ mod tests {
         let round = |highest_mm: f64, cutting_length_mm: f64| CorrectionRound {
             highest_mm,
             border_mm: None,
-            error_bound_mm: 0.1,
+            error_bound_mm: Some(0.1),
             median_mm: 0.9,
             cutting_length_mm,
             factors: [1.0; 2],

@@ -1,10 +1,11 @@
 //! This nightly against a baseline: what got worse, what got better, what is new.
 
 use keys::printable;
+use report::Verdict;
 
 use super::checks::contradictions;
 use super::figures::{FIGURES, Figure};
-use super::results::{Cost, Outcome, Results, SceneResult, ToolpathResult, Verdict};
+use super::results::{Cost, Outcome, Results, SceneResult, ToolpathResult};
 use super::rules::{Missing, Rules};
 use super::words::{change, first_line, number};
 

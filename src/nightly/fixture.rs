@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::figures::FIGURES;
-use super::results::{Case, Cost, Outcome, Results, SceneResult, ToolpathResult, Verdict};
+use super::results::{Case, Cost, Outcome, Results, SceneResult, ToolpathResult};
+use report::Verdict;
 
 /// A scene with one toolpath whose figures are all `value`.
 pub fn scene(name: &str, value: f64) -> SceneResult {

@@ -148,7 +148,7 @@ impl Page<'_> {
         let unit = figure.shown(1.0);
         html! {
             td.worse[worse] {
-                (value.map_or_else(|| "–".into(), |value| number(figure.shown(value))))
+                (now.shown(figure))
                 @if let Some(by) = by { small { (by) } }
                 (trend(&self.history.trend(scene, &now.name, figure.key), unit))
             }

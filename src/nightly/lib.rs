@@ -27,8 +27,7 @@ pub use junit::junit;
 pub use markdown::{markdown, summary};
 pub use reference::reference_work;
 pub use results::{
-    Case, ClosedForm, Cost, Outcome, Results, ResultsError, SceneResult, Shard, ToolpathResult, Verdict,
-    merge,
+    Case, ClosedForm, Cost, Outcome, Results, ResultsError, SceneResult, Shard, ToolpathResult, merge,
 };
 pub use rules::{Exact, Limit, Missing, Rules};
 

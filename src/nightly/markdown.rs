@@ -83,11 +83,9 @@ fn table(out: &mut String, results: &Results, baseline: Option<&Results>, compar
             let old = before.iter().find(|old| old.name == t.name);
             let _ = write!(out, "| {name} | {} | {} |", escaped(&t.name), t.verdict.word());
             for figure in &FIGURES {
-                let value = t.figures.get(figure.key);
-                let text = value.map_or_else(|| "–".into(), |value| number(figure.shown(*value)));
-                let by = value.zip(old.and_then(|old| old.figures.get(figure.key)));
+                let by = t.figures.get(figure.key).zip(old.and_then(|old| old.figures.get(figure.key)));
                 let by = by.and_then(|(new, old)| change(*old, *new)).map(|by| format!(" ({by})"));
-                let _ = write!(out, " {text}{} |", by.unwrap_or_default());
+                let _ = write!(out, " {}{} |", t.shown(figure), by.unwrap_or_default());
             }
             let _ = writeln!(out, " {cpu} |");
         }

@@ -4,10 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::str::FromStr;
 
+use report::Verdict;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::figures::FIGURES;
+use super::figures::{FIGURES, Figure};
+use super::words::number;
 
 /// The format of nightly.json that this version writes and reads.
 const FORMAT: u32 = 1;
@@ -30,40 +32,6 @@ pub enum ResultsError {
     /// The shards are not those of one nightly.
     #[error("the folders are no complete set of shards: {0}")]
     Shards(String),
-}
-
-/// A verdict, from best to worst.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub enum Verdict {
-    /// Every limit is proven to hold.
-    #[serde(rename = "pass")]
-    Pass,
-    /// For some limit it is not known.
-    #[serde(rename = "undecided")]
-    Undecided,
-    /// A limit is violated.
-    #[serde(rename = "fail")]
-    Fail,
-    /// There is no path.
-    #[serde(rename = "not planned")]
-    NotPlanned,
-}
-
-impl Verdict {
-    /// As report.json writes it.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Pass => "pass",
-            Self::Undecided => "undecided",
-            Self::Fail => "fail",
-            Self::NotPlanned => "not planned",
-        }
-    }
-
-    fn of(value: &Value) -> Option<Self> {
-        let all = [Self::Pass, Self::Undecided, Self::Fail, Self::NotPlanned];
-        all.into_iter().find(|verdict| value["verdict"] == verdict.word())
-    }
 }
 
 /// One toolpath of a scene.
@@ -210,16 +178,32 @@ impl Outcome {
     /// [`ResultsError`] where it is none.
     pub fn of_report(text: &str) -> Result<Self, ResultsError> {
         let report: Value = serde_json::from_str(text).map_err(|e| ResultsError::Json(e.to_string()))?;
-        let verdict = Verdict::of(&report).ok_or(ResultsError::Report("verdict"))?;
+        let verdict = verdict_of(&report).ok_or(ResultsError::Report("verdict"))?;
         let toolpaths = report["toolpaths"].as_array().ok_or(ResultsError::Report("toolpaths"))?;
         let toolpaths = toolpaths.iter().map(toolpath).collect::<Result<_, _>>()?;
         Ok(Self::Done { verdict, toolpaths })
     }
 }
 
+fn verdict_of(value: &Value) -> Option<Verdict> {
+    Verdict::deserialize(&value["verdict"]).ok()
+}
+
+impl ToolpathResult {
+    /// A figure with its error bound, if it has one, as the pages show it; a dash where it was not measured.
+    pub(crate) fn shown(&self, figure: &Figure) -> String {
+        let value =
+            self.figures.get(figure.key).map_or_else(|| "–".into(), |value| number(figure.shown(*value)));
+        match self.bounds.get(figure.key) {
+            Some(bound) => format!("{value} ± {}", report::bound(*bound)),
+            None => value,
+        }
+    }
+}
+
 fn toolpath(value: &Value) -> Result<ToolpathResult, ResultsError> {
     let name = value["name"].as_str().ok_or(ResultsError::Report("name of a toolpath"))?;
-    let verdict = Verdict::of(value).ok_or(ResultsError::Report("verdict of a toolpath"))?;
+    let verdict = verdict_of(value).ok_or(ResultsError::Report("verdict of a toolpath"))?;
     let figures = FIGURES.iter().filter_map(|figure| Some((figure.key.to_owned(), figure.of(value)?)));
     let bounds = FIGURES.iter().filter_map(|figure| Some((figure.key.to_owned(), figure.bound_of(value)?)));
     Ok(ToolpathResult {

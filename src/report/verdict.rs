@@ -1,10 +1,10 @@
 //! What a verdict is: figures, each with the bound of its error, held against their limits.
 
-use serde::Serialize;
 use serde::ser::{SerializeMap as _, Serializer};
+use serde::{Deserialize, Serialize};
 
 /// What can be said of a limit, a toolpath, or a run; the later, the worse.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Verdict {
     /// Proven: every figure with its bound is within its limit.
     #[serde(rename = "pass")]

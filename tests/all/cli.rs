@@ -409,12 +409,25 @@ fn results_that_cannot_be_written_are_told_and_the_scene_stays() {
     assert_eq!(std::fs::read_to_string(home.path().join("plate.toml")).unwrap(), PLATE);
 }
 
+/// Sends Ctrl-C: status 2, and no file.
+#[cfg(unix)]
+fn answers_to_ctrl_c(child: std::process::Child, home: &Path) {
+    use crate::command::{Answer, ctrl_c};
+
+    let kill = std::process::Command::new("kill").args([ctrl_c(), &child.id().to_string()]).status();
+    assert!(kill.unwrap().success());
+    let answer = Answer::from(child.wait_with_output().unwrap());
+    assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{answer:?}");
+    assert!(answer.stderr.contains("interrupted; nothing was written"), "{}", answer.stderr);
+    assert_eq!(entries(home), ["plate.toml"]);
+}
+
 /// Ctrl-C at moments all over a run that would take a minute: status 2, and no file. A run that went on would end with
 /// another status.
 #[cfg(unix)]
 #[test]
 fn an_interrupted_run_leaves_nothing() {
-    use crate::command::{Answer, command, ctrl_c};
+    use crate::command::command;
     use std::time::Duration;
 
     let scene = WAVE.replace("x = [-2, 6]", "x = [0, 250]").replace("y = [0, 3]", "y = [0, 250]");
@@ -427,12 +440,7 @@ fn an_interrupted_run_leaves_nothing() {
             std::thread::sleep(Duration::from_millis(5));
         }
         std::thread::sleep(Duration::from_millis(delay_ms));
-        let kill = std::process::Command::new("kill").args([ctrl_c(), &child.id().to_string()]).status();
-        assert!(kill.unwrap().success());
-        let answer = Answer::from(child.wait_with_output().unwrap());
-        assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{answer:?}");
-        assert!(answer.stderr.contains("interrupted; nothing was written"), "{}", answer.stderr);
-        assert_eq!(entries(home.path()), ["plate.toml"]);
+        answers_to_ctrl_c(child, home.path());
     }
 }
 
@@ -440,7 +448,7 @@ fn an_interrupted_run_leaves_nothing() {
 #[cfg(target_os = "linux")]
 #[test]
 fn check_and_run_can_be_interrupted_while_the_part_is_read() {
-    use crate::command::{Answer, command, ctrl_c};
+    use crate::command::command;
     use std::fmt::Write as _;
     use std::time::Duration;
 
@@ -466,12 +474,7 @@ fn check_and_run_can_be_interrupted_while_the_part_is_read() {
             std::thread::sleep(Duration::from_millis(2));
         }
         std::thread::sleep(Duration::from_millis(300));
-        let kill = std::process::Command::new("kill").args([ctrl_c(), &child.id().to_string()]).status();
-        assert!(kill.unwrap().success());
-        let answer = Answer::from(child.wait_with_output().unwrap());
-        assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{answer:?}");
-        assert!(answer.stderr.contains("interrupted; nothing was written"), "{}", answer.stderr);
-        assert_eq!(entries(home.path()), ["plate.toml"]);
+        answers_to_ctrl_c(child, home.path());
     }
 }
 

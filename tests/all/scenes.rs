@@ -212,13 +212,36 @@ fn the_other_parts_are_good() {
     }
 }
 
+/// Passes that leave the part over its border and come back: no move leads from one side to the other.
+#[test]
+fn streamlines_of_a_wide_cutter_do_not_cut_across_a_corner() {
+    let home = tempfile::tempdir().unwrap();
+    let path = home.path().join("across.toml");
+    let text = format!(
+        "[part]\nsurface = \"nurbs\"\nfile = \"{}\"\n[cutter]\nshape = \"bull\"\ndiameter = 8\ncorner_radius = 2\n\
+         [tolerance]\nscallop = 0.3\nchord = 0.03\ngouge = 0.15\nuncut = 0.6\ncorrect = false\n\
+         [[toolpath]]\nstrategy = \"streamline\"\n",
+        scene("compare/blade_side.json").display()
+    );
+    std::fs::write(&path, text).unwrap();
+    let (_, report) = run_scene(&path);
+    let gouge = &report["toolpaths"][0]["gouge"];
+    assert!(number(gouge, "/max_depth_mm") + number(gouge, "/error_bound_mm") <= 0.15, "{gouge}");
+}
+
 /// The ball touches both sides of each crease, at r tan(δ/2) beside it, δ the angle between the sides' normals; there the
 /// crease lies r (1 − √(1 − tan²(δ/2))) below it along either normal.
 fn creases_have_passes_of_their_own((status, report): (i32, Value)) {
     assert_eq!(status, 0);
     assert_good("pan", &report);
     let toolpath = &report["toolpaths"][0];
-    assert!(toolpath["notes"].to_string().contains("run along creases"), "{}", toolpath["notes"]);
+    let notes = toolpath["notes"].to_string();
+    let (before, _) =
+        notes.split_once(" mm of passes run along creases").unwrap_or_else(|| panic!("{notes}"));
+    let along: f64 = before.rsplit(['"', ' ']).next().unwrap().parse().unwrap();
+    // Once around the floor, and from each of its corners to the rim; the ball's centre a little less.
+    let creases = 4.0 * (8.0 + 6.0) + 4.0 * 4.0 * (2.0 + PAN_SLOPE.tan().powi(2)).sqrt();
+    assert!((0.95 * creases..=creases).contains(&along), "{along} {creases}");
     // The steepest ones lie between walls: their normals' product is cos² of the slope.
     let between = PAN_SLOPE.cos().powi(2).acos();
     let left = 1.25 * (1.0 - (1.0 - (0.5 * between).tan().powi(2)).sqrt());

@@ -8,6 +8,8 @@ use std::time::{Duration, Instant};
 use ::nightly::Cost;
 use keys::printable_lines;
 
+use crate::system;
+
 /// What a process may take.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
@@ -134,11 +136,11 @@ fn ending(status: ExitStatus) -> String {
     format!("Ended with {status}.")
 }
 
-/// Notes the time and memory that a process has taken so far. Only Linux says so without unsafe code.
+/// Notes the time and the highest resident memory that a process has taken so far.
 fn look(id: u32, cost: &mut Cost) {
-    let file = |name: &str| fs::read_to_string(format!("/proc/{id}/{name}")).unwrap_or_default();
-    cost.cpu_s = cpu_s(&file("stat")).or(cost.cpu_s);
-    cost.peak_mib = peak_mib(&file("status")).or(cost.peak_mib);
+    cost.cpu_s = cpu_s(&system::text(&format!("{id}/stat"))).or(cost.cpu_s);
+    let highest = system::kib(&system::text(&format!("{id}/status")), "VmHWM");
+    cost.peak_mib = highest.map(|kib| kib as f64 / 1024.0).or(cost.peak_mib);
 }
 
 /// CPU time of all threads, from /proc/ID/stat.
@@ -151,19 +153,9 @@ fn cpu_s(stat: &str) -> Option<f64> {
     Some((user? + system?) as f64 / TICKS_PER_SECOND)
 }
 
-/// Highest resident memory, from /proc/ID/status.
-fn peak_mib(status: &str) -> Option<f64> {
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kib as f64 / 1024.0)
-}
-
 /// Memory that is free on this machine, MiB; `None` where the system does not say.
 pub fn free_mib() -> Option<u64> {
-    let text = fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kib / 1024)
+    system::kib(&system::text("meminfo"), "MemAvailable").map(|kib| kib / 1024)
 }
 
 #[cfg(all(test, unix))]
@@ -216,9 +208,8 @@ mod tests {
     }
 
     #[test]
-    fn the_systems_tables_are_read() {
+    fn the_time_of_a_process_is_read() {
         let stat = "12 (a ) b) S 1 2 3 4 5 6 7 8 9 10 150 50 0 0 20 0";
         assert_eq!((cpu_s(stat), cpu_s("")), (Some(2.0), None));
-        assert_eq!(peak_mib("Name:\tx\nVmHWM:\t    2048 kB\n"), Some(2.0));
     }
 }

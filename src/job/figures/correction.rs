@@ -21,8 +21,8 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
         let [least, most] = round.factors;
         vec![
             format!("{}{}", k + 1, if k + 1 == correction.kept { ", kept" } else { "" }),
-            with_bound(Some(round.highest_mm), Some(round.error_bound_mm)),
-            micrometres(round.border_mm),
+            with_bound(Some(round.highest()), round.error_bound_mm),
+            if round.is_on_border() { "border" } else { "ridge" }.to_owned(),
             micrometres(Some(round.median_mm)),
             format!("{:.0}", round.cutting_length_mm),
             format!("{least:.3} to {most:.3}"),
@@ -32,10 +32,10 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
         title: "Plans in turn",
         caption: "The first plan is by calculation. Each further one has its passes nearer or farther by the factors of the last \
                   column, from place to place.",
-        columns: vec!["plan", "highest ridge, µm", "border, µm", "median, µm", "length, mm", "widths by"],
+        columns: vec!["plan", "highest, µm", "which", "median, µm", "length, mm", "widths by"],
         rows: correction.rounds.iter().enumerate().map(row).collect(),
     };
-    let heights = correction.rounds.iter().map(|r| with_bound(Some(r.highest()), Some(r.error_bound_mm)));
+    let heights = correction.rounds.iter().map(|r| with_bound(Some(r.highest()), r.error_bound_mm));
     let heights: Vec<String> = heights.collect();
     let name = &run.request.name;
     let several = heights.len() > 1;

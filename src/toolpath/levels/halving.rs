@@ -66,14 +66,13 @@ pub(crate) trait LevelSource: Sync {
         run: Option<[usize; 2]>,
     ) -> Result<Vec<Vec<Point3>>, Cancelled>;
 
-    /// The pass of a tilted cutter along a curve, or along a run of its points; `None` where there is nothing to cut, or
-    /// the cutter stands upright.
+    /// The same of a tilted cutter; `None` where the cutter stands upright.
     fn touches(
         &self,
         _curve: &Track<Self::Place>,
         _level: f64,
         _run: Option<[usize; 2]>,
-    ) -> Result<Option<Vec<Touch>>, PlanError> {
+    ) -> Result<Option<Vec<Vec<Touch>>>, PlanError> {
         Ok(None)
     }
 
@@ -195,16 +194,19 @@ impl<S: LevelSource> Filler<'_, S> {
         run: Option<[usize; 2]>,
         passes: &mut Passes,
     ) -> Result<(), PlanError> {
-        if let Some(touches) = self.source.touches(curve, level, run)? {
-            passes.passes.push(touches.iter().map(|touch| touch.contact.point).collect());
-            passes.touches.push(touches);
-            passes.contacts.push(self.source.contacts(curve, run));
+        // Contacts are those of the whole curve, once.
+        let contacts = |k: usize| if k == 0 { self.source.contacts(curve, run) } else { Vec::new() };
+        if let Some(pieces) = self.source.touches(curve, level, run)? {
+            for (k, touches) in pieces.into_iter().enumerate() {
+                passes.passes.push(touches.iter().map(|touch| touch.contact.point).collect());
+                passes.touches.push(touches);
+                passes.contacts.push(contacts(k));
+            }
             return Ok(());
         }
         for (k, piece) in self.source.pass(curve, level, run)?.into_iter().enumerate() {
             passes.passes.push(piece);
-            // Those of the whole curve, once.
-            passes.contacts.push(if k == 0 { self.source.contacts(curve, run) } else { Vec::new() });
+            passes.contacts.push(contacts(k));
         }
         Ok(())
     }

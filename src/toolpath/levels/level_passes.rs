@@ -282,13 +282,7 @@ impl LevelSource for ChartGuide<'_> {
             let mut beside = Beside::default();
             let mut tip = |s| self.tip(at(s), &mut beside);
             let moves = settings.moves(stretch.from, stretch.to, &mut tip, self.monitor)?;
-            // Beyond the border the cutter may touch nothing for a while: no move leads from one side of that to the other.
-            let ends = pieces.last().and_then(|piece| piece.last()).zip(moves.first());
-            let joined = ends.is_some_and(|(a, b)| (a - b).norm() <= settings.chord_tolerance);
-            match pieces.last_mut() {
-                Some(piece) if joined => piece.extend(moves.into_iter().skip(1)),
-                _ => pieces.push(moves),
-            }
+            put_on(&mut pieces, moves, &|a, b| (a - b).norm() <= settings.chord_tolerance);
         }
         pieces.retain(|piece| piece.len() > 1);
         Ok(pieces)
@@ -299,7 +293,7 @@ impl LevelSource for ChartGuide<'_> {
         curve: &Track<[f64; 2]>,
         level: f64,
         run: Option<[usize; 2]>,
-    ) -> Result<Option<Vec<Touch>>, PlanError> {
+    ) -> Result<Option<Vec<Vec<Touch>>>, PlanError> {
         let (Some(rule), Some((points, run))) = (self.settings.axis, points_of(curve, run)) else {
             return Ok(None);
         };
@@ -315,15 +309,27 @@ impl LevelSource for ChartGuide<'_> {
             let feed = level_tangent(&p, self.field, [u, v])?;
             Some((CcPoint { point: p.jet.p, normal: p.normal }, feed))
         };
-        let mut touches: Vec<Touch> = Vec::new();
+        let mut pieces: Vec<Vec<Touch>> = Vec::new();
         let tolerance = self.settings.chord_tolerance;
         for stretch in stretches {
             let ends = [stretch.from, stretch.to];
-            let more = tilted::along(&contact, ends, self.cutter, rule, tolerance, self.monitor)?;
-            let joined = usize::from(!touches.is_empty());
-            touches.extend(more.into_iter().skip(joined));
+            let touches = tilted::along(&contact, ends, self.cutter, rule, tolerance, self.monitor)?;
+            let near = |a: &Touch, b: &Touch| (a.contact.point - b.contact.point).norm() <= tolerance;
+            put_on(&mut pieces, touches, &near);
         }
-        Ok((touches.len() > 1).then_some(touches))
+        pieces.retain(|piece| piece.len() > 1);
+        Ok(Some(pieces))
+    }
+}
+
+/// Carries the last piece on by a stretch that begins where it ends, or else begins another one: beyond the border the cutter
+/// may touch nothing for a while, and no move leads from one side of that to the other.
+fn put_on<P>(pieces: &mut Vec<Vec<P>>, stretch: Vec<P>, is_near: &dyn Fn(&P, &P) -> bool) {
+    let ends = pieces.last().and_then(|piece| piece.last()).zip(stretch.first());
+    let joined = ends.is_some_and(|(last, first)| is_near(last, first));
+    match pieces.last_mut() {
+        Some(piece) if joined => piece.extend(stretch.into_iter().skip(1)),
+        _ => pieces.push(stretch),
     }
 }
 

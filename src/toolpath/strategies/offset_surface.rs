@@ -442,9 +442,9 @@ impl LevelSource for PatchRider<'_> {
         curve: &Track<[f64; 2]>,
         _level: f64,
         run: Option<[usize; 2]>,
-    ) -> Result<Option<Vec<Touch>>, PlanError> {
+    ) -> Result<Option<Vec<Vec<Touch>>>, PlanError> {
         let (at, end) = along_track(curve, run);
-        self.touches_along(&at, end)
+        Ok(self.touches_along(&at, end)?.map(|touches| vec![touches]))
     }
 
     fn contacts(&self, curve: &Track<[f64; 2]>, run: Option<[usize; 2]>) -> Vec<Contact> {

@@ -165,11 +165,11 @@ impl LevelSource for OffsetGuide<'_> {
         curve: &Track<Spot>,
         _: f64,
         run: Option<[usize; 2]>,
-    ) -> Result<Option<Vec<Touch>>, PlanError> {
+    ) -> Result<Option<Vec<Vec<Touch>>>, PlanError> {
         if self.rider.settings.axis.is_none() {
             return Ok(None);
         }
-        Ok(self.along(curve, run)?.touches.pop())
+        Ok(Some(self.along(curve, run)?.touches))
     }
 
     fn contacts(&self, curve: &Track<Spot>, run: Option<[usize; 2]>) -> Vec<Contact> {
