@@ -36,7 +36,7 @@ pub struct Outputs {
     /// SHA-256 of each new file.
     digests: Mutex<BTreeMap<String, String>>,
     /// The target, locked as long as the run lives.
-    _lock: Option<fs::File>,
+    _lock: Option<FolderLock>,
     /// Dropped, and so removed, after the staging folder in them.
     _made: MadeFolders,
 }
@@ -78,11 +78,22 @@ fn refused(path: &Path, reason: &str) -> CliError {
     CliError::Output { path: path.to_owned(), reason: reason.to_owned() }
 }
 
+/// A folder that no other run writes to.
+#[derive(Debug)]
+struct FolderLock(fs::File);
+
+impl Drop for FolderLock {
+    /// Closing the file is not enough: a process that another thread starts at this moment has a copy of it for an instant.
+    fn drop(&mut self) {
+        let _ = self.0.unlock();
+    }
+}
+
 /// Locks a folder; `None` where the file system knows no locks. The system releases the lock of a killed run.
-fn lock(target: &Path) -> Result<Option<fs::File>, CliError> {
+fn lock(target: &Path) -> Result<Option<FolderLock>, CliError> {
     let Ok(folder) = fs::File::open(target) else { return Ok(None) };
     match folder.try_lock() {
-        Ok(()) => Ok(Some(folder)),
+        Ok(()) => Ok(Some(FolderLock(folder))),
         Err(fs::TryLockError::WouldBlock) => Err(refused(target, "another run is writing to it")),
         Err(fs::TryLockError::Error(_)) => Ok(None),
     }

@@ -109,6 +109,17 @@ fn a_second_run_waits_its_turn() {
     assert!(Outputs::begin(home.path(), &claims(&["other"])).is_ok());
 }
 
+/// A process that is just being started has a copy of every open file.
+#[test]
+fn a_copy_of_the_lock_does_not_hold_it() {
+    let home = tempfile::tempdir().unwrap();
+    let first = fill(home.path(), "text");
+    let copy = first._lock.as_ref().unwrap().0.try_clone().unwrap();
+    first.publish().unwrap();
+    assert!(Outputs::begin(home.path(), &claims(&["other"])).is_ok());
+    drop(copy);
+}
+
 #[test]
 fn a_file_in_the_place_of_the_folder_and_the_root_are_refused() {
     let home = tempfile::tempdir().unwrap();
