@@ -1,17 +1,19 @@
 //! Where a tool touches what it should not: the part away from the contact, neighbours, fixtures.
 //!
 //! Enters: the tool as a [`Solid`] of convex pieces, its location, and meshes with their search trees, mm. Leaves: the
-//! nearest place of the meshes with its signed distance from the tool, for one location ([`Obstacle::clearance`]) or
-//! a whole move ([`Obstacle::swept_clearance`]).
+//! nearest place of the meshes with its signed distance from the tool, for one location ([`Obstacle::clearance`]),
+//! a whole move ([`Obstacle::swept_clearance`]) or a whole path ([`Obstacle::least_clearance`]).
 //!
 //! The distance from a convex piece is convex, so its gradient supports it over a box, a triangle and a stretch of a move. A
 //! tool that slides along a surface comes no nearer by its motion: its supporting plane moves along itself. A bound by speed
 //! alone would need far more looks. Cutter and holder are checked apart, because a cutter may cut in by a tolerance.
 //!
-//! Limits: only the surface of a mesh counts, closed or not. A tool wholly inside a closed mesh touches none of it; it
-//! reached that position through the surface, and the move that did so is reported.
+//! Limits: only the surface of a mesh counts, closed or not. A tool wholly inside a closed mesh touches none of it. It
+//! reached that position through the surface, and the move that did so is reported, or it began there
+//! ([`Obstacle::least_clearance`]).
 
 mod checks;
+mod least;
 mod piece;
 #[doc(hidden)]
 pub mod samples;
@@ -22,6 +24,7 @@ mod tests;
 pub use checks::{Check, Interference, Shortfall};
 use cutter::Solid;
 use geometry::{Bvh, Node, Point3, TriangleMesh};
+pub use least::LeastClearance;
 use motion::ClPoint;
 use piece::ToolPiece;
 #[cfg(test)]

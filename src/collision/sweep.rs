@@ -14,7 +14,7 @@ use std::collections::VecDeque;
 
 /// A move counts as clear when nothing comes nearer than what is needed less this, mm. Less costs time where a tool slides
 /// along a surface at just the distance that is needed.
-const RESOLUTION: f64 = 1e-5;
+pub(crate) const RESOLUTION: f64 = 1e-5;
 
 /// The worst of a move is found to this share of what is missing.
 const SHARE: f64 = 0.01;

@@ -13,13 +13,14 @@ mod engine_tests;
 mod envelope;
 mod form;
 mod grid;
-mod holder;
+
 mod in_order;
 mod rays;
 mod reference;
 #[doc(hidden)]
 pub mod scenes;
 mod solid;
+mod standing;
 mod sweep;
 mod swept;
 mod tiles;
@@ -31,11 +32,12 @@ pub use bins::MoveBins;
 pub use cut::{Work, cut, cut_all_candidates, cut_counted};
 pub use envelope::Envelope;
 pub use grid::{Grid, GridError};
-pub use holder::{Collision, HolderClearance, holder_collisions};
+
 pub use in_order::{ENGAGED, MoveRemoval, RapidContact, Removal, cut_in_order, cut_in_order_plain};
 pub use rays::{RayHit, Rays, RaysError};
 pub use reference::cut_reference;
 pub use solid::{Nearest, OppositeAxes, SweptHit, SweptMoves, SweptSolid};
+pub use standing::{FAR, NearStanding, StandingClearance, holder_clearance};
 pub use swept::SweptMove;
 pub use voxel::{
     BarAxis, HolderHit, LineExit, StandingHits, StockMesh, VoxelEngine, VoxelError, VoxelRemoval,

@@ -103,8 +103,9 @@ fn a_holder_that_leans_away_from_the_walls_is_clear_of_them() {
     is_good(leaning);
     stays_near(leaning);
     takes_its_part_of_the_block(leaning);
-    let notes = leaning["notes"].to_string();
-    assert!(notes.contains("stay clear of what still stands"), "{notes}");
+    let pairs = leaning["clearance"]["pairs"].as_array().unwrap();
+    let standing = pairs.iter().find(|pair| pair["other"] == "standing stock").unwrap();
+    assert!(standing["tool"] == "holder" && standing["move"].is_null(), "{standing}");
 }
 
 /// The same from the full block: the holder goes where the passes to come have yet to make way.
@@ -123,7 +124,10 @@ fn a_holder_in_stock_that_still_stands_is_a_collision() {
     let (code, report) = run_scene(&path);
     let violation = &report["toolpaths"][0]["violations"][0];
     assert_eq!((code, &violation["what"]), (1, &"collision".into()), "{violation:#}");
-    assert!(violation["text"].as_str().unwrap().contains("into stock that still stands at"), "{violation}");
+    assert!(
+        violation["text"].as_str().unwrap().starts_with("Holder collides with standing stock, at least"),
+        "{violation}"
+    );
 }
 
 /// A bull nose end mill that leads by five degrees, on a patch and on its triangles.

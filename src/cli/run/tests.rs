@@ -106,8 +106,11 @@ fn a_holder_that_meets_the_slope_is_a_collision() {
     assert!(depth > 0.5 && depth < 8.0 * 30f64.to_radians().tan() - 3.0 + 1.0, "{depth}");
     assert!(violation["text"].as_str().unwrap().contains("toolpath.nc line "), "{violation}");
     let clear = report("slim", &wide.replace("= 3\n", "= 12\n"));
-    let notes = clear["toolpaths"][0]["notes"].to_string();
-    assert!(notes.contains("above the finished stock"), "{notes}");
+    let pairs = clear["toolpaths"][0]["clearance"]["pairs"].as_array().unwrap();
+    assert!(
+        pairs.len() == 2 && pairs.iter().all(|pair| pair["clearance_mm"].as_f64().is_none_or(|c| c > 1.0)),
+        "{pairs:?}"
+    );
     let collides = |v: &serde_json::Value| v["what"] == "collision";
     assert!(!clear["toolpaths"][0]["violations"].as_array().unwrap().iter().any(collides));
 }

@@ -1,11 +1,11 @@
 //! The figures of a toolpath beside scallop, gouge, uncut and deviation. Each is one file, which finds its numbers, tells
 //! them in words, and holds them against their limits; a new one is one file and one line in [`FIGURES`].
 
+mod clearance;
 mod correction;
 mod coverage;
 mod feeds;
 mod field;
-mod holder;
 mod machine;
 mod offset;
 mod pairs;
@@ -15,7 +15,6 @@ mod roughness;
 mod sections;
 mod shortest;
 mod solid;
-mod tool_contact;
 mod turning;
 
 use serde::Serialize;
@@ -31,7 +30,7 @@ use super::run::{Finding, Run};
 type Find = fn(&Run<'_>, &dyn Monitor) -> Result<Finding, JobError>;
 
 /// All figures, in the order of report.json.
-const FIGURES: [Find; 16] = [
+const FIGURES: [Find; 15] = [
     coverage::find,
     shortest::find,
     correction::find,
@@ -44,8 +43,7 @@ const FIGURES: [Find; 16] = [
     pocket::find,
     solid::find,
     offset::find,
-    tool_contact::find,
-    holder::find,
+    clearance::find,
     feeds::find,
     turning::find,
 ];

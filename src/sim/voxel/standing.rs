@@ -1,9 +1,9 @@
 //! Whether shank and holder run into stock that still stands when they come: places that a section of the holder
 //! covers on an earlier move than the cutter does, or that the cutter never does.
 //!
-//! At the samples of the lattice that is exact: a place that is told does lie in the stock, in the holder and outside
-//! of all that the cutter swept before. What passes between the samples is not seen; where stock and holder share a ball
-//! of √3 voxels across, a sample lies in it.
+//! At the samples of the lattice that is exact: a place that is reported does lie in the stock, in the holder and outside
+//! of all that the cutter swept before. Every place is within half a voxel's diagonal of a sample. So where no sample comes so
+//! near to all three, nothing collides between the samples either.
 
 use super::bricks::Lattice;
 use super::cube::Cube;
@@ -51,6 +51,8 @@ pub struct StandingHits {
     pub moves: Vec<u32>,
     /// The deepest hit that was found.
     pub worst: Option<HolderHit>,
+    /// The first move on which they may meet between the samples, where no sample tells that they do.
+    pub open: Option<u32>,
 }
 
 /// The place that each move hits deepest, by what is known of that on the way.
@@ -68,6 +70,8 @@ struct Search<'a> {
     engine: &'a VoxelEngine<'a>,
     holder: MotionParts,
     lattice: Lattice,
+    /// How deep a place must lie in holder and stock to count, mm; below zero it counts so far outside of them.
+    depth: f64,
 }
 
 /// How parts lie to a cube.
@@ -86,8 +90,8 @@ impl VoxelEngine<'_> {
     /// [`VoxelError::Cancelled`].
     ///
     /// # Tolerance
-    /// What is told is true to 1e-5 mm, and deeper than 0.01 mm; what is wider than √3 voxels in all
-    /// directions is told.
+    /// What is reported is true to 1e-5 mm, and deeper than 0.01 mm. Where neither a hit nor an open move is reported, shank
+    /// and holder meet nothing that still stands.
     pub fn holder_in_stock(
         &self,
         holder: &Holder,
@@ -98,16 +102,13 @@ impl VoxelEngine<'_> {
         let Some(lattice) = self.lattice(voxel)? else {
             return Err(VoxelError::Voxel(voxel));
         };
-        let mut all: Vec<(f64, HolderHit)> = Vec::new();
         let sections = Solid::of_sections(holder);
-        for (section, solid) in sections.iter().enumerate() {
-            check(monitor)?;
-            let search = Search { engine: self, holder: MotionParts::new(solid, path)?, lattice };
-            let hits = descend(&search, search.whole(), "looking for the holder in the stock", monitor)?;
-            all.extend(hits.into_iter().flat_map(|(move_index, places)| {
-                let hit = move |at| HolderHit { move_index, section, at, depth: 0.0 };
-                places.into_iter().map(move |(depth, at)| (depth, hit(at)))
-            }));
+        let mut all = self.hits_deeper_than(SHALLOWEST, &sections, path, lattice, monitor)?;
+        if all.is_empty() {
+            let between = -(0.5 * 3f64.sqrt() * voxel + TOUCH);
+            let near = self.hits_deeper_than(between, &sections, path, lattice, monitor)?;
+            let open = near.iter().map(|(_, hit)| hit.move_index).min();
+            return Ok(StandingHits { open, ..StandingHits::default() });
         }
         let mut moves: Vec<u32> = all.iter().map(|(_, hit)| hit.move_index).collect();
         moves.sort_unstable();
@@ -125,7 +126,29 @@ impl VoxelEngine<'_> {
         })?;
         let deeper = |a: HolderHit, b: HolderHit| if b.depth > a.depth { b } else { a };
         let with_depth = all.iter().zip(depths).map(|((_, hit), depth)| HolderHit { depth, ..*hit });
-        Ok(StandingHits { moves, worst: with_depth.reduce(deeper) })
+        Ok(StandingHits { moves, worst: with_depth.reduce(deeper), open: None })
+    }
+
+    /// The samples at which sections and standing stock share more than `depth`, each with the depth known on the way.
+    fn hits_deeper_than(
+        &self,
+        depth: f64,
+        sections: &[Solid],
+        path: &Toolpath,
+        lattice: Lattice,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<(f64, HolderHit)>, VoxelError> {
+        let mut all = Vec::new();
+        for (section, solid) in sections.iter().enumerate() {
+            check(monitor)?;
+            let search = Search { engine: self, holder: MotionParts::new(solid, path)?, lattice, depth };
+            let hits = descend(&search, search.whole(), "looking for the holder in the stock", monitor)?;
+            all.extend(hits.into_iter().flat_map(|(move_index, places)| {
+                let hit = move |at| HolderHit { move_index, section, at, depth: 0.0 };
+                places.into_iter().map(move |(depth, at)| (depth, hit(at)))
+            }));
+        }
+        Ok(all)
     }
 }
 
@@ -169,13 +192,13 @@ impl Search<'_> {
                 break;
             }
             let Some(distance) = theirs.distance(part, q, depth) else { continue };
-            if distance >= SHALLOWEST {
+            if distance >= self.depth {
                 depth = if part.index < index { distance } else { depth };
                 continue;
             }
             // On the same move the earlier one has it.
             let when = |parts: &MotionParts, near: f64| parts.first_within(index, q, near, TOUCH, MOST_LOOKS);
-            if part.index < index || when(theirs, SHALLOWEST) <= when(mine, -SHALLOWEST) {
+            if part.index < index || when(theirs, self.depth) <= when(mine, -self.depth) {
                 return None;
             }
         }
@@ -205,15 +228,15 @@ impl Descent for Search<'_> {
             let half = 0.5 * f64::from(cube.n - 1) * self.lattice.pitch;
             let reach = half * 3f64.sqrt();
             let from_stock = if parent.stock { self.engine.stock.foot(&centre).0 } else { f64::NEG_INFINITY };
-            if from_stock - reach > -SHALLOWEST {
+            if from_stock - reach > -self.depth {
                 continue;
             }
-            let stock = from_stock + reach > -SHALLOWEST;
-            let holder = Self::near(&self.holder, &parent.holder, &centre, half, -SHALLOWEST, u32::MAX);
+            let stock = from_stock + reach > -self.depth;
+            let holder = Self::near(&self.holder, &parent.holder, &centre, half, -self.depth, u32::MAX);
             let index_of = |k: &u32| self.holder.all[*k as usize].index;
             let Some(last) = holder.parts.last().map(index_of) else { continue };
             let theirs = &self.engine.parts;
-            let cutter = Self::near(theirs, &parent.cutter, &centre, half, SHALLOWEST, last);
+            let cutter = Self::near(theirs, &parent.cutter, &centre, half, self.depth, last);
             let mut mine = holder.parts;
             if let (true, Some(&gone)) = (cutter.covered, cutter.parts.last()) {
                 // Nothing stands any more for what comes later.
@@ -238,12 +261,12 @@ impl Descent for Search<'_> {
             let at = [k % SIDE, k / SIDE % SIDE, k / SIDE / SIDE];
             let q = low + Vector3::from(at.map(f64::from)) * pitch;
             let in_stock = -self.engine.stock.foot(&q).0;
-            if in_stock < SHALLOWEST {
+            if in_stock < self.depth {
                 continue;
             }
             let inside = |k: &u32| {
                 let part = &self.holder.all[*k as usize];
-                Some((part.index, -self.holder.distance(part, &q, -SHALLOWEST)?))
+                Some((part.index, -self.holder.distance(part, &q, -self.depth)?))
             };
             let Some((index, inside)) = piece.holder.iter().find_map(inside) else { continue };
             if let Some(depth) = self.stands(&q, index, &piece.cutter, inside.min(in_stock)) {

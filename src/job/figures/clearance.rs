@@ -1,0 +1,329 @@
+//! How near the tool comes to what it must not touch: shank and holder to the part, to fixtures and to the stock that stands
+//! when they pass; the cutter to fixtures, and on rapid moves to the part.
+//!
+//! The finished path is looked at, whatever its planner thought of it. How deep an upright cutter cuts into the part, gouges
+//! tell.
+
+use collision::{LeastClearance, Obstacle};
+use cutter::Solid;
+use metrology::View;
+use motion::{Move, MoveKind};
+use report::{Claim, Figure, FigureTable, Gravity, place};
+use serde::Serialize;
+use sim::{FAR, VoxelEngine, holder_clearance};
+use work::monitor::Monitor;
+
+use super::removal::voxel_in_order;
+use super::{more_moves, value};
+use crate::JobError;
+use crate::run::{Finding, Run};
+
+/// Differences of distances that the search along moves leaves open, mm.
+const RESOLUTION: f64 = 2e-5;
+
+/// Why a clearance is null where nothing collides.
+const UNKNOWN: &str = "nothing collides, and no distance is known";
+const BEYOND: &str = "nothing is so near that it counts";
+
+/// Why a line is null.
+const NO_PROGRAM: &str = "the moves stand in no program";
+
+/// Why a bound is null.
+const TOO_DEEP: &str = "the tool is deep in the other body";
+
+/// Pairs in the table of the page.
+const LISTED: usize = 5;
+
+/// Times that voxels are halved to decide whether a holder meets what stands. Each time takes four to eight times as long.
+const HALVINGS: usize = 2;
+
+/// What the word means.
+const MEANING: (&str, &str) = (
+    "clearance",
+    "The least distance between a part of the tool that must not cut and what it must not touch, anywhere along the path; \
+     below zero they collide, at least so deep.",
+);
+
+/// How near two bodies come on a path.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PairClearance {
+    /// Which part of the tool.
+    pub tool: &'static str,
+    /// What it must not touch.
+    pub other: String,
+    /// The least signed distance; below zero they collide, at least so deep. Null where nothing is near enough to count.
+    pub clearance_mm: Option<f64>,
+    /// It is less than that by no more than this; null where that is open, or nothing collides and no distance is known.
+    pub error_bound_mm: Option<f64>,
+    /// Where on the other body.
+    pub at_mm: Option<[f64; 3]>,
+    /// Why one of these is null.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<&'static str>,
+    /// The move on which it happens, counted from 0.
+    #[serde(rename = "move")]
+    pub move_index: Option<u32>,
+    /// Its line in toolpath.nc, counted from 1.
+    pub line: Option<u32>,
+    /// They may come so near to each other, and no nearer.
+    #[serde(skip)]
+    needed: f64,
+    /// What else is to be said where they collide.
+    #[serde(skip)]
+    more: String,
+}
+
+/// All pairs, the nearest first.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct ClearanceFigures {
+    pairs: Vec<PairClearance>,
+}
+
+pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
+    let mut pairs = with_meshes(run, monitor)?;
+    let mut claims: Vec<Claim> = kept_away(run, &pairs).into_iter().collect();
+    pairs.extend(with_standing_stock(run, monitor)?);
+    if pairs.is_empty() {
+        return Ok(Finding::default());
+    }
+    pairs.sort_by(|a, b| nearness(a).total_cmp(&nearness(b)));
+    claims.extend(pairs.iter().map(|pair| pair.claim(run)));
+    let rows = pairs.iter().take(LISTED).map(|pair| pair.row()).collect();
+    let table = FigureTable {
+        title: "Nearest places",
+        caption: "What the tool must not touch, and how near it comes.",
+        columns: vec!["tool", "to", "clearance, mm", "at", "move", "line"],
+        rows,
+    };
+    let sentence = pairs.first().map(|pair| ("Least clearance", format!("{}: {}", pair.sentence(), run.request.name)));
+    let figure = Figure {
+        key: "clearance",
+        value: value(&ClearanceFigures { pairs })?,
+        meaning: Some(MEANING),
+        table: Some(table),
+        sentence,
+        ..Figure::default()
+    };
+    Ok(Finding { figure: Some(figure), claims, ..Finding::default() })
+}
+
+fn nearness(pair: &PairClearance) -> f64 {
+    pair.clearance_mm.unwrap_or(f64::INFINITY)
+}
+
+/// Cutter and holder against fixtures and the part.
+fn with_meshes(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Vec<PairClearance>, JobError> {
+    let (tool, near) = (run.around.tool, run.around.near);
+    let mut pairs = Vec::new();
+    let mut add =
+        |name: (&'static str, String), solid: &Solid, obstacle: Obstacle<'_>, off: f64, needed: f64| {
+            let rapids = |to: &Move| to.kind == MoveKind::Rapid;
+            let chosen: &(dyn Fn(&Move) -> bool + Sync) = if needed < 0.0 { &rapids } else { &|_| true };
+            let least = obstacle.least_clearance(solid, run.path(), chosen, monitor)?;
+            pairs.extend(least.map(|least| PairClearance::of_mesh(name, &least, run, off, needed)));
+            Ok::<(), JobError>(())
+        };
+    monitor.start("looking for collisions", 0);
+    let files = run.scene().keep_clear.fixtures.iter().map(|fixture| &fixture.file.written);
+    for ((mesh, bvh), file) in run.around.fixtures.iter().zip(files) {
+        let fixture = Obstacle::new(mesh, bvh);
+        add(("cutter", file.clone()), &tool.cutter, fixture, 0.0, 0.0)?;
+        if let Some(holder) = &tool.holder {
+            add(("holder", file.clone()), holder, fixture, 0.0, 0.0)?;
+        }
+    }
+    let (part, off) = (Obstacle::new(near.mesh(), near.bvh()), near.mesh_deviation());
+    if let Some(holder) = &tool.holder {
+        add(("holder", "part".into()), holder, part, off, 0.0)?;
+    }
+    if matches!(run.view(), View::Normals(_)) {
+        // What it may cut in, it may also touch.
+        add(("cutter on rapid moves", "part".into()), &tool.cutter, part, off, -run.scene().tolerance.gouge)?;
+    }
+    Ok(pairs)
+}
+
+/// Shank and holder against the stock that stands when they pass.
+fn with_standing_stock(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Option<PairClearance>, JobError> {
+    let Some(holder) = &run.scene().holder else { return Ok(None) };
+    let stock = run.session.voxel_stock();
+    match run.view() {
+        View::Heights(_) => {
+            let found = holder_clearance(&stock, &run.scene().cutter, holder, run.path(), monitor)?;
+            let pair = PairClearance {
+                error_bound_mm: Some(found.error_bound),
+                more: more_moves(found.collisions.len()),
+                ..PairClearance::new(("holder", "standing stock".into()))
+            };
+            let Some(near) = found.nearest else {
+                return Ok(Some(PairClearance { reason: Some(BEYOND), ..pair }));
+            };
+            let pair = PairClearance { clearance_mm: Some(near.distance), ..pair };
+            Ok(Some(pair.at(run, near.at.into(), near.move_index)))
+        }
+        View::Normals(_) if run.scene().simulation.removal => {
+            let engine =
+                VoxelEngine::new(&stock, &run.around.tool.cutter, run.path()).map_err(run.voxels())?;
+            let mut voxel = voxel_in_order(run, &stock);
+            let mut hits =
+                engine.holder_in_stock(holder, run.path(), voxel, monitor).map_err(run.voxels())?;
+            for _ in 0..HALVINGS {
+                if hits.open.is_none() {
+                    break;
+                }
+                voxel *= 0.5;
+                hits = engine.holder_in_stock(holder, run.path(), voxel, monitor).map_err(run.voxels())?;
+            }
+            let pair = PairClearance::new(("holder", "standing stock".into()));
+            Ok(Some(match (&hits.worst, hits.open) {
+                (Some(worst), _) => PairClearance {
+                    clearance_mm: Some(-worst.depth),
+                    error_bound_mm: Some(0.0),
+                    more: more_moves(hits.moves.len()),
+                    ..pair.at(run, worst.at.into(), worst.move_index)
+                },
+                (None, Some(open)) => {
+                    let bound = Some(3f64.sqrt() * voxel);
+                    PairClearance {
+                        clearance_mm: Some(0.0),
+                        error_bound_mm: bound,
+                        move_index: Some(open),
+                        ..pair
+                    }
+                }
+                (None, None) => pair,
+            }))
+        }
+        View::Normals(_) => Ok(None),
+    }
+}
+
+impl PairClearance {
+    fn new((tool, other): (&'static str, String)) -> Self {
+        Self {
+            tool,
+            other,
+            clearance_mm: None,
+            error_bound_mm: None,
+            at_mm: None,
+            move_index: None,
+            line: None,
+            reason: Some(UNKNOWN),
+            needed: 0.0,
+            more: String::new(),
+        }
+    }
+
+    /// From a mesh that stands off the true surface by up to `off`.
+    fn of_mesh(
+        name: (&'static str, String),
+        least: &LeastClearance,
+        run: &Run<'_>,
+        off: f64,
+        needed: f64,
+    ) -> Self {
+        let bound = least.error_bound + off;
+        let pair = Self {
+            clearance_mm: Some(least.nearest.distance),
+            error_bound_mm: bound.is_finite().then_some(bound),
+            needed,
+            ..Self::new(name)
+        };
+        let pair = pair.at(run, least.nearest.place.into(), least.move_index as u32);
+        if bound.is_finite() { pair } else { Self { reason: Some(TOO_DEEP), ..pair } }
+    }
+
+    fn at(self, run: &Run<'_>, at: [f64; 3], move_index: u32) -> Self {
+        let line = run.path().line_of(move_index as usize);
+        let reason = line.is_none().then_some(NO_PROGRAM);
+        Self { at_mm: Some(at), move_index: Some(move_index), line, reason, ..self }
+    }
+
+    /// That the two do not collide.
+    fn claim(&self, run: &Run<'_>) -> Claim {
+        let claim =
+            |depth, bound| Claim::length("collision", Gravity::Crash, 0.0 - self.needed, depth, bound);
+        let Some(clearance) = self.clearance_mm else {
+            return claim(0.0, 0.0).told(self.sentence());
+        };
+        if clearance >= self.needed {
+            return claim(-clearance, self.error_bound_mm.unwrap_or(f64::INFINITY)).told(self.sentence());
+        }
+        let index = self.move_index.unwrap_or_default();
+        let text = format!(
+            "{} collides with {}, at least {:.3} mm deep, at {}, move {index}{}{}",
+            capital(self.tool),
+            self.other,
+            -clearance,
+            place(self.at_mm.unwrap_or_default()),
+            run.program_line(index),
+            self.more
+        );
+        // Of a collision the depth is a lower bound already, but for what triangles stand off their surface.
+        let off = if self.other == "part" { run.around.near.mesh_deviation() } else { 0.0 };
+        claim(-clearance, off).told(text)
+    }
+
+    fn sentence(&self) -> String {
+        match self.clearance_mm {
+            Some(_) => format!("{} mm, {} to {}", self.shown(), self.tool, self.other),
+            None => format!("{}, {} to {}", self.shown(), self.tool, self.other),
+        }
+    }
+
+    /// The distance with its bound.
+    fn shown(&self) -> String {
+        match (self.clearance_mm, self.error_bound_mm) {
+            // A bound that is not zero never reads as zero.
+            (Some(clearance), Some(bound)) => format!("{clearance:.3} ± {:.3}", (1e3 * bound - 1e-9).ceil() / 1e3),
+            (Some(clearance), None) => format!("{clearance:.3}, or less"),
+            (None, _) if self.error_bound_mm == Some(0.0) => format!("over {FAR} mm"),
+            (None, _) => "clear".to_owned(),
+        }
+    }
+
+    /// As the table of the page has it.
+    fn row(&self) -> Vec<String> {
+        let number = |n: Option<u32>| n.map_or_else(|| "-".to_owned(), |n| n.to_string());
+        vec![
+            self.tool.to_owned(),
+            self.other.clone(),
+            self.shown(),
+            self.at_mm.map_or_else(|| "-".to_owned(), place),
+            number(self.move_index),
+            number(self.line),
+        ]
+    }
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// That shank and holder stay as far from part and fixtures as the scene asks for.
+fn kept_away(run: &Run<'_>, pairs: &[PairClearance]) -> Option<Claim> {
+    let asked = run.scene().keep_clear.clearance;
+    let held = pairs.iter().filter(|pair| pair.tool == "holder");
+    let least = held.reduce(|a, b| if nearness(b) < nearness(a) { b } else { a })?;
+    let clearance = least.clearance_mm?;
+    let claim = |missing: f64, bound| Claim::length("clearance", Gravity::Crash, RESOLUTION, missing, bound);
+    let bound = least.error_bound_mm.unwrap_or(f64::INFINITY);
+    if clearance >= asked {
+        let text = format!("shank and holder stay {asked:.3} mm off part and fixtures");
+        return Some(claim(asked - clearance, bound).told(text));
+    }
+    let index = least.move_index.unwrap_or_default();
+    let text = format!(
+        "shank and holder come within {} mm of {}, {:.4} mm less than their clearance of {asked:.3} mm, at {}, move {index}{}",
+        least.shown(),
+        least.other,
+        asked - clearance,
+        place(least.at_mm.unwrap_or_default()),
+        run.program_line(index)
+    );
+    Some(claim(asked - clearance, bound).told(text))
+}
+
+#[cfg(test)]
+mod tests;

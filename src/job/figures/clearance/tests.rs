@@ -1,0 +1,129 @@
+//! Clamps, vises and holders planted at known distances.
+
+use crate::{Outcome, Session};
+use report::{Claim, ToolpathResult, Verdict};
+use scene::Scene;
+use std::path::{Path, PathBuf};
+use work::monitor::Silent;
+
+/// A plate of 8 × 6 mm whose top is z = 0, in strips of 0.5 mm.
+const PLATE: &str =
+    "[part]\nsurface = \"plane\"\nx = [0, 8]\ny = [0, 6]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n";
+const ZIGZAG: &str = "[[toolpath]]\nstrategy = \"zigzag\"\nstepover = 0.5\n";
+
+/// A folder of its own that goes away.
+struct Home(PathBuf);
+
+impl Home {
+    fn new(name: &str) -> Self {
+        let home = std::env::temp_dir().join(format!("millstream-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&home).unwrap();
+        Self(home)
+    }
+
+    fn outcome(&self, text: &str) -> Outcome {
+        let name = self.0.join("plate.toml");
+        let session = Session::new(Scene::parse(&name.to_string_lossy(), text).unwrap()).unwrap();
+        session.toolpath(&session.scene.toolpaths[0], &Silent).unwrap()
+    }
+
+    fn run(&self, text: &str) -> ToolpathResult {
+        self.outcome(text).result
+    }
+
+    /// A box as an STL file.
+    fn solid(&self, file: &str, low: [f64; 3], high: [f64; 3]) {
+        let corner = |i: usize| [0, 1, 2].map(|axis| if i >> axis & 1 == 1 { high[axis] } else { low[axis] });
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let vertex = |i: usize| {
+            let [x, y, z] = corner(i);
+            format!("vertex {x} {y} {z}\n")
+        };
+        let facet = |corners: [usize; 3]| {
+            format!("facet normal 0 0 0\nouter loop\n{}endloop\nendfacet\n", corners.map(vertex).concat())
+        };
+        let facets: String =
+            quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).map(facet).collect();
+        write(&self.0.join(file), &format!("solid x\n{facets}endsolid x\n"));
+    }
+}
+
+impl Drop for Home {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn write(path: &Path, text: &str) {
+    std::fs::write(path, text).unwrap();
+}
+
+/// The claim on a pair.
+fn claim<'a>(result: &'a ToolpathResult, other: &str) -> &'a Claim {
+    let of_pair = |claim: &&Claim| claim.what == "collision" && claim.text.contains(other);
+    result.claims.iter().find(of_pair).unwrap_or_else(|| panic!("{:#?}", result.claims))
+}
+
+/// A clamp as a wall across the plate, in its middle or beside the ends of the passes.
+#[test]
+fn an_upright_cutter_must_not_touch_a_clamp() {
+    let home = Home::new("clamp");
+    let text = format!("{PLATE}[[fixture]]\nfile = \"clamp.stl\"\n{ZIGZAG}");
+    let path = home.outcome(&format!("{PLATE}{ZIGZAG}")).path;
+    let reached = path.moves.iter().map(|m| m.to.tip.x).fold(0.0, f64::max) + 3.0;
+    let found = |x: f64| {
+        home.solid("clamp.stl", [x, -9.0, -2.0], [x + 4.0, 19.0, 14.0]);
+        let result = home.run(&text);
+        let claim = claim(&result, "clamp.stl").clone();
+        (claim.verdict(), -claim.measured.unwrap(), claim.error_bound)
+    };
+    assert_eq!(found(4.0).0, Verdict::Fail);
+    for clearance in [0.05, 29.0] {
+        let (verdict, measured, bound) = found(reached + clearance);
+        assert_eq!(verdict, Verdict::Pass);
+        assert!((measured - clearance).abs() <= bound + 1e-9 && bound < 1e-4, "{measured} ± {bound}");
+    }
+    assert_eq!(found(reached - 0.05).0, Verdict::Fail);
+}
+
+#[test]
+fn a_tool_inside_a_closed_vise_collides_with_it() {
+    let home = Home::new("vise");
+    home.solid("vise.stl", [-90.0; 3], [90.0; 3]);
+    let result = home.run(&format!("{PLATE}[[fixture]]\nfile = \"vise.stl\"\n{ZIGZAG}"));
+    let found = claim(&result, "vise.stl");
+    assert_eq!(found.verdict(), Verdict::Fail, "{found:?}");
+    assert!(found.text.starts_with("Cutter collides with vise.stl, at least"), "{}", found.text);
+}
+
+/// A holder of 20 mm that begins `length` above the tip, and a block that stands 4 mm over the plate.
+fn held(length: f64) -> String {
+    format!(
+        "{PLATE}[stock]\nallowance = 4\n[holder]\ncutting_length = {length}\n[[holder.section]]\ndiameter = 20\nlength = 30\n\
+         {ZIGZAG}"
+    )
+}
+
+/// The first pass runs 4 mm below the top of the block, and the holder over stock that no pass has cut yet. On the
+/// finished plate the same holder would stand as high as it is long.
+#[test]
+fn an_upright_holder_is_held_against_the_stock_that_stands_when_it_comes() {
+    let home = Home::new("standing");
+    for (length, verdict) in [(3.95, Verdict::Fail), (4.05, Verdict::Pass), (9.0, Verdict::Pass)] {
+        let result = home.run(&held(length));
+        let found = claim(&result, "standing stock");
+        assert_eq!(found.verdict(), verdict, "{found:?}");
+        let clearance = -found.measured.unwrap();
+        // Passes lie within the chord tolerance of their place.
+        assert!((clearance - (length - 4.0)).abs() <= found.error_bound + 1e-3, "{found:?}");
+    }
+    let figure = home.run(&held(4.05)).figures.into_iter().find(|figure| figure.key == "clearance").unwrap();
+    let nearest = &figure.value["pairs"][0];
+    assert_eq!((&nearest["tool"], &nearest["other"]), (&"holder".into(), &"standing stock".into()));
+    assert!(nearest["line"].as_u64().is_some_and(|line| line > 5), "{nearest}");
+    let sentence = figure.sentence.unwrap().1;
+    assert!(
+        sentence.starts_with("0.050 ± 0.0") && sentence.ends_with("mm, holder to standing stock: zigzag"),
+        "{sentence}"
+    );
+}
