@@ -1,13 +1,15 @@
-//! Poses of a tool along passes over a wave of a million triangles, each asked for cutter and holder. The table gives
-//! poses per second.
+//! Poses of a tool along passes over a wave of a million triangles, each asked for cutter and holder, and the least clearance
+//! of a whole path. The table gives poses, or moves, per second.
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use millstream::collision::{Check, Interference, Obstacle};
 use millstream::cutter::{Cutter, Holder, HolderSection, Solid};
-use millstream::geometry::{Bvh, Point3, TriangleMesh, Vector3};
-use millstream::motion::{CcPoint, ClPoint, location};
+use millstream::geometry::{Aabb, Bvh, Point3, TriangleMesh, Vector3};
+use millstream::monitor::Silent;
+use millstream::motion::{CcPoint, ClPoint, Move, MoveKind, Toolpath, location};
 use millstream::parallel;
+use millstream::sim::{VoxelStock, holder_clearance};
 
 fn main() {
     divan::main();
@@ -123,4 +125,43 @@ fn moves(bencher: Bencher, name: &str) {
         let clear = |&k: &usize| keep.on_move(&poses[k], &poses[k + 1]).is_none();
         parallel::map(starts.len(), |i| clear(&starts[i])).iter().filter(|&&c| c).count()
     });
+}
+
+/// A zigzag over the wave through all poses.
+fn path(cutter: &Cutter, upright: bool) -> Toolpath {
+    let mut poses = poses(cutter);
+    for pass in poses.chunks_mut(POSES).skip(1).step_by(2) {
+        pass.reverse();
+    }
+    if upright {
+        let stand = |pose: &ClPoint| {
+            ClPoint::upright(Point3::new(pose.tip.x, pose.tip.y, height(pose.tip.x, pose.tip.y)))
+        };
+        poses = poses.iter().map(stand).collect();
+    }
+    let cut = |&to: &ClPoint| Move { to, kind: MoveKind::Cut, feed_rate: 1000.0, pass: 0 };
+    Toolpath::new(poses[0], poses[1..].iter().map(cut).collect())
+}
+
+/// The least clearance of the holder from the part on a path of 100,000 moves.
+#[divan::bench(args = ["leaning", "upright"], sample_count = 3)]
+fn least(bencher: Bencher, how: &str) {
+    let (mesh, bvh) = wave();
+    let cutter = cutter("ball");
+    let (tool, path, obstacle) = (tool(&cutter), path(&cutter, how == "upright"), Obstacle::new(&mesh, &bvh));
+    bencher.counter(ItemsCount::new(path.len())).bench_local(|| {
+        obstacle.least_clearance(&tool.held, &path, &|_| true, &Silent).expect("nothing stops it")
+    });
+}
+
+/// The same from the stock that stands when the holder passes: `top` mm over the middle of the wave.
+#[divan::bench(args = [10.0, 25.5], sample_count = 3)]
+fn standing(bencher: Bencher, top: f64) {
+    let cutter = cutter("ball");
+    let (path, held) = (path(&cutter, true), holder());
+    let block = Aabb { min: Point3::new(0.0, 0.0, -20.0), max: Point3::new(SIZE, SIZE, top) };
+    let stock = VoxelStock::Box(block);
+    bencher
+        .counter(ItemsCount::new(path.len()))
+        .bench_local(|| holder_clearance(&stock, &cutter, &held, &path, &Silent).expect("nothing stops it"));
 }

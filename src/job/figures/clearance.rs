@@ -95,7 +95,8 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
         columns: vec!["tool", "to", "clearance, mm", "at", "move", "line"],
         rows,
     };
-    let sentence = pairs.first().map(|pair| ("Least clearance", format!("{}: {}", pair.sentence(), run.request.name)));
+    let sentence =
+        pairs.first().map(|pair| ("Least clearance", format!("{}: {}", pair.sentence(), run.request.name)));
     let figure = Figure {
         key: "clearance",
         value: value(&ClearanceFigures { pairs })?,
@@ -275,7 +276,9 @@ impl PairClearance {
     fn shown(&self) -> String {
         match (self.clearance_mm, self.error_bound_mm) {
             // A bound that is not zero never reads as zero.
-            (Some(clearance), Some(bound)) => format!("{clearance:.3} ± {:.3}", (1e3 * bound - 1e-9).ceil() / 1e3),
+            (Some(clearance), Some(bound)) => {
+                format!("{clearance:.3} ± {:.3}", (1e3 * bound - 1e-9).ceil() / 1e3)
+            }
             (Some(clearance), None) => format!("{clearance:.3}, or less"),
             (None, _) if self.error_bound_mm == Some(0.0) => format!("over {FAR} mm"),
             (None, _) => "clear".to_owned(),
