@@ -23,7 +23,7 @@ mod tests;
 
 pub use checks::{Check, Interference, Shortfall};
 use cutter::Solid;
-use geometry::{Bvh, Node, Point3, TriangleMesh};
+use geometry::{Aabb, Bvh, Node, Point3, TriangleMesh};
 pub use least::LeastClearance;
 use motion::ClPoint;
 use piece::ToolPiece;
@@ -53,6 +53,11 @@ impl<'a> Obstacle<'a> {
     /// A mesh with its own search tree.
     pub fn new(mesh: &'a TriangleMesh, bvh: &'a Bvh) -> Self {
         Self { mesh, bvh }
+    }
+
+    /// The box around the mesh.
+    pub fn bounds(&self) -> Aabb {
+        self.mesh.bounds()
     }
 
     /// The nearest place of the mesh, if it is nearer than `limit`, mm, to a tool standing at `at`.

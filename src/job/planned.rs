@@ -10,8 +10,8 @@ use metrology::{ContactArcs, finer_contact_arcs};
 use motion::Toolpath;
 use scene::{Scene, ToolpathRequest};
 use toolpath::{
-    Earlier, Engagement, OffsetDrive, OffsetSurface, Plan, PlanError, PlanSettings, PocketStrategy, Strategy,
-    Tilting, engagement, plan, plan_pocket, plan_tilted,
+    Detour, Earlier, Engagement, OffsetDrive, OffsetSurface, Plan, PlanError, PlanSettings, PocketStrategy,
+    Strategy, Tilting, around_fixtures, engagement, plan, plan_pocket, plan_tilted,
 };
 use work::monitor::Monitor;
 
@@ -97,18 +97,25 @@ impl Session {
         monitor: &dyn Monitor,
     ) -> Result<Plan, PlanError> {
         let cutter = &self.scene.cutter;
-        if let (Some(pocket), Some(strategy)) = (&self.pocket, strategy.downcast_ref::<PocketStrategy>()) {
-            return plan_pocket(pocket, cutter, strategy, settings, monitor);
-        }
-        let Some(axis) = &request.axis else { return plan(&self.part, cutter, strategy, settings, monitor) };
-        let keep = around.tool.keep_clear(&self.scene, around.near, around.fixtures);
-        let tilting = Tilting {
-            axis: &axis.rule,
-            most_turning: axis.most_turning.map(|rate| TURNING_SHARE * rate),
-            most_turning_across: axis.most_turning_across,
-            interference: Some(&keep),
+        let pocket = self.pocket.as_ref().zip(strategy.downcast_ref::<PocketStrategy>());
+        let plan = match (pocket, &request.axis) {
+            (Some((pocket, strategy)), _) => plan_pocket(pocket, cutter, strategy, settings, monitor)?,
+            (None, None) => plan(&self.part, cutter, strategy, settings, monitor)?,
+            (None, Some(axis)) => {
+                let keep = around.tool.keep_clear(&self.scene, around.near, around.fixtures);
+                let tilting = Tilting {
+                    axis: &axis.rule,
+                    most_turning: axis.most_turning.map(|rate| TURNING_SHARE * rate),
+                    most_turning_across: axis.most_turning_across,
+                    interference: Some(&keep),
+                };
+                return plan_tilted(&self.part, cutter, strategy, &tilting, settings, monitor);
+            }
         };
-        plan_tilted(&self.part, cutter, strategy, &tilting, settings, monitor)
+        let keep = around.tool.keep_off_fixtures(&self.scene, around.fixtures);
+        let Detour { path, note, .. } = around_fixtures(plan.path, &keep, settings, monitor)?;
+        let notes = plan.notes.into_iter().chain(note).collect();
+        Ok(Plan { path, notes, ..plan })
     }
 
     fn settings(&self, request: &ToolpathRequest) -> PlanSettings {

@@ -35,15 +35,21 @@ impl Tool {
         let keep = &scene.keep_clear;
         let obstacle = Obstacle::new(part.mesh(), part.bvh());
         let depth = 0.5 * scene.tolerance.gouge + part.mesh_deviation();
-        let clear = |solid, obstacle| Check { solid, obstacle, needed: keep.clearance };
         let mut checks = vec![Check { solid: &self.cutter, obstacle, needed: -depth }];
         let off = keep.clearance + part.mesh_deviation();
         checks.extend(self.holder.as_ref().map(|solid| Check { solid, obstacle, needed: off }));
-        for (mesh, bvh) in fixtures {
-            let solids = std::iter::once(&self.cutter).chain(&self.holder);
-            checks.extend(solids.map(|solid| clear(solid, Obstacle::new(mesh, bvh))));
-        }
+        checks.extend(self.keep_off_fixtures(scene, fixtures).checks);
         Interference { checks, greatest_tilt: keep.greatest_tilt, greatest_lift: keep.greatest_lift }
+    }
+
+    /// What the planner of an upright tool keeps it away from.
+    pub fn keep_off_fixtures<'a>(&'a self, scene: &Scene, fixtures: &'a [FixtureMesh]) -> Interference<'a> {
+        let solids = || std::iter::once(&self.cutter).chain(&self.holder);
+        let of_one = |(mesh, bvh): &'a FixtureMesh| {
+            let obstacle = Obstacle::new(mesh, bvh);
+            solids().map(move |solid| Check { solid, obstacle, needed: scene.keep_clear.clearance })
+        };
+        Interference { checks: fixtures.iter().flat_map(of_one).collect(), ..Interference::default() }
     }
 }
 

@@ -15,7 +15,7 @@ mod vocabulary;
 
 pub use drop::{Drop, DropCutter, GridDrop, PlanGrid};
 pub use levels::spacing::LevelSteps;
-pub use link::{LONGEST_LINK, longest_link, plane_interval};
+pub use link::{Detour, LONGEST_LINK, around_fixtures, longest_link, plane_interval};
 pub use plan::{Plan, plan, plan_tilted};
 pub use pocket::{
     Engagement, Flow, LEAST_SHARE, Pattern, Pocket, PocketStrategy, engagement, engagement_angle, limit_feed,

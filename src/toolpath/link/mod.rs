@@ -17,6 +17,7 @@
 
 mod bend;
 mod ceiling;
+mod detour;
 mod order;
 #[cfg(test)]
 mod tests;
@@ -28,6 +29,7 @@ use crate::vocabulary::{Joining, Links, PlanSettings, Setup, Step};
 use bend::{Bends, End};
 use ceiling::Ceiling;
 use cutter::Cutter;
+pub use detour::{Detour, around_fixtures};
 use geometry::{Point2, Point3, Vector2, distance_to_segment};
 use motion::{ClPoint, Move, MoveKind, Toolpath};
 use order::{Visit, is_closed, order};

@@ -66,24 +66,33 @@ fn claim<'a>(result: &'a ToolpathResult, other: &str) -> &'a Claim {
 
 /// A clamp as a wall across the plate, in its middle or beside the ends of the passes.
 #[test]
-fn an_upright_cutter_must_not_touch_a_clamp() {
+fn an_upright_cutter_keeps_off_a_clamp_and_its_distance_is_told() {
     let home = Home::new("clamp");
-    let text = format!("{PLATE}[[fixture]]\nfile = \"clamp.stl\"\n{ZIGZAG}");
+    let text = |clearance: f64| {
+        format!("{PLATE}[interference]\nclearance = {clearance}\n[[fixture]]\nfile = \"clamp.stl\"\n{ZIGZAG}")
+    };
     let path = home.outcome(&format!("{PLATE}{ZIGZAG}")).path;
     let reached = path.moves.iter().map(|m| m.to.tip.x).fold(0.0, f64::max) + 3.0;
-    let found = |x: f64| {
+    let run = |x: f64, clearance: f64| {
         home.solid("clamp.stl", [x, -9.0, -2.0], [x + 4.0, 19.0, 14.0]);
-        let result = home.run(&text);
+        let result = home.run(&text(clearance));
         let claim = claim(&result, "clamp.stl").clone();
-        (claim.verdict(), -claim.measured.unwrap(), claim.error_bound)
+        assert_eq!(claim.verdict(), Verdict::Pass, "{claim:?}");
+        (result, -claim.measured.unwrap(), claim.error_bound)
     };
-    assert_eq!(found(4.0).0, Verdict::Fail);
     for clearance in [0.05, 29.0] {
-        let (verdict, measured, bound) = found(reached + clearance);
-        assert_eq!(verdict, Verdict::Pass);
+        let (_, measured, bound) = run(reached + clearance, 0.0);
         assert!((measured - clearance).abs() <= bound + 1e-9 && bound < 1e-4, "{measured} ± {bound}");
     }
-    assert_eq!(found(reached - 0.05).0, Verdict::Fail);
+    // In the middle no pass reaches what is nearer than 3.5 mm, and the plate stays uncut there.
+    let (result, measured, bound) = run(4.0, 0.5);
+    assert!((measured - 0.5).abs() <= bound + 1e-4, "{measured} ± {bound}");
+    assert!(
+        result.notes.iter().any(|note| note.contains("of passes beside fixtures are skipped")),
+        "{:?}",
+        result.notes
+    );
+    assert!(result.verdict == Verdict::Fail && result.uncut.area_mm2 > 20.0, "{:?}", result.uncut);
 }
 
 #[test]

@@ -13,8 +13,10 @@
 //! The height aloft is the least at which the straight way stays clear of the part, on its outer side where there is no surface
 //! to meet.
 //!
-//! All but the last are proved clear, move by move, of all that the tool is to keep away from; the last is taken where it is
-//! the quickest and clear too, or where nothing else is. Times are length over rate.
+//! - Around a greater sphere that holds the fixtures, too.
+//!
+//! All but the last are proved clear, move by move, of all that the tool is to keep away from; the last is taken where nothing else
+//! is clear. Over the block the tool also rises over all fixtures where it meets one. Times are length over rate.
 
 use super::bent::Bent;
 use crate::link::Speeds;
@@ -58,8 +60,7 @@ pub struct Block {
 impl Block {
     /// The block of a part and its stock.
     pub fn of(part: &Part, settings: &PlanSettings) -> Self {
-        let mut bounds = part.bounds();
-        bounds.max.z = bounds.max.z.max(settings.stock_top);
+        let bounds = stock_bounds(part, settings);
         let around = Vector3::repeat(settings.clearance);
         let grown = Aabb { min: bounds.min - around, max: bounds.max + around };
         let pick = |i: usize, c: usize| if i >> c & 1 == 1 { grown.max[c] } else { grown.min[c] };
@@ -93,6 +94,9 @@ pub struct Ways<'a> {
     middle: f64,
     block: &'a Block,
     sphere: Sphere,
+    /// A sphere around the fixtures as well, and the height of the tip over all of them.
+    widest: Sphere,
+    highest: f64,
     bent: Option<Bent<'a>>,
     /// What the tool keeps away from while the cutter touches, while it goes over, and outside of the block.
     touching: &'a Interference<'a>,
@@ -130,9 +134,13 @@ impl<'a> Ways<'a> {
             outside.checks.extend(solids.into_iter().map(|solid| Check { solid, obstacle, needed: 0.0 }));
         }
         let radii = touching.checks.iter().map(|check| check.solid.radius());
-        let sphere = Sphere::around(part, settings, radii.fold(cutter.radius(), f64::max));
-        let middle = cutter.profile().centre_z;
-        Self { part, settings, rates, middle, block, sphere, bent, touching, aloft, outside }
+        let (radius, middle) = (radii.fold(cutter.radius(), f64::max), cutter.profile().centre_z);
+        let stock = stock_bounds(part, settings);
+        let obstacles = touching.checks.iter().map(|check| check.obstacle.bounds());
+        let all = obstacles.fold(stock, |a, b| Aabb { min: a.min.inf(&b.min), max: a.max.sup(&b.max) });
+        let [sphere, widest] = [stock, all].map(|bounds| Sphere::around(&bounds, settings, radius));
+        let highest = all.max.z + settings.clearance;
+        Self { part, settings, rates, middle, block, sphere, widest, highest, bent, touching, aloft, outside }
     }
 
     /// About what it takes to go on at a distance, s: no less the farther it is.
@@ -153,8 +161,12 @@ impl<'a> Ways<'a> {
     /// # Errors
     /// [`Cancelled`] when the monitor says so.
     pub fn between(&self, from: &Touch, to: &Touch, monitor: &dyn Monitor) -> Result<Vec<Leg>, Cancelled> {
-        let around = self.around(&from.at, &to.at);
-        let clear = self.is_clear(&from.at, &around, self.touching);
+        let mut around = self.around(&self.sphere, &from.at, &to.at);
+        let mut clear = self.is_clear(&from.at, &around, self.touching);
+        if !clear {
+            around = self.around(&self.widest, &from.at, &to.at);
+            clear = self.is_clear(&from.at, &around, self.touching);
+        }
         let mut best = (clear, self.time(&from.at, &around), around);
         let mut take = |way: Option<Vec<Leg>>| {
             if let Some(way) = way {
@@ -179,7 +191,8 @@ impl<'a> Ways<'a> {
 
     /// Where the tool stands outside of all before its first pass, or after its last.
     pub fn outside(&self, at: &ClPoint) -> ClPoint {
-        self.sphere.exit(at)
+        let near = self.sphere.exit(at);
+        if self.touching.is_clear(&near) { near } else { self.widest.exit(at) }
     }
 
     /// Above all, upright.
@@ -282,14 +295,19 @@ impl<'a> Ways<'a> {
             return None;
         }
         let top = a.tip.z.max(b.tip.z).max(self.block.bounds.max.z);
-        let raised = |at: &ClPoint| ClPoint { tip: Point3::new(at.tip.x, at.tip.y, top), axis: at.axis };
         let rapid = |at: ClPoint| (at, MoveKind::Rapid);
         let straight: Vec<_> = evenly(&a, &b).into_iter().map(rapid).collect();
-        let (above_a, above_b) = (raised(&a), raised(&b));
-        let mut over = vec![rapid(above_a)];
-        over.extend(evenly(&above_a, &above_b).into_iter().map(rapid));
-        over.push(rapid(b));
-        let free = [straight, over].into_iter().find(|way| self.is_clear(&a, way, &self.outside))?;
+        let over = |height: f64| {
+            let raised =
+                |at: &ClPoint| ClPoint { tip: Point3::new(at.tip.x, at.tip.y, height), axis: at.axis };
+            let (above_a, above_b) = (raised(&a), raised(&b));
+            let mut way = vec![rapid(above_a)];
+            way.extend(evenly(&above_a, &above_b).into_iter().map(rapid));
+            way.push(rapid(b));
+            way
+        };
+        let ways = [straight, over(top), over(top.max(self.highest))];
+        let free = ways.into_iter().find(|way| self.is_clear(&a, way, &self.outside))?;
         let moves = legs.into_iter().chain(free).chain(down);
         // Places that are raised by nothing take no move.
         let mut at = *from;
@@ -313,10 +331,10 @@ impl<'a> Ways<'a> {
     }
 
     /// Out along the axis, around the sphere, and in along the axis there.
-    fn around(&self, from: &ClPoint, to: &ClPoint) -> Vec<Leg> {
-        let (a, b) = (self.sphere.exit(from), self.sphere.exit(to));
+    fn around(&self, sphere: &Sphere, from: &ClPoint, to: &ClPoint) -> Vec<Leg> {
+        let (a, b) = (sphere.exit(from), sphere.exit(to));
         let mut moves = vec![(self.off(from, &a), MoveKind::Retract), (a, MoveKind::Rapid)];
-        moves.extend(self.sphere.around_to(&a, &b).into_iter().map(|at| (at, MoveKind::Rapid)));
+        moves.extend(sphere.around_to(&a, &b).into_iter().map(|at| (at, MoveKind::Rapid)));
         moves.extend(self.down(&b, to));
         moves
     }
@@ -341,7 +359,14 @@ fn turns(from: &ClPoint, to: &ClPoint) -> usize {
     (turn / GREATEST_TURN).ceil().max(1.0) as usize
 }
 
-/// A sphere around part and stock, on which a tool that points away from its middle touches neither.
+/// Part and stock.
+fn stock_bounds(part: &Part, settings: &PlanSettings) -> Aabb {
+    let mut bounds = part.bounds();
+    bounds.max.z = bounds.max.z.max(settings.stock_top);
+    bounds
+}
+
+/// A sphere around part and stock, or more, on which a tool that points away from its middle touches neither.
 struct Sphere {
     centre: Point3,
     radius: f64,
@@ -349,13 +374,10 @@ struct Sphere {
 
 impl Sphere {
     /// For a tool of this greatest radius, mm.
-    fn around(part: &Part, settings: &PlanSettings, tool: f64) -> Self {
-        let bounds = part.bounds();
-        let top = settings.stock_top.max(bounds.max.z);
-        let (low, high) = (bounds.min, Point3::new(bounds.max.x, bounds.max.y, top));
-        let least = 0.5 * (high - low).norm() + settings.clearance;
+    fn around(bounds: &Aabb, settings: &PlanSettings, tool: f64) -> Self {
+        let least = 0.5 * bounds.size().norm() + settings.clearance;
         let radius = (least + tool) / (0.5 * SPHERE_STEP).cos();
-        Self { centre: nalgebra::center(&low, &high), radius }
+        Self { centre: nalgebra::center(&bounds.min, &bounds.max), radius }
     }
 
     /// Where a cutter that retreats along its axis leaves the sphere.
@@ -412,7 +434,7 @@ mod tests {
         let section = HolderSection { diameter: 30.0, top_diameter: 30.0, length: 40.0 };
         let tool =
             Solid::of_tool(&Cutter::bull(10.0, 2.0).unwrap(), &Holder::new(4.0, vec![section]).unwrap());
-        let sphere = Sphere::around(&part, &settings, tool.radius());
+        let sphere = Sphere::around(&stock_bounds(&part, &settings), &settings, tool.radius());
         let bounds = Block::of(&part, &PlanSettings { clearance: 0.0, ..settings }).bounds;
         let corners = (0..8).map(|i| {
             let pick = |c: usize| if i >> c & 1 == 1 { bounds.max[c] } else { bounds.min[c] };
