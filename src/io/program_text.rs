@@ -37,6 +37,12 @@ pub(super) fn number(value: f64) -> String {
     shortened(format!("{:.DECIMALS$}", rounded(value) / 10f64.powi(DECIMALS as i32)))
 }
 
+/// [`number`] rounded down, for feeds that reach a limit.
+pub(super) fn number_below(value: f64) -> String {
+    let power = 10f64.powi(DECIMALS as i32);
+    number((value * power).floor().max(1.0) / power)
+}
+
 /// [`number`] with other decimals.
 pub(super) fn number_to(value: f64, decimals: usize) -> String {
     let power = 10f64.powi(decimals as i32);

@@ -46,17 +46,17 @@ pub(crate) struct Planned {
 impl Planned {
     /// Time that the scene's machine takes, s.
     pub fn time(&self, scene: &Scene) -> f64 {
-        machining_time_turning(&self.plan.path, &scene.machine, &self.turning_times(scene))
+        machining_time_turning(&self.plan.path, &scene.machine, &self.joint_times(scene))
     }
 
-    /// Time that the rotary joints turn for at least, s; 0 on machines without.
-    pub fn turning(&self, scene: &Scene) -> f64 {
-        self.turning_times(scene).iter().sum()
+    /// Time that the joints take at least by their rates, s; 0 on machines of three axes.
+    pub fn joint_time(&self, scene: &Scene) -> f64 {
+        self.joint_times(scene).iter().sum()
     }
 
-    fn turning_times(&self, scene: &Scene) -> Vec<f64> {
+    fn joint_times(&self, scene: &Scene) -> Vec<f64> {
         self.joints.as_ref().zip(scene.five_axis.as_ref()).map_or_else(Vec::new, |(joints, machine)| {
-            joints.turning_times(&machine.kinematics, self.plan.path.len())
+            joints.least_times(&machine.kinematics, self.plan.path.len())
         })
     }
 }

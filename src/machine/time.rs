@@ -14,7 +14,7 @@
 //!   a 24th of jump times the square of that time, which must stay within the junction deviation.
 //!   Curvature at a corner is β over half of both moves' lengths.
 //!
-//! On a machine with rotary axes a move lasts at least as long as their turning by their rates: its feed is no
+//! On a machine with rotary axes a move lasts at least as long as each of its joints takes by its rate: its feed is no
 //! higher than its length over that time, and where the tip stands meanwhile the machine stops for it.
 //!
 //! A backward pass then limits speeds to what can still be braked, a forward pass to what can have been
@@ -65,8 +65,8 @@ pub fn machining_time(path: &Toolpath, machine: &Machine) -> f64 {
     machining_time_turning(path, machine, &[])
 }
 
-/// [`machining_time`] on a machine whose rotary axes take at least `turning` s for each move
-/// ([`super::kinematics::JointPath::turning_times`]; moves beyond its end turn nothing). Rises for rewinds are
+/// [`machining_time`] on a machine whose joints take at least `turning` s for each move
+/// ([`super::kinematics::JointPath::least_times`]; moves beyond its end take none). Rises for rewinds are
 /// not counted. Infinite when one of `turning` is no finite time.
 ///
 /// # Tolerance

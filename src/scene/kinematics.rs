@@ -28,6 +28,11 @@ const PLACE: std::ops::RangeInclusive<f64> = -99_999.0..=99_999.0;
 /// rad/s of a degree a minute.
 const DEGREE_A_MINUTE: f64 = std::f64::consts::PI / 180.0 / 60.0;
 
+const SECONDS_PER_MINUTE: f64 = 60.0;
+
+/// Rates of linear axes, mm/min.
+const RATES: std::ops::RangeInclusive<f64> = 1.0..=1e6;
+
 const SIDES: [&str; 2] = ["head", "table"];
 
 /// A five-axis machine and how programs for it are written.
@@ -37,12 +42,16 @@ pub struct FiveAxis {
     pub kinematics: Kinematics,
     /// How programs are written.
     pub post: Style,
+    /// Whether the scene says where the workpiece's zero is; else it is taken to be the machine's.
+    pub zero_is_given: bool,
     /// Directions of the rotary axes as the scene has them, of any length.
     directions: [Vector3; 2],
 }
 
 /// Reads the rotary axes of `[machine]`; `None` for a machine of three axes.
-pub(super) fn read(machine: &Section<'_>) -> Result<Option<FiveAxis>, SceneError> {
+///
+/// Linear axes are as fast as rapids, `rapid_rate` mm/min, unless the table says otherwise.
+pub(super) fn read(machine: &Section<'_>, rapid_rate: f64) -> Result<Option<FiveAxis>, SceneError> {
     let words: Vec<&str> = [NONE].into_iter().chain(PRESETS).collect();
     let Some(table) = machine.inline(KEY) else {
         let Some(word) = machine.word(KEY, &words)?.filter(|word| word.value != NONE) else {
@@ -52,15 +61,16 @@ pub(super) fn read(machine: &Section<'_>) -> Result<Option<FiveAxis>, SceneError
             let kinematics =
                 Kinematics::new(axes[0], axes[1], DEFAULT_GAUGE_LENGTH, Point3::origin(), [None; 3]);
             kinematics.map(|kinematics| FiveAxis {
-                kinematics,
+                kinematics: kinematics.with_rates([rapid_rate / SECONDS_PER_MINUTE; 3]),
                 post: Style::Tcp,
+                zero_is_given: false,
                 directions: axes.map(|axis| axis.direction),
             })
         });
         return made.transpose().map_err(|e| machine.error(&word.span, e.to_string(), e.cure()));
     };
     table.only(
-        &["preset", "post", "first", "second", "gauge_length", "workpiece_zero", "x", "y", "z"],
+        &["preset", "post", "first", "second", "gauge_length", "workpiece_zero", "x", "y", "z", "rates"],
         &[],
         "`kinematics`",
     )?;
@@ -93,11 +103,17 @@ pub(super) fn read(machine: &Section<'_>) -> Result<Option<FiveAxis>, SceneError
         first,
         second,
         gauge_length.map_or(DEFAULT_GAUGE_LENGTH, |length| length.value),
-        workpiece_zero.map_or(Point3::origin(), |zero| Point3::from(zero.value)),
+        workpiece_zero.as_ref().map_or(Point3::origin(), |zero| Point3::from(zero.value)),
         [x?, y?, z?],
     );
     let kinematics = kinematics.map_err(|e| refused(&table, first.letter, &e))?;
-    Ok(Some(FiveAxis { kinematics, post, directions: [first, second].map(|axis| axis.direction) }))
+    let rates = rates(&table)?.unwrap_or([rapid_rate; 3]).map(|rate| rate / SECONDS_PER_MINUTE);
+    Ok(Some(FiveAxis {
+        kinematics: kinematics.with_rates(rates),
+        post,
+        zero_is_given: workpiece_zero.is_some(),
+        directions: [first, second].map(|axis| axis.direction),
+    }))
 }
 
 /// A refusal of the machine at the axis that it is about.
@@ -184,9 +200,19 @@ fn place(section: &Section<'_>, key: &str) -> Result<Option<Located<[f64; 3]>>, 
     Err(section.error(&place.span, message, cure))
 }
 
+/// Fastest X, Y and Z, mm/min.
+fn rates(section: &Section<'_>) -> Result<Option<[f64; 3]>, SceneError> {
+    let Some(rates) = section.vector("rates")? else { return Ok(None) };
+    if rates.value.iter().all(|rate| RATES.contains(rate)) {
+        return Ok(Some(rates.value));
+    }
+    let cure = format!("write mm/min of X, Y and Z, from {} to {}", RATES.start(), RATES.end());
+    Err(section.error(&rates.span, "`rates` are no rates of linear axes", cure))
+}
+
 /// Writes the machine as scenes spell it, after all other keys of `[machine]`.
 pub(super) fn write(out: &mut String, five_axis: Option<&FiveAxis>) -> fmt::Result {
-    let Some(FiveAxis { kinematics, post, directions }) = five_axis else {
+    let Some(FiveAxis { kinematics, post, zero_is_given, directions }) = five_axis else {
         return writeln!(out, "{KEY} = {}  # three axes", text(NONE));
     };
     writeln!(out, "\n[machine.{KEY}]  # mm, degrees")?;
@@ -209,7 +235,13 @@ pub(super) fn write(out: &mut String, five_axis: Option<&FiveAxis>) -> fmt::Resu
     }
     writeln!(out, "gauge_length = {}  # spindle nose to tip", number(kinematics.gauge_length()))?;
     let zero = list(kinematics.workpiece_zero().coords.as_slice());
-    writeln!(out, "workpiece_zero = {zero}  # in machine coordinates, table at zero")?;
+    if *zero_is_given {
+        writeln!(out, "workpiece_zero = {zero}  # in machine coordinates, table at zero")?;
+    } else {
+        writeln!(out, "# workpiece_zero is not given: it is taken to be the machine's zero")?;
+    }
+    let [x, y, z, ..] = kinematics.rates().map(|rate| rate * SECONDS_PER_MINUTE);
+    writeln!(out, "rates = {}  # mm/min of X, Y and Z", list(&[x, y, z]))?;
     for (key, limits) in ["x", "y", "z"].into_iter().zip(kinematics.travel()) {
         if let Some(limits) = limits {
             writeln!(out, "{key} = {}", list(limits))?;
@@ -250,7 +282,9 @@ mod tests {
         assert_eq!(parse("kinematics = \"none\"").unwrap().five_axis, None);
         for name in PRESETS {
             let five_axis = parse(&format!("kinematics = \"{name}\"")).unwrap().five_axis.unwrap();
-            assert_eq!(Some(five_axis.kinematics), Kinematics::by_name(name), "{name}");
+            let rapid = [250.0; 3];
+            let expected = Kinematics::by_name(name).map(|made| made.with_rates(rapid));
+            assert_eq!(Some(five_axis.kinematics), expected, "{name}");
             assert_eq!(five_axis.post, Style::Tcp);
         }
         let table = "[machine.kinematics]\npost = \"full\"\ngauge_length = 120\nz = [-500, 0]\n\
@@ -300,6 +334,7 @@ mod tests {
         let made = parse(table.split("```").next().unwrap()).unwrap().five_axis.unwrap();
         assert_eq!(made.kinematics.axes()[1].point, Point3::new(250.0, 203.0, -350.0));
         assert_eq!((made.post, made.kinematics.workpiece_zero().z), (Style::Full, -300.0));
+        assert_eq!((made.zero_is_given, made.kinematics.rates()[2]), (true, 10_000.0 / 60.0));
         assert!(PRESETS.iter().all(|name| readme.contains(&format!("`{name}`"))));
     }
 

@@ -9,20 +9,21 @@
 //! divided so that the tip stays on its line within the chord tolerance. Feeds are inverse times (G93, 1/min), since
 //! no other feed has a meaning for lines and turns together.
 //!
+//! In both styles a feed is lowered where a joint would exceed its rate, as far as its ends tell.
+//!
 //! A rapid move that turns the tool is a G1 at the rapid rate: with G0 each axis would go its own way.
 //!
-//! Begin and end. The spindle rises along the machine's z to its zero (G53), the rotary axes turn up there, and the tip
-//! comes down along the machine's z over the start of the path, from above all of the path. The same way round
-//! before rewinds, and up again at the end.
+//! Begin and end. The spindle rises along the machine's z to its zero (G53), the rotary axes turn up there, X and Y move, and
+//! the tip comes down along the machine's z over the start of the path, from above all of the path. With [`Style::Tcp`] the
+//! linear axes stand there before the control begins to keep the tip, so that only Z is left to move. The same way round before
+//! rewinds, and up again at the end.
 
-use super::super::program_text::{ProgramHeader, describe, number, number_to};
+use super::super::program_text::{ProgramHeader, describe, number, number_below, number_to};
 use super::MoveLines;
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
-use machine::kinematics::{
-    Following, JointLocation, JointPath, Joints, Kinematics, Side, Turn, turning_time,
-};
-use motion::{ClPoint, MoveKind, Toolpath};
+use machine::kinematics::{Following, JointLocation, JointPath, Joints, Kinematics, Side, Turn, least_time};
+use motion::{MoveKind, Toolpath};
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
@@ -125,8 +126,7 @@ pub fn write_five_axis(
 struct FiveAxisProgram<'a> {
     writer: &'a mut dyn Write,
     post: &'a FiveAxisPost<'a>,
-    /// All tips of the path.
-    tips: Vec<Point3>,
+    path: &'a Toolpath,
     lines: u32,
     /// The words X Y Z and of both rotary axes, as they were written.
     words: [Option<String>; 5],
@@ -137,10 +137,8 @@ struct FiveAxisProgram<'a> {
 }
 
 impl<'a> FiveAxisProgram<'a> {
-    fn new(writer: &'a mut dyn Write, post: &'a FiveAxisPost<'a>, path: &Toolpath) -> Self {
-        let locations = std::iter::once(&path.start).chain(path.moves.iter().map(|m| &m.to));
-        let tips = locations.map(|at: &ClPoint| at.tip).collect();
-        Self { writer, post, tips, lines: 0, words: Default::default(), rapid: None, feed: None, at: None }
+    fn new(writer: &'a mut dyn Write, post: &'a FiveAxisPost<'a>, path: &'a Toolpath) -> Self {
+        Self { writer, post, path, lines: 0, words: Default::default(), rapid: None, feed: None, at: None }
     }
 
     fn line(&mut self, text: &str) -> io::Result<()> {
@@ -184,28 +182,36 @@ impl<'a> FiveAxisProgram<'a> {
 
     /// The words of a location: X Y Z and both rotary axes.
     fn words(&self, joints: &Joints, tip: Point3) -> [String; 5] {
-        let kinematics = self.post.kinematics;
         let linear = match self.post.style {
             Style::Tcp => tip.coords,
-            Style::Full => {
-                let nose = Vector3::new(0.0, 0.0, kinematics.gauge_length());
-                joints.linear - kinematics.workpiece_zero().coords - nose
-            }
+            Style::Full => self.linear_axes(joints),
         };
         let rotary = joints.rotary.map(|angle| number_to(angle.to_degrees(), ROTARY_DECIMALS));
         let ([x, y, z], [first, second]) = (<[f64; 3]>::from(linear).map(number), rotary);
         [x, y, z, first, second]
     }
 
+    /// X Y Z of the linear axes themselves, in the work offset.
+    fn linear_axes(&self, joints: &Joints) -> Vector3 {
+        let kinematics = self.post.kinematics;
+        let nose = Vector3::new(0.0, 0.0, kinematics.gauge_length());
+        joints.linear - kinematics.workpiece_zero().coords - nose
+    }
+
     /// From anywhere to a location: up along the machine's z, turning up there, and down over the location.
     fn approach(&mut self, joints: &Joints, tip: Point3) -> io::Result<()> {
         self.rise()?;
-        let over = self.above(joints, tip);
-        let [x, y, z, first, second] = self.words(&self.post.kinematics.place(over, joints.rotary), over);
+        let over = self.post.kinematics.over(self.path, joints.rotary, tip);
+        let high = self.post.kinematics.place(over, joints.rotary);
+        let [x, y, z, first, second] = self.words(&high, over);
         self.step([None, None, None, Some(first), Some(second)], None)?;
         match self.post.style {
             Style::Tcp => {
+                let axes = self.linear_axes(&high);
+                self.step([Some(number(axes.x)), Some(number(axes.y)), None, None, None], None)?;
                 self.line("G43.4 H1")?;
+                // The words of the tip are others.
+                self.words[..3].fill(None);
                 self.step([Some(x), Some(y), Some(z), None, None], None)?;
             }
             Style::Full => {
@@ -218,21 +224,13 @@ impl<'a> FiveAxisProgram<'a> {
         Ok(())
     }
 
-    /// Over a location along the machine's z, as high as the highest tip of the path is while the table stands so.
-    fn above(&self, joints: &Joints, tip: Point3) -> Point3 {
-        let up = self.post.kinematics.upward(joints.rotary);
-        let height = |tip: &Point3| up.dot(&tip.coords);
-        let top = self.tips.iter().map(height).fold(height(&tip), f64::max);
-        tip + up * (top - height(&tip))
-    }
-
     /// Up to the machine's zero.
     fn rise(&mut self) -> io::Result<()> {
         if let Some((joints, tip)) = self.at.take()
             && self.post.style == Style::Tcp
         {
             // Straight up while the control still follows the tip: what it does when it stops is its own.
-            let over = self.above(&joints, tip);
+            let over = self.post.kinematics.over(self.path, joints.rotary, tip);
             let words = self.words(&self.post.kinematics.place(over, joints.rotary), over);
             self.step(words.map(Some), None)?;
             self.line("G49")?;
@@ -254,15 +252,17 @@ impl<'a> FiveAxisProgram<'a> {
         let turns = self.words[3..] != [Some(words[3].clone()), Some(words[4].clone())];
         let rate = if step.kind == MoveKind::Rapid { self.post.rapid_rate } else { step.feed_rate };
         let length = (location.at.tip - last.1).norm();
-        let turning = turning_time(self.post.kinematics, &last.0, &location.joints) / 60.0;
+        let least = least_time(self.post.kinematics, &last.0, &location.joints) / 60.0;
         let feed = if step.kind == MoveKind::Rapid && !turns {
             None
         } else if self.post.style == Style::Full {
-            let time = (length / rate).max(turning);
-            Some(number((1.0 / time).min(GREATEST_INVERSE_TIME)))
-        } else if (0..3).all(|k| self.words[k].as_ref() == Some(&words[k])) && turning > 0.0 {
+            let time = (length / rate).max(least);
+            Some(number_below((1.0 / time).min(GREATEST_INVERSE_TIME)))
+        } else if (0..3).all(|k| self.words[k].as_ref() == Some(&words[k])) && least > 0.0 {
             let turn = |k: usize| (location.joints.rotary[k] - last.0.rotary[k]).abs();
-            Some(number(turn(0).max(turn(1)).to_degrees() / turning))
+            Some(number(turn(0).max(turn(1)).to_degrees() / least))
+        } else if length < rate * least {
+            Some(number_below(length / least))
         } else {
             Some(number(rate))
         };

@@ -23,7 +23,7 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
         down_no_faster(path, scene.cutting.plunge_rate, &line),
     ];
     let time = run.planned.time(scene);
-    claims.push(in_time(time, longest(path, &scene.cutting, &scene.machine) + run.planned.turning(scene)));
+    claims.push(in_time(time, longest(path, &scene.cutting, &scene.machine) + run.planned.joint_time(scene)));
     Ok(Finding { claims, ..Finding::default() })
 }
 

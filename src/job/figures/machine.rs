@@ -17,6 +17,8 @@ pub struct JointRange {
     pub joint: char,
     /// Least and greatest value, mm, or degrees of a rotary joint.
     pub range: [f64; 2],
+    /// Its fastest motion, mm/min, or degrees/min of a rotary joint.
+    pub fastest: f64,
 }
 
 /// How the joints of a five-axis machine move along a path.
@@ -35,12 +37,12 @@ pub struct MachineFigures {
 }
 
 impl MachineFigures {
-    /// Of the joints along a path.
-    pub fn new(kinematics: &Kinematics, report: &JointReport) -> Self {
+    /// Of the joints along a path, and their fastest motion, mm/s and rad/s.
+    pub fn new(kinematics: &Kinematics, report: &JointReport, fastest: [f64; 5]) -> Self {
         let ranges = kinematics.letters().into_iter().zip(report.ranges);
-        let shown = |(k, (joint, range)): (usize, (char, [f64; 2]))| JointRange {
-            joint,
-            range: if k < 3 { range } else { range.map(f64::to_degrees) },
+        let shown = |(k, (joint, range)): (usize, (char, [f64; 2]))| {
+            let degrees = |value: f64| if k < 3 { value } else { value.to_degrees() };
+            JointRange { joint, range: range.map(degrees), fastest: 60.0 * degrees(fastest[k]) }
         };
         Self {
             joints: ranges.enumerate().map(shown).collect(),
@@ -57,13 +59,30 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
     let Some((joints, five_axis)) = joints.zip(run.scene().five_axis.as_ref()) else {
         return Ok(Finding::default());
     };
-    let figures = MachineFigures::new(&five_axis.kinematics, &joints.report);
+    let (machine, path) = (&five_axis.kinematics, run.path());
+    let fastest = joints.fastest(machine, path, run.scene().machine.rapid_rate);
+    let figures = MachineFigures::new(machine, &joints.report, fastest);
+    let mut claims = within_travel(machine, &joints.report);
+    let mut notes: Vec<String> = note(&joints.report).into_iter().collect();
+    if five_axis.zero_is_given {
+        claims.push(retract_above(joints.highest_nose(machine, path)));
+    } else {
+        notes.push(UNKNOWN_ZERO.to_owned());
+    }
     let figure = Figure { key: "machine", value: value(&figures)?, ..Figure::default() };
-    Ok(Finding {
-        figure: Some(figure),
-        notes: note(&joints.report).into_iter().collect(),
-        claims: within_travel(&five_axis.kinematics, &joints.report),
-    })
+    Ok(Finding { figure: Some(figure), notes, claims })
+}
+
+/// What is said where the scene does not tell where the workpiece is in the machine.
+const UNKNOWN_ZERO: &str = "the program begins and ends at the machine's Z zero, which must be above the work; give \
+                            `workpiece_zero` in [machine.kinematics] to have that checked";
+
+/// That the machine's Z zero, to which programs rise, is no lower than where they come down from.
+fn retract_above(nose: f64) -> Claim {
+    let text = format!(
+        "programs rise to the machine's Z zero, and the spindle nose must stand at Z {nose:.3} or higher to be over the path"
+    );
+    Claim::length("retract", Gravity::Crash, 0.0, nose, 0.0).told(text)
 }
 
 /// Beyond a limit by so little, mm or degrees, a joint is at it.
@@ -103,4 +122,22 @@ fn note(report: &JointReport) -> Option<String> {
              between passes"
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use report::Verdict;
+
+    #[test]
+    fn a_retract_below_the_work_is_a_violation() {
+        let claim = retract_above(161.0);
+        assert_eq!((claim.what, claim.verdict()), ("retract", Verdict::Fail));
+        assert!(
+            claim.text.ends_with("must stand at Z 161.000 or higher to be over the path"),
+            "{}",
+            claim.text
+        );
+        assert_eq!(retract_above(-40.0).verdict(), Verdict::Pass);
+    }
 }

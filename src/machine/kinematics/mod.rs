@@ -13,7 +13,7 @@
 //! where a is parallel to its direction (the singular poses).
 //!
 //! Where a move runs through a singular pose a location is put in. The first axis turns there while the tip stays in place.
-//! Machining time knows the rates of the rotary axes, not those of the single linear axes.
+//! Feeds and machining time keep every joint within its rate.
 
 mod angles;
 mod choice;
@@ -28,7 +28,7 @@ mod tests;
 pub use error::KinematicsError;
 pub use follow::{Following, JointLocation, JointPath, PathError, Turn, follow};
 pub use presets::{DEFAULT_GAUGE_LENGTH, DEFAULT_ROTARY_RATE, PRESETS, preset};
-pub use report::{JointReport, LimitViolation, Obstacle, Rewind, SINGULAR_ANGLE, SingularPose, turning_time};
+pub use report::{JointReport, LimitViolation, Obstacle, Rewind, SINGULAR_ANGLE, SingularPose, least_time};
 
 use angles::Triangle;
 
@@ -84,6 +84,8 @@ pub struct Kinematics {
     workpiece_zero: Point3,
     /// Least and greatest X, Y and Z, mm.
     travel: [Option<[f64; 2]>; 3],
+    /// Fastest X, Y and Z, mm/s.
+    rates: [f64; 3],
     triangle: Triangle,
 }
 
@@ -172,7 +174,20 @@ impl Kinematics {
         for (joint, limits) in ['X', 'Y', 'Z'].into_iter().zip(travel) {
             check_limits(joint, limits, GREATEST)?;
         }
-        Ok(Self { axes, gauge_length, workpiece_zero, travel, triangle: Triangle::new(u, v) })
+        let (rates, triangle) = ([f64::INFINITY; 3], Triangle::new(u, v));
+        Ok(Self { axes, gauge_length, workpiece_zero, travel, rates, triangle })
+    }
+
+    /// The same with the fastest motion of X, Y and Z, mm/s; without, they are not limited.
+    #[must_use]
+    pub fn with_rates(self, rates: [f64; 3]) -> Self {
+        Self { rates, ..self }
+    }
+
+    /// Fastest motion of the five joints, mm/s and rad/s.
+    pub fn rates(&self) -> [f64; 5] {
+        let [x, y, z] = self.rates;
+        [x, y, z, self.axes[0].rate, self.axes[1].rate]
     }
 
     /// First and second rotary axis; directions are unit vectors.

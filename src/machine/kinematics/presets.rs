@@ -1,5 +1,7 @@
-//! Machines by name. Heads are named from the frame to the spindle, tables from the bed to the
-//! workpiece, as builders name them: an A–C table is a C table on an A trunnion.
+//! Machines by name: the letters of both rotary axes in the order of the alphabet. Their letters are those of ISO 841 (A turns
+//! about x, B about y, C about z). Which axis carries which: in `ac-head` and `bc-head` C turns the fork that carries
+//! the other; in `ab-head` A carries B. In `ac-table` and `bc-table` the trunnion A or B carries the table C, as in LinuxCNC's
+//! `xyzac-trt` and `xyzbc-trt`; in `ab-table` A carries B.
 
 use super::{Kinematics, RotaryAxis, Side};
 use geometry::{Point3, Vector3};

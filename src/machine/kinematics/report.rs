@@ -2,10 +2,10 @@
 
 use super::angles::angle_between;
 use super::choice::LIMIT_SLACK;
-use super::follow::{JointPath, passes};
+use super::follow::{JointPath, Turn, passes};
 use super::{Joints, Kinematics};
-use geometry::Vector3;
-use motion::Toolpath;
+use geometry::{Point3, Vector3};
+use motion::{MoveKind, Toolpath};
 use std::f64::consts::PI;
 
 /// Within this angle of a singular pose the first rotary axis turns by nearly half a turn while the tool hardly
@@ -159,13 +159,13 @@ impl JointPath {
         }
     }
 
-    /// The least time of each of the path's `moves` moves by the rates of the rotary joints, s.
-    pub fn turning_times(&self, kinematics: &Kinematics, moves: usize) -> Vec<f64> {
+    /// The least time of each of the path's `moves` moves by the rates of the joints, s.
+    pub fn least_times(&self, kinematics: &Kinematics, moves: usize) -> Vec<f64> {
         let mut times = vec![0.0; moves];
         let mut last = self.start;
         for location in &self.locations {
             if let Some(time) = times.get_mut(location.step) {
-                *time += turning_time(kinematics, &last, &location.joints);
+                *time += least_time(kinematics, &last, &location.joints);
             }
             last = location.joints;
         }
@@ -173,10 +173,59 @@ impl JointPath {
     }
 }
 
-/// The least time between two sets of joints by the rates of the rotary ones, s.
-pub fn turning_time(kinematics: &Kinematics, from: &Joints, to: &Joints) -> f64 {
-    let time = |k: usize| (to.rotary[k] - from.rotary[k]).abs() / kinematics.axes()[k].rate;
-    time(0).max(time(1))
+impl JointPath {
+    /// The fastest motion of each joint, mm/s and rad/s, where every move runs at its feed, or as fast as its slowest joint
+    /// lets it. `rapid_rate` in mm/min.
+    pub fn fastest(&self, kinematics: &Kinematics, path: &Toolpath, rapid_rate: f64) -> [f64; 5] {
+        let mut fastest = [0.0f64; 5];
+        let (mut last, mut tip) = (self.start, path.start.tip);
+        for location in &self.locations {
+            let step = path.moves.get(location.step);
+            let rate =
+                step.map_or(rapid_rate, |s| if s.kind == MoveKind::Rapid { rapid_rate } else { s.feed_rate });
+            let length = (location.at.tip - tip).norm();
+            let time = (60.0 * length / rate).max(least_time(kinematics, &last, &location.joints));
+            // What rounding leaves of a move has no rate.
+            if time > 1e-9 {
+                let ways = location.joints.values().into_iter().zip(last.values());
+                for (fastest, (to, from)) in fastest.iter_mut().zip(ways) {
+                    *fastest = fastest.max((to - from).abs() / time);
+                }
+            }
+            (last, tip) = (location.joints, location.at.tip);
+        }
+        fastest
+    }
+
+    /// The highest nose, machine coordinates, mm, at which programs come down to the path or leave it: over all its tips
+    /// along the machine's z.
+    pub fn highest_nose(&self, kinematics: &Kinematics, path: &Toolpath) -> f64 {
+        let rewinds = self.locations.iter().filter(|at| at.turn == Turn::Rewind);
+        let poses = rewinds.chain(self.locations.last()).map(|at| (at.joints, at.at.tip));
+        let poses = poses.chain([(self.start, path.start.tip)]);
+        let nose = |(joints, tip): (Joints, Point3)| {
+            let over = kinematics.over(path, joints.rotary, tip);
+            kinematics.place(over, joints.rotary).linear.z
+        };
+        poses.map(nose).fold(f64::NEG_INFINITY, f64::max)
+    }
+}
+
+impl Kinematics {
+    /// The place over a tip along the machine's z that is as high as the highest tip of the path while the table stands so.
+    pub fn over(&self, path: &Toolpath, rotary: [f64; 2], tip: Point3) -> Point3 {
+        let up = self.upward(rotary);
+        let height = |tip: &Point3| up.dot(&tip.coords);
+        let tips =
+            std::iter::once(&path.start).chain(path.moves.iter().map(|m| &m.to)).map(|at| height(&at.tip));
+        tip + up * (tips.fold(height(&tip), f64::max) - height(&tip))
+    }
+}
+
+/// The least time between two sets of joints by their rates, s.
+pub fn least_time(kinematics: &Kinematics, from: &Joints, to: &Joints) -> f64 {
+    let ways = to.values().into_iter().zip(from.values()).map(|(to, from)| (to - from).abs());
+    ways.zip(kinematics.rates()).map(|(way, rate)| way / rate).fold(0.0, f64::max)
 }
 
 impl JointReport {

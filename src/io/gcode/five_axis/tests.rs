@@ -2,7 +2,7 @@
 
 use super::*;
 use machine::kinematics::{DEFAULT_ROTARY_RATE, PRESETS, RotaryAxis, follow, preset};
-use motion::Move;
+use motion::{ClPoint, Move};
 
 const HEADER: ProgramHeader = ProgramHeader { name: String::new(), spindle_speed: None };
 
@@ -173,16 +173,80 @@ fn full_programs_keep_tip_and_feed() {
                 (from, k) = (path.moves[k].to, k + 1);
             }
         }
-        let turning = joints.turning_times(&kinematics, path.len());
+        let least_times = joints.least_times(&kinematics, path.len());
         for (k, step) in path.moves.iter().enumerate().skip(1) {
             let length = (step.to.tip - path.start_of(k)).norm();
             let rate = if step.kind == MoveKind::Rapid { 15_000.0 } else { step.feed_rate };
-            let least = (60.0 * length / rate).max(turning[k]);
+            let least = (60.0 * length / rate).max(least_times[k]);
             if times[k] > 0.0 {
                 assert!(times[k] > least * (1.0 - 2e-3) - 1e-3, "{name} move {k} {} {least}", times[k]);
-                assert!(times[k] < (60.0 * length / rate + turning[k]) * (1.0 + 2e-3) + 1e-2, "{name} {k}");
+                assert!(
+                    times[k] < (60.0 * length / rate + least_times[k]) * (1.0 + 2e-3) + 1e-2,
+                    "{name} {k}"
+                );
             }
         }
+    }
+}
+
+/// By differences of the words: a head with a long gauge and a table far from its axes at a high feed.
+#[test]
+fn no_joint_is_faster_than_its_rate() {
+    let mut path = path();
+    path.moves.iter_mut().for_each(|m| m.feed_rate = 12_000.0);
+    for name in ["ab-head", "ac-table", "nutating-head-c-table"] {
+        let rates = [15_000.0, 12_000.0, 9_000.0];
+        let kinematics = machine(name).with_rates(rates.map(|rate| rate / 60.0));
+        let (text, lines, joints) = program(&path, &kinematics, Style::Full);
+        let states = states(&text, kinematics.letters());
+        let mut limited = 0;
+        for at in lines[0] as usize..lines[path.len() - 1] as usize {
+            let [before, after] =
+                [at - 1, at].map(|line| joints_of(&kinematics, &states[line].words).values());
+            if states[at].rapid {
+                continue;
+            }
+            for (k, limit) in kinematics.rates().into_iter().enumerate() {
+                let rate = (after[k] - before[k]).abs() * states[at].feed / 60.0;
+                // Words are rounded: 0.1 µm in a way of a micrometre would be a tenth.
+                let rounding = 1.2e-4 * states[at].feed / 60.0;
+                assert!(rate <= limit + rounding, "{name} joint {k} line {at}: {rate} {limit}");
+                limited += usize::from(k < 3 && rate > 0.9 * limit);
+            }
+        }
+        assert!(limited > 10, "{name} {limited}");
+        let fastest = joints.fastest(&kinematics, &path, 15_000.0);
+        assert!(fastest.iter().zip(kinematics.rates()).all(|(rate, limit)| *rate <= limit * (1.0 + 1e-12)));
+    }
+}
+
+/// Up, turn, over, down: before the control keeps the tip the linear axes stand over the start, and then go straight down.
+#[test]
+fn a_program_that_keeps_the_tip_comes_down_along_the_machines_z() {
+    let path = path();
+    for name in PRESETS {
+        let kinematics = machine(name);
+        let (text, ..) = program(&path, &kinematics, Style::Tcp);
+        let lines: Vec<&str> = text.lines().collect();
+        let states = states(&text, kinematics.letters());
+        let mut seen = 0;
+        for keeps in (0..lines.len()).filter(|&k| lines[k].starts_with("G43.4")) {
+            assert!(
+                lines[keeps - 1].starts_with(['X', 'Y']) && !lines[keeps - 1].contains('Z'),
+                "{}",
+                lines[keeps - 1]
+            );
+            let stood = joints_of(&kinematics, &states[keeps - 1].words).linear;
+            let [over, down] = [keeps + 1, keeps + 2].map(|line| {
+                let words = states[line].words;
+                let tip = Point3::from(Vector3::from_column_slice(&words[..3]));
+                kinematics.place(tip, [words[3].to_radians(), words[4].to_radians()]).linear
+            });
+            assert!((over.xy() - stood.xy()).norm() < 1e-3, "{name}: {stood} {over}");
+            assert!((down.xy() - over.xy()).norm() < 1e-3 && down.z < over.z + 1e-3, "{name}: {over} {down}");
+            seen += 1;
+        }
+        assert!(seen > 0, "{name}");
     }
 }
 
@@ -210,6 +274,7 @@ fn a_short_program_in_both_styles() {
 G17 G21 G40 G49 G80 G90 G94
 G53 G0 Z0.0
 B36.8699 C0.0
+X0.0 Y0.0
 G43.4 H1
 X12.48 Y0.0 Z16.64
 X6.0 Z8.0
@@ -223,10 +288,10 @@ M30
 %
 ";
     assert_eq!(text, expected);
-    assert_eq!(lines, [12, 13, 14, 15]);
+    assert_eq!(lines, [13, 14, 15, 16]);
     let (text, ..) = program_following(&path, &kinematics, Style::Full, &coarse);
     // Along the turned table: x' = 0.8 x − 0.6 z, z' = 0.6 x + 0.8 z.
-    // 36.8699° at 10800 a minute: 292.9219 times a minute.
+    // 36.8699° at 10800 a minute: 292.92187 times a minute, and no more.
     let expected = "\
 (LINEAR AXES FROM THE WORKPIECE ZERO WITH ROTARY AXES AT ZERO)
 (WORKPIECE ZERO IN MACHINE COORDINATES X0.0 Y0.0 Z0.0)
@@ -238,7 +303,7 @@ Z20.8
 Z10.0
 G1 Z0.0 F50.0
 X6.4 Z4.8 F62.5
-X8.0 Z0.0 B0.0 F292.9219
+X8.0 Z0.0 B0.0 F292.9218
 G0 Z20.0
 G53 G0 Z0.0
 G94

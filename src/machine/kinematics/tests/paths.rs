@@ -262,7 +262,7 @@ proptest! {
         let path = path(stations.iter().map(|(tip, tilt, azimuth)| (*tip, tilted(*tilt, *azimuth))));
         let following = if all_joints { Following::all_joints(0.01, 50.0) } else { Following::with_tip_kept(0.01, 50.0) };
         let joints = check(&machine, &path, &following);
-        let times = joints.turning_times(&machine, path.len());
+        let times = joints.least_times(&machine, path.len());
         // Both joints at their rate take no longer than one after the other.
         let travel: f64 = joints.report.rotary_travel.iter().sum();
         let time: f64 = times.iter().sum();
