@@ -22,6 +22,8 @@ pub struct Machine {
     pub junction_deviation: f64,
     /// How fast acceleration may change, mm/s³: it sets the speed where curvature changes suddenly.
     pub jerk: f64,
+    /// Lines of a program that the control can run, 1/s: a shorter move lasts as long as one.
+    pub block_rate: f64,
     /// Whether programs have the feeds at which corners and bends can be run.
     pub slow_corners: bool,
 }
@@ -29,13 +31,14 @@ pub struct Machine {
 impl Default for Machine {
     /// A mid-sized vertical machining centre: rapids of 15 m/min, 0.3 g, and corners rounded by
     /// 0.01 mm, the usual setting of controls for finishing (also grbl's); jerk as such machines are set
-    /// for finishing, 50 m/s³.
+    /// for finishing, 50 m/s³; a thousand lines a second, as controls with a high-speed option run.
     fn default() -> Self {
         Self {
             rapid_rate: 15_000.0,
             acceleration: 3000.0,
             junction_deviation: 0.01,
             jerk: 50_000.0,
+            block_rate: 1000.0,
             slow_corners: true,
         }
     }
@@ -70,6 +73,7 @@ impl Machine {
             ("acceleration", self.acceleration, "mm/s²"),
             ("junction deviation", self.junction_deviation, "mm"),
             ("jerk", self.jerk, "mm/s³"),
+            ("block rate", self.block_rate, "lines/s"),
         ];
         match limits.into_iter().find(|(_, value, _)| !(*value > 0.0 && value.is_finite())) {
             Some((what, value, unit)) => Err(MachineError { what, value, unit }),
@@ -115,6 +119,7 @@ mod fixture {
             acceleration: 1000.0,
             junction_deviation: 0.01,
             jerk,
+            block_rate: 1e9,
             slow_corners: true,
         }
     }

@@ -14,12 +14,14 @@
 //!   a 24th of jump times the square of that time, which must stay within the junction deviation.
 //!   Curvature at a corner is β over half of both moves' lengths.
 //!
+//! A move lasts at least as long as the control takes for a line of the program.
+//!
 //! On a machine with rotary axes a move lasts at least as long as each of its joints takes by its rate: its feed is no
 //! higher than its length over that time, and where the tip stands meanwhile the machine stops for it.
 //!
 //! A backward pass then limits speeds to what can still be braked, a forward pass to what can have been
-//! reached: both in one sweep, O(n). The path starts and ends at rest. Jerk along the path, the acceleration of
-//! the single axes and the control's block rate are not modelled: real machines take somewhat longer.
+//! reached: both in one sweep, O(n). The path starts and ends at rest. Jerk along the path and the acceleration of
+//! the single axes are not modelled: real machines take somewhat longer.
 
 use super::Machine;
 use geometry::Vector3;
@@ -107,10 +109,11 @@ pub(super) fn profile(path: &Toolpath, machine: &Machine, turning: &[f64]) -> Op
             stood |= turning > 0.0;
             continue;
         }
-        let mut feed = feed(step, machine);
-        if turning > 0.0 {
-            feed = feed.min(length / turning);
-        }
+        let feed = feed(step, machine);
+        let fastest =
+            (length * machine.block_rate).min(if turning > 0.0 { length / turning } else { f64::INFINITY });
+        // What is no number stays none.
+        let feed = if feed > fastest { fastest } else { feed };
         if !(feed > 0.0 && length.is_finite() && machine.check().is_ok()) {
             return None;
         }
@@ -252,6 +255,20 @@ mod tests {
         let half = 0.1 + (100.0 - corner.sqrt()) / 1000.0 + (50.0 - 5.0 - (1e4 - corner) / 2000.0) / 100.0;
         let got = time([[0.0; 3], [50.0, 0.0, 0.0], [50.0, 50.0, 0.0]]);
         assert_relative_eq!(got, 2.0 * half, epsilon = 1e-12);
+    }
+
+    #[test]
+    fn moves_shorter_than_a_line_takes_last_as_long_as_one() {
+        // 100 mm in pieces of 0.05 mm: at 1000 lines a second no faster than 50 mm/s.
+        let pieces = (0..=2000).map(|k| [0.05 * f64::from(k), 0.0, 0.0]);
+        let slow = Machine { block_rate: 1000.0, ..MACHINE };
+        let got = machining_time(&path(pieces), &slow);
+        assert_relative_eq!(got, 100.0 / 50.0 + 50.0 / 1000.0, max_relative = 1e-9);
+        assert_relative_eq!(
+            machining_time(&path([[0.0; 3], [100.0, 0.0, 0.0]]), &slow),
+            1.1,
+            epsilon = 1e-12
+        );
     }
 
     #[test]

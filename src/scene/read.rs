@@ -21,6 +21,9 @@ const MAX_BYTES: u64 = 1 << 20;
 /// Feeds and speeds that make sense.
 const RATE: std::ops::RangeInclusive<f64> = 0.001..=1e6;
 
+/// Lines of a program that controls run in a second.
+const BLOCK_RATE: std::ops::RangeInclusive<f64> = 1.0..=1e6;
+
 /// Jerks that make sense, mm/s³.
 const JERK: std::ops::RangeInclusive<f64> = 1.0..=1e12;
 
@@ -287,6 +290,7 @@ fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
             "acceleration",
             "junction_deviation",
             "jerk",
+            "block_rate",
             "slow_corners",
             "clearance",
             kinematics::KEY,
@@ -304,6 +308,9 @@ fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
             .length("junction_deviation")?
             .map_or(default.junction_deviation, |v| v.value),
         jerk: section.number("jerk", JERK, " mm/s3")?.map_or(default.jerk, |v| v.value),
+        block_rate: section
+            .number("block_rate", BLOCK_RATE, " lines/s")?
+            .map_or(default.block_rate, |v| v.value),
         slow_corners: section.flag("slow_corners")?.unwrap_or(default.slow_corners),
     };
     Ok((machine, section.length("clearance")?.map_or(DEFAULT_CLEARANCE, |v| v.value)))

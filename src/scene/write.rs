@@ -60,6 +60,7 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
         number(scene.machine.junction_deviation)
     )?;
     writeln!(out, "jerk = {}  # mm/s3", number(scene.machine.jerk))?;
+    writeln!(out, "block_rate = {}  # lines of a program a second", number(scene.machine.block_rate))?;
     writeln!(out, "slow_corners = {}  # feeds of sharp bends in the program", scene.machine.slow_corners)?;
     writeln!(out, "clearance = {}  # mm of rapid moves above stock", number(scene.clearance))?;
     kinematics::write(out, scene.five_axis.as_ref())?;

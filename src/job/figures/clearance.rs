@@ -81,13 +81,13 @@ struct ClearanceFigures {
 
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
     let mut pairs = with_meshes(run, monitor)?;
-    let mut claims: Vec<Claim> = kept_away(run, &pairs).into_iter().collect();
+    let kept_away = kept_away(run, &pairs);
     pairs.extend(with_standing_stock(run, monitor)?);
     if pairs.is_empty() {
         return Ok(Finding::default());
     }
     pairs.sort_by(|a, b| nearness(a).total_cmp(&nearness(b)));
-    claims.extend(pairs.iter().map(|pair| pair.claim(run)));
+    let claims = pairs.iter().map(|pair| pair.claim(run)).chain(kept_away).collect();
     let rows = pairs.iter().take(LISTED).map(|pair| pair.row()).collect();
     let table = FigureTable {
         title: "Nearest places",

@@ -85,6 +85,9 @@ fn engaged_within(run: &Run<'_>, pocket: &PocketFigures, limit: f64) -> Claim {
     Claim { unit: "deg", ..Claim::length("engagement", Gravity::Scrap, limit, measured, bound) }.told(text)
 }
 
+/// What two heights differ by at most for their last decimal, mm.
+const LAST_DECIMAL: f64 = 1e-4;
+
 /// Differences of heights, mm, and of slopes below which they are rounding.
 const ROUNDING: f64 = 1e-6;
 
@@ -110,7 +113,7 @@ fn steps_down(path: &Toolpath, top: f64, limit: f64) -> Claim {
 /// That no way down through stock is steeper than the scene allows.
 fn ramps(run: &Run<'_>, strategy: &PocketStrategy) -> Claim {
     let limit = strategy.ramp_angle.to_degrees();
-    let (steepest, index) = steepest(run.path(), run.session.top);
+    let (steepest, at_least, index) = steepest(run.path(), run.session.top);
     let text = match index {
         None => "no way down cuts".to_owned(),
         Some(k) => format!(
@@ -118,12 +121,13 @@ fn ramps(run: &Run<'_>, strategy: &PocketStrategy) -> Claim {
             run.program_line(k as u32)
         ),
     };
-    let measured = if steepest <= limit + ROUNDING { steepest.min(limit) } else { steepest };
+    let measured = if at_least <= limit + ROUNDING { steepest.min(limit) } else { steepest };
     Claim { unit: "deg", ..Claim::length("ramp", Gravity::Crash, limit, measured, 0.0) }.told(text)
 }
 
-/// The steepest way down below what the level above its pass has cleared, degrees from level, and its move.
-fn steepest(path: &Toolpath, top: f64) -> (f64, Option<usize>) {
+/// The steepest way down below what the level above its pass has cleared, degrees from level; the same less what rounding of
+/// its coordinates may have added; its move.
+fn steepest(path: &Toolpath, top: f64) -> (f64, f64, Option<usize>) {
     let levels = levels(path);
     let mut floors = vec![f64::INFINITY; path.passes()];
     // A helix may be all that a pass is.
@@ -135,12 +139,13 @@ fn steepest(path: &Toolpath, top: f64) -> (f64, Option<usize>) {
         let above = |level: &f64| *level > floors[pass as usize] + ROUNDING;
         levels.iter().rev().copied().find(above).unwrap_or(top).min(top)
     };
-    let mut found = (0.0, None);
+    let mut found = (0.0, 0.0, None);
     for (k, (a, b, m)) in path.segments().enumerate() {
         let cuts = || b.z < cleared(m.pass) - ROUNDING;
-        let slope = (a.z - b.z).atan2((b - a).xy().norm()).to_degrees();
-        if m.kind == MoveKind::Plunge && a.z - b.z > ROUNDING && slope > found.0 && cuts() {
-            found = (slope, Some(k));
+        let slope = |drop: f64| drop.max(0.0).atan2((b - a).xy().norm()).to_degrees();
+        let at_least = slope(a.z - b.z - LAST_DECIMAL);
+        if m.kind == MoveKind::Plunge && at_least > found.1 && cuts() {
+            found = (slope(a.z - b.z), at_least, Some(k));
         }
     }
     found
@@ -179,9 +184,9 @@ mod tests {
         assert_eq!((claim(2.0).verdict(), claim(1.9).verdict()), (Verdict::Pass, Verdict::Fail));
         assert_eq!(claim(1.9).measured, Some(2.0));
         // The way through air above the stock is no way down.
-        assert_eq!(steepest(&path, 0.0), (90.0, Some(5)));
+        assert_eq!(steepest(&path, 0.0), (90.0, 90.0, Some(5)));
         let ramped = Toolpath::new(path.start, path.moves[..3].to_vec());
-        let (slope, index) = steepest(&ramped, 0.0);
+        let (slope, _, index) = steepest(&ramped, 0.0);
         assert!((slope - 45.0).abs() < 1e-12 && index == Some(1));
     }
 }

@@ -42,7 +42,6 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     let surface = engine.surface(&voxels, monitor)?;
     let vertices: Vec<[f32; 3]> =
         surface.vertices.iter().map(|p| p.coords.map(|c| c as f32).into()).collect();
-    // Square edges cost the voxels' volume a little, before and after alike.
     let uncut = Toolpath::new(ClPoint::upright(stock.bounds().max), Vec::new());
     let untouched = VoxelEngine::new(&stock, &tool, &uncut).map_err(run.voxels())?;
     let whole =
@@ -51,8 +50,13 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     drop(voxels);
     let coarse = 2.0 * voxel;
     let coarse_volume = engine.cut(coarse, left, monitor).map_err(run.voxels())?.volume();
-    let removed_mm3 = whole(voxel)? - volume_mm3;
-    let coarse_removed = whole(coarse)? - coarse_volume;
+    // Stock with a closed form leaves what is removed to rounding.
+    let (fine_whole, coarse_whole) = match stock.volume() {
+        Some(exact) => (exact, exact),
+        None => (whole(voxel)?, whole(coarse)?),
+    };
+    let removed_mm3 = fine_whole - volume_mm3;
+    let coarse_removed = coarse_whole - coarse_volume;
     let figures = SolidFigures {
         voxel_mm: voxel,
         bricks,

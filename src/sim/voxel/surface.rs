@@ -73,7 +73,8 @@ impl VoxelEngine<'_> {
     ///
     /// # Tolerance
     /// Vertices lie on the tangent planes of the tool near them, which is second order in the voxel; on ridges
-    /// on both. Every edge has an even number of triangles, two but where sheets touch within a cell.
+    /// on both. None lies outside of the stock. Every edge has an even number of triangles, two but where sheets touch within a
+    /// cell.
     pub fn surface(&self, voxels: &Voxels, monitor: &dyn Monitor) -> Result<VoxelSurface, Cancelled> {
         let bricks = &voxels.bricks;
         monitor.start("surface of voxels", 2 * bricks.blocks.len() as u64);
@@ -144,6 +145,11 @@ impl VoxelEngine<'_> {
                 }
             }
             place = vertex(&planes, &middle, half).0;
+        }
+        // Planes that meet outside of the stock, or of a cell that it ends in, are no place of the material.
+        let (beyond, outward) = self.stock.foot(&place);
+        if beyond > 0.0 {
+            place -= outward * beyond;
         }
         let off = |k: &usize| planes[*k].normal.dot(&(place - planes[*k].point)).abs();
         let nearest = (0..planes.len()).min_by(|a, b| off(a).total_cmp(&off(b)));

@@ -47,6 +47,7 @@ fn the_surface_is_closed_and_lies_on_the_material() {
             let w = swept.iter().map(|s| s.distance(q).distance).fold(f64::INFINITY, f64::min);
             let exact = stock.foot(q).0.max(-w);
             off.push(exact.abs());
+            assert!(stock.foot(q).0 < 1e-9, "cutter {c}: {q} lies outside of the stock");
             // In its cell.
             assert!(exact.abs() < 0.25 * 3f64.sqrt(), "cutter {c}: {exact} at {q}");
             assert!(by == NOT_CUT || (by as usize) < path.len());
