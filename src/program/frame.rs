@@ -122,11 +122,6 @@ impl Frame {
         }
         [along[0], along[1], along[2]]
     }
-
-    /// Whether the program's axes are the machine's.
-    pub fn is_straight(&self) -> bool {
-        self.rotation.is_none() && self.work[self.active].1 == 0.0
-    }
 }
 
 #[cfg(test)]

@@ -10,10 +10,12 @@
 //! Text becomes words (`block`), words become codes in force and motion (`interpret`), a motion becomes a step (`program`).
 //! Controls differ as data only (`control`).
 
+mod apt;
 mod arc;
 mod block;
 #[cfg(test)]
 mod canonical_tests;
+mod checks;
 mod control;
 mod cursor;
 mod cycle;
@@ -25,12 +27,19 @@ mod interpret;
 mod lines;
 mod parameters;
 mod program;
+mod runs;
 mod state;
 mod tools;
 
+pub use apt::{looks_like_apt, read_apt};
+pub use checks::{Finding, FindingKind};
 pub use control::{CONTROLS, Code, Control, Cycle, Down, FeedMode, Length, Motion, Plane, RadiusSide};
 pub use error::{Fault, ProgramError};
 pub use frame::{Place, WORK_OFFSETS};
 pub use interpret::read_gcode;
 pub use program::{Arc, Note, Program, Setting, Spindle, Step, StepKind, ToolRemark};
+pub use runs::{FEED_WHERE_NONE, Placing, ToolRun};
 pub use state::Setup;
+
+/// The control that is taken where none is named.
+pub const GENERAL_CONTROL: &Control = &CONTROLS[0];
