@@ -196,7 +196,13 @@ impl Session {
             threads: work::parallel::threads(),
         };
         let (verdict, claims) =
-            judge::judge(&measured.measurement, &scene.tolerance, &scene.scallop_rule, found.claims);
+            judge::judge(
+            &measured.measurement,
+            &scene.tolerance,
+            &scene.scallop_rule,
+            found.claims,
+            planned.plan.path.program_name(),
+        );
         let measurement = &measured.measurement;
         let result = ToolpathResult {
             name: request.name.clone(),
@@ -276,14 +282,14 @@ impl Session {
     /// The engine of a toolpath.
     fn engine(&self, request: &ToolpathRequest) -> Result<&'static dyn Engine, JobError> {
         let (scene, name) = (&self.scene, &request.name);
-        let engine = scene.simulation.engine.for_path(request.axis.is_some());
+        let engine = scene.simulation.engine.for_path(request.tilts());
         if self.pocket.is_some() && !engine.measures_pockets() {
             return Err(JobError::PocketAlongNormals {
                 scene: scene.source.name.clone(),
                 name: name.clone(),
             });
         }
-        if request.axis.is_some() && !engine.tilts() {
+        if request.tilts() && !engine.tilts() {
             let engine = engine.word();
             return Err(JobError::Upright { scene: scene.source.name.clone(), name: name.clone(), engine });
         }
@@ -384,7 +390,8 @@ impl Session {
 
     /// Whether an outcome has a program.
     pub fn has_program(&self, outcome: &Outcome) -> bool {
-        outcome.path.is_upright() || outcome.joints.is_some()
+        // A program from elsewhere has its own file.
+        outcome.path.origin.program.is_empty() && (outcome.path.is_upright() || outcome.joints.is_some())
     }
 }
 

@@ -17,7 +17,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     match run.view() {
         View::Heights(cut) => {
             let held = holder_collisions(cut, holder, run.path(), monitor)?;
-            let claims = vec![clear_of_stock(&held, &|k| run.line(k))];
+            let claims = vec![clear_of_stock(&held, &|k| run.program_line(k))];
             Ok(Finding { notes: vec![note(&held)], claims, ..Finding::default() })
         }
         View::Normals(_) if run.scene().simulation.removal => {
@@ -38,14 +38,14 @@ fn collision(depth: f64, error_bound: f64) -> Claim {
 }
 
 /// That shank and holder do not meet the finished stock.
-fn clear_of_stock(holder: &HolderClearance, line: &dyn Fn(u32) -> u32) -> Claim {
+fn clear_of_stock(holder: &HolderClearance, line: &dyn Fn(u32) -> String) -> Claim {
     let Some(worst) = holder.collisions.iter().reduce(|a, b| if b.depth > a.depth { b } else { a }) else {
         let (lowest, bound) =
             if holder.lowest.is_finite() { (holder.lowest, holder.error_bound) } else { (0.0, 0.0) };
         return collision(-lowest, bound).told(note(holder));
     };
     let text = format!(
-        "section {} of the holder stands {:.3} ± {:.3} mm deep in the stock at {}, move {}, toolpath.nc line {}{}",
+        "section {} of the holder stands {:.3} ± {:.3} mm deep in the stock at {}, move {}{}{}",
         worst.section + 1,
         worst.depth,
         worst.error_bound,
@@ -124,16 +124,16 @@ mod tests {
             collisions,
             uncertain: 3,
         };
-        let found = clear_of_stock(&holder, &|k| k + 10);
+        let found = clear_of_stock(&holder, &|k| format!(", toolpath.nc line {}", k + 10));
         assert_eq!((found.what, found.measured, found.verdict()), ("collision", Some(2.25), Verdict::Fail));
         let expected = "section 2 of the holder stands 2.250 ± 0.100 mm deep in the stock at x 1.000 y 2.000 z 3.000, \
                         move 6, toolpath.nc line 16, and on one more move";
         assert_eq!(found.text, expected);
         assert!(note(&holder).contains("on 3 moves only a finer cell"));
         (holder.collisions, holder.lowest, holder.uncertain) = (vec![], 1.5, 0);
-        assert_eq!(clear_of_stock(&holder, &|_| 0).verdict(), Verdict::Pass);
+        assert_eq!(clear_of_stock(&holder, &|_| String::new()).verdict(), Verdict::Pass);
         let near = HolderClearance { lowest: 0.05, ..holder.clone() };
-        assert_eq!(clear_of_stock(&near, &|_| 0).verdict(), Verdict::Undecided);
+        assert_eq!(clear_of_stock(&near, &|_| String::new()).verdict(), Verdict::Undecided);
         assert_eq!(note(&holder), "shank and holder stay 1.500 ± 0.100 mm above the finished stock");
     }
 

@@ -3,6 +3,7 @@
 
 mod correction;
 mod coverage;
+mod entries;
 mod feeds;
 mod field;
 mod holder;
@@ -10,6 +11,7 @@ mod machine;
 mod offset;
 mod pairs;
 mod pocket;
+mod program;
 mod removal;
 mod roughness;
 mod sections;
@@ -31,10 +33,11 @@ use super::run::{Finding, Run};
 type Find = fn(&Run<'_>, &dyn Monitor) -> Result<Finding, JobError>;
 
 /// All figures, in the order of report.json.
-const FIGURES: [Find; 16] = [
+const FIGURES: [Find; 17] = [
     coverage::find,
     shortest::find,
     correction::find,
+    program::find,
     field::find,
     machine::find,
     pairs::find,

@@ -1,0 +1,78 @@
+//! A program from elsewhere: G-code or cutter locations of another system. It plans nothing; its path is read from a file and
+//! cut and measured like any other.
+
+use std::fmt::{self, Write as _};
+use std::sync::Arc;
+
+use crate::vocabulary::{Definition, PartKind, Passes, PlanError, Strategy, Task};
+use keys::toml_string;
+use motion::Toolpath;
+use program::{Control, Finding};
+
+/// Greatest number of a tool.
+const MOST_TOOLS: u32 = 99_999_999;
+
+/// A program from elsewhere.
+#[derive(Debug, Clone)]
+pub struct ForeignProgram {
+    /// The file as a scene names it.
+    pub file: String,
+    /// The control that it is written for.
+    pub control: &'static str,
+    /// The tool whose moves are meant; `None` where the program has one only.
+    pub tool: Option<u32>,
+    /// What was read from the file; `None` until it is.
+    pub read: Option<Arc<ReadProgram>>,
+}
+
+/// What was read from the file of a program.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadProgram {
+    /// The moves of the tool.
+    pub path: Toolpath,
+    /// What is wrong with it before it is cut.
+    pub findings: Vec<Finding>,
+    /// What is to be said of it.
+    pub notes: Vec<String>,
+}
+
+/// How scenes speak of it.
+pub(crate) static DEFINITION: Definition = Definition {
+    word: "program",
+    help: "a program from elsewhere, in G-code or APT: cut, measured and judged as it is",
+    part: PartKind::Any,
+    keys: &["file", "control", "tool"],
+    read: |from| {
+        let file = from.section.required_text("file", "job.nc")?;
+        let control = from.section.word("control", &Control::words())?;
+        let control = control.map_or(program::GENERAL_CONTROL.word, |word| word.value);
+        let tool = from.section.count("tool", 0..=MOST_TOOLS)?;
+        let program = ForeignProgram { file: file.value.to_owned(), control, tool, read: None };
+        from.tables.push(keys::Located { value: file.value.to_owned(), span: file.span });
+        Ok(Box::new(program))
+    },
+};
+
+impl Strategy for ForeignProgram {
+    fn definition(&self) -> &'static Definition {
+        &DEFINITION
+    }
+
+    fn write(&self, out: &mut String) -> fmt::Result {
+        writeln!(out, "file = {}", toml_string(&self.file))?;
+        writeln!(out, "control = \"{}\"", self.control)?;
+        match self.tool {
+            Some(tool) => writeln!(out, "tool = {tool}"),
+            None => Ok(()),
+        }
+    }
+
+    fn passes(&self, _: &Task<'_>) -> Result<Passes, PlanError> {
+        let reason = "a program is read from its file and not planned".to_owned();
+        Err(PlanError::NotApplicable { strategy: DEFINITION.word, reason })
+    }
+
+    fn both_ways(&self) -> bool {
+        false
+    }
+}
