@@ -85,6 +85,11 @@ fn of_table(file: &Path, number: Option<u32>) -> Result<(Cutter, String), CliErr
     Ok((tool.cutter, holder))
 }
 
+/// Whether a toolpath can be called so.
+fn is_name(stem: &str) -> bool {
+    stem.len() <= 40 && stem.is_ascii() && stem.bytes().any(|b| b.is_ascii_alphanumeric())
+}
+
 fn write_scene(
     out: &mut String,
     options: &VerifyOptions,
@@ -107,6 +112,9 @@ fn write_scene(
         }
     }
     writeln!(out, "[[toolpath]]\nstrategy = \"program\"\nfile = {}", quoted(&options.program))?;
+    if let Some(stem) = options.program.file_stem().filter(|stem| is_name(&stem.to_string_lossy())) {
+        writeln!(out, "name = {}", toml_string(&stem.to_string_lossy()))?;
+    }
     writeln!(out, "control = {}", toml_string(&options.control))?;
     match options.tool {
         Some(tool) => writeln!(out, "tool = {tool}"),
