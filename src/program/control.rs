@@ -200,6 +200,9 @@ pub struct Control {
     pub arc_tolerance: f64,
 }
 
+/// What sets how closely paths are followed, and moves nothing.
+const QUIET: Option<Code> = Some(Code::Quiet);
+
 const fn cycle(code: u16, down: Down, feeds_up: bool) -> Code {
     Code::Motion(Motion::Cycle(Cycle { code, down, feeds_up }))
 }
@@ -312,7 +315,7 @@ const COMMON: &[(u16, Code)] = &[
 pub const GENERAL: Control = Control {
     word: "general",
     help: "words of Fanuc, Haas, LinuxCNC, Mach, grbl and Siemens in ISO mode together",
-    codes: &[],
+    codes: &[(51, QUIET), (1030, QUIET), (1540, Some(Code::MoreWork)), (1870, QUIET)],
     one_shift: false,
     peck_clearance: 0.25,
     cycles_by_level: false,
@@ -335,7 +338,6 @@ pub const LINUXCNC: Control = Control {
         (440, None),
         (500, None),
         (541, None),
-        (611, Some(Code::Quiet)),
         (650, None),
         (670, None),
         (680, None),
@@ -356,13 +358,19 @@ pub const LINUXCNC: Control = Control {
 pub const FANUC: Control = Control {
     word: "fanuc",
     help: "Fanuc 0i and 30i for milling, and Siemens in its ISO mode",
-    codes: &[(80, Some(Code::Quiet)), (382, None), (383, None), (384, None), (385, None), (432, None)],
+    codes: &[(50, QUIET), (51, QUIET), (80, QUIET), (382, None), (383, None), (384, None), (385, None), (432, None)],
     repeats_in_p: true,
     ..GENERAL
 };
 
 /// Haas mills.
-pub const HAAS: Control = Control { word: "haas", help: "Haas mills", repeats_in_p: false, ..FANUC };
+pub const HAAS: Control = Control {
+    word: "haas",
+    help: "Haas mills",
+    codes: &[(1030, QUIET), (1540, Some(Code::MoreWork)), (1870, QUIET)],
+    repeats_in_p: false,
+    ..FANUC
+};
 
 /// grbl 1.1: no cycles, no subprograms.
 pub const GRBL: Control = Control {
@@ -414,7 +422,7 @@ pub(crate) struct Codes(Vec<Option<Code>>);
 
 impl Codes {
     pub fn of(control: &Control) -> Self {
-        let mut all = vec![None; 1000];
+        let mut all = vec![None; 2000];
         for (tenths, code) in COMMON {
             all[usize::from(*tenths)] = Some(*code);
         }

@@ -37,7 +37,9 @@ impl Interpreter<'_> {
         let initial = *self.state.sticky.level.get_or_insert(level);
         let column = self.block.column(AXES[w]);
         let levels = self.levels(cycle, w, level)?;
-        if levels.bottom > levels.retract {
+        // G87 goes down to R first, and feeds up to Z.
+        let back = cycle.down == Down::Back;
+        if (levels.bottom > levels.retract) != back {
             let Levels { bottom, retract, .. } = levels;
             return Err(Stop::new(column, Fault::CycleUpward { retract, bottom }));
         }
@@ -47,11 +49,11 @@ impl Interpreter<'_> {
         hole[3..].copy_from_slice(&rotary[3..]);
         let to = self.target_of(&[u, v])?;
         let by = [to[u] - hole[u], to[v] - hole[v]];
-        if level < levels.retract {
+        if level < levels.retract && !back {
             self.to_level(StepKind::Rapid, w, levels.retract, 0.0)?;
             level = levels.retract;
         }
-        let clear = if self.state.modal.initial { initial.max(levels.retract) } else { levels.retract };
+        let clear = if self.state.modal.initial || back { initial.max(levels.retract) } else { levels.retract };
         if self.control.cycles_by_level && self.state.modal.initial {
             level = level.max(initial);
         }
@@ -60,7 +62,9 @@ impl Interpreter<'_> {
             let mut over: Place = hole;
             (over[u], over[v], over[w]) = (hole[u] + count * by[0], hole[v] + count * by[1], level);
             self.go(StepKind::Rapid, over)?;
-            self.to_level(StepKind::Rapid, w, levels.retract, 0.0)?;
+            if !back {
+                self.to_level(StepKind::Rapid, w, levels.retract, 0.0)?;
+            }
             self.hole(cycle, &Levels { clear, ..levels })?;
             level = clear;
         }
@@ -99,7 +103,7 @@ impl Interpreter<'_> {
         if matches!(cycle.down, Down::Pecks | Down::Breaks) && peck.is_none() {
             return Err(missing("Q, the depth of a peck"));
         }
-        let feed = self.feed(retract - bottom)?;
+        let feed = self.feed((retract - bottom).abs())?;
         Ok(Levels { w, retract, bottom, clear: retract, peck, feed })
     }
 
@@ -170,11 +174,10 @@ impl Interpreter<'_> {
     /// G87: aside, down past the hole, back, and up at feed.
     fn back(&mut self, levels: &Levels) -> Result<(), Stop> {
         let Levels { w, retract, bottom, clear, feed, .. } = *levels;
-        self.to_level(StepKind::Rapid, w, clear, 0.0)?;
         self.aside(1.0)?;
-        self.to_level(StepKind::Rapid, w, bottom, 0.0)?;
+        self.to_level(StepKind::Rapid, w, retract, 0.0)?;
         self.aside(-1.0)?;
-        self.to_level(StepKind::Feed, w, retract, feed)?;
+        self.to_level(StepKind::Feed, w, bottom, feed)?;
         self.aside(1.0)?;
         self.to_level(StepKind::Rapid, w, clear, 0.0)?;
         self.aside(-1.0)

@@ -146,7 +146,7 @@ mod tests {
         for (x, expected) in at.iter().zip([4.0, 3.0, 3.0, 10.0]) {
             assert!((x - expected).abs() < 1e-12, "{at:?}");
         }
-        assert!((frame.direction(0)[1] - 1.0).abs() < 1e-12 && !frame.is_straight());
+        assert!((frame.direction(0)[1] - 1.0).abs() < 1e-12);
     }
 
     proptest! {

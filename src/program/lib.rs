@@ -23,6 +23,8 @@ mod error;
 mod expression;
 mod flow;
 mod frame;
+#[cfg(test)]
+mod gcode_tests;
 mod interpret;
 mod lines;
 mod parameters;
