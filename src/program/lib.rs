@@ -46,3 +46,6 @@ pub use tools::{TableTool, Tool, ToolTable, cutter_of_remark, read_tool_table};
 
 /// The control that is taken where none is named.
 pub const GENERAL_CONTROL: &Control = &CONTROLS[0];
+
+/// LinuxCNC, which rs274 interprets for.
+pub const LINUXCNC_CONTROL: &Control = &CONTROLS[1];
