@@ -29,6 +29,9 @@ impl Interpreter<'_> {
         let start = self.state.at;
         let column = AXES.iter().filter(|a| self.block.peek(**a).is_some()).map(|a| self.block.column(*a)).min();
         let to = self.target()?;
+        if self.control.spare_offset && self.block.peek(OFFSETS[w]) == Some(0.0) {
+            self.block.ignore(&[OFFSETS[w]]);
+        }
         let radius = self.block.take(b'R').map(|r| r * self.state.modal.unit);
         let centre = match radius {
             Some(radius) => self.centre_by_radius([u, v], &to, radius, clockwise)?,

@@ -72,5 +72,29 @@ fn every_program_moves_as_rs274_says() {
         .collect();
     programs.sort();
     let motions: usize = programs.iter().map(|p| std::panic::catch_unwind(|| check(p)).unwrap_or(0)).sum();
-    assert!(programs.len() >= 20 && motions > 300, "{} programs, {motions} motions", programs.len());
+    assert!(programs.len() >= 30 && motions > 2000, "{} programs, {motions} motions", programs.len());
+}
+
+/// Posts for other controls write the same operation with words that rs274 refuses, and with fewer decimals.
+#[test]
+fn posts_of_one_system_agree() {
+    let ends = |name: &str, control| -> Vec<[f64; 3]> {
+        let bytes = std::fs::read(folder().join(name)).unwrap();
+        let program = read_gcode(name, &bytes, control, &setup()).unwrap_or_else(|error| panic!("{error}"));
+        let moves = program.steps.iter().filter(|step| step.kind != StepKind::Set);
+        moves.map(|step| [step.to[0], step.to[1], step.to[2]]).collect()
+    };
+    for operation in ["pocket", "profile"] {
+        let expected = ends(&format!("freecad_{operation}_linuxcnc.ngc"), &LINUXCNC);
+        for post in ["grbl", "centroid"] {
+            let mut found = ends(&format!("freecad_{operation}_{post}.nc"), crate::GENERAL_CONTROL);
+            // Some posts write a place twice with different words; what moves is the same.
+            found.dedup();
+            let mut expected = expected.clone();
+            expected.dedup();
+            assert_eq!(found.len(), expected.len(), "{operation} {post}");
+            let off = found.iter().flatten().zip(expected.iter().flatten()).map(|(a, b)| (a - b).abs());
+            assert!(off.fold(0.0, f64::max) < 1.1e-3, "{operation} {post}");
+        }
+    }
 }

@@ -192,6 +192,8 @@ pub struct Control {
     pub cycles_by_level: bool,
     /// Whether F counts in the units that were in force before a G20 or G21 of its block.
     pub feed_before_units: bool,
+    /// Whether an arc may have an offset across its plane that says nothing because it is zero.
+    pub spare_offset: bool,
     /// Whether an empty parameter leaves out its word, as on Fanuc.
     pub empty_words: bool,
     /// Whether M98 P counts repeats in the digits before the last four.
@@ -320,6 +322,7 @@ pub const GENERAL: Control = Control {
     peck_clearance: 0.25,
     cycles_by_level: false,
     feed_before_units: false,
+    spare_offset: true,
     empty_words: true,
     repeats_in_p: true,
     arc_tolerance: 0.01,
@@ -349,6 +352,7 @@ pub const LINUXCNC: Control = Control {
     peck_clearance: 0.254,
     cycles_by_level: true,
     feed_before_units: true,
+    spare_offset: false,
     empty_words: false,
     repeats_in_p: false,
     arc_tolerance: 0.001_27,

@@ -131,6 +131,8 @@ impl<'a> Interpreter<'a> {
                 }
             }
         }
+        // What is still open is told at the last line.
+        self.line = self.lines.len().saturating_sub(1);
         self.flow.check_closed()
     }
 
