@@ -20,7 +20,7 @@ fn follow(program: &Program, lines: u32) {
         assert!((1..=lines).contains(&step.line) && step.to.iter().all(|x| x.is_finite()), "{step:?}");
         assert!(step.feed >= 0.0 && (step.setting as usize) < program.settings.len(), "{step:?}");
     }
-    let _ = program.findings();
+    let _ = program.findings(&|_| Some(1.0));
     // A coarse tolerance: huge arcs would take many chords.
     match program.runs(&Placing { chord: 1.0, kinematics: None, lengths: &|_| None }) {
         Ok(runs) => {

@@ -116,6 +116,9 @@ fn write_scene(
         writeln!(out, "name = {}", toml_string(&stem.to_string_lossy()))?;
     }
     writeln!(out, "control = {}", toml_string(&options.control))?;
+    if let Some(tools) = &options.tools {
+        writeln!(out, "tools = {}", quoted(tools))?;
+    }
     match options.tool {
         Some(tool) => writeln!(out, "tool = {tool}"),
         None => Ok(()),

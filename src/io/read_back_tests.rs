@@ -33,7 +33,7 @@ fn three_axes_by_every_control_that_has_no_own_words_for_them() {
             let mut bytes = Vec::new();
             let lines = gcode::write(&mut bytes, &path, cutter.as_ref().unwrap(), &header()).unwrap();
             let program = read_gcode("a.nc", &bytes, control, &Setup::from_above(200.0)).unwrap();
-            assert!(program.findings().is_empty(), "{:?}", program.findings());
+            assert!(program.findings(&|_| None).is_empty(), "{:?}", program.findings(&|_| None));
             let read = program.runs(&placing(None)).unwrap().swap_remove(0).path;
             let found = by_line(&read);
             for (step, line) in path.moves.iter().zip(&lines) {
@@ -66,7 +66,7 @@ fn locations_with_and_without_axes() {
         let mut bytes = Vec::new();
         apt_cl::write(&mut bytes, &path, &Cutter::ball(6.0).unwrap(), &header()).unwrap();
         let program = read_apt("a.cls", &bytes).unwrap();
-        assert!(program.ended && program.notes.is_empty() && program.findings().is_empty());
+        assert!(program.ended && program.notes.is_empty() && program.findings(&|_| None).is_empty());
         let read = program.runs(&placing(None)).unwrap().swap_remove(0).path;
         assert_eq!(read.len(), path.len());
         for (again, step) in read.moves.iter().zip(&path.moves) {

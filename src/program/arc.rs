@@ -47,7 +47,7 @@ impl Interpreter<'_> {
         let feed = self.feed(length)?;
         let mut level = start;
         (level[u], level[v]) = (centre[0], centre[1]);
-        let placed = self.state.frame.to_machine(&level);
+        let placed = self.state.frame.machine_place(&level);
         let sense = if clockwise { -1.0 } else { 1.0 };
         let normal = self.state.frame.direction(w).map(|x| sense * x);
         let plane = self.state.modal.plane;

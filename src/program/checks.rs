@@ -36,6 +36,9 @@ impl FindingKind {
     }
 }
 
+/// Lengths that differ by less, mm, are the same: tables have three or four decimals.
+const SAME_LENGTH: f64 = 1e-4;
+
 /// Something wrong, at the first line where it shows.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Finding {
@@ -52,8 +55,9 @@ pub struct Finding {
 }
 
 impl Program {
-    /// All findings, each kind once for each tool, in the order of their lines.
-    pub fn findings(&self) -> Vec<Finding> {
+    /// All findings, each kind once for each tool, in the order of their lines. `lengths` are those of the tools, mm, where
+    /// they are known.
+    pub fn findings(&self, lengths: &dyn Fn(u32) -> Option<f64>) -> Vec<Finding> {
         let mut found: Vec<Finding> = Vec::new();
         let named = self.settings.iter().any(|setting| setting.tool > 0);
         for step in &self.steps {
@@ -63,14 +67,15 @@ impl Program {
             let setting = self.setting(step);
             let spins = setting.spindle != Spindle::Off && setting.speed > 0.0;
             let other = setting.register > 0 && setting.tool > 0 && setting.register != setting.tool;
+            let known = lengths(setting.tool).filter(|length| (length - setting.length[2]).abs() > SAME_LENGTH);
             for (wrong, kind) in [
                 (!spins && self.spins_at_all(), FindingKind::SpindleOff),
                 (step.feed <= 0.0, FindingKind::NoFeed),
                 (named && setting.tool == 0, FindingKind::NoTool),
-                (other, FindingKind::OtherLength),
+                (other || known.is_some(), FindingKind::OtherLength),
             ] {
                 if wrong {
-                    note(&mut found, kind, step.line, setting);
+                    note(&mut found, kind, step.line, setting, known);
                 }
             }
         }
@@ -89,7 +94,7 @@ impl Program {
     }
 }
 
-fn note(found: &mut Vec<Finding>, kind: FindingKind, line: u32, setting: &Setting) {
+fn note(found: &mut Vec<Finding>, kind: FindingKind, line: u32, setting: &Setting, known: Option<f64>) {
     let tool = setting.tool;
     if let Some(known) = found.iter_mut().find(|known| known.kind == kind && known.tool == tool) {
         known.motions += 1;
@@ -99,9 +104,13 @@ fn note(found: &mut Vec<Finding>, kind: FindingKind, line: u32, setting: &Settin
         FindingKind::SpindleOff => format!("line {line} feeds while the spindle is off"),
         FindingKind::NoFeed => format!("line {line} feeds and no F was given"),
         FindingKind::NoTool => format!("line {line} feeds before the first tool change (M6)"),
-        FindingKind::OtherLength => {
-            format!("line {line} feeds tool {tool} with the length of register H{}", setting.register)
-        }
+        FindingKind::OtherLength => match known {
+            Some(known) => format!(
+                "line {line} feeds tool {tool} as if it were {:.4} mm long; the table of tools has {known:.4} mm",
+                setting.length[2]
+            ),
+            None => format!("line {line} feeds tool {tool} with the length of register H{}", setting.register),
+        },
         FindingKind::NoEnd => String::new(),
     };
     found.push(Finding { kind, line, tool, motions: 1, text });
@@ -114,7 +123,7 @@ mod tests {
 
     fn kinds(text: &str) -> Vec<(FindingKind, u32)> {
         let program = read_gcode("a.nc", text.as_bytes(), GENERAL_CONTROL, &Setup::default()).unwrap();
-        program.findings().iter().map(|finding| (finding.kind, finding.line)).collect()
+        program.findings(&|_| None).iter().map(|finding| (finding.kind, finding.line)).collect()
     }
 
     #[test]

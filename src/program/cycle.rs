@@ -50,7 +50,7 @@ impl Interpreter<'_> {
         let to = self.target_of(&[u, v])?;
         let by = [to[u] - hole[u], to[v] - hole[v]];
         if level < levels.retract && !back {
-            self.to_level(StepKind::Rapid, w, levels.retract, 0.0)?;
+            self.go_to_level(StepKind::Rapid, w, levels.retract, 0.0)?;
             level = levels.retract;
         }
         let clear = if self.state.modal.initial || back { initial.max(levels.retract) } else { levels.retract };
@@ -63,7 +63,7 @@ impl Interpreter<'_> {
             (over[u], over[v], over[w]) = (hole[u] + count * by[0], hole[v] + count * by[1], level);
             self.go(StepKind::Rapid, over)?;
             if !back {
-                self.to_level(StepKind::Rapid, w, levels.retract, 0.0)?;
+                self.go_to_level(StepKind::Rapid, w, levels.retract, 0.0)?;
             }
             self.hole(cycle, &Levels { clear, ..levels })?;
             level = clear;
@@ -123,7 +123,7 @@ impl Interpreter<'_> {
         Ok(to)
     }
 
-    fn to_level(&mut self, kind: StepKind, w: usize, level: f64, feed: f64) -> Result<(), Stop> {
+    fn go_to_level(&mut self, kind: StepKind, w: usize, level: f64, feed: f64) -> Result<(), Stop> {
         let mut to = self.state.at;
         to[w] = level;
         self.fed(kind, to, feed)
@@ -138,15 +138,15 @@ impl Interpreter<'_> {
         if let (Down::Pecks | Down::Breaks, Some(peck)) = (cycle.down, levels.peck) {
             self.pecks(cycle.down, levels, peck)?;
         }
-        self.to_level(StepKind::Feed, w, bottom, feed)?;
+        self.go_to_level(StepKind::Feed, w, bottom, feed)?;
         if cycle.code == 76 {
             self.aside(1.0)?;
         }
         if cycle.feeds_up {
             let to = if self.control.cycles_by_level && cycle.code == 89 { clear } else { retract };
-            self.to_level(StepKind::Feed, w, to, feed)?;
+            self.go_to_level(StepKind::Feed, w, to, feed)?;
         }
-        self.to_level(StepKind::Rapid, w, clear, 0.0)?;
+        self.go_to_level(StepKind::Rapid, w, clear, 0.0)?;
         if cycle.code == 76 {
             self.aside(-1.0)?;
         }
@@ -161,11 +161,11 @@ impl Interpreter<'_> {
         let clearance = self.control.peck_clearance;
         let mut depth = retract - peck;
         while depth > bottom {
-            self.to_level(StepKind::Feed, w, depth, feed)?;
+            self.go_to_level(StepKind::Feed, w, depth, feed)?;
             if down == Down::Pecks {
-                self.to_level(StepKind::Rapid, w, retract, 0.0)?;
+                self.go_to_level(StepKind::Rapid, w, retract, 0.0)?;
             }
-            self.to_level(StepKind::Rapid, w, depth + clearance, 0.0)?;
+            self.go_to_level(StepKind::Rapid, w, depth + clearance, 0.0)?;
             depth -= peck;
         }
         Ok(())
@@ -175,11 +175,11 @@ impl Interpreter<'_> {
     fn back(&mut self, levels: &Levels) -> Result<(), Stop> {
         let Levels { w, retract, bottom, clear, feed, .. } = *levels;
         self.aside(1.0)?;
-        self.to_level(StepKind::Rapid, w, retract, 0.0)?;
+        self.go_to_level(StepKind::Rapid, w, retract, 0.0)?;
         self.aside(-1.0)?;
-        self.to_level(StepKind::Feed, w, bottom, feed)?;
+        self.go_to_level(StepKind::Feed, w, bottom, feed)?;
         self.aside(1.0)?;
-        self.to_level(StepKind::Rapid, w, clear, 0.0)?;
+        self.go_to_level(StepKind::Rapid, w, clear, 0.0)?;
         self.aside(-1.0)
     }
 

@@ -75,7 +75,7 @@ impl Frame {
 
     /// Coordinates of the program as the machine's.
     #[inline]
-    pub fn to_machine(&self, at: &Place) -> Place {
+    pub fn machine_place(&self, at: &Place) -> Place {
         let mut place = *at;
         if let Some(rotation) = &self.rotation {
             place = rotation.turned(place, 1.0);
@@ -93,7 +93,7 @@ impl Frame {
     }
 
     /// Coordinates of the machine as the program's.
-    pub fn from_machine(&self, at: &Place) -> Place {
+    pub fn program_place(&self, at: &Place) -> Place {
         let mut place = *at;
         for (x, offset) in place.iter_mut().zip(&self.work[self.active].0) {
             *x -= offset;
@@ -142,7 +142,7 @@ mod tests {
     fn a_rotation_turns_about_its_centre() {
         let mut frame = frame(90.0, 0.0);
         (frame.shift, frame.local) = ([0.0; 6], [0.0; 6]);
-        let at = frame.to_machine(&[4.0, 4.0, 0.0, 0.0, 0.0, 0.0]);
+        let at = frame.machine_place(&[4.0, 4.0, 0.0, 0.0, 0.0, 0.0]);
         for (x, expected) in at.iter().zip([4.0, 3.0, 3.0, 10.0]) {
             assert!((x - expected).abs() < 1e-12, "{at:?}");
         }
@@ -153,7 +153,7 @@ mod tests {
         #[test]
         fn both_ways_undo_each_other(at in prop::array::uniform6(-500.0..500.0), angle in -400.0..400.0, turn in -180.0..180.0) {
             let frame = frame(angle, turn);
-            let back = frame.from_machine(&frame.to_machine(&at));
+            let back = frame.program_place(&frame.machine_place(&at));
             for (a, b) in at.iter().zip(back) {
                 prop_assert!((a - b).abs() < 1e-9);
             }

@@ -480,11 +480,11 @@ impl<'a> Interpreter<'a> {
             // The offset under which the place here has the coordinates that are given.
             let mut frame = self.state.frame.clone();
             frame.active = index;
-            let mut at = frame.from_machine(&self.state.place);
+            let mut at = frame.program_place(&self.state.place);
             for k in 0..6 {
                 at[k] = named[k].map_or(at[k], |x| x * self.unit_of(k));
             }
-            let shown = frame.to_machine(&at);
+            let shown = frame.machine_place(&at);
             (0..6).for_each(|k| offset[k] += self.state.place[k] - shown[k]);
         } else {
             for k in 0..6 {
@@ -649,7 +649,7 @@ impl<'a> Interpreter<'a> {
         if self.state.modal.motion == Motion::Line {
             let mut tip = to;
             (0..3).for_each(|k| tip[k] -= self.state.frame.length[k]);
-            let at = self.state.frame.from_machine(&tip);
+            let at = self.state.frame.program_place(&tip);
             let feed = self.feed(self.length_to(&at))?;
             return self.fed(StepKind::Feed, at, feed);
         }
@@ -685,7 +685,7 @@ impl<'a> Interpreter<'a> {
     /// A move, in the program's coordinates.
     #[inline]
     pub fn fed(&mut self, kind: StepKind, to: Place, feed: f64) -> Result<(), Stop> {
-        let place = self.state.frame.to_machine(&to);
+        let place = self.state.frame.machine_place(&to);
         let still = place == self.state.place && !matches!(kind, StepKind::Arc(_));
         (self.state.at, self.state.place) = (to, place);
         if still { Ok(()) } else { self.push(kind, feed) }
@@ -719,7 +719,7 @@ impl<'a> Interpreter<'a> {
     fn zero(&self) -> Place {
         let mut frame = self.state.frame.clone();
         (frame.local, frame.rotation) = ([0.0; 6], None);
-        frame.to_machine(&[0.0; 6])
+        frame.machine_place(&[0.0; 6])
     }
 
     fn setting(&self) -> Setting {

@@ -116,7 +116,7 @@ impl State {
         };
         Self {
             modal,
-            at: frame.from_machine(&setup.start),
+            at: frame.program_place(&setup.start),
             frame,
             place: setup.start,
             homes: setup.homes,
@@ -132,7 +132,7 @@ impl State {
 
     /// After the frame has changed: the tip stays where it is.
     pub fn reframe(&mut self) {
-        self.at = self.frame.from_machine(&self.place);
+        self.at = self.frame.program_place(&self.place);
     }
 
     /// Takes another length for the tool's; the spindle stays where it is.

@@ -1,12 +1,14 @@
 //! Programs from elsewhere: their files as paths of one tool.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use super::named_file::NamedFile;
 use super::{Scene, ToolpathRequest};
 use io::regular;
 use keys::{SceneError, SceneText};
 use motion::{Move, MoveKind, Toolpath};
-use program::{Control, Finding, Placing, Program, ProgramError, Setup, ToolRun, looks_like_apt, read_apt, read_gcode};
+use program::{Control, Finding, Placing, Program, ProgramError, Setup, ToolRun, ToolTable, looks_like_apt, read_apt, read_gcode};
 use toolpath::{ForeignProgram, ReadProgram};
 
 /// Largest program that is read, bytes: some twenty million lines.
@@ -14,6 +16,9 @@ const MAX_BYTES: u64 = 1 << 29;
 
 /// How far above the program's zero that of the machine is taken to be, mm. G28 and G53 go there.
 pub const MACHINE_ZERO_ABOVE: f64 = 200.0;
+
+/// Largest table of tools that is read, bytes.
+const MAX_TABLE_BYTES: u64 = 1 << 20;
 
 /// Notes of a program that are listed.
 const MOST_NOTES: usize = 20;
@@ -34,23 +39,47 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
     let refused = |error: ProgramError| in_text(&error, &bytes);
     let is_apt = looks_like_apt(&bytes);
     let name = file.path.file_name().map_or_else(|| file.written.clone(), |n| n.to_string_lossy().into_owned());
+    let lengths = match request.directions.get(1) {
+        Some(tools) => lengths(tools, scene)?,
+        None => BTreeMap::new(),
+    };
     let read = if is_apt {
         read_apt(&name, &bytes)
     } else {
-        read_gcode(&name, &bytes, control, &Setup::from_above(MACHINE_ZERO_ABOVE))
+        let registers = lengths.iter().map(|(number, length)| (*number, [0.0, 0.0, *length])).collect();
+        let setup = Setup { lengths: registers, ..Setup::from_above(MACHINE_ZERO_ABOVE) };
+        read_gcode(&name, &bytes, control, &setup)
     };
     let read = read.map_err(refused)?;
     let kinematics = scene.five_axis.as_ref().map(|machine| &machine.kinematics);
-    let placing = Placing { chord: scene.tolerance.chord, kinematics, lengths: &|_| None };
+    // Locations by APT are of the tip, whatever its length.
+    let length = |tool: u32| lengths.get(&tool).copied().filter(|_| !is_apt);
+    let placing = Placing { chord: scene.tolerance.chord, kinematics, lengths: &length };
     let runs = read.runs(&placing).map_err(refused)?;
     let tool = chosen(foreign.tool, &read, &runs)
         .map_err(|(message, cure)| scene.source.error(file.span.clone(), message, cure))?;
     let path = joined(runs.into_iter().filter(|run| run.tool == tool));
     let findings: Vec<Finding> =
-        read.findings().into_iter().filter(|found| found.tool == tool || found.tool == 0).collect();
+        read.findings(&length).into_iter().filter(|found| found.tool == tool || found.tool == 0).collect();
     let foreign = ForeignProgram { read: Some(Arc::new(ReadProgram { path, findings, notes: notes(&read) })), ..foreign.clone() };
     request.strategy = Box::new(foreign);
     Ok(())
+}
+
+/// The lengths of the tools of a table, mm, by their numbers.
+fn lengths(file: &NamedFile, scene: &Scene) -> Result<BTreeMap<u32, f64>, SceneError> {
+    let unreadable = |reason: String| {
+        let message = format!("cannot read the tools {}: {reason}", file.path.display());
+        scene.source.error(file.span.clone(), message, "name a file of tools in TOML")
+    };
+    let bytes = regular::read(&file.path, MAX_TABLE_BYTES).map_err(|e| unreadable(e.to_string()))?;
+    if bytes.len() as u64 > MAX_TABLE_BYTES {
+        return Err(unreadable(format!("it is larger than {MAX_TABLE_BYTES} bytes")));
+    }
+    let text = String::from_utf8(bytes).map_err(|_| unreadable("it is not UTF-8 text".to_owned()))?;
+    let source = SceneText::new(file.path.to_string_lossy(), text);
+    let table = ToolTable::read(&source)?;
+    Ok(table.tools.iter().filter_map(|tool| Some((tool.number, tool.gauge_length?))).collect())
 }
 
 /// The fault shown in the text of the program, where that can be shown.

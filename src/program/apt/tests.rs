@@ -31,7 +31,7 @@ FINI
 #[test]
 fn nx_is_read_with_its_arcs() {
     let program = read(NX);
-    assert!(program.ended && program.findings().is_empty(), "{:?}", program.findings());
+    assert!(program.ended && program.findings(&|_| None).is_empty(), "{:?}", program.findings(&|_| None));
     let kinds: Vec<(StepKind, u32)> = program.steps.iter().map(|s| (s.kind, s.line)).collect();
     use StepKind::{Arc, Feed, Rapid};
     assert_eq!(kinds, [(Rapid, 11), (Feed, 13), (Arc(0), 15), (Feed, 16)]);
@@ -89,7 +89,7 @@ fn what_may_move_the_tool_is_refused_with_its_line() {
     }
     assert!(read_apt("a.cls", b"GOTO/1,2,3\nCYCLE/OFF\nFINI").is_ok());
     let cut = read("GOTO/0,0,1\nFEDRAT/100\nGOTO/1,0,1\n");
-    assert_eq!(cut.findings().last().map(|f| f.kind), Some(FindingKind::NoEnd));
+    assert_eq!(cut.findings(&|_| None).last().map(|f| f.kind), Some(FindingKind::NoEnd));
 }
 
 #[test]

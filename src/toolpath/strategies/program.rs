@@ -5,7 +5,7 @@ use std::fmt::{self, Write as _};
 use std::sync::Arc;
 
 use crate::vocabulary::{Definition, PartKind, Passes, PlanError, Strategy, Task};
-use keys::toml_string;
+use keys::{Located, toml_string};
 use motion::Toolpath;
 use program::{Control, Finding};
 
@@ -21,6 +21,8 @@ pub struct ForeignProgram {
     pub control: &'static str,
     /// The tool whose moves are meant; `None` where the program has one only.
     pub tool: Option<u32>,
+    /// A table of tools as a scene names it: their lengths, which the control's registers are taken to hold.
+    pub tools: Option<String>,
     /// What was read from the file; `None` until it is.
     pub read: Option<Arc<ReadProgram>>,
 }
@@ -41,14 +43,17 @@ pub(crate) static DEFINITION: Definition = Definition {
     word: "program",
     help: "a program from elsewhere, in G-code or APT: cut, measured and judged as it is",
     part: PartKind::Any,
-    keys: &["file", "control", "tool"],
+    keys: &["file", "control", "tool", "tools"],
     read: |from| {
         let file = from.section.required_text("file", "job.nc")?;
         let control = from.section.word("control", &Control::words())?;
         let control = control.map_or(program::GENERAL_CONTROL.word, |word| word.value);
         let tool = from.section.count("tool", 0..=MOST_TOOLS)?;
-        let program = ForeignProgram { file: file.value.to_owned(), control, tool, read: None };
-        from.tables.push(keys::Located { value: file.value.to_owned(), span: file.span });
+        let tools = from.section.text("tools")?;
+        let named = |text: &Located<&str>| Located { value: text.value.to_owned(), span: text.span.clone() };
+        from.tables.extend(std::iter::once(&file).chain(&tools).map(named));
+        let tools = tools.map(|tools| tools.value.to_owned());
+        let program = ForeignProgram { file: file.value.to_owned(), control, tool, tools, read: None };
         Ok(Box::new(program))
     },
 };
@@ -61,8 +66,11 @@ impl Strategy for ForeignProgram {
     fn write(&self, out: &mut String) -> fmt::Result {
         writeln!(out, "file = {}", toml_string(&self.file))?;
         writeln!(out, "control = \"{}\"", self.control)?;
-        match self.tool {
-            Some(tool) => writeln!(out, "tool = {tool}"),
+        if let Some(tool) = self.tool {
+            writeln!(out, "tool = {tool}")?;
+        }
+        match &self.tools {
+            Some(tools) => writeln!(out, "tools = {}", toml_string(tools)),
             None => Ok(()),
         }
     }
