@@ -205,6 +205,11 @@ impl Session {
             found.claims,
             planned.plan.path.program_name(),
         );
+        let (verdict, claims) = if request.foreign().is_some_and(|read| read.others) {
+            figures::with_other_tools(claims)
+        } else {
+            (verdict, claims)
+        };
         let measurement = &measured.measurement;
         let result = ToolpathResult {
             name: request.name.clone(),

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::named_file::NamedFile;
 use super::{Scene, ToolpathRequest};
+use cutter::Cutter;
 use io::regular;
 use keys::{SceneError, SceneText};
 use motion::{Move, MoveKind, Toolpath};
@@ -39,10 +40,12 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
     let refused = |error: ProgramError| in_text(&error, &bytes);
     let is_apt = looks_like_apt(&bytes);
     let name = file.path.file_name().map_or_else(|| file.written.clone(), |n| n.to_string_lossy().into_owned());
-    let lengths = match request.directions.get(1) {
-        Some(tools) => lengths(tools, scene)?,
-        None => BTreeMap::new(),
+    let table = match request.directions.get(1) {
+        Some(tools) => table(tools, scene)?,
+        None => ToolTable::default(),
     };
+    let lengths: BTreeMap<u32, f64> =
+        table.tools.iter().filter_map(|tool| Some((tool.number, tool.gauge_length?))).collect();
     let read = if is_apt {
         read_apt(&name, &bytes)
     } else {
@@ -58,16 +61,19 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
     let runs = read.runs(&placing).map_err(refused)?;
     let tool = chosen(foreign.tool, &read, &runs)
         .map_err(|(message, cure)| scene.source.error(file.span.clone(), message, cure))?;
+    let others = Others::of(&runs, tool, &table);
     let path = joined(runs.into_iter().filter(|run| run.tool == tool));
     let findings: Vec<Finding> =
         read.findings(&length).into_iter().filter(|found| found.tool == tool || found.tool == 0).collect();
-    let foreign = ForeignProgram { read: Some(Arc::new(ReadProgram { path, findings, notes: notes(&read) })), ..foreign.clone() };
-    request.strategy = Box::new(foreign);
+    let Others { before, unknown_before, any } = others;
+    let notes = notes(&read);
+    let read = ReadProgram { path, before, unknown_before, others: any, findings, notes };
+    request.strategy = Box::new(ForeignProgram { read: Some(Arc::new(read)), ..foreign.clone() });
     Ok(())
 }
 
-/// The lengths of the tools of a table, mm, by their numbers.
-fn lengths(file: &NamedFile, scene: &Scene) -> Result<BTreeMap<u32, f64>, SceneError> {
+/// The table of tools that a toolpath names.
+fn table(file: &NamedFile, scene: &Scene) -> Result<ToolTable, SceneError> {
     let unreadable = |reason: String| {
         let message = format!("cannot read the tools {}: {reason}", file.path.display());
         scene.source.error(file.span.clone(), message, "name a file of tools in TOML")
@@ -78,8 +84,7 @@ fn lengths(file: &NamedFile, scene: &Scene) -> Result<BTreeMap<u32, f64>, SceneE
     }
     let text = String::from_utf8(bytes).map_err(|_| unreadable("it is not UTF-8 text".to_owned()))?;
     let source = SceneText::new(file.path.to_string_lossy(), text);
-    let table = ToolTable::read(&source)?;
-    Ok(table.tools.iter().filter_map(|tool| Some((tool.number, tool.gauge_length?))).collect())
+    ToolTable::read(&source)
 }
 
 /// The fault shown in the text of the program, where that can be shown.
@@ -118,6 +123,26 @@ fn chosen(asked: Option<u32>, read: &Program, runs: &[ToolRun]) -> Result<u32, (
                 )),
             }
         }
+    }
+}
+
+/// What the other tools of a program do.
+struct Others {
+    before: Vec<(Cutter, Toolpath)>,
+    unknown_before: bool,
+    any: bool,
+}
+
+impl Others {
+    /// Of all runs beside those of a tool; what comes before its last run is cut before it.
+    fn of(runs: &[ToolRun], tool: u32, table: &ToolTable) -> Self {
+        let last = runs.iter().rposition(|run| run.tool == tool).unwrap_or_default();
+        let cuts = |run: &&ToolRun| run.tool != tool && feeds(std::slice::from_ref(*run), run.tool);
+        let earlier: Vec<&ToolRun> = runs[..last].iter().filter(cuts).collect();
+        let known = |run: &&ToolRun| Some((table.get(run.tool)?.cutter, run.path.clone()));
+        let before: Vec<(Cutter, Toolpath)> = earlier.iter().filter_map(known).collect();
+        let unknown_before = before.len() < earlier.len();
+        Self { before, unknown_before, any: runs.iter().any(|run| cuts(&run)) }
     }
 }
 

@@ -189,3 +189,30 @@ fn what_cannot_be_read_is_refused_with_line_and_cure() {
         }
     }
 }
+
+#[test]
+fn a_tool_is_judged_on_what_the_tools_before_it_left() {
+    let home = tempfile::tempdir().unwrap();
+    let tools = "[[tool]]\nnumber = 1\nshape = \"ball\"\ndiameter = 6\n[[tool]]\nnumber = 2\nshape = \"flat\"\ndiameter = 10\n";
+    std::fs::write(home.path().join("tools.toml"), tools).unwrap();
+    // A face mill takes the block off first; then a rapid of the ball runs close over the plate.
+    let mut program = raster();
+    let start = line_of(&program, "T1 M6") - 1;
+    let face = ["T2 M6", "S8000 M3", "G0 X-10 Y2 Z5", "G1 Z0.2 F500", "X26", "Y7", "X-10", "G0 Z10"];
+    program.splice(start..start, face.map(str::to_owned));
+    let over = line_of(&program, "G1 Z0 F600");
+    program.insert(over - 1, "G0 Z0.5\nX16\nX0".to_owned());
+    let claims = |answer: &Answer, report: Option<Value>, kind: &str| -> Vec<String> {
+        let report = report.unwrap_or_else(|| panic!("{}", answer.stderr));
+        let found = report["toolpaths"][0][kind].as_array().unwrap();
+        found.iter().map(|claim| claim["what"].as_str().unwrap().to_owned()).collect()
+    };
+    let (answer, report) = verify_in(home.path(), &program, &["--tools", "tools.toml", "--tool", "1"]);
+    assert_eq!(answer.code, Some(0), "{}{}", answer.stdout, answer.stderr);
+    drop(report);
+    let (answer, report) = verify_in(home.path(), &program, &["--tool", "1"]);
+    assert_eq!((answer.code, claims(&answer, report, "undecided")), (Some(1), vec!["rapid".to_owned()]));
+    // What the face mill leaves, another tool may take.
+    let (answer, report) = verify_in(home.path(), &program, &["--tools", "tools.toml", "--tool", "2"]);
+    assert_eq!(claims(&answer, report, "undecided"), ["uncut"]);
+}

@@ -2,7 +2,7 @@
 
 use cutter::Solid;
 use metrology::{RemovalFigures, View, removal_figures, voxel_removal_figures};
-use report::{Claim, Figure, Gravity, place};
+use report::{Claim, Figure, Gravity, Verdict, place};
 use sim::{MoveRemoval, VoxelEngine, VoxelStock, ZMap, cut_in_order};
 use work::monitor::Monitor;
 
@@ -29,7 +29,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     }
     let (mut r, moves) = match run.view() {
         View::Heights(cut) => {
-            let stock = ZMap::block(cut.grid, run.session.top);
+            let stock = stock(run, cut, monitor)?;
             let removed = cut_in_order(stock, &run.scene().cutter, run.path(), monitor)?;
             (removal_figures(run.path(), &removed, &cut.height), removed.moves)
         }
@@ -39,6 +39,10 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
         contact.line = run.line(contact.move_index);
     }
     let mut claims = vec![no_rapid_in_stock(&r, run.path().program_name())];
+    if run.request.foreign().is_some_and(|read| read.unknown_before) {
+        let decided_by = "a table of tools with the cutters of the tools before would decide it";
+        doubt(&mut claims, decided_by);
+    }
     let (greatest, bound) =
         (r.max_material_removal_rate_mm3_min, r.max_material_removal_rate_error_bound_mm3_min);
     let (most, mean) = (r.p95_material_removal_rate_mm3_min, r.mean_material_removal_rate_mm3_min);
@@ -56,6 +60,23 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     let entries = entries::of(run, &moves);
     claims.extend(entries.claims);
     Ok(Finding { figure: Some(figure), claims, notes: entries.notes })
+}
+
+/// What seems violated may not be: other tools may have cut there.
+pub(crate) fn doubt(claims: &mut [Claim], decided_by: &'static str) {
+    for claim in claims.iter_mut().filter(|claim| claim.verdict() == Verdict::Fail) {
+        (claim.error_bound, claim.decided_by) = (f64::INFINITY, decided_by);
+    }
+}
+
+/// The block, less what other tools of a program from elsewhere cut before.
+fn stock(run: &Run<'_>, cut: &ZMap, monitor: &dyn Monitor) -> Result<ZMap, JobError> {
+    let mut stock = ZMap::block(cut.grid, run.session.top);
+    for (cutter, path) in run.request.foreign().iter().flat_map(|read| &read.before) {
+        stock = sim::cut(stock, cutter, path, monitor)?;
+        stock.cut_by.fill(sim::NOT_CUT);
+    }
+    Ok(stock)
 }
 
 /// The voxel of removal in order, mm.

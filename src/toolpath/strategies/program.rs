@@ -5,6 +5,7 @@ use std::fmt::{self, Write as _};
 use std::sync::Arc;
 
 use crate::vocabulary::{Definition, PartKind, Passes, PlanError, Strategy, Task};
+use cutter::Cutter;
 use keys::{Located, toml_string};
 use motion::Toolpath;
 use program::{Control, Finding};
@@ -32,6 +33,12 @@ pub struct ForeignProgram {
 pub struct ReadProgram {
     /// The moves of the tool.
     pub path: Toolpath,
+    /// What other tools of the program cut before, where the table of tools has their cutters.
+    pub before: Vec<(Cutter, Toolpath)>,
+    /// Whether other tools feed before this one whose cutters are not known.
+    pub unknown_before: bool,
+    /// Whether other tools feed at all.
+    pub others: bool,
     /// What is wrong with it before it is cut.
     pub findings: Vec<Finding>,
     /// What is to be said of it.
