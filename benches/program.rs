@@ -23,7 +23,8 @@ fn gcode() -> String {
 fn apt() -> String {
     let gcode = gcode();
     let words = |line: &str| line.replace(['X', 'Y', 'Z'], "").replace(' ', ",");
-    let goto = gcode.lines().filter(|line| line.starts_with('X')).map(|line| format!("GOTO/{}\n", words(line)));
+    let goto =
+        gcode.lines().filter(|line| line.starts_with('X')).map(|line| format!("GOTO/{}\n", words(line)));
     format!("FROM/0,0,5\nFEDRAT/1000,MMPM\n{}FINI\n", goto.collect::<String>())
 }
 

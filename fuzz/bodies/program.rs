@@ -26,7 +26,11 @@ fn follow(program: &Program, lines: u32) {
         Ok(runs) => {
             for run in &runs {
                 assert_eq!(run.path.origin.lines.len(), run.path.len());
-                let sound = run.path.moves.iter().all(|m| m.to.tip.iter().all(|x| x.is_finite()) && m.feed_rate > 0.0);
+                let sound = run
+                    .path
+                    .moves
+                    .iter()
+                    .all(|m| m.to.tip.iter().all(|x| x.is_finite()) && m.feed_rate > 0.0);
                 assert!(sound && run.path.start.tip.iter().all(|x| x.is_finite()));
             }
         }

@@ -46,7 +46,8 @@ fn text(options: &VerifyOptions) -> Result<String, CliError> {
         (None, None) => return Err(refused("no cutter is given", "add --cutter or --tools")),
     };
     let mut text = String::new();
-    write_scene(&mut text, options, &cutter, &holder).map_err(|e| refused(&e.to_string(), "check the arguments"))?;
+    write_scene(&mut text, options, &cutter, &holder)
+        .map_err(|e| refused(&e.to_string(), "check the arguments"))?;
     Ok(text)
 }
 
@@ -56,7 +57,9 @@ fn refused(what: &str, cure: &str) -> CliError {
 
 /// Cutter and holder of a tool of a table, the latter as scenes spell it.
 fn of_table(file: &Path, number: Option<u32>) -> Result<(Cutter, String), CliError> {
-    let unreadable = |reason: String| refused(&format!("cannot read {}: {reason}", shown(file)), "name a file of tools in TOML");
+    let unreadable = |reason: String| {
+        refused(&format!("cannot read {}: {reason}", shown(file)), "name a file of tools in TOML")
+    };
     let bytes = io::regular::read(file, MAX_BYTES).map_err(|e| unreadable(e.to_string()))?;
     let text = String::from_utf8(bytes).map_err(|_| unreadable("it is no UTF-8 text".to_owned()))?;
     let source = SceneText::new(file.to_string_lossy(), text);
@@ -65,9 +68,14 @@ fn of_table(file: &Path, number: Option<u32>) -> Result<(Cutter, String), CliErr
     let listed = tools.iter().map(|tool| tool.number.to_string()).collect::<Vec<_>>().join(", ");
     let tool = match (number, &tools[..]) {
         (None, [only]) => only,
-        (None, _) => return Err(refused("the table has several tools", &format!("name one of {listed} with --tool"))),
+        (None, _) => {
+            return Err(refused("the table has several tools", &format!("name one of {listed} with --tool")));
+        }
         (Some(number), _) => tools.iter().find(|tool| tool.number == number).ok_or_else(|| {
-            refused(&format!("{} has no tool {number}", shown(file)), &format!("name one of {listed} with --tool"))
+            refused(
+                &format!("{} has no tool {number}", shown(file)),
+                &format!("name one of {listed} with --tool"),
+            )
         })?,
     };
     let mut holder = String::new();
@@ -90,12 +98,7 @@ fn is_name(stem: &str) -> bool {
     stem.len() <= 40 && stem.is_ascii() && stem.bytes().any(|b| b.is_ascii_alphanumeric())
 }
 
-fn write_scene(
-    out: &mut String,
-    options: &VerifyOptions,
-    cutter: &Cutter,
-    holder: &str,
-) -> std::fmt::Result {
+fn write_scene(out: &mut String, options: &VerifyOptions, cutter: &Cutter, holder: &str) -> std::fmt::Result {
     let quoted = |path: &Path| toml_string(&path.to_string_lossy());
     writeln!(out, "title = {}", toml_string(&name(&options.program)))?;
     writeln!(out, "[part]\nfile = {}\nunit = {}", quoted(&options.part), toml_string(&options.unit))?;

@@ -47,7 +47,8 @@ fn three_axes_by_every_control_that_has_no_own_words_for_them() {
                 let again = found.get(&lines[k]).filter(|_| !still);
                 let Some(again) = again else { continue };
                 assert_eq!(again.kind == MoveKind::Rapid, step.kind == MoveKind::Rapid, "line {}", lines[k]);
-                let fed = step.kind == MoveKind::Rapid || (again.feed_rate - step.feed_rate).abs() <= 0.5001e-4;
+                let fed =
+                    step.kind == MoveKind::Rapid || (again.feed_rate - step.feed_rate).abs() <= 0.5001e-4;
                 assert!(fed, "line {}", lines[k]);
             }
         }
@@ -86,7 +87,8 @@ fn five_axes_on_every_machine_in_both_styles() {
             let joints = follow(&kinematics, &path, &style.following(0.002, 50.0)).unwrap();
             let post = FiveAxisPost { kinematics: &kinematics, joints: &joints, style, rapid_rate: 15_000.0 };
             let mut bytes = Vec::new();
-            let lines = write_five_axis(&mut bytes, &path, &post, &Cutter::ball(6.0).unwrap(), &header()).unwrap();
+            let lines =
+                write_five_axis(&mut bytes, &path, &post, &Cutter::ball(6.0).unwrap(), &header()).unwrap();
             let program = read_gcode("a.nc", &bytes, GENERAL_CONTROL, &Setup::from_above(400.0)).unwrap();
             let read = program.runs(&placing(Some(&kinematics))).unwrap().swap_remove(0).path;
             let found = by_line(&read);

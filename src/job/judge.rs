@@ -23,7 +23,11 @@ pub(crate) fn judge(
     program: &str,
 ) -> (Verdict, Vec<Claim>) {
     let mut claims = found;
-    claims.extend([gouge(measured, limits, program), uncut(measured, limits), highest(measured, limits, rule)]);
+    claims.extend([
+        gouge(measured, limits, program),
+        uncut(measured, limits),
+        highest(measured, limits, rule),
+    ]);
     claims.extend(most(measured, limits, rule));
     claims.sort_by_key(|claim| std::cmp::Reverse(claim.gravity));
     (claims.iter().map(Claim::verdict).max().unwrap_or(Verdict::Undecided), claims)

@@ -197,8 +197,7 @@ impl Session {
             wall_s: measured.wall_s,
             threads: work::parallel::threads(),
         };
-        let (verdict, claims) =
-            judge::judge(
+        let (verdict, claims) = judge::judge(
             &measured.measurement,
             &scene.tolerance,
             &scene.scallop_rule,

@@ -14,10 +14,46 @@ use crate::program::{Arc, Note, Program, Setting, Spindle, Step, StepKind, ToolR
 
 /// Major words that move nothing, with those that only machines act on.
 const QUIET: [&str; 40] = [
-    "PARTNO", "PPRINT", "REMARK", "MACHIN", "COOLNT", "CLEARP", "OPSKIP", "STOP", "OPSTOP", "DELAY", "INTOL", "OUTTOL",
-    "TOLER", "CUTCOM", "LINTOL", "PREFUN", "AUXFUN", "SEQNO", "TOOLPATH", "TLDATA", "MSYS", "PAINT", "END-OF-PATH",
-    "TOOLNO", "OPERATION", "ROTHED", "MODE", "DISPLY", "LEADER", "CHECK", "INSERT", "TPRINT", "PROGRAM", "MCHTOL",
-    "CATMAT", "CATPROCESS", "CATCALL", "PIVOTZ", "SELCTL", "HEAD",
+    "PARTNO",
+    "PPRINT",
+    "REMARK",
+    "MACHIN",
+    "COOLNT",
+    "CLEARP",
+    "OPSKIP",
+    "STOP",
+    "OPSTOP",
+    "DELAY",
+    "INTOL",
+    "OUTTOL",
+    "TOLER",
+    "CUTCOM",
+    "LINTOL",
+    "PREFUN",
+    "AUXFUN",
+    "SEQNO",
+    "TOOLPATH",
+    "TLDATA",
+    "MSYS",
+    "PAINT",
+    "END-OF-PATH",
+    "TOOLNO",
+    "OPERATION",
+    "ROTHED",
+    "MODE",
+    "DISPLY",
+    "LEADER",
+    "CHECK",
+    "INSERT",
+    "TPRINT",
+    "PROGRAM",
+    "MCHTOL",
+    "CATMAT",
+    "CATPROCESS",
+    "CATCALL",
+    "PIVOTZ",
+    "SELCTL",
+    "HEAD",
 ];
 
 /// Words after which all of the line is text.
@@ -145,7 +181,12 @@ impl Statement {
     }
 
     /// All its words as numbers.
-    fn all_numbers(&self, what: &'static str, wanted: &'static str, counts: &[usize]) -> Result<Vec<f64>, Stop> {
+    fn all_numbers(
+        &self,
+        what: &'static str,
+        wanted: &'static str,
+        counts: &[usize],
+    ) -> Result<Vec<f64>, Stop> {
         let values: Vec<f64> = self
             .words
             .iter()
@@ -211,8 +252,8 @@ impl Reader {
             "GOTO" => self.go_to(statement),
             "GODLTA" => self.go_by(statement),
             "FROM" => self.from(statement),
-            "GOHOME" | "GOFWD" | "GOLFT" | "GORGT" | "GOBACK" | "GOUP" | "GODOWN" | "CYCLE" | "COPY" | "INDEX"
-            | "TRACUT" | "ROTABL" | "TRANS" | "ORIGIN"
+            "GOHOME" | "GOFWD" | "GOLFT" | "GORGT" | "GOBACK" | "GOUP" | "GODOWN" | "CYCLE" | "COPY"
+            | "INDEX" | "TRACUT" | "ROTABL" | "TRANS" | "ORIGIN"
                 if !statement.has("OFF") =>
             {
                 Err(Stop::new(0, Fault::Statement(statement.text())))
@@ -242,7 +283,10 @@ impl Reader {
                 Ok(())
             }
             "CUTTER" => {
-                let text = format!("CUTTER/{}", statement.numbers().iter().map(f64::to_string).collect::<Vec<_>>().join(","));
+                let text = format!(
+                    "CUTTER/{}",
+                    statement.numbers().iter().map(f64::to_string).collect::<Vec<_>>().join(",")
+                );
                 let (tool, line) = (self.setting.tool, statement.line as u32 + 1);
                 self.out.tools.push(ToolRemark { tool, line, text });
                 Ok(())
@@ -289,7 +333,14 @@ impl Reader {
         self.per_revolution = statement.has("MMPR") || statement.has("IPR") || statement.has("PERREV");
         if let Some(feed) = number.filter(|feed| *feed >= 0.0) {
             let metric = statement.has("MMPM") || statement.has("MMPR");
-            self.feed = feed * if inch { 25.4 } else if metric { 1.0 } else { self.unit };
+            self.feed = feed
+                * if inch {
+                    25.4
+                } else if metric {
+                    1.0
+                } else {
+                    self.unit
+                };
         }
         if statement.has("RAPID") {
             self.rapid = true;
@@ -400,7 +451,8 @@ impl Reader {
             return Err(Stop::new(0, Fault::Count { what, wanted, found: values.len() }));
         }
         let axis = Vector3::new(values[3], values[4], values[5]);
-        let axis = axis.try_normalize(1e-9).ok_or_else(|| Stop::new(0, Fault::Statement(statement.text())))?;
+        let axis =
+            axis.try_normalize(1e-9).ok_or_else(|| Stop::new(0, Fault::Statement(statement.text())))?;
         let centre = Point3::new(values[0], values[1], values[2]) * self.unit;
         self.circle = Some(Circle { centre, axis, radius: values[6].abs() * self.unit });
         Ok(())
@@ -418,7 +470,10 @@ fn arc(circle: &Circle, from: &Point3, to: &Point3) -> Option<Arc> {
         spoke - circle.axis * spoke.dot(&circle.axis)
     });
     let allowed = 0.01f64.max(RADIUS_SHARE * circle.radius);
-    if (a.norm() - circle.radius).abs() > allowed || (b.norm() - circle.radius).abs() > allowed || circle.radius <= 0.0 {
+    if (a.norm() - circle.radius).abs() > allowed
+        || (b.norm() - circle.radius).abs() > allowed
+        || circle.radius <= 0.0
+    {
         return None;
     }
     let angle = a.cross(&b).dot(&circle.axis).atan2(a.dot(&b));

@@ -27,7 +27,8 @@ impl Interpreter<'_> {
     pub fn arc(&mut self, clockwise: bool) -> Result<(), Stop> {
         let [u, v, w] = self.plane_axes();
         let start = self.state.at;
-        let column = AXES.iter().filter(|a| self.block.peek(**a).is_some()).map(|a| self.block.column(*a)).min();
+        let column =
+            AXES.iter().filter(|a| self.block.peek(**a).is_some()).map(|a| self.block.column(*a)).min();
         let to = self.target()?;
         if self.control.spare_offset && self.block.peek(OFFSETS[w]) == Some(0.0) {
             self.block.ignore(&[OFFSETS[w]]);
@@ -147,7 +148,11 @@ impl Arc {
         let radius = dot(&spoke, &spoke).sqrt();
         let flat = minus(&last, &n.map(|x| x * dot(&last, &n)));
         let grown = 1.0 + t * (dot(&flat, &flat).sqrt() / radius - 1.0);
-        let across = [n[1] * spoke[2] - n[2] * spoke[1], n[2] * spoke[0] - n[0] * spoke[2], n[0] * spoke[1] - n[1] * spoke[0]];
+        let across = [
+            n[1] * spoke[2] - n[2] * spoke[1],
+            n[2] * spoke[0] - n[0] * spoke[2],
+            n[0] * spoke[1] - n[1] * spoke[0],
+        ];
         let (sin, cos) = (t * self.sweep).sin_cos();
         [0, 1, 2].map(|k| self.centre[k] + grown * (cos * spoke[k] + sin * across[k]) + t * rise * n[k])
     }

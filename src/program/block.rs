@@ -239,13 +239,12 @@ impl Block {
                 if !(0.0..10_000.0).contains(&tenths) || (value * 10.0 - tenths).abs() > 1e-3 {
                     return Err(Stop::new(column, fault()));
                 }
-                let word = CodeWord { tenths: tenths as u16, column: column.min(usize::from(u16::MAX)) as u16 };
+                let word =
+                    CodeWord { tenths: tenths as u16, column: column.min(usize::from(u16::MAX)) as u16 };
                 let list = if letter == b'G' { &mut self.g } else { &mut self.m };
                 if list.push(word) { Ok(()) } else { Err(Stop::new(column, fault())) }
             }
-            _ if self.present & bit(letter) != 0 => {
-                Err(Stop::new(column, Fault::Twice(char::from(letter))))
-            }
+            _ if self.present & bit(letter) != 0 => Err(Stop::new(column, Fault::Twice(char::from(letter)))),
             _ => {
                 let k = usize::from(letter - b'A');
                 self.values[k] = value;
@@ -361,8 +360,7 @@ mod tests {
         assert_eq!((block.comment, block.peek(b'X')), (Some((4, 7)), Some(1.0)));
         assert!(read("/ G0 X1").unwrap().deleted && read("/2 G0").unwrap().deleted);
         let block = read("#1=[2*3] #<a b> = -#2 + 1").unwrap();
-        let expected =
-            [(Target::Number(1), Some(6.0)), (Target::Name("ab".into()), Some(-3.0))];
+        let expected = [(Target::Number(1), Some(6.0)), (Target::Name("ab".into()), Some(-3.0))];
         assert_eq!(block.assignments, expected);
         assert!(read("X#5 Y1").unwrap().peek(b'X').is_none(), "an empty parameter leaves its word out");
         let mut block = Block::default();
@@ -373,7 +371,9 @@ mod tests {
 
     #[test]
     fn control_flow_ends_the_words() {
-        for (text, at) in [("o100 sub", 0), ("N5 IF [#1 GT 2] GOTO 7", 3), ("WHILE[1]DO1", 0), ("END1", 0), (":12", 0)] {
+        for (text, at) in
+            [("o100 sub", 0), ("N5 IF [#1 GT 2] GOTO 7", 3), ("WHILE[1]DO1", 0), ("END1", 0), (":12", 0)]
+        {
             assert_eq!(read(text).unwrap().flow, Some(at), "{text}");
         }
         assert_eq!(read("I5 D2 W3 E4").unwrap().flow, None);

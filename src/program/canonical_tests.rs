@@ -43,7 +43,14 @@ fn compare(name: &str, program: &Program, step: &Step, expected: &str) {
     if let StepKind::Arc(index) = step.kind {
         let arc = &program.arcs[index as usize];
         let [u, v, w] = arc.plane.axes();
-        near(name, step.line, "centre", &[arc.centre[u], arc.centre[v]], &[numbers[7 + u], numbers[7 + v]], place);
+        near(
+            name,
+            step.line,
+            "centre",
+            &[arc.centre[u], arc.centre[v]],
+            &[numbers[7 + u], numbers[7 + v]],
+            place,
+        );
         let turns = (arc.sweep / std::f64::consts::TAU).ceil() * arc.normal[w].signum();
         assert_eq!(turns, numbers[10], "{name} line {}: turns and sense", step.line);
         assert_eq!(arc.plane.word(), format!("G{}", numbers[11]), "{name} line {}", step.line);

@@ -67,7 +67,8 @@ impl Program {
             let setting = self.setting(step);
             let spins = setting.spindle != Spindle::Off && setting.speed > 0.0;
             let other = setting.register > 0 && setting.tool > 0 && setting.register != setting.tool;
-            let known = lengths(setting.tool).filter(|length| (length - setting.length[2]).abs() > SAME_LENGTH);
+            let known =
+                lengths(setting.tool).filter(|length| (length - setting.length[2]).abs() > SAME_LENGTH);
             for (wrong, kind) in [
                 (!spins && self.spins_at_all(), FindingKind::SpindleOff),
                 (step.feed <= 0.0, FindingKind::NoFeed),
@@ -109,7 +110,9 @@ fn note(found: &mut Vec<Finding>, kind: FindingKind, line: u32, setting: &Settin
                 "line {line} feeds tool {tool} as if it were {:.4} mm long; the table of tools has {known:.4} mm",
                 setting.length[2]
             ),
-            None => format!("line {line} feeds tool {tool} with the length of register H{}", setting.register),
+            None => {
+                format!("line {line} feeds tool {tool} with the length of register H{}", setting.register)
+            }
         },
         FindingKind::NoEnd => String::new(),
     };

@@ -362,7 +362,16 @@ pub const LINUXCNC: Control = Control {
 pub const FANUC: Control = Control {
     word: "fanuc",
     help: "Fanuc 0i and 30i for milling, and Siemens in its ISO mode",
-    codes: &[(50, QUIET), (51, QUIET), (80, QUIET), (382, None), (383, None), (384, None), (385, None), (432, None)],
+    codes: &[
+        (50, QUIET),
+        (51, QUIET),
+        (80, QUIET),
+        (382, None),
+        (383, None),
+        (384, None),
+        (385, None),
+        (432, None),
+    ],
     repeats_in_p: true,
     ..GENERAL
 };

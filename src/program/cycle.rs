@@ -53,7 +53,8 @@ impl Interpreter<'_> {
             self.go_to_level(StepKind::Rapid, w, levels.retract, 0.0)?;
             level = levels.retract;
         }
-        let clear = if self.state.modal.initial || back { initial.max(levels.retract) } else { levels.retract };
+        let clear =
+            if self.state.modal.initial || back { initial.max(levels.retract) } else { levels.retract };
         if self.control.cycles_by_level && self.state.modal.initial {
             level = level.max(initial);
         }

@@ -99,9 +99,7 @@ impl Flow {
     /// At the end of the text nothing may be open.
     pub fn check_closed(&self) -> Result<(), Stop> {
         match self.calls.last() {
-            Some(call) if !call.label.is_empty() => {
-                Err(unmatched(&format!("O{} sub", call.label), "endsub"))
-            }
+            Some(call) if !call.label.is_empty() => Err(unmatched(&format!("O{} sub", call.label), "endsub")),
             Some(_) => Err(unmatched("the subprogram", "M99")),
             None => Ok(()),
         }
@@ -216,7 +214,9 @@ impl<'a> Interpreter<'a> {
         text.skip_blanks();
         match text.peek() {
             None | Some(b'(' | b';') => Ok(Next::Line),
-            Some(b) if b.is_ascii_alphabetic() && !text.rest().get(1).is_some_and(u8::is_ascii_alphabetic) => {
+            Some(b)
+                if b.is_ascii_alphabetic() && !text.rest().get(1).is_some_and(u8::is_ascii_alphabetic) =>
+            {
                 let from = text.at();
                 self.step(line, from)
             }
@@ -229,7 +229,8 @@ impl<'a> Interpreter<'a> {
         match word {
             Word::Sub => {
                 let end = self.ahead(here, label, &[Word::EndSub]);
-                end.map(|mark| Next::At(mark.line + 1)).ok_or_else(|| unmatched(&format!("O{label} sub"), "endsub"))
+                end.map(|mark| Next::At(mark.line + 1))
+                    .ok_or_else(|| unmatched(&format!("O{label} sub"), "endsub"))
             }
             Word::Call => self.o_call(label, text),
             Word::EndSub | Word::Return => {
@@ -244,7 +245,8 @@ impl<'a> Interpreter<'a> {
             // Reached from above: the branch before it is done.
             Word::ElseIf | Word::Else => {
                 let end = self.ahead(here, label, &[Word::EndIf]);
-                end.map(|mark| Next::At(mark.line + 1)).ok_or_else(|| unmatched(&format!("O{label} else"), "endif"))
+                end.map(|mark| Next::At(mark.line + 1))
+                    .ok_or_else(|| unmatched(&format!("O{label} else"), "endif"))
             }
             Word::EndIf | Word::Do | Word::If => Ok(Next::Line),
             Word::While => {
@@ -257,7 +259,9 @@ impl<'a> Interpreter<'a> {
             }
             Word::EndWhile => {
                 let begin = self.behind(here, label, &[Word::While]);
-                begin.map(|mark| Next::At(mark.line)).ok_or_else(|| unmatched(&format!("O{label} endwhile"), "while"))
+                begin
+                    .map(|mark| Next::At(mark.line))
+                    .ok_or_else(|| unmatched(&format!("O{label} endwhile"), "while"))
             }
             Word::Repeat => {
                 let times = self.bracket(&mut text)?;
@@ -276,7 +280,8 @@ impl<'a> Interpreter<'a> {
             Word::Continue => {
                 let ends = [Word::EndWhile, Word::EndRepeat, Word::While];
                 let end = self.ahead(here, label, &ends);
-                end.map(|mark| Next::At(mark.line)).ok_or_else(|| unmatched(&format!("O{label} continue"), "loop"))
+                end.map(|mark| Next::At(mark.line))
+                    .ok_or_else(|| unmatched(&format!("O{label} continue"), "loop"))
             }
         }
     }
@@ -523,7 +528,8 @@ impl<'a> Interpreter<'a> {
 
     fn go_to_number(&mut self, number: f64, column: usize) -> Result<Next, Stop> {
         let whole = number.round();
-        let line = if (0.0..=99_999_999.0).contains(&whole) { self.line_of(b'N', whole as u32) } else { None };
+        let line =
+            if (0.0..=99_999_999.0).contains(&whole) { self.line_of(b'N', whole as u32) } else { None };
         line.map(Next::At).ok_or_else(|| Stop::new(column, Fault::NoTarget(format!("block N{whole}"))))
     }
 

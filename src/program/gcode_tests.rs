@@ -40,7 +40,8 @@ fn loops_and_branches_of_fanuc() {
     let text = "O1000 (MAIN)\n#1=0\nWHILE [#1 LT 3] DO1\n#1=#1+1\nG1 X#1 F100\nEND1\nIF [#1 EQ 3] GOTO 20\nG1 X99\n\
                 N20 IF [#1 GT 5] THEN #2=7\nG1 Y#2\nIF [#1 NE 5] THEN G1 Z4\nM30\n";
     assert_ends(text, &[[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0], [3.0, 0.0, 4.0]]);
-    let nested = "#1=0\nWHILE[#1LT2]DO1\n#2=0\nWHILE[#2LT2]DO2\nG91 G1 X1 F1\n#2=#2+1\nEND2\n#1=#1+1\nEND1\nM30\n";
+    let nested =
+        "#1=0\nWHILE[#1LT2]DO1\n#2=0\nWHILE[#2LT2]DO2\nG91 G1 X1 F1\n#2=#2+1\nEND2\n#1=#1+1\nEND1\nM30\n";
     assert_eq!(ends(&read(nested)).last(), Some(&[4.0, 0.0, 0.0]));
 }
 
@@ -71,10 +72,7 @@ fn a_rotation_turns_what_follows() {
 
 #[test]
 fn shifts_are_independent_of_each_other_on_fanuc() {
-    assert_ends(
-        "G92 X5 Y0\nG52 X1\nG1 X0 F1\nG52 X0\nX0\nM30\n",
-        &[[-4.0, 0.0, 0.0], [-5.0, 0.0, 0.0]],
-    );
+    assert_ends("G92 X5 Y0\nG52 X1\nG1 X0 F1\nG52 X0\nX0\nM30\n", &[[-4.0, 0.0, 0.0], [-5.0, 0.0, 0.0]]);
     assert_ends("G10 L2 P2 X1 Y2\nG55 G0 X0 Y0\nG54.1 P3 X5\nM30\n", &[[1.0, 2.0, 0.0], [5.0, 2.0, 0.0]]);
 }
 
@@ -112,7 +110,8 @@ fn feeds_in_every_mode() {
 
 #[test]
 fn lengths_count_for_the_tip() {
-    let setup = Setup { lengths: [(1, [0.0, 0.0, 80.0]), (2, [0.0, 0.0, 81.0])].into(), ..Setup::from_above(200.0) };
+    let setup =
+        Setup { lengths: [(1, [0.0, 0.0, 80.0]), (2, [0.0, 0.0, 81.0])].into(), ..Setup::from_above(200.0) };
     let program = read_with("T1 M6\nG43 H2\nG0 X1 Z10\nG1 Z-1 F100\nG91 G28 Z0\nM30\n", &HAAS, &setup);
     let placing = |lengths| Placing { chord: 0.01, kinematics: None, lengths };
     let tips = |placing: &Placing<'_>| -> Vec<f64> {
@@ -142,7 +141,15 @@ fn what_cannot_be_followed_is_refused_at_its_place() {
     unsupported("G5 I1 J1 P1 Q1 X3 Y3\n", 1, 1);
     for (text, line, column, fault) in [
         ("G1 X1 F1\nG1 Y2 U3\n", 2, 7, Fault::Unused('U')),
-        ("X5\n", 1, 1, Fault::Missing { code: "the word X".into(), words: "a motion such as G0 or G1, in this block or before" }),
+        (
+            "X5\n",
+            1,
+            1,
+            Fault::Missing {
+                code: "the word X".into(),
+                words: "a motion such as G0 or G1, in this block or before",
+            },
+        ),
         ("G0 G1 X5\n", 1, 4, Fault::Conflict { first: "G0".into(), second: "G1".into() }),
         ("G123 X5\n", 1, 1, Fault::UnknownCode { code: "G123".into(), control: "general" }),
         ("G2 X10 I4 F1\n", 1, 4, Fault::ArcEnds { start: 4.0, end: 6.0 }),
@@ -154,7 +161,12 @@ fn what_cannot_be_followed_is_refused_at_its_place() {
         ("G81 X1 Z1 R0 F1\n", 1, 8, Fault::CycleUpward { retract: 0.0, bottom: 1.0 }),
         ("M98 P7\n", 1, 5, Fault::NoTarget("subprogram O7".into())),
         ("GOTO 5\n", 1, 1, Fault::NoTarget("block N5".into())),
-        ("o1 while [1 EQ 0]\nG0 X1\n", 1, 1, Fault::Unmatched { found: "the loop O1".into(), wanted: "endwhile or endrepeat" }),
+        (
+            "o1 while [1 EQ 0]\nG0 X1\n",
+            1,
+            1,
+            Fault::Unmatched { found: "the loop O1".into(), wanted: "endwhile or endrepeat" },
+        ),
     ] {
         assert_eq!(refused(text, GENERAL_CONTROL), (line, column, fault), "{text}");
     }
@@ -167,7 +179,10 @@ fn what_cannot_be_followed_is_refused_at_its_place() {
 fn nothing_runs_without_end() {
     assert!(matches!(refused("N1 G0 X1\nGOTO 1\n", GENERAL_CONTROL).2, Fault::Endless(_)));
     assert!(matches!(refused("o1 while [1]\no1 endwhile\n", GENERAL_CONTROL).2, Fault::Endless(_)));
-    assert!(matches!(refused("o1 sub\no1 call\no1 endsub\no1 call\n", GENERAL_CONTROL).2, Fault::Recursion(_)));
+    assert!(matches!(
+        refused("o1 sub\no1 call\no1 endsub\no1 call\n", GENERAL_CONTROL).2,
+        Fault::Recursion(_)
+    ));
     assert!(matches!(refused("O1\nM98 P1\n", GENERAL_CONTROL).2, Fault::Recursion(_)));
     assert!(matches!(refused("G0 Z9\nG81 X1 Z-1 R1 L999999 F1\n", GENERAL_CONTROL).2, Fault::Endless(_)));
     assert!(matches!(refused("G0 Z9\nG83 X1 Z-999 R1 Q0.0001 F1\n", GENERAL_CONTROL).2, Fault::Value { .. }));

@@ -18,8 +18,7 @@ use crate::state::{MORE_OFFSETS, Setup, State, Sticky};
 pub(crate) const AXES: [u8; 6] = *b"XYZABC";
 
 /// The same as bits of a block's letters.
-const AXIS_BITS: u32 =
-    1 << (b'X' - b'A') | 1 << (b'Y' - b'A') | 1 << (b'Z' - b'A') | 0b111;
+const AXIS_BITS: u32 = 1 << (b'X' - b'A') | 1 << (b'Y' - b'A') | 1 << (b'Z' - b'A') | 0b111;
 
 /// Notes that a report lists; more tell nothing new.
 const MOST_NOTES: usize = 200;
@@ -329,7 +328,8 @@ impl<'a> Interpreter<'a> {
                     self.block.ignore(b"P");
                 }
                 700 | 710 | 720 | 730 => {
-                    let (code, why) = (format!("M{}", word.tenths / 10), "it brings back codes of an earlier place");
+                    let (code, why) =
+                        (format!("M{}", word.tenths / 10), "it brings back codes of an earlier place");
                     return Err(Stop::new(usize::from(word.column), Fault::Unsupported { code, why }));
                 }
                 other => {
@@ -347,7 +347,9 @@ impl<'a> Interpreter<'a> {
     }
 
     fn change_tool(&mut self, word: CodeWord) -> Result<(), Stop> {
-        let Some(tool) = self.state.selected else { return Err(self.missing_m(word, "T with the number of a tool")) };
+        let Some(tool) = self.state.selected else {
+            return Err(self.missing_m(word, "T with the number of a tool"));
+        };
         self.turn(Spindle::Off);
         self.load(tool);
         Ok(())
@@ -446,8 +448,10 @@ impl<'a> Interpreter<'a> {
         match kind {
             2 | 20 => self.work_data(kind == 20, number)?,
             1 | 10 | 11 => {
-                let number = self.whole(b'P', number.unwrap_or(0.0), 0.0..=99_999_999.0, "the number of a tool")?;
-                let z = self.block.take(b'Z').or_else(|| if kind == 1 { None } else { self.block.take(b'R') });
+                let number =
+                    self.whole(b'P', number.unwrap_or(0.0), 0.0..=99_999_999.0, "the number of a tool")?;
+                let z =
+                    self.block.take(b'Z').or_else(|| if kind == 1 { None } else { self.block.take(b'R') });
                 self.block.ignore(b"R");
                 if let Some(z) = z {
                     let incremental = !self.state.modal.absolute && kind != 1;
@@ -489,7 +493,8 @@ impl<'a> Interpreter<'a> {
         } else {
             for k in 0..6 {
                 if let Some(x) = named[k] {
-                    let old = if self.state.modal.absolute || self.control.one_shift { 0.0 } else { offset[k] };
+                    let old =
+                        if self.state.modal.absolute || self.control.one_shift { 0.0 } else { offset[k] };
                     offset[k] = old + x * self.unit_of(k);
                 }
             }

@@ -193,7 +193,14 @@ impl Layer<'_> {
         self.straight(from, to, step, turns, run)
     }
 
-    fn straight(&self, from: &Place, to: &Place, step: &Step, turns: bool, run: &mut Run) -> Result<(), Fault> {
+    fn straight(
+        &self,
+        from: &Place,
+        to: &Place,
+        step: &Step,
+        turns: bool,
+        run: &mut Run,
+    ) -> Result<(), Fault> {
         if turns {
             self.halve(from, to, [0.0, 1.0], step, run, 0)?;
         }

@@ -9,7 +9,10 @@ use cutter::Cutter;
 use io::regular;
 use keys::{SceneError, SceneText};
 use motion::{Move, MoveKind, Toolpath};
-use program::{Control, Finding, Placing, Program, ProgramError, Setup, ToolRun, ToolTable, looks_like_apt, read_apt, read_gcode};
+use program::{
+    Control, Finding, Placing, Program, ProgramError, Setup, ToolRun, ToolTable, looks_like_apt, read_apt,
+    read_gcode,
+};
 use toolpath::{ForeignProgram, ReadProgram};
 
 /// Largest program that is read, bytes: some twenty million lines.
@@ -39,7 +42,8 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
     let control = Control::from_word(foreign.control).unwrap_or(program::GENERAL_CONTROL);
     let refused = |error: ProgramError| in_text(&error, &bytes);
     let is_apt = looks_like_apt(&bytes);
-    let name = file.path.file_name().map_or_else(|| file.written.clone(), |n| n.to_string_lossy().into_owned());
+    let name =
+        file.path.file_name().map_or_else(|| file.written.clone(), |n| n.to_string_lossy().into_owned());
     let table = match request.directions.get(1) {
         Some(tools) => table(tools, scene)?,
         None => ToolTable::default(),
@@ -118,8 +122,14 @@ fn chosen(asked: Option<u32>, read: &Program, runs: &[ToolRun]) -> Result<u32, (
             match feeding[..] {
                 [tool] => Ok(tool),
                 _ => Err((
-                    format!("the program {} uses several tools ({listed}), and a scene has one cutter", read.name),
-                    format!("write `tool = {}` for the tool that is the scene's cutter", tools[tools.len() - 1]),
+                    format!(
+                        "the program {} uses several tools ({listed}), and a scene has one cutter",
+                        read.name
+                    ),
+                    format!(
+                        "write `tool = {}` for the tool that is the scene's cutter",
+                        tools[tools.len() - 1]
+                    ),
                 )),
             }
         }
@@ -176,7 +186,11 @@ fn joined(runs: impl Iterator<Item = ToolRun>) -> Toolpath {
 }
 
 fn notes(read: &Program) -> Vec<String> {
-    let shown = read.notes.iter().take(MOST_NOTES).map(|note| format!("{} line {}: {}", read.name, note.line, note.text));
+    let shown = read
+        .notes
+        .iter()
+        .take(MOST_NOTES)
+        .map(|note| format!("{} line {}: {}", read.name, note.line, note.text));
     let mut notes: Vec<String> = shown.collect();
     if read.notes.len() > MOST_NOTES {
         notes.push(format!("{}: {} more remarks", read.name, read.notes.len() - MOST_NOTES));

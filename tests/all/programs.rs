@@ -25,7 +25,17 @@ fn plate() -> String {
 
 /// A raster over the plate with a ball of 6 mm.
 fn raster() -> Vec<String> {
-    let head = ["%", "(PLATE)", "G21 G90 G17 G94", "T1 M6", "S12000 M3", "G54", "G43 H1", "G0 X0 Y0 Z10", "G1 Z0 F600"];
+    let head = [
+        "%",
+        "(PLATE)",
+        "G21 G90 G17 G94",
+        "T1 M6",
+        "S12000 M3",
+        "G54",
+        "G43 H1",
+        "G0 X0 Y0 Z10",
+        "G1 Z0 F600",
+    ];
     let mut lines: Vec<String> = head.iter().map(|&line| line.to_owned()).collect();
     for k in 0..=(SIZE[1] / STEP) as usize {
         let (y, ends) = (STEP * k as f64, if k % 2 == 0 { [0.0, SIZE[0]] } else { [SIZE[0], 0.0] });
@@ -45,7 +55,8 @@ fn verify(program: &[String], options: &[&str]) -> (Answer, Option<Value>) {
 fn verify_in(home: &Path, program: &[String], options: &[&str]) -> (Answer, Option<Value>) {
     std::fs::write(home.join("plate.stl"), plate()).unwrap();
     std::fs::write(home.join("job.nc"), program.join("\n") + "\n").unwrap();
-    let mut arguments = vec!["verify", "--part", "plate.stl", "--program", "job.nc", "--cell", "0.1", "--out", "out"];
+    let mut arguments =
+        vec!["verify", "--part", "plate.stl", "--program", "job.nc", "--cell", "0.1", "--out", "out"];
     if !options.contains(&"--tools") {
         arguments.extend(["--cutter", "ball:6"]);
     }
@@ -84,7 +95,10 @@ fn a_sound_program_passes_in_every_format() {
     let toolpath = &report["toolpaths"][0];
     assert_eq!((&toolpath["name"], &toolpath["strategy"]), (&Value::from("job"), &Value::from("program")));
     assert_eq!(toolpath["program"]["file"], "job.nc");
-    assert!(!home.path().join("out/job/toolpath.nc").exists() && home.path().join("out/job/toolpath.cls").exists());
+    assert!(
+        !home.path().join("out/job/toolpath.nc").exists()
+            && home.path().join("out/job/toolpath.cls").exists()
+    );
     let (json, _) = verify_in(home.path(), &raster(), &["--format", "json"]);
     assert_eq!(serde_json::from_str::<Value>(&json.stdout).unwrap()["verdict"], "pass");
     let (junit, _) = verify_in(home.path(), &raster(), &["--format", "junit"]);
@@ -103,14 +117,24 @@ fn it_stands_beside_planned_paths_in_one_table() {
     std::fs::write(home.path().join("scene.toml"), scene).unwrap();
     let answer = millstream(home.path(), &["run", "scene.toml", "--out", "out"]);
     assert_eq!(answer.code, Some(0), "{}{}", answer.stdout, answer.stderr);
-    let report: Value = serde_json::from_slice(&std::fs::read(home.path().join("out/report.json")).unwrap()).unwrap();
+    let report: Value =
+        serde_json::from_slice(&std::fs::read(home.path().join("out/report.json")).unwrap()).unwrap();
     let height = |k: usize| report["toolpaths"][k]["scallop"]["max_mm"].as_f64().unwrap();
     let closed = 3.0 - (9.0f64 - 0.25 * STEP * STEP).sqrt();
-    assert!((height(0) - closed).abs() < 1e-4 && (height(1) - closed).abs() < 1e-4, "{} {}", height(0), height(1));
+    assert!(
+        (height(0) - closed).abs() < 1e-4 && (height(1) - closed).abs() < 1e-4,
+        "{} {}",
+        height(0),
+        height(1)
+    );
     let inputs = report["inputs"].as_array().unwrap();
     assert!(inputs.iter().any(|input| input["file"] == "job.nc"), "{inputs:?}");
     let checked = millstream(home.path(), &["check", "scene.toml"]);
-    assert!(checked.stdout.contains("strategy = \"program\"\nfile = \"job.nc\"\ncontrol = \"general\""), "{}", checked.stdout);
+    assert!(
+        checked.stdout.contains("strategy = \"program\"\nfile = \"job.nc\"\ncontrol = \"general\""),
+        "{}",
+        checked.stdout
+    );
 }
 
 #[test]
@@ -123,7 +147,11 @@ fn a_gouge_is_found_with_the_line_that_made_it() {
     assert_eq!(answer.code, Some(1));
     let gouge = &report.unwrap()["toolpaths"][0]["gouge"];
     assert!((gouge["max_depth_mm"].as_f64().unwrap() - 0.2).abs() < 0.002, "{gouge}");
-    assert_eq!((&gouge["region_count"], &gouge["regions"][0]["line"]), (&Value::from(1), &Value::from(line)), "{gouge}");
+    assert_eq!(
+        (&gouge["region_count"], &gouge["regions"][0]["line"]),
+        (&Value::from(1), &Value::from(line)),
+        "{gouge}"
+    );
 }
 
 #[test]
@@ -139,16 +167,28 @@ fn faults_are_named_with_their_lines() {
     assert_violates(&rapid, &[], "a rapid move touches stock");
     assert_violates(&rapid, &[], &format!("job.nc line {line}"));
     let first = line_of(&sound, "G1 Z0");
-    assert_violates(&changed("S12000", "S12000").0, &[], &format!("line {first} feeds while the spindle is off"));
+    assert_violates(
+        &changed("S12000", "S12000").0,
+        &[],
+        &format!("line {first} feeds while the spindle is off"),
+    );
     assert_violates(&changed("G1 Z0", "G1 Z0").0, &[], &format!("line {first} feeds and no F was given"));
-    assert_violates(&changed("G43", "G43 H2").0, &[], &format!("line {first} feeds tool 1 with the length of register H2"));
+    assert_violates(
+        &changed("G43", "G43 H2").0,
+        &[],
+        &format!("line {first} feeds tool 1 with the length of register H2"),
+    );
     // The other tool comes too late.
     let mut late = changed("T1 M6", "").0;
     let end = line_of(&late, "M5") - 1;
     late.splice(end..end, ["T2 M6", "S5000 M3", "G0 X0", "G1 Z9"].map(str::to_owned));
     assert_violates(&late, &["--tool", "0"], &format!("line {first} feeds before the first tool change"));
     let (answer, _) = verify(&late, &[]);
-    assert!(answer.code == Some(2) && answer.stderr.contains("uses several tools (T0, T2)"), "{}", answer.stderr);
+    assert!(
+        answer.code == Some(2) && answer.stderr.contains("uses several tools (T0, T2)"),
+        "{}",
+        answer.stderr
+    );
 }
 
 #[test]

@@ -20,7 +20,8 @@ fn cuts(removed: &MoveRemoval) -> bool {
 }
 
 fn first_and_last(run: &Run<'_>, moves: &[MoveRemoval]) -> Option<String> {
-    let [first, last] = [moves.iter().position(cuts)?, moves.iter().rposition(cuts)?].map(|k| run.line(k as u32));
+    let [first, last] =
+        [moves.iter().position(cuts)?, moves.iter().rposition(cuts)?].map(|k| run.line(k as u32));
     let name = run.path().program_name();
     Some(format!("{name}: the first cut is in line {first}, the last one in line {last}"))
 }

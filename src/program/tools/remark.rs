@@ -16,7 +16,10 @@ pub(crate) fn may_describe_a_tool(text: &str) -> bool {
 pub fn cutter_of_remark(text: &str, unit: f64) -> Option<Cutter> {
     let diameter = unit * number_after(text, &["D=", "DIA=", "DIAMETER="])?;
     let lower = text.to_ascii_lowercase();
-    if ["drill", "tap", "thread", "reamer", "chamfer", "spot", "taper"].iter().any(|word| lower.contains(word)) {
+    if ["drill", "tap", "thread", "reamer", "chamfer", "spot", "taper"]
+        .iter()
+        .any(|word| lower.contains(word))
+    {
         return None;
     }
     let corner = number_after(text, &["CR=", "R="]).map_or(0.0, |r| unit * r);

@@ -64,7 +64,11 @@ impl ToolTable {
 fn read(section: &Section<'_>) -> Result<Tool, SceneError> {
     let cutter = Cutter::read(section, &BESIDES)?;
     let number = section.count("number", 0..=MOST)?.ok_or_else(|| {
-        section.error(section.header(), "the tool has no `number`", "add `number = 1`, as T has it in programs")
+        section.error(
+            section.header(),
+            "the tool has no `number`",
+            "add `number = 1`, as T has it in programs",
+        )
     })?;
     let gauge_length = section.length("gauge_length")?.map(|length| length.value);
     Ok(Tool { number, cutter, gauge_length, holder: read_holder(section, &cutter)? })
@@ -90,7 +94,8 @@ fn read_holder(section: &Section<'_>, cutter: &Cutter) -> Result<Option<Holder>,
     };
     let sections: Vec<HolderSection> = sections.iter().map(one).collect::<Result<_, SceneError>>()?;
     Holder::new(length, sections).map(Some).map_err(|e| {
-        let cure = "add `[[tool.holder]]` with `diameter` and `length` for shank and holder, the lowest first";
+        let cure =
+            "add `[[tool.holder]]` with `diameter` and `length` for shank and holder, the lowest first";
         section.error(section.header(), e.to_string(), cure)
     })
 }

@@ -19,11 +19,17 @@ pub struct TableTool {
 ///
 /// # Errors
 /// [`ProgramError`] at the first word that is wrong.
-pub fn read_tool_table(name: &str, bytes: &[u8], unit: f64) -> Result<BTreeMap<u32, TableTool>, ProgramError> {
+pub fn read_tool_table(
+    name: &str,
+    bytes: &[u8],
+    unit: f64,
+) -> Result<BTreeMap<u32, TableTool>, ProgramError> {
     let lines = Lines::new(bytes).map_err(|(line, stop)| stop.in_line(name, line))?;
     let mut tools = BTreeMap::new();
     for line in 0..lines.len() {
-        if let Some((number, tool)) = read_line(lines.get(line), unit).map_err(|stop| stop.in_line(name, line))? {
+        if let Some((number, tool)) =
+            read_line(lines.get(line), unit).map_err(|stop| stop.in_line(name, line))?
+        {
             tools.insert(number, tool);
         }
     }
