@@ -7,7 +7,7 @@ use clap::{Args, Parser, Subcommand};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use cutter::Cutter;
 use io::mesh_extensions;
-use metrology::ENGINES;
+use metrology::{ENGINES, Judged};
 use nightly::Shard;
 use program::Control;
 use scallop::DEFAULT_DEGREE;
@@ -98,6 +98,9 @@ pub struct VerifyOptions {
     /// The control that the program is written for.
     #[arg(long, value_name = "CONTROL", default_value = "general", value_parser = PossibleValuesParser::new(Control::words()))]
     pub control: String,
+    /// What of the part is judged: what the tool can face, or all of it, walls too.
+    #[arg(long, value_name = "WHAT", value_parser = PossibleValuesParser::new(Judged::ALL.map(Judged::word)))]
+    pub judge: Option<String>,
     /// Stock above the part's highest point, mm [default: 1].
     #[arg(long, value_name = "MM")]
     pub allowance: Option<f64>,

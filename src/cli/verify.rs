@@ -102,6 +102,9 @@ fn write_scene(out: &mut String, options: &VerifyOptions, cutter: &Cutter, holde
     let quoted = |path: &Path| toml_string(&path.to_string_lossy());
     writeln!(out, "title = {}", toml_string(&name(&options.program)))?;
     writeln!(out, "[part]\nfile = {}\nunit = {}", quoted(&options.part), toml_string(&options.unit))?;
+    if let Some(judge) = &options.judge {
+        writeln!(out, "judge = {}", toml_string(judge))?;
+    }
     writeln!(out, "[cutter]")?;
     cutter.write(out)?;
     out.push_str(holder);
