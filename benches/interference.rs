@@ -161,7 +161,7 @@ fn standing(bencher: Bencher, top: f64) {
     let (path, held) = (path(&cutter, true), holder());
     let block = Aabb { min: Point3::new(0.0, 0.0, -20.0), max: Point3::new(SIZE, SIZE, top) };
     let stock = VoxelStock::Box(block);
-    bencher
-        .counter(ItemsCount::new(path.len()))
-        .bench_local(|| holder_clearance(&stock, &cutter, &held, &path, &Silent).expect("nothing stops it"));
+    bencher.counter(ItemsCount::new(path.len())).bench_local(|| {
+        holder_clearance(&stock, &[], &cutter, &held, &path, &Silent).expect("nothing stops it")
+    });
 }

@@ -26,6 +26,7 @@
 //! | [`sim`] | stock, cutter, path | what is left |
 //! | [`metrology`] | what is left, the part | figures with bounds |
 //! | [`collision`], [`machine`] | tool, path, meshes, axes | clearances, times, joints |
+//! | [`program`] | G-code or APT text | motion with lines, tools, feeds; paths |
 //! | [`io`], [`scene`], [`job`], [`report`] | files | a report and its pictures |
 //!
 //! `examples/` has one program for each of: two strategies compared, a path of your own measured, a cutter dropped on a
@@ -42,5 +43,5 @@ pub use scene::Scene;
 pub use work::{monitor, parallel};
 pub use {
     blade, collision, cutter, field, geometry, io, job, keys, machine, metrology, motion, offset, part,
-    report, scallop, scene, sim, toolpath,
+    program, report, scallop, scene, sim, toolpath,
 };

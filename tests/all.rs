@@ -35,6 +35,8 @@ mod memory;
 mod nightly;
 #[path = "all/outputs.rs"]
 mod outputs;
+#[path = "all/programs.rs"]
+mod programs;
 #[path = "all/refined.rs"]
 mod refined;
 #[path = "all/scallop.rs"]

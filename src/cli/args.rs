@@ -7,8 +7,9 @@ use clap::{Args, Parser, Subcommand};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use cutter::Cutter;
 use io::mesh_extensions;
-use metrology::ENGINES;
+use metrology::{ENGINES, Judged};
 use nightly::Shard;
+use program::Control;
 use scallop::DEFAULT_DEGREE;
 use scene::EngineChoice;
 use toolpath::STRATEGIES;
@@ -31,6 +32,9 @@ pub enum Command {
     /// Plan, cut, measure and report all toolpaths of a scene.
     #[command(after_help = kinds())]
     Run(RunOptions),
+    /// Verify a program of another system against a part, without a scene.
+    #[command(after_help = VERIFY_HELP)]
+    Verify(Box<VerifyOptions>),
     /// Run many scenes, compare their figures with a baseline, and report what got worse.
     #[command(after_help = NIGHTLY_HELP)]
     Nightly(Box<NightlyOptions>),
@@ -63,6 +67,83 @@ pub struct RunOptions {
     /// End when standard input closes, as it does when the program that started this one dies.
     #[arg(long, hide = true)]
     pub until_stdin_closes: bool,
+}
+
+const VERIFY_HELP: &str = "The program is G-code or APT cutter locations (known by its text). Its zero is the part's zero, mm are \
+millimetres of the part's file, and the machine's zero is taken to be 200 mm above.\n\n\
+Exit status: 0 every limit is proven to hold, 1 one is violated or undecided, 2 could not run.";
+
+/// What is verified against what.
+#[derive(Debug, Args)]
+pub struct VerifyOptions {
+    /// The part.
+    #[arg(long, value_name = "FILE", help = format!("The part ({})", mesh_extensions().join(", ")))]
+    pub part: PathBuf,
+    /// Unit of the part's file.
+    #[arg(long, value_name = "UNIT", default_value = "mm")]
+    pub unit: String,
+    /// The program.
+    #[arg(long, value_name = "FILE")]
+    pub program: PathBuf,
+    /// The cutter, in one of the short forms of its families.
+    #[arg(long, value_name = "CUTTER", help = format!("The cutter: {}", cutter::short_forms()),
+        required_unless_present = "tools", conflicts_with = "tools")]
+    pub cutter: Option<Cutter>,
+    /// A table of tools, a TOML file with a [[tool]] for each.
+    #[arg(long, value_name = "FILE")]
+    pub tools: Option<PathBuf>,
+    /// The tool to verify, where the program has several.
+    #[arg(long, value_name = "N")]
+    pub tool: Option<u32>,
+    /// The control that the program is written for.
+    #[arg(long, value_name = "CONTROL", default_value = "general", value_parser = PossibleValuesParser::new(Control::words()))]
+    pub control: String,
+    /// What of the part is judged: what the tool can face, or all of it, walls too.
+    #[arg(long, value_name = "WHAT", value_parser = PossibleValuesParser::new(Judged::ALL.map(Judged::word)))]
+    pub judge: Option<String>,
+    /// Stock above the part's highest point, mm [default: 1].
+    #[arg(long, value_name = "MM")]
+    pub allowance: Option<f64>,
+    /// Deepest gouge that is tolerated, mm [default: 0.005].
+    #[arg(long, value_name = "MM")]
+    pub gouge: Option<f64>,
+    /// Highest uncut material that is tolerated, mm [default: 0.05].
+    #[arg(long, value_name = "MM")]
+    pub uncut: Option<f64>,
+    /// Highest scallop that is tolerated, mm [default: 0.01].
+    #[arg(long, value_name = "MM")]
+    pub scallop: Option<f64>,
+    /// Where the results go [default: out/NAME OF THE PROGRAM].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// What is printed.
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub format: Format,
+    /// Threads to use [default: all cores]. Changes no result.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Pitch of the simulation's cells, mm; auto: the program chooses.
+    #[arg(long, value_name = "MM", value_parser = cell)]
+    pub cell: Option<Cell>,
+    /// Memory that the simulation may take, MiB.
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    pub memory: Option<u32>,
+    /// Engine that cuts.
+    #[arg(long, value_name = "ENGINE", value_parser = engine_words())]
+    pub engine: Option<EngineChoice>,
+}
+
+/// How an answer is printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// The table.
+    Text,
+    /// report.json.
+    Json,
+    /// report.html.
+    Html,
+    /// A test case for each limit.
+    Junit,
 }
 
 const NIGHTLY_HELP: &str = "Each scene runs as a process of its own. One that fails, hangs or takes too much memory costs no other. After a \

@@ -57,6 +57,15 @@ pub enum CliError {
     #[error("cannot start the threads: {0}")]
     #[diagnostic(help("ask for fewer with --threads"))]
     Threads(String),
+    /// What was to be verified cannot be.
+    #[error("{}", printable(what))]
+    #[diagnostic(help("{cure}"))]
+    Verify {
+        /// What is wrong, and where.
+        what: String,
+        /// What mends it.
+        cure: String,
+    },
     /// A nightly cannot begin or cannot use what it was given.
     #[error("{}", printable(what))]
     #[diagnostic(help("{cure}"))]

@@ -13,6 +13,7 @@ mod run;
 mod scallop;
 mod signals;
 mod system;
+mod verify;
 mod watch;
 
 use std::io::{ErrorKind, Write as _};
@@ -101,6 +102,10 @@ fn execute(command: &Command, progress: &Progress) -> Result<(String, Verdict), 
                 signals::end_with_stdin(COULD_NOT_RUN);
             }
             let report = run::run(options, progress)?;
+            Ok((report.text, report.verdict))
+        }
+        Command::Verify(options) => {
+            let report = verify::verify(options, progress)?;
             Ok((report.text, report.verdict))
         }
         Command::Check(options) => Ok((check::check(&options.scene, progress)?, Verdict::Pass)),

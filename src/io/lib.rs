@@ -14,6 +14,8 @@ pub mod outline;
 pub mod ply_write;
 pub mod png;
 mod program_text;
+#[cfg(test)]
+mod read_back_tests;
 pub mod regular;
 pub mod section_table;
 pub mod stl;

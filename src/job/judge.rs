@@ -14,15 +14,20 @@
 use metrology::{Bounded, Limits, Measurement, ScallopRule};
 use report::{Claim, Gravity, MapMark, Verdict, micrometres, per_cent, place, with_bound};
 
-/// The verdict on a measured toolpath, and its limits, the gravest first. `found` are the claims of further figures.
+/// The verdict on a measured toolpath, and its limits, the gravest first. `found` are the claims of further figures; lines are of `program`.
 pub(crate) fn judge(
     measured: &Measurement,
     limits: &Limits,
     rule: &ScallopRule,
     found: Vec<Claim>,
+    program: &str,
 ) -> (Verdict, Vec<Claim>) {
     let mut claims = found;
-    claims.extend([gouge(measured, limits), uncut(measured, limits), highest(measured, limits, rule)]);
+    claims.extend([
+        gouge(measured, limits, program),
+        uncut(measured, limits),
+        highest(measured, limits, rule),
+    ]);
     claims.extend(most(measured, limits, rule));
     claims.sort_by_key(|claim| std::cmp::Reverse(claim.gravity));
     (claims.iter().map(Claim::verdict).max().unwrap_or(Verdict::Undecided), claims)
@@ -30,10 +35,10 @@ pub(crate) fn judge(
 
 /// Whether a limit of the measured surface is undecided, and none violated.
 pub(crate) fn is_open(measured: &Measurement, limits: &Limits, rule: &ScallopRule) -> bool {
-    judge(measured, limits, rule, Vec::new()).0 == Verdict::Undecided
+    judge(measured, limits, rule, Vec::new(), "").0 == Verdict::Undecided
 }
 
-fn gouge(measured: &Measurement, limits: &Limits) -> Claim {
+fn gouge(measured: &Measurement, limits: &Limits, program: &str) -> Claim {
     let figures = &measured.gouge;
     let mut text = format!(
         "gouge {} µm deep (limit {})",
@@ -44,7 +49,7 @@ fn gouge(measured: &Measurement, limits: &Limits) -> Claim {
         text += &format!(" at {}, move {}", place(worst.at_mm), worst.move_index);
         // Paths that tilt the tool have no program where the scene names no machine for it.
         if worst.line > 0 {
-            text += &format!(", toolpath.nc line {}", worst.line);
+            text += &format!(", {program} line {}", worst.line);
         }
         text += &others(figures.region_count);
     }

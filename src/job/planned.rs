@@ -72,6 +72,10 @@ impl Session {
     ) -> Result<Planned, JobError> {
         let scene = &self.scene;
         let strategy = self.strategy(request)?;
+        if let Some(read) = request.foreign() {
+            let plan = Plan::of_program(read.path.clone(), read.notes.clone());
+            return Ok(Planned { plan, strategy, joints: None, engaged: None, correction: None });
+        }
         let settings = PlanSettings { earlier, ..self.settings(request) };
         let planned = |strategy: &dyn Strategy| {
             let found = self.path(request, strategy, &settings, around, monitor);

@@ -49,16 +49,16 @@ impl Run<'_> {
         self.session.budget()
     }
 
-    /// The line of toolpath.nc that a move stands in; 0 where there is no program.
+    /// The line of its program that a move stands in; 0 where there is no program.
     pub fn line(&self, move_index: u32) -> u32 {
         self.path().line_of(move_index as usize).unwrap_or_default()
     }
 
-    /// `, toolpath.nc line N`, where there is a program.
+    /// `, PROGRAM line N`, where there is a program.
     pub fn program_line(&self, move_index: u32) -> String {
         self.path()
             .line_of(move_index as usize)
-            .map_or_else(String::new, |line| format!(", toolpath.nc line {line}"))
+            .map_or_else(String::new, |line| format!(", {} line {line}", self.path().program_name()))
     }
 
     /// For voxels that do not fit.

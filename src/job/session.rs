@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use blade::Blade;
-use geometry::{Aabb, Bvh};
+use cutter::Cutter;
+use geometry::{Aabb, Bvh, Point3, Vector3};
 use io::ProgramHeader;
 use io::digest::{self, Fingerprint};
 use metrology::{Budget, Engine, EngineError, LaidOut, Measured, Simulation, Task, path_figures};
@@ -179,7 +180,8 @@ impl Session {
         let around = Around { tool: &tool, near, fixtures: &fixtures };
         let (planned, mut measured) = self.plan_and_measure(request, around, engine, monitor)?;
         for region in &mut measured.measurement.gouge.regions {
-            region.line = planned.plan.path.line_of(region.move_index as usize).unwrap_or_default();
+            let at = region.at_mm.into();
+            region.line = line_of_cut(&planned.plan.path, &scene.cutter, region.move_index as usize, &at);
         }
         let run = Run { session: self, request, planned: &planned, measured: &measured, around };
         let found = figures::all(&run, monitor)?;
@@ -195,8 +197,18 @@ impl Session {
             wall_s: measured.wall_s,
             threads: work::parallel::threads(),
         };
-        let (verdict, claims) =
-            judge::judge(&measured.measurement, &scene.tolerance, &scene.scallop_rule, found.claims);
+        let (verdict, claims) = judge::judge(
+            &measured.measurement,
+            &scene.tolerance,
+            &scene.scallop_rule,
+            found.claims,
+            planned.plan.path.program_name(),
+        );
+        let (verdict, claims) = if request.foreign().is_some_and(|read| read.others) {
+            figures::with_other_tools(claims)
+        } else {
+            (verdict, claims)
+        };
         let measurement = &measured.measurement;
         let result = ToolpathResult {
             name: request.name.clone(),
@@ -276,14 +288,14 @@ impl Session {
     /// The engine of a toolpath.
     fn engine(&self, request: &ToolpathRequest) -> Result<&'static dyn Engine, JobError> {
         let (scene, name) = (&self.scene, &request.name);
-        let engine = scene.simulation.engine.for_path(request.axis.is_some());
+        let engine = scene.simulation.engine.for_path(request.tilts());
         if self.pocket.is_some() && !engine.measures_pockets() {
             return Err(JobError::PocketAlongNormals {
                 scene: scene.source.name.clone(),
                 name: name.clone(),
             });
         }
-        if request.axis.is_some() && !engine.tilts() {
+        if request.tilts() && !engine.tilts() {
             let engine = engine.word();
             return Err(JobError::Upright { scene: scene.source.name.clone(), name: name.clone(), engine });
         }
@@ -384,8 +396,28 @@ impl Session {
 
     /// Whether an outcome has a program.
     pub fn has_program(&self, outcome: &Outcome) -> bool {
-        outcome.path.is_upright() || outcome.joints.is_some()
+        // A program from elsewhere has its own file.
+        outcome.path.origin.program.is_empty() && (outcome.path.is_upright() || outcome.joints.is_some())
     }
+}
+
+/// The line that took the cutter to where it cuts deepest, at a place that a move cuts. That is the line before where the
+/// move begins there.
+fn line_of_cut(path: &Toolpath, cutter: &Cutter, step: usize, at: &Point3) -> u32 {
+    /// Places along the move; a start that is lowest by less than a share of it counts as its end.
+    const PLACES: u32 = 64;
+    let line = |k: usize| path.line_of(k).unwrap_or_default();
+    let (Some(before), Some(this)) = (step.checked_sub(1), path.moves.get(step)) else { return line(step) };
+    let (from, to) = (path.location_before(step), this.to);
+    if from.axis != Vector3::z() || to.axis != from.axis {
+        return line(step);
+    }
+    let height = |k: u32| {
+        let tip = from.towards(&to, f64::from(k) / f64::from(PLACES)).tip;
+        cutter.height((tip.x - at.x).hypot(tip.y - at.y)).map_or(f64::INFINITY, |above| tip.z + above)
+    };
+    let begins = (1..=PLACES).all(|k| height(k) >= height(0));
+    line(if begins { before } else { step })
 }
 
 fn finer_note(simulation: &Simulation, scene: &Scene) -> Option<String> {

@@ -80,6 +80,8 @@ pub struct Move {
 /// Where the moves of a path stand in a program. The pass that a move belongs to is the move's own.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Origin {
+    /// The file of the program; empty for one that is written from the moves.
+    pub program: String,
     /// Number of the tool; 0 where no program names one.
     pub tool: u32,
     /// The line of each move, counted from 1; empty where there is no program.
@@ -106,6 +108,11 @@ impl Toolpath {
     /// The line of the program that a move stands in; `None` without a program.
     pub fn line_of(&self, move_index: usize) -> Option<u32> {
         self.origin.lines.get(move_index).copied()
+    }
+
+    /// What messages call the program that the lines are of.
+    pub fn program_name(&self) -> &str {
+        if self.origin.program.is_empty() { "toolpath.nc" } else { &self.origin.program }
     }
 
     /// Number of moves.

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use super::compare::{Comparison, Finding};
 use super::results::{Outcome, Results, SceneResult};
 use super::words::first_line;
+use report::xml_escaped as escaped;
 
 /// A test case for each scene and for each toolpath. What got worse is a failure, a scene that newly failed is an error,
 /// and one that failed in the baseline too is skipped.
@@ -78,24 +79,6 @@ fn gone<'a>(results: &'a Results, comparison: &'a Comparison) -> impl Iterator<I
 fn failures(worse: &[&Finding]) -> String {
     let texts: Vec<String> = worse.iter().map(|finding| escaped(&finding.text)).collect();
     if texts.is_empty() { String::new() } else { format!("<failure message=\"{}\"/>", texts.join(" ")) }
-}
-
-/// A text within XML 1.0, which has no control characters but three.
-fn escaped(text: &str) -> String {
-    let mut out = String::new();
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\n' | '\t' => out.push(c),
-            '\u{fffe}' | '\u{ffff}' => out.push('\u{fffd}'),
-            c if c.is_control() => out.push('\u{fffd}'),
-            c => out.push(c),
-        }
-    }
-    out
 }
 
 #[cfg(test)]

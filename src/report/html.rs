@@ -327,7 +327,7 @@ fn regions(t: &ToolpathResult) -> Markup {
             h3 { "Gouges" }
             p.faint { (shown(t.gouge.regions.len(), t.gouge.region_count)) }
             table.figures {
-                thead { tr { th { "ring" } th { "depth µm" } th { "area mm²" } th { "at mm" } th { "move" } th { "line of toolpath.nc" } } }
+                thead { tr { th { "ring" } th { "depth µm" } th { "area mm²" } th { "at mm" } th { "move" } th { "line of the program" } } }
                 tbody { @for (k, r) in (1..).zip(&t.gouge.regions) {
                     tr { th { "G" (k) } td { (micrometres(Some(r.depth_mm))) } td { (format!("{:.4}", r.area_mm2)) } td { (place(r.at_mm)) } td { (r.move_index) } td { @if r.line > 0 { (r.line) } } }
                 } }
@@ -382,7 +382,7 @@ fn method(t: &ToolpathResult, field: bool) -> Markup {
             @if s.threads == 1 { " thread." } @else { " threads." }
         }
         p.faint {
-            "Files: toolpath.nc (the program), toolpath.cls (cutter locations), height.exr (height, deviation and move of every cell), machined.stl and machined.ply (the part as cut, the latter coloured by deviation; "
+            "Files: toolpath.nc (the program, where it was planned here), toolpath.cls (cutter locations), height.exr (height, deviation and move of every cell), machined.stl and machined.ply (the part as cut, the latter coloured by deviation; "
             (t.surface_mesh.triangles) " triangles within " (bound(t.surface_mesh.tolerance_mm)) " µm of the cells"
             @if t.surface_mesh.tolerance_mm > t.scallop.target_mm { ": too coarse for ridges of the target's height; height.exr has them" }
             "), scallop_pairs.csv (calculated and measured scallops of each pair of passes), deviation.png and height.png" @if field { ", field.png and interval.png" } " (larger than here)."

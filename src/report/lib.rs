@@ -9,6 +9,7 @@ mod figure;
 mod fixture;
 mod histogram;
 mod html;
+mod junit;
 mod map;
 mod result;
 mod scale;
@@ -22,6 +23,7 @@ pub use field_map::{field_picture, interval_picture};
 pub use figure::{Figure, FigureFile, FigureTable, FileContent};
 pub use histogram::Histogram;
 pub use html::{ToolpathPage, html_page};
+pub use junit::{junit, xml_escaped};
 pub use map::{MapMark, MapSize, MapWords, deviation_colours, deviation_picture, height_picture};
 pub use result::{
     InputFile, NotPlanned, ReportError, RunReport, SimulationFigures, SurfaceMeshFigures, ToleranceFigures,

@@ -6,6 +6,7 @@
 
 mod axis;
 mod direction;
+mod foreign;
 mod interference;
 mod kinematics;
 mod load;
@@ -32,7 +33,7 @@ use cutter::{Cutter, Holder};
 use machine::Machine;
 pub use metrology::{EngineChoice, Judged, Simulation};
 use metrology::{Limits, ScallopRule};
-use toolpath::{Joining, Step, Strategy};
+use toolpath::{ForeignProgram, Joining, ReadProgram, Step, Strategy};
 
 /// Default allowance of stock above the part's highest point, mm.
 pub const DEFAULT_ALLOWANCE: f64 = 1.0;
@@ -109,6 +110,16 @@ pub struct ToolpathRequest {
 }
 
 impl ToolpathRequest {
+    /// Whether its tool may lean.
+    pub fn tilts(&self) -> bool {
+        self.axis.is_some() || self.foreign().is_some_and(|read| !read.path.is_upright())
+    }
+
+    /// What was read of it, where it is a program from elsewhere.
+    pub fn foreign(&self) -> Option<&ReadProgram> {
+        self.strategy.downcast_ref::<ForeignProgram>().and_then(|program| program.read.as_deref())
+    }
+
     /// The strategy's name as scenes spell it.
     pub fn strategy_name(&self) -> &'static str {
         self.strategy.word()

@@ -7,7 +7,7 @@ use super::{
     DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE, DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, EngineChoice, NamedFile,
     PartSource, Scene, Simulation, Stock, ToolpathRequest, auto_cell, default_error_bound,
 };
-use super::{axis, direction, interference, kinematics, part};
+use super::{axis, direction, foreign, interference, kinematics, part};
 use cutter::{Cutter, Holder, HolderSection};
 use io::regular;
 use keys::{LENGTH, Located, SceneError, SceneText, Section, printable};
@@ -43,9 +43,19 @@ impl Scene {
                 e.as_bytes()[..e.utf8_error().valid_up_to()].iter().filter(|b| **b == b'\n').count() + 1;
             unreadable(format!("line {line} is not UTF-8 text"))
         })?;
-        let mut scene = Self::parse(&path.to_string_lossy(), text)?;
+        Self::of_text(&path.to_string_lossy(), text)
+    }
+
+    /// Checks a scene's text and reads what its toolpaths need from files. `name` is what messages call it, and relative
+    /// paths start from its folder.
+    ///
+    /// # Errors
+    /// [`SceneError`] when anything in it, or a file that it names, is wrong.
+    pub fn of_text(name: &str, text: impl Into<String>) -> Result<Self, SceneError> {
+        let mut scene = Self::parse(name, text)?;
         scene.check_files()?;
         scene.load_directions()?;
+        scene.load_programs()?;
         Ok(scene)
     }
 
@@ -137,6 +147,14 @@ impl Scene {
             direction::load(request, &self.source)?;
         }
         Ok(())
+    }
+
+    /// Reads the programs from elsewhere.
+    fn load_programs(&mut self) -> Result<(), SceneError> {
+        let mut requests = std::mem::take(&mut self.toolpaths);
+        let loaded = requests.iter_mut().try_for_each(|request| foreign::load(request, self));
+        self.toolpaths = requests;
+        loaded
     }
 
     /// Refuses a file that is not there or cannot be opened, pointing at its name in the scene.
@@ -363,11 +381,13 @@ fn read_toolpath(
     cutter: &Cutter,
 ) -> Result<ToolpathRequest, SceneError> {
     let read = read_strategy(section, cutter.radius())?;
-    let surface = read.strategy.definition().part == PartKind::Surface;
-    let step = if surface {
-        read_step(section, limits, cutter)?
-    } else {
-        read_pocket_step(section, cutter.radius())?
+    let kind = read.strategy.definition().part;
+    let surface = kind == PartKind::Surface;
+    let step = match kind {
+        PartKind::Surface => read_step(section, limits, cutter)?,
+        PartKind::Pocket => read_pocket_step(section, cutter.radius())?,
+        // A program's steps are its own; cells are laid out as for the scallop that is allowed.
+        PartKind::Any => Step::Scallop(limits.scallop),
     };
     let (name, own_folder) = read_name(section, &read.word)?;
     let (joining, axis) =
@@ -433,12 +453,12 @@ fn check_pocket_strategies(
         PartSource::Pocket { .. } => (PartKind::Pocket, "a pocket"),
         _ => (PartKind::Surface, "anything but a pocket"),
     };
-    let strange = |request: &&ToolpathRequest| request.strategy.definition().part != kind;
+    let strange = |request: &&ToolpathRequest| !request.strategy.definition().part.suits(kind);
     let Some(wrong) = toolpaths.iter().find(strange) else { return Ok(()) };
     let message = format!("strategy = \"{}\" does not mill {what}", wrong.strategy_name());
     let cure = match kind {
         PartKind::Pocket => format!("use one of {}", words_for(kind)),
-        PartKind::Surface => format!("use one of {}, or `surface = \"pocket\"` in [part]", words_for(kind)),
+        _ => format!("use one of {}, or `surface = \"pocket\"` in [part]", words_for(kind)),
     };
     Err(root.error(&root.key_span("toolpath"), message, cure))
 }

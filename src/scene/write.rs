@@ -72,6 +72,9 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
         writeln!(out, "name = {}", text(&request.name))?;
         writeln!(out, "strategy = {}", text(request.strategy_name()))?;
         request.strategy.write(out)?;
+        if request.strategy.definition().part == PartKind::Any {
+            return Ok(());
+        }
         match request.step {
             Step::Scallop(height) => {
                 writeln!(out, "scallop = {}  # mm, steps are planned for it", number(height))?;

@@ -90,9 +90,16 @@ impl Section {
     }
 }
 
+/// What another cutter did before.
+struct Before {
+    form: Form,
+    tracks: Vec<Track>,
+}
+
 /// What every replay needs.
 struct Task<'a> {
     stock: &'a VoxelStock,
+    before: Vec<Before>,
     form: Form,
     sections: Vec<Section>,
     tracks: Vec<Track>,
@@ -111,7 +118,8 @@ struct Pending {
     bound: f64,
 }
 
-/// How near shank and holder come to what stands of `stock` when they pass, on every move of `path`, rapids included.
+/// How near shank and holder come to what stands of `stock` when they pass, on every move of `path`, rapids included. Other
+/// cutters may have cut the stock `before`.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -121,12 +129,14 @@ struct Pending {
 /// more than 10,000 tiles leave it open. The result does not depend on the number of threads.
 pub fn holder_clearance(
     stock: &VoxelStock,
+    before: &[(Cutter, Toolpath)],
     cutter: &Cutter,
     holder: &Holder,
     path: &Toolpath,
     monitor: &dyn Monitor,
 ) -> Result<StandingClearance, Cancelled> {
-    let task = Task::new(stock, cutter, holder, path);
+    let mut task = Task::new(stock, cutter, holder, path);
+    task.before = before.iter().map(|(cutter, path)| Before::of(cutter, path)).collect();
     if task.sections.is_empty() || path.is_empty() {
         return Ok(StandingClearance { error_bound: 0.0, ..StandingClearance::default() });
     }
@@ -148,14 +158,24 @@ pub fn holder_clearance(
     Ok(search.result())
 }
 
+impl Before {
+    fn of(cutter: &Cutter, path: &Toolpath) -> Self {
+        Self { form: Form::new(cutter), tracks: tracks(path) }
+    }
+}
+
+fn tracks(path: &Toolpath) -> Vec<Track> {
+    path.segments().map(|(from, to, _)| Track::new(from, to)).collect()
+}
+
 impl<'a> Task<'a> {
     fn new(stock: &'a VoxelStock, cutter: &Cutter, holder: &Holder, path: &'a Toolpath) -> Self {
         let sections = Solid::of_sections(holder).into_iter().enumerate();
         let wider = sections.filter(|(_, solid)| solid.radius() > cutter.radius());
         let sections: Vec<Section> = wider.map(|(index, solid)| Section { solid, index }).collect();
         let radius = sections.iter().map(|s| s.solid.radius()).fold(cutter.radius(), f64::max);
-        let tracks = path.segments().map(|(from, to, _)| Track::new(from, to)).collect();
-        Self { stock, form: Form::new(cutter), sections, tracks, path, radius }
+        let tracks = tracks(path);
+        Self { stock, before: Vec::new(), form: Form::new(cutter), sections, tracks, path, radius }
     }
 
     /// Whether a move runs down its track.

@@ -34,6 +34,11 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// A path that was read and not planned.
+    pub fn of_program(path: Toolpath, notes: Vec<String>) -> Self {
+        Self { path, notes, shortest: None, field: None, functions: Vec::new() }
+    }
+
     fn new(
         path: Toolpath,
         mut notes: Vec<String>,
@@ -145,7 +150,7 @@ pub fn plan_tilted(
 fn passes(setup: &Setup<'_>, strategy: &dyn Strategy, axis: Option<&ToolAxis>) -> Result<Passes, PlanError> {
     let Setup { part, cutter, settings, monitor } = *setup;
     let definition = strategy.definition();
-    if definition.part != PartKind::Surface {
+    if !definition.part.suits(PartKind::Surface) {
         let reason = format!("it mills pockets; use one of {}", words_for(PartKind::Surface));
         return Err(PlanError::NotApplicable { strategy: definition.word, reason });
     }

@@ -13,13 +13,16 @@ use serde::Serialize;
 use sim::{FAR, VoxelEngine, holder_clearance};
 use work::monitor::Monitor;
 
-use super::removal::voxel_in_order;
+use super::removal::{TOOLS_BEFORE, doubt, voxel_in_order};
 use super::{more_moves, value};
 use crate::JobError;
 use crate::run::{Finding, Run};
 
 /// Differences of distances that the search along moves leaves open, mm.
 const RESOLUTION: f64 = 2e-5;
+
+/// The stock that stands when a move comes.
+const STANDING: &str = "standing stock";
 
 /// Why a clearance is null where nothing collides.
 const UNKNOWN: &str = "nothing collides, and no distance is known";
@@ -87,7 +90,11 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
         return Ok(Finding::default());
     }
     pairs.sort_by(|a, b| nearness(a).total_cmp(&nearness(b)));
-    let claims = pairs.iter().map(|pair| pair.claim(run)).chain(kept_away).collect();
+    let mut claims: Vec<Claim> = pairs.iter().map(|pair| pair.claim(run)).chain(kept_away).collect();
+    if run.request.foreign().is_some_and(|read| read.unknown_before) {
+        let of_stock = |claim: &&mut Claim| claim.text.contains(STANDING);
+        claims.iter_mut().filter(of_stock).for_each(|claim| doubt(std::slice::from_mut(claim), TOOLS_BEFORE));
+    }
     let rows = pairs.iter().take(LISTED).map(|pair| pair.row()).collect();
     let table = FigureTable {
         title: "Nearest places",
@@ -150,11 +157,12 @@ fn with_standing_stock(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Option<Pa
     let stock = run.session.voxel_stock();
     match run.view() {
         View::Heights(_) => {
-            let found = holder_clearance(&stock, &run.scene().cutter, holder, run.path(), monitor)?;
+            let before = run.request.foreign().map_or(&[][..], |read| &read.before);
+            let found = holder_clearance(&stock, before, &run.scene().cutter, holder, run.path(), monitor)?;
             let pair = PairClearance {
                 error_bound_mm: Some(found.error_bound),
                 more: more_moves(found.collisions.len()),
-                ..PairClearance::new(("holder", "standing stock".into()))
+                ..PairClearance::new(("holder", STANDING.into()))
             };
             let Some(near) = found.nearest else {
                 return Ok(Some(PairClearance { reason: Some(BEYOND), ..pair }));
@@ -175,7 +183,7 @@ fn with_standing_stock(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Option<Pa
                 voxel *= 0.5;
                 hits = engine.holder_in_stock(holder, run.path(), voxel, monitor).map_err(run.voxels())?;
             }
-            let pair = PairClearance::new(("holder", "standing stock".into()));
+            let pair = PairClearance::new(("holder", STANDING.into()));
             Ok(Some(match (&hits.worst, hits.open) {
                 (Some(worst), _) => PairClearance {
                     clearance_mm: Some(-worst.depth),

@@ -131,7 +131,7 @@ fn of_part(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Covered, JobError> {
 /// The limits of the surface that no cell sees.
 fn judged(run: &Run<'_>, measured: &Measurement, never_cut: bool) -> Vec<Claim> {
     let (limits, rule) = (&run.scene().tolerance, &run.scene().scallop_rule);
-    let (_, mut claims) = judge::judge(measured, limits, rule, Vec::new());
+    let (_, mut claims) = judge::judge(measured, limits, rule, Vec::new(), run.path().program_name());
     for claim in &mut claims {
         if claim.what == "uncut" && never_cut {
             let at = measured

@@ -16,6 +16,10 @@ const ROUNDING: f64 = 1e-9;
 /// Of every toolpath.
 pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> {
     let (scene, path) = (run.scene(), run.path());
+    // The feeds of a program from elsewhere are its own.
+    if run.request.foreign().is_some() {
+        return Ok(Finding::default());
+    }
     let line = |k: usize| format!("at move {k}{}", run.program_line(k as u32));
     let mut claims = vec![
         fast_enough(path, &scene.cutting, &scene.machine, &line),

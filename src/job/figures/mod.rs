@@ -4,12 +4,14 @@
 mod clearance;
 mod correction;
 mod coverage;
+mod entries;
 mod feeds;
 mod field;
 mod machine;
 mod offset;
 mod pairs;
 mod pocket;
+mod program;
 mod removal;
 mod roughness;
 mod sections;
@@ -20,7 +22,7 @@ mod turning;
 use serde::Serialize;
 use serde_json::Value;
 
-use report::{Claim, Figure, FigureFile, ReportError};
+use report::{Claim, Figure, FigureFile, ReportError, Verdict};
 use work::monitor::{self, Monitor};
 
 use super::JobError;
@@ -30,10 +32,11 @@ use super::run::{Finding, Run};
 type Find = fn(&Run<'_>, &dyn Monitor) -> Result<Finding, JobError>;
 
 /// All figures, in the order of report.json.
-const FIGURES: [Find; 15] = [
+const FIGURES: [Find; 16] = [
     coverage::find,
     shortest::find,
     correction::find,
+    program::find,
     field::find,
     machine::find,
     pairs::find,
@@ -71,6 +74,16 @@ pub(crate) fn all(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Found, JobErro
         }
     }
     Ok(found)
+}
+
+/// Limits of material that is left, where other tools of a program may have cut it: they are not violated for sure.
+pub(crate) fn with_other_tools(mut claims: Vec<Claim>) -> (Verdict, Vec<Claim>) {
+    let decided_by = "the other tools of the program may cut there, and each tool is measured by itself";
+    let left = |claim: &&mut Claim| ["uncut", "scallop"].contains(&claim.what);
+    for claim in claims.iter_mut().filter(left) {
+        removal::doubt(std::slice::from_mut(claim), decided_by);
+    }
+    (claims.iter().map(Claim::verdict).max().unwrap_or(Verdict::Undecided), claims)
 }
 
 /// Numbers as report.json has them.

@@ -63,10 +63,10 @@ fn within_walls(run: &Run<'_>, pocket: &PocketFigures) -> Claim {
     let bound = pocket.wall_gouge_error_bound_mm;
     let index = pocket.wall_gouge_move;
     let text = format!(
-        "the wall is cut {} µm beyond the outline (limit {}) by move {index}, toolpath.nc line {}",
+        "the wall is cut {} µm beyond the outline (limit {}) by move {index}{}",
         with_bound(Some(measured), Some(bound)),
         micrometres(Some(limit)),
-        run.line(index)
+        run.program_line(index)
     );
     Claim::length("wall", Gravity::Scrap, limit, measured, bound).told(text)
 }

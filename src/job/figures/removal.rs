@@ -2,11 +2,11 @@
 
 use cutter::Solid;
 use metrology::{RemovalFigures, View, removal_figures, voxel_removal_figures};
-use report::{Claim, Figure, Gravity, place};
-use sim::{VoxelEngine, VoxelStock, ZMap, cut_in_order};
+use report::{Claim, Figure, Gravity, Verdict, place};
+use sim::{MoveRemoval, VoxelEngine, VoxelStock, ZMap, cut_in_order};
 use work::monitor::Monitor;
 
-use super::value;
+use super::{entries, value};
 use crate::JobError;
 use crate::run::{Finding, Run};
 
@@ -18,6 +18,9 @@ const MEANING: (&str, &str) = (
      wide a move cuts. No rapid move may touch stock.",
 );
 
+/// What decides whether stock stands that tools with unknown cutters may have taken.
+pub(super) const TOOLS_BEFORE: &str = "a table of tools with the cutters of the tools before would decide it";
+
 /// Voxels in the block where the program chooses: more take longer than planning and measuring do, fewer leave engagement
 /// and rates rough.
 const VOXELS: f64 = 1e6;
@@ -27,18 +30,21 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     if !run.scene().simulation.removal {
         return Ok(Finding::default());
     }
-    let mut r = match run.view() {
+    let (mut r, moves) = match run.view() {
         View::Heights(cut) => {
-            let stock = ZMap::block(cut.grid, run.session.top);
+            let stock = stock(run, cut, monitor)?;
             let removed = cut_in_order(stock, &run.scene().cutter, run.path(), monitor)?;
-            removal_figures(run.path(), &removed, &cut.height)
+            (removal_figures(run.path(), &removed, &cut.height), removed.moves)
         }
         View::Normals(_) => by_voxels(run, monitor)?,
     };
     for contact in &mut r.rapid_contacts {
         contact.line = run.line(contact.move_index);
     }
-    let claims = vec![no_rapid_in_stock(&r)];
+    let mut claims = vec![no_rapid_in_stock(&r, run.path().program_name())];
+    if run.request.foreign().is_some_and(|read| read.unknown_before) {
+        doubt(&mut claims, TOOLS_BEFORE);
+    }
     let (greatest, bound) =
         (r.max_material_removal_rate_mm3_min, r.max_material_removal_rate_error_bound_mm3_min);
     let (most, mean) = (r.p95_material_removal_rate_mm3_min, r.mean_material_removal_rate_mm3_min);
@@ -53,7 +59,26 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     ];
     let figure =
         Figure { key: "removal", value: value(&r)?, rows, meaning: Some(MEANING), ..Figure::default() };
-    Ok(Finding { figure: Some(figure), claims, ..Finding::default() })
+    let entries = entries::of(run, &moves);
+    claims.extend(entries.claims);
+    Ok(Finding { figure: Some(figure), claims, notes: entries.notes })
+}
+
+/// What seems violated may not be: other tools may have cut there.
+pub(crate) fn doubt(claims: &mut [Claim], decided_by: &'static str) {
+    for claim in claims.iter_mut().filter(|claim| claim.verdict() == Verdict::Fail) {
+        (claim.error_bound, claim.decided_by) = (f64::INFINITY, decided_by);
+    }
+}
+
+/// The block, less what other tools of a program from elsewhere cut before.
+fn stock(run: &Run<'_>, cut: &ZMap, monitor: &dyn Monitor) -> Result<ZMap, JobError> {
+    let mut stock = ZMap::block(cut.grid, run.session.top);
+    for (cutter, path) in run.request.foreign().iter().flat_map(|read| &read.before) {
+        stock = sim::cut(stock, cutter, path, monitor)?;
+        stock.cut_by.fill(sim::NOT_CUT);
+    }
+    Ok(stock)
 }
 
 /// The voxel of removal in order, mm.
@@ -62,17 +87,17 @@ pub(super) fn voxel_in_order(run: &Run<'_>, stock: &VoxelStock) -> f64 {
     run.scene().simulation.voxel.unwrap_or_else(about)
 }
 
-fn by_voxels(run: &Run<'_>, monitor: &dyn Monitor) -> Result<RemovalFigures, JobError> {
+fn by_voxels(run: &Run<'_>, monitor: &dyn Monitor) -> Result<(RemovalFigures, Vec<MoveRemoval>), JobError> {
     let (scene, stock) = (run.scene(), run.session.voxel_stock());
     let voxel = voxel_in_order(run, &stock);
     let cutter = Solid::of_cutter(&scene.cutter, scene.holder.as_ref());
     let engine = VoxelEngine::new(&stock, &cutter, run.path()).map_err(run.voxels())?;
     let removed = engine.removal(voxel, monitor).map_err(run.voxels())?;
-    Ok(voxel_removal_figures(run.path(), &removed, voxel))
+    Ok((voxel_removal_figures(run.path(), &removed, voxel), removed.moves))
 }
 
 /// That no rapid move touches stock; told of the first one that does: on a machine it is the one that breaks the cutter.
-fn no_rapid_in_stock(removal: &RemovalFigures) -> Claim {
+fn no_rapid_in_stock(removal: &RemovalFigures, program: &str) -> Claim {
     let claim = |depth| Claim::length("rapid", Gravity::Crash, 0.0, depth, 0.0);
     let Some(first) = removal.rapid_contacts.first() else {
         return claim(0.0).told("no rapid move touches stock".into());
@@ -86,7 +111,7 @@ fn no_rapid_in_stock(removal: &RemovalFigures) -> Claim {
     );
     // Paths that tilt the tool have no program where the scene names no machine for it.
     if first.line > 0 {
-        text += &format!(", toolpath.nc line {}", first.line);
+        text += &format!(", {program} line {}", first.line);
     }
     match removal.rapid_contact_count {
         0 | 1 => {}
@@ -103,12 +128,12 @@ mod tests {
     #[test]
     fn the_first_rapid_in_stock_is_told_with_its_line() {
         use metrology::RapidContactFigures;
-        assert_eq!(no_rapid_in_stock(&RemovalFigures::default()).verdict(), report::Verdict::Pass);
+        assert_eq!(no_rapid_in_stock(&RemovalFigures::default(), "").verdict(), report::Verdict::Pass);
         let contact =
             |depth_mm| RapidContactFigures { move_index: 7, line: 12, at_mm: [1.0, 2.0, 3.0], depth_mm };
         let rapid_contacts = vec![contact(0.25), contact(1.5)];
         let removal = RemovalFigures { rapid_contacts, rapid_contact_count: 3, ..Default::default() };
-        let found = no_rapid_in_stock(&removal);
+        let found = no_rapid_in_stock(&removal, "toolpath.nc");
         assert_eq!((found.what, found.measured), ("rapid", Some(1.5)));
         assert_eq!(found.verdict(), report::Verdict::Fail);
         let place =

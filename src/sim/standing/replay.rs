@@ -8,6 +8,7 @@
 use geometry::Point3;
 use work::monitor::{Cancelled, Monitor, check};
 
+use super::super::form::Form;
 use super::super::swept::swept_height;
 use super::super::track::{Track, larger, smaller};
 use super::{NearStanding, Pending, Replayed, Section, Task};
@@ -74,6 +75,11 @@ impl<'a> Replay<'a> {
     /// Runs through all moves of the tile.
     pub fn run(mut self, monitor: &dyn Monitor) -> Result<Replayed, Cancelled> {
         let mut open = Vec::new();
+        let task = self.task;
+        for before in &task.before {
+            check(monitor)?;
+            before.tracks.iter().for_each(|track| self.cut(&before.form, track));
+        }
         for (count, &k) in self.tile.moves.iter().enumerate() {
             if count % MOVES_BETWEEN_QUESTIONS == 0 {
                 check(monitor)?;
@@ -85,9 +91,9 @@ impl<'a> Replay<'a> {
                 self.look(&track, &mut open);
                 let falls = self.task.falls(k);
                 self.reach(k, &open, |section, at| vec![just_before(&track, falls, self.task, section, at)]);
-                self.cut(&track);
+                self.cut(&task.form, &track);
             } else {
-                self.cut(&track);
+                self.cut(&task.form, &track);
                 self.look(&track, &mut open);
             }
             self.reach(k, &open, |_, at| abeam(&track, at));
@@ -108,8 +114,7 @@ impl<'a> Replay<'a> {
     }
 
     /// Lowers the stock to what a move leaves.
-    fn cut(&mut self, track: &Track) {
-        let form = &self.task.form;
+    fn cut(&mut self, form: &Form, track: &Track) {
         for block in 0..BLOCKS * BLOCKS {
             let (bi, bj) = (block % BLOCKS * BLOCK, block / BLOCKS * BLOCK);
             let square = self.square(bi, bj, BLOCK);
@@ -123,18 +128,18 @@ impl<'a> Replay<'a> {
             if track.tip(first) + form.height(larger(near, 0.0)) - SLACK >= self.blocks[block] {
                 continue;
             }
-            self.cut_block(track, bi, bj);
+            self.cut_block(form, track, bi, bj);
             self.lower_block(block);
         }
     }
 
-    fn cut_block(&mut self, track: &Track, bi: usize, bj: usize) {
+    fn cut_block(&mut self, form: &Form, track: &Track, bi: usize, bj: usize) {
         let mut swept = [[0.0; BLOCK + 1]; BLOCK + 1];
         for (j, row) in swept.iter_mut().enumerate() {
             let y = self.tile.low[1] + (bj + j) as f64 * self.tile.cell;
             for (i, height) in row.iter_mut().enumerate() {
                 let x = self.tile.low[0] + (bi + i) as f64 * self.tile.cell;
-                *height = swept_height(&self.task.form, track, x, y);
+                *height = swept_height(form, track, x, y);
                 let node = &mut self.nodes[(bj + j) * NODES + bi + i];
                 *node = smaller(*node, *height);
             }

@@ -24,7 +24,7 @@ fn flat() -> Cutter {
 }
 
 fn of(block: &VoxelStock, cutter: &Cutter, holder: &Holder, path: &Toolpath) -> StandingClearance {
-    holder_clearance(block, cutter, holder, path, &Silent).unwrap()
+    holder_clearance(block, &[], cutter, holder, path, &Silent).unwrap()
 }
 
 /// A slot of 8 mm down from the top, along x.
@@ -69,6 +69,21 @@ fn what_is_cut_before_does_not_stand_any_more() {
     assert!((got.nearest.unwrap().distance - 2.0).abs() <= got.error_bound + SHARP, "{got:?}");
     let at_once = path_through([at(-20.0, 20.0), at(-20.0, -12.0), at(80.0, -12.0)]);
     assert!(of(&block, &flat(), &holder(6.0), &at_once).nearest.unwrap().distance < 0.0);
+}
+
+/// A face mill of 40 mm that takes the top off makes way for the nut.
+#[test]
+fn what_another_cutter_took_before_does_not_stand() {
+    let block = block([0.0, 0.0, -30.0], [40.0, 40.0, 0.0]);
+    let at = |x: f64| Point3::new(x, 20.0, -5.0);
+    let faced = (Cutter::flat(60.0).unwrap(), path_through([at(-40.0), at(80.0)]));
+    let clearance = |before: &[(Cutter, Toolpath)]| {
+        holder_clearance(&block, before, &flat(), &holder(7.0), &slot(), &Silent).unwrap()
+    };
+    assert!(!clearance(&[]).collisions.is_empty());
+    let got = clearance(&[faced]);
+    // The nut is 7 mm above the tip, and 3 mm of the slot are left.
+    assert!((got.nearest.unwrap().distance - 4.0).abs() <= got.error_bound + SHARP, "{got:?}");
 }
 
 /// Beside the block, as near as the pass lies.
@@ -177,7 +192,7 @@ fn threads_change_nothing_and_it_can_be_stopped() {
         pool.install(|| of(&block, &cutter, &holder, &path))
     };
     assert_eq!(run(1), run(3));
-    assert_eq!(holder_clearance(&block, &cutter, &holder, &path, &Stop), Err(Cancelled));
+    assert_eq!(holder_clearance(&block, &[], &cutter, &holder, &path, &Stop), Err(Cancelled));
     let nothing = path_through([Point3::origin()]);
     assert_eq!(of(&block, &cutter, &holder, &nothing), StandingClearance::default());
 }

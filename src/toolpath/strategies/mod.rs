@@ -11,6 +11,7 @@ mod mesh_passes;
 mod mesh_shortest;
 mod offset_mesh;
 pub(crate) mod offset_surface;
+pub(crate) mod program;
 pub(crate) mod shortest;
 pub(crate) mod spiral;
 pub(crate) mod streamline;
@@ -33,11 +34,12 @@ pub const STRATEGIES: &[&Definition] = &[
     &pocket::FLOW,
     &pocket::OFFSET,
     &pocket::ZIGZAG,
+    &program::DEFINITION,
 ];
 
 /// The words of all strategies for a kind of part, with commas between them.
 pub fn words_for(part: PartKind) -> String {
-    let words = STRATEGIES.iter().filter(|strategy| strategy.part == part).map(|strategy| strategy.word);
+    let words = STRATEGIES.iter().filter(|strategy| strategy.part.suits(part)).map(|strategy| strategy.word);
     words.collect::<Vec<_>>().join(", ")
 }
 

@@ -17,6 +17,8 @@ pub enum PartKind {
     Surface,
     /// Pockets: a plane region cut down to a level floor.
     Pocket,
+    /// Any part.
+    Any,
 }
 
 impl PartKind {
@@ -35,7 +37,13 @@ impl PartKind {
                 "axis",
             ],
             Self::Pocket => &["name", "strategy", "stepover"],
+            Self::Any => &["name", "strategy"],
         }
+    }
+
+    /// Whether a strategy for such parts mills a part of another kind.
+    pub fn suits(self, part: Self) -> bool {
+        self == Self::Any || self == part
     }
 }
 

@@ -51,7 +51,7 @@ fn states(text: &str, letters: [char; 5]) -> Vec<State> {
     states
 }
 
-fn machine(name: &str) -> Kinematics {
+pub(crate) fn machine(name: &str) -> Kinematics {
     let [mut first, mut second] = preset(name).unwrap();
     let place = |axis: &mut RotaryAxis, table: [f64; 3], head: [f64; 3]| {
         axis.point = Point3::from(if axis.side == Side::Table { table } else { head });
@@ -62,7 +62,7 @@ fn machine(name: &str) -> Kinematics {
 }
 
 /// Rapids over, cuts that tilt, a turn on the spot, rapids back; within a cone that all machines reach.
-fn path() -> Toolpath {
+pub(crate) fn tilting_path() -> Toolpath {
     let mut rng = sim::scenes::Rng::new(11);
     let mut at = |z: f64| {
         let tip = Point3::new(rng.within(-40.0, 40.0), rng.within(-40.0, 40.0), z);
@@ -115,7 +115,7 @@ fn joints_of(kinematics: &Kinematics, words: &[f64; 5]) -> Joints {
 
 #[test]
 fn reading_back_gives_the_locations() {
-    let path = path();
+    let path = tilting_path();
     for name in PRESETS {
         let kinematics = machine(name);
         for style in [Style::Tcp, Style::Full] {
@@ -146,7 +146,7 @@ fn reading_back_gives_the_locations() {
 /// Between lines of a full program the joints move evenly: the tip stays on its line, the feed is kept.
 #[test]
 fn full_programs_keep_tip_and_feed() {
-    let path = path();
+    let path = tilting_path();
     for name in ["ac-table", "bc-head", "nutating-head-c-table", "nutating-table"] {
         let kinematics = machine(name);
         let (text, lines, joints) = program(&path, &kinematics, Style::Full);
@@ -192,7 +192,7 @@ fn full_programs_keep_tip_and_feed() {
 /// By differences of the words: a head with a long gauge and a table far from its axes at a high feed.
 #[test]
 fn no_joint_is_faster_than_its_rate() {
-    let mut path = path();
+    let mut path = tilting_path();
     path.moves.iter_mut().for_each(|m| m.feed_rate = 12_000.0);
     for name in ["ab-head", "ac-table", "nutating-head-c-table"] {
         let rates = [15_000.0, 12_000.0, 9_000.0];
@@ -223,7 +223,7 @@ fn no_joint_is_faster_than_its_rate() {
 /// Up, turn, over, down: before the control keeps the tip the linear axes stand over the start, and then go straight down.
 #[test]
 fn a_program_that_keeps_the_tip_comes_down_along_the_machines_z() {
-    let path = path();
+    let path = tilting_path();
     for name in PRESETS {
         let kinematics = machine(name);
         let (text, ..) = program(&path, &kinematics, Style::Tcp);
@@ -319,7 +319,7 @@ fn no_program_is_made_of_joints_that_must_not_be() {
     let [first, second] = preset("ac-table").unwrap();
     let upward = RotaryAxis { limits: Some([-0.1, 0.1]), ..second };
     let kinematics = Kinematics::new(first, upward, 100.0, Point3::origin(), [None; 3]).unwrap();
-    let path = path();
+    let path = tilting_path();
     let write = |style: Style, kinematics: &Kinematics, following: &Following| {
         let joints = follow(kinematics, &path, following).unwrap();
         let post = FiveAxisPost { kinematics, joints: &joints, style, rapid_rate: 15_000.0 };

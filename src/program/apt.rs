@@ -1,0 +1,486 @@
+//! Cutter locations in APT (ISO 3592, ISO 4343), as NX, CATIA, Creo and this project write them.
+//!
+//! A statement is a major word, `/`, and minor words and numbers between commas; `$` carries it on in the next line, `$$`
+//! begins a remark. What moves the tool is followed (GOTO, GODLTA, FROM, CIRCLE before GOTO, RAPID), what describes it is kept
+//! (CUTTER, LOADTL, SPINDL, FEDRAT, UNITS, MULTAX), what moves nothing is passed over, and what may move it and is not
+//! understood stops the reading.
+
+use geometry::{Point3, Vector3};
+
+use crate::control::Plane;
+use crate::error::{Fault, ProgramError, Stop};
+use crate::lines::Lines;
+use crate::program::{Arc, Note, Program, Setting, Spindle, Step, StepKind, ToolRemark};
+
+/// Major words that move nothing, with those that only machines act on.
+const QUIET: [&str; 40] = [
+    "PARTNO",
+    "PPRINT",
+    "REMARK",
+    "MACHIN",
+    "COOLNT",
+    "CLEARP",
+    "OPSKIP",
+    "STOP",
+    "OPSTOP",
+    "DELAY",
+    "INTOL",
+    "OUTTOL",
+    "TOLER",
+    "CUTCOM",
+    "LINTOL",
+    "PREFUN",
+    "AUXFUN",
+    "SEQNO",
+    "TOOLPATH",
+    "TLDATA",
+    "MSYS",
+    "PAINT",
+    "END-OF-PATH",
+    "TOOLNO",
+    "OPERATION",
+    "ROTHED",
+    "MODE",
+    "DISPLY",
+    "LEADER",
+    "CHECK",
+    "INSERT",
+    "TPRINT",
+    "PROGRAM",
+    "MCHTOL",
+    "CATMAT",
+    "CATPROCESS",
+    "CATCALL",
+    "PIVOTZ",
+    "SELCTL",
+    "HEAD",
+];
+
+/// Words after which all of the line is text.
+const TEXT: [&str; 5] = ["PARTNO", "PPRINT", "REMARK", "INSERT", "TPRINT"];
+
+/// Lines that one statement may be carried over.
+const MOST_LINES: usize = 1000;
+
+/// Locations between which one circle runs at most half a turn are exact; longer ones follow from the points given.
+const RADIUS_SHARE: f64 = 1e-3;
+
+/// What CIRCLE says of the motion that follows.
+#[derive(Debug, Clone, Copy)]
+struct Circle {
+    centre: Point3,
+    /// About which the motion turns anticlockwise.
+    axis: Vector3,
+    radius: f64,
+}
+
+/// A reader of locations.
+struct Reader {
+    out: Program,
+    unit: f64,
+    rapid: bool,
+    circle: Option<Circle>,
+    /// mm/min, or mm/rev.
+    feed: f64,
+    per_revolution: bool,
+    setting: Setting,
+    changed: bool,
+    at: Point3,
+    axis: Vector3,
+    begun: bool,
+}
+
+/// A statement: its words, and where each begins.
+struct Statement {
+    line: usize,
+    major: String,
+    words: Vec<(String, usize)>,
+}
+
+/// Reads cutter locations. `name` is what messages call them.
+///
+/// # Errors
+/// [`ProgramError`] at the first thing that cannot be followed.
+pub fn read_apt(name: &str, bytes: &[u8]) -> Result<Program, ProgramError> {
+    let lines = Lines::new(bytes).map_err(|(line, stop)| stop.in_line(name, line))?;
+    let mut reader = Reader::new(name, lines.len());
+    let mut line = 0;
+    while line < lines.len() && !reader.out.ended {
+        let (statement, next) = statement(&lines, line).map_err(|stop| stop.in_line(name, line))?;
+        if let Some(statement) = statement {
+            reader.run(&statement).map_err(|stop| stop.in_line(name, statement.line))?;
+        }
+        line = next;
+    }
+    Ok(reader.out)
+}
+
+/// Whether a text is cutter locations rather than G-code.
+pub fn looks_like_apt(bytes: &[u8]) -> bool {
+    let head = String::from_utf8_lossy(&bytes[..bytes.len().min(20_000)]).to_ascii_uppercase();
+    let major = |line: &str| {
+        let line = line.trim_start();
+        ["GOTO", "CUTTER", "FEDRAT", "LOADTL", "TOOL PATH", "PARTNO", "MULTAX", "UNITS", "FROM"]
+            .iter()
+            .any(|word| line.strip_prefix(word).is_some_and(|rest| rest.trim_start().starts_with(['/', ' '])))
+    };
+    head.lines().any(|line| major(line) && !line.trim_start().starts_with("GOTO "))
+}
+
+/// The statement that begins in a line, and the line after it.
+fn statement(lines: &Lines<'_>, first: usize) -> Result<(Option<Statement>, usize), Stop> {
+    let mut words: Vec<(String, usize)> = Vec::new();
+    let mut line = first;
+    let mut major = String::new();
+    loop {
+        let text = String::from_utf8_lossy(lines.get(line)).into_owned();
+        let code = text.split("$$").next().unwrap_or_default();
+        let (code, carried) = match code.trim_end().strip_suffix('$') {
+            Some(code) => (code, true),
+            None => (code, false),
+        };
+        let mut rest = code;
+        let mut at = 0;
+        if line == first {
+            let end = code.find(['/', ',']).unwrap_or(code.len());
+            let head = code[..end].trim().to_ascii_uppercase();
+            let word = head.split_whitespace().next().unwrap_or_default();
+            // TOOL PATH/… of NX is one word.
+            major = if head.starts_with("TOOL PATH") { "TOOLPATH".to_owned() } else { word.to_owned() };
+            if TEXT.contains(&word) || word.is_empty() {
+                let whole = code.trim_start().get(word.len()..).unwrap_or_default().trim();
+                let said = vec![(whole.trim_start_matches('/').to_owned(), 0)];
+                let statement = (!word.is_empty()).then_some(Statement { line, major, words: said });
+                return Ok((statement, line + 1));
+            }
+            at = (end + 1).min(code.len());
+            rest = &code[at..];
+        }
+        for word in rest.split(',') {
+            let trimmed = word.trim();
+            if !trimmed.is_empty() {
+                let column = at + word.len() - word.trim_start().len();
+                words.push((trimmed.to_ascii_uppercase(), column));
+            }
+            at += word.len() + 1;
+        }
+        line += 1;
+        if !carried || line >= lines.len() {
+            return Ok((Some(Statement { line: first, major, words }), line));
+        }
+        if line - first > MOST_LINES {
+            return Err(Stop::new(0, Fault::LongLine(MOST_LINES)));
+        }
+    }
+}
+
+impl Statement {
+    /// All its numbers.
+    fn numbers(&self) -> Vec<f64> {
+        self.words.iter().filter_map(|(word, _)| number(word)).collect()
+    }
+
+    /// All its words as numbers.
+    fn all_numbers(
+        &self,
+        what: &'static str,
+        wanted: &'static str,
+        counts: &[usize],
+    ) -> Result<Vec<f64>, Stop> {
+        let values: Vec<f64> = self
+            .words
+            .iter()
+            .map(|(word, column)| {
+                number(word)
+                    .filter(|value| value.abs() <= geometry::MAX_COORDINATE)
+                    .ok_or_else(|| Stop::new(*column, Fault::Malformed(word.clone())))
+            })
+            .collect::<Result<_, _>>()?;
+        if counts.contains(&values.len()) {
+            Ok(values)
+        } else {
+            Err(Stop::new(0, Fault::Count { what, wanted, found: values.len() }))
+        }
+    }
+
+    fn has(&self, word: &str) -> bool {
+        self.words.iter().any(|(other, _)| other == word)
+    }
+
+    fn text(&self) -> String {
+        let words: Vec<&str> = self.words.iter().map(|(word, _)| word.as_str()).collect();
+        format!("{}/{}", self.major, words.join(","))
+    }
+}
+
+/// A number of APT; exponents are written with E or D.
+fn number(word: &str) -> Option<f64> {
+    let plain = word.replace('D', "E");
+    let digits = plain.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '-' | '+' | '.'));
+    plain.parse::<f64>().ok().filter(|value| digits && value.is_finite())
+}
+
+impl Reader {
+    fn new(name: &str, lines: usize) -> Self {
+        let setting = Setting {
+            tool: 0,
+            spindle: Spindle::Off,
+            speed: 0.0,
+            register: 0,
+            length: [0.0; 3],
+            tip_kept: true,
+            work: 1,
+        };
+        let out = Program { name: name.to_owned(), lines, axes: vec![[0.0, 0.0, 1.0]], ..Program::default() };
+        Self {
+            out,
+            unit: 1.0,
+            rapid: false,
+            circle: None,
+            feed: 0.0,
+            per_revolution: false,
+            setting,
+            changed: true,
+            at: Point3::origin(),
+            axis: Vector3::z(),
+            begun: false,
+        }
+    }
+
+    fn run(&mut self, statement: &Statement) -> Result<(), Stop> {
+        match statement.major.as_str() {
+            "GOTO" => self.go_to(statement),
+            "GODLTA" => self.go_by(statement),
+            "FROM" => self.from(statement),
+            "GOHOME" | "GOFWD" | "GOLFT" | "GORGT" | "GOBACK" | "GOUP" | "GODOWN" | "CYCLE" | "COPY"
+            | "INDEX" | "TRACUT" | "ROTABL" | "TRANS" | "ORIGIN"
+                if !statement.has("OFF") =>
+            {
+                Err(Stop::new(0, Fault::Statement(statement.text())))
+            }
+            "RAPID" => {
+                self.rapid = true;
+                Ok(())
+            }
+            "FEDRAT" => {
+                self.feed(statement);
+                Ok(())
+            }
+            "UNITS" => {
+                self.unit = if statement.has("INCHES") || statement.has("INCH") { 25.4 } else { 1.0 };
+                Ok(())
+            }
+            "SPINDL" => {
+                self.spindle(statement);
+                Ok(())
+            }
+            "LOADTL" | "TURRET" | "LOAD" => {
+                if let Some(tool) = statement.numbers().first().filter(|n| (0.0..1e9).contains(*n)) {
+                    (self.setting.tool, self.changed) = (*tool as u32, true);
+                    // A tool change stops the spindle.
+                    self.setting.spindle = Spindle::Off;
+                }
+                Ok(())
+            }
+            "CUTTER" => {
+                let text = format!(
+                    "CUTTER/{}",
+                    statement.numbers().iter().map(f64::to_string).collect::<Vec<_>>().join(",")
+                );
+                let (tool, line) = (self.setting.tool, statement.line as u32 + 1);
+                self.out.tools.push(ToolRemark { tool, line, text });
+                Ok(())
+            }
+            "CIRCLE" => self.circle(statement),
+            "MULTAX" | "CYCLE" | "TRACUT" | "ROTABL" | "TRANS" | "ORIGIN" => Ok(()),
+            "FINI" => {
+                self.out.ended = true;
+                Ok(())
+            }
+            "TLAXIS" | "SET" => self.tool_axis(statement),
+            quiet if QUIET.contains(&quiet) => Ok(()),
+            _ => {
+                // Macros, patterns and geometry are no cutter locations.
+                let text = statement.text();
+                if statement.words.is_empty() && !statement.major.starts_with("GO") {
+                    self.note(statement.line, format!("`{}` is taken to move nothing", statement.major));
+                    return Ok(());
+                }
+                Err(Stop::new(0, Fault::Statement(text)))
+            }
+        }
+    }
+
+    fn note(&mut self, line: usize, text: String) {
+        if self.out.notes.len() < 200 && !self.out.notes.iter().any(|note| note.text == text) {
+            self.out.notes.push(Note { line: line as u32 + 1, text });
+        }
+    }
+
+    fn tool_axis(&mut self, statement: &Statement) -> Result<(), Stop> {
+        let values = statement.numbers();
+        let [i, j, k] = values[..] else { return Ok(()) };
+        self.axis = Vector3::new(i, j, k)
+            .try_normalize(1e-9)
+            .ok_or_else(|| Stop::new(0, Fault::Statement(statement.text())))?;
+        Ok(())
+    }
+
+    fn feed(&mut self, statement: &Statement) {
+        let number = statement.numbers().first().copied();
+        // NX writes FEDRAT/MMPM,250 and FEDRAT/250,MMPM; CATIA FEDRAT/ 250.0000,MMPM.
+        let inch = statement.has("IPM") || statement.has("IPR");
+        self.per_revolution = statement.has("MMPR") || statement.has("IPR") || statement.has("PERREV");
+        if let Some(feed) = number.filter(|feed| *feed >= 0.0) {
+            let metric = statement.has("MMPM") || statement.has("MMPR");
+            self.feed = feed
+                * if inch {
+                    25.4
+                } else if metric {
+                    1.0
+                } else {
+                    self.unit
+                };
+        }
+        if statement.has("RAPID") {
+            self.rapid = true;
+        }
+    }
+
+    fn spindle(&mut self, statement: &Statement) {
+        self.changed = true;
+        if statement.has("OFF") {
+            self.setting.spindle = Spindle::Off;
+            return;
+        }
+        let anticlockwise = statement.has("CCLW");
+        self.setting.spindle = if anticlockwise { Spindle::Anticlockwise } else { Spindle::Clockwise };
+        if let Some(speed) = statement.numbers().first() {
+            self.setting.speed = speed.abs();
+        }
+    }
+
+    /// `FROM/x,y,z[,i,j,k]`: where the tool stands.
+    fn from(&mut self, statement: &Statement) -> Result<(), Stop> {
+        let (at, axis) = self.location(statement, "FROM")?;
+        (self.at, self.axis) = (at, axis);
+        if self.out.steps.is_empty() {
+            self.out.start = place(&at);
+            self.out.axes[0] = axis.into();
+            self.begun = true;
+            return Ok(());
+        }
+        self.push(statement.line, StepKind::Set);
+        Ok(())
+    }
+
+    fn location(&self, statement: &Statement, what: &'static str) -> Result<(Point3, Vector3), Stop> {
+        let values = statement.all_numbers(what, "3 or 6", &[3, 6])?;
+        let at = Point3::new(values[0], values[1], values[2]) * self.unit;
+        if let Some(k) = at.iter().position(|x| x.abs() > geometry::MAX_COORDINATE) {
+            let (letter, value) = (['X', 'Y', 'Z'][k], at[k]);
+            return Err(Stop::new(0, Fault::Range { letter, value }));
+        }
+        let axis = match values[3..] {
+            [i, j, k] => Vector3::new(i, j, k)
+                .try_normalize(1e-9)
+                .ok_or_else(|| Stop::new(0, Fault::Statement(statement.text())))?,
+            _ => self.axis,
+        };
+        Ok((at, axis))
+    }
+
+    fn go_to(&mut self, statement: &Statement) -> Result<(), Stop> {
+        let (at, axis) = self.location(statement, "GOTO")?;
+        self.go(statement.line, at, axis)
+    }
+
+    fn go_by(&mut self, statement: &Statement) -> Result<(), Stop> {
+        let values = statement.all_numbers("GODLTA", "1 or 3", &[1, 3])?;
+        let by = match values[..] {
+            [x, y, z] => Vector3::new(x, y, z) * self.unit,
+            _ => self.axis * values[0] * self.unit,
+        };
+        self.go(statement.line, self.at + by, self.axis)
+    }
+
+    fn go(&mut self, line: usize, at: Point3, axis: Vector3) -> Result<(), Stop> {
+        let from = self.at;
+        let turned = axis != self.axis;
+        (self.at, self.axis) = (at, axis);
+        if !self.begun {
+            // Where the tool comes from is not said: it begins here.
+            self.begun = true;
+            self.out.start = place(&at);
+            self.out.axes[0] = axis.into();
+            self.rapid = false;
+            return Ok(());
+        }
+        let rapid = std::mem::take(&mut self.rapid);
+        let circle = self.circle.take().filter(|_| !rapid && !turned);
+        match circle.and_then(|circle| arc(&circle, &from, &at)) {
+            Some(arc) => {
+                self.out.arcs.push(arc);
+                self.push(line, StepKind::Arc(self.out.arcs.len() as u32 - 1));
+            }
+            None => self.push(line, if rapid { StepKind::Rapid } else { StepKind::Feed }),
+        }
+        Ok(())
+    }
+
+    fn push(&mut self, line: usize, kind: StepKind) {
+        if self.changed {
+            self.changed = false;
+            self.out.settings.push(self.setting);
+        }
+        let feed = match kind {
+            StepKind::Feed | StepKind::Arc(_) if self.per_revolution => self.feed * self.setting.speed,
+            StepKind::Feed | StepKind::Arc(_) => self.feed,
+            _ => 0.0,
+        };
+        let setting = self.out.settings.len() as u32 - 1;
+        self.out.steps.push(Step { kind, to: place(&self.at), feed, line: line as u32 + 1, setting });
+        self.out.axes.push(self.axis.into());
+    }
+
+    /// `CIRCLE/x,y,z,i,j,k,r[,…]`: the next location is reached along it.
+    fn circle(&mut self, statement: &Statement) -> Result<(), Stop> {
+        let values = statement.numbers();
+        if values.len() < 7 {
+            let (what, wanted) = ("CIRCLE", "at least 7");
+            return Err(Stop::new(0, Fault::Count { what, wanted, found: values.len() }));
+        }
+        let axis = Vector3::new(values[3], values[4], values[5]);
+        let axis =
+            axis.try_normalize(1e-9).ok_or_else(|| Stop::new(0, Fault::Statement(statement.text())))?;
+        let centre = Point3::new(values[0], values[1], values[2]) * self.unit;
+        self.circle = Some(Circle { centre, axis, radius: values[6].abs() * self.unit });
+        Ok(())
+    }
+}
+
+fn place(at: &Point3) -> [f64; 6] {
+    [at.x, at.y, at.z, 0.0, 0.0, 0.0]
+}
+
+/// The arc from one point of a circle to another about its axis; `None` where they do not lie on it.
+fn arc(circle: &Circle, from: &Point3, to: &Point3) -> Option<Arc> {
+    let [a, b] = [from, to].map(|p| {
+        let spoke = p - circle.centre;
+        spoke - circle.axis * spoke.dot(&circle.axis)
+    });
+    let allowed = 0.01f64.max(RADIUS_SHARE * circle.radius);
+    if (a.norm() - circle.radius).abs() > allowed
+        || (b.norm() - circle.radius).abs() > allowed
+        || circle.radius <= 0.0
+    {
+        return None;
+    }
+    let angle = a.cross(&b).dot(&circle.axis).atan2(a.dot(&b));
+    let sweep = if angle <= 1e-12 { angle + std::f64::consts::TAU } else { angle };
+    let centre = circle.centre + circle.axis * (from - circle.centre).dot(&circle.axis);
+    Some(Arc { centre: centre.into(), normal: circle.axis.into(), sweep, plane: Plane::Xy })
+}
+
+#[cfg(test)]
+mod tests;

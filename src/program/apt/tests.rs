@@ -1,0 +1,99 @@
+use super::*;
+use crate::{FindingKind, Placing};
+
+fn read(text: &str) -> Program {
+    read_apt("a.cls", text.as_bytes()).unwrap()
+}
+
+/// As NX writes it.
+const NX: &str = "\
+TOOL PATH/CONTOUR,TOOL,MILL_10
+TLDATA/MILL,10.0000,5.0000,75.0000,0.0000,0.0000
+MSYS/0.0000,0.0000,0.0000,1.0000000,0.0000000,0.0000000,0.0000000,1.0000000,0.0000000
+$$ centerline data
+PAINT/PATH
+LOAD/TOOL,3
+SPINDL/RPM,8000,CLW
+RAPID
+GOTO/0.0000,0.0000,50.0000,0.0000000,0.0000000,1.0000000
+RAPID
+GOTO/10.0000,0.0000,5.0000
+FEDRAT/MMPM,250.0000
+GOTO/10.0000,0.0000,-1.0000
+CIRCLE/0.0000,0.0000,-1.0000,0.0000000,0.0000000,1.0000000,10.0000,0.0600,0.5000,10.0000,0.0000
+GOTO/0.0000,10.0000,-1.0000
+GOTO/0.0000,10.0000,$
+  5.0000
+END-OF-PATH
+FINI
+";
+
+#[test]
+fn nx_is_read_with_its_arcs() {
+    let program = read(NX);
+    assert!(program.ended && program.findings(&|_| None).is_empty(), "{:?}", program.findings(&|_| None));
+    let kinds: Vec<(StepKind, u32)> = program.steps.iter().map(|s| (s.kind, s.line)).collect();
+    use StepKind::{Arc, Feed, Rapid};
+    assert_eq!(kinds, [(Rapid, 11), (Feed, 13), (Arc(0), 15), (Feed, 16)]);
+    assert!((program.arcs[0].sweep - 0.5 * std::f64::consts::PI).abs() < 1e-12);
+    assert_eq!((program.steps[1].feed, program.setting(&program.steps[1]).tool), (250.0, 3));
+    let placing = Placing { chord: 0.01, kinematics: None, lengths: &|_| None };
+    let runs = program.runs(&placing).unwrap();
+    assert_eq!((runs.len(), runs[0].tool), (1, 3));
+    for (_, to, m) in runs[0].path.segments().filter(|(.., m)| m.to.tip.z == -1.0) {
+        let radius = to.x.hypot(to.y);
+        assert!((radius - 10.0).abs() < 1e-9, "{m:?}");
+    }
+}
+
+#[test]
+fn catia_habits_inches_and_five_axes() {
+    let text = "\
+$$ -----------------------------------------------------------------
+PARTNO PART TO BE MACHINED
+CUTTER/ 10.000000,  5.000000,  0.000000,  5.000000,  0.000000,$
+  0.000000, 50.000000
+MULTAX
+TPRINT/T1 END MILL D 10
+LOADTL/1
+FEDRAT/ 1000.0000,MMPM
+SPINDL/   70.0000,RPM,CLW
+GOTO  /    0.00000,    0.00000,   10.00000, 0.000000, 0.000000, 1.000000
+GOTO  /    5.00000,    0.00000,   10.00000, 0.600000, 0.000000, 0.800000
+GODLTA/1,0,0
+UNITS/INCHES
+GOTO/1,1,1
+FINI
+";
+    let program = read(text);
+    assert_eq!(program.steps.len(), 3);
+    assert!((program.axes[1][0] - 0.6).abs() < 1e-12 && program.axes[2] == program.axes[1]);
+    assert_eq!(program.steps[1].to[..3], [6.0, 0.0, 10.0]);
+    assert_eq!(program.steps[2].to[..3], [25.4, 25.4, 25.4]);
+    assert_eq!(program.tools[0].text, "CUTTER/10,5,0,5,0,0,50");
+}
+
+#[test]
+fn what_may_move_the_tool_is_refused_with_its_line() {
+    for (text, line, column) in [
+        ("GOTO/1,2\n", 1, 1),
+        ("PARTNO x\nGOTO/1,2,z\n", 2, 10),
+        ("GOTO/1,2,3\nGOFWD/L1,TANTO,C2\n", 2, 1),
+        ("GOTO/1,2,3\nCYCLE/DRILL,10,1\n", 2, 1),
+        ("GOTO/1,2,3,0,0,0\n", 1, 1),
+        ("L1=LINE/P1,P2\n", 1, 1),
+        ("GOTO/1e9,2,3\n", 1, 6),
+    ] {
+        let error = read_apt("a.cls", text.as_bytes()).unwrap_err();
+        assert_eq!((error.line, error.column), (line, column), "{text}: {error}");
+    }
+    assert!(read_apt("a.cls", b"GOTO/1,2,3\nCYCLE/OFF\nFINI").is_ok());
+    let cut = read("GOTO/0,0,1\nFEDRAT/100\nGOTO/1,0,1\n");
+    assert_eq!(cut.findings(&|_| None).last().map(|f| f.kind), Some(FindingKind::NoEnd));
+}
+
+#[test]
+fn locations_are_told_from_g_code() {
+    assert!(looks_like_apt(NX.as_bytes()) && looks_like_apt(b"PARTNO a\nGOTO/1,2,3"));
+    assert!(!looks_like_apt(b"%\nO1\nG0 X1\nIF [#1 GT 2] GOTO 5\nN5 M30\n") && !looks_like_apt(b""));
+}

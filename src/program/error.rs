@@ -1,0 +1,268 @@
+//! Why a program cannot be read: the place, what was expected, and the cure.
+
+use thiserror::Error;
+
+/// A program that cannot be read.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[error("{name}:{line}:{column}: {fault}")]
+pub struct ProgramError {
+    /// What messages call the program.
+    pub name: String,
+    /// Line, from 1.
+    pub line: u32,
+    /// Column in bytes, from 1.
+    pub column: u32,
+    /// What is wrong.
+    pub fault: Fault,
+}
+
+impl ProgramError {
+    /// What mends it.
+    pub fn cure(&self) -> &'static str {
+        self.fault.cure()
+    }
+}
+
+/// What is wrong at a place of a program. Lengths in mm.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum Fault {
+    /// A byte that no text holds.
+    #[error("expected text, found the byte {0:#04x}")]
+    Binary(u8),
+    /// A line without end.
+    #[error("the line is longer than {0} bytes")]
+    LongLine(usize),
+    /// More lines than line numbers.
+    #[error("the program has more than {0} lines")]
+    TooManyLines(usize),
+    /// A character that begins no word.
+    #[error("expected a word such as X1.5, found `{0}`")]
+    Character(char),
+    /// A letter without a number.
+    #[error("expected a number after {0}")]
+    Number(String),
+    /// A number with too many digits, points or signs.
+    #[error("`{0}` is not a number")]
+    Malformed(String),
+    /// A comment that does not end.
+    #[error("the comment has no closing parenthesis")]
+    OpenComment,
+    /// Something that was opened and not closed.
+    #[error("expected `{0}`")]
+    Expected(&'static str),
+    /// A name that is no function.
+    #[error("unknown function `{0}`")]
+    Function(String),
+    /// A value outside of what a function takes.
+    #[error("{what} of {value} has no value")]
+    Domain {
+        /// The function.
+        what: &'static str,
+        /// Its argument.
+        value: f64,
+    },
+    /// Division by zero.
+    #[error("division by zero")]
+    Zero,
+    /// Brackets within brackets without end.
+    #[error("more than {0} brackets stand within each other")]
+    Deep(usize),
+    /// A parameter's number that is none.
+    #[error("#{0} is no parameter: expected a whole number from 1 to 99999")]
+    Parameter(f64),
+    /// A named parameter without a value.
+    #[error("#<{0}> has no value yet")]
+    Unset(String),
+    /// A parameter that programs cannot set.
+    #[error("#{0} belongs to the control and cannot be set")]
+    ReadOnly(u32),
+    /// A number that no machine can take.
+    #[error("{letter} = {value} is beyond every machine")]
+    Range {
+        /// The word's letter.
+        letter: char,
+        /// Its value.
+        value: f64,
+    },
+    /// A code that no table has.
+    #[error("the control `{control}` has no {code}")]
+    UnknownCode {
+        /// As the program has it.
+        code: String,
+        /// The control.
+        control: &'static str,
+    },
+    /// A code that is known and cannot be followed.
+    #[error("{code} cannot be verified: {why}")]
+    Unsupported {
+        /// As the program has it.
+        code: String,
+        /// What it would do.
+        why: &'static str,
+    },
+    /// Two codes of which only one can hold.
+    #[error("{first} and {second} cannot stand in one block")]
+    Conflict {
+        /// One code.
+        first: String,
+        /// The other.
+        second: String,
+    },
+    /// The same letter twice.
+    #[error("the word {0} stands twice in one block")]
+    Twice(char),
+    /// A word that is missing.
+    #[error("{code} needs {words}")]
+    Missing {
+        /// What needs it.
+        code: String,
+        /// The words, any of which would do.
+        words: &'static str,
+    },
+    /// A word that nothing in the block takes.
+    #[error("nothing in this block takes the word {0}")]
+    Unused(char),
+    /// A word whose value makes no sense.
+    #[error("{letter}{value} is not {expected}")]
+    Value {
+        /// The word's letter.
+        letter: char,
+        /// Its value.
+        value: f64,
+        /// What it has to be.
+        expected: &'static str,
+    },
+    /// An arc whose ends lie at different distances from its centre.
+    #[error("the arc starts {start:.4} mm from its centre and ends {end:.4} mm from it")]
+    ArcEnds {
+        /// Radius at its start.
+        start: f64,
+        /// Radius at its end.
+        end: f64,
+    },
+    /// An arc of no radius.
+    #[error("the arc has no radius")]
+    ArcPoint,
+    /// An arc by radius that cannot reach.
+    #[error("an arc of radius {radius:.4} mm cannot join points {apart:.4} mm apart")]
+    ArcReach {
+        /// The radius.
+        radius: f64,
+        /// Distance of its ends.
+        apart: f64,
+    },
+    /// A cycle that would drill upwards.
+    #[error("the cycle ends at {bottom:.4} mm, above its retract plane at {retract:.4} mm")]
+    CycleUpward {
+        /// Retract plane.
+        retract: f64,
+        /// Bottom.
+        bottom: f64,
+    },
+    /// A label that is not there.
+    #[error("the program has no {0}")]
+    NoTarget(String),
+    /// A loop or branch that is not closed, or not open.
+    #[error("{found} has no matching {wanted}")]
+    Unmatched {
+        /// What stands there.
+        found: String,
+        /// What belongs to it.
+        wanted: &'static str,
+    },
+    /// Loops without end.
+    #[error("the program is still running after {0} blocks")]
+    Endless(u64),
+    /// Calls without end.
+    #[error("more than {0} subprograms call each other")]
+    Recursion(usize),
+    /// Motion with rotary axes without a machine that has them.
+    #[error("the word {0} turns an axis, and no machine with such an axis is given")]
+    Rotary(char),
+    /// The tool axis turns in a way that cannot be followed.
+    #[error("the tool axis turns by half a turn in one move")]
+    HalfTurn,
+    /// A cutter's words that make no cutter.
+    #[error("the CUTTER statement makes no cutter: {0}")]
+    Cutter(String),
+    /// A statement of APT that moves the tool in a way that cannot be followed.
+    #[error("`{0}` is not understood, and it may move the tool")]
+    Statement(String),
+    /// The wrong number of values.
+    #[error("{what} takes {wanted} numbers, found {found}")]
+    Count {
+        /// The statement.
+        what: &'static str,
+        /// How many it takes.
+        wanted: &'static str,
+        /// How many there are.
+        found: usize,
+    },
+}
+
+impl Fault {
+    /// What mends it.
+    pub fn cure(&self) -> &'static str {
+        match self {
+            Self::Binary(_) => "name a program file (G-code or APT), not a compiled or packed one",
+            Self::LongLine(_) | Self::TooManyLines(_) => "check that the file is a program",
+            Self::Character(_) | Self::Number(_) | Self::Malformed(_) | Self::Expected(_) => {
+                "correct the word, or put remarks in parentheses"
+            }
+            Self::OpenComment => "close it with `)` in the same line",
+            Self::Function(_) => {
+                "use ABS ACOS ASIN ATAN COS EXISTS EXP FIX FUP LN ROUND SIN SQRT or TAN with brackets"
+            }
+            Self::Domain { .. } | Self::Zero => "check the parameters in this expression",
+            Self::Deep(_) => "divide the expression",
+            Self::Parameter(_) | Self::ReadOnly(_) => "use another parameter",
+            Self::Unset(_) => "set the parameter before it is used",
+            Self::Range { .. } => "check the number, and the units of the program",
+            Self::UnknownCode { .. } => "name the control that the program is made for with --control",
+            Self::Unsupported { .. } => "have the post processor write plain moves instead",
+            Self::Conflict { .. } | Self::Twice(_) => "put them in separate blocks",
+            Self::Missing { .. } => "add the word",
+            Self::Unused(_) => "delete the word, or add the code that takes it",
+            Self::Value { .. } => "correct the value",
+            Self::ArcEnds { .. } | Self::ArcPoint => {
+                "check I J K: whether they count from the start of the arc (G91.1) or from zero (G90.1), and the plane"
+            }
+            Self::ArcReach { .. } => "check R and the end point",
+            Self::CycleUpward { .. } => "check Z and R of the cycle",
+            Self::NoTarget(_) => "add it, or put the subprogram in the same file",
+            Self::Unmatched { .. } => "close every loop and branch",
+            Self::Endless(_) | Self::Recursion(_) => "check the condition under which it ends",
+            Self::Rotary(_) => "name a machine with rotary axes in the scene ([machine.kinematics])",
+            Self::HalfTurn => "put a location in between",
+            Self::Cutter(_) => "write CUTTER/diameter,corner radius or all seven numbers",
+            Self::Statement(_) => "write plain GOTO motion in the post processor's output",
+            Self::Count { .. } => "correct the statement",
+        }
+    }
+}
+
+/// A fault in the line at hand.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Stop {
+    /// Byte of the line, from 0.
+    pub column: usize,
+    /// What is wrong.
+    pub fault: Box<Fault>,
+}
+
+impl Stop {
+    pub fn new(column: usize, fault: Fault) -> Self {
+        Self { column, fault: Box::new(fault) }
+    }
+
+    /// The same as an error of a whole program; `line` counts from 0.
+    pub fn in_line(self, name: &str, line: usize) -> ProgramError {
+        ProgramError {
+            name: name.to_owned(),
+            line: line as u32 + 1,
+            column: self.column as u32 + 1,
+            fault: *self.fault,
+        }
+    }
+}

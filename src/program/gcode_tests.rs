@@ -1,0 +1,221 @@
+//! What rs274 cannot tell: words of Fanuc, Haas, grbl and Mach by closed forms, faults with their places, bounds on what
+//! never ends.
+
+use crate::control::{FANUC, GRBL, HAAS, LINUXCNC};
+use crate::*;
+
+fn read(text: &str) -> Program {
+    read_with(text, GENERAL_CONTROL, &Setup::default())
+}
+
+fn read_with(text: &str, control: &'static Control, setup: &Setup) -> Program {
+    read_gcode("a.nc", text.as_bytes(), control, setup).unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+/// Ends of all motions: X Y Z.
+fn ends(program: &Program) -> Vec<[f64; 3]> {
+    let moves = program.steps.iter().filter(|step| step.kind != StepKind::Set);
+    moves.map(|step| [step.to[0], step.to[1], step.to[2]]).collect()
+}
+
+#[track_caller]
+fn assert_ends(text: &str, expected: &[[f64; 3]]) {
+    let found = ends(&read(text));
+    assert_eq!(found.len(), expected.len(), "{text}: {found:?}");
+    for (a, b) in found.iter().flatten().zip(expected.iter().flatten()) {
+        assert!((a - b).abs() < 1e-9, "{text}: {found:?}");
+    }
+}
+
+#[track_caller]
+fn refused(text: &str, control: &'static Control) -> (u32, u32, Fault) {
+    let setup = Setup { most_repeats: 10_000, ..Setup::default() };
+    let error = read_gcode("a.nc", text.as_bytes(), control, &setup).expect_err(text);
+    assert!(!error.cure().is_empty() && error.to_string().starts_with("a.nc:"), "{error}");
+    (error.line, error.column, error.fault)
+}
+
+#[test]
+fn loops_and_branches_of_fanuc() {
+    let text = "O1000 (MAIN)\n#1=0\nWHILE [#1 LT 3] DO1\n#1=#1+1\nG1 X#1 F100\nEND1\nIF [#1 EQ 3] GOTO 20\nG1 X99\n\
+                N20 IF [#1 GT 5] THEN #2=7\nG1 Y#2\nIF [#1 NE 5] THEN G1 Z4\nM30\n";
+    assert_ends(text, &[[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0], [3.0, 0.0, 4.0]]);
+    let nested =
+        "#1=0\nWHILE[#1LT2]DO1\n#2=0\nWHILE[#2LT2]DO2\nG91 G1 X1 F1\n#2=#2+1\nEND2\n#1=#1+1\nEND1\nM30\n";
+    assert_eq!(ends(&read(nested)).last(), Some(&[4.0, 0.0, 0.0]));
+}
+
+#[test]
+fn subprograms_by_number() {
+    let text = "%\nO1\nG91\nM98 P32000\nM98 P2000 L2\nM97 P50\nG65 P3000 X7 I2\nM30\nN50 G1 Y1 F1\nM99\nO2000\nG1 X1 F1\n\
+                M99\nO3000\nG1 Z#24 Y#4\nM99\n%\n";
+    let at = |x: f64, y: f64, z: f64| [x, y, z];
+    let expected = [1.0, 2.0, 3.0, 4.0, 5.0].map(|x| at(x, 0.0, 0.0));
+    let mut expected = expected.to_vec();
+    expected.extend([at(5.0, 1.0, 0.0), at(5.0, 3.0, 7.0)]);
+    assert_ends(text, &expected);
+    let nested = "M98 P10\nM30\nO10\nM98 P20 L2\nM99\nO20\nG91 G1 X1 F1\nM99\n";
+    assert_ends(nested, &[[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]);
+}
+
+#[test]
+fn a_rotation_turns_what_follows() {
+    assert_ends(
+        "G0 X10 Y0\nG68 X10 Y0 R90\nG1 X12 F1\nG91 X2\nG90\nG69\nX0 Y0\nM30\n",
+        &[[10.0, 0.0, 0.0], [10.0, 2.0, 0.0], [10.0, 4.0, 0.0], [0.0, 0.0, 0.0]],
+    );
+    let program = read("G68 X0 Y0 R90\nG0 X10 Y0\nG2 X0 Y10 I-10 J0 F1\nM30\n");
+    // Clockwise from east to north is three quarters, and stays so however it is turned.
+    assert!((program.arcs[0].sweep - 1.5 * std::f64::consts::PI).abs() < 1e-12);
+    assert!((program.steps[1].to[0] + 10.0).abs() < 1e-12 && program.arcs[0].centre[0].abs() < 1e-12);
+}
+
+#[test]
+fn shifts_are_independent_of_each_other_on_fanuc() {
+    assert_ends("G92 X5 Y0\nG52 X1\nG1 X0 F1\nG52 X0\nX0\nM30\n", &[[-4.0, 0.0, 0.0], [-5.0, 0.0, 0.0]]);
+    assert_ends("G10 L2 P2 X1 Y2\nG55 G0 X0 Y0\nG54.1 P3 X5\nM30\n", &[[1.0, 2.0, 0.0], [5.0, 2.0, 0.0]]);
+}
+
+#[test]
+fn cycles_of_fanuc() {
+    let program = read_with(
+        "G0 Z10\nG98 G83 X1 Y0 Z-4 R2 Q3 F100\nG99 X2\nG98 X3\nG80\nM30\n",
+        &FANUC,
+        &Setup::default(),
+    );
+    let z: Vec<f64> = program.steps.iter().filter(|s| s.to[0] == 1.0).map(|s| s.to[2]).collect();
+    assert_eq!(z, [10.0, 2.0, -1.0, 2.0, -0.75, -4.0, 10.0]);
+    let third: Vec<f64> = program.steps.iter().filter(|s| s.to[0] == 3.0).map(|s| s.to[2]).collect();
+    assert_eq!(third, [2.0, -1.0, 2.0, -0.75, -4.0, 10.0], "it comes at the retract plane");
+    let back = ends(&read("G0 Z5\nG98 G87 X1 Y0 Z-3 R-8 Q0.5 F100\nG80\nM30\n"));
+    let expected = [
+        [1.0, 0.0, 5.0],
+        [1.5, 0.0, 5.0],
+        [1.5, 0.0, -8.0],
+        [1.0, 0.0, -8.0],
+        [1.0, 0.0, -3.0],
+        [1.5, 0.0, -3.0],
+        [1.5, 0.0, 5.0],
+        [1.0, 0.0, 5.0],
+    ];
+    assert_eq!(back[1..], expected, "{back:?}");
+}
+
+#[test]
+fn feeds_in_every_mode() {
+    let program = read("S1000 M3\nG95 F0.2\nG1 X10\nG94 F300\nX20\nG93 X30 F6\nG20 G94 F10\nX1\nM30\n");
+    let feeds: Vec<f64> = program.steps.iter().map(|step| step.feed).collect();
+    assert_eq!(feeds, [200.0, 300.0, 60.0, 254.0]);
+}
+
+#[test]
+fn lengths_count_for_the_tip() {
+    let setup =
+        Setup { lengths: [(1, [0.0, 0.0, 80.0]), (2, [0.0, 0.0, 81.0])].into(), ..Setup::from_above(200.0) };
+    let program = read_with("T1 M6\nG43 H2\nG0 X1 Z10\nG1 Z-1 F100\nG91 G28 Z0\nM30\n", &HAAS, &setup);
+    let placing = |lengths| Placing { chord: 0.01, kinematics: None, lengths };
+    let tips = |placing: &Placing<'_>| -> Vec<f64> {
+        program.runs(placing).unwrap()[0].path.moves.iter().map(|m| m.to.tip.z).collect()
+    };
+    let believed = tips(&placing(&|_| None));
+    assert_eq!(believed, [10.0, -1.0, 200.0 - 81.0]);
+    // The tool is 1 mm shorter than the control thinks.
+    let true_lengths = |tool: u32| (tool == 1).then_some(80.0);
+    assert_eq!(tips(&placing(&true_lengths)), [11.0, 0.0, 120.0]);
+    assert_eq!(program.findings(&|_| None)[0].kind, FindingKind::SpindleOff);
+    assert!(program.findings(&|_| None).iter().any(|found| found.kind == FindingKind::OtherLength));
+}
+
+#[test]
+fn what_cannot_be_followed_is_refused_at_its_place() {
+    let unsupported = |text: &str, line: u32, column: u32| {
+        let (l, c, fault) = refused(text, GENERAL_CONTROL);
+        assert!(matches!(fault, Fault::Unsupported { .. }), "{text}: {fault}");
+        assert_eq!((l, c), (line, column), "{text}");
+    };
+    unsupported("G0 X1\nG41 D1 X2\n", 2, 1);
+    unsupported("G0 X1\nN5 G33 Z-1 K1\n", 2, 4);
+    unsupported("G38.2 Z-1\n", 1, 1);
+    unsupported("G1 X1 F1\nG51 X0 Y0 P2\n", 2, 1);
+    unsupported("G16\n", 1, 1);
+    unsupported("G5 I1 J1 P1 Q1 X3 Y3\n", 1, 1);
+    for (text, line, column, fault) in [
+        ("G1 X1 F1\nG1 Y2 U3\n", 2, 7, Fault::Unused('U')),
+        (
+            "X5\n",
+            1,
+            1,
+            Fault::Missing {
+                code: "the word X".into(),
+                words: "a motion such as G0 or G1, in this block or before",
+            },
+        ),
+        ("G0 G1 X5\n", 1, 4, Fault::Conflict { first: "G0".into(), second: "G1".into() }),
+        ("G123 X5\n", 1, 1, Fault::UnknownCode { code: "G123".into(), control: "general" }),
+        ("G2 X10 I4 F1\n", 1, 4, Fault::ArcEnds { start: 4.0, end: 6.0 }),
+        ("G2 X10 R4 F1\n", 1, 8, Fault::ArcReach { radius: 4.0, apart: 10.0 }),
+        ("G1 X[1/0]\n", 1, 7, Fault::Zero),
+        ("G1 X1e5 F1\n", 1, 6, Fault::Unused('E')),
+        ("G1 X99999999999 F1\n", 1, 4, Fault::Range { letter: 'X', value: 99_999_999_999.0 }),
+        ("M6\n", 1, 1, Fault::Missing { code: "M6".into(), words: "T with the number of a tool" }),
+        ("G81 X1 Z1 R0 F1\n", 1, 8, Fault::CycleUpward { retract: 0.0, bottom: 1.0 }),
+        ("M98 P7\n", 1, 5, Fault::NoTarget("subprogram O7".into())),
+        ("GOTO 5\n", 1, 1, Fault::NoTarget("block N5".into())),
+        (
+            "o1 while [1 EQ 0]\nG0 X1\n",
+            1,
+            1,
+            Fault::Unmatched { found: "the loop O1".into(), wanted: "endwhile or endrepeat" },
+        ),
+    ] {
+        assert_eq!(refused(text, GENERAL_CONTROL), (line, column, fault), "{text}");
+    }
+    assert!(matches!(refused("G81 X1 Z-1 R1\n", &GRBL).2, Fault::UnknownCode { .. }));
+    assert!(matches!(refused("G43.4 H1\n", &LINUXCNC).2, Fault::UnknownCode { .. }));
+    assert!(matches!(refused("G93 G1 X1 F5\nX2\n", &LINUXCNC).2, Fault::Missing { .. }));
+}
+
+#[test]
+fn nothing_runs_without_end() {
+    assert!(matches!(refused("N1 G0 X1\nGOTO 1\n", GENERAL_CONTROL).2, Fault::Endless(_)));
+    assert!(matches!(refused("o1 while [1]\no1 endwhile\n", GENERAL_CONTROL).2, Fault::Endless(_)));
+    assert!(matches!(
+        refused("o1 sub\no1 call\no1 endsub\no1 call\n", GENERAL_CONTROL).2,
+        Fault::Recursion(_)
+    ));
+    assert!(matches!(refused("O1\nM98 P1\n", GENERAL_CONTROL).2, Fault::Recursion(_)));
+    assert!(matches!(refused("G0 Z9\nG81 X1 Z-1 R1 L999999 F1\n", GENERAL_CONTROL).2, Fault::Endless(_)));
+    assert!(matches!(refused("G0 Z9\nG83 X1 Z-999 R1 Q0.0001 F1\n", GENERAL_CONTROL).2, Fault::Value { .. }));
+    assert!(matches!(refused("o1 repeat [1e]\n", GENERAL_CONTROL).2, Fault::Expected(_)));
+}
+
+#[test]
+fn what_moves_nothing_is_noted_and_never_in_silence() {
+    let program = read("M100\nM62 P1\nG64 P0.01\nG5.1 Q1\nG0 X1\nM99\n");
+    let lines: Vec<u32> = program.notes.iter().map(|note| note.line).collect();
+    assert_eq!(lines, [1, 2, 6]);
+    assert!(program.ended);
+}
+
+#[test]
+fn rotary_words_need_a_machine() {
+    let program = read("G0 X1\nG1 A30 F100\nM30\n");
+    let error = program.runs(&Placing { chord: 0.01, kinematics: None, lengths: &|_| None }).unwrap_err();
+    assert_eq!((error.line, error.fault), (2, Fault::Rotary('A')));
+}
+
+#[test]
+fn the_part_s_zero_is_where_the_program_first_moves() {
+    let setup = Setup::from_above(200.0);
+    let placing = Placing { chord: 0.01, kinematics: None, lengths: &|_| None };
+    for text in [
+        "G54 G0 X1 Y2 Z3\nM30\n",
+        "G10 L2 P2 X50 Y60 Z-70\nG55 G0 X1 Y2 Z3\nM30\n",
+        "G92 X0 Y0 Z0\nG0 X1 Y2 Z3\nM30\n",
+        "G53 G0 Z0\nG52 X0\nG0 X1 Y2 Z3\nM30\n",
+    ] {
+        let path = read_with(text, GENERAL_CONTROL, &setup).runs(&placing).unwrap().swap_remove(0).path;
+        let tip = path.moves.last().unwrap().to.tip;
+        assert!((tip - geometry::Point3::new(1.0, 2.0, 3.0)).norm() < 1e-12, "{text}: {tip}");
+    }
+}

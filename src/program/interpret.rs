@@ -1,0 +1,779 @@
+//! A control at work: block after block, what each makes of the state, and the motions that leave.
+//!
+//! The order within a block is that of LinuxCNC and ISO 6983: feed mode, F, S, T, M6, spindle, then the codes that set
+//! something, then the motion, then stops.
+
+use crate::block::{Block, CodeWord};
+use crate::control::{Code, Codes, Control, FeedMode, Length, Motion, Plane, RadiusSide, spelled};
+use crate::error::{Fault, ProgramError, Stop};
+use crate::expression::Scope;
+use crate::flow::{Flow, Next};
+use crate::frame::{Place, Rotation};
+use crate::lines::Lines;
+use crate::parameters::Parameters;
+use crate::program::{Arc, Note, Program, Setting, Spindle, Step, StepKind, ToolRemark};
+use crate::state::{MORE_OFFSETS, Setup, State, Sticky};
+
+/// Letters of the axes.
+pub(crate) const AXES: [u8; 6] = *b"XYZABC";
+
+/// The same as bits of a block's letters.
+const AXIS_BITS: u32 = 1 << (b'X' - b'A') | 1 << (b'Y' - b'A') | 1 << (b'Z' - b'A') | 0b111;
+
+/// Notes that a report lists; more tell nothing new.
+const MOST_NOTES: usize = 200;
+
+/// Millimetres of an inch.
+const INCH: f64 = 25.4;
+
+/// Reads a program of G-code. `name` is what messages call it.
+///
+/// # Errors
+/// [`ProgramError`] at the first thing that cannot be followed.
+pub fn read_gcode(
+    name: &str,
+    bytes: &[u8],
+    control: &'static Control,
+    setup: &Setup,
+) -> Result<Program, ProgramError> {
+    let lines = Lines::new(bytes).map_err(|(line, stop)| stop.in_line(name, line))?;
+    let mut reader = Interpreter::new(lines, control, setup);
+    reader.out.name = name.to_owned();
+    match reader.run() {
+        Ok(()) => Ok(reader.out),
+        Err(stop) => Err(stop.in_line(name, reader.line)),
+    }
+}
+
+/// What codes of a block ask for beside setting something.
+#[derive(Debug, Default, Clone, Copy)]
+struct Asked {
+    motion: Option<(Motion, CodeWord)>,
+    /// A code that takes the axis words and moves at most by itself.
+    single: Option<(Code, CodeWord)>,
+    /// G53.
+    machine: bool,
+    length: Option<(Length, CodeWord)>,
+    quiet: bool,
+}
+
+/// A control that reads a program.
+pub(crate) struct Interpreter<'a> {
+    pub lines: Lines<'a>,
+    /// The line at hand, from 0.
+    pub line: usize,
+    pub control: &'static Control,
+    codes: Codes,
+    delete: bool,
+    pub state: State,
+    pub parameters: Parameters,
+    pub block: Block,
+    pub flow: Flow,
+    pub out: Program,
+    /// The setting changed since the last step.
+    changed: bool,
+    /// The program has moved.
+    moved: bool,
+    most_repeats: u64,
+    /// Where the block's text begins within its line.
+    shift: usize,
+}
+
+impl<'a> Interpreter<'a> {
+    pub fn new(lines: Lines<'a>, control: &'static Control, setup: &Setup) -> Self {
+        let state = State::new(setup);
+        let out = Program { start: state.place, lines: lines.len(), ..Program::default() };
+        Self {
+            lines,
+            line: 0,
+            control,
+            codes: Codes::of(control),
+            delete: setup.delete_blocks,
+            state,
+            parameters: Parameters::default(),
+            block: Block::default(),
+            flow: Flow::default(),
+            out,
+            changed: true,
+            moved: false,
+            most_repeats: setup.most_repeats,
+            shift: 0,
+        }
+    }
+
+    fn run(&mut self) -> Result<(), Stop> {
+        let most = self.lines.len() as u64 + self.most_repeats;
+        let mut blocks = 0;
+        let mut marks = 0;
+        while self.line < self.lines.len() {
+            blocks += 1;
+            if blocks > most {
+                return Err(Stop::new(0, Fault::Endless(blocks)));
+            }
+            let line = self.lines.get(self.line);
+            if line.iter().find(|b| !b.is_ascii_whitespace()) == Some(&b'%') {
+                marks += 1;
+                // What follows the closing mark is no program.
+                if marks == 2 || marks == 1 && !self.out.steps.is_empty() {
+                    self.out.ended = true;
+                    return Ok(());
+                }
+                self.line += 1;
+                continue;
+            }
+            match self.step(line, 0)? {
+                Next::Line => self.line += 1,
+                Next::At(line) => self.line = line,
+                Next::End => {
+                    self.out.ended = true;
+                    return Ok(());
+                }
+            }
+        }
+        // What is still open is told at the last line.
+        self.line = self.lines.len().saturating_sub(1);
+        self.flow.check_closed()
+    }
+
+    /// Runs the text of a line from byte `from` on.
+    pub fn step(&mut self, line: &'a [u8], from: usize) -> Result<Next, Stop> {
+        let Self { block, parameters, state, control, .. } = self;
+        let scope = Scope { parameters, system: &|number| state.system(number) };
+        let text = &line[from.min(line.len())..];
+        block.read(text, control, self.delete, scope).map_err(|stop| shifted(stop, from))?;
+        if self.block.deleted {
+            return Ok(Next::Line);
+        }
+        self.shift = from;
+        if let Some((from, to)) = self.block.comment {
+            self.remark(&text[from..to]);
+        }
+        let next = self.execute().map_err(|stop| shifted(stop, from))?;
+        match self.block.flow {
+            Some(at) => self.control_flow(line, from + at),
+            None => Ok(next),
+        }
+    }
+
+    /// Keeps comments that may describe a tool.
+    fn remark(&mut self, text: &[u8]) {
+        let text = String::from_utf8_lossy(text);
+        if crate::tools::may_describe_a_tool(&text) && self.out.tools.len() < MOST_NOTES {
+            let tool = self.block.peek(b'T').map_or(0, |t| t.max(0.0) as u32);
+            self.out.tools.push(ToolRemark { tool, line: self.line_number(), text: text.trim().to_owned() });
+        }
+    }
+
+    pub fn line_number(&self) -> u32 {
+        self.line as u32 + 1
+    }
+
+    pub fn note(&mut self, text: impl Into<String>) {
+        let note = Note { line: self.line_number(), text: text.into() };
+        if self.out.notes.len() < MOST_NOTES && !self.out.notes.iter().any(|other| other.text == note.text) {
+            self.out.notes.push(note);
+        }
+    }
+
+    fn execute(&mut self) -> Result<Next, Stop> {
+        if self.block.is_empty() {
+            return Ok(Next::Line);
+        }
+        self.block.take(b'N');
+        let mut asked = Asked::default();
+        let unit_before = self.state.modal.unit;
+        if !self.block.g.as_slice().is_empty() {
+            self.settings(&mut asked)?;
+        }
+        if let Some((Code::Macro, _)) = asked.single {
+            return self.call_macro();
+        }
+        self.words(unit_before)?;
+        let next = if self.block.m.as_slice().is_empty() { Next::Line } else { self.switches()? };
+        self.lengths(&asked)?;
+        if asked.quiet {
+            self.block.ignore(b"PQREL");
+        }
+        match asked.single {
+            Some((code, word)) => self.single(code, word)?,
+            None => self.motion(&asked)?,
+        }
+        if let Some(letter) = self.block.unused() {
+            return Err(Stop::new(self.block.column(letter), Fault::Unused(char::from(letter))));
+        }
+        for (target, value) in std::mem::take(&mut self.block.assignments) {
+            self.parameters.set(&target, value);
+        }
+        Ok(next)
+    }
+
+    /// The codes that set something, and what the others ask for.
+    fn settings(&mut self, asked: &mut Asked) -> Result<(), Stop> {
+        let words = self.block.g;
+        for word in words.as_slice() {
+            let column = usize::from(word.column);
+            let Some(code) = self.codes.get(word.tenths) else {
+                let code = spelled(word.tenths);
+                return Err(Stop::new(column, Fault::UnknownCode { code, control: self.control.word }));
+            };
+            let conflict = |first: CodeWord| {
+                let [first, second] = [first.tenths, word.tenths].map(spelled);
+                Stop::new(column, Fault::Conflict { first, second })
+            };
+            let modal = &mut self.state.modal;
+            match code {
+                Code::Motion(motion) => match asked.motion {
+                    // G80 may stand before another motion.
+                    Some((other, first)) if other != Motion::None && motion != Motion::None => {
+                        return Err(conflict(first));
+                    }
+                    Some((other, _)) if other != Motion::None => {}
+                    _ => asked.motion = Some((motion, *word)),
+                },
+                Code::Plane(plane) => modal.plane = plane,
+                Code::Units { inch } => modal.unit = if inch { INCH } else { 1.0 },
+                Code::Absolute(absolute) => modal.absolute = absolute,
+                Code::ArcAbsolute(absolute) => modal.arc_absolute = absolute,
+                Code::Feed(mode) => {
+                    // A feed of one kind is none of another.
+                    if modal.feed_mode != mode {
+                        (modal.feed_mode, modal.feed) = (mode, 0.0);
+                    }
+                }
+                Code::Retract { initial } => modal.initial = initial,
+                Code::Work(number) => self.select_work(usize::from(number) - 1),
+                Code::MoreWork => self.more_work(*word)?,
+                Code::Length(length) => asked.length = Some((length, *word)),
+                Code::Radius(RadiusSide::Off) => {}
+                Code::Radius(_) => {
+                    let why = "the control would shift the path by the radius of the cutter";
+                    let code = spelled(word.tenths);
+                    return Err(Stop::new(column, Fault::Unsupported { code, why }));
+                }
+                Code::Machine => asked.machine = true,
+                Code::Quiet => asked.quiet = true,
+                Code::Unsupported(why) => {
+                    let code = spelled(word.tenths);
+                    return Err(Stop::new(column, Fault::Unsupported { code, why }));
+                }
+                Code::Rotation(false) => {
+                    self.state.frame.rotation = None;
+                    self.state.reframe();
+                }
+                _ => match asked.single {
+                    Some((_, first)) => return Err(conflict(first)),
+                    None => asked.single = Some((code, *word)),
+                },
+            }
+        }
+        Ok(())
+    }
+
+    fn select_work(&mut self, index: usize) {
+        if self.state.frame.active != index {
+            self.state.frame.active = index;
+            self.state.reframe();
+            self.changed = true;
+        }
+    }
+
+    fn more_work(&mut self, word: CodeWord) -> Result<(), Stop> {
+        let Some(number) = self.block.take(b'P') else { return Err(self.missing(word, "P")) };
+        let index = self.whole(b'P', number, 1.0..=MORE_OFFSETS as f64, "the number of a work offset")?;
+        self.select_work(crate::frame::WORK_OFFSETS + index as usize - 1);
+        Ok(())
+    }
+
+    /// F, S, T.
+    fn words(&mut self, unit_before: f64) -> Result<(), Stop> {
+        if let Some(feed) = self.block.take(b'F') {
+            let modal = &mut self.state.modal;
+            let unit = if self.control.feed_before_units { unit_before } else { modal.unit };
+            if !(0.0..1e9).contains(&feed) {
+                return Err(self.value(b'F', feed, "a feed"));
+            }
+            modal.feed = if modal.feed_mode == FeedMode::InverseTime { feed } else { feed * unit };
+        }
+        if let Some(speed) = self.block.take(b'S') {
+            if !(0.0..1e7).contains(&speed) {
+                return Err(self.value(b'S', speed, "a speed"));
+            }
+            self.changed |= self.state.speed != speed;
+            self.state.speed = speed;
+        }
+        if let Some(tool) = self.block.take(b'T') {
+            self.state.selected = Some(self.whole(b'T', tool, 0.0..=99_999_999.0, "the number of a tool")?);
+        }
+        Ok(())
+    }
+
+    /// Codes of M. Those that end the program come last.
+    fn switches(&mut self) -> Result<Next, Stop> {
+        let (words, mut next) = (self.block.m, Next::Line);
+        for word in words.as_slice() {
+            match word.tenths {
+                20 | 300 => next = Next::End,
+                30 => self.turn(Spindle::Clockwise),
+                40 => self.turn(Spindle::Anticlockwise),
+                50 => self.turn(Spindle::Off),
+                60 => self.change_tool(*word)?,
+                610 => {
+                    let Some(tool) = self.block.take(b'Q') else { return Err(self.missing_m(*word, "Q")) };
+                    self.load(self.whole(b'Q', tool, 0.0..=99_999_999.0, "the number of a tool")?);
+                }
+                970 | 980 => next = self.call_by_number(*word)?,
+                990 => next = self.return_from_call()?,
+                // Coolant, stops, pallets, overrides: they move no axis.
+                0 | 10 | 70 | 80 | 90 | 480 | 490 | 500 | 510 | 520 | 530 | 600 => {
+                    self.block.ignore(b"P");
+                }
+                700 | 710 | 720 | 730 => {
+                    let (code, why) =
+                        (format!("M{}", word.tenths / 10), "it brings back codes of an earlier place");
+                    return Err(Stop::new(usize::from(word.column), Fault::Unsupported { code, why }));
+                }
+                other => {
+                    self.block.ignore(b"PQRELD");
+                    self.note(format!("M{} is taken to move no axis", f64::from(other) / 10.0));
+                }
+            }
+        }
+        Ok(next)
+    }
+
+    fn turn(&mut self, spindle: Spindle) {
+        self.changed |= self.state.spindle != spindle;
+        self.state.spindle = spindle;
+    }
+
+    fn change_tool(&mut self, word: CodeWord) -> Result<(), Stop> {
+        let Some(tool) = self.state.selected else {
+            return Err(self.missing_m(word, "T with the number of a tool"));
+        };
+        self.turn(Spindle::Off);
+        self.load(tool);
+        Ok(())
+    }
+
+    fn load(&mut self, tool: u32) {
+        self.state.tool = tool;
+        self.changed = true;
+    }
+
+    /// G43 and the like, and an H that changes the register in force.
+    fn lengths(&mut self, asked: &Asked) -> Result<(), Stop> {
+        let register = self.block.take(b'H');
+        let (length, word) = match asked.length {
+            Some(asked) => asked,
+            None if register.is_none() || self.state.modal.length == Length::Off => return Ok(()),
+            None => (self.state.modal.length, CodeWord::default()),
+        };
+        let number = match register {
+            Some(h) => Some(self.whole(b'H', h, 0.0..=99_999_999.0, "the number of a register")?),
+            None => None,
+        };
+        let of = |number: u32| self.state.lengths.get(&number).copied().unwrap_or([0.0; 3]);
+        let sum = |a: [f64; 3], b: [f64; 3], sign: f64| [0, 1, 2].map(|k| a[k] + sign * b[k]);
+        let before = self.state.frame.length;
+        let new = match length {
+            Length::Off => [0.0; 3],
+            Length::Plus | Length::Tcp => of(number.unwrap_or(self.state.tool)),
+            Length::Minus => sum([0.0; 3], of(number.unwrap_or(self.state.tool)), -1.0),
+            Length::More => match number {
+                Some(number) => sum(before, of(number), 1.0),
+                None => {
+                    let words = [b'X', b'Y', b'Z'].map(|k| self.block.take(k).unwrap_or(0.0));
+                    sum(before, words.map(|x| x * self.state.modal.unit), 1.0)
+                }
+            },
+            Length::Given => {
+                let words = [b'X', b'Y', b'Z'].map(|letter| self.block.take(letter));
+                let old = [b'I', b'J', b'K'].map(|letter| self.block.take(letter));
+                if words.iter().chain(&old).all(Option::is_none) {
+                    return Err(self.missing(word, "X Y or Z"));
+                }
+                [0, 1, 2].map(|k| words[k].or(old[k]).map_or(before[k], |x| x * self.state.modal.unit))
+            }
+        };
+        self.state.modal.length = length;
+        self.state.register = match length {
+            Length::Off => 0,
+            Length::Given | Length::More => number.unwrap_or(self.state.register),
+            _ => number.unwrap_or(self.state.tool),
+        };
+        self.changed = true;
+        if new != before {
+            self.state.take_length(new);
+            self.push(StepKind::Set, 0.0)?;
+        }
+        Ok(())
+    }
+
+    /// A code that takes the block's axis words for itself.
+    fn single(&mut self, code: Code, word: CodeWord) -> Result<(), Stop> {
+        match code {
+            Code::Dwell => self.block.ignore(b"PXUSF"),
+            Code::Data => self.data(word)?,
+            Code::Home(which) => self.home(usize::from(which))?,
+            Code::SetHome(which) => self.state.homes[usize::from(which)] = self.nose(),
+            Code::Local => self.local()?,
+            Code::Shift => self.shift(word)?,
+            Code::ShiftState(kind) => {
+                match kind {
+                    1 => self.state.frame.shift = [0.0; 6],
+                    other => self.state.frame.shifted = other == 3,
+                }
+                self.state.frame.shifted |= kind == 1;
+                self.state.reframe();
+            }
+            Code::Rotation(_) => self.rotate(word)?,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Machine coordinates of the spindle nose.
+    fn nose(&self) -> Place {
+        let mut place = self.state.place;
+        (0..3).for_each(|k| place[k] += self.state.frame.length[k]);
+        place
+    }
+
+    /// G10: offsets and lengths.
+    fn data(&mut self, word: CodeWord) -> Result<(), Stop> {
+        let Some(kind) = self.block.take(b'L') else { return Err(self.missing(word, "L")) };
+        let kind = self.whole(b'L', kind, 0.0..=99.0, "a kind of data")?;
+        let number = self.block.take(b'P');
+        let unit = self.state.modal.unit;
+        match kind {
+            2 | 20 => self.work_data(kind == 20, number)?,
+            1 | 10 | 11 => {
+                let number =
+                    self.whole(b'P', number.unwrap_or(0.0), 0.0..=99_999_999.0, "the number of a tool")?;
+                let z =
+                    self.block.take(b'Z').or_else(|| if kind == 1 { None } else { self.block.take(b'R') });
+                self.block.ignore(b"R");
+                if let Some(z) = z {
+                    let incremental = !self.state.modal.absolute && kind != 1;
+                    let entry = self.state.lengths.entry(number).or_default();
+                    entry[2] = z * unit + if incremental { entry[2] } else { 0.0 };
+                }
+            }
+            12 | 13 => self.block.ignore(b"R"),
+            _ => {
+                let (code, why) = (format!("G10 L{kind}"), "it sets data that the reader does not know");
+                return Err(Stop::new(usize::from(word.column), Fault::Unsupported { code, why }));
+            }
+        }
+        Ok(())
+    }
+
+    /// G10 L2 and L20: work offsets, by their values or by what the place here is to be called.
+    fn work_data(&mut self, here: bool, number: Option<f64>) -> Result<(), Stop> {
+        let number = number.unwrap_or(0.0);
+        let most = crate::frame::WORK_OFFSETS as f64;
+        let number = self.whole(b'P', number, 0.0..=most, "the number of a work offset")?;
+        let index = if number == 0 { self.state.frame.active } else { number as usize - 1 };
+        let turn = self.block.take(b'R');
+        if let Some(turn) = turn.filter(|_| !here) {
+            self.state.frame.work[index].1 = turn;
+        }
+        let named = AXES.map(|letter| self.block.take(letter));
+        let mut offset = self.state.frame.work[index].0;
+        if here {
+            // The offset under which the place here has the coordinates that are given.
+            let mut frame = self.state.frame.clone();
+            frame.active = index;
+            let mut at = frame.program_place(&self.state.place);
+            for k in 0..6 {
+                at[k] = named[k].map_or(at[k], |x| x * self.unit_of(k));
+            }
+            let shown = frame.machine_place(&at);
+            (0..6).for_each(|k| offset[k] += self.state.place[k] - shown[k]);
+        } else {
+            for k in 0..6 {
+                if let Some(x) = named[k] {
+                    let old =
+                        if self.state.modal.absolute || self.control.one_shift { 0.0 } else { offset[k] };
+                    offset[k] = old + x * self.unit_of(k);
+                }
+            }
+        }
+        self.state.frame.work[index].0 = offset;
+        self.state.reframe();
+        Ok(())
+    }
+
+    fn unit_of(&self, axis: usize) -> f64 {
+        if axis < 3 { self.state.modal.unit } else { 1.0 }
+    }
+
+    /// G28 and G30: over a point to a fixed place.
+    fn home(&mut self, which: usize) -> Result<(), Stop> {
+        let named = self.block.has_any(AXIS_BITS);
+        let letters = AXES.map(|letter| !named || self.block.peek(letter).is_some());
+        self.block.ignore(b"P");
+        if named {
+            let over = self.target()?;
+            self.go(StepKind::Rapid, over)?;
+        }
+        let mut to = self.nose();
+        (0..6).filter(|k| letters[*k]).for_each(|k| to[k] = self.state.homes[which][k]);
+        self.go_to_machine(to)
+    }
+
+    fn go_to_machine(&mut self, mut nose: Place) -> Result<(), Stop> {
+        (0..3).for_each(|k| nose[k] -= self.state.frame.length[k]);
+        let still = nose == self.state.place;
+        self.state.place = nose;
+        self.state.reframe();
+        if still { Ok(()) } else { self.push(StepKind::Rapid, 0.0) }
+    }
+
+    /// G52: a zero within the work offset.
+    fn local(&mut self) -> Result<(), Stop> {
+        for (k, letter) in AXES.into_iter().enumerate() {
+            if let Some(x) = self.block.take(letter) {
+                let x = x * self.unit_of(k);
+                let frame = &mut self.state.frame;
+                if self.control.one_shift { frame.shift[k] = x } else { frame.local[k] = x }
+            }
+        }
+        self.state.frame.shifted = true;
+        self.state.reframe();
+        Ok(())
+    }
+
+    /// G92: the place here has these coordinates.
+    fn shift(&mut self, word: CodeWord) -> Result<(), Stop> {
+        if !self.block.has_any(AXIS_BITS) {
+            return Err(self.missing(word, "X Y Z A B or C"));
+        }
+        let mut named = [None; 6];
+        for (k, letter) in AXES.into_iter().enumerate() {
+            named[k] = self.block.take(letter).map(|x| x * self.unit_of(k));
+        }
+        let at = self.state.at;
+        let frame = &mut self.state.frame;
+        frame.shifted = true;
+        for k in 0..6 {
+            if let Some(x) = named[k] {
+                frame.shift[k] += at[k] - x;
+            }
+        }
+        self.state.reframe();
+        Ok(())
+    }
+
+    /// G68: turns what follows in the plane.
+    fn rotate(&mut self, word: CodeWord) -> Result<(), Stop> {
+        let Some(angle) = self.block.take(b'R') else { return Err(self.missing(word, "R")) };
+        let [u, v, w] = self.state.modal.plane.axes();
+        if self.block.peek(AXES[w]).is_some() {
+            let (code, why) = (spelled(word.tenths), "coordinate systems turned in space are not followed");
+            return Err(Stop::new(usize::from(word.column), Fault::Unsupported { code, why }));
+        }
+        self.state.frame.rotation = None;
+        self.state.reframe();
+        let unit = self.state.modal.unit;
+        let centre = [u, v].map(|k| self.block.take(AXES[k]).map_or(self.state.at[k], |x| x * unit));
+        self.state.frame.rotation = Some(Rotation { axes: [u, v], centre, angle });
+        self.state.reframe();
+        Ok(())
+    }
+
+    /// Where the block's axis words lead, in the program's coordinates.
+    #[inline]
+    pub fn target(&mut self) -> Result<Place, Stop> {
+        let mut to = self.state.at;
+        let (unit, absolute) = (self.state.modal.unit, self.state.modal.absolute);
+        for (k, letter) in AXES.into_iter().enumerate() {
+            if let Some(value) = self.block.take(letter) {
+                let value = if k < 3 { value * unit } else { value };
+                to[k] = if absolute { value } else { to[k] + value };
+                if to[k].is_nan() || to[k].abs() > geometry::MAX_COORDINATE {
+                    let (letter, column) = (char::from(letter), self.block.column(letter));
+                    return Err(Stop::new(column, Fault::Range { letter, value }));
+                }
+            }
+        }
+        Ok(to)
+    }
+
+    fn motion(&mut self, asked: &Asked) -> Result<(), Stop> {
+        let axes = self.block.has_any(AXIS_BITS);
+        if let Some((motion, word)) = asked.motion {
+            self.begin(motion, word);
+        }
+        if asked.machine {
+            return self.in_machine(axes);
+        }
+        let offsets = || b"IJK".iter().any(|letter| self.block.peek(*letter).is_some());
+        match self.state.modal.motion {
+            Motion::Arc { clockwise } if axes || offsets() => self.arc(clockwise),
+            _ if !axes => Ok(()),
+            Motion::Rapid => {
+                let to = self.target()?;
+                self.go(StepKind::Rapid, to)
+            }
+            Motion::Line => {
+                let to = self.target()?;
+                let feed = self.feed(self.length_to(&to))?;
+                self.fed(StepKind::Feed, to, feed)
+            }
+            Motion::Cycle(cycle) => self.cycle(cycle),
+            Motion::Arc { .. } => Ok(()),
+            Motion::None => {
+                let letter = self.block.unused().unwrap_or(b'X');
+                let code = format!("the word {}", char::from(letter));
+                let words = "a motion such as G0 or G1, in this block or before";
+                Err(Stop::new(self.block.column(letter), Fault::Missing { code, words }))
+            }
+        }
+    }
+
+    /// A motion code takes force.
+    fn begin(&mut self, motion: Motion, word: CodeWord) {
+        if !matches!((self.state.modal.motion, motion), (Motion::Cycle(_), Motion::Cycle(_))) {
+            self.state.sticky = Sticky::default();
+        }
+        (self.state.modal.motion, self.state.modal.code) = (motion, word.tenths);
+    }
+
+    /// G53: the axis words are machine coordinates.
+    fn in_machine(&mut self, axes: bool) -> Result<(), Stop> {
+        if !axes {
+            return Ok(());
+        }
+        let mut to = self.nose();
+        for (k, letter) in AXES.into_iter().enumerate() {
+            if let Some(value) = self.block.take(letter) {
+                to[k] = value * self.unit_of(k);
+            }
+        }
+        if self.state.modal.motion == Motion::Line {
+            let mut tip = to;
+            (0..3).for_each(|k| tip[k] -= self.state.frame.length[k]);
+            let at = self.state.frame.program_place(&tip);
+            let feed = self.feed(self.length_to(&at))?;
+            return self.fed(StepKind::Feed, at, feed);
+        }
+        self.go_to_machine(to)
+    }
+
+    fn length_to(&self, to: &Place) -> f64 {
+        let apart = |k: usize| to[k] - self.state.at[k];
+        let straight = apart(0).hypot(apart(1)).hypot(apart(2));
+        if straight > 0.0 { straight } else { apart(3).hypot(apart(4)).hypot(apart(5)) }
+    }
+
+    /// The feed of a move of this length, mm/min; 0 where the program gives none.
+    pub fn feed(&self, length: f64) -> Result<f64, Stop> {
+        let modal = &self.state.modal;
+        match modal.feed_mode {
+            FeedMode::PerMinute => Ok(modal.feed),
+            FeedMode::PerRevolution => Ok(modal.feed * self.state.speed),
+            // The word was taken: its presence counts, not its value of before.
+            FeedMode::InverseTime if self.block.peek(b'F').is_some() => Ok(modal.feed * length),
+            FeedMode::InverseTime => {
+                let code = "a move under G93".to_owned();
+                Err(Stop::new(0, Fault::Missing { code, words: "F in its own block" }))
+            }
+        }
+    }
+
+    /// A rapid, in the program's coordinates.
+    pub fn go(&mut self, kind: StepKind, to: Place) -> Result<(), Stop> {
+        self.fed(kind, to, 0.0)
+    }
+
+    /// A move, in the program's coordinates.
+    #[inline]
+    pub fn fed(&mut self, kind: StepKind, to: Place, feed: f64) -> Result<(), Stop> {
+        let place = self.state.frame.machine_place(&to);
+        let still = place == self.state.place && !matches!(kind, StepKind::Arc(_));
+        (self.state.at, self.state.place) = (to, place);
+        if still { Ok(()) } else { self.push(kind, feed) }
+    }
+
+    /// An exact arc to here.
+    pub fn arc_to(&mut self, arc: Arc, to: Place, feed: f64) -> Result<(), Stop> {
+        let index = self.out.arcs.len() as u32;
+        self.out.arcs.push(arc);
+        self.fed(StepKind::Arc(index), to, feed)
+    }
+
+    fn push(&mut self, kind: StepKind, feed: f64) -> Result<(), Stop> {
+        if self.changed {
+            self.changed = false;
+            self.out.settings.push(self.setting());
+        }
+        if !self.moved && kind != StepKind::Set {
+            self.moved = true;
+            self.out.zero = self.zero();
+        }
+        if self.out.steps.len() as u64 > self.lines.len() as u64 + self.most_repeats {
+            return Err(Stop::new(0, Fault::Endless(self.out.steps.len() as u64)));
+        }
+        let (line, setting) = (self.line_number(), self.out.settings.len() as u32 - 1);
+        self.out.steps.push(Step { kind, to: self.state.place, feed, line, setting });
+        Ok(())
+    }
+
+    /// The origin of the program now, a local one left aside.
+    fn zero(&self) -> Place {
+        let mut frame = self.state.frame.clone();
+        (frame.local, frame.rotation) = ([0.0; 6], None);
+        frame.machine_place(&[0.0; 6])
+    }
+
+    fn setting(&self) -> Setting {
+        let State { modal, frame, register, tool, spindle, speed, .. } = &self.state;
+        Setting {
+            tool: *tool,
+            spindle: *spindle,
+            speed: *speed,
+            register: *register,
+            length: frame.length,
+            tip_kept: modal.length == Length::Tcp,
+            work: frame.active as u32 + 1,
+        }
+    }
+
+    pub fn plane_axes(&self) -> [usize; 3] {
+        Plane::axes(self.state.modal.plane)
+    }
+
+    pub fn missing(&self, word: CodeWord, words: &'static str) -> Stop {
+        Stop::new(usize::from(word.column), Fault::Missing { code: spelled(word.tenths), words })
+    }
+
+    pub fn missing_m(&self, word: CodeWord, words: &'static str) -> Stop {
+        let code = format!("M{}", word.tenths / 10);
+        Stop::new(usize::from(word.column), Fault::Missing { code, words })
+    }
+
+    pub fn value(&self, letter: u8, value: f64, expected: &'static str) -> Stop {
+        Stop::new(self.block.column(letter), Fault::Value { letter: char::from(letter), value, expected })
+    }
+
+    /// A word as a whole number.
+    pub fn whole(
+        &self,
+        letter: u8,
+        value: f64,
+        range: std::ops::RangeInclusive<f64>,
+        expected: &'static str,
+    ) -> Result<u32, Stop> {
+        let whole = value.round();
+        if (value - whole).abs() < 1e-4 && range.contains(&whole) {
+            Ok(whole as u32)
+        } else {
+            Err(self.value(letter, value, expected))
+        }
+    }
+}
+
+fn shifted(stop: Stop, by: usize) -> Stop {
+    Stop { column: stop.column + by, ..stop }
+}

@@ -1,0 +1,147 @@
+//! A program as motion: what a control makes of the text.
+
+use crate::control::Plane;
+use crate::frame::Place;
+
+/// How a step moves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum StepKind {
+    /// Nothing moves: the control takes another tool length, so that the tip counts as elsewhere.
+    Set,
+    /// At rapid speed.
+    Rapid,
+    /// Straight, at feed.
+    Feed,
+    /// Along an arc or helix, at feed: an index into [`Program::arcs`].
+    Arc(u32),
+}
+
+/// One motion of a program.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// How it moves.
+    pub kind: StepKind,
+    /// Where it ends: X Y Z of the tip and A B C, machine coordinates less the tool's length, mm and degrees.
+    pub to: Place,
+    /// Feed, mm/min (degrees/min where only rotary axes move); 0 where the program gives none.
+    pub feed: f64,
+    /// Line, from 1.
+    pub line: u32,
+    /// What holds meanwhile: an index into [`Program::settings`].
+    pub setting: u32,
+}
+
+/// An exact arc, in machine coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Arc {
+    /// Centre, level with the start along the normal, mm.
+    pub centre: [f64; 3],
+    /// Unit vector about which the arc runs anticlockwise.
+    pub normal: [f64; 3],
+    /// Angle that it runs through, rad; whole turns included.
+    pub sweep: f64,
+    /// The plane that was in force.
+    pub plane: Plane,
+}
+
+/// What the spindle does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Spindle {
+    /// M5.
+    #[default]
+    Off,
+    /// M3.
+    Clockwise,
+    /// M4.
+    Anticlockwise,
+}
+
+/// What holds during some steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Setting {
+    /// Number of the tool; 0 before the first change.
+    pub tool: u32,
+    /// The spindle.
+    pub spindle: Spindle,
+    /// Its speed, rev/min.
+    pub speed: f64,
+    /// The register of the tool's length; 0 without one.
+    pub register: u32,
+    /// What the control takes the length for, mm.
+    pub length: [f64; 3],
+    /// Whether the control keeps the tip on its way while rotary axes turn.
+    pub tip_kept: bool,
+    /// Work offset, from 1 for G54.
+    pub work: u32,
+}
+
+/// A remark of the reader on a line.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Note {
+    /// Line, from 1.
+    pub line: u32,
+    /// In a sentence.
+    pub text: String,
+}
+
+/// A cutter that the program itself describes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ToolRemark {
+    /// Number of the tool; 0 where none is named.
+    pub tool: u32,
+    /// Line, from 1.
+    pub line: u32,
+    /// The remark.
+    pub text: String,
+}
+
+/// A program as motion.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Program {
+    /// What messages call it.
+    pub name: String,
+    /// Where the tip is before the first step, machine coordinates.
+    pub start: Place,
+    /// The motions, in the order in which they run.
+    pub steps: Vec<Step>,
+    /// The arcs among them.
+    pub arcs: Vec<Arc>,
+    /// What holds meanwhile.
+    pub settings: Vec<Setting>,
+    /// The part's zero in machine coordinates: the origin of the program where it first moves.
+    pub zero: Place,
+    /// What was read and moves nothing, and what is doubtful.
+    pub notes: Vec<Note>,
+    /// Comments that describe tools.
+    pub tools: Vec<ToolRemark>,
+    /// Lines of the text.
+    pub lines: usize,
+    /// Whether it says where it ends.
+    pub ended: bool,
+    /// Tool axes of the steps, and of the start before them, where the program gives them itself (APT); empty else.
+    pub axes: Vec<[f64; 3]>,
+}
+
+impl Program {
+    /// Where step `k` begins.
+    pub fn start_of(&self, k: usize) -> &Place {
+        k.checked_sub(1).map_or(&self.start, |before| &self.steps[before].to)
+    }
+
+    /// What holds during a step.
+    pub fn setting(&self, step: &Step) -> &Setting {
+        &self.settings[step.setting as usize]
+    }
+
+    /// The tools in the order of their first motion.
+    pub fn tools_in_use(&self) -> Vec<u32> {
+        let mut tools = Vec::new();
+        for step in self.steps.iter().filter(|step| step.kind != StepKind::Set) {
+            let tool = self.setting(step).tool;
+            if tools.last() != Some(&tool) && !tools.contains(&tool) {
+                tools.push(tool);
+            }
+        }
+        tools
+    }
+}

@@ -1,0 +1,171 @@
+//! What a control remembers between blocks.
+
+use std::collections::BTreeMap;
+
+use crate::control::{FeedMode, Length, Motion, Plane};
+use crate::frame::{Frame, Place, WORK_OFFSETS};
+use crate::program::Spindle;
+
+/// More work offsets: G54.1 P1 to P300.
+pub(crate) const MORE_OFFSETS: usize = 300;
+
+/// What a program finds when it starts. mm and degrees.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setup {
+    /// Work offsets G54 to G59.3: the program's zero in machine coordinates.
+    pub work: [Place; WORK_OFFSETS],
+    /// Where G28 and G30 go, machine coordinates of the spindle nose.
+    pub homes: [Place; 2],
+    /// Where the machine stands, machine coordinates.
+    pub start: Place,
+    /// Lengths by their registers.
+    pub lengths: BTreeMap<u32, [f64; 3]>,
+    /// Whether lines with a slash are left out.
+    pub delete_blocks: bool,
+    /// Blocks and motions that loops may add to those of the file. A program that adds more has no end.
+    pub most_repeats: u64,
+}
+
+impl Default for Setup {
+    /// All zero, and lines with a slash run, as on a machine whose switch is off.
+    fn default() -> Self {
+        Self {
+            work: [[0.0; 6]; WORK_OFFSETS],
+            homes: [[0.0; 6]; 2],
+            start: [0.0; 6],
+            lengths: BTreeMap::new(),
+            delete_blocks: false,
+            most_repeats: 10_000_000,
+        }
+    }
+}
+
+impl Setup {
+    /// A machine whose zero stands `above` the program's zero, mm, and whose tool starts there.
+    pub fn from_above(above: f64) -> Self {
+        Self { work: [[0.0, 0.0, -above, 0.0, 0.0, 0.0]; WORK_OFFSETS], ..Self::default() }
+    }
+}
+
+/// The codes in force.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Modal {
+    pub motion: Motion,
+    /// Its code in tenths.
+    pub code: u16,
+    pub plane: Plane,
+    /// mm of a unit of length.
+    pub unit: f64,
+    pub absolute: bool,
+    pub arc_absolute: bool,
+    pub feed_mode: FeedMode,
+    /// As it was written, times the unit unless times are inverse.
+    pub feed: f64,
+    /// Cycles retract to the level before them.
+    pub initial: bool,
+    pub length: Length,
+}
+
+/// What stays from one cycle to the next, in units of the program's coordinates (mm).
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Sticky {
+    pub bottom: Option<f64>,
+    pub retract: Option<f64>,
+    pub peck: Option<f64>,
+    /// I J of G76 and G87, or Q: how far the spindle is moved aside.
+    pub aside: [f64; 3],
+    /// The level before the first cycle.
+    pub level: Option<f64>,
+}
+
+/// All that a control remembers.
+#[derive(Debug)]
+pub(crate) struct State {
+    pub modal: Modal,
+    pub frame: Frame,
+    /// Where the tip is in the program's coordinates.
+    pub at: Place,
+    /// Where the tip is in the machine's, less the tool's length.
+    pub place: Place,
+    pub homes: [Place; 2],
+    pub lengths: BTreeMap<u32, [f64; 3]>,
+    pub register: u32,
+    pub selected: Option<u32>,
+    pub tool: u32,
+    pub spindle: Spindle,
+    pub speed: f64,
+    pub sticky: Sticky,
+}
+
+impl State {
+    pub fn new(setup: &Setup) -> Self {
+        let mut frame = Frame::new(setup.work);
+        let more = frame.work[0];
+        frame.work.extend(std::iter::repeat_n(more, MORE_OFFSETS));
+        let modal = Modal {
+            motion: Motion::None,
+            code: 800,
+            plane: Plane::Xy,
+            unit: 1.0,
+            absolute: true,
+            arc_absolute: false,
+            feed_mode: FeedMode::PerMinute,
+            feed: 0.0,
+            initial: true,
+            length: Length::Off,
+        };
+        Self {
+            modal,
+            at: frame.program_place(&setup.start),
+            frame,
+            place: setup.start,
+            homes: setup.homes,
+            lengths: setup.lengths.clone(),
+            register: 0,
+            selected: None,
+            tool: 0,
+            spindle: Spindle::Off,
+            speed: 0.0,
+            sticky: Sticky::default(),
+        }
+    }
+
+    /// After the frame has changed: the tip stays where it is.
+    pub fn reframe(&mut self) {
+        self.at = self.frame.program_place(&self.place);
+    }
+
+    /// Takes another length for the tool's; the spindle stays where it is.
+    pub fn take_length(&mut self, length: [f64; 3]) {
+        for k in 0..3 {
+            self.place[k] += self.frame.length[k] - length[k];
+        }
+        self.frame.length = length;
+        self.reframe();
+    }
+
+    /// Values that programs can ask for by a number.
+    pub fn system(&self, number: u32) -> Option<f64> {
+        let length = |mm: f64| mm / self.modal.unit;
+        let axis = |k: u32, at: &Place| {
+            let value = at[k as usize];
+            Some(if k < 3 { length(value) } else { value })
+        };
+        match number {
+            3901 | 5400 | 4120 => Some(f64::from(self.tool)),
+            5220 => Some(self.frame.active as f64 + 1.0),
+            5420..=5425 => axis(number - 5420, &self.at),
+            5041..=5046 => axis(number - 5041, &self.at),
+            5001..=5006 => axis(number - 5001, &self.at),
+            5221..=5226 => axis(number - 5221, &self.frame.work[0].0),
+            5241..=5246 => axis(number - 5241, &self.frame.work[1].0),
+            4001 => Some(f64::from(self.modal.code) / 10.0),
+            4002 => Some([17.0, 18.0, 19.0][self.modal.plane as usize]),
+            4003 => Some(if self.modal.absolute { 90.0 } else { 91.0 }),
+            4006 => Some(if self.modal.unit > 1.0 { 20.0 } else { 21.0 }),
+            4109 => Some(length(self.modal.feed)),
+            4119 => Some(self.speed),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,10 @@
+//! Tools that programs use: a table in TOML, the table of LinuxCNC, and remarks in programs.
+
+mod remark;
+mod table;
+mod tbl;
+
+pub use remark::cutter_of_remark;
+pub(crate) use remark::may_describe_a_tool;
+pub use table::{Tool, ToolTable};
+pub use tbl::{TableTool, read_tool_table};

@@ -1,0 +1,61 @@
+//! Comments in which post processors describe a tool, such as `T1 D=6. CR=0.5 - ZMIN=-3. - bull nose end mill`.
+
+use cutter::Cutter;
+
+/// Whether a comment may describe a tool.
+pub(crate) fn may_describe_a_tool(text: &str) -> bool {
+    let text = text.trim_start();
+    let mut letters = text.bytes();
+    let begins_with_t = letters.next().is_some_and(|b| b.eq_ignore_ascii_case(&b'T'))
+        && letters.find(|b| *b != b' ').is_some_and(|b| b.is_ascii_digit());
+    begins_with_t || number_after(text, &["D=", "DIA=", "DIAMETER="]).is_some()
+}
+
+/// The cutter that a comment describes: a diameter, a corner radius, and whether it is a ball. `unit` is that of the program,
+/// mm. `None` where it tells no diameter, or describes another kind of tool.
+pub fn cutter_of_remark(text: &str, unit: f64) -> Option<Cutter> {
+    let diameter = unit * number_after(text, &["D=", "DIA=", "DIAMETER="])?;
+    let lower = text.to_ascii_lowercase();
+    if ["drill", "tap", "thread", "reamer", "chamfer", "spot", "taper"]
+        .iter()
+        .any(|word| lower.contains(word))
+    {
+        return None;
+    }
+    let corner = number_after(text, &["CR=", "R="]).map_or(0.0, |r| unit * r);
+    if lower.contains("ball") || corner == 0.5 * diameter && corner > 0.0 {
+        return Cutter::ball(diameter).ok();
+    }
+    if corner > 0.0 { Cutter::bull(diameter, corner).ok() } else { Cutter::flat(diameter).ok() }
+}
+
+/// The number after the first of some words that stands at the beginning of a word.
+fn number_after(text: &str, words: &[&str]) -> Option<f64> {
+    let upper = text.to_ascii_uppercase();
+    words.iter().find_map(|word| {
+        let starts = |at: usize| at == 0 || !upper.as_bytes()[at - 1].is_ascii_alphanumeric();
+        let at = upper.match_indices(word).map(|(at, _)| at).find(|at| starts(*at))?;
+        let rest = upper[at + word.len()..].trim_start();
+        let end = rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());
+        rest[..end].parse().ok().filter(|value: &f64| *value >= 0.0)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn remarks_of_common_posts() {
+        let cutter = |text: &str| cutter_of_remark(text, 1.0);
+        assert_eq!(cutter("T1 D=6. CR=0. - ZMIN=-3. - flat end mill"), Cutter::flat(6.0).ok());
+        assert_eq!(cutter("T2  D=10. CR=2. - bullnose end mill"), Cutter::bull(10.0, 2.0).ok());
+        assert_eq!(cutter("T3 D=6 CR=3 - ball end mill"), Cutter::ball(6.0).ok());
+        assert_eq!(cutter("BALL END D=6.0"), Cutter::ball(6.0).ok());
+        assert_eq!(cutter("BULL NOSE D=6.0 R=0.5"), Cutter::bull(6.0, 0.5).ok());
+        assert_eq!(cutter("T4 D=5 TAPER=118deg - drill"), None);
+        assert_eq!(cutter("ZMIN=-3 AND=4"), None);
+        assert_eq!(cutter_of_remark("T1 D=0.25", 25.4), Cutter::flat(6.35).ok());
+        assert!(may_describe_a_tool("T12 something") && !may_describe_a_tool("TOP 3 = 4"));
+    }
+}

@@ -1,0 +1,134 @@
+//! A table of tools in TOML: `[[tool]]` with `number`, the keys of a cutter, and what holds it.
+
+use cutter::{Cutter, Holder, HolderSection};
+use keys::{SceneError, SceneText, Section};
+
+/// A tool.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tool {
+    /// Its number in programs.
+    pub number: u32,
+    /// What cuts.
+    pub cutter: Cutter,
+    /// From the spindle nose to the tip, mm, where it was measured.
+    pub gauge_length: Option<f64>,
+    /// What holds it.
+    pub holder: Option<Holder>,
+}
+
+/// All tools.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ToolTable {
+    /// In the order of the table.
+    pub tools: Vec<Tool>,
+}
+
+/// Keys of a tool besides those of its cutter.
+const BESIDES: [&str; 4] = ["number", "gauge_length", "cutting_length", "holder"];
+
+/// Greatest number of a tool.
+const MOST: u32 = 99_999_999;
+
+impl ToolTable {
+    /// Reads a table.
+    ///
+    /// # Errors
+    /// [`SceneError`] at the first thing that is wrong.
+    pub fn read(source: &SceneText) -> Result<Self, SceneError> {
+        let table = source.table()?;
+        let root = Section::whole(source, table.get_ref(), "the table of tools");
+        root.only(&["tool"], &[], "a table of tools")?;
+        let sections = root.sections("tool")?;
+        if sections.is_empty() {
+            let cure = "add `[[tool]]` with `number = 1`, `shape = \"ball\"` and `diameter = 6.0`";
+            return Err(root.error(root.header(), "the table has no tool", cure));
+        }
+        let mut tools: Vec<Tool> = Vec::new();
+        for section in &sections {
+            let tool = read(section)?;
+            if tools.iter().any(|other| other.number == tool.number) {
+                let message = format!("two tools have the number {}", tool.number);
+                return Err(section.error(&section.key_span("number"), message, "give each its own"));
+            }
+            tools.push(tool);
+        }
+        Ok(Self { tools })
+    }
+
+    /// The tool of a number.
+    pub fn get(&self, number: u32) -> Option<&Tool> {
+        self.tools.iter().find(|tool| tool.number == number)
+    }
+}
+
+fn read(section: &Section<'_>) -> Result<Tool, SceneError> {
+    let cutter = Cutter::read(section, &BESIDES)?;
+    let number = section.count("number", 0..=MOST)?.ok_or_else(|| {
+        section.error(
+            section.header(),
+            "the tool has no `number`",
+            "add `number = 1`, as T has it in programs",
+        )
+    })?;
+    let gauge_length = section.length("gauge_length")?.map(|length| length.value);
+    Ok(Tool { number, cutter, gauge_length, holder: read_holder(section, &cutter)? })
+}
+
+/// Shank and holder, the lowest section first, from the end of the cutting edges on.
+fn read_holder(section: &Section<'_>, cutter: &Cutter) -> Result<Option<Holder>, SceneError> {
+    let sections = section.sections("holder")?;
+    let length = section.length("cutting_length")?;
+    if sections.is_empty() {
+        return Ok(None);
+    }
+    let length = match (length, cutter.stated_length()) {
+        (Some(length), _) => length.value,
+        (None, Some(length)) => length,
+        (None, None) => section.required_length("cutting_length", 20.0)?.value,
+    };
+    let one = |section: &Section<'_>| {
+        section.only(&["diameter", "top_diameter", "length"], &[], "a section of the holder")?;
+        let diameter = section.required_length("diameter", 32.0)?.value;
+        let top_diameter = section.length("top_diameter")?.map_or(diameter, |v| v.value);
+        Ok(HolderSection { diameter, top_diameter, length: section.required_length("length", 40.0)?.value })
+    };
+    let sections: Vec<HolderSection> = sections.iter().map(one).collect::<Result<_, SceneError>>()?;
+    Holder::new(length, sections).map(Some).map_err(|e| {
+        let cure =
+            "add `[[tool.holder]]` with `diameter` and `length` for shank and holder, the lowest first";
+        section.error(section.header(), e.to_string(), cure)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table(text: &str) -> Result<ToolTable, SceneError> {
+        ToolTable::read(&SceneText::new("tools.toml", text))
+    }
+
+    #[test]
+    fn tools_have_cutters_lengths_and_holders() {
+        let text = "[[tool]]\nnumber = 1\nshape = \"ball\"\ndiameter = 6\ngauge_length = 80\ncutting_length = 20\n\
+                    [[tool.holder]]\ndiameter = 6\nlength = 30\n[[tool]]\nnumber = 7\nshape = \"flat\"\ndiameter = 10\n";
+        let tools = table(text).unwrap();
+        assert_eq!(tools.get(7).unwrap().cutter, Cutter::flat(10.0).unwrap());
+        let first = tools.get(1).unwrap();
+        assert_eq!((first.gauge_length, first.holder.as_ref().unwrap().cutting_length()), (Some(80.0), 20.0));
+        assert!(tools.get(2).is_none());
+    }
+
+    #[test]
+    fn faults_are_refused() {
+        for text in [
+            "",
+            "[[tool]]\nshape = \"ball\"\ndiameter = 6\n",
+            "[[tool]]\nnumber = 1\nshape = \"ball\"\ndiametr = 6\n",
+            "[[tool]]\nnumber = 1\nshape = \"ball\"\ndiameter = 6\n[[tool]]\nnumber = 1\nshape = \"ball\"\ndiameter = 6\n",
+            "[[tool]]\nnumber = 1\nshape = \"ball\"\ndiameter = 6\n[[tool.holder]]\ndiameter = 6\nlength = 30\n",
+        ] {
+            assert!(table(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,207 @@
+//! Programs from elsewhere: their files as paths of one tool.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::named_file::NamedFile;
+use super::{Scene, ToolpathRequest};
+use cutter::Cutter;
+use io::regular;
+use keys::{SceneError, SceneText};
+use motion::{Move, MoveKind, Toolpath};
+use program::{
+    Control, Finding, Placing, Program, ProgramError, Setup, ToolRun, ToolTable, looks_like_apt, read_apt,
+    read_gcode,
+};
+use toolpath::{ForeignProgram, ReadProgram};
+
+/// Largest program that is read, bytes: some twenty million lines.
+const MAX_BYTES: u64 = 1 << 29;
+
+/// How far above the program's zero that of the machine is taken to be, mm. G28 and G53 go there.
+pub const MACHINE_ZERO_ABOVE: f64 = 200.0;
+
+/// Largest table of tools that is read, bytes.
+const MAX_TABLE_BYTES: u64 = 1 << 20;
+
+/// Notes of a program that are listed.
+const MOST_NOTES: usize = 20;
+
+/// Reads the program of a toolpath, if it is one from elsewhere.
+pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), SceneError> {
+    let Some(foreign) = request.strategy.downcast_ref::<ForeignProgram>() else { return Ok(()) };
+    let Some(file) = request.directions.first() else { return Ok(()) };
+    let unreadable = |reason: String| {
+        let message = format!("cannot read the program {}: {reason}", file.path.display());
+        scene.source.error(file.span.clone(), message, "relative paths start from the scene's folder")
+    };
+    let bytes = regular::read(&file.path, MAX_BYTES).map_err(|e| unreadable(e.to_string()))?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(unreadable(format!("it is larger than {} MiB", MAX_BYTES >> 20)));
+    }
+    let control = Control::from_word(foreign.control).unwrap_or(program::GENERAL_CONTROL);
+    let refused = |error: ProgramError| in_text(&error, &bytes);
+    let is_apt = looks_like_apt(&bytes);
+    let name =
+        file.path.file_name().map_or_else(|| file.written.clone(), |n| n.to_string_lossy().into_owned());
+    let table = match request.directions.get(1) {
+        Some(tools) => table(tools, scene)?,
+        None => ToolTable::default(),
+    };
+    let lengths: BTreeMap<u32, f64> =
+        table.tools.iter().filter_map(|tool| Some((tool.number, tool.gauge_length?))).collect();
+    let read = if is_apt {
+        read_apt(&name, &bytes)
+    } else {
+        let registers = lengths.iter().map(|(number, length)| (*number, [0.0, 0.0, *length])).collect();
+        let setup = Setup { lengths: registers, ..Setup::from_above(MACHINE_ZERO_ABOVE) };
+        read_gcode(&name, &bytes, control, &setup)
+    };
+    let read = read.map_err(refused)?;
+    let kinematics = scene.five_axis.as_ref().map(|machine| &machine.kinematics);
+    // Locations by APT are of the tip, whatever its length.
+    let length = |tool: u32| lengths.get(&tool).copied().filter(|_| !is_apt);
+    let placing = Placing { chord: scene.tolerance.chord, kinematics, lengths: &length };
+    let runs = read.runs(&placing).map_err(refused)?;
+    let tool = chosen(foreign.tool, &read, &runs)
+        .map_err(|(message, cure)| scene.source.error(file.span.clone(), message, cure))?;
+    let others = Others::of(&runs, tool, &table);
+    let path = joined(runs.into_iter().filter(|run| run.tool == tool));
+    let findings: Vec<Finding> =
+        read.findings(&length).into_iter().filter(|found| found.tool == tool || found.tool == 0).collect();
+    let Others { before, unknown_before, any } = others;
+    let notes = notes(&read);
+    let read = ReadProgram { path, before, unknown_before, others: any, findings, notes };
+    request.strategy = Box::new(ForeignProgram { read: Some(Arc::new(read)), ..foreign.clone() });
+    Ok(())
+}
+
+/// The table of tools that a toolpath names.
+fn table(file: &NamedFile, scene: &Scene) -> Result<ToolTable, SceneError> {
+    let unreadable = |reason: String| {
+        let message = format!("cannot read the tools {}: {reason}", file.path.display());
+        scene.source.error(file.span.clone(), message, "name a file of tools in TOML")
+    };
+    let bytes = regular::read(&file.path, MAX_TABLE_BYTES).map_err(|e| unreadable(e.to_string()))?;
+    if bytes.len() as u64 > MAX_TABLE_BYTES {
+        return Err(unreadable(format!("it is larger than {MAX_TABLE_BYTES} bytes")));
+    }
+    let text = String::from_utf8(bytes).map_err(|_| unreadable("it is not UTF-8 text".to_owned()))?;
+    let source = SceneText::new(file.path.to_string_lossy(), text);
+    ToolTable::read(&source)
+}
+
+/// The fault shown in the text of the program, where that can be shown.
+fn in_text(error: &ProgramError, bytes: &[u8]) -> SceneError {
+    let text = String::from_utf8_lossy(bytes);
+    let start = text.split_inclusive('\n').take(error.line as usize - 1).map(str::len).sum::<usize>();
+    let at = start + error.column as usize - 1;
+    let source = SceneText::new(&error.name, text.into_owned());
+    let message = format!("line {}, column {}: {}", error.line, error.column, error.fault);
+    source.error(at..at + 1, message, error.cure())
+}
+
+/// The tool whose moves are meant; else what is wrong, and the cure.
+fn chosen(asked: Option<u32>, read: &Program, runs: &[ToolRun]) -> Result<u32, (String, String)> {
+    let tools = read.tools_in_use();
+    let listed = tools.iter().map(|tool| format!("T{tool}")).collect::<Vec<_>>().join(", ");
+    match (asked, &tools[..]) {
+        (_, []) => Err((
+            format!("the program {} moves nothing", read.name),
+            "name a program with motion such as G1 X10 F100".to_owned(),
+        )),
+        (Some(tool), _) if runs.iter().any(|run| run.tool == tool) => Ok(tool),
+        (Some(tool), _) => Err((
+            format!("the program {} does not use tool {tool}", read.name),
+            format!("write one of {listed}"),
+        )),
+        (None, [tool]) => Ok(*tool),
+        (None, _) => {
+            // What moves before the first change is most often no more than a way home.
+            let feeding: Vec<u32> = tools.iter().copied().filter(|tool| feeds(runs, *tool)).collect();
+            match feeding[..] {
+                [tool] => Ok(tool),
+                _ => Err((
+                    format!(
+                        "the program {} uses several tools ({listed}), and a scene has one cutter",
+                        read.name
+                    ),
+                    format!(
+                        "write `tool = {}` for the tool that is the scene's cutter",
+                        tools[tools.len() - 1]
+                    ),
+                )),
+            }
+        }
+    }
+}
+
+/// What the other tools of a program do.
+struct Others {
+    before: Vec<(Cutter, Toolpath)>,
+    unknown_before: bool,
+    any: bool,
+}
+
+impl Others {
+    /// Of all runs beside those of a tool; what comes before its last run is cut before it.
+    fn of(runs: &[ToolRun], tool: u32, table: &ToolTable) -> Self {
+        let last = runs.iter().rposition(|run| run.tool == tool).unwrap_or_default();
+        let cuts = |run: &&ToolRun| run.tool != tool && feeds(std::slice::from_ref(*run), run.tool);
+        let earlier: Vec<&ToolRun> = runs[..last].iter().filter(cuts).collect();
+        let known = |run: &&ToolRun| Some((table.get(run.tool)?.cutter, run.path.clone()));
+        let before: Vec<(Cutter, Toolpath)> = earlier.iter().filter_map(known).collect();
+        let unknown_before = before.len() < earlier.len();
+        Self { before, unknown_before, any: runs.iter().any(|run| cuts(&run)) }
+    }
+}
+
+fn feeds(runs: &[ToolRun], tool: u32) -> bool {
+    let of_tool = runs.iter().filter(|run| run.tool == tool);
+    of_tool.flat_map(|run| &run.path.moves).any(|step| step.kind != MoveKind::Rapid)
+}
+
+/// The runs of one tool as one path. Between runs the tool is away; it comes back from above all of the path.
+fn joined(runs: impl Iterator<Item = ToolRun>) -> Toolpath {
+    let mut runs = runs;
+    let Some(ToolRun { mut path, .. }) = runs.next() else {
+        return Toolpath::new(motion::ClPoint::upright(geometry::Point3::origin()), Vec::new());
+    };
+    for ToolRun { path: next, .. } in runs {
+        let pass = path.passes() as u32;
+        let line = next.origin.lines.first().copied().unwrap_or_default();
+        let tips = path.moves.iter().chain(&next.moves).map(|step| step.to.tip.z);
+        let top = tips.fold(path.start.tip.z.max(next.start.tip.z), f64::max);
+        let mut from = path.moves.last().map_or(path.start, |step| step.to);
+        let mut over = next.start;
+        (from.tip.z, over.tip.z) = (top, top);
+        for to in [from, over, next.start] {
+            path.moves.push(Move { to, kind: MoveKind::Rapid, feed_rate: program::FEED_WHERE_NONE, pass });
+            path.origin.lines.push(line);
+        }
+        path.moves.extend(next.moves.into_iter().map(|step| Move { pass: step.pass + pass, ..step }));
+        path.origin.lines.extend(next.origin.lines);
+    }
+    path
+}
+
+fn notes(read: &Program) -> Vec<String> {
+    let shown = read
+        .notes
+        .iter()
+        .take(MOST_NOTES)
+        .map(|note| format!("{} line {}: {}", read.name, note.line, note.text));
+    let mut notes: Vec<String> = shown.collect();
+    if read.notes.len() > MOST_NOTES {
+        notes.push(format!("{}: {} more remarks", read.name, read.notes.len() - MOST_NOTES));
+    }
+    let works: std::collections::BTreeSet<u32> = read.settings.iter().map(|setting| setting.work).collect();
+    if works.len() > 1 {
+        notes.push(format!(
+            "{} uses {} work offsets; those it does not set itself are taken to be the part's zero",
+            read.name,
+            works.len()
+        ));
+    }
+    notes
+}

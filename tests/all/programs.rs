@@ -1,0 +1,258 @@
+//! Programs from elsewhere through the real command: a sound one passes, planted faults are found with their lines.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::command::{Answer, millstream};
+
+/// Size of the plate along x and y, mm.
+const SIZE: [f64; 2] = [16.0, 8.0];
+
+/// Distance of passes, mm: a ball of 6 mm leaves 6.7 µm.
+const STEP: f64 = 0.4;
+
+/// A level plate at z = 0.
+fn plate() -> String {
+    let [x, y] = SIZE;
+    let facet = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
+        let corner = |[x, y]: [f64; 2]| format!("vertex {x} {y} 0\n");
+        format!("facet normal 0 0 1\nouter loop\n{}{}{}endloop\nendfacet\n", corner(a), corner(b), corner(c))
+    };
+    let [low, right, high, left] = [[0.0, 0.0], [x, 0.0], [x, y], [0.0, y]];
+    format!("solid plate\n{}{}endsolid plate\n", facet(low, right, high), facet(low, high, left))
+}
+
+/// A raster over the plate with a ball of 6 mm.
+fn raster() -> Vec<String> {
+    let head = [
+        "%",
+        "(PLATE)",
+        "G21 G90 G17 G94",
+        "T1 M6",
+        "S12000 M3",
+        "G54",
+        "G43 H1",
+        "G0 X0 Y0 Z10",
+        "G1 Z0 F600",
+    ];
+    let mut lines: Vec<String> = head.iter().map(|&line| line.to_owned()).collect();
+    for k in 0..=(SIZE[1] / STEP) as usize {
+        let (y, ends) = (STEP * k as f64, if k % 2 == 0 { [0.0, SIZE[0]] } else { [SIZE[0], 0.0] });
+        let places = [ends[0], 0.5 * SIZE[0], ends[1]];
+        lines.extend(places.map(|x| format!("X{x:.3} Y{y:.3}")));
+    }
+    lines.extend(["G0 Z10", "M5", "M30", "%"].map(str::to_owned));
+    lines
+}
+
+/// Verifies a program in a folder of its own.
+fn verify(program: &[String], options: &[&str]) -> (Answer, Option<Value>) {
+    let home = tempfile::tempdir().unwrap();
+    verify_in(home.path(), program, options)
+}
+
+fn verify_in(home: &Path, program: &[String], options: &[&str]) -> (Answer, Option<Value>) {
+    std::fs::write(home.join("plate.stl"), plate()).unwrap();
+    std::fs::write(home.join("job.nc"), program.join("\n") + "\n").unwrap();
+    let mut arguments =
+        vec!["verify", "--part", "plate.stl", "--program", "job.nc", "--cell", "0.1", "--out", "out"];
+    if !options.contains(&"--tools") {
+        arguments.extend(["--cutter", "ball:6"]);
+    }
+    arguments.extend(options);
+    let answer = millstream(home, &arguments);
+    let report = std::fs::read(home.join("out/report.json")).ok();
+    (answer, report.map(|bytes| serde_json::from_slice(&bytes).unwrap()))
+}
+
+/// The sentences of the limits that do not hold.
+fn violations(report: &Value) -> Vec<String> {
+    let all = report["toolpaths"][0]["violations"].as_array().unwrap();
+    all.iter().map(|claim| claim["text"].as_str().unwrap().to_owned()).collect()
+}
+
+#[track_caller]
+fn assert_violates(program: &[String], options: &[&str], text: &str) {
+    let (answer, report) = verify(program, options);
+    assert_eq!(answer.code, Some(1), "{}", answer.stderr);
+    let found = violations(&report.unwrap());
+    assert!(found.iter().any(|sentence| sentence.contains(text)), "{text}: {found:?}");
+}
+
+/// The line, from 1, of the first that begins so.
+fn line_of(program: &[String], begin: &str) -> usize {
+    program.iter().position(|line| line.starts_with(begin)).unwrap() + 1
+}
+
+#[test]
+fn a_sound_program_passes_in_every_format() {
+    let home = tempfile::tempdir().unwrap();
+    let (answer, report) = verify_in(home.path(), &raster(), &[]);
+    assert_eq!(answer.code, Some(0), "{}{}", answer.stdout, answer.stderr);
+    assert!(answer.stdout.contains("Every tolerance holds."), "{}", answer.stdout);
+    let report = report.unwrap();
+    let toolpath = &report["toolpaths"][0];
+    assert_eq!((&toolpath["name"], &toolpath["strategy"]), (&Value::from("job"), &Value::from("program")));
+    assert_eq!(toolpath["program"]["file"], "job.nc");
+    assert!(
+        !home.path().join("out/job/toolpath.nc").exists()
+            && home.path().join("out/job/toolpath.cls").exists()
+    );
+    let (json, _) = verify_in(home.path(), &raster(), &["--format", "json"]);
+    assert_eq!(serde_json::from_str::<Value>(&json.stdout).unwrap()["verdict"], "pass");
+    let (junit, _) = verify_in(home.path(), &raster(), &["--format", "junit"]);
+    assert!(junit.stdout.starts_with("<?xml") && !junit.stdout.contains("<failure"), "{}", junit.stdout);
+    let (html, _) = verify_in(home.path(), &raster(), &["--format", "html"]);
+    assert!(html.stdout.starts_with("<!DOCTYPE html>"), "{}", &html.stdout[..100]);
+}
+
+#[test]
+fn it_stands_beside_planned_paths_in_one_table() {
+    let home = tempfile::tempdir().unwrap();
+    std::fs::write(home.path().join("plate.stl"), plate()).unwrap();
+    std::fs::write(home.path().join("job.nc"), raster().join("\n")).unwrap();
+    let scene = "[part]\nfile = \"plate.stl\"\n[cutter]\nshape = \"ball\"\ndiameter = 6\n[simulation]\ncell = 0.1\n\
+                 [[toolpath]]\nstrategy = \"zigzag\"\nstepover = 0.4\n[[toolpath]]\nstrategy = \"program\"\nfile = \"job.nc\"\n";
+    std::fs::write(home.path().join("scene.toml"), scene).unwrap();
+    let answer = millstream(home.path(), &["run", "scene.toml", "--out", "out"]);
+    assert_eq!(answer.code, Some(0), "{}{}", answer.stdout, answer.stderr);
+    let report: Value =
+        serde_json::from_slice(&std::fs::read(home.path().join("out/report.json")).unwrap()).unwrap();
+    let height = |k: usize| report["toolpaths"][k]["scallop"]["max_mm"].as_f64().unwrap();
+    let closed = 3.0 - (9.0f64 - 0.25 * STEP * STEP).sqrt();
+    assert!(
+        (height(0) - closed).abs() < 1e-4 && (height(1) - closed).abs() < 1e-4,
+        "{} {}",
+        height(0),
+        height(1)
+    );
+    let inputs = report["inputs"].as_array().unwrap();
+    assert!(inputs.iter().any(|input| input["file"] == "job.nc"), "{inputs:?}");
+    let checked = millstream(home.path(), &["check", "scene.toml"]);
+    assert!(
+        checked.stdout.contains("strategy = \"program\"\nfile = \"job.nc\"\ncontrol = \"general\""),
+        "{}",
+        checked.stdout
+    );
+}
+
+#[test]
+fn a_gouge_is_found_with_the_line_that_made_it() {
+    let mut program = raster();
+    let line = line_of(&program, "X8.000 Y4.000");
+    program[line - 1] += " Z-0.2";
+    program[line] += " Z0";
+    let (answer, report) = verify(&program, &[]);
+    assert_eq!(answer.code, Some(1));
+    let gouge = &report.unwrap()["toolpaths"][0]["gouge"];
+    assert!((gouge["max_depth_mm"].as_f64().unwrap() - 0.2).abs() < 0.002, "{gouge}");
+    assert_eq!(
+        (&gouge["region_count"], &gouge["regions"][0]["line"]),
+        (&Value::from(1), &Value::from(line)),
+        "{gouge}"
+    );
+}
+
+#[test]
+fn faults_are_named_with_their_lines() {
+    let sound = raster();
+    let changed = |begin: &str, new: &str| {
+        let mut program = sound.clone();
+        let line = line_of(&program, begin);
+        program[line - 1] = new.to_owned();
+        (program, line)
+    };
+    let (rapid, line) = changed("X16.000 Y0.000", "G0 X16 Y0\nG1");
+    assert_violates(&rapid, &[], "a rapid move touches stock");
+    assert_violates(&rapid, &[], &format!("job.nc line {line}"));
+    let first = line_of(&sound, "G1 Z0");
+    assert_violates(
+        &changed("S12000", "S12000").0,
+        &[],
+        &format!("line {first} feeds while the spindle is off"),
+    );
+    assert_violates(&changed("G1 Z0", "G1 Z0").0, &[], &format!("line {first} feeds and no F was given"));
+    assert_violates(
+        &changed("G43", "G43 H2").0,
+        &[],
+        &format!("line {first} feeds tool 1 with the length of register H2"),
+    );
+    // The other tool comes too late.
+    let mut late = changed("T1 M6", "").0;
+    let end = line_of(&late, "M5") - 1;
+    late.splice(end..end, ["T2 M6", "S5000 M3", "G0 X0", "G1 Z9"].map(str::to_owned));
+    assert_violates(&late, &["--tool", "0"], &format!("line {first} feeds before the first tool change"));
+    let (answer, _) = verify(&late, &[]);
+    assert!(
+        answer.code == Some(2) && answer.stderr.contains("uses several tools (T0, T2)"),
+        "{}",
+        answer.stderr
+    );
+}
+
+#[test]
+fn wrong_offsets_and_lengths_show() {
+    let mut moved = raster();
+    let line = line_of(&moved, "X0.000 Y4.000");
+    moved.insert(line - 1, "G10 L2 P2 X0.5 Y0 Z-200.1\nG55 G1 Z0".to_owned());
+    assert_violates(&moved, &[], "gouge 100.0");
+    let home = tempfile::tempdir().unwrap();
+    let tools = "[[tool]]\nnumber = 1\nshape = \"ball\"\ndiameter = 6\ngauge_length = 80\n";
+    std::fs::write(home.path().join("tools.toml"), tools).unwrap();
+    let (sound, _) = verify_in(home.path(), &raster(), &["--tools", "tools.toml"]);
+    assert_eq!(sound.code, Some(0), "{}{}", sound.stdout, sound.stderr);
+    let mut longer = raster();
+    longer.insert(3, "G10 L1 P1 Z79".to_owned());
+    let (answer, report) = verify_in(home.path(), &longer, &["--tools", "tools.toml"]);
+    let found = violations(&report.unwrap());
+    let named = "feeds tool 1 as if it were 79.0000 mm long; the table of tools has 80.0000 mm";
+    assert!(answer.code == Some(1) && found.iter().any(|text| text.contains(named)), "{found:?}");
+    assert!(found.iter().any(|text| text.contains("gouge 1000")), "{found:?}");
+}
+
+#[test]
+fn what_cannot_be_read_is_refused_with_line_and_cure() {
+    let cases: [(&str, &[&str]); 6] = [
+        ("G1 X1 F1\nG41 D1 X2", &["job.nc:2:1", "G41 cannot be verified", "help:"]),
+        ("G1 X1 F1\nG2 X5 I1", &["job.nc:2:4", "the arc starts 1.0000 mm from its centre and ends 3.0000"]),
+        ("G1 X1 F1\nG1 X[1/0]", &["job.nc:2:7", "division by zero"]),
+        ("N1 G4\nGOTO 1", &["still running"]),
+        ("G0\u{0}X", &["line 1, column 3", "expected text"]),
+        ("(nothing)", &["moves nothing"]),
+    ];
+    for (program, expected) in cases {
+        let (answer, report) = verify(&[program.to_owned()], &[]);
+        assert_eq!((answer.code, report.is_none()), (Some(2), true), "{program}: {}", answer.stdout);
+        for text in expected {
+            assert!(answer.stderr.contains(text), "{program}: {}", answer.stderr);
+        }
+    }
+}
+
+#[test]
+fn a_tool_is_judged_on_what_the_tools_before_it_left() {
+    let home = tempfile::tempdir().unwrap();
+    let tools = "[[tool]]\nnumber = 1\nshape = \"ball\"\ndiameter = 6\n[[tool]]\nnumber = 2\nshape = \"flat\"\ndiameter = 10\n";
+    std::fs::write(home.path().join("tools.toml"), tools).unwrap();
+    // A face mill takes the block off first; then a rapid of the ball runs close over the plate.
+    let mut program = raster();
+    let start = line_of(&program, "T1 M6") - 1;
+    let face = ["T2 M6", "S8000 M3", "G0 X-10 Y2 Z5", "G1 Z0.2 F500", "X26", "Y7", "X-10", "G0 Z10"];
+    program.splice(start..start, face.map(str::to_owned));
+    let over = line_of(&program, "G1 Z0 F600");
+    program.insert(over - 1, "G0 Z0.5\nX16\nX0".to_owned());
+    let claims = |answer: &Answer, report: Option<Value>, kind: &str| -> Vec<String> {
+        let report = report.unwrap_or_else(|| panic!("{}", answer.stderr));
+        let found = report["toolpaths"][0][kind].as_array().unwrap();
+        found.iter().map(|claim| claim["what"].as_str().unwrap().to_owned()).collect()
+    };
+    let (answer, report) = verify_in(home.path(), &program, &["--tools", "tools.toml", "--tool", "1"]);
+    assert_eq!(answer.code, Some(0), "{}{}", answer.stdout, answer.stderr);
+    drop(report);
+    let (answer, report) = verify_in(home.path(), &program, &["--tool", "1"]);
+    assert_eq!((answer.code, claims(&answer, report, "undecided")), (Some(1), vec!["rapid".to_owned()]));
+    // What the face mill leaves, another tool may take.
+    let (answer, report) = verify_in(home.path(), &program, &["--tools", "tools.toml", "--tool", "2"]);
+    assert_eq!(claims(&answer, report, "undecided"), ["uncut"]);
+}
