@@ -5,7 +5,8 @@
 //! (or offsets of them, or parallel lines), cut from the inside outwards, so that only the first pass of
 //! each nest is a slot; each nest is entered by a helix where there is room, else by a ramp along its first
 //! pass. Where an engagement is asked for, passes that turn toward the stock lie closer, loops clear first
-//! passes, corners and necks, and a helix opens every run that would begin in stock (`bounded`). The design's frame: z = 0 is the upper face, the floor lies at minus the depth; mm.
+//! passes, corners and necks, and a helix opens every run that would begin in stock (`bounded`). Every finished move keeps to
+//! the exact region (`walls`). The design's frame: z = 0 is the upper face, the floor lies at minus the depth; mm.
 
 mod bounded;
 mod cleared;
@@ -59,12 +60,6 @@ const SPACING: f64 = 0.25;
 /// Share of the chord tolerance that straight moves may be off the curves that they stand for.
 const CHORDS_SHARE: f64 = 0.5;
 
-/// Share of the chord tolerance that a move may cut into a wall: where a wall is round, chords have to.
-const WALL_SHARE: f64 = 0.1;
-
-/// Of that, what is left for the digits of the program, mm: half of its last one, along both axes.
-const WRITTEN: f64 = 0.75e-4;
-
 /// Precision of the largest cutter that an error names, mm.
 const DISC_PRECISION: f64 = 0.005;
 
@@ -104,10 +99,10 @@ pub fn plan_pocket(
     }
     let radius = cutter.radius();
     let chords = CHORDS_SHARE * settings.chord_tolerance;
-    let beyond = WALL_SHARE * settings.chord_tolerance;
-    // What straight sides of an inset stand off too far, as far as its round corners have room for it.
-    let stand_off = radius - Region::offset_excess(radius).min(beyond - WRITTEN);
-    let walls_at = pocket.region.watched_inset(stand_off, monitor)?;
+    // Straight sides of an inset stand off farther than they are asked to.
+    let stand_off = radius - Region::offset_excess(radius);
+    let inset = pocket.region.watched_inset(stand_off, monitor)?;
+    let walls_at = walls::tangent(inset, &pocket.region, radius);
     if walls_at.is_empty() {
         let largest = pocket.region.largest_disc(DISC_PRECISION, monitor)?.map_or(0.0, |d| 2.0 * d.1);
         return Err(refuse(format!(
@@ -168,7 +163,7 @@ pub fn plan_pocket(
     }
     let mut runs: Vec<Run> = groups.into_iter().flat_map(|group| group.1).collect();
     let turn = strategy.bounded().map_or(std::f64::consts::PI, |_| MOST_TURN);
-    let walls = walls::Walls::new(&pocket.region, radius - (beyond - WRITTEN));
+    let walls = walls::Walls::new(&pocket.region, radius - walls::ROUNDING);
     for run in &mut runs {
         monitor::check(monitor)?;
         let holds = |a: &Point2, b: &Point2| walls.hold(a, b);

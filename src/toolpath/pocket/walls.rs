@@ -7,6 +7,9 @@
 use super::route::{Entry, Run};
 use geometry::{Piece, Point2, Region, SegmentGrid, Vector2, foot};
 
+/// What offsets may be off by rounding, mm: some 2⁻³⁰ of the size of the region.
+pub(super) const ROUNDING: f64 = 5.0e-7;
+
 /// Places nearer to the piece's wall than this, mm, are on it: far above rounding, far below any tolerance.
 const ON_WALL: f64 = 1.0e-6;
 
@@ -124,6 +127,31 @@ impl<'a> Room<'a> {
     }
 }
 
+/// An inset of `region` by `radius` whose round corners are chords between places on the circle: each chord becomes the two
+/// tangents at its ends. So no side comes nearer to a wall than the radius, and straight ones stand just there.
+pub(super) fn tangent(inset: Region, region: &Region, radius: f64) -> Region {
+    let walls = SegmentGrid::of_curves(region.curves());
+    let corner = |a: &Point2, b: &Point2| {
+        let middle = nalgebra::center(a, b);
+        let near = walls.nearest(&middle).filter(|near| near.distance < radius - ROUNDING)?;
+        let [from, to] = walls.segments()[near.segment as usize].ends;
+        let foot = from + (to - from) * near.share;
+        let on_circle = |p: &Point2| ((p - foot).norm() - radius).abs() < ROUNDING;
+        let scale = (radius / near.distance).powi(2);
+        (on_circle(a) && on_circle(b)).then(|| foot + (middle - foot) * scale)
+    };
+    let rounded = |curve: Vec<Point2>| {
+        let n = curve.len();
+        let sides = (0..n).map(|k| (curve[k], corner(&curve[k], &curve[(k + 1) % n])));
+        sides.flat_map(|(begin, middle)| std::iter::once(begin).chain(middle)).collect::<Vec<Point2>>()
+    };
+    let pieces = inset.pieces.into_iter().map(|piece| Piece {
+        outer: rounded(piece.outer),
+        islands: piece.islands.into_iter().map(rounded).collect(),
+    });
+    Region { pieces: pieces.collect() }
+}
+
 /// The walls themselves, which a cutter may touch.
 pub(super) struct Walls {
     grid: SegmentGrid,
@@ -210,6 +238,29 @@ mod tests {
                 .windows(2)
                 .any(|w| !Room::new(&slit).outside(&w[0], &w[1]).is_empty()))
         );
+    }
+
+    /// Around a reflex corner no side comes nearer than the radius, and straight walls are touched.
+    #[test]
+    fn sides_of_round_corners_are_tangents() {
+        let region = Region { pieces: vec![room()] };
+        for radius in [0.5, 0.9] {
+            let inset = region.inset(radius - Region::offset_excess(radius));
+            let round = tangent(inset.clone(), &region, radius);
+            let nearest = |of: &Region| {
+                let sides = SegmentGrid::of_curves(of.curves());
+                let gap = |k: &geometry::CurveSegment| {
+                    let all =
+                        region.curves().flat_map(|c| (0..c.len()).map(move |i| [c[i], c[(i + 1) % c.len()]]));
+                    all.map(|wall| distance(&k.ends, &wall)).fold(f64::INFINITY, f64::min)
+                };
+                sides.segments().iter().map(gap).fold(f64::INFINITY, f64::min)
+            };
+            assert!(nearest(&inset) < radius * (1.0 - 1e-4), "chords cut in");
+            assert!((nearest(&round) - radius).abs() < ROUNDING, "{}", nearest(&round));
+            let walls = SegmentGrid::of_curves(region.curves());
+            assert!(round.curves().flatten().all(|p| walls.distance(p) < radius * (1.0 + 2e-4)));
+        }
     }
 
     #[test]
