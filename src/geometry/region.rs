@@ -290,6 +290,12 @@ impl Region {
         work::aside::run(monitor, move || region.offset(distance))
     }
 
+    /// How much farther than by `distance` straight sides move in an offset, mm: so far that the chords of round corners
+    /// come no nearer.
+    pub fn offset_excess(distance: f64) -> f64 {
+        distance / (0.5 * ROUND_STEP).cos() - distance
+    }
+
     fn offset(&self, distance: f64) -> Self {
         if distance == 0.0 || self.is_empty() {
             return self.clone();

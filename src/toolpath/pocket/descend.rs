@@ -37,7 +37,14 @@ pub(super) fn floors(depth: f64, strategy: &PocketStrategy) -> Vec<f64> {
 
 /// A polyline with fewer points (within `tolerance`), none farther apart than `longest`, none of whose
 /// sides turns from one that it stands for by more than `turn`, rad: what is ahead of the cutter stays so.
-pub(super) fn shortened(points: &[Point2], tolerance: f64, longest: f64, turn: f64) -> Vec<Point2> {
+/// Sides that stand for several keep to the walls as `holds` says.
+pub(super) fn shortened(
+    points: &[Point2],
+    tolerance: f64,
+    longest: f64,
+    turn: f64,
+    holds: impl Fn(&Point2, &Point2) -> bool,
+) -> Vec<Point2> {
     const MAX_SKIP: usize = 200;
     let least = turn.cos() - ROUNDING;
     let mut points = points.to_vec();
@@ -55,6 +62,7 @@ pub(super) fn shortened(points: &[Point2], tolerance: f64, longest: f64, turn: f
             };
             (from + 1..to).all(|k| foot(&points[k], &[points[from], points[to]]).1 <= tolerance)
                 && (from..to).all(along)
+                && holds(&points[from], &points[to])
         };
         let mut to = from + 1;
         while to + 1 < points.len() && to - from < MAX_SKIP && fits(to + 1) {

@@ -5,7 +5,8 @@
 //! (or offsets of them, or parallel lines), cut from the inside outwards, so that only the first pass of
 //! each nest is a slot; each nest is entered by a helix where there is room, else by a ramp along its first
 //! pass. Where an engagement is asked for, passes that turn toward the stock lie closer, loops clear first
-//! passes, corners and necks, and a helix opens every run that would begin in stock (`bounded`). The design's frame: z = 0 is the upper face, the floor lies at minus the depth; mm.
+//! passes, corners and necks, and a helix opens every run that would begin in stock (`bounded`). Every finished move keeps to
+//! the exact region (`walls`). The design's frame: z = 0 is the upper face, the floor lies at minus the depth; mm.
 
 mod bounded;
 mod cleared;
@@ -18,6 +19,7 @@ pub(crate) mod strategy;
 #[cfg(test)]
 mod tests;
 mod turning;
+mod walls;
 mod way;
 
 use cleared::Cleared;
@@ -54,6 +56,9 @@ const MOST_TURN: f64 = 0.03;
 
 /// Sides of spirals and links over the stepover.
 const SPACING: f64 = 0.25;
+
+/// Share of the chord tolerance that straight moves may be off the curves that they stand for.
+const CHORDS_SHARE: f64 = 0.5;
 
 /// Precision of the largest cutter that an error names, mm.
 const DISC_PRECISION: f64 = 0.005;
@@ -93,9 +98,11 @@ pub fn plan_pocket(
         return Err(refuse("its walls are vertical; use a flat, bull or ball cutter".into()));
     }
     let radius = cutter.radius();
-    // Half of the chord tolerance is for chords, which may come as much nearer to the walls.
-    let chords = 0.5 * settings.chord_tolerance;
-    let walls_at = pocket.region.watched_inset(radius + chords, monitor)?;
+    let chords = CHORDS_SHARE * settings.chord_tolerance;
+    // Straight sides of an inset stand off farther than they are asked to.
+    let stand_off = radius - Region::offset_excess(radius);
+    let inset = pocket.region.watched_inset(stand_off, monitor)?;
+    let walls_at = walls::tangent(inset, &pocket.region, radius);
     if walls_at.is_empty() {
         let largest = pocket.region.largest_disc(DISC_PRECISION, monitor)?.map_or(0.0, |d| 2.0 * d.1);
         return Err(refuse(format!(
@@ -105,7 +112,7 @@ pub fn plan_pocket(
         )));
     }
     let rough = if strategy.wall_allowance > 0.0 {
-        pocket.region.watched_inset(radius + chords + strategy.wall_allowance, monitor)?
+        pocket.region.watched_inset(stand_off + strategy.wall_allowance, monitor)?
     } else {
         walls_at.clone()
     };
@@ -119,7 +126,8 @@ pub fn plan_pocket(
     let mut groups: Vec<(&Piece, Vec<Run>)> = Vec::new();
     for piece in &rough.pieces {
         monitor::check(monitor)?;
-        groups.push((piece, piece_runs(piece, cutter, strategy, step, &mut notes, monitor)?));
+        let runs = piece_runs(piece, cutter, strategy, step, &mut notes, monitor)?;
+        groups.push((piece, runs));
     }
     if strategy.wall_allowance > 0.0 {
         for piece in &walls_at.pieces {
@@ -142,6 +150,7 @@ pub fn plan_pocket(
         "{rest:.3} mm² of {:.1} mm² lie in corners that no position of the cutter reaches",
         pocket.region.area()
     ));
+    kept(&mut groups, monitor)?;
     if let Some(limit) = strategy.bounded() {
         let bounds = Turning { limit, radius };
         let sides = match strategy.pattern {
@@ -150,14 +159,30 @@ pub fn plan_pocket(
         };
         let rules = bounded::Rules { bounds, sides, helix: strategy.helix(radius) };
         bound_runs(&mut groups, pocket, &rules, &mut notes, monitor)?;
+        kept(&mut groups, monitor)?;
     }
     let mut runs: Vec<Run> = groups.into_iter().flat_map(|group| group.1).collect();
     let turn = strategy.bounded().map_or(std::f64::consts::PI, |_| MOST_TURN);
+    let walls = walls::Walls::new(&pocket.region, radius - walls::ROUNDING);
     for run in &mut runs {
-        run.points = descend::shortened(&run.points, chords, MOVE_OVER_RADIUS * radius, turn);
+        monitor::check(monitor)?;
+        let holds = |a: &Point2, b: &Point2| walls.hold(a, b);
+        run.points = descend::shortened(&run.points, chords, MOVE_OVER_RADIUS * radius, turn, holds);
     }
     let path = descend::program(&runs, pocket.depth, strategy, settings);
     Ok(Plan { path, notes, shortest: None, field: None, functions: Vec::new() })
+}
+
+/// Keeps all runs where the cutter's centre may be.
+fn kept(groups: &mut [(&Piece, Vec<Run>)], monitor: &dyn Monitor) -> Result<(), Cancelled> {
+    for (piece, runs) in groups {
+        let room = walls::Room::new(piece);
+        for run in std::mem::take(runs) {
+            monitor::check(monitor)?;
+            runs.extend(room.kept_runs(run));
+        }
+    }
+    Ok(())
 }
 
 /// Puts loops into the runs where more of the circumference than the limit would stand in stock.

@@ -200,9 +200,9 @@ fn shortened_ways_keep_their_heading() {
         let side = |k: usize| points[k + 1] - points[k];
         (2..points.len()).map(|k| side(k - 1).angle(&side(k - 2))).fold(0.0, f64::max)
     };
-    let sides = descend::shortened(&circle, 0.0025, 1.0, PI);
+    let sides = descend::shortened(&circle, 0.0025, 1.0, PI, |_, _| true);
     assert!(turn(&sides) > 0.4);
-    let sides = descend::shortened(&circle, 0.0025, 1.0, 0.03);
+    let sides = descend::shortened(&circle, 0.0025, 1.0, 0.03, |_, _| true);
     assert!(turn(&sides) < 0.085 && sides.len() < circle.len() / 2, "{} {}", turn(&sides), sides.len());
 }
 

@@ -1,0 +1,274 @@
+//! Ways kept to where the cutter's centre may be.
+//!
+//! Enters: the piece of the centre, the exact region, a way. Leaves: the same way, in the piece: where it would leave, it
+//! follows the wall of the piece instead; and whether a straight move keeps the cutter out of the region's walls. Links are
+//! bends between curves and level curves come from triangles, so neither keeps to walls by itself; mm.
+
+use super::route::{Entry, Run};
+use geometry::{Piece, Point2, Region, SegmentGrid, Vector2, foot};
+
+/// What offsets may be off by rounding, mm: some 2⁻³⁰ of the size of the region.
+pub(super) const ROUNDING: f64 = 5.0e-7;
+
+/// Places nearer to the piece's wall than this, mm, are on it: far above rounding, far below any tolerance.
+const ON_WALL: f64 = 1.0e-6;
+
+/// The piece of the cutter's centre.
+pub(super) struct Room<'a> {
+    piece: &'a Piece,
+    curves: Vec<&'a [Point2]>,
+    walls: SegmentGrid,
+}
+
+/// A stretch of a move: how far along it begins and ends, 0 to 1.
+type Stretch = [f64; 2];
+
+impl<'a> Room<'a> {
+    pub fn new(piece: &'a Piece) -> Self {
+        let curves = piece.curves().collect();
+        Self { piece, curves, walls: SegmentGrid::of_curves(piece.curves()) }
+    }
+
+    /// The run in this room: several where a move would cross from one wall to another one.
+    pub fn kept_runs(&self, run: Run) -> Vec<Run> {
+        let entry = match run.entry {
+            Entry::Ramp(way) => Entry::Ramp(self.kept(&way).pop().unwrap_or_default()),
+            helix @ Entry::Helix { .. } => helix,
+        };
+        let mut parts = self.kept(&run.points).into_iter();
+        let first = Run { entry, points: parts.next().unwrap_or_default() };
+        let back_and_forth = |points: Vec<Point2>| {
+            let way = points.iter().chain(points.iter().rev().skip(1)).copied().collect();
+            Run { entry: Entry::Ramp(way), points }
+        };
+        std::iter::once(first).chain(parts.map(back_and_forth)).collect()
+    }
+
+    /// The way in this room.
+    fn kept(&self, way: &[Point2]) -> Vec<Vec<Point2>> {
+        let places: Vec<Point2> = way.iter().map(|p| self.nearest_inside(p)).collect();
+        let mut parts: Vec<Vec<Point2>> = vec![places.first().copied().into_iter().collect()];
+        for ends in places.windows(2) {
+            let (a, b) = (ends[0], ends[1]);
+            for [from, to] in self.outside(&a, &b) {
+                let ends = [from, to].map(|t| a + (b - a) * t);
+                match (self.along_wall(&ends), parts.last_mut()) {
+                    (Some(wall), Some(part)) => part.extend(wall),
+                    _ => {
+                        parts.last_mut().into_iter().for_each(|part| part.push(ends[0]));
+                        parts.push(vec![ends[1]]);
+                    }
+                }
+            }
+            parts.last_mut().into_iter().for_each(|part| part.push(b));
+        }
+        parts.iter_mut().for_each(|part| part.dedup());
+        parts.retain(|part| part.len() > 1 || part.len() == way.len());
+        parts
+    }
+
+    fn is_outside(&self, p: &Point2) -> bool {
+        !self.piece.contains(p) && self.walls.distance(p) > ON_WALL
+    }
+
+    fn nearest_inside(&self, p: &Point2) -> Point2 {
+        if !self.is_outside(p) {
+            return *p;
+        }
+        self.walls.nearest(p).map_or(*p, |near| {
+            let [a, b] = self.walls.segments()[near.segment as usize].ends;
+            a + (b - a) * near.share
+        })
+    }
+
+    /// The stretches of a move that lie outside.
+    fn outside(&self, a: &Point2, b: &Point2) -> Vec<Stretch> {
+        let mut cuts = vec![0.0, 1.0];
+        let along = b - a;
+        self.walls.near(&[a.inf(b), a.sup(b)], |k| {
+            let [c, d] = self.walls.segments()[k as usize].ends;
+            let across = along.perp(&(d - c));
+            if across != 0.0 {
+                let (t, u) = ((c - a).perp(&(d - c)) / across, (c - a).perp(&along) / across);
+                if (0.0..=1.0).contains(&t) && (-1e-9..=1.0 + 1e-9).contains(&u) {
+                    cuts.push(t);
+                }
+            }
+        });
+        cuts.sort_by(f64::total_cmp);
+        let middle = |c: &Stretch| a + along * (0.5 * (c[0] + c[1]));
+        let stretches = cuts.windows(2).map(|w| [w[0], w[1]]);
+        stretches.filter(|c| self.is_outside(&middle(c))).collect()
+    }
+
+    /// The shorter way along a wall between two places on it, ends included; `None` where they are on two walls.
+    fn along_wall(&self, ends: &[Point2; 2]) -> Option<Vec<Point2>> {
+        let [from, to] = [self.walls.nearest(&ends[0])?, self.walls.nearest(&ends[1])?];
+        let [first, last] = [from.segment, to.segment].map(|k| self.walls.segments()[k as usize]);
+        if first.curve != last.curve {
+            return None;
+        }
+        let curve = self.curves[first.curve as usize];
+        let n = curve.len();
+        let at = |index: usize, share: f64| curve[index] + (curve[(index + 1) % n] - curve[index]) * share;
+        let (i, j) = (first.index as usize, last.index as usize);
+        let [begin, end] = [at(i, from.share), at(j, to.share)];
+        let way = |corners: Vec<usize>| {
+            let corners = corners.into_iter().map(|k| curve[k % n]);
+            std::iter::once(begin).chain(corners).chain([end]).collect::<Vec<Point2>>()
+        };
+        let wraps = |back: bool| i == j && (from.share > to.share) != back;
+        let steps = (j + n - i) % n + if wraps(false) { n } else { 0 };
+        let onwards = way((1..=steps).map(|k| i + k).collect());
+        let steps = (i + n - j) % n + if wraps(true) && from.share != to.share { n } else { 0 };
+        let backwards = way((0..steps).map(|k| i + 2 * n - k).collect());
+        let length = |way: &[Point2]| way.windows(2).map(|w| (w[1] - w[0]).norm()).sum::<f64>();
+        Some(if length(&onwards) <= length(&backwards) { onwards } else { backwards })
+    }
+}
+
+/// An inset of `region` by `radius` whose round corners are chords between places on the circle: each chord becomes the two
+/// tangents at its ends. So no side comes nearer to a wall than the radius, and straight ones stand just there.
+pub(super) fn tangent(inset: Region, region: &Region, radius: f64) -> Region {
+    let walls = SegmentGrid::of_curves(region.curves());
+    let corner = |a: &Point2, b: &Point2| {
+        let middle = nalgebra::center(a, b);
+        let near = walls.nearest(&middle).filter(|near| near.distance < radius - ROUNDING)?;
+        let [from, to] = walls.segments()[near.segment as usize].ends;
+        let foot = from + (to - from) * near.share;
+        let on_circle = |p: &Point2| ((p - foot).norm() - radius).abs() < ROUNDING;
+        let scale = (radius / near.distance).powi(2);
+        (on_circle(a) && on_circle(b)).then(|| foot + (middle - foot) * scale)
+    };
+    let rounded = |curve: Vec<Point2>| {
+        let n = curve.len();
+        let sides = (0..n).map(|k| (curve[k], corner(&curve[k], &curve[(k + 1) % n])));
+        sides.flat_map(|(begin, middle)| std::iter::once(begin).chain(middle)).collect::<Vec<Point2>>()
+    };
+    let pieces = inset.pieces.into_iter().map(|piece| Piece {
+        outer: rounded(piece.outer),
+        islands: piece.islands.into_iter().map(rounded).collect(),
+    });
+    Region { pieces: pieces.collect() }
+}
+
+/// The walls themselves, which a cutter may touch.
+pub(super) struct Walls {
+    grid: SegmentGrid,
+    nearest: f64,
+}
+
+impl Walls {
+    /// Of a region, and how near to them the cutter's centre may come, mm.
+    pub fn new(region: &Region, nearest: f64) -> Self {
+        Self { grid: SegmentGrid::of_curves(region.curves()), nearest }
+    }
+
+    /// Whether a straight move of a centre that is inside keeps its distance.
+    pub fn hold(&self, a: &Point2, b: &Point2) -> bool {
+        let reach = Vector2::new(self.nearest, self.nearest);
+        let mut hold = true;
+        self.grid.near(&[a.inf(b) - reach, a.sup(b) + reach], |k| {
+            hold = hold && distance(&[*a, *b], &self.grid.segments()[k as usize].ends) >= self.nearest;
+        });
+        hold
+    }
+}
+
+/// Distance of two segments.
+fn distance(a: &[Point2; 2], b: &[Point2; 2]) -> f64 {
+    let side = |s: &[Point2; 2], p: &Point2| (s[1] - s[0]).perp(&(p - s[0]));
+    let across = |s: &[Point2; 2], t: &[Point2; 2]| side(s, &t[0]) * side(s, &t[1]) < 0.0;
+    if across(a, b) && across(b, a) {
+        return 0.0;
+    }
+    let feet = [foot(&a[0], b), foot(&a[1], b), foot(&b[0], a), foot(&b[1], a)];
+    feet.iter().map(|f| f.1).fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points(c: &[(f64, f64)]) -> Vec<Point2> {
+        c.iter().map(|&(x, y)| Point2::new(x, y)).collect()
+    }
+
+    /// An L with an island.
+    fn room() -> Piece {
+        let outer = points(&[(0., 0.), (20., 0.), (20., 8.), (8., 8.), (8., 20.), (0., 20.)]);
+        Piece { outer, islands: vec![points(&[(3., 3.), (3., 5.), (5., 5.), (5., 3.)])] }
+    }
+
+    #[test]
+    fn a_way_past_a_reflex_corner_goes_around_it() {
+        let piece = room();
+        let kept = Room::new(&piece).kept(&points(&[(7., 12.), (12., 7.)]));
+        assert_eq!(kept, [points(&[(7., 12.), (8., 11.), (8., 8.), (11., 8.), (12., 7.)])]);
+    }
+
+    #[test]
+    fn places_beyond_a_wall_go_onto_it_and_ways_inside_stay() {
+        let piece = room();
+        let room = Room::new(&piece);
+        let inside = points(&[(1., 1.), (19., 1.), (19., 0.), (0., 0.), (0., 20.)]);
+        assert_eq!(room.kept(&inside), std::slice::from_ref(&inside));
+        let beyond = points(&[(1., 1.), (10., -0.01), (19., 1.)]);
+        assert_eq!(room.kept(&beyond), [points(&[(1., 1.), (10., 0.), (19., 1.)])]);
+        // Through the island: around it, the shorter way.
+        let through = room.kept(&points(&[(4.5, 2.), (4.5, 6.)]));
+        assert_eq!(through, [points(&[(4.5, 2.), (4.5, 3.), (5., 3.), (5., 5.), (4.5, 5.), (4.5, 6.)])]);
+    }
+
+    /// Islands that touch: whichever way it takes around them, no move is outside.
+    #[test]
+    fn ways_over_islands_that_touch_stay_inside() {
+        let slit = Piece {
+            outer: points(&[(0., 0.), (9., 0.), (9., 9.), (0., 9.)]),
+            islands: vec![
+                points(&[(3., 1.), (3., 2.), (4., 2.), (4., 1.)]),
+                points(&[(4., 1.), (4., 2.), (5., 2.), (5., 1.)]),
+            ],
+        };
+        let run = Run { entry: Entry::Ramp(Vec::new()), points: points(&[(1., 1.5), (8., 1.5)]) };
+        let runs = Room::new(&slit).kept_runs(run);
+        assert!(
+            runs.iter().all(|run| !run
+                .points
+                .windows(2)
+                .any(|w| !Room::new(&slit).outside(&w[0], &w[1]).is_empty()))
+        );
+    }
+
+    /// Around a reflex corner no side comes nearer than the radius, and straight walls are touched.
+    #[test]
+    fn sides_of_round_corners_are_tangents() {
+        let region = Region { pieces: vec![room()] };
+        for radius in [0.5, 0.9] {
+            let inset = region.inset(radius - Region::offset_excess(radius));
+            let round = tangent(inset.clone(), &region, radius);
+            let nearest = |of: &Region| {
+                let sides = SegmentGrid::of_curves(of.curves());
+                let gap = |k: &geometry::CurveSegment| {
+                    let all =
+                        region.curves().flat_map(|c| (0..c.len()).map(move |i| [c[i], c[(i + 1) % c.len()]]));
+                    all.map(|wall| distance(&k.ends, &wall)).fold(f64::INFINITY, f64::min)
+                };
+                sides.segments().iter().map(gap).fold(f64::INFINITY, f64::min)
+            };
+            assert!(nearest(&inset) < radius * (1.0 - 1e-4), "chords cut in");
+            assert!((nearest(&round) - radius).abs() < ROUNDING, "{}", nearest(&round));
+            let walls = SegmentGrid::of_curves(region.curves());
+            assert!(round.curves().flatten().all(|p| walls.distance(p) < radius * (1.0 + 2e-4)));
+        }
+    }
+
+    #[test]
+    fn walls_hold_where_the_radius_has_room() {
+        let region = Region { pieces: vec![room()] };
+        let walls = Walls::new(&region, 1.0);
+        assert!(walls.hold(&Point2::new(1.0, 1.0), &Point2::new(19.0, 1.0)));
+        assert!(!walls.hold(&Point2::new(1.0, 1.0), &Point2::new(19.0, 0.99)));
+        assert!(!walls.hold(&Point2::new(6.5, 12.0), &Point2::new(12.0, 6.5)));
+    }
+}
