@@ -142,8 +142,11 @@ pub(super) fn tangent(inset: Region, region: &Region, radius: f64) -> Region {
     };
     let rounded = |curve: Vec<Point2>| {
         let n = curve.len();
-        let sides = (0..n).map(|k| (curve[k], corner(&curve[k], &curve[(k + 1) % n])));
-        sides.flat_map(|(begin, middle)| std::iter::once(begin).chain(middle)).collect::<Vec<Point2>>()
+        let corners: Vec<Option<Point2>> = (0..n).map(|k| corner(&curve[k], &curve[(k + 1) % n])).collect();
+        // Between two tangents an end of chords lies on their common line.
+        let begin =
+            |k: usize| (corners[k].is_none() || corners[(k + n - 1) % n].is_none()).then_some(curve[k]);
+        (0..n).flat_map(|k| begin(k).into_iter().chain(corners[k])).collect::<Vec<Point2>>()
     };
     let pieces = inset.pieces.into_iter().map(|piece| Piece {
         outer: rounded(piece.outer),
