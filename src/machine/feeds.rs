@@ -23,12 +23,17 @@ const SHARP: f64 = std::f64::consts::PI / 6.0;
 /// A corner that can be run at this share of the feed needs no moves of its own.
 const HARDLY_SLOWER: f64 = 0.9;
 
+/// Lines a second that no path asks for.
+const ANY_RATE: f64 = 1e12;
+
 const SECONDS_PER_MINUTE: f64 = 60.0;
 
 /// The path with feeds that the machine can hold. Rapids, plunges and lifts stay as they are; the tool's
 /// way does as well, but for points put in on straight moves. A path for which no time can be told comes
 /// back unchanged.
 pub fn slow_corners(path: &Toolpath, machine: &Machine) -> Toolpath {
+    // Words that slow down what is short anyway would only be more lines to run.
+    let machine = &Machine { block_rate: ANY_RATE, ..*machine };
     let Some(blocks) = profile(path, machine, &[]) else { return path.clone() };
     let mut moves = Vec::with_capacity(path.len());
     let mut next = blocks.iter().enumerate().peekable();
