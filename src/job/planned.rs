@@ -192,6 +192,9 @@ type Engaged = (Plan, Option<(Engagement, f64)>);
 /// Times that a pocket is planned again at most.
 const ROUNDS: usize = 3;
 
+/// The share of the limit by which it is lowered at least. Less may change no pass at all.
+const LEAST_LOWERING: f64 = 0.01;
+
 /// The plan, or where its engagement is not proven to keep to the limit of the strategy, one for a lower limit: by as much
 /// as the first was above. It is taken if that helps; in slots without room it does not.
 fn within_engagement(
@@ -211,7 +214,7 @@ fn within_engagement(
         if by <= 0.0 || target - by < 0.25 * limit {
             break;
         }
-        target -= by;
+        target -= by.max(LEAST_LOWERING * limit);
         let next = planned(&PocketStrategy { engagement: Some(target), ..*asked })?;
         if over(&next) >= by {
             break;

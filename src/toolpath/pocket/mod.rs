@@ -60,6 +60,9 @@ const SPACING: f64 = 0.25;
 /// Share of the chord tolerance that straight moves may be off the curves that they stand for.
 const CHORDS_SHARE: f64 = 0.5;
 
+/// What is left on walls for the digits of the program, mm: half of the last one, along both axes.
+const WRITTEN: f64 = 0.75e-4;
+
 /// Precision of the largest cutter that an error names, mm.
 const DISC_PRECISION: f64 = 0.005;
 
@@ -100,9 +103,9 @@ pub fn plan_pocket(
     let radius = cutter.radius();
     let chords = CHORDS_SHARE * settings.chord_tolerance;
     // Straight sides of an inset stand off farther than they are asked to.
-    let stand_off = radius - Region::offset_excess(radius);
-    let inset = pocket.region.watched_inset(stand_off, monitor)?;
-    let walls_at = walls::tangent(inset, &pocket.region, radius);
+    let off = radius + WRITTEN;
+    let inset = pocket.region.watched_inset(off - Region::offset_excess(off), monitor)?;
+    let walls_at = walls::tangent(inset, &pocket.region, off);
     if walls_at.is_empty() {
         let largest = pocket.region.largest_disc(DISC_PRECISION, monitor)?.map_or(0.0, |d| 2.0 * d.1);
         return Err(refuse(format!(
@@ -112,7 +115,7 @@ pub fn plan_pocket(
         )));
     }
     let rough = if strategy.wall_allowance > 0.0 {
-        pocket.region.watched_inset(stand_off + strategy.wall_allowance, monitor)?
+        pocket.region.watched_inset(off + strategy.wall_allowance, monitor)?
     } else {
         walls_at.clone()
     };
@@ -163,7 +166,7 @@ pub fn plan_pocket(
     }
     let mut runs: Vec<Run> = groups.into_iter().flat_map(|group| group.1).collect();
     let turn = strategy.bounded().map_or(std::f64::consts::PI, |_| MOST_TURN);
-    let walls = walls::Walls::new(&pocket.region, radius - walls::ROUNDING);
+    let walls = walls::Walls::new(&pocket.region, off - walls::ROUNDING);
     for run in &mut runs {
         monitor::check(monitor)?;
         let holds = |a: &Point2, b: &Point2| walls.hold(a, b);
