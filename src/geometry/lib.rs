@@ -37,5 +37,7 @@ pub use mesh::{MeshError, Outside, RepairNotes, TriangleMesh};
 pub use normal::{inward, normal_at, unit_normal};
 pub use nurbs::{MAX_WEIGHT, NurbsError, NurbsSurface};
 pub use region::{MAX_OUTLINE_POINTS, Piece, Region, RegionError, first_crossing, inside_curve, signed_area};
-pub use segment_grid::{CurveSegment, NearestSegment, SegmentGrid, distance_to_segment, foot};
+pub use segment_grid::{
+    CurveSegment, NearestSegment, SegmentGrid, distance_of_segments, distance_to_segment, foot,
+};
 pub use tessellate::{MAX_TRIANGLES, TessellateError, Tessellation, tessellate};

@@ -201,10 +201,30 @@ pub fn foot(p: &Point2, ends: &[Point2; 2]) -> (f64, f64) {
     (t, (p - (ends[0] + d * t)).norm())
 }
 
+/// Distance of two segments; 0 where they cross.
+pub fn distance_of_segments(a: &[Point2; 2], b: &[Point2; 2]) -> f64 {
+    let side = |s: &[Point2; 2], p: &Point2| (s[1] - s[0]).perp(&(p - s[0]));
+    let across = |s: &[Point2; 2], t: &[Point2; 2]| side(s, &t[0]) * side(s, &t[1]) < 0.0;
+    if across(a, b) && across(b, a) {
+        return 0.0;
+    }
+    let feet = [foot(&a[0], b), foot(&a[1], b), foot(&b[0], a), foot(&b[1], a)];
+    feet.iter().map(|f| f.1).fold(f64::INFINITY, f64::min)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn segments_cross_touch_and_pass_by() {
+        let at = Point2::new;
+        let level = [at(0.0, 0.0), at(4.0, 0.0)];
+        assert_eq!(distance_of_segments(&level, &[at(1.0, -1.0), at(1.0, 1.0)]), 0.0);
+        assert_eq!(distance_of_segments(&level, &[at(4.0, 0.0), at(5.0, 1.0)]), 0.0);
+        assert_eq!(distance_of_segments(&level, &[at(7.0, 4.0), at(9.0, 9.0)]), 5.0);
+    }
 
     proptest! {
         /// Against a look at every segment, also from far outside.

@@ -7,7 +7,7 @@
 use serde::Serialize;
 
 use cutter::Cutter;
-use geometry::{Point2, Region, SegmentGrid, Vector2, foot};
+use geometry::{Region, SegmentGrid, Vector2, distance_of_segments};
 use motion::Toolpath;
 use sim::ZMap;
 use work::monitor::{self, Cancelled, Monitor};
@@ -53,19 +53,6 @@ pub struct PocketFigures {
     pub over_engagement_limit_fraction: f64,
 }
 
-/// Distance of two segments.
-fn segment_distance(a: &[Point2; 2], b: &[Point2; 2]) -> f64 {
-    let side = |s: &[Point2; 2], p: &Point2| (s[1] - s[0]).perp(&(p - s[0]));
-    let across = |s: &[Point2; 2], t: &[Point2; 2]| side(s, &t[0]) * side(s, &t[1]) < 0.0;
-    if across(a, b) && across(b, a) {
-        return 0.0;
-    }
-    [foot(&a[0], b), foot(&a[1], b), foot(&b[0], a), foot(&b[1], a)]
-        .iter()
-        .map(|f| f.1)
-        .fold(f64::INFINITY, f64::min)
-}
-
 /// How far beyond the outline the cutter came, and on which move: every move below `top`, mm.
 ///
 /// # Errors
@@ -94,7 +81,7 @@ pub fn wall_gouge_of_moves(
         let around = [ends[0].inf(&ends[1]) - reach, ends[0].sup(&ends[1]) + reach];
         let mut nearest = r;
         walls.near(&around, |s| {
-            nearest = nearest.min(segment_distance(&ends, &walls.segments()[s as usize].ends));
+            nearest = nearest.min(distance_of_segments(&ends, &walls.segments()[s as usize].ends));
         });
         Ok(r - nearest)
     })?;
@@ -149,6 +136,7 @@ pub fn wall_gouge_of_cells(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use geometry::Point2;
     use geometry::Point3;
     use motion::{ClPoint, Move, MoveKind};
     use sim::{Grid, cut};

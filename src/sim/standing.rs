@@ -62,7 +62,8 @@ pub struct NearStanding {
 pub struct StandingClearance {
     /// The nearest place; `None` where nothing comes nearer than [`FAR`].
     pub nearest: Option<NearStanding>,
-    /// No place comes nearer than the nearest by more than this, mm; of a collision the depth is at least that found.
+    /// No place comes nearer than the nearest, or than [`FAR`], by more than this, mm; infinite where the search left it open
+    /// whether they collide. Of a collision the depth is at least that found.
     pub error_bound: f64,
     /// Moves on which they certainly collide, in program order; those beside a deeper one may be missing.
     pub collisions: Vec<u32>,
@@ -119,7 +120,7 @@ struct Pending {
 }
 
 /// How near shank and holder come to what stands of `stock` when they pass, on every move of `path`, rapids included. Other
-/// cutters may have cut the stock `before`.
+/// cutters may have cut the stock `before`. `None` where no section is wider than the cutter.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -134,11 +135,11 @@ pub fn holder_clearance(
     holder: &Holder,
     path: &Toolpath,
     monitor: &dyn Monitor,
-) -> Result<StandingClearance, Cancelled> {
+) -> Result<Option<StandingClearance>, Cancelled> {
     let mut task = Task::new(stock, cutter, holder, path);
     task.before = before.iter().map(|(cutter, path)| Before::of(cutter, path)).collect();
-    if task.sections.is_empty() || path.is_empty() {
-        return Ok(StandingClearance { error_bound: 0.0, ..StandingClearance::default() });
+    if task.sections.is_empty() {
+        return Ok(None);
     }
     monitor.start("checking the holder", 0);
     let mut search = Search { waiting: task.tiles(cutter.radius()), ..Search::default() };
@@ -155,7 +156,7 @@ pub fn holder_clearance(
             search.take(&task, tile, found);
         }
     }
-    Ok(search.result())
+    Ok(Some(search.result()))
 }
 
 impl Before {

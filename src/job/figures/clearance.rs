@@ -32,7 +32,8 @@ const BEYOND: &str = "nothing is so near that it counts";
 const NO_PROGRAM: &str = "the moves stand in no program";
 
 /// Why a bound is null.
-const TOO_DEEP: &str = "the tool is deep in the other body";
+const AT_LEAST: &str = "they collide, at least so deep";
+const LEFT_OPEN: &str = "the search left it open whether they are nearer";
 
 /// Pairs in the table of the page.
 const LISTED: usize = 5;
@@ -90,11 +91,12 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
         return Ok(Finding::default());
     }
     pairs.sort_by(|a, b| nearness(a).total_cmp(&nearness(b)));
-    let mut claims: Vec<Claim> = pairs.iter().map(|pair| pair.claim(run)).chain(kept_away).collect();
+    let mut claims: Vec<Claim> = pairs.iter().map(|pair| pair.claim(run)).collect();
     if run.request.foreign().is_some_and(|read| read.unknown_before) {
-        let of_stock = |claim: &&mut Claim| claim.text.contains(STANDING);
-        claims.iter_mut().filter(of_stock).for_each(|claim| doubt(std::slice::from_mut(claim), TOOLS_BEFORE));
+        let of_stock = pairs.iter().zip(&mut claims).filter(|(pair, _)| pair.other == STANDING);
+        of_stock.for_each(|(_, claim)| doubt(std::slice::from_mut(claim), TOOLS_BEFORE));
     }
+    claims.extend(kept_away);
     let rows = pairs.iter().take(LISTED).map(|pair| pair.row()).collect();
     let table = FigureTable {
         title: "Nearest places",
@@ -159,16 +161,17 @@ fn with_standing_stock(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Option<Pa
         View::Heights(_) => {
             let before = run.request.foreign().map_or(&[][..], |read| &read.before);
             let found = holder_clearance(&stock, before, &run.scene().cutter, holder, run.path(), monitor)?;
-            let pair = PairClearance {
-                error_bound_mm: Some(found.error_bound),
-                more: more_moves(found.collisions.len()),
-                ..PairClearance::new(("holder", STANDING.into()))
-            };
-            let Some(near) = found.nearest else {
-                return Ok(Some(PairClearance { reason: Some(BEYOND), ..pair }));
-            };
-            let pair = PairClearance { clearance_mm: Some(near.distance), ..pair };
-            Ok(Some(pair.at(run, near.at.into(), near.move_index)))
+            // A section no wider than the cutter stands where it has been.
+            let Some(found) = found else { return Ok(None) };
+            let more = more_moves(found.collisions.len());
+            let pair = PairClearance { more, ..PairClearance::new(("holder", STANDING.into())) };
+            Ok(Some(match found.nearest {
+                None => PairClearance { reason: Some(BEYOND), ..pair }.within(found.error_bound),
+                Some(near) => {
+                    let pair = PairClearance { clearance_mm: Some(near.distance), ..pair };
+                    pair.at(run, near.at.into(), near.move_index).within(found.error_bound)
+                }
+            }))
         }
         View::Normals(_) if run.scene().simulation.removal => {
             let engine =
@@ -185,20 +188,15 @@ fn with_standing_stock(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Option<Pa
             }
             let pair = PairClearance::new(("holder", STANDING.into()));
             Ok(Some(match (&hits.worst, hits.open) {
-                (Some(worst), _) => PairClearance {
-                    clearance_mm: Some(-worst.depth),
-                    error_bound_mm: Some(0.0),
-                    more: more_moves(hits.moves.len()),
-                    ..pair.at(run, worst.at.into(), worst.move_index)
-                },
+                (Some(worst), _) => {
+                    let pair = pair.at(run, worst.at.into(), worst.move_index);
+                    let more = more_moves(hits.moves.len());
+                    PairClearance { clearance_mm: Some(-worst.depth), more, ..pair }.within(0.0)
+                }
                 (None, Some(open)) => {
-                    let bound = Some(3f64.sqrt() * voxel);
-                    PairClearance {
-                        clearance_mm: Some(0.0),
-                        error_bound_mm: bound,
-                        move_index: Some(open),
-                        ..pair
-                    }
+                    let at = run.path().moves[open as usize].to.tip.into();
+                    let pair = pair.at(run, at, open);
+                    PairClearance { clearance_mm: Some(0.0), ..pair }.within(3f64.sqrt() * voxel)
                 }
                 (None, None) => pair,
             }))
@@ -231,15 +229,20 @@ impl PairClearance {
         off: f64,
         needed: f64,
     ) -> Self {
-        let bound = least.error_bound + off;
-        let pair = Self {
-            clearance_mm: Some(least.nearest.distance),
-            error_bound_mm: bound.is_finite().then_some(bound),
-            needed,
-            ..Self::new(name)
-        };
+        let clearance_mm = Some(least.nearest.distance);
+        let pair = Self { clearance_mm, needed, ..Self::new(name) };
         let pair = pair.at(run, least.nearest.place.into(), least.move_index as u32);
-        if bound.is_finite() { pair } else { Self { reason: Some(TOO_DEEP), ..pair } }
+        pair.within(least.error_bound + off)
+    }
+
+    /// With its bound. A collision without one, and a search that was left open, have none.
+    fn within(self, bound: f64) -> Self {
+        let collides = self.clearance_mm.is_some_and(|clearance| clearance < 0.0);
+        match () {
+            () if collides && (bound == 0.0 || !bound.is_finite()) => Self { reason: Some(AT_LEAST), ..self },
+            () if !bound.is_finite() => Self { reason: Some(LEFT_OPEN), ..self },
+            () => Self { error_bound_mm: Some(bound), ..self },
+        }
     }
 
     fn at(self, run: &Run<'_>, at: [f64; 3], move_index: u32) -> Self {
@@ -252,11 +255,15 @@ impl PairClearance {
     fn claim(&self, run: &Run<'_>) -> Claim {
         let claim =
             |depth, bound| Claim::length("collision", Gravity::Crash, 0.0 - self.needed, depth, bound);
-        let Some(clearance) = self.clearance_mm else {
-            return claim(0.0, 0.0).told(self.sentence());
+        let bound = self.error_bound_mm.unwrap_or(f64::INFINITY);
+        let clearance = match self.clearance_mm {
+            // Voxels that leave nothing open prove it without a distance.
+            None if self.reason == Some(UNKNOWN) => return claim(0.0, 0.0).told(self.sentence()),
+            None => return claim(-FAR, bound).told(self.sentence()),
+            Some(clearance) => clearance,
         };
         if clearance >= self.needed {
-            return claim(-clearance, self.error_bound_mm.unwrap_or(f64::INFINITY)).told(self.sentence());
+            return claim(-clearance, bound).told(self.sentence());
         }
         let index = self.move_index.unwrap_or_default();
         let text = format!(
@@ -288,8 +295,9 @@ impl PairClearance {
                 format!("{clearance:.3} ± {:.3}", (1e3 * bound - 1e-9).ceil() / 1e3)
             }
             (Some(clearance), None) => format!("{clearance:.3}, or less"),
-            (None, _) if self.error_bound_mm == Some(0.0) => format!("over {FAR} mm"),
-            (None, _) => "clear".to_owned(),
+            (None, Some(bound)) if bound < FAR => format!("over {:.3} mm", FAR - bound),
+            (None, None) if self.reason == Some(UNKNOWN) => "clear".to_owned(),
+            (None, _) => "open".to_owned(),
         }
     }
 

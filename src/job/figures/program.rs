@@ -56,7 +56,8 @@ fn claim(name: &str, kind: FindingKind, all: &[Fault]) -> Claim {
     let mut found = all.iter().filter(|found| found.kind == kind);
     let motions: usize = all.iter().filter(|found| found.kind == kind).map(|found| found.motions).sum();
     let text = match found.next() {
-        Some(first) => format!("{name}: {}, and so do {} motions in all", first.text, motions),
+        Some(first) if motions == 1 => format!("{name}: {}", first.text),
+        Some(first) => format!("{name}: {} ({motions} motions in all)", first.text),
         None => format!("{name}: no {}", what(kind)),
     };
     let gravity = if kind == FindingKind::OtherLength { Gravity::Scrap } else { Gravity::Crash };

@@ -24,7 +24,7 @@ fn flat() -> Cutter {
 }
 
 fn of(block: &VoxelStock, cutter: &Cutter, holder: &Holder, path: &Toolpath) -> StandingClearance {
-    holder_clearance(block, &[], cutter, holder, path, &Silent).unwrap()
+    holder_clearance(block, &[], cutter, holder, path, &Silent).unwrap().unwrap()
 }
 
 /// A slot of 8 mm down from the top, along x.
@@ -78,7 +78,7 @@ fn what_another_cutter_took_before_does_not_stand() {
     let at = |x: f64| Point3::new(x, 20.0, -5.0);
     let faced = (Cutter::flat(60.0).unwrap(), path_through([at(-40.0), at(80.0)]));
     let clearance = |before: &[(Cutter, Toolpath)]| {
-        holder_clearance(&block, before, &flat(), &holder(7.0), &slot(), &Silent).unwrap()
+        holder_clearance(&block, before, &flat(), &holder(7.0), &slot(), &Silent).unwrap().unwrap()
     };
     assert!(!clearance(&[]).collisions.is_empty());
     let got = clearance(&[faced]);
@@ -102,14 +102,18 @@ fn a_pass_beside_the_block_has_its_distance() {
         assert!(got.error_bound <= (0.05 * gap).max(0.011), "{got:?}");
     }
     assert!(!of(&block, &flat(), &holder(9.0), &beside(-0.05)).collisions.is_empty());
+    // One that rubs along the side is neither clear nor in it.
+    let rubs = of(&block, &flat(), &holder(9.0), &beside(0.0));
+    let distance = rubs.nearest.unwrap().distance;
+    assert!(distance.abs() < 1e-3 && distance - rubs.error_bound <= 0.0, "{rubs:?}");
 }
 
 #[test]
 fn a_shank_as_wide_as_the_cutter_stands_where_it_has_been() {
     let block = block([0.0, 0.0, -30.0], [40.0, 40.0, 0.0]);
     let shank = HolderSection { diameter: 6.0, top_diameter: 6.0, length: 90.0 };
-    let got = of(&block, &flat(), &Holder::new(2.0, vec![shank]).unwrap(), &slot());
-    assert_eq!(got, StandingClearance::default());
+    let shank = Holder::new(2.0, vec![shank]).unwrap();
+    assert_eq!(holder_clearance(&block, &[], &flat(), &shank, &slot(), &Silent), Ok(None));
 }
 
 /// Columns of stock on a dense grid, and the holder at many times of each move.

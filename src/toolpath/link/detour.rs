@@ -32,17 +32,13 @@ pub struct Detour {
 
 fn note(left_out: f64, detours: usize) -> Option<String> {
     let raised = match detours {
-        0 => {
-            return (left_out > 0.0)
-                .then(|| format!("{left_out:.1} mm of passes beside fixtures are skipped"));
-        }
-        1 => "once the tool rises over a fixture".to_owned(),
-        n => format!("{n} times the tool rises over a fixture"),
+        0 => None,
+        1 => Some("once the tool rises over a fixture".to_owned()),
+        n => Some(format!("{n} times the tool rises over a fixture")),
     };
-    Some(match left_out {
-        0.0 => raised,
-        length => format!("{raised}; {length:.1} mm of passes beside fixtures are skipped"),
-    })
+    let skipped = (left_out > 0.0).then(|| format!("{left_out:.1} mm of passes beside fixtures are skipped"));
+    let parts: Vec<String> = raised.into_iter().chain(skipped).collect();
+    (!parts.is_empty()).then(|| parts.join("; "))
 }
 
 /// Leads an upright path around what `keep` holds.

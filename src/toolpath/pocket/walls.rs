@@ -5,7 +5,7 @@
 //! bends between curves and level curves come from triangles, so neither keeps to walls by itself; mm.
 
 use super::route::{Entry, Run};
-use geometry::{Piece, Point2, Region, SegmentGrid, Vector2, foot};
+use geometry::{Piece, Point2, Region, SegmentGrid, Vector2, distance_of_segments};
 
 /// What offsets may be off by rounding, mm: some 2⁻³⁰ of the size of the region.
 pub(super) const ROUNDING: f64 = 5.0e-7;
@@ -172,21 +172,11 @@ impl Walls {
         let reach = Vector2::new(self.nearest, self.nearest);
         let mut hold = true;
         self.grid.near(&[a.inf(b) - reach, a.sup(b) + reach], |k| {
-            hold = hold && distance(&[*a, *b], &self.grid.segments()[k as usize].ends) >= self.nearest;
+            hold = hold
+                && distance_of_segments(&[*a, *b], &self.grid.segments()[k as usize].ends) >= self.nearest;
         });
         hold
     }
-}
-
-/// Distance of two segments.
-fn distance(a: &[Point2; 2], b: &[Point2; 2]) -> f64 {
-    let side = |s: &[Point2; 2], p: &Point2| (s[1] - s[0]).perp(&(p - s[0]));
-    let across = |s: &[Point2; 2], t: &[Point2; 2]| side(s, &t[0]) * side(s, &t[1]) < 0.0;
-    if across(a, b) && across(b, a) {
-        return 0.0;
-    }
-    let feet = [foot(&a[0], b), foot(&a[1], b), foot(&b[0], a), foot(&b[1], a)];
-    feet.iter().map(|f| f.1).fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]
@@ -255,7 +245,7 @@ mod tests {
                 let gap = |k: &geometry::CurveSegment| {
                     let all =
                         region.curves().flat_map(|c| (0..c.len()).map(move |i| [c[i], c[(i + 1) % c.len()]]));
-                    all.map(|wall| distance(&k.ends, &wall)).fold(f64::INFINITY, f64::min)
+                    all.map(|wall| distance_of_segments(&k.ends, &wall)).fold(f64::INFINITY, f64::min)
                 };
                 sides.segments().iter().map(gap).fold(f64::INFINITY, f64::min)
             };
