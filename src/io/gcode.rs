@@ -13,10 +13,10 @@ mod five_axis;
 pub(crate) use five_axis::tests as five_axis_tests;
 pub use five_axis::{FiveAxisPost, Style, write_five_axis};
 
-use super::program_text::{ProgramHeader, describe, number, rounded};
+use super::program_text::{ProgramHeader, describe, number};
 use cutter::Cutter;
 use geometry::Point3;
-use motion::{MoveKind, Toolpath};
+use motion::{MoveKind, Toolpath, in_last_decimals};
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
@@ -75,7 +75,7 @@ pub fn write(
 struct ThreeAxisProgram<'a> {
     writer: &'a mut dyn Write,
     lines: u32,
-    /// In the units of [`rounded`].
+    /// In the units of [`in_last_decimals`].
     tip: [Option<f64>; 3],
     rapid: Option<bool>,
     feed: Option<f64>,
@@ -101,8 +101,8 @@ impl ThreeAxisProgram<'_> {
         let mut words = String::new();
         for ((axis, value), tip) in ["X", "Y", "Z"].into_iter().zip(to).zip(&mut self.tip) {
             let Some(value) = value else { continue };
-            if *tip != Some(rounded(value)) {
-                *tip = Some(rounded(value));
+            if *tip != Some(in_last_decimals(value)) {
+                *tip = Some(in_last_decimals(value));
                 let _ = write!(words, " {axis}{}", number(value));
             }
         }
@@ -116,9 +116,9 @@ impl ThreeAxisProgram<'_> {
         }
         text.push_str(&words);
         if let Some(feed) = feed
-            && self.feed != Some(rounded(feed))
+            && self.feed != Some(in_last_decimals(feed))
         {
-            self.feed = Some(rounded(feed));
+            self.feed = Some(in_last_decimals(feed));
             let _ = write!(text, " F{}", number(feed));
         }
         self.line(text.trim_start())

@@ -25,4 +25,4 @@ pub use mesh_file::{
     FilePlace, MAX_BYTES as MAX_MESH_FILE_BYTES, MeshFileError, MeshFormat, MeshLimits, MeshReadError,
 };
 pub use mesh_formats::{MESH_FORMATS, UnknownMeshFormat, extension, mesh_extensions};
-pub use program_text::{ProgramHeader, as_written};
+pub use program_text::ProgramHeader;

@@ -1,11 +1,7 @@
 //! What the two program writers share: the header's data and the way numbers and names are written.
 
 use cutter::{Cutter, CutterKey};
-use geometry::Point3;
-use motion::{ClPoint, Move, Toolpath};
-
-/// Decimals of every coordinate: rounding moves a point by at most 0.05 µm along each axis.
-const DECIMALS: usize = 4;
+use motion::{DECIMALS, in_last_decimals};
 
 /// Longest name that is written; longer ones are cut. Controls refuse lines far beyond it.
 const NAME_LENGTH: usize = 60;
@@ -28,25 +24,10 @@ impl ProgramHeader {
     }
 }
 
-/// A coordinate in ten-thousandths of a millimetre: what is compared when a word is left out.
-pub(super) fn rounded(value: f64) -> f64 {
-    (value * 10f64.powi(DECIMALS as i32)).round() + 0.0
-}
-
-/// The path as its programs have it: every coordinate with four decimals. Axes and feeds stay as they are.
-pub fn as_written(path: Toolpath) -> Toolpath {
-    let at = |at: &ClPoint| ClPoint {
-        tip: Point3::from(at.tip.coords.map(|c| rounded(c) / 10f64.powi(DECIMALS as i32))),
-        axis: at.axis,
-    };
-    let moves = path.moves.iter().map(|step| Move { to: at(&step.to), ..*step }).collect();
-    Toolpath { start: at(&path.start), moves, origin: path.origin }
-}
-
 /// A number with four decimals, trailing zeros left out but for one: a control may read a number
 /// without a decimal point as micrometres.
 pub(super) fn number(value: f64) -> String {
-    shortened(format!("{:.DECIMALS$}", rounded(value) / 10f64.powi(DECIMALS as i32)))
+    shortened(format!("{:.DECIMALS$}", in_last_decimals(value) / 10f64.powi(DECIMALS as i32)))
 }
 
 /// [`number`] rounded down, for feeds that reach a limit.

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use io::ProgramHeader;
 use io::gcode::{self, FiveAxisPost, MoveLines};
-use io::{ProgramHeader, as_written};
 use machine::kinematics::{JointPath, follow};
 use machine::{machining_time_turning, slow_corners};
 use metrology::{ContactArcs, finer_contact_arcs};
@@ -84,7 +84,7 @@ impl Session {
                 plan.path = slow_corners(&plan.path, &scene.machine);
             }
             // What is cut and measured is what programs say.
-            plan.path = as_written(plan.path);
+            plan.path = plan.path.as_written();
             let engaged = self.limit_feed(request, &mut plan.path, monitor)?;
             Ok::<_, JobError>((plan, engaged))
         };

@@ -8,6 +8,8 @@
 
 mod path;
 mod tool_axis;
+mod written;
 
 pub use path::{CcPoint, ClPoint, Move, MoveKind, Origin, Toolpath};
 pub use tool_axis::{AxisError, ToolAxis, in_tool_frame, location};
+pub use written::{DECIMALS, ROUNDING, in_last_decimals};

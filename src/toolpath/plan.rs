@@ -13,7 +13,7 @@ use crate::vocabulary::{
 };
 use cutter::Cutter;
 use field::{PlannedField, ShortestPossible};
-use motion::{ToolAxis, Toolpath};
+use motion::{ROUNDING, ToolAxis, Toolpath};
 use part::Part;
 use scallop::strip_width;
 use work::monitor::Monitor;
@@ -173,13 +173,13 @@ fn passes(setup: &Setup<'_>, strategy: &dyn Strategy, axis: Option<&ToolAxis>) -
     strategy.passes(&task)
 }
 
-/// The distance of passes less what chords and facets take of a scallop target.
+/// The distance of passes less what chords, facets and the program's decimals take of a scallop target.
 fn charged_step(task: &Task<'_>, strategy: &dyn Strategy, settings: &PlanSettings) -> Step {
     let Step::Scallop(h) = settings.step else { return settings.step };
     let fitted = !strategy.on_facets(task) && !task.wants_mesh;
     let smooth = !task.part.patches().is_empty();
     let facets = if smooth { 0.0 } else { facet_charge(task.part.mesh(), fitted, h) };
     let chords = if settings.joining.smoothing { SMOOTHED_CHORD_SHARE } else { CHORD_SHARE };
-    let less = chords * settings.chord_tolerance + facets;
+    let less = chords * settings.chord_tolerance + facets + ROUNDING;
     Step::Scallop((h - less).max(LEAST_SHARE_OF_TARGET * h))
 }

@@ -33,6 +33,7 @@ use crate::plan::Plan;
 use crate::vocabulary::{PlanError, PlanSettings, Strategy};
 use cutter::Cutter;
 use geometry::{Piece, Point2, Region, SegmentGrid, Vector2};
+use motion::ROUNDING;
 use work::monitor::{self, Cancelled, Monitor};
 
 /// A pocket to mill.
@@ -60,8 +61,8 @@ const SPACING: f64 = 0.25;
 /// Share of the chord tolerance that straight moves may be off the curves that they stand for.
 const CHORDS_SHARE: f64 = 0.5;
 
-/// What is left on walls for the digits of the program, mm: half of the last one, along both axes.
-const WRITTEN: f64 = 0.75e-4;
+/// What is left on walls for the decimals of the program, mm: more than the diagonal of their rounding.
+const WRITTEN: f64 = 1.5 * ROUNDING;
 
 /// Precision of the largest cutter that an error names, mm.
 const DISC_PRECISION: f64 = 0.005;
