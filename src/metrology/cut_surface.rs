@@ -200,6 +200,11 @@ const MOST_ITERATIONS: usize = 70;
 const MOST_MARCHING_STEPS: usize = 20_000;
 
 impl CutSurface<'_> {
+    /// Height to which the lowest of `moves` cuts above or below a point, mm; infinite where none passes.
+    pub(crate) fn height_of(&self, moves: &[u32], at: &Point3) -> f64 {
+        self.envelope.lowest(at.x, at.y, moves).map_or(f64::INFINITY, |(z, _)| z)
+    }
+
     /// Signed distance from the design point `p` with outward unit normal `n` to the cut surface
     /// along `n`. `None` off the grid.
     ///

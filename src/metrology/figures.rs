@@ -1,10 +1,10 @@
 //! The figures of one measured toolpath, with the names under which they stand in report.json.
 //! Lengths in mm, areas in mm², volumes in mm³, times in s.
 
+use geometry::Point3;
 use serde::Serialize;
 
 use super::pairs::PairFigures;
-use super::ridge_map::RidgePlace;
 
 /// Numerical floor of every bound, mm: root finding and the design surface's own evaluation.
 pub(crate) const NUMERICAL_FLOOR: f64 = 1e-6;
@@ -20,6 +20,15 @@ pub struct Limits {
     pub uncut: f64,
     /// Chord tolerance of the path.
     pub chord: f64,
+}
+
+/// A place of a ridge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RidgePlace {
+    /// Where it stands.
+    pub at: Point3,
+    /// Over the design surface, mm.
+    pub height: f64,
 }
 
 /// Which ridges may exceed the scallop target. By default none may.

@@ -64,7 +64,7 @@ pub use engines::{
 pub use facing::{Facing, Judged, PlaceKind};
 pub use figures::{
     Bounded, CloserLook, DeviationFigures, ExcessFigures, ExcessKind, GougeFigures, GougeRegion, Limits,
-    Measurement, PathFigures, ScallopFigures, ScallopRule, UncutFigures, UncutRegion,
+    Measurement, PathFigures, RidgePlace, ScallopFigures, ScallopRule, UncutFigures, UncutRegion,
 };
 pub use measure::measure;
 pub use meetings::Meetings;
@@ -76,7 +76,7 @@ pub use path::path_figures;
 pub use pocket::{PocketFigures, wall_gouge_of_cells, wall_gouge_of_moves};
 pub use refine::Asked;
 pub use removal::{RapidContactFigures, RemovalFigures, removal_figures, voxel_removal_figures};
-pub use ridge_map::{RidgeMap, RidgePlace};
+pub use ridge_map::RidgeMap;
 pub use roughness::{RoughnessFigures, roughness};
 pub use sections::{SectionFigures, section_figures};
 pub use turning::{FastestTurn, fastest_turn};

@@ -68,7 +68,7 @@ pub fn measure(
     measured.refined = refinement.run(&hidden, &hiding, &mut measured, monitor)?;
     doubt(&mut measured, &surface, part, path, asked);
     let all: Vec<u32> = (0..path.len() as u32).collect();
-    let cut_away = |at: &Point3| lowest_of_all(&surface, at, &all) < at.z - asked.error_bound;
+    let cut_away = |at: &Point3| surface.height_of(&all, at) < at.z - asked.error_bound;
     let search = ExcessSearch { inspection: &inspection, stock_top: asked.stock_top, cut_away: &cut_away };
     if !asked.borders {
         measured.excess = ExcessFigures::of_cells(&measured);
@@ -81,16 +81,11 @@ pub fn measure(
     Ok(measured)
 }
 
-/// Height to which the lowest of all moves cuts above or below a point, mm; infinite where none passes.
-pub(super) fn lowest_of_all(surface: &CutSurface<'_>, at: &Point3, all: &[u32]) -> f64 {
-    surface.envelope.lowest(at.x, at.y, all).map_or(f64::INFINITY, |(z, _)| z)
-}
-
 /// Where a move that no cell saw cuts the highest scallop or uncut place away, the figure is too great by
 /// an unknown amount: its bound becomes the figure itself. All moves are asked at the two places.
 fn doubt(measured: &mut Measurement, surface: &CutSurface<'_>, part: &Part, path: &Toolpath, asked: &Asked) {
     let all: Vec<u32> = (0..path.len() as u32).collect();
-    let cut_away = |at: &Point3| lowest_of_all(surface, at, &all) < at.z - asked.error_bound;
+    let cut_away = |at: &Point3| surface.height_of(&all, at) < at.z - asked.error_bound;
     let (scallop, uncut) = (&mut measured.scallop, &mut measured.uncut);
     let mut doubtful = false;
     if scallop.max_at_mm.is_some_and(|at| cut_away(&at.into())) {

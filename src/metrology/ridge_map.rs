@@ -1,9 +1,8 @@
 //! The ridges of a cut surface and the remnants along its borders, and nothing else: what a planner is corrected by.
 
 use super::cut_surface::CutSurface;
-use super::figures::{Limits, ScallopFigures};
+use super::figures::{Limits, RidgePlace, ScallopFigures};
 use super::inspection::{Inspection, Sample};
-use super::measure::lowest_of_all;
 use super::ridges::{RidgeFinder, scallop_figures};
 use cutter::Cutter;
 use geometry::{Point2, Point3, Vector2};
@@ -11,15 +10,6 @@ use motion::Toolpath;
 use part::Part;
 use sim::{Envelope, ZMap};
 use work::monitor::{Cancelled, Monitor};
-
-/// A place of a ridge.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RidgePlace {
-    /// Where it stands.
-    pub at: Point3,
-    /// Over the design surface, mm.
-    pub height: f64,
-}
 
 /// All ridges of a cut surface.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,7 +49,7 @@ pub(super) fn ridge_map(
     };
     let all: Vec<u32> = (0..path.len() as u32).collect();
     let mut tops = scallop.max_at_mm.map(Point3::from).into_iter().chain(of_borders.and_then(top_of));
-    let seen = tops.all(|top| lowest_of_all(&surface, &top, &all) >= top.z - asked);
+    let seen = tops.all(|top| surface.height_of(&all, &top) >= top.z - asked);
     Ok(seen.then(|| RidgeMap { above, border: of_borders.map_or(0.0, |place| place.height), scallop }))
 }
 

@@ -15,10 +15,9 @@
 //! ridge is high. There the height is taken along the border's normal.
 
 use super::cut_surface::CutSurface;
-use super::figures::{Limits, NUMERICAL_FLOOR, ScallopFigures};
+use super::figures::{Limits, NUMERICAL_FLOOR, RidgePlace, ScallopFigures};
 use super::meetings::{Meeting, Meetings};
 use super::pairs::{PairTally, RidgeCrossing};
-use super::ridge_map::RidgePlace;
 use cutter::Cutter;
 use geometry::{Point2, Point3, Vector2, distance_to_segment};
 use motion::Toolpath;

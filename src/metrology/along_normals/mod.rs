@@ -26,11 +26,10 @@ mod tests;
 
 use super::facing::{Facing, Judged};
 use super::figures::{
-    Bounded, CloserLook, ExcessFigures, ExcessKind, Limits, Measurement, NUMERICAL_FLOOR, ScallopFigures,
-    UncutFigures,
+    Bounded, CloserLook, ExcessFigures, ExcessKind, Limits, Measurement, NUMERICAL_FLOOR, RidgePlace,
+    ScallopFigures, UncutFigures,
 };
 use super::pairs::{PairTally, RidgeCrossing, pair_figures};
-use super::ridge_map::RidgePlace;
 use super::ridges::{Highest, scallop_figures};
 use super::tracks::Tracks;
 use super::turning::contact as contact_of;
