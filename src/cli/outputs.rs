@@ -22,7 +22,7 @@ use super::error::CliError;
 use disk::Disk;
 pub use owned::Claims;
 use owned::Owned;
-use publish::{NEW, Place};
+use publish::{NEW, ResultsPlace};
 
 /// The staging folder's name in the target.
 const STAGING: &str = ".millstream";
@@ -30,7 +30,7 @@ const STAGING: &str = ".millstream";
 /// A folder that fills up, unseen until [`Outputs::publish`].
 #[derive(Debug)]
 pub struct Outputs {
-    place: Place,
+    place: ResultsPlace,
     /// The files of an earlier run, which are to be replaced.
     old: Vec<Owned>,
     /// SHA-256 of each new file.
@@ -131,7 +131,7 @@ impl Outputs {
             return Err(refused(target, "it is the root of the file system"));
         }
         let lock = lock(target)?;
-        let place = Place { target: target.to_owned(), disk };
+        let place = ResultsPlace { target: target.to_owned(), disk };
         put_in_order(&place, lock.is_some())?;
         let old = owned::check(target, claims)?;
         place.stage().map_err(CliError::output(target))?;
@@ -199,7 +199,7 @@ impl Drop for Outputs {
 }
 
 /// Completes or undoes what a killed run was about to publish, and removes its staging folder.
-fn put_in_order(place: &Place, locked: bool) -> Result<(), CliError> {
+fn put_in_order(place: &ResultsPlace, locked: bool) -> Result<(), CliError> {
     let staging = place.staging();
     if fs::symlink_metadata(&staging).is_err() {
         return Ok(());

@@ -65,7 +65,7 @@ impl Comparison {
 /// Compares a nightly with a baseline. Without one, only scenes that failed and figures that contradict each other are
 /// worse. A shard is compared on its own scenes alone.
 pub fn compare(now: &Results, baseline: Option<&Results>, rules: &Rules) -> Comparison {
-    let mut found = Found { rules, all: Comparison::default(), figures: Vec::new() };
+    let mut found = Comparing { rules, all: Comparison::default(), figures: Vec::new() };
     found.all.baseline = baseline.map(|baseline| baseline.date.clone());
     let known = baseline.map(contradictions).unwrap_or_default();
     for wrong in contradictions(now) {
@@ -85,14 +85,14 @@ pub fn compare(now: &Results, baseline: Option<&Results>, rules: &Rules) -> Comp
             "The scene is in the baseline, and this nightly has none of that name.",
         );
     }
-    let Found { mut all, mut figures, .. } = found;
+    let Comparing { mut all, mut figures, .. } = found;
     // The greatest relative growth first; what grew from nothing before it.
     figures.sort_by(|a, b| b.0.total_cmp(&a.0));
     all.worse.extend(figures.into_iter().map(|(_, finding)| finding));
     all
 }
 
-struct Found<'a> {
+struct Comparing<'a> {
     rules: &'a Rules,
     all: Comparison,
     /// Figures that got worse, with their relative growth.
@@ -103,7 +103,7 @@ pub(crate) fn finding(scene: &str, toolpath: Option<&str>, text: impl Into<Strin
     Finding { scene: scene.to_owned(), toolpath: toolpath.map(str::to_owned), text: text.into() }
 }
 
-impl Found<'_> {
+impl Comparing<'_> {
     fn scene(&mut self, now: &SceneResult, before: Option<&SceneResult>, has_baseline: bool) {
         let name = now.name.as_str();
         let failed_before = before.is_some_and(|before| matches!(before.outcome, Outcome::Failed { .. }));

@@ -38,7 +38,7 @@ pub(crate) struct Silhouette<'a> {
 
 /// A place of the outline.
 #[derive(Clone, Copy)]
-struct Place {
+struct OnOutline {
     x: f64,
     y: f64,
     /// Radius of curvature; 0 at edges and on jumps.
@@ -58,17 +58,17 @@ pub(crate) struct Over {
 
 impl Over {
     /// How much higher a place stands than asked, mm: the sign is exact, the value to first order.
-    fn excess(&self, p: &Place) -> f64 {
+    fn excess(&self, p: &OnOutline) -> f64 {
         p.y - self.height - 0.5 * self.curvature * (p.x * p.x + p.y * p.y - self.height * self.height)
     }
 
     /// Its derivative along the outline's tangent.
-    fn slope(&self, p: &Place, [x, y]: [f64; 2]) -> f64 {
+    fn slope(&self, p: &OnOutline, [x, y]: [f64; 2]) -> f64 {
         y - self.curvature * (p.x * x + p.y * y)
     }
 
     /// The way to it along the surface.
-    fn arc(&self, p: &Place) -> f64 {
+    fn arc(&self, p: &OnOutline) -> f64 {
         let straight = p.x / (1.0 - self.curvature * p.y);
         let angle = self.curvature * straight;
         if angle.abs() < 1e-5 {
@@ -112,14 +112,14 @@ impl<'a> Silhouette<'a> {
         (Vector3::new(d.x / sine * rho, d.y / sine * rho, z), [meridian, rho / sine])
     }
 
-    fn at(&self, phi: f64) -> Place {
+    fn at(&self, phi: f64) -> OnOutline {
         let (sin, cos) = phi.sin_cos();
         let d = self.b * sin - self.n * cos;
         let (p, [meridian, parallel]) = self.place(&d);
         let (p, along) = (p - self.contact, self.b * cos + self.n * sin);
         let level = d.x * d.x + d.y * d.y;
         let share = if level > 1e-24 { (along.y * d.x - along.x * d.y).powi(2) / level } else { 0.0 };
-        Place {
+        OnOutline {
             x: p.dot(&self.b),
             y: p.dot(&self.n),
             bend: meridian * (1.0 - share).max(0.0) + parallel * share,
@@ -133,7 +133,7 @@ impl<'a> Silhouette<'a> {
         if upright.is_nan() || upright <= 0.0 {
             return f64::INFINITY;
         }
-        let high = |p: &Place| p.x >= over.farthest || over.excess(p) >= 0.0;
+        let high = |p: &OnOutline| p.x >= over.farthest || over.excess(p) >= 0.0;
         let (mut low, mut top) = (0.0, upright.min(std::f64::consts::FRAC_PI_2));
         let [mut below, mut above] = [low, top].map(|phi| self.at(phi));
         if !high(&above) {
@@ -171,13 +171,13 @@ impl<'a> Silhouette<'a> {
     }
 
     /// As [`Silhouette::reach`] from the last place of the outline, along the cutter's side.
-    fn up_the_side(&self, over: &Over, from: &Place) -> f64 {
+    fn up_the_side(&self, over: &Over, from: &OnOutline) -> f64 {
         let on = from.along([self.b.z, self.n.z], over);
         on.filter(|on| on.x < over.farthest).map_or(f64::INFINITY, |on| over.arc(&on))
     }
 }
 
-impl Place {
+impl OnOutline {
     /// Where a straight line in the direction `[x, y]` stands as high as asked; `None` where it never does.
     fn along(&self, [x, y]: [f64; 2], over: &Over) -> Option<Self> {
         let (lacking, slope) = (-over.excess(self), over.slope(self, [x, y]));
@@ -191,7 +191,7 @@ impl Place {
 
 /// Where the chord from a place below the height to one above reaches it: it lies inside the outline, so that the way is
 /// never too long.
-fn between(over: &Over, below: &Place, above: &Place) -> Place {
+fn between(over: &Over, below: &OnOutline, above: &OnOutline) -> OnOutline {
     let chord = [above.x - below.x, above.y - below.y];
     below.along(chord, over).filter(|p| p.x <= above.x).unwrap_or(*below)
 }

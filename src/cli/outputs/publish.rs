@@ -11,7 +11,7 @@
 //! 4. Each link is replaced by the file that it leads to, links to nowhere are removed, and `.millstream` goes.
 //!
 //! A kill leaves `.millstream` behind. The next run sees by `current` which results hold: it undoes step 2 or completes
-//! step 4, both by [`Place::settle`], which may be killed and repeated as well. Between the steps everything is synced,
+//! step 4, both by [`ResultsPlace::settle`], which may be killed and repeated as well. Between the steps everything is synced,
 //! in this order, so that the same is true when the power fails.
 //!
 //! Where the file system knows no links (FAT, Windows), a file `commit` takes the place of `current`. It names the old
@@ -47,12 +47,12 @@ const ABOUT_TEXT: &str = "Millstream keeps results here until all of them are co
 
 /// A folder of results, and how it is changed.
 #[derive(Debug)]
-pub(super) struct Place {
+pub(super) struct ResultsPlace {
     pub(super) target: PathBuf,
     pub(super) disk: Disk,
 }
 
-impl Place {
+impl ResultsPlace {
     pub(super) fn staging(&self) -> PathBuf {
         self.target.join(STAGING)
     }

@@ -274,7 +274,7 @@ fn a_kill_at_any_step_leaves_the_old_or_the_new_results() {
 /// Puts `home` in order, killed after each number of steps in turn until it is done.
 fn kill_every_repair(home: &Path, expected: &BTreeMap<String, String>, step: usize) {
     for steps in 0.. {
-        let place = Place { target: home.to_owned(), disk: killed_after(steps, false) };
+        let place = ResultsPlace { target: home.to_owned(), disk: killed_after(steps, false) };
         let done = place.settle().is_ok();
         assert!(read(home) == *expected, "step {step}, repaired {steps} steps");
         if done {
@@ -310,7 +310,7 @@ fn without_links_a_kill_leaves_what_the_next_run_completes() {
             "step {steps}: {found:?}"
         );
         for repairing in 0.. {
-            let place = Place { target: home.path().to_owned(), disk: killed_after(repairing, true) };
+            let place = ResultsPlace { target: home.path().to_owned(), disk: killed_after(repairing, true) };
             if place.settle().is_ok() {
                 break;
             }

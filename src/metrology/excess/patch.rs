@@ -41,7 +41,7 @@ pub(super) enum Held {
 }
 
 /// A polygon of the plan with the plane that the design lies on there, or above.
-struct Piece {
+struct Clipped {
     corners: [Point2; MOST_CORNERS],
     len: usize,
     /// On the design, within the polygon.
@@ -140,7 +140,7 @@ impl Patches<'_> {
     }
 
     /// The part of a triangle within the square, where it is seen from above.
-    fn piece(&self, t: usize, centre: Point2, half: f64) -> Option<Piece> {
+    fn piece(&self, t: usize, centre: Point2, half: f64) -> Option<Clipped> {
         let part = self.inspection.part;
         let triangle = part.mesh().corners(t);
         let (corners, len) = clipped(&triangle, centre, half)?;
@@ -154,7 +154,7 @@ impl Patches<'_> {
         // Just inside the corners, where the next triangle does not answer.
         let inside = |c: &Point2| c + (middle - c) * 1e-3;
         let foot = seen(middle).or_else(|| corners[..len].iter().find_map(|c| seen(inside(c))))?;
-        let mut piece = Piece { corners, len, foot, below: 0.0, cosine: 1.0 };
+        let mut piece = Clipped { corners, len, foot, below: 0.0, cosine: 1.0 };
         if part.patches().is_empty() {
             let point =
                 Point3::new(foot.point.x, foot.point.y, height(Point2::new(foot.point.x, foot.point.y)));
@@ -166,7 +166,7 @@ impl Patches<'_> {
     }
 
     /// What stands above a piece at most, and what stands on its foot, cut by which move; `None` where that cannot be told.
-    fn above(&self, piece: &Piece) -> Option<(f64, f64, u32)> {
+    fn above(&self, piece: &Clipped) -> Option<(f64, f64, u32)> {
         let surface = self.inspection.surface;
         let SurfacePoint { point, normal, .. } = &piece.foot;
         let here = surface.along_normal(point, normal)?;
@@ -203,7 +203,7 @@ impl Patches<'_> {
 
     /// Height of the cut above the piece's plane, along its normal, at most: where the polygon comes to when it moves from
     /// one place aside to the other.
-    fn over(&self, piece: &Piece, moves: &[u32], aside: [Vector2; 2]) -> f64 {
+    fn over(&self, piece: &Clipped, moves: &[u32], aside: [Vector2; 2]) -> f64 {
         let SurfacePoint { point, normal, .. } = &piece.foot;
         let mut places = [Point2::origin(); 2 * MOST_CORNERS];
         let mut count = 0;
@@ -232,7 +232,7 @@ impl Patches<'_> {
     }
 }
 
-impl Piece {
+impl Clipped {
     /// Measures how the design leaves its tangent plane, at the corners just inside.
     fn bend(&mut self, part: &part::Part, inside: &dyn Fn(&Point2) -> Point2) {
         let SurfacePoint { point, normal, .. } = self.foot;
