@@ -24,6 +24,9 @@ use super::{JobError, Session};
 /// memory as its square.
 const FINER: usize = 4;
 
+/// One part in so many of the memory that the part leaves is for the tables of a plan.
+const PLAN_SHARE: u64 = 2;
+
 /// Share of the turning that was asked for which axes are planned by: moves take the chord of the contact's way, which is
 /// shorter than the way.
 const TURNING_SHARE: f64 = 0.99;
@@ -134,6 +137,7 @@ impl Session {
             plunge_rate: self.scene.cutting.plunge_rate,
             rapid_rate: self.scene.machine.rapid_rate,
             joining: request.joining,
+            memory: self.budget().left(0) / PLAN_SHARE,
             earlier: None,
         }
     }

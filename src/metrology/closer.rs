@@ -32,6 +32,49 @@ pub(super) struct Value {
     pub possible: f64,
 }
 
+/// The squares that promise most, as many as will be looked at.
+#[derive(Debug, Clone)]
+pub(super) struct Promising {
+    /// In no order.
+    pub squares: Vec<Square>,
+    /// What those left out promise at most, mm.
+    pub others: f64,
+}
+
+impl Default for Promising {
+    fn default() -> Self {
+        Self { squares: Vec::new(), others: f64::NEG_INFINITY }
+    }
+}
+
+impl Promising {
+    /// The `most` best of some squares.
+    pub fn of(squares: impl Iterator<Item = Square>, most: usize) -> Self {
+        let mut all = Self::default();
+        all.add(squares, most);
+        all
+    }
+
+    /// Joins more squares and keeps the `most` best of all.
+    pub fn add(&mut self, squares: impl Iterator<Item = Square>, most: usize) {
+        for square in squares {
+            self.squares.push(square);
+            if self.squares.len() >= 2 * most {
+                self.keep(most);
+            }
+        }
+        self.keep(most);
+    }
+
+    fn keep(&mut self, most: usize) {
+        if self.squares.len() > most {
+            self.squares.select_nth_unstable_by(most, |a, b| b.cmp(a));
+            self.others = self.others.max(self.squares[most].possible);
+            self.squares.truncate(most);
+        }
+    }
+}
+
 /// Places asked for in any case, each some 2 µs: they bring most figures to nanometres. Fewer leave wider
 /// bounds than need be, more take time where nobody asked.
 const CHEAP: usize = 20_000;
@@ -46,6 +89,18 @@ const BATCH: usize = 256;
 
 /// A square whose centre and corners lie off the part is divided until it is this share of the first one.
 const OFF_PART_SHARE: f64 = 1.0 / 16.0;
+
+/// What a search may spend.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Effort {
+    /// Places that are asked for.
+    pub places: usize,
+    /// Squares that are held at a time, [`BYTES_PER_SQUARE`] each.
+    pub squares: usize,
+}
+
+/// Bytes that a square takes while its list grows.
+pub(super) const BYTES_PER_SQUARE: u64 = 2 * size_of::<Square>() as u64;
 
 /// What a search found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,12 +128,12 @@ impl PartialOrd for Square {
     }
 }
 
-/// Searches `squares`, all of one size, for values above `known`. `at` tells what the square around a
+/// Searches `squares`, all of one size, for values above `known`, holding no more than `held` at a time. `at` tells what the square around a
 /// place with a given half side holds; `None` off the part.
 ///
 /// # Tolerance
 /// `possible` exceeds the greater of `known` and the value found by no more than `asked` unless [`MOST`]
-/// places did not suffice. It is as right as the bounds that `at` gives.
+/// places or `held` squares did not suffice. It is as right as the bounds that `at` gives.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -86,6 +141,7 @@ pub(super) fn greatest(
     squares: Vec<Square>,
     known: f64,
     asked: f64,
+    held: usize,
     at: &(dyn Fn(Point2, f64) -> Option<Value> + Sync),
     monitor: &dyn Monitor,
 ) -> Result<BoundedGreatest, Cancelled> {
@@ -101,22 +157,22 @@ pub(super) fn greatest(
         let found = at(centre, half).map(|v| (centre, v)).or_else(|| (0..4).find_map(corner));
         found.or((half > least).then_some(unknown))
     };
-    search(squares, known, asked, MOST, &inside, monitor)
+    search(squares, known, asked, Effort { places: MOST, squares: held }, &inside, monitor)
 }
 
-/// As [`greatest`], looking at `most` places. `inside` tells what the square around a centre with a given half side holds,
+/// As [`greatest`], with `most` effort. `inside` tells what the square around a centre with a given half side holds,
 /// and at which of its places; `None` where it holds nothing.
 pub(super) fn search(
     squares: Vec<Square>,
     known: f64,
     asked: f64,
-    most: usize,
+    most: Effort,
     inside: &(dyn Fn(Point2, f64) -> Option<(Point2, Value)> + Sync),
     monitor: &dyn Monitor,
 ) -> Result<BoundedGreatest, Cancelled> {
     let mut open = BinaryHeap::from(squares);
     let (mut best, mut place, mut spent) = (known, None, 0);
-    while spent < most {
+    while spent < most.places && open.len() < most.squares.max(BATCH) {
         let enough = if spent < CHEAP { NUMERICAL_FLOOR } else { asked.max(NUMERICAL_FLOOR) };
         let mut batch = Vec::with_capacity(BATCH);
         while batch.len() < BATCH && open.peek().is_some_and(|s| s.possible > best + enough) {
@@ -172,7 +228,7 @@ mod tests {
         let centres = (0..n * n).map(|k| Point2::new(f64::from(k % n) + 0.5, f64::from(k / n) + 0.5));
         let squares = centres
             .filter_map(|centre| at(centre, 0.5).map(|v| Square { possible: v.possible, centre, half: 0.5 }));
-        greatest(squares.collect(), known, asked, &at, &Silent).unwrap()
+        greatest(squares.collect(), known, asked, usize::MAX, &at, &Silent).unwrap()
     }
 
     #[test]
@@ -214,7 +270,7 @@ mod tests {
             let (here, slope) = cliff(centre)?;
             Some(Value { here, possible: here + 1.5 * slope * half })
         };
-        let value = greatest(squares, 0.0, 1e-3, &at, &Silent).unwrap().greatest.unwrap().0;
+        let value = greatest(squares, 0.0, 1e-3, usize::MAX, &at, &Silent).unwrap().greatest.unwrap().0;
         assert!((2.93 - 2e-3..=2.93).contains(&value), "{value}");
     }
 }

@@ -19,7 +19,7 @@ mod patch;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::closer::{Square, Value, search};
+use super::closer::{Effort, Promising, Square, Value, search};
 use super::figures::{Bounded, ExcessFigures, ExcessKind, Measurement, NUMERICAL_FLOOR};
 use super::inspection::{Inspection, Sample};
 use geometry::{Node, Point2};
@@ -29,6 +29,9 @@ use work::monitor::{self, Cancelled, Monitor};
 
 /// Squares looked at in search of one figure. Each takes some 10 µs; with fewer, wide bounds stay.
 const MOST: usize = 400_000;
+
+/// Rows of cells that are looked through at a time: enough for many workers.
+const ROWS: usize = 64;
 
 /// A square whose middle is of the other kind is left out once it is this share of a cell.
 const OTHER_KIND_SHARE: f64 = 0.25;
@@ -99,10 +102,10 @@ impl ExcessSearch<'_> {
 
     /// The squares of cells that may hold more than `known`, mm: those whose own move leaves more at a corner, those beside
     /// the part's border, and those whose centre cannot speak for them.
-    fn open(&self, samples: &[Sample], known: f64, monitor: &dyn Monitor) -> Result<Vec<Square>, Cancelled> {
+    fn open(&self, samples: &[Sample], known: f64, monitor: &dyn Monitor) -> Result<Promising, Cancelled> {
         let grid = &self.inspection.grid;
         let fine = self.finer_than_cells(grid);
-        let rows = work::parallel::try_map(grid.ny, |j| {
+        let row = |j: usize| {
             monitor::check(monitor)?;
             let patches = self.patches(known);
             let looked_at = (0..grid.nx).filter(|&i| {
@@ -122,8 +125,14 @@ impl ExcessSearch<'_> {
                 }
             });
             Ok(squares.filter(|square| square.possible > known).collect::<Vec<_>>())
-        })?;
-        Ok(rows.into_iter().flatten().collect())
+        };
+        // Band by band, so that there are never many more squares than will be divided.
+        let mut open = Promising::default();
+        for first in (0..grid.ny).step_by(ROWS) {
+            let rows = work::parallel::try_map(ROWS.min(grid.ny - first), |j| row(first + j))?;
+            open.add(rows.into_iter().flatten(), (MOST.min(self.inspection.most_squares) / 4).max(1));
+        }
+        Ok(open)
     }
 
     fn patches(&self, least: f64) -> Patches<'_> {
@@ -140,7 +149,7 @@ impl ExcessSearch<'_> {
     /// The highest place of a kind in some squares, if it is higher than `known`.
     fn highest(
         &self,
-        squares: &[Square],
+        open: &Promising,
         known: Bounded,
         kind: Kind,
         monitor: &dyn Monitor,
@@ -168,8 +177,10 @@ impl ExcessSearch<'_> {
                 }
             }
         };
-        let open = squares.iter().filter(|square| square.possible > known.max_mm).copied().collect();
-        let found = search(open, known.max_mm, self.asked(known.max_mm, kind), MOST, &at, monitor)?;
+        let squares = open.squares.iter().filter(|square| square.possible > known.max_mm).copied().collect();
+        let most = Effort { places: MOST, squares: self.inspection.most_squares };
+        let mut found = search(squares, known.max_mm, self.asked(known.max_mm, kind), most, &at, monitor)?;
+        found.possible = found.possible.max(open.others);
         let mut highest = match found.greatest {
             Some((height, q)) => {
                 let z = self.inspection.part.highest_at(q.x, q.y).map_or(0.0, |design| design.point.z);

@@ -4,7 +4,7 @@
 //! or below every cell centre, and the figures of what lies below and above the design, each with the
 //! bound of its error. mm.
 
-use super::closer::{Square, Value};
+use super::closer::{Promising, Square, Value};
 use super::cut_surface::{CutSurface, Deviation};
 use super::figures::{
     DeviationFigures, GougeFigures, GougeRegion, Limits, NUMERICAL_FLOOR, UncutFigures, UncutRegion,
@@ -65,6 +65,8 @@ pub(super) struct Inspection<'a> {
     pub limits: &'a Limits,
     /// The error bound that is asked for, mm.
     pub asked: f64,
+    /// Squares that a search may hold at a time.
+    pub most_squares: usize,
     pub surface: &'a CutSurface<'a>,
     pub grid: Grid,
 }
@@ -224,28 +226,21 @@ impl Inspection<'_> {
         monitor: &dyn Monitor,
     ) -> Result<closer::BoundedGreatest, Cancelled> {
         let half = 0.5 * self.grid.cell;
-        let mut open: Vec<Square> = cells
-            .filter_map(|k| {
-                let s = sample(k);
-                let d = Deviation { distance: s.deviation.into(), slope: s.slope.into(), by: NOT_CUT };
-                let possible = value(&d, s.lean.into(), half).possible;
-                let centre = self.centre(k);
-                (possible > known + NUMERICAL_FLOOR).then_some(Square { possible, centre, half })
-            })
-            .collect();
-        let mut others = known;
-        if open.len() > MOST_SEARCHED {
-            open.select_nth_unstable_by(MOST_SEARCHED, |a, b| b.cmp(a));
-            others = open[MOST_SEARCHED].possible;
-            open.truncate(MOST_SEARCHED);
-        }
+        let squares = cells.filter_map(|k| {
+            let s = sample(k);
+            let d = Deviation { distance: s.deviation.into(), slope: s.slope.into(), by: NOT_CUT };
+            let possible = value(&d, s.lean.into(), half).possible;
+            let centre = self.centre(k);
+            (possible > known + NUMERICAL_FLOOR).then_some(Square { possible, centre, half })
+        });
+        let open = Promising::of(squares, MOST_SEARCHED.min(self.most_squares / 2).max(1));
         let at = |q: Point2, half: f64| {
             let design = self.design_at(q)?;
             let d = self.surface.along_normal(&design.point, &design.normal)?;
             Some(value(&d, design.normal.z, half))
         };
-        let mut found = closer::greatest(open, known, self.asked, &at, monitor)?;
-        found.possible = found.possible.max(others);
+        let mut found = closer::greatest(open.squares, known, self.asked, self.most_squares, &at, monitor)?;
+        found.possible = found.possible.max(open.others);
         Ok(found)
     }
 

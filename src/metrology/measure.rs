@@ -37,7 +37,15 @@ pub fn measure(
 ) -> Result<Measurement, Cancelled> {
     let surface = CutSurface::new(Envelope::new(cutter, path), cut, path);
     let bound = asked.error_bound;
-    let inspection = Inspection { part, cutter, limits, asked: bound, surface: &surface, grid: cut.grid };
+    let inspection = Inspection {
+        part,
+        cutter,
+        limits,
+        asked: bound,
+        most_squares: asked.most_squares,
+        surface: &surface,
+        grid: cut.grid,
+    };
     let mut found = inspect(&inspection, path, 0.0, monitor)?;
     let highest_ridge = found.ridges.highest_sample();
     let lean = found.least_lean;

@@ -44,6 +44,8 @@ pub struct Asked {
     pub borders: bool,
     /// Cells that may be held beside those of the stock at a time.
     pub most_cells: usize,
+    /// Squares that a search between cell centres may hold at a time.
+    pub most_squares: usize,
 }
 
 /// What a rectangle may hold, mm.

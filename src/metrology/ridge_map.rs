@@ -34,7 +34,9 @@ pub(super) fn ridge_map(
     monitor: &dyn Monitor,
 ) -> Result<Option<RidgeMap>, Cancelled> {
     let surface = CutSurface::new(Envelope::new(cutter, path), cut, path);
-    let inspection = Inspection { part, cutter, limits, asked, surface: &surface, grid: cut.grid };
+    // Nothing is searched between centres.
+    let (most_squares, grid) = (0, cut.grid);
+    let inspection = Inspection { part, cutter, limits, asked, most_squares, surface: &surface, grid };
     let samples = inspection.samples(monitor)?;
     let finder = RidgeFinder::new(&surface, part, cutter, path, limits);
     let mut ridges = finder.find(&|k| samples[k].deviation, monitor)?;

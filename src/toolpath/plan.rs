@@ -163,6 +163,7 @@ fn passes(setup: &Setup<'_>, strategy: &dyn Strategy, axis: Option<&ToolAxis>) -
         // A tilted cutter's passes are smoothed once they are tilted.
         smoothing: (settings.joining.smoothing && axis.is_none()).then_some(sampling),
         axis,
+        memory: settings.memory,
         earlier: settings.earlier.as_deref(),
         probe: probe.as_ref(),
     };

@@ -43,7 +43,7 @@ fn settings(part: &Part) -> PlanSettings {
         plunge_rate: 300.0,
         rapid_rate: 15_000.0,
         joining: Joining::default(),
-        earlier: None,
+        ..PlanSettings::default()
     }
 }
 

@@ -90,6 +90,20 @@ fn a_plan_that_takes_more_than_was_allowed_ends_the_run() {
     assert!(highest <= 1 + BESIDES + SLACK, "{highest} MiB");
 }
 
+/// The tables of a plan are made to fit; a large part under next to no memory is refused for its cells.
+#[test]
+fn the_plan_of_a_large_part_takes_no_more_than_was_allowed() {
+    let scene = "[part]\nsurface = \"plane\"\nx = [0, 1000]\ny = [0, 1000]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n\
+                 [simulation]\nmemory_mib = 1\n[[toolpath]]\nstrategy = \"zigzag\"\nstepover = 5\n";
+    let (home, process) = start(scene);
+    let highest = peak(&process);
+    let output = process.wait_with_output().unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.code() == Some(2) && message.contains("memory_mib"), "{message}");
+    assert!(!home.path().join("out").exists());
+    assert!(highest <= 1 + BESIDES, "{highest} MiB");
+}
+
 /// A mesh is refused by the size that its file states, before its triangles are made.
 #[test]
 fn a_mesh_beyond_the_memory_is_refused_unread() {

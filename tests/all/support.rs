@@ -40,7 +40,7 @@ pub fn settings(part: &Part, step: Step) -> PlanSettings {
         plunge_rate: 300.0,
         rapid_rate: 15_000.0,
         joining: Joining::default(),
-        earlier: None,
+        ..PlanSettings::default()
     }
 }
 

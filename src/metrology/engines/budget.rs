@@ -5,6 +5,7 @@ use part::Part;
 use sim::{Grid, GridError};
 
 use super::Simulation;
+use crate::closer::BYTES_PER_SQUARE;
 
 /// Bytes in a MiB.
 pub const MIB: u64 = 1 << 20;
@@ -21,6 +22,9 @@ const BYTES_PER_CUT_CELL: usize = 8;
 /// Reading the file takes half of that. Too small a figure lets a run exhaust the machine; too great a one refuses meshes
 /// that would fit.
 pub const BYTES_PER_TRIANGLE: u64 = 780;
+
+/// Bytes a cell that was measured: stock, winning move, deviation, ridges.
+const BYTES_PER_MEASURED_CELL: usize = 36;
 
 /// Bytes a move: the move itself, its prepared form, and its places in the engine's lists.
 const BYTES_PER_MOVE: usize = 240;
@@ -65,6 +69,12 @@ impl Budget {
     /// What is left beside a grid that was cut and not yet measured, bytes.
     pub fn left_beside(&self, moves: usize, grid: &Grid) -> u64 {
         self.left(moves).saturating_sub((grid.len() * BYTES_PER_CUT_CELL) as u64)
+    }
+
+    /// Squares that a search may hold beside a grid that was measured.
+    pub(crate) fn squares_beside(&self, moves: usize, grid: &Grid) -> usize {
+        let left = self.left(moves).saturating_sub((grid.len() * BYTES_PER_MEASURED_CELL) as u64);
+        (left / BYTES_PER_SQUARE) as usize
     }
 
     /// Cells that may be added to a grid.

@@ -64,6 +64,7 @@ impl Engine for Cells {
             error_bound: task.simulation.error_bound,
             stock_top: task.top,
             most_cells,
+            most_squares: task.budget.squares_beside(path.len(), &grid),
             borders: !task.pocket,
         };
         let measurement = measure(task.part, task.cutter, path, &cut, task.limits, &asked, monitor)?;

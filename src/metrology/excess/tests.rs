@@ -78,7 +78,13 @@ fn path(part: &Part, cutter: &Cutter, angle: f64, step: f64, lift: f64) -> Toolp
 fn measured(part: &Part, cutter: &Cutter, path: &Toolpath, cell: f64) -> Measurement {
     let grid = Grid::covering(&part.bounds(), cell, 64, 1 << 30).unwrap();
     let cut = cut_reference(&ZMap::block(grid, TOP), cutter, path, &Silent).unwrap();
-    let asked = Asked { error_bound: 5e-4, stock_top: TOP, most_cells: 1 << 20, borders: true };
+    let asked = Asked {
+        error_bound: 5e-4,
+        stock_top: TOP,
+        most_cells: 1 << 20,
+        most_squares: 1 << 20,
+        borders: true,
+    };
     measure(part, cutter, path, &cut, &LIMITS, &asked, &Silent).unwrap()
 }
 

@@ -49,7 +49,13 @@ fn path(part: &Part, passes: &[[Vector2; 2]]) -> Toolpath {
 fn measured(part: &Part, cutter: &Cutter, path: &Toolpath) -> Measurement {
     let grid = Grid::covering(&part.bounds(), 0.07, 64, 1 << 30).unwrap();
     let cut = cut_reference(&ZMap::block(grid, 9.0), cutter, path, &Silent).unwrap();
-    let asked = Asked { error_bound: 5e-4, stock_top: 9.0, most_cells: 1 << 20, borders: true };
+    let asked = Asked {
+        error_bound: 5e-4,
+        stock_top: 9.0,
+        most_cells: 1 << 20,
+        most_squares: 1 << 20,
+        borders: true,
+    };
     measure(part, cutter, path, &cut, &LIMITS, &asked, &Silent).unwrap()
 }
 

@@ -14,8 +14,9 @@ use geometry::{Point2, Point3, Vector2};
 /// diagonal of a square: with fewer squares rapids stay higher than they have to, more cost time.
 const SQUARES_A_RADIUS: f64 = 8.0;
 
-/// Most squares; parts that would take more get larger ones.
+/// Most squares, and fewest, however little memory there is; parts that would take more get larger ones.
 const MOST_SQUARES: f64 = 4e6;
+const LEAST_SQUARES: f64 = 1e4;
 
 /// An upper bound of the stock's height over the plan view, mm.
 pub struct Ceiling<'a> {
@@ -31,10 +32,11 @@ pub struct Ceiling<'a> {
 
 impl<'a> Ceiling<'a> {
     /// Flat stock up to `top`, for a cutter whose axis stays between the points `low` and `high` of the
-    /// plan view.
-    pub fn new(cutter: &'a Cutter, low: Point2, high: Point2, top: f64) -> Self {
+    /// plan view. The squares take no more than `memory` bytes; fewer are larger, and bound the stock higher.
+    pub fn new(cutter: &'a Cutter, [low, high]: [Point2; 2], top: f64, memory: u64) -> Self {
         let size = (high - low).map(|s| s.max(0.0) + 2.0 * cutter.radius());
-        let side = (cutter.radius() / SQUARES_A_RADIUS).max((size.x * size.y / MOST_SQUARES).sqrt());
+        let most = (memory as f64 / size_of::<f64>() as f64).clamp(LEAST_SQUARES, MOST_SQUARES);
+        let side = (cutter.radius() / SQUARES_A_RADIUS).max((size.x * size.y / most).sqrt());
         // Two squares more all around, so that the whole rim of the cutter stays over some.
         let border = cutter.radius() + 2.0 * side;
         let count = [size.x, size.y].map(|s| (s / side).ceil() as usize + 4);

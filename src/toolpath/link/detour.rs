@@ -226,7 +226,7 @@ mod tests {
             plunge_rate: 300.0,
             rapid_rate: 15_000.0,
             joining: Joining::default(),
-            earlier: None,
+            ..PlanSettings::default()
         };
         let led = around_fixtures(passes(), &of(clearance), &settings, &Silent).unwrap();
         let clear = of(clearance).on_path(&led.path, |_| true).is_empty();

@@ -229,7 +229,8 @@ impl<'a> Program<'a> {
         }
         // Links swing a little beyond the passes.
         let margin = Vector2::new(cutter.radius(), cutter.radius());
-        let ceiling = Ceiling::new(cutter, low - margin, high + margin, settings.stock_top);
+        let ceiling =
+            Ceiling::new(cutter, [low - margin, high + margin], settings.stock_top, settings.memory);
         Self { settings, rates, ceiling, start: None, moves: Vec::new(), lowered: 0 }
     }
 

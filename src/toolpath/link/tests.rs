@@ -18,7 +18,7 @@ fn settings(links: Links) -> PlanSettings {
         plunge_rate: 300.0,
         rapid_rate: 15_000.0,
         joining: Joining { links, ..Joining::default() },
-        earlier: None,
+        ..PlanSettings::default()
     }
 }
 
@@ -169,7 +169,7 @@ fn a_wall_between_two_ends_forces_a_retract() {
 #[test]
 fn retracts_stay_low_where_all_around_is_cut() {
     let cutter = Cutter::ball(6.0).unwrap();
-    let mut ceiling = Ceiling::new(&cutter, Point2::new(0.0, 0.0), Point2::new(20.0, 20.0), TOP);
+    let mut ceiling = Ceiling::new(&cutter, [Point2::new(0.0, 0.0), Point2::new(20.0, 20.0)], TOP, u64::MAX);
     let free = |ceiling: &Ceiling| ceiling.free_height(&Point2::new(4.5, 10.2), &Point2::new(14.5, 10.2));
     assert_eq!(free(&ceiling), TOP);
     for pass in (0..41).map(|k| 0.5 * f64::from(k)).map(|y| line([0.0, y], [20.0, y])) {
@@ -194,7 +194,7 @@ fn nothing_stands_above_the_free_height() {
     {
         let cutter = cutter.unwrap();
         let corners = [Point2::new(0.0, 0.0), Point2::new(20.0, 20.0)];
-        let mut ceiling = Ceiling::new(&cutter, corners[0], corners[1], TOP);
+        let mut ceiling = Ceiling::new(&cutter, corners, TOP, u64::MAX);
         let mut place = || Point3::new(rng.within(0.0, 20.0), rng.within(0.0, 20.0), rng.within(0.0, 5.0));
         let mut moves = Vec::new();
         let start = place();

@@ -36,7 +36,7 @@ fn settings() -> PlanSettings {
         plunge_rate: 300.0,
         rapid_rate: 5000.0,
         joining: Joining::default(),
-        earlier: None,
+        ..PlanSettings::default()
     }
 }
 

@@ -317,6 +317,7 @@ mod tests {
             chord_tolerance: 1e-3,
             smoothing: None,
             axis: None,
+            memory: 1 << 30,
             earlier: None,
             probe: None,
         };

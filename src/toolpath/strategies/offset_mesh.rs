@@ -48,9 +48,6 @@ const CELL_OVER_RADIUS: f64 = 0.1;
 const CELLS_TRIED: i32 = 4;
 const LESS_CELL: f64 = 0.83;
 
-/// Memory that the offset may take, bytes.
-const MEMORY: f64 = 2e9;
-
 /// Passes serve the strip inside of a border from this share of an interval beyond it, too.
 const BORDER_SHARE: f64 = 0.6;
 
@@ -96,7 +93,7 @@ pub(crate) fn passes(task: &Task<'_>, angle: f64) -> Result<Passes, PlanError> {
         Step::Stepover(s) => s,
         Step::Scallop(h) => 2.0 * (2.0 * radius * h - h * h).max(0.0).sqrt(),
     };
-    let (offset, meshes) = offset_pieces(part, radius, BORDER_SHARE * flat, monitor)?;
+    let (offset, meshes) = offset_pieces(task, BORDER_SHARE * flat)?;
     let level = LevelSet::new(part.mesh(), part.bvh(), radius);
     let drop = settings.axis.is_none().then(|| DropCutter::watched(part, cutter, monitor)).transpose()?;
     let rider = MeshRider { part, cutter, level, drop, settings, flat, pencils: pencils(&offset), monitor };
@@ -125,17 +122,15 @@ fn refused(reason: &str) -> PlanError {
 }
 
 /// The offset and its connected pieces.
-fn offset_pieces(
-    part: &Part,
-    radius: f64,
-    margin: f64,
-    monitor: &dyn Monitor,
-) -> Result<(MeshOffset, Vec<FieldMesh>), PlanError> {
+fn offset_pieces(task: &Task<'_>, margin: f64) -> Result<(MeshOffset, Vec<FieldMesh>), PlanError> {
+    let Task { part, cutter, ref settings, monitor, .. } = *task;
+    let radius = cutter.radius();
     part.mesh().surface().map_err(|e| refused(&e.to_string()))?;
     let mut last = None;
     for k in 0..CELLS_TRIED {
         let cell = CELL_OVER_RADIUS * radius * LESS_CELL.powi(k);
-        let settings = OffsetSettings { distance: radius, cell, margin, valley: PENCIL, memory: MEMORY };
+        let settings =
+            OffsetSettings { distance: radius, cell, margin, valley: PENCIL, memory: settings.memory as f64 };
         let offset = MeshOffset::new(part.mesh(), part.bvh(), &settings, monitor).map_err(|e| match e {
             OffsetError::Cancelled(cancelled) => PlanError::Cancelled(cancelled),
             other => refused(&other.to_string()),

@@ -53,6 +53,8 @@ pub struct PassSettings<'a> {
     pub smoothing: Option<f64>,
     /// How the cutter is tilted; upright without it.
     pub axis: Option<&'a ToolAxis>,
+    /// What tables may take, bytes.
+    pub memory: u64,
     /// What an earlier plan left.
     pub earlier: Option<&'a Earlier>,
     /// The ball that is dropped in its stead where a tilted cutter, no ball itself, is located by the contacts of that.

@@ -59,6 +59,8 @@ pub struct PlanSettings {
     pub rapid_rate: f64,
     /// How passes are smoothed and joined.
     pub joining: Joining,
+    /// What the tables of a plan may take beside its path, bytes; less makes them coarser.
+    pub memory: u64,
     /// What an earlier plan of the same toolpath left.
     pub earlier: Option<Arc<Earlier>>,
 }
@@ -91,6 +93,9 @@ const PLUNGE_RATE: f64 = 300.0;
 /// The rapid rate by default, mm/min: that of a machining centre of today.
 const RAPID_RATE: f64 = 15_000.0;
 
+/// What tables may take by default, bytes: more makes none finer.
+const MEMORY: u64 = 2 << 30;
+
 impl Default for PlanSettings {
     /// Finishing by scallop height under stock whose highest point is at z = 0: set `stock_top` where stock is higher, or
     /// rapid moves run through it.
@@ -104,6 +109,7 @@ impl Default for PlanSettings {
             plunge_rate: PLUNGE_RATE,
             rapid_rate: RAPID_RATE,
             joining: Joining::default(),
+            memory: MEMORY,
             earlier: None,
         }
     }

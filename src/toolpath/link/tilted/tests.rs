@@ -48,7 +48,7 @@ fn beside_a_wall_the_axis_leans_away_and_every_cut_is_clear() {
         plunge_rate: 300.0,
         rapid_rate: 15_000.0,
         joining: Joining::default(),
-        earlier: None,
+        ..PlanSettings::default()
     };
     let strategy = Zigzag::at(0.0);
     let planned = |interference| {
@@ -87,7 +87,7 @@ fn settings(links: Links) -> PlanSettings {
         plunge_rate: 300.0,
         rapid_rate: 15_000.0,
         joining: Joining { links, ..Joining::default() },
-        earlier: None,
+        ..PlanSettings::default()
     }
 }
 

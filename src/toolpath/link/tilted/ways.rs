@@ -429,7 +429,7 @@ mod tests {
             plunge_rate: 300.0,
             rapid_rate: 15_000.0,
             joining: Joining::default(),
-            earlier: None,
+            ..PlanSettings::default()
         };
         let section = HolderSection { diameter: 30.0, top_diameter: 30.0, length: 40.0 };
         let tool =

@@ -116,7 +116,7 @@ fn plan(pocket: &Pocket, diameter: f64, pattern: Pattern, engagement: Option<f64
         plunge_rate: 300.0,
         rapid_rate: 5000.0,
         joining: Joining::default(),
-        earlier: None,
+        ..PlanSettings::default()
     };
     plan_pocket(pocket, &Cutter::flat(diameter).unwrap(), &strategy, &settings, &Silent).unwrap()
 }

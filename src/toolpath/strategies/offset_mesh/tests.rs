@@ -12,6 +12,7 @@ const SETTINGS: PassSettings = PassSettings {
     chord_tolerance: 1e-3,
     smoothing: None,
     axis: None,
+    memory: 1 << 30,
     earlier: None,
     probe: None,
 };
