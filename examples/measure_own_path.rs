@@ -35,7 +35,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let grid = Grid::covering(&part.bounds(), cell, 80, memory)?;
     let stock = cut(ZMap::block(grid, 1.0), &cutter, &path, &Silent)?;
     let limits = Limits { scallop: 0.05, gouge: 0.005, uncut: 0.1, chord: 0.001 };
-    let asked = Asked { error_bound: 1e-5, stock_top: 1.0, most_cells: 1_000_000, borders: true };
+    let asked = Asked {
+        error_bound: 1e-5,
+        stock_top: 1.0,
+        most_cells: 1_000_000,
+        most_squares: 1_000_000,
+        borders: true,
+    };
     let found = measure(&part, &cutter, &path, &stock, &limits, &asked, &Silent)?;
 
     let exact = 3.0 - (9.0f64 - 0.25).sqrt();

@@ -29,6 +29,10 @@ const MOST_ROUNDS: usize = 4;
 /// Most plans that are made again after all was measured: each costs as much as the whole run without correction.
 const MOST_MEASURED: usize = 2;
 
+/// The same while the best plan stands above the target by no more than [`SLACK`]: what is left is little, and its cost is not in
+/// vain.
+const MOST_MEASURED_NEAR: usize = 4;
+
 /// A plan whose highest ridge is within this share below the target is as wide as it should be. What is corrected is aimed
 /// at the middle of it, since points and chords of a new plan lie elsewhere.
 const SLACK: f64 = 0.02;
@@ -134,7 +138,12 @@ impl CorrectionRound {
 
     /// Whether no ridge exceeds the target.
     fn holds(&self, target: f64) -> bool {
-        self.highest() <= target
+        self.highest() + self.margin(target) <= target
+    }
+
+    /// The bound of the highest, mm, where keeping clear of it costs little: a wider one is to be refined instead.
+    fn margin(&self, target: f64) -> f64 {
+        self.error_bound_mm.filter(|bound| *bound <= SLACK * target).unwrap_or(0.0)
     }
 
     /// Whether this round is to be kept instead of another: first what holds the target, then what is shorter; where neither
@@ -262,7 +271,10 @@ impl Corrected<'_> {
     /// Plans anew while what the verdict is made of stands above the target.
     fn by_measurements(&mut self, measured: Measured, monitor: &dyn Monitor) -> Result<Measured, JobError> {
         let (mut measured, mut in_vain) = (Some(measured), 0);
-        for _ in 0..MOST_MEASURED {
+        for round in 0..MOST_MEASURED_NEAR {
+            if round >= MOST_MEASURED && !self.is_near() {
+                break;
+            }
             let Some(next) = self.next(in_vain, MEASURED_SLACK) else { break };
             let (planned, factors) = self.plan(&next, monitor)?;
             // Two at a time might be more than the memory that the run may take.
@@ -278,6 +290,12 @@ impl Corrected<'_> {
         measured.map_or_else(|| self.measure_best(monitor), Ok)
     }
 
+    /// Whether the best plan stands above the target, but little.
+    fn is_near(&self) -> bool {
+        let round = &self.standing.round;
+        !round.holds(self.target) && round.highest() <= (1.0 + SLACK) * self.target
+    }
+
     /// The widths to try next: narrower where the best plan stands too high, while that helps; else all in proportion, to which
     /// remnants along borders do not give way. `None` where it holds the target and comes within `slack` of it, or what there
     /// is was tried `in_vain`.
@@ -288,9 +306,10 @@ impl Corrected<'_> {
             let low = in_vain == 0 && round.highest() < (1.0 - slack) * target;
             low.then(|| scaled(round.highest()))
         } else if in_vain == 0 {
-            Some(self.widths.narrowed(&self.standing.above, target))
+            Some(self.widths.narrowed(&self.standing.above, target, round.margin(target)))
         } else {
-            (in_vain == 1 && round.highest_mm > target).then(|| scaled(round.highest_mm))
+            (in_vain == 1 && round.highest_mm + round.margin(target) > target)
+                .then(|| scaled(round.highest_mm))
         }
     }
 
@@ -353,9 +372,10 @@ impl Widths {
     /// Narrower where ridges and borders stand above the target, so that they come to the middle of the slack: height goes
     /// with the square of width. A place that was narrowed already and did not give way enough is narrowed by twice as much:
     /// there passes may lie nearer than they have to, or less than all of the height goes with their width.
-    fn narrowed(&self, standing: &[(Point3, f64)], target: f64) -> Self {
+    /// `margin` is what their heights are uncertain by, mm.
+    fn narrowed(&self, standing: &[(Point3, f64)], target: f64, margin: f64) -> Self {
         let now = Correction::new(&self.places, self.interval);
-        let above = standing.iter().filter(|(_, height)| *height > target);
+        let above = standing.iter().filter(|(_, height)| *height + margin > target);
         let narrower = above.map(|&(at, height)| {
             let before = now.at(&at);
             let power = if before < 1.0 - STILL_WIDE { 1.0 } else { 0.5 };
@@ -391,7 +411,7 @@ mod tests {
             let [open, closed] = [false, true].map(|correct| planned(correct, toolpath));
             assert!(figure(&open).is_none());
             let rounds = figure(&closed).unwrap()["rounds"].as_array().unwrap();
-            assert!((1..=MOST_ROUNDS + MOST_MEASURED).contains(&rounds.len()));
+            assert!((1..=MOST_ROUNDS + MOST_MEASURED_NEAR).contains(&rounds.len()));
             let [before, after] = [&open, &closed].map(|result| result.scallop.max_mm.unwrap());
             assert!(after <= before.max(0.05), "{toolpath}: {before} {after} {rounds:?}");
         }
@@ -418,12 +438,12 @@ mod tests {
         let places = [(0.0, 1.2), (10.0, 0.99), (20.0, 0.5), (40.0, 1.1)];
         let places = places.map(|(x, height)| (Point3::new(x, 0.0, 0.0), height));
         let by_calculation = Widths { places: Vec::new(), everywhere: 1.0, interval: 1.0 };
-        let once = by_calculation.narrowed(&places, 1.0);
+        let once = by_calculation.narrowed(&places, 1.0, 0.0);
         let found = places.map(|(at, _)| once.correction().at(&at));
         let wanted = [(0.99f64 / 1.2).sqrt(), 1.0, 1.0, (0.99f64 / 1.1).sqrt()];
         assert!(found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
         // What was narrowed stays so, and is narrowed further where that was not enough.
-        let twice = once.narrowed(&[(places[0].0, 1.1)], 1.0).correction();
+        let twice = once.narrowed(&[(places[0].0, 1.1)], 1.0, 0.0).correction();
         assert!((twice.at(&places[0].0) - wanted[0] * 0.99 / 1.1).abs() < 1e-12);
         assert!((twice.at(&places[3].0) - wanted[3]).abs() < 1e-12);
     }

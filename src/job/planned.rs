@@ -6,12 +6,12 @@ use io::ProgramHeader;
 use io::gcode::{self, FiveAxisPost, MoveLines};
 use machine::kinematics::{JointPath, follow};
 use machine::{machining_time_turning, slow_corners};
-use metrology::{ContactArcs, finer_contact_arcs};
-use motion::Toolpath;
+use metrology::contact_arcs;
+use motion::{Move, MoveKind, Toolpath};
 use scene::{Scene, ToolpathRequest};
 use toolpath::{
     Detour, Earlier, Engagement, OffsetDrive, OffsetSurface, Plan, PlanError, PlanSettings, PocketStrategy,
-    Strategy, Tilting, around_fixtures, engagement, plan, plan_pocket, plan_tilted,
+    Strategy, Tilting, around_fixtures, plan, plan_pocket, plan_tilted,
 };
 use work::monitor::Monitor;
 
@@ -19,10 +19,6 @@ use super::correction::CorrectionFigures;
 use super::pocket::limit_feed_by;
 use super::tool::Around;
 use super::{JobError, Session};
-
-/// How much finer the engagement is measured where its bound leaves open whether it keeps to its limit. More costs time and
-/// memory as its square.
-const FINER: usize = 4;
 
 /// One part in so many of the memory that the part leaves is for the tables of a plan.
 const PLAN_SHARE: u64 = 2;
@@ -173,19 +169,10 @@ impl Session {
         else {
             return Ok(None);
         };
-        let (scene, budget) = (&self.scene, self.budget());
-        let cells = budget
-            .grid_for(path.len(), &self.area(), &scene.simulation, &self.cells)
-            .map_err(JobError::grid(scene))?;
-        let left = budget.left_beside(path.len(), &cells.0);
+        let scene = &self.scene;
         let radius = scene.cutter.radius();
-        let measured = |finer| finer_contact_arcs(path, &scene.cutter, self.top, finer, left, monitor);
-        let mut arcs = measured(1)?;
-        if strategy.engagement.is_some()
-            && is_open(&arcs, path, strategy.engagement_limit(request.step, radius))
-        {
-            arcs = measured(FINER)?;
-        }
+        let of_passes = |step: &Move| step.kind == MoveKind::Cut;
+        let arcs = contact_arcs(path, &scene.cutter, self.top, &of_passes, monitor)?;
         Ok(Some(limit_feed_by(path, &arcs, strategy, request.step, radius)))
     }
 }
@@ -194,7 +181,7 @@ impl Session {
 type Engaged = (Plan, Option<(Engagement, f64)>);
 
 /// Times that a pocket is planned again at most.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 4;
 
 /// The share of the limit by which it is lowered at least. Less may change no pass at all.
 const LEAST_LOWERING: f64 = 0.01;
@@ -220,19 +207,12 @@ fn within_engagement(
         }
         target -= by.max(LEAST_LOWERING * limit);
         let next = planned(&PocketStrategy { engagement: Some(target), ..*asked })?;
-        if over(&next) >= by {
-            break;
+        // Corners are reached by chance at another angle, so that a lower limit may stand higher for once.
+        if over(&next) < by {
+            best = next;
         }
-        best = next;
     }
     Ok(best)
-}
-
-/// Whether the bound of the greatest engagement leaves it open on which side of the limit, rad, it lies.
-fn is_open(arcs: &ContactArcs, path: &Toolpath, limit: f64) -> bool {
-    let greatest = engagement(path, &arcs.of_moves, limit).max;
-    let bound = arcs.bound(greatest);
-    greatest - bound <= limit && limit < greatest + bound
 }
 
 /// The path in the joints of the scene's five-axis machine, as its programs need it; `None` without one. The cutter, up to

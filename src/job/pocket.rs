@@ -19,7 +19,7 @@ pub fn limit_feed_by(
     let limit = strategy.engagement_limit(step, radius);
     let found = engagement(path, &arcs.of_moves, limit);
     limit_feed(path, &arcs.of_moves, limit);
-    (found, arcs.bound(found.max))
+    (found, arcs.bound())
 }
 
 /// What is measured of a pocket besides its floor. `top` is the height of the stock, mm.

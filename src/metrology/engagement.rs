@@ -1,354 +1,426 @@
 //! How much of the cutter's circumference stands in stock along a path, in the plan view.
 //!
-//! Enters: path, cutter, the stock's flat top. Leaves: for every move the greatest angle of the front half
-//! of the circumference in contact with stock. The path is gone through once more, in its order, on cells
-//! that know the lowest height to which the cutter's cylinder has come, and when. Corners of bull cutters
-//! and balls count as cylinders of the same radius; mm, rad. Nothing here knows how a path was planned.
+//! Enters: path, cutter, the stock's flat top. Leaves: for every move the greatest angle of the front half of the circumference
+//! in stock, and what it is at most anywhere on the move. Corners of bull cutters and balls count as cylinders of the same
+//! radius; mm, rad. Nothing here knows how a path was planned.
 //!
-//! The angle is measured along the circumference. The extent of a move's cells across its direction is no angle in corners, where
-//! the stock is ahead of the cutter and not beside it.
+//! What the path has cleared is the union of what its segments swept, each a stadium of the cutter's radius. A circle meets a
+//! stadium along arcs in closed form, so the angle at a place is exact. Where a layer beyond the circumference is thinner than
+//! [`FILM`] it does not count as stock: chords and rounding leave films along ground that was cut before, which load nothing.
+//! Only the chip that is just being cut begins as thin as one likes. So what the path cleared just before is taken as it is,
+//! as far back as it would hide the sides of a straight slot.
+//!
+//! What lies within r − h of a segment, seen from the middle of a stretch of length 2h, lies within r of it from all of the
+//! stretch. So the same calculation with a lesser radius bounds the angle on the whole stretch; stretches are halved until
+//! the bound is near the greatest angle that was found.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use cutter::Cutter;
 use geometry::{Point2, Vector2};
-use motion::{MoveKind, Toolpath};
+use motion::{Move, MoveKind, Toolpath};
 use sim::ENGAGED;
 use work::monitor::{self, Cancelled, Monitor};
 
-/// Cells a radius. More see thinner layers, and cost memory as their square.
-const CELLS_A_RADIUS: f64 = 60.0;
+/// Layers up to this share of the radius do not count. Beside a straight wall an angle `a` is seen smaller by about
+/// `FILM / sin a`.
+const FILM: f64 = 0.005;
 
-/// Most cells; larger pockets have larger ones, and a larger bound.
-const MAX_CELLS: f64 = 4.0e7;
+/// Stretches of a move that are looked at are no longer than this share of the radius, and may be halved so often.
+const STRETCH: f64 = 0.05;
+const HALVINGS: u32 = 12;
 
-/// Fewest cells, however little memory there is.
-const MIN_CELLS: f64 = 1.0e4;
+/// A bound that exceeds the greatest angle by no more is good enough, rad.
+const PRECISE: f64 = 0.02 * PI / 180.0;
 
-/// Lowest height and when it was reached.
-const BYTES_PER_CELL: u64 = 8;
+/// A segment that is no nearer than this beyond an arc, over the radius, cannot clear a part of it. Longer parts let pass
+/// more segments, shorter ones are more to ask for.
+const PART: f64 = 0.25;
 
-/// The circumference is looked at this many cells inside of itself: more than half a diagonal, so that a
-/// wall beside it is never seen.
-const INSIDE: f64 = 1.0;
+/// Shorter arcs, rad, and nearer places, over the radius, are rounding.
+const ROUNDING: f64 = 1e-12;
+const TOUCHING: f64 = 1e-9;
 
-/// Places on the front half circle; so many times more of them where cells are so many times finer.
-const PLACES: usize = 256;
-
-/// The path is gone along by steps of this share of the radius at most.
-const STEP: f64 = 0.1;
+/// Buckets along a side at most.
+const MOST_BUCKETS: f64 = 1024.0;
 
 /// Angles of the circumference in stock.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactArcs {
-    /// The greatest of each move, rad; 0 of rapid moves.
+    /// The greatest that was found on each move, rad; 0 of moves that do not feed sideways.
     pub of_moves: Vec<f64>,
-    /// Layers of stock up to this thickness may not be seen, over the cutter's radius.
-    pub unseen_layer: f64,
-    /// Places on the front half of the circumference that were looked at.
-    pub places: usize,
+    /// What it is at most on each move that counts, rad; not below the greatest of all that count.
+    pub at_most: Vec<f64>,
 }
 
 impl ContactArcs {
-    /// By how much a measured `angle` beside a straight wall may be off, rad.
-    pub fn bound(&self, angle: f64) -> f64 {
-        (angle.cos() - self.unseen_layer).max(-1.0).acos() - angle + PI / self.places as f64
+    /// By how much the greatest angle of the moves that count may exceed the greatest that was found, rad.
+    pub fn bound(&self) -> f64 {
+        let greatest = |angles: &[f64]| angles.iter().copied().fold(0.0, f64::max);
+        let counted = self.of_moves.iter().zip(&self.at_most).filter(|(_, most)| **most > 0.0);
+        let found: Vec<f64> = counted.map(|(found, _)| *found).collect();
+        (greatest(&self.at_most) - greatest(&found)).max(0.0)
     }
 }
 
-/// Cells with the lowest height of the cylinder and the way gone when it came there.
-struct Ground {
-    origin: Point2,
-    cell: f64,
-    nx: usize,
-    ny: usize,
-    lowest: Vec<f32>,
-    when: Vec<f32>,
-    /// Looked at on the front half circle.
-    places: usize,
-}
-
-/// The angles along `path` in a stock whose flat top is at `top`, mm. The cells take no more than `memory` bytes; fewer of
-/// them are larger, and the bound says so.
+/// The angles along `path` in a stock whose flat top is at `top`, mm. Those of the moves that `count` are bounded.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
 ///
 /// # Tolerance
-/// Beside straight walls the angle is within [`ContactArcs::bound`] of the true one, below it up to a right
-/// angle: layers thinner than two cells may not be seen.
+/// Exact at the places that are looked at. Between them [`ContactArcs::at_most`] holds but for rounding.
 pub fn contact_arcs(
     path: &Toolpath,
     cutter: &Cutter,
     top: f64,
-    memory: u64,
+    count: &(dyn Fn(&Move) -> bool + Sync),
     monitor: &dyn Monitor,
 ) -> Result<ContactArcs, Cancelled> {
-    finer_contact_arcs(path, cutter, top, 1, memory, monitor)
-}
-
-/// As [`contact_arcs`] on cells `finer` times smaller, as far as memory allows: the bound shrinks about as much.
-///
-/// # Errors
-/// [`Cancelled`] when the monitor says so.
-pub fn finer_contact_arcs(
-    path: &Toolpath,
-    cutter: &Cutter,
-    top: f64,
-    finer: usize,
-    memory: u64,
-    monitor: &dyn Monitor,
-) -> Result<ContactArcs, Cancelled> {
-    /// Moves between two questions to the monitor.
-    const MOVES: usize = 4096;
-    let radius = cutter.radius();
-    let mut ground = Ground::around(path, radius, top, finer, memory);
-    let unseen_layer = (INSIDE + std::f64::consts::FRAC_1_SQRT_2) * ground.cell / radius;
-    // The own chip is as thin as one likes beside the cutter: what was cut so shortly before counts.
-    let fresh = radius * (2.5 * INSIDE * ground.cell / radius).sqrt();
-    let mut of_moves = vec![0.0; path.len()];
-    let mut gone = 0.0f64;
-    for (k, (a, b, m)) in path.segments().enumerate() {
-        if k % MOVES == 0 {
+    monitor.start("measuring engagement", path.len() as u64);
+    let cleared = Swept::by(path, cutter.radius());
+    let of_moves = work::parallel::try_map(path.len(), |k| {
+        if k % 64 == 0 {
             monitor::check(monitor)?;
+            monitor.advance(64);
         }
-        let length = (b.xy() - a.xy()).norm();
-        let steps = (length / (STEP * radius)).ceil().max(1.0);
-        for step in 0..steps as usize {
-            let (from, to) = (a + (b - a) * (step as f64 / steps), a + (b - a) * ((step + 1) as f64 / steps));
-            gone += length / steps;
-            if let Some(heading) = (b.xy() - a.xy()).try_normalize(0.0)
-                && m.kind != MoveKind::Rapid
-            {
-                let arc = ground.arc(&to.xy(), &heading, radius, to.z.max(from.z), gone - fresh);
-                of_moves[k] = arc.max(of_moves[k]);
-            }
-            ground.lower([from.xy(), to.xy()], radius, from.z.max(to.z), gone);
-        }
-        ground.lower([b.xy(), b.xy()], radius, b.z, gone);
-    }
-    Ok(ContactArcs { of_moves, unseen_layer, places: ground.places })
+        let stretches = cleared.stretches(path, top, k);
+        let begin = stretches.first().map_or(0.0, |first| cleared.at(first, -first.half));
+        let found = |s: &Stretch| cleared.at(s, 0.0).max(cleared.at(s, s.half));
+        Ok(stretches.iter().map(found).fold(begin, f64::max))
+    })?;
+    let counted = |k: usize| count(&path.moves[k]);
+    let greatest = (0..path.len()).filter(|&k| counted(k)).map(|k| of_moves[k]).fold(0.0, f64::max);
+    let at_most = work::parallel::try_map(path.len(), |k| {
+        monitor::check(monitor)?;
+        let stretches = if counted(k) { cleared.stretches(path, top, k) } else { Vec::new() };
+        let most = |stretch: &Stretch| cleared.at_most(stretch, greatest, HALVINGS);
+        Ok(stretches.iter().map(most).fold(0.0, f64::max))
+    })?;
+    Ok(ContactArcs { of_moves, at_most })
 }
 
-impl Ground {
-    fn around(path: &Toolpath, radius: f64, top: f64, finer: usize, memory: u64) -> Self {
+/// A part of a straight move.
+#[derive(Debug, Clone, Copy)]
+struct Stretch {
+    /// Its middle, and the unit vector along it.
+    middle: Point2,
+    heading: Vector2,
+    /// Half its length, mm.
+    half: f64,
+    /// The way gone up to its middle, mm.
+    gone: f64,
+    /// Height of the tip, mm.
+    z: f64,
+}
+
+impl Stretch {
+    /// A place as seen from the middle, x along the heading.
+    fn seen(&self, p: &Point2) -> Vector2 {
+        let to = p - self.middle;
+        Vector2::new(self.heading.dot(&to), self.heading.perp(&to))
+    }
+
+    fn halves(&self) -> [Self; 2] {
+        let half = 0.5 * self.half;
+        [-half, half].map(|by| Self {
+            middle: self.middle + self.heading * by,
+            gone: self.gone + by,
+            half,
+            ..*self
+        })
+    }
+}
+
+/// A straight way of the cutter's axis.
+#[derive(Debug, Clone, Copy)]
+struct Segment {
+    ends: [Point2; 2],
+    /// It cleared down to this height, mm.
+    z: f64,
+    /// The way gone when it began and ended, mm.
+    gone: [f64; 2],
+}
+
+/// What a path sweeps, in order, with buckets to find what is near.
+struct Swept {
+    radius: f64,
+    /// The way just behind the cutter that leaves no films, mm.
+    fresh: f64,
+    segments: Vec<Segment>,
+    origin: Point2,
+    bucket: f64,
+    side: [usize; 2],
+    buckets: Vec<Vec<u32>>,
+}
+
+impl Swept {
+    fn by(path: &Toolpath, radius: f64) -> Self {
+        let fresh = radius * (2.0 * FILM + FILM * FILM).sqrt();
+        let mut gone = 0.0;
+        let mut segments = Vec::with_capacity(path.len());
+        for (a, b, m) in path.segments() {
+            let length = (b.xy() - a.xy()).norm();
+            if m.kind == MoveKind::Rapid || length == 0.0 {
+                // What was cut before the tool was lifted or plunged is no chip of its own any more.
+                gone += fresh;
+            }
+            segments.push(Segment { ends: [a.xy(), b.xy()], z: a.z.max(b.z), gone: [gone, gone + length] });
+            gone += length;
+            if length == 0.0 {
+                gone += fresh;
+            }
+        }
+        let ends = || segments.iter().flat_map(|s: &Segment| s.ends);
         let first = path.start.tip.xy();
-        let (lo, hi) = path
-            .moves
-            .iter()
-            .fold((first, first), |(lo, hi), m| (lo.inf(&m.to.tip.xy()), hi.sup(&m.to.tip.xy())));
-        let reach = Vector2::new(radius, radius) * 1.05;
-        let (lo, hi) = (lo - reach, hi + reach);
+        let (lo, hi) = ends().fold((first, first), |(lo, hi), p| (lo.inf(&p), hi.sup(&p)));
         let size = hi - lo;
-        let most = ((memory / BYTES_PER_CELL) as f64).clamp(MIN_CELLS, MAX_CELLS);
-        let cell = (radius / (CELLS_A_RADIUS * finer as f64)).max((size.x * size.y / most).sqrt());
-        let (nx, ny) = ((size.x / cell).ceil() as usize + 1, (size.y / cell).ceil() as usize + 1);
-        let lowest = vec![top as f32; nx * ny];
-        Self {
+        let bucket = radius.max(size.x.max(size.y) / MOST_BUCKETS);
+        let side = [size.x, size.y].map(|s| (s / bucket).floor() as usize + 1);
+        let mut swept = Self {
+            radius,
+            fresh,
+            segments: Vec::new(),
             origin: lo,
-            cell,
-            nx,
-            ny,
-            lowest,
-            when: vec![f32::NEG_INFINITY; nx * ny],
-            places: PLACES * finer,
+            bucket,
+            side,
+            buckets: vec![Vec::new(); side[0] * side[1]],
+        };
+        for (k, segment) in segments.iter().enumerate() {
+            swept.put(k as u32, segment);
+        }
+        swept.segments = segments;
+        swept
+    }
+
+    /// Puts a segment into every bucket that it comes within half a bucket of.
+    fn put(&mut self, k: u32, segment: &Segment) {
+        let [a, b] = segment.ends;
+        let steps = ((b - a).norm() / self.bucket).ceil().max(1.0);
+        for step in 0..=steps as usize {
+            let at = a + (b - a) * (step as f64 / steps) - self.origin;
+            let index = self.column(1, at.y) * self.side[0] + self.column(0, at.x);
+            if self.buckets[index].last() != Some(&k) {
+                self.buckets[index].push(k);
+            }
         }
     }
 
-    /// Angle in stock above `z` at `centre`; what was cut after `since` still counts.
-    fn arc(&self, centre: &Point2, heading: &Vector2, radius: f64, z: f64, since: f64) -> f64 {
-        let left = Vector2::new(-heading.y, heading.x);
-        let reach = radius - INSIDE * self.cell;
-        let standing = |angle: f64| {
-            let (sin, cos) = angle.sin_cos();
-            let at = (centre + (heading * cos + left * sin) * reach - self.origin) / self.cell;
-            let (i, j) = (at.x as usize, at.y as usize);
-            let k = j.min(self.ny - 1) * self.nx + i.min(self.nx - 1);
-            f64::from(self.lowest[k]) > z + ENGAGED || f64::from(self.when[k]) > since
-        };
-        let part = PI / self.places as f64;
-        let count = (0..self.places).filter(|k| standing((*k as f64 + 0.5) * part - FRAC_PI_2)).count();
-        count as f64 * part
+    fn column(&self, axis: usize, at: f64) -> usize {
+        ((at / self.bucket).floor().max(0.0) as usize).min(self.side[axis] - 1)
     }
 
-    /// Brings the cells within `radius` of a segment down to `z`.
-    fn lower(&mut self, ends: [Point2; 2], radius: f64, z: f64, gone: f64) {
-        let (lo, hi) = (ends[0].inf(&ends[1]), ends[0].sup(&ends[1]));
-        let row = |y: f64| ((y - self.origin.y) / self.cell - 0.5).max(0.0);
-        let (first, last) = (row(lo.y - radius).ceil() as usize, row(hi.y + radius).floor() as usize);
-        for j in first..=last.min(self.ny - 1) {
-            let y = self.origin.y + (j as f64 + 0.5) * self.cell;
-            let Some([from, to]) = chord(&ends, radius, y) else { continue };
-            let column = |x: f64| ((x - self.origin.x) / self.cell - 0.5).max(0.0);
-            let (from, to) = (column(from).ceil() as usize, column(to).floor() as usize);
-            let cells = j * self.nx + from..(j * self.nx + (to + 1).min(self.nx)).max(j * self.nx + from);
-            for (lowest, when) in self.lowest[cells.clone()].iter_mut().zip(&mut self.when[cells]) {
-                if f64::from(*lowest) > z + ENGAGED {
-                    (*lowest, *when) = (z as f32, gone as f32);
+    /// A move that feeds sideways below the stock's top, in stretches.
+    fn stretches(&self, path: &Toolpath, top: f64, k: usize) -> Vec<Stretch> {
+        let Segment { ends: [a, b], z, gone } = self.segments[k];
+        let Some(heading) =
+            (b - a).try_normalize(0.0).filter(|_| path.moves[k].kind != MoveKind::Rapid && z < top)
+        else {
+            return Vec::new();
+        };
+        let length = gone[1] - gone[0];
+        let count = (length / (STRETCH * self.radius)).ceil().max(1.0);
+        let half = 0.5 * length / count;
+        (0..count as usize)
+            .map(|i| {
+                let to = (2 * i + 1) as f64 * half;
+                Stretch { middle: a + heading * to, heading, half, gone: gone[0] + to, z }
+            })
+            .collect()
+    }
+
+    /// The angle so far from the middle of a stretch, mm.
+    fn at(&self, stretch: &Stretch, by: f64) -> f64 {
+        let (middle, gone) = (stretch.middle + stretch.heading * by, stretch.gone + by);
+        self.standing(&Stretch { middle, gone, half: 0.0, ..*stretch })
+    }
+
+    /// What the angle is at most on a stretch, as far as it exceeds `enough`.
+    fn at_most(&self, stretch: &Stretch, enough: f64, halvings: u32) -> f64 {
+        let most = self.standing(stretch);
+        if most <= enough + PRECISE {
+            return most.max(enough);
+        }
+        if halvings == 0 {
+            return most;
+        }
+        // One that stands so high all along need not be divided for its bound.
+        if most - self.at(stretch, 0.0) <= PRECISE {
+            return most;
+        }
+        stretch.halves().iter().map(|half| self.at_most(half, enough, halvings - 1)).fold(0.0, f64::max)
+    }
+
+    /// The angle of the front half of the circumference in stock, at most anywhere on a stretch.
+    fn standing(&self, stretch: &Stretch) -> f64 {
+        let gone = stretch.gone - stretch.half;
+        let before = gone - self.fresh;
+        let own = (1.0 - TOUCHING) * self.radius - stretch.half;
+        let earlier = (1.0 + FILM) * self.radius - stretch.half;
+        let mut front = Front::new(self.radius);
+        let reach = Vector2::new(1.0, 1.0) * (self.radius + earlier + self.bucket);
+        let (lo, hi) = (stretch.middle - reach - self.origin, stretch.middle + reach - self.origin);
+        for j in self.column(1, lo.y)..=self.column(1, hi.y) {
+            for i in self.column(0, lo.x)..=self.column(0, hi.x) {
+                for &k in &self.buckets[j * self.side[0] + i] {
+                    let segment = &self.segments[k as usize];
+                    if segment.gone[0] > gone {
+                        break;
+                    }
+                    if segment.z > stretch.z + ENGAGED {
+                        continue;
+                    }
+                    for (ways, radius) in [([f64::NEG_INFINITY, before], earlier), ([before, gone], own)] {
+                        if let Some(ends) = segment.between(ways) {
+                            front.clear(&ends.map(|p| stretch.seen(&p)), radius);
+                        }
+                    }
+                    if front.standing.is_empty() {
+                        return 0.0;
+                    }
                 }
             }
         }
+        front.standing.iter().map(|[from, to]| to - from).sum()
     }
 }
 
-/// The stretch of the row `y` within `radius` of a segment.
-fn chord(ends: &[Point2; 2], radius: f64, y: f64) -> Option<[f64; 2]> {
-    let mut found: Option<[f64; 2]> = None;
-    let mut join = |a: f64, b: f64| {
-        found = Some(found.map_or([a.min(b), a.max(b)], |f| [f[0].min(a).min(b), f[1].max(a).max(b)]));
-    };
-    for end in ends {
-        let half = radius * radius - (y - end.y).powi(2);
-        if half >= 0.0 {
-            join(end.x - half.sqrt(), end.x + half.sqrt());
+impl Segment {
+    /// The ends of what was gone of it between two ways.
+    fn between(&self, [from, to]: [f64; 2]) -> Option<[Point2; 2]> {
+        let [begin, end] = self.gone;
+        if end < from || begin > to {
+            return None;
         }
+        let [a, b] = self.ends;
+        let at = |way: f64| if end > begin { a + (b - a) * ((way - begin) / (end - begin)) } else { a };
+        Some([if from <= begin { a } else { at(from) }, if to >= end { b } else { at(to) }])
     }
-    // The two sides: where the row crosses them.
-    if let Some(along) = (ends[1] - ends[0]).try_normalize(0.0) {
-        for side in [Vector2::new(-along.y, along.x) * radius, Vector2::new(along.y, -along.x) * radius] {
-            let (a, b) = (ends[0] + side, ends[1] + side);
-            if (a.y - y) * (b.y - y) < 0.0 {
-                let x = a.x + (b.x - a.x) * ((y - a.y) / (b.y - a.y));
-                join(x, x);
+}
+
+/// The front half of a circle around the origin, x along the heading; what of it was not cleared yet.
+struct Front {
+    rim: f64,
+    /// Arcs from the right to the left, rad.
+    standing: Vec<[f64; 2]>,
+    /// Middles of parts of them, and how far a part reaches from there, mm.
+    parts: Vec<(Vector2, f64)>,
+}
+
+impl Front {
+    fn new(rim: f64) -> Self {
+        let mut front = Self { rim, standing: vec![[-FRAC_PI_2, FRAC_PI_2]], parts: Vec::new() };
+        front.divide();
+        front
+    }
+
+    fn divide(&mut self) {
+        let mut parts = std::mem::take(&mut self.parts);
+        parts.clear();
+        for [from, to] in &self.standing {
+            let count = ((to - from) / PART).ceil().max(1.0);
+            let half = 0.5 * (to - from) / count;
+            let middles = (0..count as usize).map(|k| self.at(from + (2 * k + 1) as f64 * half));
+            parts.extend(middles.map(|middle| (middle, self.rim * half)));
+        }
+        self.parts = parts;
+    }
+
+    fn at(&self, angle: f64) -> Vector2 {
+        let (sin, cos) = angle.sin_cos();
+        Vector2::new(cos, sin) * self.rim
+    }
+
+    /// Clears what is nearer than `radius` to a segment.
+    fn clear(&mut self, ends: &[Vector2; 2], radius: f64) {
+        if ends[0].x.max(ends[1].x) + radius <= 0.0 || !self.may_clear(ends, radius) {
+            return;
+        }
+        let mut angles = self.crossings(ends, radius);
+        angles.sort_by(f64::total_cmp);
+        let Some(&first) = angles.first() else {
+            if square_distance(&self.at(0.0), ends) < radius * radius {
+                self.standing.clear();
+            }
+            return;
+        };
+        let mut taken = false;
+        for k in 0..angles.len() {
+            let (from, to) = (angles[k], angles.get(k + 1).copied().unwrap_or(first + TAU));
+            if square_distance(&self.at(0.5 * (from + to)), ends) < radius * radius {
+                for turn in [-TAU, 0.0, TAU] {
+                    taken |= self.take(from + turn, to + turn);
+                }
             }
         }
+        if taken {
+            self.divide();
+        }
     }
-    found
+
+    /// Whether a segment is near enough to clear any part.
+    fn may_clear(&self, ends: &[Vector2; 2], radius: f64) -> bool {
+        self.parts.iter().any(|(middle, reach)| square_distance(middle, ends) < (radius + reach).powi(2))
+    }
+
+    /// Where the circle crosses the border of the stadium around a segment, each from -π to π.
+    fn crossings(&self, ends: &[Vector2; 2], radius: f64) -> Vec<f64> {
+        let along = ends[1] - ends[0];
+        let square = along.norm_squared();
+        let share = |angle: f64| (self.at(angle) - ends[0]).dot(&along);
+        let mut found = Vec::with_capacity(4);
+        let mut around = |middle: f64, cos: f64, valid: &dyn Fn(f64) -> bool| {
+            if cos.abs() <= 1.0 {
+                let half = cos.acos();
+                found.extend(
+                    [middle - half, middle + half].into_iter().filter(|angle| valid(*angle)).map(turned),
+                );
+            }
+        };
+        for (k, end) in ends.iter().enumerate() {
+            let away = end.norm();
+            let cos = (self.rim * self.rim + away * away - radius * radius) / (2.0 * self.rim * away);
+            let valid = |angle: f64| if k == 0 { share(angle) <= 0.0 } else { share(angle) >= square };
+            around(end.y.atan2(end.x), cos, &valid);
+        }
+        if let Some(unit) = along.try_normalize(0.0) {
+            let across = Vector2::new(-unit.y, unit.x);
+            let middle = across.y.atan2(across.x);
+            for side in [-radius, radius] {
+                let valid = |angle: f64| share(angle) > 0.0 && share(angle) < square;
+                around(middle, (across.dot(&ends[0]) + side) / self.rim, &valid);
+            }
+        }
+        found
+    }
+
+    /// Takes an arc away; whether any of it was standing.
+    fn take(&mut self, from: f64, to: f64) -> bool {
+        if self.standing.iter().all(|[a, b]| to <= *a || from >= *b) {
+            return false;
+        }
+        let mut left = Vec::with_capacity(self.standing.len() + 1);
+        for &[a, b] in &self.standing {
+            let parts = [[a, b.min(from)], [a.max(to), b]];
+            left.extend(parts.into_iter().filter(|[a, b]| b - a > ROUNDING));
+        }
+        self.standing = left;
+        true
+    }
+}
+
+/// An angle from -π to π.
+fn turned(angle: f64) -> f64 {
+    angle - TAU * (angle / TAU).round()
+}
+
+/// Square of the distance of a point from a segment.
+fn square_distance(p: &Vector2, [a, b]: &[Vector2; 2]) -> f64 {
+    let along = b - a;
+    let square = along.norm_squared();
+    let t = if square > 0.0 { ((p - a).dot(&along) / square).clamp(0.0, 1.0) } else { 0.0 };
+    (p - (a + along * t)).norm_squared()
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use geometry::Point3;
-    use motion::{ClPoint, Move};
-    use work::monitor::Silent;
-
-    /// The path through `places` at z = -2 in stock up to 0, after a plunge to the first of them.
-    fn through(places: &[(f64, f64)]) -> Toolpath {
-        let to = |&(x, y): &(f64, f64), kind| Move {
-            to: ClPoint::upright(Point3::new(x, y, -2.0)),
-            kind,
-            feed_rate: 600.0,
-            pass: 0,
-        };
-        let mut moves = vec![to(&places[0], MoveKind::Plunge)];
-        moves.extend(places[1..].iter().map(|p| to(p, MoveKind::Cut)));
-        Toolpath::new(ClPoint::upright(Point3::new(places[0].0, places[0].1, 5.0)), moves)
-    }
-
-    fn arcs(places: &[(f64, f64)]) -> ContactArcs {
-        contact_arcs(&through(places), &Cutter::flat(6.0).unwrap(), 0.0, u64::MAX, &Silent).unwrap()
-    }
-
-    fn check(found: &ContactArcs, k: usize, exact: f64) {
-        let angle = found.of_moves[k];
-        let part = PI / found.places as f64;
-        let bound = found.bound(exact.min(angle)) + part;
-        assert!((angle - exact).abs() <= bound, "move {k}: {angle} of {exact}, bound {bound}");
-    }
-
-    /// A slot is half a turn; beside it passes of the stepover w stand in stock by acos(1 − w/r), in either
-    /// direction; what is cleared is none, also along its walls.
-    #[test]
-    fn straight_passes_have_the_angles_of_closed_forms() {
-        for turn in [0.0f64, 0.3, 1.0] {
-            let at = |x: f64, y: f64| (x * turn.cos() - y * turn.sin(), x * turn.sin() + y * turn.cos());
-            for width in [0.4f64, 1.5, 3.0, 4.5] {
-                let y = width;
-                let found = arcs(&[
-                    at(0.0, 0.0),
-                    at(20.0, 0.0),
-                    at(0.0, 0.0),
-                    at(-10.0, 0.0),
-                    at(-10.0, y),
-                    at(20.0, y),
-                    at(20.0, 2.0 * y),
-                    at(-20.0, 2.0 * y),
-                    at(20.0, 2.0 * y),
-                ]);
-                check(&found, 1, PI);
-                assert_eq!(found.of_moves[2], 0.0);
-                check(&found, 3, PI);
-                // The middle of the long passes; their ends turn into the corner beside.
-                let middle = arcs(&[at(-10.0, 0.0), at(30.0, 0.0), at(29.0, y), at(10.0, y)]);
-                check(&middle, 3, (1.0 - width / 3.0).acos());
-                assert_eq!(found.of_moves[8], 0.0);
-            }
-        }
-    }
-
-    /// Along both walls of a corner up to `d` before its end, then into it by the bisector: in stock is the
-    /// quarter between the walls' feet and on either side what the disc there left, asin(d / 2r).
-    #[test]
-    fn into_a_square_corner_the_arc_is_a_quarter_and_what_was_left() {
-        let d = 2.5f64;
-        let to_the_end =
-            [(-20.0, 0.0), (-d, 0.0), (-d, -d), (0.0, -d), (0.0, -20.0), (0.0, -d), (-d, -d), (0.0, 0.0)];
-        let found = arcs(&to_the_end);
-        let exact = FRAC_PI_2 + 2.0 * (d / 6.0).asin();
-        // Both ends of the arc meet ground whose border crosses the circumference at this angle.
-        let bound = 2.0 * found.unseen_layer / (2.0 * (d / 6.0).asin()).sin() + 2.0 * PI / PLACES as f64;
-        assert!((found.of_moves[7] - exact).abs() <= bound, "{} {exact} {bound}", found.of_moves[7]);
-    }
-
-    /// Circles of the centre, each a little greater than the one before.
-    #[test]
-    fn rings_follow_the_law_of_cosines() {
-        let ring = |rho: f64| {
-            (0..=400)
-                .map(move |k| 2.0 * PI * f64::from(k) / 400.0)
-                .map(move |a| (rho * a.cos(), rho * a.sin()))
-        };
-        let (first, width) = (2.0f64, 0.6f64);
-        let places: Vec<(f64, f64)> = ring(first).chain(ring(first + width)).collect();
-        let found = arcs(&places);
-        let rho = first + width;
-        let exact = (1.0 - (width * (rho + 3.0) - 0.5 * width * width) / (rho * 3.0)).acos();
-        (500..700).for_each(|k| check(&found, k, exact));
-    }
-
-    #[test]
-    fn less_memory_is_told_by_the_bound() {
-        let path = through(&[(-10.0, 0.0), (40.0, 0.0), (39.0, 1.5), (10.0, 1.5)]);
-        let arcs = |memory| contact_arcs(&path, &Cutter::flat(6.0).unwrap(), 0.0, memory, &Silent).unwrap();
-        let (fine, coarse) = (arcs(u64::MAX), arcs(0));
-        assert!(coarse.unseen_layer > 3.0 * fine.unseen_layer);
-        let exact = 0.5f64.acos();
-        for found in [&fine, &coarse] {
-            let (angle, bound) = (found.of_moves[3], found.bound(exact));
-            assert!((angle - exact).abs() <= bound + PI / PLACES as f64, "{angle} of {exact}, {bound}");
-        }
-    }
-
-    #[test]
-    fn finer_cells_bound_the_angle_closer() {
-        let path = through(&[(-10.0, 0.0), (40.0, 0.0), (39.0, 1.5), (10.0, 1.5)]);
-        let arcs = |finer| {
-            finer_contact_arcs(&path, &Cutter::flat(6.0).unwrap(), 0.0, finer, u64::MAX, &Silent).unwrap()
-        };
-        let exact = 0.5f64.acos();
-        let [plain, fine] = [1, 4].map(arcs);
-        assert!(fine.bound(exact) < 0.3 * plain.bound(exact));
-        for found in [&plain, &fine] {
-            let part = PI / found.places as f64;
-            assert!((found.of_moves[3] - exact).abs() <= found.bound(exact) + part, "{}", found.of_moves[3]);
-        }
-    }
-
-    /// What the cells say of the ground is what the engine's stock says.
-    #[test]
-    fn cells_are_lowered_as_by_the_engine() {
-        let path = through(&[(0.0, 0.0), (7.0, 2.0), (3.0, 9.0), (3.0, 4.0)]);
-        let mut ground = Ground::around(&path, 3.0, 0.0, 1, u64::MAX);
-        for (a, b, _) in path.segments() {
-            ground.lower([a.xy(), b.xy()], 3.0, a.z.max(b.z), 0.0);
-            ground.lower([b.xy(), b.xy()], 3.0, b.z, 0.0);
-        }
-        let centre = ground.origin + Vector2::new(0.5, 0.5) * ground.cell;
-        let grid = sim::Grid { origin: centre, cell: ground.cell, nx: ground.nx, ny: ground.ny };
-        let stock = sim::ZMap::block(grid, 0.0);
-        let cut = sim::cut(stock, &Cutter::flat(6.0).unwrap(), &path, &Silent).unwrap();
-        let differ = ground.lowest.iter().zip(&cut.height).filter(|(a, b)| (*a - *b).abs() > 1e-6).count();
-        assert!(differ <= 2, "{differ} cells differ: only those on the rim to the last bits may");
-    }
-}
+mod tests;

@@ -56,7 +56,7 @@ pub use along_normals::{
 };
 pub use coverage::{AlongTask, CellsSeen, Coverage, CoverageFigures};
 pub use cut_surface::CutSurface;
-pub use engagement::{ContactArcs, contact_arcs, finer_contact_arcs};
+pub use engagement::{ContactArcs, contact_arcs};
 pub use engines::{
     BYTES_PER_TRIANGLE, Budget, ENGINES, Engine, EngineChoice, EngineError, LaidOut, MIB, Measured,
     NormalView, REACH_OVER_UNCUT, Simulation, Task, View,

@@ -75,8 +75,13 @@ fn a_ball_by_any_name_plans_cuts_and_measures_the_same() {
     let grid = Grid::covering(&area, 0.1, 80, 1 << 30).unwrap();
     let stock = || ZMap::block(grid, settings.stock_top);
     let limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.002 };
-    let asked =
-        Asked { error_bound: 0.0005, stock_top: settings.stock_top, most_cells: 1 << 22, borders: true };
+    let asked = Asked {
+        error_bound: 0.0005,
+        stock_top: settings.stock_top,
+        most_cells: 1 << 22,
+        most_squares: 1 << 22,
+        borders: true,
+    };
     let of = |cutter: &Cutter| {
         let cut = cut(stock(), cutter, &path, &Silent).unwrap();
         let measured = measure(&part, cutter, &path, &cut, &limits, &asked, &Silent).unwrap();

@@ -46,7 +46,13 @@ fn measured(cutter: &Cutter, path: &Toolpath, cell: f64, limits: &Limits, cells:
     let part = plane();
     let grid = Grid::covering(&part.bounds(), cell, 64, 1 << 32).unwrap();
     let stock = cut(ZMap::block(grid, ALLOWANCE), cutter, path, &Silent).unwrap();
-    let asked = Asked { error_bound: ASKED, stock_top: ALLOWANCE, most_cells: cells, borders: true };
+    let asked = Asked {
+        error_bound: ASKED,
+        stock_top: ALLOWANCE,
+        most_cells: cells,
+        most_squares: 1 << 22,
+        borders: true,
+    };
     measure(&part, cutter, path, &stock, limits, &asked, &Silent).unwrap()
 }
 

@@ -56,8 +56,13 @@ pub fn cut_and_measure(
     let grid = Grid::covering(&bounds, cell, 64, 1 << 32).unwrap();
     let stock = ZMap::block(grid, bounds.max.z + ALLOWANCE);
     let cut = cut_reference(&stock, cutter, path, &Silent).unwrap();
-    let asked =
-        Asked { error_bound: ASKED, stock_top: bounds.max.z + ALLOWANCE, most_cells: 1 << 20, borders: true };
+    let asked = Asked {
+        error_bound: ASKED,
+        stock_top: bounds.max.z + ALLOWANCE,
+        most_cells: 1 << 20,
+        most_squares: 1 << 22,
+        borders: true,
+    };
     measure(part, cutter, path, &cut, limits, &asked, &Silent).unwrap()
 }
 

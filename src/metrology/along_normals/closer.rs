@@ -141,6 +141,26 @@ struct Closer {
     crossings: Vec<Crossing>,
 }
 
+/// How deep a move may cut in a triangle by the planes that touch the cut at the corners, mm. What one straight move cuts is
+/// hollow or straight in every direction. So its height over the design lies above each of these planes, less what the
+/// design rises off its own where it is hollow itself.
+fn depth_by_tangents(samples: &[Sample; 3], by: u32) -> f64 {
+    let way = |i: usize, j: usize| samples[j].place.point - samples[i].place.point;
+    // The design's rise off its tangent planes at both ends of a side, together.
+    let rise = |i: usize, j: usize| -(samples[j].place.normal - samples[i].place.normal).dot(&way(i, j));
+    let hollow = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| rise(i, j)).into_iter().fold(0.0, f64::max);
+    let of_corner = |i: usize| {
+        let sample = &samples[i];
+        let hit = sample.hit.filter(|hit| hit.by == by)?;
+        let cos = hit.normal.dot(&sample.place.normal);
+        let across = hit.normal - sample.place.normal * cos;
+        // The height falls toward where the cut's normal leans.
+        let fall = |j: usize| if cos > 0.0 { across.dot(&way(i, j)) / cos } else { f64::INFINITY };
+        Some((0..3).filter(|&j| j != i).map(fall).fold(0.0, f64::max) - hit.deviation + hollow)
+    };
+    (0..3).filter_map(of_corner).fold(f64::INFINITY, f64::min)
+}
+
 impl NormalInspection<'_> {
     /// What may be found in a triangle.
     fn possible(&self, samples: &[Sample; 3], crossings: &[Crossing], greatest: &Greatest) -> Possible {
@@ -151,19 +171,30 @@ impl NormalInspection<'_> {
         let mut found = Possible::NOTHING;
         for sample in samples {
             let Some(hit) = sample.hit else { continue };
-            // A cut of radius r that meets the design at the slope s goes no deeper than about s²r below that.
             let slope = sample.slope();
-            let deeper = (slope * far).min(slope * slope * self.radius);
-            // Nothing counts as deeper or higher than is looked, however steep a cut is.
-            found.depth = found.depth.max((-hit.deviation + deeper).min(self.engine.depth()));
             // What is part of a scallop rises to its ridge, which promises for itself.
             if self.is_uncut(sample, greatest.highest_ridge()) {
                 found.uncut = found.uncut.max((hit.deviation + slope * far).min(self.engine.reach()));
             }
+            // Nothing counts as deeper or higher than is looked, however steep a cut is.
+            let depth = self.depth_around(samples, hit.by, far).min(depth_by_tangents(samples, hit.by));
+            found.depth = found.depth.max(depth.min(self.engine.depth()));
         }
         let ridge = |c: &Crossing| (c.height + c.rise * longest).min(self.engine.reach().max(c.height));
         found.ridge = crossings.iter().map(ridge).fold(found.ridge, f64::max);
         found
+    }
+
+    /// How deep a move may cut near the corners of a triangle that it cut, by how steep it is there: no place is farther than
+    /// `far` from a corner, mm.
+    fn depth_around(&self, samples: &[Sample; 3], by: u32, far: f64) -> f64 {
+        let of_corner = |sample: &Sample| {
+            let slope = sample.slope();
+            // A cut of radius r that meets the design at the slope s goes no deeper than about s²r below that.
+            let deeper = (slope * far).min(slope * slope * self.radius);
+            sample.hit.filter(|hit| hit.by == by).map(|hit| deeper - hit.deviation)
+        };
+        samples.iter().filter_map(of_corner).fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// Divides triangles, the most promising ones first. Returns by how much the figures may still be exceeded, mm.
