@@ -4,5 +4,6 @@
 pub mod gaps;
 pub mod halving;
 pub mod level_passes;
+pub mod obedience;
 pub mod planned_field;
 pub mod spacing;

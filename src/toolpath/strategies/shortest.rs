@@ -25,8 +25,9 @@ use std::sync::Arc;
 use super::direction_keys;
 use super::iso_scallop::{front_at, on_chart, places};
 use super::mesh_passes::{self, Aim};
+use super::streamline;
 use crate::levels::level_passes::{along_earlier, along_levels};
-use crate::levels::planned_field;
+use crate::levels::{obedience, planned_field};
 use crate::strategies::iso_scallop::FrontStart;
 use crate::surface::chart::{Chart, ChartPoint};
 use crate::surface::feed;
@@ -205,12 +206,17 @@ fn searched(
         let field = ScalarField::Spline(spline);
         all_planned.push((along_levels(task, chart, &field)?, field, promised));
     }
-    all_planned.sort_by(|(a, ..), (b, ..)| a.length().total_cmp(&b.length()));
+    // With a direction to keep to, the best comes first: a shorter path may be one that leaves the direction.
+    if toward.is_none() {
+        all_planned.sort_by(|(a, ..), (b, ..)| a.length().total_cmp(&b.length()));
+    }
     let Some((mut planned, field, promised)) = all_planned.into_iter().next() else {
         return Ok(Passes::default());
     };
     let worth = planned.length();
     let told = toward.is_none().then(|| (SHORTEST.to_owned(), promised));
+    let off = toward.and_then(|(direction, _)| obedience::angle_off(chart, &field, direction, cutter));
+    planned.notes.extend(obedience::note(off));
     Levelled { function: LevelFunction::Chart(Arc::new(field)), told }.put_with(&mut planned);
     if toward.is_some() {
         return Ok(planned);
@@ -292,7 +298,9 @@ impl Search<'_> {
             let found = start.map(|start| minimise(&finest, start, Rounds::Last)).transpose()?;
             Ok::<_, Cancelled>(found.flatten())
         })?;
-        let mut found: Vec<Packed> = fronts.into_iter().chain([best]).flatten().collect();
+        let fitted = self.fitted(&finest)?;
+        let fitted = fitted.map(|start| minimise(&finest, start, Rounds::Last)).transpose()?.flatten();
+        let mut found: Vec<Packed> = fronts.into_iter().chain([best, fitted]).flatten().collect();
         // Passes along a whole border have no ends there, which the cost of ends does not know: the best without them
         // is planned too.
         let least = |cost: &dyn Fn(&Packed) -> f64| {
@@ -310,6 +318,13 @@ impl Search<'_> {
         let length = |f: &Packed| f.cost - f.turning + f.ends;
         let spline = |k: usize| Some((finest.spline(&found[k])?, length(&found[k])));
         Ok(chosen.into_iter().filter_map(spline).collect())
+    }
+
+    /// The function fitted to the direction to keep to, as a start; `None` without one.
+    fn fitted(&self, net: &Net) -> Result<Option<Vec<f64>>, PlanError> {
+        let Some((direction, _)) = self.toward else { return Ok(None) };
+        let fit = streamline::fitted_to(self.chart, self.cutter, direction, self.step)?;
+        Ok(net.coefficients(|u, v| fit.value_and_gradient(u, v)[0]))
     }
 
     /// Minimises from `start`, where each end of a pass costs `end`, mm.
@@ -554,5 +569,30 @@ mod tests {
         let pass = found.cost / passes;
         assert!(drawn.cost < found.cost + 0.5 * pass, "{} {} {pass}", drawn.cost, found.cost);
         assert!(drawn.short < 0.01);
+    }
+
+    /// Circles about the middle of a part are no front of a border, and straight passes are a minimum of their own, 23 degrees
+    /// off and more: the function fitted to the circles is where the search has to start.
+    #[test]
+    fn circles_are_kept_to_where_leaving_them_is_dear() {
+        let (surface, cutter) = (saddle(), Cutter::ball(6.0).unwrap());
+        let chart = Chart::of_surface(&surface, crate::vocabulary::Guide::default());
+        let circle = |k: usize| {
+            let (x, y) = (-10.0 + (k % 21) as f64, -8.5 + 0.85 * (k / 21) as f64);
+            field::LineSample { at: [x, y], line: [-y, x + 1e-9], weight: 1.0 }
+        };
+        let samples: Vec<_> = (0..441).map(circle).collect();
+        let samples = field::LineField::new(field::SamplePlane::Plan, &samples).unwrap();
+        let direction = FeedDirection::Samples(Arc::new(samples));
+        for dearer in [10.0, 100.0] {
+            let (step, toward) = (Step::Scallop(0.01), Some((&direction, dearer)));
+            let search = Search { chart: &chart, cutter: &cutter, step, toward, monitor: &Silent };
+            let (psi, _) = search.run().unwrap().swap_remove(0);
+            let psi = ScalarField::Spline(psi);
+            let rms = obedience::angle_off(&chart, &psi, &direction, &cutter).unwrap().to_degrees();
+            assert_eq!(obedience::note(Some(rms.to_radians())), None);
+            // The middle, where circles have no direction, is in it.
+            assert!(rms <= 3.0, "{dearer}: {rms} degrees");
+        }
     }
 }

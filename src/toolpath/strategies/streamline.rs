@@ -11,7 +11,7 @@ use crate::surface::chart::{Chart, ChartPoint};
 use crate::surface::feed;
 use crate::surface::mesh_surface::not_applicable;
 use crate::vocabulary::{
-    Definition, FeedDirection, Guide, PartKind, PassSettings, Passes, PlanError, Reading, Strategy, Task,
+    Definition, FeedDirection, Guide, PartKind, Passes, PlanError, Reading, Step, Strategy, Task,
 };
 use cutter::Cutter;
 use field::{
@@ -234,7 +234,8 @@ fn on_charts(task: &Task<'_>, asked: &Streamline) -> Result<Passes, PlanError> {
     let mut all = Passes::default();
     for (chart, calculated) in charts.into_iter().zip(by_calculation) {
         let direction = feed::on_chart(direction, &chart, cutter)?;
-        let (field, mut notes, wanted) = stream_function(&calculated, cutter, &direction, asked, settings)?;
+        let (field, mut notes, wanted) =
+            stream_function(&calculated, cutter, &direction, asked, settings.step)?;
         let mut passes = along_levels(task, &chart, &field)?;
         let feed = |[u, v]: [f64; 2]| chart.at(u, v)?.feed(&direction, cutter);
         planned_field::set_directions(&mut passes.field, part, &chart, feed);
@@ -261,13 +262,24 @@ struct FeedGrid {
     lines: Vec<Option<(Vector3, f64)>>,
 }
 
+/// The stream function that fits feed directions over a chart, all else by default.
+pub(crate) fn fitted_to(
+    chart: &Chart,
+    cutter: &Cutter,
+    direction: &FeedDirection,
+    step: Step,
+) -> Result<ScalarField, PlanError> {
+    let asked = Streamline::along(direction.clone());
+    Ok(stream_function(chart, cutter, direction, &asked, step)?.0)
+}
+
 /// Samples feed directions over a chart and fits the stream function.
 fn stream_function(
     chart: &Chart,
     cutter: &Cutter,
     direction: &FeedDirection,
     asked: &Streamline,
-    settings: &PassSettings,
+    step: Step,
 ) -> Result<(ScalarField, Vec<String>, FeedGrid), PlanError> {
     let n = asked.control_points * SAMPLES_PER_CONTROL;
     let places: Vec<[f64; 2]> = chart.grid(n).collect();
@@ -287,7 +299,7 @@ fn stream_function(
             v: places[k][1],
             along: along.into(),
             across: across.into(),
-            density: 1.0 / p.strip_width(cutter, &t, settings.step).0,
+            density: 1.0 / p.strip_width(cutter, &t, step).0,
             weight: (e * g - f * f).max(0.0).sqrt() * (matters + LEAST_WEIGHT),
         })
     };
