@@ -193,7 +193,7 @@ impl Swept {
         swept
     }
 
-    /// Puts a segment into every bucket that it comes within half a bucket of.
+    /// Puts a segment into the buckets of places along it, a bucket apart at most; who looks for it looks a bucket farther.
     fn put(&mut self, k: u32, segment: &Segment) {
         let [a, b] = segment.ends;
         let steps = ((b - a).norm() / self.bucket).ceil().max(1.0);

@@ -94,7 +94,7 @@ fn a_plan_that_takes_more_than_was_allowed_ends_the_run() {
 #[test]
 fn the_plan_of_a_large_part_takes_no_more_than_was_allowed() {
     let scene = "[part]\nsurface = \"plane\"\nx = [0, 1000]\ny = [0, 1000]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n\
-                 [simulation]\nmemory_mib = 1\n[[toolpath]]\nstrategy = \"zigzag\"\nstepover = 5\n";
+                 [simulation]\nmemory_mib = 1\n[[toolpath]]\nstrategy = \"zigzag\"\nstepover = 2\n";
     let (home, process) = start(scene);
     let highest = peak(&process);
     let output = process.wait_with_output().unwrap();
