@@ -15,6 +15,21 @@ pub struct PlannedField {
     pub singular_points: Vec<SingularPoint>,
     /// The contacts of each pass.
     pub passes: Vec<Vec<PassPoint>>,
+    /// How far passes are off the directions asked for; `None` where none were.
+    pub direction_error: Option<DirectionError>,
+}
+
+/// Angles between passes and the feed directions asked for, rad.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DirectionError {
+    /// Root mean square over the length of all passes, by how much the direction matters at each place.
+    pub rms: f64,
+    /// The greatest.
+    pub max: f64,
+    /// What it changes by to the next place of its pass: between places it may be greater by as much.
+    pub error_bound: f64,
+    /// Where it is.
+    pub at: Point3,
 }
 
 /// A feed direction at a place of the plan view.

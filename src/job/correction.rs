@@ -5,7 +5,8 @@
 //! round found.
 //!
 //! The functions whose levels are passes are kept from round to round: only levels are placed anew, narrower around the
-//! places that stood too high. Where an engine tells ridges apart, the first rounds measure no more than those, on cells as
+//! places that stood too high. Places that stand above it by no more than chords may have raised them get shorter chords
+//! first, which costs points and no length, and leaves all levels where they are. Where an engine tells ridges apart, the first rounds measure no more than those, on cells as
 //! coarse as show every pass. Then all is measured as the verdict is; what still stands above the target then is corrected
 //! as well. Where narrowing does not help, the widths of the whole plan are scaled, which leaves its passes in shape.
 
@@ -19,6 +20,7 @@ use scene::ToolpathRequest;
 use toolpath::{Correction, Earlier, Step, plane_interval};
 use work::monitor::{self, Monitor};
 
+use super::judge::highest_reached;
 use super::planned::Planned;
 use super::tool::Around;
 use super::{JobError, Session};
@@ -40,6 +42,12 @@ const SLACK: f64 = 0.02;
 /// The same where all has to be measured to see whether a wider plan holds. With less, whole measurements are spent on a few
 /// per cent of length.
 const MEASURED_SLACK: f64 = 0.2;
+
+/// Chords of two passes raise a ridge by no more than this share of their tolerance.
+const RAISED_BY_CHORDS: f64 = 0.5;
+
+/// The factor of the chord tolerance where a ridge was raised by chords.
+const SHORTER_CHORDS: f64 = 0.25;
 
 /// No width is corrected by more than this factor in a round.
 const MOST_NARROWED: f64 = 0.5;
@@ -67,6 +75,8 @@ pub(crate) struct CorrectionRound {
     pub cutting_length_mm: f64,
     /// Least and greatest factor of the widths that the round was planned with.
     pub factors: [f64; 2],
+    /// Whether all was measured as the verdict is, and not ridges alone on cells that just show them.
+    pub measured: bool,
 }
 
 /// The rounds of the loop.
@@ -84,7 +94,7 @@ pub(crate) struct CorrectionFigures {
 struct Standing {
     /// As a round tells it, its length and factors aside.
     round: CorrectionRound,
-    /// Places above the target with their heights, mm.
+    /// Places near the target and above it with their heights, mm.
     above: Vec<(Point3, f64)>,
 }
 
@@ -99,6 +109,7 @@ impl Standing {
             median_mm: map.scallop.p50_mm?,
             cutting_length_mm: path_figures(&planned.plan.path, 0.0).cutting_length_mm,
             factors,
+            measured: false,
         };
         let places = map.above.iter().map(|place| (place.at, place.height));
         // The highest place stands between those that cells show.
@@ -113,10 +124,11 @@ impl Standing {
         let round = CorrectionRound {
             highest_mm: scallop.max_mm?,
             border_mm: on_border.then_some(reached.max_mm),
-            error_bound_mm: Some(reached.error_bound_mm),
+            error_bound_mm: Some(highest_reached(measured).error_bound_mm),
             median_mm: scallop.p50_mm?,
             cutting_length_mm: path_figures(&planned.plan.path, 0.0).cutting_length_mm,
             factors,
+            measured: true,
         };
         let places = measured.above.iter().map(|place| (place.at, place.height));
         let highest = scallop.max_at_mm.map(|at| (at.into(), round.highest_mm));
@@ -141,9 +153,11 @@ impl CorrectionRound {
         self.highest() + self.margin(target) <= target
     }
 
-    /// The bound of the highest, mm, where keeping clear of it costs little: a wider one is to be refined instead.
+    /// The bound of the highest, mm, where keeping clear of it costs little: a wider one is to be refined instead, as it is
+    /// when all is measured.
     fn margin(&self, target: f64) -> f64 {
-        self.error_bound_mm.filter(|bound| *bound <= SLACK * target).unwrap_or(0.0)
+        let bound = self.error_bound_mm.filter(|bound| self.measured && *bound <= SLACK * target);
+        bound.unwrap_or(0.0)
     }
 
     /// Whether this round is to be kept instead of another: first what holds the target, then what is shorter; where neither
@@ -206,7 +220,7 @@ impl Session {
             return Ok((first, measured));
         };
         let interval = plane_interval(&self.scene.cutter, request.step);
-        let widths = Widths { places: Vec::new(), everywhere: 1.0, interval };
+        let widths = Widths { places: Vec::new(), everywhere: 1.0, finer: Vec::new(), interval };
         let rounds = vec![standing.round];
         let mut corrected = Corrected {
             session: self,
@@ -296,8 +310,9 @@ impl Corrected<'_> {
         !round.holds(self.target) && round.highest() <= (1.0 + SLACK) * self.target
     }
 
-    /// The widths to try next: narrower where the best plan stands too high, while that helps; else all in proportion, to which
-    /// remnants along borders do not give way. `None` where it holds the target and comes within `slack` of it, or what there
+    /// The widths to try next where the best plan stands too high: shorter chords where that may be enough and narrower ones
+    /// elsewhere; else narrower ones at all these places; else all in proportion, to which remnants along borders do not give
+    /// way. `None` where it holds the target and comes within `slack` of it, or what there
     /// is was tried `in_vain`.
     fn next(&self, in_vain: usize, slack: f64) -> Option<Widths> {
         let (target, round) = (self.target, &self.standing.round);
@@ -305,12 +320,40 @@ impl Corrected<'_> {
         if round.holds(target) {
             let low = in_vain == 0 && round.highest() < (1.0 - slack) * target;
             low.then(|| scaled(round.highest()))
-        } else if in_vain == 0 {
-            Some(self.widths.narrowed(&self.standing.above, target, round.margin(target)))
         } else {
-            (in_vain == 1 && round.highest_mm + round.margin(target) > target)
-                .then(|| scaled(round.highest_mm))
+            let standing = self.standing_high(round.margin(target));
+            let is_raised = self.raised_by_chords();
+            let (raised, others): (Vec<_>, Vec<_>) = standing.iter().partition(|place| is_raised(place));
+            let above = |places: &[HighPlace]| -> Vec<HighPlace> {
+                places.iter().filter(|place| place.over > 0.0).copied().collect()
+            };
+            let finer = self.widths.finer(&raised).narrowed(&above(&others));
+            let ways = [
+                (!above(&raised).is_empty()).then_some(finer),
+                Some(self.widths.narrowed(&above(&standing))),
+            ];
+            let in_proportion =
+                (round.highest_mm + round.margin(target) > target).then(|| scaled(round.highest_mm));
+            ways.into_iter().flatten().chain(in_proportion).nth(in_vain)
         }
+    }
+
+    /// The places that stand near the target or above it, with `margin` mm for what their heights are uncertain by.
+    fn standing_high(&self, margin: f64) -> Vec<HighPlace> {
+        let cutter = &self.session.scene.cutter;
+        let places = self.standing.above.iter().map(|&(at, height)| {
+            let tip = at + cutter.contact_to_tip(&self.session.part.closest_point(&at).0.normal);
+            HighPlace { at, tip, over: height + margin - self.target, factor: aim(self.target) / height }
+        });
+        places.collect()
+    }
+
+    /// Whether it may be that chords alone have raised a place above the target, and they are not shorter there yet.
+    fn raised_by_chords(&self) -> impl Fn(&HighPlace) -> bool {
+        let most = RAISED_BY_CHORDS * self.session.scene.tolerance.chord;
+        let can_be_shorter = self.request.axis.is_none() && !self.request.joining.smoothing;
+        let chords = self.widths.chords();
+        move |place| can_be_shorter && place.over <= most && chords.at(&place.tip) >= 1.0
     }
 
     /// The plan by given widths, and their least and greatest factors.
@@ -318,7 +361,8 @@ impl Corrected<'_> {
         monitor::check(monitor)?;
         let correction = widths.correction();
         let factors = correction.range();
-        let earlier = Earlier { correction, functions: self.best.plan.functions.clone() };
+        let earlier =
+            Earlier { correction, chords: widths.chords(), functions: self.best.plan.functions.clone() };
         Ok((self.session.plan(self.request, self.around, Some(Arc::new(earlier)), monitor)?, factors))
     }
 
@@ -349,13 +393,27 @@ fn aim(target: f64) -> f64 {
     (1.0 - 0.5 * SLACK) * target
 }
 
-/// How much narrower or wider than by calculation passes are planned.
+/// A place that stands near the target or above it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct HighPlace {
+    at: Point3,
+    /// The tip of an upright cutter that touches the part there.
+    tip: Point3,
+    /// By how much it may stand above the target, mm.
+    over: f64,
+    /// The height that it is to have as a share of the one it has.
+    factor: f64,
+}
+
+/// How much narrower or wider than by calculation passes are planned, and where their chords are shorter.
 #[derive(Debug, Clone, PartialEq)]
 struct Widths {
     /// Places where ridges stood above the target, with their factors.
     places: Vec<(Point3, f64)>,
     /// The factor of all places.
     everywhere: f64,
+    /// Tips of the cutter around which chords are shorter.
+    finer: Vec<Point3>,
     /// How far around a place its factor holds, mm: the interval of passes on a plane.
     interval: f64,
 }
@@ -369,17 +427,27 @@ impl Widths {
         Self { everywhere: factor * self.everywhere, ..self.clone() }
     }
 
+    /// The factor of the chord tolerance around tips of the cutter.
+    fn chords(&self) -> Correction {
+        let factors: Vec<(Point3, f64)> = self.finer.iter().map(|tip| (*tip, SHORTER_CHORDS)).collect();
+        Correction::new(&factors, self.interval)
+    }
+
+    /// With shorter chords around places.
+    fn finer(&self, places: &[HighPlace]) -> Self {
+        let finer = self.finer.iter().copied().chain(places.iter().map(|place| place.tip)).collect();
+        Self { finer, ..self.clone() }
+    }
+
     /// Narrower where ridges and borders stand above the target, so that they come to the middle of the slack: height goes
     /// with the square of width. A place that was narrowed already and did not give way enough is narrowed by twice as much:
     /// there passes may lie nearer than they have to, or less than all of the height goes with their width.
-    /// `margin` is what their heights are uncertain by, mm.
-    fn narrowed(&self, standing: &[(Point3, f64)], target: f64, margin: f64) -> Self {
+    fn narrowed(&self, places: &[HighPlace]) -> Self {
         let now = Correction::new(&self.places, self.interval);
-        let above = standing.iter().filter(|(_, height)| *height + margin > target);
-        let narrower = above.map(|&(at, height)| {
-            let before = now.at(&at);
+        let narrower = places.iter().map(|place| {
+            let before = now.at(&place.at);
             let power = if before < 1.0 - STILL_WIDE { 1.0 } else { 0.5 };
-            (at, before * (aim(target) / height).powf(power).max(MOST_NARROWED))
+            (place.at, before * place.factor.powf(power).max(MOST_NARROWED))
         });
         Self { places: self.places.iter().copied().chain(narrower).collect(), ..self.clone() }
     }
@@ -427,6 +495,7 @@ mod tests {
             median_mm: 0.9,
             cutting_length_mm,
             factors: [1.0; 2],
+            measured: true,
         };
         let better = |a: CorrectionRound, b: CorrectionRound| a.is_better(&b, 1.0);
         assert!(better(round(0.8, 20.0), round(1.05, 10.0)) && !better(round(1.05, 10.0), round(0.8, 20.0)));
@@ -435,16 +504,25 @@ mod tests {
 
     #[test]
     fn widths_go_with_the_root_of_heights_above_the_target() {
-        let places = [(0.0, 1.2), (10.0, 0.99), (20.0, 0.5), (40.0, 1.1)];
-        let places = places.map(|(x, height)| (Point3::new(x, 0.0, 0.0), height));
-        let by_calculation = Widths { places: Vec::new(), everywhere: 1.0, interval: 1.0 };
-        let once = by_calculation.narrowed(&places, 1.0, 0.0);
-        let found = places.map(|(at, _)| once.correction().at(&at));
+        let above = |x: f64, height: f64| {
+            let at = Point3::new(x, 0.0, 0.0);
+            HighPlace { at, tip: at, over: height - 1.0, factor: 0.99 / height }
+        };
+        let places = [above(0.0, 1.2), above(40.0, 1.1)];
+        let by_calculation = Widths { places: Vec::new(), everywhere: 1.0, finer: Vec::new(), interval: 1.0 };
+        let once = by_calculation.narrowed(&places);
+        let found = [0.0, 10.0, 20.0, 40.0].map(|x| once.correction().at(&Point3::new(x, 0.0, 0.0)));
         let wanted = [(0.99f64 / 1.2).sqrt(), 1.0, 1.0, (0.99f64 / 1.1).sqrt()];
         assert!(found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
         // What was narrowed stays so, and is narrowed further where that was not enough.
-        let twice = once.narrowed(&[(places[0].0, 1.1)], 1.0, 0.0).correction();
-        assert!((twice.at(&places[0].0) - wanted[0] * 0.99 / 1.1).abs() < 1e-12);
-        assert!((twice.at(&places[3].0) - wanted[3]).abs() < 1e-12);
+        let twice = once.narrowed(&[above(0.0, 1.1)]).correction();
+        assert!((twice.at(&places[0].at) - wanted[0] * 0.99 / 1.1).abs() < 1e-12);
+        assert!((twice.at(&places[1].at) - wanted[3]).abs() < 1e-12);
+        // Shorter chords leave all widths as they are.
+        let finer = once.finer(&places[..1]);
+        assert_eq!(finer.correction(), once.correction());
+        assert!(
+            finer.chords().at(&places[0].tip) == SHORTER_CHORDS && finer.chords().at(&places[1].tip) == 1.0
+        );
     }
 }

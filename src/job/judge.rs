@@ -79,18 +79,23 @@ fn uncut(measured: &Measurement, limits: &Limits) -> Claim {
     .told(text)
 }
 
-/// The highest ridge or remnant along a border.
-fn highest(measured: &Measurement, limits: &Limits, rule: &ScallopRule) -> Claim {
+/// What of the cut surface answers to the scallop limit: the highest ridge, and the highest remnant along a border.
+pub(crate) fn highest_reached(measured: &Measurement) -> Bounded {
     let figures = &measured.scallop;
     let ridges = figures.max_mm.map(|height| Bounded {
         at_mm: figures.max_at_mm,
         ..Bounded::new(height, figures.error_bound_mm.unwrap_or(f64::INFINITY))
     });
     let reached = measured.excess.reached;
-    let all = ridges.map_or(reached, |ridges| ridges.or(&reached));
+    ridges.map_or(reached, |ridges| ridges.or(&reached))
+}
+
+/// The highest ridge or remnant along a border.
+fn highest(measured: &Measurement, limits: &Limits, rule: &ScallopRule) -> Claim {
+    let all = highest_reached(measured);
     let limit = rule.highest * limits.scallop;
-    let what = match ridges {
-        Some(ridges) if ridges.max_mm >= reached.max_mm => "the highest scallop",
+    let what = match measured.scallop.max_mm {
+        Some(ridge) if ridge >= measured.excess.reached.max_mm => "the highest scallop",
         _ => "the highest scallop or remnant beside a border",
     };
     let text = format!(

@@ -31,6 +31,10 @@ pub struct RidgePlace {
     pub height: f64,
 }
 
+/// Ridges above this share of the scallop limit come near it: what is cut once more, with moves that are a little others,
+/// may stand above it.
+pub(crate) const NEAR_LIMIT: f64 = 0.99;
+
 /// Which ridges may exceed the scallop target. By default none may.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ScallopRule {
@@ -294,8 +298,8 @@ pub struct Measurement {
     pub deviation_map: Vec<f32>,
     /// Height and weight (ridge length, mm) of every ridge sample.
     pub ridge_samples: Vec<[f32; 2]>,
-    /// Places above the scallop limit and within the uncut tolerance, on ridges and along borders: where passes lie too far
-    /// apart.
+    /// Places on ridges that come within a hundredth of the scallop limit or stand above it, and those along borders that
+    /// stand above it, all within the uncut tolerance: where passes lie too far apart, or as far as they may.
     pub above: Vec<RidgePlace>,
     /// Scallops of pairs of passes, calculated beside measured.
     pub pairs: PairFigures,

@@ -14,7 +14,8 @@ use work::monitor::{Cancelled, Monitor};
 /// All ridges of a cut surface.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RidgeMap {
-    /// Places above the scallop limit: where a ridge crosses from a cell to the next, and sides of cells along the borders.
+    /// Places near the scallop limit and above it, where a ridge crosses from a cell to the next; above it, sides of cells along
+    /// the borders.
     pub above: Vec<RidgePlace>,
     /// The highest remnant along a border, mm.
     pub border: f64,

@@ -15,7 +15,7 @@
 //! ridge is high. There the height is taken along the border's normal.
 
 use super::cut_surface::CutSurface;
-use super::figures::{Limits, NUMERICAL_FLOOR, RidgePlace, ScallopFigures};
+use super::figures::{Limits, NEAR_LIMIT, NUMERICAL_FLOOR, RidgePlace, ScallopFigures};
 use super::meetings::{Meeting, Meetings};
 use super::pairs::{PairTally, RidgeCrossing};
 use cutter::Cutter;
@@ -62,7 +62,7 @@ pub(super) struct Ridges {
     pub hidden: Vec<Hidden>,
     /// The ridges of each pair of passes.
     pub pairs: PairTally,
-    /// The samples above the scallop limit.
+    /// The samples near the scallop limit and above it.
     pub above: Vec<RidgePlace>,
 }
 
@@ -206,7 +206,7 @@ impl<'a> RidgeFinder<'a> {
                 }
             }
             monitor.advance(1);
-            let above = samples.iter().filter(|s| s.height > self.limits.scallop);
+            let above = samples.iter().filter(|s| s.height > NEAR_LIMIT * self.limits.scallop);
             let above = above.map(|s| RidgePlace { at: s.at, height: s.height }).collect();
             Ok(Ridges { pairs: self.pairs(&samples), above, ..Ridges::of_row(&samples, hidden) })
         })?;

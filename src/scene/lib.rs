@@ -149,6 +149,8 @@ pub struct Scene {
     pub tolerance: Limits,
     /// Which ridges may exceed the scallop tolerance.
     pub scallop_rule: ScallopRule,
+    /// By how much passes may be off the feed directions asked for, rad; `None` leaves it unjudged.
+    pub off_direction: Option<f64>,
     /// How it is simulated.
     pub simulation: Simulation,
     /// On what.

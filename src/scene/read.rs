@@ -98,6 +98,8 @@ impl Scene {
         let section = root.section("tolerance")?;
         let tolerance = read_tolerance(&section)?;
         let scallop_rule = read_scallop_rule(&section)?;
+        let off_direction =
+            section.number("direction", OFF_DIRECTION, " degrees")?.map(|v| v.value.to_radians());
         let correct = section.flag("correct")?.unwrap_or(true);
         let mut simulation = read_simulation(&root.section("simulation")?, &cutter, &tolerance)?;
         let section = root.section("machine")?;
@@ -120,6 +122,7 @@ impl Scene {
             cutting,
             tolerance,
             scallop_rule,
+            off_direction,
             simulation,
             machine,
             five_axis,
@@ -250,8 +253,8 @@ fn read_holder(root: &Section<'_>, cutter: &Cutter) -> Result<Option<Holder>, Sc
 }
 
 fn read_tolerance(section: &Section<'_>) -> Result<Limits, SceneError> {
-    const KEYS: [&str; 7] =
-        ["scallop", "scallop_share", "scallop_highest", "gouge", "uncut", "chord", "correct"];
+    const KEYS: [&str; 8] =
+        ["scallop", "scallop_share", "scallop_highest", "gouge", "uncut", "chord", "direction", "correct"];
     section.only(&KEYS, &[], "[tolerance]")?;
     let length = |key, default| Ok::<f64, SceneError>(section.length(key)?.map_or(default, |v| v.value));
     Ok(Limits {
@@ -261,6 +264,9 @@ fn read_tolerance(section: &Section<'_>) -> Result<Limits, SceneError> {
         chord: length("chord", DEFAULT_LIMITS.chord)?,
     })
 }
+
+/// Limits of how far passes may be off their directions, degrees: none is off by more than a right angle.
+const OFF_DIRECTION: std::ops::RangeInclusive<f64> = 0.0..=90.0;
 
 /// Ridges of which less must hold the target are not judged by it; ridges that may be higher neither.
 const LEAST_SHARE: f64 = 0.01;

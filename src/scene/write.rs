@@ -38,6 +38,9 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     writeln!(out, "gouge = {}", number(limits.gouge))?;
     writeln!(out, "uncut = {}", number(limits.uncut))?;
     writeln!(out, "chord = {}", number(limits.chord))?;
+    if let Some(angle) = scene.off_direction {
+        writeln!(out, "direction = {}  # degrees off the feed directions", number(angle.to_degrees()))?;
+    }
     writeln!(out, "\n[simulation]")?;
     writeln!(out, "cell = {}  # mm", number(scene.simulation.cell))?;
     writeln!(out, "memory_mib = {}", scene.simulation.memory_mib)?;

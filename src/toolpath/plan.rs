@@ -1,7 +1,7 @@
 //! What a strategy is asked for, and the one entrance to all strategies.
 
 use crate::facets::facet_charge;
-use crate::levels::planned_field;
+use crate::levels::{obedience, planned_field};
 use crate::link::{join, join_tilted};
 use crate::strategies::shortest::shortest_possible;
 use crate::strategies::words_for;
@@ -48,6 +48,8 @@ impl Plan {
     ) -> Self {
         let field = strategy.shows_field().then(|| {
             planned_field::measure(&mut field, contacts);
+            field.direction_error = obedience::measure(contacts);
+            notes.extend(field.direction_error.as_ref().and_then(obedience::note));
             field
         });
         if path.is_empty() {

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use ::field::{PassPoint, PlannedField};
-use report::Figure;
+use ::field::{DirectionError, PassPoint, PlannedField};
+use report::{Claim, Figure, Gravity, place};
 use work::monitor::Monitor;
 
 use super::value;
@@ -40,6 +40,19 @@ pub struct FieldFigures {
     pub singular_point_count: usize,
     /// The first of them, 100 at most.
     pub singular_points: Vec<SingularPointFigures>,
+    /// The angle between passes and the feed directions asked for, degrees: root mean square over the length of all passes, by
+    /// how much the direction matters at each place. Absent where none were asked for, as the two that follow.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub direction_error_rms_deg: Option<f64>,
+    /// The greatest, degrees.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub direction_error_max_deg: Option<f64>,
+    /// By how much it may be greater between the places that were looked at, degrees.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub direction_error_bound_deg: Option<f64>,
+    /// Where.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub direction_error_at_mm: Option<[f64; 3]>,
     /// Intervals over the allowed ones, where passes have neighbours.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interval_over_allowed: Option<IntervalFigures>,
@@ -66,6 +79,10 @@ impl FieldFigures {
         Self {
             singular_point_count: field.singular_points.len(),
             singular_points: field.singular_points.iter().take(MOST_SINGULAR_POINTS).map(point).collect(),
+            direction_error_rms_deg: field.direction_error.map(|error| error.rms.to_degrees()),
+            direction_error_max_deg: field.direction_error.map(|error| error.max.to_degrees()),
+            direction_error_bound_deg: field.direction_error.map(|error| error.error_bound.to_degrees()),
+            direction_error_at_mm: field.direction_error.map(|error| error.at.into()),
             interval_over_allowed,
         }
     }
@@ -75,6 +92,12 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
     let Some(field) = &run.planned.plan.field else { return Ok(Finding::default()) };
     let figures = FieldFigures::new(field);
     let mut rows = vec![("singular points of the feed", figures.singular_point_count.to_string())];
+    let sentence = field.direction_error.map(|error| {
+        let [rms, max] = [error.rms, error.max].map(|angle| format!("{:.2}", angle.to_degrees()));
+        let told = format!("{rms} (root mean square), {max} at most");
+        rows.push(("off the directions asked for, degrees", told.clone()));
+        ("Degrees off the feed directions asked for", format!("{told}: {}", run.request.name))
+    });
     if let Some(i) = &figures.interval_over_allowed {
         let [p5, p50, p95, max] = [i.p5, i.p50, i.p95, i.max].map(|r| format!("{:.0}", 100.0 * r));
         rows.push((
@@ -82,6 +105,61 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
             format!("{p5}, {p50}, {p95} (5, 50, 95 %), widest {max}"),
         ));
     }
-    let figure = Figure { key: "field", value: value(&figures)?, rows, ..Figure::default() };
-    Ok(Finding { figure: Some(figure), ..Finding::default() })
+    let meaning = sentence.is_some().then_some((
+        "off the directions asked for",
+        "Angle between passes and the feed directions that the scene asks for, at the contacts along all passes. Where \
+         directions turn around a point, passes cannot follow them close to it.",
+    ));
+    let figure =
+        Figure { key: "field", value: value(&figures)?, rows, sentence, meaning, ..Figure::default() };
+    let claims = field.direction_error.zip(run.scene().off_direction).map(obeys).into_iter().collect();
+    Ok(Finding { figure: Some(figure), claims, ..Finding::default() })
+}
+
+/// The claim that passes keep to the directions asked for, within a limit, rad.
+fn obeys((error, limit): (DirectionError, f64)) -> Claim {
+    let [max, bound, limit] = [error.max, error.error_bound, limit].map(f64::to_degrees);
+    let text = format!(
+        "passes are up to {max:.2} ± {bound:.2} degrees off the directions asked for (limit {limit:.2}) at {}",
+        place(error.at.into())
+    );
+    let claim = Claim::length("direction", Gravity::Finish, limit, max, bound).told(text);
+    Claim { unit: "deg", ..claim }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::Session;
+    use report::{ToolpathResult, Verdict};
+    use scene::Scene;
+    use work::monitor::Silent;
+
+    /// The first toolpath of a plate of 8 by 6 mm with a limit for directions, degrees.
+    fn planned(limit: f64, toolpath: &str) -> ToolpathResult {
+        let text = format!(
+            "[part]\nsurface = \"plane\"\nx = [0, 8]\ny = [0, 6]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n\
+             [tolerance]\nscallop = 0.05\nchord = 0.005\ndirection = {limit}\n[[toolpath]]\nstrategy = \"streamline\"\n{toolpath}\n"
+        );
+        let session = Session::new(Scene::parse("plate.toml", text).unwrap()).unwrap();
+        session.toolpath(&session.scene.toolpaths[0], &Silent).unwrap().result
+    }
+
+    fn claim(result: &ToolpathResult) -> Option<Verdict> {
+        result.claims.iter().find(|claim| claim.what == "direction").map(report::Claim::verdict)
+    }
+
+    #[test]
+    fn passes_that_leave_their_directions_violate_the_limit_for_them() {
+        let along = planned(0.5, "direction = { angle = 30 }");
+        let figure = along.figures.iter().find(|figure| figure.key == "field").unwrap();
+        let of = |key: &str| figure.value[key].as_f64().unwrap();
+        assert!(of("direction_error_rms_deg") <= of("direction_error_max_deg"), "{}", figure.value);
+        assert!(of("direction_error_max_deg") + of("direction_error_bound_deg") < 0.5, "{}", figure.value);
+        assert_eq!(claim(&along), Some(Verdict::Pass));
+        // Left free, passes of least length run along the longer sides.
+        let free = planned(0.5, "direction = { angle = 30 }\nfollow = 0");
+        assert_eq!(claim(&free), Some(Verdict::Fail));
+        assert!(free.notes.iter().any(|note| note.contains("off the directions")), "{:?}", free.notes);
+        assert_eq!(claim(&planned(0.5, "direction = \"shortest\"")), None, "none was asked for");
+    }
 }

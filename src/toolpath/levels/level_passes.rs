@@ -254,6 +254,7 @@ impl LevelSource for ChartGuide<'_> {
                 allowed,
                 inside: self.chart.holds([u, v]),
                 parameters: Some([u, v]),
+                off: None,
             })
         };
         curve.along(run).filter_map(contact).collect()

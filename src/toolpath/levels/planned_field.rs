@@ -264,7 +264,7 @@ mod tests {
         // The surface rises by half along y.
         let across = Vector3::new(0.0, 1.0, 0.5).normalize();
         (0..=25)
-            .map(|k| Contact { at: at(k), across, allowed: 0.5, inside: true, parameters: None })
+            .map(|k| Contact { at: at(k), across, allowed: 0.5, inside: true, parameters: None, off: None })
             .collect()
     }
 
@@ -308,6 +308,7 @@ mod tests {
                 allowed: 1.0,
                 inside: true,
                 parameters: None,
+                off: None,
             }
         };
         let mut field = PlannedField::default();

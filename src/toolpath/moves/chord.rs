@@ -141,17 +141,31 @@ const MAX_SKIP: usize = 400;
 /// # Errors
 /// [`Cancelled`] when the watch says so.
 pub fn reduce(points: &[Point3], tolerance: f64, watch: &mut Watch<'_>) -> Result<Vec<Point3>, Cancelled> {
-    Ok(moved_aside(points, &reduced_indices(points, tolerance, watch)?, Side::Lesser, tolerance))
+    reduce_unevenly(points, tolerance, &|_| 1.0, watch)
+}
+
+/// As [`reduce`], where the point of an index may lie off its move by a `share` of the tolerance only, at most 1.
+///
+/// # Errors
+/// [`Cancelled`] when the watch says so.
+pub fn reduce_unevenly(
+    points: &[Point3],
+    tolerance: f64,
+    share: &dyn Fn(usize) -> f64,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<Point3>, Cancelled> {
+    let kept = reduced_indices(points, &|k| share(k) * tolerance, watch)?;
+    Ok(moved_aside(points, &kept, Side::Lesser, tolerance))
 }
 
 /// Indices of the points that the rest does without least: from each the longest straight move that stays within
-/// `tolerance` of all points that it skips. The ends stay.
+/// the `tolerance` of each point that it skips, given by index, mm. The ends stay.
 ///
 /// # Errors
 /// [`Cancelled`] when the watch says so.
 pub fn reduced_indices<P: Waypoint>(
     points: &[P],
-    tolerance: f64,
+    tolerance: &dyn Fn(usize) -> f64,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<usize>, Cancelled> {
     if points.is_empty() {
@@ -161,7 +175,7 @@ pub fn reduced_indices<P: Waypoint>(
     let mut from = 0;
     while from + 1 < points.len() {
         let fits =
-            |to: usize| points[from + 1..to].iter().all(|p| p.stray(&points[from], &points[to]) <= tolerance);
+            |to: usize| (from + 1..to).all(|k| points[k].stray(&points[from], &points[to]) <= tolerance(k));
         watch.step()?;
         let mut to = from + 1;
         while to + 1 < points.len() && to - from < MAX_SKIP && fits(to + 1) {

@@ -16,13 +16,14 @@ use crate::surface::border::useful_overrun;
 use crate::surface::feed::{self, SMOOTHING_OVER_RADIUS};
 use crate::surface::mesh_surface::{MeshSurface, Piece, not_applicable, reachable};
 use crate::vocabulary::{
-    Contact, FeedDirection, LevelFunction, Levelled, PassSettings, Passes, PlanError, Step, Task,
+    Contact, FeedDirection, LevelFunction, Levelled, OffDirection, PassSettings, Passes, PlanError, Step,
+    Task,
 };
 use cutter::Cutter;
 use field::DIRECTION_WEIGHT;
 use field::mesh::{
-    Bend, Held, Line, MeshCurve, MeshFieldError, MeshLevels, MeshPoint, flows, orient_lines, smooth_lines,
-    solve_stream,
+    Bend, Held, Line, MeshCurve, MeshFieldError, MeshLevels, MeshPoint, Wanted, flows, orient_lines,
+    smooth_lines, solve_stream,
 };
 use geometry::{Point2, Point3, Vector2, Vector3};
 use scallop::strip_width_at;
@@ -101,12 +102,18 @@ fn on_piece(
 ) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, monitor, .. } = *task;
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
+    let wanted = match aim {
+        Aim::Fitted(direction) | Aim::Shortest(Some((direction, _))) => {
+            feed::on_mesh(part, cutter, direction, piece, surface).map_err(refused)?
+        }
+        Aim::Shortest(None) => Vec::new(),
+    };
     // Notes and field, to which passes come later.
     let mut all = Passes::default();
     let levelled = match (aim, earlier) {
         // A fitted function is solved again, with its notes: that takes little.
         (Aim::Fitted(direction), _) => {
-            let values = along_direction(task, direction, piece, surface, &mut all)?;
+            let values = along_direction(task, direction, piece, surface, &wanted, &mut all)?;
             Levelled { function: LevelFunction::Mesh(values.into()), told: None }
         }
         (Aim::Shortest(_), Some((values, levelled))) if values.len() == surface.mesh.points().len() => {
@@ -114,7 +121,7 @@ fn on_piece(
         }
         (Aim::Shortest(toward), _) => {
             let lines = toward.map(|(direction, dearer)| {
-                let (lines, matters) = feed_lines(task, direction, piece, surface, &mut all)?;
+                let (lines, matters) = feed_lines(task, direction, piece, surface, &wanted, &mut all)?;
                 let pull = |(line, matters): (&Line, &f64)| (line.direction, dearer * matters);
                 Ok::<_, PlanError>(lines.iter().zip(&matters).map(pull).collect::<Vec<_>>())
             });
@@ -134,7 +141,7 @@ fn on_piece(
     let own_values = own_values.filter(|&(v, (_, &origin))| origin as usize == v).map(|(_, (psi, _))| *psi);
     let range = own_values.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], x| [lo.min(x), hi.max(x)]);
     let drop = DropCutter::watched(part, cutter, monitor)?;
-    let guide = MeshGuide { surface, levels, cutter, drop, settings, monitor };
+    let guide = MeshGuide { surface, levels, wanted: &wanted, cutter, drop, settings, monitor };
     let places = guide.places(values);
     let placed = place_levels(&places, range, LevelSteps::Shortest, &mut all.notes);
     planned_field::set_mesh_levels(&mut all.field, &guide.levels, range, surface.own_triangles);
@@ -168,12 +175,13 @@ fn along_direction(
     direction: &FeedDirection,
     piece: &Piece,
     surface: &MeshSurface,
+    wanted: &[Wanted],
     all: &mut Passes,
 ) -> Result<Vec<f64>, PlanError> {
     let Task { cutter, ref settings, .. } = *task;
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     let mesh = &surface.mesh;
-    let (lines, matters) = feed_lines(task, direction, piece, surface, all)?;
+    let (lines, matters) = feed_lines(task, direction, piece, surface, wanted, all)?;
     // What was measured of an earlier plan moves levels, not the function.
     let width =
         |v: usize, b: &Vector3| width_at(cutter, &mesh.normals()[v], b, &surface.bends[v], settings.step).0;
@@ -206,12 +214,13 @@ fn feed_lines(
     direction: &FeedDirection,
     piece: &Piece,
     surface: &MeshSurface,
+    wanted: &[Wanted],
     passes: &mut Passes,
 ) -> Result<(Vec<Line>, Vec<f64>), PlanError> {
     let Task { part, cutter, .. } = *task;
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     let mesh = &surface.mesh;
-    let mut wanted = feed::on_mesh(part, cutter, direction, piece, surface).map_err(refused)?;
+    let mut wanted = wanted.to_vec();
     let matters = wanted.iter().map(|w| w.map_or(0.0, |(_, matters)| matters)).collect();
     // Beyond the border the field goes on as it comes.
     for v in 0..wanted.len() {
@@ -265,6 +274,8 @@ impl Knot {
 struct MeshGuide<'a> {
     surface: &'a MeshSurface,
     levels: MeshLevels<'a>,
+    /// The directions asked for at the vertices; empty where none are.
+    wanted: &'a [Wanted],
     cutter: &'a Cutter,
     drop: DropCutter<'a>,
     settings: &'a PassSettings<'a>,
@@ -294,6 +305,19 @@ impl MeshGuide<'_> {
         let corners = &self.surface.corner_normals[p.triangle as usize];
         let mixed: Vector3 = (0..3).map(|k| corners[k] * p.weights[k]).sum();
         mixed.try_normalize(1e-9).unwrap_or_else(Vector3::z)
+    }
+
+    /// How far a pass with a unit tangent `across` it is off the direction asked for: the mean of the corners', as lines.
+    fn off_direction(&self, p: &MeshPoint, across: &Vector3, normal: &Vector3) -> Option<OffDirection> {
+        let corners = self.surface.mesh.triangles()[p.triangle as usize];
+        let asked = (0..3).filter_map(|k| Some((p.weights[k], (*self.wanted.get(corners[k] as usize)?)?)));
+        let (mut sum, mut matters) = (Vector3::zeros(), 0.0);
+        for (weight, (line, of_corner)) in asked {
+            sum += line * (weight * if line.dot(&sum) < 0.0 { -1.0 } else { 1.0 });
+            matters += weight * of_corner;
+        }
+        let asked = (sum - normal * normal.dot(&sum)).try_normalize(1e-9)?;
+        Some(OffDirection::new(across, normal, &asked, matters))
     }
 
     /// The place of its weights.
@@ -472,6 +496,7 @@ impl LevelSource for MeshGuide<'_> {
                 allowed: spot.allowed.width,
                 inside,
                 parameters: None,
+                off: self.off_direction(&spot.at, &across, &normal),
             })
         };
         curve.along(run).filter_map(contact).collect()

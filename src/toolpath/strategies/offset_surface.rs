@@ -452,7 +452,14 @@ impl LevelSource for PatchRider<'_> {
             let ride = self.ride(uv)?;
             let (_, allowed) = self.place(uv)?;
             let across = ride.contact.normal.cross(&ride.feed);
-            Some(Contact { at: ride.contact.point, across, allowed, inside: true, parameters: None })
+            Some(Contact {
+                at: ride.contact.point,
+                across,
+                allowed,
+                inside: true,
+                parameters: None,
+                off: None,
+            })
         };
         curve.along(run).filter_map(contact).collect()
     }

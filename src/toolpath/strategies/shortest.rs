@@ -187,6 +187,7 @@ fn passes(task: &Task<'_>, toward: Option<(&FeedDirection, f64)>) -> Result<Pass
             planned_field::set_directions(&mut planned.field, part, chart, |[u, v]| {
                 chart.at(u, v)?.feed(direction, cutter)
             });
+            obedience::compare_on_chart(&mut planned.contacts, chart, direction, cutter);
         }
         all.append(planned);
     }
@@ -215,8 +216,6 @@ fn searched(
     };
     let worth = planned.length();
     let told = toward.is_none().then(|| (SHORTEST.to_owned(), promised));
-    let off = toward.and_then(|(direction, _)| obedience::angle_off(chart, &field, direction, cutter));
-    planned.notes.extend(obedience::note(off));
     Levelled { function: LevelFunction::Chart(Arc::new(field)), told }.put_with(&mut planned);
     if toward.is_some() {
         return Ok(planned);
@@ -538,6 +537,8 @@ impl Net {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::levels::spacing::level_tangent;
+    use crate::vocabulary::OffDirection;
     use geometry::{NurbsSurface, Point3};
     use work::monitor::Silent;
 
@@ -589,8 +590,15 @@ mod tests {
             let search = Search { chart: &chart, cutter: &cutter, step, toward, monitor: &Silent };
             let (psi, _) = search.run().unwrap().swap_remove(0);
             let psi = ScalarField::Spline(psi);
-            let rms = obedience::angle_off(&chart, &psi, &direction, &cutter).unwrap().to_degrees();
-            assert_eq!(obedience::note(Some(rms.to_radians())), None);
+            let off = |[u, v]: [f64; 2]| {
+                let p = chart.at(u, v)?;
+                let (asked, _) = p.feed(&direction, &cutter)?;
+                let across = p.normal.cross(&level_tangent(&p, &psi, [u, v])?);
+                Some(OffDirection::new(&across, &p.normal, &asked, 1.0).angle)
+            };
+            let off: Vec<f64> = chart.grid(41).filter_map(off).collect();
+            let rms =
+                (off.iter().map(|angle| angle * angle).sum::<f64>() / off.len() as f64).sqrt().to_degrees();
             // The middle, where circles have no direction, is in it.
             assert!(rms <= 3.0, "{dearer}: {rms} degrees");
         }

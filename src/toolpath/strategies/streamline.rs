@@ -6,7 +6,7 @@ use super::direction_keys;
 use super::mesh_passes::{self, Aim};
 use super::shortest::ShortestStreamline;
 use crate::levels::level_passes::along_levels;
-use crate::levels::planned_field;
+use crate::levels::{obedience, planned_field};
 use crate::surface::chart::{Chart, ChartPoint};
 use crate::surface::feed;
 use crate::surface::mesh_surface::not_applicable;
@@ -239,6 +239,7 @@ fn on_charts(task: &Task<'_>, asked: &Streamline) -> Result<Passes, PlanError> {
         let mut passes = along_levels(task, &chart, &field)?;
         let feed = |[u, v]: [f64; 2]| chart.at(u, v)?.feed(&direction, cutter);
         planned_field::set_directions(&mut passes.field, part, &chart, feed);
+        obedience::compare_on_chart(&mut passes.contacts, &chart, &direction, cutter);
         let places: Vec<[f64; 2]> = chart.grid(wanted.side).collect();
         planned_field::set_singular_points(
             &mut passes.field,

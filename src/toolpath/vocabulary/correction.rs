@@ -80,7 +80,7 @@ impl Correction {
 
     /// The factor at a place.
     pub fn at(&self, p: &Point3) -> f64 {
-        if self.cubes.is_empty() {
+        if self.is_even() {
             return self.everywhere;
         }
         // From the centre of a cube to that of the next.
@@ -103,6 +103,11 @@ impl Correction {
         self.everywhere * (sum + (1.0 - weights))
     }
 
+    /// Whether there are no other factors than that of all places.
+    pub fn is_even(&self) -> bool {
+        self.cubes.is_empty()
+    }
+
     /// The same with all factors multiplied by one.
     pub fn scaled(&self, factor: f64) -> Self {
         Self { everywhere: factor * self.everywhere, ..self.clone() }
@@ -110,7 +115,7 @@ impl Correction {
 
     /// Least and greatest factor.
     pub fn range(&self) -> [f64; 2] {
-        if self.cubes.is_empty() {
+        if self.is_even() {
             return [self.everywhere; 2];
         }
         let factors = self.cubes.iter().map(|(_, factor)| *factor);

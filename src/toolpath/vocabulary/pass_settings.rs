@@ -1,7 +1,7 @@
 //! What every pass needs to know besides part and cutter.
 
 use super::{Correction, Earlier, Step};
-use crate::moves::chord::{Watch, reduce, sample_within_chord};
+use crate::moves::chord::{Watch, reduce_unevenly, sample_within_chord};
 use crate::moves::smooth::smooth_and_spread;
 use cutter::Cutter;
 use geometry::Point3;
@@ -94,7 +94,14 @@ impl<'a> PassSettings<'a> {
                 let share = if let Step::Scallop(_) = self.step { SMOOTHED_SHARE } else { 1.0 };
                 smooth_and_spread(&points, sampling, share * (self.chord_tolerance - fine), &mut watch)
             }
-            None => reduce(&points, REDUCTION_SHARE * self.chord_tolerance, &mut watch),
+            None => {
+                let shares: Option<Vec<f64>> = self
+                    .earlier
+                    .filter(|earlier| !earlier.chords.is_even())
+                    .map(|earlier| points.iter().map(|p| earlier.chords.at(p)).collect());
+                let share = |k: usize| shares.as_ref().map_or(1.0, |shares| shares[k]);
+                reduce_unevenly(&points, REDUCTION_SHARE * self.chord_tolerance, &share, &mut watch)
+            }
         }?;
         // Thousands of passes are kept, each of far fewer places than were sampled.
         moves.shrink_to_fit();

@@ -81,4 +81,15 @@ pub struct Contact {
     pub inside: bool,
     /// Its parameters on a chart.
     pub parameters: Option<[f64; 2]>,
+    /// How far the pass is off the direction asked for here; `None` where none was.
+    pub off: Option<OffDirection>,
+}
+
+/// The angle between a pass and the feed direction that was asked for at a place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OffDirection {
+    /// As lines, 0 to a right angle, rad.
+    pub angle: f64,
+    /// How much the direction matters there.
+    pub matters: f64,
 }

@@ -70,6 +70,9 @@ pub struct PlanSettings {
 pub struct Earlier {
     /// By what passes spaced for a scallop lie wider or narrower than by calculation.
     pub correction: Correction,
+    /// The factor of the chord tolerance, at most 1, around tips of the cutter: where chords of two passes leave a ridge higher
+    /// than by calculation.
+    pub chords: Correction,
     /// The functions whose levels are placed anew, one for each chart or piece; all are searched where the number is another.
     pub functions: Vec<Levelled>,
 }

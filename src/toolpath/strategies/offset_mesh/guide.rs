@@ -177,7 +177,14 @@ impl LevelSource for OffsetGuide<'_> {
             let gradient = self.mixed(&spot.at, self.levels.gradients());
             let across = (gradient - spot.away * spot.away.dot(&gradient)).try_normalize(1e-300)?;
             let at = spot.at.position - spot.away * self.rider.level.distance();
-            Some(Contact { at, across, allowed: spot.allowed?.width, inside: true, parameters: None })
+            Some(Contact {
+                at,
+                across,
+                allowed: spot.allowed?.width,
+                inside: true,
+                parameters: None,
+                off: None,
+            })
         };
         curve.along(run).filter_map(contact).collect()
     }
