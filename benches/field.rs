@@ -20,7 +20,15 @@ fn samples(n: usize) -> Vec<StreamSample> {
             let (u, v) = (((k % n) as f64 + 0.5) / n as f64, ((k / n) as f64 + 0.5) / n as f64);
             let (s, c) = (0.3 * (3.0 * u).sin() + 0.5 * v).sin_cos();
             let density = 1.0 + 0.3 * (2.0 * u + v).cos();
-            StreamSample { u, v, along: [c, s], across: [-s, c], density, weight: 0.02 + u * u }
+            StreamSample {
+                u,
+                v,
+                along: [c, s],
+                across: [-s, c],
+                density,
+                weight: 0.02 + u * u,
+                direction: DIRECTION_WEIGHT,
+            }
         })
         .collect()
 }

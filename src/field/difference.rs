@@ -255,6 +255,7 @@ fn relative_residual(edges: &Edges<f64>, x: &[f64], rhs: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::DIRECTION_WEIGHT;
     use crate::{LevelTracer, ScalarField};
 
     const SOLVERS: [Solver; 3] = [Solver::ConjugateGradient, Solver::Cholesky, Solver::Gmres];
@@ -268,7 +269,15 @@ mod tests {
                 let [gu, gv] = gradient(u, v);
                 let density = gu.hypot(gv);
                 let across = [gu / density, gv / density];
-                Some(StreamSample { u, v, along: [across[1], -across[0]], across, density, weight: 0.1 + u })
+                Some(StreamSample {
+                    u,
+                    v,
+                    along: [across[1], -across[0]],
+                    across,
+                    density,
+                    weight: 0.1 + u,
+                    direction: DIRECTION_WEIGHT,
+                })
             })
             .collect()
     }

@@ -7,8 +7,8 @@
 //! ```
 //!
 //! with `t` the unit feed direction, `b` the unit tangent across it, `g` the density of passes
-//! wanted (passes per mm), `q` how much the direction matters there, and `α`
-//! ([`DIRECTION_WEIGHT`]) how much direction counts over density. With α = 1 and g = 1 it is the
+//! wanted (passes per mm), `q` how much the direction matters there, and `α` (mostly
+//! [`DIRECTION_WEIGHT`]) how much direction counts over density. With α = 1 and g = 1 it is the
 //! fit of `(ψ_v, −ψ_u)` to a sampled unit direction field; asking for |∇ψ| = 1 alone would also ask
 //! for a divergence-free field, which unit directions seldom are, so direction is weighted above
 //! density, and density follows the spacing that the scallop allows.
@@ -23,7 +23,7 @@ use super::solve::{Columns, Rows, Solution, SolveReport, Solver};
 use crate::solve;
 use geometry::{KnotVector, MAX_BASIS};
 
-/// Weight of following the direction over matching the density, α above. Greater keeps passes along
+/// The usual weight of following the direction over matching the density, α above. Greater keeps passes along
 /// the wanted directions at uneven distances; less bends them to keep their distances even. On a wave
 /// of 32° slopes 10, 1 and 0.3 gave paths 1, 4 and 7 % shorter than zigzag, 0.02°, 0.6° and 2.3° off
 /// the directions; below 0.1 passes begin to leave them by more than a machinist would accept.
@@ -357,13 +357,15 @@ pub struct StreamSample {
     pub density: f64,
     /// Surface area that the sample stands for times how much its direction matters.
     pub weight: f64,
+    /// How much its direction counts over its density, α.
+    pub direction: f64,
 }
 
 impl StreamSample {
     /// `K` of the quadratic form `∇ψᵀ K ∇ψ` that the sample asks to be small, `[K_uu, K_uv, K_vv]`.
     pub(super) fn tensor(&self) -> [f64; 3] {
         let ([a, b], [c, d]) = (self.along, self.across);
-        let along = DIRECTION_WEIGHT * self.weight;
+        let along = self.direction * self.weight;
         [
             along * a * a + self.weight * c * c,
             along * a * b + self.weight * c * d,
@@ -381,7 +383,7 @@ impl StreamSample {
     pub(super) fn misfit(&self, [pu, pv]: [f64; 2]) -> [f64; 2] {
         let along = self.along[0] * pu + self.along[1] * pv;
         let across = self.across[0] * pu + self.across[1] * pv;
-        let left = DIRECTION_WEIGHT * along * along + (across - self.density).powi(2);
+        let left = self.direction * along * along + (across - self.density).powi(2);
         [self.weight * left, self.weight * along.atan2(across.abs()).powi(2)]
     }
 }
@@ -392,9 +394,11 @@ pub(super) fn checked_sums<'a>(
 ) -> Result<[f64; 2], FieldError> {
     let mut sums = [0.0; 2];
     for s in samples {
-        let numbers = [s.u, s.v, s.along[0], s.along[1], s.across[0], s.across[1], s.density, s.weight];
-        if numbers.iter().any(|x| !x.is_finite()) || s.weight < 0.0 {
-            let fault = if s.weight < 0.0 { "has a negative weight" } else { "is not finite" };
+        let numbers =
+            [s.u, s.v, s.along[0], s.along[1], s.across[0], s.across[1], s.density, s.weight, s.direction];
+        if numbers.iter().any(|x| !x.is_finite()) || s.weight.min(s.direction) < 0.0 {
+            let fault =
+                if s.weight.min(s.direction) < 0.0 { "has a negative weight" } else { "is not finite" };
             return Err(FieldError::Invalid(format!("the feed direction at ({}, {}) {fault}", s.u, s.v)));
         }
         sums[0] += s.weight;
@@ -497,7 +501,7 @@ fn condition_rows(samples: &[StreamSample], knots_u: &KnotVector, knots_v: &Knot
     let mut rows = Rows::default();
     for s in samples {
         let (a, b) = (Line::at(knots_u, s.u), Line::at(knots_v, s.v));
-        let conditions = [(s.along, 0.0, DIRECTION_WEIGHT * s.weight), (s.across, s.density, s.weight)];
+        let conditions = [(s.along, 0.0, s.direction * s.weight), (s.across, s.density, s.weight)];
         for (d, target, weight) in conditions {
             let root = weight.sqrt();
             rows.starts.push(rows.columns.len());
@@ -568,7 +572,15 @@ mod tests {
                 if length > 1e-9 {
                     let along = [t[0] / length, t[1] / length];
                     let across = [-along[1], along[0]];
-                    samples.push(StreamSample { u, v, along, across, density, weight: 1.0 });
+                    samples.push(StreamSample {
+                        u,
+                        v,
+                        along,
+                        across,
+                        density,
+                        weight: 1.0,
+                        direction: DIRECTION_WEIGHT,
+                    });
                 }
             }
         }
@@ -615,8 +627,15 @@ mod tests {
 
     #[test]
     fn too_few_samples_are_refused() {
-        let sample =
-            StreamSample { u: 0.5, v: 0.5, along: [1.0, 0.0], across: [0.0, 1.0], density: 1.0, weight: 1.0 };
+        let sample = StreamSample {
+            u: 0.5,
+            v: 0.5,
+            along: [1.0, 0.0],
+            across: [0.0, 1.0],
+            density: 1.0,
+            weight: 1.0,
+            direction: DIRECTION_WEIGHT,
+        };
         let error =
             fit_stream_function(&[sample], knots(8, [0.0, 1.0]), knots(8, [0.0, 1.0]), Solver::Cholesky)
                 .unwrap_err();
@@ -655,7 +674,7 @@ mod tests {
                 let density = gu.hypot(gv);
                 let across = [gu / density, gv / density];
                 let along = [across[1], -across[0]];
-                StreamSample { u, v, along, across, density, weight: 0.1 + u }
+                StreamSample { u, v, along, across, density, weight: 0.1 + u, direction: DIRECTION_WEIGHT }
             })
             .collect()
     }
@@ -721,7 +740,15 @@ mod tests {
                             let [gu, gv] = gradient(u, v);
                             let density = gu.hypot(gv);
                             let across = [gu / density, gv / density];
-                            StreamSample { u, v, along: [across[1], -across[0]], across, density, weight }
+                            StreamSample {
+                                u,
+                                v,
+                                along: [across[1], -across[0]],
+                                across,
+                                density,
+                                weight,
+                                direction: DIRECTION_WEIGHT,
+                            }
                         })
                         .collect();
                     let knots = KnotVector::clamped_uniform(degree, spans + degree, [0.0, 1.0]).unwrap();
@@ -788,7 +815,7 @@ mod tests {
         let mut single = NormalEquations::new(knots.clone(), knots.clone());
         for s in &samples {
             let gradient = |d: [f64; 2]| [[0.0, d[1], 0.0], [d[0], 0.0, 0.0], [0.0; 3]];
-            single.add(s.u, s.v, &gradient(s.along), 0.0, DIRECTION_WEIGHT * s.weight);
+            single.add(s.u, s.v, &gradient(s.along), 0.0, s.direction * s.weight);
             single.add(s.u, s.v, &gradient(s.across), s.density, s.weight);
         }
         let expected = single.solve(true).unwrap();

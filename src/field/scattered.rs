@@ -43,6 +43,8 @@ pub struct LineField {
     bucket_size: [f64; 2],
     /// Where each bucket's samples begin.
     starts: Vec<usize>,
+    /// Lengths of the lines as given, in units of `scale`.
+    lengths: Vec<f64>,
     /// Usual distance of samples, in units of `scale`.
     pitch: f64,
 }
@@ -62,7 +64,7 @@ impl LineField {
     /// From samples; those that are not finite, of length 0 or of no weight are left out. `None` when
     /// none are left.
     pub fn new(plane: SamplePlane, samples: &[LineSample]) -> Option<Self> {
-        let mut kept: Vec<LineSample> = samples.iter().copied().filter(usable).collect();
+        let kept: Vec<LineSample> = samples.iter().copied().filter(usable).collect();
         let first = *kept.first()?;
         let (mut lo, mut hi) = (first.at, first.at);
         for s in &kept {
@@ -76,14 +78,16 @@ impl LineField {
             SamplePlane::Plan => [extent[0].max(extent[1]); 2],
             SamplePlane::Parameters => extent,
         };
-        for s in &mut kept {
+        let scaled = |mut s: LineSample| {
             for c in 0..2 {
                 s.at[c] = (s.at[c] - lo[c]) / scale[c];
                 s.line[c] /= scale[c];
             }
             let length = s.line[0].hypot(s.line[1]);
             s.line = s.line.map(|x| x / length);
-        }
+            (s, length)
+        };
+        let mut kept: Vec<(LineSample, f64)> = kept.into_iter().map(scaled).collect();
         let size = [0, 1].map(|c| (hi[c] - lo[c]) / scale[c]);
         // About two samples a bucket, by area, or by length where they stand on a line.
         let wanted = (0.5 * kept.len() as f64).max(1.0);
@@ -100,17 +104,18 @@ impl LineField {
             buckets,
             bucket_size,
             starts: vec![0; buckets[0] * buckets[1] + 1],
+            lengths: Vec::new(),
             pitch: 0.0,
         };
-        kept.sort_by_key(|s| field.bucket(s.at));
-        for s in &kept {
+        kept.sort_by_key(|(s, _)| field.bucket(s.at));
+        for (s, _) in &kept {
             let bucket = field.bucket(s.at);
             field.starts[bucket + 1] += 1;
         }
         for k in 1..field.starts.len() {
             field.starts[k] += field.starts[k - 1];
         }
-        field.samples = kept;
+        (field.samples, field.lengths) = kept.into_iter().unzip();
         field.pitch = field.usual_distance();
         Some(field)
     }
@@ -123,6 +128,15 @@ impl LineField {
     /// Number of samples.
     pub fn len(&self) -> usize {
         self.samples.len()
+    }
+
+    /// The samples as they were given, lengths too, in no order.
+    pub fn given(&self) -> impl Iterator<Item = LineSample> {
+        self.samples.iter().zip(&self.lengths).map(|(s, length)| LineSample {
+            at: [0, 1].map(|c| self.origin[c] + s.at[c] * self.scale[c]),
+            line: [0, 1].map(|c| s.line[c] * length * self.scale[c]),
+            weight: s.weight,
+        })
     }
 
     /// Never: a field has at least one sample.

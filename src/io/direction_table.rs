@@ -11,7 +11,7 @@
 //! the plan view (mm), or `u v tu tv [weight]` in the parameters of the part's patches. A first line of
 //! words says which; without it they are x and y. Numbers stand apart by blanks, tabs, commas or
 //! semicolons; `#` begins a comment; empty lines are passed over. Directions are lines: `1 0` and
-//! `-1 0` are the same, and their length does not matter, but 0 is refused. Places may be scattered.
+//! `-1 0` are the same, and their length matters to a fit of velocities only, but 0 is refused. Places may be scattered.
 
 use std::path::{Path, PathBuf};
 
@@ -145,7 +145,7 @@ fn sample(fields: &[&str]) -> Result<LineSample, String> {
     if weight < 0.0 {
         return Err(format!("the weight is {weight}; write 0 or more"));
     }
-    Ok(LineSample { at: [x, y], line: [tx / length, ty / length], weight })
+    Ok(LineSample { at: [x, y], line: [tx, ty], weight })
 }
 
 #[cfg(test)]

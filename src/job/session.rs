@@ -1,5 +1,6 @@
 //! A scene with its part, ready to run its toolpaths.
 
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
 
 use blade::Blade;
@@ -133,10 +134,12 @@ impl Session {
         done: &mut dyn FnMut(&Outcome) -> Result<(), E>,
     ) -> Result<RunReport, E> {
         let (mut rows, mut refused) = (Vec::new(), None);
+        let mut seen = Vec::new();
         for request in &self.scene.toolpaths {
             monitor.belongs_to(&request.name);
             match self.toolpath(request, monitor) {
-                Ok(outcome) => {
+                Ok(mut outcome) => {
+                    note_same_path(&mut seen, &mut outcome);
                     done(&outcome)?;
                     rows.push(ToolpathReport::Measured(Box::new(outcome.result)));
                 }
@@ -452,6 +455,20 @@ fn inputs(scene: &Scene) -> Result<Vec<InputFile>, JobError> {
         inputs.push(InputFile { file: file.written.clone(), bytes, sha256 });
     }
     Ok(inputs)
+}
+
+/// Says so where a toolpath moves as one before it, as two strategies do whose best path is the same.
+fn note_same_path(seen: &mut Vec<(u64, String)>, outcome: &mut Outcome) {
+    let mut hasher = DefaultHasher::new();
+    let stops = outcome.path.moves.iter().map(|step| &step.to);
+    for place in stops.chain([&outcome.path.start]) {
+        place.tip.iter().chain(place.axis.iter()).for_each(|x| x.to_bits().hash(&mut hasher));
+    }
+    let (path, result) = (hasher.finish(), &mut outcome.result);
+    if let Some((_, other)) = seen.iter().find(|(earlier, _)| *earlier == path) {
+        result.notes.insert(0, format!("this is the same path as that of {other}"));
+    }
+    seen.push((path, result.name.clone()));
 }
 
 #[cfg(test)]

@@ -27,13 +27,13 @@ pub use strategies::offset_surface::{OffsetAlong, OffsetDrive, OffsetSurface};
 pub use strategies::program::{ForeignProgram, ReadProgram};
 pub use strategies::shortest::{ShortestStreamline, shortest_possible};
 pub use strategies::spiral::Spiral;
-pub use strategies::streamline::{DEFAULT_CONTROL_POINTS, DEFAULT_DEGREE, StreamMethod, Streamline};
+pub use strategies::streamline::{DEFAULT_CONTROL_POINTS, DEFAULT_DEGREE, FITTED, StreamMethod, Streamline};
 pub use strategies::waterline::Waterline;
 pub use strategies::zigzag::{Zigzag, ZigzagAngle};
 pub use strategies::{STRATEGIES, StrategyRead, read_strategy, words_for};
 pub use tilt::repair::{RepairSummary, Unreachable};
 pub use tilt::tilted::Tilting;
 pub use vocabulary::{
-    Along, Correction, Definition, Earlier, FeedDirection, Joining, Links, PartKind, PlanError, PlanSettings,
-    Reading, Step, Strategy,
+    Along, Correction, Definition, Earlier, FeedDirection, Joining, Levelled, Links, PartKind, PlanError,
+    PlanSettings, Reading, Step, Strategy,
 };

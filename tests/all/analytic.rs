@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use millstream::cutter::Cutter;
-use millstream::field::{KnotRule, Solver};
+use millstream::field::{DIRECTION_WEIGHT, KnotRule, Solver};
 use millstream::geometry::AnalyticShape;
 use millstream::scallop::ball_scallop_height;
 use millstream::toolpath::{
@@ -110,6 +110,7 @@ fn a_scallop_target_holds_on_every_smooth_test_surface() {
                 control_points: 16,
                 method: StreamMethod::BSpline { degree: 3, knots: KnotRule::Uniform },
                 solver: Solver::Cholesky,
+                direction_weight: DIRECTION_WEIGHT,
             },
         ),
     ];

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 
 use millstream::cutter::Cutter;
-use millstream::field::{KnotRule, Solver};
+use millstream::field::{DIRECTION_WEIGHT, KnotRule, Solver};
 use millstream::geometry::AnalyticShape;
 use millstream::io::direction_table;
 use millstream::monitor::Silent;
@@ -48,7 +48,8 @@ fn sampled_circles_are_followed_by_every_method_and_solver() {
         (StreamMethod::Differences, Solver::Cholesky),
     ] {
         let direction = FeedDirection::Samples(samples.clone());
-        let strategy = Streamline { direction, control_points: 12, method, solver };
+        let strategy =
+            Streamline { direction, control_points: 12, method, solver, direction_weight: DIRECTION_WEIGHT };
         let plan = plan(&part, &cutter, &strategy, &settings(&part, Step::Stepover(0.6)), &Silent).unwrap();
         assert!(plan.notes.iter().any(|n| n.contains(", residual ")), "{:?}", plan.notes);
         println!("{method:?} {solver:?}: {:?}", plan.notes);
@@ -88,6 +89,7 @@ fn a_table_outside_of_the_part_or_of_the_wrong_kind_is_refused() {
         control_points: 8,
         method: StreamMethod::Differences,
         solver: Solver::ConjugateGradient,
+        direction_weight: DIRECTION_WEIGHT,
     };
     let refused = plan(&part, &cutter, &strategy, &settings(&part, Step::Stepover(0.6)), &Silent);
     let message = refused.unwrap_err().to_string();

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use millstream::cutter::Cutter;
 use millstream::field::PlannedField;
 use millstream::field::mesh::Sense;
-use millstream::field::{KnotRule, LineField, LineSample, SamplePlane, Solver};
+use millstream::field::{DIRECTION_WEIGHT, KnotRule, LineField, LineSample, SamplePlane, Solver};
 use millstream::geometry::{AnalyticShape, Point2, Point3};
 use millstream::monitor::Silent;
 use millstream::motion::{MoveKind, Toolpath};
@@ -32,13 +32,20 @@ fn planned(
     direction: &FeedDirection,
     (method, solver): (StreamMethod, Solver),
 ) -> Result<Toolpath, PlanError> {
-    let strategy = Streamline { direction: direction.clone(), control_points: 12, method, solver };
+    let strategy = Streamline {
+        direction: direction.clone(),
+        control_points: 12,
+        method,
+        solver,
+        direction_weight: DIRECTION_WEIGHT,
+    };
     let cutter = Cutter::ball(6.0).unwrap();
     plan(part, &cutter, &strategy, &settings(part, Step::Stepover(0.6)), &Silent).map(|plan| plan.path)
 }
 
 fn fields(part: &Part, direction: FeedDirection, (method, solver): (StreamMethod, Solver)) -> PlannedField {
-    let strategy = Streamline { direction, control_points: 24, method, solver };
+    let strategy =
+        Streamline { direction, control_points: 24, method, solver, direction_weight: DIRECTION_WEIGHT };
     let cutter = Cutter::ball(6.0).unwrap();
     plan(part, &cutter, &strategy, &settings(part, Step::Stepover(0.6)), &Silent).unwrap().field.unwrap()
 }

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use ::field::{DirectionError, PassPoint, PlannedField};
 use report::{Claim, Figure, Gravity, place};
+use toolpath::{FITTED, Levelled};
 use work::monitor::Monitor;
 
 use super::value;
@@ -36,6 +37,9 @@ pub struct IntervalFigures {
 /// What a streamline path was planned by. Predictions of the planner; nothing of it is measured.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FieldFigures {
+    /// What the functions are whose levels are the passes, each once: a stream function that was searched or fitted, or a front
+    /// from a border where its passes are shorter.
+    pub planned_as: Vec<String>,
     /// Number of singular points.
     pub singular_point_count: usize,
     /// The first of them, 100 at most.
@@ -62,8 +66,14 @@ pub struct FieldFigures {
 pub const MOST_SINGULAR_POINTS: usize = 100;
 
 impl FieldFigures {
-    /// Of a planned field.
-    pub fn new(field: &PlannedField) -> Self {
+    /// Of a planned field and the functions that were kept of it; those fitted to directions over charts are not.
+    pub fn new(field: &PlannedField, functions: &[Levelled]) -> Self {
+        let mut planned_as: Vec<String> = functions.iter().map(|f| f.planned_as.to_string()).collect();
+        planned_as.sort();
+        planned_as.dedup();
+        if planned_as.is_empty() {
+            planned_as.push(FITTED.to_owned());
+        }
         let mut ratios: Vec<f64> =
             field.passes.iter().flatten().filter(|p| p.inside).filter_map(PassPoint::ratio).collect();
         ratios.sort_by(f64::total_cmp);
@@ -77,6 +87,7 @@ impl FieldFigures {
             index: 0.5 * f64::from(s.half_turns),
         };
         Self {
+            planned_as,
             singular_point_count: field.singular_points.len(),
             singular_points: field.singular_points.iter().take(MOST_SINGULAR_POINTS).map(point).collect(),
             direction_error_rms_deg: field.direction_error.map(|error| error.rms.to_degrees()),
@@ -90,8 +101,11 @@ impl FieldFigures {
 
 pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> {
     let Some(field) = &run.planned.plan.field else { return Ok(Finding::default()) };
-    let figures = FieldFigures::new(field);
-    let mut rows = vec![("singular points of the feed", figures.singular_point_count.to_string())];
+    let figures = FieldFigures::new(field, &run.planned.plan.functions);
+    let mut rows = vec![
+        ("planned as", figures.planned_as.join("; ")),
+        ("singular points of the feed", figures.singular_point_count.to_string()),
+    ];
     let sentence = field.direction_error.map(|error| {
         let [rms, max] = [error.rms, error.max].map(|angle| format!("{:.2}", angle.to_degrees()));
         let told = format!("{rms} (root mean square), {max} at most");

@@ -19,19 +19,22 @@ const SHORTEST: &str = "shortest";
 /// Weights of a blend that make sense: below, a direction has no part in it.
 const WEIGHT: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
 
-/// Reads a direction and the files that it names, in order; what these hold is read later. `None` for
-/// the shortest path.
+/// Reads a direction and the files that it names, in order; what these hold is read later. `None` for the shortest path, which
+/// is asked for where nothing is said of directions, and no other key needs one (`needed`).
 pub(crate) fn read(
     section: &Section<'_>,
     files: &mut Vec<Located<String>>,
+    needed: bool,
 ) -> Result<Option<FeedDirection>, SceneError> {
     let words: Vec<&str> = WORDS.into_iter().chain([SHORTEST]).collect();
-    read_one(section, &words, files)
+    read_one(section, &words, if needed { WORDS[0] } else { SHORTEST }, files)
 }
 
+/// Reads a direction by one of some words, by the `usual` one where none is written.
 fn read_one(
     section: &Section<'_>,
     words: &[&'static str],
+    usual: &'static str,
     files: &mut Vec<Located<String>>,
 ) -> Result<Option<FeedDirection>, SceneError> {
     let (word, direction) = match section.inline("direction") {
@@ -42,7 +45,7 @@ fn read_one(
             ("", Some(FeedDirection::Angle(angle.value.to_radians())))
         }
         None => {
-            let word = section.word("direction", words)?.map_or(WORDS[0], |word| word.value);
+            let word = section.word("direction", words)?.map_or(usual, |word| word.value);
             (word, read_word(word, section, files)?)
         }
     };
@@ -127,7 +130,7 @@ fn read_blend(table: &Section<'_>, files: &mut Vec<Located<String>>) -> Result<F
             return Err(part.error(&part.key_span("direction"), "a blend cannot be blended again", cure));
         }
         // The words leave the shortest path out, so that there is always a direction.
-        let direction = read_one(part, &WORDS, files)?.unwrap_or(FeedDirection::WidestStrip);
+        let direction = read_one(part, &WORDS, WORDS[0], files)?.unwrap_or(FeedDirection::WidestStrip);
         Ok((direction, part.number("weight", WEIGHT, "")?.map_or(1.0, |weight| weight.value)))
     };
     Ok(FeedDirection::Blend(parts.iter().map(read_part).collect::<Result<_, SceneError>>()?))

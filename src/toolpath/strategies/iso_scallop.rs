@@ -163,7 +163,8 @@ pub(crate) fn on_chart(
     };
     let told = format!("passes start {name}{}", if searched > 1 { ", the best of four borders" } else { "" });
     let function = LevelFunction::Chart(Arc::new(field));
-    Levelled { function, told: Some((told, length)) }.put_with(&mut best);
+    let planned_as = format!("front, starting {name}").into();
+    Levelled { function, planned_as, told: Some((told, length)) }.put_with(&mut best);
     Ok(best)
 }
 

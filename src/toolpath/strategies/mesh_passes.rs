@@ -7,7 +7,8 @@
 //! the cutter there, so that the mesh decides where passes run, never how deep.
 
 use super::mesh_shortest::shortest_stream;
-use super::shortest::SHORTEST;
+use super::shortest::{SEARCHED, SHORTEST};
+use super::streamline::FITTED;
 use crate::drop::DropCutter;
 use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between};
 use crate::levels::planned_field;
@@ -20,7 +21,6 @@ use crate::vocabulary::{
     Task,
 };
 use cutter::Cutter;
-use field::DIRECTION_WEIGHT;
 use field::mesh::{
     Bend, Held, Line, MeshCurve, MeshFieldError, MeshLevels, MeshPoint, Wanted, flows, orient_lines,
     smooth_lines, solve_stream,
@@ -54,8 +54,8 @@ const EVEN: [f64; 5] = [-3.0 / 35.0, 12.0 / 35.0, 17.0 / 35.0, 12.0 / 35.0, -3.0
 /// What the stream function shall do.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Aim<'a> {
-    /// Follow a direction.
-    Fitted(&'a FeedDirection),
+    /// Follow a direction, by how much it counts over the distances of passes.
+    Fitted(&'a FeedDirection, f64),
     /// Make the path shortest; with a direction and how much dearer passes square to it are.
     Shortest(Option<(&'a FeedDirection, f64)>),
 }
@@ -73,11 +73,11 @@ pub(crate) fn on_mesh(task: &Task<'_>, aim: Aim) -> Result<Passes, PlanError> {
         [] => [part.bounds()].map(|b| [[b.min.x, b.max.x], [b.min.y, b.max.y]]).to_vec(),
         patches => patches.iter().map(|patch| patch.domain()).collect(),
     };
-    if let Aim::Fitted(direction) | Aim::Shortest(Some((direction, _))) = aim {
-        feed::check(direction, part, &parameters)?;
+    let mut all = Passes::default();
+    if let Aim::Fitted(direction, _) | Aim::Shortest(Some((direction, _))) = aim {
+        all.notes.extend(feed::check(direction, part, &parameters)?);
     }
     let reached = reachable(part, cutter, flat)?;
-    let mut all = Passes::default();
     if reached.steep_area >= LEAST_TOLD {
         all.notes.push(format!(
             "{:.1} mm² of the surface are steeper than 80 degrees; passes go around them and touch them only where the \
@@ -103,7 +103,7 @@ fn on_piece(
     let Task { part, cutter, ref settings, monitor, .. } = *task;
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     let wanted = match aim {
-        Aim::Fitted(direction) | Aim::Shortest(Some((direction, _))) => {
+        Aim::Fitted(direction, _) | Aim::Shortest(Some((direction, _))) => {
             feed::on_mesh(part, cutter, direction, piece, surface).map_err(refused)?
         }
         Aim::Shortest(None) => Vec::new(),
@@ -112,9 +112,11 @@ fn on_piece(
     let mut all = Passes::default();
     let levelled = match (aim, earlier) {
         // A fitted function is solved again, with its notes: that takes little.
-        (Aim::Fitted(direction), _) => {
-            let values = along_direction(task, direction, piece, surface, &wanted, &mut all)?;
-            Levelled { function: LevelFunction::Mesh(values.into()), told: None }
+        (Aim::Fitted(direction, weight), _) => {
+            let (lines, matters) = feed_lines(task, direction, piece, surface, &wanted, &mut all)?;
+            let values = along_lines(task, (&lines, &matters), weight, surface, &mut all)?;
+            let function = LevelFunction::Mesh(values.into());
+            Levelled { function, planned_as: FITTED.into(), told: None }
         }
         (Aim::Shortest(_), Some((values, levelled))) if values.len() == surface.mesh.points().len() => {
             levelled.clone()
@@ -130,7 +132,8 @@ fn on_piece(
             let found =
                 found.ok_or_else(|| not_applicable("no stream function of least length was found"))?;
             let told = toward.is_none().then(|| (SHORTEST.to_owned(), found.cost));
-            Levelled { function: LevelFunction::Mesh(found.coefficients.into()), told }
+            let function = LevelFunction::Mesh(found.coefficients.into());
+            Levelled { function, planned_as: SEARCHED.into(), told }
         }
     };
     let LevelFunction::Mesh(values) = &levelled.function else {
@@ -170,18 +173,16 @@ fn level_lines(surface: &MeshSurface, levels: &MeshLevels<'_>) -> Vec<Line> {
 }
 
 /// ψ at the vertices whose levels follow feed directions.
-fn along_direction(
+fn along_lines(
     task: &Task<'_>,
-    direction: &FeedDirection,
-    piece: &Piece,
+    (lines, matters): (&[Line], &[f64]),
+    direction_weight: f64,
     surface: &MeshSurface,
-    wanted: &[Wanted],
     all: &mut Passes,
 ) -> Result<Vec<f64>, PlanError> {
     let Task { cutter, ref settings, .. } = *task;
     let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     let mesh = &surface.mesh;
-    let (lines, matters) = feed_lines(task, direction, piece, surface, wanted, all)?;
     // What was measured of an earlier plan moves levels, not the function.
     let width =
         |v: usize, b: &Vector3| width_at(cutter, &mesh.normals()[v], b, &surface.bends[v], settings.step).0;
@@ -190,8 +191,8 @@ fn along_direction(
     let across = |v: usize| mesh.normals()[v].cross(&lines[v].direction);
     let density: Vec<f64> = (0..count).map(|v| 1.0 / width(own(v), &across(own(v)))).collect();
     let weight: Vec<f64> = (0..count).map(|v| matters[own(v)] + LEAST_WEIGHT).collect();
-    let flows = flows(mesh, &lines, &density, &weight);
-    let stream = solve_stream(mesh, &flows, DIRECTION_WEIGHT, &Held::default()).map_err(refused)?;
+    let flows = flows(mesh, lines, &density, &weight);
+    let stream = solve_stream(mesh, &flows, direction_weight, &Held::default()).map_err(refused)?;
     all.notes.push(format!(
         "the stream function follows the feed directions within {:.2} degrees (root mean square)",
         stream.angle_rms.to_degrees()

@@ -168,11 +168,11 @@ impl Strategy for ShortestStreamline {
 fn passes(task: &Task<'_>, toward: Option<(&FeedDirection, f64)>) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, .. } = *task;
     let charts = Chart::all(part, cutter, settings.guide())?;
+    let mut all = Passes::default();
     if let Some((direction, _)) = toward {
         let parameters: Vec<_> = charts.iter().map(|chart| chart.domain).collect();
-        feed::check(direction, part, &parameters)?;
+        all.notes.extend(feed::check(direction, part, &parameters)?);
     }
-    let mut all = Passes::default();
     for (k, chart) in charts.iter().enumerate() {
         let toward = match toward {
             Some((direction, dearer)) => Some((feed::on_chart(direction, chart, cutter)?, dearer)),
@@ -216,7 +216,8 @@ fn searched(
     };
     let worth = planned.length();
     let told = toward.is_none().then(|| (SHORTEST.to_owned(), promised));
-    Levelled { function: LevelFunction::Chart(Arc::new(field)), told }.put_with(&mut planned);
+    let function = LevelFunction::Chart(Arc::new(field));
+    Levelled { function, planned_as: SEARCHED.into(), told }.put_with(&mut planned);
     if toward.is_some() {
         return Ok(planned);
     }
@@ -227,6 +228,9 @@ fn searched(
         _ => Ok(planned),
     }
 }
+
+/// What such a function is.
+pub(crate) const SEARCHED: &str = "stream function, searched";
 
 /// What the user is told of passes along such a function.
 pub(crate) const SHORTEST: &str = "passes follow the stream function of the shortest path";

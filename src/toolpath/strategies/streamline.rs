@@ -15,11 +15,12 @@ use crate::vocabulary::{
 };
 use cutter::Cutter;
 use field::{
-    FieldError, KnotRule, MAX_DENSE, ScalarField, Solver, StreamSample, averaged_knots, equal_shares,
-    fit_by_differences, fit_stream_function, weighted_knots,
+    DIRECTION_WEIGHT, FieldError, KnotRule, LineField, LineSample, MAX_DENSE, SamplePlane, ScalarField,
+    Solver, StreamFit, StreamSample, averaged_knots, equal_shares, fit_by_differences, fit_stream_function,
+    weighted_knots,
 };
 use geometry::{KnotVector, Vector3};
-use keys::{SceneError, Section, toml_string};
+use keys::{SceneError, Section, toml_number, toml_string};
 
 /// Samples of the feed direction per control point of the stream function and side.
 const SAMPLES_PER_CONTROL: usize = 3;
@@ -42,6 +43,9 @@ pub enum StreamMethod {
     Differences,
     /// Finite elements on the part's mesh: all patches as one surface, holes and steps as they are.
     Elements,
+    /// As published for vectors of a table: a tensor-product cubic B-spline whose gradient, turned by a right angle, is nearest to
+    /// the vectors at their own places, lengths included, on averaged knots and of minimum norm.
+    Published,
     /// Elements for parts of several patches and for meshes that no height surface follows; else a cubic B-spline on
     /// uniform knots.
     Automatic,
@@ -58,6 +62,8 @@ pub struct Streamline {
     pub method: StreamMethod,
     /// What solves its equations.
     pub solver: Solver,
+    /// How much following the directions counts over the distances of passes.
+    pub direction_weight: f64,
 }
 
 /// Default control points a side of a stream function. More follow finer changes of the feed direction and cost time as
@@ -75,9 +81,23 @@ impl Streamline {
             control_points: DEFAULT_CONTROL_POINTS,
             method: StreamMethod::Automatic,
             solver: Solver::Cholesky,
+            direction_weight: DIRECTION_WEIGHT,
         }
     }
 }
+
+/// Keys that say how directions are followed.
+const DIRECTED: [&str; 7] =
+    ["follow", "control_points", "method", "degree", "knots", "solver", "direction_weight"];
+
+/// Weights of directions over distances: below, passes leave them; above, distances count for nothing.
+const DIRECTION_WEIGHTS: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
+
+/// Control points a side of the published fit.
+const PUBLISHED_CONTROL_POINTS: usize = 7;
+
+/// What a function is that was fitted to directions.
+pub const FITTED: &str = "stream function, fitted";
 
 /// How much dearer passes square to a wanted direction may be made.
 const FOLLOW: std::ops::RangeInclusive<f64> = 0.0..=1000.0;
@@ -98,6 +118,7 @@ pub(crate) static DEFINITION: Definition = Definition {
         "degree",
         "knots",
         "solver",
+        "direction_weight",
     ],
     read,
 };
@@ -108,7 +129,8 @@ fn read(from: &mut Reading<'_>) -> Result<Box<dyn Strategy>, SceneError> {
         let keys: Vec<&str> = PartKind::Surface.common_keys().iter().chain(keys).copied().collect();
         section.only(&keys, DEFINITION.keys, what)
     };
-    let Some(direction) = direction_keys::read(section, &mut from.tables)? else {
+    let needed = DIRECTED.iter().any(|key| section.has(key));
+    let Some(direction) = direction_keys::read(section, &mut from.tables, needed)? else {
         shortest(&["direction"], "direction = \"shortest\"")?;
         return Ok(Box::new(ShortestStreamline { toward: None }));
     };
@@ -117,14 +139,28 @@ fn read(from: &mut Reading<'_>) -> Result<Box<dyn Strategy>, SceneError> {
         shortest(&keys, "`follow`, which leaves no method to choose")?;
         return Ok(Box::new(ShortestStreamline { toward: Some((direction, dearer.value)) }));
     }
-    let control_points =
-        section.count("control_points", 4..=200)?.map_or(DEFAULT_CONTROL_POINTS, |n| n as usize);
-    let (method, solver) = read_method(section, control_points)?;
-    Ok(Box::new(Streamline { direction, control_points, method, solver }))
+    let control_points = section.count("control_points", 4..=200)?.map(|n| n as usize);
+    let (method, solver) = read_method(section, control_points.unwrap_or(DEFAULT_CONTROL_POINTS))?;
+    let usual = if method == StreamMethod::Published {
+        if !matches!(direction, FeedDirection::File { .. }) {
+            let message = "the published fit is made to the vectors of a table".to_owned();
+            let cure = "add `direction = \"file\"` and `directions = \"FILE\"`, or write another method";
+            return Err(section.error(&section.key_span("method"), message, cure));
+        }
+        PUBLISHED_CONTROL_POINTS
+    } else {
+        DEFAULT_CONTROL_POINTS
+    };
+    let control_points = control_points.unwrap_or(usual);
+    let weight = section.number("direction_weight", DIRECTION_WEIGHTS, "")?;
+    let direction_weight = weight.map_or(DIRECTION_WEIGHT, |weight| weight.value);
+    Ok(Box::new(Streamline { direction, control_points, method, solver, direction_weight }))
 }
 
 fn read_method(section: &Section<'_>, control_points: usize) -> Result<(StreamMethod, Solver), SceneError> {
-    let method = section.word("method", &["auto", "bspline", "differences", "elements"])?.map(|m| m.value);
+    let method = section
+        .word("method", &["auto", "bspline", "differences", "elements", "published"])?
+        .map(|m| m.value);
     let degree = section.count("degree", 2..=5)?.map(|degree| degree as usize);
     let rule = section.word("knots", &KnotRule::WORDS)?.and_then(|word| KnotRule::from_word(word.value));
     let chosen = section.word("solver", &Solver::WORDS)?;
@@ -137,6 +173,15 @@ fn read_method(section: &Section<'_>, control_points: usize) -> Result<(StreamMe
             return refuse(key, message, "delete it, or write `method = \"bspline\"`");
         }
         return Ok((StreamMethod::Elements, Solver::Cholesky));
+    }
+    if method == Some("published") {
+        if let Some(key) =
+            ["degree", "knots", "solver", "direction_weight"].into_iter().find(|key| section.has(key))
+        {
+            let message = format!("`{key}` is as published, which `method` asks for");
+            return refuse(key, message, "delete it, or write `method = \"bspline\"`");
+        }
+        return Ok((StreamMethod::Published, Solver::MinimumNorm));
     }
     if method == Some("differences") {
         if let Some(key) = ["degree", "knots"].into_iter().find(|key| section.has(key)) {
@@ -180,9 +225,13 @@ impl Strategy for Streamline {
     fn write(&self, out: &mut String) -> fmt::Result {
         direction_keys::write(out, &self.direction, "\n")?;
         writeln!(out, "\ncontrol_points = {}", self.control_points)?;
+        if self.direction_weight != DIRECTION_WEIGHT {
+            writeln!(out, "direction_weight = {}", toml_number(self.direction_weight))?;
+        }
         match self.method {
             StreamMethod::Automatic => return writeln!(out, "method = \"auto\""),
             StreamMethod::Elements => return writeln!(out, "method = \"elements\""),
+            StreamMethod::Published => return writeln!(out, "method = \"published\""),
             StreamMethod::Differences => {
                 writeln!(out, "method = \"differences\"  # on three cells for each control point and side")?;
             }
@@ -203,7 +252,7 @@ impl Strategy for Streamline {
                 "its passes by elements are spaced for an upright cutter; use a ball, or another `method`";
             return Err(PlanError::NotApplicable { strategy: DEFINITION.word, reason: reason.to_owned() });
         }
-        mesh_passes::on_mesh(task, Aim::Fitted(&self.direction))
+        mesh_passes::on_mesh(task, Aim::Fitted(&self.direction, self.direction_weight))
     }
 
     fn on_facets(&self, task: &Task<'_>) -> bool {
@@ -228,10 +277,9 @@ fn on_charts(task: &Task<'_>, asked: &Streamline) -> Result<Passes, PlanError> {
     let direction = &asked.direction;
     let charts = Chart::all(part, cutter, settings.guide())?;
     let parameters: Vec<_> = charts.iter().map(|chart| chart.domain).collect();
-    feed::check(direction, part, &parameters)?;
+    let mut all = Passes { notes: feed::check(direction, part, &parameters)?, ..Passes::default() };
     // What was measured of an earlier plan moves levels, not the function.
     let by_calculation = Chart::all(part, cutter, Guide { correction: None, ..settings.guide() })?;
-    let mut all = Passes::default();
     for (chart, calculated) in charts.into_iter().zip(by_calculation) {
         let direction = feed::on_chart(direction, &chart, cutter)?;
         let (field, mut notes, wanted) =
@@ -302,6 +350,7 @@ fn stream_function(
             across: across.into(),
             density: 1.0 / p.strip_width(cutter, &t, step).0,
             weight: (e * g - f * f).max(0.0).sqrt() * (matters + LEAST_WEIGHT),
+            direction: asked.direction_weight,
         })
     };
     let samples: Vec<Option<StreamSample>> = (0..places.len()).map(sample).collect();
@@ -310,6 +359,12 @@ fn stream_function(
         StreamMethod::Differences => {
             let fit = fit_by_differences(&samples, chart.domain, [n; 2], asked.solver).map_err(refused)?;
             (ScalarField::Grid(fit.psi), fit.angle_rms, format!("differences on {n} x {n} cells"), fit.report)
+        }
+        StreamMethod::Published => {
+            let fit = published(direction, chart, asked.control_points)?;
+            let name =
+                format!("the published cubic B-spline with {0} x {0} control points", asked.control_points);
+            (ScalarField::Spline(fit.psi), fit.angle_rms, name, fit.report)
         }
         spline => {
             let (degree, knots) = match spline {
@@ -333,6 +388,53 @@ fn stream_function(
     ];
     Ok((psi, notes, FeedGrid { side: n, lines }))
 }
+
+/// Degree of the published fit.
+const PUBLISHED_DEGREE: usize = 3;
+
+/// The function whose gradient, turned by a right angle, is nearest to the vectors of a table in the parameters of a chart:
+/// all count alike, at their own places and with their lengths.
+fn published(direction: &FeedDirection, chart: &Chart, controls: usize) -> Result<StreamFit, PlanError> {
+    let given: Vec<LineSample> = match direction {
+        FeedDirection::File { samples: Some(table), .. } if is_by_parameters(table, chart) => {
+            table.given().collect()
+        }
+        _ => {
+            return Err(not_applicable(
+                "the published fit needs vectors in its parameters: write the table as u v tu tv",
+            ));
+        }
+    };
+    let sample = |s: &LineSample| {
+        let length = s.line[0].hypot(s.line[1]);
+        let along = s.line.map(|x| x / length);
+        let ([u, v], across) = (s.at, [-along[1], along[0]]);
+        StreamSample { u, v, along, across, density: length, weight: s.weight, direction: 1.0 }
+    };
+    let mut samples: Vec<StreamSample> = given.iter().map(sample).collect();
+    samples.sort_by(|a, b| a.v.total_cmp(&b.v).then(a.u.total_cmp(&b.u)));
+    let knots = |c: usize| {
+        let mut parameters: Vec<f64> = given.iter().map(|s| s.at[c]).collect();
+        parameters.sort_by(f64::total_cmp);
+        parameters.dedup();
+        averaged_knots(PUBLISHED_DEGREE, controls, &parameters, chart.domain[c])
+            .map_err(|e| not_applicable(&format!("its control points cannot be placed: {e}")))
+    };
+    fit_stream_function(&samples, knots(0)?, knots(1)?, Solver::MinimumNorm)
+        .map_err(|e| not_applicable(&e.to_string()))
+}
+
+/// Whether the places of a table are parameters of a chart: those of the plan view are where u and v are x and y.
+fn is_by_parameters(table: &LineField, chart: &Chart) -> bool {
+    let is_plan = |[u, v]: [f64; 2]| {
+        let p = chart.jet(u, v).p;
+        (p.x - u).abs().max((p.y - v).abs()) <= SAME_PLACE
+    };
+    table.plane() == SamplePlane::Parameters || chart.grid(4).all(is_plan)
+}
+
+/// Places nearer than this, mm, are one: rounding.
+const SAME_PLACE: f64 = 1e-9;
 
 /// Knots of both parameters by a rule. What the rule weighs along one parameter is the mean over the
 /// other: speed for averaged knots, which then suit samples evenly spaced on the surface; speed times
@@ -368,4 +470,66 @@ fn placed_knots(
         .map_err(|e| not_applicable(&format!("its control points cannot be placed: {e}")))
     };
     Ok([along(0)?, along(1)?])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use field::LineSample;
+    use geometry::{AnalyticShape, AnalyticSurface};
+    use part::{Part, Patch};
+    use std::sync::Arc;
+
+    /// The velocities of ψ = sin(u/6) cos(v/5) + u v/60 at 15 × 15 places of a plane of 15 by 12 mm, as a file of directions.
+    fn vectors() -> FeedDirection {
+        let sample = |k: usize| {
+            let at @ [u, v] = [15.0 * (k % 15) as f64 / 14.0, 12.0 * (k / 15) as f64 / 14.0];
+            LineSample { at, line: velocity(u, v), weight: 1.0 }
+        };
+        let samples: Vec<_> = (0..225).map(sample).collect();
+        let samples = LineField::new(SamplePlane::Plan, &samples).map(Arc::new);
+        FeedDirection::File { name: "vectors.txt".into(), samples }
+    }
+
+    fn velocity(u: f64, v: f64) -> [f64; 2] {
+        let (psi_u, psi_v) = (
+            (u / 6.0).cos() * (v / 5.0).cos() / 6.0 + v / 60.0,
+            -(u / 6.0).sin() * (v / 5.0).sin() / 5.0 + u / 60.0,
+        );
+        [psi_v, -psi_u]
+    }
+
+    /// Root mean square and greatest angle between the levels of a fit and the velocities, degrees.
+    fn off(method: StreamMethod, solver: Solver, control_points: usize, direction_weight: f64) -> [f64; 2] {
+        let surface = AnalyticSurface::new(AnalyticShape::Plane { height: 0.0 }, [[0.0, 15.0], [0.0, 12.0]]);
+        let part = Part::from_patches(vec![Patch::Analytic(surface.unwrap())], 0.002).unwrap();
+        let cutter = Cutter::ball(6.0).unwrap();
+        let chart = Chart::all(&part, &cutter, Guide::default()).unwrap().remove(0);
+        let direction = vectors();
+        let asked =
+            Streamline { direction: direction.clone(), control_points, method, solver, direction_weight };
+        let (psi, ..) = stream_function(&chart, &cutter, &direction, &asked, Step::Scallop(0.01)).unwrap();
+        let angles: Vec<f64> = chart
+            .grid(61)
+            .map(|[u, v]| {
+                let ([_, a, b], [x, y]) = (psi.value_and_gradient(u, v), velocity(u, v));
+                (a * x + b * y).atan2((b * x - a * y).abs()).abs().to_degrees()
+            })
+            .collect();
+        let squares: f64 = angles.iter().map(|a| a * a).sum();
+        [(squares / angles.len() as f64).sqrt(), angles.into_iter().fold(0.0, f64::max)]
+    }
+
+    /// Vectors that have a stream function are followed as closely as the published fit does where their lengths set the
+    /// distances of passes; where the scallop sets them, by the more the greater their weight.
+    #[test]
+    fn vectors_of_a_stream_function_are_followed() {
+        let [rms, most] = off(StreamMethod::Published, Solver::MinimumNorm, 7, DIRECTION_WEIGHT);
+        println!("published {rms} {most}");
+        assert!(rms <= 0.2 && most <= 1.0, "{rms} {most}");
+        let spline = StreamMethod::BSpline { degree: 3, knots: KnotRule::Uniform };
+        let weighed = [0.3, 10.0, 300.0].map(|weight| off(spline, Solver::Cholesky, 16, weight)[0]);
+        println!("{weighed:?}");
+        assert!(weighed[2] < 1.0 && weighed[1] < weighed[0] && weighed[2] < weighed[1], "{weighed:?}");
+    }
 }

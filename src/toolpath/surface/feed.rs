@@ -42,30 +42,43 @@ const MITRE: f64 = 0.35;
 const SAY: i32 = 4;
 const LEAST_SAY: f64 = 0.3;
 
-/// Refuses directions that are given only outside of the part. `domains` are the parameters of its patches.
+/// Sampled directions that cover less than this share of a part leave most of it to what they are at their border.
+const LEAST_COVERED: f64 = 0.5;
+
+/// Refuses directions that are given only outside of the part, and leaves notes on those that cover little of it. `domains`
+/// are the parameters of its patches.
 pub(crate) fn check(
     direction: &FeedDirection,
     part: &Part,
     domains: &[[[f64; 2]; 2]],
-) -> Result<(), PlanError> {
+) -> Result<Vec<String>, PlanError> {
     let b = part.bounds();
     let rectangle = [[b.min.x, b.max.x], [b.min.y, b.max.y]];
     match direction {
         FeedDirection::Samples(samples) | FeedDirection::File { samples: Some(samples), .. } => {
-            let (names, inside) = match samples.plane() {
-                SamplePlane::Plan => (["x", "y"], samples.count_inside(rectangle) > 0),
-                SamplePlane::Parameters => {
-                    (["u", "v"], domains.iter().any(|domain| samples.count_inside(*domain) > 0))
-                }
+            let (names, all) = match samples.plane() {
+                SamplePlane::Plan => (["x", "y"], &[rectangle][..]),
+                SamplePlane::Parameters => (["u", "v"], domains),
             };
             let what = format!("{} sampled directions", samples.len());
             let cure = "check their unit and origin, and whether they are x and y or u and v";
-            if inside { Ok(()) } else { Err(outside(&what, names, samples.bounds(), cure)) }
+            if all.iter().all(|domain| samples.count_inside(*domain) == 0) {
+                return Err(outside(&what, names, samples.bounds(), cure));
+            }
+            let covered = all.iter().map(|domain| share_covered(samples.bounds(), *domain));
+            let most = covered.fold(0.0, f64::max);
+            let ranges = ranges(names, samples.bounds());
+            Ok(Vec::from_iter((most < LEAST_COVERED).then(|| {
+                format!(
+                    "the {what} ({ranges}) cover {:.2} % of the part; beyond them they go on as they are at their border: {cure}",
+                    100.0 * most
+                )
+            })))
         }
         FeedDirection::Guides { curves, .. } => {
             let mut stretches = curves.iter().flat_map(|curve| curve.windows(2));
             if stretches.any(|ends| meets(rectangle, [ends[0], ends[1]])) {
-                return Ok(());
+                return Ok(Vec::new());
             }
             let mut all = Aabb::EMPTY;
             curves.iter().flatten().for_each(|p| all.grow(&Point3::new(p.x, p.y, 0.0)));
@@ -77,17 +90,32 @@ pub(crate) fn check(
             Err(not_applicable(&format!("its directions in {name} were not read")))
         }
         FeedDirection::Blend(parts) => {
-            parts.iter().try_for_each(|(part_of, _)| check(part_of, part, domains))
+            let notes = parts.iter().map(|(part_of, _)| check(part_of, part, domains));
+            Ok(notes.collect::<Result<Vec<_>, PlanError>>()?.concat())
         }
-        _ => Ok(()),
+        _ => Ok(Vec::new()),
     }
 }
 
-fn outside(what: &str, [name_a, name_b]: [&str; 2], [a, b]: [[f64; 2]; 2], cure: &str) -> PlanError {
-    not_applicable(&format!(
-        "all {what} lie outside of it ({name_a} from {} to {}, {name_b} from {} to {}); {cure}",
-        a[0], a[1], b[0], b[1]
-    ))
+fn outside(what: &str, names: [&str; 2], bounds: [[f64; 2]; 2], cure: &str) -> PlanError {
+    not_applicable(&format!("all {what} lie outside of it ({}); {cure}", ranges(names, bounds)))
+}
+
+fn ranges([name_a, name_b]: [&str; 2], [a, b]: [[f64; 2]; 2]) -> String {
+    format!("{name_a} from {} to {}, {name_b} from {} to {}", a[0], a[1], b[0], b[1])
+}
+
+/// The share of a domain that bounds cover; where they have no width along a side, of the other one.
+fn share_covered(bounds: [[f64; 2]; 2], domain: [[f64; 2]; 2]) -> f64 {
+    let along = |c: usize| {
+        let ([a, b], [lo, hi]) = (bounds[c], domain[c]);
+        if a == b {
+            1.0
+        } else {
+            ((b.min(hi) - a.max(lo)) / (hi - lo).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
+        }
+    };
+    along(0) * along(1)
 }
 
 /// True where a segment has a point in common with a rectangle, borders included (Liang and Barsky 1984).
@@ -331,6 +359,28 @@ mod tests {
             assert!((line[1].atan2(line[0]) - exact).abs() < 0.02, "{x} {y}: {line:?} {exact}");
             assert!((sure - re.hypot(im)).abs() < 0.02, "{x} {y}: {sure}");
         }
+    }
+
+    /// u and v from 0 to 1 where the parameters of the part are millimetres.
+    #[test]
+    fn samples_that_cover_little_of_a_part_are_told() {
+        let surface = AnalyticSurface::new(AnalyticShape::Plane { height: 0.0 }, [[0.0, 30.0], [0.0, 20.0]]);
+        let part = Part::from_patches(vec![Patch::Analytic(surface.unwrap())], 0.002).unwrap();
+        let over = |size: [f64; 2]| {
+            let sample = |k: usize| {
+                let at = [size[0] * (k % 5) as f64 / 4.0, size[1] * (k / 5) as f64 / 4.0];
+                LineSample { at, line: [1.0, 0.0], weight: 1.0 }
+            };
+            let samples: Vec<_> = (0..25).map(sample).collect();
+            let field = LineField::new(SamplePlane::Parameters, &samples).unwrap();
+            check(&FeedDirection::Samples(Arc::new(field)), &part, &[[[0.0, 30.0], [0.0, 20.0]]]).unwrap()
+        };
+        assert!(
+            over([1.0, 1.0])[0].contains("(u from 0 to 1, v from 0 to 1) cover 0.17 %"),
+            "{:?}",
+            over([1.0; 2])
+        );
+        assert!(over([30.0, 20.0]).is_empty() && over([28.0, 0.0]).is_empty());
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Planned passes, not yet joined.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use crate::moves::touch::Touch;
@@ -29,6 +30,8 @@ pub struct Passes {
 pub struct Levelled {
     /// The function.
     pub function: LevelFunction,
+    /// What it is, in a few words.
+    pub planned_as: Cow<'static, str>,
     /// What is told of its passes, and the length that was predicted, mm.
     pub told: Option<(String, f64)>,
 }
