@@ -32,8 +32,9 @@ use super::{JobError, Machined, Outcome, figures, judge, units};
 const FINER: f64 = 0.5;
 
 /// Rounds in which bounds are asked for that are smaller by the square of that, down to a share of the first; the cell may
-/// be the finest already.
+/// be the finest already that suits the scene. It shrinks in them, too, up to so many cells: more take minutes.
 const CLOSER_ROUNDS: usize = 2;
+const MOST_CLOSER_CELLS: usize = 4_000_000;
 const CLOSEST_BOUND: f64 = 0.02;
 /// Share of the gouge tolerance that triangles may stand off the patches which tools are kept away from. The plan uses half
 /// of the tolerance for itself, and triangles may stand off to either side. Less takes more triangles.
@@ -263,7 +264,8 @@ impl Session {
         {
             rounds += 1;
             let before = simulation.cell;
-            simulation.cell = (FINER * before).max(finest.min(before));
+            let few = measured.cells as f64 <= FINER * FINER * MOST_CLOSER_CELLS as f64;
+            simulation.cell = if few { FINER * before } else { (FINER * before).max(finest.min(before)) };
             simulation.error_bound = (FINER * FINER * simulation.error_bound).max(least);
             let cells = self.budget().grid_before_planning(&self.area(), &simulation);
             let finer = cells.map(|cells| engine.measure(&self.task(path, &simulation, &cells), monitor));

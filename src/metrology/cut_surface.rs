@@ -212,19 +212,28 @@ impl CutSurface<'_> {
     /// The meeting lies on the closed-form surface to `MEETING`. Where the line leaves the grid
     /// before it meets the surface, the vertical distance times `n.z` stands in for it.
     pub fn along_normal(&self, p: &Point3, n: &Vector3) -> Option<Deviation> {
+        self.along_normal_with(p, n, &[])
+    }
+
+    /// As [`CutSurface::along_normal`], with further moves that may be lowest between centres.
+    pub fn along_normal_with(&self, p: &Point3, n: &Vector3, further: &[u32]) -> Option<Deviation> {
+        let lower = |lowest: CutPoint, x: f64, y: f64| match self.envelope.lowest(x, y, further) {
+            Some((z, by)) if z < lowest.z => CutPoint { z, by },
+            _ => lowest,
+        };
         let (i, j) = self.cut.grid.cell_at(p.x, p.y)?;
         let winners = self.winners(i, j);
-        let start = self.lowest_of(&winners, p.x, p.y);
+        let start = lower(self.lowest_of(&winners, p.x, p.y), p.x, p.y);
         if !start.z.is_finite() {
             return None;
         }
         let vertical = start.z - p.z;
         let sideways = vertical * n.z * n.xy().norm();
         let found = if sideways.abs() < 0.5 * self.cut.grid.cell {
-            let at = |x: f64, y: f64| Some(self.lowest_of(&winners, x, y));
+            let at = |x: f64, y: f64| Some(lower(self.lowest_of(&winners, x, y), x, y));
             self.newton(p, n, start, None, &at)
         } else {
-            let at = |x: f64, y: f64| self.at(x, y);
+            let at = |x: f64, y: f64| Some(lower(self.at(x, y)?, x, y));
             self.march(p, n, vertical).and_then(|(lo, hi)| self.newton(p, n, start, Some((lo, hi)), &at))
         };
         Some(found.unwrap_or(Deviation {

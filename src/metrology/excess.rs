@@ -22,7 +22,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::closer::{Effort, Promising, Square, Value, search};
 use super::figures::{Bounded, ExcessFigures, ExcessKind, Measurement, NUMERICAL_FLOOR};
 use super::inspection::{Inspection, Sample};
-use geometry::{Node, Point2};
+use geometry::{Node, Point2, Point3};
 use patch::{Held, Patches};
 use sim::Grid;
 use work::monitor::{self, Cancelled, Monitor};
@@ -41,9 +41,12 @@ pub(super) struct ExcessSearch<'a> {
     pub inspection: &'a Inspection<'a>,
     /// Height of the stock's flat top, mm.
     pub stock_top: f64,
-    /// Whether moves that no cell saw may cut lower at a place; then its height is no figure.
-    pub cut_away: &'a (dyn Fn(&geometry::Point3) -> bool + Sync),
+    /// The move that cuts lower at a place, though it may have won no cell: then the height there is no figure.
+    pub cut_away_by: &'a (dyn Fn(&Point3) -> Option<u32> + Sync),
 }
+
+/// Searches that are repeated with a move which no cell saw: it is lowest between centres only.
+const MOST_UNSEEN: usize = 24;
 
 /// Which places count.
 #[derive(Clone, Copy, PartialEq)]
@@ -66,15 +69,25 @@ impl ExcessSearch<'_> {
     ) -> Result<ExcessFigures, Cancelled> {
         let limits = self.inspection.limits;
         let (scallop, uncut) = (&measured.scallop, &measured.uncut);
-        let ridge = Bounded { at_mm: scallop.max_at_mm, ..Bounded::new(scallop.max_mm.unwrap_or(0.0), 0.0) };
-        let region = uncut.regions.first().map_or(Bounded::default(), |region| Bounded {
+        // What moves that no cell saw cut away does not stand.
+        let stands = scallop.max_at_mm.filter(|at| (self.cut_away_by)(&Point3::from(*at)).is_none());
+        let ridge = stands.map_or(Bounded::default(), |at| Bounded {
+            at_mm: Some(self.inspection.part.closest_point(&Point3::from(at)).0.point.into()),
+            ..Bounded::new(scallop.max_mm.unwrap_or(0.0), 0.0)
+        });
+        let stands =
+            uncut.regions.first().filter(|region| self.top_is_cut(region.at_mm, region.height_mm).is_none());
+        let region = stands.map_or(Bounded::default(), |region| Bounded {
             at_mm: Some(region.at_mm),
             ..Bounded::new(region.height_mm, 0.0)
         });
         let known = if region.max_mm > ridge.max_mm { region } else { ridge };
         monitor.start("looking for the highest material", 0);
         let open = self.open(samples, known.max_mm.min(limits.scallop), monitor)?;
-        let highest = self.highest(&open, known, Kind::Any, monitor)?;
+        // Moves that no cell saw, as they are found.
+        let mut unseen = Vec::new();
+        let mut sought = |known, kind| self.highest(&open, known, kind, &mut unseen, monitor);
+        let highest = sought(known, Kind::Any)?;
         monitor::check(monitor)?;
         let (reached, unreached) = if highest.at_most() <= limits.scallop {
             // Whatever it is, it holds every limit.
@@ -83,12 +96,12 @@ impl ExcessSearch<'_> {
             // Below its limit it is of no account.
             let floor = limits.uncut - self.inspection.asked.max(2.0 * NUMERICAL_FLOOR);
             let unreached = Bounded { max_mm: region.max_mm.max(floor), ..region };
-            let found = self.highest(&open, unreached, Kind::Unreached, monitor)?;
+            let found = sought(unreached, Kind::Unreached)?;
             monitor::check(monitor)?;
             let most = found.at_most();
             let found = if found.max_mm > unreached.max_mm { found } else { region };
             let unreached = Bounded { error_bound_mm: (most - found.max_mm).max(0.0), ..found };
-            (self.highest(&open, ridge, Kind::Reached, monitor)?, unreached)
+            (sought(ridge, Kind::Reached)?, unreached)
         };
         let kind = if unreached.max_mm >= highest.max_mm && unreached.max_mm > 0.0 {
             ExcessKind::Uncut
@@ -107,7 +120,7 @@ impl ExcessSearch<'_> {
         let fine = self.finer_than_cells(grid);
         let row = |j: usize| {
             monitor::check(monitor)?;
-            let patches = self.patches(known);
+            let patches = self.patches(known, &[]);
             let looked_at = (0..grid.nx).filter(|&i| {
                 let k = grid.index(i, j);
                 let on = !samples[k].deviation.is_nan();
@@ -135,8 +148,8 @@ impl ExcessSearch<'_> {
         Ok(open)
     }
 
-    fn patches(&self, least: f64) -> Patches<'_> {
-        Patches { inspection: self.inspection, stock_top: self.stock_top, least }
+    fn patches<'b>(&'b self, least: f64, unseen: &'b [u32]) -> Patches<'b> {
+        Patches { inspection: self.inspection, stock_top: self.stock_top, least, unseen }
     }
 
     /// How far off the highest place may be, mm: nearer where it is to be told from its limit.
@@ -146,15 +159,46 @@ impl ExcessSearch<'_> {
         if known < limit { asked.min(0.5 * (limit - known)).max(NUMERICAL_FLOOR) } else { asked }
     }
 
-    /// The highest place of a kind in some squares, if it is higher than `known`.
+    /// The highest place of a kind in some squares, if it is higher than `known`. Moves that are found to have cut it away are
+    /// added to those that no cell saw, and it is sought again.
     fn highest(
         &self,
         open: &Promising,
         known: Bounded,
         kind: Kind,
+        unseen: &mut Vec<u32>,
         monitor: &dyn Monitor,
     ) -> Result<Bounded, Cancelled> {
-        let patches = self.patches(known.max_mm);
+        loop {
+            let highest = self.highest_seen(open, known, kind, unseen, monitor)?;
+            let found = highest.at_mm.filter(|_| highest.max_mm > known.max_mm);
+            match found.and_then(|at| self.top_is_cut(at, highest.max_mm)) {
+                None => return Ok(highest),
+                Some(by) if unseen.len() < MOST_UNSEEN && !unseen.contains(&by) => unseen.push(by),
+                // Between nothing and this height all is possible.
+                Some(_) => {
+                    let error_bound_mm = highest.error_bound_mm.max(highest.max_mm);
+                    return Ok(Bounded { error_bound_mm, ..highest });
+                }
+            }
+        }
+    }
+
+    /// The move that cuts away what stands so high, mm, on the design over a place.
+    fn top_is_cut(&self, [x, y, _]: [f64; 3], height: f64) -> Option<u32> {
+        let design = self.inspection.part.highest_at(x, y)?;
+        (self.cut_away_by)(&(design.point + design.normal * height))
+    }
+
+    fn highest_seen(
+        &self,
+        open: &Promising,
+        known: Bounded,
+        kind: Kind,
+        unseen: &[u32],
+        monitor: &dyn Monitor,
+    ) -> Result<Bounded, Cancelled> {
+        let patches = self.patches(known.max_mm, unseen);
         let small = OTHER_KIND_SHARE * 0.5 * self.inspection.grid.cell;
         let at = |centre: Point2, half: f64| {
             let unknown = |place| (place, Value { here: f64::NEG_INFINITY, possible: patches.most() });
@@ -189,14 +233,6 @@ impl ExcessSearch<'_> {
             None => known,
         };
         highest.error_bound_mm = (found.possible - highest.max_mm).max(0.0) + NUMERICAL_FLOOR;
-        let cut_away = |at: [f64; 3]| {
-            let design = self.inspection.part.highest_at(at[0], at[1]);
-            design.is_some_and(|d| (self.cut_away)(&(d.point + d.normal * highest.max_mm)))
-        };
-        if found.greatest.is_some() && highest.at_mm.is_some_and(cut_away) {
-            // Moves that no cell saw cut it away: between nothing and this height all is possible.
-            highest.error_bound_mm = highest.error_bound_mm.max(highest.max_mm);
-        }
         Ok(highest)
     }
 

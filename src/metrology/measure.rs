@@ -2,7 +2,7 @@
 
 use super::cut_surface::CutSurface;
 use super::excess::ExcessSearch;
-use super::figures::{CloserLook, ExcessFigures, Limits, Measurement};
+use super::figures::{CloserLook, ExcessFigures, Limits, Measurement, NUMERICAL_FLOOR};
 use super::inspected::inspect;
 use super::inspection::Inspection;
 use super::pairs::pair_figures;
@@ -76,8 +76,12 @@ pub fn measure(
     measured.refined = refinement.run(&hidden, &hiding, &mut measured, monitor)?;
     doubt(&mut measured, &surface, part, path, asked);
     let all: Vec<u32> = (0..path.len() as u32).collect();
-    let cut_away = |at: &Point3| surface.height_of(&all, at) < at.z - asked.error_bound;
-    let search = ExcessSearch { inspection: &inspection, stock_top: asked.stock_top, cut_away: &cut_away };
+    let cut_away_by = |at: &Point3| {
+        let (z, by) = surface.envelope.lowest(at.x, at.y, &all)?;
+        (z < at.z - NUMERICAL_FLOOR).then_some(by)
+    };
+    let search =
+        ExcessSearch { inspection: &inspection, stock_top: asked.stock_top, cut_away_by: &cut_away_by };
     if !asked.borders {
         measured.excess = ExcessFigures::of_cells(&measured);
         return Ok(measured);

@@ -11,8 +11,8 @@
 //! families of lines gives the length of any curve: `ds = |n_x||dy| + |n_y||dx|`), stretched by its
 //! rise.
 //!
-//! A ridge over a sloping border leans out over it, and its nearest design point lies on the border, farther away than the
-//! ridge is high. There the height is taken along the border's normal.
+//! What stands aside of a border's normal, on the side where the part has ended, stands over no place of the part: it is no
+//! ridge of it, though the part may lie below.
 
 use super::cut_surface::CutSurface;
 use super::figures::{Limits, NEAR_LIMIT, NUMERICAL_FLOOR, RidgePlace, ScallopFigures};
@@ -259,8 +259,11 @@ impl<'a> RidgeFinder<'a> {
     fn sample(&self, line: &GridLine, meeting: Meeting, hidden: &mut Vec<Hidden>) -> Option<RidgeSample> {
         let Meeting { at: q, z, moves, .. } = meeting;
         let at = Point3::new(q.x, q.y, z);
-        let (foot, distance) = self.part.closest_point(&at);
-        let height = if self.ends_at(&foot) { (at - foot.point).dot(&foot.normal) } else { distance };
+        let (foot, height) = self.part.closest_point(&at);
+        let aside = (at - foot.point).cross(&foot.normal).norm();
+        if aside > NUMERICAL_FLOOR && self.ends_at(&foot) {
+            return None;
+        }
         let [m, n] = moves.map(|by| self.surface.normal(by, q.x, q.y));
         if height > self.limits.uncut && !self.is_scallop(moves, &foot) {
             hidden.push(Hidden::Ridge(q, height));
@@ -334,8 +337,7 @@ impl<'a> RidgeFinder<'a> {
 }
 
 impl RidgeFinder<'_> {
-    /// True where the part ends at `foot`. What stands over its border leans out over it where the border slopes; it is
-    /// as high as it stands along the normal there. Seams between patches are no ends.
+    /// True where the part ends at `foot`. Seams between patches are no ends.
     fn ends_at(&self, foot: &SurfacePoint) -> bool {
         if let Some(at) = foot.at {
             return self.part.patches().len() == 1 && self.part.is_at_patch_end(at);

@@ -308,6 +308,7 @@ mod tests {
             level_lines: vec![far.iter().map(|p| p.xy()).collect(), Vec::new()],
             singular_points: vec![SingularPoint { position: far[1], half_turns: 1 }],
             passes: vec![far.iter().map(point).collect(), Vec::new()],
+            ..PlannedField::default()
         };
         let none = PlannedField::default();
         for (nx, ny) in [(1, 1), (1, 300), (300, 1), (70, 50)] {

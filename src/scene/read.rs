@@ -257,10 +257,13 @@ fn read_tolerance(section: &Section<'_>) -> Result<Limits, SceneError> {
         ["scallop", "scallop_share", "scallop_highest", "gouge", "uncut", "chord", "direction", "correct"];
     section.only(&KEYS, &[], "[tolerance]")?;
     let length = |key, default| Ok::<f64, SceneError>(section.length(key)?.map_or(default, |v| v.value));
+    let scallop = length("scallop", DEFAULT_LIMITS.scallop)?;
+    let highest = read_scallop_rule(section)?.highest * scallop;
     Ok(Limits {
-        scallop: length("scallop", DEFAULT_LIMITS.scallop)?,
+        scallop,
         gouge: length("gouge", DEFAULT_LIMITS.gouge)?,
-        uncut: length("uncut", DEFAULT_LIMITS.uncut)?,
+        // What ridges may be, other material may be as well where nothing is said of it.
+        uncut: length("uncut", DEFAULT_LIMITS.uncut.max(highest))?,
         chord: length("chord", DEFAULT_LIMITS.chord)?,
     })
 }

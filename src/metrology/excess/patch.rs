@@ -44,6 +44,8 @@ pub(super) enum Held {
 struct Clipped {
     corners: [Point2; MOST_CORNERS],
     len: usize,
+    /// Plan parts of the design's normals at the corners; between them normals turn a little less.
+    leans: [Vector2; MOST_CORNERS],
     /// On the design, within the polygon.
     foot: SurfacePoint,
     /// How far the design may lie below the plane, mm.
@@ -58,6 +60,8 @@ pub(super) struct Patches<'a> {
     pub stock_top: f64,
     /// Heights up to this, mm, are of no account: what may stand is told at least that high.
     pub least: f64,
+    /// Moves that no cell shows.
+    pub unseen: &'a [u32],
 }
 
 impl Patches<'_> {
@@ -154,11 +158,13 @@ impl Patches<'_> {
         // Just inside the corners, where the next triangle does not answer.
         let inside = |c: &Point2| c + (middle - c) * 1e-3;
         let foot = seen(middle).or_else(|| corners[..len].iter().find_map(|c| seen(inside(c))))?;
-        let mut piece = Clipped { corners, len, foot, below: 0.0, cosine: 1.0 };
+        let leans = [foot.normal.xy(); MOST_CORNERS];
+        let mut piece = Clipped { corners, len, leans, foot, below: 0.0, cosine: 1.0 };
         if part.patches().is_empty() {
             let point =
                 Point3::new(foot.point.x, foot.point.y, height(Point2::new(foot.point.x, foot.point.y)));
             piece.foot = SurfacePoint { point, normal, ..foot };
+            piece.leans = [normal.xy(); MOST_CORNERS];
         } else {
             piece.bend(part, &inside);
         }
@@ -169,17 +175,17 @@ impl Patches<'_> {
     fn above(&self, piece: &Clipped) -> Option<(f64, f64, u32)> {
         let surface = self.inspection.surface;
         let SurfacePoint { point, normal, .. } = &piece.foot;
-        let here = surface.along_normal(point, normal)?;
+        let here = surface.along_normal_with(point, normal, self.unseen)?;
         let moves = self.moves(point, here.by);
-        let lean = normal.xy();
+        let upright = piece.leans[..piece.len].iter().all(|lean| lean.norm() < 1e-12);
         let least = self.least.max(0.0);
         let mut reach = 1.2 * here.distance.max(least) + 1e-4;
-        // The cut over a place stands aside of it by its height times the lean: heights from the least one that counts to
+        // The cut over a place stands aside of it by its height times its lean: heights from the least one that counts to
         // the assumed one are looked at, and the latter must be enough.
         for _ in 0..MOST_REACHES {
-            let above = self.over(piece, &moves, [lean * least, lean * reach]);
+            let above = self.over(piece, &moves, [least, reach]);
             let possible = (above + piece.below) / piece.cosine;
-            if possible <= reach || lean.norm() < 1e-12 {
+            if possible <= reach || upright {
                 return Some((possible.max(here.distance).max(least), here.distance, here.by));
             }
             reach = 1.5 * possible;
@@ -192,7 +198,9 @@ impl Patches<'_> {
         let surface = self.inspection.surface;
         let Some((i, j)) = surface.cut.grid.cell_at(point.x, point.y) else { return Vec::new() };
         let winners = surface.winners(i, j);
-        let all = std::iter::once(first).chain(winners.moves().iter().copied()).filter(|&by| by != NOT_CUT);
+        let all = std::iter::once(first)
+            .chain(winners.moves().iter().chain(self.unseen).copied())
+            .filter(|&by| by != NOT_CUT);
         let mut low: Vec<(f64, u32)> =
             all.filter_map(|by| Some((surface.envelope.height(by, point.x, point.y)?, by))).collect();
         low.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -201,15 +209,15 @@ impl Patches<'_> {
         low.into_iter().map(|m| m.1).collect()
     }
 
-    /// Height of the cut above the piece's plane, along its normal, at most: where the polygon comes to when it moves from
-    /// one place aside to the other.
-    fn over(&self, piece: &Clipped, moves: &[u32], aside: [Vector2; 2]) -> f64 {
+    /// Height of the cut above the piece's plane, along its normal, at most: where the polygon comes to when it rises from
+    /// one height to the other, each corner along its own normal.
+    fn over(&self, piece: &Clipped, moves: &[u32], heights: [f64; 2]) -> f64 {
         let SurfacePoint { point, normal, .. } = &piece.foot;
         let mut places = [Point2::origin(); 2 * MOST_CORNERS];
         let mut count = 0;
-        for corner in &piece.corners[..piece.len] {
-            for shift in aside {
-                (places[count], count) = (corner + shift, count + 1);
+        for (corner, lean) in piece.corners.iter().zip(&piece.leans).take(piece.len) {
+            for height in heights {
+                (places[count], count) = (corner + lean * height, count + 1);
             }
         }
         let level = |q: &Point2, z: f64| {
@@ -236,9 +244,10 @@ impl Clipped {
     /// Measures how the design leaves its tangent plane, at the corners just inside.
     fn bend(&mut self, part: &part::Part, inside: &dyn Fn(&Point2) -> Point2) {
         let SurfacePoint { point, normal, .. } = self.foot;
-        for corner in &self.corners[..self.len] {
+        for (corner, lean) in self.corners.iter().zip(&mut self.leans).take(self.len) {
             let q = inside(corner);
             let Some(foot) = part.highest_at(q.x, q.y) else { continue };
+            *lean += BETWEEN_CORNERS * (foot.normal - normal).xy();
             self.below = self.below.max(-BETWEEN_CORNERS * (foot.point - point).dot(&normal));
             self.cosine = self.cosine.min(foot.normal.dot(&normal)).max(0.1);
         }
