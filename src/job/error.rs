@@ -114,6 +114,17 @@ pub enum JobError {
         /// What is wrong.
         reason: VoxelError,
     },
+    /// The moves take more memory than is left, where they are to be met by rays.
+    #[error("{scene}: the toolpath \"{name}\" cannot be measured: {reason}")]
+    #[diagnostic(help("write a greater `memory_mib` in [simulation]"))]
+    Rays {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// Name of the toolpath.
+        name: String,
+        /// What is needed and what is left.
+        reason: EngineError,
+    },
     /// The places along the normals take more memory than allowed.
     #[error(
         "{scene}: places {spacing} mm apart on the part need {needed_mib} MiB, and {allowed_mib} MiB are allowed"
@@ -161,6 +172,7 @@ impl JobError {
             EngineError::Places { spacing, needed_mib, allowed_mib, fitting } => {
                 Self::Places { scene, spacing, needed_mib, allowed_mib, fitting }
             }
+            EngineError::Rays { .. } => Self::Rays { scene, name, reason },
         }
     }
 

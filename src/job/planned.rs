@@ -181,7 +181,7 @@ impl Session {
 type Engaged = (Plan, Option<(Engagement, f64)>);
 
 /// Times that a pocket is planned again at most.
-const ROUNDS: usize = 4;
+const ROUNDS: usize = 2;
 
 /// The share of the limit by which it is lowered at least. Less may change no pass at all.
 const LEAST_LOWERING: f64 = 0.01;

@@ -13,11 +13,14 @@
 //! What lies within r − h of a segment, seen from the middle of a stretch of length 2h, lies within r of it from all of the
 //! stretch. So the same calculation with a lesser radius bounds the angle on the whole stretch; stretches are halved until
 //! the bound is near the greatest angle that was found.
+//!
+//! Moves are taken in blocks, one after the other. What was cleared well before a block and lies whole in what else was is left
+//! out from then on: loops and passes over cleared ground are most of a long path.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use cutter::Cutter;
-use geometry::{Point2, Vector2};
+use geometry::{DiscSamples, Point2, Vector2};
 use motion::{Move, MoveKind, Toolpath};
 use sim::ENGAGED;
 use work::monitor::{self, Cancelled, Monitor};
@@ -40,6 +43,15 @@ const PART: f64 = 0.25;
 /// Shorter arcs, rad, and nearer places, over the radius, are rounding.
 const ROUNDING: f64 = 1e-12;
 const TOUCHING: f64 = 1e-9;
+
+/// Moves of a block: fewer are thinned more often, more see more that lies in other ground.
+const BLOCK: usize = 512;
+
+/// Margin over the radius by which a segment must lie in others to be left out. Greater is quicker, and leaves more of them.
+const MARGIN: f64 = 0.1;
+
+/// Longer segments, over the radius, are never left out.
+const SHORT: f64 = 0.3;
 
 /// Buckets along a side at most.
 const MOST_BUCKETS: f64 = 1024.0;
@@ -78,25 +90,44 @@ pub fn contact_arcs(
     monitor: &dyn Monitor,
 ) -> Result<ContactArcs, Cancelled> {
     monitor.start("measuring engagement", path.len() as u64);
-    let cleared = Swept::by(path, cutter.radius());
-    let of_moves = work::parallel::try_map(path.len(), |k| {
-        if k % 64 == 0 {
-            monitor::check(monitor)?;
-            monitor.advance(64);
-        }
-        let stretches = cleared.stretches(path, top, k);
-        let begin = stretches.first().map_or(0.0, |first| cleared.at(first, -first.half));
-        let found = |s: &Stretch| cleared.at(s, 0.0).max(cleared.at(s, s.half));
-        Ok(stretches.iter().map(found).fold(begin, f64::max))
-    })?;
-    let counted = |k: usize| count(&path.moves[k]);
-    let greatest = (0..path.len()).filter(|&k| counted(k)).map(|k| of_moves[k]).fold(0.0, f64::max);
-    let at_most = work::parallel::try_map(path.len(), |k| {
+    let mut cleared = Swept::by(path, cutter.radius());
+    let (mut of_moves, mut at_most) = (Vec::new(), Vec::new());
+    // Of the moves that count, so far.
+    let mut greatest = 0.0f64;
+    while of_moves.len() < path.len() {
         monitor::check(monitor)?;
-        let stretches = if counted(k) { cleared.stretches(path, top, k) } else { Vec::new() };
-        let most = |stretch: &Stretch| cleared.at_most(stretch, greatest, HALVINGS);
-        Ok(stretches.iter().map(most).fold(0.0, f64::max))
-    })?;
+        let first = of_moves.len();
+        cleared.thin(first);
+        let count_of = BLOCK.min(path.len() - first);
+        let stretches: Vec<_> = (first..first + count_of).map(|k| cleared.stretches(path, top, k)).collect();
+        of_moves.extend(work::parallel::try_map(count_of, |k| {
+            monitor::check(monitor)?;
+            let stretches = &stretches[k];
+            let begin = stretches.first().map_or(0.0, |first| cleared.at(first, -first.half));
+            let found = |s: &Stretch| cleared.at(s, 0.0).max(cleared.at(s, s.half));
+            Ok(stretches.iter().map(found).fold(begin, f64::max))
+        })?);
+        let counted: Vec<bool> = path.moves[first..first + count_of].iter().map(count).collect();
+        let greatest_of = |found: &[f64]| {
+            let counted = found.iter().zip(&counted).filter(|(_, counted)| **counted);
+            counted.map(|(found, _)| *found).fold(0.0, f64::max)
+        };
+        greatest = greatest.max(greatest_of(&of_moves[first..]));
+        let bounds = work::parallel::try_map(count_of, |k| {
+            monitor::check(monitor)?;
+            let of_counted = stretches[k].iter().filter(|_| counted[k]);
+            let each = of_counted.map(|stretch| cleared.bounded(stretch, greatest, HALVINGS));
+            Ok(each.fold([0.0f64; 2], |most, one| [0, 1].map(|side| most[side].max(one[side]))))
+        })?;
+        for (k, [least, most]) in bounds.into_iter().enumerate() {
+            of_moves[first + k] = of_moves[first + k].max(least);
+            at_most.push(most);
+        }
+        greatest = greatest.max(greatest_of(&of_moves[first..]));
+        monitor.advance(count_of as u64);
+    }
+    // What stays below the greatest of all is of no account.
+    at_most.iter_mut().filter(|most| **most > 0.0).for_each(|most| *most = most.max(greatest));
     Ok(ContactArcs { of_moves, at_most })
 }
 
@@ -152,6 +183,9 @@ struct Swept {
     bucket: f64,
     side: [usize; 2],
     buckets: Vec<Vec<u32>>,
+    samples: DiscSamples,
+    /// Segments in the buckets up to the one with this index were thinned, when so many of them were left.
+    thinned: (usize, usize),
 }
 
 impl Swept {
@@ -185,6 +219,8 @@ impl Swept {
             bucket,
             side,
             buckets: vec![Vec::new(); side[0] * side[1]],
+            samples: DiscSamples::new((1.0 + FILM + SHORT) * radius, MARGIN * radius),
+            thinned: (0, 0),
         };
         for (k, segment) in segments.iter().enumerate() {
             swept.put(k as u32, segment);
@@ -202,6 +238,61 @@ impl Swept {
             let index = self.column(1, at.y) * self.side[0] + self.column(0, at.x);
             if self.buckets[index].last() != Some(&k) {
                 self.buckets[index].push(k);
+            }
+        }
+    }
+
+    /// Leaves out segments that lie whole in others: those of both that no place of move `from` or later may find fresh. Every
+    /// angle, and every bound of a stretch, stays the same.
+    fn thin(&mut self, from: usize) {
+        /// Fewer are no matter.
+        const FEW: usize = 1000;
+        let before = self.segments[from].gone[0] - self.fresh;
+        let settled = self.segments[..from].partition_point(|s| s.gone[1] < before);
+        let (thinned, left) = self.thinned;
+        if settled - thinned < left + FEW {
+            return;
+        }
+        // Stretches are half so long at most: their lesser radius sees no gap either.
+        let within = ((1.0 - MARGIN - 0.5 * STRETCH) * self.radius).powi(2);
+        let mut live = vec![false; settled];
+        self.buckets
+            .iter()
+            .flatten()
+            .filter(|k| (**k as usize) < settled)
+            .for_each(|&k| live[k as usize] = true);
+        let mut near = Vec::new();
+        for k in 0..settled {
+            let Segment { ends: [a, b], z, .. } = self.segments[k];
+            let length = (b - a).norm();
+            if !live[k] || length > SHORT * self.radius {
+                continue;
+            }
+            let (middle, radius) = (a + 0.5 * (b - a), (1.0 + FILM) * self.radius + 0.5 * length);
+            near.clear();
+            self.each_near(&middle, radius + self.radius, |other| {
+                if other < settled && other != k && live[other] && self.segments[other].z <= z {
+                    near.push(self.segments[other].ends.map(|p| p - middle));
+                }
+                true
+            });
+            live[k] = !self.samples.covered(radius, &mut near, |ends, p| square_distance(p, ends) <= within);
+        }
+        for bucket in &mut self.buckets {
+            bucket.retain(|&k| live.get(k as usize).is_none_or(|live| *live));
+        }
+        self.thinned = (settled, live.iter().filter(|live| **live).count());
+    }
+
+    /// Tells the segments that may come so near to a place, bucket by bucket in the order of the path, until `tell` has enough of
+    /// a bucket.
+    fn each_near(&self, place: &Point2, reach: f64, mut tell: impl FnMut(usize) -> bool) {
+        let reach = Vector2::new(1.0, 1.0) * (reach + self.bucket);
+        let (lo, hi) = (place - reach - self.origin, place + reach - self.origin);
+        for j in self.column(1, lo.y)..=self.column(1, hi.y) {
+            for i in self.column(0, lo.x)..=self.column(0, hi.x) {
+                let bucket = &self.buckets[j * self.side[0] + i];
+                let _ = bucket.iter().all(|&k| tell(k as usize));
             }
         }
     }
@@ -235,20 +326,19 @@ impl Swept {
         self.standing(&Stretch { middle, gone, half: 0.0, ..*stretch })
     }
 
-    /// What the angle is at most on a stretch, as far as it exceeds `enough`.
-    fn at_most(&self, stretch: &Stretch, enough: f64, halvings: u32) -> f64 {
+    /// What the angle is at least and at most on a stretch, as far as it exceeds `enough`.
+    fn bounded(&self, stretch: &Stretch, enough: f64, halvings: u32) -> [f64; 2] {
         let most = self.standing(stretch);
         if most <= enough + PRECISE {
-            return most.max(enough);
+            return [0.0, most.max(enough)];
         }
-        if halvings == 0 {
-            return most;
-        }
+        let here = self.at(stretch, 0.0);
         // One that stands so high all along need not be divided for its bound.
-        if most - self.at(stretch, 0.0) <= PRECISE {
-            return most;
+        if halvings == 0 || most - here <= PRECISE {
+            return [here, most];
         }
-        stretch.halves().iter().map(|half| self.at_most(half, enough, halvings - 1)).fold(0.0, f64::max)
+        let [a, b] = stretch.halves().map(|half| self.bounded(&half, enough, halvings - 1));
+        [here.max(a[0]).max(b[0]), a[1].max(b[1])]
     }
 
     /// The angle of the front half of the circumference in stock, at most anywhere on a stretch.
@@ -258,29 +348,21 @@ impl Swept {
         let own = (1.0 - TOUCHING) * self.radius - stretch.half;
         let earlier = (1.0 + FILM) * self.radius - stretch.half;
         let mut front = Front::new(self.radius);
-        let reach = Vector2::new(1.0, 1.0) * (self.radius + earlier + self.bucket);
-        let (lo, hi) = (stretch.middle - reach - self.origin, stretch.middle + reach - self.origin);
-        for j in self.column(1, lo.y)..=self.column(1, hi.y) {
-            for i in self.column(0, lo.x)..=self.column(0, hi.x) {
-                for &k in &self.buckets[j * self.side[0] + i] {
-                    let segment = &self.segments[k as usize];
-                    if segment.gone[0] > gone {
-                        break;
-                    }
-                    if segment.z > stretch.z + ENGAGED {
-                        continue;
-                    }
-                    for (ways, radius) in [([f64::NEG_INFINITY, before], earlier), ([before, gone], own)] {
-                        if let Some(ends) = segment.between(ways) {
-                            front.clear(&ends.map(|p| stretch.seen(&p)), radius);
-                        }
-                    }
-                    if front.standing.is_empty() {
-                        return 0.0;
-                    }
+        self.each_near(&stretch.middle, self.radius + earlier, |k| {
+            let segment = &self.segments[k];
+            if segment.gone[0] > gone || front.standing.is_empty() {
+                return false;
+            }
+            if segment.z > stretch.z + ENGAGED {
+                return true;
+            }
+            for (ways, radius) in [([f64::NEG_INFINITY, before], earlier), ([before, gone], own)] {
+                if let Some(ends) = segment.between(ways) {
+                    front.clear(&ends.map(|p| stretch.seen(&p)), radius);
                 }
             }
-        }
+            true
+        });
         front.standing.iter().map(|[from, to]| to - from).sum()
     }
 }

@@ -25,7 +25,7 @@ use super::solid::{Moving, OppositeAxes, SweptMoves, below};
 use cutter::Solid;
 use geometry::{Node, Point3, Vector3};
 use lowest::{Ray, Support};
-use motion::{MoveKind, Toolpath};
+use motion::{Move, MoveKind, Toolpath};
 use work::monitor::{Cancelled, Monitor, check};
 use work::parallel;
 
@@ -102,6 +102,10 @@ impl LowestHit {
     }
 }
 
+fn cuts(step: &Move) -> bool {
+    step.kind != MoveKind::Rapid
+}
+
 impl Rays {
     /// Of all moves of `path` but rapids.
     ///
@@ -109,9 +113,14 @@ impl Rays {
     /// [`RaysError::Opposite`] when one turns the axis to its opposite; [`RaysError::Cancelled`].
     pub fn new(path: &Toolpath, solid: &Solid, monitor: &dyn Monitor) -> Result<Self, RaysError> {
         check(monitor)?;
-        let moves = SweptMoves::new(solid, path, |m| m.kind != MoveKind::Rapid)?;
+        let moves = SweptMoves::new(solid, path, cuts)?;
         check(monitor)?;
         Ok(Self { moves })
+    }
+
+    /// Memory that the moves of `path` take, bytes.
+    pub fn bytes(path: &Toolpath, solid: &Solid) -> u64 {
+        SweptMoves::bytes(solid, path, cuts)
     }
 
     /// The moves.

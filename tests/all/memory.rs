@@ -104,6 +104,23 @@ fn the_plan_of_a_large_part_takes_no_more_than_was_allowed() {
     assert!(highest <= 1 + BESIDES, "{highest} MiB");
 }
 
+/// Figures that nothing is judged by are left out where they do not fit, with the reason.
+#[test]
+fn a_roughness_that_does_not_fit_is_left_out() {
+    let scene = "[part]\nsurface = \"plane\"\nx = [0, 1000]\ny = [0, 1000]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n\
+                 [simulation]\nmemory_mib = 1\n[[toolpath]]\nstrategy = \"zigzag\"\nstepover = 5\n";
+    let (home, process) = start(scene);
+    let highest = peak(&process);
+    let output = process.wait_with_output().unwrap();
+    assert!(matches!(output.status.code(), Some(0 | 1)), "{output:?}");
+    let report = std::fs::read_to_string(home.path().join("out/report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let roughness = &report["toolpaths"][0]["roughness"];
+    assert!(roughness["ra_mm"].is_null(), "{roughness}");
+    assert!(roughness["reason"].as_str().unwrap().contains("to be met by rays"), "{roughness}");
+    assert!(highest <= 1 + BESIDES, "{highest} MiB");
+}
+
 /// A mesh is refused by the size that its file states, before its triangles are made.
 #[test]
 fn a_mesh_beyond_the_memory_is_refused_unread() {

@@ -7,7 +7,6 @@ use metrology::{
 };
 use report::{Claim, Figure, Gravity, micrometres, place};
 use serde::Serialize;
-use sim::Rays;
 use toolpath::Pocket;
 use work::monitor::Monitor;
 
@@ -98,8 +97,10 @@ fn of_part(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Covered, JobError> {
         return Ok((areas, None));
     }
     let solid = Solid::of_cutter(&scene.cutter, scene.holder.as_ref());
-    let rays = Rays::new(path, &solid, monitor)
-        .map_err(|reason| JobError::engine(scene, &run.request.name, reason.into()))?;
+    let rays = run
+        .budget()
+        .rays(path, &solid, Some(&cut.grid), monitor)
+        .map_err(|reason| JobError::engine(scene, &run.request.name, reason))?;
     let by_rays = RaysCut { rays: &rays, path, solid: &solid };
     let inward = scene.cutter.radius();
     let outward = (REACH_OVER_UNCUT * scene.tolerance.uncut).max(inward);

@@ -1,7 +1,9 @@
 //! Roughness across the feed.
 
 use cutter::Solid;
-use metrology::{REACH_OVER_UNCUT, RaysCut, RoughnessFigures, SweptVolume, View, path_figures, roughness};
+use metrology::{
+    EngineError, REACH_OVER_UNCUT, RaysCut, RoughnessFigures, SweptVolume, View, path_figures, roughness,
+};
 use report::{Figure, with_bound};
 use sim::Rays;
 use work::monitor::Monitor;
@@ -25,11 +27,16 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     }
     let r = match run.view() {
         View::Normals(view) => measure(run, &view.rays, &view.solid, monitor)?,
-        View::Heights(_) => {
+        View::Heights(cut) => {
             let solid = Solid::of_cutter(&run.scene().cutter, None);
-            let rays = Rays::new(run.path(), &solid, monitor)
-                .map_err(|reason| JobError::engine(run.scene(), &run.request.name, reason.into()))?;
-            measure(run, &rays, &solid, monitor)?
+            match run.budget().rays(run.path(), &solid, Some(&cut.grid), monitor) {
+                Ok(rays) => measure(run, &rays, &solid, monitor)?,
+                // Nothing is judged by it.
+                Err(memory @ EngineError::Rays { .. }) => {
+                    RoughnessFigures { reason: Some(memory.to_string()), ..RoughnessFigures::default() }
+                }
+                Err(reason) => return Err(JobError::engine(run.scene(), &run.request.name, reason)),
+            }
         }
     };
     let [ra, rz] = [r.ra_mm, r.rz_mm].map(|height| with_bound(height, r.error_bound_mm));

@@ -1,10 +1,13 @@
 //! The memory that a simulation may take, and the cells that fit into it.
 
+use cutter::Solid;
 use geometry::Aabb;
+use motion::Toolpath;
 use part::Part;
-use sim::{Grid, GridError};
+use sim::{Grid, GridError, Rays};
+use work::monitor::Monitor;
 
-use super::Simulation;
+use super::{EngineError, Simulation};
 use crate::closer::BYTES_PER_SQUARE;
 
 /// Bytes in a MiB.
@@ -69,6 +72,26 @@ impl Budget {
     /// What is left beside a grid that was cut and not yet measured, bytes.
     pub fn left_beside(&self, moves: usize, grid: &Grid) -> u64 {
         self.left(moves).saturating_sub((grid.len() * BYTES_PER_CUT_CELL) as u64)
+    }
+
+    /// The moves of a path, ready to be met by rays, beside the grid that was measured.
+    ///
+    /// # Errors
+    /// [`EngineError::Rays`] when they do not fit into what is left; those of [`Rays::new`].
+    pub fn rays(
+        &self,
+        path: &Toolpath,
+        solid: &Solid,
+        grid: Option<&Grid>,
+        monitor: &dyn Monitor,
+    ) -> Result<Rays, EngineError> {
+        let measured = grid.map_or(0, |grid| (grid.len() * BYTES_PER_MEASURED_CELL) as u64);
+        let left = self.left(path.len()).saturating_sub(measured);
+        let needed = Rays::bytes(path, solid);
+        if needed > left {
+            return Err(EngineError::Rays { needed_mib: needed.div_ceil(MIB), left_mib: left / MIB });
+        }
+        Ok(Rays::new(path, solid, monitor)?)
     }
 
     /// Squares that a search may hold beside a grid that was measured.

@@ -30,6 +30,14 @@ pub enum EngineError {
         /// Spacing that fits, mm.
         fitting: f64,
     },
+    /// The moves that rays are to meet take more memory than is left.
+    #[error("the moves need {needed_mib} MiB to be met by rays, and {left_mib} MiB of the memory are left")]
+    Rays {
+        /// What they need.
+        needed_mib: u64,
+        /// What is left.
+        left_mib: u64,
+    },
 }
 
 impl From<RaysError> for EngineError {

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use cutter::Solid;
 use geometry::{Aabb, Vector3};
-use sim::{Rays, VoxelEngine, VoxelStock, Voxels};
+use sim::{VoxelEngine, VoxelStock, Voxels};
 use work::monitor::Monitor;
 
 use super::budget::MIB;
@@ -65,7 +65,7 @@ impl Engine for Normals {
         let spacing = wider * task.simulation.cell;
         check_places(task, spacing)?;
         let reach = (REACH_OVER_UNCUT * task.limits.uncut).max(cutter.radius());
-        let rays = Rays::new(path, &solid, monitor)?;
+        let rays = task.budget.rays(path, &solid, None, monitor)?;
         let inward = cutter.radius();
         let space = space(task, inward.max(reach));
         let voxels =

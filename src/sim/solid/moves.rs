@@ -28,6 +28,10 @@ const LEAF: u32 = 2;
 /// Relative rounding of an axis that is kept in f32.
 const ROUNDING: f64 = 4.0 * f32::EPSILON as f64;
 
+/// Bytes a move, and at most a part while the tree grows: the part twice, its box three times, the tree and what it is made from.
+const BYTES_PER_MOTION: u64 = (size_of::<Motion>() + size_of::<u32>()) as u64;
+const BYTES_PER_PART: u64 = 240;
+
 /// Axes that differ from their mean by this chord or less lie in a convex cone (half a right angle to each side is the
 /// chord of 1.41).
 const WIDEST_CONE: f64 = 1.4;
@@ -95,6 +99,12 @@ pub struct SweptMoves {
     slots: Vec<MovePart>,
 }
 
+/// Into how many parts a move is divided.
+fn parts(m: &Motion, solid: &Solid) -> u32 {
+    let pieces = (m.way.norm() / (RADII_LONG * solid.radius())).max(m.turn / WIDEST_TURN);
+    pieces.ceil().clamp(1.0, MAX_PARTS) as u32
+}
+
 impl SweptMoves {
     /// Of the moves of `path` that `chosen` picks; coordinates up to [`MAX_COORDINATE`].
     ///
@@ -118,14 +128,16 @@ impl SweptMoves {
         Ok(moves)
     }
 
+    /// Memory at most while the chosen moves of `path` are put in order, bytes.
+    pub fn bytes(solid: &Solid, path: &Toolpath, chosen: impl Fn(&Move) -> bool) -> u64 {
+        let chosen = (0..path.len()).filter(|&k| chosen(&path.moves[k]));
+        let motions = chosen.filter_map(|k| Motion::new(&path.location_before(k), &path.moves[k].to));
+        motions.map(|m| BYTES_PER_MOTION + u64::from(parts(&m, solid)) * BYTES_PER_PART).sum()
+    }
+
     fn plant(&mut self) {
-        let long = RADII_LONG * self.solid.radius();
-        let count = |m: &Motion| {
-            let pieces = (m.way.norm() / long).max(m.turn / WIDEST_TURN);
-            pieces.ceil().clamp(1.0, MAX_PARTS) as u32
-        };
         let of_move = |(k, m): (usize, &Motion)| {
-            let n = count(m);
+            let n = parts(m, &self.solid);
             let at = move |i: u32| f64::from(i) / f64::from(n);
             (0..n).map(move |i| MovePart { chosen: k as u32, range: [at(i), at(i + 1)] })
         };

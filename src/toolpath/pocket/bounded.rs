@@ -14,7 +14,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::cleared::Cleared;
+use super::cleared::{Cleared, FILM};
 use super::route::{Entry, Run, bend, circle};
 use super::turning::Turning;
 use super::way::{Room, Way, fitting};
@@ -178,6 +178,7 @@ pub(super) fn bound(
         out: Vec::new(),
         marks: Vec::new(),
         above_to: f64::NEG_INFINITY,
+        thin_at: 0,
         did: Bounding::default(),
     };
     walker.go(monitor)?;
@@ -223,6 +224,8 @@ struct Walker<'a> {
     marks: Vec<Mark>,
     /// Where the last stretch above the limit ends.
     above_to: f64,
+    /// The ground is thinned when it has so many places.
+    thin_at: usize,
     did: Bounding,
 }
 
@@ -236,6 +239,7 @@ impl Walker<'_> {
         let mut here = 0.0;
         while s < total {
             check(monitor)?;
+            self.thin(s);
             let begun = self.marks.len();
             let reach = self.walk(s, total, false);
             if reach >= total {
@@ -254,9 +258,15 @@ impl Walker<'_> {
                     self.follow(&found, s);
                 }
                 None => {
-                    let on = (s + STEP * self.radius).min(total);
-                    self.tell_above(reach, on);
-                    s = self.walk(s, on.max(reach), true);
+                    let on = (s + STEP * self.radius).min(total).max(reach);
+                    s = self.walk(s, reach, true);
+                    let nibbled = self.nibble(s);
+                    if nibbled > s {
+                        s = nibbled;
+                    } else {
+                        self.tell_above(reach, on);
+                        s = self.walk(s, on, true);
+                    }
                     here = 0.0;
                 }
             }
@@ -268,6 +278,21 @@ impl Walker<'_> {
         self.cleared.add(at);
         self.out.push(at);
         self.marks.push(Mark { s, out: self.out.len(), places: self.cleared.len() });
+    }
+
+    /// Leaves out places of the ground that others cover, where none of them will be taken back and none is fresh at `s`.
+    fn thin(&mut self, s: f64) {
+        /// Fewer are no matter.
+        const FEW: usize = 1000;
+        if self.cleared.len() < self.thin_at {
+            return;
+        }
+        let settled = self.fresh_from(s);
+        let left_out = self.cleared.thin(settled);
+        for mark in &mut self.marks {
+            mark.places = (mark.places.max(settled) - left_out).max(1);
+        }
+        self.thin_at = 2 * self.cleared.len() + FEW;
     }
 
     fn back_to_mark(&mut self, index: usize) {
@@ -325,9 +350,49 @@ impl Walker<'_> {
     /// Angle in stock where the way comes to `s`.
     fn arc_at(&self, s: f64) -> f64 {
         let Some(heading) = self.way.heading(s) else { return 0.0 };
+        self.cleared.arc(&self.way.at(s), &heading, self.fresh_from(s))
+    }
+
+    /// The first place that is beside the chip of a move at `s`.
+    fn fresh_from(&self, s: f64) -> usize {
         let behind = self.marks.partition_point(|m| m.s < s - FRESH * self.radius);
-        let fresh = self.marks.get(behind).map_or(0, |m| m.places - 1);
-        self.cleared.arc(&self.way.at(s), &heading, fresh)
+        self.marks.get(behind).map_or(0, |m| m.places - 1)
+    }
+
+    /// Goes on from `s` to a corner of walls right before it, a film at a time, each after a way back and forth over cleared ground:
+    /// where no loop fits any more, only a layer that loads nothing may stand at so great an angle. Leaves how far it came.
+    fn nibble(&mut self, s: f64) -> f64 {
+        /// Layers over a film. Greater might be more than one, where chords meet.
+        const LAYER: f64 = 0.9;
+        /// Longer ways, over the radius, are no corner's last bit.
+        const MOST: f64 = 0.06;
+        /// Half the way back and forth over the radius: what was cut farther behind is no chip of its own any more.
+        const BACK: f64 = 0.06;
+        /// Cosine of the turn in a corner of walls. Bends that are less sharp have room for loops beyond them.
+        const WALLS: f64 = 0.8;
+        let (radius, corner) = (self.radius, self.way.corner_after(s));
+        let back = s - BACK * radius;
+        let Some(heading) = self.way.heading(corner) else { return s };
+        let onward = self.way.heading(corner + FINEST * radius).unwrap_or(heading);
+        let bends = corner < self.way.total() && heading.dot(&onward) > WALLS;
+        if bends || corner - s > MOST * radius || back < 0.0 {
+            return s;
+        }
+        let behind = self.way.at(back);
+        let between = self.way.corners_between(back, s).to_vec();
+        let steps = ((corner - s) / (LAYER * FILM * radius)).ceil() as usize;
+        let mut gone = s;
+        for step in 1..=steps {
+            let on = s + (corner - s) * step as f64 / steps as f64;
+            let at = self.way.at(on);
+            if self.cleared.arc(&at, &heading, usize::MAX) > self.bounds.limit {
+                break;
+            }
+            self.out.extend(between.iter().rev().chain([&behind]).chain(&between));
+            self.place(on, at);
+            gone = on;
+        }
+        gone
     }
 
     /// The next loop: how far on along the way, at most `reach`, and the loop. `here` is the radius of the

@@ -9,12 +9,15 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use geometry::{Point2, Vector2};
+use geometry::{DiscSamples, Point2, Vector2};
 
 /// Stock thinner than this share of the radius counts as none: where the cutter passes along ground that
 /// it has cut before, chords and rounding leave films that load nothing. More would hide real stock: beside
 /// a straight pass an angle `a` is seen smaller by up to `FILM / sin a`.
 pub(super) const FILM: f64 = 0.004;
+
+/// Margin over the radius by which a disc must be covered to be left out. Greater is quicker, and leaves more discs.
+const MARGIN: f64 = 0.1;
 
 /// Parts of the front half circle that are told apart.
 const PARTS: usize = 192;
@@ -69,6 +72,43 @@ impl Cleared {
             if let Some(p) = self.discs.pop() {
                 let bucket = self.bucket_of(&p);
                 self.buckets[bucket].pop();
+            }
+        }
+    }
+
+    /// Leaves out the discs among the first `count` that the others cover whole: every angle stays the same. Leaves how many
+    /// those were.
+    pub fn thin(&mut self, count: usize) -> usize {
+        let samples = DiscSamples::new(self.radius, MARGIN * self.radius);
+        let within = ((1.0 - MARGIN) * self.radius).powi(2);
+        let mut keep = vec![true; self.discs.len()];
+        let mut near = Vec::new();
+        for k in 0..count.min(self.discs.len()) {
+            let centre = self.discs[k];
+            near.clear();
+            self.each_near(&centre, 2.0 * self.radius, |other| {
+                if other != k && keep[other] {
+                    near.push(self.discs[other] - centre);
+                }
+            });
+            keep[k] = !samples.covered(self.radius, &mut near, |c, p| (c - p).norm_squared() <= within);
+        }
+        let kept: Vec<Point2> =
+            self.discs.iter().zip(&keep).filter(|(_, keep)| **keep).map(|(p, _)| *p).collect();
+        let left_out = self.discs.len() - kept.len();
+        self.buckets.iter_mut().for_each(Vec::clear);
+        self.discs.clear();
+        kept.into_iter().for_each(|p| self.add(p));
+        left_out
+    }
+
+    /// The discs whose centres may be within `reach` of a place, by bucket.
+    fn each_near(&self, place: &Point2, reach: f64, mut tell: impl FnMut(usize)) {
+        let reach = Vector2::new(reach, reach);
+        let (lo, hi) = (place - reach - self.origin, place + reach - self.origin);
+        for j in self.column(1, lo.y)..=self.column(1, hi.y) {
+            for i in self.column(0, lo.x)..=self.column(0, hi.x) {
+                self.buckets[j * self.side[0] + i].iter().for_each(|&k| tell(k as usize));
             }
         }
     }
@@ -183,6 +223,31 @@ mod tests {
         // A place that is cleared already, and one that is not.
         assert_eq!(ring.arc(&Point2::new(0.5, 0.5), &x, usize::MAX), 0.0);
         assert_eq!(ring.arc(&Point2::new(12.0, 0.5), &x, usize::MAX), PI);
+    }
+
+    /// Passes beside each other: the ground stays as it was, without most of its places.
+    #[test]
+    fn what_others_cover_is_left_out() {
+        let pass = |k: u32| {
+            let y = -6.0 + 0.3 * f64::from(k);
+            line(Point2::new(-12.0, y), Point2::new(12.0, y))
+        };
+        let mut ground = cleared((0..40).flat_map(pass));
+        let places = (0..4000).map(|k| {
+            let (a, b) = (0.618_034 * f64::from(k), 0.754_878 * f64::from(k));
+            Point2::new(40.0 * a.fract() - 20.0, 30.0 * b.fract() - 15.0)
+        });
+        let heading = |k: usize| Vector2::new((k as f64).cos(), (k as f64).sin());
+        let places: Vec<Point2> = places.collect();
+        let fresh = ground.len() - 500;
+        let arcs = |ground: &Cleared, fresh: usize| -> Vec<f64> {
+            places.iter().enumerate().map(|(k, p)| ground.arc(p, &heading(k), fresh)).collect()
+        };
+        let before = arcs(&ground, fresh);
+        let left_out = ground.thin(fresh);
+        assert!(left_out > 12_000 && ground.len() == 40 * 401 - left_out, "{left_out}");
+        assert_eq!(arcs(&ground, fresh - left_out), before);
+        assert!(before.iter().any(|arc| *arc > 0.0 && *arc < PI));
     }
 
     #[test]

@@ -240,7 +240,7 @@ impl PocketStrategy {
     pub(super) fn bounded(&self) -> Option<f64> {
         /// Planned for less by this, rad, which is what sides of polylines, films and the parts in which
         /// angles are told apart add.
-        const SPARE: f64 = 0.03;
+        const SPARE: f64 = 0.04;
         self.engagement.filter(|angle| *angle < std::f64::consts::PI).map(|angle| angle - SPARE)
     }
 

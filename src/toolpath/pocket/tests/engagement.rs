@@ -56,13 +56,9 @@ fn bounded_passes_keep_to_their_engagement() {
         let (bounded, arcs) = measured(Some(limit.to_radians()));
         assert!(arcs.bound() < 1f64.to_radians(), "{}", arcs.bound().to_degrees());
         let above = above(&bounded, &arcs, (limit + SLACK).to_radians());
-        let all: f64 =
-            bounded.segments().filter(|(_, _, m)| of_passes(m)).map(|(a, b, _)| (b - a).norm()).sum();
-        assert!(above.iter().all(|(_, length)| *length <= TIP * 0.5 * diameter), "{pattern:?}: {above:?}");
-        assert!(
-            above.iter().map(|(_, length)| length).sum::<f64>() < 2e-3 * all,
-            "{pattern:?}: {above:?} of {all}"
-        );
+        // Where a line of a zigzag meets a wall, its loops become films.
+        let longest = if matches!(pattern, Pattern::Zigzag { .. }) { 0.01 * diameter } else { 0.0 };
+        assert!(above.iter().all(|(_, length)| *length <= longest), "{pattern:?}: {above:?}");
         let (plain, arcs) = measured(None);
         let cut = plain.moves.iter().zip(&arcs.of_moves).filter(|(m, _)| of_passes(m));
         let plain = cut.map(|(_, arc)| *arc).fold(0.0, f64::max);
