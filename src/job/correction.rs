@@ -179,6 +179,8 @@ struct Corrected<'a> {
     engine: &'a dyn Engine,
     /// What no ridge may exceed, mm.
     target: f64,
+    /// To what the height of the highest is measured while it may be planned lower, mm; 0: as closely as the verdict needs.
+    enough: f64,
     /// The best plan, by what widths, and what it leaves.
     best: Planned,
     widths: Widths,
@@ -206,7 +208,9 @@ impl Session {
             Some(_) => self.ridges(request, engine, &first, monitor)?,
             None => None,
         };
-        let measure = |planned: &Planned| self.measure(request, engine, &planned.plan.path, monitor);
+        // Where each round measures all, narrower passes cost less time than a closer look, and little length.
+        let enough = target.filter(|_| map.is_none()).map_or(0.0, |target| SLACK * target);
+        let measure = |planned: &Planned| self.measure(request, engine, &planned.plan.path, enough, monitor);
         let (measured, standing) = match &map {
             Some(map) => (None, Standing::of_ridges(map, &first, [1.0; 2])),
             None => {
@@ -216,7 +220,10 @@ impl Session {
             }
         };
         let (Some(target), Some(standing)) = (target, standing) else {
-            let measured = measured.map_or_else(|| measure(&first), Ok)?;
+            let measured = match measured {
+                Some(measured) if enough == 0.0 || !self.is_open(&measured) => measured,
+                _ => self.measure(request, engine, &first.plan.path, 0.0, monitor)?,
+            };
             return Ok((first, measured));
         };
         let interval = plane_interval(&self.scene.cutter, request.step);
@@ -228,6 +235,7 @@ impl Session {
             around,
             engine,
             target,
+            enough,
             best: first,
             widths,
             standing,
@@ -293,7 +301,8 @@ impl Corrected<'_> {
             let (planned, factors) = self.plan(&next, monitor)?;
             // Two at a time might be more than the memory that the run may take.
             drop(measured.take());
-            let again = self.session.measure(self.request, self.engine, &planned.plan.path, monitor)?;
+            let path = &planned.plan.path;
+            let again = self.session.measure(self.request, self.engine, path, self.enough, monitor)?;
             let found = Standing::of_all(&again.measurement, &planned, factors);
             if found.is_some_and(|found| self.keep_if_better(planned, next, found)) {
                 (measured, in_vain) = (Some(again), 0);
@@ -301,7 +310,13 @@ impl Corrected<'_> {
                 in_vain += 1;
             }
         }
-        measured.map_or_else(|| self.measure_best(monitor), Ok)
+        match measured {
+            Some(measured) if self.enough == 0.0 || !self.session.is_open(&measured) => Ok(measured),
+            other => {
+                drop(other);
+                self.measure_best(monitor)
+            }
+        }
     }
 
     /// Whether the best plan stands above the target, but little.
@@ -368,7 +383,8 @@ impl Corrected<'_> {
 
     /// Measures all of the best plan.
     fn measure_best(&mut self, monitor: &dyn Monitor) -> Result<Measured, JobError> {
-        let measured = self.session.measure(self.request, self.engine, &self.best.plan.path, monitor)?;
+        let measured =
+            self.session.measure(self.request, self.engine, &self.best.plan.path, 0.0, monitor)?;
         let factors = self.standing.round.factors;
         if let Some(standing) = Standing::of_all(&measured.measurement, &self.best, factors) {
             self.rounds[self.kept] = standing.round;

@@ -244,12 +244,14 @@ impl Session {
         })
     }
 
-    /// Cuts and measures; on finer cells where a limit hangs on that.
+    /// Cuts and measures; on finer cells where a limit hangs on that, until the height of what stands highest is known to
+    /// `enough` mm.
     pub(crate) fn measure(
         &self,
         request: &ToolpathRequest,
         engine: &dyn Engine,
         path: &Toolpath,
+        enough: f64,
         monitor: &dyn Monitor,
     ) -> Result<Measured, JobError> {
         let scene = &self.scene;
@@ -260,7 +262,8 @@ impl Session {
         let mut simulation = Simulation { cell_is_auto: false, cell: measured.cell, ..scene.simulation };
         let (mut rounds, least) = (0, CLOSEST_BOUND * scene.simulation.error_bound);
         while (simulation.cell > finest || rounds < CLOSER_ROUNDS)
-            && judge::is_open(&measured.measurement, &scene.tolerance, &scene.scallop_rule)
+            && self.is_open(&measured)
+            && judge::highest_reached(&measured.measurement).error_bound_mm > enough
         {
             rounds += 1;
             let before = simulation.cell;
@@ -282,6 +285,11 @@ impl Session {
             }
         }
         Ok(measured)
+    }
+
+    /// Whether a limit of the measured surface is undecided, and none violated.
+    pub(crate) fn is_open(&self, measured: &Measured) -> bool {
+        judge::is_open(&measured.measurement, &self.scene.tolerance, &self.scene.scallop_rule)
     }
 
     /// The notes on a toolpath: on the part, the cells, the measurement, the plan, and of its figures.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::support::{height_mesh, is_good, number, patch, run_scene, write_stl};
+use crate::support::{height_mesh, is_good, number, patch, run_changed, run_scene, write_stl};
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/five_axes")
@@ -53,9 +53,7 @@ fn stays_near(path: &Value) {
     assert!(air < 0.35 * cutting, "{}: {air} mm of air for {cutting} mm cut", path["name"]);
 }
 
-#[test]
-fn a_lead_makes_passes_on_a_dome_wider() {
-    let (_, report) = run_scene(&folder().join("dome.toml"));
+fn passes_of_a_lead_are_wider((_, report): (i32, Value)) {
     let [upright, lead] = [0, 1].map(|k| &report["toolpaths"][k]);
     assert_eq!(
         (&upright["simulation"]["engine"], &lead["simulation"]["engine"]),
@@ -66,6 +64,21 @@ fn a_lead_makes_passes_on_a_dome_wider() {
     takes_its_part_of_the_block(lead);
     let length = |path: &Value| number(path, "/path/cutting_length_mm");
     assert!(length(lead) < 0.7 * length(upright), "{} {}", length(lead), length(upright));
+}
+
+/// As first planned, in coarser cells.
+#[test]
+fn a_lead_makes_passes_on_a_dome_wider() {
+    let words = [["[simulation]\ncell = 0.1", "[tolerance]\ncorrect = false\n[simulation]\ncell = 0.2"]];
+    passes_of_a_lead_are_wider(run_changed(&folder().join("dome.toml"), &words, |_| true));
+}
+
+#[test]
+#[ignore = "minutes: plans corrected until they hold"]
+fn a_lead_makes_passes_on_a_dome_wider_as_shipped() {
+    let (code, report) = run_scene(&folder().join("dome.toml"));
+    assert_eq!(code, 0, "{report:#}");
+    passes_of_a_lead_are_wider((code, report));
 }
 
 #[test]

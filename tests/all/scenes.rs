@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use millstream::geometry::{Point3, TriangleMesh};
 use serde_json::Value;
 
-use crate::support::{height_mesh, number, run_scene, write_stl};
+use crate::support::{height_mesh, number, run_changed, run_scene, write_stl};
 
 fn scene(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)
@@ -160,20 +160,9 @@ fn plate_reports_the_closed_form() {
     }
 }
 
-/// Runs a shipped scene with some words replaced, and with those toolpaths only whose text is wanted.
+/// A shipped scene with other words, and those of its toolpaths that are wanted.
 fn run_with(name: &str, words: &[[&str; 2]], wanted: impl Fn(&str) -> bool) -> (i32, Value) {
-    let text = std::fs::read_to_string(scene(name)).unwrap();
-    let text = text.replace("file = \"", &format!("file = \"{}/", scene("").display()));
-    let text = words.iter().fold(text, |text, [from, to]| {
-        assert!(text.contains(from), "{name} has no {from}");
-        text.replace(from, to)
-    });
-    let (head, toolpaths) = text.split_once("[[toolpath]]").unwrap();
-    let kept = toolpaths.split("[[toolpath]]").filter(|toolpath| wanted(toolpath));
-    let changed = kept.fold(head.to_owned(), |text, toolpath| text + "[[toolpath]]" + toolpath);
-    let file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
-    std::fs::write(file.path(), changed).unwrap();
-    run_scene(file.path())
+    run_changed(&scene(name), words, wanted)
 }
 
 fn wave_is_good((status, report): (i32, Value)) {

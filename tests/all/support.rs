@@ -168,3 +168,20 @@ pub fn is_good(path: &Value) {
         assert!(off <= 0.01, "{name}: {off}");
     }
 }
+
+/// Runs the scene in `path` with other words, and those of its toolpaths that are wanted.
+pub fn run_changed(path: &Path, words: &[[&str; 2]], wanted: impl Fn(&str) -> bool) -> (i32, Value) {
+    let text = std::fs::read_to_string(path).unwrap();
+    let folder = path.parent().unwrap();
+    let text = text.replace("file = \"", &format!("file = \"{}/", folder.display()));
+    let text = words.iter().fold(text, |text, [from, to]| {
+        assert!(text.contains(from), "{} has no {from}", path.display());
+        text.replace(from, to)
+    });
+    let (head, toolpaths) = text.split_once("[[toolpath]]").unwrap();
+    let kept = toolpaths.split("[[toolpath]]").filter(|toolpath| wanted(toolpath));
+    let changed = kept.fold(head.to_owned(), |text, toolpath| text + "[[toolpath]]" + toolpath);
+    let file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
+    std::fs::write(file.path(), changed).unwrap();
+    run_scene(file.path())
+}

@@ -24,7 +24,9 @@ fn offset_of(side: &dyn Fn(f64) -> f64, offset: &str, diameter: f64) -> (serde_j
     let scene = home.path().join("side.toml");
     let text = format!(
         "[part]\nsections = \"side.txt\"\nside = \"suction\"\nrotate = [90, 0, 0]\n[cutter]\nshape = \"ball\"\n\
-         diameter = {diameter}\n[tolerance]\nscallop = 0.05\n[simulation]\ncell = 0.2\n[[toolpath]]\nname = \"a\"\nstrategy = \"offset-surface\"\n\
+         diameter = {diameter}\n[tolerance]\nscallop = 0.1\nscallop_highest = 3\n\
+         correct = false\n[simulation]\ncell = 0.2\nengine = \"rays\"\n\
+         [[toolpath]]\nname = \"a\"\nstrategy = \"offset-surface\"\n\
          offset = \"{offset}\"\n"
     );
     std::fs::write(&scene, text).unwrap();
