@@ -108,9 +108,9 @@ pub fn tessellate(
         return Err(TessellateError::Domain);
     }
     let density = Density::of(jet, lines);
-    let mut refine = 1.0;
+    let (mut refine, mut least, mut before) = (1.0, 1, 0.0);
     loop {
-        let [us, vs] = density.lines(tolerance / SAFETY, refine);
+        let [us, vs] = density.lines(tolerance / SAFETY, refine, least);
         let needed = 2.0 * (us.len as f64 * vs.len as f64);
         if needed > MAX_TRIANGLES as f64 {
             return Err(TessellateError::TooMany { tolerance, needed: needed as u64 });
@@ -120,6 +120,9 @@ pub fn tessellate(
         if deviation <= tolerance {
             return net.triangulate(deviation);
         }
+        // Where second derivatives say nothing, the number of lines itself has to grow.
+        least *= if needed > before { 1 } else { 2 };
+        before = needed;
         // The distance falls with the square of the cell.
         refine *= (1.05 * (deviation / tolerance).sqrt()).clamp(1.1, 2.0);
     }
@@ -189,13 +192,13 @@ impl Family {
         (b - a) * (self.bend[s] / (4.0 * tolerance)).sqrt()
     }
 
-    fn placement(&self, tolerance: f64, factor: f64) -> Placement<'_> {
+    fn placement(&self, tolerance: f64, factor: f64, least: usize) -> Placement<'_> {
         let spaces: Vec<usize> = (0..self.kept.len() - 1)
             .map(|span| {
                 let strips = span * self.strips..(span + 1) * self.strips;
                 let need: f64 = strips.map(|s| self.need(s, tolerance)).sum();
                 // More than the limit fails later: keep the number countable.
-                (factor * need).ceil().clamp(1.0, MAX_TRIANGLES as f64) as usize
+                (factor * need).ceil().clamp(1.0, MAX_TRIANGLES as f64).max(least as f64) as usize
             })
             .collect();
         let len = spaces.iter().fold(0usize, |n, &k| n.saturating_add(k));
@@ -268,9 +271,10 @@ impl Density {
         Self { u, v }
     }
 
-    /// Lines for a tolerance, `refine` times denser than the formula says, and no cells much longer than wide.
-    fn lines(&self, tolerance: f64, refine: f64) -> [Placement<'_>; 2] {
-        let (u, v) = (self.u.placement(tolerance, refine), self.v.placement(tolerance, refine));
+    /// Lines for a tolerance, `refine` times denser than the formula says, at least so many between two kept ones, and no
+    /// cells much longer than wide.
+    fn lines(&self, tolerance: f64, refine: f64, least: usize) -> [Placement<'_>; 2] {
+        let [u, v] = [&self.u, &self.v].map(|family| family.placement(tolerance, refine, least));
         let (long_u, long_v) = (self.u.length / u.len as f64, self.v.length / v.len as f64);
         let slender = |long: f64, short: f64| {
             // A direction without any length is not worth dividing the other one for.
@@ -345,8 +349,11 @@ impl Net {
         let columns = parallel::map(self.us.len() - 1, |i| {
             let mut worst: f64 = 0.0;
             for j in 0..self.vs.len() - 1 {
-                for corners in self.cell(i, j) {
-                    worst = worst.max(self.measure_triangle(jet, corners));
+                let triangles = self.cell(i, j);
+                let normals = triangles.map(|corners| self.normal(corners));
+                for (k, corners) in triangles.into_iter().enumerate() {
+                    // What a triangle without area stands for lies on the cell's other one.
+                    worst = worst.max(self.measure_triangle(jet, corners, normals[k].or(normals[1 - k])));
                 }
             }
             worst
@@ -354,11 +361,19 @@ impl Net {
         columns.into_iter().fold(0.0, f64::max)
     }
 
-    fn measure_triangle(&self, jet: &(dyn Fn(f64, f64) -> Jet2 + Sync), corners: [(usize, usize); 3]) -> f64 {
+    fn normal(&self, corners: [(usize, usize); 3]) -> Option<Vector3> {
+        let p = corners.map(|(i, j)| self.points[self.index(i, j)]);
+        (!is_degenerate(&p)).then(|| (p[1] - p[0]).cross(&(p[2] - p[0])).normalize())
+    }
+
+    fn measure_triangle(
+        &self,
+        jet: &(dyn Fn(f64, f64) -> Jet2 + Sync),
+        corners: [(usize, usize); 3],
+        normal: Option<Vector3>,
+    ) -> f64 {
         let p = corners.map(|(i, j)| self.points[self.index(i, j)]);
         let q = corners.map(|c| self.parameters(c));
-        let cross = (p[1] - p[0]).cross(&(p[2] - p[0]));
-        let normal = if is_degenerate(&p) { None } else { Some(cross.normalize()) };
         let mut worst: f64 = 0.0;
         for k in 0..3 {
             let (a, b) = (k, (k + 1) % 3);

@@ -13,6 +13,7 @@
 //! semicolons; `#` begins a comment; empty lines are passed over. Directions are lines: `1 0` and
 //! `-1 0` are the same, and their length matters to a fit of velocities only, but 0 is refused. Places may be scattered.
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use field::{LineField, LineSample, SamplePlane};
@@ -21,6 +22,9 @@ use crate::regular;
 
 /// Greatest file that is read, bytes: a million samples.
 pub const MAX_BYTES: u64 = 64 << 20;
+
+/// Lengths and weights, where they are not 0: beyond these, sums of them and of their squares are lost.
+const BELIEVABLE: RangeInclusive<f64> = 1e-30..=1e30;
 
 /// What is wrong with a table, and where.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -139,11 +143,17 @@ fn sample(fields: &[&str]) -> Result<LineSample, String> {
         return Err(format!("the place ({x}, {y}) is farther than a kilometre; check its unit"));
     }
     let length = tx.hypot(ty);
-    if length == 0.0 || !length.is_finite() {
+    if length == 0.0 {
         return Err("the direction has no length; delete the line where there is none".into());
     }
     if weight < 0.0 {
         return Err(format!("the weight is {weight}; write 0 or more"));
+    }
+    for (what, number) in [("the direction's length", length), ("the weight", weight)] {
+        if number != 0.0 && !BELIEVABLE.contains(&number) {
+            let [least, most] = [BELIEVABLE.start(), BELIEVABLE.end()];
+            return Err(format!("{what} is {number:e}; write one between {least:e} and {most:e}"));
+        }
     }
     Ok(LineSample { at: [x, y], line: [tx, ty], weight })
 }
@@ -180,6 +190,9 @@ mod tests {
         assert!(refusal("").starts_with("line 1: the table has no direction"));
         assert!(refusal("0 0 1 0 0\n").starts_with("line 1: no direction has a weight"));
         assert!(refusal("0 0 1 0 -1\n").starts_with("line 1: the weight is -1"));
+        assert!(refusal("0 0 1e308 0\n").starts_with("line 1: the direction's length is 1e308; write one between"));
+        assert!(refusal("0 0 1e-200 0\n").starts_with("line 1: the direction's length is 1e-200"));
+        assert!(refusal("0 0 1 0 1e40\n").starts_with("line 1: the weight is 1e40"));
         assert!(refusal("2e6 0 1 0\n").contains("farther than a kilometre"));
         assert!(parse(b"0 0 1 0\n\xff").unwrap_err().to_string().starts_with("line 2: this is not text"));
     }

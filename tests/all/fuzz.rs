@@ -6,6 +6,7 @@ mod bodies;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use bodies::{TARGETS, Target};
 
@@ -15,6 +16,9 @@ const CASES: usize = 20_000;
 
 /// Longest input that is made, bytes.
 const LONGEST: usize = 8_192;
+
+/// Longest that a case may take.
+const SLOWEST: Duration = Duration::from_secs(10);
 
 /// Changes of one input at most.
 const CHANGES: usize = 6;
@@ -74,7 +78,7 @@ fn cases_made_by_chance_hold() {
     let cases = asked("MILLSTREAM_FUZZ_CASES").map_or(CASES, |count| count.parse().expect("a count"));
     let only = asked("MILLSTREAM_FUZZ_TARGET");
     for target in TARGETS.iter().filter(|(name, _)| only.as_deref().is_none_or(|only| only == *name)) {
-        let began = std::time::Instant::now();
+        let began = Instant::now();
         hold(target, cases);
         println!("{}: {cases} cases in {:.0} s", target.0, began.elapsed().as_secs_f64());
     }
@@ -84,11 +88,13 @@ fn cases_made_by_chance_hold() {
 fn hold((target, check): &Target, cases: usize) {
     let seeds: Vec<Vec<u8>> = inputs("seeds", target).into_iter().map(|(_, bytes)| bytes).collect();
     millstream::parallel::map(cases, |case| {
-        let bytes = Chance::new(case as u64).input(&seeds);
-        if catch_unwind(AssertUnwindSafe(|| check(&bytes))).is_err() {
+        let (bytes, began) = (Chance::new(case as u64).input(&seeds), Instant::now());
+        let held = catch_unwind(AssertUnwindSafe(|| check(&bytes))).is_ok();
+        let took = began.elapsed();
+        if !held || took > SLOWEST {
             let path = std::env::temp_dir().join(format!("{target}-{case}"));
             std::fs::write(&path, &bytes).unwrap();
-            panic!("{target}, case {case}: {}", path.display());
+            panic!("{target}, case {case} after {took:.1?}: {}", path.display());
         }
     });
 }

@@ -164,3 +164,27 @@ fn refuses_what_cannot_be_done() {
     };
     assert_eq!(tessellate(&line, [whole, whole], 0.1), Err(TessellateError::NoArea));
 }
+
+/// A flat patch, one of whose sides is a point: no second derivative says how dense its lines must be.
+#[test]
+fn a_flat_patch_with_three_sides_is_a_triangle() {
+    let corners = [[0.0, 0.0, 0.0], [0.0, 20.0, 0.0], [30.0, 0.0, 5.0]].map(Point3::from);
+    let jet = |u: f64, v: f64| {
+        let [a, b, c] = corners;
+        let (side, other) = (b - a, c - a);
+        Jet2 {
+            p: a + other * u + side * (1.0 - u) * v,
+            du: other - side * v,
+            dv: side * (1.0 - u),
+            duu: Vector3::zeros(),
+            duv: -side,
+            dvv: Vector3::zeros(),
+        }
+    };
+    let lines: [&[f64]; 2] = [&[0.0, 1.0], &[0.0, 1.0]];
+    let found = tessellate(&jet, lines, 0.01).unwrap();
+    assert_eq!(found.triangles.len(), 1);
+    assert!(found.deviation < 1e-12, "{}", found.deviation);
+    // Rounding alone is more than that.
+    assert!(matches!(tessellate(&jet, lines, 1e-20), Err(TessellateError::TooMany { .. })));
+}
