@@ -11,6 +11,9 @@
 //!
 //! Limits: linear fields of `2θ` are reproduced; the error is of second order in the distance of samples.
 
+/// Samples whose coordinates differ by no more than this, mm or of a parameter, stand on a line: less is lost in a division.
+const NARROWEST: f64 = 1e-12;
+
 /// A direction at a place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LineSample {
@@ -73,7 +76,7 @@ impl LineField {
             }
         }
         // Parameters have no common unit: each counts by its range.
-        let extent = [0, 1].map(|c| if hi[c] > lo[c] { hi[c] - lo[c] } else { 1.0 });
+        let extent = [0, 1].map(|c| if hi[c] - lo[c] > NARROWEST { hi[c] - lo[c] } else { 1.0 });
         let scale = match plane {
             SamplePlane::Plan => [extent[0].max(extent[1]); 2],
             SamplePlane::Parameters => extent,
