@@ -190,7 +190,10 @@ mod tests {
         assert!(refusal("").starts_with("line 1: the table has no direction"));
         assert!(refusal("0 0 1 0 0\n").starts_with("line 1: no direction has a weight"));
         assert!(refusal("0 0 1 0 -1\n").starts_with("line 1: the weight is -1"));
-        assert!(refusal("0 0 1e308 0\n").starts_with("line 1: the direction's length is 1e308; write one between"));
+        assert!(
+            refusal("0 0 1e308 0\n")
+                .starts_with("line 1: the direction's length is 1e308; write one between")
+        );
         assert!(refusal("0 0 1e-200 0\n").starts_with("line 1: the direction's length is 1e-200"));
         assert!(refusal("0 0 1 0 1e40\n").starts_with("line 1: the weight is 1e40"));
         assert!(refusal("2e6 0 1 0\n").contains("farther than a kilometre"));

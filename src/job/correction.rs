@@ -383,8 +383,7 @@ impl Corrected<'_> {
 
     /// Measures all of the best plan.
     fn measure_best(&mut self, monitor: &dyn Monitor) -> Result<Measured, JobError> {
-        let measured =
-            self.session.measure(self.request, self.engine, &self.best.plan.path, 0.0, monitor)?;
+        let measured = self.session.measure(self.request, self.engine, &self.best.plan.path, 0.0, monitor)?;
         let factors = self.standing.round.factors;
         if let Some(standing) = Standing::of_all(&measured.measurement, &self.best, factors) {
             self.rounds[self.kept] = standing.round;

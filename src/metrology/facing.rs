@@ -75,6 +75,11 @@ pub enum PlaceKind {
     OutsideStock,
 }
 
+impl PlaceKind {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Facing, Self::Wall, Self::FacingAway, Self::Hidden, Self::OutsideStock];
+}
+
 /// Tells what places of a part are to the tool of a path.
 #[derive(Debug)]
 pub struct Facing<'a> {

@@ -5,6 +5,7 @@ use std::process::{Child, Stdio};
 use std::time::Duration;
 
 use super::command::command;
+use super::support::{height_mesh, write_stl};
 
 /// Memory that the scenes here allow, MiB.
 const ALLOWED: u64 = 64;
@@ -142,6 +143,28 @@ fn a_mesh_beyond_the_memory_is_refused_unread() {
     assert!(output.status.code() == Some(2) && message.contains("the mesh needs about"), "{message}");
     assert!(!home.path().join("out").exists());
     assert!(highest <= 100 + BESIDES, "{highest} MiB");
+}
+
+/// A part of so many triangles that little else counts: they take no more than they are counted as.
+#[test]
+fn a_large_mesh_runs_within_the_memory_that_its_triangles_count() {
+    const ALLOWED: u64 = 140;
+    let home = tempfile::tempdir().unwrap();
+    let mesh = height_mesh(290, [60.0, 60.0], |x, y| 2.0 * (x / 8.0).sin() * (y / 8.0).cos());
+    let corners: Vec<_> = (0..mesh.triangles().len()).map(|t| mesh.corners(t)).collect();
+    write_stl(&home.path().join("part.stl"), &corners);
+    let scene = "[part]\nfile = \"part.stl\"\n[cutter]\nshape = \"ball\"\ndiameter = 6\n\
+                 [tolerance]\ncorrect = false\n[simulation]\ncell = 0.5\n[[toolpath]]\nstrategy = \"zigzag\"\n";
+    std::fs::write(home.path().join("plate.toml"), scene).unwrap();
+    let allowed = ALLOWED.to_string();
+    let arguments = ["run", "plate.toml", "--memory", &allowed, "--threads", "1", "--out", "out"];
+    let process = command(home.path(), &arguments).stdout(Stdio::null()).spawn().unwrap();
+    let highest = peak(&process);
+    let output = process.wait_with_output().unwrap();
+    assert!(matches!(output.status.code(), Some(0 | 1)), "{output:?}");
+    assert!(highest <= ALLOWED + BESIDES, "{highest} MiB");
+    // Nor is it counted as much more than it takes.
+    assert!(highest > ALLOWED / 2, "{highest} MiB");
 }
 
 /// Runs shipped scenes with the memory that each allows.

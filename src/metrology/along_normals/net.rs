@@ -38,6 +38,7 @@ pub struct PatchGrid {
 }
 
 /// Places and the triangles between them.
+#[derive(Default)]
 pub(crate) struct Net {
     pub places: Vec<NetPlace>,
     pub triangles: Vec<[u32; 3]>,

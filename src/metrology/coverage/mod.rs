@@ -16,13 +16,13 @@ mod near;
 mod pieces;
 mod unseen_cut;
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use geometry::{Point2, Point3};
 use sim::Grid;
 use work::monitor::{Cancelled, Monitor};
 
-use super::along_normals::{Along, NetPlace, Site, SweptVolume};
+use super::along_normals::{Along, Net, NetPlace, Site, SweptVolume};
 use super::facing::{Facing, Judged, PlaceKind};
 use super::figures::{Limits, Measurement};
 use cutter::Cutter;
@@ -30,7 +30,7 @@ pub use figures::CoverageFigures;
 use motion::Toolpath;
 use near::{Near, cube};
 use part::{Part, Patch, SurfacePoint};
-use pieces::Pieces;
+use pieces::{Pieces, divided, join};
 use unseen_cut::{UnseenCut, lowest_tip};
 
 /// Where the vertical part of the normal is less, cells lie more than five times as far apart on the surface as in the plan:
@@ -92,12 +92,12 @@ pub struct Coverage<'a> {
     part: &'a Part,
     facing: &'a Facing<'a>,
     judged: Judged,
-    pieces: Pieces,
-    kinds: Vec<PlaceKind>,
-    /// Whether cells measure each piece.
-    by_cells: Vec<bool>,
-    /// Area of pieces whose corners are of another kind, mm².
-    mixed: f64,
+    /// Areas by kind, and by whether cells measure them, mm².
+    areas: HashMap<(PlaceKind, bool), f64>,
+    /// Bound of the error of each area, mm².
+    area_error: f64,
+    /// What is judged and no cell measures.
+    unseen: Net,
     cells: Option<CellsSeen<'a>>,
 }
 
@@ -105,23 +105,33 @@ impl<'a> Coverage<'a> {
     /// Of a part; without cells all that is judged is measured along normals.
     pub fn new(part: &'a Part, facing: &'a Facing<'a>, judged: Judged, cells: Option<CellsSeen<'a>>) -> Self {
         let area: f64 = (0..part.mesh().triangles().len()).map(|t| area(&part.mesh().corners(t))).sum();
-        let pieces = Pieces::of(part, (TRIANGLES_A_SQUARE * area / PIECES).sqrt().max(f64::MIN_POSITIVE));
-        let kinds =
-            facing.kinds(pieces.middles.len(), |t| (pieces.middles[t].point, pieces.middles[t].normal));
-        let by_cells = work::parallel::map(kinds.len(), |t| {
-            kinds[t] == PlaceKind::Facing && cells.is_some_and(|cells| cells.see(part, &pieces.middles[t]))
-        });
-        let mixed = mixed(facing, &pieces, &kinds);
-        Self { part, facing, judged, pieces, kinds, by_cells, mixed, cells }
+        let spacing = (TRIANGLES_A_SQUARE * area / PIECES).sqrt().max(f64::MIN_POSITIVE);
+        let (areas, area_error) = (HashMap::new(), 0.0);
+        let mut coverage = Self { part, facing, judged, areas, area_error, unseen: Net::default(), cells };
+        Pieces::of(part, spacing).for_each(|pieces| coverage.add(pieces));
+        coverage
     }
 
-    /// Area of the pieces that `chosen` picks by their kind and whether cells measure them, mm².
+    fn add(&mut self, pieces: Pieces) {
+        let middles = &pieces.middles;
+        let kinds = self.facing.kinds(middles.len(), |t| (middles[t].point, middles[t].normal));
+        let by_cells = work::parallel::map(kinds.len(), |t| {
+            kinds[t] == PlaceKind::Facing && self.cells.is_some_and(|cells| cells.see(self.part, &middles[t]))
+        });
+        self.area_error += pieces.area_error + mixed(self.facing, &pieces, &kinds);
+        for (t, area) in pieces.areas.iter().enumerate() {
+            *self.areas.entry((kinds[t], by_cells[t])).or_insert(0.0) += area;
+        }
+        let unseen = |t: usize| self.facing.is_judged(self.judged, kinds[t]) && !by_cells[t];
+        join(&mut self.unseen, pieces.chosen(unseen));
+    }
+
+    /// Area of what `chosen` picks by its kind and whether cells measure it, mm².
     fn area(&self, chosen: impl Fn(PlaceKind, bool) -> bool) -> f64 {
-        let pieces = self.kinds.iter().zip(&self.by_cells).zip(&self.pieces.areas);
-        pieces
-            .filter(|((kind, by_cells), _)| chosen(**kind, **by_cells))
-            // From 0.0, since an empty sum is -0.0.
-            .fold(0.0, |sum, (_, area)| sum + area)
+        // One after the other, so that the sum has the same bits in every run.
+        let kinds = PlaceKind::ALL.into_iter().flat_map(|kind| [(kind, false), (kind, true)]);
+        let of = |(kind, by_cells)| self.areas.get(&(kind, by_cells)).filter(|_| chosen(kind, by_cells));
+        kinds.filter_map(of).fold(0.0, |sum, area| sum + area)
     }
 
     /// The areas.
@@ -136,7 +146,7 @@ impl<'a> Coverage<'a> {
             facing_away_mm2: not_judged(PlaceKind::FacingAway),
             hidden_mm2: not_judged(PlaceKind::Hidden),
             outside_stock_mm2: not_judged(PlaceKind::OutsideStock),
-            error_bound_mm2: self.mixed + self.pieces.area_error,
+            error_bound_mm2: self.area_error,
             ..CoverageFigures::default()
         }
         .summed()
@@ -147,12 +157,11 @@ impl<'a> Coverage<'a> {
     /// # Errors
     /// [`Cancelled`] when the monitor says so.
     pub fn measure_unseen(
-        &self,
+        mut self,
         task: &AlongTask<'_>,
         monitor: &dyn Monitor,
     ) -> Result<Option<(Measurement, f64)>, Cancelled> {
-        let unseen = |t: usize| self.facing.is_judged(self.judged, self.kinds[t]) && !self.by_cells[t];
-        let area: f64 = (0..self.kinds.len()).filter(|t| unseen(*t)).map(|t| self.pieces.areas[t]).sum();
+        let area = self.area(|kind, by_cells| self.facing.is_judged(self.judged, kind) && !by_cells);
         if area == 0.0 {
             return Ok(None);
         }
@@ -160,7 +169,7 @@ impl<'a> Coverage<'a> {
             / 100.0)
             .max(LEAST_TRIANGLES);
         let spacing = (TRIANGLES_A_SQUARE * area / triangles).sqrt().max(task.finest);
-        let net = self.pieces.chosen(self.part, unseen, spacing);
+        let net = divided(self.part, std::mem::take(&mut self.unseen), spacing);
         let lowest_tip = lowest_tip(task.path);
         let cut = UnseenCut { cut: task.cut, block: self.facing.block(), facing: self.facing, lowest_tip };
         let along = Along {

@@ -4,6 +4,7 @@
 //! patches in their parameters, that together are the whole surface. mm, mm².
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use part::{Part, PatchPoint};
 
@@ -21,11 +22,22 @@ pub(super) struct Pieces {
     pub area_error: f64,
 }
 
+/// Facets of a mesh that are held at a time.
+const BLOCK: usize = 1 << 14;
+
 impl Pieces {
-    /// Of a part, about `spacing` mm across.
-    pub fn of(part: &Part, spacing: f64) -> Self {
-        let net = if part.patches().is_empty() { facets(part) } else { Net::over(part, spacing) };
-        Self::new(part, divided(part, net, |_| true, spacing))
+    /// Of a part, about `spacing` mm across: a block of facets at a time, patches all at once.
+    pub fn of(part: &Part, spacing: f64) -> impl Iterator<Item = Self> {
+        let facets_of = part.mesh().triangles().len();
+        let blocks = if part.patches().is_empty() { facets_of.div_ceil(BLOCK) } else { 1 };
+        (0..blocks).map(move |block| {
+            let net = if part.patches().is_empty() {
+                facets(part, block * BLOCK..((block + 1) * BLOCK).min(facets_of))
+            } else {
+                Net::over(part, spacing)
+            };
+            Self::new(part, divided(part, net, spacing))
+        })
     }
 
     fn new(part: &Part, net: Net) -> Self {
@@ -41,18 +53,25 @@ impl Pieces {
         Self { net, middles, areas, area_error }
     }
 
-    /// The chosen triangles, divided until no side is longer than `spacing` mm.
-    pub fn chosen(&self, part: &Part, chosen: impl Fn(usize) -> bool, spacing: f64) -> Net {
-        let net =
-            Net { places: self.net.places.clone(), triangles: self.net.triangles.clone(), grids: Vec::new() };
-        compact(divided(part, net, chosen, spacing))
+    /// The chosen triangles alone.
+    pub fn chosen(self, chosen: impl Fn(usize) -> bool) -> Net {
+        let Net { places, triangles, .. } = self.net;
+        let triangles = triangles.into_iter().enumerate().filter(|(t, _)| chosen(*t)).map(|(_, t)| t);
+        compact(&places, triangles.collect())
     }
 }
 
-/// The facets of a mesh as they are.
-fn facets(part: &Part) -> Net {
-    let mut net = Net { places: Vec::new(), triangles: Vec::new(), grids: Vec::new() };
-    for t in 0..part.mesh().triangles().len() {
+/// Adds the triangles of another net.
+pub(super) fn join(net: &mut Net, other: Net) {
+    let first = net.places.len() as u32;
+    net.places.extend(other.places);
+    net.triangles.extend(other.triangles.into_iter().map(|t| t.map(|k| first + k)));
+}
+
+/// Some facets of a mesh as they are.
+fn facets(part: &Part, range: Range<usize>) -> Net {
+    let mut net = Net::default();
+    for t in range {
         let first = net.places.len() as u32;
         let normal = part.mesh().normal(t);
         let place = |point| NetPlace { site: Site::Facet { triangle: t as u32, point }, point, normal };
@@ -62,14 +81,9 @@ fn facets(part: &Part) -> Net {
     net
 }
 
-/// The chosen triangles of a net; the longest side is halved while it is longer than `spacing` mm.
-fn divided(part: &Part, mut net: Net, chosen: impl Fn(usize) -> bool, spacing: f64) -> Net {
-    let mut open: Vec<[u32; 3]> = std::mem::take(&mut net.triangles)
-        .into_iter()
-        .enumerate()
-        .filter(|(t, _)| chosen(*t))
-        .map(|(_, t)| t)
-        .collect();
+/// The triangles of a net; the longest side is halved while it is longer than `spacing` mm.
+pub(super) fn divided(part: &Part, mut net: Net, spacing: f64) -> Net {
+    let mut open = std::mem::take(&mut net.triangles);
     let mut middles: HashMap<[u32; 2], u32> = HashMap::new();
     while let Some(t) = open.pop() {
         let side = |k: usize| {
@@ -94,19 +108,19 @@ fn divided(part: &Part, mut net: Net, chosen: impl Fn(usize) -> bool, spacing: f
     net
 }
 
-/// A net without the places that none of its triangles has.
-fn compact(net: Net) -> Net {
-    let mut index = vec![u32::MAX; net.places.len()];
+/// A net of some triangles, without the places that none of them has.
+fn compact(all: &[NetPlace], triangles: Vec<[u32; 3]>) -> Net {
+    let mut index = vec![u32::MAX; all.len()];
     let mut places = Vec::new();
     let mut number = |k: u32| {
         let at = &mut index[k as usize];
         if *at == u32::MAX {
             *at = places.len() as u32;
-            places.push(net.places[k as usize]);
+            places.push(all[k as usize]);
         }
         *at
     };
-    let triangles = net.triangles.iter().map(|t| t.map(&mut number)).collect();
+    let triangles = triangles.into_iter().map(|t| t.map(&mut number)).collect();
     Net { places, triangles, grids: Vec::new() }
 }
 
@@ -141,12 +155,13 @@ mod tests {
             TriangleMesh::new(corners.map(Point3::from).to_vec(), vec![[0, 1, 2], [1, 3, 2]]).unwrap().0;
         let exact = 0.1 * 2509f64.sqrt();
         let part = Part::from_mesh(mesh);
-        let pieces = Pieces::of(&part, 0.5);
+        let pieces = Pieces::of(&part, 0.5).next().unwrap();
         assert!((pieces.areas.iter().sum::<f64>() - exact).abs() < 1e-12 && pieces.area_error < 1e-12);
         assert!(pieces.areas.len() < 6000, "{}", pieces.areas.len());
-        let one = pieces.chosen(&part, |t| t == 7, 0.2);
+        let exact = pieces.areas[7];
+        let one = divided(&part, pieces.chosen(|t| t == 7), 0.2);
         let area: f64 = one.triangles.iter().map(|t| flat(&t.map(|k| one.places[k as usize]))).sum();
-        assert!((area - pieces.areas[7]).abs() < 1e-12 && one.places.len() < 3 * one.triangles.len());
+        assert!((area - exact).abs() < 1e-12 && one.places.len() < 3 * one.triangles.len());
     }
 
     #[test]
@@ -155,7 +170,7 @@ mod tests {
         let part = Part::from_patches(vec![Patch::Nurbs(dome)], 0.05).unwrap();
         let exact = 200.0 * std::f64::consts::PI;
         let off = [1.0, 0.5].map(|spacing| {
-            let pieces = Pieces::of(&part, spacing);
+            let pieces = Pieces::of(&part, spacing).next().unwrap();
             let off = (pieces.areas.iter().sum::<f64>() - exact).abs();
             assert!(
                 off <= pieces.area_error && pieces.area_error < 0.02 * exact,
