@@ -1,9 +1,14 @@
 //! Curves of drawings as chords within a tolerance, mm.
 
-use geometry::{Point2, foot};
+use geometry::{MAX_COORDINATE, Point2, foot};
 
 /// A chord is halved at most so often: cusps would be halved without end.
 const MAX_HALVINGS: u32 = 24;
+
+/// Whether a place is so far out that its drawing is refused: then no chords are wanted.
+fn is_beyond(p: &Point2) -> bool {
+    !p.iter().all(|x| x.abs() <= MAX_COORDINATE)
+}
 
 /// Appends the chords of `curve` over `[t0, t1]`, without its first point. The curve is first cut in
 /// `pieces`, each of which should turn by less than a right angle or so.
@@ -38,7 +43,8 @@ fn halve(
     let at = |share: f64| curve(a.0 + (b.0 - a.0) * share);
     let middle = at(0.5);
     let off = |p: &Point2| foot(p, &[a.1, b.1]).1 > tolerance;
-    if halvings > 0 && (off(&middle) || off(&at(0.25)) || off(&at(0.75))) {
+    let beyond = [&a.1, &middle, &b.1].into_iter().any(is_beyond);
+    if halvings > 0 && !beyond && (off(&middle) || off(&at(0.25)) || off(&at(0.75))) {
         let middle = (0.5 * (a.0 + b.0), middle);
         halve(curve, a, middle, tolerance, halvings - 1, out);
         halve(curve, middle, b, tolerance, halvings - 1, out);
@@ -62,7 +68,9 @@ pub fn ellipse(
     let radius = (axes[0].norm_squared() + axes[1].norm_squared()).sqrt();
     let step =
         if radius > tolerance { 4.0 * (0.5 * tolerance / radius).sqrt().min(0.38).asin() } else { 1.5 };
-    let count = ((to - from).abs() / step).ceil().clamp(1.0, 1e6);
+    let beyond = is_beyond(&(centre + axes[0])) || is_beyond(&(centre + axes[1]));
+    let most = if beyond { 4.0 } else { 1e6 };
+    let count = ((to - from).abs() / step).ceil().clamp(1.0, most);
     for k in 1..=count as usize {
         let (sin, cos) = (from + (to - from) * k as f64 / count).sin_cos();
         out.push(centre + axes[0] * cos + axes[1] * sin);
