@@ -210,13 +210,13 @@ impl ChartGuide<'_> {
         stretches.iter().any(|s| s.inside).then_some(stretches)
     }
 
-    /// Whether half an interval to either side of a place outside lies the chart.
+    /// Whether half an interval to either side of a place outside, where the cutter cuts, lies the chart.
     fn serves(&self, p: [f64; 2]) -> bool {
         let beside = || {
             let (here, [du, dv]) = (self.chart.at(p[0], p[1])?, self.tracer.direction(p)?);
             let feed = (here.jet.du * du + here.jet.dv * dv).try_normalize(1e-300)?;
             let interval = here.strip_width(self.cutter, &feed, self.settings.step).0;
-            let (du, dv) = here.jet.pull_back(&here.normal.cross(&feed))?;
+            let (du, dv) = here.jet.pull_back(&here.cut_across(self.cutter, &feed))?;
             Some([0.5 * interval * du, 0.5 * interval * dv])
         };
         beside().is_some_and(|[du, dv]| {

@@ -162,9 +162,28 @@ impl ChartPoint<'_> {
 
     /// How much more the cutter is curved than the surface across the feed `t`, 1/mm.
     fn gap_across(&self, cutter: &Cutter, t: &Vector3) -> f64 {
+        self.gap_along(cutter, t, &self.normal.cross(t))
+    }
+
+    /// How much more the cutter that is fed along `t` is curved than the surface along a unit tangent, 1/mm.
+    fn gap_along(&self, cutter: &Cutter, t: &Vector3, tangent: &Vector3) -> f64 {
+        let [n, b] = self.in_tool_frame(t, *tangent);
+        cutter.normal_curvature(&n, &b) - self.curvature_along(tangent)
+    }
+
+    /// The tangent across the feed `t` along which the cutter cuts: its gap to the surface, a quadratic form, is least there
+    /// of all places of the pass. On a plane a ball cuts at right angles to the feed; a torus fed askew to its slope does not,
+    /// nor does any cutter on a surface that twists along the feed. Its part across the feed has length one.
+    pub fn cut_across(&self, cutter: &Cutter, t: &Vector3) -> Vector3 {
+        /// Where a cutter hugs the surface along the feed, the form says little about places so far aside.
+        const MOST_ASKEW: f64 = 3.0;
         let across = self.normal.cross(t);
-        let [n, b] = self.in_tool_frame(t, across);
-        cutter.normal_curvature(&n, &b) - self.curvature_along(&across)
+        let askew = (t + across) * std::f64::consts::FRAC_1_SQRT_2;
+        let [along, beside, between] = [t, &across, &askew].map(|d| self.gap_along(cutter, t, d));
+        let mixed = between - 0.5 * (along + beside);
+        let ahead = -mixed / along;
+        let is_known = along > 0.0 && ahead.is_finite();
+        across + if is_known { t * ahead.clamp(-MOST_ASKEW, MOST_ASKEW) } else { Vector3::zeros() }
     }
 
     /// The normal and a vector in the frame of the cutter that is fed along `t`.
@@ -471,6 +490,38 @@ mod tests {
         let gap = |s: f64| if s < 0.02 { 1.0 / 3.0 } else { 1.0 / 3.0 + 1.0 };
         let ridge = ridge_between(width, gap).max(ridge_between(width, |s| gap(-s)));
         assert!(width < 0.8 * plane && ridge < 1.15 * h && ridge > 0.8 * h, "{width} of {plane}: {ridge}");
+    }
+
+    /// A torus and a ball on a surface that slopes and twists, fed in all directions: over places at one distance across the
+    /// feed the cutter stands least above the one that is told.
+    #[test]
+    fn the_cutter_cuts_where_it_stands_least_above_the_surface() {
+        let corner = |x: f64, y: f64| Point3::new(x, y, 0.35 * x + 0.1 * y + 0.03 * x * y);
+        let net: Vec<Vec<Point3>> = [-5.0, 5.0].map(|x| [-5.0, 5.0].map(|y| corner(x, y)).to_vec()).to_vec();
+        let ends = || vec![0.0, 0.0, 1.0, 1.0];
+        let surface = NurbsSurface::new(1, 1, ends(), ends(), &net, None).unwrap();
+        let chart = Chart::of_surface(&surface, Guide::default());
+        let here = chart.at(0.6, 0.45).unwrap();
+        let (p, n) = (here.jet.p, here.normal);
+        for cutter in [Cutter::ball(6.0).unwrap(), Cutter::bull(6.0, 1.5).unwrap()] {
+            let tip = p + cutter.contact_to_tip(&n);
+            let above = |q: Point3| {
+                let reach = (q - tip).xy().norm();
+                tip.z + cutter.height(reach).unwrap() - corner(q.x, q.y).z
+            };
+            for k in 0..12 {
+                let t = here.tangent_at(0.5 * f64::from(k)).unwrap();
+                let across = n.cross(&t);
+                let y = 0.02;
+                let gap = |s: f64| above(p + across * y + t * s);
+                // The least of a parabola through three places.
+                let [a, b, c] = [-y, 0.0, y].map(gap);
+                let least = 0.5 * y * (a - c) / (a - 2.0 * b + c);
+                let told = here.cut_across(&cutter, &t);
+                assert_relative_eq!(told.dot(&across), 1.0, epsilon = 1e-12);
+                assert_relative_eq!(told.dot(&t), least / y, epsilon = 0.03);
+            }
+        }
     }
 
     /// On a bump hardly wider than the cutter the fitted surface has the curvature of what the facets are chords of, within
