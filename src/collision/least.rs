@@ -24,7 +24,7 @@ const MOST_LOOKS: usize = 20;
 /// A tool that is in the mesh is followed to where it is deeper by this share, and by this length, mm, and no further: the
 /// program is refused anyway, and many places of a tool that ploughs are about as deep.
 const DEEPER_SHARE: f64 = 0.1;
-const DEEPER: f64 = 0.01;
+const DEEPER: f64 = 0.001;
 
 /// Where a tool comes nearest to an obstacle, or is deepest in it.
 #[derive(Debug, Clone, Copy, PartialEq)]

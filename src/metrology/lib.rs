@@ -79,4 +79,4 @@ pub use removal::{RapidContactFigures, RemovalFigures, removal_figures, voxel_re
 pub use ridge_map::RidgeMap;
 pub use roughness::{RoughnessFigures, roughness};
 pub use sections::{SectionFigures, section_figures};
-pub use turning::{FastestTurn, fastest_turn};
+pub use turning::{FastestTurn, fastest_turn, fastest_turn_across};

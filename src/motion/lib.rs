@@ -6,10 +6,12 @@
 //! Lengths in mm, feed in mm/min, tilt in rad. A location is that of the tip; an axis is a unit vector from the tip to the
 //! holder.
 
+mod beside;
 mod path;
 mod tool_axis;
 mod written;
 
+pub use beside::{Beside, PassStretches};
 pub use path::{CcPoint, ClPoint, Move, MoveKind, Origin, Toolpath};
 pub use tool_axis::{AxisError, ToolAxis, in_tool_frame, location};
 pub use written::{DECIMALS, ROUNDING, in_last_decimals};

@@ -72,7 +72,8 @@ impl Node {
     }
 
     /// Squared distance from `q` to the box, mm²; 0 inside.
-    pub(super) fn distance_squared(&self, q: &Point3) -> f64 {
+    #[inline]
+    pub fn distance_squared(&self, q: &Point3) -> f64 {
         let dz = self.gap(2, q.z);
         self.plan_distance_squared(q.x, q.y) + dz * dz
     }

@@ -219,9 +219,23 @@ impl NormalInspection<'_> {
             }
             Some(Open { promise, possible, samples, depth })
         };
+        let mut first: Vec<Open> = Vec::new();
+        let mut dropped = Possible::NOTHING;
+        // No more than so many will be divided; of the others what is possible counts.
+        let mut least_promising = |first: &mut Vec<Open>| {
+            if first.len() > self.most_divided {
+                first.select_nth_unstable_by(self.most_divided, |a, b| b.cmp(a));
+                dropped = first.drain(self.most_divided..).fold(dropped, |all, open| all.or(open.possible));
+            }
+        };
         for (samples, crossings) in triangles {
-            heap.extend(keep(samples, crossings, 0, greatest));
+            first.extend(keep(samples, crossings, 0, greatest));
+            if first.len() > 2 * self.most_divided {
+                least_promising(&mut first);
+            }
         }
+        least_promising(&mut first);
+        heap.extend(first);
         while divided < self.most_divided && !heap.is_empty() {
             monitor::check(monitor)?;
             let batch: Vec<Open> = std::iter::from_fn(|| heap.pop()).take(BATCH).collect();
@@ -238,7 +252,7 @@ impl NormalInspection<'_> {
                 }
             }
         }
-        let possible = heap.iter().fold(closed, |possible, open| possible.or(open.possible));
+        let possible = heap.iter().fold(closed.or(dropped), |possible, open| possible.or(open.possible));
         Ok(possible.beyond(greatest, self.limits))
     }
 

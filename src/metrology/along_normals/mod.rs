@@ -212,16 +212,20 @@ impl Along<'_> {
         let on_sides = in_runs("measuring ridges", sides.len(), monitor, |range| {
             sides[range].iter().map(|side| inspection.on_side(&side.map(|k| samples[k as usize]))).collect()
         })?;
-        let mut of_triangle = in_runs("joining ridges", triangles.len(), monitor, |range| {
+        let on_sides = Grouped::of(on_sides);
+        let of_triangle = in_runs("joining ridges", triangles.len(), monitor, |range| {
             let of_one = |t: &[u32; 3]| {
                 let side = |k: usize| [t[k].min(t[(k + 1) % 3]), t[k].max(t[(k + 1) % 3])];
                 let found = (0..3)
                     .filter_map(|k| sides.binary_search(&side(k)).ok())
-                    .flat_map(|k| on_sides[k].clone());
+                    .flat_map(|k| on_sides.group(k))
+                    .copied();
                 with_lengths(found.collect())
             };
             triangles[range].iter().map(of_one).collect()
         })?;
+        drop((sides, on_sides));
+        let (of_triangle, hollow) = inspection.without_hollows(of_triangle);
         let contacts = in_runs("measuring contacts", path.len(), monitor, |range| {
             let contacts = |k: &usize| near(*k).then(|| contacts_of(part, cutter, path, *k, spacing));
             range.filter_map(|k| contacts(&k)).flatten().collect()
@@ -236,24 +240,21 @@ impl Along<'_> {
             };
             range.filter(|&k| kept_contacts[k]).map(of_one).collect()
         })?;
-        let hollow = inspection.take_hollows(&mut of_triangle);
         let mut greatest = Greatest::default();
         let judged = || samples.iter().zip(kept).filter(|(_, kept)| **kept).map(|(sample, _)| sample);
-        of_triangle.iter().flatten().for_each(|crossing| greatest.look_at_ridge(crossing));
+        of_triangle.items.iter().for_each(|crossing| greatest.look_at_ridge(crossing));
         for sample in contacts.iter().chain(judged()) {
             greatest.look_at(sample);
             greatest.look_at_height(sample, &inspection);
         }
         let pairs = pair_figures(part, cutter, path, tally(&of_triangle, cutter, spacing), monitor)?;
         let ridge_samples: Vec<[f32; 2]> =
-            of_triangle.iter().flatten().map(|c| [c.height as f32, c.length as f32]).collect();
+            of_triangle.items.iter().map(|c| [c.height as f32, c.length as f32]).collect();
         let shares = areas(&net);
         let mut gouge = inspection.gouges(&net, &samples, &shares, kept);
         let deviation = deviation_figures(&samples, &shares, kept);
-        let triangles = triangles
-            .iter()
-            .zip(&of_triangle)
-            .map(|(t, crossings)| (t.map(|v| samples[v as usize]), &crossings[..]));
+        let triangles =
+            triangles.iter().enumerate().map(|(k, t)| (t.map(|v| samples[v as usize]), of_triangle.group(k)));
         let left = inspection.search(triangles, &mut greatest, asked, monitor)?;
         gouge.max_depth_mm = greatest.depth;
         gouge.error_bound_mm =
@@ -286,7 +287,7 @@ impl Along<'_> {
             grids: net.grids,
         };
         let above = |height: f64| height > limits.scallop && height <= limits.uncut;
-        let ridges = of_triangle.iter().flatten().filter(|c| above(c.height));
+        let ridges = of_triangle.items.iter().filter(|c| above(c.height));
         let ridges = ridges.map(|c| RidgePlace { at: c.at, height: c.height });
         let places = judged().filter_map(|sample| Some((sample.hit?.deviation, sample.place.point)));
         let places =
@@ -313,10 +314,10 @@ impl NormalInspection<'_> {
         Sample { place, hit: self.engine.hit(&place.point, &place.normal, near) }
     }
 
-    /// Takes the ridges in hollows that the cutter does not fit, which are uncut; the highest of them.
-    fn take_hollows(&self, of_triangle: &mut [Vec<Crossing>]) -> Option<Crossing> {
+    /// The ridges without those in hollows that the cutter does not fit, which are uncut; the highest of these.
+    fn without_hollows(&self, of_triangle: Vec<Vec<Crossing>>) -> (Grouped<Crossing>, Option<Crossing>) {
         let mut hollow: Option<Crossing> = None;
-        for crossings in of_triangle {
+        let scallops = of_triangle.into_iter().map(|mut crossings| {
             crossings.retain(|c| {
                 let scallop = self.is_scallop(c);
                 if !scallop && hollow.is_none_or(|other| c.height > other.height) {
@@ -324,8 +325,9 @@ impl NormalInspection<'_> {
                 }
                 scallop
             });
-        }
-        hollow
+            crossings
+        });
+        (Grouped::of(scallops), hollow)
     }
 
     /// The ridges that cross the side between two places.
@@ -397,25 +399,49 @@ fn in_runs<T: Send>(
         monitor.advance(done);
         Ok(found)
     })?;
-    Ok(runs.into_iter().flatten().collect())
+    // A list that grows would stand in the memory twice.
+    let mut all = Vec::with_capacity(runs.iter().map(Vec::len).sum());
+    runs.into_iter().for_each(|run| all.extend(run));
+    Ok(all)
+}
+
+/// Lists one after the other in one: most are empty, and each of its own would take more than what it holds.
+struct Grouped<T> {
+    items: Vec<T>,
+    /// Where each list begins, and where the last one ends.
+    starts: Vec<usize>,
+}
+
+impl<T> Grouped<T> {
+    fn of(lists: impl IntoIterator<Item = Vec<T>>) -> Self {
+        let (mut items, mut starts) = (Vec::new(), vec![0]);
+        for list in lists {
+            items.extend(list);
+            starts.push(items.len());
+        }
+        Self { items, starts }
+    }
+
+    fn group(&self, k: usize) -> &[T] {
+        &self.items[self.starts[k]..self.starts[k + 1]]
+    }
 }
 
 /// The sides of all triangles, each once and from the lesser index, in order.
 fn sides(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
-    let of = |t: &[u32; 3]| {
-        (0..3).map(|k| [t[k], t[(k + 1) % 3]]).map(|[a, b]| [a.min(b), a.max(b)]).collect::<Vec<_>>()
-    };
-    let mut sides: Vec<[u32; 2]> = triangles.iter().flat_map(of).collect();
+    let of = |t: &[u32; 3]| [0, 1, 2].map(|k| [t[k].min(t[(k + 1) % 3]), t[k].max(t[(k + 1) % 3])]);
+    let mut sides = Vec::with_capacity(3 * triangles.len());
+    triangles.iter().for_each(|t| sides.extend(of(t)));
     sides.sort_unstable();
     sides.dedup();
     sides
 }
 
 /// Crossings by the passes that meet, every so many of each pair to be calculated too.
-fn tally(of_triangle: &[Vec<Crossing>], cutter: &Cutter, spacing: f64) -> PairTally {
+fn tally(of_triangle: &Grouped<Crossing>, cutter: &Cutter, spacing: f64) -> PairTally {
     let one_in = PairTally::one_in(cutter, spacing);
     let mut tally = PairTally::default();
-    for c in of_triangle.iter().flatten() {
+    for c in of_triangle.items.iter() {
         let crossing = RidgeCrossing { at: c.at, height: c.height, length: c.length, moves: c.moves };
         let chosen = tally.count(c.passes).is_multiple_of(one_in);
         tally.add(c.passes, crossing, chosen);

@@ -144,8 +144,10 @@ impl Net {
             let site = |i: usize| Site::Patch(PatchPoint { patch: k as u32, u: at(0, i), v: at(1, j) });
             (0..counts[0]).map(|i| NetPlace::on(part, site(i))).collect::<Vec<_>>()
         });
-        self.places.extend(rows.into_iter().flatten());
+        self.places.reserve_exact(counts[0] * counts[1]);
+        rows.into_iter().for_each(|row| self.places.extend(row));
         let index = |i: usize, j: usize| (first + j * counts[0] + i) as u32;
+        self.triangles.reserve_exact(2 * steps[0] * steps[1]);
         for (i, j) in (0..steps[1]).flat_map(|j| (0..steps[0]).map(move |i| (i, j))) {
             let [a, b, c, d] = [index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1)];
             self.triangles.extend([[a, b, c], [a, c, d]]);

@@ -11,8 +11,9 @@ use super::budget::MIB;
 use super::{Engine, EngineError, Measured, NormalView, Task, View};
 use crate::{FirstCut, RaysCut, SweptVolume, VoxelCut, measure_along_normals, net_places};
 
-/// Bytes a place of the net: place, hit, triangles with their crossings, and the map.
-const BYTES_PER_PLACE: u64 = 600;
+/// Bytes a place of the net: place, hit, triangles with their crossings, and the map; and the map of the measurement before,
+/// which stays until this one is known to be better.
+const BYTES_PER_PLACE: u64 = 800;
 
 /// Distance of the places over that of cells where the program chooses: three places from pass to pass.
 const PLACES_OVER_CELLS: f64 = 2.0;

@@ -67,7 +67,7 @@ pub(crate) fn join_tilted(
     let turned =
         |k: usize| visited(&passes[visits[k].pass], &contacts[visits[k].pass], &visits[k], cutter, tilting);
     let turned = work::parallel::try_map(visits.len(), turned)?;
-    let passes = cleared(turned, cutter, tilting, plane_interval(cutter, settings.step), notes, monitor)?;
+    let passes = cleared(turned, cutter, tilting, notes, monitor)?;
     let pieces = work::parallel::try_map(passes.len(), |k| {
         LocatedPass::of(&passes[k], tolerance, smoothing, tilting.interference, monitor)
     })?;
@@ -79,12 +79,11 @@ pub(crate) fn join_tilted(
     Ok(path)
 }
 
-/// The passes, `interval` mm apart, with axes evened out as far as is asked for, and so that the tool stays clear.
+/// The passes with axes evened out as far as is asked for, and so that the tool stays clear.
 fn cleared(
     passes: Vec<Vec<Touch>>,
     cutter: &Cutter,
     tilting: &Tilting,
-    interval: f64,
     notes: &mut Vec<String>,
     monitor: &dyn Monitor,
 ) -> Result<Vec<Vec<Touch>>, PlanError> {
@@ -104,7 +103,7 @@ fn cleared(
     let mut passes: Vec<_> = evened.into_iter().flat_map(|(one, _)| one.passes).collect();
     if let Some(across) = tilting.most_turning_across {
         let rates = across::TurningRates { across, along: tilting.most_turning };
-        let left = across::even_out(&mut passes, cutter, rates, interval, tilting.interference, monitor)?;
+        let left = across::even_out(&mut passes, cutter, rates, tilting.interference, monitor)?;
         notes.extend(left.map(|left| left.note(across)));
         // The touches are clear; moves between them may be no longer.
         let again = |k: usize| repaired(passes[k].clone(), cutter, tilting, monitor);

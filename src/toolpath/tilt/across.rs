@@ -1,19 +1,18 @@
-//! Axes that turn little from pass to pass: the turn between neighbouring contacts of different passes, bounded.
+//! Axes that turn little from pass to pass: the turn between a contact and the nearest place of a pass beside it, bounded.
 //!
-//! Enters: passes as touches of the cutter, and the greatest turn, rad a mm from contact to contact. Leaves: the same
+//! Enters: passes as touches of the cutter, and the greatest turn, rad a mm from contact to place. Leaves: the same
 //! contacts with axes that meet half way wherever a pair turned faster, as far as the tool stays clear there: an axis that
 //! would not be is held where it was, and its neighbours come to it.
 //!
 //! Each pair is drawn together in turn until all hold (the projections of position based dynamics, M. Müller et al. 2007,
 //! on the unit sphere): axes where nothing turns too fast stay as they are.
 
-use std::collections::HashMap;
-
 use super::tilted::ABOVE_SURFACE;
 use crate::moves::touch::Touch;
 use collision::Interference;
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
+use motion::PassStretches;
 use work::monitor::{self, Cancelled, Monitor};
 
 /// Sweeps over all pairs. What a sweep leaves shrinks the slower the more passes lie between.
@@ -26,11 +25,8 @@ const ROUNDS: usize = 6;
 const SPARE: f64 = 0.01;
 const SLACK: f64 = 1e-3;
 
-/// Passes beside a contact are looked for in this many shells of cells at most, each as wide as passes lie apart.
-const SHELLS: i64 = 8;
-
-/// A pass counts as a neighbour up to this many times as far off as the nearest one.
-const BESIDE: f64 = 2.0;
+/// mm that contacts in the same place count as apart.
+const LEAST_WAY: f64 = 1e-9;
 
 /// How fast axes may turn, rad a mm of contact.
 #[derive(Debug, Clone, Copy)]
@@ -68,14 +64,16 @@ impl TooFast {
     }
 }
 
-/// Two touches, and how far apart their axes may be (chord).
+/// A touch and a place on a move between two others, and how far apart their axes may be (chord).
 struct Pair {
-    a: u32,
-    b: u32,
+    touch: u32,
+    /// The touches before and after the place, and how far it lies from the first to the second.
+    between: [u32; 2],
+    at: f64,
     most: f64,
 }
 
-/// Evens out the axes of passes `interval` mm apart; tells what turns too fast still.
+/// Evens out the axes of passes; tells what turns too fast still.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -83,13 +81,12 @@ pub(crate) fn even_out(
     passes: &mut [Vec<Touch>],
     cutter: &Cutter,
     rates: TurningRates,
-    interval: f64,
     keep: Option<&Interference>,
     monitor: &dyn Monitor,
 ) -> Result<Option<TooFast>, Cancelled> {
     let touches: Vec<(usize, Touch)> =
         passes.iter().enumerate().flat_map(|(k, pass)| pass.iter().map(move |touch| (k, *touch))).collect();
-    let across = beside(&touches, interval, rates.across);
+    let across = beside(&touches, 2.0 * cutter.radius(), rates.across);
     let mut pairs: Vec<&Pair> = across.iter().collect();
     let along = rates.along.map_or_else(Vec::new, |rate| in_passes(&touches, rate));
     pairs.extend(&along);
@@ -136,38 +133,40 @@ pub(crate) fn even_out(
 }
 
 impl Pair {
-    /// Turns two axes towards each other by what is too much; one alone where the other is held.
+    /// From the touch's axis to the other.
+    fn apart(&self, axes: &[Vector3]) -> Vector3 {
+        let [a, b] = self.between.map(|k| axes[k as usize]);
+        a + (b - a) * self.at - axes[self.touch as usize]
+    }
+
+    /// Turns the axes towards each other by what is too much, each by its share in it; those that are held stay.
     fn draw_together(&self, axes: &mut [Vector3], held: &[bool]) -> bool {
-        let (i, j) = (self.a as usize, self.b as usize);
-        let (a, b) = (axes[i], axes[j]);
-        let apart = (b - a).norm();
-        if apart <= self.most {
+        let apart = self.apart(axes);
+        let distance = apart.norm();
+        if distance <= self.most {
             return false;
         }
-        let by = 1.0 - (1.0 - SPARE) * self.most / apart;
-        let (to_a, to_b) = match (held[i], held[j]) {
-            (true, true) => return false,
-            (true, false) => (0.0, by),
-            (false, true) => (by, 0.0),
-            (false, false) => (0.5 * by, 0.5 * by),
-        };
-        let (Some(to), Some(from)) =
-            ((a + (b - a) * to_a).try_normalize(1e-6), (b + (a - b) * to_b).try_normalize(1e-6))
-        else {
+        let too_much = apart * (1.0 - (1.0 - SPARE) * self.most / distance);
+        let shares = [(self.touch, 1.0), (self.between[0], self.at - 1.0), (self.between[1], -self.at)];
+        let free = shares.map(|(k, share)| (k as usize, if held[k as usize] { 0.0 } else { share }));
+        let sum: f64 = free.iter().map(|(_, share)| share * share).sum();
+        if sum < 1e-9 {
             return false;
-        };
-        (axes[i], axes[j]) = (to, from);
+        }
+        for (k, share) in free {
+            if let Some(turned) = (axes[k] + too_much * (share / sum)).try_normalize(1e-6) {
+                axes[k] = turned;
+            }
+        }
         true
     }
 }
 
 fn too_fast(pairs: &[Pair], touches: &[(usize, Touch)], axes: &[Vector3], rate: f64) -> Option<TooFast> {
-    let share = |pair: &Pair| {
-        (axes[pair.b as usize] - axes[pair.a as usize]).norm() / pair.most.max(f64::MIN_POSITIVE)
-    };
+    let share = |pair: &Pair| pair.apart(axes).norm() / pair.most.max(f64::MIN_POSITIVE);
     let found = pairs.iter().filter(|pair| share(pair) > 1.0 + SLACK);
     found.fold(None, |worst: Option<TooFast>, pair| {
-        let (turn, place) = (share(pair) * rate, touches[pair.a as usize].1.contact.point);
+        let (turn, place) = (share(pair) * rate, touches[pair.touch as usize].1.contact.point);
         Some(match worst {
             Some(so_far) if so_far.worst >= turn => TooFast { count: so_far.count + 1, ..so_far },
             so_far => TooFast { count: so_far.map_or(1, |s| s.count + 1), worst: turn, place },
@@ -178,85 +177,34 @@ fn too_fast(pairs: &[Pair], touches: &[(usize, Touch)], axes: &[Vector3], rate: 
 /// Touches that follow each other on a pass.
 fn in_passes(touches: &[(usize, Touch)], rate: f64) -> Vec<Pair> {
     let same = (1..touches.len()).filter(|&k| touches[k].0 == touches[k - 1].0);
-    same.map(|k| pair(touches, k - 1, k, rate)).collect()
+    let pairs = same.map(|k| {
+        let way = (touches[k].1.contact.point - touches[k - 1].1.contact.point).norm();
+        Pair { touch: k as u32, between: [k as u32 - 1; 2], at: 0.0, most: rate * way.max(LEAST_WAY) }
+    });
+    pairs.collect()
 }
 
-fn pair(touches: &[(usize, Touch)], a: usize, b: usize, rate: f64) -> Pair {
-    let way = (touches[b].1.contact.point - touches[a].1.contact.point).norm();
-    Pair { a: a as u32, b: b as u32, most: rate * way.max(1e-9) }
-}
-
-/// Each touch with the nearest touch of every pass beside it.
-fn beside(touches: &[(usize, Touch)], interval: f64, rate: f64) -> Vec<Pair> {
-    let cells = Cells::of(touches, interval);
-    let found = work::parallel::map(touches.len(), |k| cells.beside(k));
-    let pairs = found.iter().enumerate().flat_map(|(k, near)| near.iter().map(move |&other| (k, other)));
-    pairs.map(|(k, other)| pair(touches, k, other, rate)).collect()
-}
-
-/// Touches in cubes.
-struct Cells<'a> {
-    touches: &'a [(usize, Touch)],
-    side: f64,
-    cubes: HashMap<[i64; 3], Vec<u32>>,
-}
-
-impl<'a> Cells<'a> {
-    fn of(touches: &'a [(usize, Touch)], side: f64) -> Self {
-        let mut cells = Self { touches, side, cubes: HashMap::new() };
-        for (k, (_, touch)) in touches.iter().enumerate() {
-            cells.cubes.entry(cells.cube(&touch.contact.point)).or_default().push(k as u32);
-        }
-        cells
-    }
-
-    fn cube(&self, p: &Point3) -> [i64; 3] {
-        [p.x, p.y, p.z].map(|x| (x / self.side).floor() as i64)
-    }
-
-    /// The nearest touch of each pass beside the touch `k`.
-    fn beside(&self, k: usize) -> Vec<usize> {
-        let (own, touch) = &self.touches[k];
-        let (p, home) = (touch.contact.point, self.cube(&touch.contact.point));
-        // Nearest of each pass, in the order in which passes are met.
-        let mut near: Vec<(usize, usize, f64)> = Vec::new();
-        let mut nearest = f64::INFINITY;
-        for shell in 0..=SHELLS {
-            // What lies beyond this shell is at least so far away.
-            if nearest * BESIDE < (shell - 1) as f64 * self.side {
-                break;
+/// Each touch with the nearest place of every pass beside it within so many mm.
+fn beside(touches: &[(usize, Touch)], within: f64, rate: f64) -> Vec<Pair> {
+    // The second touch of each stretch.
+    let ends: Vec<usize> = (1..touches.len()).filter(|&k| touches[k].0 == touches[k - 1].0).collect();
+    let stretch = |&k: &usize| ([k - 1, k].map(|k| touches[k].1.contact.point), touches[k].0 as u32);
+    let stretches = PassStretches::new(ends.iter().map(stretch).collect());
+    let found = work::parallel::map(touches.len(), |k| {
+        let (own, touch) = &touches[k];
+        let near = stretches.beside(&touch.contact.point, *own as u32, within);
+        let pair = |one: motion::Beside| {
+            let end = ends[one.stretch as usize] as u32;
+            Pair {
+                touch: k as u32,
+                between: [end - 1, end],
+                at: one.at,
+                most: rate * one.distance.max(LEAST_WAY),
             }
-            for other in self.shell(home, shell) {
-                let (pass, at) = &self.touches[other];
-                let distance = (at.contact.point - p).norm();
-                if pass == own {
-                    continue;
-                }
-                nearest = nearest.min(distance);
-                match near.iter_mut().find(|(known, ..)| known == pass) {
-                    Some(known) if distance < known.2 => *known = (*pass, other, distance),
-                    Some(_) => {}
-                    None => near.push((*pass, other, distance)),
-                }
-            }
-        }
-        near.retain(|(.., distance)| *distance <= BESIDE * nearest);
-        near.into_iter().map(|(_, other, _)| other).collect()
-    }
-
-    /// The touches in the cubes of a shell around one.
-    fn shell(&self, home: [i64; 3], shell: i64) -> impl Iterator<Item = usize> + '_ {
-        let range = -shell..=shell;
-        let cubes = range.clone().flat_map(move |i| {
-            let range = -shell..=shell;
-            range.flat_map(move |j| {
-                let edge = i.abs() == shell || j.abs() == shell;
-                let step = if edge { 1 } else { (2 * shell).max(1) };
-                (-shell..=shell).step_by(step as usize).map(move |k| [home[0] + i, home[1] + j, home[2] + k])
-            })
-        });
-        cubes.filter_map(|cube| self.cubes.get(&cube)).flatten().map(|&k| k as usize)
-    }
+        };
+        near.into_iter().map(pair).collect::<Vec<_>>()
+    });
+    found.into_iter().flatten().collect()
 }
 
 #[cfg(test)]
@@ -288,7 +236,7 @@ mod tests {
         let cutter = Cutter::ball(6.0).unwrap();
         let start = passes(&cutter, |y| if y < 12 { 0.1 } else { -0.1 });
         let mut got = start.clone();
-        let left = even_out(&mut got, &cutter, rates(0.1), 0.4, None, &Silent).unwrap();
+        let left = even_out(&mut got, &cutter, rates(0.1), None, &Silent).unwrap();
         assert_eq!(left, None);
         for (a, b) in got.iter().zip(&got[1..]) {
             for (a, b) in a.iter().zip(b) {
@@ -307,7 +255,7 @@ mod tests {
         let cutter = Cutter::bull(6.0, 1.0).unwrap();
         let start = passes(&cutter, |y| 0.01 * f64::from(y));
         let mut got = start.clone();
-        assert_eq!(even_out(&mut got, &cutter, rates(0.021), 0.4, None, &Silent).unwrap(), None);
+        assert_eq!(even_out(&mut got, &cutter, rates(0.021), None, &Silent).unwrap(), None);
         assert_eq!(got, start);
     }
 
@@ -337,7 +285,7 @@ mod tests {
         };
         let start = passes(&cutter, |y| if y < 12 { 0.0 } else { -0.45 });
         let mut got = start.clone();
-        let left = even_out(&mut got, &cutter, rates(0.02), 0.4, Some(&one), &Silent).unwrap();
+        let left = even_out(&mut got, &cutter, rates(0.02), Some(&one), &Silent).unwrap();
         assert!(is_clear(&one, &start) && is_clear(&one, &got));
         assert_eq!(left, None);
         assert_eq!(got[23], start[23], "held");
@@ -345,7 +293,7 @@ mod tests {
         // Both cannot be had between two walls.
         let start = passes(&cutter, |y| 0.45 * (11.5 - f64::from(y)) / 11.5);
         let mut got = start.clone();
-        let left = even_out(&mut got, &cutter, rates(1e-3), 0.4, Some(&both), &Silent).unwrap();
+        let left = even_out(&mut got, &cutter, rates(1e-3), Some(&both), &Silent).unwrap();
         assert!(is_clear(&both, &start) && is_clear(&both, &got));
         assert!(left.is_some_and(|left| left.worst > 1e-3 && left.count > 0), "{left:?}");
     }
