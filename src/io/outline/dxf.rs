@@ -8,8 +8,11 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use super::curve::{Spline, ellipse};
-use super::{Drawn, OutlineError, OutlineOptions};
+use super::{Drawn, OutlineError, OutlineFormat, OutlineOptions};
 use geometry::{Point2, Vector2};
+
+/// AutoCAD DXF as text.
+pub const FORMAT: OutlineFormat = OutlineFormat { extension: "dxf", parse };
 
 /// Most vertices of one entity.
 const MAX_VERTICES: usize = 1_000_000;
@@ -110,7 +113,7 @@ fn pairs(text: &str) -> Result<Vec<CodePair<'_>>, OutlineError> {
 }
 
 /// The drawn entities, mm.
-pub fn parse(
+fn parse(
     bytes: &[u8],
     options: &OutlineOptions,
     notes: &mut Vec<String>,

@@ -1,14 +1,14 @@
 //! Outlines of plane regions from drawings.
 //!
-//! Enters: a DXF file (text) or an SVG file. Leaves: closed polylines in mm, y up, and the entity that
+//! Enters: a drawing of one of [`OUTLINE_FORMATS`]. Leaves: closed polylines in mm, y up, and the entity that
 //! each came from. Curves are flattened within a chord tolerance; open chains are joined where ends lie
 //! within [`JOIN_TOLERANCE`]. Nothing is left out in silence: what cannot be an outline is refused with
 //! file, line and place, or named in a note.
 
 mod chain;
 mod curve;
-mod dxf;
-mod svg;
+pub mod dxf;
+pub mod svg;
 #[cfg(test)]
 mod tests;
 
@@ -16,6 +16,7 @@ use std::path::Path;
 
 use geometry::{Point2, Region, RegionError};
 
+use crate::mesh_formats::extension;
 use crate::regular;
 
 /// Ends of open chains that lie no farther apart are joined, mm. Drawings are exact to four decimals as a
@@ -25,13 +26,40 @@ pub const JOIN_TOLERANCE: f64 = 0.01;
 /// Largest drawing that is read, bytes.
 pub const MAX_BYTES: u64 = 64 << 20;
 
-/// Kind of a drawing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum OutlineFormat {
-    /// AutoCAD DXF as text.
-    Dxf,
-    /// Scalable Vector Graphics.
-    Svg,
+/// The formats of drawings, in the order in which messages list them: a new one is a file of its own and a line here.
+pub const OUTLINE_FORMATS: [OutlineFormat; 2] = [dxf::FORMAT, svg::FORMAT];
+
+/// Extensions of the files of all formats, lower case.
+pub const EXTENSIONS: [&str; OUTLINE_FORMATS.len()] = {
+    let mut extensions = [""; OUTLINE_FORMATS.len()];
+    let mut k = 0;
+    while k < extensions.len() {
+        extensions[k] = OUTLINE_FORMATS[k].extension;
+        k += 1;
+    }
+    extensions
+};
+
+/// A format of drawings.
+#[derive(Debug, Clone, Copy)]
+pub struct OutlineFormat {
+    /// The extension of its files, lower case.
+    pub extension: &'static str,
+    parse: fn(&[u8], &OutlineOptions, &mut Vec<String>) -> Result<Vec<Drawn>, OutlineError>,
+}
+
+impl PartialEq for OutlineFormat {
+    fn eq(&self, other: &Self) -> bool {
+        self.extension == other.extension
+    }
+}
+
+impl OutlineFormat {
+    /// The format of a file, by its extension.
+    pub fn of(path: &Path) -> Option<Self> {
+        let extension = extension(path)?;
+        OUTLINE_FORMATS.into_iter().find(|format| format.extension == extension)
+    }
 }
 
 /// How a drawing is read.
@@ -114,10 +142,7 @@ pub fn parse(
     options: &OutlineOptions,
 ) -> Result<Outlines, OutlineError> {
     let mut notes = Vec::new();
-    let drawn = match format {
-        OutlineFormat::Dxf => dxf::parse(bytes, options, &mut notes)?,
-        OutlineFormat::Svg => svg::parse(bytes, options, &mut notes)?,
-    };
+    let drawn = (format.parse)(bytes, options, &mut notes)?;
     if drawn.is_empty() {
         let place = options.layer.as_ref().map_or_else(String::new, |layer| format!(" on \"{layer}\""));
         return Err(OutlineError::new(format!("it has no outlines{place}")));

@@ -12,8 +12,11 @@ use roxmltree::{Document, Node};
 use svgtypes::{Length, LengthUnit, PathParser, PathSegment, PointsParser, Transform, ViewBox};
 
 use super::curve::{ellipse, flatten};
-use super::{Drawn, OutlineError, OutlineOptions};
+use super::{Drawn, OutlineError, OutlineFormat, OutlineOptions};
 use geometry::{Point2, Vector2};
+
+/// Scalable Vector Graphics.
+pub const FORMAT: OutlineFormat = OutlineFormat { extension: "svg", parse };
 
 /// Deepest nesting of elements that is followed.
 const MAX_DEPTH: usize = 64;
@@ -136,7 +139,7 @@ fn page(root: &Node<'_, '_>, options: &OutlineOptions, notes: &mut Vec<String>) 
 }
 
 /// The drawn elements, mm.
-pub fn parse(
+fn parse(
     bytes: &[u8],
     options: &OutlineOptions,
     notes: &mut Vec<String>,

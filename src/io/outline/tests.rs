@@ -14,14 +14,14 @@ fn dxf(entities: &str) -> String {
 }
 
 fn from_dxf(entities: &str) -> Result<Outlines, OutlineError> {
-    parse(dxf(entities).as_bytes(), OutlineFormat::Dxf, &options())
+    parse(dxf(entities).as_bytes(), dxf::FORMAT, &options())
 }
 
 fn svg(body: &str) -> Result<Outlines, OutlineError> {
     let text = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"100mm\" height=\"50mm\" viewBox=\"0 0 200 100\">{body}</svg>"
     );
-    parse(text.as_bytes(), OutlineFormat::Svg, &options())
+    parse(text.as_bytes(), svg::FORMAT, &options())
 }
 
 fn near(outlines: Result<Outlines, OutlineError>, area: f64) {
@@ -95,13 +95,12 @@ fn units_and_layers_are_those_of_the_file_or_of_the_scene() {
     let square = "0 LWPOLYLINE 8 cut 90 4 70 1 10 0 20 0 10 2 20 0 10 2 20 2 10 0 20 2 0 CIRCLE 8 marks 10 9 20 9 40 1";
     let inches = dxf(square).replace("$INSUNITS\n70\n4", "$INSUNITS\n70\n1");
     let wanted = OutlineOptions { layer: Some("cut".into()), ..options() };
-    let area = |options: &OutlineOptions| {
-        parse(inches.as_bytes(), OutlineFormat::Dxf, options).unwrap().region.area()
-    };
+    let area =
+        |options: &OutlineOptions| parse(inches.as_bytes(), dxf::FORMAT, options).unwrap().region.area();
     assert!((area(&wanted) - 4.0 * 25.4 * 25.4).abs() < 1e-9);
     assert_eq!(area(&OutlineOptions { scale: Some(1.0), ..wanted }), 4.0);
     let missing = OutlineOptions { layer: Some("cuts".into()), ..options() };
-    let error = parse(inches.as_bytes(), OutlineFormat::Dxf, &missing).unwrap_err().to_string();
+    let error = parse(inches.as_bytes(), dxf::FORMAT, &missing).unwrap_err().to_string();
     assert!(error.contains("\"cut\", \"marks\""), "{error}");
 }
 
@@ -130,11 +129,11 @@ fn what_is_wrong_is_told_with_its_place() {
     says(from_dxf("0 INSERT 8 0 2 block"), &["explode"]);
     says(from_dxf("0 TEXT 8 0 1 hello"), &["no outlines"]);
     says(from_dxf("0 SPLINE 8 0 71 3 40 0 10 0 20 0"), &["SPLINE", "degree 3 needs more than 1"]);
-    says(parse(b"solid cube", OutlineFormat::Dxf, &options()), &["line 1", "no group code"]);
+    says(parse(b"solid cube", dxf::FORMAT, &options()), &["line 1", "no group code"]);
     says(svg("<path d='M0 0 L10 0 L10 10'/>"), &["line 1", "open at x 5.0000 y 45.0000"]);
     says(svg("<path id='p' d='M0 0 L10 zz'/>"), &["path \"p\""]);
     says(svg("<use href='#a'/>"), &["convert them to paths"]);
-    says(parse(b"<svg><g></svg>", OutlineFormat::Svg, &options()), &["not valid XML"]);
+    says(parse(b"<svg><g></svg>", svg::FORMAT, &options()), &["not valid XML"]);
     says(svg("<text>hello</text>"), &["no outlines"]);
 }
 
@@ -146,7 +145,7 @@ proptest! {
             dxf("0 LWPOLYLINE 8 0 90 4 70 1 10 0 20 0 10 20 20 0 42 1 10 20 20 20 10 0 20 20 42 1 0 SPLINE 8 0 71 1 40 0 40 0 40 1 40 2 40 2 10 5 20 5 10 8 20 5 10 8 20 8 0 LINE 10 8 20 8 11 5 21 5"),
             "<svg width='9mm' viewBox='0 0 9 9'><g transform='scale(2)'><path d='M1 1 C 2 3 4 5 6 7 A 1 2 3 0 1 4 5 Q 1 2 3 4 T 5 6 z'/><rect width='3' height='4' rx='1'/></g></svg>".to_owned(),
         ];
-        let format = [OutlineFormat::Dxf, OutlineFormat::Svg][which];
+        let format = [dxf::FORMAT, svg::FORMAT][which];
         let mut bytes = drawing[which].clone().into_bytes();
         let n = bytes.len();
         bytes[at % n] = byte;

@@ -60,7 +60,7 @@ pub struct PocketSource {
 }
 
 impl Source for PocketSource {
-    const EXTENSIONS: &'static [&'static str] = &["dxf", "svg"];
+    const EXTENSIONS: &'static [&'static str] = &outline::EXTENSIONS;
 
     fn surfaces() -> Vec<&'static str> {
         vec![SURFACE]
@@ -138,17 +138,16 @@ fn read_points(part: &Section<'_>) -> Result<OutlineSource, SceneError> {
 fn read_drawing(table: &PartTable<'_>) -> Result<OutlineSource, SceneError> {
     let part = table.table;
     let file = part.required_text("file", "pocket.dxf")?;
-    let format = match io::extension(Path::new(file.value)).as_deref() {
-        Some("dxf") => OutlineFormat::Dxf,
-        Some("svg") => OutlineFormat::Svg,
-        _ => {
-            return Err(part.error(
-                &file.span,
-                format!("\"{}\" is no drawing that can be read. Supported: .dxf, .svg", file.value),
-                "name a file that ends in .dxf or .svg, or write `outline = [[x, y], ...]`",
-            ));
-        }
+    let unsupported = || {
+        let known: Vec<String> =
+            outline::EXTENSIONS.iter().map(|extension| format!(".{extension}")).collect();
+        part.error(
+            &file.span,
+            format!("Unsupported drawing format: \"{}\". Supported: {}", file.value, known.join(", ")),
+            format!("name a file that ends in {}, or write `outline = [[x, y], ...]`", known.join(" or ")),
+        )
     };
+    let format = OutlineFormat::of(Path::new(file.value)).ok_or_else(unsupported)?;
     let words: Vec<&'static str> = UNITS.iter().map(|u| u.0).collect();
     let unit = part.word("unit", &words)?.and_then(|word| UNITS.iter().find(|u| u.0 == word.value).copied());
     let layer = part.text("layer")?.map(|l| l.value.to_owned());

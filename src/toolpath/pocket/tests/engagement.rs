@@ -15,10 +15,10 @@ fn points(c: &[(f64, f64)]) -> Vec<Point2> {
 
 /// The shipped drawing.
 fn bracket() -> Region {
-    use io::outline::{OutlineFormat, OutlineOptions, parse};
+    use io::outline::{OutlineOptions, parse, svg};
     let drawing = include_bytes!("../../../../scenes/bracket.svg");
     let options = OutlineOptions { chord_tolerance: 0.0025, scale: None, layer: Some("pocket".into()) };
-    parse(drawing, OutlineFormat::Svg, &options).unwrap().region
+    parse(drawing, svg::FORMAT, &options).unwrap().region
 }
 
 /// Pockets whose passes are bounded, with sharp corners, a neck, islands: nothing above the limit but by
