@@ -16,7 +16,8 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use ::nightly::{
-    Comparison, History, Night, Results, Rules, compare, date_of, html_page, junit, markdown, summary,
+    Comparison, History, Night, Results, Rules, accuracy, compare, date_of, html_page, junit, markdown,
+    summary,
 };
 use io::{digest, regular};
 use report::Verdict;
@@ -79,7 +80,7 @@ fn claims(options: &NightlyOptions, plan: &Plan) -> Claims {
     let named = [&options.baseline, &options.rules, &options.history].into_iter().flatten().cloned();
     let scenes = plan.cases.iter().map(|planned| planned.path.clone());
     Claims {
-        files: &["report.html", "report.md", FIGURES, "junit.xml"],
+        files: &["report.html", "report.md", "accuracy.md", FIGURES, "junit.xml"],
         folders: Vec::new(),
         inputs: named.chain(shards).chain(scenes).collect(),
     }
@@ -97,6 +98,7 @@ fn write(
     let page = html_page(results, baseline, comparison, history, rules);
     file("report.html", printable_lines(&page))?;
     file("report.md", printable_lines(&markdown(results, baseline, comparison)))?;
+    file("accuracy.md", printable_lines(&accuracy(results, rules)))?;
     file("junit.xml", junit(results, comparison))?;
     file(FIGURES, results.to_json().map_err(|e| CliError::nightly(e.to_string(), "report this error"))?)
 }

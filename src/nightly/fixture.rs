@@ -10,8 +10,14 @@ use report::Verdict;
 pub fn scene(name: &str, value: f64) -> SceneResult {
     let figures: BTreeMap<String, f64> =
         FIGURES.iter().map(|figure| (figure.key.to_owned(), value)).collect();
-    let toolpath =
-        ToolpathResult { name: "zigzag".into(), verdict: Verdict::Pass, figures, bounds: BTreeMap::new() };
+    let toolpath = ToolpathResult {
+        name: "zigzag".into(),
+        strategy: "zigzag".into(),
+        verdict: Verdict::Pass,
+        figures,
+        bounds: BTreeMap::new(),
+        further: BTreeMap::new(),
+    };
     SceneResult {
         name: name.into(),
         case: Case::plain(name),

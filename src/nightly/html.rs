@@ -2,6 +2,7 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
+use super::accuracy::tables;
 use super::compare::{Comparison, Finding};
 use super::convergence;
 use super::figures::{FIGURES, Figure};
@@ -52,6 +53,7 @@ pub fn html_page(
                     div.scroll { (page.table(results, comparison)) }
                 }
                 (convergence::section(results))
+                @for table in tables(results, rules) { (table.html()) }
             }
         }
     };

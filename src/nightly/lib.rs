@@ -3,6 +3,7 @@
 //!
 //! Nothing here reads a file, starts a process or knows the time. The command does (`cli::nightly`).
 
+mod accuracy;
 mod checks;
 mod compare;
 mod convergence;
@@ -12,11 +13,14 @@ mod history;
 mod html;
 mod junit;
 mod markdown;
+mod published;
 mod reference;
 mod results;
 mod rules;
+mod table;
 mod words;
 
+pub use accuracy::{accuracy, further};
 pub use checks::{Measured, Study, studies};
 pub use compare::{Comparison, Finding, compare};
 pub use date::date_of;
@@ -25,6 +29,7 @@ pub use history::{History, Night};
 pub use html::html_page;
 pub use junit::junit;
 pub use markdown::{markdown, summary};
+pub use published::Published;
 pub use reference::reference_work;
 pub use results::{
     Case, ClosedForm, Cost, Outcome, Results, ResultsError, SceneResult, Shard, ToolpathResult, merge,

@@ -49,7 +49,7 @@ fn list(out: &mut String, title: &str, findings: &[Finding]) {
 }
 
 /// A text that Markdown shows as it is, in one line.
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     let special = |c: char| matches!(c, '\\' | '|' | '*' | '_' | '`' | '<' | '>' | '[' | ']' | '#');
     let mut out = String::new();
     for c in printable(text).chars() {

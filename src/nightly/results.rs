@@ -39,12 +39,18 @@ pub enum ResultsError {
 pub struct ToolpathResult {
     /// Its name in the scene.
     pub name: String,
+    /// Its strategy.
+    #[serde(default)]
+    pub strategy: String,
     /// Its verdict.
     pub verdict: Verdict,
     /// Values of [`FIGURES`] by their keys. What was not measured is not there.
     pub figures: BTreeMap<String, f64>,
     /// Error bounds of those figures that have one, mm.
     pub bounds: BTreeMap<String, f64>,
+    /// Further values, by their place in the toolpath of report.json (RFC 6901).
+    #[serde(default)]
+    pub further: BTreeMap<String, f64>,
 }
 
 /// What became of a scene.
@@ -172,15 +178,15 @@ impl SceneResult {
 }
 
 impl Outcome {
-    /// What the text of a report.json says.
+    /// What the text of a report.json says, with the `further` values of each toolpath that stand at these places.
     ///
     /// # Errors
     /// [`ResultsError`] where it is none.
-    pub fn of_report(text: &str) -> Result<Self, ResultsError> {
+    pub fn of_report(text: &str, further: &[&str]) -> Result<Self, ResultsError> {
         let report: Value = serde_json::from_str(text).map_err(|e| ResultsError::Json(e.to_string()))?;
         let verdict = verdict_of(&report).ok_or(ResultsError::Report("verdict"))?;
         let toolpaths = report["toolpaths"].as_array().ok_or(ResultsError::Report("toolpaths"))?;
-        let toolpaths = toolpaths.iter().map(toolpath).collect::<Result<_, _>>()?;
+        let toolpaths = toolpaths.iter().map(|value| toolpath(value, further)).collect::<Result<_, _>>()?;
         Ok(Self::Done { verdict, toolpaths })
     }
 }
@@ -201,16 +207,19 @@ impl ToolpathResult {
     }
 }
 
-fn toolpath(value: &Value) -> Result<ToolpathResult, ResultsError> {
+fn toolpath(value: &Value, further: &[&str]) -> Result<ToolpathResult, ResultsError> {
     let name = value["name"].as_str().ok_or(ResultsError::Report("name of a toolpath"))?;
     let verdict = verdict_of(value).ok_or(ResultsError::Report("verdict of a toolpath"))?;
     let figures = FIGURES.iter().filter_map(|figure| Some((figure.key.to_owned(), figure.of(value)?)));
     let bounds = FIGURES.iter().filter_map(|figure| Some((figure.key.to_owned(), figure.bound_of(value)?)));
+    let further = further.iter().filter_map(|at| Some(((*at).to_owned(), value.pointer(at)?.as_f64()?)));
     Ok(ToolpathResult {
         name: name.to_owned(),
+        strategy: value["strategy"].as_str().unwrap_or_default().to_owned(),
         verdict,
         figures: figures.collect(),
         bounds: bounds.collect(),
+        further: further.collect(),
     })
 }
 
@@ -351,12 +360,15 @@ mod tests {
         let text = r#"{"verdict": "fail", "toolpaths": [
             {"name": "a", "verdict": "pass", "excess": {"max_mm": 0.01, "error_bound_mm": 0.001}, "scallop": {"max_mm": null}},
             {"name": "b", "verdict": "not planned", "reason": "no room"}]}"#;
-        let Ok(Outcome::Done { verdict, toolpaths }) = Outcome::of_report(text) else { panic!() };
+        let Ok(Outcome::Done { verdict, toolpaths }) = Outcome::of_report(text, &["/scallop/target_mm"])
+        else {
+            panic!()
+        };
         assert_eq!((verdict, toolpaths[1].verdict), (Verdict::Fail, Verdict::NotPlanned));
         assert_eq!(toolpaths[0].figures, BTreeMap::from([("highest_mm".to_owned(), 0.01)]));
         assert_eq!(toolpaths[0].bounds, BTreeMap::from([("highest_mm".to_owned(), 0.001)]));
         for bad in ["", "[]", "{}", r#"{"verdict": "pass"}"#, r#"{"verdict": "good", "toolpaths": []}"#] {
-            assert!(Outcome::of_report(bad).is_err(), "{bad}");
+            assert!(Outcome::of_report(bad, &[]).is_err(), "{bad}");
         }
     }
 

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use ::nightly::{Case, ClosedForm, Results, Rules};
+use ::nightly::{Case, ClosedForm, Results, Rules, further};
 use io::{digest, regular};
 use keys::{SceneText, Section, printable};
 use scene::{DEFAULT_MEMORY_MIB, Scene};
@@ -39,6 +39,8 @@ pub struct Planned {
 pub struct Plan {
     /// In the order in which they start.
     pub cases: Vec<Planned>,
+    /// Places in the toolpath of report.json that the pages need beside the figures.
+    pub further: Vec<String>,
 }
 
 impl Plan {
@@ -52,7 +54,9 @@ impl Plan {
         baseline: Option<&Results>,
     ) -> Result<Self, CliError> {
         let scenes = find(&options.paths)?;
-        let mut wanted = rules.checks.iter().map(|c| &c.scene).chain(rules.exact.iter().map(|e| &e.scene));
+        let published = rules.published.iter().map(|p| &p.scene);
+        let exact = rules.exact.iter().map(|e| &e.scene);
+        let mut wanted = rules.checks.iter().map(|c| &c.scene).chain(exact).chain(published);
         if let Some(missing) = wanted.find(|name| !scenes.contains_key(*name)) {
             let what = format!("the rules name the scene {missing}, and no scene has that name");
             return Err(CliError::nightly(what, format!("the scenes are {}", listed(scenes.keys()))));
@@ -68,7 +72,8 @@ impl Plan {
         let mut cases: Vec<Planned> =
             mine.map(|(_, case)| planned(case, &scenes, rules, baseline, &program)).collect();
         cases.sort_by(|a, b| b.expected_s.total_cmp(&a.expected_s));
-        Ok(Self { cases })
+        let further = further(rules).into_iter().map(str::to_owned).collect();
+        Ok(Self { cases, further })
     }
 }
 

@@ -40,13 +40,13 @@ pub fn run(options: &NightlyOptions, plan: &Plan, progress: &Progress) -> Result
         plan.cases.iter().zip(records).partition(|(_, record)| record.is_some());
     let mut results: Vec<SceneResult> = done
         .into_iter()
-        .filter_map(|(planned, record)| record.map(|record| current(record, planned)))
+        .filter_map(|(planned, record)| record.map(|record| current(record, planned, options, &plan.further)))
         .collect();
     if !results.is_empty() {
         progress.line(&format!("{} of {} scenes have finished already", results.len(), plan.cases.len()));
     }
     let left: Vec<&Planned> = left.into_iter().map(|(planned, _)| planned).collect();
-    results.extend(Runner::new(options, left.len(), progress)?.run(&left)?);
+    results.extend(Runner::new(options, left.len(), &plan.further, progress)?.run(&left)?);
     // Whoever else uses the machine makes the reference work slower now and then, never quicker.
     let least = results.iter().map(|result| result.cost.reference_s).fold(f64::INFINITY, f64::min);
     results.iter_mut().for_each(|result| result.cost.reference_s = least);
@@ -54,8 +54,14 @@ pub fn run(options: &NightlyOptions, plan: &Plan, progress: &Progress) -> Result
 }
 
 /// A finished scene with what the rules say today.
-fn current(record: SceneResult, planned: &Planned) -> SceneResult {
-    SceneResult { exact: planned.exact.clone(), ..record }
+fn current(
+    record: SceneResult,
+    planned: &Planned,
+    options: &NightlyOptions,
+    further: &[String],
+) -> SceneResult {
+    let outcome = outcome(&options.out.join(scene_folder(&planned.key)), further);
+    SceneResult { exact: planned.exact.clone(), outcome, ..record }
 }
 
 fn record_path(options: &NightlyOptions, planned: &Planned) -> PathBuf {
@@ -83,6 +89,7 @@ fn record(options: &NightlyOptions, planned: &Planned) -> Result<Option<SceneRes
 /// What all runs have in common.
 struct Runner<'a> {
     options: &'a NightlyOptions,
+    further: &'a [String],
     progress: &'a Progress,
     program: PathBuf,
     jobs: usize,
@@ -91,13 +98,18 @@ struct Runner<'a> {
 }
 
 impl<'a> Runner<'a> {
-    fn new(options: &'a NightlyOptions, scenes: usize, progress: &'a Progress) -> Result<Self, CliError> {
+    fn new(
+        options: &'a NightlyOptions,
+        scenes: usize,
+        further: &'a [String],
+        progress: &'a Progress,
+    ) -> Result<Self, CliError> {
         let program = super::program()?;
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let jobs = options.jobs.map_or(cores, usize::from).min(scenes.max(1));
         let free = child::free_mib().map(|free| free / 5 * 4);
         let budget_mib = options.memory.map(u64::from).or(free).unwrap_or(DEFAULT_BUDGET_MIB);
-        Ok(Self { options, progress, program, jobs, threads: (cores / jobs).max(1), budget_mib })
+        Ok(Self { options, further, progress, program, jobs, threads: (cores / jobs).max(1), budget_mib })
     }
 
     fn run(&self, left: &[&Planned]) -> Result<Vec<SceneResult>, CliError> {
@@ -127,7 +139,7 @@ impl<'a> Runner<'a> {
         let (ended, mut cost) = child::watch(self.command(planned, &folder), &limits, &cancelled);
         cost.reference_s = reference_s;
         let outcome = match ended {
-            Ok(()) => outcome(&folder),
+            Ok(()) => outcome(&folder, self.further),
             // A signal to all processes of a terminal or a job ends the scene, too.
             Err(_) if cancelled() => return Err(CliError::NightlyInterrupted),
             Err(Stopped::Cancelled) => return Err(CliError::NightlyInterrupted),
@@ -175,10 +187,11 @@ fn most_mib(planned: &Planned) -> u64 {
 }
 
 /// What the report.json of a scene says.
-fn outcome(folder: &Path) -> Outcome {
+fn outcome(folder: &Path, further: &[String]) -> Outcome {
     let path = folder.join("report.json");
     let read = super::read_text(&path).map_err(|e| e.to_string());
-    let outcome = read.and_then(|text| Outcome::of_report(&text).map_err(|e| e.to_string()));
+    let further: Vec<&str> = further.iter().map(String::as_str).collect();
+    let outcome = read.and_then(|text| Outcome::of_report(&text, &further).map_err(|e| e.to_string()));
     outcome.unwrap_or_else(|e| Outcome::Failed { reason: format!("Its results cannot be read: {e}") })
 }
 
