@@ -22,6 +22,7 @@
 
 mod along_normals;
 mod closer;
+mod contact;
 mod coverage;
 mod cut_surface;
 mod engagement;
@@ -54,6 +55,7 @@ pub use along_normals::{
     AlongNormal, FirstCut, NormalHit, NormalMap, PatchGrid, RaysCut, SweptVolume, VoxelCut,
     measure_along_normals, net_places,
 };
+pub use contact::contacts_on_patches;
 pub use coverage::{AlongTask, CellsSeen, Coverage, CoverageFigures};
 pub use cut_surface::CutSurface;
 pub use engagement::{ContactArcs, contact_arcs};

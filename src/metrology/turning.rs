@@ -1,31 +1,18 @@
 //! How fast the axis of a tool turns along its passes, and from pass to pass.
 //!
 //! Enters: the part, the cutter, the path. Leaves: the greatest turn of a cutting move over the way of its contact on the
-//! part, and the greatest one between a contact and the nearest of a pass beside it over their distance, rad a mm. The
-//! contact is found from part, cutter and location alone.
+//! part, and the greatest one between a contact and the nearest of a pass beside it over their distance, rad a mm.
 
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
-use motion::{ClPoint, MoveKind, PassStretches, Toolpath};
-use part::{Part, SurfacePoint};
+use motion::{MoveKind, PassStretches, Toolpath};
+use part::Part;
 use work::monitor::{self, Cancelled, Monitor};
 
-/// Rounds in which the place where a tilted cutter touches is found: each takes the normal of the one before.
-const CONTACT_ROUNDS: usize = 4;
+use crate::contact::contact;
 
 /// Axes that differ by less, rad, are the same to rounding.
 const NO_TURN: f64 = 1e-9;
-
-/// The place of the part that a cutter touches, or comes nearest to, how far it is off, and where on the cutter that is.
-pub(super) fn contact(part: &Part, cutter: &Cutter, at: &ClPoint) -> (SurfacePoint, f64, Point3) {
-    let mut foot = part.closest_point(&(at.tip + at.axis * cutter.profile().centre_z)).0;
-    let (mut off, mut contact) = (f64::INFINITY, at.tip);
-    for _ in 0..CONTACT_ROUNDS {
-        contact = at.tip - cutter.contact_to_tip_along(&foot.normal, &at.axis);
-        (foot, off) = part.closest_point(&contact);
-    }
-    (foot, off, contact)
-}
 
 /// The fastest turn of a path's cutting moves, or between them.
 #[derive(Debug, Clone, Copy, PartialEq)]

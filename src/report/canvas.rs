@@ -175,13 +175,19 @@ impl Strokes {
     /// wholly and nothing else.
     pub fn line(&mut self, a: [f64; 2], b: [f64; 2], width: f64) {
         let reach = 0.5 * width + 0.5;
-        let range = |c: usize, most: usize| {
-            let lo = (a[c].min(b[c]) - reach - 1.0).floor().clamp(0.0, most as f64) as usize;
-            lo..(a[c].max(b[c]) + reach + 1.0).ceil().clamp(0.0, most as f64) as usize
+        let range = |from: f64, to: f64, most: usize| {
+            let lo = (from.min(to) - reach - 1.0).floor().clamp(0.0, most as f64) as usize;
+            lo..(from.max(to) + reach + 1.0).ceil().clamp(0.0, most as f64) as usize
         };
-        for y in range(1, self.height) {
-            for x in range(0, self.width) {
-                let distance = distance_to_segment_2d([x as f64 + 0.5, y as f64 + 0.5], a, b);
+        // Along the line from row to row; along all of it where it is level.
+        let (rise, run) = (b[1] - a[1], b[0] - a[0]);
+        let share = |y: f64| if rise == 0.0 { 0.0 } else { ((y - a[1]) / rise).clamp(0.0, 1.0) };
+        for y in range(a[1], b[1], self.height) {
+            let row = y as f64 + 0.5;
+            let near = [row - reach - 1.0, row + reach + 1.0].map(share);
+            let ends = if rise == 0.0 { [a[0], b[0]] } else { near.map(|t| a[0] + t * run) };
+            for x in range(ends[0], ends[1], self.width) {
+                let distance = distance_to_segment_2d([x as f64 + 0.5, row], a, b);
                 let share = if width > 0.0 { reach - distance } else { f64::from(distance <= NEAREST_PIXEL) };
                 let cell = &mut self.coverage[y * self.width + x];
                 *cell = (*cell).max((share.clamp(0.0, 1.0) * 255.0) as u8);

@@ -10,10 +10,12 @@ use super::verdict::{Claim, Verdict, place};
 use metrology::{ExcessFigures, ExcessKind};
 
 /// What the page shows of one toolpath besides its figures.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct ToolpathPage {
     /// deviation.png.
     pub deviation_png: Vec<u8>,
+    /// path.png.
+    pub path_png: Vec<u8>,
     /// height.png; `None` where the part is measured along its normals.
     pub height_png: Option<Vec<u8>>,
     /// field.png and interval.png, for a streamline.
@@ -236,6 +238,10 @@ fn toolpath_section(t: &ToolpathResult, page: &ToolpathPage) -> Markup {
                     figcaption { "No scallop heights: " (t.scallop.reason.as_deref().unwrap_or("no ridge was found")) }
                 }
             }
+            figure {
+                img src=(data_url(&page.path_png)) alt=(format!("Path of {}", t.name));
+                figcaption { "The path: passes from the first (dark) to the last (light), links on the surface, and moves off the surface." }
+            }
             @if let Some(height_png) = &page.height_png {
                 figure {
                     img src=(data_url(height_png)) alt=(format!("Height of {}", t.name));
@@ -385,7 +391,7 @@ fn method(t: &ToolpathResult, field: bool) -> Markup {
             "Files: toolpath.nc (the program, where it was planned here), toolpath.cls (cutter locations), height.exr (height, deviation and move of every cell), machined.stl and machined.ply (the part as cut, the latter coloured by deviation; "
             (t.surface_mesh.triangles) " triangles within " (bound(t.surface_mesh.tolerance_mm)) " µm of the cells"
             @if t.surface_mesh.tolerance_mm > t.scallop.target_mm { ": too coarse for ridges of the target's height; height.exr has them" }
-            "), scallop_pairs.csv (calculated and measured scallops of each pair of passes), deviation.png and height.png" @if field { ", field.png and interval.png" } " (larger than here)."
+            "), scallop_pairs.csv (calculated and measured scallops of each pair of passes), deviation.png, height.png and path.png" @if field { ", field.png and interval.png" } " (larger than here)."
         }
     }
 }
@@ -401,6 +407,7 @@ mod tests {
         let png = vec![1u8, 2, 3];
         let page = ToolpathPage {
             deviation_png: png.clone(),
+            path_png: png.clone(),
             height_png: Some(png.clone()),
             field_pngs: None,
             histogram: Histogram::new(&[[0.004, 1.0]], 0.01, 0.0125),
@@ -409,7 +416,7 @@ mod tests {
         let html = html_page(&report, &[page, streamline], "title = \"<script>\" # a & b");
         assert!(html.contains("&lt;script&gt;") && !html.contains("<script"));
         assert!(!html.contains("http://") && !html.contains("https://"), "nothing is fetched");
-        assert_eq!(html.matches("data:image/png;base64,AQID").count(), 6);
+        assert_eq!(html.matches("data:image/png;base64,AQID").count(), 8);
         assert_eq!(html.matches("toolpath.nc line 1240").count(), 2, "in the head and in its toolpath");
         assert!(html.contains("Rings mark") && html.contains("<th>G1</th>") && !html.contains("<th>G2</th>"));
         assert!(html.contains("1 of 2 toolpaths hold every tolerance"));

@@ -11,6 +11,7 @@ mod histogram;
 mod html;
 mod junit;
 mod map;
+mod path_map;
 mod result;
 mod scale;
 mod surface_mesh;
@@ -25,6 +26,7 @@ pub use histogram::Histogram;
 pub use html::{ToolpathPage, html_page};
 pub use junit::{junit, xml_escaped};
 pub use map::{MapMark, MapSize, MapWords, deviation_colours, deviation_picture, height_picture};
+pub use path_map::{PathLine, path_picture};
 pub use result::{
     InputFile, NotPlanned, ReportError, RunReport, SimulationFigures, SurfaceMeshFigures, ToleranceFigures,
     ToolpathReport, ToolpathResult,

@@ -195,7 +195,7 @@ pub(super) fn diverging(t: f64) -> Rgb {
     [colour.r, colour.g, colour.b]
 }
 
-fn sequential(t: f64) -> Rgb {
+pub(super) fn sequential(t: f64) -> Rgb {
     let colour = colorous::VIRIDIS.eval_continuous(t);
     [colour.r, colour.g, colour.b]
 }

@@ -9,12 +9,13 @@ use serde_json::Value;
 use crate::command::{PLATE, entries, millstream};
 
 /// Files of every toolpath.
-const TOOLPATH_FILES: [&str; 8] = [
+const TOOLPATH_FILES: [&str; 9] = [
     "deviation.png",
     "height.exr",
     "height.png",
     "machined.ply",
     "machined.stl",
+    "path.png",
     "scallop_pairs.csv",
     "toolpath.cls",
     "toolpath.nc",
@@ -205,7 +206,7 @@ fn a_run_leaves_the_files_of_the_contract_and_no_other() {
 }
 
 fn pictures_have_the_grid(folder: &Path, [nx, ny]: [usize; 2]) {
-    let names = ["deviation.png", "height.png", "field.png", "interval.png"];
+    let names = ["deviation.png", "height.png", "path.png", "field.png", "interval.png"];
     for name in names.into_iter().filter(|name| folder.join(name).exists()) {
         let picture = image::open(folder.join(name)).unwrap();
         // The map is drawn with one pixel or more a cell, and has axes, a key and a scale bar around.

@@ -5,10 +5,12 @@ use std::path::Path;
 use geometry::{Aabb, Point2};
 use io::{exr, png};
 use job::{Outcome, Session, marks};
-use metrology::{NormalMap, PatchGrid, View};
+use metrology::{NormalMap, PatchGrid, View, contacts_on_patches};
+use motion::{Move, Toolpath};
+use part::PatchPoint;
 use report::{
-    Histogram, MapSize, MapWords, Picture, ToolpathPage, deviation_picture, field_picture, height_picture,
-    interval_picture,
+    Histogram, MapSize, MapWords, PathLine, Picture, ToolpathPage, deviation_picture, field_picture,
+    height_picture, interval_picture, path_picture,
 };
 use sim::{Grid, ZMap};
 use work::parallel;
@@ -72,29 +74,43 @@ impl Maps<'_> {
         pictures
     }
 
-    /// Writes deviation.png, height.png, and field.png and interval.png of streamlines.
+    /// Writes deviation.png, height.png, path.png, and field.png and interval.png of streamlines.
     fn pictures(&self, cut: &ZMap) -> Result<ToolpathPage, CliError> {
         let (scene, result) = (&self.session.scene, &self.outcome.result);
         let (grid, deviation) = (&cut.grid, &self.outcome.measurement.deviation_map);
         let cell = format!("{} mm", grid.cell);
         let subtitle = format!("{} · cell {cell} · engine {}", scene.title, result.simulation.engine);
         let title = |what: &str| format!("{what}, {}", result.name);
-        let [deviations, heights, fields, intervals] =
-            ["Deviation", "Height", "Feed directions", "Interval of passes"].map(title);
+        let [deviations, heights, paths, fields, intervals] =
+            ["Deviation", "Height", "Path", "Feed directions", "Interval of passes"].map(title);
         let rings = marks(&self.outcome.measurement, &scene.tolerance, &scene.scallop_rule);
         let words = |title, marks| MapWords { title, subtitle: &subtitle, marks, axes: ["x", "y"] };
-        let (deviation_png, height_png) = parallel::join(
-            || {
-                self.picture("deviation.png", &cell, &|size| {
-                    deviation_picture(grid, deviation, &scene.tolerance, &words(&deviations, &rings), size)
-                })
-            },
-            || {
-                self.picture("height.png", &cell, &|size| {
-                    height_picture(grid, &cut.height, &words(&heights, &[]), size)
-                })
-            },
-        );
+        let lines = plan_lines(&self.outcome.path);
+        let draw_path = || {
+            self.picture("path.png", &cell, &|size| {
+                path_picture(grid, deviation, &lines, &words(&paths, &[]), size)
+            })
+        };
+        let (path_png, (deviation_png, height_png)) = parallel::join(draw_path, || {
+            parallel::join(
+                || {
+                    self.picture("deviation.png", &cell, &|size| {
+                        deviation_picture(
+                            grid,
+                            deviation,
+                            &scene.tolerance,
+                            &words(&deviations, &rings),
+                            size,
+                        )
+                    })
+                },
+                || {
+                    self.picture("height.png", &cell, &|size| {
+                        height_picture(grid, &cut.height, &words(&heights, &[]), size)
+                    })
+                },
+            )
+        });
         let field_pngs = self.outcome.field.as_ref().map(|field| {
             let (field, interval) = parallel::join(
                 || {
@@ -112,47 +128,88 @@ impl Maps<'_> {
         });
         Ok(ToolpathPage {
             deviation_png: deviation_png?,
+            path_png: path_png?,
             height_png: Some(height_png?),
             field_pngs: field_pngs.transpose()?,
             histogram: None,
         })
     }
 
-    /// Writes deviation.png and deviation.exr, of several patches with their number; a mesh is shown in the plan view.
+    /// Writes deviation.png, path.png and deviation.exr, of several patches with their number; a mesh is shown in the plan view.
     fn of_normals(&self, map: &NormalMap, spacing: f64) -> Result<ToolpathPage, CliError> {
-        let mut page = Vec::new();
         if map.grids.is_empty() {
-            page = self.unrolled_picture("deviation.png", ["x", "y"], spacing, &plan_view(map, spacing))?;
+            let lines = plan_lines(&self.outcome.path);
+            return self.laid_flat("", ["x", "y"], spacing, &plan_view(map, spacing), &lines);
         }
+        let contacts =
+            contacts_on_patches(&self.session.part, &self.session.scene.cutter, &self.outcome.path);
+        let mut first: Option<ToolpathPage> = None;
         for (k, patch) in map.grids.iter().enumerate() {
             let number = if map.grids.len() > 1 { format!("-{}", k + 1) } else { String::new() };
             let name = self.file(&format!("deviation{number}.exr"));
             let bytes = exr::encode_patch(map, patch).map_err(CliError::output(Path::new(&name)))?;
             self.outputs.file(&name, |out| out.write_all(&bytes))?;
-            let name = format!("deviation{number}.png");
-            let picture = self.unrolled_picture(&name, ["u", "v"], spacing, &unrolled(map, patch))?;
-            if k == 0 {
-                page = picture;
-            }
+            let flat = unrolled(map, patch);
+            let lines = patch_lines(&self.outcome.path, &contacts, k as u32, patch, &flat.0);
+            let page = self.laid_flat(&number, ["u", "v"], spacing, &flat, &lines)?;
+            first.get_or_insert(page);
         }
-        Ok(ToolpathPage { deviation_png: page, height_png: None, field_pngs: None, histogram: None })
+        Ok(first.unwrap_or_default())
     }
 
-    fn unrolled_picture(
+    /// Writes the pictures of deviation and path over a map; leaves the smaller ones for the page.
+    fn laid_flat(
         &self,
-        name: &str,
+        number: &str,
         axes: [&str; 2],
         spacing: f64,
         (grid, values): &(Grid, Vec<f32>),
-    ) -> Result<Vec<u8>, CliError> {
+        lines: &[PathLine],
+    ) -> Result<ToolpathPage, CliError> {
         let (scene, result) = (&self.session.scene, &self.outcome.result);
-        let title = format!("Deviation, {}", result.name);
+        let [deviations, paths] = ["Deviation", "Path"].map(|what| format!("{what}, {}", result.name));
         let (cell, engine) = (format!("{spacing} mm"), result.simulation.engine);
         let [u, v] = axes;
         let subtitle = format!("{} · along {u} and {v} · every {cell} · engine {engine}", scene.title);
-        let words = MapWords { title: &title, subtitle: &subtitle, marks: &[], axes };
-        self.picture(name, &cell, &|size| deviation_picture(grid, values, &scene.tolerance, &words, size))
+        let words = |title| MapWords { title, subtitle: &subtitle, marks: &[], axes };
+        let deviation_png = self.picture(&format!("deviation{number}.png"), &cell, &|size| {
+            deviation_picture(grid, values, &scene.tolerance, &words(&deviations), size)
+        })?;
+        let path_png = self.picture(&format!("path{number}.png"), &cell, &|size| {
+            path_picture(grid, values, lines, &words(&paths), size)
+        })?;
+        Ok(ToolpathPage { deviation_png, path_png, height_png: None, field_pngs: None, histogram: None })
     }
+}
+
+/// The moves seen from above.
+fn plan_lines(path: &Toolpath) -> Vec<PathLine> {
+    let line = |(from, to, step): (_, _, &Move)| {
+        let ends = [from, to].map(|end: geometry::Point3| end.xy());
+        PathLine { ends, kind: step.kind }
+    };
+    path.segments().map(line).collect()
+}
+
+/// The moves whose contacts run on a patch, over the patch laid flat.
+fn patch_lines(
+    path: &Toolpath,
+    contacts: &[Option<PatchPoint>],
+    patch: u32,
+    laid: &PatchGrid,
+    grid: &Grid,
+) -> Vec<PathLine> {
+    let size = [grid.nx, grid.ny].map(|n| n as f64 * grid.cell);
+    let place = |at: PatchPoint| {
+        let share = |c: usize, t: f64| (t - laid.domain[c][0]) / (laid.domain[c][1] - laid.domain[c][0]);
+        Point2::new(share(0, at.u) * size[0], share(1, at.v) * size[1])
+    };
+    let on = |k: usize| contacts[k].filter(|at| at.patch == patch).map(place);
+    let line = |k: usize| {
+        let (from, to) = (on(k - 1)?, on(k)?);
+        Some(PathLine { ends: [from, to], kind: path.moves[k].kind })
+    };
+    (1..path.len()).filter_map(line).collect()
 }
 
 /// A patch laid flat: cells of its mean distances along u and v, made square.

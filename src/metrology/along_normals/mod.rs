@@ -24,6 +24,7 @@ mod swept_volume;
 #[cfg(test)]
 mod tests;
 
+use super::contact::contact as contact_of;
 use super::facing::{Facing, Judged};
 use super::figures::{
     Bounded, CloserLook, ExcessFigures, ExcessKind, Limits, Measurement, NUMERICAL_FLOOR, RidgePlace,
@@ -32,7 +33,6 @@ use super::figures::{
 use super::pairs::{PairTally, RidgeCrossing, pair_figures};
 use super::ridges::{Highest, scallop_figures};
 use super::tracks::Tracks;
-use super::turning::contact as contact_of;
 use closer::{Greatest, MOST_DIVIDED};
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
