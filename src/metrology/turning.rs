@@ -120,7 +120,7 @@ fn angle(a: &Vector3, b: &Vector3) -> f64 {
 mod tests {
     use super::*;
     use geometry::TriangleMesh;
-    use motion::{CcPoint, Move, location};
+    use motion::{CcPoint, ClPoint, Move, location};
     use work::monitor::Silent;
 
     /// On a plate, contacts 0.5 mm apart, the axis leaning by so much more each time.
