@@ -86,10 +86,10 @@ pub struct VerifyOptions {
     #[arg(long, value_name = "FILE")]
     pub program: PathBuf,
     /// The cutter, in one of the short forms of its families.
-    #[arg(long, value_name = "CUTTER", help = format!("The cutter: {}", cutter::short_forms()),
-        required_unless_present = "tools", conflicts_with = "tools")]
+    #[arg(long, value_name = "CUTTER", help = format!("The cutter: {} [default: as the program describes it]", cutter::short_forms()),
+        conflicts_with = "tools")]
     pub cutter: Option<Cutter>,
-    /// A table of tools, a TOML file with a [[tool]] for each.
+    /// A table of tools: a TOML file with a [[tool]] for each, or a .tbl of LinuxCNC in mm.
     #[arg(long, value_name = "FILE")]
     pub tools: Option<PathBuf>,
     /// The tool to verify, where the program has several.
@@ -98,9 +98,9 @@ pub struct VerifyOptions {
     /// The control that the program is written for.
     #[arg(long, value_name = "CONTROL", default_value = "general", value_parser = PossibleValuesParser::new(Control::words()))]
     pub control: String,
-    /// What of the part is judged: what the tool can face, or all of it, walls too.
-    #[arg(long, value_name = "WHAT", value_parser = PossibleValuesParser::new(Judged::ALL.map(Judged::word)))]
-    pub judge: Option<String>,
+    /// What of the part is judged: what the tool can face, vertical walls too, or all of it.
+    #[arg(long, value_name = "WHAT", default_value = Judged::Walls.word(), value_parser = PossibleValuesParser::new(Judged::ALL.map(Judged::word)))]
+    pub judge: String,
     /// Stock above the part's highest point, mm [default: 1].
     #[arg(long, value_name = "MM")]
     pub allowance: Option<f64>,

@@ -5,17 +5,13 @@ use std::path::Path;
 
 use cutter::Cutter;
 use keys::{toml_number, toml_string};
-use program::ToolTable;
-use scene::{Scene, SceneText};
+use scene::{Scene, TableError, described_tools, tool_table};
 use work::monitor;
 
 use super::args::VerifyOptions;
 use super::error::{CliError, shown};
 use super::progress::Progress;
 use super::run::{Chosen, RunOutcome, Target, default_target, on_threads, run_scene};
-
-/// Largest table of tools, bytes.
-const MAX_BYTES: u64 = 1 << 20;
 
 /// Verifies a program and writes the results.
 ///
@@ -43,7 +39,7 @@ fn text(options: &VerifyOptions) -> Result<String, CliError> {
     let (cutter, holder) = match (&options.cutter, &options.tools) {
         (Some(cutter), _) => (*cutter, String::new()),
         (None, Some(tools)) => of_table(tools, options.tool)?,
-        (None, None) => return Err(refused("no cutter is given", "add --cutter or --tools")),
+        (None, None) => of_program(options)?,
     };
     let mut text = String::new();
     write_scene(&mut text, options, &cutter, &holder)
@@ -55,15 +51,36 @@ fn refused(what: &str, cure: &str) -> CliError {
     CliError::Verify { what: what.to_owned(), cure: cure.to_owned() }
 }
 
+/// The cutter that the program itself describes in its comments.
+fn of_program(options: &VerifyOptions) -> Result<(Cutter, String), CliError> {
+    let file = shown(&options.program);
+    let cure = "add --cutter or --tools";
+    let (table, used) = described_tools(&options.program, &options.control).map_err(|error| match error {
+        TableError::Fault(error) => error.into(),
+        TableError::Unreadable(reason) => refused(&format!("cannot read {file}: {reason}"), "name a program"),
+    })?;
+    let known: Vec<u32> = used.into_iter().filter(|number| table.get(*number).is_some()).collect();
+    let number = match (options.tool, &known[..]) {
+        (Some(number), _) => number,
+        (None, [only]) => *only,
+        (None, []) => return Err(refused(&format!("{file} describes no cutter"), cure)),
+        (None, _) => {
+            return Err(refused(&format!("{file} describes several cutters"), "name one with --tool"));
+        }
+    };
+    let described = table.get(number).map(|tool| (tool.cutter, String::new()));
+    described.ok_or_else(|| refused(&format!("{file} describes no cutter for tool {number}"), cure))
+}
+
 /// Cutter and holder of a tool of a table, the latter as scenes spell it.
 fn of_table(file: &Path, number: Option<u32>) -> Result<(Cutter, String), CliError> {
-    let unreadable = |reason: String| {
-        refused(&format!("cannot read {}: {reason}", shown(file)), "name a file of tools in TOML")
-    };
-    let bytes = io::regular::read(file, MAX_BYTES).map_err(|e| unreadable(e.to_string()))?;
-    let text = String::from_utf8(bytes).map_err(|_| unreadable("it is no UTF-8 text".to_owned()))?;
-    let source = SceneText::new(file.to_string_lossy(), text);
-    let table = ToolTable::read(&source)?;
+    let table = tool_table(file).map_err(|error| match error {
+        TableError::Fault(error) => error.into(),
+        TableError::Unreadable(reason) => refused(
+            &format!("cannot read {}: {reason}", shown(file)),
+            "name a file of tools in TOML, or a .tbl of LinuxCNC",
+        ),
+    })?;
     let tools = &table.tools;
     let listed = tools.iter().map(|tool| tool.number.to_string()).collect::<Vec<_>>().join(", ");
     let tool = match (number, &tools[..]) {
@@ -102,9 +119,7 @@ fn write_scene(out: &mut String, options: &VerifyOptions, cutter: &Cutter, holde
     let quoted = |path: &Path| toml_string(&path.to_string_lossy());
     writeln!(out, "title = {}", toml_string(&name(&options.program)))?;
     writeln!(out, "[part]\nfile = {}\nunit = {}", quoted(&options.part), toml_string(&options.unit))?;
-    if let Some(judge) = &options.judge {
-        writeln!(out, "judge = {}", toml_string(judge))?;
-    }
+    writeln!(out, "judge = {}", toml_string(&options.judge))?;
     writeln!(out, "[cutter]")?;
     cutter.write(out)?;
     out.push_str(holder);

@@ -23,6 +23,9 @@ const SAME_AXIS: f64 = 1e-2;
 /// What lies this far over a place, mm, beside what the part's triangles are off its surface, is another surface.
 const ABOVE: f64 = 1e-6;
 
+/// So far before a wall it is looked whether other surface lies over it, mm: more than rounding of mesh files.
+const BEFORE: f64 = 1e-3;
+
 /// What of a part is judged.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -30,18 +33,21 @@ pub enum Judged {
     /// What some tool axis of the path faces.
     #[default]
     Facing,
+    /// That, and what stands along it and is open above.
+    Walls,
     /// All of it.
     All,
 }
 
 impl Judged {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Facing, Self::All];
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Facing, Self::Walls, Self::All];
 
     /// As scenes spell it.
     pub fn word(self) -> &'static str {
         match self {
             Self::Facing => "facing",
+            Self::Walls => "walls",
             Self::All => "all",
         }
     }
@@ -55,6 +61,7 @@ impl Judged {
     pub fn meaning(self) -> &'static str {
         match self {
             Self::Facing => "the surface that the tool can face",
+            Self::Walls => "that, and walls along the tool axis",
             Self::All => "the whole surface",
         }
     }
@@ -69,7 +76,7 @@ pub enum PlaceKind {
     Wall,
     /// It faces away from every axis.
     FacingAway,
-    /// It faces up, and other surface of the part lies over it.
+    /// It faces up, or is a wall that is judged, and other surface of the part lies over it.
     Hidden,
     /// It lies outside of the block.
     OutsideStock,
@@ -116,6 +123,7 @@ impl<'a> Facing<'a> {
     pub fn is_judged(&self, judged: Judged, kind: PlaceKind) -> bool {
         match judged {
             Judged::Facing => kind == PlaceKind::Facing,
+            Judged::Walls => matches!(kind, PlaceKind::Facing | PlaceKind::Wall),
             Judged::All => kind != PlaceKind::OutsideStock,
         }
     }
@@ -167,6 +175,11 @@ impl<'a> Facing<'a> {
             }
         }
         if most < -LEAST_FACING { PlaceKind::FacingAway } else { PlaceKind::Wall }
+    }
+
+    /// Whether other surface of the part lies over an upright tool at a wall.
+    pub(crate) fn is_hidden_wall(&self, point: &Point3, normal: &Vector3) -> bool {
+        self.is_covered(&(point + normal * BEFORE), self.part.mesh_deviation() + ABOVE)
     }
 
     /// Whether other surface of the part lies over a place.

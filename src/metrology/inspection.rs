@@ -10,9 +10,10 @@ use super::figures::{
     DeviationFigures, GougeFigures, GougeRegion, Limits, NUMERICAL_FLOOR, UncutFigures, UncutRegion,
 };
 use super::regions::connected;
+use super::walls::Walls;
 use crate::closer;
 use cutter::Cutter;
-use geometry::{Point2, Point3};
+use geometry::{Point2, Point3, Vector3};
 use part::{Part, SurfaceGrid, SurfacePoint};
 use sim::{Grid, NOT_CUT};
 use work::monitor::{self, Cancelled, Monitor};
@@ -69,6 +70,8 @@ pub(super) struct Inspection<'a> {
     pub most_squares: usize,
     pub surface: &'a CutSurface<'a>,
     pub grid: Grid,
+    /// The walls beside, where they are measured.
+    pub walls: Option<&'a Walls>,
 }
 
 impl Inspection<'_> {
@@ -98,12 +101,13 @@ impl Inspection<'_> {
                     }
                     let centre = self.grid.centre(i, first + j);
                     let p = Point3::new(centre.x, centre.y, here.z);
-                    if let Some(d) = self.surface.along_normal(&p, &here.normal) {
+                    if let Some((d, of_wall)) = self.along_normal(&p, &here.normal) {
+                        let top = if of_wall { d.distance } else { self.top(&design, (i, row), &p, &d) };
                         *sample = Sample {
                             deviation: d.distance as f32,
                             slope: d.slope as f32,
                             lean: here.normal.z as f32,
-                            top: self.top(&design, (i, row), &p, &d) as f32,
+                            top: top as f32,
                         };
                     }
                 }
@@ -112,6 +116,16 @@ impl Inspection<'_> {
             monitor::check(monitor)?;
         }
         Ok(samples)
+    }
+
+    /// The deviation at a place of the design, and whether a wall beside it accounts for it.
+    fn along_normal(&self, p: &Point3, normal: &Vector3) -> Option<(Deviation, bool)> {
+        let found = self.surface.along_normal(p, normal)?;
+        let distance = self.walls.map_or(found.distance, |walls| walls.beside(p, found.distance));
+        if distance == found.distance {
+            return Some((found, false));
+        }
+        Some((Deviation { distance, slope: 0.0, ..found }, true))
     }
 
     /// What stands at most in the cell `(i, j)` of a band by the move that cut its centre, and with the normals of the design
@@ -236,7 +250,7 @@ impl Inspection<'_> {
         let open = Promising::of(squares, MOST_SEARCHED.min(self.most_squares / 2).max(1));
         let at = |q: Point2, half: f64| {
             let design = self.design_at(q)?;
-            let d = self.surface.along_normal(&design.point, &design.normal)?;
+            let (d, _) = self.along_normal(&design.point, &design.normal)?;
             Some(value(&d, design.normal.z, half))
         };
         let mut found = closer::greatest(open.squares, known, self.asked, self.most_squares, &at, monitor)?;
@@ -247,7 +261,7 @@ impl Inspection<'_> {
     /// Depth at a place of the plan, its design point, and the move that cut it.
     fn depth_at(&self, q: Point2) -> Option<(f64, Point3, u32)> {
         let design = self.design_at(q)?;
-        let d = self.surface.along_normal(&design.point, &design.normal)?;
+        let (d, _) = self.along_normal(&design.point, &design.normal)?;
         Some((-d.distance, design.point, d.by))
     }
 

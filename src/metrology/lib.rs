@@ -50,6 +50,7 @@ mod sections;
 mod tracks;
 mod turning;
 mod unseen;
+mod walls;
 
 pub use along_normals::{
     AlongNormal, FirstCut, NormalHit, NormalMap, PatchGrid, RaysCut, SweptVolume, VoxelCut,
@@ -68,7 +69,7 @@ pub use figures::{
     Bounded, CloserLook, DeviationFigures, ExcessFigures, ExcessKind, GougeFigures, GougeRegion, Limits,
     Measurement, PathFigures, RidgePlace, ScallopFigures, ScallopRule, UncutFigures, UncutRegion,
 };
-pub use measure::measure;
+pub use measure::{measure, measure_with_walls};
 pub use meetings::Meetings;
 pub use offset_distance::{
     OffsetDistance, OffsetFigures, OffsetPoints, SingularPlaceFigures, measure_offset, offset_figures,

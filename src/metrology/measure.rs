@@ -10,6 +10,8 @@ use super::refine::{Asked, Refinement};
 use super::ridge_map::borders;
 use super::ridges::scallop_figures;
 use super::unseen::{dips, unseen_depth};
+use super::walls::{WallTask, Walls};
+use super::{Facing, REACH_OVER_UNCUT};
 use cutter::Cutter;
 use geometry::Point3;
 use motion::Toolpath;
@@ -35,8 +37,35 @@ pub fn measure(
     asked: &Asked,
     monitor: &dyn Monitor,
 ) -> Result<Measurement, Cancelled> {
+    measure_with_walls(part, cutter, path, cut, limits, asked, None, monitor)
+}
+
+/// As [`measure`], and the part's vertical walls too, as far as they are walls to the path.
+///
+/// # Errors
+/// [`Cancelled`] when the monitor says so.
+pub fn measure_with_walls(
+    part: &Part,
+    cutter: &Cutter,
+    path: &Toolpath,
+    cut: &ZMap,
+    limits: &Limits,
+    asked: &Asked,
+    facing: Option<&Facing<'_>>,
+    monitor: &dyn Monitor,
+) -> Result<Measurement, Cancelled> {
     let surface = CutSurface::new(Envelope::new(cutter, path), cut, path);
     let bound = asked.error_bound;
+    let grid = cut.grid;
+    let walls = match facing {
+        Some(facing) => {
+            let (envelope, reach) =
+                (&surface.envelope, (REACH_OVER_UNCUT * limits.uncut).max(cutter.radius()));
+            let task = WallTask { part, cutter, path, envelope, grid, facing, limits, reach, asked: bound };
+            Walls::measure(&task, monitor)?
+        }
+        None => None,
+    };
     let inspection = Inspection {
         part,
         cutter,
@@ -44,7 +73,8 @@ pub fn measure(
         asked: bound,
         most_squares: asked.most_squares,
         surface: &surface,
-        grid: cut.grid,
+        grid,
+        walls: walls.as_ref(),
     };
     let mut found = inspect(&inspection, path, 0.0, monitor)?;
     let highest_ridge = found.ridges.highest_sample();
@@ -90,6 +120,9 @@ pub fn measure(
     let (highest, unreached) = (measured.excess.highest.max_mm, measured.excess.unreached.max_mm);
     measured.deviation.max_mm = measured.deviation.max_mm.map(|max| max.max(highest));
     measured.uncut.max_height_mm = measured.uncut.max_height_mm.max(unreached);
+    if let Some(walls) = &walls {
+        walls.add_to(&mut measured, limits);
+    }
     Ok(measured)
 }
 

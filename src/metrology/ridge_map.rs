@@ -37,7 +37,8 @@ pub(super) fn ridge_map(
     let surface = CutSurface::new(Envelope::new(cutter, path), cut, path);
     // Nothing is searched between centres.
     let (most_squares, grid) = (0, cut.grid);
-    let inspection = Inspection { part, cutter, limits, asked, most_squares, surface: &surface, grid };
+    let inspection =
+        Inspection { part, cutter, limits, asked, most_squares, surface: &surface, grid, walls: None };
     let samples = inspection.samples(monitor)?;
     let finder = RidgeFinder::new(&surface, part, cutter, path, limits);
     let mut ridges = finder.find(&|k| samples[k].deviation, monitor)?;

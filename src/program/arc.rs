@@ -2,6 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
+use crate::compensation::{Way, whole_turns};
 use crate::error::{Fault, Stop};
 use crate::frame::Place;
 use crate::interpret::{AXES, Interpreter};
@@ -43,6 +44,11 @@ impl Interpreter<'_> {
         let [at_start, at_end] = [a, b].map(|[x, y]| x.hypot(y));
         self.check_radii(at_start, at_end, column.unwrap_or(0))?;
         let sweep = sweep(a, b, at_start, clockwise) + self.turns()?;
+        if self.compensation.is_some() {
+            let feed = self.feed((0.5 * (at_start + at_end) * sweep).hypot(to[w] - start[w]))?;
+            let turns = whole_turns(sweep);
+            return self.beside(Way::Round { centre, clockwise, turns }, to, feed);
+        }
         let rise = to[w] - start[w];
         let length = (0.5 * (at_start + at_end) * sweep).hypot(rise);
         let feed = self.feed(length)?;
@@ -122,7 +128,7 @@ impl Interpreter<'_> {
 }
 
 /// The angle from `a` to `b` about zero, rad; a whole turn where both are one point.
-fn sweep(a: [f64; 2], b: [f64; 2], radius: f64, clockwise: bool) -> f64 {
+pub(crate) fn sweep(a: [f64; 2], b: [f64; 2], radius: f64, clockwise: bool) -> f64 {
     let apart = (a[0] - b[0]).hypot(a[1] - b[1]);
     if apart <= SAME_POINT * radius {
         return TAU;

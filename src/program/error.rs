@@ -177,6 +177,34 @@ pub enum Fault {
     /// Calls without end.
     #[error("more than {0} subprograms call each other")]
     Recursion(usize),
+    /// A radius that is asked for and not known.
+    #[error("G41 or G42 needs the radius of tool {0}, which is not known")]
+    NoRadius(u32),
+    /// A first move that is no straight one of some length.
+    #[error(
+        "the first move under G41 or G42 must be straight and longer than the cutter's radius of {radius:.4} mm"
+    )]
+    Entry {
+        /// Radius of the cutter.
+        radius: f64,
+    },
+    /// An inner corner that is too narrow.
+    #[error("a cutter of radius {radius:.4} mm does not fit into the corner before this move")]
+    Corner {
+        /// Radius of the cutter.
+        radius: f64,
+    },
+    /// An inner arc that is too narrow.
+    #[error("a cutter of radius {radius:.4} mm does not fit into an arc of radius {arc:.4} mm")]
+    InnerArc {
+        /// Radius of the cutter.
+        radius: f64,
+        /// Radius of the arc.
+        arc: f64,
+    },
+    /// A code that cannot stand while the radius is compensated.
+    #[error("{0} cannot stand while the cutter's radius is compensated")]
+    Meanwhile(String),
     /// Motion with rotary axes without a machine that has them.
     #[error("the word {0} turns an axis, and no machine with such an axis is given")]
     Rotary(char),
@@ -233,6 +261,14 @@ impl Fault {
             Self::NoTarget(_) => "add it, or put the subprogram in the same file",
             Self::Unmatched { .. } => "close every loop and branch",
             Self::Endless(_) | Self::Recursion(_) => "check the condition under which it ends",
+            Self::NoRadius(_) => {
+                "give the cutter with this number in a table of tools (--tools), or the diameter with G41.1 D"
+            }
+            Self::Entry { .. } => "lead in by a straight move that is longer than the radius",
+            Self::Corner { .. } | Self::InnerArc { .. } => {
+                "check the cutter's radius, the side (G41 left, G42 right), and the contour"
+            }
+            Self::Meanwhile(_) => "write G40 before it",
             Self::Rotary(_) => "name a machine with rotary axes in the scene ([machine.kinematics])",
             Self::HalfTurn => "put a location in between",
             Self::Cutter(_) => "write CUTTER/diameter,corner radius or all seven numbers",

@@ -133,13 +133,19 @@ fn what_cannot_be_followed_is_refused_at_its_place() {
         assert!(matches!(fault, Fault::Unsupported { .. }), "{text}: {fault}");
         assert_eq!((l, c), (line, column), "{text}");
     };
-    unsupported("G0 X1\nG41 D1 X2\n", 2, 1);
     unsupported("G0 X1\nN5 G33 Z-1 K1\n", 2, 4);
     unsupported("G38.2 Z-1\n", 1, 1);
     unsupported("G1 X1 F1\nG51 X0 Y0 P2\n", 2, 1);
     unsupported("G16\n", 1, 1);
     unsupported("G5 I1 J1 P1 Q1 X3 Y3\n", 1, 1);
     for (text, line, column, fault) in [
+        ("G0 X1\nG41 D1 X2\n", 2, 5, Fault::NoRadius(1)),
+        ("T4 M6\nG42 X2\n", 2, 1, Fault::NoRadius(4)),
+        ("F1\nG41.1 D4 G1 X1\n", 2, 1, Fault::Entry { radius: 2.0 }),
+        ("F1\nG41.1 D4 G1 X9\nY1\nX8\n", 4, 1, Fault::Corner { radius: 2.0 }),
+        ("F1\nG41.1 D4 G1 X9\nG3 X8 Y1 R1\n", 3, 1, Fault::InnerArc { radius: 2.0, arc: 1.0 }),
+        ("F1\nG41.1 D4 G1 X9\nG10 L2 P1 X1\n", 3, 1, Fault::Meanwhile("G10".into())),
+        ("T1\nG41.1 D4 G1 X9 F1\nM6\n", 3, 1, Fault::Meanwhile("M6".into())),
         ("G1 X1 F1\nG1 Y2 U3\n", 2, 7, Fault::Unused('U')),
         (
             "X5\n",

@@ -4,6 +4,7 @@
 //! something, then the motion, then stops.
 
 use crate::block::{Block, CodeWord};
+use crate::compensation::{Compensation, Way};
 use crate::control::{Code, Codes, Control, FeedMode, Length, Motion, Plane, RadiusSide, spelled};
 use crate::error::{Fault, ProgramError, Stop};
 use crate::expression::Scope;
@@ -40,7 +41,10 @@ pub fn read_gcode(
     let mut reader = Interpreter::new(lines, control, setup);
     reader.out.name = name.to_owned();
     match reader.run() {
-        Ok(()) => Ok(reader.out),
+        Ok(()) => {
+            reader.out.unit = reader.state.modal.unit;
+            Ok(reader.out)
+        }
         Err(stop) => Err(stop.in_line(name, reader.line)),
     }
 }
@@ -54,6 +58,7 @@ struct Asked {
     /// G53.
     machine: bool,
     length: Option<(Length, CodeWord)>,
+    radius: Option<(RadiusSide, CodeWord)>,
     quiet: bool,
 }
 
@@ -75,6 +80,8 @@ pub(crate) struct Interpreter<'a> {
     /// The program has moved.
     moved: bool,
     most_repeats: u64,
+    /// The cutter's radius, while it is compensated.
+    pub compensation: Option<Compensation>,
     /// Where the block's text begins within its line.
     shift: usize,
 }
@@ -97,11 +104,17 @@ impl<'a> Interpreter<'a> {
             changed: true,
             moved: false,
             most_repeats: setup.most_repeats,
+            compensation: None,
             shift: 0,
         }
     }
 
     fn run(&mut self) -> Result<(), Stop> {
+        self.run_blocks()?;
+        self.end_compensation()
+    }
+
+    fn run_blocks(&mut self) -> Result<(), Stop> {
         let most = self.lines.len() as u64 + self.most_repeats;
         let mut blocks = 0;
         let mut marks = 0;
@@ -191,6 +204,9 @@ impl<'a> Interpreter<'a> {
         self.words(unit_before)?;
         let next = if self.block.m.as_slice().is_empty() { Next::Line } else { self.switches()? };
         self.lengths(&asked)?;
+        if let Some((side, word)) = asked.radius {
+            self.compensate(side, word)?;
+        }
         if asked.quiet {
             self.block.ignore(b"PQREL");
         }
@@ -220,6 +236,9 @@ impl<'a> Interpreter<'a> {
                 let [first, second] = [first.tenths, word.tenths].map(spelled);
                 Stop::new(column, Fault::Conflict { first, second })
             };
+            if self.moves_frame(code) {
+                self.needs_no_compensation(*word)?;
+            }
             let modal = &mut self.state.modal;
             match code {
                 Code::Motion(motion) => match asked.motion {
@@ -244,12 +263,7 @@ impl<'a> Interpreter<'a> {
                 Code::Work(number) => self.select_work(usize::from(number) - 1),
                 Code::MoreWork => self.more_work(*word)?,
                 Code::Length(length) => asked.length = Some((length, *word)),
-                Code::Radius(RadiusSide::Off) => {}
-                Code::Radius(_) => {
-                    let why = "the control would shift the path by the radius of the cutter";
-                    let code = spelled(word.tenths);
-                    return Err(Stop::new(column, Fault::Unsupported { code, why }));
-                }
+                Code::Radius(side) => asked.radius = Some((side, *word)),
                 Code::Machine => asked.machine = true,
                 Code::Quiet => asked.quiet = true,
                 Code::Unsupported(why) => {
@@ -350,6 +364,9 @@ impl<'a> Interpreter<'a> {
         let Some(tool) = self.state.selected else {
             return Err(self.missing_m(word, "T with the number of a tool"));
         };
+        if self.compensation.is_some() {
+            return Err(Stop::new(usize::from(word.column), Fault::Meanwhile("M6".to_owned())));
+        }
         self.turn(Spindle::Off);
         self.load(tool);
         Ok(())
@@ -452,14 +469,22 @@ impl<'a> Interpreter<'a> {
                     self.whole(b'P', number.unwrap_or(0.0), 0.0..=99_999_999.0, "the number of a tool")?;
                 let z =
                     self.block.take(b'Z').or_else(|| if kind == 1 { None } else { self.block.take(b'R') });
-                self.block.ignore(b"R");
+                if let Some(radius) = self.block.take(b'R').filter(|_| kind == 1) {
+                    self.state.radii.insert(number, radius * unit);
+                }
                 if let Some(z) = z {
                     let incremental = !self.state.modal.absolute && kind != 1;
                     let entry = self.state.lengths.entry(number).or_default();
                     entry[2] = z * unit + if incremental { entry[2] } else { 0.0 };
                 }
             }
-            12 | 13 => self.block.ignore(b"R"),
+            12 | 13 => {
+                let register =
+                    self.whole(b'P', number.unwrap_or(0.0), 0.0..=99_999_999.0, "the number of a tool")?;
+                if let Some(radius) = self.block.take(b'R').filter(|_| kind == 12) {
+                    self.state.radii.insert(register, radius * unit);
+                }
+            }
             _ => {
                 let (code, why) = (format!("G10 L{kind}"), "it sets data that the reader does not know");
                 return Err(Stop::new(usize::from(word.column), Fault::Unsupported { code, why }));
@@ -614,14 +639,18 @@ impl<'a> Interpreter<'a> {
             _ if !axes => Ok(()),
             Motion::Rapid => {
                 let to = self.target()?;
-                self.go(StepKind::Rapid, to)
+                self.straight(StepKind::Rapid, to, 0.0)
             }
             Motion::Line => {
                 let to = self.target()?;
                 let feed = self.feed(self.length_to(&to))?;
-                self.fed(StepKind::Feed, to, feed)
+                self.straight(StepKind::Feed, to, feed)
             }
-            Motion::Cycle(cycle) => self.cycle(cycle),
+            Motion::Cycle(cycle) => {
+                let code = self.state.modal.code;
+                self.needs_no_compensation(CodeWord { tenths: code, ..CodeWord::default() })?;
+                self.cycle(cycle)
+            }
             Motion::Arc { .. } => Ok(()),
             Motion::None => {
                 let letter = self.block.unused().unwrap_or(b'X');
@@ -629,6 +658,33 @@ impl<'a> Interpreter<'a> {
                 let words = "a motion such as G0 or G1, in this block or before";
                 Err(Stop::new(self.block.column(letter), Fault::Missing { code, words }))
             }
+        }
+    }
+
+    /// A straight move, compensated where the cutter's radius is.
+    fn straight(&mut self, kind: StepKind, to: Place, feed: f64) -> Result<(), Stop> {
+        if self.compensation.is_some() {
+            self.beside(Way::Straight(kind), to, feed)
+        } else {
+            self.fed(kind, to, feed)
+        }
+    }
+
+    /// Whether a code changes what the compensated moves are placed in.
+    fn moves_frame(&self, code: Code) -> bool {
+        let modal = &self.state.modal;
+        match code {
+            Code::Plane(plane) => plane != modal.plane,
+            Code::Work(number) => usize::from(number) - 1 != self.state.frame.active,
+            Code::Length(_)
+            | Code::MoreWork
+            | Code::Machine
+            | Code::Data
+            | Code::Home(_)
+            | Code::SetHome(_) => true,
+            Code::Local | Code::Shift | Code::ShiftState(_) | Code::Rotation(true) => true,
+            Code::Rotation(false) => self.state.frame.rotation.is_some(),
+            _ => false,
         }
     }
 
@@ -704,10 +760,21 @@ impl<'a> Interpreter<'a> {
     }
 
     fn push(&mut self, kind: StepKind, feed: f64) -> Result<(), Stop> {
+        let setting = self.setting_index();
+        self.push_as(kind, feed, self.line_number(), setting)
+    }
+
+    /// The setting in force, as an index.
+    pub fn setting_index(&mut self) -> u32 {
         if self.changed {
             self.changed = false;
             self.out.settings.push(self.setting());
         }
+        self.out.settings.len() as u32 - 1
+    }
+
+    /// A step of a line under a setting.
+    pub fn push_as(&mut self, kind: StepKind, feed: f64, line: u32, setting: u32) -> Result<(), Stop> {
         if !self.moved && kind != StepKind::Set {
             self.moved = true;
             self.out.zero = self.zero();
@@ -715,7 +782,6 @@ impl<'a> Interpreter<'a> {
         if self.out.steps.len() as u64 > self.lines.len() as u64 + self.most_repeats {
             return Err(Stop::new(0, Fault::Endless(self.out.steps.len() as u64)));
         }
-        let (line, setting) = (self.line_number(), self.out.settings.len() as u32 - 1);
         self.out.steps.push(Step { kind, to: self.state.place, feed, line, setting });
         Ok(())
     }

@@ -16,6 +16,7 @@ mod block;
 #[cfg(test)]
 mod canonical_tests;
 mod checks;
+mod compensation;
 mod control;
 mod cursor;
 mod cycle;

@@ -114,6 +114,8 @@ pub struct Program {
     pub notes: Vec<Note>,
     /// Comments that describe tools.
     pub tools: Vec<ToolRemark>,
+    /// Millimetres of its unit of length, where it ends.
+    pub unit: f64,
     /// Lines of the text.
     pub lines: usize,
     /// Whether it says where it ends.

@@ -20,6 +20,10 @@ pub struct Setup {
     pub start: Place,
     /// Lengths by their registers.
     pub lengths: BTreeMap<u32, [f64; 3]>,
+    /// Radii of cutters by the numbers of D, mm.
+    pub radii: BTreeMap<u32, f64>,
+    /// That of all others, where it is known, mm.
+    pub any_radius: Option<f64>,
     /// Whether lines with a slash are left out.
     pub delete_blocks: bool,
     /// Blocks and motions that loops may add to those of the file. A program that adds more has no end.
@@ -34,6 +38,8 @@ impl Default for Setup {
             homes: [[0.0; 6]; 2],
             start: [0.0; 6],
             lengths: BTreeMap::new(),
+            radii: BTreeMap::new(),
+            any_radius: None,
             delete_blocks: false,
             most_repeats: 10_000_000,
         }
@@ -89,6 +95,8 @@ pub(crate) struct State {
     pub place: Place,
     pub homes: [Place; 2],
     pub lengths: BTreeMap<u32, [f64; 3]>,
+    pub radii: BTreeMap<u32, f64>,
+    pub any_radius: Option<f64>,
     pub register: u32,
     pub selected: Option<u32>,
     pub tool: u32,
@@ -121,6 +129,8 @@ impl State {
             place: setup.start,
             homes: setup.homes,
             lengths: setup.lengths.clone(),
+            radii: setup.radii.clone(),
+            any_radius: setup.any_radius,
             register: 0,
             selected: None,
             tool: 0,
@@ -133,6 +143,11 @@ impl State {
     /// After the frame has changed: the tip stays where it is.
     pub fn reframe(&mut self) {
         self.at = self.frame.program_place(&self.place);
+    }
+
+    /// Where the tip is in the program's coordinates, which differs from `at` while the radius is compensated.
+    pub fn tip(&self) -> Place {
+        self.frame.program_place(&self.place)
     }
 
     /// Takes another length for the tool's; the spindle stays where it is.

@@ -1,6 +1,7 @@
 //! Programs from elsewhere: their files as paths of one tool.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
 
 use super::named_file::NamedFile;
@@ -54,7 +55,9 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
         read_apt(&name, &bytes)
     } else {
         let registers = lengths.iter().map(|(number, length)| (*number, [0.0, 0.0, *length])).collect();
-        let setup = Setup { lengths: registers, ..Setup::from_above(MACHINE_ZERO_ABOVE) };
+        let radii = table.tools.iter().map(|tool| (tool.number, tool.cutter.radius())).collect();
+        let any_radius = table.tools.is_empty().then(|| scene.cutter.radius());
+        let setup = Setup { lengths: registers, radii, any_radius, ..Setup::from_above(MACHINE_ZERO_ABOVE) };
         read_gcode(&name, &bytes, control, &setup)
     };
     let read = read.map_err(refused)?;
@@ -65,7 +68,8 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
     let runs = read.runs(&placing).map_err(refused)?;
     let tool = chosen(foreign.tool, &read, &runs)
         .map_err(|(message, cure)| scene.source.error(file.span.clone(), message, cure))?;
-    let others = Others::of(&runs, tool, &table);
+    let described = if table.tools.is_empty() { ToolTable::of_remarks(&read) } else { table };
+    let others = Others::of(&runs, tool, &described);
     let path = joined(runs.into_iter().filter(|run| run.tool == tool));
     let findings: Vec<Finding> =
         read.findings(&length).into_iter().filter(|found| found.tool == tool || found.tool == 0).collect();
@@ -78,17 +82,63 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
 
 /// The table of tools that a toolpath names.
 fn table(file: &NamedFile, scene: &Scene) -> Result<ToolTable, SceneError> {
-    let unreadable = |reason: String| {
-        let message = format!("cannot read the tools {}: {reason}", file.path.display());
-        scene.source.error(file.span.clone(), message, "name a file of tools in TOML")
-    };
-    let bytes = regular::read(&file.path, MAX_TABLE_BYTES).map_err(|e| unreadable(e.to_string()))?;
+    tool_table(&file.path).map_err(|error| match error {
+        TableError::Fault(error) => error,
+        TableError::Unreadable(reason) => {
+            let message = format!("cannot read the tools {}: {reason}", file.path.display());
+            scene.source.error(
+                file.span.clone(),
+                message,
+                "name a file of tools in TOML, or a .tbl of LinuxCNC",
+            )
+        }
+    })
+}
+
+/// Why a table of tools is none.
+#[derive(Debug)]
+pub enum TableError {
+    /// Its file cannot be read.
+    Unreadable(String),
+    /// Something in it is wrong.
+    Fault(SceneError),
+}
+
+/// Reads a table of tools: LinuxCNC's by the ending `.tbl`, else TOML. mm.
+///
+/// # Errors
+/// [`TableError`].
+pub fn tool_table(path: &Path) -> Result<ToolTable, TableError> {
+    let bytes = regular::read(path, MAX_TABLE_BYTES).map_err(|e| TableError::Unreadable(e.to_string()))?;
     if bytes.len() as u64 > MAX_TABLE_BYTES {
-        return Err(unreadable(format!("it is larger than {MAX_TABLE_BYTES} bytes")));
+        return Err(TableError::Unreadable(format!("it is larger than {MAX_TABLE_BYTES} bytes")));
     }
-    let text = String::from_utf8(bytes).map_err(|_| unreadable("it is not UTF-8 text".to_owned()))?;
-    let source = SceneText::new(file.path.to_string_lossy(), text);
-    ToolTable::read(&source)
+    let name = path.to_string_lossy();
+    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("tbl")) {
+        return ToolTable::of_linuxcnc(&name, &bytes).map_err(|e| TableError::Fault(in_text(&e, &bytes)));
+    }
+    let text =
+        String::from_utf8(bytes).map_err(|_| TableError::Unreadable("it is not UTF-8 text".to_owned()))?;
+    ToolTable::read(&SceneText::new(name, text)).map_err(TableError::Fault)
+}
+
+/// The tools that a program of G-code describes in its comments, and those that it uses.
+///
+/// # Errors
+/// [`TableError`] where it cannot be read.
+pub fn described_tools(path: &Path, control: &str) -> Result<(ToolTable, Vec<u32>), TableError> {
+    let bytes = regular::read(path, MAX_BYTES).map_err(|e| TableError::Unreadable(e.to_string()))?;
+    let control = Control::from_word(control).unwrap_or(program::GENERAL_CONTROL);
+    let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    // The radius of a cutter moves no tool from its place in the list.
+    let setup = Setup { any_radius: Some(0.0), ..Setup::from_above(MACHINE_ZERO_ABOVE) };
+    let read = if looks_like_apt(&bytes) {
+        read_apt(&name, &bytes)
+    } else {
+        read_gcode(&name, &bytes, control, &setup)
+    };
+    let read = read.map_err(|error| TableError::Fault(in_text(&error, &bytes)))?;
+    Ok((ToolTable::of_remarks(&read), read.tools_in_use()))
 }
 
 /// The fault shown in the text of the program, where that can be shown.

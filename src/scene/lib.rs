@@ -30,6 +30,7 @@ pub use part::{
 pub use write::complete_toml;
 
 use cutter::{Cutter, Holder};
+pub use foreign::{TableError, described_tools, tool_table};
 use machine::Machine;
 pub use metrology::{EngineChoice, Judged, Simulation};
 use metrology::{Limits, ScallopRule};

@@ -213,13 +213,16 @@ fn wrong_offsets_and_lengths_show() {
 
 #[test]
 fn what_cannot_be_read_is_refused_with_line_and_cure() {
-    let cases: [(&str, &[&str]); 6] = [
-        ("G1 X1 F1\nG41 D1 X2", &["job.nc:2:1", "G41 cannot be verified", "help:"]),
+    let cases: [(&str, &[&str]); 9] = [
+        ("G1 X1 F1\nG41 D1 X2", &["job.nc:2:1", "longer than the cutter's radius of 3.0000 mm", "help:"]),
         ("G1 X1 F1\nG2 X5 I1", &["job.nc:2:4", "the arc starts 1.0000 mm from its centre and ends 3.0000"]),
         ("G1 X1 F1\nG1 X[1/0]", &["job.nc:2:7", "division by zero"]),
         ("N1 G4\nGOTO 1", &["still running"]),
         ("G0\u{0}X", &["line 1, column 3", "expected text"]),
         ("(nothing)", &["moves nothing"]),
+        ("O1 sub\nO1 call\nO1 endsub\nO1 call\nM2", &["job.nc:2:", "subprograms call each other", "help:"]),
+        ("G1 X1 F1\nM6", &["job.nc:2:1", "M6 needs T", "help:"]),
+        ("G1 X1 F1\nG1 X[1", &["job.nc:2:", "help:"]),
     ];
     for (program, expected) in cases {
         let (answer, report) = verify(&[program.to_owned()], &[]);
@@ -228,6 +231,14 @@ fn what_cannot_be_read_is_refused_with_line_and_cure() {
             assert!(answer.stderr.contains(text), "{program}: {}", answer.stderr);
         }
     }
+}
+
+#[test]
+fn a_line_of_ten_megabytes_is_refused() {
+    let long = "X1 ".repeat(3_500_000);
+    let (answer, report) = verify(&["G1 F1".to_owned(), long], &[]);
+    assert_eq!((answer.code, report.is_none()), (Some(2), true));
+    assert!(answer.stderr.contains("line 2") && answer.stderr.len() < 100_000, "{}", answer.stderr.len());
 }
 
 #[test]
@@ -255,4 +266,93 @@ fn a_tool_is_judged_on_what_the_tools_before_it_left() {
     // What the face mill leaves, another tool may take.
     let (answer, report) = verify_in(home.path(), &program, &["--tools", "tools.toml", "--tool", "2"]);
     assert_eq!(claims(&answer, report, "undecided"), ["uncut"]);
+}
+
+/// FreeCAD's program for a block with a pocket, a boss and holes. Its arcs are 7 to 8 µm too near to the boss, and its pocket
+/// leaves islands and corners: so says a union of the discs of all moves, too.
+#[test]
+fn a_prismatic_part_is_judged_with_its_walls() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs");
+    let file = |name: &str| folder.join(name).to_string_lossy().into_owned();
+    let (part, job) = (file("freecad_part.stl"), file("freecad_job_linuxcnc.ngc"));
+    let arguments =
+        ["verify", "--part", &part, "--program", &job, "--cutter", "flat:5", "--cell", "0.1", "--out", "out"];
+    let answer = millstream(home.path(), &arguments);
+    assert_eq!(answer.code, Some(1), "{}{}", answer.stdout, answer.stderr);
+    let report = std::fs::read(home.path().join("out/report.json")).unwrap();
+    let report: Value = serde_json::from_slice(&report).unwrap();
+    let toolpath = &report["toolpaths"][0];
+    let number = |pointer: &str| toolpath.pointer(pointer).unwrap().as_f64().unwrap();
+    let gouge = number("/gouge/max_depth_mm");
+    assert!(
+        (0.0060..0.0086).contains(&gouge) && number("/gouge/error_bound_mm") < 0.002,
+        "{}",
+        toolpath["gouge"]
+    );
+    assert_eq!(toolpath["gouge"]["regions"][0]["line"], 125);
+    // The walls of the block, the pocket, the boss and the holes; the underside alone is not judged.
+    let walls = 2.0 * (60.0 + 40.0) * 15.0
+        + 2.0 * (24.0 + 20.0) * 6.0
+        + 6.0 * 8.0 * std::f64::consts::PI
+        + 3.0 * 15.0 * 5.0 * std::f64::consts::PI;
+    assert!((number("/coverage/by_moves_mm2") - walls).abs() < 1e-3 * walls, "{}", toolpath["coverage"]);
+    assert_eq!(number("/coverage/walls_mm2"), 0.0);
+    assert!((number("/uncut/max_height_mm") - 6.0).abs() < 1e-6, "{}", toolpath["uncut"]);
+    assert!(number("/excess/error_bound_mm") < 1.1, "{}", toolpath["excess"]);
+}
+
+/// Passes about as far apart as cells leave ridges of one height, and so say the figures, within their bounds.
+#[test]
+fn passes_as_far_apart_as_cells_leave_ridges_of_one_height() {
+    for step in [0.097, 0.1, 0.104, 0.21] {
+        let mut program = raster();
+        let (begin, end) = (line_of(&program, "X0.000 Y0.000"), program.len() - 4);
+        let rows = (0..=(SIZE[1] / step).ceil() as usize).flat_map(|k| {
+            let (y, ends) = (step * k as f64, if k % 2 == 0 { [0.0, SIZE[0]] } else { [SIZE[0], 0.0] });
+            ends.map(|x| format!("X{x:.3} Y{y:.4}"))
+        });
+        program.splice(begin - 1..end, rows);
+        let (answer, report) = verify(&program, &[]);
+        assert_eq!(answer.code, Some(0), "{step}: {}{}", answer.stdout, answer.stderr);
+        let scallop = &report.unwrap()["toolpaths"][0]["scallop"];
+        let closed = 3.0 - (9.0f64 - 0.25 * step * step).sqrt();
+        let number = |key: &str| scallop[key].as_f64().unwrap();
+        for key in ["p95_mm", "p50_mm"] {
+            assert!((number(key) - closed).abs() < 2e-6, "{step} {key}: {scallop}");
+        }
+        // Two passes in one cell may hide one from the figure; its bound says so.
+        assert!((number("max_mm") - closed).abs() <= number("error_bound_mm"), "{step}: {scallop}");
+        assert!(step < 0.1 || (number("mean_mm") / closed - 1.0).abs() < 0.01, "{step}: {scallop}");
+        assert_eq!(scallop["over_target_fraction"], 0.0);
+        let ridges = number("ridge_length_mm") / (SIZE[0] * (SIZE[1] / step).floor());
+        assert!((ridges - 1.0).abs() < 0.03, "{step}: {ridges}");
+    }
+}
+
+#[test]
+fn cutters_come_from_tables_of_linuxcnc_and_from_comments() {
+    let home = tempfile::tempdir().unwrap();
+    std::fs::write(home.path().join("tool.tbl"), "T1 P1 D6 ;ball nose\nT2 P2 D10 ;end mill\n").unwrap();
+    let (answer, report) = verify_in(home.path(), &raster(), &["--tools", "tool.tbl", "--tool", "1"]);
+    assert_eq!((answer.code, report.is_some()), (Some(0), true), "{}{}", answer.stdout, answer.stderr);
+    std::fs::write(home.path().join("plate.stl"), plate()).unwrap();
+    let run = |program: &[String]| {
+        std::fs::write(home.path().join("job.nc"), program.join("\n")).unwrap();
+        millstream(
+            home.path(),
+            &["verify", "--part", "plate.stl", "--program", "job.nc", "--cell", "0.1", "--out", "out"],
+        )
+    };
+    let mut described = raster();
+    described.insert(2, "(T1 D=6. CR=3. - ball end mill)".to_owned());
+    let answer = run(&described);
+    assert_eq!(answer.code, Some(0), "{}{}", answer.stdout, answer.stderr);
+    let answer = run(&raster());
+    assert_eq!(answer.code, Some(2));
+    assert!(
+        answer.stderr.contains("describes no cutter") && answer.stderr.contains("--cutter"),
+        "{}",
+        answer.stderr
+    );
 }

@@ -18,7 +18,7 @@ use crate::{JobError, judge};
 const MEANING: (&str, &str) = (
     "coverage",
     "What share of the part's surface the verdict covers. Cells over the plan view measure what is seen from above and is \
-     not too steep; the rest of what is judged is measured along its normals. Its areas sum up to the whole surface.",
+     not too steep, moves measure vertical walls; the rest of what is judged is measured along its normals. Its areas sum up to the whole surface.",
 );
 
 /// The coverage, and what was found on the surface that no cell sees.
@@ -90,7 +90,8 @@ fn of_part(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Covered, JobError> {
     let View::Heights(cut) = run.view() else {
         return Ok((Coverage::new(part, &facing, scene.judged, None).figures(), None));
     };
-    let cells = CellsSeen { grid: &cut.grid, deviations: &run.measurement().deviation_map };
+    let walls = run.session.task(path, &scene.simulation, &run.session.cells).measures_walls();
+    let cells = CellsSeen { grid: &cut.grid, deviations: &run.measurement().deviation_map, walls };
     let coverage = Coverage::new(part, &facing, scene.judged, Some(cells));
     let areas = coverage.figures();
     if areas.along_normals_mm2 == 0.0 {

@@ -40,6 +40,7 @@ use motion::Toolpath;
 pub(crate) use net::{Net, NetPlace, Site};
 pub use net::{PatchGrid, net_places};
 use part::Part;
+pub(crate) use regions::connected;
 use regions::{Standing, areas, deviation_figures};
 use ridges::{Crossing, Finder};
 pub(crate) use swept_volume::ball_beneath;

@@ -22,7 +22,7 @@ pub struct CoverageFigures {
     pub by_cells_mm2: f64,
     /// What was measured along its normals.
     pub along_normals_mm2: f64,
-    /// Walls of a pocket, which were held against the moves.
+    /// Walls, which were held against the moves.
     pub by_moves_mm2: f64,
     /// Not judged: faces along the tool axis.
     pub walls_mm2: f64,

@@ -68,6 +68,8 @@ pub struct CellsSeen<'a> {
     pub grid: &'a Grid,
     /// Deviation at each, `[ny][nx]`, mm; NaN where none was measured.
     pub deviations: &'a [f32],
+    /// Whether walls were measured beside them, against the moves.
+    pub walls: bool,
 }
 
 /// How a path is measured along normals.
@@ -92,13 +94,21 @@ pub struct Coverage<'a> {
     part: &'a Part,
     facing: &'a Facing<'a>,
     judged: Judged,
-    /// Areas by kind, and by whether cells measure them, mm².
-    areas: HashMap<(PlaceKind, bool), f64>,
+    /// Areas by kind, and by what measures them, mm².
+    areas: HashMap<(PlaceKind, By), f64>,
     /// Bound of the error of each area, mm².
     area_error: f64,
     /// What is judged and no cell measures.
     unseen: Net,
     cells: Option<CellsSeen<'a>>,
+}
+
+/// What measures a place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum By {
+    Cells,
+    Moves,
+    Normals,
 }
 
 impl<'a> Coverage<'a> {
@@ -114,23 +124,37 @@ impl<'a> Coverage<'a> {
 
     fn add(&mut self, pieces: Pieces) {
         let middles = &pieces.middles;
-        let kinds = self.facing.kinds(middles.len(), |t| (middles[t].point, middles[t].normal));
-        let by_cells = work::parallel::map(kinds.len(), |t| {
-            kinds[t] == PlaceKind::Facing && self.cells.is_some_and(|cells| cells.see(self.part, &middles[t]))
-        });
+        let mut kinds = self.facing.kinds(middles.len(), |t| (middles[t].point, middles[t].normal));
+        if self.cells.is_some_and(|cells| cells.walls) {
+            let hidden = |t: usize| self.facing.is_hidden_wall(&middles[t].point, &middles[t].normal);
+            let hidden = work::parallel::map(kinds.len(), |t| kinds[t] == PlaceKind::Wall && hidden(t));
+            let walls = kinds.iter_mut().zip(hidden).filter(|(_, hidden)| *hidden);
+            walls.for_each(|(kind, _)| *kind = PlaceKind::Hidden);
+        }
+        let by = work::parallel::map(kinds.len(), |t| self.measured_by(kinds[t], &middles[t]));
         self.area_error += pieces.area_error + mixed(self.facing, &pieces, &kinds);
         for (t, area) in pieces.areas.iter().enumerate() {
-            *self.areas.entry((kinds[t], by_cells[t])).or_insert(0.0) += area;
+            *self.areas.entry((kinds[t], by[t])).or_insert(0.0) += area;
         }
-        let unseen = |t: usize| self.facing.is_judged(self.judged, kinds[t]) && !by_cells[t];
+        let unseen = |t: usize| self.facing.is_judged(self.judged, kinds[t]) && by[t] == By::Normals;
         join(&mut self.unseen, pieces.chosen(unseen));
     }
 
-    /// Area of what `chosen` picks by its kind and whether cells measure it, mm².
-    fn area(&self, chosen: impl Fn(PlaceKind, bool) -> bool) -> f64 {
+    /// What measures a place of a kind.
+    fn measured_by(&self, kind: PlaceKind, place: &NetPlace) -> By {
+        match (kind, &self.cells) {
+            (PlaceKind::Facing, Some(cells)) if cells.see(self.part, place) => By::Cells,
+            (PlaceKind::Wall, Some(cells)) if cells.walls => By::Moves,
+            _ => By::Normals,
+        }
+    }
+
+    /// Area of what `chosen` picks by its kind and what measures it, mm².
+    fn area(&self, chosen: impl Fn(PlaceKind, By) -> bool) -> f64 {
         // One after the other, so that the sum has the same bits in every run.
-        let kinds = PlaceKind::ALL.into_iter().flat_map(|kind| [(kind, false), (kind, true)]);
-        let of = |(kind, by_cells)| self.areas.get(&(kind, by_cells)).filter(|_| chosen(kind, by_cells));
+        let kinds = PlaceKind::ALL.into_iter();
+        let kinds = kinds.flat_map(|kind| [By::Normals, By::Moves, By::Cells].map(|by| (kind, by)));
+        let of = |(kind, by)| self.areas.get(&(kind, by)).filter(|_| chosen(kind, by));
         kinds.filter_map(of).fold(0.0, |sum, area| sum + area)
     }
 
@@ -140,8 +164,9 @@ impl<'a> Coverage<'a> {
         let not_judged = |kind| self.area(|k, _| k == kind && !is_judged(k));
         CoverageFigures {
             judge: self.judged,
-            by_cells_mm2: self.area(|_, by_cells| by_cells),
-            along_normals_mm2: self.area(|kind, by_cells| is_judged(kind) && !by_cells),
+            by_cells_mm2: self.area(|_, by| by == By::Cells),
+            along_normals_mm2: self.area(|kind, by| is_judged(kind) && by == By::Normals),
+            by_moves_mm2: self.area(|kind, by| is_judged(kind) && by == By::Moves),
             walls_mm2: not_judged(PlaceKind::Wall),
             facing_away_mm2: not_judged(PlaceKind::FacingAway),
             hidden_mm2: not_judged(PlaceKind::Hidden),
@@ -161,7 +186,7 @@ impl<'a> Coverage<'a> {
         task: &AlongTask<'_>,
         monitor: &dyn Monitor,
     ) -> Result<Option<(Measurement, f64)>, Cancelled> {
-        let area = self.area(|kind, by_cells| self.facing.is_judged(self.judged, kind) && !by_cells);
+        let area = self.area(|kind, by| self.facing.is_judged(self.judged, kind) && by == By::Normals);
         if area == 0.0 {
             return Ok(None);
         }
@@ -194,9 +219,7 @@ impl<'a> Coverage<'a> {
     /// Which places are judged and not measured by cells.
     fn are_unseen(&self, places: &[NetPlace]) -> Vec<bool> {
         let kinds = self.facing.kinds(places.len(), |k| (places[k].point, places[k].normal));
-        let seen = |k: usize| {
-            kinds[k] == PlaceKind::Facing && self.cells.is_some_and(|cells| cells.see(self.part, &places[k]))
-        };
+        let seen = |k: usize| self.measured_by(kinds[k], &places[k]) != By::Normals;
         // A contact on an edge of a mesh has a normal between those of its facets, which are measured beside it.
         let on_facet = |k: usize| match places[k].site {
             Site::Facet { triangle, .. } => {

@@ -76,7 +76,7 @@ fn upright() -> Toolpath {
 fn figures(part: &Part, judged: Judged, cell: f64) -> CoverageFigures {
     let facing = Facing::new(part, &upright(), block(part, 0.0));
     let (grid, deviations) = all_cells(part, cell);
-    let cells = CellsSeen { grid: &grid, deviations: &deviations };
+    let cells = CellsSeen { grid: &grid, deviations: &deviations, walls: false };
     Coverage::new(part, &facing, judged, Some(cells)).figures()
 }
 
@@ -176,7 +176,7 @@ fn unseen(tips: &[[f64; 3]], margin: f64) -> Measurement {
     let path = path_through(tips.iter().map(|p| Point3::from(*p)));
     let facing = Facing::new(&part, &path, block(&part, margin));
     let (grid, deviations) = all_cells(&part, 0.1);
-    let cells = CellsSeen { grid: &grid, deviations: &deviations };
+    let cells = CellsSeen { grid: &grid, deviations: &deviations, walls: false };
     let coverage = Coverage::new(&part, &facing, Judged::All, Some(cells));
     let cutter = Cutter::ball(6.0).unwrap();
     let solid = Solid::of_cutter(&cutter, None);

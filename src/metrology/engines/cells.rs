@@ -9,7 +9,7 @@ use work::monitor::{Cancelled, Monitor};
 
 use super::{Engine, EngineError, Measured, Task, View};
 use crate::ridge_map::ridge_map;
-use crate::{Asked, RidgeMap, measure};
+use crate::{Asked, RidgeMap, measure_with_walls};
 
 /// An engine on cells.
 pub(super) struct Cells {
@@ -67,7 +67,17 @@ impl Engine for Cells {
             most_squares: task.budget.squares_beside(path.len(), &grid),
             borders: !task.pocket,
         };
-        let measurement = measure(task.part, task.cutter, path, &cut, task.limits, &asked, monitor)?;
+        let facing = task.measures_walls().then(|| task.facing());
+        let measurement = measure_with_walls(
+            task.part,
+            task.cutter,
+            path,
+            &cut,
+            task.limits,
+            &asked,
+            facing.as_ref(),
+            monitor,
+        )?;
         Ok(Measured {
             cell: grid.cell,
             cells: grid.len(),

@@ -66,6 +66,14 @@ impl<'a> Task<'a> {
         Aabb { min, max }
     }
 
+    /// Whether cells measure vertical walls as well: those of a mesh, against the moves.
+    pub fn measures_walls(&self) -> bool {
+        self.judged == Judged::Walls
+            && !self.pocket
+            && self.path.is_upright()
+            && self.part.patches().is_empty()
+    }
+
     /// What of the part the path's tool can face.
     pub fn facing(&self) -> Facing<'a> {
         Facing::new(self.part, self.path, self.block())

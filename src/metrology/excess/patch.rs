@@ -1,7 +1,7 @@
 //! What stands at most above the part within one square of the plan.
 
 use super::meets;
-use crate::inspection::Inspection;
+use crate::inspection::{Inspection, LEAST_FACING};
 use geometry::{Point2, Point3, Vector2};
 use part::SurfacePoint;
 use sim::NOT_CUT;
@@ -12,8 +12,11 @@ const MOST_TRIANGLES: usize = 48;
 /// Moves that are weighed, the lowest in the middle. With fewer, places where several passes meet take more divisions.
 const MOST_MOVES: usize = 5;
 
-/// Corners of a triangle clipped by a square.
-const MOST_CORNERS: usize = 8;
+/// In squares with half sides below this share of a cell all triangles are looked at.
+const CORNER_SHARE: f64 = 1.0 / 256.0;
+
+/// Corners of a triangle clipped by a square and by the lines before some walls.
+const MOST_CORNERS: usize = 12;
 
 /// How often a greater height is assumed.
 const MOST_REACHES: usize = 6;
@@ -74,10 +77,12 @@ pub(super) struct Patches<'a> {
 impl Patches<'_> {
     /// What the square around a centre holds.
     pub fn held(&self, centre: Point2, half: f64) -> Held {
-        let mut triangles = [0usize; MOST_TRIANGLES];
-        let Some(count) = self.triangles(centre, half, &mut triangles) else { return Held::Unknown };
+        // Around a corner where more of them meet no square is small enough.
+        let small = half < CORNER_SHARE * self.inspection.grid.cell;
+        let most = if small { usize::MAX } else { MOST_TRIANGLES };
+        let Some(triangles) = self.triangles(centre, half, most) else { return Held::Unknown };
         let mut held: Option<(f64, Point2, f64, u32)> = None;
-        for &t in &triangles[..count] {
+        for &t in &triangles {
             let Some(piece) = self.piece(t, centre, half) else { continue };
             let Some((possible, here, by)) = self.above(&piece) else { return Held::Unknown };
             let place = Point2::new(piece.foot.point.x, piece.foot.point.y);
@@ -125,10 +130,10 @@ impl Patches<'_> {
     }
 
     /// Triangles that face up and whose boxes meet the square; `None` if there are too many.
-    fn triangles(&self, centre: Point2, half: f64, found: &mut [usize; MOST_TRIANGLES]) -> Option<usize> {
+    fn triangles(&self, centre: Point2, half: f64, most: usize) -> Option<Vec<usize>> {
         let part = self.inspection.part;
         let (mesh, bvh) = (part.mesh(), part.bvh());
-        let (mut count, mut waiting) = (0, vec![0]);
+        let (mut found, mut waiting) = (Vec::new(), vec![0]);
         while let Some(index) = waiting.pop() {
             let node = bvh.tree().node(index);
             if !meets(node, centre, half) {
@@ -139,27 +144,29 @@ impl Patches<'_> {
                 waiting.extend([first + 1, first]);
                 continue;
             }
+            if found.len() > most {
+                return None;
+            }
             for slot in first..first + slots {
                 let t = bvh.triangle_in(slot);
-                if mesh.normal(t).z > 0.0 {
-                    *found.get_mut(count)? = t;
-                    count += 1;
+                if mesh.normal(t).z > LEAST_FACING && overlaps(&mesh.corners(t), centre, half) {
+                    found.push(t);
                 }
             }
         }
-        Some(count)
+        (found.len() <= most).then_some(found)
     }
 
     /// The part of a triangle within the square, where it is seen from above.
     fn piece(&self, t: usize, centre: Point2, half: f64) -> Option<Clipped> {
         let part = self.inspection.part;
         let triangle = part.mesh().corners(t);
-        let (corners, len) = clipped(&triangle, centre, half)?;
-        let middle = corners[..len].iter().fold(Point2::origin(), |sum, c| sum + c.coords / len as f64);
         let normal = part.mesh().normal(t);
         let height = |q: Point2| {
             triangle[0].z - (normal.x * (q.x - triangle[0].x) + normal.y * (q.y - triangle[0].y)) / normal.z
         };
+        let (corners, len) = self.beyond_walls(clipped(&triangle, centre, half)?, &height)?;
+        let middle = middle(&corners[..len]);
         let near = 2.0 * part.mesh_deviation() / normal.z.max(1e-3) + 1e-6;
         let seen = |q: Point2| part.highest_at(q.x, q.y).filter(|foot| foot.point.z - height(q) <= near);
         // Just inside the corners, where the next triangle does not answer.
@@ -176,6 +183,24 @@ impl Patches<'_> {
             piece.bend(part, &inside);
         }
         Some(piece)
+    }
+
+    /// The part of a polygon of floor that no wall before it accounts for; `None` where there is none.
+    fn beyond_walls(&self, polygon: Polygon, height: &dyn Fn(Point2) -> f64) -> Option<Polygon> {
+        let Some(walls) = self.inspection.walls else { return Some(polygon) };
+        let (mut corners, mut len) = polygon;
+        let q = middle(&corners[..len]);
+        let all = corners;
+        for (from, toward) in walls.lines(&Point3::new(q.x, q.y, height(q)), &all[..len]) {
+            if len == MOST_CORNERS {
+                break;
+            }
+            cut_off(&mut corners, &mut len, |p| (from - p).dot(&toward));
+            if len == 0 {
+                return None;
+            }
+        }
+        has_area(&corners[..len]).then_some((corners, len))
     }
 
     /// What stands above a piece at most, and what stands on its foot, cut by which move; `None` where that cannot be told.
@@ -280,34 +305,66 @@ fn lowered(mut possible: f64, known: f64, over: &dyn Fn(f64) -> f64) -> f64 {
     possible
 }
 
-/// The part of a triangle within a square of the plan (Sutherland and Hodgman 1974); `None` where there is none.
-fn clipped(triangle: &[Point3; 3], centre: Point2, half: f64) -> Option<([Point2; MOST_CORNERS], usize)> {
+/// Whether a triangle reaches into a square of the plan: no side of either has all of the other beyond it. Boxes of long
+/// triangles askew hold many squares that these do not meet.
+fn overlaps(triangle: &[Point3; 3], centre: Point2, half: f64) -> bool {
+    let [a, b, c] = triangle.map(|p| p.xy() - centre);
+    let within = |x: [f64; 3]| x.iter().any(|x| *x <= half) && x.iter().any(|x| *x >= -half);
+    let inside = |p: Vector2, q: Vector2, third: Vector2| {
+        let across = Vector2::new(p.y - q.y, q.x - p.x);
+        let sense = across.dot(&(third - p)).signum();
+        sense * across.dot(&-p) + half * (across.x.abs() + across.y.abs()) >= 0.0
+    };
+    within([a.x, b.x, c.x])
+        && within([a.y, b.y, c.y])
+        && inside(a, b, c)
+        && inside(b, c, a)
+        && inside(c, a, b)
+}
+
+/// Corners of a polygon, and how many they are.
+type Polygon = ([Point2; MOST_CORNERS], usize);
+
+/// The part of a triangle within a square of the plan; `None` where there is none.
+fn clipped(triangle: &[Point3; 3], centre: Point2, half: f64) -> Option<Polygon> {
     let mut corners = [Point2::origin(); MOST_CORNERS];
     (0..3).for_each(|k| corners[k] = triangle[k].xy());
     let mut len = 3;
     for (axis, sign) in [(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)] {
-        let beyond = |p: &Point2| sign * (p[axis] - centre[axis]) - half;
-        let (before, n) = (corners, len);
-        len = 0;
-        for k in 0..n {
-            let (p, q) = (before[k], before[(k + 1) % n]);
-            let (bp, bq) = (beyond(&p), beyond(&q));
-            if bp <= 0.0 {
-                (corners[len], len) = (p, len + 1);
-            }
-            if (bp < 0.0 && bq > 0.0) || (bp > 0.0 && bq < 0.0) {
-                (corners[len], len) = (p + (q - p) * (bp / (bp - bq)), len + 1);
-            }
-        }
+        cut_off(&mut corners, &mut len, |p| sign * (p[axis] - centre[axis]) - half);
         if len == 0 {
             return None;
         }
     }
+    has_area(&corners[..len]).then_some((corners, len))
+}
+
+/// Leaves the part of a convex polygon that is not `beyond` a line (Sutherland and Hodgman 1974).
+fn cut_off(corners: &mut [Point2; MOST_CORNERS], len: &mut usize, beyond: impl Fn(&Point2) -> f64) {
+    let (before, n) = (*corners, *len);
+    *len = 0;
+    for k in 0..n {
+        let (p, q) = (before[k], before[(k + 1) % n]);
+        let (bp, bq) = (beyond(&p), beyond(&q));
+        if bp <= 0.0 {
+            (corners[*len], *len) = (p, *len + 1);
+        }
+        if (bp < 0.0 && bq > 0.0) || (bp > 0.0 && bq < 0.0) {
+            (corners[*len], *len) = (p + (q - p) * (bp / (bp - bq)), *len + 1);
+        }
+    }
+}
+
+fn has_area(corners: &[Point2]) -> bool {
     let area = |k: usize| {
-        let (a, b) = (corners[k] - corners[0], corners[(k + 1) % len] - corners[0]);
+        let (a, b) = (corners[k] - corners[0], corners[(k + 1) % corners.len()] - corners[0]);
         a.x * b.y - a.y * b.x
     };
-    ((0..len).map(area).sum::<f64>().abs() > 0.0).then_some((corners, len))
+    (0..corners.len()).map(area).sum::<f64>().abs() > 0.0
+}
+
+fn middle(corners: &[Point2]) -> Point2 {
+    corners.iter().fold(Point2::origin(), |sum, c| sum + c.coords / corners.len() as f64)
 }
 
 /// The least, over all weights of the rows, of the greatest of `count` columns in their mean; a little more where the

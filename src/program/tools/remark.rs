@@ -29,6 +29,13 @@ pub fn cutter_of_remark(text: &str, unit: f64) -> Option<Cutter> {
     if corner > 0.0 { Cutter::bull(diameter, corner).ok() } else { Cutter::flat(diameter).ok() }
 }
 
+/// The number of the tool at the beginning of a comment.
+pub(crate) fn number_of_remark(text: &str) -> Option<u32> {
+    let rest = text.trim_start().strip_prefix(['T', 't'])?.trim_start();
+    let end = rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len());
+    rest[..end].parse().ok()
+}
+
 /// The number after the first of some words that stands at the beginning of a word.
 fn number_after(text: &str, words: &[&str]) -> Option<f64> {
     let upper = text.to_ascii_uppercase();

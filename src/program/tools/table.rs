@@ -1,5 +1,9 @@
 //! A table of tools in TOML: `[[tool]]` with `number`, the keys of a cutter, and what holds it.
 
+use super::remark::{cutter_of_remark, number_of_remark};
+use super::tbl::read_tool_table;
+use crate::error::ProgramError;
+use crate::program::Program;
 use cutter::{Cutter, Holder, HolderSection};
 use keys::{SceneError, SceneText, Section};
 
@@ -53,6 +57,38 @@ impl ToolTable {
             tools.push(tool);
         }
         Ok(Self { tools })
+    }
+
+    /// The tools of a table of LinuxCNC in mm, as far as their remarks do not name another kind of tool than an end mill: a ball
+    /// by the word, a corner radius as `CR=1`, else flat.
+    ///
+    /// # Errors
+    /// [`ProgramError`] at the first word that is wrong.
+    pub fn of_linuxcnc(name: &str, bytes: &[u8]) -> Result<Self, ProgramError> {
+        let tools = read_tool_table(name, bytes, 1.0)?.into_iter().filter_map(|(number, tool)| {
+            let cutter = cutter_of_remark(&format!("D={} {}", tool.diameter, tool.remark), 1.0)?;
+            let gauge_length = Some(tool.length[2]).filter(|length| *length != 0.0);
+            Some(Tool { number, cutter, gauge_length, holder: None })
+        });
+        Ok(Self { tools: tools.collect() })
+    }
+
+    /// The tools that a program describes in its comments. One without a number is that of the only tool in use.
+    pub fn of_remarks(program: &Program) -> Self {
+        let used = program.tools_in_use();
+        let mut tools: Vec<Tool> = Vec::new();
+        for remark in &program.tools {
+            let number = match (remark.tool, number_of_remark(&remark.text), &used[..]) {
+                (0, None, [only]) => *only,
+                (0, None, _) => continue,
+                (0, Some(number), _) | (number, _, _) => number,
+            };
+            let described = cutter_of_remark(&remark.text, program.unit);
+            if let Some(cutter) = described.filter(|_| tools.iter().all(|tool| tool.number != number)) {
+                tools.push(Tool { number, cutter, gauge_length: None, holder: None });
+            }
+        }
+        Self { tools }
     }
 
     /// The tool of a number.
@@ -117,6 +153,31 @@ mod tests {
         let first = tools.get(1).unwrap();
         assert_eq!((first.gauge_length, first.holder.as_ref().unwrap().cutting_length()), (Some(80.0), 20.0));
         assert!(tools.get(2).is_none());
+    }
+
+    #[test]
+    fn tables_of_linuxcnc_and_comments_of_posts_describe_cutters() {
+        let text = b"T1 P1 Z80 D6 ;ball nose\nT2 P2 D10 ;rougher CR=2\nT3 D5 ;drill\nT4 D8\n";
+        let tools = ToolTable::of_linuxcnc("tool.tbl", text).unwrap();
+        let cutter = |number: u32| tools.get(number).map(|tool| tool.cutter);
+        assert_eq!((cutter(1), cutter(2)), (Cutter::ball(6.0).ok(), Cutter::bull(10.0, 2.0).ok()));
+        assert_eq!((cutter(3), cutter(4)), (None, Cutter::flat(8.0).ok()));
+        assert_eq!(tools.get(1).unwrap().gauge_length, Some(80.0));
+        let read = |text: &str| {
+            let program = crate::read_gcode(
+                "job.nc",
+                text.as_bytes(),
+                crate::GENERAL_CONTROL,
+                &crate::Setup::default(),
+            );
+            ToolTable::of_remarks(&program.unwrap())
+        };
+        let tools = read("(T5 D=0.25 CR=0.125 - BALL)\nG20\nT5 M6\nG0 X1\n");
+        assert_eq!(tools.get(5).unwrap().cutter, Cutter::ball(6.35).unwrap());
+        let tools = read("G21\nT7 M6 (FLAT END MILL D=8)\nG0 X1\n(T9 D=3)\n");
+        assert_eq!((tools.tools.len(), tools.get(7).unwrap().cutter), (2, Cutter::flat(8.0).unwrap()));
+        let tools = read("(BALL END D=6.0)\nT3 M6\nG0 X1\n");
+        assert_eq!(tools.get(3).unwrap().cutter, Cutter::ball(6.0).unwrap());
     }
 
     #[test]

@@ -7,12 +7,14 @@ use crate::error::{Fault, ProgramError, Stop};
 use crate::lines::Lines;
 
 /// What the table knows of a tool; lengths in mm.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct TableTool {
     /// Offsets along X, Y and Z.
     pub length: [f64; 3],
     /// Diameter.
     pub diameter: f64,
+    /// The remark behind the semicolon.
+    pub remark: String,
 }
 
 /// Reads a table; `unit` is that of the machine, mm. `name` is what messages call it.
@@ -57,6 +59,7 @@ fn read_line(line: &[u8], unit: f64) -> Result<Option<(u32, TableTool)>, Stop> {
             other => return Err(Stop::new(column, Fault::Unused(char::from(other)))),
         }
     }
+    tool.remark = String::from_utf8_lossy(text.rest()).trim().to_owned();
     Ok(number.map(|number| (number, tool)))
 }
 
@@ -68,7 +71,8 @@ mod tests {
     fn tools_are_read_and_faults_have_a_place() {
         let text = b"; a remark\nT1 P1 Z2.0 D0.25 ;ball\n\nt2 p2 x-1 z+3\n";
         let tools = read_tool_table("tool.tbl", text, 25.4).unwrap();
-        assert_eq!(tools[&1], TableTool { length: [0.0, 0.0, 50.8], diameter: 6.35 });
+        let remark = "ball".to_owned();
+        assert_eq!(tools[&1], TableTool { length: [0.0, 0.0, 50.8], diameter: 6.35, remark });
         assert_eq!(tools[&2].length, [-25.4, 0.0, 3.0 * 25.4]);
         let error = read_tool_table("tool.tbl", b"T1 Z2\nT2 Zx\n", 1.0).unwrap_err();
         assert_eq!((error.line, error.column), (2, 5));

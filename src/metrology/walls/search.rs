@@ -1,0 +1,226 @@
+//! The deepest cut into one strip of a wall, and the highest material before it.
+//!
+//! Over a strip the place where one move begins to cut is a convex function. So its deepest cut has one hill, which a golden
+//! section climbs, and what it leaves at most stands at a corner: the least such corner over all moves bounds what stands in
+//! a part of the strip. Parts are divided until that is as near to what was found as was asked. mm.
+
+use geometry::{Point2, Vector2};
+
+use super::piece::Piece;
+use super::reach::{Line, Moves, greatest, stadium};
+
+/// Parts of a strip that are looked at, at most. With fewer, wide bounds stay where many short moves meet.
+const MOST_PARTS: usize = 400;
+
+/// A part is halved so often at most.
+const MOST_DEPTH: u32 = 24;
+
+/// Less is rounding, mm.
+const FLOOR: f64 = 1e-7;
+
+/// A strip's deepest cut.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Deepest {
+    pub depth: f64,
+    /// Where, along the strip and up.
+    pub at: [f64; 2],
+    pub by: u32,
+}
+
+/// What stands before a strip.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Highest {
+    pub height: f64,
+    /// No place is higher.
+    pub possible: f64,
+    pub at: [f64; 2],
+    /// Mean over its corners, and the share of these above a height.
+    pub mean: f64,
+    pub share: f64,
+}
+
+/// The deepest that `moves` cut into a strip. A cut through an edge
+/// belongs to the nearer side: it is no deeper than it is below the top, and than the wall beyond the end is near.
+pub(super) fn deepest(piece: &Piece, moves: &Moves<'_>, near: &[u32]) -> Deepest {
+    let mut found = Deepest::default();
+    for &k in near {
+        if !may_cut(piece, moves, k, found.depth.max(FLOOR)) {
+            continue;
+        }
+        let [a, b] = moves.ends(k);
+        let tip = a.z.min(b.z) + FLOOR;
+        let Some(range) = stadium(&a.xy(), &b.xy(), moves.radius, piece.start, piece.along) else { continue };
+        let range = [range[0].max(0.0), range[1].min(piece.length)];
+        if range[0] > range[1] {
+            continue;
+        }
+        let edges: [&dyn Fn(f64) -> f64; 2] = [&|u| piece.high_at(u), &|u| piece.low_at(u).max(tip)];
+        // The lower edge matters to walls that are not quite vertical only.
+        for edge in &edges[..if piece.lean == 0.0 { 1 } else { 2 }] {
+            let depth = |u: f64| depth(piece, moves, k, u, edge(u));
+            let (u, depth) = greatest(&depth, range, None);
+            if depth > found.depth {
+                found = Deepest { depth, at: [u, edge(u)], by: k };
+            }
+        }
+    }
+    found
+}
+
+/// Whether a move may cut deeper than `known` into a strip.
+fn may_cut(piece: &Piece, moves: &Moves<'_>, k: u32, known: f64) -> bool {
+    let [a, b] = moves.ends(k);
+    if a.z.min(b.z) >= piece.high[0].max(piece.high[1]) {
+        return false;
+    }
+    let leaning = piece.lean.abs() * (piece.high[0].max(piece.high[1]) - piece.low[0].min(piece.low[1]));
+    let front = |p: Point2| (p - piece.start).dot(&piece.normal);
+    moves.radius - front(a.xy()).min(front(b.xy())) + leaning > known
+}
+
+/// How deep a move cuts at a place of a strip; below 0 where it does not.
+fn depth(piece: &Piece, moves: &Moves<'_>, k: u32, u: f64, z: f64) -> f64 {
+    let place = piece.place(u, z).xy();
+    let cut = moves.height(k, place);
+    if cut > z {
+        return (z - cut).max(-1e9);
+    }
+    let line = Line { from: place, way: piece.normal, z };
+    let below_top = piece.top_at(u) - cut;
+    moves.begin(k, &line).map_or(0.0, |begin| (-begin).min(below_top).min(piece.own_depth(u)))
+}
+
+/// How what stands before strips is sought.
+pub(super) struct Standing<'a> {
+    pub moves: &'a Moves<'a>,
+    /// No material is looked for farther off, mm.
+    pub reach: f64,
+    /// How far the block goes on from a place along a normal, mm.
+    pub way_out: &'a (dyn Fn(Point2, Vector2) -> f64 + Sync),
+    /// What stands up to this height over a floor is the floor's, mm.
+    pub of_floor: f64,
+    /// How near the bound is asked for, mm.
+    pub asked: f64,
+    /// Heights from which area counts, mm.
+    pub counted: f64,
+}
+
+/// A part of a strip: shares of its length and height.
+#[derive(Clone, Copy)]
+struct Part {
+    u: [f64; 2],
+    v: [f64; 2],
+    /// No place is higher, mm.
+    possible: f64,
+    /// Whether what bounds it changes more along the strip than upward.
+    along: bool,
+    depth: u32,
+}
+
+/// Where moves begin to cut before the corners of a part.
+struct Seen {
+    corners: [f64; 4],
+    /// The same of the move that bounds what stands between.
+    bounding: [f64; 4],
+    at: [[f64; 2]; 4],
+    possible: f64,
+}
+
+impl Standing<'_> {
+    /// The highest material before a strip, as far as it counts: not beside its floor.
+    pub fn highest(&self, piece: &Piece, near: &[u32]) -> Highest {
+        let from = [0, 1].map(|k| piece.low[k].max(piece.floor[k] + self.of_floor));
+        if from[0] >= piece.high[0] && from[1] >= piece.high[1] {
+            return Highest::default();
+        }
+        let from = [0, 1].map(|k| from[k].min(piece.high[k]));
+        let look = |part: &Part| self.look(piece, from, part, near);
+        let whole = Part { u: [0.0, 1.0], v: [0.0, 1.0], possible: f64::INFINITY, along: true, depth: 0 };
+        let first = look(&whole);
+        let mean = 0.25 * first.corners.iter().sum::<f64>();
+        let share = 0.25 * first.corners.iter().filter(|h| **h > self.counted).count() as f64;
+        let mut found = Highest { mean, share, ..Highest::default() };
+        found.look_at(&first);
+        let mut open = vec![Part { possible: first.possible, along: first.is_along(), ..whole }];
+        let mut closed: f64 = 0.0;
+        for _ in 0..MOST_PARTS {
+            let next = (0..open.len()).max_by(|a, b| open[*a].possible.total_cmp(&open[*b].possible));
+            let Some(part) = next.map(|k| open.swap_remove(k)) else { break };
+            if part.possible <= found.height + self.asked || part.depth == MOST_DEPTH {
+                closed = closed.max(part.possible);
+                continue;
+            }
+            for half in part.halves() {
+                let seen = look(&half);
+                found.look_at(&seen);
+                open.push(Part {
+                    possible: seen.possible.min(part.possible),
+                    along: seen.is_along(),
+                    ..half
+                });
+            }
+        }
+        found.possible = open.iter().map(|part| part.possible).fold(closed.max(found.height), f64::max);
+        found
+    }
+
+    fn look(&self, piece: &Piece, from: [f64; 2], part: &Part, near: &[u32]) -> Seen {
+        let at = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(i, j)| {
+            let (s, v) = (part.u[i], part.v[j]);
+            let low = from[0] + (from[1] - from[0]) * s;
+            let u = s * piece.length;
+            [u, low + (piece.high_at(u) - low) * v]
+        });
+        let lines = at.map(|[u, z]| Line { from: piece.place(u, z).xy(), way: piece.normal, z });
+        let most = [0, 1, 2, 3].map(|c| {
+            let own = piece.own_height(at[c][0]);
+            self.reach.min((self.way_out)(lines[c].from, lines[c].way)).min(own)
+        });
+        let mut corners = most;
+        let mut bounding = most;
+        let greatest = |corners: &[f64; 4]| corners.iter().copied().fold(0.0, f64::max);
+        for &k in near {
+            let begins = [0, 1, 2, 3].map(|c| {
+                let begin = self.moves.begin(k, &lines[c]).map_or(f64::INFINITY, |begin| begin.max(0.0));
+                corners[c] = corners[c].min(begin);
+                begin
+            });
+            if greatest(&begins) < greatest(&bounding) {
+                bounding = begins;
+            }
+        }
+        let possible = greatest(&most).min(greatest(&bounding));
+        (0..4).for_each(|c| bounding[c] = bounding[c].min(most[c]));
+        Seen { corners, bounding, at, possible }
+    }
+}
+
+impl Highest {
+    fn look_at(&mut self, seen: &Seen) {
+        for (height, at) in seen.corners.iter().zip(seen.at) {
+            if *height > self.height {
+                (self.height, self.at) = (*height, at);
+            }
+        }
+    }
+}
+
+impl Part {
+    /// Both halves, across the side along which most changes.
+    fn halves(&self) -> [Self; 2] {
+        let halved = |[a, b]: [f64; 2]| [[a, 0.5 * (a + b)], [0.5 * (a + b), b]];
+        let depth = self.depth + 1;
+        if self.along {
+            halved(self.u).map(|u| Self { u, depth, ..*self })
+        } else {
+            halved(self.v).map(|v| Self { v, depth, ..*self })
+        }
+    }
+}
+
+impl Seen {
+    fn is_along(&self) -> bool {
+        let [a, b, c, d] = self.bounding;
+        (a - b).abs().max((d - c).abs()) >= (a - d).abs().max((b - c).abs())
+    }
+}

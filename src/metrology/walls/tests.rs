@@ -1,0 +1,189 @@
+//! Walls of a block against closed forms.
+
+use super::*;
+use crate::{Asked, Judged, Measurement, measure_with_walls};
+use geometry::TriangleMesh;
+use sim::scenes::path_through;
+use sim::{ZMap, cut};
+use work::monitor::Silent;
+
+/// Height and size of the block along x and y, mm.
+const HEIGHT: f64 = 5.0;
+const SIZE: [f64; 2] = [20.0, 12.0];
+const LIMITS: Limits = Limits { scallop: 0.01, gouge: 0.005, uncut: 0.05, chord: 0.001 };
+
+/// A block over a plane of rectangles: `heights` of each of 3 x 3, whose borders are `at` along x and y.
+fn steps(at: [[f64; 4]; 2], heights: [[f64; 3]; 3]) -> Part {
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    let mut quad = |corners: [[f64; 3]; 4]| {
+        let first = vertices.len() as u32;
+        vertices.extend(corners.map(Point3::from));
+        triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    };
+    let height = |i: i32, j: i32| {
+        let inside = (0..3).contains(&i) && (0..3).contains(&j);
+        if inside { heights[j as usize][i as usize] } else { 0.0 }
+    };
+    for (i, j) in (0..3).flat_map(|j| (0..3).map(move |i| (i, j))) {
+        let [x0, x1] = [at[0][i as usize], at[0][i as usize + 1]];
+        let [y0, y1] = [at[1][j as usize], at[1][j as usize + 1]];
+        let z = height(i, j);
+        quad([[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z]]);
+        quad([[x0, y0, 0.0], [x0, y1, 0.0], [x1, y1, 0.0], [x1, y0, 0.0]]);
+        // Walls where the neighbour is lower, from its height up.
+        let sides = [
+            (i + 1, j, [[x1, y0], [x1, y1]]),
+            (i - 1, j, [[x0, y1], [x0, y0]]),
+            (i, j + 1, [[x1, y1], [x0, y1]]),
+            (i, j - 1, [[x0, y0], [x1, y0]]),
+        ];
+        for (ni, nj, [[ax, ay], [bx, by]]) in sides {
+            let low = height(ni, nj);
+            if low < z {
+                quad([[ax, ay, low], [bx, by, low], [bx, by, z], [ax, ay, z]]);
+            }
+        }
+    }
+    Part::from_mesh(TriangleMesh::new(vertices, triangles).unwrap().0)
+}
+
+fn block() -> Part {
+    let [x, y] = SIZE;
+    steps([[0.0, 5.0, 15.0, x], [0.0, 4.0, 8.0, y]], [[HEIGHT; 3]; 3])
+}
+
+fn measured(part: &Part, cutter: &Cutter, path: &Toolpath) -> Measurement {
+    let mut area = part.bounds();
+    (area.min.x, area.min.y, area.max.x, area.max.y) =
+        (area.min.x - 2.0, area.min.y - 2.0, area.max.x + 2.0, area.max.y + 2.0);
+    area.max.z += 1.0;
+    let grid = Grid::covering(&area, 0.1, 8, 1 << 30).unwrap();
+    let cut = cut(ZMap::block(grid, area.max.z), cutter, path, &Silent).unwrap();
+    let asked = Asked {
+        error_bound: 5e-4,
+        stock_top: area.max.z,
+        borders: true,
+        most_cells: 1 << 20,
+        most_squares: 1 << 20,
+    };
+    let facing = Facing::new(part, path, area);
+    assert!(facing.is_judged(Judged::Walls, PlaceKind::Wall));
+    measure_with_walls(part, cutter, path, &cut, &LIMITS, &asked, Some(&facing), &Silent).unwrap()
+}
+
+/// Rows over the top, at the height of `z`, and a way around at the tip height `below` whose sides are `off` from the walls.
+fn faced_and_around(radius: f64, z: f64, off: [f64; 4], below: f64) -> Toolpath {
+    let [x, y] = SIZE;
+    let rows = (0..=6).flat_map(|k| {
+        let at = -1.0 + 2.4 * f64::from(k);
+        let ends = if k % 2 == 0 { [-4.0, x + 4.0] } else { [x + 4.0, -4.0] };
+        ends.map(|end| Point3::new(end, at, z))
+    });
+    let [x0, y0, x1, y1] = [-radius - off[0], -radius - off[1], x + radius + off[2], y + radius + off[3]];
+    let up = Point3::new(x0, y0, 20.0);
+    let around = [[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]].map(|[a, b]| Point3::new(a, b, below));
+    let lifted = Point3::new(x + 4.0, 13.4, 20.0);
+    path_through(rows.chain([lifted, up]).chain(around))
+}
+
+#[test]
+fn a_sound_block_has_no_gouge_and_nothing_uncut() {
+    let measured =
+        measured(&block(), &Cutter::flat(6.0).unwrap(), &faced_and_around(3.0, HEIGHT, [0.0; 4], 0.0));
+    assert!(measured.gouge.max_depth_mm < 1e-6 && measured.uncut.region_count == 0, "{:?}", measured.gouge);
+    assert!(measured.excess.highest.at_most() < 2e-3, "{:?}", measured.excess);
+}
+
+#[test]
+fn a_cut_into_a_wall_is_as_deep_as_it_goes_along_the_normal() {
+    for depth in [0.003, 0.02, 0.4] {
+        let path = faced_and_around(3.0, HEIGHT, [0.0, 0.0, -depth, 0.0], 0.0);
+        let measured = measured(&block(), &Cutter::flat(6.0).unwrap(), &path);
+        let gouge = &measured.gouge;
+        assert!(
+            (gouge.max_depth_mm - depth).abs() < 1e-6 && gouge.error_bound_mm < 2e-3,
+            "{depth} {gouge:?}"
+        );
+        if depth > LIMITS.gouge {
+            assert!((gouge.regions[0].at_mm[0] - SIZE[0]).abs() < 1e-9, "{gouge:?}");
+        }
+        assert!(
+            measured.uncut.region_count == 0 && measured.excess.highest.at_most() < 2e-3,
+            "{:?}",
+            measured.excess
+        );
+    }
+}
+
+#[test]
+fn what_stands_before_a_wall_is_as_high_as_it_is_thick() {
+    for thick in [0.004, 0.03, 0.3] {
+        let path = faced_and_around(3.0, HEIGHT, [thick, 0.0, 0.0, 0.0], 0.0);
+        let measured = measured(&block(), &Cutter::flat(6.0).unwrap(), &path);
+        let highest = measured.excess.highest;
+        assert!(
+            (highest.max_mm - thick).abs() < 1e-6 && highest.error_bound_mm < 2e-3,
+            "{thick} {highest:?}"
+        );
+        assert_eq!(measured.uncut.region_count, usize::from(thick > LIMITS.uncut), "{:?}", measured.uncut);
+        assert!(measured.gouge.max_depth_mm < 1e-6, "{:?}", measured.gouge);
+    }
+}
+
+/// A ball that dips into the top cuts the uppermost line of each wall wide, and no deeper than the top.
+#[test]
+fn a_cut_over_the_edge_of_a_top_is_no_deeper_than_below_it() {
+    let depth = 0.02;
+    let mut path = faced_and_around(3.0, HEIGHT, [0.0; 4], 0.0);
+    path.moves.extend(
+        path_through(
+            [[-5.0, 6.0, 20.0], [-5.0, 6.0, HEIGHT - depth], [25.0, 6.0, HEIGHT - depth]].map(Point3::from),
+        )
+        .moves,
+    );
+    let part = block();
+    let flat = measured(&part, &Cutter::flat(6.0).unwrap(), &path);
+    assert!((flat.gouge.max_depth_mm - depth).abs() < 1e-6, "{:?}", flat.gouge);
+    let ball = measured(&part, &Cutter::ball(6.0).unwrap(), &path);
+    assert!((ball.gouge.max_depth_mm - depth).abs() < 1e-6, "{:?}", ball.gouge);
+}
+
+/// In an inner corner a cutter of radius r leaves material that is farthest from both walls on the diagonal: r (1 - 1/√2).
+#[test]
+fn an_inner_corner_keeps_what_the_cutter_does_not_reach() {
+    let part = steps(
+        [[0.0, 5.0, 15.0, 20.0], [0.0, 4.0, 14.0, 18.0]],
+        [[5.0, 5.0, 5.0], [5.0, 1.0, 5.0], [5.0, 5.0, 5.0]],
+    );
+    let (radius, floor) = (2.0, 1.0);
+    let rows = (0..=4).flat_map(|k| {
+        let y = 6.0 + 1.5 * f64::from(k);
+        let ends = if k % 2 == 0 { [7.0, 13.0] } else { [13.0, 7.0] };
+        ends.map(|x| Point3::new(x, y, floor))
+    });
+    let around = [[7.0, 12.0], [7.0, 6.0], [13.0, 6.0], [13.0, 12.0], [7.0, 12.0]]
+        .map(|[x, y]| Point3::new(x, y, floor));
+    let over = [[7.0, 12.0, 20.0], [-4.0, -1.0, 20.0]].map(Point3::from);
+    let top = (0..=7).flat_map(|k| {
+        let y = -1.0 + 3.0 * f64::from(k);
+        let ends = if k % 2 == 0 { [-4.0, 24.0] } else { [24.0, -4.0] };
+        ends.map(|x| Point3::new(x, y, 5.0))
+    });
+    let outside = [
+        [-4.0, 20.0, 20.0],
+        [-2.0, -2.0, 20.0],
+        [-2.0, -2.0, 0.0],
+        [22.0, -2.0, 0.0],
+        [22.0, 20.0, 0.0],
+        [-2.0, 20.0, 0.0],
+        [-2.0, -2.0, 0.0],
+    ]
+    .map(Point3::from);
+    let path = path_through(rows.chain(around).chain(over).chain(top).chain(outside));
+    let measured = measured(&part, &Cutter::flat(2.0 * radius).unwrap(), &path);
+    let exact = radius * (1.0 - 0.5f64.sqrt());
+    assert!((measured.uncut.max_height_mm - exact).abs() < 2e-3, "{exact} {:?}", measured.uncut);
+    assert_eq!(measured.uncut.region_count % 4, 0, "{:?}", measured.uncut);
+    assert!(measured.gouge.max_depth_mm < 1e-6, "{:?}", measured.gouge);
+    assert!(measured.excess.unreached.error_bound_mm < 2e-3, "{:?}", measured.excess);
+}
