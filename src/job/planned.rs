@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use io::ProgramHeader;
 use io::gcode::{self, FiveAxisPost, MoveLines};
-use machine::kinematics::{JointPath, follow};
-use machine::{machining_time_turning, slow_corners};
-use metrology::contact_arcs;
+use machine::kinematics::{JointPath, Kinematics, follow};
+use machine::{axes_at_most, machining_time, machining_time_of_axes, slow_corners};
+use metrology::{FastestTurn, contact_arcs, fastest_turn, fastest_turn_across};
 use motion::{Move, MoveKind, Toolpath};
-use scene::{Scene, ToolpathRequest};
+use scene::{AxisRequest, Scene, ToolpathRequest};
 use toolpath::{
     Detour, Earlier, Engagement, OffsetDrive, OffsetSurface, Plan, PlanError, PlanSettings, PocketStrategy,
     Strategy, Tilting, around_fixtures, plan, plan_pocket, plan_tilted,
@@ -45,18 +45,20 @@ pub(crate) struct Planned {
 impl Planned {
     /// Time that the scene's machine takes, s.
     pub fn time(&self, scene: &Scene) -> f64 {
-        machining_time_turning(&self.plan.path, &scene.machine, &self.joint_times(scene))
+        let (path, machine) = (&self.plan.path, &scene.machine);
+        self.on_axes(scene).map_or_else(
+            || machining_time(path, machine),
+            |(kinematics, joints)| machining_time_of_axes(path, machine, kinematics, joints),
+        )
     }
 
-    /// Time that the joints take at least by their rates, s; 0 on machines of three axes.
+    /// Time that its axes take at most from location to location, s; 0 on machines of three axes.
     pub fn joint_time(&self, scene: &Scene) -> f64 {
-        self.joint_times(scene).iter().sum()
+        self.on_axes(scene).map_or(0.0, |(kinematics, joints)| axes_at_most(kinematics, joints))
     }
 
-    fn joint_times(&self, scene: &Scene) -> Vec<f64> {
-        self.joints.as_ref().zip(scene.five_axis.as_ref()).map_or_else(Vec::new, |(joints, machine)| {
-            joints.least_times(&machine.kinematics, self.plan.path.len())
-        })
+    fn on_axes<'a>(&'a self, scene: &'a Scene) -> Option<(&'a Kinematics, &'a JointPath)> {
+        Some((&scene.five_axis.as_ref()?.kinematics, self.joints.as_ref()?))
     }
 }
 
@@ -108,19 +110,37 @@ impl Session {
             (None, None) => plan(&self.part, cutter, strategy, settings, monitor)?,
             (None, Some(axis)) => {
                 let keep = around.tool.keep_clear(&self.scene, around.near, around.fixtures);
-                let tilting = Tilting {
-                    axis: &axis.rule,
-                    most_turning: axis.most_turning.map(|rate| TURNING_SHARE * rate),
-                    most_turning_across: axis.most_turning_across,
-                    interference: Some(&keep),
+                let planned = |share: f64| {
+                    let tilting = Tilting {
+                        axis: &axis.rule,
+                        most_turning: axis.most_turning.map(|rate| share * rate),
+                        most_turning_across: axis.most_turning_across.map(|rate| share * rate),
+                        interference: Some(&keep),
+                    };
+                    plan_tilted(&self.part, cutter, strategy, &tilting, settings, monitor)
                 };
-                return plan_tilted(&self.part, cutter, strategy, &tilting, settings, monitor);
+                let turns = |plan: &Plan| self.turning(axis, plan, monitor);
+                return within_turning(&planned, &turns);
             }
         };
         let keep = around.tool.keep_off_fixtures(&self.scene, around.fixtures);
         let Detour { path, note, .. } = around_fixtures(plan.path, &keep, settings, monitor)?;
         let notes = plan.notes.into_iter().chain(note).collect();
         Ok(Plan { path, notes, ..plan })
+    }
+
+    /// The fastest turns of a plan as programs have it, times what is allowed.
+    fn turning(&self, axis: &AxisRequest, plan: &Plan, monitor: &dyn Monitor) -> Result<f64, PlanError> {
+        let (part, cutter) = (&self.part, &self.scene.cutter);
+        let path = plan.path.clone().as_written();
+        let share = |found: Option<FastestTurn>, limit: f64| found.map_or(0.0, |turn| turn.rate / limit);
+        let along = axis.most_turning.map_or(Ok(0.0), |limit| {
+            fastest_turn(part, cutter, &path, monitor).map(|found| share(found, limit))
+        })?;
+        let across = axis.most_turning_across.map_or(Ok(0.0), |limit| {
+            fastest_turn_across(part, cutter, &path, monitor).map(|found| share(found, limit))
+        })?;
+        Ok(along.max(across))
     }
 
     fn settings(&self, request: &ToolpathRequest) -> PlanSettings {
@@ -175,6 +195,35 @@ impl Session {
         let arcs = contact_arcs(path, &scene.cutter, self.top, &of_passes, monitor)?;
         Ok(Some(limit_feed_by(path, &arcs, strategy, request.step, radius)))
     }
+}
+
+/// Times that a toolpath is planned again whose axis turns too fast, and how much slower than it takes. Where it turns by more
+/// than so many times what is allowed the tool stays clear only so, and no plan helps.
+const TURNING_ROUNDS: usize = 2;
+const TURNING_SPARE: f64 = 0.97;
+const TURNING_MOST: f64 = 2.0;
+
+/// The plan whose axes turn as slowly as asked. A bull nose end mill in a hollow may touch beside the contact that was planned,
+/// so that the finished path has other rates; it is then planned for lower ones.
+fn within_turning(
+    planned: &dyn Fn(f64) -> Result<Plan, PlanError>,
+    turns: &dyn Fn(&Plan) -> Result<f64, PlanError>,
+) -> Result<Plan, PlanError> {
+    let mut share = TURNING_SHARE;
+    let mut best = planned(share)?;
+    let mut fastest = turns(&best)?;
+    for _ in 0..TURNING_ROUNDS {
+        if fastest <= 1.0 || fastest > TURNING_MOST {
+            break;
+        }
+        share *= TURNING_SPARE / fastest;
+        let next = planned(share)?;
+        let its = turns(&next)?;
+        if its < fastest {
+            (best, fastest) = (next, its);
+        }
+    }
+    Ok(best)
 }
 
 /// A plan of a pocket with the engagement that was measured, and the bound of its greatest angle, rad.

@@ -34,7 +34,7 @@ const SECONDS_PER_MINUTE: f64 = 60.0;
 pub fn slow_corners(path: &Toolpath, machine: &Machine) -> Toolpath {
     // Words that slow down what is short anyway would only be more lines to run.
     let machine = &Machine { block_rate: ANY_RATE, ..*machine };
-    let Some(blocks) = profile(path, machine, &[]) else { return path.clone() };
+    let Some(blocks) = profile(path, machine) else { return path.clone() };
     let mut moves = Vec::with_capacity(path.len());
     let mut next = blocks.iter().enumerate().peekable();
     for (k, step) in path.moves.iter().enumerate() {

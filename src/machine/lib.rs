@@ -4,12 +4,14 @@
 //! of five-axis machines ([`kinematics`]). Lengths in mm, rates in mm/min, accelerations in mm/s², times in s, joint angles
 //! in rad.
 
+mod axis_limits;
 mod feeds;
 pub mod kinematics;
 mod time;
 
+pub use axis_limits::{axes_at_most, machining_time_of_axes};
 pub use feeds::slow_corners;
-pub use time::{at_most, machining_time, machining_time_turning};
+pub use time::{at_most, machining_time};
 
 /// Limits of the machine's motion.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -16,12 +16,11 @@
 //!
 //! A move lasts at least as long as the control takes for a line of the program.
 //!
-//! On a machine with rotary axes a move lasts at least as long as each of its joints takes by its rate: its feed is no
-//! higher than its length over that time, and where the tip stands meanwhile the machine stops for it.
+//! What the single axes of a machine with rotary ones need besides is in [`super::axis_limits`].
 //!
 //! A backward pass then limits speeds to what can still be braked, a forward pass to what can have been
-//! reached: both in one sweep, O(n). The path starts and ends at rest. Jerk along the path and the acceleration of
-//! the single axes are not modelled: real machines take somewhat longer.
+//! reached: both in one sweep, O(n). The path starts and ends at rest. Jerk along the path is not modelled: real machines take
+//! somewhat longer.
 
 use super::Machine;
 use geometry::Vector3;
@@ -31,7 +30,7 @@ const SECONDS_PER_MINUTE: f64 = 60.0;
 
 /// Moves no longer than this, mm, are what rounding leaves of none: programs are written to a ten-thousandth, so that no
 /// control sees them, and the way before them goes on behind them. A greater length would hide bends.
-const NO_MOVE: f64 = 1e-9;
+pub(super) const NO_MOVE: f64 = 1e-9;
 
 /// A move with a length, in mm and s.
 pub(super) struct Block {
@@ -64,21 +63,8 @@ impl Block {
 /// # Tolerance
 /// A model of the machine (see the module), computed to f64 rounding.
 pub fn machining_time(path: &Toolpath, machine: &Machine) -> f64 {
-    machining_time_turning(path, machine, &[])
-}
-
-/// [`machining_time`] on a machine whose joints take at least `turning` s for each move
-/// ([`super::kinematics::JointPath::least_times`]; moves beyond its end take none). Rises for rewinds are
-/// not counted. Infinite when one of `turning` is no finite time.
-///
-/// # Tolerance
-/// As [`machining_time`].
-pub fn machining_time_turning(path: &Toolpath, machine: &Machine, turning: &[f64]) -> f64 {
-    let Some(blocks) = profile(path, machine, turning) else { return f64::INFINITY };
-    let moving: f64 = blocks.iter().map(|block| block_time(block, machine.acceleration)).sum();
-    let standing: f64 =
-        path.segments().zip(turning).filter_map(|((from, to, _), time)| (from == to).then_some(*time)).sum();
-    moving + standing
+    let Some(blocks) = profile(path, machine) else { return f64::INFINITY };
+    blocks.iter().map(|block| block_time(block, machine.acceleration)).sum()
 }
 
 /// Time, s, that no path takes longer than, whose feeds lie between `slowest` and `fastest`, mm/min: from rest to rest each
@@ -92,26 +78,17 @@ pub fn at_most(path: &Toolpath, machine: &Machine, [slowest, fastest]: [f64; 2])
     path.segments().map(one).sum()
 }
 
-/// The moves that have a length, with their speeds; `None` when no time can be told. `turning` as in
-/// [`machining_time_turning`].
-pub(super) fn profile(path: &Toolpath, machine: &Machine, turning: &[f64]) -> Option<Vec<Block>> {
+/// The moves that have a length, with their speeds; `None` when no time can be told.
+pub(super) fn profile(path: &Toolpath, machine: &Machine) -> Option<Vec<Block>> {
     let acceleration = machine.acceleration;
     let mut blocks: Vec<Block> = Vec::with_capacity(path.len());
-    // The tip has stood, while the tool turned, since the last block.
-    let mut stood = false;
     for (k, (from, to, step)) in path.segments().enumerate() {
         let length = (to - from).norm();
-        let turning = turning.get(k).copied().unwrap_or(0.0);
-        if !(turning >= 0.0 && turning.is_finite()) {
-            return None;
-        }
         if length <= NO_MOVE {
-            stood |= turning > 0.0;
             continue;
         }
         let feed = feed(step, machine);
-        let fastest =
-            (length * machine.block_rate).min(if turning > 0.0 { length / turning } else { f64::INFINITY });
+        let fastest = length * machine.block_rate;
         // What is no number stays none.
         let feed = if feed > fastest { fastest } else { feed };
         if !(feed > 0.0 && length.is_finite() && machine.check().is_ok()) {
@@ -132,9 +109,8 @@ pub(super) fn profile(path: &Toolpath, machine: &Machine, turning: &[f64]) -> Op
         if let Some(last) = blocks.last() {
             block.turn = last.direction.cross(&direction).norm().atan2(last.direction.dot(&direction));
             block.curvature = 2.0 * block.turn / (last.length + length);
-            block.corner = if stood { 0.0 } else { corner_speed_squared(last, &block, machine) };
+            block.corner = corner_speed_squared(last, &block, machine);
         }
-        stood = false;
         blocks.push(block);
     }
     // A bend begins with a corner of half its turn, so that a change shows over one corner or two. All of
@@ -317,27 +293,6 @@ mod tests {
         assert_relative_eq!(time(there.chain(back)), expected, max_relative = 1e-9);
     }
 
-    #[test]
-    fn a_move_lasts_as_long_as_the_tool_turns() {
-        let bent = path([[0.0; 3], [100.0, 0.0, 0.0], [100.0, 0.0, 0.0], [200.0, 0.0, 0.0]]);
-        let plain = machining_time(&bent, &MACHINE);
-        assert_eq!(machining_time_turning(&bent, &MACHINE, &[0.0; 3]), plain);
-        assert_relative_eq!(plain, 2.1, epsilon = 1e-12);
-        // 100 mm in 4 s: 25 mm/s; from there on to 100 mm/s in 75 ms.
-        let slow = machining_time_turning(&bent, &MACHINE, &[4.0]);
-        let (first, ramp) = (4.0 + 0.5 * 0.025, 0.075);
-        let rest = ramp + 0.1 + (100.0 - (1e4 - 625.0) / 2000.0 - 5.0) / 100.0;
-        assert_relative_eq!(slow, first + rest, epsilon = 1e-12);
-        // Turning while the tip stands: two moves from rest to rest, and the turn.
-        let stops = machining_time_turning(&bent, &MACHINE, &[0.0, 3.0, 0.0]);
-        assert_relative_eq!(stops, 2.0 * 1.1 + 3.0, epsilon = 1e-12);
-        // A turn quicker than the feed costs nothing.
-        assert_eq!(machining_time_turning(&bent, &MACHINE, &[0.9, 0.0, 0.9]), plain);
-        for wrong in [f64::NAN, f64::INFINITY, -1.0] {
-            assert_eq!(machining_time_turning(&bent, &MACHINE, &[wrong]), f64::INFINITY);
-        }
-    }
-
     /// A line into an arc of 4 mm and out again: Δκ = 1/4 mm limits v² to ∛(24·0.01·j²)·4.
     #[test]
     fn a_sudden_curvature_is_entered_at_what_the_jerk_allows() {
@@ -347,7 +302,7 @@ mod tests {
             let arc = (0..=2000).map(|k| [4.0 * angle(k).sin(), 4.0 - 4.0 * angle(k).cos(), 0.0]);
             let line = (0..=10_000).map(|k| [-40.0 + 0.004 * f64::from(k), 0.0, 0.0]);
             let path = path(line.chain(arc));
-            let blocks = profile(&path, &machine, &[]).unwrap();
+            let blocks = profile(&path, &machine).unwrap();
             let joint = blocks.iter().find(|b| b.curvature > 0.2).unwrap();
             assert_relative_eq!(joint.entry, limit, max_relative = 2e-3);
             // Well inside the arc only its own radius counts.

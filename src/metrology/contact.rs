@@ -5,16 +5,24 @@ use geometry::Point3;
 use motion::{ClPoint, Toolpath};
 use part::{Part, PatchPoint, SurfacePoint};
 
-/// Rounds in which the place where a tilted cutter touches is found: each takes the normal of the one before.
-const CONTACT_ROUNDS: usize = 4;
+/// Rounds at most in which the place where a tilted cutter touches is found: each takes the normal of the one before. They close
+/// in by the ratio of the curvatures of part and cutter.
+const CONTACT_ROUNDS: usize = 40;
+
+/// A round that moves the contact by less, mm, is the last.
+const CLOSE: f64 = 1e-7;
 
 /// The place of the part that a cutter touches, or comes nearest to, how far it is off, and where on the cutter that is.
 pub(super) fn contact(part: &Part, cutter: &Cutter, at: &ClPoint) -> (SurfacePoint, f64, Point3) {
     let mut foot = part.closest_point(&(at.tip + at.axis * cutter.profile().centre_z)).0;
     let (mut off, mut contact) = (f64::INFINITY, at.tip);
     for _ in 0..CONTACT_ROUNDS {
+        let before = contact;
         contact = at.tip - cutter.contact_to_tip_along(&foot.normal, &at.axis);
         (foot, off) = part.closest_point(&contact);
+        if (contact - before).norm() < CLOSE {
+            break;
+        }
     }
     (foot, off, contact)
 }

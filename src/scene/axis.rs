@@ -16,6 +16,9 @@ const LEAN: std::ops::RangeInclusive<f64> = -80.0..=80.0;
 /// How fast an axis may be asked to turn, degrees a mm.
 const TURNING: std::ops::RangeInclusive<f64> = 1e-3..=360.0;
 
+/// Along the normal of the surface.
+const NORMAL: ToolAxis = ToolAxis::LeadTilt { lead: 0.0, tilt: 0.0 };
+
 /// How the axis of a toolpath is chosen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisRequest {
@@ -30,11 +33,10 @@ pub struct AxisRequest {
 /// Reads the axis of a toolpath; `None` for an upright one.
 pub(super) fn read(section: &Section<'_>) -> Result<Option<AxisRequest>, SceneError> {
     let Some(table) = section.inline(KEY) else {
-        let normal = ToolAxis::LeadTilt { lead: 0.0, tilt: 0.0 };
         let word = section.word(KEY, &["upright", "normal"])?;
         let leaning = word.filter(|word| word.value == "normal");
         return Ok(leaning.map(|_| AxisRequest {
-            rule: normal,
+            rule: NORMAL,
             most_turning: None,
             most_turning_across: None,
         }));
@@ -57,18 +59,20 @@ pub(super) fn read(section: &Section<'_>) -> Result<Option<AxisRequest>, SceneEr
         curve(&table, "away")?.map(ToolAxis::Away),
         guides(&table)?.map(ToolAxis::Between),
     ];
-    let mut rules = rules.into_iter().flatten();
-    let (Some(rule), None) = (rules.next(), rules.next()) else {
-        let message = "`axis` needs one rule for the tool axis, and only one";
-        let cure = "write `{ lead = 15, tilt = 0 }`, `{ fixed = [0, 0.5, 1] }`, `{ toward = [[0, 0, 80]] }`, \
-                    `{ away = [[0, 0, -80]] }` or `{ between = [[0, 0, 0, 0, 0, 1], [50, 0, 0, 0.3, 0, 1]] }`";
-        return Err(section.error(&section.key_span(KEY), message, cure));
-    };
     let rate = |key: &str| {
         let rate = table.number(key, TURNING, " degrees a mm")?;
         Ok::<_, SceneError>(rate.map(|rate| rate.value.to_radians()))
     };
     let (most_turning, most_turning_across) = (rate("turning")?, rate("turning_across")?);
+    let mut rules = rules.into_iter().flatten();
+    // Limits alone are for axes along the normal.
+    let limited = most_turning.or(most_turning_across).map(|_| NORMAL);
+    let (Some(rule), None) = (rules.next().or(limited), rules.next()) else {
+        let message = "`axis` needs one rule for the tool axis, and only one";
+        let cure = "write `{ lead = 15, tilt = 0 }`, `{ fixed = [0, 0.5, 1] }`, `{ toward = [[0, 0, 80]] }`, \
+                    `{ away = [[0, 0, -80]] }` or `{ between = [[0, 0, 0, 0, 0, 1], [50, 0, 0, 0.3, 0, 1]] }`";
+        return Err(section.error(&section.key_span(KEY), message, cure));
+    };
     Ok(Some(AxisRequest { rule, most_turning, most_turning_across }))
 }
 
@@ -183,7 +187,6 @@ mod tests {
         for (axis, word) in [
             ("\"tilted\"", "cannot be"),
             ("{}", "one rule"),
-            ("{ turning = 3 }", "one rule"),
             ("{ lead = 10, fixed = [0, 0, 1] }", "only one"),
             ("{ lead = 85 }", "(-80 to 80)"),
             ("{ lead = nan }", "NaN"),

@@ -6,8 +6,10 @@ use geometry::{Point3, Vector3};
 use io::gcode::Style;
 use keys::{Located, SceneError, Section};
 use keys::{toml_number as number, toml_string as text};
+use machine::Machine;
 use machine::kinematics::{
-    DEFAULT_GAUGE_LENGTH, DEFAULT_ROTARY_RATE, Kinematics, KinematicsError, PRESETS, RotaryAxis, Side, preset,
+    DEFAULT_GAUGE_LENGTH, DEFAULT_ROTARY_ACCELERATION, DEFAULT_ROTARY_RATE, Kinematics, KinematicsError,
+    PRESETS, RotaryAxis, Side, preset,
 };
 
 /// The key of the rotary axes of a machine.
@@ -22,6 +24,9 @@ const LIMITS: std::ops::RangeInclusive<f64> = -7200.0..=7200.0;
 /// Rotary rates that make sense, degrees/min.
 const RATE: std::ops::RangeInclusive<f64> = 1.0..=1e7;
 
+/// Rotary accelerations that make sense, degrees/s².
+const ACCELERATION: std::ops::RangeInclusive<f64> = 1.0..=1e6;
+
 /// Coordinates of machines, mm.
 const PLACE: std::ops::RangeInclusive<f64> = -99_999.0..=99_999.0;
 
@@ -32,6 +37,9 @@ const SECONDS_PER_MINUTE: f64 = 60.0;
 
 /// Rates of linear axes, mm/min.
 const RATES: std::ops::RangeInclusive<f64> = 1.0..=1e6;
+
+/// Accelerations of linear axes, mm/s².
+const ACCELERATIONS: std::ops::RangeInclusive<f64> = 1.0..=1e6;
 
 const SIDES: [&str; 2] = ["head", "table"];
 
@@ -50,8 +58,16 @@ pub struct FiveAxis {
 
 /// Reads the rotary axes of `[machine]`; `None` for a machine of three axes.
 ///
-/// Linear axes are as fast as rapids, `rapid_rate` mm/min, unless the table says otherwise.
-pub(super) fn read(machine: &Section<'_>, rapid_rate: f64) -> Result<Option<FiveAxis>, SceneError> {
+/// Linear axes are as fast as rapids and accelerate as the path does, unless the table says otherwise.
+pub(super) fn read(machine: &Section<'_>, limits: &Machine) -> Result<Option<FiveAxis>, SceneError> {
+    let linear = |rates: [f64; 3], accelerations: [f64; 3]| {
+        move |kinematics: Kinematics| {
+            kinematics
+                .with_rates(rates.map(|rate| rate / SECONDS_PER_MINUTE))
+                .with_accelerations(accelerations)
+        }
+    };
+    let (rapid, even) = ([limits.rapid_rate; 3], [limits.acceleration; 3]);
     let words: Vec<&str> = [NONE].into_iter().chain(PRESETS).collect();
     let Some(table) = machine.inline(KEY) else {
         let Some(word) = machine.word(KEY, &words)?.filter(|word| word.value != NONE) else {
@@ -61,7 +77,7 @@ pub(super) fn read(machine: &Section<'_>, rapid_rate: f64) -> Result<Option<Five
             let kinematics =
                 Kinematics::new(axes[0], axes[1], DEFAULT_GAUGE_LENGTH, Point3::origin(), [None; 3]);
             kinematics.map(|kinematics| FiveAxis {
-                kinematics: kinematics.with_rates([rapid_rate / SECONDS_PER_MINUTE; 3]),
+                kinematics: linear(rapid, even)(kinematics),
                 post: Style::Tcp,
                 zero_is_given: false,
                 directions: axes.map(|axis| axis.direction),
@@ -70,7 +86,19 @@ pub(super) fn read(machine: &Section<'_>, rapid_rate: f64) -> Result<Option<Five
         return made.transpose().map_err(|e| machine.error(&word.span, e.to_string(), e.cure()));
     };
     table.only(
-        &["preset", "post", "first", "second", "gauge_length", "workpiece_zero", "x", "y", "z", "rates"],
+        &[
+            "preset",
+            "post",
+            "first",
+            "second",
+            "gauge_length",
+            "workpiece_zero",
+            "x",
+            "y",
+            "z",
+            "rates",
+            "accelerations",
+        ],
         &[],
         "`kinematics`",
     )?;
@@ -107,9 +135,10 @@ pub(super) fn read(machine: &Section<'_>, rapid_rate: f64) -> Result<Option<Five
         [x?, y?, z?],
     );
     let kinematics = kinematics.map_err(|e| refused(&table, first.letter, &e))?;
-    let rates = rates(&table)?.unwrap_or([rapid_rate; 3]).map(|rate| rate / SECONDS_PER_MINUTE);
+    let rates = of_linear(&table, "rates", RATES, "mm/min")?.unwrap_or(rapid);
+    let accelerations = of_linear(&table, "accelerations", ACCELERATIONS, "mm/s²")?.unwrap_or(even);
     Ok(Some(FiveAxis {
-        kinematics: kinematics.with_rates(rates),
+        kinematics: linear(rates, accelerations)(kinematics),
         post,
         zero_is_given: workpiece_zero.is_some(),
         directions: [first, second].map(|axis| axis.direction),
@@ -143,7 +172,11 @@ fn read_axis(table: &Section<'_>, key: &str, named: Option<RotaryAxis>) -> Resul
             )),
         };
     };
-    section.only(&["name", "side", "direction", "point", "limits", "rate"], &[], "a rotary axis")?;
+    section.only(
+        &["name", "side", "direction", "point", "limits", "rate", "acceleration"],
+        &[],
+        "a rotary axis",
+    )?;
     let names = ["A", "B", "C"];
     let word = |key: &str, words: &[&'static str], has_default: bool| {
         if has_default { section.word(key, words) } else { section.required_word(key, words).map(Some) }
@@ -171,6 +204,7 @@ fn read_axis(table: &Section<'_>, key: &str, named: Option<RotaryAxis>) -> Resul
         given.map(|limits| limits.map(f64::to_radians)).or(named.and_then(|axis| axis.limits))
     };
     let rate = section.number("rate", RATE, " degrees/min")?;
+    let acceleration = section.number("acceleration", ACCELERATION, " degrees/s²")?;
     let base = named.unwrap_or(RotaryAxis {
         letter: 'A',
         direction: Vector3::zeros(),
@@ -178,6 +212,7 @@ fn read_axis(table: &Section<'_>, key: &str, named: Option<RotaryAxis>) -> Resul
         side: Side::Table,
         limits: None,
         rate: DEFAULT_ROTARY_RATE,
+        acceleration: DEFAULT_ROTARY_ACCELERATION,
     });
     Ok(RotaryAxis {
         letter: name.unwrap_or(base.letter),
@@ -186,6 +221,7 @@ fn read_axis(table: &Section<'_>, key: &str, named: Option<RotaryAxis>) -> Resul
         side: side.map_or(base.side, |word| if word.value == SIDES[0] { Side::Head } else { Side::Table }),
         limits,
         rate: rate.map_or(base.rate, |rate| rate.value * DEGREE_A_MINUTE),
+        acceleration: acceleration.map_or(base.acceleration, |given| given.value.to_radians()),
     })
 }
 
@@ -200,14 +236,19 @@ fn place(section: &Section<'_>, key: &str) -> Result<Option<Located<[f64; 3]>>, 
     Err(section.error(&place.span, message, cure))
 }
 
-/// Fastest X, Y and Z, mm/min.
-fn rates(section: &Section<'_>) -> Result<Option<[f64; 3]>, SceneError> {
-    let Some(rates) = section.vector("rates")? else { return Ok(None) };
-    if rates.value.iter().all(|rate| RATES.contains(rate)) {
-        return Ok(Some(rates.value));
+/// Limits of X, Y and Z.
+fn of_linear(
+    section: &Section<'_>,
+    key: &str,
+    range: std::ops::RangeInclusive<f64>,
+    unit: &str,
+) -> Result<Option<[f64; 3]>, SceneError> {
+    let Some(given) = section.vector(key)? else { return Ok(None) };
+    if given.value.iter().all(|value| range.contains(value)) {
+        return Ok(Some(given.value));
     }
-    let cure = format!("write mm/min of X, Y and Z, from {} to {}", RATES.start(), RATES.end());
-    Err(section.error(&rates.span, "`rates` are no rates of linear axes", cure))
+    let cure = format!("write {unit} of X, Y and Z, from {} to {}", range.start(), range.end());
+    Err(section.error(&given.span, format!("`{key}` are no {key} of linear axes"), cure))
 }
 
 /// Writes the machine as scenes spell it, after all other keys of `[machine]`.
@@ -227,10 +268,11 @@ pub(super) fn write(out: &mut String, five_axis: Option<&FiveAxis>) -> fmt::Resu
         let (direction, point) = (list(direction.as_slice()), list(axis.point.coords.as_slice()));
         writeln!(
             out,
-            "{key} = {{ name = {}, side = {}, direction = {direction}, point = {point}, limits = {limits}, rate = {} }}",
+            "{key} = {{ name = {}, side = {}, direction = {direction}, point = {point}, limits = {limits}, rate = {}, acceleration = {} }}",
             text(&axis.letter.to_string()),
             text(side),
             number(axis.rate / DEGREE_A_MINUTE),
+            number(axis.acceleration.to_degrees()),
         )?;
     }
     writeln!(out, "gauge_length = {}  # spindle nose to tip", number(kinematics.gauge_length()))?;
@@ -242,6 +284,7 @@ pub(super) fn write(out: &mut String, five_axis: Option<&FiveAxis>) -> fmt::Resu
     }
     let [x, y, z, ..] = kinematics.rates().map(|rate| rate * SECONDS_PER_MINUTE);
     writeln!(out, "rates = {}  # mm/min of X, Y and Z", list(&[x, y, z]))?;
+    writeln!(out, "accelerations = {}  # mm/s² of X, Y and Z", list(&kinematics.accelerations()[..3]))?;
     for (key, limits) in ["x", "y", "z"].into_iter().zip(kinematics.travel()) {
         if let Some(limits) = limits {
             writeln!(out, "{key} = {}", list(limits))?;
@@ -283,17 +326,20 @@ mod tests {
         for name in PRESETS {
             let five_axis = parse(&format!("kinematics = \"{name}\"")).unwrap().five_axis.unwrap();
             let rapid = [250.0; 3];
-            let expected = Kinematics::by_name(name).map(|made| made.with_rates(rapid));
+            let expected =
+                Kinematics::by_name(name).map(|made| made.with_rates(rapid).with_accelerations([3000.0; 3]));
             assert_eq!(Some(five_axis.kinematics), expected, "{name}");
             assert_eq!(five_axis.post, Style::Tcp);
         }
         let table = "[machine.kinematics]\npost = \"full\"\ngauge_length = 120\nz = [-500, 0]\n\
-                     first = { name = \"B\", side = \"head\", direction = [0, -2, 0], limits = [-90, 400], rate = 3600 }\n\
+                     first = { name = \"B\", side = \"head\", direction = [0, -2, 0], limits = [-90, 400], rate = 3600, acceleration = 90 }\naccelerations = [1, 2, 3]\n\
                      second = { name = \"A\", side = \"head\", direction = [1, 0, 1], point = [0, 0, 80] }\n";
         let made = parse(table).unwrap().five_axis.unwrap();
         let [first, second] = *made.kinematics.axes();
         assert_eq!((first.letter, first.side, first.direction), ('B', Side::Head, -Vector3::y()));
         assert!((first.rate - std::f64::consts::PI / 3.0).abs() < 1e-12);
+        assert!((first.acceleration - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
+        assert_eq!(made.kinematics.accelerations()[..3], [1.0, 2.0, 3.0]);
         let [least, greatest] = first.limits.unwrap();
         assert!((least + 90f64.to_radians()).abs() + (greatest - 400f64.to_radians()).abs() < 1e-12);
         assert_eq!((second.letter, second.limits, second.point.z), ('A', None, 80.0));

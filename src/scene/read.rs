@@ -105,7 +105,7 @@ impl Scene {
         let section = root.section("machine")?;
         let keep_clear = interference::read(&root, &folder)?;
         let (machine, clearance) = read_machine(&section)?;
-        let five_axis = kinematics::read(&section, machine.rapid_rate)?;
+        let five_axis = kinematics::read(&section, &machine)?;
         let toolpaths = read_toolpaths(&root, &folder, &tolerance, correct, &cutter)?;
         check_pocket_strategies(&root, &part, &toolpaths)?;
         if simulation.cell_is_auto {

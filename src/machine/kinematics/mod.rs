@@ -27,7 +27,7 @@ mod tests;
 
 pub use error::KinematicsError;
 pub use follow::{Following, JointLocation, JointPath, PathError, Turn, follow};
-pub use presets::{DEFAULT_GAUGE_LENGTH, DEFAULT_ROTARY_RATE, PRESETS, preset};
+pub use presets::{DEFAULT_GAUGE_LENGTH, DEFAULT_ROTARY_ACCELERATION, DEFAULT_ROTARY_RATE, PRESETS, preset};
 pub use report::{JointReport, LimitViolation, Obstacle, Rewind, SINGULAR_ANGLE, SingularPose, least_time};
 
 use angles::Triangle;
@@ -72,6 +72,8 @@ pub struct RotaryAxis {
     pub limits: Option<[f64; 2]>,
     /// Fastest turning, rad/s.
     pub rate: f64,
+    /// Greatest acceleration, rad/s².
+    pub acceleration: f64,
 }
 
 /// A five-axis machine, checked.
@@ -86,6 +88,8 @@ pub struct Kinematics {
     travel: [Option<[f64; 2]>; 3],
     /// Fastest X, Y and Z, mm/s.
     rates: [f64; 3],
+    /// Greatest acceleration of X, Y and Z, mm/s².
+    accelerations: [f64; 3],
     triangle: Triangle,
 }
 
@@ -161,6 +165,10 @@ impl Kinematics {
                 let (what, expected) = ("a rotary rate", "a positive number");
                 return Err(KinematicsError::Number { what, value: axis.rate, expected });
             }
+            if !(axis.acceleration > 0.0 && axis.acceleration.is_finite()) {
+                let (what, expected) = ("a rotary acceleration", "a positive number");
+                return Err(KinematicsError::Number { what, value: axis.acceleration, expected });
+            }
         }
         let [u, v] = axes.map(|axis| axis.direction);
         if u.cross(&v).norm() <= LEAST_ANGLE {
@@ -174,14 +182,26 @@ impl Kinematics {
         for (joint, limits) in ['X', 'Y', 'Z'].into_iter().zip(travel) {
             check_limits(joint, limits, GREATEST)?;
         }
-        let (rates, triangle) = ([f64::INFINITY; 3], Triangle::new(u, v));
-        Ok(Self { axes, gauge_length, workpiece_zero, travel, rates, triangle })
+        let ([rates, accelerations], triangle) = ([[f64::INFINITY; 3]; 2], Triangle::new(u, v));
+        Ok(Self { axes, gauge_length, workpiece_zero, travel, rates, accelerations, triangle })
     }
 
     /// The same with the fastest motion of X, Y and Z, mm/s; without, they are not limited.
     #[must_use]
     pub fn with_rates(self, rates: [f64; 3]) -> Self {
         Self { rates, ..self }
+    }
+
+    /// The same with the greatest acceleration of X, Y and Z, mm/s²; without, they are not limited.
+    #[must_use]
+    pub fn with_accelerations(self, accelerations: [f64; 3]) -> Self {
+        Self { accelerations, ..self }
+    }
+
+    /// Greatest acceleration of the five joints, mm/s² and rad/s².
+    pub fn accelerations(&self) -> [f64; 5] {
+        let [x, y, z] = self.accelerations;
+        [x, y, z, self.axes[0].acceleration, self.axes[1].acceleration]
     }
 
     /// Fastest motion of the five joints, mm/s and rad/s.

@@ -13,6 +13,9 @@ pub const DEFAULT_GAUGE_LENGTH: f64 = 150.0;
 /// Rotary rate where nothing else is said, rad/s: 30 turns a minute, as trunnions and fork heads have.
 pub const DEFAULT_ROTARY_RATE: f64 = 0.5 * TAU;
 
+/// Rotary acceleration where nothing else is said, rad/s²: a rate of 30 turns a minute is reached in a third of a second.
+pub const DEFAULT_ROTARY_ACCELERATION: f64 = 10.0;
+
 /// Tilting axes: to both sides beyond the horizontal.
 const TILTING: Option<[f64; 2]> = Some([-TAU / 3.0, TAU / 3.0]);
 /// Axes across the spindle that carry another one.
@@ -66,6 +69,7 @@ pub fn preset(name: &str) -> Option<[RotaryAxis; 2]> {
         side,
         limits,
         rate: DEFAULT_ROTARY_RATE,
+        acceleration: DEFAULT_ROTARY_ACCELERATION,
     }))
 }
 

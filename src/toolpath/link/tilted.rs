@@ -12,9 +12,9 @@ use super::order::{Visit, is_closed, order};
 use super::{Speeds, longest_link, plane_interval};
 use crate::RepairSummary;
 use crate::moves::touch::Touch;
-use crate::tilt::across;
 use crate::tilt::repair::{Repaired, repair};
-use crate::tilt::tilted::{TiltedPasses, Tilting, limit_turning, located, reversed};
+use crate::tilt::tilted::{MoveRules, TiltedPasses, Tilting, located, reversed};
+use crate::tilt::turning::{TurningRates, even_out, too_fast};
 use crate::vocabulary::{Links, PlanError, PlanSettings, Setup};
 use bent::Bent;
 use collision::{Check, Interference, Obstacle};
@@ -23,6 +23,12 @@ use geometry::Point3;
 use motion::{ClPoint, Move, MoveKind, Toolpath};
 use ways::{Block, Leg, Ways};
 use work::monitor::{self, Monitor};
+
+/// Times that axes are evened out and passes repaired by turns.
+const EVENINGS: usize = 2;
+
+/// Moves take an axis off that of its pass by no more than this share of what it may turn to the pass beside it.
+const STRAYING: f64 = 5e-3;
 
 /// Joins passes; see the module.
 ///
@@ -68,8 +74,14 @@ pub(crate) fn join_tilted(
         |k: usize| visited(&passes[visits[k].pass], &contacts[visits[k].pass], &visits[k], cutter, tilting);
     let turned = work::parallel::try_map(visits.len(), turned)?;
     let passes = cleared(turned, cutter, tilting, notes, monitor)?;
+    let interval = plane_interval(cutter, settings.step);
+    let rules = MoveRules {
+        keep: tilting.interference,
+        turning: tilting.most_turning,
+        straying: tilting.most_turning_across.map(|rate| STRAYING * rate * interval),
+    };
     let pieces = work::parallel::try_map(passes.len(), |k| {
-        LocatedPass::of(&passes[k], tolerance, smoothing, tilting.interference, monitor)
+        LocatedPass::of(&passes[k], tolerance, smoothing, rules, monitor)
     })?;
     let between = work::parallel::try_map(pieces.len().saturating_sub(1), |k| {
         ways.between(&pieces[k].ends[1], &pieces[k + 1].ends[0], monitor)
@@ -79,7 +91,7 @@ pub(crate) fn join_tilted(
     Ok(path)
 }
 
-/// The passes with axes evened out as far as is asked for, and so that the tool stays clear.
+/// The passes repaired so that the tool stays clear, with axes that turn as slowly as is asked for.
 fn cleared(
     passes: Vec<Vec<Touch>>,
     cutter: &Cutter,
@@ -87,29 +99,27 @@ fn cleared(
     notes: &mut Vec<String>,
     monitor: &dyn Monitor,
 ) -> Result<Vec<Vec<Touch>>, PlanError> {
-    let evened = work::parallel::try_map(passes.len(), |k| {
-        let mut pass = passes[k].clone();
-        let even = tilting.most_turning.is_none_or(|rate| limit_turning(&mut pass, cutter, rate));
-        Ok::<_, PlanError>((repaired(pass, cutter, tilting, monitor)?, even))
-    })?;
-    let uneven = evened.iter().filter(|(_, even)| !even).count();
-    if uneven > 0 {
-        notes.push(format!(
-            "on {uneven} passes the axis turns faster than asked: they are too short for their turns"
-        ));
-    }
     let mut summary = RepairSummary::default();
-    evened.iter().for_each(|(one, _)| summary.add(&one.summary));
-    let mut passes: Vec<_> = evened.into_iter().flat_map(|(one, _)| one.passes).collect();
-    if let Some(across) = tilting.most_turning_across {
-        let rates = across::TurningRates { across, along: tilting.most_turning };
-        let left = across::even_out(&mut passes, cutter, rates, tilting.interference, monitor)?;
-        notes.extend(left.map(|left| left.note(across)));
-        // The touches are clear; moves between them may be no longer.
+    let mut repair_all = |passes: Vec<Vec<Touch>>| {
         let again = |k: usize| repaired(passes[k].clone(), cutter, tilting, monitor);
         let again = work::parallel::try_map(passes.len(), again)?;
         again.iter().for_each(|one| summary.add(&one.summary));
-        passes = again.into_iter().flat_map(|one| one.passes).collect();
+        Ok::<_, PlanError>(again.into_iter().flat_map(|one| one.passes).collect::<Vec<_>>())
+    };
+    let mut passes = repair_all(passes)?;
+    let rates = TurningRates { along: tilting.most_turning, across: tilting.most_turning_across };
+    if rates.along.or(rates.across).is_some() {
+        let mut left = None;
+        for _ in 0..EVENINGS {
+            even_out(&mut passes, cutter, rates, tilting.interference, monitor)?;
+            // The touches are clear; moves between them may be no longer.
+            passes = repair_all(passes)?;
+            left = too_fast(&passes, cutter, rates);
+            if left.is_none() {
+                break;
+            }
+        }
+        notes.extend(left.map(|left| left.note()));
     }
     notes.extend(summary.notes());
     passes.retain(|pass| pass.len() >= 2);
@@ -142,11 +152,11 @@ impl LocatedPass {
         pass: &[Touch],
         tolerance: f64,
         smoothing: Option<f64>,
-        keep: Option<&Interference>,
+        rules: MoveRules<'_>,
         monitor: &dyn Monitor,
     ) -> Result<Self, PlanError> {
         let ends = [pass[0], pass[pass.len() - 1]];
-        Ok(Self { at: located(pass, tolerance, smoothing, keep, monitor)?, ends })
+        Ok(Self { at: located(pass, tolerance, smoothing, rules, monitor)?, ends })
     }
 }
 

@@ -17,6 +17,7 @@
 use super::chord::{Side, Watch, Waypoint, moved_aside, reduce, reduced_indices};
 use crate::moves::touch::Touch;
 use geometry::{Point3, Vector3};
+use std::ops::Range;
 use work::monitor::Cancelled;
 
 /// Waves shorter than this many sampling distances are smoothed. Longer ones belong to the part's shape; as
@@ -55,13 +56,13 @@ pub fn smooth_and_spread(
         return Ok(points.to_vec());
     }
     let smoothed = smoothed(points, WAVE * sampling, SHARE * tolerance, watch)?;
-    match spread(points, &smoothed, &|_, p| p, &|_, _| true, SAGITTA, tolerance, watch)? {
+    match spread(points, &smoothed, &|_, p| p, &|_, _, _| true, SAGITTA, tolerance, watch)? {
         Some(spread) => Ok(spread),
         None => reduce(points, tolerance, watch),
     }
 }
 
-/// As [`smooth_and_spread`], for a tilted cutter; `None` where that fails, or where moves would not be `clear`.
+/// As [`smooth_and_spread`], for a tilted cutter; `None` where that fails, or where moves would not `hold`: of the touches that they pass, from one touch to another.
 ///
 /// # Errors
 /// [`Cancelled`] when the watch says so.
@@ -69,7 +70,7 @@ pub fn smooth_and_spread_tilted(
     pass: &[Touch],
     sampling: f64,
     tolerance: f64,
-    clear: &dyn Fn(&Touch, &Touch) -> bool,
+    hold: &dyn Fn(Range<usize>, &Touch, &Touch) -> bool,
     watch: &mut Watch<'_>,
 ) -> Result<Option<Vec<Touch>>, Cancelled> {
     if pass.len() < 3 {
@@ -86,7 +87,7 @@ pub fn smooth_and_spread_tilted(
     };
     let mut fewest: Option<Vec<Touch>> = None;
     for sagitta in SAGITTAS_TILTED {
-        let found = spread(pass, &smoothed, &place, clear, sagitta, tolerance, watch)?;
+        let found = spread(pass, &smoothed, &place, hold, sagitta, tolerance, watch)?;
         fewest = [fewest, found].into_iter().flatten().min_by_key(Vec::len);
     }
     Ok(fewest)
@@ -187,14 +188,14 @@ fn moves_of_spline(points: &[Point3], steps: &[f64], slack: &[f64], lambda: f64)
     moved
 }
 
-/// Fewer points along `curve`, `sagitta` tolerances apart and each moved aside by half the sagittas beside it, whose moves are `clear` and stay within
+/// Fewer points along `curve`, `sagitta` tolerances apart and each moved aside by half the sagittas beside it, whose moves `hold` and stay within
 /// `tolerance` of all `points`; `None` where they do not. `place` puts the point of an index on a place of the curve. Both
 /// lists have the same length.
 fn spread<P: Waypoint>(
     points: &[P],
     curve: &[Point3],
     place: &dyn Fn(usize, Point3) -> P,
-    clear: &dyn Fn(&P, &P) -> bool,
+    hold: &dyn Fn(Range<usize>, &P, &P) -> bool,
     sagitta: f64,
     tolerance: f64,
     watch: &mut Watch<'_>,
@@ -207,8 +208,9 @@ fn spread<P: Waypoint>(
         let aside = moved_aside(curve, &knots, Side::Greater, tolerance - used);
         let tips: Vec<P> = knots.iter().zip(aside).map(|(&k, p)| place(k, p)).collect();
         let fails = |k: usize| {
-            let held = &points[knots[k]..=knots[k + 1]];
-            held.iter().any(|p| p.stray(&tips[k], &tips[k + 1]) > tolerance) || !clear(&tips[k], &tips[k + 1])
+            let passed = knots[k]..knots[k + 1] + 1;
+            let strays = |p: &P| p.stray(&tips[k], &tips[k + 1]) > tolerance;
+            points[passed.clone()].iter().any(strays) || !hold(passed, &tips[k], &tips[k + 1])
         };
         let failing: Vec<usize> = (0..knots.len() - 1).filter(|&k| fails(k)).collect();
         if failing.is_empty() {

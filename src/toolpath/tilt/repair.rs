@@ -108,6 +108,13 @@ pub fn repair(
     Ok(Repaired { passes: repairing.passes, summary: repairing.summary })
 }
 
+/// The axis nearest to that of a touch at which the tool is clear there.
+pub(super) fn nearest_clear(touch: &Touch, cutter: &Cutter, keep: &Interference) -> Option<Vector3> {
+    let none = RepairSummary::default();
+    let repairing = Repairing { cutter, keep, before: None, summary: none, passes: Vec::new() };
+    [true, false].iter().find_map(|&spare| repairing.tilt(touch, spare))
+}
+
 struct Repairing<'a> {
     cutter: &'a Cutter,
     keep: &'a Interference<'a>,

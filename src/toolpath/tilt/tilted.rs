@@ -12,6 +12,7 @@
 //! cutters a ball as large as their corner is dropped and gives contact and normal; its normal turns over an edge as the ball
 //! rolls. Beside the border of a mesh its plane goes on, because a flat rolled over an edge would lean out.
 
+use super::turning::LOST;
 use crate::moves::chord::{Side, Watch, moved_aside, reduced_indices, sample_within_chord};
 use crate::moves::smooth::smooth_and_spread_tilted;
 use crate::moves::touch::Touch;
@@ -22,6 +23,7 @@ use cutter::Cutter;
 use geometry::{Point3, Vector3};
 use motion::{AxisError, CcPoint, ClPoint, ToolAxis};
 use part::Part;
+use std::ops::Range;
 use work::monitor::{Cancelled, Monitor};
 
 /// Share of the chord tolerance that samples may stray, and that leaving samples out may add to that. A pass around the
@@ -194,80 +196,72 @@ pub(crate) fn reversed(pass: &[Touch], cutter: &Cutter, rule: &ToolAxis) -> Resu
     pass.iter().rev().map(|touch| Touch::by(rule, cutter, touch.contact, -touch.feed)).collect()
 }
 
-/// Rounds of evening out before a pass is given up on; each halves the sharpest turns at least.
-const MOST_ROUNDS: usize = 2000;
-
-/// Evens out the axes of a pass until none turns by more than `rate`, rad a mm of contact, along it; contacts stay.
-/// Returns whether that was reached.
-pub(crate) fn limit_turning(pass: &mut [Touch], cutter: &Cutter, rate: f64) -> bool {
-    let n = pass.len();
-    let way: Vec<f64> =
-        pass.windows(2).map(|w| (w[1].contact.point - w[0].contact.point).norm().max(1e-9)).collect();
-    let mut axes: Vec<Vector3> = pass.iter().map(|touch| touch.at.axis).collect();
-    let turns_too_fast =
-        |axes: &[Vector3]| (1..n).any(|k| (axes[k] - axes[k - 1]).norm() > rate * way[k - 1] * (1.0 + 1e-9));
-    let mut changed = false;
-    for _ in 0..MOST_ROUNDS {
-        if !turns_too_fast(&axes) {
-            break;
-        }
-        changed = true;
-        // Pairs that turn too fast meet half way, forth and back.
-        let mut meet = |k: usize| {
-            let (a, b) = (axes[k - 1], axes[k]);
-            let (apart, most) = ((b - a).norm(), rate * way[k - 1]);
-            if apart > most {
-                let by = 0.5 * (1.0 - most / apart);
-                let (a, b) = (a + (b - a) * by, b + (a - b) * by);
-                (axes[k - 1], axes[k]) = (a.normalize(), b.normalize());
-            }
-        };
-        (1..n).for_each(&mut meet);
-        (1..n).rev().for_each(&mut meet);
-    }
-    if changed {
-        for (touch, axis) in pass.iter_mut().zip(&axes) {
-            *touch = Touch::along(*axis, cutter, touch.contact, touch.feed);
-        }
-    }
-    !turns_too_fast(&axes)
+/// What the moves of a pass must hold besides its tolerance.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct MoveRules<'a> {
+    /// What the tool keeps away from.
+    pub keep: Option<&'a Interference<'a>>,
+    /// The axis turns by no more than this, rad a mm of contact.
+    pub turning: Option<f64>,
+    /// On the way it is no farther off the axes of the pass than this, rad.
+    pub straying: Option<f64>,
 }
 
-/// The locations that a pass needs to stay within `tolerance` of it, mm, and clear of what is to be kept away from, as far as
-/// its own moves are; smoothed and spread by `smoothing`, mm, where that is asked for and clear too.
+impl MoveRules<'_> {
+    /// Whether the move from one touch of a pass to another holds; `passed` are those from the first to the second.
+    fn hold(&self, passed: &[Touch], a: &Touch, b: &Touch) -> bool {
+        let angle = |a: &Vector3, b: &Vector3| a.cross(b).norm().atan2(a.dot(b));
+        let way = b.contact.point - a.contact.point;
+        let slow = |rate: f64| angle(&a.at.axis, &b.at.axis) <= rate * (way.norm() - LOST).max(0.0);
+        let near = |most: f64| {
+            passed.iter().all(|touch| {
+                let t = (touch.contact.point - a.contact.point).dot(&way)
+                    / way.norm_squared().max(f64::MIN_POSITIVE);
+                angle(&touch.at.axis, &a.at.towards(&b.at, t.clamp(0.0, 1.0)).axis) <= most
+            })
+        };
+        self.turning.is_none_or(slow) && self.straying.is_none_or(near) && self.clear(a, b)
+    }
+
+    fn clear(&self, a: &Touch, b: &Touch) -> bool {
+        self.keep.is_none_or(|keep| keep.on_move(&a.at, &b.at).is_none())
+    }
+}
+
+/// The locations that a pass needs to stay within `tolerance` of it, mm, and to hold the rules, as far as its own moves do;
+/// smoothed and spread by `smoothing`, mm, where that is asked for and holds them too.
 pub(crate) fn located(
     pass: &[Touch],
     tolerance: f64,
     smoothing: Option<f64>,
-    keep: Option<&Interference>,
+    rules: MoveRules<'_>,
     monitor: &dyn Monitor,
 ) -> Result<Vec<ClPoint>, Cancelled> {
-    let clear = |a: &Touch, b: &Touch| keep.is_none_or(|keep| keep.on_move(&a.at, &b.at).is_none());
+    let hold = |passed: Range<usize>, a: &Touch, b: &Touch| rules.hold(&pass[passed], a, b);
     if let Some(sampling) = smoothing
         && let Some(spread) =
-            smooth_and_spread_tilted(pass, sampling, tolerance, &clear, &mut Watch::new(monitor))?
+            smooth_and_spread_tilted(pass, sampling, tolerance, &hold, &mut Watch::new(monitor))?
     {
         return Ok(spread.into_iter().map(|touch| touch.at).collect());
     }
-    thinned(pass, tolerance, keep, monitor)
+    thinned(pass, tolerance, rules, monitor)
 }
 
-/// The locations that a pass needs to stay within `tolerance` of it, mm, and clear of what is to be kept away from, as far as
-/// its own moves are. The pass runs on both sides of the moves where they are clear so, too.
+/// The locations that a pass needs to stay within `tolerance` of it, mm, and to hold the rules, as far as its own moves do. The
+/// pass runs on both sides of the moves where they are clear so, too.
 pub(crate) fn thinned(
     pass: &[Touch],
     tolerance: f64,
-    keep: Option<&Interference>,
+    rules: MoveRules<'_>,
     monitor: &dyn Monitor,
 ) -> Result<Vec<ClPoint>, Cancelled> {
-    let clear = |a: &ClPoint, b: &ClPoint| keep.is_none_or(|keep| keep.on_move(a, b).is_none());
     let mut watch = Watch::new(monitor);
     let mut waiting = reduced_indices(pass, &|_| tolerance, &mut watch)?;
     waiting.reverse();
     let mut kept: Vec<usize> = waiting.pop().into_iter().collect();
     while let (Some(&from), Some(&to)) = (kept.last(), waiting.last()) {
         watch.step()?;
-        if to - from < 2 || clear(&pass[from].at, &pass[to].at) {
+        if to - from < 2 || rules.hold(&pass[from..=to], &pass[from], &pass[to]) {
             kept.push(to);
             waiting.pop();
         } else {
@@ -276,9 +270,9 @@ pub(crate) fn thinned(
     }
     let centres: Vec<Point3> = pass.iter().map(Touch::centre).collect();
     let aside = moved_aside(&centres, &kept, Side::Lesser, tolerance);
-    let beside: Vec<ClPoint> = kept.iter().zip(aside).map(|(&k, p)| pass[k].around(p).at).collect();
-    if beside.windows(2).all(|ends| clear(&ends[0], &ends[1])) {
-        return Ok(beside);
+    let beside: Vec<Touch> = kept.iter().zip(aside).map(|(&k, p)| pass[k].around(p)).collect();
+    if beside.windows(2).all(|ends| rules.clear(&ends[0], &ends[1])) {
+        return Ok(beside.iter().map(|touch| touch.at).collect());
     }
     Ok(kept.into_iter().map(|k| pass[k].at).collect())
 }
@@ -300,7 +294,7 @@ mod tests {
         for (cutter, lead) in [(Cutter::ball(6.0).unwrap(), 0.2), (Cutter::bull(6.0, 1.0).unwrap(), 0.1)] {
             let rule = ToolAxis::LeadTilt { lead, tilt: 0.05 };
             let touches = along(&arc, [0.0, 1.5], &cutter, &rule, 1e-3, &Silent).unwrap();
-            let kept = thinned(&touches, 6e-4, None, &Silent).unwrap();
+            let kept = thinned(&touches, 6e-4, MoveRules::default(), &Silent).unwrap();
             assert!(kept.len() < 90 && kept.len() * 2 < touches.len(), "{} of {}", kept.len(), touches.len());
             // The circle of the arc's centres comes as near to the cylinder as the arc's radius.
             let profile = *cutter.profile();
@@ -337,32 +331,12 @@ mod tests {
     }
 
     #[test]
-    fn sudden_turns_are_spread() {
-        let cutter = Cutter::ball(6.0).unwrap();
-        let touch = |k: i32| {
-            let axis = Vector3::new(if k < 50 { 0.3 } else { -0.3 }, 0.0, 1.0).normalize();
-            let contact = CcPoint { point: Point3::new(0.1 * f64::from(k), 0.0, 0.0), normal: Vector3::z() };
-            Touch::along(axis, &cutter, contact, Vector3::x())
-        };
-        let mut pass: Vec<Touch> = (0..100).map(touch).collect();
-        assert!(limit_turning(&mut pass, &cutter, 0.2));
-        for w in pass.windows(2) {
-            assert!((w[1].at.axis - w[0].at.axis).norm() <= 0.2 * 0.1 * 1.001);
-        }
-        assert_eq!(pass[0], touch(0), "far from the turn nothing changes");
-        assert!(
-            pass.iter()
-                .all(|t| (t.at.tip + t.at.axis * 3.0 - t.contact.point - Vector3::z() * 3.0).norm() < 1e-12)
-        );
-    }
-
-    #[test]
     fn smoothed_passes_need_fewer_moves_and_hold_the_tolerance() {
         for (cutter, tilt) in [(Cutter::ball(6.0).unwrap(), 0.0), (Cutter::bull(6.0, 1.0).unwrap(), 0.05)] {
             let rule = ToolAxis::LeadTilt { lead: 0.2, tilt };
             let touches = along(&arc, [0.0, 1.5], &cutter, &rule, 1e-3, &Silent).unwrap();
-            let plain = located(&touches, 6e-4, None, None, &Silent).unwrap();
-            let spread = located(&touches, 6e-4, Some(0.45), None, &Silent).unwrap();
+            let plain = located(&touches, 6e-4, None, MoveRules::default(), &Silent).unwrap();
+            let spread = located(&touches, 6e-4, Some(0.45), MoveRules::default(), &Silent).unwrap();
             assert!(spread.len() * 5 < plain.len() * 4, "{} of {}", spread.len(), plain.len());
             assert_eq!((spread.first(), spread.last()), (plain.first(), plain.last()));
             let ends: Vec<Touch> = spread.iter().map(|at| touches[0].located(*at)).collect();

@@ -8,7 +8,7 @@
 use crate::link::bend::{Cubic, End, MOST_ROLL, SAMPLING, curves};
 use crate::moves::chord::{Watch, sample_within_chord};
 use crate::moves::touch::Touch;
-use crate::tilt::tilted::{ABOVE_SURFACE, Tilting, located_sampling, thinned};
+use crate::tilt::tilted::{ABOVE_SURFACE, MoveRules, Tilting, located_sampling, thinned};
 use collision::Interference;
 use cutter::Cutter;
 use geometry::{Point2, Point3, Vector3};
@@ -65,7 +65,8 @@ impl Bent<'_> {
             if let Some(touches) =
                 self.follow(&Way::new(&curve, &plane, [a.tip.z, b.tip.z]), from, to, monitor)?
             {
-                let moves = thinned(&touches, self.thinning, Some(self.touching), monitor)?;
+                let rules = MoveRules { keep: Some(self.touching), ..MoveRules::default() };
+                let moves = thinned(&touches, self.thinning, rules, monitor)?;
                 let clear = |w: &[ClPoint]| self.touching.on_move(&w[0], &w[1]).is_none();
                 if moves.windows(2).all(clear) {
                     return Ok(Some(moves[1..].to_vec()));

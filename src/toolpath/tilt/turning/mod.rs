@@ -1,0 +1,238 @@
+//! Axes that turn no faster than asked, along passes and from pass to pass.
+//!
+//! Enters: passes as touches of the cutter, and the greatest turn, rad a mm of contact. Leaves: the same contacts with axes
+//! that hold it, near to those that came; where nothing turns too fast they stay as they are.
+//!
+//! Limits are held first, without a look at what the tool must keep clear of ([`draw`]). Where it is not clear then, axes are
+//! held at the nearest one that is, and their neighbours come to them. Where limits cannot be held so, one axis for all is
+//! tried, and where that is not clear either, what turns too fast is noted.
+
+mod draw;
+mod graph;
+
+use super::repair::nearest_clear;
+use super::tilted::ABOVE_SURFACE;
+use crate::moves::touch::Touch;
+use collision::Interference;
+use cutter::Cutter;
+use draw::{drawn, leant};
+use geometry::{Point3, Vector3};
+use graph::{Graph, Pair};
+use work::monitor::{self, Cancelled, Monitor};
+
+pub(crate) use graph::{LOST, TurningRates};
+
+/// Rounds in which axes that are not clear are held. Each holds more; what the last one leaves stays where it was.
+const ROUNDS: usize = 6;
+
+/// A pair turns too fast when it does by more than this share: below are rounding and what moves take up.
+const SLACK: f64 = 1e-3;
+
+/// Shares of the way to one axis for all, and how many axes of those that are held are tried for it.
+const LEANS: usize = 8;
+const CANDIDATES: usize = 8;
+
+/// Pairs that still turn too fast.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct TooFast {
+    /// How many.
+    pub count: usize,
+    /// The fastest, times what is allowed, and where.
+    pub worst: f64,
+    pub place: Point3,
+}
+
+impl TooFast {
+    /// In words.
+    pub fn note(&self) -> String {
+        let Self { count, worst, place: p } = self;
+        format!(
+            "At {count} contacts the axis turns faster than asked, by up to {worst:.2} times at ({:.3}, {:.3}, {:.3}): the tool \
+             stays clear only so. Allow more `turning` or `turning_across`, or lean the tool otherwise",
+            p.x, p.y, p.z
+        )
+    }
+
+    /// Of two lots.
+    pub fn and(self, other: Self) -> Self {
+        let worse = if other.worst > self.worst { other } else { self };
+        Self { count: self.count + other.count, ..worse }
+    }
+}
+
+/// Evens out the axes of passes. What the tool must keep away from may leave some that turn too fast ([`too_fast`]).
+///
+/// # Errors
+/// [`Cancelled`] when the monitor says so.
+pub(crate) fn even_out(
+    passes: &mut [Vec<Touch>],
+    cutter: &Cutter,
+    rates: TurningRates,
+    keep: Option<&Interference>,
+    monitor: &dyn Monitor,
+) -> Result<(), Cancelled> {
+    // Without limits from pass to pass each pass is evened out alone.
+    let lot = if rates.across.is_some() { passes.len() } else { 1 };
+    let lots: Vec<&[Vec<Touch>]> = passes.chunks(lot.max(1)).collect();
+    let found = work::parallel::try_map(lots.len(), |k| {
+        let touches = with_passes(lots[k]);
+        let graph = Graph::of(&touches, rates, 2.0 * cutter.radius());
+        Evening::new(touches, graph, cutter, keep).run(monitor)
+    })?;
+    let all = passes.iter_mut().flatten().zip(found.into_iter().flatten());
+    all.for_each(|(touch, evened)| *touch = evened);
+    Ok(())
+}
+
+/// What turns too fast in passes.
+pub(crate) fn too_fast(passes: &[Vec<Touch>], cutter: &Cutter, rates: TurningRates) -> Option<TooFast> {
+    let touches = with_passes(passes);
+    let graph = Graph::of(&touches, rates, 2.0 * cutter.radius());
+    let axes: Vec<Vector3> = graph.touches.iter().map(|its| touches[its.start].1.at.axis).collect();
+    among(&graph.pairs(0), &axes, &graph, &touches)
+}
+
+fn with_passes(passes: &[Vec<Touch>]) -> Vec<(usize, Touch)> {
+    passes.iter().enumerate().flat_map(|(k, pass)| pass.iter().map(move |touch| (k, *touch))).collect()
+}
+
+/// The pairs that turn too fast.
+fn among(pairs: &[Pair], axes: &[Vector3], graph: &Graph, touches: &[(usize, Touch)]) -> Option<TooFast> {
+    let one = |pair: &Pair| {
+        let (angle, most) = (pair.angle(axes), pair.most * (1.0 + SLACK) + draw::EXACT);
+        let place = touches[graph.touches[pair.node as usize].start].1.contact.point;
+        (angle > most).then(|| TooFast { count: 1, worst: angle / pair.most.max(draw::EXACT), place })
+    };
+    pairs.iter().filter_map(one).reduce(TooFast::and)
+}
+
+struct Evening<'a> {
+    /// With their passes.
+    touches: Vec<(usize, Touch)>,
+    graph: Graph,
+    cutter: &'a Cutter,
+    keep: Option<&'a Interference<'a>>,
+    /// Touches at which the tool has nothing to spare as they came, and need have none.
+    tight: Vec<bool>,
+}
+
+impl<'a> Evening<'a> {
+    fn new(
+        touches: Vec<(usize, Touch)>,
+        graph: Graph,
+        cutter: &'a Cutter,
+        keep: Option<&'a Interference<'a>>,
+    ) -> Self {
+        let is_tight = |k: usize| keep.is_some_and(|keep| !keep.holds(&touches[k].1.at, true));
+        let tight = work::parallel::map(touches.len(), is_tight);
+        Self { touches, graph, cutter, keep, tight }
+    }
+
+    fn run(&self, monitor: &dyn Monitor) -> Result<Vec<Touch>, Cancelled> {
+        let start: Vec<Vector3> =
+            self.graph.touches.iter().map(|its| self.touches[its.start].1.at.axis).collect();
+        let (mut axes, held) = self.clear_axes(&start, monitor)?;
+        let pairs = self.graph.pairs(0);
+        if let Some(left) = self.too_fast(&pairs, &axes) {
+            if let Some(one) = self.towards_one(&pairs, &axes, &held, monitor)? {
+                axes = one;
+            } else if self.too_fast(&pairs, &start).is_some_and(|before| before.worst < left.worst) {
+                axes = start;
+            }
+        }
+        let mut touches: Vec<Touch> = self.touches.iter().map(|(_, touch)| *touch).collect();
+        for (its, axis) in self.graph.touches.iter().zip(&axes) {
+            for touch in &mut touches[its.clone()] {
+                if touch.at.axis != *axis {
+                    *touch = self.turned(touch, *axis);
+                }
+            }
+        }
+        Ok(touches)
+    }
+
+    fn turned(&self, touch: &Touch, axis: Vector3) -> Touch {
+        Touch::along(axis, self.cutter, touch.contact, touch.feed)
+    }
+
+    /// Whether the tool is clear at all touches of a node, with something to spare for the moves between them.
+    fn is_clear(&self, node: usize, axis: Vector3) -> bool {
+        self.graph.touches[node].clone().all(|k| {
+            let touch = &self.touches[k].1;
+            axis == touch.at.axis
+                || (axis.dot(&touch.contact.normal) > ABOVE_SURFACE
+                    && self.keep.is_none_or(|keep| keep.holds(&self.turned(touch, axis).at, !self.tight[k])))
+        })
+    }
+
+    /// Clear axes that hold the limits as far as those do that had to be held, and which those are.
+    fn clear_axes(
+        &self,
+        start: &[Vector3],
+        monitor: &dyn Monitor,
+    ) -> Result<(Vec<Vector3>, Vec<bool>), Cancelled> {
+        let (mut wanted, mut held) = (start.to_vec(), vec![false; start.len()]);
+        for _ in 1..ROUNDS {
+            let axes = drawn(&self.graph, &wanted, &held, monitor)?;
+            let instead = work::parallel::try_map(axes.len(), |k| {
+                monitor::check(monitor)?;
+                let clear = held[k] || self.is_clear(k, axes[k]);
+                Ok::<_, Cancelled>((!clear).then(|| self.nearest(k, axes[k], start[k])))
+            })?;
+            if instead.iter().all(Option::is_none) {
+                return Ok((axes, held));
+            }
+            for (k, axis) in instead.into_iter().enumerate().filter_map(|(k, axis)| Some((k, axis?))) {
+                (wanted[k], held[k]) = (axis, true);
+            }
+        }
+        let mut axes = drawn(&self.graph, &wanted, &held, monitor)?;
+        let clear = work::parallel::map(axes.len(), |k| held[k] || self.is_clear(k, axes[k]));
+        for k in (0..axes.len()).filter(|&k| !clear[k]) {
+            axes[k] = start[k];
+        }
+        Ok((axes, held))
+    }
+
+    /// The clear axis nearest to a wanted one, or that at the start.
+    fn nearest(&self, node: usize, wanted: Vector3, start: Vector3) -> Vector3 {
+        let touch = self.turned(&self.touches[self.graph.touches[node].start].1, wanted);
+        let found = self.keep.and_then(|keep| nearest_clear(&touch, self.cutter, keep));
+        let nearer = |axis: &Vector3| axis.dot(&wanted) > start.dot(&wanted) && self.is_clear(node, *axis);
+        found.filter(nearer).unwrap_or(start)
+    }
+
+    /// Axes that lean towards one and the same as far as it takes to hold the limits, where the tool is clear so.
+    fn towards_one(
+        &self,
+        pairs: &[Pair],
+        axes: &[Vector3],
+        held: &[bool],
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Vec<Vector3>>, Cancelled> {
+        let chosen: Vec<Vector3> =
+            axes.iter().zip(held).filter(|(_, held)| **held).map(|(axis, _)| *axis).collect();
+        let means = [&chosen[..], axes].map(|some| some.iter().sum::<Vector3>().try_normalize(1e-6));
+        let some = chosen.iter().copied().step_by(chosen.len().div_ceil(CANDIDATES).max(1));
+        for one in means.into_iter().flatten().chain(some) {
+            for lean in 1..=LEANS {
+                monitor::check(monitor)?;
+                let share = lean as f64 / LEANS as f64;
+                let leaning: Vec<Vector3> = axes.iter().map(|axis| leant(*axis, one, share)).collect();
+                if self.too_fast(pairs, &leaning).is_none()
+                    && (0..leaning.len()).all(|k| self.is_clear(k, leaning[k]))
+                {
+                    return Ok(Some(leaning));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    fn too_fast(&self, pairs: &[Pair], axes: &[Vector3]) -> Option<TooFast> {
+        among(pairs, axes, &self.graph, &self.touches)
+    }
+}
+
+#[cfg(test)]
+mod tests;
