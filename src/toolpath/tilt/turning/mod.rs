@@ -32,6 +32,9 @@ const SLACK: f64 = 1e-3;
 const LEANS: usize = 8;
 const CANDIDATES: usize = 8;
 
+/// Steps towards the middle of all normals, which is off by the inverse of that, rad.
+const MIDDLES: usize = 100;
+
 /// Pairs that still turn too fast.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct TooFast {
@@ -94,6 +97,17 @@ pub(crate) fn too_fast(passes: &[Vec<Touch>], cutter: &Cutter, rates: TurningRat
 
 fn with_passes(passes: &[Vec<Touch>]) -> Vec<(usize, Touch)> {
     passes.iter().enumerate().flat_map(|(k, pass)| pass.iter().map(move |touch| (k, *touch))).collect()
+}
+
+/// The direction whose greatest angle to all normals is about the least (M. Badoiu and K. L. Clarkson, "Smaller core-sets for
+/// balls", 2003).
+fn above_all(normals: &[Vector3]) -> Option<Vector3> {
+    let mut middle = *normals.first()?;
+    for k in 1..MIDDLES {
+        let farthest = normals.iter().min_by(|a, b| a.dot(&middle).total_cmp(&b.dot(&middle)))?;
+        middle = (middle + (farthest - middle) / (k + 1) as f64).try_normalize(1e-6)?;
+    }
+    Some(middle)
 }
 
 /// The pairs that turn too fast.
@@ -212,9 +226,11 @@ impl<'a> Evening<'a> {
     ) -> Result<Option<Vec<Vector3>>, Cancelled> {
         let chosen: Vec<Vector3> =
             axes.iter().zip(held).filter(|(_, held)| **held).map(|(axis, _)| *axis).collect();
+        let normals: Vec<Vector3> = self.touches.iter().map(|(_, touch)| touch.contact.normal).collect();
         let means = [&chosen[..], axes].map(|some| some.iter().sum::<Vector3>().try_normalize(1e-6));
+        let means = means.into_iter().chain([above_all(&normals)]);
         let some = chosen.iter().copied().step_by(chosen.len().div_ceil(CANDIDATES).max(1));
-        for one in means.into_iter().flatten().chain(some) {
+        for one in means.flatten().chain(some) {
             for lean in 1..=LEANS {
                 monitor::check(monitor)?;
                 let share = lean as f64 / LEANS as f64;
