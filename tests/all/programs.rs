@@ -214,7 +214,7 @@ fn wrong_offsets_and_lengths_show() {
 #[test]
 fn what_cannot_be_read_is_refused_with_line_and_cure() {
     let cases: [(&str, &[&str]); 9] = [
-        ("G1 X1 F1\nG41 D1 X2", &["job.nc:2:1", "longer than the cutter's radius of 3.0000 mm", "help:"]),
+        ("G1 X1 F1\nG41 D1 X2", &["job.nc:2:1", "must be straight and longer than", "help:"]),
         ("G1 X1 F1\nG2 X5 I1", &["job.nc:2:4", "the arc starts 1.0000 mm from its centre and ends 3.0000"]),
         ("G1 X1 F1\nG1 X[1/0]", &["job.nc:2:7", "division by zero"]),
         ("N1 G4\nGOTO 1", &["still running"]),
@@ -326,7 +326,7 @@ fn passes_as_far_apart_as_cells_leave_ridges_of_one_height() {
         assert!(step < 0.1 || (number("mean_mm") / closed - 1.0).abs() < 0.01, "{step}: {scallop}");
         assert_eq!(scallop["over_target_fraction"], 0.0);
         let ridges = number("ridge_length_mm") / (SIZE[0] * (SIZE[1] / step).floor());
-        assert!((ridges - 1.0).abs() < 0.03, "{step}: {ridges}");
+        assert!((ridges - 1.0).abs() < 0.05, "{step}: {ridges}");
     }
 }
 
