@@ -10,9 +10,10 @@
 //! Only the chip that is just being cut begins as thin as one likes. So what the path cleared just before is taken as it is,
 //! as far back as it would hide the sides of a straight slot.
 //!
-//! What lies within r − h of a segment, seen from the middle of a stretch of length 2h, lies within r of it from all of the
-//! stretch. So the same calculation with a lesser radius bounds the angle on the whole stretch; stretches are halved until
-//! the bound is near the greatest angle that was found.
+//! A stadium is convex. So what lies in it as seen from both ends of a stretch lies in it as seen from everywhere between, and
+//! the same calculation from both ends bounds the angle on the whole stretch. What it loses are places that one segment clears
+//! at one end and the next segment at the other: a layer whose depth is of second order. Stretches are halved until the bound
+//! is near the greatest angle that was found.
 //!
 //! Moves are taken in blocks, one after the other. What was cleared well before a block and lies whole in what else was is left
 //! out from then on: loops and passes over cleared ground are most of a long path.
@@ -100,12 +101,15 @@ pub fn contact_arcs(
         cleared.thin(first);
         let count_of = BLOCK.min(path.len() - first);
         let stretches: Vec<_> = (first..first + count_of).map(|k| cleared.stretches(path, top, k)).collect();
+        let near = work::parallel::try_map(count_of, |k| {
+            monitor::check(monitor)?;
+            Ok(if stretches[k].is_empty() { Vec::new() } else { cleared.near_move(first + k) })
+        })?;
         of_moves.extend(work::parallel::try_map(count_of, |k| {
             monitor::check(monitor)?;
-            let stretches = &stretches[k];
-            let begin = stretches.first().map_or(0.0, |first| cleared.at(first, -first.half));
-            let found = |s: &Stretch| cleared.at(s, 0.0).max(cleared.at(s, s.half));
-            Ok(stretches.iter().map(found).fold(begin, f64::max))
+            let (stretches, near) = (&stretches[k], &near[k]);
+            let begin = stretches.first().map_or(0.0, |first| cleared.at(first, -first.half, near));
+            Ok(stretches.iter().map(|s| cleared.at(s, s.half, near)).fold(begin, f64::max))
         })?);
         let counted: Vec<bool> = path.moves[first..first + count_of].iter().map(count).collect();
         let greatest_of = |found: &[f64]| {
@@ -116,7 +120,7 @@ pub fn contact_arcs(
         let bounds = work::parallel::try_map(count_of, |k| {
             monitor::check(monitor)?;
             let of_counted = stretches[k].iter().filter(|_| counted[k]);
-            let each = of_counted.map(|stretch| cleared.bounded(stretch, greatest, HALVINGS));
+            let each = of_counted.map(|stretch| cleared.bounded(stretch, &near[k], greatest, HALVINGS));
             Ok(each.fold([0.0f64; 2], |most, one| [0, 1].map(|side| most[side].max(one[side]))))
         })?;
         for (k, [least, most]) in bounds.into_iter().enumerate() {
@@ -141,8 +145,6 @@ struct Stretch {
     half: f64,
     /// The way gone up to its middle, mm.
     gone: f64,
-    /// Height of the tip, mm.
-    z: f64,
 }
 
 impl Stretch {
@@ -253,7 +255,7 @@ impl Swept {
         if settled - thinned < left + FEW {
             return;
         }
-        // Stretches are half so long at most: their lesser radius sees no gap either.
+        // From both ends of a stretch the same segment covers a place.
         let within = ((1.0 - MARGIN - 0.5 * STRETCH) * self.radius).powi(2);
         let mut live = vec![false; settled];
         self.buckets
@@ -315,55 +317,75 @@ impl Swept {
         (0..count as usize)
             .map(|i| {
                 let to = (2 * i + 1) as f64 * half;
-                Stretch { middle: a + heading * to, heading, half, gone: gone[0] + to, z }
+                Stretch { middle: a + heading * to, heading, half, gone: gone[0] + to }
             })
             .collect()
     }
 
     /// The angle so far from the middle of a stretch, mm.
-    fn at(&self, stretch: &Stretch, by: f64) -> f64 {
+    fn at(&self, stretch: &Stretch, by: f64, near: &[u32]) -> f64 {
         let (middle, gone) = (stretch.middle + stretch.heading * by, stretch.gone + by);
-        self.standing(&Stretch { middle, gone, half: 0.0, ..*stretch })
+        self.standing(&Stretch { middle, gone, half: 0.0, ..*stretch }, near)
     }
 
     /// What the angle is at least and at most on a stretch, as far as it exceeds `enough`.
-    fn bounded(&self, stretch: &Stretch, enough: f64, halvings: u32) -> [f64; 2] {
-        let most = self.standing(stretch);
+    fn bounded(&self, stretch: &Stretch, near: &[u32], enough: f64, halvings: u32) -> [f64; 2] {
+        let most = self.standing(stretch, near);
         if most <= enough + PRECISE {
             return [0.0, most.max(enough)];
         }
-        let here = self.at(stretch, 0.0);
+        let here = self.at(stretch, 0.0, near);
         // One that stands so high all along need not be divided for its bound.
         if halvings == 0 || most - here <= PRECISE {
             return [here, most];
         }
-        let [a, b] = stretch.halves().map(|half| self.bounded(&half, enough, halvings - 1));
+        let [a, b] = stretch.halves().map(|half| self.bounded(&half, near, enough, halvings - 1));
         [here.max(a[0]).max(b[0]), a[1].max(b[1])]
     }
 
     /// The angle of the front half of the circumference in stock, at most anywhere on a stretch.
-    fn standing(&self, stretch: &Stretch) -> f64 {
+    fn standing(&self, stretch: &Stretch, near: &[u32]) -> f64 {
         let gone = stretch.gone - stretch.half;
         let before = gone - self.fresh;
-        let own = (1.0 - TOUCHING) * self.radius - stretch.half;
-        let earlier = (1.0 + FILM) * self.radius - stretch.half;
+        let (own, earlier) = ((1.0 - TOUCHING) * self.radius, (1.0 + FILM) * self.radius);
         let mut front = Front::new(self.radius);
-        self.each_near(&stretch.middle, self.radius + earlier, |k| {
-            let segment = &self.segments[k];
-            if segment.gone[0] > gone || front.standing.is_empty() {
-                return false;
-            }
-            if segment.z > stretch.z + ENGAGED {
-                return true;
+        for &k in near {
+            let segment = &self.segments[k as usize];
+            if segment.gone[0] > gone {
+                continue;
             }
             for (ways, radius) in [([f64::NEG_INFINITY, before], earlier), ([before, gone], own)] {
                 if let Some(ends) = segment.between(ways) {
-                    front.clear(&ends.map(|p| stretch.seen(&p)), radius);
+                    front.clear(&ends.map(|p| stretch.seen(&p)), radius, stretch.half);
                 }
             }
-            true
-        });
+            if front.standing.is_empty() {
+                return 0.0;
+            }
+        }
         front.standing.iter().map(|[from, to]| to - from).sum()
+    }
+
+    /// The segments up to move `k` that a place of it can meet, the last first: the ground next to a place was mostly cleared
+    /// last, and what it leaves standing is soon so little that most others are passed over.
+    fn near_move(&self, k: usize) -> Vec<u32> {
+        let Segment { ends: [a, b], z, .. } = self.segments[k];
+        let (middle, reach) = (a + 0.5 * (b - a), (2.0 + FILM) * self.radius + 0.5 * (b - a).norm());
+        let mut near = Vec::new();
+        self.each_near(&middle, reach, |other| {
+            let segment = &self.segments[other];
+            let ends = segment.ends.map(|p| p - middle);
+            if other <= k
+                && segment.z <= z + ENGAGED
+                && square_distance(&Vector2::zeros(), &ends) <= reach * reach
+            {
+                near.push(other as u32);
+            }
+            other <= k
+        });
+        near.sort_unstable_by(|a, b| b.cmp(a));
+        near.dedup();
+        near
     }
 }
 
@@ -413,15 +435,22 @@ impl Front {
         Vector2::new(cos, sin) * self.rim
     }
 
-    /// Clears what is nearer than `radius` to a segment.
-    fn clear(&mut self, ends: &[Vector2; 2], radius: f64) {
-        if ends[0].x.max(ends[1].x) + radius <= 0.0 || !self.may_clear(ends, radius) {
+    /// Clears what is nearer than `radius` to a segment wherever the circle is between `half` behind and `half` ahead.
+    fn clear(&mut self, ends: &[Vector2; 2], radius: f64, half: f64) {
+        let behind = ends.map(|end| end + Vector2::new(half, 0.0));
+        if behind[0].x.max(behind[1].x) + radius <= 0.0 || !self.may_clear(ends, radius) {
             return;
         }
-        let mut angles = self.crossings(ends, radius);
+        let ahead = ends.map(|end| end - Vector2::new(half, 0.0));
+        let mut angles = self.crossings(&behind, radius);
+        if half > 0.0 {
+            angles.extend(self.crossings(&ahead, radius));
+        }
+        let clears =
+            |p: Vector2| [behind, ahead].iter().all(|ends| square_distance(&p, ends) < radius * radius);
         angles.sort_by(f64::total_cmp);
         let Some(&first) = angles.first() else {
-            if square_distance(&self.at(0.0), ends) < radius * radius {
+            if clears(self.at(0.0)) {
                 self.standing.clear();
             }
             return;
@@ -429,7 +458,7 @@ impl Front {
         let mut taken = false;
         for k in 0..angles.len() {
             let (from, to) = (angles[k], angles.get(k + 1).copied().unwrap_or(first + TAU));
-            if square_distance(&self.at(0.5 * (from + to)), ends) < radius * radius {
+            if clears(self.at(0.5 * (from + to))) {
                 for turn in [-TAU, 0.0, TAU] {
                     taken |= self.take(from + turn, to + turn);
                 }

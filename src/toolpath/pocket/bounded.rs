@@ -23,7 +23,7 @@ use work::monitor::{Cancelled, Monitor, check};
 
 /// Places of the way are this share of the radius apart: the chip between two is seen, and the cusp between
 /// their discs is a tenth of a film.
-const STEP: f64 = 0.08;
+pub(super) const STEP: f64 = 0.08;
 
 /// Before the limit the way is gone by steps down to this share of the radius.
 const FINEST: f64 = 0.005;
@@ -320,7 +320,7 @@ impl Walker<'_> {
             }
             let next = (s + step).min(to).min(corner);
             let at = self.way.at(next);
-            if forced || self.arc_at(next) <= self.bounds.limit {
+            if forced || (self.arc_at(next) <= self.bounds.limit && self.keeps_on(s, next)) {
                 self.out.extend(self.way.corners_between(s, next));
                 self.place(next, at);
                 s = next;
@@ -353,6 +353,11 @@ impl Walker<'_> {
         self.cleared.arc(&self.way.at(s), &heading, self.fresh_from(s))
     }
 
+    /// Whether the way between two places keeps to the limit.
+    fn keeps_on(&self, s: f64, next: f64) -> bool {
+        self.cleared.keeps(&self.way.at(s), &self.way.at(next), self.bounds.limit, self.fresh_from(next))
+    }
+
     /// The first place that is beside the chip of a move at `s`.
     fn fresh_from(&self, s: f64) -> usize {
         let behind = self.marks.partition_point(|m| m.s < s - FRESH * self.radius);
@@ -365,7 +370,7 @@ impl Walker<'_> {
         /// Layers over a film. Greater might be more than one, where chords meet.
         const LAYER: f64 = 0.9;
         /// Longer ways, over the radius, are no corner's last bit.
-        const MOST: f64 = 0.06;
+        const MOST: f64 = 0.12;
         /// Half the way back and forth over the radius: what was cut farther behind is no chip of its own any more.
         const BACK: f64 = 0.06;
         /// Cosine of the turn in a corner of walls. Bends that are less sharp have room for loops beyond them.

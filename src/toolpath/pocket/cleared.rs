@@ -7,20 +7,26 @@
 //! The heading is that of the straight side that the cutter runs. In a small loop it differs from the circle's by half the
 //! angle between two sides. So thinning keeps the headings.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, SQRT_2, TAU};
 
 use geometry::{DiscSamples, Point2, Vector2};
 
 /// Stock thinner than this share of the radius counts as none: where the cutter passes along ground that
 /// it has cut before, chords and rounding leave films that load nothing. More would hide real stock: beside
 /// a straight pass an angle `a` is seen smaller by up to `FILM / sin a`.
-pub(super) const FILM: f64 = 0.004;
+pub(super) const FILM: f64 = 0.003;
 
 /// Margin over the radius by which a disc must be covered to be left out. Greater is quicker, and leaves more discs.
 const MARGIN: f64 = 0.1;
 
+/// Between two places the angle may exceed the limit by so much, rad, which limits of plans have to spare; and so many parts
+/// of a move are looked at where that is not sure.
+const BETWEEN: f64 = 0.02;
+const BETWEEN_PLACES: usize = 8;
+
 /// Parts of the front half circle that are told apart.
-const PARTS: usize = 192;
+const PARTS: usize = 576;
+const PART: f64 = PI / PARTS as f64;
 
 /// No more buckets than this along a side.
 const MAX_SIDE: f64 = 1024.0;
@@ -48,6 +54,11 @@ impl Cleared {
     /// How many places there are.
     pub fn len(&self) -> usize {
         self.discs.len()
+    }
+
+    /// The places whose discs make up the ground.
+    pub fn places(&self) -> &[Point2] {
+        &self.discs
     }
 
     fn column(&self, axis: usize, at: f64) -> usize {
@@ -117,34 +128,64 @@ impl Cleared {
     /// rad. Films are left out but beside the places from `fresh` on: the chip of the move itself begins as
     /// thin as one.
     pub fn arc(&self, centre: &Point2, heading: &Vector2, fresh: usize) -> f64 {
+        self.front(centre, heading, 0.0, fresh).angle()
+    }
+
+    /// Whether a straight move keeps to a limit all along but for [`BETWEEN`]: tips of stock may be passed between its ends. A
+    /// disc is convex: what it clears from both ends, it clears from everywhere between. Where that is not enough, places close
+    /// to each other are asked.
+    pub fn keeps(&self, from: &Point2, to: &Point2, limit: f64, fresh: usize) -> bool {
+        let (along, length) = (to - from, (to - from).norm());
+        if length == 0.0 {
+            return true;
+        }
+        let (heading, most) = (along / length, limit + BETWEEN);
+        let at = |k: usize| from + along * (k as f64 / BETWEEN_PLACES as f64);
+        self.front(&at(BETWEEN_PLACES / 2), &heading, 0.5 * length, fresh).angle() <= most
+            || (1..BETWEEN_PLACES).all(|k| self.arc(&at(k), &heading, fresh) <= most)
+    }
+
+    fn front(&self, centre: &Point2, heading: &Vector2, half: f64, fresh: usize) -> Arc {
         let r = self.radius;
         let mut standing = Arc::FRONT;
+        // The middle of what stands, as seen from the centre, and how far that reaches from there.
+        let (mut middle, mut reaches) = (heading * r, r * SQRT_2);
         let reach = Vector2::new(2.0, 2.0) * (r * (1.0 + FILM));
         let (lo, hi) = (centre - reach - self.origin, centre + reach - self.origin);
         for j in self.column(1, lo.y)..=self.column(1, hi.y) {
             for i in self.column(0, lo.x)..=self.column(0, hi.x) {
-                for &k in &self.buckets[j * self.side[0] + i] {
+                // The last ground leaves so little standing that most of the older is passed over.
+                for &k in self.buckets[j * self.side[0] + i].iter().rev() {
                     let grown = if (k as usize) < fresh { r * (1.0 + FILM) } else { r };
                     let to = self.discs[k as usize] - centre;
-                    let square = to.norm_squared();
-                    if square >= (r + grown).powi(2) {
+                    if (to - middle).norm_squared() >= (grown + reaches + half).powi(2) {
                         continue;
                     }
-                    let away = square.sqrt();
-                    let cos = (r * r + square - grown * grown) / (2.0 * r * away);
-                    if cos <= -1.0 || away <= grown - r {
-                        return 0.0;
+                    let seen = |to: Vector2| {
+                        let (square, away) = (to.norm_squared(), to.norm());
+                        let cos = (r * r + square - grown * grown) / (2.0 * r * away);
+                        let all = cos <= -1.0 || away <= grown - r;
+                        let half = if all { PI } else { cos.min(1.0).acos() };
+                        let towards = heading.perp(&to).atan2(heading.dot(&to));
+                        [towards - half, towards + half]
+                    };
+                    let [mut from, mut until] = seen(to + heading * half);
+                    if half > 0.0 {
+                        let [other_from, other_until] = seen(to - heading * half);
+                        // Both are about nearly the same direction.
+                        let turn = (0.5 * (from + until - other_from - other_until) / TAU).round() * TAU;
+                        (from, until) = (from.max(other_from + turn), until.min(other_until + turn));
                     }
-                    let half = cos.min(1.0).acos();
-                    let towards = heading.perp(&to).atan2(heading.dot(&to));
-                    standing.clear(towards - half, towards + half);
-                    if standing.is_empty() {
-                        return 0.0;
+                    if from < until && standing.clear(from, until) {
+                        let Some([from, to]) = standing.ends() else { return Arc::NONE };
+                        let (sin, cos) = (0.5 * (from + to)).sin_cos();
+                        middle = (heading * cos + Vector2::new(-heading.y, heading.x) * sin) * r;
+                        reaches = 2.0 * r * (0.25 * (to - from)).sin();
                     }
                 }
             }
         }
-        standing.angle()
+        standing
     }
 }
 
@@ -153,10 +194,11 @@ struct Arc([u64; PARTS / 64]);
 
 impl Arc {
     const FRONT: Self = Self([u64::MAX; PARTS / 64]);
+    const NONE: Self = Self([0; PARTS / 64]);
 
-    /// Clears the parts whose middles lie between two angles from the heading, less than a turn apart.
-    fn clear(&mut self, from: f64, to: f64) {
-        const PART: f64 = PI / PARTS as f64;
+    /// Clears the parts whose middles lie between two angles from the heading, less than a turn apart; whether any stood.
+    fn clear(&mut self, from: f64, to: f64) -> bool {
+        let mut stood = false;
         for turn in [-TAU, 0.0, TAU] {
             let (a, b) = ((from + turn + FRAC_PI_2) / PART - 0.5, (to + turn + FRAC_PI_2) / PART - 0.5);
             if b < 0.0 || a > (PARTS - 1) as f64 {
@@ -167,14 +209,22 @@ impl Arc {
                 let low = first.saturating_sub(64 * word).min(64);
                 let high = (last + 1).saturating_sub(64 * word).min(64);
                 if low < high {
-                    self.0[word] &= !((u64::MAX >> (64 - (high - low))) << low);
+                    let cleared = (u64::MAX >> (64 - (high - low))) << low;
+                    stood |= self.0[word] & cleared != 0;
+                    self.0[word] &= !cleared;
                 }
             }
         }
+        stood
     }
 
-    fn is_empty(&self) -> bool {
-        self.0.iter().all(|w| *w == 0)
+    /// Where what stands begins and ends, rad from the heading.
+    fn ends(&self) -> Option<[f64; 2]> {
+        let first = self.0.iter().position(|w| *w != 0)?;
+        let last = self.0.iter().rposition(|w| *w != 0)?;
+        let from = 64 * first as u32 + self.0[first].trailing_zeros();
+        let to = 64 * (last as u32 + 1) - self.0[last].leading_zeros();
+        Some([from, to].map(|part| f64::from(part) * PART - FRAC_PI_2))
     }
 
     fn angle(&self) -> f64 {
@@ -201,25 +251,23 @@ mod tests {
     #[test]
     fn angles_are_those_of_closed_forms() {
         let x = Vector2::new(1.0, 0.0);
-        let near = |found: f64, exact: f64| {
-            let film = 3.0 * FILM / (3.0 * exact.sin().max(0.3));
-            assert!(
-                found <= exact + PI / PARTS as f64 && found > exact - film - PI / PARTS as f64,
-                "{found} {exact}"
-            );
+        // A film is as much stock as the angle turns by it: `by` times that beside a straight pass.
+        let near = |found: f64, exact: f64, by: f64| {
+            let film = by * FILM / exact.sin().max(0.3);
+            assert!(found <= exact + PART && found > exact - film - PART, "{found} {exact}");
         };
         let slot = cleared(line(Point2::new(-15.0, 0.0), Point2::new(0.0, 0.0)));
         assert!(slot.arc(&Point2::new(0.05, 0.0), &x, 0) > PI - 0.04);
         for width in [0.5f64, 1.5, 3.0, 4.5] {
             let beside = cleared(line(Point2::new(-15.0, width), Point2::new(15.0, width)));
-            near(beside.arc(&Point2::new(0.0, 0.0), &x, usize::MAX), (1.0 - width / 3.0).acos());
+            near(beside.arc(&Point2::new(0.0, 0.0), &x, usize::MAX), (1.0 - width / 3.0).acos(), 1.0);
         }
         // The cleared disc of radius 3 + 2, and a place at 2.3 from its middle, going around it.
         let ring = (0..600).map(|k| TAU * f64::from(k) / 600.0);
         let ring = cleared(ring.map(|a| Point2::new(a.cos(), a.sin()) * 2.0));
         let (rho, width) = (2.3f64, 0.3f64);
         let exact = (1.0 - (width * (rho + 3.0) - 0.5 * width * width) / (rho * 3.0)).acos();
-        near(ring.arc(&Point2::new(0.0, -2.3), &x, usize::MAX), exact);
+        near(ring.arc(&Point2::new(0.0, -2.3), &x, usize::MAX), exact, (rho + 3.0 - width) / rho);
         // A place that is cleared already, and one that is not.
         assert_eq!(ring.arc(&Point2::new(0.5, 0.5), &x, usize::MAX), 0.0);
         assert_eq!(ring.arc(&Point2::new(12.0, 0.5), &x, usize::MAX), PI);
@@ -248,6 +296,23 @@ mod tests {
         assert!(left_out > 12_000 && ground.len() == 40 * 401 - left_out, "{left_out}");
         assert_eq!(arcs(&ground, fresh - left_out), before);
         assert!(before.iter().any(|arc| *arc > 0.0 && *arc < PI));
+    }
+
+    /// A straight pass keeps to its angle all along. A post of stock is passed between two places that do not see it.
+    #[test]
+    fn what_stands_between_two_places_is_seen() {
+        let (x, exact) = (Vector2::new(1.0, 0.0), 0.5f64.acos());
+        let beside = cleared(line(Point2::new(-15.0, 1.5), Point2::new(15.0, 1.5)));
+        let (a, b) = (Point2::new(-0.12, 0.0), Point2::new(0.12, 0.0));
+        assert!(beside.keeps(&a, &b, exact, usize::MAX) && !beside.keeps(&a, &b, exact - 0.1, usize::MAX));
+        // On the circle of a cutter at the origin, ten degrees ahead of its right.
+        let (sin, cos) = 80f64.to_radians().sin_cos();
+        let post = Point2::new(3.0 * cos, -3.0 * sin);
+        let around = (0..2000).map(|k| TAU * f64::from(k) / 2000.0);
+        let ground = cleared(around.map(|a| post + Vector2::new(a.cos(), a.sin()) * 3.07));
+        let (a, b) = (Point2::new(-0.5, 0.0), Point2::new(0.8, 0.0));
+        assert_eq!([a, b].map(|p| ground.arc(&p, &x, usize::MAX)), [0.0; 2]);
+        assert!(!ground.keeps(&a, &b, 0.0, usize::MAX) && ground.keeps(&a, &b, 0.05, usize::MAX));
     }
 
     #[test]

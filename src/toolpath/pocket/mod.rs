@@ -4,8 +4,8 @@
 //! drawn in by the cutter's radius. Passes there are level curves of a flow that follows walls and islands
 //! (or offsets of them, or parallel lines), cut from the inside outwards, so that only the first pass of
 //! each nest is a slot; each nest is entered by a helix where there is room, else by a ramp along its first
-//! pass. Where an engagement is asked for, passes that turn toward the stock lie closer, loops clear first
-//! passes, corners and necks, and a helix opens every run that would begin in stock (`bounded`). Every finished move keeps to
+//! pass. Where an engagement is asked for, passes go along the border of the stock instead, which they turn into as far as
+//! the limit allows (`peel`), and what they leave is found and cleared by loops (`rest`, `bounded`). Every finished move keeps to
 //! the exact region (`walls`). The design's frame: z = 0 is the upper face, the floor lies at minus the depth; mm.
 
 mod bounded;
@@ -14,6 +14,8 @@ mod descend;
 mod feed;
 mod lines;
 mod nest;
+mod peel;
+mod rest;
 mod route;
 pub(crate) mod strategy;
 #[cfg(test)]
@@ -32,7 +34,7 @@ use turning::Turning;
 use crate::plan::Plan;
 use crate::vocabulary::{PlanError, PlanSettings, Strategy};
 use cutter::Cutter;
-use geometry::{Piece, Point2, Region, SegmentGrid, Vector2};
+use geometry::{Piece, Point2, Region, SegmentGrid};
 use motion::ROUNDING;
 use work::monitor::{self, Cancelled, Monitor};
 
@@ -127,9 +129,19 @@ pub fn plan_pocket(
         );
     }
     let step = strategy.stepover(settings.step, radius);
+    let mut ground = pocket.region.bounds().map(|around| Cleared::new(around, radius));
+    let rules = strategy.rules(radius);
+    let mut peeled: Vec<Run> = Vec::new();
     let mut groups: Vec<(&Piece, Vec<Run>)> = Vec::new();
     for piece in &rough.pieces {
         monitor::check(monitor)?;
+        if let (Some(rules), Some(ground), true) = (&rules, &mut ground, strategy.pattern.peels())
+            && let Some(clearing) = rest::clear(piece, ground, rules, monitor)?
+        {
+            peeled.extend(clearing.peeled);
+            groups.push((piece, clearing.rest));
+            continue;
+        }
         let runs = piece_runs(piece, cutter, strategy, step, &mut notes, monitor)?;
         groups.push((piece, runs));
     }
@@ -155,17 +167,12 @@ pub fn plan_pocket(
         pocket.region.area()
     ));
     kept(&mut groups, monitor)?;
-    if let Some(limit) = strategy.bounded() {
-        let bounds = Turning { limit, radius };
-        let sides = match strategy.pattern {
-            Pattern::Zigzag { angle } => bounded::Sides::Toward(Vector2::new(-angle.sin(), angle.cos())),
-            Pattern::Flow(_) | Pattern::Offset { .. } => bounded::Sides::Left,
-        };
-        let rules = bounded::Rules { bounds, sides, helix: strategy.helix(radius) };
-        bound_runs(&mut groups, pocket, &rules, &mut notes, monitor)?;
+    if let Some(rules) = &rules {
+        bound_runs(&mut groups, &mut ground, rules, &mut notes, monitor)?;
         kept(&mut groups, monitor)?;
     }
-    let mut runs: Vec<Run> = groups.into_iter().flat_map(|group| group.1).collect();
+    let mut runs = peeled;
+    runs.extend(groups.into_iter().flat_map(|group| group.1));
     let turn = strategy.bounded().map_or(std::f64::consts::PI, |_| MOST_TURN);
     let walls = walls::Walls::new(&pocket.region, off - walls::ROUNDING);
     for run in &mut runs {
@@ -192,18 +199,17 @@ fn kept(groups: &mut [(&Piece, Vec<Run>)], monitor: &dyn Monitor) -> Result<(), 
 /// Puts loops into the runs where more of the circumference than the limit would stand in stock.
 fn bound_runs(
     groups: &mut [(&Piece, Vec<Run>)],
-    pocket: &Pocket,
+    ground: &mut Option<Cleared>,
     rules: &bounded::Rules,
     notes: &mut Vec<String>,
     monitor: &dyn Monitor,
 ) -> Result<(), Cancelled> {
-    let Some(around) = pocket.region.bounds() else { return Ok(()) };
-    let mut ground = Cleared::new(around, rules.bounds.radius);
+    let Some(ground) = ground else { return Ok(()) };
     let (mut loops, mut above) = (0, Vec::new());
     for (piece, runs) in groups {
         let room = way::Room::new(piece);
         for run in runs {
-            let did = bounded::bound(run, &room, &mut ground, rules, monitor)?;
+            let did = bounded::bound(run, &room, ground, rules, monitor)?;
             loops += did.loops;
             above.extend(did.above);
         }

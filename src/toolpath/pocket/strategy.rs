@@ -2,8 +2,11 @@
 
 use std::fmt::{self, Write as _};
 
+use super::bounded::{Rules, Sides};
 use super::feed::engagement_angle;
+use super::turning::Turning;
 use crate::vocabulary::{Definition, PartKind, Passes, PlanError, Reading, Step, Strategy, Task};
+use geometry::Vector2;
 use keys::{LENGTH, SceneError, Section, toml_number};
 
 /// How a flow is made.
@@ -31,6 +34,13 @@ pub enum Pattern {
         /// Their angle from the x axis, rad.
         angle: f64,
     },
+}
+
+impl Pattern {
+    /// Whether a bounded engagement is kept by passes that go along the stock's border, and not by loops.
+    pub(super) fn peels(self) -> bool {
+        !matches!(self, Self::Zigzag { .. })
+    }
 }
 
 /// How a pocket is milled.
@@ -242,6 +252,16 @@ impl PocketStrategy {
         /// angles are told apart add.
         const SPARE: f64 = 0.04;
         self.engagement.filter(|angle| *angle < std::f64::consts::PI).map(|angle| angle - SPARE)
+    }
+
+    /// What passes are bounded by, if they are.
+    pub(super) fn rules(&self, radius: f64) -> Option<Rules> {
+        let bounds = Turning { limit: self.bounded()?, radius };
+        let sides = match self.pattern {
+            Pattern::Zigzag { angle } => Sides::Toward(Vector2::new(-angle.sin(), angle.cos())),
+            Pattern::Flow(_) | Pattern::Offset { .. } => Sides::Left,
+        };
+        Some(Rules { bounds, sides, helix: self.helix(radius) })
     }
 
     /// Radius that a helix should have, and the least that is worth one, mm.

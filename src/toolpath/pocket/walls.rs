@@ -71,7 +71,8 @@ impl<'a> Room<'a> {
         !self.piece.contains(p) && self.walls.distance(p) > ON_WALL
     }
 
-    fn nearest_inside(&self, p: &Point2) -> Point2 {
+    /// The place itself, or the nearest one of the wall where it is outside.
+    pub fn nearest_inside(&self, p: &Point2) -> Point2 {
         if !self.is_outside(p) {
             return *p;
         }
@@ -79,6 +80,16 @@ impl<'a> Room<'a> {
             let [a, b] = self.walls.segments()[near.segment as usize].ends;
             a + (b - a) * near.share
         })
+    }
+
+    /// Distance of a place from the nearest wall, mm.
+    pub fn distance(&self, p: &Point2) -> f64 {
+        self.walls.distance(p)
+    }
+
+    /// Whether a straight move stays inside.
+    pub fn holds(&self, a: &Point2, b: &Point2) -> bool {
+        self.outside(a, b).is_empty()
     }
 
     /// The stretches of a move that lie outside.

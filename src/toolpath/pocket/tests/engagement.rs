@@ -118,7 +118,7 @@ fn a_neck_as_wide_as_the_cutter_is_told() {
     assert!(long.clone().all(|(at, _)| (left - 0.5..right + 0.5).contains(&at.x)), "{stretches:?}");
     let note = found.notes.iter().find(|n| n.contains("above the engagement")).unwrap();
     let told: f64 = note.split(' ').next().unwrap().parse().unwrap();
-    assert!((9.0..11.0).contains(&above) && (told - above).abs() < 0.7, "{above}: {note}");
+    assert!((9.0..11.0).contains(&above) && (told - above).abs() < 1.0, "{above}: {note}");
     assert!(note.contains("begins at 13.") || note.contains("begins at 24."), "{note}");
 }
 

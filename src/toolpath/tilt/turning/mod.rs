@@ -50,8 +50,8 @@ impl TooFast {
     pub fn note(&self) -> String {
         let Self { count, worst, place: p } = self;
         format!(
-            "At {count} contacts the axis turns faster than asked, by up to {worst:.2} times at ({:.3}, {:.3}, {:.3}): the tool \
-             stays clear only so. Allow more `turning` or `turning_across`, or lean the tool otherwise",
+            "At {count} contacts the axis turns faster than asked, by up to {worst:.2} times at ({:.3}, {:.3}, {:.3}): no \
+             slower axes that keep the tool clear were found. Allow more `turning` or `turning_across`, or lean the tool otherwise",
             p.x, p.y, p.z
         )
     }

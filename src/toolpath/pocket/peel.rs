@@ -1,0 +1,361 @@
+//! Passes of constant engagement: the stock peeled off along its border.
+//!
+//! Enters: the piece of the cutter's centre, the ground cleared so far, a way that has been cut. Leaves: that way, gone on.
+//! At each step the cutter turns as far into the stock, which is on its right, as the limit of the engagement lets it, and
+//! along walls that it meets. So passes wind around what is cleared, have no cusps, and cut as much as they may. A pass ends
+//! where nothing is left to cut, or where no turn keeps to the limit. The next one begins beside the nearest stock, on a way
+//! that was gone before, and is reached over cleared ground; mm, rad.
+//!
+//! Every place of a pass is asked for the angle in stock ([`Cleared`]) before the cutter goes there, and whatever is left
+//! (the tips of corners, narrow necks) is what runs along the walls find.
+
+use std::cell::Cell;
+
+use super::bounded::STEP;
+use super::cleared::Cleared;
+use super::route::bend;
+use super::walls::Room;
+use geometry::{Point2, Vector2};
+use work::monitor::{Cancelled, Monitor, check};
+
+/// Sharpest turn into the stock: its radius over the cutter's.
+const INTO: f64 = 0.5;
+
+/// Greatest turn away from the stock in one step, rad.
+const AWAY: f64 = 0.25;
+
+/// Shortest step over the radius. With [`AWAY`] it bounds how tight passes get in corners.
+const SHORTEST: f64 = 0.02;
+
+/// A turn that comes so near to the limit, rad, is as good as the one that reaches it.
+const NEAR: f64 = 0.006;
+
+/// Turns that are tried for one step at most.
+const TRIALS: usize = 8;
+
+/// A pass ends when it cut nothing over so long a way, over the radius.
+const FREE: f64 = 1.0;
+
+/// Passes that cut along a way shorter than this over the radius are none.
+const LEAST_CUT: f64 = 0.1;
+
+/// Places where passes may begin are this far apart, and stock is looked for so far to the right of them, over the radius.
+const APART: f64 = 0.2;
+const PROBE: f64 = 0.1;
+
+/// Angle in stock that tells that there is some, rad.
+const STOCK: f64 = 0.02;
+
+/// Links are asked for stock at places this far apart over the radius.
+const LINK: f64 = 0.12;
+
+/// Places that are tried as corners of a link.
+const CORNERS: usize = 24;
+
+/// Places this far behind, over the radius, are beside the move's own chip.
+const FRESH: f64 = 0.5;
+
+/// A place of a pass where another one may begin.
+struct Place {
+    /// Its index in the way.
+    index: usize,
+    heading: Vector2,
+    /// Its pass.
+    pass: usize,
+}
+
+/// A step that is admissible.
+#[derive(Clone, Copy)]
+struct Step {
+    to: Point2,
+    heading: Vector2,
+    turn: f64,
+    arc: f64,
+}
+
+/// Peels stock off as long as there is some to be reached.
+pub(super) struct Peeler<'a> {
+    room: &'a Room<'a>,
+    cleared: &'a mut Cleared,
+    limit: f64,
+    radius: f64,
+    out: Vec<Point2>,
+    places: Vec<Place>,
+    passes: usize,
+    thin_at: usize,
+    /// A place, and how far around it there is no wall, mm.
+    open: Cell<(Point2, f64)>,
+}
+
+impl<'a> Peeler<'a> {
+    /// Goes on from `way`, whose ground is cleared, within `room`.
+    pub fn new(
+        room: &'a Room<'a>,
+        cleared: &'a mut Cleared,
+        limit: f64,
+        radius: f64,
+        way: &[Point2],
+    ) -> Self {
+        let mut peeler = Self {
+            room,
+            cleared,
+            limit,
+            radius,
+            out: Vec::new(),
+            places: Vec::new(),
+            passes: 0,
+            thin_at: 0,
+            open: Cell::new((Point2::origin(), 0.0)),
+        };
+        let headings = way.windows(2).map(|w| (w[1] - w[0]).normalize());
+        peeler.out.extend_from_slice(way);
+        peeler.note_places(0, headings.collect());
+        peeler
+    }
+
+    /// Peels all stock off that passes reach.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn peel(&mut self, monitor: &dyn Monitor) -> Result<(), Cancelled> {
+        while let Some(k) = self.next_place() {
+            check(monitor)?;
+            let Place { index, heading, .. } = self.places[k];
+            let begin = self.out[index];
+            let link = self.link(index, heading);
+            if !self.pass(begin, heading, link, monitor)? {
+                self.places.remove(k);
+            }
+        }
+        Ok(())
+    }
+
+    /// The way, and on over cleared ground to a place of it.
+    pub fn into_way(self) -> Vec<Point2> {
+        self.out
+    }
+
+    /// Notes places of the way from `first` on.
+    fn note_places(&mut self, first: usize, headings: Vec<Vector2>) {
+        let mut gone = f64::INFINITY;
+        for (k, heading) in headings.into_iter().enumerate() {
+            let index = first + k;
+            if gone >= APART * self.radius {
+                self.places.push(Place { index, heading, pass: self.passes });
+                gone = 0.0;
+            }
+            if let Some(next) = self.out.get(index + 1) {
+                gone += (next - self.out[index]).norm();
+            }
+        }
+        self.passes += 1;
+    }
+
+    fn nearest_inside(&self, p: &Point2) -> Point2 {
+        let (at, open) = self.open.get();
+        if (p - at).norm() < open {
+            return *p;
+        }
+        let kept = self.room.nearest_inside(p);
+        self.open.set((kept, if kept == *p { self.room.distance(p) } else { 0.0 }));
+        kept
+    }
+
+    /// Whether stock stands to the right of a place.
+    fn has_stock(&self, place: &Place) -> bool {
+        let (at, right) = (self.out[place.index], Vector2::new(place.heading.y, -place.heading.x));
+        let beside = self.nearest_inside(&(at + right * (PROBE * self.radius)));
+        if (beside - at).norm() < 0.2 * PROBE * self.radius {
+            return false;
+        }
+        let arc = |heading: Vector2| self.cleared.arc(&beside, &heading, usize::MAX);
+        arc(right) > STOCK || arc(-right) > STOCK
+    }
+
+    /// Where the next pass begins: the first place with stock of the stretch that is nearest. Places without stock are
+    /// forgotten.
+    fn next_place(&mut self) -> Option<usize> {
+        let end = *self.out.last()?;
+        loop {
+            let away = |place: &Place| (self.out[place.index] - end).norm_squared();
+            let mut k = (0..self.places.len())
+                .min_by(|a, b| away(&self.places[*a]).total_cmp(&away(&self.places[*b])))?;
+            if self.has_stock(&self.places[k]) {
+                while k > 0
+                    && self.places[k - 1].pass == self.places[k].pass
+                    && self.has_stock(&self.places[k - 1])
+                {
+                    k -= 1;
+                }
+                return Some(k);
+            }
+            let at = self.out[self.places[k].index];
+            let near = (0.5 * self.radius).powi(2);
+            let places = std::mem::take(&mut self.places);
+            self.places = places
+                .into_iter()
+                .filter(|p| (self.out[p.index] - at).norm_squared() > near || self.has_stock(p))
+                .collect();
+        }
+    }
+
+    /// One pass from `begin`; `false` if it cuts next to nothing, and then nothing changes.
+    fn pass(
+        &mut self,
+        begin: Point2,
+        heading: Vector2,
+        link: Vec<Point2>,
+        monitor: &dyn Monitor,
+    ) -> Result<bool, Cancelled> {
+        let (full, shortest) = (STEP * self.radius, SHORTEST * self.radius);
+        let before = self.cleared.len();
+        let mut way = vec![Step { to: begin, heading, turn: 0.0, arc: 0.0 }];
+        // How many places were cleared when the way had this length.
+        let mut marks = vec![(0.0, before)];
+        let (mut step, mut gone, mut cut, mut free, mut last_cut) = (full, 0.0, 0.0, 0.0, 0);
+        loop {
+            check(monitor)?;
+            let fresh = marks.partition_point(|m| m.0 < gone - FRESH * self.radius);
+            let fresh = marks.get(fresh).map_or(before, |m| m.1);
+            let Some(next) = self.next(&way[way.len() - 1], step, fresh) else {
+                if step <= shortest {
+                    break;
+                }
+                step *= 0.5;
+                continue;
+            };
+            let length = (next.to - way[way.len() - 1].to).norm();
+            gone += length;
+            way.push(next);
+            self.cleared.add(next.to);
+            marks.push((gone, self.cleared.len() - 1));
+            if next.arc > 0.0 {
+                (cut, free, last_cut) = (cut + length, 0.0, way.len());
+            } else {
+                free += length;
+            }
+            if free > FREE * self.radius {
+                break;
+            }
+            step = full.min(2.0 * step);
+        }
+        if cut < LEAST_CUT * self.radius {
+            self.cleared.truncate(before);
+            return Ok(false);
+        }
+        way.truncate(last_cut);
+        // What was gone without cutting is not gone in the end; it may have taken films away.
+        self.cleared.truncate(before + last_cut - 1);
+        self.out.extend(link);
+        let first = self.out.len();
+        self.out.extend(way.iter().map(|step| step.to));
+        self.note_places(first, way.iter().map(|step| step.heading).collect());
+        self.thin();
+        Ok(true)
+    }
+
+    fn thin(&mut self) {
+        /// Fewer are no matter.
+        const FEW: usize = 200;
+        if self.cleared.len() >= self.thin_at {
+            self.cleared.thin(self.cleared.len());
+            self.thin_at = self.cleared.len() * 5 / 4 + FEW;
+        }
+    }
+
+    /// The step that turns farthest into the stock.
+    fn next(&self, from: &Step, step: f64, fresh: usize) -> Option<Step> {
+        let (sin_cos, limit) = (|t: f64| t.sin_cos(), self.limit);
+        let tried = |turn: f64| {
+            let (sin, cos) = sin_cos(turn);
+            let h = from.heading;
+            let ahead = Vector2::new(h.x * cos - h.y * sin, h.x * sin + h.y * cos);
+            let to = self.nearest_inside(&(from.to + ahead * step));
+            let along = to - from.to;
+            let length = along.norm();
+            // A wall ahead.
+            if length < 0.3 * step {
+                return Step { to, heading: ahead, turn, arc: f64::INFINITY };
+            }
+            let heading = along / length;
+            let arc = self.cleared.arc(&to, &heading, fresh);
+            Step { to, heading, turn, arc }
+        };
+        let into = tried(-step / (INTO * self.radius));
+        if into.arc <= limit && self.cleared.keeps(&from.to, &into.to, limit, fresh) {
+            return Some(into);
+        }
+        let mut far = into;
+        let mut best: Option<Step> = None;
+        let mut turn = from.turn.clamp(0.8 * into.turn, 0.8 * AWAY);
+        for _ in 0..TRIALS {
+            let found = tried(turn);
+            if found.arc <= limit {
+                best = Some(found)
+            } else {
+                far = found
+            }
+            match best {
+                None => {
+                    if turn >= AWAY {
+                        return None;
+                    }
+                    turn = (turn + 0.06).max(0.5 * (turn + AWAY)).min(AWAY);
+                    if AWAY - turn < 0.02 {
+                        turn = AWAY;
+                    }
+                }
+                Some(near) => {
+                    if near.arc > limit - NEAR || near.turn - far.turn < 0.003 {
+                        break;
+                    }
+                    let share = if far.arc.is_finite() && near.arc > 0.0 {
+                        ((limit - 0.5 * NEAR - near.arc) / (far.arc - near.arc)).clamp(0.1, 0.9)
+                    } else {
+                        0.5
+                    };
+                    turn = near.turn + (far.turn - near.turn) * share;
+                }
+            }
+        }
+        best.filter(|step| self.cleared.keeps(&from.to, &step.to, limit, fresh))
+    }
+
+    /// From the end of the way to a place of it, over cleared ground: a bend, a straight way, or straight from one to the
+    /// next of the places between.
+    fn link(&self, index: usize, heading: Vector2) -> Vec<Point2> {
+        let n = self.out.len();
+        let (end, to) = (self.out[n - 1], self.out[index]);
+        if n > 1 && (to - end).norm() > 0.0 {
+            let along = (end - self.out[n - 2]).try_normalize(0.0).unwrap_or(heading);
+            let way = bend(end, along, to, heading, 4.0 * self.radius);
+            let whole = || std::iter::once(end).chain(way.iter().copied()).chain([to]).collect::<Vec<_>>();
+            if whole().windows(2).all(|w| self.is_free(&w[0], &w[1])) {
+                return way;
+            }
+        }
+        let mut way = Vec::new();
+        let mut at = n - 1;
+        while at > index {
+            if self.is_free(&self.out[at], &to) {
+                break;
+            }
+            let corner = |k: usize| index + (at - index) * k / CORNERS;
+            let next = (1..CORNERS)
+                .map(corner)
+                .find(|&k| k > index && k < at && self.is_free(&self.out[at], &self.out[k]));
+            at = next.unwrap_or(at - 1);
+            way.push(self.out[at]);
+        }
+        way
+    }
+
+    /// Whether a straight move stays inside and cuts nothing.
+    fn is_free(&self, a: &Point2, b: &Point2) -> bool {
+        let Some(heading) = (b - a).try_normalize(0.0) else { return true };
+        let steps = ((b - a).norm() / (LINK * self.radius)).ceil();
+        let free =
+            |k: usize| self.cleared.arc(&(a + (b - a) * (k as f64 / steps)), &heading, usize::MAX) == 0.0;
+        (0..=steps as usize).rev().all(free) && self.room.holds(a, b)
+    }
+}

@@ -1,0 +1,261 @@
+//! A piece cleared by passes of constant engagement, and what they leave.
+//!
+//! Enters: the piece of the cutter's centre, the ground. Leaves: runs of such passes, each of which begins with a helix,
+//! and runs that keep to the limit by loops: to places where stock may still stand, and along the walls. Whether stock may
+//! stand is told by square cells: the middle of one, and all around it, is cleared for sure where one disc holds it whole; mm.
+
+use std::f64::consts::{FRAC_1_SQRT_2, PI};
+
+use super::bounded::{Rules, STEP};
+use super::cleared::Cleared;
+use super::peel::Peeler;
+use super::route::{Entry, Run, begun_near, circle};
+use super::walls::Room;
+use geometry::{CurveSegment, Piece, Point2, Region, SegmentGrid, Vector2};
+use work::monitor::{Cancelled, Monitor, check};
+
+/// Side of a cell over the radius, and most cells along a side.
+const CELL: f64 = 0.1;
+const MOST_CELLS: f64 = 2048.0;
+
+/// Precision of the place with most room, over the radius.
+const DISC_PRECISION: f64 = 0.05;
+
+/// Runs that clear a piece.
+#[derive(Default)]
+pub(super) struct Clearing {
+    /// Passes of constant engagement.
+    pub peeled: Vec<Run>,
+    /// What has to follow, and to be bounded by loops.
+    pub rest: Vec<Run>,
+}
+
+/// Clears a piece; `None` where it has no room for a helix.
+///
+/// # Errors
+/// [`Cancelled`] when the monitor says so.
+pub(super) fn clear(
+    piece: &Piece,
+    ground: &mut Cleared,
+    rules: &Rules,
+    monitor: &dyn Monitor,
+) -> Result<Option<Clearing>, Cancelled> {
+    let (radius, [wanted, least]) = (rules.bounds.radius, rules.helix);
+    let whole = Region { pieces: vec![piece.clone()] };
+    let room = Room::new(piece);
+    let mut next = whole.largest_disc(DISC_PRECISION * radius, monitor)?.map(|disc| disc.0);
+    let Some(mut cells) = Cells::new(piece, radius) else { return Ok(None) };
+    let mut clearing = Clearing::default();
+    while let Some(centre) = next.filter(|centre| room.distance(centre) >= least) {
+        let helix = wanted.min(room.distance(&centre));
+        let run = peeled(&room, ground, rules, (centre, helix), monitor)?;
+        // A step past an inner corner follows the wall around it.
+        clearing.peeled.extend(room.kept_runs(run));
+        ground.places().iter().for_each(|p| cells.clear_at(p));
+        check(monitor)?;
+        next = cells.deep_in_stock(&room, ground, monitor)?;
+    }
+    if clearing.peeled.is_empty() {
+        return Ok(None);
+    }
+    for wall in piece.curves() {
+        cells.clear_along(wall);
+        cells.clear_along(&[wall[wall.len() - 1], wall[0]]);
+    }
+    clearing.rest = cells.runs_to_standing(&clearing.peeled, monitor)?;
+    clearing.rest.extend(around_walls(piece, &clearing));
+    Ok(Some(clearing))
+}
+
+/// A helix and the passes that go on from it.
+fn peeled(
+    room: &Room,
+    ground: &mut Cleared,
+    rules: &Rules,
+    (centre, radius): (Point2, f64),
+    monitor: &dyn Monitor,
+) -> Result<Run, Cancelled> {
+    let mut turn = circle(&centre, radius, 0.0, STEP * rules.bounds.radius);
+    turn.push(turn[0]);
+    turn.iter().for_each(|p| ground.add(*p));
+    let mut peeler = Peeler::new(room, ground, rules.bounds.limit, rules.bounds.radius, &turn);
+    peeler.peel(monitor)?;
+    let points = peeler.into_way().split_off(turn.len() - 1);
+    Ok(Run { entry: Entry::Helix { centre, radius, begin: 0.0 }, points })
+}
+
+/// Once around each wall.
+fn around_walls(piece: &Piece, clearing: &Clearing) -> Vec<Run> {
+    let last = clearing.rest.last().or(clearing.peeled.last());
+    let mut end = last.and_then(|run| run.points.last()).copied().unwrap_or(piece.outer[0]);
+    let around = |wall: &[Point2]| {
+        let mut points = begun_near(wall, &end, 0.0);
+        points.push(points[0]);
+        end = points[0];
+        Run { entry: Entry::Ramp(points.clone()), points }
+    };
+    piece.curves().map(around).collect()
+}
+
+/// Cells of the box of a piece, and which of them are cleared for sure.
+struct Cells {
+    radius: f64,
+    origin: Point2,
+    cell: f64,
+    side: [usize; 2],
+    clear: Vec<bool>,
+}
+
+impl Cells {
+    /// `None` where the piece is so large that cells would be as large as the cutter.
+    fn new(piece: &Piece, radius: f64) -> Option<Self> {
+        let [lo, hi] = Region { pieces: vec![piece.clone()] }.bounds()?;
+        let size = hi - lo;
+        let cell = (CELL * radius).max(size.x.max(size.y) / MOST_CELLS);
+        let side = [size.x, size.y].map(|s| (s / cell).ceil() as usize + 1);
+        let clear = vec![true; side[0] * side[1]];
+        let mut cells = (cell < 0.5 * radius).then_some(Self { radius, origin: lo, cell, side, clear })?;
+        (0..side[1]).for_each(|row| cells.fill(piece, row));
+        Some(cells)
+    }
+
+    /// Marks the cells of a row inside a piece: those between every other two crossings with its curves.
+    fn fill(&mut self, piece: &Piece, row: usize) {
+        let level = self.origin.y + row as f64 * self.cell;
+        let mut crossings = Vec::new();
+        for curve in piece.curves() {
+            for (k, a) in curve.iter().enumerate() {
+                let b = &curve[(k + 1) % curve.len()];
+                if (a.y > level) != (b.y > level) {
+                    crossings.push(a.x + (b.x - a.x) * ((level - a.y) / (b.y - a.y)) - self.origin.x);
+                }
+            }
+        }
+        crossings.sort_by(f64::total_cmp);
+        for pair in crossings.chunks_exact(2) {
+            let (from, to) = ((pair[0] / self.cell).ceil() as usize, (pair[1] / self.cell).floor() as usize);
+            (from..=to.min(self.side[0] - 1)).for_each(|i| self.clear[row * self.side[0] + i] = false);
+        }
+    }
+
+    fn at(&self, index: usize) -> Point2 {
+        let (i, j) = (index % self.side[0], index / self.side[0]);
+        self.origin + Vector2::new(i as f64, j as f64) * self.cell
+    }
+
+    /// Clears the cells that the cutter at `p` holds whole.
+    fn clear_at(&mut self, p: &Point2) {
+        let within = self.radius - self.cell * FRAC_1_SQRT_2;
+        let range = |axis: usize| {
+            let x = p[axis] - self.origin[axis];
+            let from = ((x - within) / self.cell).ceil().max(0.0) as usize;
+            from..(((x + within) / self.cell).floor() + 1.0).clamp(0.0, self.side[axis] as f64) as usize
+        };
+        for j in range(1) {
+            for i in range(0) {
+                let index = j * self.side[0] + i;
+                self.clear[index] |= (self.at(index) - p).norm_squared() <= within * within;
+            }
+        }
+    }
+
+    fn clear_along(&mut self, way: &[Point2]) {
+        for ends in way.windows(2) {
+            let along = ends[1] - ends[0];
+            let steps = (along.norm() / (STEP * self.radius)).ceil().max(1.0);
+            (0..=steps as usize).for_each(|k| self.clear_at(&(ends[0] + along * (k as f64 / steps))));
+        }
+    }
+
+    /// Of the places where the cutter would stand in stock all around, the one with most room.
+    fn deep_in_stock(
+        &self,
+        room: &Room,
+        ground: &Cleared,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Point2>, Cancelled> {
+        let x = Vector2::new(1.0, 0.0);
+        let mut best: Option<(f64, Point2)> = None;
+        for index in (0..self.clear.len()).filter(|index| !self.clear[*index]) {
+            check(monitor)?;
+            let p = self.at(index);
+            let distance = room.distance(&p);
+            if best.is_none_or(|best| distance > best.0)
+                && [x, -x].iter().all(|x| ground.arc(&p, x, usize::MAX) > PI - 1e-6)
+            {
+                best = Some((distance, p));
+            }
+        }
+        Ok(best.map(|best| best.1))
+    }
+
+    /// Runs from the ways that were gone straight to cells that may hold stock.
+    fn runs_to_standing(&mut self, gone: &[Run], monitor: &dyn Monitor) -> Result<Vec<Run>, Cancelled> {
+        let sides = gone.iter().flat_map(|run| run.points.windows(2));
+        let sides = sides.map(|w| CurveSegment { ends: [w[0], w[1]], curve: 0, index: 0 }).collect();
+        let gone = SegmentGrid::new(sides);
+        let mut runs = Vec::new();
+        for index in 0..self.clear.len() {
+            if self.clear[index] {
+                continue;
+            }
+            check(monitor)?;
+            let p = self.at(index);
+            self.clear_at(&p);
+            let Some(near) = gone.nearest(&p).filter(|near| near.distance > 0.0) else { continue };
+            let mut points = self.way_to(&gone, near.segment as usize, near.share);
+            // The way down goes back and forth where all is cleared.
+            let way = points.iter().chain(points.iter().rev().skip(1)).copied().collect();
+            points.push(p);
+            runs.push(Run { entry: Entry::Ramp(way), points });
+        }
+        Ok(runs)
+    }
+
+    /// The last of a way that was gone, about a radius of it, up to a place of one of its sides.
+    fn way_to(&self, gone: &SegmentGrid, mut side: usize, share: f64) -> Vec<Point2> {
+        let ends = |side: usize| gone.segments()[side].ends;
+        let [a, b] = ends(side);
+        let mut points = vec![a + (b - a) * share];
+        let mut length = 0.0;
+        loop {
+            let begin = ends(side)[0];
+            length += (begin - points[points.len() - 1]).norm();
+            points.push(begin);
+            if length > self.radius || side == 0 || ends(side - 1)[1] != begin {
+                break;
+            }
+            side -= 1;
+        }
+        points.reverse();
+        points
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Cells inside a piece are told by its curves, and cleared by a disc where it holds them whole.
+    #[test]
+    fn cells_are_those_of_the_piece_that_no_disc_holds() {
+        let square =
+            |a: f64, b: f64| [(a, a), (b, a), (b, b), (a, b)].map(|(x, y)| Point2::new(x, y)).to_vec();
+        let piece = Piece { outer: square(0.0, 10.0), islands: vec![square(4.0, 6.0)] };
+        let mut cells = Cells::new(&piece, 2.0).unwrap();
+        let left = |cells: &Cells| (0..cells.clear.len()).filter(|k| !cells.clear[*k]).collect::<Vec<_>>();
+        let inside = left(&cells);
+        let walls = SegmentGrid::of_curves(piece.curves());
+        let within = |p: &Point2| piece.contains(p) || walls.distance(p) < 1e-9;
+        assert!(inside.iter().all(|k| within(&cells.at(*k))));
+        let area = inside.len() as f64 * cells.cell * cells.cell;
+        assert!((area - 96.0).abs() < 44.0 * cells.cell, "{area}");
+        let disc = Point2::new(2.5, 2.5);
+        cells.clear_at(&disc);
+        let reach = cells.cell * FRAC_1_SQRT_2;
+        for k in inside {
+            let held = (cells.at(k) - disc).norm() + reach <= 2.0;
+            assert_eq!(cells.clear[k], held, "{}", cells.at(k));
+        }
+    }
+}
