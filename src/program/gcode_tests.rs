@@ -142,7 +142,7 @@ fn what_cannot_be_followed_is_refused_at_its_place() {
         ("G0 X1\nG41 D1 X2\n", 2, 5, Fault::NoRadius(1)),
         ("T4 M6\nG42 X2\n", 2, 1, Fault::NoRadius(4)),
         ("F1\nG41.1 D4 G1 X1\n", 2, 1, Fault::Entry { radius: 2.0 }),
-        ("F1\nG41.1 D4 G1 X9\nY1\nX8\n", 4, 1, Fault::Corner { radius: 2.0 }),
+        ("F1\nG41.1 D4 G1 X9\nY1\nX8\n", 3, 1, Fault::Corner { radius: 2.0 }),
         ("F1\nG41.1 D4 G1 X9\nG3 X8 Y1 R1\n", 3, 1, Fault::InnerArc { radius: 2.0, arc: 1.0 }),
         ("F1\nG41.1 D4 G1 X9\nG10 L2 P1 X1\n", 3, 1, Fault::Meanwhile("G10".into())),
         ("T1\nG41.1 D4 G1 X9 F1\nM6\n", 3, 1, Fault::Meanwhile("M6".into())),

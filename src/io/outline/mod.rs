@@ -45,8 +45,11 @@ pub const EXTENSIONS: [&str; OUTLINE_FORMATS.len()] = {
 pub struct OutlineFormat {
     /// The extension of its files, lower case.
     pub extension: &'static str,
-    parse: fn(&[u8], &OutlineOptions, &mut Vec<String>) -> Result<Vec<Drawn>, OutlineError>,
+    parse: ParseDrawing,
 }
+
+/// Takes the bytes of a drawing, how it is read, and what was left out so far.
+type ParseDrawing = fn(&[u8], &OutlineOptions, &mut Vec<String>) -> Result<Vec<Drawn>, OutlineError>;
 
 impl PartialEq for OutlineFormat {
     fn eq(&self, other: &Self) -> bool {

@@ -265,9 +265,9 @@ impl<'a> Peeler<'a> {
 
     /// The step that turns farthest into the stock.
     fn next(&self, from: &Step, step: f64, fresh: usize) -> Option<Step> {
-        let (sin_cos, limit) = (|t: f64| t.sin_cos(), self.limit);
+        let limit = self.limit;
         let tried = |turn: f64| {
-            let (sin, cos) = sin_cos(turn);
+            let (sin, cos) = turn.sin_cos();
             let h = from.heading;
             let ahead = Vector2::new(h.x * cos - h.y * sin, h.x * sin + h.y * cos);
             let to = self.nearest_inside(&(from.to + ahead * step));
