@@ -14,7 +14,9 @@ use part::Part;
 use serde::Serialize;
 use work::parallel;
 
-use super::inspection::LEAST_FACING;
+/// Where the vertical part of the design's normal is no greater, no upright cutter faces the surface, and a cell says nothing
+/// of it. A greater one leaves drafts of walls unmeasured; below rounding of mesh files, walls pass for slopes.
+pub(crate) const LEAST_FACING: f64 = 1e-3;
 
 /// Axes that differ by less than this in each coordinate are one. Coarser ones call places walls that a tool faces by less than
 /// that; finer ones cost time on long paths.

@@ -12,6 +12,7 @@ use super::figures::{
 use super::regions::connected;
 use super::walls::Walls;
 use crate::closer;
+use crate::facing::LEAST_FACING;
 use cutter::Cutter;
 use geometry::{Point2, Point3, Vector3};
 use part::{Part, SurfaceGrid, SurfacePoint};
@@ -32,10 +33,6 @@ const RIDGE_IS_TOP: f64 = 1e-3;
 /// The design surface is sampled in so many bands of rows, one after the other: it takes 40 bytes a
 /// cell, more than all else that is kept. Every band looks at all triangles of the part.
 const DESIGN_BANDS: usize = 8;
-
-/// Where the vertical part of the design's normal is no greater, no upright cutter faces the surface, and a cell says nothing
-/// of it. A greater one leaves drafts of walls unmeasured; below rounding of mesh files, walls pass for slopes.
-pub(crate) const LEAST_FACING: f64 = 1e-3;
 
 /// What is measured at one cell.
 #[derive(Debug, Clone, Copy)]

@@ -1,7 +1,8 @@
 //! What stands at most above the part within one square of the plan.
 
 use super::meets;
-use crate::inspection::{Inspection, LEAST_FACING};
+use crate::facing::LEAST_FACING;
+use crate::inspection::Inspection;
 use geometry::{Point2, Point3, Vector2};
 use part::SurfacePoint;
 use sim::NOT_CUT;

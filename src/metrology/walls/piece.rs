@@ -6,7 +6,7 @@
 use geometry::{Point2, Point3, Vector2, Vector3};
 use part::Part;
 
-use crate::inspection::LEAST_FACING;
+use crate::facing::LEAST_FACING;
 
 /// How far in front of a wall its floor is looked for, and behind it the top, mm. Less than rounding of mesh files finds the
 /// wall itself; more misses what is narrower.
