@@ -26,7 +26,7 @@ use super::tool::Around;
 use super::{JobError, Session};
 
 /// Most plans that are made while only ridges are measured.
-const MOST_ROUNDS: usize = 4;
+const MOST_ROUNDS: usize = 6;
 
 /// Most plans that are made again after all was measured: each costs as much as the whole run without correction.
 const MOST_MEASURED: usize = 2;
@@ -46,14 +46,23 @@ const MEASURED_SLACK: f64 = 0.2;
 /// Chords of two passes raise a ridge by no more than this share of their tolerance.
 const RAISED_BY_CHORDS: f64 = 0.5;
 
-/// The factor of the chord tolerance where a ridge was raised by chords.
+/// The factor of the chord tolerance where a ridge was raised by chords, and again where it still is.
 const SHORTER_CHORDS: f64 = 0.25;
+
+/// Chords within this share of their tolerance are not made shorter: they raise ridges by next to nothing.
+const SHORTEST_CHORDS: f64 = 0.1;
 
 /// No width is corrected by more than this factor in a round.
 const MOST_NARROWED: f64 = 0.5;
 
 /// A place whose factor is less than one by more than this was narrowed before.
 const STILL_WIDE: f64 = 1e-6;
+
+/// Plans in vain whose high places are narrowed in the next one.
+const MOST_FOLLOWED: usize = 2;
+
+/// The plan in vain after which all is narrowed in proportion.
+const MOST_IN_VAIN: usize = MOST_FOLLOWED + 1;
 
 /// Cells from pass to pass while only ridges are measured.
 const CELLS_A_PASS: f64 = 4.0;
@@ -185,6 +194,8 @@ struct Corrected<'a> {
     best: Planned,
     widths: Widths,
     standing: Standing,
+    /// The widths of the last plan and what it leaves, where that is not the best one.
+    latest: Option<(Widths, Standing)>,
     rounds: Vec<CorrectionRound>,
     /// The round of the best plan.
     kept: usize,
@@ -239,6 +250,7 @@ impl Session {
             best: first,
             widths,
             standing,
+            latest: None,
             rounds,
             kept: 0,
         };
@@ -325,50 +337,56 @@ impl Corrected<'_> {
         !round.holds(self.target) && round.highest() <= (1.0 + SLACK) * self.target
     }
 
-    /// The widths to try next where the best plan stands too high: shorter chords where that may be enough and narrower ones
-    /// elsewhere; else narrower ones at all these places; else all in proportion, to which remnants along borders do not give
-    /// way. `None` where it holds the target and comes within `slack` of it, or what there
-    /// is was tried `in_vain`.
+    /// The widths to try next. A plan that stands too high gets shorter chords where that may be enough, and narrower widths
+    /// elsewhere; one that is too low gets wider ones. Levels are placed anew in each plan, so that other places may stand
+    /// too high then: these are narrowed as well, from the last plan on. Last of all everything is narrowed in proportion, to
+    /// which remnants along borders do not give way. `None` where the best plan holds the target and comes within `slack` of
+    /// it, or what there is was tried `in_vain`.
     fn next(&self, in_vain: usize, slack: f64) -> Option<Widths> {
         let (target, round) = (self.target, &self.standing.round);
         let scaled = |height: f64| self.widths.scaled((aim(target) / height).sqrt().max(MOST_NARROWED));
-        if round.holds(target) {
-            let low = in_vain == 0 && round.highest() < (1.0 - slack) * target;
-            low.then(|| scaled(round.highest()))
-        } else {
-            let standing = self.standing_high(round.margin(target));
-            let is_raised = self.raised_by_chords();
-            let (raised, others): (Vec<_>, Vec<_>) = standing.iter().partition(|place| is_raised(place));
-            let above = |places: &[HighPlace]| -> Vec<HighPlace> {
-                places.iter().filter(|place| place.over > 0.0).copied().collect()
-            };
-            let finer = self.widths.finer(&raised).narrowed(&above(&others));
-            let ways = [
-                (!above(&raised).is_empty()).then_some(finer),
-                Some(self.widths.narrowed(&above(&standing))),
-            ];
-            let in_proportion =
-                (round.highest_mm + round.margin(target) > target).then(|| scaled(round.highest_mm));
-            ways.into_iter().flatten().chain(in_proportion).nth(in_vain)
+        let in_proportion =
+            || (round.highest_mm + round.margin(target) > target).then(|| scaled(round.highest_mm));
+        let followed = |(widths, standing): &(Widths, Standing)| {
+            let high = self.standing_high(standing);
+            (!high.is_empty()).then(|| widths.narrowed(&high))
+        };
+        match (round.holds(target), in_vain) {
+            (true, 0) => (round.highest() < (1.0 - slack) * target).then(|| scaled(round.highest())),
+            (true, 1) => self.latest.as_ref().and_then(followed),
+            (false, 0) => {
+                let is_raised = self.raised_by_chords();
+                let (raised, others): (Vec<_>, Vec<_>) =
+                    self.standing_high(&self.standing).into_iter().partition(|place| is_raised(place));
+                let none = raised.is_empty() && others.is_empty();
+                if none { in_proportion() } else { Some(self.widths.finer(&raised).narrowed(&others)) }
+            }
+            (false, ..=MOST_FOLLOWED) => self.latest.as_ref().and_then(followed).or_else(in_proportion),
+            (false, MOST_IN_VAIN) => in_proportion(),
+            _ => None,
         }
     }
 
-    /// The places that stand near the target or above it, with `margin` mm for what their heights are uncertain by.
-    fn standing_high(&self, margin: f64) -> Vec<HighPlace> {
+    /// The places of a plan that may stand above the target.
+    fn standing_high(&self, standing: &Standing) -> Vec<HighPlace> {
         let cutter = &self.session.scene.cutter;
-        let places = self.standing.above.iter().map(|&(at, height)| {
+        let margin = standing.round.margin(self.target);
+        let places = standing.above.iter().map(|&(at, height)| {
             let tip = at + cutter.contact_to_tip(&self.session.part.closest_point(&at).0.normal);
             HighPlace { at, tip, over: height + margin - self.target, factor: aim(self.target) / height }
         });
-        places.collect()
+        places.filter(|place| place.over > 0.0).collect()
     }
 
-    /// Whether it may be that chords alone have raised a place above the target, and they are not shorter there yet.
+    /// Whether it may be that chords alone have raised a place above the target, and shorter ones would not.
     fn raised_by_chords(&self) -> impl Fn(&HighPlace) -> bool {
         let most = RAISED_BY_CHORDS * self.session.scene.tolerance.chord;
         let can_be_shorter = self.request.axis.is_none() && !self.request.joining.smoothing;
         let chords = self.widths.chords();
-        move |place| can_be_shorter && place.over <= most && chords.at(&place.tip) >= 1.0
+        move |place| {
+            let now = chords.at(&place.tip);
+            can_be_shorter && place.over <= most * now && now > SHORTEST_CHORDS
+        }
     }
 
     /// The plan by given widths, and their least and greatest factors.
@@ -395,9 +413,12 @@ impl Corrected<'_> {
     fn keep_if_better(&mut self, planned: Planned, widths: Widths, found: Standing) -> bool {
         let better = found.round.is_better(&self.standing.round, self.target);
         self.rounds.push(found.round);
+        self.latest = None;
         if better {
             (self.best, self.widths, self.standing, self.kept) =
                 (planned, widths, found, self.rounds.len() - 1);
+        } else {
+            self.latest = Some((widths, found));
         }
         better
     }
@@ -408,7 +429,7 @@ fn aim(target: f64) -> f64 {
     (1.0 - 0.5 * SLACK) * target
 }
 
-/// A place that stands near the target or above it.
+/// A place that may stand above the target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct HighPlace {
     at: Point3,
@@ -427,8 +448,8 @@ struct Widths {
     places: Vec<(Point3, f64)>,
     /// The factor of all places.
     everywhere: f64,
-    /// Tips of the cutter around which chords are shorter.
-    finer: Vec<Point3>,
+    /// Tips of the cutter around which chords are shorter, with the factor of their tolerance.
+    finer: Vec<(Point3, f64)>,
     /// How far around a place its factor holds, mm: the interval of passes on a plane.
     interval: f64,
 }
@@ -444,13 +465,14 @@ impl Widths {
 
     /// The factor of the chord tolerance around tips of the cutter.
     fn chords(&self) -> Correction {
-        let factors: Vec<(Point3, f64)> = self.finer.iter().map(|tip| (*tip, SHORTER_CHORDS)).collect();
-        Correction::new(&factors, self.interval)
+        Correction::new(&self.finer, self.interval)
     }
 
     /// With shorter chords around places.
     fn finer(&self, places: &[HighPlace]) -> Self {
-        let finer = self.finer.iter().copied().chain(places.iter().map(|place| place.tip)).collect();
+        let now = self.chords();
+        let shorter = places.iter().map(|place| (place.tip, SHORTER_CHORDS * now.at(&place.tip)));
+        let finer = self.finer.iter().copied().chain(shorter).collect();
         Self { finer, ..self.clone() }
     }
 

@@ -103,7 +103,10 @@ impl ExcessSearch<'_> {
             let unreached = Bounded { error_bound_mm: (most - found.max_mm).max(0.0), ..found };
             (sought(ridge, Kind::Reached)?, unreached)
         };
-        let kind = if unreached.max_mm >= highest.max_mm && unreached.max_mm > 0.0 {
+        // What is higher than all that passes came down to is uncut, also below its own limit.
+        let is_uncut = unreached.max_mm >= highest.max_mm && unreached.max_mm > 0.0
+            || highest.max_mm > reached.at_most();
+        let kind = if is_uncut {
             ExcessKind::Uncut
         } else if reached.max_mm > ridge.max_mm + NUMERICAL_FLOOR {
             ExcessKind::Border

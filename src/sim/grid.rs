@@ -130,6 +130,12 @@ impl Grid {
         let inside = i >= 0.0 && j >= 0.0 && i < self.nx as f64 && j < self.ny as f64;
         inside.then_some((i as usize, j as usize))
     }
+
+    /// The cell whose centre is nearest to `(x, y)`, which may lie outside of the grid.
+    pub fn nearest_cell(&self, x: f64, y: f64) -> (usize, usize) {
+        let nearest = |at: f64, n: usize| (at.round().max(0.0) as usize).min(n.saturating_sub(1));
+        (nearest((x - self.origin.x) / self.cell, self.nx), nearest((y - self.origin.y) / self.cell, self.ny))
+    }
 }
 
 #[cfg(test)]

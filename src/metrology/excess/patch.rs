@@ -3,7 +3,7 @@
 use super::meets;
 use crate::facing::LEAST_FACING;
 use crate::inspection::Inspection;
-use geometry::{Point2, Point3, Vector2};
+use geometry::{Point2, Point3, Vector2, Vector3};
 use part::SurfacePoint;
 use sim::NOT_CUT;
 
@@ -21,6 +21,13 @@ const MOST_CORNERS: usize = 12;
 
 /// How often a greater height is assumed.
 const MOST_REACHES: usize = 6;
+
+/// How often a height that is enough is lowered to what it leaves. Each time the rest shrinks by the slope of the design
+/// times that of the cut.
+const MOST_LOWERED: usize = 4;
+
+/// Lowering ends where it gains less than this share of what stands over the place looked at.
+const LITTLE_GAIN: f64 = 0.1;
 
 /// Between its corners a smooth surface may leave a tangent plane by so many times as much as there.
 const BETWEEN_CORNERS: f64 = 1.25;
@@ -104,8 +111,14 @@ impl Patches<'_> {
         by != NOT_CUT && {
             let from_contact = cutter.contact_to_tip(&design.normal);
             let tip = surface.nearest_tip(by, &(design.point + from_contact));
-            let off = part.closest_point(&(tip - from_contact)).1;
-            off <= limits.scallop.min(limits.uncut) && self.fits(&(design.point + from_contact))
+            let contact = tip - from_contact;
+            let (nearest, off) = part.closest_point(&contact);
+            let most = limits.scallop.min(limits.uncut);
+            // A pass beyond a border serves the ground inside of it, as far as that is level with the border.
+            let beyond = |point: &Point3, normal: &Vector3| (contact - point).dot(normal).abs() <= most;
+            let serves = off <= most
+                || beyond(&nearest.point, &nearest.normal) && beyond(&design.point, &design.normal);
+            serves && self.fits(&(design.point + from_contact))
         }
     }
 
@@ -202,17 +215,23 @@ impl Patches<'_> {
         let surface = self.inspection.surface;
         let SurfacePoint { point, normal, .. } = &piece.foot;
         let here = surface.along_normal_with(point, normal, self.unseen)?;
-        let moves = self.moves(point, here.by);
         let upright = piece.leans[..piece.len].iter().all(|lean| lean.norm() < 1e-12);
-        let least = self.least.max(0.0);
-        let mut reach = 1.2 * here.distance.max(least) + 1e-4;
-        // The cut over a place stands aside of it by its height times its lean: heights from the least one that counts to
+        // Lower places of the square are of no account.
+        let known = here.distance.max(self.least).max(0.0);
+        // What stands so high stands aside of its place.
+        let moves = self.moves(&(point + normal * known), here.by);
+        let over = |reach: f64| {
+            let above = self.over(piece, &moves, [known, reach]);
+            (above + piece.below) / piece.cosine
+        };
+        let mut reach = 1.2 * known + 1e-4;
+        // The cut over a place stands aside of it by its height times its lean: heights from the known one to
         // the assumed one are looked at, and the latter must be enough.
         for _ in 0..MOST_REACHES {
-            let above = self.over(piece, &moves, [least, reach]);
-            let possible = (above + piece.below) / piece.cosine;
+            let possible = over(reach);
             if possible <= reach || upright {
-                return Some((possible.max(here.distance).max(least), here.distance, here.by));
+                let possible = if upright { possible } else { lowered(possible, known, &over) };
+                return Some((possible.max(known), here.distance, here.by));
             }
             reach = 1.5 * possible;
         }
@@ -222,7 +241,7 @@ impl Patches<'_> {
     /// Moves that are low over a point: any choice gives a bound, the lowest a good one.
     fn moves(&self, point: &Point3, first: u32) -> Vec<u32> {
         let surface = self.inspection.surface;
-        let Some((i, j)) = surface.cut.grid.cell_at(point.x, point.y) else { return Vec::new() };
+        let (i, j) = surface.cut.grid.nearest_cell(point.x, point.y);
         let winners = surface.winners(i, j);
         let all = std::iter::once(first)
             .chain(winners.moves().iter().chain(self.unseen).copied())
@@ -278,6 +297,19 @@ impl Clipped {
             self.cosine = self.cosine.min(foot.normal.dot(&normal)).max(0.1);
         }
     }
+}
+
+/// What is left of a bound that is enough: nothing stands higher, so heights up to it are all that need be looked at, and what
+/// stands over those is a bound, too. `known` is what stands there at least.
+fn lowered(mut possible: f64, known: f64, over: &dyn Fn(f64) -> f64) -> f64 {
+    for _ in 0..MOST_LOWERED {
+        let before = possible;
+        possible = possible.min(over(possible));
+        if possible <= known || before - possible < LITTLE_GAIN * (possible - known) {
+            break;
+        }
+    }
+    possible
 }
 
 /// Whether a triangle reaches into a square of the plan: no side of either has all of the other beyond it. Boxes of long

@@ -165,6 +165,21 @@ fn normals_that_turn_within_a_square_are_bounded() {
     holds(2, 1, 2.9463434509808835, 1.0726896715766943, 0.04652898462678416, 0.5).unwrap();
 }
 
+/// On slopes what stands over a place is aside of it. The bound of high ridges closes all the same.
+#[test]
+fn high_ridges_on_slopes_are_bounded_as_closely_as_asked() {
+    let ball = Cutter::ball(6.0).unwrap();
+    for shape in [1, 3] {
+        let part = part(shape);
+        let path = path(&part, &ball, 0.4, 2.2, 0.0);
+        let found = measured(&part, &ball, &path, 0.1).excess.highest;
+        let truth = Brute::new(&part, &ball, &path).highest(80);
+        assert!(truth > 0.15, "{truth}");
+        assert!(found.error_bound_mm <= 5e-4 + 1e-6, "{shape}: {found:?}");
+        assert!(truth <= found.at_most() + 1e-9, "{shape}: {truth} {found:?}");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 

@@ -24,6 +24,13 @@ use scallop::strip_width_at;
 const FACETS_A_CONTROL: f64 = 5.0;
 const CONTROL_PITCH_OVER_RADIUS: [f64; 2] = [0.25, 0.5];
 
+/// A coarse height surface whose normals are off those of the facets by more than this, rad (root mean square), is fitted again
+/// with the closest control points. Facets of a smooth shape are off it by less.
+const MOST_OFF_FACETS: f64 = 0.04;
+
+/// Places a side at which that is measured.
+const FACET_SAMPLES: usize = 60;
+
 /// Most control points a side of a height surface; bounds time and memory of the fit.
 const MAX_CONTROLS: usize = 140;
 
@@ -242,15 +249,31 @@ impl<'a> Chart<'a> {
         let [least, most] = CONTROL_PITCH_OVER_RADIUS.map(|share| share * cutter.radius());
         let stepped = mesh_surface::wants_mesh(part, cutter);
         let pitch = if stepped { most } else { (FACETS_A_CONTROL * facet).clamp(least, most) };
-        let knots = domain.map(|range| {
-            let controls = ((range[1] - range[0]) / pitch).ceil().clamp(5.0, MAX_CONTROLS as f64);
-            KnotVector::clamped_uniform(3, controls as usize, range)
-        });
-        let [Ok(knots_u), Ok(knots_v)] = knots else {
-            return Err(PlanError::mesh("its plan view has no area"));
+        let fitted = |pitch: f64| {
+            let knots = domain.map(|range| {
+                let controls = ((range[1] - range[0]) / pitch).ceil().clamp(5.0, MAX_CONTROLS as f64);
+                KnotVector::clamped_uniform(3, controls as usize, range)
+            });
+            let [Ok(knots_u), Ok(knots_v)] = knots else {
+                return Err(PlanError::mesh("its plan view has no area"));
+            };
+            let surface = fit_heights(part, domain, knots_u, knots_v)?;
+            Ok(Self { source: Source::Heights(surface), domain, sign: 1.0, guide })
         };
-        let surface = fit_heights(part, domain, knots_u, knots_v)?;
-        Ok(Self { source: Source::Heights(surface), domain, sign: 1.0, guide })
+        let coarse = fitted(pitch)?;
+        // Few large facets are the shape itself.
+        let follows = stepped || pitch <= least || coarse.off_facets(part) <= MOST_OFF_FACETS;
+        if follows { Ok(coarse) } else { fitted(least) }
+    }
+
+    /// How far the normals of a fitted surface are off those of the facets, rad (root mean square over the plan view).
+    fn off_facets(&self, part: &Part) -> f64 {
+        let off = |[u, v]: [f64; 2]| {
+            let (here, facet) = (self.at(u, v)?, part.highest_at(u, v)?);
+            Some(part.mesh().normal(facet.triangle as usize).cross(&here.normal).norm_squared())
+        };
+        let squares: Vec<f64> = self.grid(FACET_SAMPLES).filter_map(off).collect();
+        (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
     }
 
     /// [`ChartPoint::strip_width`] for passes on both sides of a place, with the curvature of all that lies between them: at
