@@ -5,6 +5,7 @@
 //! of part and stock, or around a sphere ([`ways`]). Where the tool is to keep away from something, passes are repaired first,
 //! and what it comes too near to in between, where no way is clear, is noted.
 
+mod ahead;
 mod bent;
 mod ways;
 
@@ -16,6 +17,7 @@ use crate::tilt::repair::{Repaired, repair};
 use crate::tilt::tilted::{MoveRules, TiltedPasses, Tilting, located, reversed};
 use crate::tilt::turning::{TurningRates, even_out, too_fast};
 use crate::vocabulary::{Links, PlanError, PlanSettings, Setup};
+use ahead::run_on;
 use bent::Bent;
 use collision::{Check, Interference, Obstacle};
 use cutter::{Cutter, Solid};
@@ -70,8 +72,11 @@ pub(crate) fn join_tilted(
     let ways = Ways::new(part, cutter, settings, Speeds::of(settings, &contacts), &block, touching, bent);
     let visits = order(&contacts, both_ways, &|distance| ways.cost(distance));
     monitor::check(monitor)?;
-    let turned =
-        |k: usize| visited(&passes[visits[k].pass], &contacts[visits[k].pass], &visits[k], cutter, tilting);
+    let turned = |k: usize| {
+        let contacts = &contacts[visits[k].pass];
+        let pass = visited(&passes[visits[k].pass], contacts, &visits[k], cutter, tilting)?;
+        Ok::<_, PlanError>(if is_closed(contacts) { pass } else { run_on(pass, tilting.axis, setup)? })
+    };
     let turned = work::parallel::try_map(visits.len(), turned)?;
     let passes = cleared(turned, cutter, tilting, notes, monitor)?;
     let interval = plane_interval(cutter, settings.step);
