@@ -13,7 +13,7 @@ use super::sections::{SectionError, SectionSides, Sections};
 use crate::fairing::{Faired, Fairing, FairingError, FairingMethod};
 use crate::loft::{Loft, LoftError, LoftSection};
 use crate::loft_of_offsets;
-use geometry::{CubicSpline, Isometry3, NurbsSurface, Point2, SplineError, Vector3};
+use geometry::{CubicSpline, Isometry3, NurbsSurface, Point2, SplineError, Vector2, Vector3};
 
 /// Surfaces follow the curves of the sections to this, mm: a tenth of the least chord tolerance in use.
 const LOFT_TOLERANCE: f64 = 1e-4;
@@ -126,6 +126,28 @@ pub struct BladeSection {
     pub spline: CubicSpline,
     /// Faired.
     pub faired: Option<Faired>,
+}
+
+/// Places from one point of a section to the next at which it is compared with its drawing.
+const COMPARED: usize = 8;
+
+impl BladeSection {
+    /// Where the faired curve lies from the drawn one, along the outward normal, mm: least and greatest. `None` if it was not
+    /// faired.
+    pub fn off_drawing(&self) -> Option<[f64; 2]> {
+        let faired = &self.faired.as_ref()?.spline;
+        let spans = self.spline.parameters().windows(2);
+        let places = spans.flat_map(|ends| {
+            (0..=COMPARED).map(|k| ends[0] + (ends[1] - ends[0]) * k as f64 / COMPARED as f64)
+        });
+        let off = places.filter_map(|t| {
+            let (drawn, tangent, _) = self.spline.jet(t);
+            // Curves run counter-clockwise about the material.
+            let outward = Vector2::new(tangent.y, -tangent.x).try_normalize(0.0)?;
+            Some((faired.point(t) - drawn).dot(&outward))
+        });
+        Some(off.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], x| [least.min(x), most.max(x)]))
+    }
 }
 
 /// One curve of all sections, counter-clockwise about the material.
@@ -290,7 +312,7 @@ impl SplineMaker {
             source,
         })?;
         let fair = |&(method, most): &(FairingMethod, f64)| {
-            let fairing = Fairing { method, ..Fairing::within(most) };
+            let fairing = Fairing::of_noise(method, most, &spline);
             fairing.apply(&spline).map_err(|source| BladeError::Fairing { section, height, source })
         };
         let faired = self.fairing.as_ref().map(fair).transpose()?;

@@ -12,7 +12,5 @@ mod loft;
 pub mod sections;
 
 pub use blade::{Blade, BladeCurve, BladeError, BladeSection, BladeSettings, BladeSide};
-pub use fairing::{
-    Faired, Fairing, FairingError, FairingMethod, FairingStop, JUMP_REMOVING_STEP, jump_energy,
-};
+pub use fairing::{Faired, Fairing, FairingError, FairingMethod, JUMP_REMOVING_STEP, jump_energy, noise};
 pub use loft::{Loft, LoftError, LoftSection, loft, loft_of_offsets};

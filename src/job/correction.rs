@@ -29,7 +29,7 @@ use super::{JobError, Session};
 const MOST_ROUNDS: usize = 6;
 
 /// Most plans that are made again after all was measured: each costs as much as the whole run without correction.
-const MOST_MEASURED: usize = 2;
+const MOST_MEASURED: usize = 3;
 
 /// The same while the best plan stands above the target by no more than [`SLACK`]: what is left is little, and its cost is not in
 /// vain.

@@ -137,3 +137,24 @@ fn a_blade_can_be_turned_and_moved() {
     let (p, q) = (moved.surfaces[0].point(0.3, 0.7), placed * here.surfaces[0].point(0.3, 0.7));
     assert!((p - q).norm() < 1e-12);
 }
+
+/// A section with a bump of 20 µm at one point: faired by what is published, it lies off its drawing where the bump was, by no more
+/// than the bump moved.
+#[test]
+fn what_fairing_moved_is_told_as_a_distance_from_the_drawing() {
+    let mut outline = oval([12.0, 2.0], 0.0, 1.0);
+    // The normal of the upper side there is nearly upright.
+    outline[30].y += 0.02;
+    let section = |height: f64| Section { height, outline: Outline::Closed(outline.clone()) };
+    let sections = Sections::new((0..4).map(|k| section(10.0 * f64::from(k))).collect()).unwrap();
+    let fairing = Some((FairingMethod::Published { neighbours: 1 }, 0.05));
+    let blade = Blade::new(&sections, &BladeSettings { fairing, ..settings(BladeSide::Around) }).unwrap();
+    for section in &blade.sections {
+        let [least, most] = section.off_drawing().unwrap();
+        let moved = section.faired.as_ref().unwrap().furthest();
+        assert!((0.01..0.02).contains(&moved), "{moved}");
+        assert!((least + moved).abs() < 0.05 * moved && most < 0.3 * moved, "{least} {most} {moved}");
+    }
+    let drawn = Blade::new(&sections, &settings(BladeSide::Around)).unwrap();
+    assert!(drawn.sections.iter().all(|section| section.off_drawing().is_none()));
+}

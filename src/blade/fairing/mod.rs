@@ -22,17 +22,26 @@
 mod control_points;
 mod energy;
 mod kjellander;
+mod noise;
+mod published;
 mod relaxation;
 #[cfg(test)]
 mod tests;
 
 pub use kjellander::JUMP_REMOVING_STEP;
+pub use noise::noise;
 
 use geometry::{CubicSpline, KnotError, SplineError, Vector2};
 use relaxation::{Relaxation, State, Unknown};
 
 /// Rounds at most. Moves grow slower and slower as waves grow longer; what is left after so many is shape.
 const MOST_ROUNDS: usize = 1000;
+
+/// No point is moved by more than this many times the noise of the points: what a curve shows besides is shape.
+const MOST_NOISE: f64 = 2.0;
+
+/// Least cap, mm, of a curve without noise.
+const LEAST_CAP: f64 = 1e-9;
 
 /// Steps at which moving one point back and forth no longer settles: twice that which removes its jump.
 const MOST_STEP: f64 = 2.0 * JUMP_REMOVING_STEP;
@@ -53,17 +62,12 @@ pub enum FairingMethod {
     /// The control point whose move lowers the jump energy most goes to where it is least (Eck and
     /// Hadenfeldt).
     Energy,
-}
-
-/// When to stop. A round is as many moves as there are unknowns.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum FairingStop {
-    /// A round changes the curve's length by less than this, mm: Kjellander's rule, who took 0.01. Jumps are
-    /// mostly gone by then, long waves are not.
-    Length(f64),
-    /// No point has moved further than this in a round, mm. A 250th of the cap leaves long waves only, which
-    /// are shape.
-    Movement(f64),
+    /// The worst point goes to its corrected place, one a round, until the greatest distance hardly changes: as published
+    /// ([`published`]).
+    Published {
+        /// Points on each side between which the corrected place is sought: 1 for Kjellander's.
+        neighbours: usize,
+    },
 }
 
 /// How to fair a curve.
@@ -73,8 +77,9 @@ pub struct Fairing {
     pub method: FairingMethod,
     /// How far any point may end from its first place, mm, above 0.
     pub most_displacement: f64,
-    /// When to stop.
-    pub stop: FairingStop,
+    /// It ends when no point has moved further than this in a round of as many moves as there are unknowns, mm. A 250th of the
+    /// cap leaves long waves only, which are shape. What is published has a rule of its own.
+    pub least_movement: f64,
 }
 
 /// Why a curve was not faired.
@@ -91,6 +96,9 @@ pub enum FairingError {
     /// Kjellander's step.
     #[error("the step is {0}; it must be above 0 and below {MOST_STEP:.3} (1 as published)")]
     Step(f64),
+    /// Neighbours of the published method.
+    #[error("a corrected place needs a neighbour on each side; 1 is Kjellander's")]
+    NoNeighbours,
     /// Moved points let no spline through.
     #[error("fairing brought points together ({0}); allow less displacement, or delete close points")]
     Moved(SplineError),
@@ -125,6 +133,18 @@ pub struct Faired {
 }
 
 impl Faired {
+    fn unmoved(spline: &CubicSpline) -> Self {
+        Self {
+            spline: spline.clone(),
+            moved: Vec::new(),
+            moves: 0,
+            rounds: 0,
+            settled: false,
+            jump_energy: [jump_energy(spline); 2],
+            length: [spline.arc_length().total(); 2],
+        }
+    }
+
     /// The greatest displacement, mm.
     pub fn furthest(&self) -> f64 {
         self.moved.iter().map(|(_, way)| way.norm()).fold(0.0, f64::max)
@@ -141,7 +161,17 @@ impl Fairing {
     /// `most_displacement`, mm, in a round.
     pub fn within(most_displacement: f64) -> Self {
         let method = FairingMethod::Kjellander { step: JUMP_REMOVING_STEP };
-        Self { method, most_displacement, stop: FairingStop::Movement(0.004 * most_displacement) }
+        Self { method, most_displacement, least_movement: 0.004 * most_displacement }
+    }
+
+    /// By a method, no point further than `most_displacement`, mm, nor than twice the noise of the curve: a smooth one
+    /// stays. What is published knows nothing of noise.
+    pub fn of_noise(method: FairingMethod, most_displacement: f64, spline: &CubicSpline) -> Self {
+        let most = match method {
+            FairingMethod::Published { .. } => most_displacement,
+            _ => most_displacement.min((MOST_NOISE * noise(spline)).max(LEAST_CAP)),
+        };
+        Self { method, ..Self::within(most) }
     }
 
     /// Fairs a curve.
@@ -150,17 +180,12 @@ impl Fairing {
     /// Options out of range, and points that the displacement brought together.
     pub fn apply(&self, spline: &CubicSpline) -> Result<Faired, FairingError> {
         self.check()?;
+        if let FairingMethod::Published { neighbours } = self.method {
+            return published::fair(spline, neighbours, self.most_displacement);
+        }
         let relaxation =
             Relaxation::new(self.unknowns(spline)?, spline.points().len(), self.most_displacement);
-        let mut faired = Faired {
-            spline: spline.clone(),
-            moved: Vec::new(),
-            moves: 0,
-            rounds: 0,
-            settled: relaxation.is_empty(),
-            jump_energy: [jump_energy(spline); 2],
-            length: [spline.arc_length().total(); 2],
-        };
+        let mut faired = Faired { settled: relaxation.is_empty(), ..Faired::unmoved(spline) };
         let mut displacements = vec![Vector2::zeros(); spline.points().len()];
         while !faired.settled && faired.rounds < MOST_ROUNDS {
             let mut state =
@@ -172,21 +197,19 @@ impl Fairing {
             let furthest = ways.fold(0.0, f64::max);
             displacements = state.displacements;
             faired.spline = displaced(spline, &displacements)?;
-            let before = std::mem::replace(&mut faired.length[1], faired.spline.arc_length().total());
-            faired.settled = match self.stop {
-                FairingStop::Length(least) => (faired.length[1] - before).abs() < least,
-                FairingStop::Movement(least) => furthest < least,
-            };
+            faired.settled = furthest < self.least_movement;
         }
+        faired.length[1] = faired.spline.arc_length().total();
         faired.jump_energy[1] = jump_energy(&faired.spline);
         faired.moved = displacements.into_iter().enumerate().filter(|(_, way)| way.norm() > 0.0).collect();
         Ok(faired)
     }
 
     fn check(&self) -> Result<(), FairingError> {
-        let (FairingStop::Length(stop) | FairingStop::Movement(stop)) = self.stop;
-        let lengths =
-            [("the greatest displacement", self.most_displacement), ("the length that stops fairing", stop)];
+        let lengths = [
+            ("the greatest displacement", self.most_displacement),
+            ("the movement that ends fairing", self.least_movement),
+        ];
         if let Some((what, value)) =
             lengths.into_iter().find(|(_, value)| !(value.is_finite() && *value > 0.0))
         {
@@ -196,6 +219,7 @@ impl Fairing {
             FairingMethod::Kjellander { step } if !(step > 0.0 && step < MOST_STEP) => {
                 Err(FairingError::Step(step))
             }
+            FairingMethod::Published { neighbours: 0 } => Err(FairingError::NoNeighbours),
             _ => Ok(()),
         }
     }
@@ -209,6 +233,7 @@ impl Fairing {
             FairingMethod::Kjellander { step } => kjellander::unknowns(spline, step),
             FairingMethod::ControlPoints => control_points::unknowns(spline),
             FairingMethod::Energy => energy::unknowns(spline),
+            FairingMethod::Published { .. } => Ok(Vec::new()),
         }
     }
 }

@@ -252,20 +252,42 @@ fn a_noisy_section_loses_its_jumps_within_the_cap() {
         let clean = through(if closed { blade(200) } else { side(200) }, closed);
         let rough = through(noisy(clean.points(), normal), closed);
         for method in METHODS {
-            for stop in [FairingStop::Length(0.01), FairingStop::Movement(0.0005)] {
-                let faired = Fairing { method, most_displacement: 0.05, stop }.apply(&rough).unwrap();
-                let [before, after] = faired.jump_energy;
-                assert!(after < 0.01 * before, "{method:?} {stop:?} {closed} {normal}: {}", after / before);
-                assert!(faired.settled && faired.furthest() <= 0.05);
-                assert_eq!(before, jump_energy(&rough));
-                assert!((after / jump_energy(&faired.spline) - 1.0).abs() < 1e-12);
-                assert!(faired.length[1] < faired.length[0]);
-                if let (FairingStop::Movement(_), true) = (stop, closed) {
-                    let [was, is] = [&rough, &faired.spline].map(|s| curvature_error(s, &clean));
-                    assert!(is < 0.5 * was, "{method:?} {normal}: {was} {is}");
-                }
+            let faired = Fairing { method, ..Fairing::within(0.05) }.apply(&rough).unwrap();
+            let [before, after] = faired.jump_energy;
+            assert!(after < 0.01 * before, "{method:?} {closed} {normal}: {}", after / before);
+            assert!(faired.settled && faired.furthest() <= 0.05);
+            assert_eq!(before, jump_energy(&rough));
+            assert!((after / jump_energy(&faired.spline) - 1.0).abs() < 1e-12);
+            assert!(faired.length[1] < faired.length[0]);
+            if closed {
+                let [was, is] = [&rough, &faired.spline].map(|s| curvature_error(s, &clean));
+                assert!(is < 0.5 * was, "{method:?} {normal}: {was} {is}");
             }
         }
+    }
+}
+
+/// Sections as a table has them, with decimals of a thousandth or a tenth of that: no point of them moves by a tenth of the cap.
+/// With noise the cap is the user's.
+#[test]
+fn smooth_sections_stay_within_a_tenth_of_the_cap() {
+    const CAP: f64 = 0.02;
+    for (n, decimals) in [(40, 1e4), (60, 1e4), (200, 1e4), (200, 1e3)] {
+        let rounded = |p: &Point2| Point2::from(p.coords.map(|x| (x * decimals).round() / decimals));
+        let table: Vec<Point2> = side(n).iter().map(rounded).collect();
+        for spline in [through(table.clone(), false), through(blade(2 * n), true)] {
+            for method in METHODS {
+                let faired = Fairing::of_noise(method, CAP, &spline).apply(&spline).unwrap();
+                assert!(faired.furthest() <= 0.1 * CAP, "{n} {decimals} {method:?}: {}", faired.furthest());
+            }
+        }
+    }
+    for normal in [false, true] {
+        let rough = through(noisy(&blade(200), normal), true);
+        let found = noise(&rough);
+        let truth = if normal { 0.05 } else { 0.05 / 2.0f64.sqrt() };
+        assert!((found / truth - 1.0).abs() < 0.2, "{normal}: {found} {truth}");
+        assert_eq!(Fairing::of_noise(METHODS[1], CAP, &rough).most_displacement, CAP);
     }
 }
 
@@ -291,8 +313,8 @@ fn without_caps_all_becomes_one_cubic() {
     let points: Vec<Point2> = (0..9).map(|k| Point2::new(f64::from(k), random())).collect();
     let spline = through(points, false);
     for method in METHODS {
-        let stop = FairingStop::Movement(1e-9);
-        let faired = Fairing { method, most_displacement: 10.0, stop }.apply(&spline).unwrap();
+        let faired =
+            Fairing { method, most_displacement: 10.0, least_movement: 1e-9 }.apply(&spline).unwrap();
         let [before, after] = faired.jump_energy;
         assert!(after < 1e-9 * before, "{method:?} {after} {before} {}", faired.rounds);
     }
@@ -307,9 +329,11 @@ fn options_out_of_range_are_refused() {
             Err(FairingError::Length { what, .. }) => assert_eq!(what, "the greatest displacement"),
             other => panic!("{other:?}"),
         }
-        let stop = FairingStop::Length(bad);
-        assert!(matches!(Fairing { stop, ..good }.apply(&spline), Err(FairingError::Length { .. })));
+        let refused = Fairing { least_movement: bad, ..good }.apply(&spline);
+        assert!(matches!(refused, Err(FairingError::Length { .. })));
     }
+    let method = FairingMethod::Published { neighbours: 0 };
+    assert!(matches!(Fairing { method, ..good }.apply(&spline), Err(FairingError::NoNeighbours)));
     for step in [0.0, 3.4, f64::NAN] {
         let method = FairingMethod::Kjellander { step };
         let refused = Fairing { method, ..good }.apply(&spline).unwrap_err();

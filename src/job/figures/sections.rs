@@ -1,12 +1,23 @@
 //! Deviation at the sections of a blade.
 
-use metrology::{View, section_figures};
+use metrology::{SectionFigures, View, section_figures};
 use report::{Figure, FigureTable, micrometres};
+use serde::Serialize;
 use work::monitor::Monitor;
 
 use super::value;
 use crate::JobError;
 use crate::run::{Finding, Run};
+
+/// A section as the report has it.
+#[derive(Serialize)]
+struct Row {
+    #[serde(flatten)]
+    at: SectionFigures,
+    /// Between these the deviation from the drawn curve lies, where the section was faired.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    from_drawing_mm: Option<[f64; 2]>,
+}
 
 /// Of blades that are measured along their normals.
 pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> {
@@ -17,9 +28,27 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
     if sections.is_empty() {
         return Ok(Finding::default());
     }
+    // All curves of a section together.
+    let off = |height: f64| {
+        let of = blade.sections.iter().filter(|section| section.height == height);
+        let ends = of.filter_map(|section| section.off_drawing());
+        ends.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
+    };
+    let rows: Vec<Row> = sections
+        .into_iter()
+        .map(|at| {
+            let from_drawing_mm =
+                off(at.height_mm).map(|[least, most]| [at.min_mm + least, at.max_mm + most]);
+            Row { at, from_drawing_mm }
+        })
+        .collect();
     let um = |length| micrometres(Some(length));
-    let row = |s: &metrology::SectionFigures| {
+    let row = |row: &Row| {
+        let s = &row.at;
         let places = s.places.to_string();
+        let drawn = row
+            .from_drawing_mm
+            .map_or(String::new(), |[least, most]| format!("{} to {}", um(least), um(most)));
         vec![
             format!("{:.3}", s.height_mm),
             um(s.min_mm),
@@ -27,15 +56,24 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
             um(s.mean_mm),
             places,
             format!("{:.3}", s.row_off_mm),
+            drawn,
         ]
     };
     let table = FigureTable {
         title: "Deviation at the sections",
-        caption: "At the row of places nearest to each section, along the normals of the design.",
-        columns: vec!["height mm", "from µm", "to µm", "mean µm", "places", "rows off it, mm"],
-        rows: sections.iter().map(row).collect(),
+        caption: "At the row of places nearest to each section, along the normals of the design. Where the section was faired, the \
+                  last column bounds the deviation from the curve as it was drawn.",
+        columns: vec![
+            "height mm",
+            "from µm",
+            "to µm",
+            "mean µm",
+            "places",
+            "rows off it, mm",
+            "from the drawing µm",
+        ],
+        rows: rows.iter().map(row).collect(),
     };
-    let figure =
-        Figure { key: "sections", value: value(&sections)?, table: Some(table), ..Figure::default() };
+    let figure = Figure { key: "sections", value: value(&rows)?, table: Some(table), ..Figure::default() };
     Ok(Finding { figure: Some(figure), ..Finding::default() })
 }

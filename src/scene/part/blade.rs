@@ -25,11 +25,20 @@ const SIDES: [(&str, BladeSide); 5] = [
 ];
 
 /// Words for the method of fairing.
-const METHODS: [(&str, FairingMethod); 3] = [
+const METHODS: [(&str, FairingMethod); 4] = [
     ("kjellander", FairingMethod::Kjellander { step: JUMP_REMOVING_STEP }),
     ("control-points", FairingMethod::ControlPoints),
     ("energy", FairingMethod::Energy),
+    ("published", FairingMethod::Published { neighbours: 1 }),
 ];
+
+/// Most neighbours on each side for a corrected place.
+const MOST_NEIGHBOURS: u32 = 20;
+
+fn word(method: FairingMethod) -> &'static str {
+    let same = |m: &FairingMethod| std::mem::discriminant(m) == std::mem::discriminant(&method);
+    METHODS.iter().find(|(_, m)| same(m)).map_or(METHODS[0].0, |(word, _)| word)
+}
 
 /// What is made of a section table.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,9 +56,22 @@ pub struct BladeRequest {
 }
 
 fn read_fairing(table: &Section<'_>) -> Result<(FairingMethod, f64), SceneError> {
-    table.only(&["method", "tolerance"], &[], "`fairing`")?;
-    let method = table.required_word("method", &METHODS.map(|(word, _)| word))?;
-    let method = METHODS.iter().find(|(word, _)| *word == method.value).unwrap_or(&METHODS[0]).1;
+    table.only(&["method", "tolerance", "neighbours"], &[], "`fairing`")?;
+    let word = table.required_word("method", &METHODS.map(|(word, _)| word))?;
+    let method = METHODS.iter().find(|(known, _)| *known == word.value).unwrap_or(&METHODS[0]).1;
+    let method = match (method, table.count("neighbours", 1..=MOST_NEIGHBOURS)?) {
+        (FairingMethod::Published { .. }, Some(count)) => {
+            FairingMethod::Published { neighbours: count as usize }
+        }
+        (_, Some(_)) => {
+            return Err(table.error(
+                &table.key_span("neighbours"),
+                format!("`neighbours` says nothing to the method \"{}\"", word.value),
+                "remove it, or write `method = \"published\"`",
+            ));
+        }
+        (method, None) => method,
+    };
     let tolerance = table.required_number("tolerance", LENGTH, " mm", 0.05)?.value;
     Ok((method, tolerance))
 }
@@ -104,12 +126,17 @@ impl Source for BladeRequest {
             writeln!(out, "pitch = {}  # mm to the second blade", list(pitch.into()))?;
         }
         match self.fairing {
-            Some((method, tolerance)) => writeln!(
-                out,
-                "fairing = {{ method = \"{}\", tolerance = {} }}  # mm that a point may move",
-                METHODS.iter().find(|(_, m)| *m == method).map_or("kjellander", |(word, _)| word),
-                toml_number(tolerance)
-            ),
+            Some((method, tolerance)) => {
+                let neighbours = match method {
+                    FairingMethod::Published { neighbours } => format!(", neighbours = {neighbours}"),
+                    _ => String::new(),
+                };
+                let (word, tolerance) = (word(method), toml_number(tolerance));
+                writeln!(
+                    out,
+                    "fairing = {{ method = \"{word}\", tolerance = {tolerance}{neighbours} }}  # mm that a point may move"
+                )
+            }
             None => writeln!(out, "fairing = \"none\""),
         }
     }
@@ -137,5 +164,29 @@ impl Source for BladeRequest {
         let part = Part::from_oriented_patches(patches, tolerance).map_err(|e| job.refused(file, e))?;
         let notes = blade.notes();
         Ok(Loaded { blade: Some(blade), notes, ..Loaded::from(part) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::Scene;
+
+    fn scene(fairing: &str) -> Result<Scene, keys::SceneError> {
+        let part = format!("[part]\nsections = \"rotor.txt\"\nfairing = {fairing}\n");
+        let rest = "[cutter]\nshape = \"ball\"\ndiameter = 4\n[tolerance]\nscallop = 0.01\n[[toolpath]]\nstrategy = \"zigzag\"\n";
+        Scene::parse("rotor.toml", part + rest)
+    }
+
+    #[test]
+    fn the_published_loop_takes_neighbours_and_no_other_method_does() {
+        let read = scene("{ method = \"published\", tolerance = 0.02, neighbours = 3 }").unwrap();
+        let written = crate::complete_toml(&read);
+        assert!(written.contains("method = \"published\", tolerance = 0.02, neighbours = 3"), "{written}");
+        let refused = scene("{ method = \"energy\", tolerance = 0.02, neighbours = 3 }").unwrap_err();
+        assert!(
+            refused.to_string().contains("`neighbours` says nothing to the method \"energy\""),
+            "{refused}"
+        );
+        assert!(scene("{ method = \"published\", tolerance = 0.02, neighbours = 0 }").is_err());
     }
 }
