@@ -47,7 +47,8 @@ pub struct CutSurface<'a> {
     pub envelope: Envelope,
     /// Heights and winners at cell centres.
     pub cut: &'a ZMap,
-    path: &'a Toolpath,
+    /// What cut.
+    pub path: &'a Toolpath,
 }
 
 /// Most steps along the program in search of a lower move. Reached only where moves are some

@@ -21,6 +21,7 @@
 //! than the highest scallop. So a tall scallop, or half of one at the border, is a bad scallop and not an uncut place.
 
 mod along_normals;
+mod border_cuts;
 mod closer;
 mod contact;
 mod coverage;

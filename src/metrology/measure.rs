@@ -104,6 +104,9 @@ pub fn measure_with_walls(
     }
     let refinement = Refinement { coarse: &inspection, path, asked, highest_ridge };
     measured.refined = refinement.run(&hidden, &hiding, &mut measured, monitor)?;
+    if asked.borders {
+        inspection.cut_borders(&mut measured.gouge, monitor)?;
+    }
     doubt(&mut measured, &surface, part, path, asked);
     let all: Vec<u32> = (0..path.len() as u32).collect();
     let cut_away_by = |at: &Point3| {

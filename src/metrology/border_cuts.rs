@@ -1,0 +1,333 @@
+//! The deepest cut along the borders of what an upright cutter can face: a cutter that stands beside the part may cut its
+//! border between the centres of all cells. mm.
+//!
+//! Along a straight piece of a border, of a triangle with the normal n, the depth of one move along n is a concave function of
+//! the place: what the move sweeps is convex. So three places bound it between them, and halving finds its greatest.
+//!
+//! Limits: where only the side of the cutter reaches over the border, by less than the gouge tolerance, nothing is deeper than
+//! that; such places are left out.
+
+use std::collections::HashMap;
+
+use super::cut_surface::CutSurface;
+use super::facing::LEAST_FACING;
+use super::figures::{GougeFigures, GougeRegion, NUMERICAL_FLOOR};
+use super::inspection::Inspection;
+use geometry::{Point2, Point3, Vector3};
+use work::monitor::{self, Cancelled, Monitor};
+
+/// Pieces of borders are no longer than this many radii of the cutter.
+const LONGEST_PIECE: f64 = 2.0;
+
+/// Steps of Newton's method for the meeting of a normal with what a move sweeps; it converges from one side.
+const STEPS: usize = 24;
+
+/// Halvings of a piece at most: to a millionth of it.
+const MOST_HALVINGS: u32 = 20;
+
+/// A straight piece of the border.
+struct BorderPiece {
+    ends: [Point3; 2],
+    /// Of the triangle that it bounds.
+    normal: Vector3,
+    /// Unit vector along the triangle, square to the piece.
+    inward: Vector3,
+}
+
+/// The deepest cut of a move along a border.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct BorderCut {
+    depth: f64,
+    /// No place is deeper.
+    possible: f64,
+    at: Point3,
+    by: u32,
+}
+
+impl BorderPiece {
+    fn at(&self, share: f64) -> Point3 {
+        self.ends[0] + (self.ends[1] - self.ends[0]) * share
+    }
+}
+
+/// The borders of the triangles that face up.
+fn pieces(inspection: &Inspection<'_>) -> Vec<BorderPiece> {
+    let mesh = inspection.part.mesh();
+    let longest = LONGEST_PIECE * inspection.cutter.radius();
+    let faces = |t: usize| mesh.normal(t).z > LEAST_FACING;
+    let of_triangle = |t: usize| {
+        let (normal, corners) = (mesh.normal(t), mesh.corners(t));
+        let border = (0..3).filter(|&k| mesh.neighbour(t, k).is_none_or(|other| !faces(other)));
+        let sides = border.map(|k| [corners[k], corners[(k + 1) % 3]]);
+        let pieces = sides.flat_map(|[a, b]| {
+            let parts = ((b - a).norm() / longest).ceil().max(1.0) as usize;
+            let at = move |k: usize| a + (b - a) * (k as f64 / parts as f64);
+            let inward = normal.cross(&(b - a)).try_normalize(0.0);
+            let piece =
+                move |k: usize| Some(BorderPiece { ends: [at(k), at(k + 1)], normal, inward: inward? });
+            (0..parts).filter_map(piece)
+        });
+        pieces.collect::<Vec<_>>()
+    };
+    (0..mesh.triangles().len()).filter(|&t| faces(t)).flat_map(of_triangle).collect()
+}
+
+/// Which squares of the plan pieces come within a radius of.
+struct Nearby {
+    side: f64,
+    of: HashMap<[i64; 2], Vec<u32>>,
+}
+
+impl Nearby {
+    fn new(pieces: &[BorderPiece], radius: f64) -> Self {
+        let (side, mut of) = (radius, HashMap::<[i64; 2], Vec<u32>>::new());
+        for (k, piece) in pieces.iter().enumerate() {
+            let [x, y] = [0, 1].map(|c| {
+                let [a, b] = piece.ends.map(|end| end[c]);
+                // A radius to both sides, and what lies between the places of a move that are asked for.
+                let [low, high] = [a.min(b) - 2.0 * radius, a.max(b) + 2.0 * radius];
+                (low / side).floor() as i64..=(high / side).floor() as i64
+            });
+            for i in x {
+                for j in y.clone() {
+                    of.entry([i, j]).or_default().push(k as u32);
+                }
+            }
+        }
+        Self { side, of }
+    }
+
+    /// The pieces near a stretch of the plan, each once.
+    fn along(&self, from: Point2, to: Point2) -> Vec<u32> {
+        let steps = ((to - from).norm() / self.side).ceil().max(1.0) as usize;
+        let square = |k: usize| {
+            let q = from + (to - from) * (k as f64 / steps as f64);
+            [q.x, q.y].map(|x| (x / self.side).floor() as i64)
+        };
+        let mut found: Vec<u32> =
+            (0..=steps).filter_map(|k| self.of.get(&square(k))).flatten().copied().collect();
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+}
+
+/// How deep a move cuts at a place along a normal, negative above it; `None` where it does not pass.
+fn depth(surface: &CutSurface<'_>, by: u32, place: &Point3, normal: &Vector3) -> Option<f64> {
+    let mut t = 0.0;
+    for _ in 0..STEPS {
+        let q = place - normal * t;
+        let (z, m) = surface.envelope.height_and_normal(by, q.x, q.y)?;
+        let gap = q.z - z;
+        let facing = m.dot(normal);
+        if gap.abs() < 0.1 * NUMERICAL_FLOOR || facing <= 0.0 {
+            break;
+        }
+        t += gap * m.z / facing;
+    }
+    Some(t)
+}
+
+/// The share of a piece at which it comes nearest to a stretch of the plan: by turns, which converges on straight lines.
+fn nearest_share(piece: &BorderPiece, from: Point2, to: Point2) -> f64 {
+    const TURNS: usize = 20;
+    let [a, b] = piece.ends.map(|end| end.xy());
+    let share = |[from, to]: [Point2; 2], p: Point2| {
+        let way = to - from;
+        ((p - from).dot(&way) / way.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
+    };
+    let mut s = 0.5;
+    for _ in 0..TURNS {
+        let there = from + (to - from) * share([from, to], a + (b - a) * s);
+        s = share([a, b], there);
+    }
+    s
+}
+
+impl Inspection<'_> {
+    /// Takes into the figures what moves cut along the borders.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn cut_borders(&self, gouge: &mut GougeFigures, monitor: &dyn Monitor) -> Result<(), Cancelled> {
+        let pieces = pieces(self);
+        let nearby = Nearby::new(&pieces, self.cutter.radius());
+        let path = self.surface.path;
+        let known = gouge.max_depth_mm;
+        let cuts = work::parallel::try_map(path.len(), |k| {
+            monitor::check(monitor)?;
+            let (from, to) = (path.start_of(k), path.moves[k].to.tip);
+            let near = nearby.along(from.xy(), to.xy());
+            let lowest = from.z.min(to.z);
+            let reached = near
+                .iter()
+                .map(|&piece| &pieces[piece as usize])
+                .filter(|piece| piece.ends[0].z.max(piece.ends[1].z) > lowest);
+            let cuts = reached.filter_map(|piece| {
+                let share = nearest_share(piece, from.xy(), to.xy());
+                self.deepest_on(piece, k as u32, share, known)
+            });
+            Ok(cuts.reduce(deeper))
+        })?;
+        let Some(cut) = cuts.into_iter().flatten().reduce(deeper) else { return Ok(()) };
+        // Borders of patches are chords of the true ones.
+        let chords = if self.part.patches().is_empty() { 0.0 } else { 2.0 * self.part.mesh_deviation() };
+        let most = (gouge.max_depth_mm + gouge.error_bound_mm).max(cut.possible + chords + NUMERICAL_FLOOR);
+        if cut.depth > gouge.max_depth_mm {
+            gouge.max_depth_mm = cut.depth;
+            if cut.depth > self.limits.gouge {
+                let region = GougeRegion {
+                    depth_mm: cut.depth,
+                    at_mm: cut.at.into(),
+                    move_index: cut.by,
+                    ..GougeRegion::default()
+                };
+                gouge.regions.insert(0, region);
+                gouge.region_count += 1;
+            }
+        }
+        gouge.error_bound_mm = most - gouge.max_depth_mm;
+        Ok(())
+    }
+
+    /// The deepest place of a move along a piece, where it may be deeper than `known`; it comes nearest at a share.
+    fn deepest_on(&self, piece: &BorderPiece, by: u32, nearest: f64, known: f64) -> Option<BorderCut> {
+        let value = |share: f64| {
+            let place = piece.at(share);
+            // The side alone does not reach so far.
+            let inside = place + piece.inward * self.limits.gouge;
+            self.surface.envelope.height(by, inside.x, inside.y)?;
+            depth(self.surface, by, &place, &piece.normal)
+        };
+        let mut best: Option<(f64, f64)> = None;
+        let mut left = f64::NEG_INFINITY;
+        let (first, last) = (value(0.0), value(1.0));
+        let middle = value(nearest);
+        let mut open =
+            vec![(0.0, first, nearest, middle, MOST_HALVINGS), (nearest, middle, 1.0, last, MOST_HALVINGS)];
+        let mut keep = |share: f64, found: Option<f64>| {
+            if let Some(found) = found.filter(|found| best.is_none_or(|(most, _)| *found > most)) {
+                best = Some((found, share));
+            }
+            best.map_or(known, |(most, _)| most.max(known))
+        };
+        keep(0.0, first);
+        keep(1.0, last);
+        keep(nearest, middle);
+        while let Some((a, at_a, b, at_b, halvings)) = open.pop() {
+            if at_a.is_none() && at_b.is_none() || b <= a {
+                continue;
+            }
+            let m = 0.5 * (a + b);
+            let at_m = value(m);
+            let most = keep(m, at_m);
+            let possible = match (at_a, at_m, at_b) {
+                (Some(a), Some(m), Some(b)) => m.max(a).max(b).max(2.0 * m - a.min(b)),
+                (None, None, _) | (_, None, None) if halvings == 0 => f64::NEG_INFINITY,
+                _ => f64::INFINITY,
+            };
+            if possible <= most + NUMERICAL_FLOOR {
+                left = left.max(possible);
+            } else if halvings == 0 {
+                left = left.max(most + NUMERICAL_FLOOR);
+            } else {
+                open.push((a, at_a, m, at_m, halvings - 1));
+                open.push((m, at_m, b, at_b, halvings - 1));
+            }
+        }
+        let (found, share) = best?;
+        let possible = left.max(found);
+        if possible <= known {
+            return None;
+        }
+        let place = piece.at(share);
+        let foot = self.part.closest_point(&place).0;
+        // What lies under something else is not seen from above.
+        let seen = place + piece.inward * self.limits.gouge;
+        let top = self.part.highest_at(seen.x, seen.y)?;
+        if (top.point - foot.point).dot(&foot.normal) > self.limits.gouge / foot.normal.z.max(LEAST_FACING) {
+            return None;
+        }
+        let exact = depth(self.surface, by, &foot.point, &foot.normal).unwrap_or(found);
+        let of_walls =
+            |depth: f64| self.walls.map_or(depth, |walls| -walls.beside(&foot.point, -depth.max(0.0)));
+        Some(BorderCut {
+            depth: of_walls(exact),
+            possible: of_walls(possible.max(exact)),
+            at: foot.point,
+            by,
+        })
+    }
+}
+
+/// The deeper of two cuts, the first of equals, with what both may be at most.
+fn deeper(a: BorderCut, b: BorderCut) -> BorderCut {
+    let possible = a.possible.max(b.possible);
+    BorderCut { possible, ..if b.depth > a.depth { b } else { a } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::figures::Limits;
+    use crate::flat_scene::{path, plane};
+    use crate::{Asked, measure};
+    use cutter::Cutter;
+    use sim::{Grid, ZMap, cut};
+    use work::monitor::Silent;
+
+    const LIMITS: Limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.001 };
+
+    fn gouge(cutter: &Cutter, plunge: Point3, cell: f64) -> GougeFigures {
+        let part = plane([8.0, 6.0]);
+        let lines = (0..13).map(|k| 0.5 * f64::from(k));
+        let mut passes: Vec<Vec<Point3>> =
+            lines.map(|y| [-5.0, 13.0].map(|x| Point3::new(x, y, 0.0)).to_vec()).collect();
+        passes.push(vec![Point3::new(plunge.x, plunge.y, 10.0), plunge]);
+        let path = path(&passes);
+        let grid = Grid::covering(&part.bounds(), cell, 64, 1 << 30).unwrap();
+        let cut = cut(ZMap::block(grid, 1.0), cutter, &path, &Silent).unwrap();
+        let asked = Asked {
+            error_bound: 5e-4,
+            stock_top: 1.0,
+            borders: true,
+            most_cells: 1 << 20,
+            most_squares: 1 << 20,
+        };
+        measure(&part, cutter, &path, &cut, &LIMITS, &asked, &Silent).unwrap().gouge
+    }
+
+    /// A ball plunges beside the part: the border is cut by what its sphere reaches over it, on cells of every size.
+    #[test]
+    fn what_a_cutter_beside_the_part_cuts_of_its_border_is_found() {
+        let ball = Cutter::ball(6.0).unwrap();
+        for (x, y, z, truth) in [
+            (-2.0, 3.03, -0.78, 5.0f64.sqrt() - 2.22),
+            (-1.2, -1.2, -0.55, (9.0f64 - 2.88).sqrt() - 2.45),
+            (-1.0, 3.0, -0.2, 8.0f64.sqrt() - 2.8),
+            (-1.0, 3.05, -0.19, 8.0f64.sqrt() - 2.81),
+            (-0.2, 3.05, -0.01, (9.0f64 - 0.04).sqrt() - 2.99),
+        ] {
+            // Coarse cells take long: one of them.
+            let cells = if x == -2.0 { vec![0.1, 0.5, 5.0] } else { vec![0.1] };
+            for cell in cells {
+                let found = gouge(&ball, Point3::new(x, y, z), cell);
+                let off = (found.max_depth_mm - truth).abs();
+                assert!(off <= found.error_bound_mm && off < 1e-6, "{x} {y} {cell}: {truth} {found:?}");
+                if truth > LIMITS.gouge {
+                    assert_eq!(found.regions[0].move_index as usize, 27, "{found:?}");
+                }
+            }
+        }
+    }
+
+    /// The side of a flat end mill reaches over the border by less than the tolerance: no gouge as deep as it stands. By more it is
+    /// one.
+    #[test]
+    fn the_side_of_a_cutter_is_no_gouge_as_far_as_the_tolerance_lets_it() {
+        let flat = Cutter::flat(6.0).unwrap();
+        let [little, much] = [2.999, 2.98].map(|x| gouge(&flat, Point3::new(-x, 3.0, -2.0), 0.1));
+        assert!(little.max_depth_mm < 1e-6, "{little:?}");
+        assert!((much.max_depth_mm - 2.0).abs() < 1e-6, "{much:?}");
+    }
+}
