@@ -19,6 +19,7 @@ mod meeting;
 mod mesh;
 mod normal;
 mod nurbs;
+mod polytope;
 mod region;
 #[doc(hidden)]
 pub mod samples;
@@ -38,6 +39,7 @@ pub use meeting::{Plane, into_cube, meeting};
 pub use mesh::{MeshError, Outside, RepairNotes, TriangleMesh};
 pub use normal::{inward, normal_at, unit_normal};
 pub use nurbs::{MAX_WEIGHT, NurbsError, NurbsSurface};
+pub use polytope::{HalfSpace, Polytope};
 pub use region::{MAX_OUTLINE_POINTS, Piece, Region, RegionError, first_crossing, inside_curve, signed_area};
 pub use segment_grid::{
     CurveSegment, NearestSegment, SegmentGrid, distance_of_segments, distance_to_segment, foot,

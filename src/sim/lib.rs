@@ -41,6 +41,6 @@ pub use standing::{FAR, NearStanding, StandingClearance, holder_clearance};
 pub use swept::SweptMove;
 pub use voxel::{
     BarAxis, HolderHit, LineExit, StandingHits, StockMesh, VoxelEngine, VoxelError, VoxelRemoval,
-    VoxelSample, VoxelStock, VoxelSurface, Voxels,
+    VoxelSample, VoxelStock, VoxelSurface, VoxelVolumes, Voxels,
 };
 pub use zmap::{NOT_CUT, ZMap};

@@ -2,8 +2,8 @@
 //!
 //! Enters: stock (a box, a round bar, a closed mesh), the tool as a [`Solid`] and a path. Leaves: the signed
 //! distance from the surface of the remaining material at the samples near it, each with the move that is
-//! nearest there; from those its volume, its heights, its surface as a closed triangle mesh and where a line leaves it; how
-//! much each move removes in the order of the program, and whether a holder runs into what still stands.
+//! nearest there; from those its heights, its surface as a closed triangle mesh and where a line leaves it; its volume
+//! between proven bounds; how much each move removes in the order of the program, and whether a holder runs into what still stands.
 //!
 //! The material is the stock less all that the tool sweeps, so its distance is the greater of that of the
 //! stock and the negative of that of the swept volume: exact in sign and at the surface, elsewhere no greater
@@ -24,6 +24,7 @@ mod line;
 mod moves;
 mod octree;
 mod removal;
+mod sheets;
 mod slide;
 mod standing;
 mod stock;
@@ -31,6 +32,7 @@ mod surface;
 #[cfg(test)]
 mod tests;
 mod vertex;
+mod volume;
 mod voxels;
 
 pub use engine::VoxelEngine;
@@ -40,4 +42,5 @@ pub use removal::VoxelRemoval;
 pub use standing::{HolderHit, StandingHits};
 pub use stock::{BarAxis, StockMesh, VoxelStock};
 pub use surface::VoxelSurface;
+pub use volume::VoxelVolumes;
 pub use voxels::{VoxelSample, Voxels};

@@ -1,10 +1,14 @@
 //! Five axes: the scenes that ship (`scenes/five_axes`), and what their reports must say.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use geometry::Vector3;
 use serde_json::Value;
 
-use crate::support::{height_mesh, is_good, number, patch, run_changed, run_scene, write_stl};
+use crate::support::{
+    height_mesh, is_good, number, patch, run_changed, run_scene, run_scene_into, write_stl,
+};
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/five_axes")
@@ -47,6 +51,32 @@ fn parts_are_those_of_their_generators() {
     }
 }
 
+/// Every edge of solid.stl is one of two triangles, once each way, by nothing but its coordinates. Nothing lies above the stock,
+/// and its volume is the figure's but for facets within voxels.
+fn its_solid_is_closed(path: &Value, results: &Path) {
+    let name: String = path["name"].as_str().unwrap().replace(' ', "-");
+    let folder = [name.as_str(), path["name"].as_str().unwrap()].map(|name| results.join(name));
+    let bytes = folder.iter().find_map(|folder| std::fs::read(folder.join("solid.stl")).ok()).unwrap();
+    let float = |at: usize| f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+    let (mut edges, mut volume) = (HashMap::<[[u32; 3]; 2], u32>::new(), 0.0);
+    for record in (84..bytes.len()).step_by(50) {
+        let corner = |k: usize| [0, 4, 8].map(|i| float(record + 12 + 12 * k + i));
+        let corners = [0, 1, 2].map(corner);
+        for k in 0..3 {
+            let edge = [corners[k], corners[(k + 1) % 3]].map(|q| q.map(|x| (x + 0.0).to_bits()));
+            *edges.entry(edge).or_default() += 1;
+        }
+        let [a, b, c] = corners.map(|q| Vector3::from(q.map(f64::from)));
+        volume += a.dot(&b.cross(&c)) / 6.0;
+    }
+    assert!(edges.len() > 1000, "{}", edges.len());
+    for ([a, b], count) in &edges {
+        assert_eq!((*count, edges.get(&[*b, *a])), (1, Some(&1)), "{}: {a:?}", path["name"]);
+    }
+    let [left, bound] = ["/solid/volume_mm3", "/solid/volume_error_bound_mm3"].map(|key| number(path, key));
+    assert!(bound < 2e-3 * left && (volume - left).abs() < 5e-3 * left, "{volume} {left} {bound}");
+}
+
 /// From pass to pass the tool stays near: around the part, the air is 0.6 to 3 times as long as all passes.
 fn stays_near(path: &Value) {
     let [air, cutting] = ["/path/air_length_mm", "/path/cutting_length_mm"].map(|key| number(path, key));
@@ -83,9 +113,12 @@ fn a_lead_makes_passes_on_a_dome_wider_as_shipped() {
 
 #[test]
 fn a_lip_is_cut_from_the_side_below_its_widest_place() {
-    let (_, report) = run_scene(&folder().join("lip.toml"));
+    let out = tempfile::tempdir().unwrap();
+    let results = out.path().join("out");
+    let (_, report) = run_scene_into(&folder().join("lip.toml"), &results);
     for path in report["toolpaths"].as_array().unwrap() {
         is_good(path);
+        its_solid_is_closed(path, &results);
         stays_near(path);
         takes_its_part_of_the_block(path);
         // The area of 100 degrees of the cylinder.

@@ -114,12 +114,16 @@ pub fn write_stl(path: &Path, triangles: &[[Point3; 3]]) {
 /// Runs a scene and returns its exit status and report.
 pub fn run_scene(scene: &Path) -> (i32, Value) {
     let out = tempfile::tempdir().unwrap();
-    let folder = out.path().join("out");
+    run_scene_into(scene, &out.path().join("out"))
+}
+
+/// As [`run_scene`], with a folder that keeps the results.
+pub fn run_scene_into(scene: &Path, folder: &Path) -> (i32, Value) {
     let output = Command::new(env!("CARGO_BIN_EXE_millstream"))
         .arg("run")
         .arg(scene)
         .arg("--out")
-        .arg(&folder)
+        .arg(folder)
         .output()
         .unwrap();
     let text = String::from_utf8_lossy(&output.stdout).into_owned();

@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use cutter::Solid;
-use motion::{ClPoint, Toolpath};
+use geometry::{Point3, round_down, round_up};
 use report::{Figure, FigureFile, FileContent};
-use sim::VoxelEngine;
+use sim::{VoxelEngine, VoxelVolumes};
 use work::monitor::Monitor;
 
 use super::value;
@@ -21,49 +21,49 @@ pub struct SolidFigures {
     pub bricks: usize,
     /// Volume that is left.
     pub volume_mm3: f64,
-    /// How much it differs from that by voxels twice as large: three times its error, which falls with their square.
-    pub volume_error_bound_mm3: f64,
+    /// Bound of its error: half of what lies between two proven volumes.
+    pub volume_error_bound_mm3: Option<f64>,
     /// Volume that was cut away.
     pub removed_mm3: f64,
-    /// As the bound of the volume that is left.
-    pub removed_error_bound_mm3: f64,
+    /// Bound of its error.
+    pub removed_error_bound_mm3: Option<f64>,
+    /// Why there are no bounds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<&'static str>,
     /// Triangles of solid.stl.
     pub triangles: usize,
 }
+
+/// Why a roughed block may have no bounds.
+const OPEN: &str = "beside the borders of an open surface nothing bounds what was roughed";
 
 /// Where the scene asks for voxels.
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
     let Some(voxel) = run.scene().simulation.voxel else { return Ok(Finding::default()) };
     let stock = run.session.voxel_stock();
     let tool = Solid::of_cutter(&run.scene().cutter, run.scene().holder.as_ref());
-    let left = run.budget().left(0);
+    let memory = run.budget().left(0);
     let engine = VoxelEngine::new(&stock, &tool, run.path()).map_err(run.voxels())?;
-    let voxels = engine.cut(voxel, left, monitor).map_err(run.voxels())?;
+    let voxels = engine.cut(voxel, memory, monitor).map_err(run.voxels())?;
     let surface = engine.surface(&voxels, monitor)?;
-    let vertices: Vec<[f32; 3]> =
-        surface.vertices.iter().map(|p| p.coords.map(|c| c as f32).into()).collect();
-    let uncut = Toolpath::new(ClPoint::upright(stock.bounds().max), Vec::new());
-    let untouched = VoxelEngine::new(&stock, &tool, &uncut).map_err(run.voxels())?;
-    let whole =
-        |voxel| Ok::<f64, JobError>(untouched.cut(voxel, left, monitor).map_err(run.voxels())?.volume());
-    let (volume_mm3, bricks) = (voxels.volume(), voxels.bricks());
-    drop(voxels);
-    let coarse = 2.0 * voxel;
-    let coarse_volume = engine.cut(coarse, left, monitor).map_err(run.voxels())?.volume();
-    // Stock with a closed form leaves what is removed to rounding.
-    let (fine_whole, coarse_whole) = match stock.volume() {
-        Some(exact) => (exact, exact),
-        None => (whole(voxel)?, whole(coarse)?),
-    };
-    let removed_mm3 = fine_whole - volume_mm3;
-    let coarse_removed = coarse_whole - coarse_volume;
+    // Rounding may not take them out of the block.
+    let bounds = stock.bounds();
+    let (least, most) = (bounds.min.map(round_up), bounds.max.map(round_down));
+    let narrow = |p: &Point3| p.map(|c| c as f32).sup(&least).inf(&most).into();
+    let vertices: Vec<[f32; 3]> = surface.vertices.iter().map(narrow).collect();
+    let VoxelVolumes { left, removed } = engine.volumes(voxel, monitor).map_err(run.voxels())?;
+    let [volume_mm3, removed_mm3] = [left, removed].map(|[low, high]| 0.5 * (low + high));
+    let roughed = run.scene().stock.roughed.is_some();
+    let reason = (roughed && !run.session.part.mesh().is_closed()).then_some(OPEN);
+    let [of_left, of_removed] = [left, removed].map(|[low, high]| 0.5 * (high - low));
     let figures = SolidFigures {
         voxel_mm: voxel,
-        bricks,
+        bricks: voxels.bricks(),
         volume_mm3,
-        volume_error_bound_mm3: (volume_mm3 - coarse_volume).abs(),
+        volume_error_bound_mm3: reason.is_none().then_some(of_left),
         removed_mm3,
-        removed_error_bound_mm3: (removed_mm3 - coarse_removed).abs(),
+        removed_error_bound_mm3: reason.is_none().then_some(of_removed),
+        reason,
         triangles: surface.triangles.len(),
     };
     let content = FileContent::Mesh { vertices, triangles: surface.triangles };

@@ -97,8 +97,6 @@ pub(super) struct Block {
     places: Vec<u16>,
     /// The brick at each place, `x + 8 (y + 8 z)`.
     table: Box<[u16]>,
-    /// Samples inside the material that stand in no brick.
-    pub(super) inside: u64,
 }
 
 impl Block {
@@ -106,7 +104,7 @@ impl Block {
     pub(super) const BYTES: u64 = (size_of::<Self>() + 2 * SAMPLES) as u64;
 
     pub(super) fn new(at: [u32; 3]) -> Self {
-        Self { at, bricks: Vec::new(), places: Vec::new(), table: vec![NONE; SAMPLES].into(), inside: 0 }
+        Self { at, bricks: Vec::new(), places: Vec::new(), table: vec![NONE; SAMPLES].into() }
     }
 
     /// Puts in the brick whose least sample is `low`.

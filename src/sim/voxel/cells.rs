@@ -2,6 +2,7 @@
 
 use super::bricks::{BRICK, Bricks, Placed, SAMPLES, slot_of};
 use crate::NOT_CUT;
+use geometry::Vector3;
 
 /// Samples along the side of a brick and its upper neighbours' first layer.
 const WIDE: usize = BRICK as usize + 1;
@@ -68,67 +69,28 @@ impl Cells {
             cut_by: slots.map(|s| self.cut_by[s]),
         })
     }
-
-    /// Samples of the brick inside the material.
-    pub(super) fn inside(&self) -> usize {
-        (0..SAMPLES).filter(|&cell| self.is_inside(cell)).count()
-    }
-
-    /// Whether the least corner of a cell lies inside the material.
-    pub(super) fn is_inside(&self, cell: usize) -> bool {
-        self.distances[cell % 8 + WIDE * (cell / 8 % 8 + WIDE * (cell / 64))] < 0
-    }
 }
 
 impl Corners {
-    /// Share of the cell that lies inside the material, by linear interpolation on six tetrahedra.
-    pub(super) fn share(&self) -> f64 {
-        /// Corners on the way from corner 0 to corner 7, one axis after the other.
-        const WAYS: [[usize; 2]; 6] = [[1, 3], [1, 5], [2, 3], [2, 6], [4, 5], [4, 6]];
-        let d = &self.distances;
-        WAYS.iter().map(|&[a, b]| negative_share([d[0], d[a], d[b], d[7]])).sum::<f64>() / 6.0
+    /// Which of them are inside the material: bit `k` is that of corner `k`.
+    pub(super) fn shape(&self) -> u8 {
+        self.distances.iter().enumerate().map(|(k, d)| u8::from(*d < 0.0) << k).sum()
     }
-}
 
-/// Share of a tetrahedron where the linear function with these values at its corners is negative.
-fn negative_share(mut values: [f64; 4]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    // How far from one corner to the other the sign changes.
-    let cross = |i: usize, j: usize| values[i] / (values[i] - values[j]);
-    match values.iter().filter(|v| **v < 0.0).count() {
-        0 => 0.0,
-        1 => cross(0, 1) * cross(0, 2) * cross(0, 3),
-        2 => {
-            let [a, b, c, d] = [cross(0, 2), cross(0, 3), cross(1, 2), cross(1, 3)];
-            a * b + a * d * (1.0 - b) + c * d * (1.0 - a)
+    /// The middle between the two places where the surface crosses the edges from a corner inside along a face square to
+    /// `axis`, from the least corner, in cells. It stays off the corners.
+    pub(super) fn beside(&self, corner: usize, axis: usize) -> Vector3 {
+        let mut place = Vector3::from_fn(|i, _| (corner >> i & 1) as f64);
+        for along in (0..3).filter(|i| *i != axis) {
+            let (inside, outside) = (self.distances[corner], self.distances[corner ^ 1 << along]);
+            let share = (inside / (inside - outside)).clamp(0.05, 0.95);
+            place[along] += 0.5 * share * (1.0 - 2.0 * place[along]);
         }
-        3 => 1.0 - cross(3, 0) * cross(3, 1) * cross(3, 2),
-        _ => 1.0,
+        place
     }
 }
 
 /// The cells of a brick in which the surface passes.
 pub(super) fn crossed(cells: &Cells) -> impl Iterator<Item = (usize, Corners)> {
     (0..SAMPLES).filter_map(|cell| cells.crossed(cell).map(|corners| (cell, corners)))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn shares_of_a_tetrahedron() {
-        // By Σ Πⱼ fᵢ/(fᵢ − fⱼ) over the negative corners, which holds for distinct values.
-        let by_sum = |f: [f64; 4]| -> f64 {
-            let term = |i: usize| (0..4).filter(|&j| j != i).map(|j| f[i] / (f[i] - f[j])).product::<f64>();
-            (0..4).filter(|&i| f[i] < 0.0).map(term).sum()
-        };
-        for f in
-            [[-1.0, 2.0, 3.0, 5.0], [-1.0, -2.5, 3.0, 0.5], [4.0, -1.0, -2.0, -7.0], [1.0, 2.0, 3.0, 4.0]]
-        {
-            assert!((negative_share(f) - by_sum(f)).abs() < 1e-14, "{f:?}");
-        }
-        assert_eq!(negative_share([-1.0; 4]), 1.0);
-        assert_eq!(negative_share([-1.0, -1.0, 1.0, 1.0]), 0.5);
-    }
 }

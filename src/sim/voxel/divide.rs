@@ -5,7 +5,7 @@ use super::bricks::{BLOCK, BRICK, Block, Lattice};
 use super::budget::Budget;
 use super::cube::Cube;
 use super::leaf::Leaf;
-use super::moves::{MotionParts, Tangent, corner};
+use super::moves::{LOOSE, MotionParts, Tangent, corner};
 use super::stock::VoxelStock;
 use geometry::Point3;
 use work::monitor::{Cancelled, Monitor, check};
@@ -37,13 +37,6 @@ pub(super) struct Divider<'a> {
     pub(super) budget: &'a Budget,
 }
 
-/// What was found below the top.
-pub(super) struct Divided {
-    pub(super) blocks: Vec<Block>,
-    /// Samples inside the material that no brick holds.
-    pub(super) inside: u64,
-}
-
 /// Lists that live from cube to cube.
 #[derive(Default)]
 pub(super) struct Scratch {
@@ -58,8 +51,7 @@ impl Divider<'_> {
     ///
     /// # Errors
     /// [`Cancelled`].
-    pub(super) fn run(&self, monitor: &dyn Monitor) -> Result<Option<Divided>, Cancelled> {
-        let mut inside = 0;
+    pub(super) fn run(&self, monitor: &dyn Monitor) -> Result<Option<Vec<Block>>, Cancelled> {
         let whole = Cube { low: [0; 3], n: self.lattice.side() };
         let mut level = vec![CubeAndParts {
             cube: whole,
@@ -69,8 +61,7 @@ impl Divider<'_> {
         while level.first().is_some_and(|d| d.cube.n > BLOCK) {
             check(monitor)?;
             let divided = parallel::map(level.len(), |k| self.children(&level[k]));
-            inside += divided.iter().map(|(_, inside)| inside).sum::<u64>();
-            level = divided.into_iter().flat_map(|(children, _)| children).collect();
+            level = divided.into_iter().flatten().collect();
             let n = level.first().map_or(BLOCK, |d| d.cube.n);
             if self.budget.is_hopeless(level.len(), n) {
                 return Ok(None);
@@ -85,34 +76,28 @@ impl Divider<'_> {
             monitor.advance(1);
             Ok(block)
         })?;
-        inside += blocks.iter().map(|block| block.inside).sum::<u64>();
-        Ok(Some(Divided { blocks, inside }))
+        Ok(Some(blocks))
     }
 
-    /// The eight parts of a cube in which the surface may pass, and the samples inside the material in the
-    /// others.
-    fn children(&self, parent: &CubeAndParts) -> (Vec<CubeAndParts>, u64) {
-        let (mut children, mut inside) = (Vec::new(), 0);
+    /// Those of the eight parts of a cube in which the surface may pass.
+    fn children(&self, parent: &CubeAndParts) -> Vec<CubeAndParts> {
+        let mut children = Vec::new();
         let mut scratch = Scratch::default();
         for cube in parent.cube.children() {
             let mut parts = Vec::new();
             let seen = self.look_at(&cube, parent, &mut scratch, &mut parts);
-            if seen.high < -SURE {
-                inside += u64::from(cube.n).pow(3);
-            } else if seen.low <= SURE {
+            if seen.high >= -SURE && seen.low <= SURE {
                 children.push(CubeAndParts { cube, parts, stock: seen.stock });
             }
         }
-        (children, inside)
+        children
     }
 
     fn divide(&self, parent: &CubeAndParts, scratch: &mut Scratch, block: &mut Block) {
         for cube in parent.cube.children() {
             let mut parts = scratch.lists.pop().unwrap_or_default();
             let seen = self.look_at(&cube, parent, scratch, &mut parts);
-            if seen.high < -SURE {
-                block.inside += u64::from(cube.n).pow(3);
-            } else if seen.low <= SURE {
+            if seen.high >= -SURE && seen.low <= SURE {
                 if cube.n == BRICK {
                     let mut leaf = std::mem::take(&mut scratch.leaf);
                     leaf.fill(self, &cube, &parts, seen.stock, scratch);
@@ -165,14 +150,15 @@ impl Divider<'_> {
         let (mut best, mut least, mut limit) = (None, f64::INFINITY, band + reach);
         for &k in parts {
             let part = &self.parts.all[k as usize];
-            let Some(t) = self.parts.tangent(part, centre, reach, limit) else { continue };
+            let Some(t) = self.parts.tangent(part, centre, reach, limit, LOOSE) else { continue };
             if t.distance + t.slack < least {
                 (best, least) = (Some((part, t)), t.distance + t.slack);
                 limit = limit.min(least + 2.0 * reach);
             }
             tangents.push((k, t));
         }
-        let above = best.map_or([f64::INFINITY; 8], |(part, t)| self.parts.corners(part, &t, centre, half));
+        let above =
+            best.map_or([f64::INFINITY; 8], |(part, t)| self.parts.corners(part, &t, centre, half, LOOSE));
         let mut nearest = band;
         for (k, t) in tangents.iter() {
             let size = t.gradient.map(f64::abs).sum();

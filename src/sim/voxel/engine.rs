@@ -5,7 +5,7 @@
 
 use super::bricks::{Block, Brick, Bricks, Lattice};
 use super::budget::Budget;
-use super::divide::{Divided, Divider};
+use super::divide::Divider;
 use super::error::VoxelError;
 use super::moves::MotionParts;
 use super::stock::VoxelStock;
@@ -102,9 +102,9 @@ impl<'a> VoxelEngine<'a> {
         let Some(lattice) = self.lattice(voxel)? else { return Ok(None) };
         let budget = Budget::new(allowed);
         let divider = Divider { parts: &self.parts, stock: self.stock, lattice, budget: &budget };
-        let Some(Divided { blocks, inside }) = divider.run(monitor)? else { return Ok(None) };
+        let Some(blocks) = divider.run(monitor)? else { return Ok(None) };
         let bytes = budget.taken.into_inner() + blocks.len() as u64 * Block::BYTES;
-        Ok(Some(Voxels { bricks: Bricks::new(lattice, blocks), inside, bytes }))
+        Ok(Some(Voxels { bricks: Bricks::new(lattice, blocks), bytes }))
     }
 }
 

@@ -164,11 +164,9 @@ impl Leaf {
         }
     }
 
-    /// Keeps the brick if the surface passes in it or in a cell that it has a corner of; else says whether
-    /// it lies inside.
+    /// Keeps the brick if the surface passes in it or in a cell that it has a corner of.
     pub(super) fn store(&self, divider: &Divider<'_>, cube: &Cube, block: &mut Block) {
         if !self.is_near() {
-            block.inside += if self.distances[0] < 0 { SAMPLES as u64 } else { 0 };
             return;
         }
         let mut brick =

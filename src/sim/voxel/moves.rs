@@ -29,8 +29,9 @@ const WIDEST_TURN: f64 = 0.02;
 /// How exact distances from sliding tools are, mm.
 const EXACT: f64 = 1e-9;
 
-/// How loose bounds over a cube may be, as a share of it. Less costs looks at each move, more keeps moves.
-const LOOSE: f64 = 0.02;
+/// How loose bounds over a cube may be, as a share of it, where they only choose moves. Less costs looks at each move, more
+/// keeps moves.
+pub(super) const LOOSE: f64 = 0.02;
 
 /// Parts of one move at most.
 const MAX_PARTS: f64 = 1000.0;
@@ -258,14 +259,22 @@ impl MotionParts {
         Some((Strip { away }, radius))
     }
 
-    /// The distance of the stand-in from `q`, and what bounds it, where it may be below `limit` for the part.
+    /// The distance of the stand-in from `q`, and what bounds it, where it may be below `limit` for the part; loose by the
+    /// share `loose` of `reach`.
     #[inline]
-    pub(super) fn tangent(&self, part: &MotionPart, q: &Point3, reach: f64, limit: f64) -> Option<Tangent> {
+    pub(super) fn tangent(
+        &self,
+        part: &MotionPart,
+        q: &Point3,
+        reach: f64,
+        limit: f64,
+        loose: f64,
+    ) -> Option<Tangent> {
         match self.plain_slack(part, q, reach) {
-            Some(slack) => self.tangent_of(part, &part.plain, slack, q, reach, limit),
+            Some(slack) => self.tangent_of(part, &part.plain, slack, q, reach, limit, loose),
             None => {
                 let (tool, slack) = part.seen_from(q, reach);
-                self.tangent_of(part, &tool, slack, q, reach, limit)
+                self.tangent_of(part, &tool, slack, q, reach, limit, loose)
             }
         }
     }
@@ -279,6 +288,7 @@ impl MotionParts {
         q: &Point3,
         reach: f64,
         limit: f64,
+        loose: f64,
     ) -> Option<Tangent> {
         if let Some((strip, radius)) = self.strip(tool, q) {
             let size = strip.away.norm();
@@ -296,13 +306,20 @@ impl MotionParts {
             let lower = if distance > 0.0 { distance - reach } else { f64::NEG_INFINITY };
             return Some(Tangent { distance, slack: reach, lower, gradient: Vector3::zeros() });
         }
-        let found = slide(&self.solid, tool, q, limit + slack, LOOSE * reach)?;
+        let found = slide(&self.solid, tool, q, limit + slack, loose * reach)?;
         Some(Tangent { slack, lower: found.lower - slack, ..found })
     }
 
     /// Upper bounds on the distance at the eight corners of a cube around `centre`, such that in between
-    /// their greatest is one.
-    pub(super) fn corners(&self, part: &MotionPart, t: &Tangent, centre: &Point3, half: f64) -> [f64; 8] {
+    /// their greatest is one, loose by the share `loose` of `half`.
+    pub(super) fn corners(
+        &self,
+        part: &MotionPart,
+        t: &Tangent,
+        centre: &Point3,
+        half: f64,
+        loose: f64,
+    ) -> [f64; 8] {
         if !self.solid.is_convex() {
             return [t.distance + t.slack; 8];
         }
@@ -314,7 +331,7 @@ impl MotionParts {
         std::array::from_fn(|k| {
             let q = centre + corner(k) * half;
             let distance = self.strip(&tool, &q).map_or_else(
-                || slide(&self.solid, &tool, &q, f64::INFINITY, LOOSE * half).map(|f| f.distance),
+                || slide(&self.solid, &tool, &q, f64::INFINITY, loose * half).map(|f| f.distance),
                 |(strip, radius)| Some(strip.away.norm() - radius),
             );
             distance.unwrap_or(f64::INFINITY) + slack

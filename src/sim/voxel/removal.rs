@@ -10,7 +10,7 @@ use super::capsule::{Kernel, LANES, Lanes};
 use super::cube::Cube;
 use super::engine::VoxelEngine;
 use super::error::VoxelError;
-use super::moves::{MotionPart, Tangent, corner};
+use super::moves::{LOOSE, MotionPart, Tangent, corner};
 use super::octree::{Descent, SIDE, descend};
 use crate::solid::Motion;
 use crate::{ENGAGED, MoveRemoval, RapidContact};
@@ -249,7 +249,7 @@ impl Descent for Remover<'_> {
             let (mut parts, mut tangents, mut covered) = (Vec::new(), Vec::new(), false);
             for &k in &parent.parts {
                 let part = &engine.parts.all[k as usize];
-                let Some(t) = engine.parts.tangent(part, &centre, reach, reach + half_voxel) else {
+                let Some(t) = engine.parts.tangent(part, &centre, reach, reach + half_voxel, LOOSE) else {
                     continue;
                 };
                 if t.lower - half * t.gradient.map(f64::abs).sum() >= half_voxel {

@@ -9,7 +9,7 @@ use super::bricks::Lattice;
 use super::cube::Cube;
 use super::engine::VoxelEngine;
 use super::error::VoxelError;
-use super::moves::MotionParts;
+use super::moves::{LOOSE, MotionParts};
 use super::octree::{Descent, SIDE, descend};
 use cutter::{Holder, Solid};
 use geometry::{Point3, Vector3};
@@ -169,7 +169,7 @@ impl Search<'_> {
             if part.index > last {
                 break;
             }
-            let Some(t) = parts.tangent(part, centre, reach, reach + limit) else { continue };
+            let Some(t) = parts.tangent(part, centre, reach, reach + limit, LOOSE) else { continue };
             if t.lower - half * t.gradient.map(f64::abs).sum() >= limit {
                 continue;
             }

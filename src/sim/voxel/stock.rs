@@ -1,6 +1,7 @@
 //! What there is before the first cut: boxes, round bars, closed meshes, and blocks roughed to some distance from a part.
 
-use geometry::{Aabb, Bvh, Point3, TriangleMesh, Vector3};
+use super::moves::corner;
+use geometry::{Aabb, Bvh, HalfSpace, Point3, TriangleMesh, Vector3};
 
 /// Heights of curved stock are found to this, mm. Less takes more looks.
 const TRACED: f64 = 0.01;
@@ -52,6 +53,29 @@ pub struct StockMesh {
     tree: Bvh,
 }
 
+/// A stock in a cube, between two convex solids, which half spaces around the cube's middle bound.
+#[derive(Debug, PartialEq)]
+pub(super) struct StockSides {
+    /// All of the stock lies in these.
+    pub(super) outer: Vec<HalfSpace>,
+    /// What lies in these is stock; where there are none, none need be.
+    pub(super) inner: Option<Vec<HalfSpace>>,
+}
+
+impl Default for StockSides {
+    /// Of a cube inside of the stock.
+    fn default() -> Self {
+        Self { outer: Vec::new(), inner: Some(Vec::new()) }
+    }
+}
+
+impl StockSides {
+    /// Whether nothing lies between the two.
+    pub(super) fn is_exact(&self) -> bool {
+        self.inner.as_ref() == Some(&self.outer)
+    }
+}
+
 impl VoxelStock {
     /// Of a closed mesh; `None` where it has borders, since nobody can tell its inside then.
     pub fn from_mesh(mesh: TriangleMesh) -> Option<Self> {
@@ -100,6 +124,42 @@ impl VoxelStock {
                 corners.map(|[a, b, c]| (a - near).dot(&(b - near).cross(&(c - near))) / 6.0).sum()
             }
         })
+    }
+
+    /// What of it lies in the cube of half side `half` around `centre`.
+    pub(super) fn sides(&self, centre: &Point3, half: f64) -> StockSides {
+        // From one place to another along an axis.
+        let between = |axis: usize, low: f64, high: f64| {
+            let along = Vector3::ith(axis, 1.0);
+            let faces = [(along, centre[axis] - low), (-along, high - centre[axis])];
+            faces.map(|(gradient, offset)| HalfSpace { gradient, offset })
+        };
+        match self {
+            Self::Box(Aabb { min, max }) => {
+                let outer: Vec<_> = (0..3).flat_map(|i| between(i, min[i], max[i])).collect();
+                StockSides { inner: Some(outer.clone()), outer }
+            }
+            Self::Cylinder { base, axis, radius, length } => {
+                let axis = *axis as usize;
+                let ends = between(axis, base[axis], base[axis] + length);
+                // Away from the bar's axis, how far the side lies: a concave function.
+                let outward = |place: &Point3| {
+                    let mut away = place - base;
+                    away[axis] = 0.0;
+                    away
+                };
+                let (at, rho) = (outward(centre), outward(centre).norm());
+                let gradient = if rho > 0.0 { -at / rho } else { Vector3::zeros() };
+                let lowest = |k: usize| {
+                    let way = corner(k) * half;
+                    radius - outward(&(centre + way)).norm() - gradient.dot(&way)
+                };
+                let below = (0..8).map(lowest).fold(radius - rho, f64::min);
+                let with = |offset: f64| ends.into_iter().chain([HalfSpace { gradient, offset }]).collect();
+                StockSides { outer: with(radius - rho), inner: Some(with(below)) }
+            }
+            Self::Mesh(_) | Self::Roughed { .. } => StockSides { outer: Vec::new(), inner: None },
+        }
     }
 
     /// Above this height nothing stands over the square of `half` mm to each side of `(x, y)`; minus infinity where nothing

@@ -1,16 +1,12 @@
-//! What is left of a stock, as samples near its surface: its heights and its volume. mm.
+//! What is left of a stock, as samples near its surface: and its heights. mm.
 
 use super::bricks::{BRICK, Bricks, STEPS, slot_of};
-use super::cells::{Cells, crossed};
 use geometry::Point3;
-use work::parallel;
 
 /// What is left of the stock, as samples near its surface.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Voxels {
     pub(super) bricks: Bricks,
-    /// Samples inside the material in no brick.
-    pub(super) inside: u64,
     pub(super) bytes: u64,
 }
 
@@ -102,29 +98,5 @@ impl Voxels {
             above = here;
         }
         None
-    }
-
-    /// Volume of the material, mm³: cells in which the surface passes by linear interpolation.
-    ///
-    /// # Tolerance
-    /// Across a smooth surface about a twelfth of the sum of its curvatures times voxel² for each mm² of it; at a
-    /// square edge a tenth of voxel² for each mm of it.
-    pub fn volume(&self) -> f64 {
-        let of_block = |block: usize| {
-            let (mut whole, mut shares) = (0, 0.0);
-            for placed in self.bricks.of_block(block) {
-                let cells = Cells::of(&self.bricks, &placed);
-                whole += cells.inside();
-                for (cell, corners) in crossed(&cells) {
-                    whole -= usize::from(cells.is_inside(cell));
-                    shares += corners.share();
-                }
-            }
-            (whole as u64, shares)
-        };
-        let blocks = parallel::map(self.bricks.blocks.len(), of_block);
-        let whole = self.inside + blocks.iter().map(|b| b.0).sum::<u64>();
-        let shares: f64 = blocks.iter().map(|b| b.1).sum();
-        (whole as f64 + shares) * self.voxel().powi(3)
     }
 }
