@@ -49,9 +49,9 @@ pub(super) fn clear(
     while let Some(centre) = next.filter(|centre| room.distance(centre) >= least) {
         let helix = wanted.min(room.distance(&centre));
         let run = peeled(&room, ground, rules, (centre, helix), monitor)?;
+        cells.clear_along(&run.points);
         // A step past an inner corner follows the wall around it.
         clearing.peeled.extend(room.kept_runs(run));
-        ground.places().iter().for_each(|p| cells.clear_at(p));
         check(monitor)?;
         next = cells.deep_in_stock(&room, ground, monitor)?;
     }
