@@ -7,17 +7,18 @@
 //! The heading is that of the straight side that the cutter runs. In a small loop it differs from the circle's by half the
 //! angle between two sides. So thinning keeps the headings.
 
-use std::f64::consts::{FRAC_PI_2, PI, SQRT_2, TAU};
+use std::cell::Cell;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use geometry::{DiscSamples, Point2, Vector2};
+use geometry::{Point2, Vector2};
 
 /// Stock thinner than this share of the radius counts as none: where the cutter passes along ground that
 /// it has cut before, chords and rounding leave films that load nothing. More would hide real stock: beside
 /// a straight pass an angle `a` is seen smaller by up to `FILM / sin a`.
 pub(super) const FILM: f64 = 0.003;
 
-/// Margin over the radius by which a disc must be covered to be left out. Greater is quicker, and leaves more discs.
-const MARGIN: f64 = 0.1;
+/// Arcs that cover a circumference overlap by more than so much, rad: what is less is rounding.
+const ROUNDING: f64 = 1e-9;
 
 /// Between two places the angle may exceed the limit by so much, rad, which limits of plans have to spare; and so many parts
 /// of a move are looked at where that is not sure.
@@ -39,6 +40,8 @@ pub(super) struct Cleared {
     side: [usize; 2],
     buckets: Vec<Vec<u32>>,
     discs: Vec<Point2>,
+    /// The disc that cleared most of the last front, and how many of its parts.
+    best: Cell<Option<(usize, u32)>>,
 }
 
 impl Cleared {
@@ -48,17 +51,12 @@ impl Cleared {
         let bucket = radius.max(size.x.max(size.y) / MAX_SIDE);
         let side = [size.x, size.y].map(|s| (s / bucket).floor() as usize + 1);
         let buckets = vec![Vec::new(); side[0] * side[1]];
-        Self { radius, origin: lo, bucket, side, buckets, discs: Vec::new() }
+        Self { radius, origin: lo, bucket, side, buckets, discs: Vec::new(), best: Cell::new(None) }
     }
 
     /// How many places there are.
     pub fn len(&self) -> usize {
         self.discs.len()
-    }
-
-    /// The places whose discs make up the ground.
-    pub fn places(&self) -> &[Point2] {
-        &self.discs
     }
 
     fn column(&self, axis: usize, at: f64) -> usize {
@@ -87,22 +85,30 @@ impl Cleared {
         }
     }
 
-    /// Leaves out the discs among the first `count` that the others cover whole: every angle stays the same. Leaves how many
-    /// those were.
+    /// Leaves out the discs among the first `count` that others of them cover whole: every angle stays the same. Leaves how
+    /// many those were.
+    ///
+    /// A disc is covered where those that hold its middle cover its circumference: each is convex, so with a place of the
+    /// circumference it covers the straight line from the middle to there. With all radii a film greater it still is: that
+    /// its circumference is covered means that it lies beyond its Voronoi cell.
     pub fn thin(&mut self, count: usize) -> usize {
-        let samples = DiscSamples::new(self.radius, MARGIN * self.radius);
-        let within = ((1.0 - MARGIN) * self.radius).powi(2);
+        let count = count.min(self.discs.len());
         let mut keep = vec![true; self.discs.len()];
-        let mut near = Vec::new();
-        for k in 0..count.min(self.discs.len()) {
+        let mut seen: Vec<[f64; 2]> = Vec::new();
+        for k in 0..count {
             let centre = self.discs[k];
-            near.clear();
-            self.each_near(&centre, 2.0 * self.radius, |other| {
-                if other != k && keep[other] {
-                    near.push(self.discs[other] - centre);
+            seen.clear();
+            self.each_near(&centre, self.radius, |other| {
+                let to = self.discs[other] - centre;
+                let away = to.norm();
+                if other < count && other != k && keep[other] && away <= self.radius {
+                    let half = (0.5 * away / self.radius).acos() - ROUNDING;
+                    // A place that was cleared twice covers all.
+                    let (towards, half) = if away > 0.0 { (to.y.atan2(to.x), half) } else { (0.0, PI) };
+                    seen.push([towards - half, towards + half]);
                 }
             });
-            keep[k] = !samples.covered(self.radius, &mut near, |c, p| (c - p).norm_squared() <= within);
+            keep[k] = !covers_turn(&mut seen);
         }
         let kept: Vec<Point2> =
             self.discs.iter().zip(&keep).filter(|(_, keep)| **keep).map(|(p, _)| *p).collect();
@@ -146,47 +152,127 @@ impl Cleared {
     }
 
     fn front(&self, centre: &Point2, heading: &Vector2, half: f64, fresh: usize) -> Arc {
-        let r = self.radius;
-        let mut standing = Arc::FRONT;
-        // The middle of what stands, as seen from the centre, and how far that reaches from there.
-        let (mut middle, mut reaches) = (heading * r, r * SQRT_2);
-        let reach = Vector2::new(2.0, 2.0) * (r * (1.0 + FILM));
-        let (lo, hi) = (centre - reach - self.origin, centre + reach - self.origin);
+        let mut front = Front::new(self.radius, heading, half);
+        let grown = |k: usize| self.radius * if k < fresh { 1.0 + FILM } else { 1.0 };
+        // What cleared most of the last front clears most of one beside it, and leaves less to look at.
+        let mut best = self.best.get();
+        let known = best.map(|(k, _)| k).filter(|k| *k < self.discs.len());
+        if let Some(k) = known {
+            front.clear(self.discs[k] - centre, grown(k));
+        }
+        best = known.map(|k| (k, 0));
+        let [lo, hi] = front.reach(self.radius * (1.0 + FILM)).map(|corner| centre + corner - self.origin);
         for j in self.column(1, lo.y)..=self.column(1, hi.y) {
             for i in self.column(0, lo.x)..=self.column(0, hi.x) {
                 // The last ground leaves so little standing that most of the older is passed over.
                 for &k in self.buckets[j * self.side[0] + i].iter().rev() {
-                    let grown = if (k as usize) < fresh { r * (1.0 + FILM) } else { r };
-                    let to = self.discs[k as usize] - centre;
-                    if (to - middle).norm_squared() >= (grown + reaches + half).powi(2) {
-                        continue;
+                    let k = k as usize;
+                    let cleared = front.clear(self.discs[k] - centre, grown(k));
+                    if cleared > 0 && best.is_none_or(|(_, most)| cleared > most) {
+                        best = Some((k, cleared));
                     }
-                    let seen = |to: Vector2| {
-                        let (square, away) = (to.norm_squared(), to.norm());
-                        let cos = (r * r + square - grown * grown) / (2.0 * r * away);
-                        let all = cos <= -1.0 || away <= grown - r;
-                        let half = if all { PI } else { cos.min(1.0).acos() };
-                        let towards = heading.perp(&to).atan2(heading.dot(&to));
-                        [towards - half, towards + half]
-                    };
-                    let [mut from, mut until] = seen(to + heading * half);
-                    if half > 0.0 {
-                        let [other_from, other_until] = seen(to - heading * half);
-                        // Both are about nearly the same direction.
-                        let turn = (0.5 * (from + until - other_from - other_until) / TAU).round() * TAU;
-                        (from, until) = (from.max(other_from + turn), until.min(other_until + turn));
-                    }
-                    if from < until && standing.clear(from, until) {
-                        let Some([from, to]) = standing.ends() else { return Arc::NONE };
-                        let (sin, cos) = (0.5 * (from + to)).sin_cos();
-                        middle = (heading * cos + Vector2::new(-heading.y, heading.x) * sin) * r;
-                        reaches = 2.0 * r * (0.25 * (to - from)).sin();
+                    if front.ends.is_none() {
+                        self.best.set(best);
+                        return Arc::NONE;
                     }
                 }
             }
         }
-        standing
+        self.best.set(best);
+        front.standing
     }
+}
+
+/// The front of a move while discs clear it; places as seen from the middle of the move.
+struct Front {
+    radius: f64,
+    heading: Vector2,
+    /// Half of the length of the move, mm.
+    half: f64,
+    standing: Arc,
+    /// Where what stands begins and ends on the circumference.
+    ends: Option<[Vector2; 2]>,
+}
+
+impl Front {
+    fn new(radius: f64, heading: &Vector2, half: f64) -> Self {
+        let mut front = Self { radius, heading: *heading, half, standing: Arc::FRONT, ends: None };
+        front.find_ends();
+        front
+    }
+
+    fn find_ends(&mut self) {
+        let Self { radius, heading, .. } = *self;
+        self.ends = self.standing.ends().map(|ends| {
+            ends.map(|turn| {
+                let (sin, cos) = turn.sin_cos();
+                Vector2::new(heading.x * cos - heading.y * sin, heading.x * sin + heading.y * cos) * radius
+            })
+        });
+    }
+
+    /// Corners of a box that holds the middles of all discs up to the radius `grown` that may clear any of what stands.
+    fn reach(&self, grown: f64) -> [Vector2; 2] {
+        let Some([a, b]) = self.ends else { return [Vector2::zeros(); 2] };
+        // The circle about the middle of the chord holds the arc, which is no longer than half a turn.
+        let reach = 0.5 * (b - a).norm() + grown + self.half;
+        let middle = 0.5 * (a + b);
+        [-reach, reach].map(|reach| middle.add_scalar(reach))
+    }
+
+    /// Whether a disc meets the circumference between the ends: it does along an arc about its direction, which holds an end
+    /// or lies between them.
+    fn meets(&self, to: &Vector2, grown: f64) -> bool {
+        let Some([a, b]) = &self.ends else { return false };
+        let square = grown * grown;
+        let between = || a.perp(to) >= 0.0 && to.perp(b) >= 0.0;
+        (to - a).norm_squared() < square
+            || (to - b).norm_squared() < square
+            || (to.norm_squared() < (self.radius + grown).powi(2) && between())
+    }
+
+    /// Clears what a disc of the radius `grown` clears from both ends of the move; how many parts.
+    fn clear(&mut self, to: Vector2, grown: f64) -> u32 {
+        let (r, heading) = (self.radius, self.heading);
+        let [after, before] = [1.0, -1.0].map(|side| to + heading * (side * self.half));
+        if !self.meets(&after, grown) || (self.half > 0.0 && !self.meets(&before, grown)) {
+            return 0;
+        }
+        let seen = |to: Vector2| {
+            let (square, away) = (to.norm_squared(), to.norm());
+            let cos = (r * r + square - grown * grown) / (2.0 * r * away);
+            let all = cos <= -1.0 || away <= grown - r;
+            let half = if all { PI } else { cos.min(1.0).acos() };
+            let towards = heading.perp(&to).atan2(heading.dot(&to));
+            [towards - half, towards + half]
+        };
+        let [mut from, mut until] = seen(after);
+        if self.half > 0.0 {
+            let [other_from, other_until] = seen(before);
+            // Both are about nearly the same direction.
+            let turn = (0.5 * (from + until - other_from - other_until) / TAU).round() * TAU;
+            (from, until) = (from.max(other_from + turn), until.min(other_until + turn));
+        }
+        let cleared = if from < until { self.standing.clear(from, until) } else { 0 };
+        if cleared > 0 {
+            self.find_ends();
+        }
+        cleared
+    }
+}
+
+/// Whether arcs, none longer than a turn, whose middles lie between -π and π, cover a turn. Their order changes.
+fn covers_turn(arcs: &mut [[f64; 2]]) -> bool {
+    arcs.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    // From -π on: what begins before that goes on from the other end of the turn, too.
+    let mut until = arcs.iter().map(|arc| arc[1] - TAU).fold(-PI, f64::max);
+    for arc in arcs.iter() {
+        if arc[0] > until {
+            return false;
+        }
+        until = until.max(arc[1]);
+    }
+    until >= PI || arcs.first().is_some_and(|first| first[0] + TAU <= until)
 }
 
 /// Parts of the front half circle, from the right to the left.
@@ -196,9 +282,9 @@ impl Arc {
     const FRONT: Self = Self([u64::MAX; PARTS / 64]);
     const NONE: Self = Self([0; PARTS / 64]);
 
-    /// Clears the parts whose middles lie between two angles from the heading, less than a turn apart; whether any stood.
-    fn clear(&mut self, from: f64, to: f64) -> bool {
-        let mut stood = false;
+    /// Clears the parts whose middles lie between two angles from the heading, less than a turn apart; how many stood.
+    fn clear(&mut self, from: f64, to: f64) -> u32 {
+        let mut stood = 0;
         for turn in [-TAU, 0.0, TAU] {
             let (a, b) = ((from + turn + FRAC_PI_2) / PART - 0.5, (to + turn + FRAC_PI_2) / PART - 0.5);
             if b < 0.0 || a > (PARTS - 1) as f64 {
@@ -210,7 +296,7 @@ impl Arc {
                 let high = (last + 1).saturating_sub(64 * word).min(64);
                 if low < high {
                     let cleared = (u64::MAX >> (64 - (high - low))) << low;
-                    stood |= self.0[word] & cleared != 0;
+                    stood += (self.0[word] & cleared).count_ones();
                     self.0[word] &= !cleared;
                 }
             }

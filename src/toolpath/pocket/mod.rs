@@ -12,7 +12,9 @@ mod bounded;
 mod cleared;
 mod descend;
 mod feed;
+mod finish;
 mod lines;
+mod link;
 mod nest;
 mod peel;
 mod rest;
@@ -27,7 +29,7 @@ mod way;
 use cleared::Cleared;
 pub use feed::{Engagement, LEAST_SHARE, engagement, engagement_angle, limit_feed};
 use nest::NestError;
-use route::{Entry, Run};
+use route::Run;
 pub use strategy::{Flow, Pattern, PocketStrategy, read_pocket_step};
 use turning::Turning;
 
@@ -147,10 +149,14 @@ pub fn plan_pocket(
     }
     if strategy.wall_allowance > 0.0 {
         for piece in &walls_at.pieces {
+            let room = walls::Room::new(piece);
             let around = |wall: &[Point2]| {
-                let mut around = wall.to_vec();
-                around.push(wall[0]);
-                Run { entry: Entry::Ramp(around.clone()), points: around }
+                // What is cleared beside this wall.
+                let beside = rough.pieces.iter().min_by(|a, b| {
+                    let away = |piece: &Piece| SegmentGrid::of_curves(piece.curves()).distance(&wall[0]);
+                    away(a).total_cmp(&away(b))
+                });
+                finish::around(wall, &room, beside, radius)
             };
             groups.push((piece, piece.curves().map(around).collect()));
         }

@@ -13,7 +13,7 @@ use std::cell::Cell;
 
 use super::bounded::STEP;
 use super::cleared::Cleared;
-use super::route::bend;
+use super::link::Links;
 use super::walls::Room;
 use geometry::{Point2, Vector2};
 use work::monitor::{Cancelled, Monitor, check};
@@ -30,6 +30,9 @@ const SHORTEST: f64 = 0.02;
 /// A turn that comes so near to the limit, rad, is as good as the one that reaches it.
 const NEAR: f64 = 0.006;
 
+/// Steps that had to be made shorter keep so far below the limit, rad: there the stock begins or ends, and the angle changes fast.
+const CORNERS: f64 = 0.01;
+
 /// Turns that are tried for one step at most.
 const TRIALS: usize = 8;
 
@@ -45,12 +48,6 @@ const PROBE: f64 = 0.1;
 
 /// Angle in stock that tells that there is some, rad.
 const STOCK: f64 = 0.02;
-
-/// Links are asked for stock at places this far apart over the radius.
-const LINK: f64 = 0.12;
-
-/// Places that are tried as corners of a link.
-const CORNERS: usize = 24;
 
 /// Places this far behind, over the radius, are beside the move's own chip.
 const FRESH: f64 = 0.5;
@@ -122,7 +119,8 @@ impl<'a> Peeler<'a> {
             check(monitor)?;
             let Place { index, heading, .. } = self.places[k];
             let begin = self.out[index];
-            let link = self.link(index, heading);
+            let links = Links { room: self.room, cleared: self.cleared, radius: self.radius };
+            let link = links.between(&self.out, index, heading);
             if !self.pass(begin, heading, link, monitor)? {
                 self.places.remove(k);
             }
@@ -130,7 +128,7 @@ impl<'a> Peeler<'a> {
         Ok(())
     }
 
-    /// The way, and on over cleared ground to a place of it.
+    /// The way.
     pub fn into_way(self) -> Vec<Point2> {
         self.out
     }
@@ -210,13 +208,17 @@ impl<'a> Peeler<'a> {
         let (full, shortest) = (STEP * self.radius, SHORTEST * self.radius);
         let before = self.cleared.len();
         let mut way = vec![Step { to: begin, heading, turn: 0.0, arc: 0.0 }];
-        // How many places were cleared when the way had this length.
-        let mut marks = vec![(0.0, before)];
+        // The length of the way at each of its places.
+        let mut lengths = vec![0.0];
         let (mut step, mut gone, mut cut, mut free, mut last_cut) = (full, 0.0, 0.0, 0.0, 0);
         loop {
             check(monitor)?;
-            let fresh = marks.partition_point(|m| m.0 < gone - FRESH * self.radius);
-            let fresh = marks.get(fresh).map_or(before, |m| m.1);
+            // Places of the way from here on are the last ones that were cleared.
+            let settled = lengths.partition_point(|l| *l < gone - FRESH * self.radius);
+            let mut fresh = self.cleared.len() - (way.len() - settled.max(1));
+            if cut >= LEAST_CUT * self.radius && settled <= last_cut {
+                fresh -= self.thin(fresh);
+            }
             let Some(next) = self.next(&way[way.len() - 1], step, fresh) else {
                 if step <= shortest {
                     break;
@@ -228,7 +230,7 @@ impl<'a> Peeler<'a> {
             gone += length;
             way.push(next);
             self.cleared.add(next.to);
-            marks.push((gone, self.cleared.len() - 1));
+            lengths.push(gone);
             if next.arc > 0.0 {
                 (cut, free, last_cut) = (cut + length, 0.0, way.len());
             } else {
@@ -243,29 +245,33 @@ impl<'a> Peeler<'a> {
             self.cleared.truncate(before);
             return Ok(false);
         }
-        way.truncate(last_cut);
         // What was gone without cutting is not gone in the end; it may have taken films away.
-        self.cleared.truncate(before + last_cut - 1);
+        self.cleared.truncate(self.cleared.len() - (way.len() - last_cut));
+        way.truncate(last_cut);
         self.out.extend(link);
         let first = self.out.len();
         self.out.extend(way.iter().map(|step| step.to));
         self.note_places(first, way.iter().map(|step| step.heading).collect());
-        self.thin();
+        self.thin(self.cleared.len());
         Ok(true)
     }
 
-    fn thin(&mut self) {
+    /// Leaves out what the first `count` places of the ground cover of each other, from time to time; how many those were.
+    fn thin(&mut self, count: usize) -> usize {
         /// Fewer are no matter.
         const FEW: usize = 200;
-        if self.cleared.len() >= self.thin_at {
-            self.cleared.thin(self.cleared.len());
-            self.thin_at = self.cleared.len() * 5 / 4 + FEW;
+        if self.cleared.len() < self.thin_at {
+            return 0;
         }
+        let left_out = self.cleared.thin(count);
+        self.thin_at = self.cleared.len() * 5 / 4 + FEW;
+        left_out
     }
 
     /// The step that turns farthest into the stock.
     fn next(&self, from: &Step, step: f64, fresh: usize) -> Option<Step> {
-        let limit = self.limit;
+        let full = step >= STEP * self.radius;
+        let limit = self.limit - if full { 0.0 } else { CORNERS };
         let tried = |turn: f64| {
             let (sin, cos) = turn.sin_cos();
             let h = from.heading;
@@ -281,15 +287,25 @@ impl<'a> Peeler<'a> {
             let arc = self.cleared.arc(&to, &heading, fresh);
             Step { to, heading, turn, arc }
         };
-        let into = tried(-step / (INTO * self.radius));
+        let most = -step / (INTO * self.radius);
+        let mut turn = from.turn.clamp(0.8 * most, 0.8 * AWAY);
+        // Mostly the turn of the step before is as good as any, but in corners.
+        let first = tried(turn);
+        if full
+            && first.arc <= limit
+            && first.arc > limit - NEAR
+            && self.cleared.keeps(&from.to, &first.to, limit, fresh)
+        {
+            return Some(first);
+        }
+        let into = tried(most);
         if into.arc <= limit && self.cleared.keeps(&from.to, &into.to, limit, fresh) {
             return Some(into);
         }
         let mut far = into;
         let mut best: Option<Step> = None;
-        let mut turn = from.turn.clamp(0.8 * into.turn, 0.8 * AWAY);
-        for _ in 0..TRIALS {
-            let found = tried(turn);
+        for trial in 0..TRIALS {
+            let found = if trial == 0 { first } else { tried(turn) };
             if found.arc <= limit {
                 best = Some(found)
             } else {
@@ -319,43 +335,5 @@ impl<'a> Peeler<'a> {
             }
         }
         best.filter(|step| self.cleared.keeps(&from.to, &step.to, limit, fresh))
-    }
-
-    /// From the end of the way to a place of it, over cleared ground: a bend, a straight way, or straight from one to the
-    /// next of the places between.
-    fn link(&self, index: usize, heading: Vector2) -> Vec<Point2> {
-        let n = self.out.len();
-        let (end, to) = (self.out[n - 1], self.out[index]);
-        if n > 1 && (to - end).norm() > 0.0 {
-            let along = (end - self.out[n - 2]).try_normalize(0.0).unwrap_or(heading);
-            let way = bend(end, along, to, heading, 4.0 * self.radius);
-            let whole = || std::iter::once(end).chain(way.iter().copied()).chain([to]).collect::<Vec<_>>();
-            if whole().windows(2).all(|w| self.is_free(&w[0], &w[1])) {
-                return way;
-            }
-        }
-        let mut way = Vec::new();
-        let mut at = n - 1;
-        while at > index {
-            if self.is_free(&self.out[at], &to) {
-                break;
-            }
-            let corner = |k: usize| index + (at - index) * k / CORNERS;
-            let next = (1..CORNERS)
-                .map(corner)
-                .find(|&k| k > index && k < at && self.is_free(&self.out[at], &self.out[k]));
-            at = next.unwrap_or(at - 1);
-            way.push(self.out[at]);
-        }
-        way
-    }
-
-    /// Whether a straight move stays inside and cuts nothing.
-    fn is_free(&self, a: &Point2, b: &Point2) -> bool {
-        let Some(heading) = (b - a).try_normalize(0.0) else { return true };
-        let steps = ((b - a).norm() / (LINK * self.radius)).ceil();
-        let free =
-            |k: usize| self.cleared.arc(&(a + (b - a) * (k as f64 / steps)), &heading, usize::MAX) == 0.0;
-        (0..=steps as usize).rev().all(free) && self.room.holds(a, b)
     }
 }

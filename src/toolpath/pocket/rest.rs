@@ -49,9 +49,12 @@ pub(super) fn clear(
     while let Some(centre) = next.filter(|centre| room.distance(centre) >= least) {
         let helix = wanted.min(room.distance(&centre));
         let run = peeled(&room, ground, rules, (centre, helix), monitor)?;
+        let mut turn = circle(&centre, helix, 0.0, STEP * radius);
+        turn.push(turn[0]);
+        cells.clear_along(&turn);
+        cells.clear_along(&run.points);
         // A step past an inner corner follows the wall around it.
         clearing.peeled.extend(room.kept_runs(run));
-        ground.places().iter().for_each(|p| cells.clear_at(p));
         check(monitor)?;
         next = cells.deep_in_stock(&room, ground, monitor)?;
     }
@@ -257,5 +260,19 @@ mod tests {
             let held = (cells.at(k) - disc).norm() + reach <= 2.0;
             assert_eq!(cells.clear[k], held, "{}", cells.at(k));
         }
+    }
+    /// What the turn of a helix clears needs no run of its own: one to its middle would come straight down.
+    #[test]
+    fn the_middle_of_a_helix_is_cleared() {
+        let square = [(0., 0.), (12., 0.), (12., 12.), (0., 12.)].map(|(x, y)| Point2::new(x, y)).to_vec();
+        let piece = Piece { outer: square, islands: Vec::new() };
+        let bounds = crate::pocket::turning::Turning { limit: 1.2, radius: 2.0 };
+        let rules = Rules { bounds, sides: crate::pocket::bounded::Sides::Left, helix: [1.6, 0.4] };
+        let around = [Point2::new(-2.0, -2.0), Point2::new(14.0, 14.0)];
+        let mut ground = Cleared::new(around, 2.0);
+        let found = clear(&piece, &mut ground, &rules, &work::monitor::Silent).unwrap().unwrap();
+        let Entry::Helix { centre, .. } = found.peeled[0].entry else { panic!("a helix") };
+        let ends = found.rest.iter().map(|run| (run.points[run.points.len() - 1] - centre).norm());
+        assert!(ends.fold(f64::INFINITY, f64::min) > 2.0);
     }
 }
