@@ -22,6 +22,9 @@ const LONGEST_PIECE: f64 = 2.0;
 /// Steps of Newton's method for the meeting of a normal with what a move sweeps; it converges from one side.
 const STEPS: usize = 24;
 
+/// Normals of one side of an edge agree to this cosine with that of its triangle.
+const SAME_SIDE: f64 = 0.9;
+
 /// Halvings of a piece at most: to a millionth of it.
 const MOST_HALVINGS: u32 = 20;
 
@@ -47,6 +50,15 @@ struct BorderCut {
 impl BorderPiece {
     fn at(&self, share: f64) -> Point3 {
         self.ends[0] + (self.ends[1] - self.ends[0]) * share
+    }
+
+    /// The piece is no nearer to a stretch of the plan, mm.
+    fn least_distance(&self, from: Point2, to: Point2) -> f64 {
+        let [a, b] = self.ends.map(|end| end.xy());
+        let (middle, way) = (a + (b - a) * 0.5, to - from);
+        let share = (middle - from).dot(&way) / way.norm_squared().max(f64::MIN_POSITIVE);
+        let nearest = from + way * share.clamp(0.0, 1.0);
+        ((nearest - middle).norm() - 0.5 * (b - a).norm()).max(0.0)
     }
 }
 
@@ -159,10 +171,11 @@ impl Inspection<'_> {
             let (from, to) = (path.start_of(k), path.moves[k].to.tip);
             let near = nearby.along(from.xy(), to.xy());
             let lowest = from.z.min(to.z);
-            let reached = near
-                .iter()
-                .map(|&piece| &pieces[piece as usize])
-                .filter(|piece| piece.ends[0].z.max(piece.ends[1].z) > lowest);
+            let reached = near.iter().map(|&piece| &pieces[piece as usize]).filter(|piece| {
+                let least = piece.least_distance(from.xy(), to.xy());
+                let height = self.cutter.height(least);
+                height.is_some_and(|height| piece.ends[0].z.max(piece.ends[1].z) > lowest + height)
+            });
             let cuts = reached.filter_map(|piece| {
                 let share = nearest_share(piece, from.xy(), to.xy());
                 self.deepest_on(piece, k as u32, share, known)
@@ -170,9 +183,7 @@ impl Inspection<'_> {
             Ok(cuts.reduce(deeper))
         })?;
         let Some(cut) = cuts.into_iter().flatten().reduce(deeper) else { return Ok(()) };
-        // Borders of patches are chords of the true ones.
-        let chords = if self.part.patches().is_empty() { 0.0 } else { 2.0 * self.part.mesh_deviation() };
-        let most = (gouge.max_depth_mm + gouge.error_bound_mm).max(cut.possible + chords + NUMERICAL_FLOOR);
+        let most = (gouge.max_depth_mm + gouge.error_bound_mm).max(cut.possible + NUMERICAL_FLOOR);
         if cut.depth > gouge.max_depth_mm {
             gouge.max_depth_mm = cut.depth;
             if cut.depth > self.limits.gouge {
@@ -192,13 +203,24 @@ impl Inspection<'_> {
 
     /// The deepest place of a move along a piece, where it may be deeper than `known`; it comes nearest at a share.
     fn deepest_on(&self, piece: &BorderPiece, by: u32, nearest: f64, known: f64) -> Option<BorderCut> {
-        let value = |share: f64| {
+        // The place of the design, which a piece of the mesh of a patch is a chord of.
+        let is_patch = !self.part.patches().is_empty();
+        let design = |share: f64| {
             let place = piece.at(share);
+            // The nearest place of the part may be told as one of the wall that begins there.
+            let foot = is_patch.then(|| self.part.closest_point(&place).0);
+            let foot = foot.filter(|foot| foot.normal.dot(&piece.normal) > SAME_SIDE);
+            foot.map_or((place, piece.normal), |foot| (foot.point, foot.normal))
+        };
+        let value = |share: f64| {
+            let (place, normal) = design(share);
             // The side alone does not reach so far.
             let inside = place + piece.inward * self.limits.gouge;
             self.surface.envelope.height(by, inside.x, inside.y)?;
-            depth(self.surface, by, &place, &piece.normal)
+            depth(self.surface, by, &place, &normal)
         };
+        // What a border bends by between two places spoils concavity by as much; it falls with the square of their distance.
+        let bend = if is_patch { 2.0 * self.part.mesh_deviation() } else { 0.0 };
         let mut best: Option<(f64, f64)> = None;
         let mut left = f64::NEG_INFINITY;
         let (first, last) = (value(0.0), value(1.0));
@@ -222,7 +244,9 @@ impl Inspection<'_> {
             let at_m = value(m);
             let most = keep(m, at_m);
             let possible = match (at_a, at_m, at_b) {
-                (Some(a), Some(m), Some(b)) => m.max(a).max(b).max(2.0 * m - a.min(b)),
+                (Some(at_a), Some(m), Some(at_b)) => {
+                    m.max(at_a).max(at_b).max(2.0 * m - at_a.min(at_b)) + bend * (b - a) * (b - a)
+                }
                 (None, None, _) | (_, None, None) if halvings == 0 => f64::NEG_INFINITY,
                 _ => f64::INFINITY,
             };
@@ -240,23 +264,15 @@ impl Inspection<'_> {
         if possible <= known {
             return None;
         }
-        let place = piece.at(share);
-        let foot = self.part.closest_point(&place).0;
+        let (point, normal) = design(share);
         // What lies under something else is not seen from above.
-        let seen = place + piece.inward * self.limits.gouge;
+        let seen = point + piece.inward * self.limits.gouge;
         let top = self.part.highest_at(seen.x, seen.y)?;
-        if (top.point - foot.point).dot(&foot.normal) > self.limits.gouge / foot.normal.z.max(LEAST_FACING) {
+        if (top.point - point).dot(&normal) > self.limits.gouge / normal.z.max(LEAST_FACING) {
             return None;
         }
-        let exact = depth(self.surface, by, &foot.point, &foot.normal).unwrap_or(found);
-        let of_walls =
-            |depth: f64| self.walls.map_or(depth, |walls| -walls.beside(&foot.point, -depth.max(0.0)));
-        Some(BorderCut {
-            depth: of_walls(exact),
-            possible: of_walls(possible.max(exact)),
-            at: foot.point,
-            by,
-        })
+        let of_walls = |depth: f64| self.walls.map_or(depth, |walls| -walls.beside(&point, -depth.max(0.0)));
+        Some(BorderCut { depth: of_walls(found), possible: of_walls(possible), at: point, by })
     }
 }
 

@@ -10,7 +10,7 @@ use millstream::toolpath::{
     Along, FeedDirection, IsoParametric, Step, Strategy, StreamMethod, Streamline, Zigzag,
 };
 
-use crate::support::{formula, off, plan_and_measure};
+use crate::support::{LIMITS, formula, off, plan_and_measure};
 
 const ZIGZAG: Zigzag = Zigzag::at(0.0);
 
@@ -34,7 +34,8 @@ fn the_scallop_of_a_plane_does_not_depend_on_the_cell() {
             );
             assert!(off(max, exact) < 1e-3 && off(p50, exact) < 1e-3, "cell {cell}: {max} {p50} {exact}");
             assert!(m.scallop.error_bound_mm.unwrap() < 1e-3 * exact);
-            assert!(m.gouge.max_depth_mm <= 1e-6 && m.uncut.region_count == 0);
+            // Passes roll over the border, and their chords cut its edge.
+            assert!(m.gouge.max_depth_mm <= LIMITS.chord && m.uncut.region_count == 0, "{:?}", m.gouge);
         }
     }
 }
