@@ -63,7 +63,7 @@ pub enum FairingMethod {
     /// Hadenfeldt).
     Energy,
     /// The worst point goes to its corrected place, one a round, until the greatest distance hardly changes: as published
-    /// ([`published`]).
+    /// by the second source of this project.
     Published {
         /// Points on each side between which the corrected place is sought: 1 for Kjellander's.
         neighbours: usize,
