@@ -15,7 +15,9 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use geometry::Point3;
-use metrology::{Engine, ExcessKind, Measured, Measurement, RidgeMap, Simulation, path_figures};
+use metrology::{
+    Engine, Measured, Measurement, RidgeMap, ScallopRule, Simulation, path_figures,
+};
 use scene::ToolpathRequest;
 use toolpath::{Correction, Earlier, Step, plane_interval};
 use work::monitor::{self, Monitor};
@@ -80,6 +82,8 @@ pub(crate) struct CorrectionRound {
     pub error_bound_mm: Option<f64>,
     /// Half of the ridge length is lower, mm.
     pub median_mm: f64,
+    /// Share of the ridge length above the target.
+    pub over_target_fraction: f64,
     /// Length of all moves that feed along passes, mm.
     pub cutting_length_mm: f64,
     /// Least and greatest factor of the widths that the round was planned with.
@@ -116,6 +120,7 @@ impl Standing {
             border_mm: Some(map.border),
             error_bound_mm: map.scallop.error_bound_mm.filter(|_| highest_ridge >= map.border),
             median_mm: map.scallop.p50_mm?,
+            over_target_fraction: map.scallop.over_target_fraction?,
             cutting_length_mm: path_figures(&planned.plan.path, 0.0).cutting_length_mm,
             factors,
             measured: false,
@@ -129,12 +134,13 @@ impl Standing {
     /// `None` without ridges.
     fn of_all(measured: &Measurement, planned: &Planned, factors: [f64; 2]) -> Option<Self> {
         let (scallop, reached) = (&measured.scallop, &measured.excess.reached);
-        let on_border = measured.excess.kind == ExcessKind::Border;
+        let on_border = scallop.max_mm.is_some_and(|ridge| reached.max_mm > ridge);
         let round = CorrectionRound {
             highest_mm: scallop.max_mm?,
             border_mm: on_border.then_some(reached.max_mm),
             error_bound_mm: Some(highest_reached(measured).error_bound_mm),
             median_mm: scallop.p50_mm?,
+            over_target_fraction: scallop.over_target_fraction?,
             cutting_length_mm: path_figures(&planned.plan.path, 0.0).cutting_length_mm,
             factors,
             measured: true,
@@ -157,9 +163,10 @@ impl CorrectionRound {
         self.border_mm.is_some_and(|border| border > self.highest_mm)
     }
 
-    /// Whether no ridge exceeds the target.
-    fn holds(&self, target: f64) -> bool {
-        self.highest() + self.margin(target) <= target
+    /// Whether ridges exceed the target no more than they may.
+    fn holds(&self, goal: &Goal) -> bool {
+        self.highest() + self.margin(goal.target) <= goal.rule.highest * goal.target
+            && (goal.rule.share >= 1.0 || self.over_target_fraction <= 1.0 - goal.rule.share)
     }
 
     /// The bound of the highest, mm, where keeping clear of it costs little: a wider one is to be refined instead, as it is
@@ -171,13 +178,22 @@ impl CorrectionRound {
 
     /// Whether this round is to be kept instead of another: first what holds the target, then what is shorter; where neither
     /// holds it, the one with the lower ridge.
-    fn is_better(&self, other: &Self, target: f64) -> bool {
-        match (self.holds(target), other.holds(target)) {
+    fn is_better(&self, other: &Self, goal: &Goal) -> bool {
+        match (self.holds(goal), other.holds(goal)) {
             (true, true) => self.cutting_length_mm < other.cutting_length_mm,
             (false, false) => self.highest() < other.highest(),
             (holds, _) => holds,
         }
     }
+}
+
+/// What the loop is after.
+#[derive(Debug, Clone, Copy)]
+struct Goal {
+    /// The scallop height of the plan, mm.
+    target: f64,
+    /// Which ridges may exceed it.
+    rule: ScallopRule,
 }
 
 /// The loop over one toolpath.
@@ -186,8 +202,7 @@ struct Corrected<'a> {
     request: &'a ToolpathRequest,
     around: Around<'a>,
     engine: &'a dyn Engine,
-    /// What no ridge may exceed, mm.
-    target: f64,
+    goal: Goal,
     /// To what the height of the highest is measured while it may be planned lower, mm; 0: as closely as the verdict needs.
     enough: f64,
     /// The best plan, by what widths, and what it leaves.
@@ -245,7 +260,7 @@ impl Session {
             request,
             around,
             engine,
-            target,
+            goal: Goal { target, rule: self.scene.scallop_rule },
             enough,
             best: first,
             widths,
@@ -334,7 +349,7 @@ impl Corrected<'_> {
     /// Whether the best plan stands above the target, but little.
     fn is_near(&self) -> bool {
         let round = &self.standing.round;
-        !round.holds(self.target) && round.highest() <= (1.0 + SLACK) * self.target
+        !round.holds(&self.goal) && round.highest() <= (1.0 + SLACK) * self.goal.target
     }
 
     /// The widths to try next. A plan that stands too high gets shorter chords where that may be enough, and narrower widths
@@ -343,7 +358,7 @@ impl Corrected<'_> {
     /// which remnants along borders do not give way. `None` where the best plan holds the target and comes within `slack` of
     /// it, or what there is was tried `in_vain`.
     fn next(&self, in_vain: usize, slack: f64) -> Option<Widths> {
-        let (target, round) = (self.target, &self.standing.round);
+        let (target, round) = (self.goal.target, &self.standing.round);
         let scaled = |height: f64| self.widths.scaled((aim(target) / height).sqrt().max(MOST_NARROWED));
         let in_proportion =
             || (round.highest_mm + round.margin(target) > target).then(|| scaled(round.highest_mm));
@@ -351,7 +366,7 @@ impl Corrected<'_> {
             let high = self.standing_high(standing);
             (!high.is_empty()).then(|| widths.narrowed(&high))
         };
-        match (round.holds(target), in_vain) {
+        match (round.holds(&self.goal), in_vain) {
             (true, 0) => (round.highest() < (1.0 - slack) * target).then(|| scaled(round.highest())),
             (true, 1) => self.latest.as_ref().and_then(followed),
             (false, 0) => {
@@ -370,10 +385,11 @@ impl Corrected<'_> {
     /// The places of a plan that may stand above the target.
     fn standing_high(&self, standing: &Standing) -> Vec<HighPlace> {
         let cutter = &self.session.scene.cutter;
-        let margin = standing.round.margin(self.target);
+        let target = self.goal.target;
+        let margin = standing.round.margin(target);
         let places = standing.above.iter().map(|&(at, height)| {
             let tip = at + cutter.contact_to_tip(&self.session.part.closest_point(&at).0.normal);
-            HighPlace { at, tip, over: height + margin - self.target, factor: aim(self.target) / height }
+            HighPlace { at, tip, over: height + margin - target, factor: aim(target) / height }
         });
         places.filter(|place| place.over > 0.0).collect()
     }
@@ -411,7 +427,7 @@ impl Corrected<'_> {
     }
 
     fn keep_if_better(&mut self, planned: Planned, widths: Widths, found: Standing) -> bool {
-        let better = found.round.is_better(&self.standing.round, self.target);
+        let better = found.round.is_better(&self.standing.round, &self.goal);
         self.rounds.push(found.round);
         self.latest = None;
         if better {
@@ -530,13 +546,19 @@ mod tests {
             border_mm: None,
             error_bound_mm: Some(0.1),
             median_mm: 0.9,
+            over_target_fraction: if highest_mm > 1.0 { 0.02 } else { 0.0 },
             cutting_length_mm,
             factors: [1.0; 2],
             measured: true,
         };
-        let better = |a: CorrectionRound, b: CorrectionRound| a.is_better(&b, 1.0);
+        let strict = Goal { target: 1.0, rule: ScallopRule::default() };
+        let better = |a: CorrectionRound, b: CorrectionRound| a.is_better(&b, &strict);
         assert!(better(round(0.8, 20.0), round(1.05, 10.0)) && !better(round(1.05, 10.0), round(0.8, 20.0)));
         assert!(better(round(0.8, 9.0), round(0.7, 10.0)) && better(round(1.1, 20.0), round(1.2, 10.0)));
+        // What the scene lets stand above the target is no reason for another plan.
+        let lenient = |share: f64, highest: f64| Goal { rule: ScallopRule { share, highest }, ..strict };
+        assert!(round(1.2, 10.0).holds(&lenient(0.95, 1.5)) && !round(1.2, 10.0).holds(&strict));
+        assert!(!round(1.2, 10.0).holds(&lenient(0.99, 1.5)) && !round(1.2, 10.0).holds(&lenient(0.95, 1.15)));
     }
 
     #[test]

@@ -106,6 +106,7 @@ impl ExcessSearch<'_> {
         // What is higher than all that passes came down to is uncut, also below its own limit.
         let is_uncut = unreached.max_mm >= highest.max_mm && unreached.max_mm > 0.0
             || highest.max_mm > reached.at_most();
+        let unreached = if is_uncut { highest } else { unreached };
         let kind = if is_uncut {
             ExcessKind::Uncut
         } else if reached.max_mm > ridge.max_mm + NUMERICAL_FLOOR {
@@ -213,7 +214,7 @@ impl ExcessSearch<'_> {
                     if kind == Kind::Any || possible <= known.max_mm {
                         return Some((place, value));
                     }
-                    let reached = patches.reached(place, by);
+                    let reached = patches.reached(place, here, by);
                     if reached == (kind == Kind::Reached) {
                         Some((place, value))
                     } else if half <= small {

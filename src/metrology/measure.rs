@@ -2,13 +2,14 @@
 
 use super::cut_surface::CutSurface;
 use super::excess::ExcessSearch;
-use super::figures::{CloserLook, ExcessFigures, Limits, Measurement, NUMERICAL_FLOOR};
+use super::figures::{CloserLook, ExcessFigures, ExcessKind, Limits, Measurement, NUMERICAL_FLOOR};
 use super::inspected::inspect;
 use super::inspection::Inspection;
 use super::pairs::pair_figures;
 use super::refine::{Asked, Refinement};
 use super::ridge_map::borders;
 use super::ridges::scallop_figures;
+use super::tracks::Tracks;
 use super::unseen::{dips, unseen_depth};
 use super::walls::{WallTask, Walls};
 use super::{Facing, REACH_OVER_UNCUT};
@@ -120,6 +121,7 @@ pub fn measure_with_walls(
         return Ok(measured);
     }
     measured.excess = search.run(&found.samples, &measured, monitor)?;
+    raise_ridges(&mut measured, &inspection, path);
     let (highest, unreached) = (measured.excess.highest.max_mm, measured.excess.unreached.max_mm);
     measured.deviation.max_mm = measured.deviation.max_mm.map(|max| max.max(highest));
     measured.uncut.max_height_mm = measured.uncut.max_height_mm.max(unreached);
@@ -127,6 +129,36 @@ pub fn measure_with_walls(
         walls.add_to(&mut measured, limits);
     }
     Ok(measured)
+}
+
+/// The highest place that passes reached is the highest ridge, where two passes leave equally much: ridges are measured on the
+/// grid's lines, and rise between them.
+fn raise_ridges(measured: &mut Measurement, inspection: &Inspection<'_>, path: &Toolpath) {
+    /// Two passes leave equally much where their heights differ by no more than this share of it.
+    const EQUAL: f64 = 0.05;
+    let Inspection { part, cutter, surface, .. } = *inspection;
+    let (excess, scallop) = (&mut measured.excess, &mut measured.scallop);
+    let Some(ridge) = scallop.max_mm else { return };
+    let reached = excess.reached;
+    let most = excess.highest.at_most() - ridge;
+    scallop.error_bound_mm = scallop.error_bound_mm.map(|bound| bound.min(most.max(NUMERICAL_FLOOR)));
+    let place = reached.at_mm.filter(|_| reached.max_mm > ridge);
+    let Some(design) = place.and_then(|[x, y, _]| part.highest_at(x, y)) else { return };
+    let top = design.point + design.normal * reached.max_mm;
+    let all: Vec<u32> = (0..path.len() as u32).collect();
+    let Some((z, by)) = surface.envelope.lowest(top.x, top.y, &all) else { return };
+    let tracks = Tracks::new(path, cutter);
+    let other = |&k: &u32| {
+        let equal = |height: f64| height - z <= EQUAL * reached.max_mm;
+        tracks.apart(by, k) && surface.envelope.height(k, top.x, top.y).is_some_and(equal)
+    };
+    if all.iter().any(other) {
+        (scallop.max_mm, scallop.max_at_mm) = (Some(reached.max_mm), Some(top.into()));
+        scallop.error_bound_mm = Some(reached.error_bound_mm);
+        if excess.kind == ExcessKind::Border {
+            excess.kind = ExcessKind::Scallop;
+        }
+    }
 }
 
 /// Where a move that no cell saw cuts the highest scallop or uncut place away, the figure is too great by

@@ -93,7 +93,7 @@ fn ridges_up_a_slope_are_as_high_at_its_border_as_inside() {
 #[test]
 fn a_scallop_target_holds_on_every_smooth_test_surface() {
     let cutter = Cutter::ball(6.0).unwrap();
-    let (x, y) = ([-12.0, 12.0], [-12.0, 12.0]);
+    let (x, y) = ([-8.0, 8.0], [-8.0, 8.0]);
     let shapes = [
         ("inclined", AnalyticShape::Inclined { height: 0.0, angle: 0.5, azimuth: 0.3 }),
         ("dome", AnalyticShape::Sphere { height: 0.0, radius: 25.0, concave: false }),

@@ -176,9 +176,8 @@ fn a_holder_in_stock_that_still_stands_is_a_collision() {
     );
 }
 
-/// A bull nose end mill that leads by five degrees, on a patch and on its triangles.
-#[test]
-fn a_lead_on_triangles_leaves_what_it_leaves_on_their_patch() {
+/// A bull nose end mill that leads by five degrees, on a patch and on its triangles, as first planned and measured.
+fn lead_on_patch_and_triangles(correct: bool) -> [Value; 2] {
     let home = tempfile::tempdir().unwrap();
     let n = 64;
     let mesh = height_mesh(n, [22.0, 22.0], |x, y| {
@@ -188,7 +187,7 @@ fn a_lead_on_triangles_leaves_what_it_leaves_on_their_patch() {
     let corners: Vec<_> = (0..mesh.triangles().len()).map(|t| mesh.corners(t)).collect();
     write_stl(&home.path().join("dome.stl"), &corners);
     std::fs::write(home.path().join("dome.json"), dome().to_string()).unwrap();
-    let run = |part: &str, correct: bool| {
+    let run = |part: &str| {
         let scene = format!(
             "[part]\n{part}\n[cutter]\nshape = \"bull\"\ndiameter = 10\ncorner_radius = 2\n\
              [simulation]\ncell = 0.2\n[[toolpath]]\nstrategy = \"zigzag\"\naxis = {{ lead = 5 }}\ncorrect = {correct}\n"
@@ -197,12 +196,21 @@ fn a_lead_on_triangles_leaves_what_it_leaves_on_their_patch() {
         std::fs::write(&path, scene).unwrap();
         run_scene(&path).1["toolpaths"][0].clone()
     };
-    let patch = run("surface = \"nurbs\"\nfile = \"dome.json\"", true);
+    [run("surface = \"nurbs\"\nfile = \"dome.json\""), run("file = \"dome.stl\"")]
+}
+
+#[test]
+#[ignore = "minutes: plans corrected until they hold"]
+fn a_lead_on_triangles_is_corrected_until_it_holds() {
+    let [patch, mesh] = lead_on_patch_and_triangles(true);
     is_good(&patch);
     // What a correction narrows for the mesh's corners is narrowed everywhere.
-    let corrected = run("file = \"dome.stl\"", true);
-    assert_eq!(corrected["verdict"], "pass", "{corrected:#}");
-    let mesh = run("file = \"dome.stl\"", false);
+    assert_eq!(mesh["verdict"], "pass", "{mesh:#}");
+}
+
+#[test]
+fn a_lead_on_triangles_leaves_what_it_leaves_on_their_patch() {
+    let [patch, mesh] = lead_on_patch_and_triangles(false);
     // Facets raise some ridges, most of all along the border.
     assert!(
         number(&mesh, "/scallop/p95_mm") <= 0.010 && number(&mesh, "/scallop/max_mm") <= 0.015,
@@ -234,8 +242,8 @@ fn rays_and_voxels_measure_what_the_z_map_does() {
     let home = tempfile::tempdir().unwrap();
     let measured = |engine: &str| {
         let scene = format!(
-            "[part]\nsurface = \"wave\"\namplitude = 0.5\nwavelength_x = 20\nwavelength_y = 24\nx = [0, 12]\ny = [0, 12]\n\
-             [cutter]\nshape = \"ball\"\ndiameter = 6\n\
+            "[part]\nsurface = \"wave\"\namplitude = 0.5\nwavelength_x = 20\nwavelength_y = 24\nx = [0, 8]\ny = [0, 8]\n\
+             [cutter]\nshape = \"ball\"\ndiameter = 6\n[tolerance]\ncorrect = false\n\
              [simulation]\ncell = 0.05\nengine = \"{engine}\"\n[[toolpath]]\nstrategy = \"iso-parametric\"\n"
         );
         let path = home.path().join(format!("{engine}.toml"));

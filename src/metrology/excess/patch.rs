@@ -104,21 +104,25 @@ impl Patches<'_> {
         (self.stock_top - self.inspection.part.bounds().min.z).max(0.0)
     }
 
-    /// True where the cutter fits, and the pass that cut came down to the design nearby.
-    pub fn reached(&self, at: Point2, by: u32) -> bool {
+    /// True where the cutter fits, and what stands is no higher than what may be uncut, or the pass that cut came down to the
+    /// design nearby.
+    pub fn reached(&self, at: Point2, height: f64, by: u32) -> bool {
         let Inspection { part, cutter, surface, limits, .. } = *self.inspection;
         let Some(design) = part.highest_at(at.x, at.y) else { return false };
         by != NOT_CUT && {
             let from_contact = cutter.contact_to_tip(&design.normal);
+            if !self.fits(&(design.point + from_contact)) {
+                return false;
+            }
             let tip = surface.nearest_tip(by, &(design.point + from_contact));
             let contact = tip - from_contact;
             let (nearest, off) = part.closest_point(&contact);
             let most = limits.scallop.min(limits.uncut);
             // A pass beyond a border serves the ground inside of it, as far as that is level with the border.
             let beyond = |point: &Point3, normal: &Vector3| (contact - point).dot(normal).abs() <= most;
-            let serves = off <= most
-                || beyond(&nearest.point, &nearest.normal) && beyond(&design.point, &design.normal);
-            serves && self.fits(&(design.point + from_contact))
+            height <= limits.uncut
+                || off <= most
+                || beyond(&nearest.point, &nearest.normal) && beyond(&design.point, &design.normal)
         }
     }
 

@@ -181,7 +181,7 @@ fn high_ridges_on_slopes_are_bounded_as_closely_as_asked() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(12))]
+    #![proptest_config(ProptestConfig::with_cases(6))]
 
     /// Nothing stands higher than figure and bound, on any part, by any cutter, with fine cells and coarse ones.
     #[test]

@@ -275,18 +275,18 @@ fn any_number_of_threads_gives_the_same_bits() {
         let run = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
-                let voxels = engine.cut(0.15, MEMORY, &Silent).unwrap();
+                let voxels = engine.cut(0.2, MEMORY, &Silent).unwrap();
                 let surface = engine.surface(&voxels, &Silent).unwrap();
                 (
-                    engine.volumes(0.3, &Silent).unwrap(),
+                    engine.volumes(0.5, &Silent).unwrap(),
                     surface,
-                    engine.removal(0.3, &Silent).unwrap(),
+                    engine.removal(0.4, &Silent).unwrap(),
                     voxels,
                 )
             })
         };
         let one = run(1);
-        for threads in [2, 3, 8] {
+        for threads in [2, 8] {
             assert!(one == run(threads), "{cutter:?} on {threads} threads");
         }
     }

@@ -10,7 +10,7 @@ fn the_sum_is_what_is_missing() {
     for (c, cutter) in cutters().iter().enumerate() {
         let solid = Solid::of_cutter(cutter, None);
         let stock = block([0.0; 3], [10.0, 9.0, 8.0]);
-        let path = five_axis_path(&mut rng, 12);
+        let path = five_axis_path(&mut rng, 6);
         let engine = VoxelEngine::new(&stock, &solid, &path).unwrap();
         let missing = removed(&solid, &stock, &path, 0.1);
         let removal = engine.removal(0.1, &Silent).unwrap();
