@@ -15,9 +15,7 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use geometry::Point3;
-use metrology::{
-    Engine, Measured, Measurement, RidgeMap, ScallopRule, Simulation, path_figures,
-};
+use metrology::{Engine, Measured, Measurement, RidgeMap, ScallopRule, Simulation, path_figures};
 use scene::ToolpathRequest;
 use toolpath::{Correction, Earlier, Step, plane_interval};
 use work::monitor::{self, Monitor};
@@ -558,7 +556,9 @@ mod tests {
         // What the scene lets stand above the target is no reason for another plan.
         let lenient = |share: f64, highest: f64| Goal { rule: ScallopRule { share, highest }, ..strict };
         assert!(round(1.2, 10.0).holds(&lenient(0.95, 1.5)) && !round(1.2, 10.0).holds(&strict));
-        assert!(!round(1.2, 10.0).holds(&lenient(0.99, 1.5)) && !round(1.2, 10.0).holds(&lenient(0.95, 1.15)));
+        assert!(
+            !round(1.2, 10.0).holds(&lenient(0.99, 1.5)) && !round(1.2, 10.0).holds(&lenient(0.95, 1.15))
+        );
     }
 
     #[test]

@@ -105,7 +105,7 @@ fn of_part(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Covered, JobError> {
     let by_rays = RaysCut { rays: &rays, path, solid: &solid };
     let inward = scene.cutter.radius();
     let outward = (REACH_OVER_UNCUT * scene.tolerance.uncut).max(inward);
-    let swept = SweptVolume { part, cut: &by_rays, inward, outward };
+    let swept = SweptVolume { part, cut: &by_rays, inward, outward, block: *facing.block() };
     let task = AlongTask {
         cutter: &scene.cutter,
         path,

@@ -67,7 +67,8 @@ fn measure(
     let (scene, path) = (run.scene(), run.path());
     let reach = REACH_OVER_UNCUT * scene.tolerance.uncut;
     let by_rays = RaysCut { rays, path, solid };
-    let cut = SweptVolume { part: run.part(), cut: &by_rays, inward: reach, outward: reach };
+    let block = run.session.task(path, &scene.simulation, &run.session.cells).block();
+    let cut = SweptVolume { part: run.part(), cut: &by_rays, inward: reach, outward: reach, block };
     // About how far passes are apart.
     let interval = run.measurement().deviation.area_mm2 / path_figures(path, 0.0).cutting_length_mm;
     Ok(roughness(run.part(), &scene.cutter, path, &cut, interval, monitor)?)

@@ -76,6 +76,11 @@ pub trait AlongNormal: Sync {
         self.reach()
     }
 
+    /// The same at most, mm.
+    fn standing_at_most(&self, point: &Point3, normal: &Vector3) -> f64 {
+        self.standing(point, normal)
+    }
+
     /// How far inward is looked, mm.
     fn depth(&self) -> f64;
 }
@@ -264,7 +269,10 @@ impl Along<'_> {
             (first.depth_mm, first.at_mm, first.move_index) = (greatest.depth, at.into(), by);
         }
         let standing = Standing { hollow, greatest: &greatest, left: left.uncut };
-        let uncut = inspection.uncut(&net, &samples, &shares, kept, &standing);
+        let mut uncut = inspection.uncut(&net, &samples, &shares, kept, &standing);
+        let most = judged().filter(|sample| sample.hit.is_none()).map(|sample| inspection.at_most(sample));
+        let more = most.fold(0.0, f64::max) - uncut.max_height_mm;
+        uncut.error_bound_mm = uncut.error_bound_mm.max(more);
         let highest = greatest.ridge.map(|(height, at, lower)| {
             // What is uncertain may be lower only, but a bound stands to both sides.
             Highest { height, at, possible: height + left.ridge + lower }
@@ -311,6 +319,14 @@ impl Along<'_> {
 }
 
 impl NormalInspection<'_> {
+    /// How high material stands at most about a place where nothing was cut, mm: as far as the next place it rises by the
+    /// slope of the design.
+    fn at_most(&self, sample: &Sample) -> f64 {
+        let NetPlace { point, normal, .. } = &sample.place;
+        let slope = (1.0 - normal.z * normal.z).max(0.0).sqrt() / normal.z.max(f64::MIN_POSITIVE);
+        self.engine.standing_at_most(point, normal) + (slope * self.spacing).min(self.engine.reach())
+    }
+
     fn sample(&self, place: NetPlace, near: Option<&NormalHit>) -> Sample {
         Sample { place, hit: self.engine.hit(&place.point, &place.normal, near) }
     }

@@ -5,7 +5,7 @@
 
 use super::{AlongNormal, NormalHit};
 use cutter::Solid;
-use geometry::{Point3, Vector3};
+use geometry::{Aabb, Point3, Vector3};
 use motion::Toolpath;
 use part::Part;
 use sim::{Rays, VoxelEngine, Voxels};
@@ -96,13 +96,32 @@ pub struct SweptVolume<'a> {
     pub inward: f64,
     /// How far above it, mm.
     pub outward: f64,
+    /// The block that is cut, mm.
+    pub block: Aabb,
+}
+
+impl SweptVolume<'_> {
+    /// How far a line from a place in the block runs before it leaves, mm.
+    pub(crate) fn way_out(&self, point: &Point3, normal: &Vector3) -> f64 {
+        let along = |c: usize| {
+            let side = if normal[c] > 0.0 { self.block.max[c] } else { self.block.min[c] };
+            if normal[c] == 0.0 { f64::INFINITY } else { ((side - point[c]) / normal[c]).max(0.0) }
+        };
+        along(0).min(along(1)).min(along(2))
+    }
+
+    /// The same where the block had no sides. What leans out over a border is part of what stands there.
+    fn way_up(&self, point: &Point3, normal: &Vector3) -> f64 {
+        if normal.z > 0.0 { ((self.block.max.z - point.z) / normal.z).max(0.0) } else { f64::INFINITY }
+    }
 }
 
 impl AlongNormal for SweptVolume<'_> {
     fn hit(&self, point: &Point3, normal: &Vector3, near: Option<&NormalHit>) -> Option<NormalHit> {
         let look = |inward: f64| self.cut.first_cut(point, normal, [-inward, self.outward], near);
         let close = NEAR.min(self.inward);
-        let found = look(close)?;
+        // What was cut beyond the stock took nothing away.
+        let found = look(close).filter(|hit| hit.deviation <= self.way_up(point, normal))?;
         if found.deviation > -close {
             return Some(found);
         }
@@ -112,6 +131,14 @@ impl AlongNormal for SweptVolume<'_> {
 
     fn reach(&self) -> f64 {
         self.outward
+    }
+
+    fn standing(&self, point: &Point3, normal: &Vector3) -> f64 {
+        self.outward.min(self.way_up(point, normal))
+    }
+
+    fn standing_at_most(&self, point: &Point3, normal: &Vector3) -> f64 {
+        self.way_out(point, normal).max(self.standing(point, normal))
     }
 
     fn depth(&self) -> f64 {

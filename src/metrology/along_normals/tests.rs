@@ -1,7 +1,7 @@
 use super::super::flat_scene::{path, plane};
 use super::*;
 use cutter::Solid;
-use geometry::{TriangleMesh, distance_to_segment, samples};
+use geometry::{Aabb, TriangleMesh, distance_to_segment, samples};
 use motion::{ClPoint, Move, MoveKind};
 use part::Patch;
 use scallop::ball_scallop_height;
@@ -156,6 +156,28 @@ fn what_no_pass_came_down_to_is_uncut() {
     assert!((scallop - (RADIUS - (RADIUS * RADIUS - 0.0625).sqrt())).abs() < 1e-4, "{scallop}");
 }
 
+/// What no pass cut stands as high as the stock, or as far as is looked, and at most as high as the stock.
+#[test]
+fn what_was_never_cut_stands_as_high_as_the_stock() {
+    let half: Vec<[f64; 2]> = (0..4).map(|k| [0.5 * f64::from(k), 0.0]).collect();
+    let (part, path) = (plane([4.0, 6.0]), path(&along_x(&half)));
+    let ball = Cutter::ball(2.0 * RADIUS).unwrap();
+    let solid = Solid::of_cutter(&ball, None);
+    let rays = Rays::new(&path, &solid, &Silent).unwrap();
+    let by_rays = RaysCut { rays: &rays, path: &path, solid: &solid };
+    let limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.001 };
+    for (top, height, most) in [(0.3, 0.3, 0.301), (0.9, 0.9, 0.901), (2.5, 1.0, 2.501)] {
+        let mut block = part.bounds();
+        block.max.z = top;
+        let cut = SweptVolume { part: &part, cut: &by_rays, inward: 1.0, outward: 1.0, block };
+        let (measured, _) =
+            measure_along_normals(&part, &ball, &path, &cut, 0.1, &limits, 1e-4, None, &Silent).unwrap();
+        let (found, bound) = (measured.uncut.max_height_mm, measured.uncut.error_bound_mm);
+        assert!((found - height).abs() < 1e-9, "{found} of {height}");
+        assert!(found + bound >= top && found + bound <= most, "{found} ± {bound} under {top}");
+    }
+}
+
 /// Rings of constant latitude around a dome: sections across the feed are circles.
 #[test]
 fn a_dome_has_the_scallops_of_a_circle_also_where_it_is_steep() {
@@ -177,7 +199,13 @@ fn a_dome_has_the_scallops_of_a_circle_also_where_it_is_steep() {
     let solid = Solid::of_cutter(&ball, None);
     let rays = Rays::new(&path, &solid, &Silent).unwrap();
     let by_rays = RaysCut { rays: &rays, path: &path, solid: &solid };
-    let cut = SweptVolume { part: &part, cut: &by_rays, inward: 1.0, outward: 1.0 };
+    let cut = SweptVolume {
+        part: &part,
+        cut: &by_rays,
+        inward: 1.0,
+        outward: 1.0,
+        block: Aabb { min: Point3::new(-1e3, -1e3, -1e3), max: Point3::new(1e3, 1e3, 1e3) },
+    };
     let limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.001 };
     let (measured, map) =
         measure_along_normals(&part, &ball, &path, &cut, 0.25, &limits, 5e-4, None, &Silent).unwrap();
@@ -218,7 +246,13 @@ fn by_both(
     let limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.001 };
     let cuts: [&dyn FirstCut; 2] = [&by_rays, &by_voxels];
     cuts.map(|cut| {
-        let cut = SweptVolume { part, cut, inward: reach, outward: reach };
+        let cut = SweptVolume {
+            part,
+            cut,
+            inward: reach,
+            outward: reach,
+            block: Aabb { min: Point3::new(-1e3, -1e3, -1e3), max: Point3::new(1e3, 1e3, 1e3) },
+        };
         measure_along_normals(part, cutter, &path, &cut, 0.4, &limits, 1e-3, None, &Silent).unwrap()
     })
 }

@@ -196,7 +196,7 @@ impl<'a> Coverage<'a> {
         let spacing = (TRIANGLES_A_SQUARE * area / triangles).sqrt().max(task.finest);
         let net = divided(self.part, std::mem::take(&mut self.unseen), spacing);
         let lowest_tip = lowest_tip(task.path);
-        let cut = UnseenCut { cut: task.cut, block: self.facing.block(), facing: self.facing, lowest_tip };
+        let cut = UnseenCut { cut: task.cut, facing: self.facing, lowest_tip };
         let along = Along {
             part: self.part,
             cutter: task.cutter,

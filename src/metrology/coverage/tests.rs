@@ -182,7 +182,8 @@ fn unseen(tips: &[[f64; 3]], margin: f64) -> Measurement {
     let solid = Solid::of_cutter(&cutter, None);
     let rays = Rays::new(&path, &solid, &Silent).unwrap();
     let by_rays = RaysCut { rays: &rays, path: &path, solid: &solid };
-    let cut = SweptVolume { part: &part, cut: &by_rays, inward: 3.0, outward: 3.0 };
+    let cut =
+        SweptVolume { part: &part, cut: &by_rays, inward: 3.0, outward: 3.0, block: block(&part, margin) };
     let task =
         AlongTask { cutter: &cutter, path: &path, cut: &cut, limits: &LIMITS, asked: 5e-4, finest: 0.1 };
     coverage.measure_unseen(&task, &Silent).unwrap().unwrap().0

@@ -5,7 +5,7 @@
 //! uppermost line of the wall below as far as its arc is wide. On the medial axis, where the cut is as far from the top as from the
 //! wall, the top's own normal meets it as deep or deeper; so where cells measure that top, the wall has no share in it.
 
-use geometry::{Aabb, Point3, Vector3};
+use geometry::{Point3, Vector3};
 
 use super::{STEEP, sees_level};
 use motion::{MoveKind, Toolpath};
@@ -25,7 +25,6 @@ const AT_EDGE: f64 = 1e-3;
 /// The cut along the normals of surface that no cell sees.
 pub(super) struct UnseenCut<'a> {
     pub cut: &'a SweptVolume<'a>,
-    pub block: &'a Aabb,
     pub facing: &'a Facing<'a>,
     /// No upright tool cuts below this, mm; negative infinity where tools lean.
     pub lowest_tip: f64,
@@ -39,15 +38,6 @@ pub(super) fn lowest_tip(path: &Toolpath) -> f64 {
 }
 
 impl UnseenCut<'_> {
-    /// How far a line from a place in the block runs before it leaves, mm.
-    fn way_out(&self, point: &Point3, normal: &Vector3) -> f64 {
-        let along = |c: usize| {
-            let side = if normal[c] > 0.0 { self.block.max[c] } else { self.block.min[c] };
-            if normal[c] == 0.0 { f64::INFINITY } else { ((side - point[c]) / normal[c]).max(0.0) }
-        };
-        along(0).min(along(1)).min(along(2))
-    }
-
     /// Whether a place lies at a convex edge with surface that cells measure.
     fn is_at_level_edge(&self, point: &Point3, normal: &Vector3) -> bool {
         let fits = ball_beneath(self.cut.part, point, normal, AT_EDGE);
@@ -96,7 +86,7 @@ impl AlongNormal for UnseenCut<'_> {
         let hit = if hit.deviation < -NUMERICAL_FLOOR {
             self.owned(point, normal, hit)?
         } else {
-            Some(hit).filter(|hit| hit.deviation <= self.way_out(point, normal))?
+            Some(hit).filter(|hit| hit.deviation <= self.cut.way_out(point, normal))?
         };
         // At the very edge the slope of a cut is that against the surface on the other side.
         Some(if at_edge { NormalHit { normal: *normal, ..hit } } else { hit })
@@ -108,7 +98,11 @@ impl AlongNormal for UnseenCut<'_> {
 
     fn standing(&self, point: &Point3, normal: &Vector3) -> f64 {
         // The top that is measured there says what stands at its edge.
-        if self.is_at_level_edge(point, normal) { 0.0 } else { self.reach().min(self.way_out(point, normal)) }
+        if self.is_at_level_edge(point, normal) {
+            0.0
+        } else {
+            self.reach().min(self.cut.way_out(point, normal))
+        }
     }
 
     fn depth(&self) -> f64 {

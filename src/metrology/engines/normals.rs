@@ -74,7 +74,7 @@ impl Engine for Normals {
         let by_rays = RaysCut { rays: &rays, path, solid: &solid };
         let by_voxels = voxels.as_ref().map(|(engine, voxels)| VoxelCut { engine, voxels });
         let first: &dyn FirstCut = by_voxels.as_ref().map_or(&by_rays, |cut| cut);
-        let cut = SweptVolume { part, cut: first, inward, outward: reach };
+        let cut = SweptVolume { part, cut: first, inward, outward: reach, block: task.block() };
         let asked = task.simulation.error_bound;
         let facing = task.facing();
         let judged = Some((&facing, task.judged));

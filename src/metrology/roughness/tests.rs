@@ -2,7 +2,7 @@ use super::super::flat_scene::{path, plane};
 use super::*;
 use crate::{RaysCut, SweptVolume};
 use cutter::Solid;
-use geometry::samples;
+use geometry::{Aabb, samples};
 use part::Patch;
 use sim::Rays;
 use work::monitor::Silent;
@@ -14,7 +14,13 @@ fn of(part: &Part, path: &Toolpath, interval: f64) -> RoughnessFigures {
     let solid = Solid::of_cutter(&ball, None);
     let rays = Rays::new(path, &solid, &Silent).unwrap();
     let by_rays = RaysCut { rays: &rays, path, solid: &solid };
-    let cut = SweptVolume { part, cut: &by_rays, inward: 1.0, outward: 1.0 };
+    let cut = SweptVolume {
+        part,
+        cut: &by_rays,
+        inward: 1.0,
+        outward: 1.0,
+        block: Aabb { min: Point3::new(-1e3, -1e3, -1e3), max: Point3::new(1e3, 1e3, 1e3) },
+    };
     roughness(part, &ball, path, &cut, interval, &Silent).unwrap()
 }
 
