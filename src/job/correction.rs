@@ -28,29 +28,29 @@ use super::{JobError, Session};
 /// Most plans that are made while only ridges are measured.
 const MOST_ROUNDS: usize = 6;
 
+/// A plan whose highest ridge is within this share above the target is near to holding it.
+const NEAR: f64 = 0.05;
+
 /// Most plans that are made again after all was measured: each costs as much as the whole run without correction.
 const MOST_MEASURED: usize = 3;
 
-/// The same while the best plan stands above the target by no more than [`SLACK`]: what is left is little, and its cost is not in
+/// The same while the best plan stands above the target by no more than [`NEAR`]: what is left is little, and its cost is not in
 /// vain.
-const MOST_MEASURED_NEAR: usize = 4;
+const MOST_MEASURED_NEAR: usize = 6;
 
 /// A plan whose highest ridge is within this share below the target is as wide as it should be. What is corrected is aimed
 /// at the middle of it, since points and chords of a new plan lie elsewhere.
 const SLACK: f64 = 0.02;
 
-/// The same where all has to be measured to see whether a wider plan holds. With less, whole measurements are spent on a few
+/// As [`SLACK`] where all has to be measured to see whether a wider plan holds. With less, whole measurements are spent on a few
 /// per cent of length.
 const MEASURED_SLACK: f64 = 0.2;
 
 /// Chords of two passes raise a ridge by no more than this share of their tolerance.
 const RAISED_BY_CHORDS: f64 = 0.5;
 
-/// The factor of the chord tolerance where a ridge was raised by chords, and again where it still is.
+/// The factor of the chord tolerance where a ridge was raised by chords; where it still is, passes get nearer to each other.
 const SHORTER_CHORDS: f64 = 0.25;
-
-/// Chords within this share of their tolerance are not made shorter: they raise ridges by next to nothing.
-const SHORTEST_CHORDS: f64 = 0.1;
 
 /// No width is corrected by more than this factor in a round.
 const MOST_NARROWED: f64 = 0.5;
@@ -347,7 +347,7 @@ impl Corrected<'_> {
     /// Whether the best plan stands above the target, but little.
     fn is_near(&self) -> bool {
         let round = &self.standing.round;
-        !round.holds(&self.goal) && round.highest() <= (1.0 + SLACK) * self.goal.target
+        !round.holds(&self.goal) && round.highest() <= (1.0 + NEAR) * self.goal.target
     }
 
     /// The widths to try next. A plan that stands too high gets shorter chords where that may be enough, and narrower widths
@@ -398,8 +398,7 @@ impl Corrected<'_> {
         let can_be_shorter = self.request.axis.is_none() && !self.request.joining.smoothing;
         let chords = self.widths.chords();
         move |place| {
-            let now = chords.at(&place.tip);
-            can_be_shorter && place.over <= most * now && now > SHORTEST_CHORDS
+            can_be_shorter && place.over <= most && chords.at(&place.tip) == 1.0
         }
     }
 
@@ -484,8 +483,7 @@ impl Widths {
 
     /// With shorter chords around places.
     fn finer(&self, places: &[HighPlace]) -> Self {
-        let now = self.chords();
-        let shorter = places.iter().map(|place| (place.tip, SHORTER_CHORDS * now.at(&place.tip)));
+        let shorter = places.iter().map(|place| (place.tip, SHORTER_CHORDS));
         let finer = self.finer.iter().copied().chain(shorter).collect();
         Self { finer, ..self.clone() }
     }
