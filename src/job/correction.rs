@@ -397,9 +397,7 @@ impl Corrected<'_> {
         let most = RAISED_BY_CHORDS * self.session.scene.tolerance.chord;
         let can_be_shorter = self.request.axis.is_none() && !self.request.joining.smoothing;
         let chords = self.widths.chords();
-        move |place| {
-            can_be_shorter && place.over <= most && chords.at(&place.tip) == 1.0
-        }
+        move |place| can_be_shorter && place.over <= most && chords.at(&place.tip) == 1.0
     }
 
     /// The plan by given widths, and their least and greatest factors.

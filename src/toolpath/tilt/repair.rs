@@ -265,7 +265,10 @@ impl Repairing<'_> {
         let axis = a.towards(&b, most / turn).axis;
         let above = axis.dot(&to.touch.contact.normal) > ABOVE_SURFACE;
         let touch = Touch::along(axis, self.cutter, to.touch.contact, to.touch.feed);
-        if above && self.keep.is_clear(&touch.at) { Placed { touch, ..*to } } else { *to }
+        let led = Placed { touch, ..*to };
+        // The rule may turn faster than the axis.
+        let within = led.tilt() <= self.keep.greatest_tilt;
+        if above && within && self.keep.is_clear(&touch.at) { led } else { *to }
     }
 
     /// The touches after `a` up to and with `b`, with clear moves between them.

@@ -187,6 +187,34 @@ fn the_axis_is_led_over_to_where_it_must_lean() {
     assert!(fastest(Some(0.015)) < 0.0151, "{}", fastest(Some(0.015)));
 }
 
+/// Rules that turn fast beside a wall: led over to its neighbour's axis, none leans from its own by more than is allowed.
+#[test]
+fn no_axis_leans_from_its_rule_by_more_than_is_allowed() {
+    let cutter = Cutter::ball(6.0).unwrap();
+    let (part, tool) = (cavity([60.0, 60.0], 1.0), tool(cutter));
+    let (wall, wall_tree) = block([25.0, -60.0, 0.0], [27.0, 60.0, 40.0]);
+    let mut keep = keep(&tool, &part);
+    keep.checks.push(Check { solid: &tool.held, obstacle: Obstacle::new(&wall, &wall_tree), needed: NEEDED });
+    let turned = |touch: Touch| {
+        let lean = 0.5 * (0.8 * touch.contact.point.y).sin();
+        let axis = Vector3::new(0.0, lean.sin(), lean.cos());
+        Touch::along(axis, &cutter, touch.contact, touch.feed)
+    };
+    let pass: Vec<Touch> = along_floor(&cutter, 20.0, (0..161).map(|k| 0.25 * f64::from(k) - 20.0))
+        .into_iter()
+        .map(turned)
+        .collect();
+    let needed = repair(&pass, &cutter, &keep, None, &Silent).unwrap().summary.greatest_tilt;
+    for greatest_tilt in [0.8, 0.6 * needed, 0.45, 0.4] {
+        let keep = Interference { checks: keep.checks.clone(), greatest_tilt, greatest_lift: 30.0 };
+        let found = repair(&pass, &cutter, &keep, None, &Silent).unwrap().summary;
+        assert!(
+            found.tilted > 0 && found.greatest_tilt <= greatest_tilt + 1e-12,
+            "{greatest_tilt}: {found:?}"
+        );
+    }
+}
+
 #[test]
 fn the_rear_of_a_flat_leaves_bowls_and_troughs_at_the_lead_of_their_curvature() {
     const RADIUS: f64 = 20.0;
