@@ -2,7 +2,9 @@
 
 use super::cut_surface::CutSurface;
 use super::excess::ExcessSearch;
-use super::figures::{CloserLook, ExcessFigures, ExcessKind, Limits, Measurement, NUMERICAL_FLOOR};
+use super::figures::{
+    CloserLook, ExcessFigures, ExcessKind, Limits, Measurement, NUMERICAL_FLOOR, ScallopFigures,
+};
 use super::inspected::inspect;
 use super::inspection::Inspection;
 use super::pairs::pair_figures;
@@ -138,8 +140,17 @@ fn raise_ridges(measured: &mut Measurement, inspection: &Inspection<'_>, path: &
     const EQUAL: f64 = 0.05;
     let Inspection { part, cutter, surface, .. } = *inspection;
     let (excess, scallop) = (&mut measured.excess, &mut measured.scallop);
-    let Some(ridge) = scallop.max_mm else { return };
     let reached = excess.reached;
+    if scallop.max_mm.is_some_and(|ridge| ridge > excess.highest.at_most()) {
+        // Moves that no cell saw cut the ridges of the cells away.
+        *scallop = ScallopFigures {
+            target_mm: scallop.target_mm,
+            reason: Some("cells are too coarse to tell the ridges apart".into()),
+            ..ScallopFigures::default()
+        };
+        measured.ridge_samples.clear();
+    }
+    let ridge = scallop.max_mm.unwrap_or(0.0);
     let most = excess.highest.at_most() - ridge;
     scallop.error_bound_mm = scallop.error_bound_mm.map(|bound| bound.min(most.max(NUMERICAL_FLOOR)));
     let place = reached.at_mm.filter(|_| reached.max_mm > ridge);
@@ -155,6 +166,9 @@ fn raise_ridges(measured: &mut Measurement, inspection: &Inspection<'_>, path: &
     if all.iter().any(other) {
         (scallop.max_mm, scallop.max_at_mm) = (Some(reached.max_mm), Some(top.into()));
         scallop.error_bound_mm = Some(reached.error_bound_mm);
+        if scallop.p95_mm.is_none() {
+            scallop.reason = Some("cells are too coarse for any but the highest".into());
+        }
         if excess.kind == ExcessKind::Border {
             excess.kind = ExcessKind::Scallop;
         }

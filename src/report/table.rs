@@ -159,7 +159,8 @@ fn write_table(out: &mut String, report: &RunReport) -> std::fmt::Result {
         report.notes.iter().try_for_each(|note| sentence(out, note))?;
     }
     for t in report.measured() {
-        let reason = t.scallop.reason.iter().map(|reason| format!("no scallop height: {reason}"));
+        let which = if t.scallop.max_mm.is_none() { "no scallop height" } else { "no other scallop heights" };
+        let reason = t.scallop.reason.iter().map(|reason| format!("{which}: {reason}"));
         let notes: Vec<String> = t.notes.iter().cloned().chain(reason).collect();
         if !notes.is_empty() {
             writeln!(out, "\nNotes on {}:", t.name)?;

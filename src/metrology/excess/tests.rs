@@ -144,7 +144,12 @@ fn holds(
     let part = part(shape);
     let cutter = [Cutter::ball(6.0), Cutter::bull(6.0, 1.0), Cutter::flat(3.0)][tool].clone().unwrap();
     let path = path(&part, &cutter, angle, step, lift);
-    let found = measured(&part, &cutter, &path, cell).excess;
+    let Measurement { excess: found, scallop, .. } = measured(&part, &cutter, &path, cell);
+    if let (ExcessKind::Scallop, Some(ridge)) = (found.kind, scallop.max_mm) {
+        // What is highest of all and a ridge is the highest ridge.
+        let bounds = scallop.error_bound_mm.unwrap() + found.highest.error_bound_mm;
+        prop_assert!((ridge - found.highest.max_mm).abs() <= bounds, "{scallop:?} {found:?}");
+    }
     let brute = Brute::new(&part, &cutter, &path);
     let truth = brute.highest(80);
     prop_assert!(brute.confirms(&found.highest, truth), "{truth} {found:?}");
@@ -216,31 +221,53 @@ fn slopes_that_fall_away_from_a_ridge_cancel() {
     assert!((1.0 / 3.0 - 1e-12..0.45).contains(&found), "{found}");
 }
 
+/// Passes along x over the plane.
+fn straight(lines: &[f64]) -> Toolpath {
+    let mut moves = Vec::new();
+    for (pass, &y) in (0..).zip(lines) {
+        let to = |x: f64, z: f64, kind| Move {
+            to: ClPoint::upright(Point3::new(x, y, z)),
+            kind,
+            feed_rate: 1000.0,
+            pass,
+        };
+        moves.extend([
+            to(-4.0, 9.0, MoveKind::Rapid),
+            to(-4.0, 0.0, MoveKind::Plunge),
+            to(8.0, 0.0, MoveKind::Cut),
+            to(8.0, 9.0, MoveKind::Retract),
+        ]);
+    }
+    Toolpath::new(ClPoint::upright(Point3::new(-4.0, 0.0, 9.0)), moves)
+}
+
+/// How high a ball of 6 mm leaves the plane so far from its pass.
+fn sagitta(half: f64) -> f64 {
+    3.0 - (9.0 - half * half).sqrt()
+}
+
+/// Cells wider than the intervals of the passes see some passes only. What they tell of ridges is true, or not told.
+#[test]
+fn coarse_cells_tell_no_height_that_no_ridge_has() {
+    let (part, ball) = (part(0), Cutter::ball(6.0).unwrap());
+    let path = straight(&(0..11).map(|k| 0.4 * f64::from(k)).collect::<Vec<_>>());
+    let mut told = 0;
+    for cell in [0.05, 0.3, 0.5, 0.7, 1.0, 1.7, 2.5, 5.0, 20.0] {
+        let Measurement { scallop, excess, .. } = measured(&part, &ball, &path, cell);
+        assert!(sagitta(0.2) <= excess.highest.at_most() + 1e-9, "{cell}: {excess:?}");
+        let Some((height, bound)) = scallop.max_mm.zip(scallop.error_bound_mm) else { continue };
+        assert!((height - sagitta(0.2)).abs() <= bound, "{cell}: {height} ± {bound}");
+        told += 1;
+    }
+    assert!(told >= 3);
+}
+
 /// Straight passes over a plane leave ridges of a known height, and more along the border beyond the last one.
 #[test]
 fn a_remnant_along_the_border_is_as_high_as_its_closed_form() {
     let (part, ball) = (part(0), Cutter::ball(6.0).unwrap());
-    let cut = |lines: &[f64]| {
-        let mut moves = Vec::new();
-        for (pass, &y) in (0..).zip(lines) {
-            let to = |x: f64, z: f64, kind| Move {
-                to: ClPoint::upright(Point3::new(x, y, z)),
-                kind,
-                feed_rate: 1000.0,
-                pass,
-            };
-            moves.extend([
-                to(-4.0, 9.0, MoveKind::Rapid),
-                to(-4.0, 0.0, MoveKind::Plunge),
-                to(8.0, 0.0, MoveKind::Cut),
-                to(8.0, 9.0, MoveKind::Retract),
-            ]);
-        }
-        Toolpath::new(ClPoint::upright(Point3::new(-4.0, 0.0, 9.0)), moves)
-    };
-    let sagitta = |half: f64| 3.0 - (9.0 - half * half).sqrt();
     let lines: Vec<f64> = (0..9).map(|k| 0.33 + 0.4 * f64::from(k)).collect();
-    let path = cut(&lines);
+    let path = straight(&lines);
     // The last pass is at 3.53, 0.47 from the border; ridges are 0.2 from theirs.
     for cell in [0.05, 0.3] {
         let excess = measured(&part, &ball, &path, cell).excess;
@@ -250,7 +277,7 @@ fn a_remnant_along_the_border_is_as_high_as_its_closed_form() {
         assert!((excess.highest.at_mm.unwrap()[1] - SIDE).abs() < 0.01, "{excess:?}");
     }
     let even: Vec<f64> = (0..11).map(|k| 0.4 * f64::from(k)).collect();
-    let excess = measured(&part, &ball, &cut(&even), 0.05).excess;
+    let excess = measured(&part, &ball, &straight(&even), 0.05).excess;
     assert_eq!(excess.kind, ExcessKind::Scallop);
     assert!(
         (excess.highest.max_mm - sagitta(0.2)).abs() < 2e-6 && excess.highest.error_bound_mm < 1e-5,
