@@ -103,6 +103,8 @@ impl ExcessSearch<'_> {
             let unreached = Bounded { error_bound_mm: (most - found.max_mm).max(0.0), ..found };
             (sought(ridge, Kind::Reached)?, unreached)
         };
+        // Moves that no cell saw came up only after the first search.
+        let highest = if reached.max_mm > highest.max_mm { highest.or(&reached) } else { highest };
         // What is higher than all that passes came down to is uncut, also below its own limit.
         let is_uncut = unreached.max_mm >= highest.max_mm && unreached.max_mm > 0.0
             || highest.max_mm > reached.at_most();
