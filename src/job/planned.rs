@@ -16,6 +16,7 @@ use toolpath::{
 use work::monitor::Monitor;
 
 use super::correction::CorrectionFigures;
+use super::equal_time::EqualTimeFigures;
 use super::pocket::limit_feed_by;
 use super::tool::Around;
 use super::{JobError, Session};
@@ -40,6 +41,8 @@ pub(crate) struct Planned {
     pub engaged: Option<(Engagement, f64)>,
     /// The rounds in which its ridges were measured and corrected.
     pub correction: Option<CorrectionFigures>,
+    /// The search for the machining time that was asked for.
+    pub equal_time: Option<EqualTimeFigures>,
 }
 
 impl Planned {
@@ -75,7 +78,14 @@ impl Session {
         let strategy = self.strategy(request)?;
         if let Some(read) = request.foreign() {
             let plan = Plan::of_program(read.path.clone(), read.notes.clone());
-            return Ok(Planned { plan, strategy, joints: None, engaged: None, correction: None });
+            return Ok(Planned {
+                plan,
+                strategy,
+                joints: None,
+                engaged: None,
+                correction: None,
+                equal_time: None,
+            });
         }
         let settings = PlanSettings { earlier, ..self.settings(request) };
         let planned = |strategy: &dyn Strategy| {
@@ -92,7 +102,7 @@ impl Session {
         let (mut plan, engaged) = within_engagement(planned(&*strategy)?, &*strategy, &planned)?;
         let joints = joints(scene, &request.name, &plan.path)?;
         plan.path.origin.lines = lines(scene, &plan.path, joints.as_ref())?;
-        Ok(Planned { plan, strategy, joints, engaged, correction: None })
+        Ok(Planned { plan, strategy, joints, engaged, correction: None, equal_time: None })
     }
 
     fn path(

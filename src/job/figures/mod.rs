@@ -5,6 +5,7 @@ mod clearance;
 mod correction;
 mod coverage;
 mod entries;
+mod equal_time;
 mod feeds;
 mod field;
 mod machine;
@@ -32,10 +33,11 @@ use super::run::{Finding, Run};
 type Find = fn(&Run<'_>, &dyn Monitor) -> Result<Finding, JobError>;
 
 /// All figures, in the order of report.json.
-const FIGURES: [Find; 16] = [
+const FIGURES: [Find; 17] = [
     coverage::find,
     shortest::find,
     correction::find,
+    equal_time::find,
     program::find,
     field::find,
     machine::find,
