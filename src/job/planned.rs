@@ -171,11 +171,16 @@ impl Session {
     /// The strategy of a toolpath, with the offset surfaces that it rides on where these come from sections.
     fn strategy(&self, request: &ToolpathRequest) -> Result<Box<dyn Strategy>, JobError> {
         let asked = request.strategy.downcast_ref::<OffsetSurface>();
-        let (Some(OffsetSurface { along, drive: OffsetDrive::InPlane }), Some(blade)) = (asked, &self.blade)
-        else {
+        let (Some(OffsetSurface { along, drive }), Some(blade)) = (asked, &self.blade) else {
             return Ok(request.strategy.clone());
         };
-        let surfaces = blade.offset_in_planes(self.scene.cutter.radius()).map_err(|e| {
+        let radius = self.scene.cutter.radius();
+        let surfaces = match drive {
+            OffsetDrive::InPlane => blade.offset_in_planes(radius),
+            OffsetDrive::Published => blade.offset_as_published(radius, self.scene.tolerance.chord),
+            OffsetDrive::Exact | OffsetDrive::Given(_) => return Ok(request.strategy.clone()),
+        };
+        let surfaces = surfaces.map_err(|e| {
             self.refused(
                 request,
                 PlanError::NotApplicable { strategy: "offset-surface", reason: e.to_string() },
