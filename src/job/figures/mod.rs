@@ -15,6 +15,7 @@ mod pocket;
 mod program;
 mod removal;
 mod roughness;
+mod section_polynomial;
 mod sections;
 mod shortest;
 mod solid;
@@ -33,7 +34,7 @@ use super::run::{Finding, Run};
 type Find = fn(&Run<'_>, &dyn Monitor) -> Result<Finding, JobError>;
 
 /// All figures, in the order of report.json.
-const FIGURES: [Find; 17] = [
+const FIGURES: [Find; 18] = [
     coverage::find,
     shortest::find,
     correction::find,
@@ -42,6 +43,7 @@ const FIGURES: [Find; 17] = [
     field::find,
     machine::find,
     pairs::find,
+    section_polynomial::find,
     roughness::find,
     sections::find,
     removal::find,
