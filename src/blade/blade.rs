@@ -12,7 +12,7 @@ use super::loft;
 use super::sections::{SectionError, SectionSides, Sections};
 use crate::fairing::{Faired, Fairing, FairingError, FairingMethod};
 use crate::loft::{Loft, LoftError, LoftSection};
-use crate::loft_of_offsets;
+use crate::{loft_as_published, loft_of_offsets};
 use geometry::{CubicSpline, Isometry3, NurbsSurface, Point2, SplineError, Vector2, Vector3};
 
 /// Surfaces follow the curves of the sections to this, mm: a tenth of the least chord tolerance in use.
@@ -238,12 +238,28 @@ impl Blade {
     /// # Errors
     /// [`BladeError::Loft`] where an offset is singular.
     pub fn offset_in_planes(&self, distance: f64) -> Result<Vec<NurbsSurface>, BladeError> {
-        let mut lofts = Vec::with_capacity(self.curves.len());
-        for curves in &self.curves {
-            // Outward is to the right of counter-clockwise curves.
-            let all = loft_of_offsets(&curves.sections(), -distance, OFFSET_TOLERANCE);
-            lofts.push(all.map_err(|e| curves.refused(e))?);
-        }
+        self.lofts(|sections| loft_of_offsets(sections, -distance, OFFSET_TOLERANCE))
+    }
+
+    /// The same as published ([`loft_as_published`]): untrimmed, one for each of [`Blade::surfaces`].
+    ///
+    /// # Errors
+    /// [`BladeError::Loft`] where no surface goes through the offsets.
+    pub fn offset_as_published(
+        &self,
+        distance: f64,
+        chord_error: f64,
+    ) -> Result<Vec<NurbsSurface>, BladeError> {
+        self.lofts(|sections| Ok(vec![loft_as_published(sections, -distance, chord_error)?]))
+    }
+
+    /// Surfaces of all curves where they stand. Outward is to the right of counter-clockwise curves.
+    fn lofts(
+        &self,
+        laid: impl Fn(&[LoftSection]) -> Result<Vec<Loft>, LoftError>,
+    ) -> Result<Vec<NurbsSurface>, BladeError> {
+        let of = |curves: &Curves| laid(&curves.sections()).map_err(|e| curves.refused(e));
+        let lofts = self.curves.iter().map(of).collect::<Result<Vec<_>, _>>()?;
         let placed = |(k, place): &(usize, Isometry3)| {
             lofts[*k].iter().map(|loft| loft.surface.moved(place)).collect::<Vec<_>>()
         };

@@ -13,4 +13,4 @@ pub mod sections;
 
 pub use blade::{Blade, BladeCurve, BladeError, BladeSection, BladeSettings, BladeSide};
 pub use fairing::{Faired, Fairing, FairingError, FairingMethod, JUMP_REMOVING_STEP, jump_energy, noise};
-pub use loft::{Loft, LoftError, LoftSection, loft, loft_of_offsets};
+pub use loft::{Loft, LoftError, LoftSection, loft, loft_as_published, loft_of_offsets};

@@ -14,10 +14,12 @@
 //! to the right of the sections' sense: outward when they run counter-clockwise.
 
 mod offsets;
+mod published;
 #[cfg(test)]
 mod tests;
 
 pub use offsets::loft_of_offsets;
+pub use published::loft_as_published;
 
 use geometry::{
     ArcLength, CubicSpline, InterpolationAxis, KnotError, MAX_COORDINATE, NurbsError, NurbsSurface, Point2,

@@ -168,6 +168,9 @@ pub struct NightlyOptions {
     /// What counts as worse, a TOML file.
     #[arg(long, value_name = "FILE")]
     pub rules: Option<PathBuf>,
+    /// What others have published, to be shown beside the figures, a TOML file.
+    #[arg(long, value_name = "FILE")]
+    pub published: Option<PathBuf>,
     /// Scenes that run at the same time [default: all cores].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,

@@ -16,8 +16,8 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use ::nightly::{
-    Comparison, History, Night, Results, Rules, accuracy, compare, date_of, html_page, junit, markdown,
-    summary,
+    Comparison, History, Night, Published, Results, Rules, accuracy, compare, date_of, html_page, junit,
+    markdown, published_page, summary,
 };
 use io::{digest, regular};
 use report::Verdict;
@@ -44,11 +44,12 @@ pub fn nightly(options: &NightlyOptions, progress: &Progress) -> Result<(String,
         return Ok((slurm::submit(options, shards, Path::new("sbatch"))?, Verdict::Pass));
     }
     let rules = options.rules.as_deref().map_or_else(|| Ok(Rules::default()), read_rules)?;
+    let published = options.published.as_deref().map_or_else(|| Ok(Vec::new()), read_published)?;
     let baseline = options.baseline.as_deref().map(read_results).transpose()?;
     let merged = options.merge.then(|| merge::read(&options.paths)).transpose()?;
     let plan = match merged {
         Some(_) => Plan::default(),
-        None => Plan::new(options, &rules, baseline.as_ref())?,
+        None => Plan::new(options, &rules, &published, baseline.as_ref())?,
     };
     let outputs = Outputs::begin(&options.out, &claims(options, &plan))?;
     let results = match merged {
@@ -63,7 +64,8 @@ pub fn nightly(options: &NightlyOptions, progress: &Progress) -> Result<(String,
         None => History::default(),
     };
     let comparison = compare(&results, baseline.as_ref(), &rules);
-    write(&results, baseline.as_ref(), &comparison, &history, &rules, &outputs)?;
+    let page = html_page(&results, baseline.as_ref(), &comparison, &history, &rules, &published);
+    write(&results, baseline.as_ref(), &comparison, page, &published, &outputs)?;
     outputs.publish()?;
     let verdict = if comparison.worse.is_empty() { Verdict::Pass } else { Verdict::Fail };
     Ok((summary_text(&results, &comparison, &options.out), verdict))
@@ -77,12 +79,12 @@ fn now() -> u64 {
 /// What the nightly writes and reads.
 fn claims(options: &NightlyOptions, plan: &Plan) -> Claims {
     let shards = options.paths.iter().filter(|_| options.merge).map(|folder| folder.join(FIGURES));
-    let named = [&options.baseline, &options.rules, &options.history].into_iter().flatten().cloned();
+    let named = [&options.baseline, &options.rules, &options.published, &options.history];
     let scenes = plan.cases.iter().map(|planned| planned.path.clone());
     Claims {
-        files: &["report.html", "report.md", "accuracy.md", FIGURES, "junit.xml"],
+        files: &["report.html", "report.md", "accuracy.md", "published.md", FIGURES, "junit.xml"],
         folders: Vec::new(),
-        inputs: named.chain(shards).chain(scenes).collect(),
+        inputs: named.into_iter().flatten().cloned().chain(shards).chain(scenes).collect(),
     }
 }
 
@@ -90,15 +92,17 @@ fn write(
     results: &Results,
     baseline: Option<&Results>,
     comparison: &Comparison,
-    history: &History,
-    rules: &Rules,
+    page: String,
+    published: &[Published],
     outputs: &Outputs,
 ) -> Result<(), CliError> {
     let file = |name: &str, text: String| outputs.file(name, |out| out.write_all(text.as_bytes()));
-    let page = html_page(results, baseline, comparison, history, rules);
     file("report.html", printable_lines(&page))?;
     file("report.md", printable_lines(&markdown(results, baseline, comparison)))?;
-    file("accuracy.md", printable_lines(&accuracy(results, rules)))?;
+    file("accuracy.md", printable_lines(&accuracy(results)))?;
+    if !published.is_empty() {
+        file("published.md", printable_lines(&published_page(results, published)))?;
+    }
     file("junit.xml", junit(results, comparison))?;
     file(FIGURES, results.to_json().map_err(|e| CliError::nightly(e.to_string(), "report this error"))?)
 }
@@ -133,6 +137,10 @@ fn read_text(path: &Path) -> Result<String, CliError> {
 fn read_rules(path: &Path) -> Result<Rules, CliError> {
     let engines = EngineChoice::words();
     Ok(Rules::parse(&path.to_string_lossy(), &read_text(path)?, &engines)?)
+}
+
+fn read_published(path: &Path) -> Result<Vec<Published>, CliError> {
+    Ok(Published::parse(&path.to_string_lossy(), &read_text(path)?)?)
 }
 
 /// Reads a nightly.json.

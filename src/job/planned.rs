@@ -16,6 +16,7 @@ use toolpath::{
 use work::monitor::Monitor;
 
 use super::correction::CorrectionFigures;
+use super::equal_time::EqualTimeFigures;
 use super::pocket::limit_feed_by;
 use super::tool::Around;
 use super::{JobError, Session};
@@ -40,6 +41,8 @@ pub(crate) struct Planned {
     pub engaged: Option<(Engagement, f64)>,
     /// The rounds in which its ridges were measured and corrected.
     pub correction: Option<CorrectionFigures>,
+    /// The search for the machining time that was asked for.
+    pub equal_time: Option<EqualTimeFigures>,
 }
 
 impl Planned {
@@ -75,7 +78,14 @@ impl Session {
         let strategy = self.strategy(request)?;
         if let Some(read) = request.foreign() {
             let plan = Plan::of_program(read.path.clone(), read.notes.clone());
-            return Ok(Planned { plan, strategy, joints: None, engaged: None, correction: None });
+            return Ok(Planned {
+                plan,
+                strategy,
+                joints: None,
+                engaged: None,
+                correction: None,
+                equal_time: None,
+            });
         }
         let settings = PlanSettings { earlier, ..self.settings(request) };
         let planned = |strategy: &dyn Strategy| {
@@ -92,7 +102,7 @@ impl Session {
         let (mut plan, engaged) = within_engagement(planned(&*strategy)?, &*strategy, &planned)?;
         let joints = joints(scene, &request.name, &plan.path)?;
         plan.path.origin.lines = lines(scene, &plan.path, joints.as_ref())?;
-        Ok(Planned { plan, strategy, joints, engaged, correction: None })
+        Ok(Planned { plan, strategy, joints, engaged, correction: None, equal_time: None })
     }
 
     fn path(
@@ -161,11 +171,16 @@ impl Session {
     /// The strategy of a toolpath, with the offset surfaces that it rides on where these come from sections.
     fn strategy(&self, request: &ToolpathRequest) -> Result<Box<dyn Strategy>, JobError> {
         let asked = request.strategy.downcast_ref::<OffsetSurface>();
-        let (Some(OffsetSurface { along, drive: OffsetDrive::InPlane }), Some(blade)) = (asked, &self.blade)
-        else {
+        let (Some(OffsetSurface { along, drive }), Some(blade)) = (asked, &self.blade) else {
             return Ok(request.strategy.clone());
         };
-        let surfaces = blade.offset_in_planes(self.scene.cutter.radius()).map_err(|e| {
+        let radius = self.scene.cutter.radius();
+        let surfaces = match drive {
+            OffsetDrive::InPlane => blade.offset_in_planes(radius),
+            OffsetDrive::Published => blade.offset_as_published(radius, self.scene.tolerance.chord),
+            OffsetDrive::Exact | OffsetDrive::Given(_) => return Ok(request.strategy.clone()),
+        };
+        let surfaces = surfaces.map_err(|e| {
             self.refused(
                 request,
                 PlanError::NotApplicable { strategy: "offset-surface", reason: e.to_string() },

@@ -182,7 +182,19 @@ impl Session {
         let closer = if engine.tilts() { self.closer_part(monitor)? } else { None };
         let near = closer.as_ref().unwrap_or(&self.part);
         let around = Around { tool: &tool, near, fixtures: &fixtures };
-        let (planned, mut measured) = self.plan_and_measure(request, around, engine, monitor)?;
+        let at_time;
+        let (request, planned, mut measured) = match &request.equal_time {
+            None => {
+                let (planned, measured) = self.plan_and_measure(request, around, engine, monitor)?;
+                (request, planned, measured)
+            }
+            Some(time) => {
+                let (found, planned) = self.plan_for_time(request, time, around, monitor)?;
+                let measured = self.measure(&found, engine, &planned.plan.path, 0.0, monitor)?;
+                at_time = found;
+                (&at_time, planned, measured)
+            }
+        };
         for region in &mut measured.measurement.gouge.regions {
             let at = region.at_mm.into();
             region.line = line_of_cut(&planned.plan.path, &scene.cutter, region.move_index as usize, &at);
@@ -256,9 +268,12 @@ impl Session {
     ) -> Result<Measured, JobError> {
         let scene = &self.scene;
         let failed = |reason| JobError::engine(scene, &request.name, reason);
-        let first = self.task(path, &scene.simulation, &self.cells);
+        let own = self.own_cells(request)?;
+        let (simulation, cells) =
+            own.as_ref().map_or((&scene.simulation, &self.cells), |(simulation, cells)| (simulation, cells));
+        let first = self.task(path, simulation, cells);
         let mut measured = engine.measure(&first, monitor).map_err(failed)?;
-        let mut finest = auto_cell(&scene.cutter, &scene.toolpaths);
+        let mut finest = auto_cell(&scene.cutter, &scene.toolpaths).min(simulation.cell);
         let mut simulation = Simulation { cell_is_auto: false, cell: measured.cell, ..scene.simulation };
         let (mut rounds, least) = (0, CLOSEST_BOUND * scene.simulation.error_bound);
         while (simulation.cell > finest || rounds < CLOSER_ROUNDS)
@@ -285,6 +300,18 @@ impl Session {
             }
         }
         Ok(measured)
+    }
+
+    /// The cells of a toolpath that was planned for a time, where its passes lie nearer than those of the scene's scallop height.
+    fn own_cells(&self, request: &ToolpathRequest) -> Result<Option<(Simulation, LaidOut)>, JobError> {
+        let scene = &self.scene;
+        let cell = auto_cell(&scene.cutter, std::slice::from_ref(request));
+        if request.equal_time.is_none() || !scene.simulation.cell_is_auto || cell >= scene.simulation.cell {
+            return Ok(None);
+        }
+        let simulation = Simulation { cell, ..scene.simulation };
+        let cells = self.budget().grid_before_planning(&self.area(), &simulation);
+        Ok(Some((simulation, cells.map_err(JobError::grid(scene))?)))
     }
 
     /// Whether a limit of the measured surface is undecided, and none violated.

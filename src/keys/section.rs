@@ -101,6 +101,11 @@ impl<'a> Section<'a> {
         self.entry(key).is_some_and(|entry| matches!(entry.get_ref(), DeValue::String(_)))
     }
 
+    /// True when the key's value is a list.
+    pub fn is_list(&self, key: &str) -> bool {
+        self.entry(key).is_some_and(|entry| matches!(entry.get_ref(), DeValue::Array(_)))
+    }
+
     /// Where the name of a key stands (the header if it is not there).
     pub fn key_span(&self, key: &str) -> Range<usize> {
         let found = self.table.and_then(|t| t.iter().find(|(k, _)| k.get_ref() == key));
@@ -289,11 +294,23 @@ impl<'a> Section<'a> {
 
     /// Positive lengths, mm, as `[0.4, 0.2]`; none when the key is not there.
     pub fn lengths(&self, key: &str) -> Result<Vec<f64>, SceneError> {
+        self.numbers(key, &LENGTH, " mm")
+    }
+
+    /// Finite numbers within `range`, as `[0.4, 0.2]`; none when the key is not there. `unit` as in [`Self::number`].
+    pub fn numbers(
+        &self,
+        key: &str,
+        range: &RangeInclusive<f64>,
+        unit: &str,
+    ) -> Result<Vec<f64>, SceneError> {
         let Some(entry) = self.entry(key) else { return Ok(Vec::new()) };
         let DeValue::Array(list) = entry.get_ref() else {
-            return Err(self.wrong_type(key, "a list of lengths", entry, "write `[0.4, 0.2]`, in mm"));
+            let cure =
+                format!("write `[0.4, 0.2]`{}", if unit.is_empty() { "" } else { ", without the unit" });
+            return Err(self.wrong_type(key, "a list of numbers", entry, &cure));
         };
-        list.iter().map(|item| Ok(self.in_range(key, item, &LENGTH, " mm")?.value)).collect()
+        list.iter().map(|item| Ok(self.in_range(key, item, range, unit)?.value)).collect()
     }
 
     /// A positive length, mm, that must be there.

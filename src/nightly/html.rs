@@ -8,6 +8,7 @@ use super::convergence;
 use super::figures::{FIGURES, Figure};
 use super::history::History;
 use super::markdown::summary;
+use super::published::{self, Published};
 use super::results::{Outcome, Results, SceneResult, ToolpathResult};
 use super::rules::Rules;
 use super::words::{change, number};
@@ -21,6 +22,7 @@ pub fn html_page(
     comparison: &Comparison,
     history: &History,
     rules: &Rules,
+    published: &[Published],
 ) -> String {
     let page = Page { baseline, history, rules };
     let class = if comparison.worse.is_empty() { "pass" } else { "fail" };
@@ -53,7 +55,8 @@ pub fn html_page(
                     div.scroll { (page.table(results, comparison)) }
                 }
                 (convergence::section(results))
-                @for table in tables(results, rules) { (table.html()) }
+                @for table in tables(results) { (table.html()) }
+                (published::table(results, published).html())
             }
         }
     };
@@ -217,7 +220,8 @@ mod tests {
         let nights = vec![Night::of(&before, "1".into()), Night::of(&now, "2".into())];
         let history = History { nights, skipped: 0 };
         let rules = Rules::default();
-        let page = html_page(&now, Some(&before), &compare(&now, Some(&before), &rules), &history, &rules);
+        let page =
+            html_page(&now, Some(&before), &compare(&now, Some(&before), &rules), &history, &rules, &[]);
         assert!(page.find("What got worse").unwrap() < page.find("All scenes").unwrap());
         assert!(page.contains("&lt;b&gt;") && !page.contains("<broke>"));
         assert!(page.contains("href=\"scenes/a/report.html\"") && page.contains("<td class=\"worse\">"));

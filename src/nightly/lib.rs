@@ -29,7 +29,7 @@ pub use history::{History, Night};
 pub use html::html_page;
 pub use junit::junit;
 pub use markdown::{markdown, summary};
-pub use published::Published;
+pub use published::{Ours, Published, published_page};
 pub use reference::reference_work;
 pub use results::{
     Case, ClosedForm, Cost, Outcome, Results, ResultsError, SceneResult, Shard, ToolpathResult, merge,

@@ -34,14 +34,11 @@
 //! within_um = 0.01        # how far the steps of the program, which are rounded, may take it from there; default 0
 //! ```
 //!
-//! Pages may show figures that a source has published beside ours (`[[published]]`, [`Published`]).
-//!
 //! A verdict that is worse, and a scene that fails where the baseline's did not, are always worse.
 
 use keys::{SceneError, SceneText, Section};
 
 use super::figures::Group;
-use super::published::Published;
 use super::results::{Case, ClosedForm};
 
 /// A growth that is not worse yet. Both limits must be exceeded.
@@ -85,8 +82,6 @@ pub struct Rules {
     pub checks: Vec<Case>,
     /// Closed forms.
     pub exact: Vec<Exact>,
-    /// Published figures.
-    pub published: Vec<Published>,
     /// What is gone.
     pub missing: Missing,
     /// For [`Group::Accuracy`].
@@ -106,7 +101,6 @@ impl Default for Rules {
         Self {
             checks: Vec::new(),
             exact: Vec::new(),
-            published: Vec::new(),
             missing: Missing::Worse,
             accuracy: Limit { absolute: 1e-5, relative: 0.005 },
             length: Limit { absolute: 1e-6, relative: 0.005 },
@@ -126,7 +120,7 @@ impl Rules {
         let source = SceneText::new(name, text);
         let table = source.table()?;
         let root = Section::whole(&source, table.get_ref(), "the rules");
-        let keys = ["missing", "accuracy", "length", "time", "cost", "check", "exact", "published"];
+        let keys = ["missing", "accuracy", "length", "time", "cost", "check", "exact"];
         root.only(&keys, &[], "the rules")?;
         let standard = Self::default();
         let checks =
@@ -134,7 +128,6 @@ impl Rules {
         Ok(Self {
             checks: checks.concat(),
             exact: root.sections("exact")?.iter().map(exact).collect::<Result<_, _>>()?,
-            published: root.sections("published")?.iter().map(Published::read).collect::<Result<_, _>>()?,
             missing: root.choice("missing", &[("worse", Missing::Worse), ("allow", Missing::Allow)])?,
             accuracy: limit(&root, "accuracy", Some(("absolute_um", 1e-3)), standard.accuracy)?,
             length: limit(&root, "length", None, standard.length)?,
@@ -271,8 +264,6 @@ mod tests {
             "[[exact]]\nscene = \"a\"\nradius = 3\nstep = 7",
             "[[exact]]\nscene = \"a\"\nradius = 3\nstep = 1\nconcave = 9\nconvex = 9",
             "[exact]",
-            "[[published]]\nscene = \"a\"",
-            "[[published]]\nscene = \"a\"\ntoolpath = \"b\"\nfigure = \"ra\"\nwhat = \"Ra\"\nvalue = 1\nsource = \"S\"",
             "[",
         ] {
             assert!(parse(bad).is_err(), "{bad}");

@@ -6,6 +6,9 @@ use maud::{Markup, html};
 
 use super::markdown::escaped;
 
+/// A cell with more bytes is a sentence, and not a number or a few of them.
+const LONGEST_NUMBER: usize = 80;
+
 /// Rows of words under heads. The first column names the row.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Table {
@@ -31,9 +34,15 @@ impl Table {
             let cells: Vec<String> = cells.iter().map(|cell| escaped(cell)).collect();
             format!("| {} |", cells.join(" | "))
         };
+        // Numbers end in line, sentences begin so.
+        let is_text = |column: usize| {
+            let mut cells = self.rows.iter().filter_map(|cells| cells.get(column));
+            column == 0 || cells.any(|cell| cell.len() > LONGEST_NUMBER)
+        };
+        let lines = (0..self.head.len()).map(|column| if is_text(column) { "---|" } else { "---:|" });
         // Writing into a string cannot fail.
         let _ = writeln!(out, "\n## {}\n\n{}\n\n{}", self.title, self.intro, row(&self.head));
-        let _ = writeln!(out, "|---|{}", "---:|".repeat(self.head.len().saturating_sub(1)));
+        let _ = writeln!(out, "|{}", lines.collect::<String>());
         for cells in &self.rows {
             let _ = writeln!(out, "{}", row(cells));
         }
@@ -70,6 +79,10 @@ mod tests {
         let table = Table::new("Title", "Intro.", &["a", "b"], vec![vec!["x|y".into(), "<b>".into()]]);
         let text = table.markdown();
         assert!(text.contains("## Title") && text.contains("| x\\|y | \\<b\\> |"), "{text}");
+        assert!(text.contains("|---|---:|"), "{text}");
+        let told =
+            Table { rows: vec![vec!["x".into(), "long ".repeat(20)]], head: table.head.clone(), ..table };
+        assert!(told.markdown().contains("|---|---|"));
         let page = table.html().into_string();
         assert!(page.contains("<th>x|y</th><td>&lt;b&gt;</td>"), "{page}");
         let empty = Table { rows: Vec::new(), ..table };

@@ -6,6 +6,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use super::histogram::Histogram;
 use super::result::{RunReport, ToolpathReport, ToolpathResult};
 use super::table::{bound, conclusion, duration, micrometres, per_cent, with_bound};
+use super::time_plot;
 use super::verdict::{Claim, Verdict, place};
 use metrology::{ExcessFigures, ExcessKind};
 
@@ -37,7 +38,7 @@ pub fn html_page(report: &RunReport, pages: &[ToolpathPage], scene: &str) -> Str
             @if !report.notes.is_empty() { ul { @for note in &report.notes { li { (note) } } } }
             p.faint { "scene " (report.scene) " · millstream " (report.millstream) }
         }
-        section { h2 { "Comparison" } (comparison(report)) (tolerances(report)) }
+        section { h2 { "Comparison" } (comparison(report)) (tolerances(report)) (time_plot::section(report)) }
         @for (toolpath, page) in report.measured().zip(pages) { (toolpath_section(toolpath, page)) }
         section id="figures" { h2 { "What the figures mean" } (meanings(report)) }
         section {

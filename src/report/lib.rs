@@ -16,6 +16,7 @@ mod result;
 mod scale;
 mod surface_mesh;
 mod table;
+mod time_plot;
 mod verdict;
 
 pub use canvas::Picture;

@@ -5,6 +5,7 @@
 //! every refusal can point at the very key or value: tagged enums of serde only know the table.
 
 mod axis;
+mod compare;
 mod direction;
 mod foreign;
 mod interference;
@@ -18,6 +19,7 @@ mod tests;
 mod write;
 
 pub use axis::AxisRequest;
+pub use compare::EqualTime;
 pub use interference::{Fixture, KeepClear};
 pub use keys::{Finding, SceneError, SceneText, printable, printable_lines};
 pub use kinematics::FiveAxis;
@@ -108,6 +110,8 @@ pub struct ToolpathRequest {
     pub joining: Joining,
     /// How its axis is tilted; `None` for an upright one.
     pub axis: Option<AxisRequest>,
+    /// The machining time that its scallop height is to take, instead of that of `step`.
+    pub equal_time: Option<EqualTime>,
 }
 
 impl ToolpathRequest {

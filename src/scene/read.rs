@@ -7,7 +7,7 @@ use super::{
     DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE, DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, EngineChoice, NamedFile,
     PartSource, Scene, Simulation, Stock, ToolpathRequest, auto_cell, default_error_bound,
 };
-use super::{axis, direction, foreign, interference, kinematics, part};
+use super::{axis, compare, direction, foreign, interference, kinematics, part};
 use cutter::{Cutter, Holder, HolderSection};
 use io::regular;
 use keys::{LENGTH, Located, SceneError, SceneText, Section, printable};
@@ -80,6 +80,7 @@ impl Scene {
                 "machine",
                 "interference",
                 "fixture",
+                "compare",
                 "toolpath",
             ],
             &[],
@@ -101,12 +102,21 @@ impl Scene {
         let off_direction =
             section.number("direction", OFF_DIRECTION, " degrees")?.map(|v| v.value.to_radians());
         let correct = section.flag("correct")?.unwrap_or(true);
+        let minutes = compare::read(&root)?;
+        if !minutes.is_empty() && section.has("correct") {
+            let message = "`correct` does not apply where [compare] plans for a machining time";
+            return Err(section.error(
+                &section.key_span("correct"),
+                message,
+                "delete it, or delete [compare]",
+            ));
+        }
         let mut simulation = read_simulation(&root.section("simulation")?, &cutter, &tolerance)?;
         let section = root.section("machine")?;
         let keep_clear = interference::read(&root, &folder)?;
         let (machine, clearance) = read_machine(&section)?;
         let five_axis = kinematics::read(&section, &machine)?;
-        let toolpaths = read_toolpaths(&root, &folder, &tolerance, correct, &cutter)?;
+        let toolpaths = read_toolpaths(&root, &folder, &tolerance, correct, &cutter, &minutes)?;
         check_pocket_strategies(&root, &part, &toolpaths)?;
         if simulation.cell_is_auto {
             simulation.cell = auto_cell(&cutter, &toolpaths);
@@ -349,6 +359,7 @@ fn read_toolpaths(
     limits: &Limits,
     correct: bool,
     cutter: &Cutter,
+    minutes: &[f64],
 ) -> Result<Vec<ToolpathRequest>, SceneError> {
     let sections = root.sections("toolpath")?;
     if sections.is_empty() {
@@ -359,8 +370,13 @@ fn read_toolpaths(
         ));
     }
     let mut requests: Vec<ToolpathRequest> = Vec::with_capacity(sections.len());
-    for section in &sections {
+    let read = |section| {
         let request = read_toolpath(section, folder, limits, correct, cutter)?;
+        let times = compare::at_times(request, section, minutes)?;
+        Ok(times.into_iter().map(move |request| (section, request)))
+    };
+    let all = sections.iter().map(read).collect::<Result<Vec<_>, SceneError>>()?;
+    for (section, request) in all.into_iter().flatten() {
         if let Some(other) = requests.iter().find(|other| other.folder == request.folder) {
             let place = if section.has("name") { section.key_span("name") } else { section.header().clone() };
             let message = if other.name == request.name {
@@ -413,6 +429,7 @@ fn read_toolpath(
         correct,
         joining,
         axis,
+        equal_time: None,
     })
 }
 
@@ -500,7 +517,7 @@ fn read_step(section: &Section<'_>, limits: &Limits, cutter: &Cutter) -> Result<
 
 /// A folder's name for a toolpath's name: lower case, and every run of other characters than
 /// letters, digits and `_` becomes one `-`. `None` when nothing is left or it is too long.
-fn folder_name(name: &str) -> Option<String> {
+pub(super) fn folder_name(name: &str) -> Option<String> {
     /// File systems take 255 bytes a name; tables become unreadable long before.
     const MAX_CHARACTERS: usize = 64;
     let mut folder = String::new();

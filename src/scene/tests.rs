@@ -580,3 +580,62 @@ proptest! {
         survive(&text);
     }
 }
+
+#[test]
+fn equal_times_make_a_toolpath_for_each_and_are_written_once() {
+    let text = |compare: &str, more: &str| {
+        format!(
+            "[part]\nsurface = \"plane\"\nx = [0, 8]\ny = [0, 6]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n{compare}\n[[toolpath]]\n\
+             strategy = \"zigzag\"\n{more}\n[[toolpath]]\nname = \"other\"\nstrategy = \"iso-parametric\"\n"
+        )
+    };
+    let scene = |compare: &str| Scene::parse("a.toml", text(compare, "")).unwrap();
+    let of = |scene: &Scene| -> Vec<(String, Option<f64>)> {
+        let time = |r: &ToolpathRequest| r.equal_time.as_ref().map(|time| time.minutes);
+        scene.toolpaths.iter().map(|r| (r.name.clone(), time(r))).collect()
+    };
+    let named = |names: &[(&str, Option<f64>)]| -> Vec<(String, Option<f64>)> {
+        names.iter().map(|(name, time)| ((*name).to_owned(), *time)).collect()
+    };
+    assert_eq!(of(&scene("")), named(&[("zigzag", None), ("other", None)]));
+    let one = scene("[compare]\nminutes = 2.5");
+    assert_eq!(of(&one), named(&[("zigzag", Some(2.5)), ("other", Some(2.5))]));
+    assert!(one.toolpaths.iter().all(|request| !request.correct));
+    let two = scene("[compare]\nminutes = [2, 2.5]");
+    let names = [
+        ("zigzag, 2 min", Some(2.0)),
+        ("zigzag, 2.5 min", Some(2.5)),
+        ("other, 2 min", Some(2.0)),
+        ("other, 2.5 min", Some(2.5)),
+    ];
+    assert_eq!(of(&two), named(&names));
+    assert_eq!(two.toolpaths[1].folder, "zigzag-2-5-min");
+    for scene in [one, two] {
+        let complete = complete_toml(&scene);
+        let again = Scene::parse("a.toml", complete.clone()).unwrap();
+        assert_eq!((of(&again), complete_toml(&again)), (of(&scene), complete.clone()));
+        assert_eq!(complete.matches("[[toolpath]]").count(), 2, "{complete}");
+    }
+    let compare = "[compare]\nminutes = 2";
+    for (compare, more, words) in [
+        (compare, "stepover = 0.3", "`stepover` does not apply"),
+        (compare, "scallop = 0.3", "`scallop` does not apply"),
+        (compare, "correct = true", "`correct` does not apply"),
+        (
+            compare,
+            "[[toolpath]]\nstrategy = \"program\"\nfile = \"a.nc\"",
+            "\"program\" is not planned by one",
+        ),
+        ("[tolerance]\ncorrect = false\n[compare]\nminutes = 2", "", "`correct` does not apply"),
+        ("[compare]", "", "no `minutes`"),
+        ("[compare]\nminutes = []", "", "0 times"),
+        ("[compare]\nminutes = [2, 2]", "", "2 twice"),
+        ("[compare]\nminutes = 0", "", "`minutes`"),
+        ("[compare]\nminutes = [1, -1]", "", "`minutes`"),
+        ("[compare]\nseconds = 2", "", "unknown key `seconds`"),
+    ] {
+        let refused = Scene::parse("a.toml", text(compare, more)).unwrap_err();
+        let SceneError::Invalid(finding) = refused else { panic!("{compare} {more}") };
+        assert!(finding.message.contains(words), "{compare} {more}: {}", finding.message);
+    }
+}

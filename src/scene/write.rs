@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{Scene, ToolpathRequest, axis, interference, kinematics, part};
+use super::{Scene, ToolpathRequest, axis, compare, interference, kinematics, part};
 use keys::{toml_number as number, toml_string as text};
 use toolpath::{Links, PartKind, Step, longest_link};
 
@@ -70,22 +70,27 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     if !scene.keep_clear.fixtures.is_empty() || scene.toolpaths.iter().any(|request| request.axis.is_some()) {
         interference::write(out, &scene.keep_clear)?;
     }
-    scene.toolpaths.iter().try_for_each(|request| {
-        writeln!(out, "\n[[toolpath]]")?;
-        writeln!(out, "name = {}", text(&request.name))?;
-        writeln!(out, "strategy = {}", text(request.strategy_name()))?;
-        request.strategy.write(out)?;
-        if request.strategy.definition().part == PartKind::Any {
-            return Ok(());
-        }
-        match request.step {
-            Step::Scallop(height) => {
-                writeln!(out, "scallop = {}  # mm, steps are planned for it", number(height))?;
+    compare::write(out, &scene.toolpaths)?;
+    scene.toolpaths.iter().filter(|request| compare::is_first(request, &scene.toolpaths)).try_for_each(
+        |request| {
+            writeln!(out, "\n[[toolpath]]")?;
+            let name = request.equal_time.as_ref().map_or(&request.name, |time| &time.of);
+            writeln!(out, "name = {}", text(name))?;
+            writeln!(out, "strategy = {}", text(request.strategy_name()))?;
+            request.strategy.write(out)?;
+            if request.strategy.definition().part == PartKind::Any {
+                return Ok(());
             }
-            Step::Stepover(width) => writeln!(out, "stepover = {}  # mm", number(width))?,
-        }
-        write_joining(out, request, scene)
-    })
+            match request.step {
+                Step::Scallop(_) if request.equal_time.is_some() => {}
+                Step::Scallop(height) => {
+                    writeln!(out, "scallop = {}  # mm, steps are planned for it", number(height))?;
+                }
+                Step::Stepover(width) => writeln!(out, "stepover = {}  # mm", number(width))?,
+            }
+            write_joining(out, request, scene)
+        },
+    )
 }
 
 fn write_cutter(out: &mut String, scene: &Scene) -> std::fmt::Result {
@@ -112,7 +117,9 @@ fn write_joining(out: &mut String, request: &ToolpathRequest, scene: &Scene) -> 
     if request.strategy.definition().part == PartKind::Pocket {
         return Ok(());
     }
-    writeln!(out, "correct = {}  # by what is measured of a plan", request.correct)?;
+    if request.equal_time.is_none() {
+        writeln!(out, "correct = {}  # by what is measured of a plan", request.correct)?;
+    }
     let joining = &request.joining;
     match joining.links {
         Links::Surface => {

@@ -166,12 +166,33 @@ fn slurm_runs_the_shards_and_then_their_merge() {
 }
 
 #[test]
+fn what_was_published_stands_beside_what_was_measured() {
+    let home = home_with(&[("a.toml", PLATE)]);
+    let home = home.path();
+    let row =
+        "[[published]]\nsource = \"Author\"\nwhat = \"passes\"\nvalue = \"20\"\nwhy = \"other plate\"\n";
+    let run = format!("{row}scene = \"a\"\ntoolpath = \"zigzag\"\nfigure = \"/path/passes\"\n{row}");
+    std::fs::write(home.join("published.toml"), run).unwrap();
+    let answer = nightly(home, &["--out", "out", "--published", "published.toml"]);
+    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    let passes = &read(home, "out/scenes/a/report.json")["toolpaths"][0]["path"]["passes"];
+    let page = std::fs::read_to_string(home.join("out/published.md")).unwrap();
+    assert!(
+        page.contains(&format!("| a, zigzag | Author | passes | 20 | {passes} | other plate |")),
+        "{page}"
+    );
+    assert!(page.contains("| not run | Author | passes | 20 | – | other plate |"), "{page}");
+}
+
+#[test]
 fn what_a_nightly_cannot_use_is_refused_before_it_runs() {
     let home = home_with(&[("a.toml", PLATE)]);
     let home = home.path();
     std::fs::write(home.join("rules.toml"), "[[check]]\nscene = \"b\"\nengine = \"rays\"\n").unwrap();
     std::fs::write(home.join("text"), "mine\n").unwrap();
-    let cases: [(&[&str], &str); 5] = [
+    std::fs::write(home.join("half.toml"), "[[published]]\nsource = \"Author\"\n").unwrap();
+    let cases: [(&[&str], &str); 6] = [
+        (&["--published", "half.toml"], "`what`"),
         (&["--rules", "rules.toml"], "no scene has that name"),
         (&["--baseline", "none.json"], "cannot read none.json"),
         (&["--baseline", "text"], "no nightly.json"),

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use ::nightly::{Case, ClosedForm, Results, Rules, further};
+use ::nightly::{Case, ClosedForm, Published, Results, Rules, further};
 use io::{digest, regular};
 use keys::{SceneText, Section, printable};
 use scene::{DEFAULT_MEMORY_MIB, Scene};
@@ -47,18 +47,20 @@ impl Plan {
     /// Finds the scenes and what the rules check.
     ///
     /// # Errors
-    /// [`CliError`] where there is no scene, a name is not unique, or the rules name a scene that is not there.
+    /// [`CliError`] where there is no scene, a name is not unique, or rules or published figures name a scene that is not there.
     pub fn new(
         options: &NightlyOptions,
         rules: &Rules,
+        published: &[Published],
         baseline: Option<&Results>,
     ) -> Result<Self, CliError> {
         let scenes = find(&options.paths)?;
-        let published = rules.published.iter().map(|p| &p.scene);
+        let ours = published.iter().filter_map(|p| Some(&p.ours.as_ref()?.scene));
         let exact = rules.exact.iter().map(|e| &e.scene);
-        let mut wanted = rules.checks.iter().map(|c| &c.scene).chain(exact).chain(published);
+        let mut wanted = rules.checks.iter().map(|c| &c.scene).chain(exact).chain(ours);
         if let Some(missing) = wanted.find(|name| !scenes.contains_key(*name)) {
-            let what = format!("the rules name the scene {missing}, and no scene has that name");
+            let what =
+                format!("rules or published figures name the scene {missing}, and no scene has that name");
             return Err(CliError::nightly(what, format!("the scenes are {}", listed(scenes.keys()))));
         }
         let mut cases: Vec<Case> = scenes.keys().map(|name| Case::plain(name)).collect();
@@ -72,7 +74,7 @@ impl Plan {
         let mut cases: Vec<Planned> =
             mine.map(|(_, case)| planned(case, &scenes, rules, baseline, &program)).collect();
         cases.sort_by(|a, b| b.expected_s.total_cmp(&a.expected_s));
-        let further = further(rules).into_iter().map(str::to_owned).collect();
+        let further = further(published).into_iter().map(str::to_owned).collect();
         Ok(Self { cases, further })
     }
 }
@@ -202,4 +204,29 @@ fn case_digest(case: &Case, path: &Path, scene: Option<&Scene>, program: &str) -
         text += &format!("{sha256}  {name}\n");
     }
     digest::of_bytes(text.as_bytes()).sha256
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Without running them: every row of the shipped file names a toolpath of a shipped scene, and every scene has a row.
+    #[test]
+    fn the_shipped_figures_of_the_sources_name_their_scenes() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/sources");
+        let text = fs::read_to_string(folder.join("published.toml")).unwrap();
+        let published = Published::parse("published.toml", &text).unwrap();
+        let scenes = find(&[folder]).unwrap();
+        let ours = || published.iter().filter_map(|one| one.ours.as_ref());
+        for one in ours() {
+            let scene = Scene::read(&scenes[&one.scene]).unwrap();
+            for name in std::iter::once(&one.toolpath).chain(&one.over) {
+                let is_there = scene.toolpaths.iter().any(|request| request.name == *name);
+                assert!(is_there, "{}: {name}", one.scene);
+            }
+        }
+        for name in scenes.keys() {
+            assert!(ours().any(|one| one.scene == *name), "{name} has no row");
+        }
+    }
 }

@@ -50,7 +50,9 @@ impl Scripts<'_> {
         lines.extend(options.jobs.map(|jobs| format!("#SBATCH --cpus-per-task={jobs}")));
         lines.extend(options.memory.map(|mib| format!("#SBATCH --mem={mib}")));
         let mut words = vec![program.clone(), "nightly".into()];
-        words.extend(named(&[("rules", &options.rules), ("baseline", &options.baseline)])?);
+        let files =
+            [("rules", &options.rules), ("published", &options.published), ("baseline", &options.baseline)];
+        words.extend(named(&files)?);
         words.extend(options.jobs.map(|jobs| format!("--jobs {jobs}")));
         words.extend(options.memory.map(|mib| format!("--memory {mib}")));
         words.push(format!("--time-limit {}", options.time_limit));
@@ -69,8 +71,12 @@ impl Scripts<'_> {
         let Self { options, shards, program } = self;
         let mut lines = self.head("merge.log")?;
         let mut words = vec![program.clone(), "nightly --merge".into()];
-        let files =
-            [("rules", &options.rules), ("baseline", &options.baseline), ("history", &options.history)];
+        let files = [
+            ("rules", &options.rules),
+            ("published", &options.published),
+            ("baseline", &options.baseline),
+            ("history", &options.history),
+        ];
         words.extend(named(&files)?);
         words.push(format!("--out {}", quoted(&options.out)?));
         words.push("--".into());

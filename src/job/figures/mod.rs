@@ -5,6 +5,7 @@ mod clearance;
 mod correction;
 mod coverage;
 mod entries;
+mod equal_time;
 mod feeds;
 mod field;
 mod machine;
@@ -14,6 +15,7 @@ mod pocket;
 mod program;
 mod removal;
 mod roughness;
+mod section_polynomial;
 mod sections;
 mod shortest;
 mod solid;
@@ -32,14 +34,16 @@ use super::run::{Finding, Run};
 type Find = fn(&Run<'_>, &dyn Monitor) -> Result<Finding, JobError>;
 
 /// All figures, in the order of report.json.
-const FIGURES: [Find; 16] = [
+const FIGURES: [Find; 18] = [
     coverage::find,
     shortest::find,
     correction::find,
+    equal_time::find,
     program::find,
     field::find,
     machine::find,
     pairs::find,
+    section_polynomial::find,
     roughness::find,
     sections::find,
     removal::find,

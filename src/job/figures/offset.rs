@@ -24,7 +24,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     monitor.start("measuring the offset surface", 0);
     let given = match drive {
         OffsetDrive::Given(surfaces) => Some(surfaces.as_slice()),
-        OffsetDrive::Exact | OffsetDrive::InPlane => None,
+        OffsetDrive::Exact | OffsetDrive::InPlane | OffsetDrive::Published => None,
     };
     let Some(offset) = offset_figures(run.part(), run.scene().cutter.radius(), given) else {
         return Ok(Finding::default());

@@ -64,6 +64,8 @@ pub enum OffsetDrive {
     /// Sections offset in their planes, and lofted. It lies too near wherever the surface leans out of these planes; whoever
     /// has the sections puts [`OffsetDrive::Given`] in its place. A tilted tool that keeps clear leaves such places out.
     InPlane,
+    /// The same as published: offsets that cross themselves are not trimmed. Put in its place as for [`OffsetDrive::InPlane`].
+    Published,
     /// These surfaces, `du × dv` away from the part.
     Given(Arc<Vec<NurbsSurface>>),
 }
@@ -92,8 +94,9 @@ pub(crate) static DEFINITION: Definition = Definition {
 
 fn read(from: &mut Reading<'_>) -> Result<Box<dyn Strategy>, SceneError> {
     let section = from.section;
-    let drive = match section.word("offset", &["normal", "in-plane"])?.map(|word| word.value) {
+    let drive = match section.word("offset", &["normal", "in-plane", "published"])?.map(|word| word.value) {
         Some("in-plane") => OffsetDrive::InPlane,
+        Some("published") => OffsetDrive::Published,
         _ => OffsetDrive::Exact,
     };
     let angle = section.number("angle", -360.0..=360.0, " degrees")?;
@@ -126,8 +129,12 @@ impl Strategy for OffsetSurface {
                 writeln!(out, "angle = {}  # degrees from the x axis", toml_number(angle.to_degrees()))?;
             }
         }
-        let exact = self.drive == OffsetDrive::Exact;
-        writeln!(out, "offset = \"{}\"", if exact { "normal" } else { "in-plane" })
+        let drive = match self.drive {
+            OffsetDrive::Exact => "normal",
+            OffsetDrive::Published => "published",
+            OffsetDrive::InPlane | OffsetDrive::Given(_) => "in-plane",
+        };
+        writeln!(out, "offset = \"{drive}\"")
     }
 
     fn passes(&self, task: &Task<'_>) -> Result<Passes, PlanError> {
@@ -153,7 +160,7 @@ fn passes(task: &Task<'_>, along: OffsetAlong, drive: &OffsetDrive) -> Result<Pa
     }
     let charts = match drive {
         OffsetDrive::Exact => Chart::all(part, cutter, settings.guide())?,
-        OffsetDrive::InPlane => {
+        OffsetDrive::InPlane | OffsetDrive::Published => {
             return Err(refused(
                 "sections are offset in their planes, and the part has none; write `offset = \"normal\"`",
             ));

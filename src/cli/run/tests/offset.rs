@@ -6,6 +6,12 @@ use crate::progress::Progress;
 
 /// Runs a suction side that leans by 20 degrees out of its sections' planes, straight or hollow; its `offset` and notes.
 fn offset_of(side: &dyn Fn(f64) -> f64, offset: &str, diameter: f64) -> (serde_json::Value, String) {
+    let path = path_of(side, offset, diameter);
+    (path["offset"].clone(), path["notes"].to_string())
+}
+
+/// The same; all that report.json has of its path.
+fn path_of(side: &dyn Fn(f64) -> f64, offset: &str, diameter: f64) -> serde_json::Value {
     let home = tempfile::tempdir().unwrap();
     let mut table = String::from("unit mm\n");
     for height in [0.0, 4.0, 8.0, 12.0_f64] {
@@ -43,8 +49,7 @@ fn offset_of(side: &dyn Fn(f64) -> f64, offset: &str, diameter: f64) -> (serde_j
     run(&options, &Progress::quiet()).unwrap();
     let json = std::fs::read_to_string(home.path().join("out/report.json")).unwrap();
     let report: serde_json::Value = serde_json::from_str(&json).unwrap();
-    let path = &report["toolpaths"][0];
-    (path["offset"].clone(), path["notes"].to_string())
+    report["toolpaths"][0].clone()
 }
 
 #[test]
@@ -78,4 +83,35 @@ fn a_run_tells_where_its_ball_does_not_fit() {
     assert!(notes.contains("at least as hollow as the ball of 3 mm"), "{notes}");
     let small = offset_of(&hollow, "normal", 1.0).0;
     assert_eq!(small["singular_place_count"], 0);
+}
+
+/// How deep the published offset of a hollow that is narrower than the ball cuts, by brute force: of each centre, its radius less
+/// its distance from the part.
+#[test]
+fn an_offset_that_crosses_itself_is_cut_as_it_is_and_judged() {
+    let hollow = |x: f64| 0.2 * ((x - 6.0).powi(2) - 36.0) / (1.0 + 0.05 * (x - 6.0).powi(2));
+    let slope = |x: f64| (hollow(x + 1e-6) - hollow(x - 1e-6)) / 2e-6;
+    let lean = 20_f64.to_radians().tan();
+    let radius = 3.0;
+    // Through a centre, the part has the same section everywhere, moved by the lean: a place `up` higher lies `up lean` farther.
+    let distance = |centre: [f64; 2]| {
+        let places =
+            (0..=1200).flat_map(|k| (-120..=120).map(move |up| (0.01 * f64::from(k), 0.02 * f64::from(up))));
+        let to = |(x, up): (f64, f64)| {
+            ((x - centre[0]).powi(2) + (hollow(x) + lean * up - centre[1]).powi(2) + up * up).sqrt()
+        };
+        places.map(to).fold(f64::INFINITY, f64::min)
+    };
+    let depth = |k: i32| {
+        let x = 0.05 * f64::from(k);
+        let length = (1.0 + slope(x).powi(2)).sqrt();
+        radius - distance([x - radius * slope(x) / length, hollow(x) + radius / length])
+    };
+    let deepest = (0..=240).map(depth).fold(0.0, f64::max);
+    let path = path_of(&hollow, "published", 2.0 * radius);
+    let found = path["gouge"]["max_depth_mm"].as_f64().unwrap();
+    assert!((found / deepest - 1.0).abs() < 0.03, "{found} {deepest}");
+    assert_eq!(path["verdict"], "fail");
+    let trimmed = path_of(&hollow, "in-plane", 2.0 * radius)["gouge"]["max_depth_mm"].as_f64().unwrap();
+    assert!(trimmed < 0.5 * found, "{trimmed} {found}");
 }
