@@ -10,7 +10,7 @@ use super::inspection::Inspection;
 use super::pairs::pair_figures;
 use super::refine::{Asked, Refinement};
 use super::ridge_map::borders;
-use super::ridges::scallop_figures;
+use super::ridges::{Ridges, scallop_figures};
 use super::tracks::Tracks;
 use super::unseen::{dips, unseen_depth};
 use super::walls::{WallTask, Walls};
@@ -95,7 +95,7 @@ pub fn measure_with_walls(
         uncut: found.uncut,
         excess: ExcessFigures::default(),
         deviation: found.deviation,
-        ridge_samples: found.ridges.samples,
+        ridge_samples: std::mem::take(&mut found.ridges.samples),
         pairs,
         deviation_map: found.samples.iter().map(|s| s.deviation).collect(),
         refined: CloserLook::default(),
@@ -123,7 +123,7 @@ pub fn measure_with_walls(
         return Ok(measured);
     }
     measured.excess = search.run(&found.samples, &measured, monitor)?;
-    raise_ridges(&mut measured, &inspection, path);
+    raise_ridges(&mut measured, &found.ridges, &inspection, path);
     let (highest, unreached) = (measured.excess.highest.max_mm, measured.excess.unreached.max_mm);
     measured.deviation.max_mm = measured.deviation.max_mm.map(|max| max.max(highest));
     measured.uncut.max_height_mm = measured.uncut.max_height_mm.max(unreached);
@@ -135,20 +135,29 @@ pub fn measure_with_walls(
 
 /// The highest place that passes reached is the highest ridge, where two passes leave equally much: ridges are measured on the
 /// grid's lines, and rise between them.
-fn raise_ridges(measured: &mut Measurement, inspection: &Inspection<'_>, path: &Toolpath) {
+fn raise_ridges(measured: &mut Measurement, ridges: &Ridges, inspection: &Inspection<'_>, path: &Toolpath) {
     /// Two passes leave equally much where their heights differ by no more than this share of it.
     const EQUAL: f64 = 0.05;
     let Inspection { part, cutter, surface, .. } = *inspection;
     let (excess, scallop) = (&mut measured.excess, &mut measured.scallop);
     let reached = excess.reached;
-    if scallop.max_mm.is_some_and(|ridge| ridge > excess.highest.at_most()) {
-        // Moves that no cell saw cut the ridges of the cells away.
+    let highest = excess.highest.at_most();
+    if scallop.max_mm.is_some_and(|ridge| ridge > highest) {
+        // Moves that no cell saw cut ridges of the cells away.
+        measured.ridge_samples.retain(|[height, _]| f64::from(*height) <= highest);
+        let known = |figure: Option<f64>| figure.filter(|height| *height <= highest);
+        let next = ridges.highest_up_to(highest);
         *scallop = ScallopFigures {
-            target_mm: scallop.target_mm,
-            reason: Some("cells are too coarse to tell the ridges apart".into()),
-            ..ScallopFigures::default()
+            max_mm: next.map(|(height, _)| height),
+            max_at_mm: next.map(|(_, at)| at.into()),
+            error_bound_mm: next.map(|(height, _)| highest - height + NUMERICAL_FLOOR),
+            p95_mm: known(scallop.p95_mm),
+            p50_mm: known(scallop.p50_mm),
+            mean_mm: known(scallop.mean_mm),
+            over_target_fraction: (highest <= scallop.target_mm).then_some(0.0),
+            reason: next.is_none().then(|| "cells are too coarse to tell the ridges apart".into()),
+            ..std::mem::take(scallop)
         };
-        measured.ridge_samples.clear();
     }
     let ridge = scallop.max_mm.unwrap_or(0.0);
     let most = excess.highest.at_most() - ridge;

@@ -89,6 +89,12 @@ impl Ridges {
         }
     }
 
+    /// The highest of the rows' highest samples that are no higher than this, mm, and where.
+    pub fn highest_up_to(&self, most: f64) -> Option<(f64, Point3)> {
+        let below = self.candidates.iter().filter(|sample| sample.height <= most);
+        below.max_by(|a, b| a.height.total_cmp(&b.height)).map(|sample| (sample.height, sample.at))
+    }
+
     /// Height of the highest sample, mm; 0 without samples.
     pub fn highest_sample(&self) -> f64 {
         self.candidates.iter().map(|s| s.height).fold(0.0, f64::max)

@@ -76,8 +76,8 @@ pub trait AlongNormal: Sync {
         self.reach()
     }
 
-    /// The same at most, mm.
-    fn standing_at_most(&self, point: &Point3, normal: &Vector3) -> f64 {
+    /// The same at most, mm, as far as `within` mm aside.
+    fn standing_at_most(&self, point: &Point3, normal: &Vector3, _within: f64) -> f64 {
         self.standing(point, normal)
     }
 
@@ -319,12 +319,9 @@ impl Along<'_> {
 }
 
 impl NormalInspection<'_> {
-    /// How high material stands at most about a place where nothing was cut, mm: as far as the next place it rises by the
-    /// slope of the design.
+    /// How high material stands at most about a place where nothing was cut, mm.
     fn at_most(&self, sample: &Sample) -> f64 {
-        let NetPlace { point, normal, .. } = &sample.place;
-        let slope = (1.0 - normal.z * normal.z).max(0.0).sqrt() / normal.z.max(f64::MIN_POSITIVE);
-        self.engine.standing_at_most(point, normal) + (slope * self.spacing).min(self.engine.reach())
+        self.engine.standing_at_most(&sample.place.point, &sample.place.normal, self.spacing)
     }
 
     fn sample(&self, place: NetPlace, near: Option<&NormalHit>) -> Sample {

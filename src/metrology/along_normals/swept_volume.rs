@@ -103,11 +103,15 @@ pub struct SweptVolume<'a> {
 impl SweptVolume<'_> {
     /// How far a line from a place in the block runs before it leaves, mm.
     pub(crate) fn way_out(&self, point: &Point3, normal: &Vector3) -> f64 {
-        let along = |c: usize| {
+        self.ways_out(point, normal).into_iter().fold(f64::INFINITY, f64::min)
+    }
+
+    /// How far it runs to the faces across x, y and z, mm.
+    fn ways_out(&self, point: &Point3, normal: &Vector3) -> [f64; 3] {
+        [0, 1, 2].map(|c| {
             let side = if normal[c] > 0.0 { self.block.max[c] } else { self.block.min[c] };
             if normal[c] == 0.0 { f64::INFINITY } else { ((side - point[c]) / normal[c]).max(0.0) }
-        };
-        along(0).min(along(1)).min(along(2))
+        })
     }
 
     /// The same where the block had no sides. What leans out over a border is part of what stands there.
@@ -137,8 +141,12 @@ impl AlongNormal for SweptVolume<'_> {
         self.outward.min(self.way_up(point, normal))
     }
 
-    fn standing_at_most(&self, point: &Point3, normal: &Vector3) -> f64 {
-        self.way_out(point, normal).max(self.standing(point, normal))
+    fn standing_at_most(&self, point: &Point3, normal: &Vector3, within: f64) -> f64 {
+        // Aside of a place it rises by the slope of the design against the face where the line leaves.
+        let rising = |(way, n): (f64, &f64)| way + within * (1.0 - n * n).max(0.0).sqrt() / n.abs();
+        let ways =
+            self.ways_out(point, normal).into_iter().zip(normal.iter()).filter(|(way, _)| way.is_finite());
+        ways.map(rising).fold(f64::INFINITY, f64::min).max(self.standing(point, normal))
     }
 
     fn depth(&self) -> f64 {
