@@ -155,9 +155,13 @@ fn raise_ridges(measured: &mut Measurement, ridges: &Ridges, inspection: &Inspec
             p50_mm: known(scallop.p50_mm),
             mean_mm: known(scallop.mean_mm),
             over_target_fraction: (highest <= scallop.target_mm).then_some(0.0),
-            reason: next.is_none().then(|| "cells are too coarse to tell the ridges apart".into()),
             ..std::mem::take(scallop)
         };
+        let known =
+            [scallop.max_mm, scallop.p95_mm, scallop.p50_mm, scallop.mean_mm, scallop.over_target_fraction];
+        if known.contains(&None) {
+            scallop.reason = Some("cells are too coarse to tell the ridges apart".into());
+        }
     }
     let ridge = scallop.max_mm.unwrap_or(0.0);
     let most = excess.highest.at_most() - ridge;
