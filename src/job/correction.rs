@@ -78,10 +78,12 @@ pub(crate) struct CorrectionRound {
     /// Bound of the error of the higher one of both; `None` where it is a border that was looked at in places only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_bound_mm: Option<f64>,
-    /// Half of the ridge length is lower, mm.
-    pub median_mm: f64,
-    /// Share of the ridge length above the target.
-    pub over_target_fraction: f64,
+    /// Half of the ridge length is lower, mm; `None` where cells are too coarse for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub median_mm: Option<f64>,
+    /// Share of the ridge length above the target; `None` likewise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub over_target_fraction: Option<f64>,
     /// Length of all moves that feed along passes, mm.
     pub cutting_length_mm: f64,
     /// Least and greatest factor of the widths that the round was planned with.
@@ -117,8 +119,8 @@ impl Standing {
             highest_mm: highest_ridge,
             border_mm: Some(map.border),
             error_bound_mm: map.scallop.error_bound_mm.filter(|_| highest_ridge >= map.border),
-            median_mm: map.scallop.p50_mm?,
-            over_target_fraction: map.scallop.over_target_fraction?,
+            median_mm: map.scallop.p50_mm,
+            over_target_fraction: map.scallop.over_target_fraction,
             cutting_length_mm: path_figures(&planned.plan.path, 0.0).cutting_length_mm,
             factors,
             measured: false,
@@ -137,8 +139,8 @@ impl Standing {
             highest_mm: scallop.max_mm?,
             border_mm: on_border.then_some(reached.max_mm),
             error_bound_mm: Some(highest_reached(measured).error_bound_mm),
-            median_mm: scallop.p50_mm?,
-            over_target_fraction: scallop.over_target_fraction?,
+            median_mm: scallop.p50_mm,
+            over_target_fraction: scallop.over_target_fraction,
             cutting_length_mm: path_figures(&planned.plan.path, 0.0).cutting_length_mm,
             factors,
             measured: true,
@@ -164,7 +166,8 @@ impl CorrectionRound {
     /// Whether ridges exceed the target no more than they may.
     fn holds(&self, goal: &Goal) -> bool {
         self.highest() + self.margin(goal.target) <= goal.rule.highest * goal.target
-            && (goal.rule.share >= 1.0 || self.over_target_fraction <= 1.0 - goal.rule.share)
+            && (goal.rule.share >= 1.0
+                || self.over_target_fraction.is_some_and(|over| over <= 1.0 - goal.rule.share))
     }
 
     /// The bound of the highest, mm, where keeping clear of it costs little: a wider one is to be refined instead, as it is
@@ -539,8 +542,8 @@ mod tests {
             highest_mm,
             border_mm: None,
             error_bound_mm: Some(0.1),
-            median_mm: 0.9,
-            over_target_fraction: if highest_mm > 1.0 { 0.02 } else { 0.0 },
+            median_mm: Some(0.9),
+            over_target_fraction: Some(if highest_mm > 1.0 { 0.02 } else { 0.0 }),
             cutting_length_mm,
             factors: [1.0; 2],
             measured: true,

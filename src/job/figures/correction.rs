@@ -12,7 +12,7 @@ use crate::run::{Finding, Run};
 const MEANING: (&str, &str) = (
     "correction",
     "A plan is cut and measured. Where ridges or borders stand above the target, passes are moved together; where none comes \
-     near it, apart. Then the path is planned again, up to six plans in all, and the best one is kept.",
+     near it, apart. Then the path is planned again, a dozen plans at most, and the best one is kept.",
 );
 
 pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> {
@@ -23,7 +23,7 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
             format!("{}{}", k + 1, if k + 1 == correction.kept { ", kept" } else { "" }),
             with_bound(Some(round.highest()), round.error_bound_mm),
             if round.is_on_border() { "border" } else { "ridge" }.to_owned(),
-            micrometres(Some(round.median_mm)),
+            micrometres(round.median_mm),
             format!("{:.0}", round.cutting_length_mm),
             format!("{least:.3} to {most:.3}"),
         ]
