@@ -164,8 +164,8 @@ fn raise_ridges(measured: &mut Measurement, ridges: &Ridges, inspection: &Inspec
         }
     }
     let ridge = scallop.max_mm.unwrap_or(0.0);
-    let most = excess.highest.at_most() - ridge;
-    scallop.error_bound_mm = scallop.error_bound_mm.map(|bound| bound.min(most.max(NUMERICAL_FLOOR)));
+    let most = (highest - ridge).max(NUMERICAL_FLOOR);
+    scallop.error_bound_mm = scallop.error_bound_mm.map(|bound| bound.min(most));
     let place = reached.at_mm.filter(|_| reached.max_mm > ridge);
     let Some(design) = place.and_then(|[x, y, _]| part.highest_at(x, y)) else { return };
     let top = design.point + design.normal * reached.max_mm;
