@@ -11,7 +11,7 @@
 
 use super::Machine;
 use super::kinematics::{JointPath, Joints, Kinematics, Turn};
-use super::time::{Block, NO_MOVE, profile};
+use super::time::{Block, NO_MOVE, SECONDS_PER_MINUTE, profile};
 use motion::Toolpath;
 
 /// Halvings of the greatest squared speed from which a stage can be run.
@@ -42,13 +42,20 @@ struct Piece {
     after_stop: bool,
 }
 
+/// What single axes allow: X, Y, Z and two rotary ones. Rates in mm/s or rad/s, accelerations in mm/s² or rad/s².
+#[derive(Debug, Clone, Copy)]
+struct AxisLimits {
+    rates: [f64; 5],
+    accelerations: [f64; 5],
+}
+
 /// A part of a piece in which the tip accelerates evenly.
 #[derive(Debug, Clone, Copy)]
 struct Stage {
     length: f64,
     slope: [f64; 5],
-    /// At its beginning: d²q/ds².
-    bend: [f64; 5],
+    /// At its beginning and at its end: d²q/ds².
+    bends: [[f64; 5]; 2],
     /// Greatest squared speed at its beginning.
     most: f64,
 }
@@ -68,11 +75,29 @@ pub fn machining_time_of_axes(
 ) -> f64 {
     let Some(blocks) = profile(path, machine) else { return f64::INFINITY };
     let (pieces, standing) = pieces(path, kinematics, joints);
-    let accelerations = kinematics.accelerations();
-    let stages = stages(&pieces, &blocks, machine, kinematics);
-    let speeds = speeds(&stages, &accelerations, machine.acceleration);
+    let axes = AxisLimits { rates: kinematics.rates(), accelerations: kinematics.accelerations() };
+    standing + time_of_pieces(&pieces, &blocks, machine, &axes)
+}
+
+/// Time, s, of the moves of an upright tool whose X, Y and Z keep the rates and accelerations of a machine.
+pub(super) fn time_of_linear(blocks: &[Block], machine: &Machine) -> f64 {
+    let piece = |(k, block): (usize, &Block)| {
+        let Block { step, length, direction, .. } = *block;
+        let slope = [direction.x, direction.y, direction.z, 0.0, 0.0];
+        Piece { step, length, slope, after_stop: k == 0 }
+    };
+    let pieces: Vec<Piece> = blocks.iter().enumerate().map(piece).collect();
+    let with_rotary = |[x, y, z]: [f64; 3]| [x, y, z, f64::INFINITY, f64::INFINITY];
+    let rates = with_rotary(machine.rates.map(|rate| rate / SECONDS_PER_MINUTE));
+    let axes = AxisLimits { rates, accelerations: with_rotary(machine.accelerations) };
+    time_of_pieces(&pieces, blocks, machine, &axes)
+}
+
+fn time_of_pieces(pieces: &[Piece], blocks: &[Block], machine: &Machine, axes: &AxisLimits) -> f64 {
+    let stages = stages(pieces, blocks, machine, axes);
+    let speeds = speeds(&stages, &axes.accelerations, machine.acceleration);
     let time = |(stage, ends): (&Stage, &[f64])| 2.0 * stage.length / (ends[0].sqrt() + ends[1].sqrt());
-    standing + stages.iter().zip(speeds.windows(2)).map(time).sum::<f64>()
+    stages.iter().zip(speeds.windows(2)).map(time).sum()
 }
 
 /// Time, s, that no motion of the axes from location to location takes longer than, each from rest to rest.
@@ -129,38 +154,55 @@ fn from_rest_to_rest(way: &[f64; 5], kinematics: &Kinematics) -> f64 {
     way.iter().zip(limits).map(one).fold(0.0, f64::max)
 }
 
-fn stages(pieces: &[Piece], blocks: &[Block], machine: &Machine, kinematics: &Kinematics) -> Vec<Stage> {
-    let (rates, accelerations) = (kinematics.rates(), kinematics.accelerations());
+fn stages(pieces: &[Piece], blocks: &[Block], machine: &Machine, axes: &AxisLimits) -> Vec<Stage> {
     let mut stages = Vec::new();
     let mut before: Option<(&Piece, f64)> = None;
     let mut blocks = blocks.iter().peekable();
-    for piece in pieces {
+    for (k, piece) in pieces.iter().enumerate() {
         while blocks.next_if(|block| block.step < piece.step).is_some() {}
         let block = blocks.peek().filter(|block| block.step == piece.step);
         let least = |limits: &[f64; 5]| {
             let each = limits.iter().zip(&piece.slope).map(|(limit, slope)| limit / slope.abs());
             each.fold(f64::INFINITY, f64::min)
         };
-        let feed = block.map_or(machine.rapid_rate / 60.0, |block| block.feed).min(least(&rates));
+        let feed = block.map_or(machine.rapid_rate / SECONDS_PER_MINUTE, |block| block.feed);
+        let feed = feed.min(least(&axes.rates));
         let corner = match (&before, block) {
             _ if piece.after_stop => 0.0,
             (Some((last, _)), Some(block)) if last.step != piece.step => block.corner,
             _ => f64::INFINITY,
         };
-        let bend = before.map_or([0.0; 5], |(last, _)| {
-            std::array::from_fn(|k| 2.0 * (piece.slope[k] - last.slope[k]) / (piece.length + last.length))
-        });
+        let bends = [
+            k.checked_sub(1).map(|k| bend(&pieces[k], piece)),
+            pieces.get(k + 1).map(|next| bend(piece, next)),
+        ];
+        let bends = bends.map(Option::unwrap_or_default);
         let slower = before.map_or(feed, |(_, last)| feed.min(last));
         let lengths =
-            divided(piece.length, 0.5 * feed * feed / machine.acceleration.min(least(&accelerations)));
+            divided(piece.length, 0.5 * feed * feed / machine.acceleration.min(least(&axes.accelerations)));
+        let (last, halves) = (lengths.len() - 1, lengths.len() == 2);
         for (k, length) in lengths.into_iter().enumerate() {
-            let (bend, most) =
-                if k == 0 { (bend, corner.min(slower * slower)) } else { ([0.0; 5], feed * feed) };
-            stages.push(Stage { length, slope: piece.slope, bend, most });
+            // The bend at a corner reaches half-way into the pieces beside, but not along those that the machine needs to speed up.
+            let bends = match k {
+                _ if halves => [bends[k]; 2],
+                0 => [bends[0], [0.0; 5]],
+                _ if k == last => [[0.0; 5], bends[1]],
+                _ => [[0.0; 5]; 2],
+            };
+            let most = if k == 0 { corner.min(slower * slower) } else { feed * feed };
+            stages.push(Stage { length, slope: piece.slope, bends, most });
         }
         before = Some((piece, feed));
     }
     stages
+}
+
+/// How axes bend at the corner between two pieces: their slopes change over half of both. Where the tip stands, nothing bends.
+fn bend(last: &Piece, next: &Piece) -> [f64; 5] {
+    if next.after_stop {
+        return [0.0; 5];
+    }
+    std::array::from_fn(|k| 2.0 * (next.slope[k] - last.slope[k]) / (next.length + last.length))
 }
 
 /// Lengths of the stages of a piece whose ramps from rest are as long as `ramp`.
@@ -200,13 +242,13 @@ impl Limits<'_> {
     /// `end`; the least is above the greatest where there is none.
     fn window(&self, k: usize, x: f64, end: f64) -> [f64; 2] {
         let stage = &self.stages[k];
-        let after = self.stages.get(k + 1).map_or([0.0; 5], |next| next.bend);
         let twice = 2.0 * stage.length;
         let mut window = [(-x / twice).max(-self.along), ((end - x) / twice).min(self.along)];
         for (axis, most) in self.accelerations.iter().enumerate() {
             let most = most * (1.0 + ROUNDING);
             let slope = stage.slope[axis];
-            for (bend, factor) in [(stage.bend[axis], slope), (after[axis], slope + twice * after[axis])] {
+            let [begin, end] = stage.bends.map(|bend| bend[axis]);
+            for (bend, factor) in [(begin, slope), (end, slope + twice * end)] {
                 // |bend·x + factor·u| ≤ most
                 let fixed = bend * x;
                 if factor.abs() > f64::MIN_POSITIVE {

@@ -26,6 +26,10 @@ pub struct Machine {
     pub jerk: f64,
     /// Lines of a program that the control can run, 1/s: a shorter move lasts as long as one.
     pub block_rate: f64,
+    /// Fastest X, Y and Z of upright tools, mm/min; infinite ones limit nothing.
+    pub rates: [f64; 3],
+    /// Accelerations of X, Y and Z of upright tools, mm/s²; with infinite ones only `acceleration` limits.
+    pub accelerations: [f64; 3],
     /// Whether programs have the feeds at which corners and bends can be run.
     pub slow_corners: bool,
 }
@@ -41,6 +45,8 @@ impl Default for Machine {
             junction_deviation: 0.01,
             jerk: 50_000.0,
             block_rate: 1000.0,
+            rates: [f64::INFINITY; 3],
+            accelerations: [f64::INFINITY; 3],
             slow_corners: true,
         }
     }
@@ -68,7 +74,7 @@ impl Machine {
     /// Refuses limits with which no time could be told.
     ///
     /// # Errors
-    /// [`MachineError`] unless all limits are positive and finite.
+    /// [`MachineError`] unless all limits are positive, and finite but for those of single axes.
     pub fn check(&self) -> Result<(), MachineError> {
         let limits = [
             ("rapid rate", self.rapid_rate, "mm/min"),
@@ -77,7 +83,11 @@ impl Machine {
             ("jerk", self.jerk, "mm/s³"),
             ("block rate", self.block_rate, "lines/s"),
         ];
-        match limits.into_iter().find(|(_, value, _)| !(*value > 0.0 && value.is_finite())) {
+        let refused = limits.into_iter().find(|(_, value, _)| !(*value > 0.0 && value.is_finite()));
+        let rates = self.rates.map(|value| ("rate of an axis", value, "mm/min"));
+        let accelerations = self.accelerations.map(|value| ("acceleration of an axis", value, "mm/s²"));
+        let single = || rates.into_iter().chain(accelerations).find(|(_, value, _)| !(*value > 0.0));
+        match refused.or_else(single) {
             Some((what, value, unit)) => Err(MachineError { what, value, unit }),
             None => Ok(()),
         }
@@ -105,6 +115,8 @@ mod tests {
         assert!(Machine { rapid_rate: f64::NAN, ..machine }.check().is_err());
         assert!(Machine { junction_deviation: f64::INFINITY, ..machine }.check().is_err());
         assert!(Machine { jerk: -1.0, ..machine }.check().is_err());
+        assert!(Machine { rates: [1.0, f64::NAN, 1.0], ..machine }.check().is_err());
+        assert!(Machine { accelerations: [1.0, 1.0, 0.0], ..machine }.check().is_err());
     }
 }
 
@@ -122,6 +134,8 @@ mod fixture {
             junction_deviation: 0.01,
             jerk,
             block_rate: 1e9,
+            rates: [f64::INFINITY; 3],
+            accelerations: [f64::INFINITY; 3],
             slow_corners: true,
         }
     }

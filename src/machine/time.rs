@@ -16,17 +16,19 @@
 //!
 //! A move lasts at least as long as the control takes for a line of the program.
 //!
-//! What the single axes of a machine with rotary ones need besides is in [`super::axis_limits`].
+//! What single axes need besides is in [`super::axis_limits`]: those of upright tools where the machine has accelerations of their
+//! own, and those of machines with rotary axes. Rates of X, Y and Z are feeds that no move of an upright tool exceeds.
 //!
 //! A backward pass then limits speeds to what can still be braked, a forward pass to what can have been
 //! reached: both in one sweep, O(n). The path starts and ends at rest. Jerk along the path is not modelled: real machines take
 //! somewhat longer.
 
 use super::Machine;
+use super::axis_limits::time_of_linear;
 use geometry::Vector3;
 use motion::{Move, MoveKind, Toolpath};
 
-const SECONDS_PER_MINUTE: f64 = 60.0;
+pub(super) const SECONDS_PER_MINUTE: f64 = 60.0;
 
 /// Moves no longer than this, mm, are what rounding leaves of none: programs are written to a ten-thousandth, so that no
 /// control sees them, and the way before them goes on behind them. A greater length would hide bends.
@@ -37,7 +39,7 @@ pub(super) struct Block {
     /// Its index in the path.
     pub step: usize,
     pub length: f64,
-    direction: Vector3,
+    pub direction: Vector3,
     /// Feed, mm/s.
     pub feed: f64,
     /// Square of the speed at which the corner before it can be run at most.
@@ -64,15 +66,20 @@ impl Block {
 /// A model of the machine (see the module), computed to f64 rounding.
 pub fn machining_time(path: &Toolpath, machine: &Machine) -> f64 {
     let Some(blocks) = profile(path, machine) else { return f64::INFINITY };
+    if machine.accelerations.iter().any(|most| most.is_finite()) && path.is_upright() {
+        return time_of_linear(&blocks, machine);
+    }
     blocks.iter().map(|block| block_time(block, machine.acceleration)).sum()
 }
 
 /// Time, s, that no path takes longer than, whose feeds lie between `slowest` and `fastest`, mm/min: from rest to rest each
 /// move takes `l/v + v/a` or less. Rapids go at the rapid rate.
 pub fn at_most(path: &Toolpath, machine: &Machine, [slowest, fastest]: [f64; 2]) -> f64 {
+    let least = |limits: &[f64; 3], most: f64| limits.iter().copied().fold(most, f64::min);
+    let ramps = fastest / (SECONDS_PER_MINUTE * least(&machine.accelerations, machine.acceleration));
     let one = |(from, to, step): (geometry::Point3, geometry::Point3, &Move)| {
         let slowest = if step.kind == MoveKind::Rapid { machine.rapid_rate } else { slowest };
-        let ramps = fastest / (SECONDS_PER_MINUTE * machine.acceleration);
+        let slowest = least(&machine.rates, slowest);
         (to - from).norm() * SECONDS_PER_MINUTE / slowest + ramps
     };
     path.segments().map(one).sum()
@@ -82,19 +89,20 @@ pub fn at_most(path: &Toolpath, machine: &Machine, [slowest, fastest]: [f64; 2])
 pub(super) fn profile(path: &Toolpath, machine: &Machine) -> Option<Vec<Block>> {
     let acceleration = machine.acceleration;
     let mut blocks: Vec<Block> = Vec::with_capacity(path.len());
+    let rates = if path.is_upright() { machine.rates } else { [f64::INFINITY; 3] };
     for (k, (from, to, step)) in path.segments().enumerate() {
         let length = (to - from).norm();
         if length <= NO_MOVE {
             continue;
         }
-        let feed = feed(step, machine);
-        let fastest = length * machine.block_rate;
+        let (feed, direction) = (feed(step, machine), (to - from) / length);
+        let of_axis = |k: usize| rates[k] / (SECONDS_PER_MINUTE * direction[k].abs());
+        let fastest = (0..3).map(of_axis).fold(length * machine.block_rate, f64::min);
         // What is no number stays none.
         let feed = if feed > fastest { fastest } else { feed };
         if !(feed > 0.0 && length.is_finite() && machine.check().is_ok()) {
             return None;
         }
-        let direction = (to - from) / length;
         let mut block = Block {
             step: k,
             length,
@@ -245,6 +253,17 @@ mod tests {
             1.1,
             epsilon = 1e-12
         );
+    }
+
+    #[test]
+    fn no_axis_of_an_upright_tool_exceeds_its_rate() {
+        let line = path([[0.0; 3], [60.0, 80.0, 0.0]]);
+        // Y at 50 mm/s: 62.5 mm/s along the line.
+        let slow = Machine { rates: [f64::INFINITY, 3000.0, 1.0], ..MACHINE };
+        assert_relative_eq!(machining_time(&line, &slow), 100.0 / 62.5 + 0.0625, max_relative = 1e-9);
+        let words = super::super::slow_corners(&line, &slow);
+        assert!(words.moves.iter().all(|step| 0.8 * step.feed_rate <= 3000.0 * (1.0 + 1e-9)));
+        assert!(machining_time(&line, &slow) <= at_most(&line, &slow, [6000.0, 6000.0]));
     }
 
     #[test]

@@ -123,7 +123,8 @@ pub fn measure_with_walls(
         return Ok(measured);
     }
     measured.excess = search.run(&found.samples, &measured, monitor)?;
-    raise_ridges(&mut measured, &found.ridges, &inspection, path);
+    drop_disproved_ridges(&mut measured, &found.ridges);
+    raise_highest_ridge(&mut measured, &inspection, path);
     let (highest, unreached) = (measured.excess.highest.max_mm, measured.excess.unreached.max_mm);
     measured.deviation.max_mm = measured.deviation.max_mm.map(|max| max.max(highest));
     measured.uncut.max_height_mm = measured.uncut.max_height_mm.max(unreached);
@@ -133,17 +134,11 @@ pub fn measure_with_walls(
     Ok(measured)
 }
 
-/// The highest place that passes reached is the highest ridge, where two passes leave equally much: ridges are measured on the
-/// grid's lines, and rise between them.
-fn raise_ridges(measured: &mut Measurement, ridges: &Ridges, inspection: &Inspection<'_>, path: &Toolpath) {
-    /// Two passes leave equally much where their heights differ by no more than this share of it.
-    const EQUAL: f64 = 0.05;
-    let Inspection { part, cutter, surface, .. } = *inspection;
-    let (excess, scallop) = (&mut measured.excess, &mut measured.scallop);
-    let reached = excess.reached;
-    let highest = excess.highest.at_most();
+/// Leaves ridges out that stand above the highest material: moves that no cell saw cut them away. The others stand no higher
+/// than it.
+fn drop_disproved_ridges(measured: &mut Measurement, ridges: &Ridges) {
+    let (highest, scallop) = (measured.excess.highest.at_most(), &mut measured.scallop);
     if scallop.max_mm.is_some_and(|ridge| ridge > highest) {
-        // Moves that no cell saw cut ridges of the cells away.
         measured.ridge_samples.retain(|[height, _]| f64::from(*height) <= highest);
         let known = |figure: Option<f64>| figure.filter(|height| *height <= highest);
         let next = ridges.highest_up_to(highest);
@@ -163,10 +158,18 @@ fn raise_ridges(measured: &mut Measurement, ridges: &Ridges, inspection: &Inspec
             scallop.reason = Some("cells are too coarse to tell the ridges apart".into());
         }
     }
-    let ridge = scallop.max_mm.unwrap_or(0.0);
-    let most = (highest - ridge).max(NUMERICAL_FLOOR);
+    let most = (highest - scallop.max_mm.unwrap_or(0.0)).max(NUMERICAL_FLOOR);
     scallop.error_bound_mm = scallop.error_bound_mm.map(|bound| bound.min(most));
-    let place = reached.at_mm.filter(|_| reached.max_mm > ridge);
+}
+
+/// The highest place that passes reached is the highest ridge, where two passes leave equally much: ridges are measured on the
+/// grid's lines, and rise between them.
+fn raise_highest_ridge(measured: &mut Measurement, inspection: &Inspection<'_>, path: &Toolpath) {
+    /// Two passes leave equally much where their heights differ by no more than this share of it.
+    const EQUAL: f64 = 0.05;
+    let Inspection { part, cutter, surface, .. } = *inspection;
+    let (reached, scallop) = (measured.excess.reached, &mut measured.scallop);
+    let place = reached.at_mm.filter(|_| reached.max_mm > scallop.max_mm.unwrap_or(0.0));
     let Some(design) = place.and_then(|[x, y, _]| part.highest_at(x, y)) else { return };
     let top = design.point + design.normal * reached.max_mm;
     let all: Vec<u32> = (0..path.len() as u32).collect();
@@ -176,15 +179,16 @@ fn raise_ridges(measured: &mut Measurement, ridges: &Ridges, inspection: &Inspec
         let equal = |height: f64| height - z <= EQUAL * reached.max_mm;
         tracks.apart(by, k) && surface.envelope.height(k, top.x, top.y).is_some_and(equal)
     };
-    if all.iter().any(other) {
-        (scallop.max_mm, scallop.max_at_mm) = (Some(reached.max_mm), Some(top.into()));
-        scallop.error_bound_mm = Some(reached.error_bound_mm);
-        if scallop.p95_mm.is_none() {
-            scallop.reason = Some("cells are too coarse for any but the highest".into());
-        }
-        if excess.kind == ExcessKind::Border {
-            excess.kind = ExcessKind::Scallop;
-        }
+    if !all.iter().any(other) {
+        return;
+    }
+    (scallop.max_mm, scallop.max_at_mm) = (Some(reached.max_mm), Some(top.into()));
+    scallop.error_bound_mm = Some(reached.error_bound_mm);
+    if scallop.p95_mm.is_none() {
+        scallop.reason = Some("cells are too coarse for any but the highest".into());
+    }
+    if measured.excess.kind == ExcessKind::Border {
+        measured.excess.kind = ExcessKind::Scallop;
     }
 }
 

@@ -52,6 +52,10 @@ pub struct RemovalFigures {
     pub max_material_removal_rate_move: u32,
     /// Greatest height above the tip, along the tool axis, at which the cutter met stock, at the centres of cells or voxels.
     pub max_axial_engagement_mm: f64,
+    /// Bound of its error by voxels, slivers thinner than one left out. `None` by cells: between their centres nothing bounds how
+    /// high stock stands.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_axial_engagement_error_bound_mm: Option<f64>,
     /// Greatest extent of what one move cut, across its direction; moves along the axis left out.
     pub max_radial_engagement_mm: f64,
     /// Bound of its error, lips thinner than a cell left out.
@@ -81,6 +85,7 @@ struct RemovalRecord<'a> {
     contacts: &'a [RapidContact],
     volume_bound: f64,
     pitch: f64,
+    axial_bound: Option<f64>,
 }
 
 /// The figures of a removal along `path`; `final_height` is what the other engine left, mm, cell by
@@ -88,7 +93,8 @@ struct RemovalRecord<'a> {
 pub fn removal_figures(path: &Toolpath, removal: &Removal, final_height: &[f32]) -> RemovalFigures {
     let Removal { stock, moves, rapid_contacts, volume_bound } = removal;
     let pitch = stock.grid.cell;
-    let found = RemovalRecord { moves, contacts: rapid_contacts, volume_bound: *volume_bound, pitch };
+    let (contacts, volume_bound) = (&rapid_contacts[..], *volume_bound);
+    let found = RemovalRecord { moves, contacts, volume_bound, pitch, axial_bound: None };
     let apart = |(a, b): (&f32, &f32)| f64::from((a - b).abs());
     let difference = stock.height.iter().zip(final_height).map(apart).fold(0.0, f64::max);
     RemovalFigures { engine_difference_mm: Some(difference), ..figures(path, &found) }
@@ -97,10 +103,10 @@ pub fn removal_figures(path: &Toolpath, removal: &Removal, final_height: &[f32])
 /// The figures of a removal along `path` by voxels of `voxel` mm, whatever the tool axis.
 pub fn voxel_removal_figures(path: &Toolpath, removal: &VoxelRemoval, voxel: f64) -> RemovalFigures {
     let VoxelRemoval { moves, rapid_contacts, volume_bound } = removal;
-    figures(
-        path,
-        &RemovalRecord { moves, contacts: rapid_contacts, volume_bound: *volume_bound, pitch: voxel },
-    )
+    let (contacts, volume_bound) = (&rapid_contacts[..], *volume_bound);
+    // What is cut of a voxel lies no farther from its middle than its corners.
+    let axial_bound = Some(0.5 * 3f64.sqrt() * voxel);
+    figures(path, &RemovalRecord { moves, contacts, volume_bound, pitch: voxel, axial_bound })
 }
 
 fn figures(path: &Toolpath, found: &RemovalRecord<'_>) -> RemovalFigures {
@@ -109,6 +115,7 @@ fn figures(path: &Toolpath, found: &RemovalRecord<'_>) -> RemovalFigures {
         volume_mm3: found.moves.iter().map(|m| m.volume).sum(),
         volume_error_bound_mm3: found.volume_bound,
         rapid_contact_count: found.contacts.len(),
+        max_axial_engagement_error_bound_mm: found.axial_bound,
         ..RemovalFigures::default()
     };
     let listed = found.contacts.iter().take(LISTED_CONTACTS);

@@ -67,7 +67,8 @@ pub(super) fn read(machine: &Section<'_>, limits: &Machine) -> Result<Option<Fiv
                 .with_accelerations(accelerations)
         }
     };
-    let (rapid, even) = ([limits.rapid_rate; 3], [limits.acceleration; 3]);
+    let rapid = limits.rates.map(|rate| rate.min(limits.rapid_rate));
+    let even = limits.accelerations.map(|own| if own.is_finite() { own } else { limits.acceleration });
     let words: Vec<&str> = [NONE].into_iter().chain(PRESETS).collect();
     let Some(table) = machine.inline(KEY) else {
         let Some(word) = machine.word(KEY, &words)?.filter(|word| word.value != NONE) else {
@@ -135,8 +136,7 @@ pub(super) fn read(machine: &Section<'_>, limits: &Machine) -> Result<Option<Fiv
         [x?, y?, z?],
     );
     let kinematics = kinematics.map_err(|e| refused(&table, first.letter, &e))?;
-    let rates = of_linear(&table, "rates", RATES, "mm/min")?.unwrap_or(rapid);
-    let accelerations = of_linear(&table, "accelerations", ACCELERATIONS, "mm/s²")?.unwrap_or(even);
+    let (rates, accelerations) = (rates(&table)?.unwrap_or(rapid), accelerations(&table)?.unwrap_or(even));
     Ok(Some(FiveAxis {
         kinematics: linear(rates, accelerations)(kinematics),
         post,
@@ -234,6 +234,16 @@ fn place(section: &Section<'_>, key: &str) -> Result<Option<Located<[f64; 3]>>, 
     let message = format!("`{key}` lies farther out than any machine reaches");
     let cure = format!("write mm from {} to {}", PLACE.start(), PLACE.end());
     Err(section.error(&place.span, message, cure))
+}
+
+/// Fastest X, Y and Z, mm/min, where a table has them.
+pub(super) fn rates(section: &Section<'_>) -> Result<Option<[f64; 3]>, SceneError> {
+    of_linear(section, "rates", RATES, "mm/min")
+}
+
+/// Accelerations of X, Y and Z, mm/s², where a table has them.
+pub(super) fn accelerations(section: &Section<'_>) -> Result<Option<[f64; 3]>, SceneError> {
+    of_linear(section, "accelerations", ACCELERATIONS, "mm/s²")
 }
 
 /// Limits of X, Y and Z.

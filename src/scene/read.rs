@@ -328,6 +328,8 @@ fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
             "junction_deviation",
             "jerk",
             "block_rate",
+            "rates",
+            "accelerations",
             "slow_corners",
             "clearance",
             kinematics::KEY,
@@ -348,6 +350,8 @@ fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
         block_rate: section
             .number("block_rate", BLOCK_RATE, " lines/s")?
             .map_or(default.block_rate, |v| v.value),
+        rates: kinematics::rates(section)?.unwrap_or(default.rates),
+        accelerations: kinematics::accelerations(section)?.unwrap_or(default.accelerations),
         slow_corners: section.flag("slow_corners")?.unwrap_or(default.slow_corners),
     };
     Ok((machine, section.length("clearance")?.map_or(DEFAULT_CLEARANCE, |v| v.value)))

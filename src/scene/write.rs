@@ -64,6 +64,14 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     )?;
     writeln!(out, "jerk = {}  # mm/s3", number(scene.machine.jerk))?;
     writeln!(out, "block_rate = {}  # lines of a program a second", number(scene.machine.block_rate))?;
+    let own =
+        [("rates", scene.machine.rates, "mm/min"), ("accelerations", scene.machine.accelerations, "mm/s2")];
+    for (key, limits, unit) in own {
+        if limits.iter().all(|limit| limit.is_finite()) {
+            let [x, y, z] = limits.map(number);
+            writeln!(out, "{key} = [{x}, {y}, {z}]  # {unit} of X, Y and Z")?;
+        }
+    }
     writeln!(out, "slow_corners = {}  # feeds of sharp bends in the program", scene.machine.slow_corners)?;
     writeln!(out, "clearance = {}  # mm of rapid moves above stock", number(scene.clearance))?;
     kinematics::write(out, scene.five_axis.as_ref())?;

@@ -25,7 +25,7 @@ fn cutting_length(path: &Toolpath) -> f64 {
 }
 
 fn saddle() -> Part {
-    formula(AnalyticShape::Saddle { radius_concave: 8.0, radius_convex: 10.0 }, [-6.0, 6.0], [-6.0, 6.0])
+    formula(AnalyticShape::Saddle { radius_concave: 8.0, radius_convex: 10.0 }, [-5.0, 5.0], [-5.0, 5.0])
 }
 
 fn dome() -> Part {
@@ -34,7 +34,7 @@ fn dome() -> Part {
 
 fn wave() -> Part {
     let shape = AnalyticShape::Wave { amplitude: 1.0, wavelength_x: 20.0, wavelength_y: Some(25.0) };
-    formula(shape, [0.0, 16.0], [0.0, 16.0])
+    formula(shape, [0.0, 12.0], [0.0, 12.0])
 }
 
 const OPEN: [(&str, &dyn Strategy); 5] = [

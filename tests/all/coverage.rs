@@ -119,7 +119,7 @@ fn a_soup_of_triangles_has_finite_figures_and_never_passes() {
         20.0 * (state >> 11) as f64 / (1u64 << 53) as f64
     };
     let soup: Vec<[Point3; 3]> =
-        (0..300).map(|_| [0, 1, 2].map(|_| Point3::new(random(), random(), random()))).collect();
+        (0..150).map(|_| [0, 1, 2].map(|_| Point3::new(random(), random(), random()))).collect();
     let (exit, report) = run(&soup, "", "[simulation]\ncell = 1.0\nerror_bound = 0.1");
     assert_eq!(exit, 1);
     is_partition(&report["toolpaths"][0]["coverage"]);

@@ -99,7 +99,10 @@ fn passes_of_a_lead_are_wider((_, report): (i32, Value)) {
 /// As first planned, in coarser cells.
 #[test]
 fn a_lead_makes_passes_on_a_dome_wider() {
-    let words = [["[simulation]\ncell = 0.1", "[tolerance]\ncorrect = false\n[simulation]\ncell = 0.2"]];
+    let words = [[
+        "[simulation]\ncell = 0.1",
+        "[tolerance]\nscallop = 0.02\ncorrect = false\n[simulation]\ncell = 0.2",
+    ]];
     passes_of_a_lead_are_wider(run_changed(&folder().join("dome.toml"), &words, |_| true));
 }
 

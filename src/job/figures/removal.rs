@@ -48,13 +48,15 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     let (greatest, bound) =
         (r.max_material_removal_rate_mm3_min, r.max_material_removal_rate_error_bound_mm3_min);
     let (most, mean) = (r.p95_material_removal_rate_mm3_min, r.mean_material_removal_rate_mm3_min);
+    let axial_bound =
+        r.max_axial_engagement_error_bound_mm.map_or(String::new(), |bound| format!(" ± {bound:.2}"));
     let rows = vec![
         ("volume removed", format!("{:.0} ± {:.0} mm³", r.volume_mm3, r.volume_error_bound_mm3)),
         ("removal rate, greatest", format!("{greatest:.0} ± {bound:.0} mm³/min")),
         ("removal rate, 95 % and mean", format!("{most:.0}, {mean:.0} mm³/min")),
         (
             "engagement, axial and radial",
-            format!("{:.2}, {:.2} mm", r.max_axial_engagement_mm, r.max_radial_engagement_mm),
+            format!("{:.2}{axial_bound}, {:.2} mm", r.max_axial_engagement_mm, r.max_radial_engagement_mm),
         ),
     ];
     let figure =

@@ -74,7 +74,8 @@ fn hill_stages(name: &str) -> (Kinematics, Vec<Stage>) {
     let path = hill();
     let joints = follow(&kinematics, &path, &EVENLY).unwrap();
     let (pieces, _) = pieces(&path, &kinematics, &joints);
-    let stages = stages(&pieces, &profile(&path, &MACHINE).unwrap(), &MACHINE, &kinematics);
+    let axes = AxisLimits { rates: kinematics.rates(), accelerations: kinematics.accelerations() };
+    let stages = stages(&pieces, &profile(&path, &MACHINE).unwrap(), &MACHINE, &axes);
     (kinematics, stages)
 }
 
@@ -90,9 +91,8 @@ fn no_axis_exceeds_its_rate_or_acceleration() {
             let (x, y) = (speeds[k], speeds[k + 1]);
             let along = (y - x) / (2.0 * stage.length);
             assert!(along.abs() <= MACHINE.acceleration * (1.0 + 1e-6) && x <= stage.most * (1.0 + 1e-9));
-            let after = stages.get(k + 1).map_or([0.0; 5], |next| next.bend);
             for axis in 0..5 {
-                let [a, b] = [(x, stage.bend[axis]), (y, after[axis])]
+                let [a, b] = [(x, stage.bends[0][axis]), (y, stage.bends[1][axis])]
                     .map(|(x, bend)| (bend * x + stage.slope[axis] * along).abs());
                 reached = reached.max(a.max(b) / most[axis]);
                 assert!(a.max(b) <= most[axis] * (1.0 + 1e-6), "{name} {axis}: {a} {b}");
@@ -135,5 +135,75 @@ fn the_time_is_that_of_the_quickest_speeds_by_trying_all() {
         let got: f64 = stages.iter().zip(speeds.windows(2)).map(one).sum();
         // Speeds of the grid are some of those that can be had.
         assert!(got <= left[0] * (1.0 + 1e-9) && got > 0.985 * left[0], "{name}: {got} {}", left[0]);
+    }
+}
+
+/// The greatest speeds along an ellipse by small steps, from its derivatives: s, for X and Y of these rates and accelerations.
+fn ellipse_by_small_steps([a, b]: [f64; 2], feed: f64, rates: [f64; 2], most: [f64; 2]) -> f64 {
+    const STEPS: usize = 100_000;
+    let around = |k: usize| 2.0 * std::f64::consts::PI * k as f64 / STEPS as f64;
+    // Of both axes: first and second derivative by the length, and the length of a step.
+    let at = |k: usize| {
+        let (sin, cos) = around(k).sin_cos();
+        let (first, second) = ([-a * sin, b * cos], [-a * cos, -b * sin]);
+        let pace = first[0].hypot(first[1]);
+        let along = (first[0] * second[0] + first[1] * second[1]) / pace.powi(4);
+        let bend = [0, 1].map(|i| second[i] / (pace * pace) - first[i] * along);
+        (first.map(|x| x / pace), bend, pace * around(1))
+    };
+    let window = |k: usize, x: f64| {
+        let (slope, bend, _) = at(k);
+        let axis = |i: usize| {
+            let ends = [-1.0, 1.0].map(|side| (side * most[i] - bend[i] * x) / slope[i]);
+            [ends[0].min(ends[1]), ends[0].max(ends[1])]
+        };
+        let (p, q) = (axis(0), axis(1));
+        [p[0].max(q[0]), p[1].min(q[1])]
+    };
+    // From the greatest squared speed that it gives the next step can be reached.
+    let greatest = |k: usize, next: f64| {
+        let (slope, _, step) = at(k);
+        let limit = [0, 1].iter().fold(feed, |now, &i| now.min(rates[i] / slope[i].abs())).powi(2);
+        let (mut low, mut high) = (0.0, limit);
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            let [least, greatest] = window(k, middle);
+            *(if least <= greatest.min(0.5 * (next - middle) / step) { &mut low } else { &mut high }) =
+                middle;
+        }
+        low
+    };
+    let mut x = vec![0.0; STEPS + 1];
+    for k in (1..STEPS).rev() {
+        x[k] = greatest(k, x[k + 1]);
+    }
+    for k in 0..STEPS {
+        let rising = window(k, x[k])[1];
+        x[k + 1] = x[k + 1].min(x[k] + 2.0 * at(k).2 * rising).max(0.0);
+    }
+    (0..STEPS).map(|k| 2.0 * at(k).2 / (x[k].sqrt() + x[k + 1].sqrt())).sum()
+}
+
+#[test]
+fn three_axes_keep_their_own_limits_in_the_time_of_small_steps() {
+    let free = Machine { acceleration: 1e6, jerk: 1e12, ..MACHINE };
+    let infinite = f64::INFINITY;
+    for (rates, most) in
+        [([infinite; 2], [900.0, 300.0]), ([90.0, 40.0], [1500.0, 400.0]), ([70.0, 95.0], [250.0, 2000.0])]
+    {
+        let machine = Machine {
+            rates: [60.0 * rates[0], 60.0 * rates[1], infinite],
+            accelerations: [most[0], most[1], infinite],
+            ..free
+        };
+        for chords in [2000, 600] {
+            let point = |k: i32| {
+                let angle = 2.0 * std::f64::consts::PI * f64::from(k) / f64::from(chords);
+                [30.0 * angle.cos(), 12.0 * angle.sin(), 0.0]
+            };
+            let got = super::super::machining_time(&path((0..=chords).map(point)), &machine);
+            let exact = ellipse_by_small_steps([30.0, 12.0], 100.0, rates, most);
+            assert!((got / exact - 1.0).abs() < 3e-3, "{rates:?} {most:?} {chords}: {got} {exact}");
+        }
     }
 }

@@ -160,7 +160,7 @@ fn what_no_pass_came_down_to_is_uncut() {
 #[test]
 fn what_was_never_cut_stands_as_high_as_the_stock() {
     let half: Vec<[f64; 2]> = (0..4).map(|k| [0.5 * f64::from(k), 0.0]).collect();
-    let (part, path) = (plane([4.0, 6.0]), path(&along_x(&half)));
+    let (part, path) = (plane([3.0, 4.0]), path(&along_x(&half)));
     let ball = Cutter::ball(2.0 * RADIUS).unwrap();
     let solid = Solid::of_cutter(&ball, None);
     let rays = Rays::new(&path, &solid, &Silent).unwrap();

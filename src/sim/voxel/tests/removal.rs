@@ -9,7 +9,7 @@ fn the_sum_is_what_is_missing() {
     let mut rng = Rng::new(51);
     for (c, cutter) in cutters().iter().enumerate() {
         let solid = Solid::of_cutter(cutter, None);
-        let stock = block([0.0; 3], [10.0, 9.0, 8.0]);
+        let stock = block([0.0; 3], [7.0, 6.5, 6.0]);
         let path = five_axis_path(&mut rng, 6);
         let engine = VoxelEngine::new(&stock, &solid, &path).unwrap();
         let missing = removed(&solid, &stock, &path, 0.1);
@@ -79,7 +79,7 @@ fn a_leaning_slot_has_the_section_of_its_closed_form() {
         let off = (m.volume - section * step).abs();
         assert!(off <= m.volume_bound && off < 0.01 * section * step, "{m:?} {}", section * step);
         assert!((m.radial - 2.0 * radius).abs() <= m.radial_bound, "{m:?}");
-        assert!((m.axial - highest).abs() < 3f64.sqrt() * voxel, "{m:?} {highest}");
+        assert!((m.axial - highest).abs() < 0.5 * 3f64.sqrt() * voxel, "{m:?} {highest}");
     }
     let off = (removal.volume() - section * 30.0).abs();
     assert!(off <= removal.volume_bound && off < 2e-3 * section * 30.0, "{} {}", removal.volume(), section);

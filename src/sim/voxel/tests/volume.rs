@@ -157,7 +157,7 @@ fn brute_force_lies_within_the_bounds() {
         let of = |k| SweptSolid::new(&solid, &path.location_before(k), &path.moves[k].to).unwrap();
         let swept: Vec<_> = (0..path.len()).map(of).collect();
         // Places spread evenly (Roberts 2018) miss by less than random ones do.
-        let (bounds, n) = (stock.bounds(), 300_000u32);
+        let (bounds, n) = (stock.bounds(), 100_000u32);
         let steps = Vector3::new(0.819_172_513_396_164, 0.671_043_606_703_789, 0.549_700_477_901_960);
         let inside = |k: &u32| {
             let share = (steps * f64::from(*k)).map(f64::fract);
