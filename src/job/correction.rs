@@ -22,6 +22,7 @@ use work::monitor::{self, Monitor};
 
 use super::judge::highest_reached;
 use super::planned::Planned;
+use super::session::Closeness;
 use super::tool::Around;
 use super::{JobError, Session};
 
@@ -204,8 +205,8 @@ struct Corrected<'a> {
     around: Around<'a>,
     engine: &'a dyn Engine,
     goal: Goal,
-    /// To what the height of the highest is measured while it may be planned lower, mm; 0: as closely as the verdict needs.
-    enough: f64,
+    /// How closely plans are measured which may be planned better.
+    closeness: Closeness,
     /// The best plan, by what widths, and what it leaves.
     best: Planned,
     widths: Widths,
@@ -236,8 +237,11 @@ impl Session {
             None => None,
         };
         // Where each round measures all, narrower passes cost less time than a closer look, and little length.
-        let enough = target.filter(|_| map.is_none()).map_or(0.0, |target| SLACK * target);
-        let measure = |planned: &Planned| self.measure(request, engine, &planned.plan.path, enough, monitor);
+        let closeness = target.filter(|_| map.is_none()).map_or(Closeness::Verdict, |target| {
+            Closeness::Plan { within: SLACK * target, limit: self.scene.scallop_rule.highest * target }
+        });
+        let measure =
+            |planned: &Planned| self.measure(request, engine, &planned.plan.path, closeness, monitor);
         let (measured, standing) = match &map {
             Some(map) => (None, Standing::of_ridges(map, &first, [1.0; 2])),
             None => {
@@ -248,8 +252,8 @@ impl Session {
         };
         let (Some(target), Some(standing)) = (target, standing) else {
             let measured = match measured {
-                Some(measured) if enough == 0.0 || !self.is_open(&measured) => measured,
-                _ => self.measure(request, engine, &first.plan.path, 0.0, monitor)?,
+                Some(measured) if closeness == Closeness::Verdict || !self.is_open(&measured) => measured,
+                _ => self.measure(request, engine, &first.plan.path, Closeness::Verdict, monitor)?,
             };
             return Ok((first, measured));
         };
@@ -262,7 +266,7 @@ impl Session {
             around,
             engine,
             goal: Goal { target, rule: self.scene.scallop_rule },
-            enough,
+            closeness,
             best: first,
             widths,
             standing,
@@ -330,7 +334,7 @@ impl Corrected<'_> {
             // Two at a time might be more than the memory that the run may take.
             drop(measured.take());
             let path = &planned.plan.path;
-            let again = self.session.measure(self.request, self.engine, path, self.enough, monitor)?;
+            let again = self.session.measure(self.request, self.engine, path, self.closeness, monitor)?;
             let found = Standing::of_all(&again.measurement, &planned, factors);
             if found.is_some_and(|found| self.keep_if_better(planned, next, found)) {
                 (measured, in_vain) = (Some(again), 0);
@@ -339,7 +343,9 @@ impl Corrected<'_> {
             }
         }
         match measured {
-            Some(measured) if self.enough == 0.0 || !self.session.is_open(&measured) => Ok(measured),
+            Some(measured) if self.closeness == Closeness::Verdict || !self.session.is_open(&measured) => {
+                Ok(measured)
+            }
             other => {
                 drop(other);
                 self.measure_best(monitor)
@@ -415,7 +421,13 @@ impl Corrected<'_> {
 
     /// Measures all of the best plan.
     fn measure_best(&mut self, monitor: &dyn Monitor) -> Result<Measured, JobError> {
-        let measured = self.session.measure(self.request, self.engine, &self.best.plan.path, 0.0, monitor)?;
+        let measured = self.session.measure(
+            self.request,
+            self.engine,
+            &self.best.plan.path,
+            Closeness::Verdict,
+            monitor,
+        )?;
         let factors = self.standing.round.factors;
         if let Some(standing) = Standing::of_all(&measured.measurement, &self.best, factors) {
             self.rounds[self.kept] = standing.round;

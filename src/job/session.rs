@@ -40,6 +40,28 @@ const CLOSEST_BOUND: f64 = 0.02;
 /// of the tolerance for itself, and triangles may stand off to either side. Less takes more triangles.
 const NEAREST_SHARE: f64 = 0.125;
 
+/// How closely a path is measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Closeness {
+    /// As the verdict needs it.
+    Verdict,
+    /// The highest place to `within` mm; no closer where it is above `limit`, mm, for certain, and the path is to be planned anew.
+    Plan { within: f64, limit: f64 },
+}
+
+impl Closeness {
+    /// `coarse` cells may tell heights that finer ones do not have.
+    fn is_enough(self, measured: &Measured, coarse: bool) -> bool {
+        let highest = judge::highest_reached(&measured.measurement);
+        match self {
+            Self::Verdict => false,
+            Self::Plan { within, limit } => {
+                highest.error_bound_mm <= within || !coarse && highest.max_mm > limit
+            }
+        }
+    }
+}
+
 /// A scene with its part: what all its toolpaths share.
 #[derive(Debug)]
 pub struct Session {
@@ -190,7 +212,8 @@ impl Session {
             }
             Some(time) => {
                 let (found, planned) = self.plan_for_time(request, time, around, monitor)?;
-                let measured = self.measure(&found, engine, &planned.plan.path, 0.0, monitor)?;
+                let measured =
+                    self.measure(&found, engine, &planned.plan.path, Closeness::Verdict, monitor)?;
                 at_time = found;
                 (&at_time, planned, measured)
             }
@@ -256,14 +279,13 @@ impl Session {
         })
     }
 
-    /// Cuts and measures; on finer cells where a limit hangs on that, until the height of what stands highest is known to
-    /// `enough` mm.
+    /// Cuts and measures; closer, and on finer cells where these help, where a limit hangs on that.
     pub(crate) fn measure(
         &self,
         request: &ToolpathRequest,
         engine: &dyn Engine,
         path: &Toolpath,
-        enough: f64,
+        closeness: Closeness,
         monitor: &dyn Monitor,
     ) -> Result<Measured, JobError> {
         let scene = &self.scene;
@@ -275,15 +297,20 @@ impl Session {
         let mut measured = engine.measure(&first, monitor).map_err(failed)?;
         let mut finest = auto_cell(&scene.cutter, &scene.toolpaths).min(simulation.cell);
         let mut simulation = Simulation { cell_is_auto: false, cell: measured.cell, ..scene.simulation };
+        if !engine.gains_by_cells() {
+            finest = simulation.cell;
+        }
         let (mut rounds, least) = (0, CLOSEST_BOUND * scene.simulation.error_bound);
         while (simulation.cell > finest || rounds < CLOSER_ROUNDS)
             && self.is_open(&measured)
-            && judge::highest_reached(&measured.measurement).error_bound_mm > enough
+            && !closeness.is_enough(&measured, engine.gains_by_cells())
         {
             rounds += 1;
             let before = simulation.cell;
             let few = measured.cells as f64 <= FINER * FINER * MOST_CLOSER_CELLS as f64;
-            simulation.cell = if few { FINER * before } else { (FINER * before).max(finest.min(before)) };
+            if engine.gains_by_cells() {
+                simulation.cell = if few { FINER * before } else { (FINER * before).max(finest.min(before)) };
+            }
             simulation.error_bound = (FINER * FINER * simulation.error_bound).max(least);
             let cells = self.budget().grid_before_planning(&self.area(), &simulation);
             let finer = cells.map(|cells| engine.measure(&self.task(path, &simulation, &cells), monitor));

@@ -230,7 +230,9 @@ impl Along<'_> {
             };
             triangles[range].iter().map(of_one).collect()
         })?;
-        drop((sides, on_sides));
+        drop(on_sides);
+        let on_border = on_border(&triangles, &sides);
+        drop(sides);
         let (of_triangle, hollow) = inspection.without_hollows(of_triangle);
         let contacts = in_runs("measuring contacts", path.len(), monitor, |range| {
             let contacts = |k: &usize| near(*k).then(|| contacts_of(part, cutter, path, *k, spacing));
@@ -250,7 +252,7 @@ impl Along<'_> {
         let judged = || samples.iter().zip(kept).filter(|(_, kept)| **kept).map(|(sample, _)| sample);
         of_triangle.items.iter().for_each(|crossing| greatest.look_at_ridge(crossing));
         for sample in contacts.iter().chain(judged()) {
-            greatest.look_at(sample);
+            greatest.look_at(sample, limits);
             greatest.look_at_height(sample, &inspection);
         }
         let pairs = pair_figures(part, cutter, path, tally(&of_triangle, cutter, spacing), monitor)?;
@@ -259,8 +261,9 @@ impl Along<'_> {
         let shares = areas(&net);
         let mut gouge = inspection.gouges(&net, &samples, &shares, kept);
         let deviation = deviation_figures(&samples, &shares, kept);
-        let triangles =
-            triangles.iter().enumerate().map(|(k, t)| (t.map(|v| samples[v as usize]), of_triangle.group(k)));
+        let of_one =
+            |(k, t): (usize, &[u32; 3])| (t.map(|v| samples[v as usize]), on_border[k], of_triangle.group(k));
+        let triangles = triangles.iter().enumerate().map(of_one);
         let left = inspection.search(triangles, &mut greatest, asked, monitor)?;
         gouge.max_depth_mm = greatest.depth;
         gouge.error_bound_mm =
@@ -283,8 +286,7 @@ impl Along<'_> {
             format!("between the places on the normals {most:.1} µm more may stand or lie than was found; a smaller cell helps")
         });
         let scallop = scallop_figures(&ridge_samples, highest, limits);
-        let heights = judged().filter_map(|sample| Some((sample.hit?.deviation, sample.place.point)));
-        let excess = excess_figures(heights, &scallop, &uncut, left.ridge, limits);
+        let excess = excess_figures(greatest.place, &scallop, &uncut, left.border);
         let deviations: Vec<f32> =
             samples.iter().map(|sample| sample.hit.map_or(f32::NAN, |hit| hit.deviation as f32)).collect();
         let map = NormalMap {
@@ -362,25 +364,20 @@ impl NormalInspection<'_> {
     }
 }
 
-/// The highest material: where it stands up to the uncut tolerance, passes came down to the design. `left` is how much more
-/// may stand between the places, mm.
+/// The highest material: of ridges, of the highest place that stands up to the uncut tolerance, where passes came down to the
+/// design, and of what is uncut. `left` is how much more than that place may stand along the border, mm.
 fn excess_figures(
-    heights: impl Iterator<Item = (f64, Point3)>,
+    highest: Option<(f64, Point3)>,
     scallop: &ScallopFigures,
     uncut: &UncutFigures,
     left: f64,
-    limits: &Limits,
 ) -> ExcessFigures {
     let ridge = Bounded {
         at_mm: scallop.max_at_mm,
         ..Bounded::new(scallop.max_mm.unwrap_or(0.0), scallop.error_bound_mm.unwrap_or(0.0))
     };
-    let mut place = Bounded::new(0.0, left + NUMERICAL_FLOOR);
-    for (height, at) in heights.filter(|(height, _)| *height <= limits.uncut) {
-        if height > place.max_mm {
-            (place.max_mm, place.at_mm) = (height, Some(at.into()));
-        }
-    }
+    let (height, at_mm) = highest.map_or((0.0, None), |(height, at)| (height, Some(at.into())));
+    let place = Bounded { at_mm, ..Bounded::new(height, left + NUMERICAL_FLOOR) };
     let unreached = Bounded {
         at_mm: uncut.regions.first().map(|region| region.at_mm),
         ..Bounded::new(uncut.max_height_mm, uncut.error_bound_mm)
@@ -439,6 +436,18 @@ impl<T> Grouped<T> {
     fn group(&self, k: usize) -> &[T] {
         &self.items[self.starts[k]..self.starts[k + 1]]
     }
+}
+
+/// Which sides of each triangle no other one shares.
+fn on_border(triangles: &[[u32; 3]], sides: &[[u32; 2]]) -> Vec<[bool; 3]> {
+    let side = |t: &[u32; 3], k: usize| {
+        let [a, b] = [t[k], t[(k + 1) % 3]];
+        sides.binary_search(&[a.min(b), a.max(b)]).ok()
+    };
+    let mut shared = vec![0u8; sides.len()];
+    let all = || triangles.iter().flat_map(|t| (0..3).filter_map(|k| side(t, k)));
+    all().for_each(|k| shared[k] = shared[k].saturating_add(1));
+    triangles.iter().map(|t| [0, 1, 2].map(|k| side(t, k).is_some_and(|k| shared[k] == 1))).collect()
 }
 
 /// The sides of all triangles, each once and from the lesser index, in order.

@@ -29,6 +29,10 @@ pub trait Engine: Sync {
     fn tilts(&self) -> bool;
     /// Whether it measures the floor of a pocket.
     fn measures_pockets(&self) -> bool;
+    /// Whether finer cells lower its bounds, beside being asked for lower ones.
+    fn gains_by_cells(&self) -> bool {
+        true
+    }
     /// Cuts, and measures no more than ridges and borders; `None` where that takes as long as all, or
     /// the cells are too coarse to tell.
     ///

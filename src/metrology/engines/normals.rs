@@ -57,6 +57,10 @@ impl Engine for Normals {
         false
     }
 
+    fn gains_by_cells(&self) -> bool {
+        self.by_voxels
+    }
+
     fn measure(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Measured, EngineError> {
         let begun = Instant::now();
         let (part, path, cutter) = (task.part, task.path, task.cutter);
