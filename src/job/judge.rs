@@ -51,6 +51,7 @@ fn gouge(measured: &Measurement, limits: &Limits, program: &str) -> Claim {
         if worst.line > 0 {
             text += &format!(", {program} line {}", worst.line);
         }
+        text += &worst.tool.map_or_else(String::new, |tool| format!(", tool {tool}"));
         text += &others(figures.region_count);
     }
     let (depth, bound) = (figures.max_depth_mm, figures.error_bound_mm);

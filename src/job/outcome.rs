@@ -3,7 +3,7 @@
 use field::PlannedField;
 use machine::kinematics::JointPath;
 use metrology::{Measurement, View};
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use report::{FigureFile, ToolpathResult};
 
 use super::Machined;
@@ -15,6 +15,8 @@ pub struct Outcome {
     pub result: ToolpathResult,
     /// The path, with the feeds of its program.
     pub path: Toolpath,
+    /// What cuts along it.
+    pub cutters: Cutters,
     /// The path in the joints of a five-axis machine.
     pub joints: Option<JointPath>,
     /// What a streamline was planned by.

@@ -1,13 +1,13 @@
 //! One toolpath at work: what its figures are found from.
 
 use metrology::{Budget, Measured, Measurement, View};
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use part::Part;
 use report::Claim;
 use scene::{Scene, ToolpathRequest};
 
 use super::planned::Planned;
-use super::tool::Around;
+use super::tool::{Around, ToolMoves};
 use super::{JobError, Session};
 
 /// One toolpath that was planned, cut and measured.
@@ -22,6 +22,10 @@ pub(crate) struct Run<'a> {
     pub measured: &'a Measured,
     /// The tool, and what it must not touch.
     pub around: Around<'a>,
+    /// What cuts.
+    pub cutters: &'a Cutters,
+    /// The moves of each tool, in order.
+    pub tools: &'a [ToolMoves<'a>],
 }
 
 impl Run<'_> {
@@ -54,11 +58,18 @@ impl Run<'_> {
         self.path().line_of(move_index as usize).unwrap_or_default()
     }
 
-    /// `, PROGRAM line N`, where there is a program.
+    /// `, PROGRAM line N`, where there is a program, and `, tool N` where it has several.
     pub fn program_line(&self, move_index: u32) -> String {
-        self.path()
-            .line_of(move_index as usize)
-            .map_or_else(String::new, |line| format!(", {} line {line}", self.path().program_name()))
+        let (path, k) = (self.path(), move_index as usize);
+        let line =
+            path.line_of(k).map_or_else(String::new, |line| format!(", {} line {line}", path.program_name()));
+        line + &self.tool_name(move_index)
+    }
+
+    /// `, tool N` of a move, where there are several tools.
+    pub fn tool_name(&self, move_index: u32) -> String {
+        let tool = self.path().named_tool_of(move_index as usize);
+        tool.map_or_else(String::new, |tool| format!(", tool {tool}"))
     }
 
     /// For voxels that do not fit.

@@ -4,12 +4,12 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
 
 use blade::Blade;
-use cutter::Cutter;
+use cutter::{Cutter, Holder};
 use geometry::{Aabb, Bvh, Point3, Vector3};
 use io::ProgramHeader;
 use io::digest::{self, Fingerprint};
 use metrology::{Budget, Engine, EngineError, LaidOut, Measured, Simulation, Task, path_figures};
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use part::Part;
 use report::{
     InputFile, NotPlanned, RunReport, SimulationFigures, ToleranceFigures, ToolpathReport, ToolpathResult,
@@ -17,14 +17,14 @@ use report::{
 };
 use scene::{Fixture, Loaded, PartSource, Scene, ToolpathRequest, auto_cell, load_mesh, load_part};
 use sim::VoxelStock;
-use toolpath::Pocket;
+use toolpath::{PlanError, Pocket};
 use work::aside;
 use work::monitor::{self, Cancelled, Monitor, Silent};
 
 use super::machined::BASE;
 use super::planned::{self, Planned};
 use super::run::Run;
-use super::tool::{Around, FixtureMesh, Tool};
+use super::tool::{Around, FixtureMesh, Tool, ToolMoves};
 use super::{JobError, Machined, Outcome, figures, judge, units};
 
 /// The cell shrinks to this share where a limit is undecided. Nearer to 1 more cuts are made in vain, nearer to 0 more
@@ -61,6 +61,8 @@ pub struct Session {
     pub doubt: Option<String>,
     /// The files that the scene names, as they were read.
     pub inputs: Vec<InputFile>,
+    /// The scene's cutter, for all moves.
+    cutters: Cutters,
 }
 
 /// The rectangle to simulate: the part's, grown by the stock's margin.
@@ -113,7 +115,8 @@ impl Session {
         let top = face + scene.stock.allowance;
         let doubt = units::doubt(&scene, &part);
         let inputs = inputs(&scene)?;
-        Ok(Self { scene, part, blade, pocket, cells, top, notes, doubt, inputs })
+        let cutters = Cutters::from(&scene.cutter);
+        Ok(Self { scene, part, blade, pocket, cells, top, notes, doubt, inputs, cutters })
     }
 
     /// Runs all toolpaths. Maps, paths and meshes are dropped; [`Session::toolpath`] leaves them. One that cannot be
@@ -177,6 +180,10 @@ impl Session {
         monitor::check(monitor)?;
         let scene = &self.scene;
         let engine = self.engine(request)?;
+        let (cutters, holders) = self.tools(request);
+        if cutters.are_several() {
+            self.one_tool_at_a_time(request, engine)?;
+        }
         let tool = Tool::of(scene);
         let fixtures = self.fixtures(monitor)?;
         let closer = if engine.tilts() { self.closer_part(monitor)? } else { None };
@@ -197,11 +204,22 @@ impl Session {
         };
         for region in &mut measured.measurement.gouge.regions {
             let at = region.at_mm.into();
-            region.line = line_of_cut(&planned.plan.path, &scene.cutter, region.move_index as usize, &at);
+            let (path, cutter) = (&planned.plan.path, cutters.of_move(region.move_index));
+            region.line = line_of_cut(path, cutter, region.move_index as usize, &at);
+            region.tool = path.named_tool_of(region.move_index as usize);
         }
-        let run = Run { session: self, request, planned: &planned, measured: &measured, around };
+        let tools = ToolMoves::of(cutters, holders, &planned.plan.path);
+        let run = Run {
+            session: self,
+            request,
+            planned: &planned,
+            measured: &measured,
+            around,
+            cutters,
+            tools: &tools,
+        };
         let found = figures::all(&run, monitor)?;
-        let machined = Machined::new(self, &planned.plan.path, &measured.view, &measured.measurement);
+        let machined = Machined::new(&run);
         let simulation = SimulationFigures {
             engine: engine.word(),
             cell_mm: measured.cell,
@@ -247,6 +265,7 @@ impl Session {
         Ok(Outcome {
             result,
             path: plan.path,
+            cutters: cutters.clone(),
             joints,
             field: plan.field,
             measurement: measured.measurement,
@@ -271,7 +290,8 @@ impl Session {
         let own = self.own_cells(request)?;
         let (simulation, cells) =
             own.as_ref().map_or((&scene.simulation, &self.cells), |(simulation, cells)| (simulation, cells));
-        let first = self.task(path, simulation, cells);
+        let (cutters, _) = self.tools(request);
+        let first = Task { cutters, ..self.task(path, simulation, cells) };
         let mut measured = engine.measure(&first, monitor).map_err(failed)?;
         let mut finest = auto_cell(&scene.cutter, &scene.toolpaths).min(simulation.cell);
         let mut simulation = Simulation { cell_is_auto: false, cell: measured.cell, ..scene.simulation };
@@ -286,7 +306,10 @@ impl Session {
             simulation.cell = if few { FINER * before } else { (FINER * before).max(finest.min(before)) };
             simulation.error_bound = (FINER * FINER * simulation.error_bound).max(least);
             let cells = self.budget().grid_before_planning(&self.area(), &simulation);
-            let finer = cells.map(|cells| engine.measure(&self.task(path, &simulation, &cells), monitor));
+            let finer = cells.map(|cells| {
+                let task = Task { cutters, ..self.task(path, &simulation, &cells) };
+                engine.measure(&task, monitor)
+            });
             match finer {
                 Ok(Ok(finer)) => {
                     let wall_s = measured.wall_s + finer.wall_s;
@@ -348,6 +371,28 @@ impl Session {
         Ok(engine)
     }
 
+    /// The cutters of a toolpath and what holds each: those of its program where all tools of one are meant, else the scene's.
+    fn tools<'a>(&'a self, request: &'a ToolpathRequest) -> (&'a Cutters, &'a [Option<Holder>]) {
+        let of_program = request.foreign().and_then(|read| read.tools.as_ref());
+        let of_scene = || (&self.cutters, std::slice::from_ref(&self.scene.holder));
+        of_program.map_or_else(of_scene, |(cutters, holders)| (cutters, holders.as_slice()))
+    }
+
+    /// Refuses what is measured with one tool at a time.
+    fn one_tool_at_a_time(&self, request: &ToolpathRequest, engine: &dyn Engine) -> Result<(), JobError> {
+        let what = match () {
+            () if request.tilts() => "tools that lean are".to_owned(),
+            () if self.pocket.is_some() => "the floor of a pocket is".to_owned(),
+            () if engine.tilts() => format!("with the engine `{}` a program is", engine.word()),
+            () if self.scene.simulation.voxel.is_some() => {
+                "the solid of `voxel` in [simulation] is".to_owned()
+            }
+            () => return Ok(()),
+        };
+        let reason = format!("{what} measured with one tool at a time: write `tool = 2` for tool 2");
+        Err(self.refused(request, PlanError::NotApplicable { strategy: request.strategy_name(), reason }))
+    }
+
     /// A path to cut and to measure.
     pub(crate) fn task<'a>(
         &'a self,
@@ -357,7 +402,7 @@ impl Session {
     ) -> Task<'a> {
         Task {
             part: &self.part,
-            cutter: &self.scene.cutter,
+            cutters: &self.cutters,
             holder: self.scene.holder.as_ref(),
             path,
             top: self.top,

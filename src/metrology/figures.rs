@@ -117,6 +117,9 @@ pub struct GougeRegion {
     pub move_index: u32,
     /// Its line in toolpath.nc, counted from 1; 0 where there is no such program.
     pub line: u32,
+    /// Its tool, where the program has several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tool: Option<u32>,
 }
 
 /// Cuts below the design surface.

@@ -13,8 +13,8 @@ use super::regions::connected;
 use super::walls::Walls;
 use crate::closer;
 use crate::facing::LEAST_FACING;
-use cutter::Cutter;
 use geometry::{Point2, Point3, Vector3};
+use motion::Cutters;
 use part::{Part, SurfaceGrid, SurfacePoint};
 use sim::{Grid, NOT_CUT};
 use work::monitor::{self, Cancelled, Monitor};
@@ -59,7 +59,7 @@ impl Monitor for Within<'_> {
 /// A cut surface and what it is measured by.
 pub(super) struct Inspection<'a> {
     pub part: &'a Part,
-    pub cutter: &'a Cutter,
+    pub cutters: &'a Cutters,
     pub limits: &'a Limits,
     /// The error bound that is asked for, mm.
     pub asked: f64,
@@ -189,6 +189,7 @@ impl Inspection<'_> {
                 at_mm: at.into(),
                 move_index: by,
                 line: 0,
+                tool: None,
             });
         }
         let deepest = measured(samples).map(|(_, d)| -d).fold(0.0, f64::max);
@@ -219,10 +220,10 @@ impl Inspection<'_> {
     }
 
     /// Depth at a centre, and at most in the square with half side `half` around it. Beside the centre a
-    /// cut may be deeper by the slope times the distance, but a cutter of radius r that meets the design
+    /// cut may be deeper by the slope times the distance, but the widest cutter, of radius r, that meets the design
     /// at a slope s cannot go deeper than about s²r below that.
     fn depth(&self, d: &Deviation, lean: f64, half: f64) -> Value {
-        let deeper = (d.slope * reach(half, lean)).min(d.slope * d.slope * self.cutter.radius());
+        let deeper = (d.slope * reach(half, lean)).min(d.slope * d.slope * self.cutters.greatest_radius());
         Value { here: -d.distance, possible: -d.distance + deeper }
     }
 
@@ -288,7 +289,7 @@ impl Inspection<'_> {
         let (by, centre) = (self.surface.cut.cut_by[k], self.centre(k));
         let Some(design) = self.design_at(centre) else { return false };
         by != NOT_CUT && {
-            let from_contact = self.cutter.contact_to_tip(&design.normal);
+            let from_contact = self.cutters.of_move(by).contact_to_tip(&design.normal);
             let tip = self.surface.nearest_tip(by, &(design.point + from_contact));
             self.part.closest_point(&(tip - from_contact)).1 <= self.limits.uncut
         }

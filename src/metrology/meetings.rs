@@ -6,9 +6,8 @@
 
 use super::cut_surface::{CutPoint, CutSurface};
 use super::tracks::Tracks;
-use cutter::Cutter;
 use geometry::Point2;
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use sim::NOT_CUT;
 
 /// Two heights that differ by more than this, mm, do not meet.
@@ -48,8 +47,13 @@ pub struct Meetings<'a> {
 impl<'a> Meetings<'a> {
     /// On the surface that `path` has cut. With a height of `stock` the line along which a cut meets
     /// flat stock counts too.
-    pub fn new(surface: &'a CutSurface<'a>, cutter: &Cutter, path: &'a Toolpath, stock: Option<f64>) -> Self {
-        Self { surface, tracks: Tracks::new(path, cutter), stock }
+    pub fn new(
+        surface: &'a CutSurface<'a>,
+        cutters: impl Into<Cutters>,
+        path: &'a Toolpath,
+        stock: Option<f64>,
+    ) -> Self {
+        Self { surface, tracks: Tracks::new(path, cutters), stock }
     }
 
     /// True when two moves belong to neighbouring tracks rather than to one.

@@ -16,10 +16,10 @@ use super::figures::{CloserLook, Measurement, NUMERICAL_FLOOR};
 use super::inspected::{Inspected, inspect};
 use super::inspection::{Inspection, Within};
 use super::ridges::Hidden;
-use super::unseen::{Dip, unseen_depth};
+use super::unseen::{Dip, most_unseen};
 use geometry::Point2;
 use motion::Toolpath;
-use sim::{Envelope, Grid, ZMap, cut};
+use sim::{Envelope, Grid, ZMap, cut, cut_in_turn};
 use work::monitor::{self, Cancelled, Monitor};
 
 /// Cells of the grid along the side of a rectangle. More are cut for nothing around a place; fewer share
@@ -133,7 +133,7 @@ impl Refinement<'_> {
     /// True where a rectangle of cells of `cell` mm (0 before it is cut) may hold more than is known.
     fn open(&self, suspicion: &Suspicion, greatest: &GreatestSoFar, cell: f64) -> bool {
         let asked = self.asked.error_bound;
-        let seen = cell > 0.0 && unseen_depth(self.coarse.cutter, cell, 1.0) <= asked;
+        let seen = cell > 0.0 && most_unseen(self.coarse.cutters, cell, 1.0) <= asked;
         let depth = if seen { suspicion.depth } else { suspicion.deeper };
         suspicion.height > greatest.height.max(self.coarse.limits.uncut) + asked
             || depth > greatest.depth + asked
@@ -209,7 +209,7 @@ impl Refinement<'_> {
             };
             rest.height = hidden;
             // What these cells may have missed in turn.
-            let missed = unseen_depth(self.coarse.cutter, cell, 1.0);
+            let missed = most_unseen(self.coarse.cutters, cell, 1.0);
             rest.deeper = rest.deeper.min(found.gouge.max_depth_mm + found.gouge.error_bound_mm + missed);
             last = Some(found);
             if !self.open(&rest, &now, cell) {
@@ -266,7 +266,7 @@ impl Refinement<'_> {
     fn measure(&self, fine: Grid, monitor: &dyn Monitor) -> Result<(Inspected, f64), Cancelled> {
         let (coarse, within) = (self.coarse, Within(monitor));
         let stock = ZMap::block(fine, self.asked.stock_top);
-        let cut = cut(stock, coarse.cutter, self.path, &within)?;
+        let cut = cut_in_turn(cut, stock, coarse.cutters, self.path, &within)?;
         let envelope: Envelope = coarse.surface.envelope.clone();
         let surface = CutSurface::new(envelope, &cut, self.path);
         let inspection = Inspection { surface: &surface, grid: fine, ..*coarse };

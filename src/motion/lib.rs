@@ -7,11 +7,13 @@
 //! holder.
 
 mod beside;
+mod cutters;
 mod path;
 mod tool_axis;
 mod written;
 
 pub use beside::{Beside, PassStretches};
+pub use cutters::{Cutters, Stretch};
 pub use path::{CcPoint, ClPoint, Move, MoveKind, Origin, Toolpath};
 pub use tool_axis::{AxisError, ToolAxis, in_tool_frame, location};
 pub use written::{DECIMALS, ROUNDING, in_last_decimals};

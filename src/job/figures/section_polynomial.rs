@@ -17,6 +17,9 @@ const MEANING: (&str, &str) = (
 );
 
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
+    if run.cutters.are_several() {
+        return Ok(Finding::default());
+    }
     let (cutter, pairs) = (&run.scene().cutter, &run.measurement().pairs);
     let found = polynomial_figures(run.part(), cutter, run.path(), pairs, monitor)?;
     let Some(found) = found else { return Ok(Finding::default()) };

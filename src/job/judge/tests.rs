@@ -23,7 +23,8 @@ const LIMITS: Limits = Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chor
 /// A clean surface but for one gouge of the given depth, mm.
 fn measurement(gouge: f64) -> Measurement {
     let at_mm = [12.5, 7.25, -1.0 - gouge];
-    let region = GougeRegion { depth_mm: gouge, area_mm2: 0.25, at_mm, move_index: 1234, line: 1240 };
+    let region =
+        GougeRegion { depth_mm: gouge, area_mm2: 0.25, at_mm, move_index: 1234, line: 1240, tool: None };
     let regions = if gouge > LIMITS.gouge { vec![region] } else { Vec::new() };
     Measurement {
         scallop: ScallopFigures {

@@ -41,6 +41,7 @@ impl NormalInspection<'_> {
                 at_mm: sample.place.point.into(),
                 move_index: sample.hit.map_or(0, |hit| hit.by),
                 line: 0,
+                tool: None,
             });
         }
         figures.region_count = figures.regions.len();

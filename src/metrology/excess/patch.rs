@@ -3,6 +3,7 @@
 use super::meets;
 use crate::facing::LEAST_FACING;
 use crate::inspection::Inspection;
+use cutter::Cutter;
 use geometry::{Point2, Point3, Vector2, Vector3};
 use part::SurfacePoint;
 use sim::NOT_CUT;
@@ -107,11 +108,12 @@ impl Patches<'_> {
     /// True where the cutter fits, and what stands is no higher than what may be uncut, or the pass that cut came down to the
     /// design nearby.
     pub fn reached(&self, at: Point2, height: f64, by: u32) -> bool {
-        let Inspection { part, cutter, surface, limits, .. } = *self.inspection;
+        let Inspection { part, cutters, surface, limits, .. } = *self.inspection;
         let Some(design) = part.highest_at(at.x, at.y) else { return false };
         by != NOT_CUT && {
+            let cutter = cutters.of_move(by);
             let from_contact = cutter.contact_to_tip(&design.normal);
-            if !self.fits(&(design.point + from_contact)) {
+            if !self.fits(cutter, &(design.point + from_contact)) {
                 return false;
             }
             let tip = surface.nearest_tip(by, &(design.point + from_contact));
@@ -126,11 +128,11 @@ impl Patches<'_> {
         }
     }
 
-    /// Whether the cutter with its tip there keeps out of the part, as far as some places around its axis tell.
-    fn fits(&self, tip: &Point3) -> bool {
+    /// Whether a cutter with its tip there keeps out of the part, as far as some places around its axis tell.
+    fn fits(&self, cutter: &Cutter, tip: &Point3) -> bool {
         const RINGS: [f64; 4] = [0.25, 0.5, 0.75, 0.97];
         const AROUND: u32 = 12;
-        let Inspection { part, cutter, limits, .. } = *self.inspection;
+        let Inspection { part, limits, .. } = *self.inspection;
         let clear = |radius: f64, angle: f64| {
             let q = tip.xy() + Vector2::new(angle.cos(), angle.sin()) * radius;
             let least = tip.z + cutter.profile().height(radius) + limits.scallop.min(limits.gouge);
