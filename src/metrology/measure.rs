@@ -7,6 +7,7 @@ use super::figures::{
 };
 use super::inspected::inspect;
 use super::inspection::Inspection;
+use super::meetings::Meetings;
 use super::pairs::pair_figures;
 use super::refine::{Asked, Refinement};
 use super::ridge_map::borders;
@@ -76,6 +77,7 @@ pub fn measure_with_walls(
         asked: bound,
         most_squares: asked.most_squares,
         surface: &surface,
+        meetings: &Meetings::new(&surface, cutters, path, None),
         grid,
         walls: walls.as_ref(),
     };

@@ -15,6 +15,7 @@ use super::cut_surface::CutSurface;
 use super::figures::{CloserLook, Measurement, NUMERICAL_FLOOR};
 use super::inspected::{Inspected, inspect};
 use super::inspection::{Inspection, Within};
+use super::meetings::Meetings;
 use super::ridges::Hidden;
 use super::unseen::{Dip, most_unseen};
 use geometry::Point2;
@@ -269,7 +270,8 @@ impl Refinement<'_> {
         let cut = cut_in_turn(cut, stock, coarse.cutters, self.path, &within)?;
         let envelope: Envelope = coarse.surface.envelope.clone();
         let surface = CutSurface::new(envelope, &cut, self.path);
-        let inspection = Inspection { surface: &surface, grid: fine, ..*coarse };
+        let meetings = &Meetings::new(&surface, coarse.cutters, self.path, None);
+        let inspection = Inspection { surface: &surface, meetings, grid: fine, ..*coarse };
         let found = inspect(&inspection, self.path, self.highest_ridge, &within)?;
         let hidden = found.ridges.hidden.iter().map(|place| self.height(place).1).fold(0.0, f64::max);
         Ok((found, hidden))

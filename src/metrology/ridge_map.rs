@@ -3,6 +3,7 @@
 use super::cut_surface::CutSurface;
 use super::figures::{Limits, RidgePlace, ScallopFigures};
 use super::inspection::{Inspection, Sample};
+use super::meetings::Meetings;
 use super::ridges::{RidgeFinder, scallop_figures};
 use geometry::{Point2, Point3, Vector2};
 use motion::{Cutters, Toolpath};
@@ -34,12 +35,22 @@ pub(super) fn ridge_map(
     monitor: &dyn Monitor,
 ) -> Result<Option<RidgeMap>, Cancelled> {
     let surface = CutSurface::new(Envelope::new(cutters, path), cut, path);
+    let meetings = &Meetings::new(&surface, cutters, path, None);
     // Nothing is searched between centres.
     let (most_squares, grid) = (0, cut.grid);
-    let inspection =
-        Inspection { part, cutters, limits, asked, most_squares, surface: &surface, grid, walls: None };
+    let inspection = Inspection {
+        part,
+        cutters,
+        limits,
+        asked,
+        most_squares,
+        surface: &surface,
+        meetings,
+        grid,
+        walls: None,
+    };
     let samples = inspection.samples(monitor)?;
-    let finder = RidgeFinder::new(&surface, part, cutters, path, limits);
+    let finder = RidgeFinder::new(&inspection, path);
     let mut ridges = finder.find(&|k| samples[k].deviation, monitor)?;
     let mut above = std::mem::take(&mut ridges.above);
     let scallop = scallop_figures(&ridges.samples, finder.highest(&ridges, asked), limits);

@@ -16,6 +16,7 @@
 
 use super::cut_surface::CutSurface;
 use super::figures::{Limits, NEAR_LIMIT, NUMERICAL_FLOOR, RidgePlace, ScallopFigures};
+use super::inspection::Inspection;
 use super::meetings::{Meeting, Meetings};
 use super::pairs::{PairTally, RidgeCrossing};
 use geometry::{Point2, Point3, Vector2, distance_to_segment};
@@ -133,7 +134,7 @@ pub(super) struct RidgeFinder<'a> {
     pub part: &'a Part,
     pub cutters: &'a Cutters,
     pub limits: &'a Limits,
-    meetings: Meetings<'a>,
+    meetings: &'a Meetings<'a>,
     path: &'a Toolpath,
 }
 
@@ -165,14 +166,8 @@ impl GridLine {
 }
 
 impl<'a> RidgeFinder<'a> {
-    pub fn new(
-        surface: &'a CutSurface<'a>,
-        part: &'a Part,
-        cutters: &'a Cutters,
-        path: &'a Toolpath,
-        limits: &'a Limits,
-    ) -> Self {
-        let meetings = Meetings::new(surface, cutters, path, None);
+    pub fn new(inspection: &Inspection<'a>, path: &'a Toolpath) -> Self {
+        let Inspection { surface, part, cutters, limits, meetings, .. } = *inspection;
         Self { surface, part, cutters, limits, meetings, path }
     }
 

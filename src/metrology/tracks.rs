@@ -42,6 +42,11 @@ impl<'a> Tracks<'a> {
         Self { path, along, closed, cutters: cutters.into() }
     }
 
+    /// What makes the moves.
+    pub fn cutters(&self) -> &Cutters {
+        &self.cutters
+    }
+
     /// The passes of two moves, in order.
     pub fn passes(&self, a: u32, b: u32) -> [u32; 2] {
         let [x, y] = [a, b].map(|k| self.path.moves[k as usize].pass);
