@@ -45,7 +45,8 @@ fn of_heights(run: &Run<'_>, cut: &ZMap) -> Machined {
     let lowest = cut.height.iter().copied().fold(f32::INFINITY, f32::min);
     let bottom = f64::from(lowest).min(run.part().bounds().min.z) - BASE;
     // A grid of one row has no surface; its file then holds no triangle.
-    let Some(mesh) = surface_mesh(cut, run.cutters, run.path(), bottom, tolerance, MAX_TRIANGLES) else {
+    let Some(mesh) = surface_mesh(cut, run.cutters(), &run.whole.path, bottom, tolerance, MAX_TRIANGLES)
+    else {
         return Machined { vertices: Vec::new(), triangles: Vec::new(), deviations: Vec::new(), tolerance };
     };
     let deviations = mesh.deviations(run.part(), &run.measurement().deviation_map);

@@ -1,5 +1,6 @@
 //! What one toolpath left.
 
+use cutter::Holder;
 use field::PlannedField;
 use machine::kinematics::JointPath;
 use metrology::{Measurement, View};
@@ -17,6 +18,8 @@ pub struct Outcome {
     pub path: Toolpath,
     /// What cuts along it.
     pub cutters: Cutters,
+    /// What holds each of them.
+    pub holders: Vec<Option<Holder>>,
     /// The path in the joints of a five-axis machine.
     pub joints: Option<JointPath>,
     /// What a streamline was planned by.

@@ -1,11 +1,13 @@
 //! One toolpath at work: what its figures are found from.
 
+use cutter::Cutter;
 use metrology::{Budget, Measured, Measurement, View};
 use motion::{Cutters, Toolpath};
 use part::Part;
 use report::Claim;
 use scene::{Scene, ToolpathRequest};
 
+use super::earlier::{EarlierPath, WholePath};
 use super::planned::Planned;
 use super::tool::{Around, ToolMoves};
 use super::{JobError, Session};
@@ -22,8 +24,12 @@ pub(crate) struct Run<'a> {
     pub measured: &'a Measured,
     /// The tool, and what it must not touch.
     pub around: Around<'a>,
-    /// What cuts.
-    pub cutters: &'a Cutters,
+    /// Its moves behind those of the toolpaths before it: what was measured.
+    pub whole: &'a WholePath<'a>,
+    /// The toolpaths that cut the stock before it.
+    pub earlier: &'a [EarlierPath],
+    /// What makes its own moves.
+    pub own_cutters: &'a Cutters,
     /// The moves of each tool, in order.
     pub tools: &'a [ToolMoves<'a>],
 }
@@ -39,6 +45,22 @@ impl Run<'_> {
 
     pub fn path(&self) -> &Toolpath {
         &self.planned.plan.path
+    }
+
+    /// What makes the moves that were measured.
+    pub fn cutters(&self) -> &Cutters {
+        &self.whole.cutters
+    }
+
+    /// The moves of each tool that were measured, those of earlier toolpaths too.
+    pub fn all_tools(&self) -> Vec<ToolMoves<'_>> {
+        self.whole.tools(self.earlier, self.tools)
+    }
+
+    /// What other toolpaths and tools cut before the first move.
+    pub fn before(&self) -> Vec<(Cutter, Toolpath)> {
+        let tools = self.request.foreign().into_iter().flat_map(|read| read.before.iter().cloned());
+        self.earlier.iter().flat_map(EarlierPath::stretches).chain(tools).collect()
     }
 
     pub fn measurement(&self) -> &Measurement {

@@ -21,6 +21,7 @@ use toolpath::{PlanError, Pocket};
 use work::aside;
 use work::monitor::{self, Cancelled, Monitor, Silent};
 
+use super::earlier::{EarlierPath, WholePath};
 use super::machined::BASE;
 use super::planned::{self, Planned};
 use super::run::Run;
@@ -138,17 +139,30 @@ impl Session {
         done: &mut dyn FnMut(&Outcome) -> Result<(), E>,
     ) -> Result<RunReport, E> {
         let (mut rows, mut refused) = (Vec::new(), None);
-        let mut seen = Vec::new();
+        let (mut seen, mut earlier) = (Vec::new(), Some(Vec::new()));
         for request in &self.scene.toolpaths {
             monitor.belongs_to(&request.name);
-            match self.toolpath(request, monitor) {
+            if !request.stock_is_previous {
+                earlier = Some(Vec::new());
+            }
+            let outcome = match &earlier {
+                Some(earlier) => self.toolpath_after(earlier, request, monitor),
+                None => {
+                    Err(self.not_applicable(request, "the toolpath before it could not be planned".into()))
+                }
+            };
+            match outcome {
                 Ok(mut outcome) => {
                     note_same_path(&mut seen, &mut outcome);
                     done(&outcome)?;
+                    if let Some(earlier) = earlier.as_mut().filter(|_| self.goes_on(request)) {
+                        earlier.push(EarlierPath::of(&outcome));
+                    }
                     rows.push(ToolpathReport::Measured(Box::new(outcome.result)));
                 }
                 Err(error) => {
                     let Some(reason) = error.why_not_planned() else { return Err(error.into()) };
+                    earlier = None;
                     rows.push(not_planned(request, reason));
                     refused = refused.or(Some(error));
                 }
@@ -172,17 +186,44 @@ impl Session {
         RunReport { inputs: self.inputs.clone(), notes: self.doubt.iter().cloned().collect(), ..report }
     }
 
-    /// Plans, cuts, measures and judges one toolpath.
+    /// Plans, cuts, measures and judges one toolpath; where it cuts what others left, those are planned before it.
     ///
     /// # Errors
     /// [`JobError`]
     pub fn toolpath(&self, request: &ToolpathRequest, monitor: &dyn Monitor) -> Result<Outcome, JobError> {
+        let all = &self.scene.toolpaths;
+        let own = all.iter().position(|other| other.name == request.name).unwrap_or_default();
+        let first = (0..=own).rev().find(|&k| !all[k].stock_is_previous).unwrap_or_default();
+        let mut earlier = Vec::new();
+        for before in all[first..own].iter().filter(|_| request.stock_is_previous) {
+            let outcome = self.toolpath_after(&earlier, before, monitor)?;
+            earlier.push(EarlierPath::of(&outcome));
+        }
+        self.toolpath_after(&earlier, request, monitor)
+    }
+
+    /// Whether the next toolpath cuts what this one leaves.
+    fn goes_on(&self, request: &ToolpathRequest) -> bool {
+        let mut after = self.scene.toolpaths.iter().skip_while(|other| other.name != request.name).skip(1);
+        after.next().is_some_and(|next| next.stock_is_previous)
+    }
+
+    /// As [`Session::toolpath`], behind the toolpaths that cut the same stock.
+    fn toolpath_after(
+        &self,
+        earlier: &[EarlierPath],
+        request: &ToolpathRequest,
+        monitor: &dyn Monitor,
+    ) -> Result<Outcome, JobError> {
         monitor::check(monitor)?;
         let scene = &self.scene;
         let engine = self.engine(request)?;
         let (cutters, holders) = self.tools(request);
         if cutters.are_several() {
-            self.one_tool_at_a_time(request, engine)?;
+            self.on_cells(request, engine, "measured with one tool at a time: write `tool = 2` for tool 2")?;
+        }
+        if !earlier.is_empty() {
+            self.on_cells(request, engine, "measured on a block of its own: delete `stock`")?;
         }
         let tool = Tool::of(scene);
         let fixtures = self.fixtures(monitor)?;
@@ -202,11 +243,20 @@ impl Session {
                 (&at_time, planned, measured)
             }
         };
+        let whole = WholePath::new(earlier, &planned.plan.path, cutters, scene.machine.rapid_rate);
+        if !earlier.is_empty() {
+            measured = self.measure_whole(request, engine, (&whole.path, &whole.cutters), 0.0, monitor)?;
+        }
         for region in &mut measured.measurement.gouge.regions {
             let at = region.at_mm.into();
-            let (path, cutter) = (&planned.plan.path, cutters.of_move(region.move_index));
-            region.line = line_of_cut(path, cutter, region.move_index as usize, &at);
-            region.tool = path.named_tool_of(region.move_index as usize);
+            let (toolpath, move_index) = whole.own_move(region.move_index);
+            let its = earlier.get(toolpath);
+            let (path, cutters) =
+                its.map_or((&planned.plan.path, cutters), |before| (&before.path, &before.cutters));
+            region.move_index = move_index;
+            region.line = line_of_cut(path, cutters.of_move(move_index), move_index as usize, &at);
+            region.tool = path.named_tool_of(move_index as usize);
+            region.toolpath = its.map(|before| before.name.clone());
         }
         let tools = ToolMoves::of(cutters, holders, &planned.plan.path);
         let run = Run {
@@ -215,7 +265,9 @@ impl Session {
             planned: &planned,
             measured: &measured,
             around,
-            cutters,
+            whole: &whole,
+            earlier,
+            own_cutters: cutters,
             tools: &tools,
         };
         let found = figures::all(&run, monitor)?;
@@ -238,7 +290,9 @@ impl Session {
             found.claims,
             planned.plan.path.program_name(),
         );
-        let (verdict, claims) = if request.foreign().is_some_and(|read| read.others) {
+        let (verdict, claims) = if self.goes_on(request) {
+            figures::before_others(claims)
+        } else if request.foreign().is_some_and(|read| read.others) {
             figures::with_other_tools(claims)
         } else {
             (verdict, claims)
@@ -266,6 +320,7 @@ impl Session {
             result,
             path: plan.path,
             cutters: cutters.clone(),
+            holders: holders.to_vec(),
             joints,
             field: plan.field,
             measurement: measured.measurement,
@@ -285,12 +340,24 @@ impl Session {
         enough: f64,
         monitor: &dyn Monitor,
     ) -> Result<Measured, JobError> {
+        let (cutters, _) = self.tools(request);
+        self.measure_whole(request, engine, (path, cutters), enough, monitor)
+    }
+
+    /// As [`Session::measure`], of a path that may begin with the moves of other toolpaths.
+    fn measure_whole(
+        &self,
+        request: &ToolpathRequest,
+        engine: &dyn Engine,
+        (path, cutters): (&Toolpath, &Cutters),
+        enough: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<Measured, JobError> {
         let scene = &self.scene;
         let failed = |reason| JobError::engine(scene, &request.name, reason);
         let own = self.own_cells(request)?;
         let (simulation, cells) =
             own.as_ref().map_or((&scene.simulation, &self.cells), |(simulation, cells)| (simulation, cells));
-        let (cutters, _) = self.tools(request);
         let first = Task { cutters, ..self.task(path, simulation, cells) };
         let mut measured = engine.measure(&first, monitor).map_err(failed)?;
         let mut finest = auto_cell(&scene.cutter, &scene.toolpaths).min(simulation.cell);
@@ -378,19 +445,27 @@ impl Session {
         of_program.map_or_else(of_scene, |(cutters, holders)| (cutters, holders.as_slice()))
     }
 
-    /// Refuses what is measured with one tool at a time.
-    fn one_tool_at_a_time(&self, request: &ToolpathRequest, engine: &dyn Engine) -> Result<(), JobError> {
+    /// Refuses what is not measured on cells under upright tools; `otherwise` is how it is.
+    fn on_cells(
+        &self,
+        request: &ToolpathRequest,
+        engine: &dyn Engine,
+        otherwise: &str,
+    ) -> Result<(), JobError> {
         let what = match () {
-            () if request.tilts() => "tools that lean are".to_owned(),
+            () if request.tilts() => "what tools that lean leave is".to_owned(),
             () if self.pocket.is_some() => "the floor of a pocket is".to_owned(),
-            () if engine.tilts() => format!("with the engine `{}` a program is", engine.word()),
+            () if engine.tilts() => format!("with the engine `{}` a toolpath is", engine.word()),
             () if self.scene.simulation.voxel.is_some() => {
                 "the solid of `voxel` in [simulation] is".to_owned()
             }
             () => return Ok(()),
         };
-        let reason = format!("{what} measured with one tool at a time: write `tool = 2` for tool 2");
-        Err(self.refused(request, PlanError::NotApplicable { strategy: request.strategy_name(), reason }))
+        Err(self.not_applicable(request, format!("{what} {otherwise}")))
+    }
+
+    fn not_applicable(&self, request: &ToolpathRequest, reason: String) -> JobError {
+        self.refused(request, PlanError::NotApplicable { strategy: request.strategy_name(), reason })
     }
 
     /// A path to cut and to measure.

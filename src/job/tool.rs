@@ -61,6 +61,7 @@ impl Tool {
 }
 
 /// The moves of one tool, for figures that look at one tool after the other.
+#[derive(Debug, Clone)]
 pub(crate) struct ToolMoves<'a> {
     /// What cuts.
     pub cutter: &'a Cutter,

@@ -250,8 +250,7 @@ impl Inspection<'_> {
                 area_mm2: area,
                 at_mm: at.into(),
                 move_index: by,
-                line: 0,
-                tool: None,
+                ..GougeRegion::default()
             });
         }
         let deepest = measured(samples).map(|(_, d)| -d).fold(0.0, f64::max);
@@ -272,7 +271,7 @@ impl Inspection<'_> {
             });
             if let (Some((_, at, move_index)), Some(region)) = (self.depth_at(q), figures.regions.get_mut(k))
             {
-                *region = GougeRegion { depth_mm: depth, at_mm: at.into(), move_index, ..*region };
+                *region = GougeRegion { depth_mm: depth, at_mm: at.into(), move_index, ..region.clone() };
             }
         }
         figures.region_count = figures.regions.len();

@@ -252,7 +252,7 @@ impl Refinement<'_> {
                 gouge.region_count -= before - gouge.regions.len();
                 gouge.area_mm2 += region.area_mm2;
                 gouge.region_count += 1;
-                gouge.regions.push(*region);
+                gouge.regions.push(region.clone());
             }
         }
         if let (Some(highest), Some(max)) = (found.highest, scallop.max_mm)

@@ -49,6 +49,18 @@ impl Cutters {
         self
     }
 
+    /// The cutters of another path behind this one: the first from the move `begin` on, the others counted from `first`.
+    /// A cutter that goes on is the same one.
+    #[must_use]
+    pub fn and_then(mut self, begin: u32, first: u32, next: &Self) -> Self {
+        for (k, (move_index, cutter)) in next.of.iter().enumerate() {
+            if self.of[self.of.len() - 1].1 != *cutter {
+                self.of.push((if k == 0 { begin } else { first + move_index }, *cutter));
+            }
+        }
+        self
+    }
+
     /// The cutter that makes a move.
     #[inline]
     pub fn of_move(&self, move_index: u32) -> &Cutter {
@@ -129,6 +141,9 @@ mod tests {
         assert_eq!([tools(0), tools(1), tools(2)], [vec![(0, 8)], vec![(0, 6)], vec![(0, 8)]]);
         assert_eq!(path.part(2..6).origin.tools, [(0, 8), (1, 6), (3, 8)]);
         assert_eq!([0, 4, 6].map(|k| path.named_tool_of(k)), [Some(8), Some(6), Some(8)]);
+        let on = Cutters::from(ball).and_then(18, 20, &cutters);
+        assert_eq!(on, Cutters::from(ball).then(18, flat).then(23, ball).then(25, flat));
+        assert_eq!(Cutters::from(flat).and_then(18, 20, &flat.into()), flat.into());
         let whole = Cutters::from(ball);
         assert_eq!(*whole.stretches(&path)[0].path, path);
     }

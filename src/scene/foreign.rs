@@ -9,7 +9,7 @@ use super::{Scene, ToolpathRequest};
 use cutter::{Cutter, Holder};
 use io::regular;
 use keys::{SceneError, SceneText};
-use motion::{Cutters, Move, MoveKind, Toolpath};
+use motion::{Cutters, MoveKind, PathsInTurn, Toolpath};
 use program::{
     Control, Finding, Placing, Program, ProgramError, Setup, ToolRun, ToolTable, looks_like_apt, read_apt,
     read_gcode,
@@ -264,39 +264,16 @@ fn feeds(runs: &[ToolRun], tool: u32) -> bool {
     of_tool.flat_map(|run| &run.path.moves).any(|step| step.kind != MoveKind::Rapid)
 }
 
-/// Runs as one path. Between two of them the tool is away: it rises above all of the path, and the next one comes from there.
-fn joined(runs: impl Iterator<Item = ToolRun>) -> Toolpath {
-    let mut runs = runs;
-    let Some(ToolRun { mut path, .. }) = runs.next() else {
+/// Runs as one path.
+fn joined(mut runs: impl Iterator<Item = ToolRun>) -> Toolpath {
+    let Some(ToolRun { path, .. }) = runs.next() else {
         return Toolpath::new(motion::ClPoint::upright(geometry::Point3::origin()), Vec::new());
     };
-    let (mut top, mut pass) = (highest(&path), path.passes() as u32);
-    for ToolRun { tool, path: next } in runs {
-        let line = next.origin.lines.first().copied().unwrap_or_default();
-        top = top.max(highest(&next));
-        let mut from = path.moves.last().map_or(path.start, |step| step.to);
-        let mut over = next.start;
-        (from.tip.z, over.tip.z) = (top, top);
-        for to in [from, over, next.start] {
-            path.moves.push(Move { to, kind: MoveKind::Rapid, feed_rate: program::FEED_WHERE_NONE, pass });
-            path.origin.lines.push(line);
-        }
-        // The tool that was there rises itself.
-        let first = path.moves.len() - 2;
-        if path.tool_of(first) != Some(tool) {
-            path.origin.tools.push((first as u32, tool));
-        }
-        let passes = next.passes() as u32;
-        path.moves.extend(next.moves.into_iter().map(|step| Move { pass: step.pass + pass, ..step }));
-        path.origin.lines.extend(next.origin.lines);
-        pass += passes.max(1);
-    }
-    path
-}
-
-/// The highest place of the tip.
-fn highest(path: &Toolpath) -> f64 {
-    path.moves.iter().map(|step| step.to.tip.z).fold(path.start.tip.z, f64::max)
+    let mut all = PathsInTurn::new(path);
+    runs.for_each(|run| {
+        all.push(run.path, program::FEED_WHERE_NONE);
+    });
+    all.finish()
 }
 
 fn notes(read: &Program) -> Vec<String> {

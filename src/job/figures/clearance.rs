@@ -94,7 +94,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     }
     let kept_away = kept_away(run, &pairs);
     // What the tools before cut, as each comes.
-    let mut before = run.request.foreign().map_or_else(Vec::new, |read| read.before.clone());
+    let mut before = run.before();
     for (k, tool) in run.tools.iter().enumerate() {
         pairs.extend(with_standing_stock(run, tool, &before, monitor)?);
         if run.tools[k + 1..].iter().any(|later| later.holder.is_some()) {

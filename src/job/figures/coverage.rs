@@ -86,7 +86,7 @@ fn of_pocket(run: &Run<'_>, pocket: &Pocket) -> CoverageFigures {
 type Covered = (CoverageFigures, Option<(Unseen, Vec<Claim>)>);
 
 fn of_part(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Covered, JobError> {
-    let (scene, part, path) = (run.scene(), run.part(), run.path());
+    let (scene, part, path) = (run.scene(), run.part(), &*run.whole.path);
     let facing = run.session.task(path, &scene.simulation, &run.session.cells).facing();
     let View::Heights(cut) = run.view() else {
         return Ok((Coverage::new(part, &facing, scene.judged, None).figures(), None));
@@ -99,23 +99,23 @@ fn of_part(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Covered, JobError> {
         return Ok((areas, None));
     }
     // Holders end the cutters' edges.
-    let solids: Vec<Solid> =
-        run.tools.iter().map(|tool| Solid::of_cutter(tool.cutter, tool.holder)).collect();
-    let tools: Vec<(&Toolpath, &Solid)> = run.tools.iter().map(|tool| &*tool.path).zip(&solids).collect();
+    let all = run.all_tools();
+    let solids: Vec<Solid> = all.iter().map(|tool| Solid::of_cutter(tool.cutter, tool.holder)).collect();
+    let tools: Vec<(&Toolpath, &Solid)> = all.iter().map(|tool| &*tool.path).zip(&solids).collect();
     let rays = run
         .budget()
         .rays_of_each(&tools, Some(&cut.grid), monitor)
         .map_err(|reason| JobError::engine(scene, &run.request.name, reason))?;
     let of_tool = |k: usize| {
         let (path, solid) = tools[k];
-        (run.tools[k].first, RaysCut { rays: &rays[k], path, solid })
+        (all[k].first, RaysCut { rays: &rays[k], path, solid })
     };
     let by_rays = RaysCutInTurn { tools: (0..rays.len()).map(of_tool).collect() };
-    let inward = run.cutters.greatest_radius();
+    let inward = run.cutters().greatest_radius();
     let outward = (REACH_OVER_UNCUT * scene.tolerance.uncut).max(inward);
     let swept = SweptVolume { part, cut: &by_rays, inward, outward, block: *facing.block() };
     let task = AlongTask {
-        cutters: run.cutters,
+        cutters: run.cutters(),
         path,
         cut: &swept,
         limits: &scene.tolerance,

@@ -33,7 +33,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     let (mut r, moves) = match run.view() {
         View::Heights(cut) => {
             let stock = stock(run, cut, monitor)?;
-            let removed = cut_in_order_in_turn(stock, run.cutters, run.path(), monitor)?;
+            let removed = cut_in_order_in_turn(stock, run.own_cutters, run.path(), monitor)?;
             (removal_figures(run.path(), &removed, &cut.height), removed.moves)
         }
         View::Normals(_) => by_voxels(run, monitor)?,
@@ -72,11 +72,11 @@ pub(crate) fn doubt(claims: &mut [Claim], decided_by: &'static str) {
     }
 }
 
-/// The block, less what other tools of a program from elsewhere cut before.
+/// The block, less what other toolpaths and other tools of a program from elsewhere cut before.
 fn stock(run: &Run<'_>, cut: &ZMap, monitor: &dyn Monitor) -> Result<ZMap, JobError> {
     let mut stock = ZMap::block(cut.grid, run.session.top);
-    for (cutter, path) in run.request.foreign().iter().flat_map(|read| &read.before) {
-        stock = sim::cut(stock, cutter, path, monitor)?;
+    for (cutter, path) in run.before() {
+        stock = sim::cut(stock, &cutter, &path, monitor)?;
         stock.cut_by.fill(sim::NOT_CUT);
     }
     Ok(stock)

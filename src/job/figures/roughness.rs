@@ -29,10 +29,10 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     let r = match run.view() {
         View::Normals(view) => {
             let (rays, solid) = (&view.rays, &view.solid);
-            measure(run, &RaysCut { rays, path: run.path(), solid }, monitor)?
+            measure(run, &RaysCut { rays, path: &run.whole.path, solid }, monitor)?
         }
         View::Heights(cut) => {
-            let stretches = run.cutters.stretches(run.path());
+            let stretches = run.cutters().stretches(&run.whole.path);
             let solids: Vec<Solid> =
                 stretches.iter().map(|stretch| Solid::of_cutter(stretch.cutter, None)).collect();
             let tools: Vec<(&Toolpath, &Solid)> =
@@ -74,11 +74,11 @@ fn sentence(run: &Run<'_>, ra: &str, rz: &str) -> (&'static str, String) {
 }
 
 fn measure(run: &Run<'_>, cut: &dyn FirstCut, monitor: &dyn Monitor) -> Result<RoughnessFigures, JobError> {
-    let (scene, path) = (run.scene(), run.path());
+    let (scene, path) = (run.scene(), &*run.whole.path);
     let reach = REACH_OVER_UNCUT * scene.tolerance.uncut;
     let block = run.session.task(path, &scene.simulation, &run.session.cells).block();
     let cut = SweptVolume { part: run.part(), cut, inward: reach, outward: reach, block };
     // About how far passes are apart.
     let interval = run.measurement().deviation.area_mm2 / path_figures(path, 0.0).cutting_length_mm;
-    Ok(roughness(run.part(), run.cutters, path, &cut, interval, monitor)?)
+    Ok(roughness(run.part(), run.cutters(), path, &cut, interval, monitor)?)
 }

@@ -224,8 +224,7 @@ impl Walls {
                 area_mm2,
                 at_mm: strip.piece.place(strip.cut.at[0], strip.cut.at[1]).into(),
                 move_index: strip.cut.by,
-                line: 0,
-                tool: None,
+                ..GougeRegion::default()
             });
         }
         gouge.regions.sort_by(|a, b| b.depth_mm.total_cmp(&a.depth_mm));
