@@ -92,7 +92,7 @@ pub struct VerifyOptions {
     /// A table of tools: a TOML file with a [[tool]] for each, or a .tbl of LinuxCNC in mm.
     #[arg(long, value_name = "FILE")]
     pub tools: Option<PathBuf>,
-    /// The tool to verify, where the program has several.
+    /// The tool to verify by itself [default: all that the program cuts with].
     #[arg(long, value_name = "N")]
     pub tool: Option<u32>,
     /// The control that the program is written for.

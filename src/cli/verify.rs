@@ -5,13 +5,15 @@ use std::path::Path;
 
 use cutter::Cutter;
 use keys::{toml_number, toml_string};
+use program::{Tool, ToolTable};
 use scene::{Scene, TableError, described_tools, tool_table};
+use toolpath::ALL_TOOLS;
 use work::monitor;
 
 use super::args::VerifyOptions;
 use super::error::{CliError, shown};
 use super::progress::Progress;
-use super::run::{Chosen, RunOutcome, Target, default_target, on_threads, run_scene};
+use super::run::{Chosen as Simulated, RunOutcome, Target, default_target, on_threads, run_scene};
 
 /// Verifies a program and writes the results.
 ///
@@ -20,7 +22,7 @@ use super::run::{Chosen, RunOutcome, Target, default_target, on_threads, run_sce
 pub fn verify(options: &VerifyOptions, progress: &Progress) -> Result<RunOutcome, CliError> {
     on_threads(options.threads, || {
         let mut scene = Scene::of_text(&name(&options.program), text(options)?)?;
-        Chosen { cell: options.cell, memory: options.memory, engine: options.engine }.apply(&mut scene);
+        Simulated { cell: options.cell, memory: options.memory, engine: options.engine }.apply(&mut scene);
         monitor::check(progress)?;
         let target = options.out.clone().unwrap_or_else(|| default_target(&options.program));
         let inputs = options.tools.iter().cloned().collect();
@@ -34,16 +36,25 @@ fn name(program: &Path) -> String {
     format!("verify {file}")
 }
 
+/// What the scene's cutter is, and which tools of the program are meant.
+struct Chosen {
+    cutter: Cutter,
+    /// As scenes spell it.
+    holder: String,
+    /// `tool` in the scene; nothing where the program has one.
+    tool: Option<String>,
+}
+
 /// The scene.
 fn text(options: &VerifyOptions) -> Result<String, CliError> {
-    let (cutter, holder) = match (&options.cutter, &options.tools) {
-        (Some(cutter), _) => (*cutter, String::new()),
-        (None, Some(tools)) => of_table(tools, options.tool)?,
+    let asked = options.tool.map(|number| number.to_string());
+    let chosen = match (&options.cutter, &options.tools) {
+        (Some(cutter), _) => Chosen { cutter: *cutter, holder: String::new(), tool: asked },
+        (None, Some(tools)) => of_table(tools, options)?,
         (None, None) => of_program(options)?,
     };
     let mut text = String::new();
-    write_scene(&mut text, options, &cutter, &holder)
-        .map_err(|e| refused(&e.to_string(), "check the arguments"))?;
+    write_scene(&mut text, options, &chosen).map_err(|e| refused(&e.to_string(), "check the arguments"))?;
     Ok(text)
 }
 
@@ -51,50 +62,48 @@ fn refused(what: &str, cure: &str) -> CliError {
     CliError::Verify { what: what.to_owned(), cure: cure.to_owned() }
 }
 
-/// The cutter that the program itself describes in its comments.
-fn of_program(options: &VerifyOptions) -> Result<(Cutter, String), CliError> {
+/// The cutters that the program itself describes in its comments.
+fn of_program(options: &VerifyOptions) -> Result<Chosen, CliError> {
     let file = shown(&options.program);
     let cure = "add --cutter or --tools";
-    let (table, used) = described_tools(&options.program, &options.control).map_err(|error| match error {
-        TableError::Fault(error) => error.into(),
-        TableError::Unreadable(reason) => refused(&format!("cannot read {file}: {reason}"), "name a program"),
-    })?;
-    let known: Vec<u32> = used.into_iter().filter(|number| table.get(*number).is_some()).collect();
+    let (table, feeding) = in_program(options)?;
+    if options.tool.is_none() && several(&table, &feeding) {
+        return all(&table, &feeding).ok_or_else(|| refused(&format!("{file} describes no cutter"), cure));
+    }
+    let known: Vec<u32> = feeding.into_iter().filter(|number| table.get(*number).is_some()).collect();
     let number = match (options.tool, &known[..]) {
         (Some(number), _) => number,
-        (None, [only]) => *only,
+        (None, [only, ..]) => *only,
         (None, []) => return Err(refused(&format!("{file} describes no cutter"), cure)),
-        (None, _) => {
-            return Err(refused(&format!("{file} describes several cutters"), "name one with --tool"));
-        }
     };
-    let described = table.get(number).map(|tool| (tool.cutter, String::new()));
-    described.ok_or_else(|| refused(&format!("{file} describes no cutter for tool {number}"), cure))
+    let tool = table.get(number);
+    tool.map(|tool| one(tool, options.tool))
+        .ok_or_else(|| refused(&format!("{file} describes no cutter for tool {number}"), cure))
 }
 
-/// Cutter and holder of a tool of a table, the latter as scenes spell it.
-fn of_table(file: &Path, number: Option<u32>) -> Result<(Cutter, String), CliError> {
-    let table = tool_table(file).map_err(|error| match error {
+/// The tools that the program describes, and those that feed in it.
+fn in_program(options: &VerifyOptions) -> Result<(ToolTable, Vec<u32>), CliError> {
+    described_tools(&options.program, &options.control).map_err(|error| match error {
         TableError::Fault(error) => error.into(),
-        TableError::Unreadable(reason) => refused(
-            &format!("cannot read {}: {reason}", shown(file)),
-            "name a file of tools in TOML, or a .tbl of LinuxCNC",
-        ),
-    })?;
-    let tools = &table.tools;
-    let listed = tools.iter().map(|tool| tool.number.to_string()).collect::<Vec<_>>().join(", ");
-    let tool = match (number, &tools[..]) {
-        (None, [only]) => only,
-        (None, _) => {
-            return Err(refused("the table has several tools", &format!("name one of {listed} with --tool")));
+        TableError::Unreadable(reason) => {
+            refused(&format!("cannot read {}: {reason}", shown(&options.program)), "name a program")
         }
-        (Some(number), _) => tools.iter().find(|tool| tool.number == number).ok_or_else(|| {
-            refused(
-                &format!("{} has no tool {number}", shown(file)),
-                &format!("name one of {listed} with --tool"),
-            )
-        })?,
-    };
+    })
+}
+
+/// Whether several tools cut, of which one is known.
+fn several(table: &ToolTable, feeding: &[u32]) -> bool {
+    feeding.len() > 1 && feeding.iter().any(|number| table.get(*number).is_some())
+}
+
+/// All tools; the scene's cutter, which cells are chosen by, is the last one's, as it finishes.
+fn all(table: &ToolTable, feeding: &[u32]) -> Option<Chosen> {
+    let last = feeding.iter().rev().find_map(|number| table.get(*number))?;
+    Some(Chosen { cutter: last.cutter, holder: String::new(), tool: Some(toml_string(ALL_TOOLS)) })
+}
+
+/// One tool with its holder.
+fn one(tool: &Tool, asked: Option<u32>) -> Chosen {
     let mut holder = String::new();
     if let Some(known) = &tool.holder {
         let _ = writeln!(holder, "[holder]\ncutting_length = {}", toml_number(known.cutting_length()));
@@ -107,7 +116,43 @@ fn of_table(file: &Path, number: Option<u32>) -> Result<(Cutter, String), CliErr
             );
         }
     }
-    Ok((tool.cutter, holder))
+    Chosen { cutter: tool.cutter, holder, tool: asked.map(|number| number.to_string()) }
+}
+
+/// The tools of a table.
+fn of_table(file: &Path, options: &VerifyOptions) -> Result<Chosen, CliError> {
+    let table = tool_table(file).map_err(|error| match error {
+        TableError::Fault(error) => error.into(),
+        TableError::Unreadable(reason) => refused(
+            &format!("cannot read {}: {reason}", shown(file)),
+            "name a file of tools in TOML, or a .tbl of LinuxCNC",
+        ),
+    })?;
+    let tools = &table.tools;
+    let listed = tools.iter().map(|tool| tool.number.to_string()).collect::<Vec<_>>().join(", ");
+    if let Some(number) = options.tool {
+        let tool = table.get(number).ok_or_else(|| {
+            refused(
+                &format!("{} has no tool {number}", shown(file)),
+                &format!("name one of {listed} with --tool"),
+            )
+        })?;
+        return Ok(one(tool, Some(number)));
+    }
+    let (_, feeding) = in_program(options)?;
+    if several(&table, &feeding)
+        && let Some(all) = all(&table, &feeding)
+    {
+        return Ok(all);
+    }
+    let meant = match (&tools[..], &feeding[..]) {
+        ([only], _) => Some(only),
+        (_, [number]) => table.get(*number),
+        _ => None,
+    };
+    meant
+        .map(|tool| one(tool, None))
+        .ok_or_else(|| refused("the table has several tools", &format!("name one of {listed} with --tool")))
 }
 
 /// Whether a toolpath can be called so.
@@ -115,14 +160,14 @@ fn is_name(stem: &str) -> bool {
     stem.len() <= 40 && stem.is_ascii() && stem.bytes().any(|b| b.is_ascii_alphanumeric())
 }
 
-fn write_scene(out: &mut String, options: &VerifyOptions, cutter: &Cutter, holder: &str) -> std::fmt::Result {
+fn write_scene(out: &mut String, options: &VerifyOptions, chosen: &Chosen) -> std::fmt::Result {
     let quoted = |path: &Path| toml_string(&path.to_string_lossy());
     writeln!(out, "title = {}", toml_string(&name(&options.program)))?;
     writeln!(out, "[part]\nfile = {}\nunit = {}", quoted(&options.part), toml_string(&options.unit))?;
     writeln!(out, "judge = {}", toml_string(&options.judge))?;
     writeln!(out, "[cutter]")?;
-    cutter.write(out)?;
-    out.push_str(holder);
+    chosen.cutter.write(out)?;
+    out.push_str(&chosen.holder);
     if let Some(allowance) = options.allowance {
         writeln!(out, "[stock]\nallowance = {}", toml_number(allowance))?;
     }
@@ -140,7 +185,7 @@ fn write_scene(out: &mut String, options: &VerifyOptions, cutter: &Cutter, holde
     if let Some(tools) = &options.tools {
         writeln!(out, "tools = {}", quoted(tools))?;
     }
-    match options.tool {
+    match &chosen.tool {
         Some(tool) => writeln!(out, "tool = {tool}"),
         None => Ok(()),
     }

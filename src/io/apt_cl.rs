@@ -2,14 +2,14 @@
 
 use super::program_text::{ProgramHeader, describe, number, number_to};
 use cutter::Cutter;
-use motion::{ClPoint, MoveKind, Toolpath};
+use motion::{ClPoint, Cutters, MoveKind, Toolpath};
 use std::io::{self, Write};
 
 /// Decimals of the tool axis. With seven the axis is off by 8.7e-8 at most (√3/2 of the last one), which moves
 /// the end of a cutter of 100 mm by 0.009 µm, less than the tip is rounded by; with six it would be 0.09 µm.
 const AXIS_DECIMALS: usize = 7;
 
-/// Writes `PARTNO`, the cutter, `FROM` the start of the path and one `GOTO` a move, each rapid after its
+/// Writes `PARTNO`, the cutter (another one, with `LOADTL`, where its moves begin), `FROM` the start of the path and one `GOTO` a move, each rapid after its
 /// own `RAPID` (which holds for one motion only), and `FEDRAT` wherever the feed changes. Numbers have
 /// four decimals, so each coordinate stands within 0.05 µm of the path. Where the tool axis is not z
 /// throughout, `MULTAX/ON` is written and every location is `x,y,z,i,j,k`.
@@ -19,13 +19,15 @@ const AXIS_DECIMALS: usize = 7;
 pub fn write(
     writer: &mut dyn Write,
     path: &Toolpath,
-    cutter: &Cutter,
+    cutters: &Cutters,
     header: &ProgramHeader,
 ) -> io::Result<()> {
     writeln!(writer, "PARTNO {}", header.plain_name())?;
-    writeln!(writer, "PPRINT {}", describe(cutter))?;
+    writeln!(writer, "PPRINT {}", describe(cutters.first()))?;
     writeln!(writer, "UNITS/MM")?;
-    writeln!(writer, "CUTTER/{}", cutter_words(cutter))?;
+    let mut others = cutters.each().skip(1).peekable();
+    load(writer, path.named_tool_of(0))?;
+    writeln!(writer, "CUTTER/{}", cutter_words(cutters.first()))?;
     if let Some(speed) = header.spindle_speed {
         writeln!(writer, "SPINDL/{},RPM,CLW", number(speed.round()))?;
     }
@@ -35,7 +37,15 @@ pub fn write(
     }
     writeln!(writer, "FROM/{}", location(&path.start, upright))?;
     let mut feed = None;
-    for step in &path.moves {
+    for (k, step) in path.moves.iter().enumerate() {
+        while let Some((_, cutter)) = others.next_if(|(first, _)| *first as usize <= k) {
+            writeln!(writer, "PPRINT {}", describe(cutter))?;
+            load(writer, path.named_tool_of(k))?;
+            writeln!(writer, "CUTTER/{}", cutter_words(cutter))?;
+            if let Some(speed) = header.spindle_speed {
+                writeln!(writer, "SPINDL/{},RPM,CLW", number(speed.round()))?;
+            }
+        }
         if step.kind == MoveKind::Rapid {
             writeln!(writer, "RAPID")?;
         } else if feed != Some(number(step.feed_rate)) {
@@ -48,6 +58,11 @@ pub fn write(
         writeln!(writer, "SPINDL/OFF")?;
     }
     writeln!(writer, "FINI")
+}
+
+/// The change to a tool that has a number.
+fn load(writer: &mut dyn Write, tool: Option<u32>) -> io::Result<()> {
+    tool.map_or(Ok(()), |tool| writeln!(writer, "LOADTL/{tool}"))
 }
 
 /// The tip, and the tool axis as well unless all are upright.
@@ -81,7 +96,7 @@ mod tests {
 
     fn text(path: &Toolpath, cutter: &Cutter, header: &ProgramHeader) -> String {
         let mut bytes = Vec::new();
-        write(&mut bytes, path, cutter, header).unwrap();
+        write(&mut bytes, path, &cutter.into(), header).unwrap();
         String::from_utf8(bytes).unwrap()
     }
 

@@ -10,7 +10,7 @@ use crate::program_text::tests::{example, random};
 use cutter::Cutter;
 use geometry::Vector3;
 use machine::kinematics::{Kinematics, PRESETS, follow};
-use motion::{Move, MoveKind, Toolpath};
+use motion::{Cutters, Move, MoveKind, Toolpath};
 use program::{GENERAL_CONTROL, LINUXCNC_CONTROL, Placing, Setup, read_apt, read_gcode};
 
 fn placing(kinematics: Option<&Kinematics>) -> Placing<'_> {
@@ -65,7 +65,7 @@ fn locations_with_and_without_axes() {
     }
     for path in [random(300), tilted] {
         let mut bytes = Vec::new();
-        apt_cl::write(&mut bytes, &path, &Cutter::ball(6.0).unwrap(), &header()).unwrap();
+        apt_cl::write(&mut bytes, &path, &Cutter::ball(6.0).unwrap().into(), &header()).unwrap();
         let program = read_apt("a.cls", &bytes).unwrap();
         assert!(program.ended && program.notes.is_empty() && program.findings(&|_| None).is_empty());
         let read = program.runs(&placing(None)).unwrap().swap_remove(0).path;
@@ -76,6 +76,23 @@ fn locations_with_and_without_axes() {
             assert_eq!(again.kind == MoveKind::Rapid, step.kind == MoveKind::Rapid);
         }
     }
+}
+
+#[test]
+fn locations_of_several_tools() {
+    let mut path = random(40);
+    path.origin.tools = vec![(0, 4), (15, 7), (30, 4)];
+    let [flat, ball] = [Cutter::flat(8.0).unwrap(), Cutter::ball(6.0).unwrap()];
+    let cutters = Cutters::from(flat).then(15, ball).then(30, flat);
+    let mut bytes = Vec::new();
+    apt_cl::write(&mut bytes, &path, &cutters, &header()).unwrap();
+    let program = read_apt("a.cls", &bytes).unwrap();
+    assert!(program.findings(&|_| None).is_empty(), "{:?}", program.findings(&|_| None));
+    let runs = program.runs(&placing(None)).unwrap();
+    let read: Vec<(u32, usize)> = runs.iter().map(|run| (run.tool, run.path.len())).collect();
+    assert_eq!(read, [(4, 15), (7, 15), (4, 10)]);
+    let cutters: Vec<&str> = program.tools.iter().map(|remark| remark.text.as_str()).collect();
+    assert_eq!(cutters, ["CUTTER/8,0", "CUTTER/6,3", "CUTTER/8,0"]);
 }
 
 #[test]

@@ -48,9 +48,12 @@ fn gouge(measured: &Measurement, limits: &Limits, program: &str) -> Claim {
     if let Some(worst) = figures.regions.first() {
         text += &format!(" at {}, move {}", place(worst.at_mm), worst.move_index);
         // Paths that tilt the tool have no program where the scene names no machine for it.
-        if worst.line > 0 {
-            text += &format!(", {program} line {}", worst.line);
-        }
+        text += &match &worst.toolpath {
+            Some(name) => format!(" of the toolpath {name} before this one, line {}", worst.line),
+            None if worst.line > 0 => format!(", {program} line {}", worst.line),
+            None => String::new(),
+        };
+        text += &worst.tool.map_or_else(String::new, |tool| format!(", tool {tool}"));
         text += &others(figures.region_count);
     }
     let (depth, bound) = (figures.max_depth_mm, figures.error_bound_mm);

@@ -1,11 +1,10 @@
 //! The machined part as triangles.
 
-use metrology::{Measurement, NormalMap, View};
-use motion::Toolpath;
+use metrology::{NormalMap, View};
 use report::{MAX_TRIANGLES, SurfaceMeshFigures, surface_mesh};
 use sim::ZMap;
 
-use super::Session;
+use super::run::Run;
 
 /// The machined part's triangles stay within this share of the scallop tolerance: ridges remain
 /// visible in them.
@@ -28,10 +27,10 @@ pub struct Machined {
 }
 
 impl Machined {
-    pub(crate) fn new(session: &Session, path: &Toolpath, view: &View, measured: &Measurement) -> Self {
-        match view {
-            View::Heights(cut) => of_heights(session, path, cut, measured),
-            View::Normals(view) => of_normals(&view.map, session.scene.tolerance.scallop),
+    pub(crate) fn new(run: &Run<'_>) -> Self {
+        match run.view() {
+            View::Heights(cut) => of_heights(run, cut),
+            View::Normals(view) => of_normals(&view.map, run.scene().tolerance.scallop),
         }
     }
 
@@ -41,15 +40,16 @@ impl Machined {
     }
 }
 
-fn of_heights(session: &Session, path: &Toolpath, cut: &ZMap, measured: &Measurement) -> Machined {
-    let tolerance = MESH_SHARE * session.scene.tolerance.scallop;
+fn of_heights(run: &Run<'_>, cut: &ZMap) -> Machined {
+    let tolerance = MESH_SHARE * run.scene().tolerance.scallop;
     let lowest = cut.height.iter().copied().fold(f32::INFINITY, f32::min);
-    let bottom = f64::from(lowest).min(session.part.bounds().min.z) - BASE;
+    let bottom = f64::from(lowest).min(run.part().bounds().min.z) - BASE;
     // A grid of one row has no surface; its file then holds no triangle.
-    let Some(mesh) = surface_mesh(cut, &session.scene.cutter, path, bottom, tolerance, MAX_TRIANGLES) else {
+    let Some(mesh) = surface_mesh(cut, run.cutters(), &run.whole.path, bottom, tolerance, MAX_TRIANGLES)
+    else {
         return Machined { vertices: Vec::new(), triangles: Vec::new(), deviations: Vec::new(), tolerance };
     };
-    let deviations = mesh.deviations(&session.part, &measured.deviation_map);
+    let deviations = mesh.deviations(run.part(), &run.measurement().deviation_map);
     Machined { deviations, tolerance: mesh.tolerance, vertices: mesh.vertices, triangles: mesh.triangles }
 }
 

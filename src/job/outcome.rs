@@ -1,9 +1,10 @@
 //! What one toolpath left.
 
+use cutter::Holder;
 use field::PlannedField;
 use machine::kinematics::JointPath;
 use metrology::{Measurement, View};
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use report::{FigureFile, ToolpathResult};
 
 use super::Machined;
@@ -15,6 +16,10 @@ pub struct Outcome {
     pub result: ToolpathResult,
     /// The path, with the feeds of its program.
     pub path: Toolpath,
+    /// What cuts along it.
+    pub cutters: Cutters,
+    /// What holds each of them.
+    pub holders: Vec<Option<Holder>>,
     /// The path in the joints of a five-axis machine.
     pub joints: Option<JointPath>,
     /// What a streamline was planned by.

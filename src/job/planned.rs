@@ -189,7 +189,7 @@ impl Session {
         Ok(Box::new(OffsetSurface { along: *along, drive: OffsetDrive::on(surfaces) }))
     }
 
-    fn refused(&self, request: &ToolpathRequest, reason: PlanError) -> JobError {
+    pub(crate) fn refused(&self, request: &ToolpathRequest, reason: PlanError) -> JobError {
         JobError::plan(&self.scene, &request.name, reason)
     }
 

@@ -1,13 +1,15 @@
 //! One toolpath at work: what its figures are found from.
 
+use cutter::Cutter;
 use metrology::{Budget, Measured, Measurement, View};
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use part::Part;
 use report::Claim;
 use scene::{Scene, ToolpathRequest};
 
+use super::earlier::{EarlierPath, WholePath};
 use super::planned::Planned;
-use super::tool::Around;
+use super::tool::{Around, ToolMoves};
 use super::{JobError, Session};
 
 /// One toolpath that was planned, cut and measured.
@@ -22,6 +24,14 @@ pub(crate) struct Run<'a> {
     pub measured: &'a Measured,
     /// The tool, and what it must not touch.
     pub around: Around<'a>,
+    /// Its moves behind those of the toolpaths before it: what was measured.
+    pub whole: &'a WholePath<'a>,
+    /// The toolpaths that cut the stock before it.
+    pub earlier: &'a [EarlierPath],
+    /// What makes its own moves.
+    pub own_cutters: &'a Cutters,
+    /// The moves of each tool, in order.
+    pub tools: &'a [ToolMoves<'a>],
 }
 
 impl Run<'_> {
@@ -35,6 +45,22 @@ impl Run<'_> {
 
     pub fn path(&self) -> &Toolpath {
         &self.planned.plan.path
+    }
+
+    /// What makes the moves that were measured.
+    pub fn cutters(&self) -> &Cutters {
+        &self.whole.cutters
+    }
+
+    /// The moves of each tool that were measured, those of earlier toolpaths too.
+    pub fn all_tools(&self) -> Vec<ToolMoves<'_>> {
+        self.whole.tools(self.earlier, self.tools)
+    }
+
+    /// What other toolpaths and tools cut before the first move.
+    pub fn before(&self) -> Vec<(Cutter, Toolpath)> {
+        let tools = self.request.foreign().into_iter().flat_map(|read| read.before.iter().cloned());
+        self.earlier.iter().flat_map(EarlierPath::stretches).chain(tools).collect()
     }
 
     pub fn measurement(&self) -> &Measurement {
@@ -54,11 +80,18 @@ impl Run<'_> {
         self.path().line_of(move_index as usize).unwrap_or_default()
     }
 
-    /// `, PROGRAM line N`, where there is a program.
+    /// `, PROGRAM line N`, where there is a program, and `, tool N` where it has several.
     pub fn program_line(&self, move_index: u32) -> String {
-        self.path()
-            .line_of(move_index as usize)
-            .map_or_else(String::new, |line| format!(", {} line {line}", self.path().program_name()))
+        let (path, k) = (self.path(), move_index as usize);
+        let line =
+            path.line_of(k).map_or_else(String::new, |line| format!(", {} line {line}", path.program_name()));
+        line + &self.tool_name(move_index)
+    }
+
+    /// `, tool N` of a move, where there are several tools.
+    pub fn tool_name(&self, move_index: u32) -> String {
+        let tool = self.path().named_tool_of(move_index as usize);
+        tool.map_or_else(String::new, |tool| format!(", tool {tool}"))
     }
 
     /// For voxels that do not fit.

@@ -4,12 +4,12 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
 
 use blade::Blade;
-use cutter::Cutter;
+use cutter::{Cutter, Holder};
 use geometry::{Aabb, Bvh, Point3, Vector3};
 use io::ProgramHeader;
 use io::digest::{self, Fingerprint};
 use metrology::{Budget, Engine, EngineError, LaidOut, Measured, Simulation, Task, path_figures};
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use part::Part;
 use report::{
     InputFile, NotPlanned, RunReport, SimulationFigures, ToleranceFigures, ToolpathReport, ToolpathResult,
@@ -17,14 +17,15 @@ use report::{
 };
 use scene::{Fixture, Loaded, PartSource, Scene, ToolpathRequest, auto_cell, load_mesh, load_part};
 use sim::VoxelStock;
-use toolpath::Pocket;
+use toolpath::{PlanError, Pocket};
 use work::aside;
 use work::monitor::{self, Cancelled, Monitor, Silent};
 
+use super::earlier::{EarlierPath, WholePath};
 use super::machined::BASE;
 use super::planned::{self, Planned};
 use super::run::Run;
-use super::tool::{Around, FixtureMesh, Tool};
+use super::tool::{Around, FixtureMesh, Tool, ToolMoves};
 use super::{JobError, Machined, Outcome, figures, judge, units};
 
 /// The cell shrinks to this share where a limit is undecided. Nearer to 1 more cuts are made in vain, nearer to 0 more
@@ -83,6 +84,8 @@ pub struct Session {
     pub doubt: Option<String>,
     /// The files that the scene names, as they were read.
     pub inputs: Vec<InputFile>,
+    /// The scene's cutter, for all moves.
+    cutters: Cutters,
 }
 
 /// The rectangle to simulate: the part's, grown by the stock's margin.
@@ -135,7 +138,8 @@ impl Session {
         let top = face + scene.stock.allowance;
         let doubt = units::doubt(&scene, &part);
         let inputs = inputs(&scene)?;
-        Ok(Self { scene, part, blade, pocket, cells, top, notes, doubt, inputs })
+        let cutters = Cutters::from(&scene.cutter);
+        Ok(Self { scene, part, blade, pocket, cells, top, notes, doubt, inputs, cutters })
     }
 
     /// Runs all toolpaths. Maps, paths and meshes are dropped; [`Session::toolpath`] leaves them. One that cannot be
@@ -157,17 +161,30 @@ impl Session {
         done: &mut dyn FnMut(&Outcome) -> Result<(), E>,
     ) -> Result<RunReport, E> {
         let (mut rows, mut refused) = (Vec::new(), None);
-        let mut seen = Vec::new();
+        let (mut seen, mut earlier) = (Vec::new(), Some(Vec::new()));
         for request in &self.scene.toolpaths {
             monitor.belongs_to(&request.name);
-            match self.toolpath(request, monitor) {
+            if !request.stock_is_previous {
+                earlier = Some(Vec::new());
+            }
+            let outcome = match &earlier {
+                Some(earlier) => self.toolpath_after(earlier, request, monitor),
+                None => {
+                    Err(self.not_applicable(request, "the toolpath before it could not be planned".into()))
+                }
+            };
+            match outcome {
                 Ok(mut outcome) => {
                     note_same_path(&mut seen, &mut outcome);
                     done(&outcome)?;
+                    if let Some(earlier) = earlier.as_mut().filter(|_| self.goes_on(request)) {
+                        earlier.push(EarlierPath::of(&outcome));
+                    }
                     rows.push(ToolpathReport::Measured(Box::new(outcome.result)));
                 }
                 Err(error) => {
                     let Some(reason) = error.why_not_planned() else { return Err(error.into()) };
+                    earlier = None;
                     rows.push(not_planned(request, reason));
                     refused = refused.or(Some(error));
                 }
@@ -191,14 +208,45 @@ impl Session {
         RunReport { inputs: self.inputs.clone(), notes: self.doubt.iter().cloned().collect(), ..report }
     }
 
-    /// Plans, cuts, measures and judges one toolpath.
+    /// Plans, cuts, measures and judges one toolpath; where it cuts what others left, those are planned before it.
     ///
     /// # Errors
     /// [`JobError`]
     pub fn toolpath(&self, request: &ToolpathRequest, monitor: &dyn Monitor) -> Result<Outcome, JobError> {
+        let all = &self.scene.toolpaths;
+        let own = all.iter().position(|other| other.name == request.name).unwrap_or_default();
+        let first = (0..=own).rev().find(|&k| !all[k].stock_is_previous).unwrap_or_default();
+        let mut earlier = Vec::new();
+        for before in all[first..own].iter().filter(|_| request.stock_is_previous) {
+            let outcome = self.toolpath_after(&earlier, before, monitor)?;
+            earlier.push(EarlierPath::of(&outcome));
+        }
+        self.toolpath_after(&earlier, request, monitor)
+    }
+
+    /// Whether the next toolpath cuts what this one leaves.
+    fn goes_on(&self, request: &ToolpathRequest) -> bool {
+        let mut after = self.scene.toolpaths.iter().skip_while(|other| other.name != request.name).skip(1);
+        after.next().is_some_and(|next| next.stock_is_previous)
+    }
+
+    /// As [`Session::toolpath`], behind the toolpaths that cut the same stock.
+    fn toolpath_after(
+        &self,
+        earlier: &[EarlierPath],
+        request: &ToolpathRequest,
+        monitor: &dyn Monitor,
+    ) -> Result<Outcome, JobError> {
         monitor::check(monitor)?;
         let scene = &self.scene;
         let engine = self.engine(request)?;
+        let (cutters, holders) = self.tools(request);
+        if cutters.are_several() {
+            self.on_cells(request, engine, "measured with one tool at a time: write `tool = 2` for tool 2")?;
+        }
+        if !earlier.is_empty() {
+            self.on_cells(request, engine, "measured on a block of its own: delete `stock`")?;
+        }
         let tool = Tool::of(scene);
         let fixtures = self.fixtures(monitor)?;
         let closer = if engine.tilts() { self.closer_part(monitor)? } else { None };
@@ -218,13 +266,41 @@ impl Session {
                 (&at_time, planned, measured)
             }
         };
+        let whole = WholePath::new(earlier, &planned.plan.path, cutters, scene.machine.rapid_rate);
+        if !earlier.is_empty() {
+            measured = self.measure_whole(
+                request,
+                engine,
+                (&whole.path, &whole.cutters),
+                Closeness::Verdict,
+                monitor,
+            )?;
+        }
         for region in &mut measured.measurement.gouge.regions {
             let at = region.at_mm.into();
-            region.line = line_of_cut(&planned.plan.path, &scene.cutter, region.move_index as usize, &at);
+            let (toolpath, move_index) = whole.own_move(region.move_index);
+            let its = earlier.get(toolpath);
+            let (path, cutters) =
+                its.map_or((&planned.plan.path, cutters), |before| (&before.path, &before.cutters));
+            region.move_index = move_index;
+            region.line = line_of_cut(path, cutters.of_move(move_index), move_index as usize, &at);
+            region.tool = path.named_tool_of(move_index as usize);
+            region.toolpath = its.map(|before| before.name.clone());
         }
-        let run = Run { session: self, request, planned: &planned, measured: &measured, around };
+        let tools = ToolMoves::of(cutters, holders, &planned.plan.path);
+        let run = Run {
+            session: self,
+            request,
+            planned: &planned,
+            measured: &measured,
+            around,
+            whole: &whole,
+            earlier,
+            own_cutters: cutters,
+            tools: &tools,
+        };
         let found = figures::all(&run, monitor)?;
-        let machined = Machined::new(self, &planned.plan.path, &measured.view, &measured.measurement);
+        let machined = Machined::new(&run);
         let simulation = SimulationFigures {
             engine: engine.word(),
             cell_mm: measured.cell,
@@ -243,7 +319,9 @@ impl Session {
             found.claims,
             planned.plan.path.program_name(),
         );
-        let (verdict, claims) = if request.foreign().is_some_and(|read| read.others) {
+        let (verdict, claims) = if self.goes_on(request) {
+            figures::before_others(claims)
+        } else if request.foreign().is_some_and(|read| read.others) {
             figures::with_other_tools(claims)
         } else {
             (verdict, claims)
@@ -270,6 +348,8 @@ impl Session {
         Ok(Outcome {
             result,
             path: plan.path,
+            cutters: cutters.clone(),
+            holders: holders.to_vec(),
             joints,
             field: plan.field,
             measurement: measured.measurement,
@@ -288,12 +368,25 @@ impl Session {
         closeness: Closeness,
         monitor: &dyn Monitor,
     ) -> Result<Measured, JobError> {
+        let (cutters, _) = self.tools(request);
+        self.measure_whole(request, engine, (path, cutters), closeness, monitor)
+    }
+
+    /// As [`Session::measure`], of a path that may begin with the moves of other toolpaths.
+    fn measure_whole(
+        &self,
+        request: &ToolpathRequest,
+        engine: &dyn Engine,
+        (path, cutters): (&Toolpath, &Cutters),
+        closeness: Closeness,
+        monitor: &dyn Monitor,
+    ) -> Result<Measured, JobError> {
         let scene = &self.scene;
         let failed = |reason| JobError::engine(scene, &request.name, reason);
         let own = self.own_cells(request)?;
         let (simulation, cells) =
             own.as_ref().map_or((&scene.simulation, &self.cells), |(simulation, cells)| (simulation, cells));
-        let first = self.task(path, simulation, cells);
+        let first = Task { cutters, ..self.task(path, simulation, cells) };
         let mut measured = engine.measure(&first, monitor).map_err(failed)?;
         let mut finest = auto_cell(&scene.cutter, &scene.toolpaths).min(simulation.cell);
         let mut simulation = Simulation { cell_is_auto: false, cell: measured.cell, ..scene.simulation };
@@ -313,7 +406,10 @@ impl Session {
             }
             simulation.error_bound = (FINER * FINER * simulation.error_bound).max(least);
             let cells = self.budget().grid_before_planning(&self.area(), &simulation);
-            let finer = cells.map(|cells| engine.measure(&self.task(path, &simulation, &cells), monitor));
+            let finer = cells.map(|cells| {
+                let task = Task { cutters, ..self.task(path, &simulation, &cells) };
+                engine.measure(&task, monitor)
+            });
             match finer {
                 Ok(Ok(finer)) => {
                     let wall_s = measured.wall_s + finer.wall_s;
@@ -375,6 +471,36 @@ impl Session {
         Ok(engine)
     }
 
+    /// The cutters of a toolpath and what holds each: those of its program where all tools of one are meant, else the scene's.
+    fn tools<'a>(&'a self, request: &'a ToolpathRequest) -> (&'a Cutters, &'a [Option<Holder>]) {
+        let of_program = request.foreign().and_then(|read| read.tools.as_ref());
+        let of_scene = || (&self.cutters, std::slice::from_ref(&self.scene.holder));
+        of_program.map_or_else(of_scene, |(cutters, holders)| (cutters, holders.as_slice()))
+    }
+
+    /// Refuses what is not measured on cells under upright tools; `otherwise` is how it is.
+    fn on_cells(
+        &self,
+        request: &ToolpathRequest,
+        engine: &dyn Engine,
+        otherwise: &str,
+    ) -> Result<(), JobError> {
+        let what = match () {
+            () if request.tilts() => "what tools that lean leave is".to_owned(),
+            () if self.pocket.is_some() => "the floor of a pocket is".to_owned(),
+            () if engine.tilts() => format!("with the engine `{}` a toolpath is", engine.word()),
+            () if self.scene.simulation.voxel.is_some() => {
+                "the solid of `voxel` in [simulation] is".to_owned()
+            }
+            () => return Ok(()),
+        };
+        Err(self.not_applicable(request, format!("{what} {otherwise}")))
+    }
+
+    fn not_applicable(&self, request: &ToolpathRequest, reason: String) -> JobError {
+        self.refused(request, PlanError::NotApplicable { strategy: request.strategy_name(), reason })
+    }
+
     /// A path to cut and to measure.
     pub(crate) fn task<'a>(
         &'a self,
@@ -384,7 +510,7 @@ impl Session {
     ) -> Task<'a> {
         Task {
             part: &self.part,
-            cutter: &self.scene.cutter,
+            cutters: &self.cutters,
             holder: self.scene.holder.as_ref(),
             path,
             top: self.top,

@@ -1,8 +1,11 @@
-//! The tool as a solid, and what it must keep away from.
+//! The tool as a solid, what it must keep away from, and the moves of each tool of a path.
+
+use std::borrow::Cow;
 
 use collision::{Check, Interference, Obstacle};
-use cutter::Solid;
+use cutter::{Cutter, Holder, Solid};
 use geometry::{Bvh, TriangleMesh};
+use motion::{Cutters, Toolpath};
 use part::Part;
 use scene::Scene;
 
@@ -20,8 +23,12 @@ pub(crate) struct Tool {
 impl Tool {
     /// The tool of a scene.
     pub fn of(scene: &Scene) -> Self {
-        let cutter = Solid::of_cutter(&scene.cutter, scene.holder.as_ref());
-        Self { cutter, holder: scene.holder.as_ref().map(Solid::of_holder) }
+        Self::new(&scene.cutter, scene.holder.as_ref())
+    }
+
+    /// Of a cutter and what holds it.
+    pub fn new(cutter: &Cutter, holder: Option<&Holder>) -> Self {
+        Self { cutter: Solid::of_cutter(cutter, holder), holder: holder.map(Solid::of_holder) }
     }
 
     /// What the planner keeps the tool away from: shank and holder from all, the cutter from fixtures, and from cutting
@@ -50,6 +57,33 @@ impl Tool {
             solids().map(move |solid| Check { solid, obstacle, needed: scene.keep_clear.clearance })
         };
         Interference { checks: fixtures.iter().flat_map(of_one).collect(), ..Interference::default() }
+    }
+}
+
+/// The moves of one tool, for figures that look at one tool after the other.
+#[derive(Debug, Clone)]
+pub(crate) struct ToolMoves<'a> {
+    /// What cuts.
+    pub cutter: &'a Cutter,
+    /// What holds it.
+    pub holder: Option<&'a Holder>,
+    /// Index of its first move in the whole path.
+    pub first: u32,
+    /// Its moves.
+    pub path: Cow<'a, Toolpath>,
+}
+
+impl<'a> ToolMoves<'a> {
+    /// Those of all tools of a path, in the order of the program.
+    pub fn of(cutters: &'a Cutters, holders: &'a [Option<Holder>], path: &'a Toolpath) -> Vec<Self> {
+        let stretches = cutters.stretches(path).into_iter();
+        let of_one = |(stretch, holder): (motion::Stretch<'a>, &'a Option<Holder>)| Self {
+            cutter: stretch.cutter,
+            holder: holder.as_ref(),
+            first: stretch.first,
+            path: stretch.path,
+        };
+        stretches.zip(holders).map(of_one).collect()
     }
 }
 

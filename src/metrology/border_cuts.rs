@@ -13,10 +13,11 @@ use super::cut_surface::CutSurface;
 use super::facing::LEAST_FACING;
 use super::figures::{GougeFigures, GougeRegion, NUMERICAL_FLOOR};
 use super::inspection::Inspection;
+use cutter::Cutter;
 use geometry::{Point2, Point3, Vector3};
 use work::monitor::{self, Cancelled, Monitor};
 
-/// Pieces of borders are no longer than this many radii of the cutter.
+/// Pieces of borders are no longer than this many radii of the narrowest cutter.
 const LONGEST_PIECE: f64 = 2.0;
 
 /// Steps of Newton's method for the meeting of a normal with what a move sweeps; it converges from one side.
@@ -65,7 +66,7 @@ impl BorderPiece {
 /// The borders of the triangles that face up.
 fn pieces(inspection: &Inspection<'_>) -> Vec<BorderPiece> {
     let mesh = inspection.part.mesh();
-    let longest = LONGEST_PIECE * inspection.cutter.radius();
+    let longest = LONGEST_PIECE * inspection.cutters.least(Cutter::radius);
     let faces = |t: usize| mesh.normal(t).z > LEAST_FACING;
     let of_triangle = |t: usize| {
         let (normal, corners) = (mesh.normal(t), mesh.corners(t));
@@ -163,17 +164,17 @@ impl Inspection<'_> {
     /// [`Cancelled`] when the monitor says so.
     pub fn cut_borders(&self, gouge: &mut GougeFigures, monitor: &dyn Monitor) -> Result<(), Cancelled> {
         let pieces = pieces(self);
-        let nearby = Nearby::new(&pieces, self.cutter.radius());
+        let nearby = Nearby::new(&pieces, self.cutters.greatest_radius());
         let path = self.surface.path;
         let known = gouge.max_depth_mm;
         let cuts = work::parallel::try_map(path.len(), |k| {
             monitor::check(monitor)?;
             let (from, to) = (path.start_of(k), path.moves[k].to.tip);
             let near = nearby.along(from.xy(), to.xy());
-            let lowest = from.z.min(to.z);
+            let (lowest, cutter) = (from.z.min(to.z), self.cutters.of_move(k as u32));
             let reached = near.iter().map(|&piece| &pieces[piece as usize]).filter(|piece| {
                 let least = piece.least_distance(from.xy(), to.xy());
-                let height = self.cutter.height(least);
+                let height = cutter.height(least);
                 height.is_some_and(|height| piece.ends[0].z.max(piece.ends[1].z) > lowest + height)
             });
             let cuts = reached.filter_map(|piece| {
@@ -288,7 +289,6 @@ mod tests {
     use crate::figures::Limits;
     use crate::flat_scene::{path, plane};
     use crate::{Asked, measure};
-    use cutter::Cutter;
     use sim::{Grid, ZMap, cut};
     use work::monitor::Silent;
 

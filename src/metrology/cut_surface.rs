@@ -330,7 +330,7 @@ mod tests {
         let path = path_through([Point3::new(0.0, 10.0, -2.0), Point3::new(20.0, 10.0, -2.0)]);
         let grid = Grid { origin: Point2::new(0.5, 0.5), cell: 1.0, nx: 20, ny: 20 };
         let cut = cut_reference(&ZMap::block(grid, 5.0), &cutter, &path, &Silent).unwrap();
-        let surface = CutSurface::new(Envelope::new(&cutter, &path), &cut, &path);
+        let surface = CutSurface::new(Envelope::new(cutter, &path), &cut, &path);
         // Sideways, flat and down: no line of these leads up to the cut.
         for n in [[1.0, 0.0, 0.0], [0.0, 0.999, 0.0447], [0.0, -0.6, -0.8], [0.0, 0.0, -1.0]] {
             let n = Vector3::from(n).normalize();

@@ -104,7 +104,7 @@ pub struct ScallopFigures {
 }
 
 /// A connected place deeper than the gouge tolerance.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct GougeRegion {
     /// Greatest depth.
     pub depth_mm: f64,
@@ -117,6 +117,12 @@ pub struct GougeRegion {
     pub move_index: u32,
     /// Its line in toolpath.nc, counted from 1; 0 where there is no such program.
     pub line: u32,
+    /// Its tool, where the program has several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tool: Option<u32>,
+    /// The earlier toolpath whose move it is, where it is none of this one's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub toolpath: Option<String>,
 }
 
 /// Cuts below the design surface.

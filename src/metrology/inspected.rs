@@ -27,8 +27,7 @@ pub(super) fn inspect(
     monitor: &dyn Monitor,
 ) -> Result<Inspected, Cancelled> {
     let samples = inspection.samples(monitor)?;
-    let finder =
-        RidgeFinder::new(inspection.surface, inspection.part, inspection.cutter, path, inspection.limits);
+    let finder = RidgeFinder::new(inspection, path);
     let ridges = finder.find(&|k| samples[k].deviation, monitor)?;
     let deviation = inspection.deviation_figures(&samples);
     let highest_ridge = highest_ridge.max(ridges.highest_sample());

@@ -9,12 +9,13 @@ use super::cut_surface::{CutSurface, Deviation};
 use super::figures::{
     DeviationFigures, GougeFigures, GougeRegion, Limits, NUMERICAL_FLOOR, UncutFigures, UncutRegion,
 };
+use super::meetings::Meetings;
 use super::regions::connected;
 use super::walls::Walls;
 use crate::closer;
 use crate::facing::LEAST_FACING;
-use cutter::Cutter;
-use geometry::{Point2, Point3, Vector3};
+use geometry::{Point2, Point3, Vector2, Vector3};
+use motion::Cutters;
 use part::{Part, SurfaceGrid, SurfacePoint};
 use sim::{Grid, NOT_CUT};
 use work::monitor::{self, Cancelled, Monitor};
@@ -29,6 +30,16 @@ const MOST_SEARCHED: usize = 1 << 16;
 /// A place above the uncut tolerance is a scallop, or half of one on the part's border, when a pass
 /// came down to the design there and no cell rises above the highest ridge by more than this share.
 const RIDGE_IS_TOP: f64 = 1e-3;
+
+/// Tracks of fewer cells beat with them. Wider ones show in their cells as they are.
+const NARROW: usize = 3;
+
+/// Where so large a share of the cells lies in such tracks, the mean deviation is taken at places spread over the cells.
+const CROWDED_SHARE: f64 = 0.25;
+
+/// Powers of the inverse of the number whose cube is one more than itself: their multiples fill a square evenly (M. Roberts,
+/// "The unreasonable effectiveness of quasirandom sequences", 2018).
+const EVEN: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
 
 /// The design surface is sampled in so many bands of rows, one after the other: it takes 40 bytes a
 /// cell, more than all else that is kept. Every band looks at all triangles of the part.
@@ -59,13 +70,15 @@ impl Monitor for Within<'_> {
 /// A cut surface and what it is measured by.
 pub(super) struct Inspection<'a> {
     pub part: &'a Part,
-    pub cutter: &'a Cutter,
+    pub cutters: &'a Cutters,
     pub limits: &'a Limits,
     /// The error bound that is asked for, mm.
     pub asked: f64,
     /// Squares that a search may hold at a time.
     pub most_squares: usize,
     pub surface: &'a CutSurface<'a>,
+    /// Where the passes of that surface meet.
+    pub meetings: &'a Meetings<'a>,
     pub grid: Grid,
     /// The walls beside, where they are measured.
     pub walls: Option<&'a Walls>,
@@ -166,8 +179,57 @@ impl Inspection<'_> {
         self.grid.centre(k % self.grid.nx, k / self.grid.nx)
     }
 
+    /// Figures of the deviations at the centres. Where passes are about as near to each other as the cells are, centres lie on
+    /// ridges, or between them, by chance: there the mean is that of places spread over the cells.
     pub fn deviation_figures(&self, samples: &[Sample]) -> DeviationFigures {
-        DeviationFigures::of(measured(samples).map(|(k, d)| (d, self.area(&samples[k]))))
+        let figures = DeviationFigures::of(measured(samples).map(|(k, d)| (d, self.area(&samples[k]))));
+        let row = |j: usize| (0..self.grid.nx).map(move |i| self.grid.index(i, j));
+        let on = |k: &usize| !samples[*k].deviation.is_nan();
+        let crowded = work::parallel::map(self.grid.ny, |j| {
+            row(j).filter(on).filter(|k| self.is_crowded(*k, NARROW)).count()
+        });
+        if (crowded.iter().sum::<usize>() as f64) < CROWDED_SHARE * figures.samples as f64 {
+            return figures;
+        }
+        let spread = work::parallel::map(self.grid.ny, |j| {
+            let of_one = |k: usize| Some((self.beside_centre(k)?, self.area(&samples[k])));
+            row(j).filter(on).filter_map(of_one).collect::<Vec<_>>()
+        });
+        DeviationFigures { rms_mm: DeviationFigures::of(spread.into_iter().flatten()).rms_mm, ..figures }
+    }
+
+    /// Whether the tracks around are narrower than so many cells, along x or along y.
+    pub fn is_crowded(&self, k: usize, cells: usize) -> bool {
+        let (nx, ny) = (self.grid.nx, self.grid.ny);
+        let cut_by = &self.surface.cut.cut_by;
+        let along = |at: usize, count: usize, step: usize| {
+            let before = (at >= cells).then(|| k - cells * step);
+            let after = (at + cells < count).then(|| k + cells * step);
+            let mut others = before.into_iter().chain(after);
+            count >= 2 * cells && others.all(|by| self.meetings.apart(cut_by[k], cut_by[by]))
+        };
+        along(k % nx, nx, 1) || along(k / nx, ny, nx)
+    }
+
+    /// The moves that may touch the design near a place of a cell, where its cutter is the one there. What passes more than a
+    /// cell above the cell's own height is no cut of it.
+    pub fn passing(&self, k: usize, point: &Point3, normal: &Vector3) -> Vec<u32> {
+        let cutter = self.cutters.of_move(self.surface.cut.cut_by[k]);
+        let passing = self.meetings.passing((point + cutter.contact_to_tip(normal)).xy());
+        let highest = f64::from(self.surface.cut.height[k]) + self.grid.cell;
+        let cuts = |by: &&u32| self.surface.height(**by, point.x, point.y) <= highest;
+        passing.iter().filter(cuts).copied().collect()
+    }
+
+    /// The deviation at a place of a cell that differs from cell to cell: they fill the cells evenly, along any line of them.
+    fn beside_centre(&self, k: usize) -> Option<f64> {
+        let [i, j] = [k % self.grid.nx, k / self.grid.nx].map(|n| n as f64);
+        let share = |a: f64, b: f64| (i * a + j * b).fract() - 0.5;
+        let aside = Vector2::new(share(EVEN[0], EVEN[1]), share(EVEN[1], EVEN[0])) * self.grid.cell;
+        let SurfacePoint { point, normal, .. } = self.design_at(self.centre(k) + aside)?;
+        let hidden = if self.is_crowded(k, 1) { self.passing(k, &point, &normal) } else { Vec::new() };
+        let found = self.surface.along_normal_with(&point, &normal, &hidden)?;
+        Some(self.walls.map_or(found.distance, |walls| walls.beside(&point, found.distance)))
     }
 
     /// Gouges, and how deep one may be between centres.
@@ -188,7 +250,7 @@ impl Inspection<'_> {
                 area_mm2: area,
                 at_mm: at.into(),
                 move_index: by,
-                line: 0,
+                ..GougeRegion::default()
             });
         }
         let deepest = measured(samples).map(|(_, d)| -d).fold(0.0, f64::max);
@@ -209,7 +271,7 @@ impl Inspection<'_> {
             });
             if let (Some((_, at, move_index)), Some(region)) = (self.depth_at(q), figures.regions.get_mut(k))
             {
-                *region = GougeRegion { depth_mm: depth, at_mm: at.into(), move_index, ..*region };
+                *region = GougeRegion { depth_mm: depth, at_mm: at.into(), move_index, ..region.clone() };
             }
         }
         figures.region_count = figures.regions.len();
@@ -219,10 +281,10 @@ impl Inspection<'_> {
     }
 
     /// Depth at a centre, and at most in the square with half side `half` around it. Beside the centre a
-    /// cut may be deeper by the slope times the distance, but a cutter of radius r that meets the design
+    /// cut may be deeper by the slope times the distance, but the widest cutter, of radius r, that meets the design
     /// at a slope s cannot go deeper than about s²r below that.
     fn depth(&self, d: &Deviation, lean: f64, half: f64) -> Value {
-        let deeper = (d.slope * reach(half, lean)).min(d.slope * d.slope * self.cutter.radius());
+        let deeper = (d.slope * reach(half, lean)).min(d.slope * d.slope * self.cutters.greatest_radius());
         Value { here: -d.distance, possible: -d.distance + deeper }
     }
 
@@ -288,7 +350,7 @@ impl Inspection<'_> {
         let (by, centre) = (self.surface.cut.cut_by[k], self.centre(k));
         let Some(design) = self.design_at(centre) else { return false };
         by != NOT_CUT && {
-            let from_contact = self.cutter.contact_to_tip(&design.normal);
+            let from_contact = self.cutters.of_move(by).contact_to_tip(&design.normal);
             let tip = self.surface.nearest_tip(by, &(design.point + from_contact));
             self.part.closest_point(&(tip - from_contact)).1 <= self.limits.uncut
         }

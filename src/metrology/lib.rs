@@ -49,13 +49,15 @@ mod ridges;
 mod roughness;
 mod section_polynomial;
 mod sections;
+#[cfg(test)]
+mod several_tools;
 mod tracks;
 mod turning;
 mod unseen;
 mod walls;
 
 pub use along_normals::{
-    AlongNormal, FirstCut, NormalHit, NormalMap, PatchGrid, RaysCut, SweptVolume, VoxelCut,
+    AlongNormal, FirstCut, NormalHit, NormalMap, PatchGrid, RaysCut, RaysCutInTurn, SweptVolume, VoxelCut,
     measure_along_normals, net_places,
 };
 pub use contact::contacts_on_patches;

@@ -7,17 +7,18 @@ use super::figures::{
 };
 use super::inspected::inspect;
 use super::inspection::Inspection;
+use super::meetings::Meetings;
 use super::pairs::pair_figures;
 use super::refine::{Asked, Refinement};
 use super::ridge_map::borders;
 use super::ridges::{Ridges, scallop_figures};
 use super::tracks::Tracks;
-use super::unseen::{dips, unseen_depth};
+use super::unseen::{dips, most_unseen};
 use super::walls::{WallTask, Walls};
 use super::{Facing, REACH_OVER_UNCUT};
 use cutter::Cutter;
 use geometry::Point3;
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use part::Part;
 use sim::{Envelope, ZMap};
 use work::monitor::{Cancelled, Monitor};
@@ -40,16 +41,16 @@ pub fn measure(
     asked: &Asked,
     monitor: &dyn Monitor,
 ) -> Result<Measurement, Cancelled> {
-    measure_with_walls(part, cutter, path, cut, limits, asked, None, monitor)
+    measure_with_walls(part, &cutter.into(), path, cut, limits, asked, None, monitor)
 }
 
-/// As [`measure`], and the part's vertical walls too, as far as they are walls to the path.
+/// As [`measure`], each move by its own cutter, and the part's vertical walls too, as far as they are walls to the path.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
 pub fn measure_with_walls(
     part: &Part,
-    cutter: &Cutter,
+    cutters: &Cutters,
     path: &Toolpath,
     cut: &ZMap,
     limits: &Limits,
@@ -57,25 +58,26 @@ pub fn measure_with_walls(
     facing: Option<&Facing<'_>>,
     monitor: &dyn Monitor,
 ) -> Result<Measurement, Cancelled> {
-    let surface = CutSurface::new(Envelope::new(cutter, path), cut, path);
+    let surface = CutSurface::new(Envelope::new(cutters, path), cut, path);
     let bound = asked.error_bound;
     let grid = cut.grid;
     let walls = match facing {
         Some(facing) => {
             let (envelope, reach) =
-                (&surface.envelope, (REACH_OVER_UNCUT * limits.uncut).max(cutter.radius()));
-            let task = WallTask { part, cutter, path, envelope, grid, facing, limits, reach, asked: bound };
+                (&surface.envelope, (REACH_OVER_UNCUT * limits.uncut).max(cutters.greatest_radius()));
+            let task = WallTask { part, cutters, path, envelope, grid, facing, limits, reach, asked: bound };
             Walls::measure(&task, monitor)?
         }
         None => None,
     };
     let inspection = Inspection {
         part,
-        cutter,
+        cutters,
         limits,
         asked: bound,
         most_squares: asked.most_squares,
         surface: &surface,
+        meetings: &Meetings::new(&surface, cutters, path, None),
         grid,
         walls: walls.as_ref(),
     };
@@ -83,7 +85,7 @@ pub fn measure_with_walls(
     let highest_ridge = found.ridges.highest_sample();
     let lean = found.least_lean;
     let hidden = found.ridges.hidden.clone();
-    let pairs = pair_figures(part, cutter, path, std::mem::take(&mut found.ridges.pairs), monitor)?;
+    let pairs = pair_figures(part, cutters, path, std::mem::take(&mut found.ridges.pairs), monitor)?;
     let mut above = std::mem::take(&mut found.ridges.above);
     above.extend(
         borders(&inspection, &found.samples).into_iter().filter(|place| place.height > limits.scallop),
@@ -101,9 +103,9 @@ pub fn measure_with_walls(
         refined: CloserLook::default(),
     };
     let mut hiding = Vec::new();
-    if unseen_depth(cutter, cut.grid.cell, lean.max(LEAST_LEAN)) > bound {
+    if most_unseen(cutters, cut.grid.cell, lean.max(LEAST_LEAN)) > bound {
         let known = measured.gouge.max_depth_mm + bound;
-        hiding = dips(part, cutter, path, cut.grid.cell, known, monitor)?;
+        hiding = dips(part, cutters, path, cut.grid.cell, known, monitor)?;
     }
     let refinement = Refinement { coarse: &inspection, path, asked, highest_ridge };
     measured.refined = refinement.run(&hidden, &hiding, &mut measured, monitor)?;
@@ -167,14 +169,14 @@ fn drop_disproved_ridges(measured: &mut Measurement, ridges: &Ridges) {
 fn raise_highest_ridge(measured: &mut Measurement, inspection: &Inspection<'_>, path: &Toolpath) {
     /// Two passes leave equally much where their heights differ by no more than this share of it.
     const EQUAL: f64 = 0.05;
-    let Inspection { part, cutter, surface, .. } = *inspection;
+    let Inspection { part, cutters, surface, .. } = *inspection;
     let (reached, scallop) = (measured.excess.reached, &mut measured.scallop);
     let place = reached.at_mm.filter(|_| reached.max_mm > scallop.max_mm.unwrap_or(0.0));
     let Some(design) = place.and_then(|[x, y, _]| part.highest_at(x, y)) else { return };
     let top = design.point + design.normal * reached.max_mm;
     let all: Vec<u32> = (0..path.len() as u32).collect();
     let Some((z, by)) = surface.envelope.lowest(top.x, top.y, &all) else { return };
-    let tracks = Tracks::new(path, cutter);
+    let tracks = Tracks::new(path, cutters);
     let other = |&k: &u32| {
         let equal = |height: f64| height - z <= EQUAL * reached.max_mm;
         tracks.apart(by, k) && surface.envelope.height(k, top.x, top.y).is_some_and(equal)

@@ -2,14 +2,14 @@
 //!
 //! Enters: the cut surface, and a line on whose ends it is known which move is lowest. Leaves: every
 //! place on the line where the lowest move changes from one track to another, mm. Moves that are
-//! lowest only between the ends are found on the way.
+//! lowest only between the ends are found on the way. Where passes are nearer to each other than cells, no cell may have seen
+//! the pass between two others; so the tracks beside each meeting are asked, too.
 
 use super::cut_surface::{CutPoint, CutSurface};
 use super::tracks::Tracks;
-use cutter::Cutter;
-use geometry::Point2;
-use motion::Toolpath;
-use sim::NOT_CUT;
+use geometry::{Point2, Vector2};
+use motion::{Cutters, Toolpath};
+use sim::{Grid, MoveBins, NOT_CUT};
 
 /// Two heights that differ by more than this, mm, do not meet.
 const MEETING: f64 = 1e-6;
@@ -23,6 +23,13 @@ const CROSSING: f64 = 1e-10;
 /// What stands before an edge is asked for at this share of the line before it: more than [`CROSSING`].
 /// Gaps narrower than this are not seen.
 const EDGE: f64 = 1e-6;
+
+/// Between two tracks the cut of a third is half as wide as they are apart. So where they are farther apart than two cells, cells
+/// saw it; on curved parts it may be narrower.
+const HIDDEN_WITHIN: f64 = 3.0;
+
+/// Cells along the side of a bin of tracks.
+const CELLS_PER_BIN: usize = 4;
 
 /// A place where two cuts are equally high and none is lower.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,6 +48,8 @@ pub struct Meeting {
 pub struct Meetings<'a> {
     surface: &'a CutSurface<'a>,
     tracks: Tracks<'a>,
+    /// The moves by the places of their tips.
+    tips: MoveBins,
     /// Height of flat stock whose rim counts as a ridge, mm.
     stock: Option<f64>,
 }
@@ -48,8 +57,20 @@ pub struct Meetings<'a> {
 impl<'a> Meetings<'a> {
     /// On the surface that `path` has cut. With a height of `stock` the line along which a cut meets
     /// flat stock counts too.
-    pub fn new(surface: &'a CutSurface<'a>, cutter: &Cutter, path: &'a Toolpath, stock: Option<f64>) -> Self {
-        Self { surface, tracks: Tracks::new(path, cutter), stock }
+    pub fn new(
+        surface: &'a CutSurface<'a>,
+        cutters: impl Into<Cutters>,
+        path: &'a Toolpath,
+        stock: Option<f64>,
+    ) -> Self {
+        let tracks = Tracks::new(path, cutters);
+        let Grid { origin, cell, nx, ny } = surface.cut.grid;
+        // A tip stands aside of its cut by no more than the radius.
+        let margin = (tracks.cutters().greatest_radius() / cell).ceil() as usize + 1;
+        let origin = origin - Vector2::new(cell, cell) * margin as f64;
+        let around = Grid { origin, cell, nx: nx + 2 * margin, ny: ny + 2 * margin };
+        let tips = MoveBins::new(&around, CELLS_PER_BIN, 0.5 * HIDDEN_WITHIN * cell, path);
+        Self { surface, tracks, tips, stock }
     }
 
     /// True when two moves belong to neighbouring tracks rather than to one.
@@ -58,6 +79,11 @@ impl<'a> Meetings<'a> {
             return a != b && self.stock.is_some();
         }
         self.tracks.apart(a, b)
+    }
+
+    /// The moves whose tips pass near a place of the plan.
+    pub(crate) fn passing(&self, tip: Point2) -> &[u32] {
+        self.tips.at(tip)
     }
 
     /// Hands to `found` the meetings between `a`, lowest at the share `ta` of the line `at`, and `b`,
@@ -106,6 +132,7 @@ impl<'a> Meetings<'a> {
             let beside = self.surface.follow(CutPoint { z, by }, q.x, q.y);
             lowest = if beside.z < lowest.z { beside } else { lowest };
         }
+        lowest = self.hidden(q, za.max(zb), [a, b]).filter(|hidden| hidden.z < lowest.z).unwrap_or(lowest);
         // Another move is lower at the crossing: it stands between the two.
         let third = lowest.z < za.min(zb) - 1e-9 && lowest.by != a && lowest.by != b;
         if third && depth > 0 && self.surface.pass(lowest.by).is_some() {
@@ -123,6 +150,22 @@ impl<'a> Meetings<'a> {
             // A cutter with a flat ends in a wall: the ridge is its edge.
             found(Meeting { t, at: q, z: za.min(zb), moves: [a, b] });
         }
+    }
+
+    /// The lowest cut at a place where two tracks meet that are so near to each other that no cell may have seen another between
+    /// them.
+    fn hidden(&self, q: Point2, z: f64, moves: [u32; 2]) -> Option<CutPoint> {
+        let envelope = &self.surface.envelope;
+        let tip = |by: u32| {
+            let cut = if by == NOT_CUT { None } else { envelope.height_and_normal(by, q.x, q.y) };
+            cut.map(|(_, normal)| q + self.tracks.cutters().of_move(by).contact_to_tip(&normal).xy())
+        };
+        let [a, b] = [tip(moves[0])?, tip(moves[1])?];
+        if (b - a).norm() > HIDDEN_WITHIN * self.surface.cut.grid.cell {
+            return None;
+        }
+        let (lowest, by) = envelope.lowest(q.x, q.y, self.passing(a + (b - a) * 0.5))?;
+        (lowest < z).then_some(CutPoint { z: lowest, by })
     }
 
     /// Height of the cut of `by`, infinite where it does not pass.
@@ -173,5 +216,59 @@ impl<'a> Meetings<'a> {
             }
         }
         0.5 * (ta + tb)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::figures::Limits;
+    use crate::flat_scene::{path, plane};
+    use crate::{Asked, measure};
+    use cutter::Cutter;
+    use geometry::Point3;
+    use sim::{Grid, ZMap, cut};
+    use work::monitor::Silent;
+
+    /// Passes about as far apart as the cells, and much nearer: every one of them leaves its ridge, though no cell saw it.
+    #[test]
+    fn passes_that_no_cell_saw_leave_their_ridges() {
+        let ([x, y], cell) = ([6.0, 5.0], 0.1);
+        let (part, ball) = (plane([x, y]), Cutter::ball(6.0).unwrap());
+        let limits = Limits { scallop: 0.01, gouge: 0.005, uncut: 0.05, chord: 0.001 };
+        for step in [0.031, 0.06, 0.09, 0.093, 0.0951, 0.097, 0.0999, 0.1, 0.1003, 0.103, 0.107, 0.11, 0.15] {
+            let passes = (-2..=(y / step) as i32 + 3).map(|k| {
+                let y = step * f64::from(k);
+                [[-5.0, 9.0], [-5.0, 0.0], [11.0, 0.0], [11.0, 9.0]]
+                    .map(|[x, z]| Point3::new(x, y, z))
+                    .to_vec()
+            });
+            let path = path(&passes.collect::<Vec<_>>());
+            let grid = Grid::covering(&part.bounds(), cell, 64, 1 << 30).unwrap();
+            let cut = cut(ZMap::block(grid, 1.0), &ball, &path, &Silent).unwrap();
+            let asked = Asked {
+                error_bound: 5e-4,
+                stock_top: 1.0,
+                borders: true,
+                most_cells: 1 << 20,
+                most_squares: 1 << 20,
+            };
+            let found = measure(&part, &ball, &path, &cut, &limits, &asked, &Silent).unwrap();
+            let (scallop, closed) = (&found.scallop, 3.0 - (9.0f64 - 0.25 * step * step).sqrt());
+            for height in [scallop.max_mm, scallop.p95_mm, scallop.p50_mm, scallop.mean_mm] {
+                assert!((height.unwrap() - closed).abs() < 1e-8, "{step}: {closed} {scallop:?}");
+            }
+            // A ridge counts where it crosses from cell to cell: from the first centre to the last.
+            let length = x * (y - cell) / step;
+            assert!((scallop.ridge_length_mm / length - 1.0).abs() < 0.03, "{step}: {length} {scallop:?}");
+            assert_eq!(scallop.over_target_fraction, Some(0.0));
+            // Heights of parabolas between ridges.
+            let rms = closed / 5f64.sqrt();
+            assert!(
+                (found.deviation.rms_mm.unwrap() / rms - 1.0).abs() < 0.02,
+                "{step}: {rms} {:?}",
+                found.deviation
+            );
+            assert!(found.excess.highest.max_mm <= closed + 1e-6, "{step}: {:?}", found.excess);
+        }
     }
 }

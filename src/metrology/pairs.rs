@@ -24,7 +24,7 @@ use serde::Serialize;
 use calculator::{Calculated, Calculator};
 use cutter::Cutter;
 use geometry::Point3;
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use part::Part;
 use work::monitor::{self, Cancelled, Monitor};
 
@@ -219,12 +219,13 @@ fn first_pairs<S: serde::Serializer>(pairs: &[ScallopPair], to: S) -> Result<S::
 /// [`Cancelled`] when the monitor says so.
 pub(super) fn pair_figures(
     part: &Part,
-    cutter: &Cutter,
+    cutters: &Cutters,
     path: &Toolpath,
     mut tally: PairTally,
     monitor: &dyn Monitor,
 ) -> Result<PairFigures, Cancelled> {
-    let ball = cutter.profile().is_ball();
+    let cutter = cutters.first();
+    let ball = cutter.profile().is_ball() && !cutters.are_several();
     let mut places = if ball { std::mem::take(&mut tally.chosen) } else { Vec::new() };
     if ball {
         places.extend(tally.pairs.values().filter_map(|pair| Some(Chosen::from(pair.highest?))));
@@ -266,7 +267,9 @@ pub(super) fn pair_figures(
         }
     }
     let calculated = all.places > 0;
-    let missing = if !ball {
+    let missing = if cutters.are_several() {
+        Some("heights are calculated for paths of one cutter only")
+    } else if !ball {
         Some(
             "heights are calculated for ball cutters only: others show no circle of their own across the feed",
         )

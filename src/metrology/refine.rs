@@ -15,11 +15,12 @@ use super::cut_surface::CutSurface;
 use super::figures::{CloserLook, Measurement, NUMERICAL_FLOOR};
 use super::inspected::{Inspected, inspect};
 use super::inspection::{Inspection, Within};
+use super::meetings::Meetings;
 use super::ridges::Hidden;
-use super::unseen::{Dip, unseen_depth};
+use super::unseen::{Dip, most_unseen};
 use geometry::Point2;
 use motion::Toolpath;
-use sim::{Envelope, Grid, ZMap, cut};
+use sim::{Envelope, Grid, ZMap, cut, cut_in_turn};
 use work::monitor::{self, Cancelled, Monitor};
 
 /// Cells of the grid along the side of a rectangle. More are cut for nothing around a place; fewer share
@@ -133,7 +134,7 @@ impl Refinement<'_> {
     /// True where a rectangle of cells of `cell` mm (0 before it is cut) may hold more than is known.
     fn open(&self, suspicion: &Suspicion, greatest: &GreatestSoFar, cell: f64) -> bool {
         let asked = self.asked.error_bound;
-        let seen = cell > 0.0 && unseen_depth(self.coarse.cutter, cell, 1.0) <= asked;
+        let seen = cell > 0.0 && most_unseen(self.coarse.cutters, cell, 1.0) <= asked;
         let depth = if seen { suspicion.depth } else { suspicion.deeper };
         suspicion.height > greatest.height.max(self.coarse.limits.uncut) + asked
             || depth > greatest.depth + asked
@@ -209,7 +210,7 @@ impl Refinement<'_> {
             };
             rest.height = hidden;
             // What these cells may have missed in turn.
-            let missed = unseen_depth(self.coarse.cutter, cell, 1.0);
+            let missed = most_unseen(self.coarse.cutters, cell, 1.0);
             rest.deeper = rest.deeper.min(found.gouge.max_depth_mm + found.gouge.error_bound_mm + missed);
             last = Some(found);
             if !self.open(&rest, &now, cell) {
@@ -251,7 +252,7 @@ impl Refinement<'_> {
                 gouge.region_count -= before - gouge.regions.len();
                 gouge.area_mm2 += region.area_mm2;
                 gouge.region_count += 1;
-                gouge.regions.push(*region);
+                gouge.regions.push(region.clone());
             }
         }
         if let (Some(highest), Some(max)) = (found.highest, scallop.max_mm)
@@ -266,10 +267,11 @@ impl Refinement<'_> {
     fn measure(&self, fine: Grid, monitor: &dyn Monitor) -> Result<(Inspected, f64), Cancelled> {
         let (coarse, within) = (self.coarse, Within(monitor));
         let stock = ZMap::block(fine, self.asked.stock_top);
-        let cut = cut(stock, coarse.cutter, self.path, &within)?;
+        let cut = cut_in_turn(cut, stock, coarse.cutters, self.path, &within)?;
         let envelope: Envelope = coarse.surface.envelope.clone();
         let surface = CutSurface::new(envelope, &cut, self.path);
-        let inspection = Inspection { surface: &surface, grid: fine, ..*coarse };
+        let meetings = &Meetings::new(&surface, coarse.cutters, self.path, None);
+        let inspection = Inspection { surface: &surface, meetings, grid: fine, ..*coarse };
         let found = inspect(&inspection, self.path, self.highest_ridge, &within)?;
         let hidden = found.ridges.hidden.iter().map(|place| self.height(place).1).fold(0.0, f64::max);
         Ok((found, hidden))

@@ -25,6 +25,9 @@ pub struct RapidContactFigures {
     pub move_index: u32,
     /// Its line in toolpath.nc, counted from 1.
     pub line: u32,
+    /// Its tool, where the program has several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tool: Option<u32>,
     /// The cell that the cutter touched first, and the height of stock there; by voxels the voxel.
     pub at_mm: [f64; 3],
     /// Greatest height that the move removed at a cell; by voxels at least how far below the surface that stood it cut.
@@ -123,6 +126,7 @@ fn figures(path: &Toolpath, found: &RemovalRecord<'_>) -> RemovalFigures {
         .map(|c| RapidContactFigures {
             move_index: c.move_index,
             line: 0,
+            tool: None,
             at_mm: c.at.into(),
             depth_mm: c.depth,
         })

@@ -3,10 +3,10 @@
 use super::cut_surface::CutSurface;
 use super::figures::{Limits, RidgePlace, ScallopFigures};
 use super::inspection::{Inspection, Sample};
+use super::meetings::Meetings;
 use super::ridges::{RidgeFinder, scallop_figures};
-use cutter::Cutter;
 use geometry::{Point2, Point3, Vector2};
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use part::Part;
 use sim::{Envelope, ZMap};
 use work::monitor::{Cancelled, Monitor};
@@ -27,20 +27,30 @@ pub struct RidgeMap {
 /// down to that. `None` where cells are too coarse for it: a move that none of them saw cuts the highest place away.
 pub(super) fn ridge_map(
     part: &Part,
-    cutter: &Cutter,
+    cutters: &Cutters,
     path: &Toolpath,
     cut: &ZMap,
     limits: &Limits,
     asked: f64,
     monitor: &dyn Monitor,
 ) -> Result<Option<RidgeMap>, Cancelled> {
-    let surface = CutSurface::new(Envelope::new(cutter, path), cut, path);
+    let surface = CutSurface::new(Envelope::new(cutters, path), cut, path);
+    let meetings = &Meetings::new(&surface, cutters, path, None);
     // Nothing is searched between centres.
     let (most_squares, grid) = (0, cut.grid);
-    let inspection =
-        Inspection { part, cutter, limits, asked, most_squares, surface: &surface, grid, walls: None };
+    let inspection = Inspection {
+        part,
+        cutters,
+        limits,
+        asked,
+        most_squares,
+        surface: &surface,
+        meetings,
+        grid,
+        walls: None,
+    };
     let samples = inspection.samples(monitor)?;
-    let finder = RidgeFinder::new(&surface, part, cutter, path, limits);
+    let finder = RidgeFinder::new(&inspection, path);
     let mut ridges = finder.find(&|k| samples[k].deviation, monitor)?;
     let mut above = std::mem::take(&mut ridges.above);
     let scallop = scallop_figures(&ridges.samples, finder.highest(&ridges, asked), limits);
@@ -103,6 +113,7 @@ impl Inspection<'_> {
 mod tests {
     use super::*;
     use crate::flat_scene::{path, plane};
+    use cutter::Cutter;
     use sim::{Grid, cut_reference};
     use work::monitor::Silent;
 
@@ -117,7 +128,7 @@ mod tests {
         let grid = Grid::covering(&part.bounds(), 0.13, 64, 1 << 30).unwrap();
         let cut = cut_reference(&ZMap::block(grid, 1.0), &ball, &path, &Silent).unwrap();
         let limits = Limits { scallop: 0.005, gouge: 0.005, uncut: 0.05, chord: 0.001 };
-        let map = ridge_map(&part, &ball, &path, &cut, &limits, 1e-4, &Silent).unwrap().unwrap();
+        let map = ridge_map(&part, &ball.into(), &path, &cut, &limits, 1e-4, &Silent).unwrap().unwrap();
         let at = |x: f64| {
             let near = map.above.iter().filter(|p| (p.at.x - x).abs() < 1e-3 && p.at.y > 0.5 && p.at.y < 2.5);
             near.map(|p| p.height).fold(0.0, f64::max)

@@ -16,11 +16,11 @@
 
 use super::cut_surface::CutSurface;
 use super::figures::{Limits, NEAR_LIMIT, NUMERICAL_FLOOR, RidgePlace, ScallopFigures};
+use super::inspection::Inspection;
 use super::meetings::{Meeting, Meetings};
 use super::pairs::{PairTally, RidgeCrossing};
-use cutter::Cutter;
 use geometry::{Point2, Point3, Vector2, distance_to_segment};
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use part::{Part, SurfacePoint};
 use sim::Grid;
 use work::monitor::{self, Cancelled, Monitor};
@@ -132,9 +132,9 @@ const FARTHEST_CONTACT: f64 = 2.0;
 pub(super) struct RidgeFinder<'a> {
     pub surface: &'a CutSurface<'a>,
     pub part: &'a Part,
-    pub cutter: &'a Cutter,
+    pub cutters: &'a Cutters,
     pub limits: &'a Limits,
-    meetings: Meetings<'a>,
+    meetings: &'a Meetings<'a>,
     path: &'a Toolpath,
 }
 
@@ -166,15 +166,9 @@ impl GridLine {
 }
 
 impl<'a> RidgeFinder<'a> {
-    pub fn new(
-        surface: &'a CutSurface<'a>,
-        part: &'a Part,
-        cutter: &'a Cutter,
-        path: &'a Toolpath,
-        limits: &'a Limits,
-    ) -> Self {
-        let meetings = Meetings::new(surface, cutter, path, None);
-        Self { surface, part, cutter, limits, meetings, path }
+    pub fn new(inspection: &Inspection<'a>, path: &'a Toolpath) -> Self {
+        let Inspection { surface, part, cutters, limits, meetings, .. } = *inspection;
+        Self { surface, part, cutters, limits, meetings, path }
     }
 
     /// All ridges, row by row. `deviation` is that of a cell, mm, NaN where it is not measured.
@@ -233,7 +227,7 @@ impl<'a> RidgeFinder<'a> {
     /// The samples by the passes that meet; those on every so many lines of either family are to be calculated too.
     fn pairs(&self, samples: &[RidgeSample]) -> PairTally {
         let grid = &self.surface.cut.grid;
-        let one_in = PairTally::one_in(self.cutter, grid.cell);
+        let one_in = PairTally::one_in(self.cutters.first(), grid.cell);
         let mut tally = PairTally::default();
         for sample in samples {
             let (cell, along_x) = sample.from;
@@ -359,10 +353,11 @@ impl RidgeFinder<'_> {
     /// sides: one of them touches it, and not much farther away than the passes lie apart. Else it
     /// stands in a hollow that the cutter does not fit, and is material that no pass reached.
     fn is_scallop(&self, moves: [u32; 2], foot: &SurfacePoint) -> bool {
-        let from_contact = self.cutter.contact_to_tip(&foot.normal);
-        let tips = moves.map(|by| self.surface.nearest_tip(by, &(foot.point + from_contact)));
+        let from_contact = moves.map(|by| self.cutters.of_move(by).contact_to_tip(&foot.normal));
+        let tip = |k: usize| self.surface.nearest_tip(moves[k], &(foot.point + from_contact[k]));
+        let tips = [tip(0), tip(1)];
         let far = FARTHEST_CONTACT * (tips[0] - tips[1]).norm();
-        tips.iter().any(|tip| {
+        tips.iter().zip(&from_contact).any(|(tip, from_contact)| {
             let contact = tip - from_contact;
             (contact - foot.point).norm() <= far && self.part.closest_point(&contact).1 <= self.limits.uncut
         })

@@ -21,9 +21,8 @@ use serde::Serialize;
 use super::along_normals::{AlongNormal, NormalHit};
 use super::figures::NUMERICAL_FLOOR;
 use super::tracks::Tracks;
-use cutter::Cutter;
 use geometry::{Point3, Vector3};
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use part::Part;
 use work::monitor::{self, Cancelled, Monitor};
 
@@ -93,13 +92,13 @@ pub struct RoughnessFigures {
 /// [`Cancelled`] when the monitor says so.
 pub fn roughness(
     part: &Part,
-    cutter: &Cutter,
+    cutters: impl Into<Cutters>,
     path: &Toolpath,
     engine: &dyn AlongNormal,
     interval: f64,
     monitor: &dyn Monitor,
 ) -> Result<RoughnessFigures, Cancelled> {
-    let tracks = Tracks::new(path, cutter);
+    let tracks = Tracks::new(path, cutters);
     let step = interval / STEPS;
     if !(step.is_finite() && step > 0.0) {
         return Ok(RoughnessFigures {

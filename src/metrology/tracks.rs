@@ -1,8 +1,7 @@
 //! Which moves belong to neighbouring tracks rather than to one.
 
-use cutter::Cutter;
 use geometry::Point3;
-use motion::{MoveKind, Toolpath};
+use motion::{Cutters, MoveKind, Toolpath};
 
 /// Two moves of one pass that lie farther apart along the path than this many cutter radii are
 /// neighbouring turns of a spiral or loop, not neighbouring chords.
@@ -18,12 +17,11 @@ pub(crate) struct Tracks<'a> {
     along: Vec<f64>,
     /// Length of each pass that ends where it began, mm.
     closed: Vec<Option<f64>>,
-    /// Moves of one pass farther apart than this are of two tracks, mm.
-    same_track: f64,
+    cutters: Cutters,
 }
 
 impl<'a> Tracks<'a> {
-    pub fn new(path: &'a Toolpath, cutter: &Cutter) -> Self {
+    pub fn new(path: &'a Toolpath, cutters: impl Into<Cutters>) -> Self {
         let mut along = Vec::with_capacity(path.len());
         let (mut length, mut closed) = (0.0, vec![None; path.passes()]);
         // Where the pass of the moves so far began to cut: the way to there, and the place.
@@ -41,7 +39,12 @@ impl<'a> Tracks<'a> {
             length += (to - from).norm();
             along.push(length);
         }
-        Self { path, along, closed, same_track: SAME_TRACK * cutter.radius() }
+        Self { path, along, closed, cutters: cutters.into() }
+    }
+
+    /// What makes the moves.
+    pub fn cutters(&self) -> &Cutters {
+        &self.cutters
     }
 
     /// The passes of two moves, in order.
@@ -57,7 +60,9 @@ impl<'a> Tracks<'a> {
         let way = (self.along[a as usize] - self.along[b as usize]).abs();
         // The end of a closed pass goes on in its start.
         let round = self.closed[x.pass as usize].filter(|_| x.pass == y.pass);
-        let far = round.map_or(way, |round| way.min((round - way).abs())) > self.same_track;
+        // Moves of one pass are made by one cutter.
+        let same_track = SAME_TRACK * self.cutters.of_move(a).radius();
+        let far = round.map_or(way, |round| way.min((round - way).abs())) > same_track;
         (x.pass != y.pass && !linked) || far
     }
 }

@@ -5,7 +5,7 @@
 
 use cutter::Cutter;
 use geometry::{Point2, Point3};
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use part::Part;
 use work::monitor::{self, Cancelled, Monitor};
 
@@ -27,11 +27,16 @@ const BESIDE: f64 = 0.1;
 /// How deep the cutter may dip into a surface between centres `cell` mm apart and none of them be in the
 /// dip: w²/8r for a corner of radius r, w the diagonal of a cell along a surface whose
 /// normal has the vertical part `lean`. Edges and points may be as deep as half of w.
-pub(super) fn unseen_depth(cutter: &Cutter, cell: f64, lean: f64) -> f64 {
+fn unseen_depth(cutter: &Cutter, cell: f64, lean: f64) -> f64 {
     let (width, corner) = (cell * std::f64::consts::SQRT_2 / lean, cutter.corner_radius());
     let rounded = corner > 0.0 && cutter.profile().is_plain();
     let arc = if rounded { width * width / (8.0 * corner) } else { f64::INFINITY };
     arc.min(0.5 * width)
+}
+
+/// The greatest [`unseen_depth`] of some cutters.
+pub(super) fn most_unseen(cutters: &Cutters, cell: f64, lean: f64) -> f64 {
+    cutters.greatest(|cutter| unseen_depth(cutter, cell, lean))
 }
 
 /// A place where the cutter stands in the design.
@@ -49,7 +54,7 @@ pub(super) struct Dip {
 /// `known` mm, the deepest of each move.
 pub(super) fn dips(
     part: &Part,
-    cutter: &Cutter,
+    cutters: &Cutters,
     path: &Toolpath,
     pitch: f64,
     known: f64,
@@ -63,6 +68,7 @@ pub(super) fn dips(
             return Ok(None);
         }
         let length = (to - from).norm();
+        let cutter = cutters.of_move(k as u32);
         let at = |share: f64| dip_at(part, cutter, &(from + (to - from) * share));
         let steps = (length / pitch).ceil().clamp(2.0, MOST_ON_A_MOVE);
         let deepest = dips_between(&at, length, [0.0, 1.0], steps as usize, known, MOST_LOOKS)
@@ -158,10 +164,10 @@ mod tests {
         let touching = foot.point + cutter.contact_to_tip(&foot.normal);
         // From 2 mm above the design to 0.25 mm in it.
         let path = path_through([touching + foot.normal * 2.0, touching - foot.normal * 0.25]);
-        let found = dips(&part, &cutter, &path, 0.1, 0.1, &Silent).unwrap();
+        let found = dips(&part, &cutter.into(), &path, 0.1, 0.1, &Silent).unwrap();
         assert!(found.len() == 1 && (found[0].depth - 0.25).abs() < 1e-9, "{found:?}");
         assert!((found[0].at - Point2::new(9.0, 11.0)).norm() < 1e-6);
-        assert!(dips(&part, &cutter, &path, 0.1, 0.4, &Silent).unwrap().is_empty());
+        assert!(dips(&part, &cutter.into(), &path, 0.1, 0.4, &Silent).unwrap().is_empty());
     }
 
     /// Depths along a move that plunges to just the surface, and of one that passes over a crest between two places.

@@ -7,11 +7,15 @@
 //! holder.
 
 mod beside;
+mod cutters;
+mod in_turn;
 mod path;
 mod tool_axis;
 mod written;
 
 pub use beside::{Beside, PassStretches};
+pub use cutters::{Cutters, Stretch};
+pub use in_turn::PathsInTurn;
 pub use path::{CcPoint, ClPoint, Move, MoveKind, Origin, Toolpath};
 pub use tool_axis::{AxisError, ToolAxis, in_tool_frame, location};
 pub use written::{DECIMALS, ROUNDING, in_last_decimals};

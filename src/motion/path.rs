@@ -1,5 +1,7 @@
 //! The words of a path: contact, location, move, toolpath. mm; feed in mm/min.
 
+use std::ops::Range;
+
 use geometry::{Point3, Vector3};
 
 /// Cutter contact: where the cutter touches the design surface.
@@ -82,13 +84,13 @@ pub struct Move {
 pub struct Origin {
     /// The file of the program; empty for one that is written from the moves.
     pub program: String,
-    /// Number of the tool; 0 where no program names one.
-    pub tool: u32,
+    /// The first moves of the tools and their numbers, in order; empty where no program names one.
+    pub tools: Vec<(u32, u32)>,
     /// The line of each move, counted from 1; empty where there is no program.
     pub lines: Vec<u32>,
 }
 
-/// A program for one cutter: a start and the moves from there.
+/// A start and the moves from there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Toolpath {
     /// Where the tip is before the first move.
@@ -110,9 +112,32 @@ impl Toolpath {
         self.origin.lines.get(move_index).copied()
     }
 
+    /// The number of the tool that makes a move; `None` where no program names one.
+    pub fn tool_of(&self, move_index: usize) -> Option<u32> {
+        let tools = &self.origin.tools;
+        let before = tools.partition_point(|(first, _)| *first as usize <= move_index).checked_sub(1)?;
+        Some(tools[before].1)
+    }
+
+    /// As [`Toolpath::tool_of`], where there are several tools; `None` where it goes without saying.
+    pub fn named_tool_of(&self, move_index: usize) -> Option<u32> {
+        if self.origin.tools.len() > 1 { self.tool_of(move_index) } else { None }
+    }
+
     /// What messages call the program that the lines are of.
     pub fn program_name(&self) -> &str {
         if self.origin.program.is_empty() { "toolpath.nc" } else { &self.origin.program }
+    }
+
+    /// Some of its moves, as a path that begins where they do.
+    pub fn part(&self, moves: Range<usize>) -> Self {
+        let lines = self.origin.lines.get(moves.clone()).unwrap_or_default().to_vec();
+        let before = self.origin.tools.partition_point(|(first, _)| *first as usize <= moves.start);
+        let shown = self.origin.tools.get(before.saturating_sub(1)..).unwrap_or_default().iter();
+        let within = shown.take_while(|(first, _)| (*first as usize) < moves.end);
+        let tools = within.map(|(first, tool)| (first.saturating_sub(moves.start as u32), *tool)).collect();
+        let origin = Origin { program: self.origin.program.clone(), tools, lines };
+        Self { start: self.location_before(moves.start), moves: self.moves[moves].to_vec(), origin }
     }
 
     /// Number of moves.

@@ -137,8 +137,17 @@ impl Program {
 
     /// The tools in the order of their first motion.
     pub fn tools_in_use(&self) -> Vec<u32> {
+        self.tools_of(|kind| kind != StepKind::Set)
+    }
+
+    /// The tools in the order of their first feed.
+    pub fn tools_that_feed(&self) -> Vec<u32> {
+        self.tools_of(|kind| matches!(kind, StepKind::Feed | StepKind::Arc(_)))
+    }
+
+    fn tools_of(&self, counts: impl Fn(StepKind) -> bool) -> Vec<u32> {
         let mut tools = Vec::new();
-        for step in self.steps.iter().filter(|step| step.kind != StepKind::Set) {
+        for step in self.steps.iter().filter(|step| counts(step.kind)) {
             let tool = self.setting(step).tool;
             if tools.last() != Some(&tool) && !tools.contains(&tool) {
                 tools.push(tool);

@@ -87,7 +87,7 @@ impl Run {
     }
 
     fn finished(self, program: &str) -> ToolRun {
-        let origin = Origin { tool: self.tool, program: program.to_owned(), ..self.path.origin };
+        let origin = Origin { tools: vec![(0, self.tool)], program: program.to_owned(), ..self.path.origin };
         ToolRun { tool: self.tool, path: Toolpath { origin, ..self.path } }
     }
 

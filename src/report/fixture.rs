@@ -22,7 +22,14 @@ struct Measured {
 /// A clean surface but for one gouge of the given depth, mm.
 fn measurement(gouge: f64) -> Measured {
     let at_mm = [12.5, 7.25, -1.0 - gouge];
-    let region = GougeRegion { depth_mm: gouge, area_mm2: 0.25, at_mm, move_index: 1234, line: 1240 };
+    let region = GougeRegion {
+        depth_mm: gouge,
+        area_mm2: 0.25,
+        at_mm,
+        move_index: 1234,
+        line: 1240,
+        ..GougeRegion::default()
+    };
     let regions = if gouge > LIMITS.gouge { vec![region] } else { Vec::new() };
     Measured {
         scallop: ScallopFigures {

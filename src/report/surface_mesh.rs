@@ -1,7 +1,7 @@
 //! The cut stock as a closed triangle mesh, fine where the surface bends, coarse where it is flat,
 //! with its ridges along edges.
 //!
-//! Enters: the cut map, and the cutter and path that cut it. Leaves: vertices in mm, triangles
+//! Enters: the cut map, and the cutters and path that cut it. Leaves: vertices in mm, triangles
 //! counter-clockwise seen from outside. The top is a hierarchy of right triangles over the cell
 //! centres ([`network`]). Where two neighbouring centres were cut by different passes, the cuts are
 //! brought to intersection in closed form ([`ridge_points`]), and a side that crosses such a ridge is
@@ -18,9 +18,8 @@ mod tests;
 
 use std::collections::HashMap;
 
-use cutter::Cutter;
 use geometry::Point3;
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use network::{Network, Scratch};
 use part::Part;
 use ridge_points::RidgePoints;
@@ -105,7 +104,7 @@ type Node = (usize, usize);
 /// [`SurfaceMesh::tolerance`] that `max_triangles` allows, if that is greater.
 pub fn surface_mesh(
     cut: &ZMap,
-    cutter: &Cutter,
+    cutters: &Cutters,
     path: &Toolpath,
     bottom: f64,
     tolerance: f64,
@@ -114,7 +113,7 @@ pub fn surface_mesh(
     if cut.grid.nx < 2 || cut.grid.ny < 2 {
         return None;
     }
-    let ridges = RidgePoints::find(cut, cutter, path);
+    let ridges = RidgePoints::find(cut, cutters, path);
     let wanted = tolerance.max(LEAST_TOLERANCE);
     let lowest = cut.height.iter().copied().fold(f32::INFINITY, f32::min);
     let highest = cut.height.iter().copied().fold(f32::NEG_INFINITY, f32::max);

@@ -72,7 +72,7 @@ pub(super) fn at_times(
         );
         return Err(refused("strategy", what, "delete this toolpath"));
     }
-    if let Some(key) = ["stepover", "scallop", "correct"].into_iter().find(|key| section.has(key)) {
+    if let Some(key) = ["stepover", "scallop", "correct", "stock"].into_iter().find(|key| section.has(key)) {
         let what = format!("`{key}` does not apply where [compare] plans for a machining time");
         return Err(refused(key, what, "delete it"));
     }

@@ -1,4 +1,4 @@
-//! Programs from elsewhere: their files as paths of one tool.
+//! Programs from elsewhere: their files as paths of one tool, or of all.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -6,15 +6,15 @@ use std::sync::Arc;
 
 use super::named_file::NamedFile;
 use super::{Scene, ToolpathRequest};
-use cutter::Cutter;
+use cutter::{Cutter, Holder};
 use io::regular;
 use keys::{SceneError, SceneText};
-use motion::{Move, MoveKind, Toolpath};
+use motion::{Cutters, MoveKind, PathsInTurn, Toolpath};
 use program::{
     Control, Finding, Placing, Program, ProgramError, Setup, ToolRun, ToolTable, looks_like_apt, read_apt,
     read_gcode,
 };
-use toolpath::{ForeignProgram, ReadProgram};
+use toolpath::{ForeignProgram, ReadProgram, ToolsMeant};
 
 /// Largest program that is read, bytes: some twenty million lines.
 const MAX_BYTES: u64 = 1 << 29;
@@ -47,6 +47,10 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
         file.path.file_name().map_or_else(|| file.written.clone(), |n| n.to_string_lossy().into_owned());
     let table = match request.directions.get(1) {
         Some(tools) => table(tools, scene)?,
+        // Their radii shift the path where it is compensated.
+        None if foreign.tools_meant == ToolsMeant::All => {
+            described(&name, &bytes, control).map_err(refused)?.0
+        }
         None => ToolTable::default(),
     };
     let lengths: BTreeMap<u32, f64> =
@@ -66,16 +70,20 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
     let length = |tool: u32| lengths.get(&tool).copied().filter(|_| !is_apt);
     let placing = Placing { chord: scene.tolerance.chord, kinematics, lengths: &length };
     let runs = read.runs(&placing).map_err(refused)?;
-    let tool = chosen(foreign.tool, &read, &runs)
-        .map_err(|(message, cure)| scene.source.error(file.span.clone(), message, cure))?;
+    let refused = |(message, cure): (String, String)| scene.source.error(file.span.clone(), message, cure);
     let described = if table.tools.is_empty() { ToolTable::of_remarks(&read) } else { table };
-    let others = Others::of(&runs, tool, &described);
-    let path = joined(runs.into_iter().filter(|run| run.tool == tool));
-    let findings: Vec<Finding> =
-        read.findings(&length).into_iter().filter(|found| found.tool == tool || found.tool == 0).collect();
-    let Others { before, unknown_before, any } = others;
-    let notes = notes(&read);
-    let read = ReadProgram { path, before, unknown_before, others: any, findings, notes };
+    let (mut findings, notes) = (read.findings(&length), notes(&read));
+    let read = if foreign.tools_meant == ToolsMeant::All {
+        let path = joined(known(&read, runs, &described).map_err(refused)?.into_iter());
+        let tools = tools_of(&path, &described);
+        ReadProgram { path, tools, before: Vec::new(), unknown_before: false, others: false, findings, notes }
+    } else {
+        let tool = chosen(foreign.tools_meant, &read, &runs).map_err(refused)?;
+        let Others { before, unknown_before, any } = Others::of(&runs, tool, &described);
+        let path = joined(runs.into_iter().filter(|run| run.tool == tool));
+        findings.retain(|found: &Finding| found.tool == tool || found.tool == 0);
+        ReadProgram { path, tools: None, before, unknown_before, others: any, findings, notes }
+    };
     request.strategy = Box::new(ForeignProgram { read: Some(Arc::new(read)), ..foreign.clone() });
     Ok(())
 }
@@ -122,7 +130,7 @@ pub fn tool_table(path: &Path) -> Result<ToolTable, TableError> {
     ToolTable::read(&SceneText::new(name, text)).map_err(TableError::Fault)
 }
 
-/// The tools that a program of G-code describes in its comments, and those that it uses.
+/// The tools that a program of G-code describes in its comments, and those that feed in it.
 ///
 /// # Errors
 /// [`TableError`] where it cannot be read.
@@ -130,15 +138,19 @@ pub fn described_tools(path: &Path, control: &str) -> Result<(ToolTable, Vec<u32
     let bytes = regular::read(path, MAX_BYTES).map_err(|e| TableError::Unreadable(e.to_string()))?;
     let control = Control::from_word(control).unwrap_or(program::GENERAL_CONTROL);
     let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    described(&name, &bytes, control).map_err(|error| TableError::Fault(in_text(&error, &bytes)))
+}
+
+fn described(
+    name: &str,
+    bytes: &[u8],
+    control: &'static Control,
+) -> Result<(ToolTable, Vec<u32>), ProgramError> {
     // The radius of a cutter moves no tool from its place in the list.
     let setup = Setup { any_radius: Some(0.0), ..Setup::from_above(MACHINE_ZERO_ABOVE) };
-    let read = if looks_like_apt(&bytes) {
-        read_apt(&name, &bytes)
-    } else {
-        read_gcode(&name, &bytes, control, &setup)
-    };
-    let read = read.map_err(|error| TableError::Fault(in_text(&error, &bytes)))?;
-    Ok((ToolTable::of_remarks(&read), read.tools_in_use()))
+    let read =
+        if looks_like_apt(bytes) { read_apt(name, bytes) } else { read_gcode(name, bytes, control, &setup) }?;
+    Ok((ToolTable::of_remarks(&read), read.tools_that_feed()))
 }
 
 /// The fault shown in the text of the program, where that can be shown.
@@ -151,15 +163,56 @@ fn in_text(error: &ProgramError, bytes: &[u8]) -> SceneError {
     source.error(at..at + 1, message, error.cure())
 }
 
-/// The tool whose moves are meant; else what is wrong, and the cure.
-fn chosen(asked: Option<u32>, read: &Program, runs: &[ToolRun]) -> Result<u32, (String, String)> {
+/// The runs of all tools that cut; else what is wrong, and the cure. Tools without a cutter that only travel are left out.
+fn known(read: &Program, runs: Vec<ToolRun>, table: &ToolTable) -> Result<Vec<ToolRun>, (String, String)> {
+    if runs.is_empty() {
+        return Err(nothing(read));
+    }
+    let missing =
+        |run: &&ToolRun| feeds(std::slice::from_ref(*run), run.tool) && table.get(run.tool).is_none();
+    if let Some(ToolRun { tool, path }) = runs.iter().find(missing) {
+        let fed = path.moves.iter().position(|step| step.kind != MoveKind::Rapid).unwrap_or_default();
+        let line = path.line_of(fed).unwrap_or_default();
+        let message =
+            format!("no cutter is known for tool {tool}, which feeds in line {line} of {}", read.name);
+        let cure = if *tool == 0 {
+            "begin with a tool change such as `T1 M6`".to_owned()
+        } else {
+            format!("describe tool {tool} in a table of tools, or name the one tool that is to be measured")
+        };
+        return Err((message, cure));
+    }
+    let known: Vec<ToolRun> = runs.into_iter().filter(|run| table.get(run.tool).is_some()).collect();
+    if known.is_empty() { Err(nothing(read)) } else { Ok(known) }
+}
+
+/// The cutters of a path's tools and what holds them, by a table that knows them all.
+fn tools_of(path: &Toolpath, table: &ToolTable) -> Option<(Cutters, Vec<Option<Holder>>)> {
+    let known = |(first, number): &(u32, u32)| table.get(*number).map(|tool| (*first, tool));
+    let mut tools = path.origin.tools.iter().filter_map(known);
+    let (_, first) = tools.next()?;
+    let (mut cutters, mut holders) = (Cutters::from(first.cutter), vec![first.holder.clone()]);
+    for (move_index, tool) in tools {
+        cutters = cutters.then(move_index, tool.cutter);
+        holders.push(tool.holder.clone());
+    }
+    Some((cutters, holders))
+}
+
+fn nothing(read: &Program) -> (String, String) {
+    (
+        format!("the program {} moves nothing", read.name),
+        "name a program with motion such as G1 X10 F100".to_owned(),
+    )
+}
+
+/// The one tool whose moves are meant; else what is wrong, and the cure.
+fn chosen(meant: ToolsMeant, read: &Program, runs: &[ToolRun]) -> Result<u32, (String, String)> {
     let tools = read.tools_in_use();
     let listed = tools.iter().map(|tool| format!("T{tool}")).collect::<Vec<_>>().join(", ");
+    let asked = if let ToolsMeant::Number(tool) = meant { Some(tool) } else { None };
     match (asked, &tools[..]) {
-        (_, []) => Err((
-            format!("the program {} moves nothing", read.name),
-            "name a program with motion such as G1 X10 F100".to_owned(),
-        )),
+        (_, []) => Err(nothing(read)),
         (Some(tool), _) if runs.iter().any(|run| run.tool == tool) => Ok(tool),
         (Some(tool), _) => Err((
             format!("the program {} does not use tool {tool}", read.name),
@@ -177,7 +230,7 @@ fn chosen(asked: Option<u32>, read: &Program, runs: &[ToolRun]) -> Result<u32, (
                         read.name
                     ),
                     format!(
-                        "write `tool = {}` for the tool that is the scene's cutter",
+                        "write `tool = {}` for the tool that is the scene's cutter, or `tool = \"all\"` with a table of tools",
                         tools[tools.len() - 1]
                     ),
                 )),
@@ -211,28 +264,16 @@ fn feeds(runs: &[ToolRun], tool: u32) -> bool {
     of_tool.flat_map(|run| &run.path.moves).any(|step| step.kind != MoveKind::Rapid)
 }
 
-/// The runs of one tool as one path. Between runs the tool is away; it comes back from above all of the path.
-fn joined(runs: impl Iterator<Item = ToolRun>) -> Toolpath {
-    let mut runs = runs;
-    let Some(ToolRun { mut path, .. }) = runs.next() else {
+/// Runs as one path.
+fn joined(mut runs: impl Iterator<Item = ToolRun>) -> Toolpath {
+    let Some(ToolRun { path, .. }) = runs.next() else {
         return Toolpath::new(motion::ClPoint::upright(geometry::Point3::origin()), Vec::new());
     };
-    for ToolRun { path: next, .. } in runs {
-        let pass = path.passes() as u32;
-        let line = next.origin.lines.first().copied().unwrap_or_default();
-        let tips = path.moves.iter().chain(&next.moves).map(|step| step.to.tip.z);
-        let top = tips.fold(path.start.tip.z.max(next.start.tip.z), f64::max);
-        let mut from = path.moves.last().map_or(path.start, |step| step.to);
-        let mut over = next.start;
-        (from.tip.z, over.tip.z) = (top, top);
-        for to in [from, over, next.start] {
-            path.moves.push(Move { to, kind: MoveKind::Rapid, feed_rate: program::FEED_WHERE_NONE, pass });
-            path.origin.lines.push(line);
-        }
-        path.moves.extend(next.moves.into_iter().map(|step| Move { pass: step.pass + pass, ..step }));
-        path.origin.lines.extend(next.origin.lines);
-    }
-    path
+    let mut all = PathsInTurn::new(path);
+    runs.for_each(|run| {
+        all.push(run.path, program::FEED_WHERE_NONE);
+    });
+    all.finish()
 }
 
 fn notes(read: &Program) -> Vec<String> {

@@ -110,6 +110,8 @@ pub struct ToolpathRequest {
     pub joining: Joining,
     /// How its axis is tilted; `None` for an upright one.
     pub axis: Option<AxisRequest>,
+    /// Whether it cuts what the toolpath before it left, and not a block of its own.
+    pub stock_is_previous: bool,
     /// The machining time that its scallop height is to take, instead of that of `step`.
     pub equal_time: Option<EqualTime>,
 }

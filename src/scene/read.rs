@@ -380,6 +380,10 @@ fn read_toolpaths(
         Ok(times.into_iter().map(move |request| (section, request)))
     };
     let all = sections.iter().map(read).collect::<Result<Vec<_>, SceneError>>()?;
+    if let Some(first) = sections.first().filter(|section| section.has("stock")) {
+        let place = first.key_span("stock");
+        return Err(first.error(&place, "no toolpath comes before this one", "delete `stock` here"));
+    }
     for (section, request) in all.into_iter().flatten() {
         if let Some(other) = requests.iter().find(|other| other.folder == request.folder) {
             let place = if section.has("name") { section.key_span("name") } else { section.header().clone() };
@@ -402,6 +406,9 @@ fn read_toolpaths(
     Ok(requests)
 }
 
+/// How scenes spell the stock that the toolpath before left.
+pub(super) const PREVIOUS_STOCK: &str = "previous";
+
 fn read_toolpath(
     section: &Section<'_>,
     folder: &Path,
@@ -423,6 +430,7 @@ fn read_toolpath(
         if surface { (read_joining(section)?, axis::read(section)?) } else { (Joining::default(), None) };
     let named = |file: Located<String>| NamedFile::beside(folder, &file.value, file.span);
     let directions = read.tables.into_iter().map(named).collect();
+    let stock_is_previous = kind != PartKind::Pocket && section.word("stock", &[PREVIOUS_STOCK])?.is_some();
     let correct = if surface { section.flag("correct")?.unwrap_or(correct) } else { false };
     Ok(ToolpathRequest {
         name,
@@ -433,6 +441,7 @@ fn read_toolpath(
         correct,
         joining,
         axis,
+        stock_is_previous,
         equal_time: None,
     })
 }

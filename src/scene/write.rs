@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::read::PREVIOUS_STOCK;
 use super::{Scene, ToolpathRequest, axis, compare, interference, kinematics, part};
 use keys::{toml_number as number, toml_string as text};
 use toolpath::{Links, PartKind, Step, longest_link};
@@ -86,6 +87,9 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
             writeln!(out, "name = {}", text(name))?;
             writeln!(out, "strategy = {}", text(request.strategy_name()))?;
             request.strategy.write(out)?;
+            if request.stock_is_previous {
+                writeln!(out, "stock = {}  # what the toolpath before left", text(PREVIOUS_STOCK))?;
+            }
             if request.strategy.definition().part == PartKind::Any {
                 return Ok(());
             }

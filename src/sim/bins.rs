@@ -2,7 +2,7 @@
 //! ascending list of the moves that may cut there.
 
 use super::Grid;
-use geometry::Point3;
+use geometry::{Point2, Point3};
 use motion::Toolpath;
 use work::parallel;
 
@@ -79,6 +79,14 @@ impl MoveBins {
     /// Bins along y.
     pub fn ny(&self) -> usize {
         self.layout.ny
+    }
+
+    /// The moves that may touch the bin at a place of the plan, ascending; none off the grid.
+    pub fn at(&self, p: Point2) -> &[u32] {
+        let Layout { x0, y0, size, nx, ny } = self.layout;
+        let [x, y] = [(p.x - x0) / size, (p.y - y0) / size];
+        let within = x >= 0.0 && y >= 0.0 && x < nx as f64 && y < ny as f64;
+        if within { self.of_bin(x as usize, y as usize) } else { &[] }
     }
 
     /// The moves that may touch bin `(i, j)`, ascending.
@@ -175,7 +183,6 @@ impl ChunkBins {
 mod tests {
     use super::*;
     use crate::scenes::path_through;
-    use geometry::Point2;
     use proptest::prelude::*;
 
     fn distance(x: f64, y: f64, a: Point3, b: Point3) -> f64 {
@@ -197,6 +204,7 @@ mod tests {
                 for i in 0..grid.nx {
                     let p = grid.centre(i, j);
                     let found = bins.of_bin(i / cells_per_bin, j / cells_per_bin);
+                    prop_assert_eq!(found, bins.at(p));
                     prop_assert!(found.windows(2).all(|w| w[0] < w[1]));
                     for (k, (a, b, _)) in path.segments().enumerate() {
                         if distance(p.x, p.y, a, b) <= radius {

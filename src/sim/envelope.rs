@@ -3,23 +3,34 @@
 use super::form::{Family, Form};
 use super::swept::{ball_height, swept_height, swept_height_and_normal};
 use super::track::Track;
-use cutter::Cutter;
 use geometry::Vector3;
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use work::parallel;
 
 /// All moves of a path, ready to be evaluated one by one: 64 bytes a move. mm.
 #[derive(Debug, Clone)]
 pub struct Envelope {
-    form: Form,
+    /// The first moves of the cutters, and their profiles.
+    forms: Vec<(u32, Form)>,
     tracks: Vec<Track>,
 }
 
 impl Envelope {
     /// Prepares every move of `path`.
-    pub fn new(cutter: &Cutter, path: &Toolpath) -> Self {
+    pub fn new(cutters: impl Into<Cutters>, path: &Toolpath) -> Self {
         let tracks = parallel::map(path.len(), |k| Track::new(path.start_of(k), path.moves[k].to.tip));
-        Self { form: Form::new(cutter), tracks }
+        let cutters: Cutters = cutters.into();
+        let forms = cutters.each().map(|(first, cutter)| (first, Form::new(cutter))).collect();
+        Self { forms, tracks }
+    }
+
+    /// The profile that makes a move.
+    #[inline]
+    fn form(&self, index: u32) -> &Form {
+        match &self.forms[..] {
+            [(_, only)] => only,
+            forms => &forms[forms.partition_point(|(first, _)| *first <= index).max(1) - 1].1,
+        }
     }
 
     /// The lowest cut at `(x, y)` among the moves `candidates` (indices into the path's moves) and
@@ -29,21 +40,21 @@ impl Envelope {
     /// # Tolerance
     /// As [`SweptMove`](super::SweptMove).
     pub fn lowest(&self, x: f64, y: f64, candidates: &[u32]) -> Option<(f64, u32)> {
-        let radius = self.form.radius;
-        match self.form.family {
-            Family::Ball => self.lowest_by(candidates, |track| {
+        match &self.forms[..] {
+            [(_, form)] if form.family == Family::Ball => self.lowest_by(candidates, |_, track| {
                 let (along, across) = track.along_across(x, y);
-                ball_height(track, radius, along, across)
+                ball_height(track, form.radius, along, across)
             }),
-            _ => self.lowest_by(candidates, |track| swept_height(&self.form, track, x, y)),
+            [(_, form)] => self.lowest_by(candidates, |_, track| swept_height(form, track, x, y)),
+            _ => self.lowest_by(candidates, |k, track| swept_height(self.form(k), track, x, y)),
         }
     }
 
     #[inline(always)]
-    fn lowest_by(&self, candidates: &[u32], height: impl Fn(&Track) -> f64) -> Option<(f64, u32)> {
+    fn lowest_by(&self, candidates: &[u32], height: impl Fn(u32, &Track) -> f64) -> Option<(f64, u32)> {
         let mut best = (f64::INFINITY, u32::MAX);
         for &k in candidates {
-            let h = height(&self.tracks[k as usize]);
+            let h = height(k, &self.tracks[k as usize]);
             if h < best.0 || (h == best.0 && k < best.1) {
                 best = (h, k);
             }
@@ -53,7 +64,7 @@ impl Envelope {
 
     /// Height of the cut of move `index` at `(x, y)`; `None` where it does not pass.
     pub fn height(&self, index: u32, x: f64, y: f64) -> Option<f64> {
-        let height = swept_height(&self.form, &self.tracks[index as usize], x, y);
+        let height = swept_height(self.form(index), &self.tracks[index as usize], x, y);
         (height < f64::INFINITY).then_some(height)
     }
 
@@ -64,7 +75,7 @@ impl Envelope {
 
     /// [`Envelope::height`] and [`Envelope::normal`] at once.
     pub fn height_and_normal(&self, index: u32, x: f64, y: f64) -> Option<(f64, Vector3)> {
-        swept_height_and_normal(&self.form, &self.tracks[index as usize], x, y)
+        swept_height_and_normal(self.form(index), &self.tracks[index as usize], x, y)
     }
 }
 
@@ -73,6 +84,7 @@ mod tests {
     use super::*;
     use crate::SweptMove;
     use crate::scenes::{Rng, cutters, random_path};
+    use cutter::Cutter;
     use geometry::Point3;
 
     #[test]
@@ -80,7 +92,7 @@ mod tests {
         let mut rng = Rng::new(7);
         for cutter in cutters() {
             let path = random_path(&mut rng, 60, 8.0);
-            let envelope = Envelope::new(&cutter, &path);
+            let envelope = Envelope::new(cutter, &path);
             let moves: Vec<SweptMove> =
                 path.segments().map(|(a, b, _)| SweptMove::new(&cutter, a, b)).collect();
             let backwards: Vec<u32> = (0..60).rev().collect();
@@ -104,6 +116,6 @@ mod tests {
     fn of_equal_moves_the_first_wins() {
         let cutter = Cutter::flat(6.0).unwrap();
         let path = crate::scenes::path_through([0.0, 1.0, 2.0].map(|x| Point3::new(x, 0.0, 0.0)));
-        assert_eq!(Envelope::new(&cutter, &path).lowest(1.0, 0.5, &[1, 0]), Some((0.0, 0)));
+        assert_eq!(Envelope::new(cutter, &path).lowest(1.0, 0.5, &[1, 0]), Some((0.0, 0)));
     }
 }

@@ -97,7 +97,7 @@ fn a_planted_gouge_is_found_with_its_depth_place_and_move() {
     for cell in [0.05, 0.2] {
         let m = cut_and_measure(&part, &cutter, &path, cell, &Limits { uncut: 10.0, ..LIMITS });
         assert_eq!(m.gouge.region_count, 1);
-        let gouge = m.gouge.regions[0];
+        let gouge = &m.gouge.regions[0];
         println!("gouge at cell {cell}: {:.6} ± {:.6}", gouge.depth_mm, m.gouge.error_bound_mm);
         assert!((gouge.depth_mm - 0.032).abs() < 2e-6, "cell {cell}: {}", gouge.depth_mm);
         assert!((gouge.at_mm[0] - 11.013).abs() < 0.01 && (gouge.at_mm[1] - 9.537).abs() < 0.01);

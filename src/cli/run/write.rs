@@ -40,9 +40,9 @@ pub fn toolpath(
 /// Writes toolpath.cls, and toolpath.nc where there is a program.
 fn programs(session: &Session, outcome: &Outcome, outputs: &Outputs) -> Result<(), CliError> {
     let (folder, header) = (&outcome.result.folder, session.header(&outcome.result.name));
-    let cutter = &session.scene.cutter;
+    let cutters = &outcome.cutters;
     outputs
-        .file(&format!("{folder}/toolpath.cls"), |out| apt_cl::write(out, &outcome.path, cutter, &header))?;
+        .file(&format!("{folder}/toolpath.cls"), |out| apt_cl::write(out, &outcome.path, cutters, &header))?;
     if session.has_program(outcome) {
         outputs.file(&format!("{folder}/toolpath.nc"), |out| session.write_program(out, outcome))?;
     }

@@ -5,9 +5,9 @@
 //! tell.
 
 use collision::{LeastClearance, Obstacle};
-use cutter::Solid;
+use cutter::{Cutter, Solid};
 use metrology::View;
-use motion::{Move, MoveKind};
+use motion::{Move, MoveKind, Toolpath};
 use report::{Claim, Figure, FigureTable, Gravity, place};
 use serde::Serialize;
 use sim::{FAR, VoxelEngine, holder_clearance};
@@ -17,6 +17,7 @@ use super::removal::{TOOLS_BEFORE, doubt, voxel_in_order};
 use super::{more_moves, value};
 use crate::JobError;
 use crate::run::{Finding, Run};
+use crate::tool::{Tool, ToolMoves};
 
 /// Differences of distances that the search along moves leaves open, mm.
 const RESOLUTION: f64 = 2e-5;
@@ -69,6 +70,9 @@ pub struct PairClearance {
     pub move_index: Option<u32>,
     /// Its line in toolpath.nc, counted from 1.
     pub line: Option<u32>,
+    /// The number of the tool, where the program has several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tool_number: Option<u32>,
     /// They may come so near to each other, and no nearer.
     #[serde(skip)]
     needed: f64,
@@ -84,9 +88,19 @@ struct ClearanceFigures {
 }
 
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
-    let mut pairs = with_meshes(run, monitor)?;
+    let mut pairs = Vec::new();
+    for tool in run.tools {
+        pairs.extend(with_meshes(run, tool, monitor)?);
+    }
     let kept_away = kept_away(run, &pairs);
-    pairs.extend(with_standing_stock(run, monitor)?);
+    // What the tools before cut, as each comes.
+    let mut before = run.before();
+    for (k, tool) in run.tools.iter().enumerate() {
+        pairs.extend(with_standing_stock(run, tool, &before, monitor)?);
+        if run.tools[k + 1..].iter().any(|later| later.holder.is_some()) {
+            before.push((*tool.cutter, tool.path.clone().into_owned()));
+        }
+    }
     if pairs.is_empty() {
         return Ok(Finding::default());
     }
@@ -121,16 +135,21 @@ fn nearness(pair: &PairClearance) -> f64 {
     pair.clearance_mm.unwrap_or(f64::INFINITY)
 }
 
-/// Cutter and holder against fixtures and the part.
-fn with_meshes(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Vec<PairClearance>, JobError> {
-    let (tool, near) = (run.around.tool, run.around.near);
+/// Cutter and holder of a tool against fixtures and the part.
+fn with_meshes(
+    run: &Run<'_>,
+    moves: &ToolMoves<'_>,
+    monitor: &dyn Monitor,
+) -> Result<Vec<PairClearance>, JobError> {
+    let (tool, near) = (Tool::new(moves.cutter, moves.holder), run.around.near);
     let mut pairs = Vec::new();
     let mut add =
         |name: (&'static str, String), solid: &Solid, obstacle: Obstacle<'_>, off: f64, needed: f64| {
             let rapids = |to: &Move| to.kind == MoveKind::Rapid;
             let chosen: &(dyn Fn(&Move) -> bool + Sync) = if needed < 0.0 { &rapids } else { &|_| true };
-            let least = obstacle.least_clearance(solid, run.path(), chosen, monitor)?;
-            pairs.extend(least.map(|least| PairClearance::of_mesh(name, &least, run, off, needed)));
+            let least = obstacle.least_clearance(solid, &moves.path, chosen, monitor)?;
+            let of_mesh = |least| PairClearance::of_mesh(name, &least, (run, moves.first), off, needed);
+            pairs.extend(least.map(of_mesh));
             Ok::<(), JobError>(())
         };
     monitor.start("looking for collisions", 0);
@@ -153,23 +172,29 @@ fn with_meshes(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Vec<PairClearance
     Ok(pairs)
 }
 
-/// Shank and holder against the stock that stands when they pass.
-fn with_standing_stock(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Option<PairClearance>, JobError> {
-    let Some(holder) = &run.scene().holder else { return Ok(None) };
+/// Shank and holder of a tool against the stock that stands when they pass, less what others cut before.
+fn with_standing_stock(
+    run: &Run<'_>,
+    tool: &ToolMoves<'_>,
+    before: &[(Cutter, Toolpath)],
+    monitor: &dyn Monitor,
+) -> Result<Option<PairClearance>, JobError> {
+    let Some(holder) = tool.holder else { return Ok(None) };
     let stock = run.session.voxel_stock();
     match run.view() {
         View::Heights(_) => {
-            let before = run.request.foreign().map_or(&[][..], |read| &read.before);
-            let found = holder_clearance(&stock, before, &run.scene().cutter, holder, run.path(), monitor)?;
+            let found = holder_clearance(&stock, before, tool.cutter, holder, &tool.path, monitor)?;
             // A section no wider than the cutter stands where it has been.
             let Some(found) = found else { return Ok(None) };
             let more = more_moves(found.collisions.len());
-            let pair = PairClearance { more, ..PairClearance::new(("holder", STANDING.into())) };
+            let tool_number = run.path().named_tool_of(tool.first as usize);
+            let pair = PairClearance::new(("holder", STANDING.into()));
+            let pair = PairClearance { more, tool_number, ..pair };
             Ok(Some(match found.nearest {
                 None => PairClearance { reason: Some(BEYOND), ..pair }.within(found.error_bound),
                 Some(near) => {
                     let pair = PairClearance { clearance_mm: Some(near.distance), ..pair };
-                    pair.at(run, near.at.into(), near.move_index).within(found.error_bound)
+                    pair.at(run, near.at.into(), tool.first + near.move_index).within(found.error_bound)
                 }
             }))
         }
@@ -215,6 +240,7 @@ impl PairClearance {
             at_mm: None,
             move_index: None,
             line: None,
+            tool_number: None,
             reason: Some(UNKNOWN),
             needed: 0.0,
             more: String::new(),
@@ -225,13 +251,13 @@ impl PairClearance {
     fn of_mesh(
         name: (&'static str, String),
         least: &LeastClearance,
-        run: &Run<'_>,
+        (run, first): (&Run<'_>, u32),
         off: f64,
         needed: f64,
     ) -> Self {
         let clearance_mm = Some(least.nearest.distance);
         let pair = Self { clearance_mm, needed, ..Self::new(name) };
-        let pair = pair.at(run, least.nearest.place.into(), least.move_index as u32);
+        let pair = pair.at(run, least.nearest.place.into(), first + least.move_index as u32);
         pair.within(least.error_bound + off)
     }
 
@@ -248,7 +274,8 @@ impl PairClearance {
     fn at(self, run: &Run<'_>, at: [f64; 3], move_index: u32) -> Self {
         let line = run.path().line_of(move_index as usize);
         let reason = line.is_none().then_some(NO_PROGRAM);
-        Self { at_mm: Some(at), move_index: Some(move_index), line, reason, ..self }
+        let tool_number = run.path().named_tool_of(move_index as usize);
+        Self { at_mm: Some(at), move_index: Some(move_index), line, tool_number, reason, ..self }
     }
 
     /// That the two do not collide.
@@ -282,9 +309,15 @@ impl PairClearance {
 
     fn sentence(&self) -> String {
         match self.clearance_mm {
-            Some(_) => format!("{} mm, {} to {}", self.shown(), self.tool, self.other),
-            None => format!("{}, {} to {}", self.shown(), self.tool, self.other),
+            Some(_) => format!("{} mm, {} to {}", self.shown(), self.named(), self.other),
+            None => format!("{}, {} to {}", self.shown(), self.named(), self.other),
         }
+    }
+
+    /// The part of the tool, and of which, where there are several.
+    fn named(&self) -> String {
+        self.tool_number
+            .map_or_else(|| self.tool.to_owned(), |number| format!("{} of tool {number}", self.tool))
     }
 
     /// The distance with its bound.
@@ -305,7 +338,7 @@ impl PairClearance {
     fn row(&self) -> Vec<String> {
         let number = |n: Option<u32>| n.map_or_else(|| "-".to_owned(), |n| n.to_string());
         vec![
-            self.tool.to_owned(),
+            self.named(),
             self.other.clone(),
             self.shown(),
             self.at_mm.map_or_else(|| "-".to_owned(), place),

@@ -3,8 +3,9 @@
 use cutter::Solid;
 use metrology::{
     AlongNormal as _, AlongTask, CellsSeen, Coverage, CoverageFigures, Measurement, REACH_OVER_UNCUT,
-    RaysCut, SweptVolume, View,
+    RaysCut, RaysCutInTurn, SweptVolume, View,
 };
+use motion::Toolpath;
 use report::{Claim, Figure, Gravity, micrometres, place};
 use serde::Serialize;
 use toolpath::Pocket;
@@ -85,7 +86,7 @@ fn of_pocket(run: &Run<'_>, pocket: &Pocket) -> CoverageFigures {
 type Covered = (CoverageFigures, Option<(Unseen, Vec<Claim>)>);
 
 fn of_part(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Covered, JobError> {
-    let (scene, part, path) = (run.scene(), run.part(), run.path());
+    let (scene, part, path) = (run.scene(), run.part(), &*run.whole.path);
     let facing = run.session.task(path, &scene.simulation, &run.session.cells).facing();
     let View::Heights(cut) = run.view() else {
         return Ok((Coverage::new(part, &facing, scene.judged, None).figures(), None));
@@ -97,17 +98,24 @@ fn of_part(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Covered, JobError> {
     if areas.along_normals_mm2 == 0.0 {
         return Ok((areas, None));
     }
-    let solid = Solid::of_cutter(&scene.cutter, scene.holder.as_ref());
+    // Holders end the cutters' edges.
+    let all = run.all_tools();
+    let solids: Vec<Solid> = all.iter().map(|tool| Solid::of_cutter(tool.cutter, tool.holder)).collect();
+    let tools: Vec<(&Toolpath, &Solid)> = all.iter().map(|tool| &*tool.path).zip(&solids).collect();
     let rays = run
         .budget()
-        .rays(path, &solid, Some(&cut.grid), monitor)
+        .rays_of_each(&tools, Some(&cut.grid), monitor)
         .map_err(|reason| JobError::engine(scene, &run.request.name, reason))?;
-    let by_rays = RaysCut { rays: &rays, path, solid: &solid };
-    let inward = scene.cutter.radius();
+    let of_tool = |k: usize| {
+        let (path, solid) = tools[k];
+        (all[k].first, RaysCut { rays: &rays[k], path, solid })
+    };
+    let by_rays = RaysCutInTurn { tools: (0..rays.len()).map(of_tool).collect() };
+    let inward = run.cutters().greatest_radius();
     let outward = (REACH_OVER_UNCUT * scene.tolerance.uncut).max(inward);
     let swept = SweptVolume { part, cut: &by_rays, inward, outward, block: *facing.block() };
     let task = AlongTask {
-        cutter: &scene.cutter,
+        cutters: run.cutters(),
         path,
         cut: &swept,
         limits: &scene.tolerance,

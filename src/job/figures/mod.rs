@@ -80,6 +80,12 @@ pub(crate) fn all(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Found, JobErro
     Ok(found)
 }
 
+/// Material that a toolpath leaves for the next one is no fault of it: those limits are the last one's.
+pub(crate) fn before_others(mut claims: Vec<Claim>) -> (Verdict, Vec<Claim>) {
+    claims.retain(|claim| !["uncut", "scallop"].contains(&claim.what));
+    (claims.iter().map(Claim::verdict).max().unwrap_or(Verdict::Undecided), claims)
+}
+
 /// Limits of material that is left, where other tools of a program may have cut it: they are not violated for sure.
 pub(crate) fn with_other_tools(mut claims: Vec<Claim>) -> (Verdict, Vec<Claim>) {
     let decided_by = "the other tools of the program may cut there, and each tool is measured by itself";

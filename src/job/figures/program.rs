@@ -22,7 +22,11 @@ struct FindingFigures {
 #[derive(Debug, Serialize)]
 struct ProgramFigures {
     file: String,
+    /// The one that is measured, or the first of all.
     tool: u32,
+    /// All that are measured, where there are several, in the order in which they come.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    tools: Vec<u32>,
     findings: Vec<FindingFigures>,
 }
 
@@ -40,24 +44,42 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
         tool: found.tool,
         text: found.text.clone(),
     };
-    let tool = run.path().origin.tool;
+    let mut tools: Vec<u32> = run.path().origin.tools.iter().map(|(_, tool)| *tool).collect();
+    let listed = tools.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
+    let several = tools.len() > 1;
+    let rows = vec![("program", format!("{name}, {} {listed}", if several { "tools" } else { "tool" }))];
+    let tool = tools.first().copied().unwrap_or_default();
+    if !several {
+        tools.clear();
+    }
     let findings = read.findings.iter().map(figures).collect();
-    let figures = ProgramFigures { file: name.to_owned(), tool, findings };
+    let figures = ProgramFigures { file: name.to_owned(), tool, tools, findings };
     let warnings = read.findings.iter().filter(|found| !found.kind.is_violation());
     let notes = warnings.map(|found| format!("{name}: {}", found.text)).collect();
-    let claims = CHECKED.iter().map(|kind| claim(name, *kind, &read.findings)).collect();
-    let rows = vec![("program", format!("{name}, tool {tool}"))];
+    let claims = CHECKED.iter().flat_map(|kind| claims(name, *kind, &read.findings, several)).collect();
     let figure = Figure { key: "program", value: value(&figures)?, rows, ..Figure::default() };
     Ok(Finding { figure: Some(figure), notes, claims })
 }
 
-/// That nothing of a kind was found.
-fn claim(name: &str, kind: FindingKind, all: &[Fault]) -> Claim {
-    let mut found = all.iter().filter(|found| found.kind == kind);
-    let motions: usize = all.iter().filter(|found| found.kind == kind).map(|found| found.motions).sum();
-    let text = match found.next() {
-        Some(first) if motions == 1 => format!("{name}: {}", first.text),
-        Some(first) => format!("{name}: {} ({motions} motions in all)", first.text),
+/// That nothing of a kind was found: of several tools one claim for each of which it was.
+fn claims(name: &str, kind: FindingKind, all: &[Fault], several: bool) -> Vec<Claim> {
+    let found: Vec<&Fault> = all.iter().filter(|found| found.kind == kind).collect();
+    if !several || found.is_empty() {
+        return vec![claim(name, kind, &found, "")];
+    }
+    let of_tool = |found: &&Fault| {
+        // The length of a tool names it already.
+        let tool = format!(", tool {}", found.tool);
+        claim(name, kind, &[*found], if kind == FindingKind::OtherLength { "" } else { &tool })
+    };
+    found.iter().map(of_tool).collect()
+}
+
+fn claim(name: &str, kind: FindingKind, found: &[&Fault], tool: &str) -> Claim {
+    let motions: usize = found.iter().map(|found| found.motions).sum();
+    let text = match found.first() {
+        Some(first) if motions == 1 => format!("{name}: {}{tool}", first.text),
+        Some(first) => format!("{name}: {}{tool} ({motions} motions in all)", first.text),
         None => format!("{name}: no {}", what(kind)),
     };
     let gravity = if kind == FindingKind::OtherLength { Gravity::Scrap } else { Gravity::Crash };

@@ -3,7 +3,7 @@
 use cutter::Solid;
 use metrology::{RemovalFigures, View, removal_figures, voxel_removal_figures};
 use report::{Claim, Figure, Gravity, Verdict, place};
-use sim::{MoveRemoval, VoxelEngine, VoxelStock, ZMap, cut_in_order};
+use sim::{MoveRemoval, VoxelEngine, VoxelStock, ZMap, cut_in_order_in_turn};
 use work::monitor::Monitor;
 
 use super::{entries, value};
@@ -33,13 +33,14 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     let (mut r, moves) = match run.view() {
         View::Heights(cut) => {
             let stock = stock(run, cut, monitor)?;
-            let removed = cut_in_order(stock, &run.scene().cutter, run.path(), monitor)?;
+            let removed = cut_in_order_in_turn(stock, run.own_cutters, run.path(), monitor)?;
             (removal_figures(run.path(), &removed, &cut.height), removed.moves)
         }
         View::Normals(_) => by_voxels(run, monitor)?,
     };
     for contact in &mut r.rapid_contacts {
         contact.line = run.line(contact.move_index);
+        contact.tool = run.path().named_tool_of(contact.move_index as usize);
     }
     let mut claims = vec![no_rapid_in_stock(&r, run.path().program_name())];
     if run.request.foreign().is_some_and(|read| read.unknown_before) {
@@ -73,11 +74,11 @@ pub(crate) fn doubt(claims: &mut [Claim], decided_by: &'static str) {
     }
 }
 
-/// The block, less what other tools of a program from elsewhere cut before.
+/// The block, less what other toolpaths and other tools of a program from elsewhere cut before.
 fn stock(run: &Run<'_>, cut: &ZMap, monitor: &dyn Monitor) -> Result<ZMap, JobError> {
     let mut stock = ZMap::block(cut.grid, run.session.top);
-    for (cutter, path) in run.request.foreign().iter().flat_map(|read| &read.before) {
-        stock = sim::cut(stock, cutter, path, monitor)?;
+    for (cutter, path) in run.before() {
+        stock = sim::cut(stock, &cutter, &path, monitor)?;
         stock.cut_by.fill(sim::NOT_CUT);
     }
     Ok(stock)
@@ -115,6 +116,7 @@ fn no_rapid_in_stock(removal: &RemovalFigures, program: &str) -> Claim {
     if first.line > 0 {
         text += &format!(", {program} line {}", first.line);
     }
+    text += &first.tool.map_or_else(String::new, |tool| format!(", tool {tool}"));
     match removal.rapid_contact_count {
         0 | 1 => {}
         2 => text += ", and one more rapid move does",
@@ -131,8 +133,13 @@ mod tests {
     fn the_first_rapid_in_stock_is_told_with_its_line() {
         use metrology::RapidContactFigures;
         assert_eq!(no_rapid_in_stock(&RemovalFigures::default(), "").verdict(), report::Verdict::Pass);
-        let contact =
-            |depth_mm| RapidContactFigures { move_index: 7, line: 12, at_mm: [1.0, 2.0, 3.0], depth_mm };
+        let contact = |depth_mm| RapidContactFigures {
+            move_index: 7,
+            line: 12,
+            tool: None,
+            at_mm: [1.0, 2.0, 3.0],
+            depth_mm,
+        };
         let rapid_contacts = vec![contact(0.25), contact(1.5)];
         let removal = RemovalFigures { rapid_contacts, rapid_contact_count: 3, ..Default::default() };
         let found = no_rapid_in_stock(&removal, "toolpath.nc");

@@ -2,10 +2,11 @@
 
 use cutter::Solid;
 use metrology::{
-    EngineError, REACH_OVER_UNCUT, RaysCut, RoughnessFigures, SweptVolume, View, path_figures, roughness,
+    EngineError, FirstCut, REACH_OVER_UNCUT, RaysCut, RaysCutInTurn, RoughnessFigures, SweptVolume, View,
+    path_figures, roughness,
 };
+use motion::Toolpath;
 use report::{Figure, with_bound};
-use sim::Rays;
 use work::monitor::Monitor;
 
 use super::{share, value};
@@ -26,11 +27,25 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
         return Ok(Finding::default());
     }
     let r = match run.view() {
-        View::Normals(view) => measure(run, &view.rays, &view.solid, monitor)?,
+        View::Normals(view) => {
+            let (rays, solid) = (&view.rays, &view.solid);
+            measure(run, &RaysCut { rays, path: &run.whole.path, solid }, monitor)?
+        }
         View::Heights(cut) => {
-            let solid = Solid::of_cutter(&run.scene().cutter, None);
-            match run.budget().rays(run.path(), &solid, Some(&cut.grid), monitor) {
-                Ok(rays) => measure(run, &rays, &solid, monitor)?,
+            let stretches = run.cutters().stretches(&run.whole.path);
+            let solids: Vec<Solid> =
+                stretches.iter().map(|stretch| Solid::of_cutter(stretch.cutter, None)).collect();
+            let tools: Vec<(&Toolpath, &Solid)> =
+                stretches.iter().map(|stretch| &*stretch.path).zip(&solids).collect();
+            match run.budget().rays_of_each(&tools, Some(&cut.grid), monitor) {
+                Ok(rays) => {
+                    let of_tool = |k: usize| {
+                        let (path, solid) = tools[k];
+                        (stretches[k].first, RaysCut { rays: &rays[k], path, solid })
+                    };
+                    let tools = (0..rays.len()).map(of_tool).collect();
+                    measure(run, &RaysCutInTurn { tools }, monitor)?
+                }
                 // Nothing is judged by it.
                 Err(memory @ EngineError::Rays { .. }) => {
                     RoughnessFigures { reason: Some(memory.to_string()), ..RoughnessFigures::default() }
@@ -58,18 +73,12 @@ fn sentence(run: &Run<'_>, ra: &str, rz: &str) -> (&'static str, String) {
     ("Roughness across the feed, µm", format!("Ra {ra}, Rz {rz}{scallop}: {}", run.request.name))
 }
 
-fn measure(
-    run: &Run<'_>,
-    rays: &Rays,
-    solid: &Solid,
-    monitor: &dyn Monitor,
-) -> Result<RoughnessFigures, JobError> {
-    let (scene, path) = (run.scene(), run.path());
+fn measure(run: &Run<'_>, cut: &dyn FirstCut, monitor: &dyn Monitor) -> Result<RoughnessFigures, JobError> {
+    let (scene, path) = (run.scene(), &*run.whole.path);
     let reach = REACH_OVER_UNCUT * scene.tolerance.uncut;
-    let by_rays = RaysCut { rays, path, solid };
     let block = run.session.task(path, &scene.simulation, &run.session.cells).block();
-    let cut = SweptVolume { part: run.part(), cut: &by_rays, inward: reach, outward: reach, block };
+    let cut = SweptVolume { part: run.part(), cut, inward: reach, outward: reach, block };
     // About how far passes are apart.
     let interval = run.measurement().deviation.area_mm2 / path_figures(path, 0.0).cutting_length_mm;
-    Ok(roughness(run.part(), &scene.cutter, path, &cut, interval, monitor)?)
+    Ok(roughness(run.part(), run.cutters(), path, &cut, interval, monitor)?)
 }

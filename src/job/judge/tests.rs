@@ -23,7 +23,14 @@ const LIMITS: Limits = Limits { scallop: 0.010, gouge: 0.005, uncut: 0.050, chor
 /// A clean surface but for one gouge of the given depth, mm.
 fn measurement(gouge: f64) -> Measurement {
     let at_mm = [12.5, 7.25, -1.0 - gouge];
-    let region = GougeRegion { depth_mm: gouge, area_mm2: 0.25, at_mm, move_index: 1234, line: 1240 };
+    let region = GougeRegion {
+        depth_mm: gouge,
+        area_mm2: 0.25,
+        at_mm,
+        move_index: 1234,
+        line: 1240,
+        ..GougeRegion::default()
+    };
     let regions = if gouge > LIMITS.gouge { vec![region] } else { Vec::new() };
     Measurement {
         scallop: ScallopFigures {
@@ -154,7 +161,7 @@ fn uncut_material_is_told_with_its_place() {
 fn the_gravest_places_are_marked_and_those_within_limits_are_not() {
     assert_eq!(marks(&measurement(0.001), &LIMITS, &STRICT), []);
     let mut measured = measurement(0.032);
-    let region = measured.gouge.regions[0];
+    let region = measured.gouge.regions[0].clone();
     measured.gouge.regions.resize(7, region);
     measured.scallop.max_mm = Some(1.01 * LIMITS.scallop);
     let found = marks(&measured, &LIMITS, &STRICT);

@@ -36,7 +36,7 @@ use super::tracks::Tracks;
 use closer::{Greatest, MOST_DIVIDED};
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 pub(crate) use net::{Net, NetPlace, Site};
 pub use net::{PatchGrid, net_places};
 use part::Part;
@@ -44,7 +44,7 @@ pub(crate) use regions::connected;
 use regions::{Standing, areas, deviation_figures};
 use ridges::{Crossing, Finder};
 pub(crate) use swept_volume::ball_beneath;
-pub use swept_volume::{FirstCut, RaysCut, SweptVolume, VoxelCut};
+pub use swept_volume::{FirstCut, RaysCut, RaysCutInTurn, SweptVolume, VoxelCut};
 use work::monitor::{self, Cancelled, Monitor};
 
 /// The cut surface where the normal of a design point meets it.
@@ -129,7 +129,7 @@ impl Sample {
 /// What places are measured by, and how closely.
 pub(crate) struct Along<'a> {
     pub part: &'a Part,
-    pub cutter: &'a Cutter,
+    pub cutters: &'a Cutters,
     pub path: &'a Toolpath,
     pub engine: &'a dyn AlongNormal,
     pub limits: &'a Limits,
@@ -143,13 +143,13 @@ pub(crate) struct Along<'a> {
 
 struct NormalInspection<'a> {
     part: &'a Part,
-    cutter: &'a Cutter,
+    cutters: &'a Cutters,
     path: &'a Toolpath,
     engine: &'a dyn AlongNormal,
     finder: Finder<'a>,
     limits: &'a Limits,
     spacing: f64,
-    /// Radius with which the cutter bends, about, mm.
+    /// Radius with which the widest cutter bends, about, mm.
     radius: f64,
     most_divided: usize,
 }
@@ -170,7 +170,8 @@ pub fn measure_along_normals(
     judged: Option<(&Facing<'_>, Judged)>,
     monitor: &dyn Monitor,
 ) -> Result<(Measurement, NormalMap), Cancelled> {
-    let along = Along { part, cutter, path, engine, limits, spacing, asked, most_divided: MOST_DIVIDED };
+    let cutters = &Cutters::from(cutter);
+    let along = Along { part, cutters, path, engine, limits, spacing, asked, most_divided: MOST_DIVIDED };
     let keep = |places: &[NetPlace]| match judged {
         None => vec![true; places.len()],
         Some((facing, judged)) => {
@@ -196,13 +197,15 @@ impl Along<'_> {
         near: &(dyn Fn(usize) -> bool + Sync),
         monitor: &dyn Monitor,
     ) -> Result<(Measurement, NormalMap), Cancelled> {
-        let Self { part, cutter, path, engine, limits, spacing, asked, most_divided } = *self;
-        let tracks = Tracks::new(path, cutter);
-        let corner = cutter.corner_radius();
-        let radius = if corner > 0.0 { corner } else { cutter.radius() };
+        let Self { part, cutters, path, engine, limits, spacing, asked, most_divided } = *self;
+        let tracks = Tracks::new(path, cutters);
+        let radius = cutters.greatest(|cutter| {
+            let corner = cutter.corner_radius();
+            if corner > 0.0 { corner } else { cutter.radius() }
+        });
         let finder = Finder { part, engine, tracks: &tracks, radius };
         let inspection =
-            NormalInspection { part, cutter, path, engine, finder, limits, spacing, radius, most_divided };
+            NormalInspection { part, cutters, path, engine, finder, limits, spacing, radius, most_divided };
         let samples = in_runs("measuring along normals", net.places.len(), monitor, |range| {
             let mut near = None;
             let of_one = |place: &NetPlace| {
@@ -235,7 +238,10 @@ impl Along<'_> {
         drop(sides);
         let (of_triangle, hollow) = inspection.without_hollows(of_triangle);
         let contacts = in_runs("measuring contacts", path.len(), monitor, |range| {
-            let contacts = |k: &usize| near(*k).then(|| contacts_of(part, cutter, path, *k, spacing));
+            let contacts = |k: &usize| {
+                let cutter = cutters.of_move(*k as u32);
+                near(*k).then(|| contacts_of(part, cutter, path, *k, spacing))
+            };
             range.filter_map(|k| contacts(&k)).flatten().collect()
         })?;
         let kept_contacts = keep(&contacts);
@@ -255,7 +261,8 @@ impl Along<'_> {
             greatest.look_at(sample, limits);
             greatest.look_at_height(sample, &inspection);
         }
-        let pairs = pair_figures(part, cutter, path, tally(&of_triangle, cutter, spacing), monitor)?;
+        let pairs =
+            pair_figures(part, cutters, path, tally(&of_triangle, cutters.first(), spacing), monitor)?;
         let ridge_samples: Vec<[f32; 2]> =
             of_triangle.items.iter().map(|c| [c.height as f32, c.length as f32]).collect();
         let shares = areas(&net);

@@ -49,9 +49,10 @@ impl NormalInspection<'_> {
     /// Where the cutter touches a surface with this normal while the move `by` passes nearest to `place`.
     fn nearest_contact(&self, by: u32, place: &Point3, normal: &Vector3) -> Point3 {
         let (from, to) = (self.path.location_before(by as usize), self.path.moves[by as usize].to);
+        let cutter = self.cutters.of_move(by);
         let contact = |t: f64| {
             let at = from.towards(&to, t);
-            at.tip - self.cutter.contact_to_tip_along(normal, &at.axis)
+            at.tip - cutter.contact_to_tip_along(normal, &at.axis)
         };
         let (a, b) = (contact(0.0), contact(1.0));
         let way = b - a;

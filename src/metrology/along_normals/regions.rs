@@ -40,7 +40,7 @@ impl NormalInspection<'_> {
                 area_mm2,
                 at_mm: sample.place.point.into(),
                 move_index: sample.hit.map_or(0, |hit| hit.by),
-                line: 0,
+                ..GougeRegion::default()
             });
         }
         figures.region_count = figures.regions.len();

@@ -64,6 +64,30 @@ impl FirstCut for RaysCut<'_> {
     }
 }
 
+/// The moves of several tools, each with the index of its first one in the whole path.
+pub struct RaysCutInTurn<'a> {
+    /// In the order in which they come.
+    pub tools: Vec<(u32, RaysCut<'a>)>,
+}
+
+impl FirstCut for RaysCutInTurn<'_> {
+    fn first_cut(
+        &self,
+        point: &Point3,
+        normal: &Vector3,
+        range: [f64; 2],
+        near: Option<&NormalHit>,
+    ) -> Option<NormalHit> {
+        // A place that was cut nearby tells something of its own tool only.
+        let near = near.filter(|_| self.tools.len() == 1);
+        let of_tool = |(first, cut): &(u32, RaysCut<'_>)| {
+            let hit = cut.first_cut(point, normal, range, near)?;
+            Some(NormalHit { by: hit.by + first, ..hit })
+        };
+        self.tools.iter().filter_map(of_tool).min_by(|a, b| a.deviation.total_cmp(&b.deviation))
+    }
+}
+
 /// What the moves left of stock that is larger than the part all around; rapids cut, too.
 pub struct VoxelCut<'a> {
     /// The moves and the stock.

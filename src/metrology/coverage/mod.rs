@@ -25,9 +25,8 @@ use work::monitor::{Cancelled, Monitor};
 use super::along_normals::{Along, Net, NetPlace, Site, SweptVolume};
 use super::facing::{Facing, Judged, PlaceKind};
 use super::figures::{Limits, Measurement};
-use cutter::Cutter;
 pub use figures::CoverageFigures;
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use near::{Near, cube};
 use part::{Part, Patch, SurfacePoint};
 use pieces::{Pieces, divided, join};
@@ -76,7 +75,7 @@ pub struct CellsSeen<'a> {
 #[derive(Clone, Copy)]
 pub struct AlongTask<'a> {
     /// What cuts.
-    pub cutter: &'a Cutter,
+    pub cutters: &'a Cutters,
     /// How it moves.
     pub path: &'a Toolpath,
     /// What tells where a normal meets the cut.
@@ -199,7 +198,7 @@ impl<'a> Coverage<'a> {
         let cut = UnseenCut { cut: task.cut, facing: self.facing, lowest_tip };
         let along = Along {
             part: self.part,
-            cutter: task.cutter,
+            cutters: task.cutters,
             path: task.path,
             engine: &cut,
             limits: task.limits,
@@ -207,8 +206,8 @@ impl<'a> Coverage<'a> {
             asked: task.asked,
             most_divided: (DIVIDED_SHARE * net.triangles.len() as f64) as usize,
         };
-        let near = Near::new(&net.places, spacing + task.cutter.radius());
-        let comes_near = |k: usize| near.is_passed(task.path, k, task.cutter);
+        let near = Near::new(&net.places, spacing + task.cutters.greatest_radius());
+        let comes_near = |k: usize| near.is_passed(task.path, k, task.cutters.of_move(k as u32));
         let all = vec![true; net.places.len()];
         let contacts =
             |places: &[NetPlace]| thinned(places, self.are_unseen(places), CONTACT_SHARE * spacing);

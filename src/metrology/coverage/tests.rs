@@ -1,6 +1,6 @@
 use super::*;
-use crate::along_normals::RaysCut;
-use cutter::Solid;
+use crate::along_normals::{RaysCut, RaysCutInTurn};
+use cutter::{Cutter, Solid};
 use geometry::{Aabb, AnalyticShape, AnalyticSurface, TriangleMesh};
 use sim::Rays;
 use sim::scenes::path_through;
@@ -171,22 +171,44 @@ fn cells_too_coarse_for_a_ledge_leave_it_to_the_normals() {
 
 /// What the surface that no cell sees shows after passes of a ball over a box of 20 × 10 × 10.
 fn unseen(tips: &[[f64; 3]], margin: f64) -> Measurement {
+    let cutter = Cutter::ball(6.0).unwrap();
+    unseen_after(&path_through(tips.iter().map(|p| Point3::from(*p))), &cutter.into(), margin)
+}
+
+fn unseen_after(path: &Toolpath, cutters: &Cutters, margin: f64) -> Measurement {
     let profile = [[0.0, 0.0], [20.0, 0.0], [20.0, 10.0], [0.0, 10.0]];
     let part = prism(&profile, 10.0, &[[0, 1, 2], [0, 2, 3]]);
-    let path = path_through(tips.iter().map(|p| Point3::from(*p)));
-    let facing = Facing::new(&part, &path, block(&part, margin));
+    let facing = Facing::new(&part, path, block(&part, margin));
     let (grid, deviations) = all_cells(&part, 0.1);
     let cells = CellsSeen { grid: &grid, deviations: &deviations, walls: false };
     let coverage = Coverage::new(&part, &facing, Judged::All, Some(cells));
-    let cutter = Cutter::ball(6.0).unwrap();
-    let solid = Solid::of_cutter(&cutter, None);
-    let rays = Rays::new(&path, &solid, &Silent).unwrap();
-    let by_rays = RaysCut { rays: &rays, path: &path, solid: &solid };
+    let stretches = cutters.stretches(path);
+    let solids: Vec<Solid> = stretches.iter().map(|tool| Solid::of_cutter(tool.cutter, None)).collect();
+    let rays = |k: usize| Rays::new(&stretches[k].path, &solids[k], &Silent).unwrap();
+    let rays: Vec<Rays> = (0..solids.len()).map(rays).collect();
+    let tool = |k: usize| RaysCut { rays: &rays[k], path: &stretches[k].path, solid: &solids[k] };
+    let tools = (0..solids.len()).map(|k| (stretches[k].first, tool(k))).collect();
+    let by_rays = RaysCutInTurn { tools };
     let cut =
         SweptVolume { part: &part, cut: &by_rays, inward: 3.0, outward: 3.0, block: block(&part, margin) };
-    let task =
-        AlongTask { cutter: &cutter, path: &path, cut: &cut, limits: &LIMITS, asked: 5e-4, finest: 0.1 };
+    let task = AlongTask { cutters, path, cut: &cut, limits: &LIMITS, asked: 5e-4, finest: 0.1 };
     coverage.measure_unseen(&task, &Silent).unwrap().unwrap().0
+}
+
+/// A ball goes 0.02 mm too deep into the wall at y = 0, then a flat 0.05 mm into that at y = 10: both are found with their moves.
+#[test]
+fn each_of_several_tools_cuts_the_walls_that_it_passes() {
+    let tips =
+        [[-5.0, -2.98, 2.0], [25.0, -2.98, 2.0], [25.0, 13.95, 20.0], [25.0, 13.95, 4.0], [-5.0, 13.95, 4.0]];
+    let path = path_through(tips.map(Point3::from));
+    let cutters = Cutters::from(Cutter::ball(6.0).unwrap()).then(1, Cutter::flat(8.0).unwrap());
+    let gouge = unseen_after(&path, &cutters, 0.0).gouge;
+    let found = |y: f64| gouge.regions.iter().find(|region| (region.at_mm[1] - y).abs() < 1e-9).unwrap();
+    for (y, depth, move_index) in [(0.0, 0.02, 0), (10.0, 0.05, 3)] {
+        let region = found(y);
+        assert!((region.depth_mm - depth).abs() < 1e-3 && region.move_index == move_index, "{gouge:?}");
+    }
+    assert!((gouge.max_depth_mm - 0.05).abs() <= gouge.error_bound_mm, "{gouge:?}");
 }
 
 #[test]

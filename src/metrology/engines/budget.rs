@@ -85,13 +85,33 @@ impl Budget {
         grid: Option<&Grid>,
         monitor: &dyn Monitor,
     ) -> Result<Rays, EngineError> {
+        self.check_rays(&[(path, solid)], grid)?;
+        Ok(Rays::new(path, solid, monitor)?)
+    }
+
+    /// As [`Budget::rays`], of each of several paths.
+    ///
+    /// # Errors
+    /// Those of [`Budget::rays`].
+    pub fn rays_of_each(
+        &self,
+        tools: &[(&Toolpath, &Solid)],
+        grid: Option<&Grid>,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Rays>, EngineError> {
+        self.check_rays(tools, grid)?;
+        tools.iter().map(|(path, solid)| Ok(Rays::new(path, solid, monitor)?)).collect()
+    }
+
+    fn check_rays(&self, tools: &[(&Toolpath, &Solid)], grid: Option<&Grid>) -> Result<(), EngineError> {
         let measured = grid.map_or(0, |grid| (grid.len() * BYTES_PER_MEASURED_CELL) as u64);
-        let left = self.left(path.len()).saturating_sub(measured);
-        let needed = Rays::bytes(path, solid);
+        let moves = tools.iter().map(|(path, _)| path.len()).sum();
+        let left = self.left(moves).saturating_sub(measured);
+        let needed: u64 = tools.iter().map(|(path, solid)| Rays::bytes(path, solid)).sum();
         if needed > left {
             return Err(EngineError::Rays { needed_mib: needed.div_ceil(MIB), left_mib: left / MIB });
         }
-        Ok(Rays::new(path, solid, monitor)?)
+        Ok(())
     }
 
     /// Squares that a search may hold beside a grid that was measured.

@@ -2,10 +2,8 @@
 
 use std::time::Instant;
 
-use cutter::Cutter;
-use motion::Toolpath;
-use sim::{ZMap, cut, cut_reference};
-use work::monitor::{Cancelled, Monitor};
+use sim::{CutHeights, ZMap, cut, cut_in_turn, cut_reference};
+use work::monitor::Monitor;
 
 use super::{Engine, EngineError, Measured, Task, View};
 use crate::ridge_map::ridge_map;
@@ -15,7 +13,7 @@ use crate::{Asked, RidgeMap, measure_with_walls};
 pub(super) struct Cells {
     word: &'static str,
     help: &'static str,
-    cut: fn(ZMap, &Cutter, &Toolpath, &dyn Monitor) -> Result<ZMap, Cancelled>,
+    cut: CutHeights,
 }
 
 /// Heights over the plan view by branch and bound.
@@ -49,28 +47,30 @@ impl Engine for Cells {
     fn ridges(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Option<RidgeMap>, EngineError> {
         let path = task.path;
         let (grid, _) = task.budget.grid_for(path.len(), &task.area, task.simulation, task.cells)?;
-        let cut = (self.cut)(ZMap::block(grid, task.top), task.cutter, path, monitor)?;
+        let stock = ZMap::block(grid, task.top);
+        let cut = cut_in_turn(self.cut, stock, task.cutters, path, monitor)?;
         let asked = task.simulation.error_bound;
-        Ok(ridge_map(task.part, task.cutter, path, &cut, task.limits, asked, monitor)?)
+        Ok(ridge_map(task.part, task.cutters, path, &cut, task.limits, asked, monitor)?)
     }
 
     fn measure(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Measured, EngineError> {
         let begun = Instant::now();
-        let path = task.path;
-        let (grid, note) = task.budget.grid_for(path.len(), &task.area, task.simulation, task.cells)?;
-        let cut = (self.cut)(ZMap::block(grid, task.top), task.cutter, path, monitor)?;
-        let most_cells = task.budget.more_cells(path.len(), &grid);
+        let (path, held) = (task.path, task.moves_held());
+        let (grid, note) = task.budget.grid_for(held, &task.area, task.simulation, task.cells)?;
+        let stock = ZMap::block(grid, task.top);
+        let cut = cut_in_turn(self.cut, stock, task.cutters, path, monitor)?;
+        let most_cells = task.budget.more_cells(held, &grid);
         let asked = Asked {
             error_bound: task.simulation.error_bound,
             stock_top: task.top,
             most_cells,
-            most_squares: task.budget.squares_beside(path.len(), &grid),
+            most_squares: task.budget.squares_beside(held, &grid),
             borders: !task.pocket,
         };
         let facing = task.measures_walls().then(|| task.facing());
         let measurement = measure_with_walls(
             task.part,
-            task.cutter,
+            task.cutters,
             path,
             &cut,
             task.limits,

@@ -63,7 +63,7 @@ impl Engine for Normals {
 
     fn measure(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Measured, EngineError> {
         let begun = Instant::now();
-        let (part, path, cutter) = (task.part, task.path, task.cutter);
+        let (part, path, cutter) = (task.part, task.path, task.cutters.first());
         let solid = Solid::of_cutter(cutter, task.holder);
         // Deviations are exact at the places, and ridges are found between them, so that fewer do than cells.
         let wider = if task.simulation.cell_is_auto { PLACES_OVER_CELLS } else { 1.0 };

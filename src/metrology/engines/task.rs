@@ -1,8 +1,8 @@
 //! What an engine is given, and what it leaves.
 
-use cutter::{Cutter, Holder, Solid};
+use cutter::{Holder, Solid};
 use geometry::Aabb;
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use part::Part;
 use sim::{Rays, ZMap};
 
@@ -34,9 +34,9 @@ pub struct Simulation {
 pub struct Task<'a> {
     /// What is to be made.
     pub part: &'a Part,
-    /// What cuts.
-    pub cutter: &'a Cutter,
-    /// What holds it; it ends the cutter's edges.
+    /// What cuts; paths that lean have one.
+    pub cutters: &'a Cutters,
+    /// What holds the cutter of a path that leans; it ends the cutter's edges.
     pub holder: Option<&'a Holder>,
     /// How it moves.
     pub path: &'a Toolpath,
@@ -72,6 +72,11 @@ impl<'a> Task<'a> {
             && !self.pocket
             && self.path.is_upright()
             && self.part.patches().is_empty()
+    }
+
+    /// The moves that memory is reckoned for: those of several tools are held again, each tool's as a path of its own.
+    pub fn moves_held(&self) -> usize {
+        if self.cutters.are_several() { 2 * self.path.len() } else { self.path.len() }
     }
 
     /// What of the part the path's tool can face.

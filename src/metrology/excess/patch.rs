@@ -1,8 +1,11 @@
 //! What stands at most above the part within one square of the plan.
 
+use std::borrow::Cow;
+
 use super::meets;
 use crate::facing::LEAST_FACING;
 use crate::inspection::Inspection;
+use cutter::Cutter;
 use geometry::{Point2, Point3, Vector2, Vector3};
 use part::SurfacePoint;
 use sim::NOT_CUT;
@@ -107,11 +110,12 @@ impl Patches<'_> {
     /// True where the cutter fits, and what stands is no higher than what may be uncut, or the pass that cut came down to the
     /// design nearby.
     pub fn reached(&self, at: Point2, height: f64, by: u32) -> bool {
-        let Inspection { part, cutter, surface, limits, .. } = *self.inspection;
+        let Inspection { part, cutters, surface, limits, .. } = *self.inspection;
         let Some(design) = part.highest_at(at.x, at.y) else { return false };
         by != NOT_CUT && {
+            let cutter = cutters.of_move(by);
             let from_contact = cutter.contact_to_tip(&design.normal);
-            if !self.fits(&(design.point + from_contact)) {
+            if !self.fits(cutter, &(design.point + from_contact)) {
                 return false;
             }
             let tip = surface.nearest_tip(by, &(design.point + from_contact));
@@ -126,11 +130,11 @@ impl Patches<'_> {
         }
     }
 
-    /// Whether the cutter with its tip there keeps out of the part, as far as some places around its axis tell.
-    fn fits(&self, tip: &Point3) -> bool {
+    /// Whether a cutter with its tip there keeps out of the part, as far as some places around its axis tell.
+    fn fits(&self, cutter: &Cutter, tip: &Point3) -> bool {
         const RINGS: [f64; 4] = [0.25, 0.5, 0.75, 0.97];
         const AROUND: u32 = 12;
-        let Inspection { part, cutter, limits, .. } = *self.inspection;
+        let Inspection { part, limits, .. } = *self.inspection;
         let clear = |radius: f64, angle: f64| {
             let q = tip.xy() + Vector2::new(angle.cos(), angle.sin()) * radius;
             let least = tip.z + cutter.profile().height(radius) + limits.scallop.min(limits.gouge);
@@ -218,12 +222,13 @@ impl Patches<'_> {
     fn above(&self, piece: &Clipped) -> Option<(f64, f64, u32)> {
         let surface = self.inspection.surface;
         let SurfacePoint { point, normal, .. } = &piece.foot;
-        let here = surface.along_normal_with(point, normal, self.unseen)?;
+        let hidden = self.hidden(point, normal);
+        let here = surface.along_normal_with(point, normal, &hidden)?;
         let upright = piece.leans[..piece.len].iter().all(|lean| lean.norm() < 1e-12);
         // Lower places of the square are of no account.
         let known = here.distance.max(self.least).max(0.0);
         // What stands so high stands aside of its place.
-        let moves = self.moves(&(point + normal * known), here.by);
+        let moves = self.moves(&(point + normal * known), here.by, &hidden);
         let over = |reach: f64| {
             let above = self.over(piece, &moves, [known, reach]);
             (above + piece.below) / piece.cosine
@@ -242,13 +247,26 @@ impl Patches<'_> {
         None
     }
 
+    /// Moves that no cell may show: those that were found so far, and where passes are nearer to each other than cells, those
+    /// that touch the design nearby.
+    fn hidden(&self, point: &Point3, normal: &Vector3) -> Cow<'_, [u32]> {
+        let Inspection { surface, .. } = *self.inspection;
+        let (i, j) = surface.cut.grid.nearest_cell(point.x, point.y);
+        let k = surface.cut.grid.index(i, j);
+        if self.inspection.is_crowded(k, 1) {
+            let passing = self.inspection.passing(k, point, normal);
+            return Cow::Owned(self.unseen.iter().copied().chain(passing).collect());
+        }
+        Cow::Borrowed(self.unseen)
+    }
+
     /// Moves that are low over a point: any choice gives a bound, the lowest a good one.
-    fn moves(&self, point: &Point3, first: u32) -> Vec<u32> {
+    fn moves(&self, point: &Point3, first: u32, hidden: &[u32]) -> Vec<u32> {
         let surface = self.inspection.surface;
         let (i, j) = surface.cut.grid.nearest_cell(point.x, point.y);
         let winners = surface.winners(i, j);
         let all = std::iter::once(first)
-            .chain(winners.moves().iter().chain(self.unseen).copied())
+            .chain(winners.moves().iter().chain(hidden).copied())
             .filter(|&by| by != NOT_CUT);
         let mut low: Vec<(f64, u32)> =
             all.filter_map(|by| Some((surface.envelope.height(by, point.x, point.y)?, by))).collect();

@@ -1,7 +1,7 @@
 use super::super::flat_scene::{path, plane};
 use super::*;
 use crate::{RaysCut, SweptVolume};
-use cutter::Solid;
+use cutter::{Cutter, Solid};
 use geometry::{Aabb, samples};
 use part::Patch;
 use sim::Rays;
@@ -21,7 +21,7 @@ fn of(part: &Part, path: &Toolpath, interval: f64) -> RoughnessFigures {
         outward: 1.0,
         block: Aabb { min: Point3::new(-1e3, -1e3, -1e3), max: Point3::new(1e3, 1e3, 1e3) },
     };
-    roughness(part, &ball, path, &cut, interval, &Silent).unwrap()
+    roughness(part, ball, path, &cut, interval, &Silent).unwrap()
 }
 
 /// Passes along x, `step` apart, every second one `lower` than the others.

@@ -21,7 +21,7 @@ mod tests;
 use std::collections::HashMap;
 
 use geometry::{Aabb, Point2, Point3, Vector2, Vector3};
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use part::Part;
 use sim::{Envelope, Grid, MoveBins};
 use work::monitor::{self, Cancelled, Monitor};
@@ -29,7 +29,6 @@ use work::monitor::{self, Cancelled, Monitor};
 use super::along_normals::{Net, NetPlace, Site, connected};
 use super::facing::{Facing, PlaceKind};
 use super::figures::{Bounded, ExcessKind, GougeRegion, Limits, Measurement, NUMERICAL_FLOOR, UncutRegion};
-use cutter::Cutter;
 use piece::Piece;
 use reach::Moves;
 use search::{Deepest, Highest, Standing};
@@ -57,7 +56,7 @@ const LISTED_REGIONS: usize = 20;
 /// What walls are measured with.
 pub(super) struct WallTask<'a> {
     pub part: &'a Part,
-    pub cutter: &'a Cutter,
+    pub cutters: &'a Cutters,
     pub path: &'a Toolpath,
     pub envelope: &'a Envelope,
     pub grid: Grid,
@@ -91,7 +90,7 @@ impl Walls {
     /// # Errors
     /// [`Cancelled`] when the monitor says so.
     pub fn measure(task: &WallTask<'_>, monitor: &dyn Monitor) -> Result<Option<Self>, Cancelled> {
-        let WallTask { part, cutter, path, grid, facing, limits, .. } = *task;
+        let WallTask { part, cutters, path, grid, facing, limits, .. } = *task;
         let longest = STRIP_OVER_CELL * grid.cell;
         let mut pieces = piece::pieces(part, longest, facing.block().min.z);
         let kinds = facing.kinds(pieces.len(), |k| pieces[k].middle());
@@ -104,8 +103,9 @@ impl Walls {
             return Ok(None);
         }
         monitor.start("measuring walls", pieces.len() as u64);
-        let bins = MoveBins::new(&grid, CELLS_PER_BIN, cutter.radius() + task.reach + longest, path);
-        let moves = Moves { envelope: task.envelope, path, radius: cutter.radius() };
+        let widest = cutters.greatest_radius();
+        let bins = MoveBins::new(&grid, CELLS_PER_BIN, widest + task.reach + longest, path);
+        let moves = Moves { envelope: task.envelope, path, cutters };
         let way_out = |q: Point2, n: Vector2| way_out(facing.block(), q, n);
         let standing = Standing {
             moves: &moves,
@@ -224,7 +224,7 @@ impl Walls {
                 area_mm2,
                 at_mm: strip.piece.place(strip.cut.at[0], strip.cut.at[1]).into(),
                 move_index: strip.cut.by,
-                line: 0,
+                ..GougeRegion::default()
             });
         }
         gouge.regions.sort_by(|a, b| b.depth_mm.total_cmp(&a.depth_mm));
@@ -340,8 +340,8 @@ fn passing(piece: &Piece, moves: &Moves<'_>, near: &[u32], reach: f64) -> Vec<u3
             return false;
         }
         let seen = ends.map(|end| piece.seen_from(&Point3::new(end.x, end.y, piece.level)));
-        let span =
-            |c: usize| [seen[0][c].min(seen[1][c]) - moves.radius, seen[0][c].max(seen[1][c]) + moves.radius];
+        let radius = moves.radius(**k);
+        let span = |c: usize| [seen[0][c].min(seen[1][c]) - radius, seen[0][c].max(seen[1][c]) + radius];
         let ([u0, u1], [s0, s1]) = (span(0), span(1));
         u0 <= piece.length && u1 >= 0.0 && s0 <= reach && s1 >= -reach
     };

@@ -4,7 +4,7 @@
 //! height of the cut over that line is a convex function. mm.
 
 use geometry::{Point2, Point3, Vector2};
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use sim::Envelope;
 
 /// Steps of a golden section: each leaves 0.62 of a stretch.
@@ -21,7 +21,7 @@ const INSIDE: f64 = 1e-10;
 pub(super) struct Moves<'a> {
     pub envelope: &'a Envelope,
     pub path: &'a Toolpath,
-    pub radius: f64,
+    pub cutters: &'a Cutters,
 }
 
 /// A level line: from a place of the plan along a unit vector, at a height.
@@ -33,6 +33,11 @@ pub(super) struct Line {
 }
 
 impl Moves<'_> {
+    /// Radius of the cutter of a move, mm.
+    pub fn radius(&self, k: u32) -> f64 {
+        self.cutters.of_move(k).radius()
+    }
+
     /// Both ends of a move.
     pub fn ends(&self, k: u32) -> [Point3; 2] {
         [self.path.start_of(k as usize), self.path.moves[k as usize].to.tip]
@@ -49,7 +54,7 @@ impl Moves<'_> {
         if a.z.min(b.z) > line.z {
             return None;
         }
-        let [first, last] = stadium(&a.xy(), &b.xy(), self.radius, line.from, line.way)?;
+        let [first, last] = stadium(&a.xy(), &b.xy(), self.radius(k), line.from, line.way)?;
         if last <= 0.0 {
             return None;
         }
@@ -175,8 +180,8 @@ mod tests {
                 let mut point =
                     || Point3::new(rng.within(-3.0, 3.0), rng.within(1.0, 6.0), rng.within(-2.0, 1.0));
                 let path = path_through([point(), point()]);
-                let envelope = Envelope::new(&cutter, &path);
-                let moves = Moves { envelope: &envelope, path: &path, radius: cutter.radius() };
+                let envelope = Envelope::new(cutter, &path);
+                let moves = Moves { envelope: &envelope, path: &path, cutters: &cutter.into() };
                 let line = Line { from: Point2::origin(), way: Vector2::y(), z: 0.5 };
                 let taken = |s: f64| moves.height(0, Point2::new(0.0, s)) <= 0.5;
                 let first = (0..9000).map(|k| 1e-3 * f64::from(k)).find(|s| taken(*s));
@@ -192,8 +197,8 @@ mod tests {
         // A flat's side is vertical at every height.
         let path = path_through([Point3::new(-5.0, 2.9, -1.0), Point3::new(5.0, 2.9, -1.0)]);
         let cutter = Cutter::flat(6.0).unwrap();
-        let envelope = Envelope::new(&cutter, &path);
-        let moves = Moves { envelope: &envelope, path: &path, radius: 3.0 };
+        let envelope = Envelope::new(cutter, &path);
+        let moves = Moves { envelope: &envelope, path: &path, cutters: &cutter.into() };
         let begin = |z: f64| moves.begin(0, &Line { from: Point2::origin(), way: Vector2::y(), z });
         assert!((begin(0.0).unwrap() + 0.1).abs() < 1e-12 && begin(-1.1).is_none());
     }

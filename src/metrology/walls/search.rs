@@ -49,7 +49,9 @@ pub(super) fn deepest(piece: &Piece, moves: &Moves<'_>, near: &[u32]) -> Deepest
         }
         let [a, b] = moves.ends(k);
         let tip = a.z.min(b.z) + FLOOR;
-        let Some(range) = stadium(&a.xy(), &b.xy(), moves.radius, piece.start, piece.along) else { continue };
+        let Some(range) = stadium(&a.xy(), &b.xy(), moves.radius(k), piece.start, piece.along) else {
+            continue;
+        };
         let range = [range[0].max(0.0), range[1].min(piece.length)];
         if range[0] > range[1] {
             continue;
@@ -75,7 +77,7 @@ fn may_cut(piece: &Piece, moves: &Moves<'_>, k: u32, known: f64) -> bool {
     }
     let leaning = piece.lean.abs() * (piece.high[0].max(piece.high[1]) - piece.low[0].min(piece.low[1]));
     let front = |p: Point2| (p - piece.start).dot(&piece.normal);
-    moves.radius - front(a.xy()).min(front(b.xy())) + leaning > known
+    moves.radius(k) - front(a.xy()).min(front(b.xy())) + leaning > known
 }
 
 /// How deep a move cuts at a place of a strip; below 0 where it does not.

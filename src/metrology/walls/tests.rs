@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::{Asked, Judged, Measurement, measure_with_walls};
+use cutter::Cutter;
 use geometry::TriangleMesh;
 use sim::scenes::path_through;
 use sim::{ZMap, cut};
@@ -68,7 +69,7 @@ fn measured(part: &Part, cutter: &Cutter, path: &Toolpath) -> Measurement {
     };
     let facing = Facing::new(part, path, area);
     assert!(facing.is_judged(Judged::Walls, PlaceKind::Wall));
-    measure_with_walls(part, cutter, path, &cut, &LIMITS, &asked, Some(&facing), &Silent).unwrap()
+    measure_with_walls(part, &cutter.into(), path, &cut, &LIMITS, &asked, Some(&facing), &Silent).unwrap()
 }
 
 /// Rows over the top, at the height of `z`, and a way around at the tip height `below` whose sides are `off` from the walls.

@@ -5,9 +5,8 @@
 //! closed-form cuts at their meeting, mm; places are shares of a line, from its left or lower end.
 
 use super::Node;
-use cutter::Cutter;
 use metrology::{CutSurface, Meetings};
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use sim::{Envelope, NOT_CUT, ZMap};
 
 /// Ridge points keep this share of a line from its ends and from each other, so that no triangle is
@@ -95,9 +94,9 @@ pub(super) struct RidgePoints {
 
 impl RidgePoints {
     /// Of the map that `path` has cut.
-    pub fn find(cut: &ZMap, cutter: &Cutter, path: &Toolpath) -> Self {
-        let surface = CutSurface::new(Envelope::new(cutter, path), cut, path);
-        let meetings = Meetings::new(&surface, cutter, path, flat_stock(cut));
+    pub fn find(cut: &ZMap, cutters: &Cutters, path: &Toolpath) -> Self {
+        let surface = CutSurface::new(Envelope::new(cutters, path), cut, path);
+        let meetings = Meetings::new(&surface, cutters, path, flat_stock(cut));
         let grid = &cut.grid;
         let rows = work::parallel::map(grid.ny, |j| {
             let mut row: Vec<RidgePoint> = Vec::new();

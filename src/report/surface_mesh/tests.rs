@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use super::*;
+use cutter::Cutter;
 use geometry::{Point2, Point3};
 use motion::Move;
 use sim::scenes::{Rng, cutters, path_through, random_path};
@@ -22,7 +23,7 @@ fn map(nx: usize, ny: usize, height: impl Fn(f64, f64) -> f64) -> ZMap {
 /// The mesh of a map without passes.
 fn smooth(map: &ZMap, bottom: f64, tolerance: f64, max_triangles: usize) -> Option<SurfaceMesh> {
     let (cutter, path) = (Cutter::ball(6.0).unwrap(), path_through([Point3::origin()]));
-    surface_mesh(map, &cutter, &path, bottom, tolerance, max_triangles)
+    surface_mesh(map, &cutter.into(), &path, bottom, tolerance, max_triangles)
 }
 
 fn wavy(x: f64, y: f64) -> f64 {
@@ -213,7 +214,7 @@ impl<'a> Top<'a> {
 fn ridges_between_cells_keep_their_height() {
     let tolerance = 2e-3;
     let (cut, cutter, path, height) = oblique_passes(0.1);
-    let mesh = surface_mesh(&cut, &cutter, &path, -5.0, tolerance, usize::MAX).unwrap();
+    let mesh = surface_mesh(&cut, &cutter.into(), &path, -5.0, tolerance, usize::MAX).unwrap();
     assert_closed(&mesh);
     let top = Top::new(&mesh, cut.grid);
     let ridge = height(0.25 / 0.3f64.cos() * 0.0, 0.25 / 0.3f64.cos());
@@ -255,7 +256,7 @@ fn maps_cut_at_random_stay_closed_and_within_the_tolerance() {
             let grid = Grid { origin: Point2::new(-1.0, 0.4), cell, nx, ny };
             let cut = cut_reference(&ZMap::block(grid, 3.0), cutter, &path, &Silent).unwrap();
             for tolerance in [1e-3, 0.01, 0.3] {
-                let mesh = surface_mesh(&cut, cutter, &path, -9.0, tolerance, usize::MAX).unwrap();
+                let mesh = surface_mesh(&cut, &cutter.into(), &path, -9.0, tolerance, usize::MAX).unwrap();
                 assert_closed(&mesh);
                 assert_eq!(mesh.tolerance, tolerance);
                 let (worst, found) = distance(&cut, &mesh);
@@ -272,9 +273,9 @@ fn maps_cut_at_random_stay_closed_and_within_the_tolerance() {
 #[test]
 fn ridge_points_are_those_of_a_dense_search() {
     let (cut, cutter, path, _) = oblique_passes(0.15);
-    let envelope = Envelope::new(&cutter, &path);
+    let envelope = Envelope::new(cutter, &path);
     let all: Vec<u32> = (0..path.len() as u32).collect();
-    let ridges = RidgePoints::find(&cut, &cutter, &path);
+    let ridges = RidgePoints::find(&cut, &cutter.into(), &path);
     let mut found = 0;
     for j in 0..cut.grid.ny {
         for point in ridges.of_cells(0, cut.grid.nx, j) {
@@ -299,7 +300,7 @@ fn ridge_points_are_those_of_a_dense_search() {
 #[test]
 fn points_of_some_cells_are_those_of_the_row_that_stand_there() {
     let (cut, cutter, path, _) = oblique_passes(0.1);
-    let ridges = RidgePoints::find(&cut, &cutter, &path);
+    let ridges = RidgePoints::find(&cut, &cutter.into(), &path);
     let nx = cut.grid.nx;
     let mut rng = Rng::new(5);
     for j in 0..cut.grid.ny {
@@ -323,7 +324,7 @@ fn threads_do_not_change_the_mesh() {
     let (cut, cutter, path, _) = oblique_passes(0.1);
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| surface_mesh(&cut, &cutter, &path, -5.0, 2e-3, 20_000))
+        pool.install(|| surface_mesh(&cut, &cutter.into(), &path, -5.0, 2e-3, 20_000))
     };
     let one = on(1);
     assert!([2, 3, 8].into_iter().all(|n| on(n) == one));
@@ -335,7 +336,7 @@ fn a_cut_that_ends_in_stock_ends_in_an_edge() {
     let path = path_through([Point3::new(-20.0, 3.03, 0.0), Point3::new(20.0, 3.03, 0.0)]);
     let grid = Grid { origin: Point2::origin(), cell: 0.1, nx: 80, ny: 80 };
     let cut = cut_reference(&ZMap::block(grid, 1.0), &cutter, &path, &Silent).unwrap();
-    let mesh = surface_mesh(&cut, &cutter, &path, -5.0, 1e-3, usize::MAX).unwrap();
+    let mesh = surface_mesh(&cut, &cutter.into(), &path, -5.0, 1e-3, usize::MAX).unwrap();
     assert_closed(&mesh);
     // The channel of a ball of radius 3 is 2√5 wide at 1 mm.
     let edges = mesh.vertices.iter().zip(&mesh.places).filter(|(_, place)| **place == VertexPlace::Ridge);

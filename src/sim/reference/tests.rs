@@ -85,7 +85,7 @@ fn blocks_leave_out_no_move_that_matters() {
         let path = wave_path(8.0, 0.8, 0.7);
         let stock = ZMap::block(square_grid(8.0, 0.05), 5.0);
         let got = cut(&stock, &cutter, &path);
-        let envelope = crate::Envelope::new(&cutter, &path);
+        let envelope = crate::Envelope::new(cutter, &path);
         let all: Vec<u32> = (0..path.len() as u32).collect();
         for k in 0..stock.grid.len() {
             let p = stock.grid.centre(k % stock.grid.nx, k / stock.grid.nx);

@@ -5,13 +5,27 @@ use std::fmt::{self, Write as _};
 use std::sync::Arc;
 
 use crate::vocabulary::{Definition, PartKind, Passes, PlanError, Strategy, Task};
-use cutter::Cutter;
+use cutter::{Cutter, Holder};
 use keys::{Located, toml_string};
-use motion::Toolpath;
+use motion::{Cutters, Toolpath};
 use program::{Control, Finding};
 
 /// Greatest number of a tool.
 const MOST_TOOLS: u32 = 99_999_999;
+
+/// Which tools of a program are measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ToolsMeant {
+    /// The one that cuts; there is no other.
+    TheOnly,
+    /// The tool of a number, with the scene's cutter.
+    Number(u32),
+    /// All, one after the other on one part, each with its own cutter.
+    All,
+}
+
+/// How scenes spell all tools.
+pub const ALL_TOOLS: &str = "all";
 
 /// A program from elsewhere.
 #[derive(Debug, Clone)]
@@ -20,8 +34,8 @@ pub struct ForeignProgram {
     pub file: String,
     /// The control that it is written for.
     pub control: &'static str,
-    /// The tool whose moves are meant; `None` where the program has one only.
-    pub tool: Option<u32>,
+    /// The tools whose moves are meant.
+    pub tools_meant: ToolsMeant,
     /// A table of tools as a scene names it: their lengths, which the control's registers are taken to hold.
     pub tools: Option<String>,
     /// What was read from the file; `None` until it is.
@@ -31,8 +45,10 @@ pub struct ForeignProgram {
 /// What was read from the file of a program.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadProgram {
-    /// The moves of the tool.
+    /// The moves of the tool, or of all.
     pub path: Toolpath,
+    /// The cutters of all tools and what holds them, where all are meant; else the scene's cutter makes all moves.
+    pub tools: Option<(Cutters, Vec<Option<Holder>>)>,
     /// What other tools of the program cut before, where the table of tools has their cutters.
     pub before: Vec<(Cutter, Toolpath)>,
     /// Whether other tools feed before this one whose cutters are not known.
@@ -55,12 +71,17 @@ pub(crate) static DEFINITION: Definition = Definition {
         let file = from.section.required_text("file", "job.nc")?;
         let control = from.section.word("control", &Control::words())?;
         let control = control.map_or(program::GENERAL_CONTROL.word, |word| word.value);
-        let tool = from.section.count("tool", 0..=MOST_TOOLS)?;
+        let tools_meant = if from.section.is_text("tool") {
+            from.section.word("tool", &[ALL_TOOLS])?;
+            ToolsMeant::All
+        } else {
+            from.section.count("tool", 0..=MOST_TOOLS)?.map_or(ToolsMeant::TheOnly, ToolsMeant::Number)
+        };
         let tools = from.section.text("tools")?;
         let named = |text: &Located<&str>| Located { value: text.value.to_owned(), span: text.span.clone() };
         from.tables.extend(std::iter::once(&file).chain(&tools).map(named));
         let tools = tools.map(|tools| tools.value.to_owned());
-        let program = ForeignProgram { file: file.value.to_owned(), control, tool, tools, read: None };
+        let program = ForeignProgram { file: file.value.to_owned(), control, tools_meant, tools, read: None };
         Ok(Box::new(program))
     },
 };
@@ -73,8 +94,10 @@ impl Strategy for ForeignProgram {
     fn write(&self, out: &mut String) -> fmt::Result {
         writeln!(out, "file = {}", toml_string(&self.file))?;
         writeln!(out, "control = \"{}\"", self.control)?;
-        if let Some(tool) = self.tool {
-            writeln!(out, "tool = {tool}")?;
+        match self.tools_meant {
+            ToolsMeant::TheOnly => {}
+            ToolsMeant::Number(tool) => writeln!(out, "tool = {tool}")?,
+            ToolsMeant::All => writeln!(out, "tool = \"{ALL_TOOLS}\"")?,
         }
         match &self.tools {
             Some(tools) => writeln!(out, "tools = {}", toml_string(tools)),

@@ -35,9 +35,10 @@ impl PartKind {
                 "longest_link",
                 "smoothing",
                 "axis",
+                "stock",
             ],
             Self::Pocket => &["name", "strategy", "stepover"],
-            Self::Any => &["name", "strategy"],
+            Self::Any => &["name", "strategy", "stock"],
         }
     }
 

@@ -1,0 +1,83 @@
+//! Paths one after the other, as one.
+
+use crate::{Move, MoveKind, Toolpath};
+
+/// Paths that run one after the other. Between two of them the tool is away: it rises above all of the path, and the next one
+/// comes from there.
+#[derive(Debug, Clone)]
+pub struct PathsInTurn {
+    path: Toolpath,
+    /// The highest place of the tip so far.
+    top: f64,
+    passes: u32,
+}
+
+impl PathsInTurn {
+    /// Begins with a path.
+    pub fn new(path: Toolpath) -> Self {
+        Self { top: highest(&path), passes: path.passes() as u32, path }
+    }
+
+    /// Adds a path, with rapids at a feed of `rapid_rate` mm/min; tells the index of its first move. The two rapids before
+    /// that are its own, too.
+    pub fn push(&mut self, next: Toolpath, rapid_rate: f64) -> u32 {
+        let (path, pass) = (&mut self.path, self.passes);
+        self.top = self.top.max(highest(&next));
+        let mut from = path.moves.last().map_or(path.start, |step| step.to);
+        let mut over = next.start;
+        (from.tip.z, over.tip.z) = (self.top, self.top);
+        for to in [from, over, next.start] {
+            path.moves.push(Move { to, kind: MoveKind::Rapid, feed_rate: rapid_rate, pass });
+            path.origin.lines.extend(next.origin.lines.first());
+        }
+        // The tool that was there rises itself.
+        let first = path.moves.len() as u32 - 2;
+        for (move_index, tool) in &next.origin.tools {
+            if path.origin.tools.last().is_none_or(|(_, last)| last != tool) {
+                path.origin.tools.push((first + if *move_index > 0 { move_index + 2 } else { 0 }, *tool));
+            }
+        }
+        self.passes += next.passes().max(1) as u32;
+        path.moves.extend(next.moves.into_iter().map(|step| Move { pass: step.pass + pass, ..step }));
+        path.origin.lines.extend(next.origin.lines);
+        first + 2
+    }
+
+    /// The path of all.
+    pub fn finish(self) -> Toolpath {
+        self.path
+    }
+}
+
+/// The highest place of the tip.
+fn highest(path: &Toolpath) -> f64 {
+    path.moves.iter().map(|step| step.to.tip.z).fold(path.start.tip.z, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ClPoint;
+    use geometry::Point3;
+
+    #[test]
+    fn the_tool_rises_above_all_between_two_paths() {
+        let at = |x: f64, z: f64| ClPoint::upright(Point3::new(x, 0.0, z));
+        let step = |x: f64, pass: u32| Move { to: at(x, 0.0), kind: MoveKind::Cut, feed_rate: 1.0, pass };
+        let path = |tool: u32, top: f64| {
+            let mut path = Toolpath::new(at(0.0, top), vec![step(1.0, 0), step(2.0, 1)]);
+            (path.origin.tools, path.origin.lines) = (vec![(0, tool)], vec![10 * tool, 10 * tool + 1]);
+            path
+        };
+        let mut all = PathsInTurn::new(path(1, 5.0));
+        assert_eq!((all.push(path(2, 7.0), 900.0), all.push(path(2, 3.0), 900.0)), (5, 10));
+        let all = all.finish();
+        let tips: Vec<[f64; 2]> = all.moves.iter().map(|step| [step.to.tip.x, step.to.tip.z]).collect();
+        assert_eq!(tips[2..5], [[2.0, 7.0], [0.0, 7.0], [0.0, 7.0]]);
+        assert_eq!(tips[7..10], [[2.0, 7.0], [0.0, 7.0], [0.0, 3.0]]);
+        let passes: Vec<u32> = all.moves.iter().map(|step| step.pass).collect();
+        assert_eq!(passes, [0, 1, 2, 2, 2, 2, 3, 4, 4, 4, 4, 5]);
+        assert_eq!(all.origin.lines, [10, 11, 20, 20, 20, 20, 21, 20, 20, 20, 20, 21]);
+        assert_eq!(all.origin.tools, [(0, 1), (3, 2)]);
+    }
+}
