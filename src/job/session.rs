@@ -46,7 +46,8 @@ const NEAREST_SHARE: f64 = 0.125;
 pub(crate) enum Closeness {
     /// As the verdict needs it.
     Verdict,
-    /// The highest place to `within` mm; no closer where it is above `limit`, mm, for certain, and the path is to be planned anew.
+    /// The highest place to `within` mm; no closer where it is above `limit`, mm, for certain, and the path is to be planned
+    /// anew.
     Plan { within: f64, limit: f64 },
 }
 

@@ -86,7 +86,8 @@ impl Machine {
         let refused = limits.into_iter().find(|(_, value, _)| !(*value > 0.0 && value.is_finite()));
         let rates = self.rates.map(|value| ("rate of an axis", value, "mm/min"));
         let accelerations = self.accelerations.map(|value| ("acceleration of an axis", value, "mm/s²"));
-        let single = || rates.into_iter().chain(accelerations).find(|(_, value, _)| !(*value > 0.0));
+        let single =
+            || rates.into_iter().chain(accelerations).find(|(_, value, _)| value.is_nan() || *value <= 0.0);
         match refused.or_else(single) {
             Some((what, value, unit)) => Err(MachineError { what, value, unit }),
             None => Ok(()),

@@ -7,8 +7,8 @@
 //! cut; it is found on the line between them where both cut equally high, from the heights and slopes at the
 //! places. Its length is that of the way from crossing to crossing through the triangles of the net.
 //! Where more may stand or lie between the places than was found, by the slope of the cut there, triangles are
-//! divided until the asked bound holds or [`MOST_DIVIDED`] of them are. A track that no place saw is seen all the
-//! same: the contacts of every move are places too.
+//! divided until the asked bound holds, or a closer one where a limit hangs on it, or [`MOST_DIVIDED`] of them are. A track that
+//! no place saw is seen all the same: the contacts of every move are places too.
 //!
 //! Engines by samples may miss what cuts between them: each place has a bound on how much deeper it may be cut
 //! ([`NormalHit::uncertain`]), which goes into the bounds of the figures.
