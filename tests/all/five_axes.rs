@@ -280,3 +280,26 @@ fn rays_and_voxels_measure_what_the_z_map_does() {
         assert!((a / b - 1.0).abs() < share, "{figure}: {a} {b}");
     }
 }
+
+/// A ridge that ends at the border between two places of the net: whatever their distance, the bounds hold it.
+#[test]
+fn what_stands_at_a_border_between_two_places_is_found() {
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/sources/location.toml");
+    let highest = |cell: f64| {
+        let cell = format!("[simulation]\ncell = {cell}\n[stock]");
+        let (_, report) =
+            run_changed(&scene, &[["[stock]", &cell]], |toolpath| toolpath.contains("along the normal"));
+        let of = |key: &str| number(&report, &format!("/toolpaths/0/excess/{key}"));
+        [of("max_mm"), of("error_bound_mm")]
+    };
+    // Every ridge ends at a place.
+    let [exact, bound] = highest(0.05);
+    assert!(exact > 0.025 && bound < 1e-3, "{exact} {bound}");
+    for cell in [0.4, 0.2, 0.13] {
+        let [height, bound] = highest(cell);
+        assert!(
+            height <= exact + 1e-6 && height + bound >= exact && bound < 1e-3,
+            "{cell}: {height} {bound} {exact}"
+        );
+    }
+}
