@@ -7,6 +7,11 @@ use motion::{Cutters, MoveKind, Toolpath};
 /// neighbouring turns of a spiral or loop, not neighbouring chords.
 const SAME_TRACK: f64 = 4.0;
 
+/// Moves of one pass feed in opposite directions where the cosine between them is less, and aside of each other where they are this
+/// share of the cutter's radius apart: the way back beside the way there.
+const OPPOSITE: f64 = -0.5;
+const ASIDE: f64 = 1e-3;
+
 /// A pass that ends this near to where it began is closed, mm: rounding of coordinates.
 const SAME_PLACE: f64 = 1e-9;
 
@@ -18,6 +23,8 @@ pub(crate) struct Tracks<'a> {
     /// Length of each pass that ends where it began, mm.
     closed: Vec<Option<f64>>,
     cutters: Cutters,
+    /// Whether a pass that feeds back beside its way there has two tracks, however short they are.
+    ways_back: bool,
 }
 
 impl<'a> Tracks<'a> {
@@ -39,7 +46,12 @@ impl<'a> Tracks<'a> {
             length += (to - from).norm();
             along.push(length);
         }
-        Self { path, along, closed, cutters: cutters.into() }
+        Self { path, along, closed, cutters: cutters.into(), ways_back: false }
+    }
+
+    /// The same; a pass that feeds back beside its way there has two tracks, however short they are.
+    pub fn with_ways_back(self) -> Self {
+        Self { ways_back: true, ..self }
     }
 
     /// What makes the moves.
@@ -63,6 +75,23 @@ impl<'a> Tracks<'a> {
         // Moves of one pass are made by one cutter.
         let same_track = SAME_TRACK * self.cutters.of_move(a).radius();
         let far = round.map_or(way, |round| way.min((round - way).abs())) > same_track;
-        (x.pass != y.pass && !linked) || far
+        (x.pass != y.pass && !linked) || far || self.ways_back && x.pass == y.pass && self.is_way_back(a, b)
+    }
+
+    /// Whether two cutting moves feed in opposite directions, aside of each other.
+    fn is_way_back(&self, a: u32, b: u32) -> bool {
+        let moves = [a, b].map(|k| {
+            let step = &self.path.moves[k as usize];
+            let from = self.path.start_of(k as usize);
+            (step.kind == MoveKind::Cut).then(|| (from, step.to.tip - from))
+        });
+        let [Some((p, along)), Some((q, back))] = moves else { return false };
+        let lengths = along.norm() * back.norm();
+        if lengths <= 0.0 || along.dot(&back) > OPPOSITE * lengths {
+            return false;
+        }
+        let middle = q + back * 0.5 - p;
+        let aside = middle.cross(&along).norm() / along.norm();
+        aside > ASIDE * self.cutters.of_move(a).radius()
     }
 }

@@ -281,7 +281,8 @@ fn rays_and_voxels_measure_what_the_z_map_does() {
     }
 }
 
-/// A ridge that ends at the border between two places of the net: whatever their distance, the bounds hold it.
+/// A program that feeds back and forth in one pass, in lines shorter than four radii. Its ridges end at the border between two
+/// places of the net: whatever their distance, the bounds hold them.
 #[test]
 fn what_stands_at_a_border_between_two_places_is_found() {
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/sources/location.toml");
@@ -289,6 +290,11 @@ fn what_stands_at_a_border_between_two_places_is_found() {
         let cell = format!("[simulation]\ncell = {cell}\n[stock]");
         let (_, report) =
             run_changed(&scene, &[["[stock]", &cell]], |toolpath| toolpath.contains("along the normal"));
+        assert!(
+            number(&report, "/toolpaths/0/scallop/max_mm") > 0.025,
+            "{}",
+            report["toolpaths"][0]["scallop"]
+        );
         let of = |key: &str| number(&report, &format!("/toolpaths/0/excess/{key}"));
         [of("max_mm"), of("error_bound_mm")]
     };
