@@ -12,6 +12,9 @@ use work::monitor::Silent;
 
 const LIMITS: Limits = Limits { scallop: 0.01, gouge: 0.005, uncut: 0.05, chord: 0.001 };
 const TOP: f64 = 2.0;
+
+const ASKED: Asked =
+    Asked { error_bound: 5e-4, stock_top: TOP, borders: true, most_cells: 1 << 20, most_squares: 1 << 20 };
 const SIZE: [f64; 2] = [12.0, 8.0];
 
 /// The passes of one cutter after the other, with a rapid to each pass, and where each cutter begins.
@@ -54,14 +57,7 @@ fn measured_by(
 ) -> Measurement {
     let grid = Grid::covering(&part.bounds(), cell, 64, 1 << 30).unwrap();
     let cut = cut_in_turn(engine, ZMap::block(grid, TOP), cutters, path, &Silent).unwrap();
-    let asked = Asked {
-        error_bound: 5e-4,
-        stock_top: TOP,
-        borders: true,
-        most_cells: 1 << 20,
-        most_squares: 1 << 20,
-    };
-    measure_with_walls(part, cutters, path, &cut, &LIMITS, &asked, None, &Silent).unwrap()
+    measure_with_walls(part, cutters, path, &cut, &LIMITS, &ASKED, None, &Silent).unwrap()
 }
 
 fn measured(part: &Part, tools: &[(Cutter, Vec<Vec<Point3>>)]) -> Measurement {
@@ -218,13 +214,6 @@ fn a_cutter_that_comes_again_changes_no_figure() {
     assert_eq!((twice.excess, twice.deviation), (once.excess, once.deviation));
     let grid = Grid::covering(&part.bounds(), 0.1, 64, 1 << 30).unwrap();
     let cut = cut(ZMap::block(grid, TOP), &ball(), &path, &Silent).unwrap();
-    let asked = Asked {
-        error_bound: 5e-4,
-        stock_top: TOP,
-        borders: true,
-        most_cells: 1 << 20,
-        most_squares: 1 << 20,
-    };
-    let alone = measure(&part, &ball(), &path, &cut, &LIMITS, &asked, &Silent).unwrap();
+    let alone = measure(&part, &ball(), &path, &cut, &LIMITS, &ASKED, &Silent).unwrap();
     assert_eq!((alone.scallop, alone.gouge), (once.scallop, once.gouge));
 }

@@ -7,8 +7,8 @@ use motion::{Cutters, MoveKind, Toolpath};
 /// neighbouring turns of a spiral or loop, not neighbouring chords.
 const SAME_TRACK: f64 = 4.0;
 
-/// Moves of one pass feed in opposite directions where the cosine between them is less, and aside of each other where they are this
-/// share of the cutter's radius apart: the way back beside the way there.
+/// Moves of one pass feed in opposite directions where the cosine between them is less, and aside of each other where they are
+/// this share of the cutter's radius apart: the way back beside the way there.
 const OPPOSITE: f64 = -0.5;
 const ASIDE: f64 = 1e-3;
 
