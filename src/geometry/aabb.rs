@@ -28,12 +28,14 @@ impl Aabb {
     }
 
     /// Enlarges the box to hold `p`.
+    #[inline]
     pub fn grow(&mut self, p: &Point3) {
         self.min = self.min.inf(p);
         self.max = self.max.sup(p);
     }
 
     /// The smallest box that holds both.
+    #[inline]
     pub fn union(&self, other: &Self) -> Self {
         Self { min: self.min.inf(&other.min), max: self.max.sup(&other.max) }
     }

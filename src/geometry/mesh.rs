@@ -246,6 +246,7 @@ impl TriangleMesh {
     }
 
     /// The three corners of triangle `t`.
+    #[inline]
     pub fn corners(&self, t: usize) -> [Point3; 3] {
         self.triangles[t].map(|i| self.vertices[i as usize])
     }

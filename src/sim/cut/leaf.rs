@@ -35,6 +35,8 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
         [nx, ny]: [usize; 2],
     ) {
         let infinite = T::of(f64::INFINITY);
+        // A copy: numbers that loops read through a reference keep their branches, and so become no vector code.
+        let sweep = self.sweep;
         let first = self.square_at([i, j], [1, 1]);
         let diagonal = (x[CELLS - 1] * x[CELLS - 1] + y[CELLS - 1] * y[CELLS - 1]).sqrt();
         // Through arrays of a fixed length: loops over those become vector code. Read long before they are needed:
@@ -61,7 +63,7 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
             if chosen[q] == 0 {
                 continue;
             }
-            let near = Near::of(&self.sweep, chunk, &first, diagonal);
+            let near = Near::of(&sweep, chunk, &first, diagonal);
             second_look |= near.bound_only & chosen[q] != 0;
             for lane in ones(chosen[q]) {
                 let (m, index) = (chunk.lane(lane), chunk.name(lane).index());
@@ -79,13 +81,13 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
                         (&mut height[cells.clone()], &mut by[cells.clone()], &mut doubt[cells]);
                     if near.inner & (1 << lane) != 0 {
                         for c in 0..LANES {
-                            let h = self.sweep.inner_height(&m, a + along[c], w + across[c]);
+                            let h = sweep.inner_height(&m, a + along[c], w + across[c]);
                             by[c] = if h < height[c] { index } else { by[c] };
                             height[c] = h.smaller(height[c]);
                         }
                     } else {
                         for c in 0..LANES {
-                            let (h, d) = self.sweep.height(&m, a + along[c], w + across[c]);
+                            let (h, d) = sweep.height(&m, a + along[c], w + across[c]);
                             by[c] = if h < height[c] { index } else { by[c] };
                             height[c] = h.smaller(height[c]);
                             doubt[c] = d.smaller(doubt[c]);
