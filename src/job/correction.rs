@@ -89,6 +89,9 @@ pub(crate) struct CorrectionRound {
     pub cutting_length_mm: f64,
     /// Least and greatest factor of the widths that the round was planned with.
     pub factors: [f64; 2],
+    /// How much nearer than asked the tool comes to anything between passes, mm; `None` where it keeps clear.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub too_near_between_mm: Option<f64>,
     /// Whether all was measured as the verdict is, and not ridges alone on cells that just show them.
     pub measured: bool,
 }
@@ -124,6 +127,7 @@ impl Standing {
             over_target_fraction: map.scallop.over_target_fraction,
             cutting_length_mm: path_figures(&planned.plan.path, 0.0).cutting_length_mm,
             factors,
+            too_near_between_mm: too_near(planned),
             measured: false,
         };
         let places = map.above.iter().map(|place| (place.at, place.height));
@@ -144,6 +148,7 @@ impl Standing {
             over_target_fraction: scallop.over_target_fraction,
             cutting_length_mm: path_figures(&planned.plan.path, 0.0).cutting_length_mm,
             factors,
+            too_near_between_mm: too_near(planned),
             measured: true,
         };
         let places = measured.above.iter().map(|place| (place.at, place.height));
@@ -178,9 +183,13 @@ impl CorrectionRound {
         bound.unwrap_or(0.0)
     }
 
-    /// Whether this round is to be kept instead of another: first what holds the target, then what is shorter; where neither
-    /// holds it, the one with the lower ridge.
+    /// Whether this round is to be kept instead of another: first what keeps clear between passes, then what holds the target,
+    /// then what is shorter; where neither holds it, the one with the lower ridge.
     fn is_better(&self, other: &Self, goal: &Goal) -> bool {
+        let clear = [self, other].map(|round| round.too_near_between_mm.is_none());
+        if clear[0] != clear[1] {
+            return clear[0];
+        }
         match (self.holds(goal), other.holds(goal)) {
             (true, true) => self.cutting_length_mm < other.cutting_length_mm,
             (false, false) => self.highest() < other.highest(),
@@ -450,6 +459,11 @@ impl Corrected<'_> {
     }
 }
 
+/// [`CorrectionRound::too_near_between_mm`] of a plan.
+fn too_near(planned: &Planned) -> Option<f64> {
+    Some(planned.plan.too_near_between).filter(|missing| *missing > 0.0)
+}
+
 /// The height that corrected ridges are to have, mm.
 fn aim(target: f64) -> f64 {
     (1.0 - 0.5 * SLACK) * target
@@ -558,12 +572,18 @@ mod tests {
             over_target_fraction: Some(if highest_mm > 1.0 { 0.02 } else { 0.0 }),
             cutting_length_mm,
             factors: [1.0; 2],
+            too_near_between_mm: None,
             measured: true,
         };
         let strict = Goal { target: 1.0, rule: ScallopRule::default() };
         let better = |a: CorrectionRound, b: CorrectionRound| a.is_better(&b, &strict);
         assert!(better(round(0.8, 20.0), round(1.05, 10.0)) && !better(round(1.05, 10.0), round(0.8, 20.0)));
         assert!(better(round(0.8, 9.0), round(0.7, 10.0)) && better(round(1.1, 20.0), round(1.2, 10.0)));
+        // No ridge is a reason to keep what collides.
+        let colliding = |round| CorrectionRound { too_near_between_mm: Some(3.0), ..round };
+        assert!(better(round(1.2, 20.0), colliding(round(0.8, 10.0))));
+        assert!(!better(colliding(round(0.8, 10.0)), round(1.2, 20.0)));
+        assert!(better(colliding(round(0.8, 9.0)), colliding(round(0.7, 10.0))));
         // What the scene lets stand above the target is no reason for another plan.
         let lenient = |share: f64, highest: f64| Goal { rule: ScallopRule { share, highest }, ..strict };
         assert!(round(1.2, 10.0).holds(&lenient(0.95, 1.5)) && !round(1.2, 10.0).holds(&strict));

@@ -77,7 +77,7 @@ impl Session {
         let scene = &self.scene;
         let strategy = self.strategy(request)?;
         if let Some(read) = request.foreign() {
-            let plan = Plan::of_program(read.path.clone(), read.notes.clone());
+            let plan = Plan::of_path(read.path.clone(), read.notes.clone());
             return Ok(Planned {
                 plan,
                 strategy,

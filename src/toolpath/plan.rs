@@ -31,12 +31,14 @@ pub struct Plan {
     pub field: Option<PlannedField>,
     /// The functions that its passes are levels of.
     pub functions: Vec<Levelled>,
+    /// How much nearer than asked a tool that leans comes to anything between its passes, mm; 0 where it keeps clear.
+    pub too_near_between: f64,
 }
 
 impl Plan {
-    /// A path that was read and not planned.
-    pub fn of_program(path: Toolpath, notes: Vec<String>) -> Self {
-        Self { path, notes, shortest: None, field: None, functions: Vec::new() }
+    /// A path and nothing else to tell of it.
+    pub fn of_path(path: Toolpath, notes: Vec<String>) -> Self {
+        Self { path, notes, shortest: None, field: None, functions: Vec::new(), too_near_between: 0.0 }
     }
 
     fn new(
@@ -55,7 +57,7 @@ impl Plan {
         if path.is_empty() {
             notes.push("no pass reaches the part: the program is empty".into());
         }
-        Self { path, notes, shortest: None, field, functions: Vec::new() }
+        Self { path, notes, shortest: None, field, functions: Vec::new(), too_near_between: 0.0 }
     }
 }
 
@@ -144,8 +146,8 @@ pub fn plan_tilted(
         TiltedPasses::located(touches, settings.chord_tolerance)
     };
     touches.smoothing = settings.joining.smoothing.then_some(SAMPLING_OVER_RADIUS * cutter.radius());
-    let path = join_tilted(touches, strategy.both_ways(), tilting, &setup, &mut notes)?;
-    Ok(Plan { functions, ..Plan::new(path, notes, field, &contacts, strategy) })
+    let (path, too_near_between) = join_tilted(touches, strategy.both_ways(), tilting, &setup, &mut notes)?;
+    Ok(Plan { functions, too_near_between, ..Plan::new(path, notes, field, &contacts, strategy) })
 }
 
 /// The passes of a strategy, not yet joined.

@@ -164,3 +164,31 @@ fn evaluations_hardly_grow_with_the_moves() {
     };
     assert!(per_cell(0.5) < 4.0 && per_cell(0.05) < 8.0, "{} {}", per_cell(0.5), per_cell(0.05));
 }
+
+/// Loops over cells are vector code for every family: where those of one are not, it is two to five times as slow.
+#[test]
+#[ignore = "times: every night"]
+fn every_family_is_cut_in_vector_code() {
+    let path = wave_path(10.0, 0.3, 0.2);
+    let stock = ZMap::block(square_grid(10.0, 0.05), 5.0);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let seconds = |work: &(dyn Fn() + Sync)| {
+        let start = std::time::Instant::now();
+        work();
+        start.elapsed().as_secs_f64()
+    };
+    for cutter in cutters().into_iter().take(5) {
+        pool.install(|| {
+            let mut least = [f64::INFINITY; 2];
+            // In turns, and the least of each: others only ever add time.
+            for _ in 0..9 {
+                let ours = seconds(&|| drop(cut(stock.clone(), &cutter, &path, &Silent)));
+                let reference = seconds(&|| drop(cut_reference(&stock, &cutter, &path, &Silent)));
+                least = [least[0].min(ours), least[1].min(reference)];
+            }
+            let ratio = least[1] / least[0];
+            println!("{cutter:?}: {ratio:.1} times as fast as the reference");
+            assert!(ratio > 5.0, "{cutter:?}: only {ratio:.1} times as fast as the reference");
+        });
+    }
+}

@@ -32,7 +32,7 @@ const EVENINGS: usize = 2;
 /// Moves take an axis off that of its pass by no more than this share of what it may turn to the pass beside it.
 const STRAYING: f64 = 5e-3;
 
-/// Joins passes; see the module.
+/// Joins passes; see the module. Leaves, beside the path, [`crate::Plan::too_near_between`].
 ///
 /// # Errors
 /// [`PlanError::Axis`] where the rule gives no axis for a pass fed the other way round, or cancelled.
@@ -42,7 +42,7 @@ pub(crate) fn join_tilted(
     tilting: &Tilting,
     setup: &Setup<'_>,
     notes: &mut Vec<String>,
-) -> Result<Toolpath, PlanError> {
+) -> Result<(Toolpath, f64), PlanError> {
     let Setup { part, cutter, settings, monitor } = *setup;
     let TiltedPasses { passes, tolerance, smoothing } = passes;
     let passes: Vec<Vec<Touch>> = passes.into_iter().filter(|p| p.len() >= 2).collect();
@@ -92,8 +92,12 @@ pub(crate) fn join_tilted(
         ways.between(&pieces[k].ends[1], &pieces[k + 1].ends[0], monitor)
     })?;
     let path = program(&pieces, &between, &ways, settings);
-    notes.extend(tilting.interference.and_then(|keep| too_near_between(keep, &path)));
-    Ok(path)
+    let too_near = tilting.interference.and_then(|keep| too_near_between(keep, &path));
+    let missing = too_near.map_or(0.0, |(missing, note)| {
+        notes.push(note);
+        missing
+    });
+    Ok((path, missing))
 }
 
 /// The passes repaired so that the tool stays clear, with axes that turn as slowly as is asked for.
@@ -191,12 +195,12 @@ fn program(pieces: &[LocatedPass], between: &[Vec<Leg>], ways: &Ways, settings: 
     Toolpath::new(start, moves)
 }
 
-/// What the tool comes too near to between passes, in words.
-fn too_near_between(keep: &Interference, path: &Toolpath) -> Option<String> {
+/// How much nearer than asked the tool comes to anything between passes at most, mm, and that in words.
+fn too_near_between(keep: &Interference, path: &Toolpath) -> Option<(f64, String)> {
     let found = keep.on_path(path, |to| !to.kind.is_on_surface());
     let (_, worst) = found.iter().max_by(|a, b| a.1.depth.total_cmp(&b.1.depth))?;
     let p = worst.nearest.place;
-    Some(format!(
+    let note = format!(
         "{} moves between passes come nearer to part or fixtures than asked; {:.3} mm are missing at ({:.3}, {:.3}, {:.3}): \
          lean the tool otherwise there, or clear the way",
         found.len(),
@@ -204,7 +208,8 @@ fn too_near_between(keep: &Interference, path: &Toolpath) -> Option<String> {
         p.x,
         p.y,
         p.z
-    ))
+    );
+    Some((worst.depth, note))
 }
 
 /// A pass as it is visited.

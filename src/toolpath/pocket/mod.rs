@@ -187,7 +187,7 @@ pub fn plan_pocket(
         run.points = descend::shortened(&run.points, chords, MOVE_OVER_RADIUS * radius, turn, holds);
     }
     let path = descend::program(&runs, pocket.depth, strategy, settings);
-    Ok(Plan { path, notes, shortest: None, field: None, functions: Vec::new() })
+    Ok(Plan::of_path(path, notes))
 }
 
 /// Keeps all runs where the cutter's centre may be.
