@@ -56,6 +56,10 @@ const SHORTER_CHORDS: f64 = 0.25;
 /// No width is corrected by more than this factor in a round.
 const MOST_NARROWED: f64 = 0.5;
 
+/// What stands more times as high as the target is no matter of widths. Two rounds take an interval to a quarter by
+/// [`MOST_NARROWED`], and ridges to a sixteenth: what is higher was never cut, and plans by other widths do not cut it either.
+const NEVER_CUT: f64 = 16.0;
+
 /// A place whose factor is less than one by more than this was narrowed before.
 const STILL_WIDE: f64 = 1e-6;
 
@@ -372,9 +376,12 @@ impl Corrected<'_> {
     /// elsewhere; one that is too low gets wider ones. Levels are placed anew in each plan, so that other places may stand
     /// too high then: these are narrowed as well, from the last plan on. Last of all everything is narrowed in proportion, to
     /// which remnants along borders do not give way. `None` where the best plan holds the target and comes within `slack` of
-    /// it, or what there is was tried `in_vain`.
+    /// it, where it leaves what was never cut, or where what there is was tried `in_vain`.
     fn next(&self, in_vain: usize, slack: f64) -> Option<Widths> {
         let (target, round) = (self.goal.target, &self.standing.round);
+        if round.highest() > NEVER_CUT * target {
+            return None;
+        }
         let scaled = |height: f64| self.widths.scaled((aim(target) / height).sqrt().max(MOST_NARROWED));
         let in_proportion =
             || (round.highest_mm + round.margin(target) > target).then(|| scaled(round.highest_mm));

@@ -563,11 +563,16 @@ impl Session {
         aside::run(monitor, move || Part::from_patches(patches, nearest).ok())
     }
 
-    /// The block that the part is cut from, as far as it was roughed before.
-    pub(crate) fn voxel_stock(&self) -> VoxelStock {
+    /// The block that the part is cut from.
+    pub(crate) fn stock_block(&self) -> Aabb {
         let Aabb { mut min, mut max } = self.area();
         (min.z, max.z) = (min.z - BASE, self.top);
-        let block = Aabb { min, max };
+        Aabb { min, max }
+    }
+
+    /// That block, as far as it was roughed before.
+    pub(crate) fn voxel_stock(&self) -> VoxelStock {
+        let block = self.stock_block();
         match self.scene.stock.roughed {
             Some(over) => VoxelStock::roughed(block, self.part.mesh().clone(), over),
             None => VoxelStock::Box(block),

@@ -23,8 +23,6 @@ pub(crate) struct Tracks<'a> {
     /// Length of each pass that ends where it began, mm.
     closed: Vec<Option<f64>>,
     cutters: Cutters,
-    /// Whether a pass that feeds back beside its way there has two tracks, however short they are.
-    ways_back: bool,
 }
 
 impl<'a> Tracks<'a> {
@@ -46,12 +44,7 @@ impl<'a> Tracks<'a> {
             length += (to - from).norm();
             along.push(length);
         }
-        Self { path, along, closed, cutters: cutters.into(), ways_back: false }
-    }
-
-    /// The same; a pass that feeds back beside its way there has two tracks, however short they are.
-    pub fn with_ways_back(self) -> Self {
-        Self { ways_back: true, ..self }
+        Self { path, along, closed, cutters: cutters.into() }
     }
 
     /// What makes the moves.
@@ -65,7 +58,8 @@ impl<'a> Tracks<'a> {
         [x.min(y), x.max(y)]
     }
 
-    /// True when two moves belong to neighbouring tracks.
+    /// True when two moves belong to neighbouring tracks. A pass that feeds back beside its way there has two, however short
+    /// they are.
     pub fn apart(&self, a: u32, b: u32) -> bool {
         let [x, y] = [a, b].map(|k| &self.path.moves[k as usize]);
         let linked = x.kind == MoveKind::Link || y.kind == MoveKind::Link;
@@ -75,7 +69,7 @@ impl<'a> Tracks<'a> {
         // Moves of one pass are made by one cutter.
         let same_track = SAME_TRACK * self.cutters.of_move(a).radius();
         let far = round.map_or(way, |round| way.min((round - way).abs())) > same_track;
-        (x.pass != y.pass && !linked) || far || self.ways_back && x.pass == y.pass && self.is_way_back(a, b)
+        (x.pass != y.pass && !linked) || far || x.pass == y.pass && self.is_way_back(a, b)
     }
 
     /// Whether two cutting moves feed in opposite directions, aside of each other.

@@ -107,6 +107,23 @@ fn a_sound_program_passes_in_every_format() {
     assert!(html.stdout.starts_with("<!DOCTYPE html>"), "{}", &html.stdout[..100]);
 }
 
+/// The raster the other way: lines shorter than four radii, fed back and forth without a rapid, are tracks of their own.
+#[test]
+fn ridges_between_short_lines_of_one_pass_are_found() {
+    let mut program = raster()[..9].to_vec();
+    for k in 0..=(SIZE[0] / STEP) as usize {
+        let ends = if k % 2 == 0 { [0.0, SIZE[1]] } else { [SIZE[1], 0.0] };
+        program.extend(ends.map(|y| format!("X{:.3} Y{y:.3}", STEP * k as f64)));
+    }
+    program.extend(["G0 Z10", "M5", "M30", "%"].map(str::to_owned));
+    let (answer, report) = verify(&program, &[]);
+    let report = report.unwrap();
+    let height = 3.0 - (9.0 - 0.25 * STEP * STEP).sqrt();
+    let found = report["toolpaths"][0]["scallop"]["max_mm"].as_f64();
+    assert!(found.is_some_and(|found| (found - height).abs() < 1e-6), "{found:?} {height}\n{}", answer.stdout);
+    assert_eq!(report["verdict"], "pass", "{}", answer.stdout);
+}
+
 #[test]
 fn it_stands_beside_planned_paths_in_one_table() {
     let home = tempfile::tempdir().unwrap();

@@ -198,7 +198,7 @@ impl Along<'_> {
         monitor: &dyn Monitor,
     ) -> Result<(Measurement, NormalMap), Cancelled> {
         let Self { part, cutters, path, engine, limits, spacing, asked, most_divided } = *self;
-        let tracks = Tracks::new(path, cutters).with_ways_back();
+        let tracks = Tracks::new(path, cutters);
         let radius = cutters.greatest(|cutter| {
             let corner = cutter.corner_radius();
             if corner > 0.0 { corner } else { cutter.radius() }

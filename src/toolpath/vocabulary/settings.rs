@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::{Correction, Levelled};
+use geometry::Aabb;
 
 /// How far neighbouring passes lie apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,6 +52,9 @@ pub struct PlanSettings {
     pub clearance: f64,
     /// Highest point of the stock, mm.
     pub stock_top: f64,
+    /// The stock as a block, mm: between passes a tool that leans goes around it. `None` where it is as wide as the part, and
+    /// reaches from the part's lowest point to `stock_top`.
+    pub stock: Option<Aabb>,
     /// Feed along passes, mm/min.
     pub feed_rate: f64,
     /// Feed down to a pass, mm/min.
@@ -108,6 +112,7 @@ impl Default for PlanSettings {
             chord_tolerance: CHORD_TOLERANCE,
             clearance: CLEARANCE,
             stock_top: 0.0,
+            stock: None,
             feed_rate: FEED_RATE,
             plunge_rate: PLUNGE_RATE,
             rapid_rate: RAPID_RATE,

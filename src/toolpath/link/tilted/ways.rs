@@ -5,7 +5,8 @@
 //!   all fed, since stock may stand.
 //! - Over the block that holds part and stock: out along the axis, straight over or over the top of the block, and in.
 //! - Around a sphere that holds the block, and is larger by the tool's greatest radius: with the tip on it every place of the
-//!   tool is outside of the block while its axis points away from the middle.
+//!   tool is outside of the block while its axis points away from the middle. Where an axis that turns evenly does not, it is
+//!   turned away first.
 //!
 //! The way out along the axis, which the cutter has come free of, and what is outside of the block are run at rapid rate. In the
 //! block the tool comes in at the feed, for stock may stand where it comes.
@@ -161,12 +162,14 @@ impl<'a> Ways<'a> {
     /// # Errors
     /// [`Cancelled`] when the monitor says so.
     pub fn between(&self, from: &Touch, to: &Touch, monitor: &dyn Monitor) -> Result<Vec<Leg>, Cancelled> {
-        let mut around = self.around(&self.sphere, &from.at, &to.at);
-        let mut clear = self.is_clear(&from.at, &around, self.touching);
-        if !clear {
-            around = self.around(&self.widest, &from.at, &to.at);
-            clear = self.is_clear(&from.at, &around, self.touching);
-        }
+        let ways = [Sphere::around_to, Sphere::around_pointing_away];
+        let mut ways = ways.iter().flat_map(|way| [&self.sphere, &self.widest].map(|sphere| (sphere, way)));
+        let mut around = Vec::new();
+        let clear = ways.any(|(sphere, way)| {
+            let is_outside;
+            (is_outside, around) = self.around(sphere, *way, &from.at, &to.at);
+            is_outside && self.is_clear(&from.at, &around, self.touching)
+        });
         let mut best = (clear, self.time(&from.at, &around), around);
         let mut take = |way: Option<Vec<Leg>>| {
             if let Some(way) = way {
@@ -330,13 +333,20 @@ impl<'a> Ways<'a> {
         None
     }
 
-    /// Out along the axis, around the sphere, and in along the axis there.
-    fn around(&self, sphere: &Sphere, from: &ClPoint, to: &ClPoint) -> Vec<Leg> {
+    /// Out along the axis, around the sphere in some way, and in along the axis there; and whether the tool is outside of the
+    /// block all around.
+    fn around(
+        &self,
+        sphere: &Sphere,
+        way: fn(&Sphere, &ClPoint, &ClPoint) -> Vec<ClPoint>,
+        from: &ClPoint,
+        to: &ClPoint,
+    ) -> (bool, Vec<Leg>) {
         let (a, b) = (sphere.exit(from), sphere.exit(to));
-        let mut moves = vec![(self.off(from, &a), MoveKind::Retract), (a, MoveKind::Rapid)];
-        moves.extend(sphere.around_to(&a, &b).into_iter().map(|at| (at, MoveKind::Rapid)));
-        moves.extend(self.down(&b, to));
-        moves
+        let over: Vec<Leg> = way(sphere, &a, &b).into_iter().map(|at| (at, MoveKind::Rapid)).collect();
+        let is_outside = self.is_clear(&a, &over, &self.outside);
+        let off = [(self.off(from, &a), MoveKind::Retract), (a, MoveKind::Rapid)];
+        (is_outside, off.into_iter().chain(over).chain(self.down(&b, to)).collect())
     }
 
     /// The clearance off a place towards one outside on its axis, or that place if it is nearer.
@@ -361,7 +371,7 @@ fn turns(from: &ClPoint, to: &ClPoint) -> usize {
 
 /// Part and stock.
 fn stock_bounds(part: &Part, settings: &PlanSettings) -> Aabb {
-    let mut bounds = part.bounds();
+    let mut bounds = settings.stock.map_or(part.bounds(), |stock| part.bounds().union(&stock));
     bounds.max.z = bounds.max.z.max(settings.stock_top);
     bounds
 }
@@ -389,7 +399,16 @@ impl Sphere {
         ClPoint { tip: from.tip + axis * way.max(0.0), axis }
     }
 
-    /// The way from one place outside to another around the sphere, its end included.
+    /// As [`Self::around_to`], with the axis turned away from the middle first and back last: clear of what the sphere holds
+    /// whatever the axes at both ends, which may be opposite, as on two sides of a blade.
+    fn around_pointing_away(&self, from: &ClPoint, to: &ClPoint) -> Vec<ClPoint> {
+        let away = |tip: Point3| ClPoint { tip, axis: (tip - self.centre).normalize() };
+        let [a, b] = [away(from.tip), away(to.tip)];
+        let between = self.around_to(&a, &b).into_iter().map(|at| away(at.tip));
+        evenly(from, &a).into_iter().chain(between).chain(evenly(&b, to)).collect()
+    }
+
+    /// The way from one place outside to another around the sphere, its end included, while the axis turns evenly.
     fn around_to(&self, from: &ClPoint, to: &ClPoint) -> Vec<ClPoint> {
         let [a, b] = [from, to].map(|at| (at.tip - self.centre).normalize());
         let angle = a.cross(&b).norm().atan2(a.dot(&b));
@@ -441,6 +460,13 @@ mod tests {
             Point3::new(pick(0), pick(1), pick(2))
         });
         let corners: Vec<Point3> = corners.collect();
+        let assert_clear = |at: &ClPoint, what: &dyn std::fmt::Debug| {
+            for q in &corners {
+                let distance = tool.distance(&at.tip, &at.axis, q);
+                assert!(distance >= settings.clearance - 1e-9, "{what:?} {q}: {distance}");
+            }
+        };
+        let mut places: Vec<ClPoint> = Vec::new();
         for k in 0..200 {
             let (turn, height) = (f64::from(k) * 2.4, -0.99 + 1.98 * f64::from(k) / 199.0);
             let flat = (1.0f64 - height * height).sqrt();
@@ -450,10 +476,19 @@ mod tests {
                 let axis = radial * f64::cos(lean) + across * f64::sin(lean);
                 // The middle of a chord of the way around lies deepest.
                 let tip = sphere.centre + radial * (sphere.radius * (0.5 * SPHERE_STEP).cos());
-                for q in &corners {
-                    let distance = tool.distance(&tip, &axis, q);
-                    assert!(distance >= settings.clearance - 1e-9, "{k} {lean} {q}: {distance}");
-                }
+                assert_clear(&ClPoint { tip, axis }, &(k, lean));
+                places.push(sphere.exit(&ClPoint { tip: sphere.centre + radial * sphere.radius, axis }));
+            }
+        }
+        // From any of them to any other, also where the axes are opposite.
+        for (k, from) in places.iter().enumerate() {
+            let to = &places[(k * 379 + 401) % places.len()];
+            let way = sphere.around_pointing_away(from, to);
+            assert!((way[way.len() - 1].tip - to.tip).norm() < 1e-9);
+            let mut at = from;
+            for next in &way {
+                (0..=8).for_each(|n| assert_clear(&at.towards(next, f64::from(n) / 8.0), &(k, n)));
+                at = next;
             }
         }
     }
