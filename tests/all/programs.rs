@@ -120,7 +120,11 @@ fn ridges_between_short_lines_of_one_pass_are_found() {
     let report = report.unwrap();
     let height = 3.0 - (9.0 - 0.25 * STEP * STEP).sqrt();
     let found = report["toolpaths"][0]["scallop"]["max_mm"].as_f64();
-    assert!(found.is_some_and(|found| (found - height).abs() < 1e-6), "{found:?} {height}\n{}", answer.stdout);
+    assert!(
+        found.is_some_and(|found| (found - height).abs() < 1e-6),
+        "{found:?} {height}\n{}",
+        answer.stdout
+    );
     assert_eq!(report["verdict"], "pass", "{}", answer.stdout);
 }
 
