@@ -431,7 +431,9 @@ impl<T: Real, S: Sweep<T>> Worker<'_, '_, T, S> {
         let Level { moves, chosen, kept } = &mut self.levels[level];
         let margin = T::of(self.job.margin);
         self.work.tests += (moves.len() * Q) as u64;
-        *kept = self.chooser.choose(&{ self.sweep }, moves, &places, &stocks, margin, side > PART, chosen);
+        // A copy, as in a leaf.
+        let sweep = self.sweep;
+        *kept = self.chooser.choose(&sweep, moves, &places, &stocks, margin, side > PART, chosen);
     }
 
     /// Marks all of the level's moves for each square.

@@ -439,11 +439,14 @@ mod tests {
     fn on_the_sphere_no_tool_that_points_away_touches_the_block() {
         let plane = AnalyticSurface::new(AnalyticShape::Plane { height: 0.0 }, [[-6.0, 14.0], [0.0, 9.0]]);
         let part = Part::from_patches(vec![Patch::Analytic(plane.unwrap())], 0.01).unwrap();
+        let stock = Aabb { min: Point3::new(-6.0, -7.0, -5.0), max: Point3::new(14.0, 9.0, 4.0) };
         let settings = PlanSettings {
             step: Step::Stepover(1.0),
             chord_tolerance: 0.005,
             clearance: 0.5,
             stock_top: 4.0,
+            // Wider than the part on one side, and deeper.
+            stock: Some(stock),
             feed_rate: 1000.0,
             plunge_rate: 300.0,
             rapid_rate: 15_000.0,
@@ -454,9 +457,8 @@ mod tests {
         let tool =
             Solid::of_tool(&Cutter::bull(10.0, 2.0).unwrap(), &Holder::new(4.0, vec![section]).unwrap());
         let sphere = Sphere::around(&stock_bounds(&part, &settings), &settings, tool.radius());
-        let bounds = Block::of(&part, &PlanSettings { clearance: 0.0, ..settings }).bounds;
         let corners = (0..8).map(|i| {
-            let pick = |c: usize| if i >> c & 1 == 1 { bounds.max[c] } else { bounds.min[c] };
+            let pick = |c: usize| if i >> c & 1 == 1 { stock.max[c] } else { stock.min[c] };
             Point3::new(pick(0), pick(1), pick(2))
         });
         let corners: Vec<Point3> = corners.collect();
