@@ -37,7 +37,7 @@ const MOST_MEASURED: usize = 3;
 
 /// The same while the best plan stands above the target by no more than [`NEAR`]: what is left is little, and its cost is not in
 /// vain.
-const MOST_MEASURED_NEAR: usize = 6;
+const MOST_MEASURED_NEAR: usize = 8;
 
 /// A plan whose highest ridge is within this share below the target is as wide as it should be. What is corrected is aimed
 /// at the middle of it, since points and chords of a new plan lie elsewhere.
@@ -62,6 +62,9 @@ const NEVER_CUT: f64 = 16.0;
 
 /// A place whose factor is less than one by more than this was narrowed before.
 const STILL_WIDE: f64 = 1e-6;
+
+/// A plan is in vain unless it takes this share of what the best one leaves above the target.
+const LEAST_GAIN: f64 = 0.1;
 
 /// Plans in vain whose high places are narrowed in the next one.
 const MOST_FOLLOWED: usize = 2;
@@ -200,6 +203,28 @@ impl CorrectionRound {
             (holds, _) => holds,
         }
     }
+
+    /// What a plan gains over the best one before it.
+    fn gain_over(&self, best: &Self, goal: &Goal) -> Gain {
+        let above = |round: &Self| round.highest() + round.margin(goal.target) - goal.target;
+        if !self.is_better(best, goal) {
+            Gain::None
+        } else if self.holds(goal) || above(self) <= (1.0 - LEAST_GAIN) * above(best) {
+            Gain::Enough
+        } else {
+            Gain::Little
+        }
+    }
+}
+
+/// What a plan gains over the best one before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Gain {
+    /// The one before is kept.
+    None,
+    /// It is kept instead, but more of its kind would be in vain.
+    Little,
+    Enough,
 }
 
 /// What the loop is after.
@@ -330,7 +355,8 @@ impl Corrected<'_> {
             let map = self.session.ridges(self.request, self.engine, &planned, monitor)?;
             let found = map.and_then(|map| Standing::of_ridges(&map, &planned, factors));
             let Some(found) = found else { break };
-            in_vain = if self.keep_if_better(planned, next, found) { 0 } else { in_vain + 1 };
+            let gain = self.keep_if_better(planned, next, found);
+            in_vain = if gain == Gain::Enough { 0 } else { in_vain + 1 };
         }
         Ok(())
     }
@@ -349,11 +375,11 @@ impl Corrected<'_> {
             let path = &planned.plan.path;
             let again = self.session.measure(self.request, self.engine, path, self.closeness, monitor)?;
             let found = Standing::of_all(&again.measurement, &planned, factors);
-            if found.is_some_and(|found| self.keep_if_better(planned, next, found)) {
-                (measured, in_vain) = (Some(again), 0);
-            } else {
-                in_vain += 1;
+            let gain = found.map_or(Gain::None, |found| self.keep_if_better(planned, next, found));
+            if gain != Gain::None {
+                measured = Some(again);
             }
+            in_vain = if gain == Gain::Enough { 0 } else { in_vain + 1 };
         }
         match measured {
             Some(measured) if self.closeness == Closeness::Verdict || !self.session.is_open(&measured) => {
@@ -385,13 +411,15 @@ impl Corrected<'_> {
         let scaled = |height: f64| self.widths.scaled((aim(target) / height).sqrt().max(MOST_NARROWED));
         let in_proportion =
             || (round.highest_mm + round.margin(target) > target).then(|| scaled(round.highest_mm));
-        let followed = |(widths, standing): &(Widths, Standing)| {
+        let followed = || {
+            let (widths, standing) =
+                self.latest.as_ref().map_or((&self.widths, &self.standing), |latest| (&latest.0, &latest.1));
             let high = self.standing_high(standing);
             (!high.is_empty()).then(|| widths.narrowed(&high))
         };
         match (round.holds(&self.goal), in_vain) {
             (true, 0) => (round.highest() < (1.0 - slack) * target).then(|| scaled(round.highest())),
-            (true, 1) => self.latest.as_ref().and_then(followed),
+            (true, 1) => followed(),
             (false, 0) => {
                 let is_raised = self.raised_by_chords();
                 let (raised, others): (Vec<_>, Vec<_>) =
@@ -399,7 +427,7 @@ impl Corrected<'_> {
                 let none = raised.is_empty() && others.is_empty();
                 if none { in_proportion() } else { Some(self.widths.finer(&raised).narrowed(&others)) }
             }
-            (false, ..=MOST_FOLLOWED) => self.latest.as_ref().and_then(followed).or_else(in_proportion),
+            (false, ..=MOST_FOLLOWED) => followed().or_else(in_proportion),
             (false, MOST_IN_VAIN) => in_proportion(),
             _ => None,
         }
@@ -452,17 +480,17 @@ impl Corrected<'_> {
         Ok(measured)
     }
 
-    fn keep_if_better(&mut self, planned: Planned, widths: Widths, found: Standing) -> bool {
-        let better = found.round.is_better(&self.standing.round, &self.goal);
+    fn keep_if_better(&mut self, planned: Planned, widths: Widths, found: Standing) -> Gain {
+        let gain = found.round.gain_over(&self.standing.round, &self.goal);
         self.rounds.push(found.round);
         self.latest = None;
-        if better {
+        if gain == Gain::None {
+            self.latest = Some((widths, found));
+        } else {
             (self.best, self.widths, self.standing, self.kept) =
                 (planned, widths, found, self.rounds.len() - 1);
-        } else {
-            self.latest = Some((widths, found));
         }
-        better
+        gain
     }
 }
 
@@ -591,6 +619,12 @@ mod tests {
         assert!(better(round(1.2, 20.0), colliding(round(0.8, 10.0))));
         assert!(!better(colliding(round(0.8, 10.0)), round(1.2, 20.0)));
         assert!(better(colliding(round(0.8, 9.0)), colliding(round(0.7, 10.0))));
+        // A tenth of what stands above the target is worth another plan of its kind; less is kept, but no reason to go on.
+        let gain = |a: CorrectionRound, b: CorrectionRound| a.gain_over(&b, &strict);
+        assert_eq!(gain(round(1.2, 10.0), round(1.2, 10.0)), Gain::None);
+        assert_eq!(gain(round(1.199, 10.0), round(1.2, 10.0)), Gain::Little);
+        assert_eq!(gain(round(1.17, 10.0), round(1.2, 10.0)), Gain::Enough);
+        assert_eq!(gain(round(0.99, 20.0), round(1.001, 10.0)), Gain::Enough);
         // What the scene lets stand above the target is no reason for another plan.
         let lenient = |share: f64, highest: f64| Goal { rule: ScallopRule { share, highest }, ..strict };
         assert!(round(1.2, 10.0).holds(&lenient(0.95, 1.5)) && !round(1.2, 10.0).holds(&strict));
