@@ -35,8 +35,8 @@ const NEAR: f64 = 0.05;
 /// Most plans that are made again after all was measured: each costs as much as the whole run without correction.
 const MOST_MEASURED: usize = 3;
 
-/// The same while the best plan stands above the target by no more than [`NEAR`]: what is left is little, and its cost is not in
-/// vain.
+/// The same while the best plan stands above the target by no more than [`NEAR`]: what is left is little, and each plan has to
+/// take [`LEAST_GAIN`] of it.
 const MOST_MEASURED_NEAR: usize = 8;
 
 /// A plan whose highest ridge is within this share below the target is as wide as it should be. What is corrected is aimed
@@ -63,7 +63,7 @@ const NEVER_CUT: f64 = 16.0;
 /// A place whose factor is less than one by more than this was narrowed before.
 const STILL_WIDE: f64 = 1e-6;
 
-/// A plan is in vain unless it takes this share of what the best one leaves above the target.
+/// A plan that does not hold the target is in vain unless it takes this share of what the best one leaves above it.
 const LEAST_GAIN: f64 = 0.1;
 
 /// Plans in vain whose high places are narrowed in the next one.
@@ -222,8 +222,9 @@ impl CorrectionRound {
 enum Gain {
     /// The one before is kept.
     None,
-    /// It is kept instead, but more of its kind would be in vain.
+    /// The new one is kept, but another of its kind would be in vain.
     Little,
+    /// The new one is kept, and another of its kind may gain as well.
     Enough,
 }
 
@@ -419,7 +420,7 @@ impl Corrected<'_> {
         };
         match (round.holds(&self.goal), in_vain) {
             (true, 0) => (round.highest() < (1.0 - slack) * target).then(|| scaled(round.highest())),
-            (true, 1) => followed(),
+            (true, 1) => self.latest.as_ref().and_then(|_| followed()),
             (false, 0) => {
                 let is_raised = self.raised_by_chords();
                 let (raised, others): (Vec<_>, Vec<_>) =
