@@ -375,8 +375,8 @@ impl Corrected<'_> {
             drop(measured.take());
             let path = &planned.plan.path;
             let again = self.session.measure(self.request, self.engine, path, self.closeness, monitor)?;
-            let found = Standing::of_all(&again.measurement, &planned, factors);
-            let gain = found.map_or(Gain::None, |found| self.keep_if_better(planned, next, found));
+            let Some(found) = Standing::of_all(&again.measurement, &planned, factors) else { break };
+            let gain = self.keep_if_better(planned, next, found);
             if gain != Gain::None {
                 measured = Some(again);
             }
