@@ -133,19 +133,26 @@ pub(crate) fn along_and_between<S: LevelSource>(
     Ok(all)
 }
 
-/// Appends passes along the stretches of a level that need one, with their overlap.
+/// Appends passes along the stretches of a level that need one, with their overlap: where points are `needed`, and in any case
+/// at the point that is nearest by `distance`.
 pub(crate) fn along_needed<S: LevelSource>(
     source: &S,
     level: f64,
-    needed: &dyn Fn(&S::Place) -> bool,
+    (needed, distance): (&dyn Fn(&S::Place) -> bool, &dyn Fn(&S::Place) -> f64),
     sampling: f64,
     passes: &mut Passes,
     monitor: &dyn Monitor,
 ) -> Result<(), PlanError> {
     let filler = Filler { source, sampling, monitor };
-    for curve in source.curves(level) {
+    let curves = source.curves(level);
+    let places = curves.iter().enumerate().flat_map(|(c, curve)| {
+        curve.points.iter().enumerate().map(move |(k, place)| ((c, k), distance(place)))
+    });
+    let nearest = places.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(point, _)| point);
+    for (c, curve) in curves.into_iter().enumerate() {
         let (curve, runs) = filler.stretches(curve, |k, points| {
-            needed(&points[k]).then(|| source.allowed(&points[k]).map(|allowed| allowed.width)).flatten()
+            let wanted = nearest == Some((c, k)) || needed(&points[k]);
+            wanted.then(|| source.allowed(&points[k]).map(|allowed| allowed.width)).flatten()
         });
         for run in runs {
             filler.add(&curve, level, Some(run), passes)?;

@@ -215,6 +215,11 @@ impl ChartPoint<'_> {
             }
         }
     }
+
+    /// Whether a measurement asked for narrower passes here than elsewhere.
+    pub fn was_narrowed(&self) -> bool {
+        self.guide.correction.is_some_and(|correction| correction.is_narrower_at(&self.jet.p))
+    }
 }
 
 impl<'a> Chart<'a> {

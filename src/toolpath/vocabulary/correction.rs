@@ -13,6 +13,9 @@ use geometry::Point3;
 /// Most columns of cubes over the plan view; on larger parts cubes grow. They take 4 bytes each.
 const MOST_COLUMNS: f64 = 4e6;
 
+/// A factor is less than that of all places by no less than this share.
+const NARROWER: f64 = 1e-6;
+
 /// Factors of the distance of passes over a surface.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correction {
@@ -101,6 +104,11 @@ impl Correction {
         }
         // Toward the edge of what was measured it fades to 1.
         self.everywhere * (sum + (1.0 - weights))
+    }
+
+    /// Whether the factor at a place is less than that of all places.
+    pub fn is_narrower_at(&self, p: &Point3) -> bool {
+        self.at(p) < (1.0 - NARROWER) * self.everywhere
     }
 
     /// Whether there are no other factors than that of all places.
