@@ -79,7 +79,7 @@ pub(crate) fn close<S: LevelSource<Place = [f64; 2]>>(
             let needed = |place: &[f64; 2]| gaps.open_beyond(*place, SLACK).is_some();
             // What is open may be shorter than points of a level are apart.
             let from_gap = |place: &[f64; 2]| (place[0] - gap.at[0]).hypot(place[1] - gap.at[1]);
-            along_needed(source, level, (&needed, &from_gap), sampling, passes, monitor)?;
+            along_needed(source, level, &needed, &from_gap, sampling, passes, monitor)?;
             for k in before..passes.contacts.len() {
                 gaps.insert(&passes.contacts[k]);
             }

@@ -138,7 +138,8 @@ pub(crate) fn along_and_between<S: LevelSource>(
 pub(crate) fn along_needed<S: LevelSource>(
     source: &S,
     level: f64,
-    (needed, distance): (&dyn Fn(&S::Place) -> bool, &dyn Fn(&S::Place) -> f64),
+    needed: &dyn Fn(&S::Place) -> bool,
+    distance: &dyn Fn(&S::Place) -> f64,
     sampling: f64,
     passes: &mut Passes,
     monitor: &dyn Monitor,
