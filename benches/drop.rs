@@ -4,9 +4,9 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use millstream::cutter::Cutter;
+use millstream::drop_cutter::{DropCutter, PlanGrid};
 use millstream::geometry::{AnalyticShape, AnalyticSurface};
 use millstream::part::{Part, Patch, default_tessellation_tolerance};
-use millstream::toolpath::{DropCutter, PlanGrid};
 
 #[path = "common/mesh.rs"]
 mod mesh;

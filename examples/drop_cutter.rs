@@ -6,9 +6,9 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use millstream::cutter::Cutter;
+use millstream::drop_cutter::DropCutter;
 use millstream::io::stl;
 use millstream::part::Part;
-use millstream::toolpath::DropCutter;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let file = std::env::args().nth(1).map_or_else(|| PathBuf::from("scenes/relief.stl"), PathBuf::from);

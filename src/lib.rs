@@ -42,6 +42,6 @@ pub use report::{RunReport, ToolpathReport, ToolpathResult, Verdict};
 pub use scene::Scene;
 pub use work::{monitor, parallel};
 pub use {
-    blade, collision, cutter, field, geometry, io, job, keys, machine, metrology, motion, offset, part,
-    program, report, scallop, scene, sim, toolpath,
+    blade, collision, cutter, drop_cutter, field, geometry, io, job, keys, machine, metrology, motion,
+    offset, part, program, report, scallop, scene, sim, toolpath,
 };

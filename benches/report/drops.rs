@@ -4,7 +4,7 @@ use super::mesh::{SIZE, along_passes, cutter, scattered, wavy};
 use super::table::{Column, Table};
 use super::timing::{fastest, timed};
 use super::{Plan, Section};
-use millstream::toolpath::{DropCutter, PlanGrid};
+use millstream::drop_cutter::{DropCutter, PlanGrid};
 
 /// Points along each side of the grid.
 const SIDE: usize = 1000;

@@ -1,7 +1,6 @@
 //! Cutter contacts, cutter locations, moves and the strategies that plan them. Knows nothing of how
 //! stock is stored.
 
-mod drop;
 mod facets;
 mod levels;
 mod link;
@@ -13,7 +12,6 @@ mod surface;
 mod tilt;
 mod vocabulary;
 
-pub use drop::{Drop, DropCutter, GridDrop, PlanGrid};
 pub use levels::spacing::LevelSteps;
 pub use link::{Detour, LONGEST_LINK, around_fixtures, longest_link, plane_interval};
 pub use plan::{Plan, plan, plan_tilted};

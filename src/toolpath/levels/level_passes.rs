@@ -8,12 +8,12 @@
 use super::halving::{Allowed, LevelSource, Track, along_and_between};
 use super::spacing::{LevelSteps, level_tangent, place_levels, places_of};
 use super::{gaps, planned_field};
-use crate::drop::{Beside, DropCutter};
 use crate::moves::touch::Touch;
 use crate::surface::chart::Chart;
 use crate::tilt::tilted;
 use crate::vocabulary::{Contact, Levelled, PassSettings, Passes, PlanError, Step, Task};
 use cutter::Cutter;
+use drop_cutter::{Beside, DropCutter};
 use field::{LevelCurve, LevelTracer, ScalarField, surface_gradient_length};
 use geometry::Point3;
 use motion::CcPoint;

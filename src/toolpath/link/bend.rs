@@ -7,10 +7,10 @@
 //! way between two turns becomes straight. Heights come from dropping the cutter, so that a link can
 //! never cut deeper into the part than its chords, and never raises what stands beside it.
 
-use crate::DropCutter;
 use crate::moves::chord::{Watch, reduce, sample_within_chord};
 use crate::surface::border::Border;
 use cutter::Cutter;
+use drop_cutter::DropCutter;
 use geometry::{Point2, Point3, Vector2};
 use work::monitor::{Cancelled, Monitor};
 

@@ -23,13 +23,13 @@ mod order;
 mod tests;
 mod tilted;
 
-use super::DropCutter;
 use crate::surface::border::Border;
 use crate::vocabulary::{Joining, Links, PlanSettings, Setup, Step};
 use bend::{Bends, End};
 use ceiling::Ceiling;
 use cutter::Cutter;
 pub use detour::{Detour, around_fixtures};
+use drop_cutter::DropCutter;
 use geometry::{Point2, Point3, Vector2, distance_to_segment};
 use motion::{ClPoint, Move, MoveKind, Toolpath};
 use order::{Visit, is_closed, order};

@@ -8,11 +8,11 @@
 //! Limits: the levels must be single closed curves up to the middle; a front that parts is refused.
 
 use super::iso_scallop::arrival;
-use crate::drop::DropCutter;
 use crate::levels::spacing::level_tangent;
 use crate::surface::chart::Chart;
 use crate::vocabulary::{PassSettings, Passes, PlanError, Task};
 use cutter::Cutter;
+use drop_cutter::DropCutter;
 use field::{LevelTracer, ScalarField, surface_gradient_length};
 use geometry::Point3;
 use work::monitor::{self, Cancelled};

@@ -9,7 +9,6 @@
 use super::mesh_shortest::shortest_stream;
 use super::shortest::{SEARCHED, SHORTEST};
 use super::streamline::FITTED;
-use crate::drop::DropCutter;
 use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between};
 use crate::levels::planned_field;
 use crate::levels::spacing::{AllowedStep, LevelSteps, place_levels};
@@ -21,6 +20,7 @@ use crate::vocabulary::{
     Task,
 };
 use cutter::Cutter;
+use drop_cutter::DropCutter;
 use field::mesh::{
     Bend, Held, Line, MeshCurve, MeshFieldError, MeshLevels, MeshPoint, Wanted, flows, orient_lines,
     smooth_lines, solve_stream,

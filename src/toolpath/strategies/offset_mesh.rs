@@ -21,13 +21,13 @@ mod guide;
 #[cfg(test)]
 mod tests;
 
-use crate::drop::DropCutter;
 use crate::levels::halving::along_and_between;
 use crate::levels::spacing::{LevelSteps, place_levels};
 use crate::moves::touch::Touch;
 use crate::tilt::tilted;
 use crate::vocabulary::{PassSettings, Passes, PlanError, Step, Task};
 use cutter::Cutter;
+use drop_cutter::DropCutter;
 use field::DIRECTION_WEIGHT;
 use field::mesh::{
     FieldMesh, Held, MeshFieldError, MeshLevels, fixed_angle, flows, orient_lines, smooth_lines,

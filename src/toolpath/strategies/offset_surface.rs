@@ -13,7 +13,6 @@ use std::fmt::{self, Write as _};
 use std::sync::Arc;
 
 use super::offset_mesh;
-use crate::drop::{Beside, DropCutter};
 use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between};
 use crate::levels::spacing::{AllowedStep, LevelSteps, place_levels};
 use crate::moves::touch::Touch;
@@ -23,6 +22,7 @@ use crate::vocabulary::{
     Along, Contact, Definition, PartKind, PassSettings, Passes, PlanError, Reading, Step, Strategy, Task,
 };
 use cutter::Cutter;
+use drop_cutter::{Beside, DropCutter};
 use field::surface_gradient_length;
 use geometry::{NurbsSurface, Point3, Vector3};
 use keys::{SceneError, toml_number};

@@ -8,12 +8,12 @@ use std::fmt::{self, Write as _};
 
 use super::contour_spiral;
 use super::zigzag::{least_over_plane, stepover_at};
-use crate::drop::DropCutter;
 use crate::surface::border::Border;
 use crate::surface::chart::Chart;
 use crate::surface::plan_curve::PlanCurves;
 use crate::vocabulary::{Definition, PartKind, Passes, PlanError, Step, Strategy, Task};
 use cutter::Cutter;
+use drop_cutter::DropCutter;
 use geometry::Vector2;
 use keys::word_of;
 use work::monitor;

@@ -7,7 +7,6 @@
 
 use std::fmt::{self, Write as _};
 
-use crate::drop::DropCutter;
 use crate::levels::level_passes::along_levels_placed;
 use crate::levels::spacing::LevelSteps;
 use crate::surface::border::Border;
@@ -15,6 +14,7 @@ use crate::surface::chart::{Chart, ChartPoint};
 use crate::surface::plan_curve::PlanCurves;
 use crate::vocabulary::{Definition, PartKind, Passes, PlanError, Reading, Step, Strategy, Task};
 use cutter::Cutter;
+use drop_cutter::DropCutter;
 use field::ScalarField;
 use geometry::Vector2;
 use keys::{SceneError, toml_number};

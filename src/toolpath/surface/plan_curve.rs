@@ -4,10 +4,10 @@
 //! cutter touches surface, and rolls over the part's border no farther than is of use.
 
 use super::border::Border;
-use crate::drop::{Drop, DropCutter};
 use crate::moves::chord::Watch;
 use crate::vocabulary::PassSettings;
 use cutter::Cutter;
+use drop_cutter::{Drop, DropCutter};
 use geometry::{Point2, Point3, Vector2};
 use work::monitor::{Cancelled, Monitor};
 

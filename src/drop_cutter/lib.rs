@@ -102,7 +102,7 @@ const BESIDE_SLACK: f64 = 1e-6;
 
 /// Where the last of a row of drops came to rest.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Beside(Option<usize>);
+pub struct Beside(Option<usize>);
 
 impl<'a> DropCutter<'a> {
     /// Prepares: takes seconds for a million triangles, as long as a hundred thousand drops.
@@ -172,7 +172,7 @@ impl<'a> DropCutter<'a> {
 
     /// As [`DropCutter::at`], quicker where the last drop was nearby: the triangle that the cutter rested
     /// on then tells how high it stands at the least.
-    pub(crate) fn at_beside(&self, x: f64, y: f64, beside: &mut Beside) -> Option<Drop> {
+    pub fn at_beside(&self, x: f64, y: f64, beside: &mut Beside) -> Option<Drop> {
         if !(x.is_finite() && y.is_finite()) {
             return None;
         }
