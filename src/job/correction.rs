@@ -21,8 +21,8 @@ use toolpath::{Correction, Earlier, Step, plane_interval};
 use work::monitor::{self, Monitor};
 
 use super::judge::highest_reached;
+use super::measuring::Closeness;
 use super::planned::Planned;
-use super::session::Closeness;
 use super::tool::Around;
 use super::{JobError, Session};
 

@@ -5,13 +5,11 @@ use report::{MAX_TRIANGLES, SurfaceMeshFigures, surface_mesh};
 use sim::ZMap;
 
 use super::run::Run;
+use super::session::BASE;
 
 /// The machined part's triangles stay within this share of the scallop tolerance: ridges remain
 /// visible in them.
 const MESH_SHARE: f64 = 0.25;
-
-/// Thickness of the machined part below its lowest point, mm.
-pub(crate) const BASE: f64 = 5.0;
 
 /// The machined part as triangles with the deviation at each corner.
 #[derive(Debug, Clone, PartialEq)]

@@ -7,7 +7,8 @@ use metrology::{Measurement, View};
 use motion::{Cutters, Toolpath};
 use report::{FigureFile, ToolpathResult};
 
-use super::Machined;
+use super::planned::write_program;
+use super::{Machined, Session};
 
 /// What one toolpath left: its results, and what files and pictures are made from.
 #[derive(Debug)]
@@ -32,4 +33,21 @@ pub struct Outcome {
     pub machined: Machined,
     /// Further files of its folder.
     pub files: Vec<FigureFile>,
+}
+
+impl Session {
+    /// Writes the program of an outcome as G-code: nothing where the tool leans and the scene names no machine for it.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn write_program(&self, out: &mut dyn std::io::Write, outcome: &Outcome) -> std::io::Result<()> {
+        let header = self.header(&outcome.result.name);
+        write_program(out, &self.scene, &outcome.path, outcome.joints.as_ref(), &header).map(drop)
+    }
+
+    /// Whether an outcome has a program.
+    pub fn has_program(&self, outcome: &Outcome) -> bool {
+        // A program from elsewhere has its own file.
+        outcome.path.origin.program.is_empty() && (outcome.path.is_upright() || outcome.joints.is_some())
+    }
 }

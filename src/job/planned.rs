@@ -190,8 +190,9 @@ impl Session {
         Ok(Box::new(OffsetSurface { along: *along, drive: OffsetDrive::on(surfaces) }))
     }
 
-    pub(crate) fn refused(&self, request: &ToolpathRequest, reason: PlanError) -> JobError {
-        JobError::plan(&self.scene, &request.name, reason)
+    /// The header of a toolpath's programs.
+    pub fn header(&self, name: &str) -> ProgramHeader {
+        header(&self.scene, name)
     }
 
     /// Measures the engagement of a pocket's passes and lowers the feed where it is above the strategy's limit.
@@ -302,7 +303,7 @@ fn lines(scene: &Scene, path: &Toolpath, joints: Option<&JointPath>) -> Result<M
 }
 
 /// The header of a toolpath's program.
-pub(crate) fn header(scene: &Scene, name: &str) -> ProgramHeader {
+fn header(scene: &Scene, name: &str) -> ProgramHeader {
     ProgramHeader {
         name: format!("{} - {name}", scene.title),
         spindle_speed: Some(scene.cutting.spindle_speed),

@@ -14,7 +14,7 @@ use sim::{FAR, VoxelEngine, holder_clearance};
 use work::monitor::Monitor;
 
 use super::removal::{TOOLS_BEFORE, doubt, voxel_in_order};
-use super::{more_moves, value};
+use super::words::{more_moves, value};
 use crate::JobError;
 use crate::run::{Finding, Run};
 use crate::tool::{Tool, ToolMoves};

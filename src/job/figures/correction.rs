@@ -3,7 +3,7 @@
 use report::{Figure, FigureTable, micrometres, with_bound};
 use work::monitor::Monitor;
 
-use super::value;
+use super::words::value;
 use crate::JobError;
 use crate::correction::CorrectionRound;
 use crate::run::{Finding, Run};

@@ -11,7 +11,7 @@ use serde::Serialize;
 use toolpath::Pocket;
 use work::monitor::Monitor;
 
-use super::value;
+use super::words::value;
 use crate::run::{Finding, Run};
 use crate::{JobError, judge};
 

@@ -3,7 +3,7 @@
 use report::{Figure, FigureTable, duration, micrometres};
 use work::monitor::Monitor;
 
-use super::value;
+use super::words::value;
 use crate::JobError;
 use crate::equal_time::TriedPlan;
 use crate::run::{Finding, Run};

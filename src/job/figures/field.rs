@@ -7,7 +7,7 @@ use report::{Claim, Figure, Gravity, place};
 use toolpath::{FITTED, Levelled};
 use work::monitor::Monitor;
 
-use super::value;
+use super::words::value;
 use crate::JobError;
 use crate::run::{Finding, Run};
 

@@ -6,7 +6,7 @@ use ::machine::kinematics::{JointReport, Kinematics};
 use report::{Claim, Figure, Gravity};
 use work::monitor::Monitor;
 
-use super::value;
+use super::words::value;
 use crate::JobError;
 use crate::run::{Finding, Run};
 

@@ -20,11 +20,9 @@ mod sections;
 mod shortest;
 mod solid;
 mod turning;
+mod words;
 
-use serde::Serialize;
-use serde_json::Value;
-
-use report::{Claim, Figure, FigureFile, ReportError, Verdict};
+use report::{Claim, Figure, FigureFile, Verdict};
 use work::monitor::{self, Monitor};
 
 use super::JobError;
@@ -94,23 +92,4 @@ pub(crate) fn with_other_tools(mut claims: Vec<Claim>) -> (Verdict, Vec<Claim>) 
         removal::doubt(std::slice::from_mut(claim), decided_by);
     }
     (claims.iter().map(Claim::verdict).max().unwrap_or(Verdict::Undecided), claims)
-}
-
-/// Numbers as report.json has them.
-fn value(figures: &impl Serialize) -> Result<Value, JobError> {
-    serde_json::to_value(figures).map_err(|e| ReportError::Json(e.to_string()).into())
-}
-
-/// A share as per cent with two digits.
-fn share(ratio: Option<f64>) -> String {
-    ratio.map_or("-".to_owned(), |r| format!("{:.2} %", 100.0 * r))
-}
-
-/// On how many moves more than the one that was told.
-fn more_moves(moves: usize) -> String {
-    match moves {
-        0 | 1 => String::new(),
-        2 => ", and on one more move".to_owned(),
-        n => format!(", and on {} more moves", n - 1),
-    }
 }

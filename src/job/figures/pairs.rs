@@ -4,7 +4,7 @@ use metrology::PAIRS_HEADER;
 use report::{Figure, FigureFile, FileContent, micrometres};
 use work::monitor::Monitor;
 
-use super::{share, value};
+use super::words::{share, value};
 use crate::JobError;
 use crate::run::{Finding, Run};
 

@@ -6,7 +6,7 @@ use report::{Claim, Figure, Gravity, micrometres, with_bound};
 use toolpath::PocketStrategy;
 use work::monitor::Monitor;
 
-use super::value;
+use super::words::value;
 use crate::JobError;
 use crate::pocket::pocket_figures;
 use crate::run::{Finding, Run};

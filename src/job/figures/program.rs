@@ -5,7 +5,7 @@ use report::{Claim, Figure, Gravity};
 use serde::Serialize;
 use work::monitor::Monitor;
 
-use super::value;
+use super::words::value;
 use crate::JobError;
 use crate::run::{Finding, Run};
 

@@ -6,7 +6,8 @@ use report::{Claim, Figure, Gravity, Verdict, place};
 use sim::{MoveRemoval, VoxelEngine, VoxelStock, ZMap, cut_in_order_in_turn};
 use work::monitor::Monitor;
 
-use super::{entries, value};
+use super::entries;
+use super::words::value;
 use crate::JobError;
 use crate::run::{Finding, Run};
 

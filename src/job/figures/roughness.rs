@@ -9,7 +9,7 @@ use motion::Toolpath;
 use report::{Figure, with_bound};
 use work::monitor::Monitor;
 
-use super::{share, value};
+use super::words::{share, value};
 use crate::JobError;
 use crate::run::{Finding, Run};
 

@@ -4,7 +4,7 @@ use metrology::polynomial_figures;
 use report::{Figure, micrometres};
 use work::monitor::Monitor;
 
-use super::{share, value};
+use super::words::{share, value};
 use crate::JobError;
 use crate::run::{Finding, Run};
 

@@ -7,7 +7,7 @@ use metrology::path_figures;
 use report::Figure;
 use work::monitor::Monitor;
 
-use super::value;
+use super::words::value;
 use crate::JobError;
 use crate::run::{Finding, Run};
 

@@ -8,7 +8,7 @@ use report::{Figure, FigureFile, FileContent};
 use sim::{VoxelEngine, VoxelVolumes};
 use work::monitor::Monitor;
 
-use super::value;
+use super::words::value;
 use crate::JobError;
 use crate::run::{Finding, Run};
 

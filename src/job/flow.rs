@@ -1,0 +1,308 @@
+//! The flow of a job: every toolpath of a scene is planned, cut, measured and judged.
+
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::Path;
+
+use cutter::Cutter;
+use geometry::{Point3, Vector3};
+use io::digest;
+use metrology::{Engine, Measured, path_figures};
+use motion::Toolpath;
+use report::{
+    NotPlanned, RunReport, SimulationFigures, ToleranceFigures, ToolpathReport, ToolpathResult, Verdict,
+};
+use scene::ToolpathRequest;
+use work::monitor::{self, Monitor};
+
+use super::earlier::{EarlierPath, WholePath};
+use super::measuring::Closeness;
+use super::planned::Planned;
+use super::run::Run;
+use super::tool::{Around, Tool, ToolMoves};
+use super::{JobError, Machined, Outcome, Session, figures, judge};
+
+impl Session {
+    /// Runs all toolpaths. Maps, paths and meshes are dropped; [`Session::toolpath`] leaves them. One that cannot be
+    /// planned is a row with its reason, and fails the run.
+    ///
+    /// # Errors
+    /// [`JobError`] of the first toolpath that cannot be run, or if none could be planned.
+    pub fn run(&self, monitor: &dyn Monitor) -> Result<RunReport, JobError> {
+        self.run_each(monitor, &mut |_| Ok::<(), JobError>(()))
+    }
+
+    /// As [`Session::run`]; hands over what each toolpath left.
+    ///
+    /// # Errors
+    /// Those of [`Session::run`] and of `done`.
+    pub fn run_each<E: From<JobError>>(
+        &self,
+        monitor: &dyn Monitor,
+        done: &mut dyn FnMut(&Outcome) -> Result<(), E>,
+    ) -> Result<RunReport, E> {
+        let (mut rows, mut refused) = (Vec::new(), None);
+        let (mut seen, mut earlier) = (Vec::new(), Some(Vec::new()));
+        for request in &self.scene.toolpaths {
+            monitor.belongs_to(&request.name);
+            if !request.stock_is_previous {
+                earlier = Some(Vec::new());
+            }
+            let outcome = match &earlier {
+                Some(earlier) => self.toolpath_after(earlier, request, monitor),
+                None => {
+                    Err(self.not_applicable(request, "the toolpath before it could not be planned".into()))
+                }
+            };
+            match outcome {
+                Ok(mut outcome) => {
+                    note_same_path(&mut seen, &mut outcome);
+                    done(&outcome)?;
+                    if let Some(earlier) = earlier.as_mut().filter(|_| self.goes_on(request)) {
+                        earlier.push(EarlierPath::of(&outcome));
+                    }
+                    rows.push(ToolpathReport::Measured(Box::new(outcome.result)));
+                }
+                Err(error) => {
+                    let Some(reason) = error.why_not_planned() else { return Err(error.into()) };
+                    earlier = None;
+                    rows.push(not_planned(request, reason));
+                    refused = refused.or(Some(error));
+                }
+            }
+        }
+        match refused {
+            Some(error) if rows.iter().all(|row| row.measured().is_none()) => Err(error.into()),
+            _ => Ok(self.report(rows)),
+        }
+    }
+
+    /// The report of the scene's toolpaths.
+    fn report(&self, toolpaths: Vec<ToolpathReport>) -> RunReport {
+        let source = &self.scene.source;
+        let name = Path::new(&source.name).file_name();
+        let name = name.map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        let title = self.scene.title.clone();
+        let tolerance = ToleranceFigures::new(&self.scene.tolerance, &self.scene.scallop_rule);
+        let sha256 = digest::of_bytes(source.text.as_bytes()).sha256;
+        let report = RunReport::new(name, sha256, title, tolerance, toolpaths);
+        RunReport { inputs: self.inputs.clone(), notes: self.doubt.iter().cloned().collect(), ..report }
+    }
+
+    /// Plans, cuts, measures and judges one toolpath; where it cuts what others left, those are planned before it.
+    ///
+    /// # Errors
+    /// [`JobError`]
+    pub fn toolpath(&self, request: &ToolpathRequest, monitor: &dyn Monitor) -> Result<Outcome, JobError> {
+        let all = &self.scene.toolpaths;
+        let own = all.iter().position(|other| other.name == request.name).unwrap_or_default();
+        let first = (0..=own).rev().find(|&k| !all[k].stock_is_previous).unwrap_or_default();
+        let mut earlier = Vec::new();
+        for before in all[first..own].iter().filter(|_| request.stock_is_previous) {
+            let outcome = self.toolpath_after(&earlier, before, monitor)?;
+            earlier.push(EarlierPath::of(&outcome));
+        }
+        self.toolpath_after(&earlier, request, monitor)
+    }
+
+    /// Whether the next toolpath cuts what this one leaves.
+    fn goes_on(&self, request: &ToolpathRequest) -> bool {
+        let mut after = self.scene.toolpaths.iter().skip_while(|other| other.name != request.name).skip(1);
+        after.next().is_some_and(|next| next.stock_is_previous)
+    }
+
+    /// As [`Session::toolpath`], behind the toolpaths that cut the same stock.
+    fn toolpath_after(
+        &self,
+        earlier: &[EarlierPath],
+        request: &ToolpathRequest,
+        monitor: &dyn Monitor,
+    ) -> Result<Outcome, JobError> {
+        monitor::check(monitor)?;
+        let scene = &self.scene;
+        let engine = self.engine(request)?;
+        let (cutters, holders) = self.tools(request);
+        if cutters.are_several() {
+            self.on_cells(request, engine, "measured with one tool at a time: write `tool = 2` for tool 2")?;
+        }
+        if !earlier.is_empty() {
+            self.on_cells(request, engine, "measured on a block of its own: delete `stock`")?;
+        }
+        let tool = Tool::of(scene);
+        let fixtures = self.fixtures(monitor)?;
+        let closer = if engine.tilts() { self.closer_part(monitor)? } else { None };
+        let near = closer.as_ref().unwrap_or(&self.part);
+        let around = Around { tool: &tool, near, fixtures: &fixtures };
+        let at_time;
+        let (request, planned, mut measured) = match &request.equal_time {
+            None => {
+                let (planned, measured) = self.plan_and_measure(request, around, engine, monitor)?;
+                (request, planned, measured)
+            }
+            Some(time) => {
+                let (found, planned) = self.plan_for_time(request, time, around, monitor)?;
+                let measured =
+                    self.measure(&found, engine, &planned.plan.path, Closeness::Verdict, monitor)?;
+                at_time = found;
+                (&at_time, planned, measured)
+            }
+        };
+        let whole = WholePath::new(earlier, &planned.plan.path, cutters, scene.machine.rapid_rate);
+        if !earlier.is_empty() {
+            measured = self.measure_whole(
+                request,
+                engine,
+                (&whole.path, &whole.cutters),
+                Closeness::Verdict,
+                monitor,
+            )?;
+        }
+        for region in &mut measured.measurement.gouge.regions {
+            let at = region.at_mm.into();
+            let (toolpath, move_index) = whole.own_move(region.move_index);
+            let its = earlier.get(toolpath);
+            let (path, cutters) =
+                its.map_or((&planned.plan.path, cutters), |before| (&before.path, &before.cutters));
+            region.move_index = move_index;
+            region.line = line_of_cut(path, cutters.of_move(move_index), move_index as usize, &at);
+            region.tool = path.named_tool_of(move_index as usize);
+            region.toolpath = its.map(|before| before.name.clone());
+        }
+        let tools = ToolMoves::of(cutters, holders, &planned.plan.path);
+        let run = Run {
+            session: self,
+            request,
+            planned: &planned,
+            measured: &measured,
+            around,
+            whole: &whole,
+            earlier,
+            own_cutters: cutters,
+            tools: &tools,
+        };
+        let found = figures::all(&run, monitor)?;
+        let machined = Machined::new(&run);
+        let simulation = SimulationFigures {
+            engine: engine.word(),
+            cell_mm: measured.cell,
+            cells: measured.cells,
+            error_bound_asked_mm: scene.simulation.error_bound,
+            refined_rectangles: measured.refined_rectangles,
+            finest_cell_mm: measured.finest_cell,
+            moves: planned.plan.path.len(),
+            wall_s: measured.wall_s,
+            threads: work::parallel::threads(),
+        };
+        let (verdict, claims) = judge::judge(
+            &measured.measurement,
+            &scene.tolerance,
+            &scene.scallop_rule,
+            found.claims,
+            planned.plan.path.program_name(),
+        );
+        let (verdict, claims) = if self.goes_on(request) {
+            figures::before_others(claims)
+        } else if request.foreign().is_some_and(|read| read.others) {
+            figures::with_other_tools(claims)
+        } else {
+            (verdict, claims)
+        };
+        let measurement = &measured.measurement;
+        let result = ToolpathResult {
+            name: request.name.clone(),
+            strategy: request.strategy_name().to_owned(),
+            folder: request.folder.clone(),
+            verdict,
+            claims,
+            notes: self.notes_on(&planned, &measured, found.notes),
+            path: path_figures(&planned.plan.path, planned.time(scene)),
+            scallop: measurement.scallop.clone(),
+            gouge: measurement.gouge.clone(),
+            uncut: measurement.uncut.clone(),
+            excess: measurement.excess,
+            deviation: measurement.deviation,
+            figures: found.figures,
+            simulation,
+            surface_mesh: machined.figures(),
+        };
+        let Planned { plan, joints, .. } = planned;
+        Ok(Outcome {
+            result,
+            path: plan.path,
+            cutters: cutters.clone(),
+            holders: holders.to_vec(),
+            joints,
+            field: plan.field,
+            measurement: measured.measurement,
+            view: measured.view,
+            machined,
+            files: found.files,
+        })
+    }
+
+    /// The notes on a toolpath: on the part, the cells, the measurement, the plan, and of its figures.
+    fn notes_on(&self, planned: &Planned, measured: &Measured, figures: Vec<String>) -> Vec<String> {
+        let first = self.notes.iter().chain(&measured.note).chain(&measured.measurement.refined.note);
+        first.chain(&planned.plan.notes).cloned().chain(figures).collect()
+    }
+
+    /// Refuses what is not measured on cells under upright tools; `otherwise` is how it is.
+    fn on_cells(
+        &self,
+        request: &ToolpathRequest,
+        engine: &dyn Engine,
+        otherwise: &str,
+    ) -> Result<(), JobError> {
+        let what = match () {
+            () if request.tilts() => "what tools that lean leave is".to_owned(),
+            () if self.pocket.is_some() => "the floor of a pocket is".to_owned(),
+            () if engine.tilts() => format!("with the engine `{}` a toolpath is", engine.word()),
+            () if self.scene.simulation.voxel.is_some() => {
+                "the solid of `voxel` in [simulation] is".to_owned()
+            }
+            () => return Ok(()),
+        };
+        Err(self.not_applicable(request, format!("{what} {otherwise}")))
+    }
+}
+
+/// The line that took the cutter to where it cuts deepest, at a place that a move cuts. That is the line before where the
+/// move begins there.
+fn line_of_cut(path: &Toolpath, cutter: &Cutter, step: usize, at: &Point3) -> u32 {
+    /// Places along the move; a start that is lowest by less than a share of it counts as its end.
+    const PLACES: u32 = 64;
+    let line = |k: usize| path.line_of(k).unwrap_or_default();
+    let (Some(before), Some(this)) = (step.checked_sub(1), path.moves.get(step)) else { return line(step) };
+    let (from, to) = (path.location_before(step), this.to);
+    if from.axis != Vector3::z() || to.axis != from.axis {
+        return line(step);
+    }
+    let height = |k: u32| {
+        let tip = from.towards(&to, f64::from(k) / f64::from(PLACES)).tip;
+        cutter.height((tip.x - at.x).hypot(tip.y - at.y)).map_or(f64::INFINITY, |above| tip.z + above)
+    };
+    let begins = (1..=PLACES).all(|k| height(k) >= height(0));
+    line(if begins { before } else { step })
+}
+
+fn not_planned(request: &ToolpathRequest, reason: String) -> ToolpathReport {
+    ToolpathReport::NotPlanned(NotPlanned {
+        name: request.name.clone(),
+        strategy: request.strategy_name().to_owned(),
+        verdict: Verdict::NotPlanned,
+        reason,
+    })
+}
+
+/// Says so where a toolpath moves as one before it, as two strategies do whose best path is the same.
+fn note_same_path(seen: &mut Vec<(u64, String)>, outcome: &mut Outcome) {
+    let mut hasher = DefaultHasher::new();
+    let stops = outcome.path.moves.iter().map(|step| &step.to);
+    for place in stops.chain([&outcome.path.start]) {
+        place.tip.iter().chain(place.axis.iter()).for_each(|x| x.to_bits().hash(&mut hasher));
+    }
+    let (path, result) = (hasher.finish(), &mut outcome.result);
+    if let Some((_, other)) = seen.iter().find(|(earlier, _)| *earlier == path) {
+        result.notes.insert(0, format!("this is the same path as that of {other}"));
+    }
+    seen.push((path, result.name.clone()));
+}

@@ -1,0 +1,130 @@
+//! Measuring a path: closer, and on finer cells, where a limit hangs on that.
+
+use metrology::{Engine, EngineError, LaidOut, Measured, Simulation, Task};
+use motion::{Cutters, Toolpath};
+use scene::{Scene, ToolpathRequest, auto_cell};
+use work::monitor::Monitor;
+
+use super::{JobError, Session, judge};
+
+/// The cell shrinks to this share where a limit is undecided. Nearer to 1 more cuts are made in vain, nearer to 0 more
+/// cells.
+const FINER: f64 = 0.5;
+
+/// Rounds in which bounds are asked for that are smaller by the square of that, down to a share of the first; the cell may
+/// be the finest already that suits the scene. It shrinks in them, too, up to so many cells: more take minutes.
+const CLOSER_ROUNDS: usize = 2;
+const MOST_CLOSER_CELLS: usize = 4_000_000;
+const CLOSEST_BOUND: f64 = 0.02;
+
+/// How closely a path is measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Closeness {
+    /// As the verdict needs it.
+    Verdict,
+    /// The highest place to `within` mm; no closer where it is above `limit`, mm, for certain, and the path is to be planned
+    /// anew.
+    Plan { within: f64, limit: f64 },
+}
+
+impl Closeness {
+    /// `coarse` cells may tell heights that finer ones do not have.
+    fn is_enough(self, measured: &Measured, coarse: bool) -> bool {
+        let highest = judge::highest_reached(&measured.measurement);
+        match self {
+            Self::Verdict => false,
+            Self::Plan { within, limit } => {
+                highest.error_bound_mm <= within || !coarse && highest.max_mm > limit
+            }
+        }
+    }
+}
+
+impl Session {
+    /// Cuts and measures; closer, and on finer cells where these help, where a limit hangs on that.
+    pub(crate) fn measure(
+        &self,
+        request: &ToolpathRequest,
+        engine: &dyn Engine,
+        path: &Toolpath,
+        closeness: Closeness,
+        monitor: &dyn Monitor,
+    ) -> Result<Measured, JobError> {
+        let (cutters, _) = self.tools(request);
+        self.measure_whole(request, engine, (path, cutters), closeness, monitor)
+    }
+
+    /// As [`Session::measure`], of a path that may begin with the moves of other toolpaths.
+    pub(crate) fn measure_whole(
+        &self,
+        request: &ToolpathRequest,
+        engine: &dyn Engine,
+        (path, cutters): (&Toolpath, &Cutters),
+        closeness: Closeness,
+        monitor: &dyn Monitor,
+    ) -> Result<Measured, JobError> {
+        let scene = &self.scene;
+        let failed = |reason| JobError::engine(scene, &request.name, reason);
+        let own = self.own_cells(request)?;
+        let (simulation, cells) =
+            own.as_ref().map_or((&scene.simulation, &self.cells), |(simulation, cells)| (simulation, cells));
+        let first = Task { cutters, ..self.task(path, simulation, cells) };
+        let mut measured = engine.measure(&first, monitor).map_err(failed)?;
+        let mut finest = auto_cell(&scene.cutter, &scene.toolpaths).min(simulation.cell);
+        let mut simulation = Simulation { cell_is_auto: false, cell: measured.cell, ..scene.simulation };
+        if !engine.gains_by_cells() {
+            finest = simulation.cell;
+        }
+        let (mut rounds, least) = (0, CLOSEST_BOUND * scene.simulation.error_bound);
+        while (simulation.cell > finest || rounds < CLOSER_ROUNDS)
+            && self.is_open(&measured)
+            && !closeness.is_enough(&measured, engine.gains_by_cells())
+        {
+            rounds += 1;
+            let before = simulation.cell;
+            let few = measured.cells as f64 <= FINER * FINER * MOST_CLOSER_CELLS as f64;
+            if engine.gains_by_cells() {
+                simulation.cell = if few { FINER * before } else { (FINER * before).max(finest.min(before)) };
+            }
+            simulation.error_bound = (FINER * FINER * simulation.error_bound).max(least);
+            let cells = self.budget().grid_before_planning(&self.area(), &simulation);
+            let finer = cells.map(|cells| {
+                let task = Task { cutters, ..self.task(path, &simulation, &cells) };
+                engine.measure(&task, monitor)
+            });
+            match finer {
+                Ok(Ok(finer)) => {
+                    let wall_s = measured.wall_s + finer.wall_s;
+                    measured =
+                        Measured { note: finer_note(&simulation, scene).or(finer.note), wall_s, ..finer }
+                }
+                Ok(Err(EngineError::Cancelled(cancelled))) => return Err(cancelled.into()),
+                // Finer cells do not fit into the memory; smaller bounds on the same ones may be enough.
+                _ if simulation.cell < before => (simulation.cell, finest) = (before, before),
+                _ => break,
+            }
+        }
+        Ok(measured)
+    }
+
+    /// The cells of a toolpath that was planned for a time, where its passes lie nearer than those of the scene's scallop height.
+    fn own_cells(&self, request: &ToolpathRequest) -> Result<Option<(Simulation, LaidOut)>, JobError> {
+        let scene = &self.scene;
+        let cell = auto_cell(&scene.cutter, std::slice::from_ref(request));
+        if request.equal_time.is_none() || !scene.simulation.cell_is_auto || cell >= scene.simulation.cell {
+            return Ok(None);
+        }
+        let simulation = Simulation { cell, ..scene.simulation };
+        let cells = self.budget().grid_before_planning(&self.area(), &simulation);
+        Ok(Some((simulation, cells.map_err(JobError::grid(scene))?)))
+    }
+}
+
+fn finer_note(simulation: &Simulation, scene: &Scene) -> Option<String> {
+    (simulation.cell < scene.simulation.cell).then(|| {
+        format!(
+            "measured on cells of {} mm instead of {} mm: on those a limit was undecided",
+            simulation.cell, scene.simulation.cell
+        )
+    })
+}
