@@ -78,7 +78,8 @@ pub(crate) fn close<S: LevelSource<Place = [f64; 2]>>(
             let before = passes.contacts.len();
             let needed = |place: &[f64; 2]| gaps.open_beyond(*place, SLACK).is_some();
             // What is open may be shorter than points of a level are apart.
-            let from_gap = |place: &[f64; 2]| (place[0] - gap.at[0]).hypot(place[1] - gap.at[1]);
+            let open = chart.jet(gap.at[0], gap.at[1]).p;
+            let from_gap = |place: &[f64; 2]| (chart.jet(place[0], place[1]).p - open).norm();
             along_needed(source, level, &needed, &from_gap, sampling, passes, monitor)?;
             for k in before..passes.contacts.len() {
                 gaps.insert(&passes.contacts[k]);

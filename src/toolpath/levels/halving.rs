@@ -134,7 +134,7 @@ pub(crate) fn along_and_between<S: LevelSource>(
 }
 
 /// Appends passes along the stretches of a level that need one, with their overlap: where points are `needed`, and in any case
-/// at the point that is nearest by `distance`.
+/// at the point nearest to a place that is `distance` mm away, where no other point of the level may lie between.
 pub(crate) fn along_needed<S: LevelSource>(
     source: &S,
     level: f64,
@@ -149,7 +149,8 @@ pub(crate) fn along_needed<S: LevelSource>(
     let places = curves.iter().enumerate().flat_map(|(c, curve)| {
         curve.points.iter().enumerate().map(move |(k, place)| ((c, k), distance(place)))
     });
-    let nearest = places.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(point, _)| point);
+    let nearest = places.min_by(|a, b| a.1.total_cmp(&b.1));
+    let nearest = nearest.filter(|(_, distance)| *distance <= sampling).map(|(point, _)| point);
     for (c, curve) in curves.into_iter().enumerate() {
         let (curve, runs) = filler.stretches(curve, |k, points| {
             let wanted = nearest == Some((c, k)) || needed(&points[k]);
