@@ -9,7 +9,7 @@ use millstream::geometry::{Aabb, Bvh, Point3, TriangleMesh, Vector3};
 use millstream::monitor::Silent;
 use millstream::motion::{CcPoint, ClPoint, Move, MoveKind, Toolpath, location};
 use millstream::parallel;
-use millstream::sim::{VoxelStock, holder_clearance};
+use millstream::sim::{Stock, holder_clearance};
 
 fn main() {
     divan::main();
@@ -160,7 +160,7 @@ fn standing(bencher: Bencher, top: f64) {
     let cutter = cutter("ball");
     let (path, held) = (path(&cutter, true), holder());
     let block = Aabb { min: Point3::new(0.0, 0.0, -20.0), max: Point3::new(SIZE, SIZE, top) };
-    let stock = VoxelStock::Box(block);
+    let stock = Stock::Box(block);
     bencher.counter(ItemsCount::new(path.len())).bench_local(|| {
         holder_clearance(&stock, &[], &cutter, &held, &path, &Silent).expect("nothing stops it")
     });

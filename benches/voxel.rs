@@ -8,7 +8,7 @@ use millstream::cutter::Solid;
 use millstream::geometry::{Aabb, Point3, Vector3};
 use millstream::monitor::Silent;
 use millstream::motion::{ClPoint, Toolpath};
-use millstream::sim::{VoxelEngine, VoxelStock};
+use millstream::sim::{Stock, VoxelEngine};
 
 #[allow(dead_code)]
 #[path = "common/wave.rs"]
@@ -24,8 +24,8 @@ fn main() {
     divan::main();
 }
 
-fn block() -> VoxelStock {
-    VoxelStock::Box(Aabb { min: Point3::new(0.0, 0.0, -5.0), max: Point3::new(100.0, 100.0, 3.0) })
+fn block() -> Stock {
+    Stock::Box(Aabb { min: Point3::new(0.0, 0.0, -5.0), max: Point3::new(100.0, 100.0, 3.0) })
 }
 
 /// The same path with axes that sway about 20 degrees to all sides, the middle of the ball where it was.

@@ -2,7 +2,7 @@
 
 use miette::Diagnostic;
 
-use geometry::MeshError;
+use geometry::{MeshError, Point3};
 use metrology::EngineError;
 use report::ReportError;
 use scene::{LoadError, Scene, SceneError};
@@ -29,6 +29,19 @@ pub enum JobError {
         scene: String,
         /// What is wrong with the grid.
         reason: GridError,
+    },
+    /// The part is larger than its stock.
+    #[error(
+        "{scene}: the part stands {by:.3} mm out of its stock at x {:.3} y {:.3} z {:.3}", at.x, at.y, at.z
+    )]
+    #[diagnostic(help("make the stock of [stock] larger, or move it"))]
+    OutsideStock {
+        /// The scene, as its messages call it.
+        scene: String,
+        /// How far, mm.
+        by: f64,
+        /// Where it stands out farthest.
+        at: Point3,
     },
     /// A toolpath could not be planned.
     #[error("{scene}: the toolpath \"{name}\" could not be planned: {reason}")]

@@ -12,6 +12,7 @@ use report::{
     NotPlanned, RunReport, SimulationFigures, ToleranceFigures, ToolpathReport, ToolpathResult, Verdict,
 };
 use scene::ToolpathRequest;
+use sim::Stock;
 use work::monitor::{self, Monitor};
 
 use super::earlier::{EarlierPath, WholePath};
@@ -121,6 +122,13 @@ impl Session {
         let scene = &self.scene;
         let engine = self.engine(request)?;
         let (cutters, holders) = self.tools(request);
+        if !scene.stock.is_around() && !matches!(self.stock, Stock::Box(_)) {
+            self.seen_from_above(
+                request,
+                engine,
+                "measured in a block: write `corners` in [stock], or nothing",
+            )?;
+        }
         if cutters.are_several() {
             self.on_cells(request, engine, "measured with one tool at a time: write `tool = 2` for tool 2")?;
         }
@@ -252,13 +260,25 @@ impl Session {
         engine: &dyn Engine,
         otherwise: &str,
     ) -> Result<(), JobError> {
+        self.seen_from_above(request, engine, otherwise)?;
+        if self.scene.simulation.voxel.is_none() {
+            return Ok(());
+        }
+        let what = "the solid of `voxel` in [simulation] is";
+        Err(self.not_applicable(request, format!("{what} {otherwise}")))
+    }
+
+    /// Refuses what is not measured as heights; `otherwise` is how it is.
+    fn seen_from_above(
+        &self,
+        request: &ToolpathRequest,
+        engine: &dyn Engine,
+        otherwise: &str,
+    ) -> Result<(), JobError> {
         let what = match () {
             () if request.tilts() => "what tools that lean leave is".to_owned(),
             () if self.pocket.is_some() => "the floor of a pocket is".to_owned(),
             () if engine.tilts() => format!("with the engine `{}` a toolpath is", engine.word()),
-            () if self.scene.simulation.voxel.is_some() => {
-                "the solid of `voxel` in [simulation] is".to_owned()
-            }
             () => return Ok(()),
         };
         Err(self.not_applicable(request, format!("{what} {otherwise}")))

@@ -24,4 +24,4 @@ pub use error::JobError;
 pub use judge::marks;
 pub use machined::Machined;
 pub use outcome::Outcome;
-pub use session::{Session, stock_area};
+pub use session::Session;

@@ -159,7 +159,7 @@ impl Session {
             chord_tolerance: self.scene.tolerance.chord,
             clearance: self.scene.clearance,
             stock_top: self.top,
-            stock: Some(self.stock_block()),
+            stock: Some(self.area()),
             feed_rate: self.scene.cutting.feed_rate,
             plunge_rate: self.scene.cutting.plunge_rate,
             rapid_rate: self.scene.machine.rapid_rate,

@@ -4,14 +4,14 @@ use std::path::Path;
 
 use blade::Blade;
 use cutter::Holder;
-use geometry::{Aabb, Bvh};
+use geometry::{Aabb, Bvh, Point3, Vector3};
 use io::digest::{self, Fingerprint};
 use metrology::{Budget, Engine, LaidOut, Measured, Simulation, Task};
 use motion::{Cutters, Toolpath};
 use part::Part;
 use report::InputFile;
-use scene::{Fixture, Loaded, PartSource, Scene, ToolpathRequest, load_mesh, load_part};
-use sim::VoxelStock;
+use scene::{Fixture, Loaded, MeshFile, Scene, ToolpathRequest, load_mesh, load_part};
+use sim::Stock;
 use toolpath::{PlanError, Pocket};
 use work::aside;
 use work::monitor::{Cancelled, Monitor, Silent};
@@ -39,7 +39,9 @@ pub struct Session {
     pub pocket: Option<Pocket>,
     /// The cells over the stock before there is a path, and what is to be said about them.
     pub cells: LaidOut,
-    /// Height of the stock's flat top, mm.
+    /// What there is before the first cut.
+    pub stock: Stock,
+    /// Its greatest height, mm.
     pub top: f64,
     /// What was mended to make the part usable.
     pub notes: Vec<String>,
@@ -51,17 +53,51 @@ pub struct Session {
     cutters: Cutters,
 }
 
-/// The rectangle to simulate: the part's, grown by the stock's margin.
-pub fn stock_area(scene: &Scene, part: &Part) -> Aabb {
-    let mut area = part.bounds();
-    let mut margin = scene.stock.margin;
-    if matches!(scene.part, PartSource::Pocket { .. }) {
-        // The measured floor ends where the flat of the cutter's bottom does.
-        margin += scene.cutter.radius() - scene.cutter.flat_radius();
+/// What there is before the first cut, and the height of its top, mm.
+///
+/// # Errors
+/// [`JobError`] when its file cannot be used, or the part stands out of it.
+fn stock_of(scene: &Scene, part: &Part, pocket: bool) -> Result<Stock, JobError> {
+    Ok(match &scene.stock {
+        &scene::Stock::Around { allowance, margin, .. } => {
+            let Aabb { mut min, mut max } = part.bounds();
+            // The measured floor ends where the flat of the cutter's bottom does.
+            let beyond = if pocket { scene.cutter.radius() - scene.cutter.flat_radius() } else { 0.0 };
+            let margin = margin + beyond;
+            let face = if pocket { 0.0 } else { max.z };
+            min -= Vector3::new(margin, margin, BASE);
+            max += Vector3::new(margin, margin, 0.0);
+            max.z = face + allowance;
+            Stock::Box(Aabb { min, max })
+        }
+        scene::Stock::Block(block) => Stock::Box(*block),
+        &scene::Stock::Bar { from, axis, diameter, length } => {
+            Stock::Cylinder { base: from, axis, radius: 0.5 * diameter, length }
+        }
+        scene::Stock::Mesh(MeshFile { file, format, scale, .. }) => {
+            let (mesh, _) = load_mesh(scene, file, format, *scale)?;
+            let refused = || {
+                let (what, cure) =
+                    ("the stock's mesh has borders, so that it has no inside", "close its holes");
+                scene.source.error(file.span.clone(), what, cure)
+            };
+            Stock::from_mesh(mesh).ok_or_else(refused)?
+        }
+    })
+}
+
+/// Refuses a part that stands out of its stock by more than the gouge tolerance.
+fn check_inside(scene: &Scene, part: &Part, stock: &Stock) -> Result<(), JobError> {
+    let out = |p: &Point3| stock.foot(p).0;
+    let vertices = part.mesh().vertices();
+    let farthest = work::parallel::map(vertices.len(), |k| out(&vertices[k]));
+    let farthest = (0..vertices.len()).max_by(|&a, &b| farthest[a].total_cmp(&farthest[b]));
+    match farthest.map(|k| (out(&vertices[k]), vertices[k])) {
+        Some((by, at)) if by > scene.tolerance.gouge => {
+            Err(JobError::OutsideStock { scene: scene.source.name.clone(), by, at })
+        }
+        _ => Ok(()),
     }
-    (area.min.x, area.min.y) = (area.min.x - margin, area.min.y - margin);
-    (area.max.x, area.max.y) = (area.max.x + margin, area.max.y + margin);
-    area
 }
 
 impl Session {
@@ -94,15 +130,18 @@ impl Session {
     fn read(scene: Scene) -> Result<Self, JobError> {
         let Loaded { part, blade, pocket, notes } = load_part(&scene)?;
         let budget = Budget::new(&part, scene.simulation.memory_mib);
+        let stock = stock_of(&scene, &part, pocket.is_some())?;
+        if !scene.stock.is_around() {
+            check_inside(&scene, &part, &stock)?;
+        }
+        let top = stock.bounds().max.z;
         let cells = budget
-            .grid_before_planning(&stock_area(&scene, &part), &scene.simulation)
+            .grid_before_planning(&stock.bounds(), &scene.simulation)
             .map_err(JobError::grid(&scene))?;
-        let face = if pocket.is_some() { 0.0 } else { part.bounds().max.z };
-        let top = face + scene.stock.allowance;
         let doubt = units::doubt(&scene, &part);
         let inputs = inputs(&scene)?;
         let cutters = Cutters::from(&scene.cutter);
-        Ok(Self { scene, part, blade, pocket, cells, top, notes, doubt, inputs, cutters })
+        Ok(Self { scene, part, blade, pocket, cells, stock, top, notes, doubt, inputs, cutters })
     }
 
     /// What a simulation may take.
@@ -110,9 +149,9 @@ impl Session {
         Budget::new(&self.part, self.scene.simulation.memory_mib)
     }
 
-    /// The rectangle to simulate.
+    /// The box around the stock.
     pub fn area(&self) -> Aabb {
-        stock_area(&self.scene, &self.part)
+        self.stock.bounds()
     }
 
     /// The meshes that are not to be touched.
@@ -143,19 +182,11 @@ impl Session {
         aside::run(monitor, move || Part::from_patches(patches, nearest).ok())
     }
 
-    /// The block that the part is cut from.
-    pub(crate) fn stock_block(&self) -> Aabb {
-        let Aabb { mut min, mut max } = self.area();
-        (min.z, max.z) = (min.z - BASE, self.top);
-        Aabb { min, max }
-    }
-
-    /// That block, as far as it was roughed before.
-    pub(crate) fn voxel_stock(&self) -> VoxelStock {
-        let block = self.stock_block();
-        match self.scene.stock.roughed {
-            Some(over) => VoxelStock::roughed(block, self.part.mesh().clone(), over),
-            None => VoxelStock::Box(block),
+    /// What there is before the first cut, roughed as the scene says.
+    pub(crate) fn roughed_stock(&self) -> Stock {
+        match self.scene.stock.roughed() {
+            Some(over) => Stock::roughed(self.area(), self.part.mesh().clone(), over),
+            None => self.stock.clone(),
         }
     }
 
@@ -214,7 +245,7 @@ impl Session {
             cutters: &self.cutters,
             holder: self.scene.holder.as_ref(),
             path,
-            top: self.top,
+            stock: &self.stock,
             area: self.area(),
             cells,
             limits: &self.scene.tolerance,

@@ -8,7 +8,7 @@
 
 use geometry::{Point3, Vector3};
 use motion::Toolpath;
-use sim::{Envelope, NOT_CUT, ZMap};
+use sim::{Envelope, NOT_CUT, Shape, ZMap};
 
 /// A point of the cut surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,14 +20,16 @@ pub struct CutPoint {
 }
 
 /// Up to nine different moves around a cell.
-pub struct Winners {
+pub struct Winners<'a> {
     moves: [u32; 9],
     len: usize,
-    /// Height of stock that no move touched, if any cell around is such; infinite otherwise.
+    /// Height of flat stock that no move touched, if any cell around is such; infinite otherwise.
     stock: f64,
+    /// The same of stock in another shape.
+    shape: Option<&'a Shape>,
 }
 
-impl Winners {
+impl Winners<'_> {
     /// The moves.
     pub fn moves(&self) -> &[u32] {
         &self.moves[..self.len]
@@ -66,15 +68,16 @@ impl<'a> CutSurface<'a> {
     }
 
     /// The moves that won cell `(i, j)` and the eight around it, the cell's own first.
-    pub fn winners(&self, i: usize, j: usize) -> Winners {
+    pub fn winners(&self, i: usize, j: usize) -> Winners<'_> {
         let grid = &self.cut.grid;
-        let mut winners = Winners { moves: [NOT_CUT; 9], len: 0, stock: f64::INFINITY };
+        let mut winners = Winners { moves: [NOT_CUT; 9], len: 0, stock: f64::INFINITY, shape: None };
         let columns = i.saturating_sub(1)..=(i + 1).min(grid.nx - 1);
         let rows = j.saturating_sub(1)..=(j + 1).min(grid.ny - 1);
         let around = rows.flat_map(|j| columns.clone().map(move |i| (i, j)));
         for (i, j) in std::iter::once((i, j)).chain(around) {
             let k = grid.index(i, j);
             match self.cut.cut_by[k] {
+                NOT_CUT if self.cut.shape.is_some() => winners.shape = self.cut.shape.as_ref(),
                 NOT_CUT => winners.stock = f64::from(self.cut.height[k]),
                 by => winners.push(by),
             }
@@ -83,8 +86,9 @@ impl<'a> CutSurface<'a> {
     }
 
     /// The lowest of the given moves at `(x, y)`.
-    pub fn lowest_of(&self, winners: &Winners, x: f64, y: f64) -> CutPoint {
-        let mut lowest = CutPoint { z: winners.stock, by: NOT_CUT };
+    pub fn lowest_of(&self, winners: &Winners<'_>, x: f64, y: f64) -> CutPoint {
+        let stock = winners.shape.map_or(winners.stock, |shape| shape.height_at(x, y));
+        let mut lowest = CutPoint { z: stock, by: NOT_CUT };
         for &by in &winners.moves[..winners.len] {
             if let Some(z) = self.envelope.height(by, x, y)
                 && z < lowest.z
@@ -107,7 +111,7 @@ impl<'a> CutSurface<'a> {
     /// A cut that passes `(x, y)`, near the winners of cell `(i, j)` along the program: of moves that are
     /// equally low (flats on level ground) the first wins every cell and may yet end before the point.
     /// What passes more than a cell above the cell's own height is no cut of this place.
-    fn beside(&self, (i, j): (usize, usize), winners: &Winners, x: f64, y: f64) -> Option<CutPoint> {
+    fn beside(&self, (i, j): (usize, usize), winners: &Winners<'_>, x: f64, y: f64) -> Option<CutPoint> {
         let grid = &self.cut.grid;
         let highest = f64::from(self.cut.height[grid.index(i, j)]) + grid.cell;
         let near = winners.moves[..winners.len].iter().flat_map(|&by| {
@@ -159,7 +163,8 @@ impl<'a> CutSurface<'a> {
     /// Upward unit normal of the cut surface made by `by` at `(x, y)`.
     pub fn normal(&self, by: u32, x: f64, y: f64) -> Vector3 {
         if by == NOT_CUT {
-            return Vector3::z();
+            let shape = self.cut.shape.as_ref();
+            return shape.map_or(Vector3::z(), |shape| shape.stock.normal_at(x, y));
         }
         self.envelope.height_and_normal(by, x, y).map_or(Vector3::z(), |(_, n)| n)
     }

@@ -20,7 +20,7 @@ use super::ridges::Hidden;
 use super::unseen::{Dip, most_unseen};
 use geometry::Point2;
 use motion::Toolpath;
-use sim::{Envelope, Grid, ZMap, cut, cut_in_turn};
+use sim::{Envelope, Grid, Shape, cut, cut_in_turn};
 use work::monitor::{self, Cancelled, Monitor};
 
 /// Cells of the grid along the side of a rectangle. More are cut for nothing around a place; fewer share
@@ -170,7 +170,10 @@ impl Refinement<'_> {
             Hidden::Ridge(q, height) => (q, height),
             Hidden::Gap(q) => {
                 let design = self.coarse.part.highest_at(q.x, q.y);
-                (q, design.map_or(0.0, |d| (self.asked.stock_top - d.point.z) * d.normal.z))
+                let shape = self.coarse.surface.cut.shape.as_ref();
+                let within = |shape: &Shape| shape.highest_within(q.x, q.y, self.coarse.grid.cell);
+                let top = shape.map_or(self.asked.stock_top, within);
+                (q, design.map_or(0.0, |d| (top - d.point.z) * d.normal.z))
             }
         }
     }
@@ -266,7 +269,7 @@ impl Refinement<'_> {
     /// What is measured on a fine grid, and how high material may be that its cells missed as well.
     fn measure(&self, fine: Grid, monitor: &dyn Monitor) -> Result<(Inspected, f64), Cancelled> {
         let (coarse, within) = (self.coarse, Within(monitor));
-        let stock = ZMap::block(fine, self.asked.stock_top);
+        let stock = coarse.surface.cut.uncut(fine, self.asked.stock_top);
         let cut = cut_in_turn(cut, stock, coarse.cutters, self.path, &within)?;
         let envelope: Envelope = coarse.surface.envelope.clone();
         let surface = CutSurface::new(envelope, &cut, self.path);

@@ -14,6 +14,7 @@ mod load;
 mod named_file;
 mod part;
 mod read;
+mod stock;
 #[cfg(test)]
 mod tests;
 mod write;
@@ -29,6 +30,7 @@ pub use part::{
     BladeRequest, FLATTEN_SHARE, FormulaSource, LoadError, Loaded, MeshFile, NurbsSource, OutlineSource,
     PartSource, PocketSource,
 };
+pub use stock::Stock;
 pub use write::complete_toml;
 
 use cutter::{Cutter, Holder};
@@ -67,17 +69,6 @@ const LEAST_ERROR_BOUND: f64 = 1e-6;
 /// The error bound, mm, that is asked when the scene asks for none.
 pub fn default_error_bound(limits: &Limits) -> f64 {
     (limits.scallop.min(limits.gouge).min(limits.uncut) / ERROR_BOUNDS_A_TOLERANCE).max(LEAST_ERROR_BOUND)
-}
-
-/// Stock around the part.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stock {
-    /// Height of the flat top above the part's highest point, mm.
-    pub allowance: f64,
-    /// Growth of the part's rectangle on all four sides, mm.
-    pub margin: f64,
-    /// How much stands over the part's surface where the block was roughed before, mm; for voxels.
-    pub roughed: Option<f64>,
 }
 
 /// Speeds of the cutter.

@@ -3,14 +3,14 @@
 use std::path::Path;
 
 use super::{
-    CuttingData, DEFAULT_ALLOWANCE, DEFAULT_CLEARANCE, DEFAULT_FEED_RATE, DEFAULT_LIMITS, DEFAULT_MARGIN,
-    DEFAULT_MEMORY_MIB, DEFAULT_PLUNGE_RATE, DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, EngineChoice, NamedFile,
-    PartSource, Scene, Simulation, Stock, ToolpathRequest, auto_cell, default_error_bound,
+    CuttingData, DEFAULT_CLEARANCE, DEFAULT_FEED_RATE, DEFAULT_LIMITS, DEFAULT_MEMORY_MIB,
+    DEFAULT_PLUNGE_RATE, DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, EngineChoice, NamedFile, PartSource, Scene,
+    Simulation, ToolpathRequest, auto_cell, default_error_bound,
 };
-use super::{axis, compare, direction, foreign, interference, kinematics, part};
+use super::{axis, compare, direction, foreign, interference, kinematics, part, stock};
 use cutter::{Cutter, Holder, HolderSection};
 use io::regular;
-use keys::{LENGTH, Located, SceneError, SceneText, Section, printable};
+use keys::{Located, SceneError, SceneText, Section, printable};
 use machine::Machine;
 use metrology::{Limits, ScallopRule};
 use toolpath::{Joining, Links, PartKind, Step, read_pocket_step, read_strategy, words_for};
@@ -94,7 +94,7 @@ impl Scene {
         let part = part::read(&root.section("part")?, &folder)?;
         let judged = part::read_judged(&root.section("part")?)?;
         let (cutter, cutting) = read_cutter(&root.section("cutter")?)?;
-        let stock = read_stock(&root.section("stock")?, &part, &cutter)?;
+        let stock = stock::read(&root.section("stock")?, &folder, &part, &cutter)?;
         let holder = read_holder(&root, &cutter)?;
         let section = root.section("tolerance")?;
         let tolerance = read_tolerance(&section)?;
@@ -147,11 +147,12 @@ impl Scene {
         self.part.file()
     }
 
-    /// Every file that the scene names: of the part, the fixtures, and the feed directions.
+    /// Every file that the scene names: of the part, the stock, the fixtures, and the feed directions.
     pub fn files(&self) -> impl Iterator<Item = &NamedFile> {
         let fixtures = self.keep_clear.fixtures.iter().map(|fixture| &fixture.file);
         let directions = self.toolpaths.iter().flat_map(|request| &request.directions);
-        self.part_file().into_iter().chain(fixtures).chain(directions)
+        let stock = self.stock.file().map(|mesh| &mesh.file);
+        self.part_file().into_iter().chain(stock).chain(fixtures).chain(directions)
     }
 
     /// Reads the files of feed directions into the strategies that follow them.
@@ -173,7 +174,8 @@ impl Scene {
     /// Refuses a file that is not there or cannot be opened, pointing at its name in the scene.
     fn check_files(&self) -> Result<(), SceneError> {
         let fixtures = self.keep_clear.fixtures.iter().map(|fixture| ("fixture", &fixture.file));
-        self.part_file().map(|file| ("part", file)).into_iter().chain(fixtures).try_for_each(
+        let stock = self.stock.file().map(|mesh| ("stock", &mesh.file));
+        self.part_file().map(|file| ("part", file)).into_iter().chain(stock).chain(fixtures).try_for_each(
             |(whose, file)| {
                 let Err(reason) = regular::open(&file.path) else { return Ok(()) };
                 let message = format!("cannot read the {whose}'s file {}: {reason}", file.path.display());
@@ -185,20 +187,6 @@ impl Scene {
             },
         )
     }
-}
-
-fn read_stock(stock: &Section<'_>, part: &PartSource, cutter: &Cutter) -> Result<Stock, SceneError> {
-    stock.only(&["allowance", "margin", "roughed"], &[], "[stock]")?;
-    // Zero is meant in both: stock may end at the part's top and at its rim.
-    let length = |key| stock.number(key, 0.0..=*LENGTH.end(), " mm");
-    // A pocket is milled into a finished face, and what is cut beside it has to be seen.
-    let pocket = matches!(part, PartSource::Pocket { .. });
-    let (top, around) = if pocket { (0.0, cutter.radius()) } else { (DEFAULT_ALLOWANCE, DEFAULT_MARGIN) };
-    Ok(Stock {
-        allowance: length("allowance")?.map_or(top, |v| v.value),
-        margin: length("margin")?.map_or(around, |v| v.value),
-        roughed: length("roughed")?.map(|v| v.value),
-    })
 }
 
 fn read_cutter(section: &Section<'_>) -> Result<(Cutter, CuttingData), SceneError> {

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::read::PREVIOUS_STOCK;
-use super::{Scene, ToolpathRequest, axis, compare, interference, kinematics, part};
+use super::{Scene, ToolpathRequest, axis, compare, interference, kinematics, part, stock};
 use keys::{toml_number as number, toml_string as text};
 use toolpath::{Links, PartKind, Step, longest_link};
 
@@ -18,16 +18,7 @@ pub fn complete_toml(scene: &Scene) -> String {
 fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     writeln!(out, "title = {}\n", text(&scene.title))?;
     part::write(out, &scene.part, scene.judged)?;
-    writeln!(out, "\n[stock]")?;
-    writeln!(out, "allowance = {}  # mm above the part's highest point", number(scene.stock.allowance))?;
-    writeln!(out, "margin = {}  # mm around the part in the plan view", number(scene.stock.margin))?;
-    if let Some(roughed) = scene.stock.roughed {
-        writeln!(
-            out,
-            "roughed = {}  # mm that stand over the part, for tilted tools and voxels",
-            number(roughed)
-        )?;
-    }
+    stock::write(out, &scene.stock)?;
     write_cutter(out, scene)?;
     write_holder(out, scene)?;
     let limits = &scene.tolerance;

@@ -22,6 +22,7 @@ mod reference;
 pub mod scenes;
 mod solid;
 mod standing;
+mod stock;
 mod sweep;
 mod swept;
 mod tiles;
@@ -40,9 +41,10 @@ pub use rays::{RayHit, Rays, RaysError};
 pub use reference::cut_reference;
 pub use solid::{Nearest, OppositeAxes, SweptHit, SweptMoves, SweptSolid};
 pub use standing::{FAR, NearStanding, StandingClearance, holder_clearance};
+pub use stock::{BarAxis, Stock, StockMesh};
 pub use swept::SweptMove;
 pub use voxel::{
-    BarAxis, HolderHit, LineExit, StandingHits, StockMesh, VoxelEngine, VoxelError, VoxelRemoval,
-    VoxelSample, VoxelStock, VoxelSurface, VoxelVolumes, Voxels,
+    HolderHit, LineExit, StandingHits, VoxelEngine, VoxelError, VoxelRemoval, VoxelSample, VoxelSurface,
+    VoxelVolumes, Voxels,
 };
-pub use zmap::{NOT_CUT, ZMap};
+pub use zmap::{NOT_CUT, Shape, ZMap};

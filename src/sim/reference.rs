@@ -63,8 +63,7 @@ pub fn cut_reference(
     let side = BLOCK * tile_blocks.clamp(TILE_BLOCKS[0], TILE_BLOCKS[1]) as usize;
     let bins = MoveBins::new(&stock.grid, side, form.radius, path);
     monitor.start("cutting", (bins.nx() * bins.ny()) as u64);
-    let mut cut =
-        ZMap { grid: stock.grid, height: stock.height.clone(), cut_by: vec![NOT_CUT; stock.height.len()] };
+    let mut cut = ZMap { cut_by: vec![NOT_CUT; stock.height.len()], ..stock.clone() };
     let mut tiles: Vec<Tile> =
         tiles(&mut cut, side).into_iter().map(|cells| Tile::new(&stock.grid, cells)).collect();
     parallel::try_for_each(&mut tiles, |k, tile| {

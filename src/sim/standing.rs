@@ -21,8 +21,8 @@ use work::monitor::{Cancelled, Monitor, check};
 use work::parallel;
 
 use super::form::Form;
+use super::stock::Stock;
 use super::track::Track;
-use super::voxel::VoxelStock;
 use replay::{Replay, TILE};
 
 /// Clearances above this, mm, are not told apart: no machinist asks. More takes longer.
@@ -99,7 +99,7 @@ struct Before {
 
 /// What every replay needs.
 struct Task<'a> {
-    stock: &'a VoxelStock,
+    stock: &'a Stock,
     before: Vec<Before>,
     form: Form,
     sections: Vec<Section>,
@@ -129,7 +129,7 @@ struct Pending {
 /// See [`StandingClearance::error_bound`]. It is a twentieth of the clearance and a hundredth of a millimetre at most, unless
 /// more than 10,000 tiles leave it open. The result does not depend on the number of threads.
 pub fn holder_clearance(
-    stock: &VoxelStock,
+    stock: &Stock,
     before: &[(Cutter, Toolpath)],
     cutter: &Cutter,
     holder: &Holder,
@@ -170,7 +170,7 @@ fn tracks(path: &Toolpath) -> Vec<Track> {
 }
 
 impl<'a> Task<'a> {
-    fn new(stock: &'a VoxelStock, cutter: &Cutter, holder: &Holder, path: &'a Toolpath) -> Self {
+    fn new(stock: &'a Stock, cutter: &Cutter, holder: &Holder, path: &'a Toolpath) -> Self {
         let sections = Solid::of_sections(holder).into_iter().enumerate();
         let wider = sections.filter(|(_, solid)| solid.radius() > cutter.radius());
         let sections: Vec<Section> = wider.map(|(index, solid)| Section { solid, index }).collect();

@@ -27,7 +27,6 @@ mod removal;
 mod sheets;
 mod slide;
 mod standing;
-mod stock;
 mod surface;
 #[cfg(test)]
 mod tests;
@@ -40,7 +39,6 @@ pub use error::VoxelError;
 pub use line::LineExit;
 pub use removal::VoxelRemoval;
 pub use standing::{HolderHit, StandingHits};
-pub use stock::{BarAxis, StockMesh, VoxelStock};
 pub use surface::VoxelSurface;
 pub use volume::VoxelVolumes;
 pub use voxels::{VoxelSample, Voxels};

@@ -1,12 +1,12 @@
 //! Stock as heights over a grid (three axes, no undercuts).
 
-use super::Grid;
+use super::{Grid, Stock};
 
 /// In [`ZMap::cut_by`]: no move touched this cell.
 pub const NOT_CUT: u32 = u32::MAX;
 
 /// Height of the stock at every cell centre, and which move cut it last.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct ZMap {
     /// The cells.
     pub grid: Grid,
@@ -14,11 +14,68 @@ pub struct ZMap {
     pub height: Vec<f32>,
     /// Index of the move that made the final height (the least one of equals), or [`NOT_CUT`].
     pub cut_by: Vec<u32>,
+    /// What stood there before the first cut, where its top is not flat.
+    pub shape: Option<Shape>,
+}
+
+/// Stock that is no block, as cells see it from above.
+#[derive(Debug, Clone)]
+pub struct Shape {
+    /// The stock.
+    pub stock: Stock,
+    /// Height where there is none, mm.
+    pub bottom: f64,
+}
+
+/// Shapes are of no account: equal heights of one path came from equal stock.
+impl PartialEq for ZMap {
+    fn eq(&self, other: &Self) -> bool {
+        self.grid == other.grid && self.height == other.height && self.cut_by == other.cut_by
+    }
 }
 
 impl ZMap {
     /// A block with a flat top.
     pub fn block(grid: Grid, top: f64) -> Self {
-        Self { grid, height: vec![top as f32; grid.len()], cut_by: vec![NOT_CUT; grid.len()] }
+        Self { grid, height: vec![top as f32; grid.len()], cut_by: vec![NOT_CUT; grid.len()], shape: None }
+    }
+
+    /// What stands over the cells' centres, seen from above; `bottom` where nothing stands. A roughed block counts as a
+    /// whole one.
+    pub fn of_stock(grid: Grid, stock: &Stock, bottom: f64) -> Self {
+        match stock {
+            Stock::Box(block) | Stock::Roughed { block, .. } => Self::block(grid, block.max.z),
+            Stock::Cylinder { .. } | Stock::Mesh(_) => {
+                Self::of_shape(grid, Shape { stock: stock.clone(), bottom })
+            }
+        }
+    }
+
+    fn of_shape(grid: Grid, shape: Shape) -> Self {
+        let height = |k: usize| {
+            let centre = grid.centre(k % grid.nx, k / grid.nx);
+            shape.height_at(centre.x, centre.y) as f32
+        };
+        let height = work::parallel::map(grid.len(), height);
+        Self { grid, height, cut_by: vec![NOT_CUT; grid.len()], shape: Some(shape) }
+    }
+
+    /// The same stock before the first cut on other cells; `top` is that of a block, mm.
+    pub fn uncut(&self, grid: Grid, top: f64) -> Self {
+        self.shape
+            .as_ref()
+            .map_or_else(|| Self::block(grid, top), |shape| Self::of_shape(grid, shape.clone()))
+    }
+}
+
+impl Shape {
+    /// Height before the first cut, mm.
+    pub fn height_at(&self, x: f64, y: f64) -> f64 {
+        self.stock.height_at(x, y).max(self.bottom)
+    }
+
+    /// The greatest height over the square of `half` mm to each side of `(x, y)` before the first cut, mm.
+    pub fn highest_within(&self, x: f64, y: f64, half: f64) -> f64 {
+        self.stock.highest_within(x, y, half).max(self.bottom)
     }
 }

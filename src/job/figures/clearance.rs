@@ -180,7 +180,7 @@ fn with_standing_stock(
     monitor: &dyn Monitor,
 ) -> Result<Option<PairClearance>, JobError> {
     let Some(holder) = tool.holder else { return Ok(None) };
-    let stock = run.session.voxel_stock();
+    let stock = run.session.roughed_stock();
     match run.view() {
         View::Heights(_) => {
             let found = holder_clearance(&stock, before, tool.cutter, holder, &tool.path, monitor)?;

@@ -3,7 +3,7 @@
 use cutter::Solid;
 use metrology::{RemovalFigures, View, removal_figures, voxel_removal_figures};
 use report::{Claim, Figure, Gravity, Verdict, place};
-use sim::{MoveRemoval, VoxelEngine, VoxelStock, ZMap, cut_in_order_in_turn};
+use sim::{MoveRemoval, Stock, VoxelEngine, ZMap, cut_in_order_in_turn};
 use work::monitor::Monitor;
 
 use super::entries;
@@ -75,9 +75,9 @@ pub(crate) fn doubt(claims: &mut [Claim], decided_by: &'static str) {
     }
 }
 
-/// The block, less what other toolpaths and other tools of a program from elsewhere cut before.
+/// The stock, less what other toolpaths and other tools of a program from elsewhere cut before.
 fn stock(run: &Run<'_>, cut: &ZMap, monitor: &dyn Monitor) -> Result<ZMap, JobError> {
-    let mut stock = ZMap::block(cut.grid, run.session.top);
+    let mut stock = cut.uncut(cut.grid, run.session.top);
     for (cutter, path) in run.before() {
         stock = sim::cut(stock, &cutter, &path, monitor)?;
         stock.cut_by.fill(sim::NOT_CUT);
@@ -86,13 +86,13 @@ fn stock(run: &Run<'_>, cut: &ZMap, monitor: &dyn Monitor) -> Result<ZMap, JobEr
 }
 
 /// The voxel of removal in order, mm.
-pub(super) fn voxel_in_order(run: &Run<'_>, stock: &VoxelStock) -> f64 {
+pub(super) fn voxel_in_order(run: &Run<'_>, stock: &Stock) -> f64 {
     let about = || (stock.bounds().size().product() / VOXELS).cbrt();
     run.scene().simulation.voxel.unwrap_or_else(about)
 }
 
 fn by_voxels(run: &Run<'_>, monitor: &dyn Monitor) -> Result<(RemovalFigures, Vec<MoveRemoval>), JobError> {
-    let (scene, stock) = (run.scene(), run.session.voxel_stock());
+    let (scene, stock) = (run.scene(), run.session.roughed_stock());
     let voxel = voxel_in_order(run, &stock);
     let cutter = Solid::of_cutter(&scene.cutter, scene.holder.as_ref());
     let engine = VoxelEngine::new(&stock, &cutter, run.path()).map_err(run.voxels())?;

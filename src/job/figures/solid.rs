@@ -40,7 +40,7 @@ const OPEN: &str = "beside the borders of an open surface nothing bounds what wa
 /// Where the scene asks for voxels.
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
     let Some(voxel) = run.scene().simulation.voxel else { return Ok(Finding::default()) };
-    let stock = run.session.voxel_stock();
+    let stock = run.session.roughed_stock();
     let tool = Solid::of_cutter(&run.scene().cutter, run.scene().holder.as_ref());
     let memory = run.budget().left(0);
     let engine = VoxelEngine::new(&stock, &tool, run.path()).map_err(run.voxels())?;
@@ -53,7 +53,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     let vertices: Vec<[f32; 3]> = surface.vertices.iter().map(narrow).collect();
     let VoxelVolumes { left, removed } = engine.volumes(voxel, monitor).map_err(run.voxels())?;
     let [volume_mm3, removed_mm3] = [left, removed].map(|[low, high]| 0.5 * (low + high));
-    let roughed = run.scene().stock.roughed.is_some();
+    let roughed = run.scene().stock.roughed().is_some();
     let reason = (roughed && !run.session.part.mesh().is_closed()).then_some(OPEN);
     let [of_left, of_removed] = [left, removed].map(|[low, high]| 0.5 * (high - low));
     let figures = SolidFigures {

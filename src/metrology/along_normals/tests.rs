@@ -5,7 +5,7 @@ use geometry::{Aabb, TriangleMesh, distance_to_segment, samples};
 use motion::{ClPoint, Move, MoveKind};
 use part::Patch;
 use scallop::ball_scallop_height;
-use sim::{Rays, VoxelEngine, VoxelStock};
+use sim::{Rays, Stock, VoxelEngine};
 use work::monitor::Silent;
 
 const RADIUS: f64 = 3.0;
@@ -237,7 +237,7 @@ fn by_both(
     let reach = 0.6;
     let geometry::Aabb { min, max } = part.bounds();
     let around = Vector3::repeat(reach + 1.0);
-    let space = VoxelStock::Box(geometry::Aabb { min: min - around, max: max + around });
+    let space = Stock::Box(geometry::Aabb { min: min - around, max: max + around });
     let engine = VoxelEngine::new(&space, &solid, &path).unwrap();
     let voxels = engine.cut(voxel, 1 << 30, &Silent).unwrap();
     let rays = Rays::new(&path, &solid, &Silent).unwrap();

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use sim::{CutHeights, ZMap, cut, cut_in_turn, cut_reference};
+use sim::{CutHeights, cut, cut_in_turn, cut_reference};
 use work::monitor::Monitor;
 
 use super::{Engine, EngineError, Measured, Task, View};
@@ -47,7 +47,7 @@ impl Engine for Cells {
     fn ridges(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Option<RidgeMap>, EngineError> {
         let path = task.path;
         let (grid, _) = task.budget.grid_for(path.len(), &task.area, task.simulation, task.cells)?;
-        let stock = ZMap::block(grid, task.top);
+        let stock = task.uncut(grid);
         let cut = cut_in_turn(self.cut, stock, task.cutters, path, monitor)?;
         let asked = task.simulation.error_bound;
         Ok(ridge_map(task.part, task.cutters, path, &cut, task.limits, asked, monitor)?)
@@ -57,12 +57,12 @@ impl Engine for Cells {
         let begun = Instant::now();
         let (path, held) = (task.path, task.moves_held());
         let (grid, note) = task.budget.grid_for(held, &task.area, task.simulation, task.cells)?;
-        let stock = ZMap::block(grid, task.top);
+        let stock = task.uncut(grid);
         let cut = cut_in_turn(self.cut, stock, task.cutters, path, monitor)?;
         let most_cells = task.budget.more_cells(held, &grid);
         let asked = Asked {
             error_bound: task.simulation.error_bound,
-            stock_top: task.top,
+            stock_top: task.stock.bounds().max.z,
             most_cells,
             most_squares: task.budget.squares_beside(held, &grid),
             borders: !task.pocket,

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use cutter::Solid;
 use geometry::{Aabb, Vector3};
-use sim::{VoxelEngine, VoxelStock, Voxels};
+use sim::{Stock, VoxelEngine, Voxels};
 use work::monitor::Monitor;
 
 use super::budget::MIB;
@@ -99,16 +99,16 @@ impl Engine for Normals {
 }
 
 /// More than the part by `reach` all around, so that what a normal leaves is what was cut.
-fn space(task: &Task<'_>, reach: f64) -> VoxelStock {
+fn space(task: &Task<'_>, reach: f64) -> Stock {
     let Aabb { min, max } = task.part.bounds();
     let around = Vector3::repeat(reach + BEYOND);
-    VoxelStock::Box(Aabb { min: min - around, max: max + around })
+    Stock::Box(Aabb { min: min - around, max: max + around })
 }
 
 /// What a path leaves of `space` where places `spacing` mm apart take their memory too.
 fn cut_voxels<'a>(
     task: &Task<'_>,
-    space: &'a VoxelStock,
+    space: &'a Stock,
     solid: &Solid,
     spacing: f64,
     monitor: &dyn Monitor,

@@ -4,7 +4,7 @@ use cutter::{Holder, Solid};
 use geometry::Aabb;
 use motion::{Cutters, Toolpath};
 use part::Part;
-use sim::{Rays, ZMap};
+use sim::{Grid, Rays, Stock, ZMap};
 
 use super::{Budget, EngineChoice, LaidOut};
 use crate::{Facing, Judged, Limits, Measurement, NormalMap};
@@ -40,8 +40,8 @@ pub struct Task<'a> {
     pub holder: Option<&'a Holder>,
     /// How it moves.
     pub path: &'a Toolpath,
-    /// Height of the stock's flat top, mm.
-    pub top: f64,
+    /// What there is before the first cut.
+    pub stock: &'a Stock,
     /// The rectangle of the stock.
     pub area: Aabb,
     /// The cells over it that were laid out before there was a path.
@@ -59,11 +59,19 @@ pub struct Task<'a> {
 }
 
 impl<'a> Task<'a> {
-    /// The block that the part is cut from, mm. It ends at the part's lowest place.
+    /// The block around the stock, mm. It ends at the part's lowest place.
     pub fn block(&self) -> Aabb {
-        let Aabb { mut min, mut max } = self.area;
-        (min.z, max.z) = (self.part.bounds().min.z, self.top);
+        let Aabb { mut min, max } = self.stock.bounds();
+        min.z = self.part.bounds().min.z;
         Aabb { min, max }
+    }
+
+    /// The stock on cells, before the first cut.
+    pub fn uncut(&self, grid: Grid) -> ZMap {
+        /// Cells without stock are this much lower than any tip, mm.
+        const BELOW: f64 = 1.0;
+        let lowest = self.path.moves.iter().map(|step| step.to.tip.z).fold(self.block().min.z, f64::min);
+        ZMap::of_stock(grid, self.stock, lowest - BELOW)
     }
 
     /// Whether cells measure vertical walls as well: those of a mesh, against the moves.

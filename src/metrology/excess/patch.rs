@@ -290,7 +290,8 @@ impl Patches<'_> {
         let level = |q: &Point2, z: f64| {
             (z - point.z) * normal.z + (q.x - point.x) * normal.x + (q.y - point.y) * normal.y
         };
-        let mut rows = vec![places.map(|q| level(&q, self.stock_top))];
+        let top = self.stock_over(&places[..count]);
+        let mut rows = vec![places.map(|q| level(&q, top))];
         for &by in moves {
             let mut row = [0.0; 2 * MOST_CORNERS];
             let passes = places[..count].iter().zip(&mut row).all(|(q, value)| {
@@ -304,6 +305,15 @@ impl Patches<'_> {
             }
         }
         least_greatest(&rows, count)
+    }
+
+    /// The stock is nowhere higher between some places, mm.
+    fn stock_over(&self, places: &[Point2]) -> f64 {
+        let Some(shape) = &self.inspection.surface.cut.shape else { return self.stock_top };
+        let first = places[0];
+        let [low, high] = places.iter().fold([first; 2], |[low, high], q| [low.inf(q), high.sup(q)]);
+        let (middle, size) = (low + (high - low) * 0.5, high - low);
+        shape.highest_within(middle.x, middle.y, 0.5 * size.x.max(size.y))
     }
 }
 

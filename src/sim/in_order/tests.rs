@@ -215,7 +215,7 @@ fn small_and_empty_cases() {
     let plunge = path_through([Point3::new(0.0, 0.0, 9.0), Point3::new(0.0, 0.0, -1.0)]);
     let got = cut(&one_cell, &ball(), &plunge);
     assert_eq!((got.stock.height[0], got.stock.cut_by[0], got.moves[0].depth), (-1.0, 0, 3.0));
-    let empty = ZMap { grid: Grid { nx: 0, ny: 0, ..one_cell.grid }, height: vec![], cut_by: vec![] };
+    let empty = ZMap::block(Grid { nx: 0, ny: 0, ..one_cell.grid }, 2.0);
     assert_eq!(cut(&empty, &ball(), &plunge).volume(), 0.0);
 }
 

@@ -15,15 +15,15 @@ fn holder(length: f64) -> Holder {
     Holder::new(length - 4.0, vec![section(6.0, 4.0), section(24.0, 30.0)]).unwrap()
 }
 
-fn block(low: [f64; 3], high: [f64; 3]) -> VoxelStock {
-    VoxelStock::Box(Aabb { min: Point3::from(low), max: Point3::from(high) })
+fn block(low: [f64; 3], high: [f64; 3]) -> Stock {
+    Stock::Box(Aabb { min: Point3::from(low), max: Point3::from(high) })
 }
 
 fn flat() -> Cutter {
     Cutter::flat(6.0).unwrap()
 }
 
-fn of(block: &VoxelStock, cutter: &Cutter, holder: &Holder, path: &Toolpath) -> StandingClearance {
+fn of(block: &Stock, cutter: &Cutter, holder: &Holder, path: &Toolpath) -> StandingClearance {
     holder_clearance(block, &[], cutter, holder, path, &Silent).unwrap().unwrap()
 }
 
@@ -117,7 +117,7 @@ fn a_shank_as_wide_as_the_cutter_stands_where_it_has_been() {
 }
 
 /// Columns of stock on a dense grid, and the holder at many times of each move.
-fn by_brute_force(block: &VoxelStock, cutter: &Cutter, holder: &Holder, path: &Toolpath, pitch: f64) -> f64 {
+fn by_brute_force(block: &Stock, cutter: &Cutter, holder: &Holder, path: &Toolpath, pitch: f64) -> f64 {
     let task = Task::new(block, cutter, holder, path);
     let block = block.bounds();
     let n = [0, 1].map(|axis| (block.size()[axis] / pitch).round() as usize);
@@ -208,9 +208,9 @@ fn a_roughed_block_is_as_low_as_it_was_left() {
     let corners = vec![at(0.0, 0.0, -8.0), at(40.0, 0.0, -8.0), at(40.0, 40.0, -8.0), at(0.0, 40.0, -8.0)];
     let floor = geometry::TriangleMesh::new(corners, vec![[0, 1, 2], [0, 2, 3]]).unwrap().0;
     let whole = Aabb { min: at(0.0, 0.0, -30.0), max: at(40.0, 40.0, 0.0) };
-    let roughed = VoxelStock::roughed(whole, floor, 0.5);
+    let roughed = Stock::roughed(whole, floor, 0.5);
     let got = of(&roughed, &flat(), &holder(6.0), &slot());
     // The nut is 6 mm above the floor, and half a millimetre stands on that.
     assert!((got.nearest.unwrap().distance - 5.5).abs() < got.error_bound + 0.02, "{got:?}");
-    assert!(!of(&VoxelStock::Box(whole), &flat(), &holder(6.0), &slot()).collisions.is_empty());
+    assert!(!of(&Stock::Box(whole), &flat(), &holder(6.0), &slot()).collisions.is_empty());
 }

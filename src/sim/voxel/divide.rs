@@ -5,8 +5,8 @@ use super::bricks::{BLOCK, BRICK, Block, Lattice};
 use super::budget::Budget;
 use super::cube::Cube;
 use super::leaf::Leaf;
-use super::moves::{LOOSE, MotionParts, Tangent, corner};
-use super::stock::VoxelStock;
+use super::moves::{LOOSE, MotionParts, Tangent};
+use crate::stock::{Stock, corner};
 use geometry::Point3;
 use work::monitor::{Cancelled, Monitor, check};
 use work::parallel;
@@ -32,7 +32,7 @@ pub(super) struct Seen {
 /// What all cubes share.
 pub(super) struct Divider<'a> {
     pub(super) parts: &'a MotionParts,
-    pub(super) stock: &'a VoxelStock,
+    pub(super) stock: &'a Stock,
     pub(super) lattice: Lattice,
     pub(super) budget: &'a Budget,
 }

@@ -8,8 +8,8 @@ use super::budget::Budget;
 use super::divide::Divider;
 use super::error::VoxelError;
 use super::moves::MotionParts;
-use super::stock::VoxelStock;
 use super::voxels::Voxels;
+use crate::stock::Stock;
 use cutter::Solid;
 use motion::{MoveKind, Toolpath};
 use work::monitor::{Monitor, check};
@@ -26,7 +26,7 @@ const DOUBTFUL: f64 = 4.0;
 /// further fiftieth of a radian of one that does.
 #[derive(Debug)]
 pub struct VoxelEngine<'a> {
-    pub(super) stock: &'a VoxelStock,
+    pub(super) stock: &'a Stock,
     pub(super) parts: MotionParts,
     /// Which moves are rapid ones.
     pub(super) rapids: Vec<bool>,
@@ -37,7 +37,7 @@ impl<'a> VoxelEngine<'a> {
     ///
     /// # Errors
     /// [`VoxelError::Stock`], [`VoxelError::Axes`].
-    pub fn new(stock: &'a VoxelStock, solid: &Solid, path: &Toolpath) -> Result<Self, VoxelError> {
+    pub fn new(stock: &'a Stock, solid: &Solid, path: &Toolpath) -> Result<Self, VoxelError> {
         if !stock.is_valid() {
             return Err(VoxelError::Stock);
         }

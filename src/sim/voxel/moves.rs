@@ -14,6 +14,7 @@
 
 use super::slide::{StandIn, slide};
 use crate::solid::{Motion, Nearest, OppositeAxes, below};
+use crate::stock::corner;
 use cutter::Solid;
 use geometry::{Point3, Vector3};
 use motion::Toolpath;
@@ -342,12 +343,6 @@ impl MotionParts {
     pub(super) fn track(&self, part: &MotionPart) -> (Point3, Vector3, Vector3) {
         (part.plain.start, part.plain.way, part.plain.axis)
     }
-}
-
-/// Corner `k` of a cube of half side 1.
-pub(super) fn corner(k: usize) -> Vector3 {
-    let side = |bit: usize| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
-    Vector3::new(side(0), side(1), side(2))
 }
 
 /// The angle by which the axis turns on a move, rad.

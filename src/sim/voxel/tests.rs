@@ -9,7 +9,7 @@ mod volume;
 use super::bricks::STEPS;
 use super::*;
 use crate::scenes::{Rng, cutters, path_through, random_path, wave_path};
-use crate::{NOT_CUT, SweptSolid, ZMap};
+use crate::{BarAxis, NOT_CUT, Stock, SweptSolid, ZMap};
 use cutter::{Cutter, Solid};
 use geometry::{Aabb, Point3, Vector3};
 use motion::{ClPoint, Move, MoveKind, Toolpath};
@@ -20,8 +20,8 @@ use work::monitor::{Cancelled, Monitor, Silent};
 /// More than any test takes.
 const MEMORY: u64 = 1 << 30;
 
-fn block(min: [f64; 3], max: [f64; 3]) -> VoxelStock {
-    VoxelStock::Box(Aabb { min: min.into(), max: max.into() })
+fn block(min: [f64; 3], max: [f64; 3]) -> Stock {
+    Stock::Box(Aabb { min: min.into(), max: max.into() })
 }
 
 fn ball() -> Solid {
@@ -61,7 +61,7 @@ fn five_axis_path(rng: &mut Rng, moves: usize) -> Toolpath {
 }
 
 /// Every sample against the least of all moves.
-fn against_brute_force(stock: &VoxelStock, solid: &Solid, path: &Toolpath, voxel: f64, name: &str) {
+fn against_brute_force(stock: &Stock, solid: &Solid, path: &Toolpath, voxel: f64, name: &str) {
     let engine = VoxelEngine::new(stock, solid, path).unwrap();
     let voxels = engine.cut(voxel, MEMORY, &Silent).unwrap();
     let band = voxels.bricks.lattice.band();
@@ -104,7 +104,7 @@ fn distances_are_those_of_brute_force() {
         let solid = Solid::of_cutter(cutter, None);
         let stock = match c % 3 {
             0 => block([1.0, 0.0, 1.0], [9.0, 9.5, 8.0]),
-            1 => VoxelStock::Cylinder {
+            1 => Stock::Cylinder {
                 base: Point3::new(0.5, 5.0, 5.0),
                 axis: BarAxis::X,
                 radius: 4.0,
@@ -151,7 +151,7 @@ fn a_tool_with_its_holder_cuts_as_one() {
 }
 
 /// An octahedron of the given size.
-fn octahedron(middle: Point3, size: f64) -> VoxelStock {
+fn octahedron(middle: Point3, size: f64) -> Stock {
     let corner = |k: usize| {
         let mut at = middle;
         at[k / 2] += if k.is_multiple_of(2) { size } else { -size };
@@ -164,7 +164,7 @@ fn octahedron(middle: Point3, size: f64) -> VoxelStock {
         }
     }
     let (mesh, _) = geometry::TriangleMesh::new((0..6).map(corner).collect(), triangles).unwrap();
-    VoxelStock::from_mesh(mesh).unwrap()
+    Stock::from_mesh(mesh).unwrap()
 }
 
 #[test]
@@ -175,7 +175,7 @@ fn stock_is_as_large_as_it_should_be() {
         (block([-1.0, 2.0, 3.0], [9.0, 8.0, 7.3]), 10.0 * 6.0 * 4.3),
         (octahedron(Point3::new(1.0, 2.0, 3.0), 5.0), 4.0 / 3.0 * 125.0),
     ];
-    let bars = [BarAxis::X, BarAxis::Y, BarAxis::Z].map(|axis| VoxelStock::Cylinder {
+    let bars = [BarAxis::X, BarAxis::Y, BarAxis::Z].map(|axis| Stock::Cylinder {
         base: Point3::new(1.0, 2.0, 3.0),
         axis,
         radius: 4.0,
@@ -197,7 +197,7 @@ fn a_roughed_block_ends_where_it_was_roughed() {
     let corners = [[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], [10.0, 10.0, 5.0], [0.0, 10.0, 5.0]].map(Point3::from);
     let (mesh, _) = geometry::TriangleMesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]]).unwrap();
     let around = Aabb { min: Point3::new(0.0, 0.0, -2.0), max: Point3::new(10.0, 10.0, 5.0) };
-    let stock = VoxelStock::roughed(around, mesh, 0.7);
+    let stock = Stock::roughed(around, mesh, 0.7);
     let over = 0.7 * 1.25f64.sqrt();
     let exact = |y: f64| (0.5 * y + over).min(5.0);
     let mut rng = Rng::new(4);
@@ -218,7 +218,7 @@ fn a_roughed_block_ends_where_it_was_roughed() {
 }
 
 /// What a path takes, mm³: the middle between its bounds.
-fn removed(solid: &Solid, stock: &VoxelStock, path: &Toolpath, voxel: f64) -> f64 {
+fn removed(solid: &Solid, stock: &Stock, path: &Toolpath, voxel: f64) -> f64 {
     let [low, high] = VoxelEngine::new(stock, solid, path).unwrap().volumes(voxel, &Silent).unwrap().removed;
     0.5 * (low + high)
 }

@@ -12,9 +12,9 @@ use super::bricks::Lattice;
 use super::cube::Cube;
 use super::engine::VoxelEngine;
 use super::error::VoxelError;
-use super::moves::{Tangent, corner};
+use super::moves::Tangent;
 use super::octree::{Descent, SIDE, descend};
-use super::stock::StockSides;
+use crate::stock::{StockSides, corner};
 use geometry::{HalfSpace, Point3, Polytope, Vector3};
 use work::monitor::{Monitor, check};
 
@@ -101,7 +101,7 @@ impl VoxelEngine<'_> {
     /// [`VoxelError::Voxel`], also where there are more voxels than can be counted; [`VoxelError::Cancelled`].
     ///
     /// # Tolerance
-    /// The true volumes lie within the bounds, also those of a [`roughed`](super::VoxelStock::roughed) block whose surface is
+    /// The true volumes lie within the bounds, also those of a [`roughed`](crate::Stock::roughed) block whose surface is
     /// closed. The bits do not depend on the number of threads.
     pub fn volumes(&self, voxel: f64, monitor: &dyn Monitor) -> Result<VoxelVolumes, VoxelError> {
         check(monitor)?;

@@ -3,7 +3,7 @@
 use super::*;
 use std::collections::HashMap;
 
-fn surface_of(stock: &VoxelStock, solid: &Solid, path: &Toolpath, voxel: f64) -> VoxelSurface {
+fn surface_of(stock: &Stock, solid: &Solid, path: &Toolpath, voxel: f64) -> VoxelSurface {
     let engine = VoxelEngine::new(stock, solid, path).unwrap();
     let voxels = engine.cut(voxel, MEMORY, &Silent).unwrap();
     engine.surface(&voxels, &Silent).unwrap()
@@ -96,7 +96,7 @@ fn two_triangles_meet_at_every_edge_of_random_cuts() {
         let stock = match k % 3 {
             0 => block([0.0; 3], [10.0, 9.0, 8.0]),
             1 => block([0.0; 3], [20.0 * voxel, 16.5 * voxel, 9.0]),
-            _ => VoxelStock::Cylinder {
+            _ => Stock::Cylinder {
                 base: Point3::new(0.5, 5.0, 5.0),
                 axis: BarAxis::X,
                 radius: 4.0,

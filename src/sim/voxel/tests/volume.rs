@@ -43,7 +43,7 @@ impl Round {
 }
 
 /// A cut of one of six kinds in a block of 24 × 20 × 8 mm, and what it takes.
-fn random_cut(rng: &mut Rng, k: usize) -> (Round, VoxelStock, Toolpath, f64) {
+fn random_cut(rng: &mut Rng, k: usize) -> (Round, Stock, Toolpath, f64) {
     let radius = rng.within(1.5, 3.0);
     let corner = match k % 3 {
         0 => 0.0,
@@ -145,7 +145,7 @@ fn brute_force_lies_within_the_bounds() {
         let solid = Solid::of_cutter(cutter, None);
         let stock = match c % 2 {
             0 => block([0.0; 3], [10.0, 9.0, 8.0]),
-            _ => VoxelStock::Cylinder {
+            _ => Stock::Cylinder {
                 base: Point3::new(0.5, 5.0, 5.0),
                 axis: BarAxis::X,
                 radius: 4.0,

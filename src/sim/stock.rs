@@ -1,6 +1,8 @@
 //! What there is before the first cut: boxes, round bars, closed meshes, and blocks roughed to some distance from a part.
+//! Engines on heights see it from above.
 
-use super::moves::corner;
+use std::sync::Arc;
+
 use geometry::{Aabb, Bvh, HalfSpace, Point3, TriangleMesh, Vector3};
 
 /// Heights of curved stock are found to this, mm. Less takes more looks.
@@ -18,8 +20,8 @@ pub enum BarAxis {
 }
 
 /// Stock as a solid, mm.
-#[derive(Debug)]
-pub enum VoxelStock {
+#[derive(Debug, Clone)]
+pub enum Stock {
     /// A block.
     Box(Aabb),
     /// A round bar.
@@ -33,14 +35,14 @@ pub enum VoxelStock {
         /// Length, mm.
         length: f64,
     },
-    /// A casting or forging: see [`VoxelStock::from_mesh`].
-    Mesh(Box<StockMesh>),
-    /// What an earlier cutter left of a block: see [`VoxelStock::roughed`].
+    /// A casting or forging: see [`Stock::from_mesh`].
+    Mesh(Arc<StockMesh>),
+    /// What an earlier cutter left of a block: see [`Stock::roughed`].
     Roughed {
         /// The block.
         block: Aabb,
         /// The surface that was roughed.
-        part: Box<StockMesh>,
+        part: Arc<StockMesh>,
         /// How much stands over it, mm.
         over: f64,
     },
@@ -55,11 +57,11 @@ pub struct StockMesh {
 
 /// A stock in a cube, between two convex solids, which half spaces around the cube's middle bound.
 #[derive(Debug, PartialEq)]
-pub(super) struct StockSides {
+pub(crate) struct StockSides {
     /// All of the stock lies in these.
-    pub(super) outer: Vec<HalfSpace>,
+    pub(crate) outer: Vec<HalfSpace>,
     /// What lies in these is stock; where there are none, none need be.
-    pub(super) inner: Option<Vec<HalfSpace>>,
+    pub(crate) inner: Option<Vec<HalfSpace>>,
 }
 
 impl Default for StockSides {
@@ -71,22 +73,22 @@ impl Default for StockSides {
 
 impl StockSides {
     /// Whether nothing lies between the two.
-    pub(super) fn is_exact(&self) -> bool {
+    pub(crate) fn is_exact(&self) -> bool {
         self.inner.as_ref() == Some(&self.outer)
     }
 }
 
-impl VoxelStock {
+impl Stock {
     /// Of a closed mesh; `None` where it has borders, since nobody can tell its inside then.
     pub fn from_mesh(mesh: TriangleMesh) -> Option<Self> {
         let closed = mesh.is_closed();
-        closed.then(|| Self::Mesh(Box::new(StockMesh { tree: Bvh::new(&mesh), mesh })))
+        closed.then(|| Self::Mesh(Arc::new(StockMesh { tree: Bvh::new(&mesh), mesh })))
     }
 
     /// A block that was roughed to `over` mm from the outer side of a part's surface. Beside an open surface its borders'
     /// planes go on.
     pub fn roughed(block: Aabb, part: TriangleMesh, over: f64) -> Self {
-        Self::Roughed { block, part: Box::new(StockMesh { tree: Bvh::new(&part), mesh: part }), over }
+        Self::Roughed { block, part: Arc::new(StockMesh { tree: Bvh::new(&part), mesh: part }), over }
     }
 
     /// The box around it.
@@ -106,7 +108,7 @@ impl VoxelStock {
     }
 
     /// Whether its sizes are positive and all its numbers finite.
-    pub(super) fn is_valid(&self) -> bool {
+    pub(crate) fn is_valid(&self) -> bool {
         let Aabb { min, max } = self.bounds();
         (0..3).all(|i| min[i] < max[i] && min[i].is_finite() && max[i].is_finite())
     }
@@ -127,7 +129,7 @@ impl VoxelStock {
     }
 
     /// What of it lies in the cube of half side `half` around `centre`.
-    pub(super) fn sides(&self, centre: &Point3, half: f64) -> StockSides {
+    pub(crate) fn sides(&self, centre: &Point3, half: f64) -> StockSides {
         // From one place to another along an axis.
         let between = |axis: usize, low: f64, high: f64| {
             let along = Vector3::ith(axis, 1.0);
@@ -166,12 +168,37 @@ impl VoxelStock {
     /// stands at all.
     ///
     /// # Tolerance
-    /// Exact for a box, else too high by up to 0.01 mm and what the surface rises within the square.
+    /// Exact; of a roughed block too high by up to 0.01 mm and what the surface rises within the square.
     pub fn highest_within(&self, x: f64, y: f64, half: f64) -> f64 {
-        if let Self::Box(Aabb { min, max }) = self {
-            let meets = x + half >= min.x && x - half <= max.x && y + half >= min.y && y - half <= max.y;
-            return if meets { max.z } else { f64::NEG_INFINITY };
+        match self {
+            Self::Box(Aabb { min, max }) => {
+                let meets = x + half >= min.x && x - half <= max.x && y + half >= min.y && y - half <= max.y;
+                if meets { max.z } else { f64::NEG_INFINITY }
+            }
+            Self::Cylinder { base, axis, radius, length } => {
+                let beside = |i: usize, middle: f64| ([x, y][i] - middle).abs() - half;
+                let across = |i: usize| beside(i, base[i]).max(0.0);
+                // Along the axis: how far the square ends before the bar begins.
+                let beyond = |i: usize| beside(i, base[i] + 0.5 * length) - 0.5 * length;
+                let (rho, beyond, top) = match axis {
+                    BarAxis::Z => (across(0).hypot(across(1)), 0.0, base.z + length),
+                    BarAxis::X => (across(1), beyond(0), base.z),
+                    BarAxis::Y => (across(0), beyond(1), base.z),
+                };
+                if rho > *radius || beyond > 0.0 {
+                    f64::NEG_INFINITY
+                } else if *axis == BarAxis::Z {
+                    top
+                } else {
+                    top + (radius * radius - rho * rho).sqrt()
+                }
+            }
+            Self::Mesh(stock) => stock.highest_within(x, y, half),
+            Self::Roughed { .. } => self.traced_within(x, y, half),
         }
+    }
+
+    fn traced_within(&self, x: f64, y: f64, half: f64) -> f64 {
         // A ball that touches nothing keeps the column free as far down as it covers it.
         let (reach, bounds) = (half * std::f64::consts::SQRT_2, self.bounds());
         let mut z = bounds.max.z;
@@ -189,9 +216,9 @@ impl VoxelStock {
     /// A height at `(x, y)` at which stock stands, the highest or a little below; minus infinity where there is none.
     ///
     /// # Tolerance
-    /// Exact for a box, else too low by 0.01 mm at most where the stock is thicker than that.
+    /// Exact; of a roughed block too low by 0.01 mm at most where the stock is thicker than that.
     pub fn height_at(&self, x: f64, y: f64) -> f64 {
-        if matches!(self, Self::Box(_)) {
+        if !matches!(self, Self::Roughed { .. }) {
             return self.highest_within(x, y, 0.0);
         }
         let bounds = self.bounds();
@@ -204,6 +231,21 @@ impl VoxelStock {
             z -= free.max(TRACED);
         }
         f64::NEG_INFINITY
+    }
+
+    /// Upward unit normal of what is seen from above at `(x, y)`.
+    pub fn normal_at(&self, x: f64, y: f64) -> Vector3 {
+        let z = self.height_at(x, y);
+        let seen = match self {
+            Self::Cylinder { base, axis: BarAxis::X, .. } => Vector3::new(0.0, y - base.y, z - base.z),
+            Self::Cylinder { base, axis: BarAxis::Y, .. } => Vector3::new(x - base.x, 0.0, z - base.z),
+            Self::Mesh(stock) => {
+                let hit = stock.tree.highest_at(&stock.mesh, x, y);
+                hit.map_or(Vector3::z(), |hit| stock.mesh.normal(hit.triangle as usize))
+            }
+            _ => Vector3::z(),
+        };
+        if z.is_finite() { seen.try_normalize(0.0).unwrap_or_else(Vector3::z) } else { Vector3::z() }
     }
 
     /// Signed distance, mm, below zero inside, and its unit gradient: exact; of a roughed block the greater of those of the
@@ -255,7 +297,31 @@ impl VoxelStock {
     }
 }
 
+/// Corner `k` of a cube of half side 1.
+pub(crate) fn corner(k: usize) -> Vector3 {
+    let side = |bit: usize| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
+    Vector3::new(side(0), side(1), side(2))
+}
+
 impl StockMesh {
+    fn highest_within(&self, x: f64, y: f64, half: f64) -> f64 {
+        if half == 0.0 {
+            return self.tree.highest_at(&self.mesh, x, y).map_or(f64::NEG_INFINITY, |hit| hit.z);
+        }
+        let (low, high) = ([x - half, y - half], [x + half, y + half]);
+        let mut highest = f64::NEG_INFINITY;
+        self.tree.tree().search(
+            highest,
+            |_, node, _| if node.meets(low, high) { node.top() } else { f64::NEG_INFINITY },
+            |slot, _| {
+                let corners = self.mesh.corners(self.tree.triangle_in(slot));
+                highest = highest.max(highest_in(&corners, low, high));
+                highest
+            },
+        );
+        highest
+    }
+
     fn foot(&self, q: &Point3) -> (f64, Vector3) {
         let foot = self.tree.closest_point(&self.mesh, q);
         let distance = foot.signed_distance;
@@ -264,21 +330,77 @@ impl StockMesh {
     }
 }
 
+/// The highest place of a triangle over a rectangle of the plan view; minus infinity where it lies beside it.
+fn highest_in(corners: &[Point3; 3], low: [f64; 2], high: [f64; 2]) -> f64 {
+    let mut polygon = corners.to_vec();
+    for (axis, sign, end) in [(0, 1.0, low[0]), (1, 1.0, low[1]), (0, -1.0, high[0]), (1, -1.0, high[1])] {
+        let inside = |p: &Point3| sign * (p[axis] - end);
+        let mut kept = Vec::with_capacity(polygon.len() + 1);
+        for (k, a) in polygon.iter().enumerate() {
+            let b = &polygon[(k + 1) % polygon.len()];
+            let (from, to) = (inside(a), inside(b));
+            if from >= 0.0 {
+                kept.push(*a);
+            }
+            if (from < 0.0) != (to < 0.0) {
+                kept.push(a + (b - a) * (from / (from - to)));
+            }
+        }
+        polygon = kept;
+    }
+    polygon.iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// A pyramid over a square: what is seen from above, and the greatest height over squares, against many places in them.
+    #[test]
+    fn heights_of_a_mesh_are_those_of_its_triangles() {
+        let at = Point3::new;
+        let vertices = vec![
+            at(0.0, 0.0, -3.0),
+            at(10.0, 0.0, -3.0),
+            at(10.0, 10.0, -3.0),
+            at(0.0, 10.0, -3.0),
+            at(5.0, 5.0, 2.0),
+        ];
+        let triangles = vec![[0, 2, 1], [0, 3, 2], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]];
+        let pyramid = Stock::from_mesh(TriangleMesh::new(vertices, triangles).unwrap().0).unwrap();
+        let height = |x: f64, y: f64| {
+            let beside = (x - 5.0).abs().max((y - 5.0).abs());
+            if beside > 5.0 { f64::NEG_INFINITY } else { 2.0 - beside }
+        };
+        for (x, y) in [(5.0, 5.0), (1.0, 2.0), (9.9, 4.0), (10.2, 5.0), (3.3, 8.7)] {
+            let (got, true_one) = (pyramid.height_at(x, y), height(x, y));
+            assert!(got == true_one || (got - true_one).abs() < 1e-9, "{x} {y}: {got} {true_one}");
+            for half in [0.05, 0.4, 3.0] {
+                let places = (0..=200).flat_map(|i| (0..=200).map(move |j| (f64::from(i), f64::from(j))));
+                let near =
+                    places.map(|(i, j)| height(x + half * (0.01 * i - 1.0), y + half * (0.01 * j - 1.0)));
+                let (greatest, bound) =
+                    (near.fold(f64::NEG_INFINITY, f64::max), pyramid.highest_within(x, y, half));
+                assert!(
+                    bound >= greatest - 1e-9 && bound <= greatest + 0.02 * half,
+                    "{x} {y} {half}: {bound} {greatest}"
+                );
+            }
+        }
+        let normal = pyramid.normal_at(2.0, 5.0);
+        assert!((normal - Vector3::new(-1.0, 0.0, 1.0).normalize()).norm() < 1e-9, "{normal:?}");
+    }
+
     #[test]
     fn heights_of_a_bar_and_of_a_roughed_block_have_closed_forms() {
-        let bar =
-            VoxelStock::Cylinder { base: Point3::origin(), axis: BarAxis::X, radius: 10.0, length: 40.0 };
+        let bar = Stock::Cylinder { base: Point3::origin(), axis: BarAxis::X, radius: 10.0, length: 40.0 };
         for y in [0.0f64, 3.0, 9.0] {
             let top = (100.0 - y * y).sqrt();
             let at = bar.height_at(20.0, y);
-            assert!(at <= top && at > top - 0.05, "{y} {at} {top}");
+            assert!((at - top).abs() < 1e-12, "{y} {at} {top}");
             let near = (100.0 - (y - 0.5f64).max(0.0).powi(2)).sqrt();
             let bound = bar.highest_within(20.0, y, 0.5);
-            assert!(bound >= near && bound < near + 0.6, "{y} {bound} {near}");
+            assert!((bound - near).abs() < 1e-12, "{y} {bound} {near}");
         }
         assert_eq!(bar.height_at(20.0, 10.1), f64::NEG_INFINITY);
         assert_eq!(bar.highest_within(20.0, 12.0, 0.5), f64::NEG_INFINITY);
@@ -288,13 +410,13 @@ mod tests {
             vec![[0, 1, 2]],
         );
         let block = Aabb { min: at(0.0, 0.0, -20.0), max: at(20.0, 20.0, 0.0) };
-        let roughed = VoxelStock::roughed(block, floor.unwrap().0, 0.5);
+        let roughed = Stock::roughed(block, floor.unwrap().0, 0.5);
         for half in [0.0, 0.25] {
             let bound = roughed.highest_within(4.0, 5.0, half);
             assert!((-7.5..-7.0).contains(&bound), "{half} {bound}");
         }
         assert!((roughed.height_at(4.0, 5.0) + 7.5).abs() < 0.011);
-        let whole = VoxelStock::Box(block);
+        let whole = Stock::Box(block);
         assert_eq!((whole.height_at(1.0, 1.0), whole.highest_within(-0.2, 1.0, 0.25)), (0.0, 0.0));
         assert_eq!(whole.height_at(-0.2, 1.0), f64::NEG_INFINITY);
     }
