@@ -102,8 +102,14 @@ pub struct VerifyOptions {
     #[arg(long, value_name = "WHAT", default_value = Judged::Walls.word(), value_parser = PossibleValuesParser::new(Judged::ALL.map(Judged::word)))]
     pub judge: String,
     /// Stock above the part's highest point, mm [default: 1].
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", conflicts_with = "stock")]
     pub allowance: Option<f64>,
+    /// The stock: a closed mesh in the unit of the part, or a TOML file with the [stock] of a scene [default: a block].
+    #[arg(long, value_name = "FILE")]
+    pub stock: Option<PathBuf>,
+    /// The machine: its kinematics by name, or a TOML file with the [machine] of a scene [default: three axes].
+    #[arg(long, value_name = "MACHINE")]
+    pub machine: Option<PathBuf>,
     /// Deepest gouge that is tolerated, mm [default: 0.005].
     #[arg(long, value_name = "MM")]
     pub gouge: Option<f64>,

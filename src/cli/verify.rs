@@ -6,7 +6,7 @@ use std::path::Path;
 use cutter::Cutter;
 use keys::{toml_number, toml_string};
 use program::{Tool, ToolTable};
-use scene::{Scene, TableError, described_tools, tool_table};
+use scene::{Scene, TableError, described_tools, scene_table, tool_table};
 use toolpath::ALL_TOOLS;
 use work::monitor;
 
@@ -25,7 +25,8 @@ pub fn verify(options: &VerifyOptions, progress: &Progress) -> Result<RunOutcome
         Simulated { cell: options.cell, memory: options.memory, engine: options.engine }.apply(&mut scene);
         monitor::check(progress)?;
         let target = options.out.clone().unwrap_or_else(|| default_target(&options.program));
-        let inputs = options.tools.iter().cloned().collect();
+        let tables = options.tools.iter().chain(&options.stock).chain(&options.machine);
+        let inputs = tables.cloned().collect();
         run_scene(scene, &Target { target, inputs, format: options.format }, progress)
     })
 }
@@ -53,9 +54,28 @@ fn text(options: &VerifyOptions) -> Result<String, CliError> {
         (None, Some(tools)) => of_table(tools, options)?,
         (None, None) => of_program(options)?,
     };
-    let mut text = String::new();
+    let mut text = format!("title = {}\n", toml_string(&name(&options.program)));
+    // What comes from a file stands before all other tables, whatever it ends in.
+    for (file, key) in [(&options.stock, "stock"), (&options.machine, "machine")] {
+        if let Some(file) = file.as_deref().filter(|file| is_toml(file)) {
+            text += &scene_table(file, key)
+                .map_err(|error| unusable(error, file, &format!("name a TOML file with [{key}]")))?;
+            text += "\n";
+        }
+    }
     write_scene(&mut text, options, &chosen).map_err(|e| refused(&e.to_string(), "check the arguments"))?;
     Ok(text)
+}
+
+fn is_toml(file: &Path) -> bool {
+    file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
+}
+
+fn unusable(error: TableError, file: &Path, cure: &str) -> CliError {
+    match error {
+        TableError::Fault(error) => error.into(),
+        TableError::Unreadable(reason) => refused(&format!("cannot read {}: {reason}", shown(file)), cure),
+    }
 }
 
 fn refused(what: &str, cure: &str) -> CliError {
@@ -83,12 +103,8 @@ fn of_program(options: &VerifyOptions) -> Result<Chosen, CliError> {
 
 /// The tools that the program describes, and those that feed in it.
 fn in_program(options: &VerifyOptions) -> Result<(ToolTable, Vec<u32>), CliError> {
-    described_tools(&options.program, &options.control).map_err(|error| match error {
-        TableError::Fault(error) => error.into(),
-        TableError::Unreadable(reason) => {
-            refused(&format!("cannot read {}: {reason}", shown(&options.program)), "name a program")
-        }
-    })
+    described_tools(&options.program, &options.control)
+        .map_err(|error| unusable(error, &options.program, "name a program"))
 }
 
 /// Whether several tools cut, of which one is known.
@@ -121,13 +137,8 @@ fn one(tool: &Tool, asked: Option<u32>) -> Chosen {
 
 /// The tools of a table.
 fn of_table(file: &Path, options: &VerifyOptions) -> Result<Chosen, CliError> {
-    let table = tool_table(file).map_err(|error| match error {
-        TableError::Fault(error) => error.into(),
-        TableError::Unreadable(reason) => refused(
-            &format!("cannot read {}: {reason}", shown(file)),
-            "name a file of tools in TOML, or a .tbl of LinuxCNC",
-        ),
-    })?;
+    let table = tool_table(file)
+        .map_err(|error| unusable(error, file, "name a file of tools in TOML, or a .tbl of LinuxCNC"))?;
     let tools = &table.tools;
     let listed = tools.iter().map(|tool| tool.number.to_string()).collect::<Vec<_>>().join(", ");
     if let Some(number) = options.tool {
@@ -162,7 +173,6 @@ fn is_name(stem: &str) -> bool {
 
 fn write_scene(out: &mut String, options: &VerifyOptions, chosen: &Chosen) -> std::fmt::Result {
     let quoted = |path: &Path| toml_string(&path.to_string_lossy());
-    writeln!(out, "title = {}", toml_string(&name(&options.program)))?;
     writeln!(out, "[part]\nfile = {}\nunit = {}", quoted(&options.part), toml_string(&options.unit))?;
     writeln!(out, "judge = {}", toml_string(&options.judge))?;
     writeln!(out, "[cutter]")?;
@@ -170,6 +180,12 @@ fn write_scene(out: &mut String, options: &VerifyOptions, chosen: &Chosen) -> st
     out.push_str(&chosen.holder);
     if let Some(allowance) = options.allowance {
         writeln!(out, "[stock]\nallowance = {}", toml_number(allowance))?;
+    }
+    if let Some(mesh) = options.stock.as_deref().filter(|file| !is_toml(file)) {
+        writeln!(out, "[stock]\nfile = {}\nunit = {}", quoted(mesh), toml_string(&options.unit))?;
+    }
+    if let Some(word) = options.machine.as_deref().filter(|file| !is_toml(file)) {
+        writeln!(out, "[machine]\nkinematics = {}", quoted(word))?;
     }
     writeln!(out, "[tolerance]")?;
     for (key, value) in [("gouge", options.gouge), ("uncut", options.uncut), ("scallop", options.scallop)] {

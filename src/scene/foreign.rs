@@ -8,7 +8,7 @@ use super::named_file::NamedFile;
 use super::{Scene, ToolpathRequest};
 use cutter::{Cutter, Holder};
 use io::regular;
-use keys::{SceneError, SceneText};
+use keys::{SceneError, SceneText, Section};
 use motion::{Cutters, MoveKind, PathsInTurn, Toolpath};
 use program::{
     Control, Finding, Placing, Program, ProgramError, Setup, ToolRun, ToolTable, looks_like_apt, read_apt,
@@ -117,17 +117,38 @@ pub enum TableError {
 /// # Errors
 /// [`TableError`].
 pub fn tool_table(path: &Path) -> Result<ToolTable, TableError> {
-    let bytes = regular::read(path, MAX_TABLE_BYTES).map_err(|e| TableError::Unreadable(e.to_string()))?;
-    if bytes.len() as u64 > MAX_TABLE_BYTES {
-        return Err(TableError::Unreadable(format!("it is larger than {MAX_TABLE_BYTES} bytes")));
-    }
+    let bytes = table_bytes(path)?;
     let name = path.to_string_lossy();
     if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("tbl")) {
         return ToolTable::of_linuxcnc(&name, &bytes).map_err(|e| TableError::Fault(in_text(&e, &bytes)));
     }
-    let text =
-        String::from_utf8(bytes).map_err(|_| TableError::Unreadable("it is not UTF-8 text".to_owned()))?;
-    ToolTable::read(&SceneText::new(name, text)).map_err(TableError::Fault)
+    ToolTable::read(&SceneText::new(name, utf8(bytes)?)).map_err(TableError::Fault)
+}
+
+/// The text of a TOML file that holds nothing but the table `key` of a scene.
+///
+/// # Errors
+/// [`TableError`].
+pub fn scene_table(path: &Path, key: &str) -> Result<String, TableError> {
+    let source = SceneText::new(path.to_string_lossy(), utf8(table_bytes(path)?)?);
+    let checked = source.table().and_then(|table| {
+        let root = Section::root(&source, table.get_ref());
+        root.only(&[key], &[], &format!("a file of [{key}]"))?;
+        root.section(key).map(drop)
+    });
+    checked.map(|()| source.text.to_string()).map_err(TableError::Fault)
+}
+
+fn table_bytes(path: &Path) -> Result<Vec<u8>, TableError> {
+    let bytes = regular::read(path, MAX_TABLE_BYTES).map_err(|e| TableError::Unreadable(e.to_string()))?;
+    if bytes.len() as u64 > MAX_TABLE_BYTES {
+        return Err(TableError::Unreadable(format!("it is larger than {MAX_TABLE_BYTES} bytes")));
+    }
+    Ok(bytes)
+}
+
+fn utf8(bytes: Vec<u8>) -> Result<String, TableError> {
+    String::from_utf8(bytes).map_err(|_| TableError::Unreadable("it is not UTF-8 text".to_owned()))
 }
 
 /// The tools that a program of G-code describes in its comments, and those that feed in it.

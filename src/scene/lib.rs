@@ -34,7 +34,7 @@ pub use stock::Stock;
 pub use write::complete_toml;
 
 use cutter::{Cutter, Holder};
-pub use foreign::{TableError, described_tools, tool_table};
+pub use foreign::{TableError, described_tools, scene_table, tool_table};
 use machine::Machine;
 pub use metrology::{EngineChoice, Judged, Simulation};
 use metrology::{Limits, ScallopRule};

@@ -558,3 +558,115 @@ fn one_tool_as_all_is_that_tool() {
     let checked = millstream(home.path(), &["check", "scene.toml"]);
     assert!(checked.stdout.contains("tool = \"all\"\ntools = \"tools.toml\""), "{}", checked.stdout);
 }
+
+/// A round bar along x whose top lies 0.9 mm over the plate, and the block around it.
+const BAR: &str = "[stock]\ndiameter = 20\nlength = 16\nfrom = [0, 4, -9.1]\naxis = \"x\"\n";
+const BLOCK_AROUND_IT: &str = "[stock]\ncorners = [[0, -6, -19.1], [16, 14, 0.9]]\n";
+
+/// What the raster leaves of a bar, by brute force: mm³ that it removes.
+fn removed_of_bar() -> f64 {
+    let pitch = 0.02;
+    let removed = |x: f64, y: f64| {
+        let top = (100.0 - (y - 4.0) * (y - 4.0)).sqrt() - 9.1;
+        let beside = (0.0f64).max(-x).max(x - SIZE[0]);
+        let cut = |k: usize| {
+            let d = (y - STEP * k as f64).hypot(beside);
+            if d < 3.0 { 3.0 - (9.0 - d * d).sqrt() } else { f64::INFINITY }
+        };
+        (top - (0..=(SIZE[1] / STEP) as usize).map(cut).fold(f64::INFINITY, f64::min)).max(0.0)
+    };
+    let centres = |from: f64, to: f64| {
+        (0..((to - from) / pitch).round() as usize).map(move |k| from + pitch * (k as f64 + 0.5))
+    };
+    centres(-6.0, 14.0).map(|y| removed(8.0, y)).sum::<f64>() * pitch * SIZE[0]
+}
+
+/// Where the raster of half of the plate ends, a round bar stands as high as its closed form, and a rapid beside its top is in
+/// the air; in the block around it the same rapid cuts.
+#[test]
+fn stock_has_its_own_shape() {
+    let home = tempfile::tempdir().unwrap();
+    std::fs::write(home.path().join("bar.toml"), BAR).unwrap();
+    std::fs::write(home.path().join("block.toml"), BLOCK_AROUND_IT).unwrap();
+    let (_, whole) = verify_in(home.path(), &raster(), &["--stock", "bar.toml"]);
+    let removal = &whole.unwrap()["toolpaths"][0]["removal"];
+    let [volume, bound] = ["volume_mm3", "volume_error_bound_mm3"].map(|key| removal[key].as_f64().unwrap());
+    assert!((volume - removed_of_bar()).abs() < bound, "{volume} ± {bound}, {}", removed_of_bar());
+    assert!(bound < 0.1 * volume);
+    let mut half: Vec<String> = raster().iter().map(|line| line.replace("X16.000", "X8.000")).collect();
+    let end = half.len() - 3;
+    half.splice(end..end, ["G0 Y-1", "G0 Z0.2", "G0 X16", "G0 Z10"].map(str::to_owned));
+    for (stock, rapids) in [("bar.toml", false), ("block.toml", true)] {
+        let (answer, report) = verify_in(home.path(), &half, &["--stock", stock]);
+        let report = report.unwrap();
+        let toolpath = &report["toolpaths"][0];
+        let excess = &toolpath["excess"];
+        let [highest, bound] = ["max_mm", "error_bound_mm"].map(|key| excess[key].as_f64().unwrap());
+        assert!((highest - 0.9).abs() <= bound && bound < 1e-5, "{stock}: {highest} {bound}");
+        let found = violations(&report).iter().any(|sentence| sentence.contains("rapid move touches stock"));
+        assert_eq!((answer.code, found), (Some(1), rapids), "{stock}: {}", answer.stdout);
+    }
+}
+
+/// A mesh of the block around the part is that block.
+#[test]
+fn stock_of_a_mesh_is_measured_as_the_same_block() {
+    let home = tempfile::tempdir().unwrap();
+    let [x, y] = SIZE;
+    let corner = |k: usize| {
+        let [a, b, c] = [[0.0, x], [0.0, y], [-5.0, 1.0]];
+        format!("vertex {} {} {}\n", a[k & 1], b[k >> 1 & 1], c[k >> 2 & 1])
+    };
+    let faces = [
+        [0, 2, 3],
+        [0, 3, 1],
+        [4, 5, 7],
+        [4, 7, 6],
+        [0, 1, 5],
+        [0, 5, 4],
+        [2, 6, 7],
+        [2, 7, 3],
+        [0, 4, 6],
+        [0, 6, 2],
+        [1, 3, 7],
+        [1, 7, 5],
+    ];
+    let facets: String = faces
+        .map(|face| {
+            format!("facet normal 0 0 0\nouter loop\n{}endloop\nendfacet\n", face.map(corner).concat())
+        })
+        .concat();
+    std::fs::write(home.path().join("casting.stl"), format!("solid block\n{facets}endsolid block\n"))
+        .unwrap();
+    let (_, of_block) = verify_in(home.path(), &raster(), &[]);
+    let (answer, of_mesh) = verify_in(home.path(), &raster(), &["--stock", "casting.stl"]);
+    assert_eq!(answer.code, Some(0), "{}{}", answer.stdout, answer.stderr);
+    let of_mesh = of_mesh.unwrap();
+    assert_eq!(of_mesh["inputs"].as_array().unwrap().len(), 3);
+    for key in ["excess", "removal", "uncut", "gouge", "scallop", "deviation"] {
+        assert_eq!(of_mesh["toolpaths"][0][key], of_block.as_ref().unwrap()["toolpaths"][0][key], "{key}");
+    }
+    // A part out of its stock is refused with the place.
+    std::fs::write(home.path().join("low.toml"), "[stock]\ncorners = [[0, 0, -5], [12, 8, 1]]\n").unwrap();
+    let (answer, _) = verify_in(home.path(), &raster(), &["--stock", "low.toml"]);
+    assert_eq!(answer.code, Some(2));
+    assert!(answer.stderr.contains("4.000 mm out of its stock at x 16.000"), "{}", answer.stderr);
+}
+
+#[test]
+fn rotary_words_go_through_the_machine_that_is_named() {
+    let mut leaning = raster();
+    leaning[6] = "G43.4 H1".into();
+    leaning.insert(7, "G0 A0 C0".into());
+    let (answer, _) = verify(&leaning, &["--machine", "ac-table"]);
+    assert_eq!(answer.code, Some(0), "{}{}", answer.stdout, answer.stderr);
+    // Five degrees of lean take a ball off its lines and into the plate.
+    let at = leaning.iter().position(|line| line == "X8.000 Y0.800").unwrap();
+    leaning[at] += " A5";
+    assert_violates(&leaning, &["--machine", "ac-table"], "gouge");
+    let home = tempfile::tempdir().unwrap();
+    std::fs::write(home.path().join("mill.toml"), "[machine]\nkinematics = \"ac-table\"\nfeed = 3\n")
+        .unwrap();
+    let (answer, _) = verify_in(home.path(), &leaning, &["--machine", "mill.toml"]);
+    assert!(answer.code == Some(2) && answer.stderr.contains("feed = 3"), "{}", answer.stderr);
+}
