@@ -25,8 +25,8 @@ pub fn verify(options: &VerifyOptions, progress: &Progress) -> Result<RunOutcome
         Simulated { cell: options.cell, memory: options.memory, engine: options.engine }.apply(&mut scene);
         monitor::check(progress)?;
         let target = options.out.clone().unwrap_or_else(|| default_target(&options.program));
-        let tables = options.tools.iter().chain(&options.stock).chain(&options.machine);
-        let inputs = tables.cloned().collect();
+        let machine = options.machine.iter().filter(|file| is_toml(file));
+        let inputs = options.tools.iter().chain(&options.stock).chain(machine).cloned().collect();
         run_scene(scene, &Target { target, inputs, format: options.format }, progress)
     })
 }

@@ -6,13 +6,13 @@ use std::path::Path;
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
 use io::digest;
-use metrology::{Engine, Measured, path_figures};
+use metrology::{Engine, GougeRegion, Measured, path_figures};
 use motion::Toolpath;
 use report::{
     NotPlanned, RunReport, SimulationFigures, ToleranceFigures, ToolpathReport, ToolpathResult, Verdict,
 };
 use scene::ToolpathRequest;
-use sim::Stock;
+use sim::{NOT_CUT, Stock};
 use work::monitor::{self, Monitor};
 
 use super::earlier::{EarlierPath, WholePath};
@@ -164,7 +164,9 @@ impl Session {
                 monitor,
             )?;
         }
-        for region in &mut measured.measurement.gouge.regions {
+        // Where stock itself lies below the part between the cells no move cut.
+        let cut = |region: &&mut GougeRegion| region.move_index != NOT_CUT;
+        for region in measured.measurement.gouge.regions.iter_mut().filter(cut) {
             let at = region.at_mm.into();
             let (toolpath, move_index) = whole.own_move(region.move_index);
             let its = earlier.get(toolpath);

@@ -11,7 +11,7 @@ use motion::{Cutters, Toolpath};
 use part::Part;
 use report::InputFile;
 use scene::{Fixture, Loaded, MeshFile, Scene, ToolpathRequest, load_mesh, load_part};
-use sim::Stock;
+use sim::{Grid, Stock};
 use toolpath::{PlanError, Pocket};
 use work::aside;
 use work::monitor::{Cancelled, Monitor, Silent};
@@ -86,18 +86,29 @@ fn stock_of(scene: &Scene, part: &Part, pocket: bool) -> Result<Stock, JobError>
     })
 }
 
-/// Refuses a part that stands out of its stock by more than the gouge tolerance.
-fn check_inside(scene: &Scene, part: &Part, stock: &Stock) -> Result<(), JobError> {
-    let out = |p: &Point3| stock.foot(p).0;
-    let vertices = part.mesh().vertices();
-    let farthest = work::parallel::map(vertices.len(), |k| out(&vertices[k]));
-    let farthest = (0..vertices.len()).max_by(|&a, &b| farthest[a].total_cmp(&farthest[b]));
-    match farthest.map(|k| (out(&vertices[k]), vertices[k])) {
+/// Refuses a part that stands out of its stock by more than the gouge tolerance, at its corners or on the cells.
+fn check_inside(scene: &Scene, part: &Part, stock: &Stock, grid: &Grid) -> Result<(), JobError> {
+    let in_row = |j: usize| {
+        let places = (0..grid.nx).filter_map(|i| {
+            let centre = grid.centre(i, j);
+            Some(part.highest_at(centre.x, centre.y)?.point)
+        });
+        farthest_out(stock, places)
+    };
+    let rows = work::parallel::map(grid.ny, in_row);
+    let of_corners = farthest_out(stock, part.mesh().vertices().iter().copied());
+    let farthest = rows.into_iter().chain([of_corners]).flatten().max_by(|a, b| a.0.total_cmp(&b.0));
+    match farthest {
         Some((by, at)) if by > scene.tolerance.gouge => {
             Err(JobError::OutsideStock { scene: scene.source.name.clone(), by, at })
         }
         _ => Ok(()),
     }
+}
+
+/// The place that stands farthest out of stock, and how far, mm.
+fn farthest_out(stock: &Stock, places: impl Iterator<Item = Point3>) -> Option<(f64, Point3)> {
+    places.map(|p| (stock.foot(&p).0, p)).max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
 impl Session {
@@ -131,13 +142,13 @@ impl Session {
         let Loaded { part, blade, pocket, notes } = load_part(&scene)?;
         let budget = Budget::new(&part, scene.simulation.memory_mib);
         let stock = stock_of(&scene, &part, pocket.is_some())?;
-        if !scene.stock.is_around() {
-            check_inside(&scene, &part, &stock)?;
-        }
         let top = stock.bounds().max.z;
         let cells = budget
             .grid_before_planning(&stock.bounds(), &scene.simulation)
             .map_err(JobError::grid(&scene))?;
+        if !scene.stock.is_around() {
+            check_inside(&scene, &part, &stock, &cells.0)?;
+        }
         let doubt = units::doubt(&scene, &part);
         let inputs = inputs(&scene)?;
         let cutters = Cutters::from(&scene.cutter);

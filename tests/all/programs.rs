@@ -646,6 +646,18 @@ fn stock_of_a_mesh_is_measured_as_the_same_block() {
     for key in ["excess", "removal", "uncut", "gouge", "scallop", "deviation"] {
         assert_eq!(of_mesh["toolpaths"][0][key], of_block.as_ref().unwrap()["toolpaths"][0][key], "{key}");
     }
+    // A pit in the middle of the top reaches below the plate, whose corners all lie in the stock.
+    let pit = |k: usize| {
+        let [a, b] = [[4, 5], [5, 7], [7, 6], [6, 4]][k].map(corner);
+        format!("facet normal 0 0 0\nouter loop\n{a}{b}vertex 8 4 -2\nendloop\nendfacet\n")
+    };
+    let others = facets.split_inclusive("endfacet\n").enumerate().filter(|(k, _)| !(2..4).contains(k));
+    let others: String = others.map(|(_, facet)| facet).collect();
+    let pitted = format!("solid pit\n{others}{}endsolid pit\n", (0..4).map(pit).collect::<String>());
+    std::fs::write(home.path().join("pit.stl"), pitted).unwrap();
+    let (answer, _) = verify_in(home.path(), &raster(), &["--stock", "pit.stl"]);
+    assert_eq!(answer.code, Some(2));
+    assert!(answer.stderr.contains("out of its stock at x 8"), "{}", answer.stderr);
     // A part out of its stock is refused with the place.
     std::fs::write(home.path().join("low.toml"), "[stock]\ncorners = [[0, 0, -5], [12, 8, 1]]\n").unwrap();
     let (answer, _) = verify_in(home.path(), &raster(), &["--stock", "low.toml"]);
