@@ -2,11 +2,11 @@
 //! the cutter touches without cutting in.
 //!
 //! Enters: a part, a cutter, places `(x, y)` in mm. Leaves: the height of the tip and the contact.
-//! On a mesh the answer is exact up to f64 rounding: closed forms at each triangle ([`touch`]), found
-//! with a tree of the places from which each triangle can carry the cutter ([`domain`]), for one place
-//! or for a grid of them ([`grid`]). On patches the tessellation only finds where to look, by branch
-//! and bound over its own tree with bounds that tilt with the surface ([`roof`]); the contact is then
-//! the maximum on the exact surface ([`refine`]).
+//! On a mesh the answer is exact up to f64 rounding: closed forms at each triangle (`touch`), found
+//! with a tree of the places from which each triangle can carry the cutter (`domain`), for one place
+//! or for a grid of them (`grid`). On patches the tessellation only finds where to look, by branch
+//! and bound over its own tree with bounds that tilt with the surface (`roof`); the contact is then
+//! the maximum on the exact surface (`refine`).
 //!
 //! The cutter touches from above only: above its largest radius it is a cylinder, and a vertical
 //! wall carries it with its edges, not with its side.

@@ -32,7 +32,7 @@ const MOST_PLACES: f64 = 64.0;
 
 /// A stretch on which all axes move evenly.
 #[derive(Debug, Clone, Copy)]
-struct Piece {
+struct EvenStretch {
     /// The move.
     step: usize,
     length: f64,
@@ -84,16 +84,16 @@ pub(super) fn time_of_linear(blocks: &[Block], machine: &Machine) -> f64 {
     let piece = |(k, block): (usize, &Block)| {
         let Block { step, length, direction, .. } = *block;
         let slope = [direction.x, direction.y, direction.z, 0.0, 0.0];
-        Piece { step, length, slope, after_stop: k == 0 }
+        EvenStretch { step, length, slope, after_stop: k == 0 }
     };
-    let pieces: Vec<Piece> = blocks.iter().enumerate().map(piece).collect();
+    let pieces: Vec<EvenStretch> = blocks.iter().enumerate().map(piece).collect();
     let with_rotary = |[x, y, z]: [f64; 3]| [x, y, z, f64::INFINITY, f64::INFINITY];
     let rates = with_rotary(machine.rates.map(|rate| rate / SECONDS_PER_MINUTE));
     let axes = AxisLimits { rates, accelerations: with_rotary(machine.accelerations) };
     time_of_pieces(&pieces, blocks, machine, &axes)
 }
 
-fn time_of_pieces(pieces: &[Piece], blocks: &[Block], machine: &Machine, axes: &AxisLimits) -> f64 {
+fn time_of_pieces(pieces: &[EvenStretch], blocks: &[Block], machine: &Machine, axes: &AxisLimits) -> f64 {
     let stages = stages(pieces, blocks, machine, axes);
     let speeds = speeds(&stages, &axes.accelerations, machine.acceleration);
     let time = |(stage, ends): (&Stage, &[f64])| 2.0 * stage.length / (ends[0].sqrt() + ends[1].sqrt());
@@ -109,7 +109,7 @@ pub fn axes_at_most(kinematics: &Kinematics, joints: &JointPath) -> f64 {
 }
 
 /// The pieces of a path, and the time that the tip stands while rotary axes turn, s.
-fn pieces(path: &Toolpath, kinematics: &Kinematics, joints: &JointPath) -> (Vec<Piece>, f64) {
+fn pieces(path: &Toolpath, kinematics: &Kinematics, joints: &JointPath) -> (Vec<EvenStretch>, f64) {
     let (mut last, mut tip) = (joints.start, path.start.tip);
     let (mut pieces, mut standing, mut after_stop) = (Vec::new(), 0.0, true);
     for location in &joints.locations {
@@ -126,7 +126,7 @@ fn pieces(path: &Toolpath, kinematics: &Kinematics, joints: &JointPath) -> (Vec<
                 let now = if share == 1.0 { to } else { kinematics.place(there, rotary) };
                 let length = length / parts;
                 let slope = way(&before, &now).map(|way| way / length);
-                pieces.push(Piece { step: location.step, length, slope, after_stop });
+                pieces.push(EvenStretch { step: location.step, length, slope, after_stop });
                 (before, after_stop) = (now, false);
             }
         } else if location.turn != Turn::Rewind && to != last {
@@ -154,9 +154,9 @@ fn from_rest_to_rest(way: &[f64; 5], kinematics: &Kinematics) -> f64 {
     way.iter().zip(limits).map(one).fold(0.0, f64::max)
 }
 
-fn stages(pieces: &[Piece], blocks: &[Block], machine: &Machine, axes: &AxisLimits) -> Vec<Stage> {
+fn stages(pieces: &[EvenStretch], blocks: &[Block], machine: &Machine, axes: &AxisLimits) -> Vec<Stage> {
     let mut stages = Vec::new();
-    let mut before: Option<(&Piece, f64)> = None;
+    let mut before: Option<(&EvenStretch, f64)> = None;
     let mut blocks = blocks.iter().peekable();
     for (k, piece) in pieces.iter().enumerate() {
         while blocks.next_if(|block| block.step < piece.step).is_some() {}
@@ -198,7 +198,7 @@ fn stages(pieces: &[Piece], blocks: &[Block], machine: &Machine, axes: &AxisLimi
 }
 
 /// How axes bend at the corner between two pieces: their slopes change over half of both. Where the tip stands, nothing bends.
-fn bend(last: &Piece, next: &Piece) -> [f64; 5] {
+fn bend(last: &EvenStretch, next: &EvenStretch) -> [f64; 5] {
     if next.after_stop {
         return [0.0; 5];
     }

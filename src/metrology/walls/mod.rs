@@ -29,7 +29,7 @@ use work::monitor::{self, Cancelled, Monitor};
 use super::along_normals::{Net, NetPlace, Site, connected};
 use super::facing::{Facing, PlaceKind};
 use super::figures::{Bounded, ExcessKind, GougeRegion, Limits, Measurement, NUMERICAL_FLOOR, UncutRegion};
-use piece::Piece;
+use piece::WallPiece;
 use reach::Moves;
 use search::{Deepest, Highest, Standing};
 
@@ -79,7 +79,7 @@ pub(super) struct Walls {
 }
 
 struct Strip {
-    piece: Piece,
+    piece: WallPiece,
     cut: Deepest,
     stands: Highest,
 }
@@ -119,7 +119,7 @@ impl Walls {
             monitor::check(monitor)?;
             let some = &pieces[run * RUN..((run + 1) * RUN).min(pieces.len())];
             monitor.advance(some.len() as u64);
-            let of_one = |piece: &Piece| {
+            let of_one = |piece: &WallPiece| {
                 let near = passing(piece, &moves, moves_near(&bins, &grid, piece), task.reach);
                 Strip {
                     piece: *piece,
@@ -136,7 +136,7 @@ impl Walls {
     fn of(strips: Vec<Strip>, side: f64, slack: f64, cell: f64) -> Self {
         let mut near: HashMap<[i64; 2], Vec<u32>> = HashMap::new();
         for (k, strip) in strips.iter().enumerate() {
-            let Piece { start, along, length, .. } = strip.piece;
+            let WallPiece { start, along, length, .. } = strip.piece;
             // Asked by the middle of squares no larger than a cell.
             let grown = strip.cut.depth.max(strip.stands.possible) + slack + length + cell;
             let ends = [start, start + along * length];
@@ -183,7 +183,7 @@ impl Walls {
         corners: &'b [Point2],
     ) -> impl Iterator<Item = (Point2, Vector2)> + 'b {
         self.near(p.xy()).filter_map(move |strip| {
-            let Piece { normal, length, beyond, .. } = strip.piece;
+            let WallPiece { normal, length, beyond, .. } = strip.piece;
             let most = strip.stands.possible + self.slack;
             let [before, after] = beyond.map(|beyond| if beyond > 0.0 { beyond.min(length) } else { most });
             let beside = |q: &Point2| {
@@ -322,7 +322,7 @@ impl Strip {
 }
 
 /// The moves of the bin under a strip's middle: bins are grown by more than its length.
-fn moves_near<'b>(bins: &'b MoveBins, grid: &Grid, piece: &Piece) -> &'b [u32] {
+fn moves_near<'b>(bins: &'b MoveBins, grid: &Grid, piece: &WallPiece) -> &'b [u32] {
     let (middle, _) = piece.middle();
     let bin = |x: f64, origin: f64, n: usize| {
         let cell = ((x - origin) / grid.cell + 0.5).max(0.0) as usize;
@@ -332,7 +332,7 @@ fn moves_near<'b>(bins: &'b MoveBins, grid: &Grid, piece: &Piece) -> &'b [u32] {
 }
 
 /// Those moves that may cut a strip, or material up to `reach` before it.
-fn passing(piece: &Piece, moves: &Moves<'_>, near: &[u32], reach: f64) -> Vec<u32> {
+fn passing(piece: &WallPiece, moves: &Moves<'_>, near: &[u32], reach: f64) -> Vec<u32> {
     let highest = piece.high[0].max(piece.high[1]);
     let passes = |k: &&u32| {
         let ends = moves.ends(**k);

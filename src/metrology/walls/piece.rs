@@ -28,7 +28,7 @@ const STRAIGHT: f64 = 1e-3;
 
 /// A strip of a wall. `u` runs along it from 0 to its length, z up.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Piece {
+pub(super) struct WallPiece {
     /// Where `u` is 0 and z is `level`, in the plan.
     pub start: Point2,
     /// Unit vector along it.
@@ -57,7 +57,7 @@ fn between([a, b]: [f64; 2], share: f64) -> f64 {
     a + (b - a) * share
 }
 
-impl Piece {
+impl WallPiece {
     /// Share of the length at `u`, from 0 to 1.
     fn share(&self, u: f64) -> f64 {
         (u / self.length).clamp(0.0, 1.0)
@@ -146,7 +146,7 @@ impl Piece {
 }
 
 /// Height of the design at `u`, so far in front of a strip, mm.
-fn height_at(part: &Part, piece: &Piece, u: f64, aside: f64) -> Option<f64> {
+fn height_at(part: &Part, piece: &WallPiece, u: f64, aside: f64) -> Option<f64> {
     let q = piece.place(u, piece.high_at(u)).xy() + piece.normal * aside;
     part.highest_at(q.x, q.y).map(|design| design.point.z)
 }
@@ -170,7 +170,7 @@ fn medial(holds: &dyn Fn(f64) -> bool) -> f64 {
 }
 
 /// The vertical facets of a mesh in strips no longer than `longest` mm.
-pub(super) fn pieces(part: &Part, longest: f64, bottom: f64) -> Vec<Piece> {
+pub(super) fn pieces(part: &Part, longest: f64, bottom: f64) -> Vec<WallPiece> {
     let mesh = part.mesh();
     let of_facet = |t: usize| {
         let normal = mesh.normal(t);
@@ -185,7 +185,7 @@ pub(super) fn pieces(part: &Part, longest: f64, bottom: f64) -> Vec<Piece> {
 }
 
 /// The two strips of a facet, on either side of its middle corner.
-fn of_facet(corners: &[Point3; 3], normal: &Vector3) -> [Option<Piece>; 2] {
+fn of_facet(corners: &[Point3; 3], normal: &Vector3) -> [Option<WallPiece>; 2] {
     let across = normal.xy();
     let (n, lean) = (across / across.norm(), -normal.z / across.norm());
     let along = Vector2::new(-n.y, n.x);
@@ -198,7 +198,7 @@ fn of_facet(corners: &[Point3; 3], normal: &Vector3) -> [Option<Piece>; 2] {
     let strip = |from: [f64; 2], to: [f64; 2], ends: [[f64; 2]; 2]| {
         let length = to[0] - from[0];
         let ordered = ends.map(|[x, y]| [x.min(y), x.max(y)]);
-        (length > SHORTEST).then(|| Piece {
+        (length > SHORTEST).then(|| WallPiece {
             start: first.xy() + along * from[0],
             along,
             normal: n,
@@ -218,12 +218,12 @@ fn of_facet(corners: &[Point3; 3], normal: &Vector3) -> [Option<Piece>; 2] {
 }
 
 /// A strip in parts of equal length.
-fn shortened(strip: &Piece, longest: f64) -> Vec<Piece> {
+fn shortened(strip: &WallPiece, longest: f64) -> Vec<WallPiece> {
     let parts = (strip.length / longest).ceil().max(1.0) as usize;
     let at = |k: usize| strip.length * k as f64 / parts as f64;
     let part = |k: usize| {
         let (from, to) = (at(k), at(k + 1));
-        Piece {
+        WallPiece {
             start: strip.start + strip.along * from,
             length: to - from,
             low: [strip.low_at(from), strip.low_at(to)],

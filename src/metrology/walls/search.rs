@@ -6,7 +6,7 @@
 
 use geometry::{Point2, Vector2};
 
-use super::piece::Piece;
+use super::piece::WallPiece;
 use super::reach::{Line, Moves, greatest, stadium};
 
 /// Parts of a strip that are looked at, at most. With fewer, wide bounds stay where many short moves meet.
@@ -41,7 +41,7 @@ pub(super) struct Highest {
 
 /// The deepest that `moves` cut into a strip. A cut through an edge
 /// belongs to the nearer side: it is no deeper than it is below the top, and than the wall beyond the end is near.
-pub(super) fn deepest(piece: &Piece, moves: &Moves<'_>, near: &[u32]) -> Deepest {
+pub(super) fn deepest(piece: &WallPiece, moves: &Moves<'_>, near: &[u32]) -> Deepest {
     let mut found = Deepest::default();
     for &k in near {
         if !may_cut(piece, moves, k, found.depth.max(FLOOR)) {
@@ -70,7 +70,7 @@ pub(super) fn deepest(piece: &Piece, moves: &Moves<'_>, near: &[u32]) -> Deepest
 }
 
 /// Whether a move may cut deeper than `known` into a strip.
-fn may_cut(piece: &Piece, moves: &Moves<'_>, k: u32, known: f64) -> bool {
+fn may_cut(piece: &WallPiece, moves: &Moves<'_>, k: u32, known: f64) -> bool {
     let [a, b] = moves.ends(k);
     if a.z.min(b.z) >= piece.high[0].max(piece.high[1]) {
         return false;
@@ -81,7 +81,7 @@ fn may_cut(piece: &Piece, moves: &Moves<'_>, k: u32, known: f64) -> bool {
 }
 
 /// How deep a move cuts at a place of a strip; below 0 where it does not.
-fn depth(piece: &Piece, moves: &Moves<'_>, k: u32, u: f64, z: f64) -> f64 {
+fn depth(piece: &WallPiece, moves: &Moves<'_>, k: u32, u: f64, z: f64) -> f64 {
     let place = piece.place(u, z).xy();
     let cut = moves.height(k, place);
     if cut > z {
@@ -130,7 +130,7 @@ struct Seen {
 
 impl Standing<'_> {
     /// The highest material before a strip, as far as it counts: not beside its floor.
-    pub fn highest(&self, piece: &Piece, near: &[u32]) -> Highest {
+    pub fn highest(&self, piece: &WallPiece, near: &[u32]) -> Highest {
         let from = [0, 1].map(|k| piece.low[k].max(piece.floor[k] + self.of_floor));
         if from[0] >= piece.high[0] && from[1] >= piece.high[1] {
             return Highest::default();
@@ -166,7 +166,7 @@ impl Standing<'_> {
         found
     }
 
-    fn look(&self, piece: &Piece, from: [f64; 2], part: &Part, near: &[u32]) -> Seen {
+    fn look(&self, piece: &WallPiece, from: [f64; 2], part: &Part, near: &[u32]) -> Seen {
         let at = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(i, j)| {
             let (s, v) = (part.u[i], part.v[j]);
             let low = from[0] + (from[1] - from[0]) * s;

@@ -53,7 +53,7 @@ const STOCK: f64 = 0.02;
 const FRESH: f64 = 0.5;
 
 /// A place of a pass where another one may begin.
-struct Place {
+struct Beginning {
     /// Its index in the way.
     index: usize,
     heading: Vector2,
@@ -77,7 +77,7 @@ pub(super) struct Peeler<'a> {
     limit: f64,
     radius: f64,
     out: Vec<Point2>,
-    places: Vec<Place>,
+    places: Vec<Beginning>,
     passes: usize,
     thin_at: usize,
     /// A place, and how far around it there is no wall, mm.
@@ -117,7 +117,7 @@ impl<'a> Peeler<'a> {
     pub fn peel(&mut self, monitor: &dyn Monitor) -> Result<(), Cancelled> {
         while let Some(k) = self.next_place() {
             check(monitor)?;
-            let Place { index, heading, .. } = self.places[k];
+            let Beginning { index, heading, .. } = self.places[k];
             let begin = self.out[index];
             let links = Links { room: self.room, cleared: self.cleared, radius: self.radius };
             let link = links.between(&self.out, index, heading);
@@ -139,7 +139,7 @@ impl<'a> Peeler<'a> {
         for (k, heading) in headings.into_iter().enumerate() {
             let index = first + k;
             if gone >= APART * self.radius {
-                self.places.push(Place { index, heading, pass: self.passes });
+                self.places.push(Beginning { index, heading, pass: self.passes });
                 gone = 0.0;
             }
             if let Some(next) = self.out.get(index + 1) {
@@ -160,7 +160,7 @@ impl<'a> Peeler<'a> {
     }
 
     /// Whether stock stands to the right of a place.
-    fn has_stock(&self, place: &Place) -> bool {
+    fn has_stock(&self, place: &Beginning) -> bool {
         let (at, right) = (self.out[place.index], Vector2::new(place.heading.y, -place.heading.x));
         let beside = self.nearest_inside(&(at + right * (PROBE * self.radius)));
         if (beside - at).norm() < 0.2 * PROBE * self.radius {
@@ -175,7 +175,7 @@ impl<'a> Peeler<'a> {
     fn next_place(&mut self) -> Option<usize> {
         let end = *self.out.last()?;
         loop {
-            let away = |place: &Place| (self.out[place.index] - end).norm_squared();
+            let away = |place: &Beginning| (self.out[place.index] - end).norm_squared();
             let mut k = (0..self.places.len())
                 .min_by(|a, b| away(&self.places[*a]).total_cmp(&away(&self.places[*b])))?;
             if self.has_stock(&self.places[k]) {

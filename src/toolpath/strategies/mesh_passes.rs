@@ -14,7 +14,7 @@ use crate::levels::planned_field;
 use crate::levels::spacing::{AllowedStep, LevelSteps, place_levels};
 use crate::surface::border::useful_overrun;
 use crate::surface::feed::{self, SMOOTHING_OVER_RADIUS};
-use crate::surface::mesh_surface::{MeshSurface, Piece, not_applicable, reachable};
+use crate::surface::mesh_surface::{ConnectedPiece, MeshSurface, not_applicable, reachable};
 use crate::vocabulary::{
     Contact, FeedDirection, LevelFunction, Levelled, OffDirection, PassSettings, Passes, PlanError, Step,
     Task,
@@ -96,7 +96,7 @@ pub(crate) fn on_mesh(task: &Task<'_>, aim: Aim) -> Result<Passes, PlanError> {
 fn on_piece(
     task: &Task<'_>,
     aim: Aim,
-    piece: &Piece,
+    piece: &ConnectedPiece,
     surface: &MeshSurface,
     earlier: Option<(&[f64], &Levelled)>,
 ) -> Result<Passes, PlanError> {
@@ -213,7 +213,7 @@ pub(crate) fn width_at(cutter: &Cutter, n: &Vector3, b: &Vector3, bend: &Bend, s
 fn feed_lines(
     task: &Task<'_>,
     direction: &FeedDirection,
-    piece: &Piece,
+    piece: &ConnectedPiece,
     surface: &MeshSurface,
     wanted: &[Wanted],
     passes: &mut Passes,

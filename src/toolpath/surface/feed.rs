@@ -13,7 +13,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::chart::Chart;
-use super::mesh_surface::{MeshSurface, Piece, not_applicable};
+use super::mesh_surface::{ConnectedPiece, MeshSurface, not_applicable};
 use crate::vocabulary::{Along, FeedDirection, PlanError};
 use cutter::Cutter;
 use field::mesh::{
@@ -250,7 +250,7 @@ pub(crate) fn on_mesh(
     part: &Part,
     cutter: &Cutter,
     direction: &FeedDirection,
-    piece: &Piece,
+    piece: &ConnectedPiece,
     surface: &MeshSurface,
 ) -> Result<Vec<Wanted>, MeshFieldError> {
     let mesh = &surface.mesh;

@@ -72,7 +72,7 @@ pub(crate) struct MeshSurface {
 }
 
 /// A connected piece of a surface.
-pub(crate) struct Piece {
+pub(crate) struct ConnectedPiece {
     /// Its triangles, with the mean normals at vertices.
     pub mesh: FieldMesh,
     /// Curvature at the vertices.
@@ -84,7 +84,7 @@ pub(crate) struct Piece {
 /// What of a part can be planned from above, and what cannot.
 pub(crate) struct Reachable {
     /// Connected pieces.
-    pub pieces: Vec<Piece>,
+    pub pieces: Vec<ConnectedPiece>,
     /// Area that is too steep, mm².
     pub steep_area: f64,
 }
@@ -178,7 +178,7 @@ pub(crate) fn reachable(part: &Part, cutter: &Cutter, interval: f64) -> Result<R
         .map(|own| {
             let triangles: Vec<[u32; 3]> = own.iter().map(|&t| all.triangles()[t]).collect();
             let (mesh, kept) = compacted(all.points(), &triangles, Some(all.normals()))?;
-            Ok(Piece {
+            Ok(ConnectedPiece {
                 mesh,
                 bends: kept.iter().map(|&v| bends[v as usize]).collect(),
                 corner_normals: own.iter().map(|&t| corner_normals[t]).collect(),
@@ -295,8 +295,8 @@ impl MeshSurface {
     ///
     /// # Errors
     /// When strip and piece do not make a surface.
-    pub fn with_margin(piece: &Piece, width: f64) -> Result<Self, PlanError> {
-        let Piece { mesh: piece, bends, corner_normals } = piece;
+    pub fn with_margin(piece: &ConnectedPiece, width: f64) -> Result<Self, PlanError> {
+        let ConnectedPiece { mesh: piece, bends, corner_normals } = piece;
         let mut corner_normals = corner_normals.clone();
         let (mut points, mut triangles) = (piece.points().to_vec(), piece.triangles().to_vec());
         let (mut normals, mut bends) = (piece.normals().to_vec(), bends.clone());
