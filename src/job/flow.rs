@@ -122,7 +122,7 @@ impl Session {
         let scene = &self.scene;
         let engine = self.engine(request)?;
         let (cutters, holders) = self.tools(request);
-        if !scene.stock.is_around() && !matches!(self.stock, Stock::Box(_)) {
+        if !matches!(self.stock, Stock::Box(_)) {
             self.seen_from_above(
                 request,
                 engine,
