@@ -158,7 +158,7 @@ impl Session {
             step: request.step,
             chord_tolerance: self.scene.tolerance.chord,
             clearance: self.scene.clearance,
-            stock_top: self.top,
+            stock_top: self.top(),
             stock: Some(self.area()),
             feed_rate: self.scene.cutting.feed_rate,
             plunge_rate: self.scene.cutting.plunge_rate,
@@ -209,7 +209,7 @@ impl Session {
         let scene = &self.scene;
         let radius = scene.cutter.radius();
         let of_passes = |step: &Move| step.kind == MoveKind::Cut;
-        let arcs = contact_arcs(path, &scene.cutter, self.top, &of_passes, monitor)?;
+        let arcs = contact_arcs(path, &scene.cutter, self.top(), &of_passes, monitor)?;
         Ok(Some(limit_feed_by(path, &arcs, strategy, request.step, radius)))
     }
 }

@@ -10,7 +10,7 @@ use metrology::{Budget, Engine, LaidOut, Measured, Simulation, Task};
 use motion::{Cutters, Toolpath};
 use part::Part;
 use report::InputFile;
-use scene::{Fixture, Loaded, MeshFile, Scene, ToolpathRequest, load_mesh, load_part};
+use scene::{Fixture, Loaded, MeshFile, Scene, StockRequest, ToolpathRequest, load_mesh, load_part};
 use sim::{Grid, Stock};
 use toolpath::{PlanError, Pocket};
 use work::aside;
@@ -41,8 +41,6 @@ pub struct Session {
     pub cells: LaidOut,
     /// What there is before the first cut.
     pub stock: Stock,
-    /// Its greatest height, mm.
-    pub top: f64,
     /// What was mended to make the part usable.
     pub notes: Vec<String>,
     /// What is to be said where part and cutter differ in size beyond belief.
@@ -53,13 +51,17 @@ pub struct Session {
     cutters: Cutters,
 }
 
-/// What there is before the first cut, and the height of its top, mm.
+/// How well it is known that a part lies in a mesh.
+const IN_STOCK: &str = "the part was found to lie in its stock at the corners of both meshes and on the cells; what stands out of it \
+                        between them by more than the gouge tolerance would not show";
+
+/// What there is before the first cut. What was mended to make its mesh usable is added to the notes.
 ///
 /// # Errors
-/// [`JobError`] when its file cannot be used, or the part stands out of it.
-fn stock_of(scene: &Scene, part: &Part, pocket: bool) -> Result<Stock, JobError> {
+/// [`JobError`] when its file cannot be used.
+fn stock_of(scene: &Scene, part: &Part, pocket: bool, notes: &mut Vec<String>) -> Result<Stock, JobError> {
     Ok(match &scene.stock {
-        &scene::Stock::Around { allowance, margin, .. } => {
+        &StockRequest::Around { allowance, margin, .. } => {
             let Aabb { mut min, mut max } = part.bounds();
             // The measured floor ends where the flat of the cutter's bottom does.
             let beyond = if pocket { scene.cutter.radius() - scene.cutter.flat_radius() } else { 0.0 };
@@ -70,12 +72,14 @@ fn stock_of(scene: &Scene, part: &Part, pocket: bool) -> Result<Stock, JobError>
             max.z = face + allowance;
             Stock::Box(Aabb { min, max })
         }
-        scene::Stock::Block(block) => Stock::Box(*block),
-        &scene::Stock::Bar { from, axis, diameter, length } => {
+        StockRequest::Block(block) => Stock::Box(*block),
+        &StockRequest::Bar { from, axis, diameter, length } => {
             Stock::Cylinder { base: from, axis, radius: 0.5 * diameter, length }
         }
-        scene::Stock::Mesh(MeshFile { file, format, scale, .. }) => {
-            let (mesh, _) = load_mesh(scene, file, format, *scale)?;
+        StockRequest::Mesh(MeshFile { file, format, scale, .. }) => {
+            let (mesh, mended) = load_mesh(scene, file, format, *scale)?;
+            notes.extend(mended);
+            notes.push(IN_STOCK.to_owned());
             let refused = || {
                 let (what, cure) =
                     ("the stock's mesh has borders, so that it has no inside", "close its holes");
@@ -86,7 +90,7 @@ fn stock_of(scene: &Scene, part: &Part, pocket: bool) -> Result<Stock, JobError>
     })
 }
 
-/// Refuses a part that stands out of its stock by more than the gouge tolerance, at its corners or on the cells.
+/// Refuses a part that stands out of its stock by more than the gouge tolerance, at corners or on the cells.
 fn check_inside(scene: &Scene, part: &Part, stock: &Stock, grid: &Grid) -> Result<(), JobError> {
     let in_row = |j: usize| {
         let places = (0..grid.nx).filter_map(|i| {
@@ -96,7 +100,10 @@ fn check_inside(scene: &Scene, part: &Part, stock: &Stock, grid: &Grid) -> Resul
         farthest_out(stock, places)
     };
     let rows = work::parallel::map(grid.ny, in_row);
-    let of_corners = farthest_out(stock, part.mesh().vertices().iter().copied());
+    // Where the stock's surface dips, too.
+    let over = |p: &Point3| Some(part.highest_at(p.x, p.y)?.point);
+    let corners = part.mesh().vertices().iter().copied().chain(stock.corners().iter().filter_map(over));
+    let of_corners = farthest_out(stock, corners);
     let farthest = rows.into_iter().chain([of_corners]).flatten().max_by(|a, b| a.0.total_cmp(&b.0));
     match farthest {
         Some((by, at)) if by > scene.tolerance.gouge => {
@@ -139,10 +146,9 @@ impl Session {
     }
 
     fn read(scene: Scene) -> Result<Self, JobError> {
-        let Loaded { part, blade, pocket, notes } = load_part(&scene)?;
-        let budget = Budget::new(&part, scene.simulation.memory_mib);
-        let stock = stock_of(&scene, &part, pocket.is_some())?;
-        let top = stock.bounds().max.z;
+        let Loaded { part, blade, pocket, mut notes } = load_part(&scene)?;
+        let stock = stock_of(&scene, &part, pocket.is_some(), &mut notes)?;
+        let budget = Budget::new(&part, scene.simulation.memory_mib).beside(&stock);
         let cells = budget
             .grid_before_planning(&stock.bounds(), &scene.simulation)
             .map_err(JobError::grid(&scene))?;
@@ -152,12 +158,17 @@ impl Session {
         let doubt = units::doubt(&scene, &part);
         let inputs = inputs(&scene)?;
         let cutters = Cutters::from(&scene.cutter);
-        Ok(Self { scene, part, blade, pocket, cells, stock, top, notes, doubt, inputs, cutters })
+        Ok(Self { scene, part, blade, pocket, cells, stock, notes, doubt, inputs, cutters })
     }
 
     /// What a simulation may take.
     pub(crate) fn budget(&self) -> Budget {
-        Budget::new(&self.part, self.scene.simulation.memory_mib)
+        Budget::new(&self.part, self.scene.simulation.memory_mib).beside(&self.stock)
+    }
+
+    /// The stock's greatest height, mm.
+    pub fn top(&self) -> f64 {
+        self.stock.bounds().max.z
     }
 
     /// The box around the stock.
@@ -257,7 +268,6 @@ impl Session {
             holder: self.scene.holder.as_ref(),
             path,
             stock: &self.stock,
-            area: self.area(),
             cells,
             limits: &self.scene.tolerance,
             simulation,

@@ -269,7 +269,7 @@ impl Refinement<'_> {
     /// What is measured on a fine grid, and how high material may be that its cells missed as well.
     fn measure(&self, fine: Grid, monitor: &dyn Monitor) -> Result<(Inspected, f64), Cancelled> {
         let (coarse, within) = (self.coarse, Within(monitor));
-        let stock = coarse.surface.cut.uncut(fine, self.asked.stock_top);
+        let stock = coarse.surface.cut.uncut(fine, self.asked.stock_top, &within)?;
         let cut = cut_in_turn(cut, stock, coarse.cutters, self.path, &within)?;
         let envelope: Envelope = coarse.surface.envelope.clone();
         let surface = CutSurface::new(envelope, &cut, self.path);

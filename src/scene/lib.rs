@@ -30,7 +30,7 @@ pub use part::{
     BladeRequest, FLATTEN_SHARE, FormulaSource, LoadError, Loaded, MeshFile, NurbsSource, OutlineSource,
     PartSource, PocketSource,
 };
-pub use stock::Stock;
+pub use stock::StockRequest;
 pub use write::complete_toml;
 
 use cutter::{Cutter, Holder};
@@ -136,7 +136,7 @@ pub struct Scene {
     /// What of it is judged.
     pub judged: Judged,
     /// What it is made from.
-    pub stock: Stock,
+    pub stock: StockRequest,
     /// With what.
     pub cutter: Cutter,
     /// What holds it; `None` leaves collisions of shank and holder unchecked.

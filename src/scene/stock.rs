@@ -23,7 +23,7 @@ const MESH: [&str; 2] = ["file", "unit"];
 
 /// What there is before the first cut.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Stock {
+pub enum StockRequest {
     /// A block around the part.
     Around {
         /// Height of the flat top above the part's highest point, mm.
@@ -50,7 +50,7 @@ pub enum Stock {
     Mesh(MeshFile),
 }
 
-impl Stock {
+impl StockRequest {
     /// How much stands over the part where the block was roughed before, mm.
     pub fn roughed(&self) -> Option<f64> {
         match self {
@@ -79,7 +79,7 @@ pub(super) fn read(
     folder: &Path,
     part: &PartSource,
     cutter: &Cutter,
-) -> Result<Stock, SceneError> {
+) -> Result<StockRequest, SceneError> {
     let shapes = [&BLOCK[..], &BAR, &MESH];
     let all: Vec<&str> = shapes.iter().flat_map(|keys| keys.iter().copied()).collect();
     let Some(own) = shapes.into_iter().find(|keys| stock.has(keys[0])) else {
@@ -96,24 +96,24 @@ pub(super) fn read(
     match own[0] {
         "corners" => block(stock),
         "diameter" => bar(stock),
-        _ => Ok(Stock::Mesh(MeshFile::of_table(stock, folder, "casting.stl")?)),
+        _ => Ok(StockRequest::Mesh(MeshFile::of_table(stock, folder, "casting.stl")?)),
     }
 }
 
-fn around(stock: &Section<'_>, part: &PartSource, cutter: &Cutter) -> Result<Stock, SceneError> {
+fn around(stock: &Section<'_>, part: &PartSource, cutter: &Cutter) -> Result<StockRequest, SceneError> {
     // Zero is meant in both: stock may end at the part's top and at its rim.
     let length = |key| stock.number(key, 0.0..=*LENGTH.end(), " mm");
     // A pocket is milled into a finished face, and what is cut beside it has to be seen.
     let pocket = matches!(part, PartSource::Pocket { .. });
     let (top, around) = if pocket { (0.0, cutter.radius()) } else { (DEFAULT_ALLOWANCE, DEFAULT_MARGIN) };
-    Ok(Stock::Around {
+    Ok(StockRequest::Around {
         allowance: length("allowance")?.map_or(top, |v| v.value),
         margin: length("margin")?.map_or(around, |v| v.value),
         roughed: length("roughed")?.map(|v| v.value),
     })
 }
 
-fn block(stock: &Section<'_>) -> Result<Stock, SceneError> {
+fn block(stock: &Section<'_>) -> Result<StockRequest, SceneError> {
     let place = stock.key_span("corners");
     let cure = "write two opposite corners: `corners = [[0, 0, -10], [60, 40, 2]]`";
     let corners = stock.rows::<3>("corners", "two corners", cure)?.map_or_else(Vec::new, |rows| rows.value);
@@ -125,10 +125,10 @@ fn block(stock: &Section<'_>) -> Result<Stock, SceneError> {
     if (0..3).any(|axis| max[axis] - min[axis] < *LENGTH.start()) {
         return Err(stock.error(&place, "the block has no volume", cure));
     }
-    Ok(Stock::Block(Aabb { min, max }))
+    Ok(StockRequest::Block(Aabb { min, max }))
 }
 
-fn bar(stock: &Section<'_>) -> Result<Stock, SceneError> {
+fn bar(stock: &Section<'_>) -> Result<StockRequest, SceneError> {
     let from = stock.vector("from")?.ok_or_else(|| {
         let message = "the bar begins nowhere";
         stock.error(
@@ -137,7 +137,7 @@ fn bar(stock: &Section<'_>) -> Result<Stock, SceneError> {
             "add `from = [0, 0, 0]`: the middle of one of its ends",
         )
     })?;
-    Ok(Stock::Bar {
+    Ok(StockRequest::Bar {
         from: from.value.into(),
         axis: stock.choice("axis", &AXES)?,
         diameter: stock.required_length("diameter", 40.0)?.value,
@@ -146,11 +146,11 @@ fn bar(stock: &Section<'_>) -> Result<Stock, SceneError> {
 }
 
 /// Writes `[stock]` as scenes spell it.
-pub(super) fn write(out: &mut String, stock: &Stock) -> fmt::Result {
+pub(super) fn write(out: &mut String, stock: &StockRequest) -> fmt::Result {
     let list = |p: &Point3| format!("[{}, {}, {}]", number(p.x), number(p.y), number(p.z));
     writeln!(out, "\n[stock]")?;
     match stock {
-        Stock::Around { allowance, margin, roughed } => {
+        StockRequest::Around { allowance, margin, roughed } => {
             writeln!(out, "allowance = {}  # mm above the part's highest point", number(*allowance))?;
             writeln!(out, "margin = {}  # mm around the part in the plan view", number(*margin))?;
             if let Some(over) = roughed {
@@ -162,14 +162,16 @@ pub(super) fn write(out: &mut String, stock: &Stock) -> fmt::Result {
             }
             Ok(())
         }
-        Stock::Block(Aabb { min, max }) => writeln!(out, "corners = [{}, {}]  # mm", list(min), list(max)),
-        Stock::Bar { from, axis, diameter, length } => {
+        StockRequest::Block(Aabb { min, max }) => {
+            writeln!(out, "corners = [{}, {}]  # mm", list(min), list(max))
+        }
+        StockRequest::Bar { from, axis, diameter, length } => {
             let word = AXES.iter().find(|(_, other)| other == axis).map_or("z", |(word, _)| word);
             writeln!(out, "diameter = {}  # mm", number(*diameter))?;
             writeln!(out, "length = {}  # mm", number(*length))?;
             writeln!(out, "from = {}  # middle of one end, mm", list(from))?;
             writeln!(out, "axis = \"{word}\"")
         }
-        Stock::Mesh(file) => file.write_keys(out),
+        StockRequest::Mesh(file) => file.write_keys(out),
     }
 }

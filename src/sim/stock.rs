@@ -91,6 +91,22 @@ impl Stock {
         Self::Roughed { block, part: Arc::new(StockMesh { tree: Bvh::new(&part), mesh: part }), over }
     }
 
+    /// The corners of its mesh; none of other shapes.
+    pub fn corners(&self) -> &[Point3] {
+        match self {
+            Self::Mesh(stock) => stock.mesh.vertices(),
+            _ => &[],
+        }
+    }
+
+    /// The triangles of its mesh; none of other shapes.
+    pub fn triangles(&self) -> usize {
+        match self {
+            Self::Mesh(stock) => stock.mesh.triangles().len(),
+            _ => 0,
+        }
+    }
+
     /// The box around it.
     pub fn bounds(&self) -> Aabb {
         match self {

@@ -1,6 +1,7 @@
 //! Stock as heights over a grid (three axes, no undercuts).
 
 use super::{Grid, Stock};
+use work::monitor::{self, Cancelled, Monitor};
 
 /// In [`ZMap::cut_by`]: no move touched this cell.
 pub const NOT_CUT: u32 = u32::MAX;
@@ -42,29 +43,42 @@ impl ZMap {
 
     /// What stands over the cells' centres, seen from above; `bottom` where nothing stands. A roughed block counts as a
     /// whole one.
-    pub fn of_stock(grid: Grid, stock: &Stock, bottom: f64) -> Self {
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn of_stock(
+        grid: Grid,
+        stock: &Stock,
+        bottom: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<Self, Cancelled> {
         match stock {
-            Stock::Box(block) | Stock::Roughed { block, .. } => Self::block(grid, block.max.z),
+            Stock::Box(block) | Stock::Roughed { block, .. } => Ok(Self::block(grid, block.max.z)),
             Stock::Cylinder { .. } | Stock::Mesh(_) => {
-                Self::of_shape(grid, Shape { stock: stock.clone(), bottom })
+                Self::of_shape(grid, Shape { stock: stock.clone(), bottom }, monitor)
             }
         }
     }
 
-    fn of_shape(grid: Grid, shape: Shape) -> Self {
-        let height = |k: usize| {
-            let centre = grid.centre(k % grid.nx, k / grid.nx);
-            shape.height_at(centre.x, centre.y) as f32
+    fn of_shape(grid: Grid, shape: Shape, monitor: &dyn Monitor) -> Result<Self, Cancelled> {
+        let row = |j: usize| {
+            monitor::check(monitor)?;
+            let centres = (0..grid.nx).map(|i| grid.centre(i, j));
+            Ok::<Vec<f32>, Cancelled>(centres.map(|q| shape.height_at(q.x, q.y) as f32).collect())
         };
-        let height = work::parallel::map(grid.len(), height);
-        Self { grid, height, cut_by: vec![NOT_CUT; grid.len()], shape: Some(shape) }
+        let height = work::parallel::try_map(grid.ny, row)?.concat();
+        Ok(Self { grid, height, cut_by: vec![NOT_CUT; grid.len()], shape: Some(shape) })
     }
 
     /// The same stock before the first cut on other cells; `top` is that of a block, mm.
-    pub fn uncut(&self, grid: Grid, top: f64) -> Self {
-        self.shape
-            .as_ref()
-            .map_or_else(|| Self::block(grid, top), |shape| Self::of_shape(grid, shape.clone()))
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn uncut(&self, grid: Grid, top: f64, monitor: &dyn Monitor) -> Result<Self, Cancelled> {
+        match &self.shape {
+            Some(shape) => Self::of_shape(grid, shape.clone(), monitor),
+            None => Ok(Self::block(grid, top)),
+        }
     }
 }
 

@@ -21,11 +21,11 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
         return Ok(Finding::default());
     };
     let step = run.request.step;
-    let (path, top) = (run.path(), run.session.top);
+    let (path, top) = (run.path(), run.session.top());
     let p = pocket_figures(run.scene(), pocket, strategy, step, path, cut, top, engaged, monitor)?;
     let mut claims = vec![within_walls(run, &p), ramps(run, strategy)];
     claims.extend(strategy.engagement.map(|limit| engaged_within(run, &p, limit.to_degrees())));
-    claims.extend(strategy.stepdown.map(|limit| steps_down(run.path(), run.session.top, limit)));
+    claims.extend(strategy.stepdown.map(|limit| steps_down(run.path(), run.session.top(), limit)));
     let figure = Figure { key: "pocket", value: value(&p)?, rows: rows(&p), ..Figure::default() };
     Ok(Finding { figure: Some(figure), claims, ..Finding::default() })
 }
@@ -113,7 +113,7 @@ fn steps_down(path: &Toolpath, top: f64, limit: f64) -> Claim {
 /// That no way down through stock is steeper than the scene allows.
 fn ramps(run: &Run<'_>, strategy: &PocketStrategy) -> Claim {
     let limit = strategy.ramp_angle.to_degrees();
-    let (steepest, at_least, index) = steepest(run.path(), run.session.top);
+    let (steepest, at_least, index) = steepest(run.path(), run.session.top());
     let text = match index {
         None => "no way down cuts".to_owned(),
         Some(k) => format!(

@@ -4,7 +4,7 @@ use cutter::Solid;
 use geometry::Aabb;
 use motion::Toolpath;
 use part::Part;
-use sim::{Grid, GridError, Rays};
+use sim::{Grid, GridError, Rays, Stock};
 use work::monitor::Monitor;
 
 use super::{EngineError, Simulation};
@@ -52,6 +52,12 @@ impl Budget {
     /// Of a part under the memory that a scene allows.
     pub fn new(part: &Part, memory_mib: u32) -> Self {
         Self { memory_mib, part_bytes: part.mesh().triangles().len() as u64 * BYTES_PER_TRIANGLE }
+    }
+
+    /// What a mesh of stock leaves of it.
+    pub fn beside(self, stock: &Stock) -> Self {
+        let mesh = stock.triangles() as u64 * BYTES_PER_TRIANGLE;
+        Self { part_bytes: self.part_bytes + mesh, ..self }
     }
 
     /// All of it, bytes.

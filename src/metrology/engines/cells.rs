@@ -46,8 +46,9 @@ impl Engine for Cells {
 
     fn ridges(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Option<RidgeMap>, EngineError> {
         let path = task.path;
-        let (grid, _) = task.budget.grid_for(path.len(), &task.area, task.simulation, task.cells)?;
-        let stock = task.uncut(grid);
+        let (grid, _) =
+            task.budget.grid_for(path.len(), &task.stock.bounds(), task.simulation, task.cells)?;
+        let stock = task.uncut(grid, monitor)?;
         let cut = cut_in_turn(self.cut, stock, task.cutters, path, monitor)?;
         let asked = task.simulation.error_bound;
         Ok(ridge_map(task.part, task.cutters, path, &cut, task.limits, asked, monitor)?)
@@ -56,8 +57,8 @@ impl Engine for Cells {
     fn measure(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Measured, EngineError> {
         let begun = Instant::now();
         let (path, held) = (task.path, task.moves_held());
-        let (grid, note) = task.budget.grid_for(held, &task.area, task.simulation, task.cells)?;
-        let stock = task.uncut(grid);
+        let (grid, note) = task.budget.grid_for(held, &task.stock.bounds(), task.simulation, task.cells)?;
+        let stock = task.uncut(grid, monitor)?;
         let cut = cut_in_turn(self.cut, stock, task.cutters, path, monitor)?;
         let most_cells = task.budget.more_cells(held, &grid);
         let asked = Asked {

@@ -5,6 +5,7 @@ use geometry::Aabb;
 use motion::{Cutters, Toolpath};
 use part::Part;
 use sim::{Grid, Rays, Stock, ZMap};
+use work::monitor::{Cancelled, Monitor};
 
 use super::{Budget, EngineChoice, LaidOut};
 use crate::{Facing, Judged, Limits, Measurement, NormalMap};
@@ -42,9 +43,7 @@ pub struct Task<'a> {
     pub path: &'a Toolpath,
     /// What there is before the first cut.
     pub stock: &'a Stock,
-    /// The rectangle of the stock.
-    pub area: Aabb,
-    /// The cells over it that were laid out before there was a path.
+    /// The cells over the stock that were laid out before there was a path.
     pub cells: &'a LaidOut,
     /// What is tolerated.
     pub limits: &'a Limits,
@@ -67,11 +66,14 @@ impl<'a> Task<'a> {
     }
 
     /// The stock on cells, before the first cut.
-    pub fn uncut(&self, grid: Grid) -> ZMap {
+    ///
+    /// # Errors
+    /// When cancelled.
+    pub fn uncut(&self, grid: Grid, monitor: &dyn Monitor) -> Result<ZMap, Cancelled> {
         /// Cells without stock are this much lower than any tip, mm.
         const BELOW: f64 = 1.0;
         let lowest = self.path.moves.iter().map(|step| step.to.tip.z).fold(self.block().min.z, f64::min);
-        ZMap::of_stock(grid, self.stock, lowest - BELOW)
+        ZMap::of_stock(grid, self.stock, lowest - BELOW, monitor)
     }
 
     /// Whether cells measure vertical walls as well: those of a mesh, against the moves.

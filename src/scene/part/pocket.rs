@@ -270,7 +270,7 @@ mod tests {
     #[test]
     fn a_pocket_is_read_and_written_again() {
         let scene = Scene::parse("tray.toml", TRAY).unwrap();
-        assert_eq!(scene.stock, crate::Stock::Around { allowance: 0.0, margin: 3.0, roughed: None });
+        assert_eq!(scene.stock, crate::StockRequest::Around { allowance: 0.0, margin: 3.0, roughed: None });
         let text = complete_toml(&scene);
         let again = Scene::parse("tray.toml", text.clone()).unwrap();
         assert_eq!((&again.part, &again.toolpaths), (&scene.part, &scene.toolpaths), "{text}");
