@@ -13,6 +13,7 @@
 
 mod domain;
 mod grid;
+mod least_left;
 mod refine;
 mod roof;
 #[cfg(test)]
@@ -23,6 +24,7 @@ use cutter::Cutter;
 use geometry::{BoxTree, Bvh, Extent, Feature, Jet2, Node, Paired, TriangleMesh};
 use grid::Parts;
 pub use grid::{GridDrop, PlanGrid};
+pub use least_left::LeastLeft;
 use part::{Part, PatchPoint, SurfacePoint};
 use refine::{Hill, Peak};
 use roof::Roof;
@@ -45,6 +47,8 @@ pub struct DropCutter<'a> {
     mesh: &'a TriangleMesh,
     bvh: &'a Bvh,
     exact: Option<&'a dyn ExactSurface>,
+    /// How far the part may be off the mesh, mm.
+    deviation: f64,
     /// The cutter's own profile.
     profile: Profile,
     /// The profile that is dropped onto the mesh: the cutter's own on a mesh part, a grown one
@@ -131,8 +135,8 @@ impl<'a> DropCutter<'a> {
         monitor: &dyn Monitor,
     ) -> Result<Self, Cancelled> {
         let profile = Profile::of(cutter, 0.0);
-        let search =
-            exact.map_or(profile, |(_, deviation)| Profile::of(cutter, DEVIATION_MARGIN * deviation));
+        let deviation = exact.map_or(0.0, |(_, deviation)| DEVIATION_MARGIN * deviation);
+        let search = if exact.is_some() { Profile::of(cutter, deviation) } else { profile };
         let domains = if exact.is_none() { domain::domains(mesh, &search, monitor)? } else { Vec::new() };
         let facets = work::parallel::try_map(bvh.slots(), |slot| {
             monitor::check(monitor)?;
@@ -161,7 +165,16 @@ impl<'a> DropCutter<'a> {
             Cull::Roofs(Paired::from_values(&roofs(mesh, bvh, &search, monitor)?))
         };
         monitor::check(monitor)?;
-        Ok(Self { mesh, bvh, exact: exact.map(|(surface, _)| surface), profile, search, facets, cull })
+        Ok(Self {
+            mesh,
+            bvh,
+            exact: exact.map(|(surface, _)| surface),
+            deviation,
+            profile,
+            search,
+            facets,
+            cull,
+        })
     }
 
     /// Highest tip position over `(x, y)` at which the cutter touches the part without cutting into

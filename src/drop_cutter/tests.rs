@@ -42,7 +42,12 @@ fn mesh_of(vertices: Vec<Point3>, triangles: Vec<[u32; 3]>) -> TriangleMesh {
 }
 
 /// A grid of `n × n` quads over a square of side `size`, jittered in the plan view.
-fn height_field(n: u32, size: f64, jitter: f64, mut height: impl FnMut(f64, f64) -> f64) -> TriangleMesh {
+pub(super) fn height_field(
+    n: u32,
+    size: f64,
+    jitter: f64,
+    mut height: impl FnMut(f64, f64) -> f64,
+) -> TriangleMesh {
     let mut numbers = Numbers(5);
     let step = size / f64::from(n);
     let vertices = (0..(n + 1) * (n + 1)).map(|i| {

@@ -32,15 +32,30 @@ impl ScalarSpline {
 
     /// Value and first derivatives `[f, f_u, f_v]`; parameters are clamped to the domain.
     pub fn value_and_gradient(&self, u: f64, v: f64) -> [f64; 3] {
-        let (first_u, bu) = self.knots_u.basis_derivatives(u, 1);
-        let (first_v, bv) = self.knots_v.basis_derivatives(v, 1);
+        match (self.knots_u.degree(), self.knots_v.degree()) {
+            // Stream functions are cubic.
+            (3, 3) => {
+                self.combine(self.knots_u.basis_and_slopes::<4>(u), self.knots_v.basis_and_slopes::<4>(v))
+            }
+            _ => self.combine(self.knots_u.basis_derivatives(u, 1), self.knots_v.basis_derivatives(v, 1)),
+        }
+    }
+
+    /// From the first basis function along u and v with their values, `[0]`, and slopes, `[1]`.
+    #[inline(always)]
+    fn combine<const N: usize, const ROWS: usize>(
+        &self,
+        (first_u, bu): (usize, [[f64; N]; ROWS]),
+        (first_v, bv): (usize, [[f64; N]; ROWS]),
+    ) -> [f64; 3] {
         let nu = self.knots_u.control_count();
+        let (pu, pv) = (self.knots_u.degree().min(N - 1), self.knots_v.degree().min(N - 1));
         let mut out = [0.0; 3];
-        for j in 0..=self.knots_v.degree() {
+        for j in 0..=pv {
             let row = (first_v + j) * nu + first_u;
+            let coefficients = &self.coefficients[row..=row + pu];
             let (mut value, mut slope) = (0.0, 0.0);
-            for i in 0..=self.knots_u.degree() {
-                let c = self.coefficients[row + i];
+            for (i, c) in coefficients.iter().enumerate() {
                 value += c * bu[0][i];
                 slope += c * bu[1][i];
             }

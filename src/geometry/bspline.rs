@@ -236,8 +236,30 @@ impl KnotVector {
         (span - p, out)
     }
 
+    /// As [`KnotVector::basis_derivatives`] of first order, where the number `N` of basis functions, one more than the
+    /// degree, is known to the compiler: the same bits in a fraction of the time.
+    ///
+    /// # Panics
+    /// Where `N` is another number.
+    #[inline]
+    pub fn basis_and_slopes<const N: usize>(&self, u: f64) -> (usize, [[f64; N]; 2]) {
+        assert_eq!(N, self.degree + 1, "the number of basis functions is one more than the degree");
+        let u = self.clamp(u);
+        let span = self.span(u);
+        let (mut values, mut slopes) = ([0.0; N], [0.0; N]);
+        values[0] = 1.0;
+        for k in 1..N {
+            if k == N - 1 {
+                slopes = self.differentiate(&values, k, span);
+            }
+            self.raise(&mut values, k, span, u);
+        }
+        (span + 1 - N, [values, slopes])
+    }
+
     /// From the basis of degree `k - 1` to that of degree `k`, in place.
-    fn raise(&self, values: &mut [f64; MAX_BASIS], k: usize, span: usize, u: f64) {
+    #[inline(always)]
+    fn raise<const N: usize>(&self, values: &mut [f64; N], k: usize, span: usize, u: f64) {
         let mut saved = 0.0;
         for r in 0..k {
             let right = self.knots[span + r + 1];
@@ -252,8 +274,9 @@ impl KnotVector {
 
     /// Derivatives of what the basis of degree `k` combines from `lower`, the values (or
     /// derivatives) of degree `k - 1` (Piegl & Tiller eq. 2.7).
-    fn differentiate(&self, lower: &[f64; MAX_BASIS], k: usize, span: usize) -> [f64; MAX_BASIS] {
-        let mut out = [0.0; MAX_BASIS];
+    #[inline(always)]
+    fn differentiate<const N: usize>(&self, lower: &[f64; N], k: usize, span: usize) -> [f64; N] {
+        let mut out = [0.0; N];
         let mut before = 0.0;
         for r in 0..k {
             let width = self.knots[span + r + 1] - self.knots[span + r + 1 - k];

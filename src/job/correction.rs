@@ -20,6 +20,7 @@ use scene::ToolpathRequest;
 use toolpath::{Correction, Earlier, Step, plane_interval};
 use work::monitor::{self, Monitor};
 
+use super::figures::LeastLeftFigures;
 use super::judge::highest_reached;
 use super::measuring::Closeness;
 use super::planned::Planned;
@@ -364,6 +365,9 @@ impl Corrected<'_> {
 
     /// Plans anew while what the verdict is made of stands above the target.
     fn by_measurements(&mut self, measured: Measured, monitor: &dyn Monitor) -> Result<Measured, JobError> {
+        if self.is_unavoidable(&measured.measurement, monitor)? {
+            return Ok(measured);
+        }
         let (mut measured, mut in_vain) = (Some(measured), 0);
         for round in 0..MOST_MEASURED_NEAR {
             if round >= MOST_MEASURED && !self.is_near() {
@@ -391,6 +395,16 @@ impl Corrected<'_> {
                 self.measure_best(monitor)
             }
         }
+    }
+
+    /// Whether the best plan leaves what every path of the cutter leaves.
+    fn is_unavoidable(&self, measured: &Measurement, monitor: &dyn Monitor) -> Result<bool, JobError> {
+        if self.standing.round.holds(&self.goal) {
+            return Ok(false);
+        }
+        let (session, path) = (self.session, &self.best.plan.path);
+        let cutter = &session.scene.cutter;
+        Ok(LeastLeftFigures::above_limit(session, cutter, path, measured, monitor)?.is_some())
     }
 
     /// Whether the best plan stands above the target, but little.

@@ -262,9 +262,13 @@ fn read_tolerance(section: &Section<'_>) -> Result<Limits, SceneError> {
         gouge: length("gouge", DEFAULT_LIMITS.gouge)?,
         // What ridges may be, other material may be as well where nothing is said of it.
         uncut: length("uncut", DEFAULT_LIMITS.uncut.max(highest))?,
-        chord: length("chord", DEFAULT_LIMITS.chord)?,
+        // A tenth of the ridges at most: what chords leave or cut stands beside them.
+        chord: length("chord", DEFAULT_LIMITS.chord.min(CHORD_SHARE * scallop))?,
     })
 }
+
+/// Of the scallop tolerance: the chord tolerance where none is given and the scallop tolerance is small.
+const CHORD_SHARE: f64 = 0.1;
 
 /// Limits of how far passes may be off their directions, degrees: none is off by more than a right angle.
 const OFF_DIRECTION: std::ops::RangeInclusive<f64> = 0.0..=90.0;

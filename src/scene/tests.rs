@@ -367,6 +367,22 @@ fn the_auto_cell_is_a_round_number() {
 }
 
 #[test]
+fn chords_are_a_tenth_of_small_scallops_unless_the_scene_says() {
+    let chord = |tolerance: &str| {
+        let text = format!(
+            "[part]\nsurface = \"plane\"\nx = [0, 8]\ny = [0, 6]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n\
+             [tolerance]\n{tolerance}\n[[toolpath]]\nstrategy = \"zigzag\"\n"
+        );
+        Scene::parse("a.toml", text).unwrap().tolerance.chord
+    };
+    assert_eq!(
+        [chord(""), chord("scallop = 0.1"), chord("scallop = 0.002\nchord = 0.003")],
+        [0.001, 0.001, 0.003]
+    );
+    assert!((chord("scallop = 0.0003") - 0.000_03).abs() < 1e-12);
+}
+
+#[test]
 fn the_error_bound_is_a_tenth_of_the_least_tolerance_unless_the_scene_says() {
     let text = |tolerance: &str, simulation: &str| {
         format!(

@@ -8,6 +8,7 @@ mod entries;
 mod equal_time;
 mod feeds;
 mod field;
+mod least_left;
 mod machine;
 mod offset;
 mod pairs;
@@ -25,6 +26,8 @@ mod words;
 use report::{Claim, Figure, FigureFile, Verdict};
 use work::monitor::{self, Monitor};
 
+pub(crate) use least_left::LeastLeftFigures;
+
 use super::JobError;
 use super::run::{Finding, Run};
 
@@ -32,8 +35,9 @@ use super::run::{Finding, Run};
 type Find = fn(&Run<'_>, &dyn Monitor) -> Result<Finding, JobError>;
 
 /// All figures, in the order of report.json.
-const FIGURES: [Find; 18] = [
+const FIGURES: [Find; 19] = [
     coverage::find,
+    least_left::find,
     shortest::find,
     correction::find,
     equal_time::find,

@@ -1,0 +1,187 @@
+//! What a cutter leaves at a place of the part, wherever it stands.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use super::{Beside, DropCutter};
+use cutter::Cutter;
+use geometry::Point3;
+use work::monitor::{self, Cancelled, Monitor};
+
+/// The least height, mm along z, that an upright cutter leaves above a place without cutting into the part.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LeastLeft {
+    /// What the best position that was found leaves.
+    pub height: f64,
+    /// By how much another position may leave less.
+    pub bound: f64,
+}
+
+/// Positions that are tried. Where they do not tell, nothing is said.
+const MOST: usize = 20_000;
+
+/// The bound that the search ends at, as a share of the height.
+const CLOSE: f64 = 0.01;
+
+/// Positions of the tip over a square of the plan.
+struct Square {
+    middle: [f64; 2],
+    half: f64,
+    /// No position in it leaves less, mm.
+    least: f64,
+}
+
+impl DropCutter<'_> {
+    /// What `cutter`, which this was made for, leaves at least above the place `at` of the part; `None` where that is not
+    /// proven to be more than `more_than`, mm.
+    ///
+    /// A branch and bound over all positions that cover the place. A cutter that touches the part at a contact comes no
+    /// lower than this contact from any position nearby, either; that bounds a whole square.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn least_left(
+        &self,
+        cutter: &Cutter,
+        at: &Point3,
+        more_than: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<LeastLeft>, Cancelled> {
+        let radius = cutter.radius();
+        let height = |rho: f64| cutter.height(rho).unwrap_or(f64::INFINITY);
+        let mut found = f64::INFINITY;
+        let mut beside = Beside::default();
+        let mut square = |middle: [f64; 2], half: f64, found: &mut f64| {
+            let away = |x: f64, y: f64| (middle[0] - x).hypot(middle[1] - y);
+            let (off, corner) = (away(at.x, at.y), std::f64::consts::SQRT_2 * half);
+            if off - corner > radius {
+                return None;
+            }
+            let mut least = f64::NEG_INFINITY;
+            if let Some(drop) = self.at_beside(middle[0], middle[1], &mut beside) {
+                *found = found.min(drop.tip_z + height(off) - at.z);
+                let contact = drop.contact.point;
+                let carried = |z: f64, rho: f64| z - height(rho + corner);
+                let rho = away(contact.x, contact.y);
+                let mut tip = carried(contact.z, rho);
+                // The rim of a flat leaves the contact at once; a place of the part a little further in stays below it.
+                let inner = (radius - corner).min(rho);
+                if rho + corner > radius && inner > 0.0 {
+                    let along = |from: f64, to: f64| from + (to - from) * inner / rho;
+                    let (x, y) = (along(middle[0], contact.x), along(middle[1], contact.y));
+                    if let Some(hit) = self.bvh.highest_at(self.mesh, x, y) {
+                        let level = self.mesh.normal(hit.triangle as usize).z;
+                        tip = tip.max(carried(hit.z - self.deviation / level.max(f64::MIN_POSITIVE), inner));
+                    }
+                }
+                least = tip + height((off - corner).max(0.0)) - at.z;
+            }
+            Some(Square { middle, half, least })
+        };
+        let mut open: BinaryHeap<Square> = square([at.x, at.y], radius, &mut found).into_iter().collect();
+        for tried in 0.. {
+            let Some(lowest) = open.pop() else { break };
+            if found <= more_than || tried >= MOST && lowest.least <= more_than {
+                return Ok(None);
+            }
+            if lowest.least >= found - CLOSE * found || tried >= MOST {
+                return Ok(Some(LeastLeft { height: found, bound: (found - lowest.least).max(0.0) }));
+            }
+            if tried % 64 == 0 {
+                monitor::check(monitor)?;
+            }
+            let (half, [x, y]) = (0.5 * lowest.half, lowest.middle);
+            for [right, up] in [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]] {
+                open.extend(square([x + right * half, y + up * half], half, &mut found));
+            }
+        }
+        Ok(None)
+    }
+}
+
+impl Ord for Square {
+    /// The one that may leave least is the greatest: a heap hands it out first.
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.least.total_cmp(&self.least)
+    }
+}
+
+impl PartialOrd for Square {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Square {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Square {}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{cutters, height_field};
+    use super::*;
+    use geometry::Bvh;
+    use work::monitor::Silent;
+
+    fn left(cutter: &Cutter, at: [f64; 2], more_than: f64, z: impl Fn(f64, f64) -> f64) -> Option<LeastLeft> {
+        let mesh = height_field(120, 12.0, 0.0, &z);
+        let bvh = Bvh::new(&mesh);
+        let drop = DropCutter::over(&mesh, &bvh, cutter, None, &Silent).unwrap();
+        let place = bvh.highest_at(&mesh, at[0], at[1]).unwrap();
+        drop.least_left(cutter, &Point3::new(at[0], at[1], place.z), more_than, &Silent).unwrap()
+    }
+
+    /// In the middle of a hollow cylinder of 30 mm a flat of 1.5 mm in radius rests on its corner: the closed form of the
+    /// section. A ball and a short flat reach the ground.
+    #[test]
+    fn a_flat_stands_above_the_ground_of_a_hollow() {
+        let hollow = |x: f64, _: f64| 30.0 - (900.0 - (x - 6.0).powi(2)).sqrt();
+        let bull = Cutter::bull(6.0, 1.5).unwrap();
+        let stands = 30.0 - 1.5 - (28.5f64.powi(2) - 1.5f64.powi(2)).sqrt();
+        // A chord of the mesh lies this far above the arc.
+        let chord = 0.1f64.powi(2) / 8.0 / 30.0;
+        let found = left(&bull, [6.0, 6.0], 0.01, hollow).unwrap();
+        assert!(found.bound <= 0.01 * found.height, "{found:?}");
+        assert!(found.height >= stands - chord, "{found:?} {stands}");
+        assert!(found.height - found.bound <= stands + chord, "{found:?} {stands}");
+        // Of an end mill the edge rests where it is.
+        let flat = Cutter::flat(6.0).unwrap();
+        let stands = 30.0 - (900.0f64 - 9.0).sqrt();
+        let found = left(&flat, [6.0, 6.0], 0.01, hollow).unwrap();
+        assert!(found.height - found.bound <= stands + chord && found.height >= stands - chord, "{found:?}");
+        assert_eq!(left(&Cutter::ball(6.0).unwrap(), [6.0, 6.0], 1e-3, hollow), None);
+        assert_eq!(left(&bull, [6.0, 6.0], 1.01 * (stands + chord), hollow), None);
+    }
+
+    /// No position on a dense raster leaves less than what is told, at any place, of any cutter.
+    #[test]
+    fn no_position_leaves_less() {
+        let rough = |x: f64, y: f64| 0.8 * (1.3 * x).sin() * (1.1 * y).cos() + 0.3 * (2.9 * x + y).sin();
+        let mesh = height_field(60, 12.0, 0.2, rough);
+        let bvh = Bvh::new(&mesh);
+        let mut told = 0;
+        for cutter in cutters() {
+            let drop = DropCutter::over(&mesh, &bvh, &cutter, None, &Silent).unwrap();
+            for at in [[4.1, 5.2], [7.3, 6.9], [6.0, 3.3]] {
+                let z = bvh.highest_at(&mesh, at[0], at[1]).unwrap().z;
+                let place = Point3::new(at[0], at[1], z);
+                let Some(least) = drop.least_left(&cutter, &place, 0.005, &Silent).unwrap() else { continue };
+                told += 1;
+                let n = 60;
+                for k in 0..n * n {
+                    let of =
+                        |k: usize| (2.0 * (k as f64 + 0.5) / f64::from(n as u32) - 1.0) * cutter.radius();
+                    let (dx, dy) = (of(k % n), of(k / n));
+                    let Some(up) = cutter.height(dx.hypot(dy)) else { continue };
+                    let leaves = drop.at(at[0] + dx, at[1] + dy).unwrap().tip_z + up - z;
+                    assert!(leaves >= least.height - least.bound - 1e-9, "{cutter:?} {leaves} {least:?}");
+                }
+            }
+        }
+        assert!(told >= 6, "{told} places were told");
+    }
+}

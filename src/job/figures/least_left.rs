@@ -1,0 +1,114 @@
+//! What the cutter leaves at the highest place wherever it stands: the reason where no path can hold the limit.
+
+use serde::Serialize;
+
+use cutter::Cutter;
+use drop_cutter::DropCutter;
+use geometry::Point3;
+use metrology::{Limits, Measurement};
+use motion::Toolpath;
+use report::{Figure, micrometres, place, with_bound};
+use work::monitor::Monitor;
+
+use super::words::value;
+use crate::judge::highest_reached;
+use crate::run::{Finding, Run};
+use crate::{JobError, Session};
+
+/// The least that an upright cutter leaves at the highest place without cutting into the part.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(crate) struct LeastLeftFigures {
+    /// Along z.
+    height_mm: f64,
+    error_bound_mm: f64,
+    at_mm: [f64; 3],
+    limit_mm: f64,
+}
+
+/// Of the normal's z. Where the part is steeper, heights along z say little.
+const LEAST_LEVEL: f64 = 0.2;
+
+impl LeastLeftFigures {
+    /// `None` where the highest material holds its limit, or may hold it after another path of this cutter.
+    pub fn above_limit(
+        session: &Session,
+        cutter: &Cutter,
+        path: &Toolpath,
+        measurement: &Measurement,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Self>, JobError> {
+        let (part, scene) = (&session.part, &session.scene);
+        let Limits { scallop, uncut, .. } = scene.tolerance;
+        let ridge = (highest_reached(measurement), scene.scallop_rule.highest * scallop);
+        let violated = [ridge, (measurement.excess.unreached, uncut)]
+            .into_iter()
+            .find(|(material, limit)| material.max_mm - material.error_bound_mm > *limit)
+            .and_then(|(material, limit)| Some((material.at_mm?, limit)));
+        let Some((at, limit)) = violated.filter(|_| path.is_upright()) else { return Ok(None) };
+        let (design, _) = part.closest_point(&Point3::from(at));
+        if design.normal.z < LEAST_LEVEL {
+            return Ok(None);
+        }
+        let drop = DropCutter::watched(part, cutter, monitor)?;
+        let left = drop.least_left(cutter, &design.point, limit / design.normal.z, monitor)?;
+        Ok(left.map(|left| Self {
+            height_mm: left.height,
+            error_bound_mm: left.bound,
+            at_mm: design.point.into(),
+            limit_mm: limit,
+        }))
+    }
+}
+
+pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
+    let cutters = run.cutters();
+    if cutters.are_several() {
+        return Ok(Finding::default());
+    }
+    let (path, measurement) = (run.path(), run.measurement());
+    let left = LeastLeftFigures::above_limit(run.session, cutters.first(), path, measurement, monitor)?;
+    let Some(left) = left else { return Ok(Finding::default()) };
+    let height = with_bound(Some(left.height_mm), Some(left.error_bound_mm));
+    let note = format!(
+        "no path of this cutter, upright, holds {} µm: at {} it leaves {height} µm along z wherever it stands. The part is too \
+         hollow there; take a smaller cutter, one with a smaller flat, or tilt it (`axis`)",
+        micrometres(Some(left.limit_mm)),
+        place(left.at_mm),
+    );
+    let figure = Figure { key: "least_left", value: value(&left)?, ..Figure::default() };
+    Ok(Finding { figure: Some(figure), notes: vec![note], ..Finding::default() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scene::Scene;
+    use work::monitor::Silent;
+
+    /// A bull nose in a hollow cylinder: its flat stands on its corner at the height that the section gives in closed form.
+    /// A ball of the same size says nothing.
+    #[test]
+    fn what_a_flat_leaves_in_a_hollow_is_told_and_not_corrected() {
+        let result = |cutter: &str| {
+            let text = format!(
+                "[part]\nsurface = \"cylinder\"\nradius = 30\nconcave = true\nx = [-4, 4]\ny = [-4, 4]\n[cutter]\n\
+                 {cutter}\ndiameter = 6\n[tolerance]\nscallop = 0.03\nuncut = 0.03\n[[toolpath]]\nstrategy = \"iso-parametric\"\n"
+            );
+            let session = Session::new(Scene::parse("hollow.toml", text).unwrap()).unwrap();
+            session.toolpath(&session.scene.toolpaths[0], &Silent).unwrap().result
+        };
+        let value = |result: &report::ToolpathResult, key: &str| {
+            result.figures.iter().find(|figure| figure.key == key).map(|figure| figure.value.clone())
+        };
+        let bull = result("shape = \"bull\"\ncorner_radius = 1.5");
+        let left = value(&bull, "least_left").unwrap();
+        let [height, bound] = ["height_mm", "error_bound_mm"].map(|key| left[key].as_f64().unwrap());
+        let stands = 28.5 - (28.5f64.powi(2) - 1.5f64.powi(2)).sqrt();
+        // Beside the middle the part is higher, so that less stands.
+        assert!(height > 0.03 && height - bound <= stands, "{height} {bound} {stands}");
+        assert!(bull.notes.iter().any(|note| note.contains("wherever it stands")), "{:?}", bull.notes);
+        let rounds = value(&bull, "correction").unwrap()["rounds"].as_array().unwrap().len();
+        assert!(rounds <= 6, "{rounds} rounds");
+        assert!(value(&result("shape = \"ball\""), "least_left").is_none());
+    }
+}
