@@ -1,8 +1,11 @@
 //! The deepest cut along the borders of what an upright cutter can face: a cutter that stands beside the part may cut its
 //! border between the centres of all cells. mm.
 //!
-//! Along a straight piece of a border, of a triangle with the normal n, the depth of one move along n is a concave function of
-//! the place: what the move sweeps is convex. So three places bound it between them, and halving finds its greatest.
+//! Along a straight piece of a border, of a triangle with the normal n, the depth of one move along n (or any one direction) is a
+//! concave function of the place: what the move sweeps is convex. So three places bound it between them, and halving finds its greatest.
+//!
+//! The part ends at a border as at a vertical wall. Where the normal leads out through it, the depth is that along the wall: what lies
+//! beyond belongs to no part.
 //!
 //! Limits: where only the side of the cutter reaches over the border, by less than the gouge tolerance, nothing is deeper than
 //! that; such places are left out.
@@ -51,6 +54,17 @@ struct BorderCut {
 impl BorderPiece {
     fn at(&self, share: f64) -> Point3 {
         self.ends[0] + (self.ends[1] - self.ends[0]) * share
+    }
+
+    /// The direction that depths at a place with a normal are measured against: the normal, without what of it would lead down
+    /// through the border.
+    fn upward(&self, normal: &Vector3) -> Vector3 {
+        let along = self.ends[1] - self.ends[0];
+        let across = Vector3::new(-along.y, along.x, 0.0);
+        let inward = across * across.dot(&self.inward).signum();
+        let leading_out = normal.dot(&inward).max(0.0);
+        let upward = normal - inward * (leading_out / inward.norm_squared().max(f64::MIN_POSITIVE));
+        upward.try_normalize(0.0).unwrap_or(*normal)
     }
 
     /// The piece is no nearer to a stretch of the plan, mm.
@@ -125,7 +139,7 @@ impl Nearby {
     }
 }
 
-/// How deep a move cuts at a place along a normal, negative above it; `None` where it does not pass.
+/// How deep a move cuts at a place along a direction, negative above it; `None` where it does not pass.
 fn depth(surface: &CutSurface<'_>, by: u32, place: &Point3, normal: &Vector3) -> Option<f64> {
     let mut t = 0.0;
     for _ in 0..STEPS {
@@ -218,7 +232,7 @@ impl Inspection<'_> {
             // The side alone does not reach so far.
             let inside = place + piece.inward * self.limits.gouge;
             self.surface.envelope.height(by, inside.x, inside.y)?;
-            depth(self.surface, by, &place, &normal)
+            depth(self.surface, by, &place, &piece.upward(&normal))
         };
         // What a border bends by between two places spoils concavity by as much; it falls with the square of their distance.
         let bend = if is_patch { 2.0 * self.part.mesh_deviation() } else { 0.0 };
@@ -289,28 +303,34 @@ mod tests {
     use crate::figures::Limits;
     use crate::flat_scene::{path, plane};
     use crate::{Asked, measure};
+    use geometry::TriangleMesh;
+    use part::Part;
     use sim::{Grid, ZMap, cut};
     use work::monitor::Silent;
 
     const LIMITS: Limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.001 };
 
     fn gouge(cutter: &Cutter, plunge: Point3, cell: f64) -> GougeFigures {
-        let part = plane([8.0, 6.0]);
         let lines = (0..13).map(|k| 0.5 * f64::from(k));
         let mut passes: Vec<Vec<Point3>> =
             lines.map(|y| [-5.0, 13.0].map(|x| Point3::new(x, y, 0.0)).to_vec()).collect();
         passes.push(vec![Point3::new(plunge.x, plunge.y, 10.0), plunge]);
-        let path = path(&passes);
+        gouge_of(&plane([8.0, 6.0]), cutter, &passes, cell)
+    }
+
+    fn gouge_of(part: &Part, cutter: &Cutter, passes: &[Vec<Point3>], cell: f64) -> GougeFigures {
+        let path = path(passes);
+        let top = part.bounds().max.z + 1.0;
         let grid = Grid::covering(&part.bounds(), cell, 64, 1 << 30).unwrap();
-        let cut = cut(ZMap::block(grid, 1.0), cutter, &path, &Silent).unwrap();
+        let cut = cut(ZMap::block(grid, top), cutter, &path, &Silent).unwrap();
         let asked = Asked {
             error_bound: 5e-4,
-            stock_top: 1.0,
+            stock_top: top,
             borders: true,
             most_cells: 1 << 20,
             most_squares: 1 << 20,
         };
-        measure(&part, cutter, &path, &cut, &LIMITS, &asked, &Silent).unwrap().gouge
+        measure(part, cutter, &path, &cut, &LIMITS, &asked, &Silent).unwrap().gouge
     }
 
     /// A ball plunges beside the part: the border is cut by what its sphere reaches over it, on cells of every size.
@@ -334,6 +354,24 @@ mod tests {
                     assert_eq!(found.regions[0].move_index as usize, 27, "{found:?}");
                 }
             }
+        }
+    }
+
+    /// A ball beside a border that the part rises to: the normal leads out over the border, nearly along the ball's flank, and
+    /// would find a depth many times that of the cut. It is that along the border's wall.
+    #[test]
+    fn depths_do_not_lead_out_over_a_border() {
+        let rising = TriangleMesh::new(
+            [[0.0, 0.0, 3.6], [8.0, 0.0, 0.0], [0.0, 6.0, 3.6], [8.0, 6.0, 0.0]].map(Point3::from).to_vec(),
+            vec![[0, 1, 2], [1, 3, 2]],
+        );
+        let part = Part::from_mesh(rising.unwrap().0);
+        for (beside, deep) in [(2.72, 0.0004), (2.6, 0.02)] {
+            let tip = 3.6 - (3.0 - (9.0f64 - beside * beside).sqrt()) - deep;
+            let plunge = vec![Point3::new(-beside, 3.0, 10.0), Point3::new(-beside, 3.0, tip)];
+            let found = gouge_of(&part, &Cutter::ball(6.0).unwrap(), &[plunge], 0.1);
+            let off = (found.max_depth_mm - deep).abs();
+            assert!(off <= found.error_bound_mm + 1e-6 && off < 1e-5, "{beside} {deep}: {found:?}");
         }
     }
 
