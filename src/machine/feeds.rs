@@ -101,7 +101,7 @@ fn slowed(
 }
 
 /// The least feed of the series that goes down from `feed` which is no lower than `speed`, mm/s.
-fn in_series(speed: f64, feed: f64) -> f64 {
+pub(super) fn in_series(speed: f64, feed: f64) -> f64 {
     if speed >= feed {
         return feed;
     }

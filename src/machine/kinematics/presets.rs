@@ -70,6 +70,7 @@ pub fn preset(name: &str) -> Option<[RotaryAxis; 2]> {
         limits,
         rate: DEFAULT_ROTARY_RATE,
         acceleration: DEFAULT_ROTARY_ACCELERATION,
+        jerk: f64::INFINITY,
     }))
 }
 
