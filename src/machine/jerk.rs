@@ -10,16 +10,19 @@
 use super::axis_limits::{AxisLimits, Stage};
 
 /// By how much the times found may lie above the least that the barrier can reach, as a share.
-const GAP: f64 = 1e-3;
+const GAP: f64 = 2e-3;
 
 /// The same of the convex problem.
 const FIRST_GAP: f64 = 0.02;
+
+/// Promises of steps, as a share of the gap, that end the search for one weight.
+const CENTRED: f64 = 0.05;
 
 /// The weight of the barrier over the one before.
 const WEIGHTS: f64 = 0.15;
 
 /// Newton steps for one weight at most.
-const MOST_STEPS: usize = 60;
+const MOST_STEPS: usize = 40;
 
 /// Squared speeds, mm²/s², below which the machine stands.
 const REST: f64 = 1e-18;
@@ -106,8 +109,10 @@ impl Section<'_> {
         self.slacks(x, &mut |_| limits += 1);
         let mut weight = self.time(x) / limits as f64;
         loop {
+            // What a step promises less than that is a small share of what the weight itself keeps away from the least time.
+            let little = CENTRED * weight * limits as f64;
             for _ in 0..MOST_STEPS {
-                if self.step(x, weight) < weight {
+                if self.step(x, weight) < little {
                     break;
                 }
             }

@@ -45,7 +45,7 @@ const RATES: std::ops::RangeInclusive<f64> = 1.0..=1e6;
 const ACCELERATIONS: std::ops::RangeInclusive<f64> = 1.0..=1e6;
 
 /// Jerks of linear axes, mm/s³.
-const JERKS: std::ops::RangeInclusive<f64> = 1.0..=1e8;
+const JERKS: std::ops::RangeInclusive<f64> = 1.0..=1e6;
 
 const SIDES: [&str; 2] = ["head", "table"];
 
@@ -401,7 +401,7 @@ mod tests {
         let any = "[machine.kinematics]\nx = [-1, 2.5]\nfirst = { name = \"C\", side = \"table\", \
                    direction = [0.1, 0.3, 1], limits = [-7200, 7200] }\nsecond = { name = \"B\", side = \"head\", \
                    direction = [0.123456789012345, 1, 0.7], point = [1, 2, 3.3], rate = 1e7, jerk = 999, limits = [-0.1, 33.3] }\n\
-                   jerks = [7e4, 1, 1e8]\n";
+                   jerks = [7e4, 1, 1e6]\n";
         let named = PRESETS.iter().map(|name| format!("kinematics = \"{name}\"\n"));
         for text in named.chain([any.to_owned(), String::new()]) {
             let complete = complete_toml(&parse(&text).unwrap());
