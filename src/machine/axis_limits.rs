@@ -11,7 +11,7 @@
 //! Lengths in mm, speeds in mm/s; axes in mm or rad.
 
 use super::Machine;
-use super::feeds::in_series;
+use super::feeds::{ANY_RATE, in_series};
 use super::jerk;
 use super::kinematics::{JointPath, Joints, Kinematics, Turn};
 use super::time::{Block, NO_MOVE, SECONDS_PER_MINUTE, profile};
@@ -172,6 +172,8 @@ fn linear(blocks: &[Block], machine: &Machine) -> Run {
 /// path for which no time can be told.
 pub fn slow_axes(path: &Toolpath, machine: &Machine, on_axes: Option<(&Kinematics, &JointPath)>) -> Toolpath {
     let mut path = path.clone();
+    // Words that slow down what is short anyway would only be more lines to run.
+    let machine = &Machine { block_rate: ANY_RATE, ..*machine };
     let Some(blocks) = profile(&path, machine) else { return path };
     let run = match on_axes {
         Some((kinematics, joints)) => {

@@ -24,7 +24,7 @@ const SHARP: f64 = std::f64::consts::PI / 6.0;
 const HARDLY_SLOWER: f64 = 0.9;
 
 /// Lines a second that no path asks for.
-const ANY_RATE: f64 = 1e12;
+pub(super) const ANY_RATE: f64 = 1e12;
 
 const SECONDS_PER_MINUTE: f64 = 60.0;
 
