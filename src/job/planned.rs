@@ -5,7 +5,7 @@ use std::sync::Arc;
 use io::ProgramHeader;
 use io::gcode::{self, FiveAxisPost, MoveLines};
 use machine::kinematics::{JointPath, Kinematics, follow};
-use machine::{axes_at_most, machining_time, machining_time_of_axes, slow_corners};
+use machine::{axes_at_most, machining_time, machining_time_of_axes, slow_axes, slow_corners};
 use metrology::{FastestTurn, contact_arcs, fastest_turn, fastest_turn_across};
 use motion::{Move, MoveKind, Toolpath};
 use scene::{AxisRequest, Scene, ToolpathRequest};
@@ -101,6 +101,10 @@ impl Session {
         };
         let (mut plan, engaged) = within_engagement(planned(&*strategy)?, &*strategy, &planned)?;
         let joints = joints(scene, &request.name, &plan.path)?;
+        if scene.machine.slow_corners {
+            let kinematics = scene.five_axis.as_ref().map(|five_axis| &five_axis.kinematics);
+            plan.path = slow_axes(&plan.path, &scene.machine, kinematics.zip(joints.as_ref()));
+        }
         plan.path.origin.lines = lines(scene, &plan.path, joints.as_ref())?;
         Ok(Planned { plan, strategy, joints, engaged, correction: None, equal_time: None })
     }

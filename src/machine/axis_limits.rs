@@ -6,10 +6,13 @@
 //! one sweep backward, for what can still be braked, and one forward, for what can have been reached (H. Pham and Q.-C. Pham,
 //! "A new approach to time-optimal path parameterization based on reachability analysis", 2018).
 //!
-//! u is constant within a stage. At a corner q′ changes over half of the pieces beside it, as in [`super::time`].
+//! u is constant within a stage. At a corner q′ changes over half of the pieces beside it, as in [`super::time`]. Where axes have
+//! a limit of jerk, [`super::jerk`] lowers the speeds further. [`slow_axes`] writes the speeds into the feeds of a path.
 //! Lengths in mm, speeds in mm/s; axes in mm or rad.
 
 use super::Machine;
+use super::feeds::{ANY_RATE, in_series};
+use super::jerk;
 use super::kinematics::{JointPath, Joints, Kinematics, Turn};
 use super::time::{Block, NO_MOVE, SECONDS_PER_MINUTE, profile};
 use motion::Toolpath;
@@ -19,6 +22,9 @@ const HALVINGS: usize = 40;
 
 /// Stages of a ramp from rest to the feed. Speed rises by steps of a sixteenth of its square.
 const RAMP: f64 = 16.0;
+
+/// Pieces between which axes change their pace by less than this share of it belong to a bend.
+const SMOOTH: f64 = 0.5;
 
 /// Rounding of accelerations over their limits.
 const ROUNDING: f64 = 1e-9;
@@ -40,33 +46,94 @@ struct EvenStretch {
     slope: [f64; 5],
     /// The tip stands before it, while rotary axes turn.
     after_stop: bool,
+    /// Length of the program's line that it belongs to.
+    line: f64,
 }
 
-/// What single axes allow: X, Y, Z and two rotary ones. Rates in mm/s or rad/s, accelerations in mm/s² or rad/s².
+impl EvenStretch {
+    /// The least of limits of the axes, as one along the tip's way.
+    fn least(&self, limits: &[f64; 5]) -> f64 {
+        limits.iter().zip(&self.slope).map(|(limit, slope)| limit / slope.abs()).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// What single axes allow: X, Y, Z and two rotary ones. Rates in mm/s or rad/s, accelerations in mm/s² or rad/s², jerks in mm/s³
+/// or rad/s³; what is infinite limits nothing.
 #[derive(Debug, Clone, Copy)]
-struct AxisLimits {
-    rates: [f64; 5],
-    accelerations: [f64; 5],
+pub(super) struct AxisLimits {
+    pub rates: [f64; 5],
+    pub accelerations: [f64; 5],
+    pub jerks: [f64; 5],
+    /// Acceleration along the path.
+    pub along: f64,
 }
 
 /// A part of a piece in which the tip accelerates evenly.
 #[derive(Debug, Clone, Copy)]
-struct Stage {
-    length: f64,
-    slope: [f64; 5],
+pub(super) struct Stage {
+    /// The move that it belongs to.
+    step: usize,
+    pub length: f64,
+    pub slope: [f64; 5],
     /// At its beginning and at its end: d²q/ds².
-    bends: [[f64; 5]; 2],
+    pub bends: [[f64; 5]; 2],
     /// Greatest squared speed at its beginning.
-    most: f64,
+    pub most: f64,
+    /// An axis in it has a limit of jerk.
+    pub jerk: bool,
 }
 
-/// Time for the whole path, s, on a machine whose axes keep their rates and accelerations, besides all that
+impl Stage {
+    /// Its time, s, between squared speeds. From and to rest an acceleration that rises evenly takes half as long again as an even
+    /// one.
+    pub fn time(&self, [begin, end]: [f64; 2]) -> f64 {
+        let even = 2.0 * self.length / (begin.sqrt() + end.sqrt());
+        if self.jerk && (begin == 0.0 || end == 0.0) { 1.5 * even } else { even }
+    }
+}
+
+/// How a path is run.
+struct Run {
+    stages: Vec<Stage>,
+    /// Squared speeds at the ends of all stages.
+    speeds: Vec<f64>,
+}
+
+impl Run {
+    fn new(pieces: &[EvenStretch], blocks: &[Block], machine: &Machine, axes: &AxisLimits) -> Self {
+        let stages = stages(pieces, blocks, machine, axes);
+        let speeds = speeds(&stages, axes);
+        let speeds = jerk::within(&stages, speeds, axes);
+        Self { stages, speeds }
+    }
+
+    /// s.
+    fn time(&self) -> f64 {
+        self.stages
+            .iter()
+            .zip(self.speeds.windows(2))
+            .map(|(stage, ends)| stage.time([ends[0], ends[1]]))
+            .sum()
+    }
+
+    /// The greatest speed within each of so many moves; 0 for moves of no length.
+    fn peaks(&self, moves: usize) -> Vec<f64> {
+        let mut peaks = vec![0.0f64; moves];
+        for (stage, ends) in self.stages.iter().zip(self.speeds.windows(2)) {
+            if let Some(peak) = peaks.get_mut(stage.step) {
+                *peak = peak.max(ends[0].max(ends[1]).sqrt());
+            }
+        }
+        peaks
+    }
+}
+
+/// Time for the whole path, s, on a machine whose axes keep their rates, accelerations and jerks, besides all that
 /// [`super::machining_time`] looks at. The machine stops where rotary axes turn about a tip that stands; rises for rewinds are
 /// not counted. Infinite where [`super::machining_time`] is.
 ///
 /// # Tolerance
-/// A model: stages that accelerate evenly take up to a few percent of a ramp longer than the quickest motion. Jerk is limited at
-/// bends only.
+/// A model: stages that accelerate evenly take up to a few percent of a ramp longer than the quickest motion.
 pub fn machining_time_of_axes(
     path: &Toolpath,
     machine: &Machine,
@@ -74,30 +141,57 @@ pub fn machining_time_of_axes(
     joints: &JointPath,
 ) -> f64 {
     let Some(blocks) = profile(path, machine) else { return f64::INFINITY };
-    let (pieces, standing) = pieces(path, kinematics, joints);
-    let axes = AxisLimits { rates: kinematics.rates(), accelerations: kinematics.accelerations() };
-    standing + time_of_pieces(&pieces, &blocks, machine, &axes)
+    let (pieces, standing) = pieces(path, machine, kinematics, joints);
+    standing + Run::new(&pieces, &blocks, machine, &kinematics.axis_limits(machine)).time()
 }
 
-/// Time, s, of the moves of an upright tool whose X, Y and Z keep the rates and accelerations of a machine.
+/// Time, s, of the moves of an upright tool whose X, Y and Z keep the limits of a machine.
 pub(super) fn time_of_linear(blocks: &[Block], machine: &Machine) -> f64 {
+    linear(blocks, machine).time()
+}
+
+fn linear(blocks: &[Block], machine: &Machine) -> Run {
     let piece = |(k, block): (usize, &Block)| {
         let Block { step, length, direction, .. } = *block;
         let slope = [direction.x, direction.y, direction.z, 0.0, 0.0];
-        EvenStretch { step, length, slope, after_stop: k == 0 }
+        EvenStretch { step, length, slope, after_stop: k == 0, line: length }
     };
     let pieces: Vec<EvenStretch> = blocks.iter().enumerate().map(piece).collect();
     let with_rotary = |[x, y, z]: [f64; 3]| [x, y, z, f64::INFINITY, f64::INFINITY];
-    let rates = with_rotary(machine.rates.map(|rate| rate / SECONDS_PER_MINUTE));
-    let axes = AxisLimits { rates, accelerations: with_rotary(machine.accelerations) };
-    time_of_pieces(&pieces, blocks, machine, &axes)
+    let axes = AxisLimits {
+        rates: with_rotary(machine.rates.map(|rate| rate / SECONDS_PER_MINUTE)),
+        accelerations: with_rotary(machine.accelerations),
+        jerks: with_rotary(machine.jerks),
+        along: machine.acceleration,
+    };
+    Run::new(&pieces, blocks, machine, &axes)
 }
 
-fn time_of_pieces(pieces: &[EvenStretch], blocks: &[Block], machine: &Machine, axes: &AxisLimits) -> f64 {
-    let stages = stages(pieces, blocks, machine, axes);
-    let speeds = speeds(&stages, &axes.accelerations, machine.acceleration);
-    let time = |(stage, ends): (&Stage, &[f64])| 2.0 * stage.length / (ends[0].sqrt() + ends[1].sqrt());
-    stages.iter().zip(speeds.windows(2)).map(time).sum()
+/// The path with feeds of its cuts and links at which all axes can be run, on the series of [`super::slow_corners`]. No time grows
+/// by them: a move keeps the greatest speed that the machine reaches in it. Rapids, plunges and lifts stay as they are, and so does a
+/// path for which no time can be told.
+pub fn slow_axes(path: &Toolpath, machine: &Machine, on_axes: Option<(&Kinematics, &JointPath)>) -> Toolpath {
+    let mut path = path.clone();
+    // Words that slow down what is short anyway would only be more lines to run.
+    let machine = &Machine { block_rate: ANY_RATE, ..*machine };
+    let Some(blocks) = profile(&path, machine) else { return path };
+    let run = match on_axes {
+        Some((kinematics, joints)) => {
+            let (pieces, _) = pieces(&path, machine, kinematics, joints);
+            Run::new(&pieces, &blocks, machine, &kinematics.axis_limits(machine))
+        }
+        None if machine.limits_axes() && path.is_upright() => linear(&blocks, machine),
+        None => return path,
+    };
+    let peaks = run.peaks(path.len());
+    for (step, peak) in path.moves.iter_mut().zip(peaks) {
+        if peak > 0.0 && step.kind.is_on_surface() {
+            // No lower than a control creeps: what it still brakes is its own.
+            let speed = (SECONDS_PER_MINUTE * peak).max(machine.creep_feed().min(step.feed_rate));
+            step.feed_rate = in_series(speed, step.feed_rate);
+        }
+    }
+    path
 }
 
 /// Time, s, that no motion of the axes from location to location takes longer than, each from rest to rest.
@@ -109,7 +203,12 @@ pub fn axes_at_most(kinematics: &Kinematics, joints: &JointPath) -> f64 {
 }
 
 /// The pieces of a path, and the time that the tip stands while rotary axes turn, s.
-fn pieces(path: &Toolpath, kinematics: &Kinematics, joints: &JointPath) -> (Vec<EvenStretch>, f64) {
+fn pieces(
+    path: &Toolpath,
+    machine: &Machine,
+    kinematics: &Kinematics,
+    joints: &JointPath,
+) -> (Vec<EvenStretch>, f64) {
     let (mut last, mut tip) = (joints.start, path.start.tip);
     let (mut pieces, mut standing, mut after_stop) = (Vec::new(), 0.0, true);
     for location in &joints.locations {
@@ -119,6 +218,7 @@ fn pieces(path: &Toolpath, kinematics: &Kinematics, joints: &JointPath) -> (Vec<
             let turn = [0, 1].map(|k| (to.rotary[k] - last.rotary[k]).abs()).into_iter().fold(0.0, f64::max);
             let parts = if evenly { 1.0 } else { (turn / TURN).ceil().clamp(1.0, MOST_PLACES) };
             let mut before = last;
+            let line = length;
             for part in 1..=parts as u32 {
                 let share = f64::from(part) / parts;
                 let rotary = [0, 1].map(|k| last.rotary[k] + (to.rotary[k] - last.rotary[k]) * share);
@@ -126,11 +226,11 @@ fn pieces(path: &Toolpath, kinematics: &Kinematics, joints: &JointPath) -> (Vec<
                 let now = if share == 1.0 { to } else { kinematics.place(there, rotary) };
                 let length = length / parts;
                 let slope = way(&before, &now).map(|way| way / length);
-                pieces.push(EvenStretch { step: location.step, length, slope, after_stop });
+                pieces.push(EvenStretch { step: location.step, length, slope, after_stop, line });
                 (before, after_stop) = (now, false);
             }
         } else if location.turn != Turn::Rewind && to != last {
-            standing += from_rest_to_rest(&way(&last, &to), kinematics);
+            standing += from_rest_to_rest(&way(&last, &to), kinematics).max(1.0 / machine.block_rate);
             after_stop = true;
         }
         (last, tip) = (to, location.at.tip);
@@ -145,56 +245,71 @@ fn way(from: &Joints, to: &Joints) -> [f64; 5] {
 
 /// The least time of a motion of all axes, s.
 fn from_rest_to_rest(way: &[f64; 5], kinematics: &Kinematics) -> f64 {
-    let limits = kinematics.rates().into_iter().zip(kinematics.accelerations());
-    let one = |(way, (rate, most)): (&f64, (f64, f64))| {
-        let way = way.abs();
-        // Without a level stretch where the rate is not reached.
-        if way * most < rate * rate { 2.0 * (way / most).sqrt() } else { way / rate + rate / most }
+    let limits = kinematics.rates().into_iter().zip(kinematics.accelerations()).zip(kinematics.jerks());
+    let one = |(way, ((rate, most), jerk)): (&f64, ((f64, f64), f64))| {
+        jerk::from_rest_to_rest(way.abs(), rate, most, jerk)
     };
     way.iter().zip(limits).map(one).fold(0.0, f64::max)
 }
 
 fn stages(pieces: &[EvenStretch], blocks: &[Block], machine: &Machine, axes: &AxisLimits) -> Vec<Stage> {
-    let mut stages = Vec::new();
-    let mut before: Option<(&EvenStretch, f64)> = None;
+    let limited = axes.jerks.iter().any(|most| most.is_finite());
     let mut blocks = blocks.iter().peekable();
-    for (k, piece) in pieces.iter().enumerate() {
+    // Of each piece its feed, and the greatest squared speed at the corner before it.
+    let of = |(k, piece): (usize, &EvenStretch)| {
         while blocks.next_if(|block| block.step < piece.step).is_some() {}
         let block = blocks.peek().filter(|block| block.step == piece.step);
-        let least = |limits: &[f64; 5]| {
-            let each = limits.iter().zip(&piece.slope).map(|(limit, slope)| limit / slope.abs());
-            each.fold(f64::INFINITY, f64::min)
-        };
         let feed = block.map_or(machine.rapid_rate / SECONDS_PER_MINUTE, |block| block.feed);
-        let feed = feed.min(least(&axes.rates));
-        let corner = match (&before, block) {
+        let feed = feed.min(piece.least(&axes.rates)).min(piece.line * machine.block_rate);
+        let corner = match (k.checked_sub(1).map(|k| &pieces[k]), block) {
             _ if piece.after_stop => 0.0,
-            (Some((last, _)), Some(block)) if last.step != piece.step => block.corner,
+            (Some(last), Some(block)) if last.step != piece.step => block.corner,
             _ => f64::INFINITY,
         };
-        let bends = [
-            k.checked_sub(1).map(|k| bend(&pieces[k], piece)),
-            pieces.get(k + 1).map(|next| bend(piece, next)),
-        ];
-        let bends = bends.map(Option::unwrap_or_default);
-        let slower = before.map_or(feed, |(_, last)| feed.min(last));
-        let lengths =
-            divided(piece.length, 0.5 * feed * feed / machine.acceleration.min(least(&axes.accelerations)));
+        (feed, corner)
+    };
+    let limits: Vec<(f64, f64)> = pieces.iter().enumerate().map(of).collect();
+    let mut stages = Vec::new();
+    for (k, piece) in pieces.iter().enumerate() {
+        let (feed, corner) = limits[k];
+        let ends =
+            [k.checked_sub(1).map(|k| &pieces[k]).zip(Some(piece)), Some(piece).zip(pieces.get(k + 1))];
+        let bends = ends.map(|ends| ends.map(|(last, next)| bend(last, next)).unwrap_or_default());
+        let smooth = ends.map(|ends| ends.is_some_and(|(last, next)| limited && is_smooth(last, next)));
+        let slower = if k > 0 { feed.min(limits[k - 1].0) } else { feed };
+        let most = machine.acceleration.min(piece.least(&axes.accelerations));
+        let jerk = piece.least(&axes.jerks);
+        let slow = [corner, limits.get(k + 1).map_or(0.0, |next| next.1)];
+        let division = match () {
+            () if !limited => Division::Evenly { ramp: RAMP },
+            () if slow.iter().any(|x| *x < 0.25 * feed * feed) => Division::ShorterAtEnds { each: 24 },
+            () => Division::Evenly { ramp: 2.0 * RAMP },
+        };
+        let lengths = division.lengths(piece.length, 0.5 * feed * jerk::ramp(feed, most, jerk));
         let (last, halves) = (lengths.len() - 1, lengths.len() == 2);
         for (k, length) in lengths.into_iter().enumerate() {
-            // The bend at a corner reaches half-way into the pieces beside, but not along those that the machine needs to speed up.
+            // The bend at a corner reaches half-way into the pieces beside, but behind a sharp one not along those that the machine
+            // needs to speed up.
+            let half = usize::from(2 * k > last);
             let bends = match k {
-                _ if halves => [bends[k]; 2],
+                _ if halves || smooth[half] => [bends[half]; 2],
                 0 => [bends[0], [0.0; 5]],
                 _ if k == last => [[0.0; 5], bends[1]],
                 _ => [[0.0; 5]; 2],
             };
             let most = if k == 0 { corner.min(slower * slower) } else { feed * feed };
-            stages.push(Stage { length, slope: piece.slope, bends, most });
+            stages.push(Stage { step: piece.step, length, slope: piece.slope, bends, most, jerk: limited });
         }
-        before = Some((piece, feed));
     }
     stages
+}
+
+/// Whether axes hardly change their pace from one stretch to the next.
+fn is_smooth(last: &EvenStretch, next: &EvenStretch) -> bool {
+    let changes = |k: usize| (next.slope[k] - last.slope[k]).abs();
+    let size = |k: usize| last.slope[k].abs().max(next.slope[k].abs());
+    let norm = |of: &dyn Fn(usize) -> f64| (0..3).map(|k| of(k).powi(2)).sum::<f64>().sqrt();
+    !next.after_stop && norm(&changes) < SMOOTH * norm(&size)
 }
 
 /// How axes bend at the corner between two pieces: their slopes change over half of both. Where the tip stands, nothing bends.
@@ -205,20 +320,48 @@ fn bend(last: &EvenStretch, next: &EvenStretch) -> [f64; 5] {
     std::array::from_fn(|k| 2.0 * (next.slope[k] - last.slope[k]) / (next.length + last.length))
 }
 
-/// Lengths of the stages of a piece whose ramps from rest are as long as `ramp`.
-fn divided(length: f64, ramp: f64) -> Vec<f64> {
-    if length > 2.0 * ramp {
-        let ends = std::iter::repeat_n(ramp / RAMP, RAMP as usize);
-        let level = 0.5 * (length - 2.0 * ramp);
-        return ends.clone().chain([level; 2]).chain(ends).collect();
-    }
-    let count = (RAMP * length / ramp).ceil().max(2.0);
-    vec![length / count; count as usize]
+/// Into how many stages a piece is divided.
+#[derive(Clone, Copy)]
+enum Division {
+    /// Of even length along ramps from rest to the feed.
+    Evenly {
+        /// Stages of a ramp.
+        ramp: f64,
+    },
+    /// Beside corners that are run slowly: ever shorter towards both ends. The feed may be out of reach.
+    ShorterAtEnds {
+        /// Stages at each end.
+        each: u32,
+    },
 }
 
-/// Squared speeds at the ends of all stages.
-fn speeds(stages: &[Stage], accelerations: &[f64; 5], along: f64) -> Vec<f64> {
-    let limits = Limits { stages, accelerations, along };
+impl Division {
+    /// Lengths of the stages of a piece whose ramps from rest are as long as `ramp`.
+    fn lengths(self, length: f64, ramp: f64) -> Vec<f64> {
+        let long = length > 2.0 * ramp;
+        let level = if long { vec![0.5 * (length - 2.0 * ramp); 2] } else { Vec::new() };
+        match self {
+            Self::Evenly { ramp: count } if long => {
+                let ends = std::iter::repeat_n(ramp / count, count as usize);
+                ends.clone().chain(level).chain(ends).collect()
+            }
+            Self::Evenly { ramp: count } => {
+                let count = (count * length / ramp).ceil().max(2.0);
+                vec![length / count; count as usize]
+            }
+            Self::ShorterAtEnds { each } => {
+                let end = ramp.min(0.5 * length);
+                let place = |k: u32| end * (f64::from(k) / f64::from(each)).powi(3);
+                let ends = (0..each).map(|k| place(k + 1) - place(k));
+                ends.clone().chain(level).chain(ends.rev()).collect()
+            }
+        }
+    }
+}
+
+/// Squared speeds at the ends of all stages, without regard to jerk.
+fn speeds(stages: &[Stage], axes: &AxisLimits) -> Vec<f64> {
+    let limits = Limits { stages, axes };
     let mut highest = vec![0.0; stages.len() + 1];
     for k in (0..stages.len()).rev() {
         highest[k] = if k == 0 { 0.0 } else { limits.highest(k, highest[k + 1]) };
@@ -233,8 +376,7 @@ fn speeds(stages: &[Stage], accelerations: &[f64; 5], along: f64) -> Vec<f64> {
 
 struct Limits<'a> {
     stages: &'a [Stage],
-    accelerations: &'a [f64; 5],
-    along: f64,
+    axes: &'a AxisLimits,
 }
 
 impl Limits<'_> {
@@ -243,8 +385,8 @@ impl Limits<'_> {
     fn window(&self, k: usize, x: f64, end: f64) -> [f64; 2] {
         let stage = &self.stages[k];
         let twice = 2.0 * stage.length;
-        let mut window = [(-x / twice).max(-self.along), ((end - x) / twice).min(self.along)];
-        for (axis, most) in self.accelerations.iter().enumerate() {
+        let mut window = [(-x / twice).max(-self.axes.along), ((end - x) / twice).min(self.axes.along)];
+        for (axis, most) in self.axes.accelerations.iter().enumerate() {
             let most = most * (1.0 + ROUNDING);
             let slope = stage.slope[axis];
             let [begin, end] = stage.bends.map(|bend| bend[axis]);

@@ -24,7 +24,7 @@ const SHARP: f64 = std::f64::consts::PI / 6.0;
 const HARDLY_SLOWER: f64 = 0.9;
 
 /// Lines a second that no path asks for.
-const ANY_RATE: f64 = 1e12;
+pub(super) const ANY_RATE: f64 = 1e12;
 
 const SECONDS_PER_MINUTE: f64 = 60.0;
 
@@ -101,7 +101,7 @@ fn slowed(
 }
 
 /// The least feed of the series that goes down from `feed` which is no lower than `speed`, mm/s.
-fn in_series(speed: f64, feed: f64) -> f64 {
+pub(super) fn in_series(speed: f64, feed: f64) -> f64 {
     if speed >= feed {
         return feed;
     }

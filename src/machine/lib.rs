@@ -6,10 +6,11 @@
 
 mod axis_limits;
 mod feeds;
+mod jerk;
 pub mod kinematics;
 mod time;
 
-pub use axis_limits::{axes_at_most, machining_time_of_axes};
+pub use axis_limits::{axes_at_most, machining_time_of_axes, slow_axes};
 pub use feeds::slow_corners;
 pub use time::{at_most, machining_time};
 
@@ -30,6 +31,8 @@ pub struct Machine {
     pub rates: [f64; 3],
     /// Accelerations of X, Y and Z of upright tools, mm/s²; with infinite ones only `acceleration` limits.
     pub accelerations: [f64; 3],
+    /// Jerks of X, Y and Z of upright tools, mm/s³; infinite ones limit nothing.
+    pub jerks: [f64; 3],
     /// Whether programs have the feeds at which corners and bends can be run.
     pub slow_corners: bool,
 }
@@ -47,6 +50,7 @@ impl Default for Machine {
             block_rate: 1000.0,
             rates: [f64::INFINITY; 3],
             accelerations: [f64::INFINITY; 3],
+            jerks: [f64::INFINITY; 3],
             slow_corners: true,
         }
     }
@@ -71,6 +75,11 @@ impl Machine {
         60.0 * (2.0 * self.acceleration * self.junction_deviation).sqrt()
     }
 
+    /// Whether X, Y and Z of upright tools have limits of their own besides rates.
+    pub(crate) fn limits_axes(&self) -> bool {
+        self.accelerations.iter().chain(&self.jerks).any(|most| most.is_finite())
+    }
+
     /// Refuses limits with which no time could be told.
     ///
     /// # Errors
@@ -86,8 +95,11 @@ impl Machine {
         let refused = limits.into_iter().find(|(_, value, _)| !(*value > 0.0 && value.is_finite()));
         let rates = self.rates.map(|value| ("rate of an axis", value, "mm/min"));
         let accelerations = self.accelerations.map(|value| ("acceleration of an axis", value, "mm/s²"));
-        let single =
-            || rates.into_iter().chain(accelerations).find(|(_, value, _)| value.is_nan() || *value <= 0.0);
+        let jerks = self.jerks.map(|value| ("jerk of an axis", value, "mm/s³"));
+        let single = || {
+            let all = rates.into_iter().chain(accelerations).chain(jerks);
+            all.into_iter().find(|(_, value, _)| value.is_nan() || *value <= 0.0)
+        };
         match refused.or_else(single) {
             Some((what, value, unit)) => Err(MachineError { what, value, unit }),
             None => Ok(()),
@@ -137,6 +149,7 @@ mod fixture {
             block_rate: 1e9,
             rates: [f64::INFINITY; 3],
             accelerations: [f64::INFINITY; 3],
+            jerks: [f64::INFINITY; 3],
             slow_corners: true,
         }
     }

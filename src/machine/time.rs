@@ -16,15 +16,16 @@
 //!
 //! A move lasts at least as long as the control takes for a line of the program.
 //!
-//! What single axes need besides is in [`super::axis_limits`]: those of upright tools where the machine has accelerations of their
-//! own, and those of machines with rotary axes. Rates of X, Y and Z are feeds that no move of an upright tool exceeds.
+//! What single axes need besides is in [`super::axis_limits`]: those of upright tools where the machine has accelerations or jerks
+//! of their own, and those of machines with rotary axes. Rates of X, Y and Z are feeds that no move of an upright tool exceeds.
 //!
 //! A backward pass then limits speeds to what can still be braked, a forward pass to what can have been
-//! reached: both in one sweep, O(n). The path starts and ends at rest. Jerk along the path is not modelled: real machines take
-//! somewhat longer.
+//! reached: both in one sweep, O(n). The path starts and ends at rest. Jerk along the path is that of single axes, where they have
+//! limits of it; without, real machines take somewhat longer.
 
 use super::Machine;
 use super::axis_limits::time_of_linear;
+use super::jerk;
 use geometry::Vector3;
 use motion::{Move, MoveKind, Toolpath};
 
@@ -66,7 +67,7 @@ impl Block {
 /// A model of the machine (see the module), computed to f64 rounding.
 pub fn machining_time(path: &Toolpath, machine: &Machine) -> f64 {
     let Some(blocks) = profile(path, machine) else { return f64::INFINITY };
-    if machine.accelerations.iter().any(|most| most.is_finite()) && path.is_upright() {
+    if machine.limits_axes() && path.is_upright() {
         return time_of_linear(&blocks, machine);
     }
     blocks.iter().map(|block| block_time(block, machine.acceleration)).sum()
@@ -76,7 +77,8 @@ pub fn machining_time(path: &Toolpath, machine: &Machine) -> f64 {
 /// move takes `l/v + v/a` or less. Rapids go at the rapid rate.
 pub fn at_most(path: &Toolpath, machine: &Machine, [slowest, fastest]: [f64; 2]) -> f64 {
     let least = |limits: &[f64; 3], most: f64| limits.iter().copied().fold(most, f64::min);
-    let ramps = fastest / (SECONDS_PER_MINUTE * least(&machine.accelerations, machine.acceleration));
+    let most = least(&machine.accelerations, machine.acceleration);
+    let ramps = jerk::ramp(fastest / SECONDS_PER_MINUTE, most, least(&machine.jerks, f64::INFINITY));
     let one = |(from, to, step): (geometry::Point3, geometry::Point3, &Move)| {
         let slowest = if step.kind == MoveKind::Rapid { machine.rapid_rate } else { slowest };
         let slowest = least(&machine.rates, slowest);

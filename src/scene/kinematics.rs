@@ -27,6 +27,9 @@ const RATE: std::ops::RangeInclusive<f64> = 1.0..=1e7;
 /// Rotary accelerations that make sense, degrees/s².
 const ACCELERATION: std::ops::RangeInclusive<f64> = 1.0..=1e6;
 
+/// Rotary jerks that make sense, degrees/s³.
+const JERK: std::ops::RangeInclusive<f64> = 1.0..=1e8;
+
 /// Coordinates of machines, mm.
 const PLACE: std::ops::RangeInclusive<f64> = -99_999.0..=99_999.0;
 
@@ -40,6 +43,9 @@ const RATES: std::ops::RangeInclusive<f64> = 1.0..=1e6;
 
 /// Accelerations of linear axes, mm/s².
 const ACCELERATIONS: std::ops::RangeInclusive<f64> = 1.0..=1e6;
+
+/// Jerks of linear axes, mm/s³.
+const JERKS: std::ops::RangeInclusive<f64> = 1.0..=1e6;
 
 const SIDES: [&str; 2] = ["head", "table"];
 
@@ -60,11 +66,12 @@ pub struct FiveAxis {
 ///
 /// Linear axes are as fast as rapids and accelerate as the path does, unless the table says otherwise.
 pub(super) fn read(machine: &Section<'_>, limits: &Machine) -> Result<Option<FiveAxis>, SceneError> {
-    let linear = |rates: [f64; 3], accelerations: [f64; 3]| {
+    let linear = |rates: [f64; 3], accelerations: [f64; 3], jerks: [f64; 3]| {
         move |kinematics: Kinematics| {
             kinematics
                 .with_rates(rates.map(|rate| rate / SECONDS_PER_MINUTE))
                 .with_accelerations(accelerations)
+                .with_jerks(jerks)
         }
     };
     let rapid = limits.rates.map(|rate| rate.min(limits.rapid_rate));
@@ -78,7 +85,7 @@ pub(super) fn read(machine: &Section<'_>, limits: &Machine) -> Result<Option<Fiv
             let kinematics =
                 Kinematics::new(axes[0], axes[1], DEFAULT_GAUGE_LENGTH, Point3::origin(), [None; 3]);
             kinematics.map(|kinematics| FiveAxis {
-                kinematics: linear(rapid, even)(kinematics),
+                kinematics: linear(rapid, even, limits.jerks)(kinematics),
                 post: Style::Tcp,
                 zero_is_given: false,
                 directions: axes.map(|axis| axis.direction),
@@ -99,6 +106,7 @@ pub(super) fn read(machine: &Section<'_>, limits: &Machine) -> Result<Option<Fiv
             "z",
             "rates",
             "accelerations",
+            "jerks",
         ],
         &[],
         "`kinematics`",
@@ -137,8 +145,9 @@ pub(super) fn read(machine: &Section<'_>, limits: &Machine) -> Result<Option<Fiv
     );
     let kinematics = kinematics.map_err(|e| refused(&table, first.letter, &e))?;
     let (rates, accelerations) = (rates(&table)?.unwrap_or(rapid), accelerations(&table)?.unwrap_or(even));
+    let jerks = jerks(&table)?.unwrap_or(limits.jerks);
     Ok(Some(FiveAxis {
-        kinematics: linear(rates, accelerations)(kinematics),
+        kinematics: linear(rates, accelerations, jerks)(kinematics),
         post,
         zero_is_given: workpiece_zero.is_some(),
         directions: [first, second].map(|axis| axis.direction),
@@ -173,7 +182,7 @@ fn read_axis(table: &Section<'_>, key: &str, named: Option<RotaryAxis>) -> Resul
         };
     };
     section.only(
-        &["name", "side", "direction", "point", "limits", "rate", "acceleration"],
+        &["name", "side", "direction", "point", "limits", "rate", "acceleration", "jerk"],
         &[],
         "a rotary axis",
     )?;
@@ -205,6 +214,7 @@ fn read_axis(table: &Section<'_>, key: &str, named: Option<RotaryAxis>) -> Resul
     };
     let rate = section.number("rate", RATE, " degrees/min")?;
     let acceleration = section.number("acceleration", ACCELERATION, " degrees/s²")?;
+    let jerk = section.number("jerk", JERK, " degrees/s³")?;
     let base = named.unwrap_or(RotaryAxis {
         letter: 'A',
         direction: Vector3::zeros(),
@@ -213,6 +223,7 @@ fn read_axis(table: &Section<'_>, key: &str, named: Option<RotaryAxis>) -> Resul
         limits: None,
         rate: DEFAULT_ROTARY_RATE,
         acceleration: DEFAULT_ROTARY_ACCELERATION,
+        jerk: f64::INFINITY,
     });
     Ok(RotaryAxis {
         letter: name.unwrap_or(base.letter),
@@ -222,6 +233,7 @@ fn read_axis(table: &Section<'_>, key: &str, named: Option<RotaryAxis>) -> Resul
         limits,
         rate: rate.map_or(base.rate, |rate| rate.value * DEGREE_A_MINUTE),
         acceleration: acceleration.map_or(base.acceleration, |given| given.value.to_radians()),
+        jerk: jerk.map_or(base.jerk, |given| given.value.to_radians()),
     })
 }
 
@@ -244,6 +256,11 @@ pub(super) fn rates(section: &Section<'_>) -> Result<Option<[f64; 3]>, SceneErro
 /// Accelerations of X, Y and Z, mm/s², where a table has them.
 pub(super) fn accelerations(section: &Section<'_>) -> Result<Option<[f64; 3]>, SceneError> {
     of_linear(section, "accelerations", ACCELERATIONS, "mm/s²")
+}
+
+/// Jerks of X, Y and Z, mm/s³, where a table has them.
+pub(super) fn jerks(section: &Section<'_>) -> Result<Option<[f64; 3]>, SceneError> {
+    of_linear(section, "jerks", JERKS, "mm/s³")
 }
 
 /// Limits of X, Y and Z.
@@ -275,10 +292,15 @@ pub(super) fn write(out: &mut String, five_axis: Option<&FiveAxis>) -> fmt::Resu
     {
         let side = if axis.side == Side::Head { SIDES[0] } else { SIDES[1] };
         let limits = axis.limits.map_or_else(|| text(NONE), |limits| list(&limits.map(f64::to_degrees)));
+        let jerk = if axis.jerk.is_finite() {
+            format!(", jerk = {}", number(axis.jerk.to_degrees()))
+        } else {
+            String::new()
+        };
         let (direction, point) = (list(direction.as_slice()), list(axis.point.coords.as_slice()));
         writeln!(
             out,
-            "{key} = {{ name = {}, side = {}, direction = {direction}, point = {point}, limits = {limits}, rate = {}, acceleration = {} }}",
+            "{key} = {{ name = {}, side = {}, direction = {direction}, point = {point}, limits = {limits}, rate = {}, acceleration = {}{jerk} }}",
             text(&axis.letter.to_string()),
             text(side),
             number(axis.rate / DEGREE_A_MINUTE),
@@ -295,6 +317,10 @@ pub(super) fn write(out: &mut String, five_axis: Option<&FiveAxis>) -> fmt::Resu
     let [x, y, z, ..] = kinematics.rates().map(|rate| rate * SECONDS_PER_MINUTE);
     writeln!(out, "rates = {}  # mm/min of X, Y and Z", list(&[x, y, z]))?;
     writeln!(out, "accelerations = {}  # mm/s² of X, Y and Z", list(&kinematics.accelerations()[..3]))?;
+    let jerks = kinematics.jerks();
+    if jerks[..3].iter().all(|jerk| jerk.is_finite()) {
+        writeln!(out, "jerks = {}  # mm/s³ of X, Y and Z", list(&jerks[..3]))?;
+    }
     for (key, limits) in ["x", "y", "z"].into_iter().zip(kinematics.travel()) {
         if let Some(limits) = limits {
             writeln!(out, "{key} = {}", list(limits))?;
@@ -342,7 +368,7 @@ mod tests {
             assert_eq!(five_axis.post, Style::Tcp);
         }
         let table = "[machine.kinematics]\npost = \"full\"\ngauge_length = 120\nz = [-500, 0]\n\
-                     first = { name = \"B\", side = \"head\", direction = [0, -2, 0], limits = [-90, 400], rate = 3600, acceleration = 90 }\naccelerations = [1, 2, 3]\n\
+                     first = { name = \"B\", side = \"head\", direction = [0, -2, 0], limits = [-90, 400], rate = 3600, acceleration = 90, jerk = 180 }\naccelerations = [1, 2, 3]\njerks = [4, 5, 6]\n\
                      second = { name = \"A\", side = \"head\", direction = [1, 0, 1], point = [0, 0, 80] }\n";
         let made = parse(table).unwrap().five_axis.unwrap();
         let [first, second] = *made.kinematics.axes();
@@ -350,6 +376,8 @@ mod tests {
         assert!((first.rate - std::f64::consts::PI / 3.0).abs() < 1e-12);
         assert!((first.acceleration - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
         assert_eq!(made.kinematics.accelerations()[..3], [1.0, 2.0, 3.0]);
+        assert_eq!(made.kinematics.jerks()[..3], [4.0, 5.0, 6.0]);
+        assert!((first.jerk - std::f64::consts::PI).abs() < 1e-12 && second.jerk.is_infinite());
         let [least, greatest] = first.limits.unwrap();
         assert!((least + 90f64.to_radians()).abs() + (greatest - 400f64.to_radians()).abs() < 1e-12);
         assert_eq!((second.letter, second.limits, second.point.z), ('A', None, 80.0));
@@ -372,7 +400,8 @@ mod tests {
     fn the_complete_machine_reads_back_as_itself() {
         let any = "[machine.kinematics]\nx = [-1, 2.5]\nfirst = { name = \"C\", side = \"table\", \
                    direction = [0.1, 0.3, 1], limits = [-7200, 7200] }\nsecond = { name = \"B\", side = \"head\", \
-                   direction = [0.123456789012345, 1, 0.7], point = [1, 2, 3.3], rate = 1e7, limits = [-0.1, 33.3] }\n";
+                   direction = [0.123456789012345, 1, 0.7], point = [1, 2, 3.3], rate = 1e7, jerk = 999, limits = [-0.1, 33.3] }\n\
+                   jerks = [7e4, 1, 1e6]\n";
         let named = PRESETS.iter().map(|name| format!("kinematics = \"{name}\"\n"));
         for text in named.chain([any.to_owned(), String::new()]) {
             let complete = complete_toml(&parse(&text).unwrap());

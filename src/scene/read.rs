@@ -322,6 +322,7 @@ fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
             "block_rate",
             "rates",
             "accelerations",
+            "jerks",
             "slow_corners",
             "clearance",
             kinematics::KEY,
@@ -344,6 +345,7 @@ fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
             .map_or(default.block_rate, |v| v.value),
         rates: kinematics::rates(section)?.unwrap_or(default.rates),
         accelerations: kinematics::accelerations(section)?.unwrap_or(default.accelerations),
+        jerks: kinematics::jerks(section)?.unwrap_or(default.jerks),
         slow_corners: section.flag("slow_corners")?.unwrap_or(default.slow_corners),
     };
     Ok((machine, section.length("clearance")?.map_or(DEFAULT_CLEARANCE, |v| v.value)))

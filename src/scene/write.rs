@@ -56,8 +56,11 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     )?;
     writeln!(out, "jerk = {}  # mm/s3", number(scene.machine.jerk))?;
     writeln!(out, "block_rate = {}  # lines of a program a second", number(scene.machine.block_rate))?;
-    let own =
-        [("rates", scene.machine.rates, "mm/min"), ("accelerations", scene.machine.accelerations, "mm/s2")];
+    let own = [
+        ("rates", scene.machine.rates, "mm/min"),
+        ("accelerations", scene.machine.accelerations, "mm/s2"),
+        ("jerks", scene.machine.jerks, "mm/s3"),
+    ];
     for (key, limits, unit) in own {
         if limits.iter().all(|limit| limit.is_finite()) {
             let [x, y, z] = limits.map(number);

@@ -13,7 +13,7 @@
 //!
 //! A rapid move that turns the tool is a G1 at the rapid rate: with G0 each axis would go its own way.
 //!
-//! Begin and end. The spindle rises along the machine's z to its zero (G53), the rotary axes turn up there, X and Y move, and
+//! Begin and end. The spindle rises along the machine's z to the end of its travel (G53; its zero where no travel is known), the rotary axes turn up there, X and Y move, and
 //! the tip comes down along the machine's z over the start of the path, from above all of the path. With [`Style::Tcp`] the
 //! linear axes stand there before the control begins to keep the tip, so that only Z is left to move. The same way round before
 //! rewinds, and up again at the end.
@@ -224,7 +224,7 @@ impl<'a> FiveAxisProgram<'a> {
         Ok(())
     }
 
-    /// Up to the machine's zero.
+    /// Up to the end of Z's travel, or to the machine's zero where that is not known.
     fn rise(&mut self) -> io::Result<()> {
         if let Some((joints, tip)) = self.at.take()
             && self.post.style == Style::Tcp
@@ -235,7 +235,7 @@ impl<'a> FiveAxisProgram<'a> {
             self.step(words.map(Some), None)?;
             self.line("G49")?;
         }
-        self.line("G53 G0 Z0.0")?;
+        self.line(&format!("G53 G0 Z{}", number(self.post.kinematics.retracted_z())))?;
         self.rapid = Some(true);
         // Where that is in the words of this program is the machine's to know.
         match self.post.style {

@@ -65,7 +65,7 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
     let mut claims = within_travel(machine, &joints.report);
     let mut notes: Vec<String> = note(&joints.report).into_iter().collect();
     if five_axis.zero_is_given {
-        claims.push(retract_above(joints.highest_nose(machine, path)));
+        claims.push(retract_above(machine.retracted_z(), joints.highest_nose(machine, path)));
     } else {
         notes.push(UNKNOWN_ZERO.to_owned());
     }
@@ -74,15 +74,15 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
 }
 
 /// What is said where the scene does not tell where the workpiece is in the machine.
-const UNKNOWN_ZERO: &str = "the program begins and ends at the machine's Z zero, which must be above the work; give \
-                            `workpiece_zero` in [machine.kinematics] to have that checked";
+const UNKNOWN_ZERO: &str = "the program begins and ends at the upper end of Z's travel, or at the machine's Z zero where no `z` is given; \
+                            that must be above the work: give `workpiece_zero` in [machine.kinematics] to have that checked";
 
-/// That the machine's Z zero, to which programs rise, is no lower than where they come down from.
-fn retract_above(nose: f64) -> Claim {
+/// That the machine's Z to which programs rise is no lower than where they come down from.
+fn retract_above(z: f64, nose: f64) -> Claim {
     let text = format!(
-        "programs rise to the machine's Z zero, and the spindle nose must stand at Z {nose:.3} or higher to be over the path"
+        "programs rise to the machine's Z {z:.3}, and the spindle nose must stand at Z {nose:.3} or higher to be over the path"
     );
-    Claim::length("retract", Gravity::Crash, 0.0, nose, 0.0).told(text)
+    Claim::length("retract", Gravity::Crash, 0.0, nose - z, 0.0).told(text)
 }
 
 /// Beyond a limit by so little, mm or degrees, a joint is at it.
@@ -131,13 +131,14 @@ mod tests {
 
     #[test]
     fn a_retract_below_the_work_is_a_violation() {
-        let claim = retract_above(161.0);
+        let claim = retract_above(0.0, 161.0);
         assert_eq!((claim.what, claim.verdict()), ("retract", Verdict::Fail));
         assert!(
             claim.text.ends_with("must stand at Z 161.000 or higher to be over the path"),
             "{}",
             claim.text
         );
-        assert_eq!(retract_above(-40.0).verdict(), Verdict::Pass);
+        assert_eq!(retract_above(0.0, -40.0).verdict(), Verdict::Pass);
+        assert_eq!(retract_above(700.0, 161.0).verdict(), Verdict::Pass);
     }
 }

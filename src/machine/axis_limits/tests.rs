@@ -57,8 +57,13 @@ fn a_turn_about_the_tip_takes_the_time_of_its_axes() {
 
 /// Passes over a hill with the tool along the normal.
 fn hill() -> Toolpath {
+    hill_in(0.5)
+}
+
+/// In steps along x.
+fn hill_in(chord: f64) -> Toolpath {
     let at = |k: i32| {
-        let x = 0.5 * f64::from(k);
+        let x = chord * f64::from(k);
         let lean = 0.6 * (x / 4.0).sin();
         ClPoint {
             tip: Point3::new(x, 0.3 * x, 3.0 * (x / 4.0).cos()),
@@ -66,25 +71,28 @@ fn hill() -> Toolpath {
         }
     };
     let step = |k| Move { to: at(k), kind: MoveKind::Cut, feed_rate: 6000.0, pass: 0 };
-    Toolpath::new(at(0), (1..60).map(step).collect())
+    Toolpath::new(at(0), (1..=(29.5 / chord).round() as i32).map(step).collect())
 }
 
-fn hill_stages(name: &str) -> (Kinematics, Vec<Stage>) {
-    let kinematics = kinematics(name, [800.0, 900.0, 700.0], 8.0);
-    let path = hill();
+fn on_hill(name: &str) -> Kinematics {
+    kinematics(name, [800.0, 900.0, 700.0], 8.0)
+}
+
+fn hill_stages(name: &str) -> (AxisLimits, Vec<Stage>) {
+    let (kinematics, path) = (on_hill(name), hill());
     let joints = follow(&kinematics, &path, &EVENLY).unwrap();
-    let (pieces, _) = pieces(&path, &kinematics, &joints);
-    let axes = AxisLimits { rates: kinematics.rates(), accelerations: kinematics.accelerations() };
+    let (pieces, _) = pieces(&path, &MACHINE, &kinematics, &joints);
+    let axes = kinematics.axis_limits(&MACHINE);
     let stages = stages(&pieces, &profile(&path, &MACHINE).unwrap(), &MACHINE, &axes);
-    (kinematics, stages)
+    (axes, stages)
 }
 
 #[test]
 fn no_axis_exceeds_its_rate_or_acceleration() {
     for name in PRESETS {
-        let (kinematics, stages) = hill_stages(name);
-        let (rates, most) = (kinematics.rates(), kinematics.accelerations());
-        let speeds = speeds(&stages, &most, MACHINE.acceleration);
+        let (axes, stages) = hill_stages(name);
+        let (rates, most) = (axes.rates, axes.accelerations);
+        let speeds = speeds(&stages, &axes);
         assert!(speeds.iter().all(|x| *x >= 0.0) && speeds[0] == 0.0 && speeds[stages.len()] == 0.0);
         let mut reached = 0.0f64;
         for (k, stage) in stages.iter().enumerate() {
@@ -108,9 +116,8 @@ fn no_axis_exceeds_its_rate_or_acceleration() {
 fn the_time_is_that_of_the_quickest_speeds_by_trying_all() {
     const GRID: usize = 12_000;
     for name in ["ac-table", "bc-head"] {
-        let (kinematics, stages) = hill_stages(name);
-        let accelerations = kinematics.accelerations();
-        let limits = Limits { stages: &stages, accelerations: &accelerations, along: MACHINE.acceleration };
+        let (axes, stages) = hill_stages(name);
+        let limits = Limits { stages: &stages, axes: &axes };
         let top = stages.iter().map(|stage| stage.most).fold(0.0, f64::max).sqrt();
         // Even in speed.
         let speed = |n: usize| (top * n as f64 / GRID as f64).powi(2);
@@ -130,7 +137,7 @@ fn the_time_is_that_of_the_quickest_speeds_by_trying_all() {
             };
             left = (0..=GRID).map(best).collect();
         }
-        let speeds = speeds(&stages, &accelerations, MACHINE.acceleration);
+        let speeds = speeds(&stages, &axes);
         let one = |(stage, ends): (&Stage, &[f64])| 2.0 * stage.length / (ends[0].sqrt() + ends[1].sqrt());
         let got: f64 = stages.iter().zip(speeds.windows(2)).map(one).sum();
         // Speeds of the grid are some of those that can be had.
@@ -206,4 +213,237 @@ fn three_axes_keep_their_own_limits_in_the_time_of_small_steps() {
             assert!((got / exact - 1.0).abs() < 3e-3, "{rates:?} {most:?} {chords}: {got} {exact}");
         }
     }
+}
+
+/// Joints at evenly spaced places along x of the hill, and what they are at in length.
+fn hill_by_joints(kinematics: &Kinematics, chord: f64) -> Vec<([f64; 5], f64)> {
+    let path = hill_in(chord);
+    let joints = follow(kinematics, &path, &EVENLY).unwrap();
+    let ends = joints.locations.iter().filter(|at| at.at.tip == path.moves[at.step].to.tip);
+    let mut length = 0.0;
+    let mut last = path.start.tip;
+    let mut rows = vec![(joints.start.values(), 0.0)];
+    for at in ends {
+        length += (at.at.tip - last).norm();
+        last = at.at.tip;
+        rows.push((at.joints.values(), length));
+    }
+    assert_eq!(rows.len(), path.len() + 1);
+    rows
+}
+
+/// The quickest motion over the smooth hill by small steps, from derivatives of the joints by differences, s.
+fn hill_by_small_steps(kinematics: &Kinematics, feed: f64) -> f64 {
+    let rows = hill_by_joints(kinematics, 0.005);
+    let (rates, most) = (kinematics.rates(), kinematics.accelerations());
+    let n = rows.len() - 1;
+    // Slope and bend of each axis by the length, at inner places.
+    let at = |k: usize| {
+        let k = k.clamp(1, n - 1);
+        let [before, here, after] = [k - 1, k, k + 1].map(|k| rows[k]);
+        let (h, g) = (here.1 - before.1, after.1 - here.1);
+        let slope: [f64; 5] = std::array::from_fn(|i| {
+            (h * (after.0[i] - here.0[i]) / g + g * (here.0[i] - before.0[i]) / h) / (h + g)
+        });
+        let bend: [f64; 5] = std::array::from_fn(|i| {
+            2.0 * ((after.0[i] - here.0[i]) / g - (here.0[i] - before.0[i]) / h) / (h + g)
+        });
+        (slope, bend)
+    };
+    let places: Vec<([f64; 5], [f64; 5])> = (0..=n).map(at).collect();
+    let window = |k: usize, x: f64| {
+        let (slope, bend) = &places[k];
+        let mut window = [-MACHINE.acceleration, MACHINE.acceleration];
+        for i in 0..5 {
+            let ends = [-1.0, 1.0].map(|side| (side * most[i] - bend[i] * x) / slope[i]);
+            window = [window[0].max(ends[0].min(ends[1])), window[1].min(ends[0].max(ends[1]))];
+        }
+        window
+    };
+    let step = |k: usize| rows[k + 1].1 - rows[k].1;
+    let mut x = vec![0.0; n + 1];
+    for k in (1..n).rev() {
+        let fastest = (0..5).map(|i| rates[i] / places[k].0[i].abs()).fold(feed, f64::min);
+        let (mut low, mut high) = (0.0, fastest * fastest);
+        for _ in 0..50 {
+            let middle = 0.5 * (low + high);
+            let [least, greatest] = window(k, middle);
+            let can = least <= greatest.min(0.5 * (x[k + 1] - middle) / step(k));
+            *(if can { &mut low } else { &mut high }) = middle;
+        }
+        x[k] = low;
+    }
+    for k in 0..n {
+        let rising = window(k, x[k])[1];
+        x[k + 1] = x[k + 1].min(x[k] + 2.0 * step(k) * rising).max(0.0);
+    }
+    (0..n).map(|k| 2.0 * step(k) / (x[k].sqrt() + x[k + 1].sqrt())).sum()
+}
+
+#[test]
+fn every_machine_takes_the_time_of_small_steps() {
+    // Only single axes limit: corners are rounded by the path's own rule, which the smooth hill knows nothing of.
+    let free = Machine { acceleration: MACHINE.acceleration, junction_deviation: 1.0, ..MACHINE };
+    for name in PRESETS {
+        let kinematics = on_hill(name);
+        let exact = hill_by_small_steps(&kinematics, 100.0);
+        for chord in [0.25, 0.1] {
+            let got = time(&hill_in(chord), &free, &kinematics, &EVENLY);
+            assert!((got / exact - 1.0).abs() < 0.02, "{name} {chord}: {got} {exact}");
+        }
+    }
+}
+
+/// The joints of the smooth hill at even times, by the speeds found on its chords; differences are accelerations and jerks.
+#[test]
+fn no_axis_exceeds_its_jerk() {
+    const STEP: f64 = 0.012;
+    for name in PRESETS {
+        let free = on_hill(name);
+        let jerks = [6e3, 5e3, 7e3];
+        let [mut first, mut second] = *free.axes();
+        (first.jerk, second.jerk) = (60.0, 60.0);
+        let made = Kinematics::new(first, second, 100.0, free.workpiece_zero(), [None; 3]).unwrap();
+        let linear = |kinematics: Kinematics| {
+            kinematics.with_rates([150.0, 200.0, 250.0]).with_accelerations([800.0, 900.0, 700.0])
+        };
+        let kinematics = linear(made).with_jerks(jerks);
+        let path = hill_in(0.05);
+        let joints = follow(&kinematics, &path, &EVENLY).unwrap();
+        let (pieces, standing) = pieces(&path, &MACHINE, &kinematics, &joints);
+        let axes = kinematics.axis_limits(&MACHINE);
+        let run = Run::new(&pieces, &profile(&path, &MACHINE).unwrap(), &MACHINE, &axes);
+        assert_eq!(standing, 0.0);
+        let (slower, before) = (run.time(), time(&path, &MACHINE, &free, &EVENLY));
+        assert!(slower > 1.05 * before, "{name}: {slower} {before}");
+        let rows = hill_by_joints(&kinematics, 0.01);
+        let at = |s: f64| -> [f64; 5] {
+            let k = rows.partition_point(|row| row.1 < s).clamp(2, rows.len() - 2);
+            // Through four places.
+            std::array::from_fn(|i| {
+                let four = &rows[k - 2..k + 2];
+                let share = |a: usize| {
+                    let of = |b: usize| (s - four[b].1) / (four[a].1 - four[b].1);
+                    (0..4).filter(|b| *b != a).map(of).product::<f64>() * four[a].0[i]
+                };
+                (0..4).map(share).sum()
+            })
+        };
+        // Way by time.
+        let (mut ways, mut begun, mut way, mut next) = (Vec::new(), 0.0, 0.0, 0.0);
+        for (stage, ends) in run.stages.iter().zip(run.speeds.windows(2)) {
+            let [from, to] = [ends[0].sqrt(), ends[1].sqrt()];
+            let time = stage.time([ends[0], ends[1]]);
+            while next <= begun + time {
+                let t = next - begun;
+                ways.push(match () {
+                    () if from == 0.0 => way + stage.length * (t / time).powi(3),
+                    () if to == 0.0 => way + stage.length * (1.0 - (1.0 - t / time).powi(3)),
+                    () => way + from * t + 0.5 * (to - from) / time * t * t,
+                });
+                next += STEP;
+            }
+            (begun, way) = (begun + time, way + stage.length);
+        }
+        let rows: Vec<[f64; 5]> = ways.iter().map(|s| at(*s)).collect();
+        let mut reached = [0.0f64; 2];
+        for four in rows.windows(4) {
+            for axis in 0..5 {
+                let [a, b, c, d] = [0, 1, 2, 3].map(|k| four[k][axis]);
+                let acceleration = (c - 2.0 * b + a) / STEP.powi(2);
+                let jerk = (d - 3.0 * c + 3.0 * b - a) / STEP.powi(3);
+                assert!((b - a).abs() / STEP <= axes.rates[axis] * 1.001);
+                reached[0] = reached[0].max(acceleration.abs() / axes.accelerations[axis]);
+                reached[1] = reached[1].max(jerk.abs() / axes.jerks[axis]);
+            }
+        }
+        assert!(reached[0] < 1.02 && reached[1] < 1.06 && reached[1] > 0.9, "{name}: {reached:?}");
+    }
+}
+
+/// Feeds follow what axes reach, and no time changes by them.
+#[test]
+fn words_follow_the_limits_of_all_axes() {
+    for name in PRESETS {
+        let kinematics = on_hill(name);
+        let path = hill_in(0.05);
+        let joints = follow(&kinematics, &path, &EVENLY).unwrap();
+        let slow = slow_axes(&path, &MACHINE, Some((&kinematics, &joints)));
+        let [before, after] =
+            [&path, &slow].map(|path| machining_time_of_axes(path, &MACHINE, &kinematics, &joints));
+        // Slower moves are divided into shorter stages, which lose less.
+        assert!(after < 1.001 * before && after > 0.99 * before, "{name}: {before} {after}");
+        let lower = slow.moves.iter().filter(|step| step.feed_rate < 0.9 * 6000.0).count();
+        assert!(lower > 10, "{name}: {lower}");
+    }
+    let own = Machine { accelerations: [1000.0, 100.0, 1000.0], jerks: [1e5; 3], ..MACHINE };
+    let arc =
+        (0..=600).map(|k| [30.0 * (0.01 * f64::from(k)).cos(), 30.0 * (0.01 * f64::from(k)).sin(), 0.0]);
+    let path = path(arc);
+    let slow = slow_axes(&path, &own, None);
+    let [before, after] = [&path, &slow].map(|path| super::super::machining_time(path, &own));
+    assert!((before / after - 1.0).abs() < 2e-3, "{before} {after}");
+    assert!(slow.moves.iter().any(|step| step.feed_rate < 0.7 * 6000.0));
+    assert_eq!(slow_axes(&path, &MACHINE, None), path);
+}
+
+/// The moves of one of the plain programs in `tests/planner`, and the limits in its head: mm/s, mm/s².
+fn plain_program(text: &str) -> (Toolpath, f64, [f64; 3]) {
+    let numbers = |line: &str| -> Vec<f64> {
+        line.split(|c: char| !c.is_ascii_digit() && c != '.').filter_map(|word| word.parse().ok()).collect()
+    };
+    let head = numbers(text.lines().next().unwrap());
+    let (mut tip, mut feed) = ([0.0; 3], 0.0);
+    let mut moves = Vec::new();
+    for line in text.lines().skip(2) {
+        let before = tip;
+        for word in line.split_whitespace() {
+            let value = word[1..].parse().unwrap();
+            match word.as_bytes()[0] {
+                letter @ b'X'..=b'Z' => tip[usize::from(letter - b'X')] = value,
+                b'F' => feed = value,
+                _ => {}
+            }
+        }
+        if tip != before {
+            let to = ClPoint::upright(Point3::from(tip));
+            moves.push(Move { to, kind: MoveKind::Cut, feed_rate: feed, pass: 0 });
+        }
+    }
+    (Toolpath::new(ClPoint::upright(Point3::origin()), moves), head[0], [head[1], head[2], head[3]])
+}
+
+/// Against LinuxCNC's trajectory planner (`tests/planner/make_times.py`). It runs bends with √3/2 of the acceleration across the
+/// path, and chains of short moves whose pace along an axis changes with more than half of what that axis could.
+#[test]
+fn an_independent_planner_takes_the_same_time() {
+    let times = include_str!("../../../tests/planner/times.txt");
+    let both = |name: &str, text: &str, share: f64, deviation: f64| {
+        let line = times.lines().find_map(|line| line.strip_prefix(name)).unwrap();
+        let expected: f64 = line.trim().parse().unwrap();
+        let (path, rate, accelerations) = plain_program(text);
+        let machine = Machine {
+            rapid_rate: 60.0 * rate,
+            rates: [60.0 * rate; 3],
+            acceleration: share * accelerations.into_iter().fold(0.0, f64::max),
+            accelerations: accelerations.map(|most| share * most),
+            junction_deviation: deviation,
+            ..MACHINE
+        };
+        (super::super::machining_time(&path, &machine), expected)
+    };
+    // With exact stop (G61) no corner is rounded.
+    let programs = [
+        ("stop_zigzag.ngc", include_str!("../../../tests/planner/stop_zigzag.ngc"), 1.0, 1e-9),
+        ("stop_axes.ngc", include_str!("../../../tests/planner/stop_axes.ngc"), 1.0, 1e-9),
+        ("blend_zigzag.ngc", include_str!("../../../tests/planner/blend_zigzag.ngc"), 1.0, 0.01),
+        ("circle.ngc", include_str!("../../../tests/planner/circle.ngc"), 0.75f64.sqrt(), 0.01),
+    ];
+    for (name, text, share, deviation) in programs {
+        let (got, expected) = both(name, text, share, deviation);
+        assert!((got / expected - 1.0).abs() < 0.05, "{name}: {got} {expected}");
+    }
+    let wave = |share: f64| both("wave.ngc", include_str!("../../../tests/planner/wave.ngc"), share, 0.01);
+    let ((quick, expected), (slow, _)) = (wave(1.0), wave(0.5));
+    assert!(quick < expected && expected < slow, "{quick} {expected} {slow}");
 }

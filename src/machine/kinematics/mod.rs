@@ -32,6 +32,9 @@ pub use report::{JointReport, LimitViolation, Obstacle, Rewind, SINGULAR_ANGLE, 
 
 use angles::Triangle;
 
+use super::Machine;
+use super::axis_limits::AxisLimits;
+
 use geometry::{Point3, Vector3};
 use motion::ClPoint;
 
@@ -74,6 +77,8 @@ pub struct RotaryAxis {
     pub rate: f64,
     /// Greatest acceleration, rad/s².
     pub acceleration: f64,
+    /// Greatest jerk, rad/s³; infinite limits nothing.
+    pub jerk: f64,
 }
 
 /// A five-axis machine, checked.
@@ -90,6 +95,8 @@ pub struct Kinematics {
     rates: [f64; 3],
     /// Greatest acceleration of X, Y and Z, mm/s².
     accelerations: [f64; 3],
+    /// Greatest jerk of X, Y and Z, mm/s³.
+    jerks: [f64; 3],
     triangle: Triangle,
 }
 
@@ -169,6 +176,10 @@ impl Kinematics {
                 let (what, expected) = ("a rotary acceleration", "a positive number");
                 return Err(KinematicsError::Number { what, value: axis.acceleration, expected });
             }
+            if axis.jerk.is_nan() || axis.jerk <= 0.0 {
+                let (what, expected) = ("a rotary jerk", "a positive number");
+                return Err(KinematicsError::Number { what, value: axis.jerk, expected });
+            }
         }
         let [u, v] = axes.map(|axis| axis.direction);
         if u.cross(&v).norm() <= LEAST_ANGLE {
@@ -182,8 +193,8 @@ impl Kinematics {
         for (joint, limits) in ['X', 'Y', 'Z'].into_iter().zip(travel) {
             check_limits(joint, limits, GREATEST)?;
         }
-        let ([rates, accelerations], triangle) = ([[f64::INFINITY; 3]; 2], Triangle::new(u, v));
-        Ok(Self { axes, gauge_length, workpiece_zero, travel, rates, accelerations, triangle })
+        let ([rates, accelerations, jerks], triangle) = ([[f64::INFINITY; 3]; 3], Triangle::new(u, v));
+        Ok(Self { axes, gauge_length, workpiece_zero, travel, rates, accelerations, jerks, triangle })
     }
 
     /// The same with the fastest motion of X, Y and Z, mm/s; without, they are not limited.
@@ -196,6 +207,28 @@ impl Kinematics {
     #[must_use]
     pub fn with_accelerations(self, accelerations: [f64; 3]) -> Self {
         Self { accelerations, ..self }
+    }
+
+    /// The same with the greatest jerk of X, Y and Z, mm/s³; without, they are not limited.
+    #[must_use]
+    pub fn with_jerks(self, jerks: [f64; 3]) -> Self {
+        Self { jerks, ..self }
+    }
+
+    /// Greatest jerk of the five joints, mm/s³ and rad/s³; infinite ones limit nothing.
+    pub fn jerks(&self) -> [f64; 5] {
+        let [x, y, z] = self.jerks;
+        [x, y, z, self.axes[0].jerk, self.axes[1].jerk]
+    }
+
+    /// What the five joints allow.
+    pub(crate) fn axis_limits(&self, machine: &Machine) -> AxisLimits {
+        AxisLimits {
+            rates: self.rates(),
+            accelerations: self.accelerations(),
+            jerks: self.jerks(),
+            along: machine.acceleration,
+        }
     }
 
     /// Greatest acceleration of the five joints, mm/s² and rad/s².
@@ -228,6 +261,12 @@ impl Kinematics {
     /// Least and greatest X, Y and Z, machine coordinates, mm.
     pub fn travel(&self) -> &[Option<[f64; 2]>; 3] {
         &self.travel
+    }
+
+    /// Where the spindle nose is out of the way of everything, machine coordinates, mm: the upper end of Z's travel, or the machine's
+    /// zero where the travel is not known.
+    pub fn retracted_z(&self) -> f64 {
+        self.travel[2].map_or(0.0, |[_, greatest]| greatest)
     }
 
     /// The letters of the five joints.

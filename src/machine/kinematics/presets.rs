@@ -1,7 +1,7 @@
 //! Machines by name: the letters of both rotary axes in the order of the alphabet. Their letters are those of ISO 841 (A turns
 //! about x, B about y, C about z). Which axis carries which: in `ac-head` and `bc-head` C turns the fork that carries
 //! the other; in `ab-head` A carries B. In `ac-table` and `bc-table` the trunnion A or B carries the table C, as in LinuxCNC's
-//! `xyzac-trt` and `xyzbc-trt`; in `ab-table` A carries B.
+//! `xyzac-trt` and `xyzbc-trt`, which count angles the other way round; in `ab-table` A carries B.
 
 use super::{Kinematics, RotaryAxis, Side};
 use geometry::{Point3, Vector3};
@@ -70,6 +70,7 @@ pub fn preset(name: &str) -> Option<[RotaryAxis; 2]> {
         limits,
         rate: DEFAULT_ROTARY_RATE,
         acceleration: DEFAULT_ROTARY_ACCELERATION,
+        jerk: f64::INFINITY,
     }))
 }
 

@@ -97,7 +97,7 @@ pub(super) trait Course {
 }
 
 /// Appends the shares of a course and its joints there, in order and the end included, between which
-/// the tool stays within `tip` (mm; infinite where the control keeps the tip) and `axis` (rad).
+/// the tool stays within `tip` (mm; infinite where the control keeps the tip) and `axis` (rad). No two pieces in a row could be one.
 pub(super) fn refine<C: Course>(
     kinematics: &Kinematics,
     course: &C,
@@ -107,13 +107,22 @@ pub(super) fn refine<C: Course>(
 ) -> Result<(), C::Error> {
     /// Halvings of a piece: beyond, its shares are no longer told apart.
     const DEEPEST: u32 = 48;
+    let within = |from: &Joints, to: &Joints| {
+        let [tip, axis] = straying(kinematics, from, to);
+        tip <= tolerance[0] && axis <= tolerance[1]
+    };
     let mut last = (0.0, *ends[0]);
+    // A piece that may still become longer by the next one, and where it begins.
+    let (mut begin, mut piece) = (*ends[0], None::<(f64, Joints)>);
     // What is still to be reached, the nearest at the end, with the halvings that it took.
     let mut ahead = vec![(1.0, *ends[1], 0u32)];
     while let Some(&(t, joints, depth)) = ahead.last() {
-        let [tip, axis] = straying(kinematics, &last.1, &joints);
-        if tip <= tolerance[0] && axis <= tolerance[1] {
-            push(t, joints);
+        if within(&last.1, &joints) {
+            if let Some((t, before)) = piece.filter(|_| !within(&begin, &joints)) {
+                push(t, before);
+                begin = before;
+            }
+            piece = Some((t, joints));
             last = (t, joints);
             ahead.pop();
         } else if depth == DEEPEST {
@@ -125,6 +134,9 @@ pub(super) fn refine<C: Course>(
             }
             ahead.push((middle, course.joints(middle)?, depth + 1));
         }
+    }
+    if let Some((t, joints)) = piece {
+        push(t, joints);
     }
     Ok(())
 }

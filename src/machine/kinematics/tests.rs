@@ -218,3 +218,43 @@ fn what_is_no_machine_is_refused_with_a_cure() {
     assert!(Kinematics::new(first, second, f64::NAN, Point3::origin(), [None; 3]).is_err());
     assert!(Kinematics::new(first, second, 0.0, Point3::new(f64::NAN, 0.0, 0.0), [None; 3]).is_err());
 }
+
+/// LinuxCNC's `xyzac-trt-kins` and `xyzbc-trt-kins`: a point of the workpiece turns by C about the table's axis, then by A or B about
+/// the trunnion's, each as the table itself turns. That is the other way round than ISO 841 counts.
+#[test]
+fn tables_with_trunnions_are_those_of_linuxcnc_turned_round() {
+    let (centre, trunnion) = (Vector3::new(12.0, -7.0, 0.0), Vector3::new(5.0, 9.0, -40.0));
+    for (name, across) in [("ac-table", Vector3::x()), ("bc-table", Vector3::y())] {
+        let [mut first, mut second] = preset(name).unwrap();
+        // The trunnion's own offset lies across it.
+        let offset = trunnion - across * across.dot(&trunnion);
+        first.point = Point3::from(centre);
+        second.point = Point3::from(centre + offset);
+        let ours = Kinematics::new(first, second, 0.0, Point3::origin(), [None; 3]).unwrap();
+        (first.direction, second.direction) = (-first.direction, -second.direction);
+        let theirs = Kinematics::new(first, second, 0.0, Point3::origin(), [None; 3]).unwrap();
+        for k in 0..200 {
+            let [c, tilt] = [0.37 * f64::from(k), 0.011 * f64::from(k) - 1.0];
+            let p = Vector3::new(f64::from(k % 11) * 9.0, f64::from(k % 7) - 30.0, f64::from(k % 5) * 8.0);
+            // Rows of both turns, written out.
+            let from = p - centre;
+            let level = Vector3::new(
+                c.cos() * from.x - c.sin() * from.y,
+                c.sin() * from.x + c.cos() * from.y,
+                from.z,
+            );
+            let v = level - offset;
+            let (sin, cos) = tilt.sin_cos();
+            let tilted = if across.x == 1.0 {
+                Vector3::new(v.x, cos * v.y - sin * v.z, sin * v.y + cos * v.z)
+            } else {
+                Vector3::new(cos * v.x + sin * v.z, v.y, cos * v.z - sin * v.x)
+            };
+            let expected = tilted + offset + centre;
+            let got = theirs.place(Point3::from(p), [c, tilt]).linear;
+            assert!((got - expected).norm() < 1e-9, "{name}: {got} {expected}");
+            let got = ours.place(Point3::from(p), [-c, -tilt]).linear;
+            assert!((got - expected).norm() < 1e-9, "{name}: {got} {expected}");
+        }
+    }
+}

@@ -194,7 +194,7 @@ fn full_programs_keep_tip_and_feed() {
 fn no_joint_is_faster_than_its_rate() {
     let mut path = tilting_path();
     path.moves.iter_mut().for_each(|m| m.feed_rate = 12_000.0);
-    for name in ["ab-head", "ac-table", "nutating-head-c-table"] {
+    for name in PRESETS {
         let rates = [15_000.0, 12_000.0, 9_000.0];
         let kinematics = machine(name).with_rates(rates.map(|rate| rate / 60.0));
         let (text, lines, joints) = program(&path, &kinematics, Style::Full);
@@ -217,6 +217,56 @@ fn no_joint_is_faster_than_its_rate() {
         assert!(limited > 10, "{name} {limited}");
         let fastest = joints.fastest(&kinematics, &path, 15_000.0);
         assert!(fastest.iter().zip(kinematics.rates()).all(|(rate, limit)| *rate <= limit * (1.0 + 1e-12)));
+    }
+}
+
+/// Up along the machine's z alone, then the rotary axes alone, then X and Y, then Z down from above the whole path, and up again
+/// before the end, for both styles.
+#[test]
+fn programs_begin_and_end_above_the_work() {
+    let path = tilting_path();
+    for name in PRESETS {
+        let free = machine(name);
+        let [first, second] = *free.axes();
+        let travel = [None, None, Some([-900.0, 650.0])];
+        let kinematics = Kinematics::new(first, second, 140.0, free.workpiece_zero(), travel).unwrap();
+        for style in [Style::Tcp, Style::Full] {
+            let (text, _, joints) = program(&path, &kinematics, style);
+            let moves: Vec<String> = text
+                .lines()
+                .filter(|line| !line.starts_with(['(', '%', 'M', 'S']) && line.contains(kinematics.letters()))
+                .map(|line| line.chars().filter(|c| kinematics.letters().contains(c)).collect())
+                .collect();
+            let rotary: String = {
+                let mut letters = kinematics.letters()[3..].to_vec();
+                letters.sort_unstable();
+                letters.into_iter().collect()
+            };
+            assert_eq!(moves[..3], ["Z".to_owned(), rotary, "XY".to_owned()], "{name}");
+            assert_eq!(moves.last().unwrap(), "Z");
+            let lines: Vec<&str> = text.lines().collect();
+            let rises: Vec<usize> = (0..lines.len()).filter(|&k| lines[k].starts_with("G53")).collect();
+            assert!(rises.iter().all(|&k| lines[k] == "G53 G0 Z650.0"));
+            // Behind the last rise nothing moves.
+            let end = rises.last().unwrap();
+            assert!(
+                lines[end + 1..]
+                    .iter()
+                    .all(|line| !line.contains(kinematics.letters()) || line.starts_with('M'))
+            );
+            let states = states(&text, kinematics.letters());
+            let nose = joints.highest_nose(&kinematics, &path);
+            assert!(nose <= kinematics.retracted_z(), "{name}: {nose}");
+            if style == Style::Full {
+                // Straight down after X and Y, from no lower than the highest tip.
+                let over = rises[0] + 3;
+                let [high, low] = [over, over + 1].map(|k| joints_of(&kinematics, &states[k].words));
+                assert!((high.linear.xy() - low.linear.xy()).norm() < 1e-9 && high.linear.z >= low.linear.z);
+                let [up, tip] = [kinematics.upward(high.rotary), kinematics.forward(&high).tip.coords];
+                let highest = path.moves.iter().map(|m| up.dot(&m.to.tip.coords)).fold(f64::MIN, f64::max);
+                assert!(up.dot(&tip) >= highest - 1e-3, "{name}: {} {highest}", up.dot(&tip));
+            }
+        }
     }
 }
 

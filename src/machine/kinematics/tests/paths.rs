@@ -53,6 +53,14 @@ fn check(machine: &Kinematics, path: &Toolpath, following: &Following) -> JointP
         }
         last = (location.joints, *wanted);
     }
+    // No two pieces in a row of a move could be one.
+    for (k, pair) in joints.locations.windows(2).enumerate() {
+        let begin = k.checked_sub(1).map_or(joints.start, |k| joints.locations[k].joints);
+        if pair[0].step == pair[1].step && pair.iter().all(|at| at.turn == Turn::Along) {
+            let [tip, axis] = refine::straying(machine, &begin, &pair[1].joints);
+            assert!(tip > following.tip || axis > following.axis, "{pair:?}");
+        }
+    }
     for (k, step) in path.moves.iter().enumerate() {
         let end = joints.locations.iter().rfind(|l| l.step == k && l.turn == Turn::Along).unwrap();
         assert!(close(&end.at, &step.to) < 2e-6, "{k}");
