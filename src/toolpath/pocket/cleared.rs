@@ -7,7 +7,7 @@
 //! The heading is that of the straight side that the cutter runs. In a small loop it differs from the circle's by half the
 //! angle between two sides. So thinning keeps the headings.
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use geometry::{Point2, Vector2};
@@ -22,7 +22,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// Between two places the angle may exceed the limit by so much, rad, which limits of plans have to spare; and so many parts
 /// of a move are looked at where that is not sure.
-const BETWEEN: f64 = 0.02;
+const BETWEEN: f64 = 0.012;
 const BETWEEN_PLACES: usize = 8;
 
 /// Parts of the front half circle that are told apart.
@@ -31,6 +31,12 @@ const PART: f64 = PI / PARTS as f64;
 
 /// No more buckets than this along a side.
 const MAX_SIDE: f64 = 1024.0;
+
+/// Queries so near to each other, over the radius, share one list of discs.
+const NEIGHBOURS: f64 = 0.15;
+
+/// Parts of the circumference for which such a list is made.
+const SECTORS: usize = 32;
 
 /// Ground cleared by a disc.
 pub(super) struct Cleared {
@@ -42,6 +48,22 @@ pub(super) struct Cleared {
     discs: Vec<Point2>,
     /// The disc that cleared most of the last front, and how many of its parts.
     best: Cell<Option<(usize, u32)>>,
+    near: RefCell<Near>,
+    /// Buckets to which discs were added since the ground was thinned.
+    fresh: Vec<bool>,
+}
+
+/// The discs that decide about every place near to one.
+#[derive(Default)]
+struct Near {
+    anchor: Point2,
+    /// How far from the anchor the list holds, mm; 0 when it does not hold.
+    reach: f64,
+    /// How many discs there were. Later ones are asked, too.
+    count: usize,
+    discs: Vec<u32>,
+    /// Those that clear some of the circumference whole.
+    keepers: Vec<u32>,
 }
 
 impl Cleared {
@@ -51,7 +73,9 @@ impl Cleared {
         let bucket = radius.max(size.x.max(size.y) / MAX_SIDE);
         let side = [size.x, size.y].map(|s| (s / bucket).floor() as usize + 1);
         let buckets = vec![Vec::new(); side[0] * side[1]];
-        Self { radius, origin: lo, bucket, side, buckets, discs: Vec::new(), best: Cell::new(None) }
+        let fresh = vec![false; buckets.len()];
+        let (best, near) = (Cell::new(None), RefCell::new(Near::default()));
+        Self { radius, origin: lo, bucket, side, buckets, discs: Vec::new(), best, near, fresh }
     }
 
     /// How many places there are.
@@ -72,11 +96,16 @@ impl Cleared {
     pub fn add(&mut self, p: Point2) {
         let bucket = self.bucket_of(&p);
         self.buckets[bucket].push(self.discs.len() as u32);
+        self.fresh[bucket] = true;
         self.discs.push(p);
     }
 
     /// Takes back all but the first `count` places.
     pub fn truncate(&mut self, count: usize) {
+        let near = self.near.get_mut();
+        if near.count > count {
+            near.reach = 0.0;
+        }
         while self.discs.len() > count {
             if let Some(p) = self.discs.pop() {
                 let bucket = self.bucket_of(&p);
@@ -94,9 +123,13 @@ impl Cleared {
     pub fn thin(&mut self, count: usize) -> usize {
         let count = count.min(self.discs.len());
         let mut keep = vec![true; self.discs.len()];
+        let changed = self.changed();
         let mut seen: Vec<[f64; 2]> = Vec::new();
         for k in 0..count {
             let centre = self.discs[k];
+            if !changed[self.bucket_of(&centre)] {
+                continue;
+            }
             seen.clear();
             self.each_near(&centre, self.radius, |other| {
                 let to = self.discs[other] - centre;
@@ -116,7 +149,27 @@ impl Cleared {
         self.buckets.iter_mut().for_each(Vec::clear);
         self.discs.clear();
         kept.into_iter().for_each(|p| self.add(p));
+        self.near.get_mut().reach = 0.0;
+        // Those that could not be left out yet are looked at again.
+        self.fresh.fill(false);
+        for k in count - left_out..self.discs.len() {
+            let bucket = self.bucket_of(&self.discs[k]);
+            self.fresh[bucket] = true;
+        }
         left_out
+    }
+
+    /// Buckets whose discs may be covered since the ground was thinned: discs were added within a radius.
+    fn changed(&self) -> Vec<bool> {
+        let [width, height] = self.side;
+        let mut changed = vec![false; self.buckets.len()];
+        for at in (0..self.fresh.len()).filter(|at| self.fresh[*at]) {
+            let (i, j) = (at % width, at / width);
+            for j in j.saturating_sub(1)..=(j + 1).min(height - 1) {
+                changed[j * width + i.saturating_sub(1)..=j * width + (i + 1).min(width - 1)].fill(true);
+            }
+        }
+        changed
     }
 
     /// The discs whose centres may be within `reach` of a place, by bucket.
@@ -161,25 +214,79 @@ impl Cleared {
             front.clear(self.discs[k] - centre, grown(k));
         }
         best = known.map(|k| (k, 0));
-        let [lo, hi] = front.reach(self.radius * (1.0 + FILM)).map(|corner| centre + corner - self.origin);
-        for j in self.column(1, lo.y)..=self.column(1, hi.y) {
-            for i in self.column(0, lo.x)..=self.column(0, hi.x) {
-                // The last ground leaves so little standing that most of the older is passed over.
-                for &k in self.buckets[j * self.side[0] + i].iter().rev() {
-                    let k = k as usize;
-                    let cleared = front.clear(self.discs[k] - centre, grown(k));
-                    if cleared > 0 && best.is_none_or(|(_, most)| cleared > most) {
-                        best = Some((k, cleared));
-                    }
-                    if front.ends.is_none() {
-                        self.best.set(best);
-                        return Arc::NONE;
-                    }
-                }
+        let mut near = self.near.borrow_mut();
+        if near.reach == 0.0 || (centre - near.anchor).norm() + half > near.reach {
+            self.list(&mut near, centre);
+        }
+        let later = (near.count..self.discs.len()).rev();
+        // The last ground leaves so little standing that most of the older is passed over.
+        for k in later.chain(near.discs.iter().map(|k| *k as usize)) {
+            if front.ends.is_none() {
+                break;
+            }
+            let cleared = front.clear(self.discs[k] - centre, grown(k));
+            if cleared > 0 && best.is_none_or(|(_, most)| cleared > most) {
+                best = Some((k, cleared));
             }
         }
         self.best.set(best);
         front.standing
+    }
+
+    /// Lists the discs that decide about all places near to one, the last first: those that may clear a sector of the circumference
+    /// which no disc clears whole wherever the place is, and for each other sector one that does.
+    fn list(&self, near: &mut Near, anchor: &Point2) {
+        let reach = NEIGHBOURS * self.radius;
+        let off = reach + self.radius * PI / SECTORS as f64;
+        let (whole, touched) = ((self.radius - off).powi(2), (self.radius * (1.0 + FILM) + off).powi(2));
+        let sector = |k: usize| {
+            let (sin, cos) = (TAU * k as f64 / SECTORS as f64).sin_cos();
+            Vector2::new(cos, sin) * self.radius
+        };
+        let mut open: [Vector2; SECTORS] = std::array::from_fn(sector);
+        let mut left = SECTORS;
+        let mut keep = |k: u32, keepers: &mut Vec<u32>| {
+            let to = self.discs[k as usize] - anchor;
+            let before = left;
+            let mut at = 0;
+            while at < left {
+                if (open[at] - to).norm_squared() < whole {
+                    left -= 1;
+                    open.swap(at, left);
+                } else {
+                    at += 1;
+                }
+            }
+            if left < before {
+                keepers.push(k);
+            }
+            left
+        };
+        let known = std::mem::take(&mut near.keepers);
+        for k in known.into_iter().filter(|k| (*k as usize) < self.discs.len()) {
+            keep(k, &mut near.keepers);
+        }
+        near.discs.clear();
+        let most = 2.0 * self.radius + off;
+        self.each_near(anchor, most, |k| {
+            if (self.discs[k] - anchor).norm_squared() < most * most {
+                near.discs.push(k as u32);
+            }
+        });
+        for k in near.discs.iter().rev() {
+            if keep(*k, &mut near.keepers) == 0 {
+                break;
+            }
+        }
+        let open = &open[..left];
+        near.discs.retain(|k| {
+            let to = self.discs[*k as usize] - anchor;
+            open.iter().any(|sector| (sector - to).norm_squared() < touched)
+        });
+        near.discs.extend(&near.keepers);
+        near.discs.sort_unstable_by(|a, b| b.cmp(a));
+        near.discs.dedup();
+        (near.anchor, near.reach, near.count) = (*anchor, reach, self.discs.len());
     }
 }
 
@@ -209,15 +316,6 @@ impl Front {
                 Vector2::new(heading.x * cos - heading.y * sin, heading.x * sin + heading.y * cos) * radius
             })
         });
-    }
-
-    /// Corners of a box that holds the middles of all discs up to the radius `grown` that may clear any of what stands.
-    fn reach(&self, grown: f64) -> [Vector2; 2] {
-        let Some([a, b]) = self.ends else { return [Vector2::zeros(); 2] };
-        // The circle about the middle of the chord holds the arc, which is no longer than half a turn.
-        let reach = 0.5 * (b - a).norm() + grown + self.half;
-        let middle = 0.5 * (a + b);
-        [-reach, reach].map(|reach| middle.add_scalar(reach))
     }
 
     /// Whether a disc meets the circumference between the ends: it does along an arc about its direction, which holds an end
@@ -280,7 +378,6 @@ struct Arc([u64; PARTS / 64]);
 
 impl Arc {
     const FRONT: Self = Self([u64::MAX; PARTS / 64]);
-    const NONE: Self = Self([0; PARTS / 64]);
 
     /// Clears the parts whose middles lie between two angles from the heading, less than a turn apart; how many stood.
     fn clear(&mut self, from: f64, to: f64) -> u32 {
@@ -410,5 +507,39 @@ mod tests {
         assert!(ground.arc(&at, &x, usize::MAX) < before);
         ground.truncate(count);
         assert_eq!(ground.arc(&at, &x, usize::MAX), before);
+    }
+
+    /// Angles are the same whether queries share a list of discs or each has its own.
+    #[test]
+    fn lists_of_discs_change_no_angle() {
+        let mut ground = cleared((0..30).flat_map(|k| {
+            let y = -6.0 + 0.3 * f64::from(k);
+            line(Point2::new(-12.0, y), Point2::new(12.0 - 0.2 * f64::from(k), y))
+        }));
+        let mut at = Point2::new(9.0, 4.0);
+        let mut angles = 0;
+        for k in 0..600 {
+            let turn = 0.1 * f64::from(k);
+            at += Vector2::new(turn.cos(), (0.37 * turn).sin()) * 0.2;
+            if k % 7 == 0 {
+                ground.add(at);
+            }
+            if k % 50 == 0 {
+                let count = ground.len();
+                ground.thin(count);
+            }
+            let heading = Vector2::new((3.0 * turn).cos(), (3.0 * turn).sin());
+            let fresh = ground.len().saturating_sub(20);
+            for (to, half) in [(at, 0.0), (at + heading * 0.2, 0.1)] {
+                let found = ground.front(&to, &heading, half, fresh).angle();
+                let mut all = Front::new(ground.radius, &heading, half);
+                for (k, disc) in ground.discs.iter().enumerate() {
+                    all.clear(disc - to, ground.radius * if k < fresh { 1.0 + FILM } else { 1.0 });
+                }
+                assert_eq!(found, all.standing.angle(), "{k}");
+                angles += usize::from(found > 0.0 && found < PI);
+            }
+        }
+        assert!(angles > 300, "{angles}");
     }
 }

@@ -13,7 +13,7 @@ use geometry::{Point2, Vector2};
 
 /// Radii of the arcs over the cutter's, the first that has a free way is taken. Greater ones make longer links, which are half of
 /// a path in narrow places.
-const RADII: [f64; 2] = [0.25, 0.1];
+const RADII: [f64; 2] = [0.15, 0.1];
 
 /// Sides of arcs turn by at most so much, rad: their chords stay far within a film of the arc.
 const SIDE: f64 = 0.1;

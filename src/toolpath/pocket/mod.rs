@@ -65,8 +65,9 @@ const SPACING: f64 = 0.25;
 /// Share of the chord tolerance that straight moves may be off the curves that they stand for.
 const CHORDS_SHARE: f64 = 0.5;
 
-/// What is left on walls for the decimals of the program, mm: more than the diagonal of their rounding.
-const WRITTEN: f64 = 1.5 * ROUNDING;
+/// What is left on walls for the decimals of the program, mm. Rounding cuts in by less than their last decimal, and no layer as
+/// thin as that stays along walls whose places have no more decimals.
+const WRITTEN: f64 = 0.5 * ROUNDING;
 
 /// Precision of the largest cutter that an error names, mm.
 const DISC_PRECISION: f64 = 0.005;

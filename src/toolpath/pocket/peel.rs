@@ -36,14 +36,7 @@ const CORNERS: f64 = 0.01;
 /// Turns that are tried for one step at most.
 const TRIALS: usize = 8;
 
-/// A pass ends when it cut nothing over so long a way, over the radius.
-const FREE: f64 = 1.0;
-
-/// Passes that cut along a way shorter than this over the radius are none.
-const LEAST_CUT: f64 = 0.1;
-
-/// Places where passes may begin are this far apart, and stock is looked for so far to the right of them, over the radius.
-const APART: f64 = 0.2;
+/// Stock is looked for so far to the right of a place, over the radius.
 const PROBE: f64 = 0.1;
 
 /// Angle in stock that tells that there is some, rad.
@@ -51,6 +44,17 @@ const STOCK: f64 = 0.02;
 
 /// Places this far behind, over the radius, are beside the move's own chip.
 const FRESH: f64 = 0.5;
+
+/// A pass ends when it cut nothing over so long a way, over the radius: the first less the second for each radius of a pass's width.
+/// Wide passes that go on for longer gain less than links take, narrow ones leave bits to the loops when they end too soon.
+const FREE: [f64; 2] = [0.3, 0.3];
+const LEAST_FREE: f64 = 0.1;
+
+/// Passes that cut along a way shorter than this over the radius are none.
+const LEAST_CUT: f64 = 0.1;
+
+/// Places where passes may begin are this far apart over the radius.
+const APART: f64 = 0.35;
 
 /// A place of a pass where another one may begin.
 struct Beginning {
@@ -76,6 +80,8 @@ pub(super) struct Peeler<'a> {
     cleared: &'a mut Cleared,
     limit: f64,
     radius: f64,
+    /// A pass ends when it cut nothing over so long a way, mm.
+    longest_free: f64,
     out: Vec<Point2>,
     places: Vec<Beginning>,
     passes: usize,
@@ -98,6 +104,7 @@ impl<'a> Peeler<'a> {
             cleared,
             limit,
             radius,
+            longest_free: (FREE[0] - FREE[1] * (1.0 - limit.cos())).max(LEAST_FREE) * radius,
             out: Vec::new(),
             places: Vec::new(),
             passes: 0,
@@ -236,7 +243,7 @@ impl<'a> Peeler<'a> {
             } else {
                 free += length;
             }
-            if free > FREE * self.radius {
+            if free > self.longest_free {
                 break;
             }
             step = full.min(2.0 * step);
@@ -259,12 +266,12 @@ impl<'a> Peeler<'a> {
     /// Leaves out what the first `count` places of the ground cover of each other, from time to time; how many those were.
     fn thin(&mut self, count: usize) -> usize {
         /// Fewer are no matter.
-        const FEW: usize = 200;
+        const FEW: usize = 150;
         if self.cleared.len() < self.thin_at {
             return 0;
         }
         let left_out = self.cleared.thin(count);
-        self.thin_at = self.cleared.len() * 5 / 4 + FEW;
+        self.thin_at = self.cleared.len() + FEW;
         left_out
     }
 

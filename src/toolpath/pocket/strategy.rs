@@ -249,9 +249,11 @@ impl PocketStrategy {
     /// Angle of the cutter in stock, rad, that passes are planned within, if they are.
     pub(super) fn bounded(&self) -> Option<f64> {
         /// Planned for less by this, rad, which is what sides of polylines, films and the parts in which
-        /// angles are told apart add.
-        const SPARE: f64 = 0.04;
-        self.engagement.filter(|angle| *angle < std::f64::consts::PI).map(|angle| angle - SPARE)
+        /// angles are told apart add. Loops alone, whose sides turn, need more.
+        const SPARE: f64 = 0.025;
+        const SPARE_OF_LOOPS: f64 = 0.04;
+        let spare = if self.pattern.peels() { SPARE } else { SPARE_OF_LOOPS };
+        self.engagement.filter(|angle| *angle < std::f64::consts::PI).map(|angle| angle - spare)
     }
 
     /// What passes are bounded by, if they are.

@@ -13,6 +13,9 @@ pub(super) const ROUNDING: f64 = 5.0e-7;
 /// Places nearer to the piece's wall than this, mm, are on it: far above rounding, far below any tolerance.
 const ON_WALL: f64 = 1.0e-6;
 
+/// Tips between round corners are moved by less than this over the radius.
+const NEAR_TIP: f64 = 0.02;
+
 /// The piece of the cutter's centre.
 pub(super) struct Room<'a> {
     piece: &'a Piece,
@@ -142,21 +145,46 @@ impl<'a> Room<'a> {
 /// tangents at its ends. So no side comes nearer to a wall than the radius, and straight ones stand just there.
 pub(super) fn tangent(inset: Region, region: &Region, radius: f64) -> Region {
     let walls = SegmentGrid::of_curves(region.curves());
-    let corner = |a: &Point2, b: &Point2| {
+    // The nearest place of the walls where a chord comes nearer than the radius, and which of its ends are on the circle.
+    let chord = |a: &Point2, b: &Point2| {
         let middle = nalgebra::center(a, b);
         let near = walls.nearest(&middle).filter(|near| near.distance < radius - ROUNDING)?;
         let [from, to] = walls.segments()[near.segment as usize].ends;
         let foot = from + (to - from) * near.share;
         let on_circle = |p: &Point2| ((p - foot).norm() - radius).abs() < ROUNDING;
-        let scale = (radius / near.distance).powi(2);
-        (on_circle(a) && on_circle(b)).then(|| foot + (middle - foot) * scale)
+        Some((foot, [on_circle(a), on_circle(b)]))
+    };
+    let corner = |a: &Point2, b: &Point2| {
+        let (foot, _) = chord(a, b).filter(|(_, on)| *on == [true, true])?;
+        let out = nalgebra::center(a, b) - foot;
+        Some(foot + out * (radius * radius / out.norm_squared()))
+    };
+    // A chord that another one ends early ends where both circles meet.
+    let tip = |before: &Point2, p: &Point2, after: &Point2| {
+        let (Some((one, [true, false])), Some((other, [false, true]))) = (chord(before, p), chord(p, after))
+        else {
+            return *p;
+        };
+        let (half, middle) = (0.5 * (other - one), nalgebra::center(&one, &other));
+        let (square, off) = (half.norm_squared(), p - middle);
+        let out = (off - half * (off.dot(&half) / square)).try_normalize(0.0);
+        let met = out.map(|out| middle + out * (radius * radius - square).max(0.0).sqrt());
+        met.filter(|met| (met - p).norm() < NEAR_TIP * radius).unwrap_or(*p)
     };
     let rounded = |curve: Vec<Point2>| {
         let n = curve.len();
+        let tips = (0..n).map(|k| tip(&curve[(k + n - 1) % n], &curve[k], &curve[(k + 1) % n]));
+        let curve: Vec<Point2> = tips.collect();
         let corners: Vec<Option<Point2>> = (0..n).map(|k| corner(&curve[k], &curve[(k + 1) % n])).collect();
-        // Between two tangents an end of chords lies on their common line.
-        let begin =
-            |k: usize| (corners[k].is_none() || corners[(k + n - 1) % n].is_none()).then_some(curve[k]);
+        // Between two tangents an end of chords lies on their common line, but in a tip.
+        let begin = |k: usize| {
+            let before = (k + n - 1) % n;
+            let smooth = corners[before].zip(corners[k]).is_some_and(|(a, b)| {
+                let (a, b) = (curve[k] - a, b - curve[k]);
+                a.perp(&b).abs() < ROUNDING * (a.norm() + b.norm()) && a.dot(&b) > 0.0
+            });
+            (!smooth).then_some(curve[k])
+        };
         (0..n).flat_map(|k| begin(k).into_iter().chain(corners[k])).collect::<Vec<Point2>>()
     };
     let pieces = inset.pieces.into_iter().map(|piece| Piece {
@@ -264,6 +292,26 @@ mod tests {
             assert!((nearest(&round) - radius).abs() < ROUNDING, "{}", nearest(&round));
             let walls = SegmentGrid::of_curves(region.curves());
             assert!(round.curves().flatten().all(|p| walls.distance(p) < radius * (1.0 + 2e-4)));
+        }
+    }
+
+    /// In front of a neck that is too narrow two round corners meet in a tip.
+    #[test]
+    fn tips_between_round_corners_keep_the_radius() {
+        let (low, high) = (points(&[(0., 0.), (20., 0.)]), points(&[(20., 20.), (0., 20.)]));
+        for width in [7.6, 7.9, 7.98] {
+            let (a, b) = (10.0 - 0.5 * width, 10.0 + 0.5 * width);
+            let neck = points(&[(20., a), (26., a), (26., b), (20., b)]);
+            let outline = [low.clone(), neck, high.clone()].concat();
+            let region = Region::nested(vec![outline]).unwrap().0;
+            let radius = 4.0;
+            let inset = region.inset(radius - Region::offset_excess(radius));
+            let round = tangent(inset, &region, radius);
+            let walls = Walls::new(&region, radius - 2.0 * ROUNDING);
+            let sides = SegmentGrid::of_curves(round.curves());
+            let corner = Point2::new(20.0, a);
+            assert!((sides.distance(&corner) - radius).abs() < 2.0 * ROUNDING);
+            assert!(sides.segments().iter().all(|side| walls.hold(&side.ends[0], &side.ends[1])), "{width}");
         }
     }
 
