@@ -4,8 +4,8 @@
 //! Along a straight piece of a border, of a triangle with the normal n, the depth of one move along n (or any one direction) is a
 //! concave function of the place: what the move sweeps is convex. So three places bound it between them, and halving finds its greatest.
 //!
-//! The part ends at a border as at a vertical wall. Where the normal leads out through it, the depth is that along the wall: what lies
-//! beyond belongs to no part.
+//! The part ends at a border as at a vertical wall. Where the way down along the normal leads out through it, the depth is no more
+//! than that along the wall: what lies beyond belongs to no part. The lesser of two concave depths is concave, too.
 //!
 //! Limits: where only the side of the cutter reaches over the border, by less than the gouge tolerance, nothing is deeper than
 //! that; such places are left out.
@@ -56,15 +56,11 @@ impl BorderPiece {
         self.ends[0] + (self.ends[1] - self.ends[0]) * share
     }
 
-    /// The direction that depths at a place with a normal are measured against: the normal, without what of it would lead down
-    /// through the border.
-    fn upward(&self, normal: &Vector3) -> Vector3 {
+    /// Whether a way down against the normal of a place leads out over the border.
+    fn leads_out(&self, normal: &Vector3) -> bool {
         let along = self.ends[1] - self.ends[0];
         let across = Vector3::new(-along.y, along.x, 0.0);
-        let inward = across * across.dot(&self.inward).signum();
-        let leading_out = normal.dot(&inward).max(0.0);
-        let upward = normal - inward * (leading_out / inward.norm_squared().max(f64::MIN_POSITIVE));
-        upward.try_normalize(0.0).unwrap_or(*normal)
+        normal.dot(&across) * across.dot(&self.inward) > 0.0
     }
 
     /// The piece is no nearer to a stretch of the plan, mm.
@@ -139,7 +135,8 @@ impl Nearby {
     }
 }
 
-/// How deep a move cuts at a place along a direction, negative above it; `None` where it does not pass.
+/// How deep a move cuts at a place along a direction, negative above it; infinite where it goes along the cutter's flank, and
+/// `None` where the move does not pass.
 fn depth(surface: &CutSurface<'_>, by: u32, place: &Point3, normal: &Vector3) -> Option<f64> {
     let mut t = 0.0;
     for _ in 0..STEPS {
@@ -147,8 +144,11 @@ fn depth(surface: &CutSurface<'_>, by: u32, place: &Point3, normal: &Vector3) ->
         let (z, m) = surface.envelope.height_and_normal(by, q.x, q.y)?;
         let gap = q.z - z;
         let facing = m.dot(normal);
-        if gap.abs() < 0.1 * NUMERICAL_FLOOR || facing <= 0.0 {
+        if gap.abs() < 0.1 * NUMERICAL_FLOOR {
             break;
+        }
+        if facing <= 0.0 {
+            return Some(if gap > 0.0 { f64::INFINITY } else { t });
         }
         t += gap * m.z / facing;
     }
@@ -232,7 +232,11 @@ impl Inspection<'_> {
             // The side alone does not reach so far.
             let inside = place + piece.inward * self.limits.gouge;
             self.surface.envelope.height(by, inside.x, inside.y)?;
-            depth(self.surface, by, &place, &piece.upward(&normal))
+            let along = depth(self.surface, by, &place, &normal)?;
+            if along.is_finite() && !piece.leads_out(&normal) {
+                return Some(along);
+            }
+            Some(along.min(depth(self.surface, by, &place, &Vector3::z())?))
         };
         // What a border bends by between two places spoils concavity by as much; it falls with the square of their distance.
         let bend = if is_patch { 2.0 * self.part.mesh_deviation() } else { 0.0 };
@@ -358,7 +362,7 @@ mod tests {
     }
 
     /// A ball beside a border that the part rises to: the normal leads out over the border, nearly along the ball's flank, and
-    /// would find a depth many times that of the cut. It is that along the border's wall.
+    /// would find a depth many times that of the cut. It is no more than that along the border's wall.
     #[test]
     fn depths_do_not_lead_out_over_a_border() {
         let rising = TriangleMesh::new(
@@ -373,6 +377,14 @@ mod tests {
             let off = (found.max_depth_mm - deep).abs();
             assert!(off <= found.error_bound_mm + 1e-6 && off < 1e-5, "{beside} {deep}: {found:?}");
         }
+        // A pass down the slope cuts evenly deep, at the border as well: along z that would be more.
+        let (deep, normal) = (0.02, Vector3::new(3.6, 0.0, 8.0).normalize());
+        let tip = |x: f64| {
+            let centre = Point3::new(x, 3.0, 3.6 - 0.45 * x) + normal * (3.0 - deep);
+            Point3::new(centre.x, centre.y, centre.z - 3.0)
+        };
+        let found = gouge_of(&part, &Cutter::ball(6.0).unwrap(), &[vec![tip(-6.0), tip(14.0)]], 0.1);
+        assert!((found.max_depth_mm - deep).abs() < 1e-6, "{found:?}");
     }
 
     /// The side of a flat end mill reaches over the border by less than the tolerance: no gouge as deep as it stands. By more it is
