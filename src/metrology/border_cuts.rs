@@ -236,7 +236,7 @@ impl Inspection<'_> {
             if along.is_finite() && !piece.leads_out(&normal) {
                 return Some(along);
             }
-            Some(along.min(depth(self.surface, by, &place, &Vector3::z())?))
+            Some(along.min(place.z - self.surface.envelope.height(by, place.x, place.y)?))
         };
         // What a border bends by between two places spoils concavity by as much; it falls with the square of their distance.
         let bend = if is_patch { 2.0 * self.part.mesh_deviation() } else { 0.0 };
