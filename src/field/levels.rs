@@ -84,10 +84,14 @@ impl<'a> LevelTracer<'a> {
             .into_iter()
             .filter(|chain| chain.points.len() >= 2)
             .map(|chain| {
-                let traced = self.trace(chain.points[0], chain.points[1], level, chain.closed);
-                let (a, b) = (self.length(&traced), self.length(&chain));
-                let honest = a < LENGTH_RATIO * b + 2.0 * self.step && b < LENGTH_RATIO * a + 2.0 * self.step;
-                if honest { traced } else { chain }
+                let length = self.length(&chain);
+                let longest = LENGTH_RATIO * length + 2.0 * self.step;
+                let traced = self.trace(&chain, level, longest);
+                let honest = |curve: &LevelCurve| {
+                    let traced = self.length(curve);
+                    traced < longest && length < LENGTH_RATIO * traced + 2.0 * self.step
+                };
+                traced.filter(honest).unwrap_or(chain)
             })
             .filter(|curve| curve.points.len() >= 2)
             .collect()
@@ -156,18 +160,18 @@ impl<'a> LevelTracer<'a> {
         Some([p[0] + h * mean(0), p[1] + h * mean(1)])
     }
 
-    /// Traces from `seed` toward `next` until the domain's border or the seed is reached again.
-    fn trace(&self, seed: [f64; 2], next: [f64; 2], level: f64, closed: bool) -> LevelCurve {
-        let seed = self.onto_level(seed, level);
+    /// Traces from the first point of a chain toward the second, until the domain's border or the beginning is reached again;
+    /// `None` where that takes `longest` mm or more.
+    fn trace(&self, chain: &LevelCurve, level: f64, longest: f64) -> Option<LevelCurve> {
+        let (next, closed) = (chain.points[1], chain.closed);
+        let seed = self.onto_level(chain.points[0], level);
         let mut points = vec![seed];
         let sense = match self.direction(seed) {
             Some(d) if d[0] * (next[0] - seed[0]) + d[1] * (next[1] - seed[1]) < 0.0 => -1.0,
             _ => 1.0,
         };
-        // More steps than the domain's grid could hold mean that the trace goes in circles.
-        let most = 40 * (self.cells + 1) + (1e3 * self.diagonal() / self.step) as usize;
-        let mut travelled = 0.0;
-        while points.len() < most.min(2_000_000) {
+        let (mut travelled, mut length) = (0.0, 0.0);
+        loop {
             let p = points[points.len() - 1];
             let Some(q) = self.step(p, sense * self.step) else { break };
             if !self.inside(q) {
@@ -175,22 +179,22 @@ impl<'a> LevelTracer<'a> {
                 break;
             }
             let q = self.onto_level(q, level);
-            let advanced = self.distance(p, q) / self.step;
+            let advance = self.distance(p, q);
+            let advanced = advance / self.step;
             if !(LEAST_ADVANCE..MOST_ADVANCE).contains(&advanced) {
                 break;
             }
             travelled += self.step;
+            length += advance;
+            if length >= longest {
+                return None;
+            }
             if closed && travelled > 3.0 * self.step && self.distance(q, seed) < 0.75 * self.step {
                 break;
             }
             points.push(q);
         }
-        LevelCurve { points, closed }
-    }
-
-    fn diagonal(&self) -> f64 {
-        let [[u0, u1], [v0, v1]] = self.domain;
-        self.distance([u0, v0], [u1, v1])
+        Some(LevelCurve { points, closed })
     }
 
     /// Where the level curve from `p` (inside) to `q` (outside) crosses the border: the point of
