@@ -68,10 +68,16 @@ const STILL_WIDE: f64 = 1e-6;
 const LEAST_GAIN: f64 = 0.1;
 
 /// Plans in vain whose high places are narrowed in the next one.
-const MOST_FOLLOWED: usize = 2;
+const MOST_FOLLOWED: usize = 1;
 
-/// The plan in vain after which all is narrowed in proportion.
-const MOST_IN_VAIN: usize = MOST_FOLLOWED + 1;
+/// Plans in vain after which no other is made. Behind those that are followed, all is narrowed in proportion.
+const MOST_IN_VAIN: usize = MOST_FOLLOWED + 3;
+
+/// A place takes at most so many intervals of a pass of its own.
+const TOUCH_UP_LENGTH: f64 = 3.0;
+
+/// Passes of their own are no longer in all than this share of the path.
+const MOST_TOUCH_UP: f64 = 0.02;
 
 /// Cells from pass to pass while only ridges are measured.
 const CELLS_A_PASS: f64 = 4.0;
@@ -298,7 +304,8 @@ impl Session {
             return Ok((first, measured));
         };
         let interval = plane_interval(&self.scene.cutter, request.step);
-        let widths = Widths { places: Vec::new(), everywhere: 1.0, finer: Vec::new(), interval };
+        let widths =
+            Widths { places: Vec::new(), everywhere: 1.0, finer: Vec::new(), touch_up: Vec::new(), interval };
         let rounds = vec![standing.round];
         let mut corrected = Corrected {
             session: self,
@@ -423,29 +430,53 @@ impl Corrected<'_> {
         if round.highest() > NEVER_CUT * target {
             return None;
         }
-        let scaled = |height: f64| self.widths.scaled((aim(target) / height).sqrt().max(MOST_NARROWED));
-        let in_proportion =
-            || (round.highest_mm + round.margin(target) > target).then(|| scaled(round.highest_mm));
-        let followed = || {
-            let (widths, standing) =
-                self.latest.as_ref().map_or((&self.widths, &self.standing), |latest| (&latest.0, &latest.1));
-            let high = self.standing_high(standing);
-            (!high.is_empty()).then(|| widths.narrowed(&high))
+        let scaled =
+            |widths: &Widths, height: f64| widths.scaled((aim(target) / height).sqrt().max(MOST_NARROWED));
+        let (latest_widths, latest) =
+            self.latest.as_ref().map_or((&self.widths, &self.standing), |latest| (&latest.0, &latest.1));
+        let in_proportion = || {
+            let round = &latest.round;
+            (round.highest_mm + round.margin(target) > target)
+                .then(|| scaled(latest_widths, round.highest_mm))
         };
+        let followed = || self.corrected(latest_widths, latest);
         match (round.holds(&self.goal), in_vain) {
-            (true, 0) => (round.highest() < (1.0 - slack) * target).then(|| scaled(round.highest())),
-            (true, 1) => self.latest.as_ref().and_then(|_| followed()),
-            (false, 0) => {
-                let is_raised = self.raised_by_chords();
-                let (raised, others): (Vec<_>, Vec<_>) =
-                    self.standing_high(&self.standing).into_iter().partition(|place| is_raised(place));
-                let none = raised.is_empty() && others.is_empty();
-                if none { in_proportion() } else { Some(self.widths.finer(&raised).narrowed(&others)) }
+            (true, 0) => {
+                (round.highest() < (1.0 - slack) * target).then(|| scaled(&self.widths, round.highest()))
             }
+            (true, 1) => self.latest.as_ref().and_then(|_| followed()),
+            (false, 0) => self.corrected(&self.widths, &self.standing).or_else(in_proportion),
             (false, ..=MOST_FOLLOWED) => followed().or_else(in_proportion),
-            (false, MOST_IN_VAIN) => in_proportion(),
+            (false, ..=MOST_IN_VAIN) => in_proportion(),
             _ => None,
         }
+    }
+
+    /// The widths of a plan corrected by the places where it leaves too much. Few get passes of their own, once. Of many, or
+    /// where that was no help, those that chords may have raised get shorter chords, and others narrower widths. `None` without
+    /// such places.
+    fn corrected(&self, widths: &Widths, standing: &Standing) -> Option<Widths> {
+        let high = self.standing_high(standing);
+        if high.is_empty() {
+            return None;
+        }
+        if self.are_few(&high) && !high.iter().any(|place| widths.is_touched_up(place)) {
+            return Some(widths.touched_up(&high));
+        }
+        let is_raised = self.raised_by_chords(widths);
+        let (raised, others): (Vec<_>, Vec<_>) = high.into_iter().partition(is_raised);
+        Some(widths.finer(&raised).narrowed(&others))
+    }
+
+    /// Whether places take so little that passes of their own are shorter than any narrower widths.
+    fn are_few(&self, places: &[HighPlace]) -> bool {
+        let interval = self.widths.interval;
+        let cell = |at: &Point3| at.coords.map(|x| (x / interval).floor() as i64);
+        let mut cells: Vec<[i64; 3]> = places.iter().map(|place| cell(&place.at).into()).collect();
+        cells.sort_unstable();
+        cells.dedup();
+        let length = TOUCH_UP_LENGTH * interval * cells.len() as f64;
+        self.request.axis.is_none() && length <= MOST_TOUCH_UP * self.standing.round.cutting_length_mm
     }
 
     /// The places of a plan that may stand above the target.
@@ -461,10 +492,10 @@ impl Corrected<'_> {
     }
 
     /// Whether it may be that chords alone have raised a place above the target, and shorter ones would not.
-    fn raised_by_chords(&self) -> impl Fn(&HighPlace) -> bool {
+    fn raised_by_chords(&self, widths: &Widths) -> impl Fn(&HighPlace) -> bool {
         let most = RAISED_BY_CHORDS * self.session.scene.tolerance.chord;
         let can_be_shorter = self.request.axis.is_none() && !self.request.joining.smoothing;
-        let chords = self.widths.chords();
+        let chords = widths.chords();
         move |place| can_be_shorter && place.over <= most && chords.at(&place.tip) == 1.0
     }
 
@@ -473,8 +504,12 @@ impl Corrected<'_> {
         monitor::check(monitor)?;
         let correction = widths.correction();
         let factors = correction.range();
-        let earlier =
-            Earlier { correction, chords: widths.chords(), functions: self.best.plan.functions.clone() };
+        let earlier = Earlier {
+            correction,
+            chords: widths.chords(),
+            touch_up: widths.touch_up.clone(),
+            functions: self.best.plan.functions.clone(),
+        };
         Ok((self.session.plan(self.request, self.around, Some(Arc::new(earlier)), monitor)?, factors))
     }
 
@@ -540,6 +575,8 @@ struct Widths {
     everywhere: f64,
     /// Tips of the cutter around which chords are shorter, with the factor of their tolerance.
     finer: Vec<(Point3, f64)>,
+    /// Places that get passes of their own, while all others stay where they are.
+    touch_up: Vec<Point3>,
     /// How far around a place its factor holds, mm: the interval of passes on a plane.
     interval: f64,
 }
@@ -550,7 +587,20 @@ impl Widths {
     }
 
     fn scaled(&self, factor: f64) -> Self {
-        Self { everywhere: factor * self.everywhere, ..self.clone() }
+        Self { everywhere: factor * self.everywhere, touch_up: Vec::new(), ..self.clone() }
+    }
+
+    /// Whether a pass of its own was to serve a place.
+    fn is_touched_up(&self, place: &HighPlace) -> bool {
+        self.touch_up.iter().any(|at| (at - place.at).norm() <= 0.5 * self.interval)
+    }
+
+    /// With passes of their own over places, the highest first.
+    fn touched_up(&self, places: &[HighPlace]) -> Self {
+        let mut places = places.to_vec();
+        places.sort_by(|a, b| b.over.total_cmp(&a.over));
+        let touch_up = self.touch_up.iter().copied().chain(places.iter().map(|place| place.at)).collect();
+        Self { touch_up, ..self.clone() }
     }
 
     /// The factor of the chord tolerance around tips of the cutter.
@@ -569,13 +619,17 @@ impl Widths {
     /// with the square of width. A place that was narrowed already and did not give way enough is narrowed by twice as much:
     /// there passes may lie nearer than they have to, or less than all of the height goes with their width.
     fn narrowed(&self, places: &[HighPlace]) -> Self {
+        if places.is_empty() {
+            return self.clone();
+        }
         let now = Correction::new(&self.places, self.interval);
         let narrower = places.iter().map(|place| {
             let before = now.at(&place.at);
             let power = if before < 1.0 - STILL_WIDE { 1.0 } else { 0.5 };
             (place.at, before * place.factor.powf(power).max(MOST_NARROWED))
         });
-        Self { places: self.places.iter().copied().chain(narrower).collect(), ..self.clone() }
+        let places = self.places.iter().copied().chain(narrower).collect();
+        Self { places, touch_up: Vec::new(), ..self.clone() }
     }
 }
 
@@ -655,7 +709,13 @@ mod tests {
             HighPlace { at, tip: at, over: height - 1.0, factor: 0.99 / height }
         };
         let places = [above(0.0, 1.2), above(40.0, 1.1)];
-        let by_calculation = Widths { places: Vec::new(), everywhere: 1.0, finer: Vec::new(), interval: 1.0 };
+        let by_calculation = Widths {
+            places: Vec::new(),
+            everywhere: 1.0,
+            finer: Vec::new(),
+            touch_up: Vec::new(),
+            interval: 1.0,
+        };
         let once = by_calculation.narrowed(&places);
         let found = [0.0, 10.0, 20.0, 40.0].map(|x| once.correction().at(&Point3::new(x, 0.0, 0.0)));
         let wanted = [(0.99f64 / 1.2).sqrt(), 1.0, 1.0, (0.99f64 / 1.1).sqrt()];

@@ -20,9 +20,9 @@ mod patch;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::closer::{Effort, Promising, Square, Value, search};
-use super::figures::{Bounded, ExcessFigures, ExcessKind, Measurement, NUMERICAL_FLOOR};
+use super::figures::{Bounded, ExcessFigures, ExcessKind, Measurement, NUMERICAL_FLOOR, RidgePlace};
 use super::inspection::{Inspection, Sample};
-use geometry::{Node, Point2, Point3};
+use geometry::{Node, Point2, Point3, Vector2};
 use patch::{Held, Patches};
 use sim::Grid;
 use work::monitor::{self, Cancelled, Monitor};
@@ -45,6 +45,12 @@ pub(super) struct ExcessSearch<'a> {
     pub cut_away_by: &'a (dyn Fn(&Point3) -> Option<u32> + Sync),
 }
 
+/// Of the cells that may hold more than a pass may leave, so many are looked through for such places.
+const MOST_HIGH_CELLS: usize = 4096;
+
+/// How often such a cell is divided before it counts as low enough.
+const HIGH_DIVISIONS: u32 = 6;
+
 /// Searches that are repeated with a move which no cell saw: it is lowest between centres only.
 const MOST_UNSEEN: usize = 24;
 
@@ -57,7 +63,8 @@ enum Kind {
 }
 
 impl ExcessSearch<'_> {
-    /// The figures. `samples` are those of the grid's cells, `measured` what was found so far.
+    /// The figures, and one place of each cell where passes came down to the design and left more than the scallop limit.
+    /// `samples` are those of the grid's cells, `measured` what was found so far.
     ///
     /// # Errors
     /// [`Cancelled`] when the monitor says so.
@@ -66,7 +73,7 @@ impl ExcessSearch<'_> {
         samples: &[Sample],
         measured: &Measurement,
         monitor: &dyn Monitor,
-    ) -> Result<ExcessFigures, Cancelled> {
+    ) -> Result<(ExcessFigures, Vec<RidgePlace>), Cancelled> {
         let limits = self.inspection.limits;
         let (scallop, uncut) = (&measured.scallop, &measured.uncut);
         // What moves that no cell saw cut away does not stand.
@@ -116,7 +123,48 @@ impl ExcessSearch<'_> {
         } else {
             ExcessKind::Scallop
         };
-        Ok(ExcessFigures { highest, kind, reached, unreached })
+        let is_low = reached.at_most() <= limits.scallop;
+        let high = if is_low { Vec::new() } else { self.high_places(&open, &unseen, monitor)? };
+        Ok((ExcessFigures { highest, kind, reached, unreached }, high))
+    }
+
+    /// One place of each square where passes came down to the design and left more than the scallop limit.
+    fn high_places(
+        &self,
+        open: &Promising,
+        unseen: &[u32],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<RidgePlace>, Cancelled> {
+        let Inspection { part, limits, .. } = *self.inspection;
+        let patches = self.patches(limits.scallop, unseen);
+        let may_be = open.squares.iter().filter(|square| square.possible > limits.scallop).copied();
+        let squares = Promising::of(may_be, MOST_HIGH_CELLS).squares;
+        let found = work::parallel::try_map(squares.len(), |k| {
+            monitor::check(monitor)?;
+            let mut waiting = vec![(squares[k].centre, squares[k].half, HIGH_DIVISIONS)];
+            while let Some((centre, half, divisions)) = waiting.pop() {
+                let (quarter, is_open) = match patches.held(centre, half) {
+                    Held::Nothing => continue,
+                    Held::Unknown => (0.5 * half, true),
+                    Held::Some { possible, place, here, by } => {
+                        if here > limits.scallop && patches.reached(place, here, by) {
+                            let design = part.highest_at(place.x, place.y);
+                            return Ok(design.map(|design| RidgePlace { at: design.point, height: here }));
+                        }
+                        (0.5 * half, possible > limits.scallop)
+                    }
+                };
+                if is_open && divisions > 0 {
+                    let side = |up: bool| if up { quarter } else { -quarter };
+                    waiting.extend((0..4).map(|k| {
+                        let offset = Vector2::new(side(k & 1 != 0), side(k & 2 != 0));
+                        (centre + offset, quarter, divisions - 1)
+                    }));
+                }
+            }
+            Ok(None)
+        })?;
+        Ok(found.into_iter().flatten().collect())
     }
 
     /// The squares of cells that may hold more than `known`, mm: those whose own move leaves more at a corner, those beside

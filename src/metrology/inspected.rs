@@ -28,11 +28,11 @@ pub(super) fn inspect(
 ) -> Result<Inspected, Cancelled> {
     let samples = inspection.samples(monitor)?;
     let finder = RidgeFinder::new(inspection, path);
-    let ridges = finder.find(&|k| samples[k].deviation, monitor)?;
+    let mut ridges = finder.find(&|k| samples[k].deviation, monitor)?;
     let deviation = inspection.deviation_figures(&samples);
     let highest_ridge = highest_ridge.max(ridges.highest_sample());
     Ok(Inspected {
-        highest: finder.highest(&ridges, inspection.asked),
+        highest: finder.highest(&mut ridges, inspection.asked),
         ridges,
         gouge: inspection.gouges(&samples, monitor)?,
         uncut: inspection.uncut(&samples, highest_ridge, deviation.area_mm2, monitor)?,

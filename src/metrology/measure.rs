@@ -124,7 +124,9 @@ pub fn measure_with_walls(
         measured.excess = ExcessFigures::of_cells(&measured);
         return Ok(measured);
     }
-    measured.excess = search.run(&found.samples, &measured, monitor)?;
+    let (excess, high) = search.run(&found.samples, &measured, monitor)?;
+    measured.excess = excess;
+    measured.above.extend(high);
     drop_disproved_ridges(&mut measured, &found.ridges);
     raise_highest_ridge(&mut measured, &inspection, path);
     let (highest, unreached) = (measured.excess.highest.max_mm, measured.excess.unreached.max_mm);

@@ -52,8 +52,9 @@ pub(super) fn ridge_map(
     let samples = inspection.samples(monitor)?;
     let finder = RidgeFinder::new(&inspection, path);
     let mut ridges = finder.find(&|k| samples[k].deviation, monitor)?;
+    let highest = finder.highest(&mut ridges, asked);
     let mut above = std::mem::take(&mut ridges.above);
-    let scallop = scallop_figures(&ridges.samples, finder.highest(&ridges, asked), limits);
+    let scallop = scallop_figures(&ridges.samples, highest, limits);
     let borders = borders(&inspection, &samples);
     let of_borders = borders.iter().max_by(|a, b| a.height.total_cmp(&b.height)).copied();
     above.extend(borders.into_iter().filter(|place| place.height > limits.scallop));

@@ -46,8 +46,8 @@ pub(super) struct RidgeSample {
 
 impl RidgeSample {
     /// True when the ridge may stand higher than `highest` before the next grid line that it crosses squarely.
-    fn might_rise_above(&self, highest: &RidgeSample) -> bool {
-        self.squareness >= SQUARE_ENOUGH && self.height + self.rise > highest.height + NUMERICAL_FLOOR
+    fn might_rise_above(&self, highest: f64) -> bool {
+        self.squareness >= SQUARE_ENOUGH && self.height + self.rise > highest + NUMERICAL_FLOOR
     }
 }
 
@@ -79,7 +79,8 @@ impl Ridges {
     /// Of the samples of one row.
     fn of_row(samples: &[RidgeSample], hidden: Vec<Hidden>) -> Self {
         let highest = samples.iter().max_by(|a, b| a.height.total_cmp(&b.height));
-        let others = samples.iter().filter(|s| highest.is_some_and(|highest| s.might_rise_above(highest)));
+        let others =
+            samples.iter().filter(|s| highest.is_some_and(|highest| s.might_rise_above(highest.height)));
         Self {
             samples: samples.iter().map(|s| [s.height as f32, s.length as f32]).collect(),
             candidates: highest.into_iter().chain(others).copied().collect(),
@@ -292,18 +293,24 @@ impl<'a> RidgeFinder<'a> {
 
     /// The highest place of all ridges, looked at closer wherever a ridge might rise above the highest
     /// sample before the next grid line, and closer still until it cannot by more than `asked` mm; `None`
-    /// without samples.
-    pub fn highest(&self, ridges: &Ridges, asked: f64) -> Option<Highest> {
+    /// without samples. Places above the scallop limit that come to light are added to the ridges' own.
+    pub fn highest(&self, ridges: &mut Ridges, asked: f64) -> Option<Highest> {
         let samples = &ridges.candidates;
         let first = samples.iter().max_by(|a, b| a.height.total_cmp(&b.height))?;
         let mut highest = Highest { height: first.height, at: first.at, possible: first.height };
-        let mut open: Vec<&RidgeSample> = samples.iter().filter(|s| s.might_rise_above(first)).collect();
+        // All that may be above the limit, though another place is higher.
+        let known = first.height.min(self.limits.scallop);
+        let mut open: Vec<&RidgeSample> = samples.iter().filter(|s| s.might_rise_above(known)).collect();
         let mut lines = CLOSER_LINES;
         while !open.is_empty() {
             let closer = work::parallel::map(open.len(), |k| self.closer(open[k], lines));
-            for sample in closer.iter().flatten() {
-                if sample.height > highest.height {
-                    (highest.height, highest.at) = (sample.height, sample.at);
+            for lines in &closer {
+                let Some(top) = lines.iter().max_by(|a, b| a.height.total_cmp(&b.height)) else { continue };
+                if top.height > highest.height {
+                    (highest.height, highest.at) = (top.height, top.at);
+                }
+                if top.height > self.limits.scallop {
+                    ridges.above.push(RidgePlace { at: top.at, height: top.height });
                 }
             }
             let possible: Vec<f64> = closer

@@ -10,6 +10,7 @@ mod pocket;
 mod strategies;
 mod surface;
 mod tilt;
+mod touch_up;
 mod vocabulary;
 
 pub use levels::spacing::LevelSteps;

@@ -7,6 +7,7 @@ use crate::strategies::shortest::shortest_possible;
 use crate::strategies::words_for;
 use crate::surface::mesh_surface;
 use crate::tilt::tilted::{self, TiltedPasses, Tilting};
+use crate::touch_up;
 use crate::vocabulary::{
     Contact, Levelled, PartKind, PassSettings, Passes, PlanError, PlanSettings, SAMPLING_OVER_RADIUS, Setup,
     Step, Strategy, Task,
@@ -175,7 +176,11 @@ fn passes(setup: &Setup<'_>, strategy: &dyn Strategy, axis: Option<&ToolAxis>) -
     let mut task = Task { part, cutter, settings: pass, wants_mesh, monitor };
     task.settings.step = charged_step(&task, strategy, settings);
     check_extent(&task)?;
-    strategy.passes(&task)
+    let mut passes = strategy.passes(&task)?;
+    if let Some(earlier) = task.settings.earlier.filter(|_| passes.touches.is_empty()) {
+        touch_up::add(&task, &earlier.touch_up, &mut passes.passes)?;
+    }
+    Ok(passes)
 }
 
 /// The distance of passes less what chords, facets and the program's decimals take of a scallop target.

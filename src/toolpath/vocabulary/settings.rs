@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{Correction, Levelled};
-use geometry::Aabb;
+use geometry::{Aabb, Point3};
 
 /// How far neighbouring passes lie apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,6 +77,8 @@ pub struct Earlier {
     /// The factor of the chord tolerance, at most 1, around tips of the cutter: where chords of two passes leave a ridge higher
     /// than by calculation.
     pub chords: Correction,
+    /// Places on the design over which passes of their own are added to an upright cutter's, the most needed first.
+    pub touch_up: Vec<Point3>,
     /// The functions whose levels are placed anew, one for each chart or piece; all are searched where the number is another.
     pub functions: Vec<Levelled>,
 }

@@ -1,0 +1,182 @@
+//! Short passes over places where an earlier plan left too much, while all other passes stay where they are.
+//!
+//! Enters: the passes of an upright cutter, and places on the design. Leaves: further passes, each beside a stretch of its
+//! nearest pass and through the places there, so that it runs along their ridge. What is cut once more can only sink;
+//! passes that are placed anew leave ridges at other places.
+
+use crate::link::plane_interval;
+use crate::vocabulary::{PlanError, Task};
+use drop_cutter::{Beside, DropCutter};
+use geometry::{Point2, Point3, Vector2};
+use work::monitor;
+
+/// A pass serves what lies within this share of an interval beside it: on a plane, what stands there sinks to a quarter.
+const SERVED: f64 = 0.25;
+
+/// It goes on to the next place along the ridge that is no farther than so many intervals,
+const NEXT: f64 = 2.0;
+
+/// reaches so many beyond the last one, where the ridge is low again,
+const BEYOND: f64 = 1.0;
+
+/// and follows its neighbour no farther than so many to either side: what lies beyond takes another pass.
+const FARTHEST: f64 = 16.0;
+
+/// Appends passes over `places`; the first of them are served first.
+///
+/// # Errors
+/// When cancelled.
+pub(crate) fn add(
+    task: &Task<'_>,
+    places: &[Point3],
+    passes: &mut Vec<Vec<Point3>>,
+) -> Result<(), PlanError> {
+    let Task { part, ref settings, monitor, .. } = *task;
+    let dropped = task.dropped();
+    let interval = plane_interval(dropped, settings.step);
+    let axis_over = |place: &Point3| {
+        let foot = part.closest_point(place).0;
+        foot.point.xy() + dropped.axis_offset(&foot.normal)
+    };
+    let mut waiting: Vec<Point2> = places.iter().map(axis_over).collect();
+    if waiting.is_empty() || passes.is_empty() {
+        return Ok(());
+    }
+    let drop = DropCutter::watched(part, dropped, monitor)?;
+    let planned = passes.len();
+    while let Some(&first) = waiting.first() {
+        monitor::check(monitor)?;
+        let Some(copy) = Copied::beside(&passes[..planned], first, FARTHEST * interval) else { break };
+        let [from, to] = copy.serve(&mut waiting, interval);
+        let mut last = Beside::default();
+        let mut tip = |s: f64| {
+            let q = copy.at(s);
+            drop.at_beside(q.x, q.y, &mut last).map(|drop| Point3::new(q.x, q.y, drop.tip_z))
+        };
+        let pass = settings.moves(from, to, &mut tip, monitor)?;
+        if pass.len() > 1 {
+            passes.push(pass);
+        }
+    }
+    Ok(())
+}
+
+/// A stretch of a pass in the plan view, shifted so that it runs through a place.
+struct Copied {
+    corners: Vec<Point2>,
+    /// Length up to each corner, mm.
+    lengths: Vec<f64>,
+}
+
+impl Copied {
+    /// Of the pass that is nearest to a place, up to `farthest` mm to either side of it; `None` without passes.
+    fn beside(passes: &[Vec<Point3>], place: Point2, farthest: f64) -> Option<Self> {
+        let stretches = passes.iter().flat_map(|pass| (1..pass.len()).map(move |k| (pass, k)));
+        let near = stretches.map(|(pass, k)| {
+            let (a, b) = (pass[k - 1].xy(), pass[k].xy());
+            let on = nearest_on(place, a, b).0;
+            ((on - place).norm_squared(), pass, k, on)
+        });
+        let (_, pass, k, on) = near.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let shift = place - on;
+        let walk = |corners: &mut dyn Iterator<Item = &Point3>| {
+            let (mut found, mut far, mut before) = (Vec::new(), 0.0, on);
+            for corner in corners.map(|corner| corner.xy()) {
+                if far >= farthest {
+                    break;
+                }
+                far += (corner - before).norm();
+                before = corner;
+                found.push(corner + shift);
+            }
+            found
+        };
+        let mut corners = walk(&mut pass[..k].iter().rev());
+        corners.reverse();
+        corners.push(place);
+        corners.extend(walk(&mut pass[k..].iter()));
+        let mut length = 0.0;
+        let mut lengths = vec![0.0];
+        for pair in corners.windows(2) {
+            length += (pair[1] - pair[0]).norm();
+            lengths.push(length);
+        }
+        Some(Self { corners, lengths })
+    }
+
+    /// The place so many mm from the beginning.
+    fn at(&self, s: f64) -> Point2 {
+        let k = self.lengths.partition_point(|length| *length <= s).clamp(1, self.corners.len() - 1);
+        let step: Vector2 = self.corners[k] - self.corners[k - 1];
+        let length = self.lengths[k] - self.lengths[k - 1];
+        self.corners[k - 1] + step * if length > 0.0 { (s - self.lengths[k - 1]) / length } else { 0.0 }
+    }
+
+    /// How far along the stretch and how far beside it a place lies, mm.
+    fn along_and_aside(&self, place: Point2) -> [f64; 2] {
+        let of_piece = |k: usize| {
+            let (on, share) = nearest_on(place, self.corners[k - 1], self.corners[k]);
+            [self.lengths[k - 1] + share * (self.lengths[k] - self.lengths[k - 1]), (on - place).norm()]
+        };
+        let pieces = (1..self.corners.len()).map(of_piece);
+        pieces.min_by(|a, b| a[1].total_cmp(&b[1])).unwrap_or([0.0, f64::INFINITY])
+    }
+
+    /// Takes the first of the waiting places, and those that follow it along the stretch; leaves the run that serves them.
+    fn serve(&self, waiting: &mut Vec<Point2>, interval: f64) -> [f64; 2] {
+        let found: Vec<[f64; 2]> = waiting.iter().map(|place| self.along_and_aside(*place)).collect();
+        let mut beside: Vec<f64> = found.iter().filter(|f| f[1] <= SERVED * interval).map(|f| f[0]).collect();
+        beside.sort_by(f64::total_cmp);
+        let own = found[0][0];
+        let up = |far: f64, s: &f64| if *s - far <= NEXT * interval { far.max(*s) } else { far };
+        let down = |far: f64, s: &f64| if far - *s <= NEXT * interval { far.min(*s) } else { far };
+        let [from, to] = [beside.iter().rev().fold(own, down), beside.iter().fold(own, up)];
+        let mut served = found.iter().map(|f| f[1] <= SERVED * interval && (from..=to).contains(&f[0]));
+        // The first one lies on the stretch but for rounding.
+        let mut first = true;
+        waiting.retain(|_| {
+            let is_served = served.next().is_some_and(|served| served);
+            !(std::mem::take(&mut first) || is_served)
+        });
+        let end = self.lengths[self.lengths.len() - 1];
+        [(from - BEYOND * interval).max(0.0), (to + BEYOND * interval).min(end)]
+    }
+}
+
+/// The place of a straight piece nearest to another, and its share of the way.
+fn nearest_on(place: Point2, a: Point2, b: Point2) -> (Point2, f64) {
+    let along = b - a;
+    let share = ((place - a).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    (a + along * share, share)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_pass_serves_the_places_along_a_ridge() {
+        // Passes along x, 1 mm apart.
+        let line = |y: f64| (0..=100).map(|k| Point3::new(f64::from(k), y, 0.0)).collect::<Vec<_>>();
+        let passes = [line(0.0), line(1.0), line(2.0)];
+        let copy = Copied::beside(&passes, Point2::new(50.0, 0.45), 16.0).unwrap();
+        let mut waiting = vec![
+            Point2::new(50.0, 0.45),
+            Point2::new(51.5, 0.5),
+            Point2::new(48.7, 0.4),
+            // Too far along, and on another ridge.
+            Point2::new(55.0, 0.45),
+            Point2::new(50.0, 1.5),
+        ];
+        let run = copy.serve(&mut waiting, 1.0);
+        assert_eq!(waiting, [Point2::new(55.0, 0.45), Point2::new(50.0, 1.5)]);
+        let ends = run.map(|s| copy.at(s));
+        assert!((ends[0] - Point2::new(47.7, 0.45)).norm() < 1e-12, "{ends:?}");
+        assert!((ends[1] - Point2::new(52.5, 0.45)).norm() < 1e-12, "{ends:?}");
+        // Beside the end of a pass there is no more of it.
+        let copy = Copied::beside(&passes, Point2::new(99.5, 0.45), 16.0).unwrap();
+        let run = copy.serve(&mut vec![Point2::new(99.5, 0.45)], 1.0);
+        assert!((copy.at(run[1]) - Point2::new(100.0, 0.45)).norm() < 1e-12);
+        assert!(Copied::beside(&[], Point2::origin(), 1.0).is_none());
+    }
+}
