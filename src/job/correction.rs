@@ -51,6 +51,9 @@ const MEASURED_SLACK: f64 = 0.2;
 /// Chords of two passes raise a ridge by no more than this share of their tolerance.
 const RAISED_BY_CHORDS: f64 = 0.5;
 
+/// Ridges are about equally high where half of their length stands no lower than this share of the highest.
+const EVENLY_HIGH: f64 = 0.95;
+
 /// The factor of the chord tolerance where a ridge was raised by chords; where it still is, passes get nearer to each other.
 const SHORTER_CHORDS: f64 = 0.25;
 
@@ -77,7 +80,7 @@ const MOST_IN_VAIN: usize = MOST_FOLLOWED + 3;
 const TOUCH_UP_LENGTH: f64 = 3.0;
 
 /// Passes of their own are no longer in all than this share of the path.
-const MOST_TOUCH_UP: f64 = 0.02;
+const MOST_TOUCH_UP: f64 = 0.04;
 
 /// Cells from pass to pass while only ridges are measured.
 const CELLS_A_PASS: f64 = 4.0;
@@ -441,15 +444,23 @@ impl Corrected<'_> {
         };
         let followed = || self.corrected(latest_widths, latest);
         match (round.holds(&self.goal), in_vain) {
-            (true, 0) => {
-                (round.highest() < (1.0 - slack) * target).then(|| scaled(&self.widths, round.highest()))
-            }
+            (true, 0) => (round.highest() < (1.0 - slack) * target && self.may_lie_wider())
+                .then(|| scaled(&self.widths, round.highest())),
             (true, 1) => self.latest.as_ref().and_then(|_| followed()),
             (false, 0) => self.corrected(&self.widths, &self.standing).or_else(in_proportion),
             (false, ..=MOST_FOLLOWED) => followed().or_else(in_proportion),
             (false, ..=MOST_IN_VAIN) => in_proportion(),
             _ => None,
         }
+    }
+
+    /// Whether the best plan would hold the target with one pass less: where ridges are about equally high, passes are spread
+    /// evenly, and each interval then grows by as much as all of them.
+    fn may_lie_wider(&self) -> bool {
+        let round = &self.standing.round;
+        let is_even = round.median_mm.is_some_and(|median| median >= EVENLY_HIGH * round.highest());
+        let intervals = path_figures(&self.best.plan.path, 0.0).passes as f64 - 1.0;
+        !is_even || round.highest() * (intervals / (intervals - 1.0)).powi(2) <= self.goal.target
     }
 
     /// The widths of a plan corrected by the places where it leaves too much. Few get passes of their own, once. Of many, or
