@@ -96,10 +96,8 @@ mod tests {
     /// A square with a square island, against the distance from both borders and against many places in squares.
     #[test]
     fn depths_and_squares_are_those_of_the_region() {
-        let index = RegionIndex::new(region(vec![
-            rectangle(0.0, 0.0, 10.0, 10.0),
-            rectangle(4.0, 4.0, 6.0, 6.0),
-        ]));
+        let index =
+            RegionIndex::new(region(vec![rectangle(0.0, 0.0, 10.0, 10.0), rectangle(4.0, 4.0, 6.0, 6.0)]));
         for i in -3..=24 {
             for j in -3..=24 {
                 let p = Point2::new(0.5 * f64::from(i) + 0.013, 0.5 * f64::from(j) + 0.007);

@@ -213,7 +213,7 @@ impl Session {
         let scene = &self.scene;
         let radius = scene.cutter.radius();
         let of_passes = |step: &Move| step.kind == MoveKind::Cut;
-        let arcs = contact_arcs(path, &scene.cutter, self.top(), &of_passes, monitor)?;
+        let arcs = contact_arcs(path, &scene.cutter, &self.stock, &of_passes, monitor)?;
         Ok(Some(limit_feed_by(path, &arcs, strategy, request.step, radius)))
     }
 }

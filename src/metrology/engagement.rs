@@ -494,8 +494,7 @@ impl Front {
             .iter()
             .map(|k| region.sides().segments()[*k as usize].ends.map(|p| stretch.seen(&p)))
             .collect();
-        let mut angles: Vec<f64> =
-            sides.iter().flat_map(|side| self.crossings(side, depth.abs())).collect();
+        let mut angles: Vec<f64> = sides.iter().flat_map(|side| self.crossings(side, depth.abs())).collect();
         angles.sort_by(f64::total_cmp);
         let clears = |angle: f64| {
             let seen = self.at(angle);

@@ -27,8 +27,8 @@ pub use kinematics::FiveAxis;
 pub use load::{load_mesh, load_part};
 pub use named_file::NamedFile;
 pub use part::{
-    BladeRequest, FLATTEN_SHARE, FormulaSource, LoadError, Loaded, MeshFile, NurbsSource, OutlineSource,
-    PartSource, PocketSource,
+    BladeRequest, EarlierCutter, FLATTEN_SHARE, FormulaSource, LoadError, Loaded, MeshFile, NurbsSource,
+    OpenLine, OutlineSource, PartSource, PocketSource,
 };
 pub use stock::StockRequest;
 pub use write::complete_toml;

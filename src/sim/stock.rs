@@ -51,7 +51,7 @@ pub enum Stock {
     Milled {
         /// The block.
         block: Aabb,
-        /// The region, within the block's rectangle.
+        /// The region; it may lie beyond the block in part.
         cleared: Arc<RegionIndex>,
         /// Down to here, mm.
         floor: f64,
@@ -103,12 +103,7 @@ impl Stock {
 
     /// A block from which an end mill took all that lies over `cleared` and above `floor`.
     pub fn milled(block: Aabb, cleared: &Region, floor: f64) -> Self {
-        let Aabb { min, max } = block;
-        let corners = [(min.x, min.y), (max.x, min.y), (max.x, max.y), (min.x, max.y)];
-        let outer = corners.map(|(x, y)| Point2::new(x, y)).to_vec();
-        let rectangle = Region { pieces: vec![geometry::Piece { outer, islands: Vec::new() }] };
-        let cleared = Arc::new(RegionIndex::new(cleared.intersection(&rectangle)));
-        Self::Milled { block, cleared, floor }
+        Self::Milled { block, cleared: Arc::new(RegionIndex::new(cleared.clone())), floor }
     }
 
     /// Where no stock stands above a level, mm, and the level, if that is known as a region of the plan view.
@@ -163,7 +158,12 @@ impl Stock {
             Self::Roughed { .. } => return None,
             Self::Box(bounds) => bounds.size().product(),
             Self::Milled { block, cleared, floor } => {
-                block.size().product() - cleared.region().area() * (block.max.z - floor)
+                let Aabb { min, max } = block;
+                let corners = [(min.x, min.y), (max.x, min.y), (max.x, max.y), (min.x, max.y)];
+                let outer = corners.map(|(x, y)| Point2::new(x, y)).to_vec();
+                let rectangle = Region { pieces: vec![geometry::Piece { outer, islands: Vec::new() }] };
+                let within = cleared.region().intersection(&rectangle).area();
+                block.size().product() - within * (block.max.z - floor)
             }
             Self::Cylinder { radius, length, .. } => std::f64::consts::PI * radius * radius * length,
             Self::Mesh(stock) => {
@@ -207,7 +207,9 @@ impl Stock {
                 let with = |offset: f64| ends.into_iter().chain([HalfSpace { gradient, offset }]).collect();
                 StockSides { outer: with(radius - rho), inner: Some(with(below)) }
             }
-            Self::Mesh(_) | Self::Roughed { .. } | Self::Milled { .. } => StockSides { outer: Vec::new(), inner: None },
+            Self::Mesh(_) | Self::Roughed { .. } | Self::Milled { .. } => {
+                StockSides { outer: Vec::new(), inner: None }
+            }
         }
     }
 

@@ -222,7 +222,10 @@ fn ground_cleared_before_is_no_stock() {
     let lower = Stock::milled(block(), &region, -1.9);
     assert!((arcs_in(&lower, &through(&[(20.0, 4.0), (25.0, 4.0)])).of_moves[1] - PI).abs() < 1e-9);
     // The greatest angle on short moves, each by itself, against places 0.01 degrees apart on the circumference.
-    for (k, at) in [(4.0, 3.0), (9.0, 9.5), (13.0, 15.0), (24.0, 5.0), (1.0, 6.0), (9.5, 5.0), (31.0, 10.0)].iter().enumerate() {
+    for (k, at) in [(4.0, 3.0), (9.0, 9.5), (13.0, 15.0), (24.0, 5.0), (1.0, 6.0), (9.5, 5.0), (31.0, 10.0)]
+        .iter()
+        .enumerate()
+    {
         let turn = 1.3 * k as f64;
         let heading = Vector2::new(turn.cos(), turn.sin());
         let (from, length) = (Point2::new(at.0, at.1), 0.02);

@@ -157,6 +157,7 @@ fn way_down(
             turn
         }
         Entry::Ramp(way) => way.clone(),
+        Entry::Air => return plunge,
     };
     let length: f64 = once.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
     if length < LEAST_RAMP || drop <= ROUNDING {

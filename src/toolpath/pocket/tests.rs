@@ -19,7 +19,7 @@ fn disc(x: f64, y: f64, r: f64) -> Vec<Point2> {
 }
 
 fn pocket(curves: Vec<Vec<Point2>>) -> Pocket {
-    Pocket { region: Region::nested(curves).unwrap().0, depth: 6.0 }
+    Pocket::new(Region::nested(curves).unwrap().0, 6.0)
 }
 
 fn with_island() -> Pocket {
