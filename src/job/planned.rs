@@ -325,7 +325,7 @@ pub(crate) fn write_program(
 ) -> std::io::Result<MoveLines> {
     let Some((five_axis, joints)) = scene.five_axis.as_ref().zip(joints) else {
         return if path.is_upright() {
-            gcode::write(out, path, &scene.cutter, header)
+            gcode::write(out, path, &scene.cutter, header, scene.arcs)
         } else {
             Ok(MoveLines::new())
         };

@@ -155,6 +155,8 @@ pub struct Scene {
     pub machine: Machine,
     /// Its rotary axes; `None` for a machine of three axes, or where none is named.
     pub five_axis: Option<FiveAxis>,
+    /// How near arcs of programs stay to the moves that they stand for, mm; `None` writes moves alone.
+    pub arcs: Option<f64>,
     /// Height of rapid moves above stock, mm.
     pub clearance: f64,
     /// What tilted tools keep away from.

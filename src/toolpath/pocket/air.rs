@@ -25,6 +25,8 @@ const LEAD: f64 = 0.1;
 pub(super) struct Air {
     radius: f64,
     index: RegionIndex,
+    /// Sides of the air beside which stock stands.
+    stock: SegmentGrid,
     /// Centres whose discs lie in it.
     pub discs: Vec<Point2>,
     /// Closed ways of the centre along its border, the stock on their right.
@@ -48,12 +50,19 @@ impl Air {
         let mut discs = sampled(&within).concat();
         discs.extend(inside(&within, APART * radius));
         let borders = SegmentGrid::of_curves(ways.iter().map(Vec::as_slice));
-        Some(Self { radius, index: RegionIndex::new(air.clone()), discs, ways, borders })
+        Some(Self {
+            radius,
+            stock: pocket.borders_of_air(),
+            index: RegionIndex::new(air.clone()),
+            discs,
+            ways,
+            borders,
+        })
     }
 
-    /// Whether the cutter at a place touches no stock.
+    /// Whether the cutter at a place where it may be touches no stock. It may touch walls.
     pub fn holds(&self, centre: &Point2) -> bool {
-        self.index.contains(centre) && self.index.sides().distance(centre) >= HELD * self.radius
+        self.index.contains(centre) && self.stock.distance(centre) >= HELD * self.radius
     }
 
     /// The stretches of the ways along its border that lie in a room.

@@ -127,7 +127,8 @@ pub fn plan_pocket(
             continue;
         }
         let mut runs = piece_runs(piece, cutter, strategy, step, air.is_none(), &mut notes, monitor)?;
-        if let Some(air) = &air {
+        // Loops that bound the engagement lean to one side of lines, and may find no room beside a way from elsewhere.
+        if let (Some(air), None) = (&air, &rules) {
             let room = walls::Room::new(piece);
             runs = runs.into_iter().map(|run| air.entered(run, &room)).collect();
         }

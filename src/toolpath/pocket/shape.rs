@@ -7,6 +7,9 @@ use work::monitor::{Cancelled, Monitor};
 /// How far beyond an open side there is room, over the cutter's radius: it leaves the stock whole, and turns there.
 const BEYOND: f64 = 2.6;
 
+/// What is no farther from a wall than this, mm, is on it: far above rounding, far below any tolerance.
+const ON_WALL: f64 = 1.0e-5;
+
 /// Sides of the rounds between strips beyond open sides, rad.
 const ROUND: f64 = 0.2;
 
@@ -95,6 +98,17 @@ impl Pocket {
     /// Where no stock stands above the floor before the first cut.
     pub fn air(&self) -> &Region {
         &self.air
+    }
+
+    /// The sides of the air beside which stock stands: those that lie on no wall.
+    pub(super) fn borders_of_air(&self) -> SegmentGrid {
+        let walls = SegmentGrid::of_curves(self.free.curves());
+        let on_wall = |side: &CurveSegment| {
+            let [a, b] = side.ends;
+            [a, nalgebra::center(&a, &b), b].iter().all(|p| walls.distance(p) < ON_WALL)
+        };
+        let sides = SegmentGrid::of_curves(self.air.curves());
+        SegmentGrid::new(sides.segments().iter().copied().filter(|side| !on_wall(side)).collect())
     }
 
     /// Length of its walls in the plan view: of the sides that are not open, mm.

@@ -248,7 +248,9 @@ fn open_pockets_and_rests_are_cleared_from_the_air() {
                 let arcs =
                     contact_arcs(&path, &Cutter::flat(2.0 * radius).unwrap(), &stock, &of_passes, &Silent);
                 let above = above(&path, &arcs.unwrap(), (limit + SLACK).to_radians());
-                assert!(above.iter().all(|(_, length)| *length <= 0.02 * radius), "{what}: {above:?}");
+                // Loops of a zigzag lean to one side, and in corners they become films.
+                let longest = if matches!(pattern, Pattern::Zigzag { .. }) { TIP } else { 0.02 };
+                assert!(above.iter().all(|(_, length)| *length <= longest * radius), "{what}: {above:?}");
             }
         }
     }
