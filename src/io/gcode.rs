@@ -16,6 +16,7 @@ pub use five_axis::{FiveAxisPost, Style, write_five_axis};
 
 use super::program_text::{ProgramHeader, describe, number};
 use arcs::Arc;
+pub use arcs::ArcRule;
 use cutter::Cutter;
 use geometry::Point3;
 use motion::{Move, MoveKind, Toolpath, in_last_decimals};
@@ -33,7 +34,7 @@ pub type MoveLines = Vec<u32>;
 /// the first move the tip rises to the highest tip of the path, moves over its start and comes down there;
 /// after the last one it rises again.
 ///
-/// With a tolerance for `arcs`, mm, moves of one feed become one arc where it stays so near to them. It is the line of them all.
+/// With a rule for `arcs`, moves of one feed become one arc where it stays near to them. It is the line of them all.
 ///
 /// # Errors
 /// Whatever the writer returns; a path with a tilted tool.
@@ -42,7 +43,7 @@ pub fn write(
     path: &Toolpath,
     cutter: &Cutter,
     header: &ProgramHeader,
-    arcs: Option<f64>,
+    arcs: Option<ArcRule>,
 ) -> io::Result<MoveLines> {
     if !path.is_upright() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "three axes cannot tilt the tool"));
@@ -64,7 +65,7 @@ pub fn write(
     let mut lines = Vec::with_capacity(path.len());
     while let Some(step) = path.moves.get(lines.len()) {
         let feed = (step.kind != MoveKind::Rapid).then_some(step.feed_rate);
-        let arc = feed.zip(arcs).and_then(|(_, tolerance)| arc_from(path, lines.len(), tolerance));
+        let arc = feed.zip(arcs).and_then(|(_, rule)| arc_from(path, lines.len(), &rule));
         match arc.zip(feed) {
             Some((arc, feed)) => {
                 program.arc(&arc, path.moves[lines.len() + arc.moves - 1].to.tip, feed)?;
@@ -85,24 +86,23 @@ pub fn write(
     Ok(lines)
 }
 
-/// The arc that begins with a move, within a tolerance of all the moves that it stands for, mm.
-fn arc_from(path: &Toolpath, first: usize, tolerance: f64) -> Option<Arc> {
+/// The arc that begins with a move.
+fn arc_from(path: &Toolpath, first: usize, rule: &ArcRule) -> Option<Arc> {
     /// Longer arcs go on as another one.
     const MOST_MOVES: usize = 1000;
-    let same = |m: &&Move| {
-        let feed = path.moves[first].feed_rate;
-        m.kind != MoveKind::Rapid && in_last_decimals(m.feed_rate) == in_last_decimals(feed)
-    };
+    let feed = path.moves[first].feed_rate;
+    let same =
+        |m: &&Move| m.kind != MoveKind::Rapid && in_last_decimals(m.feed_rate) == in_last_decimals(feed);
     let tips = path.moves[first..].iter().take(MOST_MOVES).take_while(same).map(|m| m.to.tip);
     let mut places: Vec<Point3> = Vec::new();
     for tip in std::iter::once(path.start_of(first)).chain(tips) {
         places.push(arcs::written(&tip));
         // Most moves are no arcs, and their first ones tell.
-        if places.len() == arcs::LEAST_MOVES + 1 && arcs::longest(&places, tolerance).is_none() {
+        if places.len() == arcs::LEAST_MOVES + 1 && arcs::longest(&places, feed, rule).is_none() {
             return None;
         }
     }
-    arcs::longest(&places, tolerance)
+    arcs::longest(&places, feed, rule)
 }
 
 /// A program in the making, and what its last lines have left in force.

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use crate::apt_cl;
 use crate::gcode::five_axis_tests::{machine, tilting_path};
-use crate::gcode::{self, FiveAxisPost, Style, write_five_axis};
+use crate::gcode::{self, ArcRule, FiveAxisPost, Style, write_five_axis};
 use crate::program_text::ProgramHeader;
 use crate::program_text::tests::{example, random};
 use cutter::Cutter;
@@ -87,6 +87,7 @@ fn arcs_stay_as_near_to_the_moves_as_they_are_asked_to() {
         of.segments().map(|(a, b, _)| distance_to_segment(p, &a, &b)).fold(f64::INFINITY, f64::min)
     };
     let written = |arcs: Option<f64>| {
+        let arcs = arcs.map(|tolerance| ArcRule { tolerance, acceleration: 1000.0 });
         let mut bytes = Vec::new();
         let lines = gcode::write(&mut bytes, &path, &Cutter::flat(6.0).unwrap(), &header(), arcs).unwrap();
         (String::from_utf8(bytes).unwrap(), lines)
@@ -105,7 +106,7 @@ fn arcs_stay_as_near_to_the_moves_as_they_are_asked_to() {
             let read = program.runs(&placing).unwrap().swap_remove(0).path;
             let own: Vec<_> = read.moves.iter().filter(|m| m.kind != MoveKind::Rapid).collect();
             // Chords of the arcs and last decimals.
-            let most = tolerance.max(1e-3) + 1e-4 + 2e-4;
+            let most = tolerance + 1e-4 + 1e-4;
             let farthest = own.iter().map(|m| feet(&m.to.tip, &path)).fold(0.0, f64::max);
             assert!(farthest < most, "{tolerance}: {farthest}");
             let farthest = path.moves.iter().map(|m| feet(&m.to.tip, &read)).fold(0.0, f64::max);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use io::ProgramHeader;
-use io::gcode::{self, FiveAxisPost, MoveLines};
+use io::gcode::{self, ArcRule, FiveAxisPost, MoveLines};
 use machine::kinematics::{JointPath, Kinematics, follow};
 use machine::{axes_at_most, machining_time, machining_time_of_axes, slow_axes, slow_corners};
 use metrology::{FastestTurn, contact_arcs, fastest_turn, fastest_turn_across};
@@ -325,7 +325,9 @@ pub(crate) fn write_program(
 ) -> std::io::Result<MoveLines> {
     let Some((five_axis, joints)) = scene.five_axis.as_ref().zip(joints) else {
         return if path.is_upright() {
-            gcode::write(out, path, &scene.cutter, header, scene.arcs)
+            let acceleration = scene.machine.acceleration;
+            let arcs = scene.arcs.map(|tolerance| ArcRule { tolerance, acceleration });
+            gcode::write(out, path, &scene.cutter, header, arcs)
         } else {
             Ok(MoveLines::new())
         };

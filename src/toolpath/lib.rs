@@ -16,7 +16,7 @@ pub use levels::spacing::LevelSteps;
 pub use link::{Detour, LONGEST_LINK, around_fixtures, longest_link, plane_interval};
 pub use plan::{Plan, plan, plan_tilted};
 pub use pocket::{
-    Engagement, Flow, LEAST_SHARE, NotOnOutline, Pattern, Pocket, PocketStrategy, engagement,
+    Engagement, Flow, LEAST_SHARE, NotOnOutline, Pattern, Pocket, PocketStrategy, WallFinish, engagement,
     engagement_angle, limit_feed, plan_pocket, read_pocket_step,
 };
 pub use strategies::iso_parametric::IsoParametric;

@@ -374,7 +374,8 @@ mod tests {
         let text = complete_toml(&scene);
         assert!(text.contains("open = [[[60.0, 0.0], [60.0, 40.0]]]"), "{text}");
         let again = Scene::parse("tray.toml", text.clone()).unwrap();
-        assert_eq!(complete_toml(&again), text);
+        assert_eq!((complete_toml(&again), again.arcs), (text, Some(0.0005)));
+        assert_eq!(again.toolpaths, scene.toolpaths);
         assert!(crate::load_part(&again).unwrap().pocket.unwrap().air().area() > 1000.0);
     }
 
@@ -410,6 +411,13 @@ mod tests {
             ("pocket-zigzag\"\nangle = 20", "zigzag\"", "does not mill a pocket"),
             ("angle = 20", "spiral = true", "does not apply"),
             ("spiral = true", "stepover = 6", "more than 0.95"),
+            ("spiral = true", "wall_finish = \"depth\"", "does not apply without a `wall_allowance`"),
+            ("spiral = true", "wall_allowance = 0.2\nwall_finish = \"deep\"", "\"steps\" or \"depth\""),
+            (
+                "[[toolpath]]\nstrategy = \"pocket-flow\"",
+                "[machine]\narcs = 0.1\n[[toolpath]]\nstrategy = \"pocket-flow\"",
+                "more than the chord tolerance",
+            ),
             ("depth = 5", "depth = 5\nopen = [[[60, 0]]]", "needs two points"),
             ("depth = 5", "depth = 5\nopen = [[60, 0], [60, 40]]", "points of two numbers"),
             ("depth = 5", "depth = 5\ncleared_allowance = 0.2", "needs `cleared_by`"),

@@ -34,7 +34,7 @@ pub use feed::{Engagement, LEAST_SHARE, engagement, engagement_angle, limit_feed
 use nest::NestError;
 use route::Run;
 pub use shape::{NotOnOutline, Pocket};
-pub use strategy::{Flow, Pattern, PocketStrategy, read_pocket_step};
+pub use strategy::{Flow, Pattern, PocketStrategy, WallFinish, read_pocket_step};
 use turning::Turning;
 
 use crate::plan::Plan;
@@ -134,6 +134,7 @@ pub fn plan_pocket(
         }
         groups.push((piece, runs));
     }
+    let rough_groups = groups.len();
     if strategy.wall_allowance > 0.0 {
         for piece in &walls_at.pieces {
             let room = walls::Room::new(piece);
@@ -164,14 +165,17 @@ pub fn plan_pocket(
         bound_runs(&mut groups, &mut ground, rules, &mut notes, monitor)?;
         kept(&mut groups, monitor)?;
     }
+    let along_walls = groups.split_off(rough_groups).into_iter().flat_map(|group| group.1).collect();
     let mut runs = peeled;
     runs.extend(groups.into_iter().flat_map(|group| group.1));
-    if let Some(air) = &air {
-        runs = runs.into_iter().flat_map(|run| air.trimmed(run)).collect();
-    }
+    let trimmed = |runs: Vec<Run>| -> Vec<Run> {
+        let Some(air) = &air else { return runs };
+        runs.into_iter().flat_map(|run| air.trimmed(run)).collect()
+    };
+    let mut runs = descend::Runs { clearing: trimmed(runs), along_walls: trimmed(along_walls) };
     let turn = strategy.bounded().map_or(std::f64::consts::PI, |_| MOST_TURN);
     let walls = walls::Walls::new(pocket.free(), off - walls::ROUNDING);
-    for run in &mut runs {
+    for run in runs.clearing.iter_mut().chain(&mut runs.along_walls) {
         monitor::check(monitor)?;
         let holds = |a: &Point2, b: &Point2| walls.hold(a, b);
         run.points = descend::shortened(&run.points, chords, MOVE_OVER_RADIUS * radius, turn, holds);

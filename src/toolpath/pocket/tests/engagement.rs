@@ -9,7 +9,7 @@ use work::monitor::Silent;
 
 use super::super::walls;
 use crate::vocabulary::{Joining, PlanSettings, Step};
-use crate::{Flow, Pattern, Plan, Pocket, PocketStrategy, plan_pocket};
+use crate::{Flow, Pattern, Plan, Pocket, PocketStrategy, WallFinish, plan_pocket};
 
 fn points(c: &[(f64, f64)]) -> Vec<Point2> {
     c.iter().map(|&(x, y)| Point2::new(x, y)).collect()
@@ -164,6 +164,7 @@ fn plan(pocket: &Pocket, diameter: f64, pattern: Pattern, engagement: Option<f64
         stepdown: Some(1.5),
         floor_allowance: 0.0,
         wall_allowance: 0.0,
+        wall_finish: WallFinish::Steps,
         ramp_angle: 0.1,
         helix_radius: None,
         engagement,
