@@ -370,6 +370,8 @@ mod tests {
             "depth = 5",
             "depth = 5\nopen = [[[60, 0], [60, 40]]]\ncleared_by = 12\ncleared_allowance = 0.2",
         );
+        let finish = "engagement = 80\nwall_allowance = 0.2\nwall_finish = \"depth\"";
+        let text = format!("{}[machine]\narcs = 0.0005\n", text.replace("engagement = 80", finish));
         let scene = Scene::parse("tray.toml", text).unwrap();
         let text = complete_toml(&scene);
         assert!(text.contains("open = [[[60.0, 0.0], [60.0, 40.0]]]"), "{text}");
@@ -412,7 +414,7 @@ mod tests {
             ("angle = 20", "spiral = true", "does not apply"),
             ("spiral = true", "stepover = 6", "more than 0.95"),
             ("spiral = true", "wall_finish = \"depth\"", "does not apply without a `wall_allowance`"),
-            ("spiral = true", "wall_allowance = 0.2\nwall_finish = \"deep\"", "\"steps\" or \"depth\""),
+            ("spiral = true", "wall_allowance = 0.2\nwall_finish = \"deep\"", "cannot be \"deep\""),
             (
                 "[[toolpath]]\nstrategy = \"pocket-flow\"",
                 "[machine]\narcs = 0.1\n[[toolpath]]\nstrategy = \"pocket-flow\"",
