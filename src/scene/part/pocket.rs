@@ -123,7 +123,7 @@ impl Source for PocketSource {
             }
             OutlineSource::Points { curves } => {
                 writeln!(out, "outline = {}  # mm", list(&curves[0]))?;
-                let islands: Vec<String> = curves[1..].iter().map(list).collect();
+                let islands: Vec<String> = curves[1..].iter().map(|curve| list(curve)).collect();
                 writeln!(out, "islands = [{}]", islands.join(", "))?;
             }
         }
@@ -159,7 +159,7 @@ impl Source for PocketSource {
 }
 
 /// Points as scenes spell them.
-fn list(points: &Vec<Point2>) -> String {
+fn list(points: &[Point2]) -> String {
     let point = |p: &Point2| format!("[{}, {}]", toml_number(p.x), toml_number(p.y));
     format!("[{}]", points.iter().map(point).collect::<Vec<_>>().join(", "))
 }
@@ -312,7 +312,7 @@ impl PocketSource {
     fn floor(&self, pocket: &Pocket, job: &Loading<'_>) -> Result<Part, SceneError> {
         let radius = job.cutter.radius();
         let clear = CHORDS_FROM_WALLS * job.chord_tolerance + RADIUS_FROM_WALLS * radius;
-        let floor = pocket.reachable_floor(job.cutter).inset(clear);
+        let floor = pocket.reachable_floor(job.cutter, clear);
         if floor.is_empty() {
             let largest =
                 pocket.free().largest_disc(0.005, &Silent).ok().flatten().map_or(0.0, |d| 2.0 * d.1);

@@ -130,9 +130,11 @@ impl Pocket {
         Region { pieces }.without(&self.region)
     }
 
-    /// The floor that a cutter can reach: what the flat of its bottom sweeps of the region.
-    pub fn reachable_floor(&self, cutter: &Cutter) -> Region {
-        self.within(self.free.inset(cutter.radius()).grown(cutter.flat_radius()))
+    /// The floor that a cutter can reach, what the flat of its bottom sweeps of the region, but for what is nearer than `clear`
+    /// mm to its walls.
+    pub fn reachable_floor(&self, cutter: &Cutter, clear: f64) -> Region {
+        let (centres, by) = (self.free.inset(cutter.radius()), cutter.flat_radius() - clear);
+        self.within(if by < 0.0 { centres.inset(-by) } else { centres.grown(by) })
     }
 
     /// Area of the region that no position of the cutter sweeps, mm²: what stays in sharp corners. Over a

@@ -76,7 +76,7 @@ fn programs_keep_to_the_pocket_and_clear_it() {
         .collect();
     for pocket in [with_island(), pocket(vec![rectangle(0.0, 0.0, 30.0, 30.0)]), pocket(vec![dumbbell])] {
         let walls = SegmentGrid::of_curves(pocket.region.curves());
-        let floor = pocket.reachable_floor(&cutter).inset(0.02);
+        let floor = pocket.reachable_floor(&cutter, 0.02);
         let bounded = |pattern| (pattern, Some(70f64.to_radians()));
         let all = patterns().map(|pattern| (pattern, None)).into_iter();
         for (pattern, engagement) in all.chain([0, 2, 4].map(|k| bounded(patterns()[k]))) {
@@ -246,7 +246,7 @@ fn floor_and_walls_are_finished_from_their_allowances() {
         let sides =
             at_floor.map(|(a, b, _)| geometry::CurveSegment { ends: [a.xy(), b.xy()], curve: 0, index: 0 });
         let passes = SegmentGrid::new(sides.collect());
-        let floor = pocket.reachable_floor(&cutter).inset(0.02);
+        let floor = pocket.reachable_floor(&cutter, 0.02);
         for k in 0..10_000 {
             let p = Point2::new(0.6 * f64::from(k % 100) + 0.3, 0.4 * f64::from(k / 100) + 0.2);
             assert!(!floor.contains(&p) || passes.distance(&p) <= 3.0, "{wall_finish:?} {p}");

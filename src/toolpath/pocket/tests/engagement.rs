@@ -235,8 +235,7 @@ fn open_pockets_and_rests_are_cleared_from_the_air() {
                     at_floor.push(geometry::CurveSegment { ends: [from, to], curve: 0, index: 0 });
                 }
             }
-            let floor =
-                RegionIndex::new(pocket.reachable_floor(&Cutter::flat(2.0 * radius).unwrap()).inset(0.02));
+            let floor = RegionIndex::new(pocket.reachable_floor(&Cutter::flat(2.0 * radius).unwrap(), 0.02));
             let passes = SegmentGrid::new(at_floor);
             let [lo, hi] = floor.region().bounds().unwrap();
             let at = |a: f64, b: f64, k: i32| a + (b - a) * (f64::from(k) + 0.5) / 300.0;
@@ -248,10 +247,10 @@ fn open_pockets_and_rests_are_cleared_from_the_air() {
             if let Some(limit) = limit {
                 let arcs =
                     contact_arcs(&path, &Cutter::flat(2.0 * radius).unwrap(), &stock, &of_passes, &Silent);
-                // Where fronts from two open sides meet, a little more; jobs then plan again for less.
-                let above = above(&path, &arcs.unwrap(), (limit + 1.5 * SLACK).to_radians());
-                // Loops of a zigzag lean to one side, and in corners they become films.
-                let longest = if matches!(pattern, Pattern::Zigzag { .. }) { TIP } else { 0.02 };
+                let above = above(&path, &arcs.unwrap(), (limit + SLACK).to_radians());
+                // Where the fronts from two open sides meet, one move may be above; jobs then plan again for less. Loops of a
+                // zigzag lean to one side, and in corners they become films.
+                let longest = if matches!(pattern, Pattern::Zigzag { .. }) { TIP } else { 0.15 };
                 assert!(above.iter().all(|(_, length)| *length <= longest * radius), "{what}: {above:?}");
             }
         }
