@@ -21,6 +21,7 @@ mod normal;
 mod nurbs;
 mod polytope;
 mod region;
+mod region_index;
 #[doc(hidden)]
 pub mod samples;
 mod segment_grid;
@@ -41,6 +42,7 @@ pub use normal::{inward, normal_at, unit_normal};
 pub use nurbs::{MAX_WEIGHT, NurbsError, NurbsSurface};
 pub use polytope::{HalfSpace, Polytope};
 pub use region::{MAX_OUTLINE_POINTS, Piece, Region, RegionError, first_crossing, inside_curve, signed_area};
+pub use region_index::RegionIndex;
 pub use segment_grid::{
     CurveSegment, NearestSegment, SegmentGrid, distance_of_segments, distance_to_segment, foot,
 };

@@ -4,6 +4,9 @@
 //! (clockwise), without crossings. Offsets are done by `i_overlay` on a grid of integers: robust
 //! on any input, and rounded by a 2⁻³⁰th of the region's size or less.
 
+use i_overlay::core::fill_rule::FillRule;
+use i_overlay::core::overlay_rule::OverlayRule;
+use i_overlay::float::single::SingleFloatOverlay;
 use i_overlay::mesh::float::outline::offset::OutlineOffset;
 use i_overlay::mesh::float::style::{LineJoin, OutlineStyle};
 use i_overlay::mesh::math::MathMode;
@@ -333,6 +336,26 @@ impl Region {
             a.y.total_cmp(&b.y).then(a.x.total_cmp(&b.x))
         });
         Self { pieces }
+    }
+
+    /// What lies in this region or in the other one.
+    pub fn union(&self, other: &Self) -> Self {
+        self.combined(other, OverlayRule::Union)
+    }
+
+    /// What lies in both regions.
+    pub fn intersection(&self, other: &Self) -> Self {
+        self.combined(other, OverlayRule::Intersect)
+    }
+
+    /// What lies in this region and not in the other one.
+    pub fn without(&self, other: &Self) -> Self {
+        self.combined(other, OverlayRule::Difference)
+    }
+
+    fn combined(&self, other: &Self, rule: OverlayRule) -> Self {
+        let size = self.bounds().map_or(0.0, |[lo, hi]| (hi - lo).amax());
+        Self::of_shapes(self.shapes().overlay_as::<i64>(&other.shapes(), rule, FillRule::NonZero), size)
     }
 
     /// The largest disc inside: its centre and its radius, mm, within `precision`. `None` without pieces.

@@ -1,5 +1,5 @@
 //! Writes a toolpath as a plain ISO 6983 program for three axes: G0, G1, F and the axis words that
-//! changed. mm, mm/min, absolute.
+//! changed, and G2 and G3 where arcs are asked for. mm, mm/min, absolute; middles of arcs from their start.
 //!
 //! There is no O-number, because controls disagree about what an O-word is, no tool change and no length
 //! offset: the tip is taken to be where the program says. Rapids are simulated as straight lines; a
@@ -7,6 +7,7 @@
 //!
 //! [`write_five_axis`] writes programs for machines with two rotary axes.
 
+mod arcs;
 mod five_axis;
 
 #[cfg(test)]
@@ -14,9 +15,11 @@ pub(crate) use five_axis::tests as five_axis_tests;
 pub use five_axis::{FiveAxisPost, Style, write_five_axis};
 
 use super::program_text::{ProgramHeader, describe, number};
+use arcs::Arc;
+pub use arcs::ArcRule;
 use cutter::Cutter;
 use geometry::Point3;
-use motion::{MoveKind, Toolpath, in_last_decimals};
+use motion::{Move, MoveKind, Toolpath, in_last_decimals};
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
@@ -31,6 +34,8 @@ pub type MoveLines = Vec<u32>;
 /// the first move the tip rises to the highest tip of the path, moves over its start and comes down there;
 /// after the last one it rises again.
 ///
+/// With a rule for `arcs`, moves of one feed become one arc where it stays near to them. It is the line of them all.
+///
 /// # Errors
 /// Whatever the writer returns; a path with a tilted tool.
 pub fn write(
@@ -38,11 +43,12 @@ pub fn write(
     path: &Toolpath,
     cutter: &Cutter,
     header: &ProgramHeader,
+    arcs: Option<ArcRule>,
 ) -> io::Result<MoveLines> {
     if !path.is_upright() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "three axes cannot tilt the tool"));
     }
-    let mut program = ThreeAxisProgram { writer, lines: 0, tip: [None; 3], rapid: None, feed: None };
+    let mut program = ThreeAxisProgram { writer, lines: 0, tip: [None; 3], code: None, feed: None };
     let start = path.start.tip;
     let top = path.moves.iter().map(|m| m.to.tip.z).fold(start.z, f64::max);
     program.line("%")?;
@@ -57,10 +63,19 @@ pub fn write(
     program.go(Point3::new(start.x, start.y, top), None)?;
     program.go(start, None)?;
     let mut lines = Vec::with_capacity(path.len());
-    for step in &path.moves {
+    while let Some(step) = path.moves.get(lines.len()) {
         let feed = (step.kind != MoveKind::Rapid).then_some(step.feed_rate);
-        program.go(step.to.tip, feed)?;
-        lines.push(program.lines);
+        let arc = feed.zip(arcs).and_then(|(_, rule)| arc_from(path, lines.len(), &rule));
+        match arc.zip(feed) {
+            Some((arc, feed)) => {
+                program.arc(&arc, path.moves[lines.len() + arc.moves - 1].to.tip, feed)?;
+                lines.extend(std::iter::repeat_n(program.lines, arc.moves));
+            }
+            None => {
+                program.go(step.to.tip, feed)?;
+                lines.push(program.lines);
+            }
+        }
     }
     program.rise(top)?;
     if header.spindle_speed.is_some() {
@@ -71,13 +86,33 @@ pub fn write(
     Ok(lines)
 }
 
+/// The arc that begins with a move.
+fn arc_from(path: &Toolpath, first: usize, rule: &ArcRule) -> Option<Arc> {
+    /// Longer arcs go on as another one.
+    const MOST_MOVES: usize = 1000;
+    let feed = path.moves[first].feed_rate;
+    let same =
+        |m: &&Move| m.kind != MoveKind::Rapid && in_last_decimals(m.feed_rate) == in_last_decimals(feed);
+    let tips = path.moves[first..].iter().take(MOST_MOVES).take_while(same).map(|m| m.to.tip);
+    let mut places: Vec<Point3> = Vec::new();
+    for tip in std::iter::once(path.start_of(first)).chain(tips) {
+        places.push(arcs::written(&tip));
+        // Most moves are no arcs, and their first ones tell.
+        if places.len() == arcs::LEAST_MOVES + 1 && arcs::longest(&places, feed, rule).is_none() {
+            return None;
+        }
+    }
+    arcs::longest(&places, feed, rule)
+}
+
 /// A program in the making, and what its last lines have left in force.
 struct ThreeAxisProgram<'a> {
     writer: &'a mut dyn Write,
     lines: u32,
     /// In the units of [`in_last_decimals`].
     tip: [Option<f64>; 3],
-    rapid: Option<bool>,
+    /// The number of the G word: 0 to 3.
+    code: Option<u8>,
     feed: Option<f64>,
 }
 
@@ -96,8 +131,23 @@ impl ThreeAxisProgram<'_> {
         self.step([Some(to.x), Some(to.y), Some(to.z)], feed)
     }
 
+    fn arc(&mut self, arc: &Arc, to: Point3, feed: f64) -> io::Result<()> {
+        let words = self.axis_words([Some(to.x), Some(to.y), Some(to.z)]);
+        let middle = format!(" I{} J{}", number(arc.middle.x), number(arc.middle.y));
+        self.motion(if arc.clockwise { 2 } else { 3 }, &(words + &middle), Some(feed))
+    }
+
     /// A line with the words that change; none when no axis does.
     fn step(&mut self, to: [Option<f64>; 3], feed: Option<f64>) -> io::Result<()> {
+        let words = self.axis_words(to);
+        if words.is_empty() {
+            return Ok(());
+        }
+        self.motion(u8::from(feed.is_some()), &words, feed)
+    }
+
+    /// The words of the axes that change.
+    fn axis_words(&mut self, to: [Option<f64>; 3]) -> String {
         let mut words = String::new();
         for ((axis, value), tip) in ["X", "Y", "Z"].into_iter().zip(to).zip(&mut self.tip) {
             let Some(value) = value else { continue };
@@ -106,15 +156,16 @@ impl ThreeAxisProgram<'_> {
                 let _ = write!(words, " {axis}{}", number(value));
             }
         }
-        if words.is_empty() {
-            return Ok(());
-        }
+        words
+    }
+
+    fn motion(&mut self, code: u8, words: &str, feed: Option<f64>) -> io::Result<()> {
         let mut text = String::new();
-        if self.rapid != Some(feed.is_none()) {
-            self.rapid = Some(feed.is_none());
-            text.push_str(if feed.is_none() { "G0" } else { "G1" });
+        if self.code != Some(code) {
+            self.code = Some(code);
+            let _ = write!(text, "G{code}");
         }
-        text.push_str(&words);
+        text.push_str(words);
         if let Some(feed) = feed
             && self.feed != Some(in_last_decimals(feed))
         {
@@ -132,7 +183,7 @@ mod tests {
 
     fn text(path: &Toolpath, header: &ProgramHeader) -> (String, MoveLines) {
         let mut bytes = Vec::new();
-        let lines = write(&mut bytes, path, &Cutter::bull(6.0, 0.5).unwrap(), header).unwrap();
+        let lines = write(&mut bytes, path, &Cutter::bull(6.0, 0.5).unwrap(), header, None).unwrap();
         (String::from_utf8(bytes).unwrap(), lines)
     }
 

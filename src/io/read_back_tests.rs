@@ -4,13 +4,13 @@ use std::collections::HashMap;
 
 use crate::apt_cl;
 use crate::gcode::five_axis_tests::{machine, tilting_path};
-use crate::gcode::{self, FiveAxisPost, Style, write_five_axis};
+use crate::gcode::{self, ArcRule, FiveAxisPost, Style, write_five_axis};
 use crate::program_text::ProgramHeader;
 use crate::program_text::tests::{example, random};
 use cutter::Cutter;
-use geometry::Vector3;
+use geometry::{Point3, Vector3, distance_to_segment};
 use machine::kinematics::{Kinematics, PRESETS, follow};
-use motion::{Cutters, Move, MoveKind, Toolpath};
+use motion::{ClPoint, Cutters, Move, MoveKind, Toolpath};
 use program::{GENERAL_CONTROL, LINUXCNC_CONTROL, Placing, Setup, read_apt, read_gcode};
 
 fn placing(kinematics: Option<&Kinematics>) -> Placing<'_> {
@@ -31,7 +31,7 @@ fn three_axes_by_every_control_that_has_no_own_words_for_them() {
     for (path, cutter) in [(example(), Cutter::ball(6.0)), (random(500), Cutter::flat(10.0))] {
         for control in [GENERAL_CONTROL, LINUXCNC_CONTROL] {
             let mut bytes = Vec::new();
-            let lines = gcode::write(&mut bytes, &path, cutter.as_ref().unwrap(), &header()).unwrap();
+            let lines = gcode::write(&mut bytes, &path, cutter.as_ref().unwrap(), &header(), None).unwrap();
             let program = read_gcode("a.nc", &bytes, control, &Setup::from_above(200.0)).unwrap();
             assert!(program.findings(&|_| None).is_empty(), "{:?}", program.findings(&|_| None));
             let read = program.runs(&placing(None)).unwrap().swap_remove(0).path;
@@ -51,6 +51,79 @@ fn three_axes_by_every_control_that_has_no_own_words_for_them() {
                     step.kind == MoveKind::Rapid || (again.feed_rate - step.feed_rate).abs() <= 0.5001e-4;
                 assert!(fed, "line {}", lines[k]);
             }
+        }
+    }
+}
+
+/// Down a helix, along a line onto a circle and off it, and around a corner, at three feeds; and the places of it.
+fn round_path() -> Toolpath {
+    let mut path = example();
+    path.moves.clear();
+    let mut to = |x: f64, y: f64, z: f64, kind, feed_rate| {
+        path.moves.push(Move { to: ClPoint::upright(Point3::new(x, y, z)), kind, feed_rate, pass: 0 });
+    };
+    to(8.0, 0.0, 10.0, MoveKind::Rapid, 0.0);
+    to(8.0, 0.0, 0.5, MoveKind::Rapid, 0.0);
+    for k in 1..=200 {
+        let turn = 0.06 * f64::from(k);
+        to(5.0 + 3.0 * turn.cos(), 3.0 * turn.sin(), 0.5 - 0.01 * f64::from(k), MoveKind::Plunge, 300.0);
+    }
+    for k in 0..=90 {
+        let turn = -0.05 * f64::from(k);
+        let feed = if k < 30 { 1200.0 } else { 1100.0 };
+        to(25.0 + 12.0 * turn.cos(), 4.0 + 12.0 * turn.sin(), -1.5, MoveKind::Cut, feed);
+    }
+    to(0.0, 30.0, -1.5, MoveKind::Cut, 1200.0);
+    to(0.0, 0.0, -1.5, MoveKind::Cut, 1200.0);
+    to(0.0, 0.0, 10.0, MoveKind::Retract, 1200.0);
+    path.as_written()
+}
+
+/// Arcs stay within their tolerance of the moves, begin and end where these do, and have their feeds: lengths and times hold.
+#[test]
+fn arcs_stay_as_near_to_the_moves_as_they_are_asked_to() {
+    let path = round_path();
+    let feet = |p: &Point3, of: &Toolpath| {
+        of.segments().map(|(a, b, _)| distance_to_segment(p, &a, &b)).fold(f64::INFINITY, f64::min)
+    };
+    let written = |arcs: Option<f64>| {
+        let arcs = arcs.map(|tolerance| ArcRule { tolerance, acceleration: 1000.0 });
+        let mut bytes = Vec::new();
+        let lines = gcode::write(&mut bytes, &path, &Cutter::flat(6.0).unwrap(), &header(), arcs).unwrap();
+        (String::from_utf8(bytes).unwrap(), lines)
+    };
+    let (plain, _) = written(None);
+    // The sagittas of its circles are 1.4 and 3.8 µm.
+    for (tolerance, count) in [(0.001, 0), (0.002, 4), (0.005, 6)] {
+        let (text, lines) = written(Some(tolerance));
+        let arcs = text.lines().filter(|line| line.contains(" I")).count();
+        assert_eq!((arcs, lines.len()), (count, path.len()), "{tolerance}");
+        assert!(count == 0 || text.lines().count() + 150 < plain.lines().count());
+        for control in [GENERAL_CONTROL, LINUXCNC_CONTROL] {
+            let program = read_gcode("a.nc", text.as_bytes(), control, &Setup::from_above(200.0)).unwrap();
+            assert!(program.findings(&|_| None).is_empty(), "{:?}", program.findings(&|_| None));
+            let placing = Placing { chord: 1e-4, ..placing(None) };
+            let read = program.runs(&placing).unwrap().swap_remove(0).path;
+            let own: Vec<_> = read.moves.iter().filter(|m| m.kind != MoveKind::Rapid).collect();
+            // Chords of the arcs and last decimals.
+            let most = tolerance + 1e-4 + 1e-4;
+            let farthest = own.iter().map(|m| feet(&m.to.tip, &path)).fold(0.0, f64::max);
+            assert!(farthest < most, "{tolerance}: {farthest}");
+            let farthest = path.moves.iter().map(|m| feet(&m.to.tip, &read)).fold(0.0, f64::max);
+            assert!(farthest < most, "{tolerance}: {farthest}");
+            let found = by_line(&read);
+            for (k, step) in
+                path.moves.iter().enumerate().filter(|(k, _)| lines.get(k + 1) != Some(&lines[*k]))
+            {
+                let again = found[&lines[k]];
+                assert!((again.to.tip - step.to.tip).amax() < 1.001e-4, "move {k}: {again:?}");
+                assert!(step.kind == MoveKind::Rapid || (again.feed_rate - step.feed_rate).abs() < 1e-4);
+            }
+            let fed = |path: &Toolpath| -> f64 {
+                let fed = path.segments().filter(|(_, _, m)| m.kind != MoveKind::Rapid);
+                fed.map(|(a, b, m)| (b - a).norm() / m.feed_rate).sum()
+            };
+            assert!((fed(&read) / fed(&path) - 1.0).abs() < 1e-3, "{} {}", fed(&read), fed(&path));
         }
     }
 }

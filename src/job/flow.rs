@@ -122,7 +122,7 @@ impl Session {
         let scene = &self.scene;
         let engine = self.engine(request)?;
         let (cutters, holders) = self.tools(request);
-        if !matches!(self.stock, Stock::Box(_)) {
+        if !matches!(self.stock, Stock::Box(_) | Stock::Milled { .. }) {
             self.seen_from_above(
                 request,
                 engine,

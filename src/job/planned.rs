@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use io::ProgramHeader;
-use io::gcode::{self, FiveAxisPost, MoveLines};
+use io::gcode::{self, ArcRule, FiveAxisPost, MoveLines};
 use machine::kinematics::{JointPath, Kinematics, follow};
 use machine::{axes_at_most, machining_time, machining_time_of_axes, slow_axes, slow_corners};
 use metrology::{FastestTurn, contact_arcs, fastest_turn, fastest_turn_across};
@@ -213,7 +213,7 @@ impl Session {
         let scene = &self.scene;
         let radius = scene.cutter.radius();
         let of_passes = |step: &Move| step.kind == MoveKind::Cut;
-        let arcs = contact_arcs(path, &scene.cutter, self.top(), &of_passes, monitor)?;
+        let arcs = contact_arcs(path, &scene.cutter, &self.stock, &of_passes, monitor)?;
         Ok(Some(limit_feed_by(path, &arcs, strategy, request.step, radius)))
     }
 }
@@ -325,7 +325,9 @@ pub(crate) fn write_program(
 ) -> std::io::Result<MoveLines> {
     let Some((five_axis, joints)) = scene.five_axis.as_ref().zip(joints) else {
         return if path.is_upright() {
-            gcode::write(out, path, &scene.cutter, header)
+            let acceleration = scene.machine.acceleration;
+            let arcs = scene.arcs.map(|tolerance| ArcRule { tolerance, acceleration });
+            gcode::write(out, path, &scene.cutter, header, arcs)
         } else {
             Ok(MoveLines::new())
         };

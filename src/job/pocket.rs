@@ -38,8 +38,8 @@ pub fn pocket_figures(
     monitor: &dyn Monitor,
 ) -> Result<PocketFigures, Cancelled> {
     let cutter = &scene.cutter;
-    let (wall_gouge_mm, wall_gouge_move) = wall_gouge_of_moves(&pocket.region, cutter, path, top, monitor)?;
-    let (of_cells, area) = wall_gouge_of_cells(&pocket.region, cut, top, monitor)?;
+    let (wall_gouge_mm, wall_gouge_move) = wall_gouge_of_moves(pocket.free(), cutter, path, top, monitor)?;
+    let (of_cells, area) = wall_gouge_of_cells(pocket.free(), cut, top, monitor)?;
     Ok(PocketFigures {
         area_mm2: pocket.region.area(),
         unreachable_area_mm2: pocket.rest_area(cutter, monitor)?,

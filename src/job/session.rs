@@ -59,18 +59,27 @@ const IN_STOCK: &str = "the part was found to lie in its stock at the corners of
 ///
 /// # Errors
 /// [`JobError`] when its file cannot be used.
-fn stock_of(scene: &Scene, part: &Part, pocket: bool, notes: &mut Vec<String>) -> Result<Stock, JobError> {
+fn stock_of(
+    scene: &Scene,
+    part: &Part,
+    pocket: Option<&Pocket>,
+    notes: &mut Vec<String>,
+) -> Result<Stock, JobError> {
     Ok(match &scene.stock {
         &StockRequest::Around { allowance, margin, .. } => {
             let Aabb { mut min, mut max } = part.bounds();
             // The measured floor ends where the flat of the cutter's bottom does.
-            let beyond = if pocket { scene.cutter.radius() - scene.cutter.flat_radius() } else { 0.0 };
+            let beyond = pocket.map_or(0.0, |_| scene.cutter.radius() - scene.cutter.flat_radius());
             let margin = margin + beyond;
-            let face = if pocket { 0.0 } else { max.z };
+            let face = pocket.map_or(max.z, |_| 0.0);
             min -= Vector3::new(margin, margin, BASE);
             max += Vector3::new(margin, margin, 0.0);
             max.z = face + allowance;
-            Stock::Box(Aabb { min, max })
+            let block = Aabb { min, max };
+            match pocket.filter(|pocket| !pocket.air().is_empty()) {
+                Some(pocket) => Stock::milled(block, pocket.air(), -pocket.depth),
+                None => Stock::Box(block),
+            }
         }
         StockRequest::Block(block) => Stock::Box(*block),
         &StockRequest::Bar { from, axis, diameter, length } => {
@@ -147,7 +156,7 @@ impl Session {
 
     fn read(scene: Scene) -> Result<Self, JobError> {
         let Loaded { part, blade, pocket, mut notes } = load_part(&scene)?;
-        let stock = stock_of(&scene, &part, pocket.is_some(), &mut notes)?;
+        let stock = stock_of(&scene, &part, pocket.as_ref(), &mut notes)?;
         let budget = Budget::new(&part, scene.simulation.memory_mib).beside(&stock);
         let cells = budget
             .grid_before_planning(&stock.bounds(), &scene.simulation)

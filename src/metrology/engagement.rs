@@ -1,6 +1,6 @@
 //! How much of the cutter's circumference stands in stock along a path, in the plan view.
 //!
-//! Enters: path, cutter, the stock's flat top. Leaves: for every move the greatest angle of the front half of the circumference
+//! Enters: path, cutter, stock with a flat top. Leaves: for every move the greatest angle of the front half of the circumference
 //! in stock, and what it is at most anywhere on the move. Corners of bull cutters and balls count as cylinders of the same
 //! radius; mm, rad. Nothing here knows how a path was planned.
 //!
@@ -21,9 +21,9 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use cutter::Cutter;
-use geometry::{DiscSamples, Point2, Vector2};
+use geometry::{DiscSamples, Point2, RegionIndex, Vector2};
 use motion::{Move, MoveKind, Toolpath};
-use sim::ENGAGED;
+use sim::{ENGAGED, Stock};
 use work::monitor::{self, Cancelled, Monitor};
 
 /// Layers up to this share of the radius do not count. Beside a straight wall an angle `a` is seen smaller by about
@@ -76,7 +76,8 @@ impl ContactArcs {
     }
 }
 
-/// The angles along `path` in a stock whose flat top is at `top`, mm. Those of the moves that `count` are bounded.
+/// The angles along `path` in a stock whose top is flat, but for what was [cleared](Stock::cleared) before. Those of the moves
+/// that `count` are bounded.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -86,12 +87,14 @@ impl ContactArcs {
 pub fn contact_arcs(
     path: &Toolpath,
     cutter: &Cutter,
-    top: f64,
+    stock: &Stock,
     count: &(dyn Fn(&Move) -> bool + Sync),
     monitor: &dyn Monitor,
 ) -> Result<ContactArcs, Cancelled> {
     monitor.start("measuring engagement", path.len() as u64);
+    let top = stock.bounds().max.z;
     let mut cleared = Swept::by(path, cutter.radius());
+    cleared.before = stock.cleared();
     let (mut of_moves, mut at_most) = (Vec::new(), Vec::new());
     // Of the moves that count, so far.
     let mut greatest = 0.0f64;
@@ -145,6 +148,8 @@ struct Stretch {
     half: f64,
     /// The way gone up to its middle, mm.
     gone: f64,
+    /// Whether it is no lower than what was cleared before the path.
+    over_floor: bool,
 }
 
 impl Stretch {
@@ -176,8 +181,10 @@ struct Segment {
 }
 
 /// What a path sweeps, in order, with buckets to find what is near.
-struct Swept {
+struct Swept<'a> {
     radius: f64,
+    /// Where nothing stood above a level before the path, and that level, mm.
+    before: Option<(&'a RegionIndex, f64)>,
     /// The way just behind the cutter that leaves no films, mm.
     fresh: f64,
     segments: Vec<Segment>,
@@ -190,7 +197,7 @@ struct Swept {
     thinned: (usize, usize),
 }
 
-impl Swept {
+impl<'a> Swept<'a> {
     fn by(path: &Toolpath, radius: f64) -> Self {
         let fresh = radius * (2.0 * FILM + FILM * FILM).sqrt();
         let mut gone = 0.0;
@@ -215,6 +222,7 @@ impl Swept {
         let side = [size.x, size.y].map(|s| (s / bucket).floor() as usize + 1);
         let mut swept = Self {
             radius,
+            before: None,
             fresh,
             segments: Vec::new(),
             origin: lo,
@@ -314,10 +322,11 @@ impl Swept {
         let length = gone[1] - gone[0];
         let count = (length / (STRETCH * self.radius)).ceil().max(1.0);
         let half = 0.5 * length / count;
+        let over_floor = self.before.is_some_and(|(_, floor)| z > floor - ENGAGED);
         (0..count as usize)
             .map(|i| {
                 let to = (2 * i + 1) as f64 * half;
-                Stretch { middle: a + heading * to, heading, half, gone: gone[0] + to }
+                Stretch { middle: a + heading * to, heading, half, gone: gone[0] + to, over_floor }
             })
             .collect()
     }
@@ -349,6 +358,9 @@ impl Swept {
         let before = gone - self.fresh;
         let (own, earlier) = ((1.0 - TOUCHING) * self.radius, (1.0 + FILM) * self.radius);
         let mut front = Front::new(self.radius);
+        if let Some((region, _)) = self.before.filter(|_| stretch.over_floor) {
+            front.clear_region(region, stretch, stretch.half - FILM * self.radius);
+        }
         for &k in near {
             let segment = &self.segments[k as usize];
             if segment.gone[0] > gone {
@@ -467,6 +479,48 @@ impl Front {
         if taken {
             self.divide();
         }
+    }
+
+    /// Clears what lies in a region, and farther than `depth` from its sides: with that of half a stretch, wherever the circle is
+    /// on it. Below zero, what lies no farther outside counts as well.
+    fn clear_region(&mut self, region: &RegionIndex, stretch: &Stretch, depth: f64) {
+        let middle = stretch.middle;
+        let reach = Vector2::new(1.0, 1.0) * (self.rim + depth.abs());
+        let mut near: Vec<u32> = Vec::new();
+        region.sides().near(&[middle - reach, middle + reach], |k| near.push(k));
+        near.sort_unstable();
+        near.dedup();
+        let sides: Vec<[Vector2; 2]> = near
+            .iter()
+            .map(|k| region.sides().segments()[*k as usize].ends.map(|p| stretch.seen(&p)))
+            .collect();
+        let mut angles: Vec<f64> = sides.iter().flat_map(|side| self.crossings(side, depth.abs())).collect();
+        angles.sort_by(f64::total_cmp);
+        let clears = |angle: f64| {
+            let seen = self.at(angle);
+            let (along, left) = (stretch.heading, Vector2::new(-stretch.heading.y, stretch.heading.x));
+            let away = sides.iter().map(|side| square_distance(&seen, side)).fold(f64::INFINITY, f64::min);
+            let away = away.sqrt();
+            let inside = region.contains(&(middle + along * seen.x + left * seen.y));
+            if inside { away >= depth } else { -away >= depth }
+        };
+        let Some(&first) = angles.first() else {
+            if clears(0.0) {
+                self.standing.clear();
+            }
+            return;
+        };
+        let mut cleared = Vec::new();
+        for k in 0..angles.len() {
+            let (from, to) = (angles[k], angles.get(k + 1).copied().unwrap_or(first + TAU));
+            if clears(0.5 * (from + to)) {
+                cleared.extend([-TAU, 0.0, TAU].map(|turn| [from + turn, to + turn]));
+            }
+        }
+        for [from, to] in cleared {
+            self.take(from, to);
+        }
+        self.divide();
     }
 
     /// Whether a segment is near enough to clear any part.

@@ -17,6 +17,9 @@ use work::parallel;
 /// round.
 const CUT: f64 = 1.0e-4;
 
+/// A centre nearer to the outline than this, mm, is on it.
+const ON_OUTLINE: f64 = 1.0e-9;
+
 /// Figures of a pocket.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct PocketFigures {
@@ -122,8 +125,11 @@ pub fn wall_gouge_of_cells(
                 passed += 1;
             }
             if passed % 2 == 0 && f64::from(cut.height[grid.index(i, j)]) < top - CUT {
-                farthest = farthest.max(walls.distance(&centre));
-                count += 1;
+                let beyond = walls.distance(&centre);
+                if beyond > ON_OUTLINE {
+                    farthest = farthest.max(beyond);
+                    count += 1;
+                }
             }
         }
         Ok((farthest, count))

@@ -27,8 +27,8 @@ pub use kinematics::FiveAxis;
 pub use load::{load_mesh, load_part};
 pub use named_file::NamedFile;
 pub use part::{
-    BladeRequest, FLATTEN_SHARE, FormulaSource, LoadError, Loaded, MeshFile, NurbsSource, OutlineSource,
-    PartSource, PocketSource,
+    BladeRequest, EarlierCutter, FLATTEN_SHARE, FormulaSource, LoadError, Loaded, MeshFile, NurbsSource,
+    OpenLine, OutlineSource, PartSource, PocketSource,
 };
 pub use stock::StockRequest;
 pub use write::complete_toml;
@@ -155,6 +155,8 @@ pub struct Scene {
     pub machine: Machine,
     /// Its rotary axes; `None` for a machine of three axes, or where none is named.
     pub five_axis: Option<FiveAxis>,
+    /// How near arcs of programs stay to the moves that they stand for, mm; `None` writes moves alone.
+    pub arcs: Option<f64>,
     /// Height of rapid moves above stock, mm.
     pub clearance: f64,
     /// What tilted tools keep away from.

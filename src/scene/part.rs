@@ -13,7 +13,7 @@ pub use formula::FormulaSource;
 pub use mesh::MeshFile;
 pub(crate) use mesh::read_mesh;
 pub use nurbs::NurbsSource;
-pub use pocket::{FLATTEN_SHARE, OutlineSource, PocketSource};
+pub use pocket::{EarlierCutter, FLATTEN_SHARE, OpenLine, OutlineSource, PocketSource};
 pub(crate) use source::Loading;
 pub use source::{LoadError, Loaded};
 

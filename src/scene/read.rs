@@ -116,6 +116,7 @@ impl Scene {
         let keep_clear = interference::read(&root, &folder)?;
         let (machine, clearance) = read_machine(&section)?;
         let five_axis = kinematics::read(&section, &machine)?;
+        let arcs = read_arcs(&section, five_axis.is_some(), &tolerance)?;
         let toolpaths = read_toolpaths(&root, &folder, &tolerance, correct, &cutter, &minutes)?;
         check_pocket_strategies(&root, &part, &toolpaths)?;
         if simulation.cell_is_auto {
@@ -136,6 +137,7 @@ impl Scene {
             simulation,
             machine,
             five_axis,
+            arcs,
             clearance,
             keep_clear,
             toolpaths,
@@ -312,6 +314,27 @@ fn read_simulation(
     })
 }
 
+/// The key for arcs in programs.
+const ARCS: &str = "arcs";
+
+/// How near arcs of a program stay to its moves, mm; `None` without arcs.
+fn read_arcs(section: &Section<'_>, five_axis: bool, tolerance: &Limits) -> Result<Option<f64>, SceneError> {
+    let Some(arcs) = section.length(ARCS)? else { return Ok(None) };
+    let refuse = |message: String, cure: &str| Err(section.error(&arcs.span, message, cure));
+    if five_axis {
+        return refuse(
+            "`arcs` does not apply to programs of machines with rotary axes".into(),
+            "delete one of `arcs` and `kinematics`",
+        );
+    }
+    if arcs.value > tolerance.chord {
+        let message =
+            format!("`arcs` is {} mm, more than the chord tolerance of {} mm", arcs.value, tolerance.chord);
+        return refuse(message, "write less, or a greater `chord` in [tolerance]");
+    }
+    Ok(Some(arcs.value))
+}
+
 fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
     section.only(
         &[
@@ -325,6 +348,7 @@ fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
             "jerks",
             "slow_corners",
             "clearance",
+            ARCS,
             kinematics::KEY,
         ],
         &[],

@@ -69,6 +69,9 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     }
     writeln!(out, "slow_corners = {}  # feeds of sharp bends in the program", scene.machine.slow_corners)?;
     writeln!(out, "clearance = {}  # mm of rapid moves above stock", number(scene.clearance))?;
+    if let Some(arcs) = scene.arcs {
+        writeln!(out, "arcs = {}  # mm, G2 and G3 where they stay so near to the moves", number(arcs))?;
+    }
     kinematics::write(out, scene.five_axis.as_ref())?;
     if !scene.keep_clear.fixtures.is_empty() || scene.toolpaths.iter().any(|request| request.axis.is_some()) {
         interference::write(out, &scene.keep_clear)?;

@@ -1,9 +1,10 @@
-//! What there is before the first cut: boxes, round bars, closed meshes, and blocks roughed to some distance from a part.
+//! What there is before the first cut: boxes, round bars, closed meshes, blocks roughed to some distance from a part, and
+//! blocks in which a pocket was begun.
 //! Engines on heights see it from above.
 
 use std::sync::Arc;
 
-use geometry::{Aabb, Bvh, HalfSpace, Point3, TriangleMesh, Vector3};
+use geometry::{Aabb, Bvh, HalfSpace, Point2, Point3, Region, RegionIndex, TriangleMesh, Vector3};
 
 /// Heights of curved stock are found to this, mm. Less takes more looks.
 const TRACED: f64 = 0.01;
@@ -45,6 +46,15 @@ pub enum Stock {
         part: Arc<StockMesh>,
         /// How much stands over it, mm.
         over: f64,
+    },
+    /// A block without what lies over a region above a level: see [`Stock::milled`].
+    Milled {
+        /// The block.
+        block: Aabb,
+        /// The region; it may lie beyond the block in part.
+        cleared: Arc<RegionIndex>,
+        /// Down to here, mm.
+        floor: f64,
     },
 }
 
@@ -91,6 +101,19 @@ impl Stock {
         Self::Roughed { block, part: Arc::new(StockMesh { tree: Bvh::new(&part), mesh: part }), over }
     }
 
+    /// A block from which an end mill took all that lies over `cleared` and above `floor`.
+    pub fn milled(block: Aabb, cleared: &Region, floor: f64) -> Self {
+        Self::Milled { block, cleared: Arc::new(RegionIndex::new(cleared.clone())), floor }
+    }
+
+    /// Where no stock stands above a level, mm, and the level, if that is known as a region of the plan view.
+    pub fn cleared(&self) -> Option<(&RegionIndex, f64)> {
+        match self {
+            Self::Milled { cleared, floor, .. } => Some((cleared, *floor)),
+            _ => None,
+        }
+    }
+
     /// The corners of its mesh; none of other shapes.
     pub fn corners(&self) -> &[Point3] {
         match self {
@@ -119,7 +142,7 @@ impl Stock {
                 Aabb { min: base - around, max: end + around }
             }
             Self::Mesh(stock) => stock.mesh.bounds(),
-            Self::Roughed { block, .. } => *block,
+            Self::Roughed { block, .. } | Self::Milled { block, .. } => *block,
         }
     }
 
@@ -134,6 +157,14 @@ impl Stock {
         Some(match self {
             Self::Roughed { .. } => return None,
             Self::Box(bounds) => bounds.size().product(),
+            Self::Milled { block, cleared, floor } => {
+                let Aabb { min, max } = block;
+                let corners = [(min.x, min.y), (max.x, min.y), (max.x, max.y), (min.x, max.y)];
+                let outer = corners.map(|(x, y)| Point2::new(x, y)).to_vec();
+                let rectangle = Region { pieces: vec![geometry::Piece { outer, islands: Vec::new() }] };
+                let within = cleared.region().intersection(&rectangle).area();
+                block.size().product() - within * (block.max.z - floor)
+            }
             Self::Cylinder { radius, length, .. } => std::f64::consts::PI * radius * radius * length,
             Self::Mesh(stock) => {
                 // From a place nearby, so that far from the origin no digits are lost.
@@ -176,7 +207,9 @@ impl Stock {
                 let with = |offset: f64| ends.into_iter().chain([HalfSpace { gradient, offset }]).collect();
                 StockSides { outer: with(radius - rho), inner: Some(with(below)) }
             }
-            Self::Mesh(_) | Self::Roughed { .. } => StockSides { outer: Vec::new(), inner: None },
+            Self::Mesh(_) | Self::Roughed { .. } | Self::Milled { .. } => {
+                StockSides { outer: Vec::new(), inner: None }
+            }
         }
     }
 
@@ -211,6 +244,10 @@ impl Stock {
             }
             Self::Mesh(stock) => stock.highest_within(x, y, half),
             Self::Roughed { .. } => self.traced_within(x, y, half),
+            Self::Milled { block, cleared, floor } => {
+                let top = Self::Box(*block).highest_within(x, y, half);
+                if cleared.holds_square(&Point2::new(x, y), half) { top.min(*floor) } else { top }
+            }
         }
     }
 
@@ -265,7 +302,7 @@ impl Stock {
     }
 
     /// Signed distance, mm, below zero inside, and its unit gradient: exact; of a roughed block the greater of those of the
-    /// block and of the surface, no greater than the true one.
+    /// block and of the surface, of a milled one that of the block: no greater than the true one.
     pub fn foot(&self, q: &Point3) -> (f64, Vector3) {
         match self {
             Self::Roughed { block, part, over } => {
@@ -273,6 +310,7 @@ impl Stock {
                 let of_part = (of_part.0 - over, of_part.1);
                 if of_block.0 > of_part.0 { of_block } else { of_part }
             }
+            Self::Milled { block, .. } => Self::Box(*block).foot(q),
             Self::Box(bounds) => {
                 let middle = bounds.min + bounds.size() * 0.5;
                 let away = q - middle;
@@ -405,6 +443,22 @@ mod tests {
         }
         let normal = pyramid.normal_at(2.0, 5.0);
         assert!((normal - Vector3::new(-1.0, 0.0, 1.0).normalize()).norm() < 1e-9, "{normal:?}");
+    }
+
+    /// A block with a square pocket that runs out of one side: heights, greatest heights over squares, volume.
+    #[test]
+    fn a_milled_block_stands_beside_what_was_cleared() {
+        let at = Point3::new;
+        let block = Aabb { min: at(0.0, 0.0, -20.0), max: at(20.0, 20.0, 0.0) };
+        let square = [(15.0, 5.0), (30.0, 5.0), (30.0, 12.0), (15.0, 12.0)];
+        let cleared = Region::nested(vec![square.map(|(x, y)| Point2::new(x, y)).to_vec()]).unwrap().0;
+        let stock = Stock::milled(block, &cleared, -6.0);
+        for (x, y, height) in [(16.0, 6.0, -6.0), (14.9, 6.0, 0.0), (20.1, 6.0, f64::NEG_INFINITY)] {
+            assert_eq!(stock.height_at(x, y), height);
+        }
+        assert_eq!((stock.highest_within(17.0, 8.0, 1.9), stock.highest_within(17.0, 8.0, 2.1)), (-6.0, 0.0));
+        assert!((stock.volume().unwrap() - (8000.0 - 5.0 * 7.0 * 6.0)).abs() < 1e-4);
+        assert!(stock.foot(&at(17.0, 8.0, -3.0)).0 < 0.0 && stock.bounds() == block);
     }
 
     #[test]

@@ -54,7 +54,7 @@ impl ZMap {
     ) -> Result<Self, Cancelled> {
         match stock {
             Stock::Box(block) | Stock::Roughed { block, .. } => Ok(Self::block(grid, block.max.z)),
-            Stock::Cylinder { .. } | Stock::Mesh(_) => {
+            Stock::Cylinder { .. } | Stock::Mesh(_) | Stock::Milled { .. } => {
                 Self::of_shape(grid, Shape { stock: stock.clone(), bottom }, monitor)
             }
         }

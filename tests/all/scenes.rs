@@ -329,6 +329,24 @@ fn a_pocket_with_islands_is_cleared_by_smooth_flow_as_well() {
     flow_is_smoother_than_offsets(&run("bracket.toml"));
 }
 
+/// Beyond open sides, and where a larger cutter was, no stock stands: passes begin there, without a helix or little of one.
+#[test]
+fn open_pockets_and_corners_left_by_a_larger_cutter_are_cleared() {
+    for (scene, limit) in [("open_step", 70.0), ("rest_corners", 60.0)] {
+        let run = run(&format!("{scene}.toml"));
+        is_cleared_to_its_walls(scene, &run);
+        let t = &run.1["toolpaths"][0];
+        let greatest = number(t, "/pocket/max_engagement_deg");
+        assert!(greatest > limit - 5.0 && greatest <= limit, "{scene}: {greatest}");
+    }
+    // In each of five square corners a radius of 6 mm leaves more than one of 2.5 mm does.
+    let rest = &run("rest_corners.toml").1["toolpaths"][0];
+    let left = 5.0 * (1.0 - std::f64::consts::FRAC_PI_4) * (36.0 - 6.25) * 4.0;
+    let (removed, bound) =
+        (number(rest, "/removal/volume_mm3"), number(rest, "/removal/volume_error_bound_mm3"));
+    assert!((removed - left).abs() < bound && bound < 0.2 * left, "{removed} {left} {bound}");
+}
+
 /// Where the scene bounds the engagement it is measured there, and nearly all of it is used.
 #[test]
 fn a_tray_is_cleared_to_its_walls_within_the_engagement() {

@@ -69,10 +69,7 @@ fn covered(scope: &str) -> &str {
 }
 
 fn of_pocket(run: &Run<'_>, pocket: &Pocket) -> CoverageFigures {
-    let around = |curve: &[geometry::Point2]| -> f64 {
-        (0..curve.len()).map(|k| (curve[(k + 1) % curve.len()] - curve[k]).norm()).sum()
-    };
-    let walls = pocket.depth * pocket.region.curves().map(around).sum::<f64>();
+    let walls = pocket.depth * pocket.wall_length();
     let mesh = run.part().mesh();
     let floor = |t: usize| {
         let [a, b, c] = mesh.corners(t);

@@ -1,5 +1,6 @@
 //! Walls and engagement of a pocket.
 
+use geometry::Point2;
 use metrology::{PocketFigures, View};
 use motion::{MoveKind, Toolpath};
 use report::{Claim, Figure, Gravity, micrometres, with_bound};
@@ -113,7 +114,12 @@ fn steps_down(path: &Toolpath, top: f64, limit: f64) -> Claim {
 /// That no way down through stock is steeper than the scene allows.
 fn ramps(run: &Run<'_>, strategy: &PocketStrategy) -> Claim {
     let limit = strategy.ramp_angle.to_degrees();
-    let (steepest, at_least, index) = steepest(run.path(), run.session.top());
+    let radius = run.scene().cutter.radius();
+    let clear = |p: &Point2| {
+        let cleared = run.session.stock.cleared();
+        cleared.is_some_and(|(region, _)| region.contains(p) && region.sides().distance(p) >= radius)
+    };
+    let (steepest, at_least, index) = steepest(run.path(), run.session.top(), &clear);
     let text = match index {
         None => "no way down cuts".to_owned(),
         Some(k) => format!(
@@ -126,8 +132,8 @@ fn ramps(run: &Run<'_>, strategy: &PocketStrategy) -> Claim {
 }
 
 /// The steepest way down below what the level above its pass has cleared, degrees from level; the same less what rounding of
-/// its coordinates may have added; its move.
-fn steepest(path: &Toolpath, top: f64) -> (f64, f64, Option<usize>) {
+/// its coordinates may have added; its move. Where a place of the axis is `clear` no stock stood before.
+fn steepest(path: &Toolpath, top: f64, clear: &dyn Fn(&Point2) -> bool) -> (f64, f64, Option<usize>) {
     let levels = levels(path);
     let mut floors = vec![f64::INFINITY; path.passes()];
     // A helix may be all that a pass is.
@@ -141,7 +147,8 @@ fn steepest(path: &Toolpath, top: f64) -> (f64, f64, Option<usize>) {
     };
     let mut found = (0.0, 0.0, None);
     for (k, (a, b, m)) in path.segments().enumerate() {
-        let cuts = || b.z < cleared(m.pass) - ROUNDING;
+        let straight = a.xy() == b.xy();
+        let cuts = || b.z < cleared(m.pass) - ROUNDING && !(straight && clear(&b.xy()));
         let slope = |drop: f64| drop.max(0.0).atan2((b - a).xy().norm()).to_degrees();
         let at_least = slope(a.z - b.z - LAST_DECIMAL);
         if m.kind == MoveKind::Plunge && at_least > found.1 && cuts() {
@@ -184,9 +191,11 @@ mod tests {
         assert_eq!((claim(2.0).verdict(), claim(1.9).verdict()), (Verdict::Pass, Verdict::Fail));
         assert_eq!(claim(1.9).measured, Some(2.0));
         // The way through air above the stock is no way down.
-        assert_eq!(steepest(&path, 0.0), (90.0, 90.0, Some(5)));
+        assert_eq!(steepest(&path, 0.0, &|_| false), (90.0, 90.0, Some(5)));
+        let beside = |p: &Point2| p.x > 8.0;
+        assert_eq!(steepest(&path, 0.0, &beside).2, Some(1));
         let ramped = Toolpath::new(path.start, path.moves[..3].to_vec());
-        let (slope, _, index) = steepest(&ramped, 0.0);
+        let (slope, _, index) = steepest(&ramped, 0.0, &|_| false);
         assert!((slope - 45.0).abs() < 1e-12 && index == Some(1));
     }
 }

@@ -1,5 +1,5 @@
 use super::*;
-use geometry::Point3;
+use geometry::{Aabb, Point3, Region};
 use motion::ClPoint;
 use proptest::prelude::*;
 use work::monitor::Silent;
@@ -23,8 +23,17 @@ fn cuts(m: &Move) -> bool {
     m.kind == MoveKind::Cut
 }
 
+/// A block up to z = 0.
+fn block() -> Aabb {
+    Aabb { min: Point3::new(-500.0, -500.0, -9.0), max: Point3::new(500.0, 500.0, 0.0) }
+}
+
+fn arcs_in(stock: &Stock, path: &Toolpath) -> ContactArcs {
+    contact_arcs(path, &Cutter::flat(2.0 * RADIUS).unwrap(), stock, &cuts, &Silent).unwrap()
+}
+
 fn arcs_of(path: &Toolpath) -> ContactArcs {
-    contact_arcs(path, &Cutter::flat(2.0 * RADIUS).unwrap(), 0.0, &cuts, &Silent).unwrap()
+    arcs_in(&Stock::Box(block()), path)
 }
 
 fn arcs(places: &[(f64, f64)]) -> ContactArcs {
@@ -189,5 +198,56 @@ proptest! {
             // The end of a move is one of the places that are looked at.
             prop_assert!(brute(&path, k, 1.0) <= found.of_moves[k] + rough);
         }
+    }
+}
+
+/// A way into ground that was cleared before, and beside it: as closed forms say, and as brute force over the circumference, films
+/// included, in a region with corners and an island; below its floor nothing was cleared.
+#[test]
+fn ground_cleared_before_is_no_stock() {
+    let ring = |c: &[(f64, f64)]| c.iter().map(|&(x, y)| Point2::new(x, y)).collect::<Vec<_>>();
+    let island = ring(&[(8.0, 3.0), (11.0, 4.0), (9.0, 7.0)]);
+    let outer = ring(&[(0.0, 0.0), (30.0, 0.0), (30.0, 20.0), (12.0, 20.0), (12.0, 12.0), (0.0, 12.0)]);
+    let region = Region::nested(vec![outer, island.clone()]).unwrap().0;
+    let sides: Vec<[Point2; 2]> =
+        region.curves().flat_map(|c| (0..c.len()).map(move |k| [c[k], c[(k + 1) % c.len()]])).collect();
+    let stock = Stock::milled(block(), &region, -2.0);
+    // Out of the region over its lower side: at the place where half of it has passed, half a turn.
+    let beside = |width: f64| ((1.0 + FILM) - width / RADIUS).acos();
+    for width in [0.5, 1.5, 2.9] {
+        let found = arcs_in(&stock, &through(&[(20.0, RADIUS - width), (27.0, RADIUS - width)]));
+        assert!((found.of_moves[1] - beside(width)).abs() < 1e-9, "{} {}", found.of_moves[1], beside(width));
+        assert!(found.bound() < 1e-3);
+    }
+    let lower = Stock::milled(block(), &region, -1.9);
+    assert!((arcs_in(&lower, &through(&[(20.0, 4.0), (25.0, 4.0)])).of_moves[1] - PI).abs() < 1e-9);
+    // The greatest angle on short moves, each by itself, against places 0.01 degrees apart on the circumference.
+    for (k, at) in [(4.0, 3.0), (9.0, 9.5), (13.0, 15.0), (24.0, 5.0), (1.0, 6.0), (9.5, 5.0), (31.0, 10.0)]
+        .iter()
+        .enumerate()
+    {
+        let turn = 1.3 * k as f64;
+        let heading = Vector2::new(turn.cos(), turn.sin());
+        let (from, length) = (Point2::new(at.0, at.1), 0.02);
+        let to = from + heading * length;
+        let found = arcs_in(&stock, &through(&[*at, (to.x, to.y)]));
+        let standing = |p: Point2| {
+            let away = sides.iter().map(|side| geometry::foot(&p, side).1).fold(f64::INFINITY, f64::min);
+            !region.contains(&p) && away > FILM * RADIUS
+        };
+        let count = 18_000;
+        let brute = |centre: Point2| {
+            let one = |i: usize| {
+                let angle = turn - FRAC_PI_2 + PI * (i as f64 + 0.5) / count as f64;
+                let p = centre + Vector2::new(angle.cos(), angle.sin()) * RADIUS;
+                // What the move itself cleared behind it.
+                standing(p) && (p - from).norm() >= RADIUS
+            };
+            (0..count).filter(|i| one(*i)).count() as f64 * PI / count as f64
+        };
+        let greatest = brute(from).max(brute(to));
+        let got = found.of_moves[1];
+        assert!(got > greatest - 0.02 && got < greatest + 0.02, "{at:?}: {got} {greatest}");
+        assert!(found.at_most[1] >= greatest - 1e-3, "{at:?}");
     }
 }

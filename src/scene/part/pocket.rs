@@ -1,5 +1,5 @@
-//! A pocket as the part of a scene: its region from a drawing or from points, and the floor that is
-//! measured.
+//! A pocket as the part of a scene: its region from a drawing or from points, its open sides, what was cleared before, and the
+//! floor that is measured.
 
 use std::fmt::{self, Write as _};
 use std::path::Path;
@@ -57,7 +57,32 @@ pub struct PocketSource {
     pub outline: OutlineSource,
     /// How far its floor lies below z = 0, mm.
     pub depth: f64,
+    /// Lines along its outline beyond which there is no stock, mm.
+    pub open: Vec<OpenLine>,
+    /// What cleared it before, if anything did.
+    pub cleared: Option<EarlierCutter>,
 }
+
+/// Points of a line along open sides, mm, and where the scene has them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OpenLine {
+    /// The points.
+    pub points: Vec<Point2>,
+    /// Place in the scene.
+    pub span: std::ops::Range<usize>,
+}
+
+/// A larger flat end mill that went everywhere in a pocket that it fits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EarlierCutter {
+    /// Its diameter, mm.
+    pub diameter: f64,
+    /// What it left at the walls, mm.
+    pub allowance: f64,
+}
+
+/// The keys beside those of the outline.
+const OTHERS: [&str; 4] = ["depth", "open", "cleared_by", "cleared_allowance"];
 
 impl Source for PocketSource {
     const EXTENSIONS: &'static [&'static str] = &outline::EXTENSIONS;
@@ -67,21 +92,21 @@ impl Source for PocketSource {
     }
 
     fn keys() -> Vec<&'static str> {
-        vec!["file", "unit", "layer", "outline", "islands", "depth"]
+        ["file", "unit", "layer", "outline", "islands"].into_iter().chain(OTHERS).collect()
     }
 
     fn read(table: &PartTable<'_>) -> Result<Self, SceneError> {
         let part = table.table;
         let from_points = part.has("outline") && !part.has("file");
         let (keys, what): (&[&str], _) = if from_points {
-            (&["surface", "outline", "islands", "depth"], "a pocket from points")
+            (&["surface", "outline", "islands"], "a pocket from points")
         } else {
-            (&["surface", "file", "unit", "layer", "depth"], "a pocket from a drawing")
+            (&["surface", "file", "unit", "layer"], "a pocket from a drawing")
         };
-        table.only(keys, what)?;
+        table.only(&[keys, &OTHERS].concat(), what)?;
         let depth = part.required_length("depth", 6.0)?.value;
         let outline = if from_points { read_points(part)? } else { read_drawing(table)? };
-        Ok(Self { outline, depth })
+        Ok(Self { outline, depth, open: read_open(part)?, cleared: read_cleared(part)? })
     }
 
     fn write(&self, out: &mut String) -> fmt::Result {
@@ -97,15 +122,25 @@ impl Source for PocketSource {
                 }
             }
             OutlineSource::Points { curves } => {
-                let point = |p: &Point2| format!("[{}, {}]", toml_number(p.x), toml_number(p.y));
-                let list =
-                    |c: &Vec<Point2>| format!("[{}]", c.iter().map(point).collect::<Vec<_>>().join(", "));
                 writeln!(out, "outline = {}  # mm", list(&curves[0]))?;
-                let islands: Vec<String> = curves[1..].iter().map(list).collect();
+                let islands: Vec<String> = curves[1..].iter().map(|curve| list(curve)).collect();
                 writeln!(out, "islands = [{}]", islands.join(", "))?;
             }
         }
-        writeln!(out, "depth = {}  # mm below z = 0", toml_number(self.depth))
+        writeln!(out, "depth = {}  # mm below z = 0", toml_number(self.depth))?;
+        if !self.open.is_empty() {
+            let lines: Vec<String> = self.open.iter().map(|line| list(&line.points)).collect();
+            writeln!(out, "open = [{}]  # mm, along sides without a wall", lines.join(", "))?;
+        }
+        if let Some(EarlierCutter { diameter, allowance }) = self.cleared {
+            writeln!(
+                out,
+                "cleared_by = {}  # mm, diameter of an earlier flat end mill",
+                toml_number(diameter)
+            )?;
+            writeln!(out, "cleared_allowance = {}  # mm that it left at the walls", toml_number(allowance))?;
+        }
+        Ok(())
     }
 
     fn file(&self) -> Option<&NamedFile> {
@@ -120,6 +155,40 @@ impl Source for PocketSource {
         let (pocket, notes) = self.pocket(job)?;
         let part = self.floor(&pocket, job)?;
         Ok(Loaded { pocket: Some(pocket), notes, ..Loaded::from(part) })
+    }
+}
+
+/// Points as scenes spell them.
+fn list(points: &[Point2]) -> String {
+    let point = |p: &Point2| format!("[{}, {}]", toml_number(p.x), toml_number(p.y));
+    format!("[{}]", points.iter().map(point).collect::<Vec<_>>().join(", "))
+}
+
+fn read_open(part: &Section<'_>) -> Result<Vec<OpenLine>, SceneError> {
+    let line = |line: keys::Located<Vec<Point2>>| {
+        let valid = |p: &Point2| p.coords.iter().all(|x| x.abs() <= geometry::MAX_COORDINATE);
+        if line.value.len() < 2 || !line.value.iter().all(valid) {
+            let message = "a line along open sides needs two points or more";
+            return Err(part.error(&line.span, message, "write its ends: `open = [[[60, 0], [60, 40]]]`"));
+        }
+        Ok(OpenLine { points: line.value, span: line.span })
+    };
+    part.curves("open")?.into_iter().map(line).collect()
+}
+
+fn read_cleared(part: &Section<'_>) -> Result<Option<EarlierCutter>, SceneError> {
+    let allowance = part.number("cleared_allowance", 0.0..=*keys::LENGTH.end(), " mm")?;
+    match (part.length("cleared_by")?, allowance) {
+        (Some(by), left) => {
+            let allowance = left.map_or(0.0, |left| left.value);
+            Ok(Some(EarlierCutter { diameter: by.value, allowance }))
+        }
+        (None, Some(left)) => Err(part.error(
+            &left.span,
+            "`cleared_allowance` needs `cleared_by`",
+            "add the diameter of the flat end mill that cleared the pocket: `cleared_by = 12`",
+        )),
+        (None, None) => Ok(None),
     }
 }
 
@@ -219,16 +288,34 @@ impl PocketSource {
                 (region, Vec::new())
             }
         };
-        Ok((Pocket { region, depth: self.depth }, notes))
+        let mut pocket = Pocket::new(region, self.depth);
+        let radius = job.cutter.radius();
+        if !self.open.is_empty() {
+            let lines: Vec<Vec<Point2>> = self.open.iter().map(|line| line.points.clone()).collect();
+            pocket = pocket.opened(&lines, job.chord_tolerance, radius).map_err(|e| {
+                let span = self.open[e.line].span.clone();
+                let cure = "write places of the outline, corners or others, in its order";
+                job.source.error(span, format!("this line along open sides is none: {e}"), cure)
+            })?;
+        }
+        let Some(EarlierCutter { diameter, allowance }) = self.cleared else { return Ok((pocket, notes)) };
+        if diameter <= 2.0 * radius {
+            let message = format!(
+                "an earlier cutter of {diameter} mm leaves no corners to this one of {} mm",
+                2.0 * radius
+            );
+            return Err(self.refused(job, &message));
+        }
+        Ok((pocket.cleared_by(0.5 * diameter, allowance), notes))
     }
 
     fn floor(&self, pocket: &Pocket, job: &Loading<'_>) -> Result<Part, SceneError> {
         let radius = job.cutter.radius();
         let clear = CHORDS_FROM_WALLS * job.chord_tolerance + RADIUS_FROM_WALLS * radius;
-        let floor = pocket.reachable_floor(job.cutter).inset(clear);
+        let floor = pocket.reachable_floor(job.cutter, clear);
         if floor.is_empty() {
             let largest =
-                pocket.region.largest_disc(0.005, &Silent).ok().flatten().map_or(0.0, |d| 2.0 * d.1);
+                pocket.free().largest_disc(0.005, &Silent).ok().flatten().map_or(0.0, |d| 2.0 * d.1);
             let message = format!(
                 "the cutter of {} mm fits nowhere in the pocket; the largest that would has {:.2} mm",
                 2.0 * radius,
@@ -278,6 +365,36 @@ mod tests {
     }
 
     #[test]
+    fn open_sides_and_an_earlier_cutter_are_read_and_written_again() {
+        let text = TRAY.replace(
+            "depth = 5",
+            "depth = 5\nopen = [[[60, 0], [60, 40]]]\ncleared_by = 12\ncleared_allowance = 0.2",
+        );
+        let finish = "engagement = 80\nwall_allowance = 0.2\nwall_finish = \"depth\"";
+        let text = format!("{}[machine]\narcs = 0.0005\n", text.replace("engagement = 80", finish));
+        let scene = Scene::parse("tray.toml", text).unwrap();
+        let text = complete_toml(&scene);
+        assert!(text.contains("open = [[[60.0, 0.0], [60.0, 40.0]]]"), "{text}");
+        let again = Scene::parse("tray.toml", text.clone()).unwrap();
+        assert_eq!((complete_toml(&again), again.arcs), (text, Some(0.0005)));
+        assert_eq!(again.toolpaths, scene.toolpaths);
+        assert!(crate::load_part(&again).unwrap().pocket.unwrap().air().area() > 1000.0);
+    }
+
+    #[test]
+    fn open_sides_off_the_outline_and_smaller_earlier_cutters_are_refused() {
+        for (key, words) in [
+            ("open = [[[60, 0], [61, 40]]]", "its point at x 61.0000 y 40.0000 does not lie on the outline"),
+            ("cleared_by = 6", "leaves no corners"),
+        ] {
+            let text = TRAY.replace("depth = 5", &format!("depth = 5\n{key}"));
+            let scene = Scene::parse("tray.toml", text).unwrap();
+            let refused = crate::load_part(&scene).unwrap_err().to_string();
+            assert!(refused.contains(words), "{refused}");
+        }
+    }
+
+    #[test]
     fn wrong_pockets_are_refused_with_the_reason() {
         for (from, to, words) in [
             ("[60, 40], [0, 40]", "[0, 40], [60, 40]", "the outline: it crosses itself at x 30"),
@@ -296,6 +413,16 @@ mod tests {
             ("pocket-zigzag\"\nangle = 20", "zigzag\"", "does not mill a pocket"),
             ("angle = 20", "spiral = true", "does not apply"),
             ("spiral = true", "stepover = 6", "more than 0.95"),
+            ("spiral = true", "wall_finish = \"depth\"", "does not apply without a `wall_allowance`"),
+            ("spiral = true", "wall_allowance = 0.2\nwall_finish = \"deep\"", "cannot be \"deep\""),
+            (
+                "[[toolpath]]\nstrategy = \"pocket-flow\"",
+                "[machine]\narcs = 0.1\n[[toolpath]]\nstrategy = \"pocket-flow\"",
+                "more than the chord tolerance",
+            ),
+            ("depth = 5", "depth = 5\nopen = [[[60, 0]]]", "needs two points"),
+            ("depth = 5", "depth = 5\nopen = [[60, 0], [60, 40]]", "points of two numbers"),
+            ("depth = 5", "depth = 5\ncleared_allowance = 0.2", "needs `cleared_by`"),
         ] {
             let text = refusal(from, to);
             assert!(text.contains(words), "{to}: {text}");

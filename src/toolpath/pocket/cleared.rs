@@ -190,6 +190,12 @@ impl Cleared {
         self.front(centre, heading, 0.0, fresh).angle()
     }
 
+    /// As [`Cleared::arc`], with what is clear to the right of the stock counted as well: the angle that there is once the
+    /// cutter has turned along the stock on its right.
+    pub fn arc_from_right(&self, centre: &Point2, heading: &Vector2, fresh: usize) -> f64 {
+        self.front(centre, heading, 0.0, fresh).ends().map_or(0.0, |[_, to]| to + FRAC_PI_2)
+    }
+
     /// Whether a straight move keeps to a limit all along but for [`BETWEEN`]: tips of stock may be passed between its ends. A
     /// disc is convex: what it clears from both ends, it clears from everywhere between. Where that is not enough, places close
     /// to each other are asked.

@@ -2,7 +2,7 @@
 
 use super::route::circle;
 use super::route::{Entry, Run};
-use super::strategy::PocketStrategy;
+use super::strategy::{PocketStrategy, WallFinish};
 use crate::vocabulary::PlanSettings;
 use geometry::{Point2, Point3, foot};
 use motion::{ClPoint, Move, MoveKind, Toolpath};
@@ -81,6 +81,8 @@ pub(super) fn shortened(
 
 struct Writer<'a> {
     settings: &'a PlanSettings,
+    /// Height of ways between runs, mm.
+    safe: f64,
     moves: Vec<Move>,
     at: Option<Point3>,
     start: Option<Point3>,
@@ -97,42 +99,62 @@ impl Writer<'_> {
             self.at = Some(tip);
         }
     }
+
+    /// Runs from one height down to a floor, mm.
+    fn runs(&mut self, runs: &[Run], [above, floor]: [f64; 2], strategy: &PocketStrategy) {
+        let (settings, safe) = (self.settings, self.safe);
+        for run in runs.iter().filter(|run| !run.points.is_empty()) {
+            let way = way_down(run, above, floor, strategy, settings.chord_tolerance);
+            let first = way[0];
+            let (over, near) = (Point3::new(first.x, first.y, safe), (first.z + ABOVE).min(safe));
+            self.to(over, MoveKind::Rapid, 0.0);
+            self.to(Point3::new(first.x, first.y, near), MoveKind::Rapid, 0.0);
+            for tip in way {
+                let from = self.at.unwrap_or(over);
+                let (run_length, drop) = ((tip.xy() - from.xy()).norm(), from.z - tip.z);
+                // The plunge rate bounds the speed downwards, whatever the slope.
+                let steep = if drop > 0.0 { run_length.hypot(drop) / drop } else { f64::INFINITY };
+                let feed = (settings.plunge_rate * steep).min(settings.feed_rate);
+                self.to(tip, MoveKind::Plunge, feed);
+            }
+            for p in &run.points {
+                self.to(Point3::new(p.x, p.y, floor), MoveKind::Cut, settings.feed_rate);
+            }
+            if let Some(at) = self.at {
+                self.to(Point3::new(at.x, at.y, safe), MoveKind::Retract, settings.feed_rate);
+            }
+            self.pass += 1;
+        }
+    }
 }
 
-/// Every run at every floor.
+/// The runs of a floor.
+pub(super) struct Runs {
+    /// Those that clear it, to the walls or to what is left there.
+    pub clearing: Vec<Run>,
+    /// The last passes along walls.
+    pub along_walls: Vec<Run>,
+}
+
+/// Every run at every floor; where walls have one pass of all the depth, that comes last.
 pub(super) fn program(
-    runs: &[Run],
+    runs: &Runs,
     depth: f64,
     strategy: &PocketStrategy,
     settings: &PlanSettings,
 ) -> Toolpath {
     let safe = settings.stock_top + settings.clearance;
-    let mut writer = Writer { settings, moves: Vec::new(), at: None, start: None, pass: 0 };
+    let mut writer = Writer { settings, safe, moves: Vec::new(), at: None, start: None, pass: 0 };
     let mut above = settings.stock_top;
     for floor in floors(depth, strategy) {
-        for run in runs.iter().filter(|run| !run.points.is_empty()) {
-            let way = way_down(run, above, floor, strategy, settings.chord_tolerance);
-            let first = way[0];
-            let (over, near) = (Point3::new(first.x, first.y, safe), (first.z + ABOVE).min(safe));
-            writer.to(over, MoveKind::Rapid, 0.0);
-            writer.to(Point3::new(first.x, first.y, near), MoveKind::Rapid, 0.0);
-            for tip in way {
-                let from = writer.at.unwrap_or(over);
-                let (run_length, drop) = ((tip.xy() - from.xy()).norm(), from.z - tip.z);
-                // The plunge rate bounds the speed downwards, whatever the slope.
-                let steep = if drop > 0.0 { run_length.hypot(drop) / drop } else { f64::INFINITY };
-                let feed = (settings.plunge_rate * steep).min(settings.feed_rate);
-                writer.to(tip, MoveKind::Plunge, feed);
-            }
-            for p in &run.points {
-                writer.to(Point3::new(p.x, p.y, floor), MoveKind::Cut, settings.feed_rate);
-            }
-            if let Some(at) = writer.at {
-                writer.to(Point3::new(at.x, at.y, safe), MoveKind::Retract, writer.settings.feed_rate);
-            }
-            writer.pass += 1;
+        writer.runs(&runs.clearing, [above, floor], strategy);
+        if strategy.wall_finish == WallFinish::Steps {
+            writer.runs(&runs.along_walls, [above, floor], strategy);
         }
         above = floor;
+    }
+    if strategy.wall_finish == WallFinish::Depth {
+        writer.runs(&runs.along_walls, [settings.stock_top, -depth], strategy);
     }
     let start = writer.start.unwrap_or(Point3::new(0.0, 0.0, safe));
     Toolpath::new(ClPoint::upright(start), writer.moves)
@@ -157,6 +179,7 @@ fn way_down(
             turn
         }
         Entry::Ramp(way) => way.clone(),
+        Entry::Air => return plunge,
     };
     let length: f64 = once.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
     if length < LEAST_RAMP || drop <= ROUNDING {

@@ -8,6 +8,7 @@
 //! the limit allows (`peel`), and what they leave is found and cleared by loops (`rest`, `bounded`). Every finished move keeps to
 //! the exact region (`walls`). The design's frame: z = 0 is the upper face, the floor lies at minus the depth; mm.
 
+mod air;
 mod bounded;
 mod cleared;
 mod descend;
@@ -19,6 +20,7 @@ mod nest;
 mod peel;
 mod rest;
 mod route;
+mod shape;
 pub(crate) mod strategy;
 #[cfg(test)]
 mod tests;
@@ -26,11 +28,13 @@ mod turning;
 mod walls;
 mod way;
 
+use air::Air;
 use cleared::Cleared;
 pub use feed::{Engagement, LEAST_SHARE, engagement, engagement_angle, limit_feed};
 use nest::NestError;
 use route::Run;
-pub use strategy::{Flow, Pattern, PocketStrategy, read_pocket_step};
+pub use shape::{NotOnOutline, Pocket};
+pub use strategy::{Flow, Pattern, PocketStrategy, WallFinish, read_pocket_step};
 use turning::Turning;
 
 use crate::plan::Plan;
@@ -39,15 +43,6 @@ use cutter::Cutter;
 use geometry::{Piece, Point2, Region, SegmentGrid};
 use motion::ROUNDING;
 use work::monitor::{self, Cancelled, Monitor};
-
-/// A pocket to mill.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Pocket {
-    /// Its region in the plan view.
-    pub region: Region,
-    /// How far the floor lies below z = 0, mm.
-    pub depth: f64,
-}
 
 /// Share of the flat bottom's radius that innermost passes may lie from what they have to clear.
 const REACH: f64 = 0.95;
@@ -72,24 +67,6 @@ const WRITTEN: f64 = 0.5 * ROUNDING;
 /// Precision of the largest cutter that an error names, mm.
 const DISC_PRECISION: f64 = 0.005;
 
-impl Pocket {
-    /// The floor that a cutter can reach: the region that the flat of its bottom sweeps.
-    pub fn reachable_floor(&self, cutter: &Cutter) -> Region {
-        self.region.inset(cutter.radius()).grown(cutter.flat_radius())
-    }
-
-    /// Area of the region that no position of the cutter sweeps, mm²: what stays in sharp corners. Over a
-    /// square corner it is `r² (1 − π/4)`.
-    ///
-    /// # Errors
-    /// [`Cancelled`] when the monitor says so.
-    pub fn rest_area(&self, cutter: &Cutter, monitor: &dyn Monitor) -> Result<f64, Cancelled> {
-        let r = cutter.radius();
-        let swept = self.region.watched_inset(r, monitor)?.watched_grown(r, monitor)?;
-        Ok((self.region.area() - swept.area()).max(0.0))
-    }
-}
-
 /// Plans one pocket.
 ///
 /// # Errors
@@ -110,10 +87,10 @@ pub fn plan_pocket(
     let chords = CHORDS_SHARE * settings.chord_tolerance;
     // Straight sides of an inset stand off farther than they are asked to.
     let off = radius + WRITTEN;
-    let inset = pocket.region.watched_inset(off - Region::offset_excess(off), monitor)?;
-    let walls_at = walls::tangent(inset, &pocket.region, off);
+    let inset = pocket.free().watched_inset(off - Region::offset_excess(off), monitor)?;
+    let walls_at = walls::tangent(inset, pocket.free(), off);
     if walls_at.is_empty() {
-        let largest = pocket.region.largest_disc(DISC_PRECISION, monitor)?.map_or(0.0, |d| 2.0 * d.1);
+        let largest = pocket.free().largest_disc(DISC_PRECISION, monitor)?.map_or(0.0, |d| 2.0 * d.1);
         return Err(refuse(format!(
             "a cutter of {} mm fits nowhere in the outline; the largest that would is {:.2} mm",
             2.0 * radius,
@@ -121,7 +98,7 @@ pub fn plan_pocket(
         )));
     }
     let rough = if strategy.wall_allowance > 0.0 {
-        pocket.region.watched_inset(off + strategy.wall_allowance, monitor)?
+        pocket.free().watched_inset(off + strategy.wall_allowance, monitor)?
     } else {
         walls_at.clone()
     };
@@ -132,22 +109,32 @@ pub fn plan_pocket(
         );
     }
     let step = strategy.stepover(settings.step, radius);
-    let mut ground = pocket.region.bounds().map(|around| Cleared::new(around, radius));
+    let mut ground = pocket.free().bounds().map(|around| Cleared::new(around, radius));
+    let air = Air::of(pocket, radius);
+    if let (Some(air), Some(ground)) = (&air, &mut ground) {
+        air.discs.iter().for_each(|p| ground.add(*p));
+    }
     let rules = strategy.rules(radius);
     let mut peeled: Vec<Run> = Vec::new();
     let mut groups: Vec<(&Piece, Vec<Run>)> = Vec::new();
     for piece in &rough.pieces {
         monitor::check(monitor)?;
         if let (Some(rules), Some(ground), true) = (&rules, &mut ground, strategy.pattern.peels())
-            && let Some(clearing) = rest::clear(piece, ground, rules, monitor)?
+            && let Some(clearing) = rest::clear(piece, air.as_ref(), ground, rules, monitor)?
         {
             peeled.extend(clearing.peeled);
             groups.push((piece, clearing.rest));
             continue;
         }
-        let runs = piece_runs(piece, cutter, strategy, step, &mut notes, monitor)?;
+        let mut runs = piece_runs(piece, cutter, strategy, step, air.is_none(), &mut notes, monitor)?;
+        // Loops that bound the engagement lean to one side of lines, and may find no room beside a way from elsewhere.
+        if let (Some(air), None) = (&air, &rules) {
+            let room = walls::Room::new(piece);
+            runs = runs.into_iter().map(|run| air.entered(run, &room)).collect();
+        }
         groups.push((piece, runs));
     }
+    let rough_groups = groups.len();
     if strategy.wall_allowance > 0.0 {
         for piece in &walls_at.pieces {
             let room = walls::Room::new(piece);
@@ -178,11 +165,17 @@ pub fn plan_pocket(
         bound_runs(&mut groups, &mut ground, rules, &mut notes, monitor)?;
         kept(&mut groups, monitor)?;
     }
+    let along_walls = groups.split_off(rough_groups).into_iter().flat_map(|group| group.1).collect();
     let mut runs = peeled;
     runs.extend(groups.into_iter().flat_map(|group| group.1));
+    let trimmed = |runs: Vec<Run>| -> Vec<Run> {
+        let Some(air) = &air else { return runs };
+        runs.into_iter().flat_map(|run| air.trimmed(run)).collect()
+    };
+    let mut runs = descend::Runs { clearing: trimmed(runs), along_walls: trimmed(along_walls) };
     let turn = strategy.bounded().map_or(std::f64::consts::PI, |_| MOST_TURN);
-    let walls = walls::Walls::new(&pocket.region, off - walls::ROUNDING);
-    for run in &mut runs {
+    let walls = walls::Walls::new(pocket.free(), off - walls::ROUNDING);
+    for run in runs.clearing.iter_mut().chain(&mut runs.along_walls) {
         monitor::check(monitor)?;
         let holds = |a: &Point2, b: &Point2| walls.hold(a, b);
         run.points = descend::shortened(&run.points, chords, MOVE_OVER_RADIUS * radius, turn, holds);
@@ -237,6 +230,7 @@ fn piece_runs(
     cutter: &Cutter,
     strategy: &PocketStrategy,
     step: f64,
+    helix: bool,
     notes: &mut Vec<String>,
     monitor: &dyn Monitor,
 ) -> Result<Vec<Run>, PlanError> {
@@ -270,7 +264,9 @@ fn piece_runs(
     };
     let walls = SegmentGrid::of_curves(piece.curves());
     let leads = if turning.is_some() { route::LONG_LEADS } else { route::LEADS };
-    let settings =
-        route::RouteSettings { helix: strategy.helix(radius), spiral, spacing: SPACING * step, leads };
+    let [wanted, least] = strategy.helix(radius);
+    // A way from outside needs none.
+    let helix = [wanted, if helix { least } else { f64::INFINITY }];
+    let settings = route::RouteSettings { helix, spiral, spacing: SPACING * step, leads };
     Ok(route::runs(&nest, &walls, &settings))
 }

@@ -53,6 +53,9 @@ const LEAST_FREE: f64 = 0.1;
 /// Passes that cut along a way shorter than this over the radius are none.
 const LEAST_CUT: f64 = 0.1;
 
+/// A pass that no step leads on from, so long after its beginning over the radius, is tried again with more care.
+const SOON: f64 = 1.5;
+
 /// Places where passes may begin are this far apart over the radius.
 const APART: f64 = 0.35;
 
@@ -82,6 +85,8 @@ pub(super) struct Peeler<'a> {
     radius: f64,
     /// A pass ends when it cut nothing over so long a way, mm.
     longest_free: f64,
+    /// Whether turns into the stock leave room to turn along it again.
+    careful: bool,
     out: Vec<Point2>,
     places: Vec<Beginning>,
     passes: usize,
@@ -105,6 +110,7 @@ impl<'a> Peeler<'a> {
             limit,
             radius,
             longest_free: (FREE[0] - FREE[1] * (1.0 - limit.cos())).max(LEAST_FREE) * radius,
+            careful: false,
             out: Vec::new(),
             places: Vec::new(),
             passes: 0,
@@ -128,7 +134,13 @@ impl<'a> Peeler<'a> {
             let begin = self.out[index];
             let links = Links { room: self.room, cleared: self.cleared, radius: self.radius };
             let link = links.between(&self.out, index, heading);
-            if !self.pass(begin, heading, link, monitor)? {
+            self.careful = false;
+            let mut done = self.pass(begin, heading, &link, monitor)?;
+            if !done {
+                self.careful = true;
+                done = self.pass(begin, heading, &link, monitor)?;
+            }
+            if !done {
                 self.places.remove(k);
             }
         }
@@ -204,12 +216,12 @@ impl<'a> Peeler<'a> {
         }
     }
 
-    /// One pass from `begin`; `false` if it cuts next to nothing, and then nothing changes.
+    /// One pass from `begin`; `false` if it cuts next to nothing, or ends soon without care, and then nothing changes.
     fn pass(
         &mut self,
         begin: Point2,
         heading: Vector2,
-        link: Vec<Point2>,
+        link: &[Point2],
         monitor: &dyn Monitor,
     ) -> Result<bool, Cancelled> {
         let (full, shortest) = (STEP * self.radius, SHORTEST * self.radius);
@@ -218,16 +230,18 @@ impl<'a> Peeler<'a> {
         // The length of the way at each of its places.
         let mut lengths = vec![0.0];
         let (mut step, mut gone, mut cut, mut free, mut last_cut) = (full, 0.0, 0.0, 0.0, 0);
+        let mut stuck = false;
         loop {
             check(monitor)?;
             // Places of the way from here on are the last ones that were cleared.
             let settled = lengths.partition_point(|l| *l < gone - FRESH * self.radius);
             let mut fresh = self.cleared.len() - (way.len() - settled.max(1));
-            if cut >= LEAST_CUT * self.radius && settled <= last_cut {
+            if gone >= SOON * self.radius && settled <= last_cut {
                 fresh -= self.thin(fresh);
             }
             let Some(next) = self.next(&way[way.len() - 1], step, fresh) else {
                 if step <= shortest {
+                    stuck = true;
                     break;
                 }
                 step *= 0.5;
@@ -248,14 +262,15 @@ impl<'a> Peeler<'a> {
             }
             step = full.min(2.0 * step);
         }
-        if cut < LEAST_CUT * self.radius {
+        let soon = stuck && gone < SOON * self.radius;
+        if cut < LEAST_CUT * self.radius || (soon && !self.careful) {
             self.cleared.truncate(before);
             return Ok(false);
         }
         // What was gone without cutting is not gone in the end; it may have taken films away.
         self.cleared.truncate(self.cleared.len() - (way.len() - last_cut));
         way.truncate(last_cut);
-        self.out.extend(link);
+        self.out.extend_from_slice(link);
         let first = self.out.len();
         self.out.extend(way.iter().map(|step| step.to));
         self.note_places(first, way.iter().map(|step| step.heading).collect());
@@ -291,7 +306,12 @@ impl<'a> Peeler<'a> {
                 return Step { to, heading: ahead, turn, arc: f64::INFINITY };
             }
             let heading = along / length;
-            let arc = self.cleared.arc(&to, &heading, fresh);
+            // Head-on into stock there is no way on but through more of it.
+            let arc = if self.careful && turn < 0.0 {
+                self.cleared.arc_from_right(&to, &heading, fresh)
+            } else {
+                self.cleared.arc(&to, &heading, fresh)
+            };
             Step { to, heading, turn, arc }
         };
         let most = -step / (INTO * self.radius);

@@ -1,17 +1,18 @@
 //! A piece cleared by passes of constant engagement, and what they leave.
 //!
-//! Enters: the piece of the cutter's centre, the ground. Leaves: runs of such passes, each of which begins with a helix,
-//! and runs that keep to the limit by loops: to places where stock may still stand, and along the walls. Whether stock may
+//! Enters: the piece of the cutter's centre, the ground. Leaves: runs of such passes, each of which begins with a helix, or in
+//! the air where there is some, and runs that keep to the limit by loops: to places where stock may still stand, and along the walls. Whether stock may
 //! stand is told by square cells: the middle of one, and all around it, is cleared for sure where one disc holds it whole; mm.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
+use super::air::{Air, sides};
 use super::bounded::{Rules, STEP};
 use super::cleared::Cleared;
 use super::peel::Peeler;
 use super::route::{Entry, Run, begun_near, circle};
 use super::walls::Room;
-use geometry::{CurveSegment, Piece, Point2, Region, SegmentGrid, Vector2};
+use geometry::{Piece, Point2, Region, SegmentGrid, Vector2};
 use work::monitor::{Cancelled, Monitor, check};
 
 /// Side of a cell over the radius, and most cells along a side.
@@ -30,12 +31,13 @@ pub(super) struct Clearing {
     pub rest: Vec<Run>,
 }
 
-/// Clears a piece; `None` where it has no room for a helix.
+/// Clears a piece; `None` where it has neither air nor room for a helix.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
 pub(super) fn clear(
     piece: &Piece,
+    air: Option<&Air>,
     ground: &mut Cleared,
     rules: &Rules,
     monitor: &dyn Monitor,
@@ -43,9 +45,21 @@ pub(super) fn clear(
     let (radius, [wanted, least]) = (rules.bounds.radius, rules.helix);
     let whole = Region { pieces: vec![piece.clone()] };
     let room = Room::new(piece);
-    let mut next = whole.largest_disc(DISC_PRECISION * radius, monitor)?.map(|disc| disc.0);
     let Some(mut cells) = Cells::new(piece, radius) else { return Ok(None) };
     let mut clearing = Clearing::default();
+    let ways = air.map_or_else(Vec::new, |air| air.ways_in(|p| piece.contains(p)));
+    air.iter().flat_map(|air| &air.discs).for_each(|p| cells.clear_at(p));
+    for way in &ways {
+        let run = peeled_from(&room, ground, rules, way, Entry::Air, monitor)?;
+        cells.clear_along(&run.points);
+        if run.points.len() > 1 {
+            clearing.peeled.extend(room.kept_runs(run));
+        }
+    }
+    let mut next = match ways.first() {
+        Some(_) => cells.deep_in_stock(&room, ground, monitor)?,
+        None => whole.largest_disc(DISC_PRECISION * radius, monitor)?.map(|disc| disc.0),
+    };
     while let Some(centre) = next.filter(|centre| room.distance(centre) >= least) {
         let helix = wanted.min(room.distance(&centre));
         let run = peeled(&room, ground, rules, (centre, helix), monitor)?;
@@ -65,7 +79,7 @@ pub(super) fn clear(
         cells.clear_along(wall);
         cells.clear_along(&[wall[wall.len() - 1], wall[0]]);
     }
-    clearing.rest = cells.runs_to_standing(&clearing.peeled, monitor)?;
+    clearing.rest = cells.runs_to_standing(&clearing.peeled, &ways, monitor)?;
     clearing.rest.extend(around_walls(piece, &clearing));
     Ok(Some(clearing))
 }
@@ -81,10 +95,21 @@ fn peeled(
     let mut turn = circle(&centre, radius, 0.0, STEP * rules.bounds.radius);
     turn.push(turn[0]);
     turn.iter().for_each(|p| ground.add(*p));
-    let mut peeler = Peeler::new(room, ground, rules.bounds.limit, rules.bounds.radius, &turn);
+    peeled_from(room, ground, rules, &turn, Entry::Helix { centre, radius, begin: 0.0 }, monitor)
+}
+
+/// The passes that go on from the end of a way over ground that is cleared.
+fn peeled_from(
+    room: &Room,
+    ground: &mut Cleared,
+    rules: &Rules,
+    way: &[Point2],
+    entry: Entry,
+    monitor: &dyn Monitor,
+) -> Result<Run, Cancelled> {
+    let mut peeler = Peeler::new(room, ground, rules.bounds.limit, rules.bounds.radius, way);
     peeler.peel(monitor)?;
-    let points = peeler.into_way().split_off(turn.len() - 1);
-    Ok(Run { entry: Entry::Helix { centre, radius, begin: 0.0 }, points })
+    Ok(Run { entry, points: peeler.into_way().split_off(way.len() - 1) })
 }
 
 /// Once around each wall.
@@ -193,10 +218,14 @@ impl Cells {
     }
 
     /// Runs from the ways that were gone straight to cells that may hold stock.
-    fn runs_to_standing(&mut self, gone: &[Run], monitor: &dyn Monitor) -> Result<Vec<Run>, Cancelled> {
-        let sides = gone.iter().flat_map(|run| run.points.windows(2));
-        let sides = sides.map(|w| CurveSegment { ends: [w[0], w[1]], curve: 0, index: 0 }).collect();
-        let gone = SegmentGrid::new(sides);
+    fn runs_to_standing(
+        &mut self,
+        gone: &[Run],
+        ways: &[Vec<Point2>],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Run>, Cancelled> {
+        let of_runs = gone.iter().map(|run| run.points.as_slice());
+        let gone = SegmentGrid::new(sides(of_runs.chain(ways.iter().map(Vec::as_slice))));
         let mut runs = Vec::new();
         for index in 0..self.clear.len() {
             if self.clear[index] {
@@ -270,7 +299,7 @@ mod tests {
         let rules = Rules { bounds, sides: crate::pocket::bounded::Sides::Left, helix: [1.6, 0.4] };
         let around = [Point2::new(-2.0, -2.0), Point2::new(14.0, 14.0)];
         let mut ground = Cleared::new(around, 2.0);
-        let found = clear(&piece, &mut ground, &rules, &work::monitor::Silent).unwrap().unwrap();
+        let found = clear(&piece, None, &mut ground, &rules, &work::monitor::Silent).unwrap().unwrap();
         let Entry::Helix { centre, .. } = found.peeled[0].entry else { panic!("a helix") };
         let ends = found.rest.iter().map(|run| (run.points[run.points.len() - 1] - centre).norm());
         assert!(ends.fold(f64::INFINITY, f64::min) > 2.0);

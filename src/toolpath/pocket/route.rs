@@ -38,6 +38,8 @@ pub enum Entry {
     },
     /// Back and forth, or around: a way in the plane that ends where the run begins.
     Ramp(Vec<Point2>),
+    /// Straight down where no stock stands.
+    Air,
 }
 
 /// From an entry to a retract.
@@ -65,7 +67,7 @@ impl Run {
                 let out = direction(centre, &end);
                 Some((end, Vector2::new(-out.y, out.x)))
             }
-            (Entry::Ramp(_), None) => None,
+            (Entry::Ramp(_) | Entry::Air, None) => None,
         }
     }
 }

@@ -43,6 +43,20 @@ impl Pattern {
     }
 }
 
+/// How deep the last passes along the walls go at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum WallFinish {
+    /// As deep as each step down.
+    #[default]
+    Steps,
+    /// All of the depth, after the last step, so that walls have no marks of the steps.
+    Depth,
+}
+
+impl WallFinish {
+    const WORDS: [(&'static str, Self); 2] = [("steps", Self::Steps), ("depth", Self::Depth)];
+}
+
 /// How a pocket is milled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PocketStrategy {
@@ -54,6 +68,8 @@ pub struct PocketStrategy {
     pub floor_allowance: f64,
     /// Left at the walls for a last pass along them, mm; 0 for none.
     pub wall_allowance: f64,
+    /// How deep the last passes along the walls go.
+    pub wall_finish: WallFinish,
     /// Steepest way down, rad from level.
     pub ramp_angle: f64,
     /// Radius of the helix of the cutter's centre, mm; `None`: 0.8 of the cutter's radius, which leaves no
@@ -90,6 +106,7 @@ pub(crate) static FLOW: Definition = Definition {
         "stepdown",
         "floor_allowance",
         "wall_allowance",
+        "wall_finish",
         "ramp_angle",
         "helix_radius",
         "engagement",
@@ -111,6 +128,7 @@ pub(crate) static OFFSET: Definition = Definition {
         "stepdown",
         "floor_allowance",
         "wall_allowance",
+        "wall_finish",
         "ramp_angle",
         "helix_radius",
         "engagement",
@@ -131,6 +149,7 @@ pub(crate) static ZIGZAG: Definition = Definition {
         "stepdown",
         "floor_allowance",
         "wall_allowance",
+        "wall_finish",
         "ramp_angle",
         "helix_radius",
         "engagement",
@@ -156,13 +175,22 @@ fn read(from: &Reading<'_>, pattern: Pattern) -> Result<Box<dyn Strategy>, Scene
     let allowance = |key| {
         Ok::<f64, SceneError>(section.number(key, 0.0..=*LENGTH.end(), " mm")?.map_or(0.0, |v| v.value))
     };
+    let wall_allowance = allowance("wall_allowance")?;
+    if section.has("wall_finish") && wall_allowance == 0.0 {
+        return Err(section.error(
+            &section.key_span("wall_finish"),
+            "`wall_finish` does not apply without a `wall_allowance`",
+            "delete it, or leave something at the walls: `wall_allowance = 0.2`",
+        ));
+    }
     let radians = |angle: f64| angle.to_radians();
     let stepdown = length(section, "stepdown")?;
     Ok(Box::new(PocketStrategy {
         pattern,
         stepdown: Some(stepdown.unwrap_or(2.0 * STEPDOWN_OVER_DIAMETER * from.cutter_radius)),
         floor_allowance: allowance("floor_allowance")?,
-        wall_allowance: allowance("wall_allowance")?,
+        wall_allowance,
+        wall_finish: section.choice("wall_finish", &WallFinish::WORDS)?,
         ramp_angle: radians(
             section.number("ramp_angle", 0.1..=45.0, " degrees")?.map_or(RAMP_ANGLE, |v| v.value),
         ),
@@ -219,6 +247,11 @@ impl Strategy for PocketStrategy {
         }
         writeln!(out, "floor_allowance = {}  # mm, left for a last step", toml_number(self.floor_allowance))?;
         writeln!(out, "wall_allowance = {}  # mm, left for a last pass", toml_number(self.wall_allowance))?;
+        if self.wall_allowance > 0.0 {
+            let word = WallFinish::WORDS.iter().find(|(_, finish)| *finish == self.wall_finish);
+            let word = word.map_or("steps", |(word, _)| word);
+            writeln!(out, "wall_finish = \"{word}\"  # passes along walls: each step, or all the depth")?;
+        }
         writeln!(out, "ramp_angle = {}  # degrees", toml_number(self.ramp_angle.to_degrees()))?;
         if let Some(radius) = self.helix_radius {
             writeln!(out, "helix_radius = {}  # mm", toml_number(radius))?;

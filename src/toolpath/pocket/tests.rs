@@ -19,7 +19,7 @@ fn disc(x: f64, y: f64, r: f64) -> Vec<Point2> {
 }
 
 fn pocket(curves: Vec<Vec<Point2>>) -> Pocket {
-    Pocket { region: Region::nested(curves).unwrap().0, depth: 6.0 }
+    Pocket::new(Region::nested(curves).unwrap().0, 6.0)
 }
 
 fn with_island() -> Pocket {
@@ -46,6 +46,7 @@ fn strategy(pattern: Pattern) -> PocketStrategy {
         stepdown: Some(3.0),
         floor_allowance: 0.0,
         wall_allowance: 0.0,
+        wall_finish: WallFinish::Steps,
         ramp_angle: 3f64.to_radians(),
         helix_radius: None,
         engagement: None,
@@ -75,7 +76,7 @@ fn programs_keep_to_the_pocket_and_clear_it() {
         .collect();
     for pocket in [with_island(), pocket(vec![rectangle(0.0, 0.0, 30.0, 30.0)]), pocket(vec![dumbbell])] {
         let walls = SegmentGrid::of_curves(pocket.region.curves());
-        let floor = pocket.reachable_floor(&cutter).inset(0.02);
+        let floor = pocket.reachable_floor(&cutter, 0.02);
         let bounded = |pattern| (pattern, Some(70f64.to_radians()));
         let all = patterns().map(|pattern| (pattern, None)).into_iter();
         for (pattern, engagement) in all.chain([0, 2, 4].map(|k| bounded(patterns()[k]))) {
@@ -191,6 +192,66 @@ fn steps_go_down_evenly_and_the_floor_has_its_own() {
     assert_eq!(descend::floors(6.0, &s), [-2.75, -5.5, -6.0]);
     s.stepdown = None;
     assert_eq!(descend::floors(6.0, &s), [-5.5, -6.0]);
+}
+
+/// Several steps with both allowances: until the passes along the walls the allowance stands there, also below what the floor is
+/// left; only the last step comes to the floor; all is cleared in the end. Passes along walls are one for each step and wall, or
+/// one for each wall, which then comes last and leaves no marks of steps.
+#[test]
+fn floor_and_walls_are_finished_from_their_allowances() {
+    let (cutter, pocket) = (Cutter::flat(6.0).unwrap(), with_island());
+    let walls = SegmentGrid::of_curves(pocket.region.curves());
+    for (wall_finish, engagement) in
+        [(WallFinish::Steps, None), (WallFinish::Depth, None), (WallFinish::Depth, Some(70f64.to_radians()))]
+    {
+        let (wall_allowance, floor_allowance) = (0.2, 0.3);
+        let strategy = PocketStrategy {
+            wall_allowance,
+            floor_allowance,
+            wall_finish,
+            engagement,
+            ..strategy(patterns()[2])
+        };
+        let path = plan_pocket(&pocket, &cutter, &strategy, &settings(), &Silent).unwrap().path;
+        let (mut finishing, mut levels, mut last) = (Vec::new(), Vec::new(), 0);
+        for pass in 0..path.passes() as u32 {
+            let moves: Vec<_> =
+                path.segments().filter(|(_, _, m)| m.pass == pass && m.kind == MoveKind::Cut).collect();
+            let Some(&(_, first, _)) = moves.first() else { continue };
+            let floor = first.z;
+            let nearest = moves
+                .iter()
+                .map(|(a, b, _)| walls.distance(&nalgebra::center(a, b).xy()).min(walls.distance(&b.xy())));
+            let nearest = nearest.fold(f64::INFINITY, f64::min);
+            levels.push(floor);
+            if nearest < 3.0 + 0.5 * wall_allowance {
+                assert!((nearest - 3.0).abs() < 1e-3, "{wall_finish:?}: {nearest}");
+                finishing.push(floor);
+                last = pass;
+            } else {
+                assert!(nearest > 3.0 + wall_allowance - 5e-3, "{wall_finish:?}: {nearest}");
+            }
+        }
+        levels.dedup();
+        let whole = match wall_finish {
+            WallFinish::Steps => vec![-2.85, -2.85, -5.7, -5.7, -6.0, -6.0],
+            WallFinish::Depth => vec![-6.0, -6.0],
+        };
+        let close =
+            |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
+        assert!(close(&levels, &[-2.85, -5.7, -6.0]), "{levels:?}");
+        assert!(close(&finishing, &whole), "{wall_finish:?}: {finishing:?}");
+        assert_eq!(last + 1, path.passes() as u32);
+        let at_floor = path.segments().filter(|(a, b, _)| a.z == -6.0 && b.z == -6.0);
+        let sides =
+            at_floor.map(|(a, b, _)| geometry::CurveSegment { ends: [a.xy(), b.xy()], curve: 0, index: 0 });
+        let passes = SegmentGrid::new(sides.collect());
+        let floor = pocket.reachable_floor(&cutter, 0.02);
+        for k in 0..10_000 {
+            let p = Point2::new(0.6 * f64::from(k % 100) + 0.3, 0.4 * f64::from(k / 100) + 0.2);
+            assert!(!floor.contains(&p) || passes.distance(&p) <= 3.0, "{wall_finish:?} {p}");
+        }
+    }
 }
 
 /// A circle of a twentieth of a mm whose thinning by the tolerance alone would leave sides that look aside.

@@ -36,7 +36,7 @@ impl<'a> Room<'a> {
     pub fn kept_runs(&self, run: Run) -> Vec<Run> {
         let entry = match run.entry {
             Entry::Ramp(way) => Entry::Ramp(self.kept(&way).pop().unwrap_or_default()),
-            helix @ Entry::Helix { .. } => helix,
+            other => other,
         };
         let mut parts = self.kept(&run.points).into_iter();
         let first = Run { entry, points: parts.next().unwrap_or_default() };

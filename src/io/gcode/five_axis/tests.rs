@@ -383,7 +383,7 @@ fn no_program_is_made_of_joints_that_must_not_be() {
     assert!(write(Style::Full, &free, &kept).is_err());
     let mut bytes = Vec::new();
     assert!(
-        super::super::write(&mut bytes, &path, &Cutter::ball(6.0).unwrap(), &HEADER).is_err()
+        super::super::write(&mut bytes, &path, &Cutter::ball(6.0).unwrap(), &HEADER, None).is_err()
             && bytes.is_empty()
     );
 }
