@@ -7,7 +7,7 @@ use super::{
     DEFAULT_PLUNGE_RATE, DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, EngineChoice, NamedFile, PartSource, Scene,
     Simulation, ToolpathRequest, auto_cell, default_error_bound,
 };
-use super::{axis, compare, direction, foreign, interference, kinematics, part, stock};
+use super::{axis, bodies, compare, direction, foreign, interference, kinematics, part, stock};
 use cutter::{Cutter, Holder, HolderSection};
 use io::regular;
 use keys::{Located, SceneError, SceneText, Section, printable};
@@ -116,7 +116,11 @@ impl Scene {
         let keep_clear = interference::read(&root, &folder)?;
         let (machine, clearance) = read_machine(&section)?;
         let five_axis = kinematics::read(&section, &machine)?;
+        let bodies = bodies::read(&section, five_axis.as_ref())?;
         let toolpaths = read_toolpaths(&root, &folder, &tolerance, correct, &cutter, &minutes)?;
+        if toolpaths.iter().any(|request| !request.is_foreign()) {
+            kinematics::known_height(&section, five_axis.as_ref())?;
+        }
         check_pocket_strategies(&root, &part, &toolpaths)?;
         if simulation.cell_is_auto {
             simulation.cell = auto_cell(&cutter, &toolpaths);
@@ -136,6 +140,7 @@ impl Scene {
             simulation,
             machine,
             five_axis,
+            bodies,
             clearance,
             keep_clear,
             toolpaths,
@@ -313,6 +318,7 @@ fn read_simulation(
 }
 
 fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
+    let bodies = bodies::KEYS;
     section.only(
         &[
             "rapid_rate",
@@ -326,6 +332,9 @@ fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
             "slow_corners",
             "clearance",
             kinematics::KEY,
+            bodies[0],
+            bodies[1],
+            bodies[2],
         ],
         &[],
         "[machine]",

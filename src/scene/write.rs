@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::read::PREVIOUS_STOCK;
-use super::{Scene, ToolpathRequest, axis, compare, interference, kinematics, part, stock};
+use super::{Scene, ToolpathRequest, axis, bodies, compare, interference, kinematics, part, stock};
 use keys::{toml_number as number, toml_string as text};
 use toolpath::{Links, PartKind, Step, longest_link};
 
@@ -69,7 +69,9 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     }
     writeln!(out, "slow_corners = {}  # feeds of sharp bends in the program", scene.machine.slow_corners)?;
     writeln!(out, "clearance = {}  # mm of rapid moves above stock", number(scene.clearance))?;
+    bodies::write_places(out, scene)?;
     kinematics::write(out, scene.five_axis.as_ref())?;
+    bodies::write(out, scene)?;
     if !scene.keep_clear.fixtures.is_empty() || scene.toolpaths.iter().any(|request| request.axis.is_some()) {
         interference::write(out, &scene.keep_clear)?;
     }
