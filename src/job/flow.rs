@@ -234,13 +234,14 @@ impl Session {
             simulation,
             surface_mesh: machined.figures(),
         };
-        let Planned { plan, joints, .. } = planned;
+        let Planned { plan, joints, rise_to, .. } = planned;
         Ok(Outcome {
             result,
             path: plan.path,
             cutters: cutters.clone(),
             holders: holders.to_vec(),
             joints,
+            rise_to,
             field: plan.field,
             measurement: measured.measurement,
             view: measured.view,

@@ -37,6 +37,8 @@ pub(crate) struct Planned {
     pub strategy: Box<dyn Strategy>,
     /// The path in the joints of a five-axis machine.
     pub joints: Option<JointPath>,
+    /// Its program of three axes begins and ends no lower than this, mm: over the fixtures.
+    pub rise_to: Option<f64>,
     /// Engagement in a pocket, and the bound of its greatest angle, rad.
     pub engaged: Option<(Engagement, f64)>,
     /// The rounds in which its ridges were measured and corrected.
@@ -82,6 +84,7 @@ impl Session {
                 plan,
                 strategy,
                 joints: None,
+                rise_to: None,
                 engaged: None,
                 correction: None,
                 equal_time: None,
@@ -105,8 +108,11 @@ impl Session {
             let kinematics = scene.five_axis.as_ref().map(|five_axis| &five_axis.kinematics);
             plan.path = slow_axes(&plan.path, &scene.machine, kinematics.zip(joints.as_ref()));
         }
-        plan.path.origin.lines = lines(scene, &plan.path, joints.as_ref())?;
-        Ok(Planned { plan, strategy, joints, engaged, correction: None, equal_time: None })
+        let tops = around.fixtures.iter().map(|(mesh, _)| mesh.bounds().max.z + scene.clearance);
+        let rise_to = tops.reduce(f64::max);
+        let header = ProgramHeader { rise_to, ..header(scene, "") };
+        plan.path.origin.lines = lines(scene, &plan.path, joints.as_ref(), &header)?;
+        Ok(Planned { plan, strategy, joints, rise_to, engaged, correction: None, equal_time: None })
     }
 
     fn path(
@@ -301,8 +307,13 @@ fn joints(scene: &Scene, name: &str, path: &Toolpath) -> Result<Option<JointPath
 }
 
 /// The line of each move in its program. A path that tilts the tool has no program where the scene names no machine.
-fn lines(scene: &Scene, path: &Toolpath, joints: Option<&JointPath>) -> Result<MoveLines, JobError> {
-    let written = write_program(&mut std::io::sink(), scene, path, joints, &header(scene, ""));
+fn lines(
+    scene: &Scene,
+    path: &Toolpath,
+    joints: Option<&JointPath>,
+    header: &ProgramHeader,
+) -> Result<MoveLines, JobError> {
+    let written = write_program(&mut std::io::sink(), scene, path, joints, header);
     written.map_err(|error| JobError::Program(error.to_string()))
 }
 
@@ -311,6 +322,7 @@ fn header(scene: &Scene, name: &str) -> ProgramHeader {
     ProgramHeader {
         name: format!("{} - {name}", scene.title),
         spindle_speed: Some(scene.cutting.spindle_speed),
+        rise_to: None,
     }
 }
 

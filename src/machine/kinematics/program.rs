@@ -44,12 +44,12 @@ impl JointPath {
     }
 }
 
-/// The joints of the program of an upright path on a machine of three axes: from over its start at its highest tip, and up
-/// there again.
-pub fn program_of_three_axes(path: &Toolpath, chain: &Chain) -> Vec<Waypoint> {
+/// The joints of the program of an upright path on a machine of three axes: from over its start at its highest tip, or at `rise_to`, mm,
+/// where that is higher, and up there again.
+pub fn program_of_three_axes(path: &Toolpath, rise_to: Option<f64>, chain: &Chain) -> Vec<Waypoint> {
     let tips: Vec<Point3> =
         std::iter::once(path.start.tip).chain(path.moves.iter().map(|step| step.to.tip)).collect();
-    let top = tips.iter().map(|tip| tip.z).fold(f64::NEG_INFINITY, f64::max);
+    let top = tips.iter().map(|tip| tip.z).fold(rise_to.unwrap_or(f64::NEG_INFINITY), f64::max);
     let above = |tip: &Point3| Point3::new(tip.x, tip.y, top);
     let from_tip = chain.workpiece_zero().coords - chain.tip().coords;
     let at = |tip: Point3, step: usize, way: Way| Waypoint {

@@ -4,7 +4,7 @@ use super::*;
 use machine::kinematics::{DEFAULT_ROTARY_RATE, PRESETS, RotaryAxis, follow, preset};
 use motion::{ClPoint, Move};
 
-const HEADER: ProgramHeader = ProgramHeader { name: String::new(), spindle_speed: None };
+const HEADER: ProgramHeader = ProgramHeader { name: String::new(), spindle_speed: None, rise_to: None };
 
 /// What is in force after a line: the words X Y Z and of both rotary axes, rapid or not, F.
 #[derive(Debug, Clone, Copy)]

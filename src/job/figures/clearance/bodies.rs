@@ -66,7 +66,7 @@ pub(super) fn find(
     let (chain, program) = match (rotary.zip(run.planned.joints.as_ref()), bodies) {
         (Some((kinematics, joints)), _) => (Chain::of(kinematics), joints.program(kinematics, path)),
         (None, Some(made)) if rotary.is_none() && path.is_upright() && run.tools.len() == 1 => {
-            (made.chain, program_of_three_axes(path, &made.chain))
+            (made.chain, program_of_three_axes(path, run.planned.rise_to, &made.chain))
         }
         (None, Some(_)) => {
             let unknown = Claim::length("collision", Gravity::Crash, 0.0, 0.0, f64::INFINITY);

@@ -95,6 +95,27 @@ fn an_upright_cutter_keeps_off_a_clamp_and_its_distance_is_told() {
     assert!(result.verdict == Verdict::Fail && result.uncut.area_mm2 > 20.0, "{:?}", result.uncut);
 }
 
+/// A post that stands beside the path, taller than it: from wherever the tool comes, it comes over the post.
+#[test]
+fn a_program_begins_and_ends_over_all_fixtures() {
+    let home = Home::new("post-beside");
+    home.solid("post.stl", [60.0, 60.0, -2.0], [64.0, 64.0, 90.0]);
+    let text = format!("{PLATE}[[fixture]]\nfile = \"post.stl\"\n{ZIGZAG}");
+    let name = home.0.join("plate.toml");
+    let session = Session::new(Scene::parse(&name.to_string_lossy(), text).unwrap()).unwrap();
+    let outcome = session.toolpath(&session.scene.toolpaths[0], &Silent).unwrap();
+    let mut program = Vec::new();
+    session.write_program(&mut program, &outcome).unwrap();
+    let program = String::from_utf8(program).unwrap();
+    let highest = outcome.path.moves.iter().map(|m| m.to.tip.z).fold(f64::MIN, f64::max);
+    assert!(highest < 90.0);
+    let rises: Vec<usize> =
+        (1..).zip(program.lines()).filter(|(_, l)| l.contains("Z92.0")).map(|l| l.0).collect();
+    let [first, last] = rises[..] else { panic!("{program}") };
+    let lines = outcome.path.origin.lines.clone();
+    assert!(first < lines[0] as usize && last as u32 > *lines.last().unwrap(), "{program}");
+}
+
 #[test]
 fn a_tool_inside_a_closed_vise_collides_with_it() {
     let home = Home::new("vise");

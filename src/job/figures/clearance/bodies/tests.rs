@@ -171,3 +171,19 @@ fn a_ram_over_a_part_and_a_head_that_turns() {
             == Verdict::Pass
     );
 }
+
+/// A program rises to the upper end of Z's travel: over a fixture by what is left of it, whether the path comes near it or not.
+#[test]
+fn programs_rise_over_the_fixtures_or_violate() {
+    let home = Home::new("rise");
+    home.solid("post.stl", [60.0, 60.0, -2.0], [64.0, 64.0, 40.0]);
+    for (spare, verdict) in [(0.05, Verdict::Pass), (-0.05, Verdict::Fail)] {
+        // The nose has to stand at −300 + 40 + 70.
+        let machine = "preset = \"ac-table\"\ngauge_length = 70\n[[fixture]]\nfile = \"post.stl\"\n";
+        let text = leaning([0.0, 0.0, 1.0], machine).replace("600]", &format!("{}]", -190.0 + spare));
+        let result = home.run(&text);
+        let retract = result.claims.iter().find(|claim| claim.what == "retract").unwrap();
+        assert_eq!(retract.verdict(), verdict, "{retract:?}");
+        assert!((retract.measured.unwrap() + spare).abs() < 1e-9, "{retract:?}");
+    }
+}
