@@ -10,11 +10,13 @@
 //! a limit of jerk, [`super::jerk`] lowers the speeds further. [`slow_axes`] writes the speeds into the feeds of a path.
 //! Lengths in mm, speeds in mm/s; axes in mm or rad.
 
-use super::Machine;
+use super::blending::{Arcs, Straight};
 use super::feeds::{ANY_RATE, in_series};
 use super::jerk;
 use super::kinematics::{JointPath, Joints, Kinematics, Turn};
 use super::time::{Block, NO_MOVE, SECONDS_PER_MINUTE, profile};
+use super::{Blending, Machine};
+use geometry::Vector3;
 use motion::Toolpath;
 
 /// Halvings of the greatest squared speed from which a stage can be run.
@@ -79,6 +81,8 @@ pub(super) struct Stage {
     pub bends: [[f64; 5]; 2],
     /// Greatest squared speed at its beginning.
     pub most: f64,
+    /// Greatest acceleration along the path.
+    pub along: f64,
     /// An axis in it has a limit of jerk.
     pub jerk: bool,
 }
@@ -269,9 +273,20 @@ fn stages(pieces: &[EvenStretch], blocks: &[Block], machine: &Machine, axes: &Ax
         (feed, corner)
     };
     let limits: Vec<(f64, f64)> = pieces.iter().enumerate().map(of).collect();
+    let straight = |k: usize| {
+        let piece = pieces.get(k)?;
+        let corner = |k: usize| limits.get(k).map_or(0.0, |next| next.1);
+        let direction = Vector3::from_column_slice(&piece.slope[..3]);
+        Some(Straight { direction, length: piece.length, corners: [corner(k), corner(k + 1)] })
+    };
+    let arcs = machine.blending == Blending::Arcs;
     let mut stages = Vec::new();
     for (k, piece) in pieces.iter().enumerate() {
         let (feed, corner) = limits[k];
+        let arcs = straight(k).filter(|_| arcs).map(|here| {
+            let before = k.checked_sub(1).and_then(straight);
+            Arcs::new(before.as_ref(), &here, straight(k + 1).as_ref(), machine)
+        });
         let ends =
             [k.checked_sub(1).map(|k| &pieces[k]).zip(Some(piece)), Some(piece).zip(pieces.get(k + 1))];
         let bends = ends.map(|ends| ends.map(|(last, next)| bend(last, next)).unwrap_or_default());
@@ -286,7 +301,12 @@ fn stages(pieces: &[EvenStretch], blocks: &[Block], machine: &Machine, axes: &Ax
             () => Division::Evenly { ramp: 2.0 * RAMP },
         };
         let lengths = division.lengths(piece.length, 0.5 * feed * jerk::ramp(feed, most, jerk));
+        let lengths = match &arcs {
+            Some(arcs) => arcs.divided(lengths),
+            None => lengths,
+        };
         let (last, halves) = (lengths.len() - 1, lengths.len() == 2);
+        let mut begin = 0.0;
         for (k, length) in lengths.into_iter().enumerate() {
             // The bend at a corner reaches half-way into the pieces beside, but behind a sharp one not along those that the machine
             // needs to speed up.
@@ -298,7 +318,13 @@ fn stages(pieces: &[EvenStretch], blocks: &[Block], machine: &Machine, axes: &Ax
                 _ => [[0.0; 5]; 2],
             };
             let most = if k == 0 { corner.min(slower * slower) } else { feed * feed };
-            stages.push(Stage { step: piece.step, length, slope: piece.slope, bends, most, jerk: limited });
+            let free = [f64::INFINITY; 2];
+            let [along, within] =
+                arcs.as_ref().map_or(free, |arcs| arcs.limits(piece.length, [begin, begin + length]));
+            let (along, most) = (along.min(axes.along), most.min(within));
+            let slope = piece.slope;
+            stages.push(Stage { step: piece.step, length, slope, bends, most, along, jerk: limited });
+            begin += length;
         }
     }
     stages
@@ -385,7 +411,7 @@ impl Limits<'_> {
     fn window(&self, k: usize, x: f64, end: f64) -> [f64; 2] {
         let stage = &self.stages[k];
         let twice = 2.0 * stage.length;
-        let mut window = [(-x / twice).max(-self.axes.along), ((end - x) / twice).min(self.axes.along)];
+        let mut window = [(-x / twice).max(-stage.along), ((end - x) / twice).min(stage.along)];
         for (axis, most) in self.axes.accelerations.iter().enumerate() {
             let most = most * (1.0 + ROUNDING);
             let slope = stage.slope[axis];

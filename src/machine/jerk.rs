@@ -143,7 +143,7 @@ impl Section<'_> {
 
     /// All limits, each as a share of itself.
     fn slacks(&self, x: &[f64], take: &mut dyn FnMut(&Slack)) {
-        let AxisLimits { accelerations, jerks, along, .. } = self.axes;
+        let AxisLimits { accelerations, jerks, .. } = self.axes;
         // Acceleration in the middle of the stage before, and its derivatives by the speeds at its ends, of each axis.
         let mut before = [[0.0; 3]; 5];
         let mut time_before = [0.0; 3];
@@ -167,7 +167,7 @@ impl Section<'_> {
                     });
                 }
             };
-            both((end - begin) * steep, [-steep, steep], *along);
+            both((end - begin) * steep, [-steep, steep], stage.along);
             let time = match &self.times {
                 Some(times) => [times[k], 0.0, 0.0],
                 None => stage_time(stage, begin, end),

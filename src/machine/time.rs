@@ -14,6 +14,8 @@
 //!   a 24th of jump times the square of that time, which must stay within the junction deviation.
 //!   Curvature at a corner is β over half of both moves' lengths.
 //!
+//! Where the control rounds corners by arcs, a at a corner is a share of the acceleration ([`super::blending`]).
+//!
 //! A move lasts at least as long as the control takes for a line of the program.
 //!
 //! What single axes need besides is in [`super::axis_limits`]: those of upright tools where the machine has accelerations or jerks
@@ -167,7 +169,7 @@ fn corner_speed_squared(last: &Block, next: &Block, machine: &Machine) -> f64 {
     let rounded = machine.junction_deviation * cos_half / (2.0 * sin_quarter * sin_quarter);
     let fitting = 0.5 * last.length.min(next.length) * cos_half / sin_half;
     let feed = last.feed.min(next.feed);
-    (machine.acceleration * rounded.min(fitting).max(0.0)).min(feed * feed)
+    (machine.across(&last.direction, &next.direction) * rounded.min(fitting).max(0.0)).min(feed * feed)
 }
 
 /// Time for one move from its entry to its exit speed: up to the feed or to where braking must begin,

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::read::PREVIOUS_STOCK;
+use super::read::{BLENDINGS, PREVIOUS_STOCK};
 use super::{Scene, ToolpathRequest, axis, bodies, compare, interference, kinematics, part, stock};
 use keys::{toml_number as number, toml_string as text};
 use toolpath::{Links, PartKind, Step, longest_link};
@@ -66,6 +66,11 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
             let [x, y, z] = limits.map(number);
             writeln!(out, "{key} = [{x}, {y}, {z}]  # {unit} of X, Y and Z")?;
         }
+    }
+    if scene.five_axis.is_none() {
+        let word =
+            BLENDINGS.iter().find(|(_, other)| *other == scene.machine.blending).map_or("", |(word, _)| word);
+        writeln!(out, "blending = {}  # how acceleration is shared where corners are rounded", text(word))?;
     }
     writeln!(out, "slow_corners = {}  # feeds of sharp bends in the program", scene.machine.slow_corners)?;
     writeln!(out, "clearance = {}  # mm of rapid moves above stock", number(scene.clearance))?;
