@@ -224,7 +224,7 @@ impl Session {
             verdict,
             claims,
             notes: self.notes_on(&planned, &measured, found.notes),
-            path: path_figures(&planned.plan.path, planned.time(scene)),
+            path: path_figures(&planned.plan.path, planned.time(scene, monitor)?),
             scallop: measurement.scallop.clone(),
             gouge: measurement.gouge.clone(),
             uncut: measurement.uncut.clone(),

@@ -13,7 +13,7 @@ use toolpath::{
     Detour, Earlier, Engagement, OffsetDrive, OffsetSurface, Plan, PlanError, PlanSettings, PocketStrategy,
     Strategy, Tilting, around_fixtures, plan, plan_pocket, plan_tilted,
 };
-use work::monitor::Monitor;
+use work::monitor::{Cancelled, Monitor};
 
 use super::correction::CorrectionFigures;
 use super::equal_time::EqualTimeFigures;
@@ -49,11 +49,11 @@ pub(crate) struct Planned {
 
 impl Planned {
     /// Time that the scene's machine takes, s.
-    pub fn time(&self, scene: &Scene) -> f64 {
+    pub fn time(&self, scene: &Scene, monitor: &dyn Monitor) -> Result<f64, Cancelled> {
         let (path, machine) = (&self.plan.path, &scene.machine);
         self.on_axes(scene).map_or_else(
-            || machining_time(path, machine),
-            |(kinematics, joints)| machining_time_of_axes(path, machine, kinematics, joints),
+            || machining_time(path, machine, monitor),
+            |(kinematics, joints)| machining_time_of_axes(path, machine, kinematics, joints, monitor),
         )
     }
 
@@ -106,7 +106,7 @@ impl Session {
         let joints = joints(scene, &request.name, &plan.path)?;
         if scene.machine.slow_corners {
             let kinematics = scene.five_axis.as_ref().map(|five_axis| &five_axis.kinematics);
-            plan.path = slow_axes(&plan.path, &scene.machine, kinematics.zip(joints.as_ref()));
+            plan.path = slow_axes(&plan.path, &scene.machine, kinematics.zip(joints.as_ref()), monitor)?;
         }
         let tops = around.fixtures.iter().map(|(mesh, _)| mesh.bounds().max.z + scene.clearance);
         let rise_to = tops.reduce(f64::max);

@@ -18,6 +18,7 @@ use super::time::{Block, NO_MOVE, SECONDS_PER_MINUTE, profile};
 use super::{Blending, Machine};
 use geometry::Vector3;
 use motion::Toolpath;
+use work::monitor::{Cancelled, Monitor};
 
 /// Halvings of the greatest squared speed from which a stage can be run.
 const HALVINGS: usize = 40;
@@ -104,11 +105,17 @@ struct Run {
 }
 
 impl Run {
-    fn new(pieces: &[EvenStretch], blocks: &[Block], machine: &Machine, axes: &AxisLimits) -> Self {
+    fn new(
+        pieces: &[EvenStretch],
+        blocks: &[Block],
+        machine: &Machine,
+        axes: &AxisLimits,
+        monitor: &dyn Monitor,
+    ) -> Result<Self, Cancelled> {
         let stages = stages(pieces, blocks, machine, axes);
         let speeds = speeds(&stages, axes);
-        let speeds = jerk::within(&stages, speeds, axes);
-        Self { stages, speeds }
+        let speeds = jerk::within(&stages, speeds, axes, monitor)?;
+        Ok(Self { stages, speeds })
     }
 
     /// s.
@@ -136,6 +143,9 @@ impl Run {
 /// [`super::machining_time`] looks at. The machine stops where rotary axes turn about a tip that stands; rises for rewinds are
 /// not counted. Infinite where [`super::machining_time`] is.
 ///
+/// # Errors
+/// [`Cancelled`] when the monitor says so.
+///
 /// # Tolerance
 /// A model: stages that accelerate evenly take up to a few percent of a ramp longer than the quickest motion.
 pub fn machining_time_of_axes(
@@ -143,18 +153,24 @@ pub fn machining_time_of_axes(
     machine: &Machine,
     kinematics: &Kinematics,
     joints: &JointPath,
-) -> f64 {
-    let Some(blocks) = profile(path, machine) else { return f64::INFINITY };
+    monitor: &dyn Monitor,
+) -> Result<f64, Cancelled> {
+    let Some(blocks) = profile(path, machine) else { return Ok(f64::INFINITY) };
     let (pieces, standing) = pieces(path, machine, kinematics, joints);
-    standing + Run::new(&pieces, &blocks, machine, &kinematics.axis_limits(machine)).time()
+    let run = Run::new(&pieces, &blocks, machine, &kinematics.axis_limits(machine), monitor)?;
+    Ok(standing + run.time())
 }
 
 /// Time, s, of the moves of an upright tool whose X, Y and Z keep the limits of a machine.
-pub(super) fn time_of_linear(blocks: &[Block], machine: &Machine) -> f64 {
-    linear(blocks, machine).time()
+pub(super) fn time_of_linear(
+    blocks: &[Block],
+    machine: &Machine,
+    monitor: &dyn Monitor,
+) -> Result<f64, Cancelled> {
+    Ok(linear(blocks, machine, monitor)?.time())
 }
 
-fn linear(blocks: &[Block], machine: &Machine) -> Run {
+fn linear(blocks: &[Block], machine: &Machine, monitor: &dyn Monitor) -> Result<Run, Cancelled> {
     let piece = |(k, block): (usize, &Block)| {
         let Block { step, length, direction, .. } = *block;
         let slope = [direction.x, direction.y, direction.z, 0.0, 0.0];
@@ -168,24 +184,32 @@ fn linear(blocks: &[Block], machine: &Machine) -> Run {
         jerks: with_rotary(machine.jerks),
         along: machine.acceleration,
     };
-    Run::new(&pieces, blocks, machine, &axes)
+    Run::new(&pieces, blocks, machine, &axes, monitor)
 }
 
 /// The path with feeds of its cuts and links at which all axes can be run, on the series of [`super::slow_corners`]. No time grows
 /// by them: a move keeps the greatest speed that the machine reaches in it. Rapids, plunges and lifts stay as they are, and so does a
 /// path for which no time can be told.
-pub fn slow_axes(path: &Toolpath, machine: &Machine, on_axes: Option<(&Kinematics, &JointPath)>) -> Toolpath {
+///
+/// # Errors
+/// [`Cancelled`] when the monitor says so.
+pub fn slow_axes(
+    path: &Toolpath,
+    machine: &Machine,
+    on_axes: Option<(&Kinematics, &JointPath)>,
+    monitor: &dyn Monitor,
+) -> Result<Toolpath, Cancelled> {
     let mut path = path.clone();
     // Words that slow down what is short anyway would only be more lines to run.
     let machine = &Machine { block_rate: ANY_RATE, ..*machine };
-    let Some(blocks) = profile(&path, machine) else { return path };
+    let Some(blocks) = profile(&path, machine) else { return Ok(path) };
     let run = match on_axes {
         Some((kinematics, joints)) => {
             let (pieces, _) = pieces(&path, machine, kinematics, joints);
-            Run::new(&pieces, &blocks, machine, &kinematics.axis_limits(machine))
+            Run::new(&pieces, &blocks, machine, &kinematics.axis_limits(machine), monitor)?
         }
-        None if machine.limits_axes() && path.is_upright() => linear(&blocks, machine),
-        None => return path,
+        None if machine.limits_axes() && path.is_upright() => linear(&blocks, machine, monitor)?,
+        None => return Ok(path),
     };
     let peaks = run.peaks(path.len());
     for (step, peak) in path.moves.iter_mut().zip(peaks) {
@@ -195,7 +219,7 @@ pub fn slow_axes(path: &Toolpath, machine: &Machine, on_axes: Option<(&Kinematic
             step.feed_rate = in_series(speed, step.feed_rate);
         }
     }
-    path
+    Ok(path)
 }
 
 /// Time, s, that no motion of the axes from location to location takes longer than, each from rest to rest.

@@ -161,6 +161,11 @@ mod fixture {
         }
     }
 
+    /// The time of a path that nothing interrupts.
+    pub fn seconds(path: &Toolpath, machine: &Machine) -> f64 {
+        super::machining_time(path, machine, &work::monitor::Silent).unwrap()
+    }
+
     /// Cuts at 6000 mm/min = 100 mm/s, which takes 5 mm and 0.1 s to reach.
     pub fn path(tips: impl IntoIterator<Item = [f64; 3]>) -> Toolpath {
         let mut tips = tips.into_iter().map(|t| ClPoint::upright(Point3::from(t)));

@@ -1,11 +1,12 @@
 //! Closed forms, accelerations by differences, and the quickest speeds of all by trying them.
 
-use super::super::fixture::{machine, path};
+use super::super::fixture::{machine, path, seconds};
 use super::*;
 use crate::kinematics::{Following, PRESETS, follow, preset};
 use approx::assert_relative_eq;
 use geometry::{Point3, Vector3};
 use motion::{ClPoint, Move, MoveKind};
+use work::monitor::Silent;
 
 const MACHINE: Machine = machine(1e12);
 
@@ -20,7 +21,7 @@ fn kinematics(name: &str, accelerations: [f64; 3], rotary: f64) -> Kinematics {
 
 fn time(path: &Toolpath, machine: &Machine, kinematics: &Kinematics, following: &Following) -> f64 {
     let joints = follow(kinematics, path, following).unwrap();
-    machining_time_of_axes(path, machine, kinematics, &joints)
+    machining_time_of_axes(path, machine, kinematics, &joints, &Silent).unwrap()
 }
 
 const EVENLY: Following = Following { tip: 0.01, axis: 1e-3 };
@@ -31,7 +32,7 @@ fn the_axis_that_moves_sets_the_acceleration() {
     let machine_of = |y: f64| kinematics("ac-head", [1e4, y, 1e4], 50.0);
     let line = path([[0.0; 3], [0.0, 100.0, 0.0]]);
     let quick = time(&line, &MACHINE, &machine_of(1e4), &EVENLY);
-    assert_relative_eq!(quick, super::super::machining_time(&line, &MACHINE), max_relative = 1e-3);
+    assert_relative_eq!(quick, seconds(&line, &MACHINE), max_relative = 1e-3);
     // 0.4 s up and down, 60 mm level.
     let slow = time(&line, &MACHINE, &machine_of(250.0), &EVENLY);
     assert_relative_eq!(slow, 0.8 + 0.6, max_relative = 2e-3);
@@ -49,7 +50,7 @@ fn a_turn_about_the_tip_takes_the_time_of_its_axes() {
     let turn = Toolpath::new(start, vec![step]);
     let following = Following::with_tip_kept(0.01, 50.0);
     let joints = follow(&kinematics, &turn, &following).unwrap();
-    let got = machining_time_of_axes(&turn, &MACHINE, &kinematics, &joints);
+    let got = machining_time_of_axes(&turn, &MACHINE, &kinematics, &joints, &Silent).unwrap();
     // Location by location from rest to rest: no quicker than the whole turn at once.
     assert!(got >= 2.0 * (0.5f64 / 4.0).sqrt() * (1.0 - 1e-9), "{got}");
     assert!(got <= axes_at_most(&kinematics, &joints) * (1.0 + 1e-9));
@@ -208,7 +209,7 @@ fn three_axes_keep_their_own_limits_in_the_time_of_small_steps() {
                 let angle = 2.0 * std::f64::consts::PI * f64::from(k) / f64::from(chords);
                 [30.0 * angle.cos(), 12.0 * angle.sin(), 0.0]
             };
-            let got = super::super::machining_time(&path((0..=chords).map(point)), &machine);
+            let got = seconds(&path((0..=chords).map(point)), &machine);
             let exact = ellipse_by_small_steps([30.0, 12.0], 100.0, rates, most);
             assert!((got / exact - 1.0).abs() < 3e-3, "{rates:?} {most:?} {chords}: {got} {exact}");
         }
@@ -312,7 +313,7 @@ fn no_axis_exceeds_its_jerk() {
         let joints = follow(&kinematics, &path, &EVENLY).unwrap();
         let (pieces, standing) = pieces(&path, &MACHINE, &kinematics, &joints);
         let axes = kinematics.axis_limits(&MACHINE);
-        let run = Run::new(&pieces, &profile(&path, &MACHINE).unwrap(), &MACHINE, &axes);
+        let run = Run::new(&pieces, &profile(&path, &MACHINE).unwrap(), &MACHINE, &axes, &Silent).unwrap();
         assert_eq!(standing, 0.0);
         let (slower, before) = (run.time(), time(&path, &MACHINE, &free, &EVENLY));
         assert!(slower > 1.05 * before, "{name}: {slower} {before}");
@@ -368,9 +369,9 @@ fn words_follow_the_limits_of_all_axes() {
         let kinematics = on_hill(name);
         let path = hill_in(0.05);
         let joints = follow(&kinematics, &path, &EVENLY).unwrap();
-        let slow = slow_axes(&path, &MACHINE, Some((&kinematics, &joints)));
-        let [before, after] =
-            [&path, &slow].map(|path| machining_time_of_axes(path, &MACHINE, &kinematics, &joints));
+        let slow = slow_axes(&path, &MACHINE, Some((&kinematics, &joints)), &Silent).unwrap();
+        let [before, after] = [&path, &slow]
+            .map(|path| machining_time_of_axes(path, &MACHINE, &kinematics, &joints, &Silent).unwrap());
         // Slower moves are divided into shorter stages, which lose less.
         assert!(after < 1.001 * before && after > 0.99 * before, "{name}: {before} {after}");
         let lower = slow.moves.iter().filter(|step| step.feed_rate < 0.9 * 6000.0).count();
@@ -380,11 +381,11 @@ fn words_follow_the_limits_of_all_axes() {
     let arc =
         (0..=600).map(|k| [30.0 * (0.01 * f64::from(k)).cos(), 30.0 * (0.01 * f64::from(k)).sin(), 0.0]);
     let path = path(arc);
-    let slow = slow_axes(&path, &own, None);
-    let [before, after] = [&path, &slow].map(|path| super::super::machining_time(path, &own));
+    let slow = slow_axes(&path, &own, None, &Silent).unwrap();
+    let [before, after] = [&path, &slow].map(|path| seconds(path, &own));
     assert!((before / after - 1.0).abs() < 2e-3, "{before} {after}");
     assert!(slow.moves.iter().any(|step| step.feed_rate < 0.7 * 6000.0));
-    assert_eq!(slow_axes(&path, &MACHINE, None), path);
+    assert_eq!(slow_axes(&path, &MACHINE, None, &Silent).unwrap(), path);
 }
 
 /// The moves of one of the plain programs in `tests/planner`, and the limits in its head: mm/s, mm/s².
@@ -430,7 +431,7 @@ fn an_independent_planner_takes_the_same_time() {
             blending,
             ..MACHINE
         };
-        super::super::machining_time(&path, &machine) / expected
+        seconds(&path, &machine) / expected
     };
     // With exact stop (G61) no corner is rounded.
     let stopping = [
