@@ -5,7 +5,10 @@ use std::sync::Arc;
 use io::ProgramHeader;
 use io::gcode::{self, FiveAxisPost, MoveLines};
 use machine::kinematics::{JointPath, Kinematics, follow};
-use machine::{axes_at_most, machining_time, machining_time_of_axes, slow_axes, slow_corners};
+use machine::{
+    Straying, axes_at_most, machining_time, machining_time_of_axes, merge_short_moves, slow_axes,
+    slow_corners,
+};
 use metrology::{FastestTurn, contact_arcs, fastest_turn, fastest_turn_across};
 use motion::{Move, MoveKind, Toolpath};
 use scene::{AxisRequest, Scene, ToolpathRequest};
@@ -94,6 +97,15 @@ impl Session {
         let planned = |strategy: &dyn Strategy| {
             let found = self.path(request, strategy, &settings, around, monitor);
             let mut plan = found.map_err(|e| self.refused(request, e))?;
+            let cutting_length = cutting_length(scene);
+            let straying = Straying { tolerance: scene.tolerance.chord, length: cutting_length };
+            let (merged, left_out) = merge_short_moves(&plan.path, &scene.machine, &straying);
+            if left_out > 0 {
+                plan.path = merged;
+                plan.notes.push(format!(
+                    "{left_out} moves shorter than the control takes for a line are merged within the chord tolerance"
+                ));
+            }
             if scene.machine.slow_corners {
                 plan.path = slow_corners(&plan.path, &scene.machine);
             }
@@ -291,12 +303,17 @@ fn within_engagement(
     Ok(best)
 }
 
+/// From the tip to the cutter's upper end, mm.
+fn cutting_length(scene: &Scene) -> f64 {
+    let length = scene.holder.as_ref().map_or(scene.cutter.words().length, |holder| holder.cutting_length());
+    length.max(scene.cutter.radius())
+}
+
 /// The path in the joints of the scene's five-axis machine, as its programs need it; `None` without one. The cutter, up to
 /// its holder, stays within the chord tolerance of its motion between locations.
 fn joints(scene: &Scene, name: &str, path: &Toolpath) -> Result<Option<JointPath>, JobError> {
     let Some(five_axis) = &scene.five_axis else { return Ok(None) };
-    let length = scene.holder.as_ref().map_or(scene.cutter.words().length, |holder| holder.cutting_length());
-    let following = five_axis.post.following(scene.tolerance.chord, length.max(scene.cutter.radius()));
+    let following = five_axis.post.following(scene.tolerance.chord, cutting_length(scene));
     let refused =
         |reason| JobError::Machine { scene: scene.source.name.clone(), name: name.to_owned(), reason };
     let joints = follow(&five_axis.kinematics, path, &following).map_err(|e| refused(e.to_string()))?;

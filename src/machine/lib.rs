@@ -9,11 +9,13 @@ mod blending;
 mod feeds;
 mod jerk;
 pub mod kinematics;
+mod merge;
 mod time;
 
 pub use axis_limits::{axes_at_most, machining_time_of_axes, slow_axes};
 pub use blending::Blending;
 pub use feeds::slow_corners;
+pub use merge::{Straying, merge_short_moves};
 pub use time::{at_most, machining_time};
 
 /// Limits of the machine's motion.
