@@ -1,4 +1,4 @@
-//! The least distance between a tool and a mesh on a whole path.
+//! The least distance between a tool or another body and a mesh on a whole path.
 //!
 //! Enters: a solid, a path, an obstacle. Leaves: the move and the place where they come nearest, with a bound, mm. A bound
 //! on the whole is known from a few locations before the search begins, so that most moves are settled by one look.
@@ -8,7 +8,8 @@ use motion::{Move, Toolpath};
 use work::monitor::{Cancelled, Monitor, check};
 use work::parallel;
 
-use super::sweep::RESOLUTION;
+use super::piece::Convex;
+use super::sweep::{Moving, RESOLUTION, ToolMove};
 use super::{Clearance, Obstacle};
 
 /// Locations of the path at which the tool is looked at first. More cost a full search each, fewer leave more moves to
@@ -59,25 +60,42 @@ impl Obstacle<'_> {
         monitor: &dyn Monitor,
     ) -> Result<Option<LeastClearance>, Cancelled> {
         let moves: Vec<usize> = (0..path.len()).filter(|&k| chosen(&path.moves[k])).collect();
-        let Some(&first) = moves.first() else { return Ok(None) };
-        if let Some(nearest) = self.swallowed(&path.location_before(first).tip) {
-            let error_bound = f64::INFINITY;
-            return Ok(Some(LeastClearance { move_index: first, t: 0.0, nearest, error_bound }));
+        let moving =
+            |k: usize| ToolMove { solid, ends: [path.location_before(moves[k]), path.moves[moves[k]].to] };
+        let least = self.least(moves.len(), &moving, monitor)?;
+        Ok(least.map(|least| LeastClearance { move_index: moves[least.move_index], ..least }))
+    }
+
+    /// As [`Obstacle::least_clearance`], of any body on so many moves.
+    pub(crate) fn least<M: Moving>(
+        &self,
+        moves: usize,
+        moving: &(impl Fn(usize) -> M + Sync),
+        monitor: &dyn Monitor,
+    ) -> Result<Option<LeastClearance>, Cancelled> {
+        if moves == 0 {
+            return Ok(None);
         }
-        let step = moves.len().div_ceil(FIRST_LOOKS);
-        let looks = moves.iter().step_by(step).map(|&k| (k, path.location_before(k)));
-        let found = looks.filter_map(|(move_index, at)| {
-            let nearest = self.clearance(solid, &at, f64::INFINITY)?;
+        if let Some(nearest) = self.swallowed(&moving(0).piece(0, 0.0).origin()) {
+            let error_bound = f64::INFINITY;
+            return Ok(Some(LeastClearance { move_index: 0, t: 0.0, nearest, error_bound }));
+        }
+        let looks = (0..moves).step_by(moves.div_ceil(FIRST_LOOKS)).map(|k| (k, moving(k)));
+        let found = looks.filter_map(|(move_index, moving)| {
+            let mut nearest = None;
+            for index in 0..moving.pieces() {
+                Obstacle::nearest(self, &moving.piece(index, 0.0), f64::INFINITY, &mut nearest);
+            }
+            let nearest = nearest?;
             let error_bound = RESOLUTION + left_open(nearest.distance);
             Some(LeastClearance { move_index, t: 0.0, nearest, error_bound })
         });
         let Some(seed) = found.reduce(nearer) else { return Ok(None) };
-        let of_chunks = parallel::try_map(moves.len().div_ceil(CHUNK_MOVES), |k| {
-            let chunk = &moves[k * CHUNK_MOVES..((k + 1) * CHUNK_MOVES).min(moves.len())];
+        let of_chunks = parallel::try_map(moves.div_ceil(CHUNK_MOVES), |chunk| {
             let mut least = seed;
-            for &k in chunk {
+            for k in chunk * CHUNK_MOVES..((chunk + 1) * CHUNK_MOVES).min(moves) {
                 check(monitor)?;
-                self.lower(solid, path, k, &mut least);
+                self.lower(&moving(k), k, &mut least);
             }
             Ok::<_, Cancelled>(least)
         })?;
@@ -89,13 +107,10 @@ impl Obstacle<'_> {
     }
 
     /// Lowers `least` to the nearest of one move.
-    fn lower(&self, solid: &Solid, path: &Toolpath, k: usize, least: &mut LeastClearance) {
-        let (from, to) = (path.location_before(k), path.moves[k].to);
+    fn lower<M: Moving>(&self, moving: &M, k: usize, least: &mut LeastClearance) {
         for _ in 0..MOST_LOOKS {
             let margin = left_open(least.nearest.distance);
-            let Some(hit) = self.swept_clearance(solid, &from, &to, least.nearest.distance - margin) else {
-                return;
-            };
+            let Some(hit) = self.swept(moving, least.nearest.distance - margin) else { return };
             let error_bound = RESOLUTION + left_open(hit.nearest.distance);
             *least = LeastClearance { move_index: k, t: hit.t, nearest: hit.nearest, error_bound };
             if !hit.nearest.distance.is_finite() {

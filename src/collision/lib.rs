@@ -1,8 +1,9 @@
-//! Where a tool touches what it should not: the part away from the contact, neighbours, fixtures.
+//! Where a tool or a body of the machine touches what it should not: the part away from the contact, neighbours, fixtures.
 //!
 //! Enters: the tool as a [`Solid`] of convex pieces, its location, and meshes with their search trees, mm. Leaves: the
 //! nearest place of the meshes with its signed distance from the tool, for one location ([`Obstacle::clearance`]),
-//! a whole move ([`Obstacle::swept_clearance`]) or a whole path ([`Obstacle::least_clearance`]).
+//! a whole move ([`Obstacle::swept_clearance`]) or a whole path ([`Obstacle::least_clearance`]). Boxes and cylinders of a machine
+//! move in any way ([`Obstacle::least_clearance_of_body`]).
 //!
 //! The distance from a convex piece is convex, so its gradient supports it over a box, a triangle and a stretch of a move. A
 //! tool that slides along a surface comes no nearer by its motion: its supporting plane moves along itself. A bound by speed
@@ -12,6 +13,7 @@
 //! reached that position through the surface, and the move that did so is reported, or it began there
 //! ([`Obstacle::least_clearance`]).
 
+mod body;
 mod checks;
 mod least;
 mod piece;
@@ -21,14 +23,15 @@ mod sweep;
 #[cfg(test)]
 mod tests;
 
+pub use body::{Body, Ends};
 pub use checks::{Check, Interference, Shortfall};
 use cutter::Solid;
 use geometry::{Aabb, Bvh, Node, Point3, TriangleMesh};
 pub use least::LeastClearance;
 use motion::ClPoint;
-use piece::ToolPiece;
 #[cfg(test)]
 use piece::middle;
+use piece::{Convex, ToolPiece};
 pub use sweep::SweptClearance;
 
 /// A mesh that a tool may run into.
@@ -89,7 +92,7 @@ impl<'a> Obstacle<'a> {
     }
 
     /// Puts in `best` what is nearer than that, or than `limit`; tells whether there is such a place.
-    fn nearest(&self, piece: &ToolPiece, limit: f64, best: &mut Option<Clearance>) -> bool {
+    fn nearest<P: Convex>(&self, piece: &P, limit: f64, best: &mut Option<Clearance>) -> bool {
         let start = best.as_ref().map_or(limit, |b| b.distance);
         let mut found = false;
         self.bvh.tree().search(-start, farthest(piece), |slot, now| {
@@ -105,7 +108,7 @@ impl<'a> Obstacle<'a> {
 }
 
 /// Minus a lower bound on the distance of a box: what the supporting plane at its middle leaves over its sides.
-fn farthest(piece: &ToolPiece) -> impl Fn(usize, &Node, f64) -> f64 {
+fn farthest<P: Convex>(piece: &P) -> impl Fn(usize, &Node, f64) -> f64 {
     |_, node, _| {
         let (middle, half) = node.middle();
         let sample = piece.sample(&middle);

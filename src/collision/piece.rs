@@ -1,10 +1,10 @@
-//! One convex piece of a tool that stands somewhere, and its least distance from a triangle.
+//! One convex piece of a tool or of a machine that stands somewhere, and its least distance from a triangle.
 //!
 //! The signed distance `d` is a convex function of the place, so that its gradient g at p supports it:
-//! `d(q) >= d(p) + g·(q − p)`. Over the plane of a triangle `d` is symmetric about the plane through the tool axis
-//! square to it, hence least in that one: the least of a plane is the least along a line, and where that lies off
-//! the triangle, a side between the two holds the least of the triangle. All is searched along lines, between two
-//! supporting lines whose crossing bounds the least from below.
+//! `d(q) >= d(p) + g·(q − p)`. Where the least of a triangle's plane lies off the triangle, a side between the two holds the
+//! least of the triangle. Of a solid of revolution `d` is over a plane symmetric about the plane through the axis square to it,
+//! hence least in that one: the least of a plane is the least along a line. Of a box it has a closed form. Lines are searched
+//! between two supporting lines whose crossing bounds the least from below.
 
 use cutter::Solid;
 use geometry::{Point3, Vector3};
@@ -45,43 +45,37 @@ pub struct NearPlace {
 
 /// A place on a line.
 #[derive(Clone, Copy)]
-struct OnLine {
+pub struct OnLine {
     s: f64,
     distance: f64,
     slope: f64,
 }
 
-impl ToolPiece<'_> {
-    #[inline]
-    pub fn sample(&self, q: &Point3) -> Sample {
-        let axis = &self.at.axis;
-        let away = q - self.at.tip;
-        let z = away.dot(axis);
-        let outward = away - axis * z;
-        let rho = outward.norm();
-        let foot = self.solid.piece_foot(self.index, rho, z);
-        // On the axis the mean of all gradients supports the distance as well as any.
-        let radial = if rho > 0.0 { foot.gradient[0] / rho } else { 0.0 };
-        Sample { distance: foot.distance, gradient: outward * radial + axis * foot.gradient[1] }
-    }
+/// A convex body that stands somewhere.
+pub trait Convex: Copy {
+    /// A place that it turns about.
+    fn origin(&self) -> Point3;
 
-    /// The piece lies within this of the tip along the unit vector `u`.
-    pub fn support(&self, u: &Vector3) -> f64 {
-        let along = u.dot(&self.at.axis);
-        self.solid.piece_support(self.index, (u - self.at.axis * along).norm(), along)
-    }
+    /// The signed distance of a place, and what supports it there.
+    fn sample(&self, q: &Point3) -> Sample;
+
+    /// It lies within this of its origin along the unit vector `u`.
+    fn support(&self, u: &Vector3) -> f64;
+
+    /// The nearest place of the plane of a triangle with the unit normal `normal`, if it can lie on the triangle.
+    fn lowest_of_plane(&self, corners: &[Point3; 3], normal: &Vector3) -> Option<NearPlace>;
 
     /// The unit normal of a triangle, toward the side from which the piece can be farther away, and the signed distance of
     /// its plane from the piece: no place of the triangle is nearer. Unlike a gradient it is good beside sharp edges too.
-    pub fn off_plane(&self, corners: &[Point3; 3]) -> (Vector3, f64) {
+    fn off_plane(&self, corners: &[Point3; 3]) -> (Vector3, f64) {
         let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).normalize();
-        let off = |u: Vector3| (u, u.dot(&(corners[0] - self.at.tip)) - self.support(&u));
+        let off = |u: Vector3| (u, u.dot(&(corners[0] - self.origin())) - self.support(&u));
         let (one, other) = (off(normal), off(-normal));
         if one.1 > other.1 { one } else { other }
     }
 
     /// The nearest place of a triangle, if it is nearer than `limit`.
-    pub fn nearest_on(&self, corners: &[Point3; 3], limit: f64) -> Option<NearPlace> {
+    fn nearest_on(&self, corners: &[Point3; 3], limit: f64) -> Option<NearPlace> {
         let centre = middle(corners);
         let inside = self.sample(&centre);
         if inside.distance + least_rise(&inside.gradient, &centre, corners) >= limit {
@@ -129,28 +123,7 @@ impl ToolPiece<'_> {
         best.place()
     }
 
-    /// The nearest place of a triangle's plane, if that lies no farther along the plane of symmetry than the
-    /// triangle.
-    fn lowest_of_plane(&self, corners: &[Point3; 3], normal: &Vector3) -> Option<NearPlace> {
-        let (tip, axis) = (self.at.tip, self.at.axis);
-        let origin = tip - normal * (tip - corners[0]).dot(normal);
-        let along = (axis - normal * axis.dot(normal))
-            .try_normalize(SQUARE)
-            .unwrap_or_else(|| (corners[1] - corners[0]).normalize());
-        let reach = corners.map(|c| (c - origin).dot(&along));
-        let [low, high] = [
-            reach.iter().copied().fold(f64::INFINITY, f64::min),
-            reach.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-        ];
-        let a = self.on_line(&origin, &along, low);
-        let b = self.on_line(&origin, &along, high);
-        if a.slope > 0.0 || b.slope < 0.0 {
-            return None;
-        }
-        let low = self.least_along(&origin, &along, a, b, f64::INFINITY);
-        Some(NearPlace { point: origin + along * low.s, distance: low.distance })
-    }
-
+    /// What a line, with the unit direction `along`, has at a place.
     fn on_line(&self, origin: &Point3, along: &Vector3, s: f64) -> OnLine {
         let sample = self.sample(&(origin + along * s));
         OnLine { s, distance: sample.distance, slope: sample.gradient.dot(along) }
@@ -192,6 +165,50 @@ impl ToolPiece<'_> {
             quick = b.s - a.s < 0.5 * width || !quick;
         }
         if a.distance < b.distance { a } else { b }
+    }
+}
+
+impl Convex for ToolPiece<'_> {
+    fn origin(&self) -> Point3 {
+        self.at.tip
+    }
+
+    #[inline]
+    fn sample(&self, q: &Point3) -> Sample {
+        let axis = &self.at.axis;
+        let away = q - self.at.tip;
+        let z = away.dot(axis);
+        let outward = away - axis * z;
+        let rho = outward.norm();
+        let foot = self.solid.piece_foot(self.index, rho, z);
+        // On the axis the mean of all gradients supports the distance as well as any.
+        let radial = if rho > 0.0 { foot.gradient[0] / rho } else { 0.0 };
+        Sample { distance: foot.distance, gradient: outward * radial + axis * foot.gradient[1] }
+    }
+
+    fn support(&self, u: &Vector3) -> f64 {
+        let along = u.dot(&self.at.axis);
+        self.solid.piece_support(self.index, (u - self.at.axis * along).norm(), along)
+    }
+
+    fn lowest_of_plane(&self, corners: &[Point3; 3], normal: &Vector3) -> Option<NearPlace> {
+        let (tip, axis) = (self.at.tip, self.at.axis);
+        let origin = tip - normal * (tip - corners[0]).dot(normal);
+        let along = (axis - normal * axis.dot(normal))
+            .try_normalize(SQUARE)
+            .unwrap_or_else(|| (corners[1] - corners[0]).normalize());
+        let reach = corners.map(|c| (c - origin).dot(&along));
+        let [low, high] = [
+            reach.iter().copied().fold(f64::INFINITY, f64::min),
+            reach.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        ];
+        let a = self.on_line(&origin, &along, low);
+        let b = self.on_line(&origin, &along, high);
+        if a.slope > 0.0 || b.slope < 0.0 {
+            return None;
+        }
+        let low = self.least_along(&origin, &along, a, b, f64::INFINITY);
+        Some(NearPlace { point: origin + along * low.s, distance: low.distance })
     }
 }
 

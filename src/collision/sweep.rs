@@ -5,7 +5,7 @@
 //! distance of all places of a box, or of a triangle, over a stretch of time from below: a surface that the tool slides
 //! along is no nearer for that, since it moves along the plane. Stretches that this does not settle are halved.
 
-use super::piece::{ToolPiece, middle};
+use super::piece::{Convex, ToolPiece, middle};
 use super::{Clearance, Obstacle};
 use cutter::Solid;
 use geometry::{Node, Point3, Vector3};
@@ -35,10 +35,51 @@ pub struct SweptClearance {
     pub nearest: Clearance,
 }
 
+/// A body of convex pieces on a move: its origin runs straight, and it turns evenly.
+pub(crate) trait Moving {
+    /// What it consists of.
+    type Piece: Convex;
+    /// How many pieces.
+    fn pieces(&self) -> usize;
+    /// A piece at a time from 0 to 1.
+    fn piece(&self, index: usize, t: f64) -> Self::Piece;
+    /// Way of the origin, and turn, over the whole move, mm and rad. `None` where it turns to the opposite, any way round.
+    fn course(&self) -> Option<[Vector3; 2]>;
+}
+
+/// A tool on a move.
+pub(crate) struct ToolMove<'a> {
+    pub solid: &'a Solid,
+    pub ends: [ClPoint; 2],
+}
+
+impl<'a> Moving for ToolMove<'a> {
+    type Piece = ToolPiece<'a>;
+
+    fn pieces(&self) -> usize {
+        self.solid.pieces()
+    }
+
+    fn piece(&self, index: usize, t: f64) -> ToolPiece<'a> {
+        ToolPiece { solid: self.solid, index, at: self.ends[0].towards(&self.ends[1], t) }
+    }
+
+    fn course(&self) -> Option<[Vector3; 2]> {
+        let [from, to] = &self.ends;
+        let across = from.axis.cross(&to.axis);
+        let (sin, cos) = (across.norm(), from.axis.dot(&to.axis));
+        if sin < OPPOSITE && cos < 0.0 {
+            return None;
+        }
+        let spin = if sin > 0.0 { across * (sin.atan2(cos) / sin) } else { across };
+        Some([to.tip - from.tip, spin])
+    }
+}
+
 /// A piece in the middle of a stretch of a move.
-struct Stretch<'a> {
-    piece: ToolPiece<'a>,
-    /// Way of the tip and turn of the axis over the whole move, mm and rad.
+struct Stretch<P> {
+    piece: P,
+    /// Way of the origin and turn over the whole move, mm and rad.
     way: Vector3,
     spin: Vector3,
     /// Half of the stretch, as a share of the move.
@@ -59,16 +100,18 @@ impl Obstacle<'_> {
         to: &ClPoint,
         needed: f64,
     ) -> Option<SweptClearance> {
-        let across = from.axis.cross(&to.axis);
-        let (sin, cos) = (across.norm(), from.axis.dot(&to.axis));
-        if sin < OPPOSITE && cos < 0.0 {
-            let nearest = Clearance { distance: f64::NEG_INFINITY, place: from.tip, triangle: 0 };
+        self.swept(&ToolMove { solid, ends: [*from, *to] }, needed)
+    }
+
+    /// As [`Obstacle::swept_clearance`], of any body.
+    pub(crate) fn swept<M: Moving>(&self, moving: &M, needed: f64) -> Option<SweptClearance> {
+        let Some([way, spin]) = moving.course() else {
+            let place = moving.piece(0, 0.0).origin();
+            let nearest = Clearance { distance: f64::NEG_INFINITY, place, triangle: 0 };
             return Some(SweptClearance { t: 0.5, nearest });
-        }
-        let spin = if sin > 0.0 { across * (sin.atan2(cos) / sin) } else { across };
-        let way = to.tip - from.tip;
+        };
         let mut worst: Option<SweptClearance> = None;
-        for index in 0..solid.pieces() {
+        for index in 0..moving.pieces() {
             let mut waiting = VecDeque::from([[0.0, 1.0]]);
             let mut looks = 0;
             while let Some([a, b]) = waiting.pop_front() {
@@ -77,7 +120,7 @@ impl Obstacle<'_> {
                     break;
                 }
                 let t = 0.5 * (a + b);
-                let piece = ToolPiece { solid, index, at: from.towards(to, t) };
+                let piece = moving.piece(index, t);
                 let limit = worst.map_or(needed, |w| w.nearest.distance);
                 let enough = limit - (SHARE * (needed - limit)).max(RESOLUTION);
                 if !self.may_come_nearer(&Stretch { piece, way, spin, half: 0.5 * (b - a) }, enough) {
@@ -86,7 +129,7 @@ impl Obstacle<'_> {
                 // Both ends are where a tool that runs into something is deepest.
                 let ends = if [a, b] == [0.0, 1.0] { &[0.0, 1.0][..] } else { &[] };
                 for &t in [t].iter().chain(ends) {
-                    let piece = ToolPiece { at: from.towards(to, t), ..piece };
+                    let piece = moving.piece(index, t);
                     let mut nearest = worst.map(|w| w.nearest);
                     if self.nearest(&piece, needed, &mut nearest) {
                         worst = nearest.map(|nearest| SweptClearance { t, nearest });
@@ -99,7 +142,7 @@ impl Obstacle<'_> {
     }
 
     /// Whether a bound leaves it open that the mesh comes nearer than `limit` during a stretch.
-    fn may_come_nearer(&self, stretch: &Stretch, limit: f64) -> bool {
+    fn may_come_nearer<P: Convex>(&self, stretch: &Stretch<P>, limit: f64) -> bool {
         let mut open = false;
         self.bvh.tree().search(
             -limit,
@@ -113,10 +156,10 @@ impl Obstacle<'_> {
     }
 }
 
-impl Stretch<'_> {
+impl<P: Convex> Stretch<P> {
     /// How much a place may move against `gradient`, mm; `beside` is how far others that are asked for lie from it.
     fn moved(&self, gradient: &Vector3, q: &Point3, beside: f64) -> f64 {
-        let turning = self.spin.cross(&(q - self.piece.at.tip));
+        let turning = self.spin.cross(&(q - self.piece.origin()));
         let pace = self.spin.cross(&self.way).norm();
         let turn = self.spin.norm();
         let arm = turning.norm() + turn * beside + self.half * pace;

@@ -262,6 +262,11 @@ impl Solid {
         slants(holder).into_iter().map(|slant| Self::stacked(None, slant[0][1], &[slant])).collect()
     }
 
+    /// A cylinder from the tip up.
+    pub fn cylinder(radius: f64, length: f64) -> Self {
+        Self::stacked(None, 0.0, &[[[radius, 0.0], [radius, length]]])
+    }
+
     /// Cutter, shank and holder in one.
     pub fn of_tool(cutter: &Cutter, holder: &Holder) -> Self {
         Self::stacked(Some(cutter), holder.cutting_length(), &slants(holder))

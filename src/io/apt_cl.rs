@@ -102,7 +102,8 @@ mod tests {
 
     #[test]
     fn a_short_program() {
-        let header = ProgramHeader { name: "wave zigzag".into(), spindle_speed: Some(12_000.0) };
+        let header =
+            ProgramHeader { name: "wave zigzag".into(), spindle_speed: Some(12_000.0), rise_to: None };
         let expected = "\
 PARTNO wave zigzag
 PPRINT BALL END D=6.0

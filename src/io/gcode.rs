@@ -31,8 +31,8 @@ pub type MoveLines = Vec<u32>;
 /// has no line of its own: it gets the line that brought the tip there.
 ///
 /// Coordinates and feeds are rounded to four decimals, so each stands within 0.05 µm of the path. Before
-/// the first move the tip rises to the highest tip of the path, moves over its start and comes down there;
-/// after the last one it rises again.
+/// the first move the tip rises to the highest tip of the path, or to what the header asks for, moves over its start and comes
+/// down there; after the last one it rises again.
 ///
 /// With a rule for `arcs`, moves of one feed become one arc where it stays near to them. It is the line of them all.
 ///
@@ -51,6 +51,7 @@ pub fn write(
     let mut program = ThreeAxisProgram { writer, lines: 0, tip: [None; 3], code: None, feed: None };
     let start = path.start.tip;
     let top = path.moves.iter().map(|m| m.to.tip.z).fold(start.z, f64::max);
+    let top = header.rise_to.map_or(top, |least| top.max(least));
     program.line("%")?;
     program.line(&format!("({})", header.plain_name()))?;
     program.line(&format!("({})", describe(cutter)))?;
@@ -189,7 +190,8 @@ mod tests {
 
     #[test]
     fn a_short_program() {
-        let header = ProgramHeader { name: "wave, zigzag".into(), spindle_speed: Some(12_000.0) };
+        let header =
+            ProgramHeader { name: "wave, zigzag".into(), spindle_speed: Some(12_000.0), rise_to: None };
         let (text, lines) = text(&example(), &header);
         let expected = "\
 %

@@ -14,6 +14,9 @@ pub struct ProgramHeader {
     pub name: String,
     /// Spindle speed, 1/min, clockwise; `None` leaves the spindle alone.
     pub spindle_speed: Option<f64>,
+    /// Programs of three axes begin and end no lower than this, mm: over what stands beside the path. `None` asks for nothing more
+    /// than the highest tip.
+    pub rise_to: Option<f64>,
 }
 
 impl ProgramHeader {
@@ -115,9 +118,9 @@ pub(super) mod tests {
 
     #[test]
     fn names_cannot_end_a_comment() {
-        let header = ProgramHeader { name: "wave (2)\nM30 é".into(), spindle_speed: None };
+        let header = ProgramHeader { name: "wave (2)\nM30 é".into(), spindle_speed: None, rise_to: None };
         assert_eq!(header.plain_name(), "wave _2__M30 _");
-        let long = ProgramHeader { name: "x".repeat(100), spindle_speed: None };
+        let long = ProgramHeader { name: "x".repeat(100), spindle_speed: None, rise_to: None };
         assert_eq!(long.plain_name().len(), 60);
     }
 }

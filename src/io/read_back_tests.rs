@@ -23,7 +23,7 @@ fn by_line(path: &Toolpath) -> HashMap<u32, &Move> {
 }
 
 fn header() -> ProgramHeader {
-    ProgramHeader { name: "read back".into(), spindle_speed: Some(9000.0) }
+    ProgramHeader { name: "read back".into(), spindle_speed: Some(9000.0), rise_to: None }
 }
 
 #[test]

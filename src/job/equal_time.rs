@@ -85,7 +85,7 @@ impl Session {
         let asked_s = 60.0 * time.minutes;
         let mut plan = |scallop: f64| {
             let planned = self.plan(&at(scallop), around, None, monitor)?;
-            let time = planned.time(scene);
+            let time = planned.time(scene, monitor)?;
             Ok::<_, JobError>((planned, time))
         };
         let (mut planned, kept, plans) = nearest(scene.tolerance.scallop, highest, asked_s, &mut plan)?;

@@ -224,7 +224,7 @@ impl Session {
             verdict,
             claims,
             notes: self.notes_on(&planned, &measured, found.notes),
-            path: path_figures(&planned.plan.path, planned.time(scene)),
+            path: path_figures(&planned.plan.path, planned.time(scene, monitor)?),
             scallop: measurement.scallop.clone(),
             gouge: measurement.gouge.clone(),
             uncut: measurement.uncut.clone(),
@@ -234,13 +234,14 @@ impl Session {
             simulation,
             surface_mesh: machined.figures(),
         };
-        let Planned { plan, joints, .. } = planned;
+        let Planned { plan, joints, rise_to, .. } = planned;
         Ok(Outcome {
             result,
             path: plan.path,
             cutters: cutters.clone(),
             holders: holders.to_vec(),
             joints,
+            rise_to,
             field: plan.field,
             measurement: measured.measurement,
             view: measured.view,

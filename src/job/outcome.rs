@@ -2,6 +2,7 @@
 
 use cutter::Holder;
 use field::PlannedField;
+use io::ProgramHeader;
 use machine::kinematics::JointPath;
 use metrology::{Measurement, View};
 use motion::{Cutters, Toolpath};
@@ -23,6 +24,8 @@ pub struct Outcome {
     pub holders: Vec<Option<Holder>>,
     /// The path in the joints of a five-axis machine.
     pub joints: Option<JointPath>,
+    /// Its program of three axes begins and ends no lower than this, mm: over the fixtures.
+    pub rise_to: Option<f64>,
     /// What a streamline was planned by.
     pub field: Option<PlannedField>,
     /// The figures with their maps and samples.
@@ -41,7 +44,7 @@ impl Session {
     /// # Errors
     /// Those of `out`.
     pub fn write_program(&self, out: &mut dyn std::io::Write, outcome: &Outcome) -> std::io::Result<()> {
-        let header = self.header(&outcome.result.name);
+        let header = ProgramHeader { rise_to: outcome.rise_to, ..self.header(&outcome.result.name) };
         write_program(out, &self.scene, &outcome.path, outcome.joints.as_ref(), &header).map(drop)
     }
 

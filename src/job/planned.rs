@@ -5,7 +5,10 @@ use std::sync::Arc;
 use io::ProgramHeader;
 use io::gcode::{self, ArcRule, FiveAxisPost, MoveLines};
 use machine::kinematics::{JointPath, Kinematics, follow};
-use machine::{axes_at_most, machining_time, machining_time_of_axes, slow_axes, slow_corners};
+use machine::{
+    Straying, axes_at_most, machining_time, machining_time_of_axes, merge_short_moves, slow_axes,
+    slow_corners,
+};
 use metrology::{FastestTurn, contact_arcs, fastest_turn, fastest_turn_across};
 use motion::{Move, MoveKind, Toolpath};
 use scene::{AxisRequest, Scene, ToolpathRequest};
@@ -13,7 +16,7 @@ use toolpath::{
     Detour, Earlier, Engagement, OffsetDrive, OffsetSurface, Plan, PlanError, PlanSettings, PocketStrategy,
     Strategy, Tilting, around_fixtures, plan, plan_pocket, plan_tilted,
 };
-use work::monitor::Monitor;
+use work::monitor::{Cancelled, Monitor};
 
 use super::correction::CorrectionFigures;
 use super::equal_time::EqualTimeFigures;
@@ -37,6 +40,8 @@ pub(crate) struct Planned {
     pub strategy: Box<dyn Strategy>,
     /// The path in the joints of a five-axis machine.
     pub joints: Option<JointPath>,
+    /// Its program of three axes begins and ends no lower than this, mm: over the fixtures.
+    pub rise_to: Option<f64>,
     /// Engagement in a pocket, and the bound of its greatest angle, rad.
     pub engaged: Option<(Engagement, f64)>,
     /// The rounds in which its ridges were measured and corrected.
@@ -47,11 +52,11 @@ pub(crate) struct Planned {
 
 impl Planned {
     /// Time that the scene's machine takes, s.
-    pub fn time(&self, scene: &Scene) -> f64 {
+    pub fn time(&self, scene: &Scene, monitor: &dyn Monitor) -> Result<f64, Cancelled> {
         let (path, machine) = (&self.plan.path, &scene.machine);
         self.on_axes(scene).map_or_else(
-            || machining_time(path, machine),
-            |(kinematics, joints)| machining_time_of_axes(path, machine, kinematics, joints),
+            || machining_time(path, machine, monitor),
+            |(kinematics, joints)| machining_time_of_axes(path, machine, kinematics, joints, monitor),
         )
     }
 
@@ -82,6 +87,7 @@ impl Session {
                 plan,
                 strategy,
                 joints: None,
+                rise_to: None,
                 engaged: None,
                 correction: None,
                 equal_time: None,
@@ -91,6 +97,15 @@ impl Session {
         let planned = |strategy: &dyn Strategy| {
             let found = self.path(request, strategy, &settings, around, monitor);
             let mut plan = found.map_err(|e| self.refused(request, e))?;
+            let cutting_length = cutting_length(scene);
+            let straying = Straying { tolerance: scene.tolerance.chord, length: cutting_length };
+            let (merged, left_out) = merge_short_moves(&plan.path, &scene.machine, &straying);
+            if left_out > 0 {
+                plan.path = merged;
+                plan.notes.push(format!(
+                    "{left_out} moves shorter than the control takes for a line are merged within the chord tolerance"
+                ));
+            }
             if scene.machine.slow_corners {
                 plan.path = slow_corners(&plan.path, &scene.machine);
             }
@@ -103,10 +118,13 @@ impl Session {
         let joints = joints(scene, &request.name, &plan.path)?;
         if scene.machine.slow_corners {
             let kinematics = scene.five_axis.as_ref().map(|five_axis| &five_axis.kinematics);
-            plan.path = slow_axes(&plan.path, &scene.machine, kinematics.zip(joints.as_ref()));
+            plan.path = slow_axes(&plan.path, &scene.machine, kinematics.zip(joints.as_ref()), monitor)?;
         }
-        plan.path.origin.lines = lines(scene, &plan.path, joints.as_ref())?;
-        Ok(Planned { plan, strategy, joints, engaged, correction: None, equal_time: None })
+        let tops = around.fixtures.iter().map(|(mesh, _)| mesh.bounds().max.z + scene.clearance);
+        let rise_to = tops.reduce(f64::max);
+        let header = ProgramHeader { rise_to, ..header(scene, "") };
+        plan.path.origin.lines = lines(scene, &plan.path, joints.as_ref(), &header)?;
+        Ok(Planned { plan, strategy, joints, rise_to, engaged, correction: None, equal_time: None })
     }
 
     fn path(
@@ -285,12 +303,17 @@ fn within_engagement(
     Ok(best)
 }
 
+/// From the tip to the cutter's upper end, mm.
+fn cutting_length(scene: &Scene) -> f64 {
+    let length = scene.holder.as_ref().map_or(scene.cutter.words().length, |holder| holder.cutting_length());
+    length.max(scene.cutter.radius())
+}
+
 /// The path in the joints of the scene's five-axis machine, as its programs need it; `None` without one. The cutter, up to
 /// its holder, stays within the chord tolerance of its motion between locations.
 fn joints(scene: &Scene, name: &str, path: &Toolpath) -> Result<Option<JointPath>, JobError> {
     let Some(five_axis) = &scene.five_axis else { return Ok(None) };
-    let length = scene.holder.as_ref().map_or(scene.cutter.words().length, |holder| holder.cutting_length());
-    let following = five_axis.post.following(scene.tolerance.chord, length.max(scene.cutter.radius()));
+    let following = five_axis.post.following(scene.tolerance.chord, cutting_length(scene));
     let refused =
         |reason| JobError::Machine { scene: scene.source.name.clone(), name: name.to_owned(), reason };
     let joints = follow(&five_axis.kinematics, path, &following).map_err(|e| refused(e.to_string()))?;
@@ -301,8 +324,13 @@ fn joints(scene: &Scene, name: &str, path: &Toolpath) -> Result<Option<JointPath
 }
 
 /// The line of each move in its program. A path that tilts the tool has no program where the scene names no machine.
-fn lines(scene: &Scene, path: &Toolpath, joints: Option<&JointPath>) -> Result<MoveLines, JobError> {
-    let written = write_program(&mut std::io::sink(), scene, path, joints, &header(scene, ""));
+fn lines(
+    scene: &Scene,
+    path: &Toolpath,
+    joints: Option<&JointPath>,
+    header: &ProgramHeader,
+) -> Result<MoveLines, JobError> {
+    let written = write_program(&mut std::io::sink(), scene, path, joints, header);
     written.map_err(|error| JobError::Program(error.to_string()))
 }
 
@@ -311,6 +339,7 @@ fn header(scene: &Scene, name: &str) -> ProgramHeader {
     ProgramHeader {
         name: format!("{} - {name}", scene.title),
         spindle_speed: Some(scene.cutting.spindle_speed),
+        rise_to: None,
     }
 }
 

@@ -10,12 +10,15 @@
 //! a limit of jerk, [`super::jerk`] lowers the speeds further. [`slow_axes`] writes the speeds into the feeds of a path.
 //! Lengths in mm, speeds in mm/s; axes in mm or rad.
 
-use super::Machine;
+use super::blending::{Arcs, Straight};
 use super::feeds::{ANY_RATE, in_series};
 use super::jerk;
 use super::kinematics::{JointPath, Joints, Kinematics, Turn};
 use super::time::{Block, NO_MOVE, SECONDS_PER_MINUTE, profile};
+use super::{Blending, Machine};
+use geometry::Vector3;
 use motion::Toolpath;
+use work::monitor::{Cancelled, Monitor};
 
 /// Halvings of the greatest squared speed from which a stage can be run.
 const HALVINGS: usize = 40;
@@ -79,6 +82,8 @@ pub(super) struct Stage {
     pub bends: [[f64; 5]; 2],
     /// Greatest squared speed at its beginning.
     pub most: f64,
+    /// Greatest acceleration along the path.
+    pub along: f64,
     /// An axis in it has a limit of jerk.
     pub jerk: bool,
 }
@@ -100,11 +105,17 @@ struct Run {
 }
 
 impl Run {
-    fn new(pieces: &[EvenStretch], blocks: &[Block], machine: &Machine, axes: &AxisLimits) -> Self {
+    fn new(
+        pieces: &[EvenStretch],
+        blocks: &[Block],
+        machine: &Machine,
+        axes: &AxisLimits,
+        monitor: &dyn Monitor,
+    ) -> Result<Self, Cancelled> {
         let stages = stages(pieces, blocks, machine, axes);
         let speeds = speeds(&stages, axes);
-        let speeds = jerk::within(&stages, speeds, axes);
-        Self { stages, speeds }
+        let speeds = jerk::within(&stages, speeds, axes, monitor)?;
+        Ok(Self { stages, speeds })
     }
 
     /// s.
@@ -132,6 +143,9 @@ impl Run {
 /// [`super::machining_time`] looks at. The machine stops where rotary axes turn about a tip that stands; rises for rewinds are
 /// not counted. Infinite where [`super::machining_time`] is.
 ///
+/// # Errors
+/// [`Cancelled`] when the monitor says so.
+///
 /// # Tolerance
 /// A model: stages that accelerate evenly take up to a few percent of a ramp longer than the quickest motion.
 pub fn machining_time_of_axes(
@@ -139,18 +153,24 @@ pub fn machining_time_of_axes(
     machine: &Machine,
     kinematics: &Kinematics,
     joints: &JointPath,
-) -> f64 {
-    let Some(blocks) = profile(path, machine) else { return f64::INFINITY };
+    monitor: &dyn Monitor,
+) -> Result<f64, Cancelled> {
+    let Some(blocks) = profile(path, machine) else { return Ok(f64::INFINITY) };
     let (pieces, standing) = pieces(path, machine, kinematics, joints);
-    standing + Run::new(&pieces, &blocks, machine, &kinematics.axis_limits(machine)).time()
+    let run = Run::new(&pieces, &blocks, machine, &kinematics.axis_limits(machine), monitor)?;
+    Ok(standing + run.time())
 }
 
 /// Time, s, of the moves of an upright tool whose X, Y and Z keep the limits of a machine.
-pub(super) fn time_of_linear(blocks: &[Block], machine: &Machine) -> f64 {
-    linear(blocks, machine).time()
+pub(super) fn time_of_linear(
+    blocks: &[Block],
+    machine: &Machine,
+    monitor: &dyn Monitor,
+) -> Result<f64, Cancelled> {
+    Ok(linear(blocks, machine, monitor)?.time())
 }
 
-fn linear(blocks: &[Block], machine: &Machine) -> Run {
+fn linear(blocks: &[Block], machine: &Machine, monitor: &dyn Monitor) -> Result<Run, Cancelled> {
     let piece = |(k, block): (usize, &Block)| {
         let Block { step, length, direction, .. } = *block;
         let slope = [direction.x, direction.y, direction.z, 0.0, 0.0];
@@ -164,24 +184,32 @@ fn linear(blocks: &[Block], machine: &Machine) -> Run {
         jerks: with_rotary(machine.jerks),
         along: machine.acceleration,
     };
-    Run::new(&pieces, blocks, machine, &axes)
+    Run::new(&pieces, blocks, machine, &axes, monitor)
 }
 
 /// The path with feeds of its cuts and links at which all axes can be run, on the series of [`super::slow_corners`]. No time grows
 /// by them: a move keeps the greatest speed that the machine reaches in it. Rapids, plunges and lifts stay as they are, and so does a
 /// path for which no time can be told.
-pub fn slow_axes(path: &Toolpath, machine: &Machine, on_axes: Option<(&Kinematics, &JointPath)>) -> Toolpath {
+///
+/// # Errors
+/// [`Cancelled`] when the monitor says so.
+pub fn slow_axes(
+    path: &Toolpath,
+    machine: &Machine,
+    on_axes: Option<(&Kinematics, &JointPath)>,
+    monitor: &dyn Monitor,
+) -> Result<Toolpath, Cancelled> {
     let mut path = path.clone();
     // Words that slow down what is short anyway would only be more lines to run.
     let machine = &Machine { block_rate: ANY_RATE, ..*machine };
-    let Some(blocks) = profile(&path, machine) else { return path };
+    let Some(blocks) = profile(&path, machine) else { return Ok(path) };
     let run = match on_axes {
         Some((kinematics, joints)) => {
             let (pieces, _) = pieces(&path, machine, kinematics, joints);
-            Run::new(&pieces, &blocks, machine, &kinematics.axis_limits(machine))
+            Run::new(&pieces, &blocks, machine, &kinematics.axis_limits(machine), monitor)?
         }
-        None if machine.limits_axes() && path.is_upright() => linear(&blocks, machine),
-        None => return path,
+        None if machine.limits_axes() && path.is_upright() => linear(&blocks, machine, monitor)?,
+        None => return Ok(path),
     };
     let peaks = run.peaks(path.len());
     for (step, peak) in path.moves.iter_mut().zip(peaks) {
@@ -191,7 +219,7 @@ pub fn slow_axes(path: &Toolpath, machine: &Machine, on_axes: Option<(&Kinematic
             step.feed_rate = in_series(speed, step.feed_rate);
         }
     }
-    path
+    Ok(path)
 }
 
 /// Time, s, that no motion of the axes from location to location takes longer than, each from rest to rest.
@@ -269,9 +297,20 @@ fn stages(pieces: &[EvenStretch], blocks: &[Block], machine: &Machine, axes: &Ax
         (feed, corner)
     };
     let limits: Vec<(f64, f64)> = pieces.iter().enumerate().map(of).collect();
+    let straight = |k: usize| {
+        let piece = pieces.get(k)?;
+        let corner = |k: usize| limits.get(k).map_or(0.0, |next| next.1);
+        let direction = Vector3::from_column_slice(&piece.slope[..3]);
+        Some(Straight { direction, length: piece.length, corners: [corner(k), corner(k + 1)] })
+    };
+    let arcs = machine.blending == Blending::Arcs;
     let mut stages = Vec::new();
     for (k, piece) in pieces.iter().enumerate() {
         let (feed, corner) = limits[k];
+        let arcs = straight(k).filter(|_| arcs).map(|here| {
+            let before = k.checked_sub(1).and_then(straight);
+            Arcs::new(before.as_ref(), &here, straight(k + 1).as_ref(), machine)
+        });
         let ends =
             [k.checked_sub(1).map(|k| &pieces[k]).zip(Some(piece)), Some(piece).zip(pieces.get(k + 1))];
         let bends = ends.map(|ends| ends.map(|(last, next)| bend(last, next)).unwrap_or_default());
@@ -286,7 +325,12 @@ fn stages(pieces: &[EvenStretch], blocks: &[Block], machine: &Machine, axes: &Ax
             () => Division::Evenly { ramp: 2.0 * RAMP },
         };
         let lengths = division.lengths(piece.length, 0.5 * feed * jerk::ramp(feed, most, jerk));
+        let lengths = match &arcs {
+            Some(arcs) => arcs.divided(lengths),
+            None => lengths,
+        };
         let (last, halves) = (lengths.len() - 1, lengths.len() == 2);
+        let mut begin = 0.0;
         for (k, length) in lengths.into_iter().enumerate() {
             // The bend at a corner reaches half-way into the pieces beside, but behind a sharp one not along those that the machine
             // needs to speed up.
@@ -298,7 +342,13 @@ fn stages(pieces: &[EvenStretch], blocks: &[Block], machine: &Machine, axes: &Ax
                 _ => [[0.0; 5]; 2],
             };
             let most = if k == 0 { corner.min(slower * slower) } else { feed * feed };
-            stages.push(Stage { step: piece.step, length, slope: piece.slope, bends, most, jerk: limited });
+            let free = [f64::INFINITY; 2];
+            let [along, within] =
+                arcs.as_ref().map_or(free, |arcs| arcs.limits(piece.length, [begin, begin + length]));
+            let (along, most) = (along.min(axes.along), most.min(within));
+            let slope = piece.slope;
+            stages.push(Stage { step: piece.step, length, slope, bends, most, along, jerk: limited });
+            begin += length;
         }
     }
     stages
@@ -385,7 +435,7 @@ impl Limits<'_> {
     fn window(&self, k: usize, x: f64, end: f64) -> [f64; 2] {
         let stage = &self.stages[k];
         let twice = 2.0 * stage.length;
-        let mut window = [(-x / twice).max(-self.axes.along), ((end - x) / twice).min(self.axes.along)];
+        let mut window = [(-x / twice).max(-stage.along), ((end - x) / twice).min(stage.along)];
         for (axis, most) in self.axes.accelerations.iter().enumerate() {
             let most = most * (1.0 + ROUNDING);
             let slope = stage.slope[axis];

@@ -112,8 +112,7 @@ pub(super) fn in_series(speed: f64, feed: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::fixture::{machine, path};
-    use super::super::machining_time;
+    use super::super::fixture::{machine, path, seconds};
     use super::*;
     use geometry::Point3;
     use proptest::prelude::*;
@@ -170,7 +169,7 @@ mod tests {
             let least = slow.moves.iter().map(|m| m.feed_rate).fold(f64::INFINITY, f64::min);
             assert!(least >= MACHINE.creep_feed() * (1.0 - 1e-9), "{least} in {way:?}");
             // A zone is as long as braking takes: at its word it lasts no longer than that of the sharpest corner by far.
-            let (before, after) = (machining_time(&path, &MACHINE), machining_time(&slow, &MACHINE));
+            let (before, after) = (seconds(&path, &MACHINE), seconds(&slow, &MACHINE));
             assert!(after < before + 10.0 && after >= before * (1.0 - 1e-9), "{before} {after}");
         }
     }
@@ -194,7 +193,7 @@ mod tests {
             let slow = slow_corners(&path, &MACHINE);
             prop_assert_eq!(slow.len(), path.len());
             prop_assert!(slow.moves.iter().all(|m| m.feed_rate <= rate && m.feed_rate > 0.0));
-            let (before, after) = (machining_time(&path, &MACHINE), machining_time(&slow, &MACHINE));
+            let (before, after) = (seconds(&path, &MACHINE), seconds(&slow, &MACHINE));
             prop_assert!((before / after - 1.0).abs() < 1e-9, "{} {}", before, after);
         }
     }

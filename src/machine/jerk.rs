@@ -8,18 +8,19 @@
 //! it accelerations rise evenly.
 
 use super::axis_limits::{AxisLimits, Stage};
+use work::monitor::{Cancelled, Monitor, check};
 
 /// By how much the times found may lie above the least that the barrier can reach, as a share.
 const GAP: f64 = 2e-3;
 
 /// The same of the convex problem.
-const FIRST_GAP: f64 = 0.02;
+const FIRST_GAP: f64 = 0.3;
 
 /// Promises of steps, as a share of the gap, that end the search for one weight.
 const CENTRED: f64 = 0.05;
 
 /// The weight of the barrier over the one before.
-const WEIGHTS: f64 = 0.15;
+const WEIGHTS: f64 = 0.5;
 
 /// Newton steps for one weight at most.
 const MOST_STEPS: usize = 40;
@@ -53,20 +54,25 @@ pub(super) fn from_rest_to_rest(way: f64, rate: f64, acceleration: f64, jerk: f6
 }
 
 /// The squared speeds at the ends of all stages, lowered to what the jerks of the axes allow.
-pub(super) fn within(stages: &[Stage], mut speeds: Vec<f64>, axes: &AxisLimits) -> Vec<f64> {
+pub(super) fn within(
+    stages: &[Stage],
+    mut speeds: Vec<f64>,
+    axes: &AxisLimits,
+    monitor: &dyn Monitor,
+) -> Result<Vec<f64>, Cancelled> {
     if axes.jerks.iter().all(|most| most.is_infinite()) {
-        return speeds;
+        return Ok(speeds);
     }
     let rests: Vec<usize> = (0..speeds.len()).filter(|&k| speeds[k] <= REST).collect();
     for ends in rests.windows(2) {
         let (from, to) = (ends[0], ends[1]);
         if to - from > 1 {
             let section = Section { stages: &stages[from..to], axes, times: None };
-            let inner = section.quickest(&speeds[from..=to]);
+            let inner = section.quickest(&speeds[from..=to], monitor)?;
             speeds[from..=to].copy_from_slice(&inner);
         }
     }
-    speeds
+    Ok(speeds)
 }
 
 /// Stages from rest to rest. Speeds at all their ends are zero at both.
@@ -94,30 +100,33 @@ struct Barrier {
 impl Section<'_> {
     /// The quickest speeds. With the times between accelerations as they would be without jerk, the shortest, the problem is
     /// convex; from its solution the search goes on with the times as they are.
-    fn quickest(&self, highest: &[f64]) -> Vec<f64> {
+    fn quickest(&self, highest: &[f64], monitor: &dyn Monitor) -> Result<Vec<f64>, Cancelled> {
         let times = self.stages.iter().zip(highest.windows(2)).map(|(stage, x)| stage.time([x[0], x[1]]));
         let convex = Self { times: Some(times.collect()), ..*self };
         let mut x = convex.inside(highest);
-        convex.descend(&mut x, FIRST_GAP);
-        self.descend(&mut x, GAP);
-        x
+        convex.descend(&mut x, FIRST_GAP, monitor)?;
+        // Speeds above the highest, which some bends allow, take shorter times than those.
+        let mut x = self.inside(&x);
+        self.descend(&mut x, GAP, monitor)?;
+        Ok(x)
     }
 
     /// Goes down until no more than a share of the time can be gained.
-    fn descend(&self, x: &mut [f64], gap: f64) {
+    fn descend(&self, x: &mut [f64], gap: f64, monitor: &dyn Monitor) -> Result<(), Cancelled> {
         let mut limits = 0usize;
-        self.slacks(x, &mut |_| limits += 1);
+        self.slacks(x, |_| limits += 1);
         let mut weight = self.time(x) / limits as f64;
         loop {
             // What a step promises less than that is a small share of what the weight itself keeps away from the least time.
             let little = CENTRED * weight * limits as f64;
             for _ in 0..MOST_STEPS {
+                check(monitor)?;
                 if self.step(x, weight) < little {
                     break;
                 }
             }
             if weight * limits as f64 <= gap * self.time(x) {
-                return;
+                return Ok(());
             }
             weight *= WEIGHTS;
         }
@@ -129,7 +138,7 @@ impl Section<'_> {
         loop {
             let x: Vec<f64> = highest.iter().map(|x| x / (slower * slower)).collect();
             let mut inside = true;
-            self.slacks(&x, &mut |slack| inside &= slack.left > 0.0);
+            self.slacks(&x, |slack| inside &= slack.left > 0.0);
             if inside || slower > 1e9 {
                 return x;
             }
@@ -141,9 +150,10 @@ impl Section<'_> {
         self.stages.iter().zip(x.windows(2)).map(|(stage, ends)| stage.time([ends[0], ends[1]])).sum()
     }
 
-    /// All limits, each as a share of itself.
-    fn slacks(&self, x: &[f64], take: &mut dyn FnMut(&Slack)) {
-        let AxisLimits { accelerations, jerks, along, .. } = self.axes;
+    /// All limits: what is left of each, as a share of itself, or s of jerks.
+    fn slacks(&self, x: &[f64], mut take: impl FnMut(&Slack)) {
+        let AxisLimits { accelerations, jerks, .. } = self.axes;
+        let limited: Vec<usize> = (0..5).filter(|&axis| jerks[axis].is_finite()).collect();
         // Acceleration in the middle of the stage before, and its derivatives by the speeds at its ends, of each axis.
         let mut before = [[0.0; 3]; 5];
         let mut time_before = [0.0; 3];
@@ -158,16 +168,12 @@ impl Section<'_> {
             }
             let steep = 0.5 / stage.length;
             let mut both = |value: f64, slope: [f64; 2], most: f64| {
-                for side in [1.0, -1.0] {
-                    let slope = slope.map(|slope| -side * slope / most);
-                    take(&Slack {
-                        left: 1.0 - side * value / most,
-                        first: k,
-                        slope: [slope[0], slope[1], 0.0],
-                    });
+                for side in [1.0 / most, -1.0 / most] {
+                    let slope = [-side * slope[0], -side * slope[1], 0.0];
+                    take(&Slack { left: 1.0 - side * value, first: k, slope });
                 }
             };
-            both((end - begin) * steep, [-steep, steep], *along);
+            both((end - begin) * steep, [-steep, steep], stage.along);
             let time = match &self.times {
                 Some(times) => [times[k], 0.0, 0.0],
                 None => stage_time(stage, begin, end),
@@ -182,10 +188,13 @@ impl Section<'_> {
             for axis in 0..5 {
                 let along = stage.slope[axis] * steep;
                 let [from, to] = stage.bends.map(|bend| bend[axis]);
-                if accelerations[axis].is_finite() {
+                let rests = along == 0.0 && from == 0.0 && to == 0.0;
+                if accelerations[axis].is_finite() && !rests {
                     let most = accelerations[axis];
                     both(from * begin + along * (end - begin), [from - along, along], most);
-                    both(to * end + along * (end - begin), [-along, to + along], most);
+                    if from != 0.0 || to != 0.0 {
+                        both(to * end + along * (end - begin), [-along, to + along], most);
+                    }
                 }
                 let by = [shares[0] * from - along, along + shares[1] * to];
                 now[axis] = [by[0] * begin + by[1] * end, by[0], by[1]];
@@ -194,7 +203,7 @@ impl Section<'_> {
             let (first, last) = (k == 0, k + 1 == self.stages.len());
             let [half, whole] = [0.5, 1.0].map(|share| time.map(|time| share * time));
             let none = [0.0; 3];
-            for axis in (0..5).filter(|&axis| jerks[axis].is_finite()) {
+            for &axis in &limited {
                 let ([a, da, db], [b, db2, dc]) = (before[axis], now[axis]);
                 let after = if first {
                     whole
@@ -203,9 +212,12 @@ impl Section<'_> {
                 } else {
                     half
                 };
-                jerk_slacks(jerks[axis], b - a, [-da, db2 - db, dc], time_before, after, k, take);
-                if last {
-                    jerk_slacks(jerks[axis], -b, [-db2, -dc, 0.0], whole, none, k + 1, take);
+                if [da, db, db2, dc] != [0.0; 4] {
+                    let slope = [-da, db2 - db, dc];
+                    jerk_slacks(jerks[axis], b - a, slope, [time_before, after], k, &mut take);
+                }
+                if last && [db2, dc] != [0.0; 2] {
+                    jerk_slacks(jerks[axis], -b, [-db2, -dc, 0.0], [whole, none], k + 1, &mut take);
                 }
             }
             (before, time_before) = (now, if first { none } else { half });
@@ -221,7 +233,7 @@ impl Section<'_> {
             return None;
         }
         let (mut product, mut logs, mut inside) = (1.0f64, 0.0, true);
-        self.slacks(x, &mut |slack| {
+        self.slacks(x, |slack| {
             inside &= slack.left > 0.0;
             product *= slack.left;
             if !(1e-200..1e200).contains(&product) {
@@ -231,13 +243,14 @@ impl Section<'_> {
             if !derived {
                 return;
             }
-            let share = weight / slack.left;
+            let over = 1.0 / slack.left;
+            let share = weight * over;
             for i in 0..3 {
                 let (row, slope) = (slack.first + i, slack.slope[i]);
                 if slope != 0.0 && row < size {
                     all.gradient[row] -= share * slope;
                     for j in 0..=i {
-                        all.hessian[row][i - j] += share / slack.left * slope * slack.slope[j];
+                        all.hessian[row][i - j] += share * over * slope * slack.slope[j];
                     }
                 }
             }
@@ -308,17 +321,16 @@ fn jerk_slacks(
     jerk: f64,
     change: f64,
     slope: [f64; 3],
-    before: [f64; 3],
-    after: [f64; 3],
+    [before, after]: [[f64; 3]; 2],
     at: usize,
-    take: &mut dyn FnMut(&Slack),
+    take: &mut impl FnMut(&Slack),
 ) {
-    let most = jerk * (before[0] + after[0]);
-    let of_time = [before[1], before[2] + after[1], after[2]].map(|by| jerk * by);
-    for side in [1.0, -1.0] {
-        // 1 − side·change/most
-        let by: [f64; 3] = std::array::from_fn(|i| -side * (slope[i] - change / most * of_time[i]) / most);
-        let left = 1.0 - side * change / most;
+    let time = before[0] + after[0];
+    let of_time = [before[1], before[2] + after[1], after[2]];
+    for side in [1.0 / jerk, -1.0 / jerk] {
+        // The time that is spare: convex as the time is.
+        let by: [f64; 3] = std::array::from_fn(|i| of_time[i] - side * slope[i]);
+        let left = time - side * change;
         // At the first end there is nothing before.
         let (first, slope) = if at == 0 { (0, [by[1], by[2], 0.0]) } else { (at - 1, by) };
         take(&Slack { left, first, slope });

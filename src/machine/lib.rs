@@ -5,13 +5,17 @@
 //! in rad.
 
 mod axis_limits;
+mod blending;
 mod feeds;
 mod jerk;
 pub mod kinematics;
+mod merge;
 mod time;
 
 pub use axis_limits::{axes_at_most, machining_time_of_axes, slow_axes};
+pub use blending::Blending;
 pub use feeds::slow_corners;
+pub use merge::{Straying, merge_short_moves};
 pub use time::{at_most, machining_time};
 
 /// Limits of the machine's motion.
@@ -33,6 +37,8 @@ pub struct Machine {
     pub accelerations: [f64; 3],
     /// Jerks of X, Y and Z of upright tools, mm/s³; infinite ones limit nothing.
     pub jerks: [f64; 3],
+    /// How acceleration is shared where corners are rounded; of upright tools.
+    pub blending: Blending,
     /// Whether programs have the feeds at which corners and bends can be run.
     pub slow_corners: bool,
 }
@@ -51,6 +57,7 @@ impl Default for Machine {
             rates: [f64::INFINITY; 3],
             accelerations: [f64::INFINITY; 3],
             jerks: [f64::INFINITY; 3],
+            blending: Blending::Full,
             slow_corners: true,
         }
     }
@@ -75,9 +82,10 @@ impl Machine {
         60.0 * (2.0 * self.acceleration * self.junction_deviation).sqrt()
     }
 
-    /// Whether X, Y and Z of upright tools have limits of their own besides rates.
+    /// Whether upright tools have limits besides rates and the acceleration along and across the path.
     pub(crate) fn limits_axes(&self) -> bool {
-        self.accelerations.iter().chain(&self.jerks).any(|most| most.is_finite())
+        self.blending == Blending::Arcs
+            || self.accelerations.iter().chain(&self.jerks).any(|most| most.is_finite())
     }
 
     /// Refuses limits with which no time could be told.
@@ -136,7 +144,7 @@ mod tests {
 /// What both are tested with.
 #[cfg(test)]
 mod fixture {
-    use super::Machine;
+    use super::{Blending, Machine};
     use geometry::Point3;
     use motion::{ClPoint, Move, MoveKind, Toolpath};
 
@@ -150,8 +158,14 @@ mod fixture {
             rates: [f64::INFINITY; 3],
             accelerations: [f64::INFINITY; 3],
             jerks: [f64::INFINITY; 3],
+            blending: Blending::Full,
             slow_corners: true,
         }
+    }
+
+    /// The time of a path that nothing interrupts.
+    pub fn seconds(path: &Toolpath, machine: &Machine) -> f64 {
+        super::machining_time(path, machine, &work::monitor::Silent).unwrap()
     }
 
     /// Cuts at 6000 mm/min = 100 mm/s, which takes 5 mm and 0.1 s to reach.

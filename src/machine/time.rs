@@ -14,6 +14,8 @@
 //!   a 24th of jump times the square of that time, which must stay within the junction deviation.
 //!   Curvature at a corner is β over half of both moves' lengths.
 //!
+//! Where the control rounds corners by arcs, a at a corner is a share of the acceleration ([`super::blending`]).
+//!
 //! A move lasts at least as long as the control takes for a line of the program.
 //!
 //! What single axes need besides is in [`super::axis_limits`]: those of upright tools where the machine has accelerations or jerks
@@ -28,6 +30,7 @@ use super::axis_limits::time_of_linear;
 use super::jerk;
 use geometry::Vector3;
 use motion::{Move, MoveKind, Toolpath};
+use work::monitor::{Cancelled, Monitor};
 
 pub(super) const SECONDS_PER_MINUTE: f64 = 60.0;
 
@@ -63,14 +66,17 @@ impl Block {
 /// Time for the whole path, s. Moves of no length, or of no more than a millionth of a micrometre, take none. Infinite when a move has no positive feed
 /// or `machine` fails its [`Machine::check`].
 ///
+/// # Errors
+/// [`Cancelled`] when the monitor says so, which only limits of jerk make necessary.
+///
 /// # Tolerance
 /// A model of the machine (see the module), computed to f64 rounding.
-pub fn machining_time(path: &Toolpath, machine: &Machine) -> f64 {
-    let Some(blocks) = profile(path, machine) else { return f64::INFINITY };
+pub fn machining_time(path: &Toolpath, machine: &Machine, monitor: &dyn Monitor) -> Result<f64, Cancelled> {
+    let Some(blocks) = profile(path, machine) else { return Ok(f64::INFINITY) };
     if machine.limits_axes() && path.is_upright() {
-        return time_of_linear(&blocks, machine);
+        return time_of_linear(&blocks, machine, monitor);
     }
-    blocks.iter().map(|block| block_time(block, machine.acceleration)).sum()
+    Ok(blocks.iter().map(|block| block_time(block, machine.acceleration)).sum())
 }
 
 /// Time, s, that no path takes longer than, whose feeds lie between `slowest` and `fastest`, mm/min: from rest to rest each
@@ -167,7 +173,7 @@ fn corner_speed_squared(last: &Block, next: &Block, machine: &Machine) -> f64 {
     let rounded = machine.junction_deviation * cos_half / (2.0 * sin_quarter * sin_quarter);
     let fitting = 0.5 * last.length.min(next.length) * cos_half / sin_half;
     let feed = last.feed.min(next.feed);
-    (machine.acceleration * rounded.min(fitting).max(0.0)).min(feed * feed)
+    (machine.across(&last.direction, &next.direction) * rounded.min(fitting).max(0.0)).min(feed * feed)
 }
 
 /// Time for one move from its entry to its exit speed: up to the feed or to where braking must begin,
@@ -183,14 +189,14 @@ fn block_time(block: &Block, acceleration: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::fixture::{machine, path};
+    use super::super::fixture::{machine, path, seconds};
     use super::*;
     use approx::assert_relative_eq;
 
     const MACHINE: Machine = machine(1e12);
 
     fn time(tips: impl IntoIterator<Item = [f64; 3]>) -> f64 {
-        machining_time(&path(tips), &MACHINE)
+        seconds(&path(tips), &MACHINE)
     }
 
     #[test]
@@ -202,7 +208,7 @@ mod tests {
         let mut rapid = path([[0.0; 3], [100.0, 0.0, 0.0]]);
         rapid.moves[0].kind = MoveKind::Rapid;
         // 200 mm/s: 0.2 s and 20 mm each for up and down, 60 mm level.
-        assert_relative_eq!(machining_time(&rapid, &MACHINE), 0.7, epsilon = 1e-12);
+        assert_relative_eq!(seconds(&rapid, &MACHINE), 0.7, epsilon = 1e-12);
     }
 
     #[test]
@@ -214,11 +220,11 @@ mod tests {
         assert_relative_eq!(time(speck), 1.1, epsilon = 1e-12);
         let mut standing = path([[0.0; 3], [1.0, 0.0, 0.0]]);
         standing.moves[0].feed_rate = 0.0;
-        assert_eq!(machining_time(&standing, &MACHINE), f64::INFINITY);
+        assert_eq!(seconds(&standing, &MACHINE), f64::INFINITY);
         standing.moves[0].feed_rate = f64::NAN;
-        assert_eq!(machining_time(&standing, &MACHINE), f64::INFINITY);
+        assert_eq!(seconds(&standing, &MACHINE), f64::INFINITY);
         let still = Machine { acceleration: 0.0, ..MACHINE };
-        assert_eq!(machining_time(&path([[0.0; 3], [1.0; 3]]), &still), f64::INFINITY);
+        assert_eq!(seconds(&path([[0.0; 3], [1.0; 3]]), &still), f64::INFINITY);
     }
 
     #[test]
@@ -248,13 +254,9 @@ mod tests {
         // 100 mm in pieces of 0.05 mm: at 1000 lines a second no faster than 50 mm/s.
         let pieces = (0..=2000).map(|k| [0.05 * f64::from(k), 0.0, 0.0]);
         let slow = Machine { block_rate: 1000.0, ..MACHINE };
-        let got = machining_time(&path(pieces), &slow);
+        let got = seconds(&path(pieces), &slow);
         assert_relative_eq!(got, 100.0 / 50.0 + 50.0 / 1000.0, max_relative = 1e-9);
-        assert_relative_eq!(
-            machining_time(&path([[0.0; 3], [100.0, 0.0, 0.0]]), &slow),
-            1.1,
-            epsilon = 1e-12
-        );
+        assert_relative_eq!(seconds(&path([[0.0; 3], [100.0, 0.0, 0.0]]), &slow), 1.1, epsilon = 1e-12);
     }
 
     #[test]
@@ -262,10 +264,10 @@ mod tests {
         let line = path([[0.0; 3], [60.0, 80.0, 0.0]]);
         // Y at 50 mm/s: 62.5 mm/s along the line.
         let slow = Machine { rates: [f64::INFINITY, 3000.0, 1.0], ..MACHINE };
-        assert_relative_eq!(machining_time(&line, &slow), 100.0 / 62.5 + 0.0625, max_relative = 1e-9);
+        assert_relative_eq!(seconds(&line, &slow), 100.0 / 62.5 + 0.0625, max_relative = 1e-9);
         let words = super::super::slow_corners(&line, &slow);
         assert!(words.moves.iter().all(|step| 0.8 * step.feed_rate <= 3000.0 * (1.0 + 1e-9)));
-        assert!(machining_time(&line, &slow) <= at_most(&line, &slow, [6000.0, 6000.0]));
+        assert!(seconds(&line, &slow) <= at_most(&line, &slow, [6000.0, 6000.0]));
     }
 
     #[test]
@@ -299,10 +301,10 @@ mod tests {
             step.kind = if k % 10 == 0 { MoveKind::Rapid } else { MoveKind::Cut };
         }
         let most = at_most(&zigzag, &MACHINE, [100.0, 12_000.0]);
-        assert!(machining_time(&zigzag, &MACHINE) < most);
+        assert!(seconds(&zigzag, &MACHINE) < most);
         // One long move at the lowest feed takes nearly that.
         let long = path([[0.0; 3], [1000.0, 0.0, 0.0]]);
-        assert_relative_eq!(at_most(&long, &MACHINE, [6000.0, 6000.0]), machining_time(&long, &MACHINE));
+        assert_relative_eq!(at_most(&long, &MACHINE, [6000.0, 6000.0]), seconds(&long, &MACHINE));
     }
 
     #[test]

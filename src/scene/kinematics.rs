@@ -31,7 +31,7 @@ const ACCELERATION: std::ops::RangeInclusive<f64> = 1.0..=1e6;
 const JERK: std::ops::RangeInclusive<f64> = 1.0..=1e8;
 
 /// Coordinates of machines, mm.
-const PLACE: std::ops::RangeInclusive<f64> = -99_999.0..=99_999.0;
+pub(super) const PLACE: std::ops::RangeInclusive<f64> = -99_999.0..=99_999.0;
 
 /// rad/s of a degree a minute.
 const DEGREE_A_MINUTE: f64 = std::f64::consts::PI / 180.0 / 60.0;
@@ -58,6 +58,8 @@ pub struct FiveAxis {
     pub post: Style,
     /// Whether the scene says where the workpiece's zero is; else it is taken to be the machine's.
     pub zero_is_given: bool,
+    /// Whether the scene has the length from the spindle nose to the tip; else it is a usual one.
+    pub gauge_is_given: bool,
     /// Directions of the rotary axes as the scene has them, of any length.
     directions: [Vector3; 2],
 }
@@ -88,6 +90,7 @@ pub(super) fn read(machine: &Section<'_>, limits: &Machine) -> Result<Option<Fiv
                 kinematics: linear(rapid, even, limits.jerks)(kinematics),
                 post: Style::Tcp,
                 zero_is_given: false,
+                gauge_is_given: false,
                 directions: axes.map(|axis| axis.direction),
             })
         });
@@ -136,6 +139,7 @@ pub(super) fn read(machine: &Section<'_>, limits: &Machine) -> Result<Option<Fiv
     }
     let travel = ["x", "y", "z"].map(|key| table.interval(key, PLACE, " mm"));
     let [x, y, z] = travel;
+    let gauge_is_given = gauge_length.is_some();
     let kinematics = Kinematics::new(
         first,
         second,
@@ -150,8 +154,25 @@ pub(super) fn read(machine: &Section<'_>, limits: &Machine) -> Result<Option<Fiv
         kinematics: linear(rates, accelerations, jerks)(kinematics),
         post,
         zero_is_given: workpiece_zero.is_some(),
+        gauge_is_given,
         directions: [first, second].map(|axis| axis.direction),
     }))
+}
+
+/// Refuses a machine for which it is not known how high its spindle nose has to be to stand over the work: no program for it could
+/// begin or end safely.
+pub(super) fn known_height(machine: &Section<'_>, five_axis: Option<&FiveAxis>) -> Result<(), SceneError> {
+    let Some(FiveAxis { zero_is_given, gauge_is_given, .. }) = five_axis else { return Ok(()) };
+    let keys =
+        [("gauge_length", gauge_is_given, "150.0"), ("workpiece_zero", zero_is_given, "[0.0, 0.0, -300.0]")];
+    let Some((key, _, example)) = keys.into_iter().find(|(_, given, _)| !*given) else { return Ok(()) };
+    let message =
+        format!("without `{key}` no height is known at which programs can begin and end free of the work");
+    let cure = match machine.inline(KEY) {
+        Some(_) => format!("add `{key} = {example}`"),
+        None => "write it as a table: `kinematics = { preset = \"ac-table\", gauge_length = 150.0, workpiece_zero = [0.0, 0.0, -300.0] }`".to_owned(),
+    };
+    Err(machine.error(&machine.key_span(KEY), message, cure))
 }
 
 /// A refusal of the machine at the axis that it is about.
@@ -238,7 +259,7 @@ fn read_axis(table: &Section<'_>, key: &str, named: Option<RotaryAxis>) -> Resul
 }
 
 /// Three coordinates that a machine can have.
-fn place(section: &Section<'_>, key: &str) -> Result<Option<Located<[f64; 3]>>, SceneError> {
+pub(super) fn place(section: &Section<'_>, key: &str) -> Result<Option<Located<[f64; 3]>>, SceneError> {
     let Some(place) = section.vector(key)? else { return Ok(None) };
     if place.value.iter().all(|c| PLACE.contains(c)) {
         return Ok(Some(place));
@@ -280,7 +301,7 @@ fn of_linear(
 
 /// Writes the machine as scenes spell it, after all other keys of `[machine]`.
 pub(super) fn write(out: &mut String, five_axis: Option<&FiveAxis>) -> fmt::Result {
-    let Some(FiveAxis { kinematics, post, zero_is_given, directions }) = five_axis else {
+    let Some(FiveAxis { kinematics, post, zero_is_given, gauge_is_given, directions }) = five_axis else {
         return writeln!(out, "{KEY} = {}  # three axes", text(NONE));
     };
     writeln!(out, "\n[machine.{KEY}]  # mm, degrees")?;
@@ -307,7 +328,12 @@ pub(super) fn write(out: &mut String, five_axis: Option<&FiveAxis>) -> fmt::Resu
             number(axis.acceleration.to_degrees()),
         )?;
     }
-    writeln!(out, "gauge_length = {}  # spindle nose to tip", number(kinematics.gauge_length()))?;
+    let length = number(kinematics.gauge_length());
+    if *gauge_is_given {
+        writeln!(out, "gauge_length = {length}  # spindle nose to tip")?;
+    } else {
+        writeln!(out, "# gauge_length is not given: it is taken to be {length}")?;
+    }
     let zero = list(kinematics.workpiece_zero().coords.as_slice());
     if *zero_is_given {
         writeln!(out, "workpiece_zero = {zero}  # in machine coordinates, table at zero")?;
@@ -334,8 +360,9 @@ mod tests {
     use super::*;
     use crate::{Scene, SceneText, complete_toml};
 
+    /// No program is planned for the machine, so that not all of it has to be known.
     const SCENE: &str = "[part]\nsurface = \"plane\"\nx = [0, 9]\ny = [0, 9]\n[cutter]\nshape = \"ball\"\n\
-                         diameter = 6\n[[toolpath]]\nstrategy = \"zigzag\"\n[machine]\n";
+                         diameter = 6\n[[toolpath]]\nstrategy = \"program\"\nfile = \"a.nc\"\n[machine]\n";
 
     fn parse(machine: &str) -> Result<Scene, SceneError> {
         Scene::parse("plane.toml", format!("{SCENE}{machine}"))
@@ -408,6 +435,28 @@ mod tests {
             let again =
                 Scene::parse("plane.toml", complete.clone()).unwrap_or_else(|e| panic!("{e}\n{complete}"));
             assert_eq!(complete_toml(&again), complete);
+        }
+    }
+
+    #[test]
+    fn programs_need_a_height_that_is_known_to_be_free() {
+        let planned = SCENE.replace("program\"\nfile = \"a.nc", "zigzag");
+        let refused = |machine: &str| match Scene::parse("plane.toml", format!("{planned}{machine}")) {
+            Err(SceneError::Invalid(found)) => {
+                assert!(found.message.contains("free of the work"), "{}", found.message);
+                (found.message.clone(), found.cure.clone())
+            }
+            other => panic!("{machine}: {other:?}"),
+        };
+        let (_, cure) = refused("kinematics = \"ac-table\"");
+        let table = cure.split('`').nth(1).unwrap();
+        assert!(Scene::parse("plane.toml", format!("{planned}{table}")).is_ok(), "{table}");
+        for missing in ["gauge_length", "workpiece_zero"] {
+            let given = ["gauge_length = 90", "workpiece_zero = [1, 2, 3]"].into_iter();
+            let given: Vec<&str> = given.filter(|key| !key.contains(missing)).collect();
+            let (message, cure) =
+                refused(&format!("kinematics = {{ preset = \"bc-head\", {} }}", given.join(", ")));
+            assert!(message.contains(missing) && cure.contains(missing), "{message} {cure}");
         }
     }
 

@@ -5,6 +5,7 @@
 //! every refusal can point at the very key or value: tagged enums of serde only know the table.
 
 mod axis;
+mod bodies;
 mod compare;
 mod direction;
 mod foreign;
@@ -20,6 +21,7 @@ mod tests;
 mod write;
 
 pub use axis::AxisRequest;
+pub use bodies::{BodyShape, MachineBodies, MachineBody};
 pub use compare::EqualTime;
 pub use interference::{Fixture, KeepClear};
 pub use keys::{Finding, SceneError, SceneText, printable, printable_lines};
@@ -118,6 +120,11 @@ impl ToolpathRequest {
         self.strategy.downcast_ref::<ForeignProgram>().and_then(|program| program.read.as_deref())
     }
 
+    /// Whether it is a program from elsewhere, read or not.
+    pub(crate) fn is_foreign(&self) -> bool {
+        self.strategy.downcast_ref::<ForeignProgram>().is_some()
+    }
+
     /// The strategy's name as scenes spell it.
     pub fn strategy_name(&self) -> &'static str {
         self.strategy.word()
@@ -157,6 +164,8 @@ pub struct Scene {
     pub five_axis: Option<FiveAxis>,
     /// How near arcs of programs stay to the moves that they stand for, mm; `None` writes moves alone.
     pub arcs: Option<f64>,
+    /// Its own bodies; `None` where the scene has none.
+    pub bodies: Option<MachineBodies>,
     /// Height of rapid moves above stock, mm.
     pub clearance: f64,
     /// What tilted tools keep away from.

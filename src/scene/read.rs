@@ -7,11 +7,11 @@ use super::{
     DEFAULT_PLUNGE_RATE, DEFAULT_REMOVAL, DEFAULT_SPINDLE_SPEED, EngineChoice, NamedFile, PartSource, Scene,
     Simulation, ToolpathRequest, auto_cell, default_error_bound,
 };
-use super::{axis, compare, direction, foreign, interference, kinematics, part, stock};
+use super::{axis, bodies, compare, direction, foreign, interference, kinematics, part, stock};
 use cutter::{Cutter, Holder, HolderSection};
 use io::regular;
 use keys::{Located, SceneError, SceneText, Section, printable};
-use machine::Machine;
+use machine::{Blending, Machine};
 use metrology::{Limits, ScallopRule};
 use toolpath::{Joining, Links, PartKind, Step, read_pocket_step, read_strategy, words_for};
 
@@ -26,6 +26,9 @@ const BLOCK_RATE: std::ops::RangeInclusive<f64> = 1.0..=1e6;
 
 /// Jerks that make sense, mm/s³.
 const JERK: std::ops::RangeInclusive<f64> = 1.0..=1e12;
+
+/// How controls share acceleration at corners.
+pub(super) const BLENDINGS: [(&str, Blending); 2] = [("full", Blending::Full), ("arcs", Blending::Arcs)];
 
 impl Scene {
     /// Reads and checks a scene file. Files that it names are looked for beside it.
@@ -117,7 +120,15 @@ impl Scene {
         let (machine, clearance) = read_machine(&section)?;
         let five_axis = kinematics::read(&section, &machine)?;
         let arcs = read_arcs(&section, five_axis.is_some(), &tolerance)?;
+        if five_axis.is_some() && section.has("blending") {
+            let message = "`blending` does not apply to machines with rotary axes";
+            return Err(section.error(&section.key_span("blending"), message, "delete it"));
+        }
+        let bodies = bodies::read(&section, five_axis.as_ref())?;
         let toolpaths = read_toolpaths(&root, &folder, &tolerance, correct, &cutter, &minutes)?;
+        if toolpaths.iter().any(|request| !request.is_foreign()) {
+            kinematics::known_height(&section, five_axis.as_ref())?;
+        }
         check_pocket_strategies(&root, &part, &toolpaths)?;
         if simulation.cell_is_auto {
             simulation.cell = auto_cell(&cutter, &toolpaths);
@@ -138,6 +149,7 @@ impl Scene {
             machine,
             five_axis,
             arcs,
+            bodies,
             clearance,
             keep_clear,
             toolpaths,
@@ -336,6 +348,7 @@ fn read_arcs(section: &Section<'_>, five_axis: bool, tolerance: &Limits) -> Resu
 }
 
 fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
+    let bodies = bodies::KEYS;
     section.only(
         &[
             "rapid_rate",
@@ -346,10 +359,14 @@ fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
             "rates",
             "accelerations",
             "jerks",
+            "blending",
             "slow_corners",
             "clearance",
             ARCS,
             kinematics::KEY,
+            bodies[0],
+            bodies[1],
+            bodies[2],
         ],
         &[],
         "[machine]",
@@ -357,6 +374,7 @@ fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
     let default = Machine::default();
     let number =
         |key, default| Ok::<f64, SceneError>(section.number(key, RATE, "")?.map_or(default, |v| v.value));
+    let blending = section.choice("blending", &BLENDINGS)?;
     let machine = Machine {
         rapid_rate: number("rapid_rate", default.rapid_rate)?,
         acceleration: number("acceleration", default.acceleration)?,
@@ -370,6 +388,7 @@ fn read_machine(section: &Section<'_>) -> Result<(Machine, f64), SceneError> {
         rates: kinematics::rates(section)?.unwrap_or(default.rates),
         accelerations: kinematics::accelerations(section)?.unwrap_or(default.accelerations),
         jerks: kinematics::jerks(section)?.unwrap_or(default.jerks),
+        blending,
         slow_corners: section.flag("slow_corners")?.unwrap_or(default.slow_corners),
     };
     Ok((machine, section.length("clearance")?.map_or(DEFAULT_CLEARANCE, |v| v.value)))

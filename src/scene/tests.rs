@@ -163,12 +163,24 @@ fn the_complete_scene_reads_back_as_itself() {
     let held = with("[tolerance]", &format!("[holder]\ncutting_length = 9.5\n{sections}\n[tolerance]"));
     let roughed =
         with("[tolerance]", "[stock]\nroughed = 0.25\n[simulation]\nengine = \"voxel\"\n[tolerance]");
+    let blended = with("[tolerance]", "[machine]\nblending = \"arcs\"\n[tolerance]");
     let stock = |keys: &str| with("[tolerance]", &format!("[stock]\n{keys}\n[tolerance]"));
     let block = stock("corners = [[1, 2, 3], [-40, 20, -5]]");
     let bar = stock("diameter = 40\nlength = 60\nfrom = [-30, 0, -10]\naxis = \"x\"");
     let casting = stock("file = \"casting.stl\"\nunit = \"inch\"");
-    let all =
-        all.chain([VALID.to_owned(), taper, tangent, barrel, drill, held, roughed, block, bar, casting]);
+    let all = all.chain([
+        VALID.to_owned(),
+        taper,
+        tangent,
+        barrel,
+        drill,
+        held,
+        roughed,
+        blended,
+        block,
+        bar,
+        casting,
+    ]);
     for text in all {
         let first = Scene::parse("wave.toml", text).unwrap();
         let complete = complete_toml(&first);
@@ -663,4 +675,17 @@ fn equal_times_make_a_toolpath_for_each_and_are_written_once() {
         let SceneError::Invalid(finding) = refused else { panic!("{compare} {more}") };
         assert!(finding.message.contains(words), "{compare} {more}: {}", finding.message);
     }
+}
+
+#[test]
+fn how_corners_are_blended_is_read_where_it_acts() {
+    let of = |machine: &str| {
+        Scene::parse("wave.toml", with("[tolerance]", &format!("[machine]\n{machine}\n[tolerance]")))
+    };
+    assert_eq!(of("blending = \"arcs\"").unwrap().machine.blending, machine::Blending::Arcs);
+    assert_eq!(of("kinematics = \"none\"").unwrap().machine.blending, machine::Blending::Full);
+    let refused = |machine: &str| of(machine).unwrap_err().to_string();
+    assert!(refused("blending = \"arc\"").contains("cannot be"), "{}", refused("blending = \"arc\""));
+    let five = "blending = \"arcs\"\nkinematics = { preset = \"ac-table\", gauge_length = 9, workpiece_zero = [0, 0, 0] }";
+    assert!(refused(five).contains("rotary axes"), "{}", refused(five));
 }

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::read::PREVIOUS_STOCK;
-use super::{Scene, ToolpathRequest, axis, compare, interference, kinematics, part, stock};
+use super::read::{BLENDINGS, PREVIOUS_STOCK};
+use super::{Scene, ToolpathRequest, axis, bodies, compare, interference, kinematics, part, stock};
 use keys::{toml_number as number, toml_string as text};
 use toolpath::{Links, PartKind, Step, longest_link};
 
@@ -67,12 +67,19 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
             writeln!(out, "{key} = [{x}, {y}, {z}]  # {unit} of X, Y and Z")?;
         }
     }
+    if scene.five_axis.is_none() {
+        let word =
+            BLENDINGS.iter().find(|(_, other)| *other == scene.machine.blending).map_or("", |(word, _)| word);
+        writeln!(out, "blending = {}  # how acceleration is shared where corners are rounded", text(word))?;
+    }
     writeln!(out, "slow_corners = {}  # feeds of sharp bends in the program", scene.machine.slow_corners)?;
     writeln!(out, "clearance = {}  # mm of rapid moves above stock", number(scene.clearance))?;
     if let Some(arcs) = scene.arcs {
         writeln!(out, "arcs = {}  # mm, G2 and G3 where they stay so near to the moves", number(arcs))?;
     }
+    bodies::write_places(out, scene)?;
     kinematics::write(out, scene.five_axis.as_ref())?;
+    bodies::write(out, scene)?;
     if !scene.keep_clear.fixtures.is_empty() || scene.toolpaths.iter().any(|request| request.axis.is_some()) {
         interference::write(out, &scene.keep_clear)?;
     }

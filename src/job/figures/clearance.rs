@@ -1,5 +1,5 @@
 //! How near the tool comes to what it must not touch: shank and holder to the part, to fixtures and to the stock that stands
-//! when they pass; the cutter to fixtures, and on rapid moves to the part.
+//! when they pass; the cutter to fixtures, and on rapid moves to the part; the bodies of the machine ([`bodies`]).
 //!
 //! The finished path is looked at, whatever its planner thought of it. How deep an upright cutter cuts into the part, gouges
 //! tell.
@@ -18,6 +18,8 @@ use super::words::{more_moves, value};
 use crate::JobError;
 use crate::run::{Finding, Run};
 use crate::tool::{Tool, ToolMoves};
+
+mod bodies;
 
 /// Differences of distances that the search along moves leaves open, mm.
 const RESOLUTION: f64 = 2e-5;
@@ -52,8 +54,8 @@ const MEANING: (&str, &str) = (
 /// How near two bodies come on a path.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PairClearance {
-    /// Which part of the tool.
-    pub tool: &'static str,
+    /// Which part of the tool, or which body of the machine.
+    pub tool: String,
     /// What it must not touch.
     pub other: String,
     /// The least signed distance; below zero they collide, at least so deep. Null where nothing is near enough to count.
@@ -76,6 +78,9 @@ pub struct PairClearance {
     /// They may come so near to each other, and no nearer.
     #[serde(skip)]
     needed: f64,
+    /// Where they collide, they may be less deep than found by so much.
+    #[serde(skip)]
+    off: f64,
     /// What else is to be said where they collide.
     #[serde(skip)]
     more: String,
@@ -93,6 +98,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
         pairs.extend(with_meshes(run, tool, monitor)?);
     }
     let kept_away = kept_away(run, &pairs);
+    let unchecked = bodies::find(run, &mut pairs, monitor)?;
     // What the tools before cut, as each comes.
     let mut before = run.before();
     for (k, tool) in run.tools.iter().enumerate() {
@@ -102,7 +108,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
         }
     }
     if pairs.is_empty() {
-        return Ok(Finding::default());
+        return Ok(Finding { claims: unchecked.into_iter().collect(), ..Finding::default() });
     }
     pairs.sort_by(|a, b| nearness(a).total_cmp(&nearness(b)));
     let mut claims: Vec<Claim> = pairs.iter().map(|pair| pair.claim(run)).collect();
@@ -111,6 +117,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
         of_stock.for_each(|(_, claim)| doubt(std::slice::from_mut(claim), TOOLS_BEFORE));
     }
     claims.extend(kept_away);
+    claims.extend(unchecked);
     let rows = pairs.iter().take(LISTED).map(|pair| pair.row()).collect();
     let table = FigureTable {
         title: "Nearest places",
@@ -143,15 +150,14 @@ fn with_meshes(
 ) -> Result<Vec<PairClearance>, JobError> {
     let (tool, near) = (Tool::new(moves.cutter, moves.holder), run.around.near);
     let mut pairs = Vec::new();
-    let mut add =
-        |name: (&'static str, String), solid: &Solid, obstacle: Obstacle<'_>, off: f64, needed: f64| {
-            let rapids = |to: &Move| to.kind == MoveKind::Rapid;
-            let chosen: &(dyn Fn(&Move) -> bool + Sync) = if needed < 0.0 { &rapids } else { &|_| true };
-            let least = obstacle.least_clearance(solid, &moves.path, chosen, monitor)?;
-            let of_mesh = |least| PairClearance::of_mesh(name, &least, (run, moves.first), off, needed);
-            pairs.extend(least.map(of_mesh));
-            Ok::<(), JobError>(())
-        };
+    let mut add = |name: (&str, String), solid: &Solid, obstacle: Obstacle<'_>, off: f64, needed: f64| {
+        let rapids = |to: &Move| to.kind == MoveKind::Rapid;
+        let chosen: &(dyn Fn(&Move) -> bool + Sync) = if needed < 0.0 { &rapids } else { &|_| true };
+        let least = obstacle.least_clearance(solid, &moves.path, chosen, monitor)?;
+        let of_mesh = |least| PairClearance::of_mesh(name, &least, (run, moves.first), off, needed);
+        pairs.extend(least.map(of_mesh));
+        Ok::<(), JobError>(())
+    };
     monitor.start("looking for collisions", 0);
     let files = run.scene().keep_clear.fixtures.iter().map(|fixture| &fixture.file.written);
     for ((mesh, bvh), file) in run.around.fixtures.iter().zip(files) {
@@ -231,9 +237,9 @@ fn with_standing_stock(
 }
 
 impl PairClearance {
-    fn new((tool, other): (&'static str, String)) -> Self {
+    fn new((tool, other): (&str, String)) -> Self {
         Self {
-            tool,
+            tool: tool.to_owned(),
             other,
             clearance_mm: None,
             error_bound_mm: None,
@@ -243,20 +249,21 @@ impl PairClearance {
             tool_number: None,
             reason: Some(UNKNOWN),
             needed: 0.0,
+            off: 0.0,
             more: String::new(),
         }
     }
 
     /// From a mesh that stands off the true surface by up to `off`.
     fn of_mesh(
-        name: (&'static str, String),
+        name: (&str, String),
         least: &LeastClearance,
         (run, first): (&Run<'_>, u32),
         off: f64,
         needed: f64,
     ) -> Self {
         let clearance_mm = Some(least.nearest.distance);
-        let pair = Self { clearance_mm, needed, ..Self::new(name) };
+        let pair = Self { clearance_mm, needed, off, ..Self::new(name) };
         let pair = pair.at(run, least.nearest.place.into(), first + least.move_index as u32);
         pair.within(least.error_bound + off)
     }
@@ -295,7 +302,7 @@ impl PairClearance {
         let index = self.move_index.unwrap_or_default();
         let text = format!(
             "{} collides with {}, at least {:.3} mm deep, at {}, move {index}{}{}",
-            capital(self.tool),
+            capital(&self.tool),
             self.other,
             -clearance,
             place(self.at_mm.unwrap_or_default()),
@@ -303,8 +310,7 @@ impl PairClearance {
             self.more
         );
         // Of a collision the depth is a lower bound already, but for what triangles stand off their surface.
-        let off = if self.other == "part" { run.around.near.mesh_deviation() } else { 0.0 };
-        claim(-clearance, off).told(text)
+        claim(-clearance, self.off).told(text)
     }
 
     fn sentence(&self) -> String {
@@ -316,8 +322,7 @@ impl PairClearance {
 
     /// The part of the tool, and of which, where there are several.
     fn named(&self) -> String {
-        self.tool_number
-            .map_or_else(|| self.tool.to_owned(), |number| format!("{} of tool {number}", self.tool))
+        self.tool_number.map_or_else(|| self.tool.clone(), |number| format!("{} of tool {number}", self.tool))
     }
 
     /// The distance with its bound.

@@ -14,7 +14,7 @@ use crate::run::{Finding, Run};
 const ROUNDING: f64 = 1e-9;
 
 /// Of every toolpath.
-pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> {
+pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
     let (scene, path) = (run.scene(), run.path());
     // The feeds of a program from elsewhere are its own.
     if run.request.foreign().is_some() {
@@ -26,7 +26,7 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
         no_faster(path, &scene.cutting, &scene.machine, &line),
         down_no_faster(path, scene.cutting.plunge_rate, &line),
     ];
-    let time = run.planned.time(scene);
+    let time = run.planned.time(scene, monitor)?;
     claims.push(in_time(time, longest(path, &scene.cutting, &scene.machine) + run.planned.joint_time(scene)));
     Ok(Finding { claims, ..Finding::default() })
 }
@@ -132,6 +132,7 @@ mod tests {
     use geometry::Point3;
     use motion::ClPoint;
     use report::Verdict;
+    use work::monitor::Silent;
 
     const CUTTING: CuttingData = CuttingData { spindle_speed: 12e3, feed_rate: 1000.0, plunge_rate: 300.0 };
 
@@ -145,7 +146,7 @@ mod tests {
     fn verdicts(moves: &[(MoveKind, f64)], machine: &Machine) -> [Verdict; 4] {
         let path = path(moves);
         let line = |k: usize| format!("at move {k}");
-        let time = machine::machining_time(&path, machine);
+        let time = machine::machining_time(&path, machine, &Silent).unwrap();
         [
             fast_enough(&path, &CUTTING, machine, &line),
             no_faster(&path, &CUTTING, machine, &line),

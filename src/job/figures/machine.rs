@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use ::machine::kinematics::{JointReport, Kinematics};
+use ::machine::kinematics::{JointPath, JointReport, Kinematics, Turn};
+use geometry::{Aabb, Point3};
 use report::{Claim, Figure, Gravity};
 use work::monitor::Monitor;
 
@@ -63,24 +64,39 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
     let fastest = joints.fastest(machine, path, run.scene().machine.rapid_rate);
     let figures = MachineFigures::new(machine, &joints.report, fastest);
     let mut claims = within_travel(machine, &joints.report);
-    let mut notes: Vec<String> = note(&joints.report).into_iter().collect();
-    if five_axis.zero_is_given {
-        claims.push(retract_above(machine.retracted_z(), joints.highest_nose(machine, path)));
-    } else {
-        notes.push(UNKNOWN_ZERO.to_owned());
-    }
+    let notes: Vec<String> = note(&joints.report).into_iter().collect();
+    let nose = joints.highest_nose(machine, path).max(over_the_work(run, machine, joints));
+    claims.push(retract_above(machine.retracted_z(), nose));
     let figure = Figure { key: "machine", value: value(&figures)?, ..Figure::default() };
     Ok(Finding { figure: Some(figure), notes, claims })
 }
 
-/// What is said where the scene does not tell where the workpiece is in the machine.
-const UNKNOWN_ZERO: &str = "the program begins and ends at the upper end of Z's travel, or at the machine's Z zero where no `z` is given; \
-                            that must be above the work: give `workpiece_zero` in [machine.kinematics] to have that checked";
+/// How high the spindle nose has to stand, machine coordinates, mm, for the tip to be over part, stock and fixtures wherever the rotary
+/// axes stand when a program begins, rises or ends.
+fn over_the_work(run: &Run<'_>, machine: &Kinematics, joints: &JointPath) -> f64 {
+    let meshes = run.around.fixtures.iter().map(|(mesh, _)| mesh).chain([run.around.near.mesh()]);
+    let vertices: Vec<Point3> = meshes.flat_map(|mesh| mesh.vertices().iter().copied()).collect();
+    let Aabb { min, max } = run.session.area();
+    let side = |k: usize, axis: usize| if k >> axis & 1 == 1 { max[axis] } else { min[axis] };
+    let corners: Vec<Point3> = (0..8).map(|k| Point3::new(side(k, 0), side(k, 1), side(k, 2))).collect();
+    let nose = |rotary: [f64; 2]| {
+        let up = machine.upward(rotary);
+        let over = |height: f64, place: &Point3| height.max(up.dot(&place.coords));
+        let height = vertices.iter().chain(&corners).fold(f64::NEG_INFINITY, over);
+        // With the head swung, the side of the cutter reaches below its tip.
+        let lean = machine.tool_axis(rotary).cross(&up).norm();
+        machine.place(Point3::origin(), rotary).linear.z + height + lean * run.around.tool.cutter.radius()
+    };
+    let rewinds = joints.locations.windows(2).filter(|pair| pair[1].turn == Turn::Rewind);
+    let turned = rewinds.flat_map(|pair| pair.iter().map(|at| at.joints.rotary));
+    let ends = [joints.start.rotary].into_iter().chain(joints.locations.last().map(|at| at.joints.rotary));
+    turned.chain(ends).map(nose).fold(f64::NEG_INFINITY, f64::max)
+}
 
 /// That the machine's Z to which programs rise is no lower than where they come down from.
 fn retract_above(z: f64, nose: f64) -> Claim {
     let text = format!(
-        "programs rise to the machine's Z {z:.3}, and the spindle nose must stand at Z {nose:.3} or higher to be over the path"
+        "programs rise to the machine's Z {z:.3}, and the spindle nose must stand at Z {nose:.3} or higher to be over the path and the work"
     );
     Claim::length("retract", Gravity::Crash, 0.0, nose - z, 0.0).told(text)
 }
@@ -134,7 +150,7 @@ mod tests {
         let claim = retract_above(0.0, 161.0);
         assert_eq!((claim.what, claim.verdict()), ("retract", Verdict::Fail));
         assert!(
-            claim.text.ends_with("must stand at Z 161.000 or higher to be over the path"),
+            claim.text.ends_with("must stand at Z 161.000 or higher to be over the path and the work"),
             "{}",
             claim.text
         );

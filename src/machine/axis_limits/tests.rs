@@ -1,11 +1,12 @@
 //! Closed forms, accelerations by differences, and the quickest speeds of all by trying them.
 
-use super::super::fixture::{machine, path};
+use super::super::fixture::{machine, path, seconds};
 use super::*;
 use crate::kinematics::{Following, PRESETS, follow, preset};
 use approx::assert_relative_eq;
 use geometry::{Point3, Vector3};
 use motion::{ClPoint, Move, MoveKind};
+use work::monitor::Silent;
 
 const MACHINE: Machine = machine(1e12);
 
@@ -20,7 +21,7 @@ fn kinematics(name: &str, accelerations: [f64; 3], rotary: f64) -> Kinematics {
 
 fn time(path: &Toolpath, machine: &Machine, kinematics: &Kinematics, following: &Following) -> f64 {
     let joints = follow(kinematics, path, following).unwrap();
-    machining_time_of_axes(path, machine, kinematics, &joints)
+    machining_time_of_axes(path, machine, kinematics, &joints, &Silent).unwrap()
 }
 
 const EVENLY: Following = Following { tip: 0.01, axis: 1e-3 };
@@ -31,7 +32,7 @@ fn the_axis_that_moves_sets_the_acceleration() {
     let machine_of = |y: f64| kinematics("ac-head", [1e4, y, 1e4], 50.0);
     let line = path([[0.0; 3], [0.0, 100.0, 0.0]]);
     let quick = time(&line, &MACHINE, &machine_of(1e4), &EVENLY);
-    assert_relative_eq!(quick, super::super::machining_time(&line, &MACHINE), max_relative = 1e-3);
+    assert_relative_eq!(quick, seconds(&line, &MACHINE), max_relative = 1e-3);
     // 0.4 s up and down, 60 mm level.
     let slow = time(&line, &MACHINE, &machine_of(250.0), &EVENLY);
     assert_relative_eq!(slow, 0.8 + 0.6, max_relative = 2e-3);
@@ -49,7 +50,7 @@ fn a_turn_about_the_tip_takes_the_time_of_its_axes() {
     let turn = Toolpath::new(start, vec![step]);
     let following = Following::with_tip_kept(0.01, 50.0);
     let joints = follow(&kinematics, &turn, &following).unwrap();
-    let got = machining_time_of_axes(&turn, &MACHINE, &kinematics, &joints);
+    let got = machining_time_of_axes(&turn, &MACHINE, &kinematics, &joints, &Silent).unwrap();
     // Location by location from rest to rest: no quicker than the whole turn at once.
     assert!(got >= 2.0 * (0.5f64 / 4.0).sqrt() * (1.0 - 1e-9), "{got}");
     assert!(got <= axes_at_most(&kinematics, &joints) * (1.0 + 1e-9));
@@ -208,7 +209,7 @@ fn three_axes_keep_their_own_limits_in_the_time_of_small_steps() {
                 let angle = 2.0 * std::f64::consts::PI * f64::from(k) / f64::from(chords);
                 [30.0 * angle.cos(), 12.0 * angle.sin(), 0.0]
             };
-            let got = super::super::machining_time(&path((0..=chords).map(point)), &machine);
+            let got = seconds(&path((0..=chords).map(point)), &machine);
             let exact = ellipse_by_small_steps([30.0, 12.0], 100.0, rates, most);
             assert!((got / exact - 1.0).abs() < 3e-3, "{rates:?} {most:?} {chords}: {got} {exact}");
         }
@@ -312,7 +313,7 @@ fn no_axis_exceeds_its_jerk() {
         let joints = follow(&kinematics, &path, &EVENLY).unwrap();
         let (pieces, standing) = pieces(&path, &MACHINE, &kinematics, &joints);
         let axes = kinematics.axis_limits(&MACHINE);
-        let run = Run::new(&pieces, &profile(&path, &MACHINE).unwrap(), &MACHINE, &axes);
+        let run = Run::new(&pieces, &profile(&path, &MACHINE).unwrap(), &MACHINE, &axes, &Silent).unwrap();
         assert_eq!(standing, 0.0);
         let (slower, before) = (run.time(), time(&path, &MACHINE, &free, &EVENLY));
         assert!(slower > 1.05 * before, "{name}: {slower} {before}");
@@ -368,9 +369,9 @@ fn words_follow_the_limits_of_all_axes() {
         let kinematics = on_hill(name);
         let path = hill_in(0.05);
         let joints = follow(&kinematics, &path, &EVENLY).unwrap();
-        let slow = slow_axes(&path, &MACHINE, Some((&kinematics, &joints)));
-        let [before, after] =
-            [&path, &slow].map(|path| machining_time_of_axes(path, &MACHINE, &kinematics, &joints));
+        let slow = slow_axes(&path, &MACHINE, Some((&kinematics, &joints)), &Silent).unwrap();
+        let [before, after] = [&path, &slow]
+            .map(|path| machining_time_of_axes(path, &MACHINE, &kinematics, &joints, &Silent).unwrap());
         // Slower moves are divided into shorter stages, which lose less.
         assert!(after < 1.001 * before && after > 0.99 * before, "{name}: {before} {after}");
         let lower = slow.moves.iter().filter(|step| step.feed_rate < 0.9 * 6000.0).count();
@@ -380,11 +381,11 @@ fn words_follow_the_limits_of_all_axes() {
     let arc =
         (0..=600).map(|k| [30.0 * (0.01 * f64::from(k)).cos(), 30.0 * (0.01 * f64::from(k)).sin(), 0.0]);
     let path = path(arc);
-    let slow = slow_axes(&path, &own, None);
-    let [before, after] = [&path, &slow].map(|path| super::super::machining_time(path, &own));
+    let slow = slow_axes(&path, &own, None, &Silent).unwrap();
+    let [before, after] = [&path, &slow].map(|path| seconds(path, &own));
     assert!((before / after - 1.0).abs() < 2e-3, "{before} {after}");
     assert!(slow.moves.iter().any(|step| step.feed_rate < 0.7 * 6000.0));
-    assert_eq!(slow_axes(&path, &MACHINE, None), path);
+    assert_eq!(slow_axes(&path, &MACHINE, None, &Silent).unwrap(), path);
 }
 
 /// The moves of one of the plain programs in `tests/planner`, and the limits in its head: mm/s, mm/s².
@@ -395,7 +396,7 @@ fn plain_program(text: &str) -> (Toolpath, f64, [f64; 3]) {
     let head = numbers(text.lines().next().unwrap());
     let (mut tip, mut feed) = ([0.0; 3], 0.0);
     let mut moves = Vec::new();
-    for line in text.lines().skip(2) {
+    for line in text.lines().skip(2).filter(|line| !line.starts_with('M')) {
         let before = tip;
         for word in line.split_whitespace() {
             let value = word[1..].parse().unwrap();
@@ -413,37 +414,46 @@ fn plain_program(text: &str) -> (Toolpath, f64, [f64; 3]) {
     (Toolpath::new(ClPoint::upright(Point3::origin()), moves), head[0], [head[1], head[2], head[3]])
 }
 
-/// Against LinuxCNC's trajectory planner (`tests/planner/make_times.py`). It runs bends with √3/2 of the acceleration across the
-/// path, and chains of short moves whose pace along an axis changes with more than half of what that axis could.
+/// Against LinuxCNC's trajectory planner (`tests/planner/make_times.py`).
 #[test]
 fn an_independent_planner_takes_the_same_time() {
     let times = include_str!("../../../tests/planner/times.txt");
-    let both = |name: &str, text: &str, share: f64, deviation: f64| {
+    let ratio = |name: &str, text: &str, blending: Blending, deviation: f64| {
         let line = times.lines().find_map(|line| line.strip_prefix(name)).unwrap();
         let expected: f64 = line.trim().parse().unwrap();
         let (path, rate, accelerations) = plain_program(text);
         let machine = Machine {
             rapid_rate: 60.0 * rate,
             rates: [60.0 * rate; 3],
-            acceleration: share * accelerations.into_iter().fold(0.0, f64::max),
-            accelerations: accelerations.map(|most| share * most),
+            acceleration: accelerations.into_iter().fold(0.0, f64::max),
+            accelerations,
             junction_deviation: deviation,
+            blending,
             ..MACHINE
         };
-        (super::super::machining_time(&path, &machine), expected)
+        seconds(&path, &machine) / expected
     };
     // With exact stop (G61) no corner is rounded.
-    let programs = [
-        ("stop_zigzag.ngc", include_str!("../../../tests/planner/stop_zigzag.ngc"), 1.0, 1e-9),
-        ("stop_axes.ngc", include_str!("../../../tests/planner/stop_axes.ngc"), 1.0, 1e-9),
-        ("blend_zigzag.ngc", include_str!("../../../tests/planner/blend_zigzag.ngc"), 1.0, 0.01),
-        ("circle.ngc", include_str!("../../../tests/planner/circle.ngc"), 0.75f64.sqrt(), 0.01),
+    let stopping = [
+        ("stop_zigzag.ngc", include_str!("../../../tests/planner/stop_zigzag.ngc")),
+        ("stop_axes.ngc", include_str!("../../../tests/planner/stop_axes.ngc")),
     ];
-    for (name, text, share, deviation) in programs {
-        let (got, expected) = both(name, text, share, deviation);
-        assert!((got / expected - 1.0).abs() < 0.05, "{name}: {got} {expected}");
+    for (name, text) in stopping {
+        let got = ratio(name, text, Blending::Full, 1e-9);
+        assert!((got - 1.0).abs() < 0.05, "{name}: {got}");
     }
-    let wave = |share: f64| both("wave.ngc", include_str!("../../../tests/planner/wave.ngc"), share, 0.01);
-    let ((quick, expected), (slow, _)) = (wave(1.0), wave(0.5));
-    assert!(quick < expected && expected < slow, "{quick} {expected} {slow}");
+    let blended = [
+        ("blend_zigzag.ngc", include_str!("../../../tests/planner/blend_zigzag.ngc")),
+        ("circle.ngc", include_str!("../../../tests/planner/circle.ngc")),
+        ("wave.ngc", include_str!("../../../tests/planner/wave.ngc")),
+        ("knot.ngc", include_str!("../../../tests/planner/knot.ngc")),
+        ("spiral.ngc", include_str!("../../../tests/planner/spiral.ngc")),
+        ("raster.ngc", include_str!("../../../tests/planner/raster.ngc")),
+        ("polygon.ngc", include_str!("../../../tests/planner/polygon.ngc")),
+    ];
+    let got = blended.map(|(name, text)| ratio(name, text, Blending::Arcs, 0.01));
+    assert!(got.iter().all(|got| (got - 1.0).abs() < 0.05), "{got:?}");
+    // That is the control's share of the acceleration, and not what axes can.
+    let full = blended.map(|(name, text)| ratio(name, text, Blending::Full, 0.01));
+    assert!(full[2] < 0.9, "{full:?}");
 }

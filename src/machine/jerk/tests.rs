@@ -5,12 +5,13 @@ use super::super::{Machine, machining_time};
 use super::*;
 use approx::assert_relative_eq;
 use proptest::prelude::*;
+use work::monitor::Silent;
 
 const FREE: Machine = machine(1e12);
 
 /// Along x.
 fn line(length: f64, machine: &Machine) -> f64 {
-    machining_time(&path([[0.0; 3], [length, 0.0, 0.0]]), machine)
+    machining_time(&path([[0.0; 3], [length, 0.0, 0.0]]), machine, &Silent).unwrap()
 }
 
 #[test]
@@ -52,4 +53,59 @@ proptest! {
         let got = line(length, &own);
         prop_assert!((got / exact - 1.0).abs() < 0.02, "{got} {exact}");
     }
+}
+
+/// A long way at a low feed: ramps are a thousandth of it, and slowing down in them would win time for jerk.
+#[test]
+fn ramps_of_a_long_line_are_not_slowed_down_to_gain_time_for_jerk() {
+    let infinite = f64::INFINITY;
+    let own = Machine {
+        acceleration: 1e6,
+        accelerations: [2892.3, infinite, infinite],
+        jerks: [137_253.5, infinite, infinite],
+        rates: [500.0, infinite, infinite],
+        ..FREE
+    };
+    let exact = from_rest_to_rest(293.74, 500.0 / 60.0, 2892.3, 137_253.5);
+    assert!((line(293.74, &own) / exact - 1.0).abs() < 0.02);
+}
+
+/// Chords of a random walk, with corners.
+fn walk(length: f64, moves: u32) -> Vec<[f64; 3]> {
+    let mut rng = sim::scenes::Rng::new(9);
+    let (mut at, mut heading) = ([0.0f64; 3], 0.0f64);
+    let mut tips = vec![at];
+    for _ in 0..moves {
+        heading += rng.within(-0.8, 0.8);
+        let way = length * rng.within(0.5, 1.5);
+        at = [at[0] + way * heading.cos(), at[1] + way * heading.sin(), at[2] + way * rng.within(-0.1, 0.1)];
+        tips.push(at);
+    }
+    tips
+}
+
+/// Four times the way takes about four times the time: a search that is stuck in one place stays slow everywhere.
+#[test]
+fn the_search_does_not_get_stuck_on_long_paths() {
+    let own =
+        Machine { acceleration: 1e6, accelerations: [1500.0, 1200.0, 900.0], jerks: [5e4, 4e4, 3e4], ..FREE };
+    let seconds = |moves: u32| {
+        let path = path(walk(0.3, moves));
+        let length: f64 = path.segments().map(|(a, b, _)| (b - a).norm()).sum();
+        machining_time(&path, &own, &Silent).unwrap() / length
+    };
+    let [short, long] = [1500, 6000].map(seconds);
+    assert!((long / short - 1.0).abs() < 0.05, "{short} {long}");
+}
+
+#[test]
+fn a_search_can_be_stopped() {
+    struct Stop;
+    impl Monitor for Stop {
+        fn cancelled(&self) -> bool {
+            true
+        }
+    }
+    let own = Machine { jerks: [5e4, 4e4, 3e4], ..FREE };
+    assert_eq!(machining_time(&path(walk(1.0, 20)), &own, &Stop), Err(Cancelled));
 }

@@ -19,7 +19,9 @@ mod angles;
 mod choice;
 mod error;
 mod follow;
+mod links;
 mod presets;
+mod program;
 mod refine;
 mod report;
 #[cfg(test)]
@@ -27,7 +29,9 @@ mod tests;
 
 pub use error::KinematicsError;
 pub use follow::{Following, JointLocation, JointPath, PathError, Turn, follow};
+pub use links::{Chain, Link, LinkMove, STRAY, Way, Waypoint};
 pub use presets::{DEFAULT_GAUGE_LENGTH, DEFAULT_ROTARY_ACCELERATION, DEFAULT_ROTARY_RATE, PRESETS, preset};
+pub use program::program_of_three_axes;
 pub use report::{JointReport, LimitViolation, Obstacle, Rewind, SINGULAR_ANGLE, SingularPose, least_time};
 
 use angles::Triangle;

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Named machines with offset axes and a tilted workpiece zero, and any directions.
-fn machines() -> impl Strategy<Value = Kinematics> {
+pub(super) fn machines() -> impl Strategy<Value = Kinematics> {
     let vector = || prop::array::uniform3(-1.0..1.0f64).prop_map(Vector3::from);
     let point = || prop::array::uniform3(-300.0..300.0f64).prop_map(Point3::from);
     let named = 0..PRESETS.len();

@@ -1,12 +1,14 @@
 //! Detours of an upright tool around fixtures.
 //!
 //! Enters: a finished path, what the tool must keep away from, mm. Leaves: the path without what comes too near to a fixture.
-//! Passes end where the tool comes too near and go on where it is clear again. From one to the other the tool rises over
-//! all fixtures, and so it does wherever a move between passes would meet one. The rest of the path stays as it is.
+//! Passes end where the tool comes too near and go on where it is clear again. From one to the other, and wherever a move between
+//! passes would meet a fixture, the tool goes over the stock and beside the fixtures, or over all of them where that is
+//! shorter. The rest of the path stays as it is.
 //!
 //! Limits: straight up and down no other way is looked for. Where a fixture hangs over a pass, the check of the finished path
 //! finds it.
 
+use super::beside::beside;
 use crate::vocabulary::PlanSettings;
 use collision::Interference;
 use geometry::Point3;
@@ -24,20 +26,21 @@ pub struct Detour {
     pub path: Toolpath,
     /// Length of passes that no tool can cut for the fixtures, mm.
     pub left_out: f64,
-    /// Detours between passes.
-    pub detours: usize,
+    /// Detours between passes: over all fixtures, and beside them.
+    pub detours: [usize; 2],
     /// What is to be said of them, if there are any.
     pub note: Option<String>,
 }
 
-fn note(left_out: f64, detours: usize) -> Option<String> {
-    let raised = match detours {
+fn note(left_out: f64, [over, beside]: [usize; 2]) -> Option<String> {
+    let times = |count: usize, what: &str| match count {
         0 => None,
-        1 => Some("once the tool rises over a fixture".to_owned()),
-        n => Some(format!("{n} times the tool rises over a fixture")),
+        1 => Some(format!("once the tool {what}")),
+        n => Some(format!("{n} times the tool {what}")),
     };
+    let raised = [times(over, "rises over a fixture"), times(beside, "goes around a fixture")];
     let skipped = (left_out > 0.0).then(|| format!("{left_out:.1} mm of passes beside fixtures are skipped"));
-    let parts: Vec<String> = raised.into_iter().chain(skipped).collect();
+    let parts: Vec<String> = raised.into_iter().flatten().chain(skipped).collect();
     (!parts.is_empty()).then(|| parts.join("; "))
 }
 
@@ -57,14 +60,14 @@ pub fn around_fixtures(
         Ok::<bool, Cancelled>(keep.on_move(&path.location_before(k), &path.moves[k].to).is_some())
     })?;
     if !hits.contains(&true) {
-        return Ok(Detour { path, left_out: 0.0, detours: 0, note: None });
+        return Ok(Detour { path, left_out: 0.0, detours: [0; 2], note: None });
     }
     let safe = settings.stock_top + settings.clearance;
     let top = keep.checks.iter().map(|check| check.obstacle.bounds().max.z).fold(f64::NEG_INFINITY, f64::max);
     let high = safe.max(top + settings.clearance);
     let start = if keep.is_clear(&path.start) { path.start } else { above(&path.start, high) };
     let mut leading =
-        Leading { keep, settings, safe, high, at: start, moves: Vec::new(), left_out: 0.0, detours: 0 };
+        Leading { keep, settings, safe, high, at: start, moves: Vec::new(), left_out: 0.0, detours: [0; 2] };
     let mut k = 0;
     while k < path.len() {
         check(monitor)?;
@@ -89,7 +92,7 @@ struct Leading<'a> {
     at: ClPoint,
     moves: Vec<Move>,
     left_out: f64,
-    detours: usize,
+    detours: [usize; 2],
 }
 
 impl Leading<'_> {
@@ -150,15 +153,29 @@ impl Leading<'_> {
         self.push(above(&self.at, self.high), Move { kind: MoveKind::Rapid, feed_rate: 0.0, ..*step });
     }
 
-    /// Over all fixtures to a place, and down to it.
+    /// Beside the fixtures or over all of them to a place, and down to it.
     fn go_over(&mut self, to: &ClPoint, step: &Move) {
         if self.at == *to {
             return;
         }
-        self.detours += 1;
-        self.rise(step);
         let rapid = Move { kind: MoveKind::Rapid, feed_rate: 0.0, ..*step };
-        self.push(above(to, self.high), rapid);
+        let ends = [above(&self.at, self.safe), above(to, self.safe)];
+        let over = (ends[1].tip - ends[0].tip).norm() + 2.0 * (self.high - self.safe).max(0.0);
+        // From where the tool stands higher, it is over the fixtures already.
+        let level = ends.iter().all(|end| end.tip.z == self.safe);
+        match beside(self.keep, ends, over).filter(|_| level) {
+            Some((way, _)) => {
+                self.detours[1] += 1;
+                let fed = Move { kind: MoveKind::Retract, feed_rate: self.settings.feed_rate, ..*step };
+                self.push(ends[0], fed);
+                way.into_iter().for_each(|place| self.push(place, rapid));
+            }
+            None => {
+                self.detours[0] += 1;
+                self.rise(step);
+                self.push(above(to, self.high), rapid);
+            }
+        }
         self.push(above(to, self.safe), rapid);
         self.push(*to, Move { kind: MoveKind::Plunge, feed_rate: self.settings.plunge_rate, ..*step });
     }
@@ -240,23 +257,57 @@ mod tests {
         assert!(clear, "{led:?}");
         let reach = ((3.0f64 + 0.5).powi(2) - 1.0).sqrt();
         assert!((led.left_out - 2.0 * (1.0 + reach)).abs() < 1e-3, "{} {reach}", led.left_out);
-        assert_eq!(led.detours, 1);
+        // Around the post 3.5 mm away and 2 mm over the stock, which is shorter than 42 mm up and down.
+        assert_eq!(led.detours, [0, 1]);
         let heights = led.path.moves.iter().map(|m| m.to.tip.z).fold(0.0, f64::max);
-        assert_eq!(heights, 47.0);
+        assert_eq!(heights, 5.0);
+        let aside = led.path.moves.iter().map(|m| m.to.tip.y).filter(|y| *y < 8.0).fold(0.0, f64::max);
+        assert!((aside - 2.5).abs() < 2e-3, "{aside}");
         let cut = |path: &Toolpath| {
             let cuts = path.segments().filter(|s| s.2.kind == MoveKind::Cut).map(|(a, b, _)| (b - a).norm());
             cuts.sum::<f64>()
         };
         assert!((cut(&led.path) + led.left_out - cut(&passes())).abs() < 1e-9);
-        assert!(led.note.unwrap().starts_with("once the tool rises over a fixture; "));
+        assert!(led.note.unwrap().starts_with("once the tool goes around a fixture; "));
     }
 
     #[test]
     fn a_retract_that_meets_a_post_rises_over_it_and_loses_nothing() {
         let (led, clear) = led(&block([19.0, 3.8, -20.0], [21.0, 4.2, 45.0]), 0.5);
         assert!(clear, "{led:?}");
-        assert_eq!((led.left_out, led.detours), (0.0, 1));
-        assert_eq!(led.note.unwrap(), "once the tool rises over a fixture");
+        assert_eq!((led.left_out, led.detours), (0.0, [0, 1]));
+        assert_eq!(led.note.unwrap(), "once the tool goes around a fixture");
+    }
+
+    /// A wall across the plate is as long as it takes for the way over it to be the shorter one.
+    #[test]
+    fn a_wall_is_crossed_where_it_is_lower_than_long() {
+        for (long, detours) in [(30.0, [0, 1]), (70.0, [1, 0])] {
+            let (led, clear) = led(&block([19.0, 4.0 - long, -20.0], [21.0, 4.0 + long, 45.0]), 0.5);
+            assert!(clear, "{led:?}");
+            // Both passes, and the way between them.
+            assert_eq!(led.detours, detours.map(|times| 3 * times), "{long} {led:?}");
+        }
+    }
+
+    /// The second post stands in the way around the first.
+    #[test]
+    fn the_way_leads_around_one_fixture_after_the_other() {
+        let posts =
+            [block([19.0, -40.0, -20.0], [21.0, 2.0, 45.0]), block([6.0, 3.0, -20.0], [8.0, 20.0, 45.0])];
+        let tool = Solid::of_cutter(&Cutter::flat(6.0).unwrap(), None);
+        let checks = posts.iter().map(|(mesh, tree)| Check {
+            solid: &tool,
+            obstacle: Obstacle::new(mesh, tree),
+            needed: 0.5,
+        });
+        let keep = Interference { checks: checks.collect(), ..Interference::default() };
+        let at = |x: f64| ClPoint::upright(Point3::new(x, 0.0, 5.0));
+        let (way, length) = beside(&keep, [at(0.0), at(40.0)], 1e3).unwrap();
+        let places: Vec<ClPoint> = [at(0.0)].into_iter().chain(way).chain([at(40.0)]).collect();
+        assert!(places.windows(2).all(|pair| keep.on_move(&pair[0], &pair[1]).is_none()), "{places:?}");
+        assert!(length > 40.0 && length < 50.0, "{length}");
+        assert!(beside(&keep, [at(0.0), at(40.0)], 0.99 * length).is_none());
     }
 
     #[test]

@@ -16,6 +16,7 @@
 //! say about its border.
 
 mod bend;
+mod beside;
 mod ceiling;
 mod detour;
 mod order;

@@ -4,7 +4,7 @@ use super::*;
 use machine::kinematics::{DEFAULT_ROTARY_RATE, PRESETS, RotaryAxis, follow, preset};
 use motion::{ClPoint, Move};
 
-const HEADER: ProgramHeader = ProgramHeader { name: String::new(), spindle_speed: None };
+const HEADER: ProgramHeader = ProgramHeader { name: String::new(), spindle_speed: None, rise_to: None };
 
 /// What is in force after a line: the words X Y Z and of both rotary axes, rapid or not, F.
 #[derive(Debug, Clone, Copy)]
@@ -388,10 +388,8 @@ fn no_program_is_made_of_joints_that_must_not_be() {
     );
 }
 
-/// A rewind in clear air rises, turns and comes down to where it left.
-#[test]
-fn a_rewind_is_made_at_the_top() {
-    let kinematics = Kinematics::by_name("bc-head").unwrap();
+/// Rounds that turn further than a limited axis can.
+fn rewinding_path() -> Toolpath {
     let at = |azimuth: f64| ClPoint {
         tip: Point3::new(10.0, 20.0, 30.0 + azimuth),
         axis: Vector3::new(azimuth.cos(), azimuth.sin(), 1.0).normalize(),
@@ -400,7 +398,56 @@ fn a_rewind_is_made_at_the_top() {
         let kind = if k % 10 < 2 { MoveKind::Rapid } else { MoveKind::Cut };
         Move { to: at(0.2 * f64::from(k)), kind, feed_rate: 900.0, pass: 0 }
     });
-    let path = Toolpath::new(at(0.0), moves.collect());
+    Toolpath::new(at(0.0), moves.collect())
+}
+
+/// What is checked for collisions is what the program does, from line to line.
+#[test]
+fn full_programs_go_through_the_joints_that_are_checked() {
+    let cases = PRESETS.iter().map(|name| (*name, tilting_path())).chain([("bc-head", rewinding_path())]);
+    for (name, path) in cases {
+        let free = machine(name);
+        let [first, second] = *free.axes();
+        let travel = [None, None, Some([-900.0, 650.0])];
+        let kinematics = Kinematics::new(first, second, 140.0, free.workpiece_zero(), travel).unwrap();
+        let (text, _, joints) = program(&path, &kinematics, Style::Full);
+        let apart = |a: &Joints, b: &Joints| {
+            let ways = a.values().into_iter().zip(b.values());
+            ways.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
+        let mut expected = joints.program(&kinematics, &path);
+        expected.dedup_by(|b, a| apart(&a.joints, &b.joints) < 1e-3);
+        let states = states(&text, kinematics.letters());
+        let mut found: Vec<Joints> = Vec::new();
+        let mut z = f64::NAN;
+        for (line, state) in text.lines().zip(&states) {
+            let words = state.words;
+            let mut at = joints_of(&kinematics, &words);
+            z = if line.starts_with("G53") {
+                650.0
+            } else if words[2].is_nan() {
+                z
+            } else {
+                at.linear.z
+            };
+            at.linear.z = z;
+            if at.values().iter().all(|value| value.is_finite()) {
+                found.push(at);
+            }
+        }
+        found.dedup_by(|b, a| apart(a, b) < 1e-3);
+        assert_eq!(found.len(), expected.len(), "{name}");
+        for (k, (found, expected)) in found.iter().zip(&expected).enumerate() {
+            assert!(apart(found, &expected.joints) < 2e-3, "{name} {k}: {found:?} {expected:?}");
+        }
+    }
+}
+
+/// A rewind in clear air rises, turns and comes down to where it left.
+#[test]
+fn a_rewind_is_made_at_the_top() {
+    let kinematics = Kinematics::by_name("bc-head").unwrap();
+    let path = rewinding_path();
     for style in [Style::Tcp, Style::Full] {
         let (text, lines, joints) = program(&path, &kinematics, style);
         assert!(!joints.report.rewinds.is_empty());

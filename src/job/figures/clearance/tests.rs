@@ -7,32 +7,32 @@ use std::path::{Path, PathBuf};
 use work::monitor::Silent;
 
 /// A plate of 8 × 6 mm whose top is z = 0, in strips of 0.5 mm.
-const PLATE: &str =
+pub(super) const PLATE: &str =
     "[part]\nsurface = \"plane\"\nx = [0, 8]\ny = [0, 6]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n";
-const ZIGZAG: &str = "[[toolpath]]\nstrategy = \"zigzag\"\nstepover = 0.5\n";
+pub(super) const ZIGZAG: &str = "[[toolpath]]\nstrategy = \"zigzag\"\nstepover = 0.5\n";
 
 /// A folder of its own that goes away.
-struct Home(PathBuf);
+pub(super) struct Home(PathBuf);
 
 impl Home {
-    fn new(name: &str) -> Self {
+    pub(super) fn new(name: &str) -> Self {
         let home = std::env::temp_dir().join(format!("millstream-{name}-{}", std::process::id()));
         std::fs::create_dir_all(&home).unwrap();
         Self(home)
     }
 
-    fn outcome(&self, text: &str) -> Outcome {
+    pub(super) fn outcome(&self, text: &str) -> Outcome {
         let name = self.0.join("plate.toml");
         let session = Session::new(Scene::parse(&name.to_string_lossy(), text).unwrap()).unwrap();
         session.toolpath(&session.scene.toolpaths[0], &Silent).unwrap()
     }
 
-    fn run(&self, text: &str) -> ToolpathResult {
+    pub(super) fn run(&self, text: &str) -> ToolpathResult {
         self.outcome(text).result
     }
 
     /// A box as an STL file.
-    fn solid(&self, file: &str, low: [f64; 3], high: [f64; 3]) {
+    pub(super) fn solid(&self, file: &str, low: [f64; 3], high: [f64; 3]) {
         let corner = |i: usize| [0, 1, 2].map(|axis| if i >> axis & 1 == 1 { high[axis] } else { low[axis] });
         let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
         let vertex = |i: usize| {
@@ -59,7 +59,7 @@ fn write(path: &Path, text: &str) {
 }
 
 /// The claim on a pair.
-fn claim<'a>(result: &'a ToolpathResult, other: &str) -> &'a Claim {
+pub(super) fn claim<'a>(result: &'a ToolpathResult, other: &str) -> &'a Claim {
     let of_pair = |claim: &&Claim| claim.what == "collision" && claim.text.contains(other);
     result.claims.iter().find(of_pair).unwrap_or_else(|| panic!("{:#?}", result.claims))
 }
@@ -93,6 +93,27 @@ fn an_upright_cutter_keeps_off_a_clamp_and_its_distance_is_told() {
         result.notes
     );
     assert!(result.verdict == Verdict::Fail && result.uncut.area_mm2 > 20.0, "{:?}", result.uncut);
+}
+
+/// A post that stands beside the path, taller than it: from wherever the tool comes, it comes over the post.
+#[test]
+fn a_program_begins_and_ends_over_all_fixtures() {
+    let home = Home::new("post-beside");
+    home.solid("post.stl", [60.0, 60.0, -2.0], [64.0, 64.0, 90.0]);
+    let text = format!("{PLATE}[[fixture]]\nfile = \"post.stl\"\n{ZIGZAG}");
+    let name = home.0.join("plate.toml");
+    let session = Session::new(Scene::parse(&name.to_string_lossy(), text).unwrap()).unwrap();
+    let outcome = session.toolpath(&session.scene.toolpaths[0], &Silent).unwrap();
+    let mut program = Vec::new();
+    session.write_program(&mut program, &outcome).unwrap();
+    let program = String::from_utf8(program).unwrap();
+    let highest = outcome.path.moves.iter().map(|m| m.to.tip.z).fold(f64::MIN, f64::max);
+    assert!(highest < 90.0);
+    let rises: Vec<usize> =
+        (1..).zip(program.lines()).filter(|(_, l)| l.contains("Z92.0")).map(|l| l.0).collect();
+    let [first, last] = rises[..] else { panic!("{program}") };
+    let lines = outcome.path.origin.lines.clone();
+    assert!(first < lines[0] as usize && last as u32 > *lines.last().unwrap(), "{program}");
 }
 
 #[test]

@@ -1,0 +1,177 @@
+//! The machine's own bodies, and the tool on its way to the path and away from it.
+//!
+//! Along all joints of the program: what the head carries against part, fixtures and what the table side carries; the tool against the
+//! latter; what turns on the table side against part and fixtures, where it does not carry them. Bodies that carry
+//! one another, or the tool, are not held against each other.
+
+use collision::{Body, Obstacle};
+use geometry::{Bvh, Isometry3, Point3, TriangleMesh};
+use machine::kinematics::{Chain, Link, LinkMove, STRAY, Side, Waypoint, program_of_three_axes};
+use report::{Claim, Gravity};
+use scene::{BodyShape, MachineBody};
+use work::monitor::Monitor;
+
+use super::PairClearance;
+use crate::JobError;
+use crate::run::Run;
+use crate::tool::Tool;
+
+/// What is said of a program whose joints are not known.
+const UNKNOWN_JOINTS: &str = "the machine's bodies are not checked: of a program from elsewhere the joints are not known on a machine \
+                              with rotary axes or with several tools";
+
+/// A body that moves, and what it is fixed to.
+struct Mover {
+    name: String,
+    link: Link,
+    body: Body,
+}
+
+/// A mesh in the frame of the link that it is fixed to.
+struct Other<'a> {
+    name: String,
+    link: Link,
+    obstacle: Obstacle<'a>,
+    /// Its triangles stand off its true surface by up to this, mm.
+    off: f64,
+    /// The frame of the link in that of the mesh.
+    from_link: Isometry3,
+}
+
+/// A body of the table side as a mesh.
+struct BodyMesh {
+    mesh: TriangleMesh,
+    bvh: Bvh,
+    off: f64,
+}
+
+/// The program and the links that it moves.
+struct Motion<'a> {
+    run: &'a Run<'a>,
+    chain: Chain,
+    program: Vec<Waypoint>,
+    /// What bodies stray from what is looked at, mm.
+    stray: f64,
+}
+
+/// Adds the pairs; where they cannot be looked at, what is to be said.
+pub(super) fn find(
+    run: &Run<'_>,
+    pairs: &mut Vec<PairClearance>,
+    monitor: &dyn Monitor,
+) -> Result<Option<Claim>, JobError> {
+    let (scene, path) = (run.scene(), run.path());
+    let bodies = scene.bodies.as_ref();
+    let rotary = scene.five_axis.as_ref().map(|five_axis| &five_axis.kinematics);
+    let (chain, program) = match (rotary.zip(run.planned.joints.as_ref()), bodies) {
+        (Some((kinematics, joints)), _) => (Chain::of(kinematics), joints.program(kinematics, path)),
+        (None, Some(made)) if rotary.is_none() && path.is_upright() && run.tools.len() == 1 => {
+            (made.chain, program_of_three_axes(path, run.planned.rise_to, &made.chain))
+        }
+        (None, Some(_)) => {
+            let unknown = Claim::length("collision", Gravity::Crash, 0.0, 0.0, f64::INFINITY);
+            return Ok(Some(unknown.told(UNKNOWN_JOINTS.to_owned())));
+        }
+        (None, None) => return Ok(None),
+    };
+    let stray = if rotary.is_some() { STRAY } else { 0.0 };
+    let motion = Motion { run, chain, program, stray };
+    let tool = Tool::of(scene);
+    let solids = [("cutter", Some(tool.cutter)), ("holder", tool.holder)];
+    let tools: Vec<Mover> = solids
+        .into_iter()
+        .filter_map(|(name, solid)| {
+            let body = Body::tool(solid?, chain.tip());
+            Some(Mover { name: name.to_owned(), link: chain.of_tool(), body })
+        })
+        .collect();
+    let movers = bodies
+        .into_iter()
+        .flat_map(|made| &made.bodies)
+        .filter_map(|body| Some(Mover { name: body.name.clone(), link: body.link, body: solid(body)? }));
+    let (heads, tables): (Vec<Mover>, Vec<Mover>) =
+        movers.partition(|mover| chain.side(mover.link) == Side::Head);
+    let meshes: Vec<Option<BodyMesh>> = tables.iter().map(|table| body_mesh(&table.body)).collect();
+    let of_table = tables.iter().zip(&meshes).filter_map(|(table, mesh)| {
+        let BodyMesh { mesh, bvh, off } = mesh.as_ref()?;
+        let (name, obstacle) = (table.name.clone(), Obstacle::new(mesh, bvh));
+        Some(Other { name, link: table.link, obstacle, off: *off, from_link: Isometry3::identity() })
+    });
+    let of_table: Vec<Other<'_>> = of_table.collect();
+    let of_work = on_workpiece(run, &chain);
+    let on_approach = |stretch: &LinkMove| stretch.approach;
+    if rotary.is_some() {
+        for (mover, other) in tools.iter().flat_map(|mover| of_work.iter().map(move |other| (mover, other))) {
+            let named = format!("{} on the approach", mover.name);
+            pairs.extend(motion.pair((&named, mover), other, &on_approach, monitor)?);
+        }
+    }
+    let against = |movers: &[Mover], others: &[Other<'_>], pairs: &mut Vec<PairClearance>| {
+        for (mover, other) in movers.iter().flat_map(|mover| others.iter().map(move |other| (mover, other))) {
+            if mover.link != other.link {
+                pairs.extend(motion.pair((&mover.name, mover), other, &|_| true, monitor)?);
+            }
+        }
+        Ok::<(), JobError>(())
+    };
+    against(&heads, &of_work, pairs)?;
+    against(&heads, &of_table, pairs)?;
+    against(&tools, &of_table, pairs)?;
+    against(&tables, &of_work, pairs)?;
+    Ok(None)
+}
+
+/// Part and fixtures, on the link that carries the workpiece.
+fn on_workpiece<'a>(run: &Run<'a>, chain: &Chain) -> Vec<Other<'a>> {
+    let link = chain.of_workpiece();
+    let from_link = Isometry3::from(-chain.workpiece_zero().coords);
+    let near = run.around.near;
+    let part = Obstacle::new(near.mesh(), near.bvh());
+    let fixtures = run.around.fixtures.iter().map(|(mesh, bvh)| Obstacle::new(mesh, bvh));
+    let files = run.session.scene.keep_clear.fixtures.iter().map(|fixture| fixture.file.written.clone());
+    let named = fixtures.zip(files).map(|(obstacle, name)| (name, obstacle, 0.0));
+    let all = [("part".to_owned(), part, near.mesh_deviation())].into_iter().chain(named);
+    all.map(|(name, obstacle, off)| Other { name, link, obstacle, off, from_link }).collect()
+}
+
+fn solid(body: &MachineBody) -> Option<Body> {
+    match body.shape {
+        BodyShape::Box { from, to } => Body::block(from, to),
+        BodyShape::Cylinder { from, to, diameter } => Body::cylinder(from, to, diameter),
+    }
+}
+
+fn body_mesh(body: &Body) -> Option<BodyMesh> {
+    let (mesh, off) = body.mesh()?;
+    let bvh = Bvh::new(&mesh);
+    Some(BodyMesh { mesh, bvh, off })
+}
+
+impl Motion<'_> {
+    /// How near a body comes to a mesh on the chosen stretches.
+    fn pair(
+        &self,
+        (name, mover): (&str, &Mover),
+        other: &Other<'_>,
+        chosen: &dyn Fn(&LinkMove) -> bool,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<PairClearance>, JobError> {
+        let (middle, reach) = (mover.body.middle(), mover.body.reach());
+        let mut moves = self.chain.motion(&self.program, [mover.link, other.link], &middle, reach);
+        moves.retain(chosen);
+        let ends = |k: usize| moves[k].ends.map(|end| other.from_link * end);
+        let found = other.obstacle.least_clearance_of_body(&mover.body, moves.len(), &ends, monitor)?;
+        let Some(mut least) = found else { return Ok(None) };
+        least.move_index = moves[least.move_index].step;
+        // Places on bodies of the machine are told as the part sees them with its rotary axes at zero.
+        let zero = self.chain.workpiece_zero().coords;
+        if other.from_link == Isometry3::identity() {
+            least.nearest.place = Point3::from(least.nearest.place.coords - zero);
+        }
+        let off = other.off + self.stray;
+        Ok(Some(PairClearance::of_mesh((name, other.name.clone()), &least, (self.run, 0), off, 0.0)))
+    }
+}
+
+#[cfg(test)]
+mod tests;
