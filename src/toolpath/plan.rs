@@ -2,17 +2,18 @@
 
 use crate::facets::facet_charge;
 use crate::levels::{obedience, planned_field};
-use crate::link::{join, join_tilted};
+use crate::link::{join, join_tilted, time_to_neighbour};
 use crate::strategies::shortest::shortest_possible;
 use crate::strategies::words_for;
 use crate::surface::mesh_surface;
 use crate::tilt::tilted::{self, TiltedPasses, Tilting};
 use crate::vocabulary::{
-    Contact, Levelled, PartKind, PassSettings, Passes, PlanError, PlanSettings, SAMPLING_OVER_RADIUS, Setup,
-    Step, Strategy, Task,
+    Contact, Levelled, Pace, PartKind, PassSettings, Passes, PlanError, PlanSettings, SAMPLING_OVER_RADIUS,
+    Setup, Step, Strategy, Task,
 };
 use cutter::Cutter;
 use field::{PlannedField, ShortestPossible};
+use machine::{machining_time, slow_corners};
 use motion::{ROUNDING, ToolAxis, Toolpath};
 use part::Part;
 use scallop::strip_width;
@@ -172,10 +173,24 @@ fn passes(setup: &Setup<'_>, strategy: &dyn Strategy, axis: Option<&ToolAxis>) -
         probe: probe.as_ref(),
     };
     let wants_mesh = mesh_surface::wants_mesh(part, cutter);
-    let mut task = Task { part, cutter, settings: pass, wants_mesh, monitor };
+    let duration = |passes: &Passes| duration(passes, strategy.both_ways(), setup);
+    let feed = settings.feed_rate / 60.0;
+    let bend = feed * feed / settings.machine.acceleration;
+    let pace = Pace { duration: &duration, link: feed * time_to_neighbour(setup), bend };
+    let mut task = Task { part, cutter, settings: pass, wants_mesh, pace, monitor };
     task.settings.step = charged_step(&task, strategy, settings);
     check_extent(&task)?;
     strategy.passes(&task)
+}
+
+/// The time, s, that the machine takes for passes once they are joined.
+fn duration(passes: &Passes, both_ways: bool, setup: &Setup<'_>) -> Result<f64, PlanError> {
+    let machine = &setup.settings.machine;
+    let mut path = join(passes.passes.clone(), both_ways, setup)?;
+    if machine.slow_corners {
+        path = slow_corners(&path, machine);
+    }
+    Ok(machining_time(&path, machine))
 }
 
 /// The distance of passes less what chords, facets and the program's decimals take of a scallop target.
