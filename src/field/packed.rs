@@ -100,6 +100,23 @@ impl Gradients {
         self.starts.push(self.terms.len() as u32);
     }
 
+    /// Those of functions whose coefficients are tied, by the unknowns; to them comes what is `given` at each site, by components in its
+    /// frame.
+    pub fn tied(&self, tied: &Tied, given: &[[f64; 2]]) -> Self {
+        let mut gradients = Self { coefficients: tied.count, ..Self::new(0) };
+        for (site, &given) in given.iter().enumerate() {
+            let mut fixed = given;
+            for &(k, share) in self.of(site) {
+                let offset = tied.offsets[k as usize];
+                fixed = [fixed[0] + offset * share[0], fixed[1] + offset * share[1]];
+                gradients.terms.extend(tied.unknowns[k as usize].map(|unknown| (unknown, share)));
+            }
+            gradients.terms.push((0, fixed));
+            gradients.starts.push(gradients.terms.len() as u32);
+        }
+        gradients
+    }
+
     fn of(&self, site: usize) -> &[(u32, [f64; 2])] {
         &self.terms[self.starts[site] as usize..self.starts[site + 1] as usize]
     }
@@ -124,6 +141,42 @@ impl Roughness {
     /// Adds a row of coefficients with what they are multiplied by.
     pub fn push(&mut self, weight: f64, terms: Vec<(u32, f64)>) {
         self.rows.push((weight, terms));
+    }
+
+    /// That of functions whose coefficients are tied, by the unknowns.
+    pub fn tied(&self, tied: &Tied) -> Self {
+        let row = |(weight, terms): &(f64, Vec<(u32, f64)>)| {
+            let fixed: f64 = terms.iter().map(|&(k, share)| tied.offsets[k as usize] * share).sum();
+            let free = terms.iter().filter_map(|&(k, share)| Some((tied.unknowns[k as usize]?, share)));
+            (*weight, free.chain([(0, fixed)]).collect())
+        };
+        Self { rows: self.rows.iter().map(row).collect() }
+    }
+}
+
+/// How coefficients follow from fewer unknowns. The first unknown is 1: it stands for what is given, and a minimum holds it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tied {
+    /// What is given of each coefficient.
+    pub offsets: Vec<f64>,
+    /// The unknown that comes to it, from 1 on; `None` for a coefficient that is given.
+    pub unknowns: Vec<Option<u32>>,
+    /// Number of unknowns, the first included.
+    pub count: usize,
+}
+
+impl Tied {
+    /// The unknowns of no more than what is given.
+    pub fn given(&self) -> Vec<f64> {
+        let mut unknowns = vec![0.0; self.count];
+        unknowns[0] = 1.0;
+        unknowns
+    }
+
+    /// The coefficients.
+    pub fn coefficients(&self, unknowns: &[f64]) -> Vec<f64> {
+        let free = |unknown: &Option<u32>| unknown.map_or(0.0, |k| unknowns[k as usize]);
+        self.offsets.iter().zip(&self.unknowns).map(|(offset, unknown)| offset + free(unknown)).collect()
     }
 }
 
@@ -555,6 +608,43 @@ mod tests {
         };
         let [free, dear] = [passes(0.0), passes(0.3)];
         assert!(free > 26.0 && free < 28.5 && dear < 22.0, "{free} {dear}");
+    }
+
+    /// Of coefficients that are tied, with something given besides, gradients and roughness are those of the coefficients themselves.
+    #[test]
+    fn tied_coefficients_have_the_gradients_of_their_function() {
+        let (sites, gradients) = square(|_, _, _| 0.05, [1.0, 0.0, 0.0], true);
+        let count = (CELLS + 1) * (CELLS + 1);
+        let wave = |k: usize, pitch: f64| (k as f64 * pitch).sin();
+        // One row is given, one has a single unknown, all others have one each.
+        let unknowns = (0..count).map(|k| match k / (CELLS + 1) {
+            0 => None,
+            1 => Some(1),
+            _ => Some((k - 2 * (CELLS + 1)) as u32 + 2),
+        });
+        let offsets: Vec<f64> = (0..count).map(|k| wave(k, 0.7)).collect();
+        let tied = Tied { offsets, unknowns: unknowns.collect(), count: count - 2 * (CELLS + 1) + 2 };
+        let given: Vec<[f64; 2]> = (0..sites.len()).map(|k| [wave(k, 1.3), wave(k, 2.9)]).collect();
+        let mut x: Vec<f64> = (0..tied.count).map(|k| wave(k, 1.9)).collect();
+        x[0] = tied.given()[0];
+        let (whole, reduced) = (tied.coefficients(&x), gradients.tied(&tied, &given));
+        for (k, given) in given.iter().enumerate() {
+            let (a, b) = (gradients.at(k, &whole), reduced.at(k, &x));
+            assert!((0..2).all(|c| (a[c] + given[c] - b[c]).abs() < 1e-9), "{k}: {a:?} {given:?} {b:?}");
+        }
+        let mut roughness = Roughness::default();
+        (2..count).for_each(|k| {
+            roughness
+                .push(1.0 + k as f64, [(k as u32, 1.0), (k as u32 - 1, -2.0), (k as u32 - 2, 1.0)].into())
+        });
+        let form = |roughness: &Roughness, x: &[f64]| -> f64 {
+            let row = |(weight, terms): &(f64, Vec<(u32, f64)>)| {
+                weight * terms.iter().map(|&(k, share)| share * x[k as usize]).sum::<f64>().powi(2)
+            };
+            roughness.rows.iter().map(row).sum()
+        };
+        let (a, b) = (form(&roughness, &whole), form(&roughness.tied(&tied), &x));
+        assert!((a - b).abs() < 1e-9 * a, "{a} {b}");
     }
 
     /// Of directions that are equally good inside, passes that meet the borders squarely are shorter: they end at two

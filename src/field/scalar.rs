@@ -83,6 +83,8 @@ pub enum ScalarField {
     Spline(ScalarSpline),
     /// A function on a grid.
     Grid(GridField),
+    /// A function on a grid and what a spline puts to it.
+    Corrected(GridField, ScalarSpline),
     /// A parameter itself: its level curves are the isoparametric lines of the other one.
     Coordinate(Axis),
 }
@@ -93,6 +95,10 @@ impl ScalarField {
         match self {
             Self::Spline(spline) => spline.value_and_gradient(u, v),
             Self::Grid(grid) => grid.value_and_gradient(u, v),
+            Self::Corrected(grid, spline) => {
+                let (a, b) = (grid.value_and_gradient(u, v), spline.value_and_gradient(u, v));
+                [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+            }
             Self::Coordinate(Axis::U) => [u, 1.0, 0.0],
             Self::Coordinate(Axis::V) => [v, 0.0, 1.0],
         }

@@ -184,7 +184,7 @@ impl Session {
             stock: Some(self.area()),
             feed_rate: self.scene.cutting.feed_rate,
             plunge_rate: self.scene.cutting.plunge_rate,
-            rapid_rate: self.scene.machine.rapid_rate,
+            machine: self.scene.machine,
             joining: request.joining,
             memory: self.budget().left(0) / PLAN_SHARE,
             earlier: None,

@@ -463,8 +463,9 @@ fn read_toolpath(
         PartKind::Any => Step::Scallop(limits.scallop),
     };
     let (name, own_folder) = read_name(section, &read.word)?;
-    let (joining, axis) =
-        if surface { (read_joining(section)?, axis::read(section)?) } else { (Joining::default(), None) };
+    let axis = if surface { axis::read(section)? } else { None };
+    let usual = if axis.is_none() { read.strategy.usual_links() } else { Links::Retract };
+    let joining = if surface { read_joining(section, usual)? } else { Joining::default() };
     let named = |file: Located<String>| NamedFile::beside(folder, &file.value, file.span);
     let directions = read.tables.into_iter().map(named).collect();
     let stock_is_previous = kind != PartKind::Pocket && section.word("stock", &[PREVIOUS_STOCK])?.is_some();
@@ -499,13 +500,13 @@ fn read_name(section: &Section<'_>, word: &Located<&str>) -> Result<(String, Str
     Ok((name, folder))
 }
 
-/// How passes are smoothed and joined.
-fn read_joining(section: &Section<'_>) -> Result<Joining, SceneError> {
+/// How passes are smoothed and joined, in the usual way where nothing is said.
+fn read_joining(section: &Section<'_>, usual: Links) -> Result<Joining, SceneError> {
     let default = Joining::default();
     let links = match section.word("links", &["surface", "retract"])?.map(|word| word.value) {
         Some("surface") => Links::Surface,
         Some(_) => Links::Retract,
-        None => default.links,
+        None => usual,
     };
     let longest_link = section.length_or_word("longest_link", "auto")?;
     if links == Links::Retract && longest_link.is_some() {

@@ -9,8 +9,8 @@ use field::mesh::Sense;
 use field::{KnotRule, Solver};
 use geometry::Point2;
 use toolpath::{
-    Along, FeedDirection, FrontStart, IsoParametric, IsoScallop, LevelSteps, ShortestStreamline, Spiral,
-    Strategy, StreamMethod, Streamline, Waterline, Zigzag, ZigzagAngle,
+    Along, FeedDirection, FrontStart, IsoParametric, IsoScallop, LevelSteps, Objective, ShortestStreamline,
+    Spiral, Strategy, StreamMethod, Streamline, Waterline, Zigzag, ZigzagAngle,
 };
 
 const VALID: &str = r#"
@@ -105,10 +105,20 @@ fn classical_strategies_are_read_and_written_back() {
         ("waterline\"", boxed(Waterline { steps: LevelSteps::Shortest })),
         ("waterline\"\nstep = \"constant\"", boxed(Waterline { steps: LevelSteps::Constant })),
         ("spiral\"", boxed(Spiral::Plan)),
-        ("streamline\"\ndirection = \"shortest\"", boxed(ShortestStreamline { toward: None })),
+        (
+            "streamline\"\ndirection = \"shortest\"",
+            boxed(ShortestStreamline { toward: None, objective: Objective::Time }),
+        ),
+        (
+            "streamline\"\nobjective = \"length\"",
+            boxed(ShortestStreamline { toward: None, objective: Objective::Length }),
+        ),
         (
             "streamline\"\ndirection = \"contour\"\nfollow = 1.5",
-            boxed(ShortestStreamline { toward: Some((FeedDirection::Contour, 1.5)) }),
+            boxed(ShortestStreamline {
+                toward: Some((FeedDirection::Contour, 1.5)),
+                objective: Objective::Length,
+            }),
         ),
         ("spiral\"\nkind = \"contour\"", boxed(Spiral::Contour)),
     ];

@@ -24,7 +24,7 @@ pub use strategies::iso_parametric::IsoParametric;
 pub use strategies::iso_scallop::{FrontStart, IsoScallop};
 pub use strategies::offset_surface::{OffsetAlong, OffsetDrive, OffsetSurface};
 pub use strategies::program::{ALL_TOOLS, ForeignProgram, ReadProgram, ToolsMeant};
-pub use strategies::shortest::{ShortestStreamline, shortest_possible};
+pub use strategies::shortest::{Objective, ShortestStreamline, shortest_possible};
 pub use strategies::spiral::Spiral;
 pub use strategies::streamline::{DEFAULT_CONTROL_POINTS, DEFAULT_DEGREE, FITTED, StreamMethod, Streamline};
 pub use strategies::waterline::Waterline;

@@ -2,18 +2,19 @@
 
 use crate::facets::facet_charge;
 use crate::levels::{obedience, planned_field};
-use crate::link::{join, join_tilted};
+use crate::link::{join, join_tilted, time_to_neighbour};
 use crate::strategies::shortest::shortest_possible;
 use crate::strategies::words_for;
 use crate::surface::mesh_surface;
 use crate::tilt::tilted::{self, TiltedPasses, Tilting};
 use crate::touch_up;
 use crate::vocabulary::{
-    Contact, Levelled, PartKind, PassSettings, Passes, PlanError, PlanSettings, SAMPLING_OVER_RADIUS, Setup,
-    Step, Strategy, Task,
+    Contact, Levelled, Pace, PartKind, PassSettings, Passes, PlanError, PlanSettings, SAMPLING_OVER_RADIUS,
+    Setup, Step, Strategy, Task,
 };
 use cutter::Cutter;
 use field::{PlannedField, ShortestPossible};
+use machine::{Machine, machining_time, slow_corners};
 use motion::{ROUNDING, ToolAxis, Toolpath};
 use part::Part;
 use scallop::strip_width;
@@ -173,7 +174,11 @@ fn passes(setup: &Setup<'_>, strategy: &dyn Strategy, axis: Option<&ToolAxis>) -
         probe: probe.as_ref(),
     };
     let wants_mesh = mesh_surface::wants_mesh(part, cutter);
-    let mut task = Task { part, cutter, settings: pass, wants_mesh, monitor };
+    let duration = |passes: &Passes| duration(passes, strategy.both_ways(), setup);
+    let feed = settings.feed_rate / 60.0;
+    let bend = feed * feed / settings.machine.acceleration;
+    let pace = Pace { duration: &duration, link: feed * time_to_neighbour(setup), bend };
+    let mut task = Task { part, cutter, settings: pass, wants_mesh, pace, monitor };
     task.settings.step = charged_step(&task, strategy, settings);
     check_extent(&task)?;
     let mut passes = strategy.passes(&task)?;
@@ -181,6 +186,17 @@ fn passes(setup: &Setup<'_>, strategy: &dyn Strategy, axis: Option<&ToolAxis>) -
         touch_up::add(&task, &earlier.touch_up, &mut passes.passes)?;
     }
     Ok(passes)
+}
+
+/// The time, s, that the machine takes for passes once they are joined. Jerks of its axes are left out: they take seconds to
+/// search for, and slow all plans of a part alike.
+fn duration(passes: &Passes, both_ways: bool, setup: &Setup<'_>) -> Result<f64, PlanError> {
+    let machine = &Machine { jerks: [f64::INFINITY; 3], ..setup.settings.machine };
+    let mut path = join(passes.passes.clone(), both_ways, setup)?;
+    if machine.slow_corners {
+        path = slow_corners(&path, machine);
+    }
+    Ok(machining_time(&path, machine, setup.monitor)?)
 }
 
 /// The distance of passes less what chords, facets and the program's decimals take of a scallop target.

@@ -41,7 +41,6 @@ fn settings(part: &Part) -> PlanSettings {
         stock_top: part.bounds().max.z + 1.0,
         feed_rate: 1000.0,
         plunge_rate: 300.0,
-        rapid_rate: 15_000.0,
         joining: Joining::default(),
         ..PlanSettings::default()
     }

@@ -12,7 +12,7 @@ use millstream::monitor::Silent;
 use millstream::motion::{MoveKind, Toolpath};
 use millstream::part::Part;
 use millstream::toolpath::{
-    FeedDirection, PlanError, ShortestStreamline, Step, StreamMethod, Streamline, plan,
+    FeedDirection, Objective, PlanError, ShortestStreamline, Step, StreamMethod, Streamline, plan,
 };
 
 use crate::command::{PLATE, millstream};
@@ -323,7 +323,7 @@ fn passes_keep_to_a_direction_as_far_as_it_is_worth() {
     let cutter = Cutter::ball(12.0).unwrap();
     for part in [patch, holed] {
         let run = |toward: Option<(FeedDirection, f64)>| {
-            let strategy = ShortestStreamline { toward };
+            let strategy = ShortestStreamline { toward, objective: Objective::Length };
             plan(&part, &cutter, &strategy, &settings(&part, Step::Scallop(0.01)), &Silent).unwrap().path
         };
         let length = |path: &Toolpath| -> f64 {

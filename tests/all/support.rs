@@ -38,7 +38,6 @@ pub fn settings(part: &Part, step: Step) -> PlanSettings {
         stock_top: part.bounds().max.z + ALLOWANCE,
         feed_rate: 1000.0,
         plunge_rate: 300.0,
-        rapid_rate: 15_000.0,
         joining: Joining::default(),
         ..PlanSettings::default()
     }

@@ -34,7 +34,7 @@ const TURN_PLACES: usize = 96;
 const MERGE_OVER_RADIUS: f64 = 1.0;
 
 /// Where directions matter less than this all around a place, it is no singular point: they are noise.
-const NO_MATTER: f64 = 1e-3;
+pub(crate) const NO_MATTER: f64 = 1e-3;
 
 /// Most singular points that a note names.
 const MOST_NAMED: usize = 4;

@@ -241,7 +241,6 @@ mod tests {
             stock_top: 3.0,
             feed_rate: 1000.0,
             plunge_rate: 300.0,
-            rapid_rate: 15_000.0,
             joining: Joining::default(),
             ..PlanSettings::default()
         };

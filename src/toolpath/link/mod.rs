@@ -82,7 +82,11 @@ pub(crate) fn join(
         Links::Retract => 0.0,
     };
     let cost = |distance: f64| rates.between(distance, longest);
-    let visits = order(&passes, both_ways, &cost);
+    let mut visits = order(&passes, both_ways, &cost);
+    if both_ways && rates.is_quicker_backwards(&visits, &passes) {
+        visits.reverse();
+        visits.iter_mut().for_each(|visit| visit.reversed ^= true);
+    }
     monitor::check(monitor)?;
     let passes = in_order(passes, &visits, both_ways);
     let mut links: Vec<Option<Vec<Point3>>> = Vec::new();
@@ -125,7 +129,7 @@ const BEND: f64 = std::f64::consts::FRAC_PI_2;
 impl Speeds {
     fn of(settings: &PlanSettings, passes: &[Vec<Point3>]) -> Self {
         let [feed, plunge, rapid] =
-            [settings.feed_rate, settings.plunge_rate, settings.rapid_rate].map(|rate| rate / 60.0);
+            [settings.feed_rate, settings.plunge_rate, settings.machine.rapid_rate].map(|rate| rate / 60.0);
         let ends = passes.iter().flat_map(|p| [p[0].z, p[p.len() - 1].z]);
         let (sum, count) = ends.fold((0.0, 0.0), |(sum, n), z| (sum + z, n + 1.0));
         let mean = if count > 0.0 { sum / count } else { settings.stock_top };
@@ -138,6 +142,30 @@ impl Speeds {
         let retract = self.retract + distance / self.rapid;
         if distance * BEND > longest { retract } else { retract.min(distance * BEND / self.feed) }
     }
+
+    /// Whether passes take less time from the last to the first: the way down is fed slowly, the way up at the end is not.
+    fn is_quicker_backwards(&self, visits: &[Visit], passes: &[Vec<Point3>]) -> bool {
+        let height = |visit: Option<&Visit>, at_its_end: bool| {
+            let points = &passes[visit?.pass];
+            let closed = is_closed(points);
+            let at = if visit?.reversed == at_its_end { 0 } else { points.len() - 1 };
+            Some(points[if closed { visit?.start } else { at }].z)
+        };
+        let ends = height(visits.first(), false).zip(height(visits.last(), true));
+        ends.is_some_and(|(first, last)| (last - first) * (1.0 / self.plunge - 1.0 / self.feed) > 0.0)
+    }
+}
+
+/// What it takes to go on from a pass to the next one beside it, s, as far as it can be told before there are passes.
+pub(crate) fn time_to_neighbour(setup: &Setup<'_>) -> f64 {
+    let Setup { part, cutter, settings, .. } = *setup;
+    let longest = match settings.joining.links {
+        Links::Surface => longest_link(&settings.joining, cutter, settings.step),
+        Links::Retract => 0.0,
+    };
+    let bounds = part.bounds();
+    let rates = Speeds::of(settings, &[vec![nalgebra::center(&bounds.min, &bounds.max)]]);
+    rates.between(plane_interval(cutter, settings.step), longest)
 }
 
 /// The passes as they are visited: turned round, and closed ones begun where they are to begin.

@@ -16,7 +16,6 @@ fn settings(links: Links) -> PlanSettings {
         stock_top: TOP,
         feed_rate: 1000.0,
         plunge_rate: 300.0,
-        rapid_rate: 15_000.0,
         joining: Joining { links, ..Joining::default() },
         ..PlanSettings::default()
     }
@@ -323,4 +322,22 @@ proptest! {
         // Never below the plate by more than the chords, and never over more than the safe height.
         prop_assert!(path.moves.iter().all(|m| m.to.tip.z <= TOP + 2.0));
     }
+}
+
+/// Of two ways through the same passes that one is taken whose first descent, which is fed slowly, is the shorter.
+#[test]
+fn passes_begin_at_the_higher_end() {
+    let passes: Vec<Vec<Point3>> = (0..4)
+        .map(|k| {
+            let (x, z) = (5.0 + f64::from(k), -f64::from(k));
+            vec![Point3::new(x, 5.0, z), Point3::new(x, 15.0, z)]
+        })
+        .collect();
+    let fed_down = |passes: &[Vec<Point3>]| {
+        let path = joined(&plate(), passes, true, Links::Retract);
+        assert_eq!(path.start.tip.x, 5.0);
+        path.start.tip.z - path.moves[0].to.tip.z
+    };
+    let low_first: Vec<Vec<Point3>> = passes.iter().rev().cloned().collect();
+    assert_eq!(fed_down(&passes), fed_down(&low_first));
 }

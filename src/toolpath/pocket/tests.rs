@@ -3,6 +3,7 @@ mod engagement;
 use super::*;
 use crate::vocabulary::{Joining, Step};
 use geometry::{Point2, Point3};
+use machine::Machine;
 use motion::MoveKind;
 use std::f64::consts::PI;
 use work::monitor::Silent;
@@ -34,7 +35,7 @@ fn settings() -> PlanSettings {
         stock_top: 0.0,
         feed_rate: 1000.0,
         plunge_rate: 300.0,
-        rapid_rate: 5000.0,
+        machine: Machine { rapid_rate: 5000.0, ..Machine::default() },
         joining: Joining::default(),
         ..PlanSettings::default()
     }

@@ -128,54 +128,97 @@ impl Strategy for IsoScallop {
         for (k, chart) in charts.iter().enumerate() {
             all.append(match task.earlier_on_chart(k, charts.len()) {
                 Some((field, levelled)) => along_earlier(task, chart, field, levelled)?,
-                None => on_chart(task, chart, self.start, f64::INFINITY)?,
+                None => on_chart(task, chart, self.start)?,
             });
         }
         Ok(all)
     }
 }
 
-/// Plans passes over one chart; none from starts that promise a path longer than `worth`, mm.
-pub(crate) fn on_chart(
+/// Plans passes over one chart from the best start.
+fn on_chart(task: &Task<'_>, chart: &Chart, start: FrontStart) -> Result<Passes, PlanError> {
+    let fronts = fronts(task, chart, start)?;
+    let searched = fronts.len();
+    let mut best: Option<Passes> = None;
+    for front in fronts.into_iter().take(PLANNED) {
+        let passes = along_front(task, chart, front, searched)?;
+        if best.as_ref().is_none_or(|best| passes.length() < best.length()) {
+            best = Some(passes);
+        }
+    }
+    Ok(best.unwrap_or_default())
+}
+
+/// A front from one start.
+pub(crate) struct StartedFront {
+    /// Where it starts.
+    pub name: &'static str,
+    /// That border, as [`border_name`] takes it.
+    pub border: Option<(usize, usize)>,
+    pub field: GridField,
+    /// The length of its passes as predicted, mm.
+    pub predicted: f64,
+}
+
+/// The fronts from all starts that are to be tried, that with the least predicted length first.
+pub(crate) fn fronts(
     task: &Task<'_>,
     chart: &Chart,
     start: FrontStart,
-    worth: f64,
-) -> Result<Passes, PlanError> {
+) -> Result<Vec<StartedFront>, PlanError> {
     let Task { cutter, ref settings, monitor, .. } = *task;
-    let mut tried = Vec::new();
     let places = places(chart, LENGTH_SAMPLES);
-    for (name, curves) in starts(chart, start) {
+    let mut tried = Vec::new();
+    for (name, border, curves) in starts(chart, start) {
         let signed = matches!(start, FrontStart::Line(_));
-        let field = arrival(chart, cutter, settings.step, &curves, signed, monitor)?;
-        let field = ScalarField::Grid(field);
-        tried.push((predicted_length(&places, cutter, settings.step, &field), name, field));
+        let field = ScalarField::Grid(arrival(chart, cutter, settings.step, &curves, signed, monitor)?);
+        let predicted = predicted_length(&places, cutter, settings.step, &field);
+        if let ScalarField::Grid(field) = field {
+            tried.push(StartedFront { name, border, field, predicted });
+        }
     }
-    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let searched = tried.len();
-    let mut planned = Vec::new();
-    for (length, name, field) in tried.into_iter().take(PLANNED).filter(|(length, ..)| *length < worth) {
-        planned.push((along_levels(task, chart, &field)?, field, name, length));
-    }
-    planned.sort_by(|a, b| a.0.length().total_cmp(&b.0.length()));
-    let Some((mut best, field, name, length)) = planned.into_iter().next() else {
-        return Ok(Passes::default());
-    };
-    let told = format!("passes start {name}{}", if searched > 1 { ", the best of four borders" } else { "" });
-    let function = LevelFunction::Chart(Arc::new(field));
-    let planned_as = format!("front, starting {name}").into();
-    Levelled { function, planned_as, told: Some((told, length)) }.put_with(&mut best);
-    Ok(best)
+    tried.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
+    Ok(tried)
 }
 
-/// The start curves to try, each with its name.
-fn starts(chart: &Chart, start: FrontStart) -> Vec<(&'static str, Vec<Vec<[f64; 2]>>)> {
+/// Plans passes along the levels of one of so many fronts that were tried.
+pub(crate) fn along_front(
+    task: &Task<'_>,
+    chart: &Chart,
+    front: StartedFront,
+    tried: usize,
+) -> Result<Passes, PlanError> {
+    let StartedFront { name, field, predicted, .. } = front;
+    let field = ScalarField::Grid(field);
+    let mut passes = along_levels(task, chart, &field)?;
+    let told = format!("passes start {name}{}", if tried > 1 { ", the best of four borders" } else { "" });
+    let function = LevelFunction::Chart(Arc::new(field));
+    let planned_as = format!("front, starting {name}").into();
+    Levelled { function, planned_as, told: Some((told, predicted)) }.put_with(&mut passes);
+    Ok(passes)
+}
+
+/// Where a front starts: at the border where the parameter (0: u, 1: v) is least (0) or greatest (1).
+pub(crate) fn border_name((parameter, end): (usize, usize)) -> &'static str {
+    match (parameter, end) {
+        (0, 0) => "at the border of least u",
+        (0, _) => "at the border of greatest u",
+        (_, 0) => "at the border of least v",
+        _ => "at the border of greatest v",
+    }
+}
+
+/// The start curves to try, each with its name and its border.
+fn starts(
+    chart: &Chart,
+    start: FrontStart,
+) -> Vec<(&'static str, Option<(usize, usize)>, Vec<Vec<[f64; 2]>>)> {
     let [[u0, u1], [v0, v1]] = chart.domain;
-    let border = |constant: Along, greatest: bool| match (constant, greatest) {
-        (Along::U, false) => ("at the border of least u", vec![vec![[u0, v0], [u0, v1]]]),
-        (Along::U, true) => ("at the border of greatest u", vec![vec![[u1, v0], [u1, v1]]]),
-        (Along::V, false) => ("at the border of least v", vec![vec![[u0, v0], [u1, v0]]]),
-        (Along::V, true) => ("at the border of greatest v", vec![vec![[u0, v1], [u1, v1]]]),
+    let border = |constant: Along, greatest: bool| {
+        let (parameter, end) = (usize::from(constant == Along::V), usize::from(greatest));
+        let at = chart.domain[parameter][end];
+        let line = if parameter == 0 { [[at, v0], [at, v1]] } else { [[u0, at], [u1, at]] };
+        (border_name((parameter, end)), Some((parameter, end)), vec![line.to_vec()])
     };
     match start {
         FrontStart::BestBorder => [(Along::U, false), (Along::U, true), (Along::V, false), (Along::V, true)]
@@ -183,7 +226,7 @@ fn starts(chart: &Chart, start: FrontStart) -> Vec<(&'static str, Vec<Vec<[f64; 
             .to_vec(),
         FrontStart::Border { constant, greatest } => vec![border(constant, greatest)],
         FrontStart::AllBorders => {
-            vec![("at all borders", vec![vec![[u0, v0], [u1, v0], [u1, v1], [u0, v1], [u0, v0]]])]
+            vec![("at all borders", None, vec![vec![[u0, v0], [u1, v0], [u1, v1], [u0, v1], [u0, v0]]])]
         }
         FrontStart::Line([a, b]) => {
             let at = |t: f64| {
@@ -192,7 +235,7 @@ fn starts(chart: &Chart, start: FrontStart) -> Vec<(&'static str, Vec<Vec<[f64; 
             };
             // Continued until it is beyond the unit square on both sides.
             let reach = 4.0 / (b[0] - a[0]).hypot(b[1] - a[1]).max(1e-9);
-            vec![("on a line", vec![vec![at(-reach), at(1.0 + reach)]])]
+            vec![("on a line", None, vec![vec![at(-reach), at(1.0 + reach)]])]
         }
     }
 }

@@ -7,7 +7,7 @@
 //! the cutter there, so that the mesh decides where passes run, never how deep.
 
 use super::mesh_shortest::shortest_stream;
-use super::shortest::{SEARCHED, SHORTEST};
+use super::shortest::{Objective, SEARCHED};
 use super::streamline::FITTED;
 use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between};
 use crate::levels::planned_field;
@@ -131,7 +131,7 @@ fn on_piece(
             let found = shortest_stream(surface, cutter, settings, toward.as_deref(), monitor)?;
             let found =
                 found.ok_or_else(|| not_applicable("no stream function of least length was found"))?;
-            let told = toward.is_none().then(|| (SHORTEST.to_owned(), found.cost));
+            let told = toward.is_none().then(|| (Objective::Length.told().to_owned(), found.cost));
             let function = LevelFunction::Mesh(found.coefficients.into());
             Levelled { function, planned_as: SEARCHED.into(), told }
         }

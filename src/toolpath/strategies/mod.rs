@@ -14,6 +14,7 @@ pub(crate) mod offset_surface;
 pub(crate) mod program;
 pub(crate) mod shortest;
 pub(crate) mod spiral;
+mod stream_search;
 pub(crate) mod streamline;
 pub(crate) mod waterline;
 pub(crate) mod zigzag;

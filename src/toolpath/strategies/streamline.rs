@@ -4,7 +4,7 @@ use std::fmt::{self, Write as _};
 
 use super::direction_keys;
 use super::mesh_passes::{self, Aim};
-use super::shortest::ShortestStreamline;
+use super::shortest::{self, Objective, ShortestStreamline};
 use crate::levels::level_passes::along_levels;
 use crate::levels::{obedience, planned_field};
 use crate::surface::chart::{Chart, ChartPoint};
@@ -105,9 +105,10 @@ const FOLLOW: std::ops::RangeInclusive<f64> = 0.0..=1000.0;
 /// How scenes speak of it.
 pub(crate) static DEFINITION: Definition = Definition {
     word: "streamline",
-    help: "level curves of a stream function that follows feed directions, or that makes the path shortest",
+    help: "level curves of a stream function that follows feed directions, or that makes the path quickest",
     part: PartKind::Surface,
     keys: &[
+        "objective",
         "follow",
         "direction",
         "directions",
@@ -125,19 +126,26 @@ pub(crate) static DEFINITION: Definition = Definition {
 
 fn read(from: &mut Reading<'_>) -> Result<Box<dyn Strategy>, SceneError> {
     let section = from.section;
-    let shortest = |keys: &[&'static str], what: &str| {
+    let only = |keys: &[&'static str], what: &str| {
         let keys: Vec<&str> = PartKind::Surface.common_keys().iter().chain(keys).copied().collect();
         section.only(&keys, DEFINITION.keys, what)
     };
     let needed = DIRECTED.iter().any(|key| section.has(key));
     let Some(direction) = direction_keys::read(section, &mut from.tables, needed)? else {
-        shortest(&["direction"], "direction = \"shortest\"")?;
-        return Ok(Box::new(ShortestStreamline { toward: None }));
+        only(&["direction", "objective"], "direction = \"shortest\"")?;
+        let objective = section.choice("objective", &Objective::WORDS)?;
+        return Ok(Box::new(ShortestStreamline { toward: None, objective }));
     };
     if let Some(dearer) = section.number("follow", FOLLOW, "")? {
         let keys: Vec<&'static str> = direction_keys::KEYS.into_iter().chain(["follow"]).collect();
-        shortest(&keys, "`follow`, which leaves no method to choose")?;
-        return Ok(Box::new(ShortestStreamline { toward: Some((direction, dearer.value)) }));
+        only(&keys, "`follow`, which leaves no method to choose")?;
+        let objective = Objective::Length;
+        return Ok(Box::new(ShortestStreamline { toward: Some((direction, dearer.value)), objective }));
+    }
+    if section.has("objective") {
+        let message = "`objective` does not act where passes follow a direction".to_owned();
+        let cure = "delete it, or leave the direction free";
+        return Err(section.error(&section.key_span("objective"), message, cure));
     }
     let control_points = section.count("control_points", 4..=200)?.map(|n| n as usize);
     let (method, solver) = read_method(section, control_points.unwrap_or(DEFAULT_CONTROL_POINTS))?;
@@ -280,7 +288,13 @@ fn on_charts(task: &Task<'_>, asked: &Streamline) -> Result<Passes, PlanError> {
     let mut all = Passes { notes: feed::check(direction, part, &parameters)?, ..Passes::default() };
     // What was measured of an earlier plan moves levels, not the function.
     let by_calculation = Chart::all(part, cutter, Guide { correction: None, ..settings.guide() })?;
-    for (chart, calculated) in charts.into_iter().zip(by_calculation) {
+    let of = charts.len();
+    for (k, (chart, calculated)) in charts.into_iter().zip(by_calculation).enumerate() {
+        if matches!(direction, FeedDirection::WidestStrip) && all_strips_are_alike(&chart, cutter) {
+            all.notes.push(ALIKE.to_owned());
+            all.append(shortest::on_chart(task, &chart, [k, of], None, Objective::Time)?);
+            continue;
+        }
         let direction = feed::on_chart(direction, &chart, cutter)?;
         let (field, mut notes, wanted) =
             stream_function(&calculated, cutter, &direction, asked, settings.step)?;
@@ -303,6 +317,20 @@ fn on_charts(task: &Task<'_>, asked: &Streamline) -> Result<Passes, PlanError> {
     }
     Ok(all)
 }
+
+/// What is told where no direction has a wider strip than others.
+const ALIKE: &str = "no direction has a wider strip than another here, so that passes follow the stream function of least \
+                     machining time";
+
+/// Whether strips are as wide in all directions, as on planes and spheres: what then is the widest is rounding.
+fn all_strips_are_alike(chart: &Chart, cutter: &Cutter) -> bool {
+    let matters =
+        |[u, v]: [f64; 2]| chart.at(u, v)?.feed(&FeedDirection::WidestStrip, cutter).map(|(_, m)| m);
+    chart.grid(PLACES_ALIKE).filter_map(matters).all(|matters| matters < planned_field::NO_MATTER)
+}
+
+/// Places a side at which strips are compared in all directions.
+const PLACES_ALIKE: usize = 24;
 
 /// Feed directions and how much they matter on an even grid of a chart, oriented alike.
 struct FeedGrid {
@@ -475,10 +503,13 @@ fn placed_knots(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plan::{Plan, plan};
+    use crate::vocabulary::PlanSettings;
     use field::LineSample;
     use geometry::{AnalyticShape, AnalyticSurface};
     use part::{Part, Patch};
     use std::sync::Arc;
+    use work::monitor::Silent;
 
     /// The velocities of ψ = sin(u/6) cos(v/5) + u v/60 at 15 × 15 places of a plane of 15 by 12 mm, as a file of directions.
     fn vectors() -> FeedDirection {
@@ -518,6 +549,27 @@ mod tests {
             .collect();
         let squares: f64 = angles.iter().map(|a| a * a).sum();
         [(squares / angles.len() as f64).sqrt(), angles.into_iter().fold(0.0, f64::max)]
+    }
+
+    /// On a sphere no strip is wider than another: directions of the widest would be rounding, and passes along them times as long.
+    #[test]
+    fn on_a_sphere_passes_of_the_widest_strip_are_the_quickest() {
+        let shape = AnalyticShape::Sphere { height: 0.0, radius: 20.0, concave: false };
+        let surface = AnalyticSurface::new(shape, [[-4.0, 4.0], [-3.0, 3.0]]).unwrap();
+        let part = Part::from_patches(vec![Patch::Analytic(surface)], 0.002).unwrap();
+        let cutter = Cutter::ball(6.0).unwrap();
+        let settings = PlanSettings {
+            step: Step::Scallop(0.02),
+            stock_top: part.bounds().max.z + 1.0,
+            ..PlanSettings::default()
+        };
+        let free = ShortestStreamline { toward: None, objective: Objective::Time };
+        let widest = Streamline::along(FeedDirection::WidestStrip);
+        let [free, widest]: [Plan; 2] = [&free as &dyn Strategy, &widest]
+            .map(|strategy| plan(&part, &cutter, strategy, &settings, &Silent).unwrap());
+        assert_eq!(widest.path, free.path);
+        assert!(widest.notes.iter().any(|note| note == ALIKE), "{:?}", widest.notes);
+        assert_eq!(widest.functions.len(), 1);
     }
 
     /// Vectors that have a stream function are followed as closely as the published fit does where their lengths set the

@@ -19,4 +19,4 @@ pub use passes::{Contact, LevelFunction, Levelled, OffDirection, Passes};
 pub use settings::{Earlier, Joining, Links, PlanSettings, Step};
 pub use strategy::{Definition, PartKind, Reading, Strategy};
 pub(crate) use task::Setup;
-pub use task::Task;
+pub use task::{Pace, Task};

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::{Correction, Levelled};
 use geometry::{Aabb, Point3};
+use machine::Machine;
 
 /// How far neighbouring passes lie apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,8 +60,8 @@ pub struct PlanSettings {
     pub feed_rate: f64,
     /// Feed down to a pass, mm/min.
     pub plunge_rate: f64,
-    /// Rapid rate, mm/min; it decides between links on the surface and retracts.
-    pub rapid_rate: f64,
+    /// The machine: its rapid rate decides between links on the surface and retracts, and machining times are its own.
+    pub machine: Machine,
     /// How passes are smoothed and joined.
     pub joining: Joining,
     /// What the tables of a plan may take beside its path, bytes; less makes them coarser.
@@ -99,9 +100,6 @@ const FEED_RATE: f64 = 1000.0;
 /// The feed down to a pass by default, mm/min: a third or less of the feed along it, since the tip of a cutter hardly cuts.
 const PLUNGE_RATE: f64 = 300.0;
 
-/// The rapid rate by default, mm/min: that of a machining centre of today.
-const RAPID_RATE: f64 = 15_000.0;
-
 /// What tables may take by default, bytes: more makes none finer.
 const MEMORY: u64 = 2 << 30;
 
@@ -117,7 +115,7 @@ impl Default for PlanSettings {
             stock: None,
             feed_rate: FEED_RATE,
             plunge_rate: PLUNGE_RATE,
-            rapid_rate: RAPID_RATE,
+            machine: Machine::default(),
             joining: Joining::default(),
             memory: MEMORY,
             earlier: None,

@@ -7,7 +7,7 @@
 use std::any::Any;
 use std::fmt::{self, Debug};
 
-use super::{FeedDirection, Passes, PlanError, Task};
+use super::{FeedDirection, Links, Passes, PlanError, Task};
 use keys::{Located, SceneError, Section};
 
 /// Which parts a strategy is made for.
@@ -111,6 +111,11 @@ pub trait Strategy: Any + Debug + Send + Sync + BoxedClone {
     /// Whether feed directions and the function whose levels are passes are of interest to the user.
     fn shows_field(&self) -> bool {
         false
+    }
+
+    /// How its passes are joined where nothing is said of it.
+    fn usual_links(&self) -> Links {
+        Links::Retract
     }
 
     /// Its feed direction, if it follows one: files of directions are read into it.

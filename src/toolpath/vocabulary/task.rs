@@ -1,6 +1,6 @@
 //! What a strategy is asked to cover, with what, and how.
 
-use super::{LevelFunction, Levelled, PassSettings, PlanSettings};
+use super::{LevelFunction, Levelled, PassSettings, Passes, PlanError, PlanSettings};
 use cutter::Cutter;
 use field::ScalarField;
 use part::Part;
@@ -19,6 +19,26 @@ pub(crate) struct Setup<'a> {
     pub monitor: &'a dyn Monitor,
 }
 
+/// How quick the machine is.
+#[derive(Clone, Copy)]
+pub struct Pace<'a> {
+    /// The time, s, that it takes for passes once they are joined.
+    pub duration: &'a (dyn Fn(&Passes) -> Result<f64, PlanError> + Sync),
+    /// What a link to a neighbouring pass takes, in mm of pass at the feed.
+    pub link: f64,
+    /// The least radius of a bend that it runs at the feed, mm.
+    pub bend: f64,
+}
+
+impl Pace<'_> {
+    /// How many mm of pass at the feed a mm along a surface of some curvature takes more than one, where the cutter's centre, `radius` mm
+    /// off the surface, follows a tighter bend than the machine runs at the feed: its speed falls as the root of the bend's radius.
+    pub fn slowed(&self, curvature: f64, radius: f64) -> f64 {
+        let bend = self.bend * curvature.abs() / (1.0 - curvature * radius).abs().max(f64::MIN_POSITIVE);
+        (bend.sqrt() - 1.0).max(0.0)
+    }
+}
+
 /// Everything that planning passes takes: part, cutter, settings, and whom to tell how far it has come.
 #[derive(Clone, Copy)]
 pub struct Task<'a> {
@@ -30,6 +50,8 @@ pub struct Task<'a> {
     pub settings: PassSettings<'a>,
     /// Whether no smooth surface follows the part (steps, holes, several patches), so that its mesh has to serve.
     pub wants_mesh: bool,
+    /// How quick the machine is.
+    pub pace: Pace<'a>,
     /// Is told how far planning has come, and may cancel it.
     pub monitor: &'a dyn Monitor,
 }
@@ -70,5 +92,26 @@ impl<'a> Task<'a> {
     /// Whether streamlines are those of the part's mesh, unless they are asked for otherwise.
     pub fn plans_on_mesh(&self) -> bool {
         !self.follows_contacts() && self.settings.probe.is_none() && self.wants_mesh
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Along an arc of radius ρ a machine of acceleration a runs at √(a ρ) mm/s.
+    #[test]
+    fn a_tight_bend_takes_as_much_longer_as_the_machine_is_slower_there() {
+        let (feed, acceleration, cutter): (f64, f64, f64) = (50.0, 1000.0, 0.05);
+        let pace = Pace { duration: &|_| Ok(0.0), link: 0.0, bend: feed * feed / acceleration };
+        for radius in [0.1, 0.7, 2.0] {
+            // Of surfaces, convex and concave, over which the centre's way has this radius.
+            for curvature in [-1.0 / (radius - cutter), 1.0 / (radius + cutter)] {
+                let slower = feed / (acceleration * radius).sqrt() - 1.0;
+                assert!((pace.slowed(curvature, cutter) - slower).abs() < 1e-12, "{radius} {curvature}");
+            }
+        }
+        assert_eq!(pace.slowed(1.0 / (2.6 + cutter), cutter), 0.0);
+        assert_eq!(pace.slowed(0.0, cutter), 0.0);
     }
 }

@@ -46,7 +46,6 @@ fn beside_a_wall_the_axis_leans_away_and_every_cut_is_clear() {
         stock_top: 3.0,
         feed_rate: 1000.0,
         plunge_rate: 300.0,
-        rapid_rate: 15_000.0,
         joining: Joining::default(),
         ..PlanSettings::default()
     };
@@ -85,7 +84,6 @@ fn settings(links: Links) -> PlanSettings {
         stock_top: 1.0,
         feed_rate: 1000.0,
         plunge_rate: 300.0,
-        rapid_rate: 15_000.0,
         joining: Joining { links, ..Joining::default() },
         ..PlanSettings::default()
     }

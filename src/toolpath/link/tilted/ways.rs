@@ -449,7 +449,6 @@ mod tests {
             stock: Some(stock),
             feed_rate: 1000.0,
             plunge_rate: 300.0,
-            rapid_rate: 15_000.0,
             joining: Joining::default(),
             ..PlanSettings::default()
         };

@@ -2,6 +2,7 @@
 
 use cutter::Cutter;
 use geometry::{Aabb, Point2, Point3, Region, RegionIndex, SegmentGrid};
+use machine::Machine;
 use metrology::{ContactArcs, contact_arcs};
 use motion::{Move, MoveKind, Toolpath};
 use sim::Stock;
@@ -176,7 +177,7 @@ fn plan(pocket: &Pocket, diameter: f64, pattern: Pattern, engagement: Option<f64
         stock_top: 0.0,
         feed_rate: 1000.0,
         plunge_rate: 300.0,
-        rapid_rate: 5000.0,
+        machine: Machine { rapid_rate: 5000.0, ..Machine::default() },
         joining: Joining::default(),
         ..PlanSettings::default()
     };

@@ -1,4 +1,5 @@
 use super::*;
+use crate::vocabulary::Pace;
 use geometry::TriangleMesh;
 use std::f64::consts::FRAC_PI_2;
 use work::monitor::Silent;
@@ -25,7 +26,14 @@ fn planned(part: &Part, angle: f64) -> Passes {
 }
 
 fn task<'a>(part: &'a Part, cutter: &'a Cutter) -> Task<'a> {
-    Task { part, cutter, settings: SETTINGS, wants_mesh: false, monitor: &Silent }
+    Task {
+        part,
+        cutter,
+        settings: SETTINGS,
+        wants_mesh: false,
+        pace: Pace { duration: &|passes| Ok(passes.length()), link: 1.0, bend: 0.1 },
+        monitor: &Silent,
+    }
 }
 
 /// A mesh over a grid of the plan view.

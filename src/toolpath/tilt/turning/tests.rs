@@ -151,7 +151,6 @@ fn plans_turn_no_faster_than_asked() {
                     stock_top: 8.0,
                     feed_rate: 1000.0,
                     plunge_rate: 300.0,
-                    rapid_rate: 15_000.0,
                     joining: joining[(p + r) % 2],
                     ..PlanSettings::default()
                 };
