@@ -208,11 +208,11 @@ pub(crate) fn border_name((parameter, end): (usize, usize)) -> &'static str {
     }
 }
 
-/// The start curves to try, each with its name and its border.
-fn starts(
-    chart: &Chart,
-    start: FrontStart,
-) -> Vec<(&'static str, Option<(usize, usize)>, Vec<Vec<[f64; 2]>>)> {
+/// Name and border of a start, and its curves in parameters.
+type StartCurves = (&'static str, Option<(usize, usize)>, Vec<Vec<[f64; 2]>>);
+
+/// The start curves to try.
+fn starts(chart: &Chart, start: FrontStart) -> Vec<StartCurves> {
     let [[u0, u1], [v0, v1]] = chart.domain;
     let border = |constant: Along, greatest: bool| {
         let (parameter, end) = (usize::from(constant == Along::V), usize::from(greatest));
