@@ -79,7 +79,7 @@ const MOST_IN_VAIN: usize = MOST_FOLLOWED + 3;
 /// A place takes at most so many intervals of a pass of its own.
 const TOUCH_UP_LENGTH: f64 = 3.0;
 
-/// Passes of their own are no longer in all than this share of the path.
+/// Passes of their own and the ways to them are no longer in all than this share of the path.
 const MOST_TOUCH_UP: f64 = 0.04;
 
 /// Cells from pass to pass while only ridges are measured.
@@ -463,20 +463,21 @@ impl Corrected<'_> {
         !is_even || round.highest() * (intervals / (intervals - 1.0)).powi(2) <= self.goal.target
     }
 
-    /// The widths of a plan corrected by the places where it leaves too much. Few get passes of their own, once. Of many, or
-    /// where that was no help, those that chords may have raised get shorter chords, and others narrower widths. `None` without
+    /// The widths of a plan corrected by the places where it leaves too much. Those that chords may have raised get shorter
+    /// chords. Of the others few get passes of their own, once; many, or where that was no help, narrower widths. `None` without
     /// such places.
     fn corrected(&self, widths: &Widths, standing: &Standing) -> Option<Widths> {
         let high = self.standing_high(standing);
         if high.is_empty() {
             return None;
         }
-        if self.are_few(&high) && !high.iter().any(|place| widths.is_touched_up(place)) {
-            return Some(widths.touched_up(&high));
-        }
         let is_raised = self.raised_by_chords(widths);
         let (raised, others): (Vec<_>, Vec<_>) = high.into_iter().partition(is_raised);
-        Some(widths.finer(&raised).narrowed(&others))
+        let finer = widths.finer(&raised);
+        if self.are_few(&others) && !others.iter().any(|place| widths.is_touched_up(place)) {
+            return Some(finer.touched_up(&others));
+        }
+        Some(finer.narrowed(&others))
     }
 
     /// Whether places take so little that passes of their own are shorter than any narrower widths.
@@ -486,8 +487,12 @@ impl Corrected<'_> {
         let mut cells: Vec<[i64; 3]> = places.iter().map(|place| cell(&place.at).into()).collect();
         cells.sort_unstable();
         cells.dedup();
-        let length = TOUCH_UP_LENGTH * interval * cells.len() as f64;
-        self.request.axis.is_none() && length <= MOST_TOUCH_UP * self.standing.round.cutting_length_mm
+        // What a pass takes beside its length, as those of the plan do on average.
+        let figures = path_figures(&self.best.plan.path, 0.0);
+        let off_pass = (figures.link_length_mm + figures.air_length_mm) / figures.passes.max(1) as f64;
+        let length = (TOUCH_UP_LENGTH * interval + off_pass) * cells.len() as f64;
+        let whole = figures.cutting_length_mm + figures.link_length_mm + figures.air_length_mm;
+        self.request.axis.is_none() && length <= MOST_TOUCH_UP * whole
     }
 
     /// The places of a plan that may stand above the target.
