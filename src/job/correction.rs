@@ -6,9 +6,10 @@
 //!
 //! The functions whose levels are passes are kept from round to round: only levels are placed anew, narrower around the
 //! places that stood too high. Places that stand above it by no more than chords may have raised them get shorter chords
-//! first, which costs points and no length, and leaves all levels where they are. Where an engine tells ridges apart, the first rounds measure no more than those, on cells as
-//! coarse as show every pass. Then all is measured as the verdict is; what still stands above the target then is corrected
-//! as well. Where narrowing does not help, the widths of the whole plan are scaled, which leaves its passes in shape.
+//! first, which costs points and no length, and leaves all levels where they are. Few others get short passes of their own,
+//! which leave all others where they are. Where an engine tells ridges apart, the first rounds measure no more than those,
+//! on cells as coarse as show every pass. Then all is measured as the verdict is; what still stands above the target then is
+//! corrected as well. Where narrowing does not help, the widths of the whole plan are scaled, which leaves its passes in shape.
 
 use std::sync::Arc;
 
