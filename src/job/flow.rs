@@ -164,6 +164,10 @@ impl Session {
                 monitor,
             )?;
         }
+        // Arcs of the program are as far off the moves that were measured.
+        if let Some(off) = scene.arcs.filter(|_| request.foreign().is_none()) {
+            measured.measurement.widen(off);
+        }
         // Where stock itself lies below the part between the cells no move cut.
         let cut = |region: &&mut GougeRegion| region.move_index != NOT_CUT;
         for region in measured.measurement.gouge.regions.iter_mut().filter(cut) {

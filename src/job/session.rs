@@ -325,6 +325,35 @@ mod tests {
         assert!(matches!(refused, JobError::Grid { reason: GridError::Memory { .. }, .. }), "{refused}");
     }
 
+    /// Arcs of a program may be off its moves: what they cut is not proven any nearer.
+    #[test]
+    fn bounds_are_wider_where_programs_have_arcs() {
+        let result = |arcs: &str| {
+            let text = format!(
+                "[part]\nsurface = \"plane\"\nx = [0, 8]\ny = [0, 6]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n\
+                 [tolerance]\ngouge = 0.0015\nchord = 0.002\n[machine]\nclearance = 2\n{arcs}[[toolpath]]\n\
+                 strategy = \"zigzag\"\nstepover = 0.4\n"
+            );
+            let session = Session::new(Scene::parse("plate.toml", text).unwrap()).unwrap();
+            session.toolpath(&session.scene.toolpaths[0], &work::monitor::Silent).unwrap().result
+        };
+        let [moves, arcs] = ["", "arcs = 0.002\n"].map(result);
+        let bounds = |result: &report::ToolpathResult| {
+            let (excess, scallop) = (&result.excess, &result.scallop);
+            let most =
+                [excess.highest, excess.reached, excess.unreached].map(|highest| highest.error_bound_mm);
+            [result.gouge.error_bound_mm, result.uncut.error_bound_mm, scallop.error_bound_mm.unwrap()]
+                .into_iter()
+                .chain(most)
+        };
+        assert!(bounds(&moves).zip(bounds(&arcs)).all(|(a, b)| (b - a - 0.002).abs() < 1e-12));
+        let gouge = |result: &report::ToolpathResult| {
+            let claim = result.claims.iter().find(|claim| claim.what == "gouge").unwrap();
+            claim.verdict()
+        };
+        assert_eq!([gouge(&moves), gouge(&arcs)], [report::Verdict::Pass, report::Verdict::Undecided]);
+    }
+
     /// What the planner lets the cutter into the triangles, and these into the true surface, is no gouge.
     #[test]
     fn tools_are_kept_off_triangles_that_lie_within_the_gouge_tolerance() {

@@ -314,6 +314,15 @@ pub struct Measurement {
 }
 
 impl Measurement {
+    /// Widens the bounds of all heights and depths by how far the path may be off the one that was measured, mm.
+    pub fn widen(&mut self, by: f64) {
+        let Self { scallop, gouge, uncut, excess, .. } = self;
+        let bounds = [&mut gouge.error_bound_mm, &mut uncut.error_bound_mm];
+        let highest = [&mut excess.highest, &mut excess.reached, &mut excess.unreached];
+        let highest = highest.map(|bounded| &mut bounded.error_bound_mm);
+        bounds.into_iter().chain(highest).chain(&mut scallop.error_bound_mm).for_each(|bound| *bound += by);
+    }
+
     /// Share of the ridge length that stands above a height, mm; `None` without ridges.
     pub fn share_above(&self, height: f64) -> Option<f64> {
         let length = |over: f64| -> f64 {
