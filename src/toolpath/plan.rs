@@ -183,7 +183,12 @@ fn passes(setup: &Setup<'_>, strategy: &dyn Strategy, axis: Option<&ToolAxis>) -
     check_extent(&task)?;
     let mut passes = strategy.passes(&task)?;
     if let Some(earlier) = task.settings.earlier.filter(|_| passes.touches.is_empty()) {
-        touch_up::add(&task, &earlier.touch_up, &mut passes.passes)?;
+        let added = touch_up::add(&task, &earlier.touch_up, &mut passes.passes)?;
+        if added > 0 {
+            passes
+                .notes
+                .push(format!("{added} short passes go once more over places where others left too much"));
+        }
     }
     Ok(passes)
 }

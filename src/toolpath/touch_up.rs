@@ -22,7 +22,7 @@ const BEYOND: f64 = 1.0;
 /// and follows its neighbour no farther than so many to either side: what lies beyond takes another pass.
 const FARTHEST: f64 = 16.0;
 
-/// Appends passes over `places`; the first of them are served first.
+/// Appends passes over `places`, and tells how many; the first places are served first.
 ///
 /// # Errors
 /// When cancelled.
@@ -30,7 +30,7 @@ pub(crate) fn add(
     task: &Task<'_>,
     places: &[Point3],
     passes: &mut Vec<Vec<Point3>>,
-) -> Result<(), PlanError> {
+) -> Result<usize, PlanError> {
     let Task { part, ref settings, monitor, .. } = *task;
     let dropped = task.dropped();
     let interval = plane_interval(dropped, settings.step);
@@ -40,7 +40,7 @@ pub(crate) fn add(
     };
     let mut waiting: Vec<Point2> = places.iter().map(axis_over).collect();
     if waiting.is_empty() || passes.is_empty() {
-        return Ok(());
+        return Ok(0);
     }
     let drop = DropCutter::watched(part, dropped, monitor)?;
     let planned = passes.len();
@@ -58,7 +58,7 @@ pub(crate) fn add(
             passes.push(pass);
         }
     }
-    Ok(())
+    Ok(passes.len() - planned)
 }
 
 /// A stretch of a pass in the plan view, shifted so that it runs through a place.
