@@ -1,9 +1,11 @@
 //! A scene with its part, ready to run its toolpaths.
 
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 use blade::Blade;
 use cutter::Holder;
+use field::ShortestPossible;
 use geometry::{Aabb, Bvh, Point3, Vector3};
 use io::digest::{self, Fingerprint};
 use metrology::{Budget, Engine, LaidOut, Measured, Simulation, Task};
@@ -12,7 +14,7 @@ use part::Part;
 use report::InputFile;
 use scene::{Fixture, Loaded, MeshFile, Scene, StockRequest, ToolpathRequest, load_mesh, load_part};
 use sim::{Grid, Stock};
-use toolpath::{PlanError, Pocket};
+use toolpath::{PlanError, Pocket, shortest_possible};
 use work::aside;
 use work::monitor::{Cancelled, Monitor, Silent};
 
@@ -49,6 +51,8 @@ pub struct Session {
     pub inputs: Vec<InputFile>,
     /// The scene's cutter, for all moves.
     cutters: Cutters,
+    /// The shortest possible paths that were found, with their scallop heights, mm.
+    shortest: Mutex<Vec<(f64, ShortestPossible)>>,
 }
 
 /// How well it is known that a part lies in a mesh.
@@ -167,12 +171,40 @@ impl Session {
         let doubt = units::doubt(&scene, &part);
         let inputs = inputs(&scene)?;
         let cutters = Cutters::from(&scene.cutter);
-        Ok(Self { scene, part, blade, pocket, cells, stock, notes, doubt, inputs, cutters })
+        Ok(Self {
+            scene,
+            part,
+            blade,
+            pocket,
+            cells,
+            stock,
+            notes,
+            doubt,
+            inputs,
+            cutters,
+            shortest: Mutex::default(),
+        })
     }
 
     /// What a simulation may take.
     pub(crate) fn budget(&self) -> Budget {
         Budget::new(&self.part, self.scene.simulation.memory_mib).beside(&self.stock)
+    }
+
+    /// What no path of an upright cutter below a scallop height, mm, is shorter than: the same for all plans.
+    pub(crate) fn shortest_possible(
+        &self,
+        height: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<ShortestPossible, PlanError> {
+        // Not locked while it is sought: a thread that waits for its share of that may come by here.
+        let known = || self.shortest.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, shortest)) = known().iter().find(|(of, _)| *of == height) {
+            return Ok(*shortest);
+        }
+        let shortest = shortest_possible(&self.part, &self.scene.cutter, height, monitor)?;
+        known().push((height, shortest));
+        Ok(shortest)
     }
 
     /// The stock's greatest height, mm.

@@ -3,7 +3,6 @@
 use crate::facets::facet_charge;
 use crate::levels::{obedience, planned_field};
 use crate::link::{join, join_tilted, time_to_neighbour};
-use crate::strategies::shortest::shortest_possible;
 use crate::strategies::words_for;
 use crate::surface::mesh_surface;
 use crate::tilt::tilted::{self, TiltedPasses, Tilting};
@@ -13,7 +12,7 @@ use crate::vocabulary::{
     Setup, Step, Strategy, Task,
 };
 use cutter::Cutter;
-use field::{PlannedField, ShortestPossible};
+use field::PlannedField;
 use machine::{Machine, machining_time, slow_corners};
 use motion::{ROUNDING, ToolAxis, Toolpath};
 use part::Part;
@@ -27,8 +26,6 @@ pub struct Plan {
     pub path: Toolpath,
     /// Things the user should know (a singular field, a step that was limited), in plain words.
     pub notes: Vec<String>,
-    /// What no path below the asked scallop height can be shorter than.
-    pub shortest: Option<ShortestPossible>,
     /// What a streamline path was planned by.
     pub field: Option<PlannedField>,
     /// The functions that its passes are levels of.
@@ -40,7 +37,7 @@ pub struct Plan {
 impl Plan {
     /// A path and nothing else to tell of it.
     pub fn of_path(path: Toolpath, notes: Vec<String>) -> Self {
-        Self { path, notes, shortest: None, field: None, functions: Vec::new(), too_near_between: 0.0 }
+        Self { path, notes, field: None, functions: Vec::new(), too_near_between: 0.0 }
     }
 
     fn new(
@@ -59,7 +56,7 @@ impl Plan {
         if path.is_empty() {
             notes.push("no pass reaches the part: the program is empty".into());
         }
-        Self { path, notes, shortest: None, field, functions: Vec::new(), too_near_between: 0.0 }
+        Self { path, notes, field, functions: Vec::new(), too_near_between: 0.0 }
     }
 }
 
@@ -110,11 +107,7 @@ pub fn plan(
     let setup = Setup { part, cutter, settings, monitor };
     let Passes { passes, notes, field, contacts, functions, .. } = passes(&setup, strategy, None)?;
     let path = join(passes, strategy.both_ways(), &setup)?;
-    let mut plan = Plan { functions, ..Plan::new(path, notes, field, &contacts, strategy) };
-    if let Step::Scallop(h) = settings.step {
-        plan.shortest = Some(shortest_possible(part, cutter, h)?);
-    }
-    Ok(plan)
+    Ok(Plan { functions, ..Plan::new(path, notes, field, &contacts, strategy) })
 }
 
 /// Plans one path of a cutter that tilts.

@@ -37,6 +37,8 @@ use field::ShortestPossible;
 use geometry::Vector3;
 use keys::{toml_number, word_of};
 use part::Part;
+use work::monitor::{self, Cancelled, Monitor};
+use work::parallel;
 
 /// By length alone: what a rad counts for that passes turn by since the surface is bent along them, in radii of the cutter.
 const TURN: f64 = 0.78;
@@ -52,16 +54,23 @@ const DIRECTIONS: usize = 36;
 /// The shortest possible path below the scallop height `h`, mm, by the widest strip over all directions at each place.
 ///
 /// # Errors
-/// When no smooth surface can be fitted to a mesh.
-pub fn shortest_possible(part: &Part, cutter: &Cutter, h: f64) -> Result<ShortestPossible, PlanError> {
+/// When no smooth surface can be fitted to a mesh, and when cancelled.
+pub fn shortest_possible(
+    part: &Part,
+    cutter: &Cutter,
+    h: f64,
+    monitor: &dyn Monitor,
+) -> Result<ShortestPossible, PlanError> {
     let mut sum = ShortestPossible { cutting_mm: 0.0, contact_mm: 0.0, limited_fraction: 0.0 };
     let mut total = 0.0;
     for chart in Chart::all(part, cutter, crate::vocabulary::Guide::default())? {
         let (places, cell) = places(&chart, PLACES);
-        for (_, p) in &places {
+        let least = |k: usize| {
+            monitor::check(monitor)?;
+            let (_, p) = &places[k];
             let (e, f, g) = p.jet.first_form();
             let area = cell * (e * g - f * f).max(0.0).sqrt();
-            let Some(t0) = p.jet.du.try_normalize(1e-300) else { continue };
+            let Some(t0) = p.jet.du.try_normalize(1e-300) else { return Ok(None) };
             let b0 = p.normal.cross(&t0);
             let (mut cutting, mut contact, mut limited) = (f64::INFINITY, f64::INFINITY, false);
             for k in 0..DIRECTIONS {
@@ -72,6 +81,10 @@ pub fn shortest_possible(part: &Part, cutter: &Cutter, h: f64) -> Result<Shortes
                 contact = contact.min(1.0 / width);
                 limited |= too_concave;
             }
+            Ok::<_, Cancelled>(Some((area, cutting, contact, limited)))
+        };
+        for (area, cutting, contact, limited) in parallel::try_map(places.len(), least)?.into_iter().flatten()
+        {
             sum.cutting_mm += cutting * area;
             sum.contact_mm += contact * area;
             sum.limited_fraction += if limited { area } else { 0.0 };
