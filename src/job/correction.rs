@@ -11,14 +11,16 @@
 //! on cells as coarse as show every pass. Then all is measured as the verdict is; what still stands above the target then is
 //! corrected as well. Where narrowing does not help, the widths of the whole plan are scaled, which leaves its passes in shape.
 
+mod chords;
+mod round;
+mod widths;
+
 use std::sync::Arc;
 
-use serde::Serialize;
-
 use geometry::Point3;
-use metrology::{Engine, Measured, Measurement, RidgeMap, ScallopRule, Simulation, path_figures};
+use metrology::{Engine, Measured, Measurement, RidgeMap, Simulation, path_figures};
 use scene::ToolpathRequest;
-use toolpath::{Correction, Earlier, Step, plane_interval};
+use toolpath::{Earlier, Kept, Step, plane_interval};
 use work::monitor::{self, Monitor};
 
 use super::figures::LeastLeftFigures;
@@ -27,12 +29,15 @@ use super::measuring::Closeness;
 use super::planned::Planned;
 use super::tool::Around;
 use super::{JobError, Session};
+pub(crate) use round::{CorrectionFigures, CorrectionRound};
+use round::{Gain, Goal};
+use widths::{HighPlace, MOST_NARROWED, SHORTER_CHORDS, Widths, aim};
 
 /// Most plans that are made while only ridges are measured.
 const MOST_ROUNDS: usize = 6;
 
 /// A plan whose highest ridge is within this share above the target is near to holding it.
-const NEAR: f64 = 0.05;
+const NEAR: f64 = 0.06;
 
 /// Most plans that are made again after all was measured: each costs as much as the whole run without correction.
 const MOST_MEASURED: usize = 3;
@@ -49,27 +54,12 @@ const SLACK: f64 = 0.02;
 /// per cent of length.
 const MEASURED_SLACK: f64 = 0.2;
 
-/// Chords of two passes raise a ridge by no more than this share of their tolerance.
-const RAISED_BY_CHORDS: f64 = 0.5;
-
 /// Ridges are about equally high where half of their length stands no lower than this share of the highest.
 const EVENLY_HIGH: f64 = 0.95;
-
-/// The factor of the chord tolerance where a ridge was raised by chords; where it still is, passes get nearer to each other.
-const SHORTER_CHORDS: f64 = 0.25;
-
-/// No width is corrected by more than this factor in a round.
-const MOST_NARROWED: f64 = 0.5;
 
 /// What stands more times as high as the target is no matter of widths. Two rounds take an interval to a quarter by
 /// [`MOST_NARROWED`], and ridges to a sixteenth: what is higher was never cut, and plans by other widths do not cut it either.
 const NEVER_CUT: f64 = 16.0;
-
-/// A place whose factor is less than one by more than this was narrowed before.
-const STILL_WIDE: f64 = 1e-6;
-
-/// A plan that does not hold the target is in vain unless it takes this share of what the best one leaves above it.
-const LEAST_GAIN: f64 = 0.1;
 
 /// Plans in vain whose high places are narrowed in the next one.
 const MOST_FOLLOWED: usize = 1;
@@ -85,45 +75,6 @@ const MOST_TOUCH_UP: f64 = 0.04;
 
 /// Cells from pass to pass while only ridges are measured.
 const CELLS_A_PASS: f64 = 4.0;
-
-/// What a round of the loop found.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(crate) struct CorrectionRound {
-    /// The highest ridge, mm.
-    pub highest_mm: f64,
-    /// The highest remnant along a border, mm; `None` where only what is highest of all was sought, and that is a ridge.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub border_mm: Option<f64>,
-    /// Bound of the error of the higher one of both; `None` where it is a border that was looked at in places only.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub error_bound_mm: Option<f64>,
-    /// Half of the ridge length is lower, mm; `None` where cells are too coarse for it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub median_mm: Option<f64>,
-    /// Share of the ridge length above the target; `None` likewise.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub over_target_fraction: Option<f64>,
-    /// Length of all moves that feed along passes, mm.
-    pub cutting_length_mm: f64,
-    /// Least and greatest factor of the widths that the round was planned with.
-    pub factors: [f64; 2],
-    /// How much nearer than asked the tool comes to anything between passes, mm; `None` where it keeps clear.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub too_near_between_mm: Option<f64>,
-    /// Whether all was measured as the verdict is, and not ridges alone on cells that just show them.
-    pub measured: bool,
-}
-
-/// The rounds of the loop.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct CorrectionFigures {
-    /// What no ridge may exceed, mm.
-    pub target_mm: f64,
-    /// All rounds, in order.
-    pub rounds: Vec<CorrectionRound>,
-    /// The round whose plan was kept, counted from 1.
-    pub kept: usize,
-}
 
 /// What a plan leaves above the design.
 struct Standing {
@@ -176,76 +127,14 @@ impl Standing {
     }
 }
 
-impl CorrectionRound {
-    /// What is highest, mm.
-    pub fn highest(&self) -> f64 {
-        self.border_mm.map_or(self.highest_mm, |border| border.max(self.highest_mm))
-    }
-
-    /// Whether a remnant along a border is higher than every ridge.
-    pub fn is_on_border(&self) -> bool {
-        self.border_mm.is_some_and(|border| border > self.highest_mm)
-    }
-
-    /// Whether ridges exceed the target no more than they may.
-    fn holds(&self, goal: &Goal) -> bool {
-        self.highest() + self.margin(goal.target) <= goal.rule.highest * goal.target
-            && (goal.rule.share >= 1.0
-                || self.over_target_fraction.is_some_and(|over| over <= 1.0 - goal.rule.share))
-    }
-
-    /// The bound of the highest, mm, where keeping clear of it costs little: a wider one is to be refined instead, as it is
-    /// when all is measured.
-    fn margin(&self, target: f64) -> f64 {
-        let bound = self.error_bound_mm.filter(|bound| self.measured && *bound <= SLACK * target);
-        bound.unwrap_or(0.0)
-    }
-
-    /// Whether this round is to be kept instead of another: first what keeps clear between passes, then what holds the target,
-    /// then what is shorter; where neither holds it, the one with the lower ridge.
-    fn is_better(&self, other: &Self, goal: &Goal) -> bool {
-        let clear = [self, other].map(|round| round.too_near_between_mm.is_none());
-        if clear[0] != clear[1] {
-            return clear[0];
-        }
-        match (self.holds(goal), other.holds(goal)) {
-            (true, true) => self.cutting_length_mm < other.cutting_length_mm,
-            (false, false) => self.highest() < other.highest(),
-            (holds, _) => holds,
-        }
-    }
-
-    /// What a plan gains over the best one before it.
-    fn gain_over(&self, best: &Self, goal: &Goal) -> Gain {
-        let above = |round: &Self| round.highest() + round.margin(goal.target) - goal.target;
-        if !self.is_better(best, goal) {
-            Gain::None
-        } else if self.holds(goal) || above(self) <= (1.0 - LEAST_GAIN) * above(best) {
-            Gain::Enough
-        } else {
-            Gain::Little
-        }
-    }
-}
-
-/// What a plan gains over the best one before it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Gain {
-    /// The one before is kept.
-    None,
-    /// The new one is kept, but another of its kind would be in vain.
-    Little,
-    /// The new one is kept, and another of its kind may gain as well.
-    Enough,
-}
-
-/// What the loop is after.
-#[derive(Debug, Clone, Copy)]
-struct Goal {
-    /// The scallop height of the plan, mm.
-    target: f64,
-    /// Which ridges may exceed it.
-    rule: ScallopRule,
+/// A plan that was tried.
+struct Tried {
+    /// What it was planned by.
+    widths: Widths,
+    /// What it leaves.
+    standing: Standing,
+    /// What its strategy made.
+    kept: Arc<Kept>,
 }
 
 /// The loop over one toolpath.
@@ -257,12 +146,11 @@ struct Corrected<'a> {
     goal: Goal,
     /// How closely plans are measured which may be planned better.
     closeness: Closeness,
-    /// The best plan, by what widths, and what it leaves.
+    /// The best plan, and how it was tried.
     best: Planned,
-    widths: Widths,
-    standing: Standing,
-    /// The widths of the last plan and what it leaves, where that is not the best one.
-    latest: Option<(Widths, Standing)>,
+    tried: Tried,
+    /// How the last plan was tried, where that is not the best one.
+    latest: Option<Tried>,
     rounds: Vec<CorrectionRound>,
     /// The round of the best plan.
     kept: usize,
@@ -311,6 +199,7 @@ impl Session {
         let widths =
             Widths { places: Vec::new(), everywhere: 1.0, finer: Vec::new(), touch_up: Vec::new(), interval };
         let rounds = vec![standing.round];
+        let tried = Tried { widths, standing, kept: first.plan.kept.clone() };
         let mut corrected = Corrected {
             session: self,
             request,
@@ -319,8 +208,7 @@ impl Session {
             goal: Goal { target, rule: self.scene.scallop_rule },
             closeness,
             best: first,
-            widths,
-            standing,
+            tried,
             latest: None,
             rounds,
             kept: 0,
@@ -410,7 +298,7 @@ impl Corrected<'_> {
 
     /// Whether the best plan leaves what every path of the cutter leaves.
     fn is_unavoidable(&self, measured: &Measurement, monitor: &dyn Monitor) -> Result<bool, JobError> {
-        if self.standing.round.holds(&self.goal) {
+        if self.tried.standing.round.holds(&self.goal) {
             return Ok(false);
         }
         let (session, path) = (self.session, &self.best.plan.path);
@@ -420,7 +308,7 @@ impl Corrected<'_> {
 
     /// Whether the best plan stands above the target, but little.
     fn is_near(&self) -> bool {
-        let round = &self.standing.round;
+        let round = &self.tried.standing.round;
         !round.holds(&self.goal) && round.highest() <= (1.0 + NEAR) * self.goal.target
     }
 
@@ -430,26 +318,22 @@ impl Corrected<'_> {
     /// which remnants along borders do not give way. `None` where the best plan holds the target and comes within `slack` of
     /// it, where it leaves what was never cut, or where what there is was tried `in_vain`.
     fn next(&self, in_vain: usize, slack: f64) -> Option<Widths> {
-        let (target, round) = (self.goal.target, &self.standing.round);
+        let (target, round) = (self.goal.target, &self.tried.standing.round);
         if round.highest() > NEVER_CUT * target {
             return None;
         }
-        let scaled =
-            |widths: &Widths, height: f64| widths.scaled((aim(target) / height).sqrt().max(MOST_NARROWED));
-        let (latest_widths, latest) =
-            self.latest.as_ref().map_or((&self.widths, &self.standing), |latest| (&latest.0, &latest.1));
+        let last = self.latest.as_ref().unwrap_or(&self.tried);
         let in_proportion = || {
-            let round = &latest.round;
+            let round = &last.standing.round;
             (round.highest_mm + round.margin(target) > target)
-                .then(|| scaled(latest_widths, round.highest_mm))
+                .then(|| self.scaled(&last.widths, round.highest_mm))
         };
-        let followed = || self.corrected(latest_widths, latest);
         match (round.holds(&self.goal), in_vain) {
             (true, 0) => (round.highest() < (1.0 - slack) * target && self.may_lie_wider())
-                .then(|| scaled(&self.widths, round.highest())),
-            (true, 1) => self.latest.as_ref().and_then(|_| followed()),
-            (false, 0) => self.corrected(&self.widths, &self.standing).or_else(in_proportion),
-            (false, ..=MOST_FOLLOWED) => followed().or_else(in_proportion),
+                .then(|| self.scaled(&self.tried.widths, round.highest())),
+            (true, 1) => self.latest.as_ref().and_then(|latest| self.corrected(latest)),
+            (false, 0) => self.corrected(&self.tried).or_else(in_proportion),
+            (false, ..=MOST_FOLLOWED) => self.corrected(last).or_else(in_proportion),
             (false, ..=MOST_IN_VAIN) => in_proportion(),
             _ => None,
         }
@@ -458,32 +342,48 @@ impl Corrected<'_> {
     /// Whether the best plan would hold the target with one pass less: where ridges are about equally high, passes are spread
     /// evenly, and each interval then grows by as much as all of them.
     fn may_lie_wider(&self) -> bool {
-        let round = &self.standing.round;
+        let round = &self.tried.standing.round;
         let is_even = round.median_mm.is_some_and(|median| median >= EVENLY_HIGH * round.highest());
         let intervals = path_figures(&self.best.plan.path, 0.0).passes as f64 - 1.0;
         !is_even || round.highest() * (intervals / (intervals - 1.0)).powi(2) <= self.goal.target
     }
 
+    /// Widths that bring a height to the one that is aimed at, all by the same factor.
+    fn scaled(&self, widths: &Widths, height: f64) -> Widths {
+        widths.scaled((aim(self.goal.target) / height).sqrt().max(MOST_NARROWED))
+    }
+
     /// The widths of a plan corrected by the places where it leaves too much. Those that chords may have raised get shorter
     /// chords. Of the others few get passes of their own, once; many, or where that was no help, narrower widths. `None` without
     /// such places.
-    fn corrected(&self, widths: &Widths, standing: &Standing) -> Option<Widths> {
-        let high = self.standing_high(standing);
+    fn corrected(&self, tried: &Tried) -> Option<Widths> {
+        let Tried { widths, .. } = tried;
+        let high = self.standing_high(&tried.standing);
         if high.is_empty() {
             return None;
         }
-        let is_raised = self.raised_by_chords(widths);
-        let (raised, others): (Vec<_>, Vec<_>) = high.into_iter().partition(is_raised);
+        let is_touched_up = |places: &[HighPlace]| places.iter().any(|place| widths.is_touched_up(place));
+        if tried.standing.round.measured && self.are_few(&high, &tried.standing) && !is_touched_up(&high) {
+            return Some(widths.touched_up(&high));
+        }
+        let raised = self.raised_by_chords(tried, &high);
+        let of = |kind: bool| high.iter().zip(&raised).filter(move |(_, raised)| **raised == kind);
+        let [raised, others] =
+            [true, false].map(|kind| of(kind).map(|(place, _)| *place).collect::<Vec<_>>());
         let finer = widths.finer(&raised);
-        if self.are_few(&others) && !others.iter().any(|place| widths.is_touched_up(place)) {
+        if self.are_few(&others, &tried.standing) && !is_touched_up(&others) {
             return Some(finer.touched_up(&others));
+        }
+        let round = &tried.standing.round;
+        if round.highest_mm >= round.highest() && round.highest_mm <= (1.0 + NEAR) * self.goal.target {
+            return Some(self.scaled(&finer, round.highest_mm));
         }
         Some(finer.narrowed(&others))
     }
 
-    /// Whether places take so little that passes of their own are shorter than any narrower widths.
-    fn are_few(&self, places: &[HighPlace]) -> bool {
-        let interval = self.widths.interval;
+    /// Whether places take so little that passes of their own are shorter than a plan with all passes nearer to each other.
+    fn are_few(&self, places: &[HighPlace], standing: &Standing) -> bool {
+        let interval = self.tried.widths.interval;
         let cell = |at: &Point3| at.coords.map(|x| (x / interval).floor() as i64);
         let mut cells: Vec<[i64; 3]> = places.iter().map(|place| cell(&place.at).into()).collect();
         cells.sort_unstable();
@@ -493,7 +393,8 @@ impl Corrected<'_> {
         let off_pass = (figures.link_length_mm + figures.air_length_mm) / figures.passes.max(1) as f64;
         let length = (TOUCH_UP_LENGTH * interval + off_pass) * cells.len() as f64;
         let whole = figures.cutting_length_mm + figures.link_length_mm + figures.air_length_mm;
-        self.request.axis.is_none() && length <= MOST_TOUCH_UP * whole
+        let nearer = (standing.round.highest() / aim(self.goal.target)).sqrt() - 1.0;
+        self.request.axis.is_none() && length <= nearer.min(MOST_TOUCH_UP) * whole
     }
 
     /// The places of a plan that may stand above the target.
@@ -502,18 +403,29 @@ impl Corrected<'_> {
         let target = self.goal.target;
         let margin = standing.round.margin(target);
         let places = standing.above.iter().map(|&(at, height)| {
-            let tip = at + cutter.contact_to_tip(&self.session.part.closest_point(&at).0.normal);
-            HighPlace { at, tip, over: height + margin - target, factor: aim(target) / height }
+            let normal = self.session.part.closest_point(&at).0.normal;
+            HighPlace {
+                at,
+                normal,
+                tip: at + cutter.contact_to_tip(&normal),
+                over: height + margin - target,
+                factor: aim(target) / height,
+            }
         });
         places.filter(|place| place.over > 0.0).collect()
     }
 
-    /// Whether it may be that chords alone have raised a place above the target, and shorter ones would not.
-    fn raised_by_chords(&self, widths: &Widths) -> impl Fn(&HighPlace) -> bool {
-        let most = RAISED_BY_CHORDS * self.session.scene.tolerance.chord;
-        let can_be_shorter = self.request.axis.is_none() && !self.request.joining.smoothing;
-        let chords = widths.chords();
-        move |place| can_be_shorter && place.over <= most && chords.at(&place.tip) == 1.0
+    /// Which places chords alone may have raised above the target, so that shorter ones are enough.
+    fn raised_by_chords(&self, tried: &Tried, high: &[HighPlace]) -> Vec<bool> {
+        if self.request.axis.is_some() || self.request.joining.smoothing {
+            return vec![false; high.len()];
+        }
+        let chords = tried.widths.chords();
+        let raised = chords::most_raised(&tried.kept.passes, high, tried.widths.interval);
+        let is_raised = |(place, most): (&HighPlace, f64)| {
+            place.over <= (1.0 - SHORTER_CHORDS) * most && chords.at(&place.tip) == 1.0
+        };
+        high.iter().zip(raised).map(is_raised).collect()
     }
 
     /// The plan by given widths, and their least and greatest factors.
@@ -521,11 +433,13 @@ impl Corrected<'_> {
         monitor::check(monitor)?;
         let correction = widths.correction();
         let factors = correction.range();
+        let alike = self.latest.iter().chain([&self.tried]).find(|tried| tried.widths.is_alike(widths));
         let earlier = Earlier {
             correction,
             chords: widths.chords(),
             touch_up: widths.touch_up.clone(),
-            functions: self.best.plan.functions.clone(),
+            kept: alike.unwrap_or(&self.tried).kept.clone(),
+            again: alike.is_some() && self.request.axis.is_none(),
         };
         Ok((self.session.plan(self.request, self.around, Some(Arc::new(earlier)), monitor)?, factors))
     }
@@ -539,23 +453,23 @@ impl Corrected<'_> {
             Closeness::Verdict,
             monitor,
         )?;
-        let factors = self.standing.round.factors;
+        let factors = self.tried.standing.round.factors;
         if let Some(standing) = Standing::of_all(&measured.measurement, &self.best, factors) {
             self.rounds[self.kept] = standing.round;
-            self.standing = standing;
+            self.tried.standing = standing;
         }
         Ok(measured)
     }
 
     fn keep_if_better(&mut self, planned: Planned, widths: Widths, found: Standing) -> Gain {
-        let gain = found.round.gain_over(&self.standing.round, &self.goal);
+        let gain = found.round.gain_over(&self.tried.standing.round, &self.goal);
         self.rounds.push(found.round);
+        let tried = Tried { widths, standing: found, kept: planned.plan.kept.clone() };
         self.latest = None;
         if gain == Gain::None {
-            self.latest = Some((widths, found));
+            self.latest = Some(tried);
         } else {
-            (self.best, self.widths, self.standing, self.kept) =
-                (planned, widths, found, self.rounds.len() - 1);
+            (self.best, self.tried, self.kept) = (planned, tried, self.rounds.len() - 1);
         }
         gain
     }
@@ -564,90 +478,6 @@ impl Corrected<'_> {
 /// [`CorrectionRound::too_near_between_mm`] of a plan.
 fn too_near(planned: &Planned) -> Option<f64> {
     Some(planned.plan.too_near_between).filter(|missing| *missing > 0.0)
-}
-
-/// The height that corrected ridges are to have, mm.
-fn aim(target: f64) -> f64 {
-    (1.0 - 0.5 * SLACK) * target
-}
-
-/// A place that may stand above the target.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct HighPlace {
-    at: Point3,
-    /// The tip of an upright cutter that touches the part there.
-    tip: Point3,
-    /// By how much it may stand above the target, mm.
-    over: f64,
-    /// The height that it is to have as a share of the one it has.
-    factor: f64,
-}
-
-/// How much narrower or wider than by calculation passes are planned, and where their chords are shorter.
-#[derive(Debug, Clone, PartialEq)]
-struct Widths {
-    /// Places where ridges stood above the target, with their factors.
-    places: Vec<(Point3, f64)>,
-    /// The factor of all places.
-    everywhere: f64,
-    /// Tips of the cutter around which chords are shorter, with the factor of their tolerance.
-    finer: Vec<(Point3, f64)>,
-    /// Places that get passes of their own, while all others stay where they are.
-    touch_up: Vec<Point3>,
-    /// How far around a place its factor holds, mm: the interval of passes on a plane.
-    interval: f64,
-}
-
-impl Widths {
-    fn correction(&self) -> Correction {
-        Correction::new(&self.places, self.interval).scaled(self.everywhere)
-    }
-
-    fn scaled(&self, factor: f64) -> Self {
-        Self { everywhere: factor * self.everywhere, touch_up: Vec::new(), ..self.clone() }
-    }
-
-    /// Whether a pass of its own was to serve a place.
-    fn is_touched_up(&self, place: &HighPlace) -> bool {
-        self.touch_up.iter().any(|at| (at - place.at).norm() <= 0.5 * self.interval)
-    }
-
-    /// With passes of their own over places, the highest first.
-    fn touched_up(&self, places: &[HighPlace]) -> Self {
-        let mut places = places.to_vec();
-        places.sort_by(|a, b| b.over.total_cmp(&a.over));
-        let touch_up = self.touch_up.iter().copied().chain(places.iter().map(|place| place.at)).collect();
-        Self { touch_up, ..self.clone() }
-    }
-
-    /// The factor of the chord tolerance around tips of the cutter.
-    fn chords(&self) -> Correction {
-        Correction::new(&self.finer, self.interval)
-    }
-
-    /// With shorter chords around places.
-    fn finer(&self, places: &[HighPlace]) -> Self {
-        let shorter = places.iter().map(|place| (place.tip, SHORTER_CHORDS));
-        let finer = self.finer.iter().copied().chain(shorter).collect();
-        Self { finer, ..self.clone() }
-    }
-
-    /// Narrower where ridges and borders stand above the target, so that they come to the middle of the slack: height goes
-    /// with the square of width. A place that was narrowed already and did not give way enough is narrowed by twice as much:
-    /// there passes may lie nearer than they have to, or less than all of the height goes with their width.
-    fn narrowed(&self, places: &[HighPlace]) -> Self {
-        if places.is_empty() {
-            return self.clone();
-        }
-        let now = Correction::new(&self.places, self.interval);
-        let narrower = places.iter().map(|place| {
-            let before = now.at(&place.at);
-            let power = if before < 1.0 - STILL_WIDE { 1.0 } else { 0.5 };
-            (place.at, before * place.factor.powf(power).max(MOST_NARROWED))
-        });
-        let places = self.places.iter().copied().chain(narrower).collect();
-        Self { places, touch_up: Vec::new(), ..self.clone() }
-    }
 }
 
 #[cfg(test)]
@@ -681,71 +511,5 @@ mod tests {
             assert!(after <= before.max(0.05), "{toolpath}: {before} {after} {rounds:?}");
         }
         assert!(figure(&planned(true, "strategy = \"zigzag\"\nstepover = 0.5")).is_none());
-    }
-
-    #[test]
-    fn what_holds_the_target_is_better_and_then_what_is_shorter() {
-        let round = |highest_mm: f64, cutting_length_mm: f64| CorrectionRound {
-            highest_mm,
-            border_mm: None,
-            error_bound_mm: Some(0.1),
-            median_mm: Some(0.9),
-            over_target_fraction: Some(if highest_mm > 1.0 { 0.02 } else { 0.0 }),
-            cutting_length_mm,
-            factors: [1.0; 2],
-            too_near_between_mm: None,
-            measured: true,
-        };
-        let strict = Goal { target: 1.0, rule: ScallopRule::default() };
-        let better = |a: CorrectionRound, b: CorrectionRound| a.is_better(&b, &strict);
-        assert!(better(round(0.8, 20.0), round(1.05, 10.0)) && !better(round(1.05, 10.0), round(0.8, 20.0)));
-        assert!(better(round(0.8, 9.0), round(0.7, 10.0)) && better(round(1.1, 20.0), round(1.2, 10.0)));
-        // No ridge is a reason to keep what collides.
-        let colliding = |round| CorrectionRound { too_near_between_mm: Some(3.0), ..round };
-        assert!(better(round(1.2, 20.0), colliding(round(0.8, 10.0))));
-        assert!(!better(colliding(round(0.8, 10.0)), round(1.2, 20.0)));
-        assert!(better(colliding(round(0.8, 9.0)), colliding(round(0.7, 10.0))));
-        // A tenth of what stands above the target is worth another plan of its kind; less is kept, but no reason to go on.
-        let gain = |a: CorrectionRound, b: CorrectionRound| a.gain_over(&b, &strict);
-        assert_eq!(gain(round(1.2, 10.0), round(1.2, 10.0)), Gain::None);
-        assert_eq!(gain(round(1.199, 10.0), round(1.2, 10.0)), Gain::Little);
-        assert_eq!(gain(round(1.17, 10.0), round(1.2, 10.0)), Gain::Enough);
-        assert_eq!(gain(round(0.99, 20.0), round(1.001, 10.0)), Gain::Enough);
-        // What the scene lets stand above the target is no reason for another plan.
-        let lenient = |share: f64, highest: f64| Goal { rule: ScallopRule { share, highest }, ..strict };
-        assert!(round(1.2, 10.0).holds(&lenient(0.95, 1.5)) && !round(1.2, 10.0).holds(&strict));
-        assert!(
-            !round(1.2, 10.0).holds(&lenient(0.99, 1.5)) && !round(1.2, 10.0).holds(&lenient(0.95, 1.15))
-        );
-    }
-
-    #[test]
-    fn widths_go_with_the_root_of_heights_above_the_target() {
-        let above = |x: f64, height: f64| {
-            let at = Point3::new(x, 0.0, 0.0);
-            HighPlace { at, tip: at, over: height - 1.0, factor: 0.99 / height }
-        };
-        let places = [above(0.0, 1.2), above(40.0, 1.1)];
-        let by_calculation = Widths {
-            places: Vec::new(),
-            everywhere: 1.0,
-            finer: Vec::new(),
-            touch_up: Vec::new(),
-            interval: 1.0,
-        };
-        let once = by_calculation.narrowed(&places);
-        let found = [0.0, 10.0, 20.0, 40.0].map(|x| once.correction().at(&Point3::new(x, 0.0, 0.0)));
-        let wanted = [(0.99f64 / 1.2).sqrt(), 1.0, 1.0, (0.99f64 / 1.1).sqrt()];
-        assert!(found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
-        // What was narrowed stays so, and is narrowed further where that was not enough.
-        let twice = once.narrowed(&[above(0.0, 1.1)]).correction();
-        assert!((twice.at(&places[0].at) - wanted[0] * 0.99 / 1.1).abs() < 1e-12);
-        assert!((twice.at(&places[1].at) - wanted[3]).abs() < 1e-12);
-        // Shorter chords leave all widths as they are.
-        let finer = once.finer(&places[..1]);
-        assert_eq!(finer.correction(), once.correction());
-        assert!(
-            finer.chords().at(&places[0].tip) == SHORTER_CHORDS && finer.chords().at(&places[1].tip) == 1.0
-        );
     }
 }

@@ -1,5 +1,7 @@
 //! What one toolpath left.
 
+use std::sync::Arc;
+
 use cutter::Holder;
 use field::PlannedField;
 use io::ProgramHeader;
@@ -27,7 +29,7 @@ pub struct Outcome {
     /// Its program of three axes begins and ends no lower than this, mm: over the fixtures.
     pub rise_to: Option<f64>,
     /// What a streamline was planned by.
-    pub field: Option<PlannedField>,
+    pub field: Option<Arc<PlannedField>>,
     /// The figures with their maps and samples.
     pub measurement: Measurement,
     /// What they were found in.

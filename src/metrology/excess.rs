@@ -128,7 +128,8 @@ impl ExcessSearch<'_> {
         Ok((ExcessFigures { highest, kind, reached, unreached }, high))
     }
 
-    /// One place of each square where passes came down to the design and left more than the scallop limit.
+    /// One place of each square where passes came down to the design and left more than the scallop limit, the
+    /// highest that is found there.
     fn high_places(
         &self,
         open: &Promising,
@@ -136,22 +137,26 @@ impl ExcessSearch<'_> {
         monitor: &dyn Monitor,
     ) -> Result<Vec<RidgePlace>, Cancelled> {
         let Inspection { part, limits, .. } = *self.inspection;
-        let patches = self.patches(limits.scallop, unseen);
-        let may_be = open.squares.iter().filter(|square| square.possible > limits.scallop).copied();
+        // What stands lower by so little is above the limit with its bound.
+        let high = limits.scallop - 2.0 * NUMERICAL_FLOOR;
+        let patches = self.patches(high, unseen);
+        let may_be = open.squares.iter().filter(|square| square.possible > high).copied();
         let squares = Promising::of(may_be, MOST_HIGH_CELLS).squares;
         let found = work::parallel::try_map(squares.len(), |k| {
             monitor::check(monitor)?;
+            let mut highest: Option<RidgePlace> = None;
             let mut waiting = vec![(squares[k].centre, squares[k].half, HIGH_DIVISIONS)];
             while let Some((centre, half, divisions)) = waiting.pop() {
+                let known = highest.map_or(high, |highest| highest.height + NUMERICAL_FLOOR);
                 let (quarter, is_open) = match patches.held(centre, half) {
                     Held::Nothing => continue,
                     Held::Unknown => (0.5 * half, true),
                     Held::Some { possible, place, here, by } => {
-                        if here > limits.scallop && patches.reached(place, here, by) {
+                        if here > known && patches.reached(place, here, by) {
                             let design = part.highest_at(place.x, place.y);
-                            return Ok(design.map(|design| RidgePlace { at: design.point, height: here }));
+                            highest = design.map(|design| RidgePlace { at: design.point, height: here });
                         }
-                        (0.5 * half, possible > limits.scallop)
+                        (0.5 * half, possible > known.max(here + NUMERICAL_FLOOR))
                     }
                 };
                 if is_open && divisions > 0 {
@@ -162,7 +167,7 @@ impl ExcessSearch<'_> {
                     }));
                 }
             }
-            Ok(None)
+            Ok(highest)
         })?;
         Ok(found.into_iter().flatten().collect())
     }

@@ -1,5 +1,8 @@
 //! What a strategy is asked for, and the one entrance to all strategies.
 
+use std::mem;
+use std::sync::Arc;
+
 use crate::facets::facet_charge;
 use crate::levels::{obedience, planned_field};
 use crate::link::{join, join_tilted, time_to_neighbour};
@@ -8,8 +11,8 @@ use crate::surface::mesh_surface;
 use crate::tilt::tilted::{self, TiltedPasses, Tilting};
 use crate::touch_up;
 use crate::vocabulary::{
-    Contact, Levelled, Pace, PartKind, PassSettings, Passes, PlanError, PlanSettings, SAMPLING_OVER_RADIUS,
-    Setup, Step, Strategy, Task,
+    Kept, Pace, PartKind, PassSettings, Passes, PlanError, PlanSettings, SAMPLING_OVER_RADIUS, Setup, Step,
+    Strategy, Task,
 };
 use cutter::Cutter;
 use field::PlannedField;
@@ -27,9 +30,9 @@ pub struct Plan {
     /// Things the user should know (a singular field, a step that was limited), in plain words.
     pub notes: Vec<String>,
     /// What a streamline path was planned by.
-    pub field: Option<PlannedField>,
-    /// The functions that its passes are levels of.
-    pub functions: Vec<Levelled>,
+    pub field: Option<Arc<PlannedField>>,
+    /// What another plan of the same toolpath may go on from.
+    pub kept: Arc<Kept>,
     /// How much nearer than asked a tool that leans comes to anything between its passes, mm; 0 where it keeps clear.
     pub too_near_between: f64,
 }
@@ -37,26 +40,30 @@ pub struct Plan {
 impl Plan {
     /// A path and nothing else to tell of it.
     pub fn of_path(path: Toolpath, notes: Vec<String>) -> Self {
-        Self { path, notes, field: None, functions: Vec::new(), too_near_between: 0.0 }
+        Self { path, notes, field: None, kept: Arc::default(), too_near_between: 0.0 }
     }
 
-    fn new(
-        path: Toolpath,
-        mut notes: Vec<String>,
-        mut field: PlannedField,
-        contacts: &[Vec<Contact>],
-        strategy: &dyn Strategy,
-    ) -> Self {
-        let field = strategy.shows_field().then(|| {
-            planned_field::measure(&mut field, contacts);
-            field.direction_error = obedience::measure(contacts);
-            notes.extend(field.direction_error.as_ref().and_then(obedience::note));
-            field
-        });
+    /// A path of what its strategy planned.
+    fn new(path: Toolpath, kept: Arc<Kept>, further: Vec<String>) -> Self {
+        let mut notes = kept.notes.clone();
+        notes.extend(further);
         if path.is_empty() {
             notes.push("no pass reaches the part: the program is empty".into());
         }
-        Self { path, notes, field, functions: Vec::new(), too_near_between: 0.0 }
+        Self { path, notes, field: kept.field.clone(), kept, too_near_between: 0.0 }
+    }
+}
+
+impl Kept {
+    fn new(planned: Passes, strategy: &dyn Strategy) -> Self {
+        let Passes { passes, mut notes, mut field, contacts, functions, .. } = planned;
+        let field = strategy.shows_field().then(|| {
+            planned_field::measure(&mut field, &contacts);
+            field.direction_error = obedience::measure(&contacts);
+            notes.extend(field.direction_error.as_ref().and_then(obedience::note));
+            Arc::new(field)
+        });
+        Self { passes, notes, field, functions }
     }
 }
 
@@ -105,9 +112,21 @@ pub fn plan(
     monitor: &dyn Monitor,
 ) -> Result<Plan, PlanError> {
     let setup = Setup { part, cutter, settings, monitor };
-    let Passes { passes, notes, field, contacts, functions, .. } = passes(&setup, strategy, None)?;
-    let path = join(passes, strategy.both_ways(), &setup)?;
-    Ok(Plan { functions, ..Plan::new(path, notes, field, &contacts, strategy) })
+    let (kept, added) = with_task(&setup, strategy, None, |task| {
+        let again = settings.earlier.iter().find(|earlier| earlier.again);
+        let kept = match again {
+            Some(earlier) => earlier.kept.clone(),
+            None => Arc::new(Kept::new(strategy.passes(task)?, strategy)),
+        };
+        let places = settings.earlier.as_ref().map_or(&[][..], |earlier| &earlier.touch_up);
+        let added = touch_up::passes(task, places, &kept.passes)?;
+        Ok((kept, added))
+    })?;
+    let further = (!added.is_empty())
+        .then(|| format!("{} short passes go once more over places where others left too much", added.len()));
+    let all = kept.passes.iter().cloned().chain(added).collect();
+    let path = join(all, strategy.both_ways(), &setup)?;
+    Ok(Plan::new(path, kept, further.into_iter().collect()))
 }
 
 /// Plans one path of a cutter that tilts.
@@ -131,8 +150,8 @@ pub fn plan_tilted(
         reason: format!("a cutter that tilts needs a surface with two sides. {e}"),
     })?;
     let setup = Setup { part, cutter, settings, monitor };
-    let Passes { passes, touches, mut notes, field, contacts, functions } =
-        passes(&setup, strategy, Some(tilting.axis))?;
+    let mut planned = with_task(&setup, strategy, Some(tilting.axis), |task| strategy.passes(task))?;
+    let (passes, touches) = (mem::take(&mut planned.passes), mem::take(&mut planned.touches));
     let mut touches = if touches.is_empty() && !passes.is_empty() {
         let dropped = tilted::probe(cutter).unwrap_or(*cutter);
         let dropped = tilted::Dropped { passes: &passes, ball: &dropped };
@@ -141,12 +160,18 @@ pub fn plan_tilted(
         TiltedPasses::located(touches, settings.chord_tolerance)
     };
     touches.smoothing = settings.joining.smoothing.then_some(SAMPLING_OVER_RADIUS * cutter.radius());
-    let (path, too_near_between) = join_tilted(touches, strategy.both_ways(), tilting, &setup, &mut notes)?;
-    Ok(Plan { functions, too_near_between, ..Plan::new(path, notes, field, &contacts, strategy) })
+    let (path, too_near_between) =
+        join_tilted(touches, strategy.both_ways(), tilting, &setup, &mut planned.notes)?;
+    Ok(Plan { too_near_between, ..Plan::new(path, Arc::new(Kept::new(planned, strategy)), Vec::new()) })
 }
 
-/// The passes of a strategy, not yet joined.
-fn passes(setup: &Setup<'_>, strategy: &dyn Strategy, axis: Option<&ToolAxis>) -> Result<Passes, PlanError> {
+/// What is made of the task that a strategy is given.
+fn with_task<T>(
+    setup: &Setup<'_>,
+    strategy: &dyn Strategy,
+    axis: Option<&ToolAxis>,
+    make: impl FnOnce(&Task<'_>) -> Result<T, PlanError>,
+) -> Result<T, PlanError> {
     let Setup { part, cutter, settings, monitor } = *setup;
     let definition = strategy.definition();
     if !definition.part.suits(PartKind::Surface) {
@@ -174,16 +199,7 @@ fn passes(setup: &Setup<'_>, strategy: &dyn Strategy, axis: Option<&ToolAxis>) -
     let mut task = Task { part, cutter, settings: pass, wants_mesh, pace, monitor };
     task.settings.step = charged_step(&task, strategy, settings);
     check_extent(&task)?;
-    let mut passes = strategy.passes(&task)?;
-    if let Some(earlier) = task.settings.earlier.filter(|_| passes.touches.is_empty()) {
-        let added = touch_up::add(&task, &earlier.touch_up, &mut passes.passes)?;
-        if added > 0 {
-            passes
-                .notes
-                .push(format!("{added} short passes go once more over places where others left too much"));
-        }
-    }
-    Ok(passes)
+    make(&task)
 }
 
 /// The time, s, that the machine takes for passes once they are joined. Jerks of its axes are left out: they take seconds to

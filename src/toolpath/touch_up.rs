@@ -22,15 +22,15 @@ const BEYOND: f64 = 1.0;
 /// and follows its neighbour no farther than so many to either side: what lies beyond takes another pass.
 const FARTHEST: f64 = 16.0;
 
-/// Appends passes over `places`, and tells how many; the first places are served first.
+/// Passes over `places` beside those that are `planned`; the first places are served first.
 ///
 /// # Errors
 /// When cancelled.
-pub(crate) fn add(
+pub(crate) fn passes(
     task: &Task<'_>,
     places: &[Point3],
-    passes: &mut Vec<Vec<Point3>>,
-) -> Result<usize, PlanError> {
+    planned: &[Vec<Point3>],
+) -> Result<Vec<Vec<Point3>>, PlanError> {
     let Task { part, ref settings, monitor, .. } = *task;
     let dropped = task.dropped();
     let interval = plane_interval(dropped, settings.step);
@@ -39,14 +39,14 @@ pub(crate) fn add(
         foot.point.xy() + dropped.axis_offset(&foot.normal)
     };
     let mut waiting: Vec<Point2> = places.iter().map(axis_over).collect();
-    if waiting.is_empty() || passes.is_empty() {
-        return Ok(0);
+    let mut added = Vec::new();
+    if waiting.is_empty() || planned.is_empty() {
+        return Ok(added);
     }
     let drop = DropCutter::watched(part, dropped, monitor)?;
-    let planned = passes.len();
     while let Some(&first) = waiting.first() {
         monitor::check(monitor)?;
-        let Some(copy) = Copied::beside(&passes[..planned], first, FARTHEST * interval) else { break };
+        let Some(copy) = Copied::beside(planned, first, FARTHEST * interval) else { break };
         let [from, to] = copy.serve(&mut waiting, interval);
         let mut last = Beside::default();
         let mut tip = |s: f64| {
@@ -55,10 +55,10 @@ pub(crate) fn add(
         };
         let pass = settings.moves(from, to, &mut tip, monitor)?;
         if pass.len() > 1 {
-            passes.push(pass);
+            added.push(pass);
         }
     }
-    Ok(passes.len() - planned)
+    Ok(added)
 }
 
 /// A stretch of a pass in the plan view, shifted so that it runs through a place.

@@ -101,7 +101,7 @@ impl FieldFigures {
 
 pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> {
     let Some(field) = &run.planned.plan.field else { return Ok(Finding::default()) };
-    let figures = FieldFigures::new(field, &run.planned.plan.functions);
+    let figures = FieldFigures::new(field, &run.planned.plan.kept.functions);
     let mut rows = vec![
         ("planned as", figures.planned_as.join("; ")),
         ("singular points of the feed", figures.singular_point_count.to_string()),

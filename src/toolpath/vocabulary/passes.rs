@@ -24,6 +24,19 @@ pub struct Passes {
     pub functions: Vec<Levelled>,
 }
 
+/// What the strategy of a plan made, for another plan of the same toolpath.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Kept {
+    /// Tip positions of each pass of an upright cutter, not joined; empty where it tilts.
+    pub passes: Vec<Vec<Point3>>,
+    /// Remarks on them.
+    pub notes: Vec<String>,
+    /// What they were planned by, where the strategy shows it.
+    pub field: Option<Arc<PlannedField>>,
+    /// The functions that they are levels of, one for each chart or piece that has passes.
+    pub functions: Vec<Levelled>,
+}
+
 /// A function whose levels are passes, on one chart or piece of the part: kept, so that levels can be placed anew without
 /// another search for it.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Correction, Levelled};
+use super::{Correction, Kept};
 use geometry::{Aabb, Point3};
 use machine::Machine;
 
@@ -80,8 +80,10 @@ pub struct Earlier {
     pub chords: Correction,
     /// Places on the design over which passes of their own are added to an upright cutter's, the most needed first.
     pub touch_up: Vec<Point3>,
-    /// The functions whose levels are placed anew, one for each chart or piece; all are searched where the number is another.
-    pub functions: Vec<Levelled>,
+    /// What its strategy planned: levels of its functions are placed anew.
+    pub kept: Arc<Kept>,
+    /// Whether its passes stay as they are: they were planned by the same factors, and only passes of their own are added.
+    pub again: bool,
 }
 
 /// The scallop height that passes are planned for by default, mm: what finishing of moulds and dies leaves.

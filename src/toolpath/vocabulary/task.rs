@@ -71,8 +71,8 @@ impl<'a> Task<'a> {
     fn earlier(&self, k: usize, of: usize) -> Option<&'a Levelled> {
         self.settings
             .earlier
-            .filter(|earlier| earlier.functions.len() == of)
-            .map(|earlier| &earlier.functions[k])
+            .filter(|earlier| earlier.kept.functions.len() == of)
+            .map(|earlier| &earlier.kept.functions[k])
     }
 
     /// The function of an earlier plan on one of so many charts.

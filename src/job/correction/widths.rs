@@ -1,0 +1,142 @@
+//! How much narrower or wider than by calculation passes are planned, where their chords are shorter, and which places get
+//! passes of their own.
+
+use geometry::{Point3, Vector3};
+use toolpath::Correction;
+
+use super::SLACK;
+
+/// The factor of the chord tolerance where a ridge was raised by chords; where it still is, passes get nearer to each other.
+pub(super) const SHORTER_CHORDS: f64 = 0.25;
+
+/// No width is corrected by more than this factor in a round.
+pub(super) const MOST_NARROWED: f64 = 0.5;
+
+/// A place whose factor is less than one by more than this was narrowed before.
+const STILL_WIDE: f64 = 1e-6;
+
+/// The height that corrected ridges are to have, mm.
+pub(super) fn aim(target: f64) -> f64 {
+    (1.0 - 0.5 * SLACK) * target
+}
+
+/// A place that may stand above the target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct HighPlace {
+    pub at: Point3,
+    /// The part's outward unit normal there.
+    pub normal: Vector3,
+    /// The tip of an upright cutter that touches the part there.
+    pub tip: Point3,
+    /// By how much it may stand above the target, mm.
+    pub over: f64,
+    /// The height that it is to have as a share of the one it has.
+    pub factor: f64,
+}
+
+/// How much narrower or wider than by calculation passes are planned, and where their chords are shorter.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Widths {
+    /// Places where ridges stood above the target, with their factors.
+    pub places: Vec<(Point3, f64)>,
+    /// The factor of all places.
+    pub everywhere: f64,
+    /// Tips of the cutter around which chords are shorter, with the factor of their tolerance.
+    pub finer: Vec<(Point3, f64)>,
+    /// Places that get passes of their own, while all others stay where they are.
+    pub touch_up: Vec<Point3>,
+    /// How far around a place its factor holds, mm: the interval of passes on a plane.
+    pub interval: f64,
+}
+
+impl Widths {
+    pub fn correction(&self) -> Correction {
+        Correction::new(&self.places, self.interval).scaled(self.everywhere)
+    }
+
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self { everywhere: factor * self.everywhere, touch_up: Vec::new(), ..self.clone() }
+    }
+
+    /// Whether passes are the same but for those of their own.
+    pub fn is_alike(&self, other: &Self) -> bool {
+        (&self.places, self.everywhere, &self.finer) == (&other.places, other.everywhere, &other.finer)
+    }
+
+    /// Whether a pass of its own was to serve a place.
+    pub fn is_touched_up(&self, place: &HighPlace) -> bool {
+        self.touch_up.iter().any(|at| (at - place.at).norm() <= 0.5 * self.interval)
+    }
+
+    /// With passes of their own over places, the highest first.
+    pub fn touched_up(&self, places: &[HighPlace]) -> Self {
+        let mut places = places.to_vec();
+        places.sort_by(|a, b| b.over.total_cmp(&a.over));
+        let touch_up = self.touch_up.iter().copied().chain(places.iter().map(|place| place.at)).collect();
+        Self { touch_up, ..self.clone() }
+    }
+
+    /// The factor of the chord tolerance around tips of the cutter.
+    pub fn chords(&self) -> Correction {
+        Correction::new(&self.finer, self.interval)
+    }
+
+    /// With shorter chords around places.
+    pub fn finer(&self, places: &[HighPlace]) -> Self {
+        let shorter = places.iter().map(|place| (place.tip, SHORTER_CHORDS));
+        let finer = self.finer.iter().copied().chain(shorter).collect();
+        Self { finer, ..self.clone() }
+    }
+
+    /// Narrower where ridges and borders stand above the target, so that they come to the middle of the slack: height goes
+    /// with the square of width. A place that was narrowed already and did not give way enough is narrowed by twice as much:
+    /// there passes may lie nearer than they have to, or less than all of the height goes with their width.
+    pub fn narrowed(&self, places: &[HighPlace]) -> Self {
+        if places.is_empty() {
+            return self.clone();
+        }
+        let now = Correction::new(&self.places, self.interval);
+        let narrower = places.iter().map(|place| {
+            let before = now.at(&place.at);
+            let power = if before < 1.0 - STILL_WIDE { 1.0 } else { 0.5 };
+            (place.at, before * place.factor.powf(power).max(MOST_NARROWED))
+        });
+        let places = self.places.iter().copied().chain(narrower).collect();
+        Self { places, touch_up: Vec::new(), ..self.clone() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn widths_go_with_the_root_of_heights_above_the_target() {
+        let above = |x: f64, height: f64| {
+            let at = Point3::new(x, 0.0, 0.0);
+            HighPlace { at, normal: Vector3::z(), tip: at, over: height - 1.0, factor: 0.99 / height }
+        };
+        let places = [above(0.0, 1.2), above(40.0, 1.1)];
+        let by_calculation = Widths {
+            places: Vec::new(),
+            everywhere: 1.0,
+            finer: Vec::new(),
+            touch_up: Vec::new(),
+            interval: 1.0,
+        };
+        let once = by_calculation.narrowed(&places);
+        let found = [0.0, 10.0, 20.0, 40.0].map(|x| once.correction().at(&Point3::new(x, 0.0, 0.0)));
+        let wanted = [(0.99f64 / 1.2).sqrt(), 1.0, 1.0, (0.99f64 / 1.1).sqrt()];
+        assert!(found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
+        // What was narrowed stays so, and is narrowed further where that was not enough.
+        let twice = once.narrowed(&[above(0.0, 1.1)]).correction();
+        assert!((twice.at(&places[0].at) - wanted[0] * 0.99 / 1.1).abs() < 1e-12);
+        assert!((twice.at(&places[1].at) - wanted[3]).abs() < 1e-12);
+        // Shorter chords leave all widths as they are.
+        let finer = once.finer(&places[..1]);
+        assert_eq!(finer.correction(), once.correction());
+        assert!(
+            finer.chords().at(&places[0].tip) == SHORTER_CHORDS && finer.chords().at(&places[1].tip) == 1.0
+        );
+    }
+}
