@@ -325,8 +325,8 @@ impl Corrected<'_> {
         let last = self.latest.as_ref().unwrap_or(&self.tried);
         let in_proportion = || {
             let round = &last.standing.round;
-            (round.highest_mm + round.margin(target) > target)
-                .then(|| self.scaled(&last.widths, round.highest_mm))
+            let gives_way = self.is_as_before() || round.highest_mm + round.margin(target) > target;
+            gives_way.then(|| self.scaled(&last.widths, round.highest()))
         };
         match (round.holds(&self.goal), in_vain) {
             (true, 0) => (round.highest() < (1.0 - slack) * target && self.may_lie_wider())
@@ -348,9 +348,19 @@ impl Corrected<'_> {
         !is_even || round.highest() * (intervals / (intervals - 1.0)).powi(2) <= self.goal.target
     }
 
-    /// Widths that bring a height to the one that is aimed at, all by the same factor.
+    /// Widths that bring a height to the one that is aimed at, all by the same factor: where the last ones left the plan as it
+    /// was, by so much that a pass is added.
     fn scaled(&self, widths: &Widths, height: f64) -> Widths {
-        widths.scaled((aim(self.goal.target) / height).sqrt().max(MOST_NARROWED))
+        let factor = (aim(self.goal.target) / height).sqrt();
+        let passes = path_figures(&self.best.plan.path, 0.0).passes as f64;
+        let one_more = if self.is_as_before() { (passes - 1.0) / passes } else { 1.0 };
+        widths.scaled(if factor < 1.0 { factor.min(one_more).max(MOST_NARROWED) } else { factor })
+    }
+
+    /// Whether other widths changed nothing: few passes are spread over a part.
+    fn is_as_before(&self) -> bool {
+        let last_two = self.rounds.last_chunk::<2>();
+        last_two.is_some_and(|[a, b]| a.cutting_length_mm == b.cutting_length_mm && a.factors != b.factors)
     }
 
     /// The widths of a plan corrected by the places where it leaves too much. Those that chords may have raised get shorter

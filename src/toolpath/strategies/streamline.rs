@@ -569,7 +569,7 @@ mod tests {
             .map(|strategy| plan(&part, &cutter, strategy, &settings, &Silent).unwrap());
         assert_eq!(widest.path, free.path);
         assert!(widest.notes.iter().any(|note| note == ALIKE), "{:?}", widest.notes);
-        assert_eq!(widest.functions.len(), 1);
+        assert_eq!(widest.kept.functions.len(), 1);
     }
 
     /// Vectors that have a stream function are followed as closely as the published fit does where their lengths set the
