@@ -269,7 +269,7 @@ impl Corrected<'_> {
         }
         let (mut measured, mut in_vain) = (Some(measured), 0);
         for round in 0..MOST_MEASURED_NEAR {
-            if round >= MOST_MEASURED && !self.is_near() {
+            if round >= MOST_MEASURED && !self.is_near(&self.tried) {
                 break;
             }
             let Some(next) = self.next(in_vain, MEASURED_SLACK) else { break };
@@ -306,9 +306,9 @@ impl Corrected<'_> {
         Ok(LeastLeftFigures::above_limit(session, cutter, path, measured, monitor)?.is_some())
     }
 
-    /// Whether the best plan stands above the target, but little.
-    fn is_near(&self) -> bool {
-        let round = &self.tried.standing.round;
+    /// Whether a plan stands above the target, but little.
+    fn is_near(&self, tried: &Tried) -> bool {
+        let round = &tried.standing.round;
         !round.holds(&self.goal) && round.highest() <= (1.0 + NEAR) * self.goal.target
     }
 
@@ -331,7 +331,9 @@ impl Corrected<'_> {
         match (round.holds(&self.goal), in_vain) {
             (true, 0) => (round.highest() < (1.0 - slack) * target && self.may_lie_wider())
                 .then(|| self.scaled(&self.tried.widths, round.highest())),
-            (true, 1) => self.latest.as_ref().and_then(|latest| self.corrected(latest)),
+            (true, 1) => {
+                self.latest.as_ref().filter(|latest| self.is_near(latest)).and_then(|l| self.corrected(l))
+            }
             (false, 0) => self.corrected(&self.tried).or_else(in_proportion),
             (false, ..=MOST_FOLLOWED) => self.corrected(last).or_else(in_proportion),
             (false, ..=MOST_IN_VAIN) => in_proportion(),
@@ -385,7 +387,7 @@ impl Corrected<'_> {
             return Some(finer.touched_up(&others));
         }
         let round = &tried.standing.round;
-        if round.highest_mm >= round.highest() && round.highest_mm <= (1.0 + NEAR) * self.goal.target {
+        if self.is_near(tried) && !round.is_on_border() {
             return Some(self.scaled(&finer, round.highest_mm));
         }
         Some(finer.narrowed(&others))

@@ -26,6 +26,9 @@ const PRECISION: f64 = 1e-11;
 /// A bracket of φ narrower than this, rad, holds a jump or an edge; the chord across it lies inside the outline.
 const NARROW: f64 = 1e-11;
 
+/// The outline's radius of curvature at the contact is found after this share of the greatest turn.
+const BEGIN: f64 = 1e-7;
+
 /// A cutter at its contact, seen along the feed; lengths mm.
 pub(crate) struct Silhouette<'a> {
     profile: &'a Profile,
@@ -97,7 +100,7 @@ impl<'a> Silhouette<'a> {
     /// The place of the cutter with the outward normal `d`, and its radii of curvature along the meridian and the parallel.
     fn place(&self, d: &Vector3) -> (Vector3, [f64; 2]) {
         let profile = self.profile;
-        let sine = d.x.hypot(d.y).min(1.0);
+        let sine = (d.x * d.x + d.y * d.y).sqrt().min(1.0);
         let rho = profile.reach(sine);
         let on_arc = rho > profile.bottom_end && rho < profile.arc_end;
         let z = if on_arc {
@@ -135,17 +138,26 @@ impl<'a> Silhouette<'a> {
         }
         let high = |p: &OnOutline| p.x >= over.farthest || over.excess(p) >= 0.0;
         let (mut low, mut top) = (0.0, upright.min(std::f64::consts::FRAC_PI_2));
-        let [mut below, mut above] = [low, top].map(|phi| self.at(phi));
+        let (mut below, mut above) = (OnOutline { x: 0.0, y: 0.0, bend: 0.0 }, self.at(top));
         if !high(&above) {
             // Where the side leans back over the surface, the widest place of the outline is the last to leave a ridge.
             return if upright > top { over.arc(&above) } else { self.up_the_side(over, &above) };
         }
+        // A flat at the contact is behind the cutter's first turn.
+        let turned = BEGIN * top;
+        let begin = self.at(turned);
+        let steps = if high(&begin) {
+            above = begin;
+            0
+        } else {
+            (low, below) = (turned, begin);
+            MOST_STEPS
+        };
         // As if the outline were the circle that it begins with.
-        let begin = self.at(1e-7 * top);
         let start =
             (2.0 * over.height / (begin.bend * (1.0 - over.curvature * begin.bend)).max(1e-300)).sqrt();
         let mut phi = start;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..steps {
             if !(phi > low && phi < top) {
                 phi = 0.5 * (low + top);
             }
