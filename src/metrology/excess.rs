@@ -137,6 +137,7 @@ impl ExcessSearch<'_> {
     ) -> Result<Vec<RidgePlace>, Cancelled> {
         let Inspection { part, limits, .. } = *self.inspection;
         let patches = self.patches(limits.scallop, unseen);
+        let small = OTHER_KIND_SHARE * 0.5 * self.inspection.grid.cell;
         let may_be = open.squares.iter().filter(|square| square.possible > limits.scallop).copied();
         let squares = Promising::of(may_be, MOST_HIGH_CELLS).squares;
         let found = work::parallel::try_map(squares.len(), |k| {
@@ -147,11 +148,13 @@ impl ExcessSearch<'_> {
                     Held::Nothing => continue,
                     Held::Unknown => (0.5 * half, true),
                     Held::Some { possible, place, here, by } => {
-                        if here > limits.scallop && patches.reached(place, here, by) {
+                        let high = here > limits.scallop;
+                        if high && patches.reached(place, here, by) {
                             let design = part.highest_at(place.x, place.y);
                             return Ok(design.map(|design| RidgePlace { at: design.point, height: here }));
                         }
-                        (0.5 * half, possible > limits.scallop)
+                        // Where no pass came down to the design, all around is as high.
+                        (0.5 * half, possible > limits.scallop && !(high && half <= small))
                     }
                 };
                 if is_open && divisions > 0 {
