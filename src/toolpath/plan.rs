@@ -43,7 +43,8 @@ impl Plan {
         Self { path, notes, shortest: None, field: None, functions: Vec::new(), too_near_between: 0.0 }
     }
 
-    fn new(
+    /// A path, and what it was planned by.
+    pub(crate) fn new(
         path: Toolpath,
         mut notes: Vec<String>,
         mut field: PlannedField,
