@@ -330,6 +330,19 @@ fn a_pocket_with_islands_is_cleared_by_smooth_flow_as_well() {
 }
 
 /// Beyond open sides, and where a larger cutter was, no stock stands: passes begin there, without a helix or little of one.
+/// Passes from vectors, along walls and from guides clear a pocket with an island, and keep to what was asked for where nothing
+/// turns around a point.
+#[test]
+fn a_pocket_is_cleared_along_vectors_walls_and_guides() {
+    let run = run("sources/pocket_vectors.toml");
+    is_cleared_to_its_walls("pocket_vectors.toml", &run);
+    let toolpaths = run.1["toolpaths"].as_array().unwrap();
+    let off = |k: usize| toolpaths[k]["field"]["direction_error_rms_deg"].as_f64().unwrap();
+    assert!(off(0) < 5.0 && off(2) < 2.5, "{} {}", off(0), off(2));
+    assert!(off(1) < 10.0, "{}", off(1));
+    assert!(toolpaths[3].get("field").is_none());
+}
+
 #[test]
 fn open_pockets_and_corners_left_by_a_larger_cutter_are_cleared() {
     for (scene, limit) in [("open_step", 70.0), ("rest_corners", 60.0)] {

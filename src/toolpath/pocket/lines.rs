@@ -82,17 +82,13 @@ fn chained(
     spacing: f64,
     follows: impl Fn(usize, usize) -> bool,
 ) -> Vec<Run> {
-    /// A way along the wall to the next row is at most so many times the distance of rows.
-    const LONGEST_LINK: f64 = 4.0;
     let walls = SegmentGrid::of_curves(piece.curves());
     let mut at: Option<(usize, Point2)> = None;
     while !lines.is_empty() {
         let next = at.and_then(|(row, end)| {
             let ends = lines.iter().enumerate().filter(|(_, l)| follows(row, l.row));
             ends.flat_map(|(k, l)| [(k, 0), (k, 1)].map(|(k, e)| (k, e, l.ends()[e])))
-                .filter_map(|(k, e, p)| {
-                    along_wall(piece, &walls, &end, &p, LONGEST_LINK * spacing).map(|way| (k, e, way))
-                })
+                .filter_map(|(k, e, p)| link(piece, &walls, &[end, p], spacing).map(|way| (k, e, way)))
                 .min_by(|a, b| length(&a.2).total_cmp(&length(&b.2)))
         });
         if let (Some((k, e, way)), Some(run)) = (next, runs.last_mut()) {
@@ -114,6 +110,26 @@ fn chained(
         }
     }
     runs
+}
+
+/// A way from an end of a line to that of another: along the wall that both are at, else straight where nothing is between.
+fn link(piece: &Piece, walls: &SegmentGrid, [a, b]: &[Point2; 2], spacing: f64) -> Option<Vec<Point2>> {
+    /// It is at most so many times the distance of rows long.
+    const LONGEST: f64 = 4.0;
+    /// Ends this share of the distance of rows off a wall are at it: triangles follow it no closer.
+    const AT_WALL: f64 = 0.01;
+    let longest = LONGEST * spacing;
+    if [a, b].iter().all(|p| walls.distance(p) <= AT_WALL * spacing) {
+        return along_wall(piece, walls, a, b, longest);
+    }
+    is_clear(piece, walls, &[*a, *b], longest).then(|| vec![*a, *b])
+}
+
+/// Whether a straight way is no longer than `longest` and stays in the piece, as far as some places of it tell.
+pub(super) fn is_clear(piece: &Piece, walls: &SegmentGrid, [a, b]: &[Point2; 2], longest: f64) -> bool {
+    const PLACES: usize = 16;
+    let inside = |p: &Point2| piece.contains(p) || walls.distance(p) < 1e-6;
+    (b - a).norm() <= longest && (1..PLACES).all(|k| inside(&(a + (b - a) * (k as f64 / PLACES as f64))))
 }
 
 fn length(way: &[Point2]) -> f64 {

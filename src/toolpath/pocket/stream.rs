@@ -7,7 +7,7 @@
 //! islands, so that no pass ends at a wall: with the direction of the walls themselves that is the flow that nothing forces.
 //! Walls are gone around last. The floor of the design's frame is level, so that z plays no part; mm.
 
-use super::lines::{Line, along_walls};
+use super::lines::{Line, along_walls, is_clear};
 use super::nest::{NestError, planar_mesh};
 use super::route::{Entry, Run, begun_near};
 use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between};
@@ -158,16 +158,11 @@ fn climbing(mut curve: Vec<Point2>, walls: &SegmentGrid) -> Vec<Point2> {
 
 /// Goes around a closed curve: on from the last run where that ends nearby, with nothing between, or else by a run of its own.
 fn around(runs: &mut Vec<Run>, curve: &[Point2], piece: &Piece, walls: &SegmentGrid, step: f64) {
-    /// A way to the next curve is at most so many stepovers long, and this many places of it are looked at.
+    /// A way to the next curve is at most so many stepovers long.
     const LONGEST_LINK: f64 = 4.0;
-    const PLACES: usize = 16;
     let end = runs.last().and_then(|run| run.points.last()).copied();
     let begun = begun_near(curve, &end.unwrap_or(curve[0]), 0.0);
-    let inside = |p: &Point2| piece.contains(p) || walls.distance(p) < 1e-6;
-    let is_near = |end: &Point2| {
-        (begun[0] - end).norm() <= LONGEST_LINK * step
-            && (1..PLACES).all(|k| inside(&(end + (begun[0] - end) * (k as f64 / PLACES as f64))))
-    };
+    let is_near = |end: &Point2| is_clear(piece, walls, &[*end, begun[0]], LONGEST_LINK * step);
     let mut closed = begun.clone();
     closed.push(begun[0]);
     match runs.last_mut() {
