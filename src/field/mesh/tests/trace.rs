@@ -39,7 +39,7 @@ fn parallels_of_a_sphere_close() {
 #[test]
 fn senses_do_not_matter_and_lines_end_at_borders() {
     let mesh = mapped(40, no_hole, |x, y| [x, y, 0.0]);
-    let sense = |v: usize| if v * 7919 % 3 == 0 { -1.0 } else { 1.0 };
+    let sense = |v: usize| if (v * 7919).is_multiple_of(3) { -1.0 } else { 1.0 };
     let lines: Vec<Vector3> =
         mesh.points().iter().enumerate().map(|(v, p)| Vector3::new(p.x, -p.y, 0.0) * sense(v)).collect();
     let line = MeshTracer::new(&mesh, &lines).unwrap().through(seed(&mesh, [0.5, 0.4]), 0.01, 10.0);
@@ -57,13 +57,13 @@ fn senses_do_not_matter_and_lines_end_at_borders() {
 /// along its recovered gradient turned by a right angle, are the same lines.
 #[test]
 fn levels_and_traced_lines_of_a_flow_around_a_hole_agree() {
-    let (inner, outer) = (4.0, 20.0);
+    let (inner, outer): (f64, f64) = (4.0, 20.0);
     let worst = |n: usize| {
         // A ring, by polar coordinates of a grid that is sewn together.
         let at = |k: usize| {
             let (i, j) = (k % (6 * n), k / (6 * n));
             let angle = std::f64::consts::TAU * i as f64 / (6 * n) as f64;
-            let radius = inner * (outer / inner as f64).powf(j as f64 / n as f64);
+            let radius = inner * (outer / inner).powf(j as f64 / n as f64);
             [radius * angle.cos(), radius * angle.sin()]
         };
         let points: Vec<[f64; 2]> = (0..6 * n * (n + 1)).map(at).collect();
