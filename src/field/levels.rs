@@ -383,6 +383,24 @@ mod tests {
         assert!(order > 3.7, "order {order}");
     }
 
+    /// Once around a level of 31 mm on a surface that bends, by steps alone, no place is off it by as much as a chord tolerance.
+    #[test]
+    fn levels_and_traced_lines_agree() {
+        let field = spline(|x, y| x * x + y * y + 0.3 * x * y * y);
+        // z = sin(2 u) over 10 mm for each unit of u and v.
+        let metric = |u: f64, _: f64| (100.0 + (2.0 * (2.0 * u).cos()).powi(2), 0.0, 100.0);
+        let tracer = LevelTracer::new(&field, &metric, SQUARE, [0.0; 2], 40, 0.2);
+        let level = field.value_and_gradient(0.5, 0.0)[0];
+        let length = tracer.length(&tracer.curves(level)[0]);
+        let (mut p, mut worst) = ([0.5, 0.0], 0.0f64);
+        for _ in 0..(length / 0.2).ceil() as usize {
+            p = tracer.step(p, 0.2).unwrap();
+            worst = worst.max(tracer.distance(p, tracer.onto_level(p, level)));
+        }
+        let back = tracer.distance(p, [0.5, 0.0]);
+        assert!(length > 30.0 && back < 0.2 && worst < 1e-5, "{length} {back} {worst}");
+    }
+
     #[test]
     fn open_curves_end_on_the_border_and_saddles_give_two_branches() {
         let field = spline(|x, y| x * y);

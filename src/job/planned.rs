@@ -294,7 +294,7 @@ fn within_engagement(
             break;
         }
         target -= by.max(LEAST_LOWERING * limit);
-        let next = planned(&PocketStrategy { engagement: Some(target), ..*asked })?;
+        let next = planned(&PocketStrategy { engagement: Some(target), ..asked.clone() })?;
         // Corners are reached by chance at another angle, so that a lower limit may stand higher for once.
         if over(&next) < by {
             best = next;

@@ -140,6 +140,7 @@ impl ExcessSearch<'_> {
         // What stands lower by so little is above the limit with its bound.
         let high = limits.scallop - 2.0 * NUMERICAL_FLOOR;
         let patches = self.patches(high, unseen);
+        let small = OTHER_KIND_SHARE * 0.5 * self.inspection.grid.cell;
         let may_be = open.squares.iter().filter(|square| square.possible > high).copied();
         let squares = Promising::of(may_be, MOST_HIGH_CELLS).squares;
         let found = work::parallel::try_map(squares.len(), |k| {
@@ -152,11 +153,15 @@ impl ExcessSearch<'_> {
                     Held::Nothing => continue,
                     Held::Unknown => (0.5 * half, true),
                     Held::Some { possible, place, here, by } => {
-                        if here > known && patches.reached(place, here, by) {
+                        let rises = here > known;
+                        let is_reached = rises && patches.reached(place, here, by);
+                        if is_reached {
                             let design = part.highest_at(place.x, place.y);
                             highest = design.map(|design| RidgePlace { at: design.point, height: here });
                         }
-                        (0.5 * half, possible > known.max(here + NUMERICAL_FLOOR))
+                        // Where no pass came down to the design, all around is as high.
+                        let is_uncut = rises && !is_reached && half <= small;
+                        (0.5 * half, possible > known.max(here + NUMERICAL_FLOOR) && !is_uncut)
                     }
                 };
                 if is_open && divisions > 0 {

@@ -27,9 +27,10 @@ use crate::PairFigures;
 /// Contacts by which the line of a pass is found, evenly along it.
 const CONTACTS: usize = 64;
 
-/// A contact is off its line by no more than this, mm: between the locations of a pass the ball leaves it a little where the part
-/// bends much. Passes that lie on no such line leave it by as much as they are apart.
-const ON_LINE: f64 = 0.03;
+/// A contact is off its line by no more than this share of the distance to the next line: between the locations of a pass the ball
+/// leaves it a little. A height grows with the square of the interval, so that both passes together change it by a fifth at most. Passes
+/// that lie on no such line leave it by as much as they are apart.
+const OFF_LINE: f64 = 0.05;
 
 /// A ball's centre stands over its contact within this share of the distance; beside a border it does not.
 const UPRIGHT: f64 = 1e-4;
@@ -73,9 +74,24 @@ struct Line {
     ends: [f64; 2],
     /// How much farther it may go at either end, in that parameter.
     beyond: f64,
+    /// A contact is off it by this at most, in the parameter that is constant.
+    off: f64,
 }
 
 impl Line {
+    /// Whether its contacts are near it, measured by the distance of the next one beside it; a line that is gone along twice is one.
+    fn is_apart(&self, all: &[Self]) -> bool {
+        let is_beside = |other: &&Self| {
+            (other.patch, other.constant) == (self.patch, self.constant)
+                && other.ends[0] < self.ends[1]
+                && self.ends[0] < other.ends[1]
+        };
+        let others = all.iter().filter(is_beside);
+        let apart = others.map(|other| ((other.level - self.level).abs(), other.off));
+        let next = apart.filter(|(apart, off)| *apart > self.off + off).map(|(apart, _)| apart);
+        next.min_by(f64::total_cmp).is_some_and(|next| self.off <= OFF_LINE * next)
+    }
+
     /// Whether it goes through a place of the other parameter; `None` where that is not known.
     fn passes(&self, along: f64) -> Option<bool> {
         let off = (self.ends[0] - along).max(along - self.ends[1]);
@@ -169,9 +185,10 @@ fn lines(
         let (pass, moves) = &passes[k];
         let on_part = |at: &ClPoint| contact(part, cutter, at);
         let contacts: Vec<PatchPoint> = places(path, moves).iter().filter_map(on_part).collect();
-        Ok::<_, Cancelled>(line(part, *pass, &contacts))
+        Ok::<_, Cancelled>(candidates(*pass, &contacts))
     })?;
-    let lines: Vec<Line> = found.into_iter().flatten().collect();
+    let all: Vec<Line> = found.into_iter().flatten().flatten().collect();
+    let lines: Vec<Line> = all.iter().filter(|line| line.is_apart(&all)).copied().collect();
     Ok((!lines.is_empty() && lines.len() as f64 >= MOSTLY * passes.len() as f64).then_some(lines))
 }
 
@@ -203,31 +220,24 @@ fn contact(part: &Part, cutter: &Cutter, at: &ClPoint) -> Option<PatchPoint> {
     foot.at.filter(|_| up.dot(&foot.normal) >= (1.0 - UPRIGHT) * up.norm())
 }
 
-/// The line of constant parameter that all contacts of a pass lie on.
-fn line(part: &Part, pass: u32, contacts: &[PatchPoint]) -> Option<Line> {
+/// The two lines of constant parameter that the contacts of a pass may lie on, near or far; `None` where they are on several patches.
+fn candidates(pass: u32, contacts: &[PatchPoint]) -> Option<[Line; 2]> {
     let first = contacts.first()?;
     if contacts.len() < 2 || contacts.iter().any(|at| at.patch != first.patch) {
         return None;
     }
-    let patch = &part.patches()[first.patch as usize];
-    let of = |at: &PatchPoint, which: usize| if which == 0 { at.u } else { at.v };
-    let is_on = |constant: usize, level: f64| {
-        contacts.iter().all(|at| {
-            let jet = patch.jet(at.u, at.v);
-            let speed = if constant == 0 { jet.du } else { jet.dv }.norm();
-            speed * (of(at, constant) - level).abs() <= ON_LINE
-        })
+    let sorted = |which: usize| {
+        let mut all: Vec<f64> = contacts.iter().map(|at| if which == 0 { at.u } else { at.v }).collect();
+        all.sort_by(f64::total_cmp);
+        all
     };
-    (0..2).find_map(|constant| {
-        let mut levels: Vec<f64> = contacts.iter().map(|at| of(at, constant)).collect();
-        levels.sort_by(f64::total_cmp);
-        let level = levels[levels.len() / 2];
-        let mut along: Vec<f64> = contacts.iter().map(|at| of(at, 1 - constant)).collect();
-        along.sort_by(f64::total_cmp);
-        let ends = [along[0], along[along.len() - 1]];
+    Some([0, 1].map(|constant| {
+        let (levels, along) = (sorted(constant), sorted(1 - constant));
+        let (level, last) = (levels[levels.len() / 2], levels.len() - 1);
+        let off = (level - levels[0]).max(levels[last] - level);
         let beyond = along.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
-        is_on(constant, level).then_some(Line { pass, patch: first.patch, constant, level, ends, beyond })
-    })
+        Line { pass, patch: first.patch, constant, level, ends: [along[0], along[last]], beyond, off }
+    }))
 }
 
 /// Adds the heights between the lines of a patch, sorted by level, on one line across them.
@@ -271,5 +281,56 @@ fn across(part: &Part, radius: f64, lines: &[Line], station: usize, pairs: &mut 
         sum.length += length;
         sum.height += length * height;
         sum.max = sum.max.max(height);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use geometry::{AnalyticShape, AnalyticSurface, Point2, Point3};
+    use motion::Move;
+    use part::Patch;
+    use work::monitor::Silent;
+
+    /// Straight passes of a ball of 6 mm over a plane of 20 × 20 mm.
+    fn figures(passes: &[[Point2; 2]]) -> Option<PolynomialFigures> {
+        let shape = AnalyticShape::Plane { height: 0.0 };
+        let patch = Patch::Analytic(AnalyticSurface::new(shape, [[0.0, 20.0]; 2]).unwrap());
+        let part = Part::from_patches(vec![patch], 0.002).unwrap();
+        let mut moves = Vec::new();
+        for (ends, pass) in passes.iter().zip(0..) {
+            let to = |p: &Point2, z: f64, kind| {
+                let to = ClPoint::upright(Point3::new(p.x, p.y, z));
+                Move { to, kind, feed_rate: 1000.0, pass }
+            };
+            moves.push(to(&ends[0], 5.0, MoveKind::Rapid));
+            moves.push(to(&ends[0], 0.0, MoveKind::Plunge));
+            moves.push(to(&ends[1], 0.0, MoveKind::Cut));
+            moves.push(to(&ends[1], 5.0, MoveKind::Retract));
+        }
+        let path = Toolpath::new(ClPoint::upright(Point3::new(0.0, 0.0, 5.0)), moves);
+        let cutter = Cutter::ball(6.0).unwrap();
+        polynomial_figures(&part, &cutter, &path, &PairFigures::default(), &Silent).unwrap()
+    }
+
+    /// Passes `step` mm apart in two pieces each, which turn by a slope.
+    fn passes(step: f64, slope: f64) -> Vec<[Point2; 2]> {
+        let at = |x: f64, y: f64| Point2::new(x, y + slope * (x - 10.0));
+        let pieces = |y: f64| [[at(0.5, y), at(9.0, y)], [at(9.5, y), at(19.5, y)]];
+        (0..12).flat_map(|k| pieces(4.0 + step * f64::from(k))).collect()
+    }
+
+    /// Heights on a plane have a closed form, whatever the distance of passes; passes askew lie on no lines of the patch.
+    #[test]
+    fn lines_are_told_by_their_distance_from_each_other() {
+        for step in [0.02, 0.2, 0.8] {
+            let found = figures(&passes(step, 0.0)).unwrap();
+            let exact = 3.0 - (9.0 - 0.25 * step * step).sqrt();
+            assert!((found.mean_mm / exact - 1.0).abs() < 1e-3, "{step}: {} {exact}", found.mean_mm);
+            // As far as they stray by a hundredth of their distance they are still lines; by half of it no longer.
+            assert!(figures(&passes(step, 0.001 * step)).is_some(), "{step}");
+            assert!(figures(&passes(step, 0.05 * step)).is_none(), "{step}");
+        }
+        assert!(figures(&passes(0.5, 0.5)).is_none());
     }
 }

@@ -44,7 +44,11 @@ impl Plan {
     }
 
     /// A path of what its strategy planned.
-    fn new(path: Toolpath, kept: Arc<Kept>, further: Vec<String>) -> Self {
+    pub(crate) fn new(path: Toolpath, kept: Kept) -> Self {
+        Self::again(path, Arc::new(kept), Vec::new())
+    }
+
+    fn again(path: Toolpath, kept: Arc<Kept>, further: Vec<String>) -> Self {
         let mut notes = kept.notes.clone();
         notes.extend(further);
         if path.is_empty() {
@@ -55,7 +59,7 @@ impl Plan {
 }
 
 impl Kept {
-    fn new(planned: Passes, strategy: &dyn Strategy) -> Self {
+    pub(crate) fn new(planned: Passes, strategy: &dyn Strategy) -> Self {
         let Passes { passes, mut notes, mut field, contacts, functions, .. } = planned;
         let field = strategy.shows_field().then(|| {
             planned_field::measure(&mut field, &contacts);
@@ -126,7 +130,7 @@ pub fn plan(
         .then(|| format!("{} short passes go once more over places where others left too much", added.len()));
     let all = kept.passes.iter().cloned().chain(added).collect();
     let path = join(all, strategy.both_ways(), &setup)?;
-    Ok(Plan::new(path, kept, further.into_iter().collect()))
+    Ok(Plan::again(path, kept, further.into_iter().collect()))
 }
 
 /// Plans one path of a cutter that tilts.
@@ -162,7 +166,7 @@ pub fn plan_tilted(
     touches.smoothing = settings.joining.smoothing.then_some(SAMPLING_OVER_RADIUS * cutter.radius());
     let (path, too_near_between) =
         join_tilted(touches, strategy.both_ways(), tilting, &setup, &mut planned.notes)?;
-    Ok(Plan { too_near_between, ..Plan::new(path, Arc::new(Kept::new(planned, strategy)), Vec::new()) })
+    Ok(Plan { too_near_between, ..Plan::new(path, Kept::new(planned, strategy)) })
 }
 
 /// What is made of the task that a strategy is given.

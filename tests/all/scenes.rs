@@ -330,6 +330,24 @@ fn a_pocket_with_islands_is_cleared_by_smooth_flow_as_well() {
 }
 
 /// Beyond open sides, and where a larger cutter was, no stock stands: passes begin there, without a helix or little of one.
+/// Passes from vectors, along walls and from guides clear a pocket with an island, and keep to what was asked for where nothing
+/// turns around a point.
+#[test]
+fn a_pocket_is_cleared_along_vectors_walls_and_guides() {
+    let (status, report) = run("sources/pocket_vectors.toml");
+    let toolpaths = report["toolpaths"].as_array().unwrap();
+    assert_eq!((status, toolpaths.len()), (0, 4));
+    for t in toolpaths {
+        assert_eq!(number(t, "/uncut/area_mm2"), 0.0, "{}", t["name"]);
+        // Walls askew are met to the decimals of the program.
+        assert!(number(t, "/pocket/wall_gouge_mm") < 5e-5, "{}", t["name"]);
+    }
+    let off = |k: usize| toolpaths[k]["field"]["direction_error_rms_deg"].as_f64().unwrap();
+    assert!(off(0) < 5.0 && off(2) < 2.5, "{} {}", off(0), off(2));
+    assert!(off(1) < 10.0, "{}", off(1));
+    assert!(toolpaths[3].get("field").is_none());
+}
+
 #[test]
 fn open_pockets_and_corners_left_by_a_larger_cutter_are_cleared() {
     for (scene, limit) in [("open_step", 70.0), ("rest_corners", 60.0)] {

@@ -1,7 +1,7 @@
 //! Fields on triangle meshes: surfaces with holes, several patches as one, plane regions.
 //!
 //! Enters: a mesh, directions at its vertices and the density of passes wanted there. Leaves: smooth
-//! line fields with their singular points, stream functions, and their level curves.
+//! line fields with their singular points and streamlines, stream functions, and their level curves.
 
 mod levels;
 mod lines;
@@ -13,6 +13,7 @@ mod stream;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod trace;
 mod weld;
 
 pub use levels::{MeshCurve, MeshLevels, MeshPoint};
@@ -26,4 +27,5 @@ pub use sheets::{Bend, Sheets};
 pub use sources::{Sense, borders, fixed_angle, guides, slope, slope_at};
 pub use stream::{Flow, Held, MeshStream, solve_stream, triangle_gradients};
 pub use surface::{FieldMesh, MeshFieldError};
+pub use trace::{MeshTracer, Streamline};
 pub use weld::weld;

@@ -3,6 +3,7 @@
 mod lines;
 mod making;
 mod stream;
+mod trace;
 
 use super::*;
 use geometry::{Point2, Point3, Vector3};

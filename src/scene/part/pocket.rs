@@ -382,6 +382,39 @@ mod tests {
     }
 
     #[test]
+    fn streamlines_take_the_directions_of_level_ground() {
+        let keys = "strategy = \"pocket-streamline\"\ndirection = \"guide\"\nguides = [[[0, 5], [60, 9]]]\nacross = true\n\
+                    direction_weight = 2\nalong_walls = true";
+        let text = TRAY.replace("strategy = \"pocket-flow\"\nspiral = true\nengagement = 80", keys);
+        let scene = Scene::parse("tray.toml", text.clone()).unwrap();
+        let written = complete_toml(&scene);
+        let again = Scene::parse("tray.toml", written.clone()).unwrap();
+        assert_eq!((&again.toolpaths, complete_toml(&again)), (&scene.toolpaths, written));
+        let border = text.replace("direction = \"guide\"\nguides = [[[0, 5], [60, 9]]]\nacross = true\n", "");
+        let border =
+            complete_toml(&Scene::parse("tray.toml", border.replace("along_walls = true", "")).unwrap());
+        assert!(
+            border.contains("direction = \"border\"") && border.contains("along_walls = true"),
+            "{border}"
+        );
+        for (to, words) in [
+            ("direction = \"steepest\"", "cannot be \"steepest\""),
+            (
+                "direction = { blend = [{ direction = \"u\" }, { direction = \"contour\" }] }",
+                "cannot be \"contour\"",
+            ),
+            ("direction = \"u\"\nengagement = 70", "`engagement`"),
+            ("direction = \"u\"\nfollow = 2", "`follow`"),
+            ("direction = \"u\"\nguides = [[[0, 5], [60, 9]]]", "curves that nothing follows"),
+            ("direction = \"file\"", "directions"),
+        ] {
+            let from = "direction = \"guide\"\nguides = [[[0, 5], [60, 9]]]\nacross = true";
+            let refused = Scene::parse("tray.toml", text.replace(from, to)).unwrap_err().to_string();
+            assert!(refused.contains(words), "{to}: {refused}");
+        }
+    }
+
+    #[test]
     fn open_sides_off_the_outline_and_smaller_earlier_cutters_are_refused() {
         for (key, words) in [
             ("open = [[[60, 0], [61, 40]]]", "its point at x 61.0000 y 40.0000 does not lie on the outline"),

@@ -73,7 +73,7 @@ pub(crate) fn note(error: &DirectionError) -> Option<String> {
     (rms > OFF).then(|| {
         format!(
             "passes are {:.1} degrees (root mean square; up to {:.0} at x {:.1} y {:.1}) off the directions that were asked for: \
-             with `follow` a greater one keeps closer to them, and without it more `control_points` may",
+             a greater `follow` or `direction_weight` keeps closer to them, and on smooth surfaces more `control_points` may",
             rms.to_degrees(),
             max.to_degrees(),
             at.x,

@@ -10,7 +10,7 @@ use super::spacing::level_tangent;
 use crate::surface::chart::Chart;
 use crate::surface::mesh_surface::MeshSurface;
 use cutter::Cutter;
-use field::mesh::{Line, MeshLevels, SingularPoint, merge_singular_points, singular_points};
+use field::mesh::{FieldMesh, Line, MeshLevels, SingularPoint, merge_singular_points, singular_points};
 use field::{FeedSample, LevelTracer, PassPoint, PlannedField, ScalarField, grid_turns};
 use geometry::{CurveSegment, Point2, Point3, SegmentGrid, Vector3};
 use part::Part;
@@ -133,6 +133,23 @@ pub(crate) fn set_mesh_levels(
     }
 }
 
+/// Takes the levels of a function on a plane mesh, and directions at its vertices, at some of them evenly.
+pub(crate) fn set_plane(
+    planned: &mut PlannedField,
+    mesh: &FieldMesh,
+    levels: &MeshLevels<'_>,
+    lines: &[Line],
+) {
+    set_mesh_levels(planned, levels, levels.range(), mesh.triangles().len());
+    let vertices = mesh.points().iter().zip(lines).map(|(p, line)| (*p, line.direction));
+    let (low, high) =
+        mesh.points().iter().fold(
+            (Point3::from([f64::INFINITY; 3]), Point3::from([f64::NEG_INFINITY; 3])),
+            |(low, high), p| (low.inf(p), high.sup(p)),
+        );
+    planned.directions = evenly(vertices, cell_of(high.x - low.x, high.y - low.y));
+}
+
 /// Takes directions at the vertices of a mesh, at some of them evenly over the part, and their singular points.
 pub(crate) fn set_mesh_feed(
     planned: &mut PlannedField,
@@ -145,7 +162,11 @@ pub(crate) fn set_mesh_feed(
     planned.singular_points = singular_points(mesh, lines, MERGE_OVER_RADIUS * cutter.radius());
     let own = (0..lines.len()).filter(|&v| surface.origin[v] as usize == v);
     let vertices = own.map(|v| (mesh.points()[v], lines[v].direction));
-    let cell = cell(part);
+    planned.directions = evenly(vertices, cell(part));
+}
+
+/// The direction nearest to the middle of each cell of a size, mm.
+fn evenly(vertices: impl Iterator<Item = (Point3, Vector3)>, cell: f64) -> Vec<FeedSample> {
     let mut nearest: BTreeMap<[i64; 2], (f64, FeedSample)> = BTreeMap::new();
     for (p, t) in vertices {
         let key = [p.x, p.y].map(|c| (c / cell).floor() as i64);
@@ -156,7 +177,7 @@ pub(crate) fn set_mesh_feed(
             nearest.insert(key, (distance, sample));
         }
     }
-    planned.directions = nearest.into_values().map(|(_, sample)| sample).collect();
+    nearest.into_values().map(|(_, sample)| sample).collect()
 }
 
 /// Takes the passes and measures how far they lie apart.
@@ -197,7 +218,12 @@ pub(crate) fn singular_note(planned: &PlannedField) -> Option<String> {
 /// Distance of samples of directions, mm.
 fn cell(part: &Part) -> f64 {
     let size = part.bounds().size();
-    (size.x * size.y / DIRECTIONS).sqrt().max(size.x.max(size.y) / DIRECTIONS).max(f64::MIN_POSITIVE)
+    cell_of(size.x, size.y)
+}
+
+/// The same over a rectangle of some sides, mm.
+fn cell_of(x: f64, y: f64) -> f64 {
+    (x * y / DIRECTIONS).sqrt().max(x.max(y) / DIRECTIONS).max(f64::MIN_POSITIVE)
 }
 
 fn sample(at: &Point3, feed: &Vector3) -> Option<FeedSample> {

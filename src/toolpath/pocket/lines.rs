@@ -3,11 +3,17 @@
 use super::route::{Entry, Run, begun_near};
 use geometry::{Piece, Point2, SegmentGrid, Vector2};
 
-/// One line within the piece.
-#[derive(Debug, Clone, Copy)]
-struct Line {
-    ends: [Point2; 2],
-    row: usize,
+/// One line within the piece, from wall to wall.
+#[derive(Debug, Clone)]
+pub(super) struct Line {
+    pub points: Vec<Point2>,
+    pub row: usize,
+}
+
+impl Line {
+    fn ends(&self) -> [Point2; 2] {
+        [self.points[0], self.points[self.points.len() - 1]]
+    }
 }
 
 /// Lines at `angle` (rad) from the x axis, `step` apart.
@@ -35,10 +41,23 @@ pub fn runs(piece: &Piece, angle: f64, step: f64) -> Vec<Run> {
         cuts.sort_by(f64::total_cmp);
         let at = |s: f64| Point2::from(u * s + v * level);
         lines.extend(
-            cuts.chunks_exact(2).filter(|c| c[1] > c[0]).map(|c| Line { ends: [at(c[0]), at(c[1])], row }),
+            cuts.chunks_exact(2)
+                .filter(|c| c[1] > c[0])
+                .map(|c| Line { points: vec![at(c[0]), at(c[1])], row }),
         );
     }
-    let mut runs = chained(lines, piece, spacing);
+    along_walls(lines, Vec::new(), piece, spacing, |row, next| next == row + 1)
+}
+
+/// Runs that go on with lines, each from the end of one that it follows by its row, and then go around each wall.
+pub(super) fn along_walls(
+    lines: Vec<Line>,
+    runs: Vec<Run>,
+    piece: &Piece,
+    spacing: f64,
+    follows: impl Fn(usize, usize) -> bool,
+) -> Vec<Run> {
+    let mut runs = chained(lines, runs, piece, spacing, follows);
     for wall in piece.curves() {
         let end = runs.last().and_then(|r: &Run| r.points.last()).copied();
         let closed = begun_near(wall, &end.unwrap_or(wall[0]), 0.0);
@@ -55,36 +74,62 @@ pub fn runs(piece: &Piece, angle: f64, step: f64) -> Vec<Run> {
     runs
 }
 
-/// Lines one after the other: from each to one of the next row whose end can be reached along a wall.
-fn chained(mut lines: Vec<Line>, piece: &Piece, spacing: f64) -> Vec<Run> {
-    /// A way along the wall to the next row is at most so many times the distance of rows.
-    const LONGEST_LINK: f64 = 4.0;
+/// Lines one after the other: from each to one that follows it and whose end can be reached along a wall.
+fn chained(
+    mut lines: Vec<Line>,
+    mut runs: Vec<Run>,
+    piece: &Piece,
+    spacing: f64,
+    follows: impl Fn(usize, usize) -> bool,
+) -> Vec<Run> {
     let walls = SegmentGrid::of_curves(piece.curves());
-    let mut runs: Vec<Run> = Vec::new();
     let mut at: Option<(usize, Point2)> = None;
     while !lines.is_empty() {
         let next = at.and_then(|(row, end)| {
-            let ends = lines.iter().enumerate().filter(|(_, l)| l.row == row + 1);
-            ends.flat_map(|(k, l)| [(k, 0), (k, 1)].map(|(k, e)| (k, e, l.ends[e])))
-                .filter_map(|(k, e, p)| {
-                    along_wall(piece, &walls, &end, &p, LONGEST_LINK * spacing).map(|way| (k, e, way))
-                })
+            let ends = lines.iter().enumerate().filter(|(_, l)| follows(row, l.row));
+            ends.flat_map(|(k, l)| [(k, 0), (k, 1)].map(|(k, e)| (k, e, l.ends()[e])))
+                .filter_map(|(k, e, p)| link(piece, &walls, &[end, p], spacing).map(|way| (k, e, way)))
                 .min_by(|a, b| length(&a.2).total_cmp(&length(&b.2)))
         });
         if let (Some((k, e, way)), Some(run)) = (next, runs.last_mut()) {
             let line = lines.remove(k);
             run.points.extend(way.into_iter().skip(1));
-            run.points.push(line.ends[1 - e]);
-            at = Some((line.row, line.ends[1 - e]));
+            let end = line.ends()[1 - e];
+            let mut points = line.points;
+            if e == 1 {
+                points.reverse();
+            }
+            run.points.extend(points.into_iter().skip(1));
+            at = Some((line.row, end));
         } else {
             let first = (0..lines.len()).min_by_key(|k| lines[*k].row).unwrap_or(0);
             let line = lines.remove(first);
-            let way = vec![line.ends[0], line.ends[1], line.ends[0]];
-            runs.push(Run { entry: Entry::Ramp(way), points: line.ends.to_vec() });
-            at = Some((line.row, line.ends[1]));
+            let way = line.points.iter().chain(line.points.iter().rev().skip(1)).copied().collect();
+            at = Some((line.row, line.ends()[1]));
+            runs.push(Run { entry: Entry::Ramp(way), points: line.points });
         }
     }
     runs
+}
+
+/// A way from an end of a line to that of another: along the wall that both are at, else straight where nothing is between.
+fn link(piece: &Piece, walls: &SegmentGrid, [a, b]: &[Point2; 2], spacing: f64) -> Option<Vec<Point2>> {
+    /// It is at most so many times the distance of rows long.
+    const LONGEST: f64 = 4.0;
+    /// Ends this share of the distance of rows off a wall are at it: triangles follow it no closer.
+    const AT_WALL: f64 = 0.01;
+    let longest = LONGEST * spacing;
+    if [a, b].iter().all(|p| walls.distance(p) <= AT_WALL * spacing) {
+        return along_wall(piece, walls, a, b, longest);
+    }
+    is_clear(piece, walls, &[*a, *b], longest).then(|| vec![*a, *b])
+}
+
+/// Whether a straight way is no longer than `longest` and stays in the piece, as far as some places of it tell.
+pub(super) fn is_clear(piece: &Piece, walls: &SegmentGrid, [a, b]: &[Point2; 2], longest: f64) -> bool {
+    const PLACES: usize = 16;
+    let inside = |p: &Point2| piece.contains(p) || walls.distance(p) < 1e-6;
+    (b - a).norm() <= longest && (1..PLACES).all(|k| inside(&(a + (b - a) * (k as f64 / PLACES as f64))))
 }
 
 fn length(way: &[Point2]) -> f64 {

@@ -2,7 +2,7 @@
 //!
 //! Enters: the region, its depth, the cutter. Leaves: a program. The cutter's centre stays in the region
 //! drawn in by the cutter's radius. Passes there are level curves of a flow that follows walls and islands
-//! (or offsets of them, or parallel lines), cut from the inside outwards, so that only the first pass of
+//! (or offsets of them, or parallel lines, or levels of a stream function that follows directions), cut from the inside outwards, so that only the first pass of
 //! each nest is a slot; each nest is entered by a helix where there is room, else by a ramp along its first
 //! pass. Where an engagement is asked for, passes go along the border of the stock instead, which they turn into as far as
 //! the limit allows (`peel`), and what they leave is found and cleared by loops (`rest`, `bounded`). Every finished move keeps to
@@ -22,6 +22,7 @@ mod rest;
 mod route;
 mod shape;
 pub(crate) mod strategy;
+mod stream;
 #[cfg(test)]
 mod tests;
 mod turning;
@@ -35,12 +36,14 @@ use nest::NestError;
 use route::Run;
 pub use shape::{NotOnOutline, Pocket};
 pub use strategy::{Flow, Pattern, PocketStrategy, WallFinish, read_pocket_step};
+pub use stream::Vectors;
 use turning::Turning;
 
 use crate::plan::Plan;
-use crate::vocabulary::{PlanError, PlanSettings, Strategy};
+use crate::surface::feed::check as feed_check;
+use crate::vocabulary::{Kept, Passes, PlanError, PlanSettings, Strategy};
 use cutter::Cutter;
-use geometry::{Piece, Point2, Region, SegmentGrid};
+use geometry::{Aabb, Piece, Point2, Point3, Region, SegmentGrid};
 use motion::ROUNDING;
 use work::monitor::{self, Cancelled, Monitor};
 
@@ -102,11 +105,19 @@ pub fn plan_pocket(
     } else {
         walls_at.clone()
     };
-    let mut notes = Vec::new();
+    let mut planned = Passes::default();
+    let notes = &mut planned.notes;
     if rough.is_empty() {
         notes.push(
             "no room for passes within the wall allowance: only the pass along the walls is cut".into(),
         );
+    }
+    if let Pattern::Streamline(vectors) = &strategy.pattern
+        && let Some(around) = pocket.free().bounds()
+    {
+        let [low, high] = around.map(|p| Point3::new(p.x, p.y, 0.0));
+        let domain = [[low.x, high.x], [low.y, high.y]];
+        planned.notes.extend(feed_check(&vectors.direction, &Aabb { min: low, max: high }, &[domain])?);
     }
     let step = strategy.stepover(settings.step, radius);
     let mut ground = pocket.free().bounds().map(|around| Cleared::new(around, radius));
@@ -126,7 +137,7 @@ pub fn plan_pocket(
             groups.push((piece, clearing.rest));
             continue;
         }
-        let mut runs = piece_runs(piece, cutter, strategy, step, air.is_none(), &mut notes, monitor)?;
+        let mut runs = piece_runs(piece, cutter, strategy, step, air.is_none(), &mut planned, monitor)?;
         // Loops that bound the engagement lean to one side of lines, and may find no room beside a way from elsewhere.
         if let (Some(air), None) = (&air, &rules) {
             let room = walls::Room::new(piece);
@@ -149,6 +160,7 @@ pub fn plan_pocket(
             groups.push((piece, piece.curves().map(around).collect()));
         }
     }
+    let notes = &mut planned.notes;
     if walls_at.pieces.len() > 1 {
         notes.push(format!(
             "the cutter's centre has room in {} places apart from each other",
@@ -162,7 +174,7 @@ pub fn plan_pocket(
     ));
     kept(&mut groups, monitor)?;
     if let Some(rules) = &rules {
-        bound_runs(&mut groups, &mut ground, rules, &mut notes, monitor)?;
+        bound_runs(&mut groups, &mut ground, rules, notes, monitor)?;
         kept(&mut groups, monitor)?;
     }
     let along_walls = groups.split_off(rough_groups).into_iter().flat_map(|group| group.1).collect();
@@ -181,7 +193,8 @@ pub fn plan_pocket(
         run.points = descend::shortened(&run.points, chords, MOVE_OVER_RADIUS * radius, turn, holds);
     }
     let path = descend::program(&runs, pocket.depth, strategy, settings);
-    Ok(Plan::of_path(path, notes))
+    planned.contacts.iter_mut().flatten().for_each(|contact| contact.at.z = -pocket.depth);
+    Ok(Plan::new(path, Kept::new(planned, strategy)))
 }
 
 /// Keeps all runs where the cutter's centre may be.
@@ -231,7 +244,7 @@ fn piece_runs(
     strategy: &PocketStrategy,
     step: f64,
     helix: bool,
-    notes: &mut Vec<String>,
+    planned: &mut Passes,
     monitor: &dyn Monitor,
 ) -> Result<Vec<Run>, PlanError> {
     let failed = |e: NestError| match e {
@@ -244,18 +257,19 @@ fn piece_runs(
     let turning = strategy.bounded().map(|limit| Turning { limit, radius });
     let spacing = turning
         .map_or(nest::Spacing::lenient(step, reach), |turning| nest::Spacing::bounded(step, reach, turning));
-    let (nest, spiral) = match strategy.pattern {
+    let (nest, spiral) = match &strategy.pattern {
+        Pattern::Streamline(vectors) => return stream::runs(piece, vectors, cutter, step, planned, monitor),
         Pattern::Zigzag { angle } => {
             let step = turning.map_or(step, |turning| step.min(turning.step(0.0)));
-            return Ok(lines::runs(piece, angle, step));
+            return Ok(lines::runs(piece, *angle, step));
         }
         Pattern::Offset { spiral } => {
-            (nest::offsets(piece, &spacing, reach, monitor).map_err(failed)?, spiral)
+            (nest::offsets(piece, &spacing, reach, monitor).map_err(failed)?, *spiral)
         }
         Pattern::Flow(flow) => {
-            let (nest, sigma) = nest::flow(piece, &flow, spacing, reach, monitor).map_err(failed)?;
+            let (nest, sigma) = nest::flow(piece, flow, spacing, reach, monitor).map_err(failed)?;
             let plain = nest::offsets(piece, &spacing, reach, monitor).map_err(failed)?.length();
-            notes.push(format!(
+            planned.notes.push(format!(
                 "the flow is smoothed over {sigma:.2} mm; its passes are {:.1} mm long, offsets of the walls would be {plain:.1} mm",
                 nest.length()
             ));

@@ -220,6 +220,28 @@ pub fn offsets(
     }))
 }
 
+/// Triangles of sides of some `edge` mm that fill a piece, its walls thinned for a stepover, mm.
+///
+/// # Errors
+/// [`NestError`].
+pub fn planar_mesh(
+    piece: &Piece,
+    step: f64,
+    edge: f64,
+    monitor: &dyn Monitor,
+) -> Result<PlanarMesh, NestError> {
+    let thin = |c: &[Point2]| thinned(c, WALL_SHARE * step);
+    let curves: Vec<Vec<Point2>> = piece.curves().map(thin).collect();
+    let plain = Piece { outer: curves[0].clone(), islands: curves[1..].to_vec() };
+    // Thinning may make walls touch that nearly do; the exact ones do not.
+    let exact = piece.clone();
+    let mesh = aside::run(monitor, move || {
+        let filled = if Region::nested(curves).is_ok() { plain } else { exact };
+        PlanarMesh::new(&filled, edge)
+    })??;
+    Ok(mesh)
+}
+
 /// A flow on a piece and its mesh.
 pub struct FlowField {
     mesh: Arc<PlanarMesh>,
@@ -232,15 +254,7 @@ impl FlowField {
     /// # Errors
     /// [`NestError`].
     pub fn new(piece: &Piece, step: f64, monitor: &dyn Monitor) -> Result<Self, NestError> {
-        let thin = |c: &[Point2]| thinned(c, WALL_SHARE * step);
-        let curves: Vec<Vec<Point2>> = piece.curves().map(thin).collect();
-        let plain = Piece { outer: curves[0].clone(), islands: curves[1..].to_vec() };
-        // Thinning may make walls touch that nearly do; the exact ones do not.
-        let exact = piece.clone();
-        let mesh = aside::run(monitor, move || {
-            let filled = if Region::nested(curves).is_ok() { plain } else { exact };
-            PlanarMesh::new(&filled, EDGE_OVER_STEP * step)
-        })??;
+        let mesh = planar_mesh(piece, step, EDGE_OVER_STEP * step, monitor)?;
         let region = Region { pieces: vec![piece.clone()] };
         let deepest = region.largest_disc(0.05 * step, monitor)?.map_or(0.0, |d| d.1);
         Ok(Self { mesh: Arc::new(mesh), deepest })

@@ -4,8 +4,13 @@ use std::fmt::{self, Write as _};
 
 use super::bounded::{Rules, Sides};
 use super::feed::engagement_angle;
+use super::stream::Vectors;
 use super::turning::Turning;
-use crate::vocabulary::{Definition, PartKind, Passes, PlanError, Reading, Step, Strategy, Task};
+use crate::strategies::direction_keys;
+use crate::vocabulary::{
+    Definition, FeedDirection, PartKind, Passes, PlanError, Reading, Step, Strategy, Task,
+};
+use field::mesh::Sense;
 use geometry::Vector2;
 use keys::{LENGTH, SceneError, Section, toml_number};
 
@@ -20,7 +25,7 @@ pub struct Flow {
 }
 
 /// The passes of one step down.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Pattern {
     /// Level curves of a flow that follows the walls.
     Flow(Flow),
@@ -34,12 +39,14 @@ pub enum Pattern {
         /// Their angle from the x axis, rad.
         angle: f64,
     },
+    /// Levels of a stream function that follows feed directions.
+    Streamline(Vectors),
 }
 
 impl Pattern {
     /// Whether a bounded engagement is kept by passes that go along the stock's border, and not by loops.
-    pub(super) fn peels(self) -> bool {
-        !matches!(self, Self::Zigzag { .. })
+    pub(super) fn peels(&self) -> bool {
+        matches!(self, Self::Flow(_) | Self::Offset { .. })
     }
 }
 
@@ -58,7 +65,7 @@ impl WallFinish {
 }
 
 /// How a pocket is milled.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct PocketStrategy {
     /// The passes.
     pub pattern: Pattern,
@@ -161,6 +168,34 @@ pub(crate) static ZIGZAG: Definition = Definition {
     },
 };
 
+/// How scenes speak of streamlines.
+pub(crate) static STREAMLINE: Definition = Definition {
+    word: "pocket-streamline",
+    help: "a pocket along levels of a stream function that follows feed directions",
+    part: PartKind::Pocket,
+    keys: &[
+        "stepdown",
+        "floor_allowance",
+        "wall_allowance",
+        "wall_finish",
+        "ramp_angle",
+        "direction",
+        "directions",
+        "guides",
+        "across",
+        "direction_weight",
+        "along_walls",
+    ],
+    read: |from| {
+        let direction = direction_keys::read_level(from.section, &mut from.tables)?;
+        let direction_weight = direction_keys::read_weight(from.section)?;
+        // Walls are streamlines of their own direction.
+        let usual = direction == FeedDirection::Border(Sense::Along);
+        let along_walls = from.section.flag("along_walls")?.unwrap_or(usual);
+        read(from, Pattern::Streamline(Vectors { direction, direction_weight, along_walls }))
+    },
+};
+
 fn length(section: &Section<'_>, key: &str) -> Result<Option<f64>, SceneError> {
     Ok(section.length(key)?.map(|v| v.value))
 }
@@ -169,7 +204,7 @@ fn spiral(section: &Section<'_>) -> Result<bool, SceneError> {
     Ok(section.flag("spiral")?.unwrap_or(false))
 }
 
-/// The keys of all three.
+/// The keys of all of them.
 fn read(from: &Reading<'_>, pattern: Pattern) -> Result<Box<dyn Strategy>, SceneError> {
     let section = from.section;
     let allowance = |key| {
@@ -222,15 +257,16 @@ pub fn read_pocket_step(section: &Section<'_>, radius: f64) -> Result<Step, Scen
 
 impl Strategy for PocketStrategy {
     fn definition(&self) -> &'static Definition {
-        match self.pattern {
+        match &self.pattern {
             Pattern::Flow(_) => &FLOW,
             Pattern::Offset { .. } => &OFFSET,
             Pattern::Zigzag { .. } => &ZIGZAG,
+            Pattern::Streamline(_) => &STREAMLINE,
         }
     }
 
     fn write(&self, out: &mut String) -> fmt::Result {
-        match self.pattern {
+        match &self.pattern {
             Pattern::Flow(flow) => {
                 writeln!(out, "spiral = {}", flow.spiral)?;
                 if let Some(smoothing) = flow.smoothing {
@@ -240,6 +276,11 @@ impl Strategy for PocketStrategy {
             Pattern::Offset { spiral } => writeln!(out, "spiral = {spiral}")?,
             Pattern::Zigzag { angle } => {
                 writeln!(out, "angle = {}  # degrees from the x axis", toml_number(angle.to_degrees()))?
+            }
+            Pattern::Streamline(vectors) => {
+                direction_keys::write(out, &vectors.direction, "\n")?;
+                writeln!(out, "\ndirection_weight = {}", toml_number(vectors.direction_weight))?;
+                writeln!(out, "along_walls = {}", vectors.along_walls)?;
             }
         }
         if let Some(stepdown) = self.stepdown {
@@ -260,6 +301,17 @@ impl Strategy for PocketStrategy {
             writeln!(out, "engagement = {}  # degrees", toml_number(angle.to_degrees()))?;
         }
         Ok(())
+    }
+
+    fn shows_field(&self) -> bool {
+        matches!(self.pattern, Pattern::Streamline(_))
+    }
+
+    fn direction_mut(&mut self) -> Option<&mut FeedDirection> {
+        match &mut self.pattern {
+            Pattern::Streamline(vectors) => Some(&mut vectors.direction),
+            _ => None,
+        }
     }
 
     /// There is no surface in a pocket; [`plan_pocket`](super::plan_pocket) plans one.
@@ -294,7 +346,7 @@ impl PocketStrategy {
         let bounds = Turning { limit: self.bounded()?, radius };
         let sides = match self.pattern {
             Pattern::Zigzag { angle } => Sides::Toward(Vector2::new(-angle.sin(), angle.cos())),
-            Pattern::Flow(_) | Pattern::Offset { .. } => Sides::Left,
+            Pattern::Flow(_) | Pattern::Offset { .. } | Pattern::Streamline(_) => Sides::Left,
         };
         Some(Rules { bounds, sides, helix: self.helix(radius) })
     }

@@ -1,11 +1,14 @@
 mod engagement;
 
 use super::*;
-use crate::vocabulary::{Joining, Step};
+use crate::levels::halving::LevelSource;
+use crate::vocabulary::{FeedDirection, Joining, Step};
+use field::mesh::{MeshTracer, Sense};
 use geometry::{Point2, Point3};
 use machine::Machine;
 use motion::MoveKind;
 use std::f64::consts::PI;
+use std::sync::Arc;
 use work::monitor::Silent;
 
 fn rectangle(x0: f64, y0: f64, x1: f64, y1: f64) -> Vec<Point2> {
@@ -54,6 +57,19 @@ fn strategy(pattern: Pattern) -> PocketStrategy {
     }
 }
 
+/// Streamlines along walls, at an angle, and from guides.
+fn streamlines() -> [Pattern; 3] {
+    let guide = vec![Point2::new(0.0, 5.0), Point2::new(25.0, 15.0), Point2::new(60.0, 10.0)];
+    [
+        (FeedDirection::Border(Sense::Along), true),
+        (FeedDirection::Angle(0.4), false),
+        (FeedDirection::Guides { curves: Arc::new(vec![guide]), sense: Sense::Along }, false),
+    ]
+    .map(|(direction, along_walls)| {
+        Pattern::Streamline(Vectors { direction, direction_weight: 1.0, along_walls })
+    })
+}
+
 fn patterns() -> [Pattern; 6] {
     [
         Pattern::Flow(Flow { smoothing: None, spiral: false }),
@@ -80,8 +96,11 @@ fn programs_keep_to_the_pocket_and_clear_it() {
         let floor = pocket.reachable_floor(&cutter, 0.02);
         let bounded = |pattern| (pattern, Some(70f64.to_radians()));
         let all = patterns().map(|pattern| (pattern, None)).into_iter();
-        for (pattern, engagement) in all.chain([0, 2, 4].map(|k| bounded(patterns()[k]))) {
-            let strategy = PocketStrategy { engagement, ..strategy(pattern) };
+        let vectors = streamlines().map(|pattern| (pattern, None));
+        for (pattern, engagement) in
+            all.chain([0, 2, 4].map(|k| bounded(patterns()[k].clone()))).chain(vectors)
+        {
+            let strategy = PocketStrategy { engagement, ..strategy(pattern.clone()) };
             let plan = plan_pocket(&pocket, &cutter, &strategy, &settings(), &Silent).unwrap();
             let mut segments = Vec::new();
             for (a, b, m) in plan.path.segments() {
@@ -167,26 +186,37 @@ fn what_corners_keep_has_a_closed_form() {
 #[test]
 fn a_cutter_that_fits_nowhere_is_told_the_largest_that_does() {
     let slot = pocket(vec![rectangle(0.0, 0.0, 30.0, 5.0)]);
-    let error =
-        plan_pocket(&slot, &Cutter::flat(6.0).unwrap(), &strategy(patterns()[0]), &settings(), &Silent)
-            .unwrap_err();
+    let error = plan_pocket(
+        &slot,
+        &Cutter::flat(6.0).unwrap(),
+        &strategy(patterns()[0].clone()),
+        &settings(),
+        &Silent,
+    )
+    .unwrap_err();
     assert!(
         error.to_string().contains("fits nowhere") && error.to_string().contains("is 4.99 mm")
             || error.to_string().contains("is 5.00 mm"),
         "{error}"
     );
     let taper = Cutter::taper(2.0, 0.5, 0.1, 6.0).unwrap();
-    assert!(plan_pocket(&slot, &taper, &strategy(patterns()[0]), &settings(), &Silent).is_err());
+    assert!(plan_pocket(&slot, &taper, &strategy(patterns()[0].clone()), &settings(), &Silent).is_err());
     // Just room: a single line of positions.
     assert!(
-        plan_pocket(&slot, &Cutter::flat(4.9).unwrap(), &strategy(patterns()[0]), &settings(), &Silent)
-            .is_ok()
+        plan_pocket(
+            &slot,
+            &Cutter::flat(4.9).unwrap(),
+            &strategy(patterns()[0].clone()),
+            &settings(),
+            &Silent
+        )
+        .is_ok()
     );
 }
 
 #[test]
 fn steps_go_down_evenly_and_the_floor_has_its_own() {
-    let mut s = strategy(patterns()[2]);
+    let mut s = strategy(patterns()[2].clone());
     assert_eq!(descend::floors(6.0, &s), [-3.0, -6.0]);
     assert_eq!(descend::floors(7.0, &s).len(), 3);
     s.floor_allowance = 0.5;
@@ -211,7 +241,7 @@ fn floor_and_walls_are_finished_from_their_allowances() {
             floor_allowance,
             wall_finish,
             engagement,
-            ..strategy(patterns()[2])
+            ..strategy(patterns()[2].clone())
         };
         let path = plan_pocket(&pocket, &cutter, &strategy, &settings(), &Silent).unwrap().path;
         let (mut finishing, mut levels, mut last) = (Vec::new(), Vec::new(), 0);
@@ -289,4 +319,45 @@ fn feeds_fall_where_more_of_the_cutter_cuts() {
     limit_feed(&mut path, &angles, PI / 2.0);
     let feeds: Vec<f64> = path.moves.iter().map(|m| m.feed_rate).collect();
     assert_eq!(feeds, [1000.0, 500.0, 1000.0]);
+}
+
+/// What flows around a round island in a round pocket: passes are circles, none ends at a wall, and streamlines traced by
+/// Runge and Kutta's method stay on them within the chord tolerance.
+#[test]
+fn streamlines_around_an_island_are_the_traced_ones() {
+    let pocket = pocket(vec![disc(0.0, 0.0, 30.0), disc(0.0, 0.0, 6.0)]);
+    let along = streamlines()[0].clone();
+    let plan =
+        plan_pocket(&pocket, &Cutter::flat(6.0).unwrap(), &strategy(along.clone()), &settings(), &Silent)
+            .unwrap();
+    let passes = &plan.field.as_ref().unwrap().passes;
+    assert!(passes.len() > 5, "{}", passes.len());
+    for pass in passes {
+        let radii = pass.iter().map(|p| p.at.xy().coords.norm());
+        let [least, most] = radii.fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], r| [a.min(r), b.max(r)]);
+        assert!(
+            most - least < 0.1 && pass.first().map(|p| p.at) == pass.last().map(|p| p.at),
+            "{least} {most}"
+        );
+    }
+    let Pattern::Streamline(vectors) = along else { panic!("streamlines") };
+    let ring = pocket.region.inset(3.0);
+    let (chord, mut worst) = (settings().chord_tolerance, 0.0f64);
+    let cutter = Cutter::flat(6.0).unwrap();
+    let found = stream::Fitted::new(&ring.pieces[0], &vectors, &cutter, 2.4, &Silent).unwrap();
+    let source = found.source(2.4).unwrap();
+    let gradients = source.levels.gradients().iter();
+    let lines: Vec<_> = gradients.map(|g| geometry::Vector3::new(-g.y, g.x, 0.0)).collect();
+    let tracer = MeshTracer::new(&found.mesh, &lines).unwrap();
+    let [lo, hi] = source.levels.range();
+    for share in [0.2, 0.4, 0.6, 0.8] {
+        let curve = &source.curves(lo + share * (hi - lo))[0];
+        let level: Vec<Point2> = curve.points.iter().map(|spot| spot.at.position.xy()).collect();
+        let level = SegmentGrid::of_curves([level.as_slice()]);
+        let traced = tracer.through(curve.points[0].at, 0.3, 400.0);
+        assert!(traced.closed);
+        worst = traced.points.iter().map(|p| level.distance(&p.position.xy())).fold(worst, f64::max);
+    }
+    println!("{worst}");
+    assert!(worst <= chord, "{worst}");
 }

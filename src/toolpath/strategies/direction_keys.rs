@@ -4,6 +4,7 @@ use std::fmt::{self, Write as _};
 use std::sync::Arc;
 
 use crate::vocabulary::{Along, FeedDirection};
+use field::DIRECTION_WEIGHT;
 use field::mesh::Sense;
 use keys::{Located, SceneError, Section, toml_number, toml_string};
 
@@ -13,11 +14,23 @@ pub(crate) const KEYS: [&str; 4] = ["direction", "directions", "guides", "across
 /// Words of directions that can be blended.
 const WORDS: [&str; 8] = ["widest-strip", "steepest", "contour", "u", "v", "guide", "border", "file"];
 
+/// Words of directions that level ground has, too.
+const LEVEL_WORDS: [&str; 5] = ["u", "v", "guide", "border", "file"];
+
 /// The word of a strategy of its own.
 const SHORTEST: &str = "shortest";
 
 /// Weights of a blend that make sense: below, a direction has no part in it.
 const WEIGHT: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
+
+/// Weights of directions over distances: below, passes leave them; above, distances count for nothing.
+const DIRECTION_WEIGHTS: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
+
+/// How much following a direction counts over the distances of passes.
+pub(crate) fn read_weight(section: &Section<'_>) -> Result<f64, SceneError> {
+    let weight = section.number("direction_weight", DIRECTION_WEIGHTS, "")?;
+    Ok(weight.map_or(DIRECTION_WEIGHT, |weight| weight.value))
+}
 
 /// Reads a direction and the files that it names, in order; what these hold is read later. `None` for the shortest path, which
 /// is asked for where nothing is said of directions, and no other key needs one (`needed`).
@@ -30,6 +43,15 @@ pub(crate) fn read(
     read_one(section, &words, if needed { WORDS[0] } else { SHORTEST }, files)
 }
 
+/// Reads a direction on level ground; along the border where nothing is said.
+pub(crate) fn read_level(
+    section: &Section<'_>,
+    files: &mut Vec<Located<String>>,
+) -> Result<FeedDirection, SceneError> {
+    let direction = read_one(section, &LEVEL_WORDS, "border", files)?;
+    Ok(direction.unwrap_or(FeedDirection::Border(Sense::Along)))
+}
+
 /// Reads a direction by one of some words, by the `usual` one where none is written.
 fn read_one(
     section: &Section<'_>,
@@ -38,7 +60,7 @@ fn read_one(
     files: &mut Vec<Located<String>>,
 ) -> Result<Option<FeedDirection>, SceneError> {
     let (word, direction) = match section.inline("direction") {
-        Some(table) if table.has("blend") => ("", Some(read_blend(&table, files)?)),
+        Some(table) if table.has("blend") => ("", Some(read_blend(&table, words, files)?)),
         Some(table) => {
             table.only(&["angle", "blend"], &[], "a direction")?;
             let angle = table.required_number("angle", -360.0..=360.0, " degrees", 30.0)?;
@@ -109,7 +131,13 @@ fn read_word(
 }
 
 /// `{ blend = [{ direction = "steepest", weight = 2.0 }, ...] }`.
-fn read_blend(table: &Section<'_>, files: &mut Vec<Located<String>>) -> Result<FeedDirection, SceneError> {
+fn read_blend(
+    table: &Section<'_>,
+    words: &[&'static str],
+    files: &mut Vec<Located<String>>,
+) -> Result<FeedDirection, SceneError> {
+    // The shortest path is no direction.
+    let words: Vec<&'static str> = words.iter().copied().filter(|word| *word != SHORTEST).collect();
     table.only(&["blend"], &["angle"], "a blend of directions")?;
     let keys: Vec<&str> = KEYS.into_iter().chain(["weight"]).collect();
     let parts = table.sections("blend")?;
@@ -123,14 +151,14 @@ fn read_blend(table: &Section<'_>, files: &mut Vec<Located<String>>) -> Result<F
     let read_part = |part: &Section<'_>| {
         part.only(&keys, &[], "a direction of a blend")?;
         if !part.has("direction") {
-            return part.required_word("direction", &WORDS).map(|_| (FeedDirection::WidestStrip, 0.0));
+            return part.required_word("direction", &words).map(|_| (FeedDirection::WidestStrip, 0.0));
         }
         if part.inline("direction").is_some_and(|inner| inner.has("blend")) {
             let cure = "give all directions and their weights in one blend";
             return Err(part.error(&part.key_span("direction"), "a blend cannot be blended again", cure));
         }
         // The words leave the shortest path out, so that there is always a direction.
-        let direction = read_one(part, &WORDS, WORDS[0], files)?.unwrap_or(FeedDirection::WidestStrip);
+        let direction = read_one(part, &words, words[0], files)?.unwrap_or(FeedDirection::WidestStrip);
         Ok((direction, part.number("weight", WEIGHT, "")?.map_or(1.0, |weight| weight.value)))
     };
     Ok(FeedDirection::Blend(parts.iter().map(read_part).collect::<Result<_, SceneError>>()?))

@@ -75,7 +75,7 @@ pub(crate) fn on_mesh(task: &Task<'_>, aim: Aim) -> Result<Passes, PlanError> {
     };
     let mut all = Passes::default();
     if let Aim::Fitted(direction, _) | Aim::Shortest(Some((direction, _))) = aim {
-        all.notes.extend(feed::check(direction, part, &parameters)?);
+        all.notes.extend(feed::check(direction, &part.bounds(), &parameters)?);
     }
     let reached = reachable(part, cutter, flat)?;
     if reached.steep_area >= LEAST_TOLD {

@@ -4,7 +4,7 @@
 //! A new strategy is a new file and a line in [`STRATEGIES`]; its words, keys, defaults and help come from there.
 
 mod contour_spiral;
-mod direction_keys;
+pub(crate) mod direction_keys;
 pub(crate) mod iso_parametric;
 pub(crate) mod iso_scallop;
 mod mesh_passes;
@@ -35,6 +35,7 @@ pub const STRATEGIES: &[&Definition] = &[
     &pocket::FLOW,
     &pocket::OFFSET,
     &pocket::ZIGZAG,
+    &pocket::STREAMLINE,
     &program::DEFINITION,
 ];
 

@@ -184,7 +184,7 @@ fn passes(
     let mut all = Passes::default();
     if let Some((direction, _)) = toward {
         let parameters: Vec<_> = charts.iter().map(|chart| chart.domain).collect();
-        all.notes.extend(feed::check(direction, part, &parameters)?);
+        all.notes.extend(feed::check(direction, &part.bounds(), &parameters)?);
     }
     for (k, chart) in charts.iter().enumerate() {
         let toward = match toward {

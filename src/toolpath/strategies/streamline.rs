@@ -90,9 +90,6 @@ impl Streamline {
 const DIRECTED: [&str; 7] =
     ["follow", "control_points", "method", "degree", "knots", "solver", "direction_weight"];
 
-/// Weights of directions over distances: below, passes leave them; above, distances count for nothing.
-const DIRECTION_WEIGHTS: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
-
 /// Control points a side of the published fit.
 const PUBLISHED_CONTROL_POINTS: usize = 7;
 
@@ -160,8 +157,7 @@ fn read(from: &mut Reading<'_>) -> Result<Box<dyn Strategy>, SceneError> {
         DEFAULT_CONTROL_POINTS
     };
     let control_points = control_points.unwrap_or(usual);
-    let weight = section.number("direction_weight", DIRECTION_WEIGHTS, "")?;
-    let direction_weight = weight.map_or(DIRECTION_WEIGHT, |weight| weight.value);
+    let direction_weight = direction_keys::read_weight(section)?;
     Ok(Box::new(Streamline { direction, control_points, method, solver, direction_weight }))
 }
 
@@ -285,7 +281,7 @@ fn on_charts(task: &Task<'_>, asked: &Streamline) -> Result<Passes, PlanError> {
     let direction = &asked.direction;
     let charts = Chart::all(part, cutter, settings.guide())?;
     let parameters: Vec<_> = charts.iter().map(|chart| chart.domain).collect();
-    let mut all = Passes { notes: feed::check(direction, part, &parameters)?, ..Passes::default() };
+    let mut all = Passes { notes: feed::check(direction, &part.bounds(), &parameters)?, ..Passes::default() };
     // What was measured of an earlier plan moves levels, not the function.
     let by_calculation = Chart::all(part, cutter, Guide { correction: None, ..settings.guide() })?;
     let of = charts.len();

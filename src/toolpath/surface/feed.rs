@@ -45,14 +45,13 @@ const LEAST_SAY: f64 = 0.3;
 /// Sampled directions that cover less than this share of a part leave most of it to what they are at their border.
 const LEAST_COVERED: f64 = 0.5;
 
-/// Refuses directions that are given only outside of the part, and leaves notes on those that cover little of it. `domains`
-/// are the parameters of its patches.
+/// Refuses directions that are given only outside of a part with bounds `b`, and leaves notes on those that cover little of it.
+/// `domains` are the parameters of its patches.
 pub(crate) fn check(
     direction: &FeedDirection,
-    part: &Part,
+    b: &Aabb,
     domains: &[[[f64; 2]; 2]],
 ) -> Result<Vec<String>, PlanError> {
-    let b = part.bounds();
     let rectangle = [[b.min.x, b.max.x], [b.min.y, b.max.y]];
     match direction {
         FeedDirection::Samples(samples) | FeedDirection::File { samples: Some(samples), .. } => {
@@ -90,7 +89,7 @@ pub(crate) fn check(
             Err(not_applicable(&format!("its directions in {name} were not read")))
         }
         FeedDirection::Blend(parts) => {
-            let notes = parts.iter().map(|(part_of, _)| check(part_of, part, domains));
+            let notes = parts.iter().map(|(part_of, _)| check(part_of, b, domains));
             Ok(notes.collect::<Result<Vec<_>, PlanError>>()?.concat())
         }
         _ => Ok(Vec::new()),
@@ -277,22 +276,65 @@ pub(crate) fn on_mesh(
             lines.iter().map(|line| Some((line.direction, line.agreement))).collect()
         }
         FeedDirection::Blend(parts) => {
-            let total: f64 = parts.iter().map(|(_, weight)| weight).sum();
-            let wishes = parts
-                .iter()
-                .map(|(of, weight)| Ok((on_mesh(part, cutter, of, piece, surface)?, weight / total)));
-            let wishes = wishes.collect::<Result<Vec<_>, MeshFieldError>>()?;
-            let lists: Vec<(&[Wanted], f64)> =
-                wishes.iter().map(|(wanted, weight)| (&wanted[..], *weight)).collect();
-            blend(mesh, &lists)?
+            let wishes =
+                parts.iter().map(|(of, weight)| Ok((on_mesh(part, cutter, of, piece, surface)?, *weight)));
+            blended(mesh, wishes)?
         }
     })
+}
+
+/// What is wanted at every vertex of a plane region; u and v are its x and y, and it is level.
+pub(crate) fn on_plane(
+    mesh: &FieldMesh,
+    direction: &FeedDirection,
+    cutter: &Cutter,
+) -> Result<Vec<Wanted>, MeshFieldError> {
+    Ok(match direction {
+        FeedDirection::Angle(angle) => fixed_angle(mesh, *angle),
+        FeedDirection::Parameter(along) => along_axis(mesh, *along),
+        FeedDirection::Samples(samples) | FeedDirection::File { samples: Some(samples), .. } => {
+            let at = |p: &Point3| {
+                let ([x, y], sure) = samples.at([p.x, p.y])?;
+                Vector3::new(x, y, 0.0).try_normalize(1e-12).map(|t| (t, sure))
+            };
+            mesh.points().iter().map(at).collect()
+        }
+        FeedDirection::Guides { .. } | FeedDirection::Border(_) => {
+            let lines = from_curves(direction, mesh, &beside_curves(direction, mesh, cutter), cutter)?;
+            lines.iter().map(|line| Some((line.direction, line.agreement))).collect()
+        }
+        FeedDirection::Blend(parts) => {
+            let wishes = parts.iter().map(|(of, weight)| Ok((on_plane(mesh, of, cutter)?, *weight)));
+            blended(mesh, wishes)?
+        }
+        FeedDirection::File { samples: None, .. }
+        | FeedDirection::WidestStrip
+        | FeedDirection::Steepest
+        | FeedDirection::Contour => vec![None; mesh.points().len()],
+    })
+}
+
+/// Wishes blended by their weights.
+fn blended(
+    mesh: &FieldMesh,
+    wishes: impl Iterator<Item = Result<(Vec<Wanted>, f64), MeshFieldError>>,
+) -> Result<Vec<Wanted>, MeshFieldError> {
+    let wishes = wishes.collect::<Result<Vec<_>, MeshFieldError>>()?;
+    let total: f64 = wishes.iter().map(|(_, weight)| weight).sum();
+    let lists: Vec<(&[Wanted], f64)> =
+        wishes.iter().map(|(wanted, weight)| (&wanted[..], weight / total)).collect();
+    blend(mesh, &lists)
+}
+
+/// Along x or y.
+fn along_axis(mesh: &FieldMesh, along: Along) -> Vec<Wanted> {
+    fixed_angle(mesh, if along == Along::U { 0.0 } else { std::f64::consts::FRAC_PI_2 })
 }
 
 /// Along a parameter of each patch; along x or y on a mesh.
 fn along_parameter(part: &Part, mesh: &FieldMesh, along: Along) -> Vec<Wanted> {
     if part.patches().is_empty() {
-        return fixed_angle(mesh, if along == Along::U { 0.0 } else { std::f64::consts::FRAC_PI_2 });
+        return along_axis(mesh, along);
     }
     work::parallel::map(mesh.points().len(), |v| {
         let at = part.closest_point(&mesh.points()[v]).0.at?;
@@ -373,7 +415,8 @@ mod tests {
             };
             let samples: Vec<_> = (0..25).map(sample).collect();
             let field = LineField::new(SamplePlane::Parameters, &samples).unwrap();
-            check(&FeedDirection::Samples(Arc::new(field)), &part, &[[[0.0, 30.0], [0.0, 20.0]]]).unwrap()
+            check(&FeedDirection::Samples(Arc::new(field)), &part.bounds(), &[[[0.0, 30.0], [0.0, 20.0]]])
+                .unwrap()
         };
         assert!(
             over([1.0, 1.0])[0].contains("(u from 0 to 1, v from 0 to 1) cover 0.17 %"),

@@ -46,15 +46,15 @@ fn bounded_passes_keep_to_their_engagement() {
     for (region, diameter, pattern, limit) in [
         (region(&[square]), 5.0, flow(Some(3.0)), 60.0f64),
         (region(std::slice::from_ref(&neck)), 5.0, flow(Some(3.0)), 60.0),
-        (region(&[neck]), 5.0, offset, 75.0),
-        (with_island.clone(), 5.0, offset, 60.0),
+        (region(&[neck]), 5.0, offset.clone(), 75.0),
+        (with_island.clone(), 5.0, offset.clone(), 60.0),
         (with_island, 5.0, zigzag, 60.0),
         (bracket(), 6.0, flow(None), 80.0),
         (bracket(), 6.0, offset, 80.0),
     ] {
         let pocket = Pocket::new(region, 3.0);
         let measured = |engagement: Option<f64>| {
-            let found = plan(&pocket, diameter, pattern, engagement).path;
+            let found = plan(&pocket, diameter, &pattern, engagement).path;
             assert!(
                 found.segments().all(|(a, b, _)| (b - a).norm() > 1e-9),
                 "{pattern:?}: a move without length"
@@ -121,7 +121,7 @@ fn a_neck_as_wide_as_the_cutter_is_told() {
     ]);
     let pocket = Pocket::new(Region::nested(vec![outline]).unwrap().0, 1.5);
     let limit = 60f64.to_radians();
-    let found = plan(&pocket, 5.0, Pattern::Offset { spiral: false }, Some(limit));
+    let found = plan(&pocket, 5.0, &Pattern::Offset { spiral: false }, Some(limit));
     // A move counts whole, and one may be half a radius long.
     let path = divided(&found.path, 0.05);
     let arcs =
@@ -159,9 +159,9 @@ fn of_passes(step: &Move) -> bool {
     step.kind == MoveKind::Cut
 }
 
-fn plan(pocket: &Pocket, diameter: f64, pattern: Pattern, engagement: Option<f64>) -> Plan {
+fn plan(pocket: &Pocket, diameter: f64, pattern: &Pattern, engagement: Option<f64>) -> Plan {
     let strategy = PocketStrategy {
-        pattern,
+        pattern: pattern.clone(),
         stepdown: Some(1.5),
         floor_allowance: 0.0,
         wall_allowance: 0.0,
@@ -213,7 +213,7 @@ fn open_pockets_and_rests_are_cleared_from_the_air() {
             (Pattern::Zigzag { angle: 0.3 }, None),
         ] {
             let what = format!("pocket {k}, {pattern:?} {limit:?}");
-            let found = plan(&pocket, 2.0 * radius, pattern, limit.map(f64::to_radians));
+            let found = plan(&pocket, 2.0 * radius, &pattern, limit.map(f64::to_radians));
             let path = found.path;
             let stock = stock(&pocket);
             let (air, _) = stock.cleared().unwrap();
