@@ -365,6 +365,7 @@ pub(crate) fn write_program(
         kinematics: &five_axis.kinematics,
         joints,
         style: five_axis.post,
+        tcp_words: five_axis.tcp_words.each_ref().map(String::as_str),
         rapid_rate: scene.machine.rapid_rate,
     };
     gcode::write_five_axis(out, path, &post, &scene.cutter, header)
