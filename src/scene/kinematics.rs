@@ -589,6 +589,24 @@ mod tests {
                 "\"ful\"",
             ),
             (
+                "kinematics = { preset = \"bc-head\", tcp_on = \"M128\" }".to_owned(),
+                "`tcp_on` needs `tcp_off`",
+                "add `tcp_off = \"G49\"`",
+                "tcp_on",
+            ),
+            (
+                "kinematics = { preset = \"bc-head\", post = \"full\", gauge_length = 9, tcp_off = \"M129\" }".to_owned(),
+                "acts only with `post = \"tcp\"`",
+                "leave it out",
+                "tcp_off",
+            ),
+            (
+                "kinematics = { preset = \"bc-head\", tcp_on = \"M12€\", tcp_off = \"M129\" }".to_owned(),
+                "ASCII only",
+                "plain letters",
+                "\"M12€",
+            ),
+            (
                 "kinematics = { preset = \"bc-head\", x = [3, 1] }".to_owned(),
                 "from a lesser",
                 "lesser",
