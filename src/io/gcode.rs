@@ -12,7 +12,7 @@ mod five_axis;
 
 #[cfg(test)]
 pub(crate) use five_axis::tests as five_axis_tests;
-pub use five_axis::{FiveAxisPost, Style, write_five_axis};
+pub use five_axis::{FiveAxisPost, Style, TCP_WORDS, write_five_axis};
 
 use super::program_text::{ProgramHeader, describe, number};
 use arcs::Arc;

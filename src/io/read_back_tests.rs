@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use crate::apt_cl;
 use crate::gcode::five_axis_tests::{machine, tilting_path};
-use crate::gcode::{self, ArcRule, FiveAxisPost, Style, write_five_axis};
+use crate::gcode::{self, ArcRule, FiveAxisPost, Style, TCP_WORDS, write_five_axis};
 use crate::program_text::ProgramHeader;
 use crate::program_text::tests::{example, random};
 use cutter::Cutter;
@@ -175,7 +175,13 @@ fn five_axes_on_every_machine_in_both_styles() {
         let kinematics = machine(name);
         for style in [Style::Tcp, Style::Full] {
             let joints = follow(&kinematics, &path, &style.following(0.002, 50.0)).unwrap();
-            let post = FiveAxisPost { kinematics: &kinematics, joints: &joints, style, rapid_rate: 15_000.0 };
+            let post = FiveAxisPost {
+                kinematics: &kinematics,
+                joints: &joints,
+                style,
+                tcp_words: TCP_WORDS,
+                rapid_rate: 15_000.0,
+            };
             let mut bytes = Vec::new();
             let lines =
                 write_five_axis(&mut bytes, &path, &post, &Cutter::ball(6.0).unwrap(), &header()).unwrap();

@@ -97,20 +97,13 @@ impl Session {
         let planned = |strategy: &dyn Strategy| {
             let found = self.path(request, strategy, &settings, around, monitor);
             let mut plan = found.map_err(|e| self.refused(request, e))?;
-            let cutting_length = cutting_length(scene);
-            let straying = Straying { tolerance: scene.tolerance.chord, length: cutting_length };
-            let (merged, left_out) = merge_short_moves(&plan.path, &scene.machine, &straying);
+            let (path, left_out) = self.as_written(&plan.path);
+            plan.path = path;
             if left_out > 0 {
-                plan.path = merged;
                 plan.notes.push(format!(
                     "{left_out} moves shorter than the control takes for a line are merged within the chord tolerance"
                 ));
             }
-            if scene.machine.slow_corners {
-                plan.path = slow_corners(&plan.path, &scene.machine);
-            }
-            // What is cut and measured is what programs say.
-            plan.path = plan.path.as_written();
             let engaged = self.limit_feed(request, &mut plan.path, monitor)?;
             Ok::<_, JobError>((plan, engaged))
         };
@@ -161,10 +154,20 @@ impl Session {
         Ok(Plan { path, notes, ..plan })
     }
 
+    /// A path as programs say it, which is what is cut and measured: without moves shorter than the control takes, slowed in
+    /// corners, rounded; and how many moves are left out.
+    fn as_written(&self, path: &Toolpath) -> (Toolpath, usize) {
+        let Scene { tolerance, machine, .. } = &self.scene;
+        let straying = Straying { tolerance: tolerance.chord, length: cutting_length(&self.scene) };
+        let (merged, left_out) = merge_short_moves(path, machine, &straying);
+        let slowed = if machine.slow_corners { slow_corners(&merged, machine) } else { merged };
+        (slowed.as_written(), left_out)
+    }
+
     /// The fastest turns of a plan as programs have it, times what is allowed.
     fn turning(&self, axis: &AxisRequest, plan: &Plan, monitor: &dyn Monitor) -> Result<f64, PlanError> {
         let (part, cutter) = (&self.part, &self.scene.cutter);
-        let path = plan.path.clone().as_written();
+        let path = self.as_written(&plan.path).0;
         let share = |found: Option<FastestTurn>, limit: f64| found.map_or(0.0, |turn| turn.rate / limit);
         let along = axis.most_turning.map_or(Ok(0.0), |limit| {
             fastest_turn(part, cutter, &path, monitor).map(|found| share(found, limit))
@@ -238,9 +241,9 @@ impl Session {
 
 /// Times that a toolpath is planned again whose axis turns too fast, and how much slower than it takes. Where it turns by more
 /// than so many times what is allowed the tool stays clear only so, and no plan helps.
-const TURNING_ROUNDS: usize = 2;
+const TURNING_ROUNDS: usize = 3;
 const TURNING_SPARE: f64 = 0.97;
-const TURNING_MOST: f64 = 2.0;
+const TURNING_MOST: f64 = 10.0;
 
 /// The plan whose axes turn as slowly as asked. A bull nose end mill in a hollow may touch beside the contact that was planned,
 /// so that the finished path has other rates; it is then planned for lower ones.
@@ -365,6 +368,7 @@ pub(crate) fn write_program(
         kinematics: &five_axis.kinematics,
         joints,
         style: five_axis.post,
+        tcp_words: five_axis.tcp_words.each_ref().map(String::as_str),
         rapid_rate: scene.machine.rapid_rate,
     };
     gcode::write_five_axis(out, path, &post, &scene.cutter, header)

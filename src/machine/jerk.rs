@@ -10,19 +10,26 @@
 use super::axis_limits::{AxisLimits, Stage};
 use work::monitor::{Cancelled, Monitor, check};
 
-/// By how much the times found may lie above the least that the barrier can reach, as a share.
+// None of these changes what is kept: every step stays inside of all limits. They decide how near to the least time the search ends,
+// and how long it takes.
+
+/// By how much the times found may lie above the least that the barrier can reach, as a share: a tenth of what times are held to.
+/// Each halving takes a round of Newton steps more.
 const GAP: f64 = 2e-3;
 
-/// The same of the convex problem.
+/// The same of the convex problem, which only gives the start of the other search: near its end the barrier would crowd the start
+/// against limits that are others there. Chosen by trial.
 const FIRST_GAP: f64 = 0.3;
 
-/// Promises of steps, as a share of the gap, that end the search for one weight.
+/// Promises of steps, as a share of what the weight itself keeps away from the least time, that end the search for one weight. More
+/// exact steps are lost on a weight that is left.
 const CENTRED: f64 = 0.05;
 
-/// The weight of the barrier over the one before.
+/// The weight of the barrier over the one before. Smaller ones make fewer rounds of more steps each; the sum hardly changes (S. Boyd
+/// and L. Vandenberghe, "Convex optimization", 2004, 11.3.2).
 const WEIGHTS: f64 = 0.5;
 
-/// Newton steps for one weight at most.
+/// Newton steps for one weight at most: a way out where rounding keeps promises from shrinking.
 const MOST_STEPS: usize = 40;
 
 /// Squared speeds, mm²/s², below which the machine stands.

@@ -198,6 +198,8 @@ pub struct Control {
     pub empty_words: bool,
     /// Whether M98 P counts repeats in the digits before the last four.
     pub repeats_in_p: bool,
+    /// The M words, in tenths, with which the control begins and ends to move the linear axes along with the rotary ones.
+    pub tcp_switch: Option<[u16; 2]>,
     /// Greatest difference of an arc's radii at start and end, mm; a thousandth of the radius is allowed as well.
     pub arc_tolerance: f64,
 }
@@ -325,10 +327,11 @@ pub const GENERAL: Control = Control {
     spare_offset: true,
     empty_words: true,
     repeats_in_p: true,
+    tcp_switch: None,
     arc_tolerance: 0.01,
 };
 
-/// LinuxCNC 2.9.
+/// LinuxCNC 2.9, with the M words of its machines `xyzac-trt` and `xyzbc-trt` that switch kinematics.
 pub const LINUXCNC: Control = Control {
     word: "linuxcnc",
     help: "LinuxCNC 2.9",
@@ -355,6 +358,7 @@ pub const LINUXCNC: Control = Control {
     spare_offset: false,
     empty_words: false,
     repeats_in_p: false,
+    tcp_switch: Some([4280, 4290]),
     arc_tolerance: 0.001_27,
 };
 

@@ -204,6 +204,19 @@ fn what_moves_nothing_is_noted_and_never_in_silence() {
 }
 
 #[test]
+fn words_of_linuxcnc_switch_the_kinematics() {
+    let kept = |program: &Program| -> Vec<bool> {
+        let moves = program.steps.iter().filter(|step| step.kind != StepKind::Set);
+        moves.map(|step| program.setting(step).tip_kept).collect()
+    };
+    let text = "G0 X1\nG43 H1 M428\nX2\nM429 G49\nX3\nM2\n";
+    assert_eq!(kept(&read_with(text, &LINUXCNC, &Setup::default())), [false, true, false]);
+    let general = read(text);
+    assert_eq!((kept(&general), general.notes.len()), (vec![false; 3], 2));
+    assert_eq!(kept(&read("G0 X1\nG43.4 H1\nX2\nG49\nX3\nM30\n")), [false, true, false]);
+}
+
+#[test]
 fn rotary_words_need_a_machine() {
     let program = read("G0 X1\nG1 A30 F100\nM30\n");
     let error = program.runs(&Placing { chord: 0.01, kinematics: None, lengths: &|_| None }).unwrap_err();

@@ -346,6 +346,10 @@ impl<'a> Interpreter<'a> {
                         (format!("M{}", word.tenths / 10), "it brings back codes of an earlier place");
                     return Err(Stop::new(usize::from(word.column), Fault::Unsupported { code, why }));
                 }
+                code if self.control.tcp_switch.is_some_and(|both| both.contains(&code)) => {
+                    self.state.modal.tip_kept = self.control.tcp_switch.is_some_and(|[on, _]| code == on);
+                    self.changed = true;
+                }
                 other => {
                     self.block.ignore(b"PQRELD");
                     self.note(format!("M{} is taken to move no axis", f64::from(other) / 10.0));
@@ -801,7 +805,7 @@ impl<'a> Interpreter<'a> {
             speed: *speed,
             register: *register,
             length: frame.length,
-            tip_kept: modal.length == Length::Tcp,
+            tip_kept: modal.tip_kept || modal.length == Length::Tcp,
             work: frame.active as u32 + 1,
         }
     }

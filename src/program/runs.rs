@@ -5,7 +5,7 @@
 //! divided so that straight pieces keep the same tolerance.
 
 use geometry::{Point3, Vector3};
-use machine::kinematics::{Joints, Kinematics};
+use machine::kinematics::{Joints, Kinematics, Way, Waypoint};
 use motion::{ClPoint, Move, MoveKind, Origin, Toolpath};
 
 use crate::error::{Fault, ProgramError};
@@ -41,6 +41,8 @@ pub struct ToolRun {
     pub tool: u32,
     /// Its moves; each knows its line.
     pub path: Toolpath,
+    /// The joints that it goes through on a machine with rotary axes; none of cutter locations, and on other machines.
+    pub joints: Vec<Waypoint>,
 }
 
 impl Program {
@@ -63,7 +65,8 @@ impl Program {
             let same = runs.last().is_some_and(|run| run.tool == setting.tool);
             if !same {
                 let start = layer.location(self.start_of(k), self.axes.get(k)).map_err(fault)?;
-                runs.push(Run::new(setting.tool, start));
+                let joints = layer.joints(self.start_of(k)).ok().filter(|_| self.axes.is_empty());
+                runs.push(Run::new(setting.tool, start, joints));
             }
             let Some(run) = runs.last_mut() else { continue };
             layer.follow(k, step, run).map_err(fault)?;
@@ -77,18 +80,21 @@ struct Run {
     tool: u32,
     at: ClPoint,
     path: Toolpath,
+    joints: Vec<Waypoint>,
     pass: u32,
     cutting: bool,
 }
 
 impl Run {
-    fn new(tool: u32, start: ClPoint) -> Self {
-        Self { tool, at: start, path: Toolpath::new(start, Vec::new()), pass: 0, cutting: false }
+    fn new(tool: u32, start: ClPoint, joints: Option<Joints>) -> Self {
+        let begin = joints.map(|joints| Waypoint { joints, step: 0, way: Way::Approach });
+        let joints = begin.into_iter().collect();
+        Self { tool, at: start, path: Toolpath::new(start, Vec::new()), joints, pass: 0, cutting: false }
     }
 
     fn finished(self, program: &str) -> ToolRun {
         let origin = Origin { tools: vec![(0, self.tool)], program: program.to_owned(), ..self.path.origin };
-        ToolRun { tool: self.tool, path: Toolpath { origin, ..self.path } }
+        ToolRun { tool: self.tool, path: Toolpath { origin, ..self.path }, joints: self.joints }
     }
 
     /// A straight move to a location. Passes are what lies between rapids.
@@ -148,18 +154,30 @@ impl Layer<'_> {
                 None => Ok(shifted(tip, Vector3::z())),
             };
         };
+        let at = kinematics.forward(&self.joints_of(kinematics, tip, turned)?);
+        // A control that keeps the tip says where it is.
+        Ok(shifted(if self.setting.tip_kept { tip } else { at.tip }, at.axis))
+    }
+
+    /// The joints at a place in machine coordinates, of a machine with rotary axes.
+    fn joints(&self, at: &Place) -> Result<Joints, Fault> {
+        let moved: Place = std::array::from_fn(|k| at[k] - self.program.zero[k]);
+        let [x, y, z, a, b, c] = moved;
+        let kinematics = self.placing.kinematics.ok_or(Fault::Rotary('A'))?;
+        self.joints_of(kinematics, Point3::new(x, y, z), [a, b, c])
+    }
+
+    fn joints_of(&self, kinematics: &Kinematics, tip: Point3, turned: [f64; 3]) -> Result<Joints, Fault> {
         let letters = kinematics.axes().map(|axis| axis.letter);
         if let Some(k) = (0..3).find(|k| turned[*k] != 0.0 && !letters.contains(&['A', 'B', 'C'][*k])) {
             return Err(Fault::Rotary(['A', 'B', 'C'][k]));
         }
         let rotary = letters.map(|letter| turned[usize::from(letter as u8 - b'A').min(2)].to_radians());
         if self.setting.tip_kept {
-            return Ok(shifted(tip, kinematics.tool_axis(rotary)));
+            return Ok(kinematics.place(tip, rotary));
         }
         let nose = Vector3::new(0.0, 0.0, kinematics.gauge_length());
-        let linear = tip.coords + kinematics.workpiece_zero().coords + nose;
-        let at = kinematics.forward(&Joints { linear, rotary });
-        Ok(shifted(at.tip, at.axis))
+        Ok(Joints { linear: tip.coords + kinematics.workpiece_zero().coords + nose, rotary })
     }
 
     fn follow(&self, k: usize, step: &Step, run: &mut Run) -> Result<(), Fault> {
@@ -208,6 +226,11 @@ impl Layer<'_> {
         // Where nothing is left to do after a turn, no move is left.
         if at != run.at || !turns {
             run.push(at, step.kind == StepKind::Rapid, step.feed, step.line);
+        }
+        if !run.joints.is_empty() {
+            let way = if self.setting.tip_kept { Way::Tip } else { Way::Axes };
+            let (joints, step) = (self.joints(to)?, run.path.len().saturating_sub(1));
+            run.joints.push(Waypoint { joints, step, way });
         }
         Ok(())
     }

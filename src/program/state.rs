@@ -70,6 +70,8 @@ pub(crate) struct Modal {
     /// Cycles retract to the level before them.
     pub initial: bool,
     pub length: Length,
+    /// An M word made the control move the linear axes along with the rotary ones.
+    pub tip_kept: bool,
 }
 
 /// What stays from one cycle to the next, in units of the program's coordinates (mm).
@@ -121,6 +123,7 @@ impl State {
             feed: 0.0,
             initial: true,
             length: Length::Off,
+            tip_kept: false,
         };
         Self {
             modal,

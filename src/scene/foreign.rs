@@ -9,6 +9,7 @@ use super::{Scene, ToolpathRequest};
 use cutter::{Cutter, Holder};
 use io::regular;
 use keys::{SceneError, SceneText, Section};
+use machine::kinematics::Waypoint;
 use motion::{Cutters, MoveKind, PathsInTurn, Toolpath};
 use program::{
     Control, Finding, Placing, Program, ProgramError, Setup, ToolRun, ToolTable, looks_like_apt, read_apt,
@@ -74,15 +75,16 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
     let described = if table.tools.is_empty() { ToolTable::of_remarks(&read) } else { table };
     let (mut findings, notes) = (read.findings(&length), notes(&read));
     let read = if foreign.tools_meant == ToolsMeant::All {
-        let path = joined(known(&read, runs, &described).map_err(refused)?.into_iter());
+        let (path, joints) = joined(known(&read, runs, &described).map_err(refused)?.into_iter());
         let tools = tools_of(&path, &described);
-        ReadProgram { path, tools, before: Vec::new(), unknown_before: false, others: false, findings, notes }
+        let before = Vec::new();
+        ReadProgram { path, joints, tools, before, unknown_before: false, others: false, findings, notes }
     } else {
         let tool = chosen(foreign.tools_meant, &read, &runs).map_err(refused)?;
         let Others { before, unknown_before, any } = Others::of(&runs, tool, &described);
-        let path = joined(runs.into_iter().filter(|run| run.tool == tool));
+        let (path, joints) = joined(runs.into_iter().filter(|run| run.tool == tool));
         findings.retain(|found: &Finding| found.tool == tool || found.tool == 0);
-        ReadProgram { path, tools: None, before, unknown_before, others: any, findings, notes }
+        ReadProgram { path, joints, tools: None, before, unknown_before, others: any, findings, notes }
     };
     request.strategy = Box::new(ForeignProgram { read: Some(Arc::new(read)), ..foreign.clone() });
     Ok(())
@@ -191,7 +193,7 @@ fn known(read: &Program, runs: Vec<ToolRun>, table: &ToolTable) -> Result<Vec<To
     }
     let missing =
         |run: &&ToolRun| feeds(std::slice::from_ref(*run), run.tool) && table.get(run.tool).is_none();
-    if let Some(ToolRun { tool, path }) = runs.iter().find(missing) {
+    if let Some(ToolRun { tool, path, .. }) = runs.iter().find(missing) {
         let fed = path.moves.iter().position(|step| step.kind != MoveKind::Rapid).unwrap_or_default();
         let line = path.line_of(fed).unwrap_or_default();
         let message =
@@ -286,15 +288,18 @@ fn feeds(runs: &[ToolRun], tool: u32) -> bool {
 }
 
 /// Runs as one path.
-fn joined(mut runs: impl Iterator<Item = ToolRun>) -> Toolpath {
-    let Some(ToolRun { path, .. }) = runs.next() else {
-        return Toolpath::new(motion::ClPoint::upright(geometry::Point3::origin()), Vec::new());
+fn joined(mut runs: impl Iterator<Item = ToolRun>) -> (Toolpath, Vec<Waypoint>) {
+    let Some(ToolRun { path, mut joints, .. }) = runs.next() else {
+        let nowhere = motion::ClPoint::upright(geometry::Point3::origin());
+        return (Toolpath::new(nowhere, Vec::new()), Vec::new());
     };
     let mut all = PathsInTurn::new(path);
     runs.for_each(|run| {
+        // How the machine comes from one run to the next is not known.
+        joints.clear();
         all.push(run.path, program::FEED_WHERE_NONE);
     });
-    all.finish()
+    (all.finish(), joints)
 }
 
 fn notes(read: &Program) -> Vec<String> {

@@ -3,7 +3,7 @@
 use std::fmt::{self, Write as _};
 
 use geometry::{Point3, Vector3};
-use io::gcode::Style;
+use io::gcode::{Style, TCP_WORDS};
 use keys::{Located, SceneError, Section};
 use keys::{toml_number as number, toml_string as text};
 use machine::Machine;
@@ -47,6 +47,9 @@ const ACCELERATIONS: std::ops::RangeInclusive<f64> = 1.0..=1e6;
 /// Jerks of linear axes, mm/s³.
 const JERKS: std::ops::RangeInclusive<f64> = 1.0..=1e6;
 
+/// The keys of the words with which tool centre point control begins and ends.
+const TCP_KEYS: [&str; 2] = ["tcp_on", "tcp_off"];
+
 const SIDES: [&str; 2] = ["head", "table"];
 
 /// A five-axis machine and how programs for it are written.
@@ -56,6 +59,8 @@ pub struct FiveAxis {
     pub kinematics: Kinematics,
     /// How programs are written.
     pub post: Style,
+    /// The words with which tool centre point control begins and ends.
+    pub tcp_words: [String; 2],
     /// Whether the scene says where the workpiece's zero is; else it is taken to be the machine's.
     pub zero_is_given: bool,
     /// Whether the scene has the length from the spindle nose to the tip; else it is a usual one.
@@ -89,6 +94,7 @@ pub(super) fn read(machine: &Section<'_>, limits: &Machine) -> Result<Option<Fiv
             kinematics.map(|kinematics| FiveAxis {
                 kinematics: linear(rapid, even, limits.jerks)(kinematics),
                 post: Style::Tcp,
+                tcp_words: TCP_WORDS.map(str::to_owned),
                 zero_is_given: false,
                 gauge_is_given: false,
                 directions: axes.map(|axis| axis.direction),
@@ -100,6 +106,8 @@ pub(super) fn read(machine: &Section<'_>, limits: &Machine) -> Result<Option<Fiv
         &[
             "preset",
             "post",
+            TCP_KEYS[0],
+            TCP_KEYS[1],
             "first",
             "second",
             "gauge_length",
@@ -119,6 +127,7 @@ pub(super) fn read(machine: &Section<'_>, limits: &Machine) -> Result<Option<Fiv
     let second = read_axis(&table, "second", named.map(|axes| axes[1]))?;
     let post = table.word("post", &Style::WORDS)?.and_then(|word| Style::from_word(word.value));
     let post = post.unwrap_or(Style::Tcp);
+    let tcp_words = tcp_words(&table, post)?;
     let gauge_length = table.number("gauge_length", 0.0..=*PLACE.end(), " mm")?;
     let workpiece_zero = place(&table, "workpiece_zero")?;
     let has = |side| [&first, &second].iter().any(|axis| axis.side == side);
@@ -153,10 +162,39 @@ pub(super) fn read(machine: &Section<'_>, limits: &Machine) -> Result<Option<Fiv
     Ok(Some(FiveAxis {
         kinematics: linear(rates, accelerations, jerks)(kinematics),
         post,
+        tcp_words,
         zero_is_given: workpiece_zero.is_some(),
         gauge_is_given,
         directions: [first, second].map(|axis| axis.direction),
     }))
+}
+
+/// The words with which tool centre point control begins and ends. Both are needed to leave it as it was begun.
+fn tcp_words(table: &Section<'_>, post: Style) -> Result<[String; 2], SceneError> {
+    let given = [table.text(TCP_KEYS[0])?, table.text(TCP_KEYS[1])?];
+    let at = |k: usize| table.key_span(TCP_KEYS[k]);
+    if let Some(k) = given.iter().position(Option::is_some)
+        && post == Style::Full
+    {
+        let message = format!("`{}` acts only with `post = \"tcp\"`", TCP_KEYS[k]);
+        return Err(table.error(&at(k), message, "leave it out, or write `post = \"tcp\"`"));
+    }
+    if let Some(text) = given.iter().flatten().find(|text| !text.value.is_ascii()) {
+        return Err(table.error(&text.span, "controls read ASCII only", "write plain letters and digits"));
+    }
+    match given {
+        [Some(begin), Some(end)] => Ok([begin.value.to_owned(), end.value.to_owned()]),
+        [None, None] => Ok(TCP_WORDS.map(str::to_owned)),
+        [begin, _] => {
+            let (has, lacks) = if begin.is_some() { (0, 1) } else { (1, 0) };
+            let message = format!("`{}` needs `{}`", TCP_KEYS[has], TCP_KEYS[lacks]);
+            Err(table.error(
+                &at(has),
+                message,
+                format!("add `{} = \"{}\"`", TCP_KEYS[lacks], TCP_WORDS[lacks]),
+            ))
+        }
+    }
 }
 
 /// Refuses a machine for which it is not known how high its spindle nose has to be to stand over the work: no program for it could
@@ -301,11 +339,17 @@ fn of_linear(
 
 /// Writes the machine as scenes spell it, after all other keys of `[machine]`.
 pub(super) fn write(out: &mut String, five_axis: Option<&FiveAxis>) -> fmt::Result {
-    let Some(FiveAxis { kinematics, post, zero_is_given, gauge_is_given, directions }) = five_axis else {
+    let Some(FiveAxis { kinematics, post, tcp_words, zero_is_given, gauge_is_given, directions }) = five_axis
+    else {
         return writeln!(out, "{KEY} = {}  # three axes", text(NONE));
     };
     writeln!(out, "\n[machine.{KEY}]  # mm, degrees")?;
     writeln!(out, "post = {}  # who moves the linear axes along with the rotary ones", text(post.name()))?;
+    if *post == Style::Tcp {
+        for (key, words) in TCP_KEYS.iter().zip(tcp_words) {
+            writeln!(out, "{key} = {}", text(words))?;
+        }
+    }
     let list =
         |numbers: &[f64]| format!("[{}]", numbers.iter().map(|x| number(*x)).collect::<Vec<_>>().join(", "));
     for (key, (axis, direction)) in
@@ -428,7 +472,7 @@ mod tests {
         let any = "[machine.kinematics]\nx = [-1, 2.5]\nfirst = { name = \"C\", side = \"table\", \
                    direction = [0.1, 0.3, 1], limits = [-7200, 7200] }\nsecond = { name = \"B\", side = \"head\", \
                    direction = [0.123456789012345, 1, 0.7], point = [1, 2, 3.3], rate = 1e7, jerk = 999, limits = [-0.1, 33.3] }\n\
-                   jerks = [7e4, 1, 1e6]\n";
+                   jerks = [7e4, 1, 1e6]\ntcp_on = \"G43 H1 M428\"\ntcp_off = \"M429 G49\"\n";
         let named = PRESETS.iter().map(|name| format!("kinematics = \"{name}\"\n"));
         for text in named.chain([any.to_owned(), String::new()]) {
             let complete = complete_toml(&parse(&text).unwrap());
@@ -543,6 +587,24 @@ mod tests {
                 "cannot be",
                 "`full`",
                 "\"ful\"",
+            ),
+            (
+                "kinematics = { preset = \"bc-head\", tcp_on = \"M128\" }".to_owned(),
+                "`tcp_on` needs `tcp_off`",
+                "add `tcp_off = \"G49\"`",
+                "tcp_on",
+            ),
+            (
+                "kinematics = { preset = \"bc-head\", post = \"full\", gauge_length = 9, tcp_off = \"M129\" }".to_owned(),
+                "acts only with `post = \"tcp\"`",
+                "leave it out",
+                "tcp_off",
+            ),
+            (
+                "kinematics = { preset = \"bc-head\", tcp_on = \"M12€\", tcp_off = \"M129\" }".to_owned(),
+                "ASCII only",
+                "plain letters",
+                "\"M12€",
             ),
             (
                 "kinematics = { preset = \"bc-head\", x = [3, 1] }".to_owned(),

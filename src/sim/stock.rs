@@ -114,20 +114,22 @@ impl Stock {
         }
     }
 
+    /// Its mesh, where it is one.
+    pub fn mesh(&self) -> Option<&TriangleMesh> {
+        match self {
+            Self::Mesh(stock) => Some(&stock.mesh),
+            _ => None,
+        }
+    }
+
     /// The corners of its mesh; none of other shapes.
     pub fn corners(&self) -> &[Point3] {
-        match self {
-            Self::Mesh(stock) => stock.mesh.vertices(),
-            _ => &[],
-        }
+        self.mesh().map_or(&[], TriangleMesh::vertices)
     }
 
     /// The triangles of its mesh; none of other shapes.
     pub fn triangles(&self) -> usize {
-        match self {
-            Self::Mesh(stock) => stock.mesh.triangles().len(),
-            _ => 0,
-        }
+        self.mesh().map_or(0, |mesh| mesh.triangles().len())
     }
 
     /// The box around it.

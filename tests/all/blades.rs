@@ -93,3 +93,47 @@ fn strategies_compare_on_one_side_of_a_blade() {
     assert_eq!(in_planes["verdict"], "fail");
     assert!(in_planes["notes"].to_string().contains("cannot be reached"), "{}", in_planes["notes"]);
 }
+
+/// The toolpath of a blade of `scenes/blades` with axes that lead by ten degrees and turn by no more than 0.2 degrees a mm.
+fn turning_slowly(side: &str) -> Value {
+    let home = tempfile::tempdir().unwrap();
+    let scene = format!(
+        "[part]\nsections = {:?}\nside = \"{side}\"\n[cutter]\nshape = \"ball\"\ndiameter = 6\n[tolerance]\nchord = 0.005\n\
+         [simulation]\nremoval = false\ncell = 1\nerror_bound = 1\n[[toolpath]]\nstrategy = \"iso-parametric\"\nalong = \"u\"\n\
+         stepover = 6\naxis = {{ lead = 10, turning = 0.2 }}\n",
+        folder().join("sections.toml")
+    );
+    let path = home.path().join("blade.toml");
+    std::fs::write(&path, scene).unwrap();
+    run_scene(&path).1["toolpaths"][0].clone()
+}
+
+fn judged<'a>(path: &'a Value, list: &str, what: &str) -> Option<&'a Value> {
+    path[list].as_array().unwrap().iter().find(|claim| claim["what"] == what)
+}
+
+/// On one side a constant axis is clear, so that slow turns always are possible.
+#[test]
+fn a_side_of_a_blade_is_cut_with_slow_turns() {
+    let path = turning_slowly("pressure");
+    let held = judged(&path, "held", "turning").unwrap_or_else(|| panic!("{:#}", path["violations"]));
+    assert!(held["measured_deg_per_mm"].as_f64().unwrap() <= 0.2, "{held}");
+}
+
+/// All around it the axis must turn, and the edges are short ways: where, how fast and on which line is told.
+#[test]
+fn where_slow_turns_are_impossible_the_place_is_told() {
+    let path = turning_slowly("around");
+    let violation = judged(&path, "violations", "turning").unwrap_or_else(|| panic!("{:#}", path["held"]));
+    assert!(violation["measured_deg_per_mm"].as_f64().unwrap() > 0.2, "{violation}");
+    let text = violation["text"].as_str().unwrap();
+    assert!(
+        text.contains("degrees a mm of contact along a pass (limit 0.200) at x") && text.contains("move"),
+        "{text}"
+    );
+    assert!(
+        path["notes"].to_string().contains("no slower axes that keep the tool clear were found"),
+        "{}",
+        path["notes"]
+    );
+}

@@ -12,6 +12,8 @@ length, as program::Program has them.
     a X Y Z A B C FEED CX CY CZ SENSE PLANE    arc: its centre, whole turns with their sense (+ anticlockwise), 17 18 19
 
 rs274 prints four decimals. A line ends in `inch` where these were of inches.
+
+M428 and M429, which switch kinematics, are remapped as in LinuxCNC's sample configurations of xyzac-trt and xyzbc-trt.
 """
 
 import math
@@ -23,6 +25,15 @@ import tempfile
 
 HERE = pathlib.Path(__file__).parent
 CALL = re.compile(r"^\s*\d+\s+N\S*\s+([A-Z0-9_]+)\((.*)\)\s*$")
+
+
+# The subprograms of the sample configurations, without their questions to a running machine.
+SWITCH = "o<{code}remap>sub\nM68 E3 Q{on}\nM66 E0 L0\no<{code}remap>endsub\n"
+INI = """[RS274NGC]
+SUBROUTINE_PATH = {folder}
+REMAP = M428 modalgroup=10 ngc=428remap
+REMAP = M429 modalgroup=10 ngc=429remap
+"""
 
 
 class Control:
@@ -105,7 +116,10 @@ def expected(program):
         folder = pathlib.Path(folder)
         (folder / "rs274.var").write_text("")
         (folder / "tool.tbl").write_bytes((HERE / "tool.tbl").read_bytes())
-        command = ["rs274", "-g", "-t", "tool.tbl", "-v", "rs274.var", str(program.resolve())]
+        for code, on in [(428, 1), (429, 0)]:
+            (folder / f"{code}remap.ngc").write_text(SWITCH.format(code=code, on=on))
+        (folder / "rs274.ini").write_text(INI.format(folder=folder))
+        command = ["rs274", "-g", "-i", "rs274.ini", "-t", "tool.tbl", "-v", "rs274.var", str(program.resolve())]
         ran = subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60)
     control = Control()
     for line in ran.stdout.splitlines():

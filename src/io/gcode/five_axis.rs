@@ -1,6 +1,6 @@
 //! Programs for machines with two rotary axes, in two styles.
 //!
-//! Tool centre point control ([`Style::Tcp`], `G43.4`): X Y Z are the tip in the workpiece, whose frame turns with
+//! Tool centre point control ([`Style::Tcp`], [`TCP_WORDS`] or those of another control): X Y Z are the tip in the workpiece, whose frame turns with
 //! the table; the control moves the linear axes so that the tip runs straight. Feeds are those of the tip (G94);
 //! where only rotary axes move, F is that of the one that turns farthest, degrees/min.
 //!
@@ -32,6 +32,9 @@ const ROTARY_DECIMALS: usize = 5;
 
 /// The greatest inverse time that controls take, 1/min. Shorter moves take a little longer.
 const GREATEST_INVERSE_TIME: f64 = 99_999.0;
+
+/// The words with which tool centre point control begins and ends, on Fanuc and Haas.
+pub const TCP_WORDS: [&str; 2] = ["G43.4 H1", "G49"];
 
 /// Who moves the linear axes along with the rotary ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,6 +80,8 @@ pub struct FiveAxisPost<'a> {
     pub joints: &'a JointPath,
     /// The style.
     pub style: Style,
+    /// The words with which tool centre point control begins and ends, a line each.
+    pub tcp_words: [&'a str; 2],
     /// Rapid rate, mm/min.
     pub rapid_rate: f64,
 }
@@ -209,7 +214,7 @@ impl<'a> FiveAxisProgram<'a> {
             Style::Tcp => {
                 let axes = self.linear_axes(&high);
                 self.step([Some(number(axes.x)), Some(number(axes.y)), None, None, None], None)?;
-                self.line("G43.4 H1")?;
+                self.line(self.post.tcp_words[0])?;
                 // The words of the tip are others.
                 self.words[..3].fill(None);
                 self.step([Some(x), Some(y), Some(z), None, None], None)?;
@@ -233,7 +238,7 @@ impl<'a> FiveAxisProgram<'a> {
             let over = self.post.kinematics.over(self.path, joints.rotary, tip);
             let words = self.words(&self.post.kinematics.place(over, joints.rotary), over);
             self.step(words.map(Some), None)?;
-            self.line("G49")?;
+            self.line(self.post.tcp_words[1])?;
         }
         self.line(&format!("G53 G0 Z{}", number(self.post.kinematics.retracted_z())))?;
         self.rapid = Some(true);

@@ -20,6 +20,7 @@ use crate::run::{Finding, Run};
 use crate::tool::{Tool, ToolMoves};
 
 mod bodies;
+mod uncut;
 
 /// Differences of distances that the search along moves leaves open, mm.
 const RESOLUTION: f64 = 2e-5;

@@ -13,7 +13,7 @@ use super::order::{Visit, is_closed, order};
 use super::{Speeds, longest_link, plane_interval};
 use crate::RepairSummary;
 use crate::moves::touch::Touch;
-use crate::tilt::repair::{Repaired, repair};
+use crate::tilt::repair::{Repaired, Room, repair};
 use crate::tilt::tilted::{MoveRules, TiltedPasses, Tilting, located, reversed};
 use crate::tilt::turning::{TurningRates, even_out, too_fast};
 use crate::vocabulary::{Links, PlanError, PlanSettings, Setup};
@@ -108,19 +108,23 @@ fn cleared(
     notes: &mut Vec<String>,
     monitor: &dyn Monitor,
 ) -> Result<Vec<Vec<Touch>>, PlanError> {
+    let rates = TurningRates { along: tilting.most_turning, across: tilting.most_turning_across };
+    let limited = rates.along.or(rates.across).is_some();
+    // Where a ball touches hangs on its axis nowhere.
+    let firm = limited && !cutter.is_ball();
+    let room = tilting.interference.map(|keep| Room { cutter, keep, firm });
     let mut summary = RepairSummary::default();
     let mut repair_all = |passes: Vec<Vec<Touch>>| {
-        let again = |k: usize| repaired(passes[k].clone(), cutter, tilting, monitor);
+        let again = |k: usize| repaired(passes[k].clone(), room, tilting, monitor);
         let again = work::parallel::try_map(passes.len(), again)?;
         again.iter().for_each(|one| summary.add(&one.summary));
         Ok::<_, PlanError>(again.into_iter().flat_map(|one| one.passes).collect::<Vec<_>>())
     };
     let mut passes = repair_all(passes)?;
-    let rates = TurningRates { along: tilting.most_turning, across: tilting.most_turning_across };
-    if rates.along.or(rates.across).is_some() {
+    if limited {
         let mut left = None;
         for _ in 0..EVENINGS {
-            even_out(&mut passes, cutter, rates, tilting.interference, monitor)?;
+            even_out(&mut passes, cutter, rates, room, monitor)?;
             // The touches are clear; moves between them may be no longer.
             passes = repair_all(passes)?;
             left = too_fast(&passes, cutter, rates);
@@ -138,12 +142,12 @@ fn cleared(
 /// A pass on which the tool stays clear.
 fn repaired(
     pass: Vec<Touch>,
-    cutter: &Cutter,
+    room: Option<Room<'_>>,
     tilting: &Tilting,
     monitor: &dyn Monitor,
 ) -> Result<Repaired, PlanError> {
-    Ok(match tilting.interference {
-        Some(keep) => repair(&pass, cutter, keep, tilting.most_turning, monitor)?,
+    Ok(match room {
+        Some(room) => repair(&pass, room, tilting.most_turning, monitor)?,
         None => Repaired { passes: vec![pass], summary: RepairSummary::default() },
     })
 }

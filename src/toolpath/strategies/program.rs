@@ -7,6 +7,7 @@ use std::sync::Arc;
 use crate::vocabulary::{Definition, PartKind, Passes, PlanError, Strategy, Task};
 use cutter::{Cutter, Holder};
 use keys::{Located, toml_string};
+use machine::kinematics::Waypoint;
 use motion::{Cutters, Toolpath};
 use program::{Control, Finding};
 
@@ -47,6 +48,8 @@ pub struct ForeignProgram {
 pub struct ReadProgram {
     /// The moves of the tool, or of all.
     pub path: Toolpath,
+    /// The joints of a machine with rotary axes that the program goes through, where one stretch has all moves; else none.
+    pub joints: Vec<Waypoint>,
     /// The cutters of all tools and what holds them, where all are meant; else the scene's cutter makes all moves.
     pub tools: Option<(Cutters, Vec<Option<Holder>>)>,
     /// What other tools of the program cut before, where the table of tools has their cutters.

@@ -26,6 +26,10 @@ const RING: f64 = 0.05;
 /// Axes tried on each ring.
 const AROUND: usize = 36;
 
+/// The share of its lean at which a tool must be clear as well, where its contact must be known well: a flat bottom then fills no
+/// more than about this share of the hollow's curvature. Nearer to 1 contacts spread; less leans more than it must.
+const LESS_LEAN: f64 = 0.75;
+
 /// Halvings of what lies between two rings: to a hundredth of a degree.
 const HALVINGS: u32 = 8;
 
@@ -80,19 +84,55 @@ struct Placed {
     rule: Vector3,
 }
 
+/// Where a tool may stand: clear of what it must keep away from.
+#[derive(Clone, Copy)]
+pub struct Room<'a> {
+    /// The cutter.
+    pub cutter: &'a Cutter,
+    /// What it keeps away from.
+    pub keep: &'a Interference<'a>,
+    /// Whether the tool must be clear at [`LESS_LEAN`] of its lean from the normal, too. A flat bottom that only just fits into a
+    /// hollow touches all around, and where it touches is then known badly: so is how fast the axis turns there.
+    pub firm: bool,
+}
+
+impl Room<'_> {
+    /// Whether it may stand at a contact with an axis, with something to spare if asked for.
+    pub fn holds(&self, contact: &CcPoint, axis: &Vector3, spare: bool) -> bool {
+        let at = location(self.cutter, contact, axis);
+        axis.dot(&contact.normal) > ABOVE_SURFACE
+            && self.keep.holds(&at, spare)
+            && (!self.firm || self.keep.is_clear(&self.leaning_less(contact, &at)))
+    }
+
+    /// The same for a touch with its own axis and something to spare.
+    pub fn holds_as_it_is(&self, touch: &Touch) -> bool {
+        self.holds(&touch.contact, &touch.at.axis, true)
+    }
+
+    /// The check that fails by most where a touch is.
+    fn shortfall(&self, touch: &Touch) -> Option<Shortfall> {
+        let less = || self.keep.shortfall(&self.leaning_less(&touch.contact, &touch.at));
+        self.keep.shortfall(&touch.at).or_else(|| self.firm.then(less).flatten())
+    }
+
+    fn leaning_less(&self, contact: &CcPoint, at: &ClPoint) -> ClPoint {
+        let along = ClPoint { axis: contact.normal, ..*at };
+        location(self.cutter, contact, &along.towards(at, LESS_LEAN).axis)
+    }
+}
+
 /// Repairs a pass. Beside tilted contacts the axis turns by no more than `turning`, rad a mm of contact, where that is clear.
 ///
 /// # Errors
 /// [`Cancelled`].
 pub fn repair(
     pass: &[Touch],
-    cutter: &Cutter,
-    keep: &Interference,
+    room: Room<'_>,
     turning: Option<f64>,
     monitor: &dyn Monitor,
 ) -> Result<Repaired, Cancelled> {
-    let mut repairing =
-        Repairing { cutter, keep, before: None, summary: RepairSummary::default(), passes: Vec::new() };
+    let mut repairing = Repairing::new(room);
     let mut run = Vec::new();
     for touch in pass {
         monitor::check(monitor)?;
@@ -109,56 +149,68 @@ pub fn repair(
 }
 
 /// The axis nearest to that of a touch at which the tool is clear there.
-pub(super) fn nearest_clear(touch: &Touch, cutter: &Cutter, keep: &Interference) -> Option<Vector3> {
-    let none = RepairSummary::default();
-    let repairing = Repairing { cutter, keep, before: None, summary: none, passes: Vec::new() };
-    [true, false].iter().find_map(|&spare| repairing.tilt(touch, spare))
+pub(super) fn nearest_clear(touch: &Touch, room: Room<'_>) -> Option<Vector3> {
+    Repairing::new(room).tilted(touch)
 }
 
 struct Repairing<'a> {
-    cutter: &'a Cutter,
-    keep: &'a Interference<'a>,
+    room: Room<'a>,
     /// The axis of the touch before, if that was tilted.
     before: Option<Vector3>,
     summary: RepairSummary,
     passes: Vec<Vec<Touch>>,
 }
 
-impl Repairing<'_> {
+impl<'a> Repairing<'a> {
+    fn new(room: Room<'a>) -> Self {
+        Self { room, before: None, summary: RepairSummary::default(), passes: Vec::new() }
+    }
+
     /// The touch where it is clear, or what is missing.
     fn place(&mut self, touch: &Touch) -> Result<Placed, Shortfall> {
         let rule = touch.at.axis;
-        let Some(missing) = self.keep.shortfall(&touch.at) else {
+        let Some(missing) = self.room.shortfall(touch) else {
             self.before = None;
             return Ok(Placed { touch: *touch, rule });
         };
-        let tilted = [true, false].iter().find_map(|&spare| self.tilt(touch, spare));
+        let tilted = self.tilted(touch);
         self.before = tilted;
         if let Some(axis) = tilted {
-            return Ok(Placed { touch: Touch::along(axis, self.cutter, touch.contact, touch.feed), rule });
+            return Ok(Placed { touch: self.along(axis, touch), rule });
+        }
+        if self.room.keep.is_clear(&touch.at) {
+            return Ok(Placed { touch: *touch, rule });
         }
         let lift = self.lift(touch).ok_or(missing)?;
         self.summary.lift(lift, touch.contact.point);
         let contact = CcPoint { point: touch.contact.point + touch.contact.normal * lift, ..touch.contact };
-        Ok(Placed { touch: Touch::along(rule, self.cutter, contact, touch.feed), rule })
+        Ok(Placed { touch: Touch::along(rule, self.room.cutter, contact, touch.feed), rule })
     }
 
-    fn at(&self, contact: &CcPoint, axis: &Vector3) -> ClPoint {
-        location(self.cutter, contact, axis)
+    fn along(&self, axis: Vector3, touch: &Touch) -> Touch {
+        Touch::along(axis, self.room.cutter, touch.contact, touch.feed)
+    }
+
+    /// A tilted axis, with more to spare if there is one.
+    fn tilted(&self, touch: &Touch) -> Option<Vector3> {
+        let loose = Room { firm: false, ..self.room };
+        let clear = self.room.firm && self.room.keep.is_clear(&touch.at);
+        let firm = self.room.firm.then(|| self.tilt(touch, self.room, true)).flatten();
+        // What is clear as it is needs no other axis than a firm one.
+        firm.or_else(|| {
+            [true, false].iter().filter(|_| !clear).find_map(|&spare| self.tilt(touch, loose, spare))
+        })
     }
 
     /// The axis nearest to the rule's at which the tool is clear, near to that before where there is a choice.
-    fn tilt(&self, touch: &Touch, spare: bool) -> Option<Vector3> {
+    fn tilt(&self, touch: &Touch, room: Room<'_>, spare: bool) -> Option<Vector3> {
         let (rule, contact) = (touch.at.axis, touch.contact);
         let across = if rule.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
         let x = rule.cross(&across).normalize();
         let y = rule.cross(&x);
         let axis =
             |tilt: f64, around: f64| rule * tilt.cos() + (x * around.cos() + y * around.sin()) * tilt.sin();
-        let clear = |tilt: f64, around: f64| {
-            let axis = axis(tilt, around);
-            axis.dot(&contact.normal) > ABOVE_SURFACE && self.keep.holds(&self.at(&contact, &axis), spare)
-        };
+        let clear = |tilt: f64, around: f64| room.holds(&contact, &axis(tilt, around), spare);
         let least = |mut low: f64, mut high: f64, around: f64| {
             for _ in 0..HALVINGS {
                 let middle = 0.5 * (low + high);
@@ -166,7 +218,7 @@ impl Repairing<'_> {
             }
             high
         };
-        let greatest = self.keep.greatest_tilt;
+        let greatest = self.room.keep.greatest_tilt;
         let mut first = 0.0;
         if let Some(before) = self.before {
             let tilt = rule.cross(&before).norm().atan2(rule.dot(&before));
@@ -205,9 +257,9 @@ impl Repairing<'_> {
     /// that without passing by a place that is clear.
     fn lift(&self, touch: &Touch) -> Option<f64> {
         let mut lift = 0.0;
-        while lift <= self.keep.greatest_lift {
+        while lift <= self.room.keep.greatest_lift {
             let tip = touch.at.tip + touch.contact.normal * lift;
-            let Some(missing) = self.keep.missing(&ClPoint { tip, ..touch.at }, true) else {
+            let Some(missing) = self.room.keep.missing(&ClPoint { tip, ..touch.at }, true) else {
                 return Some(lift);
             };
             lift += missing.depth.max(LEAST_LIFT);
@@ -263,12 +315,10 @@ impl Repairing<'_> {
             return *to;
         }
         let axis = a.towards(&b, most / turn).axis;
-        let above = axis.dot(&to.touch.contact.normal) > ABOVE_SURFACE;
-        let touch = Touch::along(axis, self.cutter, to.touch.contact, to.touch.feed);
-        let led = Placed { touch, ..*to };
+        let led = Placed { touch: self.along(axis, &to.touch), ..*to };
         // The rule may turn faster than the axis.
-        let within = led.tilt() <= self.keep.greatest_tilt;
-        if above && within && self.keep.is_clear(&touch.at) { led } else { *to }
+        let within = led.tilt() <= self.room.keep.greatest_tilt;
+        if within && self.room.holds(&to.touch.contact, &axis, false) { led } else { *to }
     }
 
     /// The touches after `a` up to and with `b`, with clear moves between them.
@@ -279,7 +329,7 @@ impl Repairing<'_> {
         halvings: u32,
         out: &mut Vec<Touch>,
     ) -> Result<(), Unreachable> {
-        let Some(missing) = self.keep.on_move(&a.touch.at, &b.touch.at) else {
+        let Some(missing) = self.room.keep.on_move(&a.touch.at, &b.touch.at) else {
             out.push(b.touch);
             return Ok(());
         };
@@ -287,7 +337,7 @@ impl Repairing<'_> {
             place: nalgebra::center(&a.touch.contact.point, &b.touch.contact.point),
             depth: missing.depth,
         };
-        let (Some(between), 1..) = (between(&a.touch, &b.touch, self.cutter), halvings) else {
+        let (Some(between), 1..) = (between(&a.touch, &b.touch, self.room.cutter), halvings) else {
             return Err(there);
         };
         self.before = Some(a.touch.at.axis);

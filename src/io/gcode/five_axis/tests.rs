@@ -100,10 +100,21 @@ fn program_following(
     following: &Following,
 ) -> (String, MoveLines, JointPath) {
     let joints = follow(kinematics, path, following).unwrap();
-    let post = FiveAxisPost { kinematics, joints: &joints, style, rapid_rate: 15_000.0 };
+    let (text, lines) = written(path, kinematics, style, &joints, TCP_WORDS);
+    (text, lines, joints)
+}
+
+fn written(
+    path: &Toolpath,
+    kinematics: &Kinematics,
+    style: Style,
+    joints: &JointPath,
+    tcp_words: [&str; 2],
+) -> (String, MoveLines) {
+    let post = FiveAxisPost { kinematics, joints, style, tcp_words, rapid_rate: 15_000.0 };
     let mut bytes = Vec::new();
     let lines = write_five_axis(&mut bytes, path, &post, &Cutter::ball(6.0).unwrap(), &HEADER).unwrap();
-    (String::from_utf8(bytes).unwrap(), lines, joints)
+    (String::from_utf8(bytes).unwrap(), lines)
 }
 
 /// The joints of a line of words.
@@ -372,7 +383,8 @@ fn no_program_is_made_of_joints_that_must_not_be() {
     let path = tilting_path();
     let write = |style: Style, kinematics: &Kinematics, following: &Following| {
         let joints = follow(kinematics, &path, following).unwrap();
-        let post = FiveAxisPost { kinematics, joints: &joints, style, rapid_rate: 15_000.0 };
+        let post =
+            FiveAxisPost { kinematics, joints: &joints, style, tcp_words: TCP_WORDS, rapid_rate: 15_000.0 };
         write_five_axis(&mut Vec::new(), &path, &post, &Cutter::ball(6.0).unwrap(), &HEADER)
     };
     let kept = Style::Tcp.following(0.001, 50.0);
@@ -458,6 +470,60 @@ fn a_rewind_is_made_at_the_top() {
             let words = states[lines[k] as usize - 1].words;
             let axis = kinematics.tool_axis([words[3].to_radians(), words[4].to_radians()]);
             assert!((axis - step.to.axis).norm() < 3e-7, "move {k}");
+        }
+    }
+}
+
+/// LinuxCNC's `xyzac-trt` and `xyzbc-trt`, whose tables count as they turn themselves. `trunnion_*.ngc` of tests/programs are our
+/// programs for them, and rs274 goes through our locations (`trunnion_*.motion`; the README there says how they are made).
+/// `MILLSTREAM_BLESS=1` writes the programs anew.
+#[test]
+fn linuxcnc_goes_through_the_locations_of_programs_that_keep_the_tip() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/programs");
+    for (name, table) in [("trunnion_xyzac", "ac-table"), ("trunnion_xyzbc", "bc-table")] {
+        let [mut first, mut second] = preset(table).unwrap();
+        (first.direction, second.direction) = (-first.direction, -second.direction);
+        (first.point, second.point) = (Point3::new(12.0, -7.0, 0.0), Point3::new(12.0, 13.0, -30.0));
+        let travel = [None, None, Some([-400.0, 0.0])];
+        let kinematics = Kinematics::new(first, second, 50.8, Point3::new(0.0, 0.0, -300.0), travel).unwrap();
+        let path = tilting_path();
+        let joints = follow(&kinematics, &path, &Style::Tcp.following(0.2, 50.0)).unwrap();
+        let words = ["G43 H1 M428", "M429 G49"];
+        let (text, _) = written(&path, &kinematics, Style::Tcp, &joints, words);
+        let file = folder.join(name).with_extension("ngc");
+        if std::env::var_os("MILLSTREAM_BLESS").is_some() {
+            std::fs::write(&file, &text).unwrap();
+        }
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), text, "{name}");
+
+        // X Y Z and both rotary axes from where the control begins to keep the tip, and up again before it ends.
+        let start = JointLocation { joints: joints.start, at: path.start, ..joints.locations[0] };
+        let ends = [&start, joints.locations.last().unwrap()];
+        let [over, up] = ends.map(|end| {
+            let high = kinematics.over(&path, end.joints.rotary, end.at.tip);
+            JointLocation { at: ClPoint { tip: high, ..end.at }, ..*end }
+        });
+        let through = [over, start].into_iter().chain(joints.locations.iter().copied()).chain([up]);
+        let place = |at: JointLocation| {
+            let rotary = kinematics.axes().iter().zip(at.joints.rotary);
+            let mut place = [at.at.tip.x, at.at.tip.y, at.at.tip.z, 0.0, 0.0, 0.0];
+            rotary.for_each(|(axis, angle)| place[3 + (axis.letter as usize - 65)] = angle.to_degrees());
+            place
+        };
+        let mut ours: Vec<[f64; 6]> = through.map(place).collect();
+        ours.dedup();
+        let motion = std::fs::read_to_string(file.with_extension("motion")).unwrap();
+        let theirs: Vec<Vec<f64>> = motion
+            .lines()
+            .map(|line| line.split(' ').skip(1).take(6).map(|word| word.parse().unwrap()).collect())
+            .collect();
+        assert!(ours.len() > 20 && theirs.len() > ours.len(), "{name}: {} {}", ours.len(), theirs.len());
+        // The last motion is the rise.
+        let theirs = &theirs[theirs.len() - 1 - ours.len()..];
+        for (ours, theirs) in ours.iter().zip(theirs) {
+            // Words and rs274 round to four decimals each, angles to five and four.
+            let off = ours.iter().zip(theirs).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(off < 1.1e-4, "{name}: {ours:?}, rs274 has {theirs:?}");
         }
     }
 }

@@ -1,41 +1,42 @@
 //! The machine's own bodies, and the tool on its way to the path and away from it.
 //!
-//! Along all joints of the program: what the head carries against part, fixtures and what the table side carries; the tool against the
-//! latter; what turns on the table side against part and fixtures, where it does not carry them. Bodies that carry
+//! Along all joints of the program: what the head carries against part, fixtures, stock ([`uncut`]) and what the table side carries; the tool against the
+//! latter; what turns on the table side against part, fixtures and stock, where it does not carry them. Bodies that carry
 //! one another, or the tool, are not held against each other.
 
-use collision::{Body, Obstacle};
+use collision::{Body, LeastClearance, Obstacle};
 use geometry::{Bvh, Isometry3, Point3, TriangleMesh};
 use machine::kinematics::{Chain, Link, LinkMove, STRAY, Side, Waypoint, program_of_three_axes};
 use report::{Claim, Gravity};
 use scene::{BodyShape, MachineBody};
 use work::monitor::Monitor;
 
-use super::PairClearance;
+use super::{PairClearance, uncut};
 use crate::JobError;
 use crate::run::Run;
 use crate::tool::Tool;
+use uncut::UncutStock;
 
 /// What is said of a program whose joints are not known.
-const UNKNOWN_JOINTS: &str = "the machine's bodies are not checked: of a program from elsewhere the joints are not known on a machine \
-                              with rotary axes or with several tools";
+const UNKNOWN_JOINTS: &str = "the machine's bodies are not checked: of a program from elsewhere the joints are not known with several \
+                              tools, or as cutter locations on a machine with rotary axes";
 
 /// A body that moves, and what it is fixed to.
-struct Mover {
+pub(super) struct Mover {
     name: String,
-    link: Link,
+    pub link: Link,
     body: Body,
 }
 
 /// A mesh in the frame of the link that it is fixed to.
-struct Other<'a> {
-    name: String,
-    link: Link,
-    obstacle: Obstacle<'a>,
+pub(super) struct Other<'a> {
+    pub name: String,
+    pub link: Link,
+    pub obstacle: Obstacle<'a>,
     /// Its triangles stand off its true surface by up to this, mm.
-    off: f64,
+    pub off: f64,
     /// The frame of the link in that of the mesh.
-    from_link: Isometry3,
+    pub from_link: Isometry3,
 }
 
 /// A body of the table side as a mesh.
@@ -46,8 +47,8 @@ struct BodyMesh {
 }
 
 /// The program and the links that it moves.
-struct Motion<'a> {
-    run: &'a Run<'a>,
+pub(super) struct Motion<'a> {
+    pub run: &'a Run<'a>,
     chain: Chain,
     program: Vec<Waypoint>,
     /// What bodies stray from what is looked at, mm.
@@ -63,16 +64,22 @@ pub(super) fn find(
     let (scene, path) = (run.scene(), run.path());
     let bodies = scene.bodies.as_ref();
     let rotary = scene.five_axis.as_ref().map(|five_axis| &five_axis.kinematics);
-    let (chain, program) = match (rotary.zip(run.planned.joints.as_ref()), bodies) {
-        (Some((kinematics, joints)), _) => (Chain::of(kinematics), joints.program(kinematics, path)),
-        (None, Some(made)) if rotary.is_none() && path.is_upright() && run.tools.len() == 1 => {
+    let joints = run.planned.joints.as_ref();
+    let foreign = run.request.foreign().map(|read| &read.joints).filter(|joints| !joints.is_empty());
+    let upright = rotary.is_none() && path.is_upright();
+    let (chain, program) = match (rotary, joints, foreign, bodies) {
+        (Some(kinematics), Some(joints), ..) => (Chain::of(kinematics), joints.program(kinematics, path)),
+        (Some(kinematics), None, Some(joints), Some(_)) if run.tools.len() == 1 => {
+            (Chain::of(kinematics), joints.clone())
+        }
+        (None, _, _, Some(made)) if upright && run.tools.len() == 1 => {
             (made.chain, program_of_three_axes(path, run.planned.rise_to, &made.chain))
         }
-        (None, Some(_)) => {
+        (.., Some(_)) => {
             let unknown = Claim::length("collision", Gravity::Crash, 0.0, 0.0, f64::INFINITY);
             return Ok(Some(unknown.told(UNKNOWN_JOINTS.to_owned())));
         }
-        (None, None) => return Ok(None),
+        (.., None) => return Ok(None),
     };
     let stray = if rotary.is_some() { STRAY } else { 0.0 };
     let motion = Motion { run, chain, program, stray };
@@ -99,11 +106,24 @@ pub(super) fn find(
     });
     let of_table: Vec<Other<'_>> = of_table.collect();
     let of_work = on_workpiece(run, &chain);
+    let stock = UncutStock::of(run);
+    let of_stock = stock.iter().zip(&of_work).map(|(stock, work)| (stock, stock.beside(work))).next();
     let on_approach = |stretch: &LinkMove| stretch.approach;
     if rotary.is_some() {
         for (mover, other) in tools.iter().flat_map(|mover| of_work.iter().map(move |other| (mover, other))) {
             let named = format!("{} on the approach", mover.name);
             pairs.extend(motion.pair((&named, mover), other, &on_approach, monitor)?);
+        }
+        for (mover, (stock, other)) in
+            tools.iter().flat_map(|mover| of_stock.iter().map(move |of| (mover, of)))
+        {
+            let named = format!("{} on the approach", mover.name);
+            pairs.extend(uncut::pair(&motion, (&named, mover), (stock, other), true, monitor)?);
+        }
+    }
+    if let Some((stock, other)) = &of_stock {
+        for mover in heads.iter().chain(&tables).filter(|mover| mover.link != other.link) {
+            pairs.extend(uncut::pair(&motion, (&mover.name, mover), (stock, other), false, monitor)?);
         }
     }
     let against = |movers: &[Mover], others: &[Other<'_>], pairs: &mut Vec<PairClearance>| {
@@ -156,12 +176,44 @@ impl Motion<'_> {
         chosen: &dyn Fn(&LinkMove) -> bool,
         monitor: &dyn Monitor,
     ) -> Result<Option<PairClearance>, JobError> {
+        let moves = self.moves(mover, other, chosen);
+        let least = self.least(mover, other, &moves, monitor)?;
+        Ok(least.map(|least| self.told(name, other, &moves, least)))
+    }
+
+    /// The chosen stretches as the other link sees them.
+    pub fn moves(
+        &self,
+        mover: &Mover,
+        other: &Other<'_>,
+        chosen: &dyn Fn(&LinkMove) -> bool,
+    ) -> Vec<LinkMove> {
         let (middle, reach) = (mover.body.middle(), mover.body.reach());
         let mut moves = self.chain.motion(&self.program, [mover.link, other.link], &middle, reach);
         moves.retain(chosen);
+        moves
+    }
+
+    /// The least clearance on stretches; its move counts them.
+    pub fn least(
+        &self,
+        mover: &Mover,
+        other: &Other<'_>,
+        moves: &[LinkMove],
+        monitor: &dyn Monitor,
+    ) -> Result<Option<LeastClearance>, JobError> {
         let ends = |k: usize| moves[k].ends.map(|end| other.from_link * end);
-        let found = other.obstacle.least_clearance_of_body(&mover.body, moves.len(), &ends, monitor)?;
-        let Some(mut least) = found else { return Ok(None) };
+        Ok(other.obstacle.least_clearance_of_body(&mover.body, moves.len(), &ends, monitor)?)
+    }
+
+    /// The pair of what was found on stretches.
+    pub fn told(
+        &self,
+        name: &str,
+        other: &Other<'_>,
+        moves: &[LinkMove],
+        mut least: LeastClearance,
+    ) -> PairClearance {
         least.move_index = moves[least.move_index].step;
         // Places on bodies of the machine are told as the part sees them with its rotary axes at zero.
         let zero = self.chain.workpiece_zero().coords;
@@ -169,7 +221,7 @@ impl Motion<'_> {
             least.nearest.place = Point3::from(least.nearest.place.coords - zero);
         }
         let off = other.off + self.stray;
-        Ok(Some(PairClearance::of_mesh((name, other.name.clone()), &least, (self.run, 0), off, 0.0)))
+        PairClearance::of_mesh((name, other.name.clone()), &least, (self.run, 0), off, 0.0)
     }
 }
 

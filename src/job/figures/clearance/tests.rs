@@ -21,10 +21,26 @@ impl Home {
         Self(home)
     }
 
-    pub(super) fn outcome(&self, text: &str) -> Outcome {
+    pub(super) fn planned(&self, text: &str) -> (Session, Outcome) {
         let name = self.0.join("plate.toml");
         let session = Session::new(Scene::parse(&name.to_string_lossy(), text).unwrap()).unwrap();
-        session.toolpath(&session.scene.toolpaths[0], &Silent).unwrap()
+        let outcome = session.toolpath(&session.scene.toolpaths[0], &Silent).unwrap();
+        (session, outcome)
+    }
+
+    pub(super) fn outcome(&self, text: &str) -> Outcome {
+        self.planned(text).1
+    }
+
+    /// With the files that the scene names.
+    pub(super) fn opened(&self, text: &str) -> ToolpathResult {
+        self.write("plate.toml", text);
+        let session = Session::open(self.0.join("plate.toml")).unwrap();
+        session.toolpath(&session.scene.toolpaths[0], &Silent).unwrap().result
+    }
+
+    pub(super) fn write(&self, file: &str, text: &str) {
+        write(&self.0.join(file), text);
     }
 
     pub(super) fn run(&self, text: &str) -> ToolpathResult {

@@ -35,6 +35,10 @@ fn tool(cutter: Cutter) -> Tool {
 const NEEDED: f64 = 0.5;
 const ALLOWED: f64 = 0.004;
 
+fn room<'a>(cutter: &'a Cutter, keep: &'a Interference<'a>) -> Room<'a> {
+    Room { cutter, keep, firm: false }
+}
+
 fn keep<'a>(tool: &'a Tool, part: &'a (TriangleMesh, Bvh)) -> Interference<'a> {
     let obstacle = Obstacle::new(&part.0, &part.1);
     let checks = vec![
@@ -69,7 +73,7 @@ fn in_a_deep_cavity_the_tool_leans_away_from_the_wall() {
         let keep = keep(&tool, &part);
         let pass = along_floor(&cutter, 20.0, (0..81).map(|k| 0.25 * f64::from(k) - 10.0));
         assert!(pass.iter().all(|touch| !keep.is_clear(&touch.at)), "upright, the holder is in the wall");
-        let repaired = repair(&pass, &cutter, &keep, None, &Silent).unwrap();
+        let repaired = repair(&pass, room(&cutter, &keep), None, &Silent).unwrap();
         let (passes, summary) = (repaired.passes, repaired.summary);
         assert_eq!((passes.len(), summary.tilted, summary.lifted), (1, 81, 0), "{summary:?}");
         assert!(summary.unreachable.is_empty() && summary.greatest_lift.is_none());
@@ -102,7 +106,7 @@ fn where_nothing_helps_the_tool_is_lifted_or_the_place_reported() {
     let (part, tool) = (cavity([4.0, 300.0], 40.0), tool(cutter));
     let mut keep = keep(&tool, &part);
     let pass = along_floor(&cutter, 0.0, (0..5).map(f64::from));
-    let repaired = repair(&pass, &cutter, &keep, None, &Silent).unwrap();
+    let repaired = repair(&pass, room(&cutter, &keep), None, &Silent).unwrap();
     assert!(repaired.passes.is_empty());
     let unreachable = repaired.summary.unreachable;
     assert_eq!(
@@ -119,7 +123,7 @@ fn where_nothing_helps_the_tool_is_lifted_or_the_place_reported() {
     );
     // The cone stands 30 mm above the tip, the walls are 40 high.
     keep.greatest_lift = 15.0;
-    let repaired = repair(&pass, &cutter, &keep, None, &Silent).unwrap();
+    let repaired = repair(&pass, room(&cutter, &keep), None, &Silent).unwrap();
     let (most, _) = repaired.summary.greatest_lift.unwrap();
     assert!((10.52..10.53).contains(&most), "{most}");
     assert_eq!(
@@ -138,7 +142,7 @@ fn a_pass_is_left_out_where_a_clamp_stands() {
     let obstacle = Obstacle::new(&clamp, &clamp_tree);
     keep.checks.extend([&tool.edges, &tool.held].map(|solid| Check { solid, obstacle, needed: 1.0 }));
     let pass = along_floor(&cutter, 0.0, (0..161).map(|k| 0.25 * f64::from(k) - 20.0));
-    let Repaired { passes, summary } = repair(&pass, &cutter, &keep, None, &Silent).unwrap();
+    let Repaired { passes, summary } = repair(&pass, room(&cutter, &keep), None, &Silent).unwrap();
     assert_eq!(passes.len(), 2);
     moves_are_clear(&keep, &passes);
     // A ball of 3 mm that keeps 1 mm from a wall higher than its middle stays 4 mm away from it.
@@ -158,7 +162,7 @@ fn what_stands_between_two_contacts_is_passed_by() {
     keep.checks.push(Check { solid: &tool.held, obstacle: Obstacle::new(&post, &post_tree), needed: NEEDED });
     let pass = along_floor(&cutter, 0.0, [-20.0, 20.0].into_iter());
     assert!(pass.iter().all(|touch| keep.is_clear(&touch.at)));
-    let Repaired { passes, summary } = repair(&pass, &cutter, &keep, None, &Silent).unwrap();
+    let Repaired { passes, summary } = repair(&pass, room(&cutter, &keep), None, &Silent).unwrap();
     assert_eq!((passes.len(), summary.unreachable.len(), summary.lifted), (1, 0, 0), "{summary:?}");
     assert!(summary.added > 2 && passes[0].len() == 2 + summary.added);
     moves_are_clear(&keep, &passes);
@@ -174,7 +178,7 @@ fn the_axis_is_led_over_to_where_it_must_lean() {
     keep.checks.push(Check { solid: &tool.held, obstacle: Obstacle::new(&wall, &wall_tree), needed: NEEDED });
     let pass = along_floor(&cutter, 20.0, (0..161).map(|k| 0.25 * f64::from(k) - 30.0));
     let fastest = |turning: Option<f64>| {
-        let Repaired { passes, summary } = repair(&pass, &cutter, &keep, turning, &Silent).unwrap();
+        let Repaired { passes, summary } = repair(&pass, room(&cutter, &keep), turning, &Silent).unwrap();
         assert_eq!((passes.len(), summary.unreachable.len(), summary.lifted), (1, 0, 0), "{summary:?}");
         moves_are_clear(&keep, &passes);
         assert_eq!(passes[0][0], pass[0], "far from the wall nothing changes");
@@ -204,10 +208,10 @@ fn no_axis_leans_from_its_rule_by_more_than_is_allowed() {
         .into_iter()
         .map(turned)
         .collect();
-    let needed = repair(&pass, &cutter, &keep, None, &Silent).unwrap().summary.greatest_tilt;
+    let needed = repair(&pass, room(&cutter, &keep), None, &Silent).unwrap().summary.greatest_tilt;
     for greatest_tilt in [0.8, 0.6 * needed, 0.45, 0.4] {
         let keep = Interference { checks: keep.checks.clone(), greatest_tilt, greatest_lift: 30.0 };
-        let found = repair(&pass, &cutter, &keep, None, &Silent).unwrap().summary;
+        let found = repair(&pass, room(&cutter, &keep), None, &Silent).unwrap().summary;
         assert!(
             found.tilted > 0 && found.greatest_tilt <= greatest_tilt + 1e-12,
             "{greatest_tilt}: {found:?}"
@@ -245,7 +249,7 @@ fn the_rear_of_a_flat_leaves_bowls_and_troughs_at_the_lead_of_their_curvature() 
         }
         let check = Check { solid: &edges, obstacle: Obstacle::new(&bowl.0, &bowl.1), needed: -0.001 };
         let keep = Interference { checks: vec![check], greatest_tilt: 0.5, greatest_lift: 0.0 };
-        let Repaired { passes, summary } = repair(&along, &cutter, &keep, None, &Silent).unwrap();
+        let Repaired { passes, summary } = repair(&along, room(&cutter, &keep), None, &Silent).unwrap();
         assert_eq!((passes.len(), summary.tilted), (1, 17), "{summary:?}");
         assert!((summary.greatest_tilt - expected).abs() < 0.01, "{} {expected}", summary.greatest_tilt);
         moves_are_clear(&keep, &passes);
@@ -257,7 +261,8 @@ fn a_pass_that_is_clear_stays_as_it_is() {
     let cutter = Cutter::ball(6.0).unwrap();
     let (part, tool) = (cavity([60.0, 60.0], 1.0), tool(cutter));
     let pass = along_floor(&cutter, 0.0, (0..20).map(f64::from));
-    let Repaired { passes, summary } = repair(&pass, &cutter, &keep(&tool, &part), None, &Silent).unwrap();
+    let Repaired { passes, summary } =
+        repair(&pass, room(&cutter, &keep(&tool, &part)), None, &Silent).unwrap();
     assert_eq!((passes, summary.clone()), (vec![pass], RepairSummary::default()));
     assert!(summary.notes().is_empty());
 }

@@ -30,16 +30,22 @@ pub(super) struct Pair {
 }
 
 impl Pair {
-    /// The axis at the place.
-    pub fn axis_there(&self, axes: &[Vector3]) -> Vector3 {
-        let [a, b] = self.between.map(|k| axes[k as usize]);
-        (a + (b - a) * self.share).try_normalize(1e-9).unwrap_or(a)
-    }
-
     /// Between the axes, rad.
     pub fn angle(&self, axes: &[Vector3]) -> f64 {
-        let (a, b) = (axes[self.node as usize], self.axis_there(axes));
-        a.cross(&b).norm().atan2(a.dot(&b))
+        self.angle_of(|k| axes[k])
+    }
+
+    /// The same for axes by their node.
+    pub fn angle_of(&self, axis: impl Fn(usize) -> Vector3) -> f64 {
+        let [first, second] = self.between.map(|k| k as usize);
+        let a = axis(first);
+        let there = if first == second {
+            a
+        } else {
+            (a + (axis(second) - a) * self.share).try_normalize(1e-9).unwrap_or(a)
+        };
+        let own = axis(self.node as usize);
+        own.cross(&there).norm().atan2(own.dot(&there))
     }
 }
 

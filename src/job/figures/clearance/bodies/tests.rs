@@ -187,3 +187,79 @@ fn programs_rise_over_the_fixtures_or_violate() {
         assert!((retract.measured.unwrap() + spare).abs() < 1e-9, "{retract:?}");
     }
 }
+
+/// Over the block that the plate is cut from: the nose of three axes as far as the gauge length is longer than the block stands over
+/// the plate, a motor beside the spindle over what no pass comes to.
+#[test]
+fn bodies_keep_off_the_stock() {
+    let home = Home::new("stock");
+    let run = |gauge: f64, low: f64| {
+        let nose = cylinder("nose", "Z", 40.0, "[0, 0, 0]", "[0, 0, 70]");
+        let motor = block("motor", "Z", &list([20.0, -30.0, low]), &list([60.0, 30.0, low + 90.0]));
+        home.run(&format!(
+            "{PLATE}[stock]\nallowance = 4\n{ZIGZAG}[machine]\ngauge_length = {gauge}\nworkpiece_zero = {}\n{nose}{motor}",
+            list(ZERO)
+        ))
+    };
+    for gap in [0.05, -0.05] {
+        let result = run(4.0 + gap, 100.0);
+        is_near(&result, "nose", "standing stock", gap);
+    }
+    // Beside the plate, and 26 mm under the spindle's end.
+    for gap in [0.05, -0.05] {
+        let motor = block("motor", "Z", &list([20.0, -30.0, gap - 26.0]), "[60, 30, 90]");
+        let result = home.run(&format!(
+            "{PLATE}[stock]\ncorners = [[-40, -40, -5], [48, 46, 4]]\n{ZIGZAG}[machine]\ngauge_length = 30\nworkpiece_zero = {}\n{motor}",
+            list(ZERO)
+        ));
+        is_near(&result, "motor", "standing stock", gap);
+    }
+}
+
+/// A pin above the cutter that would stand in the block if the cutter had not been there: nothing is proven, and nothing passes.
+#[test]
+fn what_may_have_been_cut_is_open() {
+    let home = Home::new("cut-before");
+    let pin = cylinder("pin", "Z", 2.0, "[0, 0, -1]", "[0, 0, 9]");
+    let result = home.run(&format!(
+        "{PLATE}[stock]\nallowance = 4\n{ZIGZAG}[machine]\ngauge_length = 4\nworkpiece_zero = {}\n{pin}",
+        list(ZERO)
+    ));
+    assert_eq!(of_pair(&result, "pin", "standing stock").verdict(), Verdict::Undecided);
+}
+
+/// The program of a planned path, read as one from elsewhere in both styles: bodies come as near to each other.
+#[test]
+fn programs_from_elsewhere_move_the_bodies() {
+    let home = Home::new("foreign");
+    for style in ["tcp", "full"] {
+        let machine = format!(
+            "preset = \"ac-table\"\ngauge_length = 90\nfirst = {{ point = {} }}\nsecond = {{ point = {} }}\n{}{}",
+            on_machine([40.0, -30.0, 0.0]),
+            on_machine([40.0, -30.0, -60.0]),
+            block("table", "C", &on_machine([-400.0, -400.0, -80.0]), &on_machine([400.0, 400.0, -60.0])),
+            cylinder("nose", "Z", 120.0, "[0, 0, 0]", "[0, 0, 60]"),
+        );
+        let text = leaning([0.0, LEAN.sin(), LEAN.cos()], &machine)
+            .replace("post = \"full\"", &format!("post = \"{style}\""));
+        let (session, outcome) = home.planned(&text);
+        let mut program = Vec::new();
+        session.write_program(&mut program, &outcome).unwrap();
+        home.write("elsewhere.nc", &String::from_utf8(program).unwrap());
+        let axis = format!("axis = {{ fixed = {} }}\n", list([0.0, LEAN.sin(), LEAN.cos()]));
+        let foreign = text
+            .replace(ZIGZAG, "[[toolpath]]\nstrategy = \"program\"\nfile = \"elsewhere.nc\"\n")
+            .replace(&axis, "");
+        let result = home.opened(&foreign);
+        for (tool, other) in
+            [("nose", "table"), ("nose", "part"), ("cutter", "table"), ("nose", "standing stock")]
+        {
+            let planned = -of_pair(&outcome.result, tool, other).measured.unwrap();
+            let found = of_pair(&result, tool, other);
+            let clearance = -found.measured.unwrap();
+            // Both stray by what the bodies' motion is divided by, and words are rounded.
+            assert!((clearance - planned).abs() < 0.02, "{style}, {tool} to {other}: {clearance} {planned}");
+            assert_eq!(found.verdict(), Verdict::Pass, "{found:?}");
+        }
+    }
+}
