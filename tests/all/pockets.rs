@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use millstream::geometry::Point3;
-use millstream::motion::Toolpath;
+use millstream::motion::{MoveKind, Toolpath};
 use millstream::program::{GENERAL_CONTROL, Placing, Program, Setup, read_apt, read_gcode};
 use serde_json::Value;
 
@@ -33,7 +33,7 @@ fn path_of(program: &Program) -> Toolpath {
     program.runs(&placing).unwrap().swap_remove(0).path
 }
 
-/// How far places of a path lie from another one at most.
+/// How far places that a path feeds to lie from another one at most.
 fn farthest(from: &Toolpath, to: &Toolpath) -> f64 {
     let away = |p: &Point3, a: &Point3, b: &Point3| {
         let along = b - a;
@@ -43,7 +43,8 @@ fn farthest(from: &Toolpath, to: &Toolpath) -> f64 {
     };
     let sides: Vec<(Point3, Point3)> = to.segments().map(|(a, b, _)| (a, b)).collect();
     let nearest = |p: &Point3| sides.iter().map(|(a, b)| away(p, a, b)).fold(f64::INFINITY, f64::min);
-    from.moves.iter().map(|m| nearest(&m.to.tip)).fold(0.0, f64::max)
+    let fed = from.moves.iter().filter(|m| m.kind != MoveKind::Rapid);
+    fed.map(|m| nearest(&m.to.tip)).fold(0.0, f64::max)
 }
 
 /// The program with arcs, read back, stays as near to the moves, which the locations in APT are, as it was asked to.
