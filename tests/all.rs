@@ -35,6 +35,8 @@ mod memory;
 mod nightly;
 #[path = "all/outputs.rs"]
 mod outputs;
+#[path = "all/pockets.rs"]
+mod pockets;
 #[path = "all/previous_stock.rs"]
 mod previous_stock;
 #[path = "all/programs.rs"]

@@ -32,7 +32,7 @@ pub use analytic::{AnalyticError, AnalyticShape, AnalyticSurface, HeightJet, MAX
 pub use bspline::{KnotError, KnotVector, MAX_BASIS, MAX_DEGREE};
 pub use bvh::{BoxTree, Bvh, Extent, Feature, MeshFoot, Node, Paired, VerticalHit, round_down, round_up};
 pub use coordinates::{Isometry3, MAX_COORDINATE, Point2, Point3, Vector2, Vector3};
-pub use cover::DiscSamples;
+pub use cover::RimSamples;
 pub use cubic_spline::{ArcLength, CubicSpline, SplineError};
 pub use interpolate::{InterpolationAxis, interpolate};
 pub use jet::{Jet2, PrincipalCurvatures};

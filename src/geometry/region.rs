@@ -303,12 +303,37 @@ impl Region {
         if distance == 0.0 || self.is_empty() {
             return self.clone();
         }
+        if let [piece] = self.pieces.as_slice()
+            && distance > 0.0
+            && !piece.islands.is_empty()
+        {
+            return Self::piece_grown(piece, distance);
+        }
         // Corners of the chords lie outside of the circle by as much as puts their middles on it.
         let radius = distance / (0.5 * ROUND_STEP).cos();
         let round = LineJoin::Round(ROUND_STEP);
         // Straight sides move by as much, which keeps to the safe side.
         let style = OutlineStyle::new(radius).line_join(round).math(MathMode::Float);
         Self::of_shapes(self.shapes().outline_as::<i64>(&style), distance)
+    }
+
+    /// A piece whose outline grows and whose islands shrink, each by itself: what lies inside of one island is nearer to no other
+    /// curve. Chords of round corners shrink until they cross each other many times, which takes long by crossings.
+    fn piece_grown(piece: &Piece, distance: f64) -> Self {
+        let alone = |outer| Self { pieces: vec![Piece { outer, islands: Vec::new() }] };
+        let mut grown = alone(piece.outer.clone()).offset(distance);
+        let shrunk = work::parallel::map(piece.islands.len(), |k| {
+            let island = tidy(piece.islands[k].clone(), true);
+            match shrunk_convex(&island, distance) {
+                Some(left) => Self::of_shapes(vec![vec![left]], distance),
+                None => alone(island).offset(-distance),
+            }
+        });
+        let left = shrunk.into_iter().flat_map(|region| region.pieces).map(|piece| tidy(piece.outer, false));
+        if let Some(whole) = grown.pieces.first_mut() {
+            whole.islands.extend(left);
+        }
+        grown
     }
 
     fn shapes(&self) -> Vec<Vec<Vec<[f64; 2]>>> {
@@ -405,6 +430,40 @@ impl Region {
     }
 }
 
+/// What lies at least `distance` inside of a convex counter-clockwise curve, as far as [`Region::inset`] takes it: what all of its
+/// sides have on their left. `None` where the curve is not convex.
+fn shrunk_convex(curve: &[Point2], distance: f64) -> Option<Vec<[f64; 2]>> {
+    let n = curve.len();
+    let side = |k: usize| curve[(k + 1) % n] - curve[k];
+    if (0..n).any(|k| side(k).perp(&side((k + 1) % n)) < 0.0) {
+        return None;
+    }
+    let by = distance / (0.5 * ROUND_STEP).cos();
+    let mut left = rectangle_around(curve);
+    for k in 0..n {
+        let Some(along) = side(k).try_normalize(0.0) else { continue };
+        let inside = |p: &Point2| along.perp(&(p - curve[k])) - by;
+        let before = std::mem::take(&mut left);
+        for (i, a) in before.iter().enumerate() {
+            let b = &before[(i + 1) % before.len()];
+            let (at_a, at_b) = (inside(a), inside(b));
+            if at_a >= 0.0 {
+                left.push(*a);
+            }
+            if (at_a < 0.0) != (at_b < 0.0) {
+                left.push(a + (b - a) * (at_a / (at_a - at_b)));
+            }
+        }
+    }
+    Some(left.into_iter().map(|p| [p.x, p.y]).collect())
+}
+
+/// The rectangle around a curve, counter-clockwise.
+fn rectangle_around(curve: &[Point2]) -> Vec<Point2> {
+    let [lo, hi] = plan_box(curve);
+    vec![lo, Point2::new(hi.x, lo.y), hi, Point2::new(lo.x, hi.y)]
+}
+
 /// Where closed curves first cross or touch themselves or each other: the two sides and the place.
 pub fn first_crossing(curves: &[Vec<Point2>]) -> Option<(CurveSegment, CurveSegment, Point2)> {
     let grid = SegmentGrid::of_curves(curves.iter().map(Vec::as_slice));
@@ -487,6 +546,36 @@ mod tests {
         let rest = r.area() - inset.grown(d).area();
         let corners = 4.0 * d * d * (1.0 - PI / 4.0);
         assert!((rest - corners).abs() < 2.0 * bound, "{rest} {corners}");
+    }
+
+    /// Islands shrink as they do all at once: those with a neck fall apart, small ones vanish, and bays of the outline close.
+    #[test]
+    fn islands_shrink_each_by_itself() {
+        let dumbbell =
+            [(5., 5.), (11., 5.), (11., 7.), (14., 7.), (14., 5.), (20., 5.), (20., 11.), (14., 11.)]
+                .into_iter()
+                .chain([(14., 9.), (11., 9.), (11., 11.), (5., 11.)])
+                .map(|(x, y)| Point2::new(x, y))
+                .collect();
+        let bay =
+            [(0., 0.), (60., 0.), (60., 40.), (42., 40.), (42., 38.), (48., 38.), (48., 26.), (33., 26.)]
+                .into_iter()
+                .chain([(33., 38.), (40., 38.), (40., 40.), (0., 40.)])
+                .map(|(x, y)| Point2::new(x, y))
+                .collect();
+        let r =
+            region(vec![bay, dumbbell, rectangle(30., 5., 32., 7.), rectangle(40., 8., 52., 20.)]).inset(0.5);
+        for distance in [0.3, 1.6, 2.2] {
+            let (each, style) = (r.grown(distance), |d: f64| {
+                let radius = d / (0.5 * ROUND_STEP).cos();
+                OutlineStyle::new(radius).line_join(LineJoin::Round(ROUND_STEP)).math(MathMode::Float)
+            });
+            let all = Region::of_shapes(r.shapes().outline_as::<i64>(&style(distance)), distance);
+            assert!(Region::nested(each.curves().map(<[Point2]>::to_vec).collect()).is_ok());
+            assert_eq!(each.curves().count(), all.curves().count(), "{distance}");
+            let differ = each.without(&all).area() + all.without(&each).area();
+            assert!(differ < 1e-5, "{distance}: {differ}");
+        }
     }
 
     #[test]

@@ -19,9 +19,10 @@
 //! out from then on: loops and passes over cleared ground are most of a long path.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::sync::LazyLock;
 
 use cutter::Cutter;
-use geometry::{DiscSamples, Point2, RegionIndex, Vector2};
+use geometry::{Point2, RegionIndex, RimSamples, Vector2};
 use motion::{Move, MoveKind, Toolpath};
 use sim::{ENGAGED, Stock};
 use work::monitor::{self, Cancelled, Monitor};
@@ -37,9 +38,10 @@ const HALVINGS: u32 = 12;
 /// A bound that exceeds the greatest angle by no more is good enough, rad.
 const PRECISE: f64 = 0.02 * PI / 180.0;
 
-/// A segment that is no nearer than this beyond an arc, over the radius, cannot clear a part of it. Longer parts let pass
-/// more segments, shorter ones are more to ask for.
-const PART: f64 = 0.25;
+/// Parts of the half circle: a segment that is near to none in which anything stands clears nothing. Longer parts let pass more
+/// segments, shorter ones are more to ask for.
+const PARTS: usize = 24;
+const PART: f64 = PI / PARTS as f64;
 
 /// Shorter arcs, rad, and nearer places, over the radius, are rounding.
 const ROUNDING: f64 = 1e-12;
@@ -48,11 +50,8 @@ const TOUCHING: f64 = 1e-9;
 /// Moves of a block: fewer are thinned more often, more see more that lies in other ground.
 const BLOCK: usize = 512;
 
-/// Margin over the radius by which a segment must lie in others to be left out. Greater is quicker, and leaves more of them.
-const MARGIN: f64 = 0.1;
-
-/// Longer segments, over the radius, are never left out.
-const SHORT: f64 = 0.3;
+/// Longer segments, over the radius, are never left out, and longer moves are looked at in parts.
+const SHORT: f64 = 1.0;
 
 /// Buckets along a side at most.
 const MOST_BUCKETS: f64 = 1024.0;
@@ -103,17 +102,13 @@ pub fn contact_arcs(
         let first = of_moves.len();
         cleared.thin(first);
         let count_of = BLOCK.min(path.len() - first);
-        let stretches: Vec<_> = (first..first + count_of).map(|k| cleared.stretches(path, top, k)).collect();
-        let near = work::parallel::try_map(count_of, |k| {
+        let stretches = work::parallel::try_map(count_of, |k| {
             monitor::check(monitor)?;
-            Ok(if stretches[k].is_empty() { Vec::new() } else { cleared.near_move(first + k) })
+            let stretches = cleared.stretches(path, top, first + k);
+            let near = if stretches.is_empty() { Vec::new() } else { cleared.near_move(first + k) };
+            Ok(cleared.looked_at(&stretches, &near))
         })?;
-        of_moves.extend(work::parallel::try_map(count_of, |k| {
-            monitor::check(monitor)?;
-            let (stretches, near) = (&stretches[k], &near[k]);
-            let begin = stretches.first().map_or(0.0, |first| cleared.at(first, -first.half, near));
-            Ok(stretches.iter().map(|s| cleared.at(s, s.half, near)).fold(begin, f64::max))
-        })?);
+        of_moves.extend(stretches.iter().map(|all| all.iter().map(|one| one.found).fold(0.0, f64::max)));
         let counted: Vec<bool> = path.moves[first..first + count_of].iter().map(count).collect();
         let greatest_of = |found: &[f64]| {
             let counted = found.iter().zip(&counted).filter(|(_, counted)| **counted);
@@ -123,7 +118,8 @@ pub fn contact_arcs(
         let bounds = work::parallel::try_map(count_of, |k| {
             monitor::check(monitor)?;
             let of_counted = stretches[k].iter().filter(|_| counted[k]);
-            let each = of_counted.map(|stretch| cleared.bounded(stretch, &near[k], greatest, HALVINGS));
+            let each = of_counted
+                .map(|one| cleared.bounded(&one.stretch, one.most, &one.deciding, greatest, HALVINGS));
             Ok(each.fold([0.0f64; 2], |most, one| [0, 1].map(|side| most[side].max(one[side]))))
         })?;
         for (k, [least, most]) in bounds.into_iter().enumerate() {
@@ -159,6 +155,13 @@ impl Stretch {
         Vector2::new(self.heading.dot(&to), self.heading.perp(&to))
     }
 
+    /// All of a row of stretches of one move.
+    fn over(part: &[Self]) -> Self {
+        let half = part.iter().map(|stretch| stretch.half).sum();
+        let (first, by) = (part[0], half - part[0].half);
+        Self { middle: first.middle + first.heading * by, gone: first.gone + by, half, ..first }
+    }
+
     fn halves(&self) -> [Self; 2] {
         let half = 0.5 * self.half;
         [-half, half].map(|by| Self {
@@ -168,6 +171,16 @@ impl Stretch {
             ..*self
         })
     }
+}
+
+/// A stretch that was looked at from both of its ends.
+struct Looked {
+    stretch: Stretch,
+    /// The greater angle at its ends, and what the angle is at most anywhere on it, rad.
+    found: f64,
+    most: f64,
+    /// The segments that decide about every place of it, the last first.
+    deciding: Vec<u32>,
 }
 
 /// A straight way of the cutter's axis.
@@ -192,9 +205,11 @@ struct Swept<'a> {
     bucket: f64,
     side: [usize; 2],
     buckets: Vec<Vec<u32>>,
-    samples: DiscSamples,
-    /// Segments in the buckets up to the one with this index were thinned, when so many of them were left.
-    thinned: (usize, usize),
+    rim: RimSamples,
+    /// So many segments no later place finds fresh.
+    settled: usize,
+    /// How many of them thinning left in each bucket.
+    left: Vec<usize>,
 }
 
 impl<'a> Swept<'a> {
@@ -229,69 +244,82 @@ impl<'a> Swept<'a> {
             bucket,
             side,
             buckets: vec![Vec::new(); side[0] * side[1]],
-            samples: DiscSamples::new((1.0 + FILM + SHORT) * radius, MARGIN * radius),
-            thinned: (0, 0),
+            rim: RimSamples::new(),
+            settled: 0,
+            left: vec![0; side[0] * side[1]],
         };
         for (k, segment) in segments.iter().enumerate() {
-            swept.put(k as u32, segment);
+            for at in swept.buckets_of(segment.ends) {
+                swept.buckets[at].push(k as u32);
+            }
         }
         swept.segments = segments;
         swept
     }
 
-    /// Puts a segment into the buckets of places along it, a bucket apart at most; who looks for it looks a bucket farther.
-    fn put(&mut self, k: u32, segment: &Segment) {
-        let [a, b] = segment.ends;
+    /// The buckets of places along a segment, a bucket apart at most; who looks for it looks a bucket farther.
+    fn buckets_of(&self, [a, b]: [Point2; 2]) -> Vec<usize> {
         let steps = ((b - a).norm() / self.bucket).ceil().max(1.0);
-        for step in 0..=steps as usize {
+        let of = |step: usize| {
             let at = a + (b - a) * (step as f64 / steps) - self.origin;
-            let index = self.column(1, at.y) * self.side[0] + self.column(0, at.x);
-            if self.buckets[index].last() != Some(&k) {
-                self.buckets[index].push(k);
-            }
-        }
+            self.column(1, at.y) * self.side[0] + self.column(0, at.x)
+        };
+        let mut all: Vec<usize> = (0..=steps as usize).map(of).collect();
+        all.dedup();
+        all
     }
 
     /// Leaves out segments that lie whole in others: those of both that no place of move `from` or later may find fresh. Every
-    /// angle, and every bound of a stretch, stays the same.
+    /// angle, and every bound of a stretch, stays the same. Looks at those in buckets with twice as many as it left there.
     fn thin(&mut self, from: usize) {
         /// Fewer are no matter.
-        const FEW: usize = 1000;
+        const FEW: usize = 24;
         let before = self.segments[from].gone[0] - self.fresh;
-        let settled = self.segments[..from].partition_point(|s| s.gone[1] < before);
-        let (thinned, left) = self.thinned;
-        if settled - thinned < left + FEW {
-            return;
-        }
-        // From both ends of a stretch the same segment covers a place.
-        let within = ((1.0 - MARGIN - 0.5 * STRETCH) * self.radius).powi(2);
-        let mut live = vec![false; settled];
-        self.buckets
-            .iter()
-            .flatten()
-            .filter(|k| (**k as usize) < settled)
-            .for_each(|&k| live[k as usize] = true);
+        let settled =
+            self.settled + self.segments[self.settled..from].partition_point(|s| s.gone[1] < before);
+        self.settled = settled;
+        let settled_in = |bucket: &Vec<u32>| bucket.partition_point(|&k| (k as usize) < settled);
+        let full: Vec<usize> = (0..self.buckets.len())
+            .filter(|&at| settled_in(&self.buckets[at]) >= 2 * self.left[at] + FEW)
+            .collect();
+        let mut looked_at: Vec<u32> =
+            full.iter().flat_map(|&at| &self.buckets[at][..settled_in(&self.buckets[at])]).copied().collect();
+        looked_at.sort_unstable();
+        looked_at.dedup();
+        let radius = (1.0 + FILM) * self.radius;
+        let within = (radius * (1.0 - RimSamples::MARGIN)).powi(2);
         let mut near = Vec::new();
-        for k in 0..settled {
-            let Segment { ends: [a, b], z, .. } = self.segments[k];
-            let length = (b - a).norm();
-            if !live[k] || length > SHORT * self.radius {
+        for k in looked_at {
+            let Segment { ends: [a, b], z, .. } = self.segments[k as usize];
+            if (b - a).norm() > SHORT * self.radius {
                 continue;
             }
-            let (middle, radius) = (a + 0.5 * (b - a), (1.0 + FILM) * self.radius + 0.5 * length);
+            let middle = a + 0.5 * (b - a);
             near.clear();
-            self.each_near(&middle, radius + self.radius, |other| {
-                if other < settled && other != k && live[other] && self.segments[other].z <= z {
-                    near.push(self.segments[other].ends.map(|p| p - middle));
+            self.each_near(&middle, radius, |other| {
+                if other >= settled {
+                    return false;
+                }
+                let segment = &self.segments[other];
+                let ends = segment.ends.map(|p| p - middle);
+                if other != k as usize
+                    && segment.z <= z
+                    && square_distance(&Vector2::zeros(), &ends) <= within
+                {
+                    near.push(ends);
                 }
                 true
             });
-            live[k] = !self.samples.covered(radius, &mut near, |ends, p| square_distance(p, ends) <= within);
+            let covers = |ends: &[Vector2; 2], p: &Vector2| square_distance(p, ends) <= within;
+            if self.rim.covered([a, b].map(|p| p - middle), radius, &mut near, covers) {
+                for at in self.buckets_of([a, b]) {
+                    self.buckets[at].retain(|&other| other != k);
+                }
+            }
         }
-        for bucket in &mut self.buckets {
-            bucket.retain(|&k| live.get(k as usize).is_none_or(|live| *live));
+        for at in full {
+            self.left[at] = settled_in(&self.buckets[at]);
         }
-        self.thinned = (settled, live.iter().filter(|live| **live).count());
     }
 
     /// Tells the segments that may come so near to a place, bucket by bucket in the order of the path, until `tell` has enough of
@@ -337,9 +365,38 @@ impl<'a> Swept<'a> {
         self.standing(&Stretch { middle, gone, half: 0.0, ..*stretch }, near)
     }
 
-    /// What the angle is at least and at most on a stretch, as far as it exceeds `enough`.
-    fn bounded(&self, stretch: &Stretch, near: &[u32], enough: f64, halvings: u32) -> [f64; 2] {
-        let most = self.standing(stretch, near);
+    /// Looks at those stretches of a move that may meet stock, each from both ends.
+    fn looked_at(&self, stretches: &[Stretch], near: &[u32]) -> Vec<Looked> {
+        let Some(first) = stretches.first() else { return Vec::new() };
+        let together = ((0.5 * SHORT * self.radius / first.half) as usize).max(1);
+        let parts = stretches.chunks(together).flat_map(|part| {
+            let (most, near) = self.deciding(&Stretch::over(part), near);
+            part.iter().filter(move |_| most > 0.0).map(move |stretch| {
+                let (most, deciding) = self.deciding(stretch, &near);
+                let ends = [-stretch.half, stretch.half].map(|by| self.at(stretch, by, &deciding));
+                Looked { stretch: *stretch, found: ends[0].max(ends[1]), most, deciding }
+            })
+        });
+        parts.collect()
+    }
+
+    /// What the angle is at most anywhere on a stretch, and the segments that decide about every place of it.
+    fn deciding(&self, stretch: &Stretch, near: &[u32]) -> (f64, Vec<u32>) {
+        let mut taking = Vec::new();
+        let front = self.front(stretch, near, |k| taking.push(k));
+        // What those that took some cover from both ends they cover from everywhere between. Others can only matter where the
+        // rest stands.
+        let reach = (1.0 + FILM) * self.radius + stretch.half;
+        let mut took = taking.iter().copied().peekable();
+        let matters = |k: &u32| {
+            took.next_if_eq(k).is_some()
+                || front.may_clear(&self.segments[*k as usize].ends.map(|p| stretch.seen(&p)), reach)
+        };
+        (front.angle(), near.iter().copied().filter(matters).collect())
+    }
+
+    /// What the angle is at least and at most on a stretch, as far as it exceeds `enough`. It is known to be `most` at most.
+    fn bounded(&self, stretch: &Stretch, most: f64, near: &[u32], enough: f64, halvings: u32) -> [f64; 2] {
         if most <= enough + PRECISE {
             return [0.0, most.max(enough)];
         }
@@ -348,12 +405,20 @@ impl<'a> Swept<'a> {
         if halvings == 0 || most - here <= PRECISE {
             return [here, most];
         }
-        let [a, b] = stretch.halves().map(|half| self.bounded(&half, near, enough, halvings - 1));
+        let [a, b] = stretch
+            .halves()
+            .map(|half| self.bounded(&half, self.standing(&half, near), near, enough, halvings - 1));
         [here.max(a[0]).max(b[0]), a[1].max(b[1])]
     }
 
     /// The angle of the front half of the circumference in stock, at most anywhere on a stretch.
     fn standing(&self, stretch: &Stretch, near: &[u32]) -> f64 {
+        self.front(stretch, near, |_| ()).angle()
+    }
+
+    /// The front half of the circumference without what is cleared from everywhere on a stretch. Tells the segments that clear
+    /// some.
+    fn front(&self, stretch: &Stretch, near: &[u32], mut tell: impl FnMut(u32)) -> Front {
         let gone = stretch.gone - stretch.half;
         let before = gone - self.fresh;
         let (own, earlier) = ((1.0 - TOUCHING) * self.radius, (1.0 + FILM) * self.radius);
@@ -366,16 +431,20 @@ impl<'a> Swept<'a> {
             if segment.gone[0] > gone {
                 continue;
             }
+            let mut took = false;
             for (ways, radius) in [([f64::NEG_INFINITY, before], earlier), ([before, gone], own)] {
                 if let Some(ends) = segment.between(ways) {
-                    front.clear(&ends.map(|p| stretch.seen(&p)), radius, stretch.half);
+                    took |= front.clear(&ends.map(|p| stretch.seen(&p)), radius, stretch.half);
                 }
             }
+            if took {
+                tell(k);
+            }
             if front.standing.is_empty() {
-                return 0.0;
+                break;
             }
         }
-        front.standing.iter().map(|[from, to]| to - from).sum()
+        front
     }
 
     /// The segments up to move `k` that a place of it can meet, the last first: the ground next to a place was mostly cleared
@@ -419,27 +488,40 @@ struct Front {
     rim: f64,
     /// Arcs from the right to the left, rad.
     standing: Vec<[f64; 2]>,
-    /// Middles of parts of them, and how far a part reaches from there, mm.
-    parts: Vec<(Vector2, f64)>,
+    /// Middles of the parts of the half circle in which any of them lies, mm.
+    parts: Vec<Vector2>,
+    /// How far a part reaches from its middle, mm.
+    reach: f64,
 }
 
 impl Front {
     fn new(rim: f64) -> Self {
-        let mut front = Self { rim, standing: vec![[-FRAC_PI_2, FRAC_PI_2]], parts: Vec::new() };
-        front.divide();
-        front
+        let standing = vec![[-FRAC_PI_2, FRAC_PI_2]];
+        Self {
+            rim,
+            standing,
+            parts: part_middles().map(|middle| middle * rim).collect(),
+            reach: 0.5 * PART * rim,
+        }
     }
 
+    fn angle(&self) -> f64 {
+        self.standing.iter().map(|[from, to]| to - from).sum()
+    }
+
+    /// Forgets parts in which nothing stands any more.
     fn divide(&mut self) {
-        let mut parts = std::mem::take(&mut self.parts);
-        parts.clear();
-        for [from, to] in &self.standing {
-            let count = ((to - from) / PART).ceil().max(1.0);
-            let half = 0.5 * (to - from) / count;
-            let middles = (0..count as usize).map(|k| self.at(from + (2 * k + 1) as f64 * half));
-            parts.extend(middles.map(|middle| (middle, self.rim * half)));
+        self.parts.clear();
+        for (k, middle) in part_middles().enumerate() {
+            let [from, to] = [k, k + 1].map(|k| k as f64 * PART - FRAC_PI_2);
+            if self.stands_between(from - ROUNDING, to + ROUNDING) {
+                self.parts.push(middle * self.rim);
+            }
         }
-        self.parts = parts;
+    }
+
+    fn stands_between(&self, from: f64, to: f64) -> bool {
+        self.standing.iter().any(|[a, b]| to > *a && from < *b)
     }
 
     fn at(&self, angle: f64) -> Vector2 {
@@ -447,11 +529,12 @@ impl Front {
         Vector2::new(cos, sin) * self.rim
     }
 
-    /// Clears what is nearer than `radius` to a segment wherever the circle is between `half` behind and `half` ahead.
-    fn clear(&mut self, ends: &[Vector2; 2], radius: f64, half: f64) {
+    /// Clears what is nearer than `radius` to a segment wherever the circle is between `half` behind and `half` ahead; whether
+    /// any of it was standing.
+    fn clear(&mut self, ends: &[Vector2; 2], radius: f64, half: f64) -> bool {
         let behind = ends.map(|end| end + Vector2::new(half, 0.0));
         if behind[0].x.max(behind[1].x) + radius <= 0.0 || !self.may_clear(ends, radius) {
-            return;
+            return false;
         }
         let ahead = ends.map(|end| end - Vector2::new(half, 0.0));
         let mut angles = self.crossings(&behind, radius);
@@ -462,23 +545,26 @@ impl Front {
             |p: Vector2| [behind, ahead].iter().all(|ends| square_distance(&p, ends) < radius * radius);
         angles.sort_by(f64::total_cmp);
         let Some(&first) = angles.first() else {
-            if clears(self.at(0.0)) {
+            let all = clears(self.at(0.0));
+            if all {
                 self.standing.clear();
             }
-            return;
+            return all;
         };
         let mut taken = false;
         for k in 0..angles.len() {
             let (from, to) = (angles[k], angles.get(k + 1).copied().unwrap_or(first + TAU));
-            if clears(self.at(0.5 * (from + to))) {
-                for turn in [-TAU, 0.0, TAU] {
-                    taken |= self.take(from + turn, to + turn);
-                }
+            // Angles begin at -π: only what goes on from the last to the first reaches the front from behind.
+            let turns = if to > PI { &[-TAU, 0.0][..] } else { &[0.0] };
+            let stands = |turn: &f64| self.stands_between(from + turn, to + turn);
+            if turns.iter().any(stands) && clears(self.at(0.5 * (from + to))) {
+                turns.iter().for_each(|turn| taken |= self.take(from + turn, to + turn));
             }
         }
         if taken {
             self.divide();
         }
+        taken
     }
 
     /// Clears what lies in a region, and farther than `depth` from its sides: with that of half a stretch, wherever the circle is
@@ -525,35 +611,39 @@ impl Front {
 
     /// Whether a segment is near enough to clear any part.
     fn may_clear(&self, ends: &[Vector2; 2], radius: f64) -> bool {
-        self.parts.iter().any(|(middle, reach)| square_distance(middle, ends) < (radius + reach).powi(2))
+        let square = (radius + self.reach).powi(2);
+        self.parts.iter().any(|middle| square_distance(middle, ends) < square)
     }
 
     /// Where the circle crosses the border of the stadium around a segment, each from -π to π.
     fn crossings(&self, ends: &[Vector2; 2], radius: f64) -> Vec<f64> {
         let along = ends[1] - ends[0];
         let square = along.norm_squared();
-        let share = |angle: f64| (self.at(angle) - ends[0]).dot(&along);
+        let share = |p: &Vector2| (p - ends[0]).dot(&along);
         let mut found = Vec::with_capacity(4);
-        let mut around = |middle: f64, cos: f64, valid: &dyn Fn(f64) -> bool| {
-            if cos.abs() <= 1.0 {
-                let half = cos.acos();
-                found.extend(
-                    [middle - half, middle + half].into_iter().filter(|angle| valid(*angle)).map(turned),
-                );
+        // Both places of the circle whose share along a direction is `off`.
+        let mut across = |direction: &Vector2, off: f64, valid: &dyn Fn(f64) -> bool| {
+            let beside = self.rim * self.rim - off * off;
+            if beside >= 0.0 {
+                let (middle, aside) =
+                    (direction * off, Vector2::new(-direction.y, direction.x) * beside.sqrt());
+                let both = [middle - aside, middle + aside].into_iter();
+                found.extend(both.filter(|p| valid(share(p))).map(|p| p.y.atan2(p.x)));
             }
         };
         for (k, end) in ends.iter().enumerate() {
             let away = end.norm();
-            let cos = (self.rim * self.rim + away * away - radius * radius) / (2.0 * self.rim * away);
-            let valid = |angle: f64| if k == 0 { share(angle) <= 0.0 } else { share(angle) >= square };
-            around(end.y.atan2(end.x), cos, &valid);
+            let off = (self.rim * self.rim + away * away - radius * radius) / (2.0 * away);
+            let valid = |share: f64| if k == 0 { share <= 0.0 } else { share >= square };
+            if away > 0.0 {
+                across(&(end / away), off, &valid);
+            }
         }
-        if let Some(unit) = along.try_normalize(0.0) {
-            let across = Vector2::new(-unit.y, unit.x);
-            let middle = across.y.atan2(across.x);
+        if square > 0.0 {
+            let unit = along / square.sqrt();
+            let beside = Vector2::new(-unit.y, unit.x);
             for side in [-radius, radius] {
-                let valid = |angle: f64| share(angle) > 0.0 && share(angle) < square;
-                around(middle, (across.dot(&ends[0]) + side) / self.rim, &valid);
+                across(&beside, beside.dot(&ends[0]) + side, &|share| share > 0.0 && share < square);
             }
         }
         found
@@ -574,9 +664,15 @@ impl Front {
     }
 }
 
-/// An angle from -π to π.
-fn turned(angle: f64) -> f64 {
-    angle - TAU * (angle / TAU).round()
+/// Middles of the parts of a half circle of radius 1, from the right to the left.
+fn part_middles() -> impl Iterator<Item = Vector2> {
+    static MIDDLES: LazyLock<[Vector2; PARTS]> = LazyLock::new(|| {
+        std::array::from_fn(|k| {
+            let (sin, cos) = ((k as f64 + 0.5) * PART - FRAC_PI_2).sin_cos();
+            Vector2::new(cos, sin)
+        })
+    });
+    MIDDLES.iter().copied()
 }
 
 /// Square of the distance of a point from a segment.

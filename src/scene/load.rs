@@ -4,15 +4,19 @@ use geometry::TriangleMesh;
 use io::MeshFormat;
 use keys::SceneError;
 
-use crate::Scene;
 use crate::named_file::NamedFile;
 use crate::part::{LoadError, Loaded, Loading, read_mesh};
+use crate::{Scene, StockRequest};
 
 fn loading(scene: &Scene) -> Loading<'_> {
     Loading {
         source: &scene.source,
         cutter: &scene.cutter,
         chord_tolerance: scene.tolerance.chord,
+        margin: match scene.stock {
+            StockRequest::Around { margin, .. } => Some(margin),
+            _ => None,
+        },
         memory_mib: scene.simulation.memory_mib,
     }
 }

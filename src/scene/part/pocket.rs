@@ -269,7 +269,7 @@ impl PocketSource {
     /// # Errors
     /// [`SceneError::Invalid`] when the drawing is refused, at its name in the scene.
     fn pocket(&self, job: &Loading<'_>) -> Result<(Pocket, Vec<String>), SceneError> {
-        let (region, notes) = match &self.outline {
+        let (region, mut notes) = match &self.outline {
             OutlineSource::File { file, format, unit, layer } => {
                 let options = OutlineOptions {
                     chord_tolerance: FLATTEN_SHARE * job.chord_tolerance,
@@ -290,10 +290,16 @@ impl PocketSource {
         };
         let mut pocket = Pocket::new(region, self.depth);
         let radius = job.cutter.radius();
-        if !self.open.is_empty() {
-            let lines: Vec<Vec<Point2>> = self.open.iter().map(|line| line.points.clone()).collect();
+        let mut lines: Vec<Vec<Point2>> = self.open.iter().map(|line| line.points.clone()).collect();
+        let at_edge = at_stock_edge(&pocket.region, job);
+        if !at_edge.is_empty() {
+            let sides = if at_edge.len() == 1 { "side" } else { "sides" };
+            notes.push(format!("open at the edge of the stock: {} {sides} of the outline", at_edge.len()));
+        }
+        lines.extend(at_edge);
+        if !lines.is_empty() {
             pocket = pocket.opened(&lines, job.chord_tolerance, radius).map_err(|e| {
-                let span = self.open[e.line].span.clone();
+                let span = self.open.get(e.line).map_or(0..0, |line| line.span.clone());
                 let cure = "write places of the outline, corners or others, in its order";
                 job.source.error(span, format!("this line along open sides is none: {e}"), cure)
             })?;
@@ -341,6 +347,19 @@ impl PocketSource {
     }
 }
 
+/// Sides of outlines that lie on an edge of the stock's block: there is no wall.
+fn at_stock_edge(region: &Region, job: &Loading<'_>) -> Vec<Vec<Point2>> {
+    let near = job.chord_tolerance;
+    let Some([lo, hi]) = region.bounds().filter(|_| job.margin.is_some_and(|margin| margin <= near)) else {
+        return Vec::new();
+    };
+    let at = |p: &Point2| [p.x <= lo.x + near, p.y <= lo.y + near, p.x >= hi.x - near, p.y >= hi.y - near];
+    let outlines = region.pieces.iter().map(|piece| &piece.outer);
+    let all =
+        outlines.flat_map(|outer| (0..outer.len()).map(|k| vec![outer[k], outer[(k + 1) % outer.len()]]));
+    all.filter(|side| at(&side[0]).iter().zip(at(&side[1])).any(|(a, b)| *a && b)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use crate::{Scene, complete_toml};
@@ -379,6 +398,24 @@ mod tests {
         assert_eq!((complete_toml(&again), again.arcs), (text, Some(0.0005)));
         assert_eq!(again.toolpaths, scene.toolpaths);
         assert!(crate::load_part(&again).unwrap().pocket.unwrap().air().area() > 1000.0);
+    }
+
+    /// Where the stock ends at the outline, sides on its edges have no wall.
+    #[test]
+    fn sides_at_the_edge_of_the_stock_are_open() {
+        let walls = |stock: &str| {
+            let text = TRAY.replace("islands = [[[20, 10], [30, 10], [30, 20]]]\n", "");
+            let text = text.replace("[60, 40], [0, 40]]", "[60, 20], [30, 20], [30, 40], [0, 40]]");
+            let scene = Scene::parse("tray.toml", format!("{text}{stock}")).unwrap();
+            let loaded = crate::load_part(&scene).unwrap();
+            (loaded.pocket.unwrap().wall_length(), loaded.notes)
+        };
+        assert_eq!((walls("").0, walls("[stock]\nmargin = 0.5\n").0), (200.0, 200.0));
+        let (length, notes) = walls("[stock]\nmargin = 0\n");
+        assert_eq!(
+            (length, notes.join("")),
+            (50.0, "open at the edge of the stock: 4 sides of the outline".into())
+        );
     }
 
     #[test]

@@ -100,6 +100,13 @@ impl Cleared {
         self.discs.push(p);
     }
 
+    /// Takes back all but the first `count` places, which it leaves.
+    pub fn split_off(&mut self, count: usize) -> Vec<Point2> {
+        let later = self.discs[count.min(self.discs.len())..].to_vec();
+        self.truncate(count);
+        later
+    }
+
     /// Takes back all but the first `count` places.
     pub fn truncate(&mut self, count: usize) {
         let near = self.near.get_mut();

@@ -9,6 +9,7 @@
 //! the exact region (`walls`). The design's frame: z = 0 is the upper face, the floor lies at minus the depth; mm.
 
 mod air;
+mod beginnings;
 mod bounded;
 mod cleared;
 mod descend;
@@ -86,6 +87,7 @@ pub fn plan_pocket(
     if !cutter.is_end_mill() {
         return Err(refuse("its walls are vertical; use a flat, bull or ball cutter".into()));
     }
+    monitor.start("planning pocket", 0);
     let radius = cutter.radius();
     let chords = CHORDS_SHARE * settings.chord_tolerance;
     // Straight sides of an inset stand off farther than they are asked to.

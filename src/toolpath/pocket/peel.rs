@@ -11,6 +11,7 @@
 
 use std::cell::Cell;
 
+use super::beginnings::{Beginning, Beginnings};
 use super::bounded::STEP;
 use super::cleared::Cleared;
 use super::link::Links;
@@ -59,15 +60,6 @@ const SOON: f64 = 1.5;
 /// Places where passes may begin are this far apart over the radius.
 const APART: f64 = 0.35;
 
-/// A place of a pass where another one may begin.
-struct Beginning {
-    /// Its index in the way.
-    index: usize,
-    heading: Vector2,
-    /// Its pass.
-    pass: usize,
-}
-
 /// A step that is admissible.
 #[derive(Clone, Copy)]
 struct Step {
@@ -88,8 +80,7 @@ pub(super) struct Peeler<'a> {
     /// Whether turns into the stock leave room to turn along it again.
     careful: bool,
     out: Vec<Point2>,
-    places: Vec<Beginning>,
-    passes: usize,
+    places: Beginnings,
     thin_at: usize,
     /// A place, and how far around it there is no wall, mm.
     open: Cell<(Point2, f64)>,
@@ -112,8 +103,7 @@ impl<'a> Peeler<'a> {
             longest_free: (FREE[0] - FREE[1] * (1.0 - limit.cos())).max(LEAST_FREE) * radius,
             careful: false,
             out: Vec::new(),
-            places: Vec::new(),
-            passes: 0,
+            places: Beginnings::new(radius),
             thin_at: 0,
             open: Cell::new((Point2::origin(), 0.0)),
         };
@@ -130,18 +120,14 @@ impl<'a> Peeler<'a> {
     pub fn peel(&mut self, monitor: &dyn Monitor) -> Result<(), Cancelled> {
         while let Some(k) = self.next_place() {
             check(monitor)?;
-            let Beginning { index, heading, .. } = self.places[k];
-            let begin = self.out[index];
-            let links = Links { room: self.room, cleared: self.cleared, radius: self.radius };
-            let link = links.between(&self.out, index, heading);
             self.careful = false;
-            let mut done = self.pass(begin, heading, &link, monitor)?;
+            let mut done = self.pass(k, monitor)?;
             if !done {
                 self.careful = true;
-                done = self.pass(begin, heading, &link, monitor)?;
+                done = self.pass(k, monitor)?;
             }
             if !done {
-                self.places.remove(k);
+                self.places.forget(k);
             }
         }
         Ok(())
@@ -158,14 +144,14 @@ impl<'a> Peeler<'a> {
         for (k, heading) in headings.into_iter().enumerate() {
             let index = first + k;
             if gone >= APART * self.radius {
-                self.places.push(Beginning { index, heading, pass: self.passes });
+                self.places.push(index, self.out[index], heading);
                 gone = 0.0;
             }
             if let Some(next) = self.out.get(index + 1) {
                 gone += (next - self.out[index]).norm();
             }
         }
-        self.passes += 1;
+        self.places.pass_done(&self.out[first..]);
     }
 
     fn nearest_inside(&self, p: &Point2) -> Point2 {
@@ -179,8 +165,15 @@ impl<'a> Peeler<'a> {
     }
 
     /// Whether stock stands to the right of a place.
-    fn has_stock(&self, place: &Beginning) -> bool {
-        let (at, right) = (self.out[place.index], Vector2::new(place.heading.y, -place.heading.x));
+    fn has_stock(&mut self, k: usize) -> bool {
+        let mut places = std::mem::replace(&mut self.places, Beginnings::new(self.radius));
+        let has = places.has_stock(k, |place| self.stock_beside(place));
+        self.places = places;
+        has
+    }
+
+    fn stock_beside(&self, Beginning { at, heading, .. }: &Beginning) -> bool {
+        let right = Vector2::new(heading.y, -heading.x);
         let beside = self.nearest_inside(&(at + right * (PROBE * self.radius)));
         if (beside - at).norm() < 0.2 * PROBE * self.radius {
             return false;
@@ -194,38 +187,40 @@ impl<'a> Peeler<'a> {
     fn next_place(&mut self) -> Option<usize> {
         let end = *self.out.last()?;
         loop {
-            let away = |place: &Beginning| (self.out[place.index] - end).norm_squared();
-            let mut k = (0..self.places.len())
-                .min_by(|a, b| away(&self.places[*a]).total_cmp(&away(&self.places[*b])))?;
-            if self.has_stock(&self.places[k]) {
-                while k > 0
-                    && self.places[k - 1].pass == self.places[k].pass
-                    && self.has_stock(&self.places[k - 1])
+            let mut k = self.places.nearest(&end)?;
+            if self.has_stock(k) {
+                while let Some(before) = self.places.before(k)
+                    && self.has_stock(before)
                 {
-                    k -= 1;
+                    k = before;
                 }
                 return Some(k);
             }
-            let at = self.out[self.places[k].index];
-            let near = (0.5 * self.radius).powi(2);
-            let places = std::mem::take(&mut self.places);
-            self.places = places
-                .into_iter()
-                .filter(|p| (self.out[p.index] - at).norm_squared() > near || self.has_stock(p))
-                .collect();
+            for near in self.places.near(&self.places.get(k).at) {
+                if !self.has_stock(near) {
+                    self.places.forget(near);
+                }
+            }
         }
     }
 
-    /// One pass from `begin`; `false` if it cuts next to nothing, or ends soon without care, and then nothing changes.
-    fn pass(
-        &mut self,
-        begin: Point2,
-        heading: Vector2,
-        link: &[Point2],
-        monitor: &dyn Monitor,
-    ) -> Result<bool, Cancelled> {
+    /// The way over cleared ground to a place. What was cleared `since` so many places is not there yet.
+    fn link_to(&mut self, k: usize, since: usize) -> Vec<Point2> {
+        let later = self.cleared.split_off(since);
+        let place = self.places.get(k);
+        let links = Links { room: self.room, cleared: self.cleared, radius: self.radius };
+        let link = links.between(&self.out, place.index, place.heading);
+        later.into_iter().for_each(|p| self.cleared.add(p));
+        link
+    }
+
+    /// One pass from a place; `false` if it cuts next to nothing, or ends soon without care, and then nothing changes.
+    fn pass(&mut self, place: usize, monitor: &dyn Monitor) -> Result<bool, Cancelled> {
+        let Beginning { at: begin, heading, .. } = *self.places.get(place);
         let (full, shortest) = (STEP * self.radius, SHORTEST * self.radius);
         let before = self.cleared.len();
+        // Most passes that are tried end soon: the way to one is looked for when it is sure.
+        let mut link = None;
         let mut way = vec![Step { to: begin, heading, turn: 0.0, arc: 0.0 }];
         // The length of the way at each of its places.
         let mut lengths = vec![0.0];
@@ -236,7 +231,10 @@ impl<'a> Peeler<'a> {
             // Places of the way from here on are the last ones that were cleared.
             let settled = lengths.partition_point(|l| *l < gone - FRESH * self.radius);
             let mut fresh = self.cleared.len() - (way.len() - settled.max(1));
-            if gone >= SOON * self.radius && settled <= last_cut {
+            if gone >= SOON * self.radius && settled <= last_cut && self.cleared.len() >= self.thin_at {
+                if link.is_none() {
+                    link = Some(self.link_to(place, before));
+                }
                 fresh -= self.thin(fresh);
             }
             let Some(next) = self.next(&way[way.len() - 1], step, fresh) else {
@@ -270,7 +268,8 @@ impl<'a> Peeler<'a> {
         // What was gone without cutting is not gone in the end; it may have taken films away.
         self.cleared.truncate(self.cleared.len() - (way.len() - last_cut));
         way.truncate(last_cut);
-        self.out.extend_from_slice(link);
+        let link = link.unwrap_or_else(|| self.link_to(place, before));
+        self.out.extend_from_slice(&link);
         let first = self.out.len();
         self.out.extend(way.iter().map(|step| step.to));
         self.note_places(first, way.iter().map(|step| step.heading).collect());
@@ -325,11 +324,14 @@ impl<'a> Peeler<'a> {
         {
             return Some(first);
         }
-        let into = tried(most);
-        if into.arc <= limit && self.cleared.keeps(&from.to, &into.to, limit, fresh) {
-            return Some(into);
+        // Where that turn is too much, so is a greater one.
+        let mut far = Step { arc: f64::INFINITY, turn: most, ..first };
+        if first.arc <= limit {
+            far = tried(most);
+            if far.arc <= limit && self.cleared.keeps(&from.to, &far.to, limit, fresh) {
+                return Some(far);
+            }
         }
-        let mut far = into;
         let mut best: Option<Step> = None;
         for trial in 0..TRIALS {
             let found = if trial == 0 { first } else { tried(turn) };
