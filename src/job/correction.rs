@@ -248,6 +248,9 @@ impl Session {
 impl Corrected<'_> {
     /// Plans anew while ridges on coarse cells stand above the target, or all below it.
     fn by_ridges(&mut self, monitor: &dyn Monitor) -> Result<(), JobError> {
+        if self.is_too_hollow(monitor)? {
+            return Ok(());
+        }
         let mut in_vain = 0;
         while self.rounds.len() < MOST_ROUNDS
             && let Some(next) = self.next(in_vain, SLACK)
@@ -294,6 +297,22 @@ impl Corrected<'_> {
                 self.measure_best(monitor)
             }
         }
+    }
+
+    /// Whether every path of an upright cutter leaves more than the target at the highest place: nearer passes would make the
+    /// path longer without end.
+    fn is_too_hollow(&self, monitor: &dyn Monitor) -> Result<bool, JobError> {
+        let standing = &self.tried.standing;
+        let highest = standing.above.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+        let limit = self.goal.rule.highest * self.goal.target;
+        let Some((at, _)) = highest.filter(|(_, height)| *height > (1.0 + NEAR) * limit) else {
+            return Ok(false);
+        };
+        if self.request.axis.is_some() {
+            return Ok(false);
+        }
+        let cutter = &self.session.scene.cutter;
+        Ok(LeastLeftFigures::at(self.session, cutter, at, limit, monitor)?.is_some())
     }
 
     /// Whether the best plan leaves what every path of the cutter leaves.

@@ -43,7 +43,11 @@ fn planned(
     plan(part, &cutter, &strategy, &settings(part, Step::Stepover(0.6)), &Silent).map(|plan| plan.path)
 }
 
-fn fields(part: &Part, direction: FeedDirection, (method, solver): (StreamMethod, Solver)) -> PlannedField {
+fn fields(
+    part: &Part,
+    direction: FeedDirection,
+    (method, solver): (StreamMethod, Solver),
+) -> Arc<PlannedField> {
     let strategy =
         Streamline { direction, control_points: 24, method, solver, direction_weight: DIRECTION_WEIGHT };
     let cutter = Cutter::ball(6.0).unwrap();
