@@ -57,7 +57,7 @@ mod tests {
         let (radius, chord) = (50.0f64, 1.0);
         let pass = |up: f64| -> Vec<Point3> {
             let at = |k: i32| (f64::from(k) * chord / radius).sin_cos();
-            (-10..=10).map(|k| at(k)).map(|(s, c)| Point3::new(radius * s, 0.0, -up * radius * c)).collect()
+            (-10..=10).map(at).map(|(s, c)| Point3::new(radius * s, 0.0, -up * radius * c)).collect()
         };
         let place = |x: f64, y: f64| {
             let at = Point3::new(x, y, 0.0);

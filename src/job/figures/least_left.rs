@@ -119,7 +119,38 @@ mod tests {
         assert!(height > 0.03 && height - bound <= stands, "{height} {bound} {stands}");
         assert!(bull.notes.iter().any(|note| note.contains("wherever it stands")), "{:?}", bull.notes);
         let rounds = value(&bull, "correction").unwrap()["rounds"].as_array().unwrap().len();
-        assert_eq!(rounds, 1);
+        assert!(rounds <= 2, "{rounds} rounds");
         assert!(value(&result("shape = \"ball\""), "least_left").is_none());
+    }
+
+    /// Two planes that meet in a hollow crease under a ball: what stands over it is `r (1/cos β − 1)` along the middle.
+    #[test]
+    fn passes_are_not_narrowed_for_a_crease_that_no_ball_reaches() {
+        let (slope, wide) = (10f64.to_radians().tan(), 6.0);
+        let corner = |x: f64, y: f64| format!("vertex {x} {y} {}\n", slope * x.abs());
+        let facet = |[a, b, c]: [(f64, f64); 3]| {
+            let corners: String = [a, b, c].map(|(x, y)| corner(x, y)).concat();
+            format!("facet normal 0 0 0\nouter loop\n{corners}endloop\nendfacet\n")
+        };
+        let side = |x: f64| [[(0.0, 0.0), (x, 0.0), (x, wide)], [(0.0, 0.0), (x, wide), (0.0, wide)]];
+        let facets: String = [wide, -wide].into_iter().flat_map(side).map(facet).collect();
+        let file = std::env::temp_dir().join(format!("crease_{}.stl", std::process::id()));
+        std::fs::write(&file, format!("solid crease\n{facets}endsolid crease\n")).unwrap();
+        let text = format!(
+            "[part]\nfile = {:?}\n[cutter]\nshape = \"ball\"\ndiameter = 6\n[tolerance]\nscallop = 0.02\nuncut = 0.1\n\
+             [[toolpath]]\nstrategy = \"zigzag\"\nangle = 90\n",
+            file.to_str().unwrap()
+        );
+        let session = Session::new(Scene::parse("crease.toml", text).unwrap()).unwrap();
+        let result = session.toolpath(&session.scene.toolpaths[0], &Silent).unwrap().result;
+        std::fs::remove_file(file).unwrap();
+        let value = |key: &str| {
+            let found = result.figures.iter().find(|figure| figure.key == key);
+            found.map(|figure| figure.value.clone()).unwrap_or_else(|| panic!("{key}: {:?}", result.notes))
+        };
+        let stands = 3.0 * (1.0 / 10f64.to_radians().cos() - 1.0);
+        let height = value("least_left")["height_mm"].as_f64().unwrap();
+        assert!(height > 0.02 && height <= stands + 1e-6, "{height} {stands}");
+        assert_eq!(value("correction")["rounds"].as_array().unwrap().len(), 1);
     }
 }
