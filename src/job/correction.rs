@@ -64,6 +64,9 @@ const NEVER_CUT: f64 = 16.0;
 /// Plans in vain whose high places are narrowed in the next one.
 const MOST_FOLLOWED: usize = 1;
 
+/// A plan that was widened in vain is corrected where it stands above the target by no more than this share.
+const WORTH_FOLLOWING: f64 = 0.2;
+
 /// Plans in vain after which no other is made. Behind those that are followed, all is narrowed in proportion.
 const MOST_IN_VAIN: usize = MOST_FOLLOWED + 3;
 
@@ -351,7 +354,9 @@ impl Corrected<'_> {
             (true, 0) => (round.highest() < (1.0 - slack) * target && self.may_lie_wider())
                 .then(|| self.scaled(&self.tried.widths, round.highest())),
             (true, 1) => {
-                self.latest.as_ref().filter(|latest| self.is_near(latest)).and_then(|l| self.corrected(l))
+                let worth =
+                    |latest: &&Tried| latest.standing.round.highest() <= (1.0 + WORTH_FOLLOWING) * target;
+                self.latest.as_ref().filter(worth).and_then(|latest| self.corrected(latest))
             }
             (false, 0) => self.corrected(&self.tried).or_else(in_proportion),
             (false, ..=MOST_FOLLOWED) => self.corrected(last).or_else(in_proportion),
@@ -370,11 +375,11 @@ impl Corrected<'_> {
     }
 
     /// Widths that bring a height to the one that is aimed at, all by the same factor: where the last ones left the plan as it
-    /// was, by so much that a pass is added.
+    /// was, by half of what surely adds a pass.
     fn scaled(&self, widths: &Widths, height: f64) -> Widths {
         let factor = (aim(self.goal.target) / height).sqrt();
         let passes = path_figures(&self.best.plan.path, 0.0).passes as f64;
-        let one_more = if self.is_as_before() { (passes - 1.0) / passes } else { 1.0 };
+        let one_more = if self.is_as_before() { ((passes - 1.0) / passes).sqrt() } else { 1.0 };
         widths.scaled(if factor < 1.0 { factor.min(one_more).max(MOST_NARROWED) } else { factor })
     }
 
