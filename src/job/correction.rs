@@ -5,11 +5,13 @@
 //! round found.
 //!
 //! The functions whose levels are passes are kept from round to round: only levels are placed anew, narrower around the
-//! places that stood too high. Places that stand above it by no more than chords may have raised them get shorter chords
-//! first, which costs points and no length, and leaves all levels where they are. Few others get short passes of their own,
-//! which leave all others where they are. Where an engine tells ridges apart, the first rounds measure no more than those,
-//! on cells as coarse as show every pass. Then all is measured as the verdict is; what still stands above the target then is
-//! corrected as well. Where narrowing does not help, the widths of the whole plan are scaled, which leaves its passes in shape.
+//! places that stood too high. Places that chords may have raised get shorter chords first, which costs points and no length,
+//! and leaves all levels where they are. Few others get short passes of their own, which leave all others where they are.
+//! Where many stand little above the target, the widths of the whole plan are scaled, which leaves its passes in shape; so
+//! they are where narrowing does not help. Nothing is narrowed for a place where every path of the cutter leaves too much.
+//!
+//! Where an engine tells ridges apart, the first rounds measure no more than those, on cells as coarse as show every pass. Then
+//! all is measured as the verdict is; what still stands above the target then is corrected as well.
 
 mod chords;
 mod round;
@@ -305,15 +307,12 @@ impl Corrected<'_> {
     /// Whether every path of an upright cutter leaves more than the target at the highest place: nearer passes would make the
     /// path longer without end.
     fn is_too_hollow(&self, monitor: &dyn Monitor) -> Result<bool, JobError> {
-        let standing = &self.tried.standing;
-        let highest = standing.above.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+        let highest = self.tried.standing.above.iter().max_by(|a, b| a.1.total_cmp(&b.1));
         let limit = self.goal.rule.highest * self.goal.target;
-        let Some((at, _)) = highest.filter(|(_, height)| *height > (1.0 + NEAR) * limit) else {
+        let is_upright = self.request.axis.is_none();
+        let Some((at, _)) = highest.filter(|(_, height)| is_upright && *height > (1.0 + NEAR) * limit) else {
             return Ok(false);
         };
-        if self.request.axis.is_some() {
-            return Ok(false);
-        }
         let cutter = &self.session.scene.cutter;
         Ok(LeastLeftFigures::at(self.session, cutter, at, limit, monitor)?.is_some())
     }
@@ -337,7 +336,7 @@ impl Corrected<'_> {
     /// The widths to try next. A plan that stands too high gets shorter chords where that may be enough, and narrower widths
     /// elsewhere; one that is too low gets wider ones. Levels are placed anew in each plan, so that other places may stand
     /// too high then: these are narrowed as well, from the last plan on. Last of all everything is narrowed in proportion, to
-    /// which remnants along borders do not give way. `None` where the best plan holds the target and comes within `slack` of
+    /// which remnants along borders give way only by another pass. `None` where the best plan holds the target and comes within `slack` of
     /// it, where it leaves what was never cut, or where what there is was tried `in_vain`.
     fn next(&self, in_vain: usize, slack: f64) -> Option<Widths> {
         let (target, round) = (self.goal.target, &self.tried.standing.round);
@@ -389,9 +388,10 @@ impl Corrected<'_> {
         last_two.is_some_and(|[a, b]| a.cutting_length_mm == b.cutting_length_mm && a.factors != b.factors)
     }
 
-    /// The widths of a plan corrected by the places where it leaves too much. Those that chords may have raised get shorter
-    /// chords. Of the others few get passes of their own, once; many, or where that was no help, narrower widths. `None` without
-    /// such places.
+    /// The widths of a plan corrected by the places where it leaves too much. Few that were measured as the verdict is get
+    /// passes of their own, once: shorter chords take another plan, and change ridges elsewhere. Before that, those that chords
+    /// may have raised get shorter chords, and few others passes of their own. Many get narrower widths, all of the plan
+    /// where they stand little above the target. `None` without such places.
     fn corrected(&self, tried: &Tried) -> Option<Widths> {
         let Tried { widths, .. } = tried;
         let high = self.standing_high(&tried.standing);

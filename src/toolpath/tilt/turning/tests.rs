@@ -147,7 +147,7 @@ fn plans_turn_no_faster_than_asked() {
             for (r, rule) in rules.iter().enumerate() {
                 let [along, across] = limits[(p + c + r) % 3].map(|rate| rate.map(f64::to_radians));
                 let settings = PlanSettings {
-                    step: Step::Stepover(3.5),
+                    step: Step::Stepover(2.5),
                     chord_tolerance: 0.01,
                     clearance: 2.0,
                     stock_top: 8.0,
@@ -156,8 +156,9 @@ fn plans_turn_no_faster_than_asked() {
                     joining: joining[(p + r) % 2],
                     ..PlanSettings::default()
                 };
-                // A contact beyond the border is measured where the cutter touches the part: as a job does, such a path is
-                // planned for lower rates.
+                // In a hollow the flat of a bull nose may touch beside the contact that was planned: as a job does, such a path
+                // is planned for lower rates. All others hold at once.
+                let at_once = cutter.is_ball() || p == 1;
                 let mut share = 0.99;
                 let (path, what) = loop {
                     let lower = |rate: Option<f64>| rate.map(|rate| share * rate);
@@ -181,7 +182,7 @@ fn plans_turn_no_faster_than_asked() {
                     if over <= 1.0 {
                         break (path, what);
                     }
-                    assert!(share > 0.2, "{what}");
+                    assert!(!at_once && share > 0.2, "{what}");
                     share *= 0.97 / over;
                 };
                 assert!(keep.on_path(&path, |to| to.kind == motion::MoveKind::Cut).is_empty(), "{what}");
