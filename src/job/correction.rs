@@ -72,6 +72,9 @@ const WORTH_FOLLOWING: f64 = 0.2;
 /// Plans in vain after which no other is made. Behind those that are followed, all is narrowed in proportion.
 const MOST_IN_VAIN: usize = MOST_FOLLOWED + 3;
 
+/// A plan is as it was where its length changed by no more than this share of what its widths did.
+const AS_BEFORE: f64 = 0.01;
+
 /// A place takes at most so many intervals of a pass of its own.
 const TOUCH_UP_LENGTH: f64 = 3.0;
 
@@ -309,17 +312,17 @@ impl Corrected<'_> {
     fn is_too_hollow(&self, monitor: &dyn Monitor) -> Result<bool, JobError> {
         let highest = self.tried.standing.above.iter().max_by(|a, b| a.1.total_cmp(&b.1));
         let limit = self.goal.rule.highest * self.goal.target;
-        let is_upright = self.request.axis.is_none();
-        let Some((at, _)) = highest.filter(|(_, height)| is_upright && *height > (1.0 + NEAR) * limit) else {
+        let is_alone = self.request.axis.is_none() && !self.request.stock_is_previous;
+        let Some((at, _)) = highest.filter(|(_, height)| is_alone && *height > (1.0 + NEAR) * limit) else {
             return Ok(false);
         };
         let cutter = &self.session.scene.cutter;
-        Ok(LeastLeftFigures::at(self.session, cutter, at, limit, monitor)?.is_some())
+        Ok(LeastLeftFigures::at_or_elsewhere(self.session, cutter, at, limit, monitor)?.is_some())
     }
 
     /// Whether the best plan leaves what every path of the cutter leaves.
     fn is_unavoidable(&self, measured: &Measurement, monitor: &dyn Monitor) -> Result<bool, JobError> {
-        if self.tried.standing.round.holds(&self.goal) {
+        if self.tried.standing.round.holds(&self.goal) || self.request.stock_is_previous {
             return Ok(false);
         }
         let (session, path) = (self.session, &self.best.plan.path);
@@ -382,10 +385,14 @@ impl Corrected<'_> {
         widths.scaled(if factor < 1.0 { factor.min(one_more).max(MOST_NARROWED) } else { factor })
     }
 
-    /// Whether other widths changed nothing: few passes are spread over a part.
+    /// Whether other widths changed no more than the ends of passes: few are spread over a part.
     fn is_as_before(&self) -> bool {
-        let last_two = self.rounds.last_chunk::<2>();
-        last_two.is_some_and(|[a, b]| a.cutting_length_mm == b.cutting_length_mm && a.factors != b.factors)
+        self.rounds.last_chunk::<2>().is_some_and(|[a, b]| {
+            let widths =
+                (b.factors[0] / a.factors[0] - 1.0).abs().max((b.factors[1] / a.factors[1] - 1.0).abs());
+            let length = (b.cutting_length_mm / a.cutting_length_mm - 1.0).abs();
+            widths > 0.0 && length <= AS_BEFORE * widths
+        })
     }
 
     /// The widths of a plan corrected by the places where it leaves too much. Few that were measured as the verdict is get

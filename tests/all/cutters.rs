@@ -1,16 +1,19 @@
 //! One cutter under the words of several families: what it plans, cuts and measures is a matter of its profile.
 
 use millstream::cutter::{AptWords, Cutter};
+use millstream::drop_cutter::DropCutter;
 use millstream::geometry::{Aabb, AnalyticShape, AnalyticSurface, Point3};
 use millstream::metrology::{Asked, Limits, measure};
 use millstream::monitor::Silent;
-use millstream::motion::{ToolAxis, Toolpath};
+use millstream::motion::{MoveKind, ToolAxis, Toolpath};
 use millstream::part::{Part, Patch};
 use millstream::sim::{Grid, ZMap, cut};
 use millstream::toolpath::{
-    Joining, OffsetAlong, OffsetDrive, OffsetSurface, PlanSettings, Step, Strategy, Tilting, Zigzag, plan,
-    plan_tilted,
+    FrontStart, IsoScallop, Joining, LevelSteps, OffsetAlong, OffsetDrive, OffsetSurface, PlanSettings, Step,
+    Strategy, Tilting, Waterline, Zigzag, plan, plan_tilted,
 };
+
+use crate::support::height_mesh;
 
 /// A ball of 6 mm as `ball`, as `bull` with its radius at the corner, and by the seven words.
 fn balls() -> [Cutter; 3] {
@@ -88,4 +91,32 @@ fn a_ball_by_any_name_plans_cuts_and_measures_the_same() {
     };
     let [ball, bull, apt] = balls().map(|cutter| of(&cutter));
     assert!(bull == ball && apt == ball);
+}
+
+/// Where the surface turns from rising to falling, a flat swings to its other side. No place of any move lies below the cutter
+/// that is dropped there.
+#[test]
+fn a_flat_that_swings_to_its_other_side_is_carried_over_the_part() {
+    let hill = |x: f64, y: f64, wide: f64| (-(x * x + y * y) / (2.0 * wide * wide)).exp();
+    let relief = |x: f64, y: f64| {
+        let (x, y) = (x - 4.0, y - 3.0);
+        0.5 * hill(x + 2.0, y + 1.0, 1.6) - 0.45 * hill(x - 2.0, y - 1.0, 1.8) + 0.03 * x * y
+    };
+    let part = Part::from_mesh(height_mesh(80, [8.0, 6.0], relief));
+    let cutter = Cutter::bull(6.0, 1.0).unwrap();
+    let settings = PlanSettings { step: Step::Scallop(0.02), ..settings(&part) };
+    let drop = DropCutter::new(&part, &cutter);
+    let front = IsoScallop { start: FrontStart::BestBorder };
+    let level = Waterline { steps: LevelSteps::Shortest };
+    for strategy in [&level as &dyn Strategy, &front] {
+        let path = plan(&part, &cutter, strategy, &settings, &Silent).unwrap().path;
+        let cutting = path.segments().filter(|(.., step)| step.kind == MoveKind::Cut);
+        let deepest = cutting.flat_map(|(from, to, _)| {
+            let count = ((to - from).norm() / 0.02).ceil().max(1.0) as usize;
+            (0..=count).map(move |k| from + (to - from) * (k as f64 / count as f64))
+        });
+        let below = |tip: Point3| drop.at(tip.x, tip.y).map_or(f64::NEG_INFINITY, |drop| drop.tip_z - tip.z);
+        let deepest = deepest.map(below).fold(f64::NEG_INFINITY, f64::max);
+        assert!(deepest <= 2.0 * settings.chord_tolerance, "{strategy:?} {deepest}");
+    }
 }

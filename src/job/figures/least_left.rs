@@ -7,8 +7,9 @@ use drop_cutter::DropCutter;
 use geometry::Point3;
 use metrology::{Limits, Measurement};
 use motion::Toolpath;
+use part::SurfacePoint;
 use report::{Figure, micrometres, place, with_bound};
-use work::monitor::Monitor;
+use work::monitor::{self, Cancelled, Monitor};
 
 use super::words::value;
 use crate::judge::highest_reached;
@@ -24,6 +25,9 @@ pub(crate) struct LeastLeftFigures {
     at_mm: [f64; 3],
     limit_mm: f64,
 }
+
+/// Places of the part's plan along x and along y that are looked at beside the highest one.
+const PLACES: usize = 12;
 
 /// Of the normal's z. Where the part is steeper, heights along z say little.
 const LEAST_LEVEL: f64 = 0.2;
@@ -45,29 +49,50 @@ impl LeastLeftFigures {
             .find(|(material, limit)| material.max_mm - material.error_bound_mm > *limit)
             .and_then(|(material, limit)| Some((material.at_mm?, limit)));
         let Some((at, limit)) = violated.filter(|_| path.is_upright()) else { return Ok(None) };
-        Self::at(session, cutter, &at.into(), limit, monitor)
+        Self::at_or_elsewhere(session, cutter, &at.into(), limit, monitor)
     }
 
-    /// Of a place, mm; `None` where it may hold a limit, mm.
-    pub fn at(
+    /// Of a place, mm, or else of the one where a few positions leave most, if that is more than any limit allows: beside a
+    /// border the cutter may come lower than elsewhere in a hollow. `None` where a path may hold the place's limit, mm, as far
+    /// as these two tell.
+    pub fn at_or_elsewhere(
         session: &Session,
         cutter: &Cutter,
         place: &Point3,
         limit: f64,
         monitor: &dyn Monitor,
     ) -> Result<Option<Self>, JobError> {
-        let (design, _) = session.part.closest_point(place);
-        if design.normal.z < LEAST_LEVEL {
-            return Ok(None);
-        }
+        let scene = &session.scene;
         let drop = DropCutter::watched(&session.part, cutter, monitor)?;
-        let left = drop.least_left(cutter, &design.point, limit / design.normal.z, monitor)?;
-        Ok(left.map(|left| Self {
-            height_mm: left.height,
-            error_bound_mm: left.bound,
-            at_mm: design.point.into(),
-            limit_mm: limit,
-        }))
+        let least = |design: SurfacePoint, limit: f64| -> Result<Option<Self>, JobError> {
+            if design.normal.z < LEAST_LEVEL {
+                return Ok(None);
+            }
+            let stock = session.stock.height_at(design.point.x, design.point.y) - design.point.z;
+            let left = drop.least_left(cutter, &design.point, limit / design.normal.z, monitor)?;
+            Ok(left.filter(|left| left.height <= stock).map(|left| Self {
+                height_mm: left.height,
+                error_bound_mm: left.bound,
+                at_mm: design.point.into(),
+                limit_mm: limit,
+            }))
+        };
+        if let Some(found) = least(session.part.closest_point(place).0, limit)? {
+            return Ok(Some(found));
+        }
+        let any_limit = (scene.scallop_rule.highest * scene.tolerance.scallop).max(scene.tolerance.uncut);
+        let (bounds, size) = (session.part.bounds(), session.part.bounds().size());
+        let at = |low: f64, size: f64, k: usize| low + size * (k as f64 + 0.5) / PLACES as f64;
+        let found = work::parallel::try_map(PLACES * PLACES, |k| {
+            monitor::check(monitor)?;
+            let (x, y) = (at(bounds.min.x, size.x, k % PLACES), at(bounds.min.y, size.y, k / PLACES));
+            let design = session.part.highest_at(x, y).filter(|design| design.normal.z >= LEAST_LEVEL);
+            Ok::<_, Cancelled>(
+                design.map(|design| (drop.left_by_some(cutter, &design.point) * design.normal.z, design)),
+            )
+        })?;
+        let most = found.into_iter().flatten().max_by(|a, b| a.0.total_cmp(&b.0));
+        most.filter(|(left, _)| *left > any_limit).map_or(Ok(None), |(_, design)| least(design, any_limit))
     }
 }
 

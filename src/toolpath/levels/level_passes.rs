@@ -282,7 +282,8 @@ impl LevelSource for ChartGuide<'_> {
         for stretch in stretches {
             let mut beside = Beside::default();
             let mut tip = |s| self.tip(at(s), &mut beside);
-            let moves = settings.moves(stretch.from, stretch.to, &mut tip, self.monitor)?;
+            let ends = [stretch.from, stretch.to];
+            let moves = settings.moves_by_contacts(ends, &mut tip, &self.drop, self.monitor)?;
             put_on(&mut pieces, moves, &|a, b| (a - b).norm() <= settings.chord_tolerance);
         }
         pieces.retain(|piece| piece.len() > 1);

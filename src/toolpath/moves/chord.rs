@@ -82,6 +82,22 @@ pub fn sample_within_chord<P: Waypoint>(
     locate: &mut dyn FnMut(f64) -> Option<P>,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<P>, Cancelled> {
+    sample_over_jumps(s0, s1, step, tolerance, locate, &mut |_, _, _| Ok(Vec::new()), watch)
+}
+
+/// As [`sample_within_chord`] of a curve that may jump: `across` gives the places between both ends of a jump.
+///
+/// # Errors
+/// [`Cancelled`] when the watch or `across` says so.
+pub fn sample_over_jumps<P: Waypoint>(
+    s0: f64,
+    s1: f64,
+    step: f64,
+    tolerance: f64,
+    locate: &mut dyn FnMut(f64) -> Option<P>,
+    across: &mut Across<'_, P>,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<P>, Cancelled> {
     let count = ((s1 - s0) / step).ceil().max(1.0) as usize;
     let at = |k: usize| s0 + (s1 - s0) * k as f64 / count as f64;
     let mut start = 0;
@@ -95,40 +111,51 @@ pub fn sample_within_chord<P: Waypoint>(
             None => start += 1,
         }
     };
-    let mut points = vec![first];
+    let mut halving = Halving { tolerance, locate, across, watch, points: vec![first] };
     let mut a = (at(start), first);
     for k in start + 1..=count {
         let s = at(k);
-        let Some(p) = locate(s) else { break };
-        halve(a, (s, p), tolerance, MAX_HALVINGS, locate, watch, &mut points)?;
+        let Some(p) = (halving.locate)(s) else { break };
+        halving.halve(a, (s, p), MAX_HALVINGS)?;
         a = (s, p);
     }
-    Ok(points)
+    Ok(halving.points)
 }
 
-/// Appends the samples after `a` up to and with `b`.
-fn halve<P: Waypoint>(
-    a: (f64, P),
-    b: (f64, P),
+/// The places between both ends of a jump, without the ends.
+pub type Across<'a, P> = dyn FnMut(&P, &P, &mut Watch<'_>) -> Result<Vec<P>, Cancelled> + 'a;
+
+/// Samples of a curve so far.
+struct Halving<'a, 'b, 'c, P> {
     tolerance: f64,
-    halvings: u32,
-    locate: &mut dyn FnMut(f64) -> Option<P>,
-    watch: &mut Watch<'_>,
-    out: &mut Vec<P>,
-) -> Result<(), Cancelled> {
-    watch.step()?;
-    let s = |t: f64| a.0 + (b.0 - a.0) * t;
-    let off = |p: &Option<P>| p.is_some_and(|p| p.stray(&a.1, &b.1) > tolerance);
-    let middle = locate(s(0.5));
-    let split = halvings > 0 && (off(&middle) || off(&locate(s(0.25))) || off(&locate(s(0.75))));
-    if let (true, Some(middle)) = (split, middle) {
-        let middle = (s(0.5), middle);
-        halve(a, middle, tolerance, halvings - 1, locate, watch, out)?;
-        halve(middle, b, tolerance, halvings - 1, locate, watch, out)?;
-    } else if !b.1.is_at(&a.1) {
-        out.push(b.1);
+    locate: &'a mut dyn FnMut(f64) -> Option<P>,
+    across: &'a mut Across<'b, P>,
+    watch: &'a mut Watch<'c>,
+    points: Vec<P>,
+}
+
+impl<P: Waypoint> Halving<'_, '_, '_, P> {
+    /// Appends the samples after `a` up to and with `b`.
+    fn halve(&mut self, a: (f64, P), b: (f64, P), halvings: u32) -> Result<(), Cancelled> {
+        self.watch.step()?;
+        let s = |t: f64| a.0 + (b.0 - a.0) * t;
+        if halvings > 0 {
+            let middle = (self.locate)(s(0.5));
+            let off = |p: Option<P>| p.is_some_and(|p| p.stray(&a.1, &b.1) > self.tolerance);
+            let split = off(middle) || off((self.locate)(s(0.25))) || off((self.locate)(s(0.75)));
+            if let (true, Some(middle)) = (split, middle) {
+                let middle = (s(0.5), middle);
+                self.halve(a, middle, halvings - 1)?;
+                return self.halve(middle, b, halvings - 1);
+            }
+        } else if b.1.stray(&a.1, &a.1) > self.tolerance {
+            self.points.extend((self.across)(&a.1, &b.1, self.watch)?);
+        }
+        if !b.1.is_at(&a.1) {
+            self.points.push(b.1);
+        }
+        Ok(())
     }
-    Ok(())
 }
 
 /// No straight move skips more points than this: it bounds the cost on long straight passes, and a
@@ -299,6 +326,26 @@ mod tests {
         }
         let line: Vec<Point3> = (0..50).map(|k| Point3::new(k as f64, 0.0, 1.0)).collect();
         assert_eq!(reduce(&line, 1e-9, &mut Watch::new(&Silent)).unwrap().len(), 2);
+    }
+
+    #[test]
+    fn a_jump_is_crossed_as_asked_and_a_kink_is_none() {
+        let jump = &mut |s: f64| Some(Point3::new(s, if s < 0.3 { 0.0 } else { 2.0 }, 0.0));
+        let mut crossed = 0;
+        let across = &mut |a: &Point3, b: &Point3, _: &mut Watch<'_>| {
+            crossed += 1;
+            Ok(vec![Point3::new(a.x, 1.0, 5.0), Point3::new(b.x, 1.5, 5.0)])
+        };
+        let watch = &mut Watch::new(&Silent);
+        let points = sample_over_jumps(0.0, 1.0, 0.25, 1e-3, jump, across, watch).unwrap();
+        let over: Vec<usize> = (0..points.len()).filter(|&k| points[k].z == 5.0).collect();
+        let &[first, second] = &over[..] else { panic!("{points:?}") };
+        assert!(second == first + 1 && points[first - 1].y == 0.0 && points[second + 1].y == 2.0);
+        assert!((points[first].x - 0.3).abs() < 1e-3);
+        let kink = &mut |s: f64| Some(Point3::new(s, (s - 0.3).abs(), 0.0));
+        let across = &mut |_: &Point3, _: &Point3, _: &mut Watch<'_>| panic!("no jump");
+        sample_over_jumps(0.0, 1.0, 0.25, 1e-3, kink, across, watch).unwrap();
+        assert_eq!(crossed, 1);
     }
 
     #[test]

@@ -73,7 +73,7 @@ fn on_chart(task: &Task<'_>, chart: &Chart) -> Result<Passes, PlanError> {
         }
         let last = (points.len() - 1) as f64;
         let steps = PassSettings { sampling: 1.0, ..*settings };
-        steps.moves(0.0, last, &mut |s| tip(between(points, s)), monitor)
+        steps.moves_by_contacts([0.0, last], &mut |s| tip(between(points, s)), &drop, monitor)
     };
     let turns = spiral.levels.curves.len();
     monitor.start("planning spiral", turns as u64);

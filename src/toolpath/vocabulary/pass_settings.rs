@@ -1,9 +1,10 @@
 //! What every pass needs to know besides part and cutter.
 
 use super::{Correction, Earlier, Step};
-use crate::moves::chord::{Watch, reduce_unevenly, sample_within_chord};
+use crate::moves::chord::{Watch, reduce_unevenly, sample_over_jumps, sample_within_chord};
 use crate::moves::smooth::smooth_and_spread;
 use cutter::Cutter;
+use drop_cutter::DropCutter;
 use geometry::Point3;
 use motion::ToolAxis;
 use work::monitor::{Cancelled, Monitor};
@@ -11,6 +12,9 @@ use work::monitor::{Cancelled, Monitor};
 /// First sampling distance along a pass as a share of the cutter's radius: features narrower than
 /// that could hide between two samples of a pass.
 pub(crate) const SAMPLING_OVER_RADIUS: f64 = 0.15;
+
+/// First samples over a jump, as a share of it: none is longer than the cutter is wide.
+const STEP_OF_JUMP: f64 = 0.5 * SAMPLING_OVER_RADIUS;
 
 /// Shares of the chord tolerance that sampling and point reduction may use. Together they leave a part of it: ridges stand
 /// between chords of two passes, and passes lie the closer the more chords may raise them.
@@ -89,10 +93,43 @@ impl<'a> PassSettings<'a> {
         let fine = SAMPLING_SHARE * self.chord_tolerance;
         let mut watch = Watch::new(monitor);
         let points = sample_within_chord(s0, s1, self.sampling, fine, locate, &mut watch)?;
+        self.reduced(&points, &mut watch)
+    }
+
+    /// As [`Self::moves`] of a cutter that is located by where it touches: at a kink of the surface its tip jumps, and is
+    /// carried from one side to the other by being dropped along the way.
+    ///
+    /// # Errors
+    /// As [`Self::moves`].
+    pub fn moves_by_contacts(
+        &self,
+        [s0, s1]: [f64; 2],
+        locate: &mut dyn FnMut(f64) -> Option<Point3>,
+        drop: &DropCutter<'_>,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Point3>, Cancelled> {
+        let fine = SAMPLING_SHARE * self.chord_tolerance;
+        let mut watch = Watch::new(monitor);
+        let mut across = |a: &Point3, b: &Point3, watch: &mut Watch<'_>| {
+            let mut dropped = |t: f64| {
+                let at = a + (b - a) * t;
+                drop.at(at.x, at.y).map(|drop| Point3::new(at.x, at.y, drop.tip_z))
+            };
+            let mut between = sample_within_chord(0.0, 1.0, STEP_OF_JUMP, fine, &mut dropped, watch)?;
+            between.pop();
+            Ok(between)
+        };
+        let points = sample_over_jumps(s0, s1, self.sampling, fine, locate, &mut across, &mut watch)?;
+        self.reduced(&points, &mut watch)
+    }
+
+    /// The points that moves within the chord tolerance need of samples.
+    fn reduced(&self, points: &[Point3], watch: &mut Watch<'_>) -> Result<Vec<Point3>, Cancelled> {
+        let fine = SAMPLING_SHARE * self.chord_tolerance;
         let mut moves = match self.smoothing {
             Some(sampling) => {
                 let share = if let Step::Scallop(_) = self.step { SMOOTHED_SHARE } else { 1.0 };
-                smooth_and_spread(&points, sampling, share * (self.chord_tolerance - fine), &mut watch)
+                smooth_and_spread(points, sampling, share * (self.chord_tolerance - fine), watch)
             }
             None => {
                 let shares: Option<Vec<f64>> = self
@@ -100,7 +137,7 @@ impl<'a> PassSettings<'a> {
                     .filter(|earlier| !earlier.chords.is_even())
                     .map(|earlier| points.iter().map(|p| earlier.chords.at(p)).collect());
                 let share = |k: usize| shares.as_ref().map_or(1.0, |shares| shares[k]);
-                reduce_unevenly(&points, REDUCTION_SHARE * self.chord_tolerance, &share, &mut watch)
+                reduce_unevenly(points, REDUCTION_SHARE * self.chord_tolerance, &share, watch)
             }
         }?;
         // Thousands of passes are kept, each of far fewer places than were sampled.
