@@ -154,6 +154,16 @@ impl MotionParts {
         below(&self.solid, &self.motions[index as usize], q, [0.0, 1.0], limit)
     }
 
+    /// Signed distance from what a move sweeps until a time, where it is below `limit`.
+    pub(super) fn until(&self, index: u32, q: &Point3, until: f64, limit: f64) -> Option<f64> {
+        below(&self.solid, &self.motions[index as usize], q, [0.0, until], limit).map(|found| found.distance)
+    }
+
+    /// Whether what a move sweeps is convex, also until some time.
+    pub(super) fn is_convex_on(&self, index: u32) -> bool {
+        self.solid.is_convex() && turn(&self.motions[index as usize]) == 0.0
+    }
+
     /// One move of the path.
     pub(super) fn motion(&self, index: u32) -> &Motion {
         &self.motions[index as usize]
