@@ -9,7 +9,7 @@
 //! divided so that the tip stays on its line within the chord tolerance. Feeds are inverse times (G93, 1/min), since
 //! no other feed has a meaning for lines and turns together.
 //!
-//! In both styles a feed is lowered where a joint would exceed its rate, as far as its ends tell.
+//! In both styles a feed is lowered where a joint would exceed its rate.
 //!
 //! A rapid move that turns the tool is a G1 at the rapid rate: with G0 each axis would go its own way.
 //!
@@ -22,7 +22,7 @@ use super::super::program_text::{ProgramHeader, describe, number, number_below, 
 use super::MoveLines;
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
-use machine::kinematics::{Following, JointLocation, JointPath, Joints, Kinematics, Side, Turn, least_time};
+use machine::kinematics::{Following, JointLocation, JointPath, Joints, Kinematics, Side, Turn};
 use motion::{MoveKind, Toolpath};
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -257,7 +257,7 @@ impl<'a> FiveAxisProgram<'a> {
         let turns = self.words[3..] != [Some(words[3].clone()), Some(words[4].clone())];
         let rate = if step.kind == MoveKind::Rapid { self.post.rapid_rate } else { step.feed_rate };
         let length = (location.at.tip - last.1).norm();
-        let least = least_time(self.post.kinematics, &last.0, &location.joints) / 60.0;
+        let least = self.post.joints.least_time(self.post.kinematics, (&last.0, last.1), location) / 60.0;
         let feed = if step.kind == MoveKind::Rapid && !turns {
             None
         } else if self.post.style == Style::Full {
