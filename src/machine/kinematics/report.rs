@@ -2,7 +2,7 @@
 
 use super::angles::angle_between;
 use super::choice::LIMIT_SLACK;
-use super::follow::{JointLocation, JointPath, Turn, passes};
+use super::follow::{JointPath, Turn, passes};
 use super::{Joints, Kinematics};
 use geometry::{Point3, Vector3};
 use motion::{MoveKind, Toolpath};
@@ -172,22 +172,27 @@ impl JointPath {
         let (mut last, mut tip) = (self.start, kinematics.forward(&self.start).tip);
         for location in &self.locations {
             if let Some(time) = times.get_mut(location.step) {
-                *time += self.least_time(kinematics, (&last, tip), location);
+                *time += self.least_time(kinematics, &(last, tip), &(location.joints, location.at.tip));
             }
             (last, tip) = (location.joints, location.at.tip);
         }
         times
     }
 
-    /// The least time from joints and tip to a location that follows by the rates of the joints, s.
-    pub fn least_time(&self, kinematics: &Kinematics, from: (&Joints, Point3), to: &JointLocation) -> f64 {
+    /// The least time of a line between joints with their tips by the rates of the joints, s.
+    pub fn least_time(&self, kinematics: &Kinematics, from: &(Joints, Point3), to: &(Joints, Point3)) -> f64 {
         let paces = self.paces(kinematics, from, to);
         paces.into_iter().zip(kinematics.rates()).map(|(pace, rate)| pace / rate).fold(0.0, f64::max)
     }
 
-    /// The greatest pace of each joint from joints and tip to a location that follows, over the time of the whole, mm or rad.
-    fn paces(&self, kinematics: &Kinematics, (from, tip): (&Joints, Point3), to: &JointLocation) -> [f64; 5] {
-        let (a, b) = (from.values(), to.joints.values());
+    /// The greatest pace of each joint on a line, over the time of the whole, mm or rad.
+    fn paces(
+        &self,
+        kinematics: &Kinematics,
+        (from, tip): &(Joints, Point3),
+        (to, end): &(Joints, Point3),
+    ) -> [f64; 5] {
+        let (a, b) = (from.values(), to.values());
         let mut paces = std::array::from_fn(|k| (b[k] - a[k]).abs());
         if self.following.tip.is_finite() {
             return paces;
@@ -195,7 +200,7 @@ impl JointPath {
         // Where the control keeps the tip on its line, linear joints run along curves.
         let at = |share: f64| {
             let rotary = [3, 4].map(|k| a[k] + (b[k] - a[k]) * share);
-            kinematics.place(tip + (to.at.tip - tip) * share, rotary).linear
+            kinematics.place(tip + (end - tip) * share, rotary).linear
         };
         let parts = (paces[3].max(paces[4]) / PACE_TURN).ceil().max(1.0);
         for part in 0..=parts as u32 {
@@ -218,10 +223,14 @@ impl JointPath {
             let rate =
                 step.map_or(rapid_rate, |s| if s.kind == MoveKind::Rapid { rapid_rate } else { s.feed_rate });
             let length = (location.at.tip - tip).norm();
-            let time = (60.0 * length / rate).max(self.least_time(kinematics, (&last, tip), location));
+            let time = (60.0 * length / rate).max(self.least_time(
+                kinematics,
+                &(last, tip),
+                &(location.joints, location.at.tip),
+            ));
             // What rounding leaves of a move has no rate.
             if time > 1e-9 {
-                let paces = self.paces(kinematics, (&last, tip), location);
+                let paces = self.paces(kinematics, &(last, tip), &(location.joints, location.at.tip));
                 fastest.iter_mut().zip(paces).for_each(|(fastest, pace)| *fastest = fastest.max(pace / time));
             }
             (last, tip) = (location.joints, location.at.tip);

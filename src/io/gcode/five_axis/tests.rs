@@ -219,9 +219,7 @@ fn no_joint_is_faster_than_its_rate() {
             }
             for (k, limit) in kinematics.rates().into_iter().enumerate() {
                 let rate = (after[k] - before[k]).abs() * states[at].feed / 60.0;
-                // Words are rounded: 0.1 µm in a way of a micrometre would be a tenth.
-                let rounding = 1.2e-4 * states[at].feed / 60.0;
-                assert!(rate <= limit + rounding, "{name} joint {k} line {at}: {rate} {limit}");
+                assert!(rate <= limit * (1.0 + 1e-9), "{name} joint {k} line {at}: {rate} {limit}");
                 limited += usize::from(k < 3 && rate > 0.9 * limit);
             }
         }
@@ -261,9 +259,7 @@ fn no_joint_is_faster_than_its_rate_where_the_control_keeps_the_tip() {
                 let [before, after] = [part, part + 1].map(joints);
                 for (k, limit) in kinematics.rates().into_iter().enumerate() {
                     let rate = (after[k] - before[k]).abs() * f64::from(PARTS) / time;
-                    // Words are rounded, lengths to 0.1 µm and angles to a millionth of a degree on an arm of half a metre.
-                    let rounding = 2e-4 / time + 1e-4 * limit;
-                    assert!(rate <= limit + rounding, "{name} joint {k} line {}: {rate} {limit}", at + 1);
+                    assert!(rate <= limit * (1.0 + 1e-4), "{name} joint {k} line {}: {rate} {limit}", at + 1);
                     limited += usize::from(k < 3 && rate > 0.98 * limit);
                 }
             }
