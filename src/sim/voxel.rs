@@ -19,6 +19,7 @@ mod cube;
 mod divide;
 mod engine;
 mod error;
+mod groups;
 mod leaf;
 mod line;
 mod moves;

@@ -2,7 +2,7 @@
 //!
 //! A place stands until the cutter covers it. Cubes around the stock are divided, those first in which the holder may come
 //! nearest. A cube knows the moves on which the holder comes near to it and those on which the cutter does; what a move
-//! covers whole is in nobody's way afterwards. A place in its middle that stands when the holder comes gives a distance that is
+//! covers whole is in nobody's way afterwards. Large cubes know them in groups ([`super::groups`]). A place in its middle that stands when the holder comes gives a distance that is
 //! reached. Supporting planes bound it from below. Of two convex bodies one may shield the other: where the distance from
 //! what is cut, less that from the section, is at most m at all corners of a cube, no place that stands is nearer than -m. So
 //! cubes stay large where a shank follows its cutter along a wall, and are small only beside the nearest places.
@@ -12,7 +12,8 @@ use std::collections::BinaryHeap;
 
 use super::engine::VoxelEngine;
 use super::error::VoxelError;
-use super::moves::{LOOSE, MotionParts};
+use super::groups::{Group, Groups};
+use super::moves::LOOSE;
 use crate::standing::{FAR, LEAST_CELL, NearStanding, StandingClearance, enough};
 use crate::stock::{Stock, corner};
 use cutter::{Cutter, Holder, Solid};
@@ -41,9 +42,6 @@ const BATCH: usize = 32;
 /// A collision is followed to where it is deeper by this share: the program is refused anyway.
 const DEEPER_SHARE: f64 = 0.1;
 
-/// A part of the way of one section, or of one cutter: which, and which part.
-type Of = (u32, u32);
-
 /// A cube with what comes near it.
 struct Node {
     middle: Point3,
@@ -51,9 +49,9 @@ struct Node {
     /// No place of it that stands comes nearer than this.
     bound: f64,
     /// Of the sections.
-    held: Vec<Of>,
+    held: Vec<Group>,
     /// Of the cutters, in the order of the program.
-    cuts: Vec<Of>,
+    cuts: Vec<Group>,
     /// Whether it reaches out of the stock.
     edge: bool,
 }
@@ -73,9 +71,10 @@ struct Divided {
 
 /// What the cutters take of a cube. Moves of this tool count from 1, those of others before are 0.
 struct Gone {
-    /// The first move that covers all of it, and the first that covers its middle.
+    /// The first move that is known to cover all of it.
     whole: u32,
-    middle: u32,
+    /// The first that covers its middle, where that was asked for.
+    middle: Option<u32>,
     /// Moves, each with bounds on the distance from what it takes at the corners. Between them their greatest is one, also
     /// of their sum with a linear function.
     shields: Vec<(u32, [f64; 8])>,
@@ -83,8 +82,9 @@ struct Gone {
 
 struct Search<'a> {
     engine: &'a VoxelEngine<'a>,
-    before: Vec<MotionParts>,
-    sections: Vec<MotionParts>,
+    /// Those before, and the tool's own.
+    cutters: Vec<Groups>,
+    sections: Vec<Groups>,
     /// Distances from a section count as greater by so much.
     rubs: Vec<f64>,
 }
@@ -110,13 +110,14 @@ impl VoxelEngine<'_> {
     ) -> Result<StandingClearance, VoxelError> {
         let solids = Solid::of_sections(holder);
         let rub = |solid: &Solid| if solid.radius() > cutter.radius() { 0.0 } else { SHALLOWEST };
-        let parts = |solid: &Solid| MotionParts::new(solid, path);
+        let sections = solids.iter().map(|solid| Groups::new(solid, path, false));
         let of_before =
-            |(cutter, path): &(Cutter, Toolpath)| MotionParts::new(&Solid::of_cutter(cutter, None), path);
+            |(cutter, path): &(Cutter, Toolpath)| Groups::new(&Solid::of_cutter(cutter, None), path, true);
+        let own = Groups::new(&self.parts.solid, path, false);
         let search = Search {
             engine: self,
-            before: before.iter().map(of_before).collect::<Result<_, _>>()?,
-            sections: solids.iter().map(parts).collect::<Result<_, _>>()?,
+            cutters: before.iter().map(of_before).chain([own]).collect::<Result<_, _>>()?,
+            sections: sections.collect::<Result<_, _>>()?,
             rubs: solids.iter().map(rub).collect(),
         };
         search.run(monitor)
@@ -166,20 +167,13 @@ impl Search<'_> {
     /// A cube around the stock.
     fn whole(&self) -> Node {
         let block = self.engine.stock.bounds();
-        let all = |tools: &[&MotionParts]| {
-            let of = |(k, parts): (usize, &&MotionParts)| {
-                let k = k as u32;
-                (0..parts.all.len() as u32).map(move |part| (k, part))
-            };
-            tools.iter().enumerate().flat_map(of).collect()
-        };
-        let cutters: Vec<&MotionParts> = self.before.iter().chain([&self.engine.parts]).collect();
+        let all = |tools: &[Groups]| (0..).zip(tools).filter_map(|(k, groups)| groups.all(k)).collect();
         Node {
             middle: block.min + block.size() * 0.5,
             half: 0.5 * block.size().max(),
             bound: f64::NEG_INFINITY,
-            held: all(&self.sections.iter().collect::<Vec<_>>()),
-            cuts: all(&cutters),
+            held: all(&self.sections),
+            cuts: all(&self.cutters),
             edge: true,
         }
     }
@@ -205,55 +199,56 @@ impl Search<'_> {
         }
         let edge = out > -reach;
         let mut child = Node { middle, half, bound: f64::INFINITY, held: Vec::new(), cuts: Vec::new(), edge };
-        let order = |of: &Of| self.sections[of.0 as usize].all[of.1 as usize].index + 1;
-        let last = node.held.iter().map(order).max().unwrap_or_default();
-        let Some(mut gone) = self.cut(node, &mut child, last, divided) else { return };
+        let last = node.held.iter().map(|held| self.sections[held.of as usize].orders(*held)[1]).max();
+        let Some(mut gone) = self.cut(node, &mut child, last.unwrap_or_default(), divided) else { return };
         if out > 0.0 {
-            gone.middle = 0;
+            gone.middle = Some(0);
         }
         if edge && matches!(self.engine.stock, Stock::Box(_) | Stock::Cylinder { .. }) {
             // The stock is convex: it ends before the plane at its nearest place.
             let beyond = |k: usize| -out - half * outward.dot(&corner(k));
             gone.shields.push((0, std::array::from_fn(beyond)));
         }
-        for held in node.held.iter().filter(|held| order(held) <= gone.whole) {
-            self.hold(held, order(held), &gone, &mut child, divided);
+        let mut open: Vec<Group> = node.held.clone();
+        while let Some(held) = open.pop() {
+            self.hold(held, &mut gone, &mut child, &mut open, divided);
         }
         if !child.held.is_empty() {
             divided.children.push(child);
         }
     }
 
-    /// Puts down the cutters' parts that come into a cube, up to move `last`, and tells what they take; `None` where another
+    /// Puts down the cutters' moves that come into a cube, up to move `last`, and tells what they take; `None` where another
     /// tool took all of it before.
     fn cut(&self, node: &Node, child: &mut Node, last: u32, divided: &mut Divided) -> Option<Gone> {
         let (middle, half) = (child.middle, child.half);
         let reach = 3f64.sqrt() * half;
-        let mut gone = Gone { whole: u32::MAX, middle: u32::MAX, shields: Vec::new() };
+        let mut gone = Gone { whole: u32::MAX, middle: None, shields: Vec::new() };
         let mut deepest = f64::INFINITY;
-        for &(tool, number) in &node.cuts {
-            let of_before = self.before.get(tool as usize);
-            let parts = of_before.unwrap_or(&self.engine.parts);
-            let part = &parts.all[number as usize];
-            let order = if of_before.is_some() { 0 } else { part.index + 1 };
-            if order > last {
+        let mut open: Vec<Group> = node.cuts.iter().rev().copied().collect();
+        while let Some(cut) = open.pop() {
+            let groups = &self.cutters[cut.of as usize];
+            if groups.orders(cut)[0] > last {
                 break;
             }
             divided.looks += 1;
-            let Some(t) = parts.tangent(part, &middle, reach, reach, LOOSE) else { continue };
+            let Some((t, spread)) = groups.tangent(cut, &middle, reach, reach) else { continue };
             if t.lower - half * t.gradient.map(f64::abs).sum() >= 0.0 {
                 continue;
             }
-            child.cuts.push((tool, number));
-            let covered = || t.distance + t.slack <= 0.0 || parts.distance(part, &middle, 0.0).is_some();
-            if gone.middle == u32::MAX && t.lower <= 0.0 && covered() {
-                gone.middle = order;
+            if spread > half {
+                open.extend(groups.within(cut).rev());
+                continue;
             }
-            if t.distance + t.slack < deepest {
-                deepest = t.distance + t.slack;
-                divided.looks += 8;
+            child.cuts.push(cut);
+            if t.distance < deepest {
+                let (parts, part) = (&groups.parts, groups.middle(cut));
+                divided.looks += 9;
+                let Some(t) = parts.tangent(part, &middle, reach, reach, LOOSE) else { continue };
+                deepest = t.distance;
                 let corners = parts.corners(part, &t, &middle, half, LOOSE);
-                if deepest <= -reach || corners.iter().all(|&distance| distance <= 0.0) {
+                let order = groups.order(part);
+                if t.distance + t.slack <= -reach || corners.iter().all(|&distance| distance <= 0.0) {
                     gone.whole = order;
                     break;
                 }
@@ -263,27 +258,27 @@ impl Search<'_> {
         (gone.whole > 0).then_some(gone)
     }
 
-    /// Puts down a section's part that may come near what stands of a cube, and how near it comes to its middle.
-    fn hold(&self, held: &Of, order: u32, gone: &Gone, child: &mut Node, divided: &mut Divided) {
+    /// Puts down a section's moves that may come near what stands of a cube, and how near they come to its middle.
+    fn hold(
+        &self,
+        held: Group,
+        gone: &mut Gone,
+        child: &mut Node,
+        open: &mut Vec<Group>,
+        divided: &mut Divided,
+    ) {
         let (middle, half) = (child.middle, child.half);
         let reach = 3f64.sqrt() * half;
-        let (parts, rub) = (&self.sections[held.0 as usize], self.rubs[held.0 as usize]);
-        let part = &parts.all[held.1 as usize];
+        let (groups, rub) = (&self.sections[held.of as usize], self.rubs[held.of as usize]);
+        let [first, last] = groups.orders(held);
+        if first > gone.whole {
+            return;
+        }
         divided.looks += 1;
         let limit = divided.limit - rub + reach;
-        let Some(t) = parts.tangent(part, &middle, reach, limit, LOOSE) else { return };
-        if order <= gone.middle && t.lower + rub < divided.limit {
-            let found = if order < gone.middle {
-                parts.distance(part, &middle, divided.limit - rub)
-            } else {
-                // Until the cutter comes to it on the same move.
-                let cutter = &self.engine.parts;
-                let until = cutter.first_within(part.index, &middle, TOUCH, TOUCH, MOST_TOUCHES);
-                parts.until(part.index, &middle, until, divided.limit - rub)
-            };
-            if let Some(distance) = found {
-                divided.take(part.index, held.0, middle, distance + rub);
-            }
+        let Some((t, spread)) = groups.tangent(held, &middle, reach, limit) else { return };
+        if t.lower + rub < divided.limit {
+            self.reach(held, gone, child, divided);
         }
         // What stands lies beyond each shield, and the section above its supporting plane.
         let behind = |shield: &[f64; 8]| {
@@ -292,32 +287,63 @@ impl Search<'_> {
         };
         let mut lower = t.lower - half * t.gradient.map(f64::abs).sum() + rub;
         for (before, shield) in &gone.shields {
-            if *before < order {
+            if *before < first {
                 lower = lower.max(behind(shield));
             }
         }
-        let same_move = order == gone.whole || gone.shields.iter().any(|shield| shield.0 == order);
-        if lower < divided.enough && same_move {
-            let shield = self.cut_first(held, part.index, child, divided);
+        if lower < divided.enough && held.level > 0 && (spread > half || last >= gone.whole) {
+            return open.extend(groups.within(held));
+        }
+        let same_move = |order: u32| held.level == 0 && order == first;
+        if lower < divided.enough
+            && (same_move(gone.whole) || gone.shields.iter().any(|shield| same_move(shield.0)))
+        {
+            let shield = self.cut_first(held, first - 1, child, divided);
             let gone = shield.is_some_and(|shield| shield.iter().all(|&distance| distance <= 0.0));
             lower =
                 if gone { divided.enough } else { shield.map_or(lower, |shield| lower.max(behind(&shield))) };
         }
         if lower >= divided.enough {
-            divided.done = divided.done.min(lower.max(divided.enough));
+            divided.done = divided.done.min(lower);
             return;
         }
         child.bound = child.bound.min(lower);
-        child.held.push(*held);
+        child.held.push(held);
+    }
+
+    /// Takes the distance from the middle of a cube on the move in the middle of a group, where it stands then.
+    fn reach(&self, held: Group, gone: &mut Gone, child: &Node, divided: &mut Divided) {
+        let (groups, rub) = (&self.sections[held.of as usize], self.rubs[held.of as usize]);
+        let (parts, part) = (&groups.parts, groups.middle(held));
+        let middle_gone = *gone.middle.get_or_insert_with(|| {
+            let over = |cut: &Group| {
+                self.cutters[cut.of as usize].first_over(*cut, &child.middle, &mut divided.looks)
+            };
+            child.cuts.iter().find_map(over).unwrap_or(u32::MAX)
+        });
+        let limit = divided.limit - rub;
+        let found = match groups.order(part).cmp(&middle_gone.min(gone.whole)) {
+            Ordering::Less => parts.distance(part, &child.middle, limit),
+            Ordering::Greater => None,
+            Ordering::Equal => {
+                // Until the cutter comes to it on the same move.
+                let cutter = &self.engine.parts;
+                let until = cutter.first_within(part.index, &child.middle, TOUCH, TOUCH, MOST_TOUCHES);
+                parts.until(part.index, &child.middle, until, limit)
+            }
+        };
+        if let Some(distance) = found {
+            divided.take(part.index, held.of, child.middle, distance + rub);
+        }
     }
 
     /// Upper bounds at the corners of a cube on the distance of what the cutter takes on a move before a section comes near
     /// the cube.
-    fn cut_first(&self, held: &Of, index: u32, child: &Node, divided: &mut Divided) -> Option<[f64; 8]> {
+    fn cut_first(&self, held: Group, index: u32, child: &Node, divided: &mut Divided) -> Option<[f64; 8]> {
         divided.looks += 16;
-        let (cutter, section) = (&self.engine.parts, &self.sections[held.0 as usize]);
+        let (cutter, section) = (&self.engine.parts, &self.sections[held.of as usize].parts);
         let reach = 3f64.sqrt() * child.half;
-        let near = divided.enough - self.rubs[held.0 as usize] + reach + TOUCH;
+        let near = divided.enough - self.rubs[held.of as usize] + reach + TOUCH;
         let until = section.first_within(index, &child.middle, near, TOUCH, MOST_TOUCHES);
         let at = |q: &Point3| cutter.until(index, q, until, f64::INFINITY);
         if cutter.is_convex_on(index) {
