@@ -82,7 +82,6 @@ const MOST_TOUCH_UP: f64 = 0.04;
 const CELLS_A_PASS: f64 = 4.0;
 
 /// What a plan leaves above the design.
-#[derive(Clone)]
 struct Standing {
     /// As a round tells it, its length and factors aside.
     round: CorrectionRound,
@@ -91,11 +90,6 @@ struct Standing {
 }
 
 impl Standing {
-    /// Of the same path by other widths.
-    fn with_factors(&self, factors: [f64; 2]) -> Self {
-        Self { round: CorrectionRound { factors, ..self.round }, above: self.above.clone() }
-    }
-
     /// `None` without ridges: there is nothing to correct.
     fn of_ridges(map: &RidgeMap, planned: &Planned, factors: [f64; 2]) -> Option<Self> {
         let highest_ridge = map.scallop.max_mm?;
@@ -288,15 +282,9 @@ impl Corrected<'_> {
             }
             let Some(next) = self.next(in_vain, MEASURED_SLACK) else { break };
             let (planned, factors) = self.plan(&next, monitor)?;
-            let path = &planned.plan.path;
-            if *path == self.best.plan.path {
-                let found = self.tried.standing.with_factors(factors);
-                self.keep_if_better(planned, next, found);
-                in_vain += 1;
-                continue;
-            }
             // Two at a time might be more than the memory that the run may take.
             drop(measured.take());
+            let path = &planned.plan.path;
             let again = self.session.measure(self.request, self.engine, path, self.closeness, monitor)?;
             let Some(found) = Standing::of_all(&again.measurement, &planned, factors) else { break };
             let gain = self.keep_if_better(planned, next, found);
