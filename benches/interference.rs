@@ -9,7 +9,7 @@ use millstream::geometry::{Aabb, Bvh, Point3, TriangleMesh, Vector3};
 use millstream::monitor::Silent;
 use millstream::motion::{CcPoint, ClPoint, Move, MoveKind, Toolpath, location};
 use millstream::parallel;
-use millstream::sim::{Stock, holder_clearance};
+use millstream::sim::{Stock, VoxelEngine, holder_clearance};
 
 fn main() {
     divan::main();
@@ -163,5 +163,21 @@ fn standing(bencher: Bencher, top: f64) {
     let stock = Stock::Box(block);
     bencher.counter(ItemsCount::new(path.len())).bench_local(|| {
         holder_clearance(&stock, &[], &cutter, &held, &path, &Silent).expect("nothing stops it")
+    });
+}
+
+/// The same of a tool that leans, whose holder passes over the block by less than a millimetre.
+#[divan::bench(sample_count = 3)]
+fn standing_leaning(bencher: Bencher) {
+    let cutter = cutter("ball");
+    let section = |diameter, top_diameter, length| HolderSection { diameter, top_diameter, length };
+    let sections = vec![section(5.0, 5.0, 4.0), section(16.0, 24.0, 15.0), section(40.0, 40.0, 30.0)];
+    let held = Holder::new(10.0, sections).expect("valid dimensions");
+    let path = path(&cutter, false);
+    let block = Aabb { min: Point3::new(0.0, 0.0, -20.0), max: Point3::new(SIZE, SIZE, 5.0) };
+    let (stock, solid) = (Stock::Box(block), Solid::of_cutter(&cutter, Some(&held)));
+    bencher.counter(ItemsCount::new(path.len())).bench_local(|| {
+        let engine = VoxelEngine::new(&stock, &solid, &path).expect("moves that can be followed");
+        engine.holder_clearance(&[], &cutter, &held, &path, &Silent).expect("nothing stops it")
     });
 }

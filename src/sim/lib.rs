@@ -44,7 +44,6 @@ pub use standing::{FAR, NearStanding, StandingClearance, holder_clearance};
 pub use stock::{BarAxis, Stock, StockMesh};
 pub use swept::SweptMove;
 pub use voxel::{
-    HolderHit, LineExit, StandingHits, VoxelEngine, VoxelError, VoxelRemoval, VoxelSample, VoxelSurface,
-    VoxelVolumes, Voxels,
+    LineExit, VoxelEngine, VoxelError, VoxelRemoval, VoxelSample, VoxelSurface, VoxelVolumes, Voxels,
 };
 pub use zmap::{NOT_CUT, Shape, ZMap};

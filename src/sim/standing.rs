@@ -36,7 +36,7 @@ const OPEN: f64 = 0.01;
 const FIRST_CELL: f64 = 0.25;
 
 /// Cells are not divided below this, mm. A holder that rubs along a wall would divide them without end.
-const LEAST_CELL: f64 = 1e-3;
+pub(crate) const LEAST_CELL: f64 = 1e-3;
 
 /// Tiles that are replayed at most; what is left open by then stays in the bound.
 const MOST_REPLAYS: usize = 10_000;
@@ -67,6 +67,11 @@ pub struct StandingClearance {
     pub error_bound: f64,
     /// Moves on which they certainly collide, in program order; those beside a deeper one may be missing.
     pub collisions: Vec<u32>,
+}
+
+/// A bound above this is near enough where nothing nearer than `limit` was found.
+pub(crate) fn enough(limit: f64) -> f64 {
+    limit - (OPEN_SHARE * limit).max(OPEN)
 }
 
 /// A section that is wider than the cutter.
@@ -253,16 +258,10 @@ impl Search {
         self.nearest.map_or(FAR, |nearest| nearest.distance.max(0.0))
     }
 
-    /// A bound above this is near enough.
-    fn enough(&self) -> f64 {
-        let limit = self.limit();
-        limit - (OPEN_SHARE * limit).max(OPEN)
-    }
-
     /// The tiles that may hold the nearest place.
     fn next_batch(&mut self) -> Option<Vec<Pending>> {
         self.waiting.sort_by(|a, b| a.bound.total_cmp(&b.bound));
-        let enough = if self.replays < MOST_REPLAYS { self.enough() } else { f64::NEG_INFINITY };
+        let enough = if self.replays < MOST_REPLAYS { enough(self.limit()) } else { f64::NEG_INFINITY };
         let open = self.waiting.partition_point(|tile| tile.bound < enough);
         let mut open: Vec<Pending> = self.waiting.drain(..open).collect();
         let shut = std::mem::take(&mut self.waiting);
@@ -283,7 +282,7 @@ impl Search {
         if let Some(nearest) = found.nearest.filter(nearer) {
             self.nearest = Some(nearest);
         }
-        if collides || found.bound >= self.enough() || tile.cell <= LEAST_CELL {
+        if collides || found.bound >= enough(self.limit()) || tile.cell <= LEAST_CELL {
             self.shut(found.bound);
         } else {
             self.waiting.extend(task.quarters(&tile, found.bound));

@@ -3,7 +3,7 @@
 //! Enters: stock (a box, a round bar, a closed mesh), the tool as a [`Solid`] and a path. Leaves: the signed
 //! distance from the surface of the remaining material at the samples near it, each with the move that is
 //! nearest there; from those its heights, its surface as a closed triangle mesh and where a line leaves it; its volume
-//! between proven bounds; how much each move removes in the order of the program, and whether a holder runs into what still stands.
+//! between proven bounds; how much each move removes in the order of the program, and how near a holder comes to what still stands.
 //!
 //! The material is the stock less all that the tool sweeps, so its distance is the greater of that of the
 //! stock and the negative of that of the swept volume: exact in sign and at the surface, elsewhere no greater
@@ -19,6 +19,7 @@ mod cube;
 mod divide;
 mod engine;
 mod error;
+mod groups;
 mod leaf;
 mod line;
 mod moves;
@@ -38,7 +39,6 @@ pub use engine::VoxelEngine;
 pub use error::VoxelError;
 pub use line::LineExit;
 pub use removal::VoxelRemoval;
-pub use standing::{HolderHit, StandingHits};
 pub use surface::VoxelSurface;
 pub use volume::VoxelVolumes;
 pub use voxels::{VoxelSample, Voxels};

@@ -154,7 +154,12 @@ fn a_holder_that_leans_away_from_the_walls_is_clear_of_them() {
     takes_its_part_of_the_block(leaning);
     let pairs = leaning["clearance"]["pairs"].as_array().unwrap();
     let standing = pairs.iter().find(|pair| pair["other"] == "standing stock").unwrap();
-    assert!(standing["tool"] == "holder" && standing["move"].is_null(), "{standing}");
+    let [clearance, bound] = ["/clearance_mm", "/error_bound_mm"].map(|key| number(standing, key));
+    // A twentieth of it is left open, and the roughed stock lies 0.4 mm over the walls that the holder keeps 2 mm off.
+    assert!(
+        standing["tool"] == "holder" && clearance > 1.5 && bound <= 0.05 * clearance + 1e-9,
+        "{standing}"
+    );
 }
 
 /// The same from the full block: the holder goes where the passes to come have yet to make way.

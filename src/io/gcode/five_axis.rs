@@ -9,7 +9,7 @@
 //! divided so that the tip stays on its line within the chord tolerance. Feeds are inverse times (G93, 1/min), since
 //! no other feed has a meaning for lines and turns together.
 //!
-//! In both styles a feed is lowered where a joint would exceed its rate, as far as its ends tell.
+//! In both styles a feed is lowered where a joint would exceed its rate.
 //!
 //! A rapid move that turns the tool is a G1 at the rapid rate: with G0 each axis would go its own way.
 //!
@@ -22,7 +22,7 @@ use super::super::program_text::{ProgramHeader, describe, number, number_below, 
 use super::MoveLines;
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
-use machine::kinematics::{Following, JointLocation, JointPath, Joints, Kinematics, Side, Turn, least_time};
+use machine::kinematics::{Following, JointLocation, JointPath, Joints, Kinematics, Side, Turn};
 use motion::{MoveKind, Toolpath};
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -196,6 +196,26 @@ impl<'a> FiveAxisProgram<'a> {
         [x, y, z, first, second]
     }
 
+    /// The joints and the tip of words.
+    fn read(&self, words: [Option<&String>; 5]) -> Option<(Joints, Point3)> {
+        let mut values = [0.0; 5];
+        for (value, word) in values.iter_mut().zip(words) {
+            *value = word?.parse().ok()?;
+        }
+        let [x, y, z, first, second] = values;
+        let (linear, rotary) = (Point3::new(x, y, z), [first.to_radians(), second.to_radians()]);
+        let kinematics = self.post.kinematics;
+        Some(match self.post.style {
+            Style::Tcp => (kinematics.place(linear, rotary), linear),
+            Style::Full => {
+                let nose = Vector3::new(0.0, 0.0, kinematics.gauge_length());
+                let joints =
+                    Joints { linear: linear.coords + kinematics.workpiece_zero().coords + nose, rotary };
+                (joints, kinematics.forward(&joints).tip)
+            }
+        })
+    }
+
     /// X Y Z of the linear axes themselves, in the work offset.
     fn linear_axes(&self, joints: &Joints) -> Vector3 {
         let kinematics = self.post.kinematics;
@@ -256,16 +276,21 @@ impl<'a> FiveAxisProgram<'a> {
         let words = self.words(&location.joints, location.at.tip);
         let turns = self.words[3..] != [Some(words[3].clone()), Some(words[4].clone())];
         let rate = if step.kind == MoveKind::Rapid { self.post.rapid_rate } else { step.feed_rate };
-        let length = (location.at.tip - last.1).norm();
-        let least = least_time(self.post.kinematics, &last.0, &location.joints) / 60.0;
+        // The control moves by what is written.
+        let written = words.each_ref().map(Some);
+        let to = self.read(written).unwrap_or((location.joints, location.at.tip));
+        let from = self.read(self.words.each_ref().map(Option::as_ref)).unwrap_or(*last);
+        let length = (to.1 - from.1).norm();
+        let least = self.post.joints.least_time(self.post.kinematics, &from, &to) / 60.0;
         let feed = if step.kind == MoveKind::Rapid && !turns {
             None
         } else if self.post.style == Style::Full {
             let time = (length / rate).max(least);
             Some(number_below((1.0 / time).min(GREATEST_INVERSE_TIME)))
         } else if (0..3).all(|k| self.words[k].as_ref() == Some(&words[k])) && least > 0.0 {
-            let turn = |k: usize| (location.joints.rotary[k] - last.0.rotary[k]).abs();
-            Some(number(turn(0).max(turn(1)).to_degrees() / least))
+            let turn = |k: usize| (to.0.rotary[k] - from.0.rotary[k]).abs();
+            // A rate that holds as it is stays so.
+            Some(number_below(turn(0).max(turn(1)).to_degrees() / least * (1.0 + 1e-12)))
         } else if length < rate * least {
             Some(number_below(length / least))
         } else {

@@ -13,7 +13,7 @@ use serde::Serialize;
 use sim::{FAR, VoxelEngine, holder_clearance};
 use work::monitor::Monitor;
 
-use super::removal::{TOOLS_BEFORE, doubt, voxel_in_order};
+use super::removal::{TOOLS_BEFORE, doubt};
 use super::words::{more_moves, value};
 use crate::JobError;
 use crate::run::{Finding, Run};
@@ -28,8 +28,7 @@ const RESOLUTION: f64 = 2e-5;
 /// The stock that stands when a move comes.
 const STANDING: &str = "standing stock";
 
-/// Why a clearance is null where nothing collides.
-const UNKNOWN: &str = "nothing collides, and no distance is known";
+/// Why a clearance is null.
 const BEYOND: &str = "nothing is so near that it counts";
 
 /// Why a line is null.
@@ -41,9 +40,6 @@ const LEFT_OPEN: &str = "the search left it open whether they are nearer";
 
 /// Pairs in the table of the page.
 const LISTED: usize = 5;
-
-/// Times that voxels are halved to decide whether a holder meets what stands. Each time takes four to eight times as long.
-const HALVINGS: usize = 2;
 
 /// What the word means.
 const MEANING: (&str, &str) = (
@@ -61,7 +57,7 @@ pub struct PairClearance {
     pub other: String,
     /// The least signed distance; below zero they collide, at least so deep. Null where nothing is near enough to count.
     pub clearance_mm: Option<f64>,
-    /// It is less than that by no more than this; null where that is open, or nothing collides and no distance is known.
+    /// It is less than that by no more than this; null where that is open.
     pub error_bound_mm: Option<f64>,
     /// Where on the other body.
     pub at_mm: Option<[f64; 3]>,
@@ -188,53 +184,30 @@ fn with_standing_stock(
 ) -> Result<Option<PairClearance>, JobError> {
     let Some(holder) = tool.holder else { return Ok(None) };
     let stock = run.session.roughed_stock();
-    match run.view() {
-        View::Heights(_) => {
-            let found = holder_clearance(&stock, before, tool.cutter, holder, &tool.path, monitor)?;
-            // A section no wider than the cutter stands where it has been.
-            let Some(found) = found else { return Ok(None) };
-            let more = more_moves(found.collisions.len());
-            let tool_number = run.path().named_tool_of(tool.first as usize);
-            let pair = PairClearance::new(("holder", STANDING.into()));
-            let pair = PairClearance { more, tool_number, ..pair };
-            Ok(Some(match found.nearest {
-                None => PairClearance { reason: Some(BEYOND), ..pair }.within(found.error_bound),
-                Some(near) => {
-                    let pair = PairClearance { clearance_mm: Some(near.distance), ..pair };
-                    pair.at(run, near.at.into(), tool.first + near.move_index).within(found.error_bound)
-                }
-            }))
+    let found = match run.view() {
+        View::Heights(_) => holder_clearance(&stock, before, tool.cutter, holder, &tool.path, monitor)?,
+        View::Normals(_) => {
+            let solid = Solid::of_cutter(tool.cutter, Some(holder));
+            let engine = VoxelEngine::new(&stock, &solid, &tool.path).map_err(run.voxels())?;
+            Some(
+                engine
+                    .holder_clearance(before, tool.cutter, holder, &tool.path, monitor)
+                    .map_err(run.voxels())?,
+            )
         }
-        View::Normals(_) if run.scene().simulation.removal => {
-            let engine =
-                VoxelEngine::new(&stock, &run.around.tool.cutter, run.path()).map_err(run.voxels())?;
-            let mut voxel = voxel_in_order(run, &stock);
-            let mut hits =
-                engine.holder_in_stock(holder, run.path(), voxel, monitor).map_err(run.voxels())?;
-            for _ in 0..HALVINGS {
-                if hits.open.is_none() {
-                    break;
-                }
-                voxel *= 0.5;
-                hits = engine.holder_in_stock(holder, run.path(), voxel, monitor).map_err(run.voxels())?;
-            }
-            let pair = PairClearance::new(("holder", STANDING.into()));
-            Ok(Some(match (&hits.worst, hits.open) {
-                (Some(worst), _) => {
-                    let pair = pair.at(run, worst.at.into(), worst.move_index);
-                    let more = more_moves(hits.moves.len());
-                    PairClearance { clearance_mm: Some(-worst.depth), more, ..pair }.within(0.0)
-                }
-                (None, Some(open)) => {
-                    let at = run.path().moves[open as usize].to.tip.into();
-                    let pair = pair.at(run, at, open);
-                    PairClearance { clearance_mm: Some(0.0), ..pair }.within(3f64.sqrt() * voxel)
-                }
-                (None, None) => pair,
-            }))
+    };
+    // An upright section no wider than the cutter stands where it has been.
+    let Some(found) = found else { return Ok(None) };
+    let more = more_moves(found.collisions.len());
+    let tool_number = run.path().named_tool_of(tool.first as usize);
+    let pair = PairClearance { more, tool_number, ..PairClearance::new(("holder", STANDING.into())) };
+    Ok(Some(match found.nearest {
+        None => PairClearance { reason: Some(BEYOND), ..pair }.within(found.error_bound),
+        Some(near) => {
+            let pair = PairClearance { clearance_mm: Some(near.distance), ..pair };
+            pair.at(run, near.at.into(), tool.first + near.move_index).within(found.error_bound)
         }
-        View::Normals(_) => Ok(None),
-    }
+    }))
 }
 
 impl PairClearance {
@@ -248,7 +221,7 @@ impl PairClearance {
             move_index: None,
             line: None,
             tool_number: None,
-            reason: Some(UNKNOWN),
+            reason: None,
             needed: 0.0,
             off: 0.0,
             more: String::new(),
@@ -292,8 +265,6 @@ impl PairClearance {
             |depth, bound| Claim::length("collision", Gravity::Crash, 0.0 - self.needed, depth, bound);
         let bound = self.error_bound_mm.unwrap_or(f64::INFINITY);
         let clearance = match self.clearance_mm {
-            // Voxels that leave nothing open prove it without a distance.
-            None if self.reason == Some(UNKNOWN) => return claim(0.0, 0.0).told(self.sentence()),
             None => return claim(-FAR, bound).told(self.sentence()),
             Some(clearance) => clearance,
         };
@@ -335,7 +306,6 @@ impl PairClearance {
             }
             (Some(clearance), None) => format!("{clearance:.3}, or less"),
             (None, Some(bound)) if bound < FAR => format!("over {:.3} mm", FAR - bound),
-            (None, None) if self.reason == Some(UNKNOWN) => "clear".to_owned(),
             (None, _) => "open".to_owned(),
         }
     }
@@ -383,5 +353,7 @@ fn kept_away(run: &Run<'_>, pairs: &[PairClearance]) -> Option<Claim> {
     Some(claim(asked - clearance, bound).told(text))
 }
 
+#[cfg(test)]
+mod planted;
 #[cfg(test)]
 mod tests;

@@ -86,7 +86,7 @@ fn stock(run: &Run<'_>, cut: &ZMap, monitor: &dyn Monitor) -> Result<ZMap, JobEr
 }
 
 /// The voxel of removal in order, mm.
-pub(super) fn voxel_in_order(run: &Run<'_>, stock: &Stock) -> f64 {
+fn voxel_in_order(run: &Run<'_>, stock: &Stock) -> f64 {
     let about = || (stock.bounds().size().product() / VOXELS).cbrt();
     run.scene().simulation.voxel.unwrap_or_else(about)
 }

@@ -32,7 +32,7 @@ pub use follow::{Following, JointLocation, JointPath, PathError, Turn, follow};
 pub use links::{Chain, Link, LinkMove, STRAY, Way, Waypoint};
 pub use presets::{DEFAULT_GAUGE_LENGTH, DEFAULT_ROTARY_ACCELERATION, DEFAULT_ROTARY_RATE, PRESETS, preset};
 pub use program::program_of_three_axes;
-pub use report::{JointReport, LimitViolation, Obstacle, Rewind, SINGULAR_ANGLE, SingularPose, least_time};
+pub use report::{JointReport, LimitViolation, Obstacle, Rewind, SINGULAR_ANGLE, SingularPose};
 
 use angles::Triangle;
 

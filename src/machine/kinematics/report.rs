@@ -12,6 +12,13 @@ use std::f64::consts::PI;
 /// tilts: such places are told, rad (1°).
 pub const SINGULAR_ANGLE: f64 = PI / 180.0;
 
+/// Rotary joints turn by no more than this between two looks at the pace of linear ones, rad: between them a pace of sines is
+/// greater by a twenty thousandth at most.
+const PACE_TURN: f64 = 0.02;
+
+/// Paces are differences over this share of a line to both sides. Less is rounding.
+const PACE_STEP: f64 = 1e-5;
+
 /// A place where the tool axis comes close to the first rotary axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SingularPose {
@@ -162,14 +169,46 @@ impl JointPath {
     /// The least time of each of the path's `moves` moves by the rates of the joints, s.
     pub fn least_times(&self, kinematics: &Kinematics, moves: usize) -> Vec<f64> {
         let mut times = vec![0.0; moves];
-        let mut last = self.start;
+        let (mut last, mut tip) = (self.start, kinematics.forward(&self.start).tip);
         for location in &self.locations {
             if let Some(time) = times.get_mut(location.step) {
-                *time += least_time(kinematics, &last, &location.joints);
+                *time += self.least_time(kinematics, &(last, tip), &(location.joints, location.at.tip));
             }
-            last = location.joints;
+            (last, tip) = (location.joints, location.at.tip);
         }
         times
+    }
+
+    /// The least time of a line between joints with their tips by the rates of the joints, s.
+    pub fn least_time(&self, kinematics: &Kinematics, from: &(Joints, Point3), to: &(Joints, Point3)) -> f64 {
+        let paces = self.paces(kinematics, from, to);
+        paces.into_iter().zip(kinematics.rates()).map(|(pace, rate)| pace / rate).fold(0.0, f64::max)
+    }
+
+    /// The greatest pace of each joint on a line, over the time of the whole, mm or rad.
+    fn paces(
+        &self,
+        kinematics: &Kinematics,
+        (from, tip): &(Joints, Point3),
+        (to, end): &(Joints, Point3),
+    ) -> [f64; 5] {
+        let (a, b) = (from.values(), to.values());
+        let mut paces = std::array::from_fn(|k| (b[k] - a[k]).abs());
+        if self.following.tip.is_finite() {
+            return paces;
+        }
+        // Where the control keeps the tip on its line, linear joints run along curves.
+        let at = |share: f64| {
+            let rotary = [3, 4].map(|k| a[k] + (b[k] - a[k]) * share);
+            kinematics.place(tip + (end - tip) * share, rotary).linear
+        };
+        let parts = (paces[3].max(paces[4]) / PACE_TURN).ceil().max(1.0);
+        for part in 0..=parts as u32 {
+            let share = f64::from(part) / parts;
+            let pace = (at(share + PACE_STEP) - at(share - PACE_STEP)) / (2.0 * PACE_STEP);
+            (0..3).for_each(|k| paces[k] = pace[k].abs().max(paces[k]));
+        }
+        paces
     }
 }
 
@@ -184,13 +223,15 @@ impl JointPath {
             let rate =
                 step.map_or(rapid_rate, |s| if s.kind == MoveKind::Rapid { rapid_rate } else { s.feed_rate });
             let length = (location.at.tip - tip).norm();
-            let time = (60.0 * length / rate).max(least_time(kinematics, &last, &location.joints));
+            let time = (60.0 * length / rate).max(self.least_time(
+                kinematics,
+                &(last, tip),
+                &(location.joints, location.at.tip),
+            ));
             // What rounding leaves of a move has no rate.
             if time > 1e-9 {
-                let ways = location.joints.values().into_iter().zip(last.values());
-                for (fastest, (to, from)) in fastest.iter_mut().zip(ways) {
-                    *fastest = fastest.max((to - from).abs() / time);
-                }
+                let paces = self.paces(kinematics, &(last, tip), &(location.joints, location.at.tip));
+                fastest.iter_mut().zip(paces).for_each(|(fastest, pace)| *fastest = fastest.max(pace / time));
             }
             (last, tip) = (location.joints, location.at.tip);
         }
@@ -220,12 +261,6 @@ impl Kinematics {
             std::iter::once(&path.start).chain(path.moves.iter().map(|m| &m.to)).map(|at| height(&at.tip));
         tip + up * (tips.fold(height(&tip), f64::max) - height(&tip))
     }
-}
-
-/// The least time between two sets of joints by their rates, s.
-pub fn least_time(kinematics: &Kinematics, from: &Joints, to: &Joints) -> f64 {
-    let ways = to.values().into_iter().zip(from.values()).map(|(to, from)| (to - from).abs());
-    ways.zip(kinematics.rates()).map(|(way, rate)| way / rate).fold(0.0, f64::max)
 }
 
 impl JointReport {

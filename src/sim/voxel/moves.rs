@@ -154,6 +154,41 @@ impl MotionParts {
         below(&self.solid, &self.motions[index as usize], q, [0.0, 1.0], limit)
     }
 
+    /// The tool as it stands in the middle of a part.
+    pub(super) fn standing(&self, part: &MotionPart) -> MotionPart {
+        let middle = 0.5 * (part.range[0] + part.range[1]);
+        let at = self.motions[part.index as usize].at(middle);
+        let pivot = part.plain.pivot;
+        let plain = StandIn::new(at.tip + at.axis * pivot, Vector3::zeros(), at.axis, pivot);
+        let (tip, tip_way) = (at.tip, Vector3::zeros());
+        MotionPart { range: [middle; 2], tip, tip_way, plain, half_turn: 0.0, bulge: 0.0, ..*part }
+    }
+
+    /// How far any place of the tool on a part is at most from the same place of one that stands.
+    pub(super) fn spread(&self, standing: &MotionPart, part: &MotionPart) -> f64 {
+        let solid = &self.solid;
+        let arm = solid.heights().map(f64::abs).into_iter().fold(0.0, f64::max).hypot(solid.radius());
+        let motion = &self.motions[part.index as usize];
+        // On the way from end to end neither is farther than at the ends.
+        let [a, b] = part.range.map(|t| {
+            let at = motion.at(t);
+            let axis = standing.plain.axis;
+            let angle = axis.cross(&at.axis).norm().atan2(axis.dot(&at.axis));
+            ((at.tip - standing.tip).norm(), angle)
+        });
+        a.0.max(b.0) + a.1.max(b.1) * arm
+    }
+
+    /// Signed distance from what a move sweeps until a time, where it is below `limit`.
+    pub(super) fn until(&self, index: u32, q: &Point3, until: f64, limit: f64) -> Option<f64> {
+        below(&self.solid, &self.motions[index as usize], q, [0.0, until], limit).map(|found| found.distance)
+    }
+
+    /// Whether what a move sweeps is convex, also until some time.
+    pub(super) fn is_convex_on(&self, index: u32) -> bool {
+        self.solid.is_convex() && turn(&self.motions[index as usize]) == 0.0
+    }
+
     /// One move of the path.
     pub(super) fn motion(&self, index: u32) -> &Motion {
         &self.motions[index as usize]

@@ -1,0 +1,142 @@
+//! Every pair of the tool, upright and leaning, at 0.05 mm to either side of touching, against closed forms.
+
+use super::tests::{Home, PLATE};
+use report::{Claim, ToolpathResult, Verdict};
+
+/// A holder of 20 mm, 30 mm long, that begins 20 mm above the tip.
+const BOTTOM: f64 = 20.0;
+const RADIUS: f64 = 10.0;
+const HOLDER: &str = "[holder]\ncutting_length = 20\n[[holder.section]]\ndiameter = 20\nlength = 30\n";
+/// A shank of 5 mm before it, which begins 6 mm above the tip.
+const SHANK: &str = "[holder]\ncutting_length = 6\n[[holder.section]]\ndiameter = 5\nlength = 14\n\
+                     [[holder.section]]\ndiameter = 20\nlength = 30\n";
+
+const GAPS: [f64; 2] = [0.05, -0.05];
+const AXES: [[f64; 2]; 2] = [[0.0, 1.0], [0.6, 0.8]];
+
+/// A program that goes down along the axis `[x, z]` to `tip`, and back.
+fn program(tip: [f64; 3], [x, z]: [f64; 2], rapid: &str) -> String {
+    let at =
+        |far: f64| format!("GOTO/{:.6},{:.6},{:.6},{x},0,{z}\n", tip[0] + far * x, tip[1], tip[2] + far * z);
+    format!(
+        "UNITS/MM\nSPINDL/8000,CLW\nRAPID\n{}{rapid}{}FEDRAT/800,MMPM\n{}FINI\n",
+        at(70.0),
+        at(0.0),
+        at(70.0)
+    )
+}
+
+struct Case {
+    home: Home,
+    axis: [f64; 2],
+    holder: &'static str,
+    /// Between the top of the plate and that of the block.
+    allowance: f64,
+    rapid: &'static str,
+}
+
+impl Case {
+    fn new(name: &str, axis: [f64; 2]) -> Self {
+        let home = Home::new(&format!("planted-{name}-{}", axis[0]));
+        Self { home, axis, holder: HOLDER, allowance: 0.0, rapid: "FEDRAT/800,MMPM\n" }
+    }
+
+    fn run(&self, tip: [f64; 3]) -> ToolpathResult {
+        self.home.write("path.cls", &program(tip, self.axis, self.rapid));
+        let fixture = "[[fixture]]\nfile = \"clamp.stl\"\n";
+        self.home.opened(&format!(
+            "{PLATE}[stock]\nallowance = {}\n{}[interference]\nclearance = 0\n{fixture}[[toolpath]]\nstrategy = \"program\"\n\
+             file = \"path.cls\"\n",
+            self.allowance, self.holder
+        ))
+    }
+
+    /// A clamp that begins so far along x, at the heights around `z`.
+    fn clamp(&self, x: [f64; 2], z: f64) {
+        self.home.solid("clamp.stl", [x[0], -20.0, z - 2.0], [x[1], 20.0, z + 2.0]);
+    }
+
+    /// A clamp under the tool, whose edge lies so far above the tip along the axis and so far from the axis.
+    fn beside(&self, tip: [f64; 3], height: f64, far: f64) {
+        let [x, z] = [
+            tip[0] + height * self.axis[0] + far * self.axis[1],
+            tip[2] + height * self.axis[1] - far * self.axis[0],
+        ];
+        self.home.solid("clamp.stl", [x, -20.0, z - 1.0], [x + 1.0, 20.0, z]);
+    }
+}
+
+/// The claim on a pair, as it begins.
+fn of_pair<'a>(result: &'a ToolpathResult, tool: &str, other: &str) -> &'a Claim {
+    let of_pair = |claim: &&Claim| {
+        let text = claim.text.to_lowercase();
+        let named = text.contains(&format!("{tool} to {other}"));
+        claim.what == "collision" && (named || text.starts_with(&format!("{tool} collides with {other}")))
+    };
+    result.claims.iter().find(of_pair).unwrap_or_else(|| panic!("{tool} {other} {:#?}", result.claims))
+}
+
+/// A contact is found and a clearance passes, with a figure that the closed form lies in.
+fn holds(result: &ToolpathResult, tool: &str, other: &str, gap: f64) {
+    let found = of_pair(result, tool, other);
+    let verdict = if gap < 0.0 { Verdict::Fail } else { Verdict::Pass };
+    assert_eq!(found.verdict(), verdict, "{tool} {other} {gap}: {found:?}");
+    let clearance = -found.measured.unwrap();
+    if gap > 0.0 {
+        assert!(clearance >= gap - 1e-5 && clearance - found.error_bound <= gap + 1e-5, "{gap} {found:?}");
+    } else {
+        assert!(clearance >= gap - 1e-5 && clearance < 0.6 * gap, "{gap} {found:?}");
+    }
+}
+
+/// A clamp beside the cutter on the side away from where it leans, and one under the holder.
+#[test]
+fn cutter_and_holder_against_a_fixture() {
+    for (axis, gap) in AXES.into_iter().flat_map(|axis| GAPS.map(|gap| (axis, gap))) {
+        let case = Case::new("fixture", axis);
+        let tip = [4.0, 3.0, 0.0];
+        let ball = [tip[0] + 3.0 * axis[0], tip[2] + 3.0 * axis[1]];
+        let side = ball[0] - 3.0 - gap;
+        case.clamp([side - 5.0, side], ball[1]);
+        holds(&case.run(tip), "cutter", "clamp.stl", gap);
+        case.beside(tip, 35.0, RADIUS + gap);
+        holds(&case.run(tip), "holder", "clamp.stl", gap);
+    }
+}
+
+/// The rim of the holder over plate and block, the tip beside them; over stock of 4 mm also from its shank.
+#[test]
+fn holder_and_shank_against_part_and_standing_stock() {
+    for (axis, gap) in AXES.into_iter().flat_map(|axis| GAPS.map(|gap| (axis, gap))) {
+        let mut case = Case::new("part", axis);
+        case.clamp([200.0, 205.0], 0.0);
+        // Upright a rim over the plate, and leaning its lowest place there.
+        let rim = [axis[0] * BOTTOM + axis[1] * RADIUS, axis[1] * BOTTOM - axis[0] * RADIUS];
+        let beside = |z: f64| [3.0 - rim[0], 3.0, z + gap - rim[1]];
+        let result = case.run(beside(0.0));
+        holds(&result, "holder", "part", gap);
+        holds(&result, "holder", "standing stock", gap);
+        case.allowance = 4.0;
+        let result = case.run(beside(4.0));
+        holds(&result, "holder", "standing stock", gap);
+        case.holder = SHANK;
+        holds(&case.run(beside(4.0)), "holder", "standing stock", gap);
+        // A clamp beside the shank, in the middle of its length.
+        let tip = beside(20.0);
+        case.beside(tip, 13.0, 2.5 + gap);
+        holds(&case.run(tip), "holder", "clamp.stl", gap);
+    }
+}
+
+/// A rapid move of a leaning cutter into the plate counts from beyond the gouge tolerance on; feeds are gouges.
+#[test]
+fn a_leaning_cutter_on_rapid_moves_against_the_part() {
+    for gap in GAPS {
+        let mut case = Case::new("rapid", AXES[1]);
+        case.clamp([200.0, 205.0], 0.0);
+        case.rapid = "RAPID\n";
+        // The lowest place of the ball.
+        let tip = [4.0, 3.0, gap + 3.0 - 3.0 * 0.8];
+        holds(&case.run(tip), "cutter on rapid moves", "part", gap);
+    }
+}
