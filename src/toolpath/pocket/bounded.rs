@@ -370,7 +370,7 @@ impl Walker<'_> {
         /// Layers over a film. Greater might be more than one, where chords meet.
         const LAYER: f64 = 0.9;
         /// Longer ways, over the radius, are no corner's last bit.
-        const MOST: f64 = 0.12;
+        const MOST: f64 = 0.5;
         /// Half the way back and forth over the radius: what was cut farther behind is no chip of its own any more.
         const BACK: f64 = 0.06;
         /// Cosine of the turn in a corner of walls. Bends that are less sharp have room for loops beyond them.
