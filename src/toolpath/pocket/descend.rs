@@ -111,7 +111,8 @@ impl Writer<'_> {
             self.to(Point3::new(first.x, first.y, near), MoveKind::Rapid, 0.0);
             for tip in way {
                 // A short side is steeper than planned once its ends are rounded.
-                let [from, to] = [self.at.unwrap_or(over), tip].map(|p| Point3::from(p.coords.map(in_last_decimals)));
+                let [from, to] =
+                    [self.at.unwrap_or(over), tip].map(|p| Point3::from(p.coords.map(in_last_decimals)));
                 let (run_length, drop) = ((to.xy() - from.xy()).norm(), from.z - to.z);
                 // The plunge rate bounds the speed downwards, whatever the slope.
                 let steep = if drop > 0.0 { run_length.hypot(drop) / drop } else { f64::INFINITY };

@@ -263,13 +263,15 @@ mod tests {
     /// is little longer than the taut one around the two inner corners.
     #[test]
     fn a_way_with_corners_goes_around_what_stands() {
-        let corners = [(0., 0.), (20., 0.), (20., 20.), (13., 20.), (13., 7.), (7., 7.), (7., 20.), (0., 20.)];
+        let corners =
+            [(0., 0.), (20., 0.), (20., 20.), (13., 20.), (13., 7.), (7., 7.), (7., 20.), (0., 20.)];
         let outer = corners.map(|(x, y)| Point2::new(x, y)).to_vec();
         let piece = geometry::Piece { outer, islands: Vec::new() };
         let (room, radius) = (Room::new(&piece), 2.0);
         let mut cleared = Cleared::new([Point2::new(-2.0, -2.0), Point2::new(22.0, 22.0)], radius);
         let mut visited = Visited::new(radius);
-        let places = (0..=200).flat_map(|j| (0..=200).map(move |i| Point2::new(0.1 * f64::from(i), 0.1 * f64::from(j))));
+        let places = (0..=200)
+            .flat_map(|j| (0..=200).map(move |i| Point2::new(0.1 * f64::from(i), 0.1 * f64::from(j))));
         for p in places.filter(|p| room.nearest_inside(p) == *p) {
             cleared.add(p);
             visited.add(p);
