@@ -17,7 +17,8 @@ use std::f64::consts::{PI, TAU};
 use super::cleared::{Cleared, FILM};
 use super::route::{Entry, Run, bend, circle};
 use super::turning::Turning;
-use super::way::{Room, Way, fitting};
+use super::walls::Room;
+use super::way::{Way, fitting};
 use geometry::{Point2, Vector2};
 use work::monitor::{Cancelled, Monitor, check};
 
@@ -369,8 +370,9 @@ impl Walker<'_> {
     fn nibble(&mut self, s: f64) -> f64 {
         /// Layers over a film. Greater might be more than one, where chords meet.
         const LAYER: f64 = 0.9;
-        /// Longer ways, over the radius, are no corner's last bit.
-        const MOST: f64 = 0.12;
+        /// Longer ways, over the radius, are slots that the report has to name. Tips of 40 degrees, and those before necks that are
+        /// too narrow, end within it at the smallest limits.
+        const MOST: f64 = 0.5;
         /// Half the way back and forth over the radius: what was cut farther behind is no chip of its own any more.
         const BACK: f64 = 0.06;
         /// Cosine of the turn in a corner of walls. Bends that are less sharp have room for loops beyond them.

@@ -9,6 +9,7 @@
 
 use std::cell::{Cell, RefCell};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::sync::LazyLock;
 
 use geometry::{Point2, Vector2};
 
@@ -49,6 +50,8 @@ pub(super) struct Cleared {
     /// The disc that cleared most of the last front, and how many of its parts.
     best: Cell<Option<(usize, u32)>>,
     near: RefCell<Near>,
+    /// So many of the first discs were looked at when the ground was thinned.
+    thinned: usize,
     /// Buckets to which discs were added since the ground was thinned.
     fresh: Vec<bool>,
 }
@@ -75,7 +78,7 @@ impl Cleared {
         let buckets = vec![Vec::new(); side[0] * side[1]];
         let fresh = vec![false; buckets.len()];
         let (best, near) = (Cell::new(None), RefCell::new(Near::default()));
-        Self { radius, origin: lo, bucket, side, buckets, discs: Vec::new(), best, near, fresh }
+        Self { radius, origin: lo, bucket, side, buckets, discs: Vec::new(), best, near, thinned: 0, fresh }
     }
 
     /// How many places there are.
@@ -113,6 +116,7 @@ impl Cleared {
         if near.count > count {
             near.reach = 0.0;
         }
+        self.thinned = self.thinned.min(count);
         while self.discs.len() > count {
             if let Some(p) = self.discs.pop() {
                 let bucket = self.bucket_of(&p);
@@ -121,7 +125,7 @@ impl Cleared {
         }
     }
 
-    /// Leaves out the discs among the first `count` that others of them cover whole: every angle stays the same. Leaves how
+    /// Leaves out discs among the first `count` that others of them cover whole: every angle stays the same. Leaves how
     /// many those were.
     ///
     /// A disc is covered where those that hold its middle cover its circumference: each is convex, so with a place of the
@@ -131,28 +135,34 @@ impl Cleared {
         let count = count.min(self.discs.len());
         let mut keep = vec![true; self.discs.len()];
         let changed = self.changed();
-        let mut seen: Vec<[f64; 2]> = Vec::new();
         for k in 0..count {
             let centre = self.discs[k];
             if !changed[self.bucket_of(&centre)] {
                 continue;
             }
-            seen.clear();
+            // What was not covered before is only where something was added.
+            let (mut rim, mut near, mut added) = (Rim::default(), Vec::new(), k >= self.thinned);
             self.each_near(&centre, self.radius, |other| {
-                let to = self.discs[other] - centre;
-                let away = to.norm();
-                if other < count && other != k && keep[other] && away <= self.radius {
-                    let half = (0.5 * away / self.radius).acos() - ROUNDING;
-                    // A place that was cleared twice covers all.
-                    let (towards, half) = if away > 0.0 { (to.y.atan2(to.x), half) } else { (0.0, PI) };
-                    seen.push([towards - half, towards + half]);
+                let to = (self.discs[other] - centre) / self.radius;
+                if other < count && other != k && keep[other] && to.norm_squared() <= 1.0 {
+                    added |= other >= self.thinned;
+                    near.push(to);
                 }
             });
-            keep[k] = !covers_turn(&mut seen);
+            if added {
+                near.iter()
+                    .take_while(|to| {
+                        rim.cover(to);
+                        !rim.is_covered()
+                    })
+                    .for_each(drop);
+                keep[k] = !rim.is_covered();
+            }
         }
         let kept: Vec<Point2> =
             self.discs.iter().zip(&keep).filter(|(_, keep)| **keep).map(|(p, _)| *p).collect();
         let left_out = self.discs.len() - kept.len();
+        self.thinned = count - left_out;
         self.buckets.iter_mut().for_each(Vec::clear);
         self.discs.clear();
         kept.into_iter().for_each(|p| self.add(p));
@@ -200,7 +210,7 @@ impl Cleared {
     /// As [`Cleared::arc`], with what is clear to the right of the stock counted as well: the angle that there is once the
     /// cutter has turned along the stock on its right.
     pub fn arc_from_right(&self, centre: &Point2, heading: &Vector2, fresh: usize) -> f64 {
-        self.front(centre, heading, 0.0, fresh).ends().map_or(0.0, |[_, to]| to + FRAC_PI_2)
+        self.front(centre, heading, 0.0, fresh).ends().map_or(0.0, |[_, to]| PART * to as f64)
     }
 
     /// Whether a straight move keeps to a limit all along but for [`BETWEEN`]: tips of stock may be passed between its ends. A
@@ -324,8 +334,8 @@ impl Front {
     fn find_ends(&mut self) {
         let Self { radius, heading, .. } = *self;
         self.ends = self.standing.ends().map(|ends| {
-            ends.map(|turn| {
-                let (sin, cos) = turn.sin_cos();
+            ends.map(|end| {
+                let [cos, sin] = DIRECTIONS[end];
                 Vector2::new(heading.x * cos - heading.y * sin, heading.x * sin + heading.y * cos) * radius
             })
         });
@@ -372,19 +382,42 @@ impl Front {
     }
 }
 
-/// Whether arcs, none longer than a turn, whose middles lie between -π and π, cover a turn. Their order changes.
-fn covers_turn(arcs: &mut [[f64; 2]]) -> bool {
-    arcs.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    // From -π on: what begins before that goes on from the other end of the turn, too.
-    let mut until = arcs.iter().map(|arc| arc[1] - TAU).fold(-PI, f64::max);
-    for arc in arcs.iter() {
-        if arc[0] > until {
-            return false;
-        }
-        until = until.max(arc[1]);
+/// Parts of a circumference, and which of them are covered whole.
+#[derive(Default)]
+struct Rim(u64);
+
+impl Rim {
+    fn is_covered(&self) -> bool {
+        self.0 == u64::MAX
     }
-    until >= PI || arcs.first().is_some_and(|first| first[0] + TAU <= until)
+
+    /// Covers the parts that an equal disc does whose middle lies at `to`, over the radius.
+    fn cover(&mut self, to: &Vector2) {
+        const PARTS: f64 = 64.0;
+        let square = to.norm_squared();
+        // A place that was cleared twice covers all.
+        if square == 0.0 {
+            self.0 = u64::MAX;
+            return;
+        }
+        let half = (0.5 * square.sqrt()).acos() - ROUNDING;
+        let towards = to.y.atan2(to.x);
+        let from = ((towards - half) / TAU * PARTS).ceil();
+        let count = ((towards + half) / TAU * PARTS).floor() - from;
+        if count > 0.0 {
+            let bits = u64::MAX >> (64 - count as u32);
+            self.0 |= bits.rotate_left(from.rem_euclid(PARTS) as u32);
+        }
+    }
 }
+
+/// Cosine and sine of where each part begins, from the heading.
+static DIRECTIONS: LazyLock<[[f64; 2]; PARTS + 1]> = LazyLock::new(|| {
+    std::array::from_fn(|part| {
+        let (sin, cos) = (PART * part as f64 - FRAC_PI_2).sin_cos();
+        [cos, sin]
+    })
+});
 
 /// Parts of the front half circle, from the right to the left.
 struct Arc([u64; PARTS / 64]);
@@ -414,13 +447,12 @@ impl Arc {
         stood
     }
 
-    /// Where what stands begins and ends, rad from the heading.
-    fn ends(&self) -> Option<[f64; 2]> {
+    /// The part with which what stands begins, and the one after its last.
+    fn ends(&self) -> Option<[usize; 2]> {
         let first = self.0.iter().position(|w| *w != 0)?;
         let last = self.0.iter().rposition(|w| *w != 0)?;
-        let from = 64 * first as u32 + self.0[first].trailing_zeros();
-        let to = 64 * (last as u32 + 1) - self.0[last].leading_zeros();
-        Some([from, to].map(|part| f64::from(part) * PART - FRAC_PI_2))
+        let from = 64 * first + self.0[first].trailing_zeros() as usize;
+        Some([from, 64 * (last + 1) - self.0[last].leading_zeros() as usize])
     }
 
     fn angle(&self) -> f64 {

@@ -5,7 +5,7 @@ use super::route::{Entry, Run};
 use super::strategy::{PocketStrategy, WallFinish};
 use crate::vocabulary::PlanSettings;
 use geometry::{Point2, Point3, foot};
-use motion::{ClPoint, Move, MoveKind, Toolpath};
+use motion::{ClPoint, Move, MoveKind, Toolpath, in_last_decimals};
 
 /// Share of the chord tolerance that the chords of a helix may use, when the rest is left to what is done with the moves
 /// afterwards. Greater shares make fewer moves.
@@ -110,8 +110,10 @@ impl Writer<'_> {
             self.to(over, MoveKind::Rapid, 0.0);
             self.to(Point3::new(first.x, first.y, near), MoveKind::Rapid, 0.0);
             for tip in way {
-                let from = self.at.unwrap_or(over);
-                let (run_length, drop) = ((tip.xy() - from.xy()).norm(), from.z - tip.z);
+                // A short side is steeper than planned once its ends are rounded.
+                let [from, to] =
+                    [self.at.unwrap_or(over), tip].map(|p| Point3::from(p.coords.map(in_last_decimals)));
+                let (run_length, drop) = ((to.xy() - from.xy()).norm(), from.z - to.z);
                 // The plunge rate bounds the speed downwards, whatever the slope.
                 let steep = if drop > 0.0 { run_length.hypot(drop) / drop } else { f64::INFINITY };
                 let feed = (settings.plunge_rate * steep).min(settings.feed_rate);

@@ -2,9 +2,11 @@
 //!
 //! Enters: the room of the cutter's centre, the ground, where and in which direction a pass ends and the next one begins, and
 //! places that the centre has been at. Leaves: the places between. A link is an arc, a straight line and an arc, the shortest
-//! of the four such ways that is free (L. E. Dubins, 1957); else the shortest way from place to place whose sides are free, with
-//! corners; mm, rad.
+//! of the four such ways that is free (L. E. Dubins, 1957); else a way with corners from place to place whose sides are free
+//! (A*: P. Hart, N. Nilsson, B. Raphael, 1968), pulled taut; mm, rad.
 
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashMap};
 use std::f64::consts::TAU;
 
 use super::cleared::Cleared;
@@ -21,18 +23,46 @@ const SIDE: f64 = 0.1;
 /// Links are asked for stock at places this far apart over the radius.
 const LINK: f64 = 0.12;
 
-/// Places of earlier passes that may be corners of a link, and sides that are asked for at most before it goes back the way
-/// that it came.
-const CORNERS: usize = 64;
-const TRIALS: usize = 400;
+/// Side of the cells over the radius of which one place each may be a corner of a link.
+const CELL: f64 = 0.5;
 
 /// A place and a direction there.
 pub(super) type Pose = (Point2, Vector2);
+
+type Cell = [i32; 2];
+
+/// Places that the centre has been at, the first in each square cell.
+pub(super) struct Visited {
+    cell: f64,
+    first: HashMap<Cell, Point2>,
+}
+
+impl Visited {
+    pub fn new(radius: f64) -> Self {
+        Self { cell: CELL * radius, first: HashMap::new() }
+    }
+
+    pub fn add(&mut self, p: Point2) {
+        self.first.entry(self.cell_of(&p)).or_insert(p);
+    }
+
+    fn cell_of(&self, p: &Point2) -> Cell {
+        [p.x, p.y].map(|x| (x / self.cell).floor() as i32)
+    }
+
+    /// The places of the cell that a place is in and of those beside it.
+    fn near(&self, p: &Point2) -> impl Iterator<Item = (Cell, Point2)> {
+        let [i, j] = self.cell_of(p);
+        let cells = (i - 1..=i + 1).flat_map(move |i| (j - 1..=j + 1).map(move |j| [i, j]));
+        cells.filter_map(|cell| Some((cell, *self.first.get(&cell)?)))
+    }
+}
 
 /// What links keep to.
 pub(super) struct Links<'a> {
     pub room: &'a Room<'a>,
     pub cleared: &'a Cleared,
+    pub visited: &'a Visited,
     pub radius: f64,
 }
 
@@ -54,30 +84,72 @@ impl Links<'_> {
             let whole = || std::iter::once(&end).chain(way).chain([&to]);
             whole().zip(whole().skip(1)).all(|(a, b)| self.is_free(a, b))
         });
-        let back = || gone[index + 1..n - 1].iter().rev().copied().collect();
-        smooth.or_else(|| self.around(gone, index)).unwrap_or_else(back)
+        smooth.or_else(|| self.around(end, to)).unwrap_or_else(|| back(gone, index))
     }
 
-    /// The shortest way with corners at places of `gone`. Sides are asked for only where such a way wants them.
-    fn around(&self, gone: &[Point2], index: usize) -> Option<Vec<Point2>> {
-        let n = gone.len();
-        let mut nodes = vec![gone[n - 1], gone[index]];
-        nodes.extend((0..CORNERS).map(|k| gone[k * n / CORNERS]));
-        let count = nodes.len();
-        let mut blocked = vec![false; count * count];
-        let mut known = vec![false; count * count];
-        for _ in 0..TRIALS {
-            let way = shortest(&nodes, &blocked)?;
-            let side = way.windows(2).find(|side| !known[side[0] * count + side[1]]);
-            let Some(&[a, b]) = side else {
-                return Some(way[1..way.len() - 1].iter().map(|k| nodes[*k]).collect());
-            };
-            let free = self.is_free(&nodes[a], &nodes[b]);
-            for at in [a * count + b, b * count + a] {
-                (known[at], blocked[at]) = (true, !free);
+    /// A short way with corners at places that were visited. Sides are asked for only where such a way wants them.
+    fn around(&self, end: Point2, to: Point2) -> Option<Vec<Point2>> {
+        const TARGET: usize = 1;
+        let mut nodes = vec![end, to];
+        let mut ids: HashMap<Cell, usize> = HashMap::new();
+        let mut from: Vec<Option<usize>> = vec![Some(0), None];
+        // By the length of the whole way at least; equal ones in the order in which they were found.
+        let mut open = BinaryHeap::new();
+        let mut found = 0u64;
+        let mut push = |open: &mut BinaryHeap<_>, [before, node]: [usize; 2], gone: f64, at: &Point2| {
+            found += 1;
+            open.push(Reverse(((gone + (to - at).norm()).to_bits(), found, [before, node], gone.to_bits())));
+        };
+        push(&mut open, [0, TARGET], (to - end).norm(), &to);
+        push(&mut open, [0, 0], 0.0, &end);
+        while let Some(Reverse((_, _, [before, node], gone))) = open.pop() {
+            let begins = node == 0 && before == 0;
+            if !begins && (from[node].is_some() || !self.is_free(&nodes[before], &nodes[node])) {
+                continue;
+            }
+            from[node] = Some(before);
+            if node == TARGET {
+                break;
+            }
+            let (at, gone) = (nodes[node], f64::from_bits(gone));
+            let target = self.visited.cell_of(&to);
+            for (cell, place) in self.visited.near(&at) {
+                let next = *ids.entry(cell).or_insert_with(|| {
+                    nodes.push(place);
+                    from.push(None);
+                    nodes.len() - 1
+                });
+                if from[next].is_none() {
+                    push(&mut open, [node, next], gone + (place - at).norm(), &place);
+                }
+                if cell == target && node != 0 {
+                    push(&mut open, [node, TARGET], gone + (to - at).norm(), &to);
+                }
             }
         }
-        None
+        let mut way = vec![to];
+        let mut at = TARGET;
+        while at != 0 {
+            at = from[at]?;
+            way.push(nodes[at]);
+        }
+        way.reverse();
+        Some(self.taut(&way))
+    }
+
+    /// Corners of a way that its other corners do not make needless, ends left out.
+    fn taut(&self, way: &[Point2]) -> Vec<Point2> {
+        let (mut at, mut corners) = (0, Vec::new());
+        while at + 1 < way.len() {
+            let mut next = way.len() - 1;
+            while next > at + 1 && !self.is_free(&way[at], &way[next]) {
+                next = at + (next - at) / 2;
+            }
+            corners.push(way[next]);
+            at = next;
+        }
+        corners.pop();
+        corners
     }
 
     /// Whether a straight move stays inside and cuts nothing.
@@ -90,31 +162,23 @@ impl Links<'_> {
     }
 }
 
-/// The shortest way from the first to the second of the places by sides that are not blocked.
-fn shortest(nodes: &[Point2], blocked: &[bool]) -> Option<Vec<usize>> {
-    let count = nodes.len();
-    let (mut far, mut from, mut done) = (vec![f64::INFINITY; count], vec![0; count], vec![false; count]);
-    far[0] = 0.0;
-    loop {
-        let open = (0..count).filter(|k| !done[*k] && far[*k].is_finite());
-        let at = open.min_by(|a, b| far[*a].total_cmp(&far[*b]))?;
-        if at == 1 {
-            break;
+/// The way back to one of the places of a way, ends left out. What it was at before it does not go around to again.
+fn back(gone: &[Point2], index: usize) -> Vec<Point2> {
+    let mut way: Vec<Point2> = Vec::new();
+    let mut known = HashMap::new();
+    let key = |p: &Point2| [p.x, p.y].map(f64::to_bits);
+    for p in gone[index..].iter().rev() {
+        if let Some(&at) = known.get(&key(p)) {
+            way.drain(at..).for_each(|p| {
+                known.remove(&key(&p));
+            });
         }
-        done[at] = true;
-        for next in (0..count).filter(|next| !done[*next] && !blocked[at * count + *next]) {
-            let length = far[at] + (nodes[next] - nodes[at]).norm();
-            if length < far[next] {
-                (far[next], from[next]) = (length, at);
-            }
-        }
+        known.insert(key(p), way.len());
+        way.push(*p);
     }
-    let mut way = vec![1];
-    while way[way.len() - 1] != 0 {
-        way.push(from[way[way.len() - 1]]);
-    }
-    way.reverse();
-    Some(way)
+    way.pop();
+    way.drain(..1.min(way.len()));
+    way
 }
 
 /// The ways of an arc, a straight line and an arc between two poses, ends left out, with their lengths.
@@ -185,17 +249,40 @@ mod tests {
         assert!(ways.iter().any(|way| (way.0 - 7.0).abs() < 1e-12));
     }
 
-    /// The first straight way is blocked; the shorter of two detours is taken, and no way is none.
+    /// Where an earlier link went back over the same ground, a way back goes there once.
     #[test]
-    fn the_shortest_free_way_is_taken() {
-        let nodes = [(0., 0.), (10., 0.), (5., 1.), (5., -3.)].map(|(x, y)| Point2::new(x, y));
-        let mut blocked = vec![false; 16];
-        assert_eq!(shortest(&nodes, &blocked), Some(vec![0, 1]));
-        (blocked[1], blocked[4]) = (true, true);
-        assert_eq!(shortest(&nodes, &blocked), Some(vec![0, 2, 1]));
-        (blocked[2], blocked[8]) = (true, true);
-        assert_eq!(shortest(&nodes, &blocked), Some(vec![0, 3, 1]));
-        blocked.fill(true);
-        assert_eq!(shortest(&nodes, &blocked), None);
+    fn ways_back_pass_no_place_twice() {
+        let places: Vec<Point2> = (0..5).map(|k| Point2::new(f64::from(k), 0.0)).collect();
+        let at = |order: &[usize]| order.iter().map(|k| places[*k]).collect::<Vec<_>>();
+        assert_eq!(back(&at(&[0, 1, 2, 3, 4]), 0), at(&[3, 2, 1]));
+        assert_eq!(back(&at(&[0, 1, 2, 3, 2, 1, 2, 3, 4]), 0), at(&[3, 2, 1]));
+        assert_eq!(back(&at(&[0, 1]), 0), []);
+    }
+
+    /// Along a U that has been cleared: from the end of one leg to that of the other one there is no arc, and the way with corners
+    /// is little longer than the taut one around the two inner corners.
+    #[test]
+    fn a_way_with_corners_goes_around_what_stands() {
+        let corners =
+            [(0., 0.), (20., 0.), (20., 20.), (13., 20.), (13., 7.), (7., 7.), (7., 20.), (0., 20.)];
+        let outer = corners.map(|(x, y)| Point2::new(x, y)).to_vec();
+        let piece = geometry::Piece { outer, islands: Vec::new() };
+        let (room, radius) = (Room::new(&piece), 2.0);
+        let mut cleared = Cleared::new([Point2::new(-2.0, -2.0), Point2::new(22.0, 22.0)], radius);
+        let mut visited = Visited::new(radius);
+        let places = (0..=200)
+            .flat_map(|j| (0..=200).map(move |i| Point2::new(0.1 * f64::from(i), 0.1 * f64::from(j))));
+        for p in places.filter(|p| room.nearest_inside(p) == *p) {
+            cleared.add(p);
+            visited.add(p);
+        }
+        let links = Links { room: &room, cleared: &cleared, visited: &visited, radius };
+        let (from, to) = (Point2::new(3.5, 19.0), Point2::new(16.5, 19.0));
+        let way = links.around(from, to).unwrap();
+        let whole: Vec<Point2> = std::iter::once(from).chain(way).chain([to]).collect();
+        let length: f64 = whole.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
+        let taut = 2.0 * 12f64.hypot(3.5) + 6.0;
+        assert!(length >= taut - 1e-9 && length < 1.1 * taut, "{length} {taut}");
+        assert!(whole.windows(2).all(|w| links.is_free(&w[0], &w[1])));
     }
 }

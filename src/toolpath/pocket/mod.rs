@@ -222,7 +222,7 @@ fn bound_runs(
     let Some(ground) = ground else { return Ok(()) };
     let (mut loops, mut above) = (0, Vec::new());
     for (piece, runs) in groups {
-        let room = way::Room::new(piece);
+        let room = walls::Room::new(piece);
         for run in runs {
             let did = bounded::bound(run, &room, ground, rules, monitor)?;
             loops += did.loops;

@@ -14,7 +14,7 @@ use std::cell::Cell;
 use super::beginnings::{Beginning, Beginnings};
 use super::bounded::STEP;
 use super::cleared::Cleared;
-use super::link::Links;
+use super::link::{Links, Visited};
 use super::walls::Room;
 use geometry::{Point2, Vector2};
 use work::monitor::{Cancelled, Monitor, check};
@@ -81,6 +81,7 @@ pub(super) struct Peeler<'a> {
     careful: bool,
     out: Vec<Point2>,
     places: Beginnings,
+    visited: Visited,
     thin_at: usize,
     /// A place, and how far around it there is no wall, mm.
     open: Cell<(Point2, f64)>,
@@ -104,6 +105,7 @@ impl<'a> Peeler<'a> {
             careful: false,
             out: Vec::new(),
             places: Beginnings::new(radius),
+            visited: Visited::new(radius),
             thin_at: 0,
             open: Cell::new((Point2::origin(), 0.0)),
         };
@@ -151,6 +153,7 @@ impl<'a> Peeler<'a> {
                 gone += (next - self.out[index]).norm();
             }
         }
+        self.out[first..].iter().for_each(|p| self.visited.add(*p));
         self.places.pass_done(&self.out[first..]);
     }
 
@@ -208,7 +211,8 @@ impl<'a> Peeler<'a> {
     fn link_to(&mut self, k: usize, since: usize) -> Vec<Point2> {
         let later = self.cleared.split_off(since);
         let place = self.places.get(k);
-        let links = Links { room: self.room, cleared: self.cleared, radius: self.radius };
+        let (room, cleared, visited) = (self.room, &*self.cleared, &self.visited);
+        let links = Links { room, cleared, visited, radius: self.radius };
         let link = links.between(&self.out, place.index, place.heading);
         later.into_iter().for_each(|p| self.cleared.add(p));
         link

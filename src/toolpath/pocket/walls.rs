@@ -5,7 +5,7 @@
 //! bends between curves and level curves come from triangles, so neither keeps to walls by itself; mm.
 
 use super::route::{Entry, Run};
-use geometry::{Piece, Point2, Region, SegmentGrid, Vector2, distance_of_segments};
+use geometry::{NearestSegment, Piece, Point2, Region, SegmentGrid, Vector2, distance_of_segments};
 
 /// What offsets may be off by rounding, mm: some 2⁻³⁰ of the size of the region.
 pub(super) const ROUNDING: f64 = 5.0e-7;
@@ -70,19 +70,45 @@ impl<'a> Room<'a> {
         parts
     }
 
+    /// The place of the wall that is nearest to a place, and its distance, mm.
+    pub fn nearest(&self, p: &Point2) -> Option<(Point2, f64)> {
+        let near = self.walls.nearest(p)?;
+        Some((self.foot(&near), near.distance))
+    }
+
+    fn foot(&self, near: &NearestSegment) -> Point2 {
+        let [a, b] = self.walls.segments()[near.segment as usize].ends;
+        a + (b - a) * near.share
+    }
+
+    /// Whether the piece contains a place: it lies on the left of its sides. At a corner of two sides all of them are asked.
+    fn contains(&self, p: &Point2, near: &NearestSegment) -> bool {
+        /// Nearer to an end of a side, as a share of it, the place may be beside the next one.
+        const END: f64 = 1e-6;
+        let [a, b] = self.walls.segments()[near.segment as usize].ends;
+        if near.distance > ON_WALL && (END..=1.0 - END).contains(&near.share) {
+            return (b - a).perp(&(p - a)) > 0.0;
+        }
+        self.piece.contains(p)
+    }
+
+    /// The wall nearest to a place that is outside.
+    fn outside_of(&self, p: &Point2) -> Option<NearestSegment> {
+        self.walls.nearest(p).filter(|near| near.distance > ON_WALL && !self.contains(p, near))
+    }
+
     fn is_outside(&self, p: &Point2) -> bool {
-        !self.piece.contains(p) && self.walls.distance(p) > ON_WALL
+        self.outside_of(p).is_some()
+    }
+
+    /// Whether a place is inside.
+    pub fn holds_place(&self, p: &Point2) -> bool {
+        self.walls.nearest(p).is_some_and(|near| self.contains(p, &near))
     }
 
     /// The place itself, or the nearest one of the wall where it is outside.
     pub fn nearest_inside(&self, p: &Point2) -> Point2 {
-        if !self.is_outside(p) {
-            return *p;
-        }
-        self.walls.nearest(p).map_or(*p, |near| {
-            let [a, b] = self.walls.segments()[near.segment as usize].ends;
-            a + (b - a) * near.share
-        })
+        self.outside_of(p).map_or(*p, |near| self.foot(&near))
     }
 
     /// Distance of a place from the nearest wall, mm.
@@ -293,6 +319,21 @@ mod tests {
             let walls = SegmentGrid::of_curves(region.curves());
             assert!(round.curves().flatten().all(|p| walls.distance(p) < radius * (1.0 + 2e-4)));
         }
+    }
+
+    /// Places are inside by the side nearest to them as they are by all sides.
+    #[test]
+    fn places_are_inside_by_their_nearest_side() {
+        let piece = room();
+        let room = Room::new(&piece);
+        let mut inside = 0;
+        for k in 0..4000 {
+            let (a, b) = (0.618_034 * f64::from(k), 0.754_878 * f64::from(k));
+            let p = Point2::new(24.0 * a.fract() - 2.0, 24.0 * b.fract() - 2.0);
+            assert_eq!(room.holds_place(&p), piece.contains(&p), "{p}");
+            inside += usize::from(piece.contains(&p));
+        }
+        assert!(inside > 1000, "{inside}");
     }
 
     /// In front of a neck that is too narrow two round corners meet in a tip.

@@ -1,7 +1,8 @@
 //! A way of the cutter's centre by its length, and the circles that touch it and fit into its room; mm.
 
 use super::bounded::LEAST;
-use geometry::{Piece, Point2, SegmentGrid, Vector2};
+use super::walls::Room;
+use geometry::{Point2, Vector2};
 
 /// A circle may be this share of the radius less than one that fits.
 const FIT: f64 = 0.002;
@@ -72,18 +73,6 @@ impl Way {
     }
 }
 
-/// Where the centre may be.
-pub(super) struct Room<'a> {
-    within: &'a Piece,
-    walls: SegmentGrid,
-}
-
-impl<'a> Room<'a> {
-    pub fn new(within: &'a Piece) -> Self {
-        Self { within, walls: SegmentGrid::of_curves(within.curves()) }
-    }
-}
-
 /// The greatest circle up to the radius `rho` that touches the way at `s` from one side and fits in.
 pub(super) fn fitting(
     way: &Way,
@@ -96,19 +85,16 @@ pub(super) fn fitting(
     let at = way.at(s);
     let heading = way.heading(s)?;
     let inwards = Vector2::new(-heading.y, heading.x) * side;
-    let Room { within, walls } = room;
     /// Each shrinks the circle to the wall that it crosses; a few suffice.
     const SHRINKS: usize = 40;
     let mut rho = rho;
     for _ in 0..SHRINKS {
         let centre = at + inwards * rho;
-        let nearest = walls.nearest(&centre)?;
-        if nearest.distance >= rho - FIT * radius {
-            let inside = within.contains(&centre);
-            return inside.then_some((centre, rho.min(nearest.distance), inwards));
+        let (wall, distance) = room.nearest(&centre)?;
+        if distance >= rho - FIT * radius {
+            return room.holds_place(&centre).then_some((centre, rho.min(distance), inwards));
         }
-        let ends = walls.segments()[nearest.segment as usize].ends;
-        let to = ends[0] + (ends[1] - ends[0]) * nearest.share - at;
+        let to = wall - at;
         let across = to.dot(&inwards);
         if across <= 0.0 {
             return None;

@@ -100,6 +100,19 @@ fn above(path: &Toolpath, arcs: &ContactArcs, limit: f64) -> Vec<(Point2, f64)> 
     found
 }
 
+/// At small limits the last of an acute tip is cut in layers: nothing is above, and nothing is told.
+#[test]
+fn acute_tips_keep_to_small_engagements() {
+    let kite = points(&[(0., 0.), (9., -3.4), (12., 0.), (9., 3.4)]);
+    let pocket = Pocket::new(Region::nested(vec![kite]).unwrap().0, 1.5);
+    let limit = 20f64.to_radians();
+    let found = plan(&pocket, 2.0, &Pattern::Offset { spiral: false }, Some(limit));
+    let arcs = contact_arcs(&found.path, &Cutter::flat(2.0).unwrap(), &stock(&pocket), &of_passes, &Silent);
+    let stretches = above(&found.path, &arcs.unwrap(), limit + SLACK.to_radians());
+    assert!(stretches.is_empty(), "{stretches:?}");
+    assert!(!found.notes.iter().any(|note| note.contains("above the engagement")), "{:?}", found.notes);
+}
+
 /// Two squares joined by a neck that has no room beside the cutter: there, and nowhere else, it is in a
 /// slot, and place and length are told.
 #[test]
