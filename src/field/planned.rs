@@ -78,6 +78,8 @@ pub struct ShortestPossible {
     pub cutting_mm: f64,
     /// Of the contact on the surface: the integral of `1/w_max`, mm.
     pub contact_mm: f64,
+    /// What both ends of a pass serve beyond themselves at most, mm of the cutter's way: the circles around them, `π/4` of the widest strip.
+    pub ends_mm: f64,
     /// Share of the surface where the part is as concave as the cutter, or nearly so: the strip is limited there.
     pub limited_fraction: f64,
 }

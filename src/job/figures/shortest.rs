@@ -5,6 +5,7 @@ use serde::Serialize;
 use field::ShortestPossible;
 use metrology::path_figures;
 use report::Figure;
+use scene::Scene;
 use toolpath::{PlanError, Step};
 use work::monitor::Monitor;
 
@@ -23,7 +24,9 @@ pub struct ShortestFigures {
     pub contact_length_mm: f64,
     /// The first of these over the path's cutting length.
     pub efficiency: f64,
-    /// The first of these at the feed, s: no path below the scallop height takes less, whatever its turns and links.
+    /// The first of these at the feed, and the last of the way down and the first of the way up, which are fed by the clearance, s: no path
+    /// below the scallop height takes less, whatever its turns and links. What the ends of a pass serve beyond themselves is taken off;
+    /// further passes with a retract between them would save no more by theirs than one more way down takes.
     pub least_time_s: f64,
     /// That over the path's machining time.
     pub time_efficiency: f64,
@@ -32,9 +35,18 @@ pub struct ShortestFigures {
 }
 
 impl ShortestFigures {
-    /// Of a path with a cutting length, mm, at a feed, mm/min, and a machining time, s; `None` for an empty one.
-    pub fn new(shortest: &ShortestPossible, cutting_length_mm: f64, feed: f64, time_s: f64) -> Option<Self> {
-        let least_time_s = shortest.cutting_mm / feed * SECONDS_PER_MINUTE;
+    /// Of a path of a scene with a cutting length, mm, and a machining time, s; `None` for an empty one.
+    pub fn new(
+        shortest: &ShortestPossible,
+        cutting_length_mm: f64,
+        scene: &Scene,
+        time_s: f64,
+    ) -> Option<Self> {
+        let (feed, plunge) = (scene.cutting.feed_rate, scene.cutting.plunge_rate);
+        let down_and_up = scene.clearance / feed + scene.clearance / plunge;
+        let saved = shortest.ends_mm / feed;
+        let beside = (down_and_up - saved).max(0.0);
+        let least_time_s = SECONDS_PER_MINUTE * (shortest.cutting_mm / feed + beside);
         (cutting_length_mm > 0.0).then(|| Self {
             least_time_s,
             time_efficiency: least_time_s / time_s,
@@ -60,7 +72,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
         Ok(shortest) => shortest,
     };
     let time = planned.time(scene, monitor)?;
-    let shortest = ShortestFigures::new(&shortest, length, scene.cutting.feed_rate, time);
+    let shortest = ShortestFigures::new(&shortest, length, scene, time);
     let Some(s) = shortest else { return Ok(Finding::default()) };
     let per_cent = 100.0 * s.efficiency;
     let name = &run.request.name;
@@ -73,7 +85,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
                 format!("{:.1} mm ({per_cent:.1} % of this path)", s.cutting_length_mm),
             ),
             (
-                "that length at the feed",
+                "at the feed, with the way down and up",
                 format!("{:.1} s ({:.1} % of the machining time)", s.least_time_s, 100.0 * s.time_efficiency),
             ),
         ],

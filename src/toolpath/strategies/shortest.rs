@@ -61,7 +61,7 @@ pub fn shortest_possible(
     h: f64,
     monitor: &dyn Monitor,
 ) -> Result<ShortestPossible, PlanError> {
-    let mut sum = ShortestPossible { cutting_mm: 0.0, contact_mm: 0.0, limited_fraction: 0.0 };
+    let mut sum = ShortestPossible { cutting_mm: 0.0, contact_mm: 0.0, ends_mm: 0.0, limited_fraction: 0.0 };
     let mut total = 0.0;
     for chart in Chart::all(part, cutter, crate::vocabulary::Guide::default())? {
         let (places, cell) = places(&chart, PLACES);
@@ -72,19 +72,24 @@ pub fn shortest_possible(
             let area = cell * (e * g - f * f).max(0.0).sqrt();
             let Some(t0) = p.jet.du.try_normalize(1e-300) else { return Ok(None) };
             let b0 = p.normal.cross(&t0);
-            let (mut cutting, mut contact, mut limited) = (f64::INFINITY, f64::INFINITY, false);
+            let (mut cutting, mut contact, mut ends, mut limited) =
+                (f64::INFINITY, f64::INFINITY, 0.0_f64, false);
             for k in 0..DIRECTIONS {
                 let (sin, cos) = (PI * k as f64 / DIRECTIONS as f64).sin_cos();
                 let t: Vector3 = t0 * cos + b0 * sin;
                 let (width, too_concave) = p.strip_width(cutter, &t, Step::Scallop(h));
-                cutting = cutting.min(p.offset_ratio(cutter, &t) / width);
+                let ratio = p.offset_ratio(cutter, &t);
+                cutting = cutting.min(ratio / width);
+                ends = ends.max(0.25 * PI * width * ratio.max(1.0));
                 contact = contact.min(1.0 / width);
                 limited |= too_concave;
             }
-            Ok::<_, Cancelled>(Some((area, cutting, contact, limited)))
+            Ok::<_, Cancelled>(Some((area, cutting, contact, ends, limited)))
         };
-        for (area, cutting, contact, limited) in parallel::try_map(places.len(), least)?.into_iter().flatten()
+        for (area, cutting, contact, ends, limited) in
+            parallel::try_map(places.len(), least)?.into_iter().flatten()
         {
+            sum.ends_mm = sum.ends_mm.max(ends);
             sum.cutting_mm += cutting * area;
             sum.contact_mm += contact * area;
             sum.limited_fraction += if limited { area } else { 0.0 };
