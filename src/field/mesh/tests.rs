@@ -6,7 +6,7 @@ mod stream;
 mod trace;
 
 use super::*;
-use geometry::{Point2, Point3, Vector3};
+use geometry::{Point2, Point3, Vector3, distance_to_segment};
 
 /// A grid of `nx` × `ny` squares over `[0, 1]²` with inner vertices shifted at random, each square cut
 /// by one or the other diagonal, squares whose centre `hole` holds left out.

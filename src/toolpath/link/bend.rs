@@ -4,7 +4,8 @@
 //! In the plan view a bend is a cubic whose ends have the directions of the passes (C. Hermite's form).
 //! With tangents twice as long as the ends lie apart, a turn between two parallel passes is nearly a half
 //! circle, as cubics go; where the ends lie farther apart than passes do, tangents stop growing, and the
-//! way between two turns becomes straight. Heights come from dropping the cutter, so that a link can
+//! way between two turns becomes straight. With shorter tangents the way is shorter and the machine slower in its turns: the bend
+//! that takes the least time is taken. Heights come from dropping the cutter, so that a link can
 //! never cut deeper into the part than its chords, and never raises what stands beside it.
 
 use crate::moves::chord::{Watch, reduce, sample_within_chord};
@@ -12,14 +13,19 @@ use crate::surface::border::Border;
 use cutter::Cutter;
 use drop_cutter::DropCutter;
 use geometry::{Point2, Point3, Vector2};
+use machine::{Machine, machining_time};
+use motion::{ClPoint, Move, MoveKind, Toolpath};
 use work::monitor::{Cancelled, Monitor};
 
 /// Length of the tangents at both ends over the distance of the ends: 2 makes a half circle's bulge,
 /// half the distance. Less makes turns tighter, more drives them farther over the border.
-const TANGENT: f64 = 2.0;
+pub const TANGENT: f64 = 2.0;
 
-/// Tangents are never longer than this many intervals between passes.
-const LONGEST_TANGENT: f64 = 4.0;
+/// Tangents of the turns that are tried: half circles, and down to ways that are hardly longer than straight ones.
+const TANGENTS: [f64; 4] = [TANGENT, 1.0, 0.5, 0.25];
+
+/// Tangents are never longer than this many times their share of the distance and the interval between passes.
+const LONGEST_TANGENT: f64 = 2.0;
 
 /// A link may roll over the border of the part by this many intervals: one for the pass itself, one
 /// for the bend. A greater roll would cut the edges of a solid part, a smaller one forbids turns at
@@ -40,6 +46,9 @@ const LOOP_TANGENT: f64 = 2.0;
 /// First sampling distance along a bend, in intervals.
 pub const SAMPLING: f64 = 0.25;
 
+/// Tips of a pass that tell its curvature at its end.
+const CURVATURE_TIPS: usize = 3;
+
 /// Share of the chord tolerance that sampling may use; thinning uses the rest.
 const SAMPLING_SHARE: f64 = 0.4;
 
@@ -57,6 +66,10 @@ pub struct Bends<'a> {
     pub longest: f64,
     /// Largest distance between the moves of a link and its exact curve, mm.
     pub chord_tolerance: f64,
+    /// Which of several bends is the quickest is asked of this machine.
+    pub machine: &'a Machine,
+    /// Feed, mm/min.
+    pub feed_rate: f64,
 }
 
 /// An end of a pass: a tip, and the direction of the feed there in the plan view (zero where the pass
@@ -137,22 +150,39 @@ impl Cubic {
     }
 }
 
-/// The bends worth trying between two ends, the best one first; passes lie an interval apart, mm.
-pub fn curves(interval: f64, from: &End, to: &End) -> Vec<Vec<Cubic>> {
+/// A turn between ends with about opposite feeds.
+struct Turn {
+    /// The mean way out.
+    out: Vector2,
+    /// How far along it the second end lies from the first, mm, and the rest of the way there.
+    ahead: f64,
+    beside: Vector2,
+}
+
+impl Turn {
+    fn between(from: &End, to: &End) -> Option<Self> {
+        let out = (from.feed - to.feed).try_normalize(0.5)?;
+        let span = (to.tip - from.tip).xy();
+        let ahead = span.dot(&out);
+        Some(Self { out, ahead, beside: span - out * ahead })
+    }
+}
+
+/// The bends worth trying between two ends, the gentlest first, with tangents of some length over the distance of the ends; passes lie an
+/// interval apart, mm.
+pub fn curves(interval: f64, tangents: f64, from: &End, to: &End) -> Vec<Vec<Cubic>> {
     let span = (to.tip - from.tip).xy();
-    let tangent = (TANGENT * span.norm()).min(LONGEST_TANGENT * interval);
+    let tangent = tangents * span.norm().min(LONGEST_TANGENT * interval);
     let plain = Cubic::new([from.tip.xy(), to.tip.xy()], [from.feed * tangent, to.feed * tangent]);
-    let Some(out) = (from.feed - to.feed).try_normalize(0.5) else { return vec![vec![plain]] };
-    let ahead = span.dot(&out);
-    let beside = span - out * ahead;
+    let Some(Turn { out, ahead, beside }) = Turn::between(from, to) else { return vec![vec![plain]] };
     if beside.norm() >= NARROW * interval {
-        let turns = SHARES_BESIDE.map(|share| turn_beside(interval, from, to, ahead, share));
+        let turns = SHARES_BESIDE.map(|share| turn_beside(interval, tangents, from, to, ahead, share));
         return turns.into_iter().chain([vec![plain]]).collect();
     }
     // Out to the far point of a loop, across it, and back.
     let across = Vector2::new(out.y, -out.x);
     let across = if across.dot(&span) < 0.0 { -across } else { across };
-    let far = from.tip.xy() + beside * 0.5 + out * (span.dot(&out).max(0.0) + interval);
+    let far = from.tip.xy() + beside * 0.5 + out * (ahead.max(0.0) + interval);
     let (wide, at_far) = (LOOP_TANGENT * interval, across * interval);
     let first = Cubic::new([from.tip.xy(), far], [from.feed * wide, at_far]);
     let second = Cubic::new([far, to.tip.xy()], [at_far, to.feed * wide]);
@@ -162,10 +192,10 @@ pub fn curves(interval: f64, from: &End, to: &End) -> Vec<Vec<Cubic>> {
 /// A turn between ends with opposite feeds, of which the second lies `ahead` of the first: on along the feed until the
 /// farther end is reached, and a bend between places this share of the way beside each other that the ends are. One
 /// bend all the way would be a hairpin.
-fn turn_beside(interval: f64, from: &End, to: &End, ahead: f64, share: f64) -> Vec<Cubic> {
+fn turn_beside(interval: f64, tangents: f64, from: &End, to: &End, ahead: f64, share: f64) -> Vec<Cubic> {
     let (start, end) = (from.tip.xy(), to.tip.xy());
     let turn = |places: [Point2; 2]| {
-        let tangent = (TANGENT * (places[1] - places[0]).norm()).min(LONGEST_TANGENT * interval);
+        let tangent = tangents * (places[1] - places[0]).norm().min(LONGEST_TANGENT * interval);
         Cubic::new(places, [from.feed * tangent, to.feed * tangent])
     };
     if ahead > 0.0 {
@@ -178,7 +208,7 @@ fn turn_beside(interval: f64, from: &End, to: &End, ahead: f64, share: f64) -> V
 }
 
 impl Bends<'_> {
-    /// The moves after `from` up to and with the tip of `to`; `None` where a link would be too long, or
+    /// The moves after the last tip of one pass up to and with the first one of the next; `None` where a link would be too long, or
     /// leave the part.
     ///
     /// # Errors
@@ -188,26 +218,81 @@ impl Bends<'_> {
     /// Straight moves stay within the chord tolerance of where the dropped cutter would be.
     pub fn link(
         &self,
-        from: &End,
-        to: &End,
+        before: &[Point3],
+        after: &[Point3],
         monitor: &dyn Monitor,
     ) -> Result<Option<Vec<Point3>>, Cancelled> {
+        let (from, to) = (End::last(before), End::first(after));
         let span = to.tip - from.tip;
         if span.norm() > self.longest || span.xy().norm() == 0.0 {
             return Ok(None);
         }
-        for curve in curves(self.interval, from, to) {
-            if let Some(moves) = self.follow(&curve, from, to, monitor)? {
-                return Ok(Some(moves));
+        let speed = self.feed_rate / 60.0;
+        let ways = [self.braking(before.iter().rev()), self.braking(after.iter())];
+        // Quicker than a loop would be a hairpin, in which the tool stands still.
+        let needs_loop = Turn::between(&from, &to).is_some_and(|t| t.beside.norm() < NARROW * self.interval);
+        let tangents = if needs_loop { &TANGENTS[..1] } else { &TANGENTS };
+        let mut best: Option<(f64, Vec<Point3>)> = None;
+        for curve in tangents.iter().flat_map(|&tangents| curves(self.interval, tangents, &from, &to)) {
+            let length = curve.iter().map(Cubic::length).sum::<f64>();
+            let least = best.as_ref().map_or(f64::INFINITY, |(time, _)| *time);
+            if length > self.longest || length / speed >= least {
+                continue;
+            }
+            if let Some(moves) = self.follow(&curve, length, &from, &to, monitor)? {
+                let time = self.time(&ways, &moves, monitor)?;
+                if time < least {
+                    best = Some((time, moves));
+                }
+                if needs_loop {
+                    break;
+                }
             }
         }
-        Ok(None)
+        Ok(best.map(|(_, moves)| moves))
+    }
+
+    /// The tips from an end on along which the machine comes to the feed, with those that tell the curvature there.
+    fn braking<'p>(&self, tips: impl Iterator<Item = &'p Point3>) -> Vec<Point3> {
+        let speed = self.feed_rate / 60.0;
+        let (mut left, mut last, mut some) = (speed * speed / self.machine.acceleration, None, Vec::new());
+        for tip in tips {
+            left -= last.map_or(0.0, |last: Point3| (tip - last).norm());
+            last = Some(*tip);
+            some.push(*tip);
+            if left <= 0.0 && some.len() > CURVATURE_TIPS {
+                break;
+            }
+        }
+        some
+    }
+
+    /// What the machine takes for a link, s, more than for the ways of passes to and from it, which are the same for all links.
+    fn time(
+        &self,
+        [before, after]: &[Vec<Point3>; 2],
+        moves: &[Point3],
+        monitor: &dyn Monitor,
+    ) -> Result<f64, Cancelled> {
+        let one = |tip: &Point3| Move {
+            to: ClPoint::upright(*tip),
+            kind: MoveKind::Link,
+            feed_rate: self.feed_rate,
+            pass: 0,
+        };
+        let steps = before.iter().rev().chain(moves).chain(after.iter().skip(1)).skip(1).map(one).collect();
+        let start = before.last().map_or(Point3::origin(), |tip| *tip);
+        let path = Toolpath::new(ClPoint::upright(start), steps);
+        let length = |tips: &[Point3]| tips.windows(2).map(|w| (w[1] - w[0]).norm()).sum::<f64>();
+        let ways = (length(before) + length(after)) * 60.0 / self.feed_rate;
+        Ok(machining_time(&path, self.machine, monitor)? - ways)
     }
 
     /// The moves along some cubics that follow each other.
     fn follow(
         &self,
         curve: &[Cubic],
+        length: f64,
         from: &End,
         to: &End,
         monitor: &dyn Monitor,
@@ -226,10 +311,7 @@ impl Bends<'_> {
         };
         let mut watch = Watch::new(monitor);
         let fine = SAMPLING_SHARE * self.chord_tolerance;
-        let (end, length) = (curve.len() as f64, curve.iter().map(Cubic::length).sum::<f64>());
-        if length > self.longest {
-            return Ok(None);
-        }
+        let end = curve.len() as f64;
         let step = (SAMPLING * self.interval * end / length).min(0.25);
         let mut points = sample_within_chord(0.0, end, step, fine, &mut locate, &mut watch)?;
         // The passes' own ends lie within their tolerance of the part, but not always on it.

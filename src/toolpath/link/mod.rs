@@ -5,7 +5,7 @@
 //! end to the other. Between two passes it takes the quicker of
 //! - a link on the surface ([`bend`]): a smooth bend, fed at the cutting feed, that the dropped cutter
 //!   holds on the part;
-//! - a retract: straight up at the feed, over and down at rapid rate, the last of the way down fed. No rapid
+//! - a retract: straight up, by the clearance at the feed, over and down at rapid rate, the last of the way down fed. No rapid
 //!   runs lower than the clearance above what stock can stand there ([`ceiling`]), and none rises above the
 //!   safe height over all stock.
 //!
@@ -31,17 +31,18 @@ use ceiling::Ceiling;
 use cutter::Cutter;
 pub use detour::{Detour, around_fixtures};
 use drop_cutter::DropCutter;
-use geometry::{Point2, Point3, Vector2, distance_to_segment};
+use geometry::{Point2, Point3, Vector2, Vector3, distance_to_segment};
+use machine::Machine;
 use motion::{ClPoint, Move, MoveKind, Toolpath};
-use order::{Visit, is_closed, order};
+use order::{Costs, Visit, is_closed, order};
 use scallop::strip_width;
 pub(crate) use tilted::join_tilted;
 use work::monitor::{self, Cancelled};
 
 /// Longest link on the surface, in intervals between passes on a plane, unless another is asked for. It
-/// reaches the next pass along borders that passes meet at six degrees or more; longer ones leave traces
-/// across finished surface.
-pub const LONGEST_LINK: f64 = 10.0;
+/// reaches the next pass along borders that passes meet at two degrees or more, and what is shorter is often quicker than a retract;
+/// longer ones leave traces across finished surface.
+pub const LONGEST_LINK: f64 = 30.0;
 
 /// A closed pass begins this many times as far ahead as it lies beside the tool, so that the link to
 /// it bends gently.
@@ -76,17 +77,17 @@ pub(crate) fn join(
     let Setup { part, cutter, settings, monitor } = *setup;
     let passes: Vec<Vec<Point3>> = passes.into_iter().filter(|p| p.len() >= 2).collect();
     monitor.start("joining passes", 0);
-    let rates = Speeds::of(settings, &passes);
+    let rates = Speeds::of(settings);
     let longest = match settings.joining.links {
         Links::Surface => longest_link(&settings.joining, cutter, settings.step),
         Links::Retract => 0.0,
     };
-    let cost = |distance: f64| rates.between(distance, longest);
-    let mut visits = order(&passes, both_ways, &cost);
-    if both_ways && rates.is_quicker_backwards(&visits, &passes) {
-        visits.reverse();
-        visits.iter_mut().for_each(|visit| visit.reversed ^= true);
-    }
+    let costs = Costs {
+        between: &|a, b| rates.between(settings, a, b, longest),
+        start: &|place| rates.descent(settings, place),
+        finish: &|place| rates.ascent(settings, place),
+    };
+    let visits = order(&passes, both_ways, costs);
     monitor::check(monitor)?;
     let passes = in_order(passes, &visits, both_ways);
     let mut links: Vec<Option<Vec<Point3>>> = Vec::new();
@@ -98,10 +99,12 @@ pub(crate) fn join(
             interval: plane_interval(cutter, settings.step),
             longest,
             chord_tolerance: settings.chord_tolerance,
+            // Jerks of its axes take seconds to search for.
+            machine: &Machine { jerks: [f64::INFINITY; 3], ..settings.machine },
+            feed_rate: settings.feed_rate,
         };
-        links = work::parallel::try_map(passes.len() - 1, |k| {
-            bends.link(&End::last(&passes[k]), &End::first(&passes[k + 1]), monitor)
-        })?;
+        links =
+            work::parallel::try_map(passes.len() - 1, |k| bends.link(&passes[k], &passes[k + 1], monitor))?;
     }
     let mut program = Program::new(&passes, cutter, settings, rates);
     for (k, pass) in passes.iter().enumerate() {
@@ -119,40 +122,35 @@ struct Speeds {
     feed: f64,
     plunge: f64,
     rapid: f64,
-    /// Time of a retract besides the way over, s, as far as it can be told before there is a program.
-    retract: f64,
 }
 
-/// Length of a bend over the distance of its ends: that of a half circle.
-const BEND: f64 = std::f64::consts::FRAC_PI_2;
+/// Length of a link over the distance of its ends: the quickest bend is hardly longer than the straight way.
+const BEND: f64 = 1.1;
 
 impl Speeds {
-    fn of(settings: &PlanSettings, passes: &[Vec<Point3>]) -> Self {
+    fn of(settings: &PlanSettings) -> Self {
         let [feed, plunge, rapid] =
             [settings.feed_rate, settings.plunge_rate, settings.machine.rapid_rate].map(|rate| rate / 60.0);
-        let ends = passes.iter().flat_map(|p| [p[0].z, p[p.len() - 1].z]);
-        let (sum, count) = ends.fold((0.0, 0.0), |(sum, n), z| (sum + z, n + 1.0));
-        let mean = if count > 0.0 { sum / count } else { settings.stock_top };
-        let height = settings.stock_top + settings.clearance - mean;
-        Self { feed, plunge, rapid, retract: height / feed + height / plunge }
+        Self { feed, plunge, rapid }
     }
 
-    /// What it takes to go on at a distance, s.
-    fn between(&self, distance: f64, longest: f64) -> f64 {
-        let retract = self.retract + distance / self.rapid;
+    /// What it takes to go on from one place to another, s, as far as it can be told before there is a program. It is the same both
+    /// ways: a retract counts by the mean height of both.
+    fn between(&self, settings: &PlanSettings, a: &Point3, b: &Point3, longest: f64) -> f64 {
+        let (distance, middle) = ((b - a).norm(), nalgebra::center(a, b));
+        let retract =
+            self.ascent(settings, &middle) + self.descent(settings, &middle) + distance / self.rapid;
         if distance * BEND > longest { retract } else { retract.min(distance * BEND / self.feed) }
     }
 
-    /// Whether passes take less time from the last to the first: the way down is fed slowly, the way up at the end is not.
-    fn is_quicker_backwards(&self, visits: &[Visit], passes: &[Vec<Point3>]) -> bool {
-        let height = |visit: Option<&Visit>, at_its_end: bool| {
-            let points = &passes[visit?.pass];
-            let closed = is_closed(points);
-            let at = if visit?.reversed == at_its_end { 0 } else { points.len() - 1 };
-            Some(points[if closed { visit?.start } else { at }].z)
-        };
-        let ends = height(visits.first(), false).zip(height(visits.last(), true));
-        ends.is_some_and(|(first, last)| (last - first) * (1.0 / self.plunge - 1.0 / self.feed) > 0.0)
+    /// The way down to the first place, s: all of it may lead through stock.
+    fn descent(&self, settings: &PlanSettings, to: &Point3) -> f64 {
+        (settings.stock_top + settings.clearance - to.z) / self.plunge
+    }
+
+    /// The way up from the last place, s: beyond the clearance it is rapid.
+    fn ascent(&self, settings: &PlanSettings, from: &Point3) -> f64 {
+        settings.clearance / self.feed + (settings.stock_top - from.z) / self.rapid
     }
 }
 
@@ -164,8 +162,9 @@ pub(crate) fn time_to_neighbour(setup: &Setup<'_>) -> f64 {
         Links::Retract => 0.0,
     };
     let bounds = part.bounds();
-    let rates = Speeds::of(settings, &[vec![nalgebra::center(&bounds.min, &bounds.max)]]);
-    rates.between(plane_interval(cutter, settings.step), longest)
+    let place = nalgebra::center(&bounds.min, &bounds.max);
+    let beside = place + Vector3::x() * plane_interval(cutter, settings.step);
+    Speeds::of(settings).between(settings, &place, &beside, longest)
 }
 
 /// The passes as they are visited: turned round, and closed ones begun where they are to begin.
@@ -294,10 +293,7 @@ impl<'a> Program<'a> {
         }
         let retract = self.retract(from, to);
         let above = |p: Point3, z: f64| Point3::new(p.x, p.y, z);
-        let mut at = above(from, retract.over);
-        if at != from {
-            self.push(at, MoveKind::Retract, self.settings.feed_rate, pass);
-        }
+        let mut at = self.rise(from, retract.over, pass);
         for tip in [above(to, retract.over), above(to, retract.down)] {
             if tip != at {
                 self.push(tip, MoveKind::Rapid, 0.0, pass);
@@ -324,16 +320,32 @@ impl<'a> Program<'a> {
         let down = (self.ceiling.free_height(&b, &b).max(to.z) + clearance).min(over);
         let down = if over - down < LEAST_DESCENT { over } else { down };
         let rapid = (b - a).norm() + (over - down);
-        let fed = (over - from.z) / self.rates.feed + (down - to.z) / self.rates.plunge;
+        let lift = clearance.min(over - from.z);
+        let rapid = rapid + (over - from.z - lift);
+        let fed = lift / self.rates.feed + (down - to.z) / self.rates.plunge;
         Retract { over, down, time: rapid / self.rates.rapid + fed }
+    }
+
+    /// Straight up, from the clearance on at rapid rate: nothing stands above where the tool is.
+    fn rise(&mut self, from: Point3, over: f64, pass: u32) -> Point3 {
+        let lift = over.min(from.z + self.settings.clearance);
+        let mut at = from;
+        for (z, kind, feed_rate) in
+            [(lift, MoveKind::Retract, self.settings.feed_rate), (over, MoveKind::Rapid, 0.0)]
+        {
+            if z > at.z {
+                at.z = z;
+                self.push(at, kind, feed_rate, pass);
+            }
+        }
+        at
     }
 
     /// Up from the last pass.
     fn finish(mut self) -> Toolpath {
         let safe = self.safe();
         if let Some(last) = self.moves.last().copied() {
-            let tip = Point3::new(last.to.tip.x, last.to.tip.y, safe);
-            self.push(tip, MoveKind::Retract, self.settings.feed_rate, last.pass);
+            self.rise(last.to.tip, safe, last.pass);
         }
         let start = self.start.unwrap_or(Point3::new(0.0, 0.0, safe));
         Toolpath::new(ClPoint::upright(start), self.moves)

@@ -1,6 +1,6 @@
 //! The order of passes that keeps moves between them short.
 //!
-//! Enters: passes as runs of tip positions, mm, and what it costs to go a distance between two of them.
+//! Enters: passes as runs of tip positions, mm, what it costs to go a distance between two of them, and to begin and end at a place.
 //! Leaves: which pass comes when, from which end, and where closed passes begin. Nothing has to come
 //! before anything else: the passes are those of one finishing path.
 //!
@@ -40,16 +40,26 @@ const MOST_SWEEPS: usize = 40;
 /// A step must save this share of the whole, so that rounding cannot run in circles.
 const LEAST_GAIN: f64 = 1e-9;
 
-/// Orders passes of one point or more each. Without `both_ways` every pass keeps its direction. `cost`
-/// of a distance in mm must grow with it. The first pass given stays where a path by nearest ends
-/// begins, though improvement may put others before it.
-pub fn order(passes: &[Vec<Point3>], both_ways: bool, cost: &(dyn Fn(f64) -> f64 + Sync)) -> Vec<Visit> {
+/// What ways cost.
+#[derive(Clone, Copy)]
+pub struct Costs<'a> {
+    /// To go from one place to another, the same both ways; it must grow with their distance.
+    pub between: &'a (dyn Fn(&Point3, &Point3) -> f64 + Sync),
+    /// To come to a place at the beginning.
+    pub start: &'a (dyn Fn(&Point3) -> f64 + Sync),
+    /// To leave a place at the end.
+    pub finish: &'a (dyn Fn(&Point3) -> f64 + Sync),
+}
+
+/// Orders passes of one point or more each. Without `both_ways` every pass keeps its direction.
+/// The first pass given stays where a path by nearest ends begins, though improvement may put others before it.
+pub fn order(passes: &[Vec<Point3>], both_ways: bool, costs: Costs<'_>) -> Vec<Visit> {
     if passes.is_empty() {
         return Vec::new();
     }
     let closed: Vec<bool> = passes.iter().map(|p| is_closed(p)).collect();
     let visits = nearest_ends(passes, &closed, both_ways);
-    let mut tour = Tour::new(passes, closed, visits, cost);
+    let mut tour = Tour::new(passes, closed, visits, costs);
     let near = tour.near_ends();
     let least = LEAST_GAIN * tour.total().max(f64::MIN_POSITIVE);
     for _ in 0..MOST_SWEEPS {
@@ -209,19 +219,14 @@ struct Tour<'a> {
     visits: Vec<Visit>,
     /// Where each pass stands in `visits`.
     place: Vec<usize>,
-    cost: &'a (dyn Fn(f64) -> f64 + Sync),
+    costs: Costs<'a>,
 }
 
 impl<'a> Tour<'a> {
-    fn new(
-        passes: &'a [Vec<Point3>],
-        closed: Vec<bool>,
-        visits: Vec<Visit>,
-        cost: &'a (dyn Fn(f64) -> f64 + Sync),
-    ) -> Self {
+    fn new(passes: &'a [Vec<Point3>], closed: Vec<bool>, visits: Vec<Visit>, costs: Costs<'a>) -> Self {
         let mut place = vec![0; visits.len()];
         visits.iter().enumerate().for_each(|(k, v)| place[v.pass] = k);
-        Self { passes, closed, visits, place, cost }
+        Self { passes, closed, visits, place, costs }
     }
 
     /// Where a visit begins, and where it ends.
@@ -243,16 +248,32 @@ impl<'a> Tour<'a> {
     }
 
     fn way(&self, a: &Point3, b: &Point3) -> f64 {
-        (self.cost)((b - a).norm())
+        (self.costs.between)(a, b)
     }
 
-    /// Cost between the visits before and at `k`; nothing at both ends of the path.
+    /// From the visit before `k` to a place, or from the start where there is none.
+    fn way_to(&self, k: usize, place: &Point3) -> f64 {
+        match k.checked_sub(1) {
+            Some(before) => self.way(&self.end(before), place),
+            None => (self.costs.start)(place),
+        }
+    }
+
+    /// From a place to the visit `k`, or to the end where there is none.
+    fn way_from(&self, place: &Point3, k: usize) -> f64 {
+        if k < self.visits.len() { self.way(place, &self.begin(k)) } else { (self.costs.finish)(place) }
+    }
+
+    /// Cost between the visits before and at `k`, to the first and from the last.
     fn edge(&self, k: usize) -> f64 {
-        if k == 0 || k >= self.visits.len() { 0.0 } else { self.way(&self.end(k - 1), &self.begin(k)) }
+        match k.checked_sub(1) {
+            Some(before) => self.way_from(&self.end(before), k),
+            None => self.way_to(0, &self.begin(0)),
+        }
     }
 
     fn total(&self) -> f64 {
-        (1..self.visits.len()).map(|k| self.edge(k)).sum()
+        (0..=self.visits.len()).map(|k| self.edge(k)).sum()
     }
 
     /// For each pass the passes with an end near one of its own, in fixed order.
@@ -299,13 +320,7 @@ impl<'a> Tour<'a> {
                     continue;
                 }
                 let before = self.edge(from) + self.edge(to + 1);
-                let mut after = 0.0;
-                if from > 0 {
-                    after += self.way(&self.end(from - 1), &self.end(to));
-                }
-                if to + 1 < n {
-                    after += self.way(&self.begin(from), &self.begin(to + 1));
-                }
+                let after = self.way_to(from, &self.end(to)) + self.way_from(&self.begin(from), to + 1);
                 if before - after > best.0 {
                     best = (before - after, Some((from, to)));
                 }
@@ -323,10 +338,14 @@ impl<'a> Tour<'a> {
         let from = self.place[pass];
         let mut best = (least, None);
         for to in from..(from + LONGEST_RUN).min(n) {
-            let mut freed = self.edge(from) + self.edge(to + 1);
-            if from > 0 && to + 1 < n {
-                freed -= self.way(&self.end(from - 1), &self.begin(to + 1));
-            }
+            let left = if from > 0 {
+                self.way_from(&self.end(from - 1), to + 1)
+            } else if to + 1 < n {
+                self.way_to(0, &self.begin(to + 1))
+            } else {
+                continue;
+            };
+            let freed = self.edge(from) + self.edge(to + 1) - left;
             let (begin, end) = (self.begin(from), self.end(to));
             let partners = near[pass].iter().chain(&near[self.visits[to].pass]).map(|&p| self.place[p]);
             // Before or after each partner: the run comes before visit `at`.
@@ -339,13 +358,7 @@ impl<'a> Tour<'a> {
                         continue;
                     }
                     let (first, last) = if turned { (end, begin) } else { (begin, end) };
-                    let mut paid = -self.edge(at);
-                    if at > 0 {
-                        paid += self.way(&self.end(at - 1), &first);
-                    }
-                    if at < n {
-                        paid += self.way(&last, &self.begin(at));
-                    }
+                    let paid = self.way_to(at, &first) + self.way_from(&last, at) - self.edge(at);
                     if freed - paid > best.0 {
                         best = (freed - paid, Some((to, at, turned)));
                     }
@@ -374,10 +387,7 @@ impl<'a> Tour<'a> {
             if !self.closed[self.visits[k].pass] {
                 continue;
             }
-            let before = k.checked_sub(1).map(|k| self.end(k));
-            let after = (k + 1 < self.visits.len()).then(|| self.begin(k + 1));
-            let way =
-                |p: &Point3| before.map_or(0.0, |b| self.way(&b, p)) + after.map_or(0.0, |a| self.way(p, &a));
+            let way = |p: &Point3| self.way_to(k, p) + self.way_from(p, k + 1);
             let points = &self.passes[self.visits[k].pass];
             let all = points[..points.len() - 1].iter().enumerate().map(|(k, p)| (way(p), k));
             let best = all.fold((f64::INFINITY, 0), |a, b| if b.0 < a.0 { b } else { a });

@@ -9,7 +9,7 @@ mod ahead;
 mod bent;
 mod ways;
 
-use super::order::{Visit, is_closed, order};
+use super::order::{Costs, Visit, is_closed, order};
 use super::{Speeds, longest_link, plane_interval};
 use crate::RepairSummary;
 use crate::moves::touch::Touch;
@@ -69,8 +69,10 @@ pub(crate) fn join_tilted(
         thinning: tolerance,
     });
     let block = Block::of(part, settings);
-    let ways = Ways::new(part, cutter, settings, Speeds::of(settings, &contacts), &block, touching, bent);
-    let visits = order(&contacts, both_ways, &|distance| ways.cost(distance));
+    let ways = Ways::new(part, cutter, settings, Speeds::of(settings), &block, touching, bent);
+    // Where such a path begins and ends hardly matters: it comes and goes along the tool's axis.
+    let costs = Costs { between: &|a, b| ways.cost((b - a).norm()), start: &|_| 0.0, finish: &|_| 0.0 };
+    let visits = order(&contacts, both_ways, costs);
     monitor::check(monitor)?;
     let turned = |k: usize| {
         let contacts = &contacts[visits[k].pass];

@@ -100,3 +100,40 @@ fn levels_and_traced_lines_of_a_flow_around_a_hole_agree() {
     // A chord tolerance of 5 µm.
     assert!(fine < 0.005 && fine < 0.4 * coarse, "{coarse} {fine}");
 }
+
+/// On a curved mesh, too, levels and lines that are traced along the recovered gradient turned by a right angle agree: by the chord
+/// tolerance of 5 µm on triangles of 0.2 mm over 20 mm, and by the square of their sides.
+#[test]
+fn levels_and_traced_lines_of_a_curved_mesh_agree() {
+    let worst = |n: usize| {
+        let mesh = mapped(n, no_hole, |x, y| {
+            let (x, y) = (20.0 * (x - 0.5), 20.0 * (y - 0.5));
+            [x, y, (24.0f64.powi(2) - x * x - y * y).sqrt()]
+        });
+        let psi = |p: &Point3| p.x + 0.4 * p.z + 1.5 * (0.2 * p.y).sin();
+        let values: Vec<f64> = mesh.points().iter().map(psi).collect();
+        let levels = MeshLevels::new(&mesh, &values).unwrap();
+        let normal = |p: &Point3| p.coords.normalize();
+        let lines = mesh.points().iter().zip(levels.gradients()).map(|(p, g)| normal(p).cross(g));
+        let lines: Vec<Vector3> = lines.collect();
+        let tracer = MeshTracer::new(&mesh, &lines).unwrap();
+        let [lo, hi] = levels.range();
+        let mut worst = 0.0f64;
+        for share in [0.25, 0.5, 0.75] {
+            let curve = &levels.curves(lo + share * (hi - lo))[0];
+            let traced = tracer.through(curve.points[curve.points.len() / 2], 0.2, 100.0);
+            // From border to border.
+            assert!(traced.points.len() as f64 * 0.2 > 0.95 * curve.length(), "{n} {share}");
+            let off = |p: &MeshPoint| {
+                let sides = curve.points.windows(2);
+                let away = sides.map(|w| distance_to_segment(&p.position, &w[0].position, &w[1].position));
+                away.fold(f64::INFINITY, f64::min)
+            };
+            worst = traced.points.iter().map(off).fold(worst, f64::max);
+        }
+        worst
+    };
+    let (coarse, fine) = (worst(25), worst(100));
+    println!("{coarse} {fine}");
+    assert!(fine < 0.005 && fine < 0.2 * coarse, "{coarse} {fine}");
+}

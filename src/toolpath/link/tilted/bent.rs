@@ -5,7 +5,7 @@
 //! link; where it follows the feed, and the cutter is no ball, it keeps its lead and tilt and so leads the contact around
 //! the cutter, which would leap from one side to the other of a flat end if the axis went through the normal.
 
-use crate::link::bend::{Cubic, End, MOST_ROLL, SAMPLING, curves};
+use crate::link::bend::{Cubic, End, MOST_ROLL, SAMPLING, TANGENT, curves};
 use crate::moves::chord::{Watch, sample_within_chord};
 use crate::moves::touch::Touch;
 use crate::tilt::tilted::{ABOVE_SURFACE, MoveRules, Tilting, located_sampling, thinned};
@@ -58,7 +58,7 @@ impl Bent<'_> {
         if self.part.patches().is_empty() || apart > self.longest || (b.tip - a.tip).xy().norm() == 0.0 {
             return Ok(None);
         }
-        for curve in curves(self.interval, &a, &b) {
+        for curve in curves(self.interval, TANGENT, &a, &b) {
             if curve.iter().map(Cubic::length).sum::<f64>() > self.longest {
                 continue;
             }

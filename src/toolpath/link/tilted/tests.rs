@@ -211,7 +211,7 @@ fn a_wall_between_two_passes_is_gone_over() {
         thinning: 0.003,
     };
     let block = Block::of(&part, &settings);
-    let ways = Ways::new(&part, &cutter, &settings, Speeds::of(&settings, &[]), &block, &keep, Some(bent));
+    let ways = Ways::new(&part, &cutter, &settings, Speeds::of(&settings), &block, &keep, Some(bent));
     let touch = |x: f64, feed: f64| {
         let contact = motion::CcPoint { point: Point3::new(x, 10.0, 0.0), normal: Vector3::z() };
         Touch::by(&axis, &cutter, contact, Vector3::x() * feed).unwrap()

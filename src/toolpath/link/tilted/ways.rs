@@ -152,7 +152,8 @@ impl<'a> Ways<'a> {
             + clearance / self.rates.plunge;
         let aloft = (ALOFT + distance) / self.rates.feed + ALOFT / self.rates.plunge;
         let longest = self.bent.as_ref().map_or(0.0, |bent| bent.longest);
-        let bent = distance * super::super::BEND;
+        // A half circle.
+        let bent = distance * std::f64::consts::FRAC_PI_2;
         let bent = if bent > longest { f64::INFINITY } else { bent / self.rates.feed };
         around.min(aloft).min(bent)
     }
