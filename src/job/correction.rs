@@ -405,8 +405,11 @@ impl Corrected<'_> {
         if high.is_empty() {
             return None;
         }
-        let is_touched_up = |places: &[HighPlace]| places.iter().any(|place| widths.is_touched_up(place));
-        if tried.standing.round.measured && self.are_few(&high, &tried.standing) && !is_touched_up(&high) {
+        // Where a measurement finds others beside those that were served, there are more to come.
+        let was_served = tried.standing.round.measured && !widths.touch_up.is_empty();
+        let is_served =
+            |places: &[HighPlace]| was_served || places.iter().any(|place| widths.is_touched_up(place));
+        if tried.standing.round.measured && self.are_few(&high, &tried.standing) && !is_served(&high) {
             return Some(widths.touched_up(&high));
         }
         let raised = self.raised_by_chords(tried, &high);
@@ -414,7 +417,7 @@ impl Corrected<'_> {
         let [raised, others] =
             [true, false].map(|kind| of(kind).map(|(place, _)| *place).collect::<Vec<_>>());
         let finer = widths.finer(&raised);
-        if self.are_few(&others, &tried.standing) && !is_touched_up(&others) {
+        if self.are_few(&others, &tried.standing) && !is_served(&others) {
             return Some(finer.touched_up(&others));
         }
         let round = &tried.standing.round;

@@ -229,7 +229,9 @@ mod tests {
         );
         for (row, asked) in rows.iter().zip([72.0, 96.0, 72.0, 96.0]) {
             let off = row.path.machining_time_s / asked - 1.0;
-            assert!(off.abs() <= WITHIN, "{}: {} s", row.name, row.path.machining_time_s);
+            // Nearer than half a pass no whole number of them comes.
+            let half_a_pass = 0.5 / row.path.passes as f64;
+            assert!(off.abs() <= WITHIN.max(half_a_pass), "{}: {} s", row.name, row.path.machining_time_s);
             let figure = row.figures.iter().find(|figure| figure.key == "equal_time").unwrap();
             let planned_for = figure.value["scallop_mm"].as_f64().unwrap();
             let (p95, highest) = (row.scallop.p95_mm.unwrap(), row.scallop.max_mm.unwrap());

@@ -337,7 +337,7 @@ mod tests {
             Ok(vec![Point3::new(a.x, 1.0, 5.0), Point3::new(b.x, 1.5, 5.0)])
         };
         let watch = &mut Watch::new(&Silent);
-        let points = sample_over_jumps(0.0, 1.0, 0.25, 1e-3, jump, across, watch).unwrap();
+        let points = sample_over_jumps(0.0, 1.0, 0.25, 1e-9, jump, across, watch).unwrap();
         let over: Vec<usize> = (0..points.len()).filter(|&k| points[k].z == 5.0).collect();
         let &[first, second] = &over[..] else { panic!("{points:?}") };
         assert!(second == first + 1 && points[first - 1].y == 0.0 && points[second + 1].y == 2.0);
