@@ -35,7 +35,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
         View::Heights(cut) => {
             let stock = stock(run, cut, monitor)?;
             let removed = cut_in_order_in_turn(stock, run.own_cutters, run.path(), monitor)?;
-            (removal_figures(run.path(), &removed, &cut.height), removed.moves)
+            (removal_figures(run.path(), &removed, &cut.height, run.session.top()), removed.moves)
         }
         View::Normals(_) => by_voxels(run, monitor)?,
     };
@@ -50,15 +50,14 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     let (greatest, bound) =
         (r.max_material_removal_rate_mm3_min, r.max_material_removal_rate_error_bound_mm3_min);
     let (most, mean) = (r.p95_material_removal_rate_mm3_min, r.mean_material_removal_rate_mm3_min);
-    let axial_bound =
-        r.max_axial_engagement_error_bound_mm.map_or(String::new(), |bound| format!(" ± {bound:.2}"));
+    let (axial, axial_bound) = (r.max_axial_engagement_mm, r.max_axial_engagement_error_bound_mm);
     let rows = vec![
         ("volume removed", format!("{:.0} ± {:.0} mm³", r.volume_mm3, r.volume_error_bound_mm3)),
         ("removal rate, greatest", format!("{greatest:.0} ± {bound:.0} mm³/min")),
         ("removal rate, 95 % and mean", format!("{most:.0}, {mean:.0} mm³/min")),
         (
             "engagement, axial and radial",
-            format!("{:.2}{axial_bound}, {:.2} mm", r.max_axial_engagement_mm, r.max_radial_engagement_mm),
+            format!("{axial:.2} ± {axial_bound:.2}, {:.2} mm", r.max_radial_engagement_mm),
         ),
     ];
     let figure =
