@@ -53,12 +53,12 @@ pub struct RemovalFigures {
     pub max_material_removal_rate_error_bound_mm3_min: f64,
     /// The move that ends the stretch with the greatest rate, counted from 0.
     pub max_material_removal_rate_move: u32,
-    /// Greatest height above the tip, along the tool axis, at which the cutter met stock, at the centres of cells or voxels.
+    /// Greatest height above the tip, along the tool axis, at which the cutter met stock, at the centres of cells or voxels. By
+    /// cells never too great: what stands between centres is not seen, and may be as high as the stock before the first cut.
     pub max_axial_engagement_mm: f64,
-    /// Bound of its error by voxels, slivers thinner than one left out. `None` by cells: between their centres nothing bounds how
-    /// high stock stands.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub max_axial_engagement_error_bound_mm: Option<f64>,
+    /// Bound of its error. By voxels slivers thinner than one are left out. By cells nothing is left out: no move meets stock higher
+    /// than from the lowest tip to the top of the stock before the first cut. Work in layers has a wide bound for that.
+    pub max_axial_engagement_error_bound_mm: f64,
     /// Greatest extent of what one move cut, across its direction; moves along the axis left out.
     pub max_radial_engagement_mm: f64,
     /// Bound of its error, lips thinner than a cell left out.
@@ -88,16 +88,24 @@ struct RemovalRecord<'a> {
     contacts: &'a [RapidContact],
     volume_bound: f64,
     pitch: f64,
-    axial_bound: Option<f64>,
+    axial: AxialBound,
+}
+
+/// What bounds the greatest axial engagement.
+enum AxialBound {
+    /// Itself, mm.
+    Of(f64),
+    /// The height over which nothing stood before the first cut, mm.
+    Top(f64),
 }
 
 /// The figures of a removal along `path`; `final_height` is what the other engine left, mm, cell by
-/// cell.
-pub fn removal_figures(path: &Toolpath, removal: &Removal, final_height: &[f32]) -> RemovalFigures {
+/// cell. Nothing stood over `top`, mm, before the first cut.
+pub fn removal_figures(path: &Toolpath, removal: &Removal, final_height: &[f32], top: f64) -> RemovalFigures {
     let Removal { stock, moves, rapid_contacts, volume_bound } = removal;
     let pitch = stock.grid.cell;
     let (contacts, volume_bound) = (&rapid_contacts[..], *volume_bound);
-    let found = RemovalRecord { moves, contacts, volume_bound, pitch, axial_bound: None };
+    let found = RemovalRecord { moves, contacts, volume_bound, pitch, axial: AxialBound::Top(top) };
     let apart = |(a, b): (&f32, &f32)| f64::from((a - b).abs());
     let difference = stock.height.iter().zip(final_height).map(apart).fold(0.0, f64::max);
     RemovalFigures { engine_difference_mm: Some(difference), ..figures(path, &found) }
@@ -108,8 +116,8 @@ pub fn voxel_removal_figures(path: &Toolpath, removal: &VoxelRemoval, voxel: f64
     let VoxelRemoval { moves, rapid_contacts, volume_bound } = removal;
     let (contacts, volume_bound) = (&rapid_contacts[..], *volume_bound);
     // What is cut of a voxel lies no farther from its middle than its corners.
-    let axial_bound = Some(0.5 * 3f64.sqrt() * voxel);
-    figures(path, &RemovalRecord { moves, contacts, volume_bound, pitch: voxel, axial_bound })
+    let axial = AxialBound::Of(0.5 * 3f64.sqrt() * voxel);
+    figures(path, &RemovalRecord { moves, contacts, volume_bound, pitch: voxel, axial })
 }
 
 fn figures(path: &Toolpath, found: &RemovalRecord<'_>) -> RemovalFigures {
@@ -118,7 +126,6 @@ fn figures(path: &Toolpath, found: &RemovalRecord<'_>) -> RemovalFigures {
         volume_mm3: found.moves.iter().map(|m| m.volume).sum(),
         volume_error_bound_mm3: found.volume_bound,
         rapid_contact_count: found.contacts.len(),
-        max_axial_engagement_error_bound_mm: found.axial_bound,
         ..RemovalFigures::default()
     };
     let listed = found.contacts.iter().take(LISTED_CONTACTS);
@@ -132,6 +139,10 @@ fn figures(path: &Toolpath, found: &RemovalRecord<'_>) -> RemovalFigures {
         })
         .collect();
     engagement(&mut figures, path, found.moves);
+    figures.max_axial_engagement_error_bound_mm = match found.axial {
+        AxialBound::Of(bound) => bound,
+        AxialBound::Top(top) => below(path, top, figures.max_axial_engagement_mm),
+    };
     rates(&mut figures, path, found);
     figures
 }
@@ -148,6 +159,15 @@ fn engagement(figures: &mut RemovalFigures, path: &Toolpath, moves: &[MoveRemova
             figures.max_radial_engagement_error_bound_mm = removed.radial_bound;
         }
     }
+}
+
+/// How much higher than `found` stock can stand over the tip of a feed move, where it ends at `top`, mm.
+fn below(path: &Toolpath, top: f64, found: f64) -> f64 {
+    let feeds = path.segments().filter(|(_, _, m)| m.kind != MoveKind::Rapid);
+    let lowest = feeds.map(|(from, to, _)| from.z.min(to.z)).fold(top, f64::min);
+    // Heights are stored as f32.
+    let rounding = f64::from(f32::EPSILON) * top.abs().max(lowest.abs());
+    (top - lowest - found).max(0.0) + rounding
 }
 
 fn rates(figures: &mut RemovalFigures, path: &Toolpath, found: &RemovalRecord<'_>) {
@@ -208,19 +228,28 @@ mod tests {
     use sim::{Grid, ZMap, cut_in_order};
     use work::monitor::Silent;
 
+    const TOP: f64 = 0.0;
+
+    fn to(x: f64, y: f64, z: f64, kind: MoveKind) -> Move {
+        Move { to: ClPoint::upright(Point3::new(x, y, z)), kind, feed_rate: 600.0, pass: 0 }
+    }
+
+    /// A block of 40 × 20 mm whose top is [`TOP`]; no centre of a cell lies within 0.025 mm of a multiple of 0.05 mm.
+    fn cut_from_block(cutter: &Cutter, path: &Toolpath) -> RemovalFigures {
+        let grid = Grid { origin: Point2::new(0.025, 0.025), cell: 0.05, nx: 800, ny: 400 };
+        let removal = cut_in_order(ZMap::block(grid, TOP), cutter, path, &Silent).unwrap();
+        removal_figures(path, &removal, &removal.stock.height, TOP)
+    }
+
     /// A flat end of 6 mm in a slot 2 mm deep at 600 mm/min, in moves of 1 mm, with rapids about it.
     fn slot(rapid_height: f64) -> (Toolpath, RemovalFigures) {
-        let tip = |x: f64, z: f64| ClPoint::upright(Point3::new(x, 10.0, z));
-        let to = |x: f64, z: f64, kind| Move { to: tip(x, z), kind, feed_rate: 600.0, pass: 0 };
+        let to = |x: f64, z: f64, kind| to(x, 10.0, z, kind);
         let mut moves = vec![to(-5.0, -2.0, MoveKind::Plunge)];
         moves.extend((0..30).map(|k| to(f64::from(k - 4), -2.0, MoveKind::Cut)));
         moves.push(to(25.0, rapid_height, MoveKind::Retract));
         moves.push(to(35.0, rapid_height, MoveKind::Rapid));
-        let path = Toolpath::new(tip(-5.0, 5.0), moves);
-        let grid = Grid { origin: Point2::new(0.025, 0.025), cell: 0.05, nx: 800, ny: 400 };
-        let stock = ZMap::block(grid, 0.0);
-        let removal = cut_in_order(stock, &Cutter::flat(6.0).unwrap(), &path, &Silent).unwrap();
-        let figures = removal_figures(&path, &removal, &removal.stock.height);
+        let path = Toolpath::new(ClPoint::upright(Point3::new(-5.0, 10.0, 5.0)), moves);
+        let figures = cut_from_block(&Cutter::flat(6.0).unwrap(), &path);
         (path, figures)
     }
 
@@ -234,7 +263,7 @@ mod tests {
         let half_disc = 0.5 * std::f64::consts::PI * 9.0;
         let off = (figures.volume_mm3 - 2.0 * (25.0 * 6.0 + half_disc)).abs();
         assert!(off <= figures.volume_error_bound_mm3 && off < 0.5, "{figures:?}");
-        assert_eq!(figures.max_axial_engagement_mm, 2.0);
+        assert!(figures.max_axial_engagement_mm == 2.0 && figures.max_axial_engagement_error_bound_mm < 1e-6);
         let off = (figures.max_radial_engagement_mm - 6.0).abs();
         assert!(off <= figures.max_radial_engagement_error_bound_mm, "{figures:?}");
         assert_eq!((figures.rapid_contact_count, figures.engine_difference_mm), (0, Some(0.0)));
@@ -250,5 +279,62 @@ mod tests {
         assert!((3.0..3.05).contains(&from_end) && contact.at_mm[0] > 25.0, "{contact:?}");
         assert_eq!(contact.at_mm[2], 0.0);
         assert!((contact.depth_mm - 0.5).abs() < 1e-6, "{contact:?}");
+    }
+
+    /// Passes of a flat end of 6 mm along x at these y and z.
+    fn passes(at: &[[f64; 2]]) -> RemovalFigures {
+        let pass = |&[y, z]: &[f64; 2]| {
+            [
+                to(-5.0, y, 5.0, MoveKind::Rapid),
+                to(-5.0, y, z, MoveKind::Plunge),
+                to(45.0, y, z, MoveKind::Cut),
+                to(45.0, y, 5.0, MoveKind::Retract),
+            ]
+        };
+        let path =
+            Toolpath::new(ClPoint::upright(Point3::new(-5.0, 5.0, 5.0)), at.iter().flat_map(pass).collect());
+        cut_from_block(&Cutter::flat(6.0).unwrap(), &path)
+    }
+
+    /// Where the true height lies, by the closed form, and how far it may be from what centres see.
+    fn lies_within(figures: &RemovalFigures, seen: f64, truth: f64) {
+        let RemovalFigures {
+            max_axial_engagement_mm: found, max_axial_engagement_error_bound_mm: bound, ..
+        } = *figures;
+        assert!((found - seen).abs() < 1e-6, "{found} {seen}");
+        assert!(found <= truth + 1e-6 && truth <= found + bound, "{found} ± {bound}: {truth}");
+    }
+
+    /// What stands between the centres of cells is not seen, however high, and lies within the bound.
+    #[test]
+    fn axial_engagement_between_the_centres_is_within_its_bound() {
+        // A rib of 0.02 mm between two slots, which the third pass takes.
+        lies_within(&passes(&[[6.99, -4.0], [13.01, -4.0], [10.0, -6.0]]), 4.0, 6.0);
+        // A step: the wall of the first slot is cut back by 0.02 mm in its full height.
+        lies_within(&passes(&[[10.0, -3.0], [10.02, -5.0]]), 3.0, 5.0);
+        // As wide as a cell, both are seen.
+        lies_within(&passes(&[[6.97, -4.0], [13.03, -4.0], [10.0, -6.0]]), 6.0, 6.0);
+        lies_within(&passes(&[[10.0, -3.0], [10.06, -5.0]]), 5.0, 5.0);
+        // In layers nothing stands over the second but what the first left: the bound is true, and wide.
+        let layers = passes(&[[10.0, -2.0], [10.0, -4.0]]);
+        lies_within(&layers, 2.0, 2.0);
+        assert!((layers.max_axial_engagement_error_bound_mm - 2.0).abs() < 1e-6, "{layers:?}");
+    }
+
+    /// The lowest tip in the full block is met up to its top; centres beside it miss what the wave rises until there.
+    #[test]
+    fn axial_engagement_of_a_ball_in_a_wave() {
+        let wave = |x: f64| -1.0 - 0.4 * (x / 2.0).sin();
+        let moves = (0..=900)
+            .map(|k| to(0.05 * f64::from(k) - 3.0, 10.0, wave(0.05 * f64::from(k) - 3.0), MoveKind::Cut));
+        let moves: Vec<Move> = moves.collect();
+        let lowest = moves.iter().map(|m| m.to.tip.z).fold(TOP, f64::min);
+        let path = Toolpath::new(ClPoint::upright(Point3::new(-3.0, 10.0, wave(-3.0))), moves);
+        let figures = cut_from_block(&Cutter::ball(6.0).unwrap(), &path);
+        let (found, bound) = (figures.max_axial_engagement_mm, figures.max_axial_engagement_error_bound_mm);
+        let truth = TOP - lowest;
+        assert!(found <= truth + 1e-6 && truth <= found + bound, "{found} ± {bound}: {truth}");
+        // A centre is half a cell from the place at most, where the wave rises by its curvature.
+        assert!(bound <= 0.5 * 0.1 * 0.05f64.powi(2) + 1e-6, "{bound}");
     }
 }

@@ -1,8 +1,7 @@
 //! How near the tool comes to what it must not touch: shank and holder to the part, to fixtures and to the stock that stands
 //! when they pass; the cutter to fixtures, and on rapid moves to the part; the bodies of the machine ([`bodies`]).
 //!
-//! The finished path is looked at, whatever its planner thought of it. How deep an upright cutter cuts into the part, gouges
-//! tell.
+//! The finished path is looked at, whatever its planner thought of it. How deep a fed cutter cuts into the part, gouges tell.
 
 use collision::{LeastClearance, Obstacle};
 use cutter::{Cutter, Solid};
@@ -168,10 +167,8 @@ fn with_meshes(
     if let Some(holder) = &tool.holder {
         add(("holder", "part".into()), holder, part, off, 0.0)?;
     }
-    if matches!(run.view(), View::Normals(_)) {
-        // What it may cut in, it may also touch.
-        add(("cutter on rapid moves", "part".into()), &tool.cutter, part, off, -run.scene().tolerance.gouge)?;
-    }
+    // What it may cut in, it may also touch.
+    add(("cutter on rapid moves", "part".into()), &tool.cutter, part, off, -run.scene().tolerance.gouge)?;
     Ok(pairs)
 }
 
@@ -353,6 +350,8 @@ fn kept_away(run: &Run<'_>, pairs: &[PairClearance]) -> Option<Claim> {
     Some(claim(asked - clearance, bound).told(text))
 }
 
+#[cfg(test)]
+mod links;
 #[cfg(test)]
 mod planted;
 #[cfg(test)]

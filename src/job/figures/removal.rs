@@ -35,7 +35,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
         View::Heights(cut) => {
             let stock = stock(run, cut, monitor)?;
             let removed = cut_in_order_in_turn(stock, run.own_cutters, run.path(), monitor)?;
-            (removal_figures(run.path(), &removed, &cut.height), removed.moves)
+            (removal_figures(run.path(), &removed, &cut.height, run.session.top()), removed.moves)
         }
         View::Normals(_) => by_voxels(run, monitor)?,
     };
@@ -50,16 +50,18 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     let (greatest, bound) =
         (r.max_material_removal_rate_mm3_min, r.max_material_removal_rate_error_bound_mm3_min);
     let (most, mean) = (r.p95_material_removal_rate_mm3_min, r.mean_material_removal_rate_mm3_min);
-    let axial_bound =
-        r.max_axial_engagement_error_bound_mm.map_or(String::new(), |bound| format!(" ± {bound:.2}"));
+    let (axial, axial_bound) = (r.max_axial_engagement_mm, r.max_axial_engagement_error_bound_mm);
+    // A bound beyond the figure is that of what was there before the first cut.
+    let axial = if axial_bound < axial {
+        format!("{axial:.2} ± {axial_bound:.2}")
+    } else {
+        format!("{axial:.2} at the centres of cells and {:.2} at most", axial + axial_bound)
+    };
     let rows = vec![
         ("volume removed", format!("{:.0} ± {:.0} mm³", r.volume_mm3, r.volume_error_bound_mm3)),
         ("removal rate, greatest", format!("{greatest:.0} ± {bound:.0} mm³/min")),
         ("removal rate, 95 % and mean", format!("{most:.0}, {mean:.0} mm³/min")),
-        (
-            "engagement, axial and radial",
-            format!("{:.2}{axial_bound}, {:.2} mm", r.max_axial_engagement_mm, r.max_radial_engagement_mm),
-        ),
+        ("engagement, axial and radial", format!("{axial}, {:.2} mm", r.max_radial_engagement_mm)),
     ];
     let figure =
         Figure { key: "removal", value: value(&r)?, rows, meaning: Some(MEANING), ..Figure::default() };

@@ -11,6 +11,11 @@ const HOLDER: &str = "[holder]\ncutting_length = 20\n[[holder.section]]\ndiamete
 const SHANK: &str = "[holder]\ncutting_length = 6\n[[holder.section]]\ndiameter = 5\nlength = 14\n\
                      [[holder.section]]\ndiameter = 20\nlength = 30\n";
 
+/// A shank alone, wider than the cutter: an upright one no wider stands where the cutter has been.
+const SHANK_BOTTOM: f64 = 6.0;
+const SHANK_RADIUS: f64 = 4.0;
+const SHANK_ALONE: &str = "[holder]\ncutting_length = 6\n[[holder.section]]\ndiameter = 8\nlength = 44\n";
+
 const GAPS: [f64; 2] = [0.05, -0.05];
 const AXES: [[f64; 2]; 2] = [[0.0, 1.0], [0.6, 0.8]];
 
@@ -54,6 +59,12 @@ impl Case {
     /// A clamp that begins so far along x, at the heights around `z`.
     fn clamp(&self, x: [f64; 2], z: f64) {
         self.home.solid("clamp.stl", [x[0], -20.0, z - 2.0], [x[1], 20.0, z + 2.0]);
+    }
+
+    /// Where the tip is when the lowest place of a rim, so far above the tip and so wide, is over the plate at `z`.
+    fn tip_under_rim(&self, [bottom, radius]: [f64; 2], z: f64) -> [f64; 3] {
+        let [x, up] = self.axis;
+        [3.0 - bottom * x - radius * up, 3.0, z - bottom * up + radius * x]
     }
 
     /// A clamp under the tool, whose edge lies so far above the tip along the axis and so far from the axis.
@@ -110,33 +121,43 @@ fn holder_and_shank_against_part_and_standing_stock() {
     for (axis, gap) in AXES.into_iter().flat_map(|axis| GAPS.map(|gap| (axis, gap))) {
         let mut case = Case::new("part", axis);
         case.clamp([200.0, 205.0], 0.0);
-        // Upright a rim over the plate, and leaning its lowest place there.
-        let rim = [axis[0] * BOTTOM + axis[1] * RADIUS, axis[1] * BOTTOM - axis[0] * RADIUS];
-        let beside = |z: f64| [3.0 - rim[0], 3.0, z + gap - rim[1]];
-        let result = case.run(beside(0.0));
+        let beside = |case: &Case, z: f64| case.tip_under_rim([BOTTOM, RADIUS], z + gap);
+        let result = case.run(beside(&case, 0.0));
         holds(&result, "holder", "part", gap);
         holds(&result, "holder", "standing stock", gap);
         case.allowance = 4.0;
-        let result = case.run(beside(4.0));
+        let result = case.run(beside(&case, 4.0));
         holds(&result, "holder", "standing stock", gap);
         case.holder = SHANK;
-        holds(&case.run(beside(4.0)), "holder", "standing stock", gap);
+        holds(&case.run(beside(&case, 4.0)), "holder", "standing stock", gap);
         // A clamp beside the shank, in the middle of its length.
-        let tip = beside(20.0);
+        let tip = beside(&case, 20.0);
         case.beside(tip, 13.0, 2.5 + gap);
         holds(&case.run(tip), "holder", "clamp.stl", gap);
     }
 }
 
-/// A rapid move of a leaning cutter into the plate counts from beyond the gouge tolerance on; feeds are gouges.
+/// The cutter goes down into a block of 8 mm until its shank is over the wall of the cut.
 #[test]
-fn a_leaning_cutter_on_rapid_moves_against_the_part() {
-    for gap in GAPS {
-        let mut case = Case::new("rapid", AXES[1]);
+fn a_shank_alone_against_standing_stock() {
+    for (axis, gap) in AXES.into_iter().flat_map(|axis| GAPS.map(|gap| (axis, gap))) {
+        let mut case = Case::new("shank", axis);
+        case.clamp([200.0, 205.0], 0.0);
+        (case.allowance, case.holder) = (8.0, SHANK_ALONE);
+        let result = case.run(case.tip_under_rim([SHANK_BOTTOM, SHANK_RADIUS], 8.0 + gap));
+        holds(&result, "holder", "standing stock", gap);
+    }
+}
+
+/// A rapid move of the cutter into the plate counts from beyond the gouge tolerance on; feeds are gouges.
+#[test]
+fn a_cutter_on_rapid_moves_against_the_part() {
+    for (axis, gap) in AXES.into_iter().flat_map(|axis| GAPS.map(|gap| (axis, gap))) {
+        let mut case = Case::new("rapid", axis);
         case.clamp([200.0, 205.0], 0.0);
         case.rapid = "RAPID\n";
         // The lowest place of the ball.
-        let tip = [4.0, 3.0, gap + 3.0 - 3.0 * 0.8];
+        let tip = [4.0, 3.0, gap + 3.0 - 3.0 * axis[1]];
         holds(&case.run(tip), "cutter on rapid moves", "part", gap);
     }
 }

@@ -1,6 +1,6 @@
 //! Clamps, vises and holders planted at known distances.
 
-use crate::{Outcome, Session};
+use crate::{JobError, Outcome, Session};
 use report::{Claim, ToolpathResult, Verdict};
 use scene::Scene;
 use std::path::{Path, PathBuf};
@@ -26,6 +26,12 @@ impl Home {
         let session = Session::new(Scene::parse(&name.to_string_lossy(), text).unwrap()).unwrap();
         let outcome = session.toolpath(&session.scene.toolpaths[0], &Silent).unwrap();
         (session, outcome)
+    }
+
+    pub(super) fn tried(&self, text: &str) -> Result<Outcome, JobError> {
+        let name = self.0.join("plate.toml");
+        let session = Session::new(Scene::parse(&name.to_string_lossy(), text).unwrap())?;
+        session.toolpath(&session.scene.toolpaths[0], &Silent)
     }
 
     pub(super) fn outcome(&self, text: &str) -> Outcome {
