@@ -115,7 +115,7 @@ fn a_holder_that_meets_the_slope_is_a_collision() {
     let clear = report("slim", &wide.replace("= 3\n", "= 12\n"));
     let pairs = clear["toolpaths"][0]["clearance"]["pairs"].as_array().unwrap();
     assert!(
-        pairs.len() == 2 && pairs.iter().all(|pair| pair["clearance_mm"].as_f64().is_none_or(|c| c > 1.0)),
+        pairs.len() == 3 && pairs.iter().all(|pair| pair["clearance_mm"].as_f64().is_none_or(|c| c > 1.0)),
         "{pairs:?}"
     );
     let collides = |v: &serde_json::Value| v["what"] == "collision";

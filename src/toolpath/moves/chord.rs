@@ -42,6 +42,9 @@ impl<'a> Watch<'a> {
 /// placed to 0.06 µm.
 const MAX_HALVINGS: u32 = 12;
 
+/// A curve jumps where the middle of an interval lies nearer to one end than by this share of the way.
+const JUMP: f64 = 0.1;
+
 /// A place of a cutter on its way.
 pub trait Waypoint: Copy {
     /// How far this place lies off the move between two others, mm.
@@ -139,17 +142,22 @@ impl<P: Waypoint> Halving<'_, '_, '_, P> {
     fn halve(&mut self, a: (f64, P), b: (f64, P), halvings: u32) -> Result<(), Cancelled> {
         self.watch.step()?;
         let s = |t: f64| a.0 + (b.0 - a.0) * t;
-        if halvings > 0 {
-            let middle = (self.locate)(s(0.5));
-            let off = |p: Option<P>| p.is_some_and(|p| p.stray(&a.1, &b.1) > self.tolerance);
-            let split = off(middle) || off((self.locate)(s(0.25))) || off((self.locate)(s(0.75)));
-            if let (true, Some(middle)) = (split, middle) {
+        let off = |p: Option<P>| p.is_some_and(|p| p.stray(&a.1, &b.1) > self.tolerance);
+        let middle = (self.locate)(s(0.5));
+        let split =
+            halvings > 0 && (off(middle) || off((self.locate)(s(0.25))) || off((self.locate)(s(0.75))));
+        if let Some(middle) = middle {
+            if split {
                 let middle = (s(0.5), middle);
                 self.halve(a, middle, halvings - 1)?;
                 return self.halve(middle, b, halvings - 1);
             }
-        } else if b.1.stray(&a.1, &a.1) > self.tolerance {
-            self.points.extend((self.across)(&a.1, &b.1, self.watch)?);
+            // Half of the interval leads nowhere, and the other half all the way.
+            let [far, first, second] =
+                [(b.1, a.1), (middle, a.1), (middle, b.1)].map(|(p, q)| p.stray(&q, &q));
+            if far > self.tolerance && first.min(second) < JUMP * far {
+                self.points.extend((self.across)(&a.1, &b.1, self.watch)?);
+            }
         }
         if !b.1.is_at(&a.1) {
             self.points.push(b.1);
@@ -337,11 +345,11 @@ mod tests {
             Ok(vec![Point3::new(a.x, 1.0, 5.0), Point3::new(b.x, 1.5, 5.0)])
         };
         let watch = &mut Watch::new(&Silent);
-        let points = sample_over_jumps(0.0, 1.0, 0.25, 1e-9, jump, across, watch).unwrap();
+        let points = sample_over_jumps(0.0, 1.0, 0.25, 1e-3, jump, across, watch).unwrap();
         let over: Vec<usize> = (0..points.len()).filter(|&k| points[k].z == 5.0).collect();
         let &[first, second] = &over[..] else { panic!("{points:?}") };
         assert!(second == first + 1 && points[first - 1].y == 0.0 && points[second + 1].y == 2.0);
-        assert!((points[first].x - 0.3).abs() < 1e-3);
+        assert!((points[first].x - 0.3).abs() < 0.01);
         let kink = &mut |s: f64| Some(Point3::new(s, (s - 0.3).abs(), 0.0));
         let across = &mut |_: &Point3, _: &Point3, _: &mut Watch<'_>| panic!("no jump");
         sample_over_jumps(0.0, 1.0, 0.25, 1e-3, kink, across, watch).unwrap();
