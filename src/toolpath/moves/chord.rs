@@ -152,10 +152,10 @@ impl<P: Waypoint> Halving<'_, '_, '_, P> {
                 self.halve(a, middle, halvings - 1)?;
                 return self.halve(middle, b, halvings - 1);
             }
-            // Half of the interval leads nowhere, and the other half all the way.
+            // Half of the interval leads nowhere and the other half all the way, or halving does not end.
             let [far, first, second] =
                 [(b.1, a.1), (middle, a.1), (middle, b.1)].map(|(p, q)| p.stray(&q, &q));
-            if far > self.tolerance && first.min(second) < JUMP * far {
+            if far > self.tolerance && (halvings == 0 || first.min(second) < JUMP * far) {
                 self.points.extend((self.across)(&a.1, &b.1, self.watch)?);
             }
         }
