@@ -115,9 +115,9 @@ impl<'a> PassSettings<'a> {
                 let at = a + (b - a) * t;
                 drop.at(at.x, at.y).map(|drop| Point3::new(at.x, at.y, drop.tip_z))
             };
-            let mut between = sample_within_chord(0.0, 1.0, STEP_OF_JUMP, fine, &mut dropped, watch)?;
-            between.pop();
-            Ok(between)
+            let mut way = sample_within_chord(0.0, 1.0, STEP_OF_JUMP, fine, &mut dropped, watch)?;
+            way.pop();
+            Ok(way.into_iter().skip(1).collect())
         };
         let points = sample_over_jumps(s0, s1, self.sampling, fine, locate, &mut across, &mut watch)?;
         self.reduced(&points, &mut watch)
