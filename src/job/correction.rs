@@ -44,8 +44,8 @@ const NEAR: f64 = 0.06;
 /// Most plans that are made again after all was measured: each costs as much as the whole run without correction.
 const MOST_MEASURED: usize = 3;
 
-/// The same while the best plan stands above the target by no more than [`NEAR`]: what is left is little, and each plan has to
-/// take [`LEAST_GAIN`] of it.
+/// The same while the best plan stands above the target by no more than [`NEAR`], or the last one took most of what the one before
+/// left.
 const MOST_MEASURED_NEAR: usize = 8;
 
 /// A plan whose highest ridge is within this share below the target is as wide as it should be. What is corrected is aimed
@@ -268,7 +268,7 @@ impl Corrected<'_> {
             let found = map.and_then(|map| Standing::of_ridges(&map, &planned, factors));
             let Some(found) = found else { break };
             let gain = self.keep_if_better(planned, next, found);
-            in_vain = if gain == Gain::Enough { 0 } else { in_vain + 1 };
+            in_vain = if gain >= Gain::Enough { 0 } else { in_vain + 1 };
         }
         Ok(())
     }
@@ -278,9 +278,9 @@ impl Corrected<'_> {
         if self.is_unavoidable(&measured.measurement, monitor)? {
             return Ok(measured);
         }
-        let (mut measured, mut in_vain) = (Some(measured), 0);
+        let (mut measured, mut in_vain, mut gain) = (Some(measured), 0, Gain::None);
         for round in 0..MOST_MEASURED_NEAR {
-            if round >= MOST_MEASURED && !self.is_near(&self.tried) {
+            if round >= MOST_MEASURED && gain < Gain::Much && !self.is_near(&self.tried) {
                 break;
             }
             let Some(next) = self.next(in_vain, MEASURED_SLACK) else { break };
@@ -290,11 +290,11 @@ impl Corrected<'_> {
             let path = &planned.plan.path;
             let again = self.session.measure(self.request, self.engine, path, self.closeness, monitor)?;
             let Some(found) = Standing::of_all(&again.measurement, &planned, factors) else { break };
-            let gain = self.keep_if_better(planned, next, found);
+            gain = self.keep_if_better(planned, next, found);
             if gain != Gain::None {
                 measured = Some(again);
             }
-            in_vain = if gain == Gain::Enough { 0 } else { in_vain + 1 };
+            in_vain = if gain >= Gain::Enough { 0 } else { in_vain + 1 };
         }
         match measured {
             Some(measured) if self.closeness == Closeness::Verdict || !self.session.is_open(&measured) => {
@@ -354,7 +354,8 @@ impl Corrected<'_> {
         };
         match (round.holds(&self.goal), in_vain) {
             (true, 0) => (round.highest() < (1.0 - slack) * target && self.may_lie_wider())
-                .then(|| self.scaled(&self.tried.widths, round.highest())),
+                .then(|| self.scaled(&self.tried.widths, round.highest()))
+                .filter(|wider| !self.was_too_wide(wider)),
             (true, 1) => {
                 let worth =
                     |latest: &&Tried| latest.standing.round.highest() <= (1.0 + WORTH_FOLLOWING) * target;
@@ -374,6 +375,12 @@ impl Corrected<'_> {
         let is_even = round.median_mm.is_some_and(|median| median >= EVENLY_HIGH * round.highest());
         let intervals = path_figures(&self.best.plan.path, 0.0).passes as f64 - 1.0;
         !is_even || round.highest() * (intervals / (intervals - 1.0)).powi(2) <= self.goal.target
+    }
+
+    /// Whether a plan with widths nowhere greater stood above the target.
+    fn was_too_wide(&self, widths: &Widths) -> bool {
+        let [least, _] = widths.correction().range();
+        self.rounds.iter().any(|round| !round.holds(&self.goal) && round.factors[1] <= least)
     }
 
     /// Widths that bring a height to the one that is aimed at, all by the same factor: where the last ones left the plan as it

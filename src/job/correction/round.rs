@@ -8,6 +8,9 @@ use super::SLACK;
 /// A plan that does not hold the target is in vain unless it takes this share of what the best one leaves above it.
 const LEAST_GAIN: f64 = 0.1;
 
+/// A plan that takes this share of it gains much: a few more of its kind take all that can be seen.
+const MUCH: f64 = 0.5;
+
 /// What a round of the loop found.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct CorrectionRound {
@@ -98,18 +101,18 @@ impl CorrectionRound {
     /// What a plan gains over the best one before it.
     pub(super) fn gain_over(&self, best: &Self, goal: &Goal) -> Gain {
         let above = |round: &Self| round.highest() + round.margin(goal.target) - goal.target;
-        if !self.is_better(best, goal) {
-            Gain::None
-        } else if self.holds(goal) || above(self) <= (1.0 - LEAST_GAIN) * above(best) {
-            Gain::Enough
-        } else {
-            Gain::Little
+        let takes = |share: f64| self.holds(goal) || above(self) <= (1.0 - share) * above(best);
+        match self.is_better(best, goal) {
+            false => Gain::None,
+            true if takes(MUCH) => Gain::Much,
+            true if takes(LEAST_GAIN) => Gain::Enough,
+            true => Gain::Little,
         }
     }
 }
 
 /// What a plan gains over the best one before it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Gain {
     /// The one before is kept.
     None,
@@ -117,6 +120,8 @@ pub(super) enum Gain {
     Little,
     /// The new one is kept, and another of its kind may gain as well.
     Enough,
+    /// The same, and it took most of what the one before left.
+    Much,
 }
 
 #[cfg(test)]
@@ -150,7 +155,8 @@ mod tests {
         assert_eq!(gain(round(1.2, 10.0), round(1.2, 10.0)), Gain::None);
         assert_eq!(gain(round(1.199, 10.0), round(1.2, 10.0)), Gain::Little);
         assert_eq!(gain(round(1.17, 10.0), round(1.2, 10.0)), Gain::Enough);
-        assert_eq!(gain(round(0.99, 20.0), round(1.001, 10.0)), Gain::Enough);
+        assert_eq!(gain(round(1.09, 10.0), round(1.2, 10.0)), Gain::Much);
+        assert_eq!(gain(round(0.99, 20.0), round(1.001, 10.0)), Gain::Much);
         // What the scene lets stand above the target is no reason for another plan.
         let lenient = |share: f64, highest: f64| Goal { rule: ScallopRule { share, highest }, ..strict };
         assert!(round(1.2, 10.0).holds(&lenient(0.95, 1.5)) && !round(1.2, 10.0).holds(&strict));
