@@ -448,7 +448,7 @@ impl Corrected<'_> {
         let length = (TOUCH_UP_LENGTH * interval + off_pass) * cells.len() as f64;
         let whole = figures.cutting_length_mm + figures.link_length_mm + figures.air_length_mm;
         let nearer = (standing.round.highest() / aim(self.goal.target)).sqrt() - 1.0;
-        self.request.axis.is_none() && length <= nearer.min(MOST_TOUCH_UP) * whole
+        length <= nearer.min(MOST_TOUCH_UP) * whole
     }
 
     /// The places of a plan that may stand above the target.

@@ -16,6 +16,7 @@ use crate::vocabulary::{
 };
 use cutter::Cutter;
 use field::PlannedField;
+use geometry::Point3;
 use machine::{Machine, machining_time, slow_corners};
 use motion::{ROUNDING, ToolAxis, Toolpath};
 use part::Part;
@@ -122,12 +123,10 @@ pub fn plan(
             Some(earlier) => earlier.kept.clone(),
             None => Arc::new(Kept::new(strategy.passes(task)?, strategy)),
         };
-        let places = settings.earlier.as_ref().map_or(&[][..], |earlier| &earlier.touch_up);
-        let added = touch_up::passes(task, places, &kept.passes)?;
+        let added = touch_up::passes(task, &kept.passes)?;
         Ok((kept, added))
     })?;
-    let further = (!added.is_empty())
-        .then(|| format!("{} short passes go once more over places where others left too much", added.len()));
+    let further = touch_up::note(&added);
     let all = kept.passes.iter().cloned().chain(added).collect();
     let path = join(all, strategy.both_ways(), &setup)?;
     Ok(Plan::again(path, kept, further.into_iter().collect()))
@@ -154,15 +153,25 @@ pub fn plan_tilted(
         reason: format!("a cutter that tilts needs a surface with two sides. {e}"),
     })?;
     let setup = Setup { part, cutter, settings, monitor };
-    let mut planned = with_task(&setup, strategy, Some(tilting.axis), |task| strategy.passes(task))?;
+    let (mut planned, added) = with_task(&setup, strategy, Some(tilting.axis), |task| {
+        let planned = strategy.passes(task)?;
+        let added = touch_up::passes(task, &planned.passes)?;
+        Ok((planned, added))
+    })?;
+    planned.notes.extend(touch_up::note(&added));
     let (passes, touches) = (mem::take(&mut planned.passes), mem::take(&mut planned.touches));
+    let ball = tilted::probe(cutter).unwrap_or(*cutter);
+    let tilt = |passes: &[Vec<Point3>]| {
+        tilted::around_centres(&tilted::Dropped { passes, ball: &ball }, tilting.axis, &setup)
+    };
     let mut touches = if touches.is_empty() && !passes.is_empty() {
-        let dropped = tilted::probe(cutter).unwrap_or(*cutter);
-        let dropped = tilted::Dropped { passes: &passes, ball: &dropped };
-        tilted::around_centres(&dropped, tilting.axis, &setup)?
+        tilt(&passes)?
     } else {
         TiltedPasses::located(touches, settings.chord_tolerance)
     };
+    if !added.is_empty() {
+        touches.append(tilt(&added)?);
+    }
     touches.smoothing = settings.joining.smoothing.then_some(SAMPLING_OVER_RADIUS * cutter.radius());
     let (path, too_near_between) =
         join_tilted(touches, strategy.both_ways(), tilting, &setup, &mut planned.notes)?;

@@ -1,7 +1,8 @@
 //! Short passes over places where an earlier plan left too much, while all other passes stay where they are.
 //!
-//! Enters: the passes of an upright cutter, and places on the design. Leaves: further passes, each beside a stretch of its
-//! nearest pass and through the places there, so that it runs along their ridge. What is cut once more can only sink;
+//! Enters: the passes of an upright cutter, or the contacts of one that leans, and places on the design. Leaves: further passes
+//! of what is dropped in its stead, each beside a stretch of its nearest pass and through the places there, so that it runs
+//! along their ridge. What is cut once more can only sink;
 //! passes that are placed anew leave ridges at other places.
 
 use crate::link::plane_interval;
@@ -22,28 +23,35 @@ const BEYOND: f64 = 1.0;
 /// and follows its neighbour no farther than so many to either side: what lies beyond takes another pass.
 const FARTHEST: f64 = 16.0;
 
-/// Passes over `places` beside those that are `planned`; the first places are served first.
+/// What the user is told of further passes.
+pub(crate) fn note(added: &[Vec<Point3>]) -> Option<String> {
+    let count = added.len();
+    (count > 0).then(|| format!("{count} short passes go once more over places where others left too much"))
+}
+
+/// Passes over the places that an earlier plan left too high, beside those that are `planned`; the first places are served
+/// first. Places that a cutter from above does not touch are left out.
 ///
 /// # Errors
 /// When cancelled.
-pub(crate) fn passes(
-    task: &Task<'_>,
-    places: &[Point3],
-    planned: &[Vec<Point3>],
-) -> Result<Vec<Vec<Point3>>, PlanError> {
+pub(crate) fn passes(task: &Task<'_>, planned: &[Vec<Point3>]) -> Result<Vec<Vec<Point3>>, PlanError> {
     let Task { part, ref settings, monitor, .. } = *task;
+    let places = settings.earlier.map_or(&[][..], |earlier| &earlier.touch_up);
     let dropped = task.dropped();
     let interval = plane_interval(dropped, settings.step);
-    let axis_over = |place: &Point3| {
-        let foot = part.closest_point(place).0;
-        foot.point.xy() + dropped.axis_offset(&foot.normal)
-    };
-    let mut waiting: Vec<Point2> = places.iter().map(axis_over).collect();
     let mut added = Vec::new();
-    if waiting.is_empty() || planned.is_empty() {
+    if places.is_empty() || planned.is_empty() {
         return Ok(added);
     }
     let drop = DropCutter::watched(part, dropped, monitor)?;
+    let axis_over = |place: &Point3| {
+        let foot = part.closest_point(place).0;
+        let axis = foot.point.xy() + dropped.axis_offset(&foot.normal);
+        let touching = foot.point + dropped.contact_to_tip(&foot.normal);
+        let is_under = |tip_z: f64| settings.axis.is_none() || (tip_z - touching.z).abs() <= interval;
+        drop.at(axis.x, axis.y).is_some_and(|drop| is_under(drop.tip_z)).then_some(axis)
+    };
+    let mut waiting: Vec<Point2> = places.iter().filter_map(axis_over).collect();
     while let Some(&first) = waiting.first() {
         monitor::check(monitor)?;
         let Some(copy) = Copied::beside(planned, first, FARTHEST * interval) else { break };
@@ -152,7 +160,18 @@ fn nearest_on(place: Point2, a: Point2, b: Point2) -> (Point2, f64) {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
+    use crate::{
+        Along, Correction, Earlier, FrontStart, IsoScallop, Plan, PlanSettings, Step, Strategy, Tilting,
+        Zigzag, plan_tilted,
+    };
+    use cutter::Cutter;
+    use geometry::{AnalyticShape, AnalyticSurface};
+    use motion::{MoveKind, ToolAxis};
+    use part::{Part, Patch};
+    use work::monitor::Silent;
 
     #[test]
     fn one_pass_serves_the_places_along_a_ridge() {
@@ -178,5 +197,47 @@ mod tests {
         let run = copy.serve(&mut vec![Point2::new(99.5, 0.45)], 1.0);
         assert!((copy.at(run[1]) - Point2::new(100.0, 0.45)).norm() < 1e-12);
         assert!(Copied::beside(&[], Point2::origin(), 1.0).is_none());
+    }
+
+    /// Whether passes are tilted around a ball that was dropped (zigzag) or located by their contacts (the front): the ball's
+    /// centre is led over the place.
+    #[test]
+    fn a_tool_that_leans_gets_passes_of_its_own_as_well() {
+        let shape = AnalyticShape::Plane { height: 0.0 };
+        let surface = AnalyticSurface::new(shape, [[0.0, 20.0], [0.0, 20.0]]).unwrap();
+        let part = Part::from_patches(vec![Patch::Analytic(surface)], 0.002).unwrap();
+        let (cutter, place) = (Cutter::ball(6.0).unwrap(), Point3::new(10.0, 7.3, 0.0));
+        let rule = ToolAxis::LeadTilt { lead: 0.2, tilt: 0.0 };
+        let tilting =
+            Tilting { axis: &rule, most_turning: None, most_turning_across: None, interference: None };
+        let planned = |strategy: &dyn Strategy, places: &[Point3]| {
+            let earlier = Earlier {
+                correction: Correction::default(),
+                chords: Correction::default(),
+                touch_up: places.to_vec(),
+                kept: Arc::default(),
+                again: false,
+            };
+            let settings = PlanSettings {
+                step: Step::Stepover(4.0),
+                earlier: Some(Arc::new(earlier)),
+                ..PlanSettings::default()
+            };
+            plan_tilted(&part, &cutter, strategy, &tilting, &settings, &Silent).unwrap()
+        };
+        // How far beside the place the nearest cut leads the ball's centre.
+        let beside = |plan: &Plan| {
+            let cuts = plan.path.moves.windows(2).filter(|ends| ends[1].kind == MoveKind::Cut);
+            let centres =
+                cuts.map(|ends| [0, 1].map(|k: usize| (ends[k].to.tip + ends[k].to.axis * 3.0).xy()));
+            centres.map(|[a, b]| (nearest_on(place.xy(), a, b).0 - place.xy()).norm()).fold(9.0, f64::min)
+        };
+        let front = IsoScallop { start: FrontStart::Border { constant: Along::V, greatest: false } };
+        for strategy in [&Zigzag::at(0.0) as &dyn Strategy, &front] {
+            let [before, after] = [&[][..], &[place]].map(|places| planned(strategy, places));
+            assert!(beside(&before) > 0.2, "{}", beside(&before));
+            assert!(beside(&after) < 1e-6, "{}", beside(&after));
+            assert!(after.notes.iter().any(|note| note.starts_with("1 short passes")), "{:?}", after.notes);
+        }
     }
 }

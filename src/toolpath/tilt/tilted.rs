@@ -68,6 +68,12 @@ impl TiltedPasses {
     pub fn located(passes: Vec<Vec<Touch>>, chord_tolerance: f64) -> Self {
         Self { passes, tolerance: LOCATED_SHARE * chord_tolerance, smoothing: None }
     }
+
+    /// Adds others; the lesser tolerance holds.
+    pub fn append(&mut self, other: Self) {
+        self.passes.extend(other.passes);
+        self.tolerance = self.tolerance.min(other.tolerance);
+    }
 }
 
 /// Touches along a curve over `[s0, s1]` so close that moves between them stray by a share of the chord

@@ -78,7 +78,7 @@ pub struct Earlier {
     /// The factor of the chord tolerance, at most 1, around tips of the cutter: where chords of two passes leave a ridge higher
     /// than by calculation.
     pub chords: Correction,
-    /// Places on the design over which passes of their own are added to an upright cutter's, the most needed first.
+    /// Places on the design over which passes of their own are added, the most needed first.
     pub touch_up: Vec<Point3>,
     /// What its strategy planned: levels of its functions are placed anew.
     pub kept: Arc<Kept>,
