@@ -14,7 +14,8 @@
 //! # Limits
 //! The front's polar diagram of slowness 1/speed must be convex for the solution to be unique: for a ball,
 //! `(κ_cutter − κ_min) ≤ 2 (κ_cutter − κ_max)`. Beyond it fronts may have corners of their own; the interval is still
-//! that which the speed says, except in the fans behind such corners, where it is smaller.
+//! that which the speed says, except in the fans behind such corners, where it is smaller. Where they break into corners without
+//! end the sweeps do not settle: [`Front::convex`] fronts do.
 
 mod front;
 #[cfg(test)]

@@ -210,6 +210,30 @@ fn plane_fronts_keep_their_speed_where_the_diagram_is_dented() {
     }
 }
 
+/// The hippopede `s² = x² + 4 y²` has a dent on either side, which its common tangent `x = 2/√3` closes.
+#[test]
+fn a_convex_front_has_the_hull_of_a_hippopede() {
+    let slowness = |t: f64| (t.cos().powi(2) + 4.0 * t.sin().powi(2)).sqrt();
+    for turn in [0.0, 0.3, 1.9] {
+        let speed = |[x, y]: [f64; 2]| 1.0 / slowness(y.atan2(x) - turn);
+        let front = Front::new((1.0, 0.0, 1.0), speed).unwrap().convex();
+        for k in 0..720 {
+            let t = f64::from(k) * PI / 720.0 - FRAC_PI_2;
+            let hull = if t.cos().powi(2) > 2.0 / 3.0 { 2.0 / (3f64.sqrt() * t.cos()) } else { slowness(t) };
+            let (sin, cos) = (t + turn).sin_cos();
+            let got = front.square([cos, sin]).0.sqrt();
+            assert!((got - hull).abs() < 2e-3 * hull, "turned by {turn}, at {t}: {got} {hull}");
+        }
+    }
+    // What is convex stays as it is.
+    let ellipse = Front::new((1.0, 0.0, 1.0), |[x, y]| 1.0 / (x * x + 1.5 * y * y).sqrt()).unwrap();
+    for k in 0..100 {
+        let (sin, cos) = (0.1 * f64::from(k)).sin_cos();
+        let (given, convex) = (ellipse.square([cos, sin]).0, ellipse.convex().square([cos, sin]).0);
+        assert!((given - convex).abs() < 1e-6 * given, "{given} {convex}");
+    }
+}
+
 #[test]
 fn what_cannot_be_solved_is_said() {
     let start = |curves| Start { curves, signed: false };
