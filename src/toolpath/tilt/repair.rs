@@ -13,7 +13,7 @@
 
 use super::tilted::ABOVE_SURFACE;
 use crate::moves::touch::Touch;
-use collision::{Interference, Shortfall};
+use collision::{Interference, LastRefusal, Shortfall};
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
 use motion::{CcPoint, ClPoint, location};
@@ -99,10 +99,15 @@ pub struct Room<'a> {
 impl Room<'_> {
     /// Whether it may stand at a contact with an axis, with something to spare if asked for.
     pub fn holds(&self, contact: &CcPoint, axis: &Vector3, spare: bool) -> bool {
+        self.holds_after(&LastRefusal::default(), contact, axis, spare)
+    }
+
+    /// The same for one of many axes that are tried.
+    fn holds_after(&self, last: &LastRefusal, contact: &CcPoint, axis: &Vector3, spare: bool) -> bool {
         let at = location(self.cutter, contact, axis);
         axis.dot(&contact.normal) > ABOVE_SURFACE
-            && self.keep.holds(&at, spare)
-            && (!self.firm || self.keep.is_clear(&self.leaning_less(contact, &at)))
+            && self.keep.holds_after(last, &at, spare)
+            && (!self.firm || self.keep.holds_after(last, &self.leaning_less(contact, &at), false))
     }
 
     /// The same for a touch with its own axis and something to spare.
@@ -157,13 +162,15 @@ struct Repairing<'a> {
     room: Room<'a>,
     /// The axis of the touch before, if that was tilted.
     before: Option<Vector3>,
+    refused: LastRefusal,
     summary: RepairSummary,
     passes: Vec<Vec<Touch>>,
 }
 
 impl<'a> Repairing<'a> {
     fn new(room: Room<'a>) -> Self {
-        Self { room, before: None, summary: RepairSummary::default(), passes: Vec::new() }
+        let refused = LastRefusal::default();
+        Self { room, before: None, refused, summary: RepairSummary::default(), passes: Vec::new() }
     }
 
     /// The touch where it is clear, or what is missing.
@@ -210,7 +217,8 @@ impl<'a> Repairing<'a> {
         let y = rule.cross(&x);
         let axis =
             |tilt: f64, around: f64| rule * tilt.cos() + (x * around.cos() + y * around.sin()) * tilt.sin();
-        let clear = |tilt: f64, around: f64| room.holds(&contact, &axis(tilt, around), spare);
+        let clear =
+            |tilt: f64, around: f64| room.holds_after(&self.refused, &contact, &axis(tilt, around), spare);
         let least = |mut low: f64, mut high: f64, around: f64| {
             for _ in 0..HALVINGS {
                 let middle = 0.5 * (low + high);
