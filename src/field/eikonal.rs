@@ -43,6 +43,11 @@ const KINK: f64 = 0.5;
 /// are skewed.
 const AROUND: f64 = 2.0;
 
+/// A node whose φ leaves that of the first order by more than this share, and a step of the grid, keeps the latter. Where the
+/// speed changes by much from node to node, nodes may come to be reached by each other, and sweeps of the second order then
+/// carry them away without end; those of the first order only fall. Where φ is smooth both agree within a few per cent.
+const STRAYED: f64 = 0.1;
+
 const QUADRANTS: [[f64; 2]; 4] = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
 
 /// Two sides of a signed front meet only on the start curve: elsewhere a neighbour of the other side whose φ is further
@@ -360,7 +365,12 @@ impl Sweeper {
                         if choosing {
                             self.choice[k] = choice;
                         }
-                        new
+                        if (new - self.first[k]).abs() > STRAYED * self.first[k] + self.rise(k) {
+                            self.fixed[k] = true;
+                            self.first[k]
+                        } else {
+                            new
+                        }
                     }
                 };
                 if new.is_finite() && new != old {
@@ -387,6 +397,11 @@ impl Sweeper {
                 !(0..2).any(|c| [-2, -1, 1, 2].iter().any(|&d| newer(self.behind(k, c, 1.0, d))))
             }
         }
+    }
+
+    /// Greatest change of φ from a node to the next ones.
+    fn rise(&self, k: usize) -> f64 {
+        (0..2).map(|c| self.pitch[c] * self.fronts[k].steepest[c]).fold(0.0, f64::max)
     }
 
     /// The node `steps` behind `k` along an axis, seen by a front that moves `toward` its end.

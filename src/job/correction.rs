@@ -409,7 +409,8 @@ impl Corrected<'_> {
         let was_served = tried.standing.round.measured && !widths.touch_up.is_empty();
         let is_served =
             |places: &[HighPlace]| was_served || places.iter().any(|place| widths.is_touched_up(place));
-        if tried.standing.round.measured && self.are_few(&high, &tried.standing) && !is_served(&high) {
+        let worth_passes = || self.are_few(&high, &tried.standing) || self.is_as_before();
+        if tried.standing.round.measured && worth_passes() && !is_served(&high) {
             return Some(widths.touched_up(&high));
         }
         let raised = self.raised_by_chords(tried, &high);

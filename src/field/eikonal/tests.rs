@@ -272,3 +272,24 @@ proptest! {
         }
     }
 }
+
+/// Where the speed changes by much from node to node, and by direction, φ stays within what the least and the greatest speed
+/// allow.
+#[test]
+fn a_front_through_sudden_changes_of_speed_is_not_carried_away() {
+    let border = [vec![[-1.0, -1.0], [1.0, -1.0]]];
+    let [slow, fast] = [0.05, 1.0];
+    for waves in [9.0, 17.0, 31.0] {
+        let front = |u: f64, v: f64| {
+            let turn = (waves * u).sin() + (waves * v).cos();
+            let along = move |[x, y]: [f64; 2]| (x * turn.cos() + y * turn.sin()).powi(2);
+            Front::new((1.0, 0.0, 1.0), |across| slow + (fast - slow) * along(across).powi(4))
+        };
+        let start = Start { curves: &border, signed: false };
+        let field = eikonal(SQUARE, [61, 61], &front, &start, &Silent).unwrap().field;
+        for ([u, v], phi) in nodes(&field) {
+            let [least, greatest] = [fast, slow].map(|speed| (v + 1.0) / speed);
+            assert!((0.9 * least..=1.1 * greatest).contains(&phi), "{waves} {u} {v}: {phi}");
+        }
+    }
+}
