@@ -23,11 +23,13 @@ use work::monitor::{self, Cancelled, Monitor};
 /// Rings of tilted axes are this far apart, rad. A gap through which the tool fits may lie between two wider ones.
 const RING: f64 = 0.05;
 
-/// Axes tried on each ring.
+/// Axes tried on each ring: 10 degrees apart, as far as rings are where the axis is tilted by 0.29 rad. Narrower rings, which come
+/// first, are denser.
 const AROUND: usize = 36;
 
 /// The share of its lean at which a tool must be clear as well, where its contact must be known well: a flat bottom then fills no
-/// more than about this share of the hollow's curvature. Nearer to 1 contacts spread; less leans more than it must.
+/// more than about this share of the hollow's curvature, so that its contact moves by no more than 1/(1 − share), four times, of what it
+/// would on a plane. Nearer to 1 contacts spread; less leans more than it must.
 const LESS_LEAN: f64 = 0.75;
 
 /// Halvings of what lies between two rings: to a hundredth of a degree.
