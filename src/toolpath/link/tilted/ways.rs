@@ -28,6 +28,7 @@ use cutter::{Cutter, Solid};
 use geometry::{Aabb, Bvh, Point3, TriangleMesh, Vector3};
 use motion::{ClPoint, MoveKind};
 use part::Part;
+use std::f64::consts::TAU;
 use work::monitor::{Cancelled, Monitor};
 
 /// The way around the sphere is divided into turns of this angle, rad, and the sphere is as much larger as its chords cut
@@ -45,6 +46,9 @@ const PLACES: usize = 8;
 
 /// Steps that the tool takes at most until it is outside of the block.
 const MOST_STEPS: usize = 100;
+
+/// Level directions that are tried from the block to where a path begins or ends, the shortest way first.
+const SIDES: usize = 16;
 
 /// Least step of these, mm.
 const LEAST_STEP: f64 = 0.1;
@@ -193,10 +197,27 @@ impl<'a> Ways<'a> {
         Ok(best.2)
     }
 
-    /// Where the tool stands outside of all before its first pass, or after its last.
-    pub fn outside(&self, at: &ClPoint) -> ClPoint {
-        let near = self.sphere.exit(at);
-        if self.touching.is_clear(&near) { near } else { self.widest.exit(at) }
+    /// The way from a place to where the tool stands outside of all, before its first pass or after its last: along its axis, or
+    /// where it meets something there, out of the block and level beside it.
+    pub fn away(&self, from: &ClPoint) -> Vec<ClPoint> {
+        let along = [&self.sphere, &self.widest].map(|sphere| vec![sphere.exit(from, &from.axis)]);
+        let block = self.out(from);
+        let level = block.iter().flat_map(|block| {
+            let to_side = |k: usize| {
+                let (sin, cos) = (TAU * k as f64 / SIDES as f64).sin_cos();
+                vec![*block, self.widest.exit(block, &Vector3::new(cos, sin, 0.0))]
+            };
+            let mut sides: Vec<_> = (0..SIDES).map(to_side).collect();
+            sides.sort_by(|a, b| (a[1].tip - a[0].tip).norm().total_cmp(&(b[1].tip - b[0].tip).norm()));
+            sides
+        });
+        let clear = |way: &Vec<ClPoint>| {
+            let mut at = from;
+            way.iter().all(|to| self.touching.on_move(std::mem::replace(&mut at, to), to).is_none())
+        };
+        let found = along.iter().cloned().chain(level).find(clear);
+        let [near, far] = along;
+        found.unwrap_or(if self.touching.is_clear(&near[0]) { near } else { far })
     }
 
     /// Above all, upright.
@@ -204,9 +225,14 @@ impl<'a> Ways<'a> {
         ClPoint::upright(self.sphere.centre + Vector3::z() * self.sphere.radius)
     }
 
-    /// In to the first place from outside along the axis.
-    pub fn into(&self, outside: &ClPoint, to: &ClPoint) -> Vec<Leg> {
-        self.to_block(outside, to).into_iter().chain([(*to, MoveKind::Plunge)]).collect()
+    /// In to the first place by a way away from it, back from its end.
+    pub fn into(&self, away: &[ClPoint], to: &ClPoint) -> Vec<Leg> {
+        let last = match away {
+            [outside] => self.to_block(outside, to),
+            [block, ..] => Some((*block, MoveKind::Rapid)),
+            [] => None,
+        };
+        last.into_iter().chain([(*to, MoveKind::Plunge)]).collect()
     }
 
     /// In along the axis to where neighbouring passes have been: at the feed, the last of it as into the full.
@@ -321,7 +347,7 @@ impl<'a> Ways<'a> {
     /// Where the whole tool is outside of the block on its axis.
     fn out(&self, from: &ClPoint) -> Option<ClPoint> {
         self.block.mesh.as_ref()?;
-        let most = (self.sphere.exit(from).tip - from.tip).norm();
+        let most = (self.sphere.exit(from, &from.axis).tip - from.tip).norm();
         let mut way = self.block.exit(from);
         for _ in 0..MOST_STEPS {
             let at = ClPoint { tip: from.tip + from.axis * way, axis: from.axis };
@@ -343,7 +369,7 @@ impl<'a> Ways<'a> {
         from: &ClPoint,
         to: &ClPoint,
     ) -> (bool, Vec<Leg>) {
-        let (a, b) = (sphere.exit(from), sphere.exit(to));
+        let (a, b) = (sphere.exit(from, &from.axis), sphere.exit(to, &to.axis));
         let over: Vec<Leg> = way(sphere, &a, &b).into_iter().map(|at| (at, MoveKind::Rapid)).collect();
         let is_outside = self.is_clear(&a, &over, &self.outside);
         let off = [(self.off(from, &a), MoveKind::Retract), (a, MoveKind::Rapid)];
@@ -391,13 +417,13 @@ impl Sphere {
         Self { centre: nalgebra::center(&bounds.min, &bounds.max), radius }
     }
 
-    /// Where a cutter that retreats along its axis leaves the sphere.
-    fn exit(&self, from: &ClPoint) -> ClPoint {
-        let (off, axis) = (from.tip - self.centre, from.axis);
-        let along = off.dot(&axis);
+    /// Where a cutter that goes along a unit vector leaves the sphere.
+    fn exit(&self, from: &ClPoint, toward: &Vector3) -> ClPoint {
+        let off = from.tip - self.centre;
+        let along = off.dot(toward);
         let inside = along * along - off.norm_squared() + self.radius * self.radius;
         let way = if inside > 0.0 { inside.sqrt() - along } else { 0.0 };
-        ClPoint { tip: from.tip + axis * way.max(0.0), axis }
+        ClPoint { tip: from.tip + toward * way.max(0.0), axis: from.axis }
     }
 
     /// As [`Self::around_to`], with the axis turned away from the middle first and back last: clear of what the sphere holds
@@ -479,7 +505,8 @@ mod tests {
                 // The middle of a chord of the way around lies deepest.
                 let tip = sphere.centre + radial * (sphere.radius * (0.5 * SPHERE_STEP).cos());
                 assert_clear(&ClPoint { tip, axis }, &(k, lean));
-                places.push(sphere.exit(&ClPoint { tip: sphere.centre + radial * sphere.radius, axis }));
+                places
+                    .push(sphere.exit(&ClPoint { tip: sphere.centre + radial * sphere.radius, axis }, &axis));
             }
         }
         // From any of them to any other, also where the axes are opposite.
