@@ -79,10 +79,10 @@ impl Block {
         Self { bounds: grown, mesh }
     }
 
-    /// How far a tip goes along its axis until it leaves the block.
-    fn exit(&self, from: &ClPoint) -> f64 {
+    /// How far a tip goes along a unit vector until it leaves the block.
+    fn exit(&self, from: &ClPoint, toward: &Vector3) -> f64 {
         let along = |c: usize| {
-            let (p, a) = (from.tip[c], from.axis[c]);
+            let (p, a) = (from.tip[c], toward[c]);
             let side = if a > 0.0 { self.bounds.max[c] } else { self.bounds.min[c] };
             if a == 0.0 { f64::INFINITY } else { (side - p) / a }
         };
@@ -198,19 +198,18 @@ impl<'a> Ways<'a> {
     }
 
     /// The way from a place to where the tool stands outside of all, before its first pass or after its last: along its axis, or
-    /// where it meets something there, out of the block and level beside it.
+    /// where it meets something there, out of the block along its axis or aslant, and on level.
     pub fn away(&self, from: &ClPoint) -> Vec<ClPoint> {
         let along = [&self.sphere, &self.widest].map(|sphere| vec![sphere.exit(from, &from.axis)]);
-        let block = self.out(from);
-        let level = block.iter().flat_map(|block| {
-            let to_side = |k: usize| {
-                let (sin, cos) = (TAU * k as f64 / SIDES as f64).sin_cos();
-                vec![*block, self.widest.exit(block, &Vector3::new(cos, sin, 0.0))]
-            };
-            let mut sides: Vec<_> = (0..SIDES).map(to_side).collect();
-            sides.sort_by(|a, b| (a[1].tip - a[0].tip).norm().total_cmp(&(b[1].tip - b[0].tip).norm()));
-            sides
-        });
+        let to_side = |k: usize| {
+            let (sin, cos) = (TAU * k as f64 / SIDES as f64).sin_cos();
+            let side = Vector3::new(cos, sin, 0.0);
+            // Where it leans to what stands beside it, it has to leave that as it rises.
+            let block = [from.axis, (from.axis + side).normalize()].map(|toward| self.out(from, &toward));
+            block.into_iter().flatten().map(move |block| vec![block, self.widest.exit(&block, &side)])
+        };
+        let mut level: Vec<Vec<ClPoint>> = (0..SIDES).flat_map(to_side).collect();
+        level.sort_by(|a, b| (a[1].tip - a[0].tip).norm().total_cmp(&(b[1].tip - b[0].tip).norm()));
         let clear = |way: &Vec<ClPoint>| {
             let mut at = from;
             way.iter().all(|to| self.touching.on_move(std::mem::replace(&mut at, to), to).is_none())
@@ -244,7 +243,7 @@ impl<'a> Ways<'a> {
     /// From outside along the axis to where the block begins, if that is any nearer.
     fn to_block(&self, outside: &ClPoint, to: &ClPoint) -> Option<Leg> {
         let nearer = |at: &ClPoint| (at.tip - to.tip).norm() < (outside.tip - to.tip).norm();
-        self.out(to).filter(nearer).map(|at| (at, MoveKind::Rapid))
+        self.out(to, &to.axis).filter(nearer).map(|at| (at, MoveKind::Rapid))
     }
 
     /// Length over rate, s.
@@ -317,7 +316,7 @@ impl<'a> Ways<'a> {
 
     /// Out of the block, over, and in again.
     fn over_block(&self, from: &ClPoint, to: &ClPoint) -> Option<Vec<Leg>> {
-        let (a, b) = (self.out(from)?, self.out(to)?);
+        let (a, b) = (self.out(from, &from.axis)?, self.out(to, &to.axis)?);
         let out = self.off(from, &a);
         let legs = [(out, MoveKind::Retract), (a, MoveKind::Rapid)];
         let down = self.down(&b, to);
@@ -344,13 +343,13 @@ impl<'a> Ways<'a> {
         Some(moves.filter(|(to, _)| std::mem::replace(&mut at, *to) != *to).collect())
     }
 
-    /// Where the whole tool is outside of the block on its axis.
-    fn out(&self, from: &ClPoint) -> Option<ClPoint> {
+    /// Where the whole tool is outside of the block as it goes along a unit vector.
+    fn out(&self, from: &ClPoint, toward: &Vector3) -> Option<ClPoint> {
         self.block.mesh.as_ref()?;
-        let most = (self.sphere.exit(from, &from.axis).tip - from.tip).norm();
-        let mut way = self.block.exit(from);
+        let most = (self.sphere.exit(from, toward).tip - from.tip).norm();
+        let mut way = self.block.exit(from, toward);
         for _ in 0..MOST_STEPS {
-            let at = ClPoint { tip: from.tip + from.axis * way, axis: from.axis };
+            let at = ClPoint { tip: from.tip + toward * way, axis: from.axis };
             let Some(missing) = self.outside.shortfall(&at) else { return Some(at) };
             way += missing.depth.max(LEAST_STEP);
             if way > most {
