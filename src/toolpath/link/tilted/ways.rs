@@ -16,6 +16,8 @@
 //!
 //! - Around a greater sphere that holds the fixtures, too.
 //!
+//! A path begins and ends outside of all along the axis there, or where that meets a fixture, level beside it.
+//!
 //! All but the last are proved clear, move by move, of all that the tool is to keep away from; the last is taken where nothing else
 //! is clear. Over the block the tool also rises over all fixtures where it meets one. Times are length over rate.
 
