@@ -3,6 +3,7 @@
 use super::{Clearance, Obstacle};
 use cutter::Solid;
 use motion::{ClPoint, Move, Toolpath};
+use std::cell::Cell;
 use work::parallel;
 
 /// A solid that keeps its distance from an obstacle: a cutter from the part and from fixtures, a holder from both.
@@ -40,6 +41,11 @@ pub struct Shortfall {
     pub nearest: Clearance,
 }
 
+/// What refused a location last: a check, a piece of its solid and a triangle. It is asked first at the next one, which is mostly
+/// near and refused by the same; no answer depends on it.
+#[derive(Debug, Clone, Default)]
+pub struct LastRefusal(Cell<Option<(usize, (usize, usize))>>);
+
 /// Distance kept beyond what is needed by locations that are repaired, mm, and the share of the allowed depth for those
 /// that may cut in: moves between such locations are then clear too. More tilts more than necessary, less takes more points.
 const SPARE: f64 = 0.02;
@@ -61,7 +67,23 @@ impl Interference<'_> {
 
     /// As [`Interference::is_clear`], with something to spare if asked for.
     pub fn holds(&self, at: &ClPoint, spare: bool) -> bool {
-        !self.checks.iter().any(|check| check.obstacle.is_nearer(check.solid, at, check.limit(spare)))
+        self.holds_after(&LastRefusal::default(), at, spare)
+    }
+
+    /// The same for one of many locations near each other.
+    pub fn holds_after(&self, last: &LastRefusal, at: &ClPoint, spare: bool) -> bool {
+        let refuses = |(k, pair): (usize, (usize, usize))| {
+            let check = self.checks.get(k);
+            check.is_some_and(|check| check.obstacle.are_nearer(check.solid, at, pair, check.limit(spare)))
+        };
+        if last.0.get().is_some_and(refuses) {
+            return false;
+        }
+        let refused = self.checks.iter().enumerate().find_map(|(k, check)| {
+            Some((k, check.obstacle.some_nearer(check.solid, at, check.limit(spare))?))
+        });
+        last.0.set(refused.or(last.0.get()));
+        refused.is_none()
     }
 
     /// The check that fails by most where a tool stands.

@@ -24,7 +24,7 @@ mod sweep;
 mod tests;
 
 pub use body::{Body, Ends};
-pub use checks::{Check, Interference, Shortfall};
+pub use checks::{Check, Interference, LastRefusal, Shortfall};
 use cutter::Solid;
 use geometry::{Aabb, Bvh, Node, Point3, TriangleMesh};
 pub use least::LeastClearance;
@@ -79,16 +79,29 @@ impl<'a> Obstacle<'a> {
 
     /// Whether the mesh comes nearer than `limit`, mm: as [`Obstacle::clearance`], but ends at the first such place.
     pub fn is_nearer(&self, solid: &Solid, at: &ClPoint, limit: f64) -> bool {
-        (0..solid.pieces()).any(|index| {
+        self.some_nearer(solid, at, limit).is_some()
+    }
+
+    /// The first piece and triangle that are found to be nearer to each other than `limit`, mm.
+    fn some_nearer(&self, solid: &Solid, at: &ClPoint, limit: f64) -> Option<(usize, usize)> {
+        (0..solid.pieces()).find_map(|index| {
             let piece = ToolPiece { solid, index, at: *at };
-            let mut found = false;
+            let mut found = None;
             self.bvh.tree().search(-limit, farthest(&piece), |slot, now| {
-                let corners = self.mesh.corners(self.bvh.triangle_in(slot));
-                found |= piece.nearest_on(&corners, limit).is_some();
-                if found { f64::INFINITY } else { now }
+                let triangle = self.bvh.triangle_in(slot);
+                if piece.nearest_on(&self.mesh.corners(triangle), limit).is_some() {
+                    found = Some((index, triangle));
+                }
+                if found.is_some() { f64::INFINITY } else { now }
             });
             found
         })
+    }
+
+    /// Whether a piece and a triangle are nearer to each other than `limit`, mm.
+    fn are_nearer(&self, solid: &Solid, at: &ClPoint, (index, triangle): (usize, usize), limit: f64) -> bool {
+        let piece = ToolPiece { solid, index, at: *at };
+        piece.nearest_on(&self.mesh.corners(triangle), limit).is_some()
     }
 
     /// Puts in `best` what is nearer than that, or than `limit`; tells whether there is such a place.

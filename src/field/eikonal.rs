@@ -14,7 +14,8 @@
 //! # Limits
 //! The front's polar diagram of slowness 1/speed must be convex for the solution to be unique: for a ball,
 //! `(κ_cutter − κ_min) ≤ 2 (κ_cutter − κ_max)`. Beyond it fronts may have corners of their own; the interval is still
-//! that which the speed says, except in the fans behind such corners, where it is smaller.
+//! that which the speed says, except in the fans behind such corners, where it is smaller. Where they break into corners without
+//! end the sweeps do not settle: [`Front::convex`] fronts do.
 
 mod front;
 #[cfg(test)]
@@ -41,11 +42,6 @@ const KINK: f64 = 0.5;
 /// Cells around a piece of a start curve whose nodes may have their nearest place on it. Fewer miss it where parameters
 /// are skewed.
 const AROUND: f64 = 2.0;
-
-/// A node whose φ leaves that of the first order by more than this share, and a step of the grid, keeps the latter. Where the
-/// speed changes by much from node to node, nodes may come to be reached by each other, and sweeps of the second order then
-/// carry them away without end; those of the first order only fall. Where φ is smooth both agree within a few per cent.
-const STRAYED: f64 = 0.1;
 
 const QUADRANTS: [[f64; 2]; 4] = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
 
@@ -364,12 +360,7 @@ impl Sweeper {
                         if choosing {
                             self.choice[k] = choice;
                         }
-                        if (new - self.first[k]).abs() > STRAYED * self.first[k] + self.rise(k) {
-                            self.fixed[k] = true;
-                            self.first[k]
-                        } else {
-                            new
-                        }
+                        new
                     }
                 };
                 if new.is_finite() && new != old {
@@ -396,11 +387,6 @@ impl Sweeper {
                 !(0..2).any(|c| [-2, -1, 1, 2].iter().any(|&d| newer(self.behind(k, c, 1.0, d))))
             }
         }
-    }
-
-    /// Greatest change of φ from a node to the next ones.
-    fn rise(&self, k: usize) -> f64 {
-        (0..2).map(|c| self.pitch[c] * self.fronts[k].steepest[c]).fold(0.0, f64::max)
     }
 
     /// The node `steps` behind `k` along an axis, seen by a front that moves `toward` its end.

@@ -74,17 +74,29 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
     let refused = |(message, cure): (String, String)| scene.source.error(file.span.clone(), message, cure);
     let described = if table.tools.is_empty() { ToolTable::of_remarks(&read) } else { table };
     let (mut findings, notes) = (read.findings(&length), notes(&read));
+    let gauge_lengths = lengths.clone();
     let read = if foreign.tools_meant == ToolsMeant::All {
         let (path, joints) = joined(known(&read, runs, &described).map_err(refused)?.into_iter());
         let tools = tools_of(&path, &described);
         let before = Vec::new();
-        ReadProgram { path, joints, tools, before, unknown_before: false, others: false, findings, notes }
+        let (unknown_before, others) = (false, false);
+        ReadProgram { path, joints, tools, gauge_lengths, before, unknown_before, others, findings, notes }
     } else {
         let tool = chosen(foreign.tools_meant, &read, &runs).map_err(refused)?;
         let Others { before, unknown_before, any } = Others::of(&runs, tool, &described);
         let (path, joints) = joined(runs.into_iter().filter(|run| run.tool == tool));
         findings.retain(|found: &Finding| found.tool == tool || found.tool == 0);
-        ReadProgram { path, joints, tools: None, before, unknown_before, others: any, findings, notes }
+        ReadProgram {
+            path,
+            joints,
+            tools: None,
+            gauge_lengths,
+            before,
+            unknown_before,
+            others: any,
+            findings,
+            notes,
+        }
     };
     request.strategy = Box::new(ForeignProgram { read: Some(Arc::new(read)), ..foreign.clone() });
     Ok(())

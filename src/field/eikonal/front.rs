@@ -54,16 +54,33 @@ impl Front {
         }
         let root = (e * determinant).sqrt();
         let frame = [1.0 / e.sqrt(), -f / root, e / root];
-        let mut squares = [0.0; DIRECTIONS];
-        for (k, square) in squares.iter_mut().enumerate() {
+        let mut slowness = [0.0; DIRECTIONS];
+        for (k, slowness) in slowness.iter_mut().enumerate() {
             let (sin, cos) = angle(k).sin_cos();
             // Vectors change by the transpose of what covectors change by.
             let s = 1.0 / speed([frame[0] * cos + frame[1] * sin, frame[2] * sin]);
             if !(s > 0.0 && s.is_finite()) {
                 return None;
             }
-            *square = s * s;
+            *slowness = s;
         }
+        Some(Self::of(frame, &slowness))
+    }
+
+    /// The same with the convex hull of the polar diagram of slowness: nowhere faster. Such fronts are unique, and have no
+    /// corners of their own.
+    #[must_use]
+    pub fn convex(&self) -> Self {
+        let slowness = std::array::from_fn(|k| {
+            let (sin, cos) = angle(k).sin_cos();
+            self.square([cos, sin]).0.max(0.0).sqrt()
+        });
+        Self::of(self.frame, &hull(&slowness))
+    }
+
+    /// From the slowness in the directions of the table.
+    fn of(frame: [f64; 3], slowness: &[f64; DIRECTIONS]) -> Self {
+        let squares = slowness.map(|s| s * s);
         let project = |wave: fn(f64) -> f64| {
             (0..DIRECTIONS).map(|k| squares[k] * wave(2.0 * angle(k))).sum::<f64>() / DIRECTIONS as f64
         };
@@ -89,7 +106,7 @@ impl Front {
         let mut front =
             Self { frame, mean, cosine, sine, fourth, table, least, greatest, steepest: [0.0; 2] };
         front.steepest = [front.latest([1.0, 0.0]), front.latest([0.0, 1.0])];
-        Some(front)
+        front
     }
 
     /// Components of a gradient in the orthonormal frame, from its derivatives by the parameters.
@@ -262,4 +279,37 @@ impl Front {
 
 fn angle(k: usize) -> f64 {
     std::f64::consts::PI * k as f64 / DIRECTIONS as f64
+}
+
+/// The convex hull of a polar diagram that is its own reverse, at the directions of the table.
+fn hull(radii: &[f64; DIRECTIONS]) -> [f64; DIRECTIONS] {
+    let place = |k: usize| {
+        let (sin, cos) = angle(k).sin_cos();
+        [radii[k % DIRECTIONS] * cos, radii[k % DIRECTIONS] * sin]
+    };
+    let cross = |a: [f64; 2], b: [f64; 2]| a[0] * b[1] - a[1] * b[0];
+    let way = |from: usize, to: usize| {
+        let (a, b) = (place(from), place(to));
+        [b[0] - a[0], b[1] - a[1]]
+    };
+    // The farthest place is a corner of the hull, and so is the opposite one.
+    let first = (0..DIRECTIONS).max_by(|&a, &b| radii[a].total_cmp(&radii[b])).unwrap_or(0);
+    let mut corners: Vec<usize> = Vec::with_capacity(DIRECTIONS + 1);
+    for k in first..=first + DIRECTIONS {
+        while let [.., a, b] = corners[..]
+            && cross(way(a, b), way(b, k)) <= 0.0
+        {
+            corners.pop();
+        }
+        corners.push(k);
+    }
+    let mut hull = *radii;
+    for pair in corners.windows(2) {
+        let side = way(pair[0], pair[1]);
+        for k in pair[0] + 1..pair[1] {
+            let (sin, cos) = angle(k).sin_cos();
+            hull[k % DIRECTIONS] = cross(side, place(pair[0])) / cross(side, [cos, sin]);
+        }
+    }
+    hull
 }

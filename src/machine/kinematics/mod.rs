@@ -353,6 +353,51 @@ impl Kinematics {
         Joints { linear: table - head, rotary }
     }
 
+    /// The pace of X, Y and Z on a line that moves the tip by `way` and turns the rotary axes by `turns`, over the time of the whole,
+    /// mm, where the tip is at `tip`.
+    fn pace(&self, tip: Point3, way: Vector3, rotary: [f64; 2], turns: [f64; 2]) -> Vector3 {
+        let turn = |k: usize, (at, pace): (Vector3, Vector3), sign: f64| {
+            let RotaryAxis { direction, point, .. } = &self.axes[k];
+            let pace = pace + direction.cross(&(at - point.coords)) * (sign * turns[k]);
+            (self.turn(k, at, sign * rotary[k]), turned(&pace, direction, sign * rotary[k]))
+        };
+        let mut table = (tip.coords + self.workpiece_zero.coords, way);
+        let mut head = (self.tip_from_nose(), Vector3::zeros());
+        for k in [0, 1].into_iter().filter(|&k| self.axes[k].side == Side::Table) {
+            table = turn(k, table, -1.0);
+        }
+        for k in [1, 0].into_iter().filter(|&k| self.axes[k].side == Side::Head) {
+            head = turn(k, head, 1.0);
+        }
+        table.1 - head.1
+    }
+
+    /// The second derivative of that by the share of the line is no greater than this, mm: a turning vector of length v has derivatives
+    /// up to those of `v (1 + turn)^n`.
+    fn pace_bends(&self, tip: Point3, way: Vector3, turns: [f64; 2]) -> f64 {
+        let on = |side: Side, order: [usize; 2], from: [Vector3; 2], pace: f64| {
+            let mut bounds = [0.0, pace, 0.0, 0.0];
+            let mut centre: Option<Vector3> = None;
+            for k in order.into_iter().filter(|&k| self.axes[k].side == side) {
+                let (through, turn) = (self.axes[k].point.coords, turns[k].abs());
+                // Distances from an axis that runs straight are greatest at an end.
+                bounds[0] = match centre {
+                    None => (from[0] - through).norm().max((from[1] - through).norm()),
+                    Some(before) => bounds[0] + (through - before).norm(),
+                };
+                let [v, pace, second, third] = bounds;
+                bounds[1] = pace + turn * v;
+                bounds[2] = second + 2.0 * turn * pace + turn * turn * v;
+                bounds[3] = third + 3.0 * turn * second + 3.0 * turn * turn * pace + turn.powi(3) * v;
+                centre = Some(through);
+            }
+            bounds[3]
+        };
+        let begin = tip.coords + self.workpiece_zero.coords;
+        let nose = self.tip_from_nose();
+        on(Side::Table, [0, 1], [begin, begin + way], way.norm()) + on(Side::Head, [1, 0], [nose; 2], 0.0)
+    }
+
     /// The ways to a location, whatever the limits; `None` where the rotary axes cannot reach the tool axis.
     ///
     /// # Tolerance

@@ -12,12 +12,9 @@ use std::f64::consts::PI;
 /// tilts: such places are told, rad (1°).
 pub const SINGULAR_ANGLE: f64 = PI / 180.0;
 
-/// Rotary joints turn by no more than this between two looks at the pace of linear ones, rad: between them a pace of sines is
-/// greater by a twenty thousandth at most.
+/// Rotary joints turn by no more than this between two looks at the pace of linear ones, rad. What it may be greater by in between is
+/// added: a twenty thousandth where one axis turns.
 const PACE_TURN: f64 = 0.02;
-
-/// Paces are differences over this share of a line to both sides. Less is rounding.
-const PACE_STEP: f64 = 1e-5;
 
 /// A place where the tool axis comes close to the first rotary axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -185,7 +182,7 @@ impl JointPath {
         paces.into_iter().zip(kinematics.rates()).map(|(pace, rate)| pace / rate).fold(0.0, f64::max)
     }
 
-    /// The greatest pace of each joint on a line, over the time of the whole, mm or rad.
+    /// A bound of the greatest pace of each joint on a line, over the time of the whole, mm or rad.
     fn paces(
         &self,
         kinematics: &Kinematics,
@@ -198,15 +195,15 @@ impl JointPath {
             return paces;
         }
         // Where the control keeps the tip on its line, linear joints run along curves.
-        let at = |share: f64| {
-            let rotary = [3, 4].map(|k| a[k] + (b[k] - a[k]) * share);
-            kinematics.place(tip + (end - tip) * share, rotary).linear
-        };
+        let (way, turns) = (end - tip, [b[3] - a[3], b[4] - a[4]]);
         let parts = (paces[3].max(paces[4]) / PACE_TURN).ceil().max(1.0);
+        // Off the chord between two looks a function is by an eighth of its second derivative times their distance squared.
+        let between = kinematics.pace_bends(*tip, way, turns) / (8.0 * parts * parts);
         for part in 0..=parts as u32 {
             let share = f64::from(part) / parts;
-            let pace = (at(share + PACE_STEP) - at(share - PACE_STEP)) / (2.0 * PACE_STEP);
-            (0..3).for_each(|k| paces[k] = pace[k].abs().max(paces[k]));
+            let rotary = [0, 1].map(|k| a[3 + k] + turns[k] * share);
+            let pace = kinematics.pace(tip + way * share, way, rotary, turns);
+            (0..3).for_each(|k| paces[k] = (pace[k].abs() + between).max(paces[k]));
         }
         paces
     }

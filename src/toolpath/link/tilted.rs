@@ -189,15 +189,19 @@ fn program(pieces: &[LocatedPass], between: &[Vec<Leg>], ways: &Ways, settings: 
         };
         moves.push(Move { to, kind, feed_rate, pass: pass as u32 });
     };
-    let start = ways.outside(&first.at[0]);
-    ways.into(&start, &first.at[0]).into_iter().for_each(|(to, kind)| push(to, kind, 0));
+    let from = ways.away(&first.at[0]);
+    let start = from[from.len() - 1];
+    ways.into(&from, &first.at[0]).into_iter().for_each(|(to, kind)| push(to, kind, 0));
     for (k, piece) in pieces.iter().enumerate() {
         if let Some(way) = k.checked_sub(1).and_then(|k| between.get(k)) {
             way.iter().for_each(|(to, kind)| push(*to, *kind, k));
         }
         piece.at[1..].iter().for_each(|to| push(*to, MoveKind::Cut, k));
     }
-    push(ways.outside(&last.ends[1].at), MoveKind::Retract, pieces.len() - 1);
+    let mut kind = MoveKind::Retract;
+    for to in ways.away(&last.ends[1].at) {
+        push(to, std::mem::replace(&mut kind, MoveKind::Rapid), pieces.len() - 1);
+    }
     Toolpath::new(start, moves)
 }
 

@@ -4,6 +4,10 @@
 //! (`speed |∇φ| = 1`, see [`field::eikonal`]); levels of φ one apart are the passes. The path is as long as
 //! `∫ (1 − κ r) dA/w(across)`, κ the curvature along the feed, so the start curve decides the directions and with them the length.
 //!
+//! Where the strip is much wider across some feed directions than across others (a leaning flat or bull nose end mill on ground
+//! nearly as hollow as the cutter), fronts may break into corners of their own without end, and passes would run to and fro.
+//! Then the intervals are narrowed until they do not ([`field::Front::convex`]), which makes the path shorter.
+//!
 //! Limits: behind the ends of a start curve on the border, and where fronts meet, passes turn sharply; further short passes
 //! are put in there.
 
@@ -32,6 +36,10 @@ const PITCH_OVER_STRIP: f64 = 0.4;
 
 /// Bounds of the nodes a side. The error of φ falls with the square of the pitch; the time grows with its inverse square.
 const NODES: [usize; 2] = [81, 401];
+
+/// A front has come to rest where its last round of sweeps moved no level by more than this share of an interval: no ridge
+/// shows that.
+const SETTLED: f64 = 1e-3;
 
 /// Places a side at which a path's length is predicted, and a side's length is measured.
 const LENGTH_SAMPLES: usize = 120;
@@ -252,7 +260,6 @@ pub(crate) fn arrival(
     signed: bool,
     monitor: &dyn Monitor,
 ) -> Result<GridField, PlanError> {
-    let front = |u, v| front_at(chart, cutter, step, u, v);
     // A closed curve sends out fronts that meet, and so do several curves.
     let meets = curves.len() > 1 || curves.iter().any(|curve| curve.first() == curve.last());
     let pitch = PITCH_OVER_RADIUS * cutter.radius();
@@ -261,11 +268,19 @@ pub(crate) fn arrival(
         Step::Stepover(width) => width,
     };
     let nodes = nodes(chart, if meets { pitch.min(PITCH_OVER_STRIP * strip) } else { pitch });
-    let arrival = eikonal(chart.domain, nodes, &front, &Start { curves, signed }, monitor);
-    arrival.map(|arrival| arrival.field).map_err(|error| match error {
-        EikonalError::Cancelled(cancelled) => PlanError::Cancelled(cancelled),
-        other => PlanError::NotApplicable { strategy: "iso-scallop", reason: other.to_string() },
-    })
+    let arrive = |front: &(dyn Fn(f64, f64) -> Option<Front> + Sync)| {
+        eikonal(chart.domain, nodes, front, &Start { curves, signed }, monitor).map_err(|error| match error {
+            EikonalError::Cancelled(cancelled) => PlanError::Cancelled(cancelled),
+            other => PlanError::NotApplicable { strategy: "iso-scallop", reason: other.to_string() },
+        })
+    };
+    let arrival = arrive(&|u, v| front_at(chart, cutter, step, u, v))?;
+    if arrival.unsettled <= SETTLED {
+        return Ok(arrival.field);
+    }
+    // Levels of fronts that break into corners without end are no passes.
+    let convex = |u, v| front_at(chart, cutter, step, u, v).map(|front| front.convex());
+    Ok(arrive(&convex)?.field)
 }
 
 /// Metric and speed at a place of a chart: a front moves by the strip's width.
@@ -388,5 +403,61 @@ mod tests {
         // Not rounded to whole passes, and of the ball's centre, which runs along circles of twice the radius.
         let exact = predicted_length(&places(chart, LENGTH_SAMPLES), &cutter, settings.step, &field);
         assert!((exact / (2.0 * 50.0 * PI / interval) - 1.0).abs() < 0.01, "{exact}");
+    }
+
+    /// A saddle, about as hollow along u as a bull nose end mill under a lead is round.
+    fn saddle() -> Part {
+        let at = |k: usize| k as f64 / 7.0;
+        let net: Vec<Vec<Point3>> = (0..8)
+            .map(|i| {
+                let place = |j: usize| {
+                    let (u, v) = (at(i), at(j));
+                    let z = 16.0 * (u - 0.5).powi(2) - 12.0 * (v - 0.5).powi(2);
+                    Point3::new(18.0 * u + 1.5 * v, 13.0 * v, z)
+                };
+                (0..8).map(place).collect()
+            })
+            .collect();
+        let knots = [[0.0; 4].as_slice(), &[0.2, 0.4, 0.6, 0.8], &[1.0; 4]].concat();
+        let surface = NurbsSurface::new(3, 3, knots.clone(), knots, &net, None).unwrap();
+        Part::from_patches(vec![Patch::Nurbs(surface)], 0.005).unwrap()
+    }
+
+    /// Levels one apart run to and fro there where fronts break into corners: by the speeds as they are, sweeps never settle.
+    #[test]
+    fn passes_of_a_leaning_bull_nose_over_a_hollow_do_not_run_to_and_fro() {
+        let (part, cutter) = (saddle(), Cutter::bull(6.0, 2.0).unwrap());
+        let lead = motion::ToolAxis::LeadTilt { lead: 8f64.to_radians(), tilt: 0.0 };
+        let guide = crate::vocabulary::Guide { axis: Some(&lead), ..Default::default() };
+        let chart = &Chart::all(&part, &cutter, guide).unwrap()[0];
+        let step = Step::Scallop(0.01);
+        let border = [vec![[0.0, 0.0], [0.0, 1.0]]];
+        let start = Start { curves: &border, signed: false };
+        let given = |u, v| front_at(chart, &cutter, step, u, v);
+        let raw = eikonal(chart.domain, [81; 2], &given, &start, &Silent).unwrap();
+        assert!(raw.unsettled > 10.0 * SETTLED, "{}", raw.unsettled);
+        let field = arrival(chart, &cutter, step, &border, false, &Silent).unwrap();
+        // By how much neighbouring places of a level differ in direction, on average, rad.
+        let turn = |field: GridField| {
+            let field = ScalarField::Grid(field);
+            let metric = |u: f64, v: f64| chart.jet(u, v).first_form();
+            let tracer = LevelTracer::new(&field, &metric, chart.domain, [0.0; 2], 120, 0.1);
+            let [low, high] = tracer.range();
+            let turns = |level: f64| {
+                let curves = tracer.curves(level);
+                let turns = |points: &[[f64; 2]]| {
+                    let at = |[u, v]: [f64; 2]| chart.jet(u, v).p;
+                    points
+                        .windows(3)
+                        .map(|w| (at(w[1]) - at(w[0])).angle(&(at(w[2]) - at(w[1]))))
+                        .sum::<f64>()
+                };
+                curves.iter().map(|curve| turns(&curve.points)).sum::<f64>()
+            };
+            (1..10).map(|k| turns(low + (high - low) * f64::from(k) / 10.0)).sum::<f64>() / 9.0
+        };
+        let (before, after) = (turn(raw.field), turn(field));
+        println!("{before:.1} rad a level by the speeds as they are, {after:.1} rad");
+        assert!(after < 0.5 * before, "{after} of {before} rad");
     }
 }

@@ -1,6 +1,7 @@
 //! A program from elsewhere: G-code or cutter locations of another system. It plans nothing; its path is read from a file and
 //! cut and measured like any other.
 
+use std::collections::BTreeMap;
 use std::fmt::{self, Write as _};
 use std::sync::Arc;
 
@@ -52,6 +53,8 @@ pub struct ReadProgram {
     pub joints: Vec<Waypoint>,
     /// The cutters of all tools and what holds them, where all are meant; else the scene's cutter makes all moves.
     pub tools: Option<(Cutters, Vec<Option<Holder>>)>,
+    /// Lengths of tools from the spindle nose to the tip by their numbers, mm, as far as the table of tools has them.
+    pub gauge_lengths: BTreeMap<u32, f64>,
     /// What other tools of the program cut before, where the table of tools has their cutters.
     pub before: Vec<(Cutter, Toolpath)>,
     /// Whether other tools feed before this one whose cutters are not known.

@@ -13,7 +13,7 @@
 
 use super::tilted::ABOVE_SURFACE;
 use crate::moves::touch::Touch;
-use collision::{Interference, Shortfall};
+use collision::{Interference, LastRefusal, Shortfall};
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
 use motion::{CcPoint, ClPoint, location};
@@ -23,11 +23,13 @@ use work::monitor::{self, Cancelled, Monitor};
 /// Rings of tilted axes are this far apart, rad. A gap through which the tool fits may lie between two wider ones.
 const RING: f64 = 0.05;
 
-/// Axes tried on each ring.
+/// Axes tried on each ring: 10 degrees apart, as far as rings are where the axis is tilted by 0.29 rad. Narrower rings, which come
+/// first, are denser.
 const AROUND: usize = 36;
 
 /// The share of its lean at which a tool must be clear as well, where its contact must be known well: a flat bottom then fills no
-/// more than about this share of the hollow's curvature. Nearer to 1 contacts spread; less leans more than it must.
+/// more than about this share of the hollow's curvature, so that its contact moves by no more than 1/(1 − share), four times, of what it
+/// would on a plane. Nearer to 1 contacts spread; less leans more than it must.
 const LESS_LEAN: f64 = 0.75;
 
 /// Halvings of what lies between two rings: to a hundredth of a degree.
@@ -99,10 +101,15 @@ pub struct Room<'a> {
 impl Room<'_> {
     /// Whether it may stand at a contact with an axis, with something to spare if asked for.
     pub fn holds(&self, contact: &CcPoint, axis: &Vector3, spare: bool) -> bool {
+        self.holds_after(&LastRefusal::default(), contact, axis, spare)
+    }
+
+    /// The same for one of many axes that are tried.
+    fn holds_after(&self, last: &LastRefusal, contact: &CcPoint, axis: &Vector3, spare: bool) -> bool {
         let at = location(self.cutter, contact, axis);
         axis.dot(&contact.normal) > ABOVE_SURFACE
-            && self.keep.holds(&at, spare)
-            && (!self.firm || self.keep.is_clear(&self.leaning_less(contact, &at)))
+            && self.keep.holds_after(last, &at, spare)
+            && (!self.firm || self.keep.holds_after(last, &self.leaning_less(contact, &at), false))
     }
 
     /// The same for a touch with its own axis and something to spare.
@@ -157,13 +164,15 @@ struct Repairing<'a> {
     room: Room<'a>,
     /// The axis of the touch before, if that was tilted.
     before: Option<Vector3>,
+    refused: LastRefusal,
     summary: RepairSummary,
     passes: Vec<Vec<Touch>>,
 }
 
 impl<'a> Repairing<'a> {
     fn new(room: Room<'a>) -> Self {
-        Self { room, before: None, summary: RepairSummary::default(), passes: Vec::new() }
+        let refused = LastRefusal::default();
+        Self { room, before: None, refused, summary: RepairSummary::default(), passes: Vec::new() }
     }
 
     /// The touch where it is clear, or what is missing.
@@ -210,7 +219,8 @@ impl<'a> Repairing<'a> {
         let y = rule.cross(&x);
         let axis =
             |tilt: f64, around: f64| rule * tilt.cos() + (x * around.cos() + y * around.sin()) * tilt.sin();
-        let clear = |tilt: f64, around: f64| room.holds(&contact, &axis(tilt, around), spare);
+        let clear =
+            |tilt: f64, around: f64| room.holds_after(&self.refused, &contact, &axis(tilt, around), spare);
         let least = |mut low: f64, mut high: f64, around: f64| {
             for _ in 0..HALVINGS {
                 let middle = 0.5 * (low + high);

@@ -259,7 +259,7 @@ fn no_joint_is_faster_than_its_rate_where_the_control_keeps_the_tip() {
                 let [before, after] = [part, part + 1].map(joints);
                 for (k, limit) in kinematics.rates().into_iter().enumerate() {
                     let rate = (after[k] - before[k]).abs() * f64::from(PARTS) / time;
-                    assert!(rate <= limit * (1.0 + 1e-4), "{name} joint {k} line {}: {rate} {limit}", at + 1);
+                    assert!(rate <= limit * (1.0 + 1e-9), "{name} joint {k} line {}: {rate} {limit}", at + 1);
                     limited += usize::from(k < 3 && rate > 0.98 * limit);
                 }
             }

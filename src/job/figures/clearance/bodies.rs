@@ -14,12 +14,12 @@ use work::monitor::Monitor;
 use super::{PairClearance, uncut};
 use crate::JobError;
 use crate::run::Run;
-use crate::tool::Tool;
+use crate::tool::{Tool, ToolMoves};
 use uncut::UncutStock;
 
 /// What is said of a program whose joints are not known.
-const UNKNOWN_JOINTS: &str = "the machine's bodies are not checked: of a program from elsewhere the joints are not known with several \
-                              tools, or as cutter locations on a machine with rotary axes";
+const UNKNOWN_JOINTS: &str = "the machine's bodies are not checked: of a program from elsewhere the joints are not known as cutter \
+                              locations on a machine with rotary axes, or where it takes the tool up more than once there";
 
 /// A body that moves, and what it is fixed to.
 pub(super) struct Mover {
@@ -46,9 +46,11 @@ struct BodyMesh {
     off: f64,
 }
 
-/// The program and the links that it moves.
+/// The program of one tool and the links that it moves.
 pub(super) struct Motion<'a> {
     pub run: &'a Run<'a>,
+    /// The tool and its moves.
+    tool: &'a ToolMoves<'a>,
     chain: Chain,
     program: Vec<Waypoint>,
     /// What bodies stray from what is looked at, mm.
@@ -61,29 +63,68 @@ pub(super) fn find(
     pairs: &mut Vec<PairClearance>,
     monitor: &dyn Monitor,
 ) -> Result<Option<Claim>, JobError> {
+    let (motions, unknown) = motions(run);
+    for motion in &motions {
+        with_tool(motion, pairs, monitor)?;
+    }
+    let unknown = unknown.filter(|_| run.scene().bodies.is_some());
+    Ok(unknown.map(|text| Claim::length("collision", Gravity::Crash, 0.0, 0.0, f64::INFINITY).told(text)))
+}
+
+/// What the machine does with each tool, and of what that is not known.
+fn motions<'a>(run: &'a Run<'a>) -> (Vec<Motion<'a>>, Option<String>) {
     let (scene, path) = (run.scene(), run.path());
-    let bodies = scene.bodies.as_ref();
-    let rotary = scene.five_axis.as_ref().map(|five_axis| &five_axis.kinematics);
-    let joints = run.planned.joints.as_ref();
-    let foreign = run.request.foreign().map(|read| &read.joints).filter(|joints| !joints.is_empty());
-    let upright = rotary.is_none() && path.is_upright();
-    let (chain, program) = match (rotary, joints, foreign, bodies) {
-        (Some(kinematics), Some(joints), ..) => (Chain::of(kinematics), joints.program(kinematics, path)),
-        (Some(kinematics), None, Some(joints), Some(_)) if run.tools.len() == 1 => {
-            (Chain::of(kinematics), joints.clone())
-        }
-        (None, _, _, Some(made)) if upright && run.tools.len() == 1 => {
-            (made.chain, program_of_three_axes(path, run.planned.rise_to, &made.chain))
-        }
-        (.., Some(_)) => {
-            let unknown = Claim::length("collision", Gravity::Crash, 0.0, 0.0, f64::INFINITY);
-            return Ok(Some(unknown.told(UNKNOWN_JOINTS.to_owned())));
-        }
-        (.., None) => return Ok(None),
+    let motion = |tool: &'a ToolMoves<'a>, chain: Chain, program: Vec<Waypoint>| {
+        let stray = if scene.five_axis.is_some() { STRAY } else { 0.0 };
+        Motion { run, tool, chain, program, stray }
     };
-    let stray = if rotary.is_some() { STRAY } else { 0.0 };
-    let motion = Motion { run, chain, program, stray };
-    let tool = Tool::of(scene);
+    let read = run.request.foreign();
+    let rotary = scene.five_axis.as_ref().map(|five_axis| &five_axis.kinematics);
+    match (rotary, run.planned.joints.as_ref(), run.tools, &scene.bodies) {
+        (Some(kinematics), Some(joints), [tool, ..], _) => {
+            let program = joints.program(kinematics, path);
+            return (vec![motion(tool, Chain::of(kinematics), program)], None);
+        }
+        (Some(kinematics), None, [tool], Some(_)) => {
+            if let Some(read) = read.filter(|read| !read.joints.is_empty()) {
+                return (vec![motion(tool, Chain::of(kinematics), read.joints.clone())], None);
+            }
+        }
+        (None, _, tools, Some(made)) if path.is_upright() => {
+            // One tool may have the length of the machine's table instead.
+            let alone = (tools.len() == 1).then(|| -made.chain.tip().z);
+            let length = |tool: &ToolMoves<'_>| {
+                let number = path.tool_of(tool.first as usize);
+                number.and_then(|number| read?.gauge_lengths.get(&number).copied()).or(alone)
+            };
+            let (known, unknown): (Vec<_>, Vec<_>) = tools.iter().partition(|tool| length(tool).is_some());
+            let motions = known.into_iter().filter_map(|tool| {
+                let chain = Chain::three_axes(length(tool)?, made.chain.workpiece_zero());
+                let program = program_of_three_axes(&tool.path, run.planned.rise_to, &chain);
+                Some(motion(tool, chain, program))
+            });
+            let text = unknown.first().map(|tool| {
+                format!(
+                    "the machine's bodies are not checked{}: add its `gauge_length` to the table of tools",
+                    run.tool_name(tool.first).replace(", ", " with ")
+                )
+            });
+            return (motions.collect(), text);
+        }
+        _ => {}
+    }
+    (Vec::new(), Some(UNKNOWN_JOINTS.to_owned()))
+}
+
+/// Adds the pairs of one tool.
+fn with_tool(
+    motion: &Motion<'_>,
+    pairs: &mut Vec<PairClearance>,
+    monitor: &dyn Monitor,
+) -> Result<(), JobError> {
+    let Motion { run, chain, .. } = *motion;
+    let (rotary, bodies) = (run.scene().five_axis.is_some(), run.scene().bodies.as_ref());
+    let tool = Tool::new(motion.tool.cutter, motion.tool.holder);
     let solids = [("cutter", Some(tool.cutter)), ("holder", tool.holder)];
     let tools: Vec<Mover> = solids
         .into_iter()
@@ -109,7 +150,7 @@ pub(super) fn find(
     let stock = UncutStock::of(run);
     let of_stock = stock.iter().zip(&of_work).map(|(stock, work)| (stock, stock.beside(work))).next();
     let on_approach = |stretch: &LinkMove| stretch.approach;
-    if rotary.is_some() {
+    if rotary {
         for (mover, other) in tools.iter().flat_map(|mover| of_work.iter().map(move |other| (mover, other))) {
             let named = format!("{} on the approach", mover.name);
             pairs.extend(motion.pair((&named, mover), other, &on_approach, monitor)?);
@@ -118,12 +159,12 @@ pub(super) fn find(
             tools.iter().flat_map(|mover| of_stock.iter().map(move |of| (mover, of)))
         {
             let named = format!("{} on the approach", mover.name);
-            pairs.extend(uncut::pair(&motion, (&named, mover), (stock, other), true, monitor)?);
+            pairs.extend(uncut::pair(motion, (&named, mover), (stock, other), true, monitor)?);
         }
     }
     if let Some((stock, other)) = &of_stock {
         for mover in heads.iter().chain(&tables).filter(|mover| mover.link != other.link) {
-            pairs.extend(uncut::pair(&motion, (&mover.name, mover), (stock, other), false, monitor)?);
+            pairs.extend(uncut::pair(motion, (&mover.name, mover), (stock, other), false, monitor)?);
         }
     }
     let against = |movers: &[Mover], others: &[Other<'_>], pairs: &mut Vec<PairClearance>| {
@@ -137,8 +178,7 @@ pub(super) fn find(
     against(&heads, &of_work, pairs)?;
     against(&heads, &of_table, pairs)?;
     against(&tools, &of_table, pairs)?;
-    against(&tables, &of_work, pairs)?;
-    Ok(None)
+    against(&tables, &of_work, pairs)
 }
 
 /// Part and fixtures, on the link that carries the workpiece.
@@ -206,6 +246,11 @@ impl Motion<'_> {
         Ok(other.obstacle.least_clearance_of_body(&mover.body, moves.len(), &ends, monitor)?)
     }
 
+    /// Index of the tool's first move in the whole path.
+    pub fn first_move(&self) -> usize {
+        self.tool.first as usize
+    }
+
     /// The pair of what was found on stretches.
     pub fn told(
         &self,
@@ -221,7 +266,7 @@ impl Motion<'_> {
             least.nearest.place = Point3::from(least.nearest.place.coords - zero);
         }
         let off = other.off + self.stray;
-        PairClearance::of_mesh((name, other.name.clone()), &least, (self.run, 0), off, 0.0)
+        PairClearance::of_mesh((name, other.name.clone()), &least, (self.run, self.tool.first), off, 0.0)
     }
 }
 

@@ -109,6 +109,27 @@ fn a_leaning_tool_goes_over_a_wall_and_beside_a_post() {
     }
 }
 
+/// A roof over the plate, little higher than the tool is long: along its axis the tool would come through it.
+#[test]
+fn a_leaning_tool_comes_and_goes_beside_a_roof() {
+    let roof = block([-60.0, -60.0, 110.0], [100.0, 80.0, 115.0]);
+    let (home, files) = with("over", &[roof]);
+    let outcome = planned(&home, &files, "");
+    let (found, told, bound) = least(&outcome, &files[0], &roof);
+    assert!(found >= CLEARANCE - 1e-3, "{found}");
+    // Its upper end is flat, where the line here has half a ball: the rim is nearest.
+    let rim = found + RADIUS * (1.0 - AXIS[0]);
+    assert!((told - rim).abs() <= bound + 1e-6, "{rim} {told} {bound}");
+    let path = &outcome.path;
+    for end in [path.start, path.moves[path.len() - 1].to] {
+        assert!(
+            end.tip.z < 110.0 && !(-60.0..=100.0).contains(&end.tip.x)
+                || end.tip.y < -60.0
+                || end.tip.y > 80.0
+        );
+    }
+}
+
 /// Under a roof that a wall reaches, no way leads from one side to the other.
 #[test]
 fn a_link_without_a_clear_way_is_a_violation() {

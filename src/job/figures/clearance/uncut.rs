@@ -78,11 +78,12 @@ impl UncutStock {
         let Ok((spot, _)) = TriangleMesh::new(corners, vec![[0, 1, 2]]) else { return Ok(false) };
         let tree = Bvh::new(&spot);
         let spot = Obstacle::new(&spot, &tree);
-        let path = run.path();
-        let moves = path.moves[..path.len().min(move_index + 1)].to_vec();
-        let own = (run.scene().cutter, Toolpath::new(path.start, moves));
-        for (cutter, path) in run.before().iter().chain([&own]) {
-            let least = spot.least_clearance(&Solid::of_cutter(cutter, None), path, &|_| true, monitor)?;
+        let own = run.tools.iter().filter(|tool| tool.first as usize <= move_index).map(|tool| {
+            let count = tool.path.len().min(move_index + 1 - tool.first as usize);
+            (*tool.cutter, Toolpath::new(tool.path.start, tool.path.moves[..count].to_vec()))
+        });
+        for (cutter, path) in run.before().into_iter().chain(own) {
+            let least = spot.least_clearance(&Solid::of_cutter(&cutter, None), &path, &|_| true, monitor)?;
             if least.is_some_and(|least| least.nearest.distance <= least.error_bound) {
                 return Ok(false);
             }
@@ -116,7 +117,7 @@ pub(super) fn pair(
             _ => clear = middle,
         }
     }
-    let (place, step) = (first.nearest.place, moves[first.move_index].step);
+    let (place, step) = (first.nearest.place, motion.first_move() + moves[first.move_index].step);
     let told = motion.told(name, other, &moves, first);
     Ok(Some(match stock.stands(motion.run, &place, step, monitor)? {
         true => told,

@@ -16,6 +16,8 @@
 //!
 //! - Around a greater sphere that holds the fixtures, too.
 //!
+//! A path begins and ends outside of all along the axis there, or where that meets a fixture, level beside it.
+//!
 //! All but the last are proved clear, move by move, of all that the tool is to keep away from; the last is taken where nothing else
 //! is clear. Over the block the tool also rises over all fixtures where it meets one. Times are length over rate.
 
@@ -28,6 +30,7 @@ use cutter::{Cutter, Solid};
 use geometry::{Aabb, Bvh, Point3, TriangleMesh, Vector3};
 use motion::{ClPoint, MoveKind};
 use part::Part;
+use std::f64::consts::TAU;
 use work::monitor::{Cancelled, Monitor};
 
 /// The way around the sphere is divided into turns of this angle, rad, and the sphere is as much larger as its chords cut
@@ -45,6 +48,9 @@ const PLACES: usize = 8;
 
 /// Steps that the tool takes at most until it is outside of the block.
 const MOST_STEPS: usize = 100;
+
+/// Level directions that are tried from the block to where a path begins or ends, the shortest way first.
+const SIDES: usize = 16;
 
 /// Least step of these, mm.
 const LEAST_STEP: f64 = 0.1;
@@ -75,10 +81,10 @@ impl Block {
         Self { bounds: grown, mesh }
     }
 
-    /// How far a tip goes along its axis until it leaves the block.
-    fn exit(&self, from: &ClPoint) -> f64 {
+    /// How far a tip goes along a unit vector until it leaves the block.
+    fn exit(&self, from: &ClPoint, toward: &Vector3) -> f64 {
         let along = |c: usize| {
-            let (p, a) = (from.tip[c], from.axis[c]);
+            let (p, a) = (from.tip[c], toward[c]);
             let side = if a > 0.0 { self.bounds.max[c] } else { self.bounds.min[c] };
             if a == 0.0 { f64::INFINITY } else { (side - p) / a }
         };
@@ -193,10 +199,26 @@ impl<'a> Ways<'a> {
         Ok(best.2)
     }
 
-    /// Where the tool stands outside of all before its first pass, or after its last.
-    pub fn outside(&self, at: &ClPoint) -> ClPoint {
-        let near = self.sphere.exit(at);
-        if self.touching.is_clear(&near) { near } else { self.widest.exit(at) }
+    /// The way from a place to where the tool stands outside of all, before its first pass or after its last: along its axis, or
+    /// where it meets something there, out of the block along its axis or aslant, and on level.
+    pub fn away(&self, from: &ClPoint) -> Vec<ClPoint> {
+        let along = [&self.sphere, &self.widest].map(|sphere| vec![sphere.exit(from, &from.axis)]);
+        let to_side = |k: usize| {
+            let (sin, cos) = (TAU * k as f64 / SIDES as f64).sin_cos();
+            let side = Vector3::new(cos, sin, 0.0);
+            // Where it leans to what stands beside it, it has to leave that as it rises.
+            let block = [from.axis, (from.axis + side).normalize()].map(|toward| self.out(from, &toward));
+            block.into_iter().flatten().map(move |block| vec![block, self.widest.exit(&block, &side)])
+        };
+        let mut level: Vec<Vec<ClPoint>> = (0..SIDES).flat_map(to_side).collect();
+        level.sort_by(|a, b| (a[1].tip - a[0].tip).norm().total_cmp(&(b[1].tip - b[0].tip).norm()));
+        let clear = |way: &Vec<ClPoint>| {
+            let mut at = from;
+            way.iter().all(|to| self.touching.on_move(std::mem::replace(&mut at, to), to).is_none())
+        };
+        let found = along.iter().cloned().chain(level).find(clear);
+        let [near, far] = along;
+        found.unwrap_or(if self.touching.is_clear(&near[0]) { near } else { far })
     }
 
     /// Above all, upright.
@@ -204,9 +226,14 @@ impl<'a> Ways<'a> {
         ClPoint::upright(self.sphere.centre + Vector3::z() * self.sphere.radius)
     }
 
-    /// In to the first place from outside along the axis.
-    pub fn into(&self, outside: &ClPoint, to: &ClPoint) -> Vec<Leg> {
-        self.to_block(outside, to).into_iter().chain([(*to, MoveKind::Plunge)]).collect()
+    /// In to the first place by a way away from it, back from its end.
+    pub fn into(&self, away: &[ClPoint], to: &ClPoint) -> Vec<Leg> {
+        let last = match away {
+            [outside] => self.to_block(outside, to),
+            [block, ..] => Some((*block, MoveKind::Rapid)),
+            [] => None,
+        };
+        last.into_iter().chain([(*to, MoveKind::Plunge)]).collect()
     }
 
     /// In along the axis to where neighbouring passes have been: at the feed, the last of it as into the full.
@@ -218,7 +245,7 @@ impl<'a> Ways<'a> {
     /// From outside along the axis to where the block begins, if that is any nearer.
     fn to_block(&self, outside: &ClPoint, to: &ClPoint) -> Option<Leg> {
         let nearer = |at: &ClPoint| (at.tip - to.tip).norm() < (outside.tip - to.tip).norm();
-        self.out(to).filter(nearer).map(|at| (at, MoveKind::Rapid))
+        self.out(to, &to.axis).filter(nearer).map(|at| (at, MoveKind::Rapid))
     }
 
     /// Length over rate, s.
@@ -291,7 +318,7 @@ impl<'a> Ways<'a> {
 
     /// Out of the block, over, and in again.
     fn over_block(&self, from: &ClPoint, to: &ClPoint) -> Option<Vec<Leg>> {
-        let (a, b) = (self.out(from)?, self.out(to)?);
+        let (a, b) = (self.out(from, &from.axis)?, self.out(to, &to.axis)?);
         let out = self.off(from, &a);
         let legs = [(out, MoveKind::Retract), (a, MoveKind::Rapid)];
         let down = self.down(&b, to);
@@ -318,13 +345,13 @@ impl<'a> Ways<'a> {
         Some(moves.filter(|(to, _)| std::mem::replace(&mut at, *to) != *to).collect())
     }
 
-    /// Where the whole tool is outside of the block on its axis.
-    fn out(&self, from: &ClPoint) -> Option<ClPoint> {
+    /// Where the whole tool is outside of the block as it goes along a unit vector.
+    fn out(&self, from: &ClPoint, toward: &Vector3) -> Option<ClPoint> {
         self.block.mesh.as_ref()?;
-        let most = (self.sphere.exit(from).tip - from.tip).norm();
-        let mut way = self.block.exit(from);
+        let most = (self.sphere.exit(from, toward).tip - from.tip).norm();
+        let mut way = self.block.exit(from, toward);
         for _ in 0..MOST_STEPS {
-            let at = ClPoint { tip: from.tip + from.axis * way, axis: from.axis };
+            let at = ClPoint { tip: from.tip + toward * way, axis: from.axis };
             let Some(missing) = self.outside.shortfall(&at) else { return Some(at) };
             way += missing.depth.max(LEAST_STEP);
             if way > most {
@@ -343,7 +370,7 @@ impl<'a> Ways<'a> {
         from: &ClPoint,
         to: &ClPoint,
     ) -> (bool, Vec<Leg>) {
-        let (a, b) = (sphere.exit(from), sphere.exit(to));
+        let (a, b) = (sphere.exit(from, &from.axis), sphere.exit(to, &to.axis));
         let over: Vec<Leg> = way(sphere, &a, &b).into_iter().map(|at| (at, MoveKind::Rapid)).collect();
         let is_outside = self.is_clear(&a, &over, &self.outside);
         let off = [(self.off(from, &a), MoveKind::Retract), (a, MoveKind::Rapid)];
@@ -391,13 +418,13 @@ impl Sphere {
         Self { centre: nalgebra::center(&bounds.min, &bounds.max), radius }
     }
 
-    /// Where a cutter that retreats along its axis leaves the sphere.
-    fn exit(&self, from: &ClPoint) -> ClPoint {
-        let (off, axis) = (from.tip - self.centre, from.axis);
-        let along = off.dot(&axis);
+    /// Where a cutter that goes along a unit vector leaves the sphere.
+    fn exit(&self, from: &ClPoint, toward: &Vector3) -> ClPoint {
+        let off = from.tip - self.centre;
+        let along = off.dot(toward);
         let inside = along * along - off.norm_squared() + self.radius * self.radius;
         let way = if inside > 0.0 { inside.sqrt() - along } else { 0.0 };
-        ClPoint { tip: from.tip + axis * way.max(0.0), axis }
+        ClPoint { tip: from.tip + toward * way.max(0.0), axis: from.axis }
     }
 
     /// As [`Self::around_to`], with the axis turned away from the middle first and back last: clear of what the sphere holds
@@ -479,7 +506,8 @@ mod tests {
                 // The middle of a chord of the way around lies deepest.
                 let tip = sphere.centre + radial * (sphere.radius * (0.5 * SPHERE_STEP).cos());
                 assert_clear(&ClPoint { tip, axis }, &(k, lean));
-                places.push(sphere.exit(&ClPoint { tip: sphere.centre + radial * sphere.radius, axis }));
+                places
+                    .push(sphere.exit(&ClPoint { tip: sphere.centre + radial * sphere.radius, axis }, &axis));
             }
         }
         // From any of them to any other, also where the axes are opposite.

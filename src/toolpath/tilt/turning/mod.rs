@@ -32,7 +32,8 @@ const SLACK: f64 = 1e-3;
 /// Shares of the way to one axis for all.
 const LEANS: usize = 8;
 
-/// Axes that all may lean to are so far apart, rad. Where only smaller ranges are clear none may be found.
+/// Axes that all may lean to are so far apart, rad: a clear cone of half that times √2, 4 degrees, holds one. Where only smaller ranges are
+/// clear none may be found.
 const SPHERE: f64 = 0.1;
 
 /// Steps towards the middle of all normals, which is off by the inverse of that, rad.

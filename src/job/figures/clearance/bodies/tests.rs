@@ -263,3 +263,48 @@ fn programs_from_elsewhere_move_the_bodies() {
         }
     }
 }
+
+/// The nose over a post beside the plate: as far as each tool is longer than the post is high.
+#[test]
+fn each_tool_of_a_program_has_its_own_length() {
+    let home = Home::new("lengths");
+    home.write(
+        "job.nc",
+        "G21 G90 G17 G94\nT1 M6\nG43 H1\nS1000 M3\nG0 X0 Y0 Z10\nG1 Z0 F500\nX8\nG0 Z10\nT2 M6\nG43 H2\nG0 X0 Y3\nG1 Z0\nX8\n\
+         G0 Z10\nM30\n",
+    );
+    let run = |post: f64, length: &str| {
+        home.solid("post.stl", [15.0, 2.0, -2.0], [19.0, 4.0, post]);
+        let tool = |number: u32, more: &str| {
+            format!("[[tool]]\nnumber = {number}\nshape = \"ball\"\ndiameter = 6\n{more}\n")
+        };
+        home.write("tools.toml", &(tool(1, "gauge_length = 60") + &tool(2, length)));
+        let nose = cylinder("nose", "Z", 40.0, "[0, 0, 0]", "[0, 0, 70]");
+        home.opened(&format!(
+            "{PLATE}[[fixture]]\nfile = \"post.stl\"\n[[toolpath]]\nstrategy = \"program\"\nfile = \"job.nc\"\ntool = \"all\"\n\
+             tools = \"tools.toml\"\n[machine]\ngauge_length = 60\nworkpiece_zero = {}\n{nose}",
+            list(ZERO)
+        ))
+    };
+    let of_nose = |result: &ToolpathResult, tool: &str| {
+        let named = |claim: &&Claim| claim.text.to_lowercase().contains("nose") && claim.text.contains(tool);
+        let found = result.claims.iter().filter(named).find(|claim| claim.text.contains("post.stl"));
+        found.unwrap_or_else(|| panic!("{tool}: {:#?}", result.claims)).clone()
+    };
+    for gap in [0.05, -0.05] {
+        let result = run(30.0 - gap, "gauge_length = 30");
+        for (tool, expected) in [("tool 1", 30.0 + gap), ("tool 2", gap)] {
+            let found = of_nose(&result, tool);
+            let verdict = if expected > 0.0 { Verdict::Pass } else { Verdict::Fail };
+            assert_eq!(found.verdict(), verdict, "{found:?}");
+            let off = (found.measured.unwrap() + expected).abs();
+            assert!(off <= found.error_bound + 1e-6 && found.error_bound < 0.02, "{found:?}");
+        }
+    }
+    // Without its length nothing is known of the second tool, and of the first as before.
+    let result = run(29.95, "");
+    assert_eq!(of_nose(&result, "tool 1").verdict(), Verdict::Pass);
+    let unknown = result.claims.iter().find(|claim| claim.text.contains("not checked")).unwrap();
+    assert_eq!(unknown.verdict(), Verdict::Undecided, "{unknown:?}");
+    assert!(unknown.text.contains("with tool 2") && unknown.text.contains("`gauge_length`"), "{unknown:?}");
+}
