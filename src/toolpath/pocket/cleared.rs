@@ -34,7 +34,7 @@ const PART: f64 = PI / PARTS as f64;
 const MAX_SIDE: f64 = 1024.0;
 
 /// Queries so near to each other, over the radius, share one list of discs.
-const NEIGHBOURS: f64 = 0.15;
+const NEIGHBOURS: f64 = 0.3;
 
 /// Parts of the circumference for which such a list is made.
 const SECTORS: usize = 32;
@@ -65,6 +65,8 @@ struct Near {
     /// How many discs there were. Later ones are asked, too.
     count: usize,
     discs: Vec<u32>,
+    /// Their centres.
+    centres: Vec<Point2>,
     /// Those that clear some of the circumference whole.
     keepers: Vec<u32>,
 }
@@ -243,11 +245,12 @@ impl Cleared {
         }
         let later = (near.count..self.discs.len()).rev();
         // The last ground leaves so little standing that most of the older is passed over.
-        for k in later.chain(near.discs.iter().map(|k| *k as usize)) {
+        let listed = near.discs.iter().map(|k| *k as usize).zip(&near.centres);
+        for (k, disc) in later.map(|k| (k, &self.discs[k])).chain(listed) {
             if front.ends.is_none() {
                 break;
             }
-            let cleared = front.clear(self.discs[k] - centre, grown(k));
+            let cleared = front.clear(disc - centre, grown(k));
             if cleared > 0 && best.is_none_or(|(_, most)| cleared > most) {
                 best = Some((k, cleared));
             }
@@ -309,6 +312,8 @@ impl Cleared {
         near.discs.extend(&near.keepers);
         near.discs.sort_unstable_by(|a, b| b.cmp(a));
         near.discs.dedup();
+        near.centres.clear();
+        near.centres.extend(near.discs.iter().map(|k| self.discs[*k as usize]));
         (near.anchor, near.reach, near.count) = (*anchor, reach, self.discs.len());
     }
 }

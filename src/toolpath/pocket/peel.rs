@@ -69,6 +69,16 @@ struct Step {
     arc: f64,
 }
 
+/// How a pass came out that was tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Came {
+    Through,
+    /// It cut next to nothing, or ended soon without care, and nothing changed.
+    Stopped,
+    /// It met no stock, and nothing changed.
+    ToNothing,
+}
+
 /// Peels stock off as long as there is some to be reached.
 pub(super) struct Peeler<'a> {
     room: &'a Room<'a>,
@@ -123,12 +133,13 @@ impl<'a> Peeler<'a> {
         while let Some(k) = self.next_place() {
             check(monitor)?;
             self.careful = false;
-            let mut done = self.pass(k, monitor)?;
-            if !done {
+            let mut came = self.pass(k, monitor)?;
+            // Care changes steps that cut, and those alone.
+            if came == Came::Stopped {
                 self.careful = true;
-                done = self.pass(k, monitor)?;
+                came = self.pass(k, monitor)?;
             }
-            if !done {
+            if came != Came::Through {
                 self.places.forget(k);
             }
         }
@@ -218,8 +229,8 @@ impl<'a> Peeler<'a> {
         link
     }
 
-    /// One pass from a place; `false` if it cuts next to nothing, or ends soon without care, and then nothing changes.
-    fn pass(&mut self, place: usize, monitor: &dyn Monitor) -> Result<bool, Cancelled> {
+    /// One pass from a place.
+    fn pass(&mut self, place: usize, monitor: &dyn Monitor) -> Result<Came, Cancelled> {
         let Beginning { at: begin, heading, .. } = *self.places.get(place);
         let (full, shortest) = (STEP * self.radius, SHORTEST * self.radius);
         let before = self.cleared.len();
@@ -267,7 +278,7 @@ impl<'a> Peeler<'a> {
         let soon = stuck && gone < SOON * self.radius;
         if cut < LEAST_CUT * self.radius || (soon && !self.careful) {
             self.cleared.truncate(before);
-            return Ok(false);
+            return Ok(if cut == 0.0 && !stuck { Came::ToNothing } else { Came::Stopped });
         }
         // What was gone without cutting is not gone in the end; it may have taken films away.
         self.cleared.truncate(self.cleared.len() - (way.len() - last_cut));
@@ -278,7 +289,7 @@ impl<'a> Peeler<'a> {
         self.out.extend(way.iter().map(|step| step.to));
         self.note_places(first, way.iter().map(|step| step.heading).collect());
         self.thin(self.cleared.len());
-        Ok(true)
+        Ok(Came::Through)
     }
 
     /// Leaves out what the first `count` places of the ground cover of each other, from time to time; how many those were.
