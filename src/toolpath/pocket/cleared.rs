@@ -39,6 +39,17 @@ const NEIGHBOURS: f64 = 0.3;
 /// Parts of the circumference for which such a list is made.
 const SECTORS: usize = 32;
 
+/// Places around which passes are planned for a lower limit of the engagement.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gentle {
+    /// Around here.
+    pub at: Point2,
+    /// So far from there, mm.
+    pub within: f64,
+    /// By so much, rad.
+    pub by: f64,
+}
+
 /// Ground cleared by a disc.
 pub(super) struct Cleared {
     radius: f64,
@@ -54,6 +65,8 @@ pub(super) struct Cleared {
     thinned: usize,
     /// Buckets to which discs were added since the ground was thinned.
     fresh: Vec<bool>,
+    /// Where angles count as greater.
+    pub gentle: Vec<Gentle>,
 }
 
 /// The discs that decide about every place near to one.
@@ -80,7 +93,19 @@ impl Cleared {
         let buckets = vec![Vec::new(); side[0] * side[1]];
         let fresh = vec![false; buckets.len()];
         let (best, near) = (Cell::new(None), RefCell::new(Near::default()));
-        Self { radius, origin: lo, bucket, side, buckets, discs: Vec::new(), best, near, thinned: 0, fresh }
+        Self {
+            radius,
+            origin: lo,
+            bucket,
+            side,
+            buckets,
+            discs: Vec::new(),
+            best,
+            near,
+            thinned: 0,
+            fresh,
+            gentle: Vec::new(),
+        }
     }
 
     /// How many places there are.
@@ -206,13 +231,20 @@ impl Cleared {
     /// rad. Films are left out but beside the places from `fresh` on: the chip of the move itself begins as
     /// thin as one.
     pub fn arc(&self, centre: &Point2, heading: &Vector2, fresh: usize) -> f64 {
-        self.front(centre, heading, 0.0, fresh).angle()
+        self.counted(centre, self.front(centre, heading, 0.0, fresh).angle())
+    }
+
+    /// An angle at a place with what it counts more there.
+    fn counted(&self, place: &Point2, angle: f64) -> f64 {
+        let near = self.gentle.iter().filter(|gentle| (gentle.at - place).norm() < gentle.within);
+        if angle > 0.0 { angle + near.map(|gentle| gentle.by).sum::<f64>() } else { angle }
     }
 
     /// As [`Cleared::arc`], with what is clear to the right of the stock counted as well: the angle that there is once the
     /// cutter has turned along the stock on its right.
     pub fn arc_from_right(&self, centre: &Point2, heading: &Vector2, fresh: usize) -> f64 {
-        self.front(centre, heading, 0.0, fresh).ends().map_or(0.0, |[_, to]| PART * to as f64)
+        let angle = self.front(centre, heading, 0.0, fresh).ends().map_or(0.0, |[_, to]| PART * to as f64);
+        self.counted(centre, angle)
     }
 
     /// Whether a straight move keeps to a limit all along but for [`BETWEEN`]: tips of stock may be passed between its ends. A
@@ -225,7 +257,8 @@ impl Cleared {
         }
         let (heading, most) = (along / length, limit + BETWEEN);
         let at = |k: usize| from + along * (k as f64 / BETWEEN_PLACES as f64);
-        self.front(&at(BETWEEN_PLACES / 2), &heading, 0.5 * length, fresh).angle() <= most
+        let middle = at(BETWEEN_PLACES / 2);
+        self.counted(&middle, self.front(&middle, &heading, 0.5 * length, fresh).angle()) <= most
             || (1..BETWEEN_PLACES).all(|k| self.arc(&at(k), &heading, fresh) <= most)
     }
 
@@ -250,7 +283,11 @@ impl Cleared {
             if front.ends.is_none() {
                 break;
             }
-            let cleared = front.clear(disc - centre, grown(k));
+            let to = disc - centre;
+            if (to - front.middle).norm_squared() >= front.reach {
+                continue;
+            }
+            let cleared = front.clear(to, grown(k));
             if cleared > 0 && best.is_none_or(|(_, most)| cleared > most) {
                 best = Some((k, cleared));
             }
@@ -327,11 +364,15 @@ struct Front {
     standing: Arc,
     /// Where what stands begins and ends on the circumference.
     ends: Option<[Vector2; 2]>,
+    /// The middle between them, and the square of the distance from it beyond which no disc clears any of it.
+    middle: Vector2,
+    reach: f64,
 }
 
 impl Front {
     fn new(radius: f64, heading: &Vector2, half: f64) -> Self {
-        let mut front = Self { radius, heading: *heading, half, standing: Arc::FRONT, ends: None };
+        let (ends, middle, reach) = (None, Vector2::zeros(), 0.0);
+        let mut front = Self { radius, heading: *heading, half, standing: Arc::FRONT, ends, middle, reach };
         front.find_ends();
         front
     }
@@ -344,6 +385,12 @@ impl Front {
                 Vector2::new(heading.x * cos - heading.y * sin, heading.x * sin + heading.y * cos) * radius
             })
         });
+        // The arc between them is half a circle at most: no place of it is farther from the middle of its chord than its ends.
+        if let Some([a, b]) = &self.ends {
+            self.middle = (a + b) * 0.5;
+            let reach = self.radius * (1.0 + FILM + ROUNDING) + self.half + (b - a).norm() * 0.5;
+            self.reach = reach * reach;
+        }
     }
 
     /// Whether a disc meets the circumference between the ends: it does along an arc about its direction, which holds an end
@@ -438,7 +485,8 @@ impl Arc {
             if b < 0.0 || a > (PARTS - 1) as f64 {
                 continue;
             }
-            let (first, last) = (a.ceil().max(0.0) as usize, (b.floor() as usize).min(PARTS - 1));
+            let below = a.max(0.0) as usize;
+            let (first, last) = (below + usize::from((below as f64) < a), (b as usize).min(PARTS - 1));
             for word in first / 64..=last / 64 {
                 let low = first.saturating_sub(64 * word).min(64);
                 let high = (last + 1).saturating_sub(64 * word).min(64);
