@@ -157,8 +157,8 @@ impl Session {
         Ok(Plan { path, notes, ..plan })
     }
 
-    /// A path as programs say it, which is what is cut and measured: without moves shorter than the control takes, slowed in
-    /// corners, rounded; and how many moves are left out.
+    /// A path as programs say it, which is what is cut and measured: without moves shorter than the control takes (merged within a
+    /// share of the chord tolerance), slowed in corners, rounded; and how many moves are left out.
     fn as_written(&self, path: &Toolpath, share: f64) -> (Toolpath, usize) {
         let Scene { tolerance, machine, .. } = &self.scene;
         let straying = Straying { tolerance: tolerance.chord * share, length: cutting_length(&self.scene) };
@@ -278,7 +278,7 @@ const BOUNDED_STRAYING: f64 = 0.2;
 /// A plan of a pocket with the engagement that was measured, and the bound of its greatest angle, rad.
 type Engaged = (Plan, Option<(Engagement, f64)>);
 
-/// Times that a pocket is planned again at most: for less where the engagement was exceeded, and once for a lower limit everywhere.
+/// Times that a pocket is planned again for less where the engagement was exceeded; once more it is for a lower limit everywhere.
 const GENTLE_ROUNDS: usize = 2;
 
 /// The share of the limit by which it is lowered at least. Less may change no pass at all.
@@ -314,27 +314,24 @@ fn within_engagement(
             break;
         }
         let (_, engaged) = last.as_ref().unwrap_or(&best);
-        eprintln!(
-            "ROUND {round} over {:.3} best {:.3} gentle {}",
-            engaged.as_ref().map_or(0.0, |(f, b)| f.max + b - limit).to_degrees(),
-            by.to_degrees(),
-            gentle.len()
-        );
-        let exceeding =
-            engaged.iter().flat_map(|(found, bound)| found.exceeding.iter().map(|one| (one, *bound)));
         let before = gentle.len();
-        gentle.extend(exceeding.map(|(one, bound)| Gentle {
-            at: one.from.xy(),
-            within: one.length + AROUND_EXCEEDING * radius,
-            by: (one.max + bound - limit).max(LEAST_LOWERING * limit),
-        }));
+        for (found, bound) in engaged {
+            for one in &found.exceeding {
+                let by = (one.max + bound - limit).max(LEAST_LOWERING * limit);
+                let (at, within) = (one.from.xy(), one.length + AROUND_EXCEEDING * radius);
+                // Every step down exceeds it at the same places.
+                let same = |gentle: &&mut Gentle| (gentle.at - at).norm() < 0.5 * radius;
+                match gentle[before..].iter_mut().find(same) {
+                    Some(known) => (known.within, known.by) = (known.within.max(within), known.by.max(by)),
+                    None => gentle.push(Gentle { at, within, by }),
+                }
+            }
+        }
         // Nothing to be mended in places, or that did not help.
-        let next = if gentle.len() == before || round == GENTLE_ROUNDS {
-            let target = limit - by.max(LEAST_LOWERING * limit);
-            planned(&PocketStrategy { engagement: Some(target), ..asked.clone() })?
-        } else {
-            planned(&PocketStrategy { gentle: gentle.clone(), ..asked.clone() })?
-        };
+        let everywhere = gentle.len() == before || round == GENTLE_ROUNDS;
+        let target = if everywhere { limit - by.max(LEAST_LOWERING * limit) } else { limit };
+        let lowered = PocketStrategy { engagement: Some(target), gentle: gentle.clone(), ..asked.clone() };
+        let next = planned(&lowered)?;
         // Corners are reached by chance at another angle, so that a lower limit may stand higher for once.
         if over(&next) < by {
             (best, last) = (next, None);

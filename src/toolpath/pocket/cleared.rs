@@ -18,8 +18,8 @@ use geometry::{Point2, Vector2};
 /// a straight pass an angle `a` is seen smaller by up to `FILM / sin a`.
 pub(super) const FILM: f64 = 0.003;
 
-/// Arcs that cover a circumference overlap by more than so much, rad: what is less is rounding.
-const ROUNDING: f64 = 1e-9;
+/// Arcs that cover a circumference overlap by more than so much, rad: what is less may be the error of two angles.
+const ROUNDING: f64 = 1e-7;
 
 /// Between two places the angle may exceed the limit by so much, rad, which limits of plans have to spare; and so many parts
 /// of a move are looked at where that is not sure.
@@ -114,7 +114,7 @@ impl Cleared {
     }
 
     fn column(&self, axis: usize, at: f64) -> usize {
-        ((at / self.bucket).floor().max(0.0) as usize).min(self.side[axis] - 1)
+        ((at / self.bucket) as usize).min(self.side[axis] - 1)
     }
 
     fn bucket_of(&self, p: &Point2) -> usize {
@@ -415,8 +415,8 @@ impl Front {
             let (square, away) = (to.norm_squared(), to.norm());
             let cos = (r * r + square - grown * grown) / (2.0 * r * away);
             let all = cos <= -1.0 || away <= grown - r;
-            let half = if all { PI } else { cos.min(1.0).acos() };
-            let towards = heading.perp(&to).atan2(heading.dot(&to));
+            let half = if all { PI } else { half_angle(cos.min(1.0)) };
+            let towards = angle_of(heading.dot(&to), heading.perp(&to));
             [towards - half, towards + half]
         };
         let [mut from, mut until] = seen(after);
@@ -432,6 +432,37 @@ impl Front {
         }
         cleared
     }
+}
+
+/// The angle of a vector from the x axis, rad, within 3e-8: of a part of the front that is next to nothing, and in half of the time
+/// (M. Abramowitz, I. Stegun, 1964, 4.4.49).
+fn angle_of(x: f64, y: f64) -> f64 {
+    const SERIES: [f64; 9] = [
+        0.0028662257,
+        -0.0161657367,
+        0.0429096138,
+        -0.0752896400,
+        0.1065626393,
+        -0.1420889944,
+        0.1999355085,
+        -0.3333314528,
+        1.0,
+    ];
+    let (along, across) = (x.abs(), y.abs());
+    let longer = along.max(across);
+    if longer == 0.0 {
+        return 0.0;
+    }
+    let tangent = along.min(across) / longer;
+    let square = tangent * tangent;
+    let angle = tangent * SERIES.iter().fold(0.0, |sum, factor| sum * square + factor);
+    let angle = if across > along { FRAC_PI_2 - angle } else { angle };
+    (if x < 0.0 { PI - angle } else { angle }).copysign(y)
+}
+
+/// The angle of a cosine, rad, as near as [`angle_of`].
+fn half_angle(cos: f64) -> f64 {
+    angle_of(cos, (1.0 - cos * cos).max(0.0).sqrt())
 }
 
 /// Parts of a circumference, and which of them are covered whole.
@@ -452,8 +483,8 @@ impl Rim {
             self.0 = u64::MAX;
             return;
         }
-        let half = (0.5 * square.sqrt()).acos() - ROUNDING;
-        let towards = to.y.atan2(to.x);
+        let half = half_angle(0.5 * square.sqrt()) - ROUNDING;
+        let towards = angle_of(to.x, to.y);
         let from = ((towards - half) / TAU * PARTS).ceil();
         let count = ((towards + half) / TAU * PARTS).floor() - from;
         if count > 0.0 {
@@ -552,6 +583,17 @@ mod tests {
         // A place that is cleared already, and one that is not.
         assert_eq!(ring.arc(&Point2::new(0.5, 0.5), &x, usize::MAX), 0.0);
         assert_eq!(ring.arc(&Point2::new(12.0, 0.5), &x, usize::MAX), PI);
+    }
+
+    #[test]
+    fn angles_of_vectors_are_near_enough() {
+        for k in -1000..=1000 {
+            let angle = PI * f64::from(k) / 1000.0;
+            let (sin, cos) = angle.sin_cos();
+            assert!((angle_of(3.0 * cos, 3.0 * sin) - sin.atan2(cos)).abs() < 3e-8, "{angle}");
+            assert!((half_angle(cos) - angle.abs()).abs() < 4e-8, "{angle}");
+        }
+        assert_eq!(angle_of(0.0, 0.0), 0.0);
     }
 
     /// Passes beside each other: the ground stays as it was, without most of its places.

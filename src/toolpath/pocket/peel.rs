@@ -31,6 +31,9 @@ const SHORTEST: f64 = 0.02;
 /// A turn that comes so near to the limit, rad, is as good as the one that reaches it.
 const NEAR: f64 = 0.006;
 
+/// Beyond the wanted angle by no more than this, rad, the border of the stock is taken for straight.
+const STRAIGHT: f64 = 0.02;
+
 /// Steps that had to be made shorter keep so far below the limit, rad: there the stock begins or ends, and the angle changes fast.
 const CORNERS: f64 = 0.01;
 
@@ -329,21 +332,38 @@ impl<'a> Peeler<'a> {
             Step { to, heading, turn, arc }
         };
         let most = -step / (INTO * self.radius);
+        let keeps =
+            |found: &Step| found.arc <= limit && self.cleared.keeps(&from.to, &found.to, limit, fresh);
+        // Over cleared ground the tool turns as far as it may.
+        let mut sharpest = None;
+        if from.arc == 0.0 {
+            let found = tried(most);
+            if keeps(&found) {
+                return Some(found);
+            }
+            sharpest = Some(found);
+        }
         let mut turn = from.turn.clamp(0.8 * most, 0.8 * AWAY);
         // Mostly the turn of the step before is as good as any, but in corners.
         let first = tried(turn);
-        if full
-            && first.arc <= limit
-            && first.arc > limit - NEAR
-            && self.cleared.keeps(&from.to, &first.to, limit, fresh)
-        {
+        let good = |found: &Step| found.arc > limit - NEAR && keeps(found);
+        if full && good(&first) {
             return Some(first);
+        }
+        // Little off, the angle along a straight border leads to one: it grows by the turn, and as the tool comes nearer.
+        let off = first.arc - limit + 0.5 * NEAR;
+        if full && first.arc > 0.0 && off.abs() < STRAIGHT {
+            let growth = 1.0 + step / (self.radius * limit.sin());
+            let second = tried((turn + off / growth).clamp(most, AWAY));
+            if good(&second) {
+                return Some(second);
+            }
         }
         // Where that turn is too much, so is a greater one.
         let mut far = Step { arc: f64::INFINITY, turn: most, ..first };
         if first.arc <= limit {
-            far = tried(most);
-            if far.arc <= limit && self.cleared.keeps(&from.to, &far.to, limit, fresh) {
+            far = sharpest.unwrap_or_else(|| tried(most));
+            if sharpest.is_none() && keeps(&far) {
                 return Some(far);
             }
         }
@@ -378,6 +398,6 @@ impl<'a> Peeler<'a> {
                 }
             }
         }
-        best.filter(|step| self.cleared.keeps(&from.to, &step.to, limit, fresh))
+        best.filter(keeps)
     }
 }
