@@ -315,7 +315,7 @@ fn within_engagement(
         }
         let (_, engaged) = last.as_ref().unwrap_or(&best);
         let before = gentle.len();
-        for (found, bound) in engaged {
+        if let Some((found, bound)) = engaged {
             for one in &found.exceeding {
                 let by = (one.max + bound - limit).max(LEAST_LOWERING * limit);
                 let (at, within) = (one.from.xy(), one.length + AROUND_EXCEEDING * radius);
