@@ -284,6 +284,9 @@ const GENTLE_ROUNDS: usize = 2;
 /// The share of the limit by which it is lowered at least. Less may change no pass at all.
 const LEAST_LOWERING: f64 = 0.01;
 
+/// Around one place it is lowered by this share at most, in all rounds together: passes there would come ever closer.
+const MOST_LOWERING: f64 = 0.3;
+
 /// No limit below this share of the one asked for: the path would grow without end.
 const LEAST_SHARE_OF_LIMIT: f64 = 0.25;
 
@@ -317,8 +320,12 @@ fn within_engagement(
         let before = gentle.len();
         if let Some((found, bound)) = engaged {
             for one in &found.exceeding {
-                let by = (one.max + bound - limit).max(LEAST_LOWERING * limit);
                 let (at, within) = (one.from.xy(), one.length + AROUND_EXCEEDING * radius);
+                // What was lowered around here before counts, too.
+                let lowered =
+                    gentle[..before].iter().filter(|gentle| (gentle.at - at).norm() < gentle.within);
+                let left = MOST_LOWERING * limit - lowered.map(|gentle| gentle.by).sum::<f64>();
+                let by = (one.max + bound - limit).max(LEAST_LOWERING * limit).min(left.max(0.0));
                 // Every step down exceeds it at the same places.
                 let same = |gentle: &&mut Gentle| (gentle.at - at).norm() < 0.5 * radius;
                 match gentle[before..].iter_mut().find(same) {
