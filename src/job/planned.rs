@@ -13,8 +13,8 @@ use metrology::{FastestTurn, contact_arcs, fastest_turn, fastest_turn_across};
 use motion::{Move, MoveKind, Toolpath};
 use scene::{AxisRequest, Scene, ToolpathRequest};
 use toolpath::{
-    Detour, Earlier, Engagement, OffsetDrive, OffsetSurface, Plan, PlanError, PlanSettings, PocketStrategy,
-    Strategy, Tilting, around_fixtures, plan, plan_pocket, plan_tilted,
+    Detour, Earlier, Engagement, Gentle, OffsetDrive, OffsetSurface, Plan, PlanError, PlanSettings,
+    PocketStrategy, Strategy, Tilting, around_fixtures, plan, plan_pocket, plan_tilted,
 };
 use work::monitor::{Cancelled, Monitor};
 
@@ -97,7 +97,9 @@ impl Session {
         let planned = |strategy: &dyn Strategy| {
             let found = self.path(request, strategy, &settings, around, monitor);
             let mut plan = found.map_err(|e| self.refused(request, e))?;
-            let (path, left_out) = self.as_written(&plan.path);
+            let pocket = strategy.downcast_ref::<PocketStrategy>();
+            let bounded = pocket.is_some_and(|strategy| strategy.engagement.is_some());
+            let (path, left_out) = self.as_written(&plan.path, if bounded { BOUNDED_STRAYING } else { 1.0 });
             plan.path = path;
             if left_out > 0 {
                 plan.notes.push(format!(
@@ -107,7 +109,8 @@ impl Session {
             let engaged = self.limit_feed(request, &mut plan.path, monitor)?;
             Ok::<_, JobError>((plan, engaged))
         };
-        let (mut plan, engaged) = within_engagement(planned(&*strategy)?, &*strategy, &planned)?;
+        let (mut plan, engaged) =
+            within_engagement(planned(&*strategy)?, &*strategy, scene.cutter.radius(), &planned)?;
         let joints = joints(scene, &request.name, &plan.path)?;
         if scene.machine.slow_corners {
             let kinematics = scene.five_axis.as_ref().map(|five_axis| &five_axis.kinematics);
@@ -154,11 +157,11 @@ impl Session {
         Ok(Plan { path, notes, ..plan })
     }
 
-    /// A path as programs say it, which is what is cut and measured: without moves shorter than the control takes, slowed in
-    /// corners, rounded; and how many moves are left out.
-    fn as_written(&self, path: &Toolpath) -> (Toolpath, usize) {
+    /// A path as programs say it, which is what is cut and measured: without moves shorter than the control takes (merged within a
+    /// share of the chord tolerance), slowed in corners, rounded; and how many moves are left out.
+    fn as_written(&self, path: &Toolpath, share: f64) -> (Toolpath, usize) {
         let Scene { tolerance, machine, .. } = &self.scene;
-        let straying = Straying { tolerance: tolerance.chord, length: cutting_length(&self.scene) };
+        let straying = Straying { tolerance: tolerance.chord * share, length: cutting_length(&self.scene) };
         let (merged, left_out) = merge_short_moves(path, machine, &straying);
         let slowed = if machine.slow_corners { slow_corners(&merged, machine) } else { merged };
         (slowed.as_written(), left_out)
@@ -167,7 +170,7 @@ impl Session {
     /// The fastest turns of a plan as programs have it, times what is allowed.
     fn turning(&self, axis: &AxisRequest, plan: &Plan, monitor: &dyn Monitor) -> Result<f64, PlanError> {
         let (part, cutter) = (&self.part, &self.scene.cutter);
-        let path = self.as_written(&plan.path).0;
+        let path = self.as_written(&plan.path, 1.0).0;
         let share = |found: Option<FastestTurn>, limit: f64| found.map_or(0.0, |turn| turn.rate / limit);
         let along = axis.most_turning.map_or(Ok(0.0), |limit| {
             fastest_turn(part, cutter, &path, monitor).map(|found| share(found, limit))
@@ -268,39 +271,83 @@ fn within_turning(
     Ok(best)
 }
 
+/// Share of the chord tolerance within which short moves are merged where the engagement is bounded: in acute tips some micrometres
+/// turn the chip by degrees.
+const BOUNDED_STRAYING: f64 = 0.2;
+
 /// A plan of a pocket with the engagement that was measured, and the bound of its greatest angle, rad.
 type Engaged = (Plan, Option<(Engagement, f64)>);
 
-/// Times that a pocket is planned again at most.
-const ROUNDS: usize = 2;
+/// Times that a pocket is planned again for less where the engagement was exceeded; once more it is for a lower limit everywhere.
+const GENTLE_ROUNDS: usize = 2;
 
 /// The share of the limit by which it is lowered at least. Less may change no pass at all.
 const LEAST_LOWERING: f64 = 0.01;
 
-/// The plan, or where its engagement is not proven to keep to the limit of the strategy, one for a lower limit: by as much
-/// as the first was above. It is taken if that helps; in slots without room it does not.
+/// Around one place it is lowered by this share at most, in all rounds together: passes there would come ever closer.
+const MOST_LOWERING: f64 = 0.3;
+
+/// No limit below this share of the one asked for: the path would grow without end.
+const LEAST_SHARE_OF_LIMIT: f64 = 0.25;
+
+/// Beyond a stretch that exceeded the limit, passes are planned for less this far, over the radius: there it is decided how they
+/// come to it.
+const AROUND_EXCEEDING: f64 = 1.0;
+
+/// The plan, or where its engagement is not proven to keep to the limit of the strategy, one for less around the places where it
+/// does not, by as much as it was above there; at last one for a lower limit. It is taken if that helps; in slots without room it
+/// does not.
 fn within_engagement(
     first: Engaged,
     strategy: &dyn Strategy,
+    radius: f64,
     planned: &dyn Fn(&dyn Strategy) -> Result<Engaged, JobError>,
 ) -> Result<Engaged, JobError> {
     let asked = strategy.downcast_ref::<PocketStrategy>();
     let Some((limit, asked)) = asked.and_then(|asked| Some((asked.engagement?, asked))) else {
         return Ok(first);
     };
-    let over = |(_, engaged): &Engaged| engaged.map_or(0.0, |(found, bound)| found.max + bound - limit);
-    let (mut best, mut target) = (first, limit);
-    for _ in 0..ROUNDS {
+    let over =
+        |(_, engaged): &Engaged| engaged.as_ref().map_or(0.0, |(found, bound)| found.max + bound - limit);
+    let (mut best, mut last) = (first, None);
+    let mut gentle: Vec<Gentle> = Vec::new();
+    for round in 0..=GENTLE_ROUNDS {
         let by = over(&best);
-        // No limit below a quarter of the one asked for: the path would grow without end.
-        if by <= 0.0 || target - by < 0.25 * limit {
+        if by <= 0.0 || limit - by < LEAST_SHARE_OF_LIMIT * limit {
             break;
         }
-        target -= by.max(LEAST_LOWERING * limit);
-        let next = planned(&PocketStrategy { engagement: Some(target), ..asked.clone() })?;
+        let (_, engaged) = last.as_ref().unwrap_or(&best);
+        let before = gentle.len();
+        if let Some((found, bound)) = engaged {
+            for one in &found.exceeding {
+                let (at, within) = (one.from.xy(), one.length + AROUND_EXCEEDING * radius);
+                // What was lowered around here before counts, too.
+                let lowered =
+                    gentle[..before].iter().filter(|gentle| (gentle.at - at).norm() < gentle.within);
+                let left = MOST_LOWERING * limit - lowered.map(|gentle| gentle.by).sum::<f64>();
+                let by = (one.max + bound - limit).max(LEAST_LOWERING * limit).min(left.max(0.0));
+                // Every step down exceeds it at the same places.
+                let same = |gentle: &&mut Gentle| (gentle.at - at).norm() < 0.5 * radius;
+                match gentle[before..].iter_mut().find(same) {
+                    Some(known) => (known.within, known.by) = (known.within.max(within), known.by.max(by)),
+                    None => gentle.push(Gentle { at, within, by }),
+                }
+            }
+        }
+        // Nothing to be mended in places, or that did not help.
+        let everywhere = gentle.len() == before || round == GENTLE_ROUNDS;
+        // Both at once would make passes ever closer.
+        let (target, gentle) = match everywhere {
+            true => (limit - by.max(LEAST_LOWERING * limit), Vec::new()),
+            false => (limit, gentle.clone()),
+        };
+        let lowered = PocketStrategy { engagement: Some(target), gentle, ..asked.clone() };
+        let next = planned(&lowered)?;
         // Corners are reached by chance at another angle, so that a lower limit may stand higher for once.
         if over(&next) < by {
-            best = next;
+            (best, last) = (next, None);
+        } else {
+            last = Some(next);
         }
     }
     Ok(best)

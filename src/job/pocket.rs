@@ -1,10 +1,10 @@
 //! What is measured of a scene's pocket.
 
-use metrology::{ContactArcs, PocketFigures, wall_gouge_of_cells, wall_gouge_of_moves};
+use metrology::{ContactArcs, ExceedingStretch, PocketFigures, wall_gouge_of_cells, wall_gouge_of_moves};
 use motion::Toolpath;
 use scene::{FLATTEN_SHARE, Scene};
 use sim::ZMap;
-use toolpath::{Engagement, Pocket, PocketStrategy, Step, engagement, limit_feed};
+use toolpath::{Engagement, Exceeding, Pocket, PocketStrategy, Step, engagement, limit_feed};
 use work::monitor::{Cancelled, Monitor};
 
 /// Lowers the feed where more of the cutter was measured in stock than the strategy allows. Leaves the
@@ -39,6 +39,7 @@ pub fn pocket_figures(
 ) -> Result<PocketFigures, Cancelled> {
     let cutter = &scene.cutter;
     let (wall_gouge_mm, wall_gouge_move) = wall_gouge_of_moves(pocket.free(), cutter, path, top, monitor)?;
+    let exceeding = if strategy.engagement.is_some() { &engaged.exceeding[..] } else { &[] };
     let (of_cells, area) = wall_gouge_of_cells(pocket.free(), cut, top, monitor)?;
     Ok(PocketFigures {
         area_mm2: pocket.region.area(),
@@ -56,5 +57,23 @@ pub fn pocket_figures(
         p95_engagement_deg: engaged.p95.to_degrees(),
         engagement_limit_deg: strategy.engagement_limit(step, cutter.radius()).to_degrees(),
         over_engagement_limit_fraction: engaged.over_limit,
+        over_engagement_limit: listed(exceeding, path),
+        over_engagement_limit_count: exceeding.len(),
     })
+}
+
+/// The longest stretches, the longest first.
+fn listed(all: &[Exceeding], path: &Toolpath) -> Vec<ExceedingStretch> {
+    let mut all = all.to_vec();
+    all.sort_by(|a, b| b.length.total_cmp(&a.length));
+    let stretch = |one: &Exceeding| ExceedingStretch {
+        x: one.from.x,
+        y: one.from.y,
+        z: one.from.z,
+        length_mm: one.length,
+        max_engagement_deg: one.max.to_degrees(),
+        first_move: one.first_move,
+        line: path.line_of(one.first_move as usize),
+    };
+    all.iter().take(PocketFigures::LISTED).map(stretch).collect()
 }

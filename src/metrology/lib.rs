@@ -80,7 +80,7 @@ pub use offset_distance::{
 };
 pub use pairs::{MOST_PAIRS, PAIRS_HEADER, PairFigures, ScallopPair};
 pub use path::path_figures;
-pub use pocket::{PocketFigures, wall_gouge_of_cells, wall_gouge_of_moves};
+pub use pocket::{ExceedingStretch, PocketFigures, wall_gouge_of_cells, wall_gouge_of_moves};
 pub use refine::Asked;
 pub use removal::{RapidContactFigures, RemovalFigures, removal_figures, voxel_removal_figures};
 pub use ridge_map::RidgeMap;

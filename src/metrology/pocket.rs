@@ -20,8 +20,27 @@ const CUT: f64 = 1.0e-4;
 /// A centre nearer to the outline than this, mm, is on it.
 const ON_OUTLINE: f64 = 1.0e-9;
 
+/// A stretch of passes above the engagement that was asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ExceedingStretch {
+    /// Where it begins: the tip.
+    pub x: f64,
+    /// y.
+    pub y: f64,
+    /// z.
+    pub z: f64,
+    /// Its length.
+    pub length_mm: f64,
+    /// The greatest angle on it.
+    pub max_engagement_deg: f64,
+    /// Its first move, counted from 0.
+    pub first_move: u32,
+    /// Its line in the program.
+    pub line: Option<u32>,
+}
+
 /// Figures of a pocket.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct PocketFigures {
     /// Area of the region.
     pub area_mm2: f64,
@@ -54,6 +73,15 @@ pub struct PocketFigures {
     pub engagement_limit_deg: f64,
     /// Share of the cutting length above it.
     pub over_engagement_limit_fraction: f64,
+    /// The stretches above it, the longest first and [`LISTED`](Self::LISTED) at most; none where no engagement was asked for.
+    pub over_engagement_limit: Vec<ExceedingStretch>,
+    /// How many there are.
+    pub over_engagement_limit_count: usize,
+}
+
+impl PocketFigures {
+    /// Stretches that are listed at most.
+    pub const LISTED: usize = 100;
 }
 
 /// How far beyond the outline the cutter came, and on which move: every move below `top`, mm.

@@ -17,8 +17,8 @@ pub use levels::spacing::LevelSteps;
 pub use link::{Detour, LONGEST_LINK, around_fixtures, longest_link, plane_interval};
 pub use plan::{Plan, plan, plan_tilted};
 pub use pocket::{
-    Engagement, Flow, LEAST_SHARE, NotOnOutline, Pattern, Pocket, PocketStrategy, Vectors, WallFinish,
-    engagement, engagement_angle, limit_feed, plan_pocket, read_pocket_step,
+    Engagement, Exceeding, Flow, Gentle, LEAST_SHARE, NotOnOutline, Pattern, Pocket, PocketStrategy, Vectors,
+    WallFinish, engagement, engagement_angle, limit_feed, plan_pocket, read_pocket_step,
 };
 pub use strategies::iso_parametric::IsoParametric;
 pub use strategies::iso_scallop::{FrontStart, IsoScallop};

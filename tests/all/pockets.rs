@@ -81,3 +81,47 @@ fn sides_at_the_edge_of_the_stock_are_open() {
     let engaged = |toolpath: &Value| toolpath["pocket"]["max_engagement_deg"].as_f64().unwrap();
     assert!((engaged(&at_edge) - engaged(&listed)).abs() < 1e-9);
 }
+
+/// In a neck as wide as the cutter the engagement is exceeded: the toolpath fails, and the stretches are listed. They lie where the
+/// neck is, make up the share that is reported, and hold the greatest angle; the program has their lines.
+#[test]
+fn stretches_above_the_engagement_are_listed() {
+    let home = tempfile::tempdir().unwrap();
+    let neck = "[part]\nsurface = \"pocket\"\noutline = [[0, 0], [14, 0], [14, 4.49], [24, 4.49], [24, 0], [38, 0], [38, 14], [24, 14], \
+                [24, 9.51], [14, 9.51], [14, 14], [0, 14]]\ndepth = 1.5\n[cutter]\nshape = \"flat\"\ndiameter = 5\n[tolerance]\n\
+                chord = 0.005\n[[toolpath]]\nstrategy = \"pocket-offset\"\nengagement = 60\n";
+    fs::write(home.path().join("neck.toml"), neck).unwrap();
+    let answer = millstream(home.path(), &["run", "neck.toml", "--out", "neck"]);
+    assert_eq!(answer.code, Some(1), "{} {}", answer.stdout, answer.stderr);
+    let report: Value =
+        serde_json::from_slice(&fs::read(home.path().join("neck/report.json")).unwrap()).unwrap();
+    let pocket = &report["toolpaths"][0]["pocket"];
+    let all = pocket["over_engagement_limit"].as_array().unwrap();
+    assert_eq!(pocket["over_engagement_limit_count"], all.len());
+    let number = |one: &Value, key: &str| one[key].as_f64().unwrap();
+    let lengths: Vec<f64> = all.iter().map(|one| number(one, "length_mm")).collect();
+    assert!(lengths.is_sorted_by(|a, b| a >= b));
+    let greatest = all.iter().map(|one| number(one, "max_engagement_deg")).fold(0.0, f64::max);
+    assert_eq!(greatest, number(pocket, "max_engagement_deg"));
+    // The slot is the neck, but for where its mouths are cleared by loops; others are the last of loops before it.
+    let longest = &all[0];
+    let neck = (13.5..24.5).contains(&number(longest, "x"));
+    assert!(neck && (4.0..=10.0).contains(&number(longest, "length_mm")), "{longest}");
+    assert!((number(longest, "max_engagement_deg") - 180.0).abs() < 0.5 && number(longest, "z") == -1.5);
+    let program = fs::read_to_string(home.path().join("neck/pocket-offset/toolpath.nc")).unwrap();
+    let line = program.lines().nth(longest["line"].as_u64().unwrap() as usize - 1).unwrap();
+    assert!(line.contains('X') || line.contains('Y'), "{line}");
+    let whole = number(pocket, "over_engagement_limit_fraction");
+    let moves =
+        read_apt("toolpath.cls", &fs::read(home.path().join("neck/pocket-offset/toolpath.cls")).unwrap());
+    let moves = path_of(&moves.unwrap());
+    let level = |(a, b, m): (Point3, Point3, &millstream::motion::Move)| {
+        (m.kind != MoveKind::Rapid && a.z == -1.5 && b.z == -1.5).then(|| (b - a).norm())
+    };
+    let cut: f64 = moves.segments().filter_map(level).sum();
+    // The last turns of helices at depth are no passes.
+    let above = lengths.iter().sum::<f64>() / cut;
+    assert!(above <= whole && above > 0.8 * whole, "{above} {whole}");
+    let page = fs::read_to_string(home.path().join("neck/report.html")).unwrap();
+    assert!(page.contains("Stretches above the engagement"));
+}

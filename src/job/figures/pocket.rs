@@ -1,9 +1,9 @@
 //! Walls and engagement of a pocket.
 
 use geometry::Point2;
-use metrology::{PocketFigures, View};
+use metrology::{ExceedingStretch, PocketFigures, View};
 use motion::{MoveKind, Toolpath};
-use report::{Claim, Figure, Gravity, micrometres, with_bound};
+use report::{Claim, Figure, FigureTable, Gravity, micrometres, with_bound};
 use toolpath::PocketStrategy;
 use work::monitor::Monitor;
 
@@ -27,7 +27,13 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     let mut claims = vec![within_walls(run, &p), ramps(run, strategy)];
     claims.extend(strategy.engagement.map(|limit| engaged_within(run, &p, limit.to_degrees())));
     claims.extend(strategy.stepdown.map(|limit| steps_down(run.path(), run.session.top(), limit)));
-    let figure = Figure { key: "pocket", value: value(&p)?, rows: rows(&p), ..Figure::default() };
+    let figure = Figure {
+        key: "pocket",
+        value: value(&p)?,
+        rows: rows(&p),
+        table: exceeding(&p),
+        ..Figure::default()
+    };
     Ok(Finding { figure: Some(figure), claims, ..Finding::default() })
 }
 
@@ -57,6 +63,25 @@ fn rows(p: &PocketFigures) -> Vec<(&'static str, String)> {
     ]
 }
 
+/// The stretches above the engagement that was asked for.
+fn exceeding(p: &PocketFigures) -> Option<FigureTable> {
+    let row = |one: &ExceedingStretch| {
+        vec![
+            format!("{:.3}, {:.3}, {:.3}", one.x, one.y, one.z),
+            format!("{:.3}", one.length_mm),
+            format!("{:.1}", one.max_engagement_deg),
+            one.first_move.to_string(),
+            one.line.map_or_else(|| "-".to_owned(), |line| line.to_string()),
+        ]
+    };
+    (!p.over_engagement_limit.is_empty()).then(|| FigureTable {
+        title: "Stretches above the engagement",
+        caption: "Where passes exceed the engagement that was asked for, the longest stretches first. The feed is reduced there.",
+        columns: vec!["from, mm", "length, mm", "greatest, degrees", "first move", "line"],
+        rows: p.over_engagement_limit.iter().map(row).collect(),
+    })
+}
+
 /// That the cutter does not come beyond a pocket's outline.
 fn within_walls(run: &Run<'_>, pocket: &PocketFigures) -> Claim {
     let limit = run.scene().tolerance.gouge;
@@ -77,11 +102,17 @@ fn engaged_within(run: &Run<'_>, pocket: &PocketFigures, limit: f64) -> Claim {
     let (measured, index) = (pocket.max_engagement_deg, pocket.max_engagement_move);
     // No more of the circumference than the front half can cut.
     let bound = pocket.max_engagement_error_bound_deg.min(180.0 - measured);
+    let (count, share) = (pocket.over_engagement_limit_count, 100.0 * pocket.over_engagement_limit_fraction);
+    let longest = pocket.over_engagement_limit.first().map_or_else(String::new, |one| {
+        let stretches = if count == 1 { "1 stretch".to_owned() } else { format!("{count} stretches") };
+        format!(
+            "; {share:.2} % of the length exceed the limit, at a reduced feed: {stretches}, the longest {:.2} mm from {:.2}, {:.2}, {:.2}",
+            one.length_mm, one.x, one.y, one.z
+        )
+    });
     let text = format!(
-        "the greatest engagement is {measured:.1} ± {bound:.1} degrees (limit {limit:.1}), at move {index}{}; {:.2} % of the \
-         length are above the limit, at a lower feed",
+        "the greatest engagement is {measured:.1} ± {bound:.1} degrees (limit {limit:.1}), at move {index}{}{longest}",
         run.program_line(index),
-        100.0 * pocket.over_engagement_limit_fraction
     );
     Claim { unit: "deg", ..Claim::length("engagement", Gravity::Scrap, limit, measured, bound) }.told(text)
 }

@@ -12,6 +12,7 @@
 //! of a single disc, whose far side moves at right angles to its heading; hence the helix. Past the end of a line of a
 //! zigzag the link along the wall goes to the side of its loops and finds ground to begin in.
 
+use std::cell::Cell;
 use std::f64::consts::{PI, TAU};
 
 use super::cleared::{Cleared, FILM};
@@ -180,6 +181,7 @@ pub(super) fn bound(
         marks: Vec::new(),
         above_to: f64::NEG_INFINITY,
         thin_at: 0,
+        above_at: Cell::new(0),
         did: Bounding::default(),
     };
     walker.go(monitor)?;
@@ -227,6 +229,8 @@ struct Walker<'a> {
     above_to: f64,
     /// The ground is thinned when it has so many places.
     thin_at: usize,
+    /// Where the last loop that could not be put in was above the limit, in sides from its beginning: others are asked there first.
+    above_at: Cell<usize>,
     did: Bounding,
 }
 
@@ -284,7 +288,7 @@ impl Walker<'_> {
     /// Leaves out places of the ground that others cover, where none of them will be taken back and none is fresh at `s`.
     fn thin(&mut self, s: f64) {
         /// Fewer are no matter.
-        const FEW: usize = 1000;
+        const FEW: usize = 200;
         if self.cleared.len() < self.thin_at {
             return;
         }
@@ -293,7 +297,7 @@ impl Walker<'_> {
         for mark in &mut self.marks {
             mark.places = (mark.places.max(settled) - left_out).max(1);
         }
-        self.thin_at = 2 * self.cleared.len() + FEW;
+        self.thin_at = self.cleared.len() + FEW;
     }
 
     fn back_to_mark(&mut self, index: usize) {
@@ -458,14 +462,21 @@ impl Walker<'_> {
         let (centre, rho, inwards) = fitting(&self.way, self.room, self.radius, s, rho, side)?;
         let sides = (TAU * rho / (SIDE * self.radius)).ceil().max(LEAST_SIDES) as usize;
         let begin = inwards.y.atan2(inwards.x) + PI;
-        let mut found = Loop { radius: rho, side, centre, places: Vec::new(), empty: true };
-        for k in 0..=sides {
+        let asked = |k: usize| {
             let turn = begin + side * TAU * k as f64 / sides as f64;
             let at = centre + Vector2::new(turn.cos(), turn.sin()) * rho;
             // That of the side that ends here: it looks farther outwards than the tangent.
             let (sin, cos) = (turn - side * PI / sides as f64).sin_cos();
-            let arc = self.cleared.arc(&at, &(Vector2::new(-sin, cos) * side), usize::MAX);
+            (at, self.cleared.arc(&at, &(Vector2::new(-sin, cos) * side), usize::MAX))
+        };
+        if asked(self.above_at.get().min(sides)).1 > self.bounds.limit {
+            return None;
+        }
+        let mut found = Loop { radius: rho, side, centre, places: Vec::new(), empty: true };
+        for k in 0..=sides {
+            let (at, arc) = asked(k);
             if arc > self.bounds.limit {
+                self.above_at.set(k);
                 return None;
             }
             found.places.push(at);

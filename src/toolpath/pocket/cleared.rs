@@ -18,8 +18,8 @@ use geometry::{Point2, Vector2};
 /// a straight pass an angle `a` is seen smaller by up to `FILM / sin a`.
 pub(super) const FILM: f64 = 0.003;
 
-/// Arcs that cover a circumference overlap by more than so much, rad: what is less is rounding.
-const ROUNDING: f64 = 1e-9;
+/// Arcs that cover a circumference overlap by more than so much, rad: what is less may be the error of two angles.
+const ROUNDING: f64 = 1e-7;
 
 /// Between two places the angle may exceed the limit by so much, rad, which limits of plans have to spare; and so many parts
 /// of a move are looked at where that is not sure.
@@ -34,10 +34,21 @@ const PART: f64 = PI / PARTS as f64;
 const MAX_SIDE: f64 = 1024.0;
 
 /// Queries so near to each other, over the radius, share one list of discs.
-const NEIGHBOURS: f64 = 0.15;
+const NEIGHBOURS: f64 = 0.3;
 
 /// Parts of the circumference for which such a list is made.
 const SECTORS: usize = 32;
+
+/// Places around which passes are planned for a lower limit of the engagement.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gentle {
+    /// Around here.
+    pub at: Point2,
+    /// So far from there, mm.
+    pub within: f64,
+    /// By so much, rad.
+    pub by: f64,
+}
 
 /// Ground cleared by a disc.
 pub(super) struct Cleared {
@@ -54,6 +65,8 @@ pub(super) struct Cleared {
     thinned: usize,
     /// Buckets to which discs were added since the ground was thinned.
     fresh: Vec<bool>,
+    /// Where angles count as greater.
+    pub gentle: Vec<Gentle>,
 }
 
 /// The discs that decide about every place near to one.
@@ -65,6 +78,8 @@ struct Near {
     /// How many discs there were. Later ones are asked, too.
     count: usize,
     discs: Vec<u32>,
+    /// Their centres.
+    centres: Vec<Point2>,
     /// Those that clear some of the circumference whole.
     keepers: Vec<u32>,
 }
@@ -78,7 +93,19 @@ impl Cleared {
         let buckets = vec![Vec::new(); side[0] * side[1]];
         let fresh = vec![false; buckets.len()];
         let (best, near) = (Cell::new(None), RefCell::new(Near::default()));
-        Self { radius, origin: lo, bucket, side, buckets, discs: Vec::new(), best, near, thinned: 0, fresh }
+        Self {
+            radius,
+            origin: lo,
+            bucket,
+            side,
+            buckets,
+            discs: Vec::new(),
+            best,
+            near,
+            thinned: 0,
+            fresh,
+            gentle: Vec::new(),
+        }
     }
 
     /// How many places there are.
@@ -87,7 +114,7 @@ impl Cleared {
     }
 
     fn column(&self, axis: usize, at: f64) -> usize {
-        ((at / self.bucket).floor().max(0.0) as usize).min(self.side[axis] - 1)
+        ((at / self.bucket) as usize).min(self.side[axis] - 1)
     }
 
     fn bucket_of(&self, p: &Point2) -> usize {
@@ -204,13 +231,20 @@ impl Cleared {
     /// rad. Films are left out but beside the places from `fresh` on: the chip of the move itself begins as
     /// thin as one.
     pub fn arc(&self, centre: &Point2, heading: &Vector2, fresh: usize) -> f64 {
-        self.front(centre, heading, 0.0, fresh).angle()
+        self.counted(centre, self.front(centre, heading, 0.0, fresh).angle())
+    }
+
+    /// An angle at a place with what it counts more there.
+    fn counted(&self, place: &Point2, angle: f64) -> f64 {
+        let near = self.gentle.iter().filter(|gentle| (gentle.at - place).norm() < gentle.within);
+        if angle > 0.0 { angle + near.map(|gentle| gentle.by).sum::<f64>() } else { angle }
     }
 
     /// As [`Cleared::arc`], with what is clear to the right of the stock counted as well: the angle that there is once the
     /// cutter has turned along the stock on its right.
     pub fn arc_from_right(&self, centre: &Point2, heading: &Vector2, fresh: usize) -> f64 {
-        self.front(centre, heading, 0.0, fresh).ends().map_or(0.0, |[_, to]| PART * to as f64)
+        let angle = self.front(centre, heading, 0.0, fresh).ends().map_or(0.0, |[_, to]| PART * to as f64);
+        self.counted(centre, angle)
     }
 
     /// Whether a straight move keeps to a limit all along but for [`BETWEEN`]: tips of stock may be passed between its ends. A
@@ -223,7 +257,8 @@ impl Cleared {
         }
         let (heading, most) = (along / length, limit + BETWEEN);
         let at = |k: usize| from + along * (k as f64 / BETWEEN_PLACES as f64);
-        self.front(&at(BETWEEN_PLACES / 2), &heading, 0.5 * length, fresh).angle() <= most
+        let middle = at(BETWEEN_PLACES / 2);
+        self.counted(&middle, self.front(&middle, &heading, 0.5 * length, fresh).angle()) <= most
             || (1..BETWEEN_PLACES).all(|k| self.arc(&at(k), &heading, fresh) <= most)
     }
 
@@ -243,11 +278,16 @@ impl Cleared {
         }
         let later = (near.count..self.discs.len()).rev();
         // The last ground leaves so little standing that most of the older is passed over.
-        for k in later.chain(near.discs.iter().map(|k| *k as usize)) {
+        let listed = near.discs.iter().map(|k| *k as usize).zip(&near.centres);
+        for (k, disc) in later.map(|k| (k, &self.discs[k])).chain(listed) {
             if front.ends.is_none() {
                 break;
             }
-            let cleared = front.clear(self.discs[k] - centre, grown(k));
+            let to = disc - centre;
+            if (to - front.middle).norm_squared() >= front.reach {
+                continue;
+            }
+            let cleared = front.clear(to, grown(k));
             if cleared > 0 && best.is_none_or(|(_, most)| cleared > most) {
                 best = Some((k, cleared));
             }
@@ -309,6 +349,8 @@ impl Cleared {
         near.discs.extend(&near.keepers);
         near.discs.sort_unstable_by(|a, b| b.cmp(a));
         near.discs.dedup();
+        near.centres.clear();
+        near.centres.extend(near.discs.iter().map(|k| self.discs[*k as usize]));
         (near.anchor, near.reach, near.count) = (*anchor, reach, self.discs.len());
     }
 }
@@ -322,11 +364,15 @@ struct Front {
     standing: Arc,
     /// Where what stands begins and ends on the circumference.
     ends: Option<[Vector2; 2]>,
+    /// The middle between them, and the square of the distance from it beyond which no disc clears any of it.
+    middle: Vector2,
+    reach: f64,
 }
 
 impl Front {
     fn new(radius: f64, heading: &Vector2, half: f64) -> Self {
-        let mut front = Self { radius, heading: *heading, half, standing: Arc::FRONT, ends: None };
+        let (ends, middle, reach) = (None, Vector2::zeros(), 0.0);
+        let mut front = Self { radius, heading: *heading, half, standing: Arc::FRONT, ends, middle, reach };
         front.find_ends();
         front
     }
@@ -339,6 +385,12 @@ impl Front {
                 Vector2::new(heading.x * cos - heading.y * sin, heading.x * sin + heading.y * cos) * radius
             })
         });
+        // The arc between them is half a circle at most: no place of it is farther from the middle of its chord than its ends.
+        if let Some([a, b]) = &self.ends {
+            self.middle = (a + b) * 0.5;
+            let reach = self.radius * (1.0 + FILM + ROUNDING) + self.half + (b - a).norm() * 0.5;
+            self.reach = reach * reach;
+        }
     }
 
     /// Whether a disc meets the circumference between the ends: it does along an arc about its direction, which holds an end
@@ -363,8 +415,8 @@ impl Front {
             let (square, away) = (to.norm_squared(), to.norm());
             let cos = (r * r + square - grown * grown) / (2.0 * r * away);
             let all = cos <= -1.0 || away <= grown - r;
-            let half = if all { PI } else { cos.min(1.0).acos() };
-            let towards = heading.perp(&to).atan2(heading.dot(&to));
+            let half = if all { PI } else { half_angle(cos.min(1.0)) };
+            let towards = angle_of(heading.dot(&to), heading.perp(&to));
             [towards - half, towards + half]
         };
         let [mut from, mut until] = seen(after);
@@ -380,6 +432,37 @@ impl Front {
         }
         cleared
     }
+}
+
+/// The angle of a vector from the x axis, rad, within 3e-8: of a part of the front that is next to nothing, and in half of the time
+/// (M. Abramowitz, I. Stegun, 1964, 4.4.49).
+fn angle_of(x: f64, y: f64) -> f64 {
+    const SERIES: [f64; 9] = [
+        0.0028662257,
+        -0.0161657367,
+        0.0429096138,
+        -0.0752896400,
+        0.1065626393,
+        -0.1420889944,
+        0.1999355085,
+        -0.3333314528,
+        1.0,
+    ];
+    let (along, across) = (x.abs(), y.abs());
+    let longer = along.max(across);
+    if longer == 0.0 {
+        return 0.0;
+    }
+    let tangent = along.min(across) / longer;
+    let square = tangent * tangent;
+    let angle = tangent * SERIES.iter().fold(0.0, |sum, factor| sum * square + factor);
+    let angle = if across > along { FRAC_PI_2 - angle } else { angle };
+    (if x < 0.0 { PI - angle } else { angle }).copysign(y)
+}
+
+/// The angle of a cosine, rad, as near as [`angle_of`].
+fn half_angle(cos: f64) -> f64 {
+    angle_of(cos, (1.0 - cos * cos).max(0.0).sqrt())
 }
 
 /// Parts of a circumference, and which of them are covered whole.
@@ -400,8 +483,8 @@ impl Rim {
             self.0 = u64::MAX;
             return;
         }
-        let half = (0.5 * square.sqrt()).acos() - ROUNDING;
-        let towards = to.y.atan2(to.x);
+        let half = half_angle(0.5 * square.sqrt()) - ROUNDING;
+        let towards = angle_of(to.x, to.y);
         let from = ((towards - half) / TAU * PARTS).ceil();
         let count = ((towards + half) / TAU * PARTS).floor() - from;
         if count > 0.0 {
@@ -433,7 +516,8 @@ impl Arc {
             if b < 0.0 || a > (PARTS - 1) as f64 {
                 continue;
             }
-            let (first, last) = (a.ceil().max(0.0) as usize, (b.floor() as usize).min(PARTS - 1));
+            let below = a.max(0.0) as usize;
+            let (first, last) = (below + usize::from((below as f64) < a), (b as usize).min(PARTS - 1));
             for word in first / 64..=last / 64 {
                 let low = first.saturating_sub(64 * word).min(64);
                 let high = (last + 1).saturating_sub(64 * word).min(64);
@@ -499,6 +583,17 @@ mod tests {
         // A place that is cleared already, and one that is not.
         assert_eq!(ring.arc(&Point2::new(0.5, 0.5), &x, usize::MAX), 0.0);
         assert_eq!(ring.arc(&Point2::new(12.0, 0.5), &x, usize::MAX), PI);
+    }
+
+    #[test]
+    fn angles_of_vectors_are_near_enough() {
+        for k in -1000..=1000 {
+            let angle = PI * f64::from(k) / 1000.0;
+            let (sin, cos) = angle.sin_cos();
+            assert!((angle_of(3.0 * cos, 3.0 * sin) - sin.atan2(cos)).abs() < 3e-8, "{angle}");
+            assert!((half_angle(cos) - angle.abs()).abs() < 4e-8, "{angle}");
+        }
+        assert_eq!(angle_of(0.0, 0.0), 0.0);
     }
 
     /// Passes beside each other: the ground stays as it was, without most of its places.

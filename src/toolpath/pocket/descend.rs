@@ -205,3 +205,59 @@ fn way_down(
     tips.dedup();
     tips
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Pattern, Step};
+
+    /// Ways down with sides from micrometres to millimetres, steep and flat, around a helix as well: as the program is written, its
+    /// coordinates rounded, no move goes down faster than the plunge rate, and flat ones are fed as fast as passes.
+    #[test]
+    fn written_ways_down_keep_the_plunge_rate() {
+        let strategy = |ramp_angle: f64| PocketStrategy {
+            pattern: Pattern::Zigzag { angle: 0.0 },
+            stepdown: Some(1.3),
+            floor_allowance: 0.0,
+            wall_allowance: 0.0,
+            wall_finish: WallFinish::Steps,
+            ramp_angle: ramp_angle.to_radians(),
+            helix_radius: None,
+            engagement: None,
+            gentle: Vec::new(),
+        };
+        let settings = PlanSettings {
+            step: Step::Stepover(1.0),
+            chord_tolerance: 1e-4,
+            clearance: 2.0,
+            feed_rate: 1000.0,
+            plunge_rate: 300.0,
+            ..PlanSettings::default()
+        };
+        let sides = [0.0013, 0.0171, 0.0007, 0.31, 0.0049, 2.3, 0.00022];
+        let mut at = Point2::new(0.123_456, -3.214_159);
+        let mut way = vec![at];
+        for k in 0..400 {
+            let turn = 0.7 * f64::from(k);
+            at += geometry::Vector2::new(turn.cos(), turn.sin()) * sides[k as usize % sides.len()];
+            way.push(at);
+        }
+        let back: Vec<Point2> = way.iter().chain(way.iter().rev().skip(1)).copied().collect();
+        let helix = Entry::Helix { centre: Point2::new(0.3, 0.7), radius: 0.913, begin: 0.4 };
+        let begin = Point2::new(0.3 + 0.913 * 0.4f64.cos(), 0.7 + 0.913 * 0.4f64.sin());
+        for ramp_angle in [0.4, 3.0, 20.0, 45.0] {
+            for (entry, points) in [(Entry::Ramp(back.clone()), way.clone()), (helix.clone(), vec![begin])] {
+                let runs = Runs { clearing: vec![Run { entry, points }], along_walls: Vec::new() };
+                let path = program(&runs, 2.6, &strategy(ramp_angle), &settings).as_written();
+                let mut fastest = 0.0f64;
+                for (a, b, m) in path.segments().filter(|(a, b, m)| m.kind == MoveKind::Plunge && a != b) {
+                    let down = m.feed_rate * (a.z - b.z) / (b - a).norm();
+                    assert!(down <= 300.0 * (1.0 + 1e-9), "{ramp_angle}: {down} from {a} to {b}");
+                    assert!(m.feed_rate <= 1000.0 && m.feed_rate > 0.0);
+                    fastest = fastest.max(down);
+                }
+                assert!(ramp_angle < 20.0 || fastest > 299.9, "{ramp_angle}: {fastest}");
+            }
+        }
+    }
+}

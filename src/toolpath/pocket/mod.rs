@@ -32,7 +32,8 @@ mod way;
 
 use air::Air;
 use cleared::Cleared;
-pub use feed::{Engagement, LEAST_SHARE, engagement, engagement_angle, limit_feed};
+pub use cleared::Gentle;
+pub use feed::{Engagement, Exceeding, LEAST_SHARE, engagement, engagement_angle, limit_feed};
 use nest::NestError;
 use route::Run;
 pub use shape::{NotOnOutline, Pocket};
@@ -123,6 +124,9 @@ pub fn plan_pocket(
     }
     let step = strategy.stepover(settings.step, radius);
     let mut ground = pocket.free().bounds().map(|around| Cleared::new(around, radius));
+    if let Some(ground) = &mut ground {
+        ground.gentle.clone_from(&strategy.gentle);
+    }
     let air = Air::of(pocket, radius);
     if let (Some(air), Some(ground)) = (&air, &mut ground) {
         air.discs.iter().for_each(|p| ground.add(*p));

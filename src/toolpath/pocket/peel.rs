@@ -31,6 +31,9 @@ const SHORTEST: f64 = 0.02;
 /// A turn that comes so near to the limit, rad, is as good as the one that reaches it.
 const NEAR: f64 = 0.006;
 
+/// Beyond the wanted angle by no more than this, rad, the border of the stock is taken for straight.
+const STRAIGHT: f64 = 0.02;
+
 /// Steps that had to be made shorter keep so far below the limit, rad: there the stock begins or ends, and the angle changes fast.
 const CORNERS: f64 = 0.01;
 
@@ -67,6 +70,16 @@ struct Step {
     heading: Vector2,
     turn: f64,
     arc: f64,
+}
+
+/// How a pass came out that was tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Came {
+    Through,
+    /// It cut next to nothing, or ended soon without care, and nothing changed.
+    Stopped,
+    /// It met no stock, and nothing changed.
+    ToNothing,
 }
 
 /// Peels stock off as long as there is some to be reached.
@@ -123,12 +136,13 @@ impl<'a> Peeler<'a> {
         while let Some(k) = self.next_place() {
             check(monitor)?;
             self.careful = false;
-            let mut done = self.pass(k, monitor)?;
-            if !done {
+            let mut came = self.pass(k, monitor)?;
+            // Care changes steps that cut, and those alone.
+            if came == Came::Stopped {
                 self.careful = true;
-                done = self.pass(k, monitor)?;
+                came = self.pass(k, monitor)?;
             }
-            if !done {
+            if came != Came::Through {
                 self.places.forget(k);
             }
         }
@@ -218,8 +232,8 @@ impl<'a> Peeler<'a> {
         link
     }
 
-    /// One pass from a place; `false` if it cuts next to nothing, or ends soon without care, and then nothing changes.
-    fn pass(&mut self, place: usize, monitor: &dyn Monitor) -> Result<bool, Cancelled> {
+    /// One pass from a place.
+    fn pass(&mut self, place: usize, monitor: &dyn Monitor) -> Result<Came, Cancelled> {
         let Beginning { at: begin, heading, .. } = *self.places.get(place);
         let (full, shortest) = (STEP * self.radius, SHORTEST * self.radius);
         let before = self.cleared.len();
@@ -267,7 +281,7 @@ impl<'a> Peeler<'a> {
         let soon = stuck && gone < SOON * self.radius;
         if cut < LEAST_CUT * self.radius || (soon && !self.careful) {
             self.cleared.truncate(before);
-            return Ok(false);
+            return Ok(if cut == 0.0 && !stuck { Came::ToNothing } else { Came::Stopped });
         }
         // What was gone without cutting is not gone in the end; it may have taken films away.
         self.cleared.truncate(self.cleared.len() - (way.len() - last_cut));
@@ -278,7 +292,7 @@ impl<'a> Peeler<'a> {
         self.out.extend(way.iter().map(|step| step.to));
         self.note_places(first, way.iter().map(|step| step.heading).collect());
         self.thin(self.cleared.len());
-        Ok(true)
+        Ok(Came::Through)
     }
 
     /// Leaves out what the first `count` places of the ground cover of each other, from time to time; how many those were.
@@ -318,21 +332,38 @@ impl<'a> Peeler<'a> {
             Step { to, heading, turn, arc }
         };
         let most = -step / (INTO * self.radius);
+        let keeps =
+            |found: &Step| found.arc <= limit && self.cleared.keeps(&from.to, &found.to, limit, fresh);
+        // Over cleared ground the tool turns as far as it may.
+        let mut sharpest = None;
+        if from.arc == 0.0 {
+            let found = tried(most);
+            if keeps(&found) {
+                return Some(found);
+            }
+            sharpest = Some(found);
+        }
         let mut turn = from.turn.clamp(0.8 * most, 0.8 * AWAY);
         // Mostly the turn of the step before is as good as any, but in corners.
         let first = tried(turn);
-        if full
-            && first.arc <= limit
-            && first.arc > limit - NEAR
-            && self.cleared.keeps(&from.to, &first.to, limit, fresh)
-        {
+        let good = |found: &Step| found.arc > limit - NEAR && keeps(found);
+        if full && good(&first) {
             return Some(first);
+        }
+        // Little off, the angle along a straight border leads to one: it grows by the turn, and as the tool comes nearer.
+        let off = first.arc - limit + 0.5 * NEAR;
+        if full && first.arc > 0.0 && off.abs() < STRAIGHT {
+            let growth = 1.0 + step / (self.radius * limit.sin());
+            let second = tried((turn + off / growth).clamp(most, AWAY));
+            if good(&second) {
+                return Some(second);
+            }
         }
         // Where that turn is too much, so is a greater one.
         let mut far = Step { arc: f64::INFINITY, turn: most, ..first };
         if first.arc <= limit {
-            far = tried(most);
-            if far.arc <= limit && self.cleared.keeps(&from.to, &far.to, limit, fresh) {
+            far = sharpest.unwrap_or_else(|| tried(most));
+            if sharpest.is_none() && keeps(&far) {
                 return Some(far);
             }
         }
@@ -367,6 +398,6 @@ impl<'a> Peeler<'a> {
                 }
             }
         }
-        best.filter(|step| self.cleared.keeps(&from.to, &step.to, limit, fresh))
+        best.filter(keeps)
     }
 }

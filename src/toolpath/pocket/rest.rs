@@ -174,15 +174,17 @@ impl Cells {
     /// Clears the cells that the cutter at `p` holds whole.
     fn clear_at(&mut self, p: &Point2) {
         let within = self.radius - self.cell * FRAC_1_SQRT_2;
-        let range = |axis: usize| {
+        // The cells of an axis so far to both sides of the place.
+        let range = |axis: usize, reach: f64| {
             let x = p[axis] - self.origin[axis];
-            let from = ((x - within) / self.cell).ceil().max(0.0) as usize;
-            from..(((x + within) / self.cell).floor() + 1.0).clamp(0.0, self.side[axis] as f64) as usize
+            let from = ((x - reach) / self.cell).ceil().max(0.0) as usize;
+            from..(((x + reach) / self.cell).floor() + 1.0).clamp(0.0, self.side[axis] as f64) as usize
         };
-        for j in range(1) {
-            for i in range(0) {
-                let index = j * self.side[0] + i;
-                self.clear[index] |= (self.at(index) - p).norm_squared() <= within * within;
+        for j in range(1, within) {
+            let up = self.origin.y + j as f64 * self.cell - p.y;
+            let row = range(0, (within * within - up * up).max(0.0).sqrt());
+            if !row.is_empty() {
+                self.clear[j * self.side[0] + row.start..j * self.side[0] + row.end].fill(true);
             }
         }
     }

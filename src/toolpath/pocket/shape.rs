@@ -1,7 +1,7 @@
 //! The pocket itself: its region, over which sides the cutter may leave, what a larger cutter took before; mm.
 
 use super::{Cutter, Region};
-use geometry::{CurveSegment, Piece, Point2, SegmentGrid, Vector2, foot};
+use geometry::{CurveSegment, Piece, Point2, SegmentGrid, Vector2, distance_of_segments, foot};
 use work::monitor::{Cancelled, Monitor};
 
 /// How far beyond an open side there is room, over the cutter's radius: it leaves the stock whole, and turns there.
@@ -64,16 +64,18 @@ impl Pocket {
         let drawn: Vec<[Point2; 2]> = lines.iter().flat_map(sides).collect();
         let along = |p: &Point2| drawn.iter().any(|side| foot(p, side).1 <= tolerance);
         let is_open = |[a, b]: &[Point2; 2]| along(a) && along(b) && along(&nalgebra::center(a, b));
-        let (mut open, mut closed) = (Vec::new(), Vec::new());
+        let (mut open, mut walls, mut closed) = (Vec::new(), Vec::new(), Vec::new());
         for curve in self.region.curves() {
             let sides: Vec<[Point2; 2]> =
                 (0..curve.len()).map(|k| [curve[k], curve[(k + 1) % curve.len()]]).collect();
             self.open.extend(sides.iter().filter(|side| is_open(side)));
             strips(&sides, is_open, BEYOND * radius, 0.0, &mut open);
-            // Behind a wall, no farther: around the end of a thin one there is room.
-            for side in sides.iter().filter(|side| !is_open(side)) {
-                strips(&[*side], |_| true, BEYOND * radius, 0.0, &mut closed);
-            }
+            walls.extend(sides.into_iter().filter(|side| !is_open(side)));
+        }
+        // Behind a wall that stands beyond an open side, no farther: around the end of a thin one there is room. What lies behind others
+        // is parted from there by stock, or by the pocket itself.
+        for wall in walls.iter().filter(|wall| open.iter().any(|strip| meets(strip, wall))) {
+            strips(&[*wall], |_| true, BEYOND * radius, 0.0, &mut closed);
         }
         let beyond = Region { pieces: open }.without(&Region { pieces: closed }).without(&self.region);
         self.free = self.region.union(&beyond);
@@ -168,6 +170,13 @@ fn divide(region: &mut Region, at: &Point2, tolerance: f64) -> Option<()> {
     Some(())
 }
 
+/// Whether a side comes onto a piece.
+fn meets(piece: &Piece, side: &[Point2; 2]) -> bool {
+    let outer = &piece.outer;
+    let near = |k: usize| distance_of_segments(side, &[outer[k], outer[(k + 1) % outer.len()]]) < ON_WALL;
+    piece.contains(&side[0]) || (0..outer.len()).any(near)
+}
+
 /// Strips of a width to the right of those sides of a closed curve that are wanted, and the rounds between two of them; each
 /// reaches `longer` mm beyond its side's ends.
 fn strips(
@@ -257,6 +266,32 @@ mod tests {
                 && !pocket.free().contains(&Point2::new(31.0, 10.0))
         );
         assert!(pocket.free().contains(&Point2::new(31.0, 7.9)));
+    }
+
+    /// A thin wall that is not square to the open side beside its end: its far side leads no way into the room beyond.
+    #[test]
+    fn walls_askew_leave_the_room_beyond_an_open_side() {
+        let outline = points(&[
+            (0., 0.),
+            (60., 0.),
+            (60., 40.),
+            (31., 40.),
+            (30.5, 12.),
+            (29.5, 12.),
+            (29., 40.),
+            (0., 40.),
+        ]);
+        let pocket = Pocket::new(Region::nested(vec![outline]).unwrap().0, 5.0);
+        let pocket = pocket.opened(&[points(&[(60., 0.), (60., 40.), (31., 40.)])], 1e-3, 4.0).unwrap();
+        // The room beyond has both strips whole, and the round between them.
+        let width = BEYOND * 4.0;
+        let beyond = (29.0 + 40.0) * width + 0.25 * std::f64::consts::PI * width * width;
+        let found = pocket.free().area() - pocket.region.area();
+        assert!((found - beyond).abs() < 0.01 * width * width, "{found} {beyond}");
+        // Corners keep stock at the two ends of the left bay, and at its foot.
+        let rest = pocket.rest_area(&Cutter::flat(8.0).unwrap(), &work::monitor::Silent).unwrap();
+        let square = 16.0 * (1.0 - std::f64::consts::FRAC_PI_4);
+        assert!((rest - 3.0 * square).abs() < 0.3, "{rest} {square}");
     }
 
     /// What a larger cutter leaves of a square are its corners, and a frame where it left an allowance.

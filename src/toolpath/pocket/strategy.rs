@@ -3,6 +3,7 @@
 use std::fmt::{self, Write as _};
 
 use super::bounded::{Rules, Sides};
+use super::cleared::Gentle;
 use super::feed::engagement_angle;
 use super::stream::Vectors;
 use super::turning::Turning;
@@ -87,6 +88,8 @@ pub struct PocketStrategy {
     /// falls in proportion. `None`: passes are not bounded, and the feed falls above a quarter more than
     /// the stepover has in straight passes.
     pub engagement: Option<f64>,
+    /// Where passes are planned for less, because an earlier plan was measured above the engagement there.
+    pub gentle: Vec<Gentle>,
 }
 
 /// Helix radius over the cutter's radius when none is asked for. Above 1 a core would stand.
@@ -231,6 +234,7 @@ fn read(from: &Reading<'_>, pattern: Pattern) -> Result<Box<dyn Strategy>, Scene
         ),
         helix_radius: length(section, "helix_radius")?,
         engagement: section.number("engagement", 10.0..=180.0, " degrees")?.map(|v| radians(v.value)),
+        gentle: Vec::new(),
     }))
 }
 

@@ -54,6 +54,7 @@ fn strategy(pattern: Pattern) -> PocketStrategy {
         ramp_angle: 3f64.to_radians(),
         helix_radius: None,
         engagement: None,
+        gentle: Vec::new(),
     }
 }
 

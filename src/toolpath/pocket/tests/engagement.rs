@@ -182,6 +182,7 @@ fn plan(pocket: &Pocket, diameter: f64, pattern: &Pattern, engagement: Option<f6
         ramp_angle: 0.1,
         helix_radius: None,
         engagement,
+        gentle: Vec::new(),
     };
     let settings = PlanSettings {
         step: Step::Stepover(2.0),
