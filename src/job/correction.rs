@@ -416,8 +416,10 @@ impl Corrected<'_> {
         let was_served = tried.standing.round.measured && !widths.touch_up.is_empty();
         let is_served =
             |places: &[HighPlace]| was_served || places.iter().any(|place| widths.is_touched_up(place));
-        let worth_passes = || self.are_few(&high, &tried.standing) || self.is_as_before();
-        if tried.standing.round.measured && worth_passes() && !is_served(&high) {
+        // Along borders narrower widths may change nothing.
+        let is_left = tried.standing.round.is_on_border() && self.is_as_before();
+        let is_worth = is_left || self.are_few(&high, &tried.standing);
+        if tried.standing.round.measured && is_worth && !is_served(&high) {
             return Some(widths.touched_up(&high));
         }
         let raised = self.raised_by_chords(tried, &high);
