@@ -13,8 +13,8 @@ use metrology::{FastestTurn, contact_arcs, fastest_turn, fastest_turn_across};
 use motion::{Move, MoveKind, Toolpath};
 use scene::{AxisRequest, Scene, ToolpathRequest};
 use toolpath::{
-    Detour, Earlier, Engagement, Gentle, OffsetDrive, OffsetSurface, Plan, PlanError, PlanSettings,
-    PocketStrategy, Strategy, Tilting, around_fixtures, plan, plan_pocket, plan_tilted,
+    Detour, Earlier, Engagement, Exceeding, Gentle, OffsetDrive, OffsetSurface, Plan, PlanError,
+    PlanSettings, PocketStrategy, Strategy, Tilting, around_fixtures, plan, plan_pocket, plan_tilted,
 };
 use work::monitor::{Cancelled, Monitor};
 
@@ -294,6 +294,29 @@ const LEAST_SHARE_OF_LIMIT: f64 = 0.25;
 /// come to it.
 const AROUND_EXCEEDING: f64 = 1.0;
 
+/// Adds lower limits around stretches that exceed the `limit`, rad, `over` by so much, for a cutter of some radius, mm.
+fn lower_around(
+    gentle: &mut Vec<Gentle>,
+    exceeding: &[Exceeding],
+    over: impl Fn(&Exceeding) -> f64,
+    [limit, radius]: [f64; 2],
+) {
+    let before = gentle.len();
+    for one in exceeding {
+        let (at, within) = (one.from.xy(), one.length + AROUND_EXCEEDING * radius);
+        // What was lowered around here before counts, too.
+        let lowered = gentle[..before].iter().filter(|gentle| (gentle.at - at).norm() < gentle.within);
+        let left = MOST_LOWERING * limit - lowered.map(|gentle| gentle.by).sum::<f64>();
+        let by = over(one).max(LEAST_LOWERING * limit).min(left.max(0.0));
+        // Every step down exceeds it at the same places.
+        let same = |gentle: &&mut Gentle| (gentle.at - at).norm() < 0.5 * radius;
+        match gentle[before..].iter_mut().find(same) {
+            Some(known) => (known.within, known.by) = (known.within.max(within), known.by.max(by)),
+            None => gentle.push(Gentle { at, within, by }),
+        }
+    }
+}
+
 /// The plan, or where its engagement is not proven to keep to the limit of the strategy, one for less around the places where it
 /// does not, by as much as it was above there; at last one for a lower limit. It is taken if that helps; in slots without room it
 /// does not.
@@ -319,20 +342,7 @@ fn within_engagement(
         let (_, engaged) = last.as_ref().unwrap_or(&best);
         let before = gentle.len();
         if let Some((found, bound)) = engaged {
-            for one in &found.exceeding {
-                let (at, within) = (one.from.xy(), one.length + AROUND_EXCEEDING * radius);
-                // What was lowered around here before counts, too.
-                let lowered =
-                    gentle[..before].iter().filter(|gentle| (gentle.at - at).norm() < gentle.within);
-                let left = MOST_LOWERING * limit - lowered.map(|gentle| gentle.by).sum::<f64>();
-                let by = (one.max + bound - limit).max(LEAST_LOWERING * limit).min(left.max(0.0));
-                // Every step down exceeds it at the same places.
-                let same = |gentle: &&mut Gentle| (gentle.at - at).norm() < 0.5 * radius;
-                match gentle[before..].iter_mut().find(same) {
-                    Some(known) => (known.within, known.by) = (known.within.max(within), known.by.max(by)),
-                    None => gentle.push(Gentle { at, within, by }),
-                }
-            }
+            lower_around(&mut gentle, &found.exceeding, |one| one.max + bound - limit, [limit, radius]);
         }
         // Nothing to be mended in places, or that did not help.
         let everywhere = gentle.len() == before || round == GENTLE_ROUNDS;

@@ -69,7 +69,7 @@ fn exceeding(p: &PocketFigures) -> Option<FigureTable> {
         vec![
             format!("{:.3}, {:.3}, {:.3}", one.x, one.y, one.z),
             format!("{:.3}", one.length_mm),
-            format!("{:.1}", one.max_engagement_deg),
+            format!("{:.2} ± {:.2}", one.max_engagement_deg, bound_of(p, one.max_engagement_deg)),
             one.first_move.to_string(),
             one.line.map_or_else(|| "-".to_owned(), |line| line.to_string()),
         ]
@@ -80,6 +80,11 @@ fn exceeding(p: &PocketFigures) -> Option<FigureTable> {
         columns: vec!["from, mm", "length, mm", "greatest, degrees", "first move", "line"],
         rows: p.over_engagement_limit.iter().map(row).collect(),
     })
+}
+
+/// Bound of the error of a measured engagement, degrees: no more of the circumference than the front half can cut.
+fn bound_of(pocket: &PocketFigures, measured: f64) -> f64 {
+    pocket.max_engagement_error_bound_deg.min(180.0 - measured)
 }
 
 /// That the cutter does not come beyond a pocket's outline.
@@ -100,8 +105,7 @@ fn within_walls(run: &Run<'_>, pocket: &PocketFigures) -> Claim {
 /// That passes keep to the engagement that the scene asks for.
 fn engaged_within(run: &Run<'_>, pocket: &PocketFigures, limit: f64) -> Claim {
     let (measured, index) = (pocket.max_engagement_deg, pocket.max_engagement_move);
-    // No more of the circumference than the front half can cut.
-    let bound = pocket.max_engagement_error_bound_deg.min(180.0 - measured);
+    let bound = bound_of(pocket, measured);
     let (count, share) = (pocket.over_engagement_limit_count, 100.0 * pocket.over_engagement_limit_fraction);
     let longest = pocket.over_engagement_limit.first().map_or_else(String::new, |one| {
         let stretches = if count == 1 { "1 stretch".to_owned() } else { format!("{count} stretches") };

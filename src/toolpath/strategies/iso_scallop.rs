@@ -6,7 +6,7 @@
 //!
 //! Where the strip is much wider across some feed directions than across others (a leaning flat or bull nose end mill on ground
 //! nearly as hollow as the cutter), fronts may break into corners of their own without end, and passes would run to and fro.
-//! Then the intervals are narrowed until they do not ([`field::Front::convex`]), which makes the path shorter.
+//! Then they move by the convex hull of their slowness ([`field::Front::convex`]): intervals are nowhere wider, and the path is shorter.
 //!
 //! Limits: behind the ends of a start curve on the border, and where fronts meet, passes turn sharply; further short passes
 //! are put in there.
