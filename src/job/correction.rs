@@ -102,7 +102,7 @@ impl Standing {
             error_bound_mm: map.scallop.error_bound_mm.filter(|_| highest_ridge >= map.border),
             median_mm: map.scallop.p50_mm,
             over_target_fraction: map.scallop.over_target_fraction,
-            cutting_length_mm: path_figures(&planned.plan.path, 0.0).cutting_length_mm,
+            cutting_length_mm: cutting_length(planned),
             factors,
             too_near_between_mm: too_near(planned),
             measured: false,
@@ -123,7 +123,7 @@ impl Standing {
             error_bound_mm: Some(highest_reached(measured).error_bound_mm),
             median_mm: scallop.p50_mm,
             over_target_fraction: scallop.over_target_fraction,
-            cutting_length_mm: path_figures(&planned.plan.path, 0.0).cutting_length_mm,
+            cutting_length_mm: cutting_length(planned),
             factors,
             too_near_between_mm: too_near(planned),
             measured: true,
@@ -182,9 +182,10 @@ impl Session {
             Some(_) => self.ridges(request, engine, &first, monitor)?,
             None => None,
         };
-        // Where each round measures all, narrower passes cost less time than a closer look, and little length.
-        let closeness = target.filter(|_| map.is_none()).map_or(Closeness::Verdict, |target| {
-            Closeness::Plan { within: SLACK * target, limit: self.scene.scallop_rule.highest * target }
+        // Narrower passes cost less time than a closer look, and little length.
+        let closeness = target.map_or(Closeness::Verdict, |target| Closeness::Plan {
+            within: SLACK * target,
+            limit: self.scene.scallop_rule.highest * target,
         });
         let measure =
             |planned: &Planned| self.measure(request, engine, &planned.plan.path, closeness, monitor);
@@ -198,7 +199,7 @@ impl Session {
         };
         let (Some(target), Some(standing)) = (target, standing) else {
             let measured = match measured {
-                Some(measured) if closeness == Closeness::Verdict || !self.is_open(&measured) => measured,
+                Some(measured) if self.is_as_verdict(&measured, closeness, engine) => measured,
                 _ => self.measure(request, engine, &first.plan.path, Closeness::Verdict, monitor)?,
             };
             return Ok((first, measured));
@@ -225,7 +226,7 @@ impl Session {
             Some(measured) => measured,
             None => {
                 corrected.by_ridges(monitor)?;
-                corrected.measure_best(monitor)?
+                corrected.measure_best(closeness, monitor)?
             }
         };
         let measured = corrected.by_measurements(measured, monitor)?;
@@ -264,10 +265,14 @@ impl Corrected<'_> {
             && let Some(next) = self.next(in_vain, SLACK)
         {
             let (planned, factors) = self.plan(&next, monitor)?;
-            let map = self.session.ridges(self.request, self.engine, &planned, monitor)?;
-            let found = map.and_then(|map| Standing::of_ridges(&map, &planned, factors));
-            let Some(found) = found else { break };
-            let gain = self.keep_if_better(planned, next, found);
+            let gain = if self.is_left_as_before(&planned, factors) {
+                self.keep_unmeasured(&planned, next, factors)
+            } else {
+                let map = self.session.ridges(self.request, self.engine, &planned, monitor)?;
+                let found = map.and_then(|map| Standing::of_ridges(&map, &planned, factors));
+                let Some(found) = found else { break };
+                self.keep_if_better(planned, next, found)
+            };
             in_vain = if gain >= Gain::Enough { 0 } else { in_vain + 1 };
         }
         Ok(())
@@ -285,24 +290,28 @@ impl Corrected<'_> {
             }
             let Some(next) = self.next(in_vain, MEASURED_SLACK) else { break };
             let (planned, factors) = self.plan(&next, monitor)?;
-            // Two at a time might be more than the memory that the run may take.
-            drop(measured.take());
-            let path = &planned.plan.path;
-            let again = self.session.measure(self.request, self.engine, path, self.closeness, monitor)?;
-            let Some(found) = Standing::of_all(&again.measurement, &planned, factors) else { break };
-            gain = self.keep_if_better(planned, next, found);
-            if gain != Gain::None {
-                measured = Some(again);
+            if self.is_left_as_before(&planned, factors) {
+                gain = self.keep_unmeasured(&planned, next, factors);
+            } else {
+                // Two at a time might be more than the memory that the run may take.
+                drop(measured.take());
+                let path = &planned.plan.path;
+                let again = self.session.measure(self.request, self.engine, path, self.closeness, monitor)?;
+                let Some(found) = Standing::of_all(&again.measurement, &planned, factors) else { break };
+                gain = self.keep_if_better(planned, next, found);
+                if gain != Gain::None {
+                    measured = Some(again);
+                }
             }
             in_vain = if gain >= Gain::Enough { 0 } else { in_vain + 1 };
         }
         match measured {
-            Some(measured) if self.closeness == Closeness::Verdict || !self.session.is_open(&measured) => {
+            Some(measured) if self.session.is_as_verdict(&measured, self.closeness, self.engine) => {
                 Ok(measured)
             }
             other => {
                 drop(other);
-                self.measure_best(monitor)
+                self.measure_best(Closeness::Verdict, monitor)
             }
         }
     }
@@ -413,7 +422,8 @@ impl Corrected<'_> {
             return None;
         }
         // Where a measurement finds others beside those that were served, there are more to come.
-        let was_served = tried.standing.round.measured && !widths.touch_up.is_empty();
+        let measured = self.rounds.iter().filter(|round| round.measured).count();
+        let was_served = measured > 1 && tried.standing.round.measured && !widths.touch_up.is_empty();
         let is_served =
             |places: &[HighPlace]| was_served || places.iter().any(|place| widths.is_touched_up(place));
         // Along borders narrower widths may change nothing.
@@ -501,20 +511,39 @@ impl Corrected<'_> {
     }
 
     /// Measures all of the best plan.
-    fn measure_best(&mut self, monitor: &dyn Monitor) -> Result<Measured, JobError> {
-        let measured = self.session.measure(
-            self.request,
-            self.engine,
-            &self.best.plan.path,
-            Closeness::Verdict,
-            monitor,
-        )?;
+    fn measure_best(&mut self, closeness: Closeness, monitor: &dyn Monitor) -> Result<Measured, JobError> {
+        let path = &self.best.plan.path;
+        let measured = self.session.measure(self.request, self.engine, path, closeness, monitor)?;
         let factors = self.tried.standing.round.factors;
         if let Some(standing) = Standing::of_all(&measured.measurement, &self.best, factors) {
             self.rounds[self.kept] = standing.round;
             self.tried.standing = standing;
         }
         Ok(measured)
+    }
+
+    /// Whether all widths of a plan differ from those of the best, and no more than the ends of passes: they are spread over a
+    /// part, a whole number of them, and it leaves what the best one leaves.
+    fn is_left_as_before(&self, planned: &Planned, factors: [f64; 2]) -> bool {
+        let before = &self.tried.standing.round;
+        let [a, b] = [0, 1].map(|k| (factors[k] / before.factors[k] - 1.0).abs());
+        let length = cutting_length(planned) / before.cutting_length_mm - 1.0;
+        a.min(b) > 0.0 && length.abs() <= AS_BEFORE * a.min(b)
+    }
+
+    /// Keeps the best plan instead of one that leaves the same.
+    fn keep_unmeasured(&mut self, planned: &Planned, widths: Widths, factors: [f64; 2]) -> Gain {
+        let Standing { round, above } = &self.tried.standing;
+        let round = CorrectionRound {
+            factors,
+            cutting_length_mm: cutting_length(planned),
+            too_near_between_mm: too_near(planned),
+            ..*round
+        };
+        self.rounds.push(round);
+        let standing = Standing { round, above: above.clone() };
+        self.latest = Some(Tried { widths, standing, kept: planned.plan.kept.clone() });
+        Gain::None
     }
 
     fn keep_if_better(&mut self, planned: Planned, widths: Widths, found: Standing) -> Gain {
@@ -529,6 +558,11 @@ impl Corrected<'_> {
         }
         gain
     }
+}
+
+/// [`CorrectionRound::cutting_length_mm`] of a plan.
+fn cutting_length(planned: &Planned) -> f64 {
+    path_figures(&planned.plan.path, 0.0).cutting_length_mm
 }
 
 /// [`CorrectionRound::too_near_between_mm`] of a plan.

@@ -22,19 +22,20 @@ const CLOSEST_BOUND: f64 = 0.02;
 pub(crate) enum Closeness {
     /// As the verdict needs it.
     Verdict,
-    /// The highest place to `within` mm; no closer where it is above `limit`, mm, for certain, and the path is to be planned
-    /// anew.
+    /// No closer where the path is to be planned anew: its highest place, known to `within` mm, may stand above `limit`, mm,
+    /// or it does for certain.
     Plan { within: f64, limit: f64 },
 }
 
 impl Closeness {
-    /// `coarse` cells may tell heights that finer ones do not have.
+    /// Whether no closer look is needed for a plan. `coarse` cells may tell heights that finer ones do not have.
     fn is_enough(self, measured: &Measured, coarse: bool) -> bool {
         let highest = judge::highest_reached(&measured.measurement);
         match self {
             Self::Verdict => false,
             Self::Plan { within, limit } => {
-                highest.error_bound_mm <= within || !coarse && highest.max_mm > limit
+                highest.error_bound_mm <= within && highest.at_most() > limit
+                    || !coarse && highest.max_mm > limit
             }
         }
     }
@@ -105,6 +106,16 @@ impl Session {
             }
         }
         Ok(measured)
+    }
+
+    /// Whether a closer look than `closeness` would change no verdict.
+    pub(crate) fn is_as_verdict(
+        &self,
+        measured: &Measured,
+        closeness: Closeness,
+        engine: &dyn Engine,
+    ) -> bool {
+        !self.is_open(measured) || !closeness.is_enough(measured, engine.gains_by_cells())
     }
 
     /// The cells of a toolpath that was planned for a time, where its passes lie nearer than those of the scene's scallop height.

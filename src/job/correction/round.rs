@@ -35,7 +35,8 @@ pub(crate) struct CorrectionRound {
     /// How much nearer than asked the tool comes to anything between passes, mm; `None` where it keeps clear.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub too_near_between_mm: Option<f64>,
-    /// Whether all was measured as the verdict is, and not ridges alone on cells that just show them.
+    /// Whether all was measured as the verdict is, and not ridges alone on cells that just show them. A plan that differs from
+    /// the best one before by the ends of its passes only has the figures of that one.
     pub measured: bool,
 }
 
