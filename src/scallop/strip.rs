@@ -1,12 +1,21 @@
 //! Strip width: how far apart neighbouring passes may lie at a point of the surface so that the
 //! ridge between them stays below a scallop height.
 //!
-//! Cutter and surface are compared in the normal section across the feed, where the surface counts as a circle of its own
-//! curvature. For a ball the width is then exact ([`BallSection`]). For other cutters it is that of the outline which the
-//! cutter shows along the feed, exact where the feed is straight and the tool turns with the surface: on planes, and along
-//! cylinders under a lead and tilt. A tool that keeps its axis while the surface turns across the feed, and a surface that
-//! bends along the feed, add terms of third order in the width. To second order a ridge of height `h` stands between
-//! passes `√(8h / (κ_cutter − κ_surface))` apart.
+//! Cutter and surface are compared where the cutter cuts. Between them stands `½ (K − B)(x − s t)`, a quadratic form of the place
+//! `x` less the contact `s t` along the feed, K and B the second fundamental forms of cutter and surface. The least over all
+//! contacts is what a pass leaves at a distance y across the feed:
+//!
+//! ```text
+//! ½ gap y²,   gap = G_bb − G_tb²/G_tt,   G = K − B
+//! ```
+//!
+//! with t along the feed and b across. A ridge of height `h` stands, to second order, between passes `√(8h / gap)` apart. The
+//! term with `G_tb` is the twist: where the surface twists along the feed, the cutter cuts ahead of or behind its contact, and passes lie
+//! farther apart than the section across the feed tells.
+//!
+//! Beyond the second order a ball and a surface that do not twist are two circles ([`BallSection`]), which is exact. Other cutters
+//! show an outline along the feed, exact where the feed is straight and the tool turns with the surface: on planes, and along
+//! cylinders under a lead and tilt. What the twist adds counts as curvature of the surface across the feed.
 //!
 //! Where the curvature changes over a strip, what really stands is measured on the cut surface.
 
@@ -27,20 +36,101 @@ const WIDEST_OVER_DIAMETER: f64 = 0.8;
 /// less, is left between them.
 const NEARLY_AS_CONCAVE: f64 = 0.25;
 
+/// Where a cutter hugs the surface along the feed, the form says little about places so many times farther ahead than aside.
+const MOST_ASKEW: f64 = 3.0;
+
+/// How a surface bends at a contact, 1/mm, positive where it is concave toward its normal.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FeedCurvature {
+    /// Normal curvature along the feed.
+    pub along: f64,
+    /// Normal curvature across the feed.
+    pub across: f64,
+    /// The mixed term of the second fundamental form.
+    pub twist: f64,
+}
+
+impl FeedCurvature {
+    /// By the normal curvature along any tangent, of a feed along `t` with `b` across, both unit.
+    pub fn of(t: &Vector3, b: &Vector3, curvature: impl Fn(&Vector3) -> f64) -> Self {
+        let askew = (t + b) * std::f64::consts::FRAC_1_SQRT_2;
+        let [along, across, between] = [t, b, &askew].map(curvature);
+        Self { along, across, twist: between - 0.5 * (along + across) }
+    }
+
+    /// How far ahead of a contact a cutter cuts for each mm across, where this is the gap between both.
+    fn ahead(&self) -> f64 {
+        let ahead = -self.twist / self.along;
+        if self.along > 0.0 && ahead.is_finite() { ahead.clamp(-MOST_ASKEW, MOST_ASKEW) } else { 0.0 }
+    }
+
+    /// Along the tangent `b + ahead t`.
+    fn at(&self, ahead: f64) -> f64 {
+        self.across + ahead * (2.0 * self.twist + ahead * self.along)
+    }
+}
+
+/// How far ahead of its contact the cutter cuts for each mm across the feed: there it stands least above the surface, of all
+/// places of the pass; arguments as of [`strip_width_at`].
+pub fn cut_ahead(cutter: &Cutter, n: &Vector3, b: &Vector3, surface: &FeedCurvature) -> f64 {
+    gap(&bend_of(cutter, n, b), surface).ahead()
+}
+
+/// How much more the cutter is curved than the surface there, for a mm across the feed, 1/mm.
+pub fn least_gap(cutter: &Cutter, n: &Vector3, b: &Vector3, surface: &FeedCurvature) -> f64 {
+    let gap = gap(&bend_of(cutter, n, b), surface);
+    gap.at(gap.ahead())
+}
+
+/// How the cutter bends at its contact.
+fn bend_of(cutter: &Cutter, n: &Vector3, b: &Vector3) -> FeedCurvature {
+    if cutter.is_ball() {
+        let bend = 1.0 / cutter.radius();
+        return FeedCurvature { along: bend, across: bend, twist: 0.0 };
+    }
+    FeedCurvature::of(&b.cross(n), b, |d| cutter.normal_curvature(n, d))
+}
+
+fn gap(cutter: &FeedCurvature, surface: &FeedCurvature) -> FeedCurvature {
+    FeedCurvature {
+        along: cutter.along - surface.along,
+        across: cutter.across - surface.across,
+        twist: cutter.twist - surface.twist,
+    }
+}
+
+/// The curvature across the feed that a surface without twist has where a cutter with this bend leaves as much.
+fn untwisted(cutter: &FeedCurvature, surface: &FeedCurvature) -> f64 {
+    let gap = gap(cutter, surface);
+    if gap.twist == 0.0 || !gap.across.is_finite() {
+        return surface.across;
+    }
+    // What the outline along the feed has less than the section across holds for a plane.
+    cutter.at(cutter.ahead()) - gap.at(gap.ahead())
+}
+
 /// Width of the strip, mm along the surface, that a cutter leaves below the scallop height `h` around a contact with
 /// outward surface normal `n`, across the feed in the tangent direction `b` (both unit, in the frame of the tool), where the
-/// surface has the normal curvature `surface` along `b`; and whether the surface is so concave that
-/// the width had to be limited.
+/// part bends as `surface`; and whether the surface is so concave that the width had to be limited.
 ///
 /// # Tolerance
-/// A few rounding errors for a ball; 1e-9 of the width for the outline of another cutter, never more than it.
-pub fn strip_width_at(cutter: &Cutter, n: &Vector3, b: &Vector3, surface: f64, h: f64) -> (f64, bool) {
+/// A few rounding errors for a ball where nothing twists; 1e-9 of the width for the outline of another cutter, never more than it.
+pub fn strip_width_at(
+    cutter: &Cutter,
+    n: &Vector3,
+    b: &Vector3,
+    surface: &FeedCurvature,
+    h: f64,
+) -> (f64, bool) {
+    let bend = bend_of(cutter, n, b);
+    // An edge shows no meridian to compare.
+    let surface = if cutter.touches_with_edge(n) { surface.across } else { untwisted(&bend, surface) };
     if cutter.is_ball() {
         return strip_width(1.0 / cutter.radius(), surface, h, cutter.radius());
     }
     let widest = widest(h, cutter.radius());
     // A point has no curvature to compare: it leaves grooves.
-    let curvature = cutter.normal_curvature(n, b);
+    let curvature = bend.across;
     let too_concave = curvature.is_finite() && too_concave(curvature, surface);
     if surface > 0.0 && curvature <= surface && !cutter.touches_with_edge(n) {
         return (widest, too_concave);
@@ -79,6 +169,65 @@ mod tests {
     use crate::section::ball_scallop_height;
     use cutter::AptWords;
 
+    fn across(across: f64) -> FeedCurvature {
+        FeedCurvature { across, ..FeedCurvature::default() }
+    }
+
+    /// Passes over `z = 0.35 x + 0.1 y + c x y` with contacts at constant y, one at 0 and one so that they are `width` apart
+    /// on the surface at x = 0: the ridge between them over its normal, by brute force.
+    fn ridge_over_twist(cutter: &Cutter, c: f64, y: f64) -> f64 {
+        let z = |x: f64, y: f64| 0.35 * x + 0.1 * y + c * x * y;
+        let normal = |x: f64, y: f64| Vector3::new(-0.35 - c * y, -0.1 - c * x, 1.0).normalize();
+        let tips = |y: f64| {
+            let at = move |k: i32| {
+                let x = f64::from(k) * 2e-4;
+                let n = normal(x, y);
+                Vector3::new(x, y, z(x, y)) + cutter.contact_to_tip(&n)
+            };
+            (-4000..=4000).map(at).collect::<Vec<_>>()
+        };
+        let passes = [tips(0.0), tips(y)];
+        let envelope = |pass: &[Vector3], x: f64, y: f64| {
+            let over =
+                |tip: &Vector3| tip.z + cutter.height((tip.x - x).hypot(tip.y - y)).unwrap_or(f64::INFINITY);
+            pass.iter().map(over).fold(f64::INFINITY, f64::min)
+        };
+        let left = |share: f64| {
+            let y = y * share;
+            let cut = passes.iter().map(|pass| envelope(pass, 0.0, y)).fold(f64::INFINITY, f64::min);
+            (cut - z(0.0, y)) * normal(0.0, y).z
+        };
+        // Where both leave as much: one rises and the other falls.
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..40 {
+            let share = 0.5 * (low + high);
+            let [a, b] = [0, 1].map(|k| envelope(&passes[k], 0.0, y * share));
+            if a < b { low = share } else { high = share }
+        }
+        left(0.5 * (low + high))
+    }
+
+    /// By the section across the feed alone, ridges of the ball are lower than asked, and those of the bull nose higher.
+    #[test]
+    fn strips_are_as_wide_as_a_twisted_surface_lets_them_be() {
+        let h = 1e-3;
+        for (cutter, c) in [(Cutter::ball(10.0).unwrap(), 0.06), (Cutter::bull(10.0, 2.0).unwrap(), 0.03)] {
+            let (x_tangent, y_tangent) = (Vector3::new(1.0, 0.0, 0.35), Vector3::new(0.0, 1.0, 0.1));
+            let n = x_tangent.cross(&y_tangent).normalize();
+            let t = x_tangent.normalize();
+            let b = n.cross(&t);
+            // The form has one entry, between x and y.
+            let curvature = |d: &Vector3| 2.0 * c * n.z * d.x * d.y;
+            let surface = FeedCurvature::of(&t, &b, curvature);
+            let plain = FeedCurvature { twist: 0.0, ..surface };
+            let [width, by_section] = [surface, plain].map(|s| strip_width_at(&cutter, &n, &b, &s, h).0);
+            // Passes at constant y are so far apart across the feed.
+            let apart = b.dot(&y_tangent);
+            let [real, off] = [width, by_section].map(|width| ridge_over_twist(&cutter, c, width / apart));
+            assert!((real / h - 1.0).abs() < 0.01 && (off / h - 1.0).abs() > 0.05, "{real} {off}");
+        }
+    }
+
     #[test]
     fn strips_of_balls_have_the_exact_height() {
         let r = 3.0;
@@ -87,7 +236,7 @@ mod tests {
             for bend in [-1.0, -0.3, -0.01, -1e-9, 0.0, 1e-9, 0.01, 0.3, 0.6] {
                 let (kappa, h) = (bend / r, over * r);
                 let (width, limited) = strip_width(1.0 / r, kappa, h, r);
-                let of_ball = strip_width_at(&ball, &Vector3::z(), &Vector3::x(), kappa, h);
+                let of_ball = strip_width_at(&ball, &Vector3::z(), &Vector3::x(), &across(kappa), h);
                 assert!(!limited && of_ball == (width, false), "{bend} {over}");
                 let real = ball_scallop_height(r, kappa, width).unwrap();
                 assert!((real / h - 1.0).abs() < 1e-9, "{bend} {over}: {real}");
@@ -105,10 +254,10 @@ mod tests {
         let slope = 30f64.to_radians();
         let (n, up) =
             (Vector3::new(-slope.sin(), 0.0, slope.cos()), Vector3::new(slope.cos(), 0.0, slope.sin()));
-        let (width, _) = strip_width_at(&flat, &n, &up, 0.0, 0.01);
+        let (width, _) = strip_width_at(&flat, &n, &up, &across(0.0), 0.01);
         assert!((width * slope.sin() * slope.cos() - 0.01).abs() < 1e-11);
         // Fed up or down the slope it shows an ellipse of half axes R and R sin λ.
-        let (along, _) = strip_width_at(&flat, &n, &Vector3::y(), 0.0, 0.01);
+        let (along, _) = strip_width_at(&flat, &n, &Vector3::y(), &across(0.0), 0.01);
         let height = 3.0 * slope.sin() * (1.0 - (1.0 - (0.5 * along / 3.0f64).powi(2)).sqrt());
         assert!((height / 0.01 - 1.0).abs() < 1e-9, "{height}");
     }
@@ -119,7 +268,7 @@ mod tests {
         let cone = Cutter::apt(&AptWords::examples()[1]).unwrap();
         let (flank, rise) = (cone.profile().point().sin.asin(), 5f64.to_radians());
         let (n, b) = (Vector3::new(-rise.sin(), 0.0, rise.cos()), Vector3::new(rise.cos(), 0.0, rise.sin()));
-        let width = strip_width_at(&cone, &n, &b, 0.0, 1e-3).0;
+        let width = strip_width_at(&cone, &n, &b, &across(0.0), 1e-3).0;
         let groove = 1e-3 * (1.0 / (flank + rise).tan() + 1.0 / (flank - rise).tan());
         assert!((width / groove - 1.0).abs() < 1e-9, "{width} {groove}");
     }
@@ -201,7 +350,7 @@ mod tests {
                 let [n, b] = [Vector3::z(), Vector3::y()].map(|v| motion::in_tool_frame(&axis, &v));
                 let hull = outline(cutter, &n, &b);
                 for (kappa, h) in [(0.0, 0.01), (0.0, 0.1), (-0.03, 0.05), (0.01, 0.05)] {
-                    let (width, limited) = strip_width_at(cutter, &n, &b, kappa, h);
+                    let (width, limited) = strip_width_at(cutter, &n, &b, &across(kappa), h);
                     if limited || width >= widest(h, cutter.radius()) {
                         continue;
                     }

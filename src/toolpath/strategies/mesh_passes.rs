@@ -26,7 +26,7 @@ use field::mesh::{
     smooth_lines, solve_stream,
 };
 use geometry::{Point2, Point3, Vector2, Vector3};
-use scallop::strip_width_at;
+use scallop::{FeedCurvature, strip_width_at};
 use work::monitor::{Cancelled, Monitor};
 
 /// Two places of the axis nearer than this, mm, are one: rounding.
@@ -66,7 +66,9 @@ pub(crate) fn on_mesh(task: &Task<'_>, aim: Aim) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, .. } = *task;
     let flat = match settings.step {
         Step::Stepover(width) => width,
-        Step::Scallop(h) => strip_width_at(cutter, &Vector3::z(), &Vector3::x(), 0.0, h).0,
+        Step::Scallop(h) => {
+            strip_width_at(cutter, &Vector3::z(), &Vector3::x(), &FeedCurvature::default(), h).0
+        }
     };
     let parameters: Vec<_> = match part.patches() {
         // u and v of a mesh are its x and y.
@@ -204,7 +206,10 @@ fn along_lines(
 pub(crate) fn width_at(cutter: &Cutter, n: &Vector3, b: &Vector3, bend: &Bend, step: Step) -> (f64, bool) {
     match step {
         Step::Stepover(width) => (width, false),
-        Step::Scallop(h) => strip_width_at(cutter, n, b, bend.along(b), h),
+        Step::Scallop(h) => {
+            let bends = FeedCurvature::of(&b.cross(n), b, |d| bend.along(d));
+            strip_width_at(cutter, n, b, &bends, h)
+        }
     }
 }
 

@@ -27,7 +27,7 @@ use field::surface_gradient_length;
 use geometry::{NurbsSurface, Point3, Vector3};
 use keys::{SceneError, toml_number};
 use motion::CcPoint;
-use scallop::strip_width;
+use scallop::{FeedCurvature, least_gap, strip_width};
 use work::monitor::{Cancelled, Monitor};
 
 /// Places a side at which steps between passes are computed.
@@ -275,7 +275,11 @@ impl PatchRider<'_> {
     /// part is too concave there.
     fn width_between_centres(&self, p: &ChartPoint, feed: &Vector3) -> (f64, bool) {
         let radius = self.cutter.radius();
-        let across = p.curvature_along(&p.normal.cross(feed));
+        let FeedCurvature { along, across, twist } = p.bends(feed);
+        // Seen from the centres, the part lies on the other side.
+        let hollow = FeedCurvature { along: -along, across: -across, twist: -twist };
+        let gap = least_gap(self.cutter, &p.normal, &p.normal.cross(feed), &hollow);
+        let across = gap - 1.0 / radius;
         // 1 − κ r of the design.
         let narrower = 1.0 / (1.0 + across * radius).max(1e-3);
         match self.settings.step {

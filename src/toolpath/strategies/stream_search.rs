@@ -469,11 +469,11 @@ mod tests {
     use std::sync::Arc;
     use work::monitor::Silent;
 
-    /// `z = 0.03 x y` over 20 × 17 mm.
-    fn saddle() -> NurbsSurface {
+    /// `z = twist x y` over 20 × 17 mm.
+    fn saddle(twist: f64) -> NurbsSurface {
         let at = |i: usize, side: f64| side * (i as f64 / 3.0 - 0.5);
         let point =
-            |i: usize, j: usize| Point3::new(at(i, 20.0), at(j, 17.0), 0.03 * at(i, 20.0) * at(j, 17.0));
+            |i: usize, j: usize| Point3::new(at(i, 20.0), at(j, 17.0), twist * at(i, 20.0) * at(j, 17.0));
         let net: Vec<Vec<Point3>> = (0..4).map(|i| (0..4).map(|j| point(i, j)).collect()).collect();
         let knots = vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
         NurbsSurface::new(3, 3, knots.clone(), knots, &net, None).unwrap()
@@ -484,7 +484,7 @@ mod tests {
     /// What is left over of the last pass is drawn in, for less than that pass would cost.
     #[test]
     fn a_number_of_passes_is_drawn_in_to_a_whole_one() {
-        let (surface, cutter) = (saddle(), Cutter::ball(18.0).unwrap());
+        let (surface, cutter) = (saddle(0.05), Cutter::ball(18.0).unwrap());
         let chart = Chart::of_surface(&surface, crate::vocabulary::Guide::default());
         let step = Step::Scallop(0.01);
         let search = Search {
@@ -512,7 +512,7 @@ mod tests {
     /// What goes on from a front has the front's passes to begin with, runs along its whole border, and is no longer than the front.
     #[test]
     fn a_function_beside_a_front_keeps_its_border_and_is_no_longer() {
-        let (surface, cutter) = (saddle(), Cutter::ball(18.0).unwrap());
+        let (surface, cutter) = (saddle(0.03), Cutter::ball(18.0).unwrap());
         let chart = Chart::of_surface(&surface, crate::vocabulary::Guide::default());
         let (step, prices) = (Step::Scallop(0.01), Prices { end: 1.0, turning: &|_| 0.0 });
         let search = Search {
@@ -559,7 +559,7 @@ mod tests {
     /// off and more: the function fitted to the circles is where the search has to start.
     #[test]
     fn circles_are_kept_to_where_leaving_them_is_dear() {
-        let (surface, cutter) = (saddle(), Cutter::ball(6.0).unwrap());
+        let (surface, cutter) = (saddle(0.03), Cutter::ball(6.0).unwrap());
         let chart = Chart::of_surface(&surface, crate::vocabulary::Guide::default());
         let circle = |k: usize| {
             let (x, y) = (-10.0 + (k % 21) as f64, -8.5 + 0.85 * (k / 21) as f64);

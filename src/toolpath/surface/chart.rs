@@ -15,7 +15,7 @@ use field::{GridField, NormalEquations, SamplePlane};
 use geometry::{Jet2, KnotVector, NurbsSurface, Point3, Vector2, Vector3};
 use motion::{CcPoint, in_tool_frame};
 use part::Part;
-use scallop::strip_width_at;
+use scallop::{FeedCurvature, cut_ahead, least_gap, strip_width_at};
 
 /// Control points of a height surface lie so many facets apart, and no less and no more than these shares of the cutter's
 /// radius. Finer follows the facets of a mesh instead of its shape, and swings beside steps, so that meshes that have any take
@@ -167,38 +167,25 @@ impl ChartPoint<'_> {
         }
     }
 
-    /// How much more the cutter is curved than the surface across the feed `t`, 1/mm.
-    fn gap_across(&self, cutter: &Cutter, t: &Vector3) -> f64 {
-        self.gap_along(cutter, t, &self.normal.cross(t))
+    /// How the surface bends where the cutter is fed along the unit tangent `t`.
+    pub fn bends(&self, t: &Vector3) -> FeedCurvature {
+        FeedCurvature::of(t, &self.normal.cross(t), |d| self.curvature_along(d))
     }
 
-    /// How much more the cutter that is fed along `t` is curved than the surface along a unit tangent, 1/mm.
-    fn gap_along(&self, cutter: &Cutter, t: &Vector3, tangent: &Vector3) -> f64 {
-        let [n, b] = self.in_tool_frame(t, *tangent);
-        cutter.normal_curvature(&n, &b) - self.curvature_along(tangent)
-    }
-
-    /// The tangent across the feed `t` along which the cutter cuts: its gap to the surface, a quadratic form, is least there
-    /// of all places of the pass. On a plane a ball cuts at right angles to the feed; a torus fed askew to its slope does not,
+    /// The tangent across the feed `t` along which the cutter cuts: it stands least above the surface there, of all places of
+    /// the pass. On a plane a ball cuts at right angles to the feed; a torus fed askew to its slope does not,
     /// nor does any cutter on a surface that twists along the feed. Its part across the feed has length one.
     pub fn cut_across(&self, cutter: &Cutter, t: &Vector3) -> Vector3 {
-        /// Where a cutter hugs the surface along the feed, the form says little about places so far aside.
-        const MOST_ASKEW: f64 = 3.0;
-        let across = self.normal.cross(t);
-        let askew = (t + across) * std::f64::consts::FRAC_1_SQRT_2;
-        let [along, beside, between] = [t, &across, &askew].map(|d| self.gap_along(cutter, t, d));
-        let mixed = between - 0.5 * (along + beside);
-        let ahead = -mixed / along;
-        let is_known = along > 0.0 && ahead.is_finite();
-        across + if is_known { t * ahead.clamp(-MOST_ASKEW, MOST_ASKEW) } else { Vector3::zeros() }
+        let [n, b] = self.across_in_tool_frame(cutter, t);
+        self.normal.cross(t) + t * cut_ahead(cutter, &n, &b, &self.bends(t))
     }
 
-    /// The normal and a vector in the frame of the cutter that is fed along `t`.
-    fn in_tool_frame(&self, t: &Vector3, v: Vector3) -> [Vector3; 2] {
+    /// The normal and the tangent across the feed `t`, in the frame of the cutter.
+    fn across_in_tool_frame(&self, cutter: &Cutter, t: &Vector3) -> [Vector3; 2] {
         let contact = CcPoint { point: self.jet.p, normal: self.normal };
-        // A place without an axis is refused where it is cut.
-        let axis = self.guide.axis.and_then(|rule| rule.at(&contact, t).ok());
-        [self.normal, v].map(|v| axis.map_or(v, |axis| in_tool_frame(&axis, &v)))
+        // A ball is the same however it leans. A place without an axis is refused where it is cut.
+        let axis = self.guide.axis.filter(|_| !cutter.is_ball()).and_then(|rule| rule.at(&contact, t).ok());
+        [self.normal, self.normal.cross(t)].map(|v| axis.map_or(v, |axis| in_tool_frame(&axis, &v)))
     }
 
     /// Distance on the surface that neighbouring passes with unit feed tangent `t` may have, mm,
@@ -207,10 +194,8 @@ impl ChartPoint<'_> {
         match step {
             Step::Stepover(width) => (width, false),
             Step::Scallop(h) => {
-                let b = self.normal.cross(t);
-                // However a ball leans.
-                let [n, across] = if cutter.is_ball() { [self.normal, b] } else { self.in_tool_frame(t, b) };
-                let (width, limited) = strip_width_at(cutter, &n, &across, self.curvature_along(&b), h);
+                let [n, b] = self.across_in_tool_frame(cutter, t);
+                let (width, limited) = strip_width_at(cutter, &n, &b, &self.bends(t), h);
                 (self.guide.corrected(width, &self.jet.p, step), limited)
             }
         }
@@ -285,17 +270,20 @@ impl<'a> Chart<'a> {
     /// an edge, or where a blend begins, it is another one half an interval away.
     pub fn interval(&self, p: &ChartPoint, cutter: &Cutter, t: &Vector3, step: Step) -> (f64, bool) {
         let (at_place, limited) = p.strip_width(cutter, t, step);
-        let across = p.normal.cross(t);
+        let across = p.cut_across(cutter, t);
         let (Step::Scallop(_), Some((du, dv))) = (step, p.jet.pull_back(&across)) else {
             return (at_place, limited);
         };
-        let own = p.gap_across(cutter, t);
+        let [n, b] = p.across_in_tool_frame(cutter, t);
+        let own = least_gap(cutter, &n, &b, &p.bends(t));
         if !own.is_finite() || own <= 0.0 {
             return (at_place, limited);
         }
+        // A form of the tangent: the curvature along its direction and the square of its length.
+        let bend = |q: &ChartPoint| q.curvature_along(&across) * across.norm_squared();
         let gap_at = |s: f64| {
             let beside = self.at(p.at[0] + s * du, p.at[1] + s * dv);
-            beside.map_or(own, |q| own + p.curvature_along(&across) - q.curvature_along(&across))
+            beside.map_or(own, |q| own + bend(p) - bend(&q))
         };
         let mut width = at_place;
         for _ in 0..INTERVAL_ROUNDS {
