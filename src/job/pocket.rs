@@ -55,11 +55,17 @@ pub fn pocket_figures(
         max_engagement_error_bound_deg: engagement_bound.to_degrees(),
         max_engagement_move: engaged.max_move,
         p95_engagement_deg: engaged.p95.to_degrees(),
-        engagement_limit_deg: strategy.engagement_limit(step, cutter.radius()).to_degrees(),
+        engagement_limit_deg: as_asked(strategy.engagement_limit(step, cutter.radius())),
         over_engagement_limit_fraction: engaged.over_limit,
         over_engagement_limit: listed(exceeding, path),
         over_engagement_limit_count: exceeding.len(),
     })
+}
+
+/// An angle, rad, in the degrees that it was asked in, without what turning them over rounds.
+fn as_asked(angle: f64) -> f64 {
+    const DECIMALS: f64 = 1e9;
+    (angle.to_degrees() * DECIMALS).round() / DECIMALS
 }
 
 /// The longest stretches, the longest first.

@@ -18,7 +18,7 @@
 //! Moves are taken in blocks, one after the other. What was cleared well before a block and lies whole in what else was is left
 //! out from then on: loops and passes over cleared ground are most of a long path.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::LazyLock;
 
 use cutter::Cutter;
@@ -369,13 +369,23 @@ impl<'a> Swept<'a> {
     fn looked_at(&self, stretches: &[Stretch], near: &[u32]) -> Vec<Looked> {
         let Some(first) = stretches.first() else { return Vec::new() };
         let together = ((0.5 * SHORT * self.radius / first.half) as usize).max(1);
+        // One stretch begins where another one ends.
+        let mut last: Option<(f64, f64)> = None;
         let parts = stretches.chunks(together).flat_map(|part| {
             let (most, near) = self.deciding(&Stretch::over(part), near);
-            part.iter().filter(move |_| most > 0.0).map(move |stretch| {
+            let part = if most > 0.0 { part } else { &[] };
+            let looked_at = part.iter().map(|stretch| {
                 let (most, deciding) = self.deciding(stretch, &near);
-                let ends = [-stretch.half, stretch.half].map(|by| self.at(stretch, by, &deciding));
+                let begin = stretch.gone - stretch.half;
+                let known = last.filter(|(gone, _)| (gone - begin).abs() < TOUCHING * self.radius);
+                let ends = [
+                    known.map_or_else(|| self.at(stretch, -stretch.half, &deciding), |(_, angle)| angle),
+                    self.at(stretch, stretch.half, &deciding),
+                ];
+                last = Some((stretch.gone + stretch.half, ends[1]));
                 Looked { stretch: *stretch, found: ends[0].max(ends[1]), most, deciding }
-            })
+            });
+            looked_at.collect::<Vec<Looked>>()
         });
         parts.collect()
     }
@@ -492,16 +502,24 @@ struct Front {
     parts: Vec<Vector2>,
     /// How far a part reaches from its middle, mm.
     reach: f64,
+    /// Where the first arc begins and the last one ends, and how far to the left that is, mm.
+    span: Option<[f64; 2]>,
+    across: [f64; 2],
+    /// Room for angles.
+    angles: Vec<f64>,
 }
 
 impl Front {
     fn new(rim: f64) -> Self {
-        let standing = vec![[-FRAC_PI_2, FRAC_PI_2]];
+        let whole = [-FRAC_PI_2, FRAC_PI_2];
         Self {
             rim,
-            standing,
+            standing: vec![whole],
             parts: part_middles().map(|middle| middle * rim).collect(),
             reach: 0.5 * PART * rim,
+            span: Some(whole),
+            across: [-rim, rim],
+            angles: Vec::new(),
         }
     }
 
@@ -511,6 +529,8 @@ impl Front {
 
     /// Forgets parts in which nothing stands any more.
     fn divide(&mut self) {
+        self.span = self.standing.first().zip(self.standing.last()).map(|(first, last)| [first[0], last[1]]);
+        self.across = self.span.unwrap_or_default().map(|angle| self.at(angle).y);
         self.parts.clear();
         for (k, middle) in part_middles().enumerate() {
             let [from, to] = [k, k + 1].map(|k| k as f64 * PART - FRAC_PI_2);
@@ -537,30 +557,33 @@ impl Front {
             return false;
         }
         let ahead = ends.map(|end| end - Vector2::new(half, 0.0));
-        let mut angles = self.crossings(&behind, radius);
+        let mut angles = std::mem::take(&mut self.angles);
+        self.crossings(&behind, radius, &mut angles);
         if half > 0.0 {
-            angles.extend(self.crossings(&ahead, radius));
+            self.crossings(&ahead, radius, &mut angles);
         }
-        let clears =
-            |p: Vector2| [behind, ahead].iter().all(|ends| square_distance(&p, ends) < radius * radius);
-        angles.sort_by(f64::total_cmp);
-        let Some(&first) = angles.first() else {
-            let all = clears(self.at(0.0));
-            if all {
-                self.standing.clear();
-            }
-            return all;
-        };
+        let square = radius * radius;
+        let clears = |p: Vector2| [behind, ahead].iter().all(|ends| square_distance(&p, ends) < square);
+        let taken = self.clear_between(&mut angles, |front, angle| clears(front.at(angle)));
+        self.angles = angles;
+        taken
+    }
+
+    /// Clears arcs between some angles, which are sorted and forgotten, where `clears` holds of their middles; whether any of it
+    /// was standing.
+    fn clear_between(&mut self, angles: &mut Vec<f64>, clears: impl Fn(&Self, f64) -> bool) -> bool {
+        let Some([begin, end]) = self.span else { return false };
+        angles.extend([begin, end]);
+        angles.sort_unstable_by(f64::total_cmp);
         let mut taken = false;
-        for k in 0..angles.len() {
-            let (from, to) = (angles[k], angles.get(k + 1).copied().unwrap_or(first + TAU));
-            // Angles begin at -π: only what goes on from the last to the first reaches the front from behind.
-            let turns = if to > PI { &[-TAU, 0.0][..] } else { &[0.0] };
-            let stands = |turn: &f64| self.stands_between(from + turn, to + turn);
-            if turns.iter().any(stands) && clears(self.at(0.5 * (from + to))) {
-                turns.iter().for_each(|turn| taken |= self.take(from + turn, to + turn));
+        for arc in angles.windows(2) {
+            let (from, to) = (arc[0], arc[1]);
+            if self.stands_between(from, to) && clears(self, 0.5 * (from + to)) {
+                self.take(from, to);
+                taken = true;
             }
         }
+        angles.clear();
         if taken {
             self.divide();
         }
@@ -580,33 +603,16 @@ impl Front {
             .iter()
             .map(|k| region.sides().segments()[*k as usize].ends.map(|p| stretch.seen(&p)))
             .collect();
-        let mut angles: Vec<f64> = sides.iter().flat_map(|side| self.crossings(side, depth.abs())).collect();
-        angles.sort_by(f64::total_cmp);
-        let clears = |angle: f64| {
-            let seen = self.at(angle);
-            let (along, left) = (stretch.heading, Vector2::new(-stretch.heading.y, stretch.heading.x));
+        let mut angles = Vec::new();
+        sides.iter().for_each(|side| self.crossings(side, depth.abs(), &mut angles));
+        let (along, left) = (stretch.heading, Vector2::new(-stretch.heading.y, stretch.heading.x));
+        self.clear_between(&mut angles, |front, angle| {
+            let seen = front.at(angle);
             let away = sides.iter().map(|side| square_distance(&seen, side)).fold(f64::INFINITY, f64::min);
             let away = away.sqrt();
             let inside = region.contains(&(middle + along * seen.x + left * seen.y));
             if inside { away >= depth } else { -away >= depth }
-        };
-        let Some(&first) = angles.first() else {
-            if clears(0.0) {
-                self.standing.clear();
-            }
-            return;
-        };
-        let mut cleared = Vec::new();
-        for k in 0..angles.len() {
-            let (from, to) = (angles[k], angles.get(k + 1).copied().unwrap_or(first + TAU));
-            if clears(0.5 * (from + to)) {
-                cleared.extend([-TAU, 0.0, TAU].map(|turn| [from + turn, to + turn]));
-            }
-        }
-        for [from, to] in cleared {
-            self.take(from, to);
-        }
-        self.divide();
+        });
     }
 
     /// Whether a segment is near enough to clear any part.
@@ -615,20 +621,20 @@ impl Front {
         self.parts.iter().any(|middle| square_distance(middle, ends) < square)
     }
 
-    /// Where the circle crosses the border of the stadium around a segment, each from -π to π.
-    fn crossings(&self, ends: &[Vector2; 2], radius: f64) -> Vec<f64> {
+    /// Adds the angles where the circle crosses the border of the stadium around a segment, of those between the ends of what stands.
+    fn crossings(&self, ends: &[Vector2; 2], radius: f64, found: &mut Vec<f64>) {
         let along = ends[1] - ends[0];
         let square = along.norm_squared();
         let share = |p: &Vector2| (p - ends[0]).dot(&along);
-        let mut found = Vec::with_capacity(4);
         // Both places of the circle whose share along a direction is `off`.
         let mut across = |direction: &Vector2, off: f64, valid: &dyn Fn(f64) -> bool| {
             let beside = self.rim * self.rim - off * off;
             if beside >= 0.0 {
                 let (middle, aside) =
                     (direction * off, Vector2::new(-direction.y, direction.x) * beside.sqrt());
+                let stands = |p: &Vector2| p.x >= 0.0 && p.y > self.across[0] && p.y < self.across[1];
                 let both = [middle - aside, middle + aside].into_iter();
-                found.extend(both.filter(|p| valid(share(p))).map(|p| p.y.atan2(p.x)));
+                found.extend(both.filter(|p| stands(p) && valid(share(p))).map(|p| p.y.atan2(p.x)));
             }
         };
         for (k, end) in ends.iter().enumerate() {
@@ -646,21 +652,13 @@ impl Front {
                 across(&beside, beside.dot(&ends[0]) + side, &|share| share > 0.0 && share < square);
             }
         }
-        found
     }
 
-    /// Takes an arc away; whether any of it was standing.
-    fn take(&mut self, from: f64, to: f64) -> bool {
-        if self.standing.iter().all(|[a, b]| to <= *a || from >= *b) {
-            return false;
-        }
-        let mut left = Vec::with_capacity(self.standing.len() + 1);
-        for &[a, b] in &self.standing {
-            let parts = [[a, b.min(from)], [a.max(to), b]];
-            left.extend(parts.into_iter().filter(|[a, b]| b - a > ROUNDING));
-        }
-        self.standing = left;
-        true
+    /// Takes an arc away.
+    fn take(&mut self, from: f64, to: f64) {
+        let whole = std::mem::take(&mut self.standing);
+        let left = whole.iter().flat_map(|&[a, b]| [[a, b.min(from)], [a.max(to), b]]);
+        self.standing = left.filter(|[a, b]| b - a > ROUNDING).collect();
     }
 }
 

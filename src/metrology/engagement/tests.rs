@@ -1,3 +1,5 @@
+use std::f64::consts::TAU;
+
 use super::*;
 use geometry::{Aabb, Point3, Region};
 use motion::ClPoint;

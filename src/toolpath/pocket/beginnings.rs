@@ -86,6 +86,14 @@ impl Beginnings {
         }
     }
 
+    /// Forgets a place and those that are the same: every pass that began there has it, too.
+    pub fn forget_alike(&mut self, k: usize) {
+        let (at, heading) = (self.all[k].at, self.all[k].heading);
+        let cell = self.cells.get(&self.cell(&at)).cloned().unwrap_or_default();
+        let alike = |k: &usize| self.all[*k].at == at && self.all[*k].heading == heading;
+        cell.into_iter().filter(alike).collect::<Vec<usize>>().into_iter().for_each(|k| self.forget(k));
+    }
+
     /// Whether a place has stock, which `ask` finds out where it may have changed.
     pub fn has_stock(&mut self, k: usize, ask: impl FnOnce(&Beginning) -> bool) -> bool {
         let place = &self.all[k];
@@ -162,6 +170,22 @@ mod tests {
             places.forget(found);
         }
         assert_eq!(places.nearest(&Point2::origin()), None);
+    }
+
+    /// Of places at one point only those with the same heading go together.
+    #[test]
+    fn places_that_are_the_same_are_forgotten_together() {
+        let mut places = Beginnings::new(1.0);
+        let (at, x, y) = (Point2::new(0.5, 0.5), Vector2::new(1.0, 0.0), Vector2::new(0.0, 1.0));
+        for (index, heading) in [x, y, x, x].into_iter().enumerate() {
+            places.push(index, at, heading);
+            places.pass_done(&[at]);
+        }
+        places.push(4, at + x * 1e-9, x);
+        places.forget_alike(2);
+        let forgotten: Vec<bool> = places.all.iter().map(|place| place.forgotten).collect();
+        assert_eq!(forgotten, [true, false, true, true, false]);
+        assert_eq!(places.left, 2);
     }
 
     /// A place is asked again after something was cleared near to it, and not before.

@@ -23,7 +23,7 @@ const ROUNDING: f64 = 1e-7;
 
 /// Between two places the angle may exceed the limit by so much, rad, which limits of plans have to spare; and so many parts
 /// of a move are looked at where that is not sure.
-const BETWEEN: f64 = 0.012;
+pub(super) const BETWEEN: f64 = 0.012;
 const BETWEEN_PLACES: usize = 8;
 
 /// Parts of the front half circle that are told apart.
@@ -34,7 +34,7 @@ const PART: f64 = PI / PARTS as f64;
 const MAX_SIDE: f64 = 1024.0;
 
 /// Queries so near to each other, over the radius, share one list of discs.
-const NEIGHBOURS: f64 = 0.3;
+const NEIGHBOURS: f64 = 0.2;
 
 /// Parts of the circumference for which such a list is made.
 const SECTORS: usize = 32;
@@ -63,6 +63,8 @@ pub(super) struct Cleared {
     near: RefCell<Near>,
     /// So many of the first discs were looked at when the ground was thinned.
     thinned: usize,
+    /// A part of the rim of each of them that no other covered then.
+    bare: Vec<u32>,
     /// Buckets to which discs were added since the ground was thinned.
     fresh: Vec<bool>,
     /// Where angles count as greater.
@@ -103,6 +105,7 @@ impl Cleared {
             best,
             near,
             thinned: 0,
+            bare: Vec::new(),
             fresh,
             gentle: Vec::new(),
         }
@@ -144,6 +147,7 @@ impl Cleared {
             near.reach = 0.0;
         }
         self.thinned = self.thinned.min(count);
+        self.bare.truncate(count);
         while self.discs.len() > count {
             if let Some(p) = self.discs.pop() {
                 let bucket = self.bucket_of(&p);
@@ -162,30 +166,32 @@ impl Cleared {
         let count = count.min(self.discs.len());
         let mut keep = vec![true; self.discs.len()];
         let changed = self.changed();
+        self.bare.resize(self.discs.len(), 0);
         for k in 0..count {
             let centre = self.discs[k];
             if !changed[self.bucket_of(&centre)] {
                 continue;
             }
+            let rim_of = |first: usize| {
+                let mut rim = Rim::default();
+                self.each_near(&centre, self.radius, first, |other| {
+                    let to = (self.discs[other] - centre) / self.radius;
+                    if other < count && other != k && keep[other] && to.norm_squared() <= 1.0 {
+                        rim.cover(&to);
+                    }
+                    !rim.is_covered()
+                });
+                rim
+            };
             // What was not covered before is only where something was added.
-            let (mut rim, mut near, mut added) = (Rim::default(), Vec::new(), k >= self.thinned);
-            self.each_near(&centre, self.radius, |other| {
-                let to = (self.discs[other] - centre) / self.radius;
-                if other < count && other != k && keep[other] && to.norm_squared() <= 1.0 {
-                    added |= other >= self.thinned;
-                    near.push(to);
-                }
-            });
-            if added {
-                near.iter()
-                    .take_while(|to| {
-                        rim.cover(to);
-                        !rim.is_covered()
-                    })
-                    .for_each(drop);
+            if k >= self.thinned || rim_of(self.thinned).covers(self.bare[k]) {
+                let rim = rim_of(0);
                 keep[k] = !rim.is_covered();
+                self.bare[k] = rim.first_bare();
             }
         }
+        let bare = std::mem::take(&mut self.bare);
+        self.bare = bare.into_iter().zip(&keep).filter(|(_, keep)| **keep).map(|(bare, _)| bare).collect();
         let kept: Vec<Point2> =
             self.discs.iter().zip(&keep).filter(|(_, keep)| **keep).map(|(p, _)| *p).collect();
         let left_out = self.discs.len() - kept.len();
@@ -216,13 +222,17 @@ impl Cleared {
         changed
     }
 
-    /// The discs whose centres may be within `reach` of a place, by bucket.
-    fn each_near(&self, place: &Point2, reach: f64, mut tell: impl FnMut(usize)) {
+    /// The discs from `first` on whose centres may be within `reach` of a place, by bucket, the last first, as long as `tell` wants
+    /// more.
+    fn each_near(&self, place: &Point2, reach: f64, first: usize, mut tell: impl FnMut(usize) -> bool) {
         let reach = Vector2::new(reach, reach);
         let (lo, hi) = (place - reach - self.origin, place + reach - self.origin);
         for j in self.column(1, lo.y)..=self.column(1, hi.y) {
             for i in self.column(0, lo.x)..=self.column(0, hi.x) {
-                self.buckets[j * self.side[0] + i].iter().for_each(|&k| tell(k as usize));
+                let bucket = self.buckets[j * self.side[0] + i].iter().rev().map(|&k| k as usize);
+                if !bucket.take_while(|&k| k >= first).all(&mut tell) {
+                    return;
+                }
             }
         }
     }
@@ -259,7 +269,7 @@ impl Cleared {
         let at = |k: usize| from + along * (k as f64 / BETWEEN_PLACES as f64);
         let middle = at(BETWEEN_PLACES / 2);
         self.counted(&middle, self.front(&middle, &heading, 0.5 * length, fresh).angle()) <= most
-            || (1..BETWEEN_PLACES).all(|k| self.arc(&at(k), &heading, fresh) <= most)
+            || (0..BETWEEN_PLACES).all(|k| self.arc(&at(k), &heading, fresh) <= most)
     }
 
     fn front(&self, centre: &Point2, heading: &Vector2, half: f64, fresh: usize) -> Arc {
@@ -331,12 +341,13 @@ impl Cleared {
         }
         near.discs.clear();
         let most = 2.0 * self.radius + off;
-        self.each_near(anchor, most, |k| {
+        self.each_near(anchor, most, 0, |k| {
             if (self.discs[k] - anchor).norm_squared() < most * most {
                 near.discs.push(k as u32);
             }
+            true
         });
-        for k in near.discs.iter().rev() {
+        for k in near.discs.iter() {
             if keep(*k, &mut near.keepers) == 0 {
                 break;
             }
@@ -472,6 +483,15 @@ struct Rim(u64);
 impl Rim {
     fn is_covered(&self) -> bool {
         self.0 == u64::MAX
+    }
+
+    fn covers(&self, part: u32) -> bool {
+        self.0 >> part & 1 == 1
+    }
+
+    /// The first part that is not covered; any where all are.
+    fn first_bare(&self) -> u32 {
+        self.0.trailing_ones() % 64
     }
 
     /// Covers the parts that an equal disc does whose middle lies at `to`, over the radius.

@@ -55,9 +55,9 @@ const REACH: f64 = 0.95;
 /// Longest move over the cutter's radius: feeds and engagement belong to moves.
 const MOVE_OVER_RADIUS: f64 = 0.5;
 
-/// Sides that are left out turn from the one instead by this much at most where the engagement is bounded,
-/// rad: it adds to the angle ahead.
-const MOST_TURN: f64 = 0.03;
+/// Sides that are left out turn from the one instead by this much at most where the engagement is bounded, rad: it adds to the angle
+/// ahead. With what the angle may have more between two places it is what plans have to spare.
+const MOST_TURN: f64 = strategy::SPARE - cleared::BETWEEN;
 
 /// Sides of spirals and links over the stepover.
 const SPACING: f64 = 0.25;

@@ -20,7 +20,7 @@ use geometry::{Point2, Vector2};
 use work::monitor::{Cancelled, Monitor, check};
 
 /// Sharpest turn into the stock: its radius over the cutter's.
-const INTO: f64 = 0.5;
+const INTO: f64 = 0.4;
 
 /// Greatest turn away from the stock in one step, rad.
 const AWAY: f64 = 0.25;
@@ -30,9 +30,6 @@ const SHORTEST: f64 = 0.02;
 
 /// A turn that comes so near to the limit, rad, is as good as the one that reaches it.
 const NEAR: f64 = 0.006;
-
-/// Beyond the wanted angle by no more than this, rad, the border of the stock is taken for straight.
-const STRAIGHT: f64 = 0.02;
 
 /// Steps that had to be made shorter keep so far below the limit, rad: there the stock begins or ends, and the angle changes fast.
 const CORNERS: f64 = 0.01;
@@ -78,7 +75,7 @@ enum Came {
     Through,
     /// It cut next to nothing, or ended soon without care, and nothing changed.
     Stopped,
-    /// It met no stock, and nothing changed.
+    /// It cut next to nothing and never turned into stock, so that with care it would be the same, and nothing changed.
     ToNothing,
 }
 
@@ -137,13 +134,13 @@ impl<'a> Peeler<'a> {
             check(monitor)?;
             self.careful = false;
             let mut came = self.pass(k, monitor)?;
-            // Care changes steps that cut, and those alone.
+            // Care changes steps that turn into stock, and those alone.
             if came == Came::Stopped {
                 self.careful = true;
                 came = self.pass(k, monitor)?;
             }
             if came != Came::Through {
-                self.places.forget(k);
+                self.places.forget_alike(k);
             }
         }
         Ok(())
@@ -232,6 +229,17 @@ impl<'a> Peeler<'a> {
         link
     }
 
+    /// How many places of earlier passes are beside the chip of one that began here and has `gone` so far, mm, after a straight link.
+    fn recent(&self, begin: &Point2, gone: f64) -> usize {
+        let mut left = FRESH * self.radius - gone - self.out.last().map_or(0.0, |end| (begin - end).norm());
+        let back = self.out.windows(2).rev().map(|w| (w[1] - w[0]).norm());
+        back.take_while(|length| {
+            left -= length;
+            left > 0.0
+        })
+        .count()
+    }
+
     /// One pass from a place.
     fn pass(&mut self, place: usize, monitor: &dyn Monitor) -> Result<Came, Cancelled> {
         let Beginning { at: begin, heading, .. } = *self.places.get(place);
@@ -249,6 +257,9 @@ impl<'a> Peeler<'a> {
             // Places of the way from here on are the last ones that were cleared.
             let settled = lengths.partition_point(|l| *l < gone - FRESH * self.radius);
             let mut fresh = self.cleared.len() - (way.len() - settled.max(1));
+            if settled == 0 {
+                fresh -= self.recent(&begin, gone).min(fresh);
+            }
             if gone >= SOON * self.radius && settled <= last_cut && self.cleared.len() >= self.thin_at {
                 if link.is_none() {
                     link = Some(self.link_to(place, before));
@@ -279,9 +290,10 @@ impl<'a> Peeler<'a> {
             step = full.min(2.0 * step);
         }
         let soon = stuck && gone < SOON * self.radius;
-        if cut < LEAST_CUT * self.radius || (soon && !self.careful) {
+        let turned = way.iter().any(|step| step.arc > 0.0 && step.turn < 0.0);
+        if cut < LEAST_CUT * self.radius || (soon && turned && !self.careful) {
             self.cleared.truncate(before);
-            return Ok(if cut == 0.0 && !stuck { Came::ToNothing } else { Came::Stopped });
+            return Ok(if turned { Came::Stopped } else { Came::ToNothing });
         }
         // What was gone without cutting is not gone in the end; it may have taken films away.
         self.cleared.truncate(self.cleared.len() - (way.len() - last_cut));
@@ -298,7 +310,7 @@ impl<'a> Peeler<'a> {
     /// Leaves out what the first `count` places of the ground cover of each other, from time to time; how many those were.
     fn thin(&mut self, count: usize) -> usize {
         /// Fewer are no matter.
-        const FEW: usize = 150;
+        const FEW: usize = 60;
         if self.cleared.len() < self.thin_at {
             return 0;
         }
@@ -335,68 +347,57 @@ impl<'a> Peeler<'a> {
         let keeps =
             |found: &Step| found.arc <= limit && self.cleared.keeps(&from.to, &found.to, limit, fresh);
         // Over cleared ground the tool turns as far as it may.
-        let mut sharpest = None;
+        let mut far = None;
         if from.arc == 0.0 {
             let found = tried(most);
             if keeps(&found) {
                 return Some(found);
             }
-            sharpest = Some(found);
+            far = Some(found);
         }
-        let mut turn = from.turn.clamp(0.8 * most, 0.8 * AWAY);
+        let goal = limit - 0.5 * NEAR;
+        // The angle grows by the turn, and as the tool comes nearer to the border of the stock, which is as far off as the way.
+        let by_growth = |found: &Step| {
+            let growth = 1.0 + (step / self.radius + found.turn).max(0.0) / limit.sin();
+            found.turn + (found.arc - goal) / growth
+        };
         // Mostly the turn of the step before is as good as any, but in corners.
-        let first = tried(turn);
-        let good = |found: &Step| found.arc > limit - NEAR && keeps(found);
-        if full && good(&first) {
-            return Some(first);
+        let mut turn = match &far {
+            Some(far) if far.arc.is_finite() => by_growth(far),
+            _ => from.turn,
         }
-        // Little off, the angle along a straight border leads to one: it grows by the turn, and as the tool comes nearer.
-        let off = first.arc - limit + 0.5 * NEAR;
-        if full && first.arc > 0.0 && off.abs() < STRAIGHT {
-            let growth = 1.0 + step / (self.radius * limit.sin());
-            let second = tried((turn + off / growth).clamp(most, AWAY));
-            if good(&second) {
-                return Some(second);
-            }
-        }
-        // Where that turn is too much, so is a greater one.
-        let mut far = Step { arc: f64::INFINITY, turn: most, ..first };
-        if first.arc <= limit {
-            far = sharpest.unwrap_or_else(|| tried(most));
-            if sharpest.is_none() && keeps(&far) {
-                return Some(far);
-            }
-        }
+        .clamp(0.8 * most, 0.8 * AWAY);
         let mut best: Option<Step> = None;
         for trial in 0..TRIALS {
-            let found = if trial == 0 { first } else { tried(turn) };
+            let found = tried(turn);
             if found.arc <= limit {
-                best = Some(found)
-            } else {
-                far = found
-            }
-            match best {
-                None => {
-                    if turn >= AWAY {
-                        return None;
-                    }
-                    turn = (turn + 0.06).max(0.5 * (turn + AWAY)).min(AWAY);
-                    if AWAY - turn < 0.02 {
-                        turn = AWAY;
-                    }
+                best = Some(found);
+                if found.arc > limit - NEAR || turn <= most {
+                    break;
                 }
-                Some(near) => {
-                    if near.arc > limit - NEAR || near.turn - far.turn < 0.003 {
-                        break;
-                    }
+            } else {
+                far = Some(found);
+            }
+            turn = match (&best, &far) {
+                (Some(near), Some(far)) if near.turn - far.turn < 0.003 => break,
+                (Some(near), Some(far)) => {
                     let share = if far.arc.is_finite() && near.arc > 0.0 {
-                        ((limit - 0.5 * NEAR - near.arc) / (far.arc - near.arc)).clamp(0.1, 0.9)
+                        ((goal - near.arc) / (far.arc - near.arc)).clamp(0.1, 0.9)
                     } else {
                         0.5
                     };
-                    turn = near.turn + (far.turn - near.turn) * share;
+                    near.turn + (far.turn - near.turn) * share
                 }
-            }
+                (Some(near), None) if trial == 0 && near.arc > 0.0 => by_growth(near).max(most),
+                // Where that turn is too much, so is a greater one.
+                (Some(_), None) => most,
+                (None, _) if turn >= AWAY => return None,
+                (None, Some(far)) if trial == 0 && far.arc.is_finite() => by_growth(far).min(AWAY),
+                (None, _) => {
+                    let next = (turn + 0.06).max(0.5 * (turn + AWAY)).min(AWAY);
+                    if AWAY - next < 0.02 { AWAY } else { next }
+                }
+            };
         }
         best.filter(keeps)
     }

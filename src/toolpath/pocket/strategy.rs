@@ -51,6 +51,11 @@ impl Pattern {
     }
 }
 
+/// Planned for less by this, rad, which is what sides of polylines, films and the parts in which angles are told apart add.
+/// Loops alone, whose sides turn, need more.
+pub(super) const SPARE: f64 = 0.025;
+const SPARE_OF_LOOPS: f64 = 0.04;
+
 /// How deep the last passes along the walls go at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum WallFinish {
@@ -337,10 +342,6 @@ impl PocketStrategy {
 
     /// Angle of the cutter in stock, rad, that passes are planned within, if they are.
     pub(super) fn bounded(&self) -> Option<f64> {
-        /// Planned for less by this, rad, which is what sides of polylines, films and the parts in which
-        /// angles are told apart add. Loops alone, whose sides turn, need more.
-        const SPARE: f64 = 0.025;
-        const SPARE_OF_LOOPS: f64 = 0.04;
         let spare = if self.pattern.peels() { SPARE } else { SPARE_OF_LOOPS };
         self.engagement.filter(|angle| *angle < std::f64::consts::PI).map(|angle| angle - spare)
     }
