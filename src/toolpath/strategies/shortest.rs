@@ -11,7 +11,7 @@
 //! least time. By length, both have a small price of their own, and the shortest passes are taken.
 //!
 //! The fronts of iso-scallop passes are among the starts. Where their own passes are still better than those of all functions found, they are
-//! taken, and named so.
+//! taken, and named so. Closed passes one inside the other are joined to spirals where that is quicker than links ([`spirals`]).
 //!
 //! Enters: a part and the scallop height. Leaves: passes. Lengths in mm.
 
@@ -25,7 +25,7 @@ use super::iso_scallop::{along_front, border_name, fronts, places};
 use super::mesh_passes::{self, Aim};
 use super::stream_search::{Found, Prices, Search};
 use crate::levels::level_passes::{along_earlier, along_levels};
-use crate::levels::{obedience, planned_field};
+use crate::levels::{obedience, planned_field, spirals};
 use crate::strategies::iso_scallop::FrontStart;
 use crate::surface::chart::Chart;
 use crate::surface::feed;
@@ -109,6 +109,14 @@ impl Objective {
     /// Its words in scenes.
     pub(super) const WORDS: [(&str, Self); 2] = [("time", Self::Time), ("length", Self::Length)];
 
+    /// What passes have of it.
+    pub(super) fn worth(self, task: &Task<'_>, passes: &Passes) -> Result<f64, PlanError> {
+        match self {
+            Self::Time => (task.pace.duration)(passes),
+            Self::Length => Ok(passes.length()),
+        }
+    }
+
     /// What the user is told of passes along the best function.
     pub(super) fn told(self) -> &'static str {
         match self {
@@ -124,8 +132,7 @@ pub struct ShortestStreamline {
     /// A direction to keep to, and how much dearer a mm of pass square to it is, in mm: 0 leaves all freedom, a great number
     /// none.
     pub toward: Option<(FeedDirection, f64)>,
-    /// What the best path has the least of; with a direction, closeness to it comes first, and passes on meshes have one function, of
-    /// the least length.
+    /// What the best path has the least of; with a direction, closeness to it comes first.
     pub objective: Objective,
 }
 
@@ -146,7 +153,7 @@ impl Strategy for ShortestStreamline {
     fn passes(&self, task: &Task<'_>) -> Result<Passes, PlanError> {
         let toward = self.toward.as_ref().map(|(direction, dearer)| (direction, *dearer));
         if self.on_facets(task) {
-            mesh_passes::on_mesh(task, Aim::Shortest(toward))
+            mesh_passes::on_mesh(task, Aim::Shortest(toward, self.objective))
         } else {
             passes(task, toward, self.objective)
         }
@@ -212,9 +219,14 @@ pub(super) fn on_chart(
     toward: Option<(&FeedDirection, f64)>,
     objective: Objective,
 ) -> Result<Passes, PlanError> {
-    match task.earlier_on_chart(k, of) {
-        Some((field, levelled)) => along_earlier(task, chart, field, levelled),
-        None => searched(task, chart, toward, objective),
+    let passes = match task.earlier_on_chart(k, of) {
+        Some((field, levelled)) => along_earlier(task, chart, field, levelled)?,
+        None => searched(task, chart, toward, objective)?,
+    };
+    if toward.is_none() && objective == Objective::Time {
+        spirals::where_quicker(task, passes)
+    } else {
+        Ok(passes)
     }
 }
 
@@ -242,14 +254,10 @@ fn searched(
     let mut found = search.run()?;
     // With a direction to keep to, the best comes first: a shorter path may be one that leaves the direction.
     found.truncate(if toward.is_some() { 1 } else { found.len() });
-    let worth = |passes: &Passes| match objective {
-        Objective::Time => (pace.duration)(passes),
-        Objective::Length => Ok(passes.length()),
-    };
     let mut best: Option<(f64, Passes, Levelled)> = None;
     for Found { function, length, along } in found {
         let passes = along_levels(task, chart, &function)?;
-        let its = worth(&passes)?;
+        let its = objective.worth(task, &passes)?;
         if best.as_ref().is_none_or(|(least, ..)| its < *least) {
             let planned_as = along.map_or(Cow::Borrowed(SEARCHED), |border| {
                 format!("{SEARCHED} from the front that starts {}", border_name(border)).into()
@@ -265,7 +273,7 @@ fn searched(
     let tried = fronts.len();
     if let Some(front) = fronts.into_iter().next() {
         let front = along_front(task, chart, front, tried)?;
-        if !front.passes.is_empty() && worth(&front)? < least {
+        if !front.passes.is_empty() && objective.worth(task, &front)? < least {
             return Ok(front);
         }
     }
