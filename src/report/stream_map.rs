@@ -134,7 +134,8 @@ mod tests {
         };
         let (low, high) = (at(Point2::new(10.0, 0.0), 2.0), at(Point2::new(10.0, 10.0), 4.0));
         let apart = |a: [u8; 3], b: [u8; 3]| (0..3).map(|k| a[k].abs_diff(b[k])).max().unwrap();
-        assert!(apart(low, sequential(0.0)) < 30 && apart(high, sequential(1.0)) < 30, "{low:?} {high:?}");
+        // Lines are smooth at their edges, and colours are those of the middle of a share.
+        assert!(apart(low, sequential(0.0)) < 45 && apart(high, sequential(1.0)) < 45, "{low:?} {high:?}");
         // As high above it as the rise and the slant say.
         let [a, b] = [view.place(Point2::new(0.0, 0.0), 2.0), view.place(Point2::new(0.0, 10.0), 4.0)];
         assert!((a[1] - b[1] - view.scale * (10.0 * UP_BY_Y + 20.0 * RISE)).abs() < 1e-9);

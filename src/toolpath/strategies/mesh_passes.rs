@@ -21,8 +21,8 @@ use crate::vocabulary::{
 };
 use cutter::Cutter;
 use drop_cutter::DropCutter;
-use field::Packed;
-use field::mesh::{Bend, Held, Line, MeshCurve, MeshPoint, Wanted};
+use field::mesh::{Bend, Held, Line, MeshCurve, MeshPoint, Sense, Wanted};
+use field::{DIRECTION_WEIGHT, Packed};
 use geometry::{Point2, Point3, Vector2, Vector3};
 use scallop::strip_width_at;
 use work::monitor::{Cancelled, Monitor};
@@ -121,7 +121,13 @@ fn on_piece(
                 Ok::<_, PlanError>(lines.iter().zip(&matters).map(pull).collect::<Vec<_>>())
             });
             let lines = lines.transpose()?;
-            let found = shortest_streams(surface, task, lines.as_deref(), objective)?;
+            let quickest = toward.is_none() && objective == Objective::Time;
+            let around = quickest.then(|| along_borders(task, piece, surface)).flatten();
+            let mut found = shortest_streams(surface, task, lines.as_deref(), around, objective)?;
+            if quickest {
+                // What the least length promises may still take less time.
+                found.extend(shortest_streams(surface, task, None, None, Objective::Length)?);
+            }
             let levelled = |found: Packed| {
                 let length = found.cost - found.turning + found.ends;
                 let told = toward.is_none().then(|| (objective.told().to_owned(), length));
@@ -148,6 +154,18 @@ fn on_piece(
     };
     all.append(best);
     Ok(all)
+}
+
+/// A function whose levels run along the borders of a piece with a hole, around which they close; `None` without a hole.
+fn along_borders(task: &Task<'_>, piece: &ConnectedPiece, surface: &MeshSurface) -> Option<Vec<f64>> {
+    if piece.mesh.loops().len() < 2 {
+        return None;
+    }
+    let direction = FeedDirection::Border(Sense::Along);
+    let wanted = feed::on_mesh(task.part, task.cutter, &direction, piece, surface).ok()?;
+    let mut unused = Passes::default();
+    let (lines, matters) = feed_lines(task, &direction, piece, surface, &wanted, &mut unused).ok()?;
+    along_lines(task, (&lines, &matters), DIRECTION_WEIGHT, surface, &mut unused).ok()
 }
 
 /// Passes along the lines of a function.
@@ -509,7 +527,13 @@ impl LevelSource for MeshGuide<'_> {
             self.drop.at(at.x, at.y).map(|drop| Point3::new(at.x, at.y, drop.tip_z))
         };
         let settings = PassSettings { sampling: 1.0, ..*self.settings };
-        let moves = settings.moves(first as f64, end as f64, &mut tip, self.monitor)?;
+        let mut moves = settings.moves(first as f64, end as f64, &mut tip, self.monitor)?;
+        if curve.closed && run.is_none() && moves.len() > 1 {
+            // It comes back to within rounding.
+            let begin = moves[0];
+            moves.pop();
+            moves.push(begin);
+        }
         Ok(if moves.len() > 1 { vec![moves] } else { Vec::new() })
     }
 }

@@ -35,7 +35,8 @@ const BEND: f64 = 0.3;
 const STRIP_SHARE: f64 = 0.02;
 
 /// ψ at the vertices, and what its passes cost: of the shortest passes, or the few that promise the least time, the most promising
-/// first. `toward` has at each vertex a direction and how much dearer passes square to it are.
+/// first. `toward` has at each vertex a direction and how much dearer passes square to it are; `further` is a start besides straight
+/// passes.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -43,6 +44,7 @@ pub(crate) fn shortest_streams(
     surface: &MeshSurface,
     task: &Task<'_>,
     toward: Option<&[(Vector3, f64)]>,
+    further: Option<Vec<f64>>,
     objective: Objective,
 ) -> Result<Vec<Packed>, Cancelled> {
     let Task { cutter, ref settings, ref pace, monitor, .. } = *task;
@@ -94,18 +96,19 @@ pub(crate) fn shortest_streams(
     let density = kept.iter().map(|site| site.area * site.front.mean_slowness()).sum::<f64>() / area;
     let roughness = roughness(surface, cutter, density);
     let most = if prices.end > 0.0 { MOST_PLANNED } else { 1 };
-    monitor.start("searching directions", (STARTS + most) as u64);
+    monitor.start("searching directions", (STARTS + usize::from(further.is_some()) + most) as u64);
     let minimise = |start: Vec<f64>, rounds: Rounds| {
         let found = minimise_priced(&kept, &gradients, &roughness, prices.end, start, rounds, monitor);
         monitor.advance(1);
         found
     };
-    let straight = parallel::try_map(STARTS, |k| {
+    let straight = |k: usize| -> Vec<f64> {
         let (sin, cos) = (PI * k as f64 / STARTS as f64).sin_cos();
-        let start = mesh.points().iter().map(|p| density * (cos * p.x + sin * p.y)).collect();
-        minimise(start, Rounds::First)
-    })?;
-    let mut starts: Vec<Packed> = straight.into_iter().flatten().collect();
+        mesh.points().iter().map(|p| density * (cos * p.x + sin * p.y)).collect()
+    };
+    let starts: Vec<Vec<f64>> = (0..STARTS).map(straight).chain(further).collect();
+    let starts = parallel::try_map(starts.len(), |k| minimise(starts[k].clone(), Rounds::First))?;
+    let mut starts: Vec<Packed> = starts.into_iter().flatten().collect();
     starts.sort_by(|a, b| a.priced(prices.end).total_cmp(&b.priced(prices.end)));
     starts.truncate(most);
     let found = parallel::try_map(starts.len(), |k| minimise(starts[k].coefficients.clone(), Rounds::Last))?;

@@ -508,7 +508,7 @@ mod tests {
     use crate::plan::{Plan, plan};
     use crate::vocabulary::{Joining, Links, PlanSettings};
     use field::LineSample;
-    use geometry::{AnalyticShape, AnalyticSurface};
+    use geometry::{AnalyticShape, AnalyticSurface, Point3, TriangleMesh};
     use part::{Part, Patch};
     use std::sync::Arc;
     use work::monitor::Silent;
@@ -603,6 +603,67 @@ mod tests {
         });
         println!("{time} {length}");
         assert!(time <= length * (1.0 + 1e-9), "{time} {length}");
+    }
+
+    /// A bowl around a hole, from 6 to 12 mm of radius; `bend` is that of its meridian, 1/mm.
+    fn ring(bend: f64) -> Part {
+        const AROUND: u32 = 120;
+        let (inner, rings) = (6.0, 15);
+        let point = |k: u32| {
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(k % AROUND) / f64::from(AROUND)).sin_cos();
+            let radius = inner * (1.0 + f64::from(k / AROUND) / f64::from(rings));
+            Point3::new(radius * cos, radius * sin, 0.5 * bend * radius * radius)
+        };
+        let square = |k: u32| {
+            let next = k / AROUND * AROUND + (k + 1) % AROUND;
+            [[k, k + AROUND, next + AROUND], [k, next + AROUND, next]]
+        };
+        let points = (0..AROUND * (rings + 1)).map(point).collect();
+        let triangles = (0..AROUND * rings).flat_map(square).collect();
+        Part::from_mesh(TriangleMesh::new(points, triangles).unwrap().0)
+    }
+
+    /// The bound of a ring is that of its own area, and not of the rectangle around it; so is that of a plate without a hole whose border
+    /// is no rectangle.
+    #[test]
+    fn the_shortest_possible_path_is_that_of_the_part() {
+        let (cutter, h) = (Cutter::ball(6.0).unwrap(), 0.02);
+        let width = scallop::strip_width_at(&cutter, &Vector3::z(), &Vector3::x(), 0.0, h).0;
+        let half = [[0.0, 0.0, 0.0], [20.0, 0.0, 0.0], [0.0, 12.0, 0.0]].map(Point3::from).to_vec();
+        let triangle = Part::from_mesh(TriangleMesh::new(half, vec![[0, 1, 2]]).unwrap().0);
+        for (part, within) in [(ring(0.0), 1e-9), (triangle, 0.01)] {
+            let mesh = part.mesh();
+            let area: f64 = (0..mesh.triangles().len())
+                .map(|t| {
+                    let [a, b, c] = mesh.corners(t);
+                    0.5 * (b - a).cross(&(c - a)).norm()
+                })
+                .sum();
+            let least = shortest::shortest_possible(&part, &cutter, h, &Silent).unwrap();
+            assert!((least.cutting_mm * width / area - 1.0).abs() < within, "{least:?} {}", area / width);
+        }
+    }
+
+    /// Around a hole in level ground passes that close have no ends, and are the quickest.
+    #[test]
+    fn around_a_hole_the_quickest_passes_close() {
+        let part = ring(0.0);
+        let cutter = Cutter::ball(6.0).unwrap();
+        let settings = PlanSettings {
+            step: Step::Scallop(0.02),
+            stock_top: part.bounds().max.z + 1.0,
+            joining: Joining { links: Links::Surface, ..Joining::default() },
+            ..PlanSettings::default()
+        };
+        let time = ShortestStreamline { toward: None, objective: Objective::Time };
+        let plan = plan(&part, &cutter, &time, &settings, &Silent).unwrap();
+        let passes = &plan.kept.passes;
+        let closed = passes.iter().filter(|pass| pass.first() == pass.last()).count();
+        let length: f64 = passes.iter().flat_map(|p| p.windows(2)).map(|w| (w[1] - w[0]).norm()).sum();
+        let least = shortest::shortest_possible(&part, &cutter, 0.02, &Silent).unwrap().cutting_mm;
+        println!("{closed} of {} close, {length} {least} {:?}", passes.len(), plan.notes);
+        assert!(closed == passes.len() && closed > 5, "{closed} of {}", passes.len());
+        assert!(length > least && length < 1.1 * least, "{length} {least}");
     }
 
     /// Vectors that have a stream function are followed as closely as the published fit does where their lengths set the
