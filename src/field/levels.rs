@@ -34,6 +34,8 @@ pub struct LevelTracer<'a> {
     /// ψ at the grid's nodes, `[cells + 1][cells + 1]`.
     values: Vec<f64>,
     step: f64,
+    /// Whether traced points are pulled back onto their level.
+    pulled: bool,
 }
 
 /// A step advances by about its own length; one that does not has come to a critical point, or its
@@ -56,10 +58,37 @@ impl<'a> LevelTracer<'a> {
         step: f64,
     ) -> Self {
         let domain = [0, 1].map(|c| [inner[c][0] - margins[c], inner[c][1] + margins[c]]);
-        let mut tracer = Self { field, metric, inner, domain, cells: cells.max(1), values: Vec::new(), step };
+        let mut tracer = Self {
+            field,
+            metric,
+            inner,
+            domain,
+            cells: cells.max(1),
+            values: Vec::new(),
+            step,
+            pulled: true,
+        };
         let n = tracer.cells + 1;
         tracer.values = (0..n * n).map(|k| tracer.value_and_gradient(tracer.node(k))[0]).collect();
         tracer
+    }
+
+    /// The same, but what it traces is the streamline through the first point of each component, by Runge–Kutta steps that nothing pulls
+    /// onto the level.
+    pub fn by_steps_alone(self) -> Self {
+        Self { pulled: false, ..self }
+    }
+
+    /// The place at a share of the way from a traced point to the next one: on the level, or by one shorter step.
+    pub fn between(&self, [a, b]: [[f64; 2]; 2], share: f64, level: f64) -> [f64; 2] {
+        let way = [b[0] - a[0], b[1] - a[1]];
+        let line = [a[0] + share * way[0], a[1] + share * way[1]];
+        if self.pulled {
+            return self.onto_level(line, level);
+        }
+        let backward = self.direction(a).is_some_and(|d| d[0] * way[0] + d[1] * way[1] < 0.0);
+        let length = share * self.distance(a, b);
+        self.step(a, if backward { -length } else { length }).unwrap_or(line)
     }
 
     /// Least and greatest ψ over a grid on the domain without its margins.
@@ -164,7 +193,7 @@ impl<'a> LevelTracer<'a> {
     /// `None` where that takes `longest` mm or more.
     fn trace(&self, chain: &LevelCurve, level: f64, longest: f64) -> Option<LevelCurve> {
         let (next, closed) = (chain.points[1], chain.closed);
-        let seed = self.onto_level(chain.points[0], level);
+        let seed = self.seed(chain.points[0], level);
         let mut points = vec![seed];
         let sense = match self.direction(seed) {
             Some(d) if d[0] * (next[0] - seed[0]) + d[1] * (next[1] - seed[1]) < 0.0 => -1.0,
@@ -178,7 +207,7 @@ impl<'a> LevelTracer<'a> {
                 points.push(self.leave(p, q, level));
                 break;
             }
-            let q = self.onto_level(q, level);
+            let q = if self.pulled { self.onto_level(q, level) } else { q };
             let advance = self.distance(p, q);
             let advanced = advance / self.step;
             if !(LEAST_ADVANCE..MOST_ADVANCE).contains(&advanced) {
@@ -213,18 +242,32 @@ impl<'a> LevelTracer<'a> {
         }
         let mut r = self.clamp([p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])]);
         r[axis] = q[axis].clamp(self.domain[axis][0], self.domain[axis][1]);
-        let along = 1 - axis;
+        // A curve that runs nearly along the border is left where the step ended.
+        let most = (q[0] - p[0]).abs() + (q[1] - p[1]).abs();
+        self.along_border(r, 1 - axis, level, most)
+    }
+
+    /// Moves a place along a border, in one parameter, onto the level, by Newton's method in steps of at most `most`.
+    fn along_border(&self, mut r: [f64; 2], along: usize, level: f64, most: f64) -> [f64; 2] {
         for _ in 0..4 {
             let values = self.value_and_gradient(r);
             let slope = values[1 + along];
             let step = (level - values[0]) / slope;
-            // A curve that runs nearly along the border is left where the step ended.
-            if slope == 0.0 || step.abs() > (q[along] - p[along]).abs() + (q[axis] - p[axis]).abs() {
+            if slope == 0.0 || step.abs() > most {
                 break;
             }
             r[along] += step;
         }
         self.clamp(r)
+    }
+
+    /// Where a chain's curve begins: on the level, and on the border where an open chain does.
+    fn seed(&self, first: [f64; 2], level: f64) -> [f64; 2] {
+        let on_border = (0..2).find(|&c| self.domain[c].contains(&first[c]));
+        let Some(across) = on_border else { return self.onto_level(first, level) };
+        let along = 1 - across;
+        let [lo, hi] = self.domain[along];
+        self.along_border(first, along, level, (hi - lo) / self.cells as f64)
     }
 
     /// Marching squares: chains of crossing points, open ones (border to border) first.
@@ -399,6 +442,31 @@ mod tests {
         }
         let back = tracer.distance(p, [0.5, 0.0]);
         assert!(length > 30.0 && back < 0.2 && worst < 1e-5, "{length} {back} {worst}");
+    }
+
+    /// Whole lines without a pull, and places between their points, are as near to their level.
+    #[test]
+    fn lines_by_steps_alone_are_levels() {
+        let field = spline(|x, y| x * x + y * y + 0.3 * x * y * y);
+        let metric = |u: f64, _: f64| (100.0 + (2.0 * (2.0 * u).cos()).powi(2), 0.0, 100.0);
+        let tracer = LevelTracer::new(&field, &metric, SQUARE, [0.0; 2], 40, 0.2);
+        let level = field.value_and_gradient(0.5, 0.0)[0];
+        let whole = tracer.curves(level);
+        let alone = LevelTracer::new(&field, &metric, SQUARE, [0.0; 2], 40, 0.2).by_steps_alone();
+        for level in [level, 1.6 * level, 5.5 * level] {
+            let lines = alone.curves(level);
+            assert_eq!(lines.len(), tracer.curves(level).len());
+            for line in &lines {
+                let places = line
+                    .points
+                    .windows(2)
+                    .flat_map(|w| [0.0, 0.3, 0.8].map(|share| alone.between([w[0], w[1]], share, level)));
+                let worst =
+                    places.map(|p| tracer.distance(p, tracer.onto_level(p, level))).fold(0.0, f64::max);
+                assert!(worst > 0.0 && worst < 1e-5, "{level} {worst}");
+            }
+        }
+        assert!(whole[0].closed && alone.curves(level)[0].closed);
     }
 
     #[test]

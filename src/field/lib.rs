@@ -34,7 +34,7 @@ pub use knots::{KnotRule, averaged_knots, equal_shares, weighted_knots};
 pub use levels::{LevelCurve, LevelTracer};
 pub use packed::{Gradients, Packed, Roughness, Rounds, Site, Tied, minimise, minimise_priced};
 pub use planar::{PlanarError, PlanarMesh, fill};
-pub use planned::{DirectionError, FeedSample, PassPoint, PlannedField, ShortestPossible};
+pub use planned::{DirectionError, FeedSample, LevelLine, PassPoint, PlannedField, ShortestPossible};
 pub use scalar::{Axis, ScalarField, ScalarSpline, surface_gradient_length};
 pub use scattered::{LineField, LineSample, SamplePlane};
 pub use solve::{MAX_DENSE, SolveReport, Solver};

@@ -197,6 +197,13 @@ pub struct Packed {
     pub short: f64,
 }
 
+impl Packed {
+    /// All that it costs where each end of a pass costs `end`, mm.
+    pub fn priced(&self, end: f64) -> f64 {
+        self.cost + self.ends + 2.0 * end * self.passes
+    }
+}
+
 /// Which rounds are gone through.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Rounds {

@@ -10,13 +10,24 @@ pub struct PlannedField {
     /// Feed directions, evenly over the part.
     pub directions: Vec<FeedSample>,
     /// Lines along which ψ is constant, at even steps of it.
-    pub level_lines: Vec<Vec<Point2>>,
+    pub level_lines: Vec<LevelLine>,
     /// The points around which the feed directions turn.
     pub singular_points: Vec<SingularPoint>,
     /// The contacts of each pass.
     pub passes: Vec<Vec<PassPoint>>,
     /// How far passes are off the directions asked for; `None` where none were.
     pub direction_error: Option<DirectionError>,
+}
+
+/// A line along which ψ is constant, in the plan view.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct LevelLine {
+    /// ψ there: neighbouring passes differ by about 1 where the function counts passes.
+    pub psi: f64,
+    /// Its points, mm.
+    pub points: Vec<Point2>,
+    /// The density of passes at each point, `|∇ψ|` on the surface, 1/mm.
+    pub densities: Vec<f64>,
 }
 
 /// Angles between passes and the feed directions asked for, rad.

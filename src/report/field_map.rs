@@ -49,7 +49,8 @@ pub fn field_picture(
     let (mut page, legend) = draw(grid, &map, &colour, words, |page| {
         let mut levels = strokes_over(&map);
         for line in &field.level_lines {
-            line.windows(2)
+            line.points
+                .windows(2)
                 .for_each(|w| levels.line(map.place(grid, w[0]), map.place(grid, w[1]), LEVEL_WIDTH));
         }
         page.ink(Pooled::CORNER, &levels, LEVEL);
@@ -231,7 +232,7 @@ fn lines(page: &mut Picture, grid: &Grid, map: &Pooled, field: &PlannedField) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use field::FeedSample;
+    use field::{FeedSample, LevelLine};
     use geometry::{Point2, Point3, Vector2};
 
     const WORDS: MapWords<'_> =
@@ -241,6 +242,10 @@ mod tests {
     fn pass(y: f64, interval: Option<f64>) -> Vec<PassPoint> {
         let at = |k: i32| Point3::new(f64::from(k), y, 0.0);
         (0..=20).map(|k| PassPoint { at: at(k), allowed: 0.5, interval, inside: true }).collect()
+    }
+
+    fn level_line(points: Vec<Point2>) -> LevelLine {
+        LevelLine { psi: 1.0, densities: vec![2.0; points.len()], points }
     }
 
     fn grid(nx: usize, ny: usize) -> Grid {
@@ -279,7 +284,7 @@ mod tests {
         let deviation = vec![0.0f32; grid.len()];
         let mut field = PlannedField {
             directions: vec![FeedSample { at: Point2::new(5.0, 5.0), direction: Vector2::new(0.6, 0.8) }],
-            level_lines: vec![vec![Point2::new(0.0, 8.0), Point2::new(20.0, 8.0)]],
+            level_lines: vec![level_line(vec![Point2::new(0.0, 8.0), Point2::new(20.0, 8.0)])],
             ..PlannedField::default()
         };
         for half_turns in [1, -2] {
@@ -305,7 +310,7 @@ mod tests {
         let point = |at: &Point3| PassPoint { at: *at, allowed: 0.5, interval: Some(900.0), inside: true };
         let field = PlannedField {
             directions: vec![FeedSample { at: far[0].xy(), direction: Vector2::x() }],
-            level_lines: vec![far.iter().map(|p| p.xy()).collect(), Vec::new()],
+            level_lines: vec![level_line(far.iter().map(|p| p.xy()).collect()), LevelLine::default()],
             singular_points: vec![SingularPoint { position: far[1], half_turns: 1 }],
             passes: vec![far.iter().map(point).collect(), Vec::new()],
             ..PlannedField::default()

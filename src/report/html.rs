@@ -19,8 +19,8 @@ pub struct ToolpathPage {
     pub path_png: Vec<u8>,
     /// height.png; `None` where the part is measured along its normals.
     pub height_png: Option<Vec<u8>>,
-    /// field.png and interval.png, for a streamline.
-    pub field_pngs: Option<[Vec<u8>; 2]>,
+    /// field.png, interval.png and psi.png, for a streamline.
+    pub field_pngs: Option<[Vec<u8>; 3]>,
     /// Scallop heights; `None` without ridges.
     pub histogram: Option<Histogram>,
 }
@@ -249,14 +249,14 @@ fn toolpath_section(t: &ToolpathResult, page: &ToolpathPage) -> Markup {
                     figcaption { "Height of the cut stock." }
                 }
             }
-            @if let Some([field, interval]) = &page.field_pngs { (planned(t, field, interval)) }
+            @if let Some(pictures) = &page.field_pngs { (planned(t, pictures)) }
             (method(t, page.field_pngs.is_some()))
         }
     }
 }
 
 /// What a streamline was planned by.
-fn planned(t: &ToolpathResult, field: &[u8], interval: &[u8]) -> Markup {
+fn planned(t: &ToolpathResult, [field, interval, psi]: &[Vec<u8>; 3]) -> Markup {
     html! {
         h3 { "How it was planned" }
         figure {
@@ -266,6 +266,10 @@ fn planned(t: &ToolpathResult, field: &[u8], interval: &[u8]) -> Markup {
         figure {
             img src=(data_url(interval)) alt=(format!("Intervals of {}", t.name));
             figcaption { "Passes, each as wide as what it serves, coloured by the distance of the farther neighbour over the distance that the scallop height (or the stepover) allows there. White is as allowed, blue narrower, red wider; light grey has no neighbour. Planned, not measured." }
+        }
+        figure {
+            img src=(data_url(psi)) alt=(format!("Stream function of {}", t.name));
+            figcaption { "The stream function psi as a surface, seen aslant: each level stands as high as its value, and is coloured by how dense passes are there." }
         }
     }
 }
@@ -392,7 +396,7 @@ fn method(t: &ToolpathResult, field: bool) -> Markup {
             "Files: toolpath.nc (the program, where it was planned here), toolpath.cls (cutter locations), height.exr (height, deviation and move of every cell), machined.stl and machined.ply (the part as cut, the latter coloured by deviation; "
             (t.surface_mesh.triangles) " triangles within " (bound(t.surface_mesh.tolerance_mm)) " µm of the cells"
             @if t.surface_mesh.tolerance_mm > t.scallop.target_mm { ": too coarse for ridges of the target's height; height.exr has them" }
-            "), scallop_pairs.csv (calculated and measured scallops of each pair of passes), deviation.png, height.png and path.png" @if field { ", field.png and interval.png" } " (larger than here)."
+            "), scallop_pairs.csv (calculated and measured scallops of each pair of passes), deviation.png, height.png and path.png" @if field { ", field.png, interval.png and psi.png" } " (larger than here)."
         }
     }
 }
@@ -413,11 +417,11 @@ mod tests {
             field_pngs: None,
             histogram: Histogram::new(&[[0.004, 1.0]], 0.01, 0.0125),
         };
-        let streamline = ToolpathPage { field_pngs: Some([png.clone(), png]), ..page.clone() };
+        let streamline = ToolpathPage { field_pngs: Some([png.clone(), png.clone(), png]), ..page.clone() };
         let html = html_page(&report, &[page, streamline], "title = \"<script>\" # a & b");
         assert!(html.contains("&lt;script&gt;") && !html.contains("<script"));
         assert!(!html.contains("http://") && !html.contains("https://"), "nothing is fetched");
-        assert_eq!(html.matches("data:image/png;base64,AQID").count(), 8);
+        assert_eq!(html.matches("data:image/png;base64,AQID").count(), 9);
         assert_eq!(html.matches("toolpath.nc line 1240").count(), 2, "in the head and in its toolpath");
         assert!(html.contains("Rings mark") && html.contains("<th>G1</th>") && !html.contains("<th>G2</th>"));
         assert!(html.contains("1 of 2 toolpaths hold every tolerance"));

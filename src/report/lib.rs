@@ -14,6 +14,7 @@ mod map;
 mod path_map;
 mod result;
 mod scale;
+mod stream_map;
 mod surface_mesh;
 mod table;
 mod time_plot;
@@ -32,6 +33,7 @@ pub use result::{
     InputFile, NotPlanned, ReportError, RunReport, SimulationFigures, SurfaceMeshFigures, ToleranceFigures,
     ToolpathReport, ToolpathResult,
 };
+pub use stream_map::stream_picture;
 pub use surface_mesh::{MAX_TRIANGLES, SurfaceMesh, VertexPlace, surface_mesh};
 pub use table::{bound, conclusion, duration, micrometres, per_cent, result_table, with_bound};
 pub use verdict::{Claim, Gravity, Verdict, place};

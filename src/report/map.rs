@@ -48,7 +48,7 @@ impl MapSize {
     }
 
     /// Small grids are magnified by whole numbers up to about this size, pixels.
-    fn comfortable(self) -> usize {
+    pub(super) fn comfortable(self) -> usize {
         match self {
             Self::File => 900,
             Self::Page => 640,

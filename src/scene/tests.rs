@@ -9,8 +9,8 @@ use field::mesh::Sense;
 use field::{KnotRule, Solver};
 use geometry::Point2;
 use toolpath::{
-    Along, FeedDirection, FrontStart, IsoParametric, IsoScallop, LevelSteps, Objective, ShortestStreamline,
-    Spiral, Strategy, StreamMethod, Streamline, Waterline, Zigzag, ZigzagAngle,
+    Along, FeedDirection, FrontStart, IsoParametric, IsoScallop, LevelSteps, Lines, Objective,
+    ShortestStreamline, Spiral, Strategy, StreamMethod, Streamline, Waterline, Zigzag, ZigzagAngle,
 };
 
 const VALID: &str = r#"
@@ -121,6 +121,10 @@ fn classical_strategies_are_read_and_written_back() {
             }),
         ),
         ("spiral\"\nkind = \"contour\"", boxed(Spiral::Contour)),
+        (
+            "streamline\"\ndirection = \"steepest\"\nlines = \"rk4\"",
+            boxed(Streamline { lines: Lines::RungeKutta, ..Streamline::along(FeedDirection::Steepest) }),
+        ),
     ];
     let head = &VALID[..VALID.find("[[toolpath]]").unwrap()];
     for (text, strategy) in cases {
@@ -136,6 +140,10 @@ fn classical_strategies_are_read_and_written_back() {
     let point = "iso-scallop\"\nstart = { from_u = 0.5, from_v = 0.5, to_u = 0.5, to_v = 0.5 }";
     assert!(refuse(point).contains("same place"));
     assert!(refuse("iso-scallop\"\nstart = { from_u = 2 }").contains("from_u"));
+    // Traced lines follow a function that is fitted to directions, and `follow` or an objective find another.
+    for keys in ["follow = 10\ndirection = \"u\"", "objective = \"time\"\ndirection = \"u\""] {
+        assert!(refuse(&format!("streamline\"\n{keys}\nlines = \"rk4\"")).contains("does not a"), "{keys}");
+    }
 }
 
 #[test]

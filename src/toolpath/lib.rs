@@ -33,6 +33,6 @@ pub use strategies::{STRATEGIES, StrategyRead, read_strategy, words_for};
 pub use tilt::repair::{RepairSummary, Unreachable};
 pub use tilt::tilted::Tilting;
 pub use vocabulary::{
-    Along, Correction, Definition, Earlier, FeedDirection, Joining, Kept, Levelled, Links, PartKind,
+    Along, Correction, Definition, Earlier, FeedDirection, Joining, Kept, Levelled, Lines, Links, PartKind,
     PlanError, PlanSettings, Reading, Step, Strategy,
 };

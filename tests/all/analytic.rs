@@ -7,7 +7,7 @@ use millstream::field::{DIRECTION_WEIGHT, KnotRule, Solver};
 use millstream::geometry::AnalyticShape;
 use millstream::scallop::ball_scallop_height;
 use millstream::toolpath::{
-    Along, FeedDirection, IsoParametric, Step, Strategy, StreamMethod, Streamline, Zigzag,
+    Along, FeedDirection, IsoParametric, Lines, Step, Strategy, StreamMethod, Streamline, Zigzag,
 };
 
 use crate::support::{LIMITS, formula, off, plan_and_measure};
@@ -112,6 +112,7 @@ fn a_scallop_target_holds_on_every_smooth_test_surface() {
                 method: StreamMethod::BSpline { degree: 3, knots: KnotRule::Uniform },
                 solver: Solver::Cholesky,
                 direction_weight: DIRECTION_WEIGHT,
+                lines: Lines::Levels,
             },
         ),
     ];

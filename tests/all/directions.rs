@@ -4,11 +4,13 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 
 use millstream::cutter::Cutter;
-use millstream::field::{DIRECTION_WEIGHT, KnotRule, Solver};
+use millstream::field::{DIRECTION_WEIGHT, KnotRule, PassPoint, Solver};
 use millstream::geometry::AnalyticShape;
 use millstream::io::direction_table;
 use millstream::monitor::Silent;
-use millstream::toolpath::{FeedDirection, Plan, Step, StreamMethod, Streamline, plan};
+use millstream::toolpath::{
+    FeedDirection, Lines, Objective, Plan, ShortestStreamline, Step, StreamMethod, Streamline, plan,
+};
 
 use crate::command::{PLATE, millstream};
 use crate::support::{LIMITS, cut_and_measure, formula, settings};
@@ -48,8 +50,14 @@ fn sampled_circles_are_followed_by_every_method_and_solver() {
         (StreamMethod::Differences, Solver::Cholesky),
     ] {
         let direction = FeedDirection::Samples(samples.clone());
-        let strategy =
-            Streamline { direction, control_points: 12, method, solver, direction_weight: DIRECTION_WEIGHT };
+        let strategy = Streamline {
+            direction,
+            control_points: 12,
+            method,
+            solver,
+            direction_weight: DIRECTION_WEIGHT,
+            lines: Lines::Levels,
+        };
         let plan = plan(&part, &cutter, &strategy, &settings(&part, Step::Stepover(0.6)), &Silent).unwrap();
         assert!(plan.notes.iter().any(|n| n.contains(", residual ")), "{:?}", plan.notes);
         println!("{method:?} {solver:?}: {:?}", plan.notes);
@@ -79,6 +87,56 @@ fn sampled_circles_are_followed_by_every_method_and_solver() {
     }
 }
 
+/// Streamlines traced by Runge-Kutta steps are as round as the levels of the same function, on a chart and on a mesh, lie no farther
+/// apart than they may, and leave nothing.
+#[test]
+fn traced_lines_are_levels() {
+    let part = formula(AnalyticShape::Plane { height: 0.0 }, [0.0, 30.0], [0.0, 20.0]);
+    let cutter = Cutter::ball(6.0).unwrap();
+    let samples = Arc::new(direction_table::parse(circles("", [1.0; 2]).as_bytes()).unwrap());
+    for method in [StreamMethod::Automatic, StreamMethod::Elements] {
+        let [levels, traced] = [Lines::Levels, Lines::RungeKutta].map(|lines| {
+            let along = Streamline::along(FeedDirection::Samples(samples.clone()));
+            let strategy = Streamline { method, lines, ..along };
+            let plan =
+                plan(&part, &cutter, &strategy, &settings(&part, Step::Stepover(0.6)), &Silent).unwrap();
+            let measured = cut_and_measure(&part, &cutter, &plan.path, 0.1, &LIMITS);
+            assert_eq!(measured.uncut.region_count, 0, "{method:?} {lines:?}");
+            let passes = &plan.field.as_ref().unwrap().passes;
+            let radius = |p: &PassPoint| (p.at.x + 20.0).hypot(p.at.y + 15.0);
+            let spread = passes.iter().map(|pass| {
+                let radii = pass.iter().filter(|p| p.inside).map(radius);
+                let [lo, hi] =
+                    radii.fold([f64::INFINITY, 0.0], |[lo, hi]: [f64; 2], r| [lo.min(r), hi.max(r)]);
+                (hi - lo).max(0.0)
+            });
+            let widest = passes.iter().flatten().filter(|p| p.inside).filter_map(PassPoint::ratio);
+            (spread.fold(0.0, f64::max), widest.fold(0.0, f64::max))
+        });
+        println!("{method:?}: {levels:?} {traced:?}");
+        assert!(traced.0 <= levels.0 + LIMITS.chord, "{method:?}: {traced:?} {levels:?}");
+        assert!(traced.1 <= 1.01, "{method:?}: {traced:?}");
+    }
+}
+
+/// Circles that leaving is dear are kept to within a degree, or else the plan says how far its passes are off.
+#[test]
+fn circles_are_followed_or_said_not_to_be() {
+    let part = formula(AnalyticShape::Plane { height: 0.0 }, [0.0, 30.0], [0.0, 20.0]);
+    let cutter = Cutter::ball(6.0).unwrap();
+    let samples = Arc::new(direction_table::parse(circles("", [1.0; 2]).as_bytes()).unwrap());
+    for dearer in [1.5, 10.0, 100.0] {
+        let toward = Some((FeedDirection::Samples(samples.clone()), dearer));
+        let strategy = ShortestStreamline { toward, objective: Objective::Length };
+        let plan = plan(&part, &cutter, &strategy, &settings(&part, Step::Scallop(0.01)), &Silent).unwrap();
+        let off = plan.field.as_ref().unwrap().direction_error.unwrap().rms.to_degrees();
+        let told = plan.notes.iter().any(|note| note.contains("off the directions that were asked for"));
+        println!("{dearer}: {off} {told}");
+        assert_eq!(told, off > 1.0, "{dearer}: {off}");
+        assert!(dearer < 10.0 || off <= 1.0, "{dearer}: {off}");
+    }
+}
+
 #[test]
 fn a_table_outside_of_the_part_or_of_the_wrong_kind_is_refused() {
     let part = formula(AnalyticShape::Plane { height: 0.0 }, [0.0, 30.0], [0.0, 20.0]);
@@ -90,6 +148,7 @@ fn a_table_outside_of_the_part_or_of_the_wrong_kind_is_refused() {
         method: StreamMethod::Differences,
         solver: Solver::ConjugateGradient,
         direction_weight: DIRECTION_WEIGHT,
+        lines: Lines::Levels,
     };
     let refused = plan(&part, &cutter, &strategy, &settings(&part, Step::Stepover(0.6)), &Silent);
     let message = refused.unwrap_err().to_string();

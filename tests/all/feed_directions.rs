@@ -12,7 +12,7 @@ use millstream::monitor::Silent;
 use millstream::motion::{MoveKind, Toolpath};
 use millstream::part::Part;
 use millstream::toolpath::{
-    FeedDirection, Objective, PlanError, ShortestStreamline, Step, StreamMethod, Streamline, plan,
+    FeedDirection, Lines, Objective, PlanError, ShortestStreamline, Step, StreamMethod, Streamline, plan,
 };
 
 use crate::command::{PLATE, millstream};
@@ -38,6 +38,7 @@ fn planned(
         method,
         solver,
         direction_weight: DIRECTION_WEIGHT,
+        lines: Lines::Levels,
     };
     let cutter = Cutter::ball(6.0).unwrap();
     plan(part, &cutter, &strategy, &settings(part, Step::Stepover(0.6)), &Silent).map(|plan| plan.path)
@@ -48,8 +49,14 @@ fn fields(
     direction: FeedDirection,
     (method, solver): (StreamMethod, Solver),
 ) -> Arc<PlannedField> {
-    let strategy =
-        Streamline { direction, control_points: 24, method, solver, direction_weight: DIRECTION_WEIGHT };
+    let strategy = Streamline {
+        direction,
+        control_points: 24,
+        method,
+        solver,
+        direction_weight: DIRECTION_WEIGHT,
+        lines: Lines::Levels,
+    };
     let cutter = Cutter::ball(6.0).unwrap();
     plan(part, &cutter, &strategy, &settings(part, Step::Stepover(0.6)), &Silent).unwrap().field.unwrap()
 }
@@ -271,7 +278,7 @@ fn planned_intervals_are_those_of_the_passes() {
         assert!(field.singular_points.is_empty());
         assert_eq!((field.level_lines.len(), field.passes.len()), (32, 34), "{method:?}");
         for line in &field.level_lines {
-            assert!(line.iter().all(|p| (p.y - line[0].y).abs() < 0.01), "{method:?}");
+            assert!(line.points.iter().all(|p| (p.y - line.points[0].y).abs() < 0.01), "{method:?}");
         }
         for ratio in field.passes.iter().flatten().filter(|p| p.inside).map(|p| p.ratio().unwrap()) {
             assert!((ratio - 20.0 / 34.0 / 0.6).abs() < 0.01, "{method:?}: {ratio}");

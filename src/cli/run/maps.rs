@@ -10,7 +10,7 @@ use motion::{Move, Toolpath};
 use part::PatchPoint;
 use report::{
     Histogram, MapSize, MapWords, PathLine, Picture, ToolpathPage, deviation_picture, field_picture,
-    height_picture, interval_picture, path_picture,
+    height_picture, interval_picture, path_picture, stream_picture,
 };
 use sim::{Grid, ZMap};
 use work::parallel;
@@ -74,15 +74,16 @@ impl Maps<'_> {
         pictures
     }
 
-    /// Writes deviation.png, height.png, path.png, and field.png and interval.png of streamlines.
+    /// Writes deviation.png, height.png, path.png, and field.png, interval.png and psi.png of streamlines.
     fn pictures(&self, cut: &ZMap) -> Result<ToolpathPage, CliError> {
         let (scene, result) = (&self.session.scene, &self.outcome.result);
         let (grid, deviation) = (&cut.grid, &self.outcome.measurement.deviation_map);
         let cell = format!("{} mm", grid.cell);
         let subtitle = format!("{} · cell {cell} · engine {}", scene.title, result.simulation.engine);
         let title = |what: &str| format!("{what}, {}", result.name);
-        let [deviations, heights, paths, fields, intervals] =
-            ["Deviation", "Height", "Path", "Feed directions", "Interval of passes"].map(title);
+        let [deviations, heights, paths, fields, intervals, streams] =
+            ["Deviation", "Height", "Path", "Feed directions", "Interval of passes", "Stream function"]
+                .map(title);
         let rings = marks(&self.outcome.measurement, &scene.tolerance, &scene.scallop_rule);
         let words = |title, marks| MapWords { title, subtitle: &subtitle, marks, axes: ["x", "y"] };
         let lines = plan_lines(&self.outcome.path);
@@ -119,12 +120,17 @@ impl Maps<'_> {
                     })
                 },
                 || {
-                    self.picture("interval.png", &cell, &|size| {
+                    let interval = self.picture("interval.png", &cell, &|size| {
                         interval_picture(grid, deviation, field, &words(&intervals, &[]), size)
-                    })
+                    });
+                    let psi = self.picture("psi.png", &cell, &|size| {
+                        stream_picture(field, &words(&streams, &[]), size)
+                    });
+                    Ok::<_, CliError>([interval?, psi?])
                 },
             );
-            Ok::<_, CliError>([field?, interval?])
+            let [interval, psi] = interval?;
+            Ok::<_, CliError>([field?, interval, psi])
         });
         Ok(ToolpathPage {
             deviation_png: deviation_png?,

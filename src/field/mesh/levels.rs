@@ -107,6 +107,12 @@ impl<'a> MeshLevels<'a> {
         Ok(levels)
     }
 
+    /// The recovered gradient at a point of a triangle, by those of its corners.
+    pub fn gradient_at(&self, p: &MeshPoint) -> Vector3 {
+        let corners = self.mesh.triangles()[p.triangle as usize];
+        (0..3).map(|k| self.gradients[corners[k] as usize] * p.weights[k]).sum()
+    }
+
     /// Least and greatest value.
     pub fn range(&self) -> [f64; 2] {
         self.range

@@ -11,7 +11,7 @@ use super::{gaps, planned_field};
 use crate::moves::touch::Touch;
 use crate::surface::chart::Chart;
 use crate::tilt::tilted;
-use crate::vocabulary::{Contact, Levelled, PassSettings, Passes, PlanError, Step, Task};
+use crate::vocabulary::{Contact, Levelled, Lines, PassSettings, Passes, PlanError, Step, Task};
 use cutter::Cutter;
 use drop_cutter::{Beside, DropCutter};
 use field::{LevelCurve, LevelTracer, ScalarField, surface_gradient_length};
@@ -53,6 +53,26 @@ pub(crate) fn along_levels(task: &Task<'_>, chart: &Chart, field: &ScalarField) 
     along_levels_placed(task, chart, field, LevelSteps::Shortest)
 }
 
+/// [`along_levels`] with levels placed in a given way.
+pub(crate) fn along_levels_placed(
+    task: &Task<'_>,
+    chart: &Chart,
+    field: &ScalarField,
+    placing: LevelSteps,
+) -> Result<Passes, PlanError> {
+    passes_along(task, chart, field, placing, Lines::Levels)
+}
+
+/// [`along_levels`], or along traced lines.
+pub(crate) fn along_lines(
+    task: &Task<'_>,
+    chart: &Chart,
+    field: &ScalarField,
+    lines: Lines,
+) -> Result<Passes, PlanError> {
+    passes_along(task, chart, field, lines.steps(), lines)
+}
+
 /// [`along_levels`] of a function that an earlier plan left.
 pub(crate) fn along_earlier(
     task: &Task<'_>,
@@ -65,17 +85,20 @@ pub(crate) fn along_earlier(
     Ok(passes)
 }
 
-/// [`along_levels`] with levels placed in a given way.
-pub(crate) fn along_levels_placed(
+fn passes_along(
     task: &Task<'_>,
     chart: &Chart,
     field: &ScalarField,
     placing: LevelSteps,
+    lines: Lines,
 ) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, monitor, .. } = *task;
     let metric = |u: f64, v: f64| chart.jet(u, v).first_form();
     let margins = margins(chart, cutter, field, settings);
-    let tracer = LevelTracer::new(field, &metric, chart.domain, margins, TRACE_CELLS, settings.sampling);
+    let mut tracer = LevelTracer::new(field, &metric, chart.domain, margins, TRACE_CELLS, settings.sampling);
+    if lines == Lines::RungeKutta {
+        tracer = tracer.by_steps_alone();
+    }
     let mut notes = Vec::new();
     let range = tracer.range();
     let places = places_of(chart, cutter, field, settings);
@@ -184,13 +207,13 @@ impl ChartGuide<'_> {
         stretches.retain(|s| s.to - s.from > BORDER_PRECISION);
     }
 
-    /// The place at `s`, which counts traced points one sampling distance apart, pulled onto the level.
+    /// The place at `s`, which counts traced points one sampling distance apart.
     fn on_level(&self, points: &[[f64; 2]], level: f64, s: f64) -> [f64; 2] {
         let k = (s as usize).min(points.len() - 2);
         let t = s - k as f64;
         let [a, b] = [points[k], points[k + 1]];
         let between = [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])];
-        let q = self.tracer.onto_level(between, level);
+        let q = self.tracer.between([a, b], t, level);
         // Near a singular point the level may be found on another branch.
         let strayed = self.tracer.distance(between, q) > MOST_STRAY * self.settings.sampling;
         if strayed { between } else { q }

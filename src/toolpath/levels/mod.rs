@@ -5,5 +5,7 @@ pub mod gaps;
 pub mod halving;
 pub mod level_passes;
 pub mod obedience;
+pub mod on_triangles;
 pub mod planned_field;
 pub mod spacing;
+pub mod spirals;

@@ -11,7 +11,10 @@ use crate::surface::chart::Chart;
 use crate::surface::mesh_surface::MeshSurface;
 use cutter::Cutter;
 use field::mesh::{FieldMesh, Line, MeshLevels, SingularPoint, merge_singular_points, singular_points};
-use field::{FeedSample, LevelTracer, PassPoint, PlannedField, ScalarField, grid_turns};
+use field::{
+    FeedSample, LevelCurve, LevelLine, LevelTracer, PassPoint, PlannedField, ScalarField, grid_turns,
+    surface_gradient_length,
+};
 use geometry::{CurveSegment, Point2, Point3, SegmentGrid, Vector3};
 use part::Part;
 
@@ -118,18 +121,21 @@ pub(crate) fn set_mesh_levels(
     range: [f64; 2],
     own: usize,
 ) {
-    for curve in level_values(range).flat_map(|level| levels.curves(level)) {
-        let mut line: Vec<Point2> = Vec::new();
+    let of_level = |psi: f64| levels.curves(psi).into_iter().map(move |curve| (psi, curve));
+    for (psi, curve) in level_values(range).flat_map(of_level) {
+        let empty = || LevelLine { psi, ..LevelLine::default() };
+        let (mut line, mut ended) = (empty(), Vec::new());
         let closing = curve.closed.then(|| curve.points[0]);
         for point in curve.points.iter().copied().chain(closing) {
-            line.push(point.position.xy());
+            line.points.push(point.position.xy());
+            line.densities.push(levels.gradient_at(&point).norm());
             // A point names the triangle after it.
             if point.triangle as usize >= own {
-                planned.level_lines.extend((line.len() > 1).then(|| std::mem::take(&mut line)));
-                line.clear();
+                ended.push(std::mem::replace(&mut line, empty()));
             }
         }
-        planned.level_lines.extend((line.len() > 1).then_some(line));
+        ended.push(line);
+        planned.level_lines.extend(ended.into_iter().filter(|line| line.points.len() > 1));
     }
 }
 
@@ -234,17 +240,21 @@ fn level_values([lo, hi]: [f64; 2]) -> impl Iterator<Item = f64> {
     (0..LEVELS).map(move |k| lo + (hi - lo) * (k as f64 + 0.5) / LEVELS as f64)
 }
 
-fn level_lines(part: &Part, chart: &Chart, field: &ScalarField) -> Vec<Vec<Point2>> {
+fn level_lines(part: &Part, chart: &Chart, field: &ScalarField) -> Vec<LevelLine> {
     let metric = |u: f64, v: f64| chart.jet(u, v).first_form();
     let step = LEVEL_STEP * part.bounds().size().norm();
     let tracer = LevelTracer::new(field, &metric, chart.domain, [0.0; 2], LEVEL_CELLS, step);
-    let curves = level_values(tracer.range()).flat_map(|level| tracer.curves(level));
-    curves
-        .map(|curve| {
-            let closing = curve.closed.then(|| curve.points[0]);
-            curve.points.iter().copied().chain(closing).map(|[u, v]| chart.jet(u, v).p.xy()).collect()
-        })
-        .collect()
+    let line = |psi: f64, curve: LevelCurve| {
+        let closing = curve.closed.then(|| curve.points[0]);
+        let point = |[u, v]: [f64; 2]| {
+            let (jet, [_, psi_u, psi_v]) = (chart.jet(u, v), field.value_and_gradient(u, v));
+            (jet.p.xy(), surface_gradient_length(jet.first_form(), psi_u, psi_v))
+        };
+        let (points, densities) = curve.points.iter().copied().chain(closing).map(point).unzip();
+        LevelLine { psi, points, densities }
+    };
+    let of_level = |psi: f64| tracer.curves(psi).into_iter().map(move |curve| line(psi, curve));
+    level_values(tracer.range()).flat_map(of_level).collect()
 }
 
 /// Distance, mm, from point `[pass, index]` to the next pass straight across the feed, to one side; `None` where none is

@@ -9,11 +9,11 @@ use super::stream::Vectors;
 use super::turning::Turning;
 use crate::strategies::direction_keys;
 use crate::vocabulary::{
-    Definition, FeedDirection, PartKind, Passes, PlanError, Reading, Step, Strategy, Task,
+    Definition, FeedDirection, Lines, PartKind, Passes, PlanError, Reading, Step, Strategy, Task,
 };
 use field::mesh::Sense;
 use geometry::Vector2;
-use keys::{LENGTH, SceneError, Section, toml_number};
+use keys::{LENGTH, SceneError, Section, toml_number, word_of};
 
 /// How a flow is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -193,6 +193,7 @@ pub(crate) static STREAMLINE: Definition = Definition {
         "across",
         "direction_weight",
         "along_walls",
+        "lines",
     ],
     read: |from| {
         let direction = direction_keys::read_level(from.section, &mut from.tables)?;
@@ -200,7 +201,8 @@ pub(crate) static STREAMLINE: Definition = Definition {
         // Walls are streamlines of their own direction.
         let usual = direction == FeedDirection::Border(Sense::Along);
         let along_walls = from.section.flag("along_walls")?.unwrap_or(usual);
-        read(from, Pattern::Streamline(Vectors { direction, direction_weight, along_walls }))
+        let lines = from.section.choice("lines", &Lines::WORDS)?;
+        read(from, Pattern::Streamline(Vectors { direction, direction_weight, along_walls, lines }))
     },
 };
 
@@ -290,6 +292,7 @@ impl Strategy for PocketStrategy {
                 direction_keys::write(out, &vectors.direction, "\n")?;
                 writeln!(out, "\ndirection_weight = {}", toml_number(vectors.direction_weight))?;
                 writeln!(out, "along_walls = {}", vectors.along_walls)?;
+                writeln!(out, "lines = \"{}\"", word_of(&Lines::WORDS, &vectors.lines))?;
             }
         }
         if let Some(stepdown) = self.stepdown {

@@ -11,21 +11,16 @@ use super::lines::{Line, along_walls, is_clear};
 use super::nest::{NestError, planar_mesh};
 use super::route::{Entry, Run, begun_near};
 use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between};
+use crate::levels::on_triangles::{OnTriangles, along_directions, refused, smooth_directions};
 use crate::levels::planned_field;
-use crate::levels::spacing::{AllowedStep, LevelSteps, place_levels};
-use crate::surface::feed::{self, SMOOTHING_OVER_RADIUS};
+use crate::levels::spacing::place_levels;
+use crate::surface::feed;
 use crate::surface::mesh_surface::not_applicable;
-use crate::vocabulary::{Contact, FeedDirection, OffDirection, Passes, PlanError};
+use crate::vocabulary::{Contact, FeedDirection, Lines, Passes, PlanError};
 use cutter::Cutter;
-use field::mesh::{
-    FieldMesh, Held, Line as FeedLine, MeshCurve, MeshFieldError, MeshLevels, MeshPoint, Wanted, flows,
-    orient_lines, singular_points, smooth_lines, solve_stream,
-};
+use field::mesh::{FieldMesh, Held, Line as FeedLine, MeshCurve, MeshPoint, Wanted, singular_points};
 use geometry::{Piece, Point2, Point3, SegmentGrid, Vector2, Vector3};
 use work::monitor::{Cancelled, Monitor};
-
-/// Part of a direction's weight that does not depend on how much the direction matters.
-const LEAST_WEIGHT: f64 = 0.02;
 
 /// Side of the triangles over the stepover. On longer ones levels stray from streamlines by more than a usual chord tolerance;
 /// time grows with the inverse square.
@@ -46,6 +41,8 @@ pub struct Vectors {
     pub direction_weight: f64,
     /// Whether walls are streamlines, so that passes run along them and none ends there.
     pub along_walls: bool,
+    /// Which lines of the function passes are.
+    pub lines: Lines,
 }
 
 /// Passes over one piece.
@@ -61,11 +58,12 @@ pub fn runs(
     monitor: &dyn Monitor,
 ) -> Result<Vec<Run>, PlanError> {
     let fitted = Fitted::new(piece, vectors, cutter, step, monitor)?;
-    let (source, Fitted { mesh, lines, .. }) = (fitted.source(step)?, &fitted);
-    let range = source.levels.range();
-    let placed = place_levels(&source.places(&fitted.psi), range, LevelSteps::Shortest, &mut planned.notes);
+    let (source, Fitted { mesh, lines, .. }) = (fitted.source(step, vectors.lines)?, &fitted);
+    let range = source.on.levels.range();
+    let places = source.on.places(mesh.triangles().len(), |p| Some((source.allowed_at(p), false)));
+    let placed = place_levels(&places, range, vectors.lines.steps(), &mut planned.notes);
     let mut passes = along_and_between(&source, &placed, range, SAMPLING * step, monitor)?;
-    planned_field::set_plane(&mut passes.field, mesh, &source.levels, lines);
+    planned_field::set_plane(&mut passes.field, mesh, &source.on.levels, lines);
     passes.field.singular_points = singular_points(mesh, lines, MERGE_OVER_RADIUS * cutter.radius());
     passes.notes.extend(planned_field::singular_note(&passes.field));
     let runs = joined(&passes.passes, piece, step);
@@ -92,7 +90,6 @@ impl Fitted {
         step: f64,
         monitor: &dyn Monitor,
     ) -> Result<Self, PlanError> {
-        let refused = |e: MeshFieldError| not_applicable(&e.to_string());
         let planar = planar_mesh(piece, step, EDGE_OVER_STEP * step, monitor).map_err(|e| match e {
             NestError::Cancelled(cancelled) => PlanError::Cancelled(cancelled),
             e => not_applicable(&e.to_string()),
@@ -103,22 +100,19 @@ impl Fitted {
         if wanted.iter().all(Option::is_none) {
             return Err(feed::nowhere(&vectors.direction, mesh.points().iter().copied()));
         }
-        let length = SMOOTHING_OVER_RADIUS * cutter.radius();
-        let mut lines = smooth_lines(&mesh, &wanted, &[], length).map_err(refused)?;
-        orient_lines(&mesh, &mut lines);
+        let lines = smooth_directions(&mesh, &wanted, cutter)?;
         let density = vec![1.0 / step; lines.len()];
-        let matters = |w: &Wanted| w.map_or(0.0, |(_, matters)| matters) + LEAST_WEIGHT;
-        let weight: Vec<f64> = wanted.iter().map(matters).collect();
-        let tied = if vectors.along_walls { mesh.loops() } else { &[] };
-        let (flows, held) = (flows(&mesh, &lines, &density, &weight), Held { fixed: &[], tied });
-        let psi = solve_stream(&mesh, &flows, vectors.direction_weight, &held).map_err(refused)?.values;
+        let matters = |v: usize| wanted[v].map_or(0.0, |(_, matters)| matters);
+        let held = Held { fixed: &[], tied: if vectors.along_walls { mesh.loops() } else { &[] } };
+        let weight = vectors.direction_weight;
+        let psi = along_directions(&mesh, &lines, &density, matters, weight, &held)?.values;
         Ok(Self { mesh, wanted, lines, psi })
     }
 
-    /// Its levels, whose passes may lie `step` apart, mm.
-    pub fn source(&self, step: f64) -> Result<Source<'_>, PlanError> {
-        let levels = MeshLevels::new(&self.mesh, &self.psi).map_err(|e| not_applicable(&e.to_string()))?;
-        Ok(Source { mesh: &self.mesh, levels, wanted: &self.wanted, step })
+    /// Its lines, which may lie `step` apart, mm.
+    pub fn source(&self, step: f64, lines: Lines) -> Result<Source<'_>, PlanError> {
+        let on = OnTriangles::new(&self.mesh, &self.psi, &self.wanted, lines, SAMPLING * step)?;
+        Ok(Source { on, step })
     }
 }
 
@@ -178,39 +172,20 @@ pub(super) struct Spot {
     allowed: Allowed,
 }
 
-/// The levels of ψ on the triangles.
+/// The lines of ψ on the triangles.
 pub(super) struct Source<'a> {
-    mesh: &'a FieldMesh,
-    pub levels: MeshLevels<'a>,
-    wanted: &'a [Wanted],
+    pub on: OnTriangles<'a>,
     step: f64,
 }
 
 impl Source<'_> {
-    /// What each triangle allows.
-    fn places(&self, psi: &[f64]) -> Vec<AllowedStep> {
-        let place = |t: usize| {
-            let third = MeshPoint { triangle: t as u32, weights: [1.0 / 3.0; 3], position: Point3::origin() };
-            let gradient = self.gradient(&third).norm();
-            let mean = self.mesh.triangles()[t].iter().map(|&v| psi[v as usize]).sum::<f64>() / 3.0;
-            let (step, length) = (self.step * gradient, self.mesh.area(t) * gradient);
-            AllowedStep { psi: mean, step, length, too_concave: false }
-        };
-        (0..self.mesh.triangles().len()).map(place).collect()
-    }
-
-    fn gradient(&self, p: &MeshPoint) -> Vector3 {
-        let corners = self.mesh.triangles()[p.triangle as usize];
-        (0..3).map(|k| self.levels.gradients()[corners[k] as usize] * p.weights[k]).sum()
+    fn allowed_at(&self, p: &MeshPoint) -> Allowed {
+        Allowed { step: self.step * self.on.gradient(p).norm(), width: self.step }
     }
 
     fn spot(&self, triangle: u32, at: Vector2) -> Spot {
-        let position = Point3::new(at.x, at.y, 0.0);
-        let (corners, hats) =
-            (self.mesh.corners(triangle as usize), self.mesh.hat_gradients(triangle as usize));
-        let weights = [0, 1, 2].map(|k| (1.0 + hats[k].dot(&(position - corners[k]))).clamp(0.0, 1.0));
-        let at = MeshPoint { triangle, weights, position };
-        Spot { at, allowed: Allowed { step: self.step * self.gradient(&at).norm(), width: self.step } }
+        let at = self.on.in_triangle(triangle, Point3::new(at.x, at.y, 0.0));
+        Spot { at, allowed: self.allowed_at(&at) }
     }
 
     /// The curve at even distances, on a smooth curve through its points (Catmull and Rom 1974).
@@ -254,7 +229,7 @@ impl LevelSource for Source<'_> {
     type Place = Spot;
 
     fn curves(&self, level: f64) -> Vec<Track<Spot>> {
-        self.levels.curves(level).iter().filter_map(|curve| self.track(curve)).collect()
+        self.on.curves(level).iter().filter_map(|curve| self.track(curve)).collect()
     }
 
     fn allowed(&self, spot: &Spot) -> Option<Allowed> {
@@ -263,12 +238,8 @@ impl LevelSource for Source<'_> {
 
     fn contacts(&self, curve: &Track<Spot>, run: Option<[usize; 2]>) -> Vec<Contact> {
         let contact = |spot: &Spot| {
-            let across = self.gradient(&spot.at).try_normalize(1e-300)?;
-            let corners = self.mesh.triangles()[spot.at.triangle as usize];
-            let asked = (0..3).filter_map(|k| Some((self.wanted[corners[k] as usize]?, spot.at.weights[k])));
-            let asked: Vec<_> = asked.map(|((line, matters), weight)| (line, matters * weight)).collect();
-            let asked = field::mesh::blend_lines(&[Vector3::x(), Vector3::y()], asked);
-            let off = asked.map(|(line, matters)| OffDirection::new(&across, &Vector3::z(), &line, matters));
+            let across = self.on.gradient(&spot.at).try_normalize(1e-300)?;
+            let off = self.on.off_direction(&spot.at, &across, &Vector3::z());
             let (at, allowed) = (spot.at.position, spot.allowed.width);
             Some(Contact { at, across, allowed, inside: true, parameters: None, off })
         };

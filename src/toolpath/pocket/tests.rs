@@ -2,8 +2,8 @@ mod engagement;
 
 use super::*;
 use crate::levels::halving::LevelSource;
-use crate::vocabulary::{FeedDirection, Joining, Step};
-use field::mesh::{MeshTracer, Sense};
+use crate::vocabulary::{FeedDirection, Joining, Lines, Step};
+use field::mesh::Sense;
 use geometry::{Point2, Point3};
 use machine::Machine;
 use motion::MoveKind;
@@ -67,7 +67,7 @@ fn streamlines() -> [Pattern; 3] {
         (FeedDirection::Guides { curves: Arc::new(vec![guide]), sense: Sense::Along }, false),
     ]
     .map(|(direction, along_walls)| {
-        Pattern::Streamline(Vectors { direction, direction_weight: 1.0, along_walls })
+        Pattern::Streamline(Vectors { direction, direction_weight: 1.0, along_walls, lines: Lines::Levels })
     })
 }
 
@@ -346,19 +346,39 @@ fn streamlines_around_an_island_are_the_traced_ones() {
     let (chord, mut worst) = (settings().chord_tolerance, 0.0f64);
     let cutter = Cutter::flat(6.0).unwrap();
     let found = stream::Fitted::new(&ring.pieces[0], &vectors, &cutter, 2.4, &Silent).unwrap();
-    let source = found.source(2.4).unwrap();
-    let gradients = source.levels.gradients().iter();
-    let lines: Vec<_> = gradients.map(|g| geometry::Vector3::new(-g.y, g.x, 0.0)).collect();
-    let tracer = MeshTracer::new(&found.mesh, &lines).unwrap();
-    let [lo, hi] = source.levels.range();
+    let source = found.source(2.4, Lines::Levels).unwrap();
+    let tracer = found.source(2.4, Lines::RungeKutta).unwrap();
+    let [lo, hi] = source.on.levels.range();
     for share in [0.2, 0.4, 0.6, 0.8] {
-        let curve = &source.curves(lo + share * (hi - lo))[0];
-        let level: Vec<Point2> = curve.points.iter().map(|spot| spot.at.position.xy()).collect();
-        let level = SegmentGrid::of_curves([level.as_slice()]);
-        let traced = tracer.through(curve.points[0].at, 0.3, 400.0);
-        assert!(traced.closed);
-        worst = traced.points.iter().map(|p| level.distance(&p.position.xy())).fold(worst, f64::max);
+        let level = lo + share * (hi - lo);
+        let curve: Vec<Point2> =
+            source.curves(level)[0].points.iter().map(|spot| spot.at.position.xy()).collect();
+        let curve = SegmentGrid::of_curves([curve.as_slice()]);
+        let traced = &tracer.on.curves(level)[0];
+        // Steps of its own, not the crossings of sides.
+        assert!(traced.closed && traced.points != source.on.curves(level)[0].points);
+        worst = traced.points.iter().map(|p| curve.distance(&p.position.xy())).fold(worst, f64::max);
     }
     println!("{worst}");
     assert!(worst <= chord, "{worst}");
+}
+
+/// Passes of a pocket along traced lines lie no farther apart than levels do: around singular points both leave gaps.
+#[test]
+fn traced_lines_fill_a_pocket() {
+    let cutter = Cutter::flat(6.0).unwrap();
+    for pattern in streamlines() {
+        let Pattern::Streamline(vectors) = pattern else { panic!("streamlines") };
+        let [levels, traced] = [Lines::Levels, Lines::RungeKutta].map(|lines| {
+            let pattern = Pattern::Streamline(Vectors { lines, ..vectors.clone() });
+            let plan =
+                plan_pocket(&with_island(), &cutter, &strategy(pattern), &settings(), &Silent).unwrap();
+            let passes = &plan.field.as_ref().unwrap().passes;
+            let points: usize = passes.iter().map(Vec::len).sum();
+            let ratios = passes.iter().flatten().filter_map(field::PassPoint::ratio);
+            (passes.len(), ratios.filter(|ratio| *ratio > 1.02).count() as f64 / points as f64)
+        });
+        println!("{:?}: passes and share too far apart {levels:?} {traced:?}", vectors.direction);
+        assert!(traced.0 > 5 && traced.1 <= levels.1 + 0.01, "{traced:?} {levels:?}");
+    }
 }

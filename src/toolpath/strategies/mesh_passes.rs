@@ -6,25 +6,23 @@
 //! run through by a smooth curve of the places of the cutter's axis; every height comes from dropping
 //! the cutter there, so that the mesh decides where passes run, never how deep.
 
-use super::mesh_shortest::shortest_stream;
+use super::mesh_shortest::shortest_streams;
 use super::shortest::{Objective, SEARCHED};
 use super::streamline::FITTED;
 use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between};
-use crate::levels::planned_field;
-use crate::levels::spacing::{AllowedStep, LevelSteps, place_levels};
+use crate::levels::on_triangles::{OnTriangles, along_directions, refused, smooth_directions};
+use crate::levels::spacing::place_levels;
+use crate::levels::{planned_field, spirals};
 use crate::surface::border::useful_overrun;
-use crate::surface::feed::{self, SMOOTHING_OVER_RADIUS};
+use crate::surface::feed;
 use crate::surface::mesh_surface::{ConnectedPiece, MeshSurface, not_applicable, reachable};
 use crate::vocabulary::{
-    Contact, FeedDirection, LevelFunction, Levelled, OffDirection, PassSettings, Passes, PlanError, Step,
-    Task,
+    Contact, FeedDirection, LevelFunction, Levelled, Lines, PassSettings, Passes, PlanError, Step, Task,
 };
 use cutter::Cutter;
 use drop_cutter::DropCutter;
-use field::mesh::{
-    Bend, Held, Line, MeshCurve, MeshFieldError, MeshLevels, MeshPoint, Wanted, flows, orient_lines,
-    smooth_lines, solve_stream,
-};
+use field::mesh::{Bend, Held, Line, MeshCurve, MeshPoint, Sense, Wanted};
+use field::{DIRECTION_WEIGHT, Packed};
 use geometry::{Point2, Point3, Vector2, Vector3};
 use scallop::{FeedCurvature, strip_width_at};
 use work::monitor::{Cancelled, Monitor};
@@ -37,9 +35,6 @@ const LEAST_TOLD: f64 = 0.05;
 
 /// The strip beyond borders is this share of an interval wide, as on charts.
 const BORDER_SHARE: f64 = 0.6;
-
-/// Part of a direction's weight that does not depend on how much the direction matters.
-const LEAST_WEIGHT: f64 = 0.02;
 
 /// Evening out moves a pass by at most this share of its interval; the scallop grows by twice that
 /// share twice over where two neighbours move apart.
@@ -54,10 +49,10 @@ const EVEN: [f64; 5] = [-3.0 / 35.0, 12.0 / 35.0, 17.0 / 35.0, 12.0 / 35.0, -3.0
 /// What the stream function shall do.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Aim<'a> {
-    /// Follow a direction, by how much it counts over the distances of passes.
-    Fitted(&'a FeedDirection, f64),
-    /// Make the path shortest; with a direction and how much dearer passes square to it are.
-    Shortest(Option<(&'a FeedDirection, f64)>),
+    /// Follow a direction, by how much it counts over the distances of passes, along levels or traced lines.
+    Fitted(&'a FeedDirection, f64, Lines),
+    /// Make the path best; with a direction and how much dearer passes square to it are.
+    Shortest(Option<(&'a FeedDirection, f64)>, Objective),
 }
 
 /// Passes along the level curves of a stream function over everything of the part that is reached from
@@ -76,7 +71,7 @@ pub(crate) fn on_mesh(task: &Task<'_>, aim: Aim) -> Result<Passes, PlanError> {
         patches => patches.iter().map(|patch| patch.domain()).collect(),
     };
     let mut all = Passes::default();
-    if let Aim::Fitted(direction, _) | Aim::Shortest(Some((direction, _))) = aim {
+    if let Aim::Fitted(direction, ..) | Aim::Shortest(Some((direction, _)), _) = aim {
         all.notes.extend(feed::check(direction, &part.bounds(), &parameters)?);
     }
     let reached = reachable(part, cutter, flat)?;
@@ -102,76 +97,116 @@ fn on_piece(
     surface: &MeshSurface,
     earlier: Option<(&[f64], &Levelled)>,
 ) -> Result<Passes, PlanError> {
-    let Task { part, cutter, ref settings, monitor, .. } = *task;
-    let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     let wanted = match aim {
-        Aim::Fitted(direction, _) | Aim::Shortest(Some((direction, _))) => {
-            feed::on_mesh(part, cutter, direction, piece, surface).map_err(refused)?
+        Aim::Fitted(direction, ..) | Aim::Shortest(Some((direction, _)), _) => {
+            feed::on_mesh(task.part, task.cutter, direction, piece, surface).map_err(refused)?
         }
-        Aim::Shortest(None) => Vec::new(),
+        Aim::Shortest(None, _) => Vec::new(),
     };
     // Notes and field, to which passes come later.
     let mut all = Passes::default();
-    let levelled = match (aim, earlier) {
+    let functions = match (aim, earlier) {
         // A fitted function is solved again, with its notes: that takes little.
-        (Aim::Fitted(direction, weight), _) => {
+        (Aim::Fitted(direction, weight, _), _) => {
             let (lines, matters) = feed_lines(task, direction, piece, surface, &wanted, &mut all)?;
             let values = along_lines(task, (&lines, &matters), weight, surface, &mut all)?;
             let function = LevelFunction::Mesh(values.into());
-            Levelled { function, planned_as: FITTED.into(), told: None }
+            vec![Levelled { function, planned_as: FITTED.into(), told: None }]
         }
-        (Aim::Shortest(_), Some((values, levelled))) if values.len() == surface.mesh.points().len() => {
-            levelled.clone()
+        (Aim::Shortest(..), Some((values, levelled))) if values.len() == surface.mesh.points().len() => {
+            vec![levelled.clone()]
         }
-        (Aim::Shortest(toward), _) => {
+        (Aim::Shortest(toward, objective), _) => {
             let lines = toward.map(|(direction, dearer)| {
                 let (lines, matters) = feed_lines(task, direction, piece, surface, &wanted, &mut all)?;
                 let pull = |(line, matters): (&Line, &f64)| (line.direction, dearer * matters);
                 Ok::<_, PlanError>(lines.iter().zip(&matters).map(pull).collect::<Vec<_>>())
             });
-            let toward = lines.transpose()?;
-            let found = shortest_stream(surface, cutter, settings, toward.as_deref(), monitor)?;
-            let found =
-                found.ok_or_else(|| not_applicable("no stream function of least length was found"))?;
-            let told = toward.is_none().then(|| (Objective::Length.told().to_owned(), found.cost));
-            let function = LevelFunction::Mesh(found.coefficients.into());
-            Levelled { function, planned_as: SEARCHED.into(), told }
+            let lines = lines.transpose()?;
+            let quickest = toward.is_none() && objective == Objective::Time;
+            let around = quickest.then(|| along_borders(task, piece, surface)).flatten();
+            let mut found = shortest_streams(surface, task, lines.as_deref(), around, objective)?;
+            if quickest {
+                // What the least length promises may still take less time.
+                found.extend(shortest_streams(surface, task, None, None, Objective::Length)?);
+            }
+            let levelled = |found: Packed| {
+                let length = found.cost - found.turning + found.ends;
+                let told = toward.is_none().then(|| (objective.told().to_owned(), length));
+                let function = LevelFunction::Mesh(found.coefficients.into());
+                Levelled { function, planned_as: SEARCHED.into(), told }
+            };
+            found.into_iter().map(levelled).collect()
         }
     };
+    let mut best: Option<(f64, Passes)> = None;
+    let several = functions.len() > 1;
+    for levelled in functions {
+        let passes = along_function(task, aim, surface, &wanted, levelled)?;
+        let worth = match aim {
+            Aim::Shortest(_, objective) if several => objective.worth(task, &passes)?,
+            _ => 0.0,
+        };
+        if best.as_ref().is_none_or(|(least, _)| worth < *least) {
+            best = Some((worth, passes));
+        }
+    }
+    let Some((_, best)) = best else {
+        return Err(not_applicable("no stream function of least length was found"));
+    };
+    all.append(best);
+    Ok(all)
+}
+
+/// A function whose levels run along the borders of a piece with a hole, around which they close; `None` without a hole.
+fn along_borders(task: &Task<'_>, piece: &ConnectedPiece, surface: &MeshSurface) -> Option<Vec<f64>> {
+    if piece.mesh.loops().len() < 2 {
+        return None;
+    }
+    let direction = FeedDirection::Border(Sense::Along);
+    let wanted = feed::on_mesh(task.part, task.cutter, &direction, piece, surface).ok()?;
+    let mut unused = Passes::default();
+    let (lines, matters) = feed_lines(task, &direction, piece, surface, &wanted, &mut unused).ok()?;
+    along_lines(task, (&lines, &matters), DIRECTION_WEIGHT, surface, &mut unused).ok()
+}
+
+/// Passes along the lines of a function.
+fn along_function(
+    task: &Task<'_>,
+    aim: Aim,
+    surface: &MeshSurface,
+    wanted: &[Wanted],
+    levelled: Levelled,
+) -> Result<Passes, PlanError> {
+    let Task { part, cutter, ref settings, monitor, .. } = *task;
     let LevelFunction::Mesh(values) = &levelled.function else {
         return Err(not_applicable("an earlier plan was made on a chart"));
     };
-    let levels = MeshLevels::new(&surface.mesh, values).map_err(refused)?;
+    let lines = match aim {
+        Aim::Fitted(_, _, lines) => lines,
+        Aim::Shortest(..) => Lines::Levels,
+    };
+    let on = OnTriangles::new(&surface.mesh, values, wanted, lines, settings.sampling)?;
     let own_values = values.iter().zip(&surface.origin).enumerate();
     let own_values = own_values.filter(|&(v, (_, &origin))| origin as usize == v).map(|(_, (psi, _))| *psi);
     let range = own_values.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], x| [lo.min(x), hi.max(x)]);
     let drop = DropCutter::watched(part, cutter, monitor)?;
-    let guide = MeshGuide { surface, levels, wanted: &wanted, cutter, drop, settings, monitor };
-    let places = guide.places(values);
-    let placed = place_levels(&places, range, LevelSteps::Shortest, &mut all.notes);
-    planned_field::set_mesh_levels(&mut all.field, &guide.levels, range, surface.own_triangles);
-    if matches!(aim, Aim::Shortest(None)) {
-        planned_field::set_mesh_feed(
-            &mut all.field,
-            part,
-            cutter,
-            &level_lines(surface, &guide.levels),
-            surface,
-        );
+    let guide = MeshGuide { surface, on, cutter, drop, settings, monitor };
+    let places = guide.on.places(surface.own_triangles, |p| guide.allowed_at(p));
+    let mut notes = Vec::new();
+    let placed = place_levels(&places, range, lines.steps(), &mut notes);
+    let mut passes = along_and_between(&guide, &placed, range, settings.sampling, monitor)?;
+    passes.notes.splice(0..0, notes);
+    planned_field::set_mesh_levels(&mut passes.field, &guide.on.levels, range, surface.own_triangles);
+    if matches!(aim, Aim::Shortest(None, _)) {
+        let lines = guide.on.level_lines();
+        planned_field::set_mesh_feed(&mut passes.field, part, cutter, &lines, surface);
     }
-    all.append(along_and_between(&guide, &placed, range, settings.sampling, monitor)?);
-    levelled.put_with(&mut all);
-    Ok(all)
-}
-
-/// The directions of levels at the vertices.
-fn level_lines(surface: &MeshSurface, levels: &MeshLevels<'_>) -> Vec<Line> {
-    let mesh = &surface.mesh;
-    let line = |(v, gradient): (usize, &Vector3)| {
-        let along = gradient.cross(&mesh.normals()[v]).try_normalize(1e-300);
-        Line { direction: along.unwrap_or(mesh.frame(v)[0]), agreement: f64::from(along.is_some()) }
-    };
-    levels.gradients().iter().enumerate().map(line).collect()
+    levelled.put_with(&mut passes);
+    if matches!(aim, Aim::Shortest(None, Objective::Time)) {
+        return spirals::where_quicker(task, passes);
+    }
+    Ok(passes)
 }
 
 /// ψ at the vertices whose levels follow feed directions.
@@ -183,18 +218,15 @@ fn along_lines(
     all: &mut Passes,
 ) -> Result<Vec<f64>, PlanError> {
     let Task { cutter, ref settings, .. } = *task;
-    let refused = |e: MeshFieldError| not_applicable(&e.to_string());
     let mesh = &surface.mesh;
     // What was measured of an earlier plan moves levels, not the function.
     let width =
         |v: usize, b: &Vector3| width_at(cutter, &mesh.normals()[v], b, &surface.bends[v], settings.step).0;
-    let count = mesh.points().len();
     let own = |v: usize| surface.origin[v] as usize;
     let across = |v: usize| mesh.normals()[v].cross(&lines[v].direction);
-    let density: Vec<f64> = (0..count).map(|v| 1.0 / width(own(v), &across(own(v)))).collect();
-    let weight: Vec<f64> = (0..count).map(|v| matters[own(v)] + LEAST_WEIGHT).collect();
-    let flows = flows(mesh, lines, &density, &weight);
-    let stream = solve_stream(mesh, &flows, direction_weight, &Held::default()).map_err(refused)?;
+    let density: Vec<f64> = (0..lines.len()).map(|v| 1.0 / width(own(v), &across(own(v)))).collect();
+    let matters = |v: usize| matters[own(v)];
+    let stream = along_directions(mesh, lines, &density, matters, direction_weight, &Held::default())?;
     all.notes.push(format!(
         "the stream function follows the feed directions within {:.2} degrees (root mean square)",
         stream.angle_rms.to_degrees()
@@ -224,8 +256,6 @@ fn feed_lines(
     passes: &mut Passes,
 ) -> Result<(Vec<Line>, Vec<f64>), PlanError> {
     let Task { part, cutter, .. } = *task;
-    let refused = |e: MeshFieldError| not_applicable(&e.to_string());
-    let mesh = &surface.mesh;
     let mut wanted = wanted.to_vec();
     let matters = wanted.iter().map(|w| w.map_or(0.0, |(_, matters)| matters)).collect();
     // Beyond the border the field goes on as it comes.
@@ -237,9 +267,7 @@ fn feed_lines(
     if wanted.iter().all(Option::is_none) {
         return Err(feed::nowhere(direction, piece.mesh.points().iter().copied()));
     }
-    let smoothing = SMOOTHING_OVER_RADIUS * cutter.radius();
-    let mut lines = smooth_lines(mesh, &wanted, &[], smoothing).map_err(refused)?;
-    orient_lines(mesh, &mut lines);
+    let lines = smooth_directions(&surface.mesh, &wanted, cutter)?;
     planned_field::set_mesh_feed(&mut passes.field, part, cutter, &lines, surface);
     passes.notes.extend(planned_field::singular_note(&passes.field));
     Ok((lines, matters))
@@ -276,12 +304,10 @@ impl Knot {
     }
 }
 
-/// Turns level curves on a mesh into passes.
+/// Turns lines of a function on a mesh into passes.
 struct MeshGuide<'a> {
     surface: &'a MeshSurface,
-    levels: MeshLevels<'a>,
-    /// The directions asked for at the vertices; empty where none are.
-    wanted: &'a [Wanted],
+    on: OnTriangles<'a>,
     cutter: &'a Cutter,
     drop: DropCutter<'a>,
     settings: &'a PassSettings<'a>,
@@ -289,41 +315,10 @@ struct MeshGuide<'a> {
 }
 
 impl MeshGuide<'_> {
-    /// What each of the part's own triangles allows.
-    fn places(&self, psi: &[f64]) -> Vec<AllowedStep> {
-        let mesh = &self.surface.mesh;
-        let place = |t: usize| {
-            let third = MeshPoint { triangle: t as u32, weights: [1.0 / 3.0; 3], position: Point3::origin() };
-            let (allowed, too_concave) = self.allowed_at(&third)?;
-            let gradient = allowed.step / allowed.width;
-            let mean = mesh.triangles()[t].iter().map(|&v| psi[v as usize]).sum::<f64>() / 3.0;
-            Some(AllowedStep { psi: mean, step: allowed.step, length: mesh.area(t) * gradient, too_concave })
-        };
-        (0..self.surface.own_triangles).filter_map(place).collect()
-    }
-
-    fn mixed(&self, p: &MeshPoint, of: &[Vector3]) -> Vector3 {
-        let corners = self.surface.mesh.triangles()[p.triangle as usize];
-        (0..3).map(|k| of[corners[k] as usize] * p.weights[k]).sum()
-    }
-
     fn normal(&self, p: &MeshPoint) -> Vector3 {
         let corners = &self.surface.corner_normals[p.triangle as usize];
         let mixed: Vector3 = (0..3).map(|k| corners[k] * p.weights[k]).sum();
         mixed.try_normalize(1e-9).unwrap_or_else(Vector3::z)
-    }
-
-    /// How far a pass with a unit tangent `across` it is off the direction asked for: the mean of the corners', as lines.
-    fn off_direction(&self, p: &MeshPoint, across: &Vector3, normal: &Vector3) -> Option<OffDirection> {
-        let corners = self.surface.mesh.triangles()[p.triangle as usize];
-        let asked = (0..3).filter_map(|k| Some((p.weights[k], (*self.wanted.get(corners[k] as usize)?)?)));
-        let (mut sum, mut matters) = (Vector3::zeros(), 0.0);
-        for (weight, (line, of_corner)) in asked {
-            sum += line * (weight * if line.dot(&sum) < 0.0 { -1.0 } else { 1.0 });
-            matters += weight * of_corner;
-        }
-        let asked = (sum - normal * normal.dot(&sum)).try_normalize(1e-9)?;
-        Some(OffDirection::new(across, normal, &asked, matters))
     }
 
     /// The place of its weights.
@@ -335,7 +330,7 @@ impl MeshGuide<'_> {
     /// Step and width at a point, and whether the surface is too concave there.
     fn allowed_at(&self, p: &MeshPoint) -> Option<(Allowed, bool)> {
         let normal = self.normal(p);
-        let gradient = self.mixed(p, self.levels.gradients());
+        let gradient = self.on.gradient(p);
         let gradient = gradient - normal * normal.dot(&gradient);
         let across = gradient.try_normalize(1e-300)?;
         let corners = self.surface.mesh.triangles()[p.triangle as usize];
@@ -360,7 +355,7 @@ impl MeshGuide<'_> {
             };
             // Where the stretch before it ends; at a crease the cutter then rolls over the edge.
             if let Some(&last) = knots.last() {
-                let end = axis(&self.in_triangle(last.triangle, p.position));
+                let end = axis(&self.on.in_triangle(last.triangle, p.position));
                 knots.push(last.next(p.position, end, last.triangle));
             }
             let here = axis(&p);
@@ -413,7 +408,7 @@ impl MeshGuide<'_> {
         else {
             return 0.0;
         };
-        let Some(across) = self.mixed(p, self.levels.gradients()).try_normalize(1e-300) else { return 0.0 };
+        let Some(across) = self.on.gradient(p).try_normalize(1e-300) else { return 0.0 };
         // The feed is square to the gradient, so the angles to the border trade places.
         let (along, square) = (across.cross(border).norm(), across.dot(border).abs());
         useful_overrun(along / square.max(1e-9)) * allowed.width
@@ -439,7 +434,7 @@ impl MeshGuide<'_> {
             let (a, b) = (&knots[k], &knots[k + 1]);
             let t = if b.s > a.s { ((s - a.s) / (b.s - a.s)).clamp(0.0, 1.0) } else { 0.0 };
             let contact = a.contact + (b.contact - a.contact) * t;
-            let at = self.in_triangle(a.triangle, contact);
+            let at = self.on.in_triangle(a.triangle, contact);
             let allowed = self.allowed_at(&at).map(|(allowed, _)| allowed);
             let nowhere = Allowed { step: f64::INFINITY, width: self.settings.sampling };
             spots.push(Spot {
@@ -450,13 +445,6 @@ impl MeshGuide<'_> {
         }
         even_out(&mut spots, curve.closed);
         Some(Track { points: spots, closed: curve.closed })
-    }
-
-    fn in_triangle(&self, t: u32, position: Point3) -> MeshPoint {
-        let mesh = &self.surface.mesh;
-        let (corners, hats) = (mesh.corners(t as usize), mesh.hat_gradients(t as usize));
-        let weights = [0, 1, 2].map(|k| (1.0 + hats[k].dot(&(position - corners[k]))).clamp(0.0, 1.0));
-        MeshPoint { triangle: t, weights, position }
     }
 }
 
@@ -483,7 +471,7 @@ impl LevelSource for MeshGuide<'_> {
     type Place = Spot;
 
     fn curves(&self, level: f64) -> Vec<Track<Spot>> {
-        self.levels.curves(level).iter().filter_map(|curve| self.track(curve)).collect()
+        self.on.curves(level).iter().filter_map(|curve| self.track(curve)).collect()
     }
 
     fn allowed(&self, spot: &Spot) -> Option<Allowed> {
@@ -492,7 +480,7 @@ impl LevelSource for MeshGuide<'_> {
 
     fn contacts(&self, curve: &Track<Spot>, run: Option<[usize; 2]>) -> Vec<Contact> {
         let contact = |spot: &Spot| {
-            let gradient = self.mixed(&spot.at, self.levels.gradients());
+            let gradient = self.on.gradient(&spot.at);
             let normal = self.normal(&spot.at);
             let across = (gradient - normal * normal.dot(&gradient)).try_normalize(1e-300)?;
             let inside = (spot.at.triangle as usize) < self.surface.own_triangles;
@@ -502,7 +490,7 @@ impl LevelSource for MeshGuide<'_> {
                 allowed: spot.allowed.width,
                 inside,
                 parameters: None,
-                off: self.off_direction(&spot.at, &across, &normal),
+                off: self.on.off_direction(&spot.at, &across, &normal),
             })
         };
         curve.along(run).filter_map(contact).collect()
@@ -544,7 +532,13 @@ impl LevelSource for MeshGuide<'_> {
             self.drop.at(at.x, at.y).map(|drop| Point3::new(at.x, at.y, drop.tip_z))
         };
         let settings = PassSettings { sampling: 1.0, ..*self.settings };
-        let moves = settings.moves(first as f64, end as f64, &mut tip, self.monitor)?;
+        let mut moves = settings.moves(first as f64, end as f64, &mut tip, self.monitor)?;
+        if curve.closed && run.is_none() && moves.len() > 1 {
+            // It comes back to within rounding.
+            let begin = moves[0];
+            moves.pop();
+            moves.push(begin);
+        }
         Ok(if moves.len() > 1 { vec![moves] } else { Vec::new() })
     }
 }

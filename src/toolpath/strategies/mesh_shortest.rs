@@ -1,4 +1,4 @@
-//! The stream function with the shortest path on a mesh: as `shortest`, by linear elements.
+//! The stream function with the best path on a mesh: as `shortest`, by linear elements.
 //!
 //! The gradient of linear elements jumps from triangle to triangle, so ψ is judged by recovered gradients. A little stiffness
 //! keeps it from kinks.
@@ -6,17 +6,22 @@
 use std::f64::consts::PI;
 
 use super::mesh_passes::width_at;
+use super::shortest::Objective;
+use super::stream_search::{Prices, keep_promising, turning};
 use crate::surface::mesh_surface::MeshSurface;
-use crate::vocabulary::{Guide, PassSettings, Step};
+use crate::vocabulary::{Guide, Step, Task};
 use cutter::Cutter;
 use field::mesh::{Bend, gradient_terms};
-use field::{Front, Gradients, Packed, Roughness, Rounds, Site, minimise};
+use field::{Front, Gradients, Packed, Roughness, Rounds, Site, minimise_priced};
 use geometry::Vector3;
-use work::monitor::{Cancelled, Monitor};
+use work::monitor::Cancelled;
 use work::parallel;
 
 /// Straight passes to start from, over half a turn.
 const STARTS: usize = 6;
+
+/// Functions that are gone on with, and planned, for the least time: what they promise is not what their levels give.
+const MOST_PLANNED: usize = 3;
 
 /// Intervals are judged by the gradients at vertices, as passes see them; those of triangles count by this share, for the
 /// unevenness that vertices do not see.
@@ -29,18 +34,25 @@ const BEND: f64 = 0.3;
 /// The strip beyond borders counts this share of its area: ψ goes on in it as it comes.
 const STRIP_SHARE: f64 = 0.02;
 
-/// ψ at the vertices, and what its passes cost; `None` where no passes can be planned. `toward` has at each vertex a
-/// direction and how much dearer passes square to it are.
+/// ψ at the vertices, and what its passes cost: of the shortest passes, or the few that promise the least time, the most promising
+/// first. `toward` has at each vertex a direction and how much dearer passes square to it are; `further` is a start besides straight
+/// passes.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
-pub(crate) fn shortest_stream(
+pub(crate) fn shortest_streams(
     surface: &MeshSurface,
-    cutter: &Cutter,
-    settings: &PassSettings<'_>,
+    task: &Task<'_>,
     toward: Option<&[(Vector3, f64)]>,
-    monitor: &dyn Monitor,
-) -> Result<Option<Packed>, Cancelled> {
+    further: Option<Vec<f64>>,
+    objective: Objective,
+) -> Result<Vec<Packed>, Cancelled> {
+    let Task { cutter, ref settings, ref pace, monitor, .. } = *task;
+    let slowed = |curvature: f64| pace.slowed(curvature, cutter.corner_radius());
+    let prices = match (objective, toward) {
+        (Objective::Time, None) => Prices { end: 0.5 * pace.link, turning: &slowed },
+        _ => Prices { end: 0.0, turning: &|_| 0.0 },
+    };
     let mesh = &surface.mesh;
     let (own, count) = (surface.own_triangles, mesh.points().len());
     let share = |t: usize| if t < own { mesh.area(t) } else { STRIP_SHARE * mesh.area(t) };
@@ -48,7 +60,7 @@ pub(crate) fn shortest_stream(
     for (t, corners) in mesh.triangles().iter().enumerate() {
         corners.iter().for_each(|&v| around[v as usize] += share(t) / 3.0);
     }
-    let pricing = Pricing { surface, cutter, step: settings.step, guide: settings.guide(), toward };
+    let pricing = Pricing { surface, cutter, step: settings.step, guide: settings.guide(), toward, prices };
     let sites = parallel::map(count + mesh.triangles().len(), |k| match k.checked_sub(count) {
         None => pricing.at_vertex(k, (1.0 - DAMPING) * around[k]),
         Some(t) => pricing.on_triangle(t, DAMPING * share(t)),
@@ -69,22 +81,46 @@ pub(crate) fn shortest_stream(
         }
         kept.push(site);
     }
+    if prices.end > 0.0 {
+        for [t, k] in border_sides(surface) {
+            let Some((mut site, [e1, e2])) = pricing.on_triangle(t, 0.0) else { continue };
+            let corners = mesh.corners(t);
+            let side = corners[(k + 1) % 3] - corners[k];
+            site.border = Some([side.dot(&e1), side.dot(&e2)]);
+            let hats = mesh.triangles()[t].into_iter().zip(mesh.hat_gradients(t));
+            gradients.push(&site, hats.map(|(v, gradient)| (v, [gradient.dot(&e1), gradient.dot(&e2)])));
+            kept.push(site);
+        }
+    }
     let area: f64 = kept.iter().map(|site| site.area).sum();
     let density = kept.iter().map(|site| site.area * site.front.mean_slowness()).sum::<f64>() / area;
     let roughness = roughness(surface, cutter, density);
-    monitor.start("searching directions", STARTS as u64 + 1);
+    let most = if prices.end > 0.0 { MOST_PLANNED } else { 1 };
+    monitor.start("searching directions", (STARTS + usize::from(further.is_some()) + most) as u64);
     let minimise = |start: Vec<f64>, rounds: Rounds| {
-        let found = minimise(&kept, &gradients, &roughness, start, rounds, monitor);
+        let found = minimise_priced(&kept, &gradients, &roughness, prices.end, start, rounds, monitor);
         monitor.advance(1);
         found
     };
-    let straight = parallel::try_map(STARTS, |k| {
+    let straight = |k: usize| -> Vec<f64> {
         let (sin, cos) = (PI * k as f64 / STARTS as f64).sin_cos();
-        let start = mesh.points().iter().map(|p| density * (cos * p.x + sin * p.y)).collect();
-        minimise(start, Rounds::First)
-    })?;
-    let best = straight.into_iter().flatten().min_by(|a, b| a.cost.total_cmp(&b.cost));
-    best.map_or(Ok(None), |best| minimise(best.coefficients, Rounds::Last))
+        mesh.points().iter().map(|p| density * (cos * p.x + sin * p.y)).collect()
+    };
+    let starts: Vec<Vec<f64>> = (0..STARTS).map(straight).chain(further).collect();
+    let starts = parallel::try_map(starts.len(), |k| minimise(starts[k].clone(), Rounds::First))?;
+    let mut starts: Vec<Packed> = starts.into_iter().flatten().collect();
+    starts.sort_by(|a, b| a.priced(prices.end).total_cmp(&b.priced(prices.end)));
+    starts.truncate(most);
+    let found = parallel::try_map(starts.len(), |k| minimise(starts[k].coefficients.clone(), Rounds::Last))?;
+    let mut found: Vec<Packed> = found.into_iter().flatten().collect();
+    keep_promising(&mut found, prices.end, |found| found, |_, _| true);
+    Ok(found)
+}
+
+/// The sides of the part's own triangles along its borders: triangle and side.
+fn border_sides(surface: &MeshSurface) -> impl Iterator<Item = [usize; 2]> {
+    let sides = (0..surface.own_triangles).flat_map(|t| (0..3).map(move |k| [t, k]));
+    sides.filter(|&[t, k]| surface.mesh.neighbour(t, k).is_none_or(|n| n >= surface.own_triangles))
 }
 
 /// About `BEND ∫ r² |∇∇ψ|² dA/|∇ψ|`, from the jumps of the gradient at edges.
@@ -119,6 +155,7 @@ struct Pricing<'a> {
     step: Step,
     guide: Guide<'a>,
     toward: Option<&'a [(Vector3, f64)]>,
+    prices: Prices<'a>,
 }
 
 impl Pricing<'_> {
@@ -163,16 +200,12 @@ impl Pricing<'_> {
             });
             1.0 - bend.along(&feed) * self.cutter.corner_radius() + away
         });
-        Some((
-            Site {
-                area,
-                stiff_area: 0.0,
-                front,
-                cost: Site::harmonic(costs),
-                turning: [0.0; 3],
-                border: None,
-            },
-            [e1, e2],
-        ))
+        let turning = turning(&self.prices, |angle| {
+            let (sin, cos) = angle.sin_cos();
+            bend.along(&(e2 * cos - e1 * sin))
+        });
+        let mut cost = Site::harmonic(costs);
+        (0..3).for_each(|k| cost[k] += turning[k]);
+        Some((Site { area, stiff_area: 0.0, front, cost, turning, border: None }, [e1, e2]))
     }
 }

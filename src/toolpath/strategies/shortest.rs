@@ -11,7 +11,7 @@
 //! least time. By length, both have a small price of their own, and the shortest passes are taken.
 //!
 //! The fronts of iso-scallop passes are among the starts. Where their own passes are still better than those of all functions found, they are
-//! taken, and named so.
+//! taken, and named so. Closed passes one inside the other are joined to spirals where that is quicker than links ([`spirals`]).
 //!
 //! Enters: a part and the scallop height. Leaves: passes. Lengths in mm.
 
@@ -22,21 +22,24 @@ use std::sync::Arc;
 
 use super::direction_keys;
 use super::iso_scallop::{along_front, border_name, fronts, places};
-use super::mesh_passes::{self, Aim};
+use super::mesh_passes::{self, Aim, width_at};
 use super::stream_search::{Found, Prices, Search};
 use crate::levels::level_passes::{along_earlier, along_levels};
-use crate::levels::{obedience, planned_field};
+use crate::levels::{obedience, planned_field, spirals};
 use crate::strategies::iso_scallop::FrontStart;
 use crate::surface::chart::Chart;
 use crate::surface::feed;
+use crate::surface::mesh_surface::{reachable, wants_mesh};
 use crate::vocabulary::{
     Definition, FeedDirection, LevelFunction, Levelled, Links, Passes, PlanError, Step, Strategy, Task,
 };
 use cutter::Cutter;
 use field::ShortestPossible;
+use field::mesh::Bend;
 use geometry::Vector3;
 use keys::{toml_number, word_of};
 use part::Part;
+use scallop::{FeedCurvature, strip_width_at};
 use work::monitor::{self, Cancelled, Monitor};
 use work::parallel;
 
@@ -51,7 +54,8 @@ const END: f64 = 0.28;
 const PLACES: usize = 150;
 const DIRECTIONS: usize = 36;
 
-/// The shortest possible path below the scallop height `h`, mm, by the widest strip over all directions at each place.
+/// The shortest possible path below the scallop height `h`, mm, by the widest strip over all directions at each place: of patches and of
+/// smooth surfaces that are fitted to meshes, as far as the part lies below, or of the facets of meshes with holes and steps.
 ///
 /// # Errors
 /// When no smooth surface can be fitted to a mesh, and when cancelled.
@@ -61,38 +65,84 @@ pub fn shortest_possible(
     h: f64,
     monitor: &dyn Monitor,
 ) -> Result<ShortestPossible, PlanError> {
-    let mut sum = ShortestPossible { cutting_mm: 0.0, contact_mm: 0.0, limited_fraction: 0.0 };
-    let mut total = 0.0;
-    for chart in Chart::all(part, cutter, crate::vocabulary::Guide::default())? {
-        let (places, cell) = places(&chart, PLACES);
-        let least = |k: usize| {
-            monitor::check(monitor)?;
-            let (_, p) = &places[k];
-            let (e, f, g) = p.jet.first_form();
-            let area = cell * (e * g - f * f).max(0.0).sqrt();
-            let Some(t0) = p.jet.du.try_normalize(1e-300) else { return Ok(None) };
-            let b0 = p.normal.cross(&t0);
-            let (mut cutting, mut contact, mut limited) = (f64::INFINITY, f64::INFINITY, false);
-            for k in 0..DIRECTIONS {
-                let (sin, cos) = (PI * k as f64 / DIRECTIONS as f64).sin_cos();
-                let t: Vector3 = t0 * cos + b0 * sin;
-                let (width, too_concave) = p.strip_width(cutter, &t, Step::Scallop(h));
-                cutting = cutting.min(p.offset_ratio(cutter, &t) / width);
-                contact = contact.min(1.0 / width);
-                limited |= too_concave;
-            }
-            Ok::<_, Cancelled>(Some((area, cutting, contact, limited)))
-        };
-        for (area, cutting, contact, limited) in parallel::try_map(places.len(), least)?.into_iter().flatten()
-        {
-            sum.cutting_mm += cutting * area;
-            sum.contact_mm += contact * area;
-            sum.limited_fraction += if limited { area } else { 0.0 };
-            total += area;
+    let step = Step::Scallop(h);
+    let mut all: Vec<Least> = Vec::new();
+    if part.patches().is_empty() && wants_mesh(part, cutter) {
+        let flat = strip_width_at(cutter, &Vector3::z(), &Vector3::x(), &FeedCurvature::default(), h).0;
+        for piece in reachable(part, cutter, flat)?.pieces {
+            let mesh = &piece.mesh;
+            let of_facet = |t: usize| {
+                monitor::check(monitor)?;
+                let Some(normal) = mesh.area_vector(t).try_normalize(1e-300) else { return Ok(None) };
+                let mut bend = Bend::default();
+                mesh.triangles()[t].iter().for_each(|&v| bend.add(&piece.bends[v as usize], 1.0 / 3.0));
+                let ratio = |t: &Vector3| (1.0 - bend.along(t) * cutter.corner_radius()).max(0.0);
+                let width = |t: &Vector3| width_at(cutter, &normal, &normal.cross(t), &bend, step);
+                let [a, b, _] = mesh.corners(t);
+                Ok::<_, Cancelled>(Least::of(mesh.area(t), &(b - a), &normal, ratio, width))
+            };
+            all.extend(parallel::try_map(mesh.triangles().len(), of_facet)?.into_iter().flatten());
+        }
+    } else {
+        for chart in Chart::all(part, cutter, crate::vocabulary::Guide::default())? {
+            let (places, cell) = places(&chart, PLACES);
+            let at = |k: usize| {
+                monitor::check(monitor)?;
+                let (_, p) = &places[k];
+                // A surface that is fitted to a mesh goes on beyond its border.
+                if part.patches().is_empty() && part.highest_at(p.jet.p.x, p.jet.p.y).is_none() {
+                    return Ok(None);
+                }
+                let (e, f, g) = p.jet.first_form();
+                let area = cell * (e * g - f * f).max(0.0).sqrt();
+                let ratio = |t: &Vector3| p.offset_ratio(cutter, t);
+                let width = |t: &Vector3| p.strip_width(cutter, t, step);
+                Ok::<_, Cancelled>(Least::of(area, &p.jet.du, &p.normal, ratio, width))
+            };
+            all.extend(parallel::try_map(places.len(), at)?.into_iter().flatten());
         }
     }
-    sum.limited_fraction /= total.max(f64::MIN_POSITIVE);
-    Ok(sum)
+    let sum = |of: &dyn Fn(&Least) -> f64| all.iter().map(|least| least.area * of(least)).sum::<f64>();
+    let limited = sum(&|least| if least.limited { 1.0 } else { 0.0 });
+    Ok(ShortestPossible {
+        cutting_mm: sum(&|least| least.cutting),
+        contact_mm: sum(&|least| least.contact),
+        limited_fraction: limited / sum(&|_| 1.0).max(f64::MIN_POSITIVE),
+    })
+}
+
+/// The least over all directions at a place that stands for an area, mm².
+struct Least {
+    area: f64,
+    /// Of the cutter's way for each mm² of the surface, and of that of the contact, 1/mm.
+    cutting: f64,
+    contact: f64,
+    /// Whether the surface is as concave as the cutter in one of them.
+    limited: bool,
+}
+
+impl Least {
+    /// By how much longer than the contact's the cutter's way is along a unit tangent, and by the strip's width there.
+    fn of(
+        area: f64,
+        tangent: &Vector3,
+        normal: &Vector3,
+        ratio: impl Fn(&Vector3) -> f64,
+        width: impl Fn(&Vector3) -> (f64, bool),
+    ) -> Option<Self> {
+        let t0 = tangent.try_normalize(1e-300)?;
+        let b0 = normal.cross(&t0);
+        let mut least = Self { area, cutting: f64::INFINITY, contact: f64::INFINITY, limited: false };
+        for k in 0..DIRECTIONS {
+            let (sin, cos) = (PI * k as f64 / DIRECTIONS as f64).sin_cos();
+            let t: Vector3 = t0 * cos + b0 * sin;
+            let (width, too_concave) = width(&t);
+            least.cutting = least.cutting.min(ratio(&t) / width);
+            least.contact = least.contact.min(1.0 / width);
+            least.limited |= too_concave;
+        }
+        Some(least)
+    }
 }
 
 /// What the best path has the least of.
@@ -109,6 +159,14 @@ impl Objective {
     /// Its words in scenes.
     pub(super) const WORDS: [(&str, Self); 2] = [("time", Self::Time), ("length", Self::Length)];
 
+    /// What passes have of it.
+    pub(super) fn worth(self, task: &Task<'_>, passes: &Passes) -> Result<f64, PlanError> {
+        match self {
+            Self::Time => (task.pace.duration)(passes),
+            Self::Length => Ok(passes.length()),
+        }
+    }
+
     /// What the user is told of passes along the best function.
     pub(super) fn told(self) -> &'static str {
         match self {
@@ -124,8 +182,7 @@ pub struct ShortestStreamline {
     /// A direction to keep to, and how much dearer a mm of pass square to it is, in mm: 0 leaves all freedom, a great number
     /// none.
     pub toward: Option<(FeedDirection, f64)>,
-    /// What the best path has the least of; with a direction, closeness to it comes first, and passes on meshes have one function, of
-    /// the least length.
+    /// What the best path has the least of; with a direction, closeness to it comes first.
     pub objective: Objective,
 }
 
@@ -146,7 +203,7 @@ impl Strategy for ShortestStreamline {
     fn passes(&self, task: &Task<'_>) -> Result<Passes, PlanError> {
         let toward = self.toward.as_ref().map(|(direction, dearer)| (direction, *dearer));
         if self.on_facets(task) {
-            mesh_passes::on_mesh(task, Aim::Shortest(toward))
+            mesh_passes::on_mesh(task, Aim::Shortest(toward, self.objective))
         } else {
             passes(task, toward, self.objective)
         }
@@ -212,9 +269,14 @@ pub(super) fn on_chart(
     toward: Option<(&FeedDirection, f64)>,
     objective: Objective,
 ) -> Result<Passes, PlanError> {
-    match task.earlier_on_chart(k, of) {
-        Some((field, levelled)) => along_earlier(task, chart, field, levelled),
-        None => searched(task, chart, toward, objective),
+    let passes = match task.earlier_on_chart(k, of) {
+        Some((field, levelled)) => along_earlier(task, chart, field, levelled)?,
+        None => searched(task, chart, toward, objective)?,
+    };
+    if toward.is_none() && objective == Objective::Time {
+        spirals::where_quicker(task, passes)
+    } else {
+        Ok(passes)
     }
 }
 
@@ -242,14 +304,10 @@ fn searched(
     let mut found = search.run()?;
     // With a direction to keep to, the best comes first: a shorter path may be one that leaves the direction.
     found.truncate(if toward.is_some() { 1 } else { found.len() });
-    let worth = |passes: &Passes| match objective {
-        Objective::Time => (pace.duration)(passes),
-        Objective::Length => Ok(passes.length()),
-    };
     let mut best: Option<(f64, Passes, Levelled)> = None;
     for Found { function, length, along } in found {
         let passes = along_levels(task, chart, &function)?;
-        let its = worth(&passes)?;
+        let its = objective.worth(task, &passes)?;
         if best.as_ref().is_none_or(|(least, ..)| its < *least) {
             let planned_as = along.map_or(Cow::Borrowed(SEARCHED), |border| {
                 format!("{SEARCHED} from the front that starts {}", border_name(border)).into()
@@ -265,7 +323,7 @@ fn searched(
     let tried = fronts.len();
     if let Some(front) = fronts.into_iter().next() {
         let front = along_front(task, chart, front, tried)?;
-        if !front.passes.is_empty() && worth(&front)? < least {
+        if !front.passes.is_empty() && objective.worth(task, &front)? < least {
             return Ok(front);
         }
     }

@@ -81,6 +81,36 @@ pub(super) struct Prices<'a> {
     pub turning: &'a (dyn Fn(f64) -> f64 + Sync),
 }
 
+/// Sorts what was found, the most promising first; keeps one of those that are the same minimum, and what is nearly as good as the best.
+pub(super) fn keep_promising<T>(
+    found: &mut Vec<T>,
+    end: f64,
+    packed: impl Fn(&T) -> &Packed,
+    alike: impl Fn(&T, &T) -> bool,
+) {
+    let priced = |of: &T| packed(of).priced(end);
+    found.sort_by(|a, b| priced(a).total_cmp(&priced(b)));
+    let near = |a: f64, b: f64, share: f64| (a - b).abs() <= share * a;
+    found.dedup_by(|b, a| {
+        let (of_a, of_b) = (packed(a), packed(b));
+        near(of_a.cost, of_b.cost, SAME[0]) && near(of_a.passes, of_b.passes, SAME[1]) && alike(a, b)
+    });
+    let most = found.first().map_or(0.0, &priced) * (1.0 + NEARLY_AS_GOOD);
+    found.retain(|of| priced(of) <= most);
+}
+
+/// What turning costs by the direction across the passes, as `[m, c, s]` of a [`Site`]; `curvature` is that along them.
+pub(super) fn turning(prices: &Prices<'_>, curvature: impl Fn(f64) -> f64) -> [f64; 3] {
+    let mut turning = [0.0; 3];
+    for k in 0..CURVED {
+        let angle = PI * k as f64 / CURVED as f64;
+        let price = (prices.turning)(curvature(angle)) / CURVED as f64;
+        let (sin, cos) = (2.0 * angle).sin_cos();
+        turning = [turning[0] + price, turning[1] + 2.0 * price * cos, turning[2] + 2.0 * price * sin];
+    }
+    turning
+}
+
 /// The search for the stream function of one chart.
 pub(super) struct Search<'a> {
     pub chart: &'a Chart<'a>,
@@ -150,8 +180,7 @@ impl Search<'_> {
         let straight = parallel::try_map(STARTS, |k| {
             minimise(&net, self.straight(&net, sides, PI * k as f64 / STARTS as f64), Rounds::First)
         })?;
-        let priced = |f: &Packed| f.cost + f.ends + 2.0 * end * f.passes;
-        let best = straight.into_iter().flatten().min_by(|a, b| priced(a).total_cmp(&priced(b)));
+        let best = straight.into_iter().flatten().min_by(|a, b| a.priced(end).total_cmp(&b.priced(end)));
         let mut best = best.ok_or_else(unfit)?;
         while let Some(count) = counts.pop() {
             best = minimise(&net, best.coefficients, Rounds::Last)?.ok_or_else(unfit)?;
@@ -172,13 +201,7 @@ impl Search<'_> {
         let free = [best, fitted].into_iter().flatten().map(|found| (found, finest.clone(), None));
         let mut found: Vec<(Packed, Net, Option<Border>)> =
             fronts.into_iter().flatten().chain(free).collect();
-        found.sort_by(|a, b| priced(&a.0).total_cmp(&priced(&b.0)));
-        let near = |a: f64, b: f64, share: f64| (a - b).abs() <= share * a;
-        found.dedup_by(|b, a| {
-            near(a.0.cost, b.0.cost, SAME[0]) && near(a.0.passes, b.0.passes, SAME[1]) && a.2 == b.2
-        });
-        let worth_planning = found.first().map_or(0.0, |best| priced(&best.0)) * (1.0 + NEARLY_AS_GOOD);
-        found.retain(|f| priced(&f.0) <= worth_planning);
+        keep_promising(&mut found, end, |found| &found.0, |a, b| a.2 == b.2);
         for k in 0..found.len() {
             let (packed, net, along) = &found[k];
             if let Some(drawn) = self.drawn_in(net, packed, end)? {
@@ -326,15 +349,10 @@ impl Search<'_> {
             1.0 - p.curvature_along(&feed) * self.cutter.corner_radius() + away
         });
         let mut cost = Site::harmonic(costs);
-        let mut turning = [0.0; 3];
-        for k in 0..CURVED {
-            let angle = PI * k as f64 / CURVED as f64;
+        let turning = turning(&self.prices, |angle| {
             let [du, dv] = front.vector(angle);
-            let feed = (p.jet.du * du + p.jet.dv * dv).cross(&p.normal);
-            let price = (self.prices.turning)(p.curvature_along(&feed)) / CURVED as f64;
-            let (sin, cos) = (2.0 * angle).sin_cos();
-            turning = [turning[0] + price, turning[1] + 2.0 * price * cos, turning[2] + 2.0 * price * sin];
-        }
+            p.curvature_along(&(p.jet.du * du + p.jet.dv * dv).cross(&p.normal))
+        });
         (0..3).for_each(|k| cost[k] += turning[k]);
         let border = (along != [0.0; 2]).then(|| front.components(along));
         let area = area * (e * g - f * f).max(0.0).sqrt();
@@ -591,6 +609,7 @@ mod tests {
             let weights: f64 = off.iter().map(|off| off.matters).sum();
             let squares: f64 = off.iter().map(|off| off.matters * off.angle.powi(2)).sum();
             let rms = (squares / weights).sqrt().to_degrees();
+            println!("{dearer}: {rms}");
             assert!(rms <= 3.0, "{dearer}: {rms} degrees");
         }
     }

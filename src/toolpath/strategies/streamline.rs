@@ -5,13 +5,13 @@ use std::fmt::{self, Write as _};
 use super::direction_keys;
 use super::mesh_passes::{self, Aim};
 use super::shortest::{self, Objective, ShortestStreamline};
-use crate::levels::level_passes::along_levels;
+use crate::levels::level_passes::along_lines;
 use crate::levels::{obedience, planned_field};
 use crate::surface::chart::{Chart, ChartPoint};
 use crate::surface::feed;
 use crate::surface::mesh_surface::not_applicable;
 use crate::vocabulary::{
-    Definition, FeedDirection, Guide, PartKind, Passes, PlanError, Reading, Step, Strategy, Task,
+    Definition, FeedDirection, Guide, Lines, PartKind, Passes, PlanError, Reading, Step, Strategy, Task,
 };
 use cutter::Cutter;
 use field::{
@@ -20,7 +20,7 @@ use field::{
     weighted_knots,
 };
 use geometry::{KnotVector, Vector3};
-use keys::{SceneError, Section, toml_number, toml_string};
+use keys::{SceneError, Section, toml_number, toml_string, word_of};
 
 /// Samples of the feed direction per control point of the stream function and side.
 const SAMPLES_PER_CONTROL: usize = 3;
@@ -64,6 +64,8 @@ pub struct Streamline {
     pub solver: Solver,
     /// How much following the directions counts over the distances of passes.
     pub direction_weight: f64,
+    /// Which lines of the function passes are.
+    pub lines: Lines,
 }
 
 /// Default control points a side of a stream function. More follow finer changes of the feed direction and cost time as
@@ -82,13 +84,14 @@ impl Streamline {
             method: StreamMethod::Automatic,
             solver: Solver::Cholesky,
             direction_weight: DIRECTION_WEIGHT,
+            lines: Lines::Levels,
         }
     }
 }
 
 /// Keys that say how directions are followed.
-const DIRECTED: [&str; 7] =
-    ["follow", "control_points", "method", "degree", "knots", "solver", "direction_weight"];
+const DIRECTED: [&str; 8] =
+    ["follow", "control_points", "method", "degree", "knots", "solver", "direction_weight", "lines"];
 
 /// Control points a side of the published fit.
 const PUBLISHED_CONTROL_POINTS: usize = 7;
@@ -117,6 +120,7 @@ pub(crate) static DEFINITION: Definition = Definition {
         "knots",
         "solver",
         "direction_weight",
+        "lines",
     ],
     read,
 };
@@ -158,7 +162,8 @@ fn read(from: &mut Reading<'_>) -> Result<Box<dyn Strategy>, SceneError> {
     };
     let control_points = control_points.unwrap_or(usual);
     let direction_weight = direction_keys::read_weight(section)?;
-    Ok(Box::new(Streamline { direction, control_points, method, solver, direction_weight }))
+    let lines = section.choice("lines", &Lines::WORDS)?;
+    Ok(Box::new(Streamline { direction, control_points, method, solver, direction_weight, lines }))
 }
 
 fn read_method(section: &Section<'_>, control_points: usize) -> Result<(StreamMethod, Solver), SceneError> {
@@ -232,6 +237,7 @@ impl Strategy for Streamline {
         if self.direction_weight != DIRECTION_WEIGHT {
             writeln!(out, "direction_weight = {}", toml_number(self.direction_weight))?;
         }
+        writeln!(out, "lines = \"{}\"", word_of(&Lines::WORDS, &self.lines))?;
         match self.method {
             StreamMethod::Automatic => return writeln!(out, "method = \"auto\""),
             StreamMethod::Elements => return writeln!(out, "method = \"elements\""),
@@ -256,7 +262,7 @@ impl Strategy for Streamline {
                 "its passes by elements are spaced for an upright cutter; use a ball, or another `method`";
             return Err(PlanError::NotApplicable { strategy: DEFINITION.word, reason: reason.to_owned() });
         }
-        mesh_passes::on_mesh(task, Aim::Fitted(&self.direction, self.direction_weight))
+        mesh_passes::on_mesh(task, Aim::Fitted(&self.direction, self.direction_weight, self.lines))
     }
 
     fn on_facets(&self, task: &Task<'_>) -> bool {
@@ -294,7 +300,7 @@ fn on_charts(task: &Task<'_>, asked: &Streamline) -> Result<Passes, PlanError> {
         let direction = feed::on_chart(direction, &chart, cutter)?;
         let (field, mut notes, wanted) =
             stream_function(&calculated, cutter, &direction, asked, settings.step)?;
-        let mut passes = along_levels(task, &chart, &field)?;
+        let mut passes = along_lines(task, &chart, &field, asked.lines)?;
         let feed = |[u, v]: [f64; 2]| chart.at(u, v)?.feed(&direction, cutter);
         planned_field::set_directions(&mut passes.field, part, &chart, feed);
         obedience::compare_on_chart(&mut passes.contacts, &chart, &direction, cutter);
@@ -500,9 +506,9 @@ fn placed_knots(
 mod tests {
     use super::*;
     use crate::plan::{Plan, plan};
-    use crate::vocabulary::PlanSettings;
+    use crate::vocabulary::{Joining, Links, PlanSettings};
     use field::LineSample;
-    use geometry::{AnalyticShape, AnalyticSurface};
+    use geometry::{AnalyticShape, AnalyticSurface, Point3, TriangleMesh};
     use part::{Part, Patch};
     use std::sync::Arc;
     use work::monitor::Silent;
@@ -533,8 +539,13 @@ mod tests {
         let cutter = Cutter::ball(6.0).unwrap();
         let chart = Chart::all(&part, &cutter, Guide::default()).unwrap().remove(0);
         let direction = vectors();
-        let asked =
-            Streamline { direction: direction.clone(), control_points, method, solver, direction_weight };
+        let asked = Streamline {
+            control_points,
+            method,
+            solver,
+            direction_weight,
+            ..Streamline::along(direction.clone())
+        };
         let (psi, ..) = stream_function(&chart, &cutter, &direction, &asked, Step::Scallop(0.01)).unwrap();
         let angles: Vec<f64> = chart
             .grid(61)
@@ -566,6 +577,93 @@ mod tests {
         assert_eq!(widest.path, free.path);
         assert!(widest.notes.iter().any(|note| note == ALIKE), "{:?}", widest.notes);
         assert_eq!(widest.kept.functions.len(), 1);
+    }
+
+    /// Passes of the least time on a mesh of two patches take no more of it than those of the least length.
+    #[test]
+    fn on_meshes_the_least_time_is_less_than_that_of_the_shortest_passes() {
+        let shape = AnalyticShape::Saddle { radius_concave: 20.0, radius_convex: 9.0 };
+        let patch =
+            |x: f64| Patch::Analytic(AnalyticSurface::new(shape, [[x, x + 6.0], [-4.0, 4.0]]).unwrap());
+        let part = Part::from_patches(vec![patch(-6.0), patch(0.0)], 0.002).unwrap();
+        let cutter = Cutter::ball(6.0).unwrap();
+        let settings = PlanSettings {
+            step: Step::Scallop(0.02),
+            stock_top: part.bounds().max.z + 1.0,
+            joining: Joining { links: Links::Surface, ..Joining::default() },
+            ..PlanSettings::default()
+        };
+        let machine = &machine::Machine { jerks: [f64::INFINITY; 3], ..settings.machine };
+        let [time, length] = [Objective::Time, Objective::Length].map(|objective| {
+            let strategy = ShortestStreamline { toward: None, objective };
+            let plan = plan(&part, &cutter, &strategy, &settings, &Silent).unwrap();
+            let path = machine::slow_corners(&plan.path, machine);
+            assert!(plan.notes.iter().any(|note| note.starts_with(objective.told())), "{:?}", plan.notes);
+            machine::machining_time(&path, machine, &Silent).unwrap()
+        });
+        println!("{time} {length}");
+        assert!(time <= length * (1.0 + 1e-9), "{time} {length}");
+    }
+
+    /// A bowl around a hole, from 6 to 12 mm of radius; `bend` is that of its meridian, 1/mm.
+    fn ring(bend: f64) -> Part {
+        const AROUND: u32 = 120;
+        let (inner, rings) = (6.0, 15);
+        let point = |k: u32| {
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(k % AROUND) / f64::from(AROUND)).sin_cos();
+            let radius = inner * (1.0 + f64::from(k / AROUND) / f64::from(rings));
+            Point3::new(radius * cos, radius * sin, 0.5 * bend * radius * radius)
+        };
+        let square = |k: u32| {
+            let next = k / AROUND * AROUND + (k + 1) % AROUND;
+            [[k, k + AROUND, next + AROUND], [k, next + AROUND, next]]
+        };
+        let points = (0..AROUND * (rings + 1)).map(point).collect();
+        let triangles = (0..AROUND * rings).flat_map(square).collect();
+        Part::from_mesh(TriangleMesh::new(points, triangles).unwrap().0)
+    }
+
+    /// The bound of a ring is that of its own area, and not of the rectangle around it; so is that of a plate without a hole whose border
+    /// is no rectangle.
+    #[test]
+    fn the_shortest_possible_path_is_that_of_the_part() {
+        let (cutter, h) = (Cutter::ball(6.0).unwrap(), 0.02);
+        let width = scallop::strip_width_at(&cutter, &Vector3::z(), &Vector3::x(), &Default::default(), h).0;
+        let half = [[0.0, 0.0, 0.0], [20.0, 0.0, 0.0], [0.0, 12.0, 0.0]].map(Point3::from).to_vec();
+        let triangle = Part::from_mesh(TriangleMesh::new(half, vec![[0, 1, 2]]).unwrap().0);
+        for (part, within) in [(ring(0.0), 1e-9), (triangle, 0.01)] {
+            let mesh = part.mesh();
+            let area: f64 = (0..mesh.triangles().len())
+                .map(|t| {
+                    let [a, b, c] = mesh.corners(t);
+                    0.5 * (b - a).cross(&(c - a)).norm()
+                })
+                .sum();
+            let least = shortest::shortest_possible(&part, &cutter, h, &Silent).unwrap();
+            assert!((least.cutting_mm * width / area - 1.0).abs() < within, "{least:?} {}", area / width);
+        }
+    }
+
+    /// Around a hole in level ground passes that close have no ends, and are the quickest.
+    #[test]
+    fn around_a_hole_the_quickest_passes_close() {
+        let part = ring(0.0);
+        let cutter = Cutter::ball(6.0).unwrap();
+        let settings = PlanSettings {
+            step: Step::Scallop(0.02),
+            stock_top: part.bounds().max.z + 1.0,
+            joining: Joining { links: Links::Surface, ..Joining::default() },
+            ..PlanSettings::default()
+        };
+        let time = ShortestStreamline { toward: None, objective: Objective::Time };
+        let plan = plan(&part, &cutter, &time, &settings, &Silent).unwrap();
+        let passes = &plan.kept.passes;
+        let closed = passes.iter().filter(|pass| pass.first() == pass.last()).count();
+        let length: f64 = passes.iter().flat_map(|p| p.windows(2)).map(|w| (w[1] - w[0]).norm()).sum();
+        let least = shortest::shortest_possible(&part, &cutter, 0.02, &Silent).unwrap().cutting_mm;
+        println!("{closed} of {} close, {length} {least} {:?}", passes.len(), plan.notes);
+        assert!(closed == passes.len() && closed > 5, "{closed} of {}", passes.len());
+        assert!(length > least && length < 1.1 * least, "{length} {least}");
     }
 
     /// Vectors that have a stream function are followed as closely as the published fit does where their lengths set the

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::levels::spacing::LevelSteps;
 use field::LineField;
 use field::mesh::Sense;
 use geometry::Point2;
@@ -13,6 +14,30 @@ pub enum Along {
     U,
     /// v grows along a pass, u is constant.
     V,
+}
+
+/// Which lines of a stream function passes are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Lines {
+    /// Its levels, placed for the shortest passes.
+    #[default]
+    Levels,
+    /// Its streamlines, traced by Runge–Kutta steps of fourth order from seeds: each as far from the line before as the narrowest strip
+    /// along both allows.
+    RungeKutta,
+}
+
+impl Lines {
+    /// Its words in scenes.
+    pub(crate) const WORDS: [(&str, Self); 2] = [("levels", Self::Levels), ("rk4", Self::RungeKutta)];
+
+    /// How the lines follow one another.
+    pub(crate) fn steps(self) -> LevelSteps {
+        match self {
+            Self::Levels => LevelSteps::Shortest,
+            Self::RungeKutta => LevelSteps::Least,
+        }
+    }
 }
 
 /// Where the feed direction of a streamline comes from.

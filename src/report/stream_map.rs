@@ -1,0 +1,153 @@
+//! The function whose levels passes are, as a surface seen aslant: each level at the height of its value, coloured by how dense passes are
+//! there.
+
+use super::canvas::{Align, FAINT_INK, INK, Picture, Strokes, TextSize, shortened};
+use super::map::{Key, MapSize, MapWords, Pooled, labelled, sequential};
+use super::scale::Unit;
+use field::{LevelLine, PlannedField};
+use geometry::Point2;
+
+/// The plan view seen aslant: how far y leads to the right and up, over its length.
+const RIGHT_BY_Y: f64 = 0.35;
+const UP_BY_Y: f64 = 0.5;
+
+/// The greatest value stands this much above the least, over the longer side of the plan view.
+const RISE: f64 = 0.5;
+
+/// Room to the right of the surface, pixels: its key.
+const KEY: usize = 190;
+
+/// Least height and width of the surface, pixels, so that its key and title fit.
+const LEAST_SIDE: f64 = 300.0;
+
+/// Width of lines, pixels.
+const WIDTH: f64 = 1.6;
+
+/// Colours of the key that lines wear: each takes a layer of its own.
+const COLOURS: usize = 24;
+
+/// Draws ψ of a streamline path.
+pub fn stream_picture(field: &PlannedField, words: &MapWords<'_>, size: MapSize) -> Picture {
+    const PER_MM: Unit = Unit { name: "passes / mm", a_millimetre: 1.0 };
+    let view = View::of(&field.level_lines, size);
+    let [left, top] = Pooled::CORNER;
+    let [width, height] = view.size.map(|side| side.max(LEAST_SIDE).ceil() as usize);
+    let mut page = Picture::blank(left as usize + width + KEY, top as usize + height + 24);
+    let letters = |size: TextSize| (page.pixels.width() as usize - 32) / size.letter_width();
+    let [title, subtitle] = [(words.title, TextSize::Title), (words.subtitle, TextSize::Small)]
+        .map(|(text, size)| shortened(text, letters(size)));
+    page.text(16, 12, &title, TextSize::Title, Align::Left, INK);
+    page.text(16, 36, &subtitle, TextSize::Small, Align::Left, FAINT_INK);
+    let densities =
+        || field.level_lines.iter().flat_map(|line| &line.densities).copied().filter(|d| d.is_finite());
+    let extremes = densities().fold(None, |range: Option<(f64, f64)>, d| {
+        Some(range.map_or((d, d), |(lo, hi)| (lo.min(d), hi.max(d))))
+    });
+    let (from, to) = extremes.unwrap_or((0.0, 1.0));
+    // A flat density is no rainbow of rounding.
+    let to = to.max(from + 0.01 * from.abs().max(f64::MIN_POSITIVE));
+    let key = Key {
+        from,
+        middle: 0.5 * (from + to),
+        to,
+        gradient: sequential,
+        ticks: labelled(from, to, 8.0, PER_MM),
+        unit: PER_MM,
+        top: "dense",
+        bottom: "wide",
+        extremes,
+    };
+    let share =
+        |density: f64| (((density - from) / (to - from)) * COLOURS as f64).clamp(0.0, (COLOURS - 1) as f64);
+    for colour in 0..COLOURS {
+        let mut strokes = Strokes::blank(width, height);
+        for line in &field.level_lines {
+            for (ends, density) in line.points.windows(2).zip(&line.densities) {
+                if share(*density) as usize == colour {
+                    strokes.line(view.place(ends[0], line.psi), view.place(ends[1], line.psi), WIDTH);
+                }
+            }
+        }
+        let middle = from + (to - from) * (colour as f64 + 0.5) / COLOURS as f64;
+        page.ink(Pooled::CORNER, &strokes, key.colour(middle as f32));
+    }
+    key.draw(&mut page, [left + width as i64 + 28, top + 24], height);
+    page
+}
+
+/// The way from the plan view and ψ to pixels, y down.
+struct View {
+    from: [f64; 2],
+    scale: f64,
+    least: f64,
+    rise: f64,
+    size: [f64; 2],
+}
+
+impl View {
+    fn of(lines: &[LevelLine], size: MapSize) -> Self {
+        let points = || lines.iter().flat_map(|line| &line.points);
+        let none = [f64::INFINITY, f64::NEG_INFINITY];
+        let range = |values: &mut dyn Iterator<Item = f64>| {
+            let [lo, hi] = values.fold(none, |[lo, hi], x| [lo.min(x), hi.max(x)]);
+            if lo <= hi { [lo, hi] } else { [0.0, 1.0] }
+        };
+        let [x, y] = [range(&mut points().map(|p| p.x)), range(&mut points().map(|p| p.y))];
+        let psi = range(&mut lines.iter().map(|line| line.psi));
+        let longer = (x[1] - x[0]).max(y[1] - y[0]).max(f64::MIN_POSITIVE);
+        let rise = if psi[1] > psi[0] { RISE * longer / (psi[1] - psi[0]) } else { 0.0 };
+        let wide = x[1] - x[0] + RIGHT_BY_Y * (y[1] - y[0]);
+        let high = UP_BY_Y * (y[1] - y[0]) + rise * (psi[1] - psi[0]);
+        let scale = size.comfortable() as f64 / wide.max(high).max(f64::MIN_POSITIVE);
+        Self { from: [x[0], y[0]], scale, least: psi[0], rise, size: [scale * wide, scale * high] }
+    }
+
+    fn place(&self, p: Point2, psi: f64) -> [f64; 2] {
+        let (x, y) = (p.x - self.from[0], p.y - self.from[1]);
+        let up = UP_BY_Y * y + self.rise * (psi - self.least);
+        [self.scale * (x + RIGHT_BY_Y * y), self.size[1].max(LEAST_SIDE) - self.scale * up]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WORDS: MapWords<'_> = MapWords { title: "psi", subtitle: "a part", marks: &[], axes: ["x", "y"] };
+
+    /// A line along x at `y`.
+    fn line(y: f64, psi: f64, density: f64) -> LevelLine {
+        let points: Vec<Point2> = (0..=20).map(|k| Point2::new(f64::from(k), y)).collect();
+        LevelLine { psi, densities: vec![density; points.len()], points }
+    }
+
+    #[test]
+    fn levels_stand_as_high_as_their_value_in_the_colour_of_their_density() {
+        let lines = vec![line(0.0, 2.0, 1.0), line(10.0, 4.0, 3.0)];
+        let field = PlannedField { level_lines: lines.clone(), ..PlannedField::default() };
+        let page = stream_picture(&field, &WORDS, MapSize::File);
+        let view = View::of(&lines, MapSize::File);
+        let [left, top] = Pooled::CORNER;
+        let at = |p: Point2, psi: f64| {
+            let [x, y] = view.place(p, psi);
+            page.pixels.get_pixel((left as f64 + x) as u32, (top as f64 + y) as u32).0
+        };
+        let (low, high) = (at(Point2::new(10.0, 0.0), 2.0), at(Point2::new(10.0, 10.0), 4.0));
+        let apart = |a: [u8; 3], b: [u8; 3]| (0..3).map(|k| a[k].abs_diff(b[k])).max().unwrap();
+        // Lines are smooth at their edges, and colours are those of the middle of a share.
+        assert!(apart(low, sequential(0.0)) < 45 && apart(high, sequential(1.0)) < 45, "{low:?} {high:?}");
+        // As high above it as the rise and the slant say.
+        let [a, b] = [view.place(Point2::new(0.0, 0.0), 2.0), view.place(Point2::new(0.0, 10.0), 4.0)];
+        assert!((a[1] - b[1] - view.scale * (10.0 * UP_BY_Y + 20.0 * RISE)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn nothing_and_one_level_can_be_drawn() {
+        for lines in [Vec::new(), vec![line(1.0, 1.0, 0.5)], vec![LevelLine::default()]] {
+            let field = PlannedField { level_lines: lines, ..PlannedField::default() };
+            for size in [MapSize::File, MapSize::Page] {
+                stream_picture(&field, &WORDS, size);
+            }
+        }
+    }
+}
