@@ -190,7 +190,7 @@ fn a_run_leaves_the_files_of_the_contract_and_no_other() {
         let folder = out.join(folder);
         let streamline = toolpath["strategy"] == "streamline";
         let mut files = TOOLPATH_FILES.to_vec();
-        files.extend(["field.png", "interval.png"].iter().filter(|_| streamline));
+        files.extend(["field.png", "interval.png", "psi.png"].iter().filter(|_| streamline));
         files.sort_unstable();
         assert_eq!(entries(&folder), files);
         assert_eq!(toolpath.get("field").is_some(), streamline);
