@@ -75,7 +75,7 @@ enum Came {
     Through,
     /// It cut next to nothing, or ended soon without care, and nothing changed.
     Stopped,
-    /// It cut next to nothing and never turned into stock, so that with care it would be the same, and nothing changed.
+    /// It met no stock, and nothing changed.
     ToNothing,
 }
 
@@ -134,7 +134,7 @@ impl<'a> Peeler<'a> {
             check(monitor)?;
             self.careful = false;
             let mut came = self.pass(k, monitor)?;
-            // Care changes steps that turn into stock, and those alone.
+            // Care changes steps that cut, and those alone.
             if came == Came::Stopped {
                 self.careful = true;
                 came = self.pass(k, monitor)?;
@@ -290,10 +290,9 @@ impl<'a> Peeler<'a> {
             step = full.min(2.0 * step);
         }
         let soon = stuck && gone < SOON * self.radius;
-        let turned = way.iter().any(|step| step.arc > 0.0 && step.turn < 0.0);
-        if cut < LEAST_CUT * self.radius || (soon && turned && !self.careful) {
+        if cut < LEAST_CUT * self.radius || (soon && !self.careful) {
             self.cleared.truncate(before);
-            return Ok(if turned { Came::Stopped } else { Came::ToNothing });
+            return Ok(if cut == 0.0 && !stuck { Came::ToNothing } else { Came::Stopped });
         }
         // What was gone without cutting is not gone in the end; it may have taken films away.
         self.cleared.truncate(self.cleared.len() - (way.len() - last_cut));
