@@ -266,7 +266,8 @@ impl Corrected<'_> {
         {
             let (planned, factors) = self.plan(&next, monitor)?;
             let gain = if self.is_left_as_before(&planned, factors) {
-                self.keep_unmeasured(&planned, next, factors)
+                let found = self.as_before(&planned, factors);
+                self.keep_best(&planned, next, found)
             } else {
                 let map = self.session.ridges(self.request, self.engine, &planned, monitor)?;
                 let found = map.and_then(|map| Standing::of_ridges(&map, &planned, factors));
@@ -291,14 +292,21 @@ impl Corrected<'_> {
             let Some(next) = self.next(in_vain, MEASURED_SLACK) else { break };
             let (planned, factors) = self.plan(&next, monitor)?;
             if self.is_left_as_before(&planned, factors) {
-                gain = self.keep_unmeasured(&planned, next, factors);
+                let found = self.as_before(&planned, factors);
+                gain = self.keep_best(&planned, next, found);
             } else {
+                let was_decided = measured.as_ref().is_some_and(|measured| !self.session.is_open(measured));
                 // Two at a time might be more than the memory that the run may take.
                 drop(measured.take());
                 let path = &planned.plan.path;
                 let again = self.session.measure(self.request, self.engine, path, self.closeness, monitor)?;
                 let Some(found) = Standing::of_all(&again.measurement, &planned, factors) else { break };
-                gain = self.keep_if_better(planned, next, found);
+                // A shorter path is no reason to give up what was decided.
+                gain = if was_decided && self.holds() && self.session.is_open(&again) {
+                    self.keep_best(&planned, next, found)
+                } else {
+                    self.keep_if_better(planned, next, found)
+                };
                 if gain != Gain::None {
                     measured = Some(again);
                 }
@@ -531,8 +539,8 @@ impl Corrected<'_> {
         a.min(b) > 0.0 && length.abs() <= AS_BEFORE * a.min(b)
     }
 
-    /// Keeps the best plan instead of one that leaves the same.
-    fn keep_unmeasured(&mut self, planned: &Planned, widths: Widths, factors: [f64; 2]) -> Gain {
+    /// What the best plan leaves, as that of another with other ends of passes.
+    fn as_before(&self, planned: &Planned, factors: [f64; 2]) -> Standing {
         let Standing { round, above } = &self.tried.standing;
         let round = CorrectionRound {
             factors,
@@ -540,9 +548,17 @@ impl Corrected<'_> {
             too_near_between_mm: too_near(planned),
             ..*round
         };
-        self.rounds.push(round);
-        let standing = Standing { round, above: above.clone() };
-        self.latest = Some(Tried { widths, standing, kept: planned.plan.kept.clone() });
+        Standing { round, above: above.clone() }
+    }
+
+    fn holds(&self) -> bool {
+        self.tried.standing.round.holds(&self.goal)
+    }
+
+    /// Keeps the best plan instead of this one.
+    fn keep_best(&mut self, planned: &Planned, widths: Widths, found: Standing) -> Gain {
+        self.rounds.push(found.round);
+        self.latest = Some(Tried { widths, standing: found, kept: planned.plan.kept.clone() });
         Gain::None
     }
 
