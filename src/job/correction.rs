@@ -21,6 +21,7 @@ use std::sync::Arc;
 
 use geometry::Point3;
 use metrology::{Engine, Measured, Measurement, RidgeMap, Simulation, path_figures};
+use report::Verdict;
 use scene::ToolpathRequest;
 use toolpath::{Earlier, Kept, Step, plane_interval};
 use work::monitor::{self, Monitor};
@@ -295,14 +296,15 @@ impl Corrected<'_> {
                 let found = self.as_before(&planned, factors);
                 gain = self.keep_best(&planned, next, found);
             } else {
-                let was_decided = measured.as_ref().is_some_and(|measured| !self.session.is_open(measured));
+                let passes = |measured: &Measured| self.session.verdict_on(measured) == Verdict::Pass;
+                let is_passing = measured.as_ref().is_some_and(passes);
                 // Two at a time might be more than the memory that the run may take.
                 drop(measured.take());
                 let path = &planned.plan.path;
                 let again = self.session.measure(self.request, self.engine, path, self.closeness, monitor)?;
                 let Some(found) = Standing::of_all(&again.measurement, &planned, factors) else { break };
-                // A shorter path is no reason to give up what was decided.
-                gain = if was_decided && self.holds() && self.session.is_open(&again) {
+                // A shorter path is no reason to give up a plan that passes.
+                gain = if is_passing && !passes(&again) {
                     self.keep_best(&planned, next, found)
                 } else {
                     self.keep_if_better(planned, next, found)
@@ -549,10 +551,6 @@ impl Corrected<'_> {
             ..*round
         };
         Standing { round, above: above.clone() }
-    }
-
-    fn holds(&self) -> bool {
-        self.tried.standing.round.holds(&self.goal)
     }
 
     /// Keeps the best plan instead of this one.

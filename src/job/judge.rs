@@ -33,9 +33,9 @@ pub(crate) fn judge(
     (claims.iter().map(Claim::verdict).max().unwrap_or(Verdict::Undecided), claims)
 }
 
-/// Whether a limit of the measured surface is undecided, and none violated.
-pub(crate) fn is_open(measured: &Measurement, limits: &Limits, rule: &ScallopRule) -> bool {
-    judge(measured, limits, rule, Vec::new(), "").0 == Verdict::Undecided
+/// The verdict on the measured surface alone.
+pub(crate) fn of_surface(measured: &Measurement, limits: &Limits, rule: &ScallopRule) -> Verdict {
+    judge(measured, limits, rule, Vec::new(), "").0
 }
 
 fn gouge(measured: &Measurement, limits: &Limits, program: &str) -> Claim {

@@ -11,7 +11,7 @@ use io::digest::{self, Fingerprint};
 use metrology::{Budget, Engine, LaidOut, Measured, Simulation, Task};
 use motion::{Cutters, Toolpath};
 use part::Part;
-use report::InputFile;
+use report::{InputFile, Verdict};
 use scene::{Fixture, Loaded, MeshFile, Scene, StockRequest, ToolpathRequest, load_mesh, load_part};
 use sim::{Grid, Stock};
 use toolpath::{PlanError, Pocket, shortest_possible};
@@ -255,7 +255,12 @@ impl Session {
 
     /// Whether a limit of the measured surface is undecided, and none violated.
     pub(crate) fn is_open(&self, measured: &Measured) -> bool {
-        judge::is_open(&measured.measurement, &self.scene.tolerance, &self.scene.scallop_rule)
+        self.verdict_on(measured) == Verdict::Undecided
+    }
+
+    /// The verdict on the measured surface alone.
+    pub(crate) fn verdict_on(&self, measured: &Measured) -> Verdict {
+        judge::of_surface(&measured.measurement, &self.scene.tolerance, &self.scene.scallop_rule)
     }
 
     /// The engine of a toolpath.

@@ -10,8 +10,8 @@
 //! ```
 //!
 //! with t along the feed and b across. A ridge of height `h` stands, to second order, between passes `√(8h / gap)` apart. The
-//! term with `G_tb` is the twist: where the surface twists along the feed, the cutter cuts ahead of or behind its contact, and passes lie
-//! farther apart than the section across the feed tells.
+//! term with `G_tb` is the twist: where the surface twists along the feed, the cutter cuts ahead of or behind its contact, and passes
+//! of a ball may lie farther apart than the section across the feed tells.
 //!
 //! Beyond the second order a ball and a surface that do not twist are two circles ([`BallSection`]), which is exact. Other cutters
 //! show an outline along the feed, exact where the feed is straight and the tool turns with the surface: on planes, and along
