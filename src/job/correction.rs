@@ -20,17 +20,19 @@ mod widths;
 use std::sync::Arc;
 
 use geometry::Point3;
-use metrology::{Engine, Measured, Measurement, RidgeMap, Simulation, path_figures};
+use metrology::{Bounded, Engine, Measured, Measurement, RidgeMap, Simulation, path_figures};
+use motion::Toolpath;
 use report::Verdict;
 use scene::ToolpathRequest;
 use toolpath::{Earlier, Kept, Step, plane_interval};
 use work::monitor::{self, Monitor};
 
+use super::covered::Covered;
 use super::figures::LeastLeftFigures;
-use super::judge::highest_reached;
+use super::judge::{self, highest_reached};
 use super::measuring::Closeness;
 use super::planned::Planned;
-use super::tool::Around;
+use super::tool::{Around, ToolMoves};
 use super::{JobError, Session};
 pub(crate) use round::{CorrectionFigures, CorrectionRound};
 use round::{Gain, Goal};
@@ -62,6 +64,7 @@ const EVENLY_HIGH: f64 = 0.95;
 
 /// What stands more times as high as the target is no matter of widths. Two rounds take an interval to a quarter by
 /// [`MOST_NARROWED`], and ridges to a sixteenth: what is higher was never cut, and plans by other widths do not cut it either.
+/// They cut no less deep either where a plan cuts deeper by as many times than it may.
 const NEVER_CUT: f64 = 16.0;
 
 /// Plans in vain whose high places are narrowed in the next one.
@@ -91,6 +94,8 @@ struct Standing {
     round: CorrectionRound,
     /// Places near the target and above it with their heights, mm.
     above: Vec<(Point3, f64)>,
+    /// How deep it cuts below the design for certain, mm; 0 while only ridges are measured.
+    depth: f64,
 }
 
 impl Standing {
@@ -111,17 +116,22 @@ impl Standing {
         let places = map.above.iter().map(|place| (place.at, place.height));
         // The highest place stands between those that cells show.
         let highest = map.scallop.max_at_mm.map(|at| (at.into(), round.highest_mm));
-        Some(Self { round, above: places.chain(highest).collect() })
+        Some(Self { round, above: places.chain(highest).collect(), depth: 0.0 })
     }
 
     /// `None` without ridges.
-    fn of_all(measured: &Measurement, planned: &Planned, factors: [f64; 2]) -> Option<Self> {
-        let (scallop, reached) = (&measured.scallop, &measured.excess.reached);
-        let on_border = scallop.max_mm.is_some_and(|ridge| reached.max_mm > ridge);
+    fn of_all(looked: &Looked, planned: &Planned, factors: [f64; 2]) -> Option<Self> {
+        let measured = &looked.measured.measurement;
+        let scallop = &measured.scallop;
+        let (seen, reached) = (highest_reached(measured), measured.excess.reached);
+        let unseen = looked.unseen();
+        let of_unseen = unseen.map_or(Bounded::default(), |unseen| unseen.excess.highest);
+        let highest = scallop.max_mm?;
+        let on_border = reached.max_mm.max(of_unseen.max_mm) > highest;
         let round = CorrectionRound {
-            highest_mm: scallop.max_mm?,
-            border_mm: on_border.then_some(reached.max_mm),
-            error_bound_mm: Some(highest_reached(measured).error_bound_mm),
+            highest_mm: highest,
+            border_mm: on_border.then_some(reached.max_mm.max(of_unseen.max_mm)),
+            error_bound_mm: Some(seen.or(&of_unseen).error_bound_mm),
             median_mm: scallop.p50_mm,
             over_target_fraction: scallop.over_target_fraction,
             cutting_length_mm: cutting_length(planned),
@@ -129,10 +139,28 @@ impl Standing {
             too_near_between_mm: too_near(planned),
             measured: true,
         };
-        let places = measured.above.iter().map(|place| (place.at, place.height));
-        let highest = scallop.max_at_mm.map(|at| (at.into(), round.highest_mm));
-        let reached = reached.at_mm.map(|at| (at.into(), reached.max_mm));
-        Some(Self { round, above: places.chain(highest).chain(reached).collect() })
+        let places = measured.above.iter().chain(unseen.iter().flat_map(|unseen| &unseen.above));
+        let places = places.map(|place| (place.at, place.height));
+        let ridge = scallop.max_at_mm.map(|at| (at.into(), highest));
+        let others = [reached, of_unseen].map(|place| place.at_mm.map(|at| (at.into(), place.max_mm)));
+        let above = places.chain(ridge).chain(others.into_iter().flatten()).collect();
+        let depth = measured.gouge.max_depth_mm - measured.gouge.error_bound_mm;
+        Some(Self { round, above, depth })
+    }
+}
+
+/// A path whose whole surface was measured.
+struct Looked {
+    measured: Measured,
+    /// What that covers; `None` where what cells see fails already.
+    covered: Option<Covered>,
+}
+
+impl Looked {
+    /// What stands where no cell sees, as far as it was cut.
+    fn unseen(&self) -> Option<&Measurement> {
+        let unseen = self.covered.as_ref()?.unseen.as_ref()?;
+        (!unseen.never_cut).then_some(&unseen.measurement)
     }
 }
 
@@ -160,6 +188,8 @@ struct Corrected<'a> {
     tried: Tried,
     /// How the last plan was tried, where that is not the best one.
     latest: Option<Tried>,
+    /// What a plan that holds the target was planned by, as far as ridges tell, before a wider one took its place.
+    narrower: Option<Widths>,
     rounds: Vec<CorrectionRound>,
     /// The round of the best plan.
     kept: usize,
@@ -173,7 +203,7 @@ impl Session {
         around: Around<'_>,
         engine: &dyn Engine,
         monitor: &dyn Monitor,
-    ) -> Result<(Planned, Measured), JobError> {
+    ) -> Result<(Planned, Measured, Option<Covered>), JobError> {
         let target = match request.step {
             Step::Scallop(target) if request.correct => Some(target),
             _ => None,
@@ -188,22 +218,21 @@ impl Session {
             within: SLACK * target,
             limit: self.scene.scallop_rule.highest * target,
         });
-        let measure =
-            |planned: &Planned| self.measure(request, engine, &planned.plan.path, closeness, monitor);
-        let (measured, standing) = match &map {
+        let whole = |planned: &Planned| self.look(request, engine, &planned.plan.path, closeness, monitor);
+        let (looked, standing) = match &map {
             Some(map) => (None, Standing::of_ridges(map, &first, [1.0; 2])),
             None => {
-                let measured = measure(&first)?;
-                let standing = target.and_then(|_| Standing::of_all(&measured.measurement, &first, [1.0; 2]));
-                (Some(measured), standing)
+                let looked = whole(&first)?;
+                let standing = target.and_then(|_| Standing::of_all(&looked, &first, [1.0; 2]));
+                (Some(looked), standing)
             }
         };
         let (Some(target), Some(standing)) = (target, standing) else {
-            let measured = match measured {
-                Some(measured) if self.is_as_verdict(&measured, closeness, engine) => measured,
-                _ => self.measure(request, engine, &first.plan.path, Closeness::Verdict, monitor)?,
+            let Looked { measured, covered } = match looked {
+                Some(looked) if self.is_as_verdict(&looked.measured, closeness, engine) => looked,
+                _ => self.look(request, engine, &first.plan.path, Closeness::Verdict, monitor)?,
             };
-            return Ok((first, measured));
+            return Ok((first, measured, covered));
         };
         let interval = plane_interval(&self.scene.cutter, request.step);
         let widths =
@@ -220,20 +249,42 @@ impl Session {
             best: first,
             tried,
             latest: None,
+            narrower: None,
             rounds,
             kept: 0,
         };
-        let measured = match measured {
-            Some(measured) => measured,
+        let looked = match looked {
+            Some(looked) => looked,
             None => {
                 corrected.by_ridges(monitor)?;
-                corrected.measure_best(closeness, monitor)?
+                corrected.look_at_best(closeness, monitor)?
             }
         };
-        let measured = corrected.by_measurements(measured, monitor)?;
+        let Looked { measured, covered } = corrected.by_measurements(looked, monitor)?;
         let Corrected { mut best, rounds, kept, .. } = corrected;
         best.correction = Some(CorrectionFigures { target_mm: target, rounds, kept: kept + 1 });
-        Ok((best, measured))
+        Ok((best, measured, covered))
+    }
+
+    /// Measures the whole surface, where no cell sees as well unless the rest fails for certain.
+    fn look(
+        &self,
+        request: &ToolpathRequest,
+        engine: &dyn Engine,
+        path: &Toolpath,
+        closeness: Closeness,
+        monitor: &dyn Monitor,
+    ) -> Result<Looked, JobError> {
+        let measured = self.measure(request, engine, path, closeness, monitor)?;
+        let covered = match self.pocket {
+            None if self.verdict_on(&measured) != Verdict::Fail => {
+                let (cutters, holders) = self.tools(request);
+                let tools = ToolMoves::of(cutters, holders, path);
+                Some(self.covered(request, &measured, (path, cutters), &tools, monitor)?)
+            }
+            _ => None,
+        };
+        Ok(Looked { measured, covered })
     }
 
     /// The ridges that a plan leaves; `None` where finding them takes as long as measuring all, or coarse cells cannot tell.
@@ -252,6 +303,15 @@ impl Session {
             self.budget().grid_before_planning(&self.area(), &simulation).map_err(JobError::grid(scene))?;
         let task = self.task(&planned.plan.path, &simulation, &cells);
         engine.ridges(&task, monitor).map_err(|reason| JobError::engine(scene, &request.name, reason))
+    }
+
+    /// Whether all of the surface that was measured passes, where no cell sees as well.
+    fn passes(&self, looked: &Looked) -> bool {
+        let (limits, rule) = (&self.scene.tolerance, &self.scene.scallop_rule);
+        let unseen = looked.covered.as_ref().and_then(|covered| covered.unseen.as_ref());
+        self.verdict_on(&looked.measured) == Verdict::Pass
+            && unseen
+                .is_none_or(|unseen| judge::of_surface(&unseen.measurement, limits, rule) == Verdict::Pass)
     }
 }
 
@@ -281,47 +341,49 @@ impl Corrected<'_> {
     }
 
     /// Plans anew while what the verdict is made of stands above the target.
-    fn by_measurements(&mut self, measured: Measured, monitor: &dyn Monitor) -> Result<Measured, JobError> {
-        if self.is_unavoidable(&measured.measurement, monitor)? {
-            return Ok(measured);
+    fn by_measurements(&mut self, looked: Looked, monitor: &dyn Monitor) -> Result<Looked, JobError> {
+        if self.is_unavoidable(&looked.measured.measurement, monitor)? {
+            return Ok(looked);
         }
-        let (mut measured, mut in_vain, mut gain) = (Some(measured), 0, Gain::None);
+        let (mut looked, mut in_vain, mut gain) = (Some(looked), 0, Gain::None);
         for round in 0..MOST_MEASURED_NEAR {
             if round >= MOST_MEASURED && gain < Gain::Much && !self.is_near(&self.tried) {
                 break;
             }
-            let Some(next) = self.next(in_vain, MEASURED_SLACK) else { break };
+            // Ridges alone did not show what stands far above the target.
+            let fails = !self.tried.standing.round.holds(&self.goal) && !self.is_near(&self.tried);
+            let narrower = self.narrower.take().filter(|_| round == 0 && fails && !self.is_far_off());
+            let Some(next) = narrower.or_else(|| self.next(in_vain, MEASURED_SLACK)) else { break };
             let (planned, factors) = self.plan(&next, monitor)?;
             if self.is_left_as_before(&planned, factors) {
                 let found = self.as_before(&planned, factors);
                 gain = self.keep_best(&planned, next, found);
             } else {
-                let passes = |measured: &Measured| self.session.verdict_on(measured) == Verdict::Pass;
-                let is_passing = measured.as_ref().is_some_and(passes);
+                let is_passing = looked.as_ref().is_some_and(|looked| self.session.passes(looked));
                 // Two at a time might be more than the memory that the run may take.
-                drop(measured.take());
+                drop(looked.take());
                 let path = &planned.plan.path;
-                let again = self.session.measure(self.request, self.engine, path, self.closeness, monitor)?;
-                let Some(found) = Standing::of_all(&again.measurement, &planned, factors) else { break };
+                let again = self.session.look(self.request, self.engine, path, self.closeness, monitor)?;
+                let Some(found) = Standing::of_all(&again, &planned, factors) else { break };
                 // A shorter path is no reason to give up a plan that passes.
-                gain = if is_passing && !passes(&again) {
+                gain = if is_passing && !self.session.passes(&again) {
                     self.keep_best(&planned, next, found)
                 } else {
                     self.keep_if_better(planned, next, found)
                 };
                 if gain != Gain::None {
-                    measured = Some(again);
+                    looked = Some(again);
                 }
             }
             in_vain = if gain >= Gain::Enough { 0 } else { in_vain + 1 };
         }
-        match measured {
-            Some(measured) if self.session.is_as_verdict(&measured, self.closeness, self.engine) => {
-                Ok(measured)
+        match looked {
+            Some(looked) if self.session.is_as_verdict(&looked.measured, self.closeness, self.engine) => {
+                Ok(looked)
             }
             other => {
                 drop(other);
-                self.measure_best(Closeness::Verdict, monitor)
+                self.look_at_best(Closeness::Verdict, monitor)
             }
         }
     }
@@ -355,14 +417,21 @@ impl Corrected<'_> {
         !round.holds(&self.goal) && round.highest() <= (1.0 + NEAR) * self.goal.target
     }
 
+    /// Whether the best plan leaves what was never cut, or cuts far too deep.
+    fn is_far_off(&self) -> bool {
+        let Standing { round, depth, .. } = &self.tried.standing;
+        round.highest() > NEVER_CUT * self.goal.target
+            || *depth > NEVER_CUT * self.session.scene.tolerance.gouge
+    }
+
     /// The widths to try next. A plan that stands too high gets shorter chords where that may be enough, and narrower widths
     /// elsewhere; one that is too low gets wider ones. Levels are placed anew in each plan, so that other places may stand
     /// too high then: these are narrowed as well, from the last plan on. Last of all everything is narrowed in proportion, to
     /// which remnants along borders give way only by another pass. `None` where the best plan holds the target and comes within `slack` of
-    /// it, where it leaves what was never cut, or where what there is was tried `in_vain`.
+    /// it, where it is far off, or where what there is was tried `in_vain`.
     fn next(&self, in_vain: usize, slack: f64) -> Option<Widths> {
         let (target, round) = (self.goal.target, &self.tried.standing.round);
-        if round.highest() > NEVER_CUT * target {
+        if self.is_far_off() {
             return None;
         }
         let last = self.latest.as_ref().unwrap_or(&self.tried);
@@ -521,15 +590,15 @@ impl Corrected<'_> {
     }
 
     /// Measures all of the best plan.
-    fn measure_best(&mut self, closeness: Closeness, monitor: &dyn Monitor) -> Result<Measured, JobError> {
+    fn look_at_best(&mut self, closeness: Closeness, monitor: &dyn Monitor) -> Result<Looked, JobError> {
         let path = &self.best.plan.path;
-        let measured = self.session.measure(self.request, self.engine, path, closeness, monitor)?;
+        let looked = self.session.look(self.request, self.engine, path, closeness, monitor)?;
         let factors = self.tried.standing.round.factors;
-        if let Some(standing) = Standing::of_all(&measured.measurement, &self.best, factors) {
+        if let Some(standing) = Standing::of_all(&looked, &self.best, factors) {
             self.rounds[self.kept] = standing.round;
             self.tried.standing = standing;
         }
-        Ok(measured)
+        Ok(looked)
     }
 
     /// Whether all widths of a plan differ from those of the best, and no more than the ends of passes: they are spread over a
@@ -543,14 +612,14 @@ impl Corrected<'_> {
 
     /// What the best plan leaves, as that of another with other ends of passes.
     fn as_before(&self, planned: &Planned, factors: [f64; 2]) -> Standing {
-        let Standing { round, above } = &self.tried.standing;
+        let Standing { round, above, depth } = &self.tried.standing;
         let round = CorrectionRound {
             factors,
             cutting_length_mm: cutting_length(planned),
             too_near_between_mm: too_near(planned),
             ..*round
         };
-        Standing { round, above: above.clone() }
+        Standing { round, above: above.clone(), depth: *depth }
     }
 
     /// Keeps the best plan instead of this one.
@@ -568,6 +637,7 @@ impl Corrected<'_> {
         if gain == Gain::None {
             self.latest = Some(tried);
         } else {
+            self.narrower = self.tried.standing.round.holds(&self.goal).then(|| self.tried.widths.clone());
             (self.best, self.tried, self.kept) = (planned, tried, self.rounds.len() - 1);
         }
         gain

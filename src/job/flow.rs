@@ -141,21 +141,22 @@ impl Session {
         let near = closer.as_ref().unwrap_or(&self.part);
         let around = Around { tool: &tool, near, fixtures: &fixtures };
         let at_time;
-        let (request, planned, mut measured) = match &request.equal_time {
+        let (request, planned, mut measured, mut covered) = match &request.equal_time {
             None => {
-                let (planned, measured) = self.plan_and_measure(request, around, engine, monitor)?;
-                (request, planned, measured)
+                let (planned, measured, covered) = self.plan_and_measure(request, around, engine, monitor)?;
+                (request, planned, measured, covered)
             }
             Some(time) => {
                 let (found, planned) = self.plan_for_time(request, time, around, monitor)?;
                 let measured =
                     self.measure(&found, engine, &planned.plan.path, Closeness::Verdict, monitor)?;
                 at_time = found;
-                (&at_time, planned, measured)
+                (&at_time, planned, measured, None)
             }
         };
         let whole = WholePath::new(earlier, &planned.plan.path, cutters, scene.machine.rapid_rate);
         if !earlier.is_empty() {
+            covered = None;
             measured = self.measure_whole(
                 request,
                 engine,
@@ -187,6 +188,7 @@ impl Session {
             request,
             planned: &planned,
             measured: &measured,
+            covered: covered.as_ref(),
             around,
             whole: &whole,
             earlier,

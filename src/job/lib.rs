@@ -4,6 +4,7 @@
 //! the report is one file in `figures` and one line in their list; the rule by which a toolpath passes stands in `judge`.
 
 mod correction;
+mod covered;
 mod earlier;
 mod equal_time;
 mod error;

@@ -7,6 +7,7 @@ use part::Part;
 use report::Claim;
 use scene::{Scene, ToolpathRequest};
 
+use super::covered::Covered;
 use super::earlier::{EarlierPath, WholePath};
 use super::planned::Planned;
 use super::tool::{Around, ToolMoves};
@@ -22,6 +23,8 @@ pub(crate) struct Run<'a> {
     pub planned: &'a Planned,
     /// What was measured.
     pub measured: &'a Measured,
+    /// What the measurement covers, where that is known already.
+    pub covered: Option<&'a Covered>,
     /// The tool, and what it must not touch.
     pub around: Around<'a>,
     /// Its moves behind those of the toolpaths before it: what was measured.

@@ -1,17 +1,13 @@
 //! How much of the surface the verdict covers, and the surface that no cell sees.
 
-use cutter::Solid;
-use metrology::{
-    AlongNormal as _, AlongTask, CellsSeen, Coverage, CoverageFigures, Measurement, REACH_OVER_UNCUT,
-    RaysCut, RaysCutInTurn, SweptVolume, View,
-};
-use motion::Toolpath;
+use metrology::CoverageFigures;
 use report::{Claim, Figure, Gravity, micrometres, place};
 use serde::Serialize;
 use toolpath::Pocket;
 use work::monitor::Monitor;
 
 use super::words::value;
+use crate::covered::{Covered, Unseen};
 use crate::run::{Finding, Run};
 use crate::{JobError, judge};
 
@@ -24,22 +20,22 @@ const MEANING: (&str, &str) = (
 
 /// The coverage, and what was found on the surface that no cell sees.
 #[derive(Debug, Serialize)]
-struct Value {
+struct Value<'a> {
     #[serde(flatten)]
-    areas: CoverageFigures,
+    areas: &'a CoverageFigures,
     /// Where cells cut and something is judged that they do not see.
     #[serde(skip_serializing_if = "Option::is_none")]
-    unseen: Option<Unseen>,
+    unseen: Option<UnseenValue<'a>>,
 }
 
 /// What was found along the normals of surface that no cell sees. mm.
 #[derive(Debug, Serialize)]
-struct Unseen {
+struct UnseenValue<'a> {
     spacing_mm: f64,
     places: usize,
-    scallop: metrology::ScallopFigures,
-    gouge: metrology::GougeFigures,
-    uncut: metrology::UncutFigures,
+    scallop: &'a metrology::ScallopFigures,
+    gouge: &'a metrology::GougeFigures,
+    uncut: &'a metrology::UncutFigures,
     /// Whether a place was never cut: material then stands at least as high as `uncut` says.
     never_cut: bool,
 }
@@ -47,17 +43,34 @@ struct Unseen {
 /// Of every toolpath.
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
     monitor.start("measuring the coverage", 0);
-    let (areas, unseen) = match &run.session.pocket {
-        Some(pocket) => (of_pocket(run, pocket), None),
-        None => of_part(run, monitor)?,
+    let found;
+    let Covered { areas, unseen } = match (&run.session.pocket, run.covered) {
+        (Some(pocket), _) => {
+            found = Covered { areas: of_pocket(run, pocket), unseen: None };
+            &found
+        }
+        (None, Some(covered)) => covered,
+        (None, None) => {
+            let whole = (&*run.whole.path, run.cutters());
+            found = run.session.covered(run.request, run.measured, whole, &run.all_tools(), monitor)?;
+            &found
+        }
     };
-    let mut claims = nothing_judged(&areas).into_iter().collect::<Vec<_>>();
-    claims.extend(unseen.as_ref().map_or_else(Vec::new, |(_, claims)| claims.clone()));
+    let mut claims = nothing_judged(areas).into_iter().collect::<Vec<_>>();
+    claims.extend(unseen.as_ref().map_or_else(Vec::new, |unseen| judged(run, unseen)));
     let sentence = (!areas.scope.is_empty()).then(|| {
         ("Coverage", format!("the verdict of {} covers {}", run.request.name, covered(&areas.scope)))
     });
-    let rows = rows(&areas);
-    let value = value(&Value { areas, unseen: unseen.map(|(unseen, _)| unseen) })?;
+    let rows = rows(areas);
+    let unseen = unseen.as_ref().map(|Unseen { measurement, spacing_mm, never_cut }| UnseenValue {
+        spacing_mm: *spacing_mm,
+        places: measurement.deviation_map.len(),
+        scallop: &measurement.scallop,
+        gouge: &measurement.gouge,
+        uncut: &measurement.uncut,
+        never_cut: *never_cut,
+    });
+    let value = value(&Value { areas, unseen })?;
     let figure =
         Figure { key: "coverage", value, rows, meaning: Some(MEANING), sentence, ..Figure::default() };
     Ok(Finding { figure: Some(figure), claims, ..Finding::default() })
@@ -79,68 +92,13 @@ fn of_pocket(run: &Run<'_>, pocket: &Pocket) -> CoverageFigures {
     CoverageFigures::of_pocket(run.scene().judged, floor, pocket.region.area(), walls)
 }
 
-/// The areas, and what was found where no cell sees, with its limits.
-type Covered = (CoverageFigures, Option<(Unseen, Vec<Claim>)>);
-
-fn of_part(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Covered, JobError> {
-    let (scene, part, path) = (run.scene(), run.part(), &*run.whole.path);
-    let facing = run.session.task(path, &scene.simulation, &run.session.cells).facing();
-    let View::Heights(cut) = run.view() else {
-        return Ok((Coverage::new(part, &facing, scene.judged, None).figures(), None));
-    };
-    let walls = run.session.task(path, &scene.simulation, &run.session.cells).measures_walls();
-    let cells = CellsSeen { grid: &cut.grid, deviations: &run.measurement().deviation_map, walls };
-    let coverage = Coverage::new(part, &facing, scene.judged, Some(cells));
-    let areas = coverage.figures();
-    if areas.along_normals_mm2 == 0.0 {
-        return Ok((areas, None));
-    }
-    // Holders end the cutters' edges.
-    let all = run.all_tools();
-    let solids: Vec<Solid> = all.iter().map(|tool| Solid::of_cutter(tool.cutter, tool.holder)).collect();
-    let tools: Vec<(&Toolpath, &Solid)> = all.iter().map(|tool| &*tool.path).zip(&solids).collect();
-    let rays = run
-        .budget()
-        .rays_of_each(&tools, Some(&cut.grid), monitor)
-        .map_err(|reason| JobError::engine(scene, &run.request.name, reason))?;
-    let of_tool = |k: usize| {
-        let (path, solid) = tools[k];
-        (all[k].first, RaysCut { rays: &rays[k], path, solid })
-    };
-    let by_rays = RaysCutInTurn { tools: (0..rays.len()).map(of_tool).collect() };
-    let inward = run.cutters().greatest_radius();
-    let outward = (REACH_OVER_UNCUT * scene.tolerance.uncut).max(inward);
-    let swept = SweptVolume { part, cut: &by_rays, inward, outward, block: *facing.block() };
-    let task = AlongTask {
-        cutters: run.cutters(),
-        path,
-        cut: &swept,
-        limits: &scene.tolerance,
-        asked: scene.simulation.error_bound,
-        finest: run.measured.cell,
-    };
-    let Some((measured, spacing_mm)) = coverage.measure_unseen(&task, monitor)? else {
-        return Ok((areas, None));
-    };
-    let never_cut = measured.uncut.max_height_mm >= swept.reach();
-    let claims = judged(run, &measured, never_cut);
-    let unseen = Unseen {
-        spacing_mm,
-        places: measured.deviation_map.len(),
-        scallop: measured.scallop,
-        gouge: measured.gouge,
-        uncut: measured.uncut,
-        never_cut,
-    };
-    Ok((areas, Some((unseen, claims))))
-}
-
 /// The limits of the surface that no cell sees.
-fn judged(run: &Run<'_>, measured: &Measurement, never_cut: bool) -> Vec<Claim> {
+fn judged(run: &Run<'_>, unseen: &Unseen) -> Vec<Claim> {
+    let measured = &unseen.measurement;
     let (limits, rule) = (&run.scene().tolerance, &run.scene().scallop_rule);
     let (_, mut claims) = judge::judge(measured, limits, rule, Vec::new(), run.path().program_name());
     for claim in &mut claims {
-        if claim.what == "uncut" && never_cut {
+        if claim.what == "uncut" && unseen.never_cut {
             let at = measured
                 .uncut
                 .regions

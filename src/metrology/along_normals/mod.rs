@@ -19,18 +19,21 @@ mod closer;
 mod net;
 mod reached;
 mod regions;
+mod ridge_map;
 mod ridges;
 mod swept_volume;
 #[cfg(test)]
 mod tests;
 
 use super::contact::contact as contact_of;
+use super::engines::Task;
 use super::facing::{Facing, Judged};
 use super::figures::{
     Bounded, CloserLook, ExcessFigures, ExcessKind, Limits, Measurement, NUMERICAL_FLOOR, RidgePlace,
     ScallopFigures, UncutFigures,
 };
 use super::pairs::{PairTally, RidgeCrossing, pair_figures};
+use super::ridge_map::RidgeMap;
 use super::ridges::{Highest, scallop_figures};
 use super::tracks::Tracks;
 use closer::{Greatest, MOST_DIVIDED};
@@ -42,7 +45,7 @@ pub use net::{PatchGrid, net_places};
 use part::Part;
 pub(crate) use regions::connected;
 use regions::{Standing, areas, deviation_figures};
-use ridges::{Crossing, Finder};
+use ridges::{CLOSE, Crossing, Finder};
 pub(crate) use swept_volume::ball_beneath;
 pub use swept_volume::{FirstCut, RaysCut, RaysCutInTurn, SweptVolume, VoxelCut};
 use work::monitor::{self, Cancelled, Monitor};
@@ -172,19 +175,64 @@ pub fn measure_along_normals(
 ) -> Result<(Measurement, NormalMap), Cancelled> {
     let cutters = &Cutters::from(cutter);
     let along = Along { part, cutters, path, engine, limits, spacing, asked, most_divided: MOST_DIVIDED };
-    let keep = |places: &[NetPlace]| match judged {
-        None => vec![true; places.len()],
-        Some((facing, judged)) => {
-            let kinds = facing.kinds(places.len(), |k| (places[k].point, places[k].normal));
-            kinds.into_iter().map(|kind| facing.is_judged(judged, kind)).collect()
-        }
-    };
+    let keep = |places: &[NetPlace]| are_judged(places, judged);
     let net = Net::over(part, spacing);
     let kept = keep(&net.places);
     along.measure(net, &kept, &keep, &|_| true, monitor)
 }
 
+/// No more than the ridges and the remnants along borders of what [`measure_along_normals`] measures, at places `spacing` mm
+/// apart: nothing is looked at closer, so that bounds are wide.
+///
+/// # Errors
+/// [`Cancelled`] when the monitor says so.
+pub(crate) fn ridges_along_normals(
+    task: &Task<'_>,
+    engine: &dyn AlongNormal,
+    spacing: f64,
+    monitor: &dyn Monitor,
+) -> Result<RidgeMap, Cancelled> {
+    let Task { part, cutters, path, limits, .. } = *task;
+    let asked = task.simulation.error_bound;
+    let along = Along { part, cutters, path, engine, limits, spacing, asked, most_divided: 0 };
+    let net = Net::over(part, spacing);
+    let kept = are_judged(&net.places, Some((&task.facing(), task.judged)));
+    along.ridges(&net, &kept, monitor)
+}
+
+/// Which places are judged.
+fn are_judged(places: &[NetPlace], judged: Option<(&Facing<'_>, Judged)>) -> Vec<bool> {
+    match judged {
+        None => vec![true; places.len()],
+        Some((facing, judged)) => {
+            let kinds = facing.kinds(places.len(), |k| (places[k].point, places[k].normal));
+            kinds.into_iter().map(|kind| facing.is_judged(judged, kind)).collect()
+        }
+    }
+}
+
+/// What a first look at a net finds.
+struct Seen {
+    samples: Vec<Sample>,
+    /// The triangles whose places are all kept.
+    triangles: Vec<[u32; 3]>,
+    /// The ridges that cross each of them, those in hollows with them.
+    of_triangle: Vec<Vec<Crossing>>,
+    /// Which sides of each are the border.
+    on_border: Vec<[bool; 3]>,
+}
+
 impl Along<'_> {
+    fn inspection<'a>(&'a self, tracks: &'a Tracks<'a>) -> NormalInspection<'a> {
+        let Self { part, cutters, path, engine, limits, spacing, most_divided, .. } = *self;
+        let radius = cutters.greatest(|cutter| {
+            let corner = cutter.corner_radius();
+            if corner > 0.0 { corner } else { cutter.radius() }
+        });
+        let finder = Finder { part, engine, tracks, radius, close: CLOSE };
+        NormalInspection { part, cutters, path, engine, finder, limits, spacing, radius, most_divided }
+    }
+
     /// Measures the places of a net that are `kept`, and of the contacts of the moves that come `near` those to `keep`.
     ///
     /// # Errors
@@ -197,45 +245,10 @@ impl Along<'_> {
         near: &(dyn Fn(usize) -> bool + Sync),
         monitor: &dyn Monitor,
     ) -> Result<(Measurement, NormalMap), Cancelled> {
-        let Self { part, cutters, path, engine, limits, spacing, asked, most_divided } = *self;
+        let Self { part, cutters, path, limits, spacing, asked, .. } = *self;
         let tracks = Tracks::new(path, cutters);
-        let radius = cutters.greatest(|cutter| {
-            let corner = cutter.corner_radius();
-            if corner > 0.0 { corner } else { cutter.radius() }
-        });
-        let finder = Finder { part, engine, tracks: &tracks, radius };
-        let inspection =
-            NormalInspection { part, cutters, path, engine, finder, limits, spacing, radius, most_divided };
-        let samples = in_runs("measuring along normals", net.places.len(), monitor, |range| {
-            let mut near = None;
-            let of_one = |place: &NetPlace| {
-                let sample = inspection.sample(*place, near.as_ref());
-                near = sample.hit.or(near);
-                sample
-            };
-            net.places[range].iter().map(of_one).collect()
-        })?;
-        let triangles: Vec<[u32; 3]> =
-            net.triangles.iter().filter(|t| t.iter().all(|&k| kept[k as usize])).copied().collect();
-        let sides = sides(&triangles);
-        let on_sides = in_runs("measuring ridges", sides.len(), monitor, |range| {
-            sides[range].iter().map(|side| inspection.on_side(&side.map(|k| samples[k as usize]))).collect()
-        })?;
-        let on_sides = Grouped::of(on_sides);
-        let of_triangle = in_runs("joining ridges", triangles.len(), monitor, |range| {
-            let of_one = |t: &[u32; 3]| {
-                let side = |k: usize| [t[k].min(t[(k + 1) % 3]), t[k].max(t[(k + 1) % 3])];
-                let found = (0..3)
-                    .filter_map(|k| sides.binary_search(&side(k)).ok())
-                    .flat_map(|k| on_sides.group(k))
-                    .copied();
-                with_lengths(found.collect())
-            };
-            triangles[range].iter().map(of_one).collect()
-        })?;
-        drop(on_sides);
-        let on_border = on_border(&triangles, &sides);
-        drop(sides);
+        let inspection = self.inspection(&tracks);
+        let Seen { samples, triangles, of_triangle, on_border } = inspection.look(&net, kept, monitor)?;
         let (of_triangle, hollow) = inspection.without_hollows(of_triangle);
         let contacts = in_runs("measuring contacts", path.len(), monitor, |range| {
             let contacts = |k: &usize| {
@@ -263,8 +276,7 @@ impl Along<'_> {
         }
         let pairs =
             pair_figures(part, cutters, path, tally(&of_triangle, cutters.first(), spacing), monitor)?;
-        let ridge_samples: Vec<[f32; 2]> =
-            of_triangle.items.iter().map(|c| [c.height as f32, c.length as f32]).collect();
+        let ridge_samples = ridge_map::ridge_samples(&of_triangle);
         let shares = areas(&net);
         let mut gouge = inspection.gouges(&net, &samples, &shares, kept);
         let deviation = deviation_figures(&samples, &shares, kept);
@@ -328,6 +340,40 @@ impl Along<'_> {
 }
 
 impl NormalInspection<'_> {
+    /// What was cut at the places of a net, and the ridges through those of its triangles that are kept.
+    fn look(&self, net: &Net, kept: &[bool], monitor: &dyn Monitor) -> Result<Seen, Cancelled> {
+        let samples = in_runs("measuring along normals", net.places.len(), monitor, |range| {
+            let mut near = None;
+            let of_one = |place: &NetPlace| {
+                let sample = self.sample(*place, near.as_ref());
+                near = sample.hit.or(near);
+                sample
+            };
+            net.places[range].iter().map(of_one).collect()
+        })?;
+        let triangles: Vec<[u32; 3]> =
+            net.triangles.iter().filter(|t| t.iter().all(|&k| kept[k as usize])).copied().collect();
+        let sides = sides(&triangles);
+        let on_sides = in_runs("measuring ridges", sides.len(), monitor, |range| {
+            sides[range].iter().map(|side| self.on_side(&side.map(|k| samples[k as usize]))).collect()
+        })?;
+        let on_sides = Grouped::of(on_sides);
+        let of_triangle = in_runs("joining ridges", triangles.len(), monitor, |range| {
+            let of_one = |t: &[u32; 3]| {
+                let side = |k: usize| [t[k].min(t[(k + 1) % 3]), t[k].max(t[(k + 1) % 3])];
+                let found = (0..3)
+                    .filter_map(|k| sides.binary_search(&side(k)).ok())
+                    .flat_map(|k| on_sides.group(k))
+                    .copied();
+                with_lengths(found.collect())
+            };
+            triangles[range].iter().map(of_one).collect()
+        })?;
+        drop(on_sides);
+        let on_border = on_border(&triangles, &sides);
+        Ok(Seen { samples, triangles, of_triangle, on_border })
+    }
+
     /// How high material stands at most about a place where nothing was cut, mm.
     fn at_most(&self, sample: &Sample) -> f64 {
         self.engine.standing_at_most(&sample.place.point, &sample.place.normal, self.spacing)

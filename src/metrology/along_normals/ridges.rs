@@ -8,7 +8,10 @@ use part::Part;
 
 /// A crossing is found when both tracks were seen within this share of the side from each other: what the tangents then
 /// miss is of the order of its square.
-const CLOSE: f64 = 1e-3;
+pub(super) const CLOSE: f64 = 1e-3;
+
+/// The same where heights within a few per cent are enough.
+pub(super) const NEARLY: f64 = 0.1;
 
 /// Looks are taken this share of the side before and beyond where the crossing should be, so that both tracks are seen.
 const ASIDE: f64 = 2e-4;
@@ -45,6 +48,8 @@ pub(super) struct Finder<'a> {
     pub tracks: &'a Tracks<'a>,
     /// Radius with which the cutter bends across the feed, about, mm.
     pub radius: f64,
+    /// Share of the side within which both tracks of a crossing are seen.
+    pub close: f64,
 }
 
 /// A cut on the way: share of the way, place, and hit.
@@ -82,7 +87,7 @@ impl Finder<'_> {
         let mut bend = (to.point - from.point).norm_squared() / self.radius;
         let mut aside = -ASIDE;
         for look in 0..MOST_LOOKS {
-            if b.t - a.t < CLOSE {
+            if b.t - a.t < self.close {
                 break;
             }
             let rest = b.t - a.t;

@@ -9,6 +9,7 @@ use sim::{Rays, Stock, VoxelEngine};
 use work::monitor::Silent;
 
 const RADIUS: f64 = 3.0;
+const LIMITS: Limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.001 };
 
 /// All moves of a ball, one by one: steps as long as the distance.
 struct BruteForce<'a>(&'a Toolpath);
@@ -54,9 +55,8 @@ impl AlongNormal for BruteForce<'_> {
 }
 
 fn measured(part: &Part, path: &Toolpath, spacing: f64) -> (Measurement, NormalMap) {
-    let limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.001 };
     let ball = Cutter::ball(2.0 * RADIUS).unwrap();
-    measure_along_normals(part, &ball, path, &BruteForce(path), spacing, &limits, 1e-4, None, &Silent)
+    measure_along_normals(part, &ball, path, &BruteForce(path), spacing, &LIMITS, 1e-4, None, &Silent)
         .unwrap()
 }
 
@@ -81,6 +81,40 @@ fn a_plane_has_the_scallops_of_the_closed_form_whatever_the_spacing() {
         assert!(measured.gouge.max_depth_mm < 1e-9 && measured.uncut.region_count == 0);
         assert!((measured.deviation.area_mm2 - 12.0).abs() < 1e-9);
         assert_eq!(map.points.len(), map.deviations.len());
+    }
+}
+
+/// Passes half a mm apart, and a border 0.2 mm beside the last one, by places half an interval and more apart.
+#[test]
+fn a_look_at_ridges_alone_finds_their_heights_and_what_stands_along_borders() {
+    let (part, path) = (plane([4.0, 3.2]), path(&passes(0.0)));
+    let cutters = Cutter::ball(2.0 * RADIUS).unwrap().into();
+    let limits = Limits { scallop: 0.005, ..LIMITS };
+    let sagitta = |half: f64| RADIUS - (RADIUS * RADIUS - half * half).sqrt();
+    for spacing in [0.25, 0.41] {
+        let net = Net::over(&part, spacing);
+        let (engine, asked) = (&BruteForce(&path), 1e-4);
+        let along = Along {
+            part: &part,
+            cutters: &cutters,
+            path: &path,
+            engine,
+            limits: &limits,
+            spacing,
+            asked,
+            most_divided: 0,
+        };
+        let map = along.ridges(&net, &vec![true; net.places.len()], &Silent).unwrap();
+        let (max, p50) = (map.scallop.max_mm.unwrap(), map.scallop.p50_mm.unwrap());
+        assert!((max / sagitta(0.25) - 1.0).abs() < 0.01, "{max} {}", sagitta(0.25));
+        assert!((p50 / sagitta(0.25) - 1.0).abs() < 0.01, "{p50}");
+        // Ridges end at the border as well.
+        assert!(map.border >= sagitta(0.2) - 1e-9 && map.border <= max, "{} {max}", map.border);
+        let beside: Vec<f64> =
+            map.above.iter().filter(|place| place.at.y > 3.19).map(|place| place.height).collect();
+        assert!(beside.len() > 9, "{beside:?}");
+        assert!(beside.iter().all(|height| (height - sagitta(0.2)).abs() < 1e-6), "{beside:?}");
+        assert!(map.above.iter().any(|place| (place.at.y - 1.25).abs() < 0.01));
     }
 }
 

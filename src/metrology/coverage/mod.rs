@@ -285,7 +285,7 @@ fn mixed(facing: &Facing<'_>, pieces: &Pieces, kinds: &[PlaceKind]) -> f64 {
     (0..kinds.len()).filter(|t| other(*t)).map(|t| pieces.areas[t]).sum()
 }
 
-fn area(corners: &[Point3; 3]) -> f64 {
+pub(crate) fn area(corners: &[Point3; 3]) -> f64 {
     let [a, b, c] = corners;
     0.5 * (b - a).cross(&(c - a)).norm()
 }

@@ -5,6 +5,7 @@ use std::time::Instant;
 use sim::{CutHeights, cut, cut_in_turn, cut_reference};
 use work::monitor::Monitor;
 
+use super::normals::RAYS;
 use super::{Engine, EngineError, Measured, Task, View};
 use crate::ridge_map::ridge_map;
 use crate::{Asked, RidgeMap, measure_with_walls};
@@ -51,7 +52,13 @@ impl Engine for Cells {
         let stock = task.uncut(grid, monitor)?;
         let cut = cut_in_turn(self.cut, stock, task.cutters, path, monitor)?;
         let asked = task.simulation.error_bound;
-        Ok(ridge_map(task.part, task.cutters, path, &cut, task.limits, asked, monitor)?)
+        let found = ridge_map(task.part, task.cutters, path, &cut, task.limits, asked, monitor)?;
+        drop(cut);
+        // Places along the normals may be as coarse: each sees every move.
+        match found {
+            None if !task.cutters.are_several() => RAYS.ridges(task, monitor),
+            found => Ok(found),
+        }
     }
 
     fn measure(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Measured, EngineError> {

@@ -9,7 +9,11 @@ use work::monitor::Monitor;
 
 use super::budget::MIB;
 use super::{Engine, EngineError, Measured, NormalView, Task, View};
-use crate::{FirstCut, RaysCut, SweptVolume, VoxelCut, measure_along_normals, net_places};
+use crate::along_normals::ridges_along_normals;
+use crate::coverage::area;
+use crate::{
+    FirstCut, RaysCut, RidgeMap, SweptVolume, VoxelCut, measure_along_normals, net_places, path_figures,
+};
 
 /// Bytes a place of the net: place, hit, triangles with their crossings, and the map; and the map of the measurement before,
 /// which stays until this one is known to be better.
@@ -17,6 +21,9 @@ const BYTES_PER_PLACE: u64 = 800;
 
 /// Distance of the places over that of cells where the program chooses: three places from pass to pass.
 const PLACES_OVER_CELLS: f64 = 2.0;
+
+/// Places from pass to pass while only ridges are measured: these are found between places.
+const PLACES_A_PASS: f64 = 2.0;
 
 /// Material is looked for this many uncut tolerances above the design, and no less far than the cutter's radius; cuts as
 /// far below it as that radius, so that the far side of a thin part counts for nothing.
@@ -61,6 +68,19 @@ impl Engine for Normals {
         self.by_voxels
     }
 
+    fn ridges(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Option<RidgeMap>, EngineError> {
+        // Voxels take longer than the places between them.
+        if self.by_voxels {
+            return Ok(None);
+        }
+        let spacing = task.simulation.cell.max(mean_interval(task) / PLACES_A_PASS);
+        check_places(task, spacing)?;
+        let solid = Solid::of_cutter(task.cutters.first(), task.holder);
+        let rays = task.budget.rays(task.path, &solid, None, monitor)?;
+        let first = RaysCut { rays: &rays, path: task.path, solid: &solid };
+        Ok(Some(ridges_along_normals(task, &swept_volume(task, &first), spacing, monitor)?))
+    }
+
     fn measure(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Measured, EngineError> {
         let begun = Instant::now();
         let (part, path, cutter) = (task.part, task.path, task.cutters.first());
@@ -69,16 +89,14 @@ impl Engine for Normals {
         let wider = if task.simulation.cell_is_auto { PLACES_OVER_CELLS } else { 1.0 };
         let spacing = wider * task.simulation.cell;
         check_places(task, spacing)?;
-        let reach = (REACH_OVER_UNCUT * task.limits.uncut).max(cutter.radius());
         let rays = task.budget.rays(path, &solid, None, monitor)?;
-        let inward = cutter.radius();
-        let space = space(task, inward.max(reach));
+        let space = space(task, outward(task));
         let voxels =
             self.by_voxels.then(|| cut_voxels(task, &space, &solid, spacing, monitor)).transpose()?;
         let by_rays = RaysCut { rays: &rays, path, solid: &solid };
         let by_voxels = voxels.as_ref().map(|(engine, voxels)| VoxelCut { engine, voxels });
         let first: &dyn FirstCut = by_voxels.as_ref().map_or(&by_rays, |cut| cut);
-        let cut = SweptVolume { part, cut: first, inward, outward: reach, block: task.block() };
+        let cut = swept_volume(task, first);
         let asked = task.simulation.error_bound;
         let facing = task.facing();
         let judged = Some((&facing, task.judged));
@@ -96,6 +114,23 @@ impl Engine for Normals {
             note: None,
         })
     }
+}
+
+/// The part's surface over the length that is cut, mm.
+fn mean_interval(task: &Task<'_>) -> f64 {
+    let mesh = task.part.mesh();
+    let surface: f64 = (0..mesh.triangles().len()).map(|t| area(&mesh.corners(t))).sum();
+    surface / path_figures(task.path, 0.0).cutting_length_mm.max(f64::MIN_POSITIVE)
+}
+
+/// How far above the design material is looked for, mm.
+fn outward(task: &Task<'_>) -> f64 {
+    (REACH_OVER_UNCUT * task.limits.uncut).max(task.cutters.first().radius())
+}
+
+fn swept_volume<'a>(task: &'a Task<'_>, cut: &'a dyn FirstCut) -> SweptVolume<'a> {
+    let inward = task.cutters.first().radius();
+    SweptVolume { part: task.part, cut, inward, outward: outward(task), block: task.block() }
 }
 
 /// More than the part by `reach` all around, so that what a normal leaves is what was cut.

@@ -1,0 +1,90 @@
+//! The surface that a measurement covers, and the share of it that no cell sees, measured along its normals.
+
+use cutter::Solid;
+use metrology::{
+    AlongNormal as _, AlongTask, CellsSeen, Coverage, CoverageFigures, Measured, Measurement,
+    REACH_OVER_UNCUT, RaysCut, RaysCutInTurn, SweptVolume, View,
+};
+use motion::{Cutters, Toolpath};
+use scene::ToolpathRequest;
+use work::monitor::Monitor;
+
+use super::tool::ToolMoves;
+use super::{JobError, Session};
+
+/// What a measurement covers.
+#[derive(Debug)]
+pub(crate) struct Covered {
+    /// The areas.
+    pub areas: CoverageFigures,
+    /// What was found where cells cut and something is judged that they do not see.
+    pub unseen: Option<Unseen>,
+}
+
+/// What was found along the normals of surface that no cell sees.
+#[derive(Debug)]
+pub(crate) struct Unseen {
+    /// The figures.
+    pub measurement: Measurement,
+    /// Distance of the places, mm.
+    pub spacing_mm: f64,
+    /// Whether a place was never cut: material then stands at least as high as is looked.
+    pub never_cut: bool,
+}
+
+impl Session {
+    /// What `measured`, the cut by `path` with the moves of all its `tools`, covers.
+    pub(crate) fn covered(
+        &self,
+        request: &ToolpathRequest,
+        measured: &Measured,
+        (path, cutters): (&Toolpath, &Cutters),
+        tools: &[ToolMoves<'_>],
+        monitor: &dyn Monitor,
+    ) -> Result<Covered, JobError> {
+        let (scene, part) = (&self.scene, &self.part);
+        let own = self.task(path, &scene.simulation, &self.cells);
+        let facing = own.facing();
+        let View::Heights(cut) = &measured.view else {
+            let areas = Coverage::new(part, &facing, scene.judged, None).figures();
+            return Ok(Covered { areas, unseen: None });
+        };
+        let deviations = &measured.measurement.deviation_map;
+        let cells = CellsSeen { grid: &cut.grid, deviations, walls: own.measures_walls() };
+        let coverage = Coverage::new(part, &facing, scene.judged, Some(cells));
+        let areas = coverage.figures();
+        if areas.along_normals_mm2 == 0.0 {
+            return Ok(Covered { areas, unseen: None });
+        }
+        // Holders end the cutters' edges.
+        let solids: Vec<Solid> =
+            tools.iter().map(|tool| Solid::of_cutter(tool.cutter, tool.holder)).collect();
+        let paths: Vec<(&Toolpath, &Solid)> = tools.iter().map(|tool| &*tool.path).zip(&solids).collect();
+        let rays = self
+            .budget()
+            .rays_of_each(&paths, Some(&cut.grid), monitor)
+            .map_err(|reason| JobError::engine(scene, &request.name, reason))?;
+        let of_tool = |k: usize| {
+            let (path, solid) = paths[k];
+            (tools[k].first, RaysCut { rays: &rays[k], path, solid })
+        };
+        let by_rays = RaysCutInTurn { tools: (0..rays.len()).map(of_tool).collect() };
+        let inward = cutters.greatest_radius();
+        let outward = (REACH_OVER_UNCUT * scene.tolerance.uncut).max(inward);
+        let swept = SweptVolume { part, cut: &by_rays, inward, outward, block: *facing.block() };
+        let task = AlongTask {
+            cutters,
+            path,
+            cut: &swept,
+            limits: &scene.tolerance,
+            asked: scene.simulation.error_bound,
+            finest: measured.cell,
+        };
+        let found = coverage.measure_unseen(&task, monitor)?;
+        let unseen = found.map(|(measurement, spacing_mm)| {
+            let never_cut = measurement.uncut.max_height_mm >= swept.reach();
+            Unseen { measurement, spacing_mm, never_cut }
+        });
+        Ok(Covered { areas, unseen })
+    }
+}
