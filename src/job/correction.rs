@@ -483,10 +483,8 @@ impl Corrected<'_> {
     /// Whether other widths changed no more than the ends of passes: few are spread over a part.
     fn is_as_before(&self) -> bool {
         self.rounds.last_chunk::<2>().is_some_and(|[a, b]| {
-            let widths =
-                (b.factors[0] / a.factors[0] - 1.0).abs().max((b.factors[1] / a.factors[1] - 1.0).abs());
-            let length = (b.cutting_length_mm / a.cutting_length_mm - 1.0).abs();
-            widths > 0.0 && length <= AS_BEFORE * widths
+            let [least, most] = changes(b.factors, a.factors);
+            are_ends_alone(least.max(most), b.cutting_length_mm / a.cutting_length_mm)
         })
     }
 
@@ -605,9 +603,8 @@ impl Corrected<'_> {
     /// part, a whole number of them, and it leaves what the best one leaves.
     fn is_left_as_before(&self, planned: &Planned, factors: [f64; 2]) -> bool {
         let before = &self.tried.standing.round;
-        let [a, b] = [0, 1].map(|k| (factors[k] / before.factors[k] - 1.0).abs());
-        let length = cutting_length(planned) / before.cutting_length_mm - 1.0;
-        a.min(b) > 0.0 && length.abs() <= AS_BEFORE * a.min(b)
+        let [least, most] = changes(factors, before.factors);
+        are_ends_alone(least.min(most), cutting_length(planned) / before.cutting_length_mm)
     }
 
     /// What the best plan leaves, as that of another with other ends of passes.
@@ -642,6 +639,16 @@ impl Corrected<'_> {
         }
         gain
     }
+}
+
+/// By which share the least and the greatest width of a plan differ from those of another.
+fn changes(factors: [f64; 2], others: [f64; 2]) -> [f64; 2] {
+    [0, 1].map(|k| (factors[k] / others[k] - 1.0).abs())
+}
+
+/// Whether widths that differ by this share, on a path this many times as long, changed no more than the ends of passes.
+fn are_ends_alone(widths: f64, length: f64) -> bool {
+    widths > 0.0 && (length - 1.0).abs() <= AS_BEFORE * widths
 }
 
 /// [`CorrectionRound::cutting_length_mm`] of a plan.

@@ -25,7 +25,8 @@ impl Along<'_> {
         let mut inspection = self.inspection(&tracks);
         inspection.finder.close = NEARLY;
         let Seen { samples, triangles, of_triangle, on_border } = inspection.look(net, kept, monitor)?;
-        let (of_triangle, _) = inspection.without_hollows(of_triangle);
+        // Those that are too tall for scallops count as well: plans are corrected by them.
+        let of_triangle = Grouped::of(of_triangle);
         let mut greatest = Greatest::default();
         of_triangle.items.iter().for_each(|crossing| greatest.look_at_ridge(crossing));
         let mut above: Vec<RidgePlace> =
