@@ -55,8 +55,8 @@ const MOST_MEASURED_NEAR: usize = 8;
 /// at the middle of it, since points and chords of a new plan lie elsewhere.
 const SLACK: f64 = 0.02;
 
-/// As [`SLACK`] where all has to be measured to see whether a wider plan holds. With less, whole measurements are spent on a few
-/// per cent of length.
+/// As [`SLACK`] where all has to be measured to see whether a wider plan holds, or where tools lean, whose plans take as long. With
+/// less, whole measurements are spent on a few per cent of length.
 const MEASURED_SLACK: f64 = 0.2;
 
 /// Ridges are about equally high where half of their length stands no lower than this share of the highest.
@@ -322,8 +322,9 @@ impl Corrected<'_> {
             return Ok(());
         }
         let mut in_vain = 0;
+        let slack = if self.request.axis.is_some() { MEASURED_SLACK } else { SLACK };
         while self.rounds.len() < MOST_ROUNDS
-            && let Some(next) = self.next(in_vain, SLACK)
+            && let Some(next) = self.next(in_vain, slack)
         {
             let (planned, factors) = self.plan(&next, monitor)?;
             let gain = if self.is_left_as_before(&planned, factors) {
