@@ -293,9 +293,9 @@ impl Walker<'_> {
             return;
         }
         let settled = self.fresh_from(s);
-        let left_out = self.cleared.thin(settled);
+        self.cleared.thin(settled);
         for mark in &mut self.marks {
-            mark.places = (mark.places.max(settled) - left_out).max(1);
+            mark.places = mark.places.max(settled);
         }
         self.thin_at = self.cleared.len() + FEW;
     }

@@ -8,7 +8,9 @@
 //! angle between two sides. So thinning keeps the headings.
 
 use std::cell::{Cell, RefCell};
+use std::cmp::Reverse;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::ops::Range;
 use std::sync::LazyLock;
 
 use geometry::{Point2, Vector2};
@@ -50,13 +52,18 @@ pub struct Gentle {
     pub by: f64,
 }
 
+/// A disc: its index in the order in which they were cleared, and its centre.
+type Disc = (u32, Point2);
+
 /// Ground cleared by a disc.
 pub(super) struct Cleared {
     radius: f64,
     origin: Point2,
     bucket: f64,
     side: [usize; 2],
-    buckets: Vec<Vec<u32>>,
+    /// The discs by place, each bucket in their order, but those that others cover.
+    buckets: Vec<Vec<Disc>>,
+    /// All of them, in the order in which they were cleared.
     discs: Vec<Point2>,
     /// The disc that cleared most of the last front, and how many of its parts.
     best: Cell<Option<(usize, u32)>>,
@@ -79,11 +86,9 @@ struct Near {
     reach: f64,
     /// How many discs there were. Later ones are asked, too.
     count: usize,
-    discs: Vec<u32>,
-    /// Their centres.
-    centres: Vec<Point2>,
+    discs: Vec<Disc>,
     /// Those that clear some of the circumference whole.
-    keepers: Vec<u32>,
+    keepers: Vec<Disc>,
 }
 
 impl Cleared {
@@ -128,7 +133,7 @@ impl Cleared {
     /// Clears the disc about a place.
     pub fn add(&mut self, p: Point2) {
         let bucket = self.bucket_of(&p);
-        self.buckets[bucket].push(self.discs.len() as u32);
+        self.buckets[bucket].push((self.discs.len() as u32, p));
         self.fresh[bucket] = true;
         self.discs.push(p);
     }
@@ -148,65 +153,74 @@ impl Cleared {
         }
         self.thinned = self.thinned.min(count);
         self.bare.truncate(count);
-        while self.discs.len() > count {
-            if let Some(p) = self.discs.pop() {
-                let bucket = self.bucket_of(&p);
-                self.buckets[bucket].pop();
-            }
+        near.keepers.retain(|(k, _)| (*k as usize) < count);
+        for k in (count..self.discs.len()).rev() {
+            let bucket = self.bucket_of(&self.discs[k]);
+            self.buckets[bucket].pop_if(|(last, _)| *last as usize == k);
         }
+        self.discs.truncate(count);
     }
 
-    /// Leaves out discs among the first `count` that others of them cover whole: every angle stays the same. Leaves how
-    /// many those were.
+    /// Leaves out discs among the first `count` that others of them cover whole: every angle stays the same. They still count as
+    /// places, and none of the first `count` may be taken back from here on.
     ///
     /// A disc is covered where those that hold its middle cover its circumference: each is convex, so with a place of the
     /// circumference it covers the straight line from the middle to there. With all radii a film greater it still is: that
     /// its circumference is covered means that it lies beyond its Voronoi cell.
-    pub fn thin(&mut self, count: usize) -> usize {
+    pub fn thin(&mut self, count: usize) {
         let count = count.min(self.discs.len());
-        let mut keep = vec![true; self.discs.len()];
         let changed = self.changed();
-        self.bare.resize(self.discs.len(), 0);
-        for k in 0..count {
-            let centre = self.discs[k];
-            if !changed[self.bucket_of(&centre)] {
-                continue;
-            }
-            let rim_of = |first: usize| {
-                let mut rim = Rim::default();
-                self.each_near(&centre, self.radius, first, |other| {
-                    let to = (self.discs[other] - centre) / self.radius;
-                    if other < count && other != k && keep[other] && to.norm_squared() <= 1.0 {
-                        rim.cover(&to);
-                    }
-                    !rim.is_covered()
-                });
-                rim
-            };
+        let in_changed = self.buckets.iter().zip(&changed).filter(|(_, changed)| **changed);
+        let mut asked: Vec<Disc> = in_changed.flat_map(|(bucket, _)| bucket).copied().collect();
+        asked.retain(|(k, _)| (*k as usize) < count);
+        asked.sort_unstable_by_key(|(k, _)| *k);
+        self.bare.resize(count, 0);
+        for (k, centre) in asked {
+            let k = k as usize;
             // What was not covered before is only where something was added.
-            if k >= self.thinned || rim_of(self.thinned).covers(self.bare[k]) {
-                let rim = rim_of(0);
-                keep[k] = !rim.is_covered();
+            if k < self.thinned {
+                let bare = self.bare[k];
+                if !self.any_beside(k, &centre, self.thinned..count, |to| Rim::part_is_within(bare, to)) {
+                    continue;
+                }
+            }
+            let mut rim = Rim::default();
+            let covered = self.any_beside(k, &centre, 0..count, |to| {
+                rim.cover(to);
+                rim.is_covered()
+            });
+            if covered {
+                let bucket = self.bucket_of(&centre);
+                self.buckets[bucket].retain(|(other, _)| *other as usize != k);
+            } else {
                 self.bare[k] = rim.first_bare();
             }
         }
-        let bare = std::mem::take(&mut self.bare);
-        self.bare = bare.into_iter().zip(&keep).filter(|(_, keep)| **keep).map(|(bare, _)| bare).collect();
-        let kept: Vec<Point2> =
-            self.discs.iter().zip(&keep).filter(|(_, keep)| **keep).map(|(p, _)| *p).collect();
-        let left_out = self.discs.len() - kept.len();
-        self.thinned = count - left_out;
-        self.buckets.iter_mut().for_each(Vec::clear);
-        self.discs.clear();
-        kept.into_iter().for_each(|p| self.add(p));
+        self.thinned = count;
         self.near.get_mut().reach = 0.0;
         // Those that could not be left out yet are looked at again.
         self.fresh.fill(false);
-        for k in count - left_out..self.discs.len() {
+        for k in count..self.discs.len() {
             let bucket = self.bucket_of(&self.discs[k]);
             self.fresh[bucket] = true;
         }
-        left_out
+    }
+
+    /// Whether anything is `found` among the `others` that hold the middle of a disc, which are told where they lie from there, over
+    /// the radius.
+    fn any_beside(
+        &self,
+        disc: usize,
+        centre: &Point2,
+        others: Range<usize>,
+        mut found: impl FnMut(&Vector2) -> bool,
+    ) -> bool {
+        let reach = Vector2::new(self.radius, self.radius);
+        !self.each_within(&[centre - reach, centre + reach], others.start, |(other, at)| {
+            let to = (at - centre) / self.radius;
+            let other = *other as usize;
+            !(other < others.end && other != disc && to.norm_squared() <= 1.0 && found(&to))
+        })
     }
 
     /// Buckets whose discs may be covered since the ground was thinned: discs were added within a radius.
@@ -222,19 +236,19 @@ impl Cleared {
         changed
     }
 
-    /// The discs from `first` on whose centres may be within `reach` of a place, by bucket, the last first, as long as `tell` wants
-    /// more.
-    fn each_near(&self, place: &Point2, reach: f64, first: usize, mut tell: impl FnMut(usize) -> bool) {
-        let reach = Vector2::new(reach, reach);
-        let (lo, hi) = (place - reach - self.origin, place + reach - self.origin);
-        for j in self.column(1, lo.y)..=self.column(1, hi.y) {
-            for i in self.column(0, lo.x)..=self.column(0, hi.x) {
-                let bucket = self.buckets[j * self.side[0] + i].iter().rev().map(|&k| k as usize);
-                if !bucket.take_while(|&k| k >= first).all(&mut tell) {
-                    return;
-                }
-            }
-        }
+    /// The discs from `first` on whose centres may be within a box, by bucket, the last first, as long as `tell` wants more; whether
+    /// it still did in the end.
+    fn each_within(&self, [lo, hi]: &[Point2; 2], first: usize, mut tell: impl FnMut(&Disc) -> bool) -> bool {
+        let (lo, hi) = (lo - self.origin, hi - self.origin);
+        let mut rows = self.column(1, lo.y)..=self.column(1, hi.y);
+        rows.all(|j| {
+            let row = j * self.side[0];
+            let buckets = &self.buckets[row + self.column(0, lo.x)..=row + self.column(0, hi.x)];
+            buckets.iter().all(|bucket| {
+                let bucket = bucket.iter().rev();
+                bucket.take_while(|(k, _)| *k as usize >= first).all(&mut tell)
+            })
+        })
     }
 
     /// Angle of the front half of the circumference in stock at `centre` with the unit vector `heading`,
@@ -288,7 +302,7 @@ impl Cleared {
         }
         let later = (near.count..self.discs.len()).rev();
         // The last ground leaves so little standing that most of the older is passed over.
-        let listed = near.discs.iter().map(|k| *k as usize).zip(&near.centres);
+        let listed = near.discs.iter().map(|(k, centre)| (*k as usize, centre));
         for (k, disc) in later.map(|k| (k, &self.discs[k])).chain(listed) {
             if front.ends.is_none() {
                 break;
@@ -311,57 +325,37 @@ impl Cleared {
     fn list(&self, near: &mut Near, anchor: &Point2) {
         let reach = NEIGHBOURS * self.radius;
         let off = reach + self.radius * PI / SECTORS as f64;
-        let (whole, touched) = ((self.radius - off).powi(2), (self.radius * (1.0 + FILM) + off).powi(2));
+        let (whole, touched) = ((self.radius - off).powi(2), self.radius * (1.0 + FILM) + off);
         let sector = |k: usize| {
             let (sin, cos) = (TAU * k as f64 / SECTORS as f64).sin_cos();
             Vector2::new(cos, sin) * self.radius
         };
-        let mut open: [Vector2; SECTORS] = std::array::from_fn(sector);
-        let mut left = SECTORS;
-        let mut keep = |k: u32, keepers: &mut Vec<u32>| {
-            let to = self.discs[k as usize] - anchor;
-            let before = left;
-            let mut at = 0;
-            while at < left {
-                if (open[at] - to).norm_squared() < whole {
-                    left -= 1;
-                    open.swap(at, left);
-                } else {
-                    at += 1;
-                }
-            }
-            if left < before {
-                keepers.push(k);
-            }
-            left
+        let mut open: Vec<Vector2> = (0..SECTORS).map(sector).collect();
+        let closes = |open: &mut Vec<Vector2>, centre: &Point2| {
+            let (to, before) = (centre - anchor, open.len());
+            open.retain(|sector| (sector - to).norm_squared() >= whole);
+            open.len() < before
         };
-        let known = std::mem::take(&mut near.keepers);
-        for k in known.into_iter().filter(|k| (*k as usize) < self.discs.len()) {
-            keep(k, &mut near.keepers);
-        }
+        near.keepers.retain(|(_, centre)| closes(&mut open, centre));
         near.discs.clear();
-        let most = 2.0 * self.radius + off;
-        self.each_near(anchor, most, 0, |k| {
-            if (self.discs[k] - anchor).norm_squared() < most * most {
-                near.discs.push(k as u32);
-            }
-            true
-        });
-        for k in near.discs.iter() {
-            if keep(*k, &mut near.keepers) == 0 {
-                break;
-            }
+        if let Some(first) = open.first() {
+            // Others matter only where the known ones leave something open.
+            let (lo, hi) =
+                open.iter().fold((*first, *first), |(lo, hi), sector| (lo.inf(sector), hi.sup(sector)));
+            let beyond = Vector2::new(touched, touched);
+            self.each_within(&[anchor + lo - beyond, anchor + hi + beyond], 0, |disc| {
+                near.discs.push(*disc);
+                true
+            });
+            near.keepers.extend(near.discs.iter().filter(|(_, centre)| closes(&mut open, centre)));
+            near.discs.retain(|(_, centre)| {
+                let to = centre - anchor;
+                open.iter().any(|sector| (sector - to).norm_squared() < touched * touched)
+            });
         }
-        let open = &open[..left];
-        near.discs.retain(|k| {
-            let to = self.discs[*k as usize] - anchor;
-            open.iter().any(|sector| (sector - to).norm_squared() < touched)
-        });
         near.discs.extend(&near.keepers);
-        near.discs.sort_unstable_by(|a, b| b.cmp(a));
-        near.discs.dedup();
-        near.centres.clear();
-        near.centres.extend(near.discs.iter().map(|k| self.discs[*k as usize]));
+        near.discs.sort_unstable_by_key(|(k, _)| Reverse(*k));
+        near.discs.dedup_by_key(|(k, _)| *k);
         (near.anchor, near.reach, near.count) = (*anchor, reach, self.discs.len());
     }
 }
@@ -476,6 +470,14 @@ fn half_angle(cos: f64) -> f64 {
     angle_of(cos, (1.0 - cos * cos).max(0.0).sqrt())
 }
 
+/// Where the parts of a circumference begin and end, over the radius.
+static RIM: LazyLock<[Vector2; 65]> = LazyLock::new(|| {
+    std::array::from_fn(|k| {
+        let (sin, cos) = (TAU * k as f64 / 64.0).sin_cos();
+        Vector2::new(cos, sin)
+    })
+});
+
 /// Parts of a circumference, and which of them are covered whole.
 #[derive(Default)]
 struct Rim(u64);
@@ -485,8 +487,10 @@ impl Rim {
         self.0 == u64::MAX
     }
 
-    fn covers(&self, part: u32) -> bool {
-        self.0 >> part & 1 == 1
+    /// Whether the disc lies over a part whose middle is at `to`.
+    fn part_is_within(part: u32, to: &Vector2) -> bool {
+        let held = |k: u32| (RIM[k as usize] - to).norm_squared() <= 1.0 - 4.0 * ROUNDING;
+        held(part) && held(part + 1)
     }
 
     /// The first part that is not covered; any where all are.
@@ -635,9 +639,10 @@ mod tests {
             places.iter().enumerate().map(|(k, p)| ground.arc(p, &heading(k), fresh)).collect()
         };
         let before = arcs(&ground, fresh);
-        let left_out = ground.thin(fresh);
-        assert!(left_out > 12_000 && ground.len() == 40 * 401 - left_out, "{left_out}");
-        assert_eq!(arcs(&ground, fresh - left_out), before);
+        ground.thin(fresh);
+        let left: usize = ground.buckets.iter().map(Vec::len).sum();
+        assert!(left < 4_000 && ground.len() == 40 * 401, "{left}");
+        assert_eq!(arcs(&ground, fresh), before);
         assert!(before.iter().any(|arc| *arc > 0.0 && *arc < PI));
     }
 

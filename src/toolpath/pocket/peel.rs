@@ -264,7 +264,7 @@ impl<'a> Peeler<'a> {
                 if link.is_none() {
                     link = Some(self.link_to(place, before));
                 }
-                fresh -= self.thin(fresh);
+                self.thin(fresh);
             }
             let Some(next) = self.next(&way[way.len() - 1], step, fresh) else {
                 if step <= shortest {
@@ -306,16 +306,14 @@ impl<'a> Peeler<'a> {
         Ok(Came::Through)
     }
 
-    /// Leaves out what the first `count` places of the ground cover of each other, from time to time; how many those were.
-    fn thin(&mut self, count: usize) -> usize {
+    /// Leaves out what the first `count` places of the ground cover of each other, from time to time.
+    fn thin(&mut self, count: usize) {
         /// Fewer are no matter.
         const FEW: usize = 60;
-        if self.cleared.len() < self.thin_at {
-            return 0;
+        if self.cleared.len() >= self.thin_at {
+            self.cleared.thin(count);
+            self.thin_at = self.cleared.len() + FEW;
         }
-        let left_out = self.cleared.thin(count);
-        self.thin_at = self.cleared.len() + FEW;
-        left_out
     }
 
     /// The step that turns farthest into the stock.
