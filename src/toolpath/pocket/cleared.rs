@@ -8,7 +8,6 @@
 //! angle between two sides. So thinning keeps the headings.
 
 use std::cell::{Cell, RefCell};
-use std::cmp::Reverse;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::ops::Range;
 use std::sync::LazyLock;
@@ -255,19 +254,24 @@ impl Cleared {
     /// rad. Films are left out but beside the places from `fresh` on: the chip of the move itself begins as
     /// thin as one.
     pub fn arc(&self, centre: &Point2, heading: &Vector2, fresh: usize) -> f64 {
-        self.counted(centre, self.front(centre, heading, 0.0, fresh).angle())
+        self.counted(centre, self.front(centre, heading, 0.0, fresh, 0.0).angle())
     }
 
     /// An angle at a place with what it counts more there.
     fn counted(&self, place: &Point2, angle: f64) -> f64 {
+        if angle > 0.0 { angle + self.more_at(place) } else { angle }
+    }
+
+    fn more_at(&self, place: &Point2) -> f64 {
         let near = self.gentle.iter().filter(|gentle| (gentle.at - place).norm() < gentle.within);
-        if angle > 0.0 { angle + near.map(|gentle| gentle.by).sum::<f64>() } else { angle }
+        near.map(|gentle| gentle.by).sum()
     }
 
     /// As [`Cleared::arc`], with what is clear to the right of the stock counted as well: the angle that there is once the
     /// cutter has turned along the stock on its right.
     pub fn arc_from_right(&self, centre: &Point2, heading: &Vector2, fresh: usize) -> f64 {
-        let angle = self.front(centre, heading, 0.0, fresh).ends().map_or(0.0, |[_, to]| PART * to as f64);
+        let angle =
+            self.front(centre, heading, 0.0, fresh, 0.0).ends().map_or(0.0, |[_, to]| PART * to as f64);
         self.counted(centre, angle)
     }
 
@@ -282,11 +286,15 @@ impl Cleared {
         let (heading, most) = (along / length, limit + BETWEEN);
         let at = |k: usize| from + along * (k as f64 / BETWEEN_PLACES as f64);
         let middle = at(BETWEEN_PLACES / 2);
-        self.counted(&middle, self.front(&middle, &heading, 0.5 * length, fresh).angle()) <= most
+        let enough = most - self.more_at(&middle);
+        self.front(&middle, &heading, 0.5 * length, fresh, enough).angle() <= enough.max(0.0)
             || (0..BETWEEN_PLACES).all(|k| self.arc(&at(k), &heading, fresh) <= most)
     }
 
-    fn front(&self, centre: &Point2, heading: &Vector2, half: f64, fresh: usize) -> Arc {
+    /// The front of a straight move of the length `2 half` about `centre`. Where no more than `enough` stands, rad, no more is
+    /// looked for that clears it.
+    fn front(&self, centre: &Point2, heading: &Vector2, half: f64, fresh: usize, enough: f64) -> Arc {
+        let enough = (enough.max(0.0) / PART) as u32;
         let mut front = Front::new(self.radius, heading, half);
         let grown = |k: usize| self.radius * if k < fresh { 1.0 + FILM } else { 1.0 };
         // What cleared most of the last front clears most of one beside it, and leaves less to look at.
@@ -300,22 +308,20 @@ impl Cleared {
         if near.reach == 0.0 || (centre - near.anchor).norm() + half > near.reach {
             self.list(&mut near, centre);
         }
-        let later = (near.count..self.discs.len()).rev();
-        // The last ground leaves so little standing that most of the older is passed over.
-        let listed = near.discs.iter().map(|(k, centre)| (*k as usize, centre));
-        for (k, disc) in later.map(|k| (k, &self.discs[k])).chain(listed) {
-            if front.ends.is_none() {
-                break;
-            }
+        let mut look = |k: usize, disc: &Point2| {
             let to = disc - centre;
             if (to - front.middle).norm_squared() >= front.reach {
-                continue;
+                return true;
             }
             let cleared = front.clear(to, grown(k));
             if cleared > 0 && best.is_none_or(|(_, most)| cleared > most) {
                 best = Some((k, cleared));
             }
-        }
+            front.left > enough
+        };
+        // The last ground leaves so little standing that most of the older is passed over.
+        let _ = (near.count..self.discs.len()).rev().all(|k| look(k, &self.discs[k]))
+            && near.discs.iter().all(|(k, centre)| look(*k as usize, centre));
         self.best.set(best);
         front.standing
     }
@@ -326,36 +332,38 @@ impl Cleared {
         let reach = NEIGHBOURS * self.radius;
         let off = reach + self.radius * PI / SECTORS as f64;
         let (whole, touched) = ((self.radius - off).powi(2), self.radius * (1.0 + FILM) + off);
-        let sector = |k: usize| {
-            let (sin, cos) = (TAU * k as f64 / SECTORS as f64).sin_cos();
-            Vector2::new(cos, sin) * self.radius
-        };
-        let mut open: Vec<Vector2> = (0..SECTORS).map(sector).collect();
-        let closes = |open: &mut Vec<Vector2>, centre: &Point2| {
-            let (to, before) = (centre - anchor, open.len());
+        let mut open: Vec<Vector2> =
+            RIM.iter().step_by(64 / SECTORS).take(SECTORS).map(|at| at * self.radius).collect();
+        let closes = |open: &mut Vec<Vector2>, to: &Vector2| {
+            let before = open.len();
             open.retain(|sector| (sector - to).norm_squared() >= whole);
             open.len() < before
         };
-        near.keepers.retain(|(_, centre)| closes(&mut open, centre));
+        near.keepers.retain(|(_, centre)| closes(&mut open, &(centre - anchor)));
         near.discs.clear();
+        near.discs.extend(&near.keepers);
         if let Some(first) = open.first() {
             // Others matter only where the known ones leave something open.
             let (lo, hi) =
                 open.iter().fold((*first, *first), |(lo, hi), sector| (lo.inf(sector), hi.sup(sector)));
             let beyond = Vector2::new(touched, touched);
             self.each_within(&[anchor + lo - beyond, anchor + hi + beyond], 0, |disc| {
-                near.discs.push(*disc);
+                let to = disc.1 - anchor;
+                let outside = to - to.sup(&lo).inf(&hi);
+                if outside.norm_squared() < touched * touched {
+                    let away = |sector: &Vector2| (sector - to).norm_squared();
+                    let nearest = open.iter().map(away).fold(f64::INFINITY, f64::min);
+                    if nearest < touched * touched {
+                        near.discs.push(*disc);
+                    }
+                    if nearest < whole {
+                        closes(&mut open, &to);
+                        near.keepers.push(*disc);
+                    }
+                }
                 true
             });
-            near.keepers.extend(near.discs.iter().filter(|(_, centre)| closes(&mut open, centre)));
-            near.discs.retain(|(_, centre)| {
-                let to = centre - anchor;
-                open.iter().any(|sector| (sector - to).norm_squared() < touched * touched)
-            });
         }
-        near.discs.extend(&near.keepers);
-        near.discs.sort_unstable_by_key(|(k, _)| Reverse(*k));
-        near.discs.dedup_by_key(|(k, _)| *k);
         (near.anchor, near.reach, near.count) = (*anchor, reach, self.discs.len());
     }
 }
@@ -367,6 +375,8 @@ struct Front {
     /// Half of the length of the move, mm.
     half: f64,
     standing: Arc,
+    /// So many parts of it.
+    left: u32,
     /// Where what stands begins and ends on the circumference.
     ends: Option<[Vector2; 2]>,
     /// The middle between them, and the square of the distance from it beyond which no disc clears any of it.
@@ -376,8 +386,9 @@ struct Front {
 
 impl Front {
     fn new(radius: f64, heading: &Vector2, half: f64) -> Self {
-        let (ends, middle, reach) = (None, Vector2::zeros(), 0.0);
-        let mut front = Self { radius, heading: *heading, half, standing: Arc::FRONT, ends, middle, reach };
+        let (ends, middle, reach, left) = (None, Vector2::zeros(), 0.0, PARTS as u32);
+        let mut front =
+            Self { radius, heading: *heading, half, standing: Arc::FRONT, left, ends, middle, reach };
         front.find_ends();
         front
     }
@@ -433,6 +444,7 @@ impl Front {
         }
         let cleared = if from < until { self.standing.clear(from, until) } else { 0 };
         if cleared > 0 {
+            self.left -= cleared;
             self.find_ends();
         }
         cleared
@@ -696,7 +708,7 @@ mod tests {
             let heading = Vector2::new((3.0 * turn).cos(), (3.0 * turn).sin());
             let fresh = ground.len().saturating_sub(20);
             for (to, half) in [(at, 0.0), (at + heading * 0.2, 0.1)] {
-                let found = ground.front(&to, &heading, half, fresh).angle();
+                let found = ground.front(&to, &heading, half, fresh, 0.0).angle();
                 let mut all = Front::new(ground.radius, &heading, half);
                 for (k, disc) in ground.discs.iter().enumerate() {
                     all.clear(disc - to, ground.radius * if k < fresh { 1.0 + FILM } else { 1.0 });
