@@ -521,12 +521,11 @@ impl Rim {
         }
         let half = half_angle(0.5 * square.sqrt()) - ROUNDING;
         let towards = angle_of(to.x, to.y);
-        let from = ((towards - half) / TAU * PARTS).ceil();
-        let count = ((towards + half) / TAU * PARTS).floor() - from;
-        if count > 0.0 {
-            let bits = u64::MAX >> (64 - count as u32);
-            self.0 |= bits.rotate_left(from.rem_euclid(PARTS) as u32);
-        }
+        // A turn is added, so that casts round down. A sixth of the circumference is covered to each side at least.
+        let from = 2 * PARTS as u32 - (PARTS - (towards - half) / TAU * PARTS) as u32;
+        let until = (PARTS + (towards + half) / TAU * PARTS) as u32;
+        let bits = u64::MAX >> (PARTS as u32 - (until - from));
+        self.0 |= bits.rotate_left(from % PARTS as u32);
     }
 }
 
