@@ -102,6 +102,8 @@ pub(super) struct Rules {
     pub sides: Sides,
     /// Radius that a helix should have, and the least that is worth one, mm.
     pub helix: [f64; 2],
+    /// Length of a way down, mm.
+    pub down: f64,
 }
 
 /// Where a ramp would begin in stock, which leaves a slot to begin with, a helix that touches the way takes

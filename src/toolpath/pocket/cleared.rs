@@ -55,6 +55,7 @@ pub struct Gentle {
 type Disc = (u32, Point2);
 
 /// Ground cleared by a disc.
+#[derive(Clone)]
 pub(super) struct Cleared {
     radius: f64,
     origin: Point2,
@@ -78,7 +79,7 @@ pub(super) struct Cleared {
 }
 
 /// The discs that decide about every place near to one.
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Near {
     anchor: Point2,
     /// How far from the anchor the list holds, mm; 0 when it does not hold.

@@ -11,6 +11,7 @@
 mod air;
 mod beginnings;
 mod bounded;
+mod chambers;
 mod cleared;
 mod descend;
 mod feed;
@@ -131,7 +132,7 @@ pub fn plan_pocket(
     if let (Some(air), Some(ground)) = (&air, &mut ground) {
         air.discs.iter().for_each(|p| ground.add(*p));
     }
-    let rules = strategy.rules(radius);
+    let rules = strategy.rules(radius, pocket.depth);
     let mut peeled: Vec<Run> = Vec::new();
     let mut groups: Vec<(&Piece, Vec<Run>)> = Vec::new();
     for piece in &rough.pieces {

@@ -8,12 +8,14 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 use super::air::{Air, sides};
 use super::bounded::{Rules, STEP};
+use super::chambers::Chambers;
 use super::cleared::Cleared;
 use super::peel::Peeler;
 use super::route::{Entry, Run, begun_near, circle};
 use super::walls::Room;
 use geometry::{Piece, Point2, Region, SegmentGrid, Vector2};
 use work::monitor::{Cancelled, Monitor, check};
+use work::parallel;
 
 /// Side of a cell over the radius, and most cells along a side.
 const CELL: f64 = 0.1;
@@ -31,7 +33,17 @@ pub(super) struct Clearing {
     pub rest: Vec<Run>,
 }
 
+impl Clearing {
+    /// Length of all ways, those down included, mm.
+    fn length(&self, down: f64) -> f64 {
+        let along = |run: &Run| down + run.points.windows(2).map(|w| (w[1] - w[0]).norm()).sum::<f64>();
+        self.peeled.iter().chain(&self.rest).map(along).sum()
+    }
+}
+
 /// Clears a piece; `None` where it has neither air nor room for a helix.
+///
+/// Passes go through necks, or each chamber gets a helix of its own before they do, whichever makes the shorter path.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -42,74 +54,114 @@ pub(super) fn clear(
     rules: &Rules,
     monitor: &dyn Monitor,
 ) -> Result<Option<Clearing>, Cancelled> {
-    let (radius, [wanted, least]) = (rules.bounds.radius, rules.helix);
-    let whole = Region { pieces: vec![piece.clone()] };
+    let radius = rules.bounds.radius;
     let room = Room::new(piece);
-    let Some(mut cells) = Cells::new(piece, radius) else { return Ok(None) };
-    let mut clearing = Clearing::default();
     let ways = air.map_or_else(Vec::new, |air| air.ways_in(|p| piece.contains(p)));
-    air.iter().flat_map(|air| &air.discs).for_each(|p| cells.clear_at(p));
-    for way in &ways {
-        let run = peeled_from(&room, ground, rules, way, Entry::Air, monitor)?;
-        cells.clear_along(&run.points);
-        if run.points.len() > 1 {
-            clearing.peeled.extend(room.kept_runs(run));
-        }
-    }
-    let mut next = match ways.first() {
-        Some(_) => cells.deep_in_stock(&room, ground, monitor)?,
-        None => whole.largest_disc(DISC_PRECISION * radius, monitor)?.map(|disc| disc.0),
+    let chambers = match ways.first() {
+        Some(_) => None,
+        None => Chambers::of(piece, &room, radius, rules.helix[1], monitor)?,
     };
-    while let Some(centre) = next.filter(|centre| room.distance(centre) >= least) {
-        let helix = wanted.min(room.distance(&centre));
-        let run = peeled(&room, ground, rules, (centre, helix), monitor)?;
-        let mut turn = circle(&centre, helix, 0.0, STEP * radius);
-        turn.push(turn[0]);
-        cells.clear_along(&turn);
-        cells.clear_along(&run.points);
-        // A step past an inner corner follows the wall around it.
-        clearing.peeled.extend(room.kept_runs(run));
-        check(monitor)?;
-        next = cells.deep_in_stock(&room, ground, monitor)?;
-    }
-    if clearing.peeled.is_empty() {
-        return Ok(None);
-    }
-    for wall in piece.curves() {
-        cells.clear_along(wall);
-        cells.clear_along(&[wall[wall.len() - 1], wall[0]]);
-    }
-    clearing.rest = cells.runs_to_standing(&clearing.peeled, &ways, monitor)?;
-    clearing.rest.extend(around_walls(piece, &clearing));
-    Ok(Some(clearing))
+    let mut plans = vec![(None, ground.clone())];
+    plans.extend(chambers.map(|chambers| (Some(chambers), ground.clone())));
+    let cleared = parallel::try_map_mut(&mut plans, |_, (chambers, ground)| {
+        let Some(cells) = Cells::new(piece, radius) else { return Ok(None) };
+        Clearer {
+            piece,
+            air,
+            ways: &ways,
+            room: &room,
+            rules,
+            monitor,
+            cells,
+            ground,
+            chambers: chambers.as_mut(),
+        }
+        .clear()
+    })?;
+    let found = cleared.into_iter().zip(plans).filter_map(|(clearing, plan)| Some((clearing?, plan.1)));
+    let best = found.min_by(|(a, _), (b, _)| a.length(rules.down).total_cmp(&b.length(rules.down)));
+    Ok(best.map(|(clearing, its)| {
+        *ground = its;
+        clearing
+    }))
 }
 
-/// A helix and the passes that go on from it.
-fn peeled(
-    room: &Room,
-    ground: &mut Cleared,
-    rules: &Rules,
-    (centre, radius): (Point2, f64),
-    monitor: &dyn Monitor,
-) -> Result<Run, Cancelled> {
-    let mut turn = circle(&centre, radius, 0.0, STEP * rules.bounds.radius);
-    turn.push(turn[0]);
-    turn.iter().for_each(|p| ground.add(*p));
-    peeled_from(room, ground, rules, &turn, Entry::Helix { centre, radius, begin: 0.0 }, monitor)
+/// Clears a piece in one way.
+struct Clearer<'a> {
+    piece: &'a Piece,
+    air: Option<&'a Air>,
+    ways: &'a [Vec<Point2>],
+    room: &'a Room<'a>,
+    rules: &'a Rules,
+    monitor: &'a dyn Monitor,
+    cells: Cells,
+    ground: &'a mut Cleared,
+    /// What passes may not go to before a helix is there.
+    chambers: Option<&'a mut Chambers>,
 }
 
-/// The passes that go on from the end of a way over ground that is cleared.
-fn peeled_from(
-    room: &Room,
-    ground: &mut Cleared,
-    rules: &Rules,
-    way: &[Point2],
-    entry: Entry,
-    monitor: &dyn Monitor,
-) -> Result<Run, Cancelled> {
-    let mut peeler = Peeler::new(room, ground, rules.bounds.limit, rules.bounds.radius, way);
-    peeler.peel(monitor)?;
-    Ok(Run { entry, points: peeler.into_way().split_off(way.len() - 1) })
+impl Clearer<'_> {
+    fn clear(mut self) -> Result<Option<Clearing>, Cancelled> {
+        let (radius, [wanted, least]) = (self.rules.bounds.radius, self.rules.helix);
+        let mut clearing = Clearing::default();
+        self.air.iter().flat_map(|air| &air.discs).for_each(|p| self.cells.clear_at(p));
+        for way in self.ways {
+            let run = self.peeled(way, Entry::Air)?;
+            if run.points.len() > 1 {
+                clearing.peeled.extend(self.room.kept_runs(run));
+            }
+        }
+        let whole = Region { pieces: vec![self.piece.clone()] };
+        let mut next = match self.ways.first() {
+            Some(_) => self.deep_in_stock()?,
+            None => whole.largest_disc(DISC_PRECISION * radius, self.monitor)?.map(|disc| disc.0),
+        };
+        while let Some(centre) = next.filter(|centre| self.room.distance(centre) >= least) {
+            let helix = wanted.min(self.room.distance(&centre));
+            let mut turn = circle(&centre, helix, 0.0, STEP * radius);
+            turn.push(turn[0]);
+            turn.iter().for_each(|p| self.ground.add(*p));
+            self.chambers.iter_mut().for_each(|chambers| chambers.enter(&centre));
+            self.cells.clear_along(&turn);
+            let run = self.peeled(&turn, Entry::Helix { centre, radius: helix, begin: 0.0 })?;
+            // A step past an inner corner follows the wall around it.
+            clearing.peeled.extend(self.room.kept_runs(run));
+            next = self.deep_in_stock()?;
+        }
+        if clearing.peeled.is_empty() || self.chambers.is_some_and(|chambers| !chambers.all_entered()) {
+            return Ok(None);
+        }
+        for wall in self.piece.curves() {
+            self.cells.clear_along(wall);
+            self.cells.clear_along(&[wall[wall.len() - 1], wall[0]]);
+        }
+        clearing.rest = self.cells.runs_to_standing(&clearing.peeled, self.ways, self.monitor)?;
+        clearing.rest.extend(around_walls(self.piece, &clearing));
+        Ok(Some(clearing))
+    }
+
+    /// The passes that go on from the end of a way over ground that is cleared. Before another helix has to go down, places from which
+    /// none came through are tried again.
+    fn peeled(&mut self, way: &[Point2], entry: Entry) -> Result<Run, Cancelled> {
+        let (bounds, least) = (self.rules.bounds, self.rules.helix[1]);
+        let chambers = self.chambers.as_deref();
+        let mut peeler = Peeler::new(self.room, chambers, self.ground, [bounds.limit, bounds.radius], way);
+        let mut from = way.len() - 1;
+        loop {
+            peeler.peel(self.monitor)?;
+            self.cells.clear_along(&peeler.way()[from..]);
+            from = peeler.way().len() - 1;
+            let next = self.cells.deep_in_stock(self.room, peeler.ground(), self.monitor)?;
+            if next.is_none_or(|next| self.room.distance(&next) < least) || !peeler.take_back() {
+                break;
+            }
+        }
+        Ok(Run { entry, points: peeler.into_way().split_off(way.len() - 1) })
+    }
+
+    fn deep_in_stock(&self) -> Result<Option<Point2>, Cancelled> {
+        self.cells.deep_in_stock(self.room, self.ground, self.monitor)
+    }
 }
 
 /// Once around each wall.
@@ -298,7 +350,8 @@ mod tests {
         let square = [(0., 0.), (12., 0.), (12., 12.), (0., 12.)].map(|(x, y)| Point2::new(x, y)).to_vec();
         let piece = Piece { outer: square, islands: Vec::new() };
         let bounds = crate::pocket::turning::Turning { limit: 1.2, radius: 2.0 };
-        let rules = Rules { bounds, sides: crate::pocket::bounded::Sides::Left, helix: [1.6, 0.4] };
+        let rules =
+            Rules { bounds, sides: crate::pocket::bounded::Sides::Left, helix: [1.6, 0.4], down: 40.0 };
         let around = [Point2::new(-2.0, -2.0), Point2::new(14.0, 14.0)];
         let mut ground = Cleared::new(around, 2.0);
         let found = clear(&piece, None, &mut ground, &rules, &work::monitor::Silent).unwrap().unwrap();
