@@ -68,6 +68,14 @@ pub(super) struct Bounding {
     pub above: Vec<(Point2, f64)>,
 }
 
+impl Bounding {
+    /// What was done to several runs.
+    pub fn add(&mut self, other: Self) {
+        self.loops += other.loops;
+        self.above.extend(other.above);
+    }
+}
+
 /// On which side of the way loops are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Sides {
@@ -151,6 +159,26 @@ fn enter(run: &Run, cleared: &mut Cleared, radius: f64) {
     if let Entry::Helix { centre, radius: turn, begin } = &run.entry {
         circle(centre, *turn, *begin, STEP * radius).into_iter().for_each(|p| cleared.add(p));
     }
+}
+
+/// Keeps runs to their room, and puts loops into them.
+///
+/// # Errors
+/// [`Cancelled`] when the monitor says so.
+pub(super) fn bound_all(
+    runs: &mut Vec<Run>,
+    room: &Room,
+    cleared: &mut Cleared,
+    rules: &Rules,
+    monitor: &dyn Monitor,
+) -> Result<Bounding, Cancelled> {
+    let mut did = Bounding::default();
+    room.keep_all(runs, monitor)?;
+    for run in runs.iter_mut() {
+        did.add(bound(run, room, cleared, rules, monitor)?);
+    }
+    room.keep_all(runs, monitor)?;
+    Ok(did)
 }
 
 /// Puts loops into `run` so that no more of the circumference stands in stock than `bounds` allow, and adds

@@ -7,7 +7,7 @@
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 use super::air::{Air, sides};
-use super::bounded::{Rules, STEP};
+use super::bounded::{Bounding, Rules, STEP, bound_all};
 use super::chambers::Chambers;
 use super::cleared::Cleared;
 use super::peel::Peeler;
@@ -29,8 +29,10 @@ const DISC_PRECISION: f64 = 0.05;
 pub(super) struct Clearing {
     /// Passes of constant engagement.
     pub peeled: Vec<Run>,
-    /// What has to follow, and to be bounded by loops.
+    /// What has to follow, bounded by loops.
     pub rest: Vec<Run>,
+    /// What bounding that did.
+    pub bounding: Bounding,
 }
 
 impl Clearing {
@@ -79,7 +81,10 @@ pub(super) fn clear(
         .clear()
     })?;
     let found = cleared.into_iter().zip(plans).filter_map(|(clearing, plan)| Some((clearing?, plan.1)));
-    let best = found.min_by(|(a, _), (b, _)| a.length(rules.down).total_cmp(&b.length(rules.down)));
+    let best = found.min_by(|(a, _), (b, _)| {
+        let exceeds = |clearing: &Clearing| !clearing.bounding.above.is_empty();
+        exceeds(a).cmp(&exceeds(b)).then(a.length(rules.down).total_cmp(&b.length(rules.down)))
+    });
     Ok(best.map(|(clearing, its)| {
         *ground = its;
         clearing
@@ -137,6 +142,7 @@ impl Clearer<'_> {
         }
         clearing.rest = self.cells.runs_to_standing(&clearing.peeled, self.ways, self.monitor)?;
         clearing.rest.extend(around_walls(self.piece, &clearing));
+        clearing.bounding = bound_all(&mut clearing.rest, self.room, self.ground, self.rules, self.monitor)?;
         Ok(Some(clearing))
     }
 
