@@ -505,7 +505,9 @@ impl Walker<'_> {
         let mut found = Loop { radius: rho, side, centre, places: Vec::new(), empty: true };
         for k in 0..=sides {
             let (at, arc) = asked(k);
-            if arc > self.bounds.limit {
+            // What stands may be met between two places.
+            let keeps = |from| self.cleared.keeps(from, &at, self.bounds.limit, usize::MAX);
+            if arc > self.bounds.limit || !found.places.last().is_none_or(keeps) {
                 self.above_at.set(k);
                 return None;
             }

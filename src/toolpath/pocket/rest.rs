@@ -119,9 +119,12 @@ impl Clearer<'_> {
         let whole = Region { pieces: vec![self.piece.clone()] };
         let mut next = match self.ways.first() {
             Some(_) => self.deep_in_stock()?,
-            None => whole.largest_disc(DISC_PRECISION * radius, self.monitor)?.map(|disc| disc.0),
+            None => whole
+                .largest_disc(DISC_PRECISION * radius, self.monitor)?
+                .filter(|disc| disc.1 >= least)
+                .map(|disc| disc.0),
         };
-        while let Some(centre) = next.filter(|centre| self.room.distance(centre) >= least) {
+        while let Some(centre) = next {
             let helix = wanted.min(self.room.distance(&centre));
             let mut turn = circle(&centre, helix, 0.0, STEP * radius);
             turn.push(turn[0]);
@@ -147,26 +150,38 @@ impl Clearer<'_> {
     }
 
     /// The passes that go on from the end of a way over ground that is cleared. Before another helix has to go down, places from which
-    /// none came through are tried again.
+    /// none came through are tried again, which stays where it comes to the place of that helix.
     fn peeled(&mut self, way: &[Point2], entry: Entry) -> Result<Run, Cancelled> {
-        let (bounds, least) = (self.rules.bounds, self.rules.helix[1]);
+        let bounds = self.rules.bounds;
         let chambers = self.chambers.as_deref();
         let mut peeler = Peeler::new(self.room, chambers, self.ground, [bounds.limit, bounds.radius], way);
-        let mut from = way.len() - 1;
-        loop {
+        peeler.peel(self.monitor)?;
+        let deep = |cells: &Cells, ground: &Cleared| {
+            cells.deep_in_stock(self.room, ground, self.rules.helix[1], self.monitor)
+        };
+        let mut next = deep(&self.cells, peeler.ground())?;
+        let (mut done, mut ground) = (peeler.way().len(), None);
+        while next.is_some() && peeler.take_back() {
+            ground = Some(peeler.ground().clone());
             peeler.peel(self.monitor)?;
-            self.cells.clear_along(&peeler.way()[from..]);
-            from = peeler.way().len() - 1;
-            let next = self.cells.deep_in_stock(self.room, peeler.ground(), self.monitor)?;
-            if next.is_none_or(|next| self.room.distance(&next) < least) || !peeler.take_back() {
+            let left = deep(&self.cells, peeler.ground())?;
+            if left == next {
                 break;
             }
+            (next, done, ground) = (left, peeler.way().len(), None);
         }
-        Ok(Run { entry, points: peeler.into_way().split_off(way.len() - 1) })
+        let mut points = peeler.into_way();
+        points.truncate(done);
+        if let Some(ground) = ground {
+            *self.ground = ground;
+        }
+        let points = points.split_off(way.len() - 1);
+        self.cells.clear_along(&points);
+        Ok(Run { entry, points })
     }
 
     fn deep_in_stock(&self) -> Result<Option<Point2>, Cancelled> {
-        self.cells.deep_in_stock(self.room, self.ground, self.monitor)
+        self.cells.deep_in_stock(self.room, self.ground, self.rules.helix[1], self.monitor)
     }
 }
 
@@ -255,11 +270,12 @@ impl Cells {
         }
     }
 
-    /// Of the places where the cutter would stand in stock all around, the one with most room.
+    /// Of the places where the cutter would stand in stock all around, the one with most room, `least` or more.
     fn deep_in_stock(
         &self,
         room: &Room,
         ground: &Cleared,
+        least: f64,
         monitor: &dyn Monitor,
     ) -> Result<Option<Point2>, Cancelled> {
         let x = Vector2::new(1.0, 0.0);
@@ -268,7 +284,8 @@ impl Cells {
             check(monitor)?;
             let p = self.at(index);
             let distance = room.distance(&p);
-            if best.is_none_or(|best| distance > best.0)
+            if distance >= least
+                && best.is_none_or(|best| distance > best.0)
                 && [x, -x].iter().all(|x| ground.arc(&p, x, usize::MAX) > PI - 1e-6)
             {
                 best = Some((distance, p));
