@@ -211,6 +211,23 @@ mod tests {
         assert_eq!(places.left, 2);
     }
 
+    /// A place from which no pass came through is taken back after ground was cleared near to it, and not before.
+    #[test]
+    fn failed_places_are_taken_back_where_ground_was_cleared() {
+        let mut places = Beginnings::new(1.0);
+        let (at, x) = (Point2::new(0.5, 0.5), Vector2::new(1.0, 0.0));
+        places.push(0, at, x);
+        places.pass_done(&[at]);
+        places.fail(0);
+        assert!(!places.take_back() && places.nearest(&at).is_none());
+        places.pass_done(&[Point2::new(9.5, 0.5)]);
+        assert!(!places.take_back());
+        places.pass_done(&[Point2::new(2.5, 0.5)]);
+        assert!(places.take_back());
+        assert_eq!(places.nearest(&at), Some(0));
+        assert!(!places.take_back());
+    }
+
     /// A place is asked again after something was cleared near to it, and not before.
     #[test]
     fn stock_is_asked_for_where_ground_was_cleared() {

@@ -556,3 +556,57 @@ impl Walker<'_> {
         found.places[last + 1..].to_vec()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use geometry::Piece;
+
+    /// A post of stock that two neighbouring places of a loop do not see, on the circumference of the cutter halfway between them,
+    /// 45 degrees ahead to the right: no loop goes there. One does where the post is beyond its reach.
+    #[test]
+    fn loops_see_what_stands_between_their_places() {
+        let (radius, rho) = (3.0, 1.5f64);
+        let corners = [(-20., -20.), (20., -20.), (20., 20.), (-20., 20.)];
+        let piece = Piece { outer: corners.map(|(x, y)| Point2::new(x, y)).to_vec(), islands: Vec::new() };
+        let room = Room::new(&piece);
+        let sides = (TAU * rho / (SIDE * radius)).ceil();
+        let loop_past = |away: f64| {
+            let (sin, cos) = (-0.5 * PI + 19.0 * PI / sides).sin_cos();
+            let (out, along) = (Vector2::new(cos, sin), Vector2::new(-sin, cos));
+            let between = Point2::new(0.0, rho) + out * (rho * (PI / sides).cos());
+            let post = between + (out + along) * (0.5f64.sqrt() * (radius + away));
+            let mut cleared = Cleared::new([Point2::new(-20., -20.), Point2::new(20., 20.)], radius);
+            let around = (0..2000).map(|k| TAU * f64::from(k) / 2000.0);
+            around.for_each(|a| cleared.add(post + Vector2::new(a.cos(), a.sin()) * (radius + 0.07)));
+            let grid = (0..1600).map(|k| Point2::new(f64::from(k % 40) - 20.0, f64::from(k / 40) - 20.0));
+            grid.filter(|p| (p - post).norm() > radius + 0.07).for_each(|p| cleared.add(p));
+            let walker = Walker {
+                way: Way::new(&[Point2::new(-10., 0.), Point2::new(10., 0.)]),
+                room: &room,
+                cleared: &mut cleared,
+                bounds: Turning { limit: 0.0, radius },
+                sides: Sides::Left,
+                radius,
+                out: Vec::new(),
+                marks: Vec::new(),
+                above_to: f64::NEG_INFINITY,
+                thin_at: 0,
+                above_at: Cell::new(0),
+                did: Bounding::default(),
+            };
+            let found = walker.loop_at(10.0, rho, 1.0);
+            // What its places alone tell.
+            let places: Vec<Point2> = (0..=sides as usize)
+                .map(|k| -0.5 * PI + TAU * k as f64 / sides)
+                .map(|a| Point2::new(rho * a.cos(), rho + rho * a.sin()))
+                .collect();
+            let clear = places
+                .windows(2)
+                .all(|w| walker.cleared.arc(&w[1], &(w[1] - w[0]).normalize(), usize::MAX) == 0.0);
+            (found.is_some(), clear)
+        };
+        assert_eq!(loop_past(0.0), (false, true));
+        assert_eq!(loop_past(0.5), (true, true));
+    }
+}

@@ -5,7 +5,7 @@
 //! (or offsets of them, or parallel lines, or levels of a stream function that follows directions), cut from the inside outwards, so that only the first pass of
 //! each nest is a slot; each nest is entered by a helix where there is room, else by a ramp along its first
 //! pass. Where an engagement is asked for, passes go along the border of the stock instead, which they turn into as far as
-//! the limit allows (`peel`), and what they leave is found and cleared by loops (`rest`, `bounded`). Every finished move keeps to
+//! the limit allows (`peel`, `clearing`), and what they leave is found and cleared by loops (`rest`, `bounded`). Every finished move keeps to
 //! the exact region (`walls`). The design's frame: z = 0 is the upper face, the floor lies at minus the depth; mm.
 
 mod air;
@@ -13,6 +13,7 @@ mod beginnings;
 mod bounded;
 mod chambers;
 mod cleared;
+mod clearing;
 mod descend;
 mod feed;
 mod finish;
@@ -139,7 +140,7 @@ pub fn plan_pocket(
     for piece in &rough.pieces {
         monitor::check(monitor)?;
         if let (Some(rules), Some(ground), true) = (&rules, &mut ground, strategy.pattern.peels())
-            && let Some(clearing) = rest::clear(piece, air.as_ref(), ground, rules, monitor)?
+            && let Some(clearing) = clearing::clear(piece, air.as_ref(), ground, rules, monitor)?
         {
             peeled.extend(clearing.peeled);
             left.extend(clearing.rest);
