@@ -199,21 +199,7 @@ pub(super) fn bound(
     if run.points.len() < 2 {
         return Ok(Bounding::default());
     }
-    let way = Way::new(&run.points);
-    let mut walker = Walker {
-        way,
-        room,
-        cleared,
-        bounds,
-        sides: rules.sides,
-        radius: bounds.radius,
-        out: Vec::new(),
-        marks: Vec::new(),
-        above_to: f64::NEG_INFINITY,
-        thin_at: 0,
-        above_at: Cell::new(0),
-        did: Bounding::default(),
-    };
+    let mut walker = Walker::new(Way::new(&run.points), room, cleared, rules);
     walker.go(monitor)?;
     run.points = walker.out;
     Ok(walker.did)
@@ -264,7 +250,24 @@ struct Walker<'a> {
     did: Bounding,
 }
 
-impl Walker<'_> {
+impl<'a> Walker<'a> {
+    fn new(way: Way, room: &'a Room<'a>, cleared: &'a mut Cleared, rules: &Rules) -> Self {
+        Self {
+            way,
+            room,
+            cleared,
+            bounds: rules.bounds,
+            sides: rules.sides,
+            radius: rules.bounds.radius,
+            out: Vec::new(),
+            marks: Vec::new(),
+            above_to: f64::NEG_INFINITY,
+            thin_at: 0,
+            above_at: Cell::new(0),
+            did: Bounding::default(),
+        }
+    }
+
     fn go(&mut self, monitor: &dyn Monitor) -> Result<(), Cancelled> {
         let total = self.way.total();
         let (free, back) = (FREE * self.radius, BACK * self.radius);
@@ -581,20 +584,10 @@ mod tests {
             around.for_each(|a| cleared.add(post + Vector2::new(a.cos(), a.sin()) * (radius + 0.07)));
             let grid = (0..1600).map(|k| Point2::new(f64::from(k % 40) - 20.0, f64::from(k / 40) - 20.0));
             grid.filter(|p| (p - post).norm() > radius + 0.07).for_each(|p| cleared.add(p));
-            let walker = Walker {
-                way: Way::new(&[Point2::new(-10., 0.), Point2::new(10., 0.)]),
-                room: &room,
-                cleared: &mut cleared,
-                bounds: Turning { limit: 0.0, radius },
-                sides: Sides::Left,
-                radius,
-                out: Vec::new(),
-                marks: Vec::new(),
-                above_to: f64::NEG_INFINITY,
-                thin_at: 0,
-                above_at: Cell::new(0),
-                did: Bounding::default(),
-            };
+            let way = Way::new(&[Point2::new(-10., 0.), Point2::new(10., 0.)]);
+            let bounds = Turning { limit: 0.0, radius };
+            let rules = Rules { bounds, sides: Sides::Left, helix: [radius; 2], down: 0.0 };
+            let walker = Walker::new(way, &room, &mut cleared, &rules);
             let found = walker.loop_at(10.0, rho, 1.0);
             // What its places alone tell.
             let places: Vec<Point2> = (0..=sides as usize)

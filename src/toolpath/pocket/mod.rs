@@ -17,6 +17,7 @@ mod clearing;
 mod descend;
 mod feed;
 mod finish;
+mod front;
 mod lines;
 mod link;
 mod nest;
