@@ -2,7 +2,7 @@
 //! stock beside them.
 //!
 //! Ground is only ever cleared. So a place without stock is forgotten, and one with stock is asked again only after something
-//! was cleared so near that it matters; mm.
+//! was cleared so near that it matters. So is a place from which no pass came through, when no other one is left; mm.
 
 use std::collections::HashMap;
 
@@ -36,12 +36,14 @@ pub(super) struct Beginnings {
     passes: usize,
     /// The last pass that cleared something that may matter to a cell.
     changed: HashMap<Cell, usize>,
+    /// Places from which no pass came through, and how many passes were done then.
+    failed: Vec<(usize, usize)>,
 }
 
 impl Beginnings {
     pub fn new(radius: f64) -> Self {
         let (cells, changed) = (HashMap::new(), HashMap::new());
-        Self { radius, all: Vec::new(), cells, left: 0, passes: 0, changed }
+        Self { radius, all: Vec::new(), cells, left: 0, passes: 0, changed, failed: Vec::new() }
     }
 
     fn cell(&self, p: &Point2) -> Cell {
@@ -86,18 +88,39 @@ impl Beginnings {
         }
     }
 
-    /// Forgets a place and those that are the same: every pass that began there has it, too.
-    pub fn forget_alike(&mut self, k: usize) {
+    /// The last pass that cleared something that may matter to a place.
+    fn changed_at(&self, k: usize) -> usize {
+        self.changed.get(&self.cell(&self.all[k].at)).copied().unwrap_or(0)
+    }
+
+    /// No pass came through from a place: it waits for ground to be cleared near to it. Those that are the same are forgotten:
+    /// every pass that began there has it, too.
+    pub fn fail(&mut self, k: usize) {
+        self.failed.push((k, self.passes));
         let (at, heading) = (self.all[k].at, self.all[k].heading);
         let cell = self.cells.get(&self.cell(&at)).cloned().unwrap_or_default();
         let alike = |k: &usize| self.all[*k].at == at && self.all[*k].heading == heading;
         cell.into_iter().filter(alike).collect::<Vec<usize>>().into_iter().for_each(|k| self.forget(k));
     }
 
+    /// Takes back places from which no pass came through where ground was cleared since; whether there are any.
+    pub fn take_back(&mut self) -> bool {
+        let failed = std::mem::take(&mut self.failed);
+        let (again, waiting) = failed.into_iter().partition(|(k, at)| self.changed_at(*k) > *at);
+        self.failed = waiting;
+        let again: Vec<(usize, usize)> = again;
+        for (k, _) in &again {
+            self.all[*k].forgotten = false;
+            self.left += 1;
+            let cell = self.cell(&self.all[*k].at);
+            self.cells.entry(cell).or_default().push(*k);
+        }
+        !again.is_empty()
+    }
+
     /// Whether a place has stock, which `ask` finds out where it may have changed.
     pub fn has_stock(&mut self, k: usize, ask: impl FnOnce(&Beginning) -> bool) -> bool {
-        let place = &self.all[k];
-        let changed = self.changed.get(&self.cell(&place.at)).copied().unwrap_or(0);
+        let (place, changed) = (&self.all[k], self.changed_at(k));
         let has = place.stock_at.is_some_and(|at| at >= changed) || ask(place);
         self.all[k].stock_at = has.then_some(self.passes);
         has
@@ -182,10 +205,27 @@ mod tests {
             places.pass_done(&[at]);
         }
         places.push(4, at + x * 1e-9, x);
-        places.forget_alike(2);
+        places.fail(2);
         let forgotten: Vec<bool> = places.all.iter().map(|place| place.forgotten).collect();
         assert_eq!(forgotten, [true, false, true, true, false]);
         assert_eq!(places.left, 2);
+    }
+
+    /// A place from which no pass came through is taken back after ground was cleared near to it, and not before.
+    #[test]
+    fn failed_places_are_taken_back_where_ground_was_cleared() {
+        let mut places = Beginnings::new(1.0);
+        let (at, x) = (Point2::new(0.5, 0.5), Vector2::new(1.0, 0.0));
+        places.push(0, at, x);
+        places.pass_done(&[at]);
+        places.fail(0);
+        assert!(!places.take_back() && places.nearest(&at).is_none());
+        places.pass_done(&[Point2::new(9.5, 0.5)]);
+        assert!(!places.take_back());
+        places.pass_done(&[Point2::new(2.5, 0.5)]);
+        assert!(places.take_back());
+        assert_eq!(places.nearest(&at), Some(0));
+        assert!(!places.take_back());
     }
 
     /// A place is asked again after something was cleared near to it, and not before.

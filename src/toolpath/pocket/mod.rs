@@ -5,16 +5,19 @@
 //! (or offsets of them, or parallel lines, or levels of a stream function that follows directions), cut from the inside outwards, so that only the first pass of
 //! each nest is a slot; each nest is entered by a helix where there is room, else by a ramp along its first
 //! pass. Where an engagement is asked for, passes go along the border of the stock instead, which they turn into as far as
-//! the limit allows (`peel`), and what they leave is found and cleared by loops (`rest`, `bounded`). Every finished move keeps to
+//! the limit allows (`peel`, `clearing`), and what they leave is found and cleared by loops (`rest`, `bounded`). Every finished move keeps to
 //! the exact region (`walls`). The design's frame: z = 0 is the upper face, the floor lies at minus the depth; mm.
 
 mod air;
 mod beginnings;
 mod bounded;
+mod chambers;
 mod cleared;
+mod clearing;
 mod descend;
 mod feed;
 mod finish;
+mod front;
 mod lines;
 mod link;
 mod nest;
@@ -47,7 +50,7 @@ use crate::vocabulary::{Kept, Passes, PlanError, PlanSettings, Strategy};
 use cutter::Cutter;
 use geometry::{Aabb, Piece, Point2, Point3, Region, SegmentGrid};
 use motion::ROUNDING;
-use work::monitor::{self, Cancelled, Monitor};
+use work::monitor::{self, Monitor};
 
 /// Share of the flat bottom's radius that innermost passes may lie from what they have to clear.
 const REACH: f64 = 0.95;
@@ -131,16 +134,18 @@ pub fn plan_pocket(
     if let (Some(air), Some(ground)) = (&air, &mut ground) {
         air.discs.iter().for_each(|p| ground.add(*p));
     }
-    let rules = strategy.rules(radius);
-    let mut peeled: Vec<Run> = Vec::new();
+    let rules = strategy.rules(radius, pocket.depth);
+    let (mut peeled, mut left): (Vec<Run>, Vec<Run>) = (Vec::new(), Vec::new());
+    let mut bounding = bounded::Bounding::default();
     let mut groups: Vec<(&Piece, Vec<Run>)> = Vec::new();
     for piece in &rough.pieces {
         monitor::check(monitor)?;
         if let (Some(rules), Some(ground), true) = (&rules, &mut ground, strategy.pattern.peels())
-            && let Some(clearing) = rest::clear(piece, air.as_ref(), ground, rules, monitor)?
+            && let Some(clearing) = clearing::clear(piece, air.as_ref(), ground, rules, monitor)?
         {
             peeled.extend(clearing.peeled);
-            groups.push((piece, clearing.rest));
+            left.extend(clearing.rest);
+            bounding.add(clearing.bounding);
             continue;
         }
         let mut runs = piece_runs(piece, cutter, strategy, step, air.is_none(), &mut planned, monitor)?;
@@ -178,13 +183,21 @@ pub fn plan_pocket(
         "{rest:.3} mm² of {:.1} mm² lie in corners that no position of the cutter reaches",
         pocket.region.area()
     ));
-    kept(&mut groups, monitor)?;
-    if let Some(rules) = &rules {
-        bound_runs(&mut groups, &mut ground, rules, notes, monitor)?;
-        kept(&mut groups, monitor)?;
+    for (piece, runs) in &mut groups {
+        let room = walls::Room::new(piece);
+        match (&rules, &mut ground) {
+            (Some(rules), Some(ground)) => {
+                bounding.add(bounded::bound_all(runs, &room, ground, rules, monitor)?);
+            }
+            _ => room.keep_all(runs, monitor)?,
+        }
+    }
+    if rules.is_some() {
+        tell_bounding(&bounding, notes);
     }
     let along_walls = groups.split_off(rough_groups).into_iter().flat_map(|group| group.1).collect();
     let mut runs = peeled;
+    runs.extend(left);
     runs.extend(groups.into_iter().flat_map(|group| group.1));
     let trimmed = |runs: Vec<Run>| -> Vec<Run> {
         let Some(air) = &air else { return runs };
@@ -203,36 +216,8 @@ pub fn plan_pocket(
     Ok(Plan::new(path, Kept::new(planned, strategy)))
 }
 
-/// Keeps all runs where the cutter's centre may be.
-fn kept(groups: &mut [(&Piece, Vec<Run>)], monitor: &dyn Monitor) -> Result<(), Cancelled> {
-    for (piece, runs) in groups {
-        let room = walls::Room::new(piece);
-        for run in std::mem::take(runs) {
-            monitor::check(monitor)?;
-            runs.extend(room.kept_runs(run));
-        }
-    }
-    Ok(())
-}
-
-/// Puts loops into the runs where more of the circumference than the limit would stand in stock.
-fn bound_runs(
-    groups: &mut [(&Piece, Vec<Run>)],
-    ground: &mut Option<Cleared>,
-    rules: &bounded::Rules,
-    notes: &mut Vec<String>,
-    monitor: &dyn Monitor,
-) -> Result<(), Cancelled> {
-    let Some(ground) = ground else { return Ok(()) };
-    let (mut loops, mut above) = (0, Vec::new());
-    for (piece, runs) in groups {
-        let room = walls::Room::new(piece);
-        for run in runs {
-            let did = bounded::bound(run, &room, ground, rules, monitor)?;
-            loops += did.loops;
-            above.extend(did.above);
-        }
-    }
+/// Notes what kept the engagement to the limit, and where nothing did.
+fn tell_bounding(bounded::Bounding { loops, above }: &bounded::Bounding, notes: &mut Vec<String>) {
     notes.push(format!("{loops} loops in each step down bound the engagement"));
     if let Some((place, longest)) = above.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
         let all: f64 = above.iter().map(|stretch| stretch.1).sum();
@@ -241,7 +226,6 @@ fn bound_runs(
             place.x, place.y
         ));
     }
-    Ok(())
 }
 
 fn piece_runs(

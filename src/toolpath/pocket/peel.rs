@@ -13,6 +13,7 @@ use std::cell::Cell;
 
 use super::beginnings::{Beginning, Beginnings};
 use super::bounded::STEP;
+use super::chambers::Chambers;
 use super::cleared::Cleared;
 use super::link::{Links, Visited};
 use super::walls::Room;
@@ -82,6 +83,8 @@ enum Came {
 /// Peels stock off as long as there is some to be reached.
 pub(super) struct Peeler<'a> {
     room: &'a Room<'a>,
+    /// Passes end where they come to a closed one.
+    chambers: Option<&'a Chambers>,
     cleared: &'a mut Cleared,
     limit: f64,
     radius: f64,
@@ -101,13 +104,14 @@ impl<'a> Peeler<'a> {
     /// Goes on from `way`, whose ground is cleared, within `room`.
     pub fn new(
         room: &'a Room<'a>,
+        chambers: Option<&'a Chambers>,
         cleared: &'a mut Cleared,
-        limit: f64,
-        radius: f64,
+        [limit, radius]: [f64; 2],
         way: &[Point2],
     ) -> Self {
         let mut peeler = Self {
             room,
+            chambers,
             cleared,
             limit,
             radius,
@@ -140,10 +144,25 @@ impl<'a> Peeler<'a> {
                 came = self.pass(k, monitor)?;
             }
             if came != Came::Through {
-                self.places.forget_alike(k);
+                self.places.fail(k);
             }
         }
         Ok(())
+    }
+
+    /// Takes back places from which no pass came through where ground was cleared since; whether there are any.
+    pub fn take_back(&mut self) -> bool {
+        self.places.take_back()
+    }
+
+    /// The ground.
+    pub fn ground(&self) -> &Cleared {
+        self.cleared
+    }
+
+    /// The way.
+    pub fn way(&self) -> &[Point2] {
+        &self.out
     }
 
     /// The way.
@@ -264,7 +283,7 @@ impl<'a> Peeler<'a> {
                 if link.is_none() {
                     link = Some(self.link_to(place, before));
                 }
-                fresh -= self.thin(fresh);
+                self.thin(fresh);
             }
             let Some(next) = self.next(&way[way.len() - 1], step, fresh) else {
                 if step <= shortest {
@@ -274,6 +293,9 @@ impl<'a> Peeler<'a> {
                 step *= 0.5;
                 continue;
             };
+            if self.chambers.is_some_and(|chambers| chambers.is_closed(&next.to)) {
+                break;
+            }
             let length = (next.to - way[way.len() - 1].to).norm();
             gone += length;
             way.push(next);
@@ -306,16 +328,14 @@ impl<'a> Peeler<'a> {
         Ok(Came::Through)
     }
 
-    /// Leaves out what the first `count` places of the ground cover of each other, from time to time; how many those were.
-    fn thin(&mut self, count: usize) -> usize {
+    /// Leaves out what the first `count` places of the ground cover of each other, from time to time.
+    fn thin(&mut self, count: usize) {
         /// Fewer are no matter.
         const FEW: usize = 60;
-        if self.cleared.len() < self.thin_at {
-            return 0;
+        if self.cleared.len() >= self.thin_at {
+            self.cleared.thin(count);
+            self.thin_at = self.cleared.len() + FEW;
         }
-        let left_out = self.cleared.thin(count);
-        self.thin_at = self.cleared.len() + FEW;
-        left_out
     }
 
     /// The step that turns farthest into the stock.

@@ -1,16 +1,15 @@
-//! A piece cleared by passes of constant engagement, and what they leave.
+//! Where stock may still stand.
 //!
-//! Enters: the piece of the cutter's centre, the ground. Leaves: runs of such passes, each of which begins with a helix, or in
-//! the air where there is some, and runs that keep to the limit by loops: to places where stock may still stand, and along the walls. Whether stock may
-//! stand is told by square cells: the middle of one, and all around it, is cleared for sure where one disc holds it whole; mm.
+//! Enters: a piece of the cutter's centre, ways that were gone. Leaves: runs to places where stock may stand, and the place deep in
+//! stock with most room. Whether stock may stand is told by square cells: the middle of one, and all around it, is cleared for
+//! sure where one disc holds it whole; mm.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-use super::air::{Air, sides};
-use super::bounded::{Rules, STEP};
+use super::air::sides;
+use super::bounded::STEP;
 use super::cleared::Cleared;
-use super::peel::Peeler;
-use super::route::{Entry, Run, begun_near, circle};
+use super::route::{Entry, Run};
 use super::walls::Room;
 use geometry::{Piece, Point2, Region, SegmentGrid, Vector2};
 use work::monitor::{Cancelled, Monitor, check};
@@ -19,114 +18,8 @@ use work::monitor::{Cancelled, Monitor, check};
 const CELL: f64 = 0.1;
 const MOST_CELLS: f64 = 2048.0;
 
-/// Precision of the place with most room, over the radius.
-const DISC_PRECISION: f64 = 0.05;
-
-/// Runs that clear a piece.
-#[derive(Default)]
-pub(super) struct Clearing {
-    /// Passes of constant engagement.
-    pub peeled: Vec<Run>,
-    /// What has to follow, and to be bounded by loops.
-    pub rest: Vec<Run>,
-}
-
-/// Clears a piece; `None` where it has neither air nor room for a helix.
-///
-/// # Errors
-/// [`Cancelled`] when the monitor says so.
-pub(super) fn clear(
-    piece: &Piece,
-    air: Option<&Air>,
-    ground: &mut Cleared,
-    rules: &Rules,
-    monitor: &dyn Monitor,
-) -> Result<Option<Clearing>, Cancelled> {
-    let (radius, [wanted, least]) = (rules.bounds.radius, rules.helix);
-    let whole = Region { pieces: vec![piece.clone()] };
-    let room = Room::new(piece);
-    let Some(mut cells) = Cells::new(piece, radius) else { return Ok(None) };
-    let mut clearing = Clearing::default();
-    let ways = air.map_or_else(Vec::new, |air| air.ways_in(|p| piece.contains(p)));
-    air.iter().flat_map(|air| &air.discs).for_each(|p| cells.clear_at(p));
-    for way in &ways {
-        let run = peeled_from(&room, ground, rules, way, Entry::Air, monitor)?;
-        cells.clear_along(&run.points);
-        if run.points.len() > 1 {
-            clearing.peeled.extend(room.kept_runs(run));
-        }
-    }
-    let mut next = match ways.first() {
-        Some(_) => cells.deep_in_stock(&room, ground, monitor)?,
-        None => whole.largest_disc(DISC_PRECISION * radius, monitor)?.map(|disc| disc.0),
-    };
-    while let Some(centre) = next.filter(|centre| room.distance(centre) >= least) {
-        let helix = wanted.min(room.distance(&centre));
-        let run = peeled(&room, ground, rules, (centre, helix), monitor)?;
-        let mut turn = circle(&centre, helix, 0.0, STEP * radius);
-        turn.push(turn[0]);
-        cells.clear_along(&turn);
-        cells.clear_along(&run.points);
-        // A step past an inner corner follows the wall around it.
-        clearing.peeled.extend(room.kept_runs(run));
-        check(monitor)?;
-        next = cells.deep_in_stock(&room, ground, monitor)?;
-    }
-    if clearing.peeled.is_empty() {
-        return Ok(None);
-    }
-    for wall in piece.curves() {
-        cells.clear_along(wall);
-        cells.clear_along(&[wall[wall.len() - 1], wall[0]]);
-    }
-    clearing.rest = cells.runs_to_standing(&clearing.peeled, &ways, monitor)?;
-    clearing.rest.extend(around_walls(piece, &clearing));
-    Ok(Some(clearing))
-}
-
-/// A helix and the passes that go on from it.
-fn peeled(
-    room: &Room,
-    ground: &mut Cleared,
-    rules: &Rules,
-    (centre, radius): (Point2, f64),
-    monitor: &dyn Monitor,
-) -> Result<Run, Cancelled> {
-    let mut turn = circle(&centre, radius, 0.0, STEP * rules.bounds.radius);
-    turn.push(turn[0]);
-    turn.iter().for_each(|p| ground.add(*p));
-    peeled_from(room, ground, rules, &turn, Entry::Helix { centre, radius, begin: 0.0 }, monitor)
-}
-
-/// The passes that go on from the end of a way over ground that is cleared.
-fn peeled_from(
-    room: &Room,
-    ground: &mut Cleared,
-    rules: &Rules,
-    way: &[Point2],
-    entry: Entry,
-    monitor: &dyn Monitor,
-) -> Result<Run, Cancelled> {
-    let mut peeler = Peeler::new(room, ground, rules.bounds.limit, rules.bounds.radius, way);
-    peeler.peel(monitor)?;
-    Ok(Run { entry, points: peeler.into_way().split_off(way.len() - 1) })
-}
-
-/// Once around each wall.
-fn around_walls(piece: &Piece, clearing: &Clearing) -> Vec<Run> {
-    let last = clearing.rest.last().or(clearing.peeled.last());
-    let mut end = last.and_then(|run| run.points.last()).copied().unwrap_or(piece.outer[0]);
-    let around = |wall: &[Point2]| {
-        let mut points = begun_near(wall, &end, 0.0);
-        points.push(points[0]);
-        end = points[0];
-        Run { entry: Entry::Ramp(points.clone()), points }
-    };
-    piece.curves().map(around).collect()
-}
-
 /// Cells of the box of a piece, and which of them are cleared for sure.
-struct Cells {
+pub(super) struct Cells {
     radius: f64,
     origin: Point2,
     cell: f64,
@@ -136,7 +29,7 @@ struct Cells {
 
 impl Cells {
     /// `None` where the piece is so large that cells would be as large as the cutter.
-    fn new(piece: &Piece, radius: f64) -> Option<Self> {
+    pub fn new(piece: &Piece, radius: f64) -> Option<Self> {
         let [lo, hi] = Region { pieces: vec![piece.clone()] }.bounds()?;
         let size = hi - lo;
         let cell = (CELL * radius).max(size.x.max(size.y) / MOST_CELLS);
@@ -172,7 +65,7 @@ impl Cells {
     }
 
     /// Clears the cells that the cutter at `p` holds whole.
-    fn clear_at(&mut self, p: &Point2) {
+    pub fn clear_at(&mut self, p: &Point2) {
         let within = self.radius - self.cell * FRAC_1_SQRT_2;
         // The cells of an axis so far to both sides of the place.
         let range = |axis: usize, reach: f64| {
@@ -189,7 +82,7 @@ impl Cells {
         }
     }
 
-    fn clear_along(&mut self, way: &[Point2]) {
+    pub fn clear_along(&mut self, way: &[Point2]) {
         for ends in way.windows(2) {
             let along = ends[1] - ends[0];
             let steps = (along.norm() / (STEP * self.radius)).ceil().max(1.0);
@@ -197,11 +90,12 @@ impl Cells {
         }
     }
 
-    /// Of the places where the cutter would stand in stock all around, the one with most room.
-    fn deep_in_stock(
+    /// Of the places where the cutter would stand in stock all around, the one with most room, `least` or more.
+    pub fn deep_in_stock(
         &self,
         room: &Room,
         ground: &Cleared,
+        least: f64,
         monitor: &dyn Monitor,
     ) -> Result<Option<Point2>, Cancelled> {
         let x = Vector2::new(1.0, 0.0);
@@ -210,7 +104,8 @@ impl Cells {
             check(monitor)?;
             let p = self.at(index);
             let distance = room.distance(&p);
-            if best.is_none_or(|best| distance > best.0)
+            if distance >= least
+                && best.is_none_or(|best| distance > best.0)
                 && [x, -x].iter().all(|x| ground.arc(&p, x, usize::MAX) > PI - 1e-6)
             {
                 best = Some((distance, p));
@@ -220,7 +115,7 @@ impl Cells {
     }
 
     /// Runs from the ways that were gone straight to cells that may hold stock.
-    fn runs_to_standing(
+    pub fn runs_to_standing(
         &mut self,
         gone: &[Run],
         ways: &[Vec<Point2>],
@@ -291,19 +186,5 @@ mod tests {
             let held = (cells.at(k) - disc).norm() + reach <= 2.0;
             assert_eq!(cells.clear[k], held, "{}", cells.at(k));
         }
-    }
-    /// What the turn of a helix clears needs no run of its own: one to its middle would come straight down.
-    #[test]
-    fn the_middle_of_a_helix_is_cleared() {
-        let square = [(0., 0.), (12., 0.), (12., 12.), (0., 12.)].map(|(x, y)| Point2::new(x, y)).to_vec();
-        let piece = Piece { outer: square, islands: Vec::new() };
-        let bounds = crate::pocket::turning::Turning { limit: 1.2, radius: 2.0 };
-        let rules = Rules { bounds, sides: crate::pocket::bounded::Sides::Left, helix: [1.6, 0.4] };
-        let around = [Point2::new(-2.0, -2.0), Point2::new(14.0, 14.0)];
-        let mut ground = Cleared::new(around, 2.0);
-        let found = clear(&piece, None, &mut ground, &rules, &work::monitor::Silent).unwrap().unwrap();
-        let Entry::Helix { centre, .. } = found.peeled[0].entry else { panic!("a helix") };
-        let ends = found.rest.iter().map(|run| (run.points[run.points.len() - 1] - centre).norm());
-        assert!(ends.fold(f64::INFINITY, f64::min) > 2.0);
     }
 }

@@ -350,13 +350,14 @@ impl PocketStrategy {
     }
 
     /// What passes are bounded by, if they are.
-    pub(super) fn rules(&self, radius: f64) -> Option<Rules> {
+    pub(super) fn rules(&self, radius: f64, depth: f64) -> Option<Rules> {
         let bounds = Turning { limit: self.bounded()?, radius };
         let sides = match self.pattern {
             Pattern::Zigzag { angle } => Sides::Toward(Vector2::new(-angle.sin(), angle.cos())),
             Pattern::Flow(_) | Pattern::Offset { .. } | Pattern::Streamline(_) => Sides::Left,
         };
-        Some(Rules { bounds, sides, helix: self.helix(radius) })
+        let down = self.stepdown.map_or(depth, |step| step.min(depth)) / self.ramp_angle.sin();
+        Some(Rules { bounds, sides, helix: self.helix(radius), down })
     }
 
     /// Radius that a helix should have, and the least that is worth one, mm.

@@ -6,6 +6,7 @@
 
 use super::route::{Entry, Run};
 use geometry::{NearestSegment, Piece, Point2, Region, SegmentGrid, Vector2, distance_of_segments};
+use work::monitor::{Cancelled, Monitor, check};
 
 /// What offsets may be off by rounding, mm: some 2⁻³⁰ of the size of the region.
 pub(super) const ROUNDING: f64 = 5.0e-7;
@@ -30,6 +31,18 @@ impl<'a> Room<'a> {
     pub fn new(piece: &'a Piece) -> Self {
         let curves = piece.curves().collect();
         Self { piece, curves, walls: SegmentGrid::of_curves(piece.curves()) }
+    }
+
+    /// All runs in this room.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn keep_all(&self, runs: &mut Vec<Run>, monitor: &dyn Monitor) -> Result<(), Cancelled> {
+        for run in std::mem::take(runs) {
+            check(monitor)?;
+            runs.extend(self.kept_runs(run));
+        }
+        Ok(())
     }
 
     /// The run in this room: several where a move would cross from one wall to another one.
