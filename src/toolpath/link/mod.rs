@@ -37,7 +37,7 @@ use drop_cutter::DropCutter;
 use entry::Sides;
 use geometry::{Point2, Point3, Vector2, Vector3, distance_to_segment};
 use machine::Machine;
-use motion::{ClPoint, Move, MoveKind, Toolpath};
+use motion::{ClPoint, Move, MoveKind, ROUNDING, Toolpath};
 use order::{Costs, Visit, is_closed, order};
 use scallop::strip_width;
 pub(crate) use tilted::join_tilted;
@@ -177,7 +177,18 @@ impl Speeds {
     /// Down to the first tip of a way and along it, s.
     fn along(&self, settings: &PlanSettings, way: &[Point3]) -> f64 {
         let down = way.first().map_or(0.0, |tip| settings.stock_top + settings.clearance - tip.z);
-        down / self.rapid + way.windows(2).map(|w| (w[1] - w[0]).norm()).sum::<f64>() / self.feed
+        let moves = way.windows(2).map(|w| (w[1] - w[0]).norm() / self.entering(&w[0], &w[1]));
+        down / self.rapid + moves.sum::<f64>()
+    }
+
+    /// The rate, mm/s, of a move on the way in: at the feed, and down no faster than a plunge, also as the program rounds it.
+    fn entering(&self, from: &Point3, to: &Point3) -> f64 {
+        let (down, length) = (from.z - to.z + 2.0 * ROUNDING, (to - from).norm() - 4.0 * ROUNDING);
+        if down * self.feed <= self.plunge * length {
+            self.feed
+        } else {
+            self.plunge * (length / down).max(0.5)
+        }
     }
 
     /// The way up from the last place, s: beyond the clearance it is rapid.
@@ -311,7 +322,12 @@ impl<'a> Program<'a> {
         let Some((&first, rest)) = way.split_first() else { return };
         self.start = Some(Point3::new(first.x, first.y, self.safe()));
         self.push(first, MoveKind::Rapid, 0.0, 0);
-        rest.iter().for_each(|&tip| self.push(tip, MoveKind::Plunge, self.settings.feed_rate, 0));
+        let mut from = first;
+        for &tip in rest {
+            let rate = 60.0 * self.rates.entering(&from, &tip);
+            self.push(tip, MoveKind::Plunge, rate.min(self.settings.feed_rate), 0);
+            from = tip;
+        }
     }
 
     /// Brings the tool to where a pass begins.

@@ -388,7 +388,7 @@ fn a_retract_is_rapid_beyond_the_clearance() {
 }
 
 /// The first pass is entered from beside the stock where that is quicker than a plunge: down where nothing stands, in at the feed, over
-/// what of the part stands higher, and no rapid touches the block.
+/// what of the part stands higher and from there down no faster than a plunge, and no rapid touches the block.
 #[test]
 fn the_first_pass_is_entered_from_beside_the_stock() {
     let pass = [line([1.0, 10.0], [19.0, 10.0])];
@@ -403,7 +403,7 @@ fn the_first_pass_is_entered_from_beside_the_stock() {
     for (part, passes, both_ways, side, gain) in [
         (&plate(), &pass, true, "least x", 1.2),
         (&behind_wall, &off_wall, true, "greatest x", 1.2),
-        (&behind_wall, &off_wall, false, "least x", 0.5),
+        (&behind_wall, &off_wall, false, "least x", 0.05),
     ] {
         let mut settings = settings(Links::Surface);
         settings.stock =
@@ -423,6 +423,10 @@ fn the_first_pass_is_entered_from_beside_the_stock() {
         let grid = Grid { origin: Point2::new(0.0, 0.0), cell: 0.1, nx: 200, ny: 200 };
         let cutter = Cutter::ball(6.0).unwrap();
         let removal = cut_in_order(ZMap::block(grid, TOP), &cutter, &path, &Silent).unwrap();
+        for (a, b, m) in path.segments().filter(|(.., m)| m.kind == MoveKind::Plunge) {
+            let down = m.feed_rate * (a.z - b.z) / (b - a).norm();
+            assert!(m.feed_rate <= settings.feed_rate && down <= settings.plunge_rate * (1.0 + 1e-9));
+        }
         // Walls that the cutter itself has left may touch it.
         assert!(removal.rapid_contacts.iter().all(|contact| contact.depth < 1e-6 && contact.travel < 1e-6));
         let drop = DropCutter::new(part, &cutter);
