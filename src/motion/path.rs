@@ -48,7 +48,7 @@ impl ClPoint {
 pub enum MoveKind {
     /// Positioning at rapid speed (G0); must not touch stock.
     Rapid,
-    /// Feeding down to the start of a pass.
+    /// Feeding down, or in from beside the stock, to the start of a pass.
     Plunge,
     /// Cutting along a pass.
     Cut,

@@ -2,7 +2,9 @@
 //! apart, over what is allowed.
 
 use super::canvas::{Align, FAINT_INK, INK, PAPER, Picture, Rgb, Strokes, TextSize, distance_to_segment_2d};
-use super::map::{Key, MapSize, MapWords, OFF_PART, Pooled, Pooling, diverging, draw, labelled, pool};
+use super::map::{
+    Key, MapSize, MapWords, OFF_PART, Pooled, Pooling, diverging, draw, extremes, labelled, pool,
+};
 use super::scale::Unit;
 use field::mesh::SingularPoint;
 use field::{PassPoint, PlannedField};
@@ -153,10 +155,8 @@ pub fn interval_picture(
 ) -> Picture {
     const PER_CENT: Unit = Unit { name: "% of allowed", a_millimetre: 100.0 };
     let map = pool(grid, deviation, Pooling::Mean, size);
-    let ratios = || field.passes.iter().flatten().filter(|p| p.inside).filter_map(PassPoint::ratio);
-    let extremes = ratios().fold(None, |range: Option<(f64, f64)>, r| {
-        Some(range.map_or((r, r), |(lo, hi)| (lo.min(r), hi.max(r))))
-    });
+    let inside = field.passes.iter().flatten().filter(|p| p.inside);
+    let extremes = extremes(inside.filter_map(PassPoint::ratio));
     let key = Key {
         from: NARROWEST,
         middle: 1.0,

@@ -143,6 +143,9 @@ fn pooled(values: impl Iterator<Item = f32>, pooling: Pooling) -> f32 {
     }
 }
 
+/// About so many round values stand beside a key.
+const TICKS: f64 = 8.0;
+
 /// Values to colours, and what the key says.
 pub(super) struct Key {
     pub from: f64,
@@ -163,6 +166,17 @@ pub(super) struct Key {
 impl Key {
     pub fn colour(&self, value: f32) -> Rgb {
         if value.is_nan() { OFF_PART } else { self.shade(self.share(f64::from(value))) }
+    }
+
+    /// From dark to light between two values, which must differ; all cells have values between the extremes.
+    pub fn sequential(
+        [from, to]: [f64; 2],
+        extremes: Option<(f64, f64)>,
+        unit: Unit,
+        [top, bottom]: [&'static str; 2],
+    ) -> Self {
+        let (middle, ticks) = (0.5 * (from + to), labelled(from, to, TICKS, unit));
+        Self { from, middle, to, gradient: sequential, ticks, unit, top, bottom, extremes }
     }
 
     /// Where a value stands between the lower end (0) and the upper end (1).
@@ -230,9 +244,13 @@ pub fn deviation_colours(deviation: &[f32], limits: &Limits) -> Vec<[u8; 3]> {
 }
 
 /// Least and greatest of the finite values.
-fn extremes(values: &[f32]) -> Option<(f64, f64)> {
-    let finite = values.iter().copied().filter(|v| v.is_finite()).map(f64::from);
+pub(super) fn extremes(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let finite = values.filter(|v| v.is_finite());
     finite.fold(None, |range, v| Some(range.map_or((v, v), |(a, b): (f64, f64)| (a.min(v), b.max(v)))))
+}
+
+fn extremes_of_cells(values: &[f32]) -> Option<(f64, f64)> {
+    extremes(values.iter().copied().map(f64::from))
 }
 
 /// Signed deviation: blue below the design (gouge), white on it, red above (excess), grey off the
@@ -251,14 +269,14 @@ pub fn deviation_picture(
     let mut ticks = labelled(-below, 0.0, HALF_TICKS, key.unit);
     let excess = labelled(0.0, above, HALF_TICKS, key.unit).into_iter().skip(1);
     ticks.extend(excess.map(|(mark, text)| (mark, format!("+{text}"))));
-    (key.ticks, key.extremes) = (ticks, extremes(deviation));
+    (key.ticks, key.extremes) = (ticks, extremes_of_cells(deviation));
     draw_keyed(grid, &pool(grid, deviation, Pooling::Extreme { below, above }, size), &key, words)
 }
 
 /// Heights of the cut stock, dark to light.
 pub fn height_picture(grid: &Grid, height: &[f32], words: &MapWords<'_>, size: MapSize) -> Picture {
     let pooled = pool(grid, height, Pooling::Mean, size);
-    let extremes = extremes(height);
+    let extremes = extremes_of_cells(height);
     let (mut from, mut to) = extremes.unwrap_or((0.0, 1.0));
     // A flat surface needs a range too.
     let least = 1e-3f64.max(to.abs() * 1e-6);
@@ -266,17 +284,7 @@ pub fn height_picture(grid: &Grid, height: &[f32], words: &MapWords<'_>, size: M
         (from, to) = (0.5 * (from + to - least), 0.5 * (from + to + least));
     }
     let unit = Unit::for_range(to - from);
-    let key = Key {
-        from,
-        middle: 0.5 * (from + to),
-        to,
-        gradient: sequential,
-        ticks: labelled(from, to, 8.0, unit),
-        unit,
-        top: "high",
-        bottom: "low",
-        extremes,
-    };
+    let key = Key::sequential([from, to], extremes, unit, ["high", "low"]);
     draw_keyed(grid, &pooled, &key, words)
 }
 
@@ -296,13 +304,7 @@ pub(super) fn draw(
 ) -> (Picture, [i64; 2]) {
     let (width, height) = (map.width * map.magnify, map.height * map.magnify);
     let mut page = Picture::blank(LEFT + width.max(MIN_WIDTH) + RIGHT, TOP + height.max(MIN_HEIGHT) + BOTTOM);
-    let letters = |size: TextSize| (page.pixels.width() as usize - 2 * 16) / size.letter_width();
-    let (title, subtitle) = (
-        shortened(words.title, letters(TextSize::Title)),
-        shortened(words.subtitle, letters(TextSize::Small)),
-    );
-    page.text(16, 12, &title, TextSize::Title, Align::Left, INK);
-    page.text(16, 36, &subtitle, TextSize::Small, Align::Left, FAINT_INK);
+    write_title(&mut page, words);
     let pixels = RgbImage::from_fn(map.width as u32, map.height as u32, |x, y| {
         image::Rgb(colour(map.values[y as usize * map.width + x as usize]))
     });
@@ -314,6 +316,16 @@ pub(super) fn draw(
     draw_marks(&mut page, grid, map, words.marks);
     draw_bar(&mut page, map, height);
     (page, [(LEFT + width.max(MIN_WIDTH) + 28) as i64, TOP as i64 + 24])
+}
+
+/// Title and subtitle, as much of them as the page is wide.
+pub(super) fn write_title(page: &mut Picture, words: &MapWords<'_>) {
+    const LEFT: i64 = 16;
+    let letters = |size: TextSize| (page.pixels.width() as usize - 2 * LEFT as usize) / size.letter_width();
+    let [title, subtitle] = [(words.title, TextSize::Title), (words.subtitle, TextSize::Small)]
+        .map(|(text, size)| shortened(text, letters(size)));
+    page.text(LEFT, 12, &title, TextSize::Title, Align::Left, INK);
+    page.text(LEFT, 36, &subtitle, TextSize::Small, Align::Left, FAINT_INK);
 }
 
 /// Rings around places, with their names beside them.

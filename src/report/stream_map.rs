@@ -1,8 +1,8 @@
 //! The function whose levels passes are, as a surface seen aslant: each level at the height of its value, coloured by how dense passes are
 //! there.
 
-use super::canvas::{Align, FAINT_INK, INK, Picture, Strokes, TextSize, shortened};
-use super::map::{Key, MapSize, MapWords, Pooled, labelled, sequential};
+use super::canvas::{Picture, Strokes};
+use super::map::{Key, MapSize, MapWords, Pooled, extremes, write_title};
 use super::scale::Unit;
 use field::{LevelLine, PlannedField};
 use geometry::Point2;
@@ -33,30 +33,12 @@ pub fn stream_picture(field: &PlannedField, words: &MapWords<'_>, size: MapSize)
     let [left, top] = Pooled::CORNER;
     let [width, height] = view.size.map(|side| side.max(LEAST_SIDE).ceil() as usize);
     let mut page = Picture::blank(left as usize + width + KEY, top as usize + height + 24);
-    let letters = |size: TextSize| (page.pixels.width() as usize - 32) / size.letter_width();
-    let [title, subtitle] = [(words.title, TextSize::Title), (words.subtitle, TextSize::Small)]
-        .map(|(text, size)| shortened(text, letters(size)));
-    page.text(16, 12, &title, TextSize::Title, Align::Left, INK);
-    page.text(16, 36, &subtitle, TextSize::Small, Align::Left, FAINT_INK);
-    let densities =
-        || field.level_lines.iter().flat_map(|line| &line.densities).copied().filter(|d| d.is_finite());
-    let extremes = densities().fold(None, |range: Option<(f64, f64)>, d| {
-        Some(range.map_or((d, d), |(lo, hi)| (lo.min(d), hi.max(d))))
-    });
+    write_title(&mut page, words);
+    let extremes = extremes(field.level_lines.iter().flat_map(|line| &line.densities).copied());
     let (from, to) = extremes.unwrap_or((0.0, 1.0));
     // A flat density is no rainbow of rounding.
     let to = to.max(from + 0.01 * from.abs().max(f64::MIN_POSITIVE));
-    let key = Key {
-        from,
-        middle: 0.5 * (from + to),
-        to,
-        gradient: sequential,
-        ticks: labelled(from, to, 8.0, PER_MM),
-        unit: PER_MM,
-        top: "dense",
-        bottom: "wide",
-        extremes,
-    };
+    let key = Key::sequential([from, to], extremes, PER_MM, ["dense", "wide"]);
     let share =
         |density: f64| (((density - from) / (to - from)) * COLOURS as f64).clamp(0.0, (COLOURS - 1) as f64);
     for colour in 0..COLOURS {
@@ -111,6 +93,7 @@ impl View {
 
 #[cfg(test)]
 mod tests {
+    use super::super::map::sequential;
     use super::*;
 
     const WORDS: MapWords<'_> = MapWords { title: "psi", subtitle: "a part", marks: &[], axes: ["x", "y"] };

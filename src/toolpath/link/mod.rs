@@ -12,6 +12,8 @@
 //! Times are those of length over rate; what the machine loses in corners is left out, which favours
 //! retracts a little.
 //!
+//! With links on the surface the first pass is entered from beside the stock where that is quicker than a plunge from above ([`entry`]).
+//!
 //! Links on the surface and smoothing are off unless a scene asks for them: bends beside the part change what closed forms
 //! say about its border.
 
@@ -19,6 +21,7 @@ mod bend;
 mod beside;
 mod ceiling;
 mod detour;
+mod entry;
 mod order;
 #[cfg(test)]
 mod tests;
@@ -31,9 +34,10 @@ use ceiling::Ceiling;
 use cutter::Cutter;
 pub use detour::{Detour, around_fixtures};
 use drop_cutter::DropCutter;
+use entry::Sides;
 use geometry::{Point2, Point3, Vector2, Vector3, distance_to_segment};
 use machine::Machine;
-use motion::{ClPoint, Move, MoveKind, Toolpath};
+use motion::{ClPoint, Move, MoveKind, ROUNDING, Toolpath};
 use order::{Costs, Visit, is_closed, order};
 use scallop::strip_width;
 pub(crate) use tilted::join_tilted;
@@ -82,18 +86,27 @@ pub(crate) fn join(
         Links::Surface => longest_link(&settings.joining, cutter, settings.step),
         Links::Retract => 0.0,
     };
+    let on_surface = longest > 0.0;
+    let sides = Sides::of(setup, longest).filter(|_| on_surface);
     let costs = Costs {
         between: &|a, b| rates.between(settings, a, b, longest),
-        start: &|place| rates.descent(settings, place),
+        start: &|place| rates.start(settings, place, sides.as_ref()),
         finish: &|place| rates.ascent(settings, place),
     };
     let visits = order(&passes, both_ways, costs);
     monitor::check(monitor)?;
     let passes = in_order(passes, &visits, both_ways);
     let mut links: Vec<Option<Vec<Point3>>> = Vec::new();
-    if longest > 0.0 && passes.len() > 1 {
+    let mut way_in = None;
+    if on_surface && !passes.is_empty() {
+        let drop = DropCutter::watched(part, cutter, monitor)?;
+        let first = passes[0][0];
+        if let Some(sides) = sides {
+            let way = sides.way(first, &drop, setup)?;
+            way_in = way.filter(|way| rates.along(settings, way) < rates.descent(settings, &first));
+        }
         let bends = Bends {
-            drop: DropCutter::watched(part, cutter, monitor)?,
+            drop,
             border: Border::of(part),
             cutter,
             interval: plane_interval(cutter, settings.step),
@@ -107,10 +120,15 @@ pub(crate) fn join(
             work::parallel::try_map(passes.len() - 1, |k| bends.link(&passes[k], &passes[k + 1], monitor))?;
     }
     let mut program = Program::new(&passes, cutter, settings, rates);
+    if let Some(way) = way_in {
+        program.come_in(&way);
+    }
     for (k, pass) in passes.iter().enumerate() {
         monitor::check(monitor)?;
         let link = k.checked_sub(1).and_then(|k| links.get_mut(k)?.take());
-        program.reach(k as u32, pass[0], link);
+        if k > 0 || program.moves.is_empty() {
+            program.reach(k as u32, pass[0], link);
+        }
         program.feed_along(k as u32, MoveKind::Cut, &pass[1..]);
     }
     Ok(program.finish())
@@ -146,6 +164,31 @@ impl Speeds {
     /// The way down to the first place, s: all of it may lead through stock.
     fn descent(&self, settings: &PlanSettings, to: &Point3) -> f64 {
         (settings.stock_top + settings.clearance - to.z) / self.plunge
+    }
+
+    /// To the first place from above, or from beside the stock, s.
+    fn start(&self, settings: &PlanSettings, to: &Point3, sides: Option<&Sides>) -> f64 {
+        let above = self.descent(settings, to);
+        let Some(from) = sides.and_then(|sides| sides.nearest(to)) else { return above };
+        let down = settings.stock_top + settings.clearance - to.z;
+        above.min(down / self.rapid + (to.xy() - from).norm() / self.feed)
+    }
+
+    /// Down to the first tip of a way and along it, s.
+    fn along(&self, settings: &PlanSettings, way: &[Point3]) -> f64 {
+        let down = way.first().map_or(0.0, |tip| settings.stock_top + settings.clearance - tip.z);
+        let moves = way.windows(2).map(|w| (w[1] - w[0]).norm() / self.entering(&w[0], &w[1]));
+        down / self.rapid + moves.sum::<f64>()
+    }
+
+    /// The rate, mm/s, of a move on the way in: at the feed, and down no faster than a plunge, also as the program rounds it.
+    fn entering(&self, from: &Point3, to: &Point3) -> f64 {
+        let (down, length) = (from.z - to.z + 2.0 * ROUNDING, (to - from).norm() - 4.0 * ROUNDING);
+        if down * self.feed <= self.plunge * length {
+            self.feed
+        } else {
+            self.plunge * (length / down).max(0.5)
+        }
     }
 
     /// The way up from the last place, s: beyond the clearance it is rapid.
@@ -272,6 +315,19 @@ impl<'a> Program<'a> {
 
     fn feed_along(&mut self, pass: u32, kind: MoveKind, tips: &[Point3]) {
         tips.iter().for_each(|&tip| self.push(tip, kind, self.settings.feed_rate, pass));
+    }
+
+    /// Brings the tool to the first pass from beside the stock.
+    fn come_in(&mut self, way: &[Point3]) {
+        let Some((&first, rest)) = way.split_first() else { return };
+        self.start = Some(Point3::new(first.x, first.y, self.safe()));
+        self.push(first, MoveKind::Rapid, 0.0, 0);
+        let mut from = first;
+        for &tip in rest {
+            let rate = 60.0 * self.rates.entering(&from, &tip);
+            self.push(tip, MoveKind::Plunge, rate.min(self.settings.feed_rate), 0);
+            from = tip;
+        }
     }
 
     /// Brings the tool to where a pass begins.

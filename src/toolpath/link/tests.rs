@@ -386,3 +386,65 @@ fn a_retract_is_rapid_beyond_the_clearance() {
     let ups = path.segments().skip(2).map(|(from, to, m)| (m.kind, from.z, to.z)).collect::<Vec<_>>();
     assert_eq!(ups, [(MoveKind::Retract, 0.0, 2.0), (MoveKind::Rapid, 2.0, TOP + 2.0)]);
 }
+
+/// The first pass is entered from beside the stock where that is quicker than a plunge: down where nothing stands, in at the feed, over
+/// what of the part stands higher and from there down no faster than a plunge, and no rapid touches the block.
+#[test]
+fn the_first_pass_is_entered_from_beside_the_stock() {
+    let pass = [line([1.0, 10.0], [19.0, 10.0])];
+    // A wall of 5 mm along x = 0, from which the ball of 3 mm stands off.
+    let wall = [(0.0, 5.0), (0.5, 5.0), (0.5001, 0.0), (20.0, 0.0)];
+    let vertices =
+        wall.iter().flat_map(|&(x, z)| [Point3::new(x, 0.0, z), Point3::new(x, 20.0, z)]).collect();
+    let triangles =
+        (0..3u32).flat_map(|k| [[2 * k, 2 * k + 2, 2 * k + 1], [2 * k + 1, 2 * k + 2, 2 * k + 3]]).collect();
+    let behind_wall = Part::from_mesh(TriangleMesh::new(vertices, triangles).unwrap().0);
+    let off_wall = [line([3.6, 10.0], [19.0, 10.0])];
+    for (part, passes, both_ways, side, gain) in [
+        (&plate(), &pass, true, "least x", 1.2),
+        (&behind_wall, &off_wall, true, "greatest x", 1.2),
+        (&behind_wall, &off_wall, false, "least x", 0.05),
+    ] {
+        let mut settings = settings(Links::Surface);
+        settings.stock =
+            Some(geometry::Aabb { min: Point3::new(0.0, 0.0, -1.0), max: Point3::new(20.0, 20.0, TOP) });
+        let plunged = join_with(passes, both_ways, part, &PlanSettings { stock: None, ..settings.clone() });
+        assert_eq!(plunged.moves[0].kind, MoveKind::Plunge);
+        let path = join_with(passes, both_ways, part, &settings);
+        assert_all_visited(&path, passes, both_ways);
+        let start = path.start.tip;
+        let away = if side == "least x" { -start.x } else { start.x - 20.0 };
+        assert!((away - 5.0).abs() < 1e-9 && (start.z - (TOP + 2.0)).abs() < 1e-9, "{side}: {start}");
+        assert_eq!(path.moves[0].kind, MoveKind::Rapid);
+        let [quick, slow] =
+            [&path, &plunged].map(|path| machine::machining_time(path, &settings.machine, &Silent).unwrap());
+        // 9 mm down at 5 mm/s against 6 mm at 16.7 mm/s.
+        assert!(slow - quick > gain, "{side}: {quick} {slow}");
+        let grid = Grid { origin: Point2::new(0.0, 0.0), cell: 0.1, nx: 200, ny: 200 };
+        let cutter = Cutter::ball(6.0).unwrap();
+        let removal = cut_in_order(ZMap::block(grid, TOP), &cutter, &path, &Silent).unwrap();
+        for (a, b, m) in path.segments().filter(|(.., m)| m.kind == MoveKind::Plunge) {
+            let down = m.feed_rate * (a.z - b.z) / (b - a).norm();
+            assert!(m.feed_rate <= settings.feed_rate && down <= settings.plunge_rate * (1.0 + 1e-9));
+        }
+        // Walls that the cutter itself has left may touch it.
+        assert!(removal.rapid_contacts.iter().all(|contact| contact.depth < 1e-6 && contact.travel < 1e-6));
+        let drop = DropCutter::new(part, &cutter);
+        for (a, b, _) in path.segments().filter(|(.., m)| m.kind != MoveKind::Rapid) {
+            for k in 0..=20 {
+                let p = a + (b - a) * (f64::from(k) / 20.0);
+                // Over the steep rim of the ball a tolerance to the side is more than one in height.
+                let least = |x: f64| drop.at(x, p.y).map_or(f64::NEG_INFINITY, |drop| drop.tip_z);
+                let least = [-1.0, 0.0, 1.0].map(|side| least(p.x + side * settings.chord_tolerance));
+                let least = least.into_iter().fold(f64::INFINITY, f64::min);
+                assert!(p.z >= least - settings.chord_tolerance, "{side}: {p} {least}");
+            }
+        }
+    }
+    // Between walls on all sides, with stock far beyond them, it stays a plunge.
+    let mut wide = settings(Links::Surface);
+    wide.stock =
+        Some(geometry::Aabb { min: Point3::new(-90.0, -90.0, -1.0), max: Point3::new(90.0, 90.0, TOP) });
+    let path = join_with(&pass, true, &plate(), &wide);
+    assert_eq!(path.moves[0].kind, MoveKind::Plunge);
+}

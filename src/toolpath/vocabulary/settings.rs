@@ -53,8 +53,8 @@ pub struct PlanSettings {
     pub clearance: f64,
     /// Highest point of the stock, mm.
     pub stock_top: f64,
-    /// The stock as a block, mm: between passes a tool that leans goes around it. `None` where it is as wide as the part, and
-    /// reaches from the part's lowest point to `stock_top`.
+    /// The stock as a block, mm: between passes a tool that leans goes around it, and an upright one may come down beside it. `None`
+    /// where it is as wide as the part, and reaches from the part's lowest point to `stock_top`, or farther.
     pub stock: Option<Aabb>,
     /// Feed along passes, mm/min.
     pub feed_rate: f64,
