@@ -188,6 +188,7 @@ impl Session {
             clearance: self.scene.clearance,
             stock_top: self.top(),
             stock: Some(self.area()),
+            may_enter_beside: self.scene.stock_is_stated && self.scene.keep_clear.fixtures.is_empty(),
             feed_rate: self.scene.cutting.feed_rate,
             plunge_rate: self.scene.cutting.plunge_rate,
             machine: self.scene.machine,

@@ -144,6 +144,8 @@ pub struct Scene {
     pub judged: Judged,
     /// What it is made from.
     pub stock: StockRequest,
+    /// Whether the scene says how wide that is, and not the default.
+    pub stock_is_stated: bool,
     /// With what.
     pub cutter: Cutter,
     /// What holds it; `None` leaves collisions of shank and holder unchecked.

@@ -97,7 +97,9 @@ impl Scene {
         let part = part::read(&root.section("part")?, &folder)?;
         let judged = part::read_judged(&root.section("part")?)?;
         let (cutter, cutting) = read_cutter(&root.section("cutter")?)?;
-        let stock = stock::read(&root.section("stock")?, &folder, &part, &cutter)?;
+        let section = root.section("stock")?;
+        let stock = stock::read(&section, &folder, &part, &cutter)?;
+        let stock_is_stated = !stock.is_around() || section.has("margin");
         let holder = read_holder(&root, &cutter)?;
         let section = root.section("tolerance")?;
         let tolerance = read_tolerance(&section)?;
@@ -139,6 +141,7 @@ impl Scene {
             part,
             judged,
             stock,
+            stock_is_stated,
             cutter,
             holder,
             cutting,

@@ -145,14 +145,17 @@ fn bar(stock: &Section<'_>) -> Result<StockRequest, SceneError> {
     })
 }
 
-/// Writes `[stock]` as scenes spell it.
-pub(super) fn write(out: &mut String, stock: &StockRequest) -> fmt::Result {
+/// Writes `[stock]` as scenes spell it. A margin that nobody stated stays one.
+pub(super) fn write(out: &mut String, stock: &StockRequest, is_stated: bool) -> fmt::Result {
     let list = |p: &Point3| format!("[{}, {}, {}]", number(p.x), number(p.y), number(p.z));
     writeln!(out, "\n[stock]")?;
     match stock {
         StockRequest::Around { allowance, margin, roughed } => {
             writeln!(out, "allowance = {}  # mm above the part's highest point", number(*allowance))?;
-            writeln!(out, "margin = {}  # mm around the part in the plan view", number(*margin))?;
+            let (mark, about) =
+                if is_stated { ("", "") } else { ("# ", "; written so, tools may come down beside it") };
+            let margin = number(*margin);
+            writeln!(out, "{mark}margin = {margin}  # mm around the part in the plan view{about}")?;
             if let Some(over) = roughed {
                 let over = number(*over);
                 writeln!(

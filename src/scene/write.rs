@@ -18,7 +18,7 @@ pub fn complete_toml(scene: &Scene) -> String {
 fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
     writeln!(out, "title = {}\n", text(&scene.title))?;
     part::write(out, &scene.part, scene.judged)?;
-    stock::write(out, &scene.stock)?;
+    stock::write(out, &scene.stock, scene.stock_is_stated)?;
     write_cutter(out, scene)?;
     write_holder(out, scene)?;
     let limits = &scene.tolerance;

@@ -26,9 +26,9 @@ pub struct Sides {
 }
 
 impl Sides {
-    /// Beside the block of the stock; `None` where nobody says how far it reaches. On the stock a way in is no longer than a link.
+    /// Beside the block of the stock; `None` where it may be wider, or something else may stand beside it. On the stock a way in is no longer than a link.
     pub fn of(setup: &Setup<'_>, longest_link: f64) -> Option<Self> {
-        let block = setup.settings.stock?;
+        let block = setup.settings.stock.filter(|_| setup.settings.may_enter_beside)?;
         let away = setup.cutter.radius() + setup.settings.clearance;
         let corners = [block.min.xy().map(|x| x - away), block.max.xy().map(|x| x + away)];
         Some(Self { corners, longest: longest_link + away })

@@ -408,7 +408,8 @@ fn the_first_pass_is_entered_from_beside_the_stock() {
         let mut settings = settings(Links::Surface);
         settings.stock =
             Some(geometry::Aabb { min: Point3::new(0.0, 0.0, -1.0), max: Point3::new(20.0, 20.0, TOP) });
-        let plunged = join_with(passes, both_ways, part, &PlanSettings { stock: None, ..settings.clone() });
+        let plunged = join_with(passes, both_ways, part, &settings);
+        settings.may_enter_beside = true;
         assert_eq!(plunged.moves[0].kind, MoveKind::Plunge);
         let path = join_with(passes, both_ways, part, &settings);
         assert_all_visited(&path, passes, both_ways);

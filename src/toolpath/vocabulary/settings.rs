@@ -53,9 +53,11 @@ pub struct PlanSettings {
     pub clearance: f64,
     /// Highest point of the stock, mm.
     pub stock_top: f64,
-    /// The stock as a block, mm: between passes a tool that leans goes around it, and an upright one may come down beside it. `None`
-    /// where it is as wide as the part, and reaches from the part's lowest point to `stock_top`, or farther.
+    /// The stock as a block, mm: between passes a tool that leans goes around it. `None`
+    /// where it is as wide as the part, and reaches from the part's lowest point to `stock_top`.
     pub stock: Option<Aabb>,
+    /// Whether an upright tool may come down beside `stock`: nothing else stands there, and it is known to be no wider.
+    pub may_enter_beside: bool,
     /// Feed along passes, mm/min.
     pub feed_rate: f64,
     /// Feed down to a pass, mm/min.
@@ -115,6 +117,7 @@ impl Default for PlanSettings {
             clearance: CLEARANCE,
             stock_top: 0.0,
             stock: None,
+            may_enter_beside: false,
             feed_rate: FEED_RATE,
             plunge_rate: PLUNGE_RATE,
             machine: Machine::default(),
