@@ -452,7 +452,8 @@ impl Corrected<'_> {
             }
             (false, 0) => self.corrected(&self.tried).or_else(in_proportion),
             (false, ..=MOST_FOLLOWED) => self.corrected(last).or_else(in_proportion),
-            (false, ..=MOST_IN_VAIN) => in_proportion(),
+            // Where all ridges hold, few places along borders are left.
+            (false, ..=MOST_IN_VAIN) => in_proportion().or_else(|| self.corrected(last)),
             _ => None,
         }
     }
