@@ -55,8 +55,8 @@ const MOST_MEASURED_NEAR: usize = 8;
 /// at the middle of it, since points and chords of a new plan lie elsewhere.
 const SLACK: f64 = 0.02;
 
-/// As [`SLACK`] where all has to be measured to see whether a wider plan holds, or where tools lean, whose plans take as long. With
-/// less, whole measurements are spent on a few per cent of length.
+/// As [`SLACK`] where all has to be measured to see whether a wider plan holds, or where ridges are known less closely. With less, whole
+/// measurements are spent on a few per cent of length.
 const MEASURED_SLACK: f64 = 0.2;
 
 /// Ridges are about equally high where half of their length stands no lower than this share of the highest.
@@ -256,7 +256,8 @@ impl Session {
         let looked = match looked {
             Some(looked) => looked,
             None => {
-                corrected.by_ridges(monitor)?;
+                let is_close = map.is_some_and(|map| map.is_close);
+                corrected.by_ridges(if is_close { SLACK } else { MEASURED_SLACK }, monitor)?;
                 corrected.look_at_best(closeness, monitor)?
             }
         };
@@ -316,13 +317,12 @@ impl Session {
 }
 
 impl Corrected<'_> {
-    /// Plans anew while ridges on coarse cells stand above the target, or all below it.
-    fn by_ridges(&mut self, monitor: &dyn Monitor) -> Result<(), JobError> {
+    /// Plans anew while ridges on coarse cells stand above the target, or all below it by more than the `slack`.
+    fn by_ridges(&mut self, slack: f64, monitor: &dyn Monitor) -> Result<(), JobError> {
         if self.is_too_hollow(monitor)? {
             return Ok(());
         }
         let mut in_vain = 0;
-        let slack = if self.request.axis.is_some() { MEASURED_SLACK } else { SLACK };
         while self.rounds.len() < MOST_ROUNDS
             && let Some(next) = self.next(in_vain, slack)
         {

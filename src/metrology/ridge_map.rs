@@ -21,6 +21,8 @@ pub struct RidgeMap {
     pub border: f64,
     /// Their figures, with the bound of the highest.
     pub scallop: ScallopFigures,
+    /// Whether the highest was looked at closer.
+    pub is_close: bool,
 }
 
 /// The ridges of `cut`, the stock after `path`; the highest is looked at closer until its bound is `asked` mm, if it comes
@@ -65,7 +67,8 @@ pub(super) fn ridge_map(
     let all: Vec<u32> = (0..path.len() as u32).collect();
     let mut tops = scallop.max_at_mm.map(Point3::from).into_iter().chain(of_borders.and_then(top_of));
     let seen = tops.all(|top| surface.height_of(&all, &top) >= top.z - asked);
-    Ok(seen.then(|| RidgeMap { above, border: of_borders.map_or(0.0, |place| place.height), scallop }))
+    let border = of_borders.map_or(0.0, |place| place.height);
+    Ok(seen.then_some(RidgeMap { above, border, scallop, is_close: true }))
 }
 
 /// What stands at the outer sides of the cells that lie at the part's border. What is higher than the uncut tolerance is no

@@ -51,7 +51,8 @@ impl Along<'_> {
             possible: height + left.ridge + lower,
         });
         let border = greatest.place.map_or(0.0, |(height, _)| height);
-        Ok(RidgeMap { above, border, scallop: scallop_figures(&ridge_samples, highest, limits) })
+        let scallop = scallop_figures(&ridge_samples, highest, limits);
+        Ok(RidgeMap { above, border, scallop, is_close: false })
     }
 }
 
