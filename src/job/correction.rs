@@ -256,8 +256,7 @@ impl Session {
         let looked = match looked {
             Some(looked) => looked,
             None => {
-                let is_close = map.is_some_and(|map| map.is_close);
-                corrected.by_ridges(if is_close { SLACK } else { MEASURED_SLACK }, monitor)?;
+                corrected.by_ridges(map.map_or(MEASURED_SLACK, |map| slack_of(&map)), monitor)?;
                 corrected.look_at_best(closeness, monitor)?
             }
         };
@@ -318,7 +317,7 @@ impl Session {
 
 impl Corrected<'_> {
     /// Plans anew while ridges on coarse cells stand above the target, or all below it by more than the `slack`.
-    fn by_ridges(&mut self, slack: f64, monitor: &dyn Monitor) -> Result<(), JobError> {
+    fn by_ridges(&mut self, mut slack: f64, monitor: &dyn Monitor) -> Result<(), JobError> {
         if self.is_too_hollow(monitor)? {
             return Ok(());
         }
@@ -332,6 +331,7 @@ impl Corrected<'_> {
                 self.keep_best(&planned, next, found)
             } else {
                 let map = self.session.ridges(self.request, self.engine, &planned, monitor)?;
+                slack = map.as_ref().map_or(slack, |map| slack.max(slack_of(map)));
                 let found = map.and_then(|map| Standing::of_ridges(&map, &planned, factors));
                 let Some(found) = found else { break };
                 self.keep_if_better(planned, next, found)
@@ -641,6 +641,11 @@ impl Corrected<'_> {
         }
         gain
     }
+}
+
+/// How far below the target ridges are let stand, by how closely they are known.
+fn slack_of(map: &RidgeMap) -> f64 {
+    if map.is_close { SLACK } else { MEASURED_SLACK }
 }
 
 /// By which share the least and the greatest width of a plan differ from those of another.
