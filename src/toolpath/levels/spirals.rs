@@ -46,7 +46,9 @@ pub(crate) fn where_quicker(task: &Task<'_>, passes: Passes) -> Result<Passes, P
     }
     let mut passes = Passes { passes: with.passes, ..passes };
     let plural = if count == 1 { "a spiral" } else { "spirals" };
-    passes.notes.push(format!("{turns} closed passes are joined to {plural}, which is quicker than links"));
+    passes.notes.push(format!(
+        "{turns} closed passes are joined to {plural}, which is quicker than ways from each to the next"
+    ));
     Ok(passes)
 }
 
