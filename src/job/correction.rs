@@ -152,7 +152,7 @@ impl Standing {
 /// A path whose whole surface was measured.
 struct Looked {
     measured: Measured,
-    /// What that covers; `None` where what cells see fails already.
+    /// What that covers, where [`Session::look`] asks for it.
     covered: Option<Covered>,
 }
 
@@ -266,7 +266,7 @@ impl Session {
         Ok((best, measured, covered))
     }
 
-    /// Measures the whole surface, where no cell sees as well unless the rest fails for certain.
+    /// Measures the whole surface, where no cell sees as well unless the rest fails for certain, or others cut the stock before.
     fn look(
         &self,
         request: &ToolpathRequest,
@@ -277,7 +277,7 @@ impl Session {
     ) -> Result<Looked, JobError> {
         let measured = self.measure(request, engine, path, closeness, monitor)?;
         let covered = match self.pocket {
-            None if self.verdict_on(&measured) != Verdict::Fail => {
+            None if !request.stock_is_previous && self.verdict_on(&measured) != Verdict::Fail => {
                 let (cutters, holders) = self.tools(request);
                 let tools = ToolMoves::of(cutters, holders, path);
                 Some(self.covered(request, &measured, (path, cutters), &tools, monitor)?)

@@ -26,7 +26,8 @@ const FARTHEST: f64 = 16.0;
 /// What the user is told of further passes.
 pub(crate) fn note(added: &[Vec<Point3>]) -> Option<String> {
     let count = added.len();
-    (count > 0).then(|| format!("{count} short passes go once more over places where others left too much"))
+    let passes = if count == 1 { "short pass goes" } else { "short passes go" };
+    (count > 0).then(|| format!("{count} {passes} once more over places where others left too much"))
 }
 
 /// Passes over the places that an earlier plan left too high, beside those that are `planned`; the first places are served

@@ -56,7 +56,7 @@ impl Engine for Cells {
         drop(cut);
         // Places along the normals may be as coarse: each sees every move.
         match found {
-            None if !task.cutters.are_several() => RAYS.ridges(task, monitor),
+            None if !task.cutters.are_several() && !task.pocket => RAYS.ridges(task, monitor),
             found => Ok(found),
         }
     }

@@ -73,10 +73,18 @@ impl Engine for Normals {
         if self.by_voxels {
             return Ok(None);
         }
-        let spacing = task.simulation.cell.max(mean_interval(task) / PLACES_A_PASS);
-        check_places(task, spacing)?;
+        let widest = task.part.bounds().size().norm();
+        let spacing = task.simulation.cell.max((mean_interval(task) / PLACES_A_PASS).min(widest));
         let solid = Solid::of_cutter(task.cutters.first(), task.holder);
-        let rays = task.budget.rays(task.path, &solid, None, monitor)?;
+        // Measuring may still fit into the memory; where it does not, it says so.
+        if check_places(task, spacing).is_err() {
+            return Ok(None);
+        }
+        let rays = match task.budget.rays(task.path, &solid, None, monitor) {
+            Ok(rays) => rays,
+            Err(EngineError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            Err(_) => return Ok(None),
+        };
         let first = RaysCut { rays: &rays, path: task.path, solid: &solid };
         Ok(Some(ridges_along_normals(task, &swept_volume(task, &first), spacing, monitor)?))
     }
