@@ -238,7 +238,7 @@ mod tests {
             let [before, after] = [&[][..], &[place]].map(|places| planned(strategy, places));
             assert!(beside(&before) > 0.2, "{}", beside(&before));
             assert!(beside(&after) < 1e-6, "{}", beside(&after));
-            assert!(after.notes.iter().any(|note| note.starts_with("1 short passes")), "{:?}", after.notes);
+            assert!(after.notes.iter().any(|note| note.starts_with("1 short pass ")), "{:?}", after.notes);
         }
     }
 }
