@@ -5,7 +5,7 @@ use std::collections::BinaryHeap;
 
 use super::{Beside, DropCutter};
 use cutter::Cutter;
-use geometry::Point3;
+use geometry::{Point2, Point3, Vector2};
 use work::monitor::{self, Cancelled, Monitor};
 
 /// The least height, mm along z, that an upright cutter leaves above a place without cutting into the part.
@@ -22,6 +22,12 @@ const MOST: usize = 20_000;
 
 /// The bound that the search ends at, as a share of the height.
 const CLOSE: f64 = 0.01;
+
+/// How often [`DropCutter::lowest_over`] halves its step.
+const HALVED: usize = 8;
+
+/// It steps on where the cutter leaves less by this share of the step; the sum over all steps is then finite.
+const LEAST_LOWERED: f64 = 1e-4;
 
 /// Positions of the tip over a square of the plan.
 struct Square {
@@ -47,6 +53,32 @@ impl DropCutter<'_> {
         let places = std::iter::once((0.0, at.x, at.y)).chain((0..RINGS * ON_RING).map(ring));
         let leaves = |(off, x, y)| Some(self.at(x, y)?.tip_z + cutter.height(off)? - at.z);
         places.filter_map(leaves).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The axis, mm, near `first` from which `cutter`, which this was made for, leaves least above the place `at` of the part: a
+    /// search by ever smaller steps from `step` mm on. Where the cutter cannot touch the place, since it stands on the part elsewhere, another
+    /// position near the one that would touch it leaves less.
+    pub fn lowest_over(&self, cutter: &Cutter, at: &Point3, first: Point2, step: f64) -> Point2 {
+        let leaves = |axis: &Point2| {
+            let height = cutter.height((axis - at.xy()).norm());
+            height
+                .zip(self.at(axis.x, axis.y))
+                .map_or(f64::INFINITY, |(height, drop)| drop.tip_z + height - at.z)
+        };
+        let (mut best, mut step) = ((leaves(&first), first), step);
+        for _ in 0..HALVED {
+            while let Some(lower) = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]]
+                .map(|[x, y]| best.1 + Vector2::new(x, y) * step)
+                .into_iter()
+                .map(|axis| (leaves(&axis), axis))
+                .filter(|(left, _)| *left < best.0 - LEAST_LOWERED * step)
+                .min_by(|a, b| a.0.total_cmp(&b.0))
+            {
+                best = lower;
+            }
+            step *= 0.5;
+        }
+        best.1
     }
 
     /// What `cutter`, which this was made for, leaves at least above the place `at` of the part; `None` where that is not
@@ -172,6 +204,26 @@ mod tests {
         assert!(found.height - found.bound <= stands + chord && found.height >= stands - chord, "{found:?}");
         assert_eq!(left(&Cutter::ball(6.0).unwrap(), [6.0, 6.0], 1e-3, hollow), None);
         assert_eq!(left(&bull, [6.0, 6.0], 1.01 * (stands + chord), hollow), None);
+    }
+
+    /// From beside the best position the search comes to it: in a hollow a cutter that rests on its corner leaves least over its middle.
+    #[test]
+    fn the_best_position_is_found_from_beside() {
+        let hollow = |x: f64, y: f64| 2e-3 * ((x - 6.0).powi(2) + 0.5 * (y - 6.0).powi(2));
+        let mesh = height_field(120, 12.0, 0.0, &hollow);
+        let bvh = Bvh::new(&mesh);
+        for cutter in [Cutter::bull(6.0, 1.5).unwrap(), Cutter::flat(6.0).unwrap()] {
+            let drop = DropCutter::over(&mesh, &bvh, &cutter, None, &Silent).unwrap();
+            let at = Point3::new(6.0, 6.0, 0.0);
+            let leaves = |axis: Point2| {
+                drop.at(axis.x, axis.y).unwrap().tip_z + cutter.height((axis - at.xy()).norm()).unwrap()
+            };
+            let first = Point2::new(6.7, 5.6);
+            let found = leaves(drop.lowest_over(&cutter, &at, first, 0.3));
+            let least = drop.least_left(&cutter, &at, 0.0, &Silent).unwrap().unwrap();
+            assert!(found < 0.9 * leaves(first), "{found} {}", leaves(first));
+            assert!(found <= 1.02 * least.height && found >= least.height - least.bound, "{found} {least:?}");
+        }
     }
 
     /// No position on a dense raster leaves less than what is told, at any place, of any cutter.

@@ -17,14 +17,15 @@ mod chords;
 mod round;
 mod widths;
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use geometry::Point3;
+use geometry::{Point2, Point3};
 use metrology::{Bounded, Engine, Measured, Measurement, RidgeMap, Simulation, path_figures};
 use motion::Toolpath;
 use report::Verdict;
 use scene::ToolpathRequest;
-use toolpath::{Earlier, Kept, Step, plane_interval};
+use toolpath::{Earlier, Kept, Step, plane_interval, short_passes};
 use work::monitor::{self, Monitor};
 
 use super::covered::Covered;
@@ -79,7 +80,7 @@ const MOST_IN_VAIN: usize = MOST_FOLLOWED + 3;
 /// A plan is as it was where its length changed by no more than this share of what its widths did.
 const AS_BEFORE: f64 = 0.01;
 
-/// A place takes at most so many intervals of a pass of its own.
+/// A cube with the edge of an interval takes at most so many intervals of a pass of its own under a cutter that leans.
 const TOUCH_UP_LENGTH: f64 = 3.0;
 
 /// Passes of their own and the ways to them are no longer in all than this share of the path.
@@ -507,7 +508,7 @@ impl Corrected<'_> {
             |places: &[HighPlace]| was_served || places.iter().any(|place| widths.is_touched_up(place));
         // Along borders narrower widths may change nothing.
         let is_left = tried.standing.round.is_on_border() && self.is_as_before();
-        let is_worth = is_left || self.are_few(&high, &tried.standing);
+        let is_worth = is_left || self.are_few(&high, tried);
         if tried.standing.round.measured && is_worth && !is_served(&high) {
             return Some(widths.touched_up(&high));
         }
@@ -516,7 +517,7 @@ impl Corrected<'_> {
         let [raised, others] =
             [true, false].map(|kind| of(kind).map(|(place, _)| *place).collect::<Vec<_>>());
         let finer = widths.finer(&raised);
-        if self.are_few(&others, &tried.standing) && !is_served(&others) {
+        if self.are_few(&others, tried) && !is_served(&others) {
             return Some(finer.touched_up(&others));
         }
         let round = &tried.standing.round;
@@ -526,20 +527,26 @@ impl Corrected<'_> {
         Some(finer.narrowed(&others))
     }
 
-    /// Whether places take so little that passes of their own are shorter than a plan with all passes nearer to each other.
-    fn are_few(&self, places: &[HighPlace], standing: &Standing) -> bool {
-        let interval = self.tried.widths.interval;
-        let cell = |at: &Point3| at.coords.map(|x| (x / interval).floor() as i64);
-        let mut cells: Vec<[i64; 3]> = places.iter().map(|place| cell(&place.at).into()).collect();
-        cells.sort_unstable();
-        cells.dedup();
+    /// Whether places take so little that passes of their own are shorter than a plan with all passes nearer to each other, which
+    /// has one more of them at least.
+    fn are_few(&self, places: &[HighPlace], tried: &Tried) -> bool {
+        let interval = tried.widths.interval;
+        let planned = &tried.kept.passes;
+        let (short, length) = if planned.is_empty() {
+            let cell = |at: &Point3| at.coords.map(|x| (x / interval).floor() as i64);
+            let cells: BTreeSet<[i64; 3]> = places.iter().map(|place| cell(&place.at).into()).collect();
+            (cells.len(), TOUCH_UP_LENGTH * interval * cells.len() as f64)
+        } else {
+            let axes: Vec<Point2> = places.iter().map(|place| place.tip.xy()).collect();
+            short_passes(planned, &axes, interval)
+        };
         // What a pass takes beside its length, as those of the plan do on average.
         let figures = path_figures(&self.best.plan.path, 0.0);
-        let off_pass = (figures.link_length_mm + figures.air_length_mm) / figures.passes.max(1) as f64;
-        let length = (TOUCH_UP_LENGTH * interval + off_pass) * cells.len() as f64;
+        let passes = figures.passes.max(1) as f64;
+        let off_pass = (figures.link_length_mm + figures.air_length_mm) / passes;
         let whole = figures.cutting_length_mm + figures.link_length_mm + figures.air_length_mm;
-        let nearer = (standing.round.highest() / aim(self.goal.target)).sqrt() - 1.0;
-        length <= nearer.min(MOST_TOUCH_UP) * whole
+        let nearer = (tried.standing.round.highest() / aim(self.goal.target)).sqrt() - 1.0;
+        length + off_pass * short as f64 <= nearer.max(1.0 / passes).min(MOST_TOUCH_UP) * whole
     }
 
     /// The places of a plan that may stand above the target.

@@ -32,6 +32,7 @@ pub use strategies::zigzag::{Zigzag, ZigzagAngle};
 pub use strategies::{STRATEGIES, StrategyRead, read_strategy, words_for};
 pub use tilt::repair::{RepairSummary, Unreachable};
 pub use tilt::tilted::Tilting;
+pub use touch_up::short_passes;
 pub use vocabulary::{
     Along, Correction, Definition, Earlier, FeedDirection, Joining, Kept, Levelled, Lines, Links, PartKind,
     PlanError, PlanSettings, Reading, Step, Strategy,

@@ -47,16 +47,15 @@ pub(crate) fn passes(task: &Task<'_>, planned: &[Vec<Point3>]) -> Result<Vec<Vec
     let drop = DropCutter::watched(part, dropped, monitor)?;
     let axis_over = |place: &Point3| {
         let foot = part.closest_point(place).0;
-        let axis = foot.point.xy() + dropped.axis_offset(&foot.normal);
+        let touching_axis = foot.point.xy() + dropped.axis_offset(&foot.normal);
+        let axis = drop.lowest_over(dropped, &foot.point, touching_axis, 0.5 * interval);
         let touching = foot.point + dropped.contact_to_tip(&foot.normal);
         let is_under = |tip_z: f64| settings.axis.is_none() || (tip_z - touching.z).abs() <= interval;
         drop.at(axis.x, axis.y).is_some_and(|drop| is_under(drop.tip_z)).then_some(axis)
     };
     let mut waiting: Vec<Point2> = places.iter().filter_map(axis_over).collect();
-    while let Some(&first) = waiting.first() {
+    while let Some((copy, [from, to])) = next_run(planned, &mut waiting, interval) {
         monitor::check(monitor)?;
-        let Some(copy) = Copied::beside(planned, first, FARTHEST * interval) else { break };
-        let [from, to] = copy.serve(&mut waiting, interval);
         let mut last = Beside::default();
         let mut tip = |s: f64| {
             let q = copy.at(s);
@@ -68,6 +67,21 @@ pub(crate) fn passes(task: &Task<'_>, planned: &[Vec<Point3>]) -> Result<Vec<Vec
         }
     }
     Ok(added)
+}
+
+/// How many passes of their own places take whose cutter stands at the `axes`, and how long they are together, mm.
+pub fn short_passes(planned: &[Vec<Point3>], axes: &[Point2], interval: f64) -> (usize, f64) {
+    let mut waiting = axes.to_vec();
+    let runs = std::iter::from_fn(|| next_run(planned, &mut waiting, interval));
+    runs.fold((0, 0.0), |(count, length), (_, [from, to])| (count + 1, length + to - from))
+}
+
+/// The pass beside which the first of the waiting places is served, and the run of it that serves those along it, mm; these wait
+/// no longer. `None` without places or passes.
+fn next_run(planned: &[Vec<Point3>], waiting: &mut Vec<Point2>, interval: f64) -> Option<(Copied, [f64; 2])> {
+    let copy = Copied::beside(planned, *waiting.first()?, FARTHEST * interval)?;
+    let run = copy.serve(waiting, interval);
+    Some((copy, run))
 }
 
 /// A stretch of a pass in the plan view, shifted so that it runs through a place.
@@ -193,6 +207,11 @@ mod tests {
         let ends = run.map(|s| copy.at(s));
         assert!((ends[0] - Point2::new(47.7, 0.45)).norm() < 1e-12, "{ends:?}");
         assert!((ends[1] - Point2::new(52.5, 0.45)).norm() < 1e-12, "{ends:?}");
+        // Three passes serve them all.
+        let axes = [[50.0, 0.45], [51.5, 0.5], [48.7, 0.4], [55.0, 0.45], [50.0, 1.5]].map(Point2::from);
+        let (count, length) = short_passes(&passes, &axes, 1.0);
+        assert!(count == 3 && (length - (4.8 + 2.0 + 2.0)).abs() < 1e-12, "{count} {length}");
+        assert_eq!(short_passes(&[], &axes, 1.0), (0, 0.0));
         // Beside the end of a pass there is no more of it.
         let copy = Copied::beside(&passes, Point2::new(99.5, 0.45), 16.0).unwrap();
         let run = copy.serve(&mut vec![Point2::new(99.5, 0.45)], 1.0);
