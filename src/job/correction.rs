@@ -86,6 +86,9 @@ const TOUCH_UP_LENGTH: f64 = 3.0;
 /// Passes of their own and the ways to them are no longer in all than this share of the path.
 const MOST_TOUCH_UP: f64 = 0.04;
 
+/// The share of the places above the target that is reckoned to be seen while only ridges are measured.
+const SEEN: f64 = 0.5;
+
 /// Cells from pass to pass while only ridges are measured.
 const CELLS_A_PASS: f64 = 4.0;
 
@@ -439,8 +442,10 @@ impl Corrected<'_> {
         let last = self.latest.as_ref().unwrap_or(&self.tried);
         let in_proportion = || {
             let round = &last.standing.round;
-            let gives_way = self.is_as_before() || round.highest_mm + round.margin(target) > target;
-            gives_way.then(|| self.scaled(&last.widths, round.highest()))
+            // Few remnants along borders take passes of their own once the ridges hold.
+            let ridges_fail = round.highest_mm + round.margin(target) > target;
+            let height = if ridges_fail { round.highest_mm } else { round.highest() };
+            (ridges_fail || self.is_as_before()).then(|| self.scaled(&last.widths, height))
         };
         match (round.holds(&self.goal), in_vain) {
             (true, 0) => (round.highest() < (1.0 - slack) * target && self.may_lie_wider())
@@ -527,8 +532,7 @@ impl Corrected<'_> {
         Some(finer.narrowed(&others))
     }
 
-    /// Whether places take so little that passes of their own are shorter than a plan with all passes nearer to each other, which
-    /// has one more of them at least.
+    /// Whether places take so little that passes of their own are shorter than a plan with all passes nearer to each other.
     fn are_few(&self, places: &[HighPlace], tried: &Tried) -> bool {
         let interval = tried.widths.interval;
         let planned = &tried.kept.passes;
@@ -542,11 +546,12 @@ impl Corrected<'_> {
         };
         // What a pass takes beside its length, as those of the plan do on average.
         let figures = path_figures(&self.best.plan.path, 0.0);
-        let passes = figures.passes.max(1) as f64;
-        let off_pass = (figures.link_length_mm + figures.air_length_mm) / passes;
+        let off_pass = (figures.link_length_mm + figures.air_length_mm) / figures.passes.max(1) as f64;
         let whole = figures.cutting_length_mm + figures.link_length_mm + figures.air_length_mm;
-        let nearer = (tried.standing.round.highest() / aim(self.goal.target)).sqrt() - 1.0;
-        length + off_pass * short as f64 <= nearer.max(1.0 / passes).min(MOST_TOUCH_UP) * whole
+        let round = &tried.standing.round;
+        let nearer = (round.highest() / aim(self.goal.target)).sqrt() - 1.0;
+        let seen = if round.measured { 1.0 } else { SEEN };
+        length + off_pass * short as f64 <= (seen * nearer).min(MOST_TOUCH_UP) * whole
     }
 
     /// The places of a plan that may stand above the target.
