@@ -210,7 +210,9 @@ impl<'a> Peeler<'a> {
         let right = Vector2::new(heading.y, -heading.x);
         let probes = [right, *heading].map(|by| at + by * (PROBE * self.radius));
         let mut inside = probes.iter().map(|probe| self.nearest_inside(probe));
-        let Some(beside) = inside.find(|p| (p - at).norm() >= 0.2 * PROBE * self.radius) else { return false };
+        let Some(beside) = inside.find(|p| (p - at).norm() >= 0.2 * PROBE * self.radius) else {
+            return false;
+        };
         let arc = |heading: Vector2| self.cleared.arc(&beside, &heading, usize::MAX);
         arc(right) > STOCK || arc(-right) > STOCK
     }

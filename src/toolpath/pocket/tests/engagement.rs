@@ -59,9 +59,15 @@ fn bounded_passes_keep_to_their_engagement() {
                 found.segments().all(|(a, b, _)| (b - a).norm() > 1e-9),
                 "{pattern:?}: a move without length"
             );
-            let arcs =
-                contact_arcs(&found, &Cutter::flat(diameter).unwrap(), &stock(&pocket), &of_passes, &Silent)
-                    .unwrap();
+            let arcs = contact_arcs(
+                &found,
+                &Cutter::flat(diameter).unwrap(),
+                &stock(&pocket),
+                metrology::UNCOUNTED_LAYER,
+                &of_passes,
+                &Silent,
+            )
+            .unwrap();
             (found, arcs)
         };
         let (bounded, arcs) = measured(Some(limit.to_radians()));
@@ -107,7 +113,14 @@ fn acute_tips_keep_to_small_engagements() {
     let pocket = Pocket::new(Region::nested(vec![kite]).unwrap().0, 1.5);
     let limit = 20f64.to_radians();
     let found = plan(&pocket, 2.0, &Pattern::Offset { spiral: false }, Some(limit));
-    let arcs = contact_arcs(&found.path, &Cutter::flat(2.0).unwrap(), &stock(&pocket), &of_passes, &Silent);
+    let arcs = contact_arcs(
+        &found.path,
+        &Cutter::flat(2.0).unwrap(),
+        &stock(&pocket),
+        metrology::UNCOUNTED_LAYER,
+        &of_passes,
+        &Silent,
+    );
     let stretches = above(&found.path, &arcs.unwrap(), limit + SLACK.to_radians());
     assert!(stretches.is_empty(), "{stretches:?}");
     assert!(!found.notes.iter().any(|note| note.contains("above the engagement")), "{:?}", found.notes);
@@ -137,8 +150,15 @@ fn a_neck_as_wide_as_the_cutter_is_told() {
     let found = plan(&pocket, 5.0, &Pattern::Offset { spiral: false }, Some(limit));
     // A move counts whole, and one may be half a radius long.
     let path = divided(&found.path, 0.05);
-    let arcs =
-        contact_arcs(&path, &Cutter::flat(5.0).unwrap(), &stock(&pocket), &of_passes, &Silent).unwrap();
+    let arcs = contact_arcs(
+        &path,
+        &Cutter::flat(5.0).unwrap(),
+        &stock(&pocket),
+        metrology::UNCOUNTED_LAYER,
+        &of_passes,
+        &Silent,
+    )
+    .unwrap();
     let stretches = above(&path, &arcs, limit + SLACK.to_radians());
     let long = stretches.iter().filter(|(_, length)| *length > TIP * 2.5);
     let above: f64 = long.clone().map(|(_, length)| length).sum();
@@ -260,8 +280,14 @@ fn open_pockets_and_rests_are_cleared_from_the_air() {
                 assert!(!left, "{what}: {p} is left, {} from a pass", passes.distance(&p));
             }
             if let Some(limit) = limit {
-                let arcs =
-                    contact_arcs(&path, &Cutter::flat(2.0 * radius).unwrap(), &stock, &of_passes, &Silent);
+                let arcs = contact_arcs(
+                    &path,
+                    &Cutter::flat(2.0 * radius).unwrap(),
+                    &stock,
+                    metrology::UNCOUNTED_LAYER,
+                    &of_passes,
+                    &Silent,
+                );
                 let above = above(&path, &arcs.unwrap(), (limit + SLACK).to_radians());
                 // Where the fronts from two open sides meet, one move may be above; jobs then plan again for less. Loops of a
                 // zigzag lean to one side, and in corners they become films.
