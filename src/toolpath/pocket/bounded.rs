@@ -310,13 +310,15 @@ impl<'a> Walker<'a> {
         /// Cosine of the turn in a corner of walls. Bends that are less sharp have room for loops beyond them.
         const WALLS: f64 = 0.8;
         let (radius, corner) = (self.radius, self.way.corner_after(s));
-        let back = s - BACK * radius;
+        // Where the way begins nearer than that, it is gone back and forth more often.
+        let back = (s - BACK * radius).max(0.0);
         let Some(heading) = self.way.heading(corner) else { return s };
         let onward = self.way.heading(corner + FINEST * radius).unwrap_or(heading);
         let bends = corner < self.way.total() && heading.dot(&onward) > WALLS;
-        if bends || corner - s > MOST * radius || back < 0.0 {
+        if bends || corner - s > MOST * radius || s - back < FINEST * radius {
             return s;
         }
+        let times = (BACK * radius / (s - back)).ceil() as usize;
         let behind = self.way.at(back);
         let between = self.way.corners_between(back, s).to_vec();
         let steps = ((corner - s) / (LAYER * FILM * radius)).ceil() as usize;
@@ -327,7 +329,10 @@ impl<'a> Walker<'a> {
             if self.cleared.arc(&at, &heading, usize::MAX) > self.bounds.limit {
                 break;
             }
-            self.out.extend(between.iter().rev().chain([&behind]).chain(&between));
+            for again in 0..times {
+                self.out.extend((again > 0).then(|| self.way.at(gone)));
+                self.out.extend(between.iter().rev().chain([&behind]).chain(&between));
+            }
             self.place(on, at);
             gone = on;
         }
