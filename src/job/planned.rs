@@ -321,10 +321,8 @@ const GENTLE_ROUNDS: usize = 2;
 /// The share of the limit by which it is lowered at least. Less may change no pass at all.
 const LEAST_LOWERING: f64 = 0.01;
 
-/// Around one place it is lowered by this share at most, in all rounds together: passes there would come ever closer.
-const MOST_LOWERING: f64 = 0.3;
-
-/// No limit below this share of the one asked for: the path would grow without end.
+/// No limit below this share of the one asked for, in all rounds together, around places or everywhere: the path would grow without
+/// end.
 const LEAST_SHARE_OF_LIMIT: f64 = 0.25;
 
 /// Beyond a stretch that exceeded the limit, passes are planned for less this far, over the radius: there it is decided how they
@@ -343,7 +341,7 @@ fn lower_around(
         let (at, within) = (one.from.xy(), one.length + AROUND_EXCEEDING * radius);
         // What was lowered around here before counts, too.
         let lowered = gentle[..before].iter().filter(|gentle| (gentle.at - at).norm() < gentle.within);
-        let left = MOST_LOWERING * limit - lowered.map(|gentle| gentle.by).sum::<f64>();
+        let left = (1.0 - LEAST_SHARE_OF_LIMIT) * limit - lowered.map(|gentle| gentle.by).sum::<f64>();
         let by = over(one).max(LEAST_LOWERING * limit).min(left.max(0.0));
         // Every step down exceeds it at the same places.
         let same = |gentle: &&mut Gentle| (gentle.at - at).norm() < 0.5 * radius;

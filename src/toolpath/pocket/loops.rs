@@ -189,7 +189,7 @@ impl Loops<'_> {
 
     /// The loop of the radius `rho` (less where there is no room) at `s`, if it keeps to the limit.
     fn loop_at(&self, s: f64, rho: f64, side: f64) -> Option<Loop> {
-        let (centre, rho, inwards) = fitting(&self.way, self.room, self.bounds.radius, s, rho, side)?;
+        let (centre, rho, inwards) = fitting(self.way, self.room, self.bounds.radius, s, rho, side)?;
         let sides = (TAU * rho / (SIDE * self.bounds.radius)).ceil().max(LEAST_SIDES) as usize;
         let begin = inwards.y.atan2(inwards.x) + PI;
         let asked = |k: usize| {

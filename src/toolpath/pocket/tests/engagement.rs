@@ -3,7 +3,7 @@
 use cutter::Cutter;
 use geometry::{Aabb, Point2, Point3, Region, RegionIndex, SegmentGrid};
 use machine::Machine;
-use metrology::{ContactArcs, contact_arcs};
+use metrology::{ContactArcs, UNCOUNTED_LAYER, contact_arcs};
 use motion::{Move, MoveKind, Toolpath};
 use sim::Stock;
 use work::monitor::Silent;
@@ -63,7 +63,7 @@ fn bounded_passes_keep_to_their_engagement() {
                 &found,
                 &Cutter::flat(diameter).unwrap(),
                 &stock(&pocket),
-                metrology::UNCOUNTED_LAYER,
+                UNCOUNTED_LAYER,
                 &of_passes,
                 &Silent,
             )
@@ -117,13 +117,39 @@ fn acute_tips_keep_to_small_engagements() {
         &found.path,
         &Cutter::flat(2.0).unwrap(),
         &stock(&pocket),
-        metrology::UNCOUNTED_LAYER,
+        UNCOUNTED_LAYER,
         &of_passes,
         &Silent,
     );
     let stretches = above(&found.path, &arcs.unwrap(), limit + SLACK.to_radians());
     assert!(stretches.is_empty(), "{stretches:?}");
     assert!(!found.notes.iter().any(|note| note.contains("above the engagement")), "{:?}", found.notes);
+}
+
+/// A run along walls may begin right before a corner, as it does here: what is left of it is cut in layers all the same.
+#[test]
+fn corners_before_which_a_run_begins_keep_to_the_engagement() {
+    let outline = points(&[
+        (0., 0.),
+        (25., 0.),
+        (25., 11.01),
+        (40., 11.01),
+        (40., 0.),
+        (65., 0.),
+        (65., 30.),
+        (40., 30.),
+        (40., 18.99),
+        (25., 18.99),
+        (25., 30.),
+        (0., 30.),
+    ]);
+    let pocket = Pocket::new(Region::nested(vec![outline]).unwrap().0, 3.0);
+    let limit = 30f64.to_radians();
+    let found = plan(&pocket, 8.0, &Pattern::Offset { spiral: false }, Some(limit));
+    let cutter = Cutter::flat(8.0).unwrap();
+    let arcs = contact_arcs(&found.path, &cutter, &stock(&pocket), UNCOUNTED_LAYER, &of_passes, &Silent);
+    let stretches = above(&found.path, &arcs.unwrap(), limit);
+    assert!(stretches.is_empty(), "{stretches:?}");
 }
 
 /// Two squares joined by a neck that has no room beside the cutter: there, and nowhere else, it is in a
@@ -154,7 +180,7 @@ fn a_neck_as_wide_as_the_cutter_is_told() {
         &path,
         &Cutter::flat(5.0).unwrap(),
         &stock(&pocket),
-        metrology::UNCOUNTED_LAYER,
+        UNCOUNTED_LAYER,
         &of_passes,
         &Silent,
     )
@@ -284,7 +310,7 @@ fn open_pockets_and_rests_are_cleared_from_the_air() {
                     &path,
                     &Cutter::flat(2.0 * radius).unwrap(),
                     &stock,
-                    metrology::UNCOUNTED_LAYER,
+                    UNCOUNTED_LAYER,
                     &of_passes,
                     &Silent,
                 );
