@@ -9,12 +9,15 @@ use machine::{
     Straying, axes_at_most, machining_time, machining_time_of_axes, merge_short_moves, slow_axes,
     slow_corners,
 };
-use metrology::{FastestTurn, contact_arcs, fastest_turn, fastest_turn_across};
+use metrology::{
+    ContactArcs, FastestTurn, THIN_LAYER, UNCOUNTED_LAYER, contact_arcs, fastest_turn, fastest_turn_across,
+};
 use motion::{Move, MoveKind, Toolpath};
 use scene::{AxisRequest, Scene, ToolpathRequest};
 use toolpath::{
     Detour, Earlier, Engagement, Exceeding, Gentle, OffsetDrive, OffsetSurface, Plan, PlanError,
-    PlanSettings, PocketStrategy, Strategy, Tilting, around_fixtures, plan, plan_pocket, plan_tilted,
+    PlanSettings, PocketStrategy, Strategy, Tilting, around_fixtures, engagement, plan, plan_pocket,
+    plan_tilted,
 };
 use work::monitor::{Cancelled, Monitor};
 
@@ -44,6 +47,8 @@ pub(crate) struct Planned {
     pub rise_to: Option<f64>,
     /// Engagement in a pocket, and the bound of its greatest angle, rad.
     pub engaged: Option<(Engagement, f64)>,
+    /// The same with thinner layers counted, where an engagement was asked for.
+    pub engaged_thinly: Option<(Engagement, f64)>,
     /// The rounds in which its ridges were measured and corrected.
     pub correction: Option<CorrectionFigures>,
     /// The search for the machining time that was asked for.
@@ -89,6 +94,7 @@ impl Session {
                 joints: None,
                 rise_to: None,
                 engaged: None,
+                engaged_thinly: None,
                 correction: None,
                 equal_time: None,
             });
@@ -111,6 +117,7 @@ impl Session {
         };
         let (mut plan, engaged) =
             within_engagement(planned(&*strategy)?, &*strategy, scene.cutter.radius(), &planned)?;
+        let engaged_thinly = self.engaged_thinly(request, &plan.path, monitor)?;
         let joints = joints(scene, &request.name, &plan.path)?;
         if scene.machine.slow_corners {
             let kinematics = scene.five_axis.as_ref().map(|five_axis| &five_axis.kinematics);
@@ -120,7 +127,16 @@ impl Session {
         let rise_to = tops.reduce(f64::max);
         let header = ProgramHeader { rise_to, ..header(scene, "") };
         plan.path.origin.lines = lines(scene, &plan.path, joints.as_ref(), &header)?;
-        Ok(Planned { plan, strategy, joints, rise_to, engaged, correction: None, equal_time: None })
+        Ok(Planned {
+            plan,
+            strategy,
+            joints,
+            rise_to,
+            engaged,
+            engaged_thinly,
+            correction: None,
+            equal_time: None,
+        })
     }
 
     fn path(
@@ -235,11 +251,31 @@ impl Session {
         else {
             return Ok(None);
         };
-        let scene = &self.scene;
-        let radius = scene.cutter.radius();
+        let arcs = self.contact_arcs(path, UNCOUNTED_LAYER, monitor)?;
+        Ok(Some(limit_feed_by(path, &arcs, strategy, request.step, self.scene.cutter.radius())))
+    }
+
+    /// The engagement of a pocket's passes with all layers counted that may be chips, where one was asked for.
+    fn engaged_thinly(
+        &self,
+        request: &ToolpathRequest,
+        path: &Toolpath,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<(Engagement, f64)>, JobError> {
+        let strategy = request.strategy.downcast_ref::<PocketStrategy>();
+        let Some(limit) = strategy.and_then(|strategy| strategy.engagement) else { return Ok(None) };
+        let arcs = self.contact_arcs(path, THIN_LAYER, monitor)?;
+        Ok(Some((engagement(path, &arcs.of_moves, limit), arcs.bound())))
+    }
+
+    fn contact_arcs(
+        &self,
+        path: &Toolpath,
+        film: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<ContactArcs, Cancelled> {
         let of_passes = |step: &Move| step.kind == MoveKind::Cut;
-        let arcs = contact_arcs(path, &scene.cutter, &self.stock, &of_passes, monitor)?;
-        Ok(Some(limit_feed_by(path, &arcs, strategy, request.step, radius)))
+        contact_arcs(path, &self.scene.cutter, &self.stock, film, &of_passes, monitor)
     }
 }
 
@@ -285,10 +321,8 @@ const GENTLE_ROUNDS: usize = 2;
 /// The share of the limit by which it is lowered at least. Less may change no pass at all.
 const LEAST_LOWERING: f64 = 0.01;
 
-/// Around one place it is lowered by this share at most, in all rounds together: passes there would come ever closer.
-const MOST_LOWERING: f64 = 0.3;
-
-/// No limit below this share of the one asked for: the path would grow without end.
+/// No limit below this share of the one asked for, in all rounds together, around places or everywhere: the path would grow without
+/// end.
 const LEAST_SHARE_OF_LIMIT: f64 = 0.25;
 
 /// Beyond a stretch that exceeded the limit, passes are planned for less this far, over the radius: there it is decided how they
@@ -307,7 +341,7 @@ fn lower_around(
         let (at, within) = (one.from.xy(), one.length + AROUND_EXCEEDING * radius);
         // What was lowered around here before counts, too.
         let lowered = gentle[..before].iter().filter(|gentle| (gentle.at - at).norm() < gentle.within);
-        let left = MOST_LOWERING * limit - lowered.map(|gentle| gentle.by).sum::<f64>();
+        let left = (1.0 - LEAST_SHARE_OF_LIMIT) * limit - lowered.map(|gentle| gentle.by).sum::<f64>();
         let by = over(one).max(LEAST_LOWERING * limit).min(left.max(0.0));
         // Every step down exceeds it at the same places.
         let same = |gentle: &&mut Gentle| (gentle.at - at).norm() < 0.5 * radius;

@@ -1,6 +1,9 @@
 //! What is measured of a scene's pocket.
 
-use metrology::{ContactArcs, ExceedingStretch, PocketFigures, wall_gouge_of_cells, wall_gouge_of_moves};
+use metrology::{
+    ContactArcs, ExceedingStretch, PocketFigures, THIN_LAYER, ThinLayers, UNCOUNTED_LAYER,
+    wall_gouge_of_cells, wall_gouge_of_moves,
+};
 use motion::Toolpath;
 use scene::{FLATTEN_SHARE, Scene};
 use sim::ZMap;
@@ -22,7 +25,8 @@ pub fn limit_feed_by(
     (found, arcs.bound())
 }
 
-/// What is measured of a pocket besides its floor. `top` is the height of the stock, mm.
+/// What is measured of a pocket besides its floor. `top` is the height of the stock, mm; each engagement is one with the bound of its
+/// greatest angle, rad.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -35,6 +39,7 @@ pub fn pocket_figures(
     cut: &ZMap,
     top: f64,
     (engaged, engagement_bound): &(Engagement, f64),
+    engaged_thinly: Option<&(Engagement, f64)>,
     monitor: &dyn Monitor,
 ) -> Result<PocketFigures, Cancelled> {
     let cutter = &scene.cutter;
@@ -53,12 +58,15 @@ pub fn pocket_figures(
         wall_gouge_area_mm2: area,
         max_engagement_deg: engaged.max.to_degrees(),
         max_engagement_error_bound_deg: engagement_bound.to_degrees(),
+        uncounted_layer_mm: UNCOUNTED_LAYER * cutter.radius(),
         max_engagement_move: engaged.max_move,
         p95_engagement_deg: engaged.p95.to_degrees(),
         engagement_limit_deg: as_asked(strategy.engagement_limit(step, cutter.radius())),
         over_engagement_limit_fraction: engaged.over_limit,
         over_engagement_limit: listed(exceeding, path),
         over_engagement_limit_count: exceeding.len(),
+        thin_layers: engaged_thinly
+            .map(|(engaged, bound)| thin_layers(engaged, *bound, cutter.radius(), path)),
     })
 }
 
@@ -72,7 +80,11 @@ fn as_asked(angle: f64) -> f64 {
 fn listed(all: &[Exceeding], path: &Toolpath) -> Vec<ExceedingStretch> {
     let mut all = all.to_vec();
     all.sort_by(|a, b| b.length.total_cmp(&a.length));
-    let stretch = |one: &Exceeding| ExceedingStretch {
+    all.iter().take(PocketFigures::LISTED).map(|one| stretch(one, path)).collect()
+}
+
+fn stretch(one: &Exceeding, path: &Toolpath) -> ExceedingStretch {
+    ExceedingStretch {
         x: one.from.x,
         y: one.from.y,
         z: one.from.z,
@@ -80,6 +92,21 @@ fn listed(all: &[Exceeding], path: &Toolpath) -> Vec<ExceedingStretch> {
         max_engagement_deg: one.max.to_degrees(),
         first_move: one.first_move,
         line: path.line_of(one.first_move as usize),
-    };
-    all.iter().take(PocketFigures::LISTED).map(stretch).collect()
+    }
+}
+
+/// The engagement with layers counted down to [`THIN_LAYER`] of a `radius`, mm; `bound` is that of its greatest angle, rad.
+fn thin_layers(engaged: &Engagement, bound: f64, radius: f64, path: &Toolpath) -> ThinLayers {
+    let above = &engaged.exceeding;
+    let greatest = above.iter().max_by(|a, b| a.max.total_cmp(&b.max));
+    ThinLayers {
+        counted_from_mm: THIN_LAYER * radius,
+        max_engagement_deg: engaged.max.to_degrees(),
+        max_engagement_error_bound_deg: bound.to_degrees(),
+        max_engagement_move: engaged.max_move,
+        greatest: greatest.map(|one| stretch(one, path)),
+        over_engagement_limit_mm: above.iter().map(|one| one.length).fold(0.0, |a, b| a + b),
+        over_engagement_limit: listed(above, path),
+        over_engagement_limit_count: above.len(),
+    }
 }

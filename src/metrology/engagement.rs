@@ -6,8 +6,8 @@
 //!
 //! What the path has cleared is the union of what its segments swept, each a stadium of the cutter's radius. A circle meets a
 //! stadium along arcs in closed form, so the angle at a place is exact. Where a layer beyond the circumference is thinner than
-//! [`FILM`] it does not count as stock: chords and rounding leave films along ground that was cut before, which load nothing.
-//! Only the chip that is just being cut begins as thin as one likes. So what the path cleared just before is taken as it is,
+//! a film, whose thickness the caller chooses, it does not count as stock: chords and rounding leave films along ground that was cut
+//! before, which load nothing. Only the chip that is just being cut begins as thin as one likes. So what the path cleared just before is taken as it is,
 //! as far back as it would hide the sides of a straight slot.
 //!
 //! A stadium is convex. So what lies in it as seen from both ends of a stretch lies in it as seen from everywhere between, and
@@ -27,9 +27,13 @@ use motion::{Move, MoveKind, Toolpath};
 use sim::{ENGAGED, Stock};
 use work::monitor::{self, Cancelled, Monitor};
 
-/// Layers up to this share of the radius do not count. Beside a straight wall an angle `a` is seen smaller by about
-/// `FILM / sin a`.
-const FILM: f64 = 0.005;
+/// Films up to this share of the radius are no stock for an engagement that is judged. Beside a straight wall an angle `a` is seen
+/// smaller by about as much over `sin a`.
+pub const UNCOUNTED_LAYER: f64 = 0.005;
+
+/// Thinner layers, over the radius, are no chips in any case: an edge needs about a third of its own radius to cut, and edges are
+/// rounded by one to three thousandths of the cutter's radius.
+pub const THIN_LAYER: f64 = 0.001;
 
 /// Stretches of a move that are looked at are no longer than this share of the radius, and may be halved so often.
 const STRETCH: f64 = 0.05;
@@ -76,7 +80,7 @@ impl ContactArcs {
 }
 
 /// The angles along `path` in a stock whose top is flat, but for what was [cleared](Stock::cleared) before. Those of the moves
-/// that `count` are bounded.
+/// that `count` are bounded. Layers up to the share `film` of the radius beside ground that was cleared before are no stock.
 ///
 /// # Errors
 /// [`Cancelled`] when the monitor says so.
@@ -87,12 +91,13 @@ pub fn contact_arcs(
     path: &Toolpath,
     cutter: &Cutter,
     stock: &Stock,
+    film: f64,
     count: &(dyn Fn(&Move) -> bool + Sync),
     monitor: &dyn Monitor,
 ) -> Result<ContactArcs, Cancelled> {
     monitor.start("measuring engagement", path.len() as u64);
     let top = stock.bounds().max.z;
-    let mut cleared = Swept::by(path, cutter.radius());
+    let mut cleared = Swept::by(path, cutter.radius(), film);
     cleared.before = stock.cleared();
     let (mut of_moves, mut at_most) = (Vec::new(), Vec::new());
     // Of the moves that count, so far.
@@ -196,6 +201,8 @@ struct Segment {
 /// What a path sweeps, in order, with buckets to find what is near.
 struct Swept<'a> {
     radius: f64,
+    /// Layers up to this share of the radius do not count.
+    film: f64,
     /// Where nothing stood above a level before the path, and that level, mm.
     before: Option<(&'a RegionIndex, f64)>,
     /// The way just behind the cutter that leaves no films, mm.
@@ -213,8 +220,8 @@ struct Swept<'a> {
 }
 
 impl<'a> Swept<'a> {
-    fn by(path: &Toolpath, radius: f64) -> Self {
-        let fresh = radius * (2.0 * FILM + FILM * FILM).sqrt();
+    fn by(path: &Toolpath, radius: f64, film: f64) -> Self {
+        let fresh = radius * (2.0 * film + film * film).sqrt();
         let mut gone = 0.0;
         let mut segments = Vec::with_capacity(path.len());
         for (a, b, m) in path.segments() {
@@ -237,6 +244,7 @@ impl<'a> Swept<'a> {
         let side = [size.x, size.y].map(|s| (s / bucket).floor() as usize + 1);
         let mut swept = Self {
             radius,
+            film,
             before: None,
             fresh,
             segments: Vec::new(),
@@ -286,7 +294,7 @@ impl<'a> Swept<'a> {
             full.iter().flat_map(|&at| &self.buckets[at][..settled_in(&self.buckets[at])]).copied().collect();
         looked_at.sort_unstable();
         looked_at.dedup();
-        let radius = (1.0 + FILM) * self.radius;
+        let radius = (1.0 + self.film) * self.radius;
         let within = (radius * (1.0 - RimSamples::MARGIN)).powi(2);
         let mut near = Vec::new();
         for k in looked_at {
@@ -396,7 +404,7 @@ impl<'a> Swept<'a> {
         let front = self.front(stretch, near, |k| taking.push(k));
         // What those that took some cover from both ends they cover from everywhere between. Others can only matter where the
         // rest stands.
-        let reach = (1.0 + FILM) * self.radius + stretch.half;
+        let reach = (1.0 + self.film) * self.radius + stretch.half;
         let mut took = taking.iter().copied().peekable();
         let matters = |k: &u32| {
             took.next_if_eq(k).is_some()
@@ -431,10 +439,10 @@ impl<'a> Swept<'a> {
     fn front(&self, stretch: &Stretch, near: &[u32], mut tell: impl FnMut(u32)) -> Front {
         let gone = stretch.gone - stretch.half;
         let before = gone - self.fresh;
-        let (own, earlier) = ((1.0 - TOUCHING) * self.radius, (1.0 + FILM) * self.radius);
+        let (own, earlier) = ((1.0 - TOUCHING) * self.radius, (1.0 + self.film) * self.radius);
         let mut front = Front::new(self.radius);
         if let Some((region, _)) = self.before.filter(|_| stretch.over_floor) {
-            front.clear_region(region, stretch, stretch.half - FILM * self.radius);
+            front.clear_region(region, stretch, stretch.half - self.film * self.radius);
         }
         for &k in near {
             let segment = &self.segments[k as usize];
@@ -461,7 +469,7 @@ impl<'a> Swept<'a> {
     /// last, and what it leaves standing is soon so little that most others are passed over.
     fn near_move(&self, k: usize) -> Vec<u32> {
         let Segment { ends: [a, b], z, .. } = self.segments[k];
-        let (middle, reach) = (a + 0.5 * (b - a), (2.0 + FILM) * self.radius + 0.5 * (b - a).norm());
+        let (middle, reach) = (a + 0.5 * (b - a), (2.0 + self.film) * self.radius + 0.5 * (b - a).norm());
         let mut near = Vec::new();
         self.each_near(&middle, reach, |other| {
             let segment = &self.segments[other];

@@ -63,7 +63,7 @@ pub use along_normals::{
 pub use contact::contacts_on_patches;
 pub use coverage::{AlongTask, CellsSeen, Coverage, CoverageFigures};
 pub use cut_surface::CutSurface;
-pub use engagement::{ContactArcs, contact_arcs};
+pub use engagement::{ContactArcs, THIN_LAYER, UNCOUNTED_LAYER, contact_arcs};
 pub use engines::{
     BYTES_PER_TRIANGLE, Budget, ENGINES, Engine, EngineChoice, EngineError, LaidOut, MIB, Measured,
     NormalView, REACH_OVER_UNCUT, Simulation, Task, View,
@@ -80,7 +80,7 @@ pub use offset_distance::{
 };
 pub use pairs::{MOST_PAIRS, PAIRS_HEADER, PairFigures, ScallopPair};
 pub use path::path_figures;
-pub use pocket::{ExceedingStretch, PocketFigures, wall_gouge_of_cells, wall_gouge_of_moves};
+pub use pocket::{ExceedingStretch, PocketFigures, ThinLayers, wall_gouge_of_cells, wall_gouge_of_moves};
 pub use refine::Asked;
 pub use removal::{RapidContactFigures, RemovalFigures, removal_figures, voxel_removal_figures};
 pub use ridge_map::RidgeMap;

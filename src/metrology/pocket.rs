@@ -39,6 +39,28 @@ pub struct ExceedingStretch {
     pub line: Option<u32>,
 }
 
+/// The engagement of passes with thinner layers of stock counted than in what is judged.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ThinLayers {
+    /// Layers from this thickness on count.
+    pub counted_from_mm: f64,
+    /// Greatest angle of the cutter's circumference in stock along passes.
+    pub max_engagement_deg: f64,
+    /// Bound of its error.
+    pub max_engagement_error_bound_deg: f64,
+    /// The move with the greatest angle, counted from 0.
+    pub max_engagement_move: u32,
+    /// The stretch above the limit that has it, if any is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub greatest: Option<ExceedingStretch>,
+    /// Length of passes above the limit.
+    pub over_engagement_limit_mm: f64,
+    /// The stretches above it, the longest first and [`PocketFigures::LISTED`] at most.
+    pub over_engagement_limit: Vec<ExceedingStretch>,
+    /// How many there are.
+    pub over_engagement_limit_count: usize,
+}
+
 /// Figures of a pocket.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct PocketFigures {
@@ -63,8 +85,10 @@ pub struct PocketFigures {
     pub wall_gouge_area_mm2: f64,
     /// Greatest angle of the cutter's circumference in stock along passes, ways down left out.
     pub max_engagement_deg: f64,
-    /// Bound of its error beside a straight wall: layers thinner than two cells are not seen.
+    /// Bound of its error.
     pub max_engagement_error_bound_deg: f64,
+    /// Thinner layers of stock beside ground that was cut before do not count in it.
+    pub uncounted_layer_mm: f64,
     /// The move with the greatest angle, counted from 0.
     pub max_engagement_move: u32,
     /// 95 % of the cutting length have less.
@@ -77,6 +101,9 @@ pub struct PocketFigures {
     pub over_engagement_limit: Vec<ExceedingStretch>,
     /// How many there are.
     pub over_engagement_limit_count: usize,
+    /// The engagement with thinner layers counted, where one was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub thin_layers: Option<ThinLayers>,
 }
 
 impl PocketFigures {

@@ -111,6 +111,13 @@ fn stretches_above_the_engagement_are_listed() {
     let program = fs::read_to_string(home.path().join("neck/pocket-offset/toolpath.nc")).unwrap();
     let line = program.lines().nth(longest["line"].as_u64().unwrap() as usize - 1).unwrap();
     assert!(line.contains('X') || line.contains('Y'), "{line}");
+    // All of them are above it with thinner layers counted, too.
+    let thin = &pocket["thin_layers"];
+    assert!((number(pocket, "uncounted_layer_mm") - 0.005 * 2.5).abs() < 1e-12);
+    assert!((number(thin, "counted_from_mm") - 0.001 * 2.5).abs() < 1e-12);
+    assert!(number(thin, "max_engagement_deg") >= greatest);
+    assert_eq!(thin["greatest"]["max_engagement_deg"], thin["max_engagement_deg"]);
+    assert!(number(thin, "over_engagement_limit_mm") >= lengths.iter().sum::<f64>());
     let whole = number(pocket, "over_engagement_limit_fraction");
     let moves =
         read_apt("toolpath.cls", &fs::read(home.path().join("neck/pocket-offset/toolpath.cls")).unwrap());
@@ -123,5 +130,5 @@ fn stretches_above_the_engagement_are_listed() {
     let above = lengths.iter().sum::<f64>() / cut;
     assert!(above <= whole && above > 0.8 * whole, "{above} {whole}");
     let page = fs::read_to_string(home.path().join("neck/report.html")).unwrap();
-    assert!(page.contains("Stretches above the engagement"));
+    assert!(page.contains("Stretches above the engagement") && page.contains("greatest with thin chips"));
 }

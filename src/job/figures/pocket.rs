@@ -23,7 +23,8 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     };
     let step = run.request.step;
     let (path, top) = (run.path(), run.session.top());
-    let p = pocket_figures(run.scene(), pocket, strategy, step, path, cut, top, engaged, monitor)?;
+    let thinly = run.planned.engaged_thinly.as_ref();
+    let p = pocket_figures(run.scene(), pocket, strategy, step, path, cut, top, engaged, thinly, monitor)?;
     let mut claims = vec![within_walls(run, &p), ramps(run, strategy)];
     claims.extend(strategy.engagement.map(|limit| engaged_within(run, &p, limit.to_degrees())));
     claims.extend(strategy.stepdown.map(|limit| steps_down(run.path(), run.session.top(), limit)));
@@ -38,13 +39,29 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
 }
 
 fn rows(p: &PocketFigures) -> Vec<(&'static str, String)> {
-    vec![
+    let with_thin_layers = p.thin_layers.as_ref().map(|thin| {
+        let place = |one: &ExceedingStretch| format!(" at {:.2}, {:.2}, {:.2}", one.x, one.y, one.z);
+        let text = format!(
+            "{:.0} ± {:.0} degrees{} (layers below {:.1} µm not counted); {:.1} mm of the length above {:.0} degrees",
+            thin.max_engagement_deg,
+            thin.max_engagement_error_bound_deg,
+            thin.greatest.as_ref().map_or_else(String::new, place),
+            1e3 * thin.counted_from_mm,
+            thin.over_engagement_limit_mm,
+            p.engagement_limit_deg
+        );
+        ("greatest with thin chips", text)
+    });
+    let rows = [
         ("stepover", format!("{:.3} mm", p.stepover_mm)),
         (
             "engagement, greatest and 95 %",
             format!(
-                "{:.0} ± {:.0}, {:.0} degrees",
-                p.max_engagement_deg, p.max_engagement_error_bound_deg, p.p95_engagement_deg
+                "{:.0} ± {:.0}, {:.0} degrees (layers below {:.1} µm not counted)",
+                p.max_engagement_deg,
+                p.max_engagement_error_bound_deg,
+                p.p95_engagement_deg,
+                1e3 * p.uncounted_layer_mm
             ),
         ),
         (
@@ -60,7 +77,8 @@ fn rows(p: &PocketFigures) -> Vec<(&'static str, String)> {
             format!("{} µm", with_bound(Some(p.wall_gouge_mm), Some(p.wall_gouge_error_bound_mm))),
         ),
         ("out of reach in corners", format!("{:.3} mm²", p.unreachable_area_mm2)),
-    ]
+    ];
+    rows.into_iter().chain(with_thin_layers).collect()
 }
 
 /// The stretches above the engagement that was asked for.
@@ -110,12 +128,13 @@ fn engaged_within(run: &Run<'_>, pocket: &PocketFigures, limit: f64) -> Claim {
     let longest = pocket.over_engagement_limit.first().map_or_else(String::new, |one| {
         let stretches = if count == 1 { "1 stretch".to_owned() } else { format!("{count} stretches") };
         format!(
-            "; {share:.2} % of the length exceed the limit, at a reduced feed: {stretches}, the longest {:.2} mm from {:.2}, {:.2}, {:.2}",
+            "; {share:.2} % of the length exceed the limit, at a reduced feed: {stretches}, the longest {:.2} mm from {:.2}, {:.2}, {:.2}. Use a smaller cutter where the pocket is too narrow, or a larger `engagement`",
             one.length_mm, one.x, one.y, one.z
         )
     });
     let text = format!(
-        "the greatest engagement is {measured:.1} ± {bound:.1} degrees (limit {limit:.1}), at move {index}{}{longest}",
+        "the greatest engagement is {measured:.1} ± {bound:.1} degrees (limit {limit:.1}, layers below {:.1} µm not counted), at move {index}{}{longest}",
+        1e3 * pocket.uncounted_layer_mm,
         run.program_line(index),
     );
     Claim { unit: "deg", ..Claim::length("engagement", Gravity::Scrap, limit, measured, bound) }.told(text)

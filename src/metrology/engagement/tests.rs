@@ -7,6 +7,7 @@ use proptest::prelude::*;
 use work::monitor::Silent;
 
 const RADIUS: f64 = 3.0;
+const FILM: f64 = UNCOUNTED_LAYER;
 
 /// The path through `places` at z = -2 in stock up to 0, after a plunge to the first of them.
 fn through(places: &[(f64, f64)]) -> Toolpath {
@@ -31,7 +32,11 @@ fn block() -> Aabb {
 }
 
 fn arcs_in(stock: &Stock, path: &Toolpath) -> ContactArcs {
-    contact_arcs(path, &Cutter::flat(2.0 * RADIUS).unwrap(), stock, &cuts, &Silent).unwrap()
+    arcs_beyond(FILM, stock, path)
+}
+
+fn arcs_beyond(film: f64, stock: &Stock, path: &Toolpath) -> ContactArcs {
+    contact_arcs(path, &Cutter::flat(2.0 * RADIUS).unwrap(), stock, film, &cuts, &Silent).unwrap()
 }
 
 fn arcs_of(path: &Toolpath) -> ContactArcs {
@@ -80,9 +85,12 @@ fn straight_passes_have_the_angles_of_closed_forms() {
 #[test]
 fn films_do_not_count() {
     let places = |by| [(-10.0, 0.0), (30.0, 0.0), (30.0, -5.0), (0.0, -5.0), (0.0, by), (20.0, by)];
-    let again = |by: f64| arcs(&places(by)).of_moves[5];
-    assert_eq!(again(0.9 * FILM * RADIUS), 0.0);
-    assert!((again(1.5 * FILM * RADIUS) - beside(1.5 * FILM * RADIUS)).abs() < 1e-9);
+    for film in [UNCOUNTED_LAYER, THIN_LAYER] {
+        let again =
+            |by: f64| arcs_beyond(film, &Stock::Box(block()), &through(&places(by * RADIUS))).of_moves[5];
+        assert_eq!(again(0.9 * film), 0.0);
+        assert!((again(1.5 * film) - (1.0 - 0.5 * film).acos()).abs() < 1e-9);
+    }
 }
 
 /// Along both walls of a corner up to `d` before its end, then into it by the bisector: in stock is the
@@ -134,11 +142,11 @@ fn depths_are_told_apart() {
 }
 
 /// The angle at a place by many points of the rim, each asked for its distance from all of the way before.
-fn brute(path: &Toolpath, k: usize, t: f64) -> f64 {
+fn brute(path: &Toolpath, film: f64, k: usize, t: f64) -> f64 {
     const POINTS: usize = 20_000;
     let segments: Vec<(Point2, Point2)> = path.segments().map(|(a, b, _)| (a.xy(), b.xy())).collect();
     let (a, b) = segments[k];
-    let fresh = RADIUS * (2.0 * FILM + FILM * FILM).sqrt();
+    let fresh = RADIUS * (2.0 * film + film * film).sqrt();
     // Short pieces of the way before, each with how far back it lies.
     let mut back = 0.0;
     let mut before: Vec<(Point2, Point2, bool)> = Vec::new();
@@ -154,7 +162,7 @@ fn brute(path: &Toolpath, k: usize, t: f64) -> f64 {
         let angle = heading - FRAC_PI_2 + PI * (*i as f64 + 0.5) / POINTS as f64;
         let p = centre + Vector2::new(angle.cos(), angle.sin()) * RADIUS;
         before.iter().all(|(from, to, filmed)| {
-            let cleared = if *filmed { (1.0 + FILM) * RADIUS } else { (1.0 - TOUCHING) * RADIUS };
+            let cleared = if *filmed { (1.0 + film) * RADIUS } else { (1.0 - TOUCHING) * RADIUS };
             square_distance(&p.coords, &[from.coords, to.coords]) >= cleared * cleared
         })
     };
@@ -188,17 +196,20 @@ proptest! {
             all.push(at);
         }
         let path = through(&all);
-        let found = arcs_of(&path);
         let rough = 4.0 * PI / 20_000.0;
-        let greatest = found.of_moves.iter().copied().fold(0.0, f64::max);
-        for k in 1..path.len() {
-            for &t in &places {
-                let angle = brute(&path, k, t);
-                prop_assert!(angle <= found.at_most[k] + rough, "move {k} at {t}: {angle} {}", found.at_most[k]);
-                prop_assert!(angle <= greatest + found.bound() + rough);
+        for film in [UNCOUNTED_LAYER, THIN_LAYER] {
+            let found = arcs_beyond(film, &Stock::Box(block()), &path);
+            let greatest = found.of_moves.iter().copied().fold(0.0, f64::max);
+            for k in 1..path.len() {
+                for &t in &places {
+                    let angle = brute(&path, film, k, t);
+                    let most = found.at_most[k];
+                    prop_assert!(angle <= most + rough, "{film}, move {k} at {t}: {angle} {most}");
+                    prop_assert!(angle <= greatest + found.bound() + rough);
+                }
+                // The end of a move is one of the places that are looked at.
+                prop_assert!(brute(&path, film, k, 1.0) <= found.of_moves[k] + rough);
             }
-            // The end of a move is one of the places that are looked at.
-            prop_assert!(brute(&path, k, 1.0) <= found.of_moves[k] + rough);
         }
     }
 }

@@ -133,6 +133,13 @@ impl Beginnings {
         same.into_iter().find(|before| !self.all[*before].forgotten)
     }
 
+    /// The index of the place right before this one in the same pass, else its own.
+    pub fn index_before(&self, k: usize) -> usize {
+        let place = &self.all[k];
+        let before = k.checked_sub(1).map(|before| &self.all[before]);
+        before.filter(|before| before.pass == place.pass).map_or(place.index, |before| before.index)
+    }
+
     /// Those nearer to a place than half a radius.
     pub fn near(&self, at: &Point2) -> Vec<usize> {
         let [i, j] = self.cell(at);

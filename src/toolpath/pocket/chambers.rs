@@ -71,9 +71,11 @@ impl Chambers {
         };
         let mut of_cells = vec![OUTSIDE; distances.len()];
         for cell in cells {
-            let mut beside: Vec<usize> =
-                self.beside(cell).map(|k| of_cells[k]).filter(|k| *k != OUTSIDE).collect();
-            beside.iter_mut().for_each(|k| *k = same(&wide, *k));
+            let known: Vec<usize> = self.beside(cell).filter(|k| of_cells[*k] != OUTSIDE).collect();
+            // Along a wall, too, the way up leads to the chamber that a cell belongs to.
+            let up =
+                known.iter().copied().max_by(|a, b| distances[*a].total_cmp(&distances[*b]).then(b.cmp(a)));
+            let mut beside: Vec<usize> = known.iter().map(|k| same(&wide, of_cells[*k])).collect();
             // Those found first are the widest.
             beside.sort_unstable();
             beside.dedup();
@@ -83,10 +85,13 @@ impl Chambers {
                     wide[*other].0 = beside[0];
                 }
             }
-            of_cells[cell] = beside.first().copied().unwrap_or_else(|| {
-                wide.push((wide.len(), distances[cell]));
-                wide.len() - 1
-            });
+            of_cells[cell] = up.map_or_else(
+                || {
+                    wide.push((wide.len(), distances[cell]));
+                    wide.len() - 1
+                },
+                |up| of_cells[up],
+            );
         }
         let kept: Vec<usize> = (0..wide.len()).filter(|k| wide[*k].0 == *k).collect();
         let number = |k: usize| kept.binary_search(&same(&wide, k)).unwrap_or(OUTSIDE);
@@ -105,7 +110,9 @@ impl Chambers {
     fn at(&self, p: &Point2) -> Option<usize> {
         let at = (p - self.origin) / self.cell;
         let [i, j] = [0, 1].map(|axis| (at[axis].round().max(0.0) as usize).min(self.side[axis] - 1));
-        Some(self.of_cells[j * self.side[0] + i]).filter(|k| *k != OUTSIDE)
+        let cell = j * self.side[0] + i;
+        // The cell of a place on a wall may be beyond it.
+        std::iter::once(cell).chain(self.beside(cell)).map(|k| self.of_cells[k]).find(|k| *k != OUTSIDE)
     }
 
     /// Passes may go to the chamber of a place.
@@ -160,6 +167,10 @@ mod tests {
         found.enter(&left);
         assert!(!found.is_closed(&left) && found.is_closed(&right) && !found.all_entered());
         assert!(!found.is_closed(&Point2::new(-11.0, 0.0)) && found.is_closed(&Point2::new(11.0, 0.0)));
+        // Along the walls as well, up to places on them.
+        let along = [-10.0, -9.97, -9.0, -6.0, 0.0, 9.97, 10.0]
+            .map(|y| [10.2, 15.0, 22.0, 30.0].map(|x| Point2::new(x, y)));
+        assert!(along.as_flattened().iter().all(|p| found.is_closed(p)));
         found.enter(&right);
         assert!(!found.is_closed(&right) && found.all_entered());
     }

@@ -194,7 +194,7 @@ fn around_walls(piece: &Piece, clearing: &Clearing) -> Vec<Run> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::bounded::Sides;
+    use super::super::loops::Sides;
     use super::super::turning::Turning;
     use super::*;
     use std::f64::consts::{PI, TAU};

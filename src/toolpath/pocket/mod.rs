@@ -20,6 +20,7 @@ mod finish;
 mod front;
 mod lines;
 mod link;
+mod loops;
 mod nest;
 mod peel;
 mod rest;

@@ -200,17 +200,19 @@ impl<'a> Peeler<'a> {
     /// Whether stock stands to the right of a place.
     fn has_stock(&mut self, k: usize) -> bool {
         let mut places = std::mem::replace(&mut self.places, Beginnings::new(self.radius));
-        let has = places.has_stock(k, |place| self.stock_beside(place));
+        let has = places.has_stock(k, |place| self.stock_beside(&place.at, &place.heading));
         self.places = places;
         has
     }
 
-    fn stock_beside(&self, Beginning { at, heading, .. }: &Beginning) -> bool {
+    /// Whether stock stands to the right of a place, or where there is a wall, ahead along it.
+    fn stock_beside(&self, at: &Point2, heading: &Vector2) -> bool {
         let right = Vector2::new(heading.y, -heading.x);
-        let beside = self.nearest_inside(&(at + right * (PROBE * self.radius)));
-        if (beside - at).norm() < 0.2 * PROBE * self.radius {
+        let probes = [right, *heading].map(|by| at + by * (PROBE * self.radius));
+        let mut inside = probes.iter().map(|probe| self.nearest_inside(probe));
+        let Some(beside) = inside.find(|p| (p - at).norm() >= 0.2 * PROBE * self.radius) else {
             return false;
-        }
+        };
         let arc = |heading: Vector2| self.cleared.arc(&beside, &heading, usize::MAX);
         arc(right) > STOCK || arc(-right) > STOCK
     }
@@ -237,13 +239,27 @@ impl<'a> Peeler<'a> {
         }
     }
 
-    /// The way over cleared ground to a place. What was cleared `since` so many places is not there yet.
-    fn link_to(&mut self, k: usize, since: usize) -> Vec<Point2> {
+    /// Where a pass from a place begins: at the first of the places of its way right before it that have stock beside them.
+    fn beginning(&self, place: usize) -> (usize, Vector2) {
+        let Beginning { index, heading, .. } = *self.places.get(place);
+        let mut begin = (index, heading);
+        for k in (self.places.index_before(place)..index).rev() {
+            let Some(heading) = (self.out[k + 1] - self.out[k]).try_normalize(0.0) else { break };
+            if !self.stock_beside(&self.out[k], &heading) {
+                break;
+            }
+            begin = (k, heading);
+        }
+        begin
+    }
+
+    /// The way over cleared ground to a place of the way, which is to be left in the direction `heading`. What was cleared `since` so
+    /// many places is not there yet.
+    fn link_to(&mut self, index: usize, heading: Vector2, since: usize) -> Vec<Point2> {
         let later = self.cleared.split_off(since);
-        let place = self.places.get(k);
         let (room, cleared, visited) = (self.room, &*self.cleared, &self.visited);
         let links = Links { room, cleared, visited, radius: self.radius };
-        let link = links.between(&self.out, place.index, place.heading);
+        let link = links.between(&self.out, index, heading);
         later.into_iter().for_each(|p| self.cleared.add(p));
         link
     }
@@ -261,7 +277,8 @@ impl<'a> Peeler<'a> {
 
     /// One pass from a place.
     fn pass(&mut self, place: usize, monitor: &dyn Monitor) -> Result<Came, Cancelled> {
-        let Beginning { at: begin, heading, .. } = *self.places.get(place);
+        let (index, heading) = self.beginning(place);
+        let begin = self.out[index];
         let (full, shortest) = (STEP * self.radius, SHORTEST * self.radius);
         let before = self.cleared.len();
         // Most passes that are tried end soon: the way to one is looked for when it is sure.
@@ -281,7 +298,7 @@ impl<'a> Peeler<'a> {
             }
             if gone >= SOON * self.radius && settled <= last_cut && self.cleared.len() >= self.thin_at {
                 if link.is_none() {
-                    link = Some(self.link_to(place, before));
+                    link = Some(self.link_to(index, heading, before));
                 }
                 self.thin(fresh);
             }
@@ -319,7 +336,7 @@ impl<'a> Peeler<'a> {
         // What was gone without cutting is not gone in the end; it may have taken films away.
         self.cleared.truncate(self.cleared.len() - (way.len() - last_cut));
         way.truncate(last_cut);
-        let link = link.unwrap_or_else(|| self.link_to(place, before));
+        let link = link.unwrap_or_else(|| self.link_to(index, heading, before));
         self.out.extend_from_slice(&link);
         let first = self.out.len();
         self.out.extend(way.iter().map(|step| step.to));

@@ -2,9 +2,10 @@
 
 use std::fmt::{self, Write as _};
 
-use super::bounded::{Rules, Sides};
+use super::bounded::Rules;
 use super::cleared::Gentle;
 use super::feed::engagement_angle;
+use super::loops::Sides;
 use super::stream::Vectors;
 use super::turning::Turning;
 use crate::strategies::direction_keys;

@@ -1,6 +1,6 @@
 //! A way of the cutter's centre by its length, and the circles that touch it and fit into its room; mm.
 
-use super::bounded::LEAST;
+use super::loops::LEAST;
 use super::walls::Room;
 use geometry::{Point2, Vector2};
 

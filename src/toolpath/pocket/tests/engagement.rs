@@ -3,7 +3,7 @@
 use cutter::Cutter;
 use geometry::{Aabb, Point2, Point3, Region, RegionIndex, SegmentGrid};
 use machine::Machine;
-use metrology::{ContactArcs, contact_arcs};
+use metrology::{ContactArcs, UNCOUNTED_LAYER, contact_arcs};
 use motion::{Move, MoveKind, Toolpath};
 use sim::Stock;
 use work::monitor::Silent;
@@ -59,9 +59,15 @@ fn bounded_passes_keep_to_their_engagement() {
                 found.segments().all(|(a, b, _)| (b - a).norm() > 1e-9),
                 "{pattern:?}: a move without length"
             );
-            let arcs =
-                contact_arcs(&found, &Cutter::flat(diameter).unwrap(), &stock(&pocket), &of_passes, &Silent)
-                    .unwrap();
+            let arcs = contact_arcs(
+                &found,
+                &Cutter::flat(diameter).unwrap(),
+                &stock(&pocket),
+                UNCOUNTED_LAYER,
+                &of_passes,
+                &Silent,
+            )
+            .unwrap();
             (found, arcs)
         };
         let (bounded, arcs) = measured(Some(limit.to_radians()));
@@ -107,10 +113,44 @@ fn acute_tips_keep_to_small_engagements() {
     let pocket = Pocket::new(Region::nested(vec![kite]).unwrap().0, 1.5);
     let limit = 20f64.to_radians();
     let found = plan(&pocket, 2.0, &Pattern::Offset { spiral: false }, Some(limit));
-    let arcs = contact_arcs(&found.path, &Cutter::flat(2.0).unwrap(), &stock(&pocket), &of_passes, &Silent);
+    let arcs = contact_arcs(
+        &found.path,
+        &Cutter::flat(2.0).unwrap(),
+        &stock(&pocket),
+        UNCOUNTED_LAYER,
+        &of_passes,
+        &Silent,
+    );
     let stretches = above(&found.path, &arcs.unwrap(), limit + SLACK.to_radians());
     assert!(stretches.is_empty(), "{stretches:?}");
     assert!(!found.notes.iter().any(|note| note.contains("above the engagement")), "{:?}", found.notes);
+}
+
+/// A run along walls may begin right before a corner, as it does here: what is left of it is cut in layers all the same.
+#[test]
+fn corners_before_which_a_run_begins_keep_to_the_engagement() {
+    let outline = points(&[
+        (0., 0.),
+        (25., 0.),
+        (25., 11.01),
+        (40., 11.01),
+        (40., 0.),
+        (65., 0.),
+        (65., 30.),
+        (40., 30.),
+        (40., 18.99),
+        (25., 18.99),
+        (25., 30.),
+        (0., 30.),
+    ]);
+    let pocket = Pocket::new(Region::nested(vec![outline]).unwrap().0, 3.0);
+    let limit = 30f64.to_radians();
+    let found = plan(&pocket, 8.0, &Pattern::Offset { spiral: false }, Some(limit));
+    let cutter = Cutter::flat(8.0).unwrap();
+    let arcs = contact_arcs(&found.path, &cutter, &stock(&pocket), UNCOUNTED_LAYER, &of_passes, &Silent);
+    // A side of one of the smallest loops may be above.
+    let stretches = above(&found.path, &arcs.unwrap(), limit);
+    assert!(stretches.iter().all(|(_, length)| *length < 0.01 * 4.0), "{stretches:?}");
 }
 
 /// Two squares joined by a neck that has no room beside the cutter: there, and nowhere else, it is in a
@@ -137,8 +177,15 @@ fn a_neck_as_wide_as_the_cutter_is_told() {
     let found = plan(&pocket, 5.0, &Pattern::Offset { spiral: false }, Some(limit));
     // A move counts whole, and one may be half a radius long.
     let path = divided(&found.path, 0.05);
-    let arcs =
-        contact_arcs(&path, &Cutter::flat(5.0).unwrap(), &stock(&pocket), &of_passes, &Silent).unwrap();
+    let arcs = contact_arcs(
+        &path,
+        &Cutter::flat(5.0).unwrap(),
+        &stock(&pocket),
+        UNCOUNTED_LAYER,
+        &of_passes,
+        &Silent,
+    )
+    .unwrap();
     let stretches = above(&path, &arcs, limit + SLACK.to_radians());
     let long = stretches.iter().filter(|(_, length)| *length > TIP * 2.5);
     let above: f64 = long.clone().map(|(_, length)| length).sum();
@@ -260,8 +307,14 @@ fn open_pockets_and_rests_are_cleared_from_the_air() {
                 assert!(!left, "{what}: {p} is left, {} from a pass", passes.distance(&p));
             }
             if let Some(limit) = limit {
-                let arcs =
-                    contact_arcs(&path, &Cutter::flat(2.0 * radius).unwrap(), &stock, &of_passes, &Silent);
+                let arcs = contact_arcs(
+                    &path,
+                    &Cutter::flat(2.0 * radius).unwrap(),
+                    &stock,
+                    UNCOUNTED_LAYER,
+                    &of_passes,
+                    &Silent,
+                );
                 let above = above(&path, &arcs.unwrap(), (limit + SLACK).to_radians());
                 // Where the fronts from two open sides meet, one move may be above; jobs then plan again for less. Loops of a
                 // zigzag lean to one side, and in corners they become films.
