@@ -63,7 +63,7 @@ pub fn pocket_figures(
         p95_engagement_deg: engaged.p95.to_degrees(),
         engagement_limit_deg: as_asked(strategy.engagement_limit(step, cutter.radius())),
         over_engagement_limit_fraction: engaged.over_limit,
-        over_engagement_limit: listed(exceeding, path),
+        over_engagement_limit: listed(exceeding, path, |one| one.length),
         over_engagement_limit_count: exceeding.len(),
         thin_layers: engaged_thinly
             .map(|(engaged, bound)| thin_layers(engaged, *bound, cutter.radius(), path)),
@@ -76,10 +76,10 @@ fn as_asked(angle: f64) -> f64 {
     (angle.to_degrees() * DECIMALS).round() / DECIMALS
 }
 
-/// The longest stretches, the longest first.
-fn listed(all: &[Exceeding], path: &Toolpath) -> Vec<ExceedingStretch> {
+/// The stretches with the greatest `by`, in that order.
+fn listed(all: &[Exceeding], path: &Toolpath, by: impl Fn(&Exceeding) -> f64) -> Vec<ExceedingStretch> {
     let mut all = all.to_vec();
-    all.sort_by(|a, b| b.length.total_cmp(&a.length));
+    all.sort_by(|a, b| by(b).total_cmp(&by(a)));
     all.iter().take(PocketFigures::LISTED).map(|one| stretch(one, path)).collect()
 }
 
@@ -98,15 +98,13 @@ fn stretch(one: &Exceeding, path: &Toolpath) -> ExceedingStretch {
 /// The engagement with layers counted down to [`THIN_LAYER`] of a `radius`, mm; `bound` is that of its greatest angle, rad.
 fn thin_layers(engaged: &Engagement, bound: f64, radius: f64, path: &Toolpath) -> ThinLayers {
     let above = &engaged.exceeding;
-    let greatest = above.iter().max_by(|a, b| a.max.total_cmp(&b.max));
     ThinLayers {
         counted_from_mm: THIN_LAYER * radius,
         max_engagement_deg: engaged.max.to_degrees(),
         max_engagement_error_bound_deg: bound.to_degrees(),
         max_engagement_move: engaged.max_move,
-        greatest: greatest.map(|one| stretch(one, path)),
         over_engagement_limit_mm: above.iter().map(|one| one.length).fold(0.0, |a, b| a + b),
-        over_engagement_limit: listed(above, path),
+        over_engagement_limit: listed(above, path, |one| one.max),
         over_engagement_limit_count: above.len(),
     }
 }

@@ -50,12 +50,9 @@ pub struct ThinLayers {
     pub max_engagement_error_bound_deg: f64,
     /// The move with the greatest angle, counted from 0.
     pub max_engagement_move: u32,
-    /// The stretch above the limit that has it, if any is.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub greatest: Option<ExceedingStretch>,
     /// Length of passes above the limit.
     pub over_engagement_limit_mm: f64,
-    /// The stretches above it, the longest first and [`PocketFigures::LISTED`] at most.
+    /// The stretches above it, the one with the greatest angle first and [`PocketFigures::LISTED`] at most.
     pub over_engagement_limit: Vec<ExceedingStretch>,
     /// How many there are.
     pub over_engagement_limit_count: usize,

@@ -116,7 +116,7 @@ fn stretches_above_the_engagement_are_listed() {
     assert!((number(pocket, "uncounted_layer_mm") - 0.005 * 2.5).abs() < 1e-12);
     assert!((number(thin, "counted_from_mm") - 0.001 * 2.5).abs() < 1e-12);
     assert!(number(thin, "max_engagement_deg") >= greatest);
-    assert_eq!(thin["greatest"]["max_engagement_deg"], thin["max_engagement_deg"]);
+    assert_eq!(thin["over_engagement_limit"][0]["max_engagement_deg"], thin["max_engagement_deg"]);
     assert!(number(thin, "over_engagement_limit_mm") >= lengths.iter().sum::<f64>());
     let whole = number(pocket, "over_engagement_limit_fraction");
     let moves =

@@ -45,7 +45,7 @@ fn rows(p: &PocketFigures) -> Vec<(&'static str, String)> {
             "{:.0} ± {:.0} degrees{} (layers below {:.1} µm not counted); {:.1} mm of the length above {:.0} degrees",
             thin.max_engagement_deg,
             thin.max_engagement_error_bound_deg,
-            thin.greatest.as_ref().map_or_else(String::new, place),
+            thin.over_engagement_limit.first().map_or_else(String::new, place),
             1e3 * thin.counted_from_mm,
             thin.over_engagement_limit_mm,
             p.engagement_limit_deg
