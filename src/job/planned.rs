@@ -316,7 +316,7 @@ const BOUNDED_STRAYING: f64 = 0.2;
 type Engaged = (Plan, Option<(Engagement, f64)>);
 
 /// Times that a pocket is planned again for less where the engagement was exceeded; once more it is for a lower limit everywhere.
-const GENTLE_ROUNDS: usize = 2;
+const GENTLE_ROUNDS: usize = 5;
 
 /// The share of the limit by which it is lowered at least. Less may change no pass at all.
 const LEAST_LOWERING: f64 = 0.01;
