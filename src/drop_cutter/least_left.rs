@@ -48,22 +48,26 @@ impl DropCutter<'_> {
         let ring = |k: usize| {
             let off = cutter.radius() * (k / ON_RING + 1) as f64 / RINGS as f64;
             let (sin, cos) = (std::f64::consts::TAU * (k % ON_RING) as f64 / ON_RING as f64).sin_cos();
-            (off, at.x + off * cos, at.y + off * sin)
+            (off, Vector2::new(cos, sin) * off)
         };
-        let places = std::iter::once((0.0, at.x, at.y)).chain((0..RINGS * ON_RING).map(ring));
-        let leaves = |(off, x, y)| Some(self.at(x, y)?.tip_z + cutter.height(off)? - at.z);
-        places.filter_map(leaves).fold(f64::INFINITY, f64::min)
+        let ways = std::iter::once((0.0, Vector2::zeros())).chain((0..RINGS * ON_RING).map(ring));
+        let leaves = |(off, way)| self.left_from(cutter, at, at.xy() + way, off);
+        ways.filter_map(leaves).fold(f64::INFINITY, f64::min)
+    }
+
+    /// What `cutter`, which this was made for, leaves above the place `at` from an axis that is `off` mm from it, mm along z; `None`
+    /// where it does not cover the place or touches no part.
+    fn left_from(&self, cutter: &Cutter, at: &Point3, axis: Point2, off: f64) -> Option<f64> {
+        Some(self.at(axis.x, axis.y)?.tip_z + cutter.height(off)? - at.z)
     }
 
     /// The axis, mm, near `first` from which `cutter`, which this was made for, leaves least above the place `at` of the part: a
-    /// search by ever smaller steps from `step` mm on. Where the cutter cannot touch the place, since it stands on the part elsewhere, another
-    /// position near the one that would touch it leaves less.
+    /// search by ever smaller steps, the first of them `step` mm. Where the cutter cannot touch the place, since it stands on the
+    /// part elsewhere, another position near the one that would touch it leaves less.
     pub fn lowest_over(&self, cutter: &Cutter, at: &Point3, first: Point2, step: f64) -> Point2 {
         let leaves = |axis: &Point2| {
-            let height = cutter.height((axis - at.xy()).norm());
-            height
-                .zip(self.at(axis.x, axis.y))
-                .map_or(f64::INFINITY, |(height, drop)| drop.tip_z + height - at.z)
+            let off = (axis - at.xy()).norm();
+            self.left_from(cutter, at, *axis, off).unwrap_or(f64::INFINITY)
         };
         let (mut best, mut step) = ((leaves(&first), first), step);
         for _ in 0..HALVED {

@@ -20,7 +20,7 @@ mod widths;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use geometry::{Point2, Point3};
+use geometry::Point3;
 use metrology::{Bounded, Engine, Measured, Measurement, RidgeMap, Simulation, path_figures};
 use motion::Toolpath;
 use report::Verdict;
@@ -534,16 +534,8 @@ impl Corrected<'_> {
 
     /// Whether places take so little that passes of their own are shorter than a plan with all passes nearer to each other.
     fn are_few(&self, places: &[HighPlace], tried: &Tried) -> bool {
-        let interval = tried.widths.interval;
+        let Widths { interval, .. } = tried.widths;
         let planned = &tried.kept.passes;
-        let (short, length) = if planned.is_empty() {
-            let cell = |at: &Point3| at.coords.map(|x| (x / interval).floor() as i64);
-            let cells: BTreeSet<[i64; 3]> = places.iter().map(|place| cell(&place.at).into()).collect();
-            (cells.len(), TOUCH_UP_LENGTH * interval * cells.len() as f64)
-        } else {
-            let axes: Vec<Point2> = places.iter().map(|place| place.tip.xy()).collect();
-            short_passes(planned, &axes, interval)
-        };
         // What a pass takes beside its length, as those of the plan do on average.
         let figures = path_figures(&self.best.plan.path, 0.0);
         let off_pass = (figures.link_length_mm + figures.air_length_mm) / figures.passes.max(1) as f64;
@@ -551,7 +543,20 @@ impl Corrected<'_> {
         let round = &tried.standing.round;
         let nearer = (round.highest() / aim(self.goal.target)).sqrt() - 1.0;
         let seen = if round.measured { 1.0 } else { SEEN };
-        length + off_pass * short as f64 <= (seen * nearer).min(MOST_TOUCH_UP) * whole
+        let mut left = (seen * nearer).min(MOST_TOUCH_UP) * whole;
+        let mut fits = |length: f64| {
+            left -= length + off_pass;
+            left >= 0.0
+        };
+        if planned.is_empty() {
+            let cell = |at: &Point3| at.coords.map(|x| (x / interval).floor() as i64);
+            let cells: BTreeSet<[i64; 3]> = places.iter().map(|place| cell(&place.at).into()).collect();
+            cells.iter().all(|_| fits(TOUCH_UP_LENGTH * interval))
+        } else {
+            // Many places would take long to be served: the first of them are enough to tell.
+            let axes = places.iter().map(|place| place.tip.xy()).collect();
+            short_passes(planned, axes, interval).all(fits)
+        }
     }
 
     /// The places of a plan that may stand above the target.

@@ -69,11 +69,15 @@ pub(crate) fn passes(task: &Task<'_>, planned: &[Vec<Point3>]) -> Result<Vec<Vec
     Ok(added)
 }
 
-/// How many passes of their own places take whose cutter stands at the `axes`, and how long they are together, mm.
-pub fn short_passes(planned: &[Vec<Point3>], axes: &[Point2], interval: f64) -> (usize, f64) {
-    let mut waiting = axes.to_vec();
-    let runs = std::iter::from_fn(|| next_run(planned, &mut waiting, interval));
-    runs.fold((0, 0.0), |(count, length), (_, [from, to])| (count + 1, length + to - from))
+/// The passes of their own that places take whose cutter stands at the `axes`: the length of each, mm. They are found one by one, so
+/// that who has seen enough may stop.
+pub fn short_passes(
+    planned: &[Vec<Point3>],
+    mut axes: Vec<Point2>,
+    interval: f64,
+) -> impl Iterator<Item = f64> {
+    let runs = std::iter::from_fn(move || next_run(planned, &mut axes, interval));
+    runs.map(|(_, [from, to])| to - from)
 }
 
 /// The pass beside which the first of the waiting places is served, and the run of it that serves those along it, mm; these wait
@@ -209,9 +213,13 @@ mod tests {
         assert!((ends[1] - Point2::new(52.5, 0.45)).norm() < 1e-12, "{ends:?}");
         // Three passes serve them all.
         let axes = [[50.0, 0.45], [51.5, 0.5], [48.7, 0.4], [55.0, 0.45], [50.0, 1.5]].map(Point2::from);
-        let (count, length) = short_passes(&passes, &axes, 1.0);
-        assert!(count == 3 && (length - (4.8 + 2.0 + 2.0)).abs() < 1e-12, "{count} {length}");
-        assert_eq!(short_passes(&[], &axes, 1.0), (0, 0.0));
+        let lengths: Vec<f64> = short_passes(&passes, axes.to_vec(), 1.0).collect();
+        let wanted = [4.8, 2.0, 2.0];
+        assert!(
+            lengths.len() == 3 && lengths.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12),
+            "{lengths:?}"
+        );
+        assert_eq!(short_passes(&[], axes.to_vec(), 1.0).count(), 0);
         // Beside the end of a pass there is no more of it.
         let copy = Copied::beside(&passes, Point2::new(99.5, 0.45), 16.0).unwrap();
         let run = copy.serve(&mut vec![Point2::new(99.5, 0.45)], 1.0);
