@@ -8,7 +8,7 @@
 //!
 //! The core is our own, because evaluations must not allocate.
 
-use super::bspline::{KnotError, KnotVector, MAX_BASIS};
+use super::bspline::{KnotError, KnotVector};
 use super::{Aabb, Isometry3, Jet2, MAX_COORDINATE, Point3, Vector3};
 
 /// Weights must lie between the inverse of this and this. Beyond, a control point is either
@@ -180,10 +180,21 @@ impl NurbsSurface {
 
     /// Position and derivatives at `(u, v)`, clamped to the domain.
     pub fn jet(&self, u: f64, v: f64) -> Jet2 {
-        let (first_u, bu) = self.u.basis_derivatives(u, 2);
-        let (first_v, bv) = self.v.basis_derivatives(v, 2);
+        match [self.u.degree(), self.v.degree()] {
+            [3, 3] => self.combined(self.u.basis_and_bends::<4>(u), self.v.basis_and_bends::<4>(v)),
+            _ => self.combined(self.u.basis_derivatives(u, 2), self.v.basis_derivatives(v, 2)),
+        }
+    }
+
+    /// By the basis functions along both parameters with their derivatives; each first entry is the first control point that matters.
+    #[inline(always)]
+    fn combined<const N: usize>(
+        &self,
+        (first_u, bu): (usize, [[f64; N]; 3]),
+        (first_v, bv): (usize, [[f64; N]; 3]),
+    ) -> Jet2 {
         let mut a = HomogeneousJet::default();
-        for r in 0..=self.u.degree() {
+        for r in 0..=self.u.degree().min(N - 1) {
             let row = self.row(first_u + r, first_v);
             let [n, nu, nuu] = [bu[0][r], bu[1][r], bu[2][r]];
             let value = combine(row, &bv[0]);
@@ -228,7 +239,8 @@ fn accumulate(sum: &mut [f64; 4], factor: f64, term: &[f64; 4]) {
     }
 }
 
-fn combine(row: &[[f64; 4]], basis: &[f64; MAX_BASIS]) -> [f64; 4] {
+#[inline(always)]
+fn combine(row: &[[f64; 4]], basis: &[f64]) -> [f64; 4] {
     let mut sum = [0.0; 4];
     for (point, &n) in row.iter().zip(basis) {
         accumulate(&mut sum, n, point);
