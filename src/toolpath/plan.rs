@@ -11,8 +11,8 @@ use crate::surface::mesh_surface;
 use crate::tilt::tilted::{self, TiltedPasses, Tilting};
 use crate::touch_up;
 use crate::vocabulary::{
-    Kept, Pace, PartKind, PassSettings, Passes, PlanError, PlanSettings, SAMPLING_OVER_RADIUS, Setup, Step,
-    Strategy, Task,
+    COMPARED_CHORDS, Kept, Pace, PartKind, PassSettings, Passes, PlanError, PlanSettings,
+    SAMPLING_OVER_RADIUS, Setup, Step, Strategy, Task,
 };
 use cutter::Cutter;
 use field::PlannedField;
@@ -218,12 +218,14 @@ fn with_task<T>(
 /// The time, s, that the machine takes for passes once they are joined. Jerks of its axes are left out: they take seconds to
 /// search for, and slow all plans of a part alike.
 fn duration(passes: &Passes, both_ways: bool, setup: &Setup<'_>) -> Result<f64, PlanError> {
-    let machine = &Machine { jerks: [f64::INFINITY; 3], ..setup.settings.machine };
-    let mut path = join(passes.passes.clone(), both_ways, setup)?;
+    let machine = Machine { jerks: [f64::INFINITY; 3], ..setup.settings.machine };
+    let chord_tolerance = COMPARED_CHORDS * setup.settings.chord_tolerance;
+    let settings = &PlanSettings { chord_tolerance, machine, ..setup.settings.clone() };
+    let mut path = join(passes.passes.clone(), both_ways, &Setup { settings, ..*setup })?;
     if machine.slow_corners {
-        path = slow_corners(&path, machine);
+        path = slow_corners(&path, &machine);
     }
-    Ok(machining_time(&path, machine, setup.monitor)?)
+    Ok(machining_time(&path, &machine, setup.monitor)?)
 }
 
 /// The distance of passes less what chords, facets and the program's decimals take of a scallop target.

@@ -11,7 +11,9 @@ use super::{gaps, planned_field};
 use crate::moves::touch::Touch;
 use crate::surface::chart::Chart;
 use crate::tilt::tilted;
-use crate::vocabulary::{Contact, Levelled, Lines, PassSettings, Passes, PlanError, Step, Task};
+use crate::vocabulary::{
+    Contact, LevelFunction, Levelled, Lines, PassSettings, Passes, PlanError, Step, Task,
+};
 use cutter::Cutter;
 use drop_cutter::{Beside, DropCutter};
 use field::{LevelCurve, LevelTracer, ScalarField, surface_gradient_length};
@@ -73,13 +75,13 @@ pub(crate) fn along_lines(
     passes_along(task, chart, field, lines.steps(), lines)
 }
 
-/// [`along_levels`] of a function that an earlier plan left.
-pub(crate) fn along_earlier(
+/// [`along_levels`] of a function on the chart that is told of; nothing along one on a mesh.
+pub(crate) fn along_levelled(
     task: &Task<'_>,
     chart: &Chart,
-    field: &ScalarField,
     levelled: &Levelled,
 ) -> Result<Passes, PlanError> {
+    let LevelFunction::Chart(field) = &levelled.function else { return Ok(Passes::default()) };
     let mut passes = along_levels(task, chart, field)?;
     levelled.clone().put_with(&mut passes);
     Ok(passes)

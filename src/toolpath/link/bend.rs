@@ -11,7 +11,7 @@
 use crate::moves::chord::{Watch, reduce, sample_within_chord};
 use crate::surface::border::Border;
 use cutter::Cutter;
-use drop_cutter::DropCutter;
+use drop_cutter::{Beside, DropCutter};
 use geometry::{Point2, Point3, Vector2};
 use machine::{Machine, machining_time};
 use motion::{ClPoint, Move, MoveKind, Toolpath};
@@ -297,11 +297,11 @@ impl Bends<'_> {
         to: &End,
         monitor: &dyn Monitor,
     ) -> Result<Option<Vec<Point3>>, Cancelled> {
-        let mut stays = true;
+        let (mut stays, mut beside) = (true, Beside::default());
         let mut locate = |t: f64| {
             let k = (t as usize).min(curve.len() - 1);
             let p = curve[k].at(t - k as f64);
-            let drop = self.drop.at(p.x, p.y);
+            let drop = self.drop.at_beside(p.x, p.y, &mut beside);
             let drop = drop.filter(|d| {
                 !self.border.holds(&d.contact)
                     || self.border.rolled(self.cutter, &p, &d.contact) <= MOST_ROLL * self.interval

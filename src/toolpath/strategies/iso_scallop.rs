@@ -14,7 +14,7 @@
 use std::fmt::{self, Write as _};
 use std::sync::Arc;
 
-use crate::levels::level_passes::{along_earlier, along_levels};
+use crate::levels::level_passes::along_levelled;
 use crate::levels::spacing::level_tangent;
 use crate::surface::chart::{Chart, ChartPoint};
 use crate::vocabulary::{
@@ -135,7 +135,7 @@ impl Strategy for IsoScallop {
         let charts = Chart::all(task.part, task.cutter, task.settings.guide())?;
         for (k, chart) in charts.iter().enumerate() {
             all.append(match task.earlier_on_chart(k, charts.len()) {
-                Some((field, levelled)) => along_earlier(task, chart, field, levelled)?,
+                Some(levelled) => along_levelled(task, chart, levelled)?,
                 None => on_chart(task, chart, self.start)?,
             });
         }
@@ -190,20 +190,28 @@ pub(crate) fn fronts(
 }
 
 /// Plans passes along the levels of one of so many fronts that were tried.
-pub(crate) fn along_front(
+fn along_front(
     task: &Task<'_>,
     chart: &Chart,
     front: StartedFront,
     tried: usize,
 ) -> Result<Passes, PlanError> {
-    let StartedFront { name, field, predicted, .. } = front;
-    let field = ScalarField::Grid(field);
-    let mut passes = along_levels(task, chart, &field)?;
-    let told = format!("passes start {name}{}", if tried > 1 { ", the best of four borders" } else { "" });
-    let function = LevelFunction::Chart(Arc::new(field));
-    let planned_as = format!("front, starting {name}").into();
-    Levelled { function, planned_as, told: Some((told, predicted)) }.put_with(&mut passes);
-    Ok(passes)
+    along_levelled(task, chart, &front.levelled(tried))
+}
+
+impl StartedFront {
+    /// Its arrival times, as one of so many that were tried.
+    pub(crate) fn levelled(self, tried: usize) -> Levelled {
+        let Self { name, field, predicted, .. } = self;
+        let told =
+            format!("passes start {name}{}", if tried > 1 { ", the best of four borders" } else { "" });
+        let function = LevelFunction::Chart(Arc::new(ScalarField::Grid(field)));
+        Levelled {
+            function,
+            planned_as: format!("front, starting {name}").into(),
+            told: Some((told, predicted)),
+        }
+    }
 }
 
 /// Where a front starts: at the border where the parameter (0: u, 1: v) is least (0) or greatest (1).

@@ -21,17 +21,18 @@ use std::fmt::{self, Write as _};
 use std::sync::Arc;
 
 use super::direction_keys;
-use super::iso_scallop::{along_front, border_name, fronts, places};
+use super::iso_scallop::{border_name, fronts, places};
 use super::mesh_passes::{self, Aim, width_at};
 use super::stream_search::{Found, Prices, Search};
-use crate::levels::level_passes::{along_earlier, along_levels};
+use crate::levels::level_passes::along_levelled;
 use crate::levels::{obedience, planned_field, spirals};
 use crate::strategies::iso_scallop::FrontStart;
 use crate::surface::chart::Chart;
 use crate::surface::feed;
 use crate::surface::mesh_surface::{reachable, wants_mesh};
 use crate::vocabulary::{
-    Definition, FeedDirection, LevelFunction, Levelled, Links, Passes, PlanError, Step, Strategy, Task,
+    COMPARED_CHORDS, Definition, FeedDirection, LevelFunction, Levelled, Links, PassSettings, Passes,
+    PlanError, Step, Strategy, Task,
 };
 use cutter::Cutter;
 use field::ShortestPossible;
@@ -270,7 +271,7 @@ pub(super) fn on_chart(
     objective: Objective,
 ) -> Result<Passes, PlanError> {
     let passes = match task.earlier_on_chart(k, of) {
-        Some((field, levelled)) => along_earlier(task, chart, field, levelled)?,
+        Some(levelled) => along_levelled(task, chart, levelled)?,
         None => searched(task, chart, toward, objective)?,
     };
     if toward.is_none() && objective == Objective::Time {
@@ -304,30 +305,40 @@ fn searched(
     let mut found = search.run()?;
     // With a direction to keep to, the best comes first: a shorter path may be one that leaves the direction.
     found.truncate(if toward.is_some() { 1 } else { found.len() });
-    let mut best: Option<(f64, Passes, Levelled)> = None;
-    for Found { function, length, along } in found {
-        let passes = along_levels(task, chart, &function)?;
-        let its = objective.worth(task, &passes)?;
-        if best.as_ref().is_none_or(|(least, ..)| its < *least) {
-            let planned_as = along.map_or(Cow::Borrowed(SEARCHED), |border| {
-                format!("{SEARCHED} from the front that starts {}", border_name(border)).into()
-            });
-            let told = toward.is_none().then(|| (objective.told().to_owned(), length));
-            let function = LevelFunction::Chart(Arc::new(function));
-            best = Some((its, passes, Levelled { function, planned_as, told }));
-        }
-    }
-    let Some((least, mut planned, levelled)) = best else { return Ok(Passes::default()) };
-    levelled.put_with(&mut planned);
+    let levelled = |Found { function, length, along }: Found| {
+        let planned_as = along.map_or(Cow::Borrowed(SEARCHED), |border| {
+            format!("{SEARCHED} from the front that starts {}", border_name(border)).into()
+        });
+        let told = toward.is_none().then(|| (objective.told().to_owned(), length));
+        Levelled { function: LevelFunction::Chart(Arc::new(function)), planned_as, told }
+    };
+    let mut candidates: Vec<Levelled> = found.into_iter().map(levelled).collect();
     // A front, whose passes are packed without any slack, may still be better.
     let tried = fronts.len();
-    if let Some(front) = fronts.into_iter().next() {
-        let front = along_front(task, chart, front, tried)?;
-        if !front.passes.is_empty() && objective.worth(task, &front)? < least {
-            return Ok(front);
+    candidates.extend(fronts.into_iter().next().map(|front| front.levelled(tried)));
+    let chosen = if candidates.len() > 1 { best(task, chart, &candidates, objective)? } else { 0 };
+    let Some(levelled) = candidates.get(chosen) else { return Ok(Passes::default()) };
+    along_levelled(task, chart, levelled)
+}
+
+/// Which of some functions has the best passes, told by passes with longer chords ([`COMPARED_CHORDS`]).
+fn best(
+    task: &Task<'_>,
+    chart: &Chart,
+    candidates: &[Levelled],
+    objective: Objective,
+) -> Result<usize, PlanError> {
+    let chord_tolerance = COMPARED_CHORDS * task.settings.chord_tolerance;
+    let settings = PassSettings { chord_tolerance, ..task.settings };
+    let mut best: Option<(f64, usize)> = None;
+    for (k, levelled) in candidates.iter().enumerate() {
+        let passes = along_levelled(&Task { settings, ..*task }, chart, levelled)?;
+        let its = objective.worth(task, &passes)?;
+        if !passes.passes.is_empty() && best.is_none_or(|(least, _)| its < least) {
+            best = Some((its, k));
         }
     }
-    Ok(planned)
+    Ok(best.map_or(0, |(_, k)| k))
 }
 
 /// What such a function is.

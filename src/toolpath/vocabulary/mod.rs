@@ -13,7 +13,7 @@ mod task;
 pub use correction::Correction;
 pub use error::PlanError;
 pub use feed_direction::{Along, FeedDirection, Lines};
-pub(crate) use pass_settings::SAMPLING_OVER_RADIUS;
+pub(crate) use pass_settings::{COMPARED_CHORDS, SAMPLING_OVER_RADIUS};
 pub use pass_settings::{Guide, PassSettings};
 pub use passes::{Contact, Kept, LevelFunction, Levelled, OffDirection, Passes};
 pub use settings::{Earlier, Joining, Links, PlanSettings, Step};

@@ -16,6 +16,10 @@ pub(crate) const SAMPLING_OVER_RADIUS: f64 = 0.15;
 /// First samples over a jump, as a share of it: none is longer than the cutter is wide.
 const STEP_OF_JUMP: f64 = 0.5 * SAMPLING_OVER_RADIUS;
 
+/// Of plans that are compared, one with the other, chords are this many times as far off as may be: they take as long, nearly,
+/// and are made sooner.
+pub(crate) const COMPARED_CHORDS: f64 = 4.0;
+
 /// Shares of the chord tolerance that sampling and point reduction may use. Together they leave a part of it: ridges stand
 /// between chords of two passes, and passes lie the closer the more chords may raise them.
 const SAMPLING_SHARE: f64 = 0.1;

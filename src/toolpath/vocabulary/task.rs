@@ -2,7 +2,6 @@
 
 use super::{LevelFunction, Levelled, PassSettings, Passes, PlanError, PlanSettings};
 use cutter::Cutter;
-use field::ScalarField;
 use part::Part;
 use work::monitor::Monitor;
 
@@ -76,10 +75,8 @@ impl<'a> Task<'a> {
     }
 
     /// The function of an earlier plan on one of so many charts.
-    pub fn earlier_on_chart(&self, k: usize, of: usize) -> Option<(&'a ScalarField, &'a Levelled)> {
-        let levelled = self.earlier(k, of)?;
-        let LevelFunction::Chart(field) = &levelled.function else { return None };
-        Some((field, levelled))
+    pub fn earlier_on_chart(&self, k: usize, of: usize) -> Option<&'a Levelled> {
+        self.earlier(k, of).filter(|levelled| matches!(levelled.function, LevelFunction::Chart(_)))
     }
 
     /// The function of an earlier plan on one of so many pieces of mesh.
