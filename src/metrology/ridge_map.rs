@@ -1,15 +1,18 @@
 //! The ridges of a cut surface and the remnants along its borders, and nothing else: what a planner is corrected by.
 
 use super::cut_surface::CutSurface;
-use super::figures::{Limits, RidgePlace, ScallopFigures};
+use super::figures::{Limits, NUMERICAL_FLOOR, RidgePlace, ScallopFigures};
 use super::inspection::{Inspection, Sample};
 use super::meetings::Meetings;
-use super::ridges::{RidgeFinder, scallop_figures};
+use super::ridges::{Highest, RidgeFinder, scallop_figures};
 use geometry::{Point2, Point3, Vector2};
 use motion::{Cutters, Toolpath};
 use part::Part;
 use sim::{Envelope, ZMap};
 use work::monitor::{Cancelled, Monitor};
+
+/// Most places that all moves are asked at.
+const MOST_ASKED: usize = 256;
 
 /// All ridges of a cut surface.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,7 +29,7 @@ pub struct RidgeMap {
 }
 
 /// The ridges of `cut`, the stock after `path`; the highest is looked at closer until its bound is `asked` mm, if it comes
-/// down to that. `None` where cells are too coarse for it: a move that none of them saw cuts the highest place away.
+/// down to that. `None` where cells are too coarse for it: moves that none of them saw cut all high places away.
 pub(super) fn ridge_map(
     part: &Part,
     cutters: &Cutters,
@@ -54,21 +57,65 @@ pub(super) fn ridge_map(
     let samples = inspection.samples(monitor)?;
     let finder = RidgeFinder::new(&inspection, path);
     let mut ridges = finder.find(&|k| samples[k].deviation, monitor)?;
-    let highest = finder.highest(&mut ridges, asked);
-    let mut above = std::mem::take(&mut ridges.above);
+    let mut highest = finder.highest(&mut ridges, asked);
+    let all = (0..path.len() as u32).collect::<Vec<_>>();
+    let as_left = |tops: &mut Vec<Top>| as_left(tops, &inspection, &all);
+    let of_ridges = ridges
+        .above
+        .iter()
+        .copied()
+        .chain(highest.map(|Highest { at, height, .. }| RidgePlace { at, height }));
+    let mut tops: Vec<Top> = of_ridges.map(|place| Top { place, at: place.at }).collect();
+    if !as_left(&mut tops) {
+        return Ok(None);
+    }
+    if let Some(highest) = &mut highest {
+        let others = tops.iter().map(|top| (top.place.height, top.at));
+        let top = others.chain(ridges.highest_up_to(limits.scallop)).max_by(|a, b| a.0.total_cmp(&b.0));
+        (highest.height, highest.at) = top.unwrap_or((highest.height, highest.at));
+    }
     let scallop = scallop_figures(&ridges.samples, highest, limits);
-    let borders = borders(&inspection, &samples);
-    let of_borders = borders.iter().max_by(|a, b| a.height.total_cmp(&b.height)).copied();
-    above.extend(borders.into_iter().filter(|place| place.height > limits.scallop));
-    let top_of = |place: RidgePlace| {
+    let of_borders = borders(&inspection, &samples).into_iter().filter_map(|place| {
         let design = part.highest_at(place.at.x, place.at.y)?;
-        Some(design.point + design.normal * place.height)
-    };
-    let all: Vec<u32> = (0..path.len() as u32).collect();
-    let mut tops = scallop.max_at_mm.map(Point3::from).into_iter().chain(of_borders.and_then(top_of));
-    let seen = tops.all(|top| surface.height_of(&all, &top) >= top.z - asked);
-    let border = of_borders.map_or(0.0, |place| place.height);
-    Ok(seen.then_some(RidgeMap { above, border, scallop, is_close: true }))
+        Some(Top { place, at: design.point + design.normal * place.height })
+    });
+    let mut of_borders: Vec<Top> = of_borders.collect();
+    as_left(&mut of_borders);
+    let border = of_borders.iter().map(|top| top.place.height).fold(0.0, f64::max);
+    tops.extend(of_borders.into_iter().filter(|top| top.place.height > limits.scallop));
+    let above = tops.into_iter().map(|top| top.place).collect();
+    Ok(Some(RidgeMap { above, border, scallop, is_close: true }))
+}
+
+/// A place and the highest point over it, mm.
+#[derive(Debug, Clone, Copy)]
+struct Top {
+    place: RidgePlace,
+    at: Point3,
+}
+
+/// Gives the highest places, and the others above the limit, the heights that all moves left there: some pass between coarse
+/// cells and no cell saw them. False where none is as high as it was found to be.
+fn as_left(tops: &mut [Top], inspection: &Inspection<'_>, all: &[u32]) -> bool {
+    let Inspection { part, limits, asked, surface, .. } = *inspection;
+    tops.sort_by(|a, b| b.place.height.total_cmp(&a.place.height));
+    let above = tops.partition_point(|top| top.place.height > limits.scallop);
+    let count = above.clamp(1, MOST_ASKED).min(tops.len());
+    let left = work::parallel::map(count, |k| {
+        let Top { place, at } = tops[k];
+        let z = surface.height_of(all, &at);
+        if z >= at.z - NUMERICAL_FLOOR {
+            place.height
+        } else {
+            part.closest_point(&Point3::new(at.x, at.y, z)).1
+        }
+    });
+    let mut is_seen = tops.is_empty();
+    for (top, left) in tops.iter_mut().zip(left) {
+        is_seen |= left >= top.place.height - asked;
+        top.place.height = left;
+    }
+    is_seen
 }
 
 /// What stands at the outer sides of the cells that lie at the part's border. What is higher than the uncut tolerance is no
@@ -140,5 +187,33 @@ mod tests {
         let sagitta = |half: f64| 3.0 - (9.0 - half * half).sqrt();
         assert!((at(4.0) - sagitta(0.3)).abs() < 1e-4, "{} {}", at(4.0), sagitta(0.3));
         assert!((at(0.0) - sagitta(0.2)).abs() < 1e-4, "{} {}", at(0.0), sagitta(0.2));
+    }
+
+    /// Two passes lie farthest from each other where a third one comes down between them, so little that no cell sees it.
+    #[test]
+    fn what_no_cell_saw_lowers_the_highest_places() {
+        let (part, ball) = (plane([4.0, 3.0]), Cutter::ball(6.0).unwrap());
+        let sagitta = |half: f64| 3.0 - (9.0 - half * half).sqrt();
+        let along = |x: f64, middle: f64| {
+            let places = [(x, -4.0, 5.0), (x, -4.0, 0.0), (middle, 1.5, 0.0), (x, 7.0, 0.0), (x, 7.0, 5.0)];
+            places.map(|(x, y, z)| Point3::new(x, y, z)).to_vec()
+        };
+        let outer = [0.2, 0.6, 1.0, 1.4, 2.6, 3.0, 3.4, 3.8].map(|x| along(x, x));
+        let left = sagitta(0.3) - 4e-4;
+        let between = [5.0, left, 5.0].map(|z| Point3::new(2.0, 1.5, z)).to_vec();
+        let passes: Vec<Vec<Point3>> =
+            outer.into_iter().chain([along(1.8, 1.7), along(2.2, 2.3), between]).collect();
+        let path = path(&passes);
+        let grid = Grid::covering(&part.bounds(), 0.13, 64, 1 << 30).unwrap();
+        let cut = cut_reference(&ZMap::block(grid, 1.0), &ball, &path, &Silent).unwrap();
+        assert!(
+            !cut.cut_by.contains(&(path.len() as u32 - 1)) && !cut.cut_by.contains(&(path.len() as u32 - 2))
+        );
+        let limits = Limits { scallop: 0.005, gouge: 0.005, uncut: 0.05, chord: 0.001 };
+        let map = ridge_map(&part, &ball.into(), &path, &cut, &limits, 1e-4, &Silent).unwrap().unwrap();
+        let highest = map.scallop.max_mm.unwrap();
+        assert!(highest > left && highest < sagitta(0.3) - 1e-5, "{highest} {left}");
+        let above = map.above.iter().map(|place| place.height).fold(0.0, f64::max);
+        assert_eq!(above, highest);
     }
 }
