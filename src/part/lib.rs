@@ -174,19 +174,37 @@ impl Part {
     /// On a mesh exact. On patches the point is a foot of the perpendicular, to 1e-12 mm, found from
     /// the mesh's nearest point; its distance is never more than the mesh's plus
     /// [`Part::mesh_deviation`] ε, and so never more than 2ε above the least one. Only where two feet
-    /// are that nearly equal (on the medial axis) the other one may be returned.
+    /// on one patch are that nearly equal (on the medial axis) the other one may be returned.
     pub fn closest_point(&self, q: &Point3) -> (SurfacePoint, f64) {
         let near = self.bvh.closest_point(&self.mesh, q);
         let Some(index) = self.patch_of(near.triangle) else {
             return mesh_point(&near);
         };
-        let patch = &self.patches[index];
-        let foot = self.refine_foot(patch, q, &near);
-        let [u, v] = foot.at;
+        let (mut index, mut triangle) = (index, near.triangle);
+        let mut foot = self.refine_foot(&self.patches[index], q, &near);
+        // Where patches meet, another one may come nearer than its mesh tells.
+        let mut asked = vec![index];
+        while asked.len() < self.patches.len()
+            && let Some(near) = self.nearest_of_others(q, foot.distance + self.deviation, &asked)
+            && let Some(other) = self.patch_of(near.triangle)
+        {
+            asked.push(other);
+            let found = self.refine_foot(&self.patches[other], q, &near);
+            if found.distance < foot.distance {
+                (foot, index, triangle) = (found, other, near.triangle);
+            }
+        }
+        let (patch, [u, v]) = (&self.patches[index], foot.at);
         let normal = patch.normal_of(&foot.jet, u, v) * self.signs[index];
         let at = Some(PatchPoint { patch: index as u32, u, v });
         let side = if (q - foot.jet.p).dot(&normal) < 0.0 { -1.0 } else { 1.0 };
-        (SurfacePoint { point: foot.jet.p, normal, at, triangle: near.triangle }, side * foot.distance)
+        (SurfacePoint { point: foot.jet.p, normal, at, triangle }, side * foot.distance)
+    }
+
+    /// The nearest point of the mesh of the patches that were not `asked` yet, nearer than a distance, mm.
+    fn nearest_of_others(&self, q: &Point3, within: f64, asked: &[usize]) -> Option<MeshFoot> {
+        let is_other = |t: usize| self.patch_of(t as u32).is_some_and(|patch| !asked.contains(&patch));
+        self.bvh.closest_point_of(&self.mesh, q, within, is_other)
     }
 
     /// The foot on the exact patch that belongs to a foot on the mesh.

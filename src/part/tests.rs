@@ -163,6 +163,49 @@ proptest! {
     }
 }
 
+/// A bicubic surface over 30 mm by 20 mm, whole and as its two halves along u.
+fn whole_and_halves() -> [Part; 2] {
+    let net: Vec<Vec<Point3>> = (0..4)
+        .map(|i| (0..4).map(move |j| (f64::from(i), f64::from(j))))
+        .map(|row| {
+            row.map(|(i, j)| Point3::new(10.0 * i + 2.0 * j, 7.0 * j, 3.0 * (2.1 * i + 1.3 * j).sin()))
+                .collect()
+        })
+        .collect();
+    let bicubic = |net: &[Vec<Point3>]| {
+        let ends = || vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
+        Patch::Nurbs(NurbsSurface::new(3, 3, ends(), ends(), net, None).unwrap())
+    };
+    // By de Casteljau's means.
+    let mean = |rows: &[Vec<Point3>]| -> Vec<Vec<Point3>> {
+        let of = |pair: &[Vec<Point3>]| {
+            pair[0].iter().zip(&pair[1]).map(|(a, b)| nalgebra::center(a, b)).collect()
+        };
+        rows.windows(2).map(of).collect()
+    };
+    let (once, twice) = (mean(&net), mean(&mean(&net)));
+    let middle = mean(&twice)[0].clone();
+    let first = [net[0].clone(), once[0].clone(), twice[0].clone(), middle.clone()];
+    let second = [middle, twice[1].clone(), once[2].clone(), net[3].clone()];
+    [vec![bicubic(&net)], vec![bicubic(&first), bicubic(&second)]]
+        .map(|patches| Part::from_patches(patches, 0.05).unwrap())
+}
+
+/// Beside a seam the mesh may come nearest on the other side of it.
+#[test]
+fn closest_points_beside_a_seam_are_those_of_the_whole_surface() {
+    let [whole, halves] = whole_and_halves();
+    for k in 0..4000 {
+        let [u, v] = [0.5 + 2e-3 * (f64::from(k % 101) / 50.0 - 1.0), f64::from(k) / 4000.0];
+        let (point, normal) = whole.point_and_normal(PatchPoint { patch: 0, u, v });
+        for height in [-0.3, 0.01, 0.01 + 0.29 * v] {
+            let (foot, distance) = halves.closest_point(&(point + normal * height));
+            assert_relative_eq!(distance, height, epsilon = 1e-11);
+            assert_relative_eq!(foot.point, point, epsilon = 1e-9);
+        }
+    }
+}
+
 /// From beside a centre of curvature the distance to the surface is the same over a wide stretch; the
 /// foot still is where the line to it stands upright.
 #[test]

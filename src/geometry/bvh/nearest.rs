@@ -18,29 +18,64 @@ pub(super) struct Foot {
 impl Bvh {
     /// The nearest point of the mesh, exact in f64; ties go to the triangle with the least index.
     pub fn closest_point(&self, mesh: &TriangleMesh, q: &Point3) -> MeshFoot {
-        let mut best_triangle = self.triangle_in(0);
-        let mut best = closest_on_triangle(&mesh.corners(best_triangle), q);
+        let first = self.triangle_in(0);
+        let start = (closest_on_triangle(&mesh.corners(first), q), first);
+        self.foot(mesh, q, self.nearest(mesh, q, start, |_| true))
+    }
+
+    /// The same of the triangles that `counts` says, nearer than a distance, mm; `None` without such.
+    pub fn closest_point_of(
+        &self,
+        mesh: &TriangleMesh,
+        q: &Point3,
+        within: f64,
+        counts: impl Fn(usize) -> bool,
+    ) -> Option<MeshFoot> {
+        let start = Foot {
+            point: *q,
+            barycentric: [0.0; 3],
+            feature: Feature::Face,
+            distance_squared: within * within,
+        };
+        let found = self.nearest(mesh, q, (start, usize::MAX), counts);
+        (found.1 != usize::MAX).then(|| self.foot(mesh, q, found))
+    }
+
+    /// The nearest of the triangles that count, and its index, from what is known on.
+    fn nearest(
+        &self,
+        mesh: &TriangleMesh,
+        q: &Point3,
+        (mut best, mut best_triangle): (Foot, usize),
+        counts: impl Fn(usize) -> bool,
+    ) -> (Foot, usize) {
         self.tree.search(
             -best.distance_squared,
             |_, node, _| -node.distance_squared(q),
             |slot, _| {
                 let t = self.triangle_in(slot);
-                let foot = closest_on_triangle(&mesh.corners(t), q);
-                let nearer = foot.distance_squared < best.distance_squared;
-                if nearer || (foot.distance_squared == best.distance_squared && t < best_triangle) {
-                    (best, best_triangle) = (foot, t);
+                if counts(t) {
+                    let foot = closest_on_triangle(&mesh.corners(t), q);
+                    let nearer = foot.distance_squared < best.distance_squared;
+                    if nearer || (foot.distance_squared == best.distance_squared && t < best_triangle) {
+                        (best, best_triangle) = (foot, t);
+                    }
                 }
                 -best.distance_squared
             },
         );
-        let normal = self.normal_at(mesh, best_triangle, best.feature);
-        let sign = if (q - best.point).dot(&normal) < 0.0 { -1.0 } else { 1.0 };
+        (best, best_triangle)
+    }
+
+    fn foot(&self, mesh: &TriangleMesh, q: &Point3, (foot, triangle): (Foot, usize)) -> MeshFoot {
+        let normal = self.normal_at(mesh, triangle, foot.feature);
+        let sign = if (q - foot.point).dot(&normal) < 0.0 { -1.0 } else { 1.0 };
         MeshFoot {
-            point: best.point,
-            triangle: best_triangle as u32,
-            barycentric: best.barycentric,
+            point: foot.point,
+            triangle: triangle as u32,
+            barycentric: foot.barycentric,
             normal,
-            signed_distance: sign * best.distance_squared.sqrt(),
+            signed_distance: sign * foot.distance_squared.sqrt(),
         }
     }
 }
