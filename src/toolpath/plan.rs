@@ -11,8 +11,8 @@ use crate::surface::mesh_surface;
 use crate::tilt::tilted::{self, TiltedPasses, Tilting};
 use crate::touch_up;
 use crate::vocabulary::{
-    COMPARED_CHORDS, Kept, Pace, PartKind, PassSettings, Passes, PlanError, PlanSettings,
-    SAMPLING_OVER_RADIUS, Setup, Step, Strategy, Task,
+    Kept, Pace, PartKind, PassSettings, Passes, PlanError, PlanSettings, SAMPLING_OVER_RADIUS, Setup, Step,
+    Strategy, Task,
 };
 use cutter::Cutter;
 use field::PlannedField;
@@ -205,7 +205,7 @@ fn with_task<T>(
         probe: probe.as_ref(),
     };
     let wants_mesh = mesh_surface::wants_mesh(part, cutter);
-    let duration = |passes: &Passes| duration(passes, strategy.both_ways(), setup);
+    let duration = |passes: &Passes, chords: f64| duration(passes, chords, strategy.both_ways(), setup);
     let feed = settings.feed_rate / 60.0;
     let bend = feed * feed / settings.machine.acceleration;
     let pace = Pace { duration: &duration, link: feed * time_to_neighbour(setup), bend };
@@ -217,9 +217,13 @@ fn with_task<T>(
 
 /// The time, s, that the machine takes for passes once they are joined. Jerks of its axes are left out: they take seconds to
 /// search for, and slow all plans of a part alike.
-fn duration(passes: &Passes, both_ways: bool, setup: &Setup<'_>) -> Result<f64, PlanError> {
+fn duration(
+    passes: &Passes,
+    chord_tolerance: f64,
+    both_ways: bool,
+    setup: &Setup<'_>,
+) -> Result<f64, PlanError> {
     let machine = Machine { jerks: [f64::INFINITY; 3], ..setup.settings.machine };
-    let chord_tolerance = COMPARED_CHORDS * setup.settings.chord_tolerance;
     let settings = &PlanSettings { chord_tolerance, machine, ..setup.settings.clone() };
     let mut path = join(passes.passes.clone(), both_ways, &Setup { settings, ..*setup })?;
     if machine.slow_corners {

@@ -4,7 +4,7 @@
 //! gone around whole. On a turn between two passes every place lies on the shortest way from the outer to the inner one, at the share
 //! of the turn that is done, so that turns are no farther apart than passes. Heights come from dropping the cutter.
 
-use crate::vocabulary::{Passes, PlanError, Task};
+use crate::vocabulary::{COMPARED_CHORDS, Passes, PlanError, Task};
 use drop_cutter::DropCutter;
 use geometry::{Point2, Point3, SegmentGrid, inside_curve, signed_area};
 
@@ -41,7 +41,9 @@ pub(crate) fn where_quicker(task: &Task<'_>, passes: Passes) -> Result<Passes, P
     }
     all.extend(passes.passes.iter().zip(&joined).filter(|(_, joined)| !**joined).map(|(p, _)| p.clone()));
     let with = Passes { passes: all, ..Passes::default() };
-    if count == 0 || (task.pace.duration)(&with)? >= (task.pace.duration)(&passes)? {
+    let duration =
+        |passes: &Passes| (task.pace.duration)(passes, COMPARED_CHORDS * task.settings.chord_tolerance);
+    if count == 0 || duration(&with)? >= duration(&passes)? {
         return Ok(passes);
     }
     let mut passes = Passes { passes: with.passes, ..passes };
@@ -179,7 +181,7 @@ fn moves(task: &Task<'_>, drop: &DropCutter<'_>, way: &[Point2]) -> Result<Vec<P
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vocabulary::{Pace, PassSettings, Step};
+    use crate::vocabulary::{COMPARED_CHORDS, Pace, PassSettings, Step};
     use cutter::Cutter;
     use geometry::{AnalyticShape, AnalyticSurface, CurveSegment};
     use part::{Part, Patch};
@@ -215,7 +217,7 @@ mod tests {
             probe: None,
         };
         // By length, and so much for each link.
-        let duration = |passes: &Passes| Ok(passes.length() + link * (passes.passes.len() - 1) as f64);
+        let duration = |passes: &Passes, _| Ok(passes.length() + link * (passes.passes.len() - 1) as f64);
         let pace = Pace { duration: &duration, link, bend: 0.1 };
         let task = Task { part: &part, cutter: &cutter, settings, wants_mesh: false, pace, monitor: &Silent };
         where_quicker(&task, Passes { passes, ..Passes::default() }).unwrap()

@@ -55,6 +55,9 @@ const END: f64 = 0.28;
 const PLACES: usize = 150;
 const DIRECTIONS: usize = 36;
 
+/// Longer chords change by less than this share which of two plans is the better one.
+const AS_GOOD: f64 = 5e-4;
+
 /// The shortest possible path below the scallop height `h`, mm, by the widest strip over all directions at each place: of patches and of
 /// smooth surfaces that are fitted to meshes, as far as the part lies below, or of the facets of meshes with holes and steps.
 ///
@@ -163,7 +166,7 @@ impl Objective {
     /// What passes have of it.
     pub(super) fn worth(self, task: &Task<'_>, passes: &Passes) -> Result<f64, PlanError> {
         match self {
-            Self::Time => (task.pace.duration)(passes),
+            Self::Time => (task.pace.duration)(passes, task.settings.chord_tolerance),
             Self::Length => Ok(passes.length()),
         }
     }
@@ -316,29 +319,44 @@ fn searched(
     // A front, whose passes are packed without any slack, may still be better.
     let tried = fronts.len();
     candidates.extend(fronts.into_iter().next().map(|front| front.levelled(tried)));
-    let chosen = if candidates.len() > 1 { best(task, chart, &candidates, objective)? } else { 0 };
-    let Some(levelled) = candidates.get(chosen) else { return Ok(Passes::default()) };
-    along_levelled(task, chart, levelled)
+    let mut near: Vec<usize> = (0..candidates.len()).collect();
+    if near.len() > 1 {
+        near =
+            compared(task, chart, &candidates, &near, COMPARED_CHORDS, objective)?.map(|(k, _)| k).collect();
+    }
+    match near[..] {
+        [] => Ok(Passes::default()),
+        [k] => along_levelled(task, chart, &candidates[k]),
+        _ => Ok(compared(task, chart, &candidates, &near, 1.0, objective)?
+            .next()
+            .map(|(_, passes)| passes)
+            .unwrap_or_default()),
+    }
 }
 
-/// Which of some functions has the best passes, told by passes with longer chords ([`COMPARED_CHORDS`]).
-fn best(
+/// Which of some functions have the best passes, by chords so many times `longer` than asked for, the best one first, and all that
+/// are nearly as good.
+fn compared(
     task: &Task<'_>,
     chart: &Chart,
     candidates: &[Levelled],
+    tried: &[usize],
+    longer: f64,
     objective: Objective,
-) -> Result<usize, PlanError> {
-    let chord_tolerance = COMPARED_CHORDS * task.settings.chord_tolerance;
-    let settings = PassSettings { chord_tolerance, ..task.settings };
-    let mut best: Option<(f64, usize)> = None;
-    for (k, levelled) in candidates.iter().enumerate() {
-        let passes = along_levelled(&Task { settings, ..*task }, chart, levelled)?;
-        let its = objective.worth(task, &passes)?;
-        if !passes.passes.is_empty() && best.is_none_or(|(least, _)| its < least) {
-            best = Some((its, k));
+) -> Result<impl Iterator<Item = (usize, Passes)> + use<>, PlanError> {
+    let settings = PassSettings { chord_tolerance: longer * task.settings.chord_tolerance, ..task.settings };
+    let task = &Task { settings, ..*task };
+    let mut found: Vec<(f64, usize, Passes)> = Vec::with_capacity(tried.len());
+    for &k in tried {
+        let passes = along_levelled(task, chart, &candidates[k])?;
+        if !passes.passes.is_empty() {
+            found.push((objective.worth(task, &passes)?, k, passes));
         }
     }
-    Ok(best.map_or(0, |(_, k)| k))
+    // A stable order: of those that are as good the first stays first.
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let most = found.first().map_or(0.0, |(least, ..)| least * (1.0 + AS_GOOD));
+    Ok(found.into_iter().take_while(move |(its, ..)| *its <= most).map(|(_, k, passes)| (k, passes)))
 }
 
 /// What such a function is.

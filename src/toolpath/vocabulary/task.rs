@@ -22,7 +22,8 @@ pub(crate) struct Setup<'a> {
 #[derive(Clone, Copy)]
 pub struct Pace<'a> {
     /// The time, s, that it takes for passes once they are joined.
-    pub duration: &'a (dyn Fn(&Passes) -> Result<f64, PlanError> + Sync),
+    /// The other argument is the chord tolerance of links, mm.
+    pub duration: &'a (dyn Fn(&Passes, f64) -> Result<f64, PlanError> + Sync),
     /// What a link to a neighbouring pass takes, in mm of pass at the feed.
     pub link: f64,
     /// The least radius of a bend that it runs at the feed, mm.
@@ -100,7 +101,7 @@ mod tests {
     #[test]
     fn a_tight_bend_takes_as_much_longer_as_the_machine_is_slower_there() {
         let (feed, acceleration, cutter): (f64, f64, f64) = (50.0, 1000.0, 0.05);
-        let pace = Pace { duration: &|_| Ok(0.0), link: 0.0, bend: feed * feed / acceleration };
+        let pace = Pace { duration: &|_, _| Ok(0.0), link: 0.0, bend: feed * feed / acceleration };
         for radius in [0.1, 0.7, 2.0] {
             // Of surfaces, convex and concave, over which the centre's way has this radius.
             for curvature in [-1.0 / (radius - cutter), 1.0 / (radius + cutter)] {

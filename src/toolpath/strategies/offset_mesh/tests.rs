@@ -31,7 +31,7 @@ fn task<'a>(part: &'a Part, cutter: &'a Cutter) -> Task<'a> {
         cutter,
         settings: SETTINGS,
         wants_mesh: false,
-        pace: Pace { duration: &|passes| Ok(passes.length()), link: 1.0, bend: 0.1 },
+        pace: Pace { duration: &|passes, _| Ok(passes.length()), link: 1.0, bend: 0.1 },
         monitor: &Silent,
     }
 }
