@@ -181,7 +181,7 @@ fn moves(task: &Task<'_>, drop: &DropCutter<'_>, way: &[Point2]) -> Result<Vec<P
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vocabulary::{COMPARED_CHORDS, Pace, PassSettings, Step};
+    use crate::vocabulary::{Pace, PassSettings, Step};
     use cutter::Cutter;
     use geometry::{AnalyticShape, AnalyticSurface, CurveSegment};
     use part::{Part, Patch};
