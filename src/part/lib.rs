@@ -183,12 +183,12 @@ impl Part {
         let (mut index, mut triangle) = (index, near.triangle);
         let mut foot = self.refine_foot(&self.patches[index], q, &near);
         // Where patches meet, another one may come nearer than its mesh tells.
-        let mut asked = vec![index];
-        while asked.len() < self.patches.len()
-            && let Some(near) = self.nearest_of_others(q, foot.distance + self.deviation, &asked)
+        let (first, mut others) = (index, Vec::new());
+        while others.len() + 1 < self.patches.len()
+            && let Some(near) = self.nearest_of_others(q, foot.distance + self.deviation, first, &others)
             && let Some(other) = self.patch_of(near.triangle)
         {
-            asked.push(other);
+            others.push(other);
             let found = self.refine_foot(&self.patches[other], q, &near);
             if found.distance < foot.distance {
                 (foot, index, triangle) = (found, other, near.triangle);
@@ -201,9 +201,10 @@ impl Part {
         (SurfacePoint { point: foot.jet.p, normal, at, triangle }, side * foot.distance)
     }
 
-    /// The nearest point of the mesh of the patches that were not `asked` yet, nearer than a distance, mm.
-    fn nearest_of_others(&self, q: &Point3, within: f64, asked: &[usize]) -> Option<MeshFoot> {
-        let is_other = |t: usize| self.patch_of(t as u32).is_some_and(|patch| !asked.contains(&patch));
+    /// The nearest point of the mesh of all patches but the `first` and those that were `asked` since, nearer than a distance, mm.
+    fn nearest_of_others(&self, q: &Point3, within: f64, first: usize, asked: &[usize]) -> Option<MeshFoot> {
+        let is_new = |patch: usize| patch != first && !asked.contains(&patch);
+        let is_other = |t: usize| self.patch_of(t as u32).is_some_and(is_new);
         self.bvh.closest_point_of(&self.mesh, q, within, is_other)
     }
 

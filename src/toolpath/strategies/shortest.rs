@@ -55,7 +55,8 @@ const END: f64 = 0.28;
 const PLACES: usize = 150;
 const DIRECTIONS: usize = 36;
 
-/// Longer chords change by less than this share which of two plans is the better one.
+/// Plans within this share of the best one are compared once more by their own chords: longer ones change what they take by about as
+/// much.
 const AS_GOOD: f64 = 5e-4;
 
 /// The shortest possible path below the scallop height `h`, mm, by the widest strip over all directions at each place: of patches and of
@@ -353,7 +354,7 @@ fn compared(
             found.push((objective.worth(task, &passes)?, k, passes));
         }
     }
-    // A stable order: of those that are as good the first stays first.
+    // Of those that are as good the first stays first.
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     let most = found.first().map_or(0.0, |(least, ..)| least * (1.0 + AS_GOOD));
     Ok(found.into_iter().take_while(move |(its, ..)| *its <= most).map(|(_, k, passes)| (k, passes)))

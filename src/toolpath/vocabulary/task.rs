@@ -21,8 +21,7 @@ pub(crate) struct Setup<'a> {
 /// How quick the machine is.
 #[derive(Clone, Copy)]
 pub struct Pace<'a> {
-    /// The time, s, that it takes for passes once they are joined.
-    /// The other argument is the chord tolerance of links, mm.
+    /// The time, s, that it takes for passes once they are joined by links of a chord tolerance, mm.
     pub duration: &'a (dyn Fn(&Passes, f64) -> Result<f64, PlanError> + Sync),
     /// What a link to a neighbouring pass takes, in mm of pass at the feed.
     pub link: f64,
