@@ -301,7 +301,7 @@ impl Session {
     ) -> Result<Option<RidgeMap>, JobError> {
         let scene = &self.scene;
         monitor.start("measuring the ridges of a plan", 0);
-        let cell = scene.simulation.cell.max(plane_interval(&scene.cutter, request.step) / CELLS_A_PASS);
+        let cell = plane_interval(&scene.cutter, request.step) / CELLS_A_PASS;
         let simulation = Simulation { cell, cell_is_auto: true, ..scene.simulation };
         let cells =
             self.budget().grid_before_planning(&self.area(), &simulation).map_err(JobError::grid(scene))?;

@@ -7,8 +7,8 @@ use work::monitor::Monitor;
 
 use super::{JobError, Session, judge};
 
-/// The cell shrinks to this share where a limit is undecided. Nearer to 1 more cuts are made in vain, nearer to 0 more
-/// cells.
+/// The cell shrinks to this share where a limit is undecided, and at once to what suits the scene where that is smaller:
+/// cells that show no pass decide little, and take longer. Nearer to 1 more cuts are made in vain, nearer to 0 more cells.
 const FINER: f64 = 0.5;
 
 /// Rounds in which bounds are asked for that are smaller by the square of that, down to a share of the first; the cell may
@@ -69,9 +69,10 @@ impl Session {
         let own = self.own_cells(request)?;
         let (simulation, cells) =
             own.as_ref().map_or((&scene.simulation, &self.cells), |(simulation, cells)| (simulation, cells));
-        let first = Task { cutters, ..self.task(path, simulation, cells) };
-        let mut measured = engine.measure(&first, monitor).map_err(failed)?;
         let mut finest = auto_cell(&scene.cutter, &scene.toolpaths).min(simulation.cell);
+        let is_first_look = engine.gains_by_cells() && cells.0.cell > finest;
+        let first = Task { cutters, is_first_look, ..self.task(path, simulation, cells) };
+        let mut measured = engine.measure(&first, monitor).map_err(failed)?;
         let mut simulation = Simulation { cell_is_auto: false, cell: measured.cell, ..scene.simulation };
         if !engine.gains_by_cells() {
             finest = simulation.cell;
@@ -83,9 +84,8 @@ impl Session {
         {
             rounds += 1;
             let before = simulation.cell;
-            let few = measured.cells as f64 <= FINER * FINER * MOST_CLOSER_CELLS as f64;
             if engine.gains_by_cells() {
-                simulation.cell = if few { FINER * before } else { (FINER * before).max(finest.min(before)) };
+                simulation.cell = finer_cell(&measured, finest, before);
             }
             simulation.error_bound = (FINER * FINER * simulation.error_bound).max(least);
             let cells = self.budget().grid_before_planning(&self.area(), &simulation);
@@ -129,6 +129,14 @@ impl Session {
         let cells = self.budget().grid_before_planning(&self.area(), &simulation);
         Ok(Some((simulation, cells.map_err(JobError::grid(scene))?)))
     }
+}
+
+/// The cell after one that left a limit undecided: `finest` suits the scene. More cells than take little time are only cut up to
+/// that, and in steps.
+fn finer_cell(measured: &Measured, finest: f64, before: f64) -> f64 {
+    let quick = before * (measured.cells as f64 / MOST_CLOSER_CELLS as f64).sqrt();
+    let halved = FINER * before;
+    if quick <= halved { halved.min(finest.max(quick)) } else { halved.max(finest.min(before)) }
 }
 
 fn finer_note(simulation: &Simulation, scene: &Scene) -> Option<String> {

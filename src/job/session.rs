@@ -320,6 +320,7 @@ impl Session {
             budget: self.budget(),
             judged: self.scene.judged,
             pocket: self.pocket.is_some(),
+            is_first_look: false,
         }
     }
 }

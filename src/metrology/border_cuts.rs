@@ -333,6 +333,7 @@ mod tests {
             borders: true,
             most_cells: 1 << 20,
             most_squares: 1 << 20,
+            is_first_look: false,
         };
         measure(part, cutter, &path, &cut, &LIMITS, &asked, &Silent).unwrap().gouge
     }

@@ -30,6 +30,9 @@ use work::monitor::{self, Cancelled, Monitor};
 /// Squares looked at in search of one figure. Each takes some 10 µs; with fewer, wide bounds stay.
 const MOST: usize = 400_000;
 
+/// The same where finer cells follow: enough where cells show every pass.
+const MOST_AT_FIRST: usize = 25_000;
+
 /// Rows of cells that are looked through at a time: enough for many workers.
 const ROWS: usize = 64;
 
@@ -123,7 +126,9 @@ impl ExcessSearch<'_> {
         } else {
             ExcessKind::Scallop
         };
-        let is_low = reached.at_most() <= limits.scallop;
+        // Nothing high is known, and what is open will be looked at on finer cells.
+        let is_low = reached.at_most() <= limits.scallop
+            || self.inspection.is_first_look && reached.max_mm <= limits.scallop;
         let high = if is_low { Vec::new() } else { self.high_places(&open, &unseen, monitor)? };
         Ok((ExcessFigures { highest, kind, reached, unreached }, high))
     }
@@ -204,12 +209,17 @@ impl ExcessSearch<'_> {
             Ok(squares.filter(|square| square.possible > known).collect::<Vec<_>>())
         };
         // Band by band, so that there are never many more squares than will be divided.
+        let most = self.most_places().min(self.inspection.most_squares);
         let mut open = Promising::default();
         for first in (0..grid.ny).step_by(ROWS) {
             let rows = work::parallel::try_map(ROWS.min(grid.ny - first), |j| row(first + j))?;
-            open.add(rows.into_iter().flatten(), (MOST.min(self.inspection.most_squares) / 4).max(1));
+            open.add(rows.into_iter().flatten(), (most / 4).max(1));
         }
         Ok(open)
+    }
+
+    fn most_places(&self) -> usize {
+        if self.inspection.is_first_look { MOST_AT_FIRST } else { MOST }
     }
 
     fn patches<'b>(&'b self, least: f64, unseen: &'b [u32]) -> Patches<'b> {
@@ -286,7 +296,7 @@ impl ExcessSearch<'_> {
             }
         };
         let squares = open.squares.iter().filter(|square| square.possible > known.max_mm).copied().collect();
-        let most = Effort { places: MOST, squares: self.inspection.most_squares };
+        let most = Effort { places: self.most_places(), squares: self.inspection.most_squares };
         let mut found = search(squares, known.max_mm, self.asked(known.max_mm, kind), most, &at, monitor)?;
         found.possible = found.possible.max(open.others);
         let mut highest = match found.greatest {

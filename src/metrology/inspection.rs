@@ -76,6 +76,8 @@ pub(super) struct Inspection<'a> {
     pub asked: f64,
     /// Squares that a search may hold at a time.
     pub most_squares: usize,
+    /// Whether finer cells follow where a limit stays open.
+    pub is_first_look: bool,
     pub surface: &'a CutSurface<'a>,
     /// Where the passes of that surface meet.
     pub meetings: &'a Meetings<'a>,

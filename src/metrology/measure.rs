@@ -76,6 +76,7 @@ pub fn measure_with_walls(
         limits,
         asked: bound,
         most_squares: asked.most_squares,
+        is_first_look: asked.is_first_look,
         surface: &surface,
         meetings: &Meetings::new(&surface, cutters, path, None),
         grid,

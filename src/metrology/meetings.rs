@@ -31,6 +31,10 @@ const HIDDEN_WITHIN: f64 = 3.0;
 /// Cells along the side of a bin of tracks.
 const CELLS_PER_BIN: usize = 4;
 
+/// Moves that a bin holds on average at most, several passes of them: all are asked at every place where cells are coarser than
+/// that, and only the nearest can be lowest.
+const MOVES_PER_BIN: f64 = 128.0;
+
 /// A place where two cuts are equally high and none is lower.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Meeting {
@@ -42,6 +46,27 @@ pub struct Meeting {
     pub z: f64,
     /// The moves that meet, in the order of the line.
     pub moves: [u32; 2],
+}
+
+/// Cells by which tips are sorted: those of a grid and around it, and no coarser than suits the moves.
+fn grid_of_tips(grid: &Grid, radius: f64, path: &Toolpath) -> Grid {
+    // A tip stands aside of its cut by no more than the radius.
+    let margin = radius + grid.cell;
+    let corner = grid.centre(0, 0) - Vector2::new(margin, margin);
+    let size = Vector2::new(grid.nx as f64, grid.ny as f64) * grid.cell + Vector2::new(2.0, 2.0) * margin;
+    // What a bin lists comes from as far around as hidden moves are sought.
+    let window = CELLS_PER_BIN as f64 + HIDDEN_WITHIN;
+    let all = [corner, corner + size];
+    let [low, high] = path
+        .moves
+        .iter()
+        .map(|m| m.to.tip.xy())
+        .fold(all, |[low, high], tip| [low.inf(&tip), high.sup(&tip)]);
+    let area = (high.x - low.x) * (high.y - low.y);
+    let cell = (area * MOVES_PER_BIN / path.len().max(1) as f64).sqrt() / window;
+    let cell = cell.min(grid.cell);
+    let count = |length: f64| (length / cell).ceil() as usize;
+    Grid { origin: corner, cell, nx: count(size.x), ny: count(size.y) }
 }
 
 /// Finds meetings on a cut surface.
@@ -64,12 +89,8 @@ impl<'a> Meetings<'a> {
         stock: Option<f64>,
     ) -> Self {
         let tracks = Tracks::new(path, cutters);
-        let Grid { origin, cell, nx, ny } = surface.cut.grid;
-        // A tip stands aside of its cut by no more than the radius.
-        let margin = (tracks.cutters().greatest_radius() / cell).ceil() as usize + 1;
-        let origin = origin - Vector2::new(cell, cell) * margin as f64;
-        let around = Grid { origin, cell, nx: nx + 2 * margin, ny: ny + 2 * margin };
-        let tips = MoveBins::new(&around, CELLS_PER_BIN, 0.5 * HIDDEN_WITHIN * cell, path);
+        let around = grid_of_tips(&surface.cut.grid, tracks.cutters().greatest_radius(), path);
+        let tips = MoveBins::new(&around, CELLS_PER_BIN, 0.5 * HIDDEN_WITHIN * around.cell, path);
         Self { surface, tracks, tips, stock }
     }
 
@@ -251,6 +272,7 @@ mod tests {
                 borders: true,
                 most_cells: 1 << 20,
                 most_squares: 1 << 20,
+                is_first_look: false,
             };
             let found = measure(&part, &ball, &path, &cut, &limits, &asked, &Silent).unwrap();
             let (scallop, closed) = (&found.scallop, 3.0 - (9.0f64 - 0.25 * step * step).sqrt());

@@ -47,6 +47,8 @@ pub struct Asked {
     pub most_cells: usize,
     /// Squares that a search between cell centres may hold at a time.
     pub most_squares: usize,
+    /// Whether finer cells follow where this measurement leaves a limit open: then it gives up early.
+    pub is_first_look: bool,
 }
 
 /// What a rectangle may hold, mm.

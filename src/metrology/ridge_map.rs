@@ -49,6 +49,7 @@ pub(super) fn ridge_map(
         limits,
         asked,
         most_squares,
+        is_first_look: false,
         surface: &surface,
         meetings,
         grid,

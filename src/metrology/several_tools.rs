@@ -13,8 +13,14 @@ use work::monitor::Silent;
 const LIMITS: Limits = Limits { scallop: 0.01, gouge: 0.005, uncut: 0.05, chord: 0.001 };
 const TOP: f64 = 2.0;
 
-const ASKED: Asked =
-    Asked { error_bound: 5e-4, stock_top: TOP, borders: true, most_cells: 1 << 20, most_squares: 1 << 20 };
+const ASKED: Asked = Asked {
+    error_bound: 5e-4,
+    stock_top: TOP,
+    borders: true,
+    most_cells: 1 << 20,
+    most_squares: 1 << 20,
+    is_first_look: false,
+};
 const SIZE: [f64; 2] = [12.0, 8.0];
 
 /// The passes of one cutter after the other, with a rapid to each pass, and where each cutter begins.

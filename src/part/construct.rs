@@ -79,6 +79,7 @@ impl Part {
             bvh: Bvh::new(&mesh),
             mesh,
             deviation: 0.0,
+            beside_others: Vec::new(),
             repairs: RepairNotes::default(),
         }
     }
@@ -135,7 +136,7 @@ impl Part {
         for (source, [p, q, r]) in sources.iter().zip(&corners) {
             turned[patch_of(source)] += (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
         }
-        Ok(Self {
+        let mut part = Self {
             patches,
             signs: turned.into_iter().map(|area| if area < 0.0 { -1.0 } else { 1.0 }).collect(),
             first_triangle,
@@ -143,8 +144,11 @@ impl Part {
             bvh: Bvh::new(&mesh),
             mesh,
             deviation: all.deviation,
+            beside_others: Vec::new(),
             repairs,
-        })
+        };
+        part.beside_others = part.find_those_beside_others();
+        Ok(part)
     }
 }
 

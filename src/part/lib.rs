@@ -12,12 +12,14 @@ mod construct;
 mod patch;
 mod refine;
 mod sample;
+mod seams;
 
 pub use construct::{PartError, default_tessellation_tolerance};
 pub use patch::Patch;
 pub use sample::{GridSample, OFF_PART, SurfaceGrid};
 
 use geometry::{Aabb, Bvh, MeshFoot, Point3, PrincipalCurvatures, RepairNotes, TriangleMesh, Vector3};
+use seams::OnPatch;
 
 /// Which point of which patch: patch index and parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,6 +58,8 @@ pub struct Part {
     mesh: TriangleMesh,
     bvh: Bvh,
     deviation: f64,
+    /// For each triangle, whether a line through it may meet another patch; empty for parts of one patch and meshes.
+    beside_others: Vec<bool>,
     repairs: RepairNotes,
 }
 
@@ -68,6 +72,9 @@ const SEAM: f64 = 1.0e-9;
 
 /// What rounding may add to a distance, mm, before it counts as greater.
 const ROUNDING: f64 = 1.0e-9;
+
+/// Surfaces that stand steeper than this, by their normals' vertical part, are not followed sideways.
+const LEAST_UPRIGHT: f64 = 0.01;
 
 impl Part {
     /// The patches; empty for a mesh part.
@@ -255,25 +262,33 @@ impl Part {
     /// [`Part::mesh_deviation`] of the part's border either answer may come.
     ///
     /// # Tolerance
-    /// The point lies on the exact surface to 1e-12 mm (where `(x, y)` is beside a patch's border by
-    /// less than the deviation, on its tangent plane). Which of two sheets is the higher one is
+    /// The point lies on the exact surface to 1e-12 mm (where `(x, y)` is beside the part's border by
+    /// less than the deviation, on the tangent plane there). Which of two sheets of one patch is the higher one is
     /// decided on the mesh.
     pub fn highest_at(&self, x: f64, y: f64) -> Option<SurfacePoint> {
-        let Some(hit) = self.bvh.highest_at(&self.mesh, x, y) else {
-            return self.highest_graph_at(x, y);
-        };
-        let Some(index) = self.patch_of(hit.triangle) else {
-            let normal = self.mesh.normal(hit.triangle as usize);
-            return Some(SurfacePoint {
+        let hit = self.bvh.highest_at(&self.mesh, x, y);
+        if self.patches.is_empty() {
+            return hit.map(|hit| SurfacePoint {
                 point: Point3::new(x, y, hit.z),
-                normal,
+                normal: self.mesh.normal(hit.triangle as usize),
                 at: None,
                 triangle: hit.triangle,
             });
-        };
-        let meeting =
-            self.refine_vertical(index, x, y, || self.interpolate(hit.triangle, &hit.barycentric))?;
-        Some(self.on_vertical(index, hit.triangle, &meeting, x, y))
+        }
+        let on_own = hit.and_then(|hit| {
+            let patch = self.patch_of(hit.triangle)?;
+            let start = || self.interpolate(hit.triangle, &hit.barycentric);
+            Some(OnPatch {
+                patch,
+                triangle: hit.triangle,
+                meeting: self.refine_vertical(patch, x, y, start)?,
+            })
+        });
+        match self.across_seams(on_own, x, y) {
+            Some(found) => Some(self.on_vertical(&found, x, y)),
+            None if hit.is_none() => self.highest_graph_at(x, y),
+            None => None,
+        }
     }
 
     /// For points on the very border of a graph, which its triangles may miss by rounding.
@@ -286,23 +301,17 @@ impl Part {
         });
         let (index, meeting) = graphs.reduce(|a, b| if b.1.z > a.1.z { b } else { a })?;
         let triangle = self.bvh.closest_point(&self.mesh, &Point3::new(x, y, meeting.z)).triangle;
-        Some(self.on_vertical(index, triangle, &meeting, x, y))
+        Some(self.on_vertical(&OnPatch { patch: index, triangle, meeting }, x, y))
     }
 
-    fn on_vertical(
-        &self,
-        index: usize,
-        triangle: u32,
-        meeting: &refine::VerticalMeeting,
-        x: f64,
-        y: f64,
-    ) -> SurfacePoint {
+    fn on_vertical(&self, found: &OnPatch, x: f64, y: f64) -> SurfacePoint {
+        let OnPatch { patch, triangle, meeting } = found;
         let [u, v] = meeting.at;
         SurfacePoint {
             point: Point3::new(x, y, meeting.z),
-            normal: meeting.normal * self.signs[index],
-            at: Some(PatchPoint { patch: index as u32, u, v }),
-            triangle,
+            normal: meeting.normal * self.signs[*patch],
+            at: Some(PatchPoint { patch: *patch as u32, u, v }),
+            triangle: *triangle,
         }
     }
 

@@ -4,8 +4,8 @@
 //! Where two distances are equal within rounding, a step is judged by what it leaves to gain. Past a centre of curvature
 //! Newton's step would climb; there it goes downhill by the size of each bend.
 
-use super::Patch;
 use super::patch::normal_of;
+use super::{LEAST_UPRIGHT, Patch};
 use geometry::{AnalyticSurface, Jet2, NurbsSurface, Point3, Vector3};
 
 /// Newton steps at most. Regular points take two to five; the rest is for starts beside poles,
@@ -268,8 +268,6 @@ fn taylor(patch: &NurbsSurface, jet: &Jet2, at: [f64; 2], [a, b]: [f64; 2]) -> V
 
 /// The tangent plane over `(x, y)`, for lines that pass beside the patch.
 fn beside(patch: &NurbsSurface, jet: &Jet2, at: [f64; 2], x: f64, y: f64) -> VerticalMeeting {
-    /// Steeper tangent planes are not followed sideways.
-    const LEAST_UPRIGHT: f64 = 0.01;
     let normal = normal_of(patch, jet, at);
     let (rx, ry) = (x - jet.p.x, y - jet.p.y);
     let rise = if normal.z.abs() > LEAST_UPRIGHT { -(normal.x * rx + normal.y * ry) / normal.z } else { 0.0 };

@@ -5,8 +5,9 @@
 //! its triangle's parameters. Bands of rows are drawn independently, each by one worker and in
 //! triangle order, so any number of threads gives the same bits.
 
-use super::{Part, ROUNDING, refine};
-use geometry::{Point2, Point3, Vector3};
+use super::seams::OnPatch;
+use super::{Part, refine};
+use geometry::{Point2, Vector3};
 use work::monitor::{Cancelled, Monitor, check};
 use work::parallel;
 
@@ -136,8 +137,7 @@ impl Part {
     }
 
     /// Where the edges of two patches meet their triangles may leave a gap of twice the deviation. A
-    /// centre that falls into one is between two centres on the part and takes the triangle nearest
-    /// to where the part must be.
+    /// centre that falls into one is between two centres on the part.
     fn fill_pinholes(&self, lines: &Lines, nx: usize, samples: &mut [GridSample]) {
         if self.patches.len() < 2 {
             return;
@@ -148,15 +148,11 @@ impl Part {
                 continue;
             }
             let (i, j) = (k % nx, k / nx);
-            let on = |k: usize| Some(&samples[k]).filter(|s| s.is_on()).map(|s| s.z);
-            let across = if i > 0 && i + 1 < nx { on(k - 1).zip(on(k + 1)) } else { None };
-            let along = || if j > 0 && j + 1 < rows { on(k - nx).zip(on(k + nx)) } else { None };
-            let Some((a, b)) = across.or_else(along) else { continue };
-            let (x, y) = (lines.x(i), lines.y(j));
-            let near = self.bvh.closest_point(&self.mesh, &Point3::new(x, y, 0.5 * (a + b)));
-            let beside = (near.point.x - x).hypot(near.point.y - y);
-            if beside <= 2.0 * self.deviation + ROUNDING {
-                samples[k] = GridSample { z: near.point.z, triangle: near.triangle, ..GridSample::OFF };
+            let across = i > 0 && i + 1 < nx && samples[k - 1].is_on() && samples[k + 1].is_on();
+            let along = j > 0 && j + 1 < rows && samples[k - nx].is_on() && samples[k + nx].is_on();
+            let found = if across || along { self.across_seams(None, lines.x(i), lines.y(j)) } else { None };
+            if let Some(OnPatch { triangle, meeting, .. }) = found {
+                samples[k] = GridSample { z: meeting.z, triangle, ..GridSample::OFF };
             }
         }
     }
@@ -167,16 +163,21 @@ impl Part {
         let Some(index) = self.patch_of(t) else {
             return GridSample { normal: self.mesh.normal(t as usize), ..*sample };
         };
-        let start = || {
-            let barycentric = Plan::new(self, t).map_or([1.0 / 3.0; 3], |p| p.clamped_barycentric(x, y));
-            self.interpolate(t, &barycentric)
-        };
-        match self.refine_vertical(index, x, y, start) {
-            Some(refine::VerticalMeeting { z, normal, .. }) => {
-                GridSample { z, normal: normal * self.signs[index], triangle: t }
+        let meeting = self.refine_vertical(index, x, y, || self.nearest_in_plan(t, x, y));
+        let on_own = meeting.map(|meeting| OnPatch { patch: index, triangle: t, meeting });
+        match self.across_seams(on_own, x, y) {
+            Some(OnPatch { patch, triangle, meeting: refine::VerticalMeeting { z, normal, .. } }) => {
+                GridSample { z, normal: normal * self.signs[patch], triangle }
             }
             None => GridSample::OFF,
         }
+    }
+
+    /// The parameters of the place of a triangle that is about nearest to `(x, y)` in the plan.
+    pub(super) fn nearest_in_plan(&self, triangle: u32, x: f64, y: f64) -> [f64; 2] {
+        let plan = Plan::new(self, triangle);
+        let barycentric = plan.map_or([1.0 / 3.0; 3], |plan| plan.clamped_barycentric(x, y));
+        self.interpolate(triangle, &barycentric)
     }
 }
 

@@ -345,3 +345,59 @@ fn refuses_and_cancels() {
     assert_eq!(default_tessellation_tolerance(&[Patch::Nurbs(samples::bicubic(&[1.0]))]), 0.005);
     assert_relative_eq!(default_tessellation_tolerance(&[plane()]), 1.4142e-4, epsilon = 1e-7);
 }
+
+/// Along a seam single lines meet the surface as on the whole one, whichever triangles they pass.
+#[test]
+fn heights_on_a_seam_are_those_of_the_whole_surface() {
+    let [whole, halves] = whole_and_halves();
+    let (seam, deviation) = (0.5, halves.mesh_deviation());
+    for k in 1..400 {
+        let at = PatchPoint { patch: 0, u: seam, v: f64::from(k) / 400.0 };
+        let place = whole.surface_point(at).point;
+        for aside in [-1.5, -1.0, -0.3, -1e-6, 0.0, 1e-6, 0.3, 1.0, 1.5] {
+            let (x, y) = (place.x + aside * deviation, place.y);
+            let [expected, hit] = [&whole, &halves].map(|part| part.highest_at(x, y).unwrap());
+            assert_relative_eq!(hit.point, expected.point, epsilon = 1e-9);
+            assert_relative_eq!(hit.normal, expected.normal, epsilon = 1e-7);
+        }
+    }
+}
+
+/// On a crease the surface is that of the patch over the place, on either side, for lines and grids.
+#[test]
+fn heights_beside_a_crease_are_those_of_the_patch_there() {
+    // Two flanks that meet in one bent line. The one bends more, so that its triangles are smaller.
+    let side = |sign: f64, bend: f64| {
+        let control = |i: usize, j: usize| {
+            let (out, t) = (i as f64, j as f64 / 3.0);
+            let edge = Point3::new(1.3 * (3.0 * t).sin(), 20.0 * t, 2.0 * (2.0 * t).cos());
+            edge + Vector3::new(sign * 3.0 * out, 0.0, -0.9 * out - bend * out * out * (5.0 * t).sin())
+        };
+        let net: Vec<Vec<Point3>> = (0..4).map(|i| (0..4).map(|j| control(i, j)).collect()).collect();
+        let ends = || vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
+        NurbsSurface::new(3, 3, ends(), ends(), &net, None).unwrap()
+    };
+    let (left, right) = (side(-1.0, 0.02), side(1.0, 0.6));
+    let patches = vec![Patch::Nurbs(left.clone()), Patch::Nurbs(right.clone())];
+    let part = Part::from_patches(patches, 0.03).unwrap();
+    let alone = [left, right].map(|surface| Part::from_patches(vec![Patch::Nurbs(surface)], 1e-4).unwrap());
+    let deviation = part.mesh_deviation();
+    let mut beside = 0;
+    for k in 1..300 {
+        let place = part.surface_point(PatchPoint { patch: 0, u: 0.0, v: f64::from(k) / 300.0 }).point;
+        for aside in [-1.8, -1.0, -0.4, -0.01, 0.01, 0.4, 1.0, 1.8] {
+            let (x, y) = (place.x + aside * deviation, place.y);
+            let hit = part.highest_at(x, y).unwrap();
+            // Only the flank over the place has a point there.
+            let own = &alone[usize::from(aside > 0.0)];
+            let Some(expected) = own.highest_at(x, y) else { continue };
+            beside += 1;
+            assert_relative_eq!(hit.point, expected.point, epsilon = 1e-8);
+            let grid = part.sample_grid(Point2::new(x, y), 1.0, 1, 1, &Silent).unwrap();
+            if grid.at(0, 0).is_on() {
+                assert_relative_eq!(grid.at(0, 0).z, expected.point.z, epsilon = 1e-8);
+            }
+        }
+    }
+    assert!(beside > 1500, "{beside}");
+}

@@ -73,6 +73,7 @@ impl Engine for Cells {
             stock_top: task.stock.bounds().max.z,
             most_cells,
             most_squares: task.budget.squares_beside(held, &grid),
+            is_first_look: task.is_first_look,
             borders: !task.pocket,
         };
         let facing = task.measures_walls().then(|| task.facing());

@@ -55,6 +55,8 @@ pub struct Task<'a> {
     pub budget: Budget,
     /// What of the part is judged.
     pub judged: Judged,
+    /// Whether finer cells follow where this measurement leaves a limit open.
+    pub is_first_look: bool,
 }
 
 impl<'a> Task<'a> {

@@ -83,6 +83,7 @@ fn measured(part: &Part, cutter: &Cutter, path: &Toolpath, cell: f64) -> Measure
         stock_top: TOP,
         most_cells: 1 << 20,
         most_squares: 1 << 20,
+        is_first_look: false,
         borders: true,
     };
     measure(part, cutter, path, &cut, &LIMITS, &asked, &Silent).unwrap()

@@ -54,6 +54,7 @@ fn measured(part: &Part, cutter: &Cutter, path: &Toolpath) -> Measurement {
         stock_top: 9.0,
         most_cells: 1 << 20,
         most_squares: 1 << 20,
+        is_first_look: false,
         borders: true,
     };
     measure(part, cutter, path, &cut, &LIMITS, &asked, &Silent).unwrap()

@@ -66,6 +66,7 @@ fn measured(part: &Part, cutter: &Cutter, path: &Toolpath) -> Measurement {
         borders: true,
         most_cells: 1 << 20,
         most_squares: 1 << 20,
+        is_first_look: false,
     };
     let facing = Facing::new(part, path, area);
     assert!(facing.is_judged(Judged::Walls, PlaceKind::Wall));
