@@ -51,6 +51,9 @@ pub(super) struct ExcessSearch<'a> {
 /// Of the cells that may hold more than a pass may leave, so many are looked through for such places.
 const MOST_HIGH_CELLS: usize = 4096;
 
+/// Such a place is known to this share of what a pass may leave: plans are made anew by no finer figures.
+const HIGH_SLACK: f64 = 0.01;
+
 /// How often such a cell is divided before it counts as low enough.
 const HIGH_DIVISIONS: u32 = 6;
 
@@ -145,6 +148,7 @@ impl ExcessSearch<'_> {
         // What stands lower by so little is above the limit with its bound.
         let high = limits.scallop - 2.0 * NUMERICAL_FLOOR;
         let patches = self.patches(high, unseen);
+        let slack = HIGH_SLACK * limits.scallop;
         let small = OTHER_KIND_SHARE * 0.5 * self.inspection.grid.cell;
         let may_be = open.squares.iter().filter(|square| square.possible > high).copied();
         let squares = Promising::of(may_be, MOST_HIGH_CELLS).squares;
@@ -153,7 +157,7 @@ impl ExcessSearch<'_> {
             let mut highest: Option<RidgePlace> = None;
             let mut waiting = vec![(squares[k].centre, squares[k].half, HIGH_DIVISIONS)];
             while let Some((centre, half, divisions)) = waiting.pop() {
-                let known = highest.map_or(high, |highest| highest.height + NUMERICAL_FLOOR);
+                let known = highest.map_or(high, |highest| highest.height + slack);
                 let (quarter, is_open) = match patches.held(centre, half) {
                     Held::Nothing => continue,
                     Held::Unknown => (0.5 * half, true),
@@ -164,9 +168,10 @@ impl ExcessSearch<'_> {
                             let design = part.highest_at(place.x, place.y);
                             highest = design.map(|design| RidgePlace { at: design.point, height: here });
                         }
+                        let enough = here + if is_reached { slack } else { NUMERICAL_FLOOR };
                         // Where no pass came down to the design, all around is as high.
                         let is_uncut = rises && !is_reached && half <= small;
-                        (0.5 * half, possible > known.max(here + NUMERICAL_FLOOR) && !is_uncut)
+                        (0.5 * half, possible > known.max(enough) && !is_uncut)
                     }
                 };
                 if is_open && divisions > 0 {
