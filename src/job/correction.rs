@@ -705,6 +705,21 @@ mod tests {
         result.figures.iter().find(|figure| figure.key == "correction").map(|figure| &figure.value)
     }
 
+    /// Cells that show no pass tell nothing about a plan: it is made as by finer ones, and judged on these.
+    #[test]
+    fn coarse_cells_change_no_plan() {
+        let [fine, coarse] = [0.1, 4.0].map(|cell| {
+            let scene = format!("strategy = \"streamline\"\n[simulation]\ncell = {cell}");
+            planned(true, &scene)
+        });
+        let lengths = |result: &report::ToolpathResult| -> Vec<f64> {
+            let rounds = figure(result).unwrap()["rounds"].as_array().unwrap().clone();
+            rounds.iter().map(|round| round["cutting_length_mm"].as_f64().unwrap()).collect()
+        };
+        assert_eq!(lengths(&fine), lengths(&coarse));
+        assert_eq!([fine.verdict, coarse.verdict], [report::Verdict::Pass; 2]);
+    }
+
     #[test]
     fn rounds_bring_ridges_toward_the_target() {
         for toolpath in ["strategy = \"streamline\"", "strategy = \"iso-parametric\""] {
