@@ -17,6 +17,7 @@
 
 mod patch;
 
+use std::collections::BinaryHeap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::closer::{Effort, Promising, Square, Value, search};
@@ -55,7 +56,10 @@ const MOST_HIGH_CELLS: usize = 4096;
 const HIGH_SLACK: f64 = 0.01;
 
 /// How often such a cell is divided before it counts as low enough.
-const HIGH_DIVISIONS: u32 = 6;
+const HIGH_DIVISIONS: i32 = 6;
+
+/// Places of such a cell that are looked at in any case.
+const LEAST_LOOKS: usize = 21;
 
 /// Searches that are repeated with a move which no cell saw: it is lowest between centres only.
 const MOST_UNSEEN: usize = 24;
@@ -152,15 +156,21 @@ impl ExcessSearch<'_> {
         let small = OTHER_KIND_SHARE * 0.5 * self.inspection.grid.cell;
         let may_be = open.squares.iter().filter(|square| square.possible > high).copied();
         let squares = Promising::of(may_be, MOST_HIGH_CELLS).squares;
+        let most = (self.most_places() / squares.len().max(1)).max(LEAST_LOOKS);
         let found = work::parallel::try_map(squares.len(), |k| {
             monitor::check(monitor)?;
+            let smallest = 0.5f64.powi(HIGH_DIVISIONS) * squares[k].half;
             let mut highest: Option<RidgePlace> = None;
-            let mut waiting = vec![(squares[k].centre, squares[k].half, HIGH_DIVISIONS)];
-            while let Some((centre, half, divisions)) = waiting.pop() {
+            let mut waiting = BinaryHeap::from([squares[k]]);
+            for _ in 0..most {
+                let Some(Square { possible, centre, half }) = waiting.pop() else { break };
                 let known = highest.map_or(high, |highest| highest.height + slack);
-                let (quarter, is_open) = match patches.held(centre, half) {
+                if possible <= known {
+                    break;
+                }
+                let (possible, is_open) = match patches.held(centre, half) {
                     Held::Nothing => continue,
-                    Held::Unknown => (0.5 * half, true),
+                    Held::Unknown => (possible, true),
                     Held::Some { possible, place, here, by } => {
                         let rises = here > known;
                         let is_reached = rises && patches.reached(place, here, by);
@@ -171,14 +181,15 @@ impl ExcessSearch<'_> {
                         let enough = here + if is_reached { slack } else { NUMERICAL_FLOOR };
                         // Where no pass came down to the design, all around is as high.
                         let is_uncut = rises && !is_reached && half <= small;
-                        (0.5 * half, possible > known.max(enough) && !is_uncut)
+                        (possible, possible > known.max(enough) && !is_uncut)
                     }
                 };
-                if is_open && divisions > 0 {
+                if is_open && half > smallest {
+                    let quarter = 0.5 * half;
                     let side = |up: bool| if up { quarter } else { -quarter };
                     waiting.extend((0..4).map(|k| {
-                        let offset = Vector2::new(side(k & 1 != 0), side(k & 2 != 0));
-                        (centre + offset, quarter, divisions - 1)
+                        let centre = centre + Vector2::new(side(k & 1 != 0), side(k & 2 != 0));
+                        Square { possible, centre, half: quarter }
                     }));
                 }
             }
