@@ -70,7 +70,8 @@ impl Session {
         let (simulation, cells) =
             own.as_ref().map_or((&scene.simulation, &self.cells), |(simulation, cells)| (simulation, cells));
         let mut finest = auto_cell(&scene.cutter, &scene.toolpaths).min(simulation.cell);
-        let is_first_look = engine.gains_by_cells() && cells.0.cell > finest;
+        // Cells up to twice as wide as suits the scene show every pass.
+        let is_first_look = engine.gains_by_cells() && FINER * cells.0.cell > finest;
         let first = Task { cutters, is_first_look, ..self.task(path, simulation, cells) };
         let mut measured = engine.measure(&first, monitor).map_err(failed)?;
         let mut simulation = Simulation { cell_is_auto: false, cell: measured.cell, ..scene.simulation };
