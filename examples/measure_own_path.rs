@@ -40,6 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         stock_top: 1.0,
         most_cells: 1_000_000,
         most_squares: 1_000_000,
+        is_first_look: false,
         borders: true,
     };
     let found = measure(&part, &cutter, &path, &stock, &limits, &asked, &Silent)?;

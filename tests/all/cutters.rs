@@ -82,6 +82,7 @@ fn a_ball_by_any_name_plans_cuts_and_measures_the_same() {
         stock_top: settings.stock_top,
         most_cells: 1 << 22,
         most_squares: 1 << 22,
+        is_first_look: false,
         borders: true,
     };
     let of = |cutter: &Cutter| {

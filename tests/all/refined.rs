@@ -51,6 +51,7 @@ fn measured(cutter: &Cutter, path: &Toolpath, cell: f64, limits: &Limits, cells:
         stock_top: ALLOWANCE,
         most_cells: cells,
         most_squares: 1 << 22,
+        is_first_look: false,
         borders: true,
     };
     measure(&part, cutter, path, &stock, limits, &asked, &Silent).unwrap()

@@ -60,6 +60,7 @@ pub fn cut_and_measure(
         stock_top: bounds.max.z + ALLOWANCE,
         most_cells: 1 << 20,
         most_squares: 1 << 22,
+        is_first_look: false,
         borders: true,
     };
     measure(part, cutter, path, &cut, limits, &asked, &Silent).unwrap()
