@@ -58,7 +58,7 @@ fn closed_forms(studies: &[Study<'_>]) -> Table {
     Table::new(
         "Closed forms",
         "The highest scallop between parallel passes. The error must be within the bound, which counts the rounding of the \
-         program's coordinates.",
+         program's coordinates. Where the cell that was asked for leaves a limit undecided, the figure is that of finer ones.",
         &["scene", "engine", "cell, mm", "closed form, µm", "measured, µm", "error, nm", "bound, nm"],
         rows.collect(),
     )
