@@ -27,7 +27,7 @@ impl Part {
             let crease = within / found.meeting.normal.z.abs().max(LEAST_UPRIGHT);
             found.meeting.z - if is_exact(found) { 0.0 } else { crease }
         });
-        let (mut best, mut asked) = (known, None);
+        let (mut best, mut beside, mut asked) = (known, None::<OnPatch>, None);
         self.bvh.tree().search(
             floor,
             |_, node, _| {
@@ -41,8 +41,15 @@ impl Part {
                     return floor;
                 }
                 let meeting = self.refine_vertical(patch, x, y, || self.nearest_in_plan(triangle, x, y));
-                let found = meeting.map(|meeting| OnPatch { patch, triangle, meeting }).filter(is_exact);
-                let Some(found) = found else { return floor };
+                let Some(meeting) = meeting else { return floor };
+                let found = OnPatch { patch, triangle, meeting };
+                if !is_exact(&found) {
+                    // Patches of a file may end a little before each other.
+                    if beside.is_none_or(|nearest| meeting.miss < nearest.meeting.miss) {
+                        beside = Some(found);
+                    }
+                    return floor;
+                }
                 asked = Some(patch);
                 if found.meeting.z > floor {
                     best = Some(found);
@@ -50,7 +57,7 @@ impl Part {
                 floor.max(found.meeting.z)
             },
         );
-        best
+        best.or(beside)
     }
 
     /// Triangles of two patches that meet lie up to so far apart, mm.

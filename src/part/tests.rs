@@ -363,6 +363,24 @@ fn heights_on_a_seam_are_those_of_the_whole_surface() {
     }
 }
 
+/// Patches of a file may end a little before each other: a line between them meets the part.
+#[test]
+fn narrow_gaps_between_patches_are_no_holes() {
+    const GAP: f64 = 1e-4;
+    let wave = |x0: f64, x1: f64| {
+        let shape = AnalyticShape::Wave { amplitude: 1.0, wavelength_x: 11.0, wavelength_y: Some(7.0) };
+        graph(shape, [[x0, x1], [0.0, 10.0]])
+    };
+    let part = Part::from_patches(vec![wave(0.0, 3.3), wave(3.3 + GAP, 10.0)], 0.02).unwrap();
+    let grid = part.sample_grid(Point2::new(0.3 + 0.5 * GAP, 0.05), 0.1, 60, 99, &Silent).unwrap();
+    for j in 0..grid.ny {
+        let (x, y) = (3.3 + 0.5 * GAP, 0.05 + 0.1 * j as f64);
+        let exact = (std::f64::consts::TAU * x / 11.0).sin() * (std::f64::consts::TAU * y / 7.0).cos();
+        assert_relative_eq!(part.highest_at(x, y).unwrap().point.z, exact, epsilon = GAP);
+        assert_relative_eq!(grid.at(30, j).z, exact, epsilon = GAP);
+    }
+}
+
 /// On a crease the surface is that of the patch over the place, on either side, for lines and grids.
 #[test]
 fn heights_beside_a_crease_are_those_of_the_patch_there() {
