@@ -28,6 +28,7 @@ impl Part {
             found.meeting.z - if is_exact(found) { 0.0 } else { crease }
         });
         let (mut best, mut beside, mut asked) = (known, None::<OnPatch>, None);
+        let mut is_between = false;
         self.bvh.tree().search(
             floor,
             |_, node, _| {
@@ -44,7 +45,7 @@ impl Part {
                 let Some(meeting) = meeting else { return floor };
                 let found = OnPatch { patch, triangle, meeting };
                 if !is_exact(&found) {
-                    // Patches of a file may end a little before each other.
+                    is_between |= beside.is_some_and(|nearest| nearest.patch != patch);
                     if beside.is_none_or(|nearest| meeting.miss < nearest.meeting.miss) {
                         beside = Some(found);
                     }
@@ -57,7 +58,8 @@ impl Part {
                 floor.max(found.meeting.z)
             },
         );
-        best.or(beside)
+        // Patches of a file may end a little before each other. Beside one alone the part ends.
+        best.or(beside.filter(|_| is_between))
     }
 
     /// Triangles of two patches that meet lie up to so far apart, mm.

@@ -378,6 +378,8 @@ fn narrow_gaps_between_patches_are_no_holes() {
         let exact = (std::f64::consts::TAU * x / 11.0).sin() * (std::f64::consts::TAU * y / 7.0).cos();
         assert_relative_eq!(part.highest_at(x, y).unwrap().point.z, exact, epsilon = GAP);
         assert_relative_eq!(grid.at(30, j).z, exact, epsilon = GAP);
+        // Beside one patch alone the part ends.
+        assert!(part.highest_at(10.0 + GAP, y).is_none());
     }
 }
 
