@@ -132,8 +132,8 @@ impl Session {
     }
 }
 
-/// The cell after one that left a limit undecided: `finest` suits the scene. More cells than take little time are only cut up to
-/// that, and in steps.
+/// The next cell after one that left a limit undecided. Where few cells are enough, it is `finest`, which suits the scene, or
+/// half of the last cell if that is smaller. More cells are reached in steps and end at `finest`.
 fn finer_cell(measured: &Measured, finest: f64, before: f64) -> f64 {
     let quick = before * (measured.cells as f64 / MOST_CLOSER_CELLS as f64).sqrt();
     let halved = FINER * before;

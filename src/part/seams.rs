@@ -2,6 +2,7 @@
 //! pass between the triangles of two patches, or through those of a patch that has ended.
 
 use super::{LEAST_UPRIGHT, Part, ROUNDING, refine};
+use geometry::{Point2, Vector2};
 use work::parallel;
 
 /// Where a vertical line meets a patch, and a triangle nearby.
@@ -27,7 +28,9 @@ impl Part {
             let crease = within / found.meeting.normal.z.abs().max(LEAST_UPRIGHT);
             found.meeting.z - if is_exact(found) { 0.0 } else { crease }
         });
-        let (mut best, mut beside, mut asked) = (known, None::<OnPatch>, None);
+        let (mut best, mut asked) = (known, None);
+        // The nearest end of a patch beside the line, and the way there in the plan.
+        let mut beside: Option<(OnPatch, Vector2)> = None;
         let mut is_between = false;
         self.bvh.tree().search(
             floor,
@@ -45,9 +48,11 @@ impl Part {
                 let Some(meeting) = meeting else { return floor };
                 let found = OnPatch { patch, triangle, meeting };
                 if !is_exact(&found) {
-                    is_between |= beside.is_some_and(|nearest| nearest.patch != patch);
-                    if beside.is_none_or(|nearest| meeting.miss < nearest.meeting.miss) {
-                        beside = Some(found);
+                    let [u, v] = meeting.at;
+                    let way = self.patches[patch].point(u, v).xy() - Point2::new(x, y);
+                    is_between |= beside.is_some_and(|(_, other)| way.dot(&other) < 0.0);
+                    if beside.is_none_or(|(nearest, _)| meeting.miss < nearest.meeting.miss) {
+                        beside = Some((found, way));
                     }
                     return floor;
                 }
@@ -58,8 +63,8 @@ impl Part {
                 floor.max(found.meeting.z)
             },
         );
-        // Patches of a file may end a little before each other. Beside one alone the part ends.
-        best.or(beside.filter(|_| is_between))
+        // Patches of a file may end a little before each other. Where all ends lie on one side, the part ends.
+        best.or(beside.filter(|_| is_between).map(|(nearest, _)| nearest))
     }
 
     /// Triangles of two patches that meet lie up to so far apart, mm.

@@ -383,6 +383,20 @@ fn narrow_gaps_between_patches_are_no_holes() {
     }
 }
 
+/// Where two sheets end in one outline, a line beyond it passes both.
+#[test]
+fn beside_a_common_outline_the_part_ends() {
+    let sheet = |amplitude: f64| {
+        let shape = AnalyticShape::Wave { amplitude, wavelength_x: 11.0, wavelength_y: None };
+        graph(shape, [[0.0, 3.3], [0.0, 10.0]])
+    };
+    let part = Part::from_patches(vec![sheet(1.0), sheet(0.5)], 0.02).unwrap();
+    for aside in [1e-6, 1e-4, 0.5 * part.mesh_deviation()] {
+        assert!(part.highest_at(3.3 + aside, 4.0).is_none());
+    }
+    assert!(part.highest_at(3.3, 4.0).is_some());
+}
+
 /// On a crease the surface is that of the patch over the place, on either side, for lines and grids.
 #[test]
 fn heights_beside_a_crease_are_those_of_the_patch_there() {
