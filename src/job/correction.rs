@@ -4,16 +4,16 @@
 //! Enters: a toolpath that is planned by a scallop height. Leaves: the best of a few plans with its measurement, and what each
 //! round found.
 //!
-//! The functions whose levels are passes are kept from round to round: only levels are placed anew, narrower around the
-//! places that stood too high. Places that chords may have raised get shorter chords first, which costs points and no length,
-//! and leaves all levels where they are. Few others get short passes of their own, which leave all others where they are.
+//! Moves go a little deeper beside places that stand a little too high, as far as the chord tolerance and the gouge tolerance allow. Where
+//! that is known beforehand, passes are planned as if chords raised nothing. All passes stay where they are then, and nothing can rise. Few
+//! places that stand higher get short passes of their own, which leave all others where they are as well.
+//! Else levels are placed anew, narrower around the places that stood too high, of functions that are kept from round to round.
 //! Where many stand little above the target, the widths of the whole plan are scaled, which leaves its passes in shape; so
 //! they are where narrowing does not help. Nothing is narrowed for a place where every path of the cutter leaves too much.
 //!
 //! Where an engine tells ridges apart, the first rounds measure no more than those, on cells as coarse as show every pass. Then
 //! all is measured as the verdict is; what still stands above the target then is corrected as well.
 
-mod chords;
 mod round;
 mod widths;
 
@@ -22,10 +22,10 @@ use std::sync::Arc;
 
 use geometry::Point3;
 use metrology::{Bounded, Engine, Measured, Measurement, RidgeMap, Simulation, path_figures};
-use motion::Toolpath;
+use motion::{ROUNDING, Toolpath};
 use report::Verdict;
 use scene::ToolpathRequest;
-use toolpath::{Earlier, Kept, Step, plane_interval, short_passes};
+use toolpath::{Earlier, Kept, Step, plane_interval, short_passes, unused_tolerance};
 use work::monitor::{self, Monitor};
 
 use super::covered::Covered;
@@ -37,7 +37,7 @@ use super::tool::{Around, ToolMoves};
 use super::{JobError, Session};
 pub(crate) use round::{CorrectionFigures, CorrectionRound};
 use round::{Gain, Goal};
-use widths::{HighPlace, MOST_NARROWED, SHORTER_CHORDS, Widths, aim};
+use widths::{HighPlace, MOST_NARROWED, Widths, aim};
 
 /// Most plans that are made while only ridges are measured.
 const MOST_ROUNDS: usize = 6;
@@ -239,8 +239,7 @@ impl Session {
             return Ok((first, measured, covered));
         };
         let interval = plane_interval(&self.scene.cutter, request.step);
-        let widths =
-            Widths { places: Vec::new(), everywhere: 1.0, finer: Vec::new(), touch_up: Vec::new(), interval };
+        let widths = Widths::by_calculation(interval);
         let rounds = vec![standing.round];
         let tried = Tried { widths, standing, kept: first.plan.kept.clone() };
         let mut corrected = Corrected {
@@ -307,6 +306,17 @@ impl Session {
             self.budget().grid_before_planning(&self.area(), &simulation).map_err(JobError::grid(scene))?;
         let task = self.task(&planned.plan.path, &simulation, &cells);
         engine.ridges(&task, monitor).map_err(|reason| JobError::engine(scene, &request.name, reason))
+    }
+
+    /// Whether moves of a toolpath can go deeper beside places that stand a little too high. Those of a tool that leans cannot.
+    fn may_lower(&self, request: &ToolpathRequest) -> bool {
+        request.correct && request.axis.is_none() && self.pocket.is_none()
+    }
+
+    /// Whether a toolpath is planned as if chords raised nothing. Where all has to be measured to find such places, passes that leave
+    /// none take less time.
+    pub(crate) fn is_lowered_later(&self, request: &ToolpathRequest) -> bool {
+        self.may_lower(request) && self.scene.simulation.engine.for_path(request.tilts()).finds_ridges()
     }
 
     /// Whether all of the surface that was measured passes, where no cell sees as well.
@@ -429,7 +439,7 @@ impl Corrected<'_> {
             || *depth > NEVER_CUT * self.session.scene.tolerance.gouge
     }
 
-    /// The widths to try next. A plan that stands too high gets shorter chords where that may be enough, and narrower widths
+    /// The widths to try next. A plan that stands too high gets deeper moves where that is enough, and narrower widths
     /// elsewhere; one that is too low gets wider ones. Levels are placed anew in each plan, so that other places may stand
     /// too high then: these are narrowed as well, from the last plan on. Last of all everything is narrowed in proportion, to
     /// which remnants along borders give way only by another pass. `None` where the best plan holds the target and comes within `slack` of
@@ -496,15 +506,22 @@ impl Corrected<'_> {
         })
     }
 
-    /// The widths of a plan corrected by the places where it leaves too much. Few that were measured as the verdict is get
-    /// passes of their own, once: shorter chords take another plan, and change ridges elsewhere. Before that, those that chords
-    /// may have raised get shorter chords, and few others passes of their own. Many get narrower widths, all of the plan
-    /// where they stand little above the target. `None` without such places.
+    /// The widths of a plan corrected by the places where it leaves too much: by deeper moves, and by passes of their own for few that
+    /// stand too high for that, once. Many get narrower widths, all of the plan where they stand little above the target. `None`
+    /// without such places.
     fn corrected(&self, tried: &Tried) -> Option<Widths> {
         let Tried { widths, .. } = tried;
-        let high = self.standing_high(&tried.standing);
+        let near = self.standing_near(&tried.standing);
+        let high: Vec<HighPlace> = near.iter().filter(|place| place.over > 0.0).copied().collect();
         if high.is_empty() {
             return None;
+        }
+        let may_lower = |place: &HighPlace| self.may_lower(widths, place);
+        let deep: Vec<HighPlace> = high.iter().filter(|place| !may_lower(place)).copied().collect();
+        let shallow: Vec<HighPlace> = near.into_iter().filter(may_lower).collect();
+        let lowered = widths.lowered(&shallow, self.room());
+        if deep.is_empty() {
+            return Some(lowered);
         }
         // Where a measurement finds others beside those that were served, there are more to come.
         let measured = self.rounds.iter().filter(|round| round.measured).count();
@@ -513,23 +530,29 @@ impl Corrected<'_> {
             |places: &[HighPlace]| was_served || places.iter().any(|place| widths.is_touched_up(place));
         // Along borders narrower widths may change nothing.
         let is_left = tried.standing.round.is_on_border() && self.is_as_before();
-        let is_worth = is_left || self.are_few(&high, tried);
-        if tried.standing.round.measured && is_worth && !is_served(&high) {
-            return Some(widths.touched_up(&high));
-        }
-        let raised = self.raised_by_chords(tried, &high);
-        let of = |kind: bool| high.iter().zip(&raised).filter(move |(_, raised)| **raised == kind);
-        let [raised, others] =
-            [true, false].map(|kind| of(kind).map(|(place, _)| *place).collect::<Vec<_>>());
-        let finer = widths.finer(&raised);
-        if self.are_few(&others, tried) && !is_served(&others) {
-            return Some(finer.touched_up(&others));
+        let is_worth = self.are_few(&deep, tried) || is_left && tried.standing.round.measured;
+        if is_worth && !is_served(&deep) {
+            return Some(lowered.touched_up(&deep));
         }
         let round = &tried.standing.round;
         if self.is_near(tried) && !round.is_on_border() {
-            return Some(self.scaled(&finer, round.highest_mm));
+            return Some(self.scaled(widths, round.highest_mm));
         }
-        Some(finer.narrowed(&others))
+        Some(widths.narrowed(&high))
+    }
+
+    /// How much deeper moves may go, mm: chords leave that of their tolerance, and the gouge tolerance has to leave it as well.
+    fn room(&self) -> f64 {
+        let tolerance = &self.session.scene.tolerance;
+        let (chord, is_smoothed) = (tolerance.chord, self.request.joining.smoothing);
+        let unused = unused_tolerance(chord, is_smoothed);
+        unused.min(tolerance.gouge - (chord - unused))
+    }
+
+    /// Whether moves beside a place can go as much deeper as it stands too high.
+    fn may_lower(&self, widths: &Widths, place: &HighPlace) -> bool {
+        self.session.may_lower(self.request)
+            && widths.depth_at(place) + place.over + 2.0 * ROUNDING <= self.room()
     }
 
     /// Whether places take so little that passes of their own are shorter than a plan with all passes nearer to each other.
@@ -559,8 +582,8 @@ impl Corrected<'_> {
         }
     }
 
-    /// The places of a plan that may stand above the target.
-    fn standing_high(&self, standing: &Standing) -> Vec<HighPlace> {
+    /// The places of a plan that come near the target.
+    fn standing_near(&self, standing: &Standing) -> Vec<HighPlace> {
         let cutter = &self.session.scene.cutter;
         let target = self.goal.target;
         let margin = standing.round.margin(target);
@@ -571,23 +594,11 @@ impl Corrected<'_> {
                 normal,
                 tip: at + cutter.contact_to_tip(&normal),
                 over: height + margin - target,
+                deeper: height + margin - aim(target),
                 factor: aim(target) / height,
             }
         });
-        places.filter(|place| place.over > 0.0).collect()
-    }
-
-    /// Which places chords alone may have raised above the target, so that shorter ones are enough.
-    fn raised_by_chords(&self, tried: &Tried, high: &[HighPlace]) -> Vec<bool> {
-        if self.request.axis.is_some() || self.request.joining.smoothing {
-            return vec![false; high.len()];
-        }
-        let chords = tried.widths.chords();
-        let raised = chords::most_raised(&tried.kept.passes, high, tried.widths.interval);
-        let is_raised = |(place, most): (&HighPlace, f64)| {
-            place.over <= (1.0 - SHORTER_CHORDS) * most && chords.at(&place.tip) == 1.0
-        };
-        high.iter().zip(raised).map(is_raised).collect()
+        places.filter(|place| place.deeper > 0.0).collect()
     }
 
     /// The plan by given widths, and their least and greatest factors.
@@ -598,7 +609,7 @@ impl Corrected<'_> {
         let alike = self.latest.iter().chain([&self.tried]).find(|tried| tried.widths.is_alike(widths));
         let earlier = Earlier {
             correction,
-            chords: widths.chords(),
+            lowered: widths.lowered.clone(),
             touch_up: widths.touch_up.clone(),
             kept: alike.unwrap_or(&self.tried).kept.clone(),
             again: alike.is_some() && self.request.axis.is_none(),

@@ -209,6 +209,7 @@ impl Session {
             plunge_rate: self.scene.cutting.plunge_rate,
             machine: self.scene.machine,
             joining: request.joining,
+            is_lowered_later: self.is_lowered_later(request),
             memory: self.budget().left(0) / PLAN_SHARE,
             earlier: None,
         }

@@ -4,6 +4,7 @@
 mod facets;
 mod levels;
 mod link;
+mod lowering;
 mod moves;
 mod plan;
 mod pocket;
@@ -15,6 +16,7 @@ mod vocabulary;
 
 pub use levels::spacing::LevelSteps;
 pub use link::{Detour, LONGEST_LINK, around_fixtures, longest_link, plane_interval};
+pub use lowering::Lowered;
 pub use plan::{Plan, plan, plan_tilted};
 pub use pocket::{
     Engagement, Exceeding, Flow, Gentle, LEAST_SHARE, NotOnOutline, Pattern, Pocket, PocketStrategy, Vectors,
@@ -35,5 +37,5 @@ pub use tilt::tilted::Tilting;
 pub use touch_up::short_passes;
 pub use vocabulary::{
     Along, Correction, Definition, Earlier, FeedDirection, Joining, Kept, Levelled, Lines, Links, PartKind,
-    PlanError, PlanSettings, Reading, Step, Strategy,
+    PlanError, PlanSettings, Reading, Step, Strategy, unused_tolerance,
 };

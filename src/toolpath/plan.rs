@@ -5,14 +5,15 @@ use std::sync::Arc;
 
 use crate::facets::facet_charge;
 use crate::levels::{obedience, planned_field};
-use crate::link::{join, join_tilted, time_to_neighbour};
+use crate::link::{join, join_tilted, plane_interval, time_to_neighbour};
+use crate::lowering::lowered;
 use crate::strategies::words_for;
 use crate::surface::mesh_surface;
 use crate::tilt::tilted::{self, TiltedPasses, Tilting};
 use crate::touch_up;
 use crate::vocabulary::{
     Kept, Pace, PartKind, PassSettings, Passes, PlanError, PlanSettings, SAMPLING_OVER_RADIUS, Setup, Step,
-    Strategy, Task,
+    Strategy, Task, unused_tolerance,
 };
 use cutter::Cutter;
 use field::PlannedField;
@@ -72,8 +73,8 @@ impl Kept {
     }
 }
 
-/// A scallop target is planned for less this share of the chord tolerance. A chord may raise a ridge by half of it, but
-/// ridges stand between chords of two passes, whose greatest deviations seldom meet.
+/// A scallop target is planned for less this share of the chord tolerance, unless moves go deeper where that is needed. A chord may raise a
+/// ridge by half of it, but ridges stand between chords of two passes, whose greatest deviations seldom meet.
 const CHORD_SHARE: f64 = 0.26;
 
 /// The same of smoothed passes, whose points and chords stray farther.
@@ -127,9 +128,20 @@ pub fn plan(
         Ok((kept, added))
     })?;
     let further = touch_up::note(&added);
-    let all = kept.passes.iter().cloned().chain(added).collect();
+    let all = deeper(&kept.passes, cutter, settings).into_iter().chain(added).collect();
     let path = join(all, strategy.both_ways(), &setup)?;
     Ok(Plan::again(path, kept, further.into_iter().collect()))
+}
+
+/// Passes of an upright cutter, deeper beside places where an earlier plan left a little too much.
+fn deeper(passes: &[Vec<Point3>], cutter: &Cutter, settings: &PlanSettings) -> Vec<Vec<Point3>> {
+    let most = unused_tolerance(settings.chord_tolerance, settings.joining.smoothing);
+    match &settings.earlier {
+        Some(earlier) if earlier.again => {
+            lowered(passes, &earlier.lowered, plane_interval(cutter, settings.step), most)
+        }
+        _ => passes.to_vec(),
+    }
 }
 
 /// Plans one path of a cutter that tilts.
@@ -238,7 +250,12 @@ fn charged_step(task: &Task<'_>, strategy: &dyn Strategy, settings: &PlanSetting
     let fitted = !strategy.on_facets(task) && !task.wants_mesh;
     let smooth = !task.part.patches().is_empty();
     let facets = if smooth { 0.0 } else { facet_charge(task.part.mesh(), fitted, h) };
-    let chords = if settings.joining.smoothing { SMOOTHED_CHORD_SHARE } else { CHORD_SHARE };
+    let chords = match (settings.joining.smoothing, settings.is_lowered_later) {
+        // More than smoothing leaves of the tolerance.
+        (true, _) => SMOOTHED_CHORD_SHARE,
+        (false, true) => 0.0,
+        (false, false) => CHORD_SHARE,
+    };
     let less = chords * settings.chord_tolerance + facets + ROUNDING;
     Step::Scallop((h - less).max(LEAST_SHARE_OF_TARGET * h))
 }

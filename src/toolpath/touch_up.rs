@@ -241,7 +241,7 @@ mod tests {
         let planned = |strategy: &dyn Strategy, places: &[Point3]| {
             let earlier = Earlier {
                 correction: Correction::default(),
-                chords: Correction::default(),
+                lowered: Vec::new(),
                 touch_up: places.to_vec(),
                 kept: Arc::default(),
                 again: false,

@@ -2,12 +2,10 @@
 //! passes of their own.
 
 use geometry::{Point3, Vector3};
-use toolpath::Correction;
+use motion::ROUNDING;
+use toolpath::{Correction, Lowered};
 
 use super::SLACK;
-
-/// The factor of the chord tolerance where a ridge was raised by chords; where it still is, passes get nearer to each other.
-pub(super) const SHORTER_CHORDS: f64 = 0.25;
 
 /// No width is corrected by more than this factor in a round.
 pub(super) const MOST_NARROWED: f64 = 0.5;
@@ -20,7 +18,7 @@ pub(super) fn aim(target: f64) -> f64 {
     (1.0 - 0.5 * SLACK) * target
 }
 
-/// A place that may stand above the target.
+/// A place that comes near the target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct HighPlace {
     pub at: Point3,
@@ -30,6 +28,8 @@ pub(super) struct HighPlace {
     pub tip: Point3,
     /// By how much it may stand above the target, mm.
     pub over: f64,
+    /// By how much it may stand above what is aimed at, mm.
+    pub deeper: f64,
     /// The height that it is to have as a share of the one it has.
     pub factor: f64,
 }
@@ -41,8 +41,8 @@ pub(super) struct Widths {
     pub places: Vec<(Point3, f64)>,
     /// The factor of all places.
     pub everywhere: f64,
-    /// Tips of the cutter around which chords are shorter, with the factor of their tolerance.
-    pub finer: Vec<(Point3, f64)>,
+    /// Places beside which moves go deeper, round after round, while all passes stay where they are.
+    pub lowered: Vec<Vec<Lowered>>,
     /// Places that get passes of their own, while all others stay where they are.
     pub touch_up: Vec<Point3>,
     /// How far around a place its factor holds, mm: the interval of passes on a plane.
@@ -50,17 +50,46 @@ pub(super) struct Widths {
 }
 
 impl Widths {
+    /// As calculated, for passes that lie so far apart on a plane, mm.
+    pub fn by_calculation(interval: f64) -> Self {
+        Self { places: Vec::new(), everywhere: 1.0, lowered: Vec::new(), touch_up: Vec::new(), interval }
+    }
+
     pub fn correction(&self) -> Correction {
         Correction::new(&self.places, self.interval).scaled(self.everywhere)
     }
 
     pub fn scaled(&self, factor: f64) -> Self {
-        Self { everywhere: factor * self.everywhere, touch_up: Vec::new(), ..self.clone() }
+        Self { everywhere: factor * self.everywhere, ..self.unserved() }
     }
 
-    /// Whether passes are the same but for those of their own.
+    /// Without what served the places of these very passes.
+    fn unserved(&self) -> Self {
+        Self { lowered: Vec::new(), touch_up: Vec::new(), ..self.clone() }
+    }
+
+    /// Whether passes are the same, but for those of their own and for how deep they go.
     pub fn is_alike(&self, other: &Self) -> bool {
-        (&self.places, self.everywhere, &self.finer) == (&other.places, other.everywhere, &other.finer)
+        (&self.places, self.everywhere) == (&other.places, other.everywhere)
+    }
+
+    /// How much deeper than planned moves beside a place go, mm.
+    pub fn depth_at(&self, place: &HighPlace) -> f64 {
+        let beside = |lowered: &&Lowered| (lowered.tip - place.tip).norm() <= self.interval;
+        let deepest = |round: &Vec<Lowered>| {
+            round.iter().filter(beside).map(|lowered| lowered.by.norm()).fold(0.0, f64::max)
+        };
+        self.lowered.iter().map(deepest).sum()
+    }
+
+    /// With deeper moves beside places: by what is aimed at, as far as there is `room`, mm.
+    pub fn lowered(&self, places: &[HighPlace], room: f64) -> Self {
+        let deeper = |place: &HighPlace| {
+            let left = room - 2.0 * ROUNDING - self.depth_at(place);
+            Lowered { tip: place.tip, by: -place.normal * place.deeper.min(left) }
+        };
+        let round = places.iter().map(deeper).collect();
+        Self { lowered: self.lowered.iter().cloned().chain([round]).collect(), ..self.clone() }
     }
 
     /// Whether a pass of its own was to serve a place.
@@ -74,18 +103,6 @@ impl Widths {
         places.sort_by(|a, b| b.over.total_cmp(&a.over));
         let touch_up = self.touch_up.iter().copied().chain(places.iter().map(|place| place.at)).collect();
         Self { touch_up, ..self.clone() }
-    }
-
-    /// The factor of the chord tolerance around tips of the cutter.
-    pub fn chords(&self) -> Correction {
-        Correction::new(&self.finer, self.interval)
-    }
-
-    /// With shorter chords around places.
-    pub fn finer(&self, places: &[HighPlace]) -> Self {
-        let shorter = places.iter().map(|place| (place.tip, SHORTER_CHORDS));
-        let finer = self.finer.iter().copied().chain(shorter).collect();
-        Self { finer, ..self.clone() }
     }
 
     /// Narrower where ridges and borders stand above the target, so that they come to the middle of the slack: height goes
@@ -102,7 +119,7 @@ impl Widths {
             (place.at, before * place.factor.powf(power).max(MOST_NARROWED))
         });
         let places = self.places.iter().copied().chain(narrower).collect();
-        Self { places, touch_up: Vec::new(), ..self.clone() }
+        Self { places, ..self.unserved() }
     }
 }
 
@@ -114,16 +131,17 @@ mod tests {
     fn widths_go_with_the_root_of_heights_above_the_target() {
         let above = |x: f64, height: f64| {
             let at = Point3::new(x, 0.0, 0.0);
-            HighPlace { at, normal: Vector3::z(), tip: at, over: height - 1.0, factor: 0.99 / height }
+            HighPlace {
+                at,
+                normal: Vector3::z(),
+                tip: at,
+                over: height - 1.0,
+                deeper: height - 0.99,
+                factor: 0.99 / height,
+            }
         };
         let places = [above(0.0, 1.2), above(40.0, 1.1)];
-        let by_calculation = Widths {
-            places: Vec::new(),
-            everywhere: 1.0,
-            finer: Vec::new(),
-            touch_up: Vec::new(),
-            interval: 1.0,
-        };
+        let by_calculation = Widths::by_calculation(1.0);
         let once = by_calculation.narrowed(&places);
         let found = [0.0, 10.0, 20.0, 40.0].map(|x| once.correction().at(&Point3::new(x, 0.0, 0.0)));
         let wanted = [(0.99f64 / 1.2).sqrt(), 1.0, 1.0, (0.99f64 / 1.1).sqrt()];
@@ -132,11 +150,11 @@ mod tests {
         let twice = once.narrowed(&[above(0.0, 1.1)]).correction();
         assert!((twice.at(&places[0].at) - wanted[0] * 0.99 / 1.1).abs() < 1e-12);
         assert!((twice.at(&places[1].at) - wanted[3]).abs() < 1e-12);
-        // Shorter chords leave all widths as they are.
-        let finer = once.finer(&places[..1]);
-        assert_eq!(finer.correction(), once.correction());
-        assert!(
-            finer.chords().at(&places[0].tip) == SHORTER_CHORDS && finer.chords().at(&places[1].tip) == 1.0
-        );
+        // Deeper moves leave all widths as they are, and are void where widths change.
+        let deeper = once.lowered(&[above(0.0, 1.2)], 0.3).lowered(&[above(0.5, 1.1)], 0.4);
+        assert!(deeper.is_alike(&once) && !deeper.is_alike(&by_calculation));
+        let depths = [0.2, 40.0].map(|x| deeper.depth_at(&above(x, 1.0)));
+        assert!((depths[0] - 0.32).abs() < 1e-12 && depths[1] == 0.0, "{depths:?}");
+        assert!(deeper.narrowed(&places).lowered.is_empty() && deeper.scaled(0.9).lowered.is_empty());
     }
 }

@@ -45,6 +45,10 @@ impl Engine for Cells {
         true
     }
 
+    fn finds_ridges(&self) -> bool {
+        true
+    }
+
     fn ridges(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Option<RidgeMap>, EngineError> {
         let path = task.path;
         let (grid, _) =

@@ -33,6 +33,8 @@ pub trait Engine: Sync {
     fn gains_by_cells(&self) -> bool {
         true
     }
+    /// Whether ridges alone are found in less time than all is measured.
+    fn finds_ridges(&self) -> bool;
     /// Cuts, and measures no more than ridges and borders; `None` where that takes as long as all, or
     /// the cells are too coarse to tell.
     ///

@@ -68,9 +68,13 @@ impl Engine for Normals {
         self.by_voxels
     }
 
-    fn ridges(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Option<RidgeMap>, EngineError> {
+    fn finds_ridges(&self) -> bool {
         // Voxels take longer than the places between them.
-        if self.by_voxels {
+        !self.by_voxels
+    }
+
+    fn ridges(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Option<RidgeMap>, EngineError> {
+        if !self.finds_ridges() {
             return Ok(None);
         }
         let widest = task.part.bounds().size().norm();

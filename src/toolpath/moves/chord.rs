@@ -176,43 +176,18 @@ const MAX_SKIP: usize = 400;
 /// # Errors
 /// [`Cancelled`] when the watch says so.
 pub fn reduce(points: &[Point3], tolerance: f64, watch: &mut Watch<'_>) -> Result<Vec<Point3>, Cancelled> {
-    reduce_unevenly(points, tolerance, &|_| 1.0, watch)
-}
-
-/// As [`reduce`], where the point of an index may lie off its move by a `share` of the tolerance only, at most 1. Moves whose
-/// points all have a share of 1 are those of [`reduce`].
-///
-/// # Errors
-/// [`Cancelled`] when the watch says so.
-pub fn reduce_unevenly(
-    points: &[Point3],
-    tolerance: f64,
-    share: &dyn Fn(usize) -> f64,
-    watch: &mut Watch<'_>,
-) -> Result<Vec<Point3>, Cancelled> {
-    let evenly = reduced_indices(points, &|_| tolerance, watch)?;
-    let mut kept = Vec::with_capacity(evenly.len());
-    for ends in evenly.windows(2) {
-        let [from, to] = [ends[0], ends[1]];
-        if (from..=to).any(|k| share(k) < 1.0) {
-            let divided = reduced_indices(&points[from..=to], &|k| share(from + k) * tolerance, watch)?;
-            kept.extend(divided[..divided.len() - 1].iter().map(|k| from + k));
-        } else {
-            kept.push(from);
-        }
-    }
-    kept.extend(evenly.last());
+    let kept = reduced_indices(points, tolerance, watch)?;
     Ok(moved_aside(points, &kept, Side::Lesser, tolerance))
 }
 
 /// Indices of the points that the rest does without least: from each the longest straight move that stays within
-/// the `tolerance` of each point that it skips, given by index, mm. The ends stay.
+/// the `tolerance` of each point that it skips, mm. The ends stay.
 ///
 /// # Errors
 /// [`Cancelled`] when the watch says so.
 pub fn reduced_indices<P: Waypoint>(
     points: &[P],
-    tolerance: &dyn Fn(usize) -> f64,
+    tolerance: f64,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<usize>, Cancelled> {
     if points.is_empty() {
@@ -222,7 +197,7 @@ pub fn reduced_indices<P: Waypoint>(
     let mut from = 0;
     while from + 1 < points.len() {
         let fits =
-            |to: usize| (from + 1..to).all(|k| points[k].stray(&points[from], &points[to]) <= tolerance(k));
+            |to: usize| (from + 1..to).all(|k| points[k].stray(&points[from], &points[to]) <= tolerance);
         watch.step()?;
         let mut to = from + 1;
         while to + 1 < points.len() && to - from < MAX_SKIP && fits(to + 1) {
@@ -354,22 +329,6 @@ mod tests {
         let across = &mut |_: &Point3, _: &Point3, _: &mut Watch<'_>| panic!("no jump");
         sample_over_jumps(0.0, 1.0, 0.25, 1e-3, kink, across, watch).unwrap();
         assert_eq!(crossed, 1);
-    }
-
-    #[test]
-    fn shorter_chords_leave_those_elsewhere_as_they_are() {
-        let dense: Vec<Point3> = (0..=1000).map(|k| circle(0.003 * k as f64).unwrap()).collect();
-        let watch = &mut Watch::new(&Silent);
-        let evenly = reduce(&dense, 1e-3, watch).unwrap();
-        let near = |k: usize| (400..440).contains(&k);
-        let finer = reduce_unevenly(&dense, 1e-3, &|k| if near(k) { 0.25 } else { 1.0 }, watch).unwrap();
-        let far = |p: &&Point3| (**p - dense[420]).norm() > 2.0;
-        let [a, b] = [&evenly, &finer].map(|points| points.iter().filter(far).copied().collect::<Vec<_>>());
-        assert!(a == b && a.len() > 40, "{} {}", a.len(), b.len());
-        let longest =
-            finer.windows(2).filter(|w| (w[0] - dense[420]).norm() < 0.4).map(|w| (w[1] - w[0]).norm());
-        let most = longest.fold(0.0, f64::max);
-        assert!(most * most / 80.0 <= 0.25e-3 * 1.01, "{most}");
     }
 
     /// A path so rough that it would take billions of places ends soon after the user asks for it,

@@ -203,7 +203,7 @@ fn spread<P: Waypoint>(
     let on_curve: Vec<P> = curve.iter().enumerate().map(|(k, p)| place(k, *p)).collect();
     // What smoothing has used up.
     let used = points.iter().zip(&on_curve).map(|(p, q)| p.stray(q, q)).fold(0.0, f64::max);
-    let mut knots = reduced_indices(&on_curve, &|_| sagitta * (tolerance - used), watch)?;
+    let mut knots = reduced_indices(&on_curve, sagitta * (tolerance - used), watch)?;
     for _ in 0..DIVISIONS {
         let aside = moved_aside(curve, &knots, Side::Greater, tolerance - used);
         let tips: Vec<P> = knots.iter().zip(aside).map(|(&k, p)| place(k, p)).collect();

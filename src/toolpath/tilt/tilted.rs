@@ -262,7 +262,7 @@ pub(crate) fn thinned(
     monitor: &dyn Monitor,
 ) -> Result<Vec<ClPoint>, Cancelled> {
     let mut watch = Watch::new(monitor);
-    let mut waiting = reduced_indices(pass, &|_| tolerance, &mut watch)?;
+    let mut waiting = reduced_indices(pass, tolerance, &mut watch)?;
     waiting.reverse();
     let mut kept: Vec<usize> = waiting.pop().into_iter().collect();
     while let (Some(&from), Some(&to)) = (kept.last(), waiting.last()) {

@@ -1,7 +1,7 @@
 //! What every pass needs to know besides part and cutter.
 
 use super::{Correction, Earlier, Step};
-use crate::moves::chord::{Watch, reduce_unevenly, sample_over_jumps, sample_within_chord};
+use crate::moves::chord::{Watch, reduce, sample_over_jumps, sample_within_chord};
 use crate::moves::smooth::smooth_and_spread;
 use cutter::Cutter;
 use drop_cutter::DropCutter;
@@ -28,6 +28,12 @@ const REDUCTION_SHARE: f64 = 0.4;
 /// Where passes are spaced for a scallop, smoothing takes this share of the chord tolerance. With all of it there are 15 % fewer
 /// points, but 2 % of the ridges of a saddle stand over the target.
 const SMOOTHED_SHARE: f64 = 0.78;
+
+/// What a chord tolerance has left after sampling and point reduction, or smoothing, mm: by so much may points go deeper.
+pub fn unused_tolerance(chord_tolerance: f64, is_smoothed: bool) -> f64 {
+    let share = if is_smoothed { SMOOTHED_SHARE * (1.0 - SAMPLING_SHARE) } else { REDUCTION_SHARE };
+    (1.0 - SAMPLING_SHARE - share) * chord_tolerance
+}
 
 /// What the width of a strip goes by besides cutter and surface.
 #[derive(Debug, Clone, Copy, Default)]
@@ -135,14 +141,7 @@ impl<'a> PassSettings<'a> {
                 let share = if let Step::Scallop(_) = self.step { SMOOTHED_SHARE } else { 1.0 };
                 smooth_and_spread(points, sampling, share * (self.chord_tolerance - fine), watch)
             }
-            None => {
-                let shares: Option<Vec<f64>> = self
-                    .earlier
-                    .filter(|earlier| !earlier.chords.is_even())
-                    .map(|earlier| points.iter().map(|p| earlier.chords.at(p)).collect());
-                let share = |k: usize| shares.as_ref().map_or(1.0, |shares| shares[k]);
-                reduce_unevenly(points, REDUCTION_SHARE * self.chord_tolerance, &share, watch)
-            }
+            None => reduce(points, REDUCTION_SHARE * self.chord_tolerance, watch),
         }?;
         // Thousands of passes are kept, each of far fewer places than were sampled.
         moves.shrink_to_fit();

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::{Correction, Kept};
+use crate::lowering::Lowered;
 use geometry::{Aabb, Point3};
 use machine::Machine;
 
@@ -66,6 +67,9 @@ pub struct PlanSettings {
     pub machine: Machine,
     /// How passes are smoothed and joined.
     pub joining: Joining,
+    /// Whether what chords leave above the scallop height is measured and moves beside it go deeper then ([`Earlier::lowered`]): passes lie as
+    /// far apart as if chords raised nothing.
+    pub is_lowered_later: bool,
     /// What the tables of a plan may take beside its path, bytes; less makes them coarser.
     pub memory: u64,
     /// What an earlier plan of the same toolpath left.
@@ -77,9 +81,8 @@ pub struct PlanSettings {
 pub struct Earlier {
     /// By what passes spaced for a scallop lie wider or narrower than by calculation.
     pub correction: Correction,
-    /// The factor of the chord tolerance, at most 1, around tips of the cutter: where chords of two passes leave a ridge higher
-    /// than by calculation.
-    pub chords: Correction,
+    /// Places beside which moves of an upright cutter go a little deeper, round after round, where its passes stay as they are.
+    pub lowered: Vec<Vec<Lowered>>,
     /// Places on the design over which passes of their own are added, the most needed first.
     pub touch_up: Vec<Point3>,
     /// What its strategy planned: levels of its functions are placed anew.
@@ -122,6 +125,7 @@ impl Default for PlanSettings {
             plunge_rate: PLUNGE_RATE,
             machine: Machine::default(),
             joining: Joining::default(),
+            is_lowered_later: false,
             memory: MEMORY,
             earlier: None,
         }
