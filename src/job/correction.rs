@@ -60,6 +60,13 @@ const SLACK: f64 = 0.02;
 /// measurements are spent on a few per cent of length.
 const MEASURED_SLACK: f64 = 0.2;
 
+/// Moves go deeper until what is known of the ridges stands no higher than this share of the target: between the places that are known
+/// they rise by about as much as that leaves.
+const LOWERED_TO: f64 = 0.985;
+
+/// Where moves go deeper later, widths leave this share of what they can: ridges of a new plan stand at other heights.
+const LOWERED_LATER: f64 = 0.4;
+
 /// Ridges are about equally high where half of their length stands no lower than this share of the highest.
 const EVENLY_HIGH: f64 = 0.95;
 
@@ -492,10 +499,18 @@ impl Corrected<'_> {
     /// Widths that bring a height to the one that is aimed at, all by the same factor: where the last ones left the plan as it
     /// was, by half of what surely adds a pass.
     fn scaled(&self, widths: &Widths, height: f64) -> Widths {
-        let factor = (aim(self.goal.target) / height).sqrt();
+        let factor = (self.brought_to(widths, height) / height).sqrt();
         let passes = path_figures(&self.best.plan.path, 0.0).passes as f64;
         let one_more = if self.is_as_before() { ((passes - 1.0) / passes).sqrt() } else { 1.0 };
         widths.scaled(if factor < 1.0 { factor.min(one_more).max(MOST_NARROWED) } else { factor })
+    }
+
+    /// The height, mm, that widths are to bring another to: deeper moves take what is left then, unless they did already.
+    fn brought_to(&self, widths: &Widths, height: f64) -> f64 {
+        let aim = aim(self.goal.target);
+        let is_left = self.session.may_lower(self.request) && widths.lowered.is_empty();
+        let left = if is_left { LOWERED_LATER * self.room().max(0.0) } else { 0.0 };
+        if height > aim + left { aim + left } else { aim }
     }
 
     /// Whether other widths changed no more than the ends of passes: few are spread over a part.
@@ -511,7 +526,7 @@ impl Corrected<'_> {
     /// without such places.
     fn corrected(&self, tried: &Tried) -> Option<Widths> {
         let Tried { widths, .. } = tried;
-        let near = self.standing_near(&tried.standing);
+        let near = self.standing_near(tried);
         let high: Vec<HighPlace> = near.iter().filter(|place| place.over > 0.0).copied().collect();
         if high.is_empty() {
             return None;
@@ -583,7 +598,7 @@ impl Corrected<'_> {
     }
 
     /// The places of a plan that come near the target.
-    fn standing_near(&self, standing: &Standing) -> Vec<HighPlace> {
+    fn standing_near(&self, Tried { standing, widths, .. }: &Tried) -> Vec<HighPlace> {
         let cutter = &self.session.scene.cutter;
         let target = self.goal.target;
         let margin = standing.round.margin(target);
@@ -592,10 +607,11 @@ impl Corrected<'_> {
             HighPlace {
                 at,
                 normal,
+                top: at + normal * height,
                 tip: at + cutter.contact_to_tip(&normal),
                 over: height + margin - target,
-                deeper: height + margin - aim(target),
-                factor: aim(target) / height,
+                deeper: height + margin - LOWERED_TO * target,
+                factor: self.brought_to(widths, height) / height,
             }
         });
         places.filter(|place| place.deeper > 0.0).collect()

@@ -33,7 +33,7 @@ pub struct RidgePlace {
 
 /// Ridges above this share of the scallop limit come near it: what is cut once more, with moves that are a little others,
 /// may stand above it.
-pub(crate) const NEAR_LIMIT: f64 = 0.99;
+pub(crate) const NEAR_LIMIT: f64 = 0.985;
 
 /// Which ridges may exceed the scallop target. By default none may.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

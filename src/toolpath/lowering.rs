@@ -1,55 +1,58 @@
 //! Moves that go a little deeper beside places where an earlier plan left a little too much.
 //!
 //! What is cut deeper can only sink: no pass has to be placed anew, and no ridge rises elsewhere, as it may when chords or levels
-//! change. Chords leave a share of their tolerance unused ([`unused`](crate::vocabulary::unused_tolerance)); no point goes deeper by more.
+//! change. Chords leave a share of their tolerance unused ([`unused_tolerance`](crate::unused_tolerance)); no point goes deeper by more.
 //!
-//! Enters: passes as tips of the cutter, and places, each with the way that the moves beside it are to go. Leaves: the passes with
-//! the same points, some of them lower. A ridge sinks by as much as the moves on both its sides.
+//! Enters: passes as tips of an upright cutter, and places, each with the way that the moves that cut it are to go. Leaves: the passes
+//! with the same points, some of them lower. A ridge sinks by as much as the moves on both its sides.
 
 use std::collections::HashMap;
 
-use geometry::{Point3, Vector3, distance_to_segment};
+use cutter::Cutter;
+use geometry::{Point2, Point3, Vector3};
 use motion::{ROUNDING, in_last_decimals};
+use work::parallel;
 
-/// Moves serve a place that are no farther from it than so many times the nearest one: a ridge is left by moves equally far away.
-const BESIDE: f64 = 1.5;
+/// A move cuts a place too where it leaves there no more than so many times the way that it is to go above the place: on the other side
+/// of a ridge.
+const BESIDE: f64 = 2.0;
 
-/// Two moves that meet are as near where their distances differ by less than this factor.
-const ALIKE: f64 = 1.001;
+/// The steepest ground whose normal tells how much lower a way leads.
+const LEAST_UPRIGHT: f64 = 0.05;
 
-/// How often the distance is doubled within which moves are sought.
-const DOUBLINGS: usize = 5;
+/// Cells of the plan view along a radius of the cutter, by which places are found that a move may cut.
+const CELLS_A_RADIUS: f64 = 4.0;
 
-/// A place beside which moves are to go deeper.
+/// A place where moves are to go deeper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lowered {
-    /// The tip of an upright cutter that touches the part there.
-    pub tip: Point3,
-    /// Which way the moves beside it go, mm: against the part's normal.
+    /// The top of what stands there.
+    pub top: Point3,
+    /// Which way the moves that left it go, mm: against the part's normal.
     pub by: Vector3,
 }
 
-/// The passes after rounds of places, one after the other. Moves beside a place are about `reach` mm away; no point goes farther
-/// than `most` mm in all.
+/// The passes of a cutter after rounds of places, one after the other. No point goes farther than `most` mm in all.
 pub(crate) fn lowered(
     passes: &[Vec<Point3>],
+    cutter: &Cutter,
     rounds: &[Vec<Lowered>],
-    reach: f64,
     most: f64,
 ) -> Vec<Vec<Point3>> {
-    let mut now = passes.to_vec();
-    for places in rounds {
-        let deeper = ways(&now, places, reach);
-        for ((pass, before), ways) in now.iter_mut().zip(passes).zip(&deeper) {
-            for ((point, before), way) in pass.iter_mut().zip(before).zip(ways) {
-                let deeper = moved(*point, way);
+    let rounds: Vec<Places> = rounds.iter().map(|places| Places::new(places, cutter)).collect();
+    parallel::map(passes.len(), |k| {
+        let (before, mut now) = (&passes[k], passes[k].clone());
+        for places in &rounds {
+            let ways = places.ways(&now);
+            for ((point, before), way) in now.iter_mut().zip(before).zip(ways) {
+                let deeper = moved(*point, &way);
                 if (deeper - before).norm() <= most {
                     *point = deeper;
                 }
             }
         }
-    }
-    now
+        now
+    })
 }
 
 /// A point as a program writes it, moved by a way and a little on, to the nearest place that a program can write.
@@ -71,68 +74,91 @@ fn moved(point: Point3, way: &Vector3) -> Point3 {
     nearest.map_or(point, |by| Point3::from((written + by) * LAST))
 }
 
-/// For each point of each pass the longest way that a place asks of the moves at it.
-fn ways(passes: &[Vec<Point3>], places: &[Lowered], reach: f64) -> Vec<Vec<Vector3>> {
-    let mut ways: Vec<Vec<Vector3>> = passes.iter().map(|pass| vec![Vector3::zeros(); pass.len()]).collect();
-    let mut waiting = places.to_vec();
-    let mut reach = reach;
-    for _ in 0..=DOUBLINGS {
-        let near = moves_near(passes, &waiting, reach);
-        let mut left = Vec::new();
-        for (place, moves) in waiting.into_iter().zip(near) {
-            let nearest = moves.iter().map(|(distance, ..)| *distance).fold(f64::INFINITY, f64::min);
-            // Farther moves were not sought.
-            if BESIDE * nearest > reach {
-                left.push(place);
-                continue;
+/// Places by the cells of the plan view from which a cutter reaches them.
+struct Places<'a> {
+    places: &'a [Lowered],
+    cutter: &'a Cutter,
+    around: HashMap<[i64; 2], Vec<usize>>,
+}
+
+impl<'a> Places<'a> {
+    fn new(places: &'a [Lowered], cutter: &'a Cutter) -> Self {
+        let mut found = Self { places, cutter, around: HashMap::new() };
+        for (k, place) in places.iter().enumerate() {
+            let [x, y] = found.cell(&place.top);
+            let far = CELLS_A_RADIUS as i64 + 1;
+            for (dx, dy) in (-far..=far).flat_map(|dx| (-far..=far).map(move |dy| (dx, dy))) {
+                found.around.entry([x + dx, y + dy]).or_default().push(k);
             }
-            let beside: Vec<_> = moves.into_iter().filter(|near| near.0 <= BESIDE * nearest).collect();
-            // Of moves one after the other the nearest one cuts the place.
-            for run in beside.chunk_by(|a, b| (a.1, a.2 + 1) == (b.1, b.2)) {
-                let nearest = run.iter().map(|(distance, ..)| *distance).fold(f64::INFINITY, f64::min);
-                for &(_, pass, k) in run.iter().filter(|near| near.0 <= ALIKE * nearest) {
-                    for way in &mut ways[pass][k..=k + 1] {
-                        if place.by.norm_squared() > way.norm_squared() {
-                            *way = place.by;
-                        }
-                    }
+        }
+        found
+    }
+
+    /// A move is looked at in steps of a cell: half of one lies between a place within a radius and the next step.
+    fn cell(&self, p: &Point3) -> [i64; 2] {
+        [p.x, p.y].map(|x| (x * CELLS_A_RADIUS / self.cutter.radius()).floor() as i64)
+    }
+
+    /// For each point of a pass the longest way that a place asks of the moves at it.
+    fn ways(&self, pass: &[Point3]) -> Vec<Vector3> {
+        let mut ways = vec![Vector3::zeros(); pass.len()];
+        for (k, ends) in pass.windows(2).enumerate() {
+            let way = ends[1] - ends[0];
+            let steps = (way.xy().norm() * CELLS_A_RADIUS / self.cutter.radius()).ceil().max(1.0) as usize;
+            let mut cells: Vec<[i64; 2]> =
+                (0..=steps).map(|step| self.cell(&(ends[0] + way * (step as f64 / steps as f64)))).collect();
+            cells.dedup();
+            for &place in cells.iter().filter_map(|cell| self.around.get(cell)).flatten() {
+                let Lowered { top, by } = self.places[place];
+                let is_longer = |of: &Vector3| by.norm_squared() > of.norm_squared();
+                if !ways[k..=k + 1].iter().any(is_longer) {
+                    continue;
+                }
+                let length = by.norm();
+                let lower = length * length / by.z.abs().max(LEAST_UPRIGHT * length);
+                let most = top.z + BESIDE * lower;
+                if left_over(self.cutter, [&ends[0], &ends[1]], &top.xy(), most) <= most {
+                    ways[k..=k + 1].iter_mut().filter(|of| is_longer(of)).for_each(|of| *of = by);
                 }
             }
         }
-        waiting = left;
-        reach *= 2.0;
+        ways
     }
-    ways
 }
 
-/// For each place the distance, the pass and the first point of all moves within `reach` mm, at least; in the order of passes.
-fn moves_near(passes: &[Vec<Point3>], places: &[Lowered], reach: f64) -> Vec<Vec<(f64, usize, usize)>> {
-    let cell = |p: &Point3| [p.x, p.y].map(|x| (x / reach).floor() as i64);
-    let mut around: HashMap<[i64; 2], Vec<usize>> = HashMap::new();
-    for (k, place) in places.iter().enumerate() {
-        let [x, y] = cell(&place.tip);
-        for (dx, dy) in (-2..=2).flat_map(|dx| (-2..=2).map(move |dy| (dx, dy))) {
-            around.entry([x + dx, y + dy]).or_default().push(k);
+/// The height that a cutter leaves over a place on a straight move, mm; infinite where it does not come over it, or where that is surely
+/// more than `most`.
+fn left_over(cutter: &Cutter, [a, b]: [&Point3; 2], place: &Point2, most: f64) -> f64 {
+    let (low, high) = if a.z <= b.z { (a, b) } else { (b, a) };
+    let (way, to) = ((high - low).xy(), place - low.xy());
+    let length = way.norm();
+    // How far along the climb the axis stands where the cutter is lowest over the place: of a convex function the nearest end is the least.
+    let (at, along, across) = if length > 0.0 {
+        let (along, across) = (to.dot(&way) / length, to.perp(&way).abs() / length);
+        // It is no lower beside the axis than abeam of it, and a convex function lies above its tangent in the middle of the move.
+        let abeam = cutter.height(across).map(|height| low.z + height);
+        if abeam.is_none_or(|abeam| abeam.max(least_by_tangent(cutter, [low, high], place)) > most) {
+            return f64::INFINITY;
         }
-    }
-    let mut near = vec![Vec::new(); places.len()];
-    for (of, pass) in passes.iter().enumerate() {
-        for (k, ends) in pass.windows(2).enumerate() {
-            let way = ends[1] - ends[0];
-            let steps = (way.xy().norm() / reach).ceil().max(1.0) as usize;
-            let mut asked: Vec<usize> = (0..=steps)
-                .filter_map(|step| around.get(&cell(&(ends[0] + way * (step as f64 / steps as f64)))))
-                .flatten()
-                .copied()
-                .collect();
-            asked.sort_unstable();
-            asked.dedup();
-            for place in asked {
-                near[place].push((distance_to_segment(&places[place].tip, &ends[0], &ends[1]), of, k));
-            }
-        }
-    }
-    near
+        let ahead = cutter.profile().ahead((high.z - low.z) / length, across).0;
+        ((along - ahead).clamp(0.0, length), along, across)
+    } else {
+        (0.0, 0.0, to.norm())
+    };
+    let climbed = if length > 0.0 { (high.z - low.z) * at / length } else { 0.0 };
+    cutter.height((along - at).hypot(across)).map_or(f64::INFINITY, |height| low.z + climbed + height)
+}
+
+/// A height, mm, that what a cutter leaves over a place is no less than anywhere on a move with a length in the plan view.
+fn least_by_tangent(cutter: &Cutter, [low, high]: [&Point3; 2], place: &Point2) -> f64 {
+    let way = high - low;
+    let middle = low + 0.5 * way;
+    let off = middle.xy() - place;
+    let rho = off.norm();
+    let Some(height) = cutter.height(rho) else { return f64::NEG_INFINITY };
+    let incline = cutter.profile().incline(rho);
+    let rise = if rho > 0.0 { incline.sin / incline.cos * off.dot(&way.xy()) / rho } else { 0.0 };
+    middle.z + height - 0.5 * (way.z + rise).abs()
 }
 
 #[cfg(test)]
@@ -145,10 +171,6 @@ mod tests {
         (0..10).map(line).collect()
     }
 
-    fn place(x: f64, y: f64, by: f64) -> Lowered {
-        Lowered { tip: Point3::new(x, y, 0.0), by: Vector3::new(0.0, 0.0, -by) }
-    }
-
     /// Pass, x and depth, in last decimals, of all points that went deeper.
     fn depths(passes: &[Vec<Point3>]) -> Vec<(usize, f64, f64)> {
         let all = passes.iter().enumerate().flat_map(|(y, pass)| pass.iter().map(move |p| (y, p)));
@@ -157,18 +179,50 @@ mod tests {
 
     #[test]
     fn the_moves_on_both_sides_of_a_ridge_go_deeper_and_no_others() {
-        // Between two passes, beside the last one, and far away from all.
-        let places = vec![place(20.5, 4.5, 3e-4), place(7.0, 9.4, 1e-4), place(7.0, 80.0, 2e-4)];
-        let lower = |rounds: &[Vec<Lowered>]| lowered(&passes(), rounds, 0.6, 5e-4);
-        let of_ridge = |depth: f64| [(4, 20.0), (4, 22.0), (5, 20.0), (5, 22.0)].map(|(y, x)| (y, x, depth));
-        let of_last = |depth: f64| [(9, 6.0, depth), (9, 8.0, depth)];
-        let once = lower(std::slice::from_ref(&places));
-        assert_eq!(depths(&once), [&of_ridge(3.0)[..], &of_last(1.0)].concat());
-        // Once more beside the last pass; beside the ridge that would be too deep.
-        let twice = lower(&[places.clone(), places]);
-        assert_eq!(depths(&twice), [&of_ridge(3.0)[..], &of_last(2.0)].concat());
-        assert_eq!(lower(&[]), passes());
-        assert!(lowered(&[], &[vec![place(0.0, 0.0, 1e-4)]], 0.6, 1.0).is_empty());
+        for cutter in [Cutter::ball(6.0), Cutter::bull(6.0, 1.0)].map(Result::unwrap) {
+            let [half, aside] = [0.5, 0.4].map(|off| cutter.height(off + cutter.flat_radius()).unwrap());
+            let place = |x: f64, y: f64, z: f64, by: f64| Lowered {
+                top: Point3::new(x, y, z),
+                by: Vector3::new(0.0, 0.0, -by),
+            };
+            let far = cutter.flat_radius();
+            // Beside the last pass, and far away from all.
+            let places = vec![place(7.0, 9.4 + far, aside, 1e-4), place(7.0, 80.0, half, 2e-4)];
+            let lower = |rounds: &[Vec<Lowered>]| lowered(&passes(), &cutter, rounds, 5e-4);
+            let of_last = |depth: f64| vec![(9, 6.0, depth), (9, 8.0, depth)];
+            assert_eq!(depths(&lower(std::slice::from_ref(&places))), of_last(1.0));
+            assert_eq!(depths(&lower(&[places.clone(), places.clone()])), of_last(2.0));
+            // What would be too deep is left as it is.
+            let deep = vec![place(7.0, 9.4 + far, aside, 4.5e-4)];
+            assert_eq!(depths(&lower(&[places, deep])), of_last(1.0));
+            assert_eq!(lower(&[]), passes());
+            if cutter.is_ball() {
+                let ridge = vec![place(21.0, 4.5, half, 3e-4)];
+                let wanted = [(4, 20.0, 3.0), (4, 22.0, 3.0), (5, 20.0, 3.0), (5, 22.0, 3.0)];
+                assert_eq!(depths(&lower(&[ridge])), wanted);
+            }
+        }
+    }
+
+    /// Against the least of many places along the move.
+    #[test]
+    fn what_a_move_leaves_over_a_place_is_that_of_brute_force() {
+        let cutters = [Cutter::ball(6.0), Cutter::bull(6.0, 1.0), Cutter::flat(6.0)].map(Result::unwrap);
+        for (k, cutter) in cutters.iter().cycle().enumerate().skip(1).take(300) {
+            let [a, b, c, d] = [0.7, 1.3, 2.1, 3.7].map(|step| (step * k as f64).sin());
+            let (from, to) = (Point3::new(2.0 * a, b, 0.0), Point3::new(2.0 * b, 2.0 * c, 2.0 * d));
+            let place = Point2::new(1.5 * d, 1.5 * a);
+            let over = |t: f64| {
+                let at = from + (to - from) * t;
+                cutter.height((at.xy() - place).norm()).map_or(f64::INFINITY, |height| at.z + height)
+            };
+            let least = (0..=100_000).map(|k| over(1e-5 * f64::from(k))).fold(f64::INFINITY, f64::min);
+            let found = left_over(cutter, [&from, &to], &place, f64::INFINITY);
+            assert!(found == least || (found - least).abs() < 1e-4, "{k}: {found} {least}");
+            // Nothing is left out that leaves no more than is asked for.
+            assert_eq!(left_over(cutter, [&from, &to], &place, least + 1e-4), found);
+            assert_eq!(left_over(cutter, [&from, &to], &place, f64::NEG_INFINITY), f64::INFINITY);
+        }
     }
 
     /// What is written is rounded; it goes as deep as asked all the same, and hardly deeper.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::facets::facet_charge;
 use crate::levels::{obedience, planned_field};
-use crate::link::{join, join_tilted, plane_interval, time_to_neighbour};
+use crate::link::{join, join_tilted, time_to_neighbour};
 use crate::lowering::lowered;
 use crate::strategies::words_for;
 use crate::surface::mesh_surface;
@@ -128,19 +128,17 @@ pub fn plan(
         Ok((kept, added))
     })?;
     let further = touch_up::note(&added);
-    let all = deeper(&kept.passes, cutter, settings).into_iter().chain(added).collect();
-    let path = join(all, strategy.both_ways(), &setup)?;
+    let all = kept.passes.iter().cloned().chain(added).collect();
+    let path = join(deeper(all, cutter, settings), strategy.both_ways(), &setup)?;
     Ok(Plan::again(path, kept, further.into_iter().collect()))
 }
 
 /// Passes of an upright cutter, deeper beside places where an earlier plan left a little too much.
-fn deeper(passes: &[Vec<Point3>], cutter: &Cutter, settings: &PlanSettings) -> Vec<Vec<Point3>> {
+fn deeper(passes: Vec<Vec<Point3>>, cutter: &Cutter, settings: &PlanSettings) -> Vec<Vec<Point3>> {
     let most = unused_tolerance(settings.chord_tolerance, settings.joining.smoothing);
     match &settings.earlier {
-        Some(earlier) if earlier.again => {
-            lowered(passes, &earlier.lowered, plane_interval(cutter, settings.step), most)
-        }
-        _ => passes.to_vec(),
+        Some(earlier) if earlier.again => lowered(&passes, cutter, &earlier.lowered, most),
+        _ => passes,
     }
 }
 

@@ -24,11 +24,13 @@ pub(super) struct HighPlace {
     pub at: Point3,
     /// The part's outward unit normal there.
     pub normal: Vector3,
+    /// The top of what stands there.
+    pub top: Point3,
     /// The tip of an upright cutter that touches the part there.
     pub tip: Point3,
     /// By how much it may stand above the target, mm.
     pub over: f64,
-    /// By how much it may stand above what is aimed at, mm.
+    /// By how much moves beside it should go deeper, mm.
     pub deeper: f64,
     /// The height that it is to have as a share of the one it has.
     pub factor: f64,
@@ -75,7 +77,7 @@ impl Widths {
 
     /// How much deeper than planned moves beside a place go, mm.
     pub fn depth_at(&self, place: &HighPlace) -> f64 {
-        let beside = |lowered: &&Lowered| (lowered.tip - place.tip).norm() <= self.interval;
+        let beside = |lowered: &&Lowered| (lowered.top - place.top).norm() <= self.interval;
         let deepest = |round: &Vec<Lowered>| {
             round.iter().filter(beside).map(|lowered| lowered.by.norm()).fold(0.0, f64::max)
         };
@@ -86,7 +88,7 @@ impl Widths {
     pub fn lowered(&self, places: &[HighPlace], room: f64) -> Self {
         let deeper = |place: &HighPlace| {
             let left = room - 2.0 * ROUNDING - self.depth_at(place);
-            Lowered { tip: place.tip, by: -place.normal * place.deeper.min(left) }
+            Lowered { top: place.top, by: -place.normal * place.deeper.min(left) }
         };
         let round = places.iter().map(deeper).collect();
         Self { lowered: self.lowered.iter().cloned().chain([round]).collect(), ..self.clone() }
