@@ -136,6 +136,7 @@ mod tests {
             HighPlace {
                 at,
                 normal: Vector3::z(),
+                top: at,
                 tip: at,
                 over: height - 1.0,
                 deeper: height - 0.99,

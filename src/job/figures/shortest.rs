@@ -23,7 +23,8 @@ pub struct ShortestFigures {
     pub contact_length_mm: f64,
     /// The first of these over the path's cutting length.
     pub efficiency: f64,
-    /// The first of these at the feed, s: no path below the scallop height takes less, whatever its turns and links.
+    /// The first of these at the feed, s: no path below the scallop height that cuts no deeper than the part takes less, whatever its turns
+    /// and links.
     pub least_time_s: f64,
     /// That over the path's machining time.
     pub time_efficiency: f64,
