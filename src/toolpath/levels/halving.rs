@@ -124,8 +124,9 @@ pub(crate) fn along_and_between<S: LevelSource>(
     let further: usize = work.iter().map(|(_, further)| further).sum();
     let mut notes = Vec::new();
     if further > 0 {
+        let passes = if further == 1 { "pass was" } else { "passes were" };
         notes.push(format!(
-            "{further} short passes were put between others where the interval had to be smaller"
+            "{further} short {passes} put between others where the interval had to be smaller"
         ));
     }
     let mut all = Passes { notes, ..Passes::default() };

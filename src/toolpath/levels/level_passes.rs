@@ -113,7 +113,8 @@ fn passes_along(
         let lengths = [height, settings.sampling];
         let further = gaps::close(&guide, chart, cutter, field, lengths, &mut passes, monitor)?;
         if further > 0 {
-            notes.push(format!("{further} short passes close gaps where the passes bend around or end"));
+            let passes = if further == 1 { "pass closes" } else { "passes close" };
+            notes.push(format!("{further} short {passes} gaps where the passes bend around or end"));
         }
     }
     passes.notes.splice(0..0, notes);
