@@ -93,6 +93,9 @@ const TOUCH_UP_LENGTH: f64 = 3.0;
 /// Passes of their own and the ways to them are no longer in all than this share of the path.
 const MOST_TOUCH_UP: f64 = 0.04;
 
+/// The same where narrower passes were in vain.
+const MOST_TOUCH_UP_IN_VAIN: f64 = 0.1;
+
 /// The share of the places above the target that is reckoned to be seen while only ridges are measured.
 const SEEN: f64 = 0.5;
 
@@ -388,10 +391,10 @@ impl Corrected<'_> {
                 let again = self.session.look(self.request, self.engine, path, self.closeness, monitor)?;
                 let Some(found) = Standing::of_all(&again, &planned, factors) else { break };
                 // A shorter path is no reason to give up a plan that passes.
-                gain = if is_passing && !self.session.passes(&again) {
-                    self.keep_best(&planned, next, found)
-                } else {
-                    self.keep_if_better(planned, next, found)
+                gain = match (is_passing, self.session.passes(&again)) {
+                    (true, false) => self.keep_best(&planned, next, found),
+                    (false, true) => self.keep(planned, next, found),
+                    _ => self.keep_if_better(planned, next, found),
                 };
                 if gain != Gain::None {
                     looked = Some(again);
@@ -471,12 +474,12 @@ impl Corrected<'_> {
             (true, 1) => {
                 let worth =
                     |latest: &&Tried| latest.standing.round.highest() <= (1.0 + WORTH_FOLLOWING) * target;
-                self.latest.as_ref().filter(worth).and_then(|latest| self.corrected(latest))
+                self.latest.as_ref().filter(worth).and_then(|latest| self.corrected(latest, in_vain))
             }
-            (false, 0) => self.corrected(&self.tried).or_else(in_proportion),
-            (false, ..=MOST_FOLLOWED) => self.corrected(last).or_else(in_proportion),
+            (false, 0) => self.corrected(&self.tried, in_vain).or_else(in_proportion),
+            (false, ..=MOST_FOLLOWED) => self.corrected(last, in_vain).or_else(in_proportion),
             // Where all ridges hold, few places along borders are left.
-            (false, ..=MOST_IN_VAIN) => in_proportion().or_else(|| self.corrected(last)),
+            (false, ..=MOST_IN_VAIN) => in_proportion().or_else(|| self.corrected(last, in_vain)),
             _ => None,
         }
     }
@@ -524,20 +527,20 @@ impl Corrected<'_> {
     /// The widths of a plan corrected by the places where it leaves too much: by deeper moves, and by passes of their own for few that
     /// stand too high for that, once. Many get narrower widths, all of the plan where they stand little above the target. `None`
     /// without such places.
-    fn corrected(&self, tried: &Tried) -> Option<Widths> {
+    fn corrected(&self, tried: &Tried, in_vain: usize) -> Option<Widths> {
         let Tried { widths, .. } = tried;
         let near = self.standing_near(tried);
         let high: Vec<HighPlace> = near.iter().filter(|place| place.over > 0.0).copied().collect();
         if high.is_empty() {
             return None;
         }
-        let may_lower = |place: &HighPlace| self.may_lower(widths, place);
-        let deep: Vec<HighPlace> = high.iter().filter(|place| !may_lower(place)).copied().collect();
-        let shallow: Vec<HighPlace> = near.into_iter().filter(may_lower).collect();
-        let lowered = widths.lowered(&shallow, self.room());
+        let deep: Vec<HighPlace> =
+            high.iter().filter(|place| !self.may_lower(widths, place)).copied().collect();
+        let lowered = self.lowered(widths, &near);
         if deep.is_empty() {
-            return Some(lowered);
+            return lowered;
         }
+        let lowered = lowered.unwrap_or_else(|| widths.clone());
         // Where a measurement finds others beside those that were served, there are more to come.
         let measured = self.rounds.iter().filter(|round| round.measured).count();
         let was_served = measured > 1 && tried.standing.round.measured && !widths.touch_up.is_empty();
@@ -545,7 +548,7 @@ impl Corrected<'_> {
             |places: &[HighPlace]| was_served || places.iter().any(|place| widths.is_touched_up(place));
         // Along borders narrower widths may change nothing.
         let is_left = tried.standing.round.is_on_border() && self.is_as_before();
-        let is_worth = self.are_few(&deep, tried) || is_left && tried.standing.round.measured;
+        let is_worth = self.are_few(&deep, tried, in_vain > 0) || is_left && tried.standing.round.measured;
         if is_worth && !is_served(&deep) {
             return Some(lowered.touched_up(&deep));
         }
@@ -564,14 +567,22 @@ impl Corrected<'_> {
         unused.min(tolerance.gouge - (chord - unused))
     }
 
+    /// Widths with deeper moves beside the places where that is enough; `None` without such places.
+    fn lowered(&self, widths: &Widths, near: &[HighPlace]) -> Option<Widths> {
+        let may_lower = |place: &&HighPlace| self.may_lower(widths, place);
+        let shallow: Vec<HighPlace> = near.iter().filter(may_lower).copied().collect();
+        (!shallow.is_empty()).then(|| widths.lowered(&shallow, self.room()))
+    }
+
     /// Whether moves beside a place can go as much deeper as it stands too high.
     fn may_lower(&self, widths: &Widths, place: &HighPlace) -> bool {
         self.session.may_lower(self.request)
             && widths.depth_at(place) + place.over + 2.0 * ROUNDING <= self.room()
     }
 
-    /// Whether places take so little that passes of their own are shorter than a plan with all passes nearer to each other.
-    fn are_few(&self, places: &[HighPlace], tried: &Tried) -> bool {
+    /// Whether places take so little that passes of their own are shorter than a plan with all passes nearer to each other, or than may be
+    /// where such plans were in vain.
+    fn are_few(&self, places: &[HighPlace], tried: &Tried, is_in_vain: bool) -> bool {
         let Widths { interval, .. } = tried.widths;
         let planned = &tried.kept.passes;
         // What a pass takes beside its length, as those of the plan do on average.
@@ -581,7 +592,8 @@ impl Corrected<'_> {
         let round = &tried.standing.round;
         let nearer = (round.highest() / aim(self.goal.target)).sqrt() - 1.0;
         let seen = if round.measured { 1.0 } else { SEEN };
-        let mut left = (seen * nearer).min(MOST_TOUCH_UP) * whole;
+        let share = if is_in_vain { MOST_TOUCH_UP_IN_VAIN } else { (seen * nearer).min(MOST_TOUCH_UP) };
+        let mut left = share * whole;
         let mut fits = |length: f64| {
             left -= length + off_pass;
             left >= 0.0
@@ -673,17 +685,22 @@ impl Corrected<'_> {
     }
 
     fn keep_if_better(&mut self, planned: Planned, widths: Widths, found: Standing) -> Gain {
-        let gain = found.round.gain_over(&self.tried.standing.round, &self.goal);
+        match found.round.gain_over(&self.tried.standing.round, &self.goal) {
+            Gain::None => self.keep_best(&planned, widths, found),
+            gain => {
+                self.keep(planned, widths, found);
+                gain
+            }
+        }
+    }
+
+    /// Keeps this plan.
+    fn keep(&mut self, planned: Planned, widths: Widths, found: Standing) -> Gain {
         self.rounds.push(found.round);
         let tried = Tried { widths, standing: found, kept: planned.plan.kept.clone() };
-        self.latest = None;
-        if gain == Gain::None {
-            self.latest = Some(tried);
-        } else {
-            self.narrower = self.tried.standing.round.holds(&self.goal).then(|| self.tried.widths.clone());
-            (self.best, self.tried, self.kept) = (planned, tried, self.rounds.len() - 1);
-        }
-        gain
+        self.narrower = self.tried.standing.round.holds(&self.goal).then(|| self.tried.widths.clone());
+        (self.best, self.tried, self.latest, self.kept) = (planned, tried, None, self.rounds.len() - 1);
+        Gain::Much
     }
 }
 
