@@ -4,8 +4,8 @@
 //! Enters: a toolpath that is planned by a scallop height. Leaves: the best of a few plans with its measurement, and what each
 //! round found.
 //!
-//! Moves go a little deeper beside places that stand a little too high, as far as the chord tolerance and the gouge tolerance allow. Where
-//! that is known beforehand, passes are planned as if chords raised nothing. All passes stay where they are then, and nothing can rise. Few
+//! Moves go a little deeper beside places that stand a little too high, as far as the chord tolerance and the gouge tolerance allow. All
+//! passes stay where they are then, and nothing can rise. Plans that can be corrected so are made as if chords raised nothing. Few
 //! places that stand higher get short passes of their own, which leave all others where they are as well.
 //! Else levels are placed anew, narrower around the places that stood too high, of functions that are kept from round to round.
 //! Where many stand little above the target, the widths of the whole plan are scaled, which leaves its passes in shape; so
@@ -323,10 +323,13 @@ impl Session {
         request.correct && request.axis.is_none() && self.pocket.is_none()
     }
 
-    /// Whether a toolpath is planned as if chords raised nothing. Where all has to be measured to find such places, passes that leave
-    /// none take less time.
+    /// Whether a toolpath is planned as if chords raised nothing. The gouge tolerance has to leave moves the room for it; and where all has
+    /// to be measured to find such places, passes that leave none take less time.
     pub(crate) fn is_lowered_later(&self, request: &ToolpathRequest) -> bool {
-        self.may_lower(request) && self.scene.simulation.engine.for_path(request.tilts()).finds_ridges()
+        let tolerance = &self.scene.tolerance;
+        self.may_lower(request)
+            && tolerance.gouge >= tolerance.chord
+            && self.scene.simulation.engine.for_path(request.tilts()).finds_ridges()
     }
 
     /// Whether all of the surface that was measured passes, where no cell sees as well.
@@ -577,7 +580,7 @@ impl Corrected<'_> {
     /// Whether moves beside a place can go as much deeper as it stands too high.
     fn may_lower(&self, widths: &Widths, place: &HighPlace) -> bool {
         self.session.may_lower(self.request)
-            && widths.depth_at(place) + place.over + 2.0 * ROUNDING <= self.room()
+            && widths.depth_at(place) + place.over.max(0.0) + 2.0 * ROUNDING <= self.room()
     }
 
     /// Whether places take so little that passes of their own are shorter than a plan with all passes nearer to each other, or than may be

@@ -88,7 +88,7 @@ impl Widths {
     pub fn lowered(&self, places: &[HighPlace], room: f64) -> Self {
         let deeper = |place: &HighPlace| {
             let left = room - 2.0 * ROUNDING - self.depth_at(place);
-            Lowered { top: place.top, by: -place.normal * place.deeper.min(left) }
+            Lowered { top: place.top, by: -place.normal * place.deeper.min(left).max(0.0) }
         };
         let round = places.iter().map(deeper).collect();
         Self { lowered: self.lowered.iter().cloned().chain([round]).collect(), ..self.clone() }
@@ -153,6 +153,9 @@ mod tests {
         let twice = once.narrowed(&[above(0.0, 1.1)]).correction();
         assert!((twice.at(&places[0].at) - wanted[0] * 0.99 / 1.1).abs() < 1e-12);
         assert!((twice.at(&places[1].at) - wanted[3]).abs() < 1e-12);
+        // Without room nothing moves, and nothing ever moves up.
+        let ways = [0.0, 0.3].map(|room| once.lowered(&[above(0.0, 1.2)], room).lowered[0][0].by.z);
+        assert!(ways[0] == 0.0 && ways[1] < -0.2, "{ways:?}");
         // Deeper moves leave all widths as they are, and are void where widths change.
         let deeper = once.lowered(&[above(0.0, 1.2)], 0.3).lowered(&[above(0.5, 1.1)], 0.4);
         assert!(deeper.is_alike(&once) && !deeper.is_alike(&by_calculation));
