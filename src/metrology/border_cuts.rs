@@ -18,6 +18,7 @@ use super::figures::{GougeFigures, GougeRegion, NUMERICAL_FLOOR};
 use super::inspection::Inspection;
 use cutter::Cutter;
 use geometry::{Point2, Point3, Vector3};
+use part::{Part, PatchPoint};
 use work::monitor::{self, Cancelled, Monitor};
 
 /// Pieces of borders are no longer than this many radii of the narrowest cutter.
@@ -26,15 +27,14 @@ const LONGEST_PIECE: f64 = 2.0;
 /// Steps of Newton's method for the meeting of a normal with what a move sweeps; it converges from one side.
 const STEPS: usize = 24;
 
-/// Normals of one side of an edge agree to this cosine with that of its triangle.
-const SAME_SIDE: f64 = 0.9;
-
 /// Halvings of a piece at most: to a millionth of it.
 const MOST_HALVINGS: u32 = 20;
 
-/// A straight piece of the border.
+/// A piece of the border that is straight, or nearly: on a patch the piece of a curve, its ends on it.
 struct BorderPiece {
     ends: [Point3; 2],
+    /// Parameters of the ends, on a patch.
+    at: Option<[PatchPoint; 2]>,
     /// Of the triangle that it bounds.
     normal: Vector3,
     /// Unit vector along the triangle, square to the piece.
@@ -52,8 +52,19 @@ struct BorderCut {
 }
 
 impl BorderPiece {
-    fn at(&self, share: f64) -> Point3 {
-        self.ends[0] + (self.ends[1] - self.ends[0]) * share
+    /// The design at a share of the piece, and its normal there.
+    fn design(&self, part: &Part, share: f64) -> (Point3, Vector3) {
+        match self.at {
+            Some([a, b]) => part.point_and_normal(a.toward(&b, share)),
+            None => (self.ends[0] + (self.ends[1] - self.ends[0]) * share, self.normal),
+        }
+    }
+
+    /// How far the piece leaves its chord at most, mm, as its middle tells.
+    fn bend(&self, part: &Part) -> f64 {
+        let middle = self.ends[0] + (self.ends[1] - self.ends[0]) * 0.5;
+        let off = (self.design(part, 0.5).0 - middle).norm();
+        if self.at.is_some() { off.max(part.mesh_deviation()) } else { 0.0 }
     }
 
     /// Whether a way down against the normal of a place leads out over the border.
@@ -80,15 +91,25 @@ fn pieces(inspection: &Inspection<'_>) -> Vec<BorderPiece> {
     let faces = |t: usize| mesh.normal(t).z > LEAST_FACING;
     let of_triangle = |t: usize| {
         let (normal, corners) = (mesh.normal(t), mesh.corners(t));
+        let parameters = inspection.part.corner_parameters(t);
         let border = (0..3).filter(|&k| mesh.neighbour(t, k).is_none_or(|other| !faces(other)));
-        let sides = border.map(|k| [corners[k], corners[(k + 1) % 3]]);
-        let pieces = sides.flat_map(|[a, b]| {
+        let pieces = border.flat_map(|k| {
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            let whole = BorderPiece {
+                ends: [a, b],
+                at: parameters.map(|at| [at[k], at[(k + 1) % 3]]),
+                normal,
+                inward: normal.cross(&(b - a)).try_normalize(0.0).unwrap_or_default(),
+            };
             let parts = ((b - a).norm() / longest).ceil().max(1.0) as usize;
-            let at = move |k: usize| a + (b - a) * (k as f64 / parts as f64);
-            let inward = normal.cross(&(b - a)).try_normalize(0.0);
-            let piece =
-                move |k: usize| Some(BorderPiece { ends: [at(k), at(k + 1)], normal, inward: inward? });
-            (0..parts).filter_map(piece)
+            let piece = |k: usize| {
+                let [from, to] = [k, k + 1].map(|k| k as f64 / parts as f64);
+                let ends = [from, to].map(|share| whole.design(inspection.part, share).0);
+                let at = whole.at.map(|[a, b]| [from, to].map(|share| a.toward(&b, share)));
+                BorderPiece { ends, at, ..whole }
+            };
+            let has_length = whole.inward.norm_squared() > 0.0;
+            (0..if has_length { parts } else { 0 }).map(piece).collect::<Vec<_>>()
         });
         pieces.collect::<Vec<_>>()
     };
@@ -218,15 +239,7 @@ impl Inspection<'_> {
 
     /// The deepest place of a move along a piece, where it may be deeper than `known`; it comes nearest at a share.
     fn deepest_on(&self, piece: &BorderPiece, by: u32, nearest: f64, known: f64) -> Option<BorderCut> {
-        // The place of the design, which a piece of the mesh of a patch is a chord of.
-        let is_patch = !self.part.patches().is_empty();
-        let design = |share: f64| {
-            let place = piece.at(share);
-            // The nearest place of the part may be told as one of the wall that begins there.
-            let foot = is_patch.then(|| self.part.closest_point(&place).0);
-            let foot = foot.filter(|foot| foot.normal.dot(&piece.normal) > SAME_SIDE);
-            foot.map_or((place, piece.normal), |foot| (foot.point, foot.normal))
-        };
+        let design = |share: f64| piece.design(self.part, share);
         let value = |share: f64| {
             let (place, normal) = design(share);
             // The side alone does not reach so far.
@@ -239,7 +252,7 @@ impl Inspection<'_> {
             Some(along.min(place.z - self.surface.envelope.height(by, place.x, place.y)?))
         };
         // What a border bends by between two places spoils concavity by as much; it falls with the square of their distance.
-        let bend = if is_patch { 2.0 * self.part.mesh_deviation() } else { 0.0 };
+        let bend = 3.0 * piece.bend(self.part);
         let mut best: Option<(f64, f64)> = None;
         let mut left = f64::NEG_INFINITY;
         let (first, last) = (value(0.0), value(1.0));
@@ -307,8 +320,8 @@ mod tests {
     use crate::figures::Limits;
     use crate::flat_scene::{path, plane};
     use crate::{Asked, measure};
-    use geometry::TriangleMesh;
-    use part::Part;
+    use geometry::{NurbsSurface, TriangleMesh};
+    use part::{Part, Patch};
     use sim::{Grid, ZMap, cut};
     use work::monitor::Silent;
 
@@ -386,6 +399,28 @@ mod tests {
         };
         let found = gouge_of(&part, &Cutter::ball(6.0).unwrap(), &[vec![tip(-6.0), tip(14.0)]], 0.1);
         assert!((found.max_depth_mm - deep).abs() < 1e-6, "{found:?}");
+    }
+
+    /// A level patch whose border is an arc in the plan. The triangles end at its chords; a ball that plunges beyond cuts the arc.
+    #[test]
+    fn the_border_of_a_patch_is_its_curve() {
+        let rows = [[[0.0, 0.0], [4.0, 0.0], [8.0, 0.0]], [[0.0, 4.0], [2.6, 8.6], [8.0, 4.4]]];
+        let rows = rows.map(|row| row.map(|[x, y]| Point3::new(x, y, 0.0)));
+        let net: Vec<Vec<Point3>> = (0..3).map(|i| vec![rows[0][i], rows[1][i]]).collect();
+        let [in_u, in_v] = [vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0], vec![0.0, 0.0, 1.0, 1.0]];
+        let surface = NurbsSurface::new(2, 1, in_u, in_v, &net, None).unwrap();
+        let ball = Cutter::ball(6.0).unwrap();
+        let tip = Point3::new(3.9, 7.7, -0.4);
+        let nearest = (0..=1_000_000)
+            .map(|k| (surface.point(1e-6 * f64::from(k), 1.0) - tip).xy().norm())
+            .fold(f64::INFINITY, f64::min);
+        let truth = (9.0 - nearest * nearest).sqrt() - 3.0 - tip.z;
+        for tolerance in [1e-4, 0.003, 0.03] {
+            let part = Part::from_patches(vec![Patch::Nurbs(surface.clone())], tolerance).unwrap();
+            let found = gouge_of(&part, &ball, &[vec![Point3::new(tip.x, tip.y, 10.0), tip]], 0.1);
+            let off = (found.max_depth_mm - truth).abs();
+            assert!(off <= found.error_bound_mm && off < 1e-6, "{tolerance}: {truth} {found:?}");
+        }
     }
 
     /// The side of a flat end mill reaches over the border by less than the tolerance: no gouge as deep as it stands. By more it is

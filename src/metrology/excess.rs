@@ -15,6 +15,7 @@
 //! by a square; so the part's borders and creases are borders of polygons, and nothing beyond them counts. Squares that may
 //! hold more than is known are divided until none does by more than was asked.
 
+mod outline;
 mod patch;
 
 use std::collections::BinaryHeap;

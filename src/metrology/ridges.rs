@@ -346,8 +346,8 @@ impl<'a> RidgeFinder<'a> {
 impl RidgeFinder<'_> {
     /// True where the part ends at `foot`. Seams between patches are no ends.
     fn ends_at(&self, foot: &SurfacePoint) -> bool {
-        if let Some(at) = foot.at {
-            return self.part.patches().len() == 1 && self.part.is_at_patch_end(at);
+        if foot.at.is_some() {
+            return self.part.ends_with_patch_at(foot);
         }
         let mesh = self.part.mesh();
         let corners = mesh.corners(foot.triangle as usize);

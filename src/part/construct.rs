@@ -77,6 +77,7 @@ impl Part {
             first_triangle: Vec::new(),
             corners: Vec::new(),
             bvh: Bvh::new(&mesh),
+            bounds: mesh.bounds(),
             mesh,
             deviation: 0.0,
             beside_others: Vec::new(),
@@ -142,13 +143,32 @@ impl Part {
             first_triangle,
             corners,
             bvh: Bvh::new(&mesh),
+            bounds: mesh.bounds(),
             mesh,
             deviation: all.deviation,
             beside_others: Vec::new(),
             repairs,
         };
         part.beside_others = part.find_those_beside_others();
+        part.bounds = part.bounds_with_borders();
         Ok(part)
+    }
+
+    /// The bounds of the mesh and of the borders of the patches, which bulge out between its corners.
+    fn bounds_with_borders(&self) -> Aabb {
+        /// Stretches between two corners whose ends are looked at: at most a sixteenth of the bulge is missed.
+        const LOOKS: usize = 4;
+        let mut bounds = self.mesh.bounds();
+        for t in 0..self.mesh.triangles().len() {
+            let Some(corners) = self.corner_parameters(t) else { break };
+            for [a, b] in [0, 1, 2].map(|k| [corners[k], corners[(k + 1) % 3]]) {
+                if self.is_at_patch_end(a.toward(&b, 0.5)) {
+                    let at = |k: usize| a.toward(&b, k as f64 / LOOKS as f64);
+                    (1..LOOKS).for_each(|k| bounds.grow(&self.point_and_normal(at(k)).0));
+                }
+            }
+        }
+        bounds
     }
 }
 

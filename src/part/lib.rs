@@ -32,6 +32,15 @@ pub struct PatchPoint {
     pub v: f64,
 }
 
+impl PatchPoint {
+    /// Parameters between these and others of the same patch.
+    #[must_use]
+    pub fn toward(&self, other: &Self, share: f64) -> Self {
+        let [u, v] = [[self.u, other.u], [self.v, other.v]].map(|[a, b]| a + share * (b - a));
+        Self { patch: self.patch, u, v }
+    }
+}
+
 /// A point of the part's surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfacePoint {
@@ -57,6 +66,7 @@ pub struct Part {
     corners: Vec<[[f64; 2]; 3]>,
     mesh: TriangleMesh,
     bvh: Bvh,
+    bounds: Aabb,
     deviation: f64,
     /// For each triangle, whether a line through it may meet another patch; empty for parts of one patch and meshes.
     beside_others: Vec<bool>,
@@ -92,9 +102,9 @@ impl Part {
         &self.bvh
     }
 
-    /// Bounds of the exact surface up to the tessellation's deviation.
+    /// Bounds of the exact surface up to the tessellation's deviation; in the plan those of the borders of patches themselves.
     pub fn bounds(&self) -> Aabb {
-        self.mesh.bounds()
+        self.bounds
     }
 
     /// Bound of the distance between [`Part::mesh`] and the exact surface, mm; 0 for a mesh part.
@@ -154,6 +164,15 @@ impl Part {
             x <= lo + near || x >= hi - near
         };
         ends(at.u, domain[0]) || ends(at.v, domain[1])
+    }
+
+    /// True where the part ends with a patch: where one does, and no other comes near. Always false on a mesh part.
+    pub fn ends_with_patch_at(&self, place: &SurfacePoint) -> bool {
+        place.at.is_some_and(|at| {
+            let goes_on =
+                || self.nearest_of_others(&place.point, self.across(), at.patch as usize, &[]).is_some();
+            self.is_at_patch_end(at) && (self.patches.len() == 1 || !goes_on())
+        })
     }
 
     /// Principal curvatures, positive where the part is concave toward its outward normal; `None`
@@ -289,6 +308,23 @@ impl Part {
             None if hit.is_none() => self.highest_graph_at(x, y),
             None => None,
         }
+    }
+
+    /// The place of the patch of triangle `t` over or below `(x, y)`, and 0; where that patch has ended there, its place nearest in
+    /// the plan, as far as a descent from the triangle finds it, and how far aside that lies, mm. `None` on a mesh part.
+    pub fn on_patch_of(&self, t: usize, x: f64, y: f64) -> Option<(SurfacePoint, f64)> {
+        let index = self.patch_of(t as u32)?;
+        let patch = &self.patches[index];
+        let found = match patch {
+            Patch::Analytic(graph) => refine::vertical_on_graph(graph, x, y),
+            Patch::Nurbs(surface) => refine::vertical(surface, x, y, self.nearest_in_plan(t as u32, x, y)),
+        };
+        let ended = found.miss > ROUNDING;
+        let [u, v] = if ended { refine::clamp(&patch.domain(), found.at) } else { found.at };
+        let point = if ended { patch.point(u, v) } else { Point3::new(x, y, found.z) };
+        let at = Some(PatchPoint { patch: index as u32, u, v });
+        let place = SurfacePoint { point, normal: found.normal * self.signs[index], at, triangle: t as u32 };
+        Some((place, if ended { found.miss } else { 0.0 }))
     }
 
     /// For points on the very border of a graph, which its triangles may miss by rounding.

@@ -280,6 +280,6 @@ fn solve(a: f64, b: f64, c: f64, d: f64, r: [f64; 2]) -> [f64; 2] {
     [(r[0] * d - b * r[1]) / det, (a * r[1] - r[0] * c) / det]
 }
 
-fn clamp(domain: &[[f64; 2]; 2], at: [f64; 2]) -> [f64; 2] {
+pub(super) fn clamp(domain: &[[f64; 2]; 2], at: [f64; 2]) -> [f64; 2] {
     [0, 1].map(|k| at[k].max(domain[k][0]).min(domain[k][1]))
 }

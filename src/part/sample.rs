@@ -96,7 +96,7 @@ impl Part {
             }
         });
         check(monitor)?;
-        self.fill_pinholes(&lines, nx, &mut grid.samples);
+        self.fill_beside_triangles(&lines, nx, &mut grid.samples);
         parallel::for_each_chunk(&mut grid.samples, nx, |j, row| {
             if monitor.cancelled() {
                 return;
@@ -136,24 +136,26 @@ impl Part {
         }
     }
 
-    /// Where the edges of two patches meet their triangles may leave a gap of twice the deviation. A
-    /// centre that falls into one is between two centres on the part.
-    fn fill_pinholes(&self, lines: &Lines, nx: usize, samples: &mut [GridSample]) {
-        if self.patches.len() < 2 {
+    /// A patch ends up to the deviation beside its triangles: where two meet, gaps stay between theirs, and where the part ends,
+    /// it ends beyond them. Centres that fall there lie beside one on the part.
+    fn fill_beside_triangles(&self, lines: &Lines, nx: usize, samples: &mut [GridSample]) {
+        if self.patches.is_empty() {
             return;
         }
         let rows = samples.len() / nx;
-        for k in 0..samples.len() {
-            if samples[k].is_on() {
-                continue;
-            }
+        let mut found = Vec::new();
+        for k in (0..samples.len()).filter(|&k| !samples[k].is_on()) {
             let (i, j) = (k % nx, k / nx);
-            let across = i > 0 && i + 1 < nx && samples[k - 1].is_on() && samples[k + 1].is_on();
-            let along = j > 0 && j + 1 < rows && samples[k - nx].is_on() && samples[k + nx].is_on();
-            let found = if across || along { self.across_seams(None, lines.x(i), lines.y(j)) } else { None };
-            if let Some(OnPatch { triangle, meeting, .. }) = found {
-                samples[k] = GridSample { z: meeting.z, triangle, ..GridSample::OFF };
+            let along_x = i > 0 && samples[k - 1].is_on() || i + 1 < nx && samples[k + 1].is_on();
+            let along_y = j > 0 && samples[k - nx].is_on() || j + 1 < rows && samples[k + nx].is_on();
+            if (along_x || along_y)
+                && let Some(place) = self.across_seams(None, lines.x(i), lines.y(j))
+            {
+                found.push((k, place));
             }
+        }
+        for (k, OnPatch { triangle, meeting, .. }) in found {
+            samples[k] = GridSample { z: meeting.z, triangle, ..GridSample::OFF };
         }
     }
 

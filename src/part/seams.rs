@@ -15,10 +15,10 @@ pub(super) struct OnPatch {
 
 impl Part {
     /// Where the vertical line through `(x, y)` meets a patch other than the `known` one that is higher, or goes on where that has
-    /// ended; else the known meeting.
+    /// ended; else the known meeting. With none known, that of a patch whose triangles end before it does.
     pub(super) fn across_seams(&self, known: Option<OnPatch>, x: f64, y: f64) -> Option<OnPatch> {
         let lies_within = |found: &OnPatch| !self.beside_others[found.triangle as usize];
-        if self.patches.len() < 2 || known.as_ref().is_some_and(lies_within) {
+        if known.as_ref().is_some_and(|found| self.patches.len() < 2 || lies_within(found)) {
             return known;
         }
         let within = self.across();
@@ -68,7 +68,7 @@ impl Part {
     }
 
     /// Triangles of two patches that meet lie up to so far apart, mm.
-    fn across(&self) -> f64 {
+    pub(super) fn across(&self) -> f64 {
         2.0 * self.deviation + ROUNDING
     }
 

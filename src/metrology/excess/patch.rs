@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use super::meets;
+use super::outline::{MOST_CORNERS, Outline, cut_off, has_area, middle, outlines, overlaps};
 use crate::facing::LEAST_FACING;
 use crate::inspection::Inspection;
 use cutter::Cutter;
@@ -18,9 +19,6 @@ const MOST_MOVES: usize = 5;
 
 /// In squares with half sides below this share of a cell all triangles are looked at.
 const CORNER_SHARE: f64 = 1.0 / 256.0;
-
-/// Corners of a triangle clipped by a square and by the lines before some walls.
-const MOST_CORNERS: usize = 12;
 
 /// How often a greater height is assumed.
 const MOST_REACHES: usize = 6;
@@ -87,17 +85,19 @@ impl Patches<'_> {
         let Some(triangles) = self.triangles(centre, half, most) else { return Held::Unknown };
         let mut held: Option<(f64, Point2, f64, u32)> = None;
         for &t in &triangles {
-            let Some(piece) = self.piece(t, centre, half) else { continue };
-            let Some((possible, here, by)) = self.above(&piece) else { return Held::Unknown };
-            let place = Point2::new(piece.foot.point.x, piece.foot.point.y);
-            held = Some(match held {
-                None => (possible, place, here, by),
-                Some((most, at, highest, its)) => {
-                    let (at, highest, its) =
-                        if here > highest { (place, here, by) } else { (at, highest, its) };
-                    (most.max(possible), at, highest, its)
-                }
-            });
+            for outline in outlines(self.inspection.part, t, centre, half).into_iter().flatten() {
+                let Some(piece) = self.piece(t, outline) else { continue };
+                let Some((possible, here, by)) = self.above(&piece) else { return Held::Unknown };
+                let place = piece.foot.point.xy();
+                held = Some(match held {
+                    None => (possible, place, here, by),
+                    Some((most, at, highest, its)) => {
+                        let (at, highest, its) =
+                            if here > highest { (place, here, by) } else { (at, highest, its) };
+                        (most.max(possible), at, highest, its)
+                    }
+                });
+            }
         }
         held.map_or(Held::Nothing, |(possible, place, here, by)| Held::Some { possible, place, here, by })
     }
@@ -148,6 +148,8 @@ impl Patches<'_> {
     fn triangles(&self, centre: Point2, half: f64, most: usize) -> Option<Vec<usize>> {
         let part = self.inspection.part;
         let (mesh, bvh) = (part.mesh(), part.bvh());
+        // A patch ends so far beside its triangles.
+        let half = half + part.mesh_deviation();
         let (mut found, mut waiting) = (Vec::new(), vec![0]);
         while let Some(index) = waiting.pop() {
             let node = bvh.tree().node(index);
@@ -172,41 +174,47 @@ impl Patches<'_> {
         (found.len() <= most).then_some(found)
     }
 
-    /// The part of a triangle within the square, where it is seen from above.
-    fn piece(&self, t: usize, centre: Point2, half: f64) -> Option<Clipped> {
+    /// The design within a polygon of a triangle, where it is seen from above.
+    fn piece(&self, t: usize, outline: Outline) -> Option<Clipped> {
         let part = self.inspection.part;
-        let triangle = part.mesh().corners(t);
-        let normal = part.mesh().normal(t);
-        let height = |q: Point2| {
-            triangle[0].z - (normal.x * (q.x - triangle[0].x) + normal.y * (q.y - triangle[0].y)) / normal.z
-        };
-        let (corners, len) = self.beyond_walls(clipped(&triangle, centre, half)?, &height)?;
+        let (first, normal) = (part.mesh().corners(t)[0], part.mesh().normal(t));
+        let height =
+            |q: &Point2| first.z - (normal.x * (q.x - first.x) + normal.y * (q.y - first.y)) / normal.z;
+        let Outline { corners, len, is_at_end } = self.beyond_walls(outline, &height)?;
         let middle = middle(&corners[..len]);
+        let own = |q: &Point2| {
+            part.on_patch_of(t, q.x, q.y).unwrap_or_else(|| {
+                let point = Point3::new(q.x, q.y, height(q));
+                (SurfacePoint { point, normal, at: None, triangle: t as u32 }, 0.0)
+            })
+        };
+        let (foot, aside) = own(&middle);
+        if is_at_end && corners[..len].iter().all(|corner| (corner - middle).norm() < aside) {
+            return None;
+        }
         let near = 2.0 * part.mesh_deviation() / normal.z.max(1e-3) + 1e-6;
-        let seen = |q: Point2| part.highest_at(q.x, q.y).filter(|foot| foot.point.z - height(q) <= near);
+        let is_seen = |foot: &SurfacePoint| {
+            let top = part.highest_at(foot.point.x, foot.point.y);
+            top.is_none_or(|top| top.point.z - foot.point.z <= near)
+        };
         // Just inside the corners, where the next triangle does not answer.
-        let inside = |c: &Point2| c + (middle - c) * 1e-3;
-        let foot = seen(middle).or_else(|| corners[..len].iter().find_map(|c| seen(inside(c))))?;
+        let inside = |corner: &Point2| own(&(corner + (middle - corner) * 1e-3)).0;
+        let foot = std::iter::once(foot).chain(corners[..len].iter().map(inside)).find(is_seen)?;
         let leans = [foot.normal.xy(); MOST_CORNERS];
         let mut piece = Clipped { corners, len, leans, foot, below: 0.0, cosine: 1.0 };
-        if part.patches().is_empty() {
-            let point =
-                Point3::new(foot.point.x, foot.point.y, height(Point2::new(foot.point.x, foot.point.y)));
-            piece.foot = SurfacePoint { point, normal, ..foot };
-            piece.leans = [normal.xy(); MOST_CORNERS];
-        } else {
-            piece.bend(part, &inside);
+        if !part.patches().is_empty() {
+            piece.bend(&|corner| own(corner).0);
         }
         Some(piece)
     }
 
     /// The part of a polygon of floor that no wall before it accounts for; `None` where there is none.
-    fn beyond_walls(&self, polygon: Polygon, height: &dyn Fn(Point2) -> f64) -> Option<Polygon> {
-        let Some(walls) = self.inspection.walls else { return Some(polygon) };
-        let (mut corners, mut len) = polygon;
+    fn beyond_walls(&self, outline: Outline, height: &dyn Fn(&Point2) -> f64) -> Option<Outline> {
+        let Some(walls) = self.inspection.walls else { return Some(outline) };
+        let Outline { mut corners, mut len, is_at_end } = outline;
         let q = middle(&corners[..len]);
         let all = corners;
-        for (from, toward) in walls.lines(&Point3::new(q.x, q.y, height(q)), &all[..len]) {
+        for (from, toward) in walls.lines(&Point3::new(q.x, q.y, height(&q)), &all[..len]) {
             if len == MOST_CORNERS {
                 break;
             }
@@ -215,7 +223,7 @@ impl Patches<'_> {
                 return None;
             }
         }
-        has_area(&corners[..len]).then_some((corners, len))
+        has_area(&corners[..len]).then_some(Outline { corners, len, is_at_end })
     }
 
     /// What stands above a piece at most, and what stands on its foot, cut by which move; `None` where that cannot be told.
@@ -318,12 +326,11 @@ impl Patches<'_> {
 }
 
 impl Clipped {
-    /// Measures how the design leaves its tangent plane, at the corners just inside.
-    fn bend(&mut self, part: &part::Part, inside: &dyn Fn(&Point2) -> Point2) {
+    /// Measures how the design leaves its tangent plane, at the corners.
+    fn bend(&mut self, own: &dyn Fn(&Point2) -> SurfacePoint) {
         let SurfacePoint { point, normal, .. } = self.foot;
         for (corner, lean) in self.corners.iter().zip(&mut self.leans).take(self.len) {
-            let q = inside(corner);
-            let Some(foot) = part.highest_at(q.x, q.y) else { continue };
+            let foot = own(corner);
             *lean += BETWEEN_CORNERS * (foot.normal - normal).xy();
             self.below = self.below.max(-BETWEEN_CORNERS * (foot.point - point).dot(&normal));
             self.cosine = self.cosine.min(foot.normal.dot(&normal)).max(0.1);
@@ -342,68 +349,6 @@ fn lowered(mut possible: f64, known: f64, over: &dyn Fn(f64) -> f64) -> f64 {
         }
     }
     possible
-}
-
-/// Whether a triangle reaches into a square of the plan: no side of either has all of the other beyond it. Boxes of long
-/// triangles askew hold many squares that these do not meet.
-fn overlaps(triangle: &[Point3; 3], centre: Point2, half: f64) -> bool {
-    let [a, b, c] = triangle.map(|p| p.xy() - centre);
-    let within = |x: [f64; 3]| x.iter().any(|x| *x <= half) && x.iter().any(|x| *x >= -half);
-    let inside = |p: Vector2, q: Vector2, third: Vector2| {
-        let across = Vector2::new(p.y - q.y, q.x - p.x);
-        let sense = across.dot(&(third - p)).signum();
-        sense * across.dot(&-p) + half * (across.x.abs() + across.y.abs()) >= 0.0
-    };
-    within([a.x, b.x, c.x])
-        && within([a.y, b.y, c.y])
-        && inside(a, b, c)
-        && inside(b, c, a)
-        && inside(c, a, b)
-}
-
-/// Corners of a polygon, and how many they are.
-type Polygon = ([Point2; MOST_CORNERS], usize);
-
-/// The part of a triangle within a square of the plan; `None` where there is none.
-fn clipped(triangle: &[Point3; 3], centre: Point2, half: f64) -> Option<Polygon> {
-    let mut corners = [Point2::origin(); MOST_CORNERS];
-    (0..3).for_each(|k| corners[k] = triangle[k].xy());
-    let mut len = 3;
-    for (axis, sign) in [(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)] {
-        cut_off(&mut corners, &mut len, |p| sign * (p[axis] - centre[axis]) - half);
-        if len == 0 {
-            return None;
-        }
-    }
-    has_area(&corners[..len]).then_some((corners, len))
-}
-
-/// Leaves the part of a convex polygon that is not `beyond` a line (Sutherland and Hodgman 1974).
-fn cut_off(corners: &mut [Point2; MOST_CORNERS], len: &mut usize, beyond: impl Fn(&Point2) -> f64) {
-    let (before, n) = (*corners, *len);
-    *len = 0;
-    for k in 0..n {
-        let (p, q) = (before[k], before[(k + 1) % n]);
-        let (bp, bq) = (beyond(&p), beyond(&q));
-        if bp <= 0.0 {
-            (corners[*len], *len) = (p, *len + 1);
-        }
-        if (bp < 0.0 && bq > 0.0) || (bp > 0.0 && bq < 0.0) {
-            (corners[*len], *len) = (p + (q - p) * (bp / (bp - bq)), *len + 1);
-        }
-    }
-}
-
-fn has_area(corners: &[Point2]) -> bool {
-    let area = |k: usize| {
-        let (a, b) = (corners[k] - corners[0], corners[(k + 1) % corners.len()] - corners[0]);
-        a.x * b.y - a.y * b.x
-    };
-    (0..corners.len()).map(area).sum::<f64>().abs() > 0.0
-}
-
-fn middle(corners: &[Point2]) -> Point2 {
-    corners.iter().fold(Point2::origin(), |sum, c| sum + c.coords / corners.len() as f64)
 }
 
 /// The least, over all weights of the rows, of the greatest of `count` columns in their mean; a little more where the

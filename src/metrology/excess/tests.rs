@@ -3,7 +3,7 @@
 use super::patch::least_greatest;
 use crate::{Asked, Bounded, ExcessKind, Limits, Measurement, measure};
 use cutter::Cutter;
-use geometry::{AnalyticShape, AnalyticSurface, Point2, Point3, TriangleMesh, Vector2};
+use geometry::{AnalyticShape, AnalyticSurface, NurbsSurface, Point2, Point3, TriangleMesh, Vector2};
 use motion::{ClPoint, Move, MoveKind, Toolpath};
 use part::{Part, Patch};
 use proptest::prelude::*;
@@ -284,4 +284,56 @@ fn a_remnant_along_the_border_is_as_high_as_its_closed_form() {
         (excess.highest.max_mm - sagitta(0.2)).abs() < 2e-6 && excess.highest.error_bound_mm < 1e-5,
         "{excess:?}"
     );
+}
+
+/// A level patch whose far border is an arc in the plan: triangles end at its chords. What stands on the slivers between them
+/// is within the bound, with a tessellation of any fineness.
+#[test]
+fn what_stands_between_the_chords_of_a_bent_border_and_its_arc_is_bounded() {
+    let row = |places: [[f64; 2]; 3]| places.map(|[x, y]| Point3::new(x, y, 0.0));
+    let net = [row([[0.0, 0.0], [2.0, 0.0], [4.0, 0.0]]), row([[0.0, 3.0], [1.3, 4.3], [4.0, 3.2]])];
+    let net: Vec<Vec<Point3>> = (0..3).map(|i| vec![net[0][i], net[1][i]]).collect();
+    let knots = [vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0], vec![0.0, 0.0, 1.0, 1.0]];
+    let [in_u, in_v] = knots;
+    let surface = NurbsSurface::new(2, 1, in_u, in_v, &net, None).unwrap();
+    let ball = Cutter::ball(6.0).unwrap();
+    let lines: Vec<f64> = (0..12).map(|k| 0.35 + 0.3 * f64::from(k)).filter(|y| *y < 3.4).collect();
+    let beyond = 3.0 + 2.6 * 2.6 / (4.0 * 2.4) - lines.last().unwrap();
+    for tolerance in [1e-4, 0.002, 0.03] {
+        let part = Part::from_patches(vec![Patch::Nurbs(surface.clone())], tolerance).unwrap();
+        for cell in [0.05, 0.3] {
+            let highest = measured(&part, &ball, &straight(&lines), cell).excess.highest;
+            let (truth, bound) = (sagitta(beyond), highest.error_bound_mm);
+            assert!(
+                (highest.max_mm - truth).abs() <= bound && bound < 6e-4,
+                "{tolerance} {cell}: {truth} {highest:?}"
+            );
+        }
+    }
+}
+
+/// Two flanks that meet in a bent crease: triangles of both end at chords of it, and those of the one lie under the other. The
+/// bound comes down there all the same.
+#[test]
+fn the_bound_closes_along_a_bent_crease() {
+    let flank = |out: f64, bend: f64| {
+        let control = |i: usize, j: usize| {
+            let (i, t) = (i as f64, j as f64 / 3.0);
+            let fall = 0.25 * i + bend * i * i * (3.0 * t).sin();
+            Point3::new(2.0 + 0.4 * (3.0 * t).sin() + out * i, 4.0 * t, 0.8 - 0.3 * t - fall)
+        };
+        let net: Vec<Vec<Point3>> = (0..4).map(|i| (0..4).map(|j| control(i, j)).collect()).collect();
+        let ends = || vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
+        Patch::Nurbs(NurbsSurface::new(3, 3, ends(), ends(), &net, None).unwrap())
+    };
+    let part = Part::from_patches(vec![flank(-0.6, 0.0), flank(0.6, 0.08)], 0.004).unwrap();
+    let ball = Cutter::ball(6.0).unwrap();
+    for angle in [0.3, 1.2] {
+        let path = path(&part, &ball, angle, 0.4, 0.0);
+        let highest = measured(&part, &ball, &path, 0.1).excess.highest;
+        let brute = Brute::new(&part, &ball, &path);
+        let (truth, [x, y, _]) = (brute.highest(300), highest.at_mm.unwrap());
+        assert!(brute.confirms(&highest, truth), "{angle}: {truth} {:?} {highest:?}", brute.at(x, y));
+        assert!(highest.error_bound_mm < 6e-4, "{angle}: {highest:?}");
+    }
 }
