@@ -31,7 +31,7 @@ use work::monitor::{self, Monitor};
 use super::covered::Covered;
 use super::figures::LeastLeftFigures;
 use super::judge::{self, highest_reached};
-use super::measuring::Closeness;
+use super::measuring::{Closeness, MeasuredClosely};
 use super::planned::Planned;
 use super::tool::{Around, ToolMoves};
 use super::{JobError, Session};
@@ -166,6 +166,8 @@ impl Standing {
 /// A path whose whole surface was measured.
 struct Looked {
     measured: Measured,
+    /// Whether a closer look would change no verdict.
+    is_as_verdict: bool,
     /// What that covers, where [`Session::look`] asks for it.
     covered: Option<Covered>,
 }
@@ -242,8 +244,8 @@ impl Session {
             }
         };
         let (Some(target), Some(standing)) = (target, standing) else {
-            let Looked { measured, covered } = match looked {
-                Some(looked) if self.is_as_verdict(&looked.measured, closeness, engine) => looked,
+            let Looked { measured, covered, .. } = match looked {
+                Some(looked) if looked.is_as_verdict => looked,
                 _ => self.look(request, engine, &first.plan.path, Closeness::Verdict, monitor)?,
             };
             return Ok((first, measured, covered));
@@ -273,7 +275,7 @@ impl Session {
                 corrected.look_at_best(closeness, monitor)?
             }
         };
-        let Looked { measured, covered } = corrected.by_measurements(looked, monitor)?;
+        let Looked { measured, covered, .. } = corrected.by_measurements(looked, monitor)?;
         let Corrected { mut best, rounds, kept, .. } = corrected;
         best.correction = Some(CorrectionFigures { target_mm: target, rounds, kept: kept + 1 });
         Ok((best, measured, covered))
@@ -288,7 +290,9 @@ impl Session {
         closeness: Closeness,
         monitor: &dyn Monitor,
     ) -> Result<Looked, JobError> {
-        let measured = self.measure(request, engine, path, closeness, monitor)?;
+        let (cutters, _) = self.tools(request);
+        let MeasuredClosely { measured, is_as_verdict } =
+            self.measure_closely(request, engine, (path, cutters), closeness, monitor)?;
         let covered = match self.pocket {
             None if !request.stock_is_previous && self.verdict_on(&measured) != Verdict::Fail => {
                 let (cutters, holders) = self.tools(request);
@@ -297,7 +301,7 @@ impl Session {
             }
             _ => None,
         };
-        Ok(Looked { measured, covered })
+        Ok(Looked { measured, is_as_verdict, covered })
     }
 
     /// The ridges that a plan leaves; `None` where finding them takes as long as measuring all, or coarse cells cannot tell.
@@ -406,9 +410,7 @@ impl Corrected<'_> {
             in_vain = if gain >= Gain::Enough { 0 } else { in_vain + 1 };
         }
         match looked {
-            Some(looked) if self.session.is_as_verdict(&looked.measured, self.closeness, self.engine) => {
-                Ok(looked)
-            }
+            Some(looked) if looked.is_as_verdict => Ok(looked),
             other => {
                 drop(other);
                 self.look_at_best(Closeness::Verdict, monitor)

@@ -16,7 +16,6 @@ use sim::{NOT_CUT, Stock};
 use work::monitor::{self, Monitor};
 
 use super::earlier::{EarlierPath, WholePath};
-use super::measuring::Closeness;
 use super::planned::Planned;
 use super::run::Run;
 use super::tool::{Around, Tool, ToolMoves};
@@ -148,8 +147,8 @@ impl Session {
             }
             Some(time) => {
                 let (found, planned) = self.plan_for_time(request, time, around, monitor)?;
-                let measured =
-                    self.measure(&found, engine, &planned.plan.path, Closeness::Verdict, monitor)?;
+                let (cutters, _) = self.tools(&found);
+                let measured = self.measure(&found, engine, (&planned.plan.path, cutters), monitor)?;
                 at_time = found;
                 (&at_time, planned, measured, None)
             }
@@ -157,13 +156,7 @@ impl Session {
         let whole = WholePath::new(earlier, &planned.plan.path, cutters, scene.machine.rapid_rate);
         if !earlier.is_empty() {
             covered = None;
-            measured = self.measure_whole(
-                request,
-                engine,
-                (&whole.path, &whole.cutters),
-                Closeness::Verdict,
-                monitor,
-            )?;
+            measured = self.measure(request, engine, (&whole.path, &whole.cutters), monitor)?;
         }
         // Arcs of the program are as far off the moves that were measured.
         if let Some(off) = scene.arcs.filter(|_| request.foreign().is_none()) {

@@ -41,29 +41,34 @@ impl Closeness {
     }
 }
 
+/// A path as closely measured as was asked.
+pub(crate) struct MeasuredClosely {
+    pub measured: Measured,
+    /// Whether a closer look would change no verdict.
+    pub is_as_verdict: bool,
+}
+
 impl Session {
-    /// Cuts and measures; closer, and on finer cells where these help, where a limit hangs on that.
+    /// Cuts and measures for the verdict; closer, and on finer cells where these help, where a limit hangs on that.
     pub(crate) fn measure(
         &self,
         request: &ToolpathRequest,
         engine: &dyn Engine,
-        path: &Toolpath,
-        closeness: Closeness,
+        whole: (&Toolpath, &Cutters),
         monitor: &dyn Monitor,
     ) -> Result<Measured, JobError> {
-        let (cutters, _) = self.tools(request);
-        self.measure_whole(request, engine, (path, cutters), closeness, monitor)
+        Ok(self.measure_closely(request, engine, whole, Closeness::Verdict, monitor)?.measured)
     }
 
-    /// As [`Session::measure`], of a path that may begin with the moves of other toolpaths.
-    pub(crate) fn measure_whole(
+    /// As [`Session::measure`], as closely as is asked. The path may begin with the moves of other toolpaths.
+    pub(crate) fn measure_closely(
         &self,
         request: &ToolpathRequest,
         engine: &dyn Engine,
         (path, cutters): (&Toolpath, &Cutters),
         closeness: Closeness,
         monitor: &dyn Monitor,
-    ) -> Result<Measured, JobError> {
+    ) -> Result<MeasuredClosely, JobError> {
         let scene = &self.scene;
         let failed = |reason| JobError::engine(scene, &request.name, reason);
         let own = self.own_cells(request)?;
@@ -79,10 +84,10 @@ impl Session {
             finest = simulation.cell;
         }
         let (mut rounds, least) = (0, CLOSEST_BOUND * scene.simulation.error_bound);
-        while (simulation.cell > finest || rounds < CLOSER_ROUNDS)
-            && self.is_open(&measured)
-            && !closeness.is_enough(&measured, engine.gains_by_cells())
-        {
+        while (simulation.cell > finest || rounds < CLOSER_ROUNDS) && self.is_open(&measured) {
+            if closeness.is_enough(&measured, engine.gains_by_cells()) {
+                return Ok(MeasuredClosely { measured, is_as_verdict: false });
+            }
             rounds += 1;
             let before = simulation.cell;
             if engine.gains_by_cells() {
@@ -106,17 +111,7 @@ impl Session {
                 _ => break,
             }
         }
-        Ok(measured)
-    }
-
-    /// Whether a closer look than `closeness` would change no verdict.
-    pub(crate) fn is_as_verdict(
-        &self,
-        measured: &Measured,
-        closeness: Closeness,
-        engine: &dyn Engine,
-    ) -> bool {
-        !self.is_open(measured) || !closeness.is_enough(measured, engine.gains_by_cells())
+        Ok(MeasuredClosely { measured, is_as_verdict: true })
     }
 
     /// The cells of a toolpath that was planned for a time, where its passes lie nearer than those of the scene's scallop height.

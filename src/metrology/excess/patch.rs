@@ -4,6 +4,7 @@ use std::borrow::Cow;
 
 use super::meets;
 use super::outline::{MOST_CORNERS, Outline, cut_off, has_area, middle, outlines, overlaps};
+use crate::cut_surface::CutSurface;
 use crate::facing::LEAST_FACING;
 use crate::inspection::Inspection;
 use cutter::Cutter;
@@ -16,6 +17,9 @@ const MOST_TRIANGLES: usize = 48;
 
 /// Moves that are weighed, the lowest in the middle. With fewer, places where several passes meet take more divisions.
 const MOST_MOVES: usize = 5;
+
+/// Moves that are followed along a path to the lowest one. Cells show one of so many short ones.
+const MOST_BESIDE: usize = 16;
 
 /// In squares with half sides below this share of a cell all triangles are looked at.
 const CORNER_SHARE: f64 = 1.0 / 256.0;
@@ -230,8 +234,14 @@ impl Patches<'_> {
     fn above(&self, piece: &Clipped) -> Option<(f64, f64, u32)> {
         let surface = self.inspection.surface;
         let SurfacePoint { point, normal, .. } = &piece.foot;
-        let hidden = self.hidden(point, normal);
-        let here = surface.along_normal_with(point, normal, &hidden)?;
+        let mut hidden = self.hidden(point, normal);
+        let mut here = surface.along_normal_with(point, normal, &hidden)?;
+        if here.distance > self.least {
+            // Short moves between cells may have cut away what seems to stand so high.
+            let beside = self.beside(&(point + normal * here.distance), &hidden);
+            hidden = Cow::Owned(hidden.iter().copied().chain(beside).collect());
+            here = surface.along_normal_with(point, normal, &hidden)?;
+        }
         let upright = piece.leans[..piece.len].iter().all(|lean| lean.norm() < 1e-12);
         // Lower places of the square are of no account.
         let known = here.distance.max(self.least).max(0.0);
@@ -266,6 +276,32 @@ impl Patches<'_> {
             return Cow::Owned(self.unseen.iter().copied().chain(passing).collect());
         }
         Cow::Borrowed(self.unseen)
+    }
+
+    /// Moves that no cell may show and that are lower over a point than one that cells show: from each of these, along the path as far
+    /// as it leads down.
+    fn beside(&self, point: &Point3, hidden: &[u32]) -> Vec<u32> {
+        let CutSurface { envelope, path, .. } = self.inspection.surface;
+        let (i, j) = self.inspection.grid.nearest_cell(point.x, point.y);
+        let last = path.len() as u32 - 1;
+        let height = |by: u32| envelope.height(by, point.x, point.y).unwrap_or(f64::INFINITY);
+        let mut found = Vec::new();
+        let winners = self.inspection.surface.winners(i, j);
+        for first in winners.moves().iter().chain(hidden).copied().filter(|&by| by != NOT_CUT) {
+            for forward in [true, false] {
+                let (mut by, mut lowest) = (first, height(first));
+                for _ in 0..MOST_BESIDE {
+                    let next = if forward { (by + 1).min(last) } else { by.saturating_sub(1) };
+                    let its = height(next);
+                    if next == by || its >= lowest || found.contains(&next) {
+                        break;
+                    }
+                    found.push(next);
+                    (by, lowest) = (next, its);
+                }
+            }
+        }
+        found
     }
 
     /// Moves that are low over a point: any choice gives a bound, the lowest a good one.
