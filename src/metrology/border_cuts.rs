@@ -35,6 +35,8 @@ struct BorderPiece {
     ends: [Point3; 2],
     /// Parameters of the ends, on a patch.
     at: Option<[PatchPoint; 2]>,
+    /// How far it leaves its chord at most, mm, as its middle tells.
+    bend: f64,
     /// Of the triangle that it bounds.
     normal: Vector3,
     /// Unit vector along the triangle, square to the piece.
@@ -60,13 +62,6 @@ impl BorderPiece {
         }
     }
 
-    /// How far the piece leaves its chord at most, mm, as its middle tells.
-    fn bend(&self, part: &Part) -> f64 {
-        let middle = self.ends[0] + (self.ends[1] - self.ends[0]) * 0.5;
-        let off = (self.design(part, 0.5).0 - middle).norm();
-        if self.at.is_some() { off.max(part.mesh_deviation()) } else { 0.0 }
-    }
-
     /// Whether a way down against the normal of a place leads out over the border.
     fn leads_out(&self, normal: &Vector3) -> bool {
         let along = self.ends[1] - self.ends[0];
@@ -80,7 +75,7 @@ impl BorderPiece {
         let (middle, way) = (a + (b - a) * 0.5, to - from);
         let share = (middle - from).dot(&way) / way.norm_squared().max(f64::MIN_POSITIVE);
         let nearest = from + way * share.clamp(0.0, 1.0);
-        ((nearest - middle).norm() - 0.5 * (b - a).norm()).max(0.0)
+        ((nearest - middle).norm() - 0.5 * (b - a).norm() - self.bend).max(0.0)
     }
 }
 
@@ -98,6 +93,7 @@ fn pieces(inspection: &Inspection<'_>) -> Vec<BorderPiece> {
             let whole = BorderPiece {
                 ends: [a, b],
                 at: parameters.map(|at| [at[k], at[(k + 1) % 3]]),
+                bend: 0.0,
                 normal,
                 inward: normal.cross(&(b - a)).try_normalize(0.0).unwrap_or_default(),
             };
@@ -106,7 +102,11 @@ fn pieces(inspection: &Inspection<'_>) -> Vec<BorderPiece> {
                 let [from, to] = [k, k + 1].map(|k| k as f64 / parts as f64);
                 let ends = [from, to].map(|share| whole.design(inspection.part, share).0);
                 let at = whole.at.map(|[a, b]| [from, to].map(|share| a.toward(&b, share)));
-                BorderPiece { ends, at, ..whole }
+                let straight = BorderPiece { ends, at, ..whole };
+                let middle = ends[0] + (ends[1] - ends[0]) * 0.5;
+                let off = (straight.design(inspection.part, 0.5).0 - middle).norm();
+                let bend = if at.is_some() { off.max(inspection.part.mesh_deviation()) } else { 0.0 };
+                BorderPiece { bend, ..straight }
             };
             let has_length = whole.inward.norm_squared() > 0.0;
             (0..if has_length { parts } else { 0 }).map(piece).collect::<Vec<_>>()
@@ -210,7 +210,8 @@ impl Inspection<'_> {
             let reached = near.iter().map(|&piece| &pieces[piece as usize]).filter(|piece| {
                 let least = piece.least_distance(from.xy(), to.xy());
                 let height = cutter.height(least);
-                height.is_some_and(|height| piece.ends[0].z.max(piece.ends[1].z) > lowest + height)
+                height
+                    .is_some_and(|height| piece.ends[0].z.max(piece.ends[1].z) + piece.bend > lowest + height)
             });
             let cuts = reached.filter_map(|piece| {
                 let share = nearest_share(piece, from.xy(), to.xy());
@@ -252,7 +253,7 @@ impl Inspection<'_> {
             Some(along.min(place.z - self.surface.envelope.height(by, place.x, place.y)?))
         };
         // What a border bends by between two places spoils concavity by as much; it falls with the square of their distance.
-        let bend = 3.0 * piece.bend(self.part);
+        let bend = 3.0 * piece.bend;
         let mut best: Option<(f64, f64)> = None;
         let mut left = f64::NEG_INFINITY;
         let (first, last) = (value(0.0), value(1.0));
