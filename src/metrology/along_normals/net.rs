@@ -66,11 +66,8 @@ impl NetPlace {
 
     /// The place at the share `t` of the way to another of the same triangle.
     pub fn towards(&self, other: &Self, t: f64, part: &Part) -> Self {
-        let mixed = |a: f64, b: f64| a + (b - a) * t;
         let site = match (self.site, other.site) {
-            (Site::Patch(a), Site::Patch(b)) => {
-                Site::Patch(PatchPoint { u: mixed(a.u, b.u), v: mixed(a.v, b.v), ..a })
-            }
+            (Site::Patch(a), Site::Patch(b)) => Site::Patch(a.toward(&b, t)),
             (Site::Facet { triangle, point }, _) => {
                 Site::Facet { triangle, point: point + (other.point - point) * t }
             }

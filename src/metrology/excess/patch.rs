@@ -186,17 +186,21 @@ impl Patches<'_> {
             |q: &Point2| first.z - (normal.x * (q.x - first.x) + normal.y * (q.y - first.y)) / normal.z;
         let Outline { corners, len, is_at_end } = self.beyond_walls(outline, &height)?;
         let middle = middle(&corners[..len]);
-        let own = |q: &Point2| {
-            part.on_patch_of(t, q.x, q.y).unwrap_or_else(|| {
-                let point = Point3::new(q.x, q.y, height(q));
-                (SurfacePoint { point, normal, at: None, triangle: t as u32 }, 0.0)
-            })
+        let near = 2.0 * part.mesh_deviation() / normal.z.max(1e-3) + 1e-6;
+        let on_facet = |q: &Point2| {
+            let point = Point3::new(q.x, q.y, height(q));
+            (SurfacePoint { point, normal, at: None, triangle: t as u32 }, 0.0)
+        };
+        let own = |q: &Point2| match part.on_patch_of(t, q.x, q.y) {
+            Some((foot, aside)) if (foot.point.z - height(&foot.point.xy())).abs() <= near => (foot, aside),
+            // The descent went astray, to another sheet of the patch.
+            Some(_) => part.highest_at(q.x, q.y).map_or_else(|| on_facet(q), |top| (top, 0.0)),
+            None => on_facet(q),
         };
         let (foot, aside) = own(&middle);
         if is_at_end && corners[..len].iter().all(|corner| (corner - middle).norm() < aside) {
             return None;
         }
-        let near = 2.0 * part.mesh_deviation() / normal.z.max(1e-3) + 1e-6;
         let is_seen = |foot: &SurfacePoint| {
             let top = part.highest_at(foot.point.x, foot.point.y);
             top.is_none_or(|top| top.point.z - foot.point.z <= near)
@@ -283,7 +287,7 @@ impl Patches<'_> {
     fn beside(&self, point: &Point3, hidden: &[u32]) -> Vec<u32> {
         let CutSurface { envelope, path, .. } = self.inspection.surface;
         let (i, j) = self.inspection.grid.nearest_cell(point.x, point.y);
-        let last = path.len() as u32 - 1;
+        let last = (path.len() as u32).saturating_sub(1);
         let height = |by: u32| envelope.height(by, point.x, point.y).unwrap_or(f64::INFINITY);
         let mut found = Vec::new();
         let winners = self.inspection.surface.winners(i, j);
