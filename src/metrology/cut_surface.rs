@@ -101,7 +101,11 @@ impl<'a> CutSurface<'a> {
 
     /// The cut surface at `(x, y)`; `None` off the grid.
     pub fn at(&self, x: f64, y: f64) -> Option<CutPoint> {
-        let (i, j) = self.cut.grid.cell_at(x, y)?;
+        self.in_cell(self.cut.grid.cell_at(x, y)?, x, y)
+    }
+
+    /// The cut surface at `(x, y)` by what cut a cell and those around it.
+    fn in_cell(&self, (i, j): (usize, usize), x: f64, y: f64) -> Option<CutPoint> {
         let winners = self.winners(i, j);
         let lowest = self.lowest_of(&winners, x, y);
         let lowest = if lowest.z.is_finite() { lowest } else { self.beside((i, j), &winners, x, y)? };
@@ -215,8 +219,8 @@ impl CutSurface<'_> {
     /// along `n`. `None` off the grid.
     ///
     /// # Tolerance
-    /// The meeting lies on the closed-form surface to `MEETING`. Where the line leaves the grid
-    /// before it meets the surface, the vertical distance times `n.z` stands in for it.
+    /// The meeting lies on the closed-form surface to `MEETING`: beside the grid that of what cut its outermost cells. Where the line
+    /// meets none of it, the vertical distance times `n.z` stands in for it.
     pub fn along_normal(&self, p: &Point3, n: &Vector3) -> Option<Deviation> {
         self.along_normal_with(p, n, &[])
     }
@@ -239,8 +243,8 @@ impl CutSurface<'_> {
             let at = |x: f64, y: f64| Some(lower(self.lowest_of(&winners, x, y), x, y));
             self.newton(p, n, start, None, &at)
         } else {
-            let at = |x: f64, y: f64| Some(lower(self.at(x, y)?, x, y));
-            self.march(p, n, vertical).and_then(|(lo, hi)| self.newton(p, n, start, Some((lo, hi)), &at))
+            let at = |x: f64, y: f64| Some(lower(self.near(x, y)?, x, y));
+            self.march(p, n, vertical, &at).and_then(|(lo, hi)| self.newton(p, n, start, Some((lo, hi)), &at))
         };
         Some(found.unwrap_or(Deviation {
             distance: vertical * n.z,
@@ -249,15 +253,26 @@ impl CutSurface<'_> {
         }))
     }
 
+    /// As [`Self::at`], beside the grid by what cut its outermost cells.
+    fn near(&self, x: f64, y: f64) -> Option<CutPoint> {
+        self.in_cell(self.cut.grid.nearest_cell(x, y), x, y)
+    }
+
     /// Follows the normal in steps of half a cell to the first change of side; the bracket
     /// `(lower, upper)` of the meeting.
-    fn march(&self, p: &Point3, n: &Vector3, vertical: f64) -> Option<(f64, f64)> {
+    fn march(
+        &self,
+        p: &Point3,
+        n: &Vector3,
+        vertical: f64,
+        at: &dyn Fn(f64, f64) -> Option<CutPoint>,
+    ) -> Option<(f64, f64)> {
         let step = 0.5 * self.cut.grid.cell * vertical.signum();
         let mut t = 0.0;
         for _ in 0..MOST_MARCHING_STEPS {
             let next = t + step;
             let q = p + n * next;
-            let gap = self.at(q.x, q.y)?.z - q.z;
+            let gap = at(q.x, q.y)?.z - q.z;
             if gap * vertical.signum() <= 0.0 {
                 return Some(if step > 0.0 { (t, next) } else { (next, t) });
             }
@@ -346,6 +361,29 @@ mod tests {
                     "{n:?} {x} {y} {z}: {found:?}"
                 );
             }
+        }
+    }
+
+    /// A ball of 6 mm along y = 10 and y = 11.5, the second unseen by cells; lines in the plane of a section meet circles.
+    #[test]
+    fn a_line_that_leaves_the_grid_meets_what_cut_its_border_and_moves_that_no_cell_saw() {
+        let cutter = Cutter::ball(6.0).unwrap();
+        let tip = |x: f64, y: f64| Point3::new(x, y, -2.0);
+        let seen = path_through([tip(0.0, 10.0), tip(20.0, 10.0)]);
+        let path = path_through([tip(0.0, 10.0), tip(20.0, 10.0), tip(20.0, 11.5), tip(0.0, 11.5)]);
+        let grid = Grid { origin: Point2::new(8.05, 9.05), cell: 0.1, nx: 40, ny: 18 };
+        let cut = cut_reference(&ZMap::block(grid, 5.0), &cutter, &seen, &Silent).unwrap();
+        let surface = CutSurface::new(Envelope::new(cutter, &path), &cut, &path);
+        let (p, n) = (Point3::new(10.0, 10.7, -3.0), Vector3::new(0.0, 0.6, 0.8));
+        let circle = |y: f64| {
+            let (to, radius) = (Vector3::new(10.0, y, 1.0) - p.coords, 3.0f64);
+            let along = to.dot(&n);
+            along - (along * along - to.norm_squared() + radius * radius).sqrt()
+        };
+        let last = path.len() as u32 - 1;
+        for (further, exact) in [(vec![], circle(10.0)), (vec![last], circle(11.5))] {
+            let found = surface.along_normal_with(&p, &n, &further).unwrap();
+            assert!((found.distance - exact).abs() < 1e-8, "{further:?}: {} {exact}", found.distance);
         }
     }
 }

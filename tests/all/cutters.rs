@@ -9,8 +9,8 @@ use millstream::motion::{MoveKind, ToolAxis, Toolpath};
 use millstream::part::{Part, Patch};
 use millstream::sim::{Grid, ZMap, cut};
 use millstream::toolpath::{
-    FrontStart, IsoScallop, Joining, LevelSteps, OffsetAlong, OffsetDrive, OffsetSurface, PlanSettings, Step,
-    Strategy, Tilting, Waterline, Zigzag, plan, plan_tilted,
+    FrontStart, IsoScallop, Joining, LevelSteps, OffsetAlong, OffsetDrive, OffsetSurface, PlanSettings,
+    Spiral, Step, Strategy, Tilting, Waterline, Zigzag, plan, plan_tilted,
 };
 
 use crate::support::height_mesh;
@@ -106,18 +106,38 @@ fn a_flat_that_swings_to_its_other_side_is_carried_over_the_part() {
     let part = Part::from_mesh(height_mesh(80, [8.0, 6.0], relief));
     let cutter = Cutter::bull(6.0, 1.0).unwrap();
     let settings = PlanSettings { step: Step::Scallop(0.02), ..settings(&part) };
-    let drop = DropCutter::new(&part, &cutter);
     let front = IsoScallop { start: FrontStart::BestBorder };
     let level = Waterline { steps: LevelSteps::Shortest };
     for strategy in [&level as &dyn Strategy, &front] {
-        let path = plan(&part, &cutter, strategy, &settings, &Silent).unwrap().path;
-        let cutting = path.segments().filter(|(.., step)| step.kind == MoveKind::Cut);
-        let deepest = cutting.flat_map(|(from, to, _)| {
-            let count = ((to - from).norm() / 0.02).ceil().max(1.0) as usize;
-            (0..=count).map(move |k| from + (to - from) * (k as f64 / count as f64))
-        });
-        let below = |tip: Point3| drop.at(tip.x, tip.y).map_or(f64::NEG_INFINITY, |drop| drop.tip_z - tip.z);
-        let deepest = deepest.map(below).fold(f64::NEG_INFINITY, f64::max);
+        let deepest = deepest(&part, &cutter, strategy, &settings);
         assert!(deepest <= 2.0 * settings.chord_tolerance, "{strategy:?} {deepest}");
+    }
+}
+
+/// How far moves of a plan lie below the cutter that is dropped there at most, mm.
+fn deepest(part: &Part, cutter: &Cutter, strategy: &dyn Strategy, settings: &PlanSettings) -> f64 {
+    let drop = DropCutter::new(part, cutter);
+    let path = plan(part, cutter, strategy, settings, &Silent).unwrap().path;
+    let cutting = path.segments().filter(|(.., step)| step.kind == MoveKind::Cut);
+    let places = cutting.flat_map(|(from, to, _)| {
+        let count = ((to - from).norm() / 0.02).ceil().max(8.0) as usize;
+        (0..=count).map(move |k| from + (to - from) * (k as f64 / count as f64))
+    });
+    let below = |tip: Point3| drop.at(tip.x, tip.y).map_or(f64::NEG_INFINITY, |drop| drop.tip_z - tip.z);
+    places.map(below).fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Passes that lie far apart roll over a corner of the part until the corner of the cutter stands upright on it: a chord that is off by
+/// little cuts it deeper by much.
+#[test]
+fn rolls_over_corners_cut_them_no_deeper_than_chords_may() {
+    let plane = AnalyticShape::Plane { height: 0.0 };
+    let surface = AnalyticSurface::new(plane, [[-4.0, 4.0], [-3.0, 3.0]]).unwrap();
+    let part = Part::from_patches(vec![Patch::Analytic(surface)], 0.002).unwrap();
+    let cutter = Cutter::bull(6.0, 1.0).unwrap();
+    let settings = PlanSettings { step: Step::Scallop(0.3), chord_tolerance: 0.004, ..settings(&part) };
+    for strategy in [&Spiral::Plan as &dyn Strategy, &Zigzag::at(0.4)] {
+        let deepest = deepest(&part, &cutter, strategy, &settings);
+        assert!(deepest <= settings.chord_tolerance, "{strategy:?} {deepest}");
     }
 }

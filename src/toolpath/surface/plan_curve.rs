@@ -24,6 +24,9 @@ const ROLLING_SAMPLING: f64 = 0.1;
 /// Places of a roll at the end of a pass that are looked at.
 const ROLL_STEPS: usize = 24;
 
+/// Chords of rolls have no less than this share of the tolerance: the side of a cutter may stand upright.
+const LEAST_UPRIGHT: f64 = 0.05;
+
 /// Where the axis is at `s`.
 pub(crate) type Curve<'a> = &'a (dyn Fn(f64) -> Vector2 + Sync);
 
@@ -163,13 +166,30 @@ impl PlanCurves<'_> {
         let mut points: Vec<Point3> = Vec::new();
         for &(contact, a, b) in run.iter().filter(|(_, a, b)| b - a > LEAST_STRETCH) {
             // Rolling over corners of the border the cutter rises and falls within less than it does on surface.
-            let share = if contact == Footing::Rolling { ROLLING_SAMPLING } else { 1.0 };
-            let settings = PassSettings { sampling: share * self.settings.sampling, ..*self.settings };
+            let mut settings = *self.settings;
+            if contact == Footing::Rolling {
+                settings.sampling *= ROLLING_SAMPLING;
+                settings.chord_tolerance *= self.least_upright(curve, [a, b]);
+            }
             let stretch = settings.moves(a, b, &mut |s| self.tip(curve, s), self.monitor)?;
             let joined = usize::from(!points.is_empty());
             points.extend(stretch.into_iter().skip(joined));
         }
         Ok(points)
+    }
+
+    /// The least cosine of the slope by which the cutter touches the border along a roll: a chord cuts the border deeper by as much as it
+    /// is off over that.
+    fn least_upright(&self, curve: Curve<'_>, [a, b]: [f64; 2]) -> f64 {
+        let upright = |k: usize| {
+            let (axis, drop) = self.drop_at(curve, a + (b - a) * k as f64 / ROLL_STEPS as f64)?;
+            let arm = (drop.contact.point.xy().coords - axis).norm();
+            let lean = self.cutter.profile().incline(arm).sin;
+            Some((1.0 - lean * lean).max(0.0).sqrt())
+        };
+        let rounded = self.cutter.corner_radius() > 0.0;
+        let least = (0..=ROLL_STEPS).filter(|_| rounded).filter_map(upright).fold(1.0, f64::min);
+        least.max(LEAST_UPRIGHT)
     }
 
     /// Where the contact changes from what it is at `before` on the way to `s`: the last place that
