@@ -96,9 +96,6 @@ const MOST_TOUCH_UP: f64 = 0.04;
 /// The same where narrower passes were in vain.
 const MOST_TOUCH_UP_IN_VAIN: f64 = 0.1;
 
-/// The share of the places above the target that is reckoned to be seen while only ridges are measured.
-const SEEN: f64 = 0.5;
-
 /// Cells from pass to pass while only ridges are measured.
 const CELLS_A_PASS: f64 = 4.0;
 
@@ -596,8 +593,7 @@ impl Corrected<'_> {
         let whole = figures.cutting_length_mm + figures.link_length_mm + figures.air_length_mm;
         let round = &tried.standing.round;
         let nearer = (round.highest() / aim(self.goal.target)).sqrt() - 1.0;
-        let seen = if round.measured { 1.0 } else { SEEN };
-        let share = if is_in_vain { MOST_TOUCH_UP_IN_VAIN } else { (seen * nearer).min(MOST_TOUCH_UP) };
+        let share = if is_in_vain { MOST_TOUCH_UP_IN_VAIN } else { nearer.min(MOST_TOUCH_UP) };
         let mut left = share * whole;
         let mut fits = |length: f64| {
             left -= length + off_pass;

@@ -3,7 +3,7 @@
 use super::cut_surface::CutSurface;
 use super::excess::ExcessSearch;
 use super::figures::{
-    CloserLook, ExcessFigures, ExcessKind, Limits, Measurement, NUMERICAL_FLOOR, ScallopFigures,
+    CloserLook, ExcessFigures, ExcessKind, Limits, Measurement, NUMERICAL_FLOOR, ScallopFigures, UncutFigures,
 };
 use super::inspected::inspect;
 use super::inspection::Inspection;
@@ -113,7 +113,7 @@ pub fn measure_with_walls(
     if asked.borders {
         inspection.cut_borders(&mut measured.gouge, monitor)?;
     }
-    doubt(&mut measured, &surface, part, path, asked);
+    let was_doubted = doubt(&mut measured, &surface, part, path, asked);
     let all: Vec<u32> = (0..path.len() as u32).collect();
     let cut_away_by = |at: &Point3| {
         let (z, by) = surface.envelope.lowest(at.x, at.y, &all)?;
@@ -123,6 +123,7 @@ pub fn measure_with_walls(
         ExcessSearch { inspection: &inspection, stock_top: asked.stock_top, cut_away_by: &cut_away_by };
     if !asked.borders {
         measured.excess = ExcessFigures::of_cells(&measured);
+        tell_doubt(&mut measured, was_doubted);
         return Ok(measured);
     }
     let (excess, high) = search.run(&found.samples, &measured, monitor)?;
@@ -130,9 +131,10 @@ pub fn measure_with_walls(
     measured.above.extend(high);
     drop_disproved_ridges(&mut measured, &found.ridges);
     raise_highest_ridge(&mut measured, &inspection, path);
-    let (highest, unreached) = (measured.excess.highest.max_mm, measured.excess.unreached.max_mm);
+    let highest = measured.excess.highest.max_mm;
     measured.deviation.max_mm = measured.deviation.max_mm.map(|max| max.max(highest));
-    measured.uncut.max_height_mm = measured.uncut.max_height_mm.max(unreached);
+    lower_disproved_regions(&mut measured, limits);
+    tell_doubt(&mut measured, was_doubted);
     if let Some(walls) = &walls {
         walls.add_to(&mut measured, limits);
     }
@@ -167,6 +169,24 @@ fn drop_disproved_ridges(measured: &mut Measurement, ridges: &Ridges) {
     scallop.error_bound_mm = scallop.error_bound_mm.map(|bound| bound.min(most));
 }
 
+/// No uncut region is higher than the highest material that passes did not come down to: what seemed to be was cut away by moves that no
+/// cell saw.
+fn lower_disproved_regions(measured: &mut Measurement, limits: &Limits) {
+    let (unreached, uncut) = (measured.excess.unreached, &mut measured.uncut);
+    let most = unreached.at_most();
+    if uncut.max_height_mm <= most {
+        uncut.max_height_mm = uncut.max_height_mm.max(unreached.max_mm);
+    } else if most <= limits.uncut {
+        *uncut = UncutFigures { error_bound_mm: NUMERICAL_FLOOR, ..UncutFigures::default() };
+    } else {
+        (uncut.max_height_mm, uncut.error_bound_mm) = (unreached.max_mm, unreached.error_bound_mm);
+        uncut.regions.iter_mut().for_each(|region| region.height_mm = region.height_mm.min(unreached.max_mm));
+        if let Some((first, at)) = uncut.regions.first_mut().zip(unreached.at_mm) {
+            first.at_mm = at;
+        }
+    }
+}
+
 /// The highest place that passes reached is the highest ridge, where two passes leave equally much: ridges are measured on the
 /// grid's lines, and rise between them.
 fn raise_highest_ridge(measured: &mut Measurement, inspection: &Inspection<'_>, path: &Toolpath) {
@@ -198,22 +218,39 @@ fn raise_highest_ridge(measured: &mut Measurement, inspection: &Inspection<'_>, 
 }
 
 /// Where a move that no cell saw cuts the highest scallop or uncut place away, the figure is too great by
-/// an unknown amount: its bound becomes the figure itself. All moves are asked at the two places.
-fn doubt(measured: &mut Measurement, surface: &CutSurface<'_>, part: &Part, path: &Toolpath, asked: &Asked) {
+/// an unknown amount: its bound becomes the figure itself. All moves are asked at the two places. Whether that is so.
+fn doubt(
+    measured: &mut Measurement,
+    surface: &CutSurface<'_>,
+    part: &Part,
+    path: &Toolpath,
+    asked: &Asked,
+) -> bool {
     let all: Vec<u32> = (0..path.len() as u32).collect();
     let cut_away = |at: &Point3| surface.height_of(&all, at) < at.z - asked.error_bound;
     let (scallop, uncut) = (&mut measured.scallop, &mut measured.uncut);
-    let mut doubtful = false;
-    if scallop.max_at_mm.is_some_and(|at| cut_away(&at.into())) {
+    let of_ridge = scallop.max_at_mm.is_some_and(|at| cut_away(&at.into()));
+    if of_ridge {
         scallop.error_bound_mm = scallop.error_bound_mm.zip(scallop.max_mm).map(|(b, m)| b.max(m));
-        doubtful = true;
     }
     let highest = uncut.regions.first().and_then(|r| Some((r, part.highest_at(r.at_mm[0], r.at_mm[1])?)));
-    if highest.is_some_and(|(r, design)| cut_away(&(design.point + design.normal * r.height_mm))) {
+    let of_region =
+        highest.is_some_and(|(r, design)| cut_away(&(design.point + design.normal * r.height_mm)));
+    if of_region {
         uncut.error_bound_mm = uncut.error_bound_mm.max(uncut.max_height_mm);
-        doubtful = true;
     }
-    if doubtful {
+    of_ridge || of_region
+}
+
+/// Says so where nothing else told the figures that were doubted.
+fn tell_doubt(measured: &mut Measurement, was_doubted: bool) {
+    let (scallop, uncut) = (&measured.scallop, &measured.uncut);
+    let is_vacuous = |max: f64, bound: f64| max > 0.0 && bound >= max;
+    let ridge = scallop.max_mm.zip(scallop.error_bound_mm);
+    if was_doubted
+        && (is_vacuous(uncut.max_height_mm, uncut.error_bound_mm)
+            || ridge.is_some_and(|(max, bound)| is_vacuous(max, bound)))
+    {
         measured.refined.note = Some(
             "moves between the centres of cells cut lower than what was measured there; passes so close need a \
              cell of a third of their distance"

@@ -339,25 +339,34 @@ fn the_bound_closes_along_a_bent_crease() {
 }
 
 /// Moves much shorter than a cell, each of its own depth: most win no cell, and are lowest over some place of a ridge. What stands
-/// there is what they left, and known as closely as elsewhere.
+/// there is what they left, and known as closely as elsewhere, also where no pass came down to the design.
 #[test]
 fn short_moves_between_cells_leave_no_figure_open() {
     let (part, ball) = (part(0), Cutter::ball(6.0).unwrap());
-    let pass = |k: i32| {
-        let depth = move |i: i32| 2e-4 * f64::from((i * 7 + k * 3) % 5);
-        let at = move |i: i32| Point3::new(-1.0 + 0.03 * f64::from(i), 0.4 * f64::from(k), -depth(i));
-        std::iter::once(Point3::new(-1.0, 0.4 * f64::from(k), 9.0)).chain((0..=200).map(at))
-    };
-    let moves = (0..=10).flat_map(|k| {
-        pass(k).enumerate().map(move |(i, tip)| {
-            let kind = if i == 0 { MoveKind::Rapid } else { MoveKind::Cut };
-            Move { to: ClPoint::upright(tip), kind, feed_rate: 1000.0, pass: k as u32 }
-        })
-    });
-    let path = Toolpath::new(ClPoint::upright(Point3::new(-1.0, 0.0, 9.0)), moves.collect());
-    let highest = measured(&part, &ball, &path, 0.3).excess.highest;
-    let brute = Brute::new(&part, &ball, &path);
-    let truth = brute.highest(200);
-    assert!(brute.confirms(&highest, truth), "{truth} {highest:?}");
-    assert!(highest.error_bound_mm < 6e-4, "{truth} {highest:?}");
+    for lift in [0.0, 2.0 * LIMITS.uncut] {
+        let pass = |k: i32| {
+            let depth = move |i: i32| 2e-4 * f64::from((i * 7 + k * 3) % 5);
+            let at =
+                move |i: i32| Point3::new(-1.0 + 0.03 * f64::from(i), 0.4 * f64::from(k), lift - depth(i));
+            std::iter::once(Point3::new(-1.0, 0.4 * f64::from(k), 9.0)).chain((0..=200).map(at))
+        };
+        let moves = (0..=10).flat_map(|k| {
+            pass(k).enumerate().map(move |(i, tip)| {
+                let kind = if i == 0 { MoveKind::Rapid } else { MoveKind::Cut };
+                Move { to: ClPoint::upright(tip), kind, feed_rate: 1000.0, pass: k as u32 }
+            })
+        });
+        let path = Toolpath::new(ClPoint::upright(Point3::new(-1.0, 0.0, 9.0)), moves.collect());
+        let Measurement { excess, uncut, .. } = measured(&part, &ball, &path, 0.3);
+        let highest = excess.highest;
+        let brute = Brute::new(&part, &ball, &path);
+        let truth = brute.highest(200);
+        assert!(brute.confirms(&highest, truth), "{lift}: {truth} {highest:?}");
+        assert!(highest.error_bound_mm < 6e-4, "{lift}: {truth} {highest:?}");
+        assert!(uncut.error_bound_mm < 6e-4, "{lift}: {truth} {uncut:?}");
+        assert_eq!(uncut.max_height_mm > 0.0, lift > 0.0, "{uncut:?}");
+        if lift > 0.0 {
+            assert!((uncut.max_height_mm - truth).abs() < 6e-4, "{truth} {uncut:?}");
+        }
+    }
 }
