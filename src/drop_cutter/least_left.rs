@@ -5,10 +5,10 @@ use std::collections::BinaryHeap;
 
 use super::{Beside, DropCutter};
 use cutter::Cutter;
-use geometry::{Point2, Point3, Vector2};
+use geometry::{Point2, Point3, Vector2, Vector3};
 use work::monitor::{self, Cancelled, Monitor};
 
-/// The least height, mm along z, that an upright cutter leaves above a place without cutting into the part.
+/// The least height, mm along the normal, that an upright cutter leaves above a place without cutting into the part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeastLeft {
     /// What the best position that was found leaves.
@@ -36,6 +36,15 @@ struct Square {
     /// No position in it leaves less, mm.
     least: f64,
 }
+
+/// Steps of the search for where a line meets the cutter: the last is a billionth of its radius.
+const SEARCHED: usize = 60;
+
+/// A line that misses the cutter by so little, mm, counts as meeting it.
+const GRAZED: f64 = 1e-9;
+
+/// Positions that meet the line above a place no further up than so many times what is to be proven are looked at.
+const AS_FAR: f64 = 2.0;
 
 /// Rings of positions around a place, and positions on each, that are tried without a proof.
 const RINGS: usize = 3;
@@ -85,11 +94,11 @@ impl DropCutter<'_> {
         best.1
     }
 
-    /// What `cutter`, which this was made for, leaves at least above the place `at` of the part; `None` where that is not
-    /// proven to be more than `more_than`, mm.
+    /// What `cutter`, which this was made for, leaves at least above the place `at` of the part along its unit normal, which looks up;
+    /// `None` where that is not proven to be more than `more_than`, mm.
     ///
-    /// A branch and bound over all positions that cover the place. A cutter that touches the part at a contact comes no
-    /// lower than this contact from any position nearby, either; that bounds a whole square.
+    /// A branch and bound over all positions that cover the place, or the line above it as far as `more_than`. A cutter that touches the
+    /// part at a contact comes no lower than this contact from any position nearby, either; that bounds a whole square.
     ///
     /// # Errors
     /// [`Cancelled`] when the monitor says so.
@@ -97,22 +106,28 @@ impl DropCutter<'_> {
         &self,
         cutter: &Cutter,
         at: &Point3,
+        normal: &Vector3,
         more_than: f64,
         monitor: &dyn Monitor,
     ) -> Result<Option<LeastLeft>, Cancelled> {
         let radius = cutter.radius();
+        let line = Line { cutter, at: *at, normal: *normal };
+        // Positions farther aside meet the line above that.
+        let lean = normal.xy().norm();
+        let as_far = if lean > 0.0 { AS_FAR * more_than } else { f64::INFINITY };
+        let reach = radius + if lean > 0.0 { as_far * lean } else { 0.0 };
         let height = |rho: f64| cutter.height(rho).unwrap_or(f64::INFINITY);
         let mut found = f64::INFINITY;
         let mut beside = Beside::default();
         let mut square = |middle: [f64; 2], half: f64, found: &mut f64| {
             let away = |x: f64, y: f64| (middle[0] - x).hypot(middle[1] - y);
             let (off, corner) = (away(at.x, at.y), std::f64::consts::SQRT_2 * half);
-            if off - corner > radius {
+            if off - corner > reach {
                 return None;
             }
             let mut least = f64::NEG_INFINITY;
             if let Some(drop) = self.at_beside(middle[0], middle[1], &mut beside) {
-                *found = found.min(drop.tip_z + height(off) - at.z);
+                *found = found.min(line.left(drop.tip_z, middle, 0.0));
                 let contact = drop.contact.point;
                 let carried = |z: f64, rho: f64| z - height(rho + corner);
                 let rho = away(contact.x, contact.y);
@@ -127,18 +142,19 @@ impl DropCutter<'_> {
                         tip = tip.max(carried(hit.z - self.deviation / level.max(f64::MIN_POSITIVE), inner));
                     }
                 }
-                least = tip + height((off - corner).max(0.0)) - at.z;
+                least = line.left(tip, middle, corner);
             }
             Some(Square { middle, half, least })
         };
-        let mut open: BinaryHeap<Square> = square([at.x, at.y], radius, &mut found).into_iter().collect();
+        let mut open: BinaryHeap<Square> = square([at.x, at.y], reach, &mut found).into_iter().collect();
         for tried in 0.. {
             let Some(lowest) = open.pop() else { break };
             if found <= more_than || tried >= MOST && lowest.least <= more_than {
                 return Ok(None);
             }
-            if lowest.least >= found - CLOSE * found || tried >= MOST {
-                return Ok(Some(LeastLeft { height: found, bound: (found - lowest.least).max(0.0) }));
+            if lowest.least >= found - CLOSE * found || lowest.least >= as_far || tried >= MOST {
+                let least = lowest.least.min(as_far);
+                return Ok(Some(LeastLeft { height: found, bound: (found - least).max(0.0) }));
             }
             if tried % 64 == 0 {
                 monitor::check(monitor)?;
@@ -149,6 +165,70 @@ impl DropCutter<'_> {
             }
         }
         Ok(None)
+    }
+}
+
+/// The line along the normal of a place, mm.
+struct Line<'a> {
+    cutter: &'a Cutter,
+    at: Point3,
+    normal: Vector3,
+}
+
+impl Line<'_> {
+    /// How far along the line it meets a cutter whose tip is at that height, or one nearer to the line by up to `aside`; infinite where it
+    /// does not, or beyond the radius from the place. Never more than that by more than rounding.
+    fn left(&self, tip: f64, [x, y]: [f64; 2], aside: f64) -> f64 {
+        let gap = |t: f64| {
+            let q = self.at + self.normal * t;
+            let off = ((q.x - x).hypot(q.y - y) - aside).max(0.0);
+            tip + self.cutter.height(off).unwrap_or(f64::INFINITY) - q.z
+        };
+        // Where the line passes beneath the cutter or through it.
+        let (way, lean) = (Vector2::new(self.at.x - x, self.at.y - y), self.normal.xy());
+        let (a, b, c) = (
+            lean.norm_squared(),
+            way.dot(&lean),
+            way.norm_squared() - (self.cutter.radius() + aside).powi(2),
+        );
+        if a < 1e-18 {
+            return if c <= 0.0 { gap(0.0) / self.normal.z } else { f64::INFINITY };
+        }
+        let root = b * b - a * c;
+        if root < 0.0 {
+            return f64::INFINITY;
+        }
+        let (first, last) = ((-b - root.sqrt()) / a, (-b + root.sqrt()) / a);
+        // Just within, for beyond its radius a cutter has no height.
+        let inset = 1e-12 * (last - first);
+        let (first, last) = ((first + inset).max(-self.cutter.radius()), last - inset);
+        if last <= first {
+            return f64::INFINITY;
+        }
+        if gap(first) <= 0.0 {
+            return first;
+        }
+        // A convex function: it falls until the meeting, if there is one.
+        let (mut low, mut high, mut is_met) = (first, last, false);
+        for _ in 0..SEARCHED {
+            if is_met {
+                let middle = 0.5 * (low + high);
+                *(if gap(middle) <= 0.0 { &mut high } else { &mut low }) = middle;
+                continue;
+            }
+            let third = (high - low) / 3.0;
+            let [left, right] = [gap(low + third), gap(high - third)];
+            if left <= 0.0 {
+                (high, is_met) = (low + third, true);
+            } else if left <= right {
+                high -= third;
+            } else {
+                low += third;
+                is_met = right <= 0.0;
+                high -= if is_met { third } else { 0.0 };
+            }
+        }
+        if is_met || gap(high) <= GRAZED { low } else { f64::INFINITY }
     }
 }
 
@@ -185,7 +265,8 @@ mod tests {
         let bvh = Bvh::new(&mesh);
         let drop = DropCutter::over(&mesh, &bvh, cutter, None, &Silent).unwrap();
         let place = bvh.highest_at(&mesh, at[0], at[1]).unwrap();
-        drop.least_left(cutter, &Point3::new(at[0], at[1], place.z), more_than, &Silent).unwrap()
+        drop.least_left(cutter, &Point3::new(at[0], at[1], place.z), &Vector3::z(), more_than, &Silent)
+            .unwrap()
     }
 
     /// In the middle of a hollow cylinder of 30 mm a flat of 1.5 mm in radius rests on its corner: the closed form of the
@@ -210,6 +291,31 @@ mod tests {
         assert_eq!(left(&bull, [6.0, 6.0], 1.01 * (stands + chord), hollow), None);
     }
 
+    /// At the foot of a steep wall on a slope of 40 degrees a ball stands on both. What it leaves is steeper than the slope there: along the
+    /// normal it is less than along z times the normal's z.
+    #[test]
+    fn heights_are_those_along_the_normal() {
+        let [slope, wall] = [40f64, 65.0].map(f64::to_radians);
+        let foot = |x: f64, _: f64| (x - 6.0).min(0.0) * slope.tan() + (x - 6.0).max(0.0) * wall.tan();
+        let aside = 3.0 * (0.5 * (wall - slope)).tan();
+        let stands = 3.0 - (9.0 - aside * aside).sqrt();
+        let mesh = height_field(120, 12.0, 0.0, &foot);
+        let bvh = Bvh::new(&mesh);
+        let ball = Cutter::ball(6.0).unwrap();
+        let drop = DropCutter::over(&mesh, &bvh, &ball, None, &Silent).unwrap();
+        let normal = Vector3::new(-slope.sin(), 0.0, slope.cos());
+        let least = |more_than: f64| {
+            drop.least_left(&ball, &Point3::new(6.0, 6.0, 0.0), &normal, more_than, &Silent).unwrap()
+        };
+        let found = least(0.9 * stands).unwrap();
+        assert!(found.height >= stands - 1e-6 && found.height <= 1.01 * stands, "{found:?} {stands}");
+        assert!(found.height - found.bound <= stands, "{found:?} {stands}");
+        assert_eq!(least(1.02 * stands), None);
+        let upright = drop.least_left(&ball, &Point3::new(6.0, 6.0, 0.0), &Vector3::z(), 0.0, &Silent);
+        let upright = upright.unwrap().unwrap();
+        assert!((upright.height - upright.bound) * normal.z > 1.2 * stands, "{upright:?} {stands}");
+    }
+
     /// From beside the best position the search comes to it: in a hollow a cutter that rests on its corner leaves least over its middle.
     #[test]
     fn the_best_position_is_found_from_beside() {
@@ -224,7 +330,7 @@ mod tests {
             };
             let first = Point2::new(6.7, 5.6);
             let found = leaves(drop.lowest_over(&cutter, &at, first, 0.3));
-            let least = drop.least_left(&cutter, &at, 0.0, &Silent).unwrap().unwrap();
+            let least = drop.least_left(&cutter, &at, &Vector3::z(), 0.0, &Silent).unwrap().unwrap();
             assert!(found < 0.9 * leaves(first), "{found} {}", leaves(first));
             assert!(found <= 1.02 * least.height && found >= least.height - least.bound, "{found} {least:?}");
         }
@@ -242,17 +348,30 @@ mod tests {
             for at in [[4.1, 5.2], [7.3, 6.9], [6.0, 3.3]] {
                 let z = bvh.highest_at(&mesh, at[0], at[1]).unwrap().z;
                 let place = Point3::new(at[0], at[1], z);
-                let Some(least) = drop.least_left(&cutter, &place, 0.005, &Silent).unwrap() else { continue };
-                told += 1;
-                assert!(drop.left_by_some(&cutter, &place) >= least.height - least.bound - 1e-9);
-                let n = 60;
-                for k in 0..n * n {
-                    let of =
-                        |k: usize| (2.0 * (k as f64 + 0.5) / f64::from(n as u32) - 1.0) * cutter.radius();
-                    let (dx, dy) = (of(k % n), of(k / n));
-                    let Some(up) = cutter.height(dx.hypot(dy)) else { continue };
-                    let leaves = drop.at(at[0] + dx, at[1] + dy).unwrap().tip_z + up - z;
-                    assert!(leaves >= least.height - least.bound - 1e-9, "{cutter:?} {leaves} {least:?}");
+                for normal in [Vector3::z(), Vector3::new(0.5, -0.3, 0.9).normalize()] {
+                    let Some(least) = drop.least_left(&cutter, &place, &normal, 0.005, &Silent).unwrap()
+                    else {
+                        continue;
+                    };
+                    told += 1;
+                    if normal.z == 1.0 {
+                        assert!(drop.left_by_some(&cutter, &place) >= least.height - least.bound - 1e-9);
+                    }
+                    let n = 60;
+                    for k in 0..n * n {
+                        let of =
+                            |k: usize| (2.0 * (k as f64 + 0.5) / f64::from(n as u32) - 1.0) * cutter.radius();
+                        let axis = place.xy() + Vector2::new(of(k % n), of(k / n));
+                        let tip = drop.at(axis.x, axis.y).unwrap().tip_z;
+                        // Up the line, step by step.
+                        let is_within = |t: f64| {
+                            let q = place + normal * t;
+                            cutter.height((q.xy() - axis).norm()).is_some_and(|up| tip + up <= q.z)
+                        };
+                        let proven = least.height - least.bound - 1e-7;
+                        let steps = (0..=200).map(|k| proven * f64::from(k) / 200.0);
+                        assert!(!steps.map(is_within).any(|is| is), "{cutter:?} {normal:?} {least:?}");
+                    }
                 }
             }
         }

@@ -19,7 +19,7 @@ use crate::{JobError, Session};
 /// The least that an upright cutter leaves at the highest place without cutting into the part.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(crate) struct LeastLeftFigures {
-    /// Along z.
+    /// Along the normal.
     height_mm: f64,
     error_bound_mm: f64,
     at_mm: [f64; 3],
@@ -29,7 +29,7 @@ pub(crate) struct LeastLeftFigures {
 /// Places of the part's plan along x and along y that are looked at beside the highest one.
 const PLACES: usize = 12;
 
-/// Of the normal's z. Where the part is steeper, heights along z say little.
+/// Of the normal's z. Where the part is steeper, it is a wall.
 const LEAST_LEVEL: f64 = 0.2;
 
 impl LeastLeftFigures {
@@ -69,7 +69,8 @@ impl LeastLeftFigures {
                 return Ok(None);
             }
             let stock = session.stock.height_at(design.point.x, design.point.y) - design.point.z;
-            let left = drop.least_left(cutter, &design.point, limit / design.normal.z, monitor)?;
+            let stock = stock / design.normal.z;
+            let left = drop.least_left(cutter, &design.point, &design.normal, limit, monitor)?;
             Ok(left.filter(|left| left.height <= stock).map(|left| Self {
                 height_mm: left.height,
                 error_bound_mm: left.bound,
@@ -106,7 +107,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     let Some(left) = left else { return Ok(Finding::default()) };
     let height = with_bound(Some(left.height_mm), Some(left.error_bound_mm));
     let note = format!(
-        "no path of this cutter, upright, holds {} µm: at {} it leaves {height} µm along z wherever it stands. The part is too \
+        "no path of this cutter, upright, holds {} µm: at {} it leaves {height} µm wherever it stands. The part is too \
          hollow there; take a smaller cutter, one with a smaller flat, or tilt it (`axis`)",
         micrometres(Some(left.limit_mm)),
         place(left.at_mm),
