@@ -141,10 +141,10 @@ pub fn measure_with_walls(
     Ok(measured)
 }
 
-/// Leaves ridges out that stand above the highest material: moves that no cell saw cut them away. The others stand no higher
-/// than it.
+/// Leaves ridges out that stand above the highest material where passes came down to the design: moves that no cell saw cut them away.
+/// The others stand no higher than it.
 fn drop_disproved_ridges(measured: &mut Measurement, ridges: &Ridges) {
-    let (highest, scallop) = (measured.excess.highest.at_most(), &mut measured.scallop);
+    let (highest, scallop) = (measured.excess.reached.at_most(), &mut measured.scallop);
     if scallop.max_mm.is_some_and(|ridge| ridge > highest) {
         measured.ridge_samples.retain(|[height, _]| f64::from(*height) <= highest);
         let known = |figure: Option<f64>| figure.filter(|height| *height <= highest);

@@ -29,6 +29,9 @@ pub(crate) struct LeastLeftFigures {
 /// Places of the part's plan along x and along y that are looked at beside the highest one.
 const PLACES: usize = 12;
 
+/// A height with a bound above this share of it is told by what is proven of it alone.
+const CLOSE: f64 = 0.1;
+
 /// Of the normal's z. Where the part is steeper, it is a wall.
 const LEAST_LEVEL: f64 = 0.2;
 
@@ -105,9 +108,14 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     let (path, measurement) = (run.path(), run.measurement());
     let left = LeastLeftFigures::above_limit(run.session, cutters.first(), path, measurement, monitor)?;
     let Some(left) = left else { return Ok(Finding::default()) };
-    let height = with_bound(Some(left.height_mm), Some(left.error_bound_mm));
+    let (height, bound) = (left.height_mm, left.error_bound_mm);
+    let height = if bound <= CLOSE * height {
+        format!("{} µm", with_bound(Some(height), Some(bound)))
+    } else {
+        format!("at least {} µm", micrometres(Some(height - bound)))
+    };
     let note = format!(
-        "no path of this cutter, upright, holds {} µm: at {} it leaves {height} µm wherever it stands. The part is too \
+        "no path of this cutter, upright, holds {} µm: at {} it leaves {height} wherever it stands. The part is too \
          hollow there; take a smaller cutter, one with a smaller flat, or tilt it (`axis`)",
         micrometres(Some(left.limit_mm)),
         place(left.at_mm),
