@@ -446,9 +446,11 @@ impl Corrected<'_> {
 
     /// Whether the best plan leaves what was never cut, or cuts far too deep.
     fn is_far_off(&self) -> bool {
-        let Standing { round, depth, .. } = &self.tried.standing;
-        round.highest() > NEVER_CUT * self.goal.target
-            || *depth > NEVER_CUT * self.session.scene.tolerance.gouge
+        self.tried.standing.round.highest() > NEVER_CUT * self.goal.target || self.is_far_too_deep()
+    }
+
+    fn is_far_too_deep(&self) -> bool {
+        self.tried.standing.depth > NEVER_CUT * self.session.scene.tolerance.gouge
     }
 
     /// The widths to try next. A plan that stands too high gets deeper moves where that is enough, and narrower widths
@@ -459,7 +461,7 @@ impl Corrected<'_> {
     fn next(&self, in_vain: usize, slack: f64) -> Option<Widths> {
         let (target, round) = (self.goal.target, &self.tried.standing.round);
         if self.is_far_off() {
-            return None;
+            return self.far_off_served(in_vain);
         }
         let last = self.latest.as_ref().unwrap_or(&self.tried);
         let in_proportion = || {
@@ -484,6 +486,19 @@ impl Corrected<'_> {
             (false, ..=MOST_IN_VAIN) => in_proportion().or_else(|| self.corrected(last, in_vain)),
             _ => None,
         }
+    }
+
+    /// Few places that were never cut get passes of their own, once. `None` where there are many, which nearer passes do not cut either,
+    /// or where the plan cuts far too deep.
+    fn far_off_served(&self, in_vain: usize) -> Option<Widths> {
+        let Tried { widths, standing, .. } = &self.tried;
+        if in_vain > 0 || !standing.round.measured || self.is_far_too_deep() {
+            return None;
+        }
+        let near = self.standing_near(&self.tried);
+        let high: Vec<HighPlace> = near.iter().filter(|place| place.over > 0.0).copied().collect();
+        let is_new = !high.is_empty() && !high.iter().any(|place| widths.is_touched_up(place));
+        (is_new && self.are_few(&high, &self.tried, true)).then(|| widths.touched_up(&high))
     }
 
     /// Whether the best plan would hold the target with one pass less: where ridges are about equally high, passes are spread
@@ -776,5 +791,19 @@ mod tests {
             assert!(after <= before.max(0.05), "{toolpath}: {before} {after} {rounds:?}");
         }
         assert!(figure(&planned(true, "strategy = \"zigzag\"\nstepover = 0.5")).is_none());
+    }
+
+    /// A spiral leaves a corner of the part by a turn that stands 18 times as high as the target there: no width matters, and a short pass of
+    /// its own cuts it.
+    #[test]
+    fn a_corner_that_was_never_cut_gets_a_pass_of_its_own() {
+        let text = "[part]\nsurface = \"wave\"\namplitude = 0.5\nwavelength_x = 12\nx = [-4, 4]\ny = [-3, 3]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n\
+                    [tolerance]\nscallop = 0.0003\nchord = 3e-5\n[[toolpath]]\nstrategy = \"spiral\"\n";
+        let session = Session::new(Scene::parse("corner.toml", text.to_owned()).unwrap()).unwrap();
+        let result = session.toolpath(&session.scene.toolpaths[0], &Silent).unwrap().result;
+        let rounds = figure(&result).unwrap()["rounds"].as_array().unwrap();
+        let highest = |round: &serde_json::Value| round["border_mm"].as_f64().unwrap();
+        assert!(highest(&rounds[0]) > NEVER_CUT * 0.0003, "{rounds:?}");
+        assert_eq!(result.verdict, report::Verdict::Pass, "{rounds:?}");
     }
 }
