@@ -253,9 +253,13 @@ impl CutSurface<'_> {
         }))
     }
 
-    /// As [`Self::at`], beside the grid by what cut its outermost cells.
+    /// As [`Self::at`]; beside the grid by the moves that cut its outermost cells, as far as they pass.
     fn near(&self, x: f64, y: f64) -> Option<CutPoint> {
-        self.in_cell(self.cut.grid.nearest_cell(x, y), x, y)
+        let grid = &self.cut.grid;
+        match grid.cell_at(x, y) {
+            Some(cell) => self.in_cell(cell, x, y),
+            None => self.in_cell(grid.nearest_cell(x, y), x, y).filter(|point| point.by != NOT_CUT),
+        }
     }
 
     /// Follows the normal in steps of half a cell to the first change of side; the bracket
