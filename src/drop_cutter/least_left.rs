@@ -369,8 +369,8 @@ mod tests {
                             cutter.height((q.xy() - axis).norm()).is_some_and(|up| tip + up <= q.z)
                         };
                         let proven = least.height - least.bound - 1e-7;
-                        let steps = (0..=200).map(|k| proven * f64::from(k) / 200.0);
-                        assert!(!steps.map(is_within).any(|is| is), "{cutter:?} {normal:?} {least:?}");
+                        let mut steps = (0..=200).map(|k| proven * f64::from(k) / 200.0);
+                        assert!(!steps.any(is_within), "{cutter:?} {normal:?} {least:?}");
                     }
                 }
             }

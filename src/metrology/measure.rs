@@ -133,7 +133,7 @@ pub fn measure_with_walls(
     raise_highest_ridge(&mut measured, &inspection, path);
     let highest = measured.excess.highest.max_mm;
     measured.deviation.max_mm = measured.deviation.max_mm.map(|max| max.max(highest));
-    lower_disproved_regions(&mut measured, limits);
+    tell_uncut(&mut measured, limits);
     tell_doubt(&mut measured, was_doubted);
     if let Some(walls) = &walls {
         walls.add_to(&mut measured, limits);
@@ -169,20 +169,19 @@ fn drop_disproved_ridges(measured: &mut Measurement, ridges: &Ridges) {
     scallop.error_bound_mm = scallop.error_bound_mm.map(|bound| bound.min(most));
 }
 
-/// No uncut region is higher than the highest material that passes did not come down to: what seemed to be was cut away by moves that no
-/// cell saw.
-fn lower_disproved_regions(measured: &mut Measurement, limits: &Limits) {
+/// The highest uncut place is the highest material that passes did not come down to, where that is higher than what cells show, or where
+/// moves that no cell saw cut away what they show.
+fn tell_uncut(measured: &mut Measurement, limits: &Limits) {
     let (unreached, uncut) = (measured.excess.unreached, &mut measured.uncut);
-    let most = unreached.at_most();
-    if uncut.max_height_mm <= most {
-        uncut.max_height_mm = uncut.max_height_mm.max(unreached.max_mm);
-    } else if most <= limits.uncut {
+    let (shown, most) = (uncut.max_height_mm, unreached.at_most());
+    let is_disproved = shown > most || shown > 0.0 && uncut.error_bound_mm >= shown;
+    if is_disproved && most <= limits.uncut {
         *uncut = UncutFigures { error_bound_mm: NUMERICAL_FLOOR, ..UncutFigures::default() };
-    } else {
+    } else if is_disproved || unreached.max_mm > shown {
         (uncut.max_height_mm, uncut.error_bound_mm) = (unreached.max_mm, unreached.error_bound_mm);
-        uncut.regions.iter_mut().for_each(|region| region.height_mm = region.height_mm.min(unreached.max_mm));
+        uncut.regions.iter_mut().for_each(|region| region.height_mm = region.height_mm.min(most));
         if let Some((first, at)) = uncut.regions.first_mut().zip(unreached.at_mm) {
-            first.at_mm = at;
+            (first.height_mm, first.at_mm) = (unreached.max_mm, at);
         }
     }
 }
