@@ -457,7 +457,7 @@ impl Corrected<'_> {
     /// elsewhere; one that is too low gets wider ones. Levels are placed anew in each plan, so that other places may stand
     /// too high then: these are narrowed as well, from the last plan on. Last of all everything is narrowed in proportion, to
     /// which remnants along borders give way only by another pass. `None` where the best plan holds the target and comes within `slack` of
-    /// it, where it is far off, or where what there is was tried `in_vain`.
+    /// it, where it is far off in many places, or where what there is was tried `in_vain`.
     fn next(&self, in_vain: usize, slack: f64) -> Option<Widths> {
         let (target, round) = (self.goal.target, &self.tried.standing.round);
         if self.is_far_off() {

@@ -141,10 +141,10 @@ pub fn measure_with_walls(
     Ok(measured)
 }
 
-/// Leaves ridges out that stand above the highest material where passes came down to the design: moves that no cell saw cut them away.
-/// The others stand no higher than it.
+/// Leaves ridges out that stand above the highest material: moves that no cell saw cut them away. The others stand no higher
+/// than it.
 fn drop_disproved_ridges(measured: &mut Measurement, ridges: &Ridges) {
-    let (highest, scallop) = (measured.excess.reached.at_most(), &mut measured.scallop);
+    let (highest, scallop) = (measured.excess.highest.at_most(), &mut measured.scallop);
     if scallop.max_mm.is_some_and(|ridge| ridge > highest) {
         measured.ridge_samples.retain(|[height, _]| f64::from(*height) <= highest);
         let known = |figure: Option<f64>| figure.filter(|height| *height <= highest);
@@ -179,7 +179,7 @@ fn tell_uncut(measured: &mut Measurement, limits: &Limits) {
         *uncut = UncutFigures { error_bound_mm: NUMERICAL_FLOOR, ..UncutFigures::default() };
     } else if is_disproved || unreached.max_mm > shown {
         (uncut.max_height_mm, uncut.error_bound_mm) = (unreached.max_mm, unreached.error_bound_mm);
-        uncut.regions.iter_mut().for_each(|region| region.height_mm = region.height_mm.min(most));
+        uncut.regions.iter_mut().for_each(|region| region.height_mm = region.height_mm.min(unreached.max_mm));
         if let Some((first, at)) = uncut.regions.first_mut().zip(unreached.at_mm) {
             (first.height_mm, first.at_mm) = (unreached.max_mm, at);
         }
