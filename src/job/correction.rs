@@ -21,7 +21,9 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use geometry::Point3;
-use metrology::{Bounded, Engine, Measured, Measurement, RidgeMap, Simulation, path_figures};
+use metrology::{
+    Bounded, Engine, EngineError, Measured, Measurement, RidgeMap, Simulation, Task, path_figures,
+};
 use motion::{ROUNDING, Toolpath};
 use report::Verdict;
 use scene::ToolpathRequest;
@@ -206,6 +208,8 @@ struct Corrected<'a> {
     rounds: Vec<CorrectionRound>,
     /// The round of the best plan.
     kept: usize,
+    /// Whether places where its passes leave too much were sought beside those that ridges on coarse cells show.
+    is_complete: bool,
 }
 
 impl Session {
@@ -264,6 +268,7 @@ impl Session {
             narrower: None,
             rounds,
             kept: 0,
+            is_complete: false,
         };
         let looked = match looked {
             Some(looked) => looked,
@@ -309,14 +314,24 @@ impl Session {
         planned: &Planned,
         monitor: &dyn Monitor,
     ) -> Result<Option<RidgeMap>, JobError> {
-        let scene = &self.scene;
         monitor.start("measuring the ridges of a plan", 0);
+        self.on_coarse_cells(request, planned, |task| engine.ridges(task, monitor))
+    }
+
+    /// Cells that are just fine enough to show every pass of a plan.
+    fn on_coarse_cells<T>(
+        &self,
+        request: &ToolpathRequest,
+        planned: &Planned,
+        of_task: impl FnOnce(&Task<'_>) -> Result<T, EngineError>,
+    ) -> Result<T, JobError> {
+        let scene = &self.scene;
         let cell = plane_interval(&scene.cutter, request.step) / CELLS_A_PASS;
         let simulation = Simulation { cell, cell_is_auto: true, ..scene.simulation };
         let cells =
             self.budget().grid_before_planning(&self.area(), &simulation).map_err(JobError::grid(scene))?;
         let task = self.task(&planned.plan.path, &simulation, &cells);
-        engine.ridges(&task, monitor).map_err(|reason| JobError::engine(scene, &request.name, reason))
+        of_task(&task).map_err(|reason| JobError::engine(scene, &request.name, reason))
     }
 
     /// Whether moves of a toolpath can go deeper beside places that stand a little too high. Those of a tool that leans cannot.
@@ -353,6 +368,7 @@ impl Corrected<'_> {
         while self.rounds.len() < MOST_ROUNDS
             && let Some(next) = self.next(in_vain, slack)
         {
+            let next = if in_vain == 0 { self.completed(next, slack, monitor)? } else { next };
             let (planned, factors) = self.plan(&next, monitor)?;
             let gain = if self.is_left_as_before(&planned, factors) {
                 let found = self.as_before(&planned, factors);
@@ -367,6 +383,22 @@ impl Corrected<'_> {
             in_vain = if gain >= Gain::Enough { 0 } else { in_vain + 1 };
         }
         Ok(())
+    }
+
+    /// The `next` widths; where they leave all passes where they are, what stands too high beside the ridges that coarse cells show is
+    /// served as well. Where most ridges stand near the target, finding that takes as long as measuring all.
+    fn completed(&mut self, next: Widths, slack: f64, monitor: &dyn Monitor) -> Result<Widths, JobError> {
+        let median = self.tried.standing.round.median_mm;
+        let are_few_near = median.is_some_and(|median| median < EVENLY_HIGH * self.goal.target);
+        if self.is_complete || !are_few_near || !next.is_alike(&self.tried.widths) {
+            return Ok(next);
+        }
+        self.is_complete = true;
+        let look = |task: &Task<'_>| self.engine.above(task, monitor);
+        let others = self.session.on_coarse_cells(self.request, &self.best, look)?;
+        self.tried.standing.above.extend(others.iter().map(|place| (place.at, place.height)));
+        // The others are no reason to place all passes anew.
+        Ok(self.next(1, slack).unwrap_or(next))
     }
 
     /// Plans anew while what the verdict is made of stands above the target.
@@ -715,6 +747,7 @@ impl Corrected<'_> {
         self.rounds.push(found.round);
         let tried = Tried { widths, standing: found, kept: planned.plan.kept.clone() };
         self.narrower = self.tried.standing.round.holds(&self.goal).then(|| self.tried.widths.clone());
+        self.is_complete &= tried.widths.is_alike(&self.tried.widths);
         (self.best, self.tried, self.latest, self.kept) = (planned, tried, None, self.rounds.len() - 1);
         Gain::Much
     }

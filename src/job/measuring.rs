@@ -28,14 +28,15 @@ pub(crate) enum Closeness {
 }
 
 impl Closeness {
-    /// Whether no closer look is needed for a plan. `coarse` cells may tell heights that finer ones do not have.
-    fn is_enough(self, measured: &Measured, coarse: bool) -> bool {
+    /// Whether no closer look is needed for a plan. Where `coarse` cells may tell heights that finer ones do not have, these have to be
+    /// known as closely as was `asked`, mm.
+    fn is_enough(self, measured: &Measured, coarse: bool, asked: f64) -> bool {
         let highest = judge::highest_reached(&measured.measurement);
         match self {
             Self::Verdict => false,
             Self::Plan { within, limit } => {
                 highest.error_bound_mm <= within && highest.at_most() > limit
-                    || !coarse && highest.max_mm > limit
+                    || highest.max_mm > limit && !(coarse && highest.error_bound_mm > asked)
             }
         }
     }
@@ -85,7 +86,7 @@ impl Session {
         }
         let (mut rounds, least) = (0, CLOSEST_BOUND * scene.simulation.error_bound);
         while (simulation.cell > finest || rounds < CLOSER_ROUNDS) && self.is_open(&measured) {
-            if closeness.is_enough(&measured, engine.gains_by_cells()) {
+            if closeness.is_enough(&measured, engine.gains_by_cells(), simulation.error_bound) {
                 return Ok(MeasuredClosely { measured, is_as_verdict: false });
             }
             rounds += 1;

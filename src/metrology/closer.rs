@@ -9,7 +9,7 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use super::figures::NUMERICAL_FLOOR;
-use geometry::Point2;
+use geometry::{Point2, Vector2};
 use work::monitor::{self, Cancelled, Monitor};
 
 /// A square of the plan.
@@ -21,6 +21,19 @@ pub(super) struct Square {
     pub centre: Point2,
     /// Half its side, mm.
     pub half: f64,
+}
+
+impl Square {
+    /// The four squares in it, each of which may hold as much.
+    pub fn quarters(&self) -> [Self; 4] {
+        let Self { possible, centre, half } = *self;
+        let quarter = 0.5 * half;
+        let side = |up: bool| if up { quarter } else { -quarter };
+        [0, 1, 2, 3].map(|k| {
+            let centre = centre + Vector2::new(side(k & 1 != 0), side(k & 2 != 0));
+            Self { possible, centre, half: quarter }
+        })
+    }
 }
 
 /// What a square holds.
@@ -184,15 +197,10 @@ pub(super) fn search(
         spent += 4 * batch.len();
         let quarters = work::parallel::try_map(4 * batch.len(), |k| {
             monitor::check(monitor)?;
-            let (square, side) = (&batch[k / 4], |up: bool| if up { 0.5 } else { -0.5 });
-            let half = 0.5 * square.half;
-            let centre = Point2::new(
-                square.centre.x + side(k & 1 != 0) * square.half,
-                square.centre.y + side(k & 2 != 0) * square.half,
-            );
+            let Square { possible: whole, centre, half } = batch[k / 4].quarters()[k % 4];
             Ok(inside(centre, half).map(|(place, v)| {
                 // A part of a square promises no more than the whole.
-                let possible = v.possible.min(square.possible).max(v.here);
+                let possible = v.possible.min(whole).max(v.here);
                 (v.here, place, Square { possible, centre, half })
             }))
         })?;

@@ -24,7 +24,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::closer::{Effort, Promising, Square, Value, search};
 use super::figures::{Bounded, ExcessFigures, ExcessKind, Measurement, NUMERICAL_FLOOR, RidgePlace};
 use super::inspection::{Inspection, Sample};
-use geometry::{Node, Point2, Point3, Vector2};
+use geometry::{Node, Point2, Point3};
+use motion::ROUNDING;
 use patch::{Held, Patches};
 use sim::Grid;
 use work::monitor::{self, Cancelled, Monitor};
@@ -53,7 +54,7 @@ pub(super) struct ExcessSearch<'a> {
 /// Of the cells that may hold more than a pass may leave, so many are looked through for such places.
 const MOST_HIGH_CELLS: usize = 4096;
 
-/// Such a place is known to this share of what a pass may leave: plans are made anew by no finer figures.
+/// Such a place is known to this share of what a pass may leave: plans are made anew by no finer figures. Told is what it may be at most.
 const HIGH_SLACK: f64 = 0.01;
 
 /// How often such a cell is divided before it counts as low enough.
@@ -101,7 +102,7 @@ impl ExcessSearch<'_> {
         });
         let known = if region.max_mm > ridge.max_mm { region } else { ridge };
         monitor.start("looking for the highest material", 0);
-        let open = self.open(samples, known.max_mm.min(limits.scallop), monitor)?;
+        let open = self.open(samples, known.max_mm.min(limits.scallop), &|_| true, monitor)?;
         // Moves that no cell saw, as they are found.
         let mut unseen = Vec::new();
         let mut sought = |known, kind| self.highest(&open, known, kind, &mut unseen, monitor);
@@ -119,7 +120,9 @@ impl ExcessSearch<'_> {
             let most = found.at_most();
             let found = if found.max_mm > unreached.max_mm { found } else { region };
             let unreached = Bounded { error_bound_mm: (most - found.max_mm).max(0.0), ..found };
-            (sought(ridge, Kind::Reached)?, unreached)
+            // Nothing at all is higher than a ridge, which passes reached.
+            let is_known = highest.max_mm <= ridge.max_mm;
+            (if is_known { highest } else { sought(ridge, Kind::Reached)? }, unreached)
         };
         // Moves that no cell saw came up only after the first search.
         let highest = if reached.max_mm > highest.max_mm { highest.or(&reached) } else { highest };
@@ -137,42 +140,69 @@ impl ExcessSearch<'_> {
         // Nothing high is known, and what is open will be looked at on finer cells.
         let is_low = reached.at_most() <= limits.scallop
             || self.inspection.is_first_look && reached.max_mm <= limits.scallop;
-        let high = if is_low { Vec::new() } else { self.high_places(&open, &unseen, monitor)? };
+        let high = if is_low {
+            Vec::new()
+        } else {
+            let squares = Promising::of(open.squares.into_iter(), MOST_HIGH_CELLS).squares;
+            // What stands lower by so little is above the limit with its bound.
+            let high = limits.scallop - 2.0 * NUMERICAL_FLOOR;
+            let most = (self.most_places() / squares.len().max(1)).max(LEAST_LOOKS);
+            self.high_places(&squares, high, most, &unseen, monitor)?
+        };
         Ok((ExcessFigures { highest, kind, reached, unreached }, high))
     }
 
-    /// One place of each square where passes came down to the design and left more than the scallop limit, the
-    /// highest that is found there.
+    /// One place of each cell, `among` those asked for, where passes came down to the design and left more than the scallop limit, or
+    /// would by the last decimals of a program.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn places_above(
+        &self,
+        samples: &[Sample],
+        among: &(dyn Fn(usize) -> bool + Sync),
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<RidgePlace>, Cancelled> {
+        monitor.start("looking for high material", 0);
+        let high = self.inspection.limits.scallop - 2.0 * ROUNDING;
+        let open = self.open(samples, high, among, monitor)?;
+        // What is left out comes to light when all is measured.
+        let most = (MOST_AT_FIRST / open.squares.len().max(1)).max(1);
+        self.high_places(&open.squares, high, most, &[], monitor)
+    }
+
+    /// One place of each square where passes came down to the design and left more than is `high`, mm, the highest that is found
+    /// there by no more than `most` looks, with the height that it may have at most.
     fn high_places(
         &self,
-        open: &Promising,
+        squares: &[Square],
+        high: f64,
+        most: usize,
         unseen: &[u32],
         monitor: &dyn Monitor,
     ) -> Result<Vec<RidgePlace>, Cancelled> {
         let Inspection { part, limits, .. } = *self.inspection;
-        // What stands lower by so little is above the limit with its bound.
-        let high = limits.scallop - 2.0 * NUMERICAL_FLOOR;
         let patches = self.patches(high, unseen);
         let slack = HIGH_SLACK * limits.scallop;
         let small = OTHER_KIND_SHARE * 0.5 * self.inspection.grid.cell;
-        let may_be = open.squares.iter().filter(|square| square.possible > high).copied();
-        let squares = Promising::of(may_be, MOST_HIGH_CELLS).squares;
-        let most = (self.most_places() / squares.len().max(1)).max(LEAST_LOOKS);
         let found = work::parallel::try_map(squares.len(), |k| {
             monitor::check(monitor)?;
             let smallest = 0.5f64.powi(HIGH_DIVISIONS) * squares[k].half;
             let mut highest: Option<RidgePlace> = None;
+            // What squares promise that are divided no further.
+            let mut left = 0f64;
             let mut waiting = BinaryHeap::from([squares[k]]);
             for _ in 0..most {
-                let Some(Square { possible, centre, half }) = waiting.pop() else { break };
                 let known = highest.map_or(high, |highest| highest.height + slack);
-                if possible <= known {
+                if waiting.peek().is_none_or(|square| square.possible <= known) {
                     break;
                 }
+                let Some(Square { possible, centre, half }) = waiting.pop() else { break };
                 let (possible, is_open) = match patches.held(centre, half) {
                     Held::Nothing => continue,
                     Held::Unknown => (possible, true),
-                    Held::Some { possible, place, here, by } => {
+                    Held::Some { possible: its, place, here, by } => {
+                        let possible = its.min(possible);
                         let rises = here > known;
                         let is_reached = rises && patches.reached(place, here, by);
                         if is_reached {
@@ -186,22 +216,28 @@ impl ExcessSearch<'_> {
                     }
                 };
                 if is_open && half > smallest {
-                    let quarter = 0.5 * half;
-                    let side = |up: bool| if up { quarter } else { -quarter };
-                    waiting.extend((0..4).map(|k| {
-                        let centre = centre + Vector2::new(side(k & 1 != 0), side(k & 2 != 0));
-                        Square { possible, centre, half: quarter }
-                    }));
+                    waiting.extend(Square { possible, centre, half }.quarters());
+                } else {
+                    left = left.max(possible);
                 }
             }
-            Ok(highest)
+            // What was not looked at is rarely higher than around.
+            let waits = waiting.peek().map_or(0.0, |square| square.possible);
+            let most = |height: f64| height.max(left).max(waits.min(height + slack));
+            Ok(highest.map(|place| RidgePlace { height: most(place.height), ..place }))
         })?;
         Ok(found.into_iter().flatten().collect())
     }
 
-    /// The squares of cells that may hold more than `known`, mm: those whose own move leaves more at a corner, those beside
-    /// the part's border, and those whose centre cannot speak for them.
-    fn open(&self, samples: &[Sample], known: f64, monitor: &dyn Monitor) -> Result<Promising, Cancelled> {
+    /// The squares of cells, `among` those asked for, that may hold more than `known`, mm: those whose own move leaves more at a
+    /// corner, those beside the part's border, and those whose centre cannot speak for them.
+    fn open(
+        &self,
+        samples: &[Sample],
+        known: f64,
+        among: &(dyn Fn(usize) -> bool + Sync),
+        monitor: &dyn Monitor,
+    ) -> Result<Promising, Cancelled> {
         let grid = &self.inspection.grid;
         let fine = self.finer_than_cells(grid);
         let row = |j: usize| {
@@ -210,10 +246,9 @@ impl ExcessSearch<'_> {
             let looked_at = (0..grid.nx).filter(|&i| {
                 let k = grid.index(i, j);
                 let on = !samples[k].deviation.is_nan();
-                if fine[k].load(Ordering::Relaxed) {
-                    return true;
-                }
-                if on { f64::from(samples[k].top) > known } else { beside_part(grid, samples, i, j) }
+                let may_hold =
+                    || if on { f64::from(samples[k].top) > known } else { beside_part(grid, samples, i, j) };
+                among(k) && (fine[k].load(Ordering::Relaxed) || may_hold())
             });
             let squares = looked_at.filter_map(|i| {
                 let (centre, half) = (grid.centre(i, j), 0.5 * grid.cell);

@@ -1,12 +1,13 @@
 //! The ridges of a cut surface and the remnants along its borders, and nothing else: what a planner is corrected by.
 
 use super::cut_surface::CutSurface;
+use super::excess::ExcessSearch;
 use super::figures::{Limits, NUMERICAL_FLOOR, RidgePlace, ScallopFigures};
 use super::inspection::{Inspection, Sample};
 use super::meetings::Meetings;
 use super::ridges::{Highest, RidgeFinder, scallop_figures};
 use geometry::{Point2, Point3, Vector2};
-use motion::{Cutters, Toolpath};
+use motion::{Cutters, ROUNDING, Toolpath};
 use part::Part;
 use sim::{Envelope, ZMap};
 use work::monitor::{Cancelled, Monitor};
@@ -40,21 +41,8 @@ pub(super) fn ridge_map(
     monitor: &dyn Monitor,
 ) -> Result<Option<RidgeMap>, Cancelled> {
     let surface = CutSurface::new(Envelope::new(cutters, path), cut, path);
-    let meetings = &Meetings::new(&surface, cutters, path, None);
-    // Nothing is searched between centres.
-    let (most_squares, grid) = (0, cut.grid);
-    let inspection = Inspection {
-        part,
-        cutters,
-        limits,
-        asked,
-        most_squares,
-        is_first_look: false,
-        surface: &surface,
-        meetings,
-        grid,
-        walls: None,
-    };
+    let meetings = Meetings::new(&surface, cutters, path, None);
+    let inspection = on_cells(part, cutters, limits, asked, &surface, &meetings);
     let samples = inspection.samples(monitor)?;
     let finder = RidgeFinder::new(&inspection, path);
     let mut ridges = finder.find(&|k| samples[k].deviation, monitor)?;
@@ -86,6 +74,80 @@ pub(super) fn ridge_map(
     tops.extend(of_borders.into_iter().filter(|top| top.place.height > limits.scallop));
     let above = tops.into_iter().map(|top| top.place).collect();
     Ok(Some(RidgeMap { above, border, scallop, is_close: true }))
+}
+
+/// What stands above the scallop limit, or would by the last decimals of a program, also between the places that a map of ridges holds: one
+/// place of each cell that a ridge near the limit crosses, or that lies along a border, with the height that it may have at most.
+/// `stock_top` is the height of the stock's flat top, mm.
+pub(super) fn places_above(
+    part: &Part,
+    cutters: &Cutters,
+    path: &Toolpath,
+    cut: &ZMap,
+    limits: &Limits,
+    (stock_top, most_squares): (f64, usize),
+    monitor: &dyn Monitor,
+) -> Result<Vec<RidgePlace>, Cancelled> {
+    let surface = CutSurface::new(Envelope::new(cutters, path), cut, path);
+    let meetings = Meetings::new(&surface, cutters, path, None);
+    let asked = NUMERICAL_FLOOR;
+    let inspection =
+        Inspection { most_squares, ..on_cells(part, cutters, limits, asked, &surface, &meetings) };
+    let samples = inspection.samples(monitor)?;
+    let nothing_cuts_away = |_: &Point3| None;
+    let search = ExcessSearch { inspection: &inspection, stock_top, cut_away_by: &nothing_cuts_away };
+    // A ridge rises by little from a line of cells to the next, but where it ends.
+    let ridges = RidgeFinder::new(&inspection, path).find(&|k| samples[k].deviation, monitor)?;
+    let grid = cut.grid;
+    let mut is_near = vec![false; grid.len()];
+    for place in &ridges.above {
+        // The cells on both sides, whichever line the ridge crosses.
+        let half = 0.5 * grid.cell;
+        for (x, y) in [(-half, 0.0), (half, 0.0), (0.0, -half), (0.0, half)] {
+            let (i, j) = grid.nearest_cell(place.at.x + x, place.at.y + y);
+            is_near[grid.index(i, j)] = true;
+        }
+    }
+    let on = |i: usize, j: usize| i < grid.nx && j < grid.ny && !samples[grid.index(i, j)].deviation.is_nan();
+    for k in 0..grid.len() {
+        let (i, j) = (k % grid.nx, k / grid.nx);
+        // Before the first cell there is none: the index wraps around to one far beyond the last.
+        let beside = [(i.wrapping_sub(1), j), (i + 1, j), (i, j.wrapping_sub(1)), (i, j + 1)];
+        is_near[k] |= on(i, j) && !beside.iter().all(|&(i, j)| on(i, j));
+    }
+    let found = search.places_above(&samples, &|k| is_near[k], monitor)?;
+    // Moves that no cell saw may have cut them away.
+    let all: Vec<u32> = (0..path.len() as u32).collect();
+    let stands = work::parallel::map(found.len(), |k| {
+        let design = part.closest_point(&found[k].at).0;
+        let left = surface.along_normal_with(&design.point, &design.normal, &all);
+        left.is_some_and(|left| left.distance > limits.scallop - 2.0 * ROUNDING)
+    });
+    Ok(found.into_iter().zip(stands).filter_map(|(place, stands)| stands.then_some(place)).collect())
+}
+
+/// An inspection that searches nothing between the centres of cells.
+fn on_cells<'a>(
+    part: &'a Part,
+    cutters: &'a Cutters,
+    limits: &'a Limits,
+    asked: f64,
+    surface: &'a CutSurface<'a>,
+    meetings: &'a Meetings<'a>,
+) -> Inspection<'a> {
+    let grid = surface.cut.grid;
+    Inspection {
+        part,
+        cutters,
+        limits,
+        asked,
+        most_squares: 0,
+        is_first_look: false,
+        surface,
+        meetings,
+        grid,
+        walls: None,
+    }
 }
 
 /// A place and the highest point over it, mm.
@@ -216,5 +278,49 @@ mod tests {
         assert!(highest > left && highest < sagitta(0.3) - 1e-5, "{highest} {left}");
         let above = map.above.iter().map(|place| place.height).fold(0.0, f64::max);
         assert_eq!(above, highest);
+    }
+
+    /// One pass rises between two lines of cells, by less than the width of a cell.
+    #[test]
+    fn what_stands_between_lines_of_cells_is_found() {
+        let (part, ball) = (plane([4.0, 3.0]), Cutter::ball(6.0).unwrap());
+        let sagitta = |half: f64| 3.0 - (9.0 - half * half).sqrt();
+        let grid = Grid::covering(&part.bounds(), 0.13, 64, 1 << 30).unwrap();
+        let half = 0.172;
+        let middle = grid.centre(0, 10).y + 0.5 * grid.cell;
+        let raised = 1.0 + 2.0 * half;
+        // Only the ridges beside that pass come near the limit.
+        let axes = [0.1, 0.4, 0.7, 1.0, raised, raised + 2.0 * half];
+        let axes = axes.into_iter().chain((1..9).map(|k| axes[5] + 0.3 * f64::from(k)));
+        let pass = |x: f64| {
+            let rise = if x == raised { 6e-4 } else { 0.0 };
+            let [from, to] = [middle - 0.04, middle + 0.04];
+            let places =
+                [(-4.0, 5.0), (-4.0, 0.0), (from, 0.0), (middle, rise), (to, 0.0), (7.0, 0.0), (7.0, 5.0)];
+            places.map(|(y, z)| Point3::new(x, y, z)).to_vec()
+        };
+        let path = path(&axes.map(pass).collect::<Vec<_>>());
+        let cut = cut_reference(&ZMap::block(grid, 1.0), &ball, &path, &Silent).unwrap();
+        let limits = Limits { scallop: 0.005, gouge: 0.005, uncut: 0.05, chord: 0.001 };
+        let map = ridge_map(&part, &ball.into(), &path, &cut, &limits, 1e-4, &Silent).unwrap().unwrap();
+        assert!(map.above.iter().all(|place| place.height < limits.scallop), "{map:?}");
+        let found = places_above(&part, &ball.into(), &path, &cut, &limits, (1.0, 1 << 16), &Silent).unwrap();
+        // Over the middle, the raised pass cuts where its rise and the way there together leave least.
+        let of_raised = |far: f64| {
+            let ways = (0..=4000).map(|k| f64::from(k) * 1e-5);
+            let left = ways.map(|way| 6e-4 * (1.0 - way / 0.04) + sagitta(far.hypot(way)));
+            left.fold(f64::INFINITY, f64::min)
+        };
+        let height = |aside: f64| (sagitta(half + aside), of_raised(half - aside));
+        let meet = (0..60).fold([0.0, 0.1], |[low, high], _| {
+            let aside = 0.5 * (low + high);
+            let (still, raised) = height(aside);
+            if still < raised { [aside, high] } else { [low, aside] }
+        });
+        let closed = height(meet[0]).0;
+        let near = |place: &&RidgePlace| (place.at.y - middle).abs() < 0.05;
+        let highest = found.iter().filter(near).map(|place| place.height).fold(0.0, f64::max);
+        assert!(closed > limits.scallop && highest >= closed - 1e-7, "{highest} {closed}");
+        assert!(highest <= closed + 0.01 * limits.scallop, "{highest} {closed}");
     }
 }

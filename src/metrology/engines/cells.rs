@@ -7,8 +7,8 @@ use work::monitor::Monitor;
 
 use super::normals::RAYS;
 use super::{Engine, EngineError, Measured, Task, View};
-use crate::ridge_map::ridge_map;
-use crate::{Asked, RidgeMap, measure_with_walls};
+use crate::ridge_map::{places_above, ridge_map};
+use crate::{Asked, RidgeMap, RidgePlace, measure_with_walls};
 
 /// An engine on cells.
 pub(super) struct Cells {
@@ -63,6 +63,15 @@ impl Engine for Cells {
             None if !task.cutters.are_several() && !task.pocket => RAYS.ridges(task, monitor),
             found => Ok(found),
         }
+    }
+
+    fn above(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Vec<RidgePlace>, EngineError> {
+        let (path, held) = (task.path, task.moves_held());
+        let (grid, _) = task.budget.grid_for(held, &task.stock.bounds(), task.simulation, task.cells)?;
+        let stock = task.uncut(grid, monitor)?;
+        let cut = cut_in_turn(self.cut, stock, task.cutters, path, monitor)?;
+        let search = (task.stock.bounds().max.z, task.budget.squares_beside(held, &grid));
+        Ok(places_above(task.part, task.cutters, path, &cut, task.limits, search, monitor)?)
     }
 
     fn measure(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Measured, EngineError> {

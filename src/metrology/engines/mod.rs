@@ -16,7 +16,7 @@ pub use error::EngineError;
 pub use normals::REACH_OVER_UNCUT;
 pub use task::{Measured, NormalView, Simulation, Task, View};
 
-use crate::RidgeMap;
+use crate::{RidgeMap, RidgePlace};
 use work::monitor::Monitor;
 
 /// A way to cut and to measure.
@@ -42,6 +42,14 @@ pub trait Engine: Sync {
     /// [`EngineError`].
     fn ridges(&self, _task: &Task<'_>, _monitor: &dyn Monitor) -> Result<Option<RidgeMap>, EngineError> {
         Ok(None)
+    }
+    /// Cuts on the same cells, and finds what stands above the scallop limit beside what [`Engine::ridges`] finds. None where that
+    /// takes as long as measuring all.
+    ///
+    /// # Errors
+    /// [`EngineError`].
+    fn above(&self, _task: &Task<'_>, _monitor: &dyn Monitor) -> Result<Vec<RidgePlace>, EngineError> {
+        Ok(Vec::new())
     }
     /// Cuts and measures.
     ///
