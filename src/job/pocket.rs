@@ -5,7 +5,7 @@ use metrology::{
     wall_gouge_of_cells, wall_gouge_of_moves,
 };
 use motion::Toolpath;
-use scene::{FLATTEN_SHARE, Scene};
+use scene::Scene;
 use sim::ZMap;
 use toolpath::{Engagement, Exceeding, Pocket, PocketStrategy, Step, engagement, limit_feed};
 use work::monitor::{Cancelled, Monitor};
@@ -24,6 +24,9 @@ pub fn limit_feed_by(
     limit_feed(path, &arcs.of_moves, limit);
     (found, arcs.bound())
 }
+
+/// Distances from walls below this are rounding, mm.
+const ROUNDING: f64 = 1e-6;
 
 /// What is measured of a pocket besides its floor. `top` is the height of the stock, mm; each engagement is one with the bound of its
 /// greatest angle, rad.
@@ -51,7 +54,7 @@ pub fn pocket_figures(
         unreachable_area_mm2: pocket.rest_area(cutter, monitor)?,
         stepover_mm: strategy.stepover(step, cutter.radius()),
         wall_gouge_mm,
-        wall_gouge_error_bound_mm: FLATTEN_SHARE * scene.tolerance.chord + scene.arcs.unwrap_or(0.0),
+        wall_gouge_error_bound_mm: ROUNDING + pocket.off_drawing + scene.arcs.unwrap_or(0.0),
         wall_gouge_move,
         wall_gouge_of_cells_mm: of_cells,
         wall_gouge_of_cells_error_bound_mm: std::f64::consts::FRAC_1_SQRT_2 * cut.grid.cell,

@@ -29,8 +29,8 @@ pub use kinematics::FiveAxis;
 pub use load::{load_mesh, load_part};
 pub use named_file::NamedFile;
 pub use part::{
-    BladeRequest, EarlierCutter, FLATTEN_SHARE, FormulaSource, LoadError, Loaded, MeshFile, NurbsSource,
-    OpenLine, OutlineSource, PartSource, PocketSource,
+    BladeRequest, EarlierCutter, FormulaSource, LoadError, Loaded, MeshFile, NurbsSource, OpenLine,
+    OutlineSource, PartSource, PocketSource,
 };
 pub use stock::StockRequest;
 pub use write::complete_toml;

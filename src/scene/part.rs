@@ -13,7 +13,8 @@ pub use formula::FormulaSource;
 pub use mesh::MeshFile;
 pub(crate) use mesh::read_mesh;
 pub use nurbs::NurbsSource;
-pub use pocket::{EarlierCutter, FLATTEN_SHARE, OpenLine, OutlineSource, PocketSource};
+pub(crate) use pocket::FLATTEN_SHARE;
+pub use pocket::{EarlierCutter, OpenLine, OutlineSource, PocketSource};
 pub(crate) use source::Loading;
 pub use source::{LoadError, Loaded};
 

@@ -19,8 +19,9 @@ use crate::named_file::NamedFile;
 /// The word for `surface`.
 const SURFACE: &str = "pocket";
 
-/// Share of the chord tolerance that drawings are flattened to; the passes have the rest.
-pub const FLATTEN_SHARE: f64 = 0.5;
+/// Share of the chord tolerance, and of the gouge tolerance where that is smaller, that drawings are flattened to: passes have the rest of
+/// the one, and verdicts that of the other.
+pub(crate) const FLATTEN_SHARE: f64 = 0.5;
 
 /// The floor is measured up to this many chord tolerances from its walls, where chords of the last pass
 /// leave as much ...
@@ -269,10 +270,10 @@ impl PocketSource {
     /// # Errors
     /// [`SceneError::Invalid`] when the drawing is refused, at its name in the scene.
     fn pocket(&self, job: &Loading<'_>) -> Result<(Pocket, Vec<String>), SceneError> {
-        let (region, mut notes) = match &self.outline {
+        let (region, mut notes, off_drawing) = match &self.outline {
             OutlineSource::File { file, format, unit, layer } => {
                 let options = OutlineOptions {
-                    chord_tolerance: FLATTEN_SHARE * job.chord_tolerance,
+                    chord_tolerance: job.flattening,
                     scale: unit.map(|u| u.1),
                     layer: layer.clone(),
                 };
@@ -281,14 +282,15 @@ impl PocketSource {
                     job.source.error(file.span.clone(), message, "mend that file or name another one")
                 })?;
                 let notes = read.notes.iter().map(|note| format!("{}: {note}", file.written)).collect();
-                (read.region, notes)
+                (read.region, notes, job.flattening)
             }
             OutlineSource::Points { curves } => {
                 let region = Region::nested(curves.clone()).map_err(|e| self.refused(job, &e.to_string()))?.0;
-                (region, Vec::new())
+                (region, Vec::new(), 0.0)
             }
         };
         let mut pocket = Pocket::new(region, self.depth);
+        pocket.off_drawing = off_drawing;
         let radius = job.cutter.radius();
         let mut lines: Vec<Vec<Point2>> = self.open.iter().map(|line| line.points.clone()).collect();
         let at_edge = at_stock_edge(&pocket.region, job);

@@ -78,6 +78,8 @@ pub(crate) struct Loading<'a> {
     pub cutter: &'a Cutter,
     /// mm.
     pub chord_tolerance: f64,
+    /// How far curves of drawings may lie off the chords that stand for them, mm.
+    pub flattening: f64,
     /// How far the stock's block stands out beyond the part on all sides, if it is one around the part, mm.
     pub margin: Option<f64>,
     /// Memory that the run may take.

@@ -137,7 +137,8 @@ impl Clearer<'_> {
             self.cells.clear_along(wall);
             self.cells.clear_along(&[wall[wall.len() - 1], wall[0]]);
         }
-        clearing.rest = self.cells.runs_to_standing(&clearing.peeled, self.ways, self.monitor)?;
+        clearing.rest =
+            self.cells.runs_to_standing(&clearing.peeled, self.ways, &|p| Some(*p), self.monitor)?;
         clearing.rest.extend(around_walls(self.piece, &clearing));
         clearing.bounding = bound_all(&mut clearing.rest, self.room, self.ground, self.rules, self.monitor)?;
         Ok(Some(clearing))

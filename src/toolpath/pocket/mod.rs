@@ -150,6 +150,10 @@ pub fn plan_pocket(
             continue;
         }
         let mut runs = piece_runs(piece, cutter, strategy, step, air.is_none(), &mut planned, monitor)?;
+        if rules.is_none() {
+            // Passes far from each other may leave something at sharp turns of inner ones.
+            runs.extend(rest::runs_to_rest(piece, &runs, cutter.flat_radius(), monitor)?);
+        }
         // Loops that bound the engagement lean to one side of lines, and may find no room beside a way from elsewhere.
         if let (Some(air), None) = (&air, &rules) {
             let room = walls::Room::new(piece);

@@ -18,6 +18,34 @@ use work::monitor::{Cancelled, Monitor, check};
 const CELL: f64 = 0.1;
 const MOST_CELLS: f64 = 2048.0;
 
+/// Places along a side of a cell that are asked whether they stand.
+const PLACES: i32 = 15;
+
+/// Runs to what stands on the floor of a piece after others, under a cutter whose bottom is level up to a `radius`, mm. None where that is so
+/// small, or the piece so large, that cells cannot tell.
+pub(super) fn runs_to_rest(
+    piece: &Piece,
+    gone: &[Run],
+    radius: f64,
+    monitor: &dyn Monitor,
+) -> Result<Vec<Run>, Cancelled> {
+    let cells = if radius > 0.0 { Cells::new(piece, radius) } else { None };
+    let Some(mut cells) = cells else { return Ok(Vec::new()) };
+    let entries: Vec<Vec<Point2>> = gone.iter().map(Run::way_down).collect();
+    let ways = || gone.iter().map(|run| run.points.as_slice()).chain(entries.iter().map(Vec::as_slice));
+    ways().for_each(|way| cells.clear_along(way));
+    let all = SegmentGrid::new(sides(ways()));
+    let step = cells.cell / f64::from(PLACES);
+    let half = PLACES / 2;
+    let farthest = |p: &Point2| {
+        let places = (-half..=half).flat_map(|j| (-half..=half).map(move |i| (i, j)));
+        let places = places.map(|(i, j)| p + Vector2::new(f64::from(i), f64::from(j)) * step);
+        let far = places.map(|place| (all.distance(&place), place));
+        far.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|far| far.0 > radius - step * FRAC_1_SQRT_2)
+    };
+    cells.runs_to_standing(gone, &[], &|p| farthest(p).map(|far| far.1), monitor)
+}
+
 /// Cells of the box of a piece, and which of them are cleared for sure.
 pub(super) struct Cells {
     radius: f64,
@@ -114,11 +142,12 @@ impl Cells {
         Ok(best.map(|best| best.1))
     }
 
-    /// Runs from the ways that were gone straight to cells that may hold stock.
+    /// Runs from the ways that were gone straight to cells that may hold stock; `stands` tells where in one, if anywhere.
     pub fn runs_to_standing(
         &mut self,
         gone: &[Run],
         ways: &[Vec<Point2>],
+        stands: &dyn Fn(&Point2) -> Option<Point2>,
         monitor: &dyn Monitor,
     ) -> Result<Vec<Run>, Cancelled> {
         let of_runs = gone.iter().map(|run| run.points.as_slice());
@@ -129,7 +158,7 @@ impl Cells {
                 continue;
             }
             check(monitor)?;
-            let p = self.at(index);
+            let Some(p) = stands(&self.at(index)) else { continue };
             self.clear_at(&p);
             let Some(near) = gone.nearest(&p).filter(|near| near.distance > 0.0) else { continue };
             let mut points = self.way_to(&gone, near.segment as usize, near.share);

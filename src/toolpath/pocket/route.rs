@@ -57,6 +57,15 @@ impl Run {
         Self { entry, points: Vec::new() }
     }
 
+    /// The way at depth, or above it, by which it comes down.
+    pub fn way_down(&self) -> Vec<Point2> {
+        match &self.entry {
+            Entry::Helix { centre, radius, begin } => circle(centre, *radius, *begin, *radius),
+            Entry::Ramp(way) => way.clone(),
+            Entry::Air => Vec::new(),
+        }
+    }
+
     /// Where it ends so far, and in which direction.
     fn end(&self) -> Option<(Point2, Vector2)> {
         let n = self.points.len();

@@ -20,6 +20,8 @@ pub struct Pocket {
     pub region: Region,
     /// How far the floor lies below z = 0, mm.
     pub depth: f64,
+    /// How far the chords of its outlines may lie off the curves that they were drawn as, mm.
+    pub off_drawing: f64,
     /// The sides of the region beyond which there is no stock, with the region on their left.
     open: Vec<[Point2; 2]>,
     /// The region and the room beyond its open sides: what the cutter may sweep.
@@ -41,7 +43,14 @@ pub struct NotOnOutline {
 impl Pocket {
     /// A pocket with walls all around, in stock that nobody has cut.
     pub fn new(region: Region, depth: f64) -> Self {
-        Self { free: region.clone(), region, depth, open: Vec::new(), air: Region::default() }
+        Self {
+            free: region.clone(),
+            region,
+            depth,
+            off_drawing: 0.0,
+            open: Vec::new(),
+            air: Region::default(),
+        }
     }
 
     /// With those sides open that lie along `lines`, within `tolerance` mm, for a cutter of a radius. Sides are divided where
