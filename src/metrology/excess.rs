@@ -54,7 +54,8 @@ pub(super) struct ExcessSearch<'a> {
 /// Of the cells that may hold more than a pass may leave, so many are looked through for such places.
 const MOST_HIGH_CELLS: usize = 4096;
 
-/// Such a place is known to this share of what a pass may leave: plans are made anew by no finer figures. Told is what it may be at most.
+/// Such a place is known to this share of what a pass may leave: plans are made anew by no finer figures. What is told is how high it may
+/// be at most.
 const HIGH_SLACK: f64 = 0.01;
 
 /// How often such a cell is divided before it counts as low enough.

@@ -5,8 +5,9 @@
 //! (or offsets of them, or parallel lines, or levels of a stream function that follows directions), cut from the inside outwards, so that only the first pass of
 //! each nest is a slot; each nest is entered by a helix where there is room, else by a ramp along its first
 //! pass. Where an engagement is asked for, passes go along the border of the stock instead, which they turn into as far as
-//! the limit allows (`peel`, `clearing`), and what they leave is found and cleared by loops (`rest`, `bounded`). Every finished move keeps to
-//! the exact region (`walls`). The design's frame: z = 0 is the upper face, the floor lies at minus the depth; mm.
+//! the limit allows (`peel`, `clearing`), and what they leave is found and cleared by loops (`rest`, `bounded`). What passes without
+//! a limit leave gets short ones of its own (`rest`). Every finished move keeps to the exact region (`walls`). The design's frame:
+//! z = 0 is the upper face, the floor lies at minus the depth; mm.
 
 mod air;
 mod beginnings;
