@@ -528,7 +528,7 @@ impl Corrected<'_> {
             return None;
         }
         let near = self.standing_near(&self.tried);
-        let high: Vec<HighPlace> = near.iter().filter(|place| place.over > 0.0).copied().collect();
+        let high = above_target(&near);
         let is_new = !high.is_empty() && !high.iter().any(|place| widths.is_touched_up(place));
         (is_new && self.are_few(&high, &self.tried, true)).then(|| widths.touched_up(&high))
     }
@@ -579,7 +579,7 @@ impl Corrected<'_> {
     fn corrected(&self, tried: &Tried, in_vain: usize) -> Option<Widths> {
         let Tried { widths, .. } = tried;
         let near = self.standing_near(tried);
-        let high: Vec<HighPlace> = near.iter().filter(|place| place.over > 0.0).copied().collect();
+        let high = above_target(&near);
         if high.is_empty() {
             return None;
         }
@@ -751,6 +751,11 @@ impl Corrected<'_> {
         (self.best, self.tried, self.latest, self.kept) = (planned, tried, None, self.rounds.len() - 1);
         Gain::Much
     }
+}
+
+/// The places that may stand above the target.
+fn above_target(near: &[HighPlace]) -> Vec<HighPlace> {
+    near.iter().filter(|place| place.over > 0.0).copied().collect()
 }
 
 /// How far below the target ridges are let stand, by how closely they are known.

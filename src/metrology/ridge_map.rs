@@ -9,7 +9,7 @@ use super::ridges::{Highest, RidgeFinder, scallop_figures};
 use geometry::{Point2, Point3, Vector2};
 use motion::{Cutters, ROUNDING, Toolpath};
 use part::Part;
-use sim::{Envelope, ZMap};
+use sim::{Envelope, Grid, ZMap};
 use work::monitor::{Cancelled, Monitor};
 
 /// Most places that all moves are asked at.
@@ -90,9 +90,8 @@ pub(super) fn places_above(
 ) -> Result<Vec<RidgePlace>, Cancelled> {
     let surface = CutSurface::new(Envelope::new(cutters, path), cut, path);
     let meetings = Meetings::new(&surface, cutters, path, None);
-    let asked = NUMERICAL_FLOOR;
-    let inspection =
-        Inspection { most_squares, ..on_cells(part, cutters, limits, asked, &surface, &meetings) };
+    let inspection = on_cells(part, cutters, limits, NUMERICAL_FLOOR, &surface, &meetings);
+    let inspection = Inspection { most_squares, ..inspection };
     let samples = inspection.samples(monitor)?;
     let nothing_cuts_away = |_: &Point3| None;
     let search = ExcessSearch { inspection: &inspection, stock_top, cut_away_by: &nothing_cuts_away };
@@ -108,12 +107,9 @@ pub(super) fn places_above(
             is_near[grid.index(i, j)] = true;
         }
     }
-    let on = |i: usize, j: usize| i < grid.nx && j < grid.ny && !samples[grid.index(i, j)].deviation.is_nan();
     for k in 0..grid.len() {
         let (i, j) = (k % grid.nx, k / grid.nx);
-        // Before the first cell there is none: the index wraps around to one far beyond the last.
-        let beside = [(i.wrapping_sub(1), j), (i + 1, j), (i, j.wrapping_sub(1)), (i, j + 1)];
-        is_near[k] |= on(i, j) && !beside.iter().all(|&(i, j)| on(i, j));
+        is_near[k] |= on_part(&grid, &samples, i, j) && ending_sides(&grid, &samples, i, j).next().is_some();
     }
     let found = search.places_above(&samples, &|k| is_near[k], monitor)?;
     // Moves that no cell saw may have cut them away.
@@ -185,21 +181,35 @@ fn as_left(tops: &mut [Top], inspection: &Inspection<'_>, all: &[u32]) -> bool {
 /// remnant of a pass.
 pub(super) fn borders(inspection: &Inspection<'_>, samples: &[Sample]) -> Vec<RidgePlace> {
     let Inspection { grid, limits, .. } = *inspection;
-    let on = |i: usize, j: usize| i < grid.nx && j < grid.ny && !samples[grid.index(i, j)].deviation.is_nan();
     let of_row = |j: usize| {
-        let mut found = Vec::new();
-        for i in (0..grid.nx).filter(|&i| on(i, j)) {
-            for (di, dj) in [(-1, 0), (1, 0), (0, -1), (0, 1)] {
-                // Before the first cell there is none: the index wraps around to one far beyond the last.
-                if !on(i.wrapping_add_signed(di), j.wrapping_add_signed(dj)) {
-                    found.extend(inspection.at_side(grid.centre(i, j), [di as f64, dj as f64]));
-                }
-            }
-        }
-        found
+        let cells = (0..grid.nx).filter(|&i| on_part(&grid, samples, i, j));
+        let sides = cells.flat_map(|i| ending_sides(&grid, samples, i, j).map(move |side| (i, side)));
+        sides.filter_map(|(i, side)| inspection.at_side(grid.centre(i, j), side)).collect::<Vec<_>>()
     };
     let rows = work::parallel::map(grid.ny, of_row);
     rows.into_iter().flatten().filter(|p| p.height > 0.0 && p.height <= limits.uncut).collect()
+}
+
+/// Whether a cell's centre lies over the part.
+fn on_part(grid: &Grid, samples: &[Sample], i: usize, j: usize) -> bool {
+    i < grid.nx && j < grid.ny && !samples[grid.index(i, j)].deviation.is_nan()
+}
+
+/// The directions in which no cell over the part lies beside a cell.
+fn ending_sides<'a>(
+    grid: &'a Grid,
+    samples: &'a [Sample],
+    i: usize,
+    j: usize,
+) -> impl Iterator<Item = [f64; 2]> + 'a {
+    // Before the first cell there is none: the index wraps around to one far beyond the last.
+    let beside = move |(di, dj): &(isize, isize)| (i.wrapping_add_signed(*di), j.wrapping_add_signed(*dj));
+    let sides = [(-1, 0), (1, 0), (0, -1), (0, 1)].into_iter();
+    let ends = sides.filter(move |side| {
+        let (i, j) = beside(side);
+        !on_part(grid, samples, i, j)
+    });
+    ends.map(|(di, dj)| [di as f64, dj as f64])
 }
 
 impl Inspection<'_> {
@@ -228,7 +238,7 @@ mod tests {
     use super::*;
     use crate::flat_scene::{path, plane};
     use cutter::Cutter;
-    use sim::{Grid, cut_reference};
+    use sim::cut_reference;
     use work::monitor::Silent;
 
     /// Passes along y, the last of them 0.3 mm from the border.

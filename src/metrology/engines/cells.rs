@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use sim::{CutHeights, cut, cut_in_turn, cut_reference};
+use sim::{CutHeights, ZMap, cut, cut_in_turn, cut_reference};
 use work::monitor::Monitor;
 
 use super::normals::RAYS;
@@ -28,6 +28,16 @@ pub(super) const REFERENCE: Cells = Cells {
     cut: |stock, cutter, path, monitor| cut_reference(&stock, cutter, path, monitor),
 };
 
+impl Cells {
+    /// What a path leaves of the stock, and a note where cells had to be coarser than was asked.
+    fn cut(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<(ZMap, Option<String>), EngineError> {
+        let bounds = task.stock.bounds();
+        let (grid, note) = task.budget.grid_for(task.moves_held(), &bounds, task.simulation, task.cells)?;
+        let stock = task.uncut(grid, monitor)?;
+        Ok((cut_in_turn(self.cut, stock, task.cutters, task.path, monitor)?, note))
+    }
+}
+
 impl Engine for Cells {
     fn word(&self) -> &'static str {
         self.word
@@ -50,13 +60,9 @@ impl Engine for Cells {
     }
 
     fn ridges(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Option<RidgeMap>, EngineError> {
-        let path = task.path;
-        let (grid, _) =
-            task.budget.grid_for(path.len(), &task.stock.bounds(), task.simulation, task.cells)?;
-        let stock = task.uncut(grid, monitor)?;
-        let cut = cut_in_turn(self.cut, stock, task.cutters, path, monitor)?;
+        let (cut, _) = self.cut(task, monitor)?;
         let asked = task.simulation.error_bound;
-        let found = ridge_map(task.part, task.cutters, path, &cut, task.limits, asked, monitor)?;
+        let found = ridge_map(task.part, task.cutters, task.path, &cut, task.limits, asked, monitor)?;
         drop(cut);
         // Places along the normals may be as coarse: each sees every move.
         match found {
@@ -66,20 +72,17 @@ impl Engine for Cells {
     }
 
     fn above(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Vec<RidgePlace>, EngineError> {
-        let (path, held) = (task.path, task.moves_held());
-        let (grid, _) = task.budget.grid_for(held, &task.stock.bounds(), task.simulation, task.cells)?;
-        let stock = task.uncut(grid, monitor)?;
-        let cut = cut_in_turn(self.cut, stock, task.cutters, path, monitor)?;
-        let search = (task.stock.bounds().max.z, task.budget.squares_beside(held, &grid));
-        Ok(places_above(task.part, task.cutters, path, &cut, task.limits, search, monitor)?)
+        let (cut, _) = self.cut(task, monitor)?;
+        let most_squares = task.budget.squares_beside(task.moves_held(), &cut.grid);
+        let search = (task.stock.bounds().max.z, most_squares);
+        Ok(places_above(task.part, task.cutters, task.path, &cut, task.limits, search, monitor)?)
     }
 
     fn measure(&self, task: &Task<'_>, monitor: &dyn Monitor) -> Result<Measured, EngineError> {
         let begun = Instant::now();
         let (path, held) = (task.path, task.moves_held());
-        let (grid, note) = task.budget.grid_for(held, &task.stock.bounds(), task.simulation, task.cells)?;
-        let stock = task.uncut(grid, monitor)?;
-        let cut = cut_in_turn(self.cut, stock, task.cutters, path, monitor)?;
+        let (cut, note) = self.cut(task, monitor)?;
+        let grid = cut.grid;
         let most_cells = task.budget.more_cells(held, &grid);
         let asked = Asked {
             error_bound: task.simulation.error_bound,

@@ -43,8 +43,8 @@ pub trait Engine: Sync {
     fn ridges(&self, _task: &Task<'_>, _monitor: &dyn Monitor) -> Result<Option<RidgeMap>, EngineError> {
         Ok(None)
     }
-    /// Cuts on the same cells, and finds what stands above the scallop limit beside what [`Engine::ridges`] finds. None where that
-    /// takes as long as measuring all.
+    /// Cuts on the same cells, and finds places above the scallop limit beside those that [`Engine::ridges`] finds, each with the height
+    /// that it may have at most. Nothing where that takes as long as measuring all.
     ///
     /// # Errors
     /// [`EngineError`].

@@ -31,8 +31,8 @@ pub(super) fn runs_to_rest(
 ) -> Result<Vec<Run>, Cancelled> {
     let cells = if radius > 0.0 { Cells::new(piece, radius) } else { None };
     let Some(mut cells) = cells else { return Ok(Vec::new()) };
-    let entries: Vec<Vec<Point2>> = gone.iter().map(Run::way_down).collect();
-    let ways = || gone.iter().map(|run| run.points.as_slice()).chain(entries.iter().map(Vec::as_slice));
+    let turns: Vec<Vec<Point2>> = gone.iter().map(Run::turn_at_depth).collect();
+    let ways = || gone.iter().map(|run| run.points.as_slice()).chain(turns.iter().map(Vec::as_slice));
     ways().for_each(|way| cells.clear_along(way));
     let all = SegmentGrid::new(sides(ways()));
     let step = cells.cell / f64::from(PLACES);

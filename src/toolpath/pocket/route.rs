@@ -57,12 +57,11 @@ impl Run {
         Self { entry, points: Vec::new() }
     }
 
-    /// The way at depth, or above it, by which it comes down.
-    pub fn way_down(&self) -> Vec<Point2> {
+    /// The turn at depth that ends its way down, if that is a helix.
+    pub fn turn_at_depth(&self) -> Vec<Point2> {
         match &self.entry {
             Entry::Helix { centre, radius, begin } => circle(centre, *radius, *begin, *radius),
-            Entry::Ramp(way) => way.clone(),
-            Entry::Air => Vec::new(),
+            Entry::Ramp(_) | Entry::Air => Vec::new(),
         }
     }
 
