@@ -77,6 +77,9 @@ const EVENLY_HIGH: f64 = 0.95;
 /// They cut no less deep either where a plan cuts deeper by as many times than it may.
 const NEVER_CUT: f64 = 16.0;
 
+/// A plan that leaves no more than so many times what every path leaves is not made better.
+const NEAR_LEAST: f64 = 2.0;
+
 /// Plans in vain whose high places are narrowed in the next one.
 const MOST_FOLLOWED: usize = 1;
 
@@ -447,8 +450,8 @@ impl Corrected<'_> {
         }
     }
 
-    /// Whether every path of an upright cutter leaves more than the target at the highest place: nearer passes would make the
-    /// path longer without end.
+    /// Whether every path of an upright cutter leaves more than the target somewhere, and the best plan not much more:
+    /// nearer passes would make the path longer without end.
     fn is_too_hollow(&self, monitor: &dyn Monitor) -> Result<bool, JobError> {
         let highest = self.tried.standing.above.iter().max_by(|a, b| a.1.total_cmp(&b.1));
         let limit = self.goal.rule.highest * self.goal.target;
@@ -457,7 +460,8 @@ impl Corrected<'_> {
             return Ok(false);
         };
         let cutter = &self.session.scene.cutter;
-        Ok(LeastLeftFigures::at_or_elsewhere(self.session, cutter, at, limit, monitor)?.is_some())
+        let left = LeastLeftFigures::at_or_elsewhere(self.session, cutter, at, limit, monitor)?;
+        Ok(left.is_some_and(|left| self.comes_near(&left)))
     }
 
     /// Whether the best plan leaves what every path of the cutter leaves.
@@ -467,7 +471,13 @@ impl Corrected<'_> {
         }
         let (session, path) = (self.session, &self.best.plan.path);
         let cutter = &session.scene.cutter;
-        Ok(LeastLeftFigures::above_limit(session, cutter, path, measured, monitor)?.is_some())
+        let left = LeastLeftFigures::above_limit(session, cutter, path, measured, monitor)?;
+        Ok(left.is_some_and(|left| self.comes_near(&left)))
+    }
+
+    /// Whether the best plan leaves little more than every path does.
+    fn comes_near(&self, left: &LeastLeftFigures) -> bool {
+        self.tried.standing.round.highest() <= NEAR_LEAST * left.height_mm
     }
 
     /// Whether a plan stands above the target, but little.
@@ -487,8 +497,8 @@ impl Corrected<'_> {
 
     /// The widths to try next. A plan that stands too high gets deeper moves where that is enough, and narrower widths
     /// elsewhere; one that is too low gets wider ones. Levels are placed anew in each plan, so that other places may stand
-    /// too high then: these are narrowed as well, from the last plan on. Last of all everything is narrowed in proportion, to
-    /// which remnants along borders give way only by another pass. `None` where the best plan holds the target and comes within `slack` of
+    /// too high then: these are narrowed as well, from the last plan on. Last of all everything is narrowed in proportion, where once
+    /// may be enough, to which remnants along borders give way only by another pass. `None` where the best plan holds the target and comes within `slack` of
     /// it, where it is far off in many places, or where what there is was tried `in_vain`.
     fn next(&self, in_vain: usize, slack: f64) -> Option<Widths> {
         let (target, round) = (self.goal.target, &self.tried.standing.round);
@@ -501,7 +511,8 @@ impl Corrected<'_> {
             // Few remnants along borders take passes of their own once the ridges hold.
             let ridges_fail = round.highest_mm + round.margin(target) > target;
             let height = if ridges_fail { round.highest_mm } else { round.highest() };
-            (ridges_fail || self.is_as_before()).then(|| self.scaled(&last.widths, height))
+            let may_help = height * MOST_NARROWED.powi(2) <= target && (ridges_fail || self.is_as_before());
+            may_help.then(|| self.scaled(&last.widths, height))
         };
         match (round.holds(&self.goal), in_vain) {
             (true, 0) => (round.highest() < (1.0 - slack) * target && self.may_lie_wider())
@@ -520,17 +531,20 @@ impl Corrected<'_> {
         }
     }
 
-    /// Few places that were never cut get passes of their own, once. `None` where there are many, which nearer passes do not cut either,
-    /// or where the plan cuts far too deep.
+    /// Few places that stand too high get passes of their own, once, or else those that were never cut. `None` where these are many,
+    /// which nearer passes do not cut either, or where the plan cuts far too deep.
     fn far_off_served(&self, in_vain: usize) -> Option<Widths> {
         let Tried { widths, standing, .. } = &self.tried;
         if in_vain > 0 || !standing.round.measured || self.is_far_too_deep() {
             return None;
         }
-        let near = self.standing_near(&self.tried);
-        let high = above_target(&near);
-        let is_new = !high.is_empty() && !high.iter().any(|place| widths.is_touched_up(place));
-        (is_new && self.are_few(&high, &self.tried, true)).then(|| widths.touched_up(&high))
+        let high = above_target(&self.standing_near(&self.tried));
+        let never_cut = |place: &&HighPlace| place.over > (NEVER_CUT - 1.0) * self.goal.target;
+        let never_cut = high.iter().filter(never_cut).copied().collect();
+        [high, never_cut].into_iter().find_map(|places: Vec<HighPlace>| {
+            let is_new = !places.is_empty() && !places.iter().any(|place| widths.is_touched_up(place));
+            (is_new && self.are_few(&places, &self.tried, true)).then(|| widths.touched_up(&places))
+        })
     }
 
     /// Whether the best plan would hold the target with one pass less: where ridges are about equally high, passes are spread

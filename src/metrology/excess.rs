@@ -64,6 +64,13 @@ const HIGH_DIVISIONS: i32 = 6;
 /// Places of such a cell that are looked at in any case.
 const LEAST_LOOKS: usize = 21;
 
+/// The rim of a cutter may end beside the end of the part by the last decimal of a program, and leave a foil that is no material. Squares
+/// with half sides below this, mm, tell the foil from the rest.
+const LEAST_HALF: f64 = ROUNDING;
+
+/// What may rise by so many times the size of a square is no slope: a foil stands there.
+const STEEPEST: f64 = 100.0;
+
 /// Searches that are repeated with a move which no cell saw: it is lowest between centres only.
 const MOST_UNSEEN: usize = 24;
 
@@ -311,10 +318,11 @@ impl ExcessSearch<'_> {
         }
     }
 
-    /// The move that cuts away what stands so high, mm, on the design over a place.
+    /// The move that cuts away what stands so high, mm, on the design over a place. A line along a normal may end at the side of what the
+    /// rim of a cutter swept: what stands is looked at just below.
     fn top_is_cut(&self, [x, y, _]: [f64; 3], height: f64) -> Option<u32> {
         let design = self.inspection.part.highest_at(x, y)?;
-        (self.cut_away_by)(&(design.point + design.normal * height))
+        (self.cut_away_by)(&(design.point + design.normal * (height - NUMERICAL_FLOOR)))
     }
 
     fn highest_seen(
@@ -328,10 +336,12 @@ impl ExcessSearch<'_> {
         let patches = self.patches(known.max_mm, unseen);
         let small = OTHER_KIND_SHARE * 0.5 * self.inspection.grid.cell;
         let at = |centre: Point2, half: f64| {
+            let is_foil = |rises: f64| half < LEAST_HALF && rises > STEEPEST * half;
             let unknown = |place| (place, Value { here: f64::NEG_INFINITY, possible: patches.most() });
             match patches.held(centre, half) {
                 Held::Nothing => None,
-                Held::Unknown => Some(unknown(centre)),
+                Held::Unknown => (!is_foil(patches.most())).then(|| unknown(centre)),
+                Held::Some { possible, here, .. } if is_foil(possible - here) => None,
                 Held::Some { possible, place, here, by } => {
                     let value = Value { here, possible };
                     if kind == Kind::Any || possible <= known.max_mm {

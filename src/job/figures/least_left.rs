@@ -20,7 +20,7 @@ use crate::{JobError, Session};
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(crate) struct LeastLeftFigures {
     /// Along the normal.
-    height_mm: f64,
+    pub height_mm: f64,
     error_bound_mm: f64,
     at_mm: [f64; 3],
     limit_mm: f64,

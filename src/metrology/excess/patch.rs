@@ -9,6 +9,7 @@ use crate::facing::LEAST_FACING;
 use crate::inspection::Inspection;
 use cutter::Cutter;
 use geometry::{Point2, Point3, Vector2, Vector3};
+use motion::ROUNDING;
 use part::SurfacePoint;
 use sim::NOT_CUT;
 
@@ -91,7 +92,12 @@ impl Patches<'_> {
         for &t in &triangles {
             for outline in outlines(self.inspection.part, t, centre, half).into_iter().flatten() {
                 let Some(piece) = self.piece(t, outline) else { continue };
-                let Some((possible, here, by)) = self.above(&piece) else { return Held::Unknown };
+                let Some((possible, here, by)) = self.above(&piece) else {
+                    if is_foil(&piece.corners[..piece.len]) {
+                        continue;
+                    }
+                    return Held::Unknown;
+                };
                 let place = piece.foot.point.xy();
                 held = Some(match held {
                     None => (possible, place, here, by),
@@ -376,6 +382,17 @@ impl Clipped {
             self.cosine = self.cosine.min(foot.normal.dot(&normal)).max(0.1);
         }
     }
+}
+
+/// Whether a polygon is so narrow that rounding a program may leave it uncut.
+fn is_foil(corners: &[Point2]) -> bool {
+    let sides = || corners.iter().zip(corners.iter().cycle().skip(1)).map(|(a, b)| b - a);
+    let least = sides().map(|side| {
+        let across = Vector2::new(-side.y, side.x) / side.norm().max(f64::MIN_POSITIVE);
+        let off = corners.iter().map(|corner| across.dot(&corner.coords));
+        off.clone().fold(f64::NEG_INFINITY, f64::max) - off.fold(f64::INFINITY, f64::min)
+    });
+    least.fold(f64::INFINITY, f64::min) < 2.0 * ROUNDING
 }
 
 /// What is left of a bound that is enough: nothing stands higher, so heights up to it are all that need be looked at, and what

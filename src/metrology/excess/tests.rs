@@ -1,9 +1,11 @@
 //! The bound against brute force: every move at many places.
 
 use super::patch::least_greatest;
-use crate::{Asked, Bounded, ExcessKind, Limits, Measurement, measure};
+use crate::{Asked, Bounded, ExcessFigures, ExcessKind, Limits, Measurement, measure};
 use cutter::Cutter;
-use geometry::{AnalyticShape, AnalyticSurface, NurbsSurface, Point2, Point3, TriangleMesh, Vector2};
+use geometry::{
+    AnalyticShape, AnalyticSurface, NurbsSurface, Point2, Point3, TriangleMesh, Vector2, Vector3,
+};
 use motion::{ClPoint, Move, MoveKind, Toolpath};
 use part::{Part, Patch};
 use proptest::prelude::*;
@@ -367,6 +369,50 @@ fn short_moves_between_cells_leave_no_figure_open() {
         assert_eq!(uncut.max_height_mm > 0.0, lift > 0.0, "{uncut:?}");
         if lift > 0.0 {
             assert!((uncut.max_height_mm - truth).abs() < 6e-4, "{truth} {uncut:?}");
+        }
+    }
+}
+
+/// A flat whose rim ends beside the part's border by less than the last decimal of a program leaves a foil: nothing that stands.
+#[test]
+fn a_foil_that_rounding_leaves_is_no_material() {
+    let (part, flat) = (part(0), Cutter::flat(3.0).unwrap());
+    let path = straight(&[0.5, 1.5, 2.49998]);
+    for cell in [0.05, 0.3] {
+        let excess = measured(&part, &flat, &path, cell).excess;
+        assert!(excess.highest.at_most() < 1e-4, "{cell}: {excess:?}");
+    }
+    // What is wider stands.
+    let excess = measured(&part, &flat, &straight(&[0.5, 1.5, 2.499]), 0.05).excess;
+    assert!(excess.highest.at_most() >= TOP, "{excess:?}");
+}
+
+/// Between two passes of a flat aslant on a slope stands a strip: the longest lines along normals end at its upright side.
+#[test]
+fn what_ends_at_the_side_of_a_cut_was_not_cut_away() {
+    let part = formula(AnalyticShape::Inclined { height: 0.0, angle: 0.15, azimuth: 0.3 });
+    let flat = Cutter::flat(3.0).unwrap();
+    let top = part.highest_at(2.0, 2.0).unwrap();
+    let (along, across) = (Vector2::new(1.0, 1.0).normalize(), Vector2::new(-1.0, 1.0).normalize());
+    let mut moves = Vec::new();
+    // The third one crosses the strip where lines would leave the part.
+    let ends = [[-6.0, 6.0].map(|a| along * a - across * 2.3), [-6.0, 6.0].map(|a| along * a + across * 0.9)];
+    for (pass, ends) in (0..).zip(ends.into_iter().chain([[-6.0, 6.0].map(|a| across * a - along * 0.3)])) {
+        for (kind, q) in [MoveKind::Rapid, MoveKind::Cut].into_iter().zip(ends) {
+            let on = top.point + q.push(-top.normal.xy().dot(&q) / top.normal.z);
+            let low = ClPoint::upright(on + flat.contact_to_tip(&top.normal));
+            let high = ClPoint::upright(low.tip + Vector3::z() * 9.0);
+            let turn = if kind == MoveKind::Rapid { [high, low] } else { [low, high] };
+            moves.extend(turn.map(|to| Move { to, kind, feed_rate: 1000.0, pass }));
+        }
+    }
+    let path = Toolpath::new(ClPoint::upright(Point3::new(0.0, 0.0, 9.0)), moves);
+    let truth = Brute::new(&part, &flat, &path).highest(400);
+    for cell in [0.05, 0.3, 1.0] {
+        let ExcessFigures { highest, reached, .. } = measured(&part, &flat, &path, cell).excess;
+        assert!(truth > 1.0 && truth <= highest.at_most() + 1e-9, "{cell}: {truth} {highest:?}");
+        for found in [highest, reached] {
+            assert!(found.error_bound_mm < 0.1 * found.max_mm, "{cell}: {found:?}");
         }
     }
 }

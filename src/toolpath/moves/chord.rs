@@ -146,18 +146,20 @@ impl<P: Waypoint> Halving<'_, '_, '_, P> {
         let middle = (self.locate)(s(0.5));
         let split =
             halvings > 0 && (off(middle) || off((self.locate)(s(0.25))) || off((self.locate)(s(0.75))));
-        if let Some(middle) = middle {
-            if split {
+        let stray = |p: &P, q: &P| p.stray(q, q);
+        let far = stray(&b.1, &a.1);
+        let jumps = match middle {
+            Some(middle) if split => {
                 let middle = (s(0.5), middle);
                 self.halve(a, middle, halvings - 1)?;
                 return self.halve(middle, b, halvings - 1);
             }
             // Half of the interval leads nowhere and the other half all the way, or halving does not end.
-            let [far, first, second] =
-                [(b.1, a.1), (middle, a.1), (middle, b.1)].map(|(p, q)| p.stray(&q, &q));
-            if far > self.tolerance && (halvings == 0 || first.min(second) < JUMP * far) {
-                self.points.extend((self.across)(&a.1, &b.1, self.watch)?);
-            }
+            Some(middle) => halvings == 0 || stray(&middle, &a.1).min(stray(&middle, &b.1)) < JUMP * far,
+            None => true,
+        };
+        if jumps && far > self.tolerance {
+            self.points.extend((self.across)(&a.1, &b.1, self.watch)?);
         }
         if !b.1.is_at(&a.1) {
             self.points.push(b.1);
@@ -329,6 +331,11 @@ mod tests {
         let across = &mut |_: &Point3, _: &Point3, _: &mut Watch<'_>| panic!("no jump");
         sample_over_jumps(0.0, 1.0, 0.25, 1e-3, kink, across, watch).unwrap();
         assert_eq!(crossed, 1);
+        // Nothing between both ends.
+        let gap = &mut |s: f64| (!(0.1..=0.9).contains(&s)).then(|| Point3::new(s, 0.0, 0.0));
+        let across = &mut |a: &Point3, _: &Point3, _: &mut Watch<'_>| Ok(vec![Point3::new(a.x, 1.0, 5.0)]);
+        let points = sample_over_jumps(0.0, 1.0, 1.0, 1e-3, gap, across, watch).unwrap();
+        assert!(points.len() == 3 && points[1].z == 5.0, "{points:?}");
     }
 
     /// A path so rough that it would take billions of places ends soon after the user asks for it,

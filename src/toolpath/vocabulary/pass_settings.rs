@@ -123,7 +123,8 @@ impl<'a> PassSettings<'a> {
         let mut across = |a: &Point3, b: &Point3, watch: &mut Watch<'_>| {
             let mut dropped = |t: f64| {
                 let at = a + (b - a) * t;
-                drop.at(at.x, at.y).map(|drop| Point3::new(at.x, at.y, drop.tip_z))
+                // Beside the part nothing is in the way.
+                Some(drop.at(at.x, at.y).map_or(at, |drop| Point3::new(at.x, at.y, drop.tip_z)))
             };
             let mut way = sample_within_chord(0.0, 1.0, STEP_OF_JUMP, fine, &mut dropped, watch)?;
             way.pop();
