@@ -74,6 +74,9 @@ const STEEPEST: f64 = 100.0;
 /// Searches that are repeated with a move which no cell saw: it is lowest between centres only.
 const MOST_UNSEEN: usize = 24;
 
+/// The same where finer cells follow: these see more of the moves.
+const MOST_UNSEEN_AT_FIRST: usize = 2;
+
 /// Which places count.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
@@ -303,12 +306,13 @@ impl ExcessSearch<'_> {
         unseen: &mut Vec<u32>,
         monitor: &dyn Monitor,
     ) -> Result<Bounded, Cancelled> {
+        let most = if self.inspection.is_first_look { MOST_UNSEEN_AT_FIRST } else { MOST_UNSEEN };
         loop {
             let highest = self.highest_seen(open, known, kind, unseen, monitor)?;
             let found = highest.at_mm.filter(|_| highest.max_mm > known.max_mm);
             match found.and_then(|at| self.top_is_cut(at, highest.max_mm)) {
                 None => return Ok(highest),
-                Some(by) if unseen.len() < MOST_UNSEEN && !unseen.contains(&by) => unseen.push(by),
+                Some(by) if unseen.len() < most && !unseen.contains(&by) => unseen.push(by),
                 // Between nothing and this height all is possible.
                 Some(_) => {
                     let error_bound_mm = highest.error_bound_mm.max(highest.max_mm);
