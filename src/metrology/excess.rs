@@ -26,7 +26,7 @@ use super::figures::{Bounded, ExcessFigures, ExcessKind, Measurement, NUMERICAL_
 use super::inspection::{Inspection, Sample};
 use geometry::{Node, Point2, Point3};
 use motion::ROUNDING;
-use patch::{Held, Patches};
+use patch::{Held, LEAST_HALF, Patches};
 use sim::Grid;
 use work::monitor::{self, Cancelled, Monitor};
 
@@ -63,10 +63,6 @@ const HIGH_DIVISIONS: i32 = 6;
 
 /// Places of such a cell that are looked at in any case.
 const LEAST_LOOKS: usize = 21;
-
-/// The rim of a cutter may end beside the end of the part by the last decimal of a program, and leave a foil that is no material. Squares
-/// with half sides below this, mm, tell the foil from the rest.
-const LEAST_HALF: f64 = ROUNDING;
 
 /// What may rise by so many times the size of a square is no slope: a foil stands there.
 const STEEPEST: f64 = 100.0;
@@ -340,11 +336,12 @@ impl ExcessSearch<'_> {
         let patches = self.patches(known.max_mm, unseen);
         let small = OTHER_KIND_SHARE * 0.5 * self.inspection.grid.cell;
         let at = |centre: Point2, half: f64| {
-            let is_foil = |rises: f64| half < LEAST_HALF && rises > STEEPEST * half;
+            let is_foil =
+                |rises: f64| half < LEAST_HALF && rises > STEEPEST * half && patches.ends_beside(centre);
             let unknown = |place| (place, Value { here: f64::NEG_INFINITY, possible: patches.most() });
             match patches.held(centre, half) {
                 Held::Nothing => None,
-                Held::Unknown => (!is_foil(patches.most())).then(|| unknown(centre)),
+                Held::Unknown => Some(unknown(centre)),
                 Held::Some { possible, here, .. } if is_foil(possible - here) => None,
                 Held::Some { possible, place, here, by } => {
                     let value = Value { here, possible };

@@ -38,6 +38,10 @@ const LITTLE_GAIN: f64 = 0.1;
 /// Between its corners a smooth surface may leave a tangent plane by so many times as much as there.
 const BETWEEN_CORNERS: f64 = 1.25;
 
+/// The rim of a cutter may end beside the end of the part by the last decimal of a program, and leave a foil that is no material. Squares
+/// with half sides below this, mm, tell the foil from the rest.
+pub(super) const LEAST_HALF: f64 = ROUNDING;
+
 /// What a square holds.
 pub(super) enum Held {
     /// No surface that is seen from above.
@@ -93,7 +97,7 @@ impl Patches<'_> {
             for outline in outlines(self.inspection.part, t, centre, half).into_iter().flatten() {
                 let Some(piece) = self.piece(t, outline) else { continue };
                 let Some((possible, here, by)) = self.above(&piece) else {
-                    if is_foil(&piece.corners[..piece.len]) {
+                    if half < LEAST_HALF && self.ends_beside(centre) {
                         continue;
                     }
                     return Held::Unknown;
@@ -110,6 +114,16 @@ impl Patches<'_> {
             }
         }
         held.map_or(Held::Nothing, |(possible, place, here, by)| Held::Some { possible, place, here, by })
+    }
+
+    /// Whether the part ends within the rounding of a program of a place.
+    pub fn ends_beside(&self, place: Point2) -> bool {
+        const AROUND: u32 = 8;
+        (0..AROUND).any(|k| {
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / f64::from(AROUND)).sin_cos();
+            let beside = place + Vector2::new(cos, sin) * (2.0 * ROUNDING);
+            self.inspection.part.highest_at(beside.x, beside.y).is_none()
+        })
     }
 
     /// Nothing stands higher than this above the design, mm.
@@ -382,17 +396,6 @@ impl Clipped {
             self.cosine = self.cosine.min(foot.normal.dot(&normal)).max(0.1);
         }
     }
-}
-
-/// Whether a polygon is so narrow that rounding a program may leave it uncut.
-fn is_foil(corners: &[Point2]) -> bool {
-    let sides = || corners.iter().zip(corners.iter().cycle().skip(1)).map(|(a, b)| b - a);
-    let least = sides().map(|side| {
-        let across = Vector2::new(-side.y, side.x) / side.norm().max(f64::MIN_POSITIVE);
-        let off = corners.iter().map(|corner| across.dot(&corner.coords));
-        off.clone().fold(f64::NEG_INFINITY, f64::max) - off.fold(f64::INFINITY, f64::min)
-    });
-    least.fold(f64::INFINITY, f64::min) < 2.0 * ROUNDING
 }
 
 /// What is left of a bound that is enough: nothing stands higher, so heights up to it are all that need be looked at, and what

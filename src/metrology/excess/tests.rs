@@ -385,6 +385,25 @@ fn a_foil_that_rounding_leaves_is_no_material() {
     // What is wider stands.
     let excess = measured(&part, &flat, &straight(&[0.5, 1.5, 2.499]), 0.05).excess;
     assert!(excess.highest.at_most() >= TOP, "{excess:?}");
+    // So does what is as small, away from the border: a needle between four passes.
+    let mut moves: Vec<Move> = straight(&[0.5113, 3.5153, 3.9]).moves;
+    for x in [0.4873, 3.4913] {
+        let at = |y: f64, z: f64, kind| Move {
+            to: ClPoint::upright(Point3::new(x, y, z)),
+            kind,
+            feed_rate: 1000.0,
+            pass: 9,
+        };
+        moves.extend([
+            at(-4.0, 9.0, MoveKind::Rapid),
+            at(-4.0, 0.0, MoveKind::Plunge),
+            at(8.0, 0.0, MoveKind::Cut),
+        ]);
+        moves.push(at(8.0, 9.0, MoveKind::Retract));
+    }
+    let path = Toolpath::new(ClPoint::upright(Point3::new(-4.0, 0.0, 9.0)), moves);
+    let excess = measured(&part, &flat, &path, 0.05).excess;
+    assert!(excess.highest.at_most() >= TOP, "{excess:?}");
 }
 
 /// Between two passes of a flat aslant on a slope stands a strip: the longest lines along normals end at its upright side.
