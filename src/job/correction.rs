@@ -233,7 +233,6 @@ impl Session {
             Some(_) => self.ridges(request, engine, &first, monitor)?,
             None => None,
         };
-        // Narrower passes cost less time than a closer look, and little length.
         let closeness = target.map_or(Closeness::Verdict, |target| Closeness::Plan {
             within: SLACK * target,
             limit: self.scene.scallop_rule.highest * target,

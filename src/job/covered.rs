@@ -71,7 +71,14 @@ impl Session {
         let by_rays = RaysCutInTurn { tools: (0..rays.len()).map(of_tool).collect() };
         let inward = cutters.greatest_radius();
         let outward = (REACH_OVER_UNCUT * scene.tolerance.uncut).max(inward);
-        let swept = SweptVolume { part, cut: &by_rays, inward, outward, block: *facing.block() };
+        let swept = SweptVolume {
+            part,
+            cut: &by_rays,
+            inward,
+            outward,
+            shallow: scene.tolerance.shallow(),
+            block: *facing.block(),
+        };
         let task = AlongTask {
             cutters,
             path,

@@ -22,8 +22,8 @@ const CLOSEST_BOUND: f64 = 0.02;
 pub(crate) enum Closeness {
     /// As the verdict needs it.
     Verdict,
-    /// No closer where the path is to be planned anew: its highest place, known to `within` mm, may stand above `limit`, mm,
-    /// or it does for certain.
+    /// No closer where the path is to be planned anew: its highest place stands above `limit`, mm, for certain. Where finer cells do not make
+    /// a look closer, another plan takes less time than that: it is enough that the place, known to `within` mm, may stand above.
     Plan { within: f64, limit: f64 },
 }
 
@@ -35,7 +35,7 @@ impl Closeness {
         match self {
             Self::Verdict => false,
             Self::Plan { within, limit } => {
-                highest.error_bound_mm <= within && highest.at_most() > limit
+                !coarse && highest.error_bound_mm <= within && highest.at_most() > limit
                     || highest.max_mm > limit && !(coarse && highest.error_bound_mm > asked)
             }
         }

@@ -252,6 +252,14 @@ impl Inspection<'_> {
             }
             Some(along.min(place.z - self.surface.envelope.height(by, place.x, place.y)?))
         };
+        // On a ridge the cut may be less deep than along the normal.
+        let on_ridge = |share: f64, along: f64| {
+            let (place, normal) = design(share);
+            // The cells may end with the part.
+            self.on_ridge(&(place + piece.inward * NUMERICAL_FLOOR), &normal, along)
+        };
+        let length = (piece.ends[1] - piece.ends[0]).norm();
+        let least = self.limits.shallow();
         // What a border bends by between two places spoils concavity by as much; it falls with the square of their distance.
         let bend = 3.0 * piece.bend;
         let mut best: Option<(f64, f64)> = None;
@@ -260,11 +268,16 @@ impl Inspection<'_> {
         let middle = value(nearest);
         let mut open =
             vec![(0.0, first, nearest, middle, MOST_HALVINGS), (nearest, middle, 1.0, last, MOST_HALVINGS)];
+        // Returns the depth of the deepest place, and the cut of this one where it lies on a ridge.
         let mut keep = |share: f64, found: Option<f64>| {
-            if let Some(found) = found.filter(|found| best.is_none_or(|(most, _)| *found > most)) {
-                best = Some((found, share));
+            let most = best.map_or(known, |(most, _)| most.max(known));
+            let Some(along) = found else { return (most, None) };
+            let ridge = if along > most.max(least) { on_ridge(share, along) } else { None };
+            let depth = ridge.map_or(along, |cut| -cut.distance);
+            if best.is_none_or(|(most, _)| depth > most) {
+                best = Some((depth, share));
             }
-            best.map_or(known, |(most, _)| most.max(known))
+            (most.max(depth), ridge)
         };
         keep(0.0, first);
         keep(1.0, last);
@@ -275,7 +288,7 @@ impl Inspection<'_> {
             }
             let m = 0.5 * (a + b);
             let at_m = value(m);
-            let most = keep(m, at_m);
+            let (most, ridge) = keep(m, at_m);
             let possible = match (at_a, at_m, at_b) {
                 (Some(at_a), Some(m), Some(at_b)) => {
                     m.max(at_a).max(at_b).max(2.0 * m - at_a.min(at_b)) + bend * (b - a) * (b - a)
@@ -283,6 +296,10 @@ impl Inspection<'_> {
                 (None, None, _) | (_, None, None) if halvings == 0 => f64::NEG_INFINITY,
                 _ => f64::INFINITY,
             };
+            let possible = ridge.map_or(possible, |cut| {
+                let within = 0.5 * (b - a) * length + piece.bend;
+                possible.min(cut.slope * within - cut.distance)
+            });
             if possible <= most + NUMERICAL_FLOOR {
                 left = left.max(possible);
             } else if halvings == 0 {
@@ -318,15 +335,9 @@ fn deeper(a: BorderCut, b: BorderCut) -> BorderCut {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figures::Limits;
-    use crate::flat_scene::{path, plane};
-    use crate::{Asked, measure};
+    use crate::flat_scene::{LIMITS, gouge_of, plane};
     use geometry::{NurbsSurface, TriangleMesh};
     use part::{Part, Patch};
-    use sim::{Grid, ZMap, cut};
-    use work::monitor::Silent;
-
-    const LIMITS: Limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.001 };
 
     fn gouge(cutter: &Cutter, plunge: Point3, cell: f64) -> GougeFigures {
         let lines = (0..13).map(|k| 0.5 * f64::from(k));
@@ -334,22 +345,6 @@ mod tests {
             lines.map(|y| [-5.0, 13.0].map(|x| Point3::new(x, y, 0.0)).to_vec()).collect();
         passes.push(vec![Point3::new(plunge.x, plunge.y, 10.0), plunge]);
         gouge_of(&plane([8.0, 6.0]), cutter, &passes, cell)
-    }
-
-    fn gouge_of(part: &Part, cutter: &Cutter, passes: &[Vec<Point3>], cell: f64) -> GougeFigures {
-        let path = path(passes);
-        let top = part.bounds().max.z + 1.0;
-        let grid = Grid::covering(&part.bounds(), cell, 64, 1 << 30).unwrap();
-        let cut = cut(ZMap::block(grid, top), cutter, &path, &Silent).unwrap();
-        let asked = Asked {
-            error_bound: 5e-4,
-            stock_top: top,
-            borders: true,
-            most_cells: 1 << 20,
-            most_squares: 1 << 20,
-            is_first_look: false,
-        };
-        measure(part, cutter, &path, &cut, &LIMITS, &asked, &Silent).unwrap().gouge
     }
 
     /// A ball plunges beside the part: the border is cut by what its sphere reaches over it, on cells of every size.

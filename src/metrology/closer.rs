@@ -170,15 +170,15 @@ pub(super) fn greatest(
         let found = at(centre, half).map(|v| (centre, v)).or_else(|| (0..4).find_map(corner));
         found.or((half > least).then_some(unknown))
     };
-    search(squares, known, asked, Effort { places: MOST, squares: held }, &inside, monitor)
+    search(squares, known, &|_| asked, Effort { places: MOST, squares: held }, &inside, monitor)
 }
 
-/// As [`greatest`], with `most` effort. `inside` tells what the square around a centre with a given half side holds,
-/// and at which of its places; `None` where it holds nothing.
+/// As [`greatest`], with `most` effort; `asked` tells how closely a greatest value is to be known. `inside` tells what the square around a
+/// centre with a given half side holds, and at which of its places; `None` where it holds nothing.
 pub(super) fn search(
     squares: Vec<Square>,
     known: f64,
-    asked: f64,
+    asked: &dyn Fn(f64) -> f64,
     most: Effort,
     inside: &(dyn Fn(Point2, f64) -> Option<(Point2, Value)> + Sync),
     monitor: &dyn Monitor,
@@ -186,7 +186,7 @@ pub(super) fn search(
     let mut open = BinaryHeap::from(squares);
     let (mut best, mut place, mut spent) = (known, None, 0);
     while spent < most.places && open.len() < most.squares.max(BATCH) {
-        let enough = if spent < CHEAP { NUMERICAL_FLOOR } else { asked.max(NUMERICAL_FLOOR) };
+        let enough = if spent < CHEAP { NUMERICAL_FLOOR } else { asked(best).max(NUMERICAL_FLOOR) };
         let mut batch = Vec::with_capacity(BATCH);
         while batch.len() < BATCH && open.peek().is_some_and(|s| s.possible > best + enough) {
             batch.extend(open.pop());

@@ -151,8 +151,8 @@ impl ExcessSearch<'_> {
             Vec::new()
         } else {
             let squares = Promising::of(open.squares.into_iter(), MOST_HIGH_CELLS).squares;
-            // What stands lower by so little is above the limit with its bound.
-            let high = limits.scallop - 2.0 * NUMERICAL_FLOOR;
+            // Places are found no more closely.
+            let high = (1.0 - HIGH_SLACK) * limits.scallop;
             let most = (self.most_places() / squares.len().max(1)).max(LEAST_LOOKS);
             self.high_places(&squares, high, most, &unseen, monitor)?
         };
@@ -361,7 +361,8 @@ impl ExcessSearch<'_> {
         };
         let squares = open.squares.iter().filter(|square| square.possible > known.max_mm).copied().collect();
         let most = Effort { places: self.most_places(), squares: self.inspection.most_squares };
-        let mut found = search(squares, known.max_mm, self.asked(known.max_mm, kind), most, &at, monitor)?;
+        let mut found =
+            search(squares, known.max_mm, &|highest| self.asked(highest, kind), most, &at, monitor)?;
         found.possible = found.possible.max(open.others);
         let mut highest = match found.greatest {
             Some((height, q)) => {

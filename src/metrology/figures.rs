@@ -22,6 +22,13 @@ pub struct Limits {
     pub chord: f64,
 }
 
+impl Limits {
+    /// Cuts that are no deeper than this below the design surface hold every limit, mm.
+    pub fn shallow(&self) -> f64 {
+        self.gouge.min(self.chord)
+    }
+}
+
 /// A place of a ridge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RidgePlace {

@@ -12,6 +12,7 @@ use super::figures::{
 use super::meetings::Meetings;
 use super::regions::connected;
 use super::walls::Walls;
+use crate::beneath::{Bounding, thinner};
 use crate::closer;
 use crate::facing::LEAST_FACING;
 use geometry::{Point2, Point3, Vector2, Vector3};
@@ -134,10 +135,33 @@ impl Inspection<'_> {
     fn along_normal(&self, p: &Point3, normal: &Vector3) -> Option<(Deviation, bool)> {
         let found = self.surface.along_normal(p, normal)?;
         let distance = self.walls.map_or(found.distance, |walls| walls.beside(p, found.distance));
-        if distance == found.distance {
+        if distance != found.distance {
+            return Some((Deviation { distance, slope: 0.0, ..found }, true));
+        }
+        // What is less deep holds every limit.
+        if -distance <= self.limits.shallow() {
             return Some((found, false));
         }
-        Some((Deviation { distance, slope: 0.0, ..found }, true))
+        Some((self.on_ridge(p, normal, -distance).unwrap_or(found), false))
+    }
+
+    /// The cut of a ridge that is thinner than the cut along the normal is deep, mm; its slope is how much deeper it may be beside.
+    pub fn on_ridge(&self, p: &Point3, normal: &Vector3, depth: f64) -> Option<Deviation> {
+        // Below the highest surface it is solid, whatever a file has there.
+        let is_highest = |other: &SurfacePoint| {
+            let highest = self.part.highest_at(other.point.x, other.point.y);
+            let is_below = highest.is_some_and(|highest| highest.point.z > other.point.z + NUMERICAL_FLOOR);
+            other.normal.z > LEAST_FACING && !is_below
+        };
+        let bounding = Bounding { counts: &is_highest, walls: false };
+        let out = thinner(self.part, p, normal, depth, bounding)?.out_of_ridge(normal)?;
+        let cut = self.surface.along_normal(p, &out)?;
+        let left = p + out * cut.distance;
+        if -cut.distance >= depth || self.part.closest_point(&left).1 > NUMERICAL_FLOOR {
+            return None;
+        }
+        let tan = cut.slope / (1.0 - cut.slope * cut.slope).max(f64::MIN_POSITIVE).sqrt();
+        Some(Deviation { distance: cut.distance.min(0.0), slope: 1.0 + tan, ..cut })
     }
 
     /// What stands at most in the cell `(i, j)` of a band by the move that cut its centre, and with the normals of the design

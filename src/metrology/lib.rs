@@ -5,7 +5,8 @@
 //! places as connected regions, and a bound of the error beside each figure. mm throughout.
 //!
 //! Deviation at a design point is the signed distance along its outward normal to the cut surface:
-//! positive is excess, negative is gouge.
+//! positive is excess, negative is gouge. On a sharp ridge, where the way down along the normal may run along the other face, a cut is no deeper
+//! than the ridge is lower (`beneath`).
 //!
 //! A bound says how much a figure may differ from the truth:
 //!
@@ -21,6 +22,7 @@
 //! than the highest scallop. So a tall scallop, or half of one at the border, is a bad scallop and not an uncut place.
 
 mod along_normals;
+mod beneath;
 mod border_cuts;
 mod closer;
 mod contact;

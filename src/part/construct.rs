@@ -1,5 +1,7 @@
 //! How a part comes into being: a mesh as it is, or patches with their search mesh.
 
+use std::sync::OnceLock;
+
 use super::{Part, Patch};
 use geometry::{
     Aabb, Bvh, MAX_TRIANGLES, MeshError, Outside, Point3, RepairNotes, TessellateError, Tessellation,
@@ -80,6 +82,7 @@ impl Part {
             bounds: mesh.bounds(),
             mesh,
             deviation: 0.0,
+            border_walls: OnceLock::new(),
             beside_others: Vec::new(),
             repairs: RepairNotes::default(),
         }
@@ -146,6 +149,7 @@ impl Part {
             bounds: mesh.bounds(),
             mesh,
             deviation: all.deviation,
+            border_walls: OnceLock::new(),
             beside_others: Vec::new(),
             repairs,
         };

@@ -8,6 +8,7 @@
 //! Outward is the side that the tool comes from. Parts are milled from above (+z), so a patch
 //! whose normal points down on the whole is turned over; a mesh brings its own orientation.
 
+mod border_walls;
 mod construct;
 mod patch;
 mod refine;
@@ -18,6 +19,9 @@ pub use construct::{PartError, default_tessellation_tolerance};
 pub use patch::Patch;
 pub use sample::{GridSample, OFF_PART, SurfaceGrid};
 
+use std::sync::OnceLock;
+
+use border_walls::BorderWalls;
 use geometry::{Aabb, Bvh, MeshFoot, Point3, PrincipalCurvatures, RepairNotes, TriangleMesh, Vector3};
 use seams::OnPatch;
 
@@ -71,6 +75,8 @@ pub struct Part {
     /// For each triangle, whether a line through it may meet another patch; empty for parts of one patch and meshes.
     beside_others: Vec<bool>,
     repairs: RepairNotes,
+    /// Made when it is first asked for.
+    border_walls: OnceLock<Option<BorderWalls>>,
 }
 
 /// A parameter within this share of its range from an end is at the end: a thousand times f64's rounding, a millionth of a

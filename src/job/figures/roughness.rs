@@ -77,7 +77,14 @@ fn measure(run: &Run<'_>, cut: &dyn FirstCut, monitor: &dyn Monitor) -> Result<R
     let (scene, path) = (run.scene(), &*run.whole.path);
     let reach = REACH_OVER_UNCUT * scene.tolerance.uncut;
     let block = run.session.task(path, &scene.simulation, &run.session.cells).block();
-    let cut = SweptVolume { part: run.part(), cut, inward: reach, outward: reach, block };
+    let cut = SweptVolume {
+        part: run.part(),
+        cut,
+        inward: reach,
+        outward: reach,
+        shallow: scene.tolerance.shallow(),
+        block,
+    };
     // About how far passes are apart.
     let interval = run.measurement().deviation.area_mm2 / path_figures(path, 0.0).cutting_length_mm;
     Ok(roughness(run.part(), run.cutters(), path, &cut, interval, monitor)?)

@@ -185,7 +185,7 @@ fn depth_by_tangents(samples: &[Sample; 3], by: u32) -> f64 {
     let hollow = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| rise(samples, i, j)).into_iter().fold(0.0, f64::max);
     let of_corner = |i: usize| {
         let sample = &samples[i];
-        let hit = sample.hit.filter(|hit| hit.by == by)?;
+        let hit = sample.hit.filter(|hit| hit.by == by && hit.direction.is_none())?;
         let cos = hit.normal.dot(&sample.place.normal);
         let across = hit.normal - sample.place.normal * cos;
         // The height falls toward where the cut's normal leans.

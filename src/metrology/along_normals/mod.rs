@@ -46,7 +46,6 @@ use part::Part;
 pub(crate) use regions::connected;
 use regions::{Standing, areas, deviation_figures};
 use ridges::{CLOSE, Crossing, Finder};
-pub(crate) use swept_volume::ball_beneath;
 pub use swept_volume::{FirstCut, RaysCut, RaysCutInTurn, SweptVolume, VoxelCut};
 use work::monitor::{self, Cancelled, Monitor};
 
@@ -59,6 +58,9 @@ pub struct NormalHit {
     pub by: u32,
     /// Unit normal of the cut surface, away from the material.
     pub normal: Vector3,
+    /// The unit vector along which the cut was met, where that is not the normal of the place: out of a ridge that is thinner than the cut along
+    /// the normal is deep.
+    pub direction: Option<Vector3>,
     /// Where the engine may begin to look beside this place.
     pub seed: usize,
     /// How much deeper than it was found the cut may be, mm.
@@ -113,11 +115,12 @@ struct Sample {
 }
 
 impl Sample {
-    /// How fast the deviation changes along the surface: the tangent of the angle between cut and design.
+    /// How fast the deviation changes along the surface: the tangent of the angle between cut and design; on a ridge at most.
     fn slope(&self) -> f64 {
         self.hit.map_or(0.0, |hit| {
-            let cos = hit.normal.dot(&self.place.normal);
-            if cos > 0.0 { (1.0 / (cos * cos) - 1.0).max(0.0).sqrt() } else { f64::INFINITY }
+            let cos = hit.normal.dot(&hit.direction.unwrap_or(self.place.normal));
+            let tan = if cos > 0.0 { (1.0 / (cos * cos) - 1.0).max(0.0).sqrt() } else { f64::INFINITY };
+            if hit.direction.is_some() { 1.0 + tan } else { tan }
         })
     }
 }

@@ -1,9 +1,10 @@
 //! The cut as the volume that the tool swept, whatever engine tells where a line meets it.
 //!
 //! A normal through a thin trailing edge comes out on the far side, where the passes of that side have cut everything. So cuts
-//! are looked for close to the design first. A deeper one counts only as far as a ball fits inside the part.
+//! are looked for close to the design first, and count only as far as a ball fits inside the part.
 
 use super::{AlongNormal, NormalHit};
+use crate::beneath::{Bounding, thinner};
 use cutter::Solid;
 use geometry::{Aabb, Point3, Vector3};
 use motion::Toolpath;
@@ -15,8 +16,8 @@ use sim::{Rays, VoxelEngine, Voxels};
 /// all the moves along the far side, and tell which of them is the first in the program.
 const NEAR: f64 = 0.1;
 
-/// Rounds in which the ball that fits under a place shrinks; each leaves a small part of what is too large.
-const SHRINKING: usize = 30;
+/// How many times deeper is looked on a ridge that is cut as deep as was looked.
+const DEEPER: f64 = 4.0;
 
 /// An engine that tells where a line first meets what was cut.
 pub trait FirstCut: Sync {
@@ -60,7 +61,14 @@ impl FirstCut for RaysCut<'_> {
             // Where an edge cuts, the tool by itself has no normal.
             self.rays.cut_normal(point, normal, &hit)?
         };
-        Some(NormalHit { deviation: hit.s, by: hit.index, normal: cut, seed, uncertain: 0.0 })
+        Some(NormalHit {
+            deviation: hit.s,
+            by: hit.index,
+            normal: cut,
+            direction: None,
+            seed,
+            uncertain: 0.0,
+        })
     }
 }
 
@@ -106,7 +114,7 @@ impl FirstCut for VoxelCut<'_> {
     ) -> Option<NormalHit> {
         let exit = self.engine.first_exit(self.voxels, point, normal, range)?;
         let (deviation, by, uncertain) = (exit.s, exit.index, exit.uncertain);
-        Some(NormalHit { deviation, by, normal: exit.normal, seed: 0, uncertain })
+        Some(NormalHit { deviation, by, normal: exit.normal, direction: None, seed: 0, uncertain })
     }
 }
 
@@ -120,6 +128,8 @@ pub struct SweptVolume<'a> {
     pub inward: f64,
     /// How far above it, mm.
     pub outward: f64,
+    /// Of cuts that are no deeper than this it is not asked how thick the part is, mm: they hold every limit.
+    pub shallow: f64,
     /// The block that is cut, mm.
     pub block: Aabb,
 }
@@ -138,6 +148,25 @@ impl SweptVolume<'_> {
         })
     }
 
+    /// The cut of a ridge, no deeper than the second of two depths, mm: first no deeper than the first is looked, since deep
+    /// in the part others may have cut.
+    fn on_ridge(
+        &self,
+        point: &Point3,
+        out: &Vector3,
+        [mut depth, most]: [f64; 2],
+        near: Option<&NormalHit>,
+    ) -> Option<NormalHit> {
+        loop {
+            depth = depth.min(most);
+            let hit = self.cut.first_cut(point, out, [-depth, self.outward], near)?;
+            if hit.deviation > -depth || depth >= most {
+                return Some(NormalHit { deviation: hit.deviation.min(0.0), direction: Some(*out), ..hit });
+            }
+            depth *= DEEPER;
+        }
+    }
+
     /// The same where the block had no sides. What leans out over a border is part of what stands there.
     fn way_up(&self, point: &Point3, normal: &Vector3) -> f64 {
         if normal.z > 0.0 { ((self.block.max.z - point.z) / normal.z).max(0.0) } else { f64::INFINITY }
@@ -150,11 +179,28 @@ impl AlongNormal for SweptVolume<'_> {
         let close = NEAR.min(self.inward);
         // What was cut beyond the stock took nothing away.
         let found = look(close).filter(|hit| hit.deviation <= self.way_up(point, normal))?;
-        if found.deviation > -close {
+        let is_near = found.deviation > -close;
+        if is_near && -found.deviation <= self.shallow {
             return Some(found);
         }
-        // What the far side of a thin part has lost is no loss of this one.
-        look(ball_beneath(self.part, point, normal, self.inward))
+        let depth = if is_near { -found.deviation } else { self.inward };
+        let bounding = Bounding { counts: &|_| true, walls: true };
+        let Some(thin) = thinner(self.part, point, normal, depth, bounding) else {
+            return if is_near { Some(found) } else { look(self.inward) };
+        };
+        if is_near && thin.is_blunt(normal) {
+            return Some(found);
+        }
+        match thin.out_of_ridge(normal) {
+            Some(way) => Some(self.on_ridge(point, &way, [2.0 * thin.radius, depth], near).unwrap_or(found)),
+            // What the far side of a thin part has lost is no loss of this one.
+            None => {
+                let hit = look(thin.radius)?;
+                // All of that: it grows no faster than the distance from where the sides meet.
+                let is_all = hit.deviation <= -thin.radius;
+                Some(if is_all { NormalHit { direction: Some(hit.normal), ..hit } } else { hit })
+            }
+        }
     }
 
     fn reach(&self) -> f64 {
@@ -175,49 +221,5 @@ impl AlongNormal for SweptVolume<'_> {
 
     fn depth(&self) -> f64 {
         self.inward
-    }
-}
-
-/// Radius of the greatest ball, `most` at most, mm, that touches the part in `point` from inside: half the thickness
-/// there, or the radius of a sharp bend (Ma, Bae & Choi, "3D medial axis point approximation using nearest neighbors and
-/// the normal field", 2012).
-pub(crate) fn ball_beneath(part: &Part, point: &Point3, normal: &Vector3, most: f64) -> f64 {
-    let near = part.mesh_deviation() + 1e-6;
-    let mut radius = most;
-    for _ in 0..SHRINKING {
-        let centre = point - normal * radius;
-        let foot = part.bvh().closest_point(part.mesh(), &centre);
-        let way = point - foot.point;
-        let along = way.dot(normal);
-        if foot.signed_distance.abs() >= radius - 2.0 * near || along <= 0.0 {
-            break;
-        }
-        radius = (0.5 * way.norm_squared() / along).min(radius);
-    }
-    radius
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use geometry::TriangleMesh;
-
-    #[test]
-    fn the_ball_beneath_is_half_a_slab_or_the_whole_depth() {
-        // A slab 2 mm thick; thick ground beside it is asked on its own.
-        let slab = |thick: f64| {
-            let corner = |i: u32| {
-                Point3::new(20.0 * f64::from(i & 1), 20.0 * f64::from(i >> 1 & 1), thick * f64::from(i >> 2))
-            };
-            let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-            let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-            Part::from_mesh(TriangleMesh::new((0..8).map(corner).collect(), triangles).unwrap().0)
-        };
-        let at =
-            |thick: f64, x: f64| ball_beneath(&slab(thick), &Point3::new(x, 10.0, thick), &Vector3::z(), 3.0);
-        assert!((at(2.0, 10.0) - 1.0).abs() < 1e-4);
-        assert!((at(20.0, 10.0) - 3.0).abs() < 1e-12);
-        // Beside the wall at x = 0 the ball touches that instead.
-        assert!((at(20.0, 0.5) - 0.5).abs() < 1e-4);
     }
 }

@@ -31,6 +31,7 @@ impl AlongNormal for BruteForce<'_> {
                     let t = ((at - a).dot(&(b - a)) / (b - a).norm_squared()).clamp(0.0, 1.0);
                     let inward = (a + (b - a) * t - at) / RADIUS;
                     best = Some(NormalHit {
+                        direction: None,
                         deviation: s,
                         by: k as u32,
                         normal: inward,
@@ -203,12 +204,49 @@ fn what_was_never_cut_stands_as_high_as_the_stock() {
     for (top, height, most) in [(0.3, 0.3, 0.301), (0.9, 0.9, 0.901), (2.5, 1.0, 2.501)] {
         let mut block = part.bounds();
         block.max.z = top;
-        let cut = SweptVolume { part: &part, cut: &by_rays, inward: 1.0, outward: 1.0, block };
+        let cut = SweptVolume { part: &part, cut: &by_rays, inward: 1.0, outward: 1.0, shallow: 1e-6, block };
         let (measured, _) =
             measure_along_normals(&part, &ball, &path, &cut, 0.1, &limits, 1e-4, None, &Silent).unwrap();
         let (found, bound) = (measured.uncut.max_height_mm, measured.uncut.error_bound_mm);
         assert!((found - height).abs() < 1e-9, "{found} of {height}");
         assert!(found + bound >= top && found + bound <= most, "{found} ± {bound} under {top}");
+    }
+}
+
+/// A ball beside the upper border of a slope, as deep below it as it is wide, cuts the edge by micrometres. The way down along the
+/// slope's normal leads out over the border, where the ball has cut all.
+#[test]
+fn a_cut_beside_the_border_of_a_sheet_is_as_deep_as_it_is_far_from_its_wall() {
+    let corners = [[0.0, 0.0, 0.0], [0.0, 3.0, -3.0], [1.0, 0.0, 0.0], [1.0, 3.0, -3.0]].map(Point3::from);
+    let part = Part::from_mesh(TriangleMesh::new(corners.to_vec(), vec![[0, 2, 1], [2, 3, 1]]).unwrap().0);
+    let ball = Cutter::ball(2.0 * RADIUS).unwrap();
+    let solid = Solid::of_cutter(&ball, None);
+    for deep in [0.001, 0.02] {
+        let path = path(&along_x(&[[deep - RADIUS, -RADIUS]]));
+        let rays = Rays::new(&path, &solid, &Silent).unwrap();
+        let by_rays = RaysCut { rays: &rays, path: &path, solid: &solid };
+        let cut = SweptVolume {
+            part: &part,
+            cut: &by_rays,
+            inward: 1.0,
+            outward: 1.0,
+            shallow: 1e-6,
+            block: Aabb { min: Point3::new(-1e3, -1e3, -1e3), max: Point3::new(1e3, 1e3, 1e3) },
+        };
+        let (found, _) =
+            measure_along_normals(&part, &ball, &path, &cut, 0.1, &LIMITS, 1e-3, None, &Silent).unwrap();
+        let gouge = &found.gouge;
+        // On the ball, as far from the wall as from the slope.
+        let on_ball = |down: f64| (RADIUS * RADIUS - down * down).sqrt() - RADIUS + deep;
+        let truth = (0..9).fold(deep, |truth, _| on_ball(truth * (1.0 + 2f64.sqrt())));
+        let off = (gouge.max_depth_mm - truth).abs();
+        assert!(off <= gouge.error_bound_mm, "{deep}: {truth} {gouge:?}");
+        // The limit is decided.
+        let to_limit = (LIMITS.gouge - gouge.max_depth_mm).abs();
+        assert!(
+            gouge.error_bound_mm < to_limit && gouge.error_bound_mm < 2.5e-3,
+            "{deep}: {truth} {gouge:?}"
+        );
     }
 }
 
@@ -238,6 +276,7 @@ fn a_dome_has_the_scallops_of_a_circle_also_where_it_is_steep() {
         cut: &by_rays,
         inward: 1.0,
         outward: 1.0,
+        shallow: 1e-6,
         block: Aabb { min: Point3::new(-1e3, -1e3, -1e3), max: Point3::new(1e3, 1e3, 1e3) },
     };
     let limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.001 };
@@ -285,6 +324,7 @@ fn by_both(
             cut,
             inward: reach,
             outward: reach,
+            shallow: 1e-6,
             block: Aabb { min: Point3::new(-1e3, -1e3, -1e3), max: Point3::new(1e3, 1e3, 1e3) },
         };
         measure_along_normals(part, cutter, &path, &cut, 0.4, &limits, 1e-3, None, &Silent).unwrap()

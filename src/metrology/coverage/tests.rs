@@ -189,8 +189,14 @@ fn unseen_after(path: &Toolpath, cutters: &Cutters, margin: f64) -> Measurement 
     let tool = |k: usize| RaysCut { rays: &rays[k], path: &stretches[k].path, solid: &solids[k] };
     let tools = (0..solids.len()).map(|k| (stretches[k].first, tool(k))).collect();
     let by_rays = RaysCutInTurn { tools };
-    let cut =
-        SweptVolume { part: &part, cut: &by_rays, inward: 3.0, outward: 3.0, block: block(&part, margin) };
+    let cut = SweptVolume {
+        part: &part,
+        cut: &by_rays,
+        inward: 3.0,
+        outward: 3.0,
+        shallow: 1e-6,
+        block: block(&part, margin),
+    };
     let task = AlongTask { cutters, path, cut: &cut, limits: &LIMITS, asked: 5e-4, finest: 0.1 };
     coverage.measure_unseen(&task, &Silent).unwrap().unwrap().0
 }

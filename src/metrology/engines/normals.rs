@@ -142,7 +142,14 @@ fn outward(task: &Task<'_>) -> f64 {
 
 fn swept_volume<'a>(task: &'a Task<'_>, cut: &'a dyn FirstCut) -> SweptVolume<'a> {
     let inward = task.cutters.first().radius();
-    SweptVolume { part: task.part, cut, inward, outward: outward(task), block: task.block() }
+    SweptVolume {
+        part: task.part,
+        cut,
+        inward,
+        outward: outward(task),
+        shallow: task.limits.shallow(),
+        block: task.block(),
+    }
 }
 
 /// More than the part by `reach` all around, so that what a normal leaves is what was cut.

@@ -150,6 +150,23 @@ impl Cubic {
     }
 }
 
+/// Places along cubics that follow each other, after the first end up to and with the second, as if the ground rose evenly from one to
+/// the other.
+fn lifted(curve: &[Cubic], from: &End, to: &End) -> Vec<Point3> {
+    /// Places along each cubic.
+    const PLACES: usize = 16;
+    let count = PLACES * curve.len();
+    let place = |k: usize| {
+        if k == count {
+            return to.tip;
+        }
+        let p = curve[k / PLACES].at((k % PLACES) as f64 / PLACES as f64);
+        let z = from.tip.z + (to.tip.z - from.tip.z) * (k as f64 / count as f64);
+        Point3::new(p.x, p.y, z)
+    };
+    (1..=count).map(place).collect()
+}
+
 /// A turn between ends with about opposite feeds.
 struct Turn {
     /// The mean way out.
@@ -232,11 +249,22 @@ impl Bends<'_> {
         // Quicker than a loop would be a hairpin, in which the tool stands still.
         let needs_loop = Turn::between(&from, &to).is_some_and(|t| t.beside.norm() < NARROW * self.interval);
         let tangents = if needs_loop { &TANGENTS[..1] } else { &TANGENTS };
-        let mut best: Option<(f64, Vec<Point3>)> = None;
+        let mut candidates = Vec::new();
         for curve in tangents.iter().flat_map(|&tangents| curves(self.interval, tangents, &from, &to)) {
             let length = curve.iter().map(Cubic::length).sum::<f64>();
+            if length <= self.longest {
+                // The loop comes before what it is to replace.
+                let about =
+                    if needs_loop { 0.0 } else { self.time(&ways, &lifted(&curve, &from, &to), monitor)? };
+                candidates.push((about, length, curve));
+            }
+        }
+        // To drop the cutter takes most of the time: only on what may be the quickest.
+        candidates.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut best: Option<(f64, Vec<Point3>)> = None;
+        for (about, length, curve) in candidates {
             let least = best.as_ref().map_or(f64::INFINITY, |(time, _)| *time);
-            if length > self.longest || length / speed >= least {
+            if about >= least || length / speed >= least {
                 continue;
             }
             if let Some(moves) = self.follow(&curve, length, &from, &to, monitor)? {

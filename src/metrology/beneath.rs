@@ -1,0 +1,153 @@
+//! How deep a part is cut where it is thin.
+//!
+//! Along the normal of a smooth face a cut is as deep as the place is far from what is left. Where another face is near, the way down along
+//! the normal may be far longer: beneath a sharp ridge it may run along the other side, and through a thin part it comes out there. What
+//! is left of a ridge is sought along the middle between the normals of both faces, too, and the lesser way counts. Between faces that look
+//! apart, and beside the wall below the border of a sheet, a cut is no deeper than half the thickness: what the far side has lost is no loss of
+//! this one. mm.
+
+use geometry::{Point3, Vector3};
+use part::{Part, SurfacePoint};
+
+use crate::figures::NUMERICAL_FLOOR;
+
+/// Rounds in which the ball shrinks; each leaves a small part of what is too large.
+const SHRINKING: usize = 30;
+
+/// Faces are a sharp ridge, or the sides of something thin, where their unit normals have no greater product: 75 degrees between them. On a blunter
+/// ridge the way along a normal is less than four times as long as what is lost.
+const SHARP: f64 = 0.26;
+
+/// Two faces whose unit normals sum up to less, some eleven degrees between them, have no ridge: they are the sides of a thin part.
+const LEAST_RIDGE: f64 = 0.2;
+
+/// A part that is thinner than a cut is deep.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Thin {
+    /// Radius of the greatest ball that touches the place from inside: half the thickness.
+    pub radius: f64,
+    /// Outward unit normal of the other face; `None` of a wall below a border, which is no face.
+    pub other: Option<Vector3>,
+}
+
+impl Thin {
+    /// Whether the part only bends there.
+    pub fn is_blunt(&self, normal: &Vector3) -> bool {
+        self.other.is_some_and(|other| normal.dot(&other) > SHARP)
+    }
+
+    /// Out of a sharp ridge, unit length; `None` between the sides of a thin part, at a wall, and where the part bends.
+    pub fn out_of_ridge(&self, normal: &Vector3) -> Option<Vector3> {
+        let other = self.other.filter(|_| !self.is_blunt(normal))?;
+        (normal + other).try_normalize(LEAST_RIDGE)
+    }
+}
+
+/// What part of the surface bounds the solid, besides the place itself.
+#[derive(Clone, Copy)]
+pub(crate) struct Bounding<'a> {
+    /// The places of the surface that do.
+    pub counts: &'a dyn Fn(&SurfacePoint) -> bool,
+    /// Whether the walls below the borders of a sheet do where the way down leads out through them.
+    pub walls: bool,
+}
+
+/// Radius of the greatest ball, `most` at most, mm, that touches the part in `point` from inside: half the thickness
+/// there, or the radius of a sharp bend (Ma, Bae & Choi, "3D medial axis point approximation using nearest neighbors and
+/// the normal field", 2012).
+pub(crate) fn ball_beneath(part: &Part, point: &Point3, normal: &Vector3, most: f64) -> f64 {
+    let all = Bounding { counts: &|_| true, walls: false };
+    thinner(part, point, normal, most, all).map_or(most, |thin| thin.radius)
+}
+
+/// The thickness beneath a place where a ball with this radius, mm, does not fit.
+pub(crate) fn thinner(
+    part: &Part,
+    point: &Point3,
+    normal: &Vector3,
+    depth: f64,
+    bounding: Bounding<'_>,
+) -> Option<Thin> {
+    // What lies so near is the place itself.
+    let near = NUMERICAL_FLOOR + 2.0 * part.closest_point(point).1.abs();
+    let (mut radius, mut found) = (depth, None);
+    for _ in 0..SHRINKING {
+        let centre = point - normal * radius;
+        let inside = radius - near;
+        let fits = |other: &Point3| {
+            let way = point - other;
+            let along = way.dot(normal);
+            if along > 0.0 { 0.5 * way.norm_squared() / along } else { f64::INFINITY }
+        };
+        let (other, distance) = part.closest_point(&centre);
+        let of_surface = (distance.abs() < inside && (bounding.counts)(&other))
+            .then(|| (fits(&other.point), Some(other.normal)));
+        let leads_out = |outward: &Vector3| normal.dot(outward) < 0.0;
+        let wall = if bounding.walls { part.nearest_border_wall(&centre, inside, &leads_out) } else { None };
+        let of_wall = wall.map(|place| (fits(&place), None));
+        let nearest = of_surface.into_iter().chain(of_wall).min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((fits, other)) = nearest.filter(|(fits, _)| *fits < radius) else { break };
+        (radius, found) = (fits, Some(Thin { radius: fits, other }));
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flat_scene::gouge_of;
+    use cutter::Cutter;
+    use geometry::TriangleMesh;
+
+    #[test]
+    fn the_ball_beneath_is_half_a_slab_or_the_whole_depth() {
+        // A slab 2 mm thick; thick ground beside it is asked on its own.
+        let slab = |thick: f64| {
+            let corner = |i: u32| {
+                Point3::new(20.0 * f64::from(i & 1), 20.0 * f64::from(i >> 1 & 1), thick * f64::from(i >> 2))
+            };
+            let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+            let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+            Part::from_mesh(TriangleMesh::new((0..8).map(corner).collect(), triangles).unwrap().0)
+        };
+        let at =
+            |thick: f64, x: f64| ball_beneath(&slab(thick), &Point3::new(x, 10.0, thick), &Vector3::z(), 3.0);
+        assert!((at(2.0, 10.0) - 1.0).abs() < 1e-4);
+        assert!((at(20.0, 10.0) - 3.0).abs() < 1e-12);
+        // Beside the wall at x = 0 the ball touches that instead.
+        assert!((at(20.0, 0.5) - 0.5).abs() < 1e-4);
+    }
+
+    /// A ball that cuts one face of a ridge by a micrometre: the way down along the normal of the other face runs along what
+    /// was cut, far longer than it is deep.
+    #[test]
+    fn a_cut_along_a_sharp_ridge_is_as_deep_as_the_crest_is_lower() {
+        let corners = [
+            [-4.0, 0.0, -4.0],
+            [0.0; 3],
+            [4.0, 0.0, -4.0],
+            [-4.0, 2.0, -4.0],
+            [0.0, 2.0, 0.0],
+            [4.0, 2.0, -4.0],
+        ];
+        let triangles = vec![[0, 1, 3], [1, 4, 3], [1, 2, 4], [2, 5, 4]];
+        let roof =
+            Part::from_mesh(TriangleMesh::new(corners.map(Point3::from).to_vec(), triangles).unwrap().0);
+        let (radius, normal) = (3.0, Vector3::new(-1.0, 0.0, 1.0).normalize());
+        for deep in [0.001, 0.02] {
+            let tip = |y: f64| Point3::new(0.0, y, -radius) + normal * (radius - deep);
+            // What is left of the crest stands so far below it.
+            let up = (radius - deep) / 2f64.sqrt();
+            let truth = (radius * radius - up * up).sqrt() - up;
+            for cell in [0.1, 0.5] {
+                let found =
+                    gouge_of(&roof, &Cutter::ball(2.0 * radius).unwrap(), &[vec![tip(-1.0), tip(3.0)]], cell);
+                let off = (found.max_depth_mm - truth).abs();
+                assert!(
+                    off <= found.error_bound_mm && found.error_bound_mm < 6e-4,
+                    "{deep} {cell}: {truth} {found:?}"
+                );
+            }
+        }
+    }
+}
