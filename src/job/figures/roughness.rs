@@ -82,7 +82,8 @@ fn measure(run: &Run<'_>, cut: &dyn FirstCut, monitor: &dyn Monitor) -> Result<R
         cut,
         inward: reach,
         outward: reach,
-        shallow: scene.tolerance.shallow(),
+        // A profile is what was cut, of whichever face.
+        shallow: f64::INFINITY,
         block,
     };
     // About how far passes are apart.

@@ -4,7 +4,7 @@
 //! are looked for close to the design first, and count only as far as a ball fits inside the part.
 
 use super::{AlongNormal, NormalHit};
-use crate::beneath::{Bounding, thinner};
+use crate::beneath::{Bounding, ball_beneath, thinner};
 use cutter::Solid;
 use geometry::{Aabb, Point3, Vector3};
 use motion::Toolpath;
@@ -128,7 +128,8 @@ pub struct SweptVolume<'a> {
     pub inward: f64,
     /// How far above it, mm.
     pub outward: f64,
-    /// Of cuts that are no deeper than this it is not asked how thick the part is, mm: they hold every limit.
+    /// Of cuts that are no deeper than this it is not asked how thick the part is, mm: they hold every limit. Infinite where the profile of the cut is
+    /// wanted; then no more is left out than what the far side of a thin part has lost.
     pub shallow: f64,
     /// The block that is cut, mm.
     pub block: Aabb,
@@ -182,6 +183,9 @@ impl AlongNormal for SweptVolume<'_> {
         let is_near = found.deviation > -close;
         if is_near && -found.deviation <= self.shallow {
             return Some(found);
+        }
+        if self.shallow.is_infinite() {
+            return look(ball_beneath(self.part, point, normal, self.inward));
         }
         let depth = if is_near { -found.deviation } else { self.inward };
         let bounding = Bounding { counts: &|_| true, walls: true };

@@ -19,7 +19,7 @@ fn of(part: &Part, path: &Toolpath, interval: f64) -> RoughnessFigures {
         cut: &by_rays,
         inward: 1.0,
         outward: 1.0,
-        shallow: 1e-6,
+        shallow: f64::INFINITY,
         block: Aabb { min: Point3::new(-1e3, -1e3, -1e3), max: Point3::new(1e3, 1e3, 1e3) },
     };
     roughness(part, ball, path, &cut, interval, &Silent).unwrap()
