@@ -5,6 +5,7 @@
 
 use super::{AlongNormal, NormalHit};
 use crate::beneath::{Bounding, ball_beneath, thinner};
+use crate::figures::NUMERICAL_FLOOR;
 use cutter::Solid;
 use geometry::{Aabb, Point3, Vector3};
 use motion::Toolpath;
@@ -161,7 +162,11 @@ impl SweptVolume<'_> {
         loop {
             depth = depth.min(most);
             let hit = self.cut.first_cut(point, out, [-depth, self.outward], near)?;
-            if hit.deviation > -depth || depth >= most {
+            // What is left beyond the part is no part of the ridge.
+            let left = point + out * hit.deviation;
+            let is_left = hit.deviation > -depth && self.part.closest_point(&left).1 <= NUMERICAL_FLOOR;
+            if is_left || depth >= most {
+                let hit = if is_left { hit } else { NormalHit { deviation: -most, ..hit } };
                 return Some(NormalHit { deviation: hit.deviation.min(0.0), direction: Some(*out), ..hit });
             }
             depth *= DEEPER;
@@ -201,7 +206,7 @@ impl AlongNormal for SweptVolume<'_> {
             None => {
                 let hit = look(thin.radius)?;
                 // All of that: it grows no faster than the distance from where the sides meet.
-                let is_all = hit.deviation <= -thin.radius;
+                let is_all = hit.deviation <= -thin.radius && !thin.is_blunt(normal);
                 Some(if is_all { NormalHit { direction: Some(hit.normal), ..hit } } else { hit })
             }
         }

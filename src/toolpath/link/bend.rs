@@ -5,8 +5,8 @@
 //! With tangents twice as long as the ends lie apart, a turn between two parallel passes is nearly a half
 //! circle, as cubics go; where the ends lie farther apart than passes do, tangents stop growing, and the
 //! way between two turns becomes straight. With shorter tangents the way is shorter and the machine slower in its turns: the bend
-//! that takes the least time is taken, as far as the plan view tells before the cutter is dropped along it. Heights come from dropping the cutter, so that a link can
-//! never cut deeper into the part than its chords, and never raises what stands beside it.
+//! that takes the least time is taken, as far as the plan view tells before the cutter is dropped along it. Heights come from
+//! dropping the cutter, so that a link can never cut deeper into the part than its chords, and never raises what stands beside it.
 
 use crate::moves::chord::{Watch, reduce, sample_within_chord};
 use crate::surface::border::Border;
