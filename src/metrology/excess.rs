@@ -109,7 +109,10 @@ impl ExcessSearch<'_> {
         });
         let known = if region.max_mm > ridge.max_mm { region } else { ridge };
         monitor.start("looking for the highest material", 0);
-        let open = self.open(samples, known.max_mm.min(limits.scallop), &|_| true, monitor)?;
+        // Where nothing is known to stand above the limit, all that may has to be divided in any case.
+        let is_divided = known.max_mm < limits.scallop && !self.inspection.is_first_look;
+        let divided = if is_divided { limits.scallop } else { f64::INFINITY };
+        let open = self.open(samples, [known.max_mm.min(limits.scallop), divided], &|_| true, monitor)?;
         // Moves that no cell saw, as they are found.
         let mut unseen = Vec::new();
         let mut sought = |known, kind| self.highest(&open, known, kind, &mut unseen, monitor);
@@ -172,7 +175,7 @@ impl ExcessSearch<'_> {
     ) -> Result<Vec<RidgePlace>, Cancelled> {
         monitor.start("looking for high material", 0);
         let high = self.inspection.limits.scallop - 2.0 * ROUNDING;
-        let open = self.open(samples, high, among, monitor)?;
+        let open = self.open(samples, [high, f64::INFINITY], among, monitor)?;
         // What is left out comes to light when all is measured.
         let most = (MOST_AT_FIRST / open.squares.len().max(1)).max(1);
         self.high_places(&open.squares, high, most, &[], monitor)
@@ -237,11 +240,12 @@ impl ExcessSearch<'_> {
     }
 
     /// The squares of cells, `among` those asked for, that may hold more than `known`, mm: those whose own move leaves more at a
-    /// corner, those beside the part's border, and those whose centre cannot speak for them.
+    /// corner, those beside the part's border, and those whose centre cannot speak for them. What may hold more than `divided`, mm, is
+    /// divided once.
     fn open(
         &self,
         samples: &[Sample],
-        known: f64,
+        [known, divided]: [f64; 2],
         among: &(dyn Fn(usize) -> bool + Sync),
         monitor: &dyn Monitor,
     ) -> Result<Promising, Cancelled> {
@@ -257,15 +261,25 @@ impl ExcessSearch<'_> {
                     || if on { f64::from(samples[k].top) > known } else { beside_part(grid, samples, i, j) };
                 among(k) && (fine[k].load(Ordering::Relaxed) || may_hold())
             });
-            let squares = looked_at.filter_map(|i| {
-                let (centre, half) = (grid.centre(i, j), 0.5 * grid.cell);
-                match patches.held(centre, half) {
-                    Held::Nothing => None,
-                    Held::Unknown => Some(Square { possible: patches.most(), centre, half }),
-                    Held::Some { possible, .. } => Some(Square { possible, centre, half }),
+            let bounded = |square: Square| {
+                let possible = match patches.held(square.centre, square.half) {
+                    Held::Nothing => return None,
+                    Held::Unknown => patches.most(),
+                    Held::Some { possible, .. } => possible,
+                };
+                let possible = possible.min(square.possible);
+                (possible > known).then_some(Square { possible, ..square })
+            };
+            let whole = |i| Square { possible: f64::INFINITY, centre: grid.centre(i, j), half: 0.5 * grid.cell };
+            let mut squares = Vec::new();
+            for square in looked_at.filter_map(|i| bounded(whole(i))) {
+                if square.possible > divided {
+                    squares.extend(square.quarters().into_iter().filter_map(bounded));
+                } else {
+                    squares.push(square);
                 }
-            });
-            Ok(squares.filter(|square| square.possible > known).collect::<Vec<_>>())
+            }
+            Ok(squares)
         };
         // Band by band, so that there are never many more squares than will be divided.
         let most = self.most_places().min(self.inspection.most_squares);
