@@ -109,10 +109,11 @@ impl ExcessSearch<'_> {
         });
         let known = if region.max_mm > ridge.max_mm { region } else { ridge };
         monitor.start("looking for the highest material", 0);
-        // Where nothing is known to stand above the limit, all that may has to be divided in any case.
-        let is_divided = known.max_mm < limits.scallop && !self.inspection.is_first_look;
-        let divided = if is_divided { limits.scallop } else { f64::INFINITY };
-        let open = self.open(samples, [known.max_mm.min(limits.scallop), divided], &|_| true, monitor)?;
+        // Where nothing is known to stand above the limit, all that may has to be looked at closer, and crowds out what does.
+        let is_closer = known.max_mm < limits.scallop && !self.inspection.is_first_look;
+        let closer_above = if is_closer { limits.scallop } else { f64::INFINITY };
+        let open =
+            self.open(samples, [known.max_mm.min(limits.scallop), closer_above], &|_| true, monitor)?;
         // Moves that no cell saw, as they are found.
         let mut unseen = Vec::new();
         let mut sought = |known, kind| self.highest(&open, known, kind, &mut unseen, monitor);
@@ -240,12 +241,12 @@ impl ExcessSearch<'_> {
     }
 
     /// The squares of cells, `among` those asked for, that may hold more than `known`, mm: those whose own move leaves more at a
-    /// corner, those beside the part's border, and those whose centre cannot speak for them. What may hold more than `divided`, mm, is
-    /// divided once.
+    /// corner, those beside the part's border, and those whose centre cannot speak for them. What may hold more than is `closer_above`, mm,
+    /// is looked at closer.
     fn open(
         &self,
         samples: &[Sample],
-        [known, divided]: [f64; 2],
+        [known, closer_above]: [f64; 2],
         among: &(dyn Fn(usize) -> bool + Sync),
         monitor: &dyn Monitor,
     ) -> Result<Promising, Cancelled> {
@@ -270,16 +271,17 @@ impl ExcessSearch<'_> {
                 let possible = possible.min(square.possible);
                 (possible > known).then_some(Square { possible, ..square })
             };
-            let whole = |i| Square { possible: f64::INFINITY, centre: grid.centre(i, j), half: 0.5 * grid.cell };
-            let mut squares = Vec::new();
-            for square in looked_at.filter_map(|i| bounded(whole(i))) {
-                if square.possible > divided {
-                    squares.extend(square.quarters().into_iter().filter_map(bounded));
-                } else {
-                    squares.push(square);
+            let whole =
+                |i| Square { possible: f64::INFINITY, centre: grid.centre(i, j), half: 0.5 * grid.cell };
+            // As low as its quarters show; none where they hold nothing.
+            let closer = |square: Square| {
+                if square.possible <= closer_above {
+                    return Some(square);
                 }
-            }
-            Ok(squares)
+                let possible = square.quarters().into_iter().filter_map(bounded).map(|part| part.possible);
+                possible.max_by(f64::total_cmp).map(|possible| Square { possible, ..square })
+            };
+            Ok(looked_at.filter_map(|i| closer(bounded(whole(i))?)).collect::<Vec<_>>())
         };
         // Band by band, so that there are never many more squares than will be divided.
         let most = self.most_places().min(self.inspection.most_squares);

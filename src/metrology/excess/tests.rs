@@ -78,13 +78,24 @@ fn path(part: &Part, cutter: &Cutter, angle: f64, step: f64, lift: f64) -> Toolp
 }
 
 fn measured(part: &Part, cutter: &Cutter, path: &Toolpath, cell: f64) -> Measurement {
+    measured_holding(1 << 20, part, cutter, path, cell)
+}
+
+/// With no more than so many squares at a time.
+fn measured_holding(
+    most_squares: usize,
+    part: &Part,
+    cutter: &Cutter,
+    path: &Toolpath,
+    cell: f64,
+) -> Measurement {
     let grid = Grid::covering(&part.bounds(), cell, 64, 1 << 30).unwrap();
     let cut = cut_reference(&ZMap::block(grid, TOP), cutter, path, &Silent).unwrap();
     let asked = Asked {
         error_bound: 5e-4,
         stock_top: TOP,
         most_cells: 1 << 20,
-        most_squares: 1 << 20,
+        most_squares,
         is_first_look: false,
         borders: true,
     };
@@ -159,6 +170,16 @@ fn holds(
     let all = found.reached.at_most().max(found.unreached.at_most());
     prop_assert!(all >= truth - 1e-9, "{truth} {found:?}");
     Ok(())
+}
+
+/// Ridges that come near the limit everywhere are told from it though few squares can be held: what may stand above it is looked at
+/// closer while it is collected.
+#[test]
+fn few_squares_are_enough_where_all_ridges_hold() {
+    let (part, cutter) = (part(4), Cutter::ball(6.0).unwrap());
+    let path = path(&part, &cutter, 0.0, 2.0 / 4.5, 0.0);
+    let found = measured_holding(128, &part, &cutter, &path, 0.2).excess.reached;
+    assert!(found.max_mm > 0.0094 && found.at_most() < LIMITS.scallop, "{found:?}");
 }
 
 /// A ridge whose foot along the normal lies beyond the border is none of the part's.
