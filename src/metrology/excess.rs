@@ -109,7 +109,7 @@ impl ExcessSearch<'_> {
         });
         let known = if region.max_mm > ridge.max_mm { region } else { ridge };
         monitor.start("looking for the highest material", 0);
-        // Where nothing is known to stand above the limit, all that may has to be looked at closer, and crowds out what does.
+        // Where nothing is known to stand above the limit, all that may has to be divided to tell, and crowds out what does.
         let is_closer = known.max_mm < limits.scallop && !self.inspection.is_first_look;
         let closer_above = if is_closer { limits.scallop } else { f64::INFINITY };
         let open =
@@ -241,8 +241,8 @@ impl ExcessSearch<'_> {
     }
 
     /// The squares of cells, `among` those asked for, that may hold more than `known`, mm: those whose own move leaves more at a
-    /// corner, those beside the part's border, and those whose centre cannot speak for them. What may hold more than is `closer_above`, mm,
-    /// is looked at closer.
+    /// corner, those beside the part's border, and those whose centre cannot speak for them. Those that may hold more than
+    /// `closer_above`, mm, are bounded by their quarters.
     fn open(
         &self,
         samples: &[Sample],

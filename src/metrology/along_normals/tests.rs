@@ -11,6 +11,12 @@ use work::monitor::Silent;
 const RADIUS: f64 = 3.0;
 const LIMITS: Limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.001 };
 
+/// What is cut of a block far larger than the part, looked for as far as `reach`, mm, on both sides of it.
+fn swept<'a>(part: &'a Part, cut: &'a dyn FirstCut, reach: f64) -> SweptVolume<'a> {
+    let block = Aabb { min: Point3::new(-1e3, -1e3, -1e3), max: Point3::new(1e3, 1e3, 1e3) };
+    SweptVolume { part, cut, inward: reach, outward: reach, shallow: 1e-6, block }
+}
+
 /// All moves of a ball, one by one: steps as long as the distance.
 struct BruteForce<'a>(&'a Toolpath);
 
@@ -204,7 +210,7 @@ fn what_was_never_cut_stands_as_high_as_the_stock() {
     for (top, height, most) in [(0.3, 0.3, 0.301), (0.9, 0.9, 0.901), (2.5, 1.0, 2.501)] {
         let mut block = part.bounds();
         block.max.z = top;
-        let cut = SweptVolume { part: &part, cut: &by_rays, inward: 1.0, outward: 1.0, shallow: 1e-6, block };
+        let cut = SweptVolume { block, ..swept(&part, &by_rays, 1.0) };
         let (measured, _) =
             measure_along_normals(&part, &ball, &path, &cut, 0.1, &limits, 1e-4, None, &Silent).unwrap();
         let (found, bound) = (measured.uncut.max_height_mm, measured.uncut.error_bound_mm);
@@ -225,14 +231,7 @@ fn a_cut_beside_the_border_of_a_sheet_is_as_deep_as_it_is_far_from_its_wall() {
         let path = path(&along_x(&[[deep - RADIUS, -RADIUS]]));
         let rays = Rays::new(&path, &solid, &Silent).unwrap();
         let by_rays = RaysCut { rays: &rays, path: &path, solid: &solid };
-        let cut = SweptVolume {
-            part: &part,
-            cut: &by_rays,
-            inward: 1.0,
-            outward: 1.0,
-            shallow: 1e-6,
-            block: Aabb { min: Point3::new(-1e3, -1e3, -1e3), max: Point3::new(1e3, 1e3, 1e3) },
-        };
+        let cut = swept(&part, &by_rays, 1.0);
         let (found, _) =
             measure_along_normals(&part, &ball, &path, &cut, 0.1, &LIMITS, 1e-3, None, &Silent).unwrap();
         let gouge = &found.gouge;
@@ -271,17 +270,9 @@ fn a_dome_has_the_scallops_of_a_circle_also_where_it_is_steep() {
     let solid = Solid::of_cutter(&ball, None);
     let rays = Rays::new(&path, &solid, &Silent).unwrap();
     let by_rays = RaysCut { rays: &rays, path: &path, solid: &solid };
-    let cut = SweptVolume {
-        part: &part,
-        cut: &by_rays,
-        inward: 1.0,
-        outward: 1.0,
-        shallow: 1e-6,
-        block: Aabb { min: Point3::new(-1e3, -1e3, -1e3), max: Point3::new(1e3, 1e3, 1e3) },
-    };
-    let limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.001 };
+    let cut = swept(&part, &by_rays, 1.0);
     let (measured, map) =
-        measure_along_normals(&part, &ball, &path, &cut, 0.25, &limits, 5e-4, None, &Silent).unwrap();
+        measure_along_normals(&part, &ball, &path, &cut, 0.25, &LIMITS, 5e-4, None, &Silent).unwrap();
     let exact = ball_scallop_height(RADIUS, -1.0 / rho, step * rho).unwrap();
     let (max, p50) = (measured.scallop.max_mm.unwrap(), measured.scallop.p50_mm.unwrap());
     // Chords of 240 a turn lie up to 1.1 µm inside the greatest ring.
@@ -319,14 +310,7 @@ fn by_both(
     let limits = Limits { scallop: 0.02, gouge: 0.005, uncut: 0.05, chord: 0.001 };
     let cuts: [&dyn FirstCut; 2] = [&by_rays, &by_voxels];
     cuts.map(|cut| {
-        let cut = SweptVolume {
-            part,
-            cut,
-            inward: reach,
-            outward: reach,
-            shallow: 1e-6,
-            block: Aabb { min: Point3::new(-1e3, -1e3, -1e3), max: Point3::new(1e3, 1e3, 1e3) },
-        };
+        let cut = swept(part, cut, reach);
         measure_along_normals(part, cutter, &path, &cut, 0.4, &limits, 1e-3, None, &Silent).unwrap()
     })
 }
