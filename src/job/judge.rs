@@ -1,7 +1,7 @@
 //! The rule by which a toolpath passes: every figure, with the bound of its error, within its limit.
 //!
 //! Each limit is a [`Claim`]. It holds where figure and bound lie within it, is violated where the figure less its bound
-//! exceeds it, and is undecided otherwise; coarser cells widen bounds, so they may turn an answer into no answer and never
+//! exceeds it, or what is there for certain does, and is undecided otherwise; coarser cells widen bounds, so they may turn an answer into no answer and never
 //! into the other one. The limits of the measured surface:
 //!
 //! - scallop: no ridge and no remnant along a border exceeds the scallop tolerance times the factor that the scene allows,
@@ -64,7 +64,8 @@ fn gouge(measured: &Measurement, limits: &Limits, program: &str) -> Claim {
 fn uncut(measured: &Measurement, limits: &Limits) -> Claim {
     let figures = &measured.uncut;
     let regions = Bounded::new(figures.max_height_mm, figures.error_bound_mm);
-    let Bounded { max_mm: height, error_bound_mm: bound, .. } = regions.or(&measured.excess.unreached);
+    let all = regions.or(&measured.excess.unreached);
+    let Bounded { max_mm: height, error_bound_mm: bound, .. } = all;
     let limit = micrometres(Some(limits.uncut));
     let mut text = if height > 0.0 {
         format!("uncut material {} µm high (limit {limit})", with_bound(Some(height), Some(bound)))
@@ -75,11 +76,8 @@ fn uncut(measured: &Measurement, limits: &Limits) -> Claim {
         let others = others(figures.region_count);
         text += &format!(" over {:.3} mm² at {}{others}", figures.area_mm2, place(worst.at_mm));
     }
-    Claim {
-        measured: known(measured, height),
-        ..length("uncut", Gravity::Finish, limits.uncut, height, bound)
-    }
-    .told(text)
+    text += &for_certain(&all, limits.uncut);
+    Claim { measured: known(measured, height), ..claim("uncut", limits.uncut, &all) }.told(text)
 }
 
 /// What of the cut surface answers to the scallop limit: the highest ridge, and the highest remnant along a border.
@@ -102,16 +100,27 @@ fn highest(measured: &Measurement, limits: &Limits, rule: &ScallopRule) -> Claim
         _ => "the highest scallop or remnant beside a border",
     };
     let text = format!(
-        "{what} is {} µm (limit {}){}",
+        "{what} is {} µm (limit {}){}{}",
         with_bound(Some(all.max_mm), Some(all.error_bound_mm)),
         micrometres(Some(limit)),
-        all.at_mm.map_or(String::new(), |at| format!(" at {}", place(at)))
+        all.at_mm.map_or(String::new(), |at| format!(" at {}", place(at))),
+        for_certain(&all, limit)
     );
-    Claim {
-        measured: known(measured, all.max_mm),
-        ..length("scallop", Gravity::Finish, limit, all.max_mm, all.error_bound_mm)
+    Claim { measured: known(measured, all.max_mm), ..claim("scallop", limit, &all) }.told(text)
+}
+
+/// That what stands on the surface holds a limit, mm.
+fn claim(what: &'static str, limit: f64, highest: &Bounded) -> Claim {
+    let at_least = Some(highest.at_least_mm).filter(|least| *least > 0.0);
+    Claim { at_least, ..length(what, Gravity::Finish, limit, highest.max_mm, highest.error_bound_mm) }
+}
+
+/// What stands above a limit for certain, where figure and bound do not say so.
+fn for_certain(highest: &Bounded, limit: f64) -> String {
+    if highest.max_mm - highest.error_bound_mm > limit || highest.at_least_mm <= limit {
+        return String::new();
     }
-    .told(text)
+    format!("; {} µm stand for certain", micrometres(Some(highest.at_least_mm)))
 }
 
 /// The share of the ridge length above the target, where the scene lets some of it be.

@@ -100,6 +100,9 @@ const MOST: usize = 2_000_000;
 /// first ones would have ruled out.
 const BATCH: usize = 256;
 
+/// Values of a batch that are asked whether they stand, in vain: what disproved them changes the next batch.
+const MOST_DISPROVED: usize = 16;
+
 /// A square whose centre and corners lie off the part is divided until it is this share of the first one.
 const OFF_PART_SHARE: f64 = 1.0 / 16.0;
 
@@ -170,17 +173,19 @@ pub(super) fn greatest(
         let found = at(centre, half).map(|v| (centre, v)).or_else(|| (0..4).find_map(corner));
         found.or((half > least).then_some(unknown))
     };
-    search(squares, known, &|_| asked, Effort { places: MOST, squares: held }, &inside, monitor)
+    search(squares, known, &|_| asked, Effort { places: MOST, squares: held }, &inside, &|_, _| true, monitor)
 }
 
 /// As [`greatest`], with `most` effort; `asked` tells how closely a greatest value is to be known. `inside` tells what the square around a
-/// centre with a given half side holds, and at which of its places; `None` where it holds nothing.
+/// centre with a given half side holds, and at which of its places; `None` where it holds nothing. A value that would be the greatest counts
+/// only where `stands` says so; what it says may change `inside` for squares that are looked at later.
 pub(super) fn search(
     squares: Vec<Square>,
     known: f64,
     asked: &dyn Fn(f64) -> f64,
     most: Effort,
     inside: &(dyn Fn(Point2, f64) -> Option<(Point2, Value)> + Sync),
+    stands: &dyn Fn(Point2, f64) -> bool,
     monitor: &dyn Monitor,
 ) -> Result<BoundedGreatest, Cancelled> {
     let mut open = BinaryHeap::from(squares);
@@ -204,9 +209,14 @@ pub(super) fn search(
                 (v.here, place, Square { possible, centre, half })
             }))
         })?;
+        let mut disproved = 0;
         for &(here, at, _) in quarters.iter().flatten() {
-            if here > best {
-                (best, place) = (here, Some(at));
+            if here > best && disproved < MOST_DISPROVED {
+                if stands(at, here) {
+                    (best, place) = (here, Some(at));
+                } else {
+                    disproved += 1;
+                }
             }
         }
         open.extend(

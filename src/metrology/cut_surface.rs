@@ -227,6 +227,7 @@ impl CutSurface<'_> {
 
     /// As [`CutSurface::along_normal`], with further moves that may be lowest between centres.
     pub fn along_normal_with(&self, p: &Point3, n: &Vector3, further: &[u32]) -> Option<Deviation> {
+        let nothing = CutPoint { z: f64::INFINITY, by: NOT_CUT };
         let lower = |lowest: CutPoint, x: f64, y: f64| match self.envelope.lowest(x, y, further) {
             Some((z, by)) if z < lowest.z => CutPoint { z, by },
             _ => lowest,
@@ -243,7 +244,9 @@ impl CutSurface<'_> {
             let at = |x: f64, y: f64| Some(lower(self.lowest_of(&winners, x, y), x, y));
             self.newton(p, n, start, None, &at)
         } else {
-            let at = |x: f64, y: f64| Some(lower(self.near(x, y)?, x, y));
+            let at = |x: f64, y: f64| {
+                Some(lower(self.near(x, y).unwrap_or(nothing), x, y)).filter(|cut| cut.z.is_finite())
+            };
             self.march(p, n, vertical, &at).and_then(|(lo, hi)| self.newton(p, n, start, Some((lo, hi)), &at))
         };
         Some(found.unwrap_or(Deviation {

@@ -15,18 +15,21 @@
 //! by a square; so the part's borders and creases are borders of polygons, and nothing beyond them counts. Squares that may
 //! hold more than is known are divided until none does by more than was asked.
 
+mod every_move;
 mod outline;
 mod patch;
 
 use std::collections::BinaryHeap;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{PoisonError, RwLock};
 
 use super::closer::{Effort, Promising, Square, Value, search};
 use super::figures::{Bounded, ExcessFigures, ExcessKind, Measurement, NUMERICAL_FLOOR, RidgePlace};
 use super::inspection::{Inspection, Sample};
+pub(super) use every_move::EveryMove;
 use geometry::{Node, Point2, Point3};
 use motion::ROUNDING;
-use patch::{Held, LEAST_HALF, Patches};
+use patch::{Held, LEAST_HALF, Patches, STEEPEST, around};
 use sim::Grid;
 use work::monitor::{self, Cancelled, Monitor};
 
@@ -47,8 +50,8 @@ pub(super) struct ExcessSearch<'a> {
     pub inspection: &'a Inspection<'a>,
     /// Height of the stock's flat top, mm.
     pub stock_top: f64,
-    /// The move that cuts lower at a place, though it may have won no cell: then the height there is no figure.
-    pub cut_away_by: &'a (dyn Fn(&Point3) -> Option<u32> + Sync),
+    /// All moves, where heights that one of them cuts away are no figures though it won no cell.
+    pub every_move: Option<&'a EveryMove<'a>>,
 }
 
 /// Of the cells that may hold more than a pass may leave, so many are looked through for such places.
@@ -64,14 +67,8 @@ const HIGH_DIVISIONS: i32 = 6;
 /// Places of such a cell that are looked at in any case.
 const LEAST_LOOKS: usize = 21;
 
-/// What may rise by so many times the size of a square is no slope: a foil stands there.
-const STEEPEST: f64 = 100.0;
-
-/// Searches that are repeated with a move which no cell saw: it is lowest between centres only.
-const MOST_UNSEEN: usize = 24;
-
-/// The same where finer cells follow: these see more of the moves.
-const MOST_UNSEEN_AT_FIRST: usize = 2;
+/// Moves that no cell saw, lowest between centres only, that are asked at every place once they are found.
+const MOST_UNSEEN: usize = 64;
 
 /// Which places count.
 #[derive(Clone, Copy, PartialEq)]
@@ -96,16 +93,17 @@ impl ExcessSearch<'_> {
         let limits = self.inspection.limits;
         let (scallop, uncut) = (&measured.scallop, &measured.uncut);
         // What moves that no cell saw cut away does not stand.
-        let stands = scallop.max_at_mm.filter(|at| (self.cut_away_by)(&Point3::from(*at)).is_none());
+        let stands = scallop.max_at_mm.filter(|at| self.cuts_away(&Point3::from(*at)).is_none());
         let ridge = stands.map_or(Bounded::default(), |at| Bounded {
             at_mm: Some(self.inspection.part.closest_point(&Point3::from(at)).0.point.into()),
-            ..Bounded::new(scallop.max_mm.unwrap_or(0.0), 0.0)
+            ..standing(scallop.max_mm.unwrap_or(0.0))
         });
-        let stands =
-            uncut.regions.first().filter(|region| self.top_is_cut(region.at_mm, region.height_mm).is_none());
+        let stands = uncut.regions.first().filter(|region| {
+            self.cut_away_below([region.at_mm[0], region.at_mm[1]], region.height_mm).is_none()
+        });
         let region = stands.map_or(Bounded::default(), |region| Bounded {
             at_mm: Some(region.at_mm),
-            ..Bounded::new(region.height_mm, 0.0)
+            ..standing(region.height_mm)
         });
         let known = if region.max_mm > ridge.max_mm { region } else { ridge };
         monitor.start("looking for the highest material", 0);
@@ -115,8 +113,8 @@ impl ExcessSearch<'_> {
         let open =
             self.open(samples, [known.max_mm.min(limits.scallop), closer_above], &|_| true, monitor)?;
         // Moves that no cell saw, as they are found.
-        let mut unseen = Vec::new();
-        let mut sought = |known, kind| self.highest(&open, known, kind, &mut unseen, monitor);
+        let unseen = RwLock::default();
+        let sought = |known, kind| self.highest(&open, known, kind, &unseen, monitor);
         let highest = sought(known, Kind::Any)?;
         monitor::check(monitor)?;
         let (reached, unreached) = if highest.at_most() <= limits.scallop {
@@ -131,8 +129,8 @@ impl ExcessSearch<'_> {
             let most = found.at_most();
             let found = if found.max_mm > unreached.max_mm { found } else { region };
             let unreached = Bounded { error_bound_mm: (most - found.max_mm).max(0.0), ..found };
-            // Nothing at all is higher than a ridge, which passes reached.
-            let is_known = highest.max_mm <= ridge.max_mm;
+            // Nothing at all is higher than a ridge, which passes reached, or than another place that they did.
+            let is_known = highest.max_mm <= ridge.max_mm || self.is_reached(&highest);
             (if is_known { highest } else { sought(ridge, Kind::Reached)? }, unreached)
         };
         // Moves that no cell saw came up only after the first search.
@@ -158,6 +156,7 @@ impl ExcessSearch<'_> {
             // Places are found no more closely.
             let high = (1.0 - HIGH_SLACK) * limits.scallop;
             let most = (self.most_places() / squares.len().max(1)).max(LEAST_LOOKS);
+            let unseen = unseen.into_inner().unwrap_or_else(PoisonError::into_inner);
             self.high_places(&squares, high, most, &unseen, monitor)?
         };
         Ok((ExcessFigures { highest, kind, reached, unreached }, high))
@@ -298,7 +297,13 @@ impl ExcessSearch<'_> {
     }
 
     fn patches<'b>(&'b self, least: f64, unseen: &'b [u32]) -> Patches<'b> {
-        Patches { inspection: self.inspection, stock_top: self.stock_top, least, unseen }
+        Patches {
+            inspection: self.inspection,
+            stock_top: self.stock_top,
+            least,
+            unseen,
+            every_move: self.every_move,
+        }
     }
 
     /// How far off the highest place may be, mm: nearer where it is to be told from its limit.
@@ -308,50 +313,56 @@ impl ExcessSearch<'_> {
         if known < limit { asked.min(0.5 * (limit - known)).max(NUMERICAL_FLOOR) } else { asked }
     }
 
-    /// The highest place of a kind in some squares, if it is higher than `known`. Moves that are found to have cut it away are
-    /// added to those that no cell saw, and it is sought again.
+    /// The move that cuts away what stands so high, mm, on the design over a place. A line along a normal may end at the side of what the
+    /// rim of a cutter swept: what stands is looked at just below.
+    fn cut_away_below(&self, [x, y]: [f64; 2], height: f64) -> Option<u32> {
+        let design = self.inspection.part.highest_at(x, y)?;
+        self.cuts_away(&(design.point + design.normal * (height - NUMERICAL_FLOOR)))
+    }
+
+    fn cuts_away(&self, at: &Point3) -> Option<u32> {
+        self.every_move?.cuts_away(at)
+    }
+
+    /// Whether passes came down to the design at the highest place.
+    fn is_reached(&self, highest: &Bounded) -> bool {
+        let Some((at, every_move)) = highest.at_mm.zip(self.every_move) else { return false };
+        let q = Point2::new(at[0], at[1]);
+        let Inspection { part, surface, .. } = *self.inspection;
+        let cut = part
+            .highest_at(q.x, q.y)
+            .and_then(|design| surface.along_normal_with(&design.point, &design.normal, every_move.over(q)));
+        cut.is_some_and(|cut| self.patches(0.0, &[]).reached(q, highest.max_mm, cut.by))
+    }
+
+    /// Whether what stands so high, mm, on a place stands between the end of the part and the rim of a cutter that ends beside it by less
+    /// than a program's rounding.
+    fn is_foil(&self, place: Point2, height: f64) -> bool {
+        /// Other material rises by no more than so many times the way aside.
+        const SLOPE: f64 = 10.0;
+        let beside = around(place, 2.0 * ROUNDING).map(|q| {
+            self.inspection
+                .part
+                .highest_at(q.x, q.y)
+                .map(|_| self.cut_away_below([q.x, q.y], height - SLOPE * 2.0 * ROUNDING).is_some())
+        });
+        beside.contains(&None) && beside.contains(&Some(true))
+    }
+
+    /// The highest place of a kind in some squares, if it is higher than `known`. Moves that are found to have cut away what seemed to be
+    /// the highest are added to those that no cell saw.
     fn highest(
         &self,
         open: &Promising,
         known: Bounded,
         kind: Kind,
-        unseen: &mut Vec<u32>,
+        unseen: &RwLock<Vec<u32>>,
         monitor: &dyn Monitor,
     ) -> Result<Bounded, Cancelled> {
-        let most = if self.inspection.is_first_look { MOST_UNSEEN_AT_FIRST } else { MOST_UNSEEN };
-        loop {
-            let highest = self.highest_seen(open, known, kind, unseen, monitor)?;
-            let found = highest.at_mm.filter(|_| highest.max_mm > known.max_mm);
-            match found.and_then(|at| self.top_is_cut(at, highest.max_mm)) {
-                None => return Ok(highest),
-                Some(by) if unseen.len() < most && !unseen.contains(&by) => unseen.push(by),
-                // Between nothing and this height all is possible.
-                Some(_) => {
-                    let error_bound_mm = highest.error_bound_mm.max(highest.max_mm);
-                    return Ok(Bounded { error_bound_mm, ..highest });
-                }
-            }
-        }
-    }
-
-    /// The move that cuts away what stands so high, mm, on the design over a place. A line along a normal may end at the side of what the
-    /// rim of a cutter swept: what stands is looked at just below.
-    fn top_is_cut(&self, [x, y, _]: [f64; 3], height: f64) -> Option<u32> {
-        let design = self.inspection.part.highest_at(x, y)?;
-        (self.cut_away_by)(&(design.point + design.normal * (height - NUMERICAL_FLOOR)))
-    }
-
-    fn highest_seen(
-        &self,
-        open: &Promising,
-        known: Bounded,
-        kind: Kind,
-        unseen: &[u32],
-        monitor: &dyn Monitor,
-    ) -> Result<Bounded, Cancelled> {
-        let patches = self.patches(known.max_mm, unseen);
         let small = OTHER_KIND_SHARE * 0.5 * self.inspection.grid.cell;
         let at = |centre: Point2, half: f64| {
+            let unseen = unseen.read().unwrap_or_else(PoisonError::into_inner);
+            let patches = self.patches(known.max_mm, &unseen);
             let is_foil =
                 |rises: f64| half < LEAST_HALF && rises > STEEPEST * half && patches.ends_beside(centre);
             let unknown = |place| (place, Value { here: f64::NEG_INFINITY, possible: patches.most() });
@@ -377,13 +388,23 @@ impl ExcessSearch<'_> {
         };
         let squares = open.squares.iter().filter(|square| square.possible > known.max_mm).copied().collect();
         let most = Effort { places: self.most_places(), squares: self.inspection.most_squares };
-        let mut found =
-            search(squares, known.max_mm, &|highest| self.asked(highest, kind), most, &at, monitor)?;
+        let stands = |q: Point2, height: f64| match self.cut_away_below([q.x, q.y], height) {
+            None => !self.is_foil(q, height),
+            Some(by) => {
+                let mut unseen = unseen.write().unwrap_or_else(PoisonError::into_inner);
+                if unseen.len() < MOST_UNSEEN && !unseen.contains(&by) {
+                    unseen.push(by);
+                }
+                false
+            }
+        };
+        let asked = |highest| self.asked(highest, kind);
+        let mut found = search(squares, known.max_mm, &asked, most, &at, &stands, monitor)?;
         found.possible = found.possible.max(open.others);
         let mut highest = match found.greatest {
             Some((height, q)) => {
                 let z = self.inspection.part.highest_at(q.x, q.y).map_or(0.0, |design| design.point.z);
-                Bounded { at_mm: Some([q.x, q.y, z]), ..Bounded::new(height, 0.0) }
+                Bounded { at_mm: Some([q.x, q.y, z]), ..standing(height) }
             }
             None => known,
         };
@@ -430,6 +451,11 @@ impl ExcessSearch<'_> {
         });
         cells
     }
+}
+
+/// What stands so high, mm, as all moves tell.
+fn standing(height: f64) -> Bounded {
+    Bounded { at_least_mm: (height - NUMERICAL_FLOOR).max(0.0), ..Bounded::new(height, 0.0) }
 }
 
 /// Least and greatest of a coordinate.

@@ -186,6 +186,9 @@ pub struct Bounded {
     pub max_mm: f64,
     /// No place is higher than that by more.
     pub error_bound_mm: f64,
+    /// So much stands somewhere for certain, all moves being asked; 0 where that is not known.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub at_least_mm: f64,
     /// Where it stands, if anything does.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at_mm: Option<[f64; 3]>,
@@ -194,7 +197,7 @@ pub struct Bounded {
 impl Bounded {
     /// A height without its place.
     pub fn new(max_mm: f64, error_bound_mm: f64) -> Self {
-        Self { max_mm, error_bound_mm, at_mm: None }
+        Self { max_mm, error_bound_mm, at_least_mm: 0.0, at_mm: None }
     }
 
     /// No place is higher than this, mm.
@@ -207,8 +210,13 @@ impl Bounded {
     pub fn or(&self, other: &Self) -> Self {
         let higher = if other.max_mm > self.max_mm { other } else { self };
         let error_bound_mm = self.at_most().max(other.at_most()) - higher.max_mm;
-        Self { error_bound_mm, ..*higher }
+        Self { error_bound_mm, at_least_mm: self.at_least_mm.max(other.at_least_mm), ..*higher }
     }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 /// What the highest material is.
@@ -327,7 +335,10 @@ impl Measurement {
         let Self { scallop, gouge, uncut, excess, .. } = self;
         let bounds = [&mut gouge.error_bound_mm, &mut uncut.error_bound_mm];
         let highest = [&mut excess.highest, &mut excess.reached, &mut excess.unreached];
-        let highest = highest.map(|bounded| &mut bounded.error_bound_mm);
+        let highest = highest.map(|bounded| {
+            bounded.at_least_mm = (bounded.at_least_mm - by).max(0.0);
+            &mut bounded.error_bound_mm
+        });
         bounds.into_iter().chain(highest).chain(&mut scallop.error_bound_mm).for_each(|bound| *bound += by);
     }
 

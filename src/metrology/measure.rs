@@ -1,7 +1,7 @@
 //! The figures of a cut on heights: the stock's own grid first, then a closer look where something may hide. mm.
 
 use super::cut_surface::CutSurface;
-use super::excess::ExcessSearch;
+use super::excess::{EveryMove, ExcessSearch};
 use super::figures::{
     CloserLook, ExcessFigures, ExcessKind, Limits, Measurement, NUMERICAL_FLOOR, ScallopFigures, UncutFigures,
 };
@@ -114,22 +114,20 @@ pub fn measure_with_walls(
         inspection.cut_borders(&mut measured.gouge, monitor)?;
     }
     let was_doubted = doubt(&mut measured, &surface, part, path, asked);
-    let all: Vec<u32> = (0..path.len() as u32).collect();
-    let cut_away_by = |at: &Point3| {
-        let (z, by) = surface.envelope.lowest(at.x, at.y, &all)?;
-        (z < at.z - NUMERICAL_FLOOR).then_some(by)
-    };
-    let search =
-        ExcessSearch { inspection: &inspection, stock_top: asked.stock_top, cut_away_by: &cut_away_by };
     if !asked.borders {
         measured.excess = ExcessFigures::of_cells(&measured);
         tell_doubt(&mut measured, was_doubted);
         return Ok(measured);
     }
+    let mut around = part.bounds();
+    around.max.z = around.max.z.max(asked.stock_top);
+    let every_move = EveryMove::new(&surface, cutters, &around);
+    let search =
+        ExcessSearch { inspection: &inspection, stock_top: asked.stock_top, every_move: Some(&every_move) };
     let (excess, high) = search.run(&found.samples, &measured, monitor)?;
     measured.excess = excess;
     measured.above.extend(high);
-    drop_disproved_ridges(&mut measured, &found.ridges);
+    drop_disproved_ridges(&mut measured, &found.ridges, was_doubted.ridge);
     raise_highest_ridge(&mut measured, &inspection, path);
     let highest = measured.excess.highest.max_mm;
     measured.deviation.max_mm = measured.deviation.max_mm.map(|max| max.max(highest));
@@ -143,8 +141,9 @@ pub fn measure_with_walls(
 
 /// Leaves ridges out that stand above the highest material: moves that no cell saw cut them away. The others stand no higher
 /// than it.
-fn drop_disproved_ridges(measured: &mut Measurement, ridges: &Ridges) {
+fn drop_disproved_ridges(measured: &mut Measurement, ridges: &Ridges, is_doubted: bool) {
     let (highest, scallop) = (measured.excess.highest.at_most(), &mut measured.scallop);
+    let before = scallop.max_at_mm;
     if scallop.max_mm.is_some_and(|ridge| ridge > highest) {
         measured.ridge_samples.retain(|[height, _]| f64::from(*height) <= highest);
         let known = |figure: Option<f64>| figure.filter(|height| *height <= highest);
@@ -164,6 +163,9 @@ fn drop_disproved_ridges(measured: &mut Measurement, ridges: &Ridges) {
         if known.contains(&None) {
             scallop.reason = Some("cells are too coarse to tell the ridges apart".into());
         }
+    }
+    if is_doubted && scallop.max_at_mm == before {
+        return;
     }
     let most = (highest - scallop.max_mm.unwrap_or(0.0)).max(NUMERICAL_FLOOR);
     scallop.error_bound_mm = scallop.error_bound_mm.map(|bound| bound.min(most));
@@ -216,6 +218,13 @@ fn raise_highest_ridge(measured: &mut Measurement, inspection: &Inspection<'_>, 
     }
 }
 
+/// Which figures stand where a move that no cell saw cuts away.
+#[derive(Clone, Copy)]
+struct Doubted {
+    ridge: bool,
+    region: bool,
+}
+
 /// Where a move that no cell saw cuts the highest scallop or uncut place away, the figure is too great by
 /// an unknown amount: its bound becomes the figure itself. All moves are asked at the two places. Whether that is so.
 fn doubt(
@@ -224,7 +233,7 @@ fn doubt(
     part: &Part,
     path: &Toolpath,
     asked: &Asked,
-) -> bool {
+) -> Doubted {
     let all: Vec<u32> = (0..path.len() as u32).collect();
     let cut_away = |at: &Point3| surface.height_of(&all, at) < at.z - asked.error_bound;
     let (scallop, uncut) = (&mut measured.scallop, &mut measured.uncut);
@@ -238,15 +247,15 @@ fn doubt(
     if of_region {
         uncut.error_bound_mm = uncut.error_bound_mm.max(uncut.max_height_mm);
     }
-    of_ridge || of_region
+    Doubted { ridge: of_ridge, region: of_region }
 }
 
 /// Says so where nothing else told the figures that were doubted.
-fn tell_doubt(measured: &mut Measurement, was_doubted: bool) {
+fn tell_doubt(measured: &mut Measurement, was_doubted: Doubted) {
     let (scallop, uncut) = (&measured.scallop, &measured.uncut);
     let is_vacuous = |max: f64, bound: f64| max > 0.0 && bound >= max;
     let ridge = scallop.max_mm.zip(scallop.error_bound_mm);
-    if was_doubted
+    if (was_doubted.ridge || was_doubted.region)
         && (is_vacuous(uncut.max_height_mm, uncut.error_bound_mm)
             || ridge.is_some_and(|(max, bound)| is_vacuous(max, bound)))
     {

@@ -93,8 +93,7 @@ pub(super) fn places_above(
     let inspection = on_cells(part, cutters, limits, NUMERICAL_FLOOR, &surface, &meetings);
     let inspection = Inspection { most_squares, ..inspection };
     let samples = inspection.samples(monitor)?;
-    let nothing_cuts_away = |_: &Point3| None;
-    let search = ExcessSearch { inspection: &inspection, stock_top, cut_away_by: &nothing_cuts_away };
+    let search = ExcessSearch { inspection: &inspection, stock_top, every_move: None };
     // A ridge rises by little from a line of cells to the next, but where it ends.
     let ridges = RidgeFinder::new(&inspection, path).find(&|k| samples[k].deviation, monitor)?;
     let grid = cut.grid;

@@ -12,7 +12,7 @@ pub enum Verdict {
     /// A limit lies within the bound of its figure, or a figure is missing.
     #[serde(rename = "undecided")]
     Undecided,
-    /// Proven not to hold: a figure less its bound exceeds its limit.
+    /// Proven not to hold: a figure less its bound exceeds its limit, or what is there for certain does.
     #[serde(rename = "fail")]
     Fail,
     /// There is no path to be judged.
@@ -63,6 +63,8 @@ pub struct Claim {
     pub measured: Option<f64>,
     /// The true value differs from the figure by no more.
     pub error_bound: f64,
+    /// The true value is no less, where that is known beside figure and bound.
+    pub at_least: Option<f64>,
     /// The finding in a sentence, with its place.
     pub text: String,
     /// What would decide it, if it is undecided.
@@ -76,7 +78,17 @@ impl Claim {
     /// That a length, mm, is within its limit.
     pub fn length(what: &'static str, gravity: Gravity, limit: f64, measured: f64, bound: f64) -> Self {
         let (measured, text) = (Some(measured), String::new());
-        Self { what, gravity, unit: "mm", limit, measured, error_bound: bound, text, decided_by: FINER }
+        Self {
+            what,
+            gravity,
+            unit: "mm",
+            limit,
+            measured,
+            error_bound: bound,
+            at_least: None,
+            text,
+            decided_by: FINER,
+        }
     }
 
     /// The same with its sentence.
@@ -89,7 +101,9 @@ impl Claim {
         let Some(measured) = self.measured else { return Verdict::Undecided };
         if measured + self.error_bound <= self.limit {
             Verdict::Pass
-        } else if measured - self.error_bound > self.limit {
+        } else if measured - self.error_bound > self.limit
+            || self.at_least.is_some_and(|least| least > self.limit)
+        {
             Verdict::Fail
         } else {
             Verdict::Undecided
@@ -120,6 +134,9 @@ impl Serialize for Claim {
         map.serialize_entry(&keyed("measured"), &measured)?;
         let bound = measured.map(|_| self.error_bound).filter(|bound| bound.is_finite());
         map.serialize_entry(&keyed("error_bound"), &bound)?;
+        if let Some(least) = self.at_least {
+            map.serialize_entry(&keyed("at_least"), &least)?;
+        }
         map.serialize_entry("text", &self.sentence())?;
         if bound.is_none() {
             let endless = self.measured == Some(f64::INFINITY);

@@ -126,6 +126,7 @@ fn nothing_judged(areas: &CoverageFigures) -> Option<Claim> {
         measured: None,
         error_bound: f64::INFINITY,
         text: "the tool faces nothing of the part's surface".to_owned(),
+        at_least: None,
         decided_by: "turn the part, or tilt the tool",
     })
 }

@@ -73,7 +73,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
 /// What seems violated may not be: other tools may have cut there.
 pub(crate) fn doubt(claims: &mut [Claim], decided_by: &'static str) {
     for claim in claims.iter_mut().filter(|claim| claim.verdict() == Verdict::Fail) {
-        (claim.error_bound, claim.decided_by) = (f64::INFINITY, decided_by);
+        (claim.error_bound, claim.at_least, claim.decided_by) = (f64::INFINITY, None, decided_by);
     }
 }
 

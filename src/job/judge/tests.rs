@@ -144,6 +144,25 @@ fn a_remnant_beside_a_border_answers_to_the_scallop_limit() {
     assert_eq!(not_held(&measured, &STRICT), [("uncut", Verdict::Fail)]);
 }
 
+/// A place that no move cuts away decides by itself, however much more may stand elsewhere; cells alone do not.
+#[test]
+fn what_stands_for_certain_fails_under_an_open_bound() {
+    let mut measured = measurement(0.0);
+    let [low, high] = [0.009, 0.02];
+    measured.excess.reached = Bounded { at_least_mm: high, ..Bounded::new(high, 3.0) };
+    measured.excess.unreached = Bounded { at_least_mm: low, ..Bounded::new(low, 3.0) };
+    let all = judged(&measured, &STRICT).1;
+    let of = |what: &str| all.iter().find(|claim| claim.what == what).unwrap();
+    assert_eq!([of("scallop").verdict(), of("uncut").verdict()], [Verdict::Fail, Verdict::Undecided]);
+    assert!(of("scallop").text.ends_with("; 20.0 µm stand for certain"), "{:?}", of("scallop"));
+    assert_eq!(serde_json::to_value(of("scallop")).unwrap()["at_least_mm"], high);
+    measured.excess.reached.at_least_mm = 0.0;
+    assert_eq!(
+        not_held(&measured, &STRICT),
+        [("uncut", Verdict::Undecided), ("scallop", Verdict::Undecided)]
+    );
+}
+
 #[test]
 fn uncut_material_is_told_with_its_place() {
     let mut measured = measurement(0.0);

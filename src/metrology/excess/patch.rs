@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use super::every_move::EveryMove;
 use super::meets;
 use super::outline::{MOST_CORNERS, Outline, cut_off, has_area, middle, outlines, overlaps};
 use crate::cut_surface::CutSurface;
@@ -21,6 +22,21 @@ const MOST_MOVES: usize = 5;
 
 /// Moves that are followed along a path to the lowest one. Cells show one of so many short ones.
 const MOST_BESIDE: usize = 16;
+
+/// Where more moves than this may cut, not all of them are asked: each takes some 5 ns, in hundreds of thousands of squares.
+const MOST_ASKED: usize = 4096;
+
+/// Of these the lowest are asked whether they pass all of a square.
+const MOST_LOW: usize = 64;
+
+/// Heights above a wall's, in sizes of the square along the normal, that are looked at for free space beyond it.
+const BEYOND_WALL: [f64; 3] = [2.0, 8.0, 32.0];
+
+/// Normals that lean less, by their part in the plan, lead over walls too late.
+const LEAST_ASIDE: f64 = 1e-3;
+
+/// What may rise by so many times the size of a square is no slope: a wall stands there, or a foil.
+pub(super) const STEEPEST: f64 = 100.0;
 
 /// In squares with half sides below this share of a cell all triangles are looked at.
 const CORNER_SHARE: f64 = 1.0 / 256.0;
@@ -83,6 +99,8 @@ pub(super) struct Patches<'a> {
     pub least: f64,
     /// Moves that no cell shows.
     pub unseen: &'a [u32],
+    /// All moves.
+    pub every_move: Option<&'a EveryMove<'a>>,
 }
 
 impl Patches<'_> {
@@ -96,7 +114,7 @@ impl Patches<'_> {
         for &t in &triangles {
             for outline in outlines(self.inspection.part, t, centre, half).into_iter().flatten() {
                 let Some(piece) = self.piece(t, outline) else { continue };
-                let Some((possible, here, by)) = self.above(&piece) else {
+                let Some((possible, here, by)) = self.above(&piece, half, small) else {
                     if half < LEAST_HALF && self.ends_beside(centre) {
                         continue;
                     }
@@ -118,12 +136,7 @@ impl Patches<'_> {
 
     /// Whether the part ends within the rounding of a program of a place.
     pub fn ends_beside(&self, place: Point2) -> bool {
-        const AROUND: u32 = 8;
-        (0..AROUND).any(|k| {
-            let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / f64::from(AROUND)).sin_cos();
-            let beside = place + Vector2::new(cos, sin) * (2.0 * ROUNDING);
-            self.inspection.part.highest_at(beside.x, beside.y).is_none()
-        })
+        around(place, 2.0 * ROUNDING).iter().any(|q| self.inspection.part.highest_at(q.x, q.y).is_none())
     }
 
     /// Nothing stands higher than this above the design, mm.
@@ -254,11 +267,67 @@ impl Patches<'_> {
         has_area(&corners[..len]).then_some(Outline { corners, len, is_at_end })
     }
 
-    /// What stands above a piece at most, and what stands on its foot, cut by which move; `None` where that cannot be told.
-    fn above(&self, piece: &Clipped) -> Option<(f64, f64, u32)> {
+    /// What stands above a piece of a square at most, and what stands on its foot, cut by which move; `None` where that cannot be told.
+    /// All moves are asked where those that cells show tell nothing, and in a `small` square where they leave a wall.
+    fn above(&self, piece: &Clipped, half: f64, small: bool) -> Option<(f64, f64, u32)> {
+        let SurfacePoint { point, normal, .. } = &piece.foot;
+        let hidden = self.hidden(point, normal);
+        let shown = self.above_with(piece, half, hidden.clone(), false);
+        let is_wall = |&(possible, here, _): &(f64, f64, u32)| possible > self.wall_over(here, half);
+        if shown.as_ref().is_some_and(|shown| !small || !is_wall(shown)) {
+            return shown;
+        }
+        let lowest = self.lowest_of_all(piece, 0.0);
+        let by_all = self.above_with(piece, half, hidden.iter().copied().chain(lowest).collect(), true);
+        // Each is a bound.
+        let least = |shown: (f64, f64, u32), all: (f64, f64, u32)| (shown.0.min(all.0), all.1, all.2);
+        [shown, by_all].into_iter().flatten().reduce(least)
+    }
+
+    /// What stands higher in a square than this, on a foot where so much stands, stands behind a wall.
+    fn wall_over(&self, here: f64, half: f64) -> f64 {
+        here.max(self.least).max(0.0) + STEEPEST * half
+    }
+
+    /// Of all moves the lowest over the foot of a piece that rose to a height, and the lowest of those that pass all of it.
+    fn lowest_of_all(&self, piece: &Clipped, height: f64) -> Vec<u32> {
+        let Some(every_move) = self.every_move else { return Vec::new() };
+        let envelope = &self.inspection.surface.envelope;
+        let q = piece.foot.point.xy() + piece.foot.normal.xy() * height;
+        // What passes above the stock cuts nothing.
+        let over = |&by: &u32| Some((envelope.height(by, q.x, q.y).filter(|z| *z < self.stock_top)?, by));
+        let all = every_move.over(q);
+        if all.len() > MOST_ASKED {
+            return Vec::new();
+        }
+        let mut low: Vec<(f64, u32)> = all.iter().filter_map(over).collect();
+        let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+        if low.len() > MOST_LOW {
+            low.select_nth_unstable_by(MOST_LOW, order);
+            low.truncate(MOST_LOW);
+        }
+        low.sort_unstable_by(order);
+        let corners = piece.corners.iter().zip(&piece.leans).take(piece.len);
+        let passes_all = |by: u32| {
+            corners.clone().all(|(corner, lean)| {
+                let q = corner + lean * height;
+                envelope.height(by, q.x, q.y).is_some()
+            })
+        };
+        let passing = low.iter().skip(1).map(|low| low.1).filter(|by| passes_all(*by)).take(MOST_MOVES);
+        low.first().map(|low| low.1).into_iter().chain(passing).collect()
+    }
+
+    /// As [`Self::above`], by the moves that cells show and some `hidden` ones; beyond walls by `all`.
+    fn above_with(
+        &self,
+        piece: &Clipped,
+        half: f64,
+        mut hidden: Cow<'_, [u32]>,
+        all: bool,
+    ) -> Option<(f64, f64, u32)> {
         let surface = self.inspection.surface;
         let SurfacePoint { point, normal, .. } = &piece.foot;
-        let mut hidden = self.hidden(point, normal);
         let mut here = surface.along_normal_with(point, normal, &hidden)?;
         if here.distance > self.least {
             // Short moves between cells may have cut away what seems to stand so high.
@@ -266,27 +335,52 @@ impl Patches<'_> {
             hidden = Cow::Owned(hidden.iter().copied().chain(beside).collect());
             here = surface.along_normal_with(point, normal, &hidden)?;
         }
-        let upright = piece.leans[..piece.len].iter().all(|lean| lean.norm() < 1e-12);
         // Lower places of the square are of no account.
         let known = here.distance.max(self.least).max(0.0);
+        let free = self.by_moves(piece, known, here.by, &hidden, all);
+        let is_wall = free.is_none_or(|possible| possible > self.wall_over(here.distance, half));
+        let wall = if is_wall { self.beside_wall(piece, half, known, &hidden, all) } else { None };
+        let possible = [free, wall].into_iter().flatten().reduce(f64::min)?;
+        Some((possible.max(known), here.distance, here.by))
+    }
+
+    /// What stands above a piece at most, where so much is `known` to, by the moves that cover all of it.
+    fn by_moves(&self, piece: &Clipped, known: f64, first: u32, hidden: &[u32], all: bool) -> Option<f64> {
+        let upright = piece.leans[..piece.len].iter().all(|lean| lean.norm() < 1e-12);
         // What stands so high stands aside of its place.
-        let moves = self.moves(&(point + normal * known), here.by, &hidden);
-        let over = |reach: f64| {
-            let above = self.over(piece, &moves, [known, reach]);
-            (above + piece.below) / piece.cosine
-        };
+        let mut moves = self.moves(&(piece.foot.point + piece.foot.normal * known), first, hidden);
+        if all {
+            moves.extend(self.lowest_of_all(piece, known));
+        }
+        let over = |reach: f64| self.over(piece, &moves, [known, reach]);
         let mut reach = 1.2 * known + 1e-4;
         // The cut over a place stands aside of it by its height times its lean: heights from the known one to
         // the assumed one are looked at, and the latter must be enough.
         for _ in 0..MOST_REACHES {
             let possible = over(reach);
-            if possible <= reach || upright {
-                let possible = if upright { possible } else { lowered(possible, known, &over) };
-                return Some((possible.max(known), here.distance, here.by));
+            if upright {
+                return Some(possible);
+            }
+            if possible <= reach {
+                return Some(lowered(possible, known, &over));
             }
             reach = 1.5 * possible;
         }
         None
+    }
+
+    /// The rim of a flat leaves a wall, across which no move bounds a square: what is free just beyond it, along all normals of the
+    /// square, bounds what stands below; `None` where none is found.
+    fn beside_wall(&self, piece: &Clipped, half: f64, known: f64, hidden: &[u32], all: bool) -> Option<f64> {
+        let SurfacePoint { point, normal, .. } = &piece.foot;
+        let aside = normal.xy().norm().max(LEAST_ASIDE);
+        BEYOND_WALL.iter().map(|times| known + times * half / aside).find(|&height| {
+            let mut moves = self.moves(&(point + normal * height), NOT_CUT, hidden);
+            if all {
+                moves.extend(self.lowest_of_all(piece, height));
+            }
+            self.over(piece, &moves, [height; 2]) <= height
+        })
     }
 
     /// Moves that no cell may show: those that were found so far, and where passes are nearer to each other than cells, those
@@ -344,8 +438,8 @@ impl Patches<'_> {
         low.into_iter().map(|m| m.1).collect()
     }
 
-    /// Height of the cut above the piece's plane, along its normal, at most: where the polygon comes to when it rises from
-    /// one height to the other, each corner along its own normal.
+    /// Height of the cut above the piece, along its normals, at most: where the polygon comes to when it rises from one height to the
+    /// other, each corner along its own normal.
     fn over(&self, piece: &Clipped, moves: &[u32], heights: [f64; 2]) -> f64 {
         let SurfacePoint { point, normal, .. } = &piece.foot;
         let mut places = [Point2::origin(); 2 * MOST_CORNERS];
@@ -372,7 +466,7 @@ impl Patches<'_> {
                 rows.push(row);
             }
         }
-        least_greatest(&rows, count)
+        (least_greatest(&rows, count) + piece.below) / piece.cosine
     }
 
     /// The stock is nowhere higher between some places, mm.
@@ -383,6 +477,14 @@ impl Patches<'_> {
         let (middle, size) = (low + (high - low) * 0.5, high - low);
         shape.highest_within(middle.x, middle.y, 0.5 * size.x.max(size.y))
     }
+}
+
+/// Places all around one.
+pub(super) fn around(place: Point2, radius: f64) -> [Point2; 8] {
+    std::array::from_fn(|k| {
+        let (sin, cos) = (std::f64::consts::FRAC_PI_4 * k as f64).sin_cos();
+        place + Vector2::new(cos, sin) * radius
+    })
 }
 
 impl Clipped {

@@ -456,3 +456,19 @@ fn what_ends_at_the_side_of_a_cut_was_not_cut_away() {
         }
     }
 }
+
+/// The rim of a flat leaves walls on slopes, and no move covers both of their sides. Bounds close all the same.
+#[test]
+fn bounds_close_across_the_walls_that_flats_leave_on_slopes() {
+    let flat = Cutter::flat(3.0).unwrap();
+    for (shape, angle, step) in
+        [(2, 0.0, 0.3), (2, 0.9, 0.6), (2, 1.5, 1.1), (4, 0.4, 0.3), (4, 0.9, 0.6), (4, 2.3, 0.6)]
+    {
+        let part = part(shape);
+        let path = path(&part, &flat, angle, step, 0.0);
+        let highest = measured(&part, &flat, &path, 0.1).excess.highest;
+        let truth = Brute::new(&part, &flat, &path).highest(80);
+        assert!(truth <= highest.at_most() + 1e-9, "{shape} {angle} {step}: {truth} {highest:?}");
+        assert!(highest.error_bound_mm < 2e-3, "{shape} {angle} {step}: {truth} {highest:?}");
+    }
+}
