@@ -1,8 +1,8 @@
 //! The rule by which a toolpath passes: every figure, with the bound of its error, within its limit.
 //!
 //! Each limit is a [`Claim`]. It holds where figure and bound lie within it, is violated where the figure less its bound
-//! exceeds it, or what is there for certain does, and is undecided otherwise; coarser cells widen bounds, so they may turn an answer into no answer and never
-//! into the other one. The limits of the measured surface:
+//! exceeds it, or what is there for certain does, and is undecided otherwise; coarser cells widen bounds, so they may turn an
+//! answer into no answer and never into the other one. The limits of the measured surface:
 //!
 //! - scallop: no ridge and no remnant along a border exceeds the scallop tolerance times the factor that the scene allows,
 //!   and the share of the ridge length that the scene names does not exceed the tolerance itself;

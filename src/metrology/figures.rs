@@ -186,7 +186,7 @@ pub struct Bounded {
     pub max_mm: f64,
     /// No place is higher than that by more.
     pub error_bound_mm: f64,
-    /// So much stands somewhere for certain, all moves being asked; 0 where that is not known.
+    /// So much stands somewhere for certain: no move cuts it away; 0 where that is not known.
     #[serde(skip_serializing_if = "is_zero")]
     pub at_least_mm: f64,
     /// Where it stands, if anything does.

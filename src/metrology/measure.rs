@@ -164,6 +164,7 @@ fn drop_disproved_ridges(measured: &mut Measurement, ridges: &Ridges, is_doubted
             scallop.reason = Some("cells are too coarse to tell the ridges apart".into());
         }
     }
+    // What stands at most says nothing of how much less a doubted ridge may be.
     if is_doubted && scallop.max_at_mm == before {
         return;
     }
