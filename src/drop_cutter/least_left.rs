@@ -46,43 +46,48 @@ const GRAZED: f64 = 1e-9;
 /// Positions that meet the line above a place no further up than so many times what is to be proven are looked at.
 const AS_FAR: f64 = 2.0;
 
+/// Eight places at so many mm along the axes and the diagonals: a cutter that stands on the part at two places comes lower only between
+/// the ways on which it leaves one of them.
+fn around(at: Point2, step: f64) -> impl Iterator<Item = Point2> {
+    let offsets = (-1..=1).flat_map(|x| (-1..=1).map(move |y| Vector2::new(f64::from(x), f64::from(y))));
+    offsets.filter(|offset| *offset != Vector2::zeros()).map(move |offset| at + offset * step)
+}
+
 /// Rings of positions around a place, and positions on each, that are tried without a proof.
 const RINGS: usize = 3;
 const ON_RING: usize = 8;
 
 impl DropCutter<'_> {
-    /// What the best of a few positions of `cutter`, which this was made for, leaves above the place `at` of the part, mm along
-    /// z: no less than [`Self::least_left`] finds. Infinite where none of them touches the part.
-    pub fn left_by_some(&self, cutter: &Cutter, at: &Point3) -> f64 {
+    /// What the best position of `cutter`, which this was made for, that a search from a few finds leaves above the place `at` of the
+    /// part, with its unit normal, mm along z: no less than [`Self::least_left`] finds. Infinite where none of them touches the part.
+    pub fn left_by_search(&self, cutter: &Cutter, at: &Point3, normal: &Vector3) -> f64 {
+        let spacing = cutter.radius() / RINGS as f64;
         let ring = |k: usize| {
-            let off = cutter.radius() * (k / ON_RING + 1) as f64 / RINGS as f64;
             let (sin, cos) = (std::f64::consts::TAU * (k % ON_RING) as f64 / ON_RING as f64).sin_cos();
-            (off, Vector2::new(cos, sin) * off)
+            at.xy() + Vector2::new(cos, sin) * (spacing * (k / ON_RING + 1) as f64)
         };
-        let ways = std::iter::once((0.0, Vector2::zeros())).chain((0..RINGS * ON_RING).map(ring));
-        let leaves = |(off, way)| self.left_from(cutter, at, at.xy() + way, off);
-        ways.filter_map(leaves).fold(f64::INFINITY, f64::min)
+        let touching = at.xy() + cutter.axis_offset(normal);
+        let leaves = |axis: Point2| self.left_from(cutter, at, axis).unwrap_or(f64::INFINITY);
+        let first = [at.xy(), touching].into_iter().chain((0..RINGS * ON_RING).map(ring));
+        let first = first.map(|axis| (leaves(axis), axis)).min_by(|a, b| a.0.total_cmp(&b.0));
+        first.map_or(f64::INFINITY, |(_, axis)| leaves(self.lowest_over(cutter, at, axis, 0.5 * spacing)))
     }
 
-    /// What `cutter`, which this was made for, leaves above the place `at` from an axis that is `off` mm from it, mm along z; `None`
-    /// where it does not cover the place or touches no part.
-    fn left_from(&self, cutter: &Cutter, at: &Point3, axis: Point2, off: f64) -> Option<f64> {
-        Some(self.at(axis.x, axis.y)?.tip_z + cutter.height(off)? - at.z)
+    /// What `cutter`, which this was made for, leaves above the place `at` from an axis, mm along z; `None` where it does not cover the
+    /// place or touches no part.
+    fn left_from(&self, cutter: &Cutter, at: &Point3, axis: Point2) -> Option<f64> {
+        let height = cutter.height((axis - at.xy()).norm())?;
+        Some(self.at(axis.x, axis.y)?.tip_z + height - at.z)
     }
 
     /// The axis, mm, near `first` from which `cutter`, which this was made for, leaves least above the place `at` of the part: a
     /// search by ever smaller steps, the first of them `step` mm. Where the cutter cannot touch the place, since it stands on the
     /// part elsewhere, another position near the one that would touch it leaves less.
     pub fn lowest_over(&self, cutter: &Cutter, at: &Point3, first: Point2, step: f64) -> Point2 {
-        let leaves = |axis: &Point2| {
-            let off = (axis - at.xy()).norm();
-            self.left_from(cutter, at, *axis, off).unwrap_or(f64::INFINITY)
-        };
+        let leaves = |axis: &Point2| self.left_from(cutter, at, *axis).unwrap_or(f64::INFINITY);
         let (mut best, mut step) = ((leaves(&first), first), step);
         for _ in 0..HALVED {
-            while let Some(lower) = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]]
-                .map(|[x, y]| best.1 + Vector2::new(x, y) * step)
-                .into_iter()
+            while let Some(lower) = around(best.1, step)
                 .map(|axis| (leaves(&axis), axis))
                 .filter(|(left, _)| *left < best.0 - LEAST_LOWERED * step)
                 .min_by(|a, b| a.0.total_cmp(&b.0))
@@ -355,7 +360,8 @@ mod tests {
                     };
                     told += 1;
                     if normal.z == 1.0 {
-                        assert!(drop.left_by_some(&cutter, &place) >= least.height - least.bound - 1e-9);
+                        let searched = drop.left_by_search(&cutter, &place, &normal);
+                        assert!(searched >= least.height - least.bound - 1e-9);
                     }
                     let n = 60;
                     for k in 0..n * n {

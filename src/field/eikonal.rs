@@ -15,7 +15,7 @@
 //! The front's polar diagram of slowness 1/speed must be convex for the solution to be unique: for a ball,
 //! `(κ_cutter − κ_min) ≤ 2 (κ_cutter − κ_max)`. Beyond it fronts may have corners of their own; the interval is still
 //! that which the speed says, except in the fans behind such corners, where it is smaller. Where they break into corners without
-//! end the sweeps do not settle: [`Front::convex`] fronts do.
+//! end the sweeps do not settle: most [`Front::convex`] fronts do, and all do in first order.
 
 mod front;
 #[cfg(test)]
@@ -31,6 +31,9 @@ const MOST_ROUNDS: usize = 60;
 
 /// Sweeps end when no node changes by more than this share of the greatest φ. Rounding would keep less from being reached.
 const SETTLED: f64 = 1e-10;
+
+/// A change of φ above this share of its greatest value in first order is no correction: the sweeps have gone astray.
+const ASTRAY: f64 = 0.5;
 
 /// Rounds after which each node keeps its quadrant. Fewer may keep that of a poor first order, more settle later.
 const CHOOSING_ROUNDS: usize = 3;
@@ -81,8 +84,11 @@ pub struct Start<'a> {
 pub struct Arrival {
     /// φ.
     pub field: GridField,
-    /// Greatest change of φ in the last round of sweeps: what is left of the iteration's error.
+    /// Greatest change of φ in the last round of sweeps: what is left of the iteration's error. Infinite where the sweeps
+    /// went astray.
     pub unsettled: f64,
+    /// φ by differences of first order, which settles for every front.
+    pub first_order: GridField,
 }
 
 /// Moves a front over a grid of `nodes = [nu, nv]` on `domain`. `front(u, v)` gives metric and speed there; places where
@@ -130,11 +136,13 @@ pub fn eikonal(
     sweeper.settle(Order::First, monitor)?;
     sweeper.first = sweeper.value.clone();
     let unsettled = sweeper.settle(Order::Second, monitor)?;
-    let signs = sweeper.side.iter().map(|&s| if s < 0 { -1.0 } else { 1.0 });
-    let values: Vec<f64> = sweeper.value.iter().zip(signs).map(|(v, s)| v * s).collect();
-    let field = GridField::new(domain, [nu - 1, nv - 1], &values);
-    let field = field.filter(|_| values.iter().all(|v| v.is_finite())).ok_or(EikonalError::Degenerate)?;
-    Ok(Arrival { field, unsettled })
+    let on_grid = |values: &[f64]| {
+        let values: Vec<f64> =
+            values.iter().zip(&sweeper.side).map(|(v, &s)| v * f64::from(s.signum())).collect();
+        let field = GridField::new(domain, [nu - 1, nv - 1], &values);
+        field.filter(|_| values.iter().all(|v| v.is_finite())).ok_or(EikonalError::Degenerate)
+    };
+    Ok(Arrival { field: on_grid(&sweeper.value)?, unsettled, first_order: on_grid(&sweeper.first)? })
 }
 
 /// Gives nodes without a front that of the nearest node, by grid steps, that has one.
@@ -313,6 +321,7 @@ impl Sweeper {
         self.looked = vec![0; self.value.len()];
         self.changed = vec![1; self.value.len()];
         let mut sweep = 1;
+        let first = self.first.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max);
         for round in 0..MOST_ROUNDS {
             change = 0.0;
             for quadrant in 0..QUADRANTS.len() {
@@ -324,6 +333,9 @@ impl Sweeper {
                 self.looked.fill(0);
             }
             let greatest = self.value.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max);
+            if order == Order::Second && change > ASTRAY * first {
+                return Ok(f64::INFINITY);
+            }
             if change <= SETTLED * greatest && (order == Order::First || round >= CHOOSING_ROUNDS) {
                 break;
             }

@@ -459,7 +459,7 @@ impl Corrected<'_> {
             return Ok(false);
         };
         let cutter = &self.session.scene.cutter;
-        let left = LeastLeftFigures::at_or_elsewhere(self.session, cutter, at, limit, monitor)?;
+        let left = LeastLeftFigures::at_or_elsewhere(self.session, cutter, &[(*at, limit)], monitor)?;
         Ok(left.is_some_and(|left| self.comes_near(&left)))
     }
 

@@ -205,6 +205,11 @@ impl Bounded {
         self.max_mm + self.error_bound_mm
     }
 
+    /// So much stands, mm, by figure and bound, or for certain.
+    pub fn stands_mm(&self) -> f64 {
+        self.at_least_mm.max(self.max_mm - self.error_bound_mm)
+    }
+
     /// The highest of these places and those; of equals, this one.
     #[must_use]
     pub fn or(&self, other: &Self) -> Self {

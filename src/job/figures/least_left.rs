@@ -26,8 +26,13 @@ pub(crate) struct LeastLeftFigures {
     limit_mm: f64,
 }
 
-/// Places of the part's plan along x and along y that are looked at beside the highest one.
+/// Places of the part's plan along x and along y that are looked at beside the highest ones.
 const PLACES: usize = 12;
+
+/// From so many of them, those that leave most of all places around them, so many steps lead uphill; one that does not is tried again
+/// half as long.
+const CLIMBS: usize = 8;
+const STEPS: usize = 12;
 
 /// A height with a bound above this share of it is told by what is proven of it alone.
 const CLOSE: f64 = 0.1;
@@ -47,22 +52,24 @@ impl LeastLeftFigures {
         let scene = &session.scene;
         let Limits { scallop, uncut, .. } = scene.tolerance;
         let ridge = (highest_reached(measurement), scene.scallop_rule.highest * scallop);
-        let violated = [ridge, (measurement.excess.unreached, uncut)]
+        let violated: Vec<(Point3, f64)> = [ridge, (measurement.excess.unreached, uncut)]
             .into_iter()
-            .find(|(material, limit)| material.max_mm - material.error_bound_mm > *limit)
-            .and_then(|(material, limit)| Some((material.at_mm?, limit)));
-        let Some((at, limit)) = violated.filter(|_| path.is_upright()) else { return Ok(None) };
-        Self::at_or_elsewhere(session, cutter, &at.into(), limit, monitor)
+            .filter(|(material, limit)| material.stands_mm() > *limit)
+            .filter_map(|(material, limit)| Some((material.at_mm?.into(), limit)))
+            .collect();
+        if violated.is_empty() || !path.is_upright() {
+            return Ok(None);
+        }
+        Self::at_or_elsewhere(session, cutter, &violated, monitor)
     }
 
-    /// Of a place, mm, or else of the one where a few positions leave most, if that is more than any limit allows: beside a
-    /// border the cutter may come lower than elsewhere in a hollow. `None` where a path may hold the place's limit, mm, as far
-    /// as these two tell.
+    /// Of the first of some places that the cutter leaves more at than the place's limit, both mm, or else of one where it leaves more
+    /// than any limit allows: beside a border it may come lower than elsewhere in a hollow. `None` where a path may hold the limits, as
+    /// far as these places tell.
     pub fn at_or_elsewhere(
         session: &Session,
         cutter: &Cutter,
-        place: &Point3,
-        limit: f64,
+        places: &[(Point3, f64)],
         monitor: &dyn Monitor,
     ) -> Result<Option<Self>, JobError> {
         let scene = &session.scene;
@@ -81,23 +88,78 @@ impl LeastLeftFigures {
                 limit_mm: limit,
             }))
         };
-        if let Some(found) = least(session.part.closest_point(place).0, limit)? {
-            return Ok(Some(found));
+        for (place, limit) in places {
+            if let Some(found) = least(session.part.closest_point(place).0, *limit)? {
+                return Ok(Some(found));
+            }
         }
         let any_limit = (scene.scallop_rule.highest * scene.tolerance.scallop).max(scene.tolerance.uncut);
-        let (bounds, size) = (session.part.bounds(), session.part.bounds().size());
-        let at = |low: f64, size: f64, k: usize| low + size * (k as f64 + 0.5) / PLACES as f64;
-        let found = work::parallel::try_map(PLACES * PLACES, |k| {
-            monitor::check(monitor)?;
-            let (x, y) = (at(bounds.min.x, size.x, k % PLACES), at(bounds.min.y, size.y, k / PLACES));
-            let design = session.part.highest_at(x, y).filter(|design| design.normal.z >= LEAST_LEVEL);
-            Ok::<_, Cancelled>(
-                design.map(|design| (drop.left_by_some(cutter, &design.point) * design.normal.z, design)),
-            )
-        })?;
-        let most = found.into_iter().flatten().max_by(|a, b| a.0.total_cmp(&b.0));
-        most.filter(|(left, _)| *left > any_limit).map_or(Ok(None), |(_, design)| least(design, any_limit))
+        for place in most_left(session, cutter, &drop, monitor)? {
+            if place.left > any_limit
+                && let Some(found) = least(place.design, any_limit)?
+            {
+                return Ok(Some(found));
+            }
+        }
+        Ok(None)
     }
+}
+
+/// A place of the part, and what the best position of the cutter that was found leaves there along its normal, mm.
+#[derive(Clone, Copy)]
+struct Place {
+    left: f64,
+    at: [f64; 2],
+    design: SurfacePoint,
+}
+
+/// Places where the cutter leaves most of all nearby, most first: those of a raster, and from there uphill.
+fn most_left(
+    session: &Session,
+    cutter: &Cutter,
+    drop: &DropCutter<'_>,
+    monitor: &dyn Monitor,
+) -> Result<Vec<Place>, Cancelled> {
+    let (bounds, size) = (session.part.bounds(), session.part.bounds().size());
+    let at = |low: f64, size: f64, k: usize| low + size * (k as f64 + 0.5) / PLACES as f64;
+    let place = |at: [f64; 2]| {
+        let design = session.part.highest_at(at[0], at[1]).filter(|design| design.normal.z >= LEAST_LEVEL)?;
+        let left = drop.left_by_search(cutter, &design.point, &design.normal) * design.normal.z;
+        Some(Place { left, at, design })
+    };
+    let raster = work::parallel::try_map(PLACES * PLACES, |k| {
+        monitor::check(monitor)?;
+        let at = [at(bounds.min.x, size.x, k % PLACES), at(bounds.min.y, size.y, k / PLACES)];
+        Ok::<_, Cancelled>(place(at))
+    })?;
+    let by_height = |a: &Place, b: &Place| b.left.total_cmp(&a.left);
+    let is_top = |k: usize| {
+        let near = |k: usize| k.saturating_sub(1)..(k + 2).min(PLACES);
+        let left = |k: usize| raster[k].as_ref().map_or(f64::NEG_INFINITY, |place| place.left);
+        near(k / PLACES).all(|row| near(k % PLACES).all(|column| left(row * PLACES + column) <= left(k)))
+    };
+    let tops: Vec<bool> = (0..raster.len()).map(is_top).collect();
+    let mut starts: Vec<Place> =
+        raster.into_iter().zip(tops).filter_map(|(place, is_top)| place.filter(|_| is_top)).collect();
+    starts.sort_by(by_height);
+    starts.truncate(CLIMBS);
+    let mut tops = work::parallel::try_map(starts.len(), |k| {
+        let mut top = starts[k];
+        let mut step = [size.x, size.y].map(|size| 0.5 * size / PLACES as f64);
+        for _ in 0..STEPS {
+            monitor::check(monitor)?;
+            let beside = (-1..=1).flat_map(|x| (-1..=1).map(move |y| [f64::from(x), f64::from(y)]));
+            let beside = beside.map(|[x, y]| [top.at[0] + x * step[0], top.at[1] + y * step[1]]);
+            let higher = beside.filter_map(place).max_by(|a, b| a.left.total_cmp(&b.left));
+            match higher.filter(|higher| higher.left > top.left) {
+                Some(higher) => top = higher,
+                None => step = step.map(|step| 0.5 * step),
+            }
+        }
+        Ok::<_, Cancelled>(top)
+    })?;
+    tops.sort_by(by_height);
+    Ok(tops)
 }
 
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
@@ -188,5 +250,28 @@ mod tests {
         let [height, bound] = ["height_mm", "error_bound_mm"].map(|key| left[key].as_f64().unwrap());
         assert!(height > 0.02 && height - bound <= stands + 1e-6, "{height} ± {bound} {stands}");
         assert_eq!(value("correction")["rounds"].as_array().unwrap().len(), 1);
+    }
+
+    /// Between the places of the raster, too, and beside places that stand higher for other reasons.
+    #[test]
+    fn the_hollow_that_leaves_most_is_found_from_anywhere() {
+        let text = "[part]\nsurface = \"wave\"\namplitude = 0.4\nwavelength_x = 6\nwavelength_y = 6\nx = [0, 6]\ny = [0, 6]\n\
+                    [cutter]\nshape = \"ball\"\ndiameter = 6\n[tolerance]\nscallop = 0.027\nuncut = 0.027\n\
+                    [[toolpath]]\nstrategy = \"zigzag\"\n";
+        let session = Session::new(Scene::parse("hollows.toml", text).unwrap()).unwrap();
+        let left = |at: [f64; 3]| {
+            let cutter = &session.scene.cutter;
+            let left = LeastLeftFigures::at_or_elsewhere(&session, cutter, &[(at.into(), 0.027)], &Silent);
+            left.unwrap().unwrap_or_else(|| panic!("nothing is left at {at:?}"))
+        };
+        // Beside the trough at x 1.5, y 3 the ball touches along x and y.
+        let (r, k): (f64, f64) = (3.0, std::f64::consts::TAU / 6.0);
+        let lift = |s: f64| 0.4 * (1.0 - (k * s).cos()) - (r - (r * r - s * s).sqrt());
+        let stands = (0..=2000).map(|n| lift(f64::from(n) * 1e-3)).fold(0.0, f64::max);
+        for at in [[1.5, 3.0, -0.4], [4.5, 3.0, 0.4]] {
+            let found = left(at);
+            assert!(found.height_mm - found.error_bound_mm <= stands + 1e-6, "{found:?} {stands}");
+            assert!(found.height_mm > 0.027, "{found:?} {stands}");
+        }
     }
 }
