@@ -103,6 +103,9 @@ const BATCH: usize = 256;
 /// Values of a batch that are asked whether they stand, in vain: what disproved them changes the next batch.
 const MOST_DISPROVED: usize = 16;
 
+/// Half sides, mm, of squares that are divided no more: coordinates are rounded not far below.
+const FINEST: f64 = 1e-9;
+
 /// A square whose centre and corners lie off the part is divided until it is this share of the first one.
 const OFF_PART_SHARE: f64 = 1.0 / 16.0;
 
@@ -189,12 +192,15 @@ pub(super) fn search(
     monitor: &dyn Monitor,
 ) -> Result<BoundedGreatest, Cancelled> {
     let mut open = BinaryHeap::from(squares);
-    let (mut best, mut place, mut spent) = (known, None, 0);
+    let (mut best, mut place, mut spent, mut undivided) = (known, None, 0, f64::NEG_INFINITY);
     while spent < most.places && open.len() < most.squares.max(BATCH) {
         let enough = if spent < CHEAP { NUMERICAL_FLOOR } else { asked(best).max(NUMERICAL_FLOOR) };
         let mut batch = Vec::with_capacity(BATCH);
         while batch.len() < BATCH && open.peek().is_some_and(|s| s.possible > best + enough) {
-            batch.extend(open.pop());
+            match open.pop() {
+                Some(fine) if fine.half < FINEST => undivided = fine.possible.max(undivided),
+                square => batch.extend(square),
+            }
         }
         if batch.is_empty() {
             break;
@@ -223,7 +229,7 @@ pub(super) fn search(
             quarters.into_iter().flatten().map(|q| q.2).filter(|s| s.possible > best + NUMERICAL_FLOOR),
         );
     }
-    let possible = open.peek().map_or(best, |s| s.possible.max(best));
+    let possible = open.peek().map_or(best, |s| s.possible.max(best)).max(undivided);
     Ok(BoundedGreatest { greatest: place.map(|place| (best, place)), possible })
 }
 

@@ -227,10 +227,25 @@ impl CutSurface<'_> {
 
     /// As [`CutSurface::along_normal`], with further moves that may be lowest between centres.
     pub fn along_normal_with(&self, p: &Point3, n: &Vector3, further: &[u32]) -> Option<Deviation> {
-        let nothing = CutPoint { z: f64::INFINITY, by: NOT_CUT };
-        let lower = |lowest: CutPoint, x: f64, y: f64| match self.envelope.lowest(x, y, further) {
-            Some((z, by)) if z < lowest.z => CutPoint { z, by },
-            _ => lowest,
+        self.along_normal_below(f64::INFINITY, p, n, further)
+    }
+
+    /// As [`CutSurface::along_normal_with`], where stock stands up to a height, mm, wherever none of these moves passes: for places where
+    /// no other does. Without it the line meets nothing there.
+    pub fn along_normal_below(
+        &self,
+        stock: f64,
+        p: &Point3,
+        n: &Vector3,
+        further: &[u32],
+    ) -> Option<Deviation> {
+        let nothing = CutPoint { z: stock, by: NOT_CUT };
+        let lower = |lowest: CutPoint, x: f64, y: f64| {
+            let lowest = if lowest.z < stock { lowest } else { nothing };
+            match self.envelope.lowest(x, y, further) {
+                Some((z, by)) if z < lowest.z => CutPoint { z, by },
+                _ => lowest,
+            }
         };
         let (i, j) = self.cut.grid.cell_at(p.x, p.y)?;
         let winners = self.winners(i, j);

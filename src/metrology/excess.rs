@@ -363,13 +363,17 @@ impl ExcessSearch<'_> {
         let at = |centre: Point2, half: f64| {
             let unseen = unseen.read().unwrap_or_else(PoisonError::into_inner);
             let patches = self.patches(known.max_mm, &unseen);
-            let is_foil =
-                |rises: f64| half < LEAST_HALF && rises > STEEPEST * half && patches.ends_beside(centre);
+            // One that is told from the rest, and one whose height is.
+            let is_foil = |possible: f64, place: Point2, here: f64| {
+                half < LEAST_HALF
+                    && (possible - here > STEEPEST * half && patches.ends_beside(centre)
+                        || here > known.max_mm && self.is_foil(place, here))
+            };
             let unknown = |place| (place, Value { here: f64::NEG_INFINITY, possible: patches.most() });
             match patches.held(centre, half) {
                 Held::Nothing => None,
                 Held::Unknown => Some(unknown(centre)),
-                Held::Some { possible, here, .. } if is_foil(possible - here) => None,
+                Held::Some { possible, place, here, .. } if is_foil(possible, place, here) => None,
                 Held::Some { possible, place, here, by } => {
                     let value = Value { here, possible };
                     if kind == Kind::Any || possible <= known.max_mm {

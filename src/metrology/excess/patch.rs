@@ -7,6 +7,7 @@ use super::meets;
 use super::outline::{MOST_CORNERS, Outline, cut_off, has_area, middle, outlines, overlaps};
 use crate::cut_surface::CutSurface;
 use crate::facing::LEAST_FACING;
+use crate::figures::NUMERICAL_FLOOR;
 use crate::inspection::Inspection;
 use cutter::Cutter;
 use geometry::{Point2, Point3, Vector2, Vector3};
@@ -25,6 +26,9 @@ const MOST_BESIDE: usize = 16;
 
 /// Where more moves than this may cut, not all of them are asked: each takes some 5 ns, in hundreds of thousands of squares.
 const MOST_ASKED: usize = 4096;
+
+/// Moves that are found to have cut away what seems to stand on a place, one after the other.
+const MOST_ON_THE_WAY: usize = 8;
 
 /// Of these the lowest are asked whether they pass all of a square.
 const MOST_LOW: usize = 64;
@@ -272,16 +276,22 @@ impl Patches<'_> {
     fn above(&self, piece: &Clipped, half: f64, small: bool) -> Option<(f64, f64, u32)> {
         let SurfacePoint { point, normal, .. } = &piece.foot;
         let hidden = self.hidden(point, normal);
-        let shown = self.above_with(piece, half, hidden.clone(), false);
-        let is_wall = |&(possible, here, _): &(f64, f64, u32)| possible > self.wall_over(here, half);
-        if shown.as_ref().is_some_and(|shown| !small || !is_wall(shown)) {
+        let shown = self.above_with(piece, half, hidden.clone(), None);
+        let is_wall = |possible: f64, here: f64| possible > self.wall_over(here, half);
+        let stands = |here: f64| here <= self.least || self.cut_away_below(&piece.foot, here).is_none();
+        if shown.is_some_and(|(possible, here, _)| !small || !is_wall(possible, here) && stands(here)) {
             return shown;
         }
         let lowest = self.lowest_of_all(piece, 0.0);
-        let by_all = self.above_with(piece, half, hidden.iter().copied().chain(lowest).collect(), true);
+        let by_all = lowest.and_then(|lowest| self.above_with(piece, half, hidden, Some(&lowest)));
         // Each is a bound.
         let least = |shown: (f64, f64, u32), all: (f64, f64, u32)| (shown.0.min(all.0), all.1, all.2);
         [shown, by_all].into_iter().flatten().reduce(least)
+    }
+
+    /// The move that cut away what seems to stand so high, mm, over a place of the design.
+    fn cut_away_below(&self, foot: &SurfacePoint, height: f64) -> Option<u32> {
+        self.every_move?.cuts_away(&(foot.point + foot.normal * (height - NUMERICAL_FLOOR)))
     }
 
     /// What stands higher in a square than this, on a foot where so much stands, stands behind a wall.
@@ -289,16 +299,16 @@ impl Patches<'_> {
         here.max(self.least).max(0.0) + STEEPEST * half
     }
 
-    /// Of all moves the lowest over the foot of a piece that rose to a height, and the lowest of those that pass all of it.
-    fn lowest_of_all(&self, piece: &Clipped, height: f64) -> Vec<u32> {
-        let Some(every_move) = self.every_move else { return Vec::new() };
+    /// Of all moves the lowest over the foot of a piece that rose to a height, and the lowest of those that pass all of it; `None` where
+    /// there are too many to ask.
+    fn lowest_of_all(&self, piece: &Clipped, height: f64) -> Option<Vec<u32>> {
         let envelope = &self.inspection.surface.envelope;
         let q = piece.foot.point.xy() + piece.foot.normal.xy() * height;
         // What passes above the stock cuts nothing.
         let over = |&by: &u32| Some((envelope.height(by, q.x, q.y).filter(|z| *z < self.stock_top)?, by));
-        let all = every_move.over(q);
+        let all = self.every_move?.over(q);
         if all.len() > MOST_ASKED {
-            return Vec::new();
+            return None;
         }
         let mut low: Vec<(f64, u32)> = all.iter().filter_map(over).collect();
         let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
@@ -315,25 +325,37 @@ impl Patches<'_> {
             })
         };
         let passing = low.iter().skip(1).map(|low| low.1).filter(|by| passes_all(*by)).take(MOST_MOVES);
-        low.first().map(|low| low.1).into_iter().chain(passing).collect()
+        Some(low.first().map(|low| low.1).into_iter().chain(passing).collect())
     }
 
-    /// As [`Self::above`], by the moves that cells show and some `hidden` ones; beyond walls by `all`.
+    /// As [`Self::above`], by the moves that cells show and some `hidden` ones; where the lowest of all moves over the foot are told, by
+    /// all.
     fn above_with(
         &self,
         piece: &Clipped,
         half: f64,
         mut hidden: Cow<'_, [u32]>,
-        all: bool,
+        lowest: Option<&[u32]>,
     ) -> Option<(f64, f64, u32)> {
         let surface = self.inspection.surface;
         let SurfacePoint { point, normal, .. } = &piece.foot;
-        let mut here = surface.along_normal_with(point, normal, &hidden)?;
+        // Where no move passes stock stands.
+        let is_stock = lowest.is_some_and(<[u32]>::is_empty) && surface.cut.shape.is_none();
+        let stock = if is_stock { self.stock_top } else { f64::INFINITY };
+        hidden.to_mut().extend(lowest.into_iter().flatten());
+        let all = lowest.is_some();
+        let mut here = surface.along_normal_below(stock, point, normal, &hidden)?;
         if here.distance > self.least {
             // Short moves between cells may have cut away what seems to stand so high.
             let beside = self.beside(&(point + normal * here.distance), &hidden);
             hidden = Cow::Owned(hidden.iter().copied().chain(beside).collect());
-            here = surface.along_normal_with(point, normal, &hidden)?;
+            here = surface.along_normal_below(stock, point, normal, &hidden)?;
+        }
+        // And so may others on the way to where the line comes out.
+        for _ in 0..if all { MOST_ON_THE_WAY } else { 0 } {
+            let Some(by) = self.cut_away_below(&piece.foot, here.distance) else { break };
+            hidden.to_mut().push(by);
+            here = surface.along_normal_below(stock, point, normal, &hidden)?;
         }
         // Lower places of the square are of no account.
         let known = here.distance.max(self.least).max(0.0);
@@ -350,7 +372,7 @@ impl Patches<'_> {
         // What stands so high stands aside of its place.
         let mut moves = self.moves(&(piece.foot.point + piece.foot.normal * known), first, hidden);
         if all {
-            moves.extend(self.lowest_of_all(piece, known));
+            moves.extend(self.lowest_of_all(piece, known).into_iter().flatten());
         }
         let over = |reach: f64| self.over(piece, &moves, [known, reach]);
         let mut reach = 1.2 * known + 1e-4;
@@ -377,7 +399,7 @@ impl Patches<'_> {
         BEYOND_WALL.iter().map(|times| known + times * half / aside).find(|&height| {
             let mut moves = self.moves(&(point + normal * height), NOT_CUT, hidden);
             if all {
-                moves.extend(self.lowest_of_all(piece, height));
+                moves.extend(self.lowest_of_all(piece, height).into_iter().flatten());
             }
             self.over(piece, &moves, [height; 2]) <= height
         })
