@@ -340,13 +340,9 @@ impl ExcessSearch<'_> {
     fn is_foil(&self, place: Point2, height: f64) -> bool {
         /// Other material rises by no more than so many times the way aside.
         const SLOPE: f64 = 10.0;
-        let beside = around(place, 2.0 * ROUNDING).map(|q| {
-            self.inspection
-                .part
-                .highest_at(q.x, q.y)
-                .map(|_| self.cut_away_below([q.x, q.y], height - SLOPE * 2.0 * ROUNDING).is_some())
-        });
-        beside.contains(&None) && beside.contains(&Some(true))
+        let below = height - SLOPE * 2.0 * ROUNDING;
+        self.patches(0.0, &[]).ends_beside(place)
+            && around(place, 2.0 * ROUNDING).iter().any(|q| self.cut_away_below([q.x, q.y], below).is_some())
     }
 
     /// The highest place of a kind in some squares, if it is higher than `known`. Moves that are found to have cut away what seemed to be

@@ -289,9 +289,11 @@ impl Patches<'_> {
         [shown, by_all].into_iter().flatten().reduce(least)
     }
 
-    /// The move that cut away what seems to stand so high, mm, over a place of the design.
+    /// The move that cut away what seems to stand so high, mm, over a place of the design; `None` also where there are too many to ask.
     fn cut_away_below(&self, foot: &SurfacePoint, height: f64) -> Option<u32> {
-        self.every_move?.cuts_away(&(foot.point + foot.normal * (height - NUMERICAL_FLOOR)))
+        let below = foot.point + foot.normal * (height - NUMERICAL_FLOOR);
+        let every_move = self.every_move.filter(|every_move| every_move.over(below.xy()).len() <= MOST_ASKED);
+        every_move?.cuts_away(&below)
     }
 
     /// What stands higher in a square than this, on a foot where so much stands, stands behind a wall.
@@ -342,7 +344,9 @@ impl Patches<'_> {
         // Where no move passes stock stands.
         let is_stock = lowest.is_some_and(<[u32]>::is_empty) && surface.cut.shape.is_none();
         let stock = if is_stock { self.stock_top } else { f64::INFINITY };
-        hidden.to_mut().extend(lowest.into_iter().flatten());
+        if let Some(lowest) = lowest {
+            hidden.to_mut().extend(lowest);
+        }
         let all = lowest.is_some();
         let mut here = surface.along_normal_below(stock, point, normal, &hidden)?;
         if here.distance > self.least {
