@@ -461,10 +461,11 @@ fn what_ends_at_the_side_of_a_cut_was_not_cut_away() {
 #[test]
 fn bounds_close_across_the_walls_that_flats_leave_on_slopes() {
     let flat = Cutter::flat(3.0).unwrap();
-    let curved = [(2, 0.0, 0.3), (2, 0.9, 0.6), (2, 1.5, 1.1), (3, 0.0, 0.3), (4, 0.4, 0.3), (4, 0.9, 0.6)];
+    let curved = [(2, 0.0, 0.3), (2, 0.9, 0.6), (2, 1.5, 1.1), (3, 0.0, 0.3)];
+    // The last leaves slivers between rims that stand as high as the stock.
+    let waves = [(4, 0.4, 0.3), (4, 0.9, 0.6), (4, 2.3, 0.6), (4, 0.4, 1.1)];
     let steep = [(1, 0.9, 1.1), (1, 1.5, 0.6), (1, 2.3, 1.1)];
-    // Slivers between the rims stand as high as the stock.
-    for (shape, angle, step) in curved.into_iter().chain(steep).chain([(4, 0.4, 1.1)]) {
+    for (shape, angle, step) in curved.into_iter().chain(waves).chain(steep) {
         let part = part(shape);
         let path = path(&part, &flat, angle, step, 0.0);
         let highest = measured(&part, &flat, &path, 0.1).excess.highest;
