@@ -59,18 +59,24 @@ const ON_RING: usize = 8;
 
 impl DropCutter<'_> {
     /// What the best position of `cutter`, which this was made for, that a search from a few finds leaves above the place `at` of the
-    /// part, with its unit normal, mm along z: no less than [`Self::least_left`] finds. Infinite where none of them touches the part.
-    pub fn left_by_search(&self, cutter: &Cutter, at: &Point3, normal: &Vector3) -> f64 {
+    /// part, with its unit normal, mm along z: no less than [`Self::least_left`] finds. Infinite where none of them touches the part. The
+    /// search ends where no more than `enough` is left.
+    pub fn left_by_search(&self, cutter: &Cutter, at: &Point3, normal: &Vector3, enough: f64) -> f64 {
+        let leaves = |axis: Point2| self.left_from(cutter, at, axis).unwrap_or(f64::INFINITY);
+        let touching = at.xy() + cutter.axis_offset(normal);
+        let first = leaves(touching);
+        if first <= enough {
+            return first;
+        }
         let spacing = cutter.radius() / RINGS as f64;
         let ring = |k: usize| {
             let (sin, cos) = (std::f64::consts::TAU * (k % ON_RING) as f64 / ON_RING as f64).sin_cos();
             at.xy() + Vector2::new(cos, sin) * (spacing * (k / ON_RING + 1) as f64)
         };
-        let touching = at.xy() + cutter.axis_offset(normal);
-        let leaves = |axis: Point2| self.left_from(cutter, at, axis).unwrap_or(f64::INFINITY);
-        let first = [at.xy(), touching].into_iter().chain((0..RINGS * ON_RING).map(ring));
-        let first = first.map(|axis| (leaves(axis), axis)).min_by(|a, b| a.0.total_cmp(&b.0));
-        first.map_or(f64::INFINITY, |(_, axis)| leaves(self.lowest_over(cutter, at, axis, 0.5 * spacing)))
+        let others = std::iter::once(at.xy()).chain((0..RINGS * ON_RING).map(ring));
+        let all = others.map(|axis| (leaves(axis), axis)).chain([(first, touching)]);
+        let best = all.min_by(|a, b| a.0.total_cmp(&b.0));
+        best.map_or(f64::INFINITY, |(_, axis)| leaves(self.lowest_over(cutter, at, axis, 0.5 * spacing)))
     }
 
     /// What `cutter`, which this was made for, leaves above the place `at` from an axis, mm along z; `None` where it does not cover the
@@ -360,7 +366,7 @@ mod tests {
                     };
                     told += 1;
                     if normal.z == 1.0 {
-                        let searched = drop.left_by_search(&cutter, &place, &normal);
+                        let searched = drop.left_by_search(&cutter, &place, &normal, 0.0);
                         assert!(searched >= least.height - least.bound - 1e-9);
                     }
                     let n = 60;

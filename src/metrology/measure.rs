@@ -9,7 +9,7 @@ use super::inspected::inspect;
 use super::inspection::Inspection;
 use super::meetings::Meetings;
 use super::pairs::pair_figures;
-use super::refine::{Asked, Refinement};
+use super::refine::{Asked, Refinement, open_bounds};
 use super::ridge_map::borders;
 use super::ridges::{Ridges, scallop_figures};
 use super::tracks::Tracks;
@@ -132,6 +132,10 @@ pub fn measure_with_walls(
     let highest = measured.excess.highest.max_mm;
     measured.deviation.max_mm = measured.deviation.max_mm.map(|max| max.max(highest));
     tell_uncut(&mut measured, limits);
+    // The search between cells may have closed what cells left open.
+    if measured.refined.note.is_some() {
+        measured.refined.note = open_bounds(&measured, bound, cut.grid.cell);
+    }
     tell_doubt(&mut measured, was_doubted);
     if let Some(walls) = &walls {
         walls.add_to(&mut measured, limits);

@@ -301,7 +301,7 @@ impl GreatestSoFar {
 
 /// Says which bounds exceed the asked one, and the cell that would hold them: a bound shrinks at least as
 /// the cell does.
-fn open_bounds(measured: &Measurement, asked: f64, cell: f64) -> Option<String> {
+pub(super) fn open_bounds(measured: &Measurement, asked: f64, cell: f64) -> Option<String> {
     let bounds = [
         ("highest scallop", measured.scallop.error_bound_mm.unwrap_or(0.0)),
         ("deepest gouge", measured.gouge.error_bound_mm),

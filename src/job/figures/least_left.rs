@@ -34,6 +34,9 @@ const PLACES: usize = 12;
 const CLIMBS: usize = 8;
 const STEPS: usize = 12;
 
+/// Places where the cutter leaves less than this share of what is looked for are no start.
+const LEAST_START: f64 = 0.1;
+
 /// A height with a bound above this share of it is told by what is proven of it alone.
 const CLOSE: f64 = 0.1;
 
@@ -94,7 +97,7 @@ impl LeastLeftFigures {
             }
         }
         let any_limit = (scene.scallop_rule.highest * scene.tolerance.scallop).max(scene.tolerance.uncut);
-        for place in most_left(session, cutter, &drop, monitor)? {
+        for place in most_left(session, cutter, &drop, LEAST_START * any_limit, monitor)? {
             if place.left > any_limit
                 && let Some(found) = least(place.design, any_limit)?
             {
@@ -113,18 +116,20 @@ struct Place {
     design: SurfacePoint,
 }
 
-/// Places where the cutter leaves most of all nearby, most first: those of a raster, and from there uphill.
+/// Places where the cutter leaves most of all nearby, most first: those of a raster that leave more than `least`, mm, and from there
+/// uphill.
 fn most_left(
     session: &Session,
     cutter: &Cutter,
     drop: &DropCutter<'_>,
+    least: f64,
     monitor: &dyn Monitor,
 ) -> Result<Vec<Place>, Cancelled> {
     let (bounds, size) = (session.part.bounds(), session.part.bounds().size());
     let at = |low: f64, size: f64, k: usize| low + size * (k as f64 + 0.5) / PLACES as f64;
     let place = |at: [f64; 2]| {
         let design = session.part.highest_at(at[0], at[1]).filter(|design| design.normal.z >= LEAST_LEVEL)?;
-        let left = drop.left_by_search(cutter, &design.point, &design.normal) * design.normal.z;
+        let left = drop.left_by_search(cutter, &design.point, &design.normal, least) * design.normal.z;
         Some(Place { left, at, design })
     };
     let raster = work::parallel::try_map(PLACES * PLACES, |k| {
@@ -136,7 +141,10 @@ fn most_left(
     let is_top = |k: usize| {
         let near = |k: usize| k.saturating_sub(1)..(k + 2).min(PLACES);
         let left = |k: usize| raster[k].as_ref().map_or(f64::NEG_INFINITY, |place| place.left);
-        near(k / PLACES).all(|row| near(k % PLACES).all(|column| left(row * PLACES + column) <= left(k)))
+        let all_around = |is_lower: &dyn Fn(usize) -> bool| {
+            near(k / PLACES).all(|row| near(k % PLACES).all(|column| is_lower(row * PLACES + column)))
+        };
+        left(k) > least && all_around(&|other| left(other) <= left(k))
     };
     let tops: Vec<bool> = (0..raster.len()).map(is_top).collect();
     let mut starts: Vec<Place> =
