@@ -195,8 +195,10 @@ pub(super) fn search(
     let (mut best, mut place, mut spent, mut undivided) = (known, None, 0, f64::NEG_INFINITY);
     while spent < most.places && open.len() < most.squares.max(BATCH) {
         let enough = if spent < CHEAP { NUMERICAL_FLOOR } else { asked(best).max(NUMERICAL_FLOOR) };
+        // What is divided no more keeps the bound as wide, however low the rest is.
+        let least = if spent < CHEAP { best + enough } else { undivided.max(best + enough) };
         let mut batch = Vec::with_capacity(BATCH);
-        while batch.len() < BATCH && open.peek().is_some_and(|s| s.possible > best + enough) {
+        while batch.len() < BATCH && open.peek().is_some_and(|s| s.possible > least) {
             match open.pop() {
                 Some(fine) if fine.half < FINEST => undivided = fine.possible.max(undivided),
                 square => batch.extend(square),

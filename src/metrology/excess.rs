@@ -15,7 +15,6 @@
 //! by a square; so the part's borders and creases are borders of polygons, and nothing beyond them counts. Squares that may
 //! hold more than is known are divided until none does by more than was asked.
 
-mod every_move;
 mod outline;
 mod patch;
 
@@ -26,7 +25,6 @@ use std::sync::{PoisonError, RwLock};
 use super::closer::{Effort, Promising, Square, Value, search};
 use super::figures::{Bounded, ExcessFigures, ExcessKind, Measurement, NUMERICAL_FLOOR, RidgePlace};
 use super::inspection::{Inspection, Sample};
-pub(super) use every_move::EveryMove;
 use geometry::{Node, Point2, Point3};
 use motion::ROUNDING;
 use patch::{Held, LEAST_HALF, Patches, STEEPEST, around};
@@ -50,8 +48,6 @@ pub(super) struct ExcessSearch<'a> {
     pub inspection: &'a Inspection<'a>,
     /// Height of the stock's flat top, mm.
     pub stock_top: f64,
-    /// All moves, where heights that one of them cuts away are no figures though it won no cell.
-    pub every_move: Option<&'a EveryMove<'a>>,
 }
 
 /// Of the cells that may hold more than a pass may leave, so many are looked through for such places.
@@ -297,13 +293,7 @@ impl ExcessSearch<'_> {
     }
 
     fn patches<'b>(&'b self, least: f64, unseen: &'b [u32]) -> Patches<'b> {
-        Patches {
-            inspection: self.inspection,
-            stock_top: self.stock_top,
-            least,
-            unseen,
-            every_move: self.every_move,
-        }
+        Patches { inspection: self.inspection, stock_top: self.stock_top, least, unseen }
     }
 
     /// How far off the highest place may be, mm: nearer where it is to be told from its limit.
@@ -321,12 +311,12 @@ impl ExcessSearch<'_> {
     }
 
     fn cuts_away(&self, at: &Point3) -> Option<u32> {
-        self.every_move?.cuts_away(at)
+        self.inspection.every_move?.cuts_away(at)
     }
 
     /// Whether passes came down to the design at the highest place.
     fn is_reached(&self, highest: &Bounded) -> bool {
-        let Some((at, every_move)) = highest.at_mm.zip(self.every_move) else { return false };
+        let Some((at, every_move)) = highest.at_mm.zip(self.inspection.every_move) else { return false };
         let q = Point2::new(at[0], at[1]);
         let Inspection { part, surface, .. } = *self.inspection;
         let cut = part

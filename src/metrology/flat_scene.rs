@@ -46,5 +46,7 @@ pub(super) fn gouge_of(part: &Part, cutter: &Cutter, passes: &[Vec<Point3>], cel
         most_squares: 1 << 20,
         is_first_look: false,
     };
-    measure(part, cutter, &path, &cut, &LIMITS, &asked, &Silent).unwrap().gouge
+    // How high what is left stands is of no account.
+    let limits = Limits { scallop: 1e3, uncut: 1e3, ..LIMITS };
+    measure(part, cutter, &path, &cut, &limits, &asked, &Silent).unwrap().gouge
 }

@@ -6,6 +6,7 @@
 
 use super::closer::{Promising, Square, Value};
 use super::cut_surface::{CutSurface, Deviation};
+use super::every_move::EveryMove;
 use super::figures::{
     DeviationFigures, GougeFigures, GougeRegion, Limits, NUMERICAL_FLOOR, UncutFigures, UncutRegion,
 };
@@ -85,6 +86,8 @@ pub(super) struct Inspection<'a> {
     pub grid: Grid,
     /// The walls beside, where they are measured.
     pub walls: Option<&'a Walls>,
+    /// All moves, where heights that one of them cuts away are no figures though it won no cell.
+    pub every_move: Option<&'a EveryMove<'a>>,
 }
 
 impl Inspection<'_> {

@@ -30,6 +30,7 @@ mod coverage;
 mod cut_surface;
 mod engagement;
 mod engines;
+mod every_move;
 mod excess;
 mod facing;
 mod figures;

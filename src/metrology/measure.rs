@@ -1,7 +1,8 @@
 //! The figures of a cut on heights: the stock's own grid first, then a closer look where something may hide. mm.
 
 use super::cut_surface::CutSurface;
-use super::excess::{EveryMove, ExcessSearch};
+use super::every_move::EveryMove;
+use super::excess::ExcessSearch;
 use super::figures::{
     CloserLook, ExcessFigures, ExcessKind, Limits, Measurement, NUMERICAL_FLOOR, ScallopFigures, UncutFigures,
 };
@@ -17,7 +18,7 @@ use super::unseen::{dips, most_unseen};
 use super::walls::{WallTask, Walls};
 use super::{Facing, REACH_OVER_UNCUT};
 use cutter::Cutter;
-use geometry::Point3;
+use geometry::{Point3, Vector3};
 use motion::{Cutters, Toolpath};
 use part::Part;
 use sim::{Envelope, ZMap};
@@ -70,6 +71,9 @@ pub fn measure_with_walls(
         }
         None => None,
     };
+    let mut around = part.bounds();
+    around.max.z = around.max.z.max(asked.stock_top);
+    let every_move = EveryMove::new(&surface, cutters, &around);
     let inspection = Inspection {
         part,
         cutters,
@@ -81,6 +85,7 @@ pub fn measure_with_walls(
         meetings: &Meetings::new(&surface, cutters, path, None),
         grid,
         walls: walls.as_ref(),
+        every_move: Some(&every_move),
     };
     let mut found = inspect(&inspection, path, 0.0, monitor)?;
     let highest_ridge = found.ridges.highest_sample();
@@ -113,21 +118,17 @@ pub fn measure_with_walls(
     if asked.borders {
         inspection.cut_borders(&mut measured.gouge, monitor)?;
     }
-    let was_doubted = doubt(&mut measured, &surface, part, path, asked);
+    let was_doubted = doubt(&mut measured, &inspection);
     if !asked.borders {
         measured.excess = ExcessFigures::of_cells(&measured);
         tell_doubt(&mut measured, was_doubted);
         return Ok(measured);
     }
-    let mut around = part.bounds();
-    around.max.z = around.max.z.max(asked.stock_top);
-    let every_move = EveryMove::new(&surface, cutters, &around);
-    let search =
-        ExcessSearch { inspection: &inspection, stock_top: asked.stock_top, every_move: Some(&every_move) };
+    let search = ExcessSearch { inspection: &inspection, stock_top: asked.stock_top };
     let (excess, high) = search.run(&found.samples, &measured, monitor)?;
     measured.excess = excess;
     measured.above.extend(high);
-    drop_disproved_ridges(&mut measured, &found.ridges, was_doubted.ridge);
+    drop_disproved_ridges(&mut measured, &found.ridges);
     raise_highest_ridge(&mut measured, &inspection, path);
     let highest = measured.excess.highest.max_mm;
     measured.deviation.max_mm = measured.deviation.max_mm.map(|max| max.max(highest));
@@ -145,9 +146,8 @@ pub fn measure_with_walls(
 
 /// Leaves ridges out that stand above the highest material: moves that no cell saw cut them away. The others stand no higher
 /// than it.
-fn drop_disproved_ridges(measured: &mut Measurement, ridges: &Ridges, is_doubted: bool) {
+fn drop_disproved_ridges(measured: &mut Measurement, ridges: &Ridges) {
     let (highest, scallop) = (measured.excess.highest.at_most(), &mut measured.scallop);
-    let before = scallop.max_at_mm;
     if scallop.max_mm.is_some_and(|ridge| ridge > highest) {
         measured.ridge_samples.retain(|[height, _]| f64::from(*height) <= highest);
         let known = |figure: Option<f64>| figure.filter(|height| *height <= highest);
@@ -167,10 +167,6 @@ fn drop_disproved_ridges(measured: &mut Measurement, ridges: &Ridges, is_doubted
         if known.contains(&None) {
             scallop.reason = Some("cells are too coarse to tell the ridges apart".into());
         }
-    }
-    // What stands at most says nothing of how much less a doubted ridge may be.
-    if is_doubted && scallop.max_at_mm == before {
-        return;
     }
     let most = (highest - scallop.max_mm.unwrap_or(0.0)).max(NUMERICAL_FLOOR);
     scallop.error_bound_mm = scallop.error_bound_mm.map(|bound| bound.min(most));
@@ -223,47 +219,27 @@ fn raise_highest_ridge(measured: &mut Measurement, inspection: &Inspection<'_>, 
     }
 }
 
-/// Which figures stand where a move that no cell saw cuts away.
-#[derive(Clone, Copy)]
-struct Doubted {
-    ridge: bool,
-    region: bool,
-}
-
-/// Where a move that no cell saw cuts the highest scallop or uncut place away, the figure is too great by
-/// an unknown amount: its bound becomes the figure itself. All moves are asked at the two places. Whether that is so.
-fn doubt(
-    measured: &mut Measurement,
-    surface: &CutSurface<'_>,
-    part: &Part,
-    path: &Toolpath,
-    asked: &Asked,
-) -> Doubted {
-    let all: Vec<u32> = (0..path.len() as u32).collect();
-    let cut_away = |at: &Point3| surface.height_of(&all, at) < at.z - asked.error_bound;
-    let (scallop, uncut) = (&mut measured.scallop, &mut measured.uncut);
-    let of_ridge = scallop.max_at_mm.is_some_and(|at| cut_away(&at.into()));
-    if of_ridge {
-        scallop.error_bound_mm = scallop.error_bound_mm.zip(scallop.max_mm).map(|(b, m)| b.max(m));
-    }
+/// Where a move that no cell saw cuts the highest uncut place away, the figure is too great by an unknown amount: its bound becomes the
+/// figure itself. Whether that is so.
+fn doubt(measured: &mut Measurement, inspection: &Inspection<'_>) -> bool {
+    let Inspection { part, every_move, asked, .. } = *inspection;
+    let uncut = &mut measured.uncut;
+    let cut_away = |at: &Point3| {
+        every_move.is_some_and(|every_move| every_move.cuts_away(&(at - Vector3::z() * asked)).is_some())
+    };
     let highest = uncut.regions.first().and_then(|r| Some((r, part.highest_at(r.at_mm[0], r.at_mm[1])?)));
-    let of_region =
+    let is_doubted =
         highest.is_some_and(|(r, design)| cut_away(&(design.point + design.normal * r.height_mm)));
-    if of_region {
+    if is_doubted {
         uncut.error_bound_mm = uncut.error_bound_mm.max(uncut.max_height_mm);
     }
-    Doubted { ridge: of_ridge, region: of_region }
+    is_doubted
 }
 
-/// Says so where nothing else told the figures that were doubted.
-fn tell_doubt(measured: &mut Measurement, was_doubted: Doubted) {
-    let (scallop, uncut) = (&measured.scallop, &measured.uncut);
-    let is_vacuous = |max: f64, bound: f64| max > 0.0 && bound >= max;
-    let ridge = scallop.max_mm.zip(scallop.error_bound_mm);
-    if (was_doubted.ridge || was_doubted.region)
-        && (is_vacuous(uncut.max_height_mm, uncut.error_bound_mm)
-            || ridge.is_some_and(|(max, bound)| is_vacuous(max, bound)))
-    {
+/// Says so where nothing else told the figure that was doubted.
+fn tell_doubt(measured: &mut Measurement, was_doubted: bool) {
+    let uncut = &measured.uncut;
+    if was_doubted && uncut.max_height_mm > 0.0 && uncut.error_bound_mm >= uncut.max_height_mm {
         measured.refined.note = Some(
             "moves between the centres of cells cut lower than what was measured there; passes so close need a \
              cell of a third of their distance"

@@ -93,7 +93,7 @@ pub(super) fn places_above(
     let inspection = on_cells(part, cutters, limits, NUMERICAL_FLOOR, &surface, &meetings);
     let inspection = Inspection { most_squares, ..inspection };
     let samples = inspection.samples(monitor)?;
-    let search = ExcessSearch { inspection: &inspection, stock_top, every_move: None };
+    let search = ExcessSearch { inspection: &inspection, stock_top };
     // A ridge rises by little from a line of cells to the next, but where it ends.
     let ridges = RidgeFinder::new(&inspection, path).find(&|k| samples[k].deviation, monitor)?;
     let grid = cut.grid;
@@ -142,6 +142,7 @@ fn on_cells<'a>(
         meetings,
         grid,
         walls: None,
+        every_move: None,
     }
 }
 

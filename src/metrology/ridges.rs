@@ -15,11 +15,12 @@
 //! ridge of it, though the part may lie below.
 
 use super::cut_surface::CutSurface;
+use super::every_move::EveryMove;
 use super::figures::{Limits, NEAR_LIMIT, NUMERICAL_FLOOR, RidgePlace, ScallopFigures};
 use super::inspection::Inspection;
 use super::meetings::{Meeting, Meetings};
 use super::pairs::{PairTally, RidgeCrossing};
-use geometry::{Point2, Point3, Vector2, distance_to_segment};
+use geometry::{Point2, Point3, Vector2, Vector3, distance_to_segment};
 use motion::{Cutters, Toolpath};
 use part::{Part, SurfacePoint};
 use sim::Grid;
@@ -137,6 +138,9 @@ pub(super) struct RidgeFinder<'a> {
     pub limits: &'a Limits,
     meetings: &'a Meetings<'a>,
     path: &'a Toolpath,
+    every_move: Option<&'a EveryMove<'a>>,
+    /// The error bound that is asked for, mm.
+    asked: f64,
 }
 
 /// A line between two neighbouring centres: from the cell `from`, along x or along y.
@@ -168,8 +172,8 @@ impl GridLine {
 
 impl<'a> RidgeFinder<'a> {
     pub fn new(inspection: &Inspection<'a>, path: &'a Toolpath) -> Self {
-        let Inspection { surface, part, cutters, limits, meetings, .. } = *inspection;
-        Self { surface, part, cutters, limits, meetings, path }
+        let Inspection { surface, part, cutters, limits, meetings, every_move, asked, .. } = *inspection;
+        Self { surface, part, cutters, limits, meetings, path, every_move, asked }
     }
 
     /// All ridges, row by row. `deviation` is that of a cell, mm, NaN where it is not measured.
@@ -207,6 +211,7 @@ impl<'a> RidgeFinder<'a> {
                 }
             }
             monitor.advance(1);
+            self.drop_cut_away(&mut samples);
             let above = samples.iter().filter(|s| s.height > NEAR_LIMIT * self.limits.scallop);
             let above = above.map(|s| RidgePlace { at: s.at, height: s.height }).collect();
             Ok(Ridges { pairs: self.pairs(&samples), above, ..Ridges::of_row(&samples, hidden) })
@@ -265,6 +270,9 @@ impl<'a> RidgeFinder<'a> {
         if aside > NUMERICAL_FLOOR && self.ends_at(&foot) {
             return None;
         }
+        if height > NEAR_LIMIT * self.limits.scallop && self.is_cut_away(&at) {
+            return None;
+        }
         let [m, n] = moves.map(|by| self.surface.normal(by, q.x, q.y));
         if height > self.limits.uncut && !self.is_scallop(moves, &foot) {
             hidden.push(Hidden::Ridge(q, height));
@@ -289,6 +297,23 @@ impl<'a> RidgeFinder<'a> {
             from: (line.from, line.along_x),
             squareness: share,
         })
+    }
+
+    /// Leaves out the highest samples of a row as long as no ridge stands there.
+    fn drop_cut_away(&self, samples: &mut Vec<RidgeSample>) {
+        let order = |a: &(usize, &RidgeSample), b: &(usize, &RidgeSample)| a.1.height.total_cmp(&b.1.height);
+        while let Some((k, highest)) = samples.iter().enumerate().max_by(order)
+            && highest.height <= NEAR_LIMIT * self.limits.scallop
+            && self.is_cut_away(&highest.at)
+        {
+            samples.swap_remove(k);
+        }
+    }
+
+    /// Whether a move that no cell shows cuts lower, by more than the figures are asked for.
+    fn is_cut_away(&self, at: &Point3) -> bool {
+        let below = at - Vector3::z() * self.asked;
+        self.every_move.is_some_and(|every_move| every_move.cuts_away(&below).is_some())
     }
 
     /// The highest place of all ridges, looked at closer wherever a ridge might rise above the highest
@@ -338,7 +363,7 @@ impl<'a> RidgeFinder<'a> {
             // The ridge may leave the cell sideways by half of it.
             self.between(&line, (-0.5, a), (1.5, b), &mut found, &mut hidden);
         }
-        found.retain(|s| self.part.highest_at(s.at.x, s.at.y).is_some());
+        found.retain(|s| self.part.highest_at(s.at.x, s.at.y).is_some() && !self.is_cut_away(&s.at));
         found
     }
 }

@@ -2,7 +2,6 @@
 
 use std::borrow::Cow;
 
-use super::every_move::EveryMove;
 use super::meets;
 use super::outline::{MOST_CORNERS, Outline, cut_off, has_area, middle, outlines, overlaps};
 use crate::cut_surface::CutSurface;
@@ -103,8 +102,6 @@ pub(super) struct Patches<'a> {
     pub least: f64,
     /// Moves that no cell shows.
     pub unseen: &'a [u32],
-    /// All moves.
-    pub every_move: Option<&'a EveryMove<'a>>,
 }
 
 impl Patches<'_> {
@@ -292,7 +289,8 @@ impl Patches<'_> {
     /// The move that cut away what seems to stand so high, mm, over a place of the design; `None` also where there are too many to ask.
     fn cut_away_below(&self, foot: &SurfacePoint, height: f64) -> Option<u32> {
         let below = foot.point + foot.normal * (height - NUMERICAL_FLOOR);
-        let every_move = self.every_move.filter(|every_move| every_move.over(below.xy()).len() <= MOST_ASKED);
+        let every_move =
+            self.inspection.every_move.filter(|every_move| every_move.over(below.xy()).len() <= MOST_ASKED);
         every_move?.cuts_away(&below)
     }
 
@@ -308,7 +306,7 @@ impl Patches<'_> {
         let q = piece.foot.point.xy() + piece.foot.normal.xy() * height;
         // What passes above the stock cuts nothing.
         let over = |&by: &u32| Some((envelope.height(by, q.x, q.y).filter(|z| *z < self.stock_top)?, by));
-        let all = self.every_move?.over(q);
+        let all = self.inspection.every_move?.over(q);
         if all.len() > MOST_ASKED {
             return None;
         }

@@ -119,6 +119,9 @@ impl<'a> Brute<'a> {
         let height =
             |q: &Point3| self.envelope.lowest(q.x, q.y, &self.all).map_or(TOP, |(z, _)| z.min(TOP)) - q.z;
         let foot = self.part.highest_at(x, y)?;
+        if foot.normal.xy().norm() == 0.0 {
+            return Some(height(&foot.point).clamp(-0.5, 2.0 * TOP));
+        }
         let (mut low, mut high) = (-0.5, 2.0 * TOP);
         for _ in 0..40 {
             let t = 0.5 * (low + high);
@@ -391,6 +394,31 @@ fn short_moves_between_cells_leave_no_figure_open() {
         if lift > 0.0 {
             assert!((uncut.max_height_mm - truth).abs() < 6e-4, "{truth} {uncut:?}");
         }
+    }
+}
+
+/// Passes far nearer to each other than cells end beside what is left: some of them win no cell and take the top off what seem to be
+/// ridges between others.
+#[test]
+fn ridges_that_passes_between_cells_take_off_are_no_figures() {
+    let (part, bull) = (part(0), Cutter::bull(6.0, 1.0).unwrap());
+    for lift in [0.0, 0.01] {
+        let moves = (0..=80).flat_map(|k| {
+            let [end, up] = [0.21, 0.37].map(|turn| (turn * f64::from(k)).sin());
+            let (x, y, z) = (3.6 + 0.08 * end, 0.05 * f64::from(k), lift * up.abs());
+            let to = |x: f64, z: f64, kind| {
+                let to = ClPoint::upright(Point3::new(x, y, z));
+                Move { to, kind, feed_rate: 1000.0, pass: k as u32 }
+            };
+            let down = [to(x, 9.0, MoveKind::Rapid), to(x, z, MoveKind::Plunge)];
+            down.into_iter().chain([to(8.0, z, MoveKind::Cut), to(8.0, 9.0, MoveKind::Retract)])
+        });
+        let path = Toolpath::new(ClPoint::upright(Point3::new(8.0, 0.0, 9.0)), moves.collect());
+        let scallop = measured(&part, &bull, &path, 0.3).scallop;
+        let (max, bound) = (scallop.max_mm.unwrap(), scallop.error_bound_mm.unwrap());
+        let [x, y, _] = scallop.max_at_mm.unwrap();
+        let there = Brute::new(&part, &bull, &path).at(x, y).unwrap();
+        assert!((max - there).abs() < 5e-4 && bound < 5e-4, "{lift}: {there} {scallop:?}");
     }
 }
 
