@@ -7,8 +7,9 @@
 //! The part ends at a border as at a vertical wall. Where the way down along the normal leads out through it, the depth is no more
 //! than that along the wall: what lies beyond belongs to no part. The lesser of two concave depths is concave, too.
 //!
-//! Limits: where only the side of the cutter reaches over the border, by less than the gouge tolerance, nothing is deeper than
-//! that; such places are left out.
+//! Limits: where the side of the cutter reaches over the border by less than the gouge tolerance, what is left of the part is nearer than
+//! that, however long the way along the normal is beside a steep flank. Such a place counts as deep as that is near; it is left out
+//! where the cutter does not come over the part farther inside.
 
 use std::collections::HashMap;
 
@@ -23,6 +24,9 @@ use work::monitor::{self, Cancelled, Monitor};
 
 /// Pieces of borders are no longer than this many radii of the narrowest cutter.
 const LONGEST_PIECE: f64 = 2.0;
+
+/// How far inside of a border, as a share of the gouge tolerance, what is left counts as near: at a corner it is √2 times as far off.
+const INSIDE_SHARE: f64 = 0.65;
 
 /// Steps of Newton's method for the meeting of a normal with what a move sweeps; it converges from one side.
 const STEPS: usize = 24;
@@ -51,6 +55,15 @@ struct BorderCut {
     possible: f64,
     at: Point3,
     by: u32,
+}
+
+/// How deep a move cuts at a place of a border, mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct PlaceDepth {
+    /// Along the normal or the wall.
+    along: f64,
+    /// Nearby, inside of all borders, along z; negative where nothing is cut there.
+    inside: f64,
 }
 
 impl BorderPiece {
@@ -241,37 +254,44 @@ impl Inspection<'_> {
     /// The deepest place of a move along a piece, where it may be deeper than `known`; it comes nearest at a share.
     fn deepest_on(&self, piece: &BorderPiece, by: u32, nearest: f64, known: f64) -> Option<BorderCut> {
         let design = |share: f64| piece.design(self.part, share);
+        let length = (piece.ends[1] - piece.ends[0]).norm();
+        // As far from the end of the piece, where another border may begin.
+        let far = INSIDE_SHARE * self.limits.gouge;
+        let nearest_left = std::f64::consts::SQRT_2 * far;
+        let end = (far / length).min(0.5);
         let value = |share: f64| {
             let (place, normal) = design(share);
-            // The side alone does not reach so far.
-            let inside = place + piece.inward * self.limits.gouge;
-            self.surface.envelope.height(by, inside.x, inside.y)?;
-            let along = depth(self.surface, by, &place, &normal)?;
-            if along.is_finite() && !piece.leads_out(&normal) {
-                return Some(along);
+            let nearby = design(share.clamp(end, 1.0 - end)).0 + piece.inward * far;
+            let inside = nearby.z - self.surface.envelope.height(by, nearby.x, nearby.y)?;
+            let mut along = depth(self.surface, by, &place, &normal)?;
+            if along.is_infinite() || piece.leads_out(&normal) {
+                along = along.min(place.z - self.surface.envelope.height(by, place.x, place.y)?);
             }
-            Some(along.min(place.z - self.surface.envelope.height(by, place.x, place.y)?))
+            Some(PlaceDepth { along, inside })
         };
+        let counted = |along: f64, inside: f64| if inside > 0.0 { along } else { along.min(nearest_left) };
         // On a ridge the cut may be less deep than along the normal.
         let on_ridge = |share: f64, along: f64| {
             let (place, normal) = design(share);
             // The cells may end with the part.
             self.on_ridge(&(place + piece.inward * NUMERICAL_FLOOR), &normal, along)
         };
-        let length = (piece.ends[1] - piece.ends[0]).norm();
         let least = self.limits.shallow();
         // What a border bends by between two places spoils concavity by as much; it falls with the square of their distance.
         let bend = 3.0 * piece.bend;
         let mut best: Option<(f64, f64)> = None;
         let mut left = f64::NEG_INFINITY;
-        let (first, last) = (value(0.0), value(1.0));
-        let middle = value(nearest);
-        let mut open =
-            vec![(0.0, first, nearest, middle, MOST_HALVINGS), (nearest, middle, 1.0, last, MOST_HALVINGS)];
+        // What is cut inside is the same from an end to where it is looked for there.
+        let mut shares = [0.0, end, nearest, 1.0 - end, 1.0];
+        shares.sort_by(f64::total_cmp);
+        let values = shares.map(value);
+        let mut open: Vec<_> =
+            (0..4).map(|k| (shares[k], values[k], shares[k + 1], values[k + 1], MOST_HALVINGS)).collect();
         // Returns the depth of the deepest place, and the cut of this one where it lies on a ridge.
-        let mut keep = |share: f64, found: Option<f64>| {
+        let mut keep = |share: f64, found: Option<PlaceDepth>| {
             let most = best.map_or(known, |(most, _)| most.max(known));
-            let Some(along) = found else { return (most, None) };
+            let Some(PlaceDepth { along, inside }) = found else { return (most, None) };
+            let along = counted(along, inside);
             let ridge = if along > most.max(least) { on_ridge(share, along) } else { None };
             let depth = ridge.map_or(along, |cut| -cut.distance);
             if best.is_none_or(|(most, _)| depth > most) {
@@ -279,9 +299,9 @@ impl Inspection<'_> {
             }
             (most.max(depth), ridge)
         };
-        keep(0.0, first);
-        keep(1.0, last);
-        keep(nearest, middle);
+        shares.iter().zip(values).for_each(|(share, found)| {
+            keep(*share, found);
+        });
         while let Some((a, at_a, b, at_b, halvings)) = open.pop() {
             if at_a.is_none() && at_b.is_none() || b <= a {
                 continue;
@@ -291,7 +311,12 @@ impl Inspection<'_> {
             let (most, ridge) = keep(m, at_m);
             let possible = match (at_a, at_m, at_b) {
                 (Some(at_a), Some(m), Some(at_b)) => {
-                    m.max(at_a).max(at_b).max(2.0 * m - at_a.min(at_b)) + bend * (b - a) * (b - a)
+                    let most = |of: &dyn Fn(PlaceDepth) -> f64| {
+                        let [a, m, b] = [at_a, m, at_b].map(of);
+                        m.max(a).max(b).max(2.0 * m - a.min(b))
+                    };
+                    let bend = bend * (b - a) * (b - a);
+                    counted(most(&|at| at.along) + bend, most(&|at| at.inside) + bend)
                 }
                 (None, None, _) | (_, None, None) if halvings == 0 => f64::NEG_INFINITY,
                 _ => f64::INFINITY,
@@ -427,5 +452,30 @@ mod tests {
         let [little, much] = [2.999, 2.98].map(|x| gouge(&flat, Point3::new(-x, 3.0, -2.0), 0.1));
         assert!(little.max_depth_mm < 1e-6, "{little:?}");
         assert!((much.max_depth_mm - 2.0).abs() < 1e-6, "{much:?}");
+        // At a corner it comes over the part beside one of the borders only.
+        let corner = gouge(&flat, Point3::new(-2.99975, 0.0027, -0.3), 0.1);
+        assert!(corner.max_depth_mm < 1e-6, "{corner:?}");
+    }
+
+    /// A ball comes half a micrometre too near to the corner of a slope, its flank along the normal: what is left is as near. Forty times
+    /// nearer it is a gouge.
+    #[test]
+    fn a_steep_flank_at_a_corner_is_as_deep_as_what_is_left_is_near() {
+        let slope = TriangleMesh::new(
+            [[0.0, 0.0, 0.0], [8.0, 0.0, 3.76], [0.0, 6.0, 0.0], [8.0, 6.0, 3.76]].map(Point3::from).to_vec(),
+            vec![[0, 1, 2], [1, 3, 2]],
+        );
+        let part = Part::from_mesh(slope.unwrap().0);
+        let normal = Vector3::new(-3.76, 0.0, 8.0).normalize();
+        let aside = Vector3::new(-0.88, 0.2, -0.4243).normalize();
+        assert!((normal.dot(&aside) + 0.01).abs() < 1e-3);
+        let deepest = |near: f64| {
+            let centre = Point3::new(8.0, 0.0, 3.76) - aside * (3.0 - near);
+            let tip = centre - Vector3::z() * 3.0;
+            let plunge = vec![Point3::new(tip.x, tip.y, 10.0), tip];
+            gouge_of(&part, &Cutter::ball(6.0).unwrap(), &[plunge], 0.1).max_depth_mm
+        };
+        assert!(deepest(0.0005) < LIMITS.gouge);
+        assert!(deepest(0.02) > 2.0 * LIMITS.gouge);
     }
 }

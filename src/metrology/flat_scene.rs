@@ -44,7 +44,7 @@ pub(super) fn gouge_of(part: &Part, cutter: &Cutter, passes: &[Vec<Point3>], cel
         borders: true,
         most_cells: 1 << 20,
         most_squares: 1 << 20,
-        is_first_look: false,
+        is_first_look: true,
     };
     // How high what is left stands is of no account.
     let limits = Limits { scallop: 1e3, uncut: 1e3, ..LIMITS };
