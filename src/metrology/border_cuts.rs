@@ -261,7 +261,8 @@ impl Inspection<'_> {
         let end = (far / length).min(0.5);
         let value = |share: f64| {
             let (place, normal) = design(share);
-            let nearby = design(share.clamp(end, 1.0 - end)).0 + piece.inward * far;
+            let from_end = (piece.ends[1] - piece.ends[0]) * (share.clamp(end, 1.0 - end) - share);
+            let nearby = place + from_end + piece.inward * far;
             let inside = nearby.z - self.surface.envelope.height(by, nearby.x, nearby.y)?;
             let mut along = depth(self.surface, by, &place, &normal)?;
             if along.is_infinite() || piece.leads_out(&normal) {
@@ -281,12 +282,10 @@ impl Inspection<'_> {
         let bend = 3.0 * piece.bend;
         let mut best: Option<(f64, f64)> = None;
         let mut left = f64::NEG_INFINITY;
-        // What is cut inside is the same from an end to where it is looked for there.
-        let mut shares = [0.0, end, nearest, 1.0 - end, 1.0];
-        shares.sort_by(f64::total_cmp);
+        let shares = [0.0, nearest, 1.0];
         let values = shares.map(value);
         let mut open: Vec<_> =
-            (0..4).map(|k| (shares[k], values[k], shares[k + 1], values[k + 1], MOST_HALVINGS)).collect();
+            (0..2).map(|k| (shares[k], values[k], shares[k + 1], values[k + 1], MOST_HALVINGS)).collect();
         // Returns the depth of the deepest place, and the cut of this one where it lies on a ridge.
         let mut keep = |share: f64, found: Option<PlaceDepth>| {
             let most = best.map_or(known, |(most, _)| most.max(known));
@@ -316,7 +315,10 @@ impl Inspection<'_> {
                         m.max(a).max(b).max(2.0 * m - a.min(b))
                     };
                     let bend = bend * (b - a) * (b - a);
-                    counted(most(&|at| at.along) + bend, most(&|at| at.inside) + bend)
+                    // Near an end the inside is that of another place.
+                    let has_bend = [end, 1.0 - end].iter().any(|place| a < *place && *place < b);
+                    let inside = if has_bend { f64::INFINITY } else { most(&|at| at.inside) + bend };
+                    counted(most(&|at| at.along) + bend, inside)
                 }
                 (None, None, _) | (_, None, None) if halvings == 0 => f64::NEG_INFINITY,
                 _ => f64::INFINITY,
