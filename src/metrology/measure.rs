@@ -85,7 +85,8 @@ pub fn measure_with_walls(
         meetings: &Meetings::new(&surface, cutters, path, None),
         grid,
         walls: walls.as_ref(),
-        every_move: Some(&every_move),
+        // What is left where a ridge is none comes to light in the search for the highest material alone.
+        every_move: asked.borders.then_some(&every_move),
     };
     let mut found = inspect(&inspection, path, 0.0, monitor)?;
     let highest_ridge = found.ridges.highest_sample();
@@ -118,7 +119,7 @@ pub fn measure_with_walls(
     if asked.borders {
         inspection.cut_borders(&mut measured.gouge, monitor)?;
     }
-    let was_doubted = doubt(&mut measured, &inspection);
+    let was_doubted = doubt(&mut measured, part, &every_move, bound);
     if !asked.borders {
         measured.excess = ExcessFigures::of_cells(&measured);
         tell_doubt(&mut measured, was_doubted);
@@ -221,12 +222,9 @@ fn raise_highest_ridge(measured: &mut Measurement, inspection: &Inspection<'_>, 
 
 /// Where a move that no cell saw cuts the highest uncut place away, the figure is too great by an unknown amount: its bound becomes the
 /// figure itself. Whether that is so.
-fn doubt(measured: &mut Measurement, inspection: &Inspection<'_>) -> bool {
-    let Inspection { part, every_move, asked, .. } = *inspection;
+fn doubt(measured: &mut Measurement, part: &Part, every_move: &EveryMove<'_>, asked: f64) -> bool {
     let uncut = &mut measured.uncut;
-    let cut_away = |at: &Point3| {
-        every_move.is_some_and(|every_move| every_move.cuts_away(&(at - Vector3::z() * asked)).is_some())
-    };
+    let cut_away = |at: &Point3| every_move.cuts_away(&(at - Vector3::z() * asked)).is_some();
     let highest = uncut.regions.first().and_then(|r| Some((r, part.highest_at(r.at_mm[0], r.at_mm[1])?)));
     let is_doubted =
         highest.is_some_and(|(r, design)| cut_away(&(design.point + design.normal * r.height_mm)));
