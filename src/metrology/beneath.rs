@@ -36,11 +36,24 @@ impl Thin {
         self.other.is_some_and(|other| normal.dot(&other) > SHARP)
     }
 
-    /// Out of a sharp ridge, unit length; `None` between the sides of a thin part, at a wall, and where the part bends.
-    pub fn out_of_ridge(&self, normal: &Vector3) -> Option<Vector3> {
+    /// The sum of the unit normals of both faces of a sharp ridge, along their middle; `None` between the sides of a thin part, at a wall, and
+    /// where the part bends.
+    pub fn ridge(&self, normal: &Vector3) -> Option<Vector3> {
         let other = self.other.filter(|_| !self.is_blunt(normal))?;
-        (normal + other).try_normalize(LEAST_RIDGE)
+        Some(normal + other).filter(leads_out)
     }
+}
+
+/// Whether a sum of unit normals of faces tells a way out of the part: where faces look apart it does not.
+pub(crate) fn leads_out(sum: &Vector3) -> bool {
+    sum.norm() > LEAST_RIDGE
+}
+
+/// Outward unit normal of the face through which a line from a place of the part comes out before it has run so far along a
+/// unit vector, mm; `None` where it ends in the part. What does not go down has not left.
+pub(crate) fn face_before(part: &Part, place: &Point3, along: &Vector3, way: f64) -> Option<Vector3> {
+    let (face, distance) = part.closest_point(&(place + along * way));
+    (way < 0.0 && distance > NUMERICAL_FLOOR).then_some(face.normal)
 }
 
 /// What part of the surface bounds the solid, besides the place itself.

@@ -13,7 +13,7 @@ use super::figures::{
 use super::meetings::Meetings;
 use super::regions::connected;
 use super::walls::Walls;
-use crate::beneath::{Bounding, thinner};
+use crate::beneath::{Bounding, face_before, thinner};
 use crate::closer;
 use crate::facing::LEAST_FACING;
 use geometry::{Point2, Point3, Vector2, Vector3};
@@ -157,10 +157,9 @@ impl Inspection<'_> {
             other.normal.z > LEAST_FACING && !is_below
         };
         let bounding = Bounding { counts: &is_highest, walls: false };
-        let out = thinner(self.part, p, normal, depth, bounding)?.out_of_ridge(normal)?;
+        let out = thinner(self.part, p, normal, depth, bounding)?.ridge(normal)?.normalize();
         let cut = self.surface.along_normal(p, &out)?;
-        let left = p + out * cut.distance;
-        if -cut.distance >= depth || self.part.closest_point(&left).1 > NUMERICAL_FLOOR {
+        if -cut.distance >= depth || face_before(self.part, p, &out, cut.distance).is_some() {
             return None;
         }
         let tan = cut.slope / (1.0 - cut.slope * cut.slope).max(f64::MIN_POSITIVE).sqrt();

@@ -6,9 +6,9 @@
 use std::collections::BinaryHeap;
 
 use super::ridges::Crossing;
-use super::{NormalInspection, Sample};
+use super::{NormalInspection, Sample, Way};
 use crate::figures::{Limits, NUMERICAL_FLOOR};
-use geometry::Point3;
+use geometry::{Point3, Vector3};
 use work::monitor::{self, Cancelled, Monitor};
 
 /// Triangles that are divided at most in search of extremes. Each asks for some ten places.
@@ -19,6 +19,9 @@ const DECIDING: f64 = 1e-3;
 
 /// A triangle is divided at most so often in a row: to a millionth of its side.
 const MOST_DEPTH: u32 = 20;
+
+/// Ways out of ridges are the same where the cosine between them is less than one by no more: an angle of a thousandth.
+const ALIKE: f64 = 1e-6;
 
 /// What may be found in a triangle, mm: the greatest depth, the highest uncut place, the highest ridge, the highest place along
 /// the border that passes came down to.
@@ -185,14 +188,33 @@ fn depth_by_tangents(samples: &[Sample; 3], by: u32) -> f64 {
     let hollow = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| rise(samples, i, j)).into_iter().fold(0.0, f64::max);
     let of_corner = |i: usize| {
         let sample = &samples[i];
-        let hit = sample.hit.filter(|hit| hit.by == by && hit.direction.is_none())?;
-        let cos = hit.normal.dot(&sample.place.normal);
-        let across = hit.normal - sample.place.normal * cos;
+        let hit = sample.hit.filter(|hit| hit.by == by)?;
+        // Along the normals the design counts as plane; on a ridge the plane is met in the same direction all over the triangle.
+        let (cos, across, hollow) = match hit.way {
+            Way::Normal => {
+                let cos = hit.normal.dot(&sample.place.normal);
+                (cos, hit.normal - sample.place.normal * cos, hollow)
+            }
+            Way::OutOfRidge(out) if is_one_ridge(samples, &out) => {
+                let cos = hit.normal.dot(&out);
+                (cos, hit.normal, hollow / cos)
+            }
+            Way::OutOfRidge(_) | Way::Thickness => return None,
+        };
         // The height falls toward where the cut's normal leans.
         let fall = |j: usize| if cos > 0.0 { across.dot(&way(i, j)) / cos } else { f64::INFINITY };
         Some((0..3).filter(|&j| j != i).map(fall).fold(0.0, f64::max) - hit.deviation + hollow)
     };
     (0..3).filter_map(of_corner).fold(f64::INFINITY, f64::min)
+}
+
+/// Whether no corner of a triangle lies on a ridge that leads out another way.
+fn is_one_ridge(samples: &[Sample; 3], out: &Vector3) -> bool {
+    samples.iter().filter_map(|sample| sample.hit).all(|hit| match hit.way {
+        Way::Normal => true,
+        Way::OutOfRidge(other) => other.dot(out) > 1.0 - ALIKE,
+        Way::Thickness => false,
+    })
 }
 
 /// How the design rises off its tangent planes at both ends of a side, together, mm: positive where it is hollow.

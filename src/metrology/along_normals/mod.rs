@@ -49,6 +49,17 @@ use ridges::{CLOSE, Crossing, Finder};
 pub use swept_volume::{FirstCut, RaysCut, RaysCutInTurn, SweptVolume, VoxelCut};
 use work::monitor::{self, Cancelled, Monitor};
 
+/// What a deviation is measured along.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Way {
+    /// The normal of the place.
+    Normal,
+    /// This unit vector out of a ridge that is thinner than the cut along the normal is deep.
+    OutOfRidge(Vector3),
+    /// The thickness of the part, all of which is lost.
+    Thickness,
+}
+
 /// The cut surface where the normal of a design point meets it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NormalHit {
@@ -58,9 +69,8 @@ pub struct NormalHit {
     pub by: u32,
     /// Unit normal of the cut surface, away from the material.
     pub normal: Vector3,
-    /// The unit vector along which the cut was met, where that is not the normal of the place: out of a ridge that is thinner than the cut along
-    /// the normal is deep.
-    pub direction: Option<Vector3>,
+    /// What was measured along.
+    pub way: Way,
     /// Where the engine may begin to look beside this place.
     pub seed: usize,
     /// How much deeper than it was found the cut may be, mm.
@@ -118,9 +128,16 @@ impl Sample {
     /// How fast the deviation changes along the surface: the tangent of the angle between cut and design; on a ridge at most.
     fn slope(&self) -> f64 {
         self.hit.map_or(0.0, |hit| {
-            let cos = hit.normal.dot(&hit.direction.unwrap_or(self.place.normal));
-            let tan = if cos > 0.0 { (1.0 / (cos * cos) - 1.0).max(0.0).sqrt() } else { f64::INFINITY };
-            if hit.direction.is_some() { 1.0 + tan } else { tan }
+            let tan = |along: &Vector3| {
+                let cos = hit.normal.dot(along);
+                if cos > 0.0 { (1.0 / (cos * cos) - 1.0).max(0.0).sqrt() } else { f64::INFINITY }
+            };
+            match hit.way {
+                Way::Normal => tan(&self.place.normal),
+                Way::OutOfRidge(out) => 1.0 + tan(&out),
+                // It grows no faster than the distance from where the sides meet.
+                Way::Thickness => 1.0,
+            }
         })
     }
 }

@@ -3,9 +3,8 @@
 //! A normal through a thin trailing edge comes out on the far side, where the passes of that side have cut everything. So cuts
 //! are looked for close to the design first, and count only as far as a ball fits inside the part.
 
-use super::{AlongNormal, NormalHit};
-use crate::beneath::{Bounding, ball_beneath, thinner};
-use crate::figures::NUMERICAL_FLOOR;
+use super::{AlongNormal, NormalHit, Way};
+use crate::beneath::{Bounding, ball_beneath, face_before, leads_out, thinner};
 use cutter::Solid;
 use geometry::{Aabb, Point3, Vector3};
 use motion::Toolpath;
@@ -66,7 +65,7 @@ impl FirstCut for RaysCut<'_> {
             deviation: hit.s,
             by: hit.index,
             normal: cut,
-            direction: None,
+            way: Way::Normal,
             seed,
             uncertain: 0.0,
         })
@@ -115,7 +114,7 @@ impl FirstCut for VoxelCut<'_> {
     ) -> Option<NormalHit> {
         let exit = self.engine.first_exit(self.voxels, point, normal, range)?;
         let (deviation, by, uncertain) = (exit.s, exit.index, exit.uncertain);
-        Some(NormalHit { deviation, by, normal: exit.normal, direction: None, seed: 0, uncertain })
+        Some(NormalHit { deviation, by, normal: exit.normal, way: Way::Normal, seed: 0, uncertain })
     }
 }
 
@@ -150,24 +149,35 @@ impl SweptVolume<'_> {
         })
     }
 
-    /// The cut of a ridge, no deeper than the second of two depths, mm: first no deeper than the first is looked, since deep
-    /// in the part others may have cut.
+    /// The cut of a ridge whose faces have this sum of unit normals, no deeper than the second of two depths, mm: first no
+    /// deeper than the first is looked, since deep in the part others may have cut.
     fn on_ridge(
         &self,
         point: &Point3,
-        out: &Vector3,
-        [mut depth, most]: [f64; 2],
-        near: Option<&NormalHit>,
-    ) -> Option<NormalHit> {
+        mut normals: Vector3,
+        [first, most]: [f64; 2],
+        found: NormalHit,
+    ) -> NormalHit {
+        let (mut depth, mut is_corner) = (first, false);
         loop {
             depth = depth.min(most);
-            let hit = self.cut.first_cut(point, out, [-depth, self.outward], near)?;
-            // What is left beyond the part is no part of the ridge.
-            let left = point + out * hit.deviation;
-            let is_left = hit.deviation > -depth && self.part.closest_point(&left).1 <= NUMERICAL_FLOOR;
-            if is_left || depth >= most {
-                let hit = if is_left { hit } else { NormalHit { deviation: -most, ..hit } };
-                return Some(NormalHit { deviation: hit.deviation.min(0.0), direction: Some(*out), ..hit });
+            let out = normals.normalize();
+            let hit = self.cut.first_cut(point, &out, [-depth, self.outward], Some(&found));
+            // Where nothing was cut, or only above the place, it stands.
+            let hit = hit.unwrap_or(NormalHit { deviation: 0.0, normal: out, ..found });
+            let deviation = hit.deviation.min(0.0);
+            let met = NormalHit { deviation, way: Way::OutOfRidge(out), ..hit };
+            // What is left beyond the part is no part of the ridge. Where the way leads out through a third face, it is a corner.
+            let face = face_before(self.part, point, &out, deviation);
+            if face.is_none() && deviation > -depth {
+                return met;
+            }
+            if let Some(corner) = face.map(|face| normals + face).filter(|sum| !is_corner && leads_out(sum)) {
+                (normals, depth, is_corner) = (corner, first, true);
+                continue;
+            }
+            if depth >= most {
+                return NormalHit { deviation: -most, ..met };
             }
             depth *= DEEPER;
         }
@@ -200,14 +210,13 @@ impl AlongNormal for SweptVolume<'_> {
         if is_near && thin.is_blunt(normal) {
             return Some(found);
         }
-        match thin.out_of_ridge(normal) {
-            Some(way) => Some(self.on_ridge(point, &way, [2.0 * thin.radius, depth], near).unwrap_or(found)),
+        match thin.ridge(normal) {
+            Some(normals) => Some(self.on_ridge(point, normals, [2.0 * thin.radius, depth], found)),
             // What the far side of a thin part has lost is no loss of this one.
             None => {
                 let hit = look(thin.radius)?;
-                // All of that: it grows no faster than the distance from where the sides meet.
                 let is_all = hit.deviation <= -thin.radius && !thin.is_blunt(normal);
-                Some(if is_all { NormalHit { direction: Some(hit.normal), ..hit } } else { hit })
+                Some(NormalHit { way: if is_all { Way::Thickness } else { hit.way }, ..hit })
             }
         }
     }

@@ -37,7 +37,7 @@ impl AlongNormal for BruteForce<'_> {
                     let t = ((at - a).dot(&(b - a)) / (b - a).norm_squared()).clamp(0.0, 1.0);
                     let inward = (a + (b - a) * t - at) / RADIUS;
                     best = Some(NormalHit {
-                        direction: None,
+                        way: Way::Normal,
                         deviation: s,
                         by: k as u32,
                         normal: inward,
@@ -246,6 +246,39 @@ fn a_cut_beside_the_border_of_a_sheet_is_as_deep_as_it_is_far_from_its_wall() {
             gouge.error_bound_mm < to_limit && gouge.error_bound_mm < 2.5e-3,
             "{deep}: {truth} {gouge:?}"
         );
+    }
+}
+
+/// A wall, the ground that falls from its crest, and walls at both ends of it, cut as deep as the ground lies below its passes: the way inward
+/// from the crest leads out over the ground, and at the corners from ridge to ridge over a third face.
+#[test]
+fn a_crest_that_stands_is_no_gouge_and_its_corners_are_as_deep_as_they_are_lower() {
+    let (fall, low) = (0.45, -4.0);
+    let top = [[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]];
+    let above = top.map(|[x, y]| Point3::new(x, y, -fall * y));
+    let below = top.map(|[x, y]| Point3::new(x, y, low));
+    let triangles =
+        vec![[0, 1, 2], [0, 2, 3], [4, 5, 1], [4, 1, 0], [5, 6, 2], [5, 2, 1], [7, 4, 0], [7, 0, 3]];
+    let mesh = TriangleMesh::new([above, below].concat(), triangles).unwrap().0;
+    let part = Part::from_mesh(mesh);
+    let normal = Vector3::new(0.0, fall, 1.0).normalize();
+    let ball = Cutter::ball(2.0 * RADIUS).unwrap();
+    let solid = Solid::of_cutter(&ball, None);
+    for deep in [-2e-5, 1e-3] {
+        let tip = |k: usize| {
+            let y = 0.25 * k as f64;
+            let centre = Point3::new(0.0, y, -fall * y) + normal * (RADIUS - deep);
+            [centre.y, centre.z - RADIUS]
+        };
+        let path = path(&along_x(&(0..13).map(tip).collect::<Vec<_>>()));
+        let rays = Rays::new(&path, &solid, &Silent).unwrap();
+        let by_rays = RaysCut { rays: &rays, path: &path, solid: &solid };
+        let cut = swept(&part, &by_rays, 1.0);
+        let (found, _) =
+            measure_along_normals(&part, &ball, &path, &cut, 0.1, &LIMITS, 1e-4, None, &Silent).unwrap();
+        let gouge = &found.gouge;
+        assert!(gouge.max_depth_mm >= deep && gouge.max_depth_mm <= 3.0 * deep.max(0.0), "{deep}: {gouge:?}");
+        assert!(gouge.max_depth_mm + gouge.error_bound_mm < LIMITS.gouge, "{deep}: {gouge:?}");
     }
 }
 

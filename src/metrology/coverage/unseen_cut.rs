@@ -10,7 +10,7 @@ use geometry::{Point3, Vector3};
 use super::{STEEP, sees_level};
 use motion::{MoveKind, Toolpath};
 
-use crate::along_normals::{AlongNormal, NormalHit, SweptVolume};
+use crate::along_normals::{AlongNormal, NormalHit, SweptVolume, Way};
 use crate::beneath::ball_beneath;
 use crate::facing::Facing;
 use crate::figures::NUMERICAL_FLOOR;
@@ -63,7 +63,7 @@ impl UnseenCut<'_> {
             return Some(capped);
         }
         // As deep as the top says, which is measured there.
-        Some(NormalHit { deviation: 0.0, normal: *normal, direction: None, ..capped })
+        Some(NormalHit { deviation: 0.0, normal: *normal, way: Way::Normal, ..capped })
     }
 
     /// Whether the line through a place stays below all that cuts.
@@ -90,7 +90,7 @@ impl AlongNormal for UnseenCut<'_> {
             Some(hit).filter(|hit| hit.deviation <= self.cut.way_out(point, normal))?
         };
         // At the very edge the slope of a cut is that against the surface on the other side.
-        Some(if at_edge { NormalHit { normal: *normal, direction: None, ..hit } } else { hit })
+        Some(if at_edge { NormalHit { normal: *normal, way: Way::Normal, ..hit } } else { hit })
     }
 
     fn reach(&self) -> f64 {
