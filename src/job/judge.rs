@@ -56,9 +56,13 @@ fn gouge(measured: &Measurement, limits: &Limits, program: &str) -> Claim {
         text += &worst.tool.map_or_else(String::new, |tool| format!(", tool {tool}"));
         text += &others(figures.region_count);
     }
-    let (depth, bound) = (figures.max_depth_mm, figures.error_bound_mm);
-    Claim { measured: known(measured, depth), ..length("gouge", Gravity::Scrap, limits.gouge, depth, bound) }
-        .told(text)
+    let (depth, bound, least) = (figures.max_depth_mm, figures.error_bound_mm, figures.at_least_mm);
+    let at_least = Some(least).filter(|least| *least > 0.0);
+    if depth - bound <= limits.gouge && least > limits.gouge {
+        text += &format!("; {} µm are cut for certain", micrometres(at_least));
+    }
+    let claim = length("gouge", Gravity::Scrap, limits.gouge, depth, bound);
+    Claim { measured: known(measured, depth), at_least, ..claim }.told(text)
 }
 
 fn uncut(measured: &Measurement, limits: &Limits) -> Claim {

@@ -141,6 +141,9 @@ pub struct GougeFigures {
     pub area_mm2: f64,
     /// Bound of the error of `max_depth_mm`.
     pub error_bound_mm: f64,
+    /// So deep something is cut for certain; 0 where that is not known.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub at_least_mm: f64,
     /// The deepest regions, deepest first.
     pub regions: Vec<GougeRegion>,
     /// Number of regions found, listed or not.
@@ -338,6 +341,7 @@ impl Measurement {
     /// Widens the bounds of all heights and depths by how far the path may be off the one that was measured, mm.
     pub fn widen(&mut self, by: f64) {
         let Self { scallop, gouge, uncut, excess, .. } = self;
+        gouge.at_least_mm = (gouge.at_least_mm - by).max(0.0);
         let bounds = [&mut gouge.error_bound_mm, &mut uncut.error_bound_mm];
         let highest = [&mut excess.highest, &mut excess.reached, &mut excess.unreached];
         let highest = highest.map(|bounded| {

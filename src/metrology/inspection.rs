@@ -288,6 +288,7 @@ impl Inspection<'_> {
         let value = |d: &Deviation, lean: f64, half: f64| self.depth(d, lean, half);
         let found = self.between_centres(cells, figures.max_depth_mm, &|k| samples[k], &value, monitor)?;
         figures.max_depth_mm = found.greatest.map_or(figures.max_depth_mm, |(depth, _)| depth);
+        figures.at_least_mm = (figures.max_depth_mm - NUMERICAL_FLOOR).max(0.0);
         figures.error_bound_mm += found.possible - figures.max_depth_mm;
         if let Some((depth, q)) = found.greatest.filter(|(depth, _)| *depth > self.limits.gouge) {
             let cell = self.grid.cell_at(q.x, q.y).map(|(i, j)| self.grid.index(i, j) as u32);

@@ -3,10 +3,11 @@
 //! Enters: triangles with what was cut at their corners and the ridges that cross them. Leaves: the greatest figures, and
 //! how much they may still be exceeded by. mm.
 
+use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use super::ridges::Crossing;
-use super::{NormalInspection, Sample, Way};
+use super::{GRAZING, NormalInspection, Sample, Way};
 use crate::figures::{Limits, NUMERICAL_FLOOR};
 use geometry::{Point3, Vector3};
 use work::monitor::{self, Cancelled, Monitor};
@@ -22,6 +23,19 @@ const MOST_DEPTH: u32 = 20;
 
 /// Ways out of ridges are the same where the cosine between them is less than one by no more: an angle of a thousandth.
 const ALIKE: f64 = 1e-6;
+
+/// What is searched for, in this order.
+#[derive(Debug, Clone, Copy)]
+enum Figure {
+    Depth,
+    Ridge,
+    Border,
+    Uncut,
+}
+
+impl Figure {
+    const ALL: [Self; 4] = [Self::Depth, Self::Ridge, Self::Border, Self::Uncut];
+}
 
 /// What may be found in a triangle, mm: the greatest depth, the highest uncut place, the highest ridge, the highest place along
 /// the border that passes came down to.
@@ -50,38 +64,59 @@ impl Possible {
         }
     }
 
+    fn of(&self, figure: Figure) -> f64 {
+        match figure {
+            Figure::Depth => self.depth,
+            Figure::Ridge => self.ridge,
+            Figure::Border => self.border,
+            Figure::Uncut => self.uncut,
+        }
+    }
+
     /// By how much the figures may be exceeded, none by less than nothing, mm.
     fn beyond(self, greatest: &Greatest, limits: &Limits) -> Self {
+        let beyond = |figure| (self.of(figure) - greatest.known(figure, limits)).max(0.0);
         Self {
-            depth: (self.depth - greatest.depth).max(0.0),
-            uncut: (self.uncut - greatest.highest_uncut(limits)).max(0.0),
-            ridge: (self.ridge - greatest.highest_ridge()).max(0.0),
-            border: (self.border - greatest.highest_place()).max(0.0),
+            depth: beyond(Figure::Depth),
+            uncut: beyond(Figure::Uncut),
+            ridge: beyond(Figure::Ridge),
+            border: beyond(Figure::Border),
         }
     }
 
     pub fn greatest(self) -> f64 {
         self.depth.max(self.uncut).max(self.ridge).max(self.border)
     }
+}
 
-    /// Whether it is to be known more closely: where a figure may be exceeded by more than is `asked`, or a limit hangs on it.
-    fn is_open(self, greatest: &Greatest, limits: &Limits, asked: f64) -> bool {
-        let open = |possible: f64, known: f64, limit: f64| {
-            // Figures have this floor on top.
-            let decides = known <= limit && possible + 2.0 * NUMERICAL_FLOOR > limit;
-            possible - known > if decides { DECIDING * asked } else { asked }.max(NUMERICAL_FLOOR)
+/// How closely figures are to be known.
+struct Wanted<'a> {
+    limits: &'a Limits,
+    /// Error bound that is asked for, mm.
+    asked: f64,
+}
+
+impl Wanted<'_> {
+    /// Whether a figure is to be known more closely: where it may be exceeded by more than is asked, or a limit hangs on it.
+    fn is_open(&self, possible: &Possible, figure: Figure, greatest: &Greatest) -> bool {
+        let limit = match figure {
+            Figure::Depth => self.limits.gouge,
+            Figure::Uncut => self.limits.uncut,
+            Figure::Ridge | Figure::Border => self.limits.scallop,
         };
-        open(self.depth, greatest.depth, limits.gouge)
-            || open(self.uncut, greatest.highest_uncut(limits), limits.uncut)
-            || open(self.ridge, greatest.highest_ridge(), limits.scallop)
-            || open(self.border, greatest.highest_place(), limits.scallop)
+        let (possible, known) = (possible.of(figure), greatest.known(figure, self.limits));
+        // Figures have this floor on top.
+        let decides = known <= limit && possible + 2.0 * NUMERICAL_FLOOR > limit;
+        possible - known > if decides { DECIDING * self.asked } else { self.asked }.max(NUMERICAL_FLOOR)
+    }
+
+    fn is_any_open(&self, possible: &Possible, greatest: &Greatest) -> bool {
+        Figure::ALL.into_iter().any(|figure| self.is_open(possible, figure, greatest))
     }
 }
 
-/// A triangle with what may be found in it, by promise.
+/// A triangle with what may be found in it.
 struct Open {
-    /// How much any figure may exceed what was known when it was opened, mm.
-    promise: f64,
     possible: Possible,
     samples: [Sample; 3],
     /// Which of its sides are the border of the part.
@@ -89,26 +124,14 @@ struct Open {
     depth: u32,
 }
 
-impl PartialEq for Open {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Open {}
-
-impl PartialOrd for Open {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Open {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+impl Open {
+    /// The order of two by what they promise of a figure.
+    fn by_promise(&self, other: &Self, figure: Figure) -> Ordering {
         let place = |open: &Self| open.samples[0].place.point;
         let (a, b) = (place(self), place(other));
-        self.promise
-            .total_cmp(&other.promise)
+        self.possible
+            .of(figure)
+            .total_cmp(&other.possible.of(figure))
             .then(b.x.total_cmp(&a.x))
             .then(b.y.total_cmp(&a.y))
             .then(b.z.total_cmp(&a.z))
@@ -116,11 +139,55 @@ impl Ord for Open {
     }
 }
 
+/// A triangle that waits for its turn in the search for a figure.
+struct Waiting {
+    figure: Figure,
+    open: Open,
+}
+
+impl PartialEq for Waiting {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Waiting {}
+
+impl PartialOrd for Waiting {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Waiting {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.open.by_promise(&other.open, self.figure)
+    }
+}
+
+/// Keeps no more triangles than so many: of each figure the most promising ones. Returns what is possible in the others.
+fn keep_most_promising(open: &mut Vec<Open>, most: usize) -> Possible {
+    let mut kept = 0;
+    for (turn, figure) in Figure::ALL.into_iter().enumerate() {
+        let share = (most - kept) / (Figure::ALL.len() - turn);
+        let rest = &mut open[kept..];
+        if share < rest.len() {
+            rest.select_nth_unstable_by(share, |a, b| b.by_promise(a, figure));
+            kept += share;
+        } else {
+            kept = open.len();
+        }
+    }
+    open.drain(kept..).fold(Possible::NOTHING, |all, open| all.or(open.possible))
+}
+
 /// The greatest figures found so far.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Greatest {
     pub depth: f64,
     pub deepest: Option<(Point3, u32)>,
+    /// What is cut for certain.
+    pub depth_at_least: f64,
     /// What the depth may be where it is uncertain.
     pub possible_depth: f64,
     /// The highest place that is uncut, with its height, mm, as far as ridges were known when it was found.
@@ -128,15 +195,18 @@ pub(super) struct Greatest {
     /// The highest ridge, where it is, and how much lower it may be.
     pub ridge: Option<(f64, Point3, f64)>,
     /// The highest place up to the uncut tolerance, with its height, mm.
-    pub place: Option<(f64, Point3)>,
+    pub place: Option<(f64, Sample)>,
 }
 
 impl Greatest {
     pub fn look_at(&mut self, sample: &Sample, limits: &Limits) {
         let Some(hit) = sample.hit else { return };
-        if hit.deviation <= limits.uncut && hit.deviation > self.highest_place() {
-            self.place = Some((hit.deviation, sample.place.point));
+        let rounding = GRAZING * sample.slope();
+        let height = hit.deviation - rounding;
+        if height <= limits.uncut && height > self.highest_place() {
+            self.place = Some((height, *sample));
         }
+        self.depth_at_least = self.depth_at_least.max(-hit.deviation - rounding - NUMERICAL_FLOOR);
         self.possible_depth = self.possible_depth.max(hit.uncertain - hit.deviation);
         if -hit.deviation > self.depth {
             (self.depth, self.deepest) = (-hit.deviation, Some((sample.place.point, hit.by)));
@@ -149,6 +219,16 @@ impl Greatest {
         let higher = height > self.highest_uncut(inspection.limits);
         if higher && inspection.is_uncut(sample, self.highest_ridge()) {
             self.uncut = Some((height, *sample));
+        }
+    }
+
+    /// What a triangle must exceed to change a figure, mm.
+    fn known(&self, figure: Figure, limits: &Limits) -> f64 {
+        match figure {
+            Figure::Depth => self.depth,
+            Figure::Ridge => self.highest_ridge(),
+            Figure::Border => self.highest_place(),
+            Figure::Uncut => self.highest_uncut(limits),
         }
     }
 
@@ -248,10 +328,26 @@ impl NormalInspection<'_> {
             let depth = self.depth_around(samples, hit.by, far).min(depth_by_tangents(samples, hit.by));
             found.depth = found.depth.max(depth.min(self.engine.depth()));
         }
+        // Beside what is cut steeply little may be cut all the same.
+        if found.depth > greatest.depth + far {
+            found.depth = found.depth.min(self.depth_by_distance(samples));
+        }
         found.border = self.border_at_most(samples, on_border, crossings);
         let ridge = |c: &Crossing| (c.height + c.rise * longest).min(self.engine.reach().max(c.height));
         found.ridge = crossings.iter().map(ridge).fold(found.ridge, f64::max);
         found
+    }
+
+    /// How deep anything may be cut along the normals of a triangle, by how near tools come to the line along one of them, mm.
+    fn depth_by_distance(&self, samples: &[Sample; 3]) -> f64 {
+        let places = samples.map(|sample| sample.place);
+        let middle = Point3::from(places.iter().map(|place| place.point.coords).sum::<Vector3>() / 3.0);
+        let normal = places.iter().map(|place| place.normal).sum::<Vector3>().normalize();
+        let far = places.iter().map(|place| (place.point - middle).norm()).fold(0.0, f64::max);
+        let turned = places.iter().map(|place| (place.normal - normal).norm()).fold(0.0, f64::max);
+        // The lines diverge, and the design lies beside the plane of its corners.
+        let aside = far + turned * (self.engine.depth() + far);
+        self.engine.depth_at_most(&middle, &normal, aside)
     }
 
     /// How high material stands at most along the sides of a triangle that are the border, as far as passes came down to it. What
@@ -287,7 +383,8 @@ impl NormalInspection<'_> {
         samples.iter().filter_map(of_corner).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Divides triangles, the most promising ones first. Returns by how much the figures may still be exceeded, mm.
+    /// Divides triangles, the most promising ones first, for one figure after the other: what is left open of one does not keep
+    /// another one open. Returns by how much the figures may still be exceeded, mm.
     pub fn search<'b>(
         &self,
         triangles: impl Iterator<Item = ([Sample; 3], [bool; 3], &'b [Crossing])>,
@@ -297,67 +394,72 @@ impl NormalInspection<'_> {
     ) -> Result<Possible, Cancelled> {
         const BATCH: usize = 64;
         monitor.start("looking closer", 0);
-        let (mut heap, mut divided, mut closed) = (BinaryHeap::new(), 0, Possible::NOTHING);
-        let mut settled = Possible::NOTHING;
+        let wanted = Wanted { limits: self.limits, asked };
         // What promises little is not kept, but counts.
-        let mut keep = |samples: [Sample; 3],
-                        on_border: [bool; 3],
-                        crossings: &[Crossing],
-                        depth: u32,
-                        greatest: &Greatest| {
-            let possible = self.possible(&samples, on_border, crossings, greatest);
-            let promise = possible.beyond(greatest, self.limits).greatest();
-            if !possible.is_open(greatest, self.limits, asked) || depth == MOST_DEPTH {
-                closed = closed.or(possible);
-                return None;
-            }
-            Some(Open { promise, possible, samples, on_border, depth })
-        };
-        let mut first: Vec<Open> = Vec::new();
-        let mut dropped = Possible::NOTHING;
-        // No more than so many will be divided; of the others what is possible counts.
-        let mut least_promising = |first: &mut Vec<Open>| {
-            if first.len() > self.most_divided {
-                first.select_nth_unstable_by(self.most_divided, |a, b| b.cmp(a));
-                dropped = first.drain(self.most_divided..).fold(dropped, |all, open| all.or(open.possible));
-            }
-        };
+        let mut closed = Possible::NOTHING;
+        let mut open: Vec<Open> = Vec::new();
         for (samples, on_border, crossings) in triangles {
-            first.extend(keep(samples, on_border, crossings, 0, greatest));
-            if first.len() > 2 * self.most_divided {
-                least_promising(&mut first);
+            let possible = self.possible(&samples, on_border, crossings, greatest);
+            if wanted.is_any_open(&possible, greatest) {
+                open.push(Open { possible, samples, on_border, depth: 0 });
+            } else {
+                closed = closed.or(possible);
+            }
+            // No more than so many will be divided.
+            if open.len() > 2 * self.most_divided {
+                closed = closed.or(keep_most_promising(&mut open, self.most_divided));
             }
         }
-        least_promising(&mut first);
-        heap.extend(first);
-        while divided < self.most_divided && !heap.is_empty() {
-            monitor::check(monitor)?;
-            // More was found since some of them were put there.
-            let next = || loop {
-                let open: Open = heap.pop()?;
-                if open.possible.is_open(greatest, self.limits, asked) {
-                    return Some(open);
-                }
-                settled = settled.or(open.possible);
-            };
-            let batch: Vec<Open> = std::iter::from_fn(next).take(BATCH).collect();
-            divided += batch.len();
-            let closer = work::parallel::map(batch.len(), |k| self.divided(&batch[k].samples));
-            for (open, parts) in batch.iter().zip(closer) {
-                let [ab, bc, ca] = open.on_border;
-                let borders = [[ab, false, ca], [ab, bc, false], [false, bc, ca], [false; 3]];
-                for ((samples, Closer { middles, crossings }), on_border) in parts.into_iter().zip(borders) {
-                    crossings.iter().for_each(|crossing| greatest.look_at_ridge(crossing));
-                    for sample in &middles {
-                        greatest.look_at(sample, self.limits);
-                        greatest.look_at_height(sample, self);
+        closed = closed.or(keep_most_promising(&mut open, self.most_divided));
+        let mut left = self.most_divided;
+        for (turn, figure) in Figure::ALL.into_iter().enumerate() {
+            let mut share = left / (Figure::ALL.len() - turn);
+            left -= share;
+            let (waiting, mut others): (Vec<Open>, Vec<Open>) =
+                open.into_iter().partition(|open| wanted.is_open(&open.possible, figure, greatest));
+            let mut heap: BinaryHeap<Waiting> =
+                waiting.into_iter().map(|open| Waiting { figure, open }).collect();
+            while share > 0 && !heap.is_empty() {
+                monitor::check(monitor)?;
+                let mut batch = Vec::new();
+                while batch.len() < BATCH.min(share) {
+                    let Some(Waiting { open, .. }) = heap.pop() else { break };
+                    // More was found since some of them were put there.
+                    if wanted.is_open(&open.possible, figure, greatest) {
+                        batch.push(open);
+                    } else {
+                        others.push(open);
                     }
-                    heap.extend(keep(samples, on_border, &crossings, open.depth + 1, greatest));
+                }
+                share -= batch.len();
+                let closer = work::parallel::map(batch.len(), |k| self.divided(&batch[k].samples));
+                for (divided, parts) in batch.iter().zip(closer) {
+                    let [ab, bc, ca] = divided.on_border;
+                    let borders = [[ab, false, ca], [ab, bc, false], [false, bc, ca], [false; 3]];
+                    for ((samples, Closer { middles, crossings }), on_border) in parts.into_iter().zip(borders)
+                    {
+                        crossings.iter().for_each(|crossing| greatest.look_at_ridge(crossing));
+                        for sample in &middles {
+                            greatest.look_at(sample, self.limits);
+                            greatest.look_at_height(sample, self);
+                        }
+                        let possible = self.possible(&samples, on_border, &crossings, greatest);
+                        let open = Open { possible, samples, on_border, depth: divided.depth + 1 };
+                        if open.depth == MOST_DEPTH || !wanted.is_any_open(&possible, greatest) {
+                            closed = closed.or(possible);
+                        } else if wanted.is_open(&possible, figure, greatest) {
+                            heap.push(Waiting { figure, open });
+                        } else {
+                            others.push(open);
+                        }
+                    }
                 }
             }
+            left += share;
+            others.extend(heap.into_iter().map(|waiting| waiting.open));
+            open = others;
         }
-        let possible =
-            heap.iter().fold(closed.or(dropped).or(settled), |possible, open| possible.or(open.possible));
+        let possible = open.iter().fold(closed, |possible, open| possible.or(open.possible));
         Ok(possible.beyond(greatest, self.limits))
     }
 

@@ -49,6 +49,10 @@ use ridges::{CLOSE, Crossing, Finder};
 pub use swept_volume::{FirstCut, RaysCut, RaysCutInTurn, SweptVolume, VoxelCut};
 use work::monitor::{self, Cancelled, Monitor};
 
+/// Lines meet what was cut to within this over the sine of the angle between them, mm: ten times what rays tell, since the angle is that of
+/// a place a little before.
+const GRAZING: f64 = 1e-8;
+
 /// What a deviation is measured along.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Way {
@@ -98,6 +102,11 @@ pub trait AlongNormal: Sync {
 
     /// How far inward is looked, mm.
     fn depth(&self) -> f64;
+
+    /// How deep anything is cut at most along lines no farther than `aside` mm from that through `point` along `normal`, mm.
+    fn depth_at_most(&self, _point: &Point3, _normal: &Vector3, _aside: f64) -> f64 {
+        self.depth()
+    }
 }
 
 /// Deviations at all places of a net.
@@ -143,9 +152,10 @@ impl Sample {
 }
 
 impl Sample {
-    /// The deviation there; what stands at least where nothing was cut.
+    /// What stands there at least but for rounding, which is great where the line grazes what was cut.
     fn height(&self, engine: &dyn AlongNormal) -> f64 {
-        self.hit.map_or_else(|| engine.standing(&self.place.point, &self.place.normal), |hit| hit.deviation)
+        let standing = || engine.standing(&self.place.point, &self.place.normal);
+        self.hit.map_or_else(standing, |hit| hit.deviation - GRAZING * self.slope())
     }
 }
 
@@ -305,6 +315,7 @@ impl Along<'_> {
         let triangles = triangles.iter().enumerate().map(of_one);
         let left = inspection.search(triangles, &mut greatest, asked, monitor)?;
         gouge.max_depth_mm = greatest.depth;
+        gouge.at_least_mm = greatest.depth_at_least;
         gouge.error_bound_mm =
             left.depth + (greatest.possible_depth - greatest.depth).max(0.0) + NUMERICAL_FLOOR;
         if let (Some(first), Some((at, by))) = (gouge.regions.first_mut(), greatest.deepest) {
@@ -325,7 +336,10 @@ impl Along<'_> {
             format!("between the places on the normals {most:.1} µm more may stand or lie than was found; a smaller cell helps")
         });
         let scallop = scallop_figures(&ridge_samples, highest, limits);
-        let excess = excess_figures(greatest.place, &scallop, &uncut, left.border);
+        let mut excess = excess_figures(greatest.place, &scallop, &uncut, left.border);
+        let of_uncut = greatest.uncut.filter(|(_, sample)| inspection.is_uncut(sample, greatest.highest_ridge()));
+        excess.unreached.at_least_mm = of_uncut.map_or(0.0, |(height, sample)| certain(height, &sample));
+        excess.highest.at_least_mm = excess.reached.at_least_mm.max(excess.unreached.at_least_mm);
         let deviations: Vec<f32> =
             samples.iter().map(|sample| sample.hit.map_or(f32::NAN, |hit| hit.deviation as f32)).collect();
         let map = NormalMap {
@@ -440,7 +454,7 @@ impl NormalInspection<'_> {
 /// The highest material: of ridges, of the highest place that stands up to the uncut tolerance, where passes came down to the
 /// design, and of what is uncut. `left` is how much more than that place may stand along the border, mm.
 fn excess_figures(
-    highest: Option<(f64, Point3)>,
+    highest: Option<(f64, Sample)>,
     scallop: &ScallopFigures,
     uncut: &UncutFigures,
     left: f64,
@@ -449,8 +463,12 @@ fn excess_figures(
         at_mm: scallop.max_at_mm,
         ..Bounded::new(scallop.max_mm.unwrap_or(0.0), scallop.error_bound_mm.unwrap_or(0.0))
     };
-    let (height, at_mm) = highest.map_or((0.0, None), |(height, at)| (height, Some(at.into())));
-    let place = Bounded { at_mm, ..Bounded::new(height, left + NUMERICAL_FLOOR) };
+    let place = highest.map_or_else(Bounded::default, |(height, sample)| Bounded {
+        at_mm: Some(sample.place.point.into()),
+        at_least_mm: certain(height, &sample),
+        ..Bounded::new(height, 0.0)
+    });
+    let place = Bounded { error_bound_mm: left + NUMERICAL_FLOOR, ..place };
     let unreached = Bounded {
         at_mm: uncut.regions.first().map(|region| region.at_mm),
         ..Bounded::new(uncut.max_height_mm, uncut.error_bound_mm)
@@ -464,6 +482,11 @@ fn excess_figures(
         ExcessKind::Scallop
     };
     ExcessFigures { highest: reached.or(&unreached), kind, reached, unreached }
+}
+
+/// What of a height stands for certain, mm.
+fn certain(height: f64, sample: &Sample) -> f64 {
+    (height - sample.hit.map_or(0.0, |hit| hit.uncertain) - NUMERICAL_FLOOR).max(0.0)
 }
 
 /// Work on runs of neighbours, so that each can begin where the one before was found; in the order of the whole.

@@ -19,6 +19,10 @@ const NEAR: f64 = 0.1;
 /// How many times deeper is looked on a ridge that is cut as deep as was looked.
 const DEEPER: f64 = 4.0;
 
+/// Steps along a line in search of what was cut beside it, and the least one as a share of how far aside is looked.
+const MOST_STEPS: usize = 64;
+const LEAST_STEP: f64 = 0.05;
+
 /// An engine that tells where a line first meets what was cut.
 pub trait FirstCut: Sync {
     /// The lowest place of the line through `point` along the unit `normal`, within a range, that was cut; the begin of the
@@ -30,6 +34,12 @@ pub trait FirstCut: Sync {
         range: [f64; 2],
         near: Option<&NormalHit>,
     ) -> Option<NormalHit>;
+
+    /// Up to where, from the begin of a range on, nothing within `aside` mm of the line was cut; the begin where that is not
+    /// known.
+    fn free_up_to(&self, _point: &Point3, _normal: &Vector3, [low, _]: [f64; 2], _aside: f64) -> f64 {
+        low
+    }
 }
 
 /// The moves themselves; rapids do not cut.
@@ -70,6 +80,25 @@ impl FirstCut for RaysCut<'_> {
             uncertain: 0.0,
         })
     }
+
+    fn free_up_to(&self, point: &Point3, normal: &Vector3, [low, high]: [f64; 2], aside: f64) -> f64 {
+        let mut free = low;
+        for _ in 0..MOST_STEPS {
+            if free >= high {
+                return high;
+            }
+            // A ball about a place of the line, as far as the nearest tool, holds the surroundings of a piece of it.
+            let far = high - low + aside;
+            let distance =
+                self.rays.moves().nearest(&(point + normal * free), far).map_or(far, |hit| hit.distance);
+            let step = (distance * distance - aside * aside).max(0.0).sqrt();
+            if distance <= aside || step < LEAST_STEP * aside {
+                break;
+            }
+            free += step;
+        }
+        free
+    }
 }
 
 /// The moves of several tools, each with the index of its first one in the whole path.
@@ -93,6 +122,11 @@ impl FirstCut for RaysCutInTurn<'_> {
             Some(NormalHit { by: hit.by + first, ..hit })
         };
         self.tools.iter().filter_map(of_tool).min_by(|a, b| a.deviation.total_cmp(&b.deviation))
+    }
+
+    fn free_up_to(&self, point: &Point3, normal: &Vector3, range: [f64; 2], aside: f64) -> f64 {
+        let of_tool = |(_, cut): &(u32, RaysCut<'_>)| cut.free_up_to(point, normal, range, aside);
+        self.tools.iter().map(of_tool).fold(range[1], f64::min)
     }
 }
 
@@ -239,5 +273,9 @@ impl AlongNormal for SweptVolume<'_> {
 
     fn depth(&self) -> f64 {
         self.inward
+    }
+
+    fn depth_at_most(&self, point: &Point3, normal: &Vector3, aside: f64) -> f64 {
+        -self.cut.free_up_to(point, normal, [-self.inward, 0.0], aside)
     }
 }

@@ -282,6 +282,24 @@ fn a_crest_that_stands_is_no_gouge_and_its_corners_are_as_deep_as_they_are_lower
     }
 }
 
+/// Along the foot of a wall, a mm before it, a flat end cuts the floor: lines along the wall's normal graze what was cut, so that its slope
+/// says nothing.
+#[test]
+fn a_wall_that_nothing_comes_near_to_is_not_gouged() {
+    let corners = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 0.0, 2.0], [0.0, 0.0, 2.0]].map(Point3::from);
+    let wall = TriangleMesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]]).unwrap().0;
+    let (part, flat) = (Part::from_mesh(wall), Cutter::flat(2.0 * RADIUS).unwrap());
+    let (path, solid) = (path(&along_x(&[[-RADIUS - 1.0, 0.0]])), Solid::of_cutter(&flat, None));
+    let rays = Rays::new(&path, &solid, &Silent).unwrap();
+    let by_rays = RaysCut { rays: &rays, path: &path, solid: &solid };
+    let cut = swept(&part, &by_rays, 2.0);
+    let (found, _) =
+        measure_along_normals(&part, &flat, &path, &cut, 0.5, &LIMITS, 1e-4, None, &Silent).unwrap();
+    let gouge = &found.gouge;
+    assert!(gouge.max_depth_mm == 0.0 && gouge.error_bound_mm <= 1e-6, "{gouge:?}");
+    assert!((found.uncut.max_height_mm - 1.0).abs() < 1e-5, "{:?}", found.uncut);
+}
+
 /// Rings of constant latitude around a dome: sections across the feed are circles.
 #[test]
 fn a_dome_has_the_scallops_of_a_circle_also_where_it_is_steep() {

@@ -109,4 +109,8 @@ impl AlongNormal for UnseenCut<'_> {
     fn depth(&self) -> f64 {
         self.cut.depth()
     }
+
+    fn depth_at_most(&self, point: &Point3, normal: &Vector3, aside: f64) -> f64 {
+        self.cut.depth_at_most(point, normal, aside)
+    }
 }
