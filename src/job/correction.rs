@@ -213,6 +213,8 @@ struct Corrected<'a> {
     kept: usize,
     /// Whether places where its passes leave too much were sought beside those that ridges on coarse cells show.
     is_complete: bool,
+    /// Whether every path of the cutter leaves more than the target somewhere.
+    is_hopeless: bool,
 }
 
 impl Session {
@@ -271,6 +273,7 @@ impl Session {
             rounds,
             kept: 0,
             is_complete: false,
+            is_hopeless: false,
         };
         let looked = match looked {
             Some(looked) => looked,
@@ -368,7 +371,7 @@ impl Corrected<'_> {
         }
         let mut in_vain = 0;
         while self.rounds.len() < MOST_ROUNDS
-            && let Some(next) = self.next(in_vain, slack)
+            && let Some(next) = self.next(in_vain, slack).filter(|_| !self.ends_in_vain(in_vain))
         {
             let next = if in_vain == 0 { self.completed(next, slack, monitor)? } else { next };
             let (planned, factors) = self.plan(&next, monitor)?;
@@ -416,7 +419,8 @@ impl Corrected<'_> {
             // Ridges alone did not show what stands far above the target.
             let fails = !self.tried.standing.round.holds(&self.goal) && !self.is_near(&self.tried);
             let narrower = self.narrower.take().filter(|_| round == 0 && fails && !self.is_far_off());
-            let Some(next) = narrower.or_else(|| self.next(in_vain, MEASURED_SLACK)) else { break };
+            let next = narrower.or_else(|| self.next(in_vain, MEASURED_SLACK));
+            let Some(next) = next.filter(|_| !self.ends_in_vain(in_vain)) else { break };
             let (planned, factors) = self.plan(&next, monitor)?;
             if self.is_left_as_before(&planned, factors) {
                 let found = self.as_before(&planned, factors);
@@ -451,7 +455,7 @@ impl Corrected<'_> {
 
     /// Whether every path of an upright cutter leaves more than the target somewhere, and the best plan not much more:
     /// nearer passes would make the path longer without end.
-    fn is_too_hollow(&self, monitor: &dyn Monitor) -> Result<bool, JobError> {
+    fn is_too_hollow(&mut self, monitor: &dyn Monitor) -> Result<bool, JobError> {
         let highest = self.tried.standing.above.iter().max_by(|a, b| a.1.total_cmp(&b.1));
         let limit = self.goal.rule.highest * self.goal.target;
         let is_alone = self.request.axis.is_none() && !self.request.stock_is_previous;
@@ -460,23 +464,29 @@ impl Corrected<'_> {
         };
         let cutter = &self.session.scene.cutter;
         let left = LeastLeftFigures::at_or_elsewhere(self.session, cutter, &[(*at, limit)], monitor)?;
-        Ok(left.is_some_and(|left| self.comes_near(&left)))
+        Ok(self.leaves_nearly(left))
     }
 
     /// Whether the best plan leaves what every path of the cutter leaves.
-    fn is_unavoidable(&self, measured: &Measurement, monitor: &dyn Monitor) -> Result<bool, JobError> {
+    fn is_unavoidable(&mut self, measured: &Measurement, monitor: &dyn Monitor) -> Result<bool, JobError> {
         if self.tried.standing.round.holds(&self.goal) || self.request.stock_is_previous {
             return Ok(false);
         }
         let (session, path) = (self.session, &self.best.plan.path);
         let cutter = &session.scene.cutter;
         let left = LeastLeftFigures::above_limit(session, cutter, path, measured, monitor)?;
-        Ok(left.is_some_and(|left| self.comes_near(&left)))
+        Ok(self.leaves_nearly(left))
     }
 
-    /// Whether the best plan leaves little more than every path does.
-    fn comes_near(&self, left: &LeastLeftFigures) -> bool {
-        self.tried.standing.round.highest() <= NEAR_LEAST * left.height_mm
+    /// Whether the best plan leaves little more than what every path does, if these leave too much.
+    fn leaves_nearly(&mut self, left: Option<LeastLeftFigures>) -> bool {
+        self.is_hopeless |= left.is_some();
+        left.is_some_and(|left| self.tried.standing.round.highest() <= NEAR_LEAST * left.height_mm)
+    }
+
+    /// Whether no other plan is made: none holds the target, and the last one was no better.
+    fn ends_in_vain(&self, in_vain: usize) -> bool {
+        self.is_hopeless && in_vain > 0
     }
 
     /// Whether a plan stands above the target, but little.

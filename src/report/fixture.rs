@@ -50,6 +50,7 @@ fn measurement(gouge: f64) -> Measured {
             error_bound_mm: 0.0005,
             region_count: regions.len(),
             regions,
+            ..GougeFigures::default()
         },
         uncut: UncutFigures { error_bound_mm: 0.0005, ..UncutFigures::default() },
         deviation: DeviationFigures {

@@ -51,6 +51,7 @@ fn measurement(gouge: f64) -> Measurement {
             error_bound_mm: 0.0005,
             region_count: regions.len(),
             regions,
+            ..GougeFigures::default()
         },
         uncut: UncutFigures { error_bound_mm: 0.0005, ..UncutFigures::default() },
         excess: ExcessFigures { reached: Bounded::new(0.0095, 0.00025), ..ExcessFigures::default() },
@@ -161,6 +162,21 @@ fn what_stands_for_certain_fails_under_an_open_bound() {
         not_held(&measured, &STRICT),
         [("uncut", Verdict::Undecided), ("scallop", Verdict::Undecided)]
     );
+}
+
+#[test]
+fn what_is_cut_for_certain_fails_under_an_open_bound() {
+    let mut measured = measurement(0.02);
+    measured.gouge.error_bound_mm = 3.0;
+    let of_gouge = |measured: &Measurement| judged(measured, &STRICT).1.remove(0);
+    assert_eq!(of_gouge(&measured).verdict(), Verdict::Undecided);
+    measured.gouge.at_least_mm = 0.0195;
+    let found = of_gouge(&measured);
+    assert_eq!((found.what, found.verdict()), ("gouge", Verdict::Fail));
+    assert!(found.text.ends_with("; 19.5 µm are cut for certain"), "{found:?}");
+    // A path that was written with other decimals cuts a little less deep.
+    measured.widen(0.015);
+    assert_eq!(of_gouge(&measured).verdict(), Verdict::Undecided);
 }
 
 #[test]

@@ -436,7 +436,8 @@ impl NormalInspection<'_> {
                 for (divided, parts) in batch.iter().zip(closer) {
                     let [ab, bc, ca] = divided.on_border;
                     let borders = [[ab, false, ca], [ab, bc, false], [false, bc, ca], [false; 3]];
-                    for ((samples, Closer { middles, crossings }), on_border) in parts.into_iter().zip(borders)
+                    for ((samples, Closer { middles, crossings }), on_border) in
+                        parts.into_iter().zip(borders)
                     {
                         crossings.iter().for_each(|crossing| greatest.look_at_ridge(crossing));
                         for sample in &middles {

@@ -337,7 +337,8 @@ impl Along<'_> {
         });
         let scallop = scallop_figures(&ridge_samples, highest, limits);
         let mut excess = excess_figures(greatest.place, &scallop, &uncut, left.border);
-        let of_uncut = greatest.uncut.filter(|(_, sample)| inspection.is_uncut(sample, greatest.highest_ridge()));
+        let of_uncut =
+            greatest.uncut.filter(|(_, sample)| inspection.is_uncut(sample, greatest.highest_ridge()));
         excess.unreached.at_least_mm = of_uncut.map_or(0.0, |(height, sample)| certain(height, &sample));
         excess.highest.at_least_mm = excess.reached.at_least_mm.max(excess.unreached.at_least_mm);
         let deviations: Vec<f32> =
