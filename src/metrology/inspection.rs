@@ -178,15 +178,24 @@ impl Inspection<'_> {
             let z = self.surface.height(cut.by, p.x + sx, p.y + sy);
             top = top.max((z - p.z) * normal.z + sx * normal.x + sy * normal.y);
         }
-        let (mut turned, mut cosine) = (0f64, 1f64);
+        let (mut turned, mut cosine, mut steepest) = (0f64, 1f64, 0f64);
         for nj in j.saturating_sub(1)..=(j + 1).min(design.ny - 1) {
             for ni in i.saturating_sub(1)..=(i + 1).min(design.nx - 1) {
                 let beside = design.at(ni, nj);
                 if beside.is_on() {
                     turned = turned.max((beside.normal - normal).norm_squared());
                     cosine = cosine.min(beside.normal.dot(&normal));
+                    let [x, y] =
+                        [(ni, i), (nj, j)].map(|(to, from)| (to as f64 - from as f64) * self.grid.cell);
+                    let way = Vector3::new(x, y, beside.z - p.z);
+                    steepest =
+                        steepest.max((way.dot(&normal).abs() - NUMERICAL_FLOOR) / way.norm().max(half));
                 }
             }
+        }
+        // No smooth surface leaves the tangent plane by more than its normals turn: there is a step.
+        if steepest > turned.sqrt() {
+            return f64::INFINITY;
         }
         let top = (top + turned.sqrt() * reach(half, normal.z)) / cosine.max(0.1);
         if top <= high { top } else { f64::INFINITY }

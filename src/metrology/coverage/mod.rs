@@ -30,7 +30,7 @@ use motion::{Cutters, Toolpath};
 use near::{Near, cube};
 use part::{Part, Patch, SurfacePoint};
 use pieces::{Pieces, divided, join};
-use unseen_cut::{UnseenCut, lowest_tip};
+use unseen_cut::{UnseenCut, lowest_of_tools};
 
 /// Where the vertical part of the normal is less, cells lie more than five times as far apart on the surface as in the plan:
 /// too far to see what one pass leaves.
@@ -194,8 +194,8 @@ impl<'a> Coverage<'a> {
             .max(LEAST_TRIANGLES);
         let spacing = (TRIANGLES_A_SQUARE * area / triangles).sqrt().max(task.finest);
         let net = divided(self.part, std::mem::take(&mut self.unseen), spacing);
-        let lowest_tip = lowest_tip(task.path);
-        let cut = UnseenCut { cut: task.cut, facing: self.facing, lowest_tip };
+        let lowest = lowest_of_tools(task.path, task.cutters.greatest_radius());
+        let cut = UnseenCut { cut: task.cut, facing: self.facing, lowest };
         let along = Along {
             part: self.part,
             cutters: task.cutters,

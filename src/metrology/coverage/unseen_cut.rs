@@ -8,7 +8,7 @@
 use geometry::{Point3, Vector3};
 
 use super::{STEEP, sees_level};
-use motion::{MoveKind, Toolpath};
+use motion::{ClPoint, MoveKind, Toolpath};
 
 use crate::along_normals::{AlongNormal, NormalHit, SweptVolume, Way};
 use crate::beneath::ball_beneath;
@@ -27,15 +27,20 @@ const AT_EDGE: f64 = 1e-3;
 pub(super) struct UnseenCut<'a> {
     pub cut: &'a SweptVolume<'a>,
     pub facing: &'a Facing<'a>,
-    /// No upright tool cuts below this, mm; negative infinity where tools lean.
-    pub lowest_tip: f64,
+    /// No tool cuts below this, mm.
+    pub lowest: f64,
 }
 
-/// The lowest tip of what cuts, mm: below it no upright tool does.
-pub(super) fn lowest_tip(path: &Toolpath) -> f64 {
-    let cuts = path.segments().filter(|(_, _, step)| step.kind != MoveKind::Rapid);
-    let lowest = cuts.map(|(from, to, _)| from.z.min(to.z)).fold(f64::INFINITY, f64::min);
-    if path.is_upright() { lowest } else { f64::NEG_INFINITY }
+/// The lowest place that tools no wider than a radius come to while they cut, mm.
+pub(super) fn lowest_of_tools(path: &Toolpath, radius: f64) -> f64 {
+    // On the way from one axis to another none leans more than both.
+    let lowest = |at: &ClPoint| match at.axis.z {
+        up if up > 0.0 => at.tip.z - radius * at.axis.xy().norm(),
+        _ => f64::NEG_INFINITY,
+    };
+    let cuts = (0..path.len()).filter(|k| path.moves[*k].kind != MoveKind::Rapid);
+    cuts.flat_map(|k| [path.location_before(k), path.moves[k].to])
+        .fold(f64::INFINITY, |z, at| z.min(lowest(&at)))
 }
 
 impl UnseenCut<'_> {
@@ -69,7 +74,7 @@ impl UnseenCut<'_> {
     /// Whether the line through a place stays below all that cuts.
     fn is_below_all(&self, point: &Point3, normal: &Vector3) -> bool {
         let highest = (normal.z * self.cut.outward).max(-normal.z * self.cut.inward);
-        point.z + highest < self.lowest_tip
+        point.z + highest < self.lowest
     }
 }
 

@@ -249,9 +249,14 @@ fn slopes_that_fall_away_from_a_ridge_cancel() {
 }
 
 /// Passes along x over the plane.
-fn straight(lines: &[f64]) -> Toolpath {
+fn on_plane(lines: &[f64]) -> Toolpath {
+    straight(&lines.iter().map(|y| [*y, 0.0]).collect::<Vec<_>>())
+}
+
+/// Passes along x with tips at these y and z.
+fn straight(lines: &[[f64; 2]]) -> Toolpath {
     let mut moves = Vec::new();
-    for (pass, &y) in (0..).zip(lines) {
+    for (pass, &[y, low]) in (0..).zip(lines) {
         let to = |x: f64, z: f64, kind| Move {
             to: ClPoint::upright(Point3::new(x, y, z)),
             kind,
@@ -260,8 +265,8 @@ fn straight(lines: &[f64]) -> Toolpath {
         };
         moves.extend([
             to(-4.0, 9.0, MoveKind::Rapid),
-            to(-4.0, 0.0, MoveKind::Plunge),
-            to(8.0, 0.0, MoveKind::Cut),
+            to(-4.0, low, MoveKind::Plunge),
+            to(8.0, low, MoveKind::Cut),
             to(8.0, 9.0, MoveKind::Retract),
         ]);
     }
@@ -273,11 +278,32 @@ fn sagitta(half: f64) -> f64 {
     3.0 - (9.0 - half * half).sqrt()
 }
 
+/// A floor, a wall, and a level above it: a pass on the floor leaves the more the nearer a place is to the wall, most of all in the
+/// strip of a cell whose centre lies beyond the wall.
+#[test]
+fn what_stands_at_the_foot_of_a_step_is_found_whatever_the_cells() {
+    let (high, from_wall) = (0.3, 1.0);
+    for wall in [1.97, 1.99, 2.01, 2.03, 2.04] {
+        let at = |y: f64, z: f64| [0.0, SIDE].map(|x| Point3::new(x, y, z));
+        let corners = [at(0.0, 0.0), at(wall, 0.0), at(wall, high), at(SIDE, high)].concat();
+        let triangles =
+            (0..3).flat_map(|k| [[2 * k, 2 * k + 1, 2 * k + 2], [2 * k + 2, 2 * k + 1, 2 * k + 3]]);
+        let part = Part::from_mesh(TriangleMesh::new(corners, triangles.collect()).unwrap().0);
+        let level = (0..12).map(|k| [wall + 0.2 * f64::from(k), high]);
+        let floor = [1.8, from_wall].map(|from| [wall - from, 0.0]);
+        let path = straight(&level.chain(floor).collect::<Vec<_>>());
+        let found = measured(&part, &Cutter::ball(6.0).unwrap(), &path, 0.1).excess.highest;
+        let truth = sagitta(from_wall);
+        assert!((found.max_mm - truth).abs() <= found.error_bound_mm, "{wall}: {found:?}, {truth}");
+        assert!(found.error_bound_mm < 1e-3, "{wall}: {found:?}");
+    }
+}
+
 /// Cells wider than the intervals of the passes see some passes only. What they tell of ridges is true, or not told.
 #[test]
 fn coarse_cells_tell_no_height_that_no_ridge_has() {
     let (part, ball) = (part(0), Cutter::ball(6.0).unwrap());
-    let path = straight(&(0..11).map(|k| 0.4 * f64::from(k)).collect::<Vec<_>>());
+    let path = on_plane(&(0..11).map(|k| 0.4 * f64::from(k)).collect::<Vec<_>>());
     let mut told = 0;
     for cell in [0.05, 0.3, 0.5, 0.7, 1.0, 1.7, 2.5, 5.0, 20.0] {
         let Measurement { scallop, excess, .. } = measured(&part, &ball, &path, cell);
@@ -294,7 +320,7 @@ fn coarse_cells_tell_no_height_that_no_ridge_has() {
 fn a_remnant_along_the_border_is_as_high_as_its_closed_form() {
     let (part, ball) = (part(0), Cutter::ball(6.0).unwrap());
     let lines: Vec<f64> = (0..9).map(|k| 0.33 + 0.4 * f64::from(k)).collect();
-    let path = straight(&lines);
+    let path = on_plane(&lines);
     // The last pass is at 3.53, 0.47 from the border; ridges are 0.2 from theirs.
     for cell in [0.05, 0.3] {
         let excess = measured(&part, &ball, &path, cell).excess;
@@ -304,7 +330,7 @@ fn a_remnant_along_the_border_is_as_high_as_its_closed_form() {
         assert!((excess.highest.at_mm.unwrap()[1] - SIDE).abs() < 0.01, "{excess:?}");
     }
     let even: Vec<f64> = (0..11).map(|k| 0.4 * f64::from(k)).collect();
-    let excess = measured(&part, &ball, &straight(&even), 0.05).excess;
+    let excess = measured(&part, &ball, &on_plane(&even), 0.05).excess;
     assert_eq!(excess.kind, ExcessKind::Scallop);
     assert!(
         (excess.highest.max_mm - sagitta(0.2)).abs() < 2e-6 && excess.highest.error_bound_mm < 1e-5,
@@ -328,7 +354,7 @@ fn what_stands_between_the_chords_of_a_bent_border_and_its_arc_is_bounded() {
     for tolerance in [1e-4, 0.002, 0.03] {
         let part = Part::from_patches(vec![Patch::Nurbs(surface.clone())], tolerance).unwrap();
         for cell in [0.05, 0.3] {
-            let highest = measured(&part, &ball, &straight(&lines), cell).excess.highest;
+            let highest = measured(&part, &ball, &on_plane(&lines), cell).excess.highest;
             let (truth, bound) = (sagitta(beyond), highest.error_bound_mm);
             assert!(
                 (highest.max_mm - truth).abs() <= bound && bound < 6e-4,
@@ -426,16 +452,16 @@ fn ridges_that_passes_between_cells_take_off_are_no_figures() {
 #[test]
 fn a_foil_that_rounding_leaves_is_no_material() {
     let (part, flat) = (part(0), Cutter::flat(3.0).unwrap());
-    let path = straight(&[0.5, 1.5, 2.49998]);
+    let path = on_plane(&[0.5, 1.5, 2.49998]);
     for cell in [0.05, 0.3] {
         let excess = measured(&part, &flat, &path, cell).excess;
         assert!(excess.highest.at_most() < 1e-4, "{cell}: {excess:?}");
     }
     // What is wider stands.
-    let excess = measured(&part, &flat, &straight(&[0.5, 1.5, 2.499]), 0.05).excess;
+    let excess = measured(&part, &flat, &on_plane(&[0.5, 1.5, 2.499]), 0.05).excess;
     assert!(excess.highest.at_most() >= TOP, "{excess:?}");
     // So does what is as small, away from the border: a needle between four passes.
-    let mut moves: Vec<Move> = straight(&[0.5113, 3.5153, 3.9]).moves;
+    let mut moves: Vec<Move> = on_plane(&[0.5113, 3.5153, 3.9]).moves;
     for x in [0.4873, 3.4913] {
         let at = |y: f64, z: f64, kind| Move {
             to: ClPoint::upright(Point3::new(x, y, z)),
