@@ -21,9 +21,6 @@ const DECIDING: f64 = 1e-3;
 /// A triangle is divided at most so often in a row: to a millionth of its side.
 const MOST_DEPTH: u32 = 20;
 
-/// Ways out of ridges are the same where the cosine between them is less than one by no more: an angle of a thousandth.
-const ALIKE: f64 = 1e-6;
-
 /// What is searched for, in this order.
 #[derive(Debug, Clone, Copy)]
 enum Figure {
@@ -269,32 +266,33 @@ fn depth_by_tangents(samples: &[Sample; 3], by: u32) -> f64 {
     let of_corner = |i: usize| {
         let sample = &samples[i];
         let hit = sample.hit.filter(|hit| hit.by == by)?;
-        // Along the normals the design counts as plane; on a ridge the plane is met in the same direction all over the triangle.
-        let (cos, across, hollow) = match hit.way {
+        // Along the normals the design counts as plane; on a ridge the plane is met along any way out that the corners tell.
+        let (cos, across, deep, hollow) = match hit.way {
             Way::Normal => {
                 let cos = hit.normal.dot(&sample.place.normal);
-                (cos, hit.normal - sample.place.normal * cos, hollow)
+                (cos, hit.normal - sample.place.normal * cos, -hit.deviation, hollow)
             }
-            Way::OutOfRidge(out) if is_one_ridge(samples, &out) => {
-                let cos = hit.normal.dot(&out);
-                (cos, hit.normal, hollow / cos)
+            Way::OutOfRidge(out) => {
+                let cos = least_cosine(samples, &hit.normal)?;
+                (cos, hit.normal, -hit.deviation * hit.normal.dot(&out) / cos, hollow / cos)
             }
-            Way::OutOfRidge(_) | Way::Thickness => return None,
+            Way::Thickness => return None,
         };
         // The height falls toward where the cut's normal leans.
         let fall = |j: usize| if cos > 0.0 { across.dot(&way(i, j)) / cos } else { f64::INFINITY };
-        Some((0..3).filter(|&j| j != i).map(fall).fold(0.0, f64::max) - hit.deviation + hollow)
+        Some((0..3).filter(|&j| j != i).map(fall).fold(0.0, f64::max) + deep + hollow)
     };
     (0..3).filter_map(of_corner).fold(f64::INFINITY, f64::min)
 }
 
-/// Whether no corner of a triangle lies on a ridge that leads out another way.
-fn is_one_ridge(samples: &[Sample; 3], out: &Vector3) -> bool {
-    samples.iter().filter_map(|sample| sample.hit).all(|hit| match hit.way {
-        Way::Normal => true,
-        Way::OutOfRidge(other) => other.dot(out) > 1.0 - ALIKE,
-        Way::Thickness => false,
-    })
+/// The least cosine between the normal of a cut and the ways out of ridges at the corners of a triangle; `None` where one is none.
+fn least_cosine(samples: &[Sample; 3], normal: &Vector3) -> Option<f64> {
+    let cosines = samples.iter().filter_map(|sample| sample.hit).map(|hit| match hit.way {
+        Way::Normal => f64::INFINITY,
+        Way::OutOfRidge(out) => normal.dot(&out),
+        Way::Thickness => f64::NEG_INFINITY,
+    });
+    Some(cosines.fold(f64::INFINITY, f64::min)).filter(|cos| *cos > 0.0)
 }
 
 /// How the design rises off its tangent planes at both ends of a side, together, mm: positive where it is hollow.
@@ -412,7 +410,8 @@ impl NormalInspection<'_> {
         }
         closed = closed.or(keep_most_promising(&mut open, self.most_divided));
         let mut left = self.most_divided;
-        for (turn, figure) in Figure::ALL.into_iter().enumerate() {
+        // A second time with what is left of all shares.
+        for (turn, figure) in Figure::ALL.into_iter().enumerate().chain(Figure::ALL.into_iter().enumerate()) {
             let mut share = left / (Figure::ALL.len() - turn);
             left -= share;
             let (waiting, mut others): (Vec<Open>, Vec<Open>) =
