@@ -199,9 +199,8 @@ impl Greatest {
     pub fn look_at(&mut self, sample: &Sample, limits: &Limits) {
         let Some(hit) = sample.hit else { return };
         let rounding = GRAZING * sample.slope();
-        let height = hit.deviation - rounding;
-        if height <= limits.uncut && height > self.highest_place() {
-            self.place = Some((height, *sample));
+        if hit.deviation <= limits.uncut && hit.deviation - rounding > self.highest_place() {
+            self.place = Some((hit.deviation - rounding, *sample));
         }
         self.depth_at_least = self.depth_at_least.max(-hit.deviation - rounding - NUMERICAL_FLOOR);
         self.possible_depth = self.possible_depth.max(hit.uncertain - hit.deviation);
