@@ -4,6 +4,7 @@ use crate::cut_surface::CutSurface;
 use crate::figures::NUMERICAL_FLOOR;
 use geometry::{Aabb, Point2, Point3, Vector2};
 use motion::Cutters;
+use part::SurfacePoint;
 use sim::{Grid, MoveBins};
 
 /// Bins at most: 8 bytes each.
@@ -37,6 +38,13 @@ impl<'a> EveryMove<'a> {
     /// The lowest move at a point, where it cuts below.
     pub fn cuts_away(&self, at: &Point3) -> Option<u32> {
         let (z, by) = self.surface.envelope.lowest(at.x, at.y, self.over(at.xy()))?;
-        (z < at.z - NUMERICAL_FLOOR).then_some(by)
+        (z < at.z - 0.5 * NUMERICAL_FLOOR).then_some(by)
+    }
+
+    /// The move that cuts away what stands so high, mm, over a place of the design. A line along a normal may end at the side of what the
+    /// rim of a cutter swept: what stands is looked at just below. What is left for that and for [`Self::cuts_away`] is one
+    /// [`NUMERICAL_FLOOR`] together.
+    pub fn cuts_away_over(&self, design: &SurfacePoint, height: f64) -> Option<u32> {
+        self.cuts_away(&(design.point + design.normal * (height - 0.5 * NUMERICAL_FLOOR)))
     }
 }

@@ -303,11 +303,10 @@ impl ExcessSearch<'_> {
         if known < limit { asked.min(0.5 * (limit - known)).max(NUMERICAL_FLOOR) } else { asked }
     }
 
-    /// The move that cuts away what stands so high, mm, on the design over a place. A line along a normal may end at the side of what the
-    /// rim of a cutter swept: what stands is looked at just below.
+    /// The move that cuts away what stands so high, mm, on the design over a place.
     fn cut_away_below(&self, [x, y]: [f64; 2], height: f64) -> Option<u32> {
         let design = self.inspection.part.highest_at(x, y)?;
-        self.cuts_away(&(design.point + design.normal * (height - NUMERICAL_FLOOR)))
+        self.inspection.every_move?.cuts_away_over(&design, height)
     }
 
     fn cuts_away(&self, at: &Point3) -> Option<u32> {

@@ -273,6 +273,9 @@ impl<'a> RidgeFinder<'a> {
         if height > NEAR_LIMIT * self.limits.scallop && self.is_cut_away(&at) {
             return None;
         }
+        if height > self.limits.uncut && self.leans_over(&foot.point, &at) {
+            return None;
+        }
         let [m, n] = moves.map(|by| self.surface.normal(by, q.x, q.y));
         if height > self.limits.uncut && !self.is_scallop(moves, &foot) {
             hidden.push(Hidden::Ridge(q, height));
@@ -314,6 +317,13 @@ impl<'a> RidgeFinder<'a> {
     fn is_cut_away(&self, at: &Point3) -> bool {
         let below = at - Vector3::z() * self.asked;
         self.every_move.is_some_and(|every_move| every_move.cuts_away(&below).is_some())
+    }
+
+    /// Whether the cut lies between a foot and a ridge: what stands so high stands on other places of the design.
+    fn leans_over(&self, foot: &Point3, ridge: &Point3) -> bool {
+        let way = ridge - foot;
+        let out = self.surface.along_normal(foot, &way.normalize());
+        out.is_some_and(|out| out.distance < way.norm() - self.asked)
     }
 
     /// The highest place of all ridges, looked at closer wherever a ridge might rise above the highest

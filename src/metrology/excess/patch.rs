@@ -6,7 +6,6 @@ use super::meets;
 use super::outline::{MOST_CORNERS, Outline, cut_off, has_area, middle, outlines, overlaps};
 use crate::cut_surface::CutSurface;
 use crate::facing::LEAST_FACING;
-use crate::figures::NUMERICAL_FLOOR;
 use crate::inspection::Inspection;
 use cutter::Cutter;
 use geometry::{Point2, Point3, Vector2, Vector3};
@@ -54,7 +53,7 @@ const MOST_LOWERED: usize = 4;
 /// Lowering ends where it gains less than this share of what stands over the place looked at.
 const LITTLE_GAIN: f64 = 0.1;
 
-/// Between its corners a smooth surface may leave a tangent plane by so many times as much as there.
+/// Between its corners a smooth surface may leave a tangent plane, and its normals turn, by so many times as much as there.
 const BETWEEN_CORNERS: f64 = 1.25;
 
 /// The rim of a cutter may end beside the end of the part by the last decimal of a program, and leave a foil that is no material. Squares
@@ -84,7 +83,7 @@ pub(super) enum Held {
 struct Clipped {
     corners: [Point2; MOST_CORNERS],
     len: usize,
-    /// Plan parts of the design's normals at the corners; between them normals turn a little less.
+    /// Plan parts of the design's normals at the corners, moved away from the middle by what normals between them may turn more.
     leans: [Vector2; MOST_CORNERS],
     /// On the design, within the polygon.
     foot: SurfacePoint,
@@ -288,10 +287,9 @@ impl Patches<'_> {
 
     /// The move that cut away what seems to stand so high, mm, over a place of the design; `None` also where there are too many to ask.
     fn cut_away_below(&self, foot: &SurfacePoint, height: f64) -> Option<u32> {
-        let below = foot.point + foot.normal * (height - NUMERICAL_FLOOR);
-        let every_move =
-            self.inspection.every_move.filter(|every_move| every_move.over(below.xy()).len() <= MOST_ASKED);
-        every_move?.cuts_away(&below)
+        let every_move = self.inspection.every_move?;
+        let place = (foot.point + foot.normal * height).xy();
+        if every_move.over(place).len() > MOST_ASKED { None } else { every_move.cuts_away_over(foot, height) }
     }
 
     /// What stands higher in a square than this, on a foot where so much stands, stands behind a wall.
@@ -515,12 +513,20 @@ impl Clipped {
     /// Measures how the design leaves its tangent plane, at the corners.
     fn bend(&mut self, own: &dyn Fn(&Point2) -> SurfacePoint) {
         let SurfacePoint { point, normal, .. } = self.foot;
-        for (corner, lean) in self.corners.iter().zip(&mut self.leans).take(self.len) {
+        let corners = &self.corners[..self.len];
+        let (middle, mut turned) = (middle(corners), 0f64);
+        for (corner, lean) in corners.iter().zip(&mut self.leans) {
             let foot = own(corner);
-            *lean += BETWEEN_CORNERS * (foot.normal - normal).xy();
+            *lean = foot.normal.xy();
+            turned = turned.max((foot.normal - normal).norm());
             self.below = self.below.max(-BETWEEN_CORNERS * (foot.point - point).dot(&normal));
-            self.cosine = self.cosine.min(foot.normal.dot(&normal)).max(0.1);
         }
+        let turned = BETWEEN_CORNERS * turned;
+        let more = turned * (1.0 - 1.0 / BETWEEN_CORNERS);
+        for (corner, lean) in corners.iter().zip(&mut self.leans) {
+            *lean += (corner - middle).try_normalize(0.0).unwrap_or_default() * more;
+        }
+        self.cosine = (1.0 - 0.5 * turned * turned).max(0.1);
     }
 }
 
