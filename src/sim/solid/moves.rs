@@ -3,13 +3,14 @@
 //! The tree is built over the track of one point of the tool, the middle of its corner, which a turning
 //! axis moves least; long and fast-turning moves stand in it in parts. Each box also has a mean tool axis
 //! and how far others in it lean away from that. The tool in the middle of a box, with its mean axis, then
-//! bounds the distance from all tools in the box: by its supporting plane over the sides of the box, and
-//! by how far a leaning axis moves the place as seen from the tool.
+//! bounds the distance from all tools in the box: by its supporting plane over the sides of the box, or over the thinnest
+//! slab that holds what stands in it, and by how far a leaning axis turns that plane toward the place.
 
 use super::{Motion, Nearest, OppositeAxes, below};
 use cutter::Solid;
 use geometry::{BoxTree, Extent, MAX_COORDINATE, Node, Paired, Point3, Vector3, round_up};
 use motion::{Move, Toolpath};
+use nalgebra::Matrix3;
 use work::parallel;
 
 /// A part of a move is at most this many radii of the tool long. Longer ones have large boxes; shorter
@@ -56,6 +57,14 @@ struct Summary {
     first: u32,
 }
 
+/// All pivots of a box lie between two planes, which box sides askew to their surface are far from telling: no farther than `half`, mm,
+/// from its middle along `across`.
+#[derive(Debug, Clone, Copy)]
+struct Slab {
+    across: [f32; 3],
+    half: f32,
+}
+
 /// A part of a move, in one slot of the tree.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct MovePart {
@@ -96,6 +105,7 @@ pub struct SweptMoves {
     /// Nothing without moves.
     tree: Option<BoxTree>,
     summaries: Paired<Summary>,
+    slabs: Paired<Slab>,
     slots: Vec<MovePart>,
 }
 
@@ -122,6 +132,7 @@ impl SweptMoves {
             indices,
             tree: None,
             summaries: Paired::from_values(&[]),
+            slabs: Paired::from_values(&[]),
             slots: Vec::new(),
         };
         moves.plant();
@@ -149,7 +160,10 @@ impl SweptMoves {
         let (tree, order) = BoxTree::around(&self.apart_by_axis(&parts, &boxes), LEAF);
         let tree = tree.refitted(&order.iter().map(|&k| boxes[k as usize]).collect::<Vec<_>>());
         self.slots = order.iter().map(|&k| parts[k as usize]).collect();
+        // What follows takes as much memory.
+        drop((parts, boxes, order));
         self.summaries = self.summaries_of(&tree);
+        self.slabs = self.slabs_of(&tree);
         self.tree = Some(tree);
     }
 
@@ -171,15 +185,21 @@ impl SweptMoves {
     /// The box around the track of the pivot in one part. On an arc it lies off the chord by no more than
     /// pivot·(1 − cos(θ/2)), θ the turn of the part.
     fn extent(&self, part: &MovePart) -> Extent {
+        let ([a, b], bulge) = self.pivots(part);
+        Extent::new(a.inf(&b).coords.add_scalar(-bulge).into(), a.sup(&b).coords.add_scalar(bulge).into())
+    }
+
+    /// The pivot at the ends of a part, and how far it may be off the chord between them.
+    fn pivots(&self, part: &MovePart) -> ([Point3; 2], f64) {
         let motion = self.motion(part);
         let pivot = self.solid.pivot();
-        let [a, b] = part.range.map(|t| {
+        let ends = part.range.map(|t| {
             let pose = motion.at(t);
             pose.tip + pose.axis * pivot
         });
         let half_turn = 0.5 * motion.turn * (part.range[1] - part.range[0]);
-        let bulge = pivot * 0.5 * half_turn * half_turn + 1e-15 * a.coords.amax().max(MAX_COORDINATE * 1e-3);
-        Extent::new(a.inf(&b).coords.add_scalar(-bulge).into(), a.sup(&b).coords.add_scalar(bulge).into())
+        let rounding = 1e-15 * ends[0].coords.amax().max(MAX_COORDINATE * 1e-3);
+        (ends, pivot * 0.5 * half_turn * half_turn + rounding)
     }
 
     /// From the leaves upward: the mean axis and the farthest from it.
@@ -204,6 +224,45 @@ impl SweptMoves {
             summaries[i] = Summary { axis: axis.into(), chord: round_up(chord.min(2.0)), first };
         }
         Paired::from_values(&summaries)
+    }
+
+    /// The thinnest slab around the pivots of each node; where they lie along a line, across the mean axis.
+    fn slabs_of(&self, tree: &BoxTree) -> Paired<Slab> {
+        /// How little the axis counts beside how the pivots lie.
+        const AXIS: f64 = 1e-3;
+        let pivots = parallel::map(self.slots.len(), |k| self.pivots(&self.slots[k]));
+        let mut below = vec![0..0; tree.nodes_len()];
+        for i in (0..below.len()).rev().filter(|i| *i != 1) {
+            let (first, count) = tree.node(i).slots_or_children();
+            below[i] =
+                if count > 0 { first..first + count } else { below[first].start..below[first + 1].end };
+        }
+        let slab = |i: usize| {
+            let (middle, axis) = (tree.node(i).middle().0, self.summaries.at(i).axis());
+            let held = &pivots[below[i].clone()];
+            let ways = held.iter().flat_map(|(ends, _)| ends).map(|p| p - middle);
+            let spread: Matrix3<f64> = ways.map(|way| way * way.transpose()).sum();
+            let level = (Matrix3::identity() - axis * axis.transpose()) * (AXIS * spread.trace());
+            let eigen = (spread + level).symmetric_eigen();
+            let across = eigen.eigenvectors.column(eigen.eigenvalues.imin()).map(|x| x as f32);
+            let direction = across.map(f64::from);
+            let off = |(ends, bulge): &([Point3; 2], f64)| {
+                ends.iter().map(|p| (p - middle).dot(&direction).abs()).fold(0.0, f64::max) + 2.0 * bulge
+            };
+            Slab { across: across.into(), half: round_up(held.iter().map(off).fold(0.0, f64::max)) }
+        };
+        Paired::from_values(&parallel::map(tree.nodes_len(), slab))
+    }
+
+    /// How far the pivots of a node lie along a direction from the middle of its box at most, which has these half sides.
+    #[inline]
+    fn spread(&self, index: usize, along: &Vector3, half: [f64; 3]) -> f64 {
+        let within = |v: &Vector3| v.x.abs() * half[0] + v.y.abs() * half[1] + v.z.abs() * half[2];
+        let slab = self.slabs.at(index);
+        let across = Vector3::from(slab.across.map(f64::from));
+        let share = along.dot(&across);
+        let by_slab = share.abs() * f64::from(slab.half) + within(&(along - across * share));
+        by_slab.min(within(along))
     }
 
     /// The axis in the middle of a part, the chord to those at its ends, and its move.
@@ -273,17 +332,21 @@ impl SweptMoves {
             && chord > 0.0
             && chord < WIDEST_CONE
         {
-            return in_cone(radius, &away, [rho, along], &axis, chord + ROUNDING, half);
+            let moved = |gradient: &Vector3| self.spread(index, gradient, half);
+            return in_cone(radius, &away, [rho, along], &axis, chord + ROUNDING, moved);
         }
         let foot = self.solid.piece_foot(piece, rho, along + self.solid.pivot());
         let radial = if rho > 0.0 { foot.gradient[0] / rho } else { 0.0 };
         let gradient = outward * radial + axis * foot.gradient[1];
-        let mut moved = gradient.x.abs() * half[0] + gradient.y.abs() * half[1] + gradient.z.abs() * half[2];
+        let mut moved = self.spread(index, &gradient, half);
         let (mut leaned, mut height, mut rounding) = (0.0, along, 0.0);
         if chord > 0.0 {
             rounding = ROUNDING;
-            let reach = away.norm() + Vector3::from(half).norm();
-            leaned = chord * reach;
+            let size = Vector3::from(half).norm();
+            let reach = away.norm() + size;
+            // The supporting plane turns about the pivot, which it passes at this arm.
+            let arm = (foot.gradient[0] * along - foot.gradient[1] * rho).abs() + size;
+            leaned = chord * reach.min(arm + 0.5 * chord * reach);
             moved += rounding * reach;
             height += (chord + rounding) * reach;
         }
@@ -355,8 +418,8 @@ fn cell_of(axis: &Vector3) -> usize {
     (2 * face + usize::from(axis[face] < 0.0)) * 9 + 3 * third(beside[0]) + third(beside[1])
 }
 
-/// How near ball ends may be whose axes differ from `axis` by a chord or less and that stand in a box of half sides `half`,
-/// seen from its middle: all of them lie within the radius of a cone around that axis, which is convex. `away` is the way
+/// How near ball ends may be whose axes differ from `axis` by a chord or less and that stand in a box, seen from its middle; `moved` tells
+/// how far they lie from there along a direction: all of them lie within the radius of a cone around that axis, which is convex. `away` is the way
 /// from the middle to the place, `rho` across the axis and `along` it.
 #[inline]
 fn in_cone(
@@ -365,7 +428,7 @@ fn in_cone(
     [rho, along]: [f64; 2],
     axis: &Vector3,
     chord: f64,
-    half: [f64; 3],
+    moved: impl Fn(&Vector3) -> f64,
 ) -> NodeView {
     let (sin, cos) = (chord * (1.0 - 0.25 * chord * chord).sqrt(), 1.0 - 0.5 * chord * chord);
     let (distance, gradient) = if rho * sin + along * cos <= 0.0 {
@@ -376,11 +439,10 @@ fn in_cone(
         let outward = if rho > 0.0 { (away - axis * along) / rho } else { Vector3::zeros() };
         (rho * cos - along * sin, outward * cos - axis * sin)
     };
-    let moved = gradient.x.abs() * half[0] + gradient.y.abs() * half[1] + gradient.z.abs() * half[2];
     NodeView {
         distance: distance - radius,
         gradient,
-        moved: moved + ROUNDING * away.norm(),
+        moved: moved(&gradient) + ROUNDING * away.norm(),
         leaned: 0.0,
         chord: 0.0,
         rounding: 0.0,
@@ -402,6 +464,36 @@ mod tests {
     use super::*;
     use crate::scenes::Rng;
     use cutter::Cutter;
+
+    #[test]
+    fn slabs_hold_the_tracks_of_the_pivot_below_them() {
+        let mut rng = Rng::new(48);
+        let solid = Solid::of_cutter(&Cutter::bull(6.0, 1.0).unwrap(), None);
+        let (from, mut all) = (some_move(&mut rng, 0).0, Vec::new());
+        for kind in 0..24 {
+            let (a, b) = some_move(&mut rng, kind);
+            all.extend([a, b]);
+        }
+        let moves = SweptMoves::new(&solid, &path_of(from, &all), |_| true).unwrap();
+        let tree = moves.tree.as_ref().unwrap();
+        let mut thin = 0;
+        for i in (0..tree.nodes_len()).filter(|i| *i != 1) {
+            let (middle, half) = tree.node(i).middle();
+            let Slab { across, half: slab } = *moves.slabs.at(i);
+            let across = Vector3::from(across.map(f64::from));
+            for part in tree.slots_below(i).into_iter().map(|slot| &moves.slots[slot]) {
+                for k in 0..=10 {
+                    let t = part.range[0] + (part.range[1] - part.range[0]) * f64::from(k) / 10.0;
+                    let pose = moves.motion(part).at(t);
+                    let off = (pose.tip + pose.axis * solid.pivot() - middle).dot(&across).abs();
+                    assert!(off <= f64::from(slab), "node {i}: {off} > {slab}");
+                }
+            }
+            let box_alone = (0..3).map(|k| across[k].abs() * half[k]).sum::<f64>();
+            thin += usize::from(f64::from(slab) < 0.5 * box_alone);
+        }
+        assert!(thin > tree.nodes_len() / 4, "{thin} of {}", tree.nodes_len());
+    }
 
     #[test]
     fn boxes_hold_the_track_of_the_pivot() {
