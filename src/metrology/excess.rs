@@ -330,8 +330,16 @@ impl ExcessSearch<'_> {
         /// Other material rises by no more than so many times the way aside.
         const SLOPE: f64 = 10.0;
         let below = height - SLOPE * 2.0 * ROUNDING;
+        // Beside a step another level tells nothing of this one.
+        let level = |q: Point2| self.inspection.part.highest_at(q.x, q.y).map(|design| design.point.z);
+        let here = level(place);
+        let is_level = |q: &Point2| {
+            here.zip(level(*q)).is_some_and(|(here, there)| (there - here).abs() <= SLOPE * 2.0 * ROUNDING)
+        };
         self.patches(0.0, &[]).ends_beside(place)
-            && around(place, 2.0 * ROUNDING).iter().any(|q| self.cut_away_below([q.x, q.y], below).is_some())
+            && around(place, 2.0 * ROUNDING)
+                .iter()
+                .any(|q| is_level(q) && self.cut_away_below([q.x, q.y], below).is_some())
     }
 
     /// The highest place of a kind in some squares, if it is higher than `known`. Moves that are found to have cut away what seemed to be

@@ -344,6 +344,42 @@ fn what_stands_at_the_foot_of_a_step_is_found_whatever_the_cells() {
     }
 }
 
+/// The same where the wall meets the border, and passes on the floor part from the wall toward it: the upper level beside, which is cut
+/// down to the design, makes no foil of what stands in that corner.
+#[test]
+fn what_stands_in_the_corner_of_a_step_and_the_border_is_found() {
+    let (high, wall) = (0.3, 2.0);
+    let at = |y: f64, z: f64| [0.0, SIDE].map(|x| Point3::new(x, y, z));
+    let corners = [at(0.0, 0.0), at(wall, 0.0), at(wall, high), at(SIDE, high)].concat();
+    let triangles = (0..3).flat_map(|k| [[2 * k, 2 * k + 1, 2 * k + 2], [2 * k + 2, 2 * k + 1, 2 * k + 3]]);
+    let part = Part::from_mesh(TriangleMesh::new(corners, triangles.collect()).unwrap().0);
+    let mut path = straight(&(0..12).map(|k| [wall + 0.2 * f64::from(k), high]).collect::<Vec<_>>());
+    let (turn, along) = (Point2::new(3.5, wall - 0.3), Vector2::new(1.0, -0.5).normalize());
+    let to = |q: Point2, z: f64, kind| Move {
+        to: ClPoint::upright(Point3::new(q.x, q.y, z)),
+        kind,
+        feed_rate: 1000.0,
+        pass: 20,
+    };
+    for aside in [0.0, 0.5, 1.0, 1.5, 2.0] {
+        let from = turn - Vector2::new(0.0, aside);
+        let [first, last] = [from - Vector2::x() * 7.0, from + along * 4.0];
+        path.moves.extend([
+            to(first, 9.0, MoveKind::Rapid),
+            to(first, 0.0, MoveKind::Plunge),
+            to(from, 0.0, MoveKind::Cut),
+            to(last, 0.0, MoveKind::Cut),
+            to(last, 9.0, MoveKind::Retract),
+        ]);
+    }
+    let truth = sagitta((Point2::new(SIDE, wall) - turn).perp(&along).abs());
+    for cell in [0.05, 0.3] {
+        let highest = measured(&part, &Cutter::ball(6.0).unwrap(), &path, cell).excess.highest;
+        assert!((highest.max_mm - truth).abs() <= highest.error_bound_mm, "{cell}: {highest:?}, {truth}");
+        assert!(highest.error_bound_mm < 1e-4, "{cell}: {highest:?}, {truth}");
+    }
+}
+
 /// Cells wider than the intervals of the passes see some passes only. What they tell of ridges is true, or not told.
 #[test]
 fn coarse_cells_tell_no_height_that_no_ridge_has() {

@@ -418,9 +418,9 @@ fn cell_of(axis: &Vector3) -> usize {
     (2 * face + usize::from(axis[face] < 0.0)) * 9 + 3 * third(beside[0]) + third(beside[1])
 }
 
-/// How near ball ends may be whose axes differ from `axis` by a chord or less and that stand in a box, seen from its middle; `moved` tells
-/// how far they lie from there along a direction: all of them lie within the radius of a cone around that axis, which is convex. `away` is the way
-/// from the middle to the place, `rho` across the axis and `along` it.
+/// How near ball ends may be whose axes differ from `axis` by a chord or less and that stand in a box, seen from its middle: all of them
+/// lie within the radius of a cone around that axis, which is convex. `away` is the way from the middle to the place, `rho` across the
+/// axis and `along` it; `moved` tells how far along a direction they may lie from the middle.
 #[inline]
 fn in_cone(
     radius: f64,
