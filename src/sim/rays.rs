@@ -145,6 +145,19 @@ impl Rays {
         self.lowest(point, normal, [-inward, outward], seed)
     }
 
+    /// As [`Rays::deviation`], of one move of the path alone, which no tree is asked for.
+    pub fn deviation_by(
+        &self,
+        point: &Point3,
+        normal: &Vector3,
+        [inward, outward]: [f64; 2],
+        index: u32,
+    ) -> Option<RayHit> {
+        let part = self.moves.part_of(index)?;
+        let ray = Ray { point: *point, normal: *normal, low: -inward, high: outward };
+        ray.lowest_of(&self.moves, &part, outward).map(|(s, t)| RayHit { s, index, t })
+    }
+
     /// The unit normal of the cut surface, out of what stands and into the swept volume, where the ray of
     /// `point` and `normal` ended with `hit`; `None` where that is none of its hits.
     ///

@@ -46,6 +46,7 @@ use part::Part;
 pub(crate) use regions::connected;
 use regions::{Standing, areas, deviation_figures};
 use ridges::{CLOSE, Crossing, Finder};
+use sim::RayHit;
 pub use swept_volume::{FirstCut, RaysCut, RaysCutInTurn, SweptVolume, VoxelCut};
 use work::monitor::{self, Cancelled, Monitor};
 
@@ -86,6 +87,17 @@ pub trait AlongNormal: Sync {
     /// The lowest place that was cut on the line through `point` along the unit `normal`; `None` where nothing was
     /// within [`AlongNormal::reach`]. What was cut nearby, if anything is known, only makes it faster.
     fn hit(&self, point: &Point3, normal: &Vector3, near: Option<&NormalHit>) -> Option<NormalHit>;
+
+    /// Where a move, and those of its pass that go on where it ends, would meet the line if no others cut; `None` also where that is
+    /// too deep to be told by them alone, and of engines that cannot tell moves apart.
+    fn cut_by(&self, _point: &Point3, _normal: &Vector3, _by: u32) -> Option<RayHit> {
+        None
+    }
+
+    /// The unit normal of the cut surface at what [`AlongNormal::cut_by`] found.
+    fn normal_of(&self, _point: &Point3, _normal: &Vector3, _hit: &RayHit) -> Option<Vector3> {
+        None
+    }
 
     /// How far outward is looked, mm.
     fn reach(&self) -> f64;

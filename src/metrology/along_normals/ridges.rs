@@ -5,6 +5,7 @@ use super::{AlongNormal, NormalHit};
 use crate::tracks::Tracks;
 use geometry::{Point3, Vector3};
 use part::Part;
+use sim::RayHit;
 
 /// A crossing is found when both tracks were seen within this share of the side from each other: what the tangents then
 /// miss is of the order of its square.
@@ -19,6 +20,13 @@ const ASIDE: f64 = 2e-4;
 /// Looks of the search for one crossing; of these so many by tangents, the others halve the way.
 const MOST_LOOKS: usize = 32;
 const BY_TANGENTS: usize = 8;
+
+/// Tracks are equally high within this, mm, ten times what rays tell, and a look along all moves that finds as much is one at them.
+const EQUALLY_HIGH: f64 = 1e-8;
+const SAME: f64 = 2e-8;
+
+/// Places at which two moves alone are asked at most; three or four are enough.
+const MOST_GUESSES: usize = 16;
 
 /// Tracks between tracks: at most this deep.
 const MOST_DEPTH: usize = 8;
@@ -83,6 +91,20 @@ impl Finder<'_> {
         if !self.tracks.apart(a.hit.by, b.hit.by) {
             return;
         }
+        if let Some(met) = self.meeting_of_moves(from, to, [&a, &b]) {
+            let place = met.place;
+            let Some(hit) = self.engine.hit(&place.point, &place.normal, Some(&a.hit)) else { return };
+            let lower = met.height() - hit.deviation;
+            if lower.abs() <= SAME {
+                return found.extend(self.crossing_of(&met));
+            }
+            if lower > 0.0 && depth > 0 {
+                // One cuts there that neither end knows: a track between them, or moves farther on along one of theirs.
+                let here = End { t: met.t, place, hit };
+                self.search(from, to, [a, here], depth - 1, found);
+                return self.search(from, to, [here, b], depth - 1, found);
+            }
+        }
         // Cuts bend away from the design as the cutter's arc does; what is seen corrects that.
         let mut bend = (to.point - from.point).norm_squared() / self.radius;
         let mut aside = -ASIDE;
@@ -140,6 +162,82 @@ impl Finder<'_> {
             moves: [a.hit.by, b.hit.by],
             uncertain: a.hit.uncertain.max(b.hit.uncertain),
         });
+    }
+
+    /// Where on the way from `a` to `b` the moves that cut these, with those that go on where they end, would meet the normal equally
+    /// high; `None` where they do not tell it alone. Two moves are asked much faster than all.
+    fn meeting_of_moves(&self, from: &NetPlace, to: &NetPlace, [a, b]: [&End; 2]) -> Option<Meeting> {
+        let rest = b.t - a.t;
+        let bend = (b.place.point - a.place.point).norm_squared() / self.radius / (rest * rest);
+        let mut by = [a.hit.by, b.hit.by];
+        let mut t = a.t + meeting(a, b, bend)[0];
+        // How much faster the first track rises along the way than the second; there the bends are equal.
+        let mut rise = rise_over(a, a, b) - rise_over(b, a, b) + bend * rest;
+        let mut last: Option<[f64; 2]> = None;
+        // Each end is cut by its own moves.
+        let mut within = [a.t, b.t];
+        for _ in 0..MOST_GUESSES {
+            if !(t >= within[0] && t <= within[1]) {
+                t = 0.5 * (within[0] + within[1]);
+            }
+            let place = from.towards(to, t, self.part);
+            let cut = |by: u32| self.engine.cut_by(&place.point, &place.normal, by);
+            let cuts = match [cut(by[0]), cut(by[1])] {
+                [Some(first), Some(second)] => [first, second],
+                // No lower than where the other one cuts.
+                [Some(_), None] => {
+                    (within[0], t, last) = (t, f64::NAN, None);
+                    continue;
+                }
+                [None, Some(_)] => {
+                    (within[1], t, last) = (t, f64::NAN, None);
+                    continue;
+                }
+                [None, None] => return None,
+            };
+            let apart = cuts[0].s - cuts[1].s;
+            if apart.abs() <= EQUALLY_HIGH {
+                return Some(Meeting { t, place, cuts });
+            }
+            within[usize::from(apart > 0.0)] = t;
+            if let Some([before, then]) = last {
+                rise = (apart - then) / (t - before);
+            }
+            (last, by) = (Some([t, apart]), cuts.map(|cut| cut.index));
+            t -= apart / rise;
+        }
+        None
+    }
+
+    /// The ridge where two tracks meet.
+    fn crossing_of(&self, met: &Meeting) -> Option<Crossing> {
+        let Meeting { place, cuts, .. } = met;
+        let normal = |cut: &RayHit| self.engine.normal_of(&place.point, &place.normal, cut);
+        let along: Vector3 = normal(&cuts[0])?.cross(&normal(&cuts[1])?);
+        let (height, moves) = (met.height(), cuts.map(|cut| cut.index));
+        Some(Crossing {
+            height,
+            at: place.point + place.normal * height,
+            rise: along.try_normalize(1e-12).map_or(0.0, |t| t.dot(&place.normal).abs()),
+            length: 0.0,
+            passes: self.tracks.passes(moves[0], moves[1]),
+            moves,
+            uncertain: 0.0,
+        })
+    }
+}
+
+/// A place between two ends, and where the tracks of both would cut its normal.
+struct Meeting {
+    t: f64,
+    place: NetPlace,
+    cuts: [RayHit; 2],
+}
+
+impl Meeting {
+    /// Over the design, mm.
+    fn height(&self) -> f64 {
+        self.cuts[0].s.min(self.cuts[1].s)
     }
 }
 

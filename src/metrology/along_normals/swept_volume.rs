@@ -9,7 +9,7 @@ use cutter::Solid;
 use geometry::{Aabb, Point3, Vector3};
 use motion::Toolpath;
 use part::Part;
-use sim::{Rays, VoxelEngine, Voxels};
+use sim::{RayHit, Rays, VoxelEngine, Voxels};
 
 /// Cuts are first looked for so far below the design, mm. What reaches deeper is asked whether it comes from the far side
 /// of a thin part: chords cut less deep, and where the part is as thin as that it ends. Looking deep at once would find
@@ -18,6 +18,10 @@ const NEAR: f64 = 0.1;
 
 /// How many times deeper is looked on a ridge that is cut as deep as was looked.
 const DEEPER: f64 = 4.0;
+
+/// So many moves before or after one of a track are asked with it, where it cuts within this share of its end.
+const BESIDE: usize = 4;
+const AT_END: f64 = 1e-6;
 
 /// Steps along a line in search of what was cut beside it, and the least one as a share of how far aside is looked.
 const MOST_STEPS: usize = 64;
@@ -34,6 +38,17 @@ pub trait FirstCut: Sync {
         range: [f64; 2],
         near: Option<&NormalHit>,
     ) -> Option<NormalHit>;
+
+    /// The same of a move alone, and of those of its pass that go on where it ends; `None` also where the engine cannot tell
+    /// moves apart.
+    fn cut_by(&self, _point: &Point3, _normal: &Vector3, _range: [f64; 2], _by: u32) -> Option<RayHit> {
+        None
+    }
+
+    /// The unit normal of the cut surface at what [`FirstCut::cut_by`] found.
+    fn normal_of(&self, _point: &Point3, _normal: &Vector3, _hit: &RayHit) -> Option<Vector3> {
+        None
+    }
 
     /// Up to where, from the begin of a range on, nothing within `aside` mm of the line was cut; the begin where that is not
     /// known.
@@ -63,22 +78,44 @@ impl FirstCut for RaysCut<'_> {
         let [low, high] = range;
         let seed = near.map(|hit| hit.seed);
         let (hit, seed) = self.rays.deviation_near(point, normal, [-low, high], seed)?;
-        let cut = if self.solid.ball().is_some() {
-            let to = &self.path.moves[hit.index as usize].to;
-            let at = self.path.location_before(hit.index as usize).towards(to, hit.t);
-            -self.solid.foot(&at.tip, &at.axis, &(point + normal * hit.s)).gradient
-        } else {
-            // Where an edge cuts, the tool by itself has no normal.
-            self.rays.cut_normal(point, normal, &hit)?
-        };
         Some(NormalHit {
             deviation: hit.s,
             by: hit.index,
-            normal: cut,
+            normal: self.normal_of(point, normal, &hit)?,
             way: Way::Normal,
             seed,
             uncertain: 0.0,
         })
+    }
+
+    fn cut_by(&self, point: &Point3, normal: &Vector3, [low, high]: [f64; 2], by: u32) -> Option<RayHit> {
+        let of = |k: u32, high: f64| self.rays.deviation_by(point, normal, [-low, high], k);
+        let pass = |k: u32| self.path.moves.get(k as usize).map(|step| step.pass);
+        let mut lowest = of(by, high)?;
+        for _ in 0..BESIDE {
+            // What a move cuts at its end the next one may cut deeper.
+            let next = match lowest {
+                RayHit { t, index, .. } if t > 1.0 - AT_END => Some(index + 1),
+                RayHit { t, index, .. } if t < AT_END => index.checked_sub(1),
+                _ => None,
+            };
+            let next = next.filter(|k| pass(*k) == pass(by));
+            let Some(deeper) = next.and_then(|k| of(k, lowest.s)).filter(|hit| hit.s < lowest.s) else {
+                break;
+            };
+            lowest = deeper;
+        }
+        Some(lowest)
+    }
+
+    fn normal_of(&self, point: &Point3, normal: &Vector3, hit: &RayHit) -> Option<Vector3> {
+        if self.solid.ball().is_none() {
+            // Where an edge cuts, the tool by itself has no normal.
+            return self.rays.cut_normal(point, normal, hit);
+        }
+        let to = &self.path.moves[hit.index as usize].to;
+        let at = self.path.location_before(hit.index as usize).towards(to, hit.t);
+        Some(-self.solid.foot(&at.tip, &at.axis, &(point + normal * hit.s)).gradient)
     }
 
     fn free_up_to(&self, point: &Point3, normal: &Vector3, [low, high]: [f64; 2], aside: f64) -> f64 {
@@ -107,6 +144,13 @@ pub struct RaysCutInTurn<'a> {
     pub tools: Vec<(u32, RaysCut<'a>)>,
 }
 
+impl RaysCutInTurn<'_> {
+    /// The tool that makes a move.
+    fn tool_of(&self, by: u32) -> Option<&(u32, RaysCut<'_>)> {
+        self.tools.iter().rev().find(|(first, _)| *first <= by)
+    }
+}
+
 impl FirstCut for RaysCutInTurn<'_> {
     fn first_cut(
         &self,
@@ -122,6 +166,17 @@ impl FirstCut for RaysCutInTurn<'_> {
             Some(NormalHit { by: hit.by + first, ..hit })
         };
         self.tools.iter().filter_map(of_tool).min_by(|a, b| a.deviation.total_cmp(&b.deviation))
+    }
+
+    fn cut_by(&self, point: &Point3, normal: &Vector3, range: [f64; 2], by: u32) -> Option<RayHit> {
+        let (first, cut) = self.tool_of(by)?;
+        let hit = cut.cut_by(point, normal, range, by - first)?;
+        Some(RayHit { index: hit.index + first, ..hit })
+    }
+
+    fn normal_of(&self, point: &Point3, normal: &Vector3, hit: &RayHit) -> Option<Vector3> {
+        let (first, cut) = self.tool_of(hit.index)?;
+        cut.normal_of(point, normal, &RayHit { index: hit.index - first, ..*hit })
     }
 
     fn free_up_to(&self, point: &Point3, normal: &Vector3, range: [f64; 2], aside: f64) -> f64 {
@@ -253,6 +308,17 @@ impl AlongNormal for SweptVolume<'_> {
                 Some(NormalHit { way: if is_all { Way::Thickness } else { hit.way }, ..hit })
             }
         }
+    }
+
+    fn cut_by(&self, point: &Point3, normal: &Vector3, by: u32) -> Option<RayHit> {
+        let close = NEAR.min(self.inward);
+        let hit = self.cut.cut_by(point, normal, [-close, self.outward], by)?;
+        // It may be cut deeper than it was looked.
+        (hit.s > -close).then_some(hit)
+    }
+
+    fn normal_of(&self, point: &Point3, normal: &Vector3, hit: &RayHit) -> Option<Vector3> {
+        self.cut.normal_of(point, normal, hit)
     }
 
     fn reach(&self) -> f64 {

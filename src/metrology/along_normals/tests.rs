@@ -420,3 +420,102 @@ fn voxels_measure_what_rays_do_upright_and_tilted() {
     let passes: Vec<Vec<ClPoint>> = (0..7).filter(|&k| k != 4).map(pass).collect();
     agree(&plane([4.0, 3.0]), &bull, &passes, 0.1, 0.02);
 }
+
+/// An engine that counts how often all moves are asked.
+struct Counted<'a> {
+    engine: SweptVolume<'a>,
+    by_moves: bool,
+    lines: std::sync::atomic::AtomicUsize,
+}
+
+impl AlongNormal for Counted<'_> {
+    fn hit(&self, point: &Point3, normal: &Vector3, near: Option<&NormalHit>) -> Option<NormalHit> {
+        self.lines.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        self.engine.hit(point, normal, near)
+    }
+
+    fn cut_by(&self, point: &Point3, normal: &Vector3, by: u32) -> Option<RayHit> {
+        if self.by_moves { self.engine.cut_by(point, normal, by) } else { None }
+    }
+
+    fn normal_of(&self, point: &Point3, normal: &Vector3, hit: &RayHit) -> Option<Vector3> {
+        self.engine.normal_of(point, normal, hit)
+    }
+
+    fn reach(&self) -> f64 {
+        self.engine.reach()
+    }
+
+    fn depth(&self) -> f64 {
+        self.engine.depth()
+    }
+}
+
+/// Ridges told by the two moves that meet stand where looks along all moves find them, and take one such look each. On a dome, leaning
+/// forth and back, some passes deeper, so that they leave nothing of their neighbours between them.
+#[test]
+fn the_two_moves_that_meet_tell_the_ridges_that_all_moves_do() {
+    let rho = 6.0;
+    let dome =
+        Part::from_patches(vec![Patch::Nurbs(samples::hemisphere(Point3::origin(), rho))], 0.01).unwrap();
+    for cutter in [Cutter::ball(2.0 * RADIUS).unwrap(), Cutter::bull(6.0, 1.0).unwrap()] {
+        let ring = |k: usize| {
+            let polar = 0.05 + 0.1 * k as f64;
+            let lower = if k % 3 == 1 { 0.01 * (k % 4) as f64 } else { 0.0 };
+            let at = |n: usize| {
+                let turn = std::f64::consts::TAU * n as f64 / 60.0;
+                let normal = Vector3::new(polar.sin() * turn.cos(), polar.sin() * turn.sin(), polar.cos());
+                let feed =
+                    Vector3::new(-turn.sin(), turn.cos(), 0.0) * if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+                let axis = (normal + feed * 0.1).normalize();
+                let contact = Point3::from(normal * (rho - lower));
+                ClPoint { tip: contact + cutter.contact_to_tip_along(&normal, &axis), axis }
+            };
+            (0..=60).map(at).collect::<Vec<_>>()
+        };
+        let step =
+            |pass: usize, to: ClPoint| Move { to, kind: MoveKind::Cut, feed_rate: 1e3, pass: pass as u32 };
+        let rings: Vec<Vec<ClPoint>> = (0..16).map(ring).collect();
+        let moves = rings.iter().enumerate().flat_map(|(k, ring)| ring.iter().map(move |&at| step(k, at)));
+        let path = Toolpath::new(rings[0][0], moves.collect());
+        let solid = Solid::of_cutter(&cutter, None);
+        let rays = Rays::new(&path, &solid, &Silent).unwrap();
+        let by_rays = RaysCut { rays: &rays, path: &path, solid: &solid };
+        let tracks = Tracks::new(&path, cutter);
+        let net = Net::over(&dome, 0.2);
+        let look = |by_moves: bool| {
+            let engine = Counted { engine: swept(&dome, &by_rays, 1.0), by_moves, lines: Default::default() };
+            let along = Along {
+                part: &dome,
+                cutters: &(&cutter).into(),
+                path: &path,
+                engine: &engine,
+                limits: &LIMITS,
+                spacing: 0.2,
+                asked: 1e-4,
+                most_divided: 0,
+            };
+            let kept = vec![true; net.places.len()];
+            let seen = along.inspection(&tracks).look(&net, &kept, &Silent).unwrap();
+            let lines = engine.lines.into_inner() - net.places.len();
+            (seen.of_triangle.into_iter().flatten().collect::<Vec<_>>(), lines)
+        };
+        let ((quick, few), (slow, many)) = (look(true), look(false));
+        assert!(
+            quick.len() > 1000 && quick.len().abs_diff(slow.len()) * 100 <= slow.len(),
+            "{} {}",
+            quick.len(),
+            slow.len()
+        );
+        let near = |c: &&Crossing| slow.iter().find(|other| (other.at - c.at).norm() < 1e-4);
+        let off: Vec<f64> = quick.iter().filter_map(|c| Some((c.height - near(&c)?.height).abs())).collect();
+        let worst = off.iter().copied().fold(0.0, f64::max);
+        assert!(
+            off.len() * 100 >= quick.len() * 99 && worst < 1e-5,
+            "{} of {}, {worst}",
+            off.len(),
+            quick.len()
+        );
+        assert!(few * 3 < many, "{few} {many}");
+    }
+}

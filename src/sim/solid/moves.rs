@@ -302,6 +302,12 @@ impl SweptMoves {
         &self.motions[part.chosen as usize]
     }
 
+    /// All of the move with that index in the path, if it was chosen.
+    pub(crate) fn part_of(&self, index: u32) -> Option<MovePart> {
+        let chosen = self.indices.binary_search(&index).ok()? as u32;
+        Some(MovePart { chosen, range: [0.0, 1.0] })
+    }
+
     /// The move with that index in the path, if it was chosen.
     pub(crate) fn motion_of(&self, index: u32) -> Option<&Motion> {
         self.indices.binary_search(&index).ok().map(|k| &self.motions[k])
