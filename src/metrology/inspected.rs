@@ -32,7 +32,7 @@ pub(super) fn inspect(
     let deviation = inspection.deviation_figures(&samples);
     let highest_ridge = highest_ridge.max(ridges.highest_sample());
     Ok(Inspected {
-        highest: finder.highest(&mut ridges, inspection.asked),
+        highest: finder.highest(&mut ridges, inspection.asked, monitor)?,
         ridges,
         gouge: inspection.gouges(&samples, monitor)?,
         uncut: inspection.uncut(&samples, highest_ridge, deviation.area_mm2, monitor)?,

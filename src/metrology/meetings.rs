@@ -116,7 +116,18 @@ impl<'a> Meetings<'a> {
         b: (f64, u32),
         found: &mut dyn FnMut(Meeting),
     ) {
-        self.between_or_gaps(at, a, b, found, &mut |_| {});
+        self.search(at, a, b, MOST_DEPTH, found, &mut |_| {});
+    }
+
+    /// As [`Meetings::between`] where `a` and `b` met nearby: those between them and one that has come in between.
+    pub fn again_between(
+        &self,
+        at: &dyn Fn(f64) -> Point2,
+        a: (f64, u32),
+        b: (f64, u32),
+        found: &mut dyn FnMut(Meeting),
+    ) {
+        self.search(at, a, b, 1, found, &mut |_| {});
     }
 
     /// As [`Meetings::between`]; hands to `gap` the places between `a` and `b` that no move around reaches:
@@ -156,9 +167,11 @@ impl<'a> Meetings<'a> {
         lowest = self.hidden(q, za.max(zb), [a, b]).filter(|hidden| hidden.z < lowest.z).unwrap_or(lowest);
         // Another move is lower at the crossing: it stands between the two.
         let third = lowest.z < za.min(zb) - 1e-9 && lowest.by != a && lowest.by != b;
-        if third && depth > 0 && self.surface.pass(lowest.by).is_some() {
-            self.search(at, (ta, a), (t, lowest.by), depth - 1, found, gap);
-            self.search(at, (t, lowest.by), (tb, b), depth - 1, found, gap);
+        if third && self.surface.pass(lowest.by).is_some() {
+            if depth > 0 {
+                self.search(at, (ta, a), (t, lowest.by), depth - 1, found, gap);
+                self.search(at, (t, lowest.by), (tb, b), depth - 1, found, gap);
+            }
         } else if za.is_finite() && zb.is_finite() && (za - zb).abs() <= MEETING {
             found(Meeting { t, at: q, z: za.max(zb), moves: [a, b] });
         } else if za.is_infinite() != zb.is_infinite() {

@@ -46,7 +46,7 @@ pub(super) fn ridge_map(
     let samples = inspection.samples(monitor)?;
     let finder = RidgeFinder::new(&inspection, path);
     let mut ridges = finder.find(&|k| samples[k].deviation, monitor)?;
-    let mut highest = finder.highest(&mut ridges, asked);
+    let mut highest = finder.highest(&mut ridges, asked, monitor)?;
     let all = (0..path.len() as u32).collect::<Vec<_>>();
     let as_left = |tops: &mut Vec<Top>| as_left(tops, &inspection, &all);
     let of_ridges = ridges

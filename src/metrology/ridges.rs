@@ -115,12 +115,9 @@ pub(super) struct Highest {
 }
 
 /// Where a ridge could rise above the highest sample between two grid lines, it is looked at on this
-/// many lines between them.
+/// many lines between them, and on so many more between two of these where it still could, by more than the asked bound, up to
+/// [`MOST_LINES`] in all. More lines at once, or at most, take longer; fewer at most leave steep ridges open.
 const CLOSER_LINES: i32 = 8;
-
-/// On so many times more lines where it still could, by more than the asked bound, up to [`MOST_LINES`].
-/// More lines at once, or at most, take longer; fewer at most leave steep ridges open.
-const CLOSER_STILL: i32 = 8;
 const MOST_LINES: i32 = 512;
 
 /// Ridges are looked at closer on lines that they cross with at least this plan normal; the lines of
@@ -327,53 +324,76 @@ impl<'a> RidgeFinder<'a> {
     }
 
     /// The highest place of all ridges, looked at closer wherever a ridge might rise above the highest
-    /// sample before the next grid line, and closer still until it cannot by more than `asked` mm; `None`
+    /// sample before the next grid line, and closer still where it yet could by more than `asked` mm; `None`
     /// without samples. Places above the scallop limit that come to light are added to the ridges' own.
-    pub fn highest(&self, ridges: &mut Ridges, asked: f64) -> Option<Highest> {
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the monitor says so.
+    pub fn highest(
+        &self,
+        ridges: &mut Ridges,
+        asked: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Highest>, Cancelled> {
         let samples = &ridges.candidates;
-        let first = samples.iter().max_by(|a, b| a.height.total_cmp(&b.height))?;
+        let Some(first) = samples.iter().max_by(|a, b| a.height.total_cmp(&b.height)) else {
+            return Ok(None);
+        };
         let mut highest = Highest { height: first.height, at: first.at, possible: first.height };
         // All that may be above the limit, though another place is higher.
         let known = first.height.min(self.limits.scallop);
-        let mut open: Vec<&RidgeSample> = samples.iter().filter(|s| s.might_rise_above(known)).collect();
+        let mut open: Vec<(f64, RidgeSample)> =
+            samples.iter().filter(|s| s.might_rise_above(known)).map(|s| (0.0, *s)).collect();
         let mut lines = CLOSER_LINES;
         while !open.is_empty() {
-            let closer = work::parallel::map(open.len(), |k| self.closer(open[k], lines));
-            for lines in &closer {
-                let Some(top) = lines.iter().max_by(|a, b| a.height.total_cmp(&b.height)) else { continue };
+            monitor.start("following ridges", open.len() as u64);
+            let closer = work::parallel::try_map(open.len(), |k| {
+                monitor::check(monitor)?;
+                let found = self.closer(&open[k], lines);
+                monitor.advance(1);
+                Ok::<_, Cancelled>(found)
+            })?;
+            for (_, top) in closer.iter().flatten() {
                 if top.height > highest.height {
                     (highest.height, highest.at) = (top.height, top.at);
                 }
-                if top.height > self.limits.scallop {
-                    ridges.above.push(RidgePlace { at: top.at, height: top.height });
+            }
+            let tops = closer.iter().filter_map(|found| {
+                let heights = found.iter().map(|(_, sample)| sample);
+                heights.max_by(|a, b| a.height.total_cmp(&b.height))
+            });
+            let above = tops.filter(|top| top.height > self.limits.scallop);
+            ridges.above.extend(above.map(|top| RidgePlace { at: top.at, height: top.height }));
+            let possible = |sample: &RidgeSample| sample.height + sample.rise / f64::from(lines);
+            let (last, enough) = (lines >= MOST_LINES, highest.height + asked);
+            open.clear();
+            for (aside, sample) in closer.into_iter().flatten() {
+                if last || possible(&sample) <= enough {
+                    highest.possible = highest.possible.max(possible(&sample));
+                } else {
+                    open.push((aside, sample));
                 }
             }
-            let possible: Vec<f64> = closer
-                .iter()
-                .map(|found| found.iter().map(|s| s.height + s.rise / f64::from(lines)).fold(0.0, f64::max))
-                .collect();
-            lines *= CLOSER_STILL;
-            let last = lines > MOST_LINES;
-            let enough = highest.height + asked;
-            let settled = |p: &&f64| last || **p <= enough;
-            highest.possible = possible.iter().filter(settled).copied().fold(highest.possible, f64::max);
-            open = (0..open.len()).filter(|k| !settled(&&possible[*k])).map(|k| open[k]).collect();
+            lines *= CLOSER_LINES;
         }
         highest.possible = highest.possible.max(highest.height);
-        Some(highest)
+        Ok(Some(highest))
     }
 
-    /// The ridge of a sample on as many lines within half a cell on either side.
-    fn closer(&self, sample: &RidgeSample, lines: i32) -> Vec<RidgeSample> {
+    /// The ridge of a sample `aside` of its line, by a share of it, on lines that are such a share of it apart; up to half a cell on either
+    /// side, or to where others are looked at.
+    fn closer(&self, (aside, sample): &(f64, RidgeSample), lines: i32) -> Vec<(f64, RidgeSample)> {
         let line = GridLine::new(&self.surface.cut.grid, sample.from.0, sample.from.1);
         let [a, b] = sample.moves;
         let (mut found, mut hidden) = (Vec::new(), Vec::new());
-        for k in -lines / 2..=lines / 2 {
-            let line = line.beside(f64::from(k) / f64::from(lines));
+        for k in -CLOSER_LINES / 2..=CLOSER_LINES / 2 {
+            let aside = aside + f64::from(k) / f64::from(lines);
             // The ridge may leave the cell sideways by half of it.
-            self.between(&line, (-0.5, a), (1.5, b), &mut found, &mut hidden);
+            let line = line.beside(aside);
+            let mut met = |m| found.extend(self.sample(&line, m, &mut hidden).map(|sample| (aside, sample)));
+            self.meetings.again_between(&|t| line.at(t), (-0.5, a), (1.5, b), &mut met);
         }
-        found.retain(|s| self.part.highest_at(s.at.x, s.at.y).is_some() && !self.is_cut_away(&s.at));
+        found.retain(|(_, s)| self.part.highest_at(s.at.x, s.at.y).is_some() && !self.is_cut_away(&s.at));
         found
     }
 }
