@@ -8,7 +8,7 @@
 
 use geometry::{Point3, Vector3};
 use motion::Toolpath;
-use sim::{Envelope, NOT_CUT, Shape, ZMap};
+use sim::{Envelope, Grid, NOT_CUT, Shape, ZMap};
 
 /// A point of the cut surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,6 +51,8 @@ pub struct CutSurface<'a> {
     pub cut: &'a ZMap,
     /// What cut.
     pub path: &'a Toolpath,
+    /// How low the tip comes on each move and those of its pass just before and after it, mm.
+    lowest_tips: Vec<f64>,
 }
 
 /// Most steps along the program in search of a lower move. Reached only where moves are some
@@ -64,7 +66,8 @@ const MOST_BESIDE: u32 = 32;
 impl<'a> CutSurface<'a> {
     /// Of a z-map that `path` has cut.
     pub fn new(envelope: Envelope, cut: &'a ZMap, path: &'a Toolpath) -> Self {
-        Self { envelope, cut, path }
+        let lowest_tips = lowest_tips(path);
+        Self { envelope, cut, path, lowest_tips }
     }
 
     /// The moves that won cell `(i, j)` and the eight around it, the cell's own first.
@@ -188,6 +191,19 @@ impl<'a> CutSurface<'a> {
     }
 }
 
+/// How low the tip comes on each move of a path and on some of its pass before and after it, which a place may be followed to, mm.
+fn lowest_tips(path: &Toolpath) -> Vec<f64> {
+    /// Moves before and after.
+    const FOLLOWED: usize = 8;
+    let tips: Vec<(f64, u32)> =
+        path.segments().map(|(from, to, step)| (from.z.min(to.z), step.pass)).collect();
+    let around = |k: usize| {
+        let near = &tips[k.saturating_sub(FOLLOWED)..(k + FOLLOWED + 1).min(tips.len())];
+        near.iter().filter(|(_, pass)| *pass == tips[k].1).map(|(z, _)| *z).fold(f64::INFINITY, f64::min)
+    };
+    work::parallel::map(tips.len(), around)
+}
+
 /// Where the line from a design point along its normal meets the cut surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deviation {
@@ -262,13 +278,40 @@ impl CutSurface<'_> {
             let at = |x: f64, y: f64| {
                 Some(lower(self.near(x, y).unwrap_or(nothing), x, y)).filter(|cut| cut.z.is_finite())
             };
-            self.march(p, n, vertical, &at).and_then(|(lo, hi)| self.newton(p, n, start, Some((lo, hi)), &at))
+            let lowest_tip =
+                |&by: &u32| self.path.start_of(by as usize).z.min(self.path.moves[by as usize].to.tip.z);
+            let lowest = further.iter().map(lowest_tip).fold(stock, f64::min);
+            let stands = |q: &Point3| {
+                let cell = self.cut.grid.cell_at(q.x, q.y);
+                lowest > q.z && cell.is_some_and(|cell| self.stands(q, cell))
+            };
+            self.march(p, n, vertical, &at, &stands)
+                .and_then(|(lo, hi)| self.newton(p, n, start, Some((lo, hi)), &at))
         };
         Some(found.unwrap_or(Deviation {
             distance: vertical * n.z,
             slope: n.cross(&self.normal(start.by, p.x, p.y)).norm(),
             by: start.by,
         }))
+    }
+
+    /// Whether what cut a cell and those around it, with the moves that follow on, left all that stood at a place there: no tool cuts below
+    /// its tip.
+    fn stands(&self, q: &Point3, (i, j): (usize, usize)) -> bool {
+        let Grid { nx, ny, .. } = self.cut.grid;
+        let is_in_stock = |k: usize| match &self.cut.shape {
+            None => f64::from(self.cut.height[k]) > q.z,
+            Some(shape) => shape.height_at(q.x, q.y) > q.z,
+        };
+        let mut in_stock = None;
+        let mut is_left = |k: usize| match self.cut.cut_by[k] {
+            // The same of all cells.
+            NOT_CUT => *in_stock.get_or_insert_with(|| is_in_stock(k)),
+            by => self.lowest_tips[by as usize] > q.z,
+        };
+        let columns = i.saturating_sub(1)..=(i + 1).min(nx - 1);
+        let mut rows = j.saturating_sub(1)..=(j + 1).min(ny - 1);
+        rows.all(|j| columns.clone().all(|i| is_left(self.cut.grid.index(i, j))))
     }
 
     /// As [`Self::at`]; beside the grid by the moves that cut its outermost cells, as far as they pass.
@@ -281,19 +324,24 @@ impl CutSurface<'_> {
     }
 
     /// Follows the normal in steps of half a cell to the first change of side; the bracket
-    /// `(lower, upper)` of the meeting.
+    /// `(lower, upper)` of the meeting. Upward it is not asked how high the cut is where so much `stands` for certain.
     fn march(
         &self,
         p: &Point3,
         n: &Vector3,
         vertical: f64,
         at: &dyn Fn(f64, f64) -> Option<CutPoint>,
+        stands: &dyn Fn(&Point3) -> bool,
     ) -> Option<(f64, f64)> {
         let step = 0.5 * self.cut.grid.cell * vertical.signum();
         let mut t = 0.0;
         for _ in 0..MOST_MARCHING_STEPS {
             let next = t + step;
             let q = p + n * next;
+            if vertical > 0.0 && stands(&q) {
+                t = next;
+                continue;
+            }
             let gap = at(q.x, q.y)?.z - q.z;
             if gap * vertical.signum() <= 0.0 {
                 return Some(if step > 0.0 { (t, next) } else { (next, t) });
