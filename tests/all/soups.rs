@@ -68,3 +68,20 @@ fn a_soup_seen_from_its_back_does_not_pass() {
     let answer = run(home.path(), &triangles, SCENE, &[]);
     assert_eq!(answer.code, Some(1), "{answer:?}");
 }
+
+/// A block whose walls lean by one degree: seen from above there is its level top and a narrow band. Its walls have contours.
+#[test]
+fn walls_of_a_mesh_that_no_contour_follows_are_named() {
+    let ([x, y, z], out) = ([10.0, 7.0, 8.0], 8.0 * 1f64.to_radians().tan());
+    let ring = |x: f64, y: f64, z: f64| [[-x, -y, z], [x, -y, z], [x, y, z], [-x, y, z]];
+    let (foot, top) = (ring(x + out, y + out, 0.0), ring(x, y, z));
+    let wall = |k: usize| quad(foot[k], foot[(k + 1) % 4], top[(k + 1) % 4], top[k]);
+    let [a, b, c, d] = top;
+    let block: Vec<[Point3; 3]> = (0..4).flat_map(wall).chain(quad(a, b, c, d)).collect();
+    let home = tempfile::tempdir().unwrap();
+    let answer = run(home.path(), &block, &SCENE.replace("zigzag\"\nstepover = 0.5", "waterline\""), &[]);
+    assert_eq!(answer.code, Some(2), "{answer:?}");
+    let said = format!("{}{}", answer.stdout, answer.stderr);
+    let said = said.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+    assert!(said.contains("549 mm² of walls steeper than 80 degrees"), "{said}");
+}

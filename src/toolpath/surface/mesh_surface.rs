@@ -30,7 +30,7 @@ const WELD_OVER_DEVIATION: f64 = 4.0;
 
 /// Steeper places than this, from the level, are left to strategies that go down walls, as the cosine
 /// (80°): passes along the surface would lie nearly on top of each other in the plan view.
-const STEEPEST_COSINE: f64 = 0.173_648;
+pub(crate) const STEEPEST_COSINE: f64 = 0.173_648;
 
 /// A place is covered where the part stands over it by more than this share of the cutter's radius.
 const COVERED_OVER_RADIUS: f64 = 0.01;
