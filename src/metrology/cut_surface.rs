@@ -278,9 +278,7 @@ impl CutSurface<'_> {
             let at = |x: f64, y: f64| {
                 Some(lower(self.near(x, y).unwrap_or(nothing), x, y)).filter(|cut| cut.z.is_finite())
             };
-            let lowest_tip =
-                |&by: &u32| self.path.start_of(by as usize).z.min(self.path.moves[by as usize].to.tip.z);
-            let lowest = further.iter().map(lowest_tip).fold(stock, f64::min);
+            let lowest = further.iter().map(|&by| self.lowest_tips[by as usize]).fold(stock, f64::min);
             let stands = |q: &Point3| {
                 let cell = self.cut.grid.cell_at(q.x, q.y);
                 lowest > q.z && cell.is_some_and(|cell| self.stands(q, cell))
@@ -324,7 +322,7 @@ impl CutSurface<'_> {
     }
 
     /// Follows the normal in steps of half a cell to the first change of side; the bracket
-    /// `(lower, upper)` of the meeting. Upward it is not asked how high the cut is where so much `stands` for certain.
+    /// `(lower, upper)` of the meeting. Upward it is not asked how high the cut is where so much `stands` by the tips of the tools around.
     fn march(
         &self,
         p: &Point3,

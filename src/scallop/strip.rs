@@ -137,6 +137,10 @@ pub fn strip_width_at(
     }
     let over = Over { curvature: surface, height: h, farthest: widest };
     let width = Silhouette::new(cutter, *n, *b).width(&over);
+    if width <= 0.0 {
+        // Over twisted ground the outline may turn back: the circle that osculates the cutter tells more.
+        return strip_width(curvature, surface, h, cutter.radius());
+    }
     if width < widest { (width, false) } else { (widest, too_concave) }
 }
 
@@ -171,6 +175,16 @@ mod tests {
 
     fn across(across: f64) -> FeedCurvature {
         FeedCurvature { across, ..FeedCurvature::default() }
+    }
+
+    /// A bull nose on a steep hollow that bends across the feed nearly as it does: its outline turns back before it is as high as asked.
+    #[test]
+    fn strips_have_a_width_where_the_outline_turns_back() {
+        let bull = Cutter::bull(2.0, 1.0 / 3.0).unwrap();
+        let n = Vector3::new(0.108_427_731_875_199_63, -0.967_080_179_726_517_9, 0.230_215_883_336_761_9);
+        let b = Vector3::new(-0.255_395_001_205_999_06, 0.196_709_405_509_804_1, 0.946_614_389_887_966_9);
+        let (width, _) = strip_width_at(&bull, &n, &b, &across(1.158_174_081_754_779_6), 0.009_95);
+        assert!(width > 0.1 && width < 1.0, "{width}");
     }
 
     /// Passes over `z = 0.35 x + 0.1 y + c x y` with contacts at constant y, one at 0 and one so that they are `width` apart
