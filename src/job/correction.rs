@@ -659,6 +659,10 @@ impl Corrected<'_> {
         let planned = &tried.kept.passes;
         // What a pass takes beside its length, as those of the plan do on average.
         let figures = path_figures(&self.best.plan.path, 0.0);
+        // One pass, as a spiral's, is left for others only where narrower ones were in vain.
+        if figures.passes == 1 && !is_in_vain {
+            return false;
+        }
         let off_pass = (figures.link_length_mm + figures.air_length_mm) / figures.passes.max(1) as f64;
         let whole = figures.cutting_length_mm + figures.link_length_mm + figures.air_length_mm;
         let round = &tried.standing.round;
