@@ -6,6 +6,8 @@
 //! on it does not depend on the grid, except that a move which is lowest nowhere on a cell centre
 //! nor next to one that is would be missed.
 
+use std::sync::Arc;
+
 use geometry::{Point3, Vector3};
 use motion::Toolpath;
 use sim::{Envelope, Grid, NOT_CUT, Shape, ZMap};
@@ -52,7 +54,7 @@ pub struct CutSurface<'a> {
     /// What cut.
     pub path: &'a Toolpath,
     /// How low the tip comes on each move and those of its pass just before and after it, mm.
-    lowest_tips: Vec<f64>,
+    lowest_tips: Arc<[f64]>,
 }
 
 /// Most steps along the program in search of a lower move. Reached only where moves are some
@@ -66,8 +68,21 @@ const MOST_BESIDE: u32 = 32;
 impl<'a> CutSurface<'a> {
     /// Of a z-map that `path` has cut.
     pub fn new(envelope: Envelope, cut: &'a ZMap, path: &'a Toolpath) -> Self {
-        let lowest_tips = lowest_tips(path);
+        let lowest_tips = lowest_tips(path).into();
         Self { envelope, cut, path, lowest_tips }
+    }
+
+    /// What the same path has cut of another z-map.
+    pub fn with_cut<'b>(&self, cut: &'b ZMap) -> CutSurface<'b>
+    where
+        'a: 'b,
+    {
+        CutSurface {
+            envelope: self.envelope.clone(),
+            cut,
+            path: self.path,
+            lowest_tips: Arc::clone(&self.lowest_tips),
+        }
     }
 
     /// The moves that won cell `(i, j)` and the eight around it, the cell's own first.

@@ -11,7 +11,6 @@
 
 use std::collections::BTreeMap;
 
-use super::cut_surface::CutSurface;
 use super::figures::{CloserLook, Measurement, NUMERICAL_FLOOR};
 use super::inspected::{Inspected, inspect};
 use super::inspection::{Inspection, Within};
@@ -20,7 +19,7 @@ use super::ridges::Hidden;
 use super::unseen::{Dip, most_unseen};
 use geometry::Point2;
 use motion::Toolpath;
-use sim::{Envelope, Grid, Shape, cut, cut_in_turn};
+use sim::{Grid, Shape, cut, cut_in_turn};
 use work::monitor::{self, Cancelled, Monitor};
 
 /// Cells of the grid along the side of a rectangle. More are cut for nothing around a place; fewer share
@@ -273,8 +272,7 @@ impl Refinement<'_> {
         let (coarse, within) = (self.coarse, Within(monitor));
         let stock = coarse.surface.cut.uncut(fine, self.asked.stock_top, &within)?;
         let cut = cut_in_turn(cut, stock, coarse.cutters, self.path, &within)?;
-        let envelope: Envelope = coarse.surface.envelope.clone();
-        let surface = CutSurface::new(envelope, &cut, self.path);
+        let surface = coarse.surface.with_cut(&cut);
         let meetings = &Meetings::new(&surface, coarse.cutters, self.path, None);
         let inspection = Inspection { surface: &surface, meetings, grid: fine, ..*coarse };
         let found = inspect(&inspection, self.path, self.highest_ridge, &within)?;

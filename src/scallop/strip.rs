@@ -137,7 +137,7 @@ pub fn strip_width_at(
     }
     let over = Over { curvature: surface, height: h, farthest: widest };
     let width = Silhouette::new(cutter, *n, *b).width(&over);
-    if width <= 0.0 {
+    if width.is_nan() || width <= 0.0 {
         // Over twisted ground the outline may turn back: the circle that osculates the cutter tells more.
         return strip_width(curvature, surface, h, cutter.radius());
     }

@@ -12,7 +12,7 @@ use crate::figures::{Limits, NUMERICAL_FLOOR};
 use geometry::{Point3, Vector3};
 use work::monitor::{self, Cancelled, Monitor};
 
-/// Triangles that are divided at most in search of extremes. Each asks for some four places.
+/// Triangles that are divided at most in search of extremes.
 pub(super) const MOST_DIVIDED: usize = 120_000;
 
 /// Where a limit lies between what is known and what is possible, this share of the asked bound is asked for.

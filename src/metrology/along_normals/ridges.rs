@@ -96,7 +96,7 @@ impl Finder<'_> {
             let Some(hit) = self.engine.hit(&place.point, &place.normal, Some(&a.hit)) else { return };
             let lower = met.height() - hit.deviation;
             if lower.abs() <= SAME {
-                return found.extend(self.crossing_of(&met));
+                return found.extend(self.crossing_of(&met, hit.uncertain));
             }
             if lower > 0.0 && depth > 0 {
                 // One cuts there that neither end knows: a track between them, or moves farther on along one of theirs.
@@ -209,8 +209,8 @@ impl Finder<'_> {
         None
     }
 
-    /// The ridge where two tracks meet.
-    fn crossing_of(&self, met: &Meeting) -> Option<Crossing> {
+    /// The ridge where two tracks meet, which may be lower by what is `uncertain`, mm.
+    fn crossing_of(&self, met: &Meeting, uncertain: f64) -> Option<Crossing> {
         let Meeting { place, cuts, .. } = met;
         let normal = |cut: &RayHit| self.engine.normal_of(&place.point, &place.normal, cut);
         let along: Vector3 = normal(&cuts[0])?.cross(&normal(&cuts[1])?);
@@ -222,7 +222,7 @@ impl Finder<'_> {
             length: 0.0,
             passes: self.tracks.passes(moves[0], moves[1]),
             moves,
-            uncertain: 0.0,
+            uncertain,
         })
     }
 }

@@ -28,7 +28,7 @@ const FIT_OVER_RADIUS: f64 = 0.5;
 /// deviation lies between two tessellations of the same curve; models leave gaps as well.
 const WELD_OVER_DEVIATION: f64 = 4.0;
 
-/// Steeper places than this, from the level, are left to strategies that go down walls, as the cosine
+/// Steeper places than this, from the level, are left out, as the cosine
 /// (80°): passes along the surface would lie nearly on top of each other in the plan view.
 pub(crate) const STEEPEST_COSINE: f64 = 0.173_648;
 
