@@ -10,7 +10,7 @@ mod repair;
 #[cfg(test)]
 mod tests;
 
-use super::{Aabb, Point3, Vector3};
+use super::{Aabb, Point3, Vector3, distance_to_segment};
 
 /// A checked triangle mesh: every index in range, every coordinate finite and within
 /// [`super::MAX_COORDINATE`], no degenerate and no duplicate triangle, at most two triangles at an
@@ -262,6 +262,22 @@ impl TriangleMesh {
     pub fn neighbour(&self, t: usize, k: usize) -> Option<usize> {
         let n = self.neighbours[t][k];
         (n != NONE).then_some(n as usize)
+    }
+
+    /// The triangles that meet within `distance`, mm, of a point on triangle `t`, that one first: two at an edge, a fan at a
+    /// vertex.
+    pub fn triangles_at(&self, t: usize, point: &Point3, distance: f64) -> Vec<usize> {
+        let mut found = vec![t];
+        let mut looked = 0;
+        while let Some(&t) = found.get(looked) {
+            looked += 1;
+            let corners = self.corners(t);
+            for k in 0..3 {
+                let is_near = distance_to_segment(point, &corners[k], &corners[(k + 1) % 3]) <= distance;
+                found.extend(self.neighbour(t, k).filter(|n| is_near && !found.contains(n)));
+            }
+        }
+        found
     }
 
     /// True without borders.

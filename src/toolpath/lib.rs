@@ -36,6 +36,6 @@ pub use tilt::repair::{RepairSummary, Unreachable};
 pub use tilt::tilted::Tilting;
 pub use touch_up::short_passes;
 pub use vocabulary::{
-    Along, Correction, Definition, Earlier, FeedDirection, Joining, Kept, Levelled, Lines, Links, PartKind,
-    PlanError, PlanSettings, Reading, Step, Strategy, unused_tolerance,
+    Along, Correction, Definition, Earlier, Faces, FeedDirection, Joining, Kept, Levelled, Lines, Links,
+    PartKind, PlanError, PlanSettings, Reading, Step, Strategy, unused_tolerance,
 };

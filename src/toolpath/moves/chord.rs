@@ -275,6 +275,21 @@ mod tests {
         Some(Point3::new(10.0 * s.cos(), 10.0 * s.sin(), 0.0))
     }
 
+    /// A straight line that falls off a wall on its way: the wall is where it is, and not a ramp.
+    #[test]
+    fn a_wall_on_the_way_stays_upright() {
+        for wall in [0.1, 0.355, 0.5, 0.77] {
+            let mut way =
+                |s: f64| Some(Point3::new(0.27 * s, 0.02 * s, if s < 2.0 + wall { 8.0 } else { 2.0 }));
+            let points =
+                sample_within_chord(0.0, 4.0, 1.0, 1e-4, &mut way, &mut Watch::new(&Silent)).unwrap();
+            let moves = reduce(&points, 4e-4, &mut Watch::new(&Silent)).unwrap();
+            let falls = moves.windows(2).filter(|w| w[1].z < w[0].z - 1.0).collect::<Vec<_>>();
+            assert_eq!(falls.len(), 1, "{moves:?}");
+            assert!((falls[0][1] - falls[0][0]).xy().norm() < 1e-3, "{wall}: {moves:?}");
+        }
+    }
+
     #[test]
     fn chords_of_a_circle_hold_the_tolerance_and_no_more() {
         let tolerance = 1e-3;

@@ -15,9 +15,10 @@ use crate::levels::spacing::place_levels;
 use crate::levels::{planned_field, spirals};
 use crate::surface::border::useful_overrun;
 use crate::surface::feed;
-use crate::surface::mesh_surface::{ConnectedPiece, MeshSurface, not_applicable, reachable};
+use crate::surface::mesh_surface::{ConnectedPiece, MeshSurface, STEEPEST_COSINE, not_applicable, reachable};
 use crate::vocabulary::{
-    Contact, FeedDirection, LevelFunction, Levelled, Lines, PassSettings, Passes, PlanError, Step, Task,
+    Contact, Faces, FeedDirection, LevelFunction, Levelled, Lines, PassSettings, Passes, PlanError, Step,
+    Task,
 };
 use cutter::Cutter;
 use drop_cutter::DropCutter;
@@ -70,7 +71,8 @@ pub(crate) fn on_mesh(task: &Task<'_>, aim: Aim) -> Result<Passes, PlanError> {
         [] => [part.bounds()].map(|b| [[b.min.x, b.max.x], [b.min.y, b.max.y]]).to_vec(),
         patches => patches.iter().map(|patch| patch.domain()).collect(),
     };
-    let mut all = Passes::default();
+    let faces = Faces { least: STEEPEST_COSINE, ..Faces::default() };
+    let mut all = Passes { faces, ..Passes::default() };
     if let Aim::Fitted(direction, ..) | Aim::Shortest(Some((direction, _)), _) = aim {
         all.notes.extend(feed::check(direction, &part.bounds(), &parameters)?);
     }
@@ -532,7 +534,9 @@ impl LevelSource for MeshGuide<'_> {
             self.drop.at(at.x, at.y).map(|drop| Point3::new(at.x, at.y, drop.tip_z))
         };
         let settings = PassSettings { sampling: 1.0, ..*self.settings };
-        let mut moves = settings.moves(first as f64, end as f64, &mut tip, self.monitor)?;
+        // On its way it may come off the part, and no ramp leads from one side of that to the other.
+        let ends = [first as f64, end as f64];
+        let mut moves = settings.moves_by_contacts(ends, &mut tip, &self.drop, self.monitor)?;
         if curve.closed && run.is_none() && moves.len() > 1 {
             // It comes back to within rounding.
             let begin = moves[0];

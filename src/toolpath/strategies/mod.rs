@@ -7,6 +7,7 @@ mod contour_spiral;
 pub(crate) mod direction_keys;
 pub(crate) mod iso_parametric;
 pub(crate) mod iso_scallop;
+mod mesh_contours;
 mod mesh_passes;
 mod mesh_shortest;
 mod offset_mesh;

@@ -9,6 +9,7 @@
 
 use std::fmt::{self, Write as _};
 
+use super::mesh_contours::{self, LEAST_FACING};
 use crate::levels::level_passes::along_levels_placed;
 use crate::levels::spacing::{LevelSteps, level_tangent};
 use crate::surface::chart::Chart;
@@ -18,7 +19,6 @@ use cutter::Cutter;
 use field::{GridField, ScalarField, surface_gradient_length};
 use geometry::TriangleMesh;
 use keys::word_of;
-use part::Part;
 
 /// Cells a side on which heights are sampled. The contours between nodes err with the third power of a cell.
 const CELLS: usize = 240;
@@ -26,8 +26,8 @@ const CELLS: usize = 240;
 /// A part whose cutter heights span less than this, mm, has no contours worth following.
 const LEAST_SPAN: f64 = 1e-3;
 
-/// Least vertical part of the normal of a wall that faces up; less is upright, or rounding of the file.
-const LEAST_FACING: f64 = 1e-4;
+/// A mesh has steep walls where they are more than this share of its area.
+const LEAST_WALLS: f64 = 1e-3;
 
 /// Places a side at which the slope is compared with the passes.
 const SLOPE_SAMPLES: usize = 120;
@@ -68,9 +68,12 @@ impl Strategy for Waterline {
 
     fn passes(&self, task: &Task<'_>) -> Result<Passes, PlanError> {
         let Task { part, cutter, ref settings, .. } = *task;
+        if self.on_facets(task) {
+            return mesh_contours::passes(task, self.steps);
+        }
         let mut all = Passes::default();
         for chart in Chart::all(part, cutter, settings.guide())? {
-            let field = ScalarField::Grid(heights(&chart, part, cutter)?);
+            let field = ScalarField::Grid(heights(&chart, cutter)?);
             let level = level_share(&chart, cutter, &field, settings);
             all.append(along_levels_placed(task, &chart, &field, self.steps)?);
             if level > 0.0 {
@@ -82,10 +85,14 @@ impl Strategy for Waterline {
         }
         Ok(all)
     }
+
+    fn on_facets(&self, task: &Task<'_>) -> bool {
+        task.part.patches().is_empty() && (task.wants_mesh || has_walls(task.part.mesh()))
+    }
 }
 
 /// Height of the tip over the chart.
-fn heights(chart: &Chart, part: &Part, cutter: &Cutter) -> Result<GridField, PlanError> {
+fn heights(chart: &Chart, cutter: &Cutter) -> Result<GridField, PlanError> {
     let field = chart.sampled(CELLS, "waterline", |u, v| {
         // Where the parametrisation is degenerate the surface's own height serves.
         let Some(p) = chart.at(u, v) else { return chart.jet(u, v).p.z };
@@ -95,30 +102,21 @@ fn heights(chart: &Chart, part: &Part, cutter: &Cutter) -> Result<GridField, Pla
     let nodes = (0..=CELLS).flat_map(|j| (0..=CELLS).map(move |i| (i, j))).map(|(i, j)| field.node(i, j));
     let [low, high] = nodes.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], z| [lo.min(z), hi.max(z)]);
     if high - low < LEAST_SPAN {
-        let level =
-            "what is seen of it from above is level, so that there are no contours; zigzag suits that";
-        let walls = if part.patches().is_empty() { steep_area(part.mesh()) } else { 0.0 };
-        let reason = if walls > 0.0 {
-            format!(
-                "{level}. {walls:.0} mm² of walls steeper than 80 degrees have contours; they are followed where each wall is a \
-                 NURBS patch (`surface = \"nurbs\"`), not on a mesh"
-            )
-        } else {
-            level.to_owned()
-        };
+        let reason = "it is level, so that there are no contours; zigzag suits that".to_owned();
         return Err(PlanError::NotApplicable { strategy: "waterline", reason });
     }
     Ok(field)
 }
 
-/// Area of a mesh that faces up and is steeper than passes along the surface can follow, mm².
-fn steep_area(mesh: &TriangleMesh) -> f64 {
-    let is_steep = |t: &usize| (LEAST_FACING..STEEPEST_COSINE).contains(&mesh.normal(*t).z);
+/// Whether a mesh has walls that face up and are steeper than its plan view shows.
+fn has_walls(mesh: &TriangleMesh) -> bool {
     let area = |t: usize| {
         let [a, b, c] = mesh.corners(t);
         0.5 * (b - a).cross(&(c - a)).norm()
     };
-    (0..mesh.triangles().len()).filter(is_steep).map(area).sum()
+    let is_steep = |t: &usize| (LEAST_FACING..STEEPEST_COSINE).contains(&mesh.normal(*t).z);
+    let (all, steep) = (0..mesh.triangles().len(), (0..mesh.triangles().len()).filter(is_steep));
+    steep.map(area).sum::<f64>() > LEAST_WALLS * all.map(area).sum::<f64>()
 }
 
 /// Share of the chart's area on which the step of height that a strip allows is less than [`LEVEL_SHARE`] of the mean one.

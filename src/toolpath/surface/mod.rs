@@ -4,5 +4,6 @@
 pub mod border;
 pub mod chart;
 pub mod feed;
+pub mod height_contours;
 pub mod mesh_surface;
 pub mod plan_curve;

@@ -149,3 +149,54 @@ impl<'a> PassSettings<'a> {
         Ok(moves)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cutter::Cutter;
+    use geometry::TriangleMesh;
+    use part::Part;
+    use work::monitor::Silent;
+
+    /// A flat end goes around the corner of a block, for a while over nothing, and down to a floor beside it: it leaves the corner
+    /// before it goes down, however far the floor is.
+    #[test]
+    fn no_ramp_leads_past_a_corner() {
+        let quad = |[x0, x1]: [f64; 2], z: f64| {
+            [[x0, -5.0], [x1, -5.0], [x1, 0.0], [x0, 0.0]].map(|[x, y]| Point3::new(x, y, z))
+        };
+        let corners: Vec<Point3> = [quad([-5.0, 0.0], 8.0), quad([0.5, 5.0], 2.0)].concat();
+        let triangles = vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]];
+        let part = Part::from_mesh(TriangleMesh::new(corners, triangles).unwrap().0);
+        let cutter = Cutter::flat(4.0).unwrap();
+        let drop = DropCutter::new(&part, &cutter);
+        // The corner is two millimetres from the axis until x = 0.2, the floor's from x = 0.3 on.
+        let y = (4.0f64 - 0.04).sqrt();
+        let mut tip = |s: f64| {
+            let x = 0.27 * s - 0.1;
+            drop.at(x, y).map(|drop| Point3::new(x, y, drop.tip_z))
+        };
+        assert!(tip(1.2).is_none() && tip(1.0).is_some() && tip(2.0).is_some());
+        let settings = PassSettings {
+            step: Step::Stepover(0.5),
+            sampling: 1.0,
+            chord_tolerance: 1e-3,
+            smoothing: None,
+            axis: None,
+            memory: 1 << 30,
+            earlier: None,
+            probe: None,
+        };
+        let moves = settings.moves_by_contacts([0.0, 3.0], &mut tip, &drop, &Silent).unwrap();
+        let lowest_at_corner = moves
+            .windows(2)
+            .filter(|w| (w[1].x.min(w[0].x)) < 0.2 - 1e-3)
+            .map(|w| {
+                // Where the move leaves the corner.
+                let t = ((0.2 - w[0].x) / (w[1].x - w[0].x)).clamp(0.0, 1.0);
+                w[0].z + (w[1].z - w[0].z) * t
+            })
+            .fold(f64::INFINITY, f64::min);
+        assert!(lowest_at_corner > 8.0 - 1e-3, "{lowest_at_corner} {moves:?}");
+    }
+}

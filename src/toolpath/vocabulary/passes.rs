@@ -22,6 +22,31 @@ pub struct Passes {
     pub contacts: Vec<Vec<Contact>>,
     /// The functions that they are levels of, one for each chart or piece that has passes.
     pub functions: Vec<Levelled>,
+    /// Which faces they are made for.
+    pub faces: Faces,
+}
+
+/// Faces of a part, by the vertical part of their unit normals.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Faces {
+    /// The steepest ones.
+    pub least: f64,
+    /// The most level ones.
+    pub most: f64,
+}
+
+impl Default for Faces {
+    /// All.
+    fn default() -> Self {
+        Self { least: -1.0, most: 1.0 }
+    }
+}
+
+impl Faces {
+    /// Whether one with this unit normal is of them.
+    pub fn hold(&self, normal: &Vector3) -> bool {
+        (self.least..=self.most).contains(&normal.z.clamp(-1.0, 1.0))
+    }
 }
 
 /// What the strategy of a plan made, for another plan of the same toolpath.
@@ -35,6 +60,8 @@ pub struct Kept {
     pub field: Option<Arc<PlannedField>>,
     /// The functions that they are levels of, one for each chart or piece that has passes.
     pub functions: Vec<Levelled>,
+    /// Which faces passes are made for: what stands on others is no matter of their widths.
+    pub faces: Faces,
 }
 
 /// A function whose levels are passes, on one chart or piece of the part: kept, so that levels can be placed anew without
