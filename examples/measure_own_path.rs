@@ -42,6 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         most_squares: 1_000_000,
         is_first_look: false,
         borders: true,
+        steep_elsewhere: false,
     };
     let found = measure(&part, &cutter, &path, &stock, &limits, &asked, &Silent)?;
 

@@ -256,6 +256,18 @@ pub struct ExcessFigures {
 }
 
 impl ExcessFigures {
+    /// The highest of these places and those; of equals, this one.
+    #[must_use]
+    pub fn or(&self, other: &Self) -> Self {
+        let kind = if other.highest.max_mm > self.highest.max_mm { other.kind } else { self.kind };
+        Self {
+            highest: self.highest.or(&other.highest),
+            kind,
+            reached: self.reached.or(&other.reached),
+            unreached: self.unreached.or(&other.unreached),
+        }
+    }
+
     /// Of cells alone: what stands on them, and the bounds of ridges and uncut places.
     pub(crate) fn of_cells(measured: &Measurement) -> Self {
         let (scallop, uncut) = (&measured.scallop, &measured.uncut);

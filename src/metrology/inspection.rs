@@ -84,6 +84,8 @@ pub(super) struct Inspection<'a> {
     /// Where the passes of that surface meet.
     pub meetings: &'a Meetings<'a>,
     pub grid: Grid,
+    /// Where the vertical part of the design's normal is less, faces are measured elsewhere: bounds do not cover them.
+    pub steepest: f64,
     /// The walls beside, where they are measured.
     pub walls: Option<&'a Walls>,
     /// All moves, where heights that one of them cuts away are no figures though it won no cell.
@@ -337,7 +339,8 @@ impl Inspection<'_> {
         monitor: &dyn Monitor,
     ) -> Result<closer::BoundedGreatest, Cancelled> {
         let half = 0.5 * self.grid.cell;
-        let squares = cells.filter_map(|k| {
+        let is_own = |lean: f64| lean >= self.steepest;
+        let squares = cells.filter(|k| is_own(sample(*k).lean.into())).filter_map(|k| {
             let s = sample(k);
             let d = Deviation { distance: s.deviation.into(), slope: s.slope.into(), by: NOT_CUT };
             let possible = value(&d, s.lean.into(), half).possible;
@@ -346,7 +349,7 @@ impl Inspection<'_> {
         });
         let open = Promising::of(squares, MOST_SEARCHED.min(self.most_squares / 2).max(1));
         let at = |q: Point2, half: f64| {
-            let design = self.design_at(q)?;
+            let design = self.design_at(q).filter(|design| is_own(design.normal.z))?;
             let (d, _) = self.along_normal(&design.point, &design.normal)?;
             Some(value(&d, design.normal.z, half))
         };

@@ -1,8 +1,10 @@
 //! The figures of a cut on heights: the stock's own grid first, then a closer look where something may hide. mm.
 
+use super::coverage::STEEP;
 use super::cut_surface::CutSurface;
 use super::every_move::EveryMove;
 use super::excess::ExcessSearch;
+use super::facing::LEAST_FACING;
 use super::figures::{
     CloserLook, ExcessFigures, ExcessKind, Limits, Measurement, NUMERICAL_FLOOR, ScallopFigures, UncutFigures,
 };
@@ -85,6 +87,7 @@ pub fn measure_with_walls(
         meetings: &Meetings::new(&surface, cutters, path, None),
         grid,
         walls: walls.as_ref(),
+        steepest: if asked.steep_elsewhere { STEEP } else { LEAST_FACING },
         // What is left where a ridge is none comes to light in the search for the highest material alone.
         every_move: asked.borders.then_some(&every_move),
     };

@@ -283,6 +283,7 @@ mod tests {
                 error_bound: 5e-4,
                 stock_top: 1.0,
                 borders: true,
+                steep_elsewhere: false,
                 most_cells: 1 << 20,
                 most_squares: 1 << 20,
                 is_first_look: false,

@@ -48,6 +48,9 @@ pub struct Asked {
     pub most_squares: usize,
     /// Whether finer cells follow where this measurement leaves a limit open: then it gives up early.
     pub is_first_look: bool,
+    /// Whether steep faces are measured along their normals beside this ([`crate::Coverage::measure_unseen`]): what cells see
+    /// of them counts, and bounds do not cover them.
+    pub steep_elsewhere: bool,
 }
 
 /// What a rectangle may hold, mm.

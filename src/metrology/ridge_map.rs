@@ -1,5 +1,6 @@
 //! The ridges of a cut surface and the remnants along its borders, and nothing else: what a planner is corrected by.
 
+use super::coverage::STEEP;
 use super::cut_surface::CutSurface;
 use super::excess::ExcessSearch;
 use super::figures::{Limits, NUMERICAL_FLOOR, RidgePlace, ScallopFigures};
@@ -141,6 +142,7 @@ fn on_cells<'a>(
         surface,
         meetings,
         grid,
+        steepest: STEEP,
         walls: None,
         every_move: None,
     }

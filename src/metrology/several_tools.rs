@@ -17,6 +17,7 @@ const ASKED: Asked = Asked {
     error_bound: 5e-4,
     stock_top: TOP,
     borders: true,
+    steep_elsewhere: false,
     most_cells: 1 << 20,
     most_squares: 1 << 20,
     is_first_look: false,

@@ -84,6 +84,7 @@ fn a_ball_by_any_name_plans_cuts_and_measures_the_same() {
         most_squares: 1 << 22,
         is_first_look: false,
         borders: true,
+        steep_elsewhere: false,
     };
     let of = |cutter: &Cutter| {
         let cut = cut(stock(), cutter, &path, &Silent).unwrap();

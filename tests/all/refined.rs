@@ -53,6 +53,7 @@ fn measured(cutter: &Cutter, path: &Toolpath, cell: f64, limits: &Limits, cells:
         most_squares: 1 << 22,
         is_first_look: false,
         borders: true,
+        steep_elsewhere: false,
     };
     measure(&part, cutter, path, &stock, limits, &asked, &Silent).unwrap()
 }

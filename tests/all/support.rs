@@ -62,6 +62,7 @@ pub fn cut_and_measure(
         most_squares: 1 << 22,
         is_first_look: false,
         borders: true,
+        steep_elsewhere: false,
     };
     measure(part, cutter, path, &cut, limits, &asked, &Silent).unwrap()
 }

@@ -34,7 +34,7 @@ use unseen_cut::{UnseenCut, lowest_of_tools};
 
 /// Where the vertical part of the normal is less, cells lie more than five times as far apart on the surface as in the plan:
 /// too far to see what one pass leaves.
-const STEEP: f64 = 0.2;
+pub(crate) const STEEP: f64 = 0.2;
 
 /// A cell's centre sees the sheet of a place where it lies within this slope from the place's tangent plane.
 const SAME_SHEET: f64 = 0.25;
@@ -58,7 +58,7 @@ const LEAST_TRIANGLES: f64 = 4_000.0;
 const CONTACT_SHARE: f64 = 0.25;
 
 /// Share of these triangles that are divided at most in search of extremes.
-const DIVIDED_SHARE: f64 = 0.1;
+const DIVIDED_SHARE: f64 = 1.0;
 
 /// What cells measured.
 #[derive(Debug, Clone, Copy)]

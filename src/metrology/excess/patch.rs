@@ -40,6 +40,10 @@ const LEAST_ASIDE: f64 = 1e-3;
 /// What may rise by so many times the size of a square is no slope: a wall stands there, or a foil.
 pub(super) const STEEPEST: f64 = 100.0;
 
+/// Patches are measured elsewhere where they are steeper than faces of meshes that are, by this: what is measured elsewhere is told by the
+/// middles of small triangles.
+const STEEP_PATCH_SHARE: f64 = 0.75;
+
 /// In squares with half sides below this share of a cell all triangles are looked at.
 const CORNER_SHARE: f64 = 1.0 / 256.0;
 
@@ -184,7 +188,7 @@ impl Patches<'_> {
     /// Triangles that face up and whose boxes meet the square; `None` if there are too many.
     fn triangles(&self, centre: Point2, half: f64, most: usize) -> Option<Vec<usize>> {
         let part = self.inspection.part;
-        let (mesh, bvh) = (part.mesh(), part.bvh());
+        let (mesh, bvh, steepest) = (part.mesh(), part.bvh(), self.inspection.steepest);
         // A patch ends so far beside its triangles.
         let half = half + part.mesh_deviation();
         let (mut found, mut waiting) = (Vec::new(), vec![0]);
@@ -203,7 +207,10 @@ impl Patches<'_> {
             }
             for slot in first..first + slots {
                 let t = bvh.triangle_in(slot);
-                if mesh.normal(t).z > LEAST_FACING && overlaps(&mesh.corners(t), centre, half) {
+                let normal = mesh.normal(t).z;
+                // The normals of a patch differ from that of its triangle.
+                let is_own = normal >= steepest || !part.patches().is_empty();
+                if normal > LEAST_FACING && is_own && overlaps(&mesh.corners(t), centre, half) {
                     found.push(t);
                 }
             }
@@ -245,6 +252,10 @@ impl Patches<'_> {
         let mut piece = Clipped { corners, len, leans, foot, below: 0.0, cosine: 1.0 };
         if !part.patches().is_empty() {
             piece.bend(&|corner| own(corner).0);
+            let turned = (2.0 * (1.0 - piece.cosine)).sqrt();
+            if piece.foot.normal.z + turned < STEEP_PATCH_SHARE * self.inspection.steepest {
+                return None;
+            }
         }
         Some(piece)
     }

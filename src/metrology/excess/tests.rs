@@ -98,6 +98,7 @@ fn measured_holding(
         most_squares,
         is_first_look: false,
         borders: true,
+        steep_elsewhere: false,
     };
     measure(part, cutter, path, &cut, &LIMITS, &asked, &Silent).unwrap()
 }

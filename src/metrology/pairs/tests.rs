@@ -56,6 +56,7 @@ fn measured(part: &Part, cutter: &Cutter, path: &Toolpath) -> Measurement {
         most_squares: 1 << 20,
         is_first_look: false,
         borders: true,
+        steep_elsewhere: false,
     };
     measure(part, cutter, path, &cut, &LIMITS, &asked, &Silent).unwrap()
 }

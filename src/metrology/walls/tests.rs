@@ -64,6 +64,7 @@ fn measured(part: &Part, cutter: &Cutter, path: &Toolpath) -> Measurement {
         error_bound: 5e-4,
         stock_top: area.max.z,
         borders: true,
+        steep_elsewhere: false,
         most_cells: 1 << 20,
         most_squares: 1 << 20,
         is_first_look: false,
