@@ -25,9 +25,10 @@ use metrology::{
     Bounded, Engine, EngineError, Measured, Measurement, RidgeMap, Simulation, Task, path_figures,
 };
 use motion::{ROUNDING, Toolpath};
+use part::Part;
 use report::Verdict;
 use scene::ToolpathRequest;
-use toolpath::{Earlier, Kept, Step, plane_interval, short_passes, unused_tolerance};
+use toolpath::{Earlier, Faces, Kept, Step, plane_interval, short_passes, unused_tolerance};
 use work::monitor::{self, Monitor};
 
 use super::covered::Covered;
@@ -101,6 +102,9 @@ const MOST_TOUCH_UP: f64 = 0.04;
 /// The same where narrower passes were in vain.
 const MOST_TOUCH_UP_IN_VAIN: f64 = 0.1;
 
+/// What lies within this distance of an edge, mm, belongs to the faces on both sides.
+const ON_EDGE: f64 = 1e-6;
+
 /// Cells from pass to pass while only ridges are measured.
 const CELLS_A_PASS: f64 = 4.0;
 
@@ -116,7 +120,7 @@ struct Standing {
 
 impl Standing {
     /// `None` without ridges: there is nothing to correct.
-    fn of_ridges(map: &RidgeMap, planned: &Planned, factors: [f64; 2]) -> Option<Self> {
+    fn of_ridges(map: &RidgeMap, planned: &Planned, factors: [f64; 2], wanted: Wanted<'_>) -> Option<Self> {
         let highest_ridge = map.scallop.max_mm?;
         let round = CorrectionRound {
             highest_mm: highest_ridge,
@@ -132,11 +136,12 @@ impl Standing {
         let places = map.above.iter().map(|place| (place.at, place.height));
         // The highest place stands between those that cells show.
         let highest = map.scallop.max_at_mm.map(|at| (at.into(), round.highest_mm));
-        Some(Self { round, above: places.chain(highest).collect(), depth: 0.0 })
+        let standing = Self { round, above: places.chain(highest).collect(), depth: 0.0 };
+        Some(standing.on_faces(&planned.plan.kept.faces, wanted))
     }
 
     /// `None` without ridges.
-    fn of_all(looked: &Looked, planned: &Planned, factors: [f64; 2]) -> Option<Self> {
+    fn of_all(looked: &Looked, planned: &Planned, factors: [f64; 2], wanted: Wanted<'_>) -> Option<Self> {
         let measured = &looked.measured.measurement;
         let scallop = &measured.scallop;
         let (seen, reached) = (highest_reached(measured), measured.excess.reached);
@@ -161,8 +166,39 @@ impl Standing {
         let others = [reached, of_unseen].map(|place| place.at_mm.map(|at| (at.into(), place.max_mm)));
         let above = places.chain(ridge).chain(others.into_iter().flatten()).collect();
         let depth = measured.gouge.max_depth_mm - measured.gouge.error_bound_mm;
-        Some(Self { round, above, depth })
+        Some(Self { round, above, depth }.on_faces(&planned.plan.kept.faces, wanted))
     }
+
+    /// Of the faces alone that passes are made for: no widths help others.
+    fn on_faces(mut self, faces: &Faces, wanted: Wanted<'_>) -> Self {
+        if *faces == Faces::default() {
+            return self;
+        }
+        let mesh = wanted.part.mesh();
+        self.above.retain(|(at, _)| {
+            let foot = wanted.part.closest_point(at).0;
+            let around = mesh.triangles_at(foot.triangle as usize, &foot.point, ON_EDGE);
+            around.into_iter().all(|t| faces.hold(&mesh.normal(t)))
+        });
+        let highest = self.above.iter().map(|(_, height)| *height);
+        // What is not among the places stays below the target.
+        let highest = highest.fold((1.0 - SLACK) * wanted.target, f64::max);
+        let round = &mut self.round;
+        if round.highest() > highest {
+            round.error_bound_mm = None;
+        }
+        round.highest_mm = round.highest_mm.min(highest);
+        round.border_mm = round.border_mm.map(|border| border.min(highest));
+        self
+    }
+}
+
+/// What a plan is to leave, and on what.
+#[derive(Clone, Copy)]
+struct Wanted<'a> {
+    part: &'a Part,
+    /// What no ridge may exceed, mm.
+    target: f64,
 }
 
 /// A path whose whole surface was measured.
@@ -240,11 +276,13 @@ impl Session {
             limit: self.scene.scallop_rule.highest * target,
         });
         let whole = |planned: &Planned| self.look(request, engine, &planned.plan.path, closeness, monitor);
-        let (looked, standing) = match &map {
-            Some(map) => (None, Standing::of_ridges(map, &first, [1.0; 2])),
-            None => {
+        let wanted = |target: f64| Wanted { part: &self.part, target };
+        let (looked, standing) = match (&map, target) {
+            (Some(map), Some(target)) => (None, Standing::of_ridges(map, &first, [1.0; 2], wanted(target))),
+            _ => {
                 let looked = whole(&first)?;
-                let standing = target.and_then(|_| Standing::of_all(&looked, &first, [1.0; 2]));
+                let of_all = |target| Standing::of_all(&looked, &first, [1.0; 2], wanted(target));
+                let standing = target.and_then(of_all);
                 (Some(looked), standing)
             }
         };
@@ -364,6 +402,10 @@ impl Session {
 }
 
 impl Corrected<'_> {
+    fn wanted(&self) -> Wanted<'_> {
+        Wanted { part: &self.session.part, target: self.goal.target }
+    }
+
     /// Plans anew while ridges on coarse cells stand above the target, or all below it by more than the `slack`.
     fn by_ridges(&mut self, mut slack: f64, monitor: &dyn Monitor) -> Result<(), JobError> {
         if self.is_too_hollow(monitor)? {
@@ -381,7 +423,7 @@ impl Corrected<'_> {
             } else {
                 let map = self.session.ridges(self.request, self.engine, &planned, monitor)?;
                 slack = map.as_ref().map_or(slack, |map| slack.max(slack_of(map)));
-                let found = map.and_then(|map| Standing::of_ridges(&map, &planned, factors));
+                let found = map.and_then(|map| Standing::of_ridges(&map, &planned, factors, self.wanted()));
                 let Some(found) = found else { break };
                 self.keep_if_better(planned, next, found)
             };
@@ -431,7 +473,7 @@ impl Corrected<'_> {
                 drop(looked.take());
                 let path = &planned.plan.path;
                 let again = self.session.look(self.request, self.engine, path, self.closeness, monitor)?;
-                let Some(found) = Standing::of_all(&again, &planned, factors) else { break };
+                let Some(found) = Standing::of_all(&again, &planned, factors, self.wanted()) else { break };
                 // A shorter path is no reason to give up a plan that passes.
                 gain = match (is_passing, self.session.passes(&again)) {
                     (true, false) => self.keep_best(&planned, next, found),
@@ -556,10 +598,14 @@ impl Corrected<'_> {
         })
     }
 
-    /// Whether the best plan would hold the target with one pass less: where ridges are about equally high, passes are spread
-    /// evenly, and each interval then grows by as much as all of them.
+    /// Whether the best plan may hold the target with wider intervals, by one pass less at least: where ridges are about equally
+    /// high, passes are spread evenly, and each interval then grows by as much as all of them.
     fn may_lie_wider(&self) -> bool {
         let round = &self.tried.standing.round;
+        // What others cut before tells nothing of its own passes; where they leave ground to others, walls are not looked at.
+        if self.request.stock_is_previous || self.best.plan.kept.faces.most < 1.0 {
+            return false;
+        }
         let is_even = round.median_mm.is_some_and(|median| median >= EVENLY_HIGH * round.highest());
         let intervals = path_figures(&self.best.plan.path, 0.0).passes as f64 - 1.0;
         !is_even || round.highest() * (intervals / (intervals - 1.0)).powi(2) <= self.goal.target
@@ -725,7 +771,7 @@ impl Corrected<'_> {
         let path = &self.best.plan.path;
         let looked = self.session.look(self.request, self.engine, path, closeness, monitor)?;
         let factors = self.tried.standing.round.factors;
-        if let Some(standing) = Standing::of_all(&looked, &self.best, factors) {
+        if let Some(standing) = Standing::of_all(&looked, &self.best, factors, self.wanted()) {
             self.rounds[self.kept] = standing.round;
             self.tried.standing = standing;
         }

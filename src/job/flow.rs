@@ -176,6 +176,14 @@ impl Session {
             region.toolpath = its.map(|before| before.name.clone());
         }
         let tools = ToolMoves::of(cutters, holders, &planned.plan.path);
+        let covered = match covered {
+            None if self.pocket.is_none() => {
+                monitor.start("measuring the coverage", 0);
+                let all = (&*whole.path, &whole.cutters);
+                Some(self.covered(request, &measured, all, &whole.tools(earlier, &tools), monitor)?)
+            }
+            known => known,
+        };
         let run = Run {
             session: self,
             request,
@@ -216,6 +224,7 @@ impl Session {
             (verdict, claims)
         };
         let measurement = &measured.measurement;
+        let unseen = covered.as_ref().and_then(|covered| covered.unseen.as_ref());
         let result = ToolpathResult {
             name: request.name.clone(),
             strategy: request.strategy_name().to_owned(),
@@ -227,7 +236,8 @@ impl Session {
             scallop: measurement.scallop.clone(),
             gouge: measurement.gouge.clone(),
             uncut: measurement.uncut.clone(),
-            excess: measurement.excess,
+            excess: unseen
+                .map_or(measurement.excess, |unseen| measurement.excess.or(&unseen.measurement.excess)),
             deviation: measurement.deviation,
             figures: found.figures,
             simulation,

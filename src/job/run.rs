@@ -23,7 +23,7 @@ pub(crate) struct Run<'a> {
     pub planned: &'a Planned,
     /// What was measured.
     pub measured: &'a Measured,
-    /// What the measurement covers, where that is known already.
+    /// What the measurement covers; `None` for the floor of a pocket.
     pub covered: Option<&'a Covered>,
     /// The tool, and what it must not touch.
     pub around: Around<'a>,
@@ -53,11 +53,6 @@ impl Run<'_> {
     /// What makes the moves that were measured.
     pub fn cutters(&self) -> &Cutters {
         &self.whole.cutters
-    }
-
-    /// The moves of each tool that were measured, those of earlier toolpaths too.
-    pub fn all_tools(&self) -> Vec<ToolMoves<'_>> {
-        self.whole.tools(self.earlier, self.tools)
     }
 
     /// What other toolpaths and tools cut before the first move.

@@ -69,19 +69,50 @@ fn a_soup_seen_from_its_back_does_not_pass() {
     assert_eq!(answer.code, Some(1), "{answer:?}");
 }
 
-/// A block whose walls lean by one degree: seen from above there is its level top and a narrow band. Its walls have contours.
-#[test]
-fn walls_of_a_mesh_that_no_contour_follows_are_named() {
-    let ([x, y, z], out) = ([10.0, 7.0, 8.0], 8.0 * 1f64.to_radians().tan());
+/// A block of 20 x 14 x 8 mm at its top whose walls lean by an angle, degrees, without an underside.
+fn drafted_block(draft: f64) -> Vec<[Point3; 3]> {
+    let ([x, y, z], out) = ([10.0, 7.0, 8.0], 8.0 * draft.to_radians().tan());
     let ring = |x: f64, y: f64, z: f64| [[-x, -y, z], [x, -y, z], [x, y, z], [-x, y, z]];
     let (foot, top) = (ring(x + out, y + out, 0.0), ring(x, y, z));
     let wall = |k: usize| quad(foot[k], foot[(k + 1) % 4], top[(k + 1) % 4], top[k]);
     let [a, b, c, d] = top;
-    let block: Vec<[Point3; 3]> = (0..4).flat_map(wall).chain(quad(a, b, c, d)).collect();
-    let home = tempfile::tempdir().unwrap();
-    let answer = run(home.path(), &block, &SCENE.replace("zigzag\"\nstepover = 0.5", "waterline\""), &[]);
-    assert_eq!(answer.code, Some(2), "{answer:?}");
-    let said = format!("{}{}", answer.stdout, answer.stderr);
-    let said = said.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
-    assert!(said.contains("549 mm² of walls steeper than 80 degrees"), "{said}");
+    (0..4).flat_map(wall).chain(quad(a, b, c, d)).collect()
+}
+
+/// Walls that lean by half a degree to three are a narrow band seen from above. Contours follow them, one strip from the next, and with
+/// another strategy on the top the part passes, every place of it measured; the contours alone leave the top, and say so.
+#[test]
+fn walls_of_a_mesh_that_the_plan_view_hardly_shows_are_cut_and_judged() {
+    for draft in [0.5, 3.0] {
+        let home = tempfile::tempdir().unwrap();
+        let stage =
+            |strategy: &str| format!("[[toolpath]]\nname = \"{strategy}\"\nstrategy = \"{strategy}\"\n");
+        let head = SCENE
+            .split("[[toolpath]]")
+            .next()
+            .unwrap()
+            .replace("[simulation]", "[stock]\nmargin = 4\n[simulation]");
+        let scene = format!("{head}{}{}stock = \"previous\"\n", stage("streamline"), stage("waterline"),);
+        let answer = run(home.path(), &drafted_block(draft), &scene, &[]);
+        assert_eq!(answer.code, Some(0), "{draft}: {answer:?}");
+        let report = std::fs::read_to_string(home.path().join("out/report.json")).unwrap();
+        let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+        let [top, walls] = [0, 1].map(|k| &report["toolpaths"][k]);
+        let strip = 2.0 * (2.0 * 3.0 * 0.011_f64 - 0.011 * 0.011).sqrt();
+        let passes = walls["path"]["passes"].as_f64().unwrap();
+        let whole = 8.0 / draft.to_radians().cos() / strip;
+        assert!(passes >= whole && passes < 1.05 * whole + 3.0, "{draft}: {passes}");
+        // What was left on walls that it does not cut makes no other passes.
+        let length = top["path"]["cutting_length_mm"].as_f64().unwrap();
+        assert!(length < 2.0 * 280.0 / strip, "{draft}: {length}");
+        let excess = &walls["excess"];
+        let (highest, bound) =
+            (excess["max_mm"].as_f64().unwrap(), excess["error_bound_mm"].as_f64().unwrap());
+        assert!(highest > 0.009 && highest + bound <= 0.011, "{draft}: {highest} {bound}");
+        assert!(walls.to_string().contains("so level that contours do not cover them"), "{walls}");
+        let coverage = &walls["coverage"];
+        let (judged, whole) =
+            (coverage["judged_mm2"].as_f64().unwrap(), coverage["surface_mm2"].as_f64().unwrap());
+        assert!((judged - whole).abs() < 1e-6, "{draft}: {judged} {whole}");
+    }
 }

@@ -41,20 +41,15 @@ struct UnseenValue<'a> {
 }
 
 /// Of every toolpath.
-pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
-    monitor.start("measuring the coverage", 0);
+pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> {
     let found;
-    let Covered { areas, unseen } = match (&run.session.pocket, run.covered) {
-        (Some(pocket), _) => {
+    let Covered { areas, unseen } = match (run.covered, &run.session.pocket) {
+        (Some(covered), _) => covered,
+        (None, Some(pocket)) => {
             found = Covered { areas: of_pocket(run, pocket), unseen: None };
             &found
         }
-        (None, Some(covered)) => covered,
-        (None, None) => {
-            let whole = (&*run.whole.path, run.cutters());
-            found = run.session.covered(run.request, run.measured, whole, &run.all_tools(), monitor)?;
-            &found
-        }
+        (None, None) => return Ok(Finding::default()),
     };
     let mut claims = nothing_judged(areas).into_iter().collect::<Vec<_>>();
     claims.extend(unseen.as_ref().map_or_else(Vec::new, |unseen| judged(run, unseen)));
