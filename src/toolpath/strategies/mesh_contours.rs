@@ -213,9 +213,13 @@ impl ContourGuide<'_> {
             let at = SurfacePoint { point, normal, at: None, triangle: t as u32 };
             if let Some((Allowed { step, width }, too_concave)) = self.allowed_at(&at) {
                 let [lowest, highest] = [(tip.z - half).max(low), (tip.z + half).min(high)];
-                // The highest level is half an interval below the end of the range.
-                let over = (ROLLED_OVER - 0.5) * step;
-                reached.range = [reached.range[0].min(lowest), reached.range[1].max(highest + over)];
+                // The outer levels are half an interval inside of the ends of the range. What of an end lies below its contact may
+                // reach less far down: a flat's nothing at all.
+                let by_scallop = matches!(self.settings.step, Step::Scallop(_));
+                let over = if by_scallop { (ROLLED_OVER - 0.5) * step } else { 0.0 };
+                let reach = self.dropped.corner_radius() * normal.xy().norm().min(1.0).asin();
+                let under = (0.5 - reach / width).max(0.0) * step;
+                reached.range = [reached.range[0].min(lowest - under), reached.range[1].max(highest + over)];
                 reached.places.push(AllowedStep {
                     psi: tip.z,
                     step,

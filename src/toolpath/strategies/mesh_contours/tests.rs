@@ -68,6 +68,9 @@ fn walls_get_a_pass_a_strip_however_steep_they_are() {
             // The centre of the tool's arc is so far above the tip, the tip so far below what is touched.
             let below = corner * (1.0 - sin);
             let (lowest, highest) = (levels[0] + below, levels[levels.len() - 1] + below);
+            // The bottom of a flat comes down to the foot of the wall.
+            let lowest_of_flat = levels[0] / step;
+            assert!(!cutter.is_flat() || (-0.2..2e-3).contains(&lowest_of_flat), "{draft} {step} {levels:?}");
             assert!(lowest < 0.502 * step && highest > TOP - 0.502 * step, "{draft} {step} {levels:?}");
             for pass in &planned.passes {
                 assert_eq!(pass[0], pass[pass.len() - 1], "{draft}");
