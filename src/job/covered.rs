@@ -6,11 +6,19 @@ use metrology::{
     REACH_OVER_UNCUT, RaysCut, RaysCutInTurn, SweptVolume, View,
 };
 use motion::{Cutters, Toolpath};
+use report::Verdict;
 use scene::ToolpathRequest;
 use work::monitor::Monitor;
 
 use super::tool::ToolMoves;
-use super::{JobError, Session};
+use super::{JobError, Session, judge};
+
+/// Where a limit is undecided on surface that no cell sees, it is measured again by places half as far apart, so often. Each time takes
+/// up to four times as long.
+const MOST_HALVINGS: i32 = 2;
+
+/// The error bound that is asked for is smaller by this each time.
+const SMALLER: f64 = 0.25;
 
 /// What a measurement covers.
 #[derive(Debug)]
@@ -79,19 +87,31 @@ impl Session {
             shallow: scene.tolerance.shallow(),
             block: *facing.block(),
         };
-        let task = AlongTask {
+        let mut task = AlongTask {
             cutters,
             path,
             cut: &swept,
             limits: &scene.tolerance,
             asked: scene.simulation.error_bound,
             finest: measured.cell,
+            halvings: 0,
         };
-        let found = coverage.measure_unseen(&task, monitor)?;
-        let unseen = found.map(|(measurement, spacing_mm)| {
-            let never_cut = measurement.uncut.max_height_mm >= swept.reach();
-            Unseen { measurement, spacing_mm, never_cut }
-        });
-        Ok(Covered { areas, unseen })
+        // What fails anyway is looked at no closer.
+        let most = if self.verdict_on(measured) == Verdict::Fail { 0 } else { MOST_HALVINGS };
+        loop {
+            let found = coverage.measure_unseen(&task, monitor)?;
+            let unseen = found.map(|(measurement, spacing_mm)| {
+                let never_cut = measurement.uncut.max_height_mm >= swept.reach();
+                Unseen { measurement, spacing_mm, never_cut }
+            });
+            let verdict = unseen
+                .as_ref()
+                .map(|unseen| judge::of_surface(&unseen.measurement, &scene.tolerance, &scene.scallop_rule));
+            if task.halvings >= most || verdict != Some(Verdict::Undecided) {
+                return Ok(Covered { areas, unseen });
+            }
+            task.halvings += 1;
+            task.asked *= SMALLER;
+        }
     }
 }

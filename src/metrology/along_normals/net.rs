@@ -38,7 +38,7 @@ pub struct PatchGrid {
 }
 
 /// Places and the triangles between them.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Net {
     pub places: Vec<NetPlace>,
     pub triangles: Vec<[u32; 3]>,

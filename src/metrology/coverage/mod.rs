@@ -86,6 +86,8 @@ pub struct AlongTask<'a> {
     pub asked: f64,
     /// No places closer than this, mm.
     pub finest: f64,
+    /// How often the distance of places that suits the cells is halved.
+    pub halvings: i32,
 }
 
 /// The surface of a part by what is judged and what measures it.
@@ -181,7 +183,7 @@ impl<'a> Coverage<'a> {
     /// # Errors
     /// [`Cancelled`] when the monitor says so.
     pub fn measure_unseen(
-        mut self,
+        &self,
         task: &AlongTask<'_>,
         monitor: &dyn Monitor,
     ) -> Result<Option<(Measurement, f64)>, Cancelled> {
@@ -192,8 +194,9 @@ impl<'a> Coverage<'a> {
         let triangles = (TRIANGLES_A_HUNDRED_CELLS * self.cells.map_or(0, |cells| cells.grid.len()) as f64
             / 100.0)
             .max(LEAST_TRIANGLES);
-        let spacing = (TRIANGLES_A_SQUARE * area / triangles).sqrt().max(task.finest);
-        let net = divided(self.part, std::mem::take(&mut self.unseen), spacing);
+        let suits = (TRIANGLES_A_SQUARE * area / triangles).sqrt();
+        let spacing = (0.5f64.powi(task.halvings) * suits).max(task.finest);
+        let net = divided(self.part, self.unseen.clone(), spacing);
         let lowest = lowest_of_tools(task.path, task.cutters.greatest_radius());
         let cut = UnseenCut { cut: task.cut, facing: self.facing, lowest };
         let along = Along {

@@ -176,6 +176,11 @@ fn unseen(tips: &[[f64; 3]], margin: f64) -> Measurement {
 }
 
 fn unseen_after(path: &Toolpath, cutters: &Cutters, margin: f64) -> Measurement {
+    unseen_closer(path, cutters, margin, 0).0
+}
+
+/// Also the distance of the places, mm, which is halved so often.
+fn unseen_closer(path: &Toolpath, cutters: &Cutters, margin: f64, halvings: i32) -> (Measurement, f64) {
     let profile = [[0.0, 0.0], [20.0, 0.0], [20.0, 10.0], [0.0, 10.0]];
     let part = prism(&profile, 10.0, &[[0, 1, 2], [0, 2, 3]]);
     let facing = Facing::new(&part, path, block(&part, margin));
@@ -197,8 +202,24 @@ fn unseen_after(path: &Toolpath, cutters: &Cutters, margin: f64) -> Measurement 
         shallow: 1e-6,
         block: block(&part, margin),
     };
-    let task = AlongTask { cutters, path, cut: &cut, limits: &LIMITS, asked: 5e-4, finest: 0.1 };
-    coverage.measure_unseen(&task, &Silent).unwrap().unwrap().0
+    let task = AlongTask { cutters, path, cut: &cut, limits: &LIMITS, asked: 5e-4, finest: 0.1, halvings };
+    coverage.measure_unseen(&task, &Silent).unwrap().unwrap()
+}
+
+/// A ball cuts 0.02 mm too deep into a wall: by places half as far apart the area of that is known better.
+#[test]
+fn places_half_as_far_apart_tell_more() {
+    let path = path_through([[-5.0, -2.98, 2.0], [25.0, -2.98, 2.0]].map(Point3::from));
+    let cutters = Cutter::ball(6.0).unwrap().into();
+    let looks = [0, 1].map(|halvings| unseen_closer(&path, &cutters, 0.0, halvings));
+    assert!((looks[0].1 / looks[1].1 - 2.0).abs() < 1e-9, "{} {}", looks[0].1, looks[1].1);
+    let area = 20.0 * (5.0 + (9.0f64 - (3.0 - 0.015f64).powi(2)).sqrt());
+    let off = looks.map(|(measured, _)| {
+        let gouge = measured.gouge;
+        assert!((gouge.max_depth_mm - 0.02).abs() <= gouge.error_bound_mm, "{gouge:?}");
+        (gouge.area_mm2 / area - 1.0).abs()
+    });
+    assert!(off[1] < off[0] && off[1] < 0.05, "{off:?}");
 }
 
 /// A ball goes 0.02 mm too deep into the wall at y = 0, then a flat 0.05 mm into that at y = 10: both are found with their moves.
