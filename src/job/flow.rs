@@ -234,7 +234,10 @@ impl Session {
             notes: self.notes_on(&planned, &measured, found.notes),
             path: path_figures(&planned.plan.path, planned.time(scene, monitor)?),
             scallop: measurement.scallop.clone(),
-            gouge: measurement.gouge.clone(),
+            gouge: unseen.map_or_else(
+                || measurement.gouge.clone(),
+                |unseen| measurement.gouge.or(&unseen.measurement.gouge),
+            ),
             uncut: measurement.uncut.clone(),
             excess: unseen
                 .map_or(measurement.excess, |unseen| measurement.excess.or(&unseen.measurement.excess)),

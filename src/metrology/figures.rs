@@ -150,6 +150,19 @@ pub struct GougeFigures {
     pub region_count: usize,
 }
 
+impl GougeFigures {
+    /// As told, and the depth of what another measurement found where that is deeper, or may be.
+    #[must_use]
+    pub fn or(&self, other: &Self) -> Self {
+        let depth = |of: &Self| Bounded {
+            at_least_mm: of.at_least_mm,
+            ..Bounded::new(of.max_depth_mm, of.error_bound_mm)
+        };
+        let Bounded { max_mm, error_bound_mm, at_least_mm, .. } = depth(self).or(&depth(other));
+        Self { max_depth_mm: max_mm, error_bound_mm, at_least_mm, ..self.clone() }
+    }
+}
+
 /// A connected place higher than the uncut tolerance.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct UncutRegion {
