@@ -8,6 +8,7 @@ use metrology::{
 use motion::{Cutters, Toolpath};
 use report::Verdict;
 use scene::ToolpathRequest;
+use toolpath::Pocket;
 use work::monitor::Monitor;
 
 use super::tool::ToolMoves;
@@ -41,6 +42,19 @@ pub(crate) struct Unseen {
 }
 
 impl Session {
+    /// What the measurement of a pocket covers: its floor by cells, its walls by the moves.
+    pub(crate) fn pocket_covered(&self, pocket: &Pocket) -> Covered {
+        let walls = pocket.depth * pocket.wall_length();
+        let mesh = self.part.mesh();
+        let floor = |t: usize| {
+            let [a, b, c] = mesh.corners(t);
+            0.5 * (b - a).cross(&(c - a)).norm()
+        };
+        let floor = (0..mesh.triangles().len()).map(floor).sum();
+        let areas = CoverageFigures::of_pocket(self.scene.judged, floor, pocket.region.area(), walls);
+        Covered { areas, unseen: None }
+    }
+
     /// What `measured`, the cut by `path` with the moves of all its `tools`, covers.
     pub(crate) fn covered(
         &self,

@@ -176,20 +176,21 @@ impl Session {
             region.toolpath = its.map(|before| before.name.clone());
         }
         let tools = ToolMoves::of(cutters, holders, &planned.plan.path);
-        let covered = match covered {
-            None if self.pocket.is_none() => {
+        let covered = match (covered, &self.pocket) {
+            (Some(known), _) => known,
+            (None, Some(pocket)) => self.pocket_covered(pocket),
+            (None, None) => {
                 monitor.start("measuring the coverage", 0);
                 let all = (&*whole.path, &whole.cutters);
-                Some(self.covered(request, &measured, all, &whole.tools(earlier, &tools), monitor)?)
+                self.covered(request, &measured, all, &whole.tools(earlier, &tools), monitor)?
             }
-            known => known,
         };
         let run = Run {
             session: self,
             request,
             planned: &planned,
             measured: &measured,
-            covered: covered.as_ref(),
+            covered: &covered,
             around,
             whole: &whole,
             earlier,
@@ -224,7 +225,7 @@ impl Session {
             (verdict, claims)
         };
         let measurement = &measured.measurement;
-        let unseen = covered.as_ref().and_then(|covered| covered.unseen.as_ref());
+        let unseen = covered.unseen.as_ref();
         let result = ToolpathResult {
             name: request.name.clone(),
             strategy: request.strategy_name().to_owned(),

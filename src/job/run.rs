@@ -23,8 +23,8 @@ pub(crate) struct Run<'a> {
     pub planned: &'a Planned,
     /// What was measured.
     pub measured: &'a Measured,
-    /// What the measurement covers; `None` for the floor of a pocket.
-    pub covered: Option<&'a Covered>,
+    /// What the measurement covers.
+    pub covered: &'a Covered,
     /// The tool, and what it must not touch.
     pub around: Around<'a>,
     /// Its moves behind those of the toolpaths before it: what was measured.

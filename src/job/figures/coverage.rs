@@ -3,7 +3,6 @@
 use metrology::CoverageFigures;
 use report::{Claim, Figure, Gravity, micrometres, place};
 use serde::Serialize;
-use toolpath::Pocket;
 use work::monitor::Monitor;
 
 use super::words::value;
@@ -42,15 +41,7 @@ struct UnseenValue<'a> {
 
 /// Of every toolpath.
 pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> {
-    let found;
-    let Covered { areas, unseen } = match (run.covered, &run.session.pocket) {
-        (Some(covered), _) => covered,
-        (None, Some(pocket)) => {
-            found = Covered { areas: of_pocket(run, pocket), unseen: None };
-            &found
-        }
-        (None, None) => return Ok(Finding::default()),
-    };
+    let Covered { areas, unseen } = run.covered;
     let mut claims = nothing_judged(areas).into_iter().collect::<Vec<_>>();
     claims.extend(unseen.as_ref().map_or_else(Vec::new, |unseen| judged(run, unseen)));
     let sentence = (!areas.scope.is_empty()).then(|| {
@@ -74,17 +65,6 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
 /// `31 % of the surface …` of `on 31 % of the surface …`.
 fn covered(scope: &str) -> &str {
     scope.strip_prefix("on ").unwrap_or(scope)
-}
-
-fn of_pocket(run: &Run<'_>, pocket: &Pocket) -> CoverageFigures {
-    let walls = pocket.depth * pocket.wall_length();
-    let mesh = run.part().mesh();
-    let floor = |t: usize| {
-        let [a, b, c] = mesh.corners(t);
-        0.5 * (b - a).cross(&(c - a)).norm()
-    };
-    let floor = (0..mesh.triangles().len()).map(floor).sum();
-    CoverageFigures::of_pocket(run.scene().judged, floor, pocket.region.area(), walls)
 }
 
 /// The limits of the surface that no cell sees.

@@ -57,9 +57,6 @@ const LEAST_TRIANGLES: f64 = 4_000.0;
 /// every chord of a pass; a greater one misses passes between passes.
 const CONTACT_SHARE: f64 = 0.25;
 
-/// Share of these triangles that are divided at most in search of extremes.
-const DIVIDED_SHARE: f64 = 1.0;
-
 /// What cells measured.
 #[derive(Debug, Clone, Copy)]
 pub struct CellsSeen<'a> {
@@ -207,7 +204,7 @@ impl<'a> Coverage<'a> {
             limits: task.limits,
             spacing,
             asked: task.asked,
-            most_divided: (DIVIDED_SHARE * net.triangles.len() as f64) as usize,
+            most_divided: net.triangles.len(),
         };
         let near = Near::new(&net.places, spacing + task.cutters.greatest_radius());
         let comes_near = |k: usize| near.is_passed(task.path, k, task.cutters.of_move(k as u32));

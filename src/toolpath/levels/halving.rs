@@ -81,6 +81,15 @@ pub(crate) trait LevelSource: Sync {
 }
 
 impl<P: Copy> Track<P> {
+    /// The points, the first one again at the end of a closed curve, and the run that is asked for; `None` for a run of nothing.
+    pub fn opened(&self, run: Option<[usize; 2]>) -> Option<(Vec<P>, [usize; 2])> {
+        let closing = self.points.first().filter(|_| self.closed);
+        let points: Vec<P> = self.points.iter().chain(closing).copied().collect();
+        let last = points.len().saturating_sub(1);
+        let [first, end] = run.map_or([0, last], |[a, b]| [a, if self.closed { last } else { b }]);
+        (end > first).then_some((points, [first, end]))
+    }
+
     /// All points, or a run of them; the first one again at the end of a whole closed curve.
     pub fn along(&self, run: Option<[usize; 2]>) -> impl Iterator<Item = &P> {
         let [first, last] = run.unwrap_or([0, self.points.len().saturating_sub(1)]);

@@ -300,7 +300,7 @@ impl LevelSource for ChartGuide<'_> {
         level: f64,
         run: Option<[usize; 2]>,
     ) -> Result<Vec<Vec<Point3>>, Cancelled> {
-        let Some((points, run)) = points_of(curve, run) else { return Ok(Vec::new()) };
+        let Some((points, run)) = curve.opened(run) else { return Ok(Vec::new()) };
         let at = |s: f64| self.on_level(&points, level, s);
         let Some(stretches) = self.useful_stretches(&at, run, curve.closed) else { return Ok(Vec::new()) };
         let settings = PassSettings { sampling: 1.0, ..*self.settings };
@@ -322,7 +322,7 @@ impl LevelSource for ChartGuide<'_> {
         level: f64,
         run: Option<[usize; 2]>,
     ) -> Result<Option<Vec<Vec<Touch>>>, PlanError> {
-        let (Some(rule), Some((points, run))) = (self.settings.axis, points_of(curve, run)) else {
+        let (Some(rule), Some((points, run))) = (self.settings.axis, curve.opened(run)) else {
             return Ok(None);
         };
         if self.chart.is_fitted() {
@@ -359,18 +359,6 @@ fn put_on<P>(pieces: &mut Vec<Vec<P>>, stretch: Vec<P>, is_near: &dyn Fn(&P, &P)
         Some(piece) if joined => piece.extend(stretch.into_iter().skip(1)),
         _ => pieces.push(stretch),
     }
-}
-
-/// The points of a curve, the first one again at the end of a closed one, and the run that is asked for; `None` for a
-/// run of nothing.
-fn points_of(curve: &Track<[f64; 2]>, run: Option<[usize; 2]>) -> Option<(Vec<[f64; 2]>, [usize; 2])> {
-    let mut points = curve.points.clone();
-    if curve.closed {
-        points.push(points[0]);
-    }
-    let last = points.len() - 1;
-    let [first, end] = run.map_or([0, last], |[a, b]| [a, if curve.closed { last } else { b }]);
-    (end > first).then_some((points, [first, end]))
 }
 
 /// A stretch of a level curve that lies inside or outside of the chart.

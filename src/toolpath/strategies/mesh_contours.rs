@@ -55,11 +55,11 @@ const LEAST_FREE: f64 = 0.05;
 /// Places along a side of a triangle that are asked for what they allow, at most.
 const MOST_PLACES: usize = 24;
 
-/// A pass goes on over stretches of no use that are shorter than the cutter is wide, times this.
-const BRIDGED: f64 = 1.0;
-
 /// Least length of a contour, mm.
 const LEAST_LENGTH: f64 = 1e-3;
+
+/// Level ground of a lesser share of the surface is not told of.
+const LEAST_TOLD: f64 = 1e-3;
 
 /// Passes along contours of a mesh.
 pub(super) fn passes(task: &Task<'_>, placing: LevelSteps) -> Result<Passes, PlanError> {
@@ -68,7 +68,7 @@ pub(super) fn passes(task: &Task<'_>, placing: LevelSteps) -> Result<Passes, Pla
     let drop = DropCutter::watched(part, dropped, monitor)?;
     // Where more than two triangles meet at an edge, faces count as flat.
     let bend = SurfaceCurvature::of(part, cutter.radius()).ok();
-    let contours = HeightContours::new(drop, &part.bounds(), dropped.radius(), monitor)?;
+    let contours = HeightContours::new(drop, &part.bounds(), dropped.radius(), settings.memory, monitor)?;
     let guide = ContourGuide { part, mesh: part.mesh(), contours, bend, cutter, dropped, settings, monitor };
     let Reached { places, range, level, served } = guide.reached()?;
     let level = level / (level + served).max(f64::MIN_POSITIVE);
@@ -90,9 +90,6 @@ pub(super) fn passes(task: &Task<'_>, placing: LevelSteps) -> Result<Passes, Pla
     }
     Ok(passes)
 }
-
-/// Level ground of a lesser share of the surface is not told of.
-const LEAST_TOLD: f64 = 1e-3;
 
 fn refused(reason: &str) -> PlanError {
     PlanError::NotApplicable { strategy: super::waterline::DEFINITION.word, reason: reason.to_owned() }
@@ -299,7 +296,8 @@ impl ContourGuide<'_> {
             found.map_or(nowhere, |axis| Spot { axis, allowed: self.allowed_on(&axis, level) })
         };
         let spots: Vec<Spot> = (0..count).map(spot).collect();
-        let bridged = (BRIDGED * 2.0 * self.dropped.radius() / self.settings.sampling) as usize;
+        // A pass goes on over stretches of no use that are shorter than the cutter is wide.
+        let bridged = (2.0 * self.dropped.radius() / self.settings.sampling) as usize;
         stretches(&spots, bridged)
     }
 
@@ -373,19 +371,12 @@ impl LevelSource for ContourGuide<'_> {
         level: f64,
         run: Option<[usize; 2]>,
     ) -> Result<Vec<Vec<Point3>>, Cancelled> {
-        let mut axes: Vec<Point2> = curve.points.iter().map(|spot| spot.axis).collect();
-        if curve.closed {
-            axes.push(axes[0]);
-        }
-        let last = axes.len() - 1;
-        let [first, end] = run.map_or([0, last], |[a, b]| [a, if curve.closed { last } else { b }]);
-        if end <= first {
-            return Ok(Vec::new());
-        }
+        let Some((spots, [first, end])) = curve.opened(run) else { return Ok(Vec::new()) };
         let mut tip = |s: f64| {
-            let k = (s as usize).min(last - 1);
-            let (way, t) = (axes[k + 1] - axes[k], s - k as f64);
-            let near = axes[k] + way * t;
+            let k = (s as usize).min(spots.len() - 2);
+            let (from, t) = (spots[k].axis, s - k as f64);
+            let way = spots[k + 1].axis - from;
+            let near = from + way * t;
             if let Some(axis) = self.beside(near, way, way.norm(), level) {
                 return Some(Point3::new(axis.x, axis.y, level));
             }

@@ -504,15 +504,9 @@ impl LevelSource for MeshGuide<'_> {
         _: f64,
         run: Option<[usize; 2]>,
     ) -> Result<Vec<Vec<Point3>>, Cancelled> {
-        let mut axes: Vec<Point2> = curve.points.iter().map(|s| s.axis).collect();
-        if curve.closed {
-            axes.push(axes[0]);
-        }
+        let Some((spots, [first, end])) = curve.opened(run) else { return Ok(Vec::new()) };
+        let axes: Vec<Point2> = spots.iter().map(|s| s.axis).collect();
         let last = axes.len() - 1;
-        let [first, end] = run.map_or([0, last], |[a, b]| [a, if curve.closed { last } else { b }]);
-        if end <= first {
-            return Ok(Vec::new());
-        }
         let before = |k: usize| match k {
             0 if curve.closed => axes[last - 1],
             0 => axes[0] + (axes[0] - axes[1]),

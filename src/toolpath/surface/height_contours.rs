@@ -18,8 +18,9 @@ use work::monitor::{self, Monitor};
 /// Side of a cell as a share of the cutter's radius.
 const CELL_OVER_RADIUS: f64 = 1.0 / 16.0;
 
-/// Cells are wider than that where a part would take more than this many.
+/// Cells are wider than that where a part would take more than this many, or more than fit into the memory.
 const MOST_CELLS: f64 = 4e6;
+const BYTES_A_CELL: f64 = 24.0;
 
 /// Rows of the lattice between two questions whether to go on.
 const BAND: usize = 16;
@@ -46,7 +47,7 @@ pub(crate) struct HeightContours<'a> {
 }
 
 impl<'a> HeightContours<'a> {
-    /// Over a part with these bounds, for a cutter of this radius, mm.
+    /// Over a part with these bounds, for a cutter of this radius, mm, in a memory, bytes.
     ///
     /// # Errors
     /// Where the part is too wide for a lattice, or when cancelled.
@@ -54,11 +55,13 @@ impl<'a> HeightContours<'a> {
         drop: DropCutter<'a>,
         bounds: &Aabb,
         radius: f64,
+        memory: u64,
         monitor: &dyn Monitor,
     ) -> Result<Self, PlanError> {
         let size = bounds.size();
         let least = CELL_OVER_RADIUS * radius;
-        let cell = least.max(((size.x + 2.0 * radius) * (size.y + 2.0 * radius) / MOST_CELLS).sqrt());
+        let most = MOST_CELLS.min(memory as f64 / BYTES_A_CELL).max(1.0);
+        let cell = least.max(((size.x + 2.0 * radius) * (size.y + 2.0 * radius) / most).sqrt());
         // Outermost nodes lie where the cutter does not come to the part.
         let margin = radius + 1.5 * cell;
         let first = [bounds.min.x - margin, bounds.min.y - margin];
