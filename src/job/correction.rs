@@ -32,6 +32,7 @@ use toolpath::{Earlier, Faces, Kept, Step, plane_interval, short_passes, unused_
 use work::monitor::{self, Monitor};
 
 use super::covered::Covered;
+use super::earlier::{EarlierPath, WholePath};
 use super::figures::LeastLeftFigures;
 use super::judge::{self, highest_reached};
 use super::measuring::{Closeness, MeasuredClosely};
@@ -140,14 +141,14 @@ impl Standing {
         Some(standing.on_faces(&planned.plan.kept.faces, wanted))
     }
 
-    /// `None` without ridges.
-    fn of_all(looked: &Looked, planned: &Planned, factors: [f64; 2], wanted: Wanted<'_>) -> Option<Self> {
+    /// Where cells see no ridge, of what stands along borders alone.
+    fn of_all(looked: &Looked, planned: &Planned, factors: [f64; 2], wanted: Wanted<'_>) -> Self {
         let measured = &looked.measured.measurement;
         let scallop = &measured.scallop;
         let (seen, reached) = (highest_reached(measured), measured.excess.reached);
         let unseen = looked.unseen();
         let of_unseen = unseen.map_or(Bounded::default(), |unseen| unseen.excess.highest);
-        let highest = scallop.max_mm?;
+        let highest = scallop.max_mm.unwrap_or_default();
         let on_border = reached.max_mm.max(of_unseen.max_mm) > highest;
         let round = CorrectionRound {
             highest_mm: highest,
@@ -166,10 +167,10 @@ impl Standing {
         let others = [reached, of_unseen].map(|place| place.at_mm.map(|at| (at.into(), place.max_mm)));
         let above = places.chain(ridge).chain(others.into_iter().flatten()).collect();
         let depth = measured.gouge.max_depth_mm - measured.gouge.error_bound_mm;
-        Some(Self { round, above, depth }.on_faces(&planned.plan.kept.faces, wanted))
+        Self { round, above, depth }.on_faces(&planned.plan.kept.faces, wanted)
     }
 
-    /// Of the faces alone that passes are made for: no widths help others.
+    /// Of the faces alone that passes are made for: no widths help others. Edges between both are theirs once those are cut.
     fn on_faces(mut self, faces: &Faces, wanted: Wanted<'_>) -> Self {
         if *faces == Faces::default() {
             return self;
@@ -178,7 +179,8 @@ impl Standing {
         self.above.retain(|(at, _)| {
             let foot = wanted.part.closest_point(at).0;
             let around = mesh.triangles_at(foot.triangle as usize, &foot.point, ON_EDGE);
-            around.into_iter().all(|t| faces.hold(&mesh.normal(t)))
+            let mut held = around.into_iter().map(|t| faces.hold(&mesh.normal(t)));
+            if wanted.behind_others { held.any(|held| held) } else { held.all(|held| held) }
         });
         let highest = self.above.iter().map(|(_, height)| *height);
         // What is not among the places stays below the target.
@@ -199,15 +201,17 @@ struct Wanted<'a> {
     part: &'a Part,
     /// What no ridge may exceed, mm.
     target: f64,
+    /// Whether what others left is all that is cut.
+    behind_others: bool,
 }
 
 /// A path whose whole surface was measured.
-struct Looked {
-    measured: Measured,
+pub(crate) struct Looked {
+    pub measured: Measured,
     /// Whether a closer look would change no verdict.
     is_as_verdict: bool,
     /// What that covers, where [`Session::look`] asks for it.
-    covered: Option<Covered>,
+    pub covered: Option<Covered>,
 }
 
 impl Looked {
@@ -232,6 +236,8 @@ struct Tried {
 struct Corrected<'a> {
     session: &'a Session,
     request: &'a ToolpathRequest,
+    /// What cuts the stock before it.
+    earlier: &'a [EarlierPath],
     around: Around<'a>,
     engine: &'a dyn Engine,
     goal: Goal,
@@ -254,10 +260,11 @@ struct Corrected<'a> {
 }
 
 impl Session {
-    /// Plans, cuts and measures one toolpath, in rounds where what it leaves is to be corrected.
+    /// Plans, cuts and measures one toolpath behind `earlier` ones, in rounds where what is left is to be corrected.
     pub(crate) fn plan_and_measure(
         &self,
         request: &ToolpathRequest,
+        earlier: &[EarlierPath],
         around: Around<'_>,
         engine: &dyn Engine,
         monitor: &dyn Monitor,
@@ -275,13 +282,22 @@ impl Session {
             within: SLACK * target,
             limit: self.scene.scallop_rule.highest * target,
         });
-        let whole = |planned: &Planned| self.look(request, engine, &planned.plan.path, closeness, monitor);
-        let wanted = |target: f64| Wanted { part: &self.part, target };
-        let (looked, standing) = match (&map, target) {
-            (Some(map), Some(target)) => (None, Standing::of_ridges(map, &first, [1.0; 2], wanted(target))),
-            _ => {
-                let looked = whole(&first)?;
-                let of_all = |target| Standing::of_all(&looked, &first, [1.0; 2], wanted(target));
+        let whole = |planned: &Planned, closeness| {
+            self.look(request, earlier, engine, &planned.plan.path, closeness, monitor)
+        };
+        let wanted =
+            |target: f64, behind_others: bool| Wanted { part: &self.part, target, behind_others };
+        let of_ridges = |(map, target)| Standing::of_ridges(map, &first, [1.0; 2], wanted(target, false));
+        let (looked, standing) = match map.as_ref().zip(target).and_then(of_ridges) {
+            Some(standing) => (None, Some(standing)),
+            None => {
+                let looked = whole(&first, closeness)?;
+                let has_ridges = looked.measured.measurement.scallop.max_mm.is_some();
+                let of_all = |target| {
+                    let wanted = wanted(target, !earlier.is_empty());
+                    let standing = Standing::of_all(&looked, &first, [1.0; 2], wanted);
+                    (has_ridges || standing.round.highest() > target).then_some(standing)
+                };
                 let standing = target.and_then(of_all);
                 (Some(looked), standing)
             }
@@ -289,7 +305,7 @@ impl Session {
         let (Some(target), Some(standing)) = (target, standing) else {
             let Looked { measured, covered, .. } = match looked {
                 Some(looked) if looked.is_as_verdict => looked,
-                _ => self.look(request, engine, &first.plan.path, Closeness::Verdict, monitor)?,
+                _ => whole(&first, Closeness::Verdict)?,
             };
             return Ok((first, measured, covered));
         };
@@ -300,6 +316,7 @@ impl Session {
         let mut corrected = Corrected {
             session: self,
             request,
+            earlier,
             around,
             engine,
             goal: Goal { target, rule: self.scene.scallop_rule },
@@ -326,23 +343,25 @@ impl Session {
         Ok((best, measured, covered))
     }
 
-    /// Measures the whole surface, where no cell sees as well unless the rest fails for certain, or others cut the stock before.
-    fn look(
+    /// Measures the whole surface that a path leaves behind `earlier` ones, where no cell sees as well unless the rest fails for certain.
+    pub(crate) fn look(
         &self,
         request: &ToolpathRequest,
+        earlier: &[EarlierPath],
         engine: &dyn Engine,
         path: &Toolpath,
         closeness: Closeness,
         monitor: &dyn Monitor,
     ) -> Result<Looked, JobError> {
-        let (cutters, _) = self.tools(request);
+        let (cutters, holders) = self.tools(request);
+        let whole = WholePath::new(earlier, path, cutters, self.scene.machine.rapid_rate);
+        let all = (&*whole.path, &whole.cutters);
         let MeasuredClosely { measured, is_as_verdict } =
-            self.measure_closely(request, engine, (path, cutters), closeness, monitor)?;
+            self.measure_closely(request, engine, all, closeness, monitor)?;
         let covered = match self.pocket {
-            None if !request.stock_is_previous && self.verdict_on(&measured) != Verdict::Fail => {
-                let (cutters, holders) = self.tools(request);
-                let tools = ToolMoves::of(cutters, holders, path);
-                Some(self.covered(request, &measured, (path, cutters), &tools, monitor)?)
+            None if self.verdict_on(&measured) != Verdict::Fail => {
+                let own = ToolMoves::of(cutters, holders, path);
+                Some(self.covered(request, &measured, all, &whole.tools(earlier, &own), monitor)?)
             }
             _ => None,
         };
@@ -402,8 +421,9 @@ impl Session {
 }
 
 impl Corrected<'_> {
-    fn wanted(&self) -> Wanted<'_> {
-        Wanted { part: &self.session.part, target: self.goal.target }
+    fn wanted(&self, measured: bool) -> Wanted<'_> {
+        let behind_others = measured && !self.earlier.is_empty();
+        Wanted { part: &self.session.part, target: self.goal.target, behind_others }
     }
 
     /// Plans anew while ridges on coarse cells stand above the target, or all below it by more than the `slack`.
@@ -423,7 +443,7 @@ impl Corrected<'_> {
             } else {
                 let map = self.session.ridges(self.request, self.engine, &planned, monitor)?;
                 slack = map.as_ref().map_or(slack, |map| slack.max(slack_of(map)));
-                let found = map.and_then(|map| Standing::of_ridges(&map, &planned, factors, self.wanted()));
+                let found = map.and_then(|map| Standing::of_ridges(&map, &planned, factors, self.wanted(false)));
                 let Some(found) = found else { break };
                 self.keep_if_better(planned, next, found)
             };
@@ -472,8 +492,8 @@ impl Corrected<'_> {
                 // Two at a time might be more than the memory that the run may take.
                 drop(looked.take());
                 let path = &planned.plan.path;
-                let again = self.session.look(self.request, self.engine, path, self.closeness, monitor)?;
-                let Some(found) = Standing::of_all(&again, &planned, factors, self.wanted()) else { break };
+                let again = self.session.look(self.request, self.earlier, self.engine, path, self.closeness, monitor)?;
+                let found = Standing::of_all(&again, &planned, factors, self.wanted(true));
                 // A shorter path is no reason to give up a plan that passes.
                 gain = match (is_passing, self.session.passes(&again)) {
                     (true, false) => self.keep_best(&planned, next, found),
@@ -602,8 +622,10 @@ impl Corrected<'_> {
     /// high, passes are spread evenly, and each interval then grows by as much as all of them.
     fn may_lie_wider(&self) -> bool {
         let round = &self.tried.standing.round;
-        // What others cut before tells nothing of its own passes; where they leave ground to others, walls are not looked at.
-        if self.request.stock_is_previous || self.best.plan.kept.faces.most < 1.0 {
+        // What others cut before tells nothing of its own passes; where they leave ground to others, walls are not looked at. Without
+        // ridges there is nothing to tell by.
+        let tells_nothing = self.request.stock_is_previous || round.highest_mm == 0.0;
+        if tells_nothing || self.best.plan.kept.faces.most < 1.0 {
             return false;
         }
         let is_even = round.median_mm.is_some_and(|median| median >= EVENLY_HIGH * round.highest());
@@ -769,12 +791,11 @@ impl Corrected<'_> {
     /// Measures all of the best plan.
     fn look_at_best(&mut self, closeness: Closeness, monitor: &dyn Monitor) -> Result<Looked, JobError> {
         let path = &self.best.plan.path;
-        let looked = self.session.look(self.request, self.engine, path, closeness, monitor)?;
+        let looked = self.session.look(self.request, self.earlier, self.engine, path, closeness, monitor)?;
         let factors = self.tried.standing.round.factors;
-        if let Some(standing) = Standing::of_all(&looked, &self.best, factors, self.wanted()) {
-            self.rounds[self.kept] = standing.round;
-            self.tried.standing = standing;
-        }
+        let standing = Standing::of_all(&looked, &self.best, factors, self.wanted(true));
+        self.rounds[self.kept] = standing.round;
+        self.tried.standing = standing;
         Ok(looked)
     }
 

@@ -15,7 +15,9 @@ use scene::ToolpathRequest;
 use sim::{NOT_CUT, Stock};
 use work::monitor::{self, Monitor};
 
+use super::correction::Looked;
 use super::earlier::{EarlierPath, WholePath};
+use super::measuring::Closeness;
 use super::planned::Planned;
 use super::run::Run;
 use super::tool::{Around, Tool, ToolMoves};
@@ -140,24 +142,22 @@ impl Session {
         let near = closer.as_ref().unwrap_or(&self.part);
         let around = Around { tool: &tool, near, fixtures: &fixtures };
         let at_time;
-        let (request, planned, mut measured, mut covered) = match &request.equal_time {
+        let (request, planned, mut measured, covered) = match &request.equal_time {
             None => {
-                let (planned, measured, covered) = self.plan_and_measure(request, around, engine, monitor)?;
+                let (planned, measured, covered) =
+                    self.plan_and_measure(request, earlier, around, engine, monitor)?;
                 (request, planned, measured, covered)
             }
             Some(time) => {
                 let (found, planned) = self.plan_for_time(request, time, around, monitor)?;
-                let (cutters, _) = self.tools(&found);
-                let measured = self.measure(&found, engine, (&planned.plan.path, cutters), monitor)?;
+                let path = &planned.plan.path;
+                let Looked { measured, covered, .. } =
+                    self.look(&found, earlier, engine, path, Closeness::Verdict, monitor)?;
                 at_time = found;
-                (&at_time, planned, measured, None)
+                (&at_time, planned, measured, covered)
             }
         };
         let whole = WholePath::new(earlier, &planned.plan.path, cutters, scene.machine.rapid_rate);
-        if !earlier.is_empty() {
-            covered = None;
-            measured = self.measure(request, engine, (&whole.path, &whole.cutters), monitor)?;
-        }
         // Arcs of the program are as far off the moves that were measured.
         if let Some(off) = scene.arcs.filter(|_| request.foreign().is_none()) {
             measured.measurement.widen(off);

@@ -50,18 +50,8 @@ pub(crate) struct MeasuredClosely {
 }
 
 impl Session {
-    /// Cuts and measures for the verdict; closer, and on finer cells where these help, where a limit hangs on that.
-    pub(crate) fn measure(
-        &self,
-        request: &ToolpathRequest,
-        engine: &dyn Engine,
-        whole: (&Toolpath, &Cutters),
-        monitor: &dyn Monitor,
-    ) -> Result<Measured, JobError> {
-        Ok(self.measure_closely(request, engine, whole, Closeness::Verdict, monitor)?.measured)
-    }
-
-    /// As [`Session::measure`], as closely as is asked. The path may begin with the moves of other toolpaths.
+    /// Cuts and measures as closely as is asked; closer, and on finer cells where these help, where a limit hangs on that. The path may begin
+    /// with the moves of other toolpaths.
     pub(crate) fn measure_closely(
         &self,
         request: &ToolpathRequest,
