@@ -352,9 +352,8 @@ pub struct Measurement {
     pub deviation_map: Vec<f32>,
     /// Height and weight (ridge length, mm) of every ridge sample.
     pub ridge_samples: Vec<[f32; 2]>,
-    /// Places on ridges that come within a hundredth of the scallop limit or stand above it, and those along borders that
-    /// stand above it, all within the uncut tolerance: where passes lie too far apart, or as far as they may. Those between centres have the
-    /// height that they may have at most.
+    /// Places on ridges that cells show near the scallop limit or above it, and all others that stand above it, within the uncut tolerance:
+    /// where passes lie too far apart, or as far as they may. Those between centres have the height that they may have at most.
     pub above: Vec<RidgePlace>,
     /// Scallops of pairs of passes, calculated beside measured.
     pub pairs: PairFigures,

@@ -111,6 +111,14 @@ impl AlongNormal for UnseenCut<'_> {
         }
     }
 
+    fn standing_at_most(&self, point: &Point3, normal: &Vector3, within: f64) -> f64 {
+        if self.is_at_level_edge(point, normal) {
+            0.0
+        } else {
+            self.reach().min(self.cut.standing_at_most(point, normal, within))
+        }
+    }
+
     fn depth(&self) -> f64 {
         self.cut.depth()
     }

@@ -56,8 +56,12 @@ impl Budget {
 
     /// What a mesh of stock leaves of it.
     pub fn beside(self, stock: &Stock) -> Self {
-        let mesh = stock.triangles() as u64 * BYTES_PER_TRIANGLE;
-        Self { part_bytes: self.part_bytes + mesh, ..self }
+        self.without(stock.triangles() as u64 * BYTES_PER_TRIANGLE)
+    }
+
+    /// What so many bytes leave of it.
+    pub fn without(self, bytes: u64) -> Self {
+        Self { part_bytes: self.part_bytes + bytes, ..self }
     }
 
     /// All of it, bytes.

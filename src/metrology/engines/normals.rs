@@ -4,11 +4,11 @@ use std::time::Instant;
 
 use cutter::Solid;
 use geometry::{Aabb, Vector3};
-use sim::{Stock, VoxelEngine, Voxels};
+use sim::{Rays, Stock, VoxelEngine, Voxels};
 use work::monitor::Monitor;
 
 use super::budget::MIB;
-use super::{Engine, EngineError, Measured, NormalView, Task, View};
+use super::{Budget, Engine, EngineError, Measured, NormalView, Task, View};
 use crate::along_normals::ridges_along_normals;
 use crate::coverage::area;
 use crate::{
@@ -81,7 +81,8 @@ impl Engine for Normals {
         let spacing = task.simulation.cell.max((mean_interval(task) / PLACES_A_PASS).min(widest));
         let solid = Solid::of_cutter(task.cutters.first(), task.holder);
         // Measuring may still fit into the memory; where it does not, it says so.
-        if check_places(task, spacing).is_err() {
+        let budget = task.budget.without(Rays::bytes(task.path, &solid));
+        if check_places(task, &budget, spacing).is_err() {
             return Ok(None);
         }
         let rays = match task.budget.rays(task.path, &solid, None, monitor) {
@@ -100,11 +101,12 @@ impl Engine for Normals {
         // Deviations are exact at the places, and ridges are found between them, so that fewer do than cells.
         let wider = if task.simulation.cell_is_auto { PLACES_OVER_CELLS } else { 1.0 };
         let spacing = wider * task.simulation.cell;
-        check_places(task, spacing)?;
         let rays = task.budget.rays(path, &solid, None, monitor)?;
+        let budget = task.budget.without(Rays::bytes(path, &solid));
+        check_places(task, &budget, spacing)?;
         let space = space(task, outward(task));
         let voxels =
-            self.by_voxels.then(|| cut_voxels(task, &space, &solid, spacing, monitor)).transpose()?;
+            self.by_voxels.then(|| cut_voxels(task, &budget, &space, &solid, spacing, monitor)).transpose()?;
         let by_rays = RaysCut { rays: &rays, path, solid: &solid };
         let by_voxels = voxels.as_ref().map(|(engine, voxels)| VoxelCut { engine, voxels });
         let first: &dyn FirstCut = by_voxels.as_ref().map_or(&by_rays, |cut| cut);
@@ -162,6 +164,7 @@ fn space(task: &Task<'_>, reach: f64) -> Stock {
 /// What a path leaves of `space` where places `spacing` mm apart take their memory too.
 fn cut_voxels<'a>(
     task: &Task<'_>,
+    budget: &Budget,
     space: &'a Stock,
     solid: &Solid,
     spacing: f64,
@@ -169,15 +172,15 @@ fn cut_voxels<'a>(
 ) -> Result<(VoxelEngine<'a>, Voxels), EngineError> {
     let voxel = task.simulation.voxel.unwrap_or(task.simulation.cell);
     let places = (net_places(task.part, spacing) * BYTES_PER_PLACE as f64) as u64;
-    let left = task.budget.left(task.path.len()).saturating_sub(places);
+    let left = budget.without(places).left(task.path.len());
     let engine = VoxelEngine::new(space, solid, task.path)?;
     let voxels = engine.cut(voxel, left, monitor)?;
     Ok((engine, voxels))
 }
 
 /// Refuses places that do not fit into the memory.
-fn check_places(task: &Task<'_>, spacing: f64) -> Result<(), EngineError> {
-    let (budget, moves) = (&task.budget, task.path.len());
+fn check_places(task: &Task<'_>, budget: &Budget, spacing: f64) -> Result<(), EngineError> {
+    let moves = task.path.len();
     let needed = net_places(task.part, spacing) * BYTES_PER_PLACE as f64;
     let left = budget.left(moves) as f64;
     if needed <= left {
