@@ -44,14 +44,20 @@ pub(crate) struct Unseen {
 impl Session {
     /// What the measurement of a pocket covers: its floor by cells, its walls by the moves.
     pub(crate) fn pocket_covered(&self, pocket: &Pocket) -> Covered {
-        let walls = pocket.depth * pocket.wall_length();
+        let cutter = &self.scene.cutter;
+        // Round corners leave a fillet at the foot.
+        let upright = (pocket.depth - cutter.corner_radius()).max(0.0);
+        let walls = [
+            upright * pocket.reached_wall_length(cutter.radius()),
+            pocket.depth * pocket.wall_length(),
+        ];
         let mesh = self.part.mesh();
         let floor = |t: usize| {
             let [a, b, c] = mesh.corners(t);
             0.5 * (b - a).cross(&(c - a)).norm()
         };
         let floor = (0..mesh.triangles().len()).map(floor).sum();
-        let areas = CoverageFigures::of_pocket(self.scene.judged, floor, pocket.region.area(), walls);
+        let areas = CoverageFigures::of_pocket(self.scene.judged, [floor, pocket.region.area()], walls);
         Covered { areas, unseen: None }
     }
 

@@ -32,7 +32,8 @@ pub struct CoverageFigures {
     pub hidden_mm2: f64,
     /// Not judged: what lies outside of the block.
     pub outside_stock_mm2: f64,
-    /// Not judged: the floor of a pocket where the cutter does not fit, and a hair beside its walls.
+    /// Not judged: floor and walls of a pocket where the cutter does not fit or only its round corner comes, and a hair of floor beside
+    /// the walls.
     pub out_of_reach_mm2: f64,
     /// Bound of the error of each area.
     pub error_bound_mm2: f64,
@@ -41,9 +42,13 @@ pub struct CoverageFigures {
 }
 
 impl CoverageFigures {
-    /// Of a pocket: the floor that was measured, all of the floor, and its walls, mm².
-    pub fn of_pocket(judge: Judged, floor: f64, whole_floor: f64, walls: f64) -> Self {
-        let out_of_reach_mm2 = (whole_floor - floor).max(0.0);
+    /// Of a pocket: what was measured of its floor and what the cutter comes to of its walls, each with all of it, mm².
+    pub fn of_pocket(
+        judge: Judged,
+        [floor, whole_floor]: [f64; 2],
+        [walls, all_walls]: [f64; 2],
+    ) -> Self {
+        let out_of_reach_mm2 = (whole_floor - floor).max(0.0) + (all_walls - walls).max(0.0);
         Self { judge, by_cells_mm2: floor, by_moves_mm2: walls, out_of_reach_mm2, ..Self::default() }.summed()
     }
 
@@ -122,9 +127,9 @@ mod tests {
             CoverageFigures { by_cells_mm2: 1000.0, hidden_mm2: 0.04, ..Default::default() }.summed();
         assert_eq!(nearly.scope, "on 99.99 % of the surface; not judged: hidden from above 0.0400 mm²");
         assert_eq!(CoverageFigures { by_cells_mm2: 7.0, ..Default::default() }.summed().scope, "");
-        let pocket = CoverageFigures::of_pocket(Judged::Facing, 90.0, 100.0, 50.0);
-        assert_eq!((pocket.surface_mm2, pocket.judged_mm2), (150.0, 140.0));
-        assert!(pocket.scope.ends_with("out of the cutter's reach 10.0 mm²"), "{}", pocket.scope);
+        let pocket = CoverageFigures::of_pocket(Judged::Facing, [90.0, 100.0], [50.0, 55.0]);
+        assert_eq!((pocket.surface_mm2, pocket.judged_mm2), (155.0, 140.0));
+        assert!(pocket.scope.ends_with("out of the cutter's reach 15.0 mm²"), "{}", pocket.scope);
         assert_eq!(CoverageFigures::default().share(), 0.0);
     }
 }

@@ -13,6 +13,11 @@ const ON_WALL: f64 = 1.0e-5;
 /// Sides of the rounds between strips beyond open sides, rad.
 const ROUND: f64 = 0.2;
 
+/// Places along a wall that are asked whether the cutter fits there are no farther apart than this share of its radius, and where that
+/// changes it is found by so many halvings.
+const WALL_STEP: f64 = 0.01;
+const HALVINGS: usize = 30;
+
 /// A pocket to mill.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pocket {
@@ -131,6 +136,43 @@ impl Pocket {
         self.region.curves().map(around).sum::<f64>() - open
     }
 
+    /// Length of its walls that a cutter of a radius touches from some place where it fits, mm, but for what their chords are off the
+    /// curves: beside sharp corners it does not come to them.
+    pub fn reached_wall_length(&self, radius: f64) -> f64 {
+        let centres = self.free.inset(radius);
+        if centres.pieces.is_empty() {
+            return 0.0;
+        }
+        let centres = SegmentGrid::of_curves(centres.curves());
+        let reach = radius + 2.0 * Region::offset_excess(radius) + self.off_drawing + ON_WALL;
+        let of_side = |[a, b]: [Point2; 2]| {
+            let along = b - a;
+            let fits = |share: f64| centres.distance(&(a + along * share)) <= reach;
+            let places = (along.norm() / (WALL_STEP * radius)).ceil().max(1.0);
+            let of_step = |k: usize| {
+                let ends = [k as f64 / places, (k + 1) as f64 / places];
+                match ends.map(fits) {
+                    [true, true] => ends[1] - ends[0],
+                    [false, false] => 0.0,
+                    [from, _] => {
+                        let (mut yes, mut no) = if from { (ends[0], ends[1]) } else { (ends[1], ends[0]) };
+                        for _ in 0..HALVINGS {
+                            let middle = 0.5 * (yes + no);
+                            *(if fits(middle) { &mut yes } else { &mut no }) = middle;
+                        }
+                        (yes - if from { ends[0] } else { ends[1] }).abs()
+                    }
+                }
+            };
+            along.norm() * (0..places as usize).map(of_step).sum::<f64>()
+        };
+        let sides = |curve: &[Point2]| -> f64 {
+            let side = |k: usize| [curve[k], curve[(k + 1) % curve.len()]];
+            (0..curve.len()).map(side).filter(|side| !self.open.contains(side)).map(of_side).sum()
+        };
+        self.region.curves().map(sides).sum()
+    }
+
     /// Ground beyond the open sides that a cutter of a radius may meet, also beyond the walls at their ends: planning asks for
     /// it only where walls let the cutter come.
     pub(super) fn ground_beyond(&self, radius: f64) -> Region {
@@ -223,6 +265,28 @@ mod tests {
 
     fn points(c: &[(f64, f64)]) -> Vec<Point2> {
         c.iter().map(|&(x, y)| Point2::new(x, y)).collect()
+    }
+
+    /// Beside a square corner it does not come to the last `r` mm of each wall; it comes to all of a round hole and around an island.
+    #[test]
+    fn the_cutter_comes_to_walls_where_it_fits() {
+        let reached = square().reached_wall_length(3.0);
+        let e = Region::offset_excess(3.0);
+        let [short, long] = [3.0_f64 + e, 3.0 + 2.0 * e + ON_WALL];
+        let beside_corner = short - (long * long - short * short).sqrt();
+        assert!((reached - (80.0 - 8.0 * beside_corner)).abs() < 1e-4, "{reached}");
+        let circle = |r: f64, n: usize| -> Vec<Point2> {
+            let at = |k: usize| std::f64::consts::TAU * k as f64 / n as f64;
+            (0..n).map(|k| Point2::new(r * at(k).cos(), r * at(k).sin())).collect()
+        };
+        let (n, r) = (60, 5.0);
+        let off_drawing = r * (1.0 - (std::f64::consts::PI / n as f64).cos());
+        let ring = Region::nested(vec![circle(r, n), circle(1.0, n)]).unwrap().0;
+        let ring = Pocket { off_drawing, ..Pocket::new(ring, 1.0) };
+        assert!((ring.reached_wall_length(1.5) - ring.wall_length()).abs() < 1e-9);
+        let slot = Pocket { off_drawing, ..Pocket::new(Region::nested(vec![circle(r, n)]).unwrap().0, 1.0) };
+        assert!((slot.reached_wall_length(4.9) - slot.wall_length()).abs() < 1e-9);
+        assert_eq!(slot.reached_wall_length(5.1), 0.0);
     }
 
     fn square() -> Pocket {
