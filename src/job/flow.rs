@@ -9,7 +9,7 @@ use io::digest;
 use metrology::{Engine, GougeRegion, Measured, path_figures};
 use motion::Toolpath;
 use report::{
-    NotPlanned, RunReport, SimulationFigures, ToleranceFigures, ToolpathReport, ToolpathResult, Verdict,
+    Claim, NotPlanned, RunReport, SimulationFigures, ToleranceFigures, ToolpathReport, ToolpathResult, Verdict,
 };
 use scene::ToolpathRequest;
 use sim::{NOT_CUT, Stock};
@@ -42,7 +42,7 @@ impl Session {
         monitor: &dyn Monitor,
         done: &mut dyn FnMut(&Outcome) -> Result<(), E>,
     ) -> Result<RunReport, E> {
-        let (mut rows, mut refused) = (Vec::new(), None);
+        let (mut rows, mut refused, mut left) = (Vec::new(), None, Vec::new());
         let (mut seen, mut earlier) = (Vec::new(), Some(Vec::new()));
         for request in &self.scene.toolpaths {
             monitor.belongs_to(&request.name);
@@ -62,11 +62,15 @@ impl Session {
                     if let Some(earlier) = earlier.as_mut().filter(|_| self.goes_on(request)) {
                         earlier.push(EarlierPath::of(&outcome));
                     }
+                    left = outcome.left;
                     rows.push(ToolpathReport::Measured(Box::new(outcome.result)));
                 }
                 Err(error) => {
                     let Some(reason) = error.why_not_planned() else { return Err(error.into()) };
                     earlier = None;
+                    if request.stock_is_previous {
+                        answers_itself(rows.last_mut(), &mut left);
+                    }
                     rows.push(not_planned(request, reason));
                     refused = refused.or(Some(error));
                 }
@@ -210,19 +214,19 @@ impl Session {
             wall_s: measured.wall_s,
             threads: work::parallel::threads(),
         };
-        let (verdict, claims) = judge::judge(
+        let claims = judge::judge(
             &measured.measurement,
             &scene.tolerance,
             &scene.scallop_rule,
             found.claims,
             planned.plan.path.program_name(),
         );
-        let (verdict, claims) = if self.goes_on(request) {
+        let [claims, left] = if self.goes_on(request) {
             figures::before_others(claims)
         } else if request.foreign().is_some_and(|read| read.others) {
-            figures::with_other_tools(claims)
+            [figures::with_other_tools(claims), Vec::new()]
         } else {
-            (verdict, claims)
+            [claims, Vec::new()]
         };
         let measurement = &measured.measurement;
         let unseen = covered.unseen.as_ref();
@@ -230,7 +234,8 @@ impl Session {
             name: request.name.clone(),
             strategy: request.strategy_name().to_owned(),
             folder: request.folder.clone(),
-            verdict,
+            stock_is_previous: request.stock_is_previous,
+            verdict: judge::verdict_by(&claims),
             claims,
             notes: self.notes_on(&planned, &measured, found.notes),
             path: path_figures(&planned.plan.path, planned.time(scene, monitor)?),
@@ -260,6 +265,7 @@ impl Session {
             view: measured.view,
             machined,
             files: found.files,
+            left,
         })
     }
 
@@ -318,6 +324,15 @@ fn line_of_cut(path: &Toolpath, cutter: &Cutter, step: usize, at: &Point3) -> u3
     };
     let begins = (1..=PLACES).all(|k| height(k) >= height(0));
     line(if begins { before } else { step })
+}
+
+/// What a toolpath left to one that could not be planned is its own.
+fn answers_itself(toolpath: Option<&mut ToolpathReport>, left: &mut Vec<Claim>) {
+    if let Some(ToolpathReport::Measured(result)) = toolpath {
+        result.claims.append(left);
+        result.claims.sort_by_key(|claim| std::cmp::Reverse(claim.gravity));
+        result.verdict = judge::verdict_by(&result.claims);
+    }
 }
 
 fn not_planned(request: &ToolpathRequest, reason: String) -> ToolpathReport {

@@ -14,14 +14,14 @@
 use metrology::{Bounded, Limits, Measurement, ScallopRule};
 use report::{Claim, Gravity, MapMark, Verdict, micrometres, per_cent, place, with_bound};
 
-/// The verdict on a measured toolpath, and its limits, the gravest first. `found` are the claims of further figures; lines are of `program`.
+/// The limits of a measured toolpath, the gravest first. `found` are the claims of further figures; lines are of `program`.
 pub(crate) fn judge(
     measured: &Measurement,
     limits: &Limits,
     rule: &ScallopRule,
     found: Vec<Claim>,
     program: &str,
-) -> (Verdict, Vec<Claim>) {
+) -> Vec<Claim> {
     let mut claims = found;
     claims.extend([
         gouge(measured, limits, program),
@@ -30,12 +30,17 @@ pub(crate) fn judge(
     ]);
     claims.extend(most(measured, limits, rule));
     claims.sort_by_key(|claim| std::cmp::Reverse(claim.gravity));
-    (claims.iter().map(Claim::verdict).max().unwrap_or(Verdict::Undecided), claims)
+    claims
+}
+
+/// The verdict by all of some limits.
+pub(crate) fn verdict_by(claims: &[Claim]) -> Verdict {
+    claims.iter().map(Claim::verdict).max().unwrap_or(Verdict::Undecided)
 }
 
 /// The verdict on the measured surface alone.
 pub(crate) fn of_surface(measured: &Measurement, limits: &Limits, rule: &ScallopRule) -> Verdict {
-    judge(measured, limits, rule, Vec::new(), "").0
+    verdict_by(&judge(measured, limits, rule, Vec::new(), ""))
 }
 
 fn gouge(measured: &Measurement, limits: &Limits, program: &str) -> Claim {

@@ -8,7 +8,7 @@ use io::ProgramHeader;
 use machine::kinematics::JointPath;
 use metrology::{Measurement, View};
 use motion::{Cutters, Toolpath};
-use report::{FigureFile, ToolpathResult};
+use report::{Claim, FigureFile, ToolpathResult};
 
 use super::planned::write_program;
 use super::{Machined, Session};
@@ -38,6 +38,8 @@ pub struct Outcome {
     pub machined: Machined,
     /// Further files of its folder.
     pub files: Vec<FigureFile>,
+    /// The limits of what it leaves to the toolpath behind it.
+    pub(crate) left: Vec<Claim>,
 }
 
 impl Session {

@@ -51,6 +51,9 @@ pub struct ToolpathResult {
     pub strategy: String,
     /// The folder with its files.
     pub folder: String,
+    /// Whether it cuts what the toolpath before it left.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub stock_is_previous: bool,
     /// Whether every limit holds.
     pub verdict: Verdict,
     /// Every limit with the figure that was held against it, the gravest first. report.json has them as `violations`,
@@ -247,6 +250,11 @@ impl RunReport {
         }
     }
 
+    /// The toolpaths that cut one block in turn, or a single one.
+    pub fn chains(&self) -> impl Iterator<Item = &[ToolpathReport]> {
+        chains(&self.toolpaths)
+    }
+
     /// The toolpaths that were planned, cut and measured.
     pub fn measured(&self) -> impl Iterator<Item = &ToolpathResult> {
         self.toolpaths.iter().filter_map(ToolpathReport::measured)
@@ -267,11 +275,20 @@ impl RunReport {
     }
 }
 
-/// The quickest of those that pass.
+fn chains(toolpaths: &[ToolpathReport]) -> impl Iterator<Item = &[ToolpathReport]> {
+    let is_behind = |next: &ToolpathReport| next.measured().is_some_and(|t| t.stock_is_previous);
+    toolpaths.chunk_by(move |_, next| is_behind(next))
+}
+
+/// How long toolpaths take one after the other, s.
+pub(super) fn time_of(chain: &[ToolpathReport]) -> f64 {
+    chain.iter().filter_map(ToolpathReport::measured).map(|t| t.path.machining_time_s).sum()
+}
+
+/// The last toolpath of the quickest of those that pass; toolpaths that cut one block in turn are one.
 fn best(toolpaths: &[ToolpathReport]) -> Option<&ToolpathResult> {
-    let passing =
-        toolpaths.iter().filter_map(ToolpathReport::measured).filter(|t| t.verdict == Verdict::Pass);
-    passing.min_by(|a, b| a.path.machining_time_s.total_cmp(&b.path.machining_time_s))
+    let passing = chains(toolpaths).filter(|chain| chain.iter().all(|t| t.verdict() == Verdict::Pass));
+    passing.min_by(|a, b| time_of(a).total_cmp(&time_of(b)))?.last()?.measured()
 }
 
 fn check_nulls(path: &str, value: &serde_json::Value) -> Result<(), ReportError> {
@@ -335,6 +352,19 @@ mod tests {
         let both = vec![slower, report.toolpaths[1].clone()];
         let report = RunReport::new("a".into(), "b".into(), "c".into(), fixture::tolerance(), both.clone());
         assert_eq!((report.best.as_deref(), report.verdict), (Some("streamline"), Verdict::Pass));
+        // Two that cut one block in turn take longer than one that does it alone.
+        let quick = |name: &str, stock_is_previous| {
+            let one = fixture::toolpath(name, 300.0, 0.0);
+            ToolpathReport::Measured(Box::new(ToolpathResult { stock_is_previous, ..one }))
+        };
+        let in_turn = |second: &str| {
+            let all = vec![both[1].clone(), quick("rough", false), quick(second, true)];
+            RunReport::new("a".into(), "b".into(), "c".into(), fixture::tolerance(), all)
+        };
+        let time = both[1].measured().unwrap().path.machining_time_s;
+        assert!(time > 300.0 && time < 600.0, "{time}");
+        assert_eq!(in_turn("finish").best.as_deref(), Some("streamline"));
+        assert_eq!(in_turn("finish").chains().map(<[_]>::len).collect::<Vec<_>>(), [1, 2]);
         let missing = NotPlanned {
             name: "odd".into(),
             strategy: "streamline".into(),

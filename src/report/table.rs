@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::canvas::shortened;
-use super::result::{NotPlanned, RunReport, ToolpathReport, ToolpathResult};
+use super::result::{NotPlanned, RunReport, ToolpathReport, ToolpathResult, time_of};
 use super::scale::plain;
 use super::verdict::Verdict;
 
@@ -203,11 +203,18 @@ pub fn conclusion(report: &RunReport) -> String {
             "" => "Every tolerance holds.".to_owned(),
             scope => format!("Every tolerance holds {scope}."),
         },
-        (Some(best), all) => format!(
-            "{passing} of {all} toolpaths hold every tolerance. Fastest: {}, {}.",
-            best.name,
-            duration(best.path.machining_time_s)
-        ),
+        (Some(best), all) => {
+            let hold = format!("{passing} of {all} toolpaths hold every tolerance.");
+            let is_best = |t: &ToolpathReport| t.measured().is_some_and(|t| t.name == best.name);
+            match report.chains().find(|chain| chain.last().is_some_and(is_best)) {
+                Some(chain) if chain.len() < all => {
+                    let names = chain.iter().filter_map(ToolpathReport::measured).map(|t| t.name.as_str());
+                    let names = names.collect::<Vec<_>>().join(" and ");
+                    format!("{hold} Fastest: {names}, {}.", duration(time_of(chain)))
+                }
+                _ => hold,
+            }
+        }
     }
 }
 

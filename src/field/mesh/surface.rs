@@ -104,7 +104,7 @@ impl FieldMesh {
                 return wrong(format!("triangle {t} has no area"));
             }
         }
-        let neighbours = neighbours_of(&triangles)?;
+        let neighbours = neighbours_of(&points, &triangles)?;
         let (starts, around) = around_vertices(points.len(), &triangles);
         if let Some(v) = starts.windows(2).position(|s| s[0] == s[1]) {
             return wrong(format!("vertex {v} belongs to no triangle"));
@@ -296,7 +296,7 @@ fn frame(normal: &Vector3) -> [Vector3; 2] {
     [first, normal.cross(&first)]
 }
 
-fn neighbours_of(triangles: &[[u32; 3]]) -> Result<Vec<[u32; 3]>, MeshFieldError> {
+fn neighbours_of(points: &[Point3], triangles: &[[u32; 3]]) -> Result<Vec<[u32; 3]>, MeshFieldError> {
     let mut sides: Vec<(u32, u32, u32)> = Vec::with_capacity(3 * triangles.len());
     for (t, corners) in triangles.iter().enumerate() {
         for k in 0..3 {
@@ -315,9 +315,14 @@ fn neighbours_of(triangles: &[[u32; 3]]) -> Result<Vec<[u32; 3]>, MeshFieldError
             let ((t, k), (u, l)) = (at(0), at(1));
             if same > 2 || triangles[t][k] == triangles[u][l] {
                 let reason = if same > 2 { "more than two triangles" } else { "two triangles on one side" };
+                let place = |v: u32| {
+                    let p = points[v as usize];
+                    format!("x {:.3} y {:.3} z {:.3}", p.x, p.y, p.z)
+                };
                 return Err(MeshFieldError::Mesh(format!(
-                    "the edge between vertices {} and {} has {reason}",
-                    sides[first].0, sides[first].1
+                    "the edge from {} to {} has {reason}: no field goes on across it; `strategy = \"zigzag\"` needs none",
+                    place(sides[first].0),
+                    place(sides[first].1)
                 )));
             }
             neighbours[t][k] = u as u32;

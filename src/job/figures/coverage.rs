@@ -71,7 +71,7 @@ fn covered(scope: &str) -> &str {
 fn judged(run: &Run<'_>, unseen: &Unseen) -> Vec<Claim> {
     let measured = &unseen.measurement;
     let (limits, rule) = (&run.scene().tolerance, &run.scene().scallop_rule);
-    let (_, mut claims) = judge::judge(measured, limits, rule, Vec::new(), run.path().program_name());
+    let mut claims = judge::judge(measured, limits, rule, Vec::new(), run.path().program_name());
     for claim in &mut claims {
         if claim.what == "uncut" && unseen.never_cut {
             let at = measured

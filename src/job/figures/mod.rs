@@ -23,7 +23,7 @@ mod solid;
 mod turning;
 mod words;
 
-use report::{Claim, Figure, FigureFile, Verdict};
+use report::{Claim, Figure, FigureFile};
 use work::monitor::{self, Monitor};
 
 pub(crate) use least_left::LeastLeftFigures;
@@ -82,18 +82,18 @@ pub(crate) fn all(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Found, JobErro
     Ok(found)
 }
 
-/// Material that a toolpath leaves for the next one is no fault of it: those limits are the last one's.
-pub(crate) fn before_others(mut claims: Vec<Claim>) -> (Verdict, Vec<Claim>) {
-    claims.retain(|claim| !["uncut", "scallop"].contains(&claim.what));
-    (claims.iter().map(Claim::verdict).max().unwrap_or(Verdict::Undecided), claims)
+/// Material that a toolpath leaves for the next one is no fault of it: those limits, which come second, are the last one's.
+pub(crate) fn before_others(claims: Vec<Claim>) -> [Vec<Claim>; 2] {
+    let (left, own) = claims.into_iter().partition(|claim| ["uncut", "scallop"].contains(&claim.what));
+    [own, left]
 }
 
 /// Limits of material that is left, where other tools of a program may have cut it: they are not violated for sure.
-pub(crate) fn with_other_tools(mut claims: Vec<Claim>) -> (Verdict, Vec<Claim>) {
+pub(crate) fn with_other_tools(mut claims: Vec<Claim>) -> Vec<Claim> {
     let decided_by = "the other tools of the program may cut there, and each tool is measured by itself";
     let left = |claim: &&mut Claim| ["uncut", "scallop"].contains(&claim.what);
     for claim in claims.iter_mut().filter(left) {
         removal::doubt(std::slice::from_mut(claim), decided_by);
     }
-    (claims.iter().map(Claim::verdict).max().unwrap_or(Verdict::Undecided), claims)
+    claims
 }

@@ -9,7 +9,8 @@ use metrology::{
 const STRICT: ScallopRule = ScallopRule { share: 1.0, highest: 1.0 };
 
 fn judged(measured: &Measurement, rule: &ScallopRule) -> (Verdict, Vec<Claim>) {
-    judge(measured, &LIMITS, rule, Vec::new(), "toolpath.nc")
+    let claims = judge(measured, &LIMITS, rule, Vec::new(), "toolpath.nc");
+    (verdict_by(&claims), claims)
 }
 
 /// Kinds of limits with their verdicts, those that hold left out.
@@ -216,7 +217,8 @@ fn a_gouge_names_move_and_line() {
 fn what_figures_found_comes_by_its_gravity_and_fails() {
     let found = |what, gravity| Claim::length(what, gravity, 0.0, 1.0, 0.0);
     let all = vec![found("wall", Gravity::Scrap), found("collision", Gravity::Crash)];
-    let (verdict, claims) = judge(&measurement(0.0), &LIMITS, &STRICT, all, "toolpath.nc");
+    let claims = judge(&measurement(0.0), &LIMITS, &STRICT, all, "toolpath.nc");
+    let verdict = verdict_by(&claims);
     let kinds: Vec<&str> = claims.iter().map(|c| c.what).collect();
     assert_eq!((verdict, kinds), (Verdict::Fail, vec!["collision", "wall", "gouge", "uncut", "scallop"]));
     assert_eq!(judged(&measurement(0.0), &STRICT).0, Verdict::Pass);

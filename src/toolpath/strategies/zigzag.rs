@@ -4,19 +4,25 @@
 //! distance Δ apart lie `Δ/√(1 − (n·e)²)` apart on the surface of the cutter's centres, `e` the
 //! plan direction across the feed; that surface is the part's offset, where lengths across the
 //! feed are `1 − κ r` times those on the part.
+//!
+//! Of meshes with creases the facets tell the stepover: a smooth surface over a crease bends as no face of the part does. What is
+//! left at creases is measured, and corrected there.
 
 use std::fmt::{self, Write as _};
 
 use crate::levels::level_passes::along_levels_placed;
 use crate::levels::spacing::LevelSteps;
+use crate::strategies::mesh_passes::width_at;
 use crate::surface::border::Border;
 use crate::surface::chart::{Chart, ChartPoint};
+use crate::surface::mesh_surface::{reachable, wants_mesh};
 use crate::surface::plan_curve::PlanCurves;
 use crate::vocabulary::{Definition, PartKind, Passes, PlanError, Reading, Step, Strategy, Task};
 use cutter::Cutter;
 use drop_cutter::DropCutter;
 use field::ScalarField;
-use geometry::Vector2;
+use field::mesh::Bend;
+use geometry::{Vector2, Vector3};
 use keys::{SceneError, toml_number};
 use work::monitor;
 
@@ -118,7 +124,10 @@ fn passes(task: &Task<'_>, angle: f64) -> Result<Passes, PlanError> {
     let dropped = task.dropped();
     let stepover = match settings.step {
         Step::Stepover(s) => s,
-        Step::Scallop(h) => safe_stepover(&charts, [cutter, dropped], angle, h, &mut notes),
+        Step::Scallop(h) => {
+            let ground = Ground::of(task, || places(&charts), h)?;
+            safe_stepover(&ground, [cutter, dropped], angle, h, &mut notes)
+        }
     };
     let (along, across) = (Vector2::new(angle.cos(), angle.sin()), Vector2::new(-angle.sin(), angle.cos()));
     let extent = |e: &Vector2| Chart::extent_of_axes(&charts, part, dropped, e);
@@ -165,11 +174,15 @@ fn best(task: &Task<'_>) -> Result<Passes, PlanError> {
     let places = places(&charts);
     let angle = |k: usize| std::f64::consts::PI * k as f64 / ANGLES as f64;
     let dropped = task.dropped();
+    let ground = match settings.step {
+        Step::Stepover(_) => Ground::Facets(Vec::new()),
+        Step::Scallop(h) => Ground::of(task, || places.clone(), h)?,
+    };
     let mut predicted: Vec<(f64, usize)> = work::parallel::map(ANGLES, |k| {
         let stepover = match settings.step {
             Step::Stepover(s) => s,
             Step::Scallop(h) => {
-                let least = least_stepover(&places, [cutter, dropped], angle(k), h);
+                let least = ground.least_stepover([cutter, dropped], angle(k), h);
                 if least.is_finite() {
                     least.max(least_over_plane(cutter, h))
                 } else {
@@ -235,31 +248,87 @@ pub(crate) fn stepover_at(
     angle: f64,
     h: f64,
 ) -> Option<f64> {
-    let e = Vector2::new(-angle.sin(), angle.cos());
     let t = p.tangent_at(angle)?;
-    let (width, too_concave) = p.strip_width(cutter, &t, Step::Scallop(h));
-    let curvature = p.curvature_along(&p.normal.cross(&t));
+    let strip = p.strip_width(cutter, &t, Step::Scallop(h));
+    in_plan(strip, p.curvature_along(&p.normal.cross(&t)), &p.normal, dropped, angle)
+}
+
+/// The plan-view stepover of a strip's width, limited or not, on a surface that bends by `curvature` across the feed.
+fn in_plan(
+    (width, too_concave): (f64, bool),
+    curvature: f64,
+    normal: &Vector3,
+    dropped: &Cutter,
+    angle: f64,
+) -> Option<f64> {
+    let e = Vector2::new(-angle.sin(), angle.cos());
     let bend = 1.0 - curvature * dropped.corner_radius();
     // Passes lie evenly apart in the plan view: across the chord of the strip, not along it.
     let half = 0.5 * curvature * width;
     let chord = if half.abs() < 1e-4 { 1.0 - half * half / 6.0 } else { half.sin() / half };
-    let lean = (1.0 - p.normal.xy().dot(&e).powi(2)).max(0.0).sqrt();
+    let lean = (1.0 - normal.xy().dot(&e).powi(2)).max(0.0).sqrt();
     (bend > 0.0 && !too_concave).then_some(width * chord * bend * lean)
 }
 
-fn least_stepover(places: &[(ChartPoint, f64)], cutters: [&Cutter; 2], angle: f64, h: f64) -> f64 {
-    places.iter().filter_map(|(p, _)| stepover_at(p, cutters, angle, h)).fold(f64::INFINITY, f64::min)
+/// Where the stepover is computed.
+enum Ground<'a> {
+    /// Places of charts.
+    Charts(Vec<(ChartPoint<'a>, f64)>),
+    /// Facets by their normals, and how the surface bends there.
+    Facets(Vec<(Vector3, Bend)>),
+}
+
+impl<'a> Ground<'a> {
+    /// The facets of a mesh with creases; the places of charts otherwise.
+    fn of(
+        task: &Task<'_>,
+        places: impl FnOnce() -> Vec<(ChartPoint<'a>, f64)>,
+        h: f64,
+    ) -> Result<Self, PlanError> {
+        let Task { part, cutter, .. } = *task;
+        if !part.patches().is_empty() || !wants_mesh(part, cutter) {
+            return Ok(Self::Charts(places()));
+        }
+        let Ok(reached) = reachable(part, cutter, (8.0 * h * cutter.radius()).sqrt()) else {
+            return Ok(Self::Charts(places()));
+        };
+        let facets = reached.pieces.iter().flat_map(|piece| {
+            (0..piece.mesh.triangles().len()).filter_map(|t| {
+                let normal = piece.mesh.area_vector(t).try_normalize(1e-300).filter(|n| n.z > 0.0)?;
+                let mut bend = Bend::default();
+                piece.mesh.triangles()[t].iter().for_each(|&v| bend.add(&piece.bends[v as usize], 1.0 / 3.0));
+                Some((normal, bend))
+            })
+        });
+        Ok(Self::Facets(facets.collect()))
+    }
+
+    fn least_stepover(&self, cutters: [&Cutter; 2], angle: f64, h: f64) -> f64 {
+        let least = |all: &mut dyn Iterator<Item = f64>| all.fold(f64::INFINITY, f64::min);
+        match self {
+            Self::Charts(places) => {
+                least(&mut places.iter().filter_map(|(p, _)| stepover_at(p, cutters, angle, h)))
+            }
+            Self::Facets(facets) => least(&mut facets.iter().filter_map(|(normal, bend)| {
+                let flat = Vector3::new(angle.cos(), angle.sin(), 0.0);
+                let t = (flat - Vector3::z() * (normal.dot(&flat) / normal.z)).normalize();
+                let b = normal.cross(&t);
+                let strip = width_at(cutters[0], normal, &b, bend, Step::Scallop(h));
+                in_plan(strip, bend.along(&b), normal, cutters[1], angle)
+            })),
+        }
+    }
 }
 
 /// The greatest stepover that keeps the scallop everywhere.
 fn safe_stepover(
-    charts: &[Chart],
+    ground: &Ground<'_>,
     cutters: [&Cutter; 2],
     angle: f64,
     h: f64,
     notes: &mut Vec<String>,
 ) -> f64 {
-    let least = least_stepover(&places(charts), cutters, angle, h);
+    let least = ground.least_stepover(cutters, angle, h);
     let floor = least_over_plane(cutters[0], h);
     if least.is_finite() && least >= floor {
         return least;
