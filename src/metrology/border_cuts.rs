@@ -63,7 +63,7 @@ struct BorderCut {
 /// The deepest cut along a piece of a border.
 struct Deepest {
     cut: BorderCut,
-    /// Whether it is so deep because what is left is no farther off.
+    /// Whether nothing is cut there as far inside as counts as near.
     is_near: bool,
 }
 
@@ -320,7 +320,7 @@ impl Inspection<'_> {
         let least = self.limits.shallow();
         // What a border bends by between two places spoils concavity by as much; it falls with the square of their distance.
         let bend = 3.0 * piece.bend;
-        let mut best: Option<(f64, f64)> = None;
+        let mut best: Option<(f64, f64, bool)> = None;
         let mut left = f64::NEG_INFINITY;
         let shares = [0.0, nearest, 1.0];
         let values = shares.map(value);
@@ -328,13 +328,13 @@ impl Inspection<'_> {
             (0..2).map(|k| (shares[k], values[k], shares[k + 1], values[k + 1], MOST_HALVINGS)).collect();
         // Returns the depth of the deepest place, and the cut of this one where it lies on a ridge.
         let mut keep = |share: f64, found: Option<PlaceDepth>| {
-            let most = best.map_or(known, |(most, _)| most.max(known));
+            let most = best.map_or(known, |(most, ..)| most.max(known));
             let Some(PlaceDepth { along, inside }) = found else { return (most, None) };
             let along = counted(along, inside);
             let ridge = if along > most.max(least) { on_ridge(share, along) } else { None };
             let depth = ridge.map_or(along, |cut| -cut.distance);
-            if best.is_none_or(|(most, _)| depth > most) {
-                best = Some((depth, share));
+            if best.is_none_or(|(most, ..)| depth > most) {
+                best = Some((depth, share, inside <= 0.0));
             }
             (most.max(depth), ridge)
         };
@@ -376,7 +376,7 @@ impl Inspection<'_> {
                 open.push((m, at_m, b, at_b, halvings - 1));
             }
         }
-        let (found, share) = best?;
+        let (found, share, is_near) = best?;
         let possible = left.max(found);
         if possible <= known {
             return None;
@@ -390,7 +390,7 @@ impl Inspection<'_> {
         }
         let of_walls = |depth: f64| self.walls.map_or(depth, |walls| -walls.beside(&point, -depth.max(0.0)));
         let cut = BorderCut { depth: of_walls(found), possible: of_walls(possible), at: point, by };
-        Some(Deepest { cut, is_near: found == nearest_left })
+        Some(Deepest { cut, is_near })
     }
 }
 
