@@ -133,10 +133,7 @@ fn off_distance(lofts: &[Loft], sections: &[LoftSection], distance: f64) -> f64 
         let outline: Vec<Point2> =
             section.curve.within_chord(1e-6).iter().map(|&t| section.curve.point(t)).collect();
         let nearest = |p: Point2| {
-            let to_side = |w: &[Point2]| {
-                let d = w[1] - w[0];
-                (p - (w[0] + d * ((p - w[0]).dot(&d) / d.norm_squared()).clamp(0.0, 1.0))).norm()
-            };
+            let to_side = |w: &[Point2]| geometry::distance_to_segment(&p, &w[0], &w[1]);
             outline.windows(2).map(to_side).fold(f64::INFINITY, f64::min)
         };
         for loft in lofts {
