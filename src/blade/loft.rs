@@ -26,7 +26,7 @@ use geometry::{
     Point3, interpolate, signed_area,
 };
 use offset::CurveOffsetError;
-use offset::curve_offset::distance_from;
+use offset::distance_from;
 
 /// Spans along the sections at first.
 const FIRST_SPANS: usize = 16;

@@ -7,7 +7,7 @@ use super::piece::{Convex, NearPlace, Sample, ToolPiece};
 use super::sweep::Moving;
 use super::{LeastClearance, Obstacle};
 use cutter::Solid;
-use geometry::{Isometry3, Point3, TriangleMesh, Vector3};
+use geometry::{Aabb, Isometry3, Point3, TriangleMesh, Vector3};
 use motion::ClPoint;
 use nalgebra::{Rotation3, Translation3, UnitQuaternion, UnitVector3};
 use work::monitor::{Cancelled, Monitor};
@@ -86,11 +86,8 @@ impl Body {
     pub fn mesh(&self) -> Option<(TriangleMesh, f64)> {
         let (vertices, triangles, off) = match &self.form {
             Form::Block(half) => {
-                let side = |i: u32, axis: usize| half[axis] * (f64::from(i >> axis & 1) * 2.0 - 1.0);
-                let vertices = (0..8).map(|i| Point3::new(side(i, 0), side(i, 1), side(i, 2))).collect();
-                let quads =
-                    [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-                let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+                let (vertices, triangles) =
+                    Aabb { min: half.map(|x| -x).into(), max: (*half).into() }.surface();
                 (vertices, triangles, 0.0)
             }
             Form::Round(solid) if self.middle.z > 0.0 => {

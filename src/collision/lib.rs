@@ -77,11 +77,6 @@ impl<'a> Obstacle<'a> {
         best
     }
 
-    /// Whether the mesh comes nearer than `limit`, mm: as [`Obstacle::clearance`], but ends at the first such place.
-    pub fn is_nearer(&self, solid: &Solid, at: &ClPoint, limit: f64) -> bool {
-        self.some_nearer(solid, at, limit).is_some()
-    }
-
     /// The first piece and triangle that are found to be nearer to each other than `limit`, mm.
     fn some_nearer(&self, solid: &Solid, at: &ClPoint, limit: f64) -> Option<(usize, usize)> {
         (0..solid.pieces()).find_map(|index| {

@@ -2,7 +2,7 @@
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use cutter::{AptWords, Cutter, Holder, HolderSection, Solid};
-use geometry::{Bvh, Point3, TriangleMesh, Vector3};
+use geometry::{Aabb, Bvh, Point3, TriangleMesh, Vector3};
 
 /// Deterministic numbers (xorshift64*, Vigna 2016).
 pub struct Numbers(pub u64);
@@ -38,10 +38,8 @@ pub fn mesh(vertices: Vec<Point3>, triangles: Vec<[u32; 3]>) -> (TriangleMesh, B
 
 /// A box with its outside outward.
 pub fn block(low: [f64; 3], high: [f64; 3]) -> (TriangleMesh, Bvh) {
-    let pick = |i: usize, axis: usize| if i >> axis & 1 == 1 { high[axis] } else { low[axis] };
-    let vertices = (0..8).map(|i| Point3::new(pick(i, 0), pick(i, 1), pick(i, 2))).collect();
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    mesh(vertices, quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect())
+    let (vertices, triangles) = Aabb { min: low.into(), max: high.into() }.surface();
+    mesh(vertices, triangles)
 }
 
 /// A height field over a square, `n` quads a side.

@@ -57,7 +57,7 @@ fn planes_spheres_and_corners_have_closed_forms() {
     let beside = cube.clearance(&ball, &ClPoint::upright(Point3::new(8.0, 9.0, -8.0)), 10.0).unwrap();
     close(beside.distance, 2.0);
     assert!(cube.clearance(&ball, &ClPoint::upright(Point3::new(8.0, 9.0, -8.0)), 2.0).is_none());
-    assert!(cube.is_nearer(&ball, &ClPoint::upright(Point3::new(8.0, 9.0, -8.0)), 2.000_001));
+    assert!(cube.some_nearer(&ball, &ClPoint::upright(Point3::new(8.0, 9.0, -8.0)), 2.000_001).is_some());
 }
 
 #[test]
@@ -88,8 +88,8 @@ fn brute_force_by_division_finds_the_same() {
             "{round}: {} {least}",
             hit.distance
         );
-        assert!(Obstacle::new(&mesh, &tree).is_nearer(solid, &at, hit.distance + 1e-8));
-        assert!(!Obstacle::new(&mesh, &tree).is_nearer(solid, &at, hit.distance - 1e-8));
+        assert!(Obstacle::new(&mesh, &tree).some_nearer(solid, &at, hit.distance + 1e-8).is_some());
+        assert!(Obstacle::new(&mesh, &tree).some_nearer(solid, &at, hit.distance - 1e-8).is_none());
     }
     assert!((300..1700).contains(&inside), "{inside} of 2000 inside");
 }

@@ -127,11 +127,6 @@ impl Cutter {
         self.profile.radius
     }
 
-    /// Distance from the axis at which the arc ends and the cone or the cylinder begins.
-    pub fn arc_end_radius(&self) -> f64 {
-        self.profile.arc_end
-    }
-
     /// Height of the cutting surface above the tip at distance `rho >= 0` from the axis; `None`
     /// beyond the cutter's radius.
     pub fn height(&self, rho: f64) -> Option<f64> {
@@ -162,7 +157,7 @@ mod tests {
         assert_eq!(bull.height(2.0), Some(0.0));
         assert_eq!(bull.height(3.0), Some(1.0));
         let taper = Cutter::taper(2.0, 1.0, 10f64.to_radians(), 6.0).unwrap();
-        let end = taper.arc_end_radius();
+        let end = taper.profile.arc_end;
         let (below, above) = (taper.height(end - 1e-9).unwrap(), taper.height(end + 1e-9).unwrap());
         assert!((below - above).abs() < 2e-8, "arc and cone meet: {below} {above}");
         // The cone is tangent to the arc: slope 1/tan(alpha) on both sides.

@@ -1,8 +1,6 @@
 //! What holds the cutter and must not touch the part: the shank above the cutting length and the
 //! stacked sections of the holder. mm, heights above the tip.
 
-use super::profile::{Incline, Profile};
-
 /// Lengths and diameters from this on are no holder's, mm.
 const GREATEST: f64 = 1.0e4;
 
@@ -73,28 +71,6 @@ impl Holder {
     pub fn sections(&self) -> &[HolderSection] {
         &self.sections
     }
-
-    /// For each section the height above the tip at which it begins, mm, and its profile from there,
-    /// pushed outward by `growth` mm, but not downward. A section that narrows upward is, seen from
-    /// below, its lower disc.
-    pub fn profiles(&self, growth: f64) -> Vec<(f64, Profile)> {
-        let mut begins = self.cutting_length;
-        let of = |section: &HolderSection| {
-            let low = 0.5 * section.diameter;
-            let top = low.max(0.5 * section.top_diameter);
-            let side = if top > low {
-                let slant = (top - low).hypot(section.length);
-                Incline { sin: section.length / slant, cos: (top - low) / slant }
-            } else {
-                Incline::UPRIGHT
-            };
-            let profile = Profile::tangent(Incline::LEVEL, [low + growth, 0.0], 0.0, side, top + growth);
-            let at = begins;
-            begins += section.length;
-            (at, profile)
-        };
-        self.sections.iter().map(of).collect()
-    }
 }
 
 #[cfg(test)]
@@ -106,20 +82,6 @@ mod tests {
         HolderSection { diameter: 20.0, top_diameter: 30.0, length: 15.0 },
         HolderSection { diameter: 50.0, top_diameter: 40.0, length: 30.0 },
     ];
-
-    #[test]
-    fn sections_stack_up_and_keep_their_slant() {
-        let holder = Holder::new(10.0, SECTIONS.to_vec()).unwrap();
-        let profiles = holder.profiles(0.0);
-        assert_eq!(profiles.iter().map(|p| p.0).collect::<Vec<_>>(), [10.0, 30.0, 45.0]);
-        assert_eq!(profiles.iter().map(|p| p.1.radius).collect::<Vec<_>>(), [3.0, 15.0, 25.0]);
-        let cone = profiles[1].1;
-        assert_eq!(cone.height(10.0), 0.0);
-        assert!((cone.height(12.5) - 7.5).abs() < 1e-12 && (cone.height(15.0) - 15.0).abs() < 1e-12);
-        assert_eq!(profiles[2].1.height(25.0), 0.0, "narrowing upward, it is its disc");
-        let grown = holder.profiles(0.5)[1].1;
-        assert!((grown.height(13.0) - 7.5).abs() < 1e-12 && grown.radius == 15.5);
-    }
 
     #[test]
     fn impossible_holders_are_refused() {

@@ -1,7 +1,7 @@
 use super::touch::Profile;
 use super::*;
 use cutter::AptWords;
-use geometry::{Point3, Vector3};
+use geometry::{Aabb, Point3, Vector3};
 
 mod exact;
 mod grid;
@@ -314,10 +314,8 @@ fn the_tree_leaves_no_better_triangle_out() {
 #[test]
 fn no_cutter_cuts_into_a_vertical_wall_or_a_needle() {
     // A box with vertical walls on a plate: the walls carry the cutter with their top edges.
-    let corner = |i: u32| Point3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)) * 10.0;
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-    let mesh = mesh_of((0..8).map(corner).collect(), triangles);
+    let (corners, triangles) = Aabb { min: Point3::origin(), max: Point3::new(10.0, 10.0, 10.0) }.surface();
+    let mesh = mesh_of(corners, triangles);
     let bvh = Bvh::new(&mesh);
     for cutter in cutters() {
         let drops = dropper(&mesh, &bvh, &cutter);

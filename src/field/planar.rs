@@ -217,12 +217,9 @@ impl PlanarMesh {
         for &t in triangles {
             let mut corners = high(t);
             let Some(first) = corners.next() else { continue };
-            let a = root(&mut parent, first);
             for v in corners {
-                let b = root(&mut parent, v);
-                let (lo, hi) = (a.min(b), a.max(b));
-                let lo = root(&mut parent, lo);
-                parent.insert(hi, lo);
+                let (a, b) = (root(&mut parent, first), root(&mut parent, v));
+                parent.insert(a.max(b), a.min(b));
             }
         }
         let mut place: HashMap<u32, usize> = HashMap::new();
@@ -323,6 +320,14 @@ mod tests {
         };
         let (coarse, fine) = (error(1.6), error(0.8));
         assert!(fine < 0.03 && coarse / fine > 2.5, "{coarse} {fine}");
+    }
+
+    #[test]
+    fn a_corner_that_joined_its_triangle_first_stays_joined() {
+        let triangles = vec![[10, 5, 7], [5, 0, 1]];
+        let mesh = PlanarMesh { points: Vec::new(), triangles, wall: Vec::new(), sides: Vec::new() };
+        let values: Vec<f64> = (0..11).map(|v| if v >= 5 { 1.0 } else { 0.0 }).collect();
+        assert_eq!(mesh.above(&values, 0.5, &[0, 1]), [[0, 1]]);
     }
 
     #[test]

@@ -40,6 +40,14 @@ impl Aabb {
         Self { min: self.min.inf(&other.min), max: self.max.sup(&other.max) }
     }
 
+    /// The corners, and the triangles of the faces, outward.
+    pub fn surface(&self) -> (Vec<Point3>, Vec<[u32; 3]>) {
+        let pick = |k: usize, axis: usize| if k >> axis & 1 == 1 { self.max[axis] } else { self.min[axis] };
+        let corners = (0..8).map(|k| Point3::new(pick(k, 0), pick(k, 1), pick(k, 2))).collect();
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        (corners, quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect())
+    }
+
     /// Edge lengths.
     pub fn size(&self) -> super::Vector3 {
         self.max - self.min

@@ -181,7 +181,7 @@ impl CubicSpline {
 
     /// Cumulated lengths of the chords between `points`, mm, from 0; when `closed` one more entry, for the
     /// chord from the last point to the first.
-    pub fn chord_lengths(points: &[Point2], closed: bool) -> Vec<f64> {
+    pub fn chord_lengths<const D: usize>(points: &[nalgebra::Point<f64, D>], closed: bool) -> Vec<f64> {
         let back = points.first().filter(|_| closed);
         let ends = points.iter().skip(1).chain(back);
         let chords = points.iter().zip(ends).map(|(from, to)| (to - from).norm());
@@ -741,7 +741,7 @@ mod tests {
                 other => panic!("{other:?}"),
             }
         }
-        assert_eq!(CubicSpline::chord_lengths(&[], true), Vec::<f64>::new());
+        assert_eq!(CubicSpline::chord_lengths::<2>(&[], true), Vec::<f64>::new());
         let spline = closed_through(square);
         assert!(spline.point(f64::NAN).coords.norm().is_finite());
         assert!(spline.arc_length().at(f64::INFINITY).is_finite());

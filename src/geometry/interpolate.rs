@@ -68,12 +68,6 @@ pub struct InterpolationAxis {
 }
 
 impl InterpolationAxis {
-    /// Points at Greville's averages of any knots, which every spline space can interpolate.
-    pub fn at_averages(knots: KnotVector) -> Option<Self> {
-        let sites = knots.averages().map(|u| knots.clamp(u)).collect();
-        Self::clamped(knots, sites)
-    }
-
     /// Points at strictly ascending `sites`, knots their running averages (Piegl & Tiller eq. 9.8).
     ///
     /// # Errors
@@ -244,25 +238,6 @@ mod tests {
                     prop_assert!(close(a.dv, b.dv) && close(a.duv, b.duv) && close(a.dvv, b.dvv));
                 }
             }
-        }
-    }
-
-    #[test]
-    fn averages_of_repeated_knots_interpolate() {
-        let knots = vec![0., 0., 0., 0., 1., 1., 1.5, 2., 2., 2., 3., 3., 3., 3.];
-        let u = InterpolationAxis::at_averages(KnotVector::new(3, knots, 10).unwrap()).unwrap();
-        let v =
-            InterpolationAxis::at_averages(KnotVector::clamped_uniform(1, 2, [0.0, 1.0]).unwrap()).unwrap();
-        let points: Vec<Vec<Point3>> = u
-            .sites()
-            .iter()
-            .map(|&t| vec![Point3::new(t * t * t, t, 0.0), Point3::new(-t * t, 1.0, t)])
-            .collect();
-        let s = interpolate(&u, &v, &points).unwrap();
-        for k in 0..=30 {
-            let t = 0.1 * f64::from(k);
-            assert!((s.point(t, 0.0) - Point3::new(t * t * t, t, 0.0)).norm() < 1e-12);
-            assert!((s.point(t, 1.0) - Point3::new(-t * t, 1.0, t)).norm() < 1e-12);
         }
     }
 

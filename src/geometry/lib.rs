@@ -25,6 +25,7 @@ mod region_index;
 #[doc(hidden)]
 pub mod samples;
 mod segment_grid;
+pub mod sheets;
 mod tessellate;
 
 pub use aabb::Aabb;
@@ -41,9 +42,11 @@ pub use mesh::{MeshError, Outside, RepairNotes, TriangleMesh};
 pub use normal::{inward, normal_at, unit_normal};
 pub use nurbs::{MAX_WEIGHT, NurbsError, NurbsSurface};
 pub use polytope::{HalfSpace, Polytope};
-pub use region::{MAX_OUTLINE_POINTS, Piece, Region, RegionError, first_crossing, inside_curve, signed_area};
+pub use region::{
+    MAX_OUTLINE_POINTS, Piece, Region, RegionError, clipped, first_crossing, inside_curve, signed_area,
+};
 pub use region_index::RegionIndex;
 pub use segment_grid::{
-    CurveSegment, NearestSegment, SegmentGrid, distance_of_segments, distance_to_segment, foot,
+    CurveSegment, NearestSegment, SegmentGrid, distance_of_segments, distance_to_segment, foot, share_on,
 };
 pub use tessellate::{MAX_TRIANGLES, TessellateError, Tessellation, tessellate};

@@ -245,6 +245,12 @@ impl TriangleMesh {
         &self.triangles
     }
 
+    /// Area of triangle `t`, mm².
+    pub fn area(&self, t: usize) -> f64 {
+        let [a, b, c] = self.corners(t);
+        0.5 * (b - a).cross(&(c - a)).norm()
+    }
+
     /// The three corners of triangle `t`.
     #[inline]
     pub fn corners(&self, t: usize) -> [Point3; 3] {

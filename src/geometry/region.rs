@@ -443,19 +443,28 @@ fn shrunk_convex(curve: &[Point2], distance: f64) -> Option<Vec<[f64; 2]>> {
     for k in 0..n {
         let Some(along) = side(k).try_normalize(0.0) else { continue };
         let inside = |p: &Point2| along.perp(&(p - curve[k])) - by;
-        let before = std::mem::take(&mut left);
-        for (i, a) in before.iter().enumerate() {
-            let b = &before[(i + 1) % before.len()];
-            let (at_a, at_b) = (inside(a), inside(b));
-            if at_a >= 0.0 {
-                left.push(*a);
-            }
-            if (at_a < 0.0) != (at_b < 0.0) {
-                left.push(a + (b - a) * (at_a / (at_a - at_b)));
-            }
-        }
+        left = clipped(&left, inside);
     }
     Some(left.into_iter().map(|p| [p.x, p.y]).collect())
+}
+
+/// What of a polygon lies where `inside`, linear in the place, is 0 or more (I. Sutherland and G. Hodgman 1974).
+pub fn clipped<const D: usize>(
+    polygon: &[nalgebra::Point<f64, D>],
+    inside: impl Fn(&nalgebra::Point<f64, D>) -> f64,
+) -> Vec<nalgebra::Point<f64, D>> {
+    let mut kept = Vec::with_capacity(polygon.len() + 1);
+    for (k, a) in polygon.iter().enumerate() {
+        let b = &polygon[(k + 1) % polygon.len()];
+        let (from, to) = (inside(a), inside(b));
+        if from >= 0.0 {
+            kept.push(*a);
+        }
+        if (from < 0.0) != (to < 0.0) {
+            kept.push(a + (b - a) * (from / (from - to)));
+        }
+    }
+    kept
 }
 
 /// The rectangle around a curve, counter-clockwise.

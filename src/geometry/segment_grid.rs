@@ -2,7 +2,7 @@
 //!
 //! Enters: closed curves as polylines. Leaves: distances in f64, exact but for rounding.
 
-use super::{Point2, Point3, Vector3};
+use super::Point2;
 
 /// Segments a bucket aimed at on average. More make a query scan longer lists, fewer more empty buckets.
 const SEGMENTS_A_BUCKET: f64 = 1.0;
@@ -185,20 +185,33 @@ impl SegmentGrid {
     }
 }
 
-/// Distance from `p` to the segment `a`–`b`, mm.
-pub fn distance_to_segment(p: &Point3, a: &Point3, b: &Point3) -> f64 {
-    let d: Vector3 = b - a;
+/// Where on the segment `a`–`b` the place nearest to `p` is, 0 to 1; 0 where it has no length.
+pub fn share_on<const D: usize>(
+    p: &nalgebra::Point<f64, D>,
+    a: &nalgebra::Point<f64, D>,
+    b: &nalgebra::Point<f64, D>,
+) -> f64 {
+    let d = b - a;
     let length2 = d.norm_squared();
-    let t = if length2 > 0.0 { ((p - a).dot(&d) / length2).clamp(0.0, 1.0) } else { 0.0 };
-    (p - (a + d * t)).norm()
+    if length2 > 0.0 { ((p - a).dot(&d) / length2).clamp(0.0, 1.0) } else { 0.0 }
+}
+
+/// Distance from `p` to the segment `a`–`b`, mm.
+pub fn distance_to_segment<const D: usize>(
+    p: &nalgebra::Point<f64, D>,
+    a: &nalgebra::Point<f64, D>,
+    b: &nalgebra::Point<f64, D>,
+) -> f64 {
+    (p - (a + (b - a) * share_on(p, a, b))).norm()
 }
 
 /// Where on a segment the foot of `p` is (0 to 1), and how far away.
-pub fn foot(p: &Point2, ends: &[Point2; 2]) -> (f64, f64) {
-    let d = ends[1] - ends[0];
-    let length2 = d.norm_squared();
-    let t = if length2 > 0.0 { ((p - ends[0]).dot(&d) / length2).clamp(0.0, 1.0) } else { 0.0 };
-    (t, (p - (ends[0] + d * t)).norm())
+pub fn foot<const D: usize>(
+    p: &nalgebra::Point<f64, D>,
+    [a, b]: &[nalgebra::Point<f64, D>; 2],
+) -> (f64, f64) {
+    let share = share_on(p, a, b);
+    (share, (p - (a + (b - a) * share)).norm())
 }
 
 /// Distance of two segments; 0 where they cross.

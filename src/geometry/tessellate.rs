@@ -11,7 +11,7 @@
 //! its own share: hᵤ²(|S_uu·n| + a|S_uv·n|) ≤ 4ε. On the borders, where no neighbour covers what a
 //! straight edge cuts off, the whole curvature of the border counts and not its normal part alone.
 
-use super::{Jet2, Point3, Vector3};
+use super::{Jet2, Point3, Vector3, distance_to_segment};
 use work::parallel;
 
 /// Greatest number of triangles of one tessellation. More costs gigabytes and seconds where a
@@ -442,13 +442,6 @@ impl Net {
 fn is_degenerate([a, b, c]: &[Point3; 3]) -> bool {
     let longest = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
     (b - a).cross(&(c - a)).norm() <= LEAST_HEIGHT * longest
-}
-
-fn distance_to_segment(p: &Point3, a: &Point3, b: &Point3) -> f64 {
-    let along = b - a;
-    let square = along.norm_squared();
-    let t = if square > 0.0 { ((p - a).dot(&along) / square).clamp(0.0, 1.0) } else { 0.0 };
-    (p - (a + along * t)).norm()
 }
 
 #[cfg(test)]

@@ -81,11 +81,7 @@ mod tests {
 
     /// The distance of a place from a path.
     fn distance(path: &Toolpath, place: &Point3) -> f64 {
-        let of_one = |(a, b, _): (Point3, Point3, &Move)| {
-            let way = b - a;
-            let share = ((place - a).dot(&way) / way.norm_squared().max(1e-30)).clamp(0.0, 1.0);
-            (place - (a + way * share)).norm()
-        };
+        let of_one = |(a, b, _): (Point3, Point3, &Move)| geometry::distance_to_segment(place, &a, &b);
         path.segments().map(of_one).fold(f64::INFINITY, f64::min)
     }
 

@@ -110,18 +110,15 @@ mod tests {
     use super::*;
     use crate::flat_scene::gouge_of;
     use cutter::Cutter;
-    use geometry::TriangleMesh;
+    use geometry::{Aabb, TriangleMesh};
 
     #[test]
     fn the_ball_beneath_is_half_a_slab_or_the_whole_depth() {
         // A slab 2 mm thick; thick ground beside it is asked on its own.
         let slab = |thick: f64| {
-            let corner = |i: u32| {
-                Point3::new(20.0 * f64::from(i & 1), 20.0 * f64::from(i >> 1 & 1), thick * f64::from(i >> 2))
-            };
-            let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-            let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-            Part::from_mesh(TriangleMesh::new((0..8).map(corner).collect(), triangles).unwrap().0)
+            let block = Aabb { min: Point3::origin(), max: Point3::new(20.0, 20.0, thick) };
+            let (vertices, triangles) = block.surface();
+            Part::from_mesh(TriangleMesh::new(vertices, triangles).unwrap().0)
         };
         let at =
             |thick: f64, x: f64| ball_beneath(&slab(thick), &Point3::new(x, 10.0, thick), &Vector3::z(), 3.0);

@@ -18,7 +18,7 @@ use super::facing::LEAST_FACING;
 use super::figures::{GougeFigures, GougeRegion, NUMERICAL_FLOOR};
 use super::inspection::Inspection;
 use cutter::Cutter;
-use geometry::{Point2, Point3, Vector3};
+use geometry::{Point2, Point3, Vector3, share_on};
 use part::{Part, PatchPoint};
 use work::monitor::{self, Cancelled, Monitor};
 
@@ -96,8 +96,7 @@ impl BorderPiece {
     fn least_distance(&self, from: Point2, to: Point2) -> f64 {
         let [a, b] = self.ends.map(|end| end.xy());
         let (middle, way) = (a + (b - a) * 0.5, to - from);
-        let share = (middle - from).dot(&way) / way.norm_squared().max(f64::MIN_POSITIVE);
-        let nearest = from + way * share.clamp(0.0, 1.0);
+        let nearest = from + way * share_on(&middle, &from, &to);
         ((nearest - middle).norm() - 0.5 * (b - a).norm() - self.bend).max(0.0)
     }
 }
@@ -203,14 +202,10 @@ fn depth(surface: &CutSurface<'_>, by: u32, place: &Point3, normal: &Vector3) ->
 fn nearest_share(piece: &BorderPiece, from: Point2, to: Point2) -> f64 {
     const TURNS: usize = 20;
     let [a, b] = piece.ends.map(|end| end.xy());
-    let share = |[from, to]: [Point2; 2], p: Point2| {
-        let way = to - from;
-        ((p - from).dot(&way) / way.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
-    };
     let mut s = 0.5;
     for _ in 0..TURNS {
-        let there = from + (to - from) * share([from, to], a + (b - a) * s);
-        s = share([a, b], there);
+        let there = from + (to - from) * share_on(&(a + (b - a) * s), &from, &to);
+        s = share_on(&there, &a, &b);
     }
     s
 }

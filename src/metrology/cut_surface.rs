@@ -8,7 +8,7 @@
 
 use std::sync::Arc;
 
-use geometry::{Point3, Vector3};
+use geometry::{Point3, Vector3, share_on};
 use motion::Toolpath;
 use sim::{Envelope, Grid, NOT_CUT, Shape, ZMap};
 
@@ -194,10 +194,7 @@ impl<'a> CutSurface<'a> {
     /// The place of the tip on move `by` that is nearest to `tip`.
     pub fn nearest_tip(&self, by: u32, tip: &Point3) -> Point3 {
         let (from, to) = (self.path.start_of(by as usize), self.path.moves[by as usize].to.tip);
-        let along = to - from;
-        let length2 = along.norm_squared();
-        let t = if length2 > 0.0 { ((tip - from).dot(&along) / length2).clamp(0.0, 1.0) } else { 0.0 };
-        from + along * t
+        from + (to - from) * share_on(tip, &from, &to)
     }
 
     /// The pass that a cut point belongs to; `None` on stock.

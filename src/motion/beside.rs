@@ -1,6 +1,6 @@
 //! Which passes lie beside a place: for each of them the stretch, and the place on it, that comes nearest.
 
-use geometry::{BoxTree, Extent, Point3};
+use geometry::{BoxTree, Extent, Point3, foot};
 
 /// A pass is beside a place up to this many times as far off as the nearest one.
 const BESIDE: f64 = 2.0;
@@ -52,7 +52,7 @@ impl PassStretches {
                 if pass == own {
                     return best;
                 }
-                let (at, distance) = nearest_on(ends, p);
+                let (at, distance) = foot(p, &ends);
                 let one = Beside { pass, stretch, at, distance };
                 match found.iter_mut().find(|known| known.pass == pass) {
                     Some(known) if distance < known.distance => *known = one,
@@ -66,13 +66,6 @@ impl PassStretches {
         found.retain(|one| -one.distance >= reach(nearest));
         found
     }
-}
-
-/// Where on a stretch the place nearest to `p` lies, from 0 to 1, and how far off.
-fn nearest_on([a, b]: [Point3; 2], p: &Point3) -> (f64, f64) {
-    let way = b - a;
-    let at = ((p - a).dot(&way) / way.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-    (at, (a + way * at - p).norm())
 }
 
 #[cfg(test)]
@@ -94,7 +87,7 @@ mod tests {
         for (p, own) in places {
             let of_pass = |pass: u32| {
                 let its = stretches.iter().filter(|(_, other)| *other == pass);
-                its.map(|(ends, _)| nearest_on(*ends, &p).1).fold(f64::INFINITY, f64::min)
+                its.map(|(ends, _)| foot(&p, ends).1).fold(f64::INFINITY, f64::min)
             };
             let all: Vec<f64> = (0..12).filter(|pass| *pass != own).map(of_pass).collect();
             let nearest = all.iter().copied().fold(f64::INFINITY, f64::min);

@@ -5,7 +5,7 @@
 
 use crate::path::{CcPoint, ClPoint};
 use cutter::Cutter;
-use geometry::{Point3, Vector3};
+use geometry::{Point3, Vector3, share_on};
 
 /// An axis nearer to the surface than this (sine) lies along it.
 const ALONG: f64 = 1e-9;
@@ -98,15 +98,7 @@ impl ToolAxis {
 
 /// The point of a polyline nearest to `p`; `None` for an empty one.
 fn nearest(curve: &[Point3], p: &Point3) -> Option<Point3> {
-    let on = |w: &[Point3]| {
-        let d = w[1] - w[0];
-        let t = if d.norm_squared() > 0.0 {
-            ((p - w[0]).dot(&d) / d.norm_squared()).clamp(0.0, 1.0)
-        } else {
-            0.0
-        };
-        w[0] + d * t
-    };
+    let on = |w: &[Point3]| w[0] + (w[1] - w[0]) * share_on(p, &w[0], &w[1]);
     let sides = curve.windows(2).map(on);
     sides
         .chain(curve.first().copied())

@@ -87,33 +87,6 @@ pub struct OffsetPiece {
     pub closed: bool,
 }
 
-impl OffsetPiece {
-    /// The corners between stretches, the one at the start of a closed piece last.
-    pub fn corners(&self) -> Vec<Point2> {
-        let ends = self.stretches.iter().filter(|s| !s.is_closed()).map(|s| s.point(s.domain()[1]));
-        let mut corners: Vec<Point2> = ends.collect();
-        if !self.closed {
-            corners.pop();
-        }
-        corners
-    }
-
-    /// Points, corners among them, whose chords stray no more than `tolerance`, mm, from the stretches; of a
-    /// closed piece the first is not repeated.
-    pub fn polyline(&self, tolerance: f64) -> Vec<Point2> {
-        let mut points: Vec<Point2> = Vec::new();
-        for stretch in &self.stretches {
-            // A corner is the end of one stretch and the start of the next.
-            points.pop();
-            points.extend(stretch.within_chord(tolerance).iter().map(|&t| stretch.point(t)));
-        }
-        if self.closed {
-            points.pop();
-        }
-        points
-    }
-}
-
 /// The trimmed offset of a curve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CurveOffset {
@@ -158,7 +131,8 @@ fn left_of(v: &Vector2) -> Vector2 {
 }
 
 /// The offset of `curve` by `distance`, mm, positive to its left, without what is nearer to the curve than
-/// that. Its splines keep the distance within `tolerance`, mm.
+/// that. Its splines keep the distance within `tolerance`, mm. Stretches also end at the parameters `breaks` of the curve, as
+/// if corners were there.
 ///
 /// # Errors
 /// A distance or a tolerance that cannot be, a curve with a cusp, an offset of which nothing is left.
@@ -167,18 +141,6 @@ fn left_of(v: &Vector2) -> Vector2 {
 /// Kept points are nowhere nearer to the curve than the distance less `tolerance`; loops less deep than that,
 /// and stretches shorter than that, may be kept or cut off.
 pub fn offset_curve(
-    curve: &CubicSpline,
-    distance: f64,
-    tolerance: f64,
-) -> Result<CurveOffset, CurveOffsetError> {
-    offset_curve_broken(curve, distance, tolerance, &[])
-}
-
-/// As [`offset_curve`], with stretches that also end at the parameters `breaks` of the curve, as if corners were there.
-///
-/// # Errors
-/// As [`offset_curve`].
-pub fn offset_curve_broken(
     curve: &CubicSpline,
     distance: f64,
     tolerance: f64,

@@ -6,10 +6,10 @@
 //! Limits: the offset of a curve is trimmed against itself. The offset of a patch is not; its singular places are reported.
 //! The offset of a mesh loses pieces that are narrower than its cells.
 
-pub mod curve_offset;
+mod curve_offset;
 mod mesh_offset;
 mod patch_offset;
 
-pub use curve_offset::{CurveOffset, CurveOffsetError, OffsetPiece, TightPlace, offset_curve};
+pub use curve_offset::{CurveOffset, CurveOffsetError, OffsetPiece, TightPlace, distance_from, offset_curve};
 pub use mesh_offset::{LevelSet, LevelSetFoot, MeshOffset, OffsetError, OffsetSettings, Valley};
-pub use patch_offset::{FittedOffset, OffsetJet, OffsetSurface, PatchOffsetError, SingularPlace};
+pub use patch_offset::{OffsetSurface, PatchOffsetError, SingularPlace};

@@ -148,17 +148,6 @@ impl Part {
         self.signs[patch]
     }
 
-    /// As [`Part::point_and_normal`], with the triangle of the mesh that lies there (which takes a
-    /// search).
-    ///
-    /// # Panics
-    /// When there is no such patch.
-    pub fn surface_point(&self, at: PatchPoint) -> SurfacePoint {
-        let (point, normal) = self.point_and_normal(at);
-        let triangle = self.bvh.closest_point(&self.mesh, &point).triangle;
-        SurfacePoint { point, normal, at: Some(at), triangle }
-    }
-
     /// True where a patch ends: within 1e-10 of its parameter range from the end of one.
     ///
     /// # Panics

@@ -74,9 +74,9 @@ fn patches_that_face_down_are_turned_over() {
     // A half cylinder's du × dv points to its axis, down on the whole.
     let part = nurbs_part(samples::half_cylinder(5.0, 20.0), 0.02);
     let at = PatchPoint { patch: 0, u: 1.0, v: 0.5 };
-    let top = part.surface_point(at);
-    assert_relative_eq!(top.normal, Vector3::z(), epsilon = 1e-14);
-    assert_relative_eq!(top.point, Point3::new(0.0, 10.0, 5.0), epsilon = 1e-13);
+    let (point, normal) = part.point_and_normal(at);
+    assert_relative_eq!(normal, Vector3::z(), epsilon = 1e-14);
+    assert_relative_eq!(point, Point3::new(0.0, 10.0, 5.0), epsilon = 1e-13);
     // Convex seen from outside, whatever the parametrisation says.
     let k = part.curvature(at).unwrap();
     assert_relative_eq!(k.min, -0.2, epsilon = 1e-13);
@@ -353,7 +353,7 @@ fn heights_on_a_seam_are_those_of_the_whole_surface() {
     let (seam, deviation) = (0.5, halves.mesh_deviation());
     for k in 1..400 {
         let at = PatchPoint { patch: 0, u: seam, v: f64::from(k) / 400.0 };
-        let place = whole.surface_point(at).point;
+        let (place, _) = whole.point_and_normal(at);
         for aside in [-1.5, -1.0, -0.3, -1e-6, 0.0, 1e-6, 0.3, 1.0, 1.5] {
             let (x, y) = (place.x + aside * deviation, place.y);
             let [expected, hit] = [&whole, &halves].map(|part| part.highest_at(x, y).unwrap());
@@ -418,7 +418,7 @@ fn heights_beside_a_crease_are_those_of_the_patch_there() {
     let deviation = part.mesh_deviation();
     let mut beside = 0;
     for k in 1..300 {
-        let place = part.surface_point(PatchPoint { patch: 0, u: 0.0, v: f64::from(k) / 300.0 }).point;
+        let (place, _) = part.point_and_normal(PatchPoint { patch: 0, u: 0.0, v: f64::from(k) / 300.0 });
         for aside in [-1.8, -1.0, -0.4, -0.01, 0.01, 0.4, 1.0, 1.8] {
             let (x, y) = (place.x + aside * deviation, place.y);
             let hit = part.highest_at(x, y).unwrap();

@@ -42,11 +42,6 @@ impl TextSize {
         let (weight, height) = self.face();
         get_raster_width(weight, height)
     }
-
-    /// Height of a line, pixels.
-    pub fn line_height(self) -> usize {
-        self.face().1.val()
-    }
 }
 
 /// Which end of a text stands at the given x.

@@ -2,19 +2,10 @@
 
 use geometry::{Point3, Vector3};
 
-/// Where two balls meet over the surface.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ridge {
-    /// Top of the ridge, mm.
-    pub at: Point3,
-    /// Half the distance of the balls' centres, mm.
-    pub half_distance: f64,
-}
-
-/// The ridge between balls of radius `r` around two centres, on their side against `outward` (a unit vector out of
+/// The top of the ridge, mm, between balls of radius `r` around two centres, on their side against `outward` (a unit vector out of
 /// the material): `K = (C₁+C₂)/2 − √(r² − d²/4) ŵ`, `ŵ` square to `C₁C₂`. `None` where they do not meet, or stand over each
 /// other.
-pub fn ridge_between(centres: [Point3; 2], r: f64, outward: &Vector3) -> Option<Ridge> {
+pub fn ridge_between(centres: [Point3; 2], r: f64, outward: &Vector3) -> Option<Point3> {
     let [a, b] = centres;
     let (middle, half) = (nalgebra::center(&a, &b), 0.5 * (b - a));
     let half_distance = half.norm();
@@ -24,7 +15,7 @@ pub fn ridge_between(centres: [Point3; 2], r: f64, outward: &Vector3) -> Option<
     }
     let along = half.try_normalize(0.0).unwrap_or_else(Vector3::zeros);
     let up = (outward - along * along.dot(outward)).try_normalize(1e-9)?;
-    Some(Ridge { at: middle - up * inside.sqrt(), half_distance })
+    Some(middle - up * inside.sqrt())
 }
 
 #[cfg(test)]
@@ -42,7 +33,7 @@ mod tests {
     }
 
     /// The ridge between two contacts of a ball of radius `r`.
-    fn ridge_of_contacts(contacts: &[CcPoint; 2], r: f64) -> Option<Ridge> {
+    fn ridge_of_contacts(contacts: &[CcPoint; 2], r: f64) -> Option<Point3> {
         let centres = contacts.map(|c| c.point + c.normal * r);
         let up = (contacts[0].normal + contacts[1].normal).try_normalize(1e-9)?;
         ridge_between(centres, r, &up)
@@ -55,7 +46,7 @@ mod tests {
         assert_eq!(ridge_of_contacts(&[flat(0.0), flat(f64::NAN)], 3.0), None);
         assert_eq!(ridge_of_contacts(&[flat(0.0), flat(1.0)], f64::NAN), None);
         let same = ridge_of_contacts(&[flat(0.5), flat(0.5)], 3.0).unwrap();
-        assert!((same.at - flat(0.5).point).norm() < 1e-12 && same.half_distance == 0.0);
+        assert!((same - flat(0.5).point).norm() < 1e-12);
     }
 
     proptest! {
@@ -67,7 +58,7 @@ mod tests {
             let arc = share * section.greatest_step().arc;
             let ridge = ridge_of_contacts(&[on_circle(k, -0.3 * arc), on_circle(k, 0.7 * arc)], r).unwrap();
             let middle = Point3::new(0.0, 0.0, 1.0 / k);
-            let height = k.signum() * (1.0 / k.abs() - (ridge.at - middle).norm());
+            let height = k.signum() * (1.0 / k.abs() - (ridge - middle).norm());
             prop_assert!((height - section.height(arc).unwrap()).abs() < 1e-10 * (1.0 + 1.0 / k.abs()));
         }
     }

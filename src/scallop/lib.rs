@@ -19,7 +19,7 @@ mod silhouette;
 mod strip;
 
 pub use comparison::{Comparison, compare};
-pub use contacts::{Ridge, ridge_between};
+pub use contacts::ridge_between;
 pub use effective::effective_radius;
 pub use error::ScallopError;
 pub use place::SurfaceCurvature;

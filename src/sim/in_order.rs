@@ -28,8 +28,9 @@ mod tile;
 
 use super::bins::MoveBins;
 use super::form::Form;
+use super::tiles::{TileCells, tiles};
 use super::track::Track;
-use super::{Grid, NOT_CUT, ZMap};
+use super::{NOT_CUT, ZMap};
 use cutter::Cutter;
 use geometry::Point3;
 use leaf::Tally;
@@ -131,13 +132,15 @@ pub fn cut_in_order(
     path: &Toolpath,
     monitor: &dyn Monitor,
 ) -> Result<Removal, Cancelled> {
-    cut_by_tiles(stock, cutter, path, monitor, SIDE, |job, slices, moves| {
-        Tile::load(slices).cut(job, slices, moves)
+    cut_by_tiles(stock, cutter, path, monitor, SIDE, |job, cells, moves| {
+        Tile::load(cells, job.cell).cut(job, cells, moves)
     })
 }
 
 /// What all tiles of a cut share.
 struct OrderedCut<'a> {
+    /// Side of a cell, mm.
+    cell: f64,
     form: Form,
     path: &'a Toolpath,
     monitor: &'a dyn Monitor,
@@ -148,16 +151,6 @@ impl OrderedCut<'_> {
         let k = index as usize;
         Track::new(self.path.start_of(k), self.path.moves[k].to.tip)
     }
-}
-
-/// The part of the map that one worker owns.
-struct Slices<'a> {
-    /// Centres of its columns and rows, and the distance between them.
-    x: Vec<f64>,
-    y: Vec<f64>,
-    cell: f64,
-    /// Its part of each row of heights and of moves.
-    rows: Vec<(&'a mut [f32], &'a mut [u32])>,
 }
 
 /// What the moves of one tile removed, in the order of the program.
@@ -174,21 +167,21 @@ fn cut_by_tiles(
     path: &Toolpath,
     monitor: &dyn Monitor,
     side: usize,
-    cut: impl Fn(&OrderedCut, &mut Slices, &[u32]) -> Result<TileRecord, Cancelled> + Sync + Send,
+    cut: impl Fn(&OrderedCut, &mut TileCells, &[u32]) -> Result<TileRecord, Cancelled> + Sync + Send,
 ) -> Result<Removal, Cancelled> {
     check(monitor)?;
-    let job = OrderedCut { form: Form::new(cutter), path, monitor };
+    let job = OrderedCut { cell: stock.grid.cell, form: Form::new(cutter), path, monitor };
     let bins = MoveBins::new(&stock.grid, side, job.form.radius, path);
     monitor.start("cutting in order", (bins.nx() * bins.ny()) as u64);
     let before = variation(&stock);
     stock.cut_by.fill(NOT_CUT);
-    let mut tiles: Vec<(Slices, TileRecord)> =
-        slices(&mut stock, side).into_iter().map(|s| (s, TileRecord::default())).collect();
-    parallel::try_for_each(&mut tiles, |k, (slices, found)| {
+    let mut tiles: Vec<(TileCells, TileRecord)> =
+        tiles(&mut stock, side).into_iter().map(|cells| (cells, TileRecord::default())).collect();
+    parallel::try_for_each(&mut tiles, |k, (cells, found)| {
         check(monitor)?;
         let moves = bins.of_bin(k % bins.nx(), k / bins.nx());
         if !moves.is_empty() {
-            *found = cut(&job, slices, moves)?;
+            *found = cut(&job, cells, moves)?;
         }
         monitor.advance(1);
         Ok(())
@@ -197,32 +190,6 @@ fn cut_by_tiles(
     let (moves, rapid_contacts) = join(found, &job, stock.grid.cell);
     let volume_bound = 0.5 * stock.grid.cell.powi(2) * (before + variation(&stock));
     Ok(Removal { stock, moves, rapid_contacts, volume_bound })
-}
-
-/// The map dealt out to squares of `side` cells, row by row of squares.
-fn slices(map: &mut ZMap, side: usize) -> Vec<Slices<'_>> {
-    let grid: Grid = map.grid;
-    let mut all = Vec::with_capacity(grid.nx.div_ceil(side) * grid.ny.div_ceil(side));
-    if grid.is_empty() {
-        return all;
-    }
-    let bands = map.height.chunks_mut(side * grid.nx).zip(map.cut_by.chunks_mut(side * grid.nx));
-    for (band, (height, cut_by)) in bands.enumerate() {
-        let first = all.len();
-        let j0 = band * side;
-        for i0 in (0..grid.nx).step_by(side) {
-            let x = (i0..(i0 + side).min(grid.nx)).map(|i| grid.centre(i, j0).x).collect();
-            let y = (j0..(j0 + side).min(grid.ny)).map(|j| grid.centre(i0, j).y).collect();
-            all.push(Slices { x, y, cell: grid.cell, rows: Vec::with_capacity(side) });
-        }
-        for (height, cut_by) in height.chunks_mut(grid.nx).zip(cut_by.chunks_mut(grid.nx)) {
-            let pieces = height.chunks_mut(side).zip(cut_by.chunks_mut(side));
-            for (tile, piece) in all[first..].iter_mut().zip(pieces) {
-                tile.rows.push(piece);
-            }
-        }
-    }
-    all
 }
 
 /// Sum over all pairs of neighbours of the difference of their heights, mm.

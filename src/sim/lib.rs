@@ -43,7 +43,5 @@ pub use solid::{Nearest, OppositeAxes, SweptHit, SweptMoves, SweptSolid};
 pub use standing::{FAR, NearStanding, StandingClearance, holder_clearance};
 pub use stock::{BarAxis, Stock, StockMesh};
 pub use swept::SweptMove;
-pub use voxel::{
-    LineExit, VoxelEngine, VoxelError, VoxelRemoval, VoxelSample, VoxelSurface, VoxelVolumes, Voxels,
-};
+pub use voxel::{LineExit, VoxelEngine, VoxelError, VoxelRemoval, VoxelSurface, VoxelVolumes, Voxels};
 pub use zmap::{NOT_CUT, Shape, ZMap};

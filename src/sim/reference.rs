@@ -16,7 +16,7 @@ use super::form::{Family, Form};
 use super::swept::{ball_height, flat_height, rounded_height_below};
 use super::tiles::{TileCells, tiles};
 use super::track::{Track, larger, smaller};
-use super::{Grid, NOT_CUT, ZMap};
+use super::{NOT_CUT, ZMap};
 use cutter::Cutter;
 use geometry::Point2;
 use motion::Toolpath;
@@ -64,8 +64,7 @@ pub fn cut_reference(
     let bins = MoveBins::new(&stock.grid, side, form.radius, path);
     monitor.start("cutting", (bins.nx() * bins.ny()) as u64);
     let mut cut = ZMap { cut_by: vec![NOT_CUT; stock.height.len()], ..stock.clone() };
-    let mut tiles: Vec<Tile> =
-        tiles(&mut cut, side).into_iter().map(|cells| Tile::new(&stock.grid, cells)).collect();
+    let mut tiles = tiles(&mut cut, side);
     parallel::try_for_each(&mut tiles, |k, tile| {
         check(monitor)?;
         tile.cut(&form, path, bins.of_bin(k % bins.nx(), k / bins.nx()));
@@ -76,28 +75,13 @@ pub fn cut_reference(
     Ok(cut)
 }
 
-/// A tile with the centres of its columns and rows.
-struct Tile<'a> {
-    x: Vec<f64>,
-    y: Vec<f64>,
-    rows: Vec<(&'a mut [f32], &'a mut [u32])>,
-}
-
-impl<'a> Tile<'a> {
-    fn new(grid: &Grid, cells: TileCells<'a>) -> Self {
-        let x = (0..cells.nx()).map(|i| grid.centre(cells.i0 + i, cells.j0).x).collect();
-        let y = (0..cells.rows.len()).map(|j| grid.centre(cells.i0, cells.j0 + j).y).collect();
-        Self { x, y, rows: cells.rows }
-    }
-}
-
 /// A move that may cut in a tile.
 struct Candidate {
     track: Track,
     index: u32,
 }
 
-impl Tile<'_> {
+impl TileCells<'_> {
     fn cut(&mut self, form: &Form, path: &Toolpath, moves: &[u32]) {
         let candidate = |&index: &u32| {
             let k = index as usize;
@@ -135,7 +119,7 @@ struct Row {
 }
 
 impl Block {
-    fn load(tile: &Tile, i0: usize, j0: usize) -> Self {
+    fn load(tile: &TileCells<'_>, i0: usize, j0: usize) -> Self {
         let (nx, ny) = ((tile.x.len() - i0).min(BLOCK), (tile.rows.len() - j0).min(BLOCK));
         let mut x = [tile.x[i0]; BLOCK];
         let mut y = [tile.y[j0]; BLOCK];
@@ -152,7 +136,7 @@ impl Block {
         Self { x, y, rows, middle, half_diagonal: 0.5 * width.hypot(depth) }
     }
 
-    fn store(&self, tile: &mut Tile, i0: usize, j0: usize) {
+    fn store(&self, tile: &mut TileCells<'_>, i0: usize, j0: usize) {
         for (row, (heights, cut_by)) in self.rows.iter().zip(&mut tile.rows[j0..]) {
             let cells = heights[i0..].iter_mut().zip(&mut cut_by[i0..]);
             for ((height, by), (&h, &rank)) in cells.zip(row.height.iter().zip(&row.rank)) {

@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use geometry::{Aabb, Bvh, HalfSpace, Point2, Point3, Region, RegionIndex, TriangleMesh, Vector3};
+use geometry::{Aabb, Bvh, HalfSpace, Point2, Point3, Region, RegionIndex, TriangleMesh, Vector3, clipped};
 
 /// Heights of curved stock are found to this, mm. Less takes more looks.
 const TRACED: f64 = 0.01;
@@ -391,18 +391,7 @@ fn highest_in(corners: &[Point3; 3], low: [f64; 2], high: [f64; 2]) -> f64 {
     let mut polygon = corners.to_vec();
     for (axis, sign, end) in [(0, 1.0, low[0]), (1, 1.0, low[1]), (0, -1.0, high[0]), (1, -1.0, high[1])] {
         let inside = |p: &Point3| sign * (p[axis] - end);
-        let mut kept = Vec::with_capacity(polygon.len() + 1);
-        for (k, a) in polygon.iter().enumerate() {
-            let b = &polygon[(k + 1) % polygon.len()];
-            let (from, to) = (inside(a), inside(b));
-            if from >= 0.0 {
-                kept.push(*a);
-            }
-            if (from < 0.0) != (to < 0.0) {
-                kept.push(a + (b - a) * (from / (from - to)));
-            }
-        }
-        polygon = kept;
+        polygon = clipped(&polygon, inside);
     }
     polygon.iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max)
 }

@@ -7,6 +7,9 @@ pub(super) struct TileCells<'a> {
     /// Its first cell in the grid.
     pub i0: usize,
     pub j0: usize,
+    /// Centres of its columns and rows, mm.
+    pub x: Vec<f64>,
+    pub y: Vec<f64>,
     /// Heights and moves of its part of each row of the map.
     pub rows: Vec<(&'a mut [f32], &'a mut [u32])>,
 }
@@ -27,9 +30,11 @@ pub(super) fn tiles(map: &mut ZMap, side: usize) -> Vec<TileCells<'_>> {
     }
     let bands = map.height.chunks_mut(side * grid.nx).zip(map.cut_by.chunks_mut(side * grid.nx));
     for (band, (height, cut_by)) in bands.enumerate() {
-        let first = tiles.len();
+        let (first, j0) = (tiles.len(), band * side);
         for i0 in (0..grid.nx).step_by(side) {
-            tiles.push(TileCells { i0, j0: band * side, rows: Vec::with_capacity(side) });
+            let x = (i0..(i0 + side).min(grid.nx)).map(|i| grid.centre(i, j0).x).collect();
+            let y = (j0..(j0 + side).min(grid.ny)).map(|j| grid.centre(i0, j).y).collect();
+            tiles.push(TileCells { i0, j0, x, y, rows: Vec::with_capacity(side) });
         }
         for (height, cut_by) in height.chunks_mut(grid.nx).zip(cut_by.chunks_mut(grid.nx)) {
             let pieces = height.chunks_mut(side).zip(cut_by.chunks_mut(side));

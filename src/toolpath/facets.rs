@@ -26,15 +26,11 @@ pub(crate) fn facet_charge(mesh: &TriangleMesh, fitted: bool, target: f64) -> f6
 /// as its neighbours and has a sagitta of an eighth of δ times the width; the one that a share of them stays below.
 fn facet_height(mesh: &TriangleMesh, share: f64) -> f64 {
     let mut facets: Vec<(f64, f64)> = Vec::new();
-    let area = |t: usize| {
-        let [a, b, c] = mesh.corners(t);
-        0.5 * (b - a).cross(&(c - a)).norm()
-    };
     for t in 0..mesh.triangles().len() {
         for k in 0..3 {
             let Some(n) = mesh.neighbour(t, k).filter(|&n| n > t) else { continue };
             let corners = mesh.corners(t);
-            let (edge, both) = ((corners[(k + 1) % 3] - corners[k]).norm(), area(t) + area(n));
+            let (edge, both) = ((corners[(k + 1) % 3] - corners[k]).norm(), mesh.area(t) + mesh.area(n));
             let angle = mesh.normal(t).cross(&mesh.normal(n)).norm();
             if angle < SHARPEST_FACETS && edge > 0.0 {
                 facets.push((0.125 * angle * both / edge, both));

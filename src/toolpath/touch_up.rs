@@ -8,7 +8,7 @@
 use crate::link::plane_interval;
 use crate::vocabulary::{PlanError, Task};
 use drop_cutter::{Beside, DropCutter};
-use geometry::{Point2, Point3, Vector2};
+use geometry::{CubicSpline, Point2, Point3, Vector2, share_on};
 use work::monitor;
 
 /// A pass serves what lies within this share of an interval beside it: on a plane, what stands there sinks to a quarter.
@@ -122,12 +122,7 @@ impl Copied {
         corners.reverse();
         corners.push(place);
         corners.extend(walk(&mut pass[k..].iter()));
-        let mut length = 0.0;
-        let mut lengths = vec![0.0];
-        for pair in corners.windows(2) {
-            length += (pair[1] - pair[0]).norm();
-            lengths.push(length);
-        }
+        let lengths = CubicSpline::chord_lengths(&corners, false);
         Some(Self { corners, lengths })
     }
 
@@ -172,9 +167,8 @@ impl Copied {
 
 /// The place of a straight piece nearest to another, and its share of the way.
 fn nearest_on(place: Point2, a: Point2, b: Point2) -> (Point2, f64) {
-    let along = b - a;
-    let share = ((place - a).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-    (a + along * share, share)
+    let share = share_on(&place, &a, &b);
+    (a + (b - a) * share, share)
 }
 
 #[cfg(test)]

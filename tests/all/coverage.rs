@@ -1,18 +1,14 @@
 //! What a verdict covers: surface that upright tools see, walls, undersides, and parts of which nothing is measured.
 
-use millstream::geometry::Point3;
+use millstream::geometry::{Aabb, Point3};
 use serde_json::Value;
 
 use crate::support::{number, run_scene, write_stl};
 
 /// Triangles of the faces of a box, outward.
-fn faces([x0, y0, z0]: [f64; 3], [x1, y1, z1]: [f64; 3]) -> Vec<[Point3; 3]> {
-    let corner = |k: usize| {
-        let pick = |bit: usize, a: f64, b: f64| if k >> bit & 1 == 1 { b } else { a };
-        Point3::new(pick(0, x0, x1), pick(1, y0, y1), pick(2, z0, z1))
-    };
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]].map(|t| t.map(corner))).collect()
+fn faces(low: [f64; 3], high: [f64; 3]) -> Vec<[Point3; 3]> {
+    let (corners, triangles) = Aabb { min: low.into(), max: high.into() }.surface();
+    triangles.iter().map(|t| t.map(|k| corners[k as usize])).collect()
 }
 
 /// A web 4 wide and 6 high under a plate of 16 by 4, 10 long: watertight.

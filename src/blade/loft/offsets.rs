@@ -11,8 +11,7 @@
 use super::{LoftError, LoftSection, check, loft};
 use crate::loft::Loft;
 use geometry::ArcLength;
-use offset::curve_offset::offset_curve_broken;
-use offset::{CurveOffset, OffsetPiece};
+use offset::{CurveOffset, OffsetPiece, offset_curve};
 
 /// Corners of neighbouring sections that lie farther apart than this share of the length are not the same one.
 const SAME_CORNER: f64 = 0.15;
@@ -40,7 +39,7 @@ pub fn loft_of_offsets(
     let half = 0.5 * tolerance;
     let offset = |section: usize, breaks: &[f64]| -> Result<OffsetPiece, LoftError> {
         let LoftSection { curve, height } = sections[section];
-        let CurveOffset { mut pieces, .. } = offset_curve_broken(curve, distance, half, breaks)
+        let CurveOffset { mut pieces, .. } = offset_curve(curve, distance, half, breaks)
             .map_err(|source| LoftError::Offset { section, source })?;
         // A ring that is left open has lost what closed it.
         let whole = pieces.len() == 1 && pieces[0].closed == curve.is_closed();

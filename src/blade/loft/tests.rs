@@ -86,10 +86,6 @@ fn closed_sections_have_a_seam_without_trace_and_point_outward() {
     let [us, vs] = [loft.surface.knots_u().breaks(), loft.surface.knots_v().breaks()];
     let net = geometry::tessellate(&|u, v| loft.surface.jet(u, v), [&us, &vs], 0.01).unwrap();
     assert!(net.triangles.len() > 100);
-    let offset = offset::OffsetSurface::new(&loft.surface, 1.0).unwrap();
-    let fit = &offset.fit(1e-3).unwrap()[0];
-    let (a, b) = (fit.surface.jet(0.0, 0.5), fit.surface.jet(1.0, 0.5));
-    assert!((a.p - b.p).norm() < 1e-9 && a.du.angle(&b.du) < 2e-2, "{}", a.du.angle(&b.du));
 }
 
 #[test]
@@ -137,10 +133,7 @@ fn off_distance(lofts: &[Loft], sections: &[LoftSection], distance: f64) -> f64 
         let outline: Vec<Point2> =
             section.curve.within_chord(1e-6).iter().map(|&t| section.curve.point(t)).collect();
         let nearest = |p: Point2| {
-            let to_side = |w: &[Point2]| {
-                let d = w[1] - w[0];
-                (p - (w[0] + d * ((p - w[0]).dot(&d) / d.norm_squared()).clamp(0.0, 1.0))).norm()
-            };
+            let to_side = |w: &[Point2]| geometry::distance_to_segment(&p, &w[0], &w[1]);
             outline.windows(2).map(to_side).fold(f64::INFINITY, f64::min)
         };
         for loft in lofts {

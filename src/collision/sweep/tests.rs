@@ -27,8 +27,8 @@ fn a_planted_tenth_of_a_millimetre_is_found_when_it_happens() {
         let worst = Obstacle::new(hit, hit_tree).swept_clearance(solid, from, to, 0.0).unwrap();
         assert!((worst.nearest.distance + 0.1).abs() < 0.0011, "{worst:?}");
         assert!((worst.t - t).abs() < 0.005, "{worst:?}");
-        let ends = [from, to].map(|at| Obstacle::new(hit, hit_tree).is_nearer(solid, at, 0.0));
-        assert_eq!(ends, [false; 2], "only the move collides");
+        let ends = [from, to].map(|at| Obstacle::new(hit, hit_tree).some_nearer(solid, at, 0.0));
+        assert_eq!(ends, [None; 2], "only the move collides");
         let free = Obstacle::new(free, free_tree);
         assert!(free.swept_clearance(solid, from, to, 0.0).is_none());
         assert!(free.swept_clearance(solid, from, to, 0.0999).is_none());

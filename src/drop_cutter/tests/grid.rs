@@ -7,9 +7,7 @@ use super::*;
 fn meshes() -> Vec<(&'static str, TriangleMesh)> {
     let mut numbers = Numbers(4);
     let mut noise = || numbers.within(0.0, 3.0);
-    let corner = |i: u32| Point3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)) * 10.0;
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    let cube = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let (corners, cube) = Aabb { min: Point3::origin(), max: Point3::new(10.0, 10.0, 10.0) }.surface();
     let terraces = |x: f64, y: f64| (x / 4.0).floor() + 2.0 * (y / 5.0).floor();
     let holed = height_field(12, 15.0, 0.2, |x, y| (0.8 * x).sin() + (0.6 * y).cos());
     let triangles = holed.triangles().iter().copied();
@@ -42,7 +40,7 @@ fn meshes() -> Vec<(&'static str, TriangleMesh)> {
         ("terraces", height_field(30, 20.0, 0.0, terraces)),
         ("noise", height_field(25, 20.0, 0.3, |_, _| noise())),
         ("hole", mesh_of(vertices, holed.collect())),
-        ("cube", mesh_of((0..8).map(corner).collect(), cube)),
+        ("cube", mesh_of(corners, cube)),
         ("globe", mesh_of(globe, belts.collect())),
     ]
 }

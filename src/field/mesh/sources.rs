@@ -2,7 +2,7 @@
 //! smoothed ([`super::smooth_lines`]) or blended with others ([`super::blend`]).
 
 use super::{FieldMesh, Wanted};
-use geometry::{Point2, Vector3};
+use geometry::{Point2, Vector3, distance_to_segment};
 use work::parallel;
 
 /// A border that turns by more than this at a vertex, nearly back, has no direction there, rad.
@@ -84,12 +84,7 @@ pub fn guides(mesh: &FieldMesh, curves: &[Vec<Point2>], reach: f64, sense: Sense
         curves.iter().flat_map(|c| c.windows(2).map(|w| [w[0], w[1]])).filter(|[a, b]| a != b).collect();
     let nearest = parallel::map(mesh.points().len(), |v| {
         let p = mesh.points()[v].xy();
-        let distance = |[a, b]: &[Point2; 2]| {
-            let d = b - a;
-            let s = ((p - a).dot(&d) / d.norm_squared()).clamp(0.0, 1.0);
-            (p - (a + d * s)).norm()
-        };
-        segments.iter().map(|s| (distance(s), s)).min_by(|a, b| a.0.total_cmp(&b.0))
+        segments.iter().map(|s| (distance_to_segment(&p, &s[0], &s[1]), s)).min_by(|a, b| a.0.total_cmp(&b.0))
     });
     let least = nearest.iter().flatten().map(|n| n.0).fold(f64::INFINITY, f64::min);
     let wanted = |(nearest, normal): (&Option<(f64, &[Point2; 2])>, &Vector3)| {

@@ -13,6 +13,7 @@
 //! streamline); a piece without a held vertex has its first vertex, or its group, held at 0. The
 //! answer is checked by its true residual. Values converge with the square of the edges' length.
 
+use super::weld::root;
 use super::{FieldMesh, MeshFieldError};
 use crate::sparse::{Entry, solve};
 use geometry::Vector3;
@@ -218,13 +219,6 @@ fn sources(mesh: &FieldMesh, held: &Held) -> Result<(Vec<Source>, usize), MeshFi
         })
         .collect();
     Ok((sources, unknowns as usize))
-}
-
-fn root(joined: &[u32], mut k: u32) -> u32 {
-    while joined[k as usize] != k {
-        k = joined[k as usize];
-    }
-    k
 }
 
 /// `max |Ax − b|` over `max (|A||x| + |b|)`; `scale` holds |b| with all its terms.

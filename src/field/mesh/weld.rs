@@ -126,7 +126,8 @@ pub fn weld(points: &[Point3], triangles: &[[u32; 3]], distance: f64) -> (Vec<Po
     compact(points, sewn)
 }
 
-fn root(head: &[u32], mut v: u32) -> u32 {
+/// What a number is joined to in the end, each to a lesser one.
+pub(super) fn root(head: &[u32], mut v: u32) -> u32 {
     while head[v as usize] != v {
         v = head[v as usize];
     }

@@ -113,15 +113,6 @@ pub struct Joints {
     pub rotary: [f64; 2],
 }
 
-/// The two ways to a location.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Inverse {
-    /// Joints with rotary angles from −π to π. Both are the same where the two ways meet.
-    pub solutions: [Joints; 2],
-    /// True where the first rotary axis is free: any angle of it serves, zero is given.
-    pub free: bool,
-}
-
 /// What turns or shifts the tool on the way from its own frame to the workpiece's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stage {
@@ -396,21 +387,6 @@ impl Kinematics {
         let begin = tip.coords + self.workpiece_zero.coords;
         let nose = self.tip_from_nose();
         on(Side::Table, [0, 1], [begin, begin + way], way.norm()) + on(Side::Head, [1, 0], [nose; 2], 0.0)
-    }
-
-    /// The ways to a location, whatever the limits; `None` where the rotary axes cannot reach the tool axis.
-    ///
-    /// # Tolerance
-    /// [`Kinematics::forward`] gives the location again within 1e-9 (mm within a metre of the axes).
-    pub fn inverse(&self, to: &ClPoint) -> Option<Inverse> {
-        let solved = self.triangle.solve(&to.axis)?;
-        let free = solved.from_pole < angles::SLACK;
-        let solutions = [1.0, -1.0].map(|side| {
-            let [first, second] = self.triangle.angles(solved.azimuth, &solved, side);
-            let rotary = [if free { 0.0 } else { folded(first) }, folded(second)];
-            self.place(to.tip, rotary)
-        });
-        Some(Inverse { solutions, free })
     }
 }
 

@@ -7,6 +7,28 @@ use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion};
 use proptest::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+/// The two ways to a location.
+pub(super) struct Inverse {
+    /// Joints with rotary angles from −π to π. Both are the same where the two ways meet.
+    pub(super) solutions: [Joints; 2],
+    /// True where the first rotary axis is free: any angle of it serves, zero is given.
+    pub(super) free: bool,
+}
+
+impl Kinematics {
+    /// The ways to a location, whatever the limits; `None` where the rotary axes cannot reach the tool axis.
+    pub(super) fn inverse(&self, to: &ClPoint) -> Option<Inverse> {
+        let solved = self.triangle.solve(&to.axis)?;
+        let free = solved.from_pole < angles::SLACK;
+        let solutions = [1.0, -1.0].map(|side| {
+            let [first, second] = self.triangle.angles(solved.azimuth, &solved, side);
+            let rotary = [if free { 0.0 } else { folded(first) }, folded(second)];
+            self.place(to.tip, rotary)
+        });
+        Some(Inverse { solutions, free })
+    }
+}
+
 /// Named machines with offset axes and a tilted workpiece zero, and any directions.
 pub(super) fn machines() -> impl Strategy<Value = Kinematics> {
     let vector = || prop::array::uniform3(-1.0..1.0f64).prop_map(Vector3::from);

@@ -18,9 +18,6 @@ pub const MIB: u64 = 1 << 20;
 /// that the scene's `memory_mib` promised to spare; too great a one refuses grids that would fit.
 const BYTES_PER_CELL: usize = 80;
 
-/// Bytes a cell while a path has been cut and nothing measured yet.
-const BYTES_PER_CUT_CELL: usize = 8;
-
 /// Bytes a triangle of the part at a run's peak: its corners, neighbours and search tree, and what drops the cutter on it.
 /// Reading the file takes half of that. Too small a figure lets a run exhaust the machine; too great a one refuses meshes
 /// that would fit.
@@ -77,11 +74,6 @@ impl Budget {
     /// What part and path leave, bytes.
     pub fn left(&self, moves: usize) -> u64 {
         self.memory().saturating_sub(self.besides(moves))
-    }
-
-    /// What is left beside a grid that was cut and not yet measured, bytes.
-    pub fn left_beside(&self, moves: usize, grid: &Grid) -> u64 {
-        self.left(moves).saturating_sub((grid.len() * BYTES_PER_CUT_CELL) as u64)
     }
 
     /// The moves of a path, ready to be met by rays, beside the grid that was measured.

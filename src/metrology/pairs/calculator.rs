@@ -87,7 +87,7 @@ impl<'a> Calculator<'a> {
         let feed = (a + b * a.dot(&b).signum()).try_normalize(1e-9)?;
         let up = (foot.normal - feed * feed.dot(&foot.normal)).try_normalize(1e-9)?;
         let across = feed.cross(&up);
-        let first = ridge_between(balls.each_ref().map(|ball| ball.centre), self.radius, &up)?.at;
+        let first = ridge_between(balls.each_ref().map(|ball| ball.centre), self.radius, &up)?;
         let mut at = first - feed * feed.dot(&(first - foot.point));
         for _ in 0..ROUNDS {
             balls = crossing.moves.map(|k| self.nearest(k, &at));

@@ -155,12 +155,7 @@ mod tests {
             let mut point = || Point2::new(rng.within(-3.0, 3.0), rng.within(-3.0, 3.0));
             let (a, b, from, to) = (point(), point(), point(), point());
             let way = (to - from).normalize();
-            let distance = |s: f64| {
-                let p = from + way * s;
-                let d = b - a;
-                let t = ((p - a).dot(&d) / d.norm_squared()).clamp(0.0, 1.0);
-                (p - (a + d * t)).norm()
-            };
+            let distance = |s: f64| geometry::distance_to_segment(&(from + way * s), &a, &b);
             match stadium(&a, &b, 1.2, from, way) {
                 Some(ends) => {
                     met += 1;

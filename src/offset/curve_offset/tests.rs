@@ -16,18 +16,40 @@ fn ellipse(a: f64, b: f64, n: u32) -> CubicSpline {
     closed((0..n).map(|k| Point2::new(a * at(k).cos(), b * at(k).sin())).collect())
 }
 
+impl OffsetPiece {
+    /// The corners between stretches, the one at the start of a closed piece last.
+    fn corners(&self) -> Vec<Point2> {
+        let ends = self.stretches.iter().filter(|s| !s.is_closed()).map(|s| s.point(s.domain()[1]));
+        let mut corners: Vec<Point2> = ends.collect();
+        if !self.closed {
+            corners.pop();
+        }
+        corners
+    }
+
+    /// Points, corners among them, whose chords stray no more than `tolerance`, mm, from the stretches; of a
+    /// closed piece the first is not repeated.
+    fn polyline(&self, tolerance: f64) -> Vec<Point2> {
+        let mut points: Vec<Point2> = Vec::new();
+        for stretch in &self.stretches {
+            // A corner is the end of one stretch and the start of the next.
+            points.pop();
+            points.extend(stretch.within_chord(tolerance).iter().map(|&t| stretch.point(t)));
+        }
+        if self.closed {
+            points.pop();
+        }
+        points
+    }
+}
+
 fn polyline(curve: &CubicSpline, tolerance: f64) -> Vec<Point2> {
     curve.within_chord(tolerance).iter().map(|&t| curve.point(t)).collect()
 }
 
 /// Distance of a point from a curve by brute force over its chords.
 fn brute(points: &[Point2], p: &Point2) -> f64 {
-    let to = |w: &[Point2]| {
-        let d = w[1] - w[0];
-        let t = ((p - w[0]).dot(&d) / d.norm_squared()).clamp(0.0, 1.0);
-        (w[0] + d * t - p).norm()
-    };
-    points.windows(2).map(to).fold(f64::INFINITY, f64::min)
+    points.windows(2).map(|w| geometry::distance_to_segment(p, &w[0], &w[1])).fold(f64::INFINITY, f64::min)
 }
 
 /// No point of the offset nearer than the distance, and none farther.
@@ -48,7 +70,7 @@ fn keeps_its_distance(offset: &CurveOffset, curve: &CubicSpline, d: f64, toleran
 fn circles_become_circles() {
     let circle = ellipse(10.0, 10.0, 240);
     for d in [-4.0, 4.0, 9.0, -0.01, 0.0] {
-        let offset = offset_curve(&circle, d, 1e-4).unwrap();
+        let offset = offset_curve(&circle, d, 1e-4, &[]).unwrap();
         assert_eq!((offset.pieces.len(), offset.tight.len()), (1, 0));
         let piece = &offset.pieces[0];
         assert!(piece.closed && piece.stretches.len() == 1 && piece.stretches[0].is_closed());
@@ -58,7 +80,7 @@ fn circles_become_circles() {
         assert!((signed_area(&ring) - PI * (10.0 - d).powi(2)).abs() < 0.01);
     }
     for d in [10.5, 25.0, 1e4] {
-        let error = offset_curve(&circle, d, 1e-3).unwrap_err();
+        let error = offset_curve(&circle, d, 1e-3, &[]).unwrap_err();
         let CurveOffsetError::Eaten { fits, .. } = error else { panic!("{error}") };
         assert!((fits - 10.0).abs() < 0.05, "{fits}");
         assert!(error.to_string().contains("to the left eats the whole section"));
@@ -70,9 +92,9 @@ fn an_ellipse_offset_beyond_its_least_radius_has_two_corners_on_its_axis() {
     let (a, b) = (10.0_f64, 5.0_f64);
     let ellipse = ellipse(a, b, 400);
     let least = b * b / a;
-    assert!(offset_curve(&ellipse, least - 0.02, 1e-4).unwrap().tight.is_empty());
+    assert!(offset_curve(&ellipse, least - 0.02, 1e-4, &[]).unwrap().tight.is_empty());
     let d = 3.5;
-    let offset = offset_curve(&ellipse, d, 1e-4).unwrap();
+    let offset = offset_curve(&ellipse, d, 1e-4, &[]).unwrap();
     assert_eq!((offset.pieces.len(), offset.tight.len()), (1, 2));
     for tight in &offset.tight {
         assert!((tight.curvature - 1.0 / least).abs() < 5e-4, "{tight:?}");
@@ -89,7 +111,7 @@ fn an_ellipse_offset_beyond_its_least_radius_has_two_corners_on_its_axis() {
         assert!((corner.x.abs() - x).abs() < 1e-5 && corner.y.abs() < 1e-6, "{corner} {x}");
     }
     keeps_its_distance(&offset, &ellipse, d, 1e-4);
-    let outward = offset_curve(&ellipse, -30.0, 1e-4).unwrap();
+    let outward = offset_curve(&ellipse, -30.0, 1e-4, &[]).unwrap();
     keeps_its_distance(&outward, &ellipse, 30.0, 1e-4);
     assert!(outward.pieces[0].stretches[0].is_closed());
 }
@@ -101,10 +123,10 @@ fn a_trough_beyond_its_least_radius_gets_one_corner() {
     let at = |k: i32| 0.05 * f64::from(k);
     let trough = open((-120..=120).map(|k| Point2::new(at(k), at(k).powi(2) / (2.0 * r))).collect());
     // Left of its sense (toward +x) is its inside.
-    let shallow = offset_curve(&trough, 1.99, 1e-4).unwrap();
+    let shallow = offset_curve(&trough, 1.99, 1e-4, &[]).unwrap();
     assert!(shallow.tight.is_empty() && shallow.pieces[0].stretches.len() == 1 && !shallow.pieces[0].closed);
     let d = 3.0;
-    let offset = offset_curve(&trough, d, 1e-4).unwrap();
+    let offset = offset_curve(&trough, d, 1e-4, &[]).unwrap();
     assert_eq!((offset.tight.len(), offset.pieces.len()), (1, 1));
     let tight = offset.tight[0];
     assert!(
@@ -117,7 +139,7 @@ fn a_trough_beyond_its_least_radius_gets_one_corner() {
     let corner = piece.corners()[0];
     assert!(corner.x.abs() < 1e-6 && (corner.y - (r + (d * d - r * r) / (2.0 * r))).abs() < 1e-5, "{corner}");
     keeps_its_distance(&offset, &trough, d, 1e-4);
-    let below = offset_curve(&trough, -3.0, 1e-4).unwrap();
+    let below = offset_curve(&trough, -3.0, 1e-4, &[]).unwrap();
     assert!(below.tight.is_empty() && below.pieces[0].stretches.len() == 1);
     keeps_its_distance(&below, &trough, 3.0, 1e-4);
 }
@@ -135,9 +157,9 @@ fn a_narrow_passage_parts_the_offset() {
     };
     let curve = closed((0..n).map(peanut).collect());
     let neck = peanut(n / 4).y;
-    let through = offset_curve(&curve, neck - 0.02, 1e-4).unwrap();
+    let through = offset_curve(&curve, neck - 0.02, 1e-4, &[]).unwrap();
     assert_eq!(through.pieces.len(), 1);
-    let parted = offset_curve(&curve, neck + 0.1, 1e-4).unwrap();
+    let parted = offset_curve(&curve, neck + 0.1, 1e-4, &[]).unwrap();
     assert_eq!(parted.pieces.len(), 2);
     for piece in &parted.pieces {
         assert!(piece.closed && piece.corners().len() == 1);
@@ -161,7 +183,7 @@ fn ends_of_open_curves_are_kept_clear_of() {
     let tail = points[200];
     points.extend((1..=40).map(|k| tail + Vector2::new(0.4, 0.2) * f64::from(k)));
     let curve = open(points);
-    let offset = offset_curve(&curve, -2.0, 1e-3).unwrap();
+    let offset = offset_curve(&curve, -2.0, 1e-3, &[]).unwrap();
     keeps_its_distance(&offset, &curve, 2.0, 1e-3);
     let from = offset.pieces[0].sources[0][0];
     assert!(offset.pieces.iter().all(|p| !p.closed));
@@ -192,7 +214,7 @@ proptest! {
         let places: Vec<f64> = (0..700).map(|k| lo + (hi - lo) * f64::from(k) / 700.0).collect();
         let clear: Vec<Point2> =
             places.iter().map(|&t| raw.point(t)).filter(|p| brute(&walls, p) > d.abs() - 2e-5).collect();
-        match offset_curve(&curve, d, tolerance) {
+        match offset_curve(&curve, d, tolerance, &[]) {
             Ok(offset) => {
                 keeps_its_distance(&offset, &curve, d, tolerance);
                 let lines = offset.pieces.iter().map(|p| p.polyline(1e-4)).collect::<Vec<_>>();
@@ -229,7 +251,7 @@ proptest! {
         let [lo, hi] = curve.domain();
         let at = |k: u32| raw.point(lo + (hi - lo) * f64::from(k) / 700.0);
         let clear: Vec<Point2> = (0..=700).map(at).filter(|p| brute(&walls, p) > d.abs() - 2e-5).collect();
-        match offset_curve(&curve, d, 1e-3) {
+        match offset_curve(&curve, d, 1e-3, &[]) {
             Ok(offset) => {
                 keeps_its_distance(&offset, &curve, d, 1e-3);
                 let line = |piece: &OffsetPiece| {
@@ -260,7 +282,7 @@ fn the_start_of_a_closed_curve_does_not_matter() {
     for by in [0, 1, 37, 100, 199] {
         let mut turned = points.clone();
         turned.rotate_left(by);
-        let offset = offset_curve(&closed(turned), 2.5, 1e-4).unwrap();
+        let offset = offset_curve(&closed(turned), 2.5, 1e-4, &[]).unwrap();
         assert_eq!((offset.pieces.len(), offset.tight.len()), (1, 2), "{by}");
         assert_eq!(offset.pieces[0].corners().len(), 2);
         areas.push(signed_area(&offset.pieces[0].polyline(1e-5)));
@@ -272,16 +294,16 @@ fn the_start_of_a_closed_curve_does_not_matter() {
 fn what_cannot_be_says_so() {
     let circle = ellipse(10.0, 10.0, 60);
     for d in [f64::NAN, f64::INFINITY, 2e6] {
-        assert!(matches!(offset_curve(&circle, d, 1e-3), Err(CurveOffsetError::Distance(_))));
+        assert!(matches!(offset_curve(&circle, d, 1e-3, &[]), Err(CurveOffsetError::Distance(_))));
     }
     for t in [f64::NAN, 0.0, -1.0, 1e-12, f64::INFINITY] {
-        assert!(matches!(offset_curve(&circle, 1.0, t), Err(CurveOffsetError::Tolerance(_))));
+        assert!(matches!(offset_curve(&circle, 1.0, t, &[]), Err(CurveOffsetError::Tolerance(_))));
     }
     // y² = x³ has a cusp.
     let cusp = CubicSpline::open(
         vec![-2.0, -1.0, 0.0, 1.0, 2.0],
         [-2.0_f64, -1.0, 0.0, 1.0, 2.0].map(|t| Point2::new(t * t, t * t * t)).to_vec(),
     );
-    let error = offset_curve(&cusp.unwrap(), 0.5, 1e-3).unwrap_err();
+    let error = offset_curve(&cusp.unwrap(), 0.5, 1e-3, &[]).unwrap_err();
     assert!(matches!(error, CurveOffsetError::Cusp { .. }), "{error}");
 }

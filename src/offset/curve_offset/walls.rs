@@ -1,7 +1,7 @@
 //! How near a point is to a cubic spline, exactly: chords in buckets find where to look, Newton's steps the
 //! foot.
 
-use geometry::{CubicSpline, CurveSegment, Point2, SegmentGrid, Vector2};
+use geometry::{CubicSpline, CurveSegment, Point2, SegmentGrid, Vector2, foot};
 
 /// Chords stray this share of the tolerance from the curve. Less makes more of them, more makes more feet to
 /// be refined.
@@ -64,9 +64,7 @@ impl<'a> Walls<'a> {
     /// Where on chord `k` the foot of `p` is, 0 to 1, and how far; far away beyond the last.
     fn chord_foot(&self, p: &Point2, k: usize) -> (f64, f64) {
         let Some(segment) = self.grid.segments().get(k) else { return (0.0, f64::INFINITY) };
-        let chord = segment.ends[1] - segment.ends[0];
-        let share = ((p - segment.ends[0]).dot(&chord) / chord.norm_squared()).clamp(0.0, 1.0);
-        (share, (segment.ends[0] + chord * share - p).norm())
+        foot(p, &segment.ends)
     }
 }
 

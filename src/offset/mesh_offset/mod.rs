@@ -1,8 +1,8 @@
 //! The offset surface of a triangle mesh: all places whose distance from it is `d`, on its outward side.
 //!
 //! Enters: a mesh, its search tree and a distance, mm. Leaves: a mesh every vertex of which lies on the level set
-//! {distance = d}, with the lines along which two places of the given mesh are equally near (valleys), and how far its
-//! triangles stray from the level set. Where a ball of radius d rolls on the mesh its centre runs on this surface: convex
+//! {distance = d}, with the lines along which two places of the given mesh are equally near (valleys).
+//! Where a ball of radius d rolls on the mesh its centre runs on this surface: convex
 //! edges are rounded by it, concave creases become sharp valleys on which the ball touches both sides.
 //!
 //! The distance is the unsigned one, so that a ball fits in between sheets that face each other; what lies behind the mesh
@@ -45,13 +45,8 @@ pub struct MeshOffset {
     pub vertices: Vec<Point3>,
     /// Vertex indices, counter-clockwise seen from farther away.
     pub triangles: Vec<[u32; 3]>,
-    /// Angle between the directions to the nearest points of the mesh at each vertex, rad; 0 where there is one.
-    pub valley_angles: Vec<f64>,
     /// The lines along which two or more points of the mesh are equally near.
     pub valleys: Vec<Valley>,
-    /// Greatest difference found between the distance from the mesh and the one asked for, in the middles of all triangles
-    /// and edges, mm; without the triangles that were cut off at a border, which may cut across a valley's end.
-    pub deviation: f64,
     /// Side of a cell, mm.
     pub cell: f64,
 }
@@ -64,7 +59,7 @@ impl MeshOffset {
     ///
     /// # Tolerance
     /// Vertices lie on the level set to 1e-9 mm (1e-14 of the coordinates, if that is more), those of valleys on both
-    /// sides; triangles stray from it by [`MeshOffset::deviation`].
+    /// sides.
     pub fn new(
         mesh: &TriangleMesh,
         bvh: &Bvh,
@@ -80,36 +75,8 @@ impl MeshOffset {
             return Err(OffsetError::Empty { distance: settings.distance });
         }
         let valleys = valleys::valleys(&level, &kept, settings);
-        let deviation = contour::deviation(&level, &kept, monitor)?;
-        let contour::Contour { vertices, triangles, angles, .. } = kept;
-        Ok(Self { vertices, triangles, valley_angles: angles, valleys, deviation, cell: settings.cell })
-    }
-
-    /// The offset of a mesh with cells so small that its triangles stray by no more than `tolerance`, mm, from the level
-    /// set, as far as three halvings of the first guess and the memory reach; [`MeshOffset::deviation`] tells.
-    ///
-    /// # Errors
-    /// See [`OffsetError`].
-    pub fn within(
-        mesh: &TriangleMesh,
-        bvh: &Bvh,
-        settings: &OffsetSettings,
-        tolerance: f64,
-        monitor: &dyn Monitor,
-    ) -> Result<Self, OffsetError> {
-        let mut best = Self::new(mesh, bvh, settings, monitor)?;
-        for halvings in 1..=MOST_HALVINGS {
-            if best.deviation <= tolerance {
-                break;
-            }
-            let finer = OffsetSettings { cell: settings.cell * 0.5f64.powi(halvings), ..*settings };
-            match Self::new(mesh, bvh, &finer, monitor) {
-                Ok(offset) => best = offset,
-                Err(OffsetError::Memory { .. } | OffsetError::Cell { .. }) => break,
-                Err(error) => return Err(error),
-            }
-        }
-        Ok(best)
+        let contour::Contour { vertices, triangles, .. } = kept;
+        Ok(Self { vertices, triangles, valleys, cell: settings.cell })
     }
 
     /// The triangles as a checked mesh.
@@ -123,6 +90,3 @@ impl MeshOffset {
             .map_err(refused)
     }
 }
-
-/// How often cells are halved for a tolerance.
-const MOST_HALVINGS: i32 = 3;

@@ -25,13 +25,6 @@ const WIDEST_CELL: f64 = 0.25;
 const NARROWEST_CELL: f64 = 1e-6;
 
 impl OffsetSettings {
-    /// Settings for which a mesh of a smooth level set strays by about `tolerance`, mm, from it where a convex edge is
-    /// rounded: an edge as long as √2 cells is `cell²/(4d)` off.
-    pub fn within(distance: f64, tolerance: f64) -> Self {
-        let cell = (2.0 * distance * tolerance).sqrt().min(WIDEST_CELL * distance);
-        Self { distance, cell, margin: 0.0, valley: 0.01, memory: 2e9 }
-    }
-
     /// Refuses numbers out of their ranges for `mesh`.
     pub(super) fn check(&self, mesh: &TriangleMesh) -> Result<(), OffsetError> {
         let OffsetSettings { distance, cell, margin, valley, memory } = *self;

@@ -1,5 +1,5 @@
 use super::*;
-use geometry::Vector3;
+use geometry::{Aabb, Vector3, distance_to_segment};
 use proptest::prelude::*;
 use work::monitor::{Cancelled, Silent};
 
@@ -41,10 +41,7 @@ fn offset(of: &(TriangleMesh, Bvh), settings: &OffsetSettings) -> MeshOffset {
 
 /// The nearest distance by a walk over all triangles: inside of each by its plane, else by its sides.
 fn distance(mesh: &TriangleMesh, q: &Point3) -> f64 {
-    let side = |a: &Point3, b: &Point3| {
-        let d = b - a;
-        (q - (a + d * ((q - a).dot(&d) / d.norm_squared()).clamp(0.0, 1.0))).norm()
-    };
+    let side = |a: &Point3, b: &Point3| distance_to_segment(q, a, b);
     let of_triangle = |t: usize| {
         let [a, b, c] = mesh.corners(t);
         let n = (b - a).cross(&(c - a)).normalize();
@@ -83,6 +80,31 @@ fn folded(of: &(TriangleMesh, Bvh), found: &MeshOffset, d: f64) -> f64 {
     inward / all
 }
 
+/// Greatest difference between the distance from the mesh and `d` in the middles of triangles and edges, mm; without triangles
+/// at a border, which may cut across a valley's end.
+fn deviation(of: &(TriangleMesh, Bvh), found: &MeshOffset, d: f64) -> f64 {
+    let level = LevelSet::new(&of.0, &of.1, d);
+    let mesh = found.mesh().unwrap();
+    let mut border = vec![false; found.vertices.len()];
+    let sides = |t: &[u32; 3]| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
+    let all: std::collections::HashSet<[u32; 2]> = mesh.triangles().iter().flat_map(sides).collect();
+    for [a, b] in all.iter().filter(|[a, b]| !all.contains(&[*b, *a])) {
+        [a, b].iter().for_each(|v| border[**v as usize] = true);
+    }
+    let of_triangle = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|v| mesh.vertices()[v as usize].coords);
+        let middles = [(a + b + c) / 3.0, (a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5];
+        middles.map(|m| level.excess(&Point3::from(m)).abs()).into_iter().fold(0.0, f64::max)
+    };
+    let inner = mesh.triangles().iter().filter(|t| t.iter().all(|&v| !border[v as usize]));
+    inner.map(of_triangle).fold(0.0, f64::max)
+}
+
+fn length(valley: &Valley) -> f64 {
+    assert!(!valley.closed);
+    valley.points.windows(2).map(|w| (w[1] - w[0]).norm()).sum()
+}
+
 fn area(found: &MeshOffset) -> f64 {
     let of = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|v| found.vertices[v as usize]);
@@ -106,7 +128,7 @@ fn of_a_plane_is_a_plane_of_its_size() {
     assert_sound(&plane, &found, 2.0);
     let exact = 100.0 * (1.0f64 + 0.04 + 0.09).sqrt();
     assert!((area(&found) / exact - 1.0).abs() < 2e-3, "{}", area(&found) / exact);
-    assert!(found.deviation < 1e-9 && found.valleys.is_empty());
+    assert!(deviation(&plane, &found, 2.0) < 1e-9 && found.valleys.is_empty());
     // A margin is as wide as a ball rolls, all around.
     let wider = offset(&plane, &OffsetSettings { margin: 0.5, ..settings(2.0, 0.2) });
     assert_sound(&plane, &wider, 2.0);
@@ -124,14 +146,15 @@ fn the_valley_of_a_groove_is_where_both_sides_are_equally_near() {
         let v = groove(opening, 20.0, 12.0);
         let found = offset(&v, &settings(3.0, 0.5));
         assert_sound(&v, &found, 3.0);
-        assert!(found.deviation < 1e-9, "flat sides: {:e} at {opening}", found.deviation);
+        let off = deviation(&v, &found, 3.0);
+        assert!(off < 1e-9, "flat sides: {off:e} at {opening}");
         assert_eq!(found.valleys.len(), 1, "{opening}");
         let valley = &found.valleys[0];
         let height = 3.0 / (0.5 * opening).sin();
         for p in &valley.points {
             assert!(p.x.abs() < 1e-9 && (p.z - height).abs() < 1e-9, "{p} at {opening}");
         }
-        assert!((valley.length() - 12.0).abs() < 0.02 && !valley.closed, "{}", valley.length());
+        assert!((length(valley) - 12.0).abs() < 0.02 && !valley.closed, "{}", length(valley));
         let between = std::f64::consts::PI - opening;
         assert!(valley.angles.iter().all(|a| (a - between).abs() < 1e-6), "{:?}", valley.angles);
     }
@@ -152,13 +175,13 @@ fn three_planes_meet_in_a_corner_with_three_valleys() {
     let corner = mesh(&points, &faces);
     let found = offset(&corner, &settings(2.0, 0.31));
     assert_sound(&corner, &found, 2.0);
-    assert!(found.deviation < 1e-9, "{}", found.deviation);
+    assert!(deviation(&corner, &found, 2.0) < 1e-9);
     assert_eq!(found.valleys.len(), 3);
     assert!((area(&found) - 3.0 * 64.0).abs() < 0.3, "{}", area(&found));
     for valley in &found.valleys {
         let ends = [valley.points[0], valley.points[valley.points.len() - 1]];
         assert!(ends.iter().any(|p| (p - Point3::new(2.0, 2.0, 2.0)).norm() < 1e-9));
-        assert!((valley.length() - 8.0).abs() < 0.02, "{}", valley.length());
+        assert!((length(valley) - 8.0).abs() < 0.02, "{}", length(valley));
     }
 }
 
@@ -181,13 +204,11 @@ fn a_convex_edge_is_rounded_and_second_order() {
         assert!(found.valleys.is_empty());
         let exact = 12.0 * (2.0 * 200f64.sqrt() + 2.0 * std::f64::consts::FRAC_PI_2);
         assert!((area(&found) / exact - 1.0).abs() < 4e-3, "{} {exact}", area(&found));
-        assert!(found.deviation <= cell * cell / (2.0 * 2.0), "{} at {cell}", found.deviation);
-        found.deviation
+        let off = deviation(&roof, &found, 2.0);
+        assert!(off <= cell * cell / (2.0 * 2.0), "{off} at {cell}");
+        off
     });
     assert!(deviations[1] < 0.5 * deviations[0], "{deviations:?}");
-    let wanted = OffsetSettings { memory: 1e9, ..OffsetSettings::within(2.0, 2e-3) };
-    let found = MeshOffset::within(&roof.0, &roof.1, &wanted, 2e-3, &Silent).unwrap();
-    assert!(found.deviation <= 2e-3, "{}", found.deviation);
 }
 
 #[test]
@@ -238,12 +259,8 @@ fn of_a_sphere_is_a_sphere_inside_and_out() {
 
 #[test]
 fn of_a_closed_box_has_its_area() {
-    let points: Vec<[f64; 3]> = (0..8)
-        .map(|k| [f64::from(k & 1) * 6.0, f64::from(k >> 1 & 1) * 5.0, f64::from(k >> 2) * 4.0])
-        .collect();
-    let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    let triangles: Vec<[u32; 3]> =
-        faces.iter().flat_map(|f| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]]).collect();
+    let (points, triangles) = Aabb { min: Point3::origin(), max: Point3::new(6.0, 5.0, 4.0) }.surface();
+    let points: Vec<[f64; 3]> = points.into_iter().map(Into::into).collect();
     let cuboid = mesh(&points, &triangles);
     let found = offset(&cuboid, &settings(1.0, 0.1));
     assert_sound(&cuboid, &found, 1.0);

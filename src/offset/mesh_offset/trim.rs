@@ -113,7 +113,6 @@ impl Kept<'_> {
             self.number[v] = self.to.vertices.len() as u32;
             self.to.vertices.push(self.from.vertices[v]);
             self.to.angles.push(self.from.angles[v]);
-            self.to.cut.push(false);
         }
         self.number[v]
     }
@@ -122,7 +121,6 @@ impl Kept<'_> {
     fn add(&mut self, point: Point3) -> u32 {
         self.to.vertices.push(point);
         self.to.angles.push(0.0);
-        self.to.cut.push(true);
         self.to.vertices.len() as u32 - 1
     }
 }
@@ -170,7 +168,6 @@ fn compacted(mut contour: Contour) -> Contour {
                 number[v as usize] = out.vertices.len() as u32;
                 out.vertices.push(contour.vertices[v as usize]);
                 out.angles.push(contour.angles[v as usize]);
-                out.cut.push(contour.cut[v as usize]);
             }
             number[v as usize]
         });

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use super::OffsetSettings;
 use super::contour::Contour;
 use super::level_set::LevelSet;
-use geometry::{Point3, Vector3};
+use geometry::{Point3, Vector3, share_on};
 
 /// Two faces meet in a valley where the angle between them is at least this share of the one between the directions to the
 /// mesh.
@@ -24,19 +24,11 @@ pub struct Valley {
 }
 
 impl Valley {
-    /// Length, mm.
-    pub fn length(&self) -> f64 {
-        let closing = self.points.first().zip(self.points.last()).filter(|_| self.closed);
-        let sides = self.points.windows(2).map(|w| (w[1] - w[0]).norm());
-        sides.sum::<f64>() + closing.map_or(0.0, |(a, b)| (a - b).norm())
-    }
-
     /// Whether a place lies on the line, within `off` mm.
     fn holds(&self, place: &Point3, off: f64) -> bool {
         self.points.windows(2).any(|w| {
-            let (side, to) = (w[1] - w[0], place - w[0]);
-            let share = (to.dot(&side) / side.norm_squared().max(1e-300)).clamp(0.0, 1.0);
-            (to - side * share).norm_squared() <= off * off
+            let share = share_on(place, &w[0], &w[1]);
+            (place - w[0] - (w[1] - w[0]) * share).norm_squared() <= off * off
         })
     }
 }

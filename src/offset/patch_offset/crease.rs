@@ -24,13 +24,13 @@ pub(super) fn continuity(knots: &KnotVector, at: f64) -> usize {
 
 /// The creases along knots of u (`along` 0) or v (1) whose angle tears the offset by more than `gap`, mm.
 pub(super) fn creases(offset: &OffsetSurface, along: usize, gap: f64) -> Vec<Crease> {
-    let surface = offset.surface();
+    let surface = offset.surface;
     let knots = [surface.knots_u(), surface.knots_v()];
     let breaks = knots[along].breaks();
     let others = looks(&knots[1 - along].breaks());
     let torn = |&at: &f64| (continuity(knots[along], at) == 0).then(|| crease(offset, along, at, &others));
     let inner = breaks.get(1..breaks.len() - 1).unwrap_or_default();
-    inner.iter().filter_map(torn).filter(|c| c.angle * offset.distance().abs() > gap).collect()
+    inner.iter().filter_map(torn).filter(|c| c.angle * offset.distance.abs() > gap).collect()
 }
 
 fn looks(breaks: &[f64]) -> Vec<f64> {
@@ -42,7 +42,7 @@ fn looks(breaks: &[f64]) -> Vec<f64> {
 }
 
 fn crease(offset: &OffsetSurface, along: usize, at: f64, others: &[f64]) -> Crease {
-    let surface = offset.surface();
+    let surface = offset.surface;
     let place = |across: f64, other: f64| if along == 0 { [across, other] } else { [other, across] };
     let mut found = Crease { at, angle: 0.0, most_concave: None };
     let mut deepest = 0.0;
@@ -54,7 +54,7 @@ fn crease(offset: &OffsetSurface, along: usize, at: f64, others: &[f64]) -> Crea
         let jet = surface.jet(after[0], after[1]);
         let across: Vector3 = if along == 0 { jet.du } else { jet.dv };
         // Concave toward the normal where normals lean toward each other.
-        let leaning = -(n1 - n0).dot(&across) * offset.distance();
+        let leaning = -(n1 - n0).dot(&across) * offset.distance;
         found.angle = f64::max(found.angle, angle);
         if leaning > 0.0 && angle > deepest {
             deepest = angle;

@@ -2,7 +2,7 @@
 //! meets. What the fast one is tested and timed against.
 
 use super::leaf::Tally;
-use super::{OrderedCut, Removal, Slices, TileRecord, cut_by_tiles};
+use super::{OrderedCut, Removal, TileCells, TileRecord, cut_by_tiles};
 use crate::ZMap;
 use crate::swept::swept_height;
 use cutter::Cutter;
@@ -21,10 +21,10 @@ pub fn cut_in_order_plain(
     path: &Toolpath,
     monitor: &dyn Monitor,
 ) -> Result<Removal, Cancelled> {
-    cut_by_tiles(stock, cutter, path, monitor, super::SIDE, |job, slices, moves| Ok(cut(job, slices, moves)))
+    cut_by_tiles(stock, cutter, path, monitor, super::SIDE, |job, cells, moves| Ok(cut(job, cells, moves)))
 }
 
-fn cut(job: &OrderedCut, slices: &mut Slices, moves: &[u32]) -> TileRecord {
+fn cut(job: &OrderedCut, cells: &mut TileCells, moves: &[u32]) -> TileRecord {
     let mut found = TileRecord::default();
     for &index in moves {
         let (k, track) = (index as usize, job.track(index));
@@ -33,12 +33,12 @@ fn cut(job: &OrderedCut, slices: &mut Slices, moves: &[u32]) -> TileRecord {
             let (low, high) = (a.min(b) - job.form.radius, a.max(b) + job.form.radius);
             centres.partition_point(|c| *c < low)..centres.partition_point(|c| *c <= high)
         };
-        let (columns, rows) = (range(&slices.x, from.x, to.x), range(&slices.y, from.y, to.y));
+        let (columns, rows) = (range(&cells.x, from.x, to.x), range(&cells.y, from.y, to.y));
         let mut tally = Tally::NOTHING;
         for j in rows {
-            let (heights, cut_by) = &mut slices.rows[j];
+            let (heights, cut_by) = &mut cells.rows[j];
             for i in columns.clone() {
-                let (x, y) = (slices.x[i], slices.y[j]);
+                let (x, y) = (cells.x[i], cells.y[j]);
                 let stored = swept_height(&job.form, &track, x, y) as f32;
                 if stored < heights[i] {
                     let now = f64::from(heights[i]);

@@ -2,9 +2,9 @@
 //! of removal must satisfy.
 
 use super::*;
-use crate::cut_reference;
 use crate::scenes::{Rng, cutters, path_through, random_path, square_grid, wave_path};
 use crate::swept::swept_height;
+use crate::{Grid, cut_reference};
 use geometry::{Point2, Vector3};
 use motion::MoveKind;
 use proptest::prelude::*;

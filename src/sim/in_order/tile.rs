@@ -4,7 +4,7 @@
 use super::bound::{Bound, CHILDREN, Ceiling, Ceilings};
 use super::contact::{first_touch, reach};
 use super::leaf::{LEAF, Lanes, Leaf, UNTOUCHED};
-use super::{ENGAGED, OrderedCut, RapidContact, Slices, TileRecord};
+use super::{ENGAGED, OrderedCut, RapidContact, TileCells, TileRecord};
 use crate::form::{Family, Form};
 use crate::sweep::{Ball, Flat, Rounded, Sweep};
 use crate::track::{Track, larger};
@@ -41,18 +41,18 @@ fn place(n: usize, l: usize) -> (usize, usize) {
 }
 
 impl Tile {
-    pub fn load(slices: &Slices) -> Self {
+    pub fn load(cells: &TileCells, cell: f64) -> Self {
         let axis = |given: &[f64]| {
             let last = given.len() - 1;
             // Extrapolated beyond the grid, so that bounds about a leaf's middle stay true.
-            let beyond = |k: usize| given[last] + (k - last) as f64 * slices.cell;
+            let beyond = |k: usize| given[last] + (k - last) as f64 * cell;
             let at = |k: usize| given.get(k).copied().unwrap_or_else(|| beyond(k));
             std::array::from_fn(|leaf| std::array::from_fn(|k| at(leaf * LEAF + k)))
         };
         let mut tile = Self {
-            x: axis(&slices.x),
-            y: axis(&slices.y),
-            cell: slices.cell,
+            x: axis(&cells.x),
+            y: axis(&cells.y),
+            cell,
             leaves: vec![std::array::from_fn(|_| Leaf::beyond()); CHILDREN],
             nodes: vec![Ceilings::nothing(); CHILDREN],
             root: Ceilings::nothing(),
@@ -61,24 +61,24 @@ impl Tile {
             for l in 0..CHILDREN {
                 let (column, row) = place(n, l);
                 let leaf = &mut tile.leaves[n][l];
-                for (j, (heights, _)) in slices.rows.iter().skip(row * LEAF).take(LEAF).enumerate() {
+                for (j, (heights, _)) in cells.rows.iter().skip(row * LEAF).take(LEAF).enumerate() {
                     for (i, &height) in heights.iter().skip(column * LEAF).take(LEAF).enumerate() {
                         leaf.height[j][i] = f64::from(height);
                     }
                 }
-                tile.nodes[n].set(l, leaf_ceiling(leaf, slices.cell));
+                tile.nodes[n].set(l, leaf_ceiling(leaf, cell));
             }
             tile.raise(n);
         }
         tile
     }
 
-    fn store(&self, slices: &mut Slices) {
+    fn store(&self, cells: &mut TileCells) {
         for n in 0..CHILDREN {
             for l in 0..CHILDREN {
                 let (column, row) = place(n, l);
                 let leaf = &self.leaves[n][l];
-                for (j, (heights, cut_by)) in slices.rows.iter_mut().skip(row * LEAF).take(LEAF).enumerate() {
+                for (j, (heights, cut_by)) in cells.rows.iter_mut().skip(row * LEAF).take(LEAF).enumerate() {
                     for i in 0..heights.len().saturating_sub(column * LEAF).min(LEAF) {
                         if leaf.by[j][i] != UNTOUCHED {
                             heights[column * LEAF + i] = leaf.height[j][i] as f32;
@@ -94,7 +94,7 @@ impl Tile {
     pub fn cut(
         mut self,
         job: &OrderedCut,
-        slices: &mut Slices,
+        cells: &mut TileCells,
         moves: &[u32],
     ) -> Result<TileRecord, Cancelled> {
         let arch = pulp::Arch::new();
@@ -109,7 +109,7 @@ impl Tile {
                 arch.dispatch(Run { tile, sweep: Rounded::<_, false>::new(form, 0.0), job, moves })
             }
         }?;
-        self.store(slices);
+        self.store(cells);
         Ok(found)
     }
 

@@ -9,10 +9,10 @@
 use super::bricks::{Bricks, Placed, offset, slot_of};
 use super::cells::{Cells, Corners, crossed};
 use super::engine::VoxelEngine;
-use super::sheets::{EDGES, Sheets, edge_at, is_crossed};
 use super::vertex::vertex;
 use super::voxels::Voxels;
 use crate::NOT_CUT;
+use geometry::sheets::{EDGES, Sheets, edge_at, is_crossed};
 use geometry::{Plane, Point3, Vector3, into_cube};
 use std::collections::HashMap;
 use work::monitor::{Cancelled, Monitor, check};
@@ -85,7 +85,7 @@ impl VoxelEngine<'_> {
     pub fn surface(&self, voxels: &Voxels, monitor: &dyn Monitor) -> Result<VoxelSurface, Cancelled> {
         let bricks = &voxels.bricks;
         monitor.start("surface of voxels", 3 * bricks.blocks.len() as u64);
-        let sheets = Sheets::new();
+        let sheets = Sheets::table();
         let step = |block: usize| {
             check(monitor)?;
             monitor.advance(1);

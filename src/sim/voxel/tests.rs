@@ -6,7 +6,7 @@ mod removal;
 mod standing;
 mod volume;
 
-use super::bricks::STEPS;
+use super::bricks::{BRICK, STEPS};
 use super::*;
 use crate::scenes::{Rng, cutters, path_through, random_path, wave_path};
 use crate::{BarAxis, NOT_CUT, Stock, SweptSolid, ZMap};
@@ -60,6 +60,51 @@ fn five_axis_path(rng: &mut Rng, moves: usize) -> Toolpath {
     through(&all)
 }
 
+impl Voxels {
+    /// The highest place of the material at `(x, y)` by trilinear interpolation, mm; `None` where there is
+    /// none.
+    fn height(&self, x: f64, y: f64) -> Option<f64> {
+        let lattice = &self.bricks.lattice;
+        let at = [(x - lattice.origin.x) / lattice.pitch, (y - lattice.origin.y) / lattice.pitch];
+        if !at.iter().zip(&lattice.size).all(|(at, n)| *at >= 0.0 && *at < f64::from(n - 1)) {
+            return None;
+        }
+        let low = at.map(f64::floor);
+        let share = [at[0] - low[0], at[1] - low[1]];
+        let column = |k: usize| [low[0] as u32 + (k as u32 & 1), low[1] as u32 + (k as u32 >> 1)];
+        let layer = |z: u32| -> Option<f64> {
+            let mut mean = 0.0;
+            for k in 0..4 {
+                let [i, j] = column(k);
+                let weight = |axis: usize| if k >> axis & 1 == 1 { share[axis] } else { 1.0 - share[axis] };
+                mean += weight(0) * weight(1) * self.sample([i, j, z])?.distance;
+            }
+            Some(mean)
+        };
+        let mut above: Option<f64> = None;
+        let mut z = lattice.size[2];
+        while z > 0 {
+            z -= 1;
+            let bricks = || (0..4).any(|k| self.bricks.holding([column(k)[0], column(k)[1], z]).is_some());
+            if z % BRICK == BRICK - 1 && !bricks() {
+                // Nothing passes in all of them.
+                above = None;
+                z -= BRICK - 1;
+                continue;
+            }
+            let here = layer(z);
+            if let (Some(above), Some(here)) = (above, here)
+                && here < 0.0
+                && above >= 0.0
+            {
+                return Some(lattice.origin.z + lattice.pitch * (f64::from(z) + here / (here - above)));
+            }
+            above = here;
+        }
+        None
+    }
+}
+
 /// Every sample against the least of all moves.
 fn against_brute_force(stock: &Stock, solid: &Solid, path: &Toolpath, voxel: f64, name: &str) {
     let engine = VoxelEngine::new(stock, solid, path).unwrap();
@@ -68,9 +113,9 @@ fn against_brute_force(stock: &Stock, solid: &Solid, path: &Toolpath, voxel: f64
     let swept: Vec<SweptSolid<'_>> = (0..path.len())
         .map(|k| SweptSolid::new(solid, &path.location_before(k), &path.moves[k].to).unwrap())
         .collect();
-    let [nx, ny, nz] = voxels.size();
+    let [nx, ny, nz] = voxels.bricks.lattice.size;
     for at in (0..nx * ny * nz).map(|k| [k % nx, k / nx % ny, k / nx / ny]) {
-        let q = voxels.place(at);
+        let q = voxels.bricks.lattice.place(at);
         let mut nearest: Option<(f64, u32)> = None;
         for (k, s) in swept.iter().enumerate() {
             if let Some(found) = s.below(&q, nearest.map_or(f64::INFINITY, |n| n.0)) {
@@ -136,9 +181,9 @@ fn a_tool_with_its_holder_cuts_as_one() {
     let swept: Vec<SweptSolid<'_>> = (0..path.len())
         .map(|k| SweptSolid::new(&solid, &path.location_before(k), &path.moves[k].to).unwrap())
         .collect();
-    let [nx, ny, nz] = voxels.size();
+    let [nx, ny, nz] = voxels.bricks.lattice.size;
     for at in (0..nx * ny * nz).map(|k| [k % nx, k / nx % ny, k / nx / ny]) {
-        let q = voxels.place(at);
+        let q = voxels.bricks.lattice.place(at);
         let w = swept.iter().map(|s| s.distance(&q).distance).fold(f64::INFINITY, f64::min);
         let exact = stock.foot(&q).0.max(-w);
         // Inside of several pieces only the sign is promised.
@@ -304,11 +349,7 @@ fn memory_is_refused_and_the_voxel_that_is_said_to_fit_fits() {
         };
         assert!(needed_mib > allowed_mib && fitting > voxel);
         let voxels = engine.cut(fitting, memory, &Silent).unwrap();
-        assert!(
-            voxels.bytes() <= memory && voxels.bytes() > memory / 6,
-            "{voxel}: {fitting} {}",
-            voxels.bytes()
-        );
+        assert!(voxels.bytes <= memory && voxels.bytes > memory / 6, "{voxel}: {fitting} {}", voxels.bytes);
     }
     assert!(matches!(engine.cut(0.5, 1000, &Silent), Err(VoxelError::Path { .. })));
     assert!(matches!(engine.cut(0.0, MEMORY, &Silent), Err(VoxelError::Voxel(_))));

@@ -289,3 +289,16 @@ impl<S: LevelSource> Filler<'_, S> {
         (curve, runs)
     }
 }
+
+/// The pass of some moves: a closed one ends where it begins, and one move alone is none.
+pub(crate) fn whole_pass(mut moves: Vec<Point3>, closed: bool) -> Vec<Vec<Point3>> {
+    if moves.len() < 2 {
+        return Vec::new();
+    }
+    if closed {
+        // It comes back to within rounding.
+        let last = moves.len() - 1;
+        moves[last] = moves[0];
+    }
+    vec![moves]
+}

@@ -6,7 +6,7 @@
 
 use crate::vocabulary::{COMPARED_CHORDS, Passes, PlanError, Task};
 use drop_cutter::DropCutter;
-use geometry::{Point2, Point3, SegmentGrid, inside_curve, signed_area};
+use geometry::{CubicSpline, Point2, Point3, SegmentGrid, inside_curve, signed_area};
 
 /// Fewest passes of a spiral: of two, both are gone around whole anyway.
 const FEWEST: usize = 3;
@@ -164,10 +164,7 @@ fn spiral(chain: &[Ring]) -> Option<Vec<Point2>> {
 
 /// The moves along a way in the plan view.
 fn moves(task: &Task<'_>, drop: &DropCutter<'_>, way: &[Point2]) -> Result<Vec<Point3>, PlanError> {
-    let mut lengths = vec![0.0];
-    for w in way.windows(2) {
-        lengths.push(lengths[lengths.len() - 1] + (w[1] - w[0]).norm());
-    }
+    let lengths = CubicSpline::chord_lengths(way, false);
     let mut tip = |s: f64| {
         let k = lengths.partition_point(|length| *length <= s).clamp(1, way.len() - 1);
         let side = lengths[k] - lengths[k - 1];

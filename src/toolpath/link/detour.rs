@@ -197,14 +197,11 @@ mod tests {
     use crate::vocabulary::{Joining, Step};
     use collision::{Check, Obstacle};
     use cutter::{Cutter, Solid};
-    use geometry::{Bvh, TriangleMesh};
+    use geometry::{Aabb, Bvh, TriangleMesh};
     use work::monitor::Silent;
 
     fn block(low: [f64; 3], high: [f64; 3]) -> (TriangleMesh, Bvh) {
-        let pick = |i: usize, c: usize| if i >> c & 1 == 1 { high[c] } else { low[c] };
-        let vertices = (0..8).map(|i| Point3::new(pick(i, 0), pick(i, 1), pick(i, 2))).collect();
-        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        let (vertices, triangles) = Aabb { min: low.into(), max: high.into() }.surface();
         let mesh = TriangleMesh::new(vertices, triangles).unwrap().0;
         let tree = Bvh::new(&mesh);
         (mesh, tree)

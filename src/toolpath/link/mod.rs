@@ -35,7 +35,7 @@ use cutter::Cutter;
 pub use detour::{Detour, around_fixtures};
 use drop_cutter::DropCutter;
 use entry::Sides;
-use geometry::{Point2, Point3, Vector2, Vector3, distance_to_segment};
+use geometry::{Point2, Point3, Vector2, Vector3, distance_to_segment, share_on};
 use machine::Machine;
 use motion::{ClPoint, Move, MoveKind, ROUNDING, Toolpath};
 use order::{Costs, Visit, is_closed, order};
@@ -250,9 +250,7 @@ fn begun_ahead(mut points: Vec<Point3>, from: &End, both_ways: bool) -> Vec<Poin
     }
     let (segment, _) = nearest(&points);
     let (a, b) = (points[segment], points[segment + 1]);
-    let length2 = (b - a).norm_squared();
-    let share = if length2 > 0.0 { ((from.tip - a).dot(&(b - a)) / length2).clamp(0.0, 1.0) } else { 0.0 };
-    let mut ahead = share * length2.sqrt() + LEAD * distance;
+    let mut ahead = share_on(&from.tip, &a, &b) * (b - a).norm() + LEAD * distance;
     let mut start = begun_at(points, segment);
     // Not round and round a pass that is shorter than that.
     for _ in 1..start.len() {

@@ -3,7 +3,7 @@
 //! Places are sampled more finely than the chord tolerance and then thinned. Corners move half way to where the chords cut
 //! short, so that the curve runs on both sides of its moves. Where one side is straight, nothing moves.
 
-use geometry::{Point3, Vector3, distance_to_segment};
+use geometry::{Point3, Vector3, distance_to_segment, share_on};
 use work::monitor::{self, Cancelled, Monitor};
 
 /// Steps of work (drops of the cutter, points thinned) between two questions whether to go on. A
@@ -224,11 +224,7 @@ pub enum Side {
 pub fn moved_aside(curve: &[Point3], knots: &[usize], side: Side, tolerance: f64) -> Vec<Point3> {
     let half_sagitta = |k: usize| {
         let (a, b) = (curve[knots[k]], curve[knots[k + 1]]);
-        let off = |p: &Point3| {
-            let d = b - a;
-            let t = ((p - a).dot(&d) / d.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-            p - (a + d * t)
-        };
+        let off = |p: &Point3| p - (a + (b - a) * share_on(p, &a, &b));
         let between = &curve[knots[k]..=knots[k + 1]];
         let far = |e: &Vector3| e.norm_squared();
         let most =

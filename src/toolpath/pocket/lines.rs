@@ -16,6 +16,27 @@ impl Line {
     }
 }
 
+/// Where the curves of a piece cross the line on which `row` is `level`: the rising `along` of these places.
+pub(super) fn crossings(
+    piece: &Piece,
+    level: f64,
+    row: impl Fn(&Point2) -> f64,
+    along: impl Fn(&Point2) -> f64,
+) -> Vec<f64> {
+    let mut crossings = Vec::new();
+    for curve in piece.curves() {
+        for (k, a) in curve.iter().enumerate() {
+            let b = &curve[(k + 1) % curve.len()];
+            let (from, to) = (row(a), row(b));
+            if (from > level) != (to > level) {
+                crossings.push(along(&(a + (b - a) * ((level - from) / (to - from)))));
+            }
+        }
+    }
+    crossings.sort_by(f64::total_cmp);
+    crossings
+}
+
 /// Lines at `angle` (rad) from the x axis, `step` apart.
 pub fn runs(piece: &Piece, angle: f64, step: f64) -> Vec<Run> {
     let (sin, cos) = angle.sin_cos();
@@ -28,17 +49,7 @@ pub fn runs(piece: &Piece, angle: f64, step: f64) -> Vec<Run> {
     let mut lines: Vec<Line> = Vec::new();
     for row in 1..count.max(2) {
         let level = if count == 1 { 0.5 * (lo + hi) } else { lo + spacing * row as f64 };
-        let mut cuts: Vec<f64> = Vec::new();
-        for curve in piece.curves() {
-            for (k, a) in curve.iter().enumerate() {
-                let b = &curve[(k + 1) % curve.len()];
-                let (ra, rb) = (rows(a), rows(b));
-                if (ra > level) != (rb > level) {
-                    cuts.push((a + (b - a) * ((level - ra) / (rb - ra))).coords.dot(&u));
-                }
-            }
-        }
-        cuts.sort_by(f64::total_cmp);
+        let cuts = crossings(piece, level, rows, |p| p.coords.dot(&u));
         let at = |s: f64| Point2::from(u * s + v * level);
         lines.extend(
             cuts.chunks_exact(2)

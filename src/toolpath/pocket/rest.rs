@@ -9,6 +9,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use super::air::sides;
 use super::bounded::STEP;
 use super::cleared::Cleared;
+use super::lines::crossings;
 use super::route::{Entry, Run};
 use super::walls::Room;
 use geometry::{Piece, Point2, Region, SegmentGrid, Vector2};
@@ -71,17 +72,7 @@ impl Cells {
     /// Marks the cells of a row inside a piece: those between every other two crossings with its curves.
     fn fill(&mut self, piece: &Piece, row: usize) {
         let level = self.origin.y + row as f64 * self.cell;
-        let mut crossings = Vec::new();
-        for curve in piece.curves() {
-            for (k, a) in curve.iter().enumerate() {
-                let b = &curve[(k + 1) % curve.len()];
-                if (a.y > level) != (b.y > level) {
-                    crossings.push(a.x + (b.x - a.x) * ((level - a.y) / (b.y - a.y)) - self.origin.x);
-                }
-            }
-        }
-        crossings.sort_by(f64::total_cmp);
-        for pair in crossings.chunks_exact(2) {
+        for pair in crossings(piece, level, |p| p.y, |p| p.x - self.origin.x).chunks_exact(2) {
             let (from, to) = ((pair[0] / self.cell).ceil() as usize, (pair[1] / self.cell).floor() as usize);
             (from..=to.min(self.side[0] - 1)).for_each(|i| self.clear[row * self.side[0] + i] = false);
         }

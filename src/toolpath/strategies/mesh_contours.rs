@@ -10,13 +10,13 @@
 #[cfg(test)]
 mod tests;
 
-use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between};
+use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between, whole_pass};
 use crate::levels::spacing::{AllowedStep, LevelSteps, place_levels};
 use crate::surface::height_contours::HeightContours;
 use crate::vocabulary::{Contact, Faces, PassSettings, Passes, PlanError, Step, Task};
 use cutter::Cutter;
 use drop_cutter::DropCutter;
-use geometry::{Point2, Point3, TriangleMesh, Vector2, Vector3};
+use geometry::{CubicSpline, Point2, Point3, TriangleMesh, Vector2, Vector3};
 use motion::{CcPoint, in_tool_frame};
 use part::{Part, SurfacePoint};
 use scallop::{FeedCurvature, SurfaceCurvature, strip_width_at};
@@ -272,11 +272,8 @@ impl ContourGuide<'_> {
     /// A contour at even distances, in the stretches where passes are of use.
     fn tracks(&self, points: &[Point2], level: f64) -> Vec<Track<Spot>> {
         let n = points.len();
-        let mut s = vec![0.0];
-        for k in 0..n {
-            s.push(s[k] + (points[(k + 1) % n] - points[k]).norm());
-        }
-        if s[n] < LEAST_LENGTH {
+        let s = CubicSpline::chord_lengths(points, true);
+        if n == 0 || s[n] < LEAST_LENGTH {
             return Vec::new();
         }
         let count = (s[n] / self.settings.sampling).ceil().max(5.0) as usize;
@@ -385,13 +382,7 @@ impl LevelSource for ContourGuide<'_> {
             Some(Point3::new(near.x, near.y, rests))
         };
         let settings = PassSettings { sampling: 1.0, ..*self.settings };
-        let mut moves = settings.moves(first as f64, end as f64, &mut tip, self.monitor)?;
-        if curve.closed && run.is_none() && moves.len() > 1 {
-            // It comes back to within rounding.
-            let begin = moves[0];
-            moves.pop();
-            moves.push(begin);
-        }
-        Ok(if moves.len() > 1 { vec![moves] } else { Vec::new() })
+        let moves = settings.moves(first as f64, end as f64, &mut tip, self.monitor)?;
+        Ok(whole_pass(moves, curve.closed && run.is_none()))
     }
 }

@@ -9,7 +9,7 @@
 use super::mesh_shortest::shortest_streams;
 use super::shortest::{Objective, SEARCHED};
 use super::streamline::FITTED;
-use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between};
+use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between, whole_pass};
 use crate::levels::on_triangles::{OnTriangles, along_directions, refused, smooth_directions};
 use crate::levels::spacing::place_levels;
 use crate::levels::{planned_field, spirals};
@@ -530,13 +530,7 @@ impl LevelSource for MeshGuide<'_> {
         let settings = PassSettings { sampling: 1.0, ..*self.settings };
         // On its way it may come off the part, and no ramp leads from one side of that to the other.
         let ends = [first as f64, end as f64];
-        let mut moves = settings.moves_by_contacts(ends, &mut tip, &self.drop, self.monitor)?;
-        if curve.closed && run.is_none() && moves.len() > 1 {
-            // It comes back to within rounding.
-            let begin = moves[0];
-            moves.pop();
-            moves.push(begin);
-        }
-        Ok(if moves.len() > 1 { vec![moves] } else { Vec::new() })
+        let moves = settings.moves_by_contacts(ends, &mut tip, &self.drop, self.monitor)?;
+        Ok(whole_pass(moves, curve.closed && run.is_none()))
     }
 }

@@ -22,18 +22,19 @@ mod guide;
 mod tests;
 
 use crate::levels::halving::along_and_between;
+use crate::levels::on_triangles::OnTriangles;
 use crate::levels::spacing::{LevelSteps, place_levels};
 use crate::moves::touch::Touch;
 use crate::tilt::tilted;
-use crate::vocabulary::{PassSettings, Passes, PlanError, Step, Task};
+use crate::vocabulary::{Lines, PassSettings, Passes, PlanError, Step, Task};
 use cutter::Cutter;
 use drop_cutter::DropCutter;
 use field::DIRECTION_WEIGHT;
 use field::mesh::{
-    FieldMesh, Held, MeshFieldError, MeshLevels, fixed_angle, flows, orient_lines, smooth_lines,
-    solve_stream, triangle_gradients,
+    FieldMesh, Held, MeshFieldError, fixed_angle, flows, orient_lines, smooth_lines, solve_stream,
+    triangle_gradients,
 };
-use geometry::{Point3, Vector3};
+use geometry::{Point3, Vector3, share_on};
 use guide::OffsetGuide;
 use motion::CcPoint;
 use offset::{LevelSet, MeshOffset, OffsetError, OffsetSettings, Valley};
@@ -274,14 +275,9 @@ impl MeshRider<'_> {
 
     fn near_pencil(&self, x: &Point3, reach: f64) -> bool {
         let reach2 = reach * reach;
-        let near = |valley: &Valley| {
-            valley.points.windows(2).any(|w| {
-                let d = w[1] - w[0];
-                let t = ((x - w[0]).dot(&d) / d.norm_squared().max(1e-300)).clamp(0.0, 1.0);
-                (x - (w[0] + d * t)).norm_squared() <= reach2
-            })
-        };
-        self.pencils.iter().any(near)
+        let near =
+            |w: &[Point3]| (x - (w[0] + (w[1] - w[0]) * share_on(x, &w[0], &w[1]))).norm_squared() <= reach2;
+        self.pencils.iter().any(|valley| valley.points.windows(2).any(near))
     }
 
     /// Passes over one piece, and the area that is left out, mm².
@@ -311,13 +307,12 @@ impl MeshRider<'_> {
         let stream =
             solve_stream(mesh, &flows(mesh, &lines, &density, &weight), DIRECTION_WEIGHT, &Held::default())
                 .map_err(failed)?;
-        let levels = MeshLevels::new(mesh, &stream.values).map_err(failed)?;
-        let range = levels.range();
+        let on = OnTriangles::new(mesh, &stream.values, &[], Lines::Levels, 0.0)?;
+        let range = on.levels.range();
         let gradients = triangle_gradients(mesh, &stream.values);
-        let guide = OffsetGuide { rider: self, mesh, levels, gradients, widths, reached };
+        let guide = OffsetGuide { rider: self, on, gradients, widths, reached };
         let mut passes = Passes::default();
-        let placed =
-            place_levels(&guide.places(&stream.values), range, LevelSteps::Shortest, &mut passes.notes);
+        let placed = place_levels(&guide.places(), range, LevelSteps::Shortest, &mut passes.notes);
         passes.append(along_and_between(&guide, &placed, range, self.settings.sampling, self.monitor)?);
         Ok((passes, missed))
     }

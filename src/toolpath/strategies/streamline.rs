@@ -633,12 +633,7 @@ mod tests {
         let triangle = Part::from_mesh(TriangleMesh::new(half, vec![[0, 1, 2]]).unwrap().0);
         for (part, within) in [(ring(0.0), 1e-9), (triangle, 0.01)] {
             let mesh = part.mesh();
-            let area: f64 = (0..mesh.triangles().len())
-                .map(|t| {
-                    let [a, b, c] = mesh.corners(t);
-                    0.5 * (b - a).cross(&(c - a)).norm()
-                })
-                .sum();
+            let area: f64 = (0..mesh.triangles().len()).map(|t| mesh.area(t)).sum();
             let least = shortest::shortest_possible(&part, &cutter, h, &Silent).unwrap();
             assert!((least.cutting_mm * width / area - 1.0).abs() < within, "{least:?} {}", area / width);
         }

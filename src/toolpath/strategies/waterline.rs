@@ -110,10 +110,7 @@ fn heights(chart: &Chart, cutter: &Cutter) -> Result<GridField, PlanError> {
 
 /// Whether a mesh has walls that face up and are steeper than its plan view shows.
 fn has_walls(mesh: &TriangleMesh) -> bool {
-    let area = |t: usize| {
-        let [a, b, c] = mesh.corners(t);
-        0.5 * (b - a).cross(&(c - a)).norm()
-    };
+    let area = |t| mesh.area(t);
     let is_steep = |t: &usize| (LEAST_FACING..STEEPEST_COSINE).contains(&mesh.normal(*t).z);
     let (all, steep) = (0..mesh.triangles().len(), (0..mesh.triangles().len()).filter(is_steep));
     steep.map(area).sum::<f64>() > LEAST_WALLS * all.map(area).sum::<f64>()

@@ -137,7 +137,7 @@ fn neighbouring_passes_are_joined_nearby_and_clear() {
         // Aloft the cutter stays off the part.
         let off = aloft.path.moves.windows(2).filter(|w| w.iter().all(|m| m.kind == MoveKind::Retract));
         for (w, t) in off.flat_map(|w| [0.0, 0.5, 1.0].map(|t| (w, t))) {
-            assert!(!obstacle.is_nearer(&solid, &w[0].to.towards(&w[1].to, t), 0.2 - 2e-5));
+            assert!(obstacle.clearance(&solid, &w[0].to.towards(&w[1].to, t), 0.2 - 2e-5).is_none());
         }
     }
 }

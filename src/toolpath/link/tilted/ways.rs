@@ -70,10 +70,7 @@ impl Block {
         let bounds = stock_bounds(part, settings);
         let around = Vector3::repeat(settings.clearance);
         let grown = Aabb { min: bounds.min - around, max: bounds.max + around };
-        let pick = |i: usize, c: usize| if i >> c & 1 == 1 { grown.max[c] } else { grown.min[c] };
-        let vertices = (0..8).map(|i| Point3::new(pick(i, 0), pick(i, 1), pick(i, 2))).collect();
-        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        let (vertices, triangles) = grown.surface();
         let mesh = TriangleMesh::new(vertices, triangles).ok().map(|(mesh, _)| {
             let bvh = Bvh::new(&mesh);
             (mesh, bvh)

@@ -2,11 +2,12 @@
 
 use super::{MeshRider, runs};
 use crate::levels::halving::{Allowed, LevelSource, Track};
+use crate::levels::on_triangles::OnTriangles;
 use crate::levels::spacing::AllowedStep;
 use crate::moves::touch::Touch;
 use crate::vocabulary::{Contact, Passes, PlanError};
-use field::mesh::{FieldMesh, MeshCurve, MeshLevels, MeshPoint};
-use geometry::{Point3, Vector3};
+use field::mesh::{MeshCurve, MeshPoint};
+use geometry::{CubicSpline, Point3, Vector3};
 use work::monitor::Cancelled;
 
 /// A triangle of which a corner's mean normal is farther off its own than this cosine lies beside a valley.
@@ -23,8 +24,7 @@ pub(crate) struct Spot {
 /// Level curves on one piece of the offset surface.
 pub(crate) struct OffsetGuide<'a> {
     pub rider: &'a MeshRider<'a>,
-    pub mesh: &'a FieldMesh,
-    pub levels: MeshLevels<'a>,
+    pub on: OnTriangles<'a>,
     /// Of the stream function, on each triangle.
     pub gradients: Vec<Vector3>,
     /// Intervals at the vertices, mm.
@@ -34,34 +34,25 @@ pub(crate) struct OffsetGuide<'a> {
 }
 
 impl OffsetGuide<'_> {
-    /// What the places of the mesh allow, `psi` at its vertices.
-    pub fn places(&self, psi: &[f64]) -> Vec<AllowedStep> {
-        let place = |t: usize| {
-            let corners = self.mesh.triangles()[t].map(|v| v as usize);
-            let middle =
-                MeshPoint { triangle: t as u32, weights: [1.0 / 3.0; 3], position: Point3::origin() };
-            let allowed = self.allowed_at(&middle).filter(|_| corners.iter().any(|&v| self.reached[v]))?;
-            let mean = corners.iter().map(|&v| psi[v]).sum::<f64>() / 3.0;
-            let length = self.mesh.area(t) * allowed.step / allowed.width;
-            Some(AllowedStep { psi: mean, step: allowed.step, length, too_concave: false })
+    /// What the places of the mesh allow.
+    pub fn places(&self) -> Vec<AllowedStep> {
+        let mesh = self.on.mesh;
+        let allowed = |p: &MeshPoint| {
+            let is_reached = mesh.triangles()[p.triangle as usize].iter().any(|&v| self.reached[v as usize]);
+            self.allowed_at(p).filter(|_| is_reached).map(|allowed| (allowed, false))
         };
-        (0..self.mesh.triangles().len()).filter_map(place).collect()
-    }
-
-    fn mixed(&self, p: &MeshPoint, of: &[Vector3]) -> Vector3 {
-        let corners = self.mesh.triangles()[p.triangle as usize];
-        (0..3).map(|k| of[corners[k] as usize] * p.weights[k]).sum()
+        self.on.places(mesh.triangles().len(), allowed)
     }
 
     fn allowed_at(&self, p: &MeshPoint) -> Option<Allowed> {
-        let corners = self.mesh.triangles()[p.triangle as usize];
-        let normal = self.mesh.area_vector(p.triangle as usize).try_normalize(0.0)?;
+        let corners = self.on.mesh.triangles()[p.triangle as usize];
+        let normal = self.on.mesh.area_vector(p.triangle as usize).try_normalize(0.0)?;
         // Beside a valley a gradient recovered from both sides is that of neither.
-        let beside = corners.iter().any(|&v| self.mesh.normals()[v as usize].dot(&normal) < VALLEY_BESIDE);
+        let beside = corners.iter().any(|&v| self.on.mesh.normals()[v as usize].dot(&normal) < VALLEY_BESIDE);
         let gradient = if beside {
             self.gradients[p.triangle as usize]
         } else {
-            let mixed = self.mixed(p, self.levels.gradients());
+            let mixed = self.on.gradient(p);
             mixed - normal * normal.dot(&mixed)
         };
         let width: f64 = (0..3).map(|k| self.widths[corners[k] as usize] * p.weights[k]).sum();
@@ -70,8 +61,10 @@ impl OffsetGuide<'_> {
     }
 
     fn spot(&self, at: MeshPoint) -> Spot {
-        let away = self.mixed(&at, self.mesh.normals()).try_normalize(1e-9);
-        let away = away.unwrap_or_else(|| self.mesh.area_vector(at.triangle as usize).normalize());
+        let (corners, normals) = (self.on.mesh.triangles()[at.triangle as usize], self.on.mesh.normals());
+        let away: Vector3 = (0..3).map(|k| normals[corners[k] as usize] * at.weights[k]).sum();
+        let away = away.try_normalize(1e-9);
+        let away = away.unwrap_or_else(|| self.on.mesh.area_vector(at.triangle as usize).normalize());
         Spot { at, away, allowed: self.allowed_at(&at) }
     }
 
@@ -81,11 +74,9 @@ impl OffsetGuide<'_> {
         if curve.closed {
             knots.push(knots[0]);
         }
-        let mut s = vec![0.0];
-        for w in knots.windows(2) {
-            s.push(s[s.len() - 1] + (w[1].position - w[0].position).norm());
-        }
-        let total = s[s.len() - 1];
+        let positions: Vec<Point3> = knots.iter().map(|knot| knot.position).collect();
+        let s = CubicSpline::chord_lengths(&positions, false);
+        let total = s.last().copied().unwrap_or(0.0);
         if total <= 0.0 {
             return Vec::new();
         }
@@ -99,23 +90,17 @@ impl OffsetGuide<'_> {
                 }
                 let t = if s[k + 1] > s[k] { ((at - s[k]) / (s[k + 1] - s[k])).clamp(0.0, 1.0) } else { 0.0 };
                 let position = knots[k].position + (knots[k + 1].position - knots[k].position) * t;
-                self.spot(self.in_triangle(knots[k].triangle, position))
+                self.spot(self.on.in_triangle(knots[k].triangle, position))
             })
             .collect();
         let near = |spot: &Spot| {
-            let corners = self.mesh.triangles()[spot.at.triangle as usize];
+            let corners = self.on.mesh.triangles()[spot.at.triangle as usize];
             let all = corners.map(|v| self.reached[v as usize]);
             all == [true; 3] || (all != [false; 3] && self.rider.is_reached(&spot.at.position))
         };
         let kept = runs(spots.len(), |k| near(&spots[k]));
         // A closed curve is cut where it begins: its last point is its first one again.
         kept.iter().map(|&[a, b]| Track { points: spots[a..=b].to_vec(), closed: false }).collect()
-    }
-
-    fn in_triangle(&self, t: u32, position: Point3) -> MeshPoint {
-        let (corners, hats) = (self.mesh.corners(t as usize), self.mesh.hat_gradients(t as usize));
-        let weights = [0, 1, 2].map(|k| (1.0 + hats[k].dot(&(position - corners[k]))).clamp(0.0, 1.0));
-        MeshPoint { triangle: t, weights, position }
     }
 
     /// Appends nothing where a run is too short.
@@ -141,7 +126,7 @@ impl LevelSource for OffsetGuide<'_> {
     type Place = Spot;
 
     fn curves(&self, level: f64) -> Vec<Track<Spot>> {
-        self.levels.curves(level).iter().flat_map(|curve| self.tracks(curve)).collect()
+        self.on.curves(level).iter().flat_map(|curve| self.tracks(curve)).collect()
     }
 
     fn allowed(&self, spot: &Spot) -> Option<Allowed> {
@@ -174,7 +159,7 @@ impl LevelSource for OffsetGuide<'_> {
 
     fn contacts(&self, curve: &Track<Spot>, run: Option<[usize; 2]>) -> Vec<Contact> {
         let contact = |spot: &Spot| {
-            let gradient = self.mixed(&spot.at, self.levels.gradients());
+            let gradient = self.on.gradient(&spot.at);
             let across = (gradient - spot.away * spot.away.dot(&gradient)).try_normalize(1e-300)?;
             let at = spot.at.position - spot.away * self.rider.level.distance();
             Some(Contact {
