@@ -7,6 +7,7 @@
 
 use geometry::{Point3, Vector3};
 
+use crate::arc::arc_tolerance;
 use crate::control::Plane;
 use crate::error::{Fault, ProgramError, Stop};
 use crate::lines::Lines;
@@ -62,8 +63,11 @@ const TEXT: [&str; 5] = ["PARTNO", "PPRINT", "REMARK", "INSERT", "TPRINT"];
 /// Lines that one statement may be carried over.
 const MOST_LINES: usize = 1000;
 
-/// Locations between which one circle runs at most half a turn are exact; longer ones follow from the points given.
-const RADIUS_SHARE: f64 = 1e-3;
+/// Tool axes that differ by less, rad, are one: four decimals round as far.
+const SAME_AXIS: f64 = 2e-4;
+
+/// Ends may miss the radius of a CIRCLE by this much, mm, or by a share of the radius, as those of arcs in G-code.
+const RADIUS_TOLERANCE: f64 = 0.01;
 
 /// What CIRCLE says of the motion that follows.
 #[derive(Debug, Clone, Copy)]
@@ -362,6 +366,9 @@ impl Reader {
 
     /// `FROM/x,y,z[,i,j,k]`: where the tool stands.
     fn from(&mut self, statement: &Statement) -> Result<(), Stop> {
+        if self.circle.is_some() {
+            return Err(Stop::new(0, Fault::Circle("ends in no GOTO".to_owned())));
+        }
         let (at, axis) = self.location(statement, "FROM")?;
         (self.at, self.axis) = (at, axis);
         if self.out.steps.is_empty() {
@@ -406,8 +413,12 @@ impl Reader {
 
     fn go(&mut self, line: usize, at: Point3, axis: Vector3) -> Result<(), Stop> {
         let from = self.at;
-        let turned = axis != self.axis;
+        let turned = (axis - self.axis).norm() > SAME_AXIS;
         (self.at, self.axis) = (at, axis);
+        let circle = self.circle.take();
+        if circle.is_some() && !self.begun {
+            return Err(Stop::new(0, Fault::Circle("has no place where it begins".to_owned())));
+        }
         if !self.begun {
             // Where the tool comes from is not said: it begins here.
             self.begun = true;
@@ -417,14 +428,17 @@ impl Reader {
             return Ok(());
         }
         let rapid = std::mem::take(&mut self.rapid);
-        let circle = self.circle.take().filter(|_| !rapid && !turned);
-        match circle.and_then(|circle| arc(&circle, &from, &at)) {
-            Some(arc) => {
-                self.out.arcs.push(arc);
-                self.push(line, StepKind::Arc(self.out.arcs.len() as u32 - 1));
+        let kind = match circle {
+            None if rapid => StepKind::Rapid,
+            None => StepKind::Feed,
+            Some(_) if rapid => return Err(Stop::new(0, Fault::Circle("is a rapid".to_owned()))),
+            Some(_) if turned => return Err(Stop::new(0, Fault::Circle("turns the tool axis".to_owned()))),
+            Some(circle) => {
+                self.out.arcs.push(arc(&circle, &from, &at)?);
+                StepKind::Arc(self.out.arcs.len() as u32 - 1)
             }
-            None => self.push(line, if rapid { StepKind::Rapid } else { StepKind::Feed }),
-        }
+        };
+        self.push(line, kind);
         Ok(())
     }
 
@@ -446,6 +460,10 @@ impl Reader {
     /// `CIRCLE/x,y,z,i,j,k,r[,…]`: the next location is reached along it.
     fn circle(&mut self, statement: &Statement) -> Result<(), Stop> {
         let values = statement.numbers();
+        // Words such as TIMES add turns.
+        if self.circle.is_some() || values.len() < statement.words.len() {
+            return Err(Stop::new(0, Fault::Statement(statement.text())));
+        }
         if values.len() < 7 {
             let (what, wanted) = ("CIRCLE", "at least 7");
             return Err(Stop::new(0, Fault::Count { what, wanted, found: values.len() }));
@@ -463,23 +481,26 @@ fn place(at: &Point3) -> [f64; 6] {
     [at.x, at.y, at.z, 0.0, 0.0, 0.0]
 }
 
-/// The arc from one point of a circle to another about its axis; `None` where they do not lie on it.
-fn arc(circle: &Circle, from: &Point3, to: &Point3) -> Option<Arc> {
-    let [a, b] = [from, to].map(|p| {
+/// The arc from one point of a circle to another about its axis.
+fn arc(circle: &Circle, from: &Point3, to: &Point3) -> Result<Arc, Stop> {
+    let spokes = [from, to].map(|p| {
         let spoke = p - circle.centre;
         spoke - circle.axis * spoke.dot(&circle.axis)
     });
-    let allowed = 0.01f64.max(RADIUS_SHARE * circle.radius);
-    if (a.norm() - circle.radius).abs() > allowed
-        || (b.norm() - circle.radius).abs() > allowed
-        || circle.radius <= 0.0
-    {
-        return None;
+    let radius = circle.radius;
+    let allowed = arc_tolerance(RADIUS_TOLERANCE, radius);
+    for (spoke, what) in spokes.iter().zip(["begins", "ends"]) {
+        let far = spoke.norm();
+        if far <= 0.0 || (far - radius).abs() > allowed {
+            let text = format!("{what} {far:.4} mm from its axis, and its radius is {radius:.4} mm");
+            return Err(Stop::new(0, Fault::Circle(text)));
+        }
     }
+    let [a, b] = spokes;
     let angle = a.cross(&b).dot(&circle.axis).atan2(a.dot(&b));
     let sweep = if angle <= 1e-12 { angle + std::f64::consts::TAU } else { angle };
     let centre = circle.centre + circle.axis * (from - circle.centre).dot(&circle.axis);
-    Some(Arc { centre: centre.into(), normal: circle.axis.into(), sweep, plane: Plane::Xy })
+    Ok(Arc { centre: centre.into(), normal: circle.axis.into(), sweep, plane: Plane::Xy })
 }
 
 #[cfg(test)]

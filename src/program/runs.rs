@@ -125,6 +125,10 @@ fn kind(from: &ClPoint, to: &ClPoint) -> MoveKind {
     }
 }
 
+fn tip(place: &Place) -> [f64; 3] {
+    [place[0], place[1], place[2]]
+}
+
 /// One setting of a program, laid to the part.
 struct Layer<'a> {
     program: &'a Program,
@@ -183,20 +187,14 @@ impl Layer<'_> {
     fn follow(&self, k: usize, step: &Step, run: &mut Run) -> Result<(), Fault> {
         let from = self.program.start_of(k);
         let to = &step.to;
-        let rapid = step.kind == StepKind::Rapid;
         if let Some(axis) = self.program.axes.get(k + 1) {
-            // Places between are not known; the tip runs straight while the axis turns evenly.
-            let at = self.location(to, Some(axis))?;
-            run.push(at, rapid, step.feed, step.line);
-            return Ok(());
+            return self.follow_axis(k, step, axis, run);
         }
         let turns = from[3..] != to[3..];
         if let StepKind::Arc(index) = step.kind {
             let arc = &self.program.arcs[index as usize];
-            let start = [from[0], from[1], from[2]];
-            let end = [to[0], to[1], to[2]];
-            let radius = (0..3).map(|k| (start[k] - arc.centre[k]).powi(2)).sum::<f64>().sqrt();
-            let chords = arc.chords(radius, self.placing.chord);
+            let (start, end) = (tip(from), tip(to));
+            let chords = arc.chords(&start, self.placing.chord);
             let mut last = *from;
             for n in 1..=chords {
                 let t = n as f64 / chords as f64;
@@ -209,6 +207,27 @@ impl Layer<'_> {
             return Ok(());
         }
         self.straight(from, to, step, turns, run)
+    }
+
+    /// A step whose tool axis the program gives. Places between are not known: the axis turns evenly on the way of the tip.
+    fn follow_axis(&self, k: usize, step: &Step, axis: &[f64; 3], run: &mut Run) -> Result<(), Fault> {
+        let (from, to) = (self.program.start_of(k), &step.to);
+        if let StepKind::Arc(index) = step.kind {
+            let arc = &self.program.arcs[index as usize];
+            let (start, end) = (tip(from), tip(to));
+            let (before, after) = (Vector3::from(self.program.axes[k]), Vector3::from(*axis));
+            let chords = arc.chords(&start, self.placing.chord);
+            for n in 1..chords {
+                let t = n as f64 / chords as f64;
+                let [x, y, z] = arc.at(&start, &end, t);
+                let turned = if before == after { after } else { before.lerp(&after, t).normalize() };
+                let at = self.location(&[x, y, z, 0.0, 0.0, 0.0], Some(&turned.into()))?;
+                run.push(at, false, step.feed, step.line);
+            }
+        }
+        let at = self.location(to, Some(axis))?;
+        run.push(at, step.kind == StepKind::Rapid, step.feed, step.line);
+        Ok(())
     }
 
     fn straight(

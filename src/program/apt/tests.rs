@@ -46,6 +46,58 @@ fn nx_is_read_with_its_arcs() {
     }
 }
 
+/// Locations of a half circle in XZ, its lowest place at z = -5, under a tool axis of these words.
+fn half_circle(before: &str, after: &str) -> String {
+    format!(
+        "FEDRAT/MMPM,200\nFROM/10.0,20.0,20.0\nGOTO/10.0,20.0,5.0{before}\n\
+         CIRCLE/20.0,20.0,5.0,0.0,-1.0,0.0,10.0\nGOTO/30.0,20.0,5.0{after}\nFINI\n"
+    )
+}
+
+#[test]
+fn circles_are_followed_under_upright_and_leaning_tools() {
+    let axes = [
+        ("", ""),
+        (",0,0,1", ",0.0001,0,1"),
+        (",0.6,0,0.8", ",0.6,0,0.8"),
+        (",0.6,0,0.8", ",0.600001,0,0.8"),
+    ];
+    for (before, after) in axes {
+        let placing = Placing { chord: 0.001, kinematics: None, lengths: &|_| None };
+        let runs = read(&half_circle(before, after)).runs(&placing).unwrap();
+        let path = &runs[0].path;
+        let along = &path.moves[1..];
+        let lowest = along.iter().map(|step| step.to.tip.z).fold(f64::INFINITY, f64::min);
+        assert!((lowest + 5.0).abs() < 0.001, "{before} {after}: {lowest}");
+        for step in along {
+            let radius = (step.to.tip.x - 20.0).hypot(step.to.tip.z - 5.0);
+            let lean = step.to.axis.dot(&path.moves[0].to.axis);
+            assert!((radius - 10.0).abs() < 1e-9 && lean > 1.0 - 1e-7, "{before} {after}: {step:?}");
+        }
+    }
+}
+
+#[test]
+fn circles_that_cannot_be_followed_are_refused_with_their_line() {
+    let sound = half_circle("", "");
+    for (text, line) in [
+        (sound.replace("GOTO/30.0", "GOTO/30.02"), 5),
+        (sound.replace("GOTO/10.0", "GOTO/9.98"), 5),
+        (sound.replace(",10.0\n", ",0.0\n"), 5),
+        (sound.replace(",10.0\n", ",10.0,TIMES,2\n"), 4),
+        (sound.replace("GOTO/30.0", "RAPID\nGOTO/30.0"), 6),
+        (sound.replace("GOTO/30.0", "FROM/30.0"), 5),
+        (sound.replace("FROM/10.0,20.0,20.0\nGOTO/10.0,20.0,5.0\n", ""), 3),
+        (half_circle(",0,0,1", ",0.001,0,1"), 5),
+        (half_circle(",0.6,0,0.8", ",0,0,1"), 5),
+        ("GOTO/0,1000,0\nCIRCLE/0,0,0,0,0,1,1000\nGOTO/0,-1000.2,0\n".to_owned(), 3),
+    ] {
+        let error = read_apt("a.cls", text.as_bytes()).expect_err(&text);
+        assert_eq!(error.line, line, "{text}: {error}");
+    }
+    assert!(read_apt("a.cls", sound.replace("GOTO/30.0", "GOTO/30.005").as_bytes()).is_ok());
+}
+
 #[test]
 fn catia_habits_inches_and_five_axes() {
     let text = "\
