@@ -127,6 +127,7 @@ impl Session {
         let rise_to = tops.reduce(f64::max);
         let header = ProgramHeader { rise_to, ..header(scene, "") };
         plan.path.origin.lines = lines(scene, &plan.path, joints.as_ref(), &header)?;
+        plan.path.origin.strays = scene.arcs.unwrap_or(0.0);
         Ok(Planned {
             plan,
             strategy,

@@ -165,6 +165,17 @@ impl Arc {
         [0, 1, 2].map(|k| self.centre[k] + grown * (cos * spoke[k] + sin * across[k]) + t * rise * n[k])
     }
 
+    /// How far the arc strays at most from so many chords, mm: an eighth of the square of their step times its bend.
+    pub fn strays(&self, start: &[f64; 3], end: &[f64; 3], chords: usize) -> f64 {
+        let [first, last] = [start, end].map(|at| {
+            let spoke = [0, 1, 2].map(|k| at[k] - self.centre[k]);
+            let along = (0..3).map(|k| spoke[k] * self.normal[k]).sum::<f64>();
+            (0..3).map(|k| (spoke[k] - along * self.normal[k]).powi(2)).sum::<f64>().sqrt()
+        });
+        let step = self.sweep / chords as f64;
+        0.125 * step * (first.max(last) * step + 2.0 * (last - first).abs() / chords as f64)
+    }
+
     /// Chords from which the arc strays no farther than `tolerance`, mm, where it begins at `start`.
     pub fn chords(&self, start: &[f64; 3], tolerance: f64) -> usize {
         /// Beyond, an arc is a mistake of units.
@@ -208,5 +219,19 @@ mod tests {
         let chords = arc.chords(&start, 0.01);
         let sagitta = |n: usize| 5.0 * (1.0 - (0.5 * arc.sweep / n as f64).cos());
         assert!(sagitta(chords) <= 0.01 && sagitta(chords - 1) > 0.01, "{chords}");
+        for (end, chords) in [(end, chords), ([1.0, -3.1, 9.0], chords), ([1.0, -2.5, 9.0], 3)] {
+            let bound = arc.strays(&start, &end, chords);
+            let place = |t: f64| geometry::Point3::from(arc.at(&start, &end, t));
+            let off = |k: usize| {
+                let [a, b] = [k, k + 1].map(|n| place(n as f64 / chords as f64));
+                let apart = |n: usize| {
+                    let t = n as f64 / 100.0;
+                    (place((k as f64 + t) / chords as f64) - (a + t * (b - a))).norm()
+                };
+                (1..100).map(apart).fold(0.0, f64::max)
+            };
+            let most = (0..chords).map(off).fold(0.0, f64::max);
+            assert!(most <= bound && bound < 1.2 * most, "{most} {bound}");
+        }
     }
 }

@@ -71,6 +71,25 @@ fn a_rotation_turns_what_follows() {
 }
 
 #[test]
+fn moves_are_off_arcs_by_no_more_than_is_told() {
+    let text = "G18\nG0 X-0.31 Z0\nG2 X0.31 Z0 I0.31 K49.999039 F100\nG17\nG3 X-40 Y0 I-20.155 J0\nM30\n";
+    let placing = Placing { chord: 0.001, kinematics: None, lengths: &|_| None };
+    let path = &read(text).runs(&placing).unwrap()[0].path;
+    let off = path.segments().filter(|(.., step)| step.kind != motion::MoveKind::Rapid).map(|(a, b, _)| {
+        let middle = a + 0.5 * (b - a);
+        if a.y == 0.0 && b.y == 0.0 {
+            50.0 - middle.x.hypot(middle.z - 49.999039)
+        } else {
+            20.155 - (middle.x + 19.845).hypot(middle.y)
+        }
+    });
+    let most = off.fold(0.0, f64::max);
+    assert!(most > 5e-5 && most <= path.origin.strays && path.origin.strays <= 1.01e-4, "{most}");
+    let straight = &read("G0 X1\nG1 X5 F100\nM30\n").runs(&placing).unwrap()[0].path;
+    assert_eq!(straight.origin.strays, 0.0);
+}
+
+#[test]
 fn shifts_are_independent_of_each_other_on_fanuc() {
     assert_ends("G92 X5 Y0\nG52 X1\nG1 X0 F1\nG52 X0\nX0\nM30\n", &[[-4.0, 0.0, 0.0], [-5.0, 0.0, 0.0]]);
     assert_ends("G10 L2 P2 X1 Y2\nG55 G0 X0 Y0\nG54.1 P3 X5\nM30\n", &[[1.0, 2.0, 0.0], [5.0, 2.0, 0.0]]);

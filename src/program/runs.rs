@@ -1,7 +1,7 @@
 //! From a program to straight moves of tips and axes, one run for each stretch of one tool.
 //!
 //! Enters: a [`Program`] in machine coordinates. Leaves: paths in the coordinates of the part, whose zero is the program's.
-//! Arcs become chords within the chord tolerance. Where rotary axes turn, the way of the tip that follows from the machine is
+//! Arcs become chords, far nearer than the chord tolerance, and [`motion::Origin::strays`] has how far they are off. Where rotary axes turn, the way of the tip that follows from the machine is
 //! divided so that straight pieces keep the same tolerance.
 
 use geometry::{Point3, Vector3};
@@ -10,10 +10,13 @@ use motion::{ClPoint, Move, MoveKind, Origin, Toolpath};
 
 use crate::error::{Fault, ProgramError};
 use crate::frame::Place;
-use crate::program::{Program, Setting, Step, StepKind};
+use crate::program::{Arc, Program, Setting, Step, StepKind};
 
 /// Feed of moves for which the program gives none, mm/min. They are violations; the time needs a number.
 pub const FEED_WHERE_NONE: f64 = 100.0;
+
+/// Chords of arcs stray by no more than this share of the chord tolerance: what is measured has to be known so much better.
+const ARC_SHARE: f64 = 0.1;
 
 /// A piece of a turning move is halved so many times at most: a thousandth of any turn.
 const MOST_HALVINGS: u32 = 12;
@@ -26,7 +29,7 @@ const STRAIGHT: f64 = 1e-6;
 
 /// How a program is laid to the part.
 pub struct Placing<'a> {
-    /// How far chords may stray, mm.
+    /// The chord tolerance, mm: pieces of turning moves may be as far off, chords of arcs a tenth as far.
     pub chord: f64,
     /// The machine, where it has rotary axes.
     pub kinematics: Option<&'a Kinematics>,
@@ -52,7 +55,7 @@ impl Program {
     /// [`ProgramError`] where a rotary axis turns that the machine does not have.
     ///
     /// # Tolerance
-    /// Chords of arcs stray by no more than [`Placing::chord`] (those of a helix, of its circle).
+    /// The motion is off the moves by no more than [`motion::Origin::strays`], mm.
     pub fn runs(&self, placing: &Placing<'_>) -> Result<Vec<ToolRun>, ProgramError> {
         let mut runs: Vec<Run> = Vec::new();
         for (k, step) in self.steps.iter().enumerate() {
@@ -83,17 +86,23 @@ struct Run {
     joints: Vec<Waypoint>,
     pass: u32,
     cutting: bool,
+    /// How far arcs are off their chords, and turning moves off their pieces, mm.
+    chords_stray: f64,
+    turns_stray: f64,
 }
 
 impl Run {
     fn new(tool: u32, start: ClPoint, joints: Option<Joints>) -> Self {
         let begin = joints.map(|joints| Waypoint { joints, step: 0, way: Way::Approach });
         let joints = begin.into_iter().collect();
-        Self { tool, at: start, path: Toolpath::new(start, Vec::new()), joints, pass: 0, cutting: false }
+        let path = Toolpath::new(start, Vec::new());
+        Self { tool, at: start, path, joints, pass: 0, cutting: false, chords_stray: 0.0, turns_stray: 0.0 }
     }
 
     fn finished(self, program: &str) -> ToolRun {
-        let origin = Origin { tools: vec![(0, self.tool)], program: program.to_owned(), ..self.path.origin };
+        let strays = self.chords_stray + self.turns_stray;
+        let (tools, program) = (vec![(0, self.tool)], program.to_owned());
+        let origin = Origin { tools, program, strays, ..self.path.origin };
         ToolRun { tool: self.tool, path: Toolpath { origin, ..self.path }, joints: self.joints }
     }
 
@@ -194,7 +203,7 @@ impl Layer<'_> {
         if let StepKind::Arc(index) = step.kind {
             let arc = &self.program.arcs[index as usize];
             let (start, end) = (tip(from), tip(to));
-            let chords = arc.chords(&start, self.placing.chord);
+            let chords = self.chords(arc, &start, &end, run);
             let mut last = *from;
             for n in 1..=chords {
                 let t = n as f64 / chords as f64;
@@ -209,6 +218,13 @@ impl Layer<'_> {
         self.straight(from, to, step, turns, run)
     }
 
+    /// Chords of an arc; the run knows how far they are off.
+    fn chords(&self, arc: &Arc, start: &[f64; 3], end: &[f64; 3], run: &mut Run) -> usize {
+        let chords = arc.chords(start, ARC_SHARE * self.placing.chord);
+        run.chords_stray = run.chords_stray.max(arc.strays(start, end, chords));
+        chords
+    }
+
     /// A step whose tool axis the program gives. Places between are not known: the axis turns evenly on the way of the tip.
     fn follow_axis(&self, k: usize, step: &Step, axis: &[f64; 3], run: &mut Run) -> Result<(), Fault> {
         let (from, to) = (self.program.start_of(k), &step.to);
@@ -216,7 +232,7 @@ impl Layer<'_> {
             let arc = &self.program.arcs[index as usize];
             let (start, end) = (tip(from), tip(to));
             let (before, after) = (Vector3::from(self.program.axes[k]), Vector3::from(*axis));
-            let chords = arc.chords(&start, self.placing.chord);
+            let chords = self.chords(arc, &start, &end, run);
             for n in 1..chords {
                 let t = n as f64 / chords as f64;
                 let [x, y, z] = arc.at(&start, &end, t);
@@ -266,17 +282,21 @@ impl Layer<'_> {
     ) -> Result<(), Fault> {
         let between = |t: f64| -> Place { std::array::from_fn(|k| from[k] + (to[k] - from[k]) * t) };
         let [start, end] = [self.location(&between(a), None)?, self.location(&between(b), None)?];
-        let near = |t: f64| {
+        let off = |t: f64| {
             let truly = self.location(&between(a + (b - a) * t), None)?;
             let straight = start.towards(&end, t);
             // The axis is weighed over a cutting length of a hundred mm.
-            let off = (truly.tip - straight.tip).norm() + 100.0 * (truly.axis - straight.axis).norm();
-            Ok::<bool, Fault>(off <= 0.5 * self.placing.chord)
+            Ok::<f64, Fault>((truly.tip - straight.tip).norm() + 100.0 * (truly.axis - straight.axis).norm())
         };
+        // Between these places it is off by no more than twice as far.
+        let strays = 2.0 * off(0.25)?.max(off(0.5)?).max(off(0.75)?);
         let small = start.axis.dot(&end.axis) > MOST_TURN.cos();
-        if depth >= MOST_HALVINGS || small && near(0.25)? && near(0.5)? && near(0.75)? {
+        if depth >= MOST_HALVINGS || small && strays <= self.placing.chord {
             if start.axis.dot(&end.axis) < -1.0 + 1e-9 {
                 return Err(Fault::HalfTurn);
+            }
+            if step.kind != StepKind::Rapid {
+                run.turns_stray = run.turns_stray.max(strays);
             }
             if b < 1.0 {
                 run.push(end, step.kind == StepKind::Rapid, step.feed, step.line);
