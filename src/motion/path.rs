@@ -90,6 +90,8 @@ pub struct Origin {
     pub lines: Vec<u32>,
     /// How far its motion may be off these moves, mm, where arcs and turns are moves here.
     pub strays: f64,
+    /// Time for which the tip stands besides its moves, s.
+    pub standing_s: f64,
 }
 
 /// A start and the moves from there.
@@ -139,7 +141,7 @@ impl Toolpath {
         let within = shown.take_while(|(first, _)| (*first as usize) < moves.end);
         let tools = within.map(|(first, tool)| (first.saturating_sub(moves.start as u32), *tool)).collect();
         let program = self.origin.program.clone();
-        let origin = Origin { program, tools, lines, ..self.origin };
+        let origin = Origin { program, tools, lines, standing_s: 0.0, ..self.origin };
         Self { start: self.location_before(moves.start), moves: self.moves[moves].to_vec(), origin }
     }
 

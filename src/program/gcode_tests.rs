@@ -89,6 +89,34 @@ fn moves_are_off_arcs_by_no_more_than_is_told() {
     assert_eq!(straight.origin.strays, 0.0);
 }
 
+/// Minutes that the moves of a program take at their feeds on a table that turns about x and z, standing included.
+fn minutes_on_a_table(text: &str) -> f64 {
+    let kinematics = machine::kinematics::Kinematics::by_name("ac-table").unwrap();
+    let placing = Placing { chord: 0.001, kinematics: Some(&kinematics), lengths: &|_| None };
+    let path = &read(text).runs(&placing).unwrap()[0].path;
+    let fed = path.segments().filter(|(.., step)| step.kind != motion::MoveKind::Rapid);
+    let moving: f64 = fed.map(|(a, b, step)| (b - a).norm() / step.feed_rate).sum();
+    moving + path.origin.standing_s / 60.0
+}
+
+#[test]
+fn moves_in_which_axes_turn_take_the_time_of_their_feed() {
+    for (text, expected) in [
+        ("G0 X50 Y0 Z20 C0 A0\nG93\nG1 C90 F1\nG1 X51 C180 F1\nG94\nM30\n", 2.0),
+        ("G0 X50 Z20 C0\nG1 C90 F45\nX60 C0 F5\nM30\n", 4.0),
+        // About the tip, and with nothing left to do.
+        ("G0 X0 Y0 Z20\nG93 G1 A30 F0.5\nM30\n", 2.0),
+        ("G0 X0 Y0 Z20\nG93 G1 C90 F0.5\nM30\n", 2.0),
+        ("G43.4 H1 G0 X10 Y0 Z20\nG93 G1 A30 C90 F0.5\nM30\n", 2.0),
+        ("G0 X50 Y0 Z20\nG93 G2 X0 Y50 I-50 J0 C90 F2\nM30\n", 0.5),
+    ] {
+        let minutes = minutes_on_a_table(text);
+        assert!((minutes / expected - 1.0).abs() < 1e-4, "{text}: {minutes}");
+    }
+    // No faster than the axes can.
+    assert!(minutes_on_a_table("G0 X50 Y0 Z20 C0\nG93 G1 C90 F1000000\nM30\n") > 1e-3);
+}
+
 #[test]
 fn shifts_are_independent_of_each_other_on_fanuc() {
     assert_ends("G92 X5 Y0\nG52 X1\nG1 X0 F1\nG52 X0\nX0\nM30\n", &[[-4.0, 0.0, 0.0], [-5.0, 0.0, 0.0]]);

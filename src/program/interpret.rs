@@ -9,7 +9,7 @@ use crate::control::{Code, Codes, Control, FeedMode, Length, Motion, Plane, Radi
 use crate::error::{Fault, ProgramError, Stop};
 use crate::expression::Scope;
 use crate::flow::{Flow, Next};
-use crate::frame::{Place, Rotation};
+use crate::frame::{Place, Rotation, fed_length};
 use crate::lines::Lines;
 use crate::parameters::Parameters;
 use crate::program::{Arc, Note, Program, Setting, Spindle, Step, StepKind, ToolRemark};
@@ -722,9 +722,7 @@ impl<'a> Interpreter<'a> {
     }
 
     fn length_to(&self, to: &Place) -> f64 {
-        let apart = |k: usize| to[k] - self.state.at[k];
-        let straight = apart(0).hypot(apart(1)).hypot(apart(2));
-        if straight > 0.0 { straight } else { apart(3).hypot(apart(4)).hypot(apart(5)) }
+        fed_length(&self.state.at, to)
     }
 
     /// The feed of a move of this length, mm/min; 0 where the program gives none.

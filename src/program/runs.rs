@@ -9,7 +9,7 @@ use machine::kinematics::{Joints, Kinematics, Way, Waypoint};
 use motion::{ClPoint, Move, MoveKind, Origin, Toolpath};
 
 use crate::error::{Fault, ProgramError};
-use crate::frame::Place;
+use crate::frame::{Place, fed_length};
 use crate::program::{Arc, Program, Setting, Step, StepKind};
 
 /// Feed of moves for which the program gives none, mm/min. They are violations; the time needs a number.
@@ -23,6 +23,9 @@ const MOST_HALVINGS: u32 = 12;
 
 /// No piece turns the tool by more than this, rad.
 const MOST_TURN: f64 = 0.5;
+
+/// Tips that are nearer to each other, mm, are one place.
+const NO_WAY: f64 = 1e-9;
 
 /// A feed that leans less than this share from the tool axis goes straight down or up.
 const STRAIGHT: f64 = 1e-6;
@@ -89,6 +92,8 @@ struct Run {
     /// How far arcs are off their chords, and turning moves off their pieces, mm.
     chords_stray: f64,
     turns_stray: f64,
+    /// Time for which the tip stands, s.
+    standing_s: f64,
 }
 
 impl Run {
@@ -96,14 +101,40 @@ impl Run {
         let begin = joints.map(|joints| Waypoint { joints, step: 0, way: Way::Approach });
         let joints = begin.into_iter().collect();
         let path = Toolpath::new(start, Vec::new());
-        Self { tool, at: start, path, joints, pass: 0, cutting: false, chords_stray: 0.0, turns_stray: 0.0 }
+        Self {
+            tool,
+            at: start,
+            path,
+            joints,
+            pass: 0,
+            cutting: false,
+            chords_stray: 0.0,
+            turns_stray: 0.0,
+            standing_s: 0.0,
+        }
     }
 
     fn finished(self, program: &str) -> ToolRun {
         let strays = self.chords_stray + self.turns_stray;
         let (tools, program) = (vec![(0, self.tool)], program.to_owned());
-        let origin = Origin { tools, program, strays, ..self.path.origin };
+        let origin = Origin { tools, program, strays, standing_s: self.standing_s, ..self.path.origin };
         ToolRun { tool: self.tool, path: Toolpath { origin, ..self.path }, joints: self.joints }
+    }
+
+    /// A piece of a step in which axes turn; it takes so many minutes, where that is known.
+    fn push_turning(&mut self, to: ClPoint, step: &Step, minutes: Option<f64>) {
+        let length = (to.tip - self.at.tip).norm();
+        let feed = match minutes {
+            Some(minutes) if length > NO_WAY => length / minutes,
+            Some(minutes) => {
+                self.standing_s += 60.0 * minutes;
+                step.feed
+            }
+            None => step.feed,
+        };
+        if to != self.at {
+            self.push(to, step.kind == StepKind::Rapid, feed, step.line);
+        }
     }
 
     /// A straight move to a location. Passes are what lies between rapids.
@@ -136,6 +167,15 @@ fn kind(from: &ClPoint, to: &ClPoint) -> MoveKind {
 
 fn tip(place: &Place) -> [f64; 3] {
     [place[0], place[1], place[2]]
+}
+
+/// A straight way of all axes, some of which turn.
+struct Turn<'a> {
+    from: &'a Place,
+    to: &'a Place,
+    step: &'a Step,
+    /// How long it takes, where that is known: all axes move evenly.
+    minutes: Option<f64>,
 }
 
 /// One setting of a program, laid to the part.
@@ -255,12 +295,10 @@ impl Layer<'_> {
         run: &mut Run,
     ) -> Result<(), Fault> {
         if turns {
-            self.halve(from, to, [0.0, 1.0], step, run, 0)?;
-        }
-        let at = self.location(to, None)?;
-        // Where nothing is left to do after a turn, no move is left.
-        if at != run.at || !turns {
-            run.push(at, step.kind == StepKind::Rapid, step.feed, step.line);
+            let minutes = self.minutes(from, to, step)?;
+            self.halve(&Turn { from, to, step, minutes }, [0.0, 1.0], run, 0)?;
+        } else {
+            run.push(self.location(to, None)?, step.kind == StepKind::Rapid, step.feed, step.line);
         }
         if !run.joints.is_empty() {
             let way = if self.setting.tip_kept { Way::Tip } else { Way::Axes };
@@ -270,16 +308,24 @@ impl Layer<'_> {
         Ok(())
     }
 
+    /// How long a feed takes in which axes turn: by its feed, or longer where an axis cannot go so fast. `None` without a feed.
+    fn minutes(&self, from: &Place, to: &Place, step: &Step) -> Result<Option<f64>, Fault> {
+        if step.kind == StepKind::Rapid || step.feed <= 0.0 {
+            return Ok(None);
+        }
+        let minutes = fed_length(from, to) / step.feed;
+        let Some(kinematics) = self.placing.kinematics else { return Ok(Some(minutes)) };
+        let [before, after] = [self.joints(from)?, self.joints(to)?];
+        let moved = (after.linear - before.linear).iter().copied().collect::<Vec<f64>>();
+        let turned = [0, 1].map(|k| after.rotary[k] - before.rotary[k]);
+        let of_axes = moved.iter().chain(&turned).zip(kinematics.rates());
+        let seconds = of_axes.map(|(by, rate)| by.abs() / rate).fold(0.0, f64::max);
+        Ok(Some(minutes.max(seconds / 60.0)))
+    }
+
     /// Divides a move in which the tool turns until its pieces are straight within the tolerance.
-    fn halve(
-        &self,
-        from: &Place,
-        to: &Place,
-        [a, b]: [f64; 2],
-        step: &Step,
-        run: &mut Run,
-        depth: u32,
-    ) -> Result<(), Fault> {
+    fn halve(&self, turn: &Turn<'_>, [a, b]: [f64; 2], run: &mut Run, depth: u32) -> Result<(), Fault> {
+        let Turn { from, to, step, minutes } = *turn;
         let between = |t: f64| -> Place { std::array::from_fn(|k| from[k] + (to[k] - from[k]) * t) };
         let [start, end] = [self.location(&between(a), None)?, self.location(&between(b), None)?];
         let off = |t: f64| {
@@ -298,13 +344,13 @@ impl Layer<'_> {
             if step.kind != StepKind::Rapid {
                 run.turns_stray = run.turns_stray.max(strays);
             }
-            if b < 1.0 {
-                run.push(end, step.kind == StepKind::Rapid, step.feed, step.line);
-            }
+            // What comes last ends exactly where the step does.
+            let end = if b < 1.0 { end } else { self.location(to, None)? };
+            run.push_turning(end, step, minutes.map(|minutes| (b - a) * minutes));
             return Ok(());
         }
         let middle = 0.5 * (a + b);
-        self.halve(from, to, [a, middle], step, run, depth + 1)?;
-        self.halve(from, to, [middle, b], step, run, depth + 1)
+        self.halve(turn, [a, middle], run, depth + 1)?;
+        self.halve(turn, [middle, b], run, depth + 1)
     }
 }
