@@ -2,7 +2,7 @@
 //!
 //! A statement is a major word, `/`, and minor words and numbers between commas; `$` carries it on in the next line, `$$`
 //! begins a remark. What moves the tool is followed (GOTO, GODLTA, FROM, CIRCLE before GOTO, RAPID), what describes it is kept
-//! (CUTTER, LOADTL, SPINDL, FEDRAT, UNITS, MULTAX), what moves nothing is passed over, and what may move it and is not
+//! (CUTTER, LOADTL, SPINDL, FEDRAT, DELAY, UNITS, MULTAX), what moves nothing is passed over, and what may move it and is not
 //! understood stops the reading.
 
 use geometry::{Point3, Vector3};
@@ -14,7 +14,7 @@ use crate::lines::Lines;
 use crate::program::{Arc, Note, Program, Setting, Spindle, Step, StepKind, ToolRemark};
 
 /// Major words that move nothing, with those that only machines act on.
-const QUIET: [&str; 40] = [
+const QUIET: [&str; 39] = [
     "PARTNO",
     "PPRINT",
     "REMARK",
@@ -24,7 +24,6 @@ const QUIET: [&str; 40] = [
     "OPSKIP",
     "STOP",
     "OPSTOP",
-    "DELAY",
     "INTOL",
     "OUTTOL",
     "TOLER",
@@ -293,6 +292,12 @@ impl Reader {
                 );
                 let (tool, line) = (self.setting.tool, statement.line as u32 + 1);
                 self.out.tools.push(ToolRemark { tool, line, text });
+                Ok(())
+            }
+            "DELAY" => {
+                let last = statement.numbers().first().map_or(0.0, |last| last.max(0.0));
+                let turns = statement.has("REV") && self.setting.speed > 0.0;
+                self.out.dwell(if turns { 60.0 * last / self.setting.speed } else { last });
                 Ok(())
             }
             "CIRCLE" => self.circle(statement),

@@ -118,6 +118,38 @@ fn moves_in_which_axes_turn_take_the_time_of_their_feed() {
 }
 
 #[test]
+fn dwells_last_as_each_control_counts_them() {
+    let lasts = |text: &str, control| -> f64 {
+        let read = read_with(text, control, &Setup::default());
+        let placing = Placing { chord: 0.001, kinematics: None, lengths: &|_| None };
+        let standing = read.runs(&placing).unwrap().iter().map(|run| run.path.origin.standing_s).sum();
+        assert!(read.notes.is_empty(), "{:?}", read.notes);
+        standing
+    };
+    let around = |dwell: &str| format!("T1 M6\nG0 X1\n{dwell}\nG1 X2 F100\nM30\n");
+    let mach = Control::from_word("mach").unwrap();
+    for (dwell, control, expected) in [
+        ("G4 X60.\nG4 P60000", GENERAL_CONTROL, 120.0),
+        ("G4 P0.5", GENERAL_CONTROL, 0.5),
+        ("G4 P500", &FANUC, 0.5),
+        ("G4 U1.5", &FANUC, 1.5),
+        ("G4 P1.", &HAAS, 1.0),
+        ("G4 P2", &LINUXCNC, 2.0),
+        ("G4 P2", &GRBL, 2.0),
+        ("G4 P2", mach, 2.0),
+        // Stays for the next hole, not for cycles that do not stand.
+        ("G82 X1 Z-1 R1 P250 F10\nX2\nG81 X3", &FANUC, 0.5),
+        ("G89 X1 Z-1 R1 P0.25 F10\nX2\nG80", &LINUXCNC, 0.5),
+    ] {
+        let found = lasts(&around(dwell), control);
+        assert!((found - expected).abs() < 1e-12, "{dwell}: {found}");
+    }
+    assert_eq!(lasts("G0 X1\nG1 X2 F100\nG4 P100\nM30\n", &FANUC), 0.1);
+    assert_eq!(refused("G0 X1\nG4 P-1\n", &FANUC).0, 2);
+    assert_eq!(read("G4\nG0 X1\nM30\n").notes.len(), 1);
+}
+
+#[test]
 fn shifts_are_independent_of_each_other_on_fanuc() {
     assert_ends("G92 X5 Y0\nG52 X1\nG1 X0 F1\nG52 X0\nX0\nM30\n", &[[-4.0, 0.0, 0.0], [-5.0, 0.0, 0.0]]);
     assert_ends("G10 L2 P2 X1 Y2\nG55 G0 X0 Y0\nG54.1 P3 X5\nM30\n", &[[1.0, 2.0, 0.0], [5.0, 2.0, 0.0]]);

@@ -83,7 +83,7 @@ pub(crate) struct Interpreter<'a> {
     /// The cutter's radius, while it is compensated.
     pub compensation: Option<Compensation>,
     /// Where the block's text begins within its line.
-    shift: usize,
+    pub shift: usize,
 }
 
 impl<'a> Interpreter<'a> {
@@ -433,7 +433,7 @@ impl<'a> Interpreter<'a> {
     /// A code that takes the block's axis words for itself.
     fn single(&mut self, code: Code, word: CodeWord) -> Result<(), Stop> {
         match code {
-            Code::Dwell => self.block.ignore(b"PXUSF"),
+            Code::Dwell => self.dwell_of_block()?,
             Code::Data => self.data(word)?,
             Code::Home(which) => self.home(usize::from(which))?,
             Code::SetHome(which) => self.state.homes[usize::from(which)] = self.nose(),

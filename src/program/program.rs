@@ -104,6 +104,8 @@ pub struct Program {
     pub start: Place,
     /// The motions, in the order in which they run.
     pub steps: Vec<Step>,
+    /// How long the tip stands, s, each before the step of an index.
+    pub dwells: Vec<(usize, f64)>,
     /// The arcs among them.
     pub arcs: Vec<Arc>,
     /// What holds meanwhile.

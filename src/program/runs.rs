@@ -61,6 +61,7 @@ impl Program {
     /// The motion is off the moves by no more than [`motion::Origin::strays`], mm.
     pub fn runs(&self, placing: &Placing<'_>) -> Result<Vec<ToolRun>, ProgramError> {
         let mut runs: Vec<Run> = Vec::new();
+        let mut dwells = self.dwells.iter().peekable();
         for (k, step) in self.steps.iter().enumerate() {
             if step.kind == StepKind::Set {
                 continue;
@@ -75,7 +76,13 @@ impl Program {
                 runs.push(Run::new(setting.tool, start, joints));
             }
             let Some(run) = runs.last_mut() else { continue };
+            while let Some((_, seconds)) = dwells.next_if(|(step, _)| *step <= k) {
+                run.standing_s += seconds;
+            }
             layer.follow(k, step, run).map_err(fault)?;
+        }
+        if let Some(run) = runs.last_mut() {
+            run.standing_s += dwells.map(|(_, seconds)| seconds).sum::<f64>();
         }
         Ok(runs.into_iter().map(|run| run.finished(&self.name)).collect())
     }

@@ -80,6 +80,8 @@ pub(crate) struct Sticky {
     pub bottom: Option<f64>,
     pub retract: Option<f64>,
     pub peck: Option<f64>,
+    /// How long the tool stands at the bottom, s.
+    pub dwell: f64,
     /// I J of G76 and G87, or Q: how far the spindle is moved aside.
     pub aside: [f64; 3],
     /// The level before the first cycle.

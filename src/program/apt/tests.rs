@@ -99,6 +99,12 @@ fn circles_that_cannot_be_followed_are_refused_with_their_line() {
 }
 
 #[test]
+fn delays_are_seconds_or_turns() {
+    let program = read("SPINDL/1200,CLW\nGOTO/0,0,1\nDELAY/2.5\nGOTO/1,0,1\nDELAY/REV,10\nFINI\n");
+    assert_eq!(program.dwells, [(0, 2.5), (1, 0.5)]);
+}
+
+#[test]
 fn catia_habits_inches_and_five_axes() {
     let text = "\
 $$ -----------------------------------------------------------------
