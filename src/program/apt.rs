@@ -1,7 +1,7 @@
 //! Cutter locations in APT (ISO 3592, ISO 4343), as NX, CATIA, Creo and this project write them.
 //!
 //! A statement is a major word, `/`, and minor words and numbers between commas; `$` carries it on in the next line, `$$`
-//! begins a remark. What moves the tool is followed (GOTO, GODLTA, FROM, CIRCLE before GOTO, RAPID), what describes it is kept
+//! begins a remark. What moves the tool is followed (GOTO, GODLTA, FROM, CIRCLE before GOTO, RAPID, MSYS), what describes it is kept
 //! (CUTTER, LOADTL, SPINDL, FEDRAT, DELAY, UNITS, MULTAX), what moves nothing is passed over, and what may move it and is not
 //! understood stops the reading.
 
@@ -14,7 +14,7 @@ use crate::lines::Lines;
 use crate::program::{Arc, Note, Program, Setting, Spindle, Step, StepKind, ToolRemark};
 
 /// Major words that move nothing, with those that only machines act on.
-const QUIET: [&str; 39] = [
+const QUIET: [&str; 36] = [
     "PARTNO",
     "PPRINT",
     "REMARK",
@@ -27,20 +27,17 @@ const QUIET: [&str; 39] = [
     "INTOL",
     "OUTTOL",
     "TOLER",
-    "CUTCOM",
     "LINTOL",
     "PREFUN",
     "AUXFUN",
     "SEQNO",
     "TOOLPATH",
     "TLDATA",
-    "MSYS",
     "PAINT",
     "END-OF-PATH",
     "TOOLNO",
     "OPERATION",
     "ROTHED",
-    "MODE",
     "DISPLY",
     "LEADER",
     "CHECK",
@@ -77,6 +74,36 @@ struct Circle {
     radius: f64,
 }
 
+/// Coordinates of an MSYS, in those of the first one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Frame {
+    origin: Point3,
+    axes: [Vector3; 3],
+}
+
+impl Frame {
+    /// `x,y,z` of the origin, and the directions of X and Y.
+    fn of(values: &[f64], unit: f64) -> Option<Self> {
+        let [x, y, z, rest @ ..] = values else { return None };
+        let [a, b, c, d, e, f] = rest[..] else { return None };
+        let (first, second) = (Vector3::new(a, b, c), Vector3::new(d, e, f));
+        let [u, across] = [first, first.cross(&second)].map(|axis| axis.try_normalize(1e-9));
+        let (u, w) = (u?, across?);
+        // Programs round to a few decimals.
+        let square =
+            [first.norm() - 1.0, second.norm() - 1.0, first.dot(&second)].iter().all(|off| off.abs() < 1e-3);
+        square.then(|| Self { origin: Point3::new(*x, *y, *z) * unit, axes: [u, w.cross(&u), w] })
+    }
+
+    fn outward(&self, way: &Vector3) -> Vector3 {
+        self.axes[0] * way.x + self.axes[1] * way.y + self.axes[2] * way.z
+    }
+
+    fn inward(&self, way: &Vector3) -> Vector3 {
+        Vector3::new(self.axes[0].dot(way), self.axes[1].dot(way), self.axes[2].dot(way))
+    }
+}
+
 /// A reader of locations.
 struct Reader {
     out: Program,
@@ -86,6 +113,10 @@ struct Reader {
     /// mm/min, or mm/rev.
     feed: f64,
     per_revolution: bool,
+    /// The first MSYS, in which the part stands.
+    first: Option<Frame>,
+    /// The one in force, where it is another.
+    frame: Option<Frame>,
     setting: Setting,
     changed: bool,
     at: Point3,
@@ -242,6 +273,8 @@ impl Reader {
             circle: None,
             feed: 0.0,
             per_revolution: false,
+            first: None,
+            frame: None,
             setting,
             changed: true,
             at: Point3::origin(),
@@ -300,6 +333,10 @@ impl Reader {
                 self.out.dwell(if turns { 60.0 * last / self.setting.speed } else { last });
                 Ok(())
             }
+            "MSYS" => self.system(statement),
+            "MODE" if !statement.has("INCR") => Ok(()),
+            // Where the control is to shift the path by is not said.
+            "CUTCOM" if !statement.has("LEFT") && !statement.has("RIGHT") => Ok(()),
             "CIRCLE" => self.circle(statement),
             "MULTAX" | "CYCLE" | "TRACUT" | "ROTABL" | "TRANS" | "ORIGIN" => Ok(()),
             "FINI" => {
@@ -326,12 +363,45 @@ impl Reader {
         }
     }
 
+    /// `MSYS/x,y,z,i,j,k,i,j,k`: what follows counts in other coordinates.
+    fn system(&mut self, statement: &Statement) -> Result<(), Stop> {
+        let stop = || Stop::new(0, Fault::Statement(statement.text()));
+        let frame = Frame::of(&statement.numbers(), self.unit).ok_or_else(stop)?;
+        let first = match self.first {
+            Some(first) => first,
+            None if self.begun => return Err(stop()),
+            None => *self.first.insert(frame),
+        };
+        let axis = self.frame.map_or(self.axis, |before| before.inward(&self.axis));
+        self.frame = (frame != first).then(|| Frame {
+            origin: Point3::from(first.inward(&(frame.origin - first.origin))),
+            axes: frame.axes.map(|axis| first.inward(&axis)),
+        });
+        self.axis = self.direction(axis);
+        if self.frame.is_some() {
+            self.note(
+                statement.line,
+                "another MSYS: what follows is laid to the part by the first one".to_owned(),
+            );
+        }
+        Ok(())
+    }
+
+    /// A direction in the coordinates of the first MSYS.
+    fn direction(&self, way: Vector3) -> Vector3 {
+        self.frame.map_or(way, |frame| frame.outward(&way))
+    }
+
+    fn point(&self, at: Point3) -> Point3 {
+        self.frame.map_or(at, |frame| frame.origin + frame.outward(&at.coords))
+    }
+
     fn tool_axis(&mut self, statement: &Statement) -> Result<(), Stop> {
         let values = statement.numbers();
         let [i, j, k] = values[..] else { return Ok(()) };
-        self.axis = Vector3::new(i, j, k)
-            .try_normalize(1e-9)
-            .ok_or_else(|| Stop::new(0, Fault::Statement(statement.text())))?;
+        let axis = Vector3::new(i, j, k).try_normalize(1e-9);
+        let axis = axis.ok_or_else(|| Stop::new(0, Fault::Statement(statement.text())))?;
+        self.axis = self.direction(axis);
         Ok(())
     }
 
@@ -388,15 +458,16 @@ impl Reader {
 
     fn location(&self, statement: &Statement, what: &'static str) -> Result<(Point3, Vector3), Stop> {
         let values = statement.all_numbers(what, "3 or 6", &[3, 6])?;
-        let at = Point3::new(values[0], values[1], values[2]) * self.unit;
+        let at = self.point(Point3::new(values[0], values[1], values[2]) * self.unit);
         if let Some(k) = at.iter().position(|x| x.abs() > geometry::MAX_COORDINATE) {
             let (letter, value) = (['X', 'Y', 'Z'][k], at[k]);
             return Err(Stop::new(0, Fault::Range { letter, value }));
         }
         let axis = match values[3..] {
-            [i, j, k] => Vector3::new(i, j, k)
-                .try_normalize(1e-9)
-                .ok_or_else(|| Stop::new(0, Fault::Statement(statement.text())))?,
+            [i, j, k] => {
+                let axis = Vector3::new(i, j, k).try_normalize(1e-9);
+                self.direction(axis.ok_or_else(|| Stop::new(0, Fault::Statement(statement.text())))?)
+            }
             _ => self.axis,
         };
         Ok((at, axis))
@@ -410,7 +481,7 @@ impl Reader {
     fn go_by(&mut self, statement: &Statement) -> Result<(), Stop> {
         let values = statement.all_numbers("GODLTA", "1 or 3", &[1, 3])?;
         let by = match values[..] {
-            [x, y, z] => Vector3::new(x, y, z) * self.unit,
+            [x, y, z] => self.direction(Vector3::new(x, y, z) * self.unit),
             _ => self.axis * values[0] * self.unit,
         };
         self.go(statement.line, self.at + by, self.axis)
@@ -476,7 +547,8 @@ impl Reader {
         let axis = Vector3::new(values[3], values[4], values[5]);
         let axis =
             axis.try_normalize(1e-9).ok_or_else(|| Stop::new(0, Fault::Statement(statement.text())))?;
-        let centre = Point3::new(values[0], values[1], values[2]) * self.unit;
+        let axis = self.direction(axis);
+        let centre = self.point(Point3::new(values[0], values[1], values[2]) * self.unit);
         self.circle = Some(Circle { centre, axis, radius: values[6].abs() * self.unit });
         Ok(())
     }

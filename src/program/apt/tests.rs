@@ -105,6 +105,39 @@ fn delays_are_seconds_or_turns() {
 }
 
 #[test]
+fn every_msys_is_another_frame() {
+    let text = "\
+MSYS/5,0,0,1,0,0,0,1,0
+FEDRAT/MMPM,200
+GOTO/1,0,10
+GOTO/2,0,10
+MSYS/105,0,0,0,0,-1,0,1,0
+GOTO/1,2,3
+GODLTA/0,0,1
+GODLTA/1
+CIRCLE/1,0,5,0,0,1,2
+GOTO/1,-2,5
+MSYS/5,0,0,1,0,0,0,1,0
+GOTO/3,0,10
+FINI
+";
+    let program = read(text);
+    let ends: Vec<[f64; 3]> = program.steps.iter().map(|step| [step.to[0], step.to[1], step.to[2]]).collect();
+    let expected = [
+        [2.0, 0.0, 10.0],
+        [103.0, 2.0, -1.0],
+        [104.0, 2.0, -1.0],
+        [105.0, 2.0, -1.0],
+        [105.0, -2.0, -1.0],
+        [3.0, 0.0, 10.0],
+    ];
+    assert_eq!(ends, expected);
+    assert_eq!(program.axes[2], [1.0, 0.0, 0.0]);
+    assert_eq!((program.axes[6], program.arcs[0].centre), ([0.0, 0.0, 1.0], [105.0, 0.0, -1.0]));
+    assert_eq!((program.notes.len(), program.notes[0].line), (1, 5));
+}
+
+#[test]
 fn catia_habits_inches_and_five_axes() {
     let text = "\
 $$ -----------------------------------------------------------------
@@ -141,11 +174,17 @@ fn what_may_move_the_tool_is_refused_with_its_line() {
         ("GOTO/1,2,3,0,0,0\n", 1, 1),
         ("L1=LINE/P1,P2\n", 1, 1),
         ("GOTO/1e9,2,3\n", 1, 6),
+        ("GOTO/1,2,3\nMODE/INCR\nGOTO/1,0,0\n", 2, 1),
+        ("GOTO/1,2,3\nCUTCOM/LEFT,1\n", 2, 1),
+        ("GOTO/1,2,3\nCUTCOM/ON,RIGHT\n", 2, 1),
+        ("MSYS/0,0,0,1,0,0\n", 1, 1),
+        ("MSYS/0,0,0,1,0,0,1,0,0\n", 1, 1),
+        ("GOTO/1,2,3\nMSYS/0,0,0,1,0,0,0,1,0\n", 2, 1),
     ] {
         let error = read_apt("a.cls", text.as_bytes()).unwrap_err();
         assert_eq!((error.line, error.column), (line, column), "{text}: {error}");
     }
-    assert!(read_apt("a.cls", b"GOTO/1,2,3\nCYCLE/OFF\nFINI").is_ok());
+    assert!(read_apt("a.cls", b"GOTO/1,2,3\nCYCLE/OFF\nCUTCOM/OFF\nMODE/ABSOL\nFINI").is_ok());
     let cut = read("GOTO/0,0,1\nFEDRAT/100\nGOTO/1,0,1\n");
     assert_eq!(cut.findings(&|_| None).last().map(|f| f.kind), Some(FindingKind::NoEnd));
 }
