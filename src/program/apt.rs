@@ -115,6 +115,8 @@ struct Reader {
     per_revolution: bool,
     /// The first MSYS, in which the part stands.
     first: Option<Frame>,
+    /// How many CUTTERs have their tool.
+    described: usize,
     /// The one in force, where it is another.
     frame: Option<Frame>,
     setting: Setting,
@@ -274,6 +276,7 @@ impl Reader {
             feed: 0.0,
             per_revolution: false,
             first: None,
+            described: 0,
             frame: None,
             setting,
             changed: true,
@@ -319,10 +322,11 @@ impl Reader {
                 Ok(())
             }
             "CUTTER" => {
-                let text = format!(
-                    "CUTTER/{}",
-                    statement.numbers().iter().map(f64::to_string).collect::<Vec<_>>().join(",")
-                );
+                // All but the fifth and sixth, which are angles, are lengths.
+                let mm = |(k, word): (usize, f64)| if k == 4 || k == 5 { word } else { word * self.unit };
+                let words: Vec<String> =
+                    statement.numbers().into_iter().enumerate().map(|word| mm(word).to_string()).collect();
+                let text = format!("CUTTER/{}", words.join(","));
                 let (tool, line) = (self.setting.tool, statement.line as u32 + 1);
                 self.out.tools.push(ToolRemark { tool, line, text });
                 Ok(())
@@ -522,6 +526,17 @@ impl Reader {
         if self.changed {
             self.changed = false;
             self.out.settings.push(self.setting);
+        }
+        // A cutter is that of the tool which moves next.
+        for k in std::mem::replace(&mut self.described, self.out.tools.len())..self.out.tools.len() {
+            let tool = self.setting.tool;
+            if self.out.tools[..k]
+                .iter()
+                .any(|other| other.tool == tool && other.text != self.out.tools[k].text)
+            {
+                self.note(line, format!("tool {tool} has several CUTTERs: the first one counts"));
+            }
+            self.out.tools[k].tool = tool;
         }
         let feed = match kind {
             StepKind::Feed | StepKind::Arc(_) if self.per_revolution => self.feed * self.setting.speed,
