@@ -78,8 +78,22 @@ fn number_after(text: &str, words: &[&str]) -> Option<f64> {
         let starts = |at: usize| at == 0 || !upper.as_bytes()[at - 1].is_ascii_alphanumeric();
         let at = upper.match_indices(word).map(|(at, _)| at).find(|at| starts(*at))?;
         let rest = upper[at + word.len()..].trim_start();
-        let end = rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());
-        rest[..end].parse().ok().filter(|value: &f64| *value >= 0.0)
+        let length = |text: &str| text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
+        let end = length(rest);
+        // A comma with digits behind it is a decimal one, unless they are a number or a word of their own.
+        let digits = rest[end..].strip_prefix(',').filter(|_| !rest[..end].contains('.')).map(|more| {
+            let digits = more.split(|c: char| !c.is_ascii_digit()).next().unwrap_or_default();
+            if more[digits.len()..].starts_with(|c: char| c.is_ascii_alphabetic() || c == '.') {
+                ""
+            } else {
+                digits
+            }
+        });
+        let number = match digits {
+            Some(digits) if !digits.is_empty() => format!("{}.{digits}", &rest[..end]),
+            _ => rest[..end].to_owned(),
+        };
+        number.parse().ok().filter(|value: &f64| *value >= 0.0)
     })
 }
 
@@ -108,6 +122,11 @@ mod tests {
             (cutter("CUTTER/6,4"), cutter("CUTTER/"), cutter("CUTTER/10,2,9,9,0,0,50")),
             (None, None, None)
         );
+        assert_eq!(cutter("T1 D=6,35 CR=0 - flat end mill"), Cutter::flat(6.35).ok());
+        assert_eq!(cutter("T1 D=10,CR=2, bullnose"), Cutter::bull(10.0, 2.0).ok());
+        assert_eq!(cutter("T1 D=6,0 CR=0,5"), Cutter::bull(6.0, 0.5).ok());
+        assert_eq!(cutter("T1 D=8.5,3FL"), Cutter::flat(8.5).ok());
+        assert_eq!(cutter("T1 D=8,3FL"), Cutter::flat(8.0).ok());
         assert!(may_describe_a_tool("T12 something") && !may_describe_a_tool("TOP 3 = 4"));
     }
 }
