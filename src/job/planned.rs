@@ -59,10 +59,11 @@ impl Planned {
     /// Time that the scene's machine takes, s.
     pub fn time(&self, scene: &Scene, monitor: &dyn Monitor) -> Result<f64, Cancelled> {
         let (path, machine) = (&self.plan.path, &scene.machine);
-        self.on_axes(scene).map_or_else(
+        let moving = self.on_axes(scene).map_or_else(
             || machining_time(path, machine, monitor),
             |(kinematics, joints)| machining_time_of_axes(path, machine, kinematics, joints, monitor),
-        )
+        )?;
+        Ok(moving + path.origin.standing_s)
     }
 
     /// Time that its axes take at most from location to location, s; 0 on machines of three axes.
@@ -127,6 +128,7 @@ impl Session {
         let rise_to = tops.reduce(f64::max);
         let header = ProgramHeader { rise_to, ..header(scene, "") };
         plan.path.origin.lines = lines(scene, &plan.path, joints.as_ref(), &header)?;
+        plan.path.origin.strays = scene.arcs.unwrap_or(0.0);
         Ok(Planned {
             plan,
             strategy,

@@ -1,19 +1,20 @@
 //! Cutter locations in APT (ISO 3592, ISO 4343), as NX, CATIA, Creo and this project write them.
 //!
 //! A statement is a major word, `/`, and minor words and numbers between commas; `$` carries it on in the next line, `$$`
-//! begins a remark. What moves the tool is followed (GOTO, GODLTA, FROM, CIRCLE before GOTO, RAPID), what describes it is kept
-//! (CUTTER, LOADTL, SPINDL, FEDRAT, UNITS, MULTAX), what moves nothing is passed over, and what may move it and is not
+//! begins a remark. What moves the tool is followed (GOTO, GODLTA, FROM, CIRCLE before GOTO, RAPID, MSYS), what describes it is kept
+//! (CUTTER, LOADTL, SPINDL, FEDRAT, DELAY, UNITS, MULTAX), what moves nothing is passed over, and what may move it and is not
 //! understood stops the reading.
 
 use geometry::{Point3, Vector3};
 
+use crate::arc::arc_tolerance;
 use crate::control::Plane;
 use crate::error::{Fault, ProgramError, Stop};
 use crate::lines::Lines;
 use crate::program::{Arc, Note, Program, Setting, Spindle, Step, StepKind, ToolRemark};
 
 /// Major words that move nothing, with those that only machines act on.
-const QUIET: [&str; 40] = [
+const QUIET: [&str; 36] = [
     "PARTNO",
     "PPRINT",
     "REMARK",
@@ -23,24 +24,20 @@ const QUIET: [&str; 40] = [
     "OPSKIP",
     "STOP",
     "OPSTOP",
-    "DELAY",
     "INTOL",
     "OUTTOL",
     "TOLER",
-    "CUTCOM",
     "LINTOL",
     "PREFUN",
     "AUXFUN",
     "SEQNO",
     "TOOLPATH",
     "TLDATA",
-    "MSYS",
     "PAINT",
     "END-OF-PATH",
     "TOOLNO",
     "OPERATION",
     "ROTHED",
-    "MODE",
     "DISPLY",
     "LEADER",
     "CHECK",
@@ -62,8 +59,11 @@ const TEXT: [&str; 5] = ["PARTNO", "PPRINT", "REMARK", "INSERT", "TPRINT"];
 /// Lines that one statement may be carried over.
 const MOST_LINES: usize = 1000;
 
-/// Locations between which one circle runs at most half a turn are exact; longer ones follow from the points given.
-const RADIUS_SHARE: f64 = 1e-3;
+/// Tool axes that differ by less, rad, are one: four decimals round as far.
+const SAME_AXIS: f64 = 2e-4;
+
+/// Ends may miss the radius of a CIRCLE by this much, mm, or by a share of the radius, as those of arcs in G-code.
+const RADIUS_TOLERANCE: f64 = 0.01;
 
 /// What CIRCLE says of the motion that follows.
 #[derive(Debug, Clone, Copy)]
@@ -72,6 +72,36 @@ struct Circle {
     /// About which the motion turns anticlockwise.
     axis: Vector3,
     radius: f64,
+}
+
+/// Coordinates of an MSYS, in those of the first one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Frame {
+    origin: Point3,
+    axes: [Vector3; 3],
+}
+
+impl Frame {
+    /// `x,y,z` of the origin, and the directions of X and Y.
+    fn of(values: &[f64], unit: f64) -> Option<Self> {
+        let [x, y, z, rest @ ..] = values else { return None };
+        let [a, b, c, d, e, f] = rest[..] else { return None };
+        let (first, second) = (Vector3::new(a, b, c), Vector3::new(d, e, f));
+        let [u, across] = [first, first.cross(&second)].map(|axis| axis.try_normalize(1e-9));
+        let (u, w) = (u?, across?);
+        // Programs round to a few decimals.
+        let square =
+            [first.norm() - 1.0, second.norm() - 1.0, first.dot(&second)].iter().all(|off| off.abs() < 1e-3);
+        square.then(|| Self { origin: Point3::new(*x, *y, *z) * unit, axes: [u, w.cross(&u), w] })
+    }
+
+    fn outward(&self, way: &Vector3) -> Vector3 {
+        self.axes[0] * way.x + self.axes[1] * way.y + self.axes[2] * way.z
+    }
+
+    fn inward(&self, way: &Vector3) -> Vector3 {
+        Vector3::new(self.axes[0].dot(way), self.axes[1].dot(way), self.axes[2].dot(way))
+    }
 }
 
 /// A reader of locations.
@@ -83,6 +113,12 @@ struct Reader {
     /// mm/min, or mm/rev.
     feed: f64,
     per_revolution: bool,
+    /// The first MSYS, in which the part stands.
+    first: Option<Frame>,
+    /// How many CUTTERs have their tool.
+    described: usize,
+    /// The one in force, where it is another.
+    frame: Option<Frame>,
     setting: Setting,
     changed: bool,
     at: Point3,
@@ -239,6 +275,9 @@ impl Reader {
             circle: None,
             feed: 0.0,
             per_revolution: false,
+            first: None,
+            described: 0,
+            frame: None,
             setting,
             changed: true,
             at: Point3::origin(),
@@ -283,14 +322,25 @@ impl Reader {
                 Ok(())
             }
             "CUTTER" => {
-                let text = format!(
-                    "CUTTER/{}",
-                    statement.numbers().iter().map(f64::to_string).collect::<Vec<_>>().join(",")
-                );
+                // All but the fifth and sixth, which are angles, are lengths.
+                let mm = |(k, word): (usize, f64)| if k == 4 || k == 5 { word } else { word * self.unit };
+                let words: Vec<String> =
+                    statement.numbers().into_iter().enumerate().map(|word| mm(word).to_string()).collect();
+                let text = format!("CUTTER/{}", words.join(","));
                 let (tool, line) = (self.setting.tool, statement.line as u32 + 1);
                 self.out.tools.push(ToolRemark { tool, line, text });
                 Ok(())
             }
+            "DELAY" => {
+                let last = statement.numbers().first().map_or(0.0, |last| last.max(0.0));
+                let turns = statement.has("REV") && self.setting.speed > 0.0;
+                self.out.dwell(if turns { 60.0 * last / self.setting.speed } else { last });
+                Ok(())
+            }
+            "MSYS" => self.system(statement),
+            "MODE" if !statement.has("INCR") => Ok(()),
+            // Where the control is to shift the path by is not said.
+            "CUTCOM" if !statement.has("LEFT") && !statement.has("RIGHT") => Ok(()),
             "CIRCLE" => self.circle(statement),
             "MULTAX" | "CYCLE" | "TRACUT" | "ROTABL" | "TRANS" | "ORIGIN" => Ok(()),
             "FINI" => {
@@ -317,12 +367,45 @@ impl Reader {
         }
     }
 
+    /// `MSYS/x,y,z,i,j,k,i,j,k`: what follows counts in other coordinates.
+    fn system(&mut self, statement: &Statement) -> Result<(), Stop> {
+        let stop = || Stop::new(0, Fault::Statement(statement.text()));
+        let frame = Frame::of(&statement.numbers(), self.unit).ok_or_else(stop)?;
+        let first = match self.first {
+            Some(first) => first,
+            None if self.begun => return Err(stop()),
+            None => *self.first.insert(frame),
+        };
+        let axis = self.frame.map_or(self.axis, |before| before.inward(&self.axis));
+        self.frame = (frame != first).then(|| Frame {
+            origin: Point3::from(first.inward(&(frame.origin - first.origin))),
+            axes: frame.axes.map(|axis| first.inward(&axis)),
+        });
+        self.axis = self.direction(axis);
+        if self.frame.is_some() {
+            self.note(
+                statement.line,
+                "another MSYS: what follows is laid to the part by the first one".to_owned(),
+            );
+        }
+        Ok(())
+    }
+
+    /// A direction in the coordinates of the first MSYS.
+    fn direction(&self, way: Vector3) -> Vector3 {
+        self.frame.map_or(way, |frame| frame.outward(&way))
+    }
+
+    fn point(&self, at: Point3) -> Point3 {
+        self.frame.map_or(at, |frame| frame.origin + frame.outward(&at.coords))
+    }
+
     fn tool_axis(&mut self, statement: &Statement) -> Result<(), Stop> {
         let values = statement.numbers();
         let [i, j, k] = values[..] else { return Ok(()) };
-        self.axis = Vector3::new(i, j, k)
-            .try_normalize(1e-9)
-            .ok_or_else(|| Stop::new(0, Fault::Statement(statement.text())))?;
+        let axis = Vector3::new(i, j, k).try_normalize(1e-9);
+        let axis = axis.ok_or_else(|| Stop::new(0, Fault::Statement(statement.text())))?;
+        self.axis = self.direction(axis);
         Ok(())
     }
 
@@ -362,6 +445,9 @@ impl Reader {
 
     /// `FROM/x,y,z[,i,j,k]`: where the tool stands.
     fn from(&mut self, statement: &Statement) -> Result<(), Stop> {
+        if self.circle.is_some() {
+            return Err(Stop::new(0, Fault::Circle("ends in no GOTO".to_owned())));
+        }
         let (at, axis) = self.location(statement, "FROM")?;
         (self.at, self.axis) = (at, axis);
         if self.out.steps.is_empty() {
@@ -376,15 +462,16 @@ impl Reader {
 
     fn location(&self, statement: &Statement, what: &'static str) -> Result<(Point3, Vector3), Stop> {
         let values = statement.all_numbers(what, "3 or 6", &[3, 6])?;
-        let at = Point3::new(values[0], values[1], values[2]) * self.unit;
+        let at = self.point(Point3::new(values[0], values[1], values[2]) * self.unit);
         if let Some(k) = at.iter().position(|x| x.abs() > geometry::MAX_COORDINATE) {
             let (letter, value) = (['X', 'Y', 'Z'][k], at[k]);
             return Err(Stop::new(0, Fault::Range { letter, value }));
         }
         let axis = match values[3..] {
-            [i, j, k] => Vector3::new(i, j, k)
-                .try_normalize(1e-9)
-                .ok_or_else(|| Stop::new(0, Fault::Statement(statement.text())))?,
+            [i, j, k] => {
+                let axis = Vector3::new(i, j, k).try_normalize(1e-9);
+                self.direction(axis.ok_or_else(|| Stop::new(0, Fault::Statement(statement.text())))?)
+            }
             _ => self.axis,
         };
         Ok((at, axis))
@@ -398,7 +485,7 @@ impl Reader {
     fn go_by(&mut self, statement: &Statement) -> Result<(), Stop> {
         let values = statement.all_numbers("GODLTA", "1 or 3", &[1, 3])?;
         let by = match values[..] {
-            [x, y, z] => Vector3::new(x, y, z) * self.unit,
+            [x, y, z] => self.direction(Vector3::new(x, y, z) * self.unit),
             _ => self.axis * values[0] * self.unit,
         };
         self.go(statement.line, self.at + by, self.axis)
@@ -406,8 +493,12 @@ impl Reader {
 
     fn go(&mut self, line: usize, at: Point3, axis: Vector3) -> Result<(), Stop> {
         let from = self.at;
-        let turned = axis != self.axis;
+        let turned = (axis - self.axis).norm() > SAME_AXIS;
         (self.at, self.axis) = (at, axis);
+        let circle = self.circle.take();
+        if circle.is_some() && !self.begun {
+            return Err(Stop::new(0, Fault::Circle("has no place where it begins".to_owned())));
+        }
         if !self.begun {
             // Where the tool comes from is not said: it begins here.
             self.begun = true;
@@ -417,14 +508,17 @@ impl Reader {
             return Ok(());
         }
         let rapid = std::mem::take(&mut self.rapid);
-        let circle = self.circle.take().filter(|_| !rapid && !turned);
-        match circle.and_then(|circle| arc(&circle, &from, &at)) {
-            Some(arc) => {
-                self.out.arcs.push(arc);
-                self.push(line, StepKind::Arc(self.out.arcs.len() as u32 - 1));
+        let kind = match circle {
+            None if rapid => StepKind::Rapid,
+            None => StepKind::Feed,
+            Some(_) if rapid => return Err(Stop::new(0, Fault::Circle("is a rapid".to_owned()))),
+            Some(_) if turned => return Err(Stop::new(0, Fault::Circle("turns the tool axis".to_owned()))),
+            Some(circle) => {
+                self.out.arcs.push(arc(&circle, &from, &at)?);
+                StepKind::Arc(self.out.arcs.len() as u32 - 1)
             }
-            None => self.push(line, if rapid { StepKind::Rapid } else { StepKind::Feed }),
-        }
+        };
+        self.push(line, kind);
         Ok(())
     }
 
@@ -432,6 +526,17 @@ impl Reader {
         if self.changed {
             self.changed = false;
             self.out.settings.push(self.setting);
+        }
+        // A cutter is that of the tool which moves next.
+        for k in std::mem::replace(&mut self.described, self.out.tools.len())..self.out.tools.len() {
+            let tool = self.setting.tool;
+            if self.out.tools[..k]
+                .iter()
+                .any(|other| other.tool == tool && other.text != self.out.tools[k].text)
+            {
+                self.note(line, format!("tool {tool} has several CUTTERs: the first one counts"));
+            }
+            self.out.tools[k].tool = tool;
         }
         let feed = match kind {
             StepKind::Feed | StepKind::Arc(_) if self.per_revolution => self.feed * self.setting.speed,
@@ -446,6 +551,10 @@ impl Reader {
     /// `CIRCLE/x,y,z,i,j,k,r[,…]`: the next location is reached along it.
     fn circle(&mut self, statement: &Statement) -> Result<(), Stop> {
         let values = statement.numbers();
+        // Words such as TIMES add turns.
+        if self.circle.is_some() || values.len() < statement.words.len() {
+            return Err(Stop::new(0, Fault::Statement(statement.text())));
+        }
         if values.len() < 7 {
             let (what, wanted) = ("CIRCLE", "at least 7");
             return Err(Stop::new(0, Fault::Count { what, wanted, found: values.len() }));
@@ -453,7 +562,8 @@ impl Reader {
         let axis = Vector3::new(values[3], values[4], values[5]);
         let axis =
             axis.try_normalize(1e-9).ok_or_else(|| Stop::new(0, Fault::Statement(statement.text())))?;
-        let centre = Point3::new(values[0], values[1], values[2]) * self.unit;
+        let axis = self.direction(axis);
+        let centre = self.point(Point3::new(values[0], values[1], values[2]) * self.unit);
         self.circle = Some(Circle { centre, axis, radius: values[6].abs() * self.unit });
         Ok(())
     }
@@ -463,23 +573,26 @@ fn place(at: &Point3) -> [f64; 6] {
     [at.x, at.y, at.z, 0.0, 0.0, 0.0]
 }
 
-/// The arc from one point of a circle to another about its axis; `None` where they do not lie on it.
-fn arc(circle: &Circle, from: &Point3, to: &Point3) -> Option<Arc> {
-    let [a, b] = [from, to].map(|p| {
+/// The arc from one point of a circle to another about its axis.
+fn arc(circle: &Circle, from: &Point3, to: &Point3) -> Result<Arc, Stop> {
+    let spokes = [from, to].map(|p| {
         let spoke = p - circle.centre;
         spoke - circle.axis * spoke.dot(&circle.axis)
     });
-    let allowed = 0.01f64.max(RADIUS_SHARE * circle.radius);
-    if (a.norm() - circle.radius).abs() > allowed
-        || (b.norm() - circle.radius).abs() > allowed
-        || circle.radius <= 0.0
-    {
-        return None;
+    let radius = circle.radius;
+    let allowed = arc_tolerance(RADIUS_TOLERANCE, radius);
+    for (spoke, what) in spokes.iter().zip(["begins", "ends"]) {
+        let far = spoke.norm();
+        if far <= 0.0 || (far - radius).abs() > allowed {
+            let text = format!("{what} {far:.4} mm from its axis, and its radius is {radius:.4} mm");
+            return Err(Stop::new(0, Fault::Circle(text)));
+        }
     }
+    let [a, b] = spokes;
     let angle = a.cross(&b).dot(&circle.axis).atan2(a.dot(&b));
     let sweep = if angle <= 1e-12 { angle + std::f64::consts::TAU } else { angle };
     let centre = circle.centre + circle.axis * (from - circle.centre).dot(&circle.axis);
-    Some(Arc { centre: centre.into(), normal: circle.axis.into(), sweep, plane: Plane::Xy })
+    Ok(Arc { centre: centre.into(), normal: circle.axis.into(), sweep, plane: Plane::Xy })
 }
 
 #[cfg(test)]

@@ -65,9 +65,7 @@ impl Interpreter<'_> {
         if start <= 0.0 || end <= 0.0 {
             return Err(Stop::new(column, Fault::ArcPoint));
         }
-        let allowed =
-            self.control.arc_tolerance.max(TOLERANCE_SHARE * start.max(end)).min(GREATEST_TOLERANCE);
-        if (start - end).abs() > allowed {
+        if (start - end).abs() > arc_tolerance(self.control.arc_tolerance, start.max(end)) {
             return Err(Stop::new(column, Fault::ArcEnds { start, end }));
         }
         Ok(())
@@ -115,8 +113,7 @@ impl Interpreter<'_> {
             return Err(Stop::new(column, Fault::ArcReach { radius, apart }));
         }
         let size = radius.abs();
-        let allowed = self.control.arc_tolerance.max(TOLERANCE_SHARE * size).min(GREATEST_TOLERANCE);
-        if 0.5 * apart > size + allowed {
+        if 0.5 * apart > size + arc_tolerance(self.control.arc_tolerance, size) {
             return Err(Stop::new(column, Fault::ArcReach { radius, apart }));
         }
         // A little too short a radius is half a turn.
@@ -125,6 +122,11 @@ impl Interpreter<'_> {
         let side = if left { off / apart } else { -off / apart };
         Ok([at[u] + 0.5 * x - side * y, at[v] + 0.5 * y + side * x])
     }
+}
+
+/// How far ends may miss an arc of this radius, mm; `least` is what is always allowed.
+pub(crate) fn arc_tolerance(least: f64, radius: f64) -> f64 {
+    least.max(TOLERANCE_SHARE * radius).min(GREATEST_TOLERANCE)
 }
 
 /// The angle from `a` to `b` about zero, rad; a whole turn where both are one point.
@@ -163,10 +165,22 @@ impl Arc {
         [0, 1, 2].map(|k| self.centre[k] + grown * (cos * spoke[k] + sin * across[k]) + t * rise * n[k])
     }
 
-    /// Chords from which the arc strays no farther than `tolerance`, mm, where it starts at this radius, mm.
-    pub fn chords(&self, radius: f64, tolerance: f64) -> usize {
+    /// How far the arc strays at most from so many chords, mm: an eighth of the square of their step times its bend.
+    pub fn strays(&self, start: &[f64; 3], end: &[f64; 3], chords: usize) -> f64 {
+        let [first, last] = [start, end].map(|at| {
+            let spoke = [0, 1, 2].map(|k| at[k] - self.centre[k]);
+            let along = (0..3).map(|k| spoke[k] * self.normal[k]).sum::<f64>();
+            (0..3).map(|k| (spoke[k] - along * self.normal[k]).powi(2)).sum::<f64>().sqrt()
+        });
+        let step = self.sweep / chords as f64;
+        0.125 * step * (first.max(last) * step + 2.0 * (last - first).abs() / chords as f64)
+    }
+
+    /// Chords from which the arc strays no farther than `tolerance`, mm, where it begins at `start`.
+    pub fn chords(&self, start: &[f64; 3], tolerance: f64) -> usize {
         /// Beyond, an arc is a mistake of units.
         const MOST: f64 = 1e5;
+        let radius = (0..3).map(|k| (start[k] - self.centre[k]).powi(2)).sum::<f64>().sqrt();
         // The sagitta of a chord over an angle φ is r (1 − cos φ/2).
         let half = (1.0 - tolerance / radius).clamp(-1.0, 1.0).acos().min(0.25 * PI);
         (self.sweep / (2.0 * half)).ceil().clamp(1.0, MOST) as usize
@@ -202,8 +216,22 @@ mod tests {
         }
         let last = arc.at(&start, &end, 1.0 - 1e-12);
         assert!((0..3).all(|k| (last[k] - end[k]).abs() < 1e-9));
-        let chords = arc.chords(5.0, 0.01);
+        let chords = arc.chords(&start, 0.01);
         let sagitta = |n: usize| 5.0 * (1.0 - (0.5 * arc.sweep / n as f64).cos());
         assert!(sagitta(chords) <= 0.01 && sagitta(chords - 1) > 0.01, "{chords}");
+        for (end, chords) in [(end, chords), ([1.0, -3.1, 9.0], chords), ([1.0, -2.5, 9.0], 3)] {
+            let bound = arc.strays(&start, &end, chords);
+            let place = |t: f64| geometry::Point3::from(arc.at(&start, &end, t));
+            let off = |k: usize| {
+                let [a, b] = [k, k + 1].map(|n| place(n as f64 / chords as f64));
+                let apart = |n: usize| {
+                    let t = n as f64 / 100.0;
+                    (place((k as f64 + t) / chords as f64) - (a + t * (b - a))).norm()
+                };
+                (1..100).map(apart).fold(0.0, f64::max)
+            };
+            let most = (0..chords).map(off).fold(0.0, f64::max);
+            assert!(most <= bound && bound < 1.2 * most, "{most} {bound}");
+        }
     }
 }

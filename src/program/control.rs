@@ -198,6 +198,8 @@ pub struct Control {
     pub empty_words: bool,
     /// Whether M98 P counts repeats in the digits before the last four.
     pub repeats_in_p: bool,
+    /// Whether P of a dwell counts milliseconds where it has no decimal point; else seconds.
+    pub dwell_in_ms: bool,
     /// The M words, in tenths, with which the control begins and ends to move the linear axes along with the rotary ones.
     pub tcp_switch: Option<[u16; 2]>,
     /// Greatest difference of an arc's radii at start and end, mm; a thousandth of the radius is allowed as well.
@@ -327,6 +329,7 @@ pub const GENERAL: Control = Control {
     spare_offset: true,
     empty_words: true,
     repeats_in_p: true,
+    dwell_in_ms: true,
     tcp_switch: None,
     arc_tolerance: 0.01,
 };
@@ -358,6 +361,7 @@ pub const LINUXCNC: Control = Control {
     spare_offset: false,
     empty_words: false,
     repeats_in_p: false,
+    dwell_in_ms: false,
     tcp_switch: Some([4280, 4290]),
     arc_tolerance: 0.001_27,
 };
@@ -412,11 +416,12 @@ pub const GRBL: Control = Control {
         (690, None),
     ],
     arc_tolerance: 0.005,
+    dwell_in_ms: false,
     ..GENERAL
 };
 
 /// Mach3 and Mach4.
-pub const MACH: Control = Control { word: "mach", help: "Mach3 and Mach4", ..GENERAL };
+pub const MACH: Control = Control { word: "mach", help: "Mach3 and Mach4", dwell_in_ms: false, ..GENERAL };
 
 /// All controls, in the order in which they are named to users.
 pub static CONTROLS: [Control; 6] = [GENERAL, LINUXCNC, FANUC, HAAS, GRBL, MACH];

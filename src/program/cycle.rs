@@ -12,6 +12,9 @@ use crate::program::StepKind;
 /// Most repeats of a cycle.
 const MOST_REPEATS: f64 = 1e6;
 
+/// Cycles that do not stand at the bottom, whatever P is from the cycle before.
+const WITHOUT_DWELL: [u16; 2] = [81, 85];
+
 /// Most pecks of a hole; more are a mistake of units.
 const MOST_PECKS: f64 = 1e5;
 
@@ -79,7 +82,7 @@ impl Interpreter<'_> {
         let mut taken = |letter: u8| self.block.take(letter).map(|x| x * modal.unit);
         let (z, r, q) = (taken(AXES[w]), taken(b'R'), taken(b'Q'));
         let aside = [taken(b'I'), taken(b'J'), taken(b'K')];
-        self.block.ignore(b"P");
+        self.state.sticky.dwell = self.dwell_word()?.unwrap_or(self.state.sticky.dwell);
         let sticky = &mut self.state.sticky;
         let code = format!("G{}", cycle.code);
         let missing = |words| Stop::new(0, Fault::Missing { code: code.clone(), words });
@@ -140,6 +143,9 @@ impl Interpreter<'_> {
             self.pecks(cycle.down, levels, peck)?;
         }
         self.go_to_level(StepKind::Feed, w, bottom, feed)?;
+        if !WITHOUT_DWELL.contains(&cycle.code) {
+            self.out.dwell(self.state.sticky.dwell);
+        }
         if cycle.code == 76 {
             self.aside(1.0)?;
         }

@@ -214,6 +214,9 @@ pub enum Fault {
     /// A cutter's words that make no cutter.
     #[error("the CUTTER statement makes no cutter: {0}")]
     Cutter(String),
+    /// Motion along a CIRCLE that cannot be followed.
+    #[error("the motion along the CIRCLE {0}")]
+    Circle(String),
     /// A statement of APT that moves the tool in a way that cannot be followed.
     #[error("`{0}` is not understood, and it may move the tool")]
     Statement(String),
@@ -272,6 +275,9 @@ impl Fault {
             Self::Rotary(_) => "name a machine with rotary axes in the scene ([machine.kinematics])",
             Self::HalfTurn => "put a location in between",
             Self::Cutter(_) => "write CUTTER/diameter,corner radius or all seven numbers",
+            Self::Circle(_) => {
+                "check CIRCLE (centre, axis, radius) and the locations around it, or write straight GOTO motion"
+            }
             Self::Statement(_) => "write plain GOTO motion in the post processor's output",
             Self::Count { .. } => "correct the statement",
         }

@@ -30,6 +30,16 @@ impl Rotation {
     }
 }
 
+/// X Y and Z that differ by less, mm, do not move.
+const NO_WAY: f64 = 1e-9;
+
+/// The length that a feed counts: of X Y Z, mm, or where they stand, of the rotary axes, degrees.
+pub(crate) fn fed_length(from: &Place, to: &Place) -> f64 {
+    let apart = |k: usize| to[k] - from[k];
+    let straight = apart(0).hypot(apart(1)).hypot(apart(2));
+    if straight > NO_WAY { straight } else { apart(3).hypot(apart(4)).hypot(apart(5)) }
+}
+
 /// What stands between a program's coordinates and the machine's.
 #[derive(Debug, Clone)]
 pub(crate) struct Frame {

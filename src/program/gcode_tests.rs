@@ -71,6 +71,85 @@ fn a_rotation_turns_what_follows() {
 }
 
 #[test]
+fn moves_are_off_arcs_by_no_more_than_is_told() {
+    let text = "G18\nG0 X-0.31 Z0\nG2 X0.31 Z0 I0.31 K49.999039 F100\nG17\nG3 X-40 Y0 I-20.155 J0\nM30\n";
+    let placing = Placing { chord: 0.001, kinematics: None, lengths: &|_| None };
+    let path = &read(text).runs(&placing).unwrap()[0].path;
+    let off = path.segments().filter(|(.., step)| step.kind != motion::MoveKind::Rapid).map(|(a, b, _)| {
+        let middle = a + 0.5 * (b - a);
+        if a.y == 0.0 && b.y == 0.0 {
+            50.0 - middle.x.hypot(middle.z - 49.999039)
+        } else {
+            20.155 - (middle.x + 19.845).hypot(middle.y)
+        }
+    });
+    let most = off.fold(0.0, f64::max);
+    assert!(most > 5e-5 && most <= path.origin.strays && path.origin.strays <= 1.01e-4, "{most}");
+    let straight = &read("G0 X1\nG1 X5 F100\nM30\n").runs(&placing).unwrap()[0].path;
+    assert_eq!(straight.origin.strays, 0.0);
+}
+
+/// Minutes that the moves of a program take at their feeds on a table that turns about x and z, standing included.
+fn minutes_on_a_table(text: &str) -> f64 {
+    let kinematics = machine::kinematics::Kinematics::by_name("ac-table").unwrap();
+    let placing = Placing { chord: 0.001, kinematics: Some(&kinematics), lengths: &|_| None };
+    let path = &read(text).runs(&placing).unwrap()[0].path;
+    let fed = path.segments().filter(|(.., step)| step.kind != motion::MoveKind::Rapid);
+    let moving: f64 = fed.map(|(a, b, step)| (b - a).norm() / step.feed_rate).sum();
+    moving + path.origin.standing_s / 60.0
+}
+
+#[test]
+fn moves_in_which_axes_turn_take_the_time_of_their_feed() {
+    for (text, expected) in [
+        ("G0 X50 Y0 Z20 C0 A0\nG93\nG1 C90 F1\nG1 X51 C180 F1\nG94\nM30\n", 2.0),
+        ("G0 X50 Z20 C0\nG1 C90 F45\nX60 C0 F5\nM30\n", 4.0),
+        // About the tip, and with nothing left to do.
+        ("G0 X0 Y0 Z20\nG93 G1 A30 F0.5\nM30\n", 2.0),
+        ("G0 X0 Y0 Z20\nG93 G1 C90 F0.5\nM30\n", 2.0),
+        ("G43.4 H1 G0 X10 Y0 Z20\nG93 G1 A30 C90 F0.5\nM30\n", 2.0),
+        ("G0 X50 Y0 Z20\nG93 G2 X0 Y50 I-50 J0 C90 F2\nM30\n", 0.5),
+    ] {
+        let minutes = minutes_on_a_table(text);
+        assert!((minutes / expected - 1.0).abs() < 1e-4, "{text}: {minutes}");
+    }
+    // No faster than the axes can.
+    assert!(minutes_on_a_table("G0 X50 Y0 Z20 C0\nG93 G1 C90 F1000000\nM30\n") > 1e-3);
+}
+
+#[test]
+fn dwells_last_as_each_control_counts_them() {
+    let lasts = |text: &str, control| -> f64 {
+        let read = read_with(text, control, &Setup::default());
+        let placing = Placing { chord: 0.001, kinematics: None, lengths: &|_| None };
+        let standing = read.runs(&placing).unwrap().iter().map(|run| run.path.origin.standing_s).sum();
+        assert!(read.notes.is_empty(), "{:?}", read.notes);
+        standing
+    };
+    let around = |dwell: &str| format!("T1 M6\nG0 X1\n{dwell}\nG1 X2 F100\nM30\n");
+    let mach = Control::from_word("mach").unwrap();
+    for (dwell, control, expected) in [
+        ("G4 X60.\nG4 P60000", GENERAL_CONTROL, 120.0),
+        ("G4 P0.5", GENERAL_CONTROL, 0.5),
+        ("G4 P500", &FANUC, 0.5),
+        ("G4 U1.5", &FANUC, 1.5),
+        ("G4 P1.", &HAAS, 1.0),
+        ("G4 P2", &LINUXCNC, 2.0),
+        ("G4 P2", &GRBL, 2.0),
+        ("G4 P2", mach, 2.0),
+        // Stays for the next hole, not for cycles that do not stand.
+        ("G82 X1 Z-1 R1 P250 F10\nX2\nG81 X3", &FANUC, 0.5),
+        ("G89 X1 Z-1 R1 P0.25 F10\nX2\nG80", &LINUXCNC, 0.5),
+    ] {
+        let found = lasts(&around(dwell), control);
+        assert!((found - expected).abs() < 1e-12, "{dwell}: {found}");
+    }
+    assert_eq!(lasts("G0 X1\nG1 X2 F100\nG4 P100\nM30\n", &FANUC), 0.1);
+    assert_eq!(refused("G0 X1\nG4 P-1\n", &FANUC).0, 2);
+    assert_eq!(read("G4\nG0 X1\nM30\n").notes.len(), 1);
+}
+
+#[test]
 fn shifts_are_independent_of_each_other_on_fanuc() {
     assert_ends("G92 X5 Y0\nG52 X1\nG1 X0 F1\nG52 X0\nX0\nM30\n", &[[-4.0, 0.0, 0.0], [-5.0, 0.0, 0.0]]);
     assert_ends("G10 L2 P2 X1 Y2\nG55 G0 X0 Y0\nG54.1 P3 X5\nM30\n", &[[1.0, 2.0, 0.0], [5.0, 2.0, 0.0]]);

@@ -9,7 +9,7 @@ use crate::control::{Code, Codes, Control, FeedMode, Length, Motion, Plane, Radi
 use crate::error::{Fault, ProgramError, Stop};
 use crate::expression::Scope;
 use crate::flow::{Flow, Next};
-use crate::frame::{Place, Rotation};
+use crate::frame::{Place, Rotation, fed_length};
 use crate::lines::Lines;
 use crate::parameters::Parameters;
 use crate::program::{Arc, Note, Program, Setting, Spindle, Step, StepKind, ToolRemark};
@@ -83,7 +83,7 @@ pub(crate) struct Interpreter<'a> {
     /// The cutter's radius, while it is compensated.
     pub compensation: Option<Compensation>,
     /// Where the block's text begins within its line.
-    shift: usize,
+    pub shift: usize,
 }
 
 impl<'a> Interpreter<'a> {
@@ -433,7 +433,7 @@ impl<'a> Interpreter<'a> {
     /// A code that takes the block's axis words for itself.
     fn single(&mut self, code: Code, word: CodeWord) -> Result<(), Stop> {
         match code {
-            Code::Dwell => self.block.ignore(b"PXUSF"),
+            Code::Dwell => self.dwell_of_block()?,
             Code::Data => self.data(word)?,
             Code::Home(which) => self.home(usize::from(which))?,
             Code::SetHome(which) => self.state.homes[usize::from(which)] = self.nose(),
@@ -722,9 +722,7 @@ impl<'a> Interpreter<'a> {
     }
 
     fn length_to(&self, to: &Place) -> f64 {
-        let apart = |k: usize| to[k] - self.state.at[k];
-        let straight = apart(0).hypot(apart(1)).hypot(apart(2));
-        if straight > 0.0 { straight } else { apart(3).hypot(apart(4)).hypot(apart(5)) }
+        fed_length(&self.state.at, to)
     }
 
     /// The feed of a move of this length, mm/min; 0 where the program gives none.

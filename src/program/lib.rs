@@ -20,6 +20,7 @@ mod compensation;
 mod control;
 mod cursor;
 mod cycle;
+mod dwell;
 mod error;
 mod expression;
 mod flow;

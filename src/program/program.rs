@@ -23,7 +23,7 @@ pub struct Step {
     pub kind: StepKind,
     /// Where it ends: X Y Z of the tip and A B C, machine coordinates less the tool's length, mm and degrees.
     pub to: Place,
-    /// Feed, mm/min (degrees/min where only rotary axes move); 0 where the program gives none.
+    /// Feed along X Y Z, mm/min (degrees/min where only rotary axes move); 0 where the program gives none.
     pub feed: f64,
     /// Line, from 1.
     pub line: u32,
@@ -104,6 +104,8 @@ pub struct Program {
     pub start: Place,
     /// The motions, in the order in which they run.
     pub steps: Vec<Step>,
+    /// How long the tip stands, s, each before the step of an index.
+    pub dwells: Vec<(usize, f64)>,
     /// The arcs among them.
     pub arcs: Vec<Arc>,
     /// What holds meanwhile.

@@ -1,7 +1,7 @@
 //! From a program to straight moves of tips and axes, one run for each stretch of one tool.
 //!
 //! Enters: a [`Program`] in machine coordinates. Leaves: paths in the coordinates of the part, whose zero is the program's.
-//! Arcs become chords within the chord tolerance. Where rotary axes turn, the way of the tip that follows from the machine is
+//! Arcs become chords, far nearer than the chord tolerance, and [`motion::Origin::strays`] has how far they are off. Where rotary axes turn, the way of the tip that follows from the machine is
 //! divided so that straight pieces keep the same tolerance.
 
 use geometry::{Point3, Vector3};
@@ -9,11 +9,14 @@ use machine::kinematics::{Joints, Kinematics, Way, Waypoint};
 use motion::{ClPoint, Move, MoveKind, Origin, Toolpath};
 
 use crate::error::{Fault, ProgramError};
-use crate::frame::Place;
-use crate::program::{Program, Setting, Step, StepKind};
+use crate::frame::{Place, fed_length};
+use crate::program::{Arc, Program, Setting, Step, StepKind};
 
 /// Feed of moves for which the program gives none, mm/min. They are violations; the time needs a number.
 pub const FEED_WHERE_NONE: f64 = 100.0;
+
+/// Chords of arcs stray by no more than this share of the chord tolerance: what is measured has to be known so much better.
+const ARC_SHARE: f64 = 0.1;
 
 /// A piece of a turning move is halved so many times at most: a thousandth of any turn.
 const MOST_HALVINGS: u32 = 12;
@@ -21,12 +24,15 @@ const MOST_HALVINGS: u32 = 12;
 /// No piece turns the tool by more than this, rad.
 const MOST_TURN: f64 = 0.5;
 
+/// Tips that are nearer to each other, mm, are one place.
+const NO_WAY: f64 = 1e-9;
+
 /// A feed that leans less than this share from the tool axis goes straight down or up.
 const STRAIGHT: f64 = 1e-6;
 
 /// How a program is laid to the part.
 pub struct Placing<'a> {
-    /// How far chords may stray, mm.
+    /// The chord tolerance, mm: pieces of turning moves may be as far off, chords of arcs a tenth as far.
     pub chord: f64,
     /// The machine, where it has rotary axes.
     pub kinematics: Option<&'a Kinematics>,
@@ -52,9 +58,10 @@ impl Program {
     /// [`ProgramError`] where a rotary axis turns that the machine does not have.
     ///
     /// # Tolerance
-    /// Chords of arcs stray by no more than [`Placing::chord`] (those of a helix, of its circle).
+    /// The motion is off the moves by no more than [`motion::Origin::strays`], mm.
     pub fn runs(&self, placing: &Placing<'_>) -> Result<Vec<ToolRun>, ProgramError> {
         let mut runs: Vec<Run> = Vec::new();
+        let mut dwells = self.dwells.iter().peekable();
         for (k, step) in self.steps.iter().enumerate() {
             if step.kind == StepKind::Set {
                 continue;
@@ -69,7 +76,13 @@ impl Program {
                 runs.push(Run::new(setting.tool, start, joints));
             }
             let Some(run) = runs.last_mut() else { continue };
+            while let Some((_, seconds)) = dwells.next_if(|(step, _)| *step <= k) {
+                run.standing_s += seconds;
+            }
             layer.follow(k, step, run).map_err(fault)?;
+        }
+        if let Some(run) = runs.last_mut() {
+            run.standing_s += dwells.map(|(_, seconds)| seconds).sum::<f64>();
         }
         Ok(runs.into_iter().map(|run| run.finished(&self.name)).collect())
     }
@@ -83,18 +96,52 @@ struct Run {
     joints: Vec<Waypoint>,
     pass: u32,
     cutting: bool,
+    /// How far arcs are off their chords, and turning moves off their pieces, mm.
+    chords_stray: f64,
+    turns_stray: f64,
+    /// Time for which the tip stands, s.
+    standing_s: f64,
 }
 
 impl Run {
     fn new(tool: u32, start: ClPoint, joints: Option<Joints>) -> Self {
         let begin = joints.map(|joints| Waypoint { joints, step: 0, way: Way::Approach });
         let joints = begin.into_iter().collect();
-        Self { tool, at: start, path: Toolpath::new(start, Vec::new()), joints, pass: 0, cutting: false }
+        let path = Toolpath::new(start, Vec::new());
+        Self {
+            tool,
+            at: start,
+            path,
+            joints,
+            pass: 0,
+            cutting: false,
+            chords_stray: 0.0,
+            turns_stray: 0.0,
+            standing_s: 0.0,
+        }
     }
 
     fn finished(self, program: &str) -> ToolRun {
-        let origin = Origin { tools: vec![(0, self.tool)], program: program.to_owned(), ..self.path.origin };
+        let strays = self.chords_stray + self.turns_stray;
+        let (tools, program) = (vec![(0, self.tool)], program.to_owned());
+        let origin = Origin { tools, program, strays, standing_s: self.standing_s, ..self.path.origin };
         ToolRun { tool: self.tool, path: Toolpath { origin, ..self.path }, joints: self.joints }
+    }
+
+    /// A piece of a step in which axes turn; it takes so many minutes, where that is known.
+    fn push_turning(&mut self, to: ClPoint, step: &Step, minutes: Option<f64>) {
+        let length = (to.tip - self.at.tip).norm();
+        let feed = match minutes {
+            Some(minutes) if length > NO_WAY => length / minutes,
+            Some(minutes) => {
+                self.standing_s += 60.0 * minutes;
+                step.feed
+            }
+            None => step.feed,
+        };
+        if to != self.at {
+            self.push(to, step.kind == StepKind::Rapid, feed, step.line);
+        }
     }
 
     /// A straight move to a location. Passes are what lies between rapids.
@@ -123,6 +170,19 @@ fn kind(from: &ClPoint, to: &ClPoint) -> MoveKind {
     } else {
         MoveKind::Retract
     }
+}
+
+fn tip(place: &Place) -> [f64; 3] {
+    [place[0], place[1], place[2]]
+}
+
+/// A straight way of all axes, some of which turn.
+struct Turn<'a> {
+    from: &'a Place,
+    to: &'a Place,
+    step: &'a Step,
+    /// How long it takes, where that is known: all axes move evenly.
+    minutes: Option<f64>,
 }
 
 /// One setting of a program, laid to the part.
@@ -183,20 +243,14 @@ impl Layer<'_> {
     fn follow(&self, k: usize, step: &Step, run: &mut Run) -> Result<(), Fault> {
         let from = self.program.start_of(k);
         let to = &step.to;
-        let rapid = step.kind == StepKind::Rapid;
         if let Some(axis) = self.program.axes.get(k + 1) {
-            // Places between are not known; the tip runs straight while the axis turns evenly.
-            let at = self.location(to, Some(axis))?;
-            run.push(at, rapid, step.feed, step.line);
-            return Ok(());
+            return self.follow_axis(k, step, axis, run);
         }
         let turns = from[3..] != to[3..];
         if let StepKind::Arc(index) = step.kind {
             let arc = &self.program.arcs[index as usize];
-            let start = [from[0], from[1], from[2]];
-            let end = [to[0], to[1], to[2]];
-            let radius = (0..3).map(|k| (start[k] - arc.centre[k]).powi(2)).sum::<f64>().sqrt();
-            let chords = arc.chords(radius, self.placing.chord);
+            let (start, end) = (tip(from), tip(to));
+            let chords = self.chords(arc, &start, &end, run);
             let mut last = *from;
             for n in 1..=chords {
                 let t = n as f64 / chords as f64;
@@ -211,6 +265,34 @@ impl Layer<'_> {
         self.straight(from, to, step, turns, run)
     }
 
+    /// Chords of an arc; the run knows how far they are off.
+    fn chords(&self, arc: &Arc, start: &[f64; 3], end: &[f64; 3], run: &mut Run) -> usize {
+        let chords = arc.chords(start, ARC_SHARE * self.placing.chord);
+        run.chords_stray = run.chords_stray.max(arc.strays(start, end, chords));
+        chords
+    }
+
+    /// A step whose tool axis the program gives. Places between are not known: the axis turns evenly on the way of the tip.
+    fn follow_axis(&self, k: usize, step: &Step, axis: &[f64; 3], run: &mut Run) -> Result<(), Fault> {
+        let (from, to) = (self.program.start_of(k), &step.to);
+        if let StepKind::Arc(index) = step.kind {
+            let arc = &self.program.arcs[index as usize];
+            let (start, end) = (tip(from), tip(to));
+            let (before, after) = (Vector3::from(self.program.axes[k]), Vector3::from(*axis));
+            let chords = self.chords(arc, &start, &end, run);
+            for n in 1..chords {
+                let t = n as f64 / chords as f64;
+                let [x, y, z] = arc.at(&start, &end, t);
+                let turned = if before == after { after } else { before.lerp(&after, t).normalize() };
+                let at = self.location(&[x, y, z, 0.0, 0.0, 0.0], Some(&turned.into()))?;
+                run.push(at, false, step.feed, step.line);
+            }
+        }
+        let at = self.location(to, Some(axis))?;
+        run.push(at, step.kind == StepKind::Rapid, step.feed, step.line);
+        Ok(())
+    }
+
     fn straight(
         &self,
         from: &Place,
@@ -220,12 +302,10 @@ impl Layer<'_> {
         run: &mut Run,
     ) -> Result<(), Fault> {
         if turns {
-            self.halve(from, to, [0.0, 1.0], step, run, 0)?;
-        }
-        let at = self.location(to, None)?;
-        // Where nothing is left to do after a turn, no move is left.
-        if at != run.at || !turns {
-            run.push(at, step.kind == StepKind::Rapid, step.feed, step.line);
+            let minutes = self.minutes(from, to, step)?;
+            self.halve(&Turn { from, to, step, minutes }, [0.0, 1.0], run, 0)?;
+        } else {
+            run.push(self.location(to, None)?, step.kind == StepKind::Rapid, step.feed, step.line);
         }
         if !run.joints.is_empty() {
             let way = if self.setting.tip_kept { Way::Tip } else { Way::Axes };
@@ -235,37 +315,49 @@ impl Layer<'_> {
         Ok(())
     }
 
+    /// How long a feed takes in which axes turn: by its feed, or longer where an axis cannot go so fast. `None` without a feed.
+    fn minutes(&self, from: &Place, to: &Place, step: &Step) -> Result<Option<f64>, Fault> {
+        if step.kind == StepKind::Rapid || step.feed <= 0.0 {
+            return Ok(None);
+        }
+        let minutes = fed_length(from, to) / step.feed;
+        let Some(kinematics) = self.placing.kinematics else { return Ok(Some(minutes)) };
+        let [before, after] = [self.joints(from)?, self.joints(to)?];
+        let moved = (after.linear - before.linear).iter().copied().collect::<Vec<f64>>();
+        let turned = [0, 1].map(|k| after.rotary[k] - before.rotary[k]);
+        let of_axes = moved.iter().chain(&turned).zip(kinematics.rates());
+        let seconds = of_axes.map(|(by, rate)| by.abs() / rate).fold(0.0, f64::max);
+        Ok(Some(minutes.max(seconds / 60.0)))
+    }
+
     /// Divides a move in which the tool turns until its pieces are straight within the tolerance.
-    fn halve(
-        &self,
-        from: &Place,
-        to: &Place,
-        [a, b]: [f64; 2],
-        step: &Step,
-        run: &mut Run,
-        depth: u32,
-    ) -> Result<(), Fault> {
+    fn halve(&self, turn: &Turn<'_>, [a, b]: [f64; 2], run: &mut Run, depth: u32) -> Result<(), Fault> {
+        let Turn { from, to, step, minutes } = *turn;
         let between = |t: f64| -> Place { std::array::from_fn(|k| from[k] + (to[k] - from[k]) * t) };
         let [start, end] = [self.location(&between(a), None)?, self.location(&between(b), None)?];
-        let near = |t: f64| {
+        let off = |t: f64| {
             let truly = self.location(&between(a + (b - a) * t), None)?;
             let straight = start.towards(&end, t);
             // The axis is weighed over a cutting length of a hundred mm.
-            let off = (truly.tip - straight.tip).norm() + 100.0 * (truly.axis - straight.axis).norm();
-            Ok::<bool, Fault>(off <= 0.5 * self.placing.chord)
+            Ok::<f64, Fault>((truly.tip - straight.tip).norm() + 100.0 * (truly.axis - straight.axis).norm())
         };
+        // Between these places it is off by no more than twice as far.
+        let strays = 2.0 * off(0.25)?.max(off(0.5)?).max(off(0.75)?);
         let small = start.axis.dot(&end.axis) > MOST_TURN.cos();
-        if depth >= MOST_HALVINGS || small && near(0.25)? && near(0.5)? && near(0.75)? {
+        if depth >= MOST_HALVINGS || small && strays <= self.placing.chord {
             if start.axis.dot(&end.axis) < -1.0 + 1e-9 {
                 return Err(Fault::HalfTurn);
             }
-            if b < 1.0 {
-                run.push(end, step.kind == StepKind::Rapid, step.feed, step.line);
+            if step.kind != StepKind::Rapid {
+                run.turns_stray = run.turns_stray.max(strays);
             }
+            // What comes last ends exactly where the step does.
+            let end = if b < 1.0 { end } else { self.location(to, None)? };
+            run.push_turning(end, step, minutes.map(|minutes| (b - a) * minutes));
             return Ok(());
         }
         let middle = 0.5 * (a + b);
-        self.halve(from, to, [a, middle], step, run, depth + 1)?;
-        self.halve(from, to, [middle, b], step, run, depth + 1)
+        self.halve(turn, [a, middle], run, depth + 1)?;
+        self.halve(turn, [middle, b], run, depth + 1)
     }
 }

@@ -51,6 +51,13 @@ impl Setup {
     pub fn from_above(above: f64) -> Self {
         Self { work: [[0.0, 0.0, -above, 0.0, 0.0, 0.0]; WORK_OFFSETS], ..Self::default() }
     }
+
+    /// A machine in whose coordinates the program's zero is `zero`, mm, and whose tool starts `above` that.
+    pub fn from_zero(zero: [f64; 3], above: f64) -> Self {
+        let [x, y, z] = zero;
+        let start = [x, y, z + above, 0.0, 0.0, 0.0];
+        Self { work: [[x, y, z, 0.0, 0.0, 0.0]; WORK_OFFSETS], start, ..Self::default() }
+    }
 }
 
 /// The codes in force.
@@ -80,6 +87,8 @@ pub(crate) struct Sticky {
     pub bottom: Option<f64>,
     pub retract: Option<f64>,
     pub peck: Option<f64>,
+    /// How long the tool stands at the bottom, s.
+    pub dwell: f64,
     /// I J of G76 and G87, or Q: how far the spindle is moved aside.
     pub aside: [f64; 3],
     /// The level before the first cycle.

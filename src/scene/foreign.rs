@@ -20,7 +20,8 @@ use toolpath::{ForeignProgram, ReadProgram, ToolsMeant};
 /// Largest program that is read, bytes: some twenty million lines.
 const MAX_BYTES: u64 = 1 << 29;
 
-/// How far above the program's zero that of the machine is taken to be, mm. G28 and G53 go there.
+/// How far above the program's zero the tool starts, mm, and that of the machine is taken to be where no machine is known. G28 and G53
+/// go there.
 pub const MACHINE_ZERO_ABOVE: f64 = 200.0;
 
 /// Largest table of tools that is read, bytes.
@@ -62,7 +63,7 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
         let registers = lengths.iter().map(|(number, length)| (*number, [0.0, 0.0, *length])).collect();
         let radii = table.tools.iter().map(|tool| (tool.number, tool.cutter.radius())).collect();
         let any_radius = table.tools.is_empty().then(|| scene.cutter.radius());
-        let setup = Setup { lengths: registers, radii, any_radius, ..Setup::from_above(MACHINE_ZERO_ABOVE) };
+        let setup = Setup { lengths: registers, radii, any_radius, ..setup(scene, lengths.is_empty()) };
         read_gcode(&name, &bytes, control, &setup)
     };
     let read = read.map_err(refused)?;
@@ -100,6 +101,16 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
     };
     request.strategy = Box::new(ForeignProgram { read: Some(Arc::new(read)), ..foreign.clone() });
     Ok(())
+}
+
+/// Where the program's zero is on the machine. A control that knows no lengths counts from where the tool's tip is, else from the
+/// spindle nose.
+fn setup(scene: &Scene, without_lengths: bool) -> Setup {
+    let known = scene.five_axis.as_ref().filter(|machine| machine.zero_is_given && machine.gauge_is_given);
+    let Some(machine) = known else { return Setup::from_above(MACHINE_ZERO_ABOVE) };
+    let (zero, length) = (machine.kinematics.workpiece_zero(), machine.kinematics.gauge_length());
+    let length = if without_lengths { length } else { 0.0 };
+    Setup::from_zero([zero.x, zero.y, zero.z + length], MACHINE_ZERO_ABOVE)
 }
 
 /// The table of tools that a toolpath names.

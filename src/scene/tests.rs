@@ -376,6 +376,33 @@ fn a_file_that_is_not_there_is_reported_at_its_name() {
     assert_eq!(reason, "line 1 is not UTF-8 text");
 }
 
+/// The nose of a tool of 150 mm goes to the machine's zero, 400 mm above that of the part.
+#[test]
+fn machine_coordinates_of_a_program_count_from_the_machine_s_zero() {
+    let home = tempfile::tempdir().unwrap();
+    let ends = |machine: &str, tools: &str, length: &str| {
+        let path = home.path().join("scene.toml");
+        let text = format!(
+            "[part]\nsurface = \"plane\"\nx = [0, 9]\ny = [0, 9]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n{machine}\
+             [[toolpath]]\nstrategy = \"program\"\nfile = \"a.nc\"\n{tools}"
+        );
+        std::fs::write(&path, text).unwrap();
+        std::fs::write(home.path().join("a.nc"), format!("T1 M6\nG0 X0 Y0 Z10 {length}\nG53 G0 Z0\nM30\n"))
+            .unwrap();
+        let tool = "[[tool]]\nnumber = 1\nshape = \"ball\"\ndiameter = 6\ngauge_length = 150\n";
+        std::fs::write(home.path().join("tools.toml"), tool).unwrap();
+        let scene = Scene::read(&path).unwrap();
+        let path = &scene.toolpaths[0].foreign().unwrap().path;
+        [path.start.tip.z, path.moves[path.len() - 1].to.tip.z]
+    };
+    let machine = |rest: &str| format!("[machine]\nkinematics = {{ preset = \"ac-table\"{rest} }}\n");
+    let known = machine(", gauge_length = 150, workpiece_zero = [5, 0, -400]");
+    assert_eq!(ends(&known, "", ""), [200.0, 250.0]);
+    assert_eq!(ends(&known, "tools = \"tools.toml\"\n", "G43 H1")[1], 250.0);
+    assert_eq!(ends(&machine(""), "", ""), [200.0, 200.0]);
+    assert_eq!(ends("", "", ""), [200.0, 200.0]);
+}
+
 #[test]
 fn the_auto_cell_is_a_round_number() {
     let at = |step: Step| {

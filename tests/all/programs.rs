@@ -289,6 +289,20 @@ fn a_tool_is_judged_on_what_the_tools_before_it_left() {
     assert_eq!(claims(&answer, report, "undecided"), ["uncut"]);
 }
 
+/// The lowest place of an arc lies between its ends, 5.50 µm below the plate.
+#[test]
+fn an_arc_is_judged_and_not_its_chords() {
+    let mut lines = raster();
+    let end = lines.len() - 4;
+    let arc = ["G0 Z5", "X7.69 Y4", "G1 Z-0.004539", "G18 G2 X8.31 Z-0.004539 I0.31 K49.999039", "G17"];
+    lines.splice(end..end, arc.map(str::to_owned));
+    let (answer, report) = verify(&lines, &[]);
+    let gouge = &report.unwrap()["toolpaths"][0]["gouge"];
+    let [depth, bound] = ["max_depth_mm", "error_bound_mm"].map(|key| gouge[key].as_f64().unwrap());
+    assert!((depth - 0.0055).abs() <= bound && bound < 0.0003, "{depth} {bound}");
+    assert!(depth - bound > 0.005 && answer.code == Some(1), "{}", answer.stdout);
+}
+
 /// FreeCAD's program for a block with a pocket, a boss and holes. Its arcs are 7 to 8 µm too near to the boss, and its pocket
 /// leaves islands and corners: so says a union of the discs of all moves, too.
 #[test]

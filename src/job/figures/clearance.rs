@@ -106,6 +106,12 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     if pairs.is_empty() {
         return Ok(Finding { claims: unchecked.into_iter().collect(), ..Finding::default() });
     }
+    // The program is as far off the moves that were looked at.
+    let strays = run.path().origin.strays;
+    for pair in &mut pairs {
+        pair.error_bound_mm = pair.error_bound_mm.map(|bound| bound + strays);
+        pair.off += strays;
+    }
     pairs.sort_by(|a, b| nearness(a).total_cmp(&nearness(b)));
     let mut claims: Vec<Claim> = pairs.iter().map(|pair| pair.claim(run)).collect();
     if run.request.foreign().is_some_and(|read| read.unknown_before) {

@@ -46,6 +46,108 @@ fn nx_is_read_with_its_arcs() {
     }
 }
 
+/// Locations of a half circle in XZ, its lowest place at z = -5, under a tool axis of these words.
+fn half_circle(before: &str, after: &str) -> String {
+    format!(
+        "FEDRAT/MMPM,200\nFROM/10.0,20.0,20.0\nGOTO/10.0,20.0,5.0{before}\n\
+         CIRCLE/20.0,20.0,5.0,0.0,-1.0,0.0,10.0\nGOTO/30.0,20.0,5.0{after}\nFINI\n"
+    )
+}
+
+#[test]
+fn circles_are_followed_under_upright_and_leaning_tools() {
+    let axes = [
+        ("", ""),
+        (",0,0,1", ",0.0001,0,1"),
+        (",0.6,0,0.8", ",0.6,0,0.8"),
+        (",0.6,0,0.8", ",0.600001,0,0.8"),
+    ];
+    for (before, after) in axes {
+        let placing = Placing { chord: 0.001, kinematics: None, lengths: &|_| None };
+        let runs = read(&half_circle(before, after)).runs(&placing).unwrap();
+        let path = &runs[0].path;
+        let along = &path.moves[1..];
+        let lowest = along.iter().map(|step| step.to.tip.z).fold(f64::INFINITY, f64::min);
+        assert!((lowest + 5.0).abs() < 0.001, "{before} {after}: {lowest}");
+        for step in along {
+            let radius = (step.to.tip.x - 20.0).hypot(step.to.tip.z - 5.0);
+            let lean = step.to.axis.dot(&path.moves[0].to.axis);
+            assert!((radius - 10.0).abs() < 1e-9 && lean > 1.0 - 1e-7, "{before} {after}: {step:?}");
+        }
+    }
+}
+
+#[test]
+fn circles_that_cannot_be_followed_are_refused_with_their_line() {
+    let sound = half_circle("", "");
+    for (text, line) in [
+        (sound.replace("GOTO/30.0", "GOTO/30.02"), 5),
+        (sound.replace("GOTO/10.0", "GOTO/9.98"), 5),
+        (sound.replace(",10.0\n", ",0.0\n"), 5),
+        (sound.replace(",10.0\n", ",10.0,TIMES,2\n"), 4),
+        (sound.replace("GOTO/30.0", "RAPID\nGOTO/30.0"), 6),
+        (sound.replace("GOTO/30.0", "FROM/30.0"), 5),
+        (sound.replace("FROM/10.0,20.0,20.0\nGOTO/10.0,20.0,5.0\n", ""), 3),
+        (half_circle(",0,0,1", ",0.001,0,1"), 5),
+        (half_circle(",0.6,0,0.8", ",0,0,1"), 5),
+        ("GOTO/0,1000,0\nCIRCLE/0,0,0,0,0,1,1000\nGOTO/0,-1000.2,0\n".to_owned(), 3),
+    ] {
+        let error = read_apt("a.cls", text.as_bytes()).expect_err(&text);
+        assert_eq!(error.line, line, "{text}: {error}");
+    }
+    assert!(read_apt("a.cls", sound.replace("GOTO/30.0", "GOTO/30.005").as_bytes()).is_ok());
+}
+
+#[test]
+fn delays_are_seconds_or_turns() {
+    let program = read("SPINDL/1200,CLW\nGOTO/0,0,1\nDELAY/2.5\nGOTO/1,0,1\nDELAY/REV,10\nFINI\n");
+    assert_eq!(program.dwells, [(0, 2.5), (1, 0.5)]);
+}
+
+#[test]
+fn every_msys_is_another_frame() {
+    let text = "\
+MSYS/5,0,0,1,0,0,0,1,0
+FEDRAT/MMPM,200
+GOTO/1,0,10
+GOTO/2,0,10
+MSYS/105,0,0,0,0,-1,0,1,0
+GOTO/1,2,3
+GODLTA/0,0,1
+GODLTA/1
+CIRCLE/1,0,5,0,0,1,2
+GOTO/1,-2,5
+MSYS/5,0,0,1,0,0,0,1,0
+GOTO/3,0,10
+FINI
+";
+    let program = read(text);
+    let ends: Vec<[f64; 3]> = program.steps.iter().map(|step| [step.to[0], step.to[1], step.to[2]]).collect();
+    let expected = [
+        [2.0, 0.0, 10.0],
+        [103.0, 2.0, -1.0],
+        [104.0, 2.0, -1.0],
+        [105.0, 2.0, -1.0],
+        [105.0, -2.0, -1.0],
+        [3.0, 0.0, 10.0],
+    ];
+    assert_eq!(ends, expected);
+    assert_eq!(program.axes[2], [1.0, 0.0, 0.0]);
+    assert_eq!((program.axes[6], program.arcs[0].centre), ([0.0, 0.0, 1.0], [105.0, 0.0, -1.0]));
+    assert_eq!((program.notes.len(), program.notes[0].line), (1, 5));
+}
+
+/// CATIA describes a cutter before its tool is loaded.
+#[test]
+fn a_cutter_is_that_of_the_tool_that_moves_next() {
+    let text = "CUTTER/10,5\nLOADTL/1\nGOTO/0,0,1\nGOTO/1,0,1\nUNITS/INCHES\nCUTTER/0.25,0,0.125,0,0,0,2\nLOADTL/2\nGOTO/2,0,1\nFINI\n";
+    let tools = crate::ToolTable::of_remarks(&read(text));
+    let cutter = |tool: u32| tools.get(tool).map(|tool| tool.cutter);
+    assert_eq!((cutter(1), cutter(2)), (cutter::Cutter::ball(10.0).ok(), cutter::Cutter::flat(6.35).ok()));
+    let twice = read("LOADTL/1\nCUTTER/10,5\nGOTO/0,0,1\nGOTO/1,0,1\nCUTTER/8,4\nGOTO/2,0,1\nFINI\n");
+    assert_eq!((twice.notes.len(), twice.notes[0].line), (1, 6));
+}
+
 #[test]
 fn catia_habits_inches_and_five_axes() {
     let text = "\
@@ -83,11 +185,17 @@ fn what_may_move_the_tool_is_refused_with_its_line() {
         ("GOTO/1,2,3,0,0,0\n", 1, 1),
         ("L1=LINE/P1,P2\n", 1, 1),
         ("GOTO/1e9,2,3\n", 1, 6),
+        ("GOTO/1,2,3\nMODE/INCR\nGOTO/1,0,0\n", 2, 1),
+        ("GOTO/1,2,3\nCUTCOM/LEFT,1\n", 2, 1),
+        ("GOTO/1,2,3\nCUTCOM/ON,RIGHT\n", 2, 1),
+        ("MSYS/0,0,0,1,0,0\n", 1, 1),
+        ("MSYS/0,0,0,1,0,0,1,0,0\n", 1, 1),
+        ("GOTO/1,2,3\nMSYS/0,0,0,1,0,0,0,1,0\n", 2, 1),
     ] {
         let error = read_apt("a.cls", text.as_bytes()).unwrap_err();
         assert_eq!((error.line, error.column), (line, column), "{text}: {error}");
     }
-    assert!(read_apt("a.cls", b"GOTO/1,2,3\nCYCLE/OFF\nFINI").is_ok());
+    assert!(read_apt("a.cls", b"GOTO/1,2,3\nCYCLE/OFF\nCUTCOM/OFF\nMODE/ABSOL\nFINI").is_ok());
     let cut = read("GOTO/0,0,1\nFEDRAT/100\nGOTO/1,0,1\n");
     assert_eq!(cut.findings(&|_| None).last().map(|f| f.kind), Some(FindingKind::NoEnd));
 }
