@@ -199,6 +199,9 @@ impl<'a> Interpreter<'a> {
             self.settings(&mut asked)?;
         }
         if let Some((Code::Macro, _)) = asked.single {
+            if let Some((motion, word)) = asked.motion {
+                self.begin(motion, word);
+            }
             return self.call_macro();
         }
         self.words(unit_before)?;
@@ -210,9 +213,16 @@ impl<'a> Interpreter<'a> {
         if asked.quiet {
             self.block.ignore(b"PQREL");
         }
-        match asked.single {
-            Some((code, word)) => self.single(code, word)?,
-            None => self.motion(&asked)?,
+        if let Some((code, word)) = asked.single {
+            self.single(code, word)?;
+        }
+        match (asked.single, asked.motion) {
+            (Some((code, _)), motion) if code.takes_axes(self.control) => {
+                if let Some((motion, word)) = motion {
+                    self.begin(motion, word);
+                }
+            }
+            _ => self.motion(&asked)?,
         }
         if let Some(letter) = self.block.unused() {
             return Err(Stop::new(self.block.column(letter), Fault::Unused(char::from(letter))));
@@ -280,7 +290,23 @@ impl<'a> Interpreter<'a> {
                 },
             }
         }
-        Ok(())
+        self.check_together(asked)
+    }
+
+    /// Refuses a motion beside a code that wants its words.
+    fn check_together(&self, asked: &Asked) -> Result<(), Stop> {
+        let (Some((motion, first)), Some((code, second))) = (asked.motion, asked.single) else {
+            return Ok(());
+        };
+        let axes = self.control.axis_words_once && motion != Motion::None && code.takes_axes(self.control);
+        // P would be both a time and a number of turns.
+        let dwell = code == Code::Dwell && matches!(motion, Motion::Arc { .. });
+        if !axes && !dwell {
+            return Ok(());
+        }
+        let column = usize::from(second.column.max(first.column));
+        let [first, second] = [first.tenths, second.tenths].map(spelled);
+        Err(Stop::new(column, Fault::Conflict { first, second }))
     }
 
     fn select_work(&mut self, index: usize) {
@@ -346,6 +372,11 @@ impl<'a> Interpreter<'a> {
                         (format!("M{}", word.tenths / 10), "it brings back codes of an earlier place");
                     return Err(Stop::new(usize::from(word.column), Fault::Unsupported { code, why }));
                 }
+                code if self.control.outside_call == Some(code) => {
+                    let number = self.block.peek(b'P').map_or(String::new(), |p| format!(" O{p}"));
+                    let found = format!("subprogram{number}, which M{} calls from another device", code / 10);
+                    return Err(Stop::new(usize::from(word.column), Fault::NoTarget(found)));
+                }
                 code if self.control.tcp_switch.is_some_and(|both| both.contains(&code)) => {
                     self.state.modal.tip_kept = self.control.tcp_switch.is_some_and(|[on, _]| code == on);
                     self.changed = true;
@@ -383,7 +414,9 @@ impl<'a> Interpreter<'a> {
 
     /// G43 and the like, and an H that changes the register in force.
     fn lengths(&mut self, asked: &Asked) -> Result<(), Stop> {
-        let register = self.block.take(b'H');
+        // The offsets of G43.1 stand in the block.
+        let given = matches!(asked.length, Some((Length::Given, _)));
+        let register = if given { None } else { self.block.take(b'H') };
         let (length, word) = match asked.length {
             Some(asked) => asked,
             None if register.is_none() || self.state.modal.length == Length::Off => return Ok(()),
@@ -433,7 +466,7 @@ impl<'a> Interpreter<'a> {
     /// A code that takes the block's axis words for itself.
     fn single(&mut self, code: Code, word: CodeWord) -> Result<(), Stop> {
         match code {
-            Code::Dwell => self.block.ignore(b"PXUSF"),
+            Code::Dwell => self.dwell(word)?,
             Code::Data => self.data(word)?,
             Code::Home(which) => self.home(usize::from(which))?,
             Code::SetHome(which) => self.state.homes[usize::from(which)] = self.nose(),
@@ -449,6 +482,16 @@ impl<'a> Interpreter<'a> {
             }
             Code::Rotation(_) => self.rotate(word)?,
             _ => {}
+        }
+        Ok(())
+    }
+
+    /// G4: its time is P, or X or U alone.
+    fn dwell(&mut self, word: CodeWord) -> Result<(), Stop> {
+        match (self.control.dwell_takes_x, self.block.take(b'P')) {
+            (true, None) => self.block.ignore(b"XU"),
+            (false, None) => return Err(self.missing(word, "P, its time")),
+            (_, Some(_)) => {}
         }
         Ok(())
     }

@@ -1,0 +1,102 @@
+//! Words that controls read in different ways, by closed forms, and what is refused where the machine alone could know.
+
+use crate::control::{FANUC, GRBL, HAAS, LINUXCNC};
+use crate::*;
+
+const GENERAL: &Control = GENERAL_CONTROL;
+
+fn try_read(text: &str, control: &'static Control) -> Result<Program, ProgramError> {
+    read_gcode("a.nc", text.as_bytes(), control, &Setup { most_repeats: 10_000, ..Setup::default() })
+}
+
+fn read(text: &str, control: &'static Control) -> Program {
+    try_read(text, control).unwrap_or_else(|error| panic!("{}: {error}\n{text}", control.word))
+}
+
+#[track_caller]
+fn refused(text: &str, control: &'static Control) -> (u32, Fault) {
+    let error = try_read(text, control).expect_err(text);
+    assert!(!error.cure().is_empty(), "{error}");
+    (error.line, error.fault)
+}
+
+/// Ends of all motions: X Y Z.
+fn ends(program: &Program) -> Vec<[f64; 3]> {
+    let moves = program.steps.iter().filter(|step| step.kind != StepKind::Set);
+    moves.map(|step| [step.to[0], step.to[1], step.to[2]]).collect()
+}
+
+#[track_caller]
+fn assert_ends(text: &str, control: &'static Control, expected: &[[f64; 3]]) {
+    let found = ends(&read(text, control));
+    assert_eq!(found.len(), expected.len(), "{} {text}: {found:?}", control.word);
+    for (a, b) in found.iter().flatten().zip(expected.iter().flatten()) {
+        assert!((a - b).abs() < 1e-9, "{} {text}: {found:?}", control.word);
+    }
+}
+
+#[test]
+fn a_motion_code_takes_force_beside_a_code_that_takes_the_words() {
+    for words in
+        ["G91 G28 Z0", "G30 Z0", "G4 P1", "G4 X1", "G10 L2 P2 X0", "G52 X0", "G92 X1", "G68 X0 Y0 R0"]
+    {
+        for control in [GENERAL, &FANUC, &HAAS] {
+            let program = read(&format!("G1 X1 F1\nG0 {words}\nG90 X9\nG1 G40\nX3\nM30\n"), control);
+            let kinds: Vec<StepKind> = program.steps.iter().map(|step| step.kind).collect();
+            assert_eq!(
+                kinds[kinds.len() - 2..],
+                [StepKind::Rapid, StepKind::Feed],
+                "{} {words}",
+                control.word
+            );
+        }
+    }
+    let homed = "G0 Z9\nG81 X1 Z-1 R2 F1\nG80 G91 G28 Z0\nG90 X3\nM30\n";
+    for control in [GENERAL, &FANUC, &HAAS, &LINUXCNC] {
+        let (line, fault) = refused(homed, control);
+        assert!(line == 4 && matches!(fault, Fault::Missing { .. }), "{}: {fault}", control.word);
+    }
+    let rapid = read(&homed.replace("G80", "G80 G0"), &FANUC);
+    assert_eq!(ends(&rapid).last(), Some(&[3.0, 0.0, 0.0]));
+    for words in ["G28 Z0", "G30", "G10 L2 P1 X0", "G52 X0", "G92 X0"] {
+        for control in [&LINUXCNC, &GRBL] {
+            let (line, fault) = refused(&format!("F1\nG0 {words}\nM2\n"), control);
+            assert!(
+                line == 2 && matches!(fault, Fault::Conflict { .. }),
+                "{} {words}: {fault}",
+                control.word
+            );
+        }
+    }
+}
+
+/// As rs274 of LinuxCNC 2.9 moves.
+#[test]
+fn a_dwell_of_linuxcnc_takes_no_axis_words() {
+    let text = "G0 X1\nF100\nG1 G4 P1 X10\nG4 P1 X20\nX30\nM2\n";
+    let expected = [1.0, 10.0, 20.0, 30.0].map(|x| [x, 0.0, 0.0]);
+    assert_ends(text, &LINUXCNC, &expected);
+    assert_eq!(read(text, &LINUXCNC).steps[1].kind, StepKind::Feed);
+    assert!(matches!(refused("G4 X2\n", &LINUXCNC).1, Fault::Missing { .. }));
+    assert!(matches!(refused("G2 G4 P1 X10 I5 F1\n", &LINUXCNC).1, Fault::Conflict { .. }));
+    assert_ends("G1 X1 F1\nG4 X2.\nG4 P9\nM30\n", &FANUC, &[[1.0, 0.0, 0.0]]);
+    assert_eq!(refused("G1 X1 F1\nG4 P1 X10\n", &FANUC), (2, Fault::Unused('X')));
+}
+
+#[test]
+fn a_subprogram_of_another_device_is_refused() {
+    for control in [GENERAL, &FANUC, &HAAS] {
+        let (line, fault) = refused("G0 X1.\nM198 P1234\n", control);
+        assert!(line == 2 && matches!(fault, Fault::NoTarget(_)), "{fault}");
+        assert!(fault.to_string().contains("O1234"), "{fault}");
+    }
+    assert_eq!(read("M198 P1\nM2\n", &LINUXCNC).notes.len(), 1, "a word of its user");
+}
+
+#[test]
+fn lengths_along_a_turning_axis_are_refused() {
+    assert!(matches!(refused("G43.1 H1 Z50.\n", &FANUC).1, Fault::Unsupported { .. }));
+    assert!(matches!(refused("G43.1 H1 Z50.\n", &HAAS).1, Fault::UnknownCode { .. }));
+    assert_eq!(refused("G43.1 H1 Z50.\n", GENERAL), (1, Fault::Unused('H')));
+    assert_eq!(read("G43.1 Z50\nM2\n", &LINUXCNC).settings[0].length[2], 50.0);
+}
