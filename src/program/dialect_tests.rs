@@ -84,6 +84,76 @@ fn a_dwell_of_linuxcnc_takes_no_axis_words() {
 }
 
 #[test]
+fn operators_bind_outside_of_brackets_too() {
+    let text = "#1=1+2*3\n#2=10-4/2\n#3=-#1+2*[#2-1]*2\nG1 X#1 Y#2 Z#3 F1\nM30\n";
+    for control in [GENERAL, &FANUC, &HAAS] {
+        assert_ends(text, control, &[[7.0, 8.0, 21.0]]);
+    }
+    assert_eq!(refused("#1=[1+2]\n#1=1+2\n", &LINUXCNC), (2, Fault::Unbracketed('+')));
+}
+
+#[test]
+fn work_offsets_are_read_and_set_as_variables() {
+    let text = "#5221=10\nG54 G1 X5 F1\n#5242=7\n#5221=#5221+1\nX5\nG55 X#5242 Y1\nG20 X1\n#5221=1\nG21 G54 X1\nM30\n";
+    for control in [GENERAL, &FANUC, &HAAS] {
+        let expected =
+            [[15.0, 0.0, 0.0], [16.0, 0.0, 0.0], [7.0, 8.0, 0.0], [25.4, 8.0, 0.0], [26.4, 8.0, 0.0]];
+        assert_ends(text, control, &expected);
+    }
+    let (line, fault) = refused("F1\n#5221=10\n", &LINUXCNC);
+    assert_eq!((line, fault), (2, Fault::ReadOnly(5221)));
+    assert_ends("G10 L2 P2 X4\nG0 X#5241\nM2\n", &LINUXCNC, &[[4.0, 0.0, 0.0]]);
+    assert_eq!(refused("G41.1 D2 G1 X5 F1\n#5221=1\n", &FANUC).0, 2);
+}
+
+#[test]
+fn positions_are_read_where_they_are_known() {
+    let setup = Setup { lengths: [(1, [0.0, 0.0, 80.0])].into(), ..Setup::from_above(200.0) };
+    let read = |text: &str| read_gcode("a.nc", text.as_bytes(), &FANUC, &setup);
+    let text = "G0 X3 Z5\nX[#5001+1]\nY#5041\nZ#5003\nZ[#5023+200]\nM30\n";
+    let found = ends(&read(text).unwrap());
+    assert_eq!(found[1..], [[4.0, 0.0, -195.0], [4.0, 4.0, -195.0]], "{found:?}");
+    let error = read("G43 H1 G0 Z5\n#1=#5043\n").unwrap_err();
+    assert_eq!((error.line, error.fault), (2, Fault::System(5043)));
+}
+
+#[test]
+fn variables_of_the_control_are_never_taken_for_empty() {
+    for (number, controls) in [
+        (2001, &[GENERAL, &FANUC, &HAAS][..]),
+        (4114, &[GENERAL, &FANUC, &HAAS]),
+        (3011, &[GENERAL, &FANUC, &HAAS]),
+        (5061, &[GENERAL, &FANUC, &HAAS, &LINUXCNC]),
+        (5399, &[GENERAL, &FANUC, &HAAS, &LINUXCNC]),
+        (10_001, &[GENERAL, &FANUC]),
+        (1_000, &[GENERAL, &FANUC, &HAAS]),
+    ] {
+        for control in controls {
+            let faults = [Fault::System(number), Fault::ReadOnly(number)];
+            assert_eq!(refused(&format!("F1\nG0 X#{number}\n"), control), (2, faults[0].clone()));
+            assert_eq!(refused(&format!("F1\n#{number}=1\n"), control), (2, faults[1].clone()));
+        }
+    }
+    assert_ends("#2001=4 #3000=5\nG0 X#2001 Y#3000\nM2\n", &LINUXCNC, &[[4.0, 5.0, 0.0]]);
+    assert_ends("#10001=4\nG0 X#10001\nM30\n", &HAAS, &[[4.0, 0.0, 0.0]]);
+    assert_ends("#3003=1\n#3006=1(LOOK)\nG0 X#500 Y1\nM30\n", &FANUC, &[[0.0, 1.0, 0.0]]);
+    let alarm = "#1=2\nIF [#1 EQ 1] THEN #3000=5(NO)\nG0 X1\nIF [#1 EQ 2] THEN #3000=1(ALARM)\nG0 X2\nM30\n";
+    assert_eq!(refused(alarm, &FANUC), (4, Fault::Alarm(1.0)));
+}
+
+#[test]
+fn a_number_without_a_point_is_noted_where_it_may_count_increments() {
+    let notes = |text: &str, control| -> Vec<u32> {
+        read(text, control).notes.iter().map(|note| note.line).collect()
+    };
+    for control in [&FANUC, &HAAS] {
+        assert_eq!(notes("G0 X0 Y1.\nG1 X10 F100\nX20\nM30\n", control), [2]);
+        assert_eq!(notes("G0 X0 Y1.\nG1 X10. F100\nM30\n", control), []);
+    }
+    assert_eq!(notes("G1 X10 F100\nM30\n", GENERAL), []);
+}
+
+#[test]
 fn a_subprogram_of_another_device_is_refused() {
     for control in [GENERAL, &FANUC, &HAAS] {
         let (line, fault) = refused("G0 X1.\nM198 P1234\n", control);
@@ -91,6 +161,12 @@ fn a_subprogram_of_another_device_is_refused() {
         assert!(fault.to_string().contains("O1234"), "{fault}");
     }
     assert_eq!(read("M198 P1\nM2\n", &LINUXCNC).notes.len(), 1, "a word of its user");
+}
+
+#[test]
+fn locals_of_linuxcnc_end_at_30() {
+    let text = "#30=3 #31=5\no1 sub\nG0 X#31 Y#30\n#31=7\no1 endsub\no1 call\nG0 X#31\nM2\n";
+    assert_ends(text, &LINUXCNC, &[[5.0, 0.0, 0.0], [7.0, 0.0, 0.0]]);
 }
 
 #[test]

@@ -7,11 +7,11 @@ use crate::block::{Block, CodeWord};
 use crate::compensation::{Compensation, Way};
 use crate::control::{Code, Codes, Control, FeedMode, Length, Motion, Plane, RadiusSide, spelled};
 use crate::error::{Fault, ProgramError, Stop};
-use crate::expression::Scope;
+use crate::expression::{Scope, Value};
 use crate::flow::{Flow, Next};
 use crate::frame::{Place, Rotation};
 use crate::lines::Lines;
-use crate::parameters::Parameters;
+use crate::parameters::{Parameters, Target};
 use crate::program::{Arc, Note, Program, Setting, Spindle, Step, StepKind, ToolRemark};
 use crate::state::{MORE_OFFSETS, Setup, State, Sticky};
 
@@ -84,6 +84,8 @@ pub(crate) struct Interpreter<'a> {
     pub compensation: Option<Compensation>,
     /// Where the block's text begins within its line.
     shift: usize,
+    /// A number without a point was noted.
+    noted_increments: bool,
 }
 
 impl<'a> Interpreter<'a> {
@@ -97,7 +99,7 @@ impl<'a> Interpreter<'a> {
             codes: Codes::of(control),
             delete: setup.delete_blocks,
             state,
-            parameters: Parameters::default(),
+            parameters: Parameters::new(control.variables.locals),
             block: Block::default(),
             flow: Flow::default(),
             out,
@@ -106,6 +108,7 @@ impl<'a> Interpreter<'a> {
             most_repeats: setup.most_repeats,
             compensation: None,
             shift: 0,
+            noted_increments: false,
         }
     }
 
@@ -150,8 +153,10 @@ impl<'a> Interpreter<'a> {
 
     /// Runs the text of a line from byte `from` on.
     pub fn step(&mut self, line: &'a [u8], from: usize) -> Result<Next, Stop> {
-        let Self { block, parameters, state, control, .. } = self;
-        let scope = Scope { parameters, system: &|number| state.system(number) };
+        let Self { block, parameters, state, control, compensation, .. } = self;
+        let (variables, compensated) = (&control.variables, compensation.is_some());
+        let system = |number| state.system(number, variables, compensated);
+        let scope = Scope { parameters, system: &system, logic: control.logic };
         let text = &line[from.min(line.len())..];
         block.read(text, control, self.delete, scope).map_err(|stop| shifted(stop, from))?;
         if self.block.deleted {
@@ -198,6 +203,9 @@ impl<'a> Interpreter<'a> {
         if !self.block.g.as_slice().is_empty() {
             self.settings(&mut asked)?;
         }
+        if self.control.may_count_increments && !self.noted_increments {
+            self.note_increments();
+        }
         if let Some((Code::Macro, _)) = asked.single {
             if let Some((motion, word)) = asked.motion {
                 self.begin(motion, word);
@@ -228,9 +236,43 @@ impl<'a> Interpreter<'a> {
             return Err(Stop::new(self.block.column(letter), Fault::Unused(char::from(letter))));
         }
         for (target, value) in std::mem::take(&mut self.block.assignments) {
-            self.parameters.set(&target, value);
+            self.assign(&target, value)?;
         }
         Ok(next)
+    }
+
+    /// Sets a variable of the program or of the control.
+    fn assign(&mut self, target: &Target, value: Value) -> Result<(), Stop> {
+        let Target::Number(number) = *target else {
+            self.parameters.set(target, value);
+            return Ok(());
+        };
+        let variables = &self.control.variables;
+        if variables.is_free(number) {
+            self.parameters.set(target, value);
+            return Ok(());
+        }
+        let value = value.unwrap_or(0.0);
+        if let Some((set, axis)) = variables.offset(number) {
+            if self.compensation.is_some() {
+                return Err(Stop::new(0, Fault::Meanwhile(format!("#{number}"))));
+            }
+            self.state.frame.work[set].0[axis] = value * self.unit_of(axis);
+            self.state.reframe();
+        }
+        if number == 3000 { Err(Stop::new(0, Fault::Alarm(value))) } else { Ok(()) }
+    }
+
+    /// Some controls take a number without a point for least increments, by a parameter of the machine.
+    fn note_increments(&mut self) {
+        if let Some(letter) = self.block.pointless(b"XYZABCUVWIJRQ") {
+            let (letter, value) = (char::from(letter), self.block.peek(letter).unwrap_or(0.0));
+            self.noted_increments = true;
+            self.note(format!(
+                "{letter}{value} has no point, and a machine may take it for least increments; here it counts units, as \
+                 {letter}{value}. does"
+            ));
+        }
     }
 
     /// The codes that set something, and what the others ask for.
