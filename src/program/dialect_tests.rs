@@ -93,6 +93,51 @@ fn operators_bind_outside_of_brackets_too() {
 }
 
 #[test]
+fn cycles_repeat_by_the_letter_of_their_control() {
+    let text = "G0 Z20\nG91 G99 G81 X10 Z-5 R-15 K3 F100\nX10\nG90 G80\nM30\n";
+    let mut expected = vec![[0.0, 0.0, 20.0]];
+    expected.push([10.0, 0.0, 20.0]);
+    for x in [10.0, 20.0, 30.0, 40.0] {
+        expected.extend([[x, 0.0, 5.0], [x, 0.0, 0.0], [x, 0.0, 5.0]]);
+    }
+    for control in [GENERAL, &FANUC] {
+        assert_ends(text, control, &expected);
+        assert_ends(&text.replace('K', "L"), control, &expected);
+        let none = format!("{}G80\nG0 X7\nM30\n", &text.replace("K3", "K0")[..text.find("X10\n").unwrap()]);
+        assert_ends(&none, control, &[[0.0, 0.0, 20.0], [7.0, 0.0, 20.0]]);
+    }
+    for control in [&HAAS, &LINUXCNC] {
+        assert_ends(&text.replace('K', "L"), control, &expected);
+        assert_eq!(refused(text, control), (2, Fault::Unused('K')));
+    }
+    assert!(matches!(refused(&text.replace("K3", "L0"), &LINUXCNC).1, Fault::Value { .. }));
+}
+
+/// As rs274 moves: R and Z stay as they were written, and R counts from the level before the first cycle.
+#[test]
+fn levels_of_linuxcnc_count_from_the_level_before_the_first_cycle() {
+    let text = "G0 Z20\nF100\nG91 G99 G81 X10 Z-5 R-15\nX10 R-2\nX10 Z-3\nM2\n";
+    let lowest = |x: f64| {
+        let there = ends(&read(text, &LINUXCNC)).into_iter().filter(move |at| at[0] == x);
+        there.map(|at| at[2]).fold(f64::INFINITY, f64::min)
+    };
+    assert_eq!([10.0, 20.0, 30.0].map(lowest), [0.0, 13.0, 15.0]);
+}
+
+/// The example of Haas' manual: a row of holes by G91 and L after the first one by G90.
+#[test]
+fn levels_stay_where_holes_go_on_in_g91() {
+    let text = "G0 Z10\nG90 G99 G81 X5 Y5 Z-1 R1 F100\nG91 X5 L2\nG90 G80\nM30\n";
+    for control in [GENERAL, &FANUC, &HAAS] {
+        let mut expected = vec![[0.0, 0.0, 10.0], [5.0, 5.0, 10.0]];
+        for x in [5.0, 10.0, 15.0] {
+            expected.extend([[x, 5.0, 1.0], [x, 5.0, -1.0], [x, 5.0, 1.0]]);
+        }
+        assert_ends(text, control, &expected);
+    }
+}
+
+#[test]
 fn work_offsets_are_read_and_set_as_variables() {
     let text = "#5221=10\nG54 G1 X5 F1\n#5242=7\n#5221=#5221+1\nX5\nG55 X#5242 Y1\nG20 X1\n#5221=1\nG21 G54 X1\nM30\n";
     for control in [GENERAL, &FANUC, &HAAS] {
