@@ -213,12 +213,7 @@ impl Interpreter<'_> {
             None => 0,
         };
         let number = if number == 0 { self.state.tool } else { number };
-        self.state
-            .radii
-            .get(&number)
-            .copied()
-            .or(self.state.any_radius)
-            .ok_or_else(|| Stop::new(column, Fault::NoRadius(number)))
+        self.state.radius_of(number).ok_or_else(|| Stop::new(column, Fault::NoRadius(number)))
     }
 
     /// Lets go what waits, and ends the compensation.

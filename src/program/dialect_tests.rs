@@ -187,6 +187,25 @@ fn variables_of_the_control_are_never_taken_for_empty() {
 }
 
 #[test]
+fn wear_adds_to_lengths_and_radii() {
+    let text = "G10 L10 P1 R100.\nG10 L11 P1 R0.05\nG91 G10 L11 P1 R0.01\nG90 G43 H1 G0 Z10\nM30\n";
+    for control in [GENERAL, &FANUC, &HAAS] {
+        assert_eq!(read(text, control).settings.last().unwrap().length[2], 100.06, "{}", control.word);
+        let radius = "G10 L12 P1 R3.\nG10 L13 P1 R-0.5\nF1\nG41 D1 G1 X10\nX20\nG40\nM30\n";
+        assert_eq!(ends(&read(radius, control))[1], [20.0, 2.5, 0.0], "{}", control.word);
+    }
+    let known = Setup { any_radius: Some(3.0), ..Setup::default() };
+    let text = "G10 L13 P1 R-0.5\nF1\nG41 D1 G1 X10\nX20\nG40\nM30\n";
+    let program = read_gcode("a.nc", text.as_bytes(), &FANUC, &known).unwrap();
+    assert_eq!(ends(&program)[1], [20.0, 2.5, 0.0]);
+    for words in ["L10 P1 Z10", "L11 P1 Z10", "L10 P1 R3"] {
+        let (line, fault) = refused(&format!("F1\nG10 {words}\n"), &LINUXCNC);
+        assert!(line == 2 && matches!(fault, Fault::Unsupported { .. }), "{words}: {fault}");
+    }
+    assert!(matches!(refused("G10 L10 P1 Z10\n", GENERAL).1, Fault::Unsupported { .. }));
+}
+
+#[test]
 fn a_number_without_a_point_is_noted_where_it_may_count_increments() {
     let notes = |text: &str, control| -> Vec<u32> {
         read(text, control).notes.iter().map(|note| note.line).collect()

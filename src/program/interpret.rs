@@ -468,7 +468,7 @@ impl<'a> Interpreter<'a> {
             Some(h) => Some(self.whole(b'H', h, 0.0..=99_999_999.0, "the number of a register")?),
             None => None,
         };
-        let of = |number: u32| self.state.lengths.get(&number).copied().unwrap_or([0.0; 3]);
+        let of = |number: u32| self.state.length_of(number);
         let sum = |a: [f64; 3], b: [f64; 3], sign: f64| [0, 1, 2].map(|k| a[k] + sign * b[k]);
         let before = self.state.frame.length;
         let new = match length {
@@ -550,35 +550,47 @@ impl<'a> Interpreter<'a> {
         let Some(kind) = self.block.take(b'L') else { return Err(self.missing(word, "L")) };
         let kind = self.whole(b'L', kind, 0.0..=99.0, "a kind of data")?;
         let number = self.block.take(b'P');
-        let unit = self.state.modal.unit;
         match kind {
             2 | 20 => self.work_data(kind == 20, number)?,
-            1 | 10 | 11 => {
-                let number =
-                    self.whole(b'P', number.unwrap_or(0.0), 0.0..=99_999_999.0, "the number of a tool")?;
-                let z =
-                    self.block.take(b'Z').or_else(|| if kind == 1 { None } else { self.block.take(b'R') });
-                if let Some(radius) = self.block.take(b'R').filter(|_| kind == 1) {
-                    self.state.radii.insert(number, radius * unit);
-                }
-                if let Some(z) = z {
-                    let incremental = !self.state.modal.absolute && kind != 1;
-                    let entry = self.state.lengths.entry(number).or_default();
-                    entry[2] = z * unit + if incremental { entry[2] } else { 0.0 };
-                }
-            }
-            12 | 13 => {
-                let register =
-                    self.whole(b'P', number.unwrap_or(0.0), 0.0..=99_999_999.0, "the number of a tool")?;
-                if let Some(radius) = self.block.take(b'R').filter(|_| kind == 12) {
-                    self.state.radii.insert(register, radius * unit);
-                }
-            }
+            1 | 10..=13 => self.tool_data(kind, number, word)?,
             _ => {
                 let (code, why) = (format!("G10 L{kind}"), "it sets data that the reader does not know");
                 return Err(Stop::new(usize::from(word.column), Fault::Unsupported { code, why }));
             }
         }
+        Ok(())
+    }
+
+    /// G10 L1 of LinuxCNC: length and radius of a tool. G10 L10 to L13 of Fanuc: length, its wear, radius, its wear.
+    fn tool_data(&mut self, kind: u32, number: Option<f64>, word: CodeWord) -> Result<(), Stop> {
+        let number = self.whole(b'P', number.unwrap_or(0.0), 0.0..=99_999_999.0, "the number of a tool")?;
+        let unit = self.state.modal.unit;
+        if kind == 1 {
+            if let Some(radius) = self.block.take(b'R') {
+                self.state.radii.insert(number, radius * unit);
+            }
+            if let Some(z) = self.block.take(b'Z') {
+                self.state.lengths.entry(number).or_default()[2] = z * unit;
+            }
+            return Ok(());
+        }
+        if !self.control.variables.of_fanuc || self.block.peek(b'Z').is_some() {
+            let why = "it measures the tool by where the machine stands; G10 L1 P Z sets its length";
+            let code = format!("G10 L{kind}");
+            return Err(Stop::new(usize::from(word.column), Fault::Unsupported { code, why }));
+        }
+        let Some(value) = self.block.take(b'R').map(|value| value * unit) else {
+            return Err(self.missing(word, "R"));
+        };
+        let state = &mut self.state;
+        let (any_radius, incremental) = (state.any_radius.unwrap_or(0.0), !state.modal.absolute);
+        let entry = match kind {
+            10 => &mut state.lengths.entry(number).or_default()[2],
+            11 => state.length_wear.entry(number).or_default(),
+            12 => state.radii.entry(number).or_insert(any_radius),
+            _ => state.radius_wear.entry(number).or_default(),
+        };
+        *entry = value + if incremental { *entry } else { 0.0 };
         Ok(())
     }
 

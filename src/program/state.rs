@@ -100,6 +100,9 @@ pub(crate) struct State {
     pub lengths: BTreeMap<u32, [f64; 3]>,
     pub radii: BTreeMap<u32, f64>,
     pub any_radius: Option<f64>,
+    /// Wear of lengths and radii by their registers, mm: it adds to them.
+    pub length_wear: BTreeMap<u32, f64>,
+    pub radius_wear: BTreeMap<u32, f64>,
     pub register: u32,
     pub selected: Option<u32>,
     pub tool: u32,
@@ -135,6 +138,8 @@ impl State {
             lengths: setup.lengths.clone(),
             radii: setup.radii.clone(),
             any_radius: setup.any_radius,
+            length_wear: BTreeMap::new(),
+            radius_wear: BTreeMap::new(),
             register: 0,
             selected: None,
             tool: 0,
@@ -142,6 +147,18 @@ impl State {
             speed: 0.0,
             sticky: Sticky::default(),
         }
+    }
+
+    /// The length of a register, with its wear.
+    pub fn length_of(&self, number: u32) -> [f64; 3] {
+        let [x, y, z] = self.lengths.get(&number).copied().unwrap_or([0.0; 3]);
+        [x, y, z + self.length_wear.get(&number).unwrap_or(&0.0)]
+    }
+
+    /// The radius of a cutter by the number of D, with its wear, where it is known.
+    pub fn radius_of(&self, number: u32) -> Option<f64> {
+        let radius = self.radii.get(&number).copied().or(self.any_radius)?;
+        Some(radius + self.radius_wear.get(&number).unwrap_or(&0.0))
     }
 
     /// After the frame has changed: the tip stays where it is.
