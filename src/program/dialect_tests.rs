@@ -206,6 +206,26 @@ fn wear_adds_to_lengths_and_radii() {
 }
 
 #[test]
+fn a_cutter_that_cannot_reach_an_inner_arc_is_refused() {
+    let text =
+        "G0 X-5\nF200\nG41.1 D6 G1 X5 Y0\nX20\nG3 X21.2426 Y0.9535 I-3. J5.1962\nG1 X21.2426 Y20\nG40\nM30\n";
+    for control in [GENERAL, &LINUXCNC] {
+        let (line, fault) = refused(text, control);
+        assert!(matches!(fault, Fault::Corner { .. }) && line == 6, "{line}: {fault}");
+    }
+    // A smaller one turns less than the programmed arc.
+    let small = read(&text.replace("D6", "D0.2"), &LINUXCNC);
+    let sweeps: Vec<f64> = small.arcs.iter().map(|arc| arc.sweep).collect();
+    assert!(sweeps.len() == 1 && sweeps[0] > 0.0 && sweeps[0] < 0.27, "{sweeps:?}");
+    // Whole turns stay whole turns: a helix between two inner corners.
+    let helix = "G0 X-20 Y0\nF1\nG41.1 D2 G1 X-10 Y0\nX0\nG3 X0 Y0 Z-2 I-3. J4. P2\nG1 X10\nG40\nM2\n";
+    if let Ok(program) = try_read(helix, &LINUXCNC) {
+        let turns = program.arcs[0].sweep / std::f64::consts::TAU;
+        assert!(turns > 1.5 && turns < 2.0, "{turns}");
+    }
+}
+
+#[test]
 fn a_number_without_a_point_is_noted_where_it_may_count_increments() {
     let notes = |text: &str, control| -> Vec<u32> {
         read(text, control).notes.iter().map(|note| note.line).collect()
