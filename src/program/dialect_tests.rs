@@ -260,3 +260,25 @@ fn lengths_along_a_turning_axis_are_refused() {
     assert_eq!(refused("G43.1 H1 Z50.\n", GENERAL), (1, Fault::Unused('H')));
     assert_eq!(read("G43.1 Z50\nM2\n", &LINUXCNC).settings[0].length[2], 50.0);
 }
+
+#[test]
+fn loops_may_stand_aside() {
+    let text = "#1=0\n  WHILE [#1 LT 3] DO1\n  #1=#1+1\n  G1 X#1 F1\n  END1\n\tN9 M30\n";
+    assert_ends(text, &FANUC, &[[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0]]);
+    let over = text.replace("LT 3", "LT 0");
+    assert_ends(&over, &FANUC, &[]);
+}
+
+#[test]
+fn places_beyond_every_machine_are_refused_with_offsets_in_them() {
+    for text in [
+        "G0 X1.\nG10 L2 P1 X1099999999999\nG1 X10. F1\nM30\n",
+        "G0 X1.\nG92 X-1099999999999\nG1 X10. F1\nM30\n",
+        "G0 X1.\n\nG53 G0 X1099999999999\nM30\n",
+    ] {
+        for control in [GENERAL, &FANUC] {
+            let (line, fault) = refused(text, control);
+            assert!(line == 3 && matches!(fault, Fault::Range { letter: 'X', .. }), "{line}: {fault}");
+        }
+    }
+}

@@ -601,7 +601,7 @@ impl<'a> Interpreter<'a> {
     fn does(&self, line: usize, word: &str, number: f64) -> bool {
         let bytes = self.lines.get(line);
         let code = bytes.split(|b| matches!(b, b'(' | b';')).next().unwrap_or_default();
-        let text = String::from_utf8_lossy(code).to_ascii_uppercase();
+        let text = String::from_utf8_lossy(code).trim_start().to_ascii_uppercase();
         let wanted = match word {
             "DO" => text.starts_with("WHILE") || text.starts_with('N') && text.contains("WHILE"),
             _ => true,

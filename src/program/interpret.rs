@@ -880,6 +880,12 @@ impl<'a> Interpreter<'a> {
             self.moved = true;
             self.out.zero = self.zero();
         }
+        if let Some(k) =
+            self.state.place.iter().position(|x| x.is_nan() || x.abs() > geometry::MAX_COORDINATE)
+        {
+            let (letter, value) = (char::from(AXES[k]), self.state.place[k]);
+            return Err(Stop::new(0, Fault::Range { letter, value }));
+        }
         if self.out.steps.len() as u64 > self.lines.len() as u64 + self.most_repeats {
             return Err(Stop::new(0, Fault::Endless(self.out.steps.len() as u64)));
         }
