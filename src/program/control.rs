@@ -245,8 +245,8 @@ pub struct Control {
     pub one_shift: bool,
     /// How far above the last depth a peck begins to feed again, and how far a chip is broken by, mm.
     pub peck_clearance: f64,
-    /// Whether a cycle that retracts to the level before it also lifts to that level on the way to its hole, and G89 feeds up
-    /// to it.
+    /// Whether a cycle that begins at its retract plane or below rises on the way to its hole to where it ends, and G89 feeds
+    /// up to there.
     pub cycles_by_level: bool,
     /// Letters of the repeats of a cycle, and the fewest that it takes.
     pub cycle_repeats: (&'static [u8], u32),

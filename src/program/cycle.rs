@@ -53,19 +53,16 @@ impl Interpreter<'_> {
         if repeats == 0 {
             return Ok(());
         }
-        // Where the level before the cycles is above the retract plane, LinuxCNC rises on the way to the hole.
-        let before = if self.control.cycles_by_level { initial } else { level };
-        if !back {
-            if before < levels.retract {
-                self.go_to_level(StepKind::Rapid, w, levels.retract, 0.0)?;
-                level = levels.retract;
-            }
-            level = level.max(levels.retract);
-        }
         let clear =
             if self.state.modal.initial || back { initial.max(levels.retract) } else { levels.retract };
-        if self.control.cycles_by_level && self.state.modal.initial {
-            level = level.max(initial);
+        let by_level = self.control.cycles_by_level;
+        let before = if by_level { initial } else { level };
+        if before < levels.retract && !back {
+            self.go_to_level(StepKind::Rapid, w, levels.retract, 0.0)?;
+            level = levels.retract;
+        }
+        if by_level && level <= levels.retract {
+            level = clear;
         }
         for round in 0..repeats {
             let count = f64::from(if absolute { 1 } else { round + 1 });

@@ -791,8 +791,15 @@ impl<'a> Interpreter<'a> {
 
     /// A motion code takes force.
     fn begin(&mut self, motion: Motion, word: CodeWord) {
-        if !matches!((self.state.modal.motion, motion), (Motion::Cycle(_), Motion::Cycle(_))) {
-            self.state.sticky = Sticky::default();
+        match (self.state.modal.motion, motion) {
+            // LinuxCNC wants the words of another cycle anew.
+            (Motion::Cycle(before), Motion::Cycle(cycle))
+                if self.control.cycle_words_stay && before != cycle =>
+            {
+                self.state.sticky = Sticky { level: self.state.sticky.level, ..Sticky::default() };
+            }
+            (Motion::Cycle(_), Motion::Cycle(_)) => {}
+            _ => self.state.sticky = Sticky::default(),
         }
         (self.state.modal.motion, self.state.modal.code) = (motion, word.tenths);
     }
