@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::compensation::{Way, whole_turns};
+use crate::compensation::Way;
 use crate::error::{Fault, Stop};
 use crate::frame::Place;
 use crate::interpret::{AXES, Interpreter};
@@ -46,8 +46,7 @@ impl Interpreter<'_> {
         let sweep = sweep(a, b, at_start, clockwise) + self.turns()?;
         if self.compensation.is_some() {
             let feed = self.feed((0.5 * (at_start + at_end) * sweep).hypot(to[w] - start[w]))?;
-            let turns = whole_turns(sweep);
-            return self.beside(Way::Round { centre, clockwise, turns }, to, feed);
+            return self.beside(Way::Round { centre, clockwise, sweep }, to, feed);
         }
         let rise = to[w] - start[w];
         let length = (0.5 * (at_start + at_end) * sweep).hypot(rise);

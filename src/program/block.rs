@@ -3,7 +3,7 @@
 use crate::control::Control;
 use crate::cursor::Cursor;
 use crate::error::{Fault, Stop};
-use crate::expression::{Scope, Value, angled, operand};
+use crate::expression::{Scope, Value, angled, open, operand};
 use crate::parameters::{Target, index, name};
 
 /// Codes of one kind in a block: more than any control takes.
@@ -48,6 +48,8 @@ pub(crate) struct Block {
     present: u32,
     /// Bits of the letters that something took.
     taken: u32,
+    /// Bits of the letters whose number is not zero and has no point.
+    pointless: u32,
     pub g: CodeWords,
     pub m: CodeWords,
     /// What the line sets once all of it is read.
@@ -66,7 +68,7 @@ fn bit(letter: u8) -> u32 {
 
 impl Block {
     fn clear(&mut self) {
-        (self.present, self.taken) = (0, 0);
+        (self.present, self.taken, self.pointless) = (0, 0, 0);
         (self.g.count, self.m.count) = (0, 0);
         self.assignments.clear();
         (self.comment, self.flow, self.deleted) = (None, None, false);
@@ -83,6 +85,11 @@ impl Block {
     pub fn take(&mut self, letter: u8) -> Option<f64> {
         self.taken |= bit(letter);
         self.peek(letter)
+    }
+
+    /// The first of these letters whose number is not zero and has no point.
+    pub fn pointless(&self, letters: &[u8]) -> Option<u8> {
+        letters.iter().copied().find(|letter| self.pointless & self.present & bit(*letter) != 0)
     }
 
     /// Takes words that move nothing.
@@ -159,7 +166,7 @@ impl Block {
                     self.comment.get_or_insert((text.at() + 1, line.len()));
                     return Ok(());
                 }
-                b'#' => self.assignment(&mut text, scope)?,
+                b'#' => self.assignment(&mut text, control, scope)?,
                 b'%' => return Ok(()),
                 b':' => {
                     self.flow = Some(text.at());
@@ -190,7 +197,14 @@ impl Block {
         }
         text.skip_blanks();
         let value = match text.peek() {
-            Some(b'0'..=b'9' | b'.' | b'-' | b'+') if !signed_expression(text.rest()) => Some(text.number()?),
+            Some(b'0'..=b'9' | b'.' | b'-' | b'+') if !signed_expression(text.rest()) => {
+                let from = text.at();
+                let value = text.number()?;
+                if value != 0.0 && !text.since(from).contains(&b'.') {
+                    self.pointless |= bit(letter);
+                }
+                Some(value)
+            }
             Some(b'#' | b'[' | b'-' | b'+') => operand(text, scope, 0)?,
             Some(b) if b.is_ascii_alphabetic() => {
                 return self.function_value(text, letter, column, scope);
@@ -255,7 +269,7 @@ impl Block {
         }
     }
 
-    fn assignment(&mut self, text: &mut Cursor<'_>, scope: Scope<'_>) -> Result<(), Stop> {
+    fn assignment(&mut self, text: &mut Cursor<'_>, control: &Control, scope: Scope<'_>) -> Result<(), Stop> {
         let column = text.at();
         text.next();
         text.skip_blanks();
@@ -265,24 +279,15 @@ impl Block {
             Target::Number(index(operand(text, scope, 0)?.unwrap_or(0.0), column)?)
         };
         text.expect(b'=', "=")?;
-        if let Target::Number(number @ (0 | 5400..=5499)) = target {
+        if let Target::Number(number) = target
+            && !control.variables.is_settable(number)
+        {
             return Err(Stop::new(column, Fault::ReadOnly(number)));
         }
-        let mut value = operand(text, scope, 0)?;
-        // Fanuc joins operands without brackets: #1=#2+1.
+        let value = if control.open_expressions { open(text, scope)? } else { operand(text, scope, 0)? };
         text.skip_blanks();
-        while let Some(sign @ (b'+' | b'-' | b'*' | b'/')) = text.peek() {
-            let at = text.at();
-            text.next();
-            let (left, right) = (value.unwrap_or(0.0), operand(text, scope, 0)?.unwrap_or(0.0));
-            value = Some(match sign {
-                b'+' => left + right,
-                b'-' => left - right,
-                b'*' => left * right,
-                _ if right == 0.0 => return Err(Stop::new(at, Fault::Zero)),
-                _ => left / right,
-            });
-            text.skip_blanks();
+        if let Some(sign @ (b'+' | b'-' | b'*' | b'/')) = text.peek() {
+            return Err(text.stop(Fault::Unbracketed(char::from(sign))));
         }
         self.assignments.push((target, value));
         Ok(())
@@ -334,12 +339,13 @@ pub(crate) fn plain_name(text: &[u8]) -> String {
 mod tests {
     use super::*;
     use crate::control::{GENERAL, LINUXCNC};
+    use crate::expression::System;
     use crate::parameters::Parameters;
 
     fn read(text: &str) -> Result<Block, Stop> {
-        let mut parameters = Parameters::default();
+        let mut parameters = Parameters::new(33);
         parameters.set(&Target::Number(2), Some(4.0));
-        let scope = Scope { parameters: &parameters, system: &|_| None };
+        let scope = Scope { parameters: &parameters, system: &|_| System::Free, logic: GENERAL.logic };
         let mut block = Block::default();
         block.read(text.as_bytes(), &GENERAL, true, scope)?;
         Ok(block)
@@ -364,7 +370,8 @@ mod tests {
         assert_eq!(block.assignments, expected);
         assert!(read("X#5 Y1").unwrap().peek(b'X').is_none(), "an empty parameter leaves its word out");
         let mut block = Block::default();
-        let scope = Scope { parameters: &Parameters::default(), system: &|_| None };
+        let scope =
+            Scope { parameters: &Parameters::new(33), system: &|_| System::Free, logic: LINUXCNC.logic };
         block.read(b"X#5", &LINUXCNC, true, scope).unwrap();
         assert_eq!(block.peek(b'X'), Some(0.0));
     }

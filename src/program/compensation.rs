@@ -30,11 +30,11 @@ type Spot = [f64; 2];
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Way {
     Straight(StepKind),
-    /// About a centre, with whole turns in rad beyond the first.
+    /// About a centre, by an angle in rad.
     Round {
         centre: Spot,
         clockwise: bool,
-        turns: f64,
+        sweep: f64,
     },
 }
 
@@ -49,6 +49,7 @@ enum Curve {
     Circle {
         centre: Spot,
         radius: f64,
+        clockwise: bool,
     },
 }
 
@@ -130,7 +131,7 @@ impl Compensation {
         if radius <= TOUCHING {
             return Err(Fault::InnerArc { radius: self.radius, arc: programmed });
         }
-        Ok(Curve::Circle { centre, radius })
+        Ok(Curve::Circle { centre, radius, clockwise })
     }
 
     /// Where two curves meet, nearest to a spot.
@@ -141,14 +142,14 @@ impl Compensation {
                 let by = cross(minus(q, p), e) / turn;
                 (turn != 0.0).then(|| [along(p, d, by); 2])
             }
-            (Curve::Line { through, along: d }, Curve::Circle { centre, radius })
-            | (Curve::Circle { centre, radius }, Curve::Line { through, along: d }) => {
+            (Curve::Line { through, along: d }, Curve::Circle { centre, radius, .. })
+            | (Curve::Circle { centre, radius, .. }, Curve::Line { through, along: d }) => {
                 let middle = dot(minus(centre, through), d);
                 let off = cross(d, minus(centre, through));
                 half_chord(radius, off)
                     .map(|half| [along(through, d, middle - half), along(through, d, middle + half)])
             }
-            (Curve::Circle { centre: p, radius: r }, Curve::Circle { centre: q, radius: s }) => {
+            (Curve::Circle { centre: p, radius: r, .. }, Curve::Circle { centre: q, radius: s, .. }) => {
                 let apart = minus(q, p);
                 let distance = apart[0].hypot(apart[1]);
                 let way = apart.map(|x| x / distance);
@@ -163,6 +164,24 @@ impl Compensation {
         let off = |spot: &Spot| minus(*spot, near)[0].hypot(minus(*spot, near)[1]);
         spots.into_iter().min_by(|a, b| off(a).total_cmp(&off(b)))
     }
+}
+
+/// The angle from `a` to `b` about a centre in the sense of an arc, rad: within half a turn on both sides.
+fn ahead(a: Spot, b: Spot, centre: Spot, clockwise: bool) -> f64 {
+    let (a, b) = (minus(a, centre), minus(b, centre));
+    let angle = cross(a, b).atan2(dot(a, b));
+    if clockwise { -angle } else { angle }
+}
+
+/// Takes an angle off an arc; something of it must be left, or its end would lie behind its start.
+fn shorten(way: &mut Way, by: f64, radius: f64) -> Result<(), Fault> {
+    if let Way::Round { sweep, .. } = way {
+        *sweep -= by;
+        if *sweep <= TOUCHING {
+            return Err(Fault::Corner { radius });
+        }
+    }
+    Ok(())
 }
 
 /// Half the chord of a circle at a distance from its centre.
@@ -213,12 +232,7 @@ impl Interpreter<'_> {
             None => 0,
         };
         let number = if number == 0 { self.state.tool } else { number };
-        self.state
-            .radii
-            .get(&number)
-            .copied()
-            .or(self.state.any_radius)
-            .ok_or_else(|| Stop::new(column, Fault::NoRadius(number)))
+        self.state.radius_of(number).ok_or_else(|| Stop::new(column, Fault::NoRadius(number)))
     }
 
     /// Lets go what waits, and ends the compensation.
@@ -237,13 +251,13 @@ impl Interpreter<'_> {
     }
 
     /// A programmed move, compensated.
-    pub fn beside(&mut self, way: Way, to: Place, feed: f64) -> Result<(), Stop> {
+    pub fn beside(&mut self, mut way: Way, to: Place, feed: f64) -> Result<(), Stop> {
         let (from, end) = ([self.state.at[0], self.state.at[1]], [to[0], to[1]]);
         let Some(compensation) = &self.compensation else { return Ok(()) };
         let axis = match (compensation.last, &way) {
             (None, _) => self.lead_in(&way, from, end)?,
             (Some(_), Way::Straight(_)) if from == end => compensation.at,
-            (Some(last), _) => self.turn_corner(&last, &way, from, end, feed)?,
+            (Some(last), _) => self.turn_corner(&last, &mut way, from, end, feed)?,
         };
         let setting = self.setting_index();
         let line = self.line_number();
@@ -275,7 +289,7 @@ impl Interpreter<'_> {
     fn turn_corner(
         &mut self,
         last: &Curve,
-        way: &Way,
+        way: &mut Way,
         from: Spot,
         end: Spot,
         feed: f64,
@@ -307,13 +321,17 @@ impl Interpreter<'_> {
                 let mut to = self.state.tip();
                 let spot = along(from, after, radius);
                 (to[0], to[1]) = (spot[0], spot[1]);
-                let arc = Way::Round { centre: from, clockwise: side > 0.0, turns: 0.0 };
+                let (clockwise, sweep) = (side > 0.0, (-turn).rem_euclid(TAU));
+                let arc = Way::Round { centre: from, clockwise, sweep };
                 let round = if matches!(way, Way::Straight(StepKind::Rapid)) { *way } else { arc };
                 let (line, setting) = (self.line_number(), self.setting_index());
                 self.leave(&Waiting { way: round, to, feed, line, setting })?;
             }
         }
         let tip = self.state.tip();
+        if let Curve::Circle { centre, clockwise, .. } = curve {
+            shorten(way, ahead(from, [tip[0], tip[1]], centre, clockwise), radius).map_err(stop)?;
+        }
         if let Some(compensation) = &mut self.compensation {
             (compensation.last, compensation.begun) = (Some(curve), [tip[0], tip[1]]);
         }
@@ -332,12 +350,7 @@ impl Interpreter<'_> {
         let start = self.state.tip();
         let kind = match step.way {
             Way::Straight(kind) => kind,
-            Way::Round { centre, clockwise, turns } => {
-                let [a, b] = [&start, &step.to].map(|place| minus([place[0], place[1]], centre));
-                let radius = a[0].hypot(a[1]);
-                let sweep = crate::arc::sweep(a, b, radius, clockwise) + turns;
-                self.add_arc(centre, &start, clockwise, sweep)
-            }
+            Way::Round { centre, clockwise, sweep } => self.add_arc(centre, &start, clockwise, sweep),
         };
         self.state.place = self.state.frame.machine_place(&step.to);
         self.push_as(kind, step.feed, step.line, step.setting)?;
@@ -372,15 +385,14 @@ impl Compensation {
                 return Err(Fault::Corner { radius: self.radius });
             }
         }
+        if let Some(Curve::Circle { centre, clockwise, .. }) = self.last {
+            let back = ahead(corner, self.at, centre, clockwise);
+            self.waiting.iter_mut().try_for_each(|step| shorten(&mut step.way, back, self.radius))?;
+        }
         for step in &mut self.waiting {
             (step.to[0], step.to[1]) = (corner[0], corner[1]);
         }
         self.at = corner;
         Ok(())
     }
-}
-
-/// The angle of whole turns, rad.
-pub(crate) fn whole_turns(sweep: f64) -> f64 {
-    TAU * ((sweep / TAU).ceil() - 1.0).max(0.0)
 }

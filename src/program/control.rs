@@ -3,6 +3,8 @@
 //! Sources: ISO 6983-1, LinuxCNC G-code reference 2.9, Fanuc 0i-F and Haas mill operator's manuals, grbl 1.1, Mach3 users'
 //! manual, Siemens 840D ISO dialects.
 
+use crate::frame::WORK_OFFSETS;
+
 /// The planes of arcs and cycles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Plane {
@@ -163,6 +165,17 @@ pub enum Code {
     Unsupported(&'static str),
 }
 
+impl Code {
+    /// Whether it takes the axis words of its block.
+    pub(crate) fn takes_axes(self, control: &Control) -> bool {
+        match self {
+            Self::Data | Self::Home(_) | Self::Local | Self::Shift | Self::Rotation(_) => true,
+            Self::Dwell => control.dwell_takes_x,
+            _ => false,
+        }
+    }
+}
+
 /// On which side of the contour the cutter runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RadiusSide {
@@ -172,6 +185,51 @@ pub enum RadiusSide {
     Left,
     /// G42.
     Right,
+}
+
+/// What FIX, FUP, AND, OR and XOR compute.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Logic {
+    /// LinuxCNC: FIX rounds down and FUP up; AND, OR and XOR know true and false.
+    Truth,
+    /// Fanuc: FIX rounds toward zero and FUP away from it; AND, OR and XOR take whole numbers bit by bit.
+    Bits,
+    /// What is the same in both.
+    Either,
+}
+
+/// Whose variables a control has.
+#[derive(Debug, Clone, Copy)]
+pub struct Variables {
+    /// First and last numbers of those that programs may use freely.
+    pub free: &'static [(u32, u32)],
+    /// Whether it has those of Fanuc: #3000 #4001 #5001 #5021 #5041 #5221.
+    pub of_fanuc: bool,
+    /// Whether it has those of LinuxCNC: #5220 #5221 #5400 #5420.
+    pub of_linuxcnc: bool,
+    /// How many belong to each call alone, from #1 on.
+    pub locals: usize,
+}
+
+impl Variables {
+    /// Whether programs may use it freely.
+    pub fn is_free(&self, number: u32) -> bool {
+        number == 0 || self.free.iter().any(|(first, last)| (*first..=*last).contains(&number))
+    }
+
+    /// Index of the work offset and of its axis that a variable holds: #5221 is X of G54.
+    pub fn offset(&self, number: u32) -> Option<(usize, usize)> {
+        let sets = if self.of_linuxcnc { WORK_OFFSETS } else { 6 };
+        let from = number.checked_sub(5221)? as usize;
+        let (set, axis) = (from / 20, from % 20);
+        (set < sets && axis < 6).then_some((set, axis))
+    }
+
+    /// Whether setting it is followed: work offsets, the alarm #3000, and timers, blocks and messages that move nothing.
+    pub fn is_settable(&self, number: u32) -> bool {
+        let known = || matches!(number, 3000..=3004 | 3006) || self.offset(number).is_some();
+        number > 0 && (self.is_free(number) || self.of_fanuc && known())
+    }
 }
 
 /// A control: a dialect of G-code.
@@ -187,15 +245,33 @@ pub struct Control {
     pub one_shift: bool,
     /// How far above the last depth a peck begins to feed again, and how far a chip is broken by, mm.
     pub peck_clearance: f64,
-    /// Whether a cycle that retracts to the level before it also lifts to that level on the way to its hole, and G89 feeds up
-    /// to it.
+    /// Whether a cycle that begins at its retract plane or below rises on the way to its hole to where it ends, and G89 feeds
+    /// up to there.
     pub cycles_by_level: bool,
+    /// Letters of the repeats of a cycle, and the fewest that it takes.
+    pub cycle_repeats: (&'static [u8], u32),
+    /// Whether R and Z of a cycle stay for the next hole as they were written, not as the levels that they meant.
+    pub cycle_words_stay: bool,
+    /// Whether a motion and another code that takes axis words are refused in one block.
+    pub axis_words_once: bool,
+    /// Whether X and U beside G4 are its time.
+    pub dwell_takes_x: bool,
     /// Whether F counts in the units that were in force before a G20 or G21 of its block.
     pub feed_before_units: bool,
     /// Whether an arc may have an offset across its plane that says nothing because it is zero.
     pub spare_offset: bool,
     /// Whether an empty parameter leaves out its word, as on Fanuc.
     pub empty_words: bool,
+    /// Whether assignments compute without brackets: #1=#2+1.
+    pub open_expressions: bool,
+    /// What some functions and operators compute.
+    pub logic: Logic,
+    /// The variables that it has.
+    pub variables: Variables,
+    /// Whether a number without a point may count least increments.
+    pub may_count_increments: bool,
+    /// The M word, in tenths, that calls a subprogram from another device.
+    pub outside_call: Option<u16>,
     /// Whether M98 P counts repeats in the digits before the last four.
     pub repeats_in_p: bool,
     /// Whether P of a dwell counts milliseconds where it has no decimal point; else seconds.
@@ -325,9 +401,18 @@ pub const GENERAL: Control = Control {
     one_shift: false,
     peck_clearance: 0.25,
     cycles_by_level: false,
+    cycle_repeats: (b"LK", 0),
+    cycle_words_stay: false,
+    axis_words_once: false,
+    dwell_takes_x: true,
     feed_before_units: false,
     spare_offset: true,
     empty_words: true,
+    open_expressions: true,
+    logic: Logic::Either,
+    variables: Variables { free: &[(1, 999)], of_fanuc: true, of_linuxcnc: true, locals: 33 },
+    may_count_increments: false,
+    outside_call: Some(1980),
     repeats_in_p: true,
     dwell_in_ms: true,
     tcp_switch: None,
@@ -357,9 +442,18 @@ pub const LINUXCNC: Control = Control {
     one_shift: true,
     peck_clearance: 0.254,
     cycles_by_level: true,
+    cycle_repeats: (b"L", 1),
+    cycle_words_stay: true,
+    axis_words_once: true,
+    dwell_takes_x: false,
     feed_before_units: true,
     spare_offset: false,
     empty_words: false,
+    open_expressions: false,
+    logic: Logic::Truth,
+    variables: Variables { free: &[(1, 5060)], of_fanuc: false, of_linuxcnc: true, locals: 30 },
+    may_count_increments: false,
+    outside_call: None,
     repeats_in_p: false,
     dwell_in_ms: false,
     tcp_switch: Some([4280, 4290]),
@@ -378,8 +472,17 @@ pub const FANUC: Control = Control {
         (383, None),
         (384, None),
         (385, None),
+        (431, Some(Code::Unsupported("it lays the tool's length along an axis that turns"))),
         (432, None),
     ],
+    logic: Logic::Bits,
+    variables: Variables {
+        free: &[(1, 999), (98_000, 98_499)],
+        of_fanuc: true,
+        of_linuxcnc: false,
+        locals: 33,
+    },
+    may_count_increments: true,
     repeats_in_p: true,
     ..GENERAL
 };
@@ -388,7 +491,9 @@ pub const FANUC: Control = Control {
 pub const HAAS: Control = Control {
     word: "haas",
     help: "Haas mills",
-    codes: &[(1030, QUIET), (1540, Some(Code::MoreWork)), (1870, QUIET)],
+    codes: &[(431, None), (1030, QUIET), (1540, Some(Code::MoreWork)), (1870, QUIET)],
+    cycle_repeats: (b"L", 0),
+    variables: Variables { free: &[(1, 999), (10_000, 10_999)], ..FANUC.variables },
     repeats_in_p: false,
     ..FANUC
 };
@@ -415,13 +520,23 @@ pub const GRBL: Control = Control {
         (680, None),
         (690, None),
     ],
+    axis_words_once: true,
+    dwell_takes_x: false,
     arc_tolerance: 0.005,
     dwell_in_ms: false,
     ..GENERAL
 };
 
 /// Mach3 and Mach4.
-pub const MACH: Control = Control { word: "mach", help: "Mach3 and Mach4", dwell_in_ms: false, ..GENERAL };
+pub const MACH: Control = Control {
+    word: "mach",
+    help: "Mach3 and Mach4",
+    dwell_in_ms: false,
+    cycle_repeats: (b"L", 0),
+    dwell_takes_x: false,
+    logic: Logic::Truth,
+    ..GENERAL
+};
 
 /// All controls, in the order in which they are named to users.
 pub static CONTROLS: [Control; 6] = [GENERAL, LINUXCNC, FANUC, HAAS, GRBL, MACH];

@@ -1,7 +1,8 @@
 //! Cycles over holes (G73, G74, G76, G81 to G89) as the moves that a control makes of them.
 //!
 //! A cycle moves over the hole, down to the retract plane R, down at feed as its kind has it, and up to the plane that G98 or
-//! G99 names. Bottom, R and Q stay for the holes that follow. In G91, R counts from the level before and the bottom from R.
+//! G99 names. Bottom, R and Q stay for the holes that follow. In G91, R counts from the level before the first cycle and the
+//! bottom from R.
 
 use crate::control::{Cycle, Down};
 use crate::error::{Fault, Stop};
@@ -39,27 +40,32 @@ impl Interpreter<'_> {
         let mut level = self.state.at[w];
         let initial = *self.state.sticky.level.get_or_insert(level);
         let column = self.block.column(AXES[w]);
-        let levels = self.levels(cycle, w, level)?;
+        let repeats = self.repeats()?;
+        let levels = self.levels(cycle, w, initial)?;
         // G87 goes down to R first, and feeds up to Z.
         let back = cycle.down == Down::Back;
         if (levels.bottom > levels.retract) != back {
             let Levels { bottom, retract, .. } = levels;
             return Err(Stop::new(column, Fault::CycleUpward { retract, bottom }));
         }
-        let repeats = self.repeats()?;
         let mut hole = self.state.at;
         let rotary = self.target_of(&[3, 4, 5])?;
         hole[3..].copy_from_slice(&rotary[3..]);
         let to = self.target_of(&[u, v])?;
         let by = [to[u] - hole[u], to[v] - hole[v]];
-        if level < levels.retract && !back {
-            self.go_to_level(StepKind::Rapid, w, levels.retract, 0.0)?;
-            level = levels.retract;
+        if repeats == 0 {
+            return Ok(());
         }
         let clear =
             if self.state.modal.initial || back { initial.max(levels.retract) } else { levels.retract };
-        if self.control.cycles_by_level && self.state.modal.initial {
-            level = level.max(initial);
+        let by_level = self.control.cycles_by_level;
+        let before = if by_level { initial } else { level };
+        if before < levels.retract && !back {
+            self.go_to_level(StepKind::Rapid, w, levels.retract, 0.0)?;
+            level = levels.retract;
+        }
+        if by_level && level <= levels.retract {
+            level = clear;
         }
         for round in 0..repeats {
             let count = f64::from(if absolute { 1 } else { round + 1 });
@@ -76,18 +82,24 @@ impl Interpreter<'_> {
     }
 
     /// The block's words, and what stayed from the cycle before.
-    fn levels(&mut self, cycle: Cycle, w: usize, level: f64) -> Result<Levels, Stop> {
+    fn levels(&mut self, cycle: Cycle, w: usize, initial: f64) -> Result<Levels, Stop> {
         let modal = self.state.modal;
-        let incremental = if modal.absolute { 0.0 } else { 1.0 };
+        let above = |level: f64| if modal.absolute { 0.0 } else { level };
+        let words_stay = self.control.cycle_words_stay;
         let mut taken = |letter: u8| self.block.take(letter).map(|x| x * modal.unit);
         let (z, r, q) = (taken(AXES[w]), taken(b'R'), taken(b'Q'));
-        let aside = [taken(b'I'), taken(b'J'), taken(b'K')];
+        let shifts = matches!(cycle.down, Down::Back) || cycle.code == 76;
+        let aside = if shifts { [taken(b'I'), taken(b'J')] } else { [None; 2] };
         self.state.sticky.dwell = self.dwell_word()?.unwrap_or(self.state.sticky.dwell);
         let sticky = &mut self.state.sticky;
         let code = format!("G{}", cycle.code);
         let missing = |words| Stop::new(0, Fault::Missing { code: code.clone(), words });
-        sticky.retract = r.or(sticky.retract);
-        sticky.bottom = z.or(sticky.bottom);
+        sticky.retract = r.map(|r| if words_stay { r } else { r + above(initial) }).or(sticky.retract);
+        let retract = sticky.retract.ok_or_else(|| missing("R, the retract plane"))?;
+        let retract = if words_stay { retract + above(initial) } else { retract };
+        sticky.bottom = z.map(|z| if words_stay { z } else { z + above(retract) }).or(sticky.bottom);
+        let bottom = sticky.bottom.ok_or_else(|| missing("the depth of the hole (Z under G17)"))?;
+        let bottom = if words_stay { bottom + above(retract) } else { bottom };
         if let Some(q) = q {
             if q == 0.0 && cycle.down != Down::Once || !q.is_finite() {
                 return Err(self.value(b'Q', q, "a depth"));
@@ -95,14 +107,10 @@ impl Interpreter<'_> {
             self.state.sticky.peck = Some(q.abs());
         }
         let sticky = &mut self.state.sticky;
-        if matches!(cycle.down, Down::Back) || cycle.code == 76 {
+        if shifts {
             let by_q = if aside.iter().all(Option::is_none) { sticky.peck } else { None };
             sticky.aside = [aside[0].or(by_q).unwrap_or(sticky.aside[0]), aside[1].unwrap_or(0.0), 0.0];
         }
-        let bottom = sticky.bottom.ok_or_else(|| missing("the depth of the hole (Z under G17)"))?;
-        let retract = sticky.retract.ok_or_else(|| missing("R, the retract plane"))?;
-        let retract = retract + incremental * level;
-        let bottom = bottom + incremental * retract;
         let peck = sticky.peck;
         if matches!(cycle.down, Down::Pecks | Down::Breaks) && peck.is_none() {
             return Err(missing("Q, the depth of a peck"));
@@ -111,12 +119,14 @@ impl Interpreter<'_> {
         Ok(Levels { w, retract, bottom, clear: retract, peck, feed })
     }
 
-    /// L, or K where no offset is meant.
+    /// How often the cycle runs, by the letter that the control has for it.
     fn repeats(&mut self) -> Result<u32, Stop> {
-        match self.block.take(b'L') {
-            Some(l) => self.whole(b'L', l, 0.0..=MOST_REPEATS, "a number of repeats"),
-            None => Ok(1),
-        }
+        let (letters, fewest) = self.control.cycle_repeats;
+        let Some(letter) = letters.iter().copied().find(|letter| self.block.peek(*letter).is_some()) else {
+            return Ok(1);
+        };
+        let value = self.block.take(letter).unwrap_or(1.0);
+        self.whole(letter, value, f64::from(fewest)..=MOST_REPEATS, "a number of repeats")
     }
 
     /// Where the block leads along some axes only.

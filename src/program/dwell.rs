@@ -1,5 +1,6 @@
 //! Dwells (G4, P of cycles): the time for which the tip stands.
 
+use crate::block::CodeWord;
 use crate::error::Stop;
 use crate::interpret::Interpreter;
 use crate::program::Program;
@@ -8,21 +9,26 @@ use crate::program::Program;
 const LONGEST: f64 = 86_400.0;
 
 impl Interpreter<'_> {
-    /// G4: P as the control counts it, else X or U in seconds.
-    pub fn dwell_of_block(&mut self) -> Result<(), Stop> {
+    /// G4: P as the control counts it, else X or U in seconds where it takes these.
+    pub fn dwell_of_block(&mut self, word: CodeWord) -> Result<(), Stop> {
         let seconds = match self.dwell_word()? {
             Some(seconds) => seconds,
-            None => match [b'X', b'U'].into_iter().find(|letter| self.block.peek(*letter).is_some()) {
-                Some(letter) => self.seconds(letter, 1.0)?,
-                None => {
-                    self.note("a dwell without P, X or U is taken to last no time");
-                    0.0
-                }
-            },
+            None if self.control.dwell_takes_x => self.dwell_of_axis_word()?,
+            None => return Err(self.missing(word, "P, its time")),
         };
-        self.block.ignore(b"PXUSF");
+        self.block.ignore(b"SF");
         self.out.dwell(seconds);
         Ok(())
+    }
+
+    fn dwell_of_axis_word(&mut self) -> Result<f64, Stop> {
+        let Some(letter) = [b'X', b'U'].into_iter().find(|letter| self.block.peek(*letter).is_some()) else {
+            self.note("a dwell without P, X or U is taken to last no time");
+            return Ok(0.0);
+        };
+        let seconds = self.seconds(letter, 1.0)?;
+        self.block.ignore(b"XU");
+        Ok(seconds)
     }
 
     /// P of a dwell, s: milliseconds on some controls where it has no decimal point.

@@ -75,8 +75,20 @@ pub enum Fault {
     #[error("#<{0}> has no value yet")]
     Unset(String),
     /// A parameter that programs cannot set.
-    #[error("#{0} belongs to the control and cannot be set")]
+    #[error("#{0} belongs to the control, and setting it is not followed")]
     ReadOnly(u32),
+    /// A variable of the control whose value is not known.
+    #[error("#{0} belongs to the control, and its value is not known")]
+    System(u32),
+    /// The program stops itself.
+    #[error("the program stops itself here by alarm {0} (#3000)")]
+    Alarm(f64),
+    /// An operator outside of brackets.
+    #[error("the operator {0} stands outside of brackets")]
+    Unbracketed(char),
+    /// What controls do not agree in.
+    #[error("controls do not agree in {0}")]
+    Disputed(&'static str),
     /// A number that no machine can take.
     #[error("{letter} = {value} is beyond every machine")]
     Range {
@@ -247,7 +259,16 @@ impl Fault {
             }
             Self::Domain { .. } | Self::Zero => "check the parameters in this expression",
             Self::Deep(_) => "divide the expression",
-            Self::Parameter(_) | Self::ReadOnly(_) => "use another parameter",
+            Self::Parameter(_) => "use another parameter",
+            Self::ReadOnly(_) => {
+                "set offsets by G10, or use another parameter; where it is a free one, name the control with --control"
+            }
+            Self::System(_) => {
+                "write the value in its place; where it is a free parameter, name the control with --control"
+            }
+            Self::Alarm(_) => "check the condition under which it stops",
+            Self::Unbracketed(_) => "put the expression in brackets: #1=[#2+1]",
+            Self::Disputed(_) => "name the control that the program is made for with --control",
             Self::Unset(_) => "set the parameter before it is used",
             Self::Range { .. } => "check the number, and the units of the program",
             Self::UnknownCode { .. } => "name the control that the program is made for with --control",

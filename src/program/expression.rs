@@ -5,6 +5,7 @@
 //! The levels are those of LinuxCNC: `**`, then `* / MOD`, then `+ -`, then comparisons, then `AND OR XOR`. Fanuc's are the
 //! same without `**`.
 
+use crate::control::Logic;
 use crate::cursor::Cursor;
 use crate::error::{Fault, Stop};
 use crate::parameters::{Parameters, index, name};
@@ -20,8 +21,21 @@ pub(crate) type Value = Option<f64>;
 pub(crate) struct Scope<'a> {
     /// The variables.
     pub parameters: &'a Parameters,
-    /// Values that belong to the control: current position, offsets, modal codes.
-    pub system: &'a dyn Fn(u32) -> Option<f64>,
+    /// What belongs to the control: current position, offsets, modal codes.
+    pub system: &'a dyn Fn(u32) -> System,
+    /// What some functions and operators compute.
+    pub logic: Logic,
+}
+
+/// A variable, as the control has it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum System {
+    /// It belongs to the program.
+    Free,
+    /// It belongs to the control.
+    Value(f64),
+    /// It belongs to the control, and its value is not known.
+    Unknown,
 }
 
 /// Reads a number, a parameter, a function or an expression in brackets, with signs before it.
@@ -45,6 +59,11 @@ pub(crate) fn operand(text: &mut Cursor<'_>, scope: Scope<'_>, depth: usize) -> 
         Some(b) if b.is_ascii_alphabetic() => function(text, scope, depth),
         _ => Err(text.stop(Fault::Expected("a number, #, [ or a function"))),
     }
+}
+
+/// Reads operands that operators join, without brackets around them.
+pub(crate) fn open(text: &mut Cursor<'_>, scope: Scope<'_>) -> Result<Value, Stop> {
+    levels(text, scope, 0, 0)
 }
 
 /// Reads `[…]`.
@@ -106,11 +125,11 @@ fn levels(text: &mut Cursor<'_>, scope: Scope<'_>, above: u8, depth: usize) -> R
         let column = text.at();
         text.advance(word.len());
         let right = levels(text, scope, *level, depth + 1)?;
-        left = Some(apply(*operator, left, right, column)?);
+        left = Some(apply(*operator, left, right, scope.logic, column)?);
     }
 }
 
-fn apply(operator: Operator, left: Value, right: Value, column: usize) -> Result<f64, Stop> {
+fn apply(operator: Operator, left: Value, right: Value, logic: Logic, column: usize) -> Result<f64, Stop> {
     let (a, b) = (left.unwrap_or(0.0), right.unwrap_or(0.0));
     let truth = |holds: bool| if holds { 1.0 } else { 0.0 };
     // An empty parameter equals nothing but an empty one.
@@ -130,11 +149,33 @@ fn apply(operator: Operator, left: Value, right: Value, column: usize) -> Result
         Operator::AtLeast => truth(a >= b),
         Operator::Less => truth(a < b),
         Operator::AtMost => truth(a <= b),
-        Operator::And => truth(a != 0.0 && b != 0.0),
-        Operator::Or => truth(a != 0.0 || b != 0.0),
-        Operator::ExclusiveOr => truth((a != 0.0) != (b != 0.0)),
+        Operator::And | Operator::Or | Operator::ExclusiveOr => {
+            return logical(operator, a, b, logic, column);
+        }
     };
     finite(value, "the power", a, column)
+}
+
+/// AND, OR and XOR: of true and false, or bit by bit.
+fn logical(operator: Operator, a: f64, b: f64, logic: Logic, column: usize) -> Result<f64, Stop> {
+    let plain = [a, b].iter().all(|x| *x == 0.0 || *x == 1.0);
+    if logic == Logic::Either && !plain {
+        return Err(Stop::new(column, Fault::Disputed("AND, OR and XOR of other numbers than 0 and 1")));
+    }
+    let bits = |x: f64| {
+        if logic != Logic::Bits {
+            return Ok(u32::from(x != 0.0));
+        }
+        let whole = x.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&x);
+        let fault = Fault::Domain { what: "the bits", value: x };
+        if whole { Ok(x as u32) } else { Err(Stop::new(column, fault)) }
+    };
+    let (a, b) = (bits(a)?, bits(b)?);
+    Ok(f64::from(match operator {
+        Operator::And => a & b,
+        Operator::Or => a | b,
+        _ => a ^ b,
+    }))
 }
 
 fn finite(value: f64, what: &'static str, of: f64, column: usize) -> Result<f64, Stop> {
@@ -153,7 +194,11 @@ fn parameter(text: &mut Cursor<'_>, scope: Scope<'_>, depth: usize) -> Result<Va
     }
     let number = operand(text, scope, depth + 1)?.unwrap_or(0.0);
     let number = index(number, column)?;
-    Ok((scope.system)(number).or_else(|| scope.parameters.get(number)))
+    match (scope.system)(number) {
+        System::Free => Ok(scope.parameters.get(number)),
+        System::Value(value) => Ok(Some(value)),
+        System::Unknown => Err(Stop::new(column, Fault::System(number))),
+    }
 }
 
 /// Names that the control gives values to.
@@ -169,7 +214,10 @@ fn predefined(name: &str, scope: Scope<'_>) -> Option<f64> {
         "_coord_system" => 5220,
         _ => return None,
     };
-    (scope.system)(number)
+    match (scope.system)(number) {
+        System::Value(value) => Some(value),
+        _ => None,
+    }
 }
 
 /// Reads `<name>`.
@@ -211,8 +259,13 @@ fn function(text: &mut Cursor<'_>, scope: Scope<'_>, depth: usize) -> Result<Val
         "ASIN" => x.asin().to_degrees(),
         "COS" => x.to_radians().cos(),
         "EXP" => x.exp(),
-        "FIX" => x.floor(),
-        "FUP" => x.ceil(),
+        "FIX" | "FUP" if scope.logic == Logic::Either && x < 0.0 && x.fract() != 0.0 => {
+            return Err(Stop::new(column, Fault::Disputed("FIX and FUP of negative numbers")));
+        }
+        "FIX" if scope.logic == Logic::Truth => x.floor(),
+        "FUP" if scope.logic == Logic::Truth => x.ceil(),
+        "FIX" => x.trunc(),
+        "FUP" => x.abs().ceil().copysign(x),
         "LN" => x.ln(),
         "ROUND" => x.round(),
         "SIN" => x.to_radians().sin(),
@@ -253,12 +306,16 @@ mod tests {
     use crate::parameters::Target;
 
     fn value(text: &str) -> Result<Value, Stop> {
-        let mut parameters = Parameters::default();
+        value_by(text, Logic::Truth)
+    }
+
+    fn value_by(text: &str, logic: Logic) -> Result<Value, Stop> {
+        let mut parameters = Parameters::new(33);
         parameters.set(&Target::Number(1), Some(2.0));
         parameters.set(&Target::Number(2), Some(100.0));
         parameters.set(&Target::Number(102), Some(9.0));
         parameters.set(&Target::Name("feed".into()), Some(250.0));
-        let scope = Scope { parameters: &parameters, system: &|_| None };
+        let scope = Scope { parameters: &parameters, system: &|_| System::Free, logic };
         operand(&mut Cursor::new(text.as_bytes()), scope, 0)
     }
 
@@ -288,6 +345,29 @@ mod tests {
             let found = value(text).unwrap().unwrap();
             assert!((found - expected).abs() < 1e-12, "{text}: {found}");
         }
+    }
+
+    #[test]
+    fn controls_round_and_join_bits_in_their_own_ways() {
+        for (text, truth, bits) in [
+            ("FIX[-1.5]", -2.0, -1.0),
+            ("FUP[-1.2]", -1.0, -2.0),
+            ("FIX[1.5]", 1.0, 1.0),
+            ("FUP[1.2]", 2.0, 2.0),
+            ("[7 AND 2]", 1.0, 2.0),
+            ("[5 OR 2]", 1.0, 7.0),
+            ("[5 XOR 4]", 0.0, 1.0),
+            ("[1 AND 0]", 0.0, 0.0),
+        ] {
+            for (logic, expected) in [(Logic::Truth, truth), (Logic::Bits, bits)] {
+                assert_eq!(value_by(text, logic), Ok(Some(expected)), "{text} {logic:?}");
+            }
+            match value_by(text, Logic::Either) {
+                Ok(found) => assert_eq!((found, truth), (Some(truth), bits), "{text}"),
+                Err(stop) => assert!(truth != bits || text.contains('7'), "{text} {}", stop.fault),
+            }
+        }
+        assert!(matches!(*value_by("[0.5 AND 1]", Logic::Bits).unwrap_err().fault, Fault::Domain { .. }));
     }
 
     #[test]

@@ -5,9 +5,9 @@ use std::collections::HashMap;
 use crate::block::{CodeWord, label, plain_name};
 use crate::cursor::Cursor;
 use crate::error::{Fault, Stop};
-use crate::expression::{Scope, angled, bracket};
+use crate::expression::{Scope, System, angled, bracket};
 use crate::interpret::Interpreter;
-use crate::parameters::{LOCALS, Target};
+use crate::parameters::Target;
 
 /// Subprograms that call each other.
 const DEEPEST: usize = 100;
@@ -164,15 +164,19 @@ impl<'a> Interpreter<'a> {
         }
     }
 
+    fn system(&self, number: u32) -> System {
+        self.state.system(number, &self.control.variables, self.compensation.is_some())
+    }
+
     fn operand(&self, text: &mut Cursor<'_>) -> Result<f64, Stop> {
-        let state = &self.state;
-        let scope = Scope { parameters: &self.parameters, system: &|number| state.system(number) };
+        let system = |number| self.system(number);
+        let scope = Scope { parameters: &self.parameters, system: &system, logic: self.control.logic };
         Ok(crate::expression::operand(text, scope, 0)?.unwrap_or(0.0))
     }
 
     fn bracket(&self, text: &mut Cursor<'_>) -> Result<f64, Stop> {
-        let state = &self.state;
-        let scope = Scope { parameters: &self.parameters, system: &|number| state.system(number) };
+        let system = |number| self.system(number);
+        let scope = Scope { parameters: &self.parameters, system: &system, logic: self.control.logic };
         text.skip_blanks();
         Ok(bracket(text, scope, 0)?.unwrap_or(0.0))
     }
@@ -375,7 +379,7 @@ impl<'a> Interpreter<'a> {
         let mut arguments = Vec::new();
         loop {
             text.skip_blanks();
-            if text.peek() != Some(b'[') || arguments.len() >= LOCALS {
+            if text.peek() != Some(b'[') || arguments.len() >= self.control.variables.locals {
                 break;
             }
             arguments.push((arguments.len() + 1, self.bracket(&mut text)?));
@@ -597,7 +601,7 @@ impl<'a> Interpreter<'a> {
     fn does(&self, line: usize, word: &str, number: f64) -> bool {
         let bytes = self.lines.get(line);
         let code = bytes.split(|b| matches!(b, b'(' | b';')).next().unwrap_or_default();
-        let text = String::from_utf8_lossy(code).to_ascii_uppercase();
+        let text = String::from_utf8_lossy(code).trim_start().to_ascii_uppercase();
         let wanted = match word {
             "DO" => text.starts_with("WHILE") || text.starts_with('N') && text.contains("WHILE"),
             _ => true,

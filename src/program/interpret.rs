@@ -7,11 +7,11 @@ use crate::block::{Block, CodeWord};
 use crate::compensation::{Compensation, Way};
 use crate::control::{Code, Codes, Control, FeedMode, Length, Motion, Plane, RadiusSide, spelled};
 use crate::error::{Fault, ProgramError, Stop};
-use crate::expression::Scope;
+use crate::expression::{Scope, Value};
 use crate::flow::{Flow, Next};
 use crate::frame::{Place, Rotation, fed_length};
 use crate::lines::Lines;
-use crate::parameters::Parameters;
+use crate::parameters::{Parameters, Target};
 use crate::program::{Arc, Note, Program, Setting, Spindle, Step, StepKind, ToolRemark};
 use crate::state::{MORE_OFFSETS, Setup, State, Sticky};
 
@@ -84,6 +84,8 @@ pub(crate) struct Interpreter<'a> {
     pub compensation: Option<Compensation>,
     /// Where the block's text begins within its line.
     pub shift: usize,
+    /// A number without a point was noted.
+    noted_increments: bool,
 }
 
 impl<'a> Interpreter<'a> {
@@ -97,7 +99,7 @@ impl<'a> Interpreter<'a> {
             codes: Codes::of(control),
             delete: setup.delete_blocks,
             state,
-            parameters: Parameters::default(),
+            parameters: Parameters::new(control.variables.locals),
             block: Block::default(),
             flow: Flow::default(),
             out,
@@ -106,6 +108,7 @@ impl<'a> Interpreter<'a> {
             most_repeats: setup.most_repeats,
             compensation: None,
             shift: 0,
+            noted_increments: false,
         }
     }
 
@@ -150,8 +153,10 @@ impl<'a> Interpreter<'a> {
 
     /// Runs the text of a line from byte `from` on.
     pub fn step(&mut self, line: &'a [u8], from: usize) -> Result<Next, Stop> {
-        let Self { block, parameters, state, control, .. } = self;
-        let scope = Scope { parameters, system: &|number| state.system(number) };
+        let Self { block, parameters, state, control, compensation, .. } = self;
+        let (variables, compensated) = (&control.variables, compensation.is_some());
+        let system = |number| state.system(number, variables, compensated);
+        let scope = Scope { parameters, system: &system, logic: control.logic };
         let text = &line[from.min(line.len())..];
         block.read(text, control, self.delete, scope).map_err(|stop| shifted(stop, from))?;
         if self.block.deleted {
@@ -198,7 +203,13 @@ impl<'a> Interpreter<'a> {
         if !self.block.g.as_slice().is_empty() {
             self.settings(&mut asked)?;
         }
+        if self.control.may_count_increments && !self.noted_increments {
+            self.note_increments();
+        }
         if let Some((Code::Macro, _)) = asked.single {
+            if let Some((motion, word)) = asked.motion {
+                self.begin(motion, word);
+            }
             return self.call_macro();
         }
         self.words(unit_before)?;
@@ -210,17 +221,58 @@ impl<'a> Interpreter<'a> {
         if asked.quiet {
             self.block.ignore(b"PQREL");
         }
-        match asked.single {
-            Some((code, word)) => self.single(code, word)?,
-            None => self.motion(&asked)?,
+        if let Some((code, word)) = asked.single {
+            self.single(code, word)?;
+        }
+        match (asked.single, asked.motion) {
+            (Some((code, _)), motion) if code.takes_axes(self.control) => {
+                if let Some((motion, word)) = motion {
+                    self.begin(motion, word);
+                }
+            }
+            _ => self.motion(&asked)?,
         }
         if let Some(letter) = self.block.unused() {
             return Err(Stop::new(self.block.column(letter), Fault::Unused(char::from(letter))));
         }
         for (target, value) in std::mem::take(&mut self.block.assignments) {
-            self.parameters.set(&target, value);
+            self.assign(&target, value)?;
         }
         Ok(next)
+    }
+
+    /// Sets a variable of the program or of the control.
+    fn assign(&mut self, target: &Target, value: Value) -> Result<(), Stop> {
+        let Target::Number(number) = *target else {
+            self.parameters.set(target, value);
+            return Ok(());
+        };
+        let variables = &self.control.variables;
+        if variables.is_free(number) {
+            self.parameters.set(target, value);
+            return Ok(());
+        }
+        let value = value.unwrap_or(0.0);
+        if let Some((set, axis)) = variables.offset(number) {
+            if self.compensation.is_some() {
+                return Err(Stop::new(0, Fault::Meanwhile(format!("#{number}"))));
+            }
+            self.state.frame.work[set].0[axis] = value * self.unit_of(axis);
+            self.state.reframe();
+        }
+        if number == 3000 { Err(Stop::new(0, Fault::Alarm(value))) } else { Ok(()) }
+    }
+
+    /// Some controls take a number without a point for least increments, by a parameter of the machine.
+    fn note_increments(&mut self) {
+        if let Some(letter) = self.block.pointless(b"XYZABCUVWIJRQ") {
+            let (letter, value) = (char::from(letter), self.block.peek(letter).unwrap_or(0.0));
+            self.noted_increments = true;
+            self.note(format!(
+                "{letter}{value} has no point, and a machine may take it for least increments; here it counts units, as \
+                 {letter}{value}. does"
+            ));
+        }
     }
 
     /// The codes that set something, and what the others ask for.
@@ -280,7 +332,23 @@ impl<'a> Interpreter<'a> {
                 },
             }
         }
-        Ok(())
+        self.check_together(asked)
+    }
+
+    /// Refuses a motion beside a code that wants its words.
+    fn check_together(&self, asked: &Asked) -> Result<(), Stop> {
+        let (Some((motion, first)), Some((code, second))) = (asked.motion, asked.single) else {
+            return Ok(());
+        };
+        let axes = self.control.axis_words_once && motion != Motion::None && code.takes_axes(self.control);
+        // P would be both a time and a number of turns.
+        let dwell = code == Code::Dwell && matches!(motion, Motion::Arc { .. });
+        if !axes && !dwell {
+            return Ok(());
+        }
+        let column = usize::from(second.column.max(first.column));
+        let [first, second] = [first.tenths, second.tenths].map(spelled);
+        Err(Stop::new(column, Fault::Conflict { first, second }))
     }
 
     fn select_work(&mut self, index: usize) {
@@ -346,6 +414,11 @@ impl<'a> Interpreter<'a> {
                         (format!("M{}", word.tenths / 10), "it brings back codes of an earlier place");
                     return Err(Stop::new(usize::from(word.column), Fault::Unsupported { code, why }));
                 }
+                code if self.control.outside_call == Some(code) => {
+                    let number = self.block.peek(b'P').map_or(String::new(), |p| format!(" O{p}"));
+                    let found = format!("subprogram{number}, which M{} calls from another device", code / 10);
+                    return Err(Stop::new(usize::from(word.column), Fault::NoTarget(found)));
+                }
                 code if self.control.tcp_switch.is_some_and(|both| both.contains(&code)) => {
                     self.state.modal.tip_kept = self.control.tcp_switch.is_some_and(|[on, _]| code == on);
                     self.changed = true;
@@ -383,7 +456,9 @@ impl<'a> Interpreter<'a> {
 
     /// G43 and the like, and an H that changes the register in force.
     fn lengths(&mut self, asked: &Asked) -> Result<(), Stop> {
-        let register = self.block.take(b'H');
+        // The offsets of G43.1 stand in the block.
+        let given = matches!(asked.length, Some((Length::Given, _)));
+        let register = if given { None } else { self.block.take(b'H') };
         let (length, word) = match asked.length {
             Some(asked) => asked,
             None if register.is_none() || self.state.modal.length == Length::Off => return Ok(()),
@@ -393,7 +468,7 @@ impl<'a> Interpreter<'a> {
             Some(h) => Some(self.whole(b'H', h, 0.0..=99_999_999.0, "the number of a register")?),
             None => None,
         };
-        let of = |number: u32| self.state.lengths.get(&number).copied().unwrap_or([0.0; 3]);
+        let of = |number: u32| self.state.length_of(number);
         let sum = |a: [f64; 3], b: [f64; 3], sign: f64| [0, 1, 2].map(|k| a[k] + sign * b[k]);
         let before = self.state.frame.length;
         let new = match length {
@@ -433,7 +508,7 @@ impl<'a> Interpreter<'a> {
     /// A code that takes the block's axis words for itself.
     fn single(&mut self, code: Code, word: CodeWord) -> Result<(), Stop> {
         match code {
-            Code::Dwell => self.dwell_of_block()?,
+            Code::Dwell => self.dwell_of_block(word)?,
             Code::Data => self.data(word)?,
             Code::Home(which) => self.home(usize::from(which))?,
             Code::SetHome(which) => self.state.homes[usize::from(which)] = self.nose(),
@@ -465,35 +540,47 @@ impl<'a> Interpreter<'a> {
         let Some(kind) = self.block.take(b'L') else { return Err(self.missing(word, "L")) };
         let kind = self.whole(b'L', kind, 0.0..=99.0, "a kind of data")?;
         let number = self.block.take(b'P');
-        let unit = self.state.modal.unit;
         match kind {
             2 | 20 => self.work_data(kind == 20, number)?,
-            1 | 10 | 11 => {
-                let number =
-                    self.whole(b'P', number.unwrap_or(0.0), 0.0..=99_999_999.0, "the number of a tool")?;
-                let z =
-                    self.block.take(b'Z').or_else(|| if kind == 1 { None } else { self.block.take(b'R') });
-                if let Some(radius) = self.block.take(b'R').filter(|_| kind == 1) {
-                    self.state.radii.insert(number, radius * unit);
-                }
-                if let Some(z) = z {
-                    let incremental = !self.state.modal.absolute && kind != 1;
-                    let entry = self.state.lengths.entry(number).or_default();
-                    entry[2] = z * unit + if incremental { entry[2] } else { 0.0 };
-                }
-            }
-            12 | 13 => {
-                let register =
-                    self.whole(b'P', number.unwrap_or(0.0), 0.0..=99_999_999.0, "the number of a tool")?;
-                if let Some(radius) = self.block.take(b'R').filter(|_| kind == 12) {
-                    self.state.radii.insert(register, radius * unit);
-                }
-            }
+            1 | 10..=13 => self.tool_data(kind, number, word)?,
             _ => {
                 let (code, why) = (format!("G10 L{kind}"), "it sets data that the reader does not know");
                 return Err(Stop::new(usize::from(word.column), Fault::Unsupported { code, why }));
             }
         }
+        Ok(())
+    }
+
+    /// G10 L1 of LinuxCNC: length and radius of a tool. G10 L10 to L13 of Fanuc: length, its wear, radius, its wear.
+    fn tool_data(&mut self, kind: u32, number: Option<f64>, word: CodeWord) -> Result<(), Stop> {
+        let number = self.whole(b'P', number.unwrap_or(0.0), 0.0..=99_999_999.0, "the number of a tool")?;
+        let unit = self.state.modal.unit;
+        if kind == 1 {
+            if let Some(radius) = self.block.take(b'R') {
+                self.state.radii.insert(number, radius * unit);
+            }
+            if let Some(z) = self.block.take(b'Z') {
+                self.state.lengths.entry(number).or_default()[2] = z * unit;
+            }
+            return Ok(());
+        }
+        if !self.control.variables.of_fanuc || self.block.peek(b'Z').is_some() {
+            let why = "it measures the tool by where the machine stands; G10 L1 P Z sets its length";
+            let code = format!("G10 L{kind}");
+            return Err(Stop::new(usize::from(word.column), Fault::Unsupported { code, why }));
+        }
+        let Some(value) = self.block.take(b'R').map(|value| value * unit) else {
+            return Err(self.missing(word, "R"));
+        };
+        let state = &mut self.state;
+        let (any_radius, incremental) = (state.any_radius.unwrap_or(0.0), !state.modal.absolute);
+        let entry = match kind {
+            10 => &mut state.lengths.entry(number).or_default()[2],
+            11 => state.length_wear.entry(number).or_default(),
+            12 => state.radii.entry(number).or_insert(any_radius),
+            _ => state.radius_wear.entry(number).or_default(),
+        };
+        *entry = value + if incremental { *entry } else { 0.0 };
         Ok(())
     }
 
@@ -694,8 +781,15 @@ impl<'a> Interpreter<'a> {
 
     /// A motion code takes force.
     fn begin(&mut self, motion: Motion, word: CodeWord) {
-        if !matches!((self.state.modal.motion, motion), (Motion::Cycle(_), Motion::Cycle(_))) {
-            self.state.sticky = Sticky::default();
+        match (self.state.modal.motion, motion) {
+            // LinuxCNC wants the words of another cycle anew.
+            (Motion::Cycle(before), Motion::Cycle(cycle))
+                if self.control.cycle_words_stay && before != cycle =>
+            {
+                self.state.sticky = Sticky { level: self.state.sticky.level, ..Sticky::default() };
+            }
+            (Motion::Cycle(_), Motion::Cycle(_)) => {}
+            _ => self.state.sticky = Sticky::default(),
         }
         (self.state.modal.motion, self.state.modal.code) = (motion, word.tenths);
     }
@@ -780,6 +874,12 @@ impl<'a> Interpreter<'a> {
         if !self.moved && kind != StepKind::Set {
             self.moved = true;
             self.out.zero = self.zero();
+        }
+        if let Some(k) =
+            self.state.place.iter().position(|x| x.is_nan() || x.abs() > geometry::MAX_COORDINATE)
+        {
+            let (letter, value) = (char::from(AXES[k]), self.state.place[k]);
+            return Err(Stop::new(0, Fault::Range { letter, value }));
         }
         if self.out.steps.len() as u64 > self.lines.len() as u64 + self.most_repeats {
             return Err(Stop::new(0, Fault::Endless(self.out.steps.len() as u64)));

@@ -20,6 +20,8 @@ mod compensation;
 mod control;
 mod cursor;
 mod cycle;
+#[cfg(test)]
+mod dialect_tests;
 mod dwell;
 mod error;
 mod expression;
@@ -37,7 +39,9 @@ mod tools;
 
 pub use apt::{looks_like_apt, read_apt};
 pub use checks::{Finding, FindingKind};
-pub use control::{CONTROLS, Code, Control, Cycle, Down, FeedMode, Length, Motion, Plane, RadiusSide};
+pub use control::{
+    CONTROLS, Code, Control, Cycle, Down, FeedMode, Length, Logic, Motion, Plane, RadiusSide, Variables,
+};
 pub use error::{Fault, ProgramError};
 pub use frame::{Place, WORK_OFFSETS};
 pub use interpret::read_gcode;

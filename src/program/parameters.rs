@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use crate::error::{Fault, Stop};
 
-/// Locals of a call, `#1` to `#33`. LinuxCNC has 30 of them, Fanuc 33.
-pub(crate) const LOCALS: usize = 33;
+/// Most locals of a call, `#1` to `#33`. LinuxCNC has 30 of them, Fanuc 33.
+const LOCALS: usize = 33;
 
 /// The greatest number of a parameter.
 const GREATEST: f64 = 99_999.0;
@@ -24,8 +24,10 @@ impl Default for Locals {
 }
 
 /// All variables.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Parameters {
+    /// How many belong to each call alone.
+    count: usize,
     globals: HashMap<u32, f64>,
     named: HashMap<String, f64>,
     calls: Vec<Locals>,
@@ -56,6 +58,18 @@ pub(crate) fn name(text: &[u8]) -> String {
 }
 
 impl Parameters {
+    /// None set; `count` of them, at most 33, belong to each call alone.
+    pub fn new(count: usize) -> Self {
+        let count = count.min(LOCALS);
+        Self {
+            count,
+            globals: HashMap::new(),
+            named: HashMap::new(),
+            calls: Vec::new(),
+            main: Locals::default(),
+        }
+    }
+
     fn locals(&self) -> &Locals {
         self.calls.last().unwrap_or(&self.main)
     }
@@ -68,7 +82,7 @@ impl Parameters {
     pub fn get(&self, number: u32) -> Option<f64> {
         match number {
             0 => None,
-            n if n as usize <= LOCALS => self.locals().numbered[n as usize],
+            n if n as usize <= self.count => self.locals().numbered[n as usize],
             n => self.globals.get(&n).copied(),
         }
     }
@@ -82,7 +96,7 @@ impl Parameters {
     /// Sets one; an empty value empties it.
     pub fn set(&mut self, target: &Target, value: Option<f64>) {
         match target {
-            Target::Number(n) if *n as usize <= LOCALS => {
+            Target::Number(n) if *n as usize <= self.count => {
                 self.locals_mut().numbered[*n as usize] = value.filter(|_| *n > 0);
             }
             Target::Number(n) => match value {
@@ -100,7 +114,7 @@ impl Parameters {
     pub fn enter(&mut self, arguments: &[(usize, f64)]) {
         let mut locals = Locals::default();
         for (k, value) in arguments {
-            if (1..=LOCALS).contains(k) {
+            if (1..=self.count).contains(k) {
                 locals.numbered[*k] = Some(*value);
             }
         }
@@ -119,7 +133,7 @@ mod tests {
 
     #[test]
     fn a_call_has_locals_of_its_own() {
-        let mut all = Parameters::default();
+        let mut all = Parameters::new(33);
         let [one, hundred] = [1, 100].map(Target::Number);
         all.set(&one, Some(7.0));
         all.set(&hundred, Some(8.0));
@@ -129,6 +143,10 @@ mod tests {
         all.set(&Target::Name("deep".into()), Some(2.0));
         all.leave();
         assert_eq!((all.get(1), all.named("_deep"), all.named("deep")), (Some(7.0), Some(1.0), None));
+        let mut few = Parameters::new(30);
+        few.set(&Target::Number(31), Some(5.0));
+        few.enter(&[(31, 9.0)]);
+        assert_eq!(few.get(31), Some(5.0), "#31 belongs to all calls of LinuxCNC");
         assert!(index(2.5, 0).is_err() && index(-1.0, 0).is_err() && index(1e5, 0).is_err());
     }
 }

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::control::{FeedMode, Length, Motion, Plane};
+use crate::control::{FeedMode, Length, Motion, Plane, Variables};
+use crate::expression::System;
 use crate::frame::{Frame, Place, WORK_OFFSETS};
 use crate::program::Spindle;
 
@@ -108,6 +109,9 @@ pub(crate) struct State {
     pub lengths: BTreeMap<u32, [f64; 3]>,
     pub radii: BTreeMap<u32, f64>,
     pub any_radius: Option<f64>,
+    /// Wear of lengths and radii by their registers, mm: it adds to them.
+    pub length_wear: BTreeMap<u32, f64>,
+    pub radius_wear: BTreeMap<u32, f64>,
     pub register: u32,
     pub selected: Option<u32>,
     pub tool: u32,
@@ -143,6 +147,8 @@ impl State {
             lengths: setup.lengths.clone(),
             radii: setup.radii.clone(),
             any_radius: setup.any_radius,
+            length_wear: BTreeMap::new(),
+            radius_wear: BTreeMap::new(),
             register: 0,
             selected: None,
             tool: 0,
@@ -150,6 +156,18 @@ impl State {
             speed: 0.0,
             sticky: Sticky::default(),
         }
+    }
+
+    /// The length of a register, with its wear.
+    pub fn length_of(&self, number: u32) -> [f64; 3] {
+        let [x, y, z] = self.lengths.get(&number).copied().unwrap_or([0.0; 3]);
+        [x, y, z + self.length_wear.get(&number).unwrap_or(&0.0)]
+    }
+
+    /// The radius of a cutter by the number of D, with its wear, where it is known.
+    pub fn radius_of(&self, number: u32) -> Option<f64> {
+        let radius = self.radii.get(&number).copied().or(self.any_radius)?;
+        Some(radius + self.radius_wear.get(&number).unwrap_or(&0.0))
     }
 
     /// After the frame has changed: the tip stays where it is.
@@ -171,27 +189,63 @@ impl State {
         self.reframe();
     }
 
-    /// Values that programs can ask for by a number.
-    pub fn system(&self, number: u32) -> Option<f64> {
-        let length = |mm: f64| mm / self.modal.unit;
-        let axis = |k: u32, at: &Place| {
-            let value = at[k as usize];
-            Some(if k < 3 { length(value) } else { value })
+    /// What programs can ask for by a number. Positions that the control knows with the cutter's radius or the tool's length
+    /// in them are not known.
+    pub fn system(&self, number: u32, variables: &Variables, compensated: bool) -> System {
+        if variables.is_free(number) {
+            return System::Free;
+        }
+        let of_fanuc = || if variables.of_fanuc { self.of_fanuc(number, compensated) } else { None };
+        let of_linuxcnc = || if variables.of_linuxcnc { self.of_linuxcnc(number) } else { None };
+        let offset = || {
+            let (set, axis) = variables.offset(number)?;
+            // LinuxCNC keeps them in units of the machine.
+            let known = variables.of_fanuc || self.modal.unit == 1.0;
+            known.then(|| self.in_units(axis, self.frame.work[set].0[axis]))
         };
+        of_fanuc().or_else(of_linuxcnc).or_else(offset).map_or(System::Unknown, System::Value)
+    }
+
+    /// A coordinate in units of the program.
+    fn in_units(&self, axis: usize, value: f64) -> f64 {
+        if axis < 3 { value / self.modal.unit } else { value }
+    }
+
+    fn of_linuxcnc(&self, number: u32) -> Option<f64> {
         match number {
-            3901 | 5400 | 4120 => Some(f64::from(self.tool)),
+            5400 => Some(f64::from(self.tool)),
             5220 => Some(self.frame.active as f64 + 1.0),
-            5420..=5425 => axis(number - 5420, &self.at),
-            5041..=5046 => axis(number - 5041, &self.at),
-            5001..=5006 => axis(number - 5001, &self.at),
-            5221..=5226 => axis(number - 5221, &self.frame.work[0].0),
-            5241..=5246 => axis(number - 5241, &self.frame.work[1].0),
-            4001 => Some(f64::from(self.modal.code) / 10.0),
-            4002 => Some([17.0, 18.0, 19.0][self.modal.plane as usize]),
-            4003 => Some(if self.modal.absolute { 90.0 } else { 91.0 }),
-            4006 => Some(if self.modal.unit > 1.0 { 20.0 } else { 21.0 }),
-            4109 => Some(length(self.modal.feed)),
+            5420..=5425 => {
+                let axis = number as usize - 5420;
+                Some(self.in_units(axis, self.at[axis]))
+            }
+            _ => None,
+        }
+    }
+
+    fn of_fanuc(&self, number: u32, compensated: bool) -> Option<f64> {
+        let modal = &self.modal;
+        let axis = (number as usize % 10).wrapping_sub(1);
+        match number {
+            4001 if !matches!(modal.motion, Motion::Cycle(_) | Motion::None) => {
+                Some(f64::from(modal.code) / 10.0)
+            }
+            4002 => Some([17.0, 18.0, 19.0][modal.plane as usize]),
+            4003 => Some(if modal.absolute { 90.0 } else { 91.0 }),
+            4006 => Some(if modal.unit > 1.0 { 20.0 } else { 21.0 }),
+            4109 if modal.feed_mode != FeedMode::InverseTime => Some(modal.feed / modal.unit),
             4119 => Some(self.speed),
+            4120 => self.selected.map(f64::from),
+            5001..=5006 => Some(self.in_units(axis, self.at[axis])),
+            5021..=5026 if !compensated => {
+                let length = self.frame.length.get(axis).unwrap_or(&0.0);
+                Some(self.in_units(axis, self.place[axis] + length))
+            }
+            5041..=5046
+                if !compensated && self.frame.length.get(axis).is_none_or(|length| *length == 0.0) =>
+            {
+                Some(self.in_units(axis, self.at[axis]))
+            }
             _ => None,
         }
     }
