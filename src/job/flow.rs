@@ -158,10 +158,9 @@ impl Session {
             }
         };
         let whole = WholePath::new(earlier, &planned.plan.path, cutters, scene.machine.rapid_rate);
-        // Arcs of the program are as far off the moves that were measured.
-        if let Some(off) = scene.arcs.filter(|_| request.foreign().is_none()) {
-            measured.measurement.widen(off);
-        }
+        // The programs are as far off the moves that were measured.
+        let strays = whole.path.origin.strays;
+        measured.measurement.widen(strays);
         // Where stock itself lies below the part between the cells no move cut.
         let cut = |region: &&mut GougeRegion| region.move_index != NOT_CUT;
         for region in measured.measurement.gouge.regions.iter_mut().filter(cut) {
@@ -176,7 +175,7 @@ impl Session {
             region.toolpath = its.map(|before| before.name.clone());
         }
         let tools = ToolMoves::of(cutters, holders, &planned.plan.path);
-        let covered = match (covered, &self.pocket) {
+        let mut covered = match (covered, &self.pocket) {
             (Some(known), _) => known,
             (None, Some(pocket)) => self.pocket_covered(pocket),
             (None, None) => {
@@ -185,6 +184,9 @@ impl Session {
                 self.covered(request, &measured, all, &whole.tools(earlier, &tools), monitor)?
             }
         };
+        if let Some(unseen) = &mut covered.unseen {
+            unseen.measurement.widen(strays);
+        }
         let run = Run {
             session: self,
             request,

@@ -54,7 +54,7 @@ pub fn pocket_figures(
         unreachable_area_mm2: pocket.rest_area(cutter, monitor)?,
         stepover_mm: strategy.stepover(step, cutter.radius()),
         wall_gouge_mm,
-        wall_gouge_error_bound_mm: pocket.off_drawing.max(ROUNDING) + scene.arcs.unwrap_or(0.0),
+        wall_gouge_error_bound_mm: pocket.off_drawing.max(ROUNDING) + path.origin.strays,
         wall_gouge_move,
         wall_gouge_of_cells_mm: of_cells,
         wall_gouge_of_cells_error_bound_mm: std::f64::consts::FRAC_1_SQRT_2 * cut.grid.cell,

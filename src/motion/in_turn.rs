@@ -37,6 +37,8 @@ impl PathsInTurn {
                 path.origin.tools.push((first + if *move_index > 0 { move_index + 2 } else { 0 }, *tool));
             }
         }
+        path.origin.strays = path.origin.strays.max(next.origin.strays);
+        path.origin.leans = path.origin.leans.max(next.origin.leans);
         self.passes += next.passes().max(1) as u32;
         path.moves.extend(next.moves.into_iter().map(|step| Move { pass: step.pass + pass, ..step }));
         path.origin.lines.extend(next.origin.lines);
@@ -67,6 +69,7 @@ mod tests {
         let path = |tool: u32, top: f64| {
             let mut path = Toolpath::new(at(0.0, top), vec![step(1.0, 0), step(2.0, 1)]);
             (path.origin.tools, path.origin.lines) = (vec![(0, tool)], vec![10 * tool, 10 * tool + 1]);
+            path.origin.strays = 1e-3 * top;
             path
         };
         let mut all = PathsInTurn::new(path(1, 5.0));
@@ -79,5 +82,6 @@ mod tests {
         assert_eq!(passes, [0, 1, 2, 2, 2, 2, 3, 4, 4, 4, 4, 5]);
         assert_eq!(all.origin.lines, [10, 11, 20, 20, 20, 20, 21, 20, 20, 20, 20, 21]);
         assert_eq!(all.origin.tools, [(0, 1), (3, 2)]);
+        assert_eq!((all.origin.strays, all.part(1..2).origin.strays), (7e-3, 7e-3));
     }
 }

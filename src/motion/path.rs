@@ -80,7 +80,7 @@ pub struct Move {
 }
 
 /// Where the moves of a path stand in a program. The pass that a move belongs to is the move's own.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Origin {
     /// The file of the program; empty for one that is written from the moves.
     pub program: String,
@@ -88,6 +88,10 @@ pub struct Origin {
     pub tools: Vec<(u32, u32)>,
     /// The line of each move, counted from 1; empty where there is no program.
     pub lines: Vec<u32>,
+    /// How far its motion may be off these moves, mm, where arcs and turns are moves here.
+    pub strays: f64,
+    /// How far the tool's axis may be off theirs, rad, which `strays` has for the cutter alone: what stands higher is farther off.
+    pub leans: f64,
 }
 
 /// A start and the moves from there.
@@ -136,7 +140,8 @@ impl Toolpath {
         let shown = self.origin.tools.get(before.saturating_sub(1)..).unwrap_or_default().iter();
         let within = shown.take_while(|(first, _)| (*first as usize) < moves.end);
         let tools = within.map(|(first, tool)| (first.saturating_sub(moves.start as u32), *tool)).collect();
-        let origin = Origin { program: self.origin.program.clone(), tools, lines };
+        let program = self.origin.program.clone();
+        let origin = Origin { program, tools, lines, ..self.origin };
         Self { start: self.location_before(moves.start), moves: self.moves[moves].to_vec(), origin }
     }
 

@@ -351,6 +351,8 @@ fn kept_away(run: &Run<'_>, pairs: &[PairClearance]) -> Option<Claim> {
 }
 
 #[cfg(test)]
+mod astray;
+#[cfg(test)]
 mod links;
 #[cfg(test)]
 mod planted;
