@@ -54,7 +54,7 @@ pub enum MoveKind {
     Cut,
     /// Feeding along the surface from the end of a pass to the start of the next.
     Link,
-    /// Feeding up from the end of a pass, over beside the part to the next, and in the block toward its start.
+    /// Feeding up from the end of a pass, and over beside the part to the next.
     Retract,
 }
 
