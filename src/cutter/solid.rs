@@ -335,6 +335,11 @@ impl Solid {
         self.radius
     }
 
+    /// No place of it lies farther from the tip, mm.
+    pub fn reach(&self) -> f64 {
+        self.length.hypot(self.radius)
+    }
+
     /// The least radius with which it is bent outward below its top, mm; 0 with a sharp edge or a point.
     pub fn sharpest(&self) -> f64 {
         let edges = &self.outline.edges;

@@ -269,7 +269,7 @@ impl Session {
         engine: &dyn Engine,
         monitor: &dyn Monitor,
     ) -> Result<(Planned, Measured, Option<Covered>), JobError> {
-        let target = match request.step {
+        let target = match self.aimed_at(request) {
             Step::Scallop(target) if request.correct => Some(target),
             _ => None,
         };

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use cutter::Solid;
 use io::ProgramHeader;
 use io::gcode::{self, ArcRule, FiveAxisPost, MoveLines};
-use machine::kinematics::{JointPath, Kinematics, follow};
+use machine::kinematics::{Following, JointPath, Kinematics, follow};
 use machine::{
     Straying, axes_at_most, machining_time, machining_time_of_axes, merge_short_moves, slow_axes,
     slow_corners,
@@ -13,10 +14,10 @@ use metrology::{
     ContactArcs, FastestTurn, THIN_LAYER, UNCOUNTED_LAYER, contact_arcs, fastest_turn, fastest_turn_across,
 };
 use motion::{Move, MoveKind, Toolpath};
-use scene::{AxisRequest, Scene, ToolpathRequest};
+use scene::{AxisRequest, FiveAxis, Scene, ToolpathRequest};
 use toolpath::{
     Detour, Earlier, Engagement, Exceeding, Gentle, OffsetDrive, OffsetSurface, Plan, PlanError,
-    PlanSettings, PocketStrategy, Strategy, Tilting, around_fixtures, engagement, plan, plan_pocket,
+    PlanSettings, PocketStrategy, Step, Strategy, Tilting, around_fixtures, engagement, plan, plan_pocket,
     plan_tilted,
 };
 use work::monitor::{Cancelled, Monitor};
@@ -24,7 +25,7 @@ use work::monitor::{Cancelled, Monitor};
 use super::correction::CorrectionFigures;
 use super::equal_time::EqualTimeFigures;
 use super::pocket::limit_feed_by;
-use super::tool::Around;
+use super::tool::{Around, Tool};
 use super::{JobError, Session};
 
 /// One part in so many of the memory that the part leaves is for the tables of a plan.
@@ -129,6 +130,10 @@ impl Session {
         let header = ProgramHeader { rise_to, ..header(scene, "") };
         plan.path.origin.lines = lines(scene, &plan.path, joints.as_ref(), &header)?;
         plan.path.origin.strays = scene.arcs.unwrap_or(0.0);
+        if let Some(JointPath { strays: [tip, axis], .. }) = joints {
+            plan.path.origin.strays += tip + axis * around.tool.cutter.reach();
+            plan.path.origin.leans = axis;
+        }
         Ok(Planned {
             plan,
             strategy,
@@ -201,7 +206,7 @@ impl Session {
 
     fn settings(&self, request: &ToolpathRequest) -> PlanSettings {
         PlanSettings {
-            step: request.step,
+            step: self.aimed_at(request),
             chord_tolerance: self.scene.tolerance.chord,
             clearance: self.scene.clearance,
             stock_top: self.top(),
@@ -214,6 +219,16 @@ impl Session {
             is_lowered_later: self.is_lowered_later(request),
             memory: self.budget().left(0) / PLAN_SHARE,
             earlier: None,
+        }
+    }
+
+    /// The step of a toolpath, by a scallop height that is lower by what joints may lead a leaning tool astray.
+    pub(crate) fn aimed_at(&self, request: &ToolpathRequest) -> Step {
+        match request.step {
+            Step::Scallop(height) if request.tilts() => {
+                Step::Scallop((height - may_stray(&self.scene)).max(LEAST_AIM * height))
+            }
+            step => step,
         }
     }
 
@@ -407,11 +422,32 @@ fn cutting_length(scene: &Scene) -> f64 {
     length.max(scene.cutter.radius())
 }
 
-/// The path in the joints of the scene's five-axis machine, as its programs need it; `None` without one. The cutter, up to
-/// its holder, stays within the chord tolerance of its motion between locations.
+/// Joints follow a path within this share of the chord tolerance, by which all that is measured may be off.
+const FOLLOWED: f64 = 0.1;
+
+/// No plan aims at a lower scallop than this share of what is asked for. Where joints stray by more, no plan is known to hold it.
+const LEAST_AIM: f64 = 0.5;
+
+/// How joints follow a path: the whole tool stays near the motion between locations that is measured.
+fn following(scene: &Scene, five_axis: &FiveAxis) -> Following {
+    let tool = Tool::of(scene);
+    let reach = tool.holder.iter().map(Solid::reach).fold(tool.cutter.reach(), f64::max);
+    five_axis.post.following(FOLLOWED * scene.tolerance.chord, reach)
+}
+
+/// How far the joints of the scene's five-axis machine may lead any place of a leaning tool astray, mm.
+pub(crate) fn may_stray(scene: &Scene) -> f64 {
+    let of = |five_axis| {
+        let tip = following(scene, five_axis).tip;
+        FOLLOWED * scene.tolerance.chord + if tip.is_finite() { tip } else { 0.0 }
+    };
+    scene.five_axis.as_ref().map_or(0.0, of)
+}
+
+/// The path in the joints of the scene's five-axis machine, as its programs need it; `None` without one.
 fn joints(scene: &Scene, name: &str, path: &Toolpath) -> Result<Option<JointPath>, JobError> {
     let Some(five_axis) = &scene.five_axis else { return Ok(None) };
-    let following = five_axis.post.following(scene.tolerance.chord, cutting_length(scene));
+    let following = following(scene, five_axis);
     let refused =
         |reason| JobError::Machine { scene: scene.source.name.clone(), name: name.to_owned(), reason };
     let joints = follow(&five_axis.kinematics, path, &following).map_err(|e| refused(e.to_string()))?;

@@ -9,6 +9,8 @@ use motion::{Cutters, Toolpath};
 use part::Part;
 use scene::Scene;
 
+use super::planned::may_stray;
+
 /// A mesh that is not to be touched, with its search tree.
 pub(crate) type FixtureMesh = (TriangleMesh, Bvh);
 
@@ -32,7 +34,8 @@ impl Tool {
     }
 
     /// What the planner keeps the tool away from: shank and holder from all, the cutter from fixtures, and from cutting
-    /// deeper into the part than half the gouge tolerance and what the part's triangles are off its surface.
+    /// deeper into the part than half the gouge tolerance and what the part's triangles are off its surface. Joints may lead all of it
+    /// astray.
     pub fn keep_clear<'a>(
         &'a self,
         scene: &Scene,
@@ -43,7 +46,7 @@ impl Tool {
         let obstacle = Obstacle::new(part.mesh(), part.bvh());
         let depth = 0.5 * scene.tolerance.gouge + part.mesh_deviation();
         let mut checks = vec![Check { solid: &self.cutter, obstacle, needed: -depth }];
-        let off = keep.clearance + part.mesh_deviation();
+        let off = keep.clearance + part.mesh_deviation() + may_stray(scene);
         checks.extend(self.holder.as_ref().map(|solid| Check { solid, obstacle, needed: off }));
         checks.extend(self.keep_off_fixtures(scene, fixtures).checks);
         Interference { checks, greatest_tilt: keep.greatest_tilt, greatest_lift: keep.greatest_lift }
@@ -54,7 +57,8 @@ impl Tool {
         let solids = || std::iter::once(&self.cutter).chain(&self.holder);
         let of_one = |(mesh, bvh): &'a FixtureMesh| {
             let obstacle = Obstacle::new(mesh, bvh);
-            solids().map(move |solid| Check { solid, obstacle, needed: scene.keep_clear.clearance })
+            let needed = scene.keep_clear.clearance + may_stray(scene);
+            solids().map(move |solid| Check { solid, obstacle, needed })
         };
         Interference { checks: fixtures.iter().flat_map(of_one).collect(), ..Interference::default() }
     }

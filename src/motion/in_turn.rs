@@ -39,6 +39,7 @@ impl PathsInTurn {
         }
         path.origin.strays = path.origin.strays.max(next.origin.strays);
         path.origin.standing_s += next.origin.standing_s;
+        path.origin.leans = path.origin.leans.max(next.origin.leans);
         self.passes += next.passes().max(1) as u32;
         path.moves.extend(next.moves.into_iter().map(|step| Move { pass: step.pass + pass, ..step }));
         path.origin.lines.extend(next.origin.lines);

@@ -54,7 +54,7 @@ pub enum MoveKind {
     Cut,
     /// Feeding along the surface from the end of a pass to the start of the next.
     Link,
-    /// Feeding up from the end of a pass, over beside the part to the next, and in the block toward its start.
+    /// Feeding up from the end of a pass, and over beside the part to the next.
     Retract,
 }
 
@@ -92,6 +92,8 @@ pub struct Origin {
     pub strays: f64,
     /// Time for which the tip stands besides its moves, s.
     pub standing_s: f64,
+    /// How far the tool's axis may be off theirs, rad, which `strays` has for the cutter alone: what stands higher is farther off.
+    pub leans: f64,
 }
 
 /// A start and the moves from there.

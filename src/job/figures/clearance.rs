@@ -106,12 +106,6 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     if pairs.is_empty() {
         return Ok(Finding { claims: unchecked.into_iter().collect(), ..Finding::default() });
     }
-    // The program is as far off the moves that were looked at.
-    let strays = run.path().origin.strays;
-    for pair in &mut pairs {
-        pair.error_bound_mm = pair.error_bound_mm.map(|bound| bound + strays);
-        pair.off += strays;
-    }
     pairs.sort_by(|a, b| nearness(a).total_cmp(&nearness(b)));
     let mut claims: Vec<Claim> = pairs.iter().map(|pair| pair.claim(run)).collect();
     if run.request.foreign().is_some_and(|read| read.unknown_before) {
@@ -151,11 +145,13 @@ fn with_meshes(
     monitor: &dyn Monitor,
 ) -> Result<Vec<PairClearance>, JobError> {
     let (tool, near) = (Tool::new(moves.cutter, moves.holder), run.around.near);
+    let astray = |solid: &Solid| strays(&moves.path, &tool.cutter, solid);
     let mut pairs = Vec::new();
     let mut add = |name: (&str, String), solid: &Solid, obstacle: Obstacle<'_>, off: f64, needed: f64| {
         let rapids = |to: &Move| to.kind == MoveKind::Rapid;
         let chosen: &(dyn Fn(&Move) -> bool + Sync) = if needed < 0.0 { &rapids } else { &|_| true };
         let least = obstacle.least_clearance(solid, &moves.path, chosen, monitor)?;
+        let off = off + astray(solid);
         let of_mesh = |least| PairClearance::of_mesh(name, &least, (run, moves.first), off, needed);
         pairs.extend(least.map(of_mesh));
         Ok::<(), JobError>(())
@@ -176,6 +172,11 @@ fn with_meshes(
     // What it may cut in, it may also touch.
     add(("cutter on rapid moves", "part".into()), &tool.cutter, part, off, -run.scene().tolerance.gouge)?;
     Ok(pairs)
+}
+
+/// How far the program may be off the moves at the upper end of a solid, mm.
+fn strays(path: &Toolpath, cutter: &Solid, solid: &Solid) -> f64 {
+    path.origin.strays + path.origin.leans * (solid.reach() - cutter.reach()).max(0.0)
 }
 
 /// Shank and holder of a tool against the stock that stands when they pass, less what others cut before.
@@ -201,14 +202,15 @@ fn with_standing_stock(
     };
     // An upright section no wider than the cutter stands where it has been.
     let Some(found) = found else { return Ok(None) };
+    let astray = strays(&tool.path, &Solid::of_cutter(tool.cutter, Some(holder)), &Solid::of_holder(holder));
     let more = more_moves(found.collisions.len());
     let tool_number = run.path().named_tool_of(tool.first as usize);
     let pair = PairClearance { more, tool_number, ..PairClearance::new(("holder", STANDING.into())) };
     Ok(Some(match found.nearest {
-        None => PairClearance { reason: Some(BEYOND), ..pair }.within(found.error_bound),
+        None => PairClearance { reason: Some(BEYOND), ..pair }.within(found.error_bound + astray),
         Some(near) => {
-            let pair = PairClearance { clearance_mm: Some(near.distance), ..pair };
-            pair.at(run, near.at.into(), tool.first + near.move_index).within(found.error_bound)
+            let pair = PairClearance { clearance_mm: Some(near.distance), off: astray, ..pair };
+            pair.at(run, near.at.into(), tool.first + near.move_index).within(found.error_bound + astray)
         }
     }))
 }
@@ -356,6 +358,8 @@ fn kept_away(run: &Run<'_>, pairs: &[PairClearance]) -> Option<Claim> {
     Some(claim(asked - clearance, bound).told(text))
 }
 
+#[cfg(test)]
+mod astray;
 #[cfg(test)]
 mod links;
 #[cfg(test)]

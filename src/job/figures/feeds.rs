@@ -81,12 +81,13 @@ fn no_faster(
     feed(limit, rounded(fastest, limit), text)
 }
 
-/// That plunges go down along the tool axis no faster than the plunge rate.
+/// That moves between passes, those on the surface aside, go down along the tool axis no faster than the plunge rate.
 fn down_no_faster(path: &Toolpath, limit: f64, line: &dyn Fn(usize) -> String) -> Claim {
     let down = |(k, (a, b, m)): (usize, (geometry::Point3, geometry::Point3, &Move))| {
         let way = b - a;
         let share = (-way.dot(&m.to.axis) / way.norm().max(f64::MIN_POSITIVE)).max(0.0);
-        (m.kind == MoveKind::Plunge && share > 0.0).then_some((k, share * m.feed_rate))
+        (matches!(m.kind, MoveKind::Plunge | MoveKind::Retract) && share > 0.0)
+            .then_some((k, share * m.feed_rate))
     };
     let fastest = path.segments().enumerate().filter_map(down).max_by(|a, b| a.1.total_cmp(&b.1));
     let (measured, text) = match fastest {
@@ -158,7 +159,7 @@ mod tests {
 
     #[test]
     fn feeds_are_held_against_scene_and_machine() {
-        use MoveKind::{Cut, Plunge, Rapid};
+        use MoveKind::{Cut, Plunge, Rapid, Retract};
         use Verdict::{Fail, Pass};
         let machine = Machine::default();
         let down = 300.0 * 2f64.sqrt();
@@ -169,6 +170,7 @@ mod tests {
         assert_eq!(verdicts(&[(Cut, f64::NAN)], &machine), [Fail, Pass, Pass, Fail]);
         assert_eq!(verdicts(&[(Cut, 1001.0)], &machine), [Pass, Fail, Pass, Pass]);
         assert_eq!(verdicts(&[(Plunge, 1.01 * down)], &machine), [Pass, Pass, Fail, Pass]);
+        assert_eq!(verdicts(&[(Retract, 1.01 * down)], &machine), [Pass, Pass, Fail, Pass]);
         // The scene's feed is faster than the machine.
         let slow = Machine { rapid_rate: 500.0, ..machine };
         assert_eq!(verdicts(&sane, &slow)[1], Fail);

@@ -3,7 +3,7 @@
 
 use super::angles::angle_between;
 use super::choice::{State, Stop};
-use super::refine::{Course, refine};
+use super::refine::{Course, refine, straying};
 use super::report::{JointReport, Rewind};
 use super::{Joints, Kinematics};
 use crate::kinematics::{choice, report};
@@ -70,6 +70,8 @@ pub struct JointPath {
     pub start: Joints,
     /// The locations after it, in order; the last one of each move along the path is the move's end.
     pub locations: Vec<JointLocation>,
+    /// How far the tool strays from the path between locations at most: its tip, mm, and its axis, rad.
+    pub strays: [f64; 2],
     /// What the machine has to do.
     pub report: JointReport,
 }
@@ -175,9 +177,22 @@ pub fn follow(
         report.inserted += pieces - 1;
     }
     report.singular = report::singular(kinematics, path);
-    let mut path = JointPath { following: *following, start, locations, report };
+    let mut path = JointPath { following: *following, start, locations, strays: [0.0; 2], report };
+    path.strays = path.straying(kinematics);
     path.measure(kinematics);
     Ok(path)
+}
+
+impl JointPath {
+    /// [`JointPath::strays`]. Rewinds leave the path.
+    fn straying(&self, kinematics: &Kinematics) -> [f64; 2] {
+        let from = std::iter::once(&self.start).chain(self.locations.iter().map(|at| &at.joints));
+        let pieces = from.zip(&self.locations).filter(|(_, to)| to.turn != Turn::Rewind);
+        let [tip, axis] = pieces
+            .map(|(from, to)| straying(kinematics, from, &to.joints))
+            .fold([0.0f64; 2], |most, its| [most[0].max(its[0]), most[1].max(its[1])]);
+        [if self.following.tip.is_finite() { tip } else { 0.0 }, axis]
+    }
 }
 
 /// The path's locations, and singular poses that a move runs through.

@@ -16,6 +16,9 @@ pub const SINGULAR_ANGLE: f64 = PI / 180.0;
 /// added: a twenty thousandth where one axis turns.
 const PACE_TURN: f64 = 0.02;
 
+/// Linear joints come no farther than is told by this, mm.
+const FARTHEST: f64 = 1e-7;
+
 /// A place where the tool axis comes close to the first rotary axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SingularPose {
@@ -124,25 +127,37 @@ impl JointPath {
     /// Ranges, travel and limits.
     pub(super) fn measure(&mut self, kinematics: &Kinematics) {
         let (limits, letters) = (kinematics.limits(), kinematics.letters());
+        let tip_kept = !self.following.tip.is_finite();
         let report = &mut self.report;
         report.ranges = self.start.values().map(|value| [value; 2]);
-        let mut last = self.start;
+        let mut last = (self.start, kinematics.forward(&self.start).tip);
         // Of each joint the violation that the row of locations before has made.
         let mut open: [Option<usize>; 5] = [None; 5];
-        let start = (self.start, 0);
-        for (joints, step) in [start].into_iter().chain(self.locations.iter().map(|l| (l.joints, l.step))) {
-            for k in [0, 1] {
-                report.rotary_travel[k] += (joints.rotary[k] - last.rotary[k]).abs();
-            }
-            last = joints;
-            for (k, value) in joints.values().into_iter().enumerate() {
-                let range = &mut report.ranges[k];
-                *range = [range[0].min(value), range[1].max(value)];
-                let beyond = limits[k].and_then(|[least, greatest]| {
-                    let limit = if value < least { least } else { greatest };
-                    ((value - value.clamp(least, greatest)).abs() > LIMIT_SLACK).then_some(limit)
+        let start = (self.start, last.1, 0, false);
+        let locations = self.locations.iter();
+        let locations = locations.map(|at| (at.joints, at.at.tip, at.step, at.turn != Turn::Rewind));
+        for (joints, tip, step, along) in std::iter::once(start).chain(locations) {
+            let mut reached = joints.values().map(|value| [value; 2]);
+            if tip_kept && along && joints.rotary != last.0.rotary {
+                let known = std::array::from_fn(|k| {
+                    let [low, high] = report.ranges[k];
+                    limits[k].map_or([low, high], |[least, greatest]| [low.max(least), high.min(greatest)])
                 });
-                let Some(limit) = beyond else {
+                let between = kinematics.farthest(&last, &(joints, tip), known);
+                (0..3).for_each(|k| reached[k] = join(reached[k], between[k]));
+            }
+            for k in [0, 1] {
+                report.rotary_travel[k] += (joints.rotary[k] - last.0.rotary[k]).abs();
+            }
+            last = (joints, tip);
+            for (k, [low, high]) in reached.into_iter().enumerate() {
+                report.ranges[k] = join(report.ranges[k], [low, high]);
+                let beyond = limits[k].and_then(|[least, greatest]| {
+                    let (value, limit) =
+                        if least - low > high - greatest { (low, least) } else { (high, greatest) };
+                    ((value - value.clamp(least, greatest)).abs() > LIMIT_SLACK).then_some((value, limit))
+                });
+                let Some((value, limit)) = beyond else {
                     open[k] = None;
                     continue;
                 };
@@ -249,7 +264,53 @@ impl JointPath {
     }
 }
 
+/// The range that holds two.
+fn join(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0].min(b[0]), a[1].max(b[1])]
+}
+
 impl Kinematics {
+    /// Least and greatest values of the linear joints, mm, where the tip runs straight from one place to another while the rotary joints
+    /// turn evenly. Those that are no farther out than `known` need not be the extremes.
+    ///
+    /// # Tolerance
+    /// [`FARTHEST`]
+    fn farthest(
+        &self,
+        (from, tip): &(Joints, Point3),
+        (to, end): &(Joints, Point3),
+        known: [[f64; 2]; 3],
+    ) -> [[f64; 2]; 3] {
+        let (way, turns) = (end - tip, [0, 1].map(|k| to.rotary[k] - from.rotary[k]));
+        let bend = self.pace_bends(*tip, way, turns);
+        let at = |share: f64| {
+            let rotary = [0, 1].map(|k| from.rotary[k] + turns[k] * share);
+            self.place(tip + way * share, rotary).linear
+        };
+        let [a, b] = [from.linear, to.linear];
+        let mut reached: [[f64; 2]; 3] = std::array::from_fn(|k| join([a[k]; 2], [b[k]; 2]));
+        let mut ahead = vec![([0.0, 1.0], [a, b])];
+        while let Some(([low, high], [a, b])) = ahead.pop() {
+            let share = 0.5 * (low + high);
+            let middle = at(share);
+            // Off its chord a function is by an eighth of its second derivative in the middle, which is four second differences, and a
+            // 48th of a bound of the third each for either.
+            let third = bend * (high - low).powi(3) / 24.0;
+            let mut is_open = false;
+            for k in 0..3 {
+                let off = 0.5 * (a[k] + b[k] - 2.0 * middle[k]).abs() + third;
+                reached[k] = join(reached[k], [middle[k]; 2]);
+                let [least, greatest] = join(reached[k], known[k]);
+                is_open |=
+                    a[k].max(b[k]) + off > greatest + FARTHEST || a[k].min(b[k]) - off < least - FARTHEST;
+            }
+            if is_open {
+                ahead.extend([([low, share], [a, middle]), ([share, high], [middle, b])]);
+            }
+        }
+        reached
+    }
+
     /// The place over a tip along the machine's z that is as high as the highest tip of the path while the table stands so.
     pub fn over(&self, path: &Toolpath, rotary: [f64; 2], tip: Point3) -> Point3 {
         let up = self.upward(rotary);

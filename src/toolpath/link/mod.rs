@@ -177,13 +177,13 @@ impl Speeds {
     /// Down to the first tip of a way and along it, s.
     fn along(&self, settings: &PlanSettings, way: &[Point3]) -> f64 {
         let down = way.first().map_or(0.0, |tip| settings.stock_top + settings.clearance - tip.z);
-        let moves = way.windows(2).map(|w| (w[1] - w[0]).norm() / self.entering(&w[0], &w[1]));
+        let moves = way.windows(2).map(|w| (w[1] - w[0]).norm() / self.entering(&w[0], &w[1], &Vector3::z()));
         down / self.rapid + moves.sum::<f64>()
     }
 
-    /// The rate, mm/s, of a move on the way in: at the feed, and down no faster than a plunge, also as the program rounds it.
-    fn entering(&self, from: &Point3, to: &Point3) -> f64 {
-        let (down, length) = (from.z - to.z + 2.0 * ROUNDING, (to - from).norm() - 4.0 * ROUNDING);
+    /// The rate, mm/s, of a move on the way in: at the feed, and down the tool axis no faster than a plunge, also as the program rounds it.
+    fn entering(&self, from: &Point3, to: &Point3, axis: &Vector3) -> f64 {
+        let (down, length) = ((from - to).dot(axis) + 2.0 * ROUNDING, (to - from).norm() - 4.0 * ROUNDING);
         if down * self.feed <= self.plunge * length {
             self.feed
         } else {
@@ -322,7 +322,7 @@ impl<'a> Program<'a> {
         self.push(first, MoveKind::Rapid, 0.0, 0);
         let mut from = first;
         for &tip in rest {
-            let rate = 60.0 * self.rates.entering(&from, &tip);
+            let rate = 60.0 * self.rates.entering(&from, &tip, &Vector3::z());
             self.push(tip, MoveKind::Plunge, rate.min(self.settings.feed_rate), 0);
             from = tip;
         }

@@ -180,17 +180,22 @@ fn program(pieces: &[LocatedPass], between: &[Vec<Leg>], ways: &Ways, settings: 
     let (Some(first), Some(last)) = (pieces.first(), pieces.last()) else {
         return Toolpath::new(ways.above(), Vec::new());
     };
+    let from = ways.away(&first.at[0]);
+    let start = from[from.len() - 1];
     let mut moves = Vec::new();
+    let mut at = start;
     let mut push = |to: ClPoint, kind: MoveKind, pass: usize| {
         let feed_rate = match kind {
             MoveKind::Rapid => 0.0,
             MoveKind::Plunge => settings.plunge_rate,
-            MoveKind::Cut | MoveKind::Link | MoveKind::Retract => settings.feed_rate,
+            MoveKind::Cut | MoveKind::Link => settings.feed_rate,
+            MoveKind::Retract => {
+                settings.feed_rate.min(60.0 * ways.rates.entering(&at.tip, &to.tip, &to.axis))
+            }
         };
         moves.push(Move { to, kind, feed_rate, pass: pass as u32 });
+        at = to;
     };
-    let from = ways.away(&first.at[0]);
-    let start = from[from.len() - 1];
     ways.into(&from, &first.at[0]).into_iter().for_each(|(to, kind)| push(to, kind, 0));
     for (k, piece) in pieces.iter().enumerate() {
         if let Some(way) = k.checked_sub(1).and_then(|k| between.get(k)) {

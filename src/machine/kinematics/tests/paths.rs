@@ -191,6 +191,54 @@ fn limits_that_cannot_be_kept_are_told() {
     assert!(follow(&machine, &none, &FINE).unwrap().locations.is_empty());
 }
 
+/// A table far off its axis: between locations X bulges by an eighth of the square of the turn times the distance. Where the rotary
+/// axes stand still, or all joints run evenly, it does not.
+#[test]
+fn linear_joints_that_bulge_between_locations_are_told() {
+    let [first, second] = preset("ac-table").unwrap();
+    let zero = Point3::new(300.0, 0.0, -200.0);
+    let machine = |limits| Kinematics::new(first, second, 100.0, zero, limits).unwrap();
+    let path = path((0..=4).map(|k| {
+        let azimuth = 0.3 * (f64::from(k) - 2.5);
+        ([f64::from(k), 0.2, 0.0], tilted(0.4, azimuth + FRAC_PI_2))
+    }));
+    let coarse = Following::with_tip_kept(10.0, 50.0);
+    let free = machine([None; 3]);
+    let joints = follow(&free, &path, &coarse).unwrap();
+    let sampled = |share: f64, last: &(Joints, Point3), at: &JointLocation| {
+        let rotary = [0, 1].map(|k| last.0.rotary[k] + (at.joints.rotary[k] - last.0.rotary[k]) * share);
+        free.place(last.1 + (at.at.tip - last.1) * share, rotary).values()
+    };
+    let (mut last, mut truth) =
+        ((joints.start, path.start.tip), joints.start.values().map(|value| [value; 2]));
+    let mut at_locations = truth;
+    for at in &joints.locations {
+        for n in 0..=2000 {
+            let values = sampled(f64::from(n) / 2000.0, &last, at);
+            for (k, value) in values.into_iter().enumerate() {
+                truth[k] = [truth[k][0].min(value), truth[k][1].max(value)];
+                if n == 2000 {
+                    at_locations[k] = [at_locations[k][0].min(value), at_locations[k][1].max(value)];
+                }
+            }
+        }
+        last = (at.joints, at.at.tip);
+    }
+    for (told, truth) in joints.report.ranges.iter().zip(&truth) {
+        assert!((0..2).all(|side| (told[side] - truth[side]).abs() < 1e-5), "{told:?} {truth:?}");
+    }
+    let [bulge, greatest] = [truth[0][1] - at_locations[0][1], truth[0][1]];
+    assert!(bulge > 0.1, "{bulge}");
+    let limited = |limit: f64| machine([Some([-500.0, limit]), None, None]);
+    let beyond = follow(&limited(greatest - 0.5 * bulge), &path, &coarse).unwrap().report;
+    assert!(
+        matches!(beyond.obstacle(), Some(Obstacle::Limit { violation }) if violation.joint == 'X'),
+        "{beyond:?}"
+    );
+    assert!((beyond.violations[0].value - greatest).abs() < 1e-5);
+    assert!(follow(&limited(greatest + 1e-5), &path, &coarse).unwrap().report.violations.is_empty());
+}
+
 /// No choice of ways and turns, tried by brute force over all of them, turns less.
 #[test]
 fn no_other_choice_turns_less() {

@@ -229,3 +229,22 @@ fn a_wall_between_two_passes_is_gone_over() {
     let beside = ways.between(&from, &touch(5.0, -1.0), &Silent).unwrap();
     assert!(beside.iter().all(|(_, kind)| *kind == MoveKind::Link));
 }
+
+/// Passes farther apart than the cutter is wide nearly, below a stock of 12 mm: it stands where the tool comes down.
+#[test]
+fn through_standing_stock_the_tool_goes_down_at_the_plunge_rate() {
+    let (part, cutter) = (plate(), Cutter::ball(6.0).unwrap());
+    for (lean, links) in [(0.2, Links::Retract), (0.2, Links::Surface), (1.0, Links::Retract)] {
+        let settings = PlanSettings { step: Step::Stepover(5.5), stock_top: 12.0, ..settings(links) };
+        let axis = ToolAxis::Fixed(Vector3::new(lean, 0.1, 1.0).normalize());
+        let tilting =
+            Tilting { axis: &axis, most_turning: None, most_turning_across: None, interference: None };
+        let strategy = Zigzag { one_way: true, ..Zigzag::at(0.0) };
+        let path =
+            plan_tilted(&part, &cutter, &strategy, &tilting, &settings, &Silent).unwrap().path.as_written();
+        let fed = path.segments().filter(|(.., m)| matches!(m.kind, MoveKind::Plunge | MoveKind::Retract));
+        let down = fed.map(|(a, b, m)| (a - b).dot(&m.to.axis) / (b - a).norm() * m.feed_rate);
+        let fastest = down.fold(0.0, f64::max);
+        assert!(fastest > 299.0 && fastest <= 300.0 * (1.0 + 1e-9), "{lean} {links:?}: {fastest}");
+    }
+}

@@ -9,7 +9,7 @@
 //!   turned away first.
 //!
 //! The way out along the axis, which the cutter has come free of, and what is outside of the block are run at rapid rate. In the
-//! block the tool comes in at the feed, for stock may stand where it comes.
+//! block stock may stand: there the tool goes at the feed, and down its axis no faster than a plunge.
 //!
 //! The height aloft is the least at which the straight way stays clear of the part, on its outer side where there is no surface
 //! to meet.
@@ -93,7 +93,7 @@ impl Block {
 pub struct Ways<'a> {
     part: &'a Part,
     settings: &'a PlanSettings,
-    rates: Speeds,
+    pub(super) rates: Speeds,
     /// Height of the middle of what cuts over the tip, mm.
     middle: f64,
     block: &'a Block,
@@ -233,10 +233,9 @@ impl<'a> Ways<'a> {
         last.into_iter().chain([(*to, MoveKind::Plunge)]).collect()
     }
 
-    /// In along the axis to where neighbouring passes have been: at the feed, the last of it as into the full.
+    /// In along the axis, through what may stand there.
     fn down(&self, outside: &ClPoint, to: &ClPoint) -> Vec<Leg> {
-        let off = (self.off(to, outside), MoveKind::Retract);
-        self.to_block(outside, to).into_iter().chain([off, (*to, MoveKind::Plunge)]).collect()
+        self.to_block(outside, to).into_iter().chain([(*to, MoveKind::Plunge)]).collect()
     }
 
     /// From outside along the axis to where the block begins, if that is any nearer.
@@ -249,12 +248,13 @@ impl<'a> Ways<'a> {
     fn time(&self, from: &ClPoint, way: &[Leg]) -> f64 {
         let mut at = from.tip;
         let one = |(to, kind): &Leg| {
-            let length = (to.tip - std::mem::replace(&mut at, to.tip)).norm();
-            length
+            let from = std::mem::replace(&mut at, to.tip);
+            (to.tip - from).norm()
                 / match kind {
                     MoveKind::Rapid => self.rates.rapid,
                     MoveKind::Plunge => self.rates.plunge,
-                    MoveKind::Cut | MoveKind::Link | MoveKind::Retract => self.rates.feed,
+                    MoveKind::Cut | MoveKind::Link => self.rates.feed,
+                    MoveKind::Retract => self.rates.entering(&from, &to.tip, &to.axis),
                 }
         };
         way.iter().map(one).sum()
