@@ -126,6 +126,33 @@ fn lengths_count_for_the_tip() {
     assert!(program.findings(&|_| None).iter().any(|found| found.kind == FindingKind::OtherLength));
 }
 
+/// The nose stands as the control lays it; the tip hangs from it by the tool's own length along the leaning axis.
+#[test]
+fn a_head_swings_each_tool_by_its_own_length() {
+    let (sin, cos) = 30f64.to_radians().sin_cos();
+    let setup = Setup { lengths: [(1, [0.0, 0.0, 80.0]), (2, [0.0, 0.0, 81.0])].into(), ..Setup::default() };
+    let table = |tool: u32| (tool == 1).then_some(80.0);
+    for gauge in [80.0, 150.0] {
+        let machine = machine::kinematics::Kinematics::by_name("ab-head").unwrap().with_gauge_length(gauge);
+        let tip = |register: &str, lengths: &dyn Fn(u32) -> Option<f64>| {
+            let text = format!("T1 M6\n{register}\nG0 B30\nG0 X1 Y2 Z3\nM30\n");
+            let placing = Placing { chord: 0.01, kinematics: Some(&machine), lengths };
+            let program = read_with(&text, GENERAL_CONTROL, &setup);
+            program.runs(&placing).unwrap()[0].path.moves.last().unwrap().to.tip
+        };
+        let swung =
+            |taken: f64, own: f64| geometry::Point3::new(1.0 - own * sin, 2.0, 3.0 + taken - own * cos);
+        for (register, taken) in [("G43 H1", 80.0), ("G43 H2", 81.0), ("G49", 0.0)] {
+            let off = (tip(register, &table) - swung(taken, 80.0)).norm();
+            assert!(off < 1e-9, "{register}, {gauge}: {off}");
+        }
+        let kept = tip("G43.4 H2", &table) - geometry::Point3::new(1.0 + sin, 2.0, 3.0 + cos);
+        assert!(kept.norm() < 1e-9, "{kept}");
+        // The machine's length is that of a tool that no table knows.
+        assert!((tip("G49", &|_| None) - swung(gauge, gauge)).norm() < 1e-9, "{gauge}");
+    }
+}
+
 #[test]
 fn what_cannot_be_followed_is_refused_at_its_place() {
     let unsupported = |text: &str, line: u32, column: u32| {

@@ -28,7 +28,7 @@ const STRAIGHT: f64 = 1e-6;
 pub struct Placing<'a> {
     /// How far chords may stray, mm.
     pub chord: f64,
-    /// The machine, where it has rotary axes.
+    /// The machine, where it has rotary axes. Its gauge length is that of tools whose length is not known.
     pub kinematics: Option<&'a Kinematics>,
     /// The true length of a tool, mm, where it is known.
     pub lengths: &'a dyn Fn(u32) -> Option<f64>,
@@ -138,6 +138,14 @@ impl Layer<'_> {
         (self.placing.lengths)(self.setting.tool).map_or(0.0, |length| self.setting.length[2] - length)
     }
 
+    /// From the spindle nose to the tip, mm: as the control takes it, and in truth. Where the tool's is not known, both are the machine's.
+    fn lengths(&self, kinematics: &Kinematics) -> [f64; 2] {
+        match (self.placing.lengths)(self.setting.tool) {
+            Some(own) => [self.setting.length[2], own],
+            None => [kinematics.gauge_length(); 2],
+        }
+    }
+
     /// Tip and axis in the part, of a place in machine coordinates.
     fn location(&self, at: &Place, axis: Option<&[f64; 3]>) -> Result<ClPoint, Fault> {
         let zero = &self.program.zero;
@@ -154,9 +162,13 @@ impl Layer<'_> {
                 None => Ok(shifted(tip, Vector3::z())),
             };
         };
-        let at = kinematics.forward(&self.joints_of(kinematics, tip, turned)?);
+        let joints = self.joints_of(kinematics, tip, turned)?;
         // A control that keeps the tip says where it is.
-        Ok(shifted(if self.setting.tip_kept { tip } else { at.tip }, at.axis))
+        if self.setting.tip_kept {
+            return Ok(shifted(tip, kinematics.tool_axis(joints.rotary)));
+        }
+        let [_, own] = self.lengths(kinematics);
+        Ok(kinematics.with_gauge_length(own).forward(&joints))
     }
 
     /// The joints at a place in machine coordinates, of a machine with rotary axes.
@@ -173,10 +185,11 @@ impl Layer<'_> {
             return Err(Fault::Rotary(['A', 'B', 'C'][k]));
         }
         let rotary = letters.map(|letter| turned[usize::from(letter as u8 - b'A').min(2)].to_radians());
+        let [taken, _] = self.lengths(kinematics);
         if self.setting.tip_kept {
-            return Ok(kinematics.place(tip, rotary));
+            return Ok(kinematics.with_gauge_length(taken).place(tip, rotary));
         }
-        let nose = Vector3::new(0.0, 0.0, kinematics.gauge_length());
+        let nose = Vector3::new(0.0, 0.0, taken);
         Ok(Joints { linear: tip.coords + kinematics.workpiece_zero().coords + nose, rotary })
     }
 
