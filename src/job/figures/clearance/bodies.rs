@@ -90,10 +90,10 @@ fn motions<'a>(run: &'a Run<'a>) -> (Vec<Motion<'a>>, Option<String>) {
             return (vec![motion(tool, Chain::of(kinematics), program)], None);
         }
         (Some(kinematics), None, [tool], Some(_)) => {
-            if let Some(read) = read.filter(|read| !read.joints.is_empty()) {
+            if let Some([(_, joints)]) = read.map(|read| &read.joints[..]) {
                 let own = own_length(tool).unwrap_or(kinematics.gauge_length());
                 let chain = Chain::of(&kinematics.with_gauge_length(own));
-                return (vec![motion(tool, chain, read.joints.clone())], None);
+                return (vec![motion(tool, chain, joints.clone())], None);
             }
         }
         (None, _, tools, Some(made)) if path.is_upright() => {
