@@ -153,6 +153,27 @@ fn a_head_swings_each_tool_by_its_own_length() {
     }
 }
 
+/// A table may carry the part turned; the spindle leans as the machine's own axes stand.
+#[test]
+fn an_offset_of_a_head_s_axis_leans_the_tool() {
+    let (sin, cos) = 30f64.to_radians().sin_cos();
+    for (machine, x, z) in [("ab-head", sin, cos), ("ab-table", 0.0, 1.0)] {
+        let machine = machine::kinematics::Kinematics::by_name(machine).unwrap();
+        let placing = Placing { chord: 0.01, kinematics: Some(&machine), lengths: &|_| None };
+        for text in ["G10 L2 P1 B30\nG0 B0\nM30\n", "G0 B30\nG92 B0\nG0 X1\nM30\n"] {
+            let program = read_with(text, GENERAL_CONTROL, &Setup::default());
+            let run = program.runs(&placing).unwrap().swap_remove(0);
+            let axis = run.path.moves.last().unwrap().to.axis;
+            // What a program sets after its first motion is no zero of the part.
+            let [x, z] = if text.starts_with("G0") { [sin, cos] } else { [x, z] };
+            assert!((axis - geometry::Vector3::new(x, 0.0, z)).norm() < 1e-12, "{text}: {axis}");
+            let turned =
+                run.joints.last().unwrap().joints.rotary.iter().map(|angle| angle.to_degrees()).sum::<f64>();
+            assert!((turned - 30.0 * f64::from(x > 0.0)).abs() < 1e-9, "{text}: {turned}");
+        }
+    }
+}
+
 #[test]
 fn what_cannot_be_followed_is_refused_at_its_place() {
     let unsupported = |text: &str, line: u32, column: u32| {

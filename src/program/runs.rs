@@ -5,7 +5,7 @@
 //! divided so that straight pieces keep the same tolerance.
 
 use geometry::{Point3, Vector3};
-use machine::kinematics::{Joints, Kinematics, Way, Waypoint};
+use machine::kinematics::{Joints, Kinematics, Side, Way, Waypoint};
 use motion::{ClPoint, Move, MoveKind, Origin, Toolpath};
 
 use crate::error::{Fault, ProgramError};
@@ -155,7 +155,7 @@ impl Layer<'_> {
         if let Some(axis) = axis {
             return Ok(shifted(tip, Vector3::from(*axis)));
         }
-        let turned = [3, 4, 5].map(|k| at[k] - zero[k]);
+        let turned = self.turned(at);
         let Some(kinematics) = self.placing.kinematics else {
             return match turned.iter().position(|angle| *angle != 0.0) {
                 Some(k) => Err(Fault::Rotary(['A', 'B', 'C'][k])),
@@ -173,10 +173,20 @@ impl Layer<'_> {
 
     /// The joints at a place in machine coordinates, of a machine with rotary axes.
     fn joints(&self, at: &Place) -> Result<Joints, Fault> {
-        let moved: Place = std::array::from_fn(|k| at[k] - self.program.zero[k]);
-        let [x, y, z, a, b, c] = moved;
+        let zero = &self.program.zero;
         let kinematics = self.placing.kinematics.ok_or(Fault::Rotary('A'))?;
-        self.joints_of(kinematics, Point3::new(x, y, z), [a, b, c])
+        let tip = Point3::new(at[0] - zero[0], at[1] - zero[1], at[2] - zero[2]);
+        self.joints_of(kinematics, tip, self.turned(at))
+    }
+
+    /// A B C at a place in machine coordinates, degrees: of a table from the part's zero, of a head from the machine's.
+    fn turned(&self, at: &Place) -> [f64; 3] {
+        let in_head = |letter: char| {
+            let axes = self.placing.kinematics.map_or(&[][..], |kinematics| kinematics.axes());
+            axes.iter().any(|axis| axis.letter == letter && axis.side == Side::Head)
+        };
+        let zero = |k: usize| if in_head(['A', 'B', 'C'][k]) { 0.0 } else { self.program.zero[k + 3] };
+        [0, 1, 2].map(|k| at[k + 3] - zero(k))
     }
 
     fn joints_of(&self, kinematics: &Kinematics, tip: Point3, turned: [f64; 3]) -> Result<Joints, Fault> {
