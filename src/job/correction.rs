@@ -285,8 +285,7 @@ impl Session {
         let whole = |planned: &Planned, closeness| {
             self.look(request, earlier, engine, &planned.plan.path, closeness, monitor)
         };
-        let wanted =
-            |target: f64, behind_others: bool| Wanted { part: &self.part, target, behind_others };
+        let wanted = |target: f64, behind_others: bool| Wanted { part: &self.part, target, behind_others };
         let of_ridges = |(map, target)| Standing::of_ridges(map, &first, [1.0; 2], wanted(target, false));
         let (looked, standing) = match map.as_ref().zip(target).and_then(of_ridges) {
             Some(standing) => (None, Some(standing)),
@@ -443,7 +442,8 @@ impl Corrected<'_> {
             } else {
                 let map = self.session.ridges(self.request, self.engine, &planned, monitor)?;
                 slack = map.as_ref().map_or(slack, |map| slack.max(slack_of(map)));
-                let found = map.and_then(|map| Standing::of_ridges(&map, &planned, factors, self.wanted(false)));
+                let found =
+                    map.and_then(|map| Standing::of_ridges(&map, &planned, factors, self.wanted(false)));
                 let Some(found) = found else { break };
                 self.keep_if_better(planned, next, found)
             };
@@ -492,7 +492,14 @@ impl Corrected<'_> {
                 // Two at a time might be more than the memory that the run may take.
                 drop(looked.take());
                 let path = &planned.plan.path;
-                let again = self.session.look(self.request, self.earlier, self.engine, path, self.closeness, monitor)?;
+                let again = self.session.look(
+                    self.request,
+                    self.earlier,
+                    self.engine,
+                    path,
+                    self.closeness,
+                    monitor,
+                )?;
                 let found = Standing::of_all(&again, &planned, factors, self.wanted(true));
                 // A shorter path is no reason to give up a plan that passes.
                 gain = match (is_passing, self.session.passes(&again)) {

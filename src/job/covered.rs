@@ -47,10 +47,8 @@ impl Session {
         let cutter = &self.scene.cutter;
         // Round corners leave a fillet at the foot.
         let upright = (pocket.depth - cutter.corner_radius()).max(0.0);
-        let walls = [
-            upright * pocket.reached_wall_length(cutter.radius()),
-            pocket.depth * pocket.wall_length(),
-        ];
+        let walls =
+            [upright * pocket.reached_wall_length(cutter.radius()), pocket.depth * pocket.wall_length()];
         let mesh = self.part.mesh();
         let floor = |t: usize| {
             let [a, b, c] = mesh.corners(t);

@@ -9,7 +9,8 @@ use io::digest;
 use metrology::{Engine, GougeRegion, Measured, path_figures};
 use motion::Toolpath;
 use report::{
-    Claim, NotPlanned, RunReport, SimulationFigures, ToleranceFigures, ToolpathReport, ToolpathResult, Verdict,
+    Claim, NotPlanned, RunReport, SimulationFigures, ToleranceFigures, ToolpathReport, ToolpathResult,
+    Verdict,
 };
 use scene::ToolpathRequest;
 use sim::{NOT_CUT, Stock};

@@ -5,11 +5,14 @@ use std::borrow::Cow;
 use collision::{Check, Interference, Obstacle};
 use cutter::{Cutter, Holder, Solid};
 use geometry::{Bvh, TriangleMesh};
-use motion::{Cutters, Toolpath};
+use motion::{Cutters, ROUNDING, Toolpath};
 use part::Part;
 use scene::Scene;
 
 use super::planned::may_stray;
+
+/// How far writing a program may move the tool, mm, with room to spare.
+const WRITTEN: f64 = 2.0 * ROUNDING;
 
 /// A mesh that is not to be touched, with its search tree.
 pub(crate) type FixtureMesh = (TriangleMesh, Bvh);
@@ -46,7 +49,7 @@ impl Tool {
         let obstacle = Obstacle::new(part.mesh(), part.bvh());
         let depth = 0.5 * scene.tolerance.gouge + part.mesh_deviation();
         let mut checks = vec![Check { solid: &self.cutter, obstacle, needed: -depth }];
-        let off = keep.clearance + part.mesh_deviation() + may_stray(scene);
+        let off = keep.clearance + part.mesh_deviation() + may_stray(scene) + WRITTEN;
         checks.extend(self.holder.as_ref().map(|solid| Check { solid, obstacle, needed: off }));
         checks.extend(self.keep_off_fixtures(scene, fixtures).checks);
         Interference { checks, greatest_tilt: keep.greatest_tilt, greatest_lift: keep.greatest_lift }
@@ -57,7 +60,7 @@ impl Tool {
         let solids = || std::iter::once(&self.cutter).chain(&self.holder);
         let of_one = |(mesh, bvh): &'a FixtureMesh| {
             let obstacle = Obstacle::new(mesh, bvh);
-            let needed = scene.keep_clear.clearance + may_stray(scene);
+            let needed = scene.keep_clear.clearance + may_stray(scene) + WRITTEN;
             solids().map(move |solid| Check { solid, obstacle, needed })
         };
         Interference { checks: fixtures.iter().flat_map(of_one).collect(), ..Interference::default() }

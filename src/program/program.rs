@@ -110,7 +110,7 @@ pub struct Program {
     pub arcs: Vec<Arc>,
     /// What holds meanwhile.
     pub settings: Vec<Setting>,
-    /// The part's zero in machine coordinates: the origin of the program where it first moves.
+    /// The part's zero in machine coordinates: the origin of the program where it first moves. Rotary axes of a head do not count from it.
     pub zero: Place,
     /// What was read and moves nothing, and what is doubtful.
     pub notes: Vec<Note>,

@@ -5,7 +5,7 @@
 //! divided so that straight pieces keep the same tolerance.
 
 use geometry::{Point3, Vector3};
-use machine::kinematics::{Joints, Kinematics, Way, Waypoint};
+use machine::kinematics::{Joints, Kinematics, Side, Way, Waypoint};
 use motion::{ClPoint, Move, MoveKind, Origin, Toolpath};
 
 use crate::error::{Fault, ProgramError};
@@ -34,7 +34,7 @@ const STRAIGHT: f64 = 1e-6;
 pub struct Placing<'a> {
     /// The chord tolerance, mm: pieces of turning moves may be as far off, chords of arcs a tenth as far.
     pub chord: f64,
-    /// The machine, where it has rotary axes.
+    /// The machine, where it has rotary axes. Its gauge length is that of tools whose length is not known.
     pub kinematics: Option<&'a Kinematics>,
     /// The true length of a tool, mm, where it is known.
     pub lengths: &'a dyn Fn(u32) -> Option<f64>,
@@ -198,6 +198,14 @@ impl Layer<'_> {
         (self.placing.lengths)(self.setting.tool).map_or(0.0, |length| self.setting.length[2] - length)
     }
 
+    /// From the spindle nose to the tip, mm: as the control takes it, and in truth. Where the tool's is not known, both are the machine's.
+    fn lengths(&self, kinematics: &Kinematics) -> [f64; 2] {
+        match (self.placing.lengths)(self.setting.tool) {
+            Some(own) => [self.setting.length[2], own],
+            None => [kinematics.gauge_length(); 2],
+        }
+    }
+
     /// Tip and axis in the part, of a place in machine coordinates.
     fn location(&self, at: &Place, axis: Option<&[f64; 3]>) -> Result<ClPoint, Fault> {
         let zero = &self.program.zero;
@@ -207,24 +215,38 @@ impl Layer<'_> {
         if let Some(axis) = axis {
             return Ok(shifted(tip, Vector3::from(*axis)));
         }
-        let turned = [3, 4, 5].map(|k| at[k] - zero[k]);
+        let turned = self.turned(at);
         let Some(kinematics) = self.placing.kinematics else {
             return match turned.iter().position(|angle| *angle != 0.0) {
                 Some(k) => Err(Fault::Rotary(['A', 'B', 'C'][k])),
                 None => Ok(shifted(tip, Vector3::z())),
             };
         };
-        let at = kinematics.forward(&self.joints_of(kinematics, tip, turned)?);
+        let joints = self.joints_of(kinematics, tip, turned)?;
         // A control that keeps the tip says where it is.
-        Ok(shifted(if self.setting.tip_kept { tip } else { at.tip }, at.axis))
+        if self.setting.tip_kept {
+            return Ok(shifted(tip, kinematics.tool_axis(joints.rotary)));
+        }
+        let [_, own] = self.lengths(kinematics);
+        Ok(kinematics.with_gauge_length(own).forward(&joints))
     }
 
     /// The joints at a place in machine coordinates, of a machine with rotary axes.
     fn joints(&self, at: &Place) -> Result<Joints, Fault> {
-        let moved: Place = std::array::from_fn(|k| at[k] - self.program.zero[k]);
-        let [x, y, z, a, b, c] = moved;
+        let zero = &self.program.zero;
         let kinematics = self.placing.kinematics.ok_or(Fault::Rotary('A'))?;
-        self.joints_of(kinematics, Point3::new(x, y, z), [a, b, c])
+        let tip = Point3::new(at[0] - zero[0], at[1] - zero[1], at[2] - zero[2]);
+        self.joints_of(kinematics, tip, self.turned(at))
+    }
+
+    /// A B C at a place in machine coordinates, degrees: of a table from the part's zero, of a head from the machine's.
+    fn turned(&self, at: &Place) -> [f64; 3] {
+        let in_head = |letter: char| {
+            let axes = self.placing.kinematics.map_or(&[][..], |kinematics| kinematics.axes());
+            axes.iter().any(|axis| axis.letter == letter && axis.side == Side::Head)
+        };
+        let zero = |k: usize| if in_head(['A', 'B', 'C'][k]) { 0.0 } else { self.program.zero[k + 3] };
+        [0, 1, 2].map(|k| at[k + 3] - zero(k))
     }
 
     fn joints_of(&self, kinematics: &Kinematics, tip: Point3, turned: [f64; 3]) -> Result<Joints, Fault> {
@@ -233,10 +255,11 @@ impl Layer<'_> {
             return Err(Fault::Rotary(['A', 'B', 'C'][k]));
         }
         let rotary = letters.map(|letter| turned[usize::from(letter as u8 - b'A').min(2)].to_radians());
+        let [taken, _] = self.lengths(kinematics);
         if self.setting.tip_kept {
-            return Ok(kinematics.place(tip, rotary));
+            return Ok(kinematics.with_gauge_length(taken).place(tip, rotary));
         }
-        let nose = Vector3::new(0.0, 0.0, kinematics.gauge_length());
+        let nose = Vector3::new(0.0, 0.0, taken);
         Ok(Joints { linear: tip.coords + kinematics.workpiece_zero().coords + nose, rotary })
     }
 

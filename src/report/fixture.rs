@@ -70,6 +70,7 @@ pub fn toolpath(name: &str, machining_time_s: f64, gouge: f64) -> ToolpathResult
     ToolpathResult {
         name: name.to_owned(),
         strategy: "zigzag".to_owned(),
+        stock_is_previous: false,
         folder: name.to_owned(),
         verdict: claims[0].verdict(),
         claims,

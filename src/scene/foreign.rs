@@ -9,7 +9,7 @@ use super::{Scene, ToolpathRequest};
 use cutter::{Cutter, Holder};
 use io::regular;
 use keys::{SceneError, SceneText, Section};
-use machine::kinematics::Waypoint;
+use machine::kinematics::{Side, Waypoint};
 use motion::{Cutters, MoveKind, PathsInTurn, Toolpath};
 use program::{
     Control, Finding, Placing, Program, ProgramError, Setup, ToolRun, ToolTable, looks_like_apt, read_apt,
@@ -76,12 +76,29 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
     let described = if table.tools.is_empty() { ToolTable::of_remarks(&read) } else { table };
     let (mut findings, notes) = (read.findings(&length), notes(&read));
     let gauge_lengths = lengths.clone();
+    let table_zero = kinematics.map_or([0.0; 2], |kinematics| {
+        kinematics.axes().map(|axis| match axis.side {
+            Side::Head => 0.0,
+            Side::Table => read.zero[3 + usize::from(axis.letter as u8 - b'A').min(2)].to_radians(),
+        })
+    });
     let read = if foreign.tools_meant == ToolsMeant::All {
         let (path, joints) = joined(known(&read, runs, &described).map_err(refused)?.into_iter());
         let tools = tools_of(&path, &described);
         let before = Vec::new();
         let (unknown_before, others) = (false, false);
-        ReadProgram { path, joints, tools, gauge_lengths, before, unknown_before, others, findings, notes }
+        ReadProgram {
+            path,
+            joints,
+            table_zero,
+            tools,
+            gauge_lengths,
+            before,
+            unknown_before,
+            others,
+            findings,
+            notes,
+        }
     } else {
         let tool = chosen(foreign.tools_meant, &read, &runs).map_err(refused)?;
         let Others { before, unknown_before, any } = Others::of(&runs, tool, &described);
@@ -90,6 +107,7 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
         ReadProgram {
             path,
             joints,
+            table_zero,
             tools: None,
             gauge_lengths,
             before,
@@ -310,19 +328,19 @@ fn feeds(runs: &[ToolRun], tool: u32) -> bool {
     of_tool.flat_map(|run| &run.path.moves).any(|step| step.kind != MoveKind::Rapid)
 }
 
-/// Runs as one path.
-fn joined(mut runs: impl Iterator<Item = ToolRun>) -> (Toolpath, Vec<Waypoint>) {
-    let Some(ToolRun { path, mut joints, .. }) = runs.next() else {
+/// Runs as one path, and the joints of each. How the machine comes from one to the next is not known.
+fn joined(mut runs: impl Iterator<Item = ToolRun>) -> (Toolpath, Vec<(u32, Vec<Waypoint>)>) {
+    let Some(ToolRun { tool, path, joints }) = runs.next() else {
         let nowhere = motion::ClPoint::upright(geometry::Point3::origin());
         return (Toolpath::new(nowhere, Vec::new()), Vec::new());
     };
-    let mut all = PathsInTurn::new(path);
+    let (mut all, mut stretches) = (PathsInTurn::new(path), vec![(tool, joints)]);
     runs.for_each(|run| {
-        // How the machine comes from one run to the next is not known.
-        joints.clear();
+        stretches.push((run.tool, run.joints));
         all.push(run.path, program::FEED_WHERE_NONE);
     });
-    (all.finish(), joints)
+    stretches.retain(|(_, joints)| !joints.is_empty());
+    (all.finish(), stretches)
 }
 
 fn notes(read: &Program) -> Vec<String> {

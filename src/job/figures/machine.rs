@@ -2,9 +2,11 @@
 
 use serde::Serialize;
 
-use ::machine::kinematics::{JointPath, JointReport, Kinematics, Turn};
+use ::machine::kinematics::{Chain, JointPath, JointReport, Kinematics, Link, STRAY, Turn, Way};
 use geometry::{Aabb, Point3};
 use report::{Claim, Figure, Gravity};
+use scene::FiveAxis;
+use toolpath::ReadProgram;
 use work::monitor::Monitor;
 
 use super::words::value;
@@ -56,19 +58,72 @@ impl MachineFigures {
 }
 
 pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> {
-    let joints = run.planned.joints.as_ref();
-    let Some((joints, five_axis)) = joints.zip(run.scene().five_axis.as_ref()) else {
-        return Ok(Finding::default());
+    let Some(five_axis) = run.scene().five_axis.as_ref() else { return Ok(Finding::default()) };
+    let Some(joints) = run.planned.joints.as_ref() else {
+        return Ok(run.request.foreign().map_or_else(Finding::default, |read| of_program(five_axis, read)));
     };
     let (machine, path) = (&five_axis.kinematics, run.path());
     let fastest = joints.fastest(machine, path, run.scene().machine.rapid_rate);
     let figures = MachineFigures::new(machine, &joints.report, fastest);
-    let mut claims = within_travel(machine, &joints.report);
+    let mut claims = within_travel(machine, &joints.report.ranges, 0.0);
     let notes: Vec<String> = note(&joints.report).into_iter().collect();
     let nose = joints.highest_nose(machine, path).max(over_the_work(run, machine, joints));
     claims.push(retract_above(machine.retracted_z(), nose));
     let figure = Figure { key: "machine", value: value(&figures)?, ..Figure::default() };
     Ok(Finding { figure: Some(figure), notes, claims })
+}
+
+/// The travel of a program from elsewhere. Where the machine stood before it is not known.
+fn of_program(five_axis: &FiveAxis, read: &ReadProgram) -> Finding {
+    let machine = &five_axis.kinematics;
+    if machine.limits().iter().all(Option::is_none) {
+        return Finding::default();
+    }
+    if read.joints.is_empty() {
+        let note = "the travel of joints is not judged: cutter locations name no joints".to_owned();
+        return Finding { notes: vec![note], ..Finding::default() };
+    }
+    let (ranges, stray) = travelled(machine, read);
+    let mut claims = within_travel(machine, &ranges, stray);
+    let unknown = read.joints.iter().find(|(tool, _)| !read.gauge_lengths.contains_key(tool));
+    let cure = match unknown {
+        _ if !five_axis.zero_is_given => Some("add `workpiece_zero` to [machine.kinematics]".to_owned()),
+        Some((tool, _)) if !five_axis.gauge_is_given => {
+            Some(format!("add the `gauge_length` of tool {tool} to the table of tools"))
+        }
+        _ => None,
+    };
+    if let Some((cure, claim)) = cure.zip(claims.iter_mut().find(|claim| claim.unit == "mm")) {
+        let unknown = Claim::length("travel", Gravity::Crash, ROUNDING, 0.0, f64::INFINITY);
+        let text = format!("where X, Y and Z stand is not known: {cure}");
+        *claim = Claim { decided_by: "that would decide it", ..unknown.told(text) };
+    }
+    Finding { claims, ..Finding::default() }
+}
+
+/// Least and greatest value of each joint, mm and rad, and by how much the linear ones may go farther, mm.
+fn travelled(machine: &Kinematics, read: &ReadProgram) -> ([[f64; 2]; 5], f64) {
+    let (mut ranges, mut stray) = ([[f64::INFINITY, f64::NEG_INFINITY]; 5], 0.0);
+    let mut widen = |k: usize, value: f64| {
+        ranges[k] = [ranges[k][0].min(value), ranges[k][1].max(value)];
+    };
+    for (tool, program) in &read.joints {
+        let own = read.gauge_lengths.get(tool).copied().unwrap_or(machine.gauge_length());
+        let chain = Chain::of(&machine.with_gauge_length(own));
+        for (at, way) in program.iter().enumerate().skip(1) {
+            way.joints.linear.iter().enumerate().for_each(|(k, value)| widen(k, *value));
+            (0..2).for_each(|k| widen(k + 3, way.joints.rotary[k] + read.table_zero[k]));
+            // Where rotary axes turn about a tip that is kept, the linear ones follow.
+            if at > 1 && way.way == Way::Tip && way.joints.rotary != program[at - 1].joints.rotary {
+                stray = STRAY;
+                let links = [Link::Linear, Link::Frame];
+                let between = chain.motion(&program[at - 1..=at], links, &Point3::origin(), 0.0);
+                let noses = between.iter().map(|stretch| stretch.ends[1].translation.vector);
+                noses.for_each(|nose| nose.iter().enumerate().for_each(|(k, value)| widen(k, *value)));
+            }
+        }
+    }
+    (ranges, stray)
 }
 
 /// How high the spindle nose has to stand, machine coordinates, mm, for the tip to be over part, stock and fixtures wherever the rotary
@@ -105,9 +160,9 @@ fn retract_above(z: f64, nose: f64) -> Claim {
 const ROUNDING: f64 = 1e-6;
 
 /// That the joints keep to their travels: one claim for those of the linear and one for those of the rotary joints that are
-/// limited.
-fn within_travel(kinematics: &Kinematics, report: &JointReport) -> Vec<Claim> {
-    let all = kinematics.letters().into_iter().zip(report.ranges).zip(kinematics.limits()).enumerate();
+/// limited. The linear ones may go farther than found by `stray`, mm.
+fn within_travel(kinematics: &Kinematics, ranges: &[[f64; 2]; 5], stray: f64) -> Vec<Claim> {
+    let all = kinematics.letters().into_iter().zip(*ranges).zip(kinematics.limits()).enumerate();
     let beyond = all.filter_map(|(k, ((joint, range), limits))| {
         let [least, greatest] = limits?;
         let over = (least - range[0]).max(range[1] - greatest);
@@ -123,8 +178,10 @@ fn within_travel(kinematics: &Kinematics, report: &JointReport) -> Vec<Claim> {
         } else {
             format!("joint {joint} runs {over:.3} {unit} beyond its limit")
         };
-        let claim = Claim::length("travel", Gravity::Crash, ROUNDING, *over, 0.0).told(text);
-        Some(Claim { unit: if linear { "mm" } else { "deg" }, ..claim })
+        let (unit, bound) = if linear { ("mm", stray) } else { ("deg", 0.0) };
+        let claim = Claim::length("travel", Gravity::Crash, ROUNDING, *over, bound).told(text);
+        let at_least = (bound > 0.0).then_some(*over);
+        Some(Claim { unit, at_least, decided_by: "more travel would decide it", ..claim })
     };
     [true, false].into_iter().filter_map(worst).collect()
 }
@@ -143,7 +200,96 @@ fn note(report: &JointReport) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ::machine::kinematics::{Joints, Waypoint};
+    use geometry::Vector3;
+    use motion::{ClPoint, Toolpath};
     use report::Verdict;
+
+    fn head(more: &str) -> FiveAxis {
+        let text = format!(
+            "[part]\nsurface = \"plane\"\nx = [0, 8]\ny = [0, 6]\n[cutter]\nshape = \"ball\"\ndiameter = 6\n[[toolpath]]\n\
+             strategy = \"program\"\nfile = \"a.nc\"\n[machine.kinematics]\npreset = \"ab-head\"\ngauge_length = 150\n{more}"
+        );
+        scene::Scene::parse("a.toml", &text).unwrap().five_axis.unwrap()
+    }
+
+    fn program(joints: Vec<(u32, Vec<Waypoint>)>) -> ReadProgram {
+        ReadProgram {
+            path: Toolpath::new(ClPoint::upright(Point3::origin()), Vec::new()),
+            joints,
+            table_zero: [0.0; 2],
+            tools: None,
+            gauge_lengths: [(1, 80.0), (2, 90.0)].into(),
+            before: Vec::new(),
+            unknown_before: false,
+            others: false,
+            findings: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+
+    /// A start that nothing is known of, then these places of X and B, degrees.
+    fn through(way: Way, places: &[[f64; 2]]) -> Vec<Waypoint> {
+        let at = |(step, &[x, b]): (usize, &[f64; 2])| {
+            let joints = Joints { linear: Vector3::new(x, 0.0, -320.0), rotary: [0.0, f64::to_radians(b)] };
+            Waypoint { joints, step, way }
+        };
+        [[999.0, 170.0]].iter().chain(places).enumerate().map(at).collect()
+    }
+
+    fn told(five_axis: &FiveAxis, read: &ReadProgram) -> Vec<(Verdict, String)> {
+        let found = of_program(five_axis, read);
+        found.claims.iter().map(|claim| (claim.verdict(), claim.text.clone())).collect()
+    }
+
+    #[test]
+    fn programs_from_elsewhere_keep_to_the_travel() {
+        let limits = "workpiece_zero = [0, 0, -400]\nx = [-20, 20]\nsecond = { limits = [-10, 10] }\n";
+        let machine = head(limits);
+        let inside = through(Way::Axes, &[[12.0, 5.0], [-3.0, 4.0]]);
+        // Each tool's stretches count.
+        let beyond = through(Way::Axes, &[[32.0, 5.0], [46.0, 30.0]]);
+        let passed = told(&machine, &program(vec![(1, inside.clone())]));
+        assert!(passed.iter().all(|(verdict, _)| *verdict == Verdict::Pass), "{passed:?}");
+        assert_eq!(passed[0].1, "joint X comes nearest to its limit, 8.000 mm inside of it");
+        let failed = told(&machine, &program(vec![(1, inside.clone()), (2, beyond)]));
+        let expected =
+            ["joint X runs 26.000 mm beyond its limit", "joint B runs 20.000 degrees beyond its limit"];
+        assert_eq!(failed, expected.map(|text| (Verdict::Fail, text.to_owned())));
+        // Without its places nothing is known of the linear joints, and of cutter locations nothing at all.
+        let nowhere = told(&head(&limits.replace("workpiece", "# ")), &program(vec![(1, inside)]));
+        assert_eq!((nowhere[0].0, nowhere[1].0), (Verdict::Undecided, Verdict::Pass));
+        assert!(nowhere[0].1.contains("`workpiece_zero`"), "{nowhere:?}");
+        let located = of_program(&machine, &program(Vec::new()));
+        assert_eq!((located.claims.len(), located.notes.len()), (0, 1));
+        assert!(
+            told(
+                &head("first = { limits = \"none\" }\nsecond = { limits = \"none\" }"),
+                &program(Vec::new())
+            )
+            .is_empty()
+        );
+    }
+
+    /// The nose is highest in the middle of a swing about a tip that stays, and the tool's own length counts.
+    #[test]
+    fn linear_joints_follow_a_head_that_swings() {
+        let (lean, own) = (60f64, 80.0);
+        let [low, top] = [-400.0 + own * lean.to_radians().cos(), -400.0 + own];
+        let swing = [-lean, lean].map(|b| {
+            let rotary = [0.0, b.to_radians()];
+            let linear = Vector3::new(own * rotary[1].sin(), 0.0, low);
+            Waypoint { joints: Joints { linear, rotary }, step: 0, way: Way::Tip }
+        });
+        let joints = through(Way::Tip, &[]).into_iter().chain(swing).collect::<Vec<_>>();
+        for (over, verdict) in [(10.0, Verdict::Fail), (0.01, Verdict::Fail), (-0.01, Verdict::Pass)] {
+            let machine = head(&format!("workpiece_zero = [0, 0, -400]\nz = [-500, {}]\n", top - over));
+            let claims = of_program(&machine, &program(vec![(1, joints.clone())])).claims;
+            let claim = claims.iter().find(|claim| claim.unit == "mm").unwrap();
+            assert_eq!(claim.verdict(), verdict, "{claim:?}");
+            assert!((claim.measured.unwrap() - over).abs() <= claim.error_bound, "{claim:?}");
+        }
+    }
 
     #[test]
     fn a_retract_below_the_work_is_a_violation() {

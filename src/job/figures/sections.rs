@@ -14,7 +14,8 @@ use crate::run::{Finding, Run};
 struct Row {
     #[serde(flatten)]
     at: SectionFigures,
-    /// Between these the deviation from the drawn curve lies, where the section was faired.
+    /// The deviation with the least and the greatest distance of the faired curve from the drawn one, where the section was faired. No
+    /// bound: other places may stand lower or higher.
     #[serde(skip_serializing_if = "Option::is_none")]
     from_drawing_mm: Option<[f64; 2]>,
 }
@@ -61,8 +62,8 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
     };
     let table = FigureTable {
         title: "Deviation at the sections",
-        caption: "At the row of places nearest to each section, along the normals of the design. Where the section was faired, the \
-                  last column bounds the deviation from the curve as it was drawn.",
+        caption: "At the row of places nearest to each section, along the normals of the design. Where the section was faired, \
+                  the last column adds how far the faired curve is from the drawn one. Between the places more may stand.",
         columns: vec![
             "height mm",
             "from µm",

@@ -192,6 +192,12 @@ impl Kinematics {
         Ok(Self { axes, gauge_length, workpiece_zero, travel, rates, accelerations, jerks, triangle })
     }
 
+    /// The same with another length from the spindle nose to the tip, mm.
+    #[must_use]
+    pub fn with_gauge_length(self, gauge_length: f64) -> Self {
+        Self { gauge_length, ..self }
+    }
+
     /// The same with the fastest motion of X, Y and Z, mm/s; without, they are not limited.
     #[must_use]
     pub fn with_rates(self, rates: [f64; 3]) -> Self {

@@ -43,11 +43,7 @@ pub struct CoverageFigures {
 
 impl CoverageFigures {
     /// Of a pocket: what was measured of its floor and what the cutter comes to of its walls, each with all of it, mm².
-    pub fn of_pocket(
-        judge: Judged,
-        [floor, whole_floor]: [f64; 2],
-        [walls, all_walls]: [f64; 2],
-    ) -> Self {
+    pub fn of_pocket(judge: Judged, [floor, whole_floor]: [f64; 2], [walls, all_walls]: [f64; 2]) -> Self {
         let out_of_reach_mm2 = (whole_floor - floor).max(0.0) + (all_walls - walls).max(0.0);
         Self { judge, by_cells_mm2: floor, by_moves_mm2: walls, out_of_reach_mm2, ..Self::default() }.summed()
     }

@@ -105,8 +105,10 @@ impl Engine for Normals {
         let budget = task.budget.without(Rays::bytes(path, &solid));
         check_places(task, &budget, spacing)?;
         let space = space(task, outward(task));
-        let voxels =
-            self.by_voxels.then(|| cut_voxels(task, &budget, &space, &solid, spacing, monitor)).transpose()?;
+        let voxels = self
+            .by_voxels
+            .then(|| cut_voxels(task, &budget, &space, &solid, spacing, monitor))
+            .transpose()?;
         let by_rays = RaysCut { rays: &rays, path, solid: &solid };
         let by_voxels = voxels.as_ref().map(|(engine, voxels)| VoxelCut { engine, voxels });
         let first: &dyn FirstCut = by_voxels.as_ref().map_or(&by_rays, |cut| cut);

@@ -49,8 +49,11 @@ pub struct ForeignProgram {
 pub struct ReadProgram {
     /// The moves of the tool, or of all.
     pub path: Toolpath,
-    /// The joints of a machine with rotary axes that the program goes through, where one stretch has all moves; else none.
-    pub joints: Vec<Waypoint>,
+    /// The joints of a machine with rotary axes that the program goes through, for each stretch of a tool, with its number. None of
+    /// cutter locations, and on other machines.
+    pub joints: Vec<(u32, Vec<Waypoint>)>,
+    /// Where the rotary axes of a table stand in the joints' zero, rad, first and second axis; a head's stand at zero.
+    pub table_zero: [f64; 2],
     /// The cutters of all tools and what holds them, where all are meant; else the scene's cutter makes all moves.
     pub tools: Option<(Cutters, Vec<Option<Holder>>)>,
     /// Lengths of tools from the spindle nose to the tip by their numbers, mm, as far as the table of tools has them.

@@ -79,6 +79,10 @@ fn motions<'a>(run: &'a Run<'a>) -> (Vec<Motion<'a>>, Option<String>) {
         Motion { run, tool, chain, program, stray }
     };
     let read = run.request.foreign();
+    let own_length = |tool: &ToolMoves<'_>| {
+        let number = path.tool_of(tool.first as usize);
+        number.and_then(|number| read?.gauge_lengths.get(&number).copied())
+    };
     let rotary = scene.five_axis.as_ref().map(|five_axis| &five_axis.kinematics);
     match (rotary, run.planned.joints.as_ref(), run.tools, &scene.bodies) {
         (Some(kinematics), Some(joints), [tool, ..], _) => {
@@ -86,17 +90,16 @@ fn motions<'a>(run: &'a Run<'a>) -> (Vec<Motion<'a>>, Option<String>) {
             return (vec![motion(tool, Chain::of(kinematics), program)], None);
         }
         (Some(kinematics), None, [tool], Some(_)) => {
-            if let Some(read) = read.filter(|read| !read.joints.is_empty()) {
-                return (vec![motion(tool, Chain::of(kinematics), read.joints.clone())], None);
+            if let Some([(_, joints)]) = read.map(|read| &read.joints[..]) {
+                let own = own_length(tool).unwrap_or(kinematics.gauge_length());
+                let chain = Chain::of(&kinematics.with_gauge_length(own));
+                return (vec![motion(tool, chain, joints.clone())], None);
             }
         }
         (None, _, tools, Some(made)) if path.is_upright() => {
             // One tool may have the length of the machine's table instead.
             let alone = (tools.len() == 1).then(|| -made.chain.tip().z);
-            let length = |tool: &ToolMoves<'_>| {
-                let number = path.tool_of(tool.first as usize);
-                number.and_then(|number| read?.gauge_lengths.get(&number).copied()).or(alone)
-            };
+            let length = |tool: &ToolMoves<'_>| own_length(tool).or(alone);
             let (known, unknown): (Vec<_>, Vec<_>) = tools.iter().partition(|tool| length(tool).is_some());
             let motions = known.into_iter().filter_map(|tool| {
                 let chain = Chain::three_axes(length(tool)?, made.chain.workpiece_zero());

@@ -86,6 +86,24 @@ pub(super) fn claim<'a>(result: &'a ToolpathResult, other: &str) -> &'a Claim {
     result.claims.iter().find(of_pair).unwrap_or_else(|| panic!("{:#?}", result.claims))
 }
 
+/// Passes that run aslant toward a clamp end where its clearance begins, and the last decimals of the program stay outside.
+#[test]
+fn what_the_planner_keeps_off_stays_off_as_written() {
+    let home = Home::new("aslant");
+    // The fifth decimal of the last places is rounded up.
+    home.solid("clamp.stl", [7.00006, -9.0, -2.0], [9.0, 19.0, 14.0]);
+    for angle in [7, 20, 33] {
+        let result = home.run(&format!(
+            "{PLATE}[holder]\ncutting_length = 7\n[[holder.section]]\ndiameter = 9\nlength = 10\n[interference]\nclearance = 0.3\n\
+             [[fixture]]\nfile = \"clamp.stl\"\n{ZIGZAG}angle = {angle}\n"
+        ));
+        let claim = result.claims.iter().find(|claim| claim.what == "clearance").unwrap();
+        assert_eq!(claim.verdict(), Verdict::Pass, "{angle}: {claim:?}");
+        // It comes as near as that.
+        assert!(claim.measured.unwrap() > -0.001, "{angle}: {claim:?}");
+    }
+}
+
 /// A clamp as a wall across the plate, in its middle or beside the ends of the passes.
 #[test]
 fn an_upright_cutter_keeps_off_a_clamp_and_its_distance_is_told() {

@@ -308,3 +308,25 @@ fn each_tool_of_a_program_has_its_own_length() {
     assert_eq!(unknown.verdict(), Verdict::Undecided, "{unknown:?}");
     assert!(unknown.text.contains("with tool 2") && unknown.text.contains("`gauge_length`"), "{unknown:?}");
 }
+
+/// The same in a head with rotary axes, whose key is the length of no tool that the table knows.
+#[test]
+fn a_head_carries_each_tool_by_its_own_length() {
+    let home = Home::new("head-lengths");
+    home.write(
+        "job.nc",
+        "G21 G90 G17 G94\nT1 M6\nS1000 M3\nG0 B0 C0\nG43.4 H1\nG0 X0 Y3 Z10\nG1 Z0 F500\nX8\nG0 Z10\nM30\n",
+    );
+    home.write("tools.toml", "[[tool]]\nnumber = 1\nshape = \"ball\"\ndiameter = 6\ngauge_length = 30\n");
+    let nose = cylinder("nose", "B", 40.0, "[0, 0, 0]", "[0, 0, 70]");
+    for (gap, gauge) in [(0.05, 30.0), (0.05, 90.0), (-0.05, 90.0)] {
+        home.solid("post.stl", [15.0, 2.0, -2.0], [19.0, 4.0, 30.0 - gap]);
+        let result = home.opened(&format!(
+            "{PLATE}[[fixture]]\nfile = \"post.stl\"\n[[toolpath]]\nstrategy = \"program\"\nfile = \"job.nc\"\n\
+             tools = \"tools.toml\"\n[machine.kinematics]\npreset = \"bc-head\"\ngauge_length = {gauge}\n\
+             workpiece_zero = {}\n{nose}",
+            list(ZERO)
+        ));
+        is_near(&result, "nose", "post.stl", gap);
+    }
+}
