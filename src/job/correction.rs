@@ -501,8 +501,11 @@ impl Corrected<'_> {
                     monitor,
                 )?;
                 let found = Standing::of_all(&again, &planned, factors, self.wanted(true));
-                // A shorter path is no reason to give up a plan that passes.
+                // A shorter path is no reason to give up a plan that passes, nor a lower ridge for one that cuts too deep.
+                let gouge = self.session.scene.tolerance.gouge;
+                let is_deeper = found.depth > gouge && self.tried.standing.depth <= gouge;
                 gain = match (is_passing, self.session.passes(&again)) {
+                    _ if is_deeper => self.keep_best(&planned, next, found),
                     (true, false) => self.keep_best(&planned, next, found),
                     (false, true) => self.keep(planned, next, found),
                     _ => self.keep_if_better(planned, next, found),

@@ -7,9 +7,9 @@
 //! The part ends at a border as at a vertical wall. Where the way down along the normal leads out through it, the depth is no more
 //! than that along the wall: what lies beyond belongs to no part. The lesser of two concave depths is concave, too.
 //!
-//! Where the side of the cutter reaches over the border by less than the gouge tolerance, what is left of the part is nearer than that,
-//! however long the way along the normal is beside a steep flank. Such a place counts as deep as the cutter reaches over: what is left is
-//! no nearer than 1/√2 of that, and no farther than √2 times as far.
+//! Limits: where the side of the cutter reaches over the border by less than the gouge tolerance, what is left of the part is nearer than
+//! that, however long the way along the normal is beside a steep flank. Such a place counts as deep as that is near; it is left out
+//! where the cutter does not come over the part farther inside.
 
 use std::collections::HashMap;
 
@@ -27,9 +27,6 @@ const LONGEST_PIECE: f64 = 2.0;
 
 /// How far inside of a border, as a share of the gouge tolerance, what is left counts as near: at a corner it is √2 times as far off.
 const INSIDE_SHARE: f64 = 0.65;
-
-/// Halvings by which it is found how near that is.
-const NEAR_HALVINGS: usize = 6;
 
 /// Steps of Newton's method for the meeting of a normal with what a move sweeps; it converges from one side.
 const STEPS: usize = 24;
@@ -58,13 +55,6 @@ struct BorderCut {
     possible: f64,
     at: Point3,
     by: u32,
-}
-
-/// The deepest cut along a piece of a border.
-struct Deepest {
-    cut: BorderCut,
-    /// Whether nothing is cut there as far inside as counts as near.
-    is_near: bool,
 }
 
 /// How deep a move cuts at a place of a border, mm.
@@ -256,42 +246,12 @@ impl Inspection<'_> {
         Ok(())
     }
 
-    /// The deepest place of a move along a piece, where it may be deeper than `known`; it comes nearest at a share. Where what is left
-    /// is near, it is found by halving how near.
+    /// The deepest place of a move along a piece, where it may be deeper than `known`; it comes nearest at a share.
     fn deepest_on(&self, piece: &BorderPiece, by: u32, nearest: f64, known: f64) -> Option<BorderCut> {
-        let [mut nearer, mut far] = [0.0, INSIDE_SHARE * self.limits.gouge];
-        let mut deepest = self.deepest_within(piece, by, nearest, known, far)?;
-        if !deepest.is_near {
-            return Some(deepest.cut);
-        }
-        for _ in 0..NEAR_HALVINGS {
-            let middle = 0.5 * (nearer + far);
-            let found = self.deepest_within(piece, by, nearest, known, middle)?;
-            if found.is_near {
-                (far, deepest) = (middle, found);
-            } else {
-                nearer = middle;
-            }
-        }
-        let cut = deepest.cut;
-        let depth = cut.depth.min(far);
-        // The bound stands to both sides.
-        let possible = cut.possible.max(2.0 * depth - std::f64::consts::FRAC_1_SQRT_2 * nearer);
-        Some(BorderCut { depth, possible, ..cut })
-    }
-
-    /// As [`Self::deepest_on`], where what is left `far` mm inside of a border counts as near.
-    fn deepest_within(
-        &self,
-        piece: &BorderPiece,
-        by: u32,
-        nearest: f64,
-        known: f64,
-        far: f64,
-    ) -> Option<Deepest> {
         let design = |share: f64| piece.design(self.part, share);
         let length = (piece.ends[1] - piece.ends[0]).norm();
         // As far from the end of the piece, where another border may begin.
+        let far = INSIDE_SHARE * self.limits.gouge;
         let nearest_left = std::f64::consts::SQRT_2 * far;
         let end = (far / length).min(0.5);
         let value = |share: f64| {
@@ -315,7 +275,7 @@ impl Inspection<'_> {
         let least = self.limits.shallow();
         // What a border bends by between two places spoils concavity by as much; it falls with the square of their distance.
         let bend = 3.0 * piece.bend;
-        let mut best: Option<(f64, f64, bool)> = None;
+        let mut best: Option<(f64, f64)> = None;
         let mut left = f64::NEG_INFINITY;
         let shares = [0.0, nearest, 1.0];
         let values = shares.map(value);
@@ -323,13 +283,13 @@ impl Inspection<'_> {
             (0..2).map(|k| (shares[k], values[k], shares[k + 1], values[k + 1], MOST_HALVINGS)).collect();
         // Returns the depth of the deepest place, and the cut of this one where it lies on a ridge.
         let mut keep = |share: f64, found: Option<PlaceDepth>| {
-            let most = best.map_or(known, |(most, ..)| most.max(known));
+            let most = best.map_or(known, |(most, _)| most.max(known));
             let Some(PlaceDepth { along, inside }) = found else { return (most, None) };
             let along = counted(along, inside);
             let ridge = if along > most.max(least) { on_ridge(share, along) } else { None };
             let depth = ridge.map_or(along, |cut| -cut.distance);
-            if best.is_none_or(|(most, ..)| depth > most) {
-                best = Some((depth, share, inside <= 0.0));
+            if best.is_none_or(|(most, _)| depth > most) {
+                best = Some((depth, share));
             }
             (most.max(depth), ridge)
         };
@@ -371,7 +331,7 @@ impl Inspection<'_> {
                 open.push((m, at_m, b, at_b, halvings - 1));
             }
         }
-        let (found, share, is_near) = best?;
+        let (found, share) = best?;
         let possible = left.max(found);
         if possible <= known {
             return None;
@@ -384,8 +344,7 @@ impl Inspection<'_> {
             return None;
         }
         let of_walls = |depth: f64| self.walls.map_or(depth, |walls| -walls.beside(&point, -depth.max(0.0)));
-        let cut = BorderCut { depth: of_walls(found), possible: of_walls(possible), at: point, by };
-        Some(Deepest { cut, is_near })
+        Some(BorderCut { depth: of_walls(found), possible: of_walls(possible), at: point, by })
     }
 }
 

@@ -15,8 +15,11 @@ use crate::program::{Arc, Program, Setting, Step, StepKind};
 /// Feed of moves for which the program gives none, mm/min. They are violations; the time needs a number.
 pub const FEED_WHERE_NONE: f64 = 100.0;
 
-/// Chords of arcs stray by no more than this share of the chord tolerance: what is measured has to be known so much better.
-const ARC_SHARE: f64 = 0.1;
+/// Moves stray from arcs and turns by no more than this share of the chord tolerance: what is measured has to be known so much better.
+const STRAY_SHARE: f64 = 0.1;
+
+/// Length of a tool over which what its axis strays counts as what the tip does, mm.
+const WEIGHED_OVER: f64 = 100.0;
 
 /// A piece of a turning move is halved so many times at most: a thousandth of any turn.
 const MOST_HALVINGS: u32 = 12;
@@ -123,8 +126,10 @@ impl Run {
 
     fn finished(self, program: &str) -> ToolRun {
         let strays = self.chords_stray + self.turns_stray;
+        let leans = self.turns_stray / WEIGHED_OVER;
         let (tools, program) = (vec![(0, self.tool)], program.to_owned());
-        let origin = Origin { tools, program, strays, standing_s: self.standing_s, ..self.path.origin };
+        let origin =
+            Origin { tools, program, strays, leans, standing_s: self.standing_s, ..self.path.origin };
         ToolRun { tool: self.tool, path: Toolpath { origin, ..self.path }, joints: self.joints }
     }
 
@@ -290,7 +295,7 @@ impl Layer<'_> {
 
     /// Chords of an arc; the run knows how far they are off.
     fn chords(&self, arc: &Arc, start: &[f64; 3], end: &[f64; 3], run: &mut Run) -> usize {
-        let chords = arc.chords(start, ARC_SHARE * self.placing.chord);
+        let chords = arc.chords(start, STRAY_SHARE * self.placing.chord);
         run.chords_stray = run.chords_stray.max(arc.strays(start, end, chords));
         chords
     }
@@ -361,13 +366,14 @@ impl Layer<'_> {
         let off = |t: f64| {
             let truly = self.location(&between(a + (b - a) * t), None)?;
             let straight = start.towards(&end, t);
-            // The axis is weighed over a cutting length of a hundred mm.
-            Ok::<f64, Fault>((truly.tip - straight.tip).norm() + 100.0 * (truly.axis - straight.axis).norm())
+            Ok::<f64, Fault>(
+                (truly.tip - straight.tip).norm() + WEIGHED_OVER * (truly.axis - straight.axis).norm(),
+            )
         };
         // Between these places it is off by no more than twice as far.
         let strays = 2.0 * off(0.25)?.max(off(0.5)?).max(off(0.75)?);
         let small = start.axis.dot(&end.axis) > MOST_TURN.cos();
-        if depth >= MOST_HALVINGS || small && strays <= self.placing.chord {
+        if depth >= MOST_HALVINGS || small && strays <= STRAY_SHARE * self.placing.chord {
             if start.axis.dot(&end.axis) < -1.0 + 1e-9 {
                 return Err(Fault::HalfTurn);
             }

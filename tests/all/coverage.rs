@@ -93,6 +93,34 @@ fn the_walls_of_a_box_in_a_larger_block_are_uncut_and_hold_without_a_margin() {
     assert_eq!(run(&block, "", "[stock]\nmargin = 1.5").0, 0, "walls are not judged by default");
 }
 
+/// A block of 6 x 4 x 3 mm without one upright edge: there it has a face from 0.1 mm aside at the foot to 0.2 mm at the top, with all its
+/// corners on the sides of the block, so that material stands between them alone. No pass comes there.
+#[test]
+fn what_stands_between_never_cut_places_is_in_the_bound() {
+    let ring = |aside: f64, z: f64| {
+        [[aside, 0.0], [6.0, 0.0], [6.0, 4.0], [0.0, 4.0], [0.0, aside]].map(|[x, y]| Point3::new(x, y, z))
+    };
+    let (foot, top) = (ring(0.1, 0.0), ring(0.2, 3.0));
+    let side = |k: usize| {
+        let next = (k + 1) % 5;
+        [[foot[k], foot[next], top[next]], [foot[k], top[next], top[k]]]
+    };
+    let ends = (1..4).flat_map(|k| [[top[0], top[k], top[k + 1]], [foot[0], foot[k + 1], foot[k]]]);
+    let part: Vec<[Point3; 3]> = (0..5).flat_map(side).chain(ends).collect();
+    let folder = tempfile::tempdir().unwrap();
+    write_stl(&folder.path().join("part.stl"), &part);
+    let scene = folder.path().join("part.toml");
+    let text = "[part]\nfile = \"part.stl\"\n[cutter]\nshape = \"flat\"\ndiameter = 4\n[stock]\nmargin = 0\n\
+                [[toolpath]]\nstrategy = \"zigzag\"\nstepover = 3\n";
+    std::fs::write(&scene, text).unwrap();
+    let (exit, report) = run_scene(&scene);
+    let uncut = &report["toolpaths"][0]["coverage"]["unseen"]["uncut"];
+    let [highest, bound] = ["/max_height_mm", "/error_bound_mm"].map(|key| number(uncut, key));
+    let truth = 0.2 / 2.0_f64.sqrt();
+    assert_eq!(exit, 1);
+    assert!(highest < truth + 1e-3 && highest + bound > truth, "{highest} {bound} {truth}");
+}
+
 #[test]
 fn a_wave_is_judged_as_a_whole() {
     let folder = tempfile::tempdir().unwrap();

@@ -71,6 +71,21 @@ fn a_gouge_of_an_earlier_toolpath_is_named() {
     assert!(text.contains("of the toolpath rough before this one, line 6"), "{text}");
 }
 
+/// What a toolpath left to one that could not be planned is its own: it fails. Behind one that passes, roughing is not the fastest.
+#[test]
+fn toolpaths_in_turn_answer_for_what_they_leave_together() {
+    let home = tempfile::tempdir().unwrap();
+    let contours = "[[toolpath]]\nname = \"contours\"\nstrategy = \"waterline\"\n";
+    let (code, report) = run(home.path(), &format!("{PLATE}{ROUGH}{contours}{PREVIOUS}"));
+    assert_eq!(code, Some(1), "{report}");
+    let verdict = |k: usize| report["toolpaths"][k]["verdict"].as_str().unwrap();
+    assert_eq!([verdict(0), verdict(1)], ["fail", "not planned"], "{report}");
+    assert!(report["toolpaths"][0]["violations"].to_string().contains("scallop"), "{report}");
+    assert_eq!(report["best"], Value::Null);
+    let (code, report) = run(home.path(), &format!("{PLATE}{ROUGH}{FINISH}{PREVIOUS}"));
+    assert_eq!((code, &report["best"]), (Some(0), &Value::from("finish")), "{report}");
+}
+
 #[test]
 fn what_has_no_previous_stock_says_so() {
     let home = tempfile::tempdir().unwrap();

@@ -69,9 +69,9 @@ fn a_soup_seen_from_its_back_does_not_pass() {
     assert_eq!(answer.code, Some(1), "{answer:?}");
 }
 
-/// A block of 20 x 14 x 8 mm at its top whose walls lean by an angle, degrees, without an underside.
-fn drafted_block(draft: f64) -> Vec<[Point3; 3]> {
-    let ([x, y, z], out) = ([10.0, 7.0, 8.0], 8.0 * draft.to_radians().tan());
+/// A block of a size at its top whose walls lean by an angle, degrees, without an underside.
+fn drafted_block([x, y, z]: [f64; 3], draft: f64) -> Vec<[Point3; 3]> {
+    let ([x, y], out) = ([0.5 * x, 0.5 * y], z * draft.to_radians().tan());
     let ring = |x: f64, y: f64, z: f64| [[-x, -y, z], [x, -y, z], [x, y, z], [-x, y, z]];
     let (foot, top) = (ring(x + out, y + out, 0.0), ring(x, y, z));
     let wall = |k: usize| quad(foot[k], foot[(k + 1) % 4], top[(k + 1) % 4], top[k]);
@@ -93,7 +93,7 @@ fn walls_of_a_mesh_that_the_plan_view_hardly_shows_are_cut_and_judged() {
             .unwrap()
             .replace("[simulation]", "[stock]\nmargin = 4\n[simulation]");
         let scene = format!("{head}{}{}stock = \"previous\"\n", stage("streamline"), stage("waterline"),);
-        let answer = run(home.path(), &drafted_block(draft), &scene, &[]);
+        let answer = run(home.path(), &drafted_block([20.0, 14.0, 8.0], draft), &scene, &[]);
         assert_eq!(answer.code, Some(0), "{draft}: {answer:?}");
         let report = std::fs::read_to_string(home.path().join("out/report.json")).unwrap();
         let report: serde_json::Value = serde_json::from_str(&report).unwrap();
@@ -115,4 +115,21 @@ fn walls_of_a_mesh_that_the_plan_view_hardly_shows_are_cut_and_judged() {
             (coverage["judged_mm2"].as_f64().unwrap(), coverage["surface_mm2"].as_f64().unwrap());
         assert!((judged - whole).abs() < 1e-6, "{draft}: {judged} {whole}");
     }
+}
+
+/// Waterlines of a flat end show no ridge in the plan view: what they leave on walls of 3 degrees is measured along the normals, and
+/// corrected where it stands too high, in the stock that the toolpath on the top left.
+#[test]
+fn what_toolpaths_leave_together_is_corrected() {
+    let home = tempfile::tempdir().unwrap();
+    let scene = "[part]\nfile = \"part.stl\"\n[cutter]\nshape = \"flat\"\ndiameter = 2\n[tolerance]\nscallop = 0.01\n[stock]\nmargin = 1\n\
+                 [[toolpath]]\nname = \"top\"\nstrategy = \"streamline\"\n\
+                 [[toolpath]]\nname = \"walls\"\nstrategy = \"waterline\"\nstock = \"previous\"\n";
+    let answer = run(home.path(), &drafted_block([1.2, 1.0, 0.6], 3.0), scene, &[]);
+    assert_eq!(answer.code, Some(0), "{answer:?}");
+    let report = std::fs::read_to_string(home.path().join("out/report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let rounds = report["toolpaths"][1]["correction"]["rounds"].as_array().unwrap();
+    let highest = |k: usize| rounds[k]["border_mm"].as_f64().or(rounds[k]["highest_mm"].as_f64()).unwrap();
+    assert!(rounds.len() > 1 && highest(0) > 0.01 && highest(rounds.len() - 1) < 0.01, "{rounds:?}");
 }

@@ -230,6 +230,14 @@ impl SweptVolume<'_> {
         self.ways_out(point, normal).into_iter().fold(f64::INFINITY, f64::min)
     }
 
+    /// How far lines as far as `within` mm aside run to the block's faces at most, mm: the way out rises by the slope of the design against
+    /// the face.
+    pub(crate) fn way_out_within(&self, point: &Point3, normal: &Vector3, within: f64) -> f64 {
+        let rising = |(way, n): (f64, &f64)| way + within * (1.0 - n * n).max(0.0).sqrt() / n.abs();
+        let ways = self.ways_out(point, normal).into_iter().zip(normal.iter());
+        ways.filter(|(way, _)| way.is_finite()).map(rising).fold(f64::INFINITY, f64::min)
+    }
+
     /// How far it runs to the faces across x, y and z, mm.
     fn ways_out(&self, point: &Point3, normal: &Vector3) -> [f64; 3] {
         [0, 1, 2].map(|c| {
@@ -330,11 +338,7 @@ impl AlongNormal for SweptVolume<'_> {
     }
 
     fn standing_at_most(&self, point: &Point3, normal: &Vector3, within: f64) -> f64 {
-        // Aside of a place it rises by the slope of the design against the face where the line leaves.
-        let rising = |(way, n): (f64, &f64)| way + within * (1.0 - n * n).max(0.0).sqrt() / n.abs();
-        let ways =
-            self.ways_out(point, normal).into_iter().zip(normal.iter()).filter(|(way, _)| way.is_finite());
-        ways.map(rising).fold(f64::INFINITY, f64::min).max(self.standing(point, normal))
+        self.way_out_within(point, normal, within).max(self.standing(point, normal))
     }
 
     fn depth(&self) -> f64 {

@@ -115,7 +115,8 @@ impl AlongNormal for UnseenCut<'_> {
         if self.is_at_level_edge(point, normal) {
             0.0
         } else {
-            self.reach().min(self.cut.standing_at_most(point, normal, within))
+            // Places at level edges tell nothing: those beside them stand for these as well.
+            self.reach().min(self.cut.way_out_within(point, normal, 2.0 * within))
         }
     }
 

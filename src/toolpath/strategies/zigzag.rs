@@ -175,7 +175,7 @@ fn best(task: &Task<'_>) -> Result<Passes, PlanError> {
     let angle = |k: usize| std::f64::consts::PI * k as f64 / ANGLES as f64;
     let dropped = task.dropped();
     let ground = match settings.step {
-        Step::Stepover(_) => Ground::Facets(Vec::new()),
+        Step::Stepover(_) => Ground::Facets { all: Vec::new(), factor: 1.0 },
         Step::Scallop(h) => Ground::of(task, || places.clone(), h)?,
     };
     let mut predicted: Vec<(f64, usize)> = work::parallel::map(ANGLES, |k| {
@@ -274,8 +274,8 @@ fn in_plan(
 enum Ground<'a> {
     /// Places of charts.
     Charts(Vec<(ChartPoint<'a>, f64)>),
-    /// Facets by their normals, and how the surface bends there.
-    Facets(Vec<(Vector3, Bend)>),
+    /// Facets by their normals, and how the surface bends there. Widths are corrected by the least factor anywhere: one stepover serves all.
+    Facets { all: Vec<(Vector3, Bend)>, factor: f64 },
 }
 
 impl<'a> Ground<'a> {
@@ -300,7 +300,8 @@ impl<'a> Ground<'a> {
                 Some((normal, bend))
             })
         });
-        Ok(Self::Facets(facets.collect()))
+        let factor = task.settings.guide().correction.map_or(1.0, |correction| correction.range()[0]);
+        Ok(Self::Facets { all: facets.collect(), factor })
     }
 
     fn least_stepover(&self, cutters: [&Cutter; 2], angle: f64, h: f64) -> f64 {
@@ -309,12 +310,12 @@ impl<'a> Ground<'a> {
             Self::Charts(places) => {
                 least(&mut places.iter().filter_map(|(p, _)| stepover_at(p, cutters, angle, h)))
             }
-            Self::Facets(facets) => least(&mut facets.iter().filter_map(|(normal, bend)| {
+            Self::Facets { all, factor } => least(&mut all.iter().filter_map(|(normal, bend)| {
                 let flat = Vector3::new(angle.cos(), angle.sin(), 0.0);
                 let t = (flat - Vector3::z() * (normal.dot(&flat) / normal.z)).normalize();
                 let b = normal.cross(&t);
-                let strip = width_at(cutters[0], normal, &b, bend, Step::Scallop(h));
-                in_plan(strip, bend.along(&b), normal, cutters[1], angle)
+                let (width, too_concave) = width_at(cutters[0], normal, &b, bend, Step::Scallop(h));
+                in_plan((factor * width, too_concave), bend.along(&b), normal, cutters[1], angle)
             })),
         }
     }
