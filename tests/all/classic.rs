@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use millstream::cutter::Cutter;
-use millstream::geometry::AnalyticShape;
+use millstream::geometry::{AnalyticShape, Point3};
 use millstream::monitor::Silent;
 use millstream::motion::{MoveKind, Toolpath};
 use millstream::part::Part;
@@ -12,7 +12,7 @@ use millstream::toolpath::{
     Waterline, Zigzag, ZigzagAngle, plan,
 };
 
-use crate::support::{LIMITS, cut_and_measure, formula, off, settings};
+use crate::support::{LIMITS, cut_and_measure, formula, mesh, off, settings};
 
 const TARGET: Step = Step::Scallop(0.010);
 
@@ -102,6 +102,26 @@ fn iso_scallop_passes_on_a_cylinder_are_those_of_its_arc() {
     let passes = path.passes() as f64;
     assert!(passes >= exact && passes <= 1.02 * exact + 1.0, "{passes} for {exact}");
     assert!(off(cutting_length(&path), 12.0 * passes) < 0.02);
+}
+
+/// A roof of two planes that meet in a ridge: its facets need the stepover of a plane, whatever a smooth surface over the ridge bends.
+#[test]
+fn a_crease_does_not_narrow_all_passes_of_a_zigzag() {
+    let at = |x: f64, y: f64, z: f64| Point3::new(x, y, z);
+    let rows = [0.0, 12.0].map(|y| [at(0.0, y, 0.0), at(8.0, y, 4.0), at(16.0, y, 0.0)]);
+    let triangles = vec![[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]];
+    let part = mesh(rows.concat(), triangles);
+    let path = planned(&part, &Zigzag::at(FRAC_PI_2)).path;
+    // Along the slope and square to the ridge, lengths in the plan are shorter by the cosine.
+    let strip = 2.0 * (2.0 * 3.0 * 0.010_f64 - 0.010 * 0.010).sqrt() * 2.0 / 5.0_f64.sqrt();
+    // Beside the foot the axis stands off the border.
+    let across = 16.0 + 2.0 * 3.0 / 5.0_f64.sqrt();
+    let passes = path.passes() as f64;
+    assert!(
+        passes >= across / strip && passes < 1.05 * across / strip + 1.0,
+        "{passes} for {}",
+        across / strip
+    );
 }
 
 #[test]
