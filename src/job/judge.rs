@@ -84,6 +84,8 @@ fn uncut(measured: &Measurement, limits: &Limits) -> Claim {
     if let Some(worst) = figures.regions.first() {
         let others = others(figures.region_count);
         text += &format!(" over {:.3} mm² at {}{others}", figures.area_mm2, place(worst.at_mm));
+    } else if let Some(at) = all.at_mm.filter(|_| height > limits.uncut) {
+        text += &format!(" at {}", place(at));
     }
     text += &for_certain(&all, limits.uncut);
     Claim { measured: known(measured, height), ..claim("uncut", limits.uncut, &all) }.told(text)

@@ -281,8 +281,8 @@ impl ExcessFigures {
         }
     }
 
-    /// Of cells alone: what stands on them, and the bounds of ridges and uncut places.
-    pub(crate) fn of_cells(measured: &Measurement) -> Self {
+    /// Of cells alone: what stands on them, highest at a place, and the bounds of ridges and uncut places.
+    pub(crate) fn of_cells(measured: &Measurement, highest_at: Option<[f64; 3]>) -> Self {
         let (scallop, uncut) = (&measured.scallop, &measured.uncut);
         let unreached = Bounded {
             at_mm: uncut.regions.first().map(|region| region.at_mm),
@@ -292,7 +292,8 @@ impl ExcessFigures {
         let ridge =
             Bounded { at_mm: scallop.max_at_mm, ..Bounded::new(scallop.max_mm.unwrap_or(0.0), bound) };
         let place = measured.deviation.max_mm.filter(|_| uncut.max_height_mm <= 0.0).unwrap_or(0.0);
-        let reached = ridge.or(&Bounded::new(place.max(0.0), uncut.error_bound_mm));
+        let place = Bounded { at_mm: highest_at, ..Bounded::new(place.max(0.0), uncut.error_bound_mm) };
+        let reached = ridge.or(&place);
         let kind = if unreached.max_mm > reached.max_mm { ExcessKind::Uncut } else { ExcessKind::Scallop };
         Self { highest: reached.or(&unreached), kind, reached, unreached }
     }

@@ -209,7 +209,7 @@ impl Inspection<'_> {
     }
 
     /// The design surface at a place of the plan, where an upright cutter faces it.
-    fn design_at(&self, q: Point2) -> Option<SurfacePoint> {
+    pub(super) fn design_at(&self, q: Point2) -> Option<SurfacePoint> {
         self.part.highest_at(q.x, q.y).filter(|design| design.normal.z > LEAST_FACING)
     }
 

@@ -124,7 +124,11 @@ pub fn measure_with_walls(
     }
     let was_doubted = doubt(&mut measured, part, &every_move, bound);
     if !asked.borders {
-        measured.excess = ExcessFigures::of_cells(&measured);
+        let deviation = |k: &usize| found.samples[*k].deviation;
+        let seen = (0..found.samples.len()).filter(|k| !deviation(k).is_nan());
+        let highest = seen.max_by(|a, b| deviation(a).total_cmp(&deviation(b)));
+        let at = highest.and_then(|k| inspection.design_at(grid.centre(k % grid.nx, k / grid.nx)));
+        measured.excess = ExcessFigures::of_cells(&measured, at.map(|at| at.point.into()));
         tell_doubt(&mut measured, was_doubted);
         return Ok(measured);
     }

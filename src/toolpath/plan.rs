@@ -201,7 +201,10 @@ fn with_task<T>(
         let reason = format!("it mills pockets; use one of {}", words_for(PartKind::Surface));
         return Err(PlanError::NotApplicable { strategy: definition.word, reason });
     }
-    let sampling = SAMPLING_OVER_RADIUS * cutter.radius();
+    // Passes over a part far smaller than the cutter would begin and end between two samples.
+    let size = part.bounds().size();
+    let narrowest = [size.x, size.y].into_iter().filter(|width| *width > 0.0).fold(f64::INFINITY, f64::min);
+    let sampling = (SAMPLING_OVER_RADIUS * cutter.radius()).min(0.5 * narrowest);
     let probe = axis.and_then(|_| tilted::probe(cutter));
     let pass = PassSettings {
         step: settings.step,

@@ -104,6 +104,17 @@ fn iso_scallop_passes_on_a_cylinder_are_those_of_its_arc() {
     assert!(off(cutting_length(&path), 12.0 * passes) < 0.02);
 }
 
+/// Parts far smaller than the cutter are found between the first samples of a pass.
+#[test]
+fn a_huge_cutter_reaches_a_small_plane() {
+    let part = formula(AnalyticShape::Plane { height: 0.0 }, [0.0, 10.0], [0.0, 8.0]);
+    for diameter in [80.0, 300.0, 3000.0] {
+        let cutter = Cutter::ball(diameter).unwrap();
+        let plan = plan(&part, &cutter, &Zigzag::at(0.0), &settings(&part, TARGET), &Silent).unwrap();
+        assert!(cutting_length(&plan.path) > 9.9, "{diameter}: {}", cutting_length(&plan.path));
+    }
+}
+
 /// A roof of two planes that meet in a ridge: its facets need the stepover of a plane, whatever a smooth surface over the ridge bends.
 #[test]
 fn a_crease_does_not_narrow_all_passes_of_a_zigzag() {

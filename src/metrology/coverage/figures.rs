@@ -82,7 +82,7 @@ impl CoverageFigures {
         let kinds = self.not_judged();
         let listed: Vec<String> = kinds
             .iter()
-            .filter(|(_, area)| *area > 0.0)
+            .filter(|(_, area)| *area > (1.0 - ALL) * self.surface_mm2)
             .map(|(kind, area)| format!("{kind} {} mm²", digits(*area)))
             .collect();
         format!("on {} % of the surface; not judged: {}", per_cent(self.share()), listed.join(", "))
