@@ -505,9 +505,9 @@ impl Corrected<'_> {
                 let gouge = self.session.scene.tolerance.gouge;
                 let is_deeper = found.depth > gouge && self.tried.standing.depth <= gouge;
                 gain = match (is_passing, self.session.passes(&again)) {
-                    _ if is_deeper => self.keep_best(&planned, next, found),
-                    (true, false) => self.keep_best(&planned, next, found),
                     (false, true) => self.keep(planned, next, found),
+                    (true, false) => self.keep_best(&planned, next, found),
+                    _ if is_deeper => self.keep_best(&planned, next, found),
                     _ => self.keep_if_better(planned, next, found),
                 };
                 if gain != Gain::None {

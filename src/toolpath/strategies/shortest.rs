@@ -37,7 +37,6 @@ use crate::vocabulary::{
 };
 use cutter::Cutter;
 use field::ShortestPossible;
-use field::mesh::Bend;
 use geometry::Vector3;
 use keys::{toml_number, word_of};
 use part::Part;
@@ -79,9 +78,7 @@ pub fn shortest_possible(
             let mesh = &piece.mesh;
             let of_facet = |t: usize| {
                 monitor::check(monitor)?;
-                let Some(normal) = mesh.area_vector(t).try_normalize(1e-300) else { return Ok(None) };
-                let mut bend = Bend::default();
-                mesh.triangles()[t].iter().for_each(|&v| bend.add(&piece.bends[v as usize], 1.0 / 3.0));
+                let Some((normal, bend)) = piece.facet(t) else { return Ok(None) };
                 let ratio = |t: &Vector3| (1.0 - bend.along(t) * cutter.corner_radius()).max(0.0);
                 let width = |t: &Vector3| width_at(cutter, &normal, &normal.cross(t), &bend, step);
                 let [a, b, _] = mesh.corners(t);

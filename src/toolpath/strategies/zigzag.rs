@@ -15,7 +15,7 @@ use crate::levels::spacing::LevelSteps;
 use crate::strategies::mesh_passes::width_at;
 use crate::surface::border::Border;
 use crate::surface::chart::{Chart, ChartPoint};
-use crate::surface::mesh_surface::{reachable, wants_mesh};
+use crate::surface::mesh_surface::{ConnectedPiece, reachable, wants_mesh};
 use crate::surface::plan_curve::PlanCurves;
 use crate::vocabulary::{Definition, PartKind, Passes, PlanError, Reading, Step, Strategy, Task};
 use cutter::Cutter;
@@ -125,7 +125,7 @@ fn passes(task: &Task<'_>, angle: f64) -> Result<Passes, PlanError> {
     let stepover = match settings.step {
         Step::Stepover(s) => s,
         Step::Scallop(h) => {
-            let ground = Ground::of(task, || places(&charts), h)?;
+            let ground = Ground::of(task, || places(&charts), h);
             safe_stepover(&ground, [cutter, dropped], angle, h, &mut notes)
         }
     };
@@ -176,7 +176,7 @@ fn best(task: &Task<'_>) -> Result<Passes, PlanError> {
     let dropped = task.dropped();
     let ground = match settings.step {
         Step::Stepover(_) => Ground::Facets { all: Vec::new(), factor: 1.0 },
-        Step::Scallop(h) => Ground::of(task, || places.clone(), h)?,
+        Step::Scallop(h) => Ground::of(task, || places.clone(), h),
     };
     let mut predicted: Vec<(f64, usize)> = work::parallel::map(ANGLES, |k| {
         let stepover = match settings.step {
@@ -280,28 +280,20 @@ enum Ground<'a> {
 
 impl<'a> Ground<'a> {
     /// The facets of a mesh with creases; the places of charts otherwise.
-    fn of(
-        task: &Task<'_>,
-        places: impl FnOnce() -> Vec<(ChartPoint<'a>, f64)>,
-        h: f64,
-    ) -> Result<Self, PlanError> {
+    fn of(task: &Task<'_>, places: impl FnOnce() -> Vec<(ChartPoint<'a>, f64)>, h: f64) -> Self {
         let Task { part, cutter, .. } = *task;
-        if !part.patches().is_empty() || !wants_mesh(part, cutter) {
-            return Ok(Self::Charts(places()));
-        }
-        let Ok(reached) = reachable(part, cutter, (8.0 * h * cutter.radius()).sqrt()) else {
-            return Ok(Self::Charts(places()));
+        let has_creases = part.patches().is_empty() && wants_mesh(part, cutter);
+        let flat = (8.0 * h * cutter.radius()).sqrt();
+        // What is no surface still has heights for charts.
+        let Some(reached) = has_creases.then(|| reachable(part, cutter, flat).ok()).flatten() else {
+            return Self::Charts(places());
         };
-        let facets = reached.pieces.iter().flat_map(|piece| {
-            (0..piece.mesh.triangles().len()).filter_map(|t| {
-                let normal = piece.mesh.area_vector(t).try_normalize(1e-300).filter(|n| n.z > 0.0)?;
-                let mut bend = Bend::default();
-                piece.mesh.triangles()[t].iter().for_each(|&v| bend.add(&piece.bends[v as usize], 1.0 / 3.0));
-                Some((normal, bend))
-            })
-        });
+        let facets = |piece: &ConnectedPiece| -> Vec<(Vector3, Bend)> {
+            let all = (0..piece.mesh.triangles().len()).filter_map(|t| piece.facet(t));
+            all.filter(|(normal, _)| normal.z > 0.0).collect()
+        };
         let factor = task.settings.guide().correction.map_or(1.0, |correction| correction.range()[0]);
-        Ok(Self::Facets { all: facets.collect(), factor })
+        Self::Facets { all: reached.pieces.iter().flat_map(facets).collect(), factor }
     }
 
     fn least_stepover(&self, cutters: [&Cutter; 2], angle: f64, h: f64) -> f64 {

@@ -81,6 +81,16 @@ pub(crate) struct ConnectedPiece {
     pub corner_normals: Vec<[Vector3; 3]>,
 }
 
+impl ConnectedPiece {
+    /// The unit normal of a triangle and how the surface bends there, the mean of its corners; `None` without an area.
+    pub fn facet(&self, t: usize) -> Option<(Vector3, Bend)> {
+        let normal = self.mesh.area_vector(t).try_normalize(1e-300)?;
+        let mut bend = Bend::default();
+        self.mesh.triangles()[t].iter().for_each(|&v| bend.add(&self.bends[v as usize], 1.0 / 3.0));
+        Some((normal, bend))
+    }
+}
+
 /// What of a part can be planned from above, and what cannot.
 pub(crate) struct Reachable {
     /// Connected pieces.
