@@ -172,7 +172,7 @@ impl Standing {
 
     /// Of the faces alone that passes are made for: no widths help others. Edges between both are theirs once those are cut.
     fn on_faces(mut self, faces: &Faces, wanted: Wanted<'_>) -> Self {
-        if *faces == Faces::default() {
+        if *faces == Faces::ALL {
             return self;
         }
         let mesh = wanted.part.mesh();

@@ -216,6 +216,7 @@ impl Session {
             plunge_rate: self.scene.cutting.plunge_rate,
             machine: self.scene.machine,
             joining: request.joining,
+            faces: request.faces(),
             is_lowered_later: self.is_lowered_later(request),
             memory: self.budget().left(0) / PLAN_SHARE,
             earlier: None,

@@ -40,7 +40,7 @@ pub use foreign::{TableError, described_tools, scene_table, tool_table};
 use machine::Machine;
 pub use metrology::{EngineChoice, Judged, Simulation};
 use metrology::{Limits, ScallopRule};
-use toolpath::{ForeignProgram, Joining, ReadProgram, Step, Strategy};
+use toolpath::{Faces, ForeignProgram, Joining, ReadProgram, Step, Strategy};
 
 /// Default allowance of stock above the part's highest point, mm.
 pub const DEFAULT_ALLOWANCE: f64 = 1.0;
@@ -101,6 +101,8 @@ pub struct ToolpathRequest {
     pub correct: bool,
     /// How its passes are smoothed and joined.
     pub joining: Joining,
+    /// The slopes of the faces that it is made for, degrees from the level.
+    pub slope: [f64; 2],
     /// How its axis is tilted; `None` for an upright one.
     pub axis: Option<AxisRequest>,
     /// Whether it cuts what the toolpath before it left, and not a block of its own.
@@ -113,6 +115,11 @@ impl ToolpathRequest {
     /// Whether its tool may lean.
     pub fn tilts(&self) -> bool {
         self.axis.is_some() || self.foreign().is_some_and(|read| !read.path.is_upright())
+    }
+
+    /// The faces that it is made for.
+    pub fn faces(&self) -> Faces {
+        Faces::of_slopes(self.slope.map(f64::to_radians))
     }
 
     /// What was read of it, where it is a program from elsewhere.

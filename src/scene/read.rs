@@ -449,6 +449,12 @@ fn read_toolpaths(
 /// How scenes spell the stock that the toolpath before left.
 pub(super) const PREVIOUS_STOCK: &str = "previous";
 
+/// The key of the slopes that a toolpath is made for.
+pub(super) const SLOPE: &str = "slope";
+
+/// From level ground to walls, degrees.
+pub(super) const ALL_SLOPES: [f64; 2] = [0.0, 90.0];
+
 fn read_toolpath(
     section: &Section<'_>,
     folder: &Path,
@@ -468,6 +474,7 @@ fn read_toolpath(
     let (name, own_folder) = read_name(section, &read.word)?;
     let axis = if surface { axis::read(section)? } else { None };
     let usual = if axis.is_none() { read.strategy.usual_links() } else { Links::Retract };
+    let slope = if surface { read_slope(section, axis.is_some())? } else { ALL_SLOPES };
     let joining = if surface { read_joining(section, usual)? } else { Joining::default() };
     let named = |file: Located<String>| NamedFile::beside(folder, &file.value, file.span);
     let directions = read.tables.into_iter().map(named).collect();
@@ -481,6 +488,7 @@ fn read_toolpath(
         directions,
         correct,
         joining,
+        slope,
         axis,
         stock_is_previous,
         equal_time: None,
@@ -501,6 +509,16 @@ fn read_name(section: &Section<'_>, word: &Located<&str>) -> Result<(String, Str
         )
     })?;
     Ok((name, folder))
+}
+
+/// The slopes that a toolpath is made for, degrees from the level: all where nothing is said.
+fn read_slope(section: &Section<'_>, tilts: bool) -> Result<[f64; 2], SceneError> {
+    let slope = section.interval(SLOPE, ALL_SLOPES[0]..=ALL_SLOPES[1], " degrees")?.unwrap_or(ALL_SLOPES);
+    if tilts && slope != ALL_SLOPES {
+        let cure = "delete one of the two: a tool that leans goes over all that its strategy covers";
+        return Err(section.error(&section.key_span(SLOPE), "`slope` does not apply beside `axis`", cure));
+    }
+    Ok(slope)
 }
 
 /// How passes are smoothed and joined, in the usual way where nothing is said.

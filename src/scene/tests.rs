@@ -186,8 +186,10 @@ fn the_complete_scene_reads_back_as_itself() {
     let block = stock("corners = [[1, 2, 3], [-40, 20, -5]]");
     let bar = stock("diameter = 40\nlength = 60\nfrom = [-30, 0, -10]\naxis = \"x\"");
     let casting = stock("file = \"casting.stl\"\nunit = \"inch\"");
+    let ground = with("stepover = 0.3", "stepover = 0.3\nslope = [0, 37.5]");
     let all = all.chain([
         VALID.to_owned(),
+        ground,
         taper,
         tangent,
         barrel,
@@ -321,6 +323,12 @@ fn numbers_out_of_range_are_refused_where_they_stand() {
     refused(&with("x = [0, 60.0]", "x = [0]"));
     let (message, ..) = refused(&with("direction = { angle = 12.5 }", "control_points = 4.5"));
     assert_eq!(message, "`control_points` in [[toolpath]] number 4 is 4.5; expected a whole number");
+    for slope in ["[45, 45]", "[60, 30]", "[-1, 45]", "[0, 91]", "[0]", "45"] {
+        let (message, ..) = refused(&with("stepover = 0.3", &format!("stepover = 0.3\nslope = {slope}")));
+        assert!(message.starts_with("`slope` in "), "{message}");
+    }
+    let leaning = "stepover = 0.3\nslope = [0, 45]\naxis = \"normal\"";
+    assert_eq!(refused(&with("stepover = 0.3", leaning)).0, "`slope` does not apply beside `axis`");
     let (message, cure, _) = refused(&with("stepover = 0.3", "stepover = 7"));
     assert!(message.contains("wider than the cutter's diameter"), "{message} {cure}");
 }

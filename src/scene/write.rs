@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::read::{BLENDINGS, PREVIOUS_STOCK};
+use super::read::{BLENDINGS, PREVIOUS_STOCK, SLOPE};
 use super::{Scene, ToolpathRequest, axis, bodies, compare, interference, kinematics, part, stock};
 use keys::{toml_number as number, toml_string as text};
 use toolpath::{Links, PartKind, Step, longest_link};
@@ -103,6 +103,13 @@ fn write_all(out: &mut String, scene: &Scene) -> std::fmt::Result {
                     writeln!(out, "scallop = {}  # mm, steps are planned for it", number(height))?;
                 }
                 Step::Stepover(width) => writeln!(out, "stepover = {}  # mm", number(width))?,
+            }
+            if request.axis.is_none() && request.strategy.definition().part == PartKind::Surface {
+                let [from, to] = request.slope.map(number);
+                writeln!(
+                    out,
+                    "{SLOPE} = [{from}, {to}]  # degrees from the level, of the faces that it is made for"
+                )?;
             }
             write_joining(out, request, scene)
         },

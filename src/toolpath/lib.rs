@@ -8,6 +8,7 @@ mod lowering;
 mod moves;
 mod plan;
 mod pocket;
+mod slope;
 mod strategies;
 mod surface;
 mod tilt;

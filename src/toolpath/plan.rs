@@ -7,6 +7,7 @@ use crate::facets::facet_charge;
 use crate::levels::{obedience, planned_field};
 use crate::link::{join, join_tilted, time_to_neighbour};
 use crate::lowering::lowered;
+use crate::slope::keep_on_faces;
 use crate::strategies::words_for;
 use crate::surface::mesh_surface;
 use crate::tilt::tilted::{self, TiltedPasses, Tilting};
@@ -122,7 +123,11 @@ pub fn plan(
         let again = settings.earlier.iter().find(|earlier| earlier.again);
         let kept = match again {
             Some(earlier) => earlier.kept.clone(),
-            None => Arc::new(Kept::new(strategy.passes(task)?, strategy)),
+            None => {
+                let mut passes = strategy.passes(task)?;
+                keep_on_faces(task, &mut passes)?;
+                Arc::new(Kept::new(passes, strategy))
+            }
         };
         let added = touch_up::passes(task, &kept.passes)?;
         Ok((kept, added))
@@ -213,6 +218,7 @@ fn with_task<T>(
         // A tilted cutter's passes are smoothed once they are tilted.
         smoothing: (settings.joining.smoothing && axis.is_none()).then_some(sampling),
         axis,
+        faces: settings.faces,
         memory: settings.memory,
         earlier: settings.earlier.as_deref(),
         probe: probe.as_ref(),

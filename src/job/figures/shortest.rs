@@ -5,7 +5,7 @@ use serde::Serialize;
 use field::ShortestPossible;
 use metrology::path_figures;
 use report::Figure;
-use toolpath::{PlanError, Step};
+use toolpath::{Faces, PlanError, Step};
 use work::monitor::Monitor;
 
 use super::words::value;
@@ -50,10 +50,12 @@ impl ShortestFigures {
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
     let length = path_figures(run.path(), 0.0).cutting_length_mm;
     let (scene, planned) = (run.scene(), run.planned);
-    // Tools that lean take other strips, and nobody planned a program from elsewhere for a scallop height.
-    let is_upright =
-        run.request.axis.is_none() && run.request.foreign().is_none() && run.session.pocket.is_none();
-    let (true, Step::Scallop(height)) = (is_upright, run.request.step) else { return Ok(Finding::default()) };
+    // Tools that lean take other strips, a path for some slopes covers a part of the whole, and nobody planned a program from elsewhere for a scallop height.
+    let request = run.request;
+    let covers_all = request.axis.is_none() && request.faces() == Faces::ALL && request.foreign().is_none();
+    let (true, Step::Scallop(height)) = (covers_all && run.session.pocket.is_none(), request.step) else {
+        return Ok(Finding::default());
+    };
     let shortest = match run.session.shortest_possible(height, monitor) {
         Err(PlanError::Cancelled(cancelled)) => return Err(cancelled.into()),
         // No smooth surface can be fitted to the part: its directions are unknown.

@@ -178,7 +178,7 @@ fn moves(task: &Task<'_>, drop: &DropCutter<'_>, way: &[Point2]) -> Result<Vec<P
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vocabulary::{Pace, PassSettings, Step};
+    use crate::vocabulary::{Faces, Pace, PassSettings, Step};
     use cutter::Cutter;
     use geometry::{AnalyticShape, AnalyticSurface, CurveSegment};
     use part::{Part, Patch};
@@ -209,6 +209,7 @@ mod tests {
             chord_tolerance: 0.001,
             smoothing: None,
             axis: None,
+            faces: Faces::ALL,
             memory: u64::MAX,
             earlier: None,
             probe: None,

@@ -360,7 +360,7 @@ pub(crate) fn predicted_length(
 mod tests {
     use super::*;
     use crate::levels::spacing::{LevelSteps, place_levels, places_of};
-    use crate::vocabulary::PassSettings;
+    use crate::vocabulary::{Faces, PassSettings};
     use field::LevelTracer;
     use geometry::{NurbsSurface, Point3};
     use part::{Part, Patch};
@@ -388,6 +388,7 @@ mod tests {
             chord_tolerance: 1e-3,
             smoothing: None,
             axis: None,
+            faces: Faces::ALL,
             memory: 1 << 30,
             earlier: None,
             probe: None,

@@ -202,6 +202,9 @@ impl ContourGuide<'_> {
             if rests.is_some_and(|rests| rests.tip_z > tip.z + HELD_OFF) {
                 return;
             }
+            if !self.settings.faces.hold(&normal) {
+                return;
+            }
             if !SERVED.hold(&normal) {
                 reached.level += area;
                 return;

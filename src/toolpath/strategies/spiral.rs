@@ -11,7 +11,7 @@ use super::zigzag::{least_over_plane, stepover_at};
 use crate::surface::border::Border;
 use crate::surface::chart::Chart;
 use crate::surface::plan_curve::PlanCurves;
-use crate::vocabulary::{Definition, PartKind, Passes, PlanError, Step, Strategy, Task};
+use crate::vocabulary::{Definition, Faces, PartKind, Passes, PlanError, Step, Strategy, Task};
 use cutter::Cutter;
 use drop_cutter::DropCutter;
 use geometry::Vector2;
@@ -87,7 +87,9 @@ fn passes(task: &Task<'_>) -> Result<Passes, PlanError> {
     let mut notes = Vec::new();
     let pitches = match settings.step {
         Step::Stepover(s) => vec![s; RINGS],
-        Step::Scallop(h) => pitches(&charts, [cutter, dropped], middle, reach, h, &mut notes),
+        Step::Scallop(h) => {
+            pitches((&charts, &settings.faces), [cutter, dropped], middle, reach, h, &mut notes)
+        }
     };
     let widest = pitches.iter().copied().fold(0.0, f64::max);
     let layout = layout(&pitches, reach, LAYOUT_SHARE * settings.sampling);
@@ -113,9 +115,9 @@ fn passes(task: &Task<'_>) -> Result<Passes, PlanError> {
     Ok(Passes { passes, notes, ..Passes::default() })
 }
 
-/// The pitch of each ring, for a cutter and what is dropped in its stead.
+/// The pitch of each ring on such faces of charts, for a cutter and what is dropped in its stead.
 fn pitches(
-    charts: &[Chart],
+    (charts, faces): (&[Chart], &Faces),
     [cutter, dropped]: [&Cutter; 2],
     middle: Vector2,
     reach: f64,
@@ -125,7 +127,8 @@ fn pitches(
     let plane = (8.0 * h * cutter.radius()).sqrt();
     let mut least: Vec<Option<f64>> = vec![None; RINGS];
     for chart in charts {
-        for p in chart.grid(SAMPLES).filter_map(|[u, v]| chart.at(u, v)) {
+        let points = chart.grid(SAMPLES).filter_map(|[u, v]| chart.at(u, v));
+        for p in points.filter(|p| faces.hold(&p.normal)) {
             let arm = p.jet.p.coords.xy() + dropped.axis_offset(&p.normal) - middle;
             let outward = arm.y.atan2(arm.x);
             let turns = if arm.norm() < MIDDLE * plane { MIDDLE_DIRECTIONS } else { 1 };

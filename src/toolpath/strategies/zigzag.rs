@@ -17,7 +17,7 @@ use crate::surface::border::Border;
 use crate::surface::chart::{Chart, ChartPoint};
 use crate::surface::mesh_surface::{ConnectedPiece, reachable, wants_mesh};
 use crate::surface::plan_curve::PlanCurves;
-use crate::vocabulary::{Definition, PartKind, Passes, PlanError, Reading, Step, Strategy, Task};
+use crate::vocabulary::{Definition, Faces, PartKind, Passes, PlanError, Reading, Step, Strategy, Task};
 use cutter::Cutter;
 use drop_cutter::DropCutter;
 use field::ScalarField;
@@ -125,7 +125,7 @@ fn passes(task: &Task<'_>, angle: f64) -> Result<Passes, PlanError> {
     let stepover = match settings.step {
         Step::Stepover(s) => s,
         Step::Scallop(h) => {
-            let ground = Ground::of(task, || places(&charts), h);
+            let ground = Ground::of(task, || places(&charts, &settings.faces), h);
             safe_stepover(&ground, [cutter, dropped], angle, h, &mut notes)
         }
     };
@@ -171,7 +171,7 @@ fn on_levels(task: &Task<'_>, angle: f64) -> Result<Passes, PlanError> {
 fn best(task: &Task<'_>) -> Result<Passes, PlanError> {
     let Task { part, cutter, ref settings, monitor, .. } = *task;
     let charts = Chart::all(part, cutter, settings.guide())?;
-    let places = places(&charts);
+    let places = places(&charts, &settings.faces);
     let angle = |k: usize| std::f64::consts::PI * k as f64 / ANGLES as f64;
     let dropped = task.dropped();
     let ground = match settings.step {
@@ -219,13 +219,13 @@ fn best(task: &Task<'_>) -> Result<Passes, PlanError> {
     Ok(best)
 }
 
-/// Points of all charts, and the area that each stands for, mm².
-fn places<'a>(charts: &[Chart<'a>]) -> Vec<(ChartPoint<'a>, f64)> {
+/// Points of all charts on such faces, and the area that each stands for, mm².
+fn places<'a>(charts: &[Chart<'a>], faces: &Faces) -> Vec<(ChartPoint<'a>, f64)> {
     let of = |chart: &Chart<'a>| {
         let [[u0, u1], [v0, v1]] = chart.domain;
         let cell = (u1 - u0) * (v1 - v0) / (STEPOVER_SAMPLES * STEPOVER_SAMPLES) as f64;
         let point = |[u, v]: [f64; 2]| {
-            let p = chart.at(u, v)?;
+            let p = chart.at(u, v).filter(|p| faces.hold(&p.normal))?;
             let (e, f, g) = p.jet.first_form();
             Some((p, cell * (e * g - f * f).max(0.0).sqrt()))
         };
@@ -290,7 +290,7 @@ impl<'a> Ground<'a> {
         };
         let facets = |piece: &ConnectedPiece| -> Vec<(Vector3, Bend)> {
             let all = (0..piece.mesh.triangles().len()).filter_map(|t| piece.facet(t));
-            all.filter(|(normal, _)| normal.z > 0.0).collect()
+            all.filter(|(normal, _)| normal.z > 0.0 && task.settings.faces.hold(normal)).collect()
         };
         let factor = task.settings.guide().correction.map_or(1.0, |correction| correction.range()[0]);
         Self::Facets { all: reached.pieces.iter().flat_map(facets).collect(), factor }
@@ -328,7 +328,7 @@ fn safe_stepover(
     }
     notes.push(format!(
         "the steepest places would need a stepover of {:.4} mm; {floor:.4} mm is used, and scallops there may exceed the \
-         target (another angle, or a streamline path, helps)",
+         target (another angle or a streamline path helps, or `slope` with another toolpath for what is steeper)",
         if least.is_finite() { least } else { 0.0 },
     ));
     floor

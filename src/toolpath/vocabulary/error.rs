@@ -22,6 +22,11 @@ pub enum PlanError {
         "no smooth surface could be fitted to the mesh ({0}); export a part that is more than a sliver seen from above"
     )]
     NoFit(String),
+    /// Nothing of the part has the slopes that are asked for.
+    #[error(
+        "no face of the part has such a slope; widen `slope`, degrees from level ground (0) to walls (90)"
+    )]
+    NoSuchSlope,
     /// The rule gives no tool axis at a place.
     #[error(transparent)]
     Axis(#[from] AxisError),

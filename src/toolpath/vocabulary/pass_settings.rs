@@ -1,6 +1,6 @@
 //! What every pass needs to know besides part and cutter.
 
-use super::{Correction, Earlier, Step};
+use super::{Correction, Earlier, Faces, Step};
 use crate::moves::chord::{Watch, reduce, sample_over_jumps, sample_within_chord};
 use crate::moves::smooth::smooth_and_spread;
 use cutter::Cutter;
@@ -67,6 +67,8 @@ pub struct PassSettings<'a> {
     pub smoothing: Option<f64>,
     /// How the cutter is tilted; upright without it.
     pub axis: Option<&'a ToolAxis>,
+    /// Which faces are to have passes: steps are what these allow.
+    pub faces: Faces,
     /// What tables may take, bytes.
     pub memory: u64,
     /// What an earlier plan left.
@@ -183,6 +185,7 @@ mod tests {
             chord_tolerance: 1e-3,
             smoothing: None,
             axis: None,
+            faces: Faces::ALL,
             memory: 1 << 30,
             earlier: None,
             probe: None,

@@ -1,6 +1,7 @@
 //! Planned passes, not yet joined.
 
 use std::borrow::Cow;
+use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 use crate::moves::touch::Touch;
@@ -26,6 +27,9 @@ pub struct Passes {
     pub faces: Faces,
 }
 
+/// A face whose slope is that at the end of a range is within it: its normal is rounded.
+const SLOPE_ROUNDING: f64 = 1e-9;
+
 /// Faces of a part, by the vertical part of their unit normals.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Faces {
@@ -38,14 +42,35 @@ pub struct Faces {
 impl Default for Faces {
     /// All.
     fn default() -> Self {
-        Self { least: -1.0, most: 1.0 }
+        Self::ALL
     }
 }
 
 impl Faces {
+    /// Whatever their slope.
+    pub const ALL: Self = Self { least: -1.0, most: 1.0 };
+
+    /// Those with slopes between two angles from the level, rad; from level ground, or down to upright walls and beyond, where the range ends
+    /// there.
+    pub fn of_slopes([from, to]: [f64; 2]) -> Self {
+        let least = if to < FRAC_PI_2 { to.cos() - SLOPE_ROUNDING } else { Self::ALL.least };
+        let most = if from > 0.0 { from.cos() + SLOPE_ROUNDING } else { Self::ALL.most };
+        Self { least, most }
+    }
+
     /// Whether one with this unit normal is of them.
     pub fn hold(&self, normal: &Vector3) -> bool {
-        (self.least..=self.most).contains(&normal.z.clamp(-1.0, 1.0))
+        self.contain(normal.z)
+    }
+
+    /// Whether one with this vertical part of its unit normal is of them.
+    pub fn contain(&self, upright: f64) -> bool {
+        (self.least..=self.most).contains(&upright.clamp(-1.0, 1.0))
+    }
+
+    /// Those that are of others, too.
+    pub fn and(&self, others: &Self) -> Self {
+        Self { least: self.least.max(others.least), most: self.most.min(others.most) }
     }
 }
 

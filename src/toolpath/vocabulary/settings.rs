@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Correction, Kept};
+use super::{Correction, Faces, Kept};
 use crate::lowering::Lowered;
 use geometry::{Aabb, Point3};
 use machine::Machine;
@@ -67,6 +67,8 @@ pub struct PlanSettings {
     pub machine: Machine,
     /// How passes are smoothed and joined.
     pub joining: Joining,
+    /// Which faces are to have passes.
+    pub faces: Faces,
     /// Whether what chords leave above the scallop height is measured and moves beside it go deeper then ([`Earlier::lowered`]): passes lie as
     /// far apart as if chords raised nothing.
     pub is_lowered_later: bool,
@@ -125,6 +127,7 @@ impl Default for PlanSettings {
             plunge_rate: PLUNGE_RATE,
             machine: Machine::default(),
             joining: Joining::default(),
+            faces: Faces::default(),
             is_lowered_later: false,
             memory: MEMORY,
             earlier: None,

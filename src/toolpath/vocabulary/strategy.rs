@@ -35,6 +35,7 @@ impl PartKind {
                 "longest_link",
                 "smoothing",
                 "axis",
+                "slope",
                 "stock",
             ],
             Self::Pocket => &["name", "strategy", "stepover"],

@@ -13,6 +13,7 @@ fn planned(part: &Part, cutter: &Cutter, step: Step, placing: LevelSteps) -> Res
         chord_tolerance: CHORD,
         smoothing: None,
         axis: None,
+        faces: Faces::ALL,
         memory: 1 << 30,
         earlier: None,
         probe: None,

@@ -1,5 +1,5 @@
 use super::*;
-use crate::vocabulary::Pace;
+use crate::vocabulary::{Faces, Pace};
 use geometry::TriangleMesh;
 use std::f64::consts::FRAC_PI_2;
 use work::monitor::Silent;
@@ -13,6 +13,7 @@ const SETTINGS: PassSettings = PassSettings {
     chord_tolerance: 1e-3,
     smoothing: None,
     axis: None,
+    faces: Faces::ALL,
     memory: 1 << 30,
     earlier: None,
     probe: None,

@@ -1,0 +1,235 @@
+//! Passes over the faces of some slopes alone: of a part with level ground and walls, each strategy takes what suits it.
+//!
+//! Enters: the passes of an upright cutter over all that its strategy covers. Leaves: their stretches on which the cutter touches faces
+//! of these slopes, or would from an interval beside: there the passes end, and others of other slopes begin.
+
+use std::f64::consts::TAU;
+use std::mem;
+
+use crate::link::plane_interval;
+use crate::vocabulary::{Faces, Passes, PlanError, Task};
+use cutter::Cutter;
+use drop_cutter::{Drop, DropCutter};
+use geometry::{Point2, Point3, Vector2};
+use part::Part;
+use work::monitor::{self, Cancelled};
+
+/// What lies within this distance of an edge, mm, belongs to the faces on both sides.
+const ON_EDGE: f64 = 1e-6;
+
+/// Directions in which an interval beside a pass is looked at.
+const AROUND: usize = 8;
+
+/// The end of a stretch is placed this closely, mm.
+const END_PRECISION: f64 = 1e-6;
+
+/// Leaves of passes what serves the faces that are asked for.
+///
+/// # Errors
+/// When no face is of these slopes, and when cancelled.
+pub(crate) fn keep_on_faces(task: &Task<'_>, passes: &mut Passes) -> Result<(), PlanError> {
+    let Task { part, monitor, ref settings, .. } = *task;
+    let faces = settings.faces;
+    if faces == Faces::ALL {
+        return Ok(());
+    }
+    let mesh = part.mesh();
+    if !(0..mesh.triangles().len()).any(|t| faces.hold(&mesh.normal(t))) {
+        return Err(PlanError::NoSuchSlope);
+    }
+    let dropped = task.dropped();
+    let served = Served {
+        part,
+        drop: DropCutter::watched(part, dropped, monitor)?,
+        cutter: dropped,
+        faces,
+        chord_tolerance: settings.chord_tolerance,
+        interval: plane_interval(dropped, settings.step),
+    };
+    let all = mem::take(&mut passes.passes);
+    let kept = work::parallel::try_map(all.len(), |k| {
+        monitor::check(monitor)?;
+        Ok::<_, Cancelled>(served.stretches(&all[k], settings.sampling))
+    })?;
+    passes.passes = kept.into_iter().flatten().collect();
+    for along in &mut passes.contacts {
+        along.retain(|contact| faces.hold(&part.closest_point(&contact.at).0.normal));
+    }
+    passes.faces = passes.faces.and(&faces);
+    Ok(())
+}
+
+/// Where passes serve faces of some slopes.
+struct Served<'a> {
+    part: &'a Part,
+    drop: DropCutter<'a>,
+    cutter: &'a Cutter,
+    faces: Faces,
+    /// Of the passes, mm: beside the foot of a wall they may touch nothing.
+    chord_tolerance: f64,
+    /// Between passes, mm.
+    interval: f64,
+}
+
+impl Served<'_> {
+    /// The stretches of a pass that serve, as far as more than a point is left of them.
+    fn stretches(&self, pass: &[Point3], sampling: f64) -> Vec<Vec<Point3>> {
+        let (mut found, mut open) = (Vec::new(), Vec::new());
+        for (a, b) in pass.iter().zip(&pass[1..]) {
+            let way = b - a;
+            let at = |t: f64| a + way * t;
+            let serves = |t: f64| self.serves(at(t).xy());
+            let count = (way.norm() / sampling).ceil().max(1.0) as usize;
+            let mut before = (0.0, serves(0.0));
+            for t in (1..=count).map(|k| k as f64 / count as f64) {
+                let now = (t, serves(t));
+                if before.1 && open.is_empty() {
+                    open.push(at(before.0));
+                }
+                if before.1 != now.1 {
+                    let end =
+                        at(change([before.0, t], END_PRECISION / way.norm(), |t| serves(t) == before.1));
+                    open.push(end);
+                    if before.1 {
+                        found.push(mem::take(&mut open));
+                    }
+                }
+                before = now;
+            }
+            if before.1 {
+                open.push(*b);
+            }
+        }
+        found.push(open);
+        found.retain_mut(|stretch| {
+            stretch.dedup();
+            stretch.len() > 1
+        });
+        found
+    }
+
+    /// Whether the cutter with its axis there touches such a face, or would an interval beside.
+    fn serves(&self, axis: Point2) -> bool {
+        let touches = |axis: Point2| {
+            self.drop.at(axis.x, axis.y).is_some_and(|rests| self.faces.contain(self.upright(axis, &rests)))
+        };
+        let around = |far: f64| {
+            (0..AROUND).any(|k| {
+                let (sin, cos) = (TAU * k as f64 / AROUND as f64).sin_cos();
+                touches(axis + Vector2::new(cos, sin) * far)
+            })
+        };
+        touches(axis) || around(self.chord_tolerance) || around(self.interval)
+    }
+
+    /// The vertical part of the unit normal by which the cutter touches: on an edge its own, between those of both faces.
+    fn upright(&self, axis: Point2, rests: &Drop) -> f64 {
+        let (contact, mesh) = (&rests.contact, self.part.mesh());
+        let around = mesh.triangles_at(contact.triangle as usize, &contact.point, ON_EDGE);
+        if around.len() < 2 {
+            return contact.normal.z;
+        }
+        let normals = around.into_iter().map(|t| mesh.normal(t).z);
+        let [least, most] =
+            normals.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| [low.min(z), high.max(z)]);
+        let arm = (contact.point.xy() - axis).norm();
+        self.cutter.profile().incline(arm).cos.clamp(least, most)
+    }
+}
+
+/// The last place of a range, nearly, that is as its beginning.
+fn change([mut same, mut other]: [f64; 2], precision: f64, is_same: impl Fn(f64) -> bool) -> f64 {
+    while other - same > precision {
+        let middle = 0.5 * (same + other);
+        if middle <= same || middle >= other {
+            break;
+        }
+        *(if is_same(middle) { &mut same } else { &mut other }) = middle;
+    }
+    same
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan;
+    use crate::vocabulary::{PlanSettings, Step, Strategy};
+    use crate::{LevelSteps, Plan, Waterline, Zigzag};
+    use geometry::TriangleMesh;
+    use motion::MoveKind;
+    use std::f64::consts::FRAC_PI_4;
+    use work::monitor::Silent;
+
+    const HALF: f64 = 4.0;
+    const TOP: f64 = 3.0;
+
+    /// A block without an underside whose walls lean by 7 degrees.
+    fn block() -> Part {
+        let out = TOP * 7.0_f64.to_radians().tan();
+        let ring = |half: f64, z: f64| {
+            [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+                .map(|[x, y]| Point3::new(x * half, y * half, z))
+        };
+        let points = [ring(HALF + out, 0.0), ring(HALF, TOP)].concat();
+        let wall = |k: u32| [[k, (k + 1) % 4, 4 + (k + 1) % 4], [k, 4 + (k + 1) % 4, 4 + k]];
+        let triangles = (0..4).flat_map(wall).chain([[4, 5, 6], [4, 6, 7]]).collect();
+        Part::from_mesh(TriangleMesh::new(points, triangles).unwrap().0)
+    }
+
+    fn planned(cutter: &Cutter, strategy: &dyn Strategy, slope: [f64; 2]) -> Result<Plan, PlanError> {
+        let faces = Faces::of_slopes(slope.map(f64::to_radians));
+        let step = Step::Scallop(0.02);
+        let settings = PlanSettings { step, stock_top: TOP + 1.0, faces, ..PlanSettings::default() };
+        plan(&block(), cutter, strategy, &settings, &Silent)
+    }
+
+    fn cut_ends(plan: &Plan) -> Vec<Point3> {
+        let moves = plan.path.segments().filter(|(.., m)| m.kind == MoveKind::Cut);
+        moves.flat_map(|(from, to, _)| [from, to]).collect()
+    }
+
+    /// Passes for the top lie as far apart as on a plane, though the walls are steep; each ends an interval beyond the place where a ball,
+    /// or a bull nose, has rolled over the edge by the steepest slope that is asked for. The plan is told of no steep places.
+    #[test]
+    fn passes_for_the_top_end_where_the_tool_has_rolled_over_its_edge() {
+        for (cutter, corner) in [(Cutter::ball(4.0).unwrap(), 2.0), (Cutter::bull(4.0, 0.5).unwrap(), 0.5)] {
+            let plan = planned(&cutter, &Zigzag::at(0.0), [0.0, 45.0]).unwrap();
+            let interval = plane_interval(&cutter, Step::Scallop(0.02));
+            let end = HALF + cutter.radius() - corner + corner * FRAC_PI_4.sin() + interval;
+            let ends = cut_ends(&plan);
+            for axis in 0..2 {
+                let farthest = ends.iter().map(|p| p[axis].abs()).fold(0.0, f64::max);
+                // The target is planned for less what chords may add.
+                let off = if axis == 0 { 0.01 } else { interval };
+                assert!(farthest <= end + 1e-3 && farthest >= end - off, "{axis}: {farthest} {end}");
+            }
+            let mut lines: Vec<i64> = ends.iter().map(|p| (p.y * 1e3).round() as i64).collect();
+            lines.sort_unstable();
+            lines.dedup();
+            let most = (2.0 * end / interval).ceil() as usize + 3;
+            assert!(lines.len() <= most, "{} {most}", lines.len());
+            assert!(plan.notes.iter().all(|note| !note.contains("steepest")), "{:?}", plan.notes);
+            let all = planned(&cutter, &Zigzag::at(0.0), [0.0, 90.0]).unwrap();
+            let more = cut_ends(&all).len() as f64 / ends.len() as f64;
+            assert!(more > 1.0, "{more}");
+        }
+    }
+
+    /// Contours follow the walls alone whatever is asked for: asked for those they stay as they are, beside the foot as well, where
+    /// a pass that is off by its tolerance touches nothing. Asked for the top nothing is left of them.
+    #[test]
+    fn contours_of_walls_stay_whole() {
+        for cutter in [Cutter::ball(4.0), Cutter::bull(4.0, 0.5), Cutter::flat(4.0)].map(Result::unwrap) {
+            let all = planned(&cutter, &Waterline { steps: LevelSteps::Shortest }, [0.0, 90.0]).unwrap();
+            let walls = planned(&cutter, &Waterline { steps: LevelSteps::Shortest }, [45.0, 90.0]).unwrap();
+            assert_eq!(walls.path, all.path);
+            assert!(planned(&cutter, &Waterline { steps: LevelSteps::Shortest }, [0.0, 45.0]).is_err());
+        }
+    }
+
+    #[test]
+    fn slopes_that_no_face_has_are_refused() {
+        let refused = planned(&Cutter::ball(4.0).unwrap(), &Zigzag::at(0.0), [20.0, 80.0]);
+        assert_eq!(refused.unwrap_err(), PlanError::NoSuchSlope);
+    }
+}
