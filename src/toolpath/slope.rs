@@ -161,7 +161,7 @@ mod tests {
     use work::monitor::Silent;
 
     const HALF: f64 = 4.0;
-    const TOP: f64 = 3.0;
+    const TOP: f64 = 8.0;
 
     /// A block without an underside whose walls lean by 7 degrees.
     fn block() -> Part {
