@@ -3,7 +3,8 @@
 //! Lengths in mm come from `width`, `height` and `viewBox`; without units 96 make an inch, as CSS has it.
 //! y, which runs down in SVG, is turned up, with the lower edge of the page at 0. What is not displayed
 //! and what is not drawn in place (`defs`, clips, masks) is left out; texts, images and `use` are refused
-//! or named, since outlines may hide in them.
+//! or named, since outlines may hide in them. So are style sheets that show, hide, place or size shapes; those of colours and pens
+//! are passed over.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -20,6 +21,27 @@ pub const FORMAT: OutlineFormat = OutlineFormat { extension: "svg", parse };
 
 /// Deepest nesting of elements that is followed.
 const MAX_DEPTH: usize = 64;
+
+/// Properties of a style that show, hide, place or size outlines.
+const SHAPING: [&str; 17] = [
+    "display",
+    "visibility",
+    "transform",
+    "translate",
+    "rotate",
+    "scale",
+    "zoom",
+    "d",
+    "x",
+    "y",
+    "cx",
+    "cy",
+    "r",
+    "rx",
+    "ry",
+    "width",
+    "height",
+];
 
 /// mm of one CSS pixel.
 const PIXEL: f64 = 25.4 / 96.0;
@@ -60,6 +82,92 @@ fn line_of(node: &Node<'_, '_>) -> usize {
 fn fault(node: &Node<'_, '_>, what: impl std::fmt::Display) -> OutlineError {
     let id = node.attribute("id").map_or_else(String::new, |id| format!(" \"{id}\""));
     OutlineError::at(line_of(node), format!("{}{id}: {what}", node.tag_name().name()))
+}
+
+/// Refuses rules of a style sheet that shape outlines: they are not applied.
+fn check_sheet(node: &Node<'_, '_>) -> Result<(), OutlineError> {
+    let text: String = node.descendants().filter_map(|n| n.text().filter(|_| n.is_text())).collect();
+    let mut rest = text.as_str();
+    let mut bare = String::new();
+    while let Some((before, after)) = rest.split_once("/*") {
+        bare.push_str(before);
+        rest = after.split_once("*/").map_or("", |(_, after)| after);
+    }
+    bare.push_str(rest);
+    if bare.contains("@import") {
+        return Err(fault(node, "rules of other files are not read; save the drawing without them"));
+    }
+    let blocks = bare.split('{').skip(1).filter_map(|block| block.split('}').next());
+    let mut declared = blocks.flat_map(declarations);
+    match declared.find(|(property, value)| shapes(property) && !is_shown(property, value)) {
+        Some((property, _)) => Err(fault(
+            node,
+            format!(
+                "its rules set `{property}`, which is not read from there; save the drawing with presentation attributes \
+                 instead of a style sheet"
+            ),
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Properties and values of a list of declarations.
+fn declarations(text: &str) -> impl Iterator<Item = (&str, &str)> {
+    let pairs = text.split(';').filter_map(|declaration| declaration.split_once(':'));
+    pairs.map(|(property, value)| (property.trim(), value.trim()))
+}
+
+fn shapes(property: &str) -> bool {
+    SHAPING.iter().any(|shaping| property.eq_ignore_ascii_case(shaping))
+}
+
+/// Whether a value is the usual one, by which shapes are drawn where they stand.
+fn is_shown(property: &str, value: &str) -> bool {
+    let usual: &[&str] = match property {
+        "display" => &["inline", "block", "initial", "inherit"],
+        "visibility" => &["visible", "initial", "inherit"],
+        "transform" | "translate" | "rotate" | "scale" => &["none"],
+        _ => &["auto"],
+    };
+    usual.contains(&value.trim_end_matches("!important").trim())
+}
+
+/// Whether an element and what it holds is displayed.
+///
+/// # Errors
+/// Where its style shapes it in another way, and where something within what is hidden is shown again.
+fn is_displayed(node: &Node<'_, '_>) -> Result<bool, OutlineError> {
+    let style = node.attribute("style").unwrap_or_default();
+    let attributes =
+        ["display", "visibility"].map(|key| node.attribute(key).map(|value| (key, value.trim())));
+    let hides = |(property, value): (&str, &str)| {
+        let value = value.trim_end_matches("!important").trim();
+        match property {
+            "display" => value == "none",
+            "visibility" => ["hidden", "collapse"].contains(&value),
+            _ => false,
+        }
+    };
+    if attributes.into_iter().flatten().chain(declarations(style)).any(hides) {
+        let is_again = |n: &Node<'_, '_>| {
+            let style = n.attribute("style").unwrap_or_default();
+            let attribute = n.attribute("visibility").map(|value| ("visibility", value.trim()));
+            attribute.into_iter().chain(declarations(style)).any(|pair| pair == ("visibility", "visible"))
+        };
+        return match node.descendants().skip(1).find(is_again) {
+            Some(again) => {
+                Err(fault(&again, "it is visible within what is hidden; show or delete the whole"))
+            }
+            None => Ok(false),
+        };
+    }
+    let shaped = declarations(style).find(|(property, value)| shapes(property) && !is_shown(property, value));
+    match shaped {
+        Some((property, _)) => {
+            Err(fault(node, format!("its style sets `{property}`; write that as an attribute of its own")))
+        }
+        None => Ok(true),
+    }
 }
 
 /// A length in mm where it has a unit, else `None` with its bare number.
@@ -148,6 +256,12 @@ fn parse(
     let xml = roxmltree::ParsingOptions { allow_dtd: true, nodes_limit: 2_000_000, ..Default::default() };
     let document = Document::parse_with_options(text, xml)
         .map_err(|e| OutlineError::at(e.pos().row as usize, format!("not valid XML: {e}")))?;
+    if let Some(sheet) =
+        document.root().children().find(|n| n.pi().is_some_and(|pi| pi.target == "xml-stylesheet"))
+    {
+        let reason = "style sheets of other files are not read; save the drawing without them";
+        return Err(OutlineError::at(line_of(&sheet), reason));
+    }
     let root = document.root_element();
     if root.tag_name().name() != "svg" {
         return Err(OutlineError::at(1, format!("its root is <{}>, not <svg>", root.tag_name().name())));
@@ -197,9 +311,10 @@ impl Reader<'_> {
         wanted: bool,
         depth: usize,
     ) -> Result<(), OutlineError> {
-        let hidden = node.attribute("display") == Some("none")
-            || node.attribute("style").is_some_and(|s| s.replace(' ', "").contains("display:none"));
-        if hidden {
+        if node.tag_name().name() == "style" {
+            return check_sheet(node);
+        }
+        if !is_displayed(node)? {
             return Ok(());
         }
         let label = |name: &str| node.attributes().find(|a| a.name() == name).map(|a| a.value());
@@ -215,8 +330,12 @@ impl Reader<'_> {
         let name = node.tag_name().name();
         match name {
             "g" | "a" | "switch" => return self.children(node, map, wanted, depth + 1),
-            "defs" | "clipPath" | "mask" | "marker" | "pattern" | "symbol" | "style" | "metadata"
-            | "title" | "desc" | "namedview" | "linearGradient" | "radialGradient" | "filter" | "script" => {
+            "defs" => {
+                let mut sheets = node.descendants().filter(|n| n.tag_name().name() == "style");
+                return sheets.try_for_each(|sheet| check_sheet(&sheet));
+            }
+            "clipPath" | "mask" | "marker" | "pattern" | "symbol" | "metadata" | "title" | "desc"
+            | "namedview" | "linearGradient" | "radialGradient" | "filter" | "script" => {
                 return Ok(());
             }
             _ if !wanted => return Ok(()),

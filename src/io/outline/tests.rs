@@ -83,6 +83,19 @@ fn every_kind_of_svg_element_has_the_area_of_its_closed_form() {
         400.0 + 100.0 * PI,
     );
     // A cubic whose area follows from its control polygon: 3/20 of it and so on; here 0.6 of the square.
+    for hidden in [
+        "display='none'",
+        "visibility='hidden'",
+        "style='display : none'",
+        "style='fill:red;visibility:hidden'",
+    ] {
+        near(svg(&format!("<rect width='40' height='20'/><circle cx='20' cy='10' r='3' {hidden}/>")), 200.0);
+    }
+    let pens = "<style>/* pens { */ .a{fill:none;stroke:#000;stroke-width:.5px;display:inline}</style>";
+    near(
+        svg(&format!("{pens}<rect class='a' width='40' height='20' style='opacity:1;display:inline'/>")),
+        200.0,
+    );
     near(svg("<path d='M0 0 C 0 40 40 40 40 0 Z'/>"), 0.6 * 400.0);
     near(svg("<path d='M0 0 Q 20 40 40 0 Z'/>"), 400.0 / 3.0);
     near(svg("<path d='M0 0 H80 V60 H0 Z M20 20 v20 h20 v-20 z'/>"), 1100.0);
@@ -133,6 +146,17 @@ fn what_is_wrong_is_told_with_its_place() {
     says(svg("<path d='M0 0 L10 0 L10 10'/>"), &["line 1", "open at x 5.0000 y 45.0000"]);
     says(svg("<path id='p' d='M0 0 L10 zz'/>"), &["path \"p\""]);
     says(svg("<use href='#a'/>"), &["convert them to paths"]);
+    says(
+        svg("<style>.h{display:none}</style><circle class='h' r='2'/>"),
+        &["style", "`display`", "presentation"],
+    );
+    says(svg("<defs><style>/* r:1 */ .a{fill:red;r:4px}</style></defs>"), &["`r`"]);
+    says(svg("<style>@import url(a.css);</style>"), &["other files"]);
+    says(svg("<rect width='9' height='9' style='transform:translate(3px,0)'/>"), &["rect", "`transform`"]);
+    let again = "<g visibility='hidden'><path id='p' d='M0 0 H9 V9 Z' style='visibility: visible'/></g>";
+    says(svg(again), &["path \"p\"", "hidden"]);
+    let sheet = b"<?xml-stylesheet href='a.css'?><svg><rect width='9' height='9'/></svg>";
+    says(parse(sheet, svg::FORMAT, &options()), &["other files"]);
     says(parse(b"<svg><g></svg>", svg::FORMAT, &options()), &["not valid XML"]);
     says(svg("<text>hello</text>"), &["no outlines"]);
 }
