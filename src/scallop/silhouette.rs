@@ -65,6 +65,11 @@ impl Over {
         p.y - self.height - 0.5 * self.curvature * (p.x * p.x + p.y * p.y - self.height * self.height)
     }
 
+    /// Whether a place lies beyond the middle of a hollow: a long side may leave it again on the other side.
+    fn is_beyond(&self, p: &OnOutline) -> bool {
+        self.curvature * p.y > 1.0
+    }
+
     /// Its derivative along the outline's tangent.
     fn slope(&self, p: &OnOutline, [x, y]: [f64; 2]) -> f64 {
         y - self.curvature * (p.x * x + p.y * y)
@@ -136,7 +141,7 @@ impl<'a> Silhouette<'a> {
         if upright.is_nan() || upright <= 0.0 {
             return f64::INFINITY;
         }
-        let high = |p: &OnOutline| p.x >= over.farthest || over.excess(p) >= 0.0;
+        let high = |p: &OnOutline| p.x >= over.farthest || over.excess(p) >= 0.0 || over.is_beyond(p);
         let (mut low, mut top) = (0.0, upright.min(std::f64::consts::FRAC_PI_2));
         let (mut below, mut above) = (OnOutline { x: 0.0, y: 0.0, bend: 0.0 }, self.at(top));
         if !high(&above) {
@@ -176,10 +181,12 @@ impl<'a> Silhouette<'a> {
             let rise = here.bend * over.slope(&here, [cos, sin]);
             phi = phi * (1.0 - 2.0 * excess / (rise * phi)).max(0.0).sqrt();
         }
-        if above.x >= over.farthest && over.excess(&above) < 0.0 {
-            return f64::INFINITY;
+        let crossing = between(over, &below, &above);
+        if over.excess(&above) < 0.0 {
+            let within = crossing.filter(|p| p.x < over.farthest);
+            return within.map_or(f64::INFINITY, |p| over.arc(&p));
         }
-        over.arc(&between(over, &below, &above))
+        over.arc(&crossing.unwrap_or(below))
     }
 
     /// As [`Silhouette::reach`] from the last place of the outline, along the cutter's side.
@@ -201,9 +208,9 @@ impl OnOutline {
     }
 }
 
-/// Where the chord from a place below the height to one above reaches it: it lies inside the outline, so that the way is
-/// never too long.
-fn between(over: &Over, below: &OnOutline, above: &OnOutline) -> OnOutline {
+/// Where the chord from a place below the height to one above, or beyond, first reaches it: it lies inside the outline, so that the
+/// way is never too long.
+fn between(over: &Over, below: &OnOutline, above: &OnOutline) -> Option<OnOutline> {
     let chord = [above.x - below.x, above.y - below.y];
-    below.along(chord, over).filter(|p| p.x <= above.x).unwrap_or(*below)
+    below.along(chord, over).filter(|p| p.x <= above.x)
 }

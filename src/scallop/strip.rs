@@ -378,4 +378,26 @@ mod tests {
             }
         }
     }
+
+    /// The cone of a taper begins far above the scallops: on level and hollow ground its strips are those of the bull nose with the same
+    /// end, though its side leads out of a hollow again.
+    #[test]
+    fn a_long_side_changes_no_strip() {
+        let taper = Cutter::taper(3.0, 1.0, 5f64.to_radians(), 6.0).unwrap();
+        let bull = Cutter::bull(3.0, 1.0).unwrap();
+        for h in [0.03, 0.1] {
+            for k in 0..441 {
+                let lean = |k: i32| 0.01 * f64::from(k - 10);
+                let n = Vector3::new(lean(k % 21), lean(k / 21), 1.0).normalize();
+                let b = n.cross(&Vector3::new(1.0, 0.0, -n.x / n.z).normalize());
+                for bend in [-0.12, 0.0, 0.05, 0.12] {
+                    let [a, b] =
+                        [&taper, &bull].map(|cutter| strip_width_at(cutter, &n, &b, &across(bend), h).0);
+                    // The wider cutter's strips are limited later.
+                    let a = a.min(widest(h, bull.radius()));
+                    assert!((a / b - 1.0).abs() < 1e-9, "{h} {n:?} {bend}: {a} {b}");
+                }
+            }
+        }
+    }
 }
