@@ -97,7 +97,9 @@ impl Session {
             scallop_mm,
             plans,
         };
-        if machining_time_s > asked_s && !figures.is_met() && scallop_mm >= highest {
+        // Of heights that all take as long the first one is kept.
+        let were_highest = figures.plans.iter().any(|tried| tried.scallop_mm >= highest);
+        if machining_time_s > asked_s && !figures.is_met() && were_highest {
             let reason = format!(
                 "it takes {:.2} minutes or more, at scallops of {highest} mm already, and {} were asked for",
                 machining_time_s / 60.0,

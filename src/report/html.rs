@@ -199,8 +199,7 @@ fn meanings(report: &RunReport) -> Markup {
         ),
         (
             "time",
-            "All moves at their feeds, as far as the machine's acceleration and cornering allow. Jerk and the \
-             control's own limits are not in it: machines take somewhat longer.",
+            "All moves at their feeds, as far as the limits in [machine] allow: acceleration, cornering, jerk, lines a second.",
         ),
     ];
     for meaning in report.measured().flat_map(|t| &t.figures).filter_map(|figure| figure.meaning) {

@@ -24,7 +24,8 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
         |plan: &TriedPlan| vec![micrometres(Some(plan.scallop_mm)), format!("{:.1}", plan.machining_time_s)];
     let note = (!found.is_met()).then(|| {
         format!(
-            "no plan takes {} within 1 %: with one pass more or less it takes {} ({:+.1} %)",
+            "none of {} plans takes {} within 1 %; the nearest takes {} ({:+.2} %)",
+            found.plans.len(),
             duration(found.asked_s),
             duration(taken),
             100.0 * (found.taken_over_asked - 1.0)
