@@ -30,17 +30,18 @@ pub struct Arguments {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Plan, cut, measure and report all toolpaths of a scene.
-    #[command(after_help = kinds())]
+    #[command(after_help = kinds(), allow_negative_numbers = true)]
     Run(RunOptions),
     /// Verify a program of another system against a part, without a scene.
-    #[command(after_help = VERIFY_HELP)]
+    #[command(after_help = VERIFY_HELP, allow_negative_numbers = true)]
     Verify(Box<VerifyOptions>),
     /// Run many scenes, compare their figures with a baseline, and report what got worse.
-    #[command(after_help = NIGHTLY_HELP)]
+    #[command(after_help = NIGHTLY_HELP, allow_negative_numbers = true)]
     Nightly(Box<NightlyOptions>),
     /// Read and validate a scene, and print it with every default in effect.
     Check(CheckOptions),
     /// Answer scallop height from step and step from scallop height, for a section or a part's place.
+    #[command(allow_negative_numbers = true)]
     Scallop(Box<ScallopOptions>),
 }
 
@@ -102,7 +103,7 @@ pub struct VerifyOptions {
     #[arg(long, value_name = "WHAT", default_value = Judged::Walls.word(), value_parser = PossibleValuesParser::new(Judged::ALL.map(Judged::word)))]
     pub judge: String,
     /// Stock above the part's highest point, mm [default: 1].
-    #[arg(long, value_name = "MM", conflicts_with = "stock")]
+    #[arg(long, value_name = "MM", value_parser = allowance, conflicts_with = "stock")]
     pub allowance: Option<f64>,
     /// The stock: a closed mesh in the unit of the part, or a TOML file with the [stock] of a scene [default: a block].
     #[arg(long, value_name = "FILE")]
@@ -111,13 +112,13 @@ pub struct VerifyOptions {
     #[arg(long, value_name = "MACHINE")]
     pub machine: Option<PathBuf>,
     /// Deepest gouge that is tolerated, mm [default: 0.005].
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", value_parser = length)]
     pub gouge: Option<f64>,
     /// Highest uncut material that is tolerated, mm [default: 0.05].
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", value_parser = length)]
     pub uncut: Option<f64>,
     /// Highest scallop that is tolerated, mm [default: 0.01].
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", value_parser = length)]
     pub scallop: Option<f64>,
     /// Where the results go [default: out/NAME OF THE PROGRAM].
     #[arg(long, value_name = "DIR")]
@@ -215,10 +216,10 @@ pub struct ScallopOptions {
     #[arg(long, value_name = "CUTTER", help = format!("The cutter: {}", cutter::short_forms()))]
     pub cutter: Cutter,
     /// Distance of passes along the surface: answers the scallop height.
-    #[arg(long, value_name = "MM", allow_negative_numbers = true, required_unless_present_any = ["scallop", "table"])]
+    #[arg(long, value_name = "MM", required_unless_present_any = ["scallop", "table"])]
     pub step: Option<f64>,
     /// Scallop height: answers the step.
-    #[arg(long, value_name = "MM", allow_negative_numbers = true, conflicts_with = "step")]
+    #[arg(long, value_name = "MM", conflicts_with = "step")]
     pub scallop: Option<f64>,
     /// Radius of a convex section across the feed [default: flat].
     #[arg(long, value_name = "MM", conflicts_with_all = ["concave", "part"])]
@@ -235,11 +236,11 @@ pub struct ScallopOptions {
     #[arg(long, value_name = "X,Y[,Z]", requires = "part", allow_hyphen_values = true, value_parser = place)]
     pub at: Option<Coordinates>,
     /// Feed direction there in the plan view, degrees from x.
-    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0)]
     pub direction: f64,
     /// Lead of the tool axis from the surface normal, degrees, for cutters that are no ball [default: the normal
     /// without a part, upright on a part].
-    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEGREES")]
     pub lead: Option<f64>,
     /// Print what the second-order formula and a polynomial section cost, over curvature and step.
     #[arg(long, conflicts_with_all = ["step", "scallop", "part", "convex", "concave"])]
@@ -283,16 +284,21 @@ pub enum Cell {
 }
 
 fn cell(text: &str) -> Result<Cell, String> {
-    /// The range of lengths that scenes take too, mm.
-    const CELL: std::ops::RangeInclusive<f64> = 1e-6..=1e4;
     if text == "auto" {
         return Ok(Cell::Auto);
     }
-    let value: Option<f64> = text.parse().ok();
-    value
-        .filter(|v| CELL.contains(v))
-        .map(Cell::Mm)
-        .ok_or_else(|| "give a positive number of millimetres, such as 0.05, or auto".to_owned())
+    length(text).map(Cell::Mm).map_err(|expected| format!("{expected}, or auto"))
+}
+
+/// A positive length, mm, in the range that scenes take too.
+fn length(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|v| (1e-6..=1e4).contains(v));
+    value.ok_or_else(|| "give a positive number of millimetres (1e-6 to 10000), such as 0.05".to_owned())
+}
+
+fn allowance(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|v| (0.0..=1e4).contains(v));
+    value.ok_or_else(|| "give a number of millimetres (0 to 10000)".to_owned())
 }
 
 /// What a scene may ask for, from the lists of strategies, engines and part formats.

@@ -46,6 +46,9 @@ pub fn nightly(options: &NightlyOptions, progress: &Progress) -> Result<(String,
     let rules = options.rules.as_deref().map_or_else(|| Ok(Rules::default()), read_rules)?;
     let published = options.published.as_deref().map_or_else(|| Ok(Vec::new()), read_published)?;
     let baseline = options.baseline.as_deref().map(read_results).transpose()?;
+    if let Some(path) = &options.history {
+        history::check(path)?;
+    }
     let merged = options.merge.then(|| merge::read(&options.paths)).transpose()?;
     let plan = match merged {
         Some(_) => Plan::default(),
@@ -60,7 +63,7 @@ pub fn nightly(options: &NightlyOptions, progress: &Progress) -> Result<(String,
         }
     };
     let history = match &options.history {
-        Some(path) => history::append(path, &Night::of(&results, id(&results)?))?,
+        Some(path) => history::append(path, &night(&results)?)?,
         None => History::default(),
     };
     let comparison = compare(&results, baseline.as_ref(), &rules);
@@ -107,12 +110,13 @@ fn write(
     file(FIGURES, results.to_json().map_err(|e| CliError::nightly(e.to_string(), "report this error"))?)
 }
 
-/// What tells a nightly from all others: its figures and times.
-fn id(results: &Results) -> Result<String, CliError> {
-    let mut dateless = results.clone();
-    dateless.date.clear();
-    let text = dateless.to_json().map_err(|e| CliError::nightly(e.to_string(), "report this error"))?;
-    Ok(digest::of_bytes(text.as_bytes()).sha256)
+/// The night of some results. What tells it from all others are its figures and costs.
+fn night(results: &Results) -> Result<Night, CliError> {
+    let night = Night::of(results, String::new());
+    let dateless = Night { date: String::new(), ..night.clone() };
+    let line =
+        dateless.line().ok_or_else(|| CliError::nightly("a figure is not finite", "report this error"))?;
+    Ok(Night { id: digest::of_bytes(line.as_bytes()).sha256, ..night })
 }
 
 fn summary_text(results: &Results, comparison: &Comparison, out: &Path) -> String {

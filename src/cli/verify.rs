@@ -145,7 +145,7 @@ fn of_table(file: &Path, options: &VerifyOptions) -> Result<Chosen, CliError> {
         let tool = table.get(number).ok_or_else(|| {
             refused(
                 &format!("{} has no tool {number}", shown(file)),
-                &format!("name one of {listed} with --tool"),
+                &format!("name one that it has with --tool: {listed}"),
             )
         })?;
         return Ok(one(tool, Some(number)));
@@ -163,7 +163,7 @@ fn of_table(file: &Path, options: &VerifyOptions) -> Result<Chosen, CliError> {
     };
     meant
         .map(|tool| one(tool, None))
-        .ok_or_else(|| refused("the table has several tools", &format!("name one of {listed} with --tool")))
+        .ok_or_else(|| refused("the table has several tools", &format!("name one with --tool: {listed}")))
 }
 
 /// Whether a toolpath can be called so.

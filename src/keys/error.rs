@@ -129,7 +129,7 @@ pub struct Finding {
 pub enum SceneError {
     /// The file could not be read.
     #[error("cannot read the scene {}: {reason}", printable(&path.to_string_lossy()))]
-    #[diagnostic(help("name an existing TOML file"))]
+    #[diagnostic(help("name an existing TOML file of UTF-8 text"))]
     Unreadable {
         /// The file.
         path: PathBuf,

@@ -41,6 +41,12 @@ fn kind(value: &DeValue<'_>) -> &'static str {
     }
 }
 
+/// A number as messages spell it: with a power of ten where it would fill the line.
+fn in_few_digits(value: f64) -> String {
+    let is_long = value != 0.0 && !(1e-7..1e16).contains(&value.abs());
+    if is_long && value.is_finite() { format!("{value:e}") } else { value.to_string() }
+}
+
 /// `a number in mm (1e-6 to 10000)`.
 fn number_in(range: &RangeInclusive<f64>, unit: &str) -> String {
     // Digits that can be counted at a glance, or an exponent.
@@ -281,7 +287,8 @@ impl<'a> Section<'a> {
         };
         // NaN and infinities, which TOML can write, lie in no range.
         if !range.contains(&value) {
-            let message = format!("`{key}` in {} is {value}; expected {expected}", self.title);
+            let message =
+                format!("`{key}` in {} is {}; expected {expected}", self.title, in_few_digits(value));
             return Err(self.error(&entry.span(), message, format!("write {expected}")));
         }
         Ok(Located { value, span: entry.span() })
