@@ -110,8 +110,10 @@ impl Session {
             let (path, left_out) = self.as_written(&plan.path, if bounded { BOUNDED_STRAYING } else { 1.0 });
             plan.path = path;
             if left_out > 0 {
+                let moves = if left_out == 1 { "move" } else { "moves" };
+                let are = if left_out == 1 { "is" } else { "are" };
                 plan.notes.push(format!(
-                    "{left_out} moves shorter than the control takes for a line are merged within the chord tolerance"
+                    "{left_out} {moves} shorter than the control takes for a line {are} merged within the chord tolerance"
                 ));
             }
             let engaged = self.limit_feed(request, &mut plan.path, monitor)?;

@@ -514,6 +514,8 @@ fn methods_and_solvers_of_stream_functions_are_read_and_written() {
     let (method, solver, file) = read("degree = 5\nknots = \"curvature\"\nsolver = \"gmres\"");
     assert_eq!((method, solver), (spline(5, KnotRule::Curvature), Solver::Gmres));
     assert!(file.is_none());
+    // Whoever names control points asks for the method that has them.
+    assert_eq!(read("control_points = 8").0, spline(3, KnotRule::default()));
     assert_eq!(read("method = \"differences\"").0, StreamMethod::Differences);
     assert_eq!(read("method = \"differences\"").1, Solver::ConjugateGradient);
     assert_eq!(read("method = \"differences\"\nsolver = \"cholesky\"").1, Solver::Cholesky);
@@ -617,6 +619,7 @@ fn methods_that_do_not_go_together_are_refused() {
         ("method = \"differences\"\nsolver = \"qr\"", "no rectangular system"),
         ("method = \"volumes\"", "cannot be"),
         ("method = \"elements\"\ndegree = 3", "does not apply to finite elements"),
+        ("method = \"elements\"\ncontrol_points = 8", "does not apply to finite elements"),
         ("degree = 1", "(2 to 5)"),
         ("degree = 6", "(2 to 5)"),
         ("degree = 5\ncontrol_points = 5", "too few for degree 5"),

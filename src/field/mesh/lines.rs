@@ -269,31 +269,20 @@ pub fn singular_points(mesh: &FieldMesh, lines: &[Line], merge: f64) -> Vec<Sing
     merge_singular_points(&found, merge)
 }
 
-/// Counts singular points nearer to each other than `merge` (mm) as one; they vanish where their turns cancel.
+/// Counts singular points nearer than `merge` (mm) to the first one of them as one; they vanish where their turns cancel.
 pub fn merge_singular_points(found: &[SingularPoint], merge: f64) -> Vec<SingularPoint> {
     let mut merged: Vec<SingularPoint> = Vec::new();
-    let mut taken = vec![false; found.len()];
-    for first in 0..found.len() {
-        if taken[first] {
-            continue;
-        }
-        taken[first] = true;
-        let mut group = vec![first];
-        let mut at = 0;
-        while at < group.len() {
-            for k in 0..found.len() {
-                if !taken[k] && (found[k].position - found[group[at]].position).norm() < merge {
-                    taken[k] = true;
-                    group.push(k);
-                }
-            }
-            at += 1;
-        }
-        let half_turns = group.iter().map(|&k| found[k].half_turns).sum();
-        let centre = group.iter().map(|&k| found[k].position.coords).sum::<Vector3>() / group.len() as f64;
+    let mut left = found.to_vec();
+    while let Some(first) = left.first().cloned() {
+        let is_near = |point: &SingularPoint| (point.position - first.position).norm() < merge;
+        let (near, far): (Vec<_>, Vec<_>) =
+            left.into_iter().enumerate().partition(|(k, point)| *k == 0 || is_near(point));
+        let half_turns = near.iter().map(|(_, point)| point.half_turns).sum();
+        let centre = near.iter().map(|(_, point)| point.position.coords).sum::<Vector3>() / near.len() as f64;
         if half_turns != 0 {
             merged.push(SingularPoint { position: Point3::from(centre), half_turns });
         }
+        left = far.into_iter().map(|(_, point)| point).collect();
     }
     merged
 }

@@ -166,6 +166,9 @@ fn read(from: &mut Reading<'_>) -> Result<Box<dyn Strategy>, SceneError> {
     Ok(Box::new(Streamline { direction, control_points, method, solver, direction_weight, lines }))
 }
 
+/// Keys that ask for B-splines, unless another method takes them.
+const SPLINE_KEYS: [&str; 4] = ["control_points", "degree", "knots", "solver"];
+
 fn read_method(section: &Section<'_>, control_points: usize) -> Result<(StreamMethod, Solver), SceneError> {
     let method = section
         .word("method", &["auto", "bspline", "differences", "elements", "published"])?
@@ -177,7 +180,7 @@ fn read_method(section: &Section<'_>, control_points: usize) -> Result<(StreamMe
     let refuse =
         |key: &str, message: String, cure: &str| Err(section.error(&section.key_span(key), message, cure));
     if method == Some("elements") {
-        if let Some(key) = ["degree", "knots", "solver"].into_iter().find(|key| section.has(key)) {
+        if let Some(key) = SPLINE_KEYS.into_iter().find(|key| section.has(key)) {
             let message = format!("`{key}` does not apply to finite elements, which `method` asks for");
             return refuse(key, message, "delete it, or write `method = \"bspline\"`");
         }
@@ -221,7 +224,7 @@ fn read_method(section: &Section<'_>, control_points: usize) -> Result<(StreamMe
         return refuse("solver", message, "write `control_points = 24` or fewer, or another solver");
     }
     let spline = StreamMethod::BSpline { degree, knots: rule.unwrap_or_default() };
-    let asked = method == Some("bspline") || ["degree", "knots", "solver"].iter().any(|key| section.has(key));
+    let asked = method == Some("bspline") || SPLINE_KEYS.iter().any(|key| section.has(key));
     let method = if asked { spline } else { StreamMethod::Automatic };
     Ok((method, solver.unwrap_or(Solver::Cholesky)))
 }
@@ -233,13 +236,23 @@ impl Strategy for Streamline {
 
     fn write(&self, out: &mut String) -> fmt::Result {
         direction_keys::write(out, &self.direction, "\n")?;
-        writeln!(out, "\ncontrol_points = {}", self.control_points)?;
+        writeln!(out)?;
+        // Where the part decides they would ask for B-splines.
+        if !matches!(self.method, StreamMethod::Automatic | StreamMethod::Elements) {
+            writeln!(out, "control_points = {}", self.control_points)?;
+        }
         if self.direction_weight != DIRECTION_WEIGHT {
             writeln!(out, "direction_weight = {}", toml_number(self.direction_weight))?;
         }
         writeln!(out, "lines = \"{}\"", word_of(&Lines::WORDS, &self.lines))?;
         match self.method {
-            StreamMethod::Automatic => return writeln!(out, "method = \"auto\""),
+            StreamMethod::Automatic => {
+                return writeln!(
+                    out,
+                    "method = \"auto\"  # {} control points a side where splines serve",
+                    self.control_points
+                );
+            }
             StreamMethod::Elements => return writeln!(out, "method = \"elements\""),
             StreamMethod::Published => return writeln!(out, "method = \"published\""),
             StreamMethod::Differences => {

@@ -143,6 +143,9 @@ pub(crate) fn nowhere(direction: &FeedDirection, places: impl Iterator<Item = Po
             "the part is level there; use another direction, or blend it with one"
         }
         FeedDirection::Blend(_) => "the blended directions cancel there; give them other weights",
+        FeedDirection::File { .. } => {
+            "the rows of the table are too few there, or cancel each other; check it"
+        }
         _ => "use another direction",
     };
     not_applicable(&format!(
