@@ -8,8 +8,8 @@
 //! than that along the wall: what lies beyond belongs to no part. The lesser of two concave depths is concave, too.
 //!
 //! Limits: where the side of the cutter reaches over the border by less than the gouge tolerance, what is left of the part is nearer than
-//! that, however long the way along the normal is beside a steep flank. Such a place counts as deep as that is near; it is left out
-//! where the cutter does not come over the part farther inside.
+//! that, however long the way along the normal is beside a steep flank. Such a place counts as deep as that is near: as far as the
+//! way inward along the design is to where it is left.
 
 use std::collections::HashMap;
 
@@ -27,6 +27,9 @@ const LONGEST_PIECE: f64 = 2.0;
 
 /// How far inside of a border, as a share of the gouge tolerance, what is left counts as near: at a corner it is √2 times as far off.
 const INSIDE_SHARE: f64 = 0.65;
+
+/// Halvings of that way: to a nanometre of millimetres.
+const INSIDE_HALVINGS: usize = 24;
 
 /// Steps of Newton's method for the meeting of a normal with what a move sweeps; it converges from one side.
 const STEPS: usize = 24;
@@ -62,7 +65,7 @@ struct BorderCut {
 struct PlaceDepth {
     /// Along the normal or the wall.
     along: f64,
-    /// Nearby, inside of all borders, along z; negative where nothing is cut there.
+    /// As far inside of all borders as counts as near, along z; negative where nothing is cut there.
     inside: f64,
 }
 
@@ -250,22 +253,30 @@ impl Inspection<'_> {
     fn deepest_on(&self, piece: &BorderPiece, by: u32, nearest: f64, known: f64) -> Option<BorderCut> {
         let design = |share: f64| piece.design(self.part, share);
         let length = (piece.ends[1] - piece.ends[0]).norm();
-        // As far from the end of the piece, where another border may begin.
         let far = INSIDE_SHARE * self.limits.gouge;
-        let nearest_left = std::f64::consts::SQRT_2 * far;
-        let end = (far / length).min(0.5);
+        // As far from the end of the piece, where another border may begin, as from the border.
+        let end = |far: f64| (far / length).min(0.5);
+        let inward = |share: f64, far: f64| {
+            let end = end(far);
+            (piece.ends[1] - piece.ends[0]) * (share.clamp(end, 1.0 - end) - share) + piece.inward * far
+        };
+        let inside = |share: f64, far: f64| {
+            let nearby = design(share).0 + inward(share, far);
+            Some(nearby.z - self.surface.envelope.height(by, nearby.x, nearby.y)?)
+        };
         let value = |share: f64| {
             let (place, normal) = design(share);
-            let from_end = (piece.ends[1] - piece.ends[0]) * (share.clamp(end, 1.0 - end) - share);
-            let nearby = place + from_end + piece.inward * far;
-            let inside = nearby.z - self.surface.envelope.height(by, nearby.x, nearby.y)?;
+            let inside = inside(share, far)?;
             let mut along = depth(self.surface, by, &place, &normal)?;
             if along.is_infinite() || piece.leads_out(&normal) {
                 along = along.min(place.z - self.surface.envelope.height(by, place.x, place.y)?);
             }
             Some(PlaceDepth { along, inside })
         };
-        let counted = |along: f64, inside: f64| if inside > 0.0 { along } else { along.min(nearest_left) };
+        // How far what is left is away, where it is near; the way to where nothing is cut for certain.
+        let near = |share: f64| {
+            inward(share, least_way(far, |far| inside(share, far).is_some_and(|inside| inside <= 0.0))).norm()
+        };
         // On a ridge the cut may be less deep than along the normal.
         let on_ridge = |share: f64, along: f64| {
             let (place, normal) = design(share);
@@ -284,8 +295,10 @@ impl Inspection<'_> {
         // Returns the depth of the deepest place, and the cut of this one where it lies on a ridge.
         let mut keep = |share: f64, found: Option<PlaceDepth>| {
             let most = best.map_or(known, |(most, _)| most.max(known));
-            let Some(PlaceDepth { along, inside }) = found else { return (most, None) };
-            let along = counted(along, inside);
+            let Some(PlaceDepth { mut along, inside }) = found else { return (most, None) };
+            if inside <= 0.0 && along > most {
+                along = along.min(near(share));
+            }
             let ridge = if along > most.max(least) { on_ridge(share, along) } else { None };
             let depth = ridge.map_or(along, |cut| -cut.distance);
             if best.is_none_or(|(most, _)| depth > most) {
@@ -304,16 +317,24 @@ impl Inspection<'_> {
             let at_m = value(m);
             let (most, ridge) = keep(m, at_m);
             let possible = match (at_a, at_m, at_b) {
-                (Some(at_a), Some(m), Some(at_b)) => {
-                    let most = |of: &dyn Fn(PlaceDepth) -> f64| {
-                        let [a, m, b] = [at_a, m, at_b].map(of);
-                        m.max(a).max(b).max(2.0 * m - a.min(b))
-                    };
-                    let bend = bend * (b - a) * (b - a);
+                (Some(at_a), Some(at_m), Some(at_b)) => {
                     // Near an end the inside is that of another place.
-                    let has_bend = [end, 1.0 - end].iter().any(|place| a < *place && *place < b);
-                    let inside = if has_bend { f64::INFINITY } else { most(&|at| at.inside) + bend };
-                    counted(most(&|at| at.along) + bend, inside)
+                    let is_kinked =
+                        |far: f64| [end(far), 1.0 - end(far)].iter().any(|place| a < *place && *place < b);
+                    let bend = bend * (b - a) * (b - a);
+                    let along = concave_most([at_a.along, at_m.along, at_b.along]) + bend;
+                    let is_left = |far: f64| {
+                        let inside = [a, m, b].map(|share| inside(share, far).unwrap_or(f64::INFINITY));
+                        !is_kinked(far) && concave_most(inside) + bend <= 0.0
+                    };
+                    if along > most && is_left(far) {
+                        let far = least_way(far, is_left);
+                        along.min(
+                            [a, b].map(|share| inward(share, far).norm()).into_iter().fold(0.0, f64::max),
+                        )
+                    } else {
+                        along
+                    }
                 }
                 (None, None, _) | (_, None, None) if halvings == 0 => f64::NEG_INFINITY,
                 _ => f64::INFINITY,
@@ -346,6 +367,21 @@ impl Inspection<'_> {
         let of_walls = |depth: f64| self.walls.map_or(depth, |walls| -walls.beside(&point, -depth.max(0.0)));
         Some(BorderCut { depth: of_walls(found), possible: of_walls(possible), at: point, by })
     }
+}
+
+/// The greatest value of a concave function between its values at both ends and in the middle.
+fn concave_most([a, m, b]: [f64; 3]) -> f64 {
+    m.max(a).max(b).max(2.0 * m - a.min(b))
+}
+
+/// The least way up to `far`, nearly, from which on a place is left, as it is at `far`.
+fn least_way(far: f64, is_left: impl Fn(f64) -> bool) -> f64 {
+    let (mut cut, mut left) = (0.0, far);
+    for _ in 0..INSIDE_HALVINGS {
+        let middle = 0.5 * (cut + left);
+        *(if is_left(middle) { &mut left } else { &mut cut }) = middle;
+    }
+    left
 }
 
 /// The deeper of two cuts, the first of equals, with what both may be at most.
@@ -394,7 +430,8 @@ mod tests {
     }
 
     /// A ball beside a border that the part rises to: the normal leads out over the border, nearly along the ball's flank, and
-    /// would find a depth many times that of the cut. It is no more than that along the border's wall.
+    /// would find a depth many times that of the cut. It is no more than that along the border's wall; and where the ball reaches
+    /// over the border by less than the tolerance, no more than the way along the design to where it is left.
     #[test]
     fn depths_do_not_lead_out_over_a_border() {
         let rising = TriangleMesh::new(
@@ -405,9 +442,13 @@ mod tests {
         for (beside, deep) in [(2.72, 0.0004), (2.6, 0.02)] {
             let tip = 3.6 - (3.0 - (9.0f64 - beside * beside).sqrt()) - deep;
             let plunge = vec![Point3::new(-beside, 3.0, 10.0), Point3::new(-beside, 3.0, tip)];
+            let is_cut = |x: f64| tip + 3.0 - (9.0 - (beside + x).powi(2)).sqrt() < 3.6 - 0.45 * x;
+            let way =
+                (0..100_000).map(|k| 1e-7 * f64::from(k)).find(|x| !is_cut(*x)).unwrap() * 0.45f64.hypot(1.0);
+            let truth = if way < INSIDE_SHARE * LIMITS.gouge { way.min(deep) } else { deep };
             let found = gouge_of(&part, &Cutter::ball(6.0).unwrap(), &[plunge], 0.1);
-            let off = (found.max_depth_mm - deep).abs();
-            assert!(off <= found.error_bound_mm + 1e-6 && off < 1e-5, "{beside} {deep}: {found:?}");
+            let off = (found.max_depth_mm - truth).abs();
+            assert!(off <= found.error_bound_mm + 1e-6 && off < 1e-5, "{beside} {truth}: {found:?}");
         }
         // A pass down the slope cuts evenly deep, at the border as well: along z that would be more.
         let (deep, normal) = (0.02, Vector3::new(3.6, 0.0, 8.0).normalize());

@@ -46,6 +46,18 @@ fn upright_cutters_plan_and_measure_where_three_triangles_meet() {
     assert!(report.contains("left 1 edge open where more than two triangles meet"), "{report}");
 }
 
+/// Streamlines and fronts take such an edge for a border of the surface on each side of it.
+#[test]
+fn fields_end_where_three_triangles_meet() {
+    for strategy in ["streamline", "iso-scallop", "streamline\"\ndirection = { angle = 30 }\nname = \"askew"]
+    {
+        let home = tempfile::tempdir().unwrap();
+        let scene = SCENE.replace("zigzag\"\nstepover = 0.5\n", &format!("{strategy}\"\n"));
+        let answer = run(home.path(), &plate_with_a_fin(), &scene, &[]);
+        assert_eq!(answer.code, Some(0), "{strategy}: {answer:?}");
+    }
+}
+
 #[test]
 fn what_needs_two_sides_says_so() {
     let home = tempfile::tempdir().unwrap();

@@ -28,4 +28,4 @@ pub use sources::{Sense, borders, fixed_angle, guides, slope, slope_at};
 pub use stream::{Flow, Held, MeshStream, solve_stream, triangle_gradients};
 pub use surface::{FieldMesh, MeshFieldError};
 pub use trace::{MeshTracer, Streamline};
-pub use weld::weld;
+pub use weld::{parted, weld};

@@ -320,7 +320,7 @@ fn neighbours_of(points: &[Point3], triangles: &[[u32; 3]]) -> Result<Vec<[u32; 
                     format!("x {:.3} y {:.3} z {:.3}", p.x, p.y, p.z)
                 };
                 return Err(MeshFieldError::Mesh(format!(
-                    "the edge from {} to {} has {reason}: no field goes on across it; `strategy = \"zigzag\"` needs none",
+                    "the edge from {} to {} has {reason}: no field goes on across it",
                     place(sides[first].0),
                     place(sides[first].1)
                 )));

@@ -91,3 +91,42 @@ fn difference(mesh: &FieldMesh, values: &[f64], exact: impl Fn(&Point3) -> f64) 
     let mean = off.iter().sum::<f64>() / n;
     (off.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt()
 }
+
+/// A plate in two halves and a fin on the edge between them; and a band with half a turn, which no edge can be seen to blame for.
+#[test]
+fn parted_surfaces_have_borders_where_more_than_two_triangles_meet() {
+    let points: Vec<Point3> = [
+        [0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [1.0, 1.0, 0.0],
+        [2.0, 0.0, 0.0],
+        [2.0, 1.0, 0.0],
+        [1.0, 0.5, 1.0],
+    ]
+    .map(Point3::from)
+    .to_vec();
+    let halves = vec![[0, 2, 1], [1, 2, 3], [2, 4, 3], [3, 4, 5], [2, 3, 6]];
+    assert!(FieldMesh::new(points.clone(), halves.clone(), None).is_err());
+    let (parted_points, triangles) = parted(&points, &halves);
+    let mesh = FieldMesh::new(parted_points, triangles, None).unwrap();
+    // Two halves of four corners each, and the fin.
+    assert_eq!((mesh.points().len(), mesh.pieces().1), (11, 3));
+    // What is a surface stays one.
+    let (same, whole) = parted(&points[..6], &halves[..4]);
+    assert_eq!((same.len(), FieldMesh::new(same, whole, None).unwrap().pieces().1), (6, 1));
+    let band: Vec<Point3> = (0..10)
+        .map(|k| {
+            let (around, turn) = (f64::from(k / 2) * 1.2566, f64::from(k / 2) * 0.62832);
+            let out = if k % 2 == 0 { 0.3 } else { -0.3 };
+            let r = 2.0 + out * turn.cos();
+            Point3::new(r * around.cos(), r * around.sin(), out * turn.sin())
+        })
+        .collect();
+    let mut strip: Vec<[u32; 3]> =
+        (0..4).flat_map(|k| [[2 * k, 2 * k + 2, 2 * k + 1], [2 * k + 1, 2 * k + 2, 2 * k + 3]]).collect();
+    strip.extend([[8, 1, 9], [9, 1, 0]]);
+    let (points, triangles) = parted(&band, &strip);
+    let mesh = FieldMesh::new(points, triangles, None).unwrap();
+    assert_eq!((mesh.points().len(), mesh.pieces().1), (12, 1));
+}

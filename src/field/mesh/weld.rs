@@ -126,6 +126,43 @@ pub fn weld(points: &[Point3], triangles: &[[u32; 3]], distance: f64) -> (Vec<Po
     compact(points, sewn)
 }
 
+/// The same triangles, joined only where an edge has two of them, one on each side: where more meet, or both lie on one side, each
+/// gets vertices of its own there, and the surface has borders.
+pub fn parted(points: &[Point3], triangles: &[[u32; 3]]) -> (Vec<Point3>, Vec<[u32; 3]>) {
+    let corner = |t: usize, k: usize| (3 * t + k % 3) as u32;
+    // Both corners of a side by its vertices, the lesser one first, and whether it runs that way.
+    let mut sides: HashMap<[u32; 2], Vec<([u32; 2], bool)>> = HashMap::new();
+    for (t, corners) in triangles.iter().enumerate() {
+        for k in 0..3 {
+            let (from, to) = (corners[k], corners[(k + 1) % 3]);
+            let (ends, at) = ([from.min(to), from.max(to)], [corner(t, k), corner(t, k + 1)]);
+            let side = if from < to { (at, true) } else { ([at[1], at[0]], false) };
+            sides.entry(ends).or_default().push(side);
+        }
+    }
+    let mut head: Vec<u32> = (0..3 * triangles.len() as u32).collect();
+    for side in sides.values() {
+        if let [(a, forth), (b, back)] = side[..]
+            && forth != back
+        {
+            for (a, b) in a.into_iter().zip(b) {
+                let (a, b) = (root(&head, a), root(&head, b));
+                head[a.max(b) as usize] = a.min(b);
+            }
+        }
+    }
+    let mut vertex_of: HashMap<u32, u32> = HashMap::new();
+    let mut vertices = Vec::new();
+    let mut vertex = |t: usize, k: usize| {
+        *vertex_of.entry(root(&head, corner(t, k))).or_insert_with(|| {
+            vertices.push(points[triangles[t][k] as usize]);
+            vertices.len() as u32 - 1
+        })
+    };
+    let triangles = (0..triangles.len()).map(|t| [0, 1, 2].map(|k| vertex(t, k))).collect();
+    (vertices, triangles)
+}
+
 /// What a number is joined to in the end, each to a lesser one.
 pub(super) fn root(head: &[u32], mut v: u32) -> u32 {
     while head[v as usize] != v {

@@ -10,7 +10,7 @@ use std::collections::BinaryHeap;
 
 use crate::vocabulary::PlanError;
 use cutter::Cutter;
-use field::mesh::{Bend, FieldMesh, MeshFieldError, Refined, Sheets, weld};
+use field::mesh::{Bend, FieldMesh, MeshFieldError, Refined, Sheets, parted, weld};
 use geometry::{Point3, Vector3};
 use part::Part;
 
@@ -138,6 +138,9 @@ pub(crate) fn reachable(part: &Part, cutter: &Cutter, interval: f64) -> Result<R
     } else {
         (mesh.vertices().to_vec(), mesh.triangles().to_vec())
     };
+    // A field goes on across an edge of two triangles only.
+    let (points, triangles) =
+        if mesh.surface().is_err() { parted(&points, &triangles) } else { (points, triangles) };
     let whole = FieldMesh::new(points, triangles, None).map_err(refused)?;
     let area: f64 = (0..whole.triangles().len()).map(|t| whole.area(t)).sum();
     // An equilateral triangle of edge l has 0.43 l², those of a split mesh about half of it.
