@@ -33,11 +33,11 @@ pub struct LevelLine {
 /// Angles between passes and the feed directions asked for, rad.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DirectionError {
-    /// Root mean square over the length of all passes, by how much the direction matters at each place.
+    /// Root mean square over the length of all passes, or over the rows of a table, or over the length of guides and borders.
     pub rms: f64,
     /// The greatest.
     pub max: f64,
-    /// What it changes by to the next place of its pass: between places it may be greater by as much.
+    /// Between the places that were looked at it may be greater by as much, and at a row it may be less.
     pub error_bound: f64,
     /// Where it is.
     pub at: Point3,

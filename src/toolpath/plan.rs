@@ -63,10 +63,10 @@ impl Plan {
 
 impl Kept {
     pub(crate) fn new(planned: Passes, strategy: &dyn Strategy) -> Self {
-        let Passes { passes, mut notes, mut field, contacts, functions, faces, .. } = planned;
+        let Passes { passes, mut notes, mut field, contacts, obedience, functions, faces, .. } = planned;
         let field = strategy.shows_field().then(|| {
             planned_field::measure(&mut field, &contacts);
-            field.direction_error = obedience::measure(&contacts);
+            field.direction_error = obedience.error();
             notes.extend(field.direction_error.as_ref().and_then(obedience::note));
             Arc::new(field)
         });

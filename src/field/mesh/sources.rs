@@ -24,8 +24,8 @@ pub enum Sense {
 }
 
 impl Sense {
-    /// The feed for a curve with this tangent on a surface with this normal.
-    fn feed(self, tangent: Vector3, normal: &Vector3) -> Vector3 {
+    /// The feed for a curve with this tangent on a surface with this unit normal.
+    pub fn feed(self, tangent: Vector3, normal: &Vector3) -> Vector3 {
         match self {
             Self::Along => tangent,
             Self::Across => normal.cross(&tangent),

@@ -143,8 +143,34 @@ impl<'a> MeshTracer<'a> {
         (mean - normal * normal.dot(&mean)).try_normalize(1e-12)
     }
 
+    /// The points of a streamline, and where it passes from one triangle to the next on its way between them.
+    pub fn over_triangles(&self, line: &Streamline) -> Vec<MeshPoint> {
+        let mut points = Vec::with_capacity(2 * line.points.len());
+        for (k, at) in line.points.iter().enumerate() {
+            points.push(*at);
+            let closing = line.points.first().filter(|_| line.closed);
+            let Some(next) = line.points.get(k + 1).or(closing) else { break };
+            let (way, normal) = (next.position - at.position, self.normal(at));
+            if let Some(along) = (way - normal * normal.dot(&way)).try_normalize(0.0) {
+                self.walked_over(*at, along, way.norm(), &mut |crossing| points.push(crossing));
+            }
+        }
+        points
+    }
+
     /// The end of a straight way from a point, `along` a unit vector in its triangle.
-    fn walked(&self, mut at: MeshPoint, mut along: Vector3, mut length: f64) -> Walked {
+    fn walked(&self, at: MeshPoint, along: Vector3, length: f64) -> Walked {
+        self.walked_over(at, along, length, &mut |_| ())
+    }
+
+    /// The same; `crossed` is told each place on a side of a triangle, as a point of the next one.
+    fn walked_over(
+        &self,
+        mut at: MeshPoint,
+        mut along: Vector3,
+        mut length: f64,
+        crossed: &mut dyn FnMut(MeshPoint),
+    ) -> Walked {
         for _ in 0..MOST_CROSSED {
             let t = at.triangle as usize;
             let rates = self.mesh.hat_gradients(t).map(|hat| hat.dot(&along));
@@ -166,6 +192,7 @@ impl<'a> MeshTracer<'a> {
             };
             along = turned(&self.normal(&at), &self.mesh.area_vector(next).normalize(), &along);
             at = self.in_triangle(next, at.position);
+            crossed(at);
         }
         Walked { at, along, left: length }
     }

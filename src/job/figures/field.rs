@@ -44,14 +44,14 @@ pub struct FieldFigures {
     pub singular_point_count: usize,
     /// The first of them, 100 at most.
     pub singular_points: Vec<SingularPointFigures>,
-    /// The angle between passes and the feed directions asked for, degrees: root mean square over the length of all passes, by
-    /// how much the direction matters at each place. Absent where none were asked for, as the two that follow.
+    /// The angle between passes and the feed directions asked for, degrees: root mean square over the length of all passes; over the
+    /// rows of a table; over the length of guides and borders. Absent where none were asked for, as the three that follow.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction_error_rms_deg: Option<f64>,
     /// The greatest, degrees.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction_error_max_deg: Option<f64>,
-    /// By how much it may be greater between the places that were looked at, degrees.
+    /// By how much it may be greater between the places that were looked at, and less at a row, degrees.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction_error_bound_deg: Option<f64>,
     /// Where.
@@ -100,7 +100,13 @@ impl FieldFigures {
 }
 
 pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> {
-    let Some(field) = &run.planned.plan.field else { return Ok(Finding::default()) };
+    let limit = run.scene().off_direction;
+    let unjudged = |error: Option<DirectionError>| {
+        Vec::from_iter((limit.is_some() && error.is_none()).then(|| UNJUDGED.to_owned()))
+    };
+    let Some(field) = &run.planned.plan.field else {
+        return Ok(Finding { notes: unjudged(None), ..Finding::default() });
+    };
     let figures = FieldFigures::new(field, &run.planned.plan.kept.functions);
     let mut rows = vec![
         ("planned as", figures.planned_as.join("; ")),
@@ -121,13 +127,13 @@ pub(super) fn find(run: &Run<'_>, _: &dyn Monitor) -> Result<Finding, JobError> 
     }
     let meaning = sentence.is_some().then_some((
         "off the directions asked for",
-        "Angle between passes and the feed directions that the scene asks for, at the contacts along all passes. Where \
-         directions turn around a point, passes cannot follow them close to it.",
+        "Angle between passes and the feed directions that the scene asks for: along all passes, or at the rows of a table, or along \
+         guides and borders. Where directions turn around a point, passes cannot follow them close to it.",
     ));
     let figure =
         Figure { key: "field", value: value(&figures)?, rows, sentence, meaning, ..Figure::default() };
-    let claims = field.direction_error.zip(run.scene().off_direction).map(obeys).into_iter().collect();
-    Ok(Finding { figure: Some(figure), claims, ..Finding::default() })
+    let claims = field.direction_error.zip(limit).map(obeys).into_iter().collect();
+    Ok(Finding { figure: Some(figure), claims, notes: unjudged(field.direction_error) })
 }
 
 /// The claim that passes keep to the directions asked for, within a limit, rad.
@@ -138,11 +144,19 @@ fn obeys((error, limit): (DirectionError, f64)) -> Claim {
         place(error.at.into())
     );
     let claim = Claim::length("direction", Gravity::Finish, limit, max, bound).told(text);
-    Claim { unit: "deg", ..claim }
+    Claim { unit: "deg", decided_by: DECIDED_BY, ..claim }
 }
+
+/// What decides whether passes keep to their directions: no cell does, because it is not measured by the cut.
+const DECIDED_BY: &str = "passes that turn less there, or a limit with more room, would decide it";
+
+/// What is told where a limit for directions has nothing to hold to.
+const UNJUDGED: &str =
+    "`[tolerance] direction` judges nothing here: no passes of this toolpath were asked for a direction";
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::Session;
     use report::{ToolpathResult, Verdict};
     use scene::Scene;
@@ -174,6 +188,17 @@ mod tests {
         let free = planned(0.5, "direction = { angle = 30 }\nfollow = 0");
         assert_eq!(claim(&free), Some(Verdict::Fail));
         assert!(free.notes.iter().any(|note| note.contains("off the directions")), "{:?}", free.notes);
-        assert_eq!(claim(&planned(0.5, "direction = \"shortest\"")), None, "none was asked for");
+        let shortest = planned(0.5, "direction = \"shortest\"");
+        assert_eq!(claim(&shortest), None, "none was asked for");
+        assert!(shortest.notes.iter().any(|note| note == UNJUDGED), "{:?}", shortest.notes);
+        assert!(!along.notes.iter().any(|note| note == UNJUDGED), "{:?}", along.notes);
+    }
+
+    /// A limit within the bound of the angle is not decided by cells.
+    #[test]
+    fn what_would_decide_a_limit_for_directions_is_told() {
+        let error = DirectionError { rms: 0.01, max: 0.1, error_bound: 0.02, at: geometry::Point3::origin() };
+        let sentence = obeys((error, 0.11)).sentence();
+        assert!(sentence.contains("a limit with more room") && !sentence.contains("cell"), "{sentence}");
     }
 }

@@ -227,10 +227,11 @@ mod tests {
             let contact = |&at: &[f64; 2]| Contact {
                 at: self.chart.jet(at[0], at[1]).p,
                 across: Vector3::y(),
+                normal: Vector3::z(),
                 allowed: self.interval,
                 inside: true,
                 parameters: Some(at),
-                off: None,
+                asked: None,
             };
             curve.along(run).map(contact).collect()
         }

@@ -269,6 +269,7 @@ impl LevelSource for ChartGuide<'_> {
     }
 
     fn contacts(&self, curve: &Track<[f64; 2]>, run: Option<[usize; 2]>) -> Vec<Contact> {
+        let Some((points, [first, end])) = curve.opened(run) else { return Vec::new() };
         let contact = |&[u, v]: &[f64; 2]| {
             let p = self.chart.at(u, v)?;
             let t = level_tangent(&p, self.field, [u, v])?;
@@ -277,13 +278,14 @@ impl LevelSource for ChartGuide<'_> {
             Some(Contact {
                 at: p.jet.p,
                 across,
+                normal: p.normal,
                 allowed,
                 inside: self.chart.holds([u, v]),
                 parameters: Some([u, v]),
-                off: None,
+                asked: None,
             })
         };
-        curve.along(run).filter_map(contact).collect()
+        points[first..=end].iter().filter_map(contact).collect()
     }
 
     fn least_allowed(&self, from: &[f64; 2], to: &[f64; 2]) -> Option<Allowed> {

@@ -8,7 +8,7 @@ use super::halving::Allowed;
 use super::spacing::AllowedStep;
 use crate::surface::feed::SMOOTHING_OVER_RADIUS;
 use crate::surface::mesh_surface::not_applicable;
-use crate::vocabulary::{Lines, OffDirection, PlanError};
+use crate::vocabulary::{Lines, PlanError};
 use cutter::Cutter;
 use field::mesh::{
     FieldMesh, Held, Line, MeshCurve, MeshFieldError, MeshLevels, MeshPoint, MeshStream, MeshTracer, Wanted,
@@ -57,8 +57,8 @@ pub(crate) struct OnTriangles<'a> {
     pub mesh: &'a FieldMesh,
     pub levels: MeshLevels<'a>,
     psi: &'a [f64],
-    /// The directions asked for at the vertices; empty where none are.
-    wanted: &'a [Wanted],
+    /// The unit tangents asked for at the vertices; empty where none are, or in rows.
+    asked: &'a [Option<Vector3>],
     /// The flow at the vertices and the length of a step, mm, where streamlines are traced.
     traced: Option<(Vec<Vector3>, f64)>,
 }
@@ -68,14 +68,14 @@ impl<'a> OnTriangles<'a> {
     pub fn new(
         mesh: &'a FieldMesh,
         psi: &'a [f64],
-        wanted: &'a [Wanted],
+        asked: &'a [Option<Vector3>],
         lines: Lines,
         step: f64,
     ) -> Result<Self, PlanError> {
         let levels = MeshLevels::new(mesh, psi).map_err(refused)?;
         let flow = || mesh.normals().iter().zip(levels.gradients()).map(|(n, g)| g.cross(n)).collect();
         let traced = (lines == Lines::RungeKutta).then(|| (flow(), step));
-        Ok(Self { mesh, levels, psi, wanted, traced })
+        Ok(Self { mesh, levels, psi, asked, traced })
     }
 
     /// The lines of a level.
@@ -87,7 +87,7 @@ impl<'a> OnTriangles<'a> {
             for curve in &mut curves {
                 let (seed, length) = (curve.points[curve.points.len() / 2], curve.length());
                 let line = tracer.through(seed, *step, LENGTH_RATIO * length + step);
-                let line = MeshCurve { points: line.points, closed: line.closed };
+                let line = MeshCurve { points: tracer.over_triangles(&line), closed: line.closed };
                 let alike = length <= LENGTH_RATIO * line.length() + step;
                 if line.closed == curve.closed && alike {
                     *curve = line;
@@ -111,24 +111,28 @@ impl<'a> OnTriangles<'a> {
         self.levels.gradient_at(p)
     }
 
+    /// The weights of the corners of a triangle at a place of its plane; some are negative beside it.
+    pub fn weights(&self, t: u32, position: &Point3) -> [f64; 3] {
+        let (corners, hats) = (self.mesh.corners(t as usize), self.mesh.hat_gradients(t as usize));
+        [0, 1, 2].map(|k| 1.0 + hats[k].dot(&(position - corners[k])))
+    }
+
     /// A place as a point of a triangle, which it may lie beside.
     pub fn in_triangle(&self, t: u32, position: Point3) -> MeshPoint {
-        let (corners, hats) = (self.mesh.corners(t as usize), self.mesh.hat_gradients(t as usize));
-        let weights = [0, 1, 2].map(|k| (1.0 + hats[k].dot(&(position - corners[k]))).clamp(0.0, 1.0));
+        let weights = self.weights(t, &position).map(|weight| weight.clamp(0.0, 1.0));
         MeshPoint { triangle: t, weights, position }
     }
 
-    /// How far a pass with a unit tangent `across` it is off the direction asked for: the mean of the corners', as lines.
-    pub fn off_direction(&self, p: &MeshPoint, across: &Vector3, normal: &Vector3) -> Option<OffDirection> {
+    /// The unit tangent asked for at a point: the mean of the corners', as lines.
+    pub fn asked_at(&self, p: &MeshPoint, normal: &Vector3) -> Option<Vector3> {
         let corners = self.mesh.triangles()[p.triangle as usize];
-        let asked = (0..3).filter_map(|k| Some((p.weights[k], (*self.wanted.get(corners[k] as usize)?)?)));
-        let (mut sum, mut matters) = (Vector3::zeros(), 0.0);
-        for (weight, (line, of_corner)) in asked {
-            sum += line * (weight * if line.dot(&sum) < 0.0 { -1.0 } else { 1.0 });
-            matters += weight * of_corner;
+        let mut sum = Vector3::zeros();
+        for k in 0..3 {
+            if let Some(Some(line)) = self.asked.get(corners[k] as usize) {
+                sum += line * (p.weights[k] * if line.dot(&sum) < 0.0 { -1.0 } else { 1.0 });
+            }
         }
-        let asked = (sum - normal * normal.dot(&sum)).try_normalize(1e-9)?;
-        Some(OffDirection::new(across, normal, &asked, matters))
+        (sum - normal * normal.dot(&sum)).try_normalize(1e-9)
     }
 
     /// What each of the first `count` triangles allows in its middle, by what a point is told to allow, and whether the surface is too

@@ -300,7 +300,15 @@ mod tests {
         // The surface rises by half along y.
         let across = Vector3::new(0.0, 1.0, 0.5).normalize();
         (0..=25)
-            .map(|k| Contact { at: at(k), across, allowed: 0.5, inside: true, parameters: None, off: None })
+            .map(|k| Contact {
+                at: at(k),
+                across,
+                normal: Vector3::x().cross(&across),
+                allowed: 0.5,
+                inside: true,
+                parameters: None,
+                asked: None,
+            })
             .collect()
     }
 
@@ -341,10 +349,11 @@ mod tests {
             Contact {
                 at: Point3::origin() + across * radius,
                 across,
+                normal: Vector3::z(),
                 allowed: 1.0,
                 inside: true,
                 parameters: None,
-                off: None,
+                asked: None,
             }
         };
         let mut field = PlannedField::default();

@@ -12,13 +12,14 @@ use super::nest::{NestError, planar_mesh};
 use super::route::{Entry, Run, begun_near};
 use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between};
 use crate::levels::on_triangles::{OnTriangles, along_directions, refused, smooth_directions};
-use crate::levels::planned_field;
 use crate::levels::spacing::place_levels;
+use crate::levels::{obedience, planned_field};
+use crate::surface::asked::{self, Ground};
 use crate::surface::feed;
 use crate::surface::mesh_surface::not_applicable;
 use crate::vocabulary::{Contact, FeedDirection, Lines, Passes, PlanError};
 use cutter::Cutter;
-use field::mesh::{FieldMesh, Held, Line as FeedLine, MeshCurve, MeshPoint, Wanted, singular_points};
+use field::mesh::{FieldMesh, Held, Line as FeedLine, MeshCurve, MeshPoint, singular_points};
 use geometry::{Piece, Point2, Point3, SegmentGrid, Vector2, Vector3};
 use work::monitor::{Cancelled, Monitor};
 
@@ -63,6 +64,15 @@ pub fn runs(
     let places = source.on.places(mesh.triangles().len(), |p| Some((source.allowed_at(p), false)));
     let placed = place_levels(&places, range, vectors.lines.steps(), &mut planned.notes);
     let mut passes = along_and_between(&source, &placed, range, SAMPLING * step, monitor)?;
+    // Parameters of a pocket are x and y.
+    let borders = || asked::borders_of(mesh);
+    let ground = Ground {
+        borders: &borders,
+        on_patches: None,
+        covers: &|p| piece.contains(p),
+        spacing: SAMPLING * step,
+    };
+    passes.obedience = obedience::measure(&passes.contacts, &ground.rows(&vectors.direction));
     planned_field::set_plane(&mut passes.field, mesh, &source.on.levels, lines);
     passes.field.singular_points = singular_points(mesh, lines, MERGE_OVER_RADIUS * cutter.radius());
     passes.notes.extend(planned_field::singular_note(&passes.field));
@@ -74,9 +84,9 @@ pub fn runs(
 /// A stream function on triangles.
 pub(super) struct Fitted {
     pub mesh: FieldMesh,
-    /// The directions asked for at the vertices.
-    wanted: Vec<Wanted>,
-    /// The same, smooth and oriented alike.
+    /// The unit tangents asked for at the vertices, where one is at every place.
+    asked: Vec<Option<Vector3>>,
+    /// The directions at the vertices, smooth and oriented alike.
     lines: Vec<FeedLine>,
     /// Its values at the vertices.
     psi: Vec<f64>,
@@ -106,12 +116,13 @@ impl Fitted {
         let held = Held { fixed: &[], tied: if vectors.along_walls { mesh.loops() } else { &[] } };
         let weight = vectors.direction_weight;
         let psi = along_directions(&mesh, &lines, &density, matters, weight, &held)?.values;
-        Ok(Self { mesh, wanted, lines, psi })
+        let asked = wanted.iter().map(|wanted| asked::everywhere(&vectors.direction, wanted)).collect();
+        Ok(Self { mesh, asked, lines, psi })
     }
 
     /// Its lines, which may lie `step` apart, mm.
     pub fn source(&self, step: f64, lines: Lines) -> Result<Source<'_>, PlanError> {
-        let on = OnTriangles::new(&self.mesh, &self.psi, &self.wanted, lines, SAMPLING * step)?;
+        let on = OnTriangles::new(&self.mesh, &self.psi, &self.asked, lines, SAMPLING * step)?;
         Ok(Source { on, step })
     }
 }
@@ -237,13 +248,24 @@ impl LevelSource for Source<'_> {
     }
 
     fn contacts(&self, curve: &Track<Spot>, run: Option<[usize; 2]>) -> Vec<Contact> {
-        let contact = |spot: &Spot| {
-            let across = self.on.gradient(&spot.at).try_normalize(1e-300)?;
-            let off = self.on.off_direction(&spot.at, &across, &Vector3::z());
-            let (at, allowed) = (spot.at.position, spot.allowed.width);
-            Some(Contact { at, across, allowed, inside: true, parameters: None, off })
+        let Some((spots, [first, end])) = curve.opened(run) else { return Vec::new() };
+        let last = spots.len() - 1;
+        let contact = |k: usize| {
+            let before = if k == 0 && curve.closed { last - 1 } else { k.saturating_sub(1) };
+            let after = if k == last && curve.closed { 1 } else { (k + 1).min(last) };
+            let along = spots[after].at.position - spots[before].at.position;
+            let (Spot { at, allowed }, normal) = (&spots[k], Vector3::z());
+            Some(Contact {
+                at: at.position,
+                across: normal.cross(&along).try_normalize(1e-300)?,
+                normal,
+                allowed: allowed.width,
+                inside: true,
+                parameters: None,
+                asked: self.on.asked_at(at, &normal),
+            })
         };
-        curve.along(run).filter_map(contact).collect()
+        (first..=end).filter_map(contact).collect()
     }
 
     fn pass(

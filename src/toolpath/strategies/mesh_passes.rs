@@ -12,19 +12,20 @@ use super::streamline::FITTED;
 use crate::levels::halving::{Allowed, LevelSource, Track, along_and_between, whole_pass};
 use crate::levels::on_triangles::{OnTriangles, along_directions, refused, smooth_directions};
 use crate::levels::spacing::place_levels;
-use crate::levels::{planned_field, spirals};
+use crate::levels::{obedience, planned_field, spirals};
 use crate::surface::border::useful_overrun;
-use crate::surface::feed;
 use crate::surface::mesh_surface::{ConnectedPiece, MeshSurface, STEEPEST_COSINE, not_applicable, reachable};
+use crate::surface::{asked, feed};
 use crate::vocabulary::{
     Contact, Faces, FeedDirection, LevelFunction, Levelled, Lines, PassSettings, Passes, PlanError, Step,
     Task,
 };
 use cutter::Cutter;
 use drop_cutter::DropCutter;
-use field::mesh::{Bend, Held, Line, MeshCurve, MeshPoint, Sense, Wanted};
+use field::mesh::{Bend, FieldMesh, Held, Line, MeshCurve, MeshPoint, Sense, Wanted};
 use field::{DIRECTION_WEIGHT, Packed};
 use geometry::{Point2, Point3, Vector2, Vector3};
+use part::Part;
 use scallop::{FeedCurvature, strip_width_at};
 use work::monitor::{Cancelled, Monitor};
 
@@ -40,6 +41,16 @@ const BORDER_SHARE: f64 = 0.6;
 /// Evening out moves a pass by at most this share of its interval; the scallop grows by twice that
 /// share twice over where two neighbours move apart.
 const MOST_MOVED: f64 = 0.02;
+
+/// Where the axis is farther from its place over the level than this many times that, the cutter rolls over an edge.
+const ROLLING: f64 = 3.0;
+
+/// Contacts from one point of a curve to before the next, where passes are compared with directions: at borders, and where the surface is
+/// nearly as concave as the cutter, contacts turn far more sharply than the axis.
+const PARTS_COMPARED: usize = 4;
+
+/// A length over which the normal is differentiated, mm.
+const DIFFERENCE: f64 = 1e-4;
 
 /// Times that a curve is evened out.
 const EVENINGS: usize = 2;
@@ -111,7 +122,7 @@ fn on_piece(
         // A fitted function is solved again, with its notes: that takes little.
         (Aim::Fitted(direction, weight, _), _) => {
             let (lines, matters) = feed_lines(task, direction, piece, surface, &wanted, &mut all)?;
-            let values = along_lines(task, (&lines, &matters), weight, surface, &mut all)?;
+            let values = along_lines(task, (&lines, &matters), weight, surface)?;
             let function = LevelFunction::Mesh(values.into());
             vec![Levelled { function, planned_as: FITTED.into(), told: None }]
         }
@@ -144,7 +155,7 @@ fn on_piece(
     let mut best: Option<(f64, Passes)> = None;
     let several = functions.len() > 1;
     for levelled in functions {
-        let passes = along_function(task, aim, surface, &wanted, levelled)?;
+        let passes = along_function(task, aim, &piece.mesh, surface, &wanted, levelled)?;
         let worth = match aim {
             Aim::Shortest(_, objective) if several => objective.worth(task, &passes)?,
             _ => 0.0,
@@ -169,13 +180,14 @@ fn along_borders(task: &Task<'_>, piece: &ConnectedPiece, surface: &MeshSurface)
     let wanted = feed::on_mesh(task.part, task.cutter, &direction, piece, surface).ok()?;
     let mut unused = Passes::default();
     let (lines, matters) = feed_lines(task, &direction, piece, surface, &wanted, &mut unused).ok()?;
-    along_lines(task, (&lines, &matters), DIRECTION_WEIGHT, surface, &mut unused).ok()
+    along_lines(task, (&lines, &matters), DIRECTION_WEIGHT, surface).ok()
 }
 
 /// Passes along the lines of a function.
 fn along_function(
     task: &Task<'_>,
     aim: Aim,
+    piece: &FieldMesh,
     surface: &MeshSurface,
     wanted: &[Wanted],
     levelled: Levelled,
@@ -188,17 +200,26 @@ fn along_function(
         Aim::Fitted(_, _, lines) => lines,
         Aim::Shortest(..) => Lines::Levels,
     };
-    let on = OnTriangles::new(&surface.mesh, values, wanted, lines, settings.sampling)?;
+    let direction = match aim {
+        Aim::Fitted(direction, ..) | Aim::Shortest(Some((direction, _)), _) => Some(direction),
+        Aim::Shortest(None, _) => None,
+    };
+    let of_vertex = |wanted: &Wanted| asked::everywhere(direction?, wanted);
+    let parts = if direction.is_some() { PARTS_COMPARED } else { 1 };
+    let asked: Vec<Option<Vector3>> = wanted.iter().map(of_vertex).collect();
+    let on = OnTriangles::new(&surface.mesh, values, &asked, lines, settings.sampling)?;
     let own_values = values.iter().zip(&surface.origin).enumerate();
     let own_values = own_values.filter(|&(v, (_, &origin))| origin as usize == v).map(|(_, (psi, _))| *psi);
     let range = own_values.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], x| [lo.min(x), hi.max(x)]);
     let drop = DropCutter::watched(part, cutter, monitor)?;
-    let guide = MeshGuide { surface, on, cutter, drop, settings, monitor };
+    let guide = MeshGuide { part, surface, on, parts, cutter, drop, settings, monitor };
     let places = guide.on.places(surface.own_triangles, |p| guide.allowed_at(p));
     let mut notes = Vec::new();
     let placed = place_levels(&places, range, lines.steps(), &mut notes);
     let mut passes = along_and_between(&guide, &placed, range, settings.sampling, monitor)?;
     passes.notes.splice(0..0, notes);
+    let rows = direction.map(|direction| asked::on_mesh(direction, part, piece, settings.sampling));
+    passes.obedience = obedience::measure(&passes.contacts, &rows.unwrap_or_default());
     planned_field::set_mesh_levels(&mut passes.field, &guide.on.levels, range, surface.own_triangles);
     if matches!(aim, Aim::Shortest(None, _)) {
         let lines = guide.on.level_lines();
@@ -217,7 +238,6 @@ fn along_lines(
     (lines, matters): (&[Line], &[f64]),
     direction_weight: f64,
     surface: &MeshSurface,
-    all: &mut Passes,
 ) -> Result<Vec<f64>, PlanError> {
     let Task { cutter, ref settings, .. } = *task;
     let mesh = &surface.mesh;
@@ -229,10 +249,6 @@ fn along_lines(
     let density: Vec<f64> = (0..lines.len()).map(|v| 1.0 / width(own(v), &across(own(v)))).collect();
     let matters = |v: usize| matters[own(v)];
     let stream = along_directions(mesh, lines, &density, matters, direction_weight, &Held::default())?;
-    all.notes.push(format!(
-        "the stream function follows the feed directions within {:.2} degrees (root mean square)",
-        stream.angle_rms.to_degrees()
-    ));
     Ok(stream.values)
 }
 
@@ -308,8 +324,11 @@ impl Knot {
 
 /// Turns lines of a function on a mesh into passes.
 struct MeshGuide<'a> {
+    part: &'a Part,
     surface: &'a MeshSurface,
     on: OnTriangles<'a>,
+    /// Contacts from one point of a curve to before the next.
+    parts: usize,
     cutter: &'a Cutter,
     drop: DropCutter<'a>,
     settings: &'a PassSettings<'a>,
@@ -327,6 +346,43 @@ impl MeshGuide<'_> {
     fn place(&self, p: &MeshPoint) -> Point3 {
         let corners = self.surface.mesh.corners(p.triangle as usize);
         Point3::from((0..3).map(|k| corners[k].coords * p.weights[k]).sum::<Vector3>())
+    }
+
+    /// The contact of a cutter whose axis is at a place, moving `toward` another, near that of the level between two points of its curve.
+    fn touch(&self, from: &Spot, to: &Spot, t: f64, axis: Point2, toward: Vector2) -> Option<Contact> {
+        let triangle = from.at.triangle;
+        let level = from.at.position + (to.at.position - from.at.position) * t;
+        let [a, b, _] = self.surface.mesh.corners(triangle as usize);
+        let e1 = (b - a).try_normalize(1e-300)?;
+        let e2 = self.surface.mesh.area_vector(triangle as usize).try_normalize(1e-300)?.cross(&e1);
+        let axis_at = |p: Point3| {
+            let at = MeshPoint { triangle, weights: self.on.weights(triangle, &p), position: p };
+            p.coords.xy() + self.cutter.axis_offset(&self.normal(&at))
+        };
+        // How the axis moves with the contact, and so the contact with the axis.
+        let here = axis_at(level);
+        let [m1, m2] = [e1, e2].map(|e| (axis_at(level + e * DIFFERENCE) - here) / DIFFERENCE);
+        let determinant = m1.perp(&m2);
+        let moved = |by: Vector2| (e1 * by.perp(&m2) + e2 * m1.perp(&by)) / determinant;
+        let allowed = from.allowed.width + t * (to.allowed.width - from.allowed.width);
+        let off = axis.coords - here;
+        let is_rolling = off.norm() > ROLLING * MOST_MOVED * allowed || determinant <= 0.0;
+        let position = if is_rolling { level } else { level + moved(off) };
+        let at = self.on.in_triangle(triangle, position);
+        let normal = self.normal(&at);
+        let along = if is_rolling { to.at.position - from.at.position } else { moved(toward) };
+        // Points of traced lines, and steps to them, may end beside the part.
+        let own = (triangle as usize) < self.surface.own_triangles;
+        let on_part = || self.part.bvh().highest_at(self.part.mesh(), position.x, position.y).is_some();
+        Some(Contact {
+            at: position,
+            across: normal.cross(&along).try_normalize(1e-300)?,
+            normal,
+            allowed,
+            inside: own && on_part(),
+            parameters: None,
+            asked: if is_rolling { None } else { self.on.asked_at(&at, &normal) },
+        })
     }
 
     /// Step and width at a point, and whether the surface is too concave there.
@@ -450,6 +506,43 @@ impl MeshGuide<'_> {
     }
 }
 
+/// A smooth curve through the places of the axis, a unit from each to the next (Catmull and Rom 1974).
+struct Smooth {
+    axes: Vec<Point2>,
+    closed: bool,
+}
+
+impl Smooth {
+    fn before(&self, k: usize) -> Point2 {
+        let (axes, last) = (&self.axes, self.axes.len() - 1);
+        match k {
+            0 if self.closed => axes[last - 1],
+            0 => axes[0] + (axes[0] - axes[1]),
+            k => axes[k - 1],
+        }
+    }
+
+    fn after(&self, k: usize) -> Point2 {
+        let (axes, last) = (&self.axes, self.axes.len() - 1);
+        match k {
+            k if k < last => axes[k + 1],
+            _ if self.closed => axes[1],
+            _ => axes[last] + (axes[last] - axes[last - 1]),
+        }
+    }
+
+    /// Its place at `s`, and its derivative.
+    fn at(&self, s: f64) -> (Point2, Vector2) {
+        let k = (s as usize).min(self.axes.len() - 2);
+        let t = s - k as f64;
+        let (p, q) = (self.axes[k], self.axes[k + 1]);
+        let (m, l) = ((q - self.before(k)) * 0.5, (self.after(k + 1) - p) * 0.5);
+        let d = q - p;
+        let [second, third] = [d * 3.0 - m * 2.0 - l, m + l - d * 2.0];
+        (p + (m + (second + third * t) * t) * t, m + (second * 2.0 + third * (3.0 * t)) * t)
+    }
+}
+
 /// Takes the wiggle of linear elements out of a curve, within bounds; the ends of open ones stay.
 fn even_out(spots: &mut [Spot], closed: bool) {
     let n = spots.len();
@@ -481,21 +574,15 @@ impl LevelSource for MeshGuide<'_> {
     }
 
     fn contacts(&self, curve: &Track<Spot>, run: Option<[usize; 2]>) -> Vec<Contact> {
-        let contact = |spot: &Spot| {
-            let gradient = self.on.gradient(&spot.at);
-            let normal = self.normal(&spot.at);
-            let across = (gradient - normal * normal.dot(&gradient)).try_normalize(1e-300)?;
-            let inside = (spot.at.triangle as usize) < self.surface.own_triangles;
-            Some(Contact {
-                at: spot.at.position,
-                across,
-                allowed: spot.allowed.width,
-                inside,
-                parameters: None,
-                off: self.on.off_direction(&spot.at, &across, &normal),
-            })
+        let Some((spots, [first, end])) = curve.opened(run) else { return Vec::new() };
+        let smooth = Smooth { axes: spots.iter().map(|s| s.axis).collect(), closed: curve.closed };
+        let contact = |n: usize| {
+            let s = first as f64 + n as f64 / self.parts as f64;
+            let k = (s as usize).min(spots.len() - 2);
+            let (axis, toward) = smooth.at(s);
+            self.touch(&spots[k], &spots[k + 1], s - k as f64, axis, toward)
         };
-        curve.along(run).filter_map(contact).collect()
+        (0..=(end - first) * self.parts).filter_map(contact).collect()
     }
 
     fn pass(
@@ -505,26 +592,9 @@ impl LevelSource for MeshGuide<'_> {
         run: Option<[usize; 2]>,
     ) -> Result<Vec<Vec<Point3>>, Cancelled> {
         let Some((spots, [first, end])) = curve.opened(run) else { return Ok(Vec::new()) };
-        let axes: Vec<Point2> = spots.iter().map(|s| s.axis).collect();
-        let last = axes.len() - 1;
-        let before = |k: usize| match k {
-            0 if curve.closed => axes[last - 1],
-            0 => axes[0] + (axes[0] - axes[1]),
-            k => axes[k - 1],
-        };
-        let after = |k: usize| match k {
-            k if k < last => axes[k + 1],
-            _ if curve.closed => axes[1],
-            _ => axes[last] + (axes[last] - axes[last - 1]),
-        };
-        // A smooth curve through the places of the axis (Catmull and Rom 1974).
+        let smooth = Smooth { axes: spots.iter().map(|s| s.axis).collect(), closed: curve.closed };
         let mut tip = |s: f64| {
-            let k = (s as usize).min(last - 1);
-            let t = s - k as f64;
-            let (p, q) = (axes[k], axes[k + 1]);
-            let (m, l) = ((q - before(k)) * 0.5, (after(k + 1) - p) * 0.5);
-            let d = q - p;
-            let at = p + (m + ((d * 3.0 - m * 2.0 - l) + (m + l - d * 2.0) * t) * t) * t;
+            let at = smooth.at(s).0;
             self.drop.at(at.x, at.y).map(|drop| Point3::new(at.x, at.y, drop.tip_z))
         };
         let settings = PassSettings { sampling: 1.0, ..*self.settings };

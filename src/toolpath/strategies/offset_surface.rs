@@ -466,10 +466,11 @@ impl LevelSource for PatchRider<'_> {
             Some(Contact {
                 at: ride.contact.point,
                 across,
+                normal: ride.contact.normal,
                 allowed,
                 inside: true,
                 parameters: None,
-                off: None,
+                asked: None,
             })
         };
         curve.along(run).filter_map(contact).collect()

@@ -247,17 +247,17 @@ fn passes(
         all.notes.extend(feed::check(direction, &part.bounds(), &parameters)?);
     }
     for (k, chart) in charts.iter().enumerate() {
-        let toward = match toward {
+        let spread = match toward {
             Some((direction, dearer)) => Some((feed::on_chart(direction, chart, cutter)?, dearer)),
             None => None,
         };
-        let toward = toward.as_ref().map(|(direction, dearer)| (&**direction, *dearer));
-        let mut planned = on_chart(task, chart, [k, charts.len()], toward, objective)?;
-        if let Some((direction, _)) = toward {
+        let spread = spread.as_ref().map(|(direction, dearer)| (&**direction, *dearer));
+        let mut planned = on_chart(task, chart, [k, charts.len()], spread, objective)?;
+        if let (Some((direction, _)), Some((spread, _))) = (toward, spread) {
             planned_field::set_directions(&mut planned.field, part, chart, |[u, v]| {
-                chart.at(u, v)?.feed(direction, cutter)
+                chart.at(u, v)?.feed(spread, cutter)
             });
-            obedience::compare_on_chart(&mut planned.contacts, chart, direction, cutter);
+            planned.obedience = obedience::on_chart(task, chart, &mut planned.contacts, [direction, spread]);
         }
         all.append(planned);
     }

@@ -480,9 +480,9 @@ impl Net {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::levels::obedience;
     use crate::levels::spacing::level_tangent;
     use crate::strategies::iso_scallop::{arrival, places, predicted_length};
-    use crate::vocabulary::OffDirection;
     use geometry::{NurbsSurface, Point3};
     use std::sync::Arc;
     use work::monitor::Silent;
@@ -601,13 +601,12 @@ mod tests {
             let off = |[u, v]: [f64; 2]| {
                 let p = chart.at(u, v)?;
                 let (asked, matters) = p.feed(&direction, &cutter)?;
-                let across = p.normal.cross(&level_tangent(&p, &psi, [u, v])?);
-                Some(OffDirection::new(&across, &p.normal, &asked, matters))
+                Some((obedience::off(&level_tangent(&p, &psi, [u, v])?, &p.normal, &asked), matters))
             };
             // In the middle, where circles have no direction, it matters little.
-            let off: Vec<OffDirection> = chart.grid(41).filter_map(off).collect();
-            let weights: f64 = off.iter().map(|off| off.matters).sum();
-            let squares: f64 = off.iter().map(|off| off.matters * off.angle.powi(2)).sum();
+            let off: Vec<(f64, f64)> = chart.grid(41).filter_map(off).collect();
+            let weights: f64 = off.iter().map(|(_, matters)| matters).sum();
+            let squares: f64 = off.iter().map(|(angle, matters)| matters * angle.powi(2)).sum();
             let rms = (squares / weights).sqrt().to_degrees();
             println!("{dearer}: {rms}");
             assert!(rms <= 3.0, "{dearer}: {rms} degrees");

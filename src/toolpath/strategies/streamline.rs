@@ -310,13 +310,12 @@ fn on_charts(task: &Task<'_>, asked: &Streamline) -> Result<Passes, PlanError> {
             all.append(shortest::on_chart(task, &chart, [k, of], None, Objective::Time)?);
             continue;
         }
-        let direction = feed::on_chart(direction, &chart, cutter)?;
-        let (field, mut notes, wanted) =
-            stream_function(&calculated, cutter, &direction, asked, settings.step)?;
+        let spread = feed::on_chart(direction, &chart, cutter)?;
+        let (field, mut notes, wanted) = stream_function(&calculated, cutter, &spread, asked, settings.step)?;
         let mut passes = along_lines(task, &chart, &field, asked.lines)?;
-        let feed = |[u, v]: [f64; 2]| chart.at(u, v)?.feed(&direction, cutter);
+        let feed = |[u, v]: [f64; 2]| chart.at(u, v)?.feed(&spread, cutter);
         planned_field::set_directions(&mut passes.field, part, &chart, feed);
-        obedience::compare_on_chart(&mut passes.contacts, &chart, &direction, cutter);
+        passes.obedience = obedience::on_chart(task, &chart, &mut passes.contacts, [direction, &spread]);
         let places: Vec<[f64; 2]> = chart.grid(wanted.side).collect();
         planned_field::set_singular_points(
             &mut passes.field,
@@ -398,16 +397,16 @@ fn stream_function(
     };
     let samples: Vec<Option<StreamSample>> = (0..places.len()).map(sample).collect();
     let refused = |e: FieldError| not_applicable(&e.to_string());
-    let (psi, angle_rms, method, report) = match asked.method {
+    let (psi, method, report) = match asked.method {
         StreamMethod::Differences => {
             let fit = fit_by_differences(&samples, chart.domain, [n; 2], asked.solver).map_err(refused)?;
-            (ScalarField::Grid(fit.psi), fit.angle_rms, format!("differences on {n} x {n} cells"), fit.report)
+            (ScalarField::Grid(fit.psi), format!("differences on {n} x {n} cells"), fit.report)
         }
         StreamMethod::Published => {
             let fit = published(direction, chart, asked.control_points)?;
             let name =
                 format!("the published cubic B-spline with {0} x {0} control points", asked.control_points);
-            (ScalarField::Spline(fit.psi), fit.angle_rms, name, fit.report)
+            (ScalarField::Spline(fit.psi), name, fit.report)
         }
         spline => {
             let (degree, knots) = match spline {
@@ -419,16 +418,10 @@ fn stream_function(
             let fit = fit_stream_function(&given, knots_u, knots_v, asked.solver).map_err(refused)?;
             let name =
                 format!("a B-spline of degree {degree} with {0} x {0} control points", asked.control_points);
-            (ScalarField::Spline(fit.psi), fit.angle_rms, name, fit.report)
+            (ScalarField::Spline(fit.psi), name, fit.report)
         }
     };
-    let notes = vec![
-        format!(
-            "the stream function follows the feed directions within {:.2} degrees (root mean square)",
-            angle_rms.to_degrees()
-        ),
-        format!("the stream function is {method}, solved by {report}"),
-    ];
+    let notes = vec![format!("the stream function is {method}, solved by {report}")];
     Ok((psi, notes, FeedGrid { side: n, lines }))
 }
 

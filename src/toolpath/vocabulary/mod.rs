@@ -15,7 +15,7 @@ pub use error::PlanError;
 pub use feed_direction::{Along, FeedDirection, Lines};
 pub(crate) use pass_settings::{COMPARED_CHORDS, SAMPLING_OVER_RADIUS};
 pub use pass_settings::{Guide, PassSettings, unused_tolerance};
-pub use passes::{Contact, Faces, Kept, LevelFunction, Levelled, OffDirection, Passes};
+pub use passes::{Contact, Faces, Kept, LevelFunction, Levelled, Obedience, Passes};
 pub use settings::{Earlier, Joining, Links, PlanSettings, Step};
 pub use strategy::{Definition, PartKind, Reading, Strategy};
 pub(crate) use task::Setup;

@@ -19,8 +19,10 @@ pub struct Passes {
     pub notes: Vec<String>,
     /// What they were planned by, where they are levels of a function.
     pub field: PlannedField,
-    /// Where the cutter touches along each pass, in no order, where they are levels of a function.
+    /// Where the cutter touches along each pass, in order, where they are levels of a function.
     pub contacts: Vec<Vec<Contact>>,
+    /// How far they are off the directions asked for.
+    pub obedience: Obedience,
     /// The functions that they are levels of, one for each chart or piece that has passes.
     pub functions: Vec<Levelled>,
     /// Which faces they are made for.
@@ -134,6 +136,7 @@ impl Passes {
         self.notes.extend(other.notes);
         self.field.append(other.field);
         self.contacts.extend(other.contacts);
+        self.obedience.append(other.obedience);
         self.functions.extend(other.functions);
     }
 }
@@ -144,20 +147,33 @@ pub struct Contact {
     pub at: Point3,
     /// Unit tangent across the feed.
     pub across: Vector3,
+    /// Unit normal of the surface.
+    pub normal: Vector3,
     /// Allowed interval, mm.
     pub allowed: f64,
     pub inside: bool,
     /// Its parameters on a chart.
     pub parameters: Option<[f64; 2]>,
-    /// How far the pass is off the direction asked for here; `None` where none was.
-    pub off: Option<OffDirection>,
+    /// The unit tangent asked for here, where one is asked for at every place.
+    pub asked: Option<Vector3>,
 }
 
-/// The angle between a pass and the feed direction that was asked for at a place.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OffDirection {
-    /// As lines, 0 to a right angle, rad.
-    pub angle: f64,
-    /// How much the direction matters there.
-    pub matters: f64,
+impl Contact {
+    /// Unit tangent along the feed.
+    pub fn along(&self) -> Vector3 {
+        self.across.cross(&self.normal)
+    }
+}
+
+/// Angles between passes and the directions asked for, taken together piece by piece.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Obedience {
+    /// Sum of squares, rad², each times the length or the rows that it counts for.
+    pub squares: f64,
+    /// Sum of these, mm or rows.
+    pub weights: f64,
+    /// The greatest angle, rad, and where.
+    pub greatest: Option<(f64, Point3)>,
+    /// None is greater between the places either, rad.
+    pub at_most: f64,
 }

@@ -29,6 +29,15 @@ fn parallels_of_a_sphere_close() {
         let line = tracer.through(start, 0.02, 10.0);
         assert!(line.closed, "{n}: {} points", line.points.len());
         assert!((line.points.len() as f64 * 0.02 / (std::f64::consts::TAU * radius) - 1.0).abs() < 0.03);
+        // Each side of its polygon with all crossings lies in the triangle that it begins in.
+        let over = tracer.over_triangles(&line);
+        assert!(over.len() > line.points.len());
+        for w in over.windows(2) {
+            let (corners, hats) =
+                (mesh.corners(w[0].triangle as usize), mesh.hat_gradients(w[0].triangle as usize));
+            let least = (0..3).map(|k| 1.0 + hats[k].dot(&(w[1].position - corners[k])));
+            assert!(least.fold(1.0, f64::min) > -1e-3, "{w:?}");
+        }
         line.points.iter().map(|p| (p.position.xy().coords.norm() - radius).abs()).fold(0.0, f64::max)
     };
     let (coarse, fine) = (worst(10), worst(40));

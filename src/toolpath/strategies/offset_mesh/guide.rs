@@ -165,10 +165,11 @@ impl LevelSource for OffsetGuide<'_> {
             Some(Contact {
                 at,
                 across,
+                normal: spot.away,
                 allowed: spot.allowed?.width,
                 inside: true,
                 parameters: None,
-                off: None,
+                asked: None,
             })
         };
         curve.along(run).filter_map(contact).collect()
