@@ -218,12 +218,15 @@ fn a_cutter_that_fits_nowhere_is_told_the_largest_that_does() {
 #[test]
 fn steps_go_down_evenly_and_the_floor_has_its_own() {
     let mut s = strategy(patterns()[2].clone());
-    assert_eq!(descend::floors(6.0, &s), [-3.0, -6.0]);
-    assert_eq!(descend::floors(7.0, &s).len(), 3);
+    assert_eq!(descend::floors([0.0, 6.0], &s), [-3.0, -6.0]);
+    assert_eq!(descend::floors([0.0, 7.0], &s).len(), 3);
     s.floor_allowance = 0.5;
-    assert_eq!(descend::floors(6.0, &s), [-2.75, -5.5, -6.0]);
+    assert_eq!(descend::floors([0.0, 6.0], &s), [-2.75, -5.5, -6.0]);
     s.stepdown = None;
-    assert_eq!(descend::floors(6.0, &s), [-5.5, -6.0]);
+    assert_eq!(descend::floors([0.0, 6.0], &s), [-5.5, -6.0]);
+    // From the top of the stock on, where that stands over the face.
+    (s.stepdown, s.floor_allowance) = (Some(2.5), 0.0);
+    assert_eq!(descend::floors([1.5, 6.0], &s), [-1.0, -3.5, -6.0]);
 }
 
 /// Several steps with both allowances: until the passes along the walls the allowance stands there, also below what the floor is
