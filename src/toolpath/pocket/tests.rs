@@ -229,6 +229,23 @@ fn steps_go_down_evenly_and_the_floor_has_its_own() {
     assert_eq!(descend::floors([1.5, 6.0], &s), [-1.0, -3.5, -6.0]);
 }
 
+/// A bull nose with next to no flat leaves ridges between its passes, by the stepover. No pass of its own goes along each of them.
+#[test]
+fn ridges_of_a_narrow_flat_are_no_rest() {
+    let triangle = [(23.0, 15.0), (31.0, 17.0), (27.0, 23.0)].map(|(x, y)| Point2::new(x, y)).to_vec();
+    let pocket = pocket(vec![rectangle(0.0, 0.0, 46.0, 39.0), triangle]);
+    let moves = |corner: f64| {
+        let cutter = Cutter::bull(6.0, corner).unwrap();
+        let s = strategy(Pattern::Offset { spiral: true });
+        plan_pocket(&pocket, &cutter, &s, &settings(), &Silent).unwrap().path.len()
+    };
+    let wide = moves(1.0);
+    for corner in [2.0, 2.7] {
+        let narrow = moves(corner);
+        assert!(narrow < 2 * wide, "{corner}: {narrow} {wide}");
+    }
+}
+
 /// Several steps with both allowances: until the passes along the walls the allowance stands there, also below what the floor is
 /// left; only the last step comes to the floor; all is cleared in the end. Passes along walls are one for each step and wall, or
 /// one for each wall, which then comes last and leaves no marks of steps.
