@@ -342,6 +342,23 @@ fn feeds_fall_where_more_of_the_cutter_cuts() {
     assert_eq!(feeds, [1000.0, 500.0, 1000.0]);
 }
 
+/// Directions straight across a pocket, and one value along each wall: both together leave no function but a level one, whose lines are noise.
+#[test]
+fn directions_across_do_not_run_along_walls() {
+    let island = rectangle(10.0, 5.0, 14.0, 9.0);
+    let pocket = pocket(vec![rectangle(0.0, 0.0, 24.0, 14.0), island]);
+    let cutter = Cutter::flat(4.0).unwrap();
+    let settings = PlanSettings { step: Step::Stepover(1.2), ..settings() };
+    let planned = |direction: FeedDirection, along_walls: bool| {
+        let vectors = Vectors { direction, direction_weight: 1.0, along_walls, lines: Lines::Levels };
+        plan_pocket(&pocket, &cutter, &strategy(Pattern::Streamline(vectors)), &settings, &Silent)
+    };
+    let refused = planned(FeedDirection::Angle(30f64.to_radians()), true).unwrap_err().to_string();
+    assert!(refused.contains("along_walls"), "{refused}");
+    assert!(planned(FeedDirection::Angle(30f64.to_radians()), false).is_ok());
+    assert!(planned(FeedDirection::Border(Sense::Along), true).is_ok());
+}
+
 /// What flows around a round island in a round pocket: passes are circles, none ends at a wall, and streamlines traced by
 /// Runge and Kutta's method stay on them within the chord tolerance.
 #[test]
