@@ -47,7 +47,8 @@ pub(crate) fn pocket_figures(
     monitor: &dyn Monitor,
 ) -> Result<PocketFigures, Cancelled> {
     let top = session.top();
-    let beside = stock_beside(pocket.free(), &session.stock.bounds());
+    let room = pocket.room();
+    let beside = stock_beside(&room, &session.stock.bounds());
     let mut gouge = WallGouge::default();
     let mut most = 0.0f64;
     for tool in tools {
@@ -57,7 +58,7 @@ pub(crate) fn pocket_figures(
             gouge = WallGouge { move_index: tool.first + its.move_index, ..its };
         }
     }
-    let (of_cells, area) = wall_gouge_of_cells(pocket.free(), cut, top, monitor)?;
+    let (of_cells, area) = wall_gouge_of_cells(&room, cut, top, monitor)?;
     let off = pocket.off_drawing.max(ROUNDING) + path.origin.strays;
     let left = material_on_walls(session, pocket, tools, monitor)?;
     Ok(PocketFigures {

@@ -226,6 +226,31 @@ fn programs_are_held_against_walls_and_islands() {
     assert!(code == Some(1) && island["pocket"]["wall_gouge_mm"].as_f64().unwrap() > 4.0, "{island}");
 }
 
+/// A program comes from beside the block, over an open side, with a cutter that is small beside the margin of the stock. Nothing stands there.
+#[test]
+fn programs_come_in_over_open_sides() {
+    let home = tempfile::tempdir().unwrap();
+    let passes = |open: &str| {
+        let rows =
+            (0..13).map(|k| format!("G1 Y{y}\nG1 X9\nG1 X-4\n", y = 1.0 + 0.6667 * f64::from(k).min(12.0)));
+        let around = "G1 Y9\nG1 X9\nG1 Y1\nG1 X-4\nG0 Z5\nM30\n";
+        let cut = "G17 G21 G40 G90 G94\nT1 M6\nS8000 M3\nG0 X-9 Y1\nG0 Z-1\nG1 X-4 F800\n".to_owned();
+        fs::write(home.path().join("cut.nc"), cut + &rows.collect::<String>() + around).unwrap();
+        judged(
+            home.path(),
+            &format!(
+                "[part]\nsurface = \"pocket\"\noutline = [[0, 0], [10, 0], [10, 10], [0, 10]]\n{open}depth = 1\n[cutter]\nshape = \"flat\"\n\
+                 diameter = 2\n[[toolpath]]\nstrategy = \"program\"\nfile = \"cut.nc\"\n"
+            ),
+        )
+    };
+    let (code, open) = passes("open = [[[0, 0], [0, 10]]]\n");
+    assert_eq!((code, violations(&open)), (Some(0), Vec::new()));
+    let (code, closed) = passes("");
+    let depth = closed["pocket"]["wall_gouge_mm"].as_f64().unwrap();
+    assert!(code == Some(1) && depth > 2.0, "{depth}");
+}
+
 /// Coarse chords along a round wall leave as much on it, which is held against `uncut`.
 #[test]
 fn material_left_on_round_walls_is_judged() {

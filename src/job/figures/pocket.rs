@@ -137,9 +137,13 @@ fn within_walls(run: &Run<'_>, pocket: &PocketFigures) -> Claim {
         micrometres(Some(limit)),
         run.program_line(index)
     );
-    let at_least =
-        Some(pocket.wall_gouge_mm - run.session.pocket.as_ref().map_or(0.0, |one| one.off_drawing));
+    let at_least = Some(pocket.wall_gouge_mm - off(run));
     Claim { at_least, ..Claim::length("wall", Gravity::Scrap, limit, measured, bound) }.told(text)
+}
+
+/// How far walls and moves may lie off those that were measured, mm.
+fn off(run: &Run<'_>) -> f64 {
+    run.session.pocket.as_ref().map_or(0.0, |pocket| pocket.off_drawing) + run.path().origin.strays
 }
 
 /// That nothing stands on the walls that the cutter comes to.
@@ -153,7 +157,7 @@ fn cut_to_walls(run: &Run<'_>, pocket: &PocketFigures) -> Claim {
         micrometres(Some(limit))
     );
     // Where no move comes near it stands as far as was looked.
-    let at_least = (!bound.is_finite()).then_some(measured);
+    let at_least = (!bound.is_finite()).then_some(measured - off(run));
     Claim { at_least, ..Claim::length("uncut", Gravity::Finish, limit, measured, bound) }.told(text)
 }
 

@@ -30,6 +30,9 @@ const CHORDS_FROM_WALLS: f64 = 2.0;
 /// ... and to this share of the cutter's radius, by which offsets keep to the safe side.
 const RADIUS_FROM_WALLS: f64 = 5.0e-4;
 
+/// Beyond open sides nothing stands as far as this over the radius behind the edge of the block.
+const BEYOND_EDGE: f64 = 0.05;
+
 /// The largest cutter that would fit is told to this, mm.
 const PRECISION: f64 = 0.005;
 
@@ -314,6 +317,9 @@ impl PocketSource {
                 job.source.error(span, format!("this line along open sides is none: {e}"), cure)
             })?;
         }
+        // Up to the edge of the block.
+        let edge = job.margin.unwrap_or_default() + radius - job.cutter.flat_radius();
+        let pocket = pocket.without_stock_beyond(edge + BEYOND_EDGE * radius, radius);
         let Some(EarlierCutter { diameter, allowance }) = self.cleared else { return Ok((pocket, notes)) };
         if diameter <= 2.0 * radius {
             let message = format!(

@@ -43,6 +43,8 @@ pub struct Pocket {
     free: Region,
     /// Where no stock stands above the floor before the first cut.
     air: Region,
+    /// The room beyond open sides as far as nothing stands, where that is farther than plans go.
+    farther: Region,
 }
 
 /// A line of open sides that does not run along the outline.
@@ -65,6 +67,7 @@ impl Pocket {
             off_drawing: 0.0,
             open: Vec::new(),
             air: Region::default(),
+            farther: Region::default(),
         }
     }
 
@@ -92,30 +95,44 @@ impl Pocket {
         let drawn: Vec<[Point2; 2]> = lines.iter().flat_map(sides).collect();
         let along = |p: &Point2| drawn.iter().any(|side| foot(p, side).1 <= tolerance);
         let is_open = |[a, b]: &[Point2; 2]| along(a) && along(b) && along(&nalgebra::center(a, b));
+        let sides = self.region.curves().flat_map(|curve| {
+            (0..curve.len()).map(|k| [curve[k], curve[(k + 1) % curve.len()]]).collect::<Vec<_>>()
+        });
+        let open = sides.filter(is_open).collect::<Vec<_>>();
+        self.open.extend(open);
+        let beyond = self.beyond(BEYOND * radius, radius);
+        self.free = self.region.union(&beyond);
+        self.air = self.air.union(&beyond.without(&self.region));
+        Ok(self)
+    }
+
+    /// With no stock beyond its open sides as far as `width` mm either, if that is farther than a cutter of a radius goes by itself.
+    #[must_use]
+    pub fn without_stock_beyond(mut self, width: f64, radius: f64) -> Self {
+        if !self.open.is_empty() && width > BEYOND * radius {
+            self.farther = self.beyond(width, radius);
+        }
+        self
+    }
+
+    /// The room beyond open sides as far as `width` mm; it laps over the region.
+    fn beyond(&self, width: f64, radius: f64) -> Region {
+        let is_open = |side: &[Point2; 2]| self.open.contains(side);
         let (mut open, mut walls, mut closed) = (Vec::new(), Vec::new(), Vec::new());
         for curve in self.region.curves() {
             let sides: Vec<[Point2; 2]> =
                 (0..curve.len()).map(|k| [curve[k], curve[(k + 1) % curve.len()]]).collect();
-            self.open.extend(sides.iter().filter(|side| is_open(side)));
-            strips(
-                &sides,
-                is_open,
-                &Strip { width: BEYOND * radius, longer: 0.0, lap: LAP * radius },
-                &mut open,
-            );
+            strips(&sides, is_open, &Strip { width, longer: 0.0, lap: LAP * radius }, &mut open);
             walls.extend(sides.into_iter().filter(|side| !is_open(side)));
         }
         // Behind a wall that stands beyond an open side, no farther: around the end of a thin one there is room. What lies behind others
         // is parted from there by stock, or by the pocket itself.
         for wall in walls.iter().filter(|wall| open.iter().any(|strip| meets(strip, wall))) {
             // Where a wall ends at an open side nothing is taken from the lap.
-            let behind = Strip { width: BEYOND * radius, longer: -2.0 * LAP * radius, lap: 0.0 };
+            let behind = Strip { width, longer: -2.0 * LAP * radius, lap: 0.0 };
             strips(&[*wall], |_| true, &behind, &mut closed);
         }
-        let beyond = Region { pieces: open }.without(&Region { pieces: closed });
-        self.free = self.region.union(&beyond);
-        self.air = self.air.union(&beyond.without(&self.region));
-        Ok(self)
+        Region { pieces: open }.without(&Region { pieces: closed })
     }
 
     /// After a flat end mill of a radius went everywhere in it that it fits, `allowance` mm off the walls.
@@ -130,6 +147,19 @@ impl Pocket {
     /// What the cutter may sweep: the region and the room beyond its open sides.
     pub fn free(&self) -> &Region {
         &self.free
+    }
+
+    /// What may be swept without a cut into walls, also by moves that come from farther away than planned ones.
+    pub fn room(&self) -> Region {
+        if self.farther.is_empty() { self.free.clone() } else { self.free.union(&self.farther) }
+    }
+
+    /// The [air](Self::air) as far as the room goes.
+    pub fn clear_of_stock(&self) -> Region {
+        if self.farther.is_empty() {
+            return self.air.clone();
+        }
+        self.air.union(&self.farther.without(&self.region))
     }
 
     /// Where no stock stands above the floor before the first cut.
@@ -467,6 +497,13 @@ mod tests {
                 assert!((found - beyond).abs() < 0.003 * beyond, "{k}: {found} {beyond}");
                 assert!((rest(&pocket) - corner).abs() < 0.03, "{k}: {} {corner}", rest(&pocket));
                 assert_eq!((pocket.free().pieces.len(), pocket.free().curves().count()), (1, 1), "{k}");
+                let farther = pocket.clone().without_stock_beyond(5.0 * r, r);
+                let wide = (w + h) * 5.0 * r + 0.25 * std::f64::consts::PI * 25.0 * r * r;
+                let found = farther.clear_of_stock().area();
+                assert!(
+                    (found - wide).abs() < 0.003 * wide && farther.free() == pocket.free(),
+                    "{k}: {found}"
+                );
                 // A larger cutter that went everywhere leaves a corner and nothing else.
                 let borders = pocket.cleared_by(1.5 * r, 0.0).borders_of_air();
                 let length: f64 = borders.segments().iter().map(|s| (s.ends[1] - s.ends[0]).norm()).sum();
