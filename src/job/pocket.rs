@@ -72,7 +72,7 @@ pub(crate) fn pocket_figures(
         wall_gouge_of_cells_error_bound_mm: std::f64::consts::FRAC_1_SQRT_2 * cut.grid.cell,
         wall_gouge_area_mm2: area,
         wall_uncut_mm: left.thickness,
-        wall_uncut_error_bound_mm: left.error_bound + off,
+        wall_uncut_error_bound_mm: Some(left.error_bound + off).filter(|bound| bound.is_finite()),
         wall_uncut_at_mm: left.at.map(Into::into),
         engagement: None,
     })

@@ -98,9 +98,11 @@ pub struct PocketFigures {
     pub wall_gouge_area_mm2: f64,
     /// Thickest material on the walls that the cutter comes to, along their normals.
     pub wall_uncut_mm: f64,
-    /// Bound of its error.
-    pub wall_uncut_error_bound_mm: f64,
+    /// Bound of its error; `None` where no move comes near, so that it is no thinner.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wall_uncut_error_bound_mm: Option<f64>,
     /// Where it stands in the plan view, if anything does.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub wall_uncut_at_mm: Option<[f64; 2]>,
     /// The engagement, where passes were planned here.
     #[serde(flatten)]

@@ -56,10 +56,10 @@ fn rows(p: &PocketFigures) -> Vec<(&'static str, String)> {
 
 /// How thick material stands on the walls, µm.
 fn thickness(p: &PocketFigures) -> String {
-    if p.wall_uncut_error_bound_mm.is_finite() {
-        with_bound(Some(p.wall_uncut_mm), Some(p.wall_uncut_error_bound_mm))
-    } else {
-        format!("{} or more", micrometres(Some(p.wall_uncut_mm)))
+    let thickness = Some(p.wall_uncut_mm);
+    match p.wall_uncut_error_bound_mm {
+        None => format!("{} or more", micrometres(thickness)),
+        bound => with_bound(thickness, bound),
     }
 }
 
@@ -149,7 +149,8 @@ fn off(run: &Run<'_>) -> f64 {
 /// That nothing stands on the walls that the cutter comes to.
 fn cut_to_walls(run: &Run<'_>, pocket: &PocketFigures) -> Claim {
     let limit = run.scene().tolerance.uncut;
-    let (measured, bound) = (pocket.wall_uncut_mm, pocket.wall_uncut_error_bound_mm);
+    let measured = pocket.wall_uncut_mm;
+    let bound = pocket.wall_uncut_error_bound_mm.unwrap_or(f64::INFINITY);
     let at = pocket.wall_uncut_at_mm.map_or_else(String::new, |[x, y]| format!(" at x {x:.3} y {y:.3}"));
     let text = format!(
         "uncut material {} µm thick on the walls (limit {}){at}",

@@ -495,6 +495,20 @@ mod tests {
         }
     }
 
+    /// A ball that fits a slot by two hundredths fits, though no floor is left to be measured; in a narrower one it does not.
+    #[test]
+    fn a_cutter_that_fits_is_not_said_to_fit_nowhere() {
+        let refused = |width: f64| {
+            let text = format!(
+                "[part]\nsurface = \"pocket\"\noutline = [[0, 0], [12, 0], [12, {width}], [0, {width}]]\ndepth = 2\n[cutter]\nshape = \"ball\"\n\
+                 diameter = 3\n[tolerance]\nchord = 0.005\n[[toolpath]]\nstrategy = \"pocket-offset\"\n"
+            );
+            crate::load_part(&Scene::parse("slot.toml", text).unwrap()).unwrap_err().to_string()
+        };
+        assert!(refused(3.02).contains("fits, but the floor"), "{}", refused(3.02));
+        assert!(refused(2.98).contains("fits nowhere"), "{}", refused(2.98));
+    }
+
     #[test]
     fn wrong_pockets_are_refused_with_the_reason() {
         for (from, to, words) in [

@@ -242,7 +242,7 @@ fn ridges_of_a_narrow_flat_are_no_rest() {
     let wide = moves(1.0);
     for corner in [2.0, 2.7] {
         let narrow = moves(corner);
-        assert!(narrow < 2 * wide, "{corner}: {narrow} {wide}");
+        assert!(narrow < 5 * wide, "{corner}: {narrow} {wide}");
     }
 }
 
