@@ -27,6 +27,7 @@ pub mod samples;
 mod segment_grid;
 pub mod sheets;
 mod tessellate;
+mod wall_stretch;
 
 pub use aabb::Aabb;
 pub use analytic::{AnalyticError, AnalyticShape, AnalyticSurface, HeightJet, MAX_SLOPE};
@@ -50,3 +51,4 @@ pub use segment_grid::{
     CurveSegment, NearestSegment, SegmentGrid, distance_of_segments, distance_to_segment, foot, share_on,
 };
 pub use tessellate::{MAX_TRIANGLES, TessellateError, Tessellation, tessellate};
+pub use wall_stretch::WallStretch;

@@ -43,8 +43,8 @@ pub(crate) struct Unseen {
 
 impl Session {
     /// What the measurement of a pocket covers: its floor by cells, its walls by the moves.
-    pub(crate) fn pocket_covered(&self, pocket: &Pocket) -> Covered {
-        let cutter = &self.scene.cutter;
+    pub(crate) fn pocket_covered(&self, pocket: &Pocket, cutters: &Cutters) -> Covered {
+        let cutter = cutters.first();
         // Round corners leave a fillet at the foot.
         let upright = (pocket.depth - cutter.corner_radius()).max(0.0);
         let walls =

@@ -182,7 +182,7 @@ impl Session {
         let tools = ToolMoves::of(cutters, holders, &planned.plan.path);
         let mut covered = match (covered, &self.pocket) {
             (Some(known), _) => known,
-            (None, Some(pocket)) => self.pocket_covered(pocket),
+            (None, Some(pocket)) => self.pocket_covered(pocket, cutters),
             (None, None) => {
                 monitor.start("measuring the coverage", 0);
                 let all = (&*whole.path, &whole.cutters);

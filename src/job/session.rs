@@ -81,7 +81,7 @@ fn stock_of(
             max.z = face + allowance;
             let block = Aabb { min, max };
             match pocket.filter(|pocket| !pocket.air().is_empty()) {
-                Some(pocket) => Stock::milled(block, pocket.air(), -pocket.depth),
+                Some(pocket) => Stock::milled(block, &pocket.clear_of_stock(), -pocket.depth),
                 None => Stock::Box(block),
             }
         }

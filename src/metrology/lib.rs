@@ -43,6 +43,7 @@ mod meetings;
 mod offset_distance;
 mod pairs;
 mod path;
+mod plunges;
 mod pocket;
 mod refine;
 mod regions;
@@ -57,6 +58,7 @@ mod several_tools;
 mod tracks;
 mod turning;
 mod unseen;
+mod wall_material;
 mod walls;
 
 pub use along_normals::{
@@ -83,7 +85,11 @@ pub use offset_distance::{
 };
 pub use pairs::{MOST_PAIRS, PAIRS_HEADER, PairFigures, ScallopPair};
 pub use path::path_figures;
-pub use pocket::{ExceedingStretch, PocketFigures, ThinLayers, wall_gouge_of_cells, wall_gouge_of_moves};
+pub use plunges::StockBefore;
+pub use pocket::{
+    EngagementFigures, ExceedingStretch, PocketFigures, ThinLayers, WallGouge, radius_below, stock_beside,
+    wall_gouge_of_cells, wall_gouge_of_moves,
+};
 pub use refine::Asked;
 pub use removal::{RapidContactFigures, RemovalFigures, removal_figures, voxel_removal_figures};
 pub use ridge_map::RidgeMap;
@@ -91,3 +97,4 @@ pub use roughness::{RoughnessFigures, roughness};
 pub use section_polynomial::{PolynomialFigures, polynomial_figures};
 pub use sections::{SectionFigures, section_figures};
 pub use turning::{FastestTurn, fastest_turn, fastest_turn_across};
+pub use wall_material::{WallMaterial, WallSearch};

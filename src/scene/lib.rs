@@ -30,7 +30,7 @@ pub use load::{load_mesh, load_part};
 pub use named_file::NamedFile;
 pub use part::{
     BladeRequest, EarlierCutter, FormulaSource, LoadError, Loaded, MeshFile, NurbsSource, OpenLine,
-    OutlineSource, PartSource, PocketSource,
+    OutlineSource, PartSource, PocketSource, unmeasured_beside_walls,
 };
 pub use stock::StockRequest;
 pub use write::complete_toml;

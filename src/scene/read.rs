@@ -467,7 +467,7 @@ fn read_toolpath(
     let surface = kind == PartKind::Surface;
     let step = match kind {
         PartKind::Surface => read_step(section, limits, cutter)?,
-        PartKind::Pocket => read_pocket_step(section, cutter.radius())?,
+        PartKind::Pocket => read_pocket_step(section, cutter, limits.scallop)?,
         // A program's steps are its own; cells are laid out as for the scallop that is allowed.
         PartKind::Any => Step::Scallop(limits.scallop),
     };

@@ -168,3 +168,144 @@ fn what_passes_far_apart_leave_is_cut() {
         assert_eq!(toolpath["uncut"]["area_mm2"], 0.0, "{name}");
     }
 }
+
+/// Runs a scene; its exit status and its report's first toolpath.
+fn judged(home: &Path, text: &str) -> (Option<i32>, Value) {
+    fs::write(home.join("scene.toml"), text).unwrap();
+    let answer = millstream(home, &["run", "scene.toml", "--out", "out"]);
+    let report = fs::read(home.join("out/report.json"));
+    let report: Value =
+        serde_json::from_slice(&report.unwrap_or_else(|_| panic!("{}", answer.stderr))).unwrap();
+    (answer.code, report["toolpaths"][0].clone())
+}
+
+/// The texts of the limits that are violated.
+fn violations(toolpath: &Value) -> Vec<String> {
+    let all = toolpath["violations"].as_array().unwrap().iter();
+    all.map(|one| one["text"].as_str().unwrap().to_owned()).collect()
+}
+
+/// A program of another system in a square pocket of 20 mm: passes along the walls, `corner` by `far` mm, and between them.
+fn program_of(corner: f64, far: f64) -> String {
+    let end = 20.0 - corner;
+    format!(
+        "G17 G21 G40 G90 G94\nT1 M6\nS8000 M3\nG0 X{corner} Y{corner}\nG0 Z5\nG0 Z1\nG1 Z-2 F200\nG1 X{far} F800\nG1 Y{end}\n\
+         G1 X{corner}\nG1 Y{corner}\nG1 X8\nG1 Y{end}\nG1 X12\nG1 Y{corner}\nG1 X10\nG1 Y16\nG0 Z5\nM30\n"
+    )
+}
+
+/// Walls and islands are judged under a program from elsewhere as under ours: what is cut beyond them, and what is left on them.
+#[test]
+fn programs_are_held_against_walls_and_islands() {
+    let home = tempfile::tempdir().unwrap();
+    let scene = |islands: &str| {
+        format!(
+            "[part]\nsurface = \"pocket\"\noutline = [[0, 0], [20, 0], [20, 20], [0, 20]]\n{islands}depth = 2\n[cutter]\nshape = \"flat\"\n\
+             diameter = 7\n[tolerance]\nchord = 0.3\n[[toolpath]]\nstrategy = \"program\"\nfile = \"cut.nc\"\n"
+        )
+    };
+    let of = |program: String, islands: &str| {
+        fs::write(home.path().join("cut.nc"), program).unwrap();
+        judged(home.path(), &scene(islands))
+    };
+    let (code, good) = of(program_of(3.5, 16.5), "");
+    assert_eq!((code, violations(&good)), (Some(0), Vec::new()));
+    let (code, beyond) = of(program_of(3.5, 17.5), "");
+    let depth = beyond["pocket"]["wall_gouge_mm"].as_f64().unwrap();
+    assert!(code == Some(1) && (depth - 1.0).abs() < 1e-9, "{depth}");
+    assert!(
+        violations(&beyond)[0].contains("beyond the outline")
+            && violations(&beyond)[0].contains("cut.nc line 8")
+    );
+    let (code, left) = of(program_of(3.5, 16.1), "");
+    let thickness = left["pocket"]["wall_uncut_mm"].as_f64().unwrap();
+    // Up to half a micrometre more counts as reached beside corners.
+    assert!(code == Some(1) && (0.4..0.4006).contains(&thickness), "{thickness}");
+    assert!(violations(&left)[0].contains("on the walls"), "{:?}", violations(&left));
+    // A wall that no pass comes near.
+    let (code, far) = of(program_of(3.5, 12.0), "");
+    let bound = far["pocket"].get("wall_uncut_error_bound_mm");
+    assert!(code == Some(1) && bound.is_none(), "{bound:?}");
+    assert!(
+        violations(&far).iter().any(|text| text.contains("or more µm thick on the walls")),
+        "{:?}",
+        violations(&far)
+    );
+    // The passes between those along the walls go through an island.
+    let (code, island) = of(program_of(3.5, 16.5), "islands = [[[9, 9], [11, 9], [11, 11], [9, 11]]]\n");
+    assert!(code == Some(1) && island["pocket"]["wall_gouge_mm"].as_f64().unwrap() > 4.0, "{island}");
+}
+
+/// A program comes from beside the block, over an open side, with a cutter that is small beside the margin of the stock. Nothing stands there.
+#[test]
+fn programs_come_in_over_open_sides() {
+    let home = tempfile::tempdir().unwrap();
+    let passes = |open: &str| {
+        let rows =
+            (0..13).map(|k| format!("G1 Y{y}\nG1 X9\nG1 X-4\n", y = 1.0 + 0.6667 * f64::from(k).min(12.0)));
+        let around = "G1 Y9\nG1 X9\nG1 Y1\nG1 X-4\nG0 Z5\nM30\n";
+        let cut = "G17 G21 G40 G90 G94\nT1 M6\nS8000 M3\nG0 X-9 Y1\nG0 Z-1\nG1 X-4 F800\n".to_owned();
+        fs::write(home.path().join("cut.nc"), cut + &rows.collect::<String>() + around).unwrap();
+        judged(
+            home.path(),
+            &format!(
+                "[part]\nsurface = \"pocket\"\noutline = [[0, 0], [10, 0], [10, 10], [0, 10]]\n{open}depth = 1\n[cutter]\nshape = \"flat\"\n\
+                 diameter = 2\n[stock]\nmargin = 3\n[[toolpath]]\nstrategy = \"program\"\nfile = \"cut.nc\"\n"
+            ),
+        )
+    };
+    let (code, open) = passes("open = [[[0, 0], [0, 10]]]\n");
+    assert_eq!((code, violations(&open)), (Some(0), Vec::new()));
+    let (code, closed) = passes("");
+    let depth = closed["pocket"]["wall_gouge_mm"].as_f64().unwrap();
+    assert!(code == Some(1) && depth > 2.0, "{depth}");
+}
+
+/// Coarse chords along a round wall leave as much on it, which is held against `uncut`.
+#[test]
+fn material_left_on_round_walls_is_judged() {
+    let home = tempfile::tempdir().unwrap();
+    let circle = (0..720).map(|k| std::f64::consts::TAU * f64::from(k) / 720.0);
+    let circle: Vec<String> =
+        circle.map(|t| format!("[{:.6}, {:.6}]", 15.0 * t.cos(), 15.0 * t.sin())).collect();
+    let of = |uncut: f64| {
+        judged(
+            home.path(),
+            &format!(
+                "[part]\nsurface = \"pocket\"\noutline = [{}]\ndepth = 2\n[cutter]\nshape = \"flat\"\ndiameter = 6\n[tolerance]\n\
+                 chord = 0.3\nuncut = {uncut}\n[[toolpath]]\nstrategy = \"pocket-zigzag\"\n",
+                circle.join(", ")
+            ),
+        )
+    };
+    let (code, coarse) = of(0.05);
+    let [thickness, bound] =
+        ["wall_uncut_mm", "wall_uncut_error_bound_mm"].map(|key| coarse["pocket"][key].as_f64().unwrap());
+    // Half of the chord tolerance is for the chords of passes.
+    assert!(code == Some(1) && thickness > 0.1 && thickness < 0.16 && bound < 1e-3, "{thickness} {bound}");
+    assert!(
+        violations(&coarse).iter().any(|text| text.contains("on the walls")),
+        "{:?}",
+        violations(&coarse)
+    );
+    assert_eq!(of(0.2).0, Some(0));
+}
+
+/// Where the way down leads through ground that is cleared, or beyond an open side, it may be as steep as it likes.
+#[test]
+fn ways_down_through_air_may_be_steep() {
+    let home = tempfile::tempdir().unwrap();
+    let scene = |part: &str, stock: &str, strategy: &str| {
+        format!(
+            "[part]\nsurface = \"pocket\"\noutline = [[0, 0], [40, 0], [40, 30], [0, 30]]\n{part}depth = 4\n[cutter]\nshape = \"flat\"\n\
+             diameter = 6\n[tolerance]\nchord = 0.005\n{stock}[[toolpath]]\nstrategy = \"pocket-offset\"\n{strategy}"
+        )
+    };
+    let (code, cleared) = judged(home.path(), &scene("", "", "helix_radius = 6\nengagement = 60\n"));
+    assert!(!violations(&cleared).iter().any(|text| text.contains("way down")), "{:?}", violations(&cleared));
+    assert_eq!(code, Some(0), "{:?}", violations(&cleared));
+    // Steps are counted from the top of the stock.
+    let allowed = scene("", "[stock]\nallowance = 1\n", "stepdown = 2.5\n");
+    let (code, stepped) = judged(home.path(), &allowed);
+    assert_eq!((code, violations(&stepped)), (Some(0), Vec::new()));
+}

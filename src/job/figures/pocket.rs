@@ -1,44 +1,70 @@
 //! Walls and engagement of a pocket.
 
-use geometry::Point2;
-use metrology::{ExceedingStretch, PocketFigures, View};
+use metrology::{EngagementFigures, ExceedingStretch, PocketFigures, StockBefore, View};
 use motion::{MoveKind, Toolpath};
 use report::{Claim, Figure, FigureTable, Gravity, micrometres, with_bound};
-use toolpath::PocketStrategy;
+use toolpath::{Pocket, PocketStrategy};
 use work::monitor::Monitor;
 
 use super::words::value;
 use crate::JobError;
-use crate::pocket::pocket_figures;
+use crate::pocket::{engagement_figures, pocket_figures};
 use crate::run::{Finding, Run};
 
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
-    let (Some(pocket), Some(strategy)) =
-        (&run.session.pocket, run.request.strategy.downcast_ref::<PocketStrategy>())
-    else {
+    let (Some(pocket), View::Heights(cut)) = (&run.session.pocket, run.view()) else {
         return Ok(Finding::default());
     };
-    let (View::Heights(cut), Some(engaged)) = (run.view(), &run.planned.engaged) else {
-        return Ok(Finding::default());
-    };
-    let step = run.request.step;
-    let (path, top) = (run.path(), run.session.top());
-    let thinly = run.planned.engaged_thinly.as_ref();
-    let p = pocket_figures(run.scene(), pocket, strategy, step, path, cut, top, engaged, thinly, monitor)?;
-    let mut claims = vec![within_walls(run, &p), ramps(run, strategy)];
-    claims.extend(strategy.engagement.map(|limit| engaged_within(run, &p, limit.to_degrees())));
-    claims.extend(strategy.stepdown.map(|limit| steps_down(run.path(), run.session.top(), limit)));
+    let path = run.path();
+    let mut p = pocket_figures(run.session, pocket, path, run.tools, cut, monitor)?;
+    let mut claims = vec![within_walls(run, &p), cut_to_walls(run, &p)];
+    let strategy = run.request.strategy.downcast_ref::<PocketStrategy>();
+    if let (Some(strategy), Some(engaged)) = (strategy, &run.planned.engaged) {
+        let (step, radius) = (run.request.step, run.scene().cutter.radius());
+        let thinly = run.planned.engaged_thinly.as_ref();
+        let engagement = engagement_figures(strategy, step, path, radius, engaged, thinly);
+        p.stepover_mm = Some(strategy.stepover(step, radius));
+        claims.push(ramps(run, pocket, strategy));
+        claims.extend(strategy.engagement.map(|limit| engaged_within(run, &engagement, limit.to_degrees())));
+        claims.extend(strategy.stepdown.map(|limit| steps_down(path, run.session.top(), limit)));
+        p.engagement = Some(engagement);
+    }
     let figure = Figure {
         key: "pocket",
         value: value(&p)?,
         rows: rows(&p),
-        table: exceeding(&p),
+        table: p.engagement.as_ref().and_then(exceeding),
         ..Figure::default()
     };
     Ok(Finding { figure: Some(figure), claims, ..Finding::default() })
 }
 
 fn rows(p: &PocketFigures) -> Vec<(&'static str, String)> {
+    let stepover = p.stepover_mm.map(|stepover| ("stepover", format!("{stepover:.3} mm")));
+    let of_walls = [
+        (
+            "cut beyond the walls",
+            format!("{} µm", with_bound(Some(p.wall_gouge_mm), Some(p.wall_gouge_error_bound_mm))),
+        ),
+        ("left on the walls", format!("{} µm", thickness(p))),
+        ("out of reach in corners", format!("{:.3} mm²", p.unreachable_area_mm2)),
+    ];
+    let engaged = p.engagement.as_ref().map(|engaged| engagement_rows(engaged));
+    let [engaged, thinly] = engaged.unwrap_or_default();
+    stepover.into_iter().chain(engaged).chain(of_walls).chain(thinly).collect()
+}
+
+/// How thick material stands on the walls, µm.
+fn thickness(p: &PocketFigures) -> String {
+    let thickness = Some(p.wall_uncut_mm);
+    match p.wall_uncut_error_bound_mm {
+        None => format!("{} or more", micrometres(thickness)),
+        bound => with_bound(thickness, bound),
+    }
+}
+
+/// The rows of the engagement: those before the walls' and those behind them.
+fn engagement_rows(p: &EngagementFigures) -> [Vec<(&'static str, String)>; 2] {
     let with_thin_layers = p.thin_layers.as_ref().map(|thin| {
         let place = |one: &ExceedingStretch| format!(" at {:.2}, {:.2}, {:.2}", one.x, one.y, one.z);
         let text = format!(
@@ -52,8 +78,7 @@ fn rows(p: &PocketFigures) -> Vec<(&'static str, String)> {
         );
         ("greatest with thin chips", text)
     });
-    let rows = [
-        ("stepover", format!("{:.3} mm", p.stepover_mm)),
+    let rows = vec![
         (
             "engagement, greatest and 95 %",
             format!(
@@ -72,17 +97,12 @@ fn rows(p: &PocketFigures) -> Vec<(&'static str, String)> {
                 p.engagement_limit_deg
             ),
         ),
-        (
-            "cut beyond the walls",
-            format!("{} µm", with_bound(Some(p.wall_gouge_mm), Some(p.wall_gouge_error_bound_mm))),
-        ),
-        ("out of reach in corners", format!("{:.3} mm²", p.unreachable_area_mm2)),
     ];
-    rows.into_iter().chain(with_thin_layers).collect()
+    [rows, with_thin_layers.into_iter().collect()]
 }
 
 /// The stretches above the engagement that was asked for.
-fn exceeding(p: &PocketFigures) -> Option<FigureTable> {
+fn exceeding(p: &EngagementFigures) -> Option<FigureTable> {
     let row = |one: &ExceedingStretch| {
         vec![
             format!("{:.3}, {:.3}, {:.3}", one.x, one.y, one.z),
@@ -101,7 +121,7 @@ fn exceeding(p: &PocketFigures) -> Option<FigureTable> {
 }
 
 /// Bound of the error of a measured engagement, degrees: no more of the circumference than the front half can cut.
-fn bound_of(pocket: &PocketFigures, measured: f64) -> f64 {
+fn bound_of(pocket: &EngagementFigures, measured: f64) -> f64 {
     pocket.max_engagement_error_bound_deg.min(180.0 - measured)
 }
 
@@ -117,11 +137,33 @@ fn within_walls(run: &Run<'_>, pocket: &PocketFigures) -> Claim {
         micrometres(Some(limit)),
         run.program_line(index)
     );
-    Claim::length("wall", Gravity::Scrap, limit, measured, bound).told(text)
+    let at_least = Some(pocket.wall_gouge_mm - off(run));
+    Claim { at_least, ..Claim::length("wall", Gravity::Scrap, limit, measured, bound) }.told(text)
+}
+
+/// How far walls and moves may lie off those that were measured, mm.
+fn off(run: &Run<'_>) -> f64 {
+    run.session.pocket.as_ref().map_or(0.0, |pocket| pocket.off_drawing) + run.path().origin.strays
+}
+
+/// That nothing stands on the walls that the cutter comes to.
+fn cut_to_walls(run: &Run<'_>, pocket: &PocketFigures) -> Claim {
+    let limit = run.scene().tolerance.uncut;
+    let measured = pocket.wall_uncut_mm;
+    let bound = pocket.wall_uncut_error_bound_mm.unwrap_or(f64::INFINITY);
+    let at = pocket.wall_uncut_at_mm.map_or_else(String::new, |[x, y]| format!(" at x {x:.3} y {y:.3}"));
+    let text = format!(
+        "uncut material {} µm thick on the walls (limit {}){at}",
+        thickness(pocket),
+        micrometres(Some(limit))
+    );
+    // Where no move comes near it stands as far as was looked.
+    let at_least = (!bound.is_finite()).then_some(measured - off(run));
+    Claim { at_least, ..Claim::length("uncut", Gravity::Finish, limit, measured, bound) }.told(text)
 }
 
 /// That passes keep to the engagement that the scene asks for.
-fn engaged_within(run: &Run<'_>, pocket: &PocketFigures, limit: f64) -> Claim {
+fn engaged_within(run: &Run<'_>, pocket: &EngagementFigures, limit: f64) -> Claim {
     let (measured, index) = (pocket.max_engagement_deg, pocket.max_engagement_move);
     let bound = bound_of(pocket, measured);
     let (count, share) = (pocket.over_engagement_limit_count, 100.0 * pocket.over_engagement_limit_fraction);
@@ -166,14 +208,11 @@ fn steps_down(path: &Toolpath, top: f64, limit: f64) -> Claim {
 }
 
 /// That no way down through stock is steeper than the scene allows.
-fn ramps(run: &Run<'_>, strategy: &PocketStrategy) -> Claim {
+fn ramps(run: &Run<'_>, pocket: &Pocket, strategy: &PocketStrategy) -> Claim {
     let limit = strategy.ramp_angle.to_degrees();
-    let radius = run.scene().cutter.radius();
-    let clear = |p: &Point2| {
-        let cleared = run.session.stock.cleared();
-        cleared.is_some_and(|(region, _)| region.contains(p) && region.sides().distance(p) >= radius)
-    };
-    let (steepest, at_least, index) = steepest(run.path(), run.session.top(), &clear);
+    let before = StockBefore::new(run.path(), run.scene().cutter.radius(), &run.session.stock, pocket.free());
+    let stands = |k: usize| before.stands_under(k);
+    let (steepest, at_least, index) = steepest(run.path(), run.session.top(), limit, &stands);
     let text = match index {
         None => "no way down cuts".to_owned(),
         Some(k) => format!(
@@ -186,8 +225,13 @@ fn ramps(run: &Run<'_>, strategy: &PocketStrategy) -> Claim {
 }
 
 /// The steepest way down below what the level above its pass has cleared, degrees from level; the same less what rounding of
-/// its coordinates may have added; its move. Where a place of the axis is `clear` no stock stood before.
-fn steepest(path: &Toolpath, top: f64, clear: &dyn Fn(&Point2) -> bool) -> (f64, f64, Option<usize>) {
+/// its coordinates may have added; its move. Straight ways, and those above the limit, count where stock `stands` under a move.
+fn steepest(
+    path: &Toolpath,
+    top: f64,
+    limit: f64,
+    stands: &dyn Fn(usize) -> bool,
+) -> (f64, f64, Option<usize>) {
     let levels = levels(path);
     let mut floors = vec![f64::INFINITY; path.passes()];
     // A helix may be all that a pass is.
@@ -201,10 +245,10 @@ fn steepest(path: &Toolpath, top: f64, clear: &dyn Fn(&Point2) -> bool) -> (f64,
     };
     let mut found = (0.0, 0.0, None);
     for (k, (a, b, m)) in path.segments().enumerate() {
-        let straight = a.xy() == b.xy();
-        let cuts = || b.z < cleared(m.pass) - ROUNDING && !(straight && clear(&b.xy()));
         let slope = |drop: f64| drop.max(0.0).atan2((b - a).xy().norm()).to_degrees();
         let at_least = slope(a.z - b.z - LAST_DECIMAL);
+        let is_asked = || a.xy() == b.xy() || at_least > limit + ROUNDING;
+        let cuts = || b.z < cleared(m.pass) - ROUNDING && (!is_asked() || stands(k));
         if m.kind == MoveKind::Plunge && at_least > found.1 && cuts() {
             found = (slope(a.z - b.z), at_least, Some(k));
         }
@@ -245,11 +289,12 @@ mod tests {
         assert_eq!((claim(2.0).verdict(), claim(1.9).verdict()), (Verdict::Pass, Verdict::Fail));
         assert_eq!(claim(1.9).measured, Some(2.0));
         // The way through air above the stock is no way down.
-        assert_eq!(steepest(&path, 0.0, &|_| false), (90.0, 90.0, Some(5)));
-        let beside = |p: &Point2| p.x > 8.0;
-        assert_eq!(steepest(&path, 0.0, &beside).2, Some(1));
+        assert_eq!(steepest(&path, 0.0, 3.0, &|_| true), (90.0, 90.0, Some(5)));
+        assert_eq!(steepest(&path, 0.0, 3.0, &|k| k < 3).2, Some(1));
+        assert_eq!(steepest(&path, 0.0, 3.0, &|_| false).2, None);
+        assert_eq!(steepest(&path, 0.0, 45.0, &|_| false).2, Some(1));
         let ramped = Toolpath::new(path.start, path.moves[..3].to_vec());
-        let (slope, _, index) = steepest(&ramped, 0.0, &|_| false);
+        let (slope, _, index) = steepest(&ramped, 0.0, 3.0, &|_| true);
         assert!((slope - 45.0).abs() < 1e-12 && index == Some(1));
     }
 }

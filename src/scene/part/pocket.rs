@@ -30,6 +30,12 @@ const CHORDS_FROM_WALLS: f64 = 2.0;
 /// ... and to this share of the cutter's radius, by which offsets keep to the safe side.
 const RADIUS_FROM_WALLS: f64 = 5.0e-4;
 
+/// Beyond open sides nothing stands as far as this over the radius behind the edge of the block.
+const BEYOND_EDGE: f64 = 0.05;
+
+/// The largest cutter that would fit is told to this, mm.
+const PRECISION: f64 = 0.005;
+
 /// Where the outlines of a pocket come from.
 #[derive(Debug, Clone, PartialEq)]
 pub enum OutlineSource {
@@ -264,6 +270,11 @@ fn check(
     }
 }
 
+/// How wide the strip of floor beside walls is that is not measured, mm: what stands there is told by the walls.
+pub fn unmeasured_beside_walls(chord_tolerance: f64, radius: f64) -> f64 {
+    CHORDS_FROM_WALLS * chord_tolerance + RADIUS_FROM_WALLS * radius
+}
+
 impl PocketSource {
     /// The pocket, and what is to be said about its drawing.
     ///
@@ -306,6 +317,9 @@ impl PocketSource {
                 job.source.error(span, format!("this line along open sides is none: {e}"), cure)
             })?;
         }
+        // Up to the edge of the block.
+        let edge = job.margin.unwrap_or_default() + radius - job.cutter.flat_radius();
+        let pocket = pocket.without_stock_beyond(edge + BEYOND_EDGE * radius, radius);
         let Some(EarlierCutter { diameter, allowance }) = self.cleared else { return Ok((pocket, notes)) };
         if diameter <= 2.0 * radius {
             let message = format!(
@@ -319,17 +333,27 @@ impl PocketSource {
 
     fn floor(&self, pocket: &Pocket, job: &Loading<'_>) -> Result<Part, SceneError> {
         let radius = job.cutter.radius();
-        let clear = CHORDS_FROM_WALLS * job.chord_tolerance + RADIUS_FROM_WALLS * radius;
+        let clear = unmeasured_beside_walls(job.chord_tolerance, radius);
         let floor = pocket.reachable_floor(job.cutter, clear);
         if floor.is_empty() {
             let largest =
-                pocket.free().largest_disc(0.005, &Silent).ok().flatten().map_or(0.0, |d| 2.0 * d.1);
+                pocket.free().largest_disc(PRECISION, &Silent).ok().flatten().map_or(0.0, |d| 2.0 * d.1);
+            let rounded = (100.0 * largest).floor() / 100.0;
+            if pocket.reachable_floor(job.cutter, 0.0).is_empty() {
+                let message = format!(
+                    "the cutter of {} mm fits nowhere in the pocket; the largest that would has {rounded:.2} mm",
+                    2.0 * radius
+                );
+                return Err(self.refused(job, &message));
+            }
             let message = format!(
-                "the cutter of {} mm fits nowhere in the pocket; the largest that would has {:.2} mm",
+                "the cutter of {} mm fits, but the floor that its bottom comes to is less than {:.4} mm wide, and so much beside its border \
+                 is not measured",
                 2.0 * radius,
-                (100.0 * largest).floor() / 100.0
+                2.0 * clear
             );
-            return Err(self.refused(job, &message));
+            let cure = "use a cutter with a flat bottom or a smaller one, or lower `chord` in [tolerance]";
+            return Err(job.source.error(self.span(), message, cure));
         }
         let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
         for piece in &floor.pieces {
@@ -343,9 +367,13 @@ impl PocketSource {
         Ok(Part::from_mesh(mesh))
     }
 
+    /// Where the scene names its drawing, if it has one.
+    fn span(&self) -> std::ops::Range<usize> {
+        self.file().map_or(0..0, |file| file.span.clone())
+    }
+
     fn refused(&self, job: &Loading<'_>, what: &str) -> SceneError {
-        let span = self.file().map_or(0..0, |file| file.span.clone());
-        job.source.error(span, what.to_owned(), "change the pocket's outline or the cutter")
+        job.source.error(self.span(), what.to_owned(), "change the pocket's outline or the cutter")
     }
 }
 
@@ -457,6 +485,7 @@ mod tests {
     fn open_sides_off_the_outline_and_smaller_earlier_cutters_are_refused() {
         for (key, words) in [
             ("open = [[[60, 0], [61, 40]]]", "its point at x 61.0000 y 40.0000 does not lie on the outline"),
+            ("open = [[[60, 0], [0, 40]]]", "its point at x 30.0000 y 20.0000 does not lie on the outline"),
             ("cleared_by = 6", "leaves no corners"),
         ] {
             let text = TRAY.replace("depth = 5", &format!("depth = 5\n{key}"));
@@ -464,6 +493,20 @@ mod tests {
             let refused = crate::load_part(&scene).unwrap_err().to_string();
             assert!(refused.contains(words), "{refused}");
         }
+    }
+
+    /// A ball that fits a slot by two hundredths fits, though no floor is left to be measured; in a narrower one it does not.
+    #[test]
+    fn a_cutter_that_fits_is_not_said_to_fit_nowhere() {
+        let refused = |width: f64| {
+            let text = format!(
+                "[part]\nsurface = \"pocket\"\noutline = [[0, 0], [12, 0], [12, {width}], [0, {width}]]\ndepth = 2\n[cutter]\nshape = \"ball\"\n\
+                 diameter = 3\n[tolerance]\nchord = 0.005\n[[toolpath]]\nstrategy = \"pocket-offset\"\n"
+            );
+            crate::load_part(&Scene::parse("slot.toml", text).unwrap()).unwrap_err().to_string()
+        };
+        assert!(refused(3.02).contains("fits, but the floor"), "{}", refused(3.02));
+        assert!(refused(2.98).contains("fits nowhere"), "{}", refused(2.98));
     }
 
     #[test]

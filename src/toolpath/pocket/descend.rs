@@ -20,12 +20,12 @@ const LEAST_RAMP: f64 = 0.5;
 /// Depths and ways below which a difference is rounding, mm.
 const ROUNDING: f64 = 1.0e-9;
 
-/// The floors of the steps, mm, from the first to the last.
-pub(super) fn floors(depth: f64, strategy: &PocketStrategy) -> Vec<f64> {
+/// The floors of the steps from the top of the stock down, mm, from the first to the last.
+pub(super) fn floors([top, depth]: [f64; 2], strategy: &PocketStrategy) -> Vec<f64> {
     let finish = if strategy.floor_allowance < depth { strategy.floor_allowance } else { 0.0 };
-    let rough = depth - finish;
+    let rough = top + depth - finish;
     let count = strategy.stepdown.map_or(1.0, |s| (rough / s - ROUNDING).ceil().max(1.0));
-    let mut floors: Vec<f64> = (1..=count as usize).map(|k| -rough * k as f64 / count).collect();
+    let mut floors: Vec<f64> = (1..=count as usize).map(|k| top - rough * k as f64 / count).collect();
     if finish > 0.0 {
         floors.push(-depth);
     }
@@ -148,7 +148,7 @@ pub(super) fn program(
     let safe = settings.stock_top + settings.clearance;
     let mut writer = Writer { settings, safe, moves: Vec::new(), at: None, start: None, pass: 0 };
     let mut above = settings.stock_top;
-    for floor in floors(depth, strategy) {
+    for floor in floors([settings.stock_top, depth], strategy) {
         writer.runs(&runs.clearing, [above, floor], strategy);
         if strategy.wall_finish == WallFinish::Steps {
             writer.runs(&runs.along_walls, [above, floor], strategy);

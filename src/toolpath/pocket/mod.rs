@@ -57,6 +57,11 @@ use work::monitor::{self, Monitor};
 /// Share of the flat bottom's radius that innermost passes may lie from what they have to clear.
 const REACH: f64 = 0.95;
 
+/// Flats that are narrower than this over the stepover leave ridges between all passes, and nothing but ridges nearer to a pass than this over
+/// the stepover: between offsets around a square corner are 0.59 of it.
+const HALF_STEP: f64 = 0.51;
+const REST_OVER_STEP: f64 = 0.6;
+
 /// Longest move over the cutter's radius: feeds and engagement belong to moves.
 const MOVE_OVER_RADIUS: f64 = 0.5;
 
@@ -153,7 +158,10 @@ pub fn plan_pocket(
         let mut runs = piece_runs(piece, cutter, strategy, step, air.is_none(), &mut planned, monitor)?;
         if rules.is_none() {
             // Passes far from each other may leave something at sharp turns of inner ones.
-            runs.extend(rest::runs_to_rest(piece, &runs, cutter.flat_radius(), monitor)?);
+            // What passes leave between them on purpose, where the flat of the bottom is narrow, is no rest.
+            let flat = cutter.flat_radius();
+            let reach = if flat > 0.0 && flat < HALF_STEP * step { REST_OVER_STEP * step } else { flat };
+            runs.extend(rest::runs_to_rest(piece, &runs, reach, monitor)?);
         }
         // Loops that bound the engagement lean to one side of lines, and may find no room beside a way from elsewhere.
         if let (Some(air), None) = (&air, &rules) {

@@ -1,7 +1,9 @@
 //! The pocket itself: its region, over which sides the cutter may leave, what a larger cutter took before; mm.
 
 use super::{Cutter, Region};
-use geometry::{CurveSegment, Piece, Point2, SegmentGrid, Vector2, distance_of_segments, foot};
+use geometry::{
+    CurveSegment, Piece, Point2, RegionIndex, SegmentGrid, Vector2, WallStretch, distance_of_segments, foot,
+};
 use work::monitor::{Cancelled, Monitor};
 
 /// How far beyond an open side there is room, over the cutter's radius: it leaves the stock whole, and turns there.
@@ -9,6 +11,14 @@ const BEYOND: f64 = 2.6;
 
 /// What is no farther from a wall than this, mm, is on it: far above rounding, far below any tolerance.
 const ON_WALL: f64 = 1.0e-5;
+
+/// What lies beyond open sides laps over the region, and one strip over the next, by so much over the cutter's radius or over the length of
+/// the side where that is short. Borders that only touch come apart by the rounding of booleans, and no cutter passes a crack.
+const LAP: f64 = 0.01;
+const LAP_OF_SIDE: f64 = 0.02;
+
+/// Laps end this share of a side before a wall begins, so that they stay inside of acute corners as well.
+const TAPER: f64 = 0.25;
 
 /// Sides of the rounds between strips beyond open sides, rad.
 const ROUND: f64 = 0.2;
@@ -33,15 +43,17 @@ pub struct Pocket {
     free: Region,
     /// Where no stock stands above the floor before the first cut.
     air: Region,
+    /// The room beyond open sides as far as nothing stands, where that is farther than plans go.
+    farther: Region,
 }
 
-/// A line of open sides that does not lie on the outline.
+/// A line of open sides that does not run along the outline.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("its point at x {:.4} y {:.4} does not lie on the outline", at.x, at.y)]
 pub struct NotOnOutline {
     /// Which line, counted from 0.
     pub line: usize,
-    /// The point.
+    /// The point, of the line.
     pub at: Point2,
 }
 
@@ -55,6 +67,7 @@ impl Pocket {
             off_drawing: 0.0,
             open: Vec::new(),
             air: Region::default(),
+            farther: Region::default(),
         }
     }
 
@@ -74,27 +87,52 @@ impl Pocket {
                 divide(&mut self.region, at, tolerance).ok_or(NotOnOutline { line, at: *at })?;
             }
         }
+        for (line, points) in lines.iter().enumerate() {
+            let off = points.windows(2).find_map(|w| off_outline(&self.region, [w[0], w[1]], tolerance));
+            off.map_or(Ok(()), |at| Err(NotOnOutline { line, at }))?;
+        }
         let sides = |line: &Vec<Point2>| line.windows(2).map(|w| [w[0], w[1]]).collect::<Vec<_>>();
         let drawn: Vec<[Point2; 2]> = lines.iter().flat_map(sides).collect();
         let along = |p: &Point2| drawn.iter().any(|side| foot(p, side).1 <= tolerance);
         let is_open = |[a, b]: &[Point2; 2]| along(a) && along(b) && along(&nalgebra::center(a, b));
+        let sides = self.region.curves().flat_map(|curve| {
+            (0..curve.len()).map(|k| [curve[k], curve[(k + 1) % curve.len()]]).collect::<Vec<_>>()
+        });
+        let open = sides.filter(is_open).collect::<Vec<_>>();
+        self.open.extend(open);
+        let beyond = self.beyond(BEYOND * radius, radius);
+        self.free = self.region.union(&beyond);
+        self.air = self.air.union(&beyond.without(&self.region));
+        Ok(self)
+    }
+
+    /// With no stock beyond its open sides as far as `width` mm either, if that is farther than a cutter of a radius goes by itself.
+    #[must_use]
+    pub fn without_stock_beyond(mut self, width: f64, radius: f64) -> Self {
+        if !self.open.is_empty() && width > BEYOND * radius {
+            self.farther = self.beyond(width, radius);
+        }
+        self
+    }
+
+    /// The room beyond open sides as far as `width` mm; it laps over the region.
+    fn beyond(&self, width: f64, radius: f64) -> Region {
+        let is_open = |side: &[Point2; 2]| self.open.contains(side);
         let (mut open, mut walls, mut closed) = (Vec::new(), Vec::new(), Vec::new());
         for curve in self.region.curves() {
             let sides: Vec<[Point2; 2]> =
                 (0..curve.len()).map(|k| [curve[k], curve[(k + 1) % curve.len()]]).collect();
-            self.open.extend(sides.iter().filter(|side| is_open(side)));
-            strips(&sides, is_open, BEYOND * radius, 0.0, &mut open);
+            strips(&sides, is_open, &Strip { width, longer: 0.0, lap: LAP * radius }, &mut open);
             walls.extend(sides.into_iter().filter(|side| !is_open(side)));
         }
         // Behind a wall that stands beyond an open side, no farther: around the end of a thin one there is room. What lies behind others
         // is parted from there by stock, or by the pocket itself.
         for wall in walls.iter().filter(|wall| open.iter().any(|strip| meets(strip, wall))) {
-            strips(&[*wall], |_| true, BEYOND * radius, 0.0, &mut closed);
+            // Where a wall ends at an open side nothing is taken from the lap.
+            let behind = Strip { width, longer: -2.0 * LAP * radius, lap: 0.0 };
+            strips(&[*wall], |_| true, &behind, &mut closed);
         }
-        let beyond = Region { pieces: open }.without(&Region { pieces: closed }).without(&self.region);
-        self.free = self.region.union(&beyond);
-        self.air = self.air.union(&beyond);
-        Ok(self)
+        Region { pieces: open }.without(&Region { pieces: closed })
     }
 
     /// After a flat end mill of a radius went everywhere in it that it fits, `allowance` mm off the walls.
@@ -102,7 +140,7 @@ impl Pocket {
         // Straight sides where they belong, and chords of round ones inside.
         let straight = |distance: f64| distance - Region::offset_excess(distance);
         let reached = self.free.inset(straight(radius + allowance)).grown(straight(radius));
-        self.air = self.air.union(&reached.intersection(&self.region));
+        self.air = self.air.union(&reached.intersection(&self.free));
         self
     }
 
@@ -111,13 +149,26 @@ impl Pocket {
         &self.free
     }
 
+    /// What may be swept without a cut into walls, also by moves that come from farther away than planned ones.
+    pub fn room(&self) -> Region {
+        if self.farther.is_empty() { self.free.clone() } else { self.free.union(&self.farther) }
+    }
+
+    /// The [air](Self::air) as far as the room goes.
+    pub fn clear_of_stock(&self) -> Region {
+        if self.farther.is_empty() {
+            return self.air.clone();
+        }
+        self.air.union(&self.farther.without(&self.region))
+    }
+
     /// Where no stock stands above the floor before the first cut.
     pub fn air(&self) -> &Region {
         &self.air
     }
 
     /// The sides of the air beside which stock stands: those that lie on no wall.
-    pub(super) fn borders_of_air(&self) -> SegmentGrid {
+    pub fn borders_of_air(&self) -> SegmentGrid {
         let walls = SegmentGrid::of_curves(self.free.curves());
         let on_wall = |side: &CurveSegment| {
             let [a, b] = side.ends;
@@ -139,38 +190,47 @@ impl Pocket {
     /// Length of its walls that a cutter of a radius touches from some place where it fits, mm, but for what their chords are off the
     /// curves: beside sharp corners it does not come to them.
     pub fn reached_wall_length(&self, radius: f64) -> f64 {
-        let centres = self.free.inset(radius);
-        if centres.pieces.is_empty() {
-            return 0.0;
+        self.reached_walls(radius).iter().map(WallStretch::length).sum()
+    }
+
+    /// The walls that a cutter of a radius touches from some place where it fits, as [`Self::reached_wall_length`] counts them, and the
+    /// edges that it goes around.
+    pub fn reached_walls(&self, radius: f64) -> Vec<WallStretch> {
+        let centres = RegionIndex::new(self.free.inset(radius));
+        if centres.region().is_empty() {
+            return Vec::new();
         }
-        let centres = SegmentGrid::of_curves(centres.curves());
-        let reach = radius + 2.0 * Region::offset_excess(radius) + self.off_drawing + ON_WALL;
-        let of_side = |[a, b]: [Point2; 2]| {
-            let along = b - a;
-            let fits = |share: f64| centres.distance(&(a + along * share)) <= reach;
-            let places = (along.norm() / (WALL_STEP * radius)).ceil().max(1.0);
-            let of_step = |k: usize| {
-                let ends = [k as f64 / places, (k + 1) as f64 / places];
-                match ends.map(fits) {
-                    [true, true] => ends[1] - ends[0],
-                    [false, false] => 0.0,
-                    [from, _] => {
-                        let (mut yes, mut no) = if from { (ends[0], ends[1]) } else { (ends[1], ends[0]) };
-                        for _ in 0..HALVINGS {
-                            let middle = 0.5 * (yes + no);
-                            *(if fits(middle) { &mut yes } else { &mut no }) = middle;
-                        }
-                        (yes - if from { ends[0] } else { ends[1] }).abs()
-                    }
-                }
-            };
-            along.norm() * (0..places as usize).map(of_step).sum::<f64>()
-        };
-        let sides = |curve: &[Point2]| -> f64 {
-            let side = |k: usize| [curve[k], curve[(k + 1) % curve.len()]];
-            (0..curve.len()).map(side).filter(|side| !self.open.contains(side)).map(of_side).sum()
-        };
-        self.region.curves().map(sides).sum()
+        let off = 2.0 * Region::offset_excess(radius) + self.off_drawing + ON_WALL;
+        let left = |[a, b]: &[Point2; 2]| (b - a).try_normalize(0.0).map(|d| Vector2::new(-d.y, d.x));
+        let mut found = Vec::new();
+        for curve in self.region.curves() {
+            let side = |k: usize| [curve[k % curve.len()], curve[(k + 1) % curve.len()]];
+            for k in 0..curve.len() {
+                let [a, b] = side(k);
+                let Some(inward) = left(&[a, b]).filter(|_| !self.open.contains(&[a, b])) else { continue };
+                let at = |share: f64| a + (b - a) * share;
+                let places = ((b - a).norm() / (WALL_STEP * radius)).ceil();
+                let reached = fitting(places, |share| centres.sides().distance(&at(share)) <= radius + off);
+                found.extend(
+                    reached.iter().map(|ends| WallStretch { ends: ends.map(at), inward: [inward; 2] }),
+                );
+                // Around an edge the cutter turns from one side to the next.
+                let next = left(&side(k + 1)).filter(|_| !self.open.contains(&side(k + 1)));
+                let Some(turn) = next.map(|next| inward.perp(&next).atan2(inward.dot(&next))) else {
+                    continue;
+                };
+                let toward = |share: f64| {
+                    let (sin, cos) = (share * turn).sin_cos();
+                    Vector2::new(inward.x * cos - inward.y * sin, inward.x * sin + inward.y * cos)
+                };
+                let fits = |share: f64| centres.depth(&(b + toward(share) * radius)) >= -off;
+                let reached = if turn < 0.0 { fitting((-turn / WALL_STEP).ceil(), fits) } else { Vec::new() };
+                found.extend(
+                    reached.iter().map(|ends| WallStretch { ends: [b; 2], inward: ends.map(toward) }),
+                );
+            }
+        }
+        found
     }
 
     /// Ground beyond the open sides that a cutter of a radius may meet, also beyond the walls at their ends: planning asks for
@@ -178,7 +238,8 @@ impl Pocket {
     pub(super) fn ground_beyond(&self, radius: f64) -> Region {
         let mut pieces = Vec::new();
         for side in &self.open {
-            strips(&[*side], |_| true, (BEYOND + 1.0) * radius, radius, &mut pieces);
+            let ground = Strip { width: (BEYOND + 1.0) * radius, longer: radius, lap: 0.0 };
+            strips(&[*side], |_| true, &ground, &mut pieces);
         }
         Region { pieces }.without(&self.region)
     }
@@ -228,25 +289,103 @@ fn meets(piece: &Piece, side: &[Point2; 2]) -> bool {
     piece.contains(&side[0]) || (0..outer.len()).any(near)
 }
 
-/// Strips of a width to the right of those sides of a closed curve that are wanted, and the rounds between two of them; each
-/// reaches `longer` mm beyond its side's ends.
+/// The stretches of a way from 0 to 1 on which something fits. It is asked at so many places, and where that changes between two of them it
+/// is found by halving.
+fn fitting(places: f64, fits: impl Fn(f64) -> bool) -> Vec<[f64; 2]> {
+    let places = places.max(1.0);
+    let mut found: Vec<[f64; 2]> = Vec::new();
+    let (mut from, mut fits_from) = (0.0, fits(0.0));
+    for k in 1..=places as usize {
+        let to = k as f64 / places;
+        let fits_to = fits(to);
+        let edge = || {
+            let (mut yes, mut no) = if fits_from { (from, to) } else { (to, from) };
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (yes + no);
+                *(if fits(middle) { &mut yes } else { &mut no }) = middle;
+            }
+            yes
+        };
+        let stretch = match [fits_from, fits_to] {
+            [true, true] => Some([from, to]),
+            [true, false] => Some([from, edge()]),
+            [false, true] => Some([edge(), to]),
+            [false, false] => None,
+        };
+        match (found.last_mut(), stretch) {
+            (Some(last), Some(stretch)) if last[1] == stretch[0] => last[1] = stretch[1],
+            (_, stretch) => found.extend(stretch),
+        }
+        (from, fits_from) = (to, fits_to);
+    }
+    found
+}
+
+/// The first place of a drawn line that does not lie within `tolerance` of the sides along it, if there is one. Sides end where it does.
+fn off_outline(region: &Region, line: [Point2; 2], tolerance: f64) -> Option<Point2> {
+    let length = (line[1] - line[0]).norm();
+    let along = |side: [Point2; 2]| {
+        let feet = side.map(|end| foot(&end, &line));
+        let from = feet[0].0.min(feet[1].0) * length;
+        feet.iter().all(|foot| foot.1 <= tolerance).then(|| [from, feet[0].0.max(feet[1].0) * length])
+    };
+    let of_curve = |curve: &[Point2]| -> Vec<[f64; 2]> {
+        (0..curve.len()).filter_map(|k| along([curve[k], curve[(k + 1) % curve.len()]])).collect()
+    };
+    let mut covered: Vec<[f64; 2]> = region.curves().flat_map(of_curve).collect();
+    covered.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut reached = 0.0f64;
+    for [from, to] in covered.into_iter().chain([[length; 2]]) {
+        if from > reached + 2.0 * tolerance {
+            return Some(line[0] + (line[1] - line[0]) * (0.5 * (reached + from) / length));
+        }
+        reached = reached.max(to);
+    }
+    None
+}
+
+/// The strips beside sides of a curve, mm.
+struct Strip {
+    /// How wide they are.
+    width: f64,
+    /// How far they reach beyond the ends of their sides; below zero they end before.
+    longer: f64,
+    /// How far they lap over what is left of their sides, and over each other, at most.
+    lap: f64,
+}
+
+/// Strips to the right of those sides of a closed curve that are wanted, and the rounds between two of them.
 fn strips(
     sides: &[[Point2; 2]],
     wanted: impl Fn(&[Point2; 2]) -> bool,
-    width: f64,
-    longer: f64,
+    strip: &Strip,
     into: &mut Vec<Piece>,
 ) {
     let right = |[a, b]: &[Point2; 2]| {
         let along = (b - a).try_normalize(0.0)?;
         Some((along, Vector2::new(along.y, -along.x)))
     };
+    let width = strip.width;
+    let length = |side: &[Point2; 2]| (side[1] - side[0]).norm();
+    let count = sides.len();
     for (k, side) in sides.iter().enumerate().filter(|(_, side)| wanted(side)) {
         let Some((along, out)) = right(side) else { continue };
-        let [a, b] = [side[0] - along * longer, side[1] + along * longer];
-        into.push(Piece { outer: vec![b, a, a + out * width, b + out * width], islands: Vec::new() });
-        let next = &sides[(k + 1) % sides.len()];
-        let Some((_, to)) = right(next).filter(|_| wanted(next) && sides.len() > 1) else { continue };
+        let longer = strip.longer.max(-TAPER * length(side));
+        let beyond = |other: &[Point2; 2]| {
+            let goes_on = strip.lap > 0.0 && count > 1 && wanted(other);
+            if goes_on { strip.lap.min(TAPER * length(other)) } else { longer }
+        };
+        let (before, next) = (&sides[(k + count - 1) % count], &sides[(k + 1) % count]);
+        let (a, b) = (side[0] - along * beyond(before), side[1] + along * beyond(next));
+        let mut outer = vec![b];
+        if strip.lap > 0.0 {
+            let (taper, lap) =
+                (along * (TAPER * length(side)), out * strip.lap.min(LAP_OF_SIDE * length(side)));
+            outer.extend([side[1] - taper - lap, side[0] + taper - lap]);
+        }
+        outer.extend([a, a + out * width, b + out * width]);
+        into.push(Piece { outer, islands: Vec::new() });
+        let Some((_, to)) = right(next).filter(|_| wanted(next) && count > 1) else { continue };
         let turn = out.perp(&to).atan2(out.dot(&to));
         if turn > 0.0 {
             let count = (turn / ROUND).ceil();
@@ -324,6 +463,60 @@ mod tests {
         }
         let beside = square().opened(&[points(&[(20., 0.), (21., 20.)])], 1e-3, 2.0).unwrap_err();
         assert_eq!(beside.at, Point2::new(21.0, 20.0));
+        // From one place of the outline to another one, across the pocket.
+        let across = square().opened(&[points(&[(20., 0.), (20., 5.), (0., 20.)])], 1e-3, 2.0).unwrap_err();
+        assert_eq!((across.line, across.at), (0, Point2::new(10.0, 12.5)));
+    }
+
+    /// Two open sides with the corner between them, turned to any angle, with and without a place of a line amid a side, and the open half
+    /// of a round: the room beyond has no cracks, so that the cutter comes into all that is open.
+    #[test]
+    fn open_sides_stay_open_at_any_angle() {
+        let r = 6.0;
+        let rest = |pocket: &Pocket| {
+            pocket.rest_area(&Cutter::flat(2.0 * r).unwrap(), &work::monitor::Silent).unwrap()
+        };
+        let corner = r * r * (1.0 - std::f64::consts::FRAC_PI_4);
+        for k in 0..60 {
+            let (sin, cos) = (0.37 + 0.1047 * f64::from(k)).sin_cos();
+            let (w, h) = (25.0 + 0.331 * f64::from(k), 50.0 - 0.217 * f64::from(k));
+            // As scenes write them.
+            let turned = |x: f64, y: f64| {
+                let [x, y] = [x * cos - y * sin, x * sin + y * cos].map(|c| (c * 1e4).round() / 1e4);
+                Point2::new(x, y)
+            };
+            let outline = [(0., 0.), (w, 0.), (w, h), (0., h)].map(|(x, y)| turned(x, y)).to_vec();
+            let between = nalgebra::center(&outline[1], &outline[2]);
+            let divided = [outline[0], outline[1], between, outline[2]].to_vec();
+            for line in [outline[..3].to_vec(), divided] {
+                let region = Region::nested(vec![outline.clone()]).unwrap().0;
+                let pocket = Pocket::new(region, 5.0).opened(&[line], 5e-3, r).unwrap();
+                let width = BEYOND * r;
+                let beyond = (w + h) * width + 0.25 * std::f64::consts::PI * width * width;
+                let found = pocket.air().area();
+                assert!((found - beyond).abs() < 0.003 * beyond, "{k}: {found} {beyond}");
+                assert!((rest(&pocket) - corner).abs() < 0.03, "{k}: {} {corner}", rest(&pocket));
+                assert_eq!((pocket.free().pieces.len(), pocket.free().curves().count()), (1, 1), "{k}");
+                let farther = pocket.clone().without_stock_beyond(5.0 * r, r);
+                let wide = (w + h) * 5.0 * r + 0.25 * std::f64::consts::PI * 25.0 * r * r;
+                let found = farther.clear_of_stock().area();
+                assert!(
+                    (found - wide).abs() < 0.003 * wide && farther.free() == pocket.free(),
+                    "{k}: {found}"
+                );
+                // A larger cutter that went everywhere leaves a corner and nothing else.
+                let borders = pocket.cleared_by(1.5 * r, 0.0).borders_of_air();
+                let length: f64 = borders.segments().iter().map(|s| (s.ends[1] - s.ends[0]).norm()).sum();
+                assert!((length - 0.75 * r * std::f64::consts::PI).abs() < 0.1, "{k}: {length}");
+            }
+            let n = 12;
+            let of_round = |i: usize| std::f64::consts::PI * i as f64 / n as f64;
+            let round: Vec<Point2> =
+                (0..=n).map(|i| turned(w * of_round(i).cos(), w * of_round(i).sin())).collect();
+            let region = Region::nested(vec![round.clone()]).unwrap().0;
+            let pocket = Pocket::new(region, 5.0).opened(&[round], 5e-3, r).unwrap();
+            assert!(rest(&pocket) < 0.02, "{k}: {}", rest(&pocket));
+        }
     }
 
     /// Walls beside an open side are no way out: behind them is no room.

@@ -12,6 +12,7 @@ use crate::strategies::direction_keys;
 use crate::vocabulary::{
     Definition, FeedDirection, Lines, PartKind, Passes, PlanError, Reading, Step, Strategy, Task,
 };
+use cutter::Cutter;
 use field::mesh::Sense;
 use geometry::Vector2;
 use keys::{LENGTH, SceneError, Section, toml_number, word_of};
@@ -106,6 +107,11 @@ const LEAST_HELIX: f64 = 0.2;
 
 /// Stepover over the cutter's diameter by default: 78 degrees of engagement.
 const STEPOVER_OVER_DIAMETER: f64 = 0.4;
+
+/// Stepover over the radius up to which the bottom lies lower than the scallop, by default: turns of passes leave more between them than
+/// half of the stepover. And the least over the cutter's radius.
+const STEPOVER_OVER_LOW: f64 = 1.6;
+const LEAST_STEPOVER: f64 = 0.02;
 
 /// Stepdown over the cutter's diameter by default.
 const STEPDOWN_OVER_DIAMETER: f64 = 0.5;
@@ -246,11 +252,13 @@ fn read(from: &Reading<'_>, pattern: Pattern) -> Result<Box<dyn Strategy>, Scene
     }))
 }
 
-/// The stepover of a pocket's toolpath.
+/// The stepover of a pocket's toolpath. By default the ridges that the round of the corner leaves between passes stay below `scallop` mm.
 ///
 /// # Errors
 /// A stepover that leaves material between passes.
-pub fn read_pocket_step(section: &Section<'_>, radius: f64) -> Result<Step, SceneError> {
+pub fn read_pocket_step(section: &Section<'_>, cutter: &Cutter, scallop: f64) -> Result<Step, SceneError> {
+    let (radius, corner) = (cutter.radius(), cutter.corner_radius());
+    let low = cutter.flat_radius().max(0.0) + (scallop * (2.0 * corner - scallop)).max(0.0).sqrt();
     let step = match section.length("stepover")? {
         Some(step) if step.value > 1.9 * radius => {
             let message = format!(
@@ -262,7 +270,10 @@ pub fn read_pocket_step(section: &Section<'_>, radius: f64) -> Result<Step, Scen
         }
         Some(step) => step.value,
         // Rounded, so that it reads back as it was written.
-        None => (2.0 * STEPOVER_OVER_DIAMETER * radius * 1e6).round() / 1e6,
+        None => {
+            let usual = (2.0 * STEPOVER_OVER_DIAMETER * radius).min(STEPOVER_OVER_LOW * low);
+            (usual.max(LEAST_STEPOVER * radius) * 1e6).round() / 1e6
+        }
     };
     Ok(Step::Stepover(step))
 }

@@ -33,6 +33,9 @@ const SAMPLING: f64 = 0.1;
 /// Singular points nearer than this many radii of the cutter count as one.
 const MERGE_OVER_RADIUS: f64 = 1.0;
 
+/// A function that rises by less than this over what its directions ask for, on average, follows none of them: its levels are noise.
+const LEAST_FOLLOWED: f64 = 0.02;
+
 /// Streamlines of a pocket.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Vectors {
@@ -62,6 +65,15 @@ pub fn runs(
     let (source, Fitted { mesh, lines, .. }) = (fitted.source(step, vectors.lines)?, &fitted);
     let range = source.on.levels.range();
     let places = source.on.places(mesh.triangles().len(), |p| Some((source.allowed_at(p), false)));
+    let (rise, area) =
+        (places.iter().map(|place| place.length), (0..mesh.triangles().len()).map(|t| mesh.area(t)));
+    let followed = step * rise.sum::<f64>() / area.sum::<f64>();
+    if vectors.along_walls && followed < LEAST_FOLLOWED {
+        return Err(not_applicable(
+            "the directions lead from wall to wall, and no function with one value along each wall follows them: leave out \
+             `along_walls`, or take directions that go around",
+        ));
+    }
     let placed = place_levels(&places, range, vectors.lines.steps(), &mut planned.notes);
     let mut passes = along_and_between(&source, &placed, range, SAMPLING * step, monitor)?;
     // Parameters of a pocket are x and y.

@@ -218,12 +218,32 @@ fn a_cutter_that_fits_nowhere_is_told_the_largest_that_does() {
 #[test]
 fn steps_go_down_evenly_and_the_floor_has_its_own() {
     let mut s = strategy(patterns()[2].clone());
-    assert_eq!(descend::floors(6.0, &s), [-3.0, -6.0]);
-    assert_eq!(descend::floors(7.0, &s).len(), 3);
+    assert_eq!(descend::floors([0.0, 6.0], &s), [-3.0, -6.0]);
+    assert_eq!(descend::floors([0.0, 7.0], &s).len(), 3);
     s.floor_allowance = 0.5;
-    assert_eq!(descend::floors(6.0, &s), [-2.75, -5.5, -6.0]);
+    assert_eq!(descend::floors([0.0, 6.0], &s), [-2.75, -5.5, -6.0]);
     s.stepdown = None;
-    assert_eq!(descend::floors(6.0, &s), [-5.5, -6.0]);
+    assert_eq!(descend::floors([0.0, 6.0], &s), [-5.5, -6.0]);
+    // From the top of the stock on, where that stands over the face.
+    (s.stepdown, s.floor_allowance) = (Some(2.5), 0.0);
+    assert_eq!(descend::floors([1.5, 6.0], &s), [-1.0, -3.5, -6.0]);
+}
+
+/// A bull nose with next to no flat leaves ridges between its passes, by the stepover. No pass of its own goes along each of them.
+#[test]
+fn ridges_of_a_narrow_flat_are_no_rest() {
+    let triangle = [(23.0, 15.0), (31.0, 17.0), (27.0, 23.0)].map(|(x, y)| Point2::new(x, y)).to_vec();
+    let pocket = pocket(vec![rectangle(0.0, 0.0, 46.0, 39.0), triangle]);
+    let moves = |corner: f64| {
+        let cutter = Cutter::bull(6.0, corner).unwrap();
+        let s = strategy(Pattern::Offset { spiral: true });
+        plan_pocket(&pocket, &cutter, &s, &settings(), &Silent).unwrap().path.len()
+    };
+    let wide = moves(1.0);
+    for corner in [2.0, 2.7] {
+        let narrow = moves(corner);
+        assert!(narrow < 5 * wide, "{corner}: {narrow} {wide}");
+    }
 }
 
 /// Several steps with both allowances: until the passes along the walls the allowance stands there, also below what the floor is
@@ -320,6 +340,23 @@ fn feeds_fall_where_more_of_the_cutter_cuts() {
     limit_feed(&mut path, &angles, PI / 2.0);
     let feeds: Vec<f64> = path.moves.iter().map(|m| m.feed_rate).collect();
     assert_eq!(feeds, [1000.0, 500.0, 1000.0]);
+}
+
+/// Directions straight across a pocket, and one value along each wall: both together leave no function but a level one, whose lines are noise.
+#[test]
+fn directions_across_do_not_run_along_walls() {
+    let island = rectangle(10.0, 5.0, 14.0, 9.0);
+    let pocket = pocket(vec![rectangle(0.0, 0.0, 24.0, 14.0), island]);
+    let cutter = Cutter::flat(4.0).unwrap();
+    let settings = PlanSettings { step: Step::Stepover(1.2), ..settings() };
+    let planned = |direction: FeedDirection, along_walls: bool| {
+        let vectors = Vectors { direction, direction_weight: 1.0, along_walls, lines: Lines::Levels };
+        plan_pocket(&pocket, &cutter, &strategy(Pattern::Streamline(vectors)), &settings, &Silent)
+    };
+    let refused = planned(FeedDirection::Angle(30f64.to_radians()), true).unwrap_err().to_string();
+    assert!(refused.contains("along_walls"), "{refused}");
+    assert!(planned(FeedDirection::Angle(30f64.to_radians()), false).is_ok());
+    assert!(planned(FeedDirection::Border(Sense::Along), true).is_ok());
 }
 
 /// What flows around a round island in a round pocket: passes are circles, none ends at a wall, and streamlines traced by
