@@ -52,9 +52,6 @@ pub(crate) fn keep_on_faces(task: &Task<'_>, passes: &mut Passes) -> Result<(), 
         Ok::<_, Cancelled>(served.stretches(&all[k], settings.sampling))
     })?;
     passes.passes = kept.into_iter().flatten().collect();
-    for along in &mut passes.contacts {
-        along.retain(|contact| faces.hold(&part.closest_point(&contact.at).0.normal));
-    }
     passes.faces = passes.faces.and(&faces);
     Ok(())
 }

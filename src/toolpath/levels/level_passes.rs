@@ -280,7 +280,7 @@ impl LevelSource for ChartGuide<'_> {
                 across,
                 normal: p.normal,
                 allowed,
-                inside: self.chart.holds([u, v]),
+                inside: self.chart.holds([u, v]) && self.settings.faces.hold(&p.normal),
                 parameters: Some([u, v]),
                 asked: None,
             })

@@ -379,7 +379,7 @@ impl MeshGuide<'_> {
             across: normal.cross(&along).try_normalize(1e-300)?,
             normal,
             allowed,
-            inside: own && on_part(),
+            inside: own && on_part() && self.settings.faces.hold(&normal),
             parameters: None,
             asked: if is_rolling { None } else { self.on.asked_at(&at, &normal) },
         })

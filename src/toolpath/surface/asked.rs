@@ -81,12 +81,15 @@ pub(crate) fn everywhere(direction: &FeedDirection, wanted: &Wanted) -> Option<V
     (is_everywhere(direction) && matters >= least_matter(direction)).then_some(tangent)
 }
 
+/// Places and tangents of patches at parameters and a direction in these.
+type OnPatches<'a> = &'a dyn Fn([f64; 2], [f64; 2]) -> Vec<(Point3, Vector3)>;
+
 /// What rows are made of besides a direction.
 pub(crate) struct Ground<'a> {
     /// The borders, closed polygons.
     pub borders: &'a dyn Fn() -> Vec<Vec<Point3>>,
     /// Place and tangent of a table's row on patches; without it parameters are x and y.
-    pub on_patches: Option<&'a dyn Fn([f64; 2], [f64; 2]) -> Vec<(Point3, Vector3)>>,
+    pub on_patches: Option<OnPatches<'a>>,
     /// Whether a place of the plan view is covered.
     pub covers: &'a dyn Fn(&Point2) -> bool,
     /// Rows along curves are no farther apart, mm.
@@ -233,8 +236,7 @@ pub(crate) fn on_mesh(
         part.patches().iter().filter_map(of_patch).collect()
     };
     let (borders, covers) = (|| borders_of(piece), |p: &Point2| covers(part, p));
-    let on_patches: Option<&dyn Fn([f64; 2], [f64; 2]) -> Vec<(Point3, Vector3)>> =
-        if part.patches().is_empty() { None } else { Some(&on_patches) };
+    let on_patches: Option<OnPatches<'_>> = if part.patches().is_empty() { None } else { Some(&on_patches) };
     Ground { borders: &borders, on_patches, covers: &covers, spacing }.rows(direction)
 }
 

@@ -151,6 +151,7 @@ pub struct Contact {
     pub normal: Vector3,
     /// Allowed interval, mm.
     pub allowed: f64,
+    /// Whether it is on the part, on faces that are asked for.
     pub inside: bool,
     /// Its parameters on a chart.
     pub parameters: Option<[f64; 2]>,
