@@ -33,7 +33,7 @@ pub enum CliError {
     },
     /// A result could not be written.
     #[error("cannot write {}: {}", shown(path), printable(reason))]
-    #[diagnostic(help("make room there, or name another place"))]
+    #[diagnostic(help("make room there, or name another folder with --out"))]
     Output {
         /// The file or folder.
         path: PathBuf,
@@ -42,7 +42,9 @@ pub enum CliError {
     },
     /// What stands where results go is not ours to replace.
     #[error("{} is in the way: {reason}; nothing was written", shown(path))]
-    #[diagnostic(help("move it, or name another place for the results"))]
+    #[diagnostic(help(
+        "move it to another place, or name another folder with --out (another file with --history)"
+    ))]
     InTheWay {
         /// The file or folder.
         path: PathBuf,

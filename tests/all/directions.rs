@@ -183,7 +183,7 @@ fn the_program_reads_directions_beside_the_scene_and_says_where_they_fail() {
     std::fs::write(home.path().join("flow.txt"), "1 1 1 0.2\n7 5 -1 -0.2\n4 3 1 0.2\n").unwrap();
     let checked = millstream(home.path(), &["check", "scene.toml"]);
     assert_eq!(checked.code, Some(0), "{}", checked.stderr);
-    for key in ["directions = \"flow.txt\"", "method = \"auto\"", "control_points = 8"] {
+    for key in ["directions = \"flow.txt\"", "method = \"bspline\"", "control_points = 8"] {
         assert!(checked.stdout.contains(key), "{key}: {}", checked.stdout);
     }
     let run = millstream(home.path(), &["run", "scene.toml"]);

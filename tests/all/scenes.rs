@@ -346,7 +346,8 @@ fn a_pocket_is_cleared_along_vectors_walls_and_guides() {
     }
     let named = |name: &str| toolpaths.iter().find(|t| t["name"] == name).unwrap();
     let off = |name: &str| named(name)["field"]["direction_error_rms_deg"].as_f64().unwrap();
-    let most = [("vectors", 5.0), ("vectors, traced", 5.0), ("along the walls", 10.0), ("guides", 2.5)];
+    // Along the guides themselves, which bend more tightly than passes beside them.
+    let most = [("vectors", 5.0), ("vectors, traced", 5.0), ("along the walls", 10.0), ("guides", 3.5)];
     for (name, most) in most {
         assert!(off(name) < most, "{name}: {}", off(name));
     }

@@ -257,6 +257,9 @@ fn level_lines(part: &Part, chart: &Chart, field: &ScalarField) -> Vec<LevelLine
     level_values(tracer.range()).flat_map(of_level).collect()
 }
 
+/// How far beyond the ends of a side, as a share of it, a neighbour still meets it.
+const END_ROUNDING: f64 = 1e-6;
+
 /// Distance, mm, from point `[pass, index]` to the next pass straight across the feed, to one side; `None` where none is
 /// near.
 fn neighbour(
@@ -278,7 +281,8 @@ fn neighbour(
             return;
         }
         let (s, t) = (d.perp(&e) / determinant, d.perp(&ray) / determinant);
-        if !(0.0..=1.0).contains(&s) || !(0.0..=1.0).contains(&t) {
+        // Passes that end at the border end beside each other but for rounding.
+        if !(0.0..=1.0).contains(&s) || !(-END_ROUNDING..=1.0 + END_ROUNDING).contains(&t) {
             return;
         }
         let (a, b) = (passes[curve][first].at, passes[curve][first + 1].at);
