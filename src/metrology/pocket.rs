@@ -46,7 +46,7 @@ pub struct ExceedingStretch {
     pub z: f64,
     /// Its length.
     pub length_mm: f64,
-    /// The greatest angle on it; its error is bounded as that of [`PocketFigures::max_engagement_deg`].
+    /// The greatest angle on it; its error is bounded as that of [`EngagementFigures::max_engagement_deg`].
     pub max_engagement_deg: f64,
     /// Its first move, counted from 0.
     pub first_move: u32,
