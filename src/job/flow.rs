@@ -217,13 +217,14 @@ impl Session {
             wall_s: measured.wall_s,
             threads: work::parallel::threads(),
         };
-        let claims = judge::judge(
+        let mut claims = judge::judge(
             &measured.measurement,
             &scene.tolerance,
             &scene.scallop_rule,
             found.claims,
             planned.plan.path.program_name(),
         );
+        judge::name_strays(&mut claims, planned.plan.path.origin.strays);
         let [claims, left] = if self.goes_on(request) {
             figures::before_others(claims)
         } else if request.foreign().is_some_and(|read| read.others) {

@@ -33,6 +33,21 @@ pub(crate) fn judge(
     claims
 }
 
+/// What decides a claim that cells cannot.
+const STRAYS: &str = "the tool strays by as much between the lines of the program: a lesser `arcs` in [machine], or shorter moves where axes \
+                      turn, would decide it";
+
+/// Says of undecided lengths that the bound would decide, did the motion not stray so far, mm, from the moves that are measured.
+pub(crate) fn name_strays(claims: &mut [Claim], strays: f64) {
+    let hangs_on_it = |claim: &Claim| {
+        let nearer = Claim { error_bound: claim.error_bound - strays, ..claim.clone() };
+        claim.unit == "mm" && claim.verdict() == Verdict::Undecided && nearer.verdict() != Verdict::Undecided
+    };
+    for claim in claims.iter_mut().filter(|claim| strays > 0.0 && hangs_on_it(claim)) {
+        claim.decided_by = STRAYS;
+    }
+}
+
 /// The verdict by all of some limits.
 pub(crate) fn verdict_by(claims: &[Claim]) -> Verdict {
     claims.iter().map(Claim::verdict).max().unwrap_or(Verdict::Undecided)

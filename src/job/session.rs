@@ -390,6 +390,8 @@ mod tests {
             claim.verdict()
         };
         assert_eq!([gouge(&moves), gouge(&arcs)], [report::Verdict::Pass, report::Verdict::Undecided]);
+        let said: String = arcs.claims.iter().map(report::Claim::sentence).collect();
+        assert!(said.contains("a lesser `arcs`") && !said.contains("finer cell"), "{said}");
     }
 
     /// What the planner lets the cutter into the triangles, and these into the true surface, is no gouge.
