@@ -28,7 +28,7 @@ const LONGEST_PIECE: f64 = 2.0;
 /// How far inside of a border, as a share of the gouge tolerance, what is left counts as near: at a corner it is √2 times as far off.
 const INSIDE_SHARE: f64 = 0.65;
 
-/// Halvings of that way: to a nanometre of millimetres.
+/// Halvings by which the way to what is left is found: to a ten-millionth of the farthest.
 const INSIDE_HALVINGS: usize = 24;
 
 /// Steps of Newton's method for the meeting of a normal with what a move sweeps; it converges from one side.

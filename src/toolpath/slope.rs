@@ -72,9 +72,9 @@ impl Served<'_> {
     /// The stretches of a pass that serve, as far as more than a point is left of them.
     fn stretches(&self, pass: &[Point3], sampling: f64) -> Vec<Vec<Point3>> {
         let (mut found, mut open) = (Vec::new(), Vec::new());
-        for (a, b) in pass.iter().zip(&pass[1..]) {
-            let way = b - a;
-            let at = |t: f64| a + way * t;
+        for ends in pass.windows(2) {
+            let (from, way) = (ends[0], ends[1] - ends[0]);
+            let at = |t: f64| from + way * t;
             let serves = |t: f64| self.serves(at(t).xy());
             let count = (way.norm() / sampling).ceil().max(1.0) as usize;
             let mut before = (0.0, serves(0.0));
@@ -94,7 +94,7 @@ impl Served<'_> {
                 before = now;
             }
             if before.1 {
-                open.push(*b);
+                open.push(ends[1]);
             }
         }
         found.push(open);
