@@ -148,7 +148,7 @@ impl PartialOrd for Square {
 }
 
 /// Searches `squares`, all of one size, for values above `known`, holding no more than `held` at a time. `at` tells what the square around a
-/// place with a given half side holds; `None` off the part.
+/// place with a given half side holds, and at which of its places; `None` off the part.
 ///
 /// # Tolerance
 /// `possible` exceeds the greater of `known` and the value found by no more than `asked` unless [`MOST`]
@@ -161,7 +161,7 @@ pub(super) fn greatest(
     known: f64,
     asked: f64,
     held: usize,
-    at: &(dyn Fn(Point2, f64) -> Option<Value> + Sync),
+    at: &(dyn Fn(Point2, f64) -> Option<(Point2, Value)> + Sync),
     monitor: &dyn Monitor,
 ) -> Result<BoundedGreatest, Cancelled> {
     let least = squares.first().map_or(0.0, |s| s.half * OFF_PART_SHARE);
@@ -170,10 +170,10 @@ pub(super) fn greatest(
         let corner = |k: usize| {
             let side = |up: bool| if up { half } else { -half };
             let corner = Point2::new(centre.x + side(k & 1 != 0), centre.y + side(k & 2 != 0));
-            Some((corner, at(corner, 2.0 * half)?))
+            at(corner, 2.0 * half)
         };
         let unknown = (centre, Value { here: f64::NEG_INFINITY, possible: f64::INFINITY });
-        let found = at(centre, half).map(|v| (centre, v)).or_else(|| (0..4).find_map(corner));
+        let found = at(centre, half).or_else(|| (0..4).find_map(corner));
         found.or((half > least).then_some(unknown))
     };
     search(squares, known, &|_| asked, Effort { places: MOST, squares: held }, &inside, &|_, _| true, monitor)
@@ -249,11 +249,12 @@ mod tests {
     ) -> BoundedGreatest {
         let at = |centre: Point2, half: f64| {
             let (here, slope) = f(centre)?;
-            Some(Value { here, possible: here + slope * half * std::f64::consts::SQRT_2 })
+            Some((centre, Value { here, possible: here + slope * half * std::f64::consts::SQRT_2 }))
         };
         let centres = (0..n * n).map(|k| Point2::new(f64::from(k % n) + 0.5, f64::from(k / n) + 0.5));
-        let squares = centres
-            .filter_map(|centre| at(centre, 0.5).map(|v| Square { possible: v.possible, centre, half: 0.5 }));
+        let squares = centres.filter_map(|centre| {
+            at(centre, 0.5).map(|(_, v)| Square { possible: v.possible, centre, half: 0.5 })
+        });
         greatest(squares.collect(), known, asked, usize::MAX, &at, &Silent).unwrap()
     }
 
@@ -294,7 +295,7 @@ mod tests {
         let squares = vec![Square { possible: 4.0, centre: Point2::new(2.5, 0.5), half: 0.5 }];
         let at = |centre: Point2, half: f64| {
             let (here, slope) = cliff(centre)?;
-            Some(Value { here, possible: here + 1.5 * slope * half })
+            Some((centre, Value { here, possible: here + 1.5 * slope * half }))
         };
         let value = greatest(squares, 0.0, 1e-3, usize::MAX, &at, &Silent).unwrap().greatest.unwrap().0;
         assert!((2.93 - 2e-3..=2.93).contains(&value), "{value}");

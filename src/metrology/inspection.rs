@@ -5,6 +5,7 @@
 //! bound of its error. mm.
 
 use super::closer::{Promising, Square, Value};
+use super::creases::Creases;
 use super::cut_surface::{CutSurface, Deviation};
 use super::every_move::EveryMove;
 use super::figures::{
@@ -86,6 +87,8 @@ pub(super) struct Inspection<'a> {
     pub grid: Grid,
     /// Where the vertical part of the design's normal is less, faces are measured elsewhere: bounds do not cover them.
     pub steepest: f64,
+    /// The creases of the part, where gouges are sought between the centres of cells.
+    pub creases: Option<&'a Creases>,
     /// The walls beside, where they are measured.
     pub walls: Option<&'a Walls>,
     /// All moves, where heights that one of them cuts away are no figures though it won no cell.
@@ -297,7 +300,8 @@ impl Inspection<'_> {
         figures.max_depth_mm = deepest.max(listed);
         let cells = measured(samples).map(|(k, _)| k);
         let value = |d: &Deviation, lean: f64, half: f64| self.depth(d, lean, half);
-        let found = self.between_centres(cells, figures.max_depth_mm, &|k| samples[k], &value, monitor)?;
+        let known = figures.max_depth_mm;
+        let found = self.between_centres(cells, known, &|k| samples[k], &value, self.creases, monitor)?;
         figures.max_depth_mm = found.greatest.map_or(figures.max_depth_mm, |(depth, _)| depth);
         figures.at_least_mm = (figures.max_depth_mm - NUMERICAL_FLOOR).max(0.0);
         figures.error_bound_mm += found.possible - figures.max_depth_mm;
@@ -328,7 +332,7 @@ impl Inspection<'_> {
         Value { here: -d.distance, possible: -d.distance + deeper }
     }
 
-    /// The greatest value above `known` in the squares of `cells`, and what may be there at most.
+    /// The greatest value above `known` in the squares of `cells` and those along `creases`, and what may be there at most.
     /// `value` makes it of a deviation, the lean of the design's normal, and half the side of a square.
     fn between_centres(
         &self,
@@ -336,10 +340,35 @@ impl Inspection<'_> {
         known: f64,
         sample: &dyn Fn(usize) -> Sample,
         value: &(dyn Fn(&Deviation, f64, f64) -> Value + Sync),
+        creases: Option<&Creases>,
         monitor: &dyn Monitor,
     ) -> Result<closer::BoundedGreatest, Cancelled> {
         let half = 0.5 * self.grid.cell;
         let is_own = |lean: f64| lean >= self.steepest;
+        let on = |point: &Point3, normal: &Vector3, half: f64| {
+            let (d, _) = self.along_normal(point, normal).filter(|_| is_own(normal.z))?;
+            Some((point.xy().into(), value(&d, normal.z, half)))
+        };
+        let at = |q: Point2, half: f64| {
+            let centre = self.design_at(q).and_then(|design| on(&design.point, &design.normal, half));
+            // From the middle of a stretch of a crease all of the square is no more than twice as far.
+            let along = creases.map_or_else(Vec::new, |creases| creases.within(self.part, q, half));
+            let along = along.iter().filter_map(|(point, normal)| on(point, normal, 2.0 * half));
+            let most = |a: f64, b: f64| if b > a { b } else { a };
+            centre.into_iter().chain(along).reduce(|a: (Point2, Value), b| {
+                let possible = most(a.1.possible, b.1.possible);
+                let (place, Value { here, .. }) = if b.1.here > a.1.here { b } else { a };
+                (place, Value { here, possible })
+            })
+        };
+        let creased = creases.map_or_else(Vec::new, |creases| creases.cells(&self.grid));
+        let along_creases = work::parallel::try_map(creased.len(), |k| {
+            monitor::check(monitor)?;
+            let centre = self.centre(creased[k]);
+            let possible = at(centre, half).map_or(f64::NEG_INFINITY, |(_, value)| value.possible);
+            Ok((possible > known + NUMERICAL_FLOOR).then_some(Square { possible, centre, half }))
+        })?;
+        let cells = cells.filter(|k| creased.binary_search(k).is_err());
         let squares = cells.filter(|k| is_own(sample(*k).lean.into())).filter_map(|k| {
             let s = sample(k);
             let d = Deviation { distance: s.deviation.into(), slope: s.slope.into(), by: NOT_CUT };
@@ -347,12 +376,8 @@ impl Inspection<'_> {
             let centre = self.centre(k);
             (possible > known + NUMERICAL_FLOOR).then_some(Square { possible, centre, half })
         });
+        let squares = along_creases.into_iter().flatten().chain(squares);
         let open = Promising::of(squares, MOST_SEARCHED.min(self.most_squares / 2).max(1));
-        let at = |q: Point2, half: f64| {
-            let design = self.design_at(q).filter(|design| is_own(design.normal.z))?;
-            let (d, _) = self.along_normal(&design.point, &design.normal)?;
-            Some(value(&d, design.normal.z, half))
-        };
         let mut found = closer::greatest(open.squares, known, self.asked, self.most_squares, &at, monitor)?;
         found.possible = found.possible.max(open.others);
         Ok(found)
@@ -445,7 +470,7 @@ impl Inspection<'_> {
             here: d.distance,
             possible: d.distance + d.slope * reach(half, lean),
         };
-        let found = self.between_centres(all, known, &|k| samples[k], &value, monitor)?;
+        let found = self.between_centres(all, known, &|k| samples[k], &value, None, monitor)?;
         if let Some((height, q)) = found.greatest {
             let cell = self.grid.cell_at(q.x, q.y).map(|(i, j)| self.grid.index(i, j) as u32);
             let holds = |k: &usize| cell.is_some_and(|cell| cells[*k].contains(&cell));

@@ -27,6 +27,7 @@ mod border_cuts;
 mod closer;
 mod contact;
 mod coverage;
+mod creases;
 mod cut_surface;
 mod engagement;
 mod engines;

@@ -1,6 +1,7 @@
 //! The figures of a cut on heights: the stock's own grid first, then a closer look where something may hide. mm.
 
 use super::coverage::STEEP;
+use super::creases::Creases;
 use super::cut_surface::CutSurface;
 use super::every_move::EveryMove;
 use super::excess::ExcessSearch;
@@ -76,6 +77,7 @@ pub fn measure_with_walls(
     let mut around = part.bounds();
     around.max.z = around.max.z.max(asked.stock_top);
     let every_move = EveryMove::new(&surface, cutters, &around);
+    let creases = Creases::new(part);
     let inspection = Inspection {
         part,
         cutters,
@@ -86,6 +88,7 @@ pub fn measure_with_walls(
         surface: &surface,
         meetings: &Meetings::new(&surface, cutters, path, None),
         grid,
+        creases: Some(&creases),
         walls: walls.as_ref(),
         steepest: if asked.steep_elsewhere { STEEP } else { LEAST_FACING },
         // What is left where a ridge is none comes to light in the search for the highest material alone.

@@ -143,6 +143,7 @@ fn on_cells<'a>(
         meetings,
         grid,
         steepest: STEEP,
+        creases: None,
         walls: None,
         every_move: None,
     }
