@@ -4,9 +4,10 @@
 use std::path::Path;
 
 use millstream::geometry::Point3;
+use serde_json::Value;
 
 use crate::command::{Answer, millstream};
-use crate::support::write_stl;
+use crate::support::{number, write_stl};
 
 const SCENE: &str = "[part]\nfile = \"part.stl\"\n[cutter]\nshape = \"ball\"\ndiameter = 6\n[tolerance]\nscallop = 0.011\n\
                      [simulation]\ncell = 0.1\n[[toolpath]]\nstrategy = \"zigzag\"\nstepover = 0.5\n";
@@ -169,4 +170,33 @@ fn level_ground_and_walls_are_shared_by_slope() {
     };
     let shared = run_with("slope = [0, 45]", "slope = [45, 90]");
     assert!(shared < 45.0, "{shared}");
+}
+
+/// A frustum a hundred metres from the origin, where coordinates are known to some 1e-11 mm, is measured as one beside it.
+#[test]
+fn far_from_the_origin_a_part_is_measured_as_beside_it() {
+    let scene = SCENE.replace("part.stl", "part.obj").replace("diameter = 6", "diameter = 2");
+    let at = |away: f64| {
+        let home = tempfile::tempdir().unwrap();
+        let ring = |half: f64, z: f64| {
+            [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+                .map(|[x, y]| format!("v {} {} {z}\n", away + half * x, away + half * y))
+        };
+        let corners = [ring(2.0, 0.0), ring(1.0, 1.5)].concat().concat();
+        let faces = "f 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\nf 4 3 2 1\n";
+        std::fs::write(home.path().join("part.obj"), corners + faces).unwrap();
+        std::fs::write(home.path().join("scene.toml"), &scene).unwrap();
+        let answer = millstream(home.path(), &["run", "scene.toml", "--out", "out"]);
+        let report = std::fs::read_to_string(home.path().join("out/report.json"));
+        let report: Value = serde_json::from_str(&report.unwrap_or_else(|_| panic!("{answer:?}"))).unwrap();
+        ["excess", "gouge"].map(|figure| {
+            let key = if figure == "gouge" { "max_depth_mm" } else { "max_mm" };
+            number(&report, &format!("/toolpaths/0/{figure}/{key}"))
+        })
+    };
+    let [[high, deep], [far_high, far_deep]] = [at(0.0), at(1e5)];
+    assert!(
+        (high - far_high).abs() < 2e-4 && (deep - far_deep).abs() < 2e-4,
+        "{high} {far_high} {deep} {far_deep}"
+    );
 }

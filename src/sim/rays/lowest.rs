@@ -16,6 +16,9 @@ const TOLERANCE: f64 = 1e-11;
 /// The entry into the tool is found to this distance from it, mm: some units of rounding.
 const TOUCHING: f64 = 1e-13;
 
+/// Up to this coordinate, mm, that holds; what lies farther off is rounded in proportion, and all of these distances grow as much.
+const NEAR_ORIGIN: f64 = 1e3;
+
 /// Steps of Newton's method, which needs three to eight; corners and grazing rays more.
 const MAX_STEPS: usize = 60;
 
@@ -134,13 +137,16 @@ struct Search<'a, M> {
     limit: f64,
     /// When the limit is reached; no number unless a move reaches it.
     at: f64,
+    /// How many times as far from the origin the ray begins as [`NEAR_ORIGIN`]; no less than 1.
+    far: f64,
 }
 
 impl<'a, M: Moving> Search<'a, M> {
     fn new(ray: &'a Ray, moving: M, range: [f64; 2], limit: f64) -> Self {
         let ends = [ray.low, limit].map(|s| moving.bends(&ray.at(s), range));
         let bends = [0, 1].map(|k| ends[0][k].max(ends[1][k]));
-        Self { ray, moving, range, bends, limit, at: f64::NAN }
+        let far = (ray.point.coords.amax() / NEAR_ORIGIN).max(1.0);
+        Self { ray, moving, range, bends, limit, at: f64::NAN, far }
     }
 
     #[inline(always)]
@@ -163,7 +169,7 @@ impl<'a, M: Moving> Search<'a, M> {
             lean: self.moving.turn() * half,
         };
         let reach = support.reach([self.ray.low, self.limit]);
-        if reach > self.limit - TOLERANCE || support.value.is_nan() {
+        if reach > self.limit - self.far * TOLERANCE || support.value.is_nan() {
             return None;
         }
         let middle = self.enter(middle);
@@ -198,10 +204,11 @@ impl<'a, M: Moving> Search<'a, M> {
         // By how much the distance may be less further down, where the tool's side faces downward.
         let fall = (open.a.rise.max(open.b.rise) + turn * width).max(0.0) * (top - open.low);
         // No number comes of places that are none.
-        if bound - fall > -TOLERANCE || width < SHORTEST || bound.is_nan() {
+        let tolerance = self.far * TOLERANCE;
+        if bound - fall > -tolerance || width < SHORTEST || bound.is_nan() {
             return;
         }
-        if bound > -TOLERANCE && top - open.low > SHORTEST_RANGE {
+        if bound > -tolerance && top - open.low > self.far * SHORTEST_RANGE {
             let middle = 0.5 * (top + open.low);
             let mut again = |t: f64| {
                 let seen = self.look(middle, t);
@@ -212,7 +219,7 @@ impl<'a, M: Moving> Search<'a, M> {
             waiting.push(Open { a, b, top: middle, ..*open });
             return;
         }
-        if bound > -TOLERANCE {
+        if bound > -tolerance {
             return;
         }
         let seen = self.look(top, stretch.next(crossing));
@@ -234,12 +241,12 @@ impl<'a, M: Moving> Search<'a, M> {
         if seen.look.sample.value > 0.0 || seen.s > self.limit {
             return seen;
         }
-        let low = self.ray.low;
+        let (low, touching) = (self.ray.low, self.far * TOUCHING);
         let beyond = if seen.rise < 0.0 { seen.s - seen.look.sample.value / seen.rise } else { low };
         let (mut now, mut inside) = (self.look(beyond.max(low), t), seen);
         for _ in 0..MAX_STEPS {
             let value = now.look.sample.value;
-            if value <= TOUCHING {
+            if value <= touching {
                 break;
             }
             let newton = now.s - value / now.rise;
@@ -253,7 +260,7 @@ impl<'a, M: Moving> Search<'a, M> {
                 now = inside;
                 break;
             }
-            *(if between.look.sample.value > TOUCHING { &mut now } else { &mut inside }) = between;
+            *(if between.look.sample.value > touching { &mut now } else { &mut inside }) = between;
         }
         (self.limit, self.at) = (now.s, t);
         now
