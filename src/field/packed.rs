@@ -51,7 +51,8 @@ const LEAST_GAIN: f64 = 1e-4;
 /// Halvings of a step before a round ends.
 const MOST_HALVINGS: usize = 30;
 
-/// No pass costs less than this share of the mean: where the cutter hardly moves, ψ would else be without direction.
+/// No pass costs less than this share of the mean, what leaving a direction costs aside: where the cutter hardly moves, ψ would else be
+/// without direction.
 const LEAST_COST: f64 = 0.02;
 
 /// A shortfall above this doubles the passes: they are put between others.
@@ -74,6 +75,8 @@ pub struct Site {
     pub cost: [f64; 3],
     /// What of that is no length, but a price of turning.
     pub turning: [f64; 3],
+    /// What of its mean is a price of leaving a direction.
+    pub leaving: f64,
     /// On a border: the vector along it that the place stands for, mm, in the frame of `front`.
     pub border: Option<[f64; 2]>,
 }
@@ -273,10 +276,15 @@ impl Site {
         [mean, a - mean, (b - c) / 3f64.sqrt()]
     }
 
+    /// The mean over all directions of a price that is `dearer` square to one and falls to 0 along it as a sine's square.
+    pub fn mean_of_leaving(dearer: f64) -> f64 {
+        0.5 * dearer
+    }
+
     /// Cost for each unit of length in the direction of `q`, and its derivative by the angle.
     fn cost_at(&self, q: [f64; 2], norm2: f64) -> (f64, f64) {
         let (cost, turn) = Self::by_direction(self.cost, q, norm2);
-        let least = LEAST_COST * self.cost[0].abs();
+        let least = LEAST_COST * (self.cost[0] - self.leaving).abs();
         if cost > least { (cost, turn) } else { (least, 0.0) }
     }
 
@@ -518,7 +526,7 @@ mod tests {
         let mut push = |i: usize, j: usize, s: f64, t: f64, area: f64, border: Option<[f64; 2]>| {
             let (x, y) = ((i as f64 + s) * h, (j as f64 + t) * h);
             let front = Front::new((1.0, 0.0, 1.0), |b| speed(x, y, b)).unwrap();
-            let site = Site { area, stiff_area: area, front, cost, turning: [0.0; 3], border };
+            let site = Site { area, stiff_area: area, front, cost, turning: [0.0; 3], leaving: 0.0, border };
             let corner = (j * (CELLS + 1) + i) as u32;
             let above = corner + CELLS as u32 + 1;
             let slopes = [
@@ -696,6 +704,7 @@ mod tests {
                 front: Front::new((1.3, 0.2, 0.9), speed).unwrap(),
                 cost: [1.0, swing * 0.5, sine],
                 turning: [0.0; 3],
+                leaving: 0.0,
                 border: border.then_some([0.4, -0.7]),
             };
             let q = [norm * angle.cos(), norm * angle.sin()];

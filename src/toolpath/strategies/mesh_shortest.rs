@@ -206,6 +206,7 @@ impl Pricing<'_> {
         });
         let mut cost = Site::harmonic(costs);
         (0..3).for_each(|k| cost[k] += turning[k]);
-        Some((Site { area, stiff_area: 0.0, front, cost, turning, border: None }, [e1, e2]))
+        let leaving = self.toward.map_or(0.0, |toward| Site::mean_of_leaving(toward[vertex].1));
+        Some((Site { area, stiff_area: 0.0, front, cost, turning, leaving, border: None }, [e1, e2]))
     }
 }

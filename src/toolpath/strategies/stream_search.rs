@@ -356,7 +356,8 @@ impl Search<'_> {
         (0..3).for_each(|k| cost[k] += turning[k]);
         let border = (along != [0.0; 2]).then(|| front.components(along));
         let area = area * (e * g - f * f).max(0.0).sqrt();
-        Some(Site { area, stiff_area: area, front, cost, turning, border })
+        let leaving = wanted.map_or(0.0, |(_, dearer)| Site::mean_of_leaving(dearer));
+        Some(Site { area, stiff_area: area, front, cost, turning, leaving, border })
     }
 
     /// Coefficients of ψ for straight passes, as dense on the whole as the strips ask for.
@@ -586,7 +587,7 @@ mod tests {
         let samples: Vec<_> = (0..441).map(circle).collect();
         let samples = field::LineField::new(field::SamplePlane::Plan, &samples).unwrap();
         let direction = FeedDirection::Samples(Arc::new(samples));
-        for dearer in [10.0, 100.0] {
+        for dearer in [10.0, 100.0, 1000.0] {
             let (step, toward) = (Step::Scallop(0.01), Some((&direction, dearer)));
             let search = Search {
                 chart: &chart,
