@@ -130,6 +130,7 @@ impl Scene {
         let toolpaths = read_toolpaths(&root, &folder, &tolerance, correct, &cutter, &minutes)?;
         if toolpaths.iter().any(|request| !request.is_foreign()) {
             kinematics::known_height(&section, five_axis.as_ref())?;
+            check_rates(&root.section("cutter")?, &section, &cutting, &machine)?;
         }
         check_pocket_strategies(&root, &part, &toolpaths)?;
         if simulation.cell_is_auto {
@@ -217,6 +218,29 @@ fn read_cutter(section: &Section<'_>) -> Result<(Cutter, CuttingData), SceneErro
         plunge_rate: rate("plunge_rate", DEFAULT_PLUNGE_RATE)?,
     };
     Ok((cutter, cutting))
+}
+
+/// Refuses feeds that the machine does not reach.
+fn check_rates(
+    cutter: &Section<'_>,
+    machine_section: &Section<'_>,
+    cutting: &CuttingData,
+    machine: &Machine,
+) -> Result<(), SceneError> {
+    let rates = [("feed_rate", cutting.feed_rate), ("plunge_rate", cutting.plunge_rate)];
+    let Some((key, rate)) = rates.into_iter().find(|(_, rate)| *rate > machine.rapid_rate) else {
+        return Ok(());
+    };
+    let (section, stated) = if cutter.has(key) { (cutter, key) } else { (machine_section, "rapid_rate") };
+    let message = format!(
+        "`{key}` is {rate} mm/min, more than the machine's `rapid_rate` of {} mm/min",
+        machine.rapid_rate
+    );
+    let cure = format!(
+        "write `{key} = {}` in [cutter] or less, or a greater `rapid_rate` in [machine]",
+        machine.rapid_rate
+    );
+    Err(section.error(&section.key_span(stated), message, cure))
 }
 
 /// What holds the cutter, if the scene says so.

@@ -745,3 +745,21 @@ fn how_corners_are_blended_is_read_where_it_acts() {
     let five = "blending = \"arcs\"\nkinematics = { preset = \"ac-table\", gauge_length = 9, workpiece_zero = [0, 0, 0] }";
     assert!(refused(five).contains("rotary axes"), "{}", refused(five));
 }
+
+/// Where a feed stands in [cutter], it is named there; else the rate of the machine that is below the usual one.
+#[test]
+fn feeds_beyond_the_rapid_rate_are_refused() {
+    let of = |cutter: &str, machine: &str| {
+        let text = with("[tolerance]", &format!("{machine}\n[tolerance]"));
+        Scene::parse("wave.toml", text.replace("[cutter]", &format!("[cutter]\n{cutter}")))
+    };
+    for (cutter, machine, words) in [
+        ("feed_rate = 20000", "", "`feed_rate` is 20000 mm/min"),
+        ("feed_rate = 700\nplunge_rate = 900", "[machine]\nrapid_rate = 800", "`plunge_rate` is 900 mm/min"),
+        ("", "[machine]\nrapid_rate = 400", "`rapid_rate` of 400 mm/min"),
+    ] {
+        let text = of(cutter, machine).unwrap_err().to_string();
+        assert!(text.contains(words), "{text}");
+    }
+    assert!(of("feed_rate = 15000", "").is_ok());
+}
