@@ -191,6 +191,9 @@ fn show_indices(t: &[usize; 3]) -> String {
 }
 
 impl TriangleMesh {
+    /// What lies within this distance of an edge, mm, belongs to the faces on both sides.
+    pub const ON_EDGE: f64 = 1e-6;
+
     /// Checks and repairs a mesh: merges vertices with equal coordinates, drops vertices that no
     /// triangle uses, triangles without area and triangles that occurred before, turns triangles
     /// to agree with their neighbours, and turns the whole mesh to face outward (closed) or upward
@@ -270,16 +273,15 @@ impl TriangleMesh {
         (n != NONE).then_some(n as usize)
     }
 
-    /// The triangles that meet within `distance`, mm, of a point on triangle `t`, that one first: two at an edge, a fan at a
-    /// vertex.
-    pub fn triangles_at(&self, t: usize, point: &Point3, distance: f64) -> Vec<usize> {
+    /// The triangles that a point on triangle `t` belongs to, that one first: two at an edge, a fan at a vertex.
+    pub fn triangles_at(&self, t: usize, point: &Point3) -> Vec<usize> {
         let mut found = vec![t];
         let mut looked = 0;
         while let Some(&t) = found.get(looked) {
             looked += 1;
             let corners = self.corners(t);
             for k in 0..3 {
-                let is_near = distance_to_segment(point, &corners[k], &corners[(k + 1) % 3]) <= distance;
+                let is_near = distance_to_segment(point, &corners[k], &corners[(k + 1) % 3]) <= Self::ON_EDGE;
                 found.extend(self.neighbour(t, k).filter(|n| is_near && !found.contains(n)));
             }
         }

@@ -103,9 +103,6 @@ const MOST_TOUCH_UP: f64 = 0.04;
 /// The same where narrower passes were in vain.
 const MOST_TOUCH_UP_IN_VAIN: f64 = 0.1;
 
-/// What lies within this distance of an edge, mm, belongs to the faces on both sides.
-const ON_EDGE: f64 = 1e-6;
-
 /// Cells from pass to pass while only ridges are measured.
 const CELLS_A_PASS: f64 = 4.0;
 
@@ -178,7 +175,7 @@ impl Standing {
         let mesh = wanted.part.mesh();
         self.above.retain(|(at, _)| {
             let foot = wanted.part.closest_point(at).0;
-            let around = mesh.triangles_at(foot.triangle as usize, &foot.point, ON_EDGE);
+            let around = mesh.triangles_at(foot.triangle as usize, &foot.point);
             let mut held = around.into_iter().map(|t| faces.hold(&mesh.normal(t)));
             if wanted.behind_others { held.any(|held| held) } else { held.all(|held| held) }
         });

@@ -14,9 +14,6 @@ use geometry::{Point2, Point3, Vector2};
 use part::Part;
 use work::monitor::{self, Cancelled};
 
-/// What lies within this distance of an edge, mm, belongs to the faces on both sides.
-const ON_EDGE: f64 = 1e-6;
-
 /// Directions in which an interval beside a pass is looked at.
 const AROUND: usize = 8;
 
@@ -122,7 +119,7 @@ impl Served<'_> {
     /// The vertical part of the unit normal by which the cutter touches: on an edge its own, between those of both faces.
     fn upright(&self, axis: Point2, rests: &Drop) -> f64 {
         let (contact, mesh) = (&rests.contact, self.part.mesh());
-        let around = mesh.triangles_at(contact.triangle as usize, &contact.point, ON_EDGE);
+        let around = mesh.triangles_at(contact.triangle as usize, &contact.point);
         if around.len() < 2 {
             return contact.normal.z;
         }

@@ -30,9 +30,6 @@ pub(super) const LEAST_FACING: f64 = 1e-4;
 /// 64th of it: the sine of the least slope.
 const SERVED: Faces = Faces { least: LEAST_FACING, most: 0.999_878 };
 
-/// Contacts within this distance, mm, of an edge lie on it.
-const ON_EDGE: f64 = 1e-6;
-
 /// Where the cutter would come to rest lower than a contour's level by more than this, mm, its side touches, not its end.
 const JUMP: f64 = 1e-3;
 
@@ -244,7 +241,8 @@ impl ContourGuide<'_> {
         let arm = (rests.contact.point.xy() - axis).norm();
         let profile = self.dropped.profile();
         let steep = |arm: f64| if arm >= profile.radius { 1.0 } else { profile.incline(arm).sin };
-        let [most, least] = [arm - ON_EDGE, arm + ON_EDGE].map(|arm| FRAC_PI_2 - steep(arm).min(1.0).asin());
+        let [most, least] = [arm - TriangleMesh::ON_EDGE, arm + TriangleMesh::ON_EDGE]
+            .map(|arm| FRAC_PI_2 - steep(arm).min(1.0).asin());
         (rests.contact, [least, most], 0.0)
     }
 
@@ -260,7 +258,7 @@ impl ContourGuide<'_> {
                 normal,
             ))
         };
-        let faces = self.mesh.triangles_at(contact.triangle as usize, &contact.point, ON_EDGE);
+        let faces = self.mesh.triangles_at(contact.triangle as usize, &contact.point);
         let farther = |a: &[f64; 2], b: &[f64; 2]| a[0].max(a[1]).total_cmp(&b[0].max(b[1]));
         let nearest = faces.into_iter().filter_map(rolled).min_by(|a, b| farther(&a.0, &b.0));
         let (angles, triangle, normal) = nearest?;

@@ -3,7 +3,7 @@
 //! A pass costs `1 − κ_f r` mm of the cutter's way for each mm along the surface (κ_f its curvature along the feed, r the
 //! cutter's corner radius) and serves a strip of width w(direction). No path that holds the scallop and cuts no
 //! deeper than the part is shorter than the integral of the least `(1 − κ_f r)/w` over all directions: [`shortest_possible`]. (Chords cut
-//! deeper by shares of their tolerance.) Directions that reach it
+//! deeper by shares of their tolerance, and what is cut around the ends of passes is left out: about half a square strip at each.) Directions that reach it
 //! everywhere seldom belong to passes that also lie one strip apart. The stream function that costs least in all
 //! ([`super::stream_search`]) settles between both.
 //!
