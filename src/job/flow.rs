@@ -63,6 +63,9 @@ impl Session {
                     if let Some(earlier) = earlier.as_mut().filter(|_| self.goes_on(request)) {
                         earlier.push(EarlierPath::of(&outcome));
                     }
+                    if request.stock_is_previous {
+                        answers_later(rows.last_mut(), &left, &request.name);
+                    }
                     left = outcome.left;
                     rows.push(ToolpathReport::Measured(Box::new(outcome.result)));
                 }
@@ -328,6 +331,15 @@ fn line_of_cut(path: &Toolpath, cutter: &Cutter, step: usize, at: &Point3) -> u3
     };
     let begins = (1..=PLACES).all(|k| height(k) >= height(0));
     line(if begins { before } else { step })
+}
+
+/// Says by which toolpath that is judged which another leaves beyond the limits.
+fn answers_later(toolpath: Option<&mut ToolpathReport>, left: &[Claim], next: &str) {
+    if let Some(ToolpathReport::Measured(result)) = toolpath
+        && left.iter().any(|claim| claim.verdict() != Verdict::Pass)
+    {
+        result.notes.push(format!("what it leaves above the design is judged behind {next}, which cuts on"));
+    }
 }
 
 /// What a toolpath left to one that could not be planned is its own.
