@@ -7,7 +7,7 @@ use crate::facets::facet_charge;
 use crate::levels::{obedience, planned_field};
 use crate::link::{join, join_tilted, time_to_neighbour};
 use crate::lowering::lowered;
-use crate::slope::keep_on_faces;
+use crate::slope::{check_faces, keep_on_faces};
 use crate::strategies::words_for;
 use crate::surface::mesh_surface;
 use crate::tilt::tilted::{self, TiltedPasses, Tilting};
@@ -124,6 +124,7 @@ pub fn plan(
         let kept = match again {
             Some(earlier) => earlier.kept.clone(),
             None => {
+                check_faces(task)?;
                 let mut passes = strategy.passes(task)?;
                 keep_on_faces(task, &mut passes)?;
                 Arc::new(Kept::new(passes, strategy))

@@ -20,19 +20,22 @@ const AROUND: usize = 8;
 /// The end of a stretch is placed this closely, mm.
 const END_PRECISION: f64 = 1e-6;
 
+/// Refuses slopes that no face has.
+pub(crate) fn check_faces(task: &Task<'_>) -> Result<(), PlanError> {
+    let (faces, mesh) = (task.settings.faces, task.part.mesh());
+    let has_any = faces == Faces::ALL || (0..mesh.triangles().len()).any(|t| faces.hold(&mesh.normal(t)));
+    if has_any { Ok(()) } else { Err(PlanError::NoSuchSlope) }
+}
+
 /// Leaves of passes what serves the faces that are asked for.
 ///
 /// # Errors
-/// When no face is of these slopes, and when cancelled.
+/// When cancelled.
 pub(crate) fn keep_on_faces(task: &Task<'_>, passes: &mut Passes) -> Result<(), PlanError> {
     let Task { part, monitor, ref settings, .. } = *task;
     let faces = settings.faces;
     if faces == Faces::ALL {
         return Ok(());
-    }
-    let mesh = part.mesh();
-    if !(0..mesh.triangles().len()).any(|t| faces.hold(&mesh.normal(t))) {
-        return Err(PlanError::NoSuchSlope);
     }
     let dropped = task.dropped();
     let served = Served {

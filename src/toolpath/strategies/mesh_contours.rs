@@ -70,7 +70,8 @@ pub(super) fn passes(task: &Task<'_>, placing: LevelSteps) -> Result<Passes, Pla
     let Reached { places, range, level, served } = guide.reached()?;
     let level = level / (level + served).max(f64::MIN_POSITIVE);
     if places.is_empty() {
-        let reason = "what the cutter reaches of it is level or upright, so that there are no contours; zigzag suits level ground";
+        let reason = "what the cutter reaches of it is level or upright, so that there are no contours; zigzag suits level ground, \
+                      and upright walls are those of pockets";
         return Err(refused(reason));
     }
     let mut notes = Vec::new();
