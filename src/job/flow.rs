@@ -6,7 +6,7 @@ use std::path::Path;
 use cutter::Cutter;
 use geometry::{Point3, Vector3};
 use io::digest;
-use metrology::{Engine, GougeRegion, Measured, path_figures};
+use metrology::{Engine, GougeRegion, Measured};
 use motion::Toolpath;
 use report::{
     Claim, NotPlanned, RunReport, SimulationFigures, ToleranceFigures, ToolpathReport, ToolpathResult,
@@ -245,7 +245,7 @@ impl Session {
             verdict: judge::verdict_by(&claims),
             claims,
             notes: self.notes_on(&planned, &measured, found.notes),
-            path: path_figures(&planned.plan.path, planned.time(scene, monitor)?),
+            path: planned.path_figures(scene, monitor)?,
             scallop: measurement.scallop.clone(),
             gouge: unseen.map_or_else(
                 || measurement.gouge.clone(),

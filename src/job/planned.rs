@@ -5,20 +5,21 @@ use std::sync::Arc;
 use cutter::Solid;
 use io::ProgramHeader;
 use io::gcode::{self, ArcRule, FiveAxisPost, MoveLines};
-use machine::kinematics::{Following, JointPath, Kinematics, follow};
+use machine::kinematics::{Following, JointPath, Kinematics, Waypoint, follow};
 use machine::{
-    Straying, axes_at_most, machining_time, machining_time_of_axes, merge_short_moves, slow_axes,
-    slow_corners,
+    Straying, axes_at_most, machining_time, machining_time_of_axes, machining_time_of_program,
+    merge_short_moves, slow_axes, slow_corners,
 };
 use metrology::{
-    ContactArcs, FastestTurn, THIN_LAYER, UNCOUNTED_LAYER, contact_arcs, fastest_turn, fastest_turn_across,
+    ContactArcs, FastestTurn, PathFigures, THIN_LAYER, UNCOUNTED_LAYER, contact_arcs, fastest_turn,
+    fastest_turn_across, path_figures,
 };
 use motion::{Move, MoveKind, Toolpath};
 use scene::{AxisRequest, FiveAxis, Scene, ToolpathRequest};
 use toolpath::{
-    Detour, Earlier, Engagement, Exceeding, Gentle, OffsetDrive, OffsetSurface, Plan, PlanError,
-    PlanSettings, PocketStrategy, Step, Strategy, Tilting, around_fixtures, engagement, plan, plan_pocket,
-    plan_tilted,
+    Detour, Earlier, Engagement, Exceeding, ForeignProgram, Gentle, OffsetDrive, OffsetSurface, Plan,
+    PlanError, PlanSettings, PocketStrategy, ReadProgram, Step, Strategy, Tilting, around_fixtures,
+    engagement, plan, plan_pocket, plan_tilted,
 };
 use work::monitor::{Cancelled, Monitor};
 
@@ -60,16 +61,42 @@ impl Planned {
     /// Time that the scene's machine takes, s.
     pub fn time(&self, scene: &Scene, monitor: &dyn Monitor) -> Result<f64, Cancelled> {
         let (path, machine) = (&self.plan.path, &scene.machine);
-        let moving = self.on_axes(scene).map_or_else(
-            || machining_time(path, machine, monitor),
-            |(kinematics, joints)| machining_time_of_axes(path, machine, kinematics, joints, monitor),
-        )?;
+        let moving = match (self.on_axes(scene), self.read_on_axes(scene)) {
+            (Some((kinematics, joints)), _) => {
+                machining_time_of_axes(path, machine, kinematics, joints, monitor)?
+            }
+            (None, Some((kinematics, read))) => {
+                let of_tool = |(tool, program): &(u32, Vec<Waypoint>)| {
+                    let kinematics = read.with_tool(kinematics, *tool);
+                    machining_time_of_program(program, machine, &kinematics, monitor)
+                };
+                read.joints.iter().map(of_tool).sum::<Result<f64, Cancelled>>()?
+            }
+            (None, None) => machining_time(path, machine, monitor)?,
+        };
         Ok(moving + path.origin.standing_s)
+    }
+
+    /// Figures of the path. Its approaches, which are rapids, are no way in the air.
+    pub fn path_figures(&self, scene: &Scene, monitor: &dyn Monitor) -> Result<PathFigures, Cancelled> {
+        let path = &self.plan.path;
+        let mut figures = path_figures(path, self.time(scene, monitor)?);
+        let approaches = path.segments().zip(path.counts()).filter(|(_, counts)| !counts);
+        let length: f64 = approaches.map(|((from, to, _), _)| (to - from).norm()).sum();
+        figures.air_length_mm = (figures.air_length_mm - length).max(0.0);
+        Ok(figures)
     }
 
     /// Time that its axes take at most from location to location, s; 0 on machines of three axes.
     pub fn joint_time(&self, scene: &Scene) -> f64 {
         self.on_axes(scene).map_or(0.0, |(kinematics, joints)| axes_at_most(kinematics, joints))
+    }
+
+    /// A program from elsewhere that names the axes of a machine with rotary ones.
+    fn read_on_axes<'a>(&'a self, scene: &'a Scene) -> Option<(&'a Kinematics, &'a ReadProgram)> {
+        let read = self.strategy.downcast_ref::<ForeignProgram>()?.read.as_deref()?;
+        let kinematics = &scene.five_axis.as_ref()?.kinematics;
+        (!read.joints.is_empty()).then_some((kinematics, read))
     }
 
     fn on_axes<'a>(&'a self, scene: &'a Scene) -> Option<(&'a Kinematics, &'a JointPath)> {

@@ -41,21 +41,27 @@ const MOST_PLACES: f64 = 64.0;
 
 /// A stretch on which all axes move evenly.
 #[derive(Debug, Clone, Copy)]
-struct EvenStretch {
+pub(super) struct EvenStretch {
     /// The move.
-    step: usize,
-    length: f64,
+    pub step: usize,
+    pub length: f64,
     /// Axes over the tip: dq/ds.
-    slope: [f64; 5],
+    pub slope: [f64; 5],
     /// The tip stands before it, while rotary axes turn.
-    after_stop: bool,
+    pub after_stop: bool,
     /// Length of the program's line that it belongs to.
-    line: f64,
+    pub line: f64,
+    /// Feed, mm/s.
+    pub feed: f64,
+    /// Square of the speed at which the corner before it can be run at most; of no account after a stop.
+    pub corner: f64,
+    /// Greatest acceleration along it.
+    pub along: f64,
 }
 
 impl EvenStretch {
     /// The least of limits of the axes, as one along the tip's way.
-    fn least(&self, limits: &[f64; 5]) -> f64 {
+    pub fn least(&self, limits: &[f64; 5]) -> f64 {
         limits.iter().zip(&self.slope).map(|(limit, slope)| limit / slope.abs()).fold(f64::INFINITY, f64::min)
     }
 }
@@ -67,8 +73,6 @@ pub(super) struct AxisLimits {
     pub rates: [f64; 5],
     pub accelerations: [f64; 5],
     pub jerks: [f64; 5],
-    /// Acceleration along the path.
-    pub along: f64,
 }
 
 /// A part of a piece in which the tip accelerates evenly.
@@ -98,28 +102,27 @@ impl Stage {
 }
 
 /// How a path is run.
-struct Run {
+pub(super) struct Run {
     stages: Vec<Stage>,
     /// Squared speeds at the ends of all stages.
     speeds: Vec<f64>,
 }
 
 impl Run {
-    fn new(
+    pub fn new(
         pieces: &[EvenStretch],
-        blocks: &[Block],
         machine: &Machine,
         axes: &AxisLimits,
         monitor: &dyn Monitor,
     ) -> Result<Self, Cancelled> {
-        let stages = stages(pieces, blocks, machine, axes);
+        let stages = stages(pieces, machine, axes);
         let speeds = speeds(&stages, axes);
         let speeds = jerk::within(&stages, speeds, axes, monitor)?;
         Ok(Self { stages, speeds })
     }
 
     /// s.
-    fn time(&self) -> f64 {
+    pub fn time(&self) -> f64 {
         self.stages
             .iter()
             .zip(self.speeds.windows(2))
@@ -156,8 +159,8 @@ pub fn machining_time_of_axes(
     monitor: &dyn Monitor,
 ) -> Result<f64, Cancelled> {
     let Some(blocks) = profile(path, machine) else { return Ok(f64::INFINITY) };
-    let (pieces, standing) = pieces(path, machine, kinematics, joints);
-    let run = Run::new(&pieces, &blocks, machine, &kinematics.axis_limits(machine), monitor)?;
+    let (pieces, standing) = pieces(path, &blocks, machine, kinematics, joints);
+    let run = Run::new(&pieces, machine, &kinematics.axis_limits(), monitor)?;
     Ok(standing + run.time())
 }
 
@@ -171,20 +174,28 @@ pub(super) fn time_of_linear(
 }
 
 fn linear(blocks: &[Block], machine: &Machine, monitor: &dyn Monitor) -> Result<Run, Cancelled> {
-    let piece = |(k, block): (usize, &Block)| {
-        let Block { step, length, direction, .. } = *block;
+    let piece = |block: &Block| {
+        let Block { step, length, direction, line, rests, feed, corner, .. } = *block;
         let slope = [direction.x, direction.y, direction.z, 0.0, 0.0];
-        EvenStretch { step, length, slope, after_stop: k == 0, line: length }
+        EvenStretch {
+            step,
+            length,
+            slope,
+            after_stop: rests,
+            line,
+            feed,
+            corner,
+            along: machine.acceleration,
+        }
     };
-    let pieces: Vec<EvenStretch> = blocks.iter().enumerate().map(piece).collect();
+    let pieces: Vec<EvenStretch> = blocks.iter().map(piece).collect();
     let with_rotary = |[x, y, z]: [f64; 3]| [x, y, z, f64::INFINITY, f64::INFINITY];
     let axes = AxisLimits {
         rates: with_rotary(machine.rates.map(|rate| rate / SECONDS_PER_MINUTE)),
         accelerations: with_rotary(machine.accelerations),
         jerks: with_rotary(machine.jerks),
-        along: machine.acceleration,
     };
-    Run::new(&pieces, blocks, machine, &axes, monitor)
+    Run::new(&pieces, machine, &axes, monitor)
 }
 
 /// The path with feeds of its cuts and links at which all axes can be run, on the series of [`super::slow_corners`]. No time grows
@@ -205,8 +216,8 @@ pub fn slow_axes(
     let Some(blocks) = profile(&path, machine) else { return Ok(path) };
     let run = match on_axes {
         Some((kinematics, joints)) => {
-            let (pieces, _) = pieces(&path, machine, kinematics, joints);
-            Run::new(&pieces, &blocks, machine, &kinematics.axis_limits(machine), monitor)?
+            let (pieces, _) = pieces(&path, &blocks, machine, kinematics, joints);
+            Run::new(&pieces, machine, &kinematics.axis_limits(), monitor)?
         }
         None if machine.limits_axes() && path.is_upright() => linear(&blocks, machine, monitor)?,
         None => return Ok(path),
@@ -233,10 +244,13 @@ pub fn axes_at_most(kinematics: &Kinematics, joints: &JointPath) -> f64 {
 /// The pieces of a path, and the time that the tip stands while rotary axes turn, s.
 fn pieces(
     path: &Toolpath,
+    blocks: &[Block],
     machine: &Machine,
     kinematics: &Kinematics,
     joints: &JointPath,
 ) -> (Vec<EvenStretch>, f64) {
+    let mut blocks = blocks.iter().peekable();
+    let rapid = machine.rapid_rate / SECONDS_PER_MINUTE;
     let (mut last, mut tip) = (joints.start, path.start.tip);
     let (mut pieces, mut standing, mut after_stop) = (Vec::new(), 0.0, true);
     for location in &joints.locations {
@@ -246,7 +260,15 @@ fn pieces(
             let turn = [0, 1].map(|k| (to.rotary[k] - last.rotary[k]).abs()).into_iter().fold(0.0, f64::max);
             let parts = if evenly { 1.0 } else { (turn / TURN).ceil().clamp(1.0, MOST_PLACES) };
             let mut before = last;
-            let line = length;
+            let (step, line) = (location.step, length);
+            while blocks.next_if(|block| block.step < step).is_some() {}
+            let (feed, corner) = match blocks.peek().filter(|block| block.step == step) {
+                Some(block) if pieces.last().is_some_and(|last: &EvenStretch| last.step != step) => {
+                    (block.feed, block.corner)
+                }
+                Some(block) => (block.feed, f64::INFINITY),
+                None => (rapid, f64::INFINITY),
+            };
             for part in 1..=parts as u32 {
                 let share = f64::from(part) / parts;
                 let rotary = [0, 1].map(|k| last.rotary[k] + (to.rotary[k] - last.rotary[k]) * share);
@@ -254,7 +276,9 @@ fn pieces(
                 let now = if share == 1.0 { to } else { kinematics.place(there, rotary) };
                 let length = length / parts;
                 let slope = way(&before, &now).map(|way| way / length);
-                pieces.push(EvenStretch { step: location.step, length, slope, after_stop, line });
+                let corner = if part == 1 { corner } else { f64::INFINITY };
+                let along = machine.acceleration;
+                pieces.push(EvenStretch { step, length, slope, after_stop, line, feed, corner, along });
                 (before, after_stop) = (now, false);
             }
         } else if location.turn != Turn::Rewind && to != last {
@@ -266,7 +290,7 @@ fn pieces(
     (pieces, standing)
 }
 
-fn way(from: &Joints, to: &Joints) -> [f64; 5] {
+pub(super) fn way(from: &Joints, to: &Joints) -> [f64; 5] {
     let (from, to) = (from.values(), to.values());
     std::array::from_fn(|k| to[k] - from[k])
 }
@@ -280,23 +304,14 @@ fn from_rest_to_rest(way: &[f64; 5], kinematics: &Kinematics) -> f64 {
     way.iter().zip(limits).map(one).fold(0.0, f64::max)
 }
 
-fn stages(pieces: &[EvenStretch], blocks: &[Block], machine: &Machine, axes: &AxisLimits) -> Vec<Stage> {
+fn stages(pieces: &[EvenStretch], machine: &Machine, axes: &AxisLimits) -> Vec<Stage> {
     let limited = axes.jerks.iter().any(|most| most.is_finite());
-    let mut blocks = blocks.iter().peekable();
     // Of each piece its feed, and the greatest squared speed at the corner before it.
-    let of = |(k, piece): (usize, &EvenStretch)| {
-        while blocks.next_if(|block| block.step < piece.step).is_some() {}
-        let block = blocks.peek().filter(|block| block.step == piece.step);
-        let feed = block.map_or(machine.rapid_rate / SECONDS_PER_MINUTE, |block| block.feed);
-        let feed = feed.min(piece.least(&axes.rates)).min(piece.line * machine.block_rate);
-        let corner = match (k.checked_sub(1).map(|k| &pieces[k]), block) {
-            _ if piece.after_stop => 0.0,
-            (Some(last), Some(block)) if last.step != piece.step => block.corner,
-            _ => f64::INFINITY,
-        };
-        (feed, corner)
+    let of = |piece: &EvenStretch| {
+        let feed = piece.feed.min(piece.least(&axes.rates)).min(piece.line * machine.block_rate);
+        (feed, if piece.after_stop { 0.0 } else { piece.corner })
     };
-    let limits: Vec<(f64, f64)> = pieces.iter().enumerate().map(of).collect();
+    let limits: Vec<(f64, f64)> = pieces.iter().map(of).collect();
     let straight = |k: usize| {
         let piece = pieces.get(k)?;
         let corner = |k: usize| limits.get(k).map_or(0.0, |next| next.1);
@@ -316,7 +331,7 @@ fn stages(pieces: &[EvenStretch], blocks: &[Block], machine: &Machine, axes: &Ax
         let bends = ends.map(|ends| ends.map(|(last, next)| bend(last, next)).unwrap_or_default());
         let smooth = ends.map(|ends| ends.is_some_and(|(last, next)| limited && is_smooth(last, next)));
         let slower = if k > 0 { feed.min(limits[k - 1].0) } else { feed };
-        let most = machine.acceleration.min(piece.least(&axes.accelerations));
+        let most = piece.along.min(piece.least(&axes.accelerations));
         let jerk = piece.least(&axes.jerks);
         let slow = [corner, limits.get(k + 1).map_or(0.0, |next| next.1)];
         let division = match () {
@@ -345,7 +360,7 @@ fn stages(pieces: &[EvenStretch], blocks: &[Block], machine: &Machine, axes: &Ax
             let free = [f64::INFINITY; 2];
             let [along, within] =
                 arcs.as_ref().map_or(free, |arcs| arcs.limits(piece.length, [begin, begin + length]));
-            let (along, most) = (along.min(axes.along), most.min(within));
+            let (along, most) = (along.min(piece.along), most.min(within));
             let slope = piece.slope;
             stages.push(Stage { step: piece.step, length, slope, bends, most, along, jerk: limited });
             begin += length;

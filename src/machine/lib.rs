@@ -10,12 +10,14 @@ mod feeds;
 mod jerk;
 pub mod kinematics;
 mod merge;
+mod program_time;
 mod time;
 
 pub use axis_limits::{axes_at_most, machining_time_of_axes, slow_axes};
 pub use blending::Blending;
 pub use feeds::slow_corners;
 pub use merge::{Straying, merge_short_moves};
+pub use program_time::machining_time_of_program;
 pub use time::{at_most, machining_time};
 
 /// Limits of the machine's motion.

@@ -16,7 +16,9 @@
 //!
 //! Where the control rounds corners by arcs, a at a corner is a share of the acceleration ([`super::blending`]).
 //!
-//! A move lasts at least as long as the control takes for a line of the program.
+//! A line of the program lasts at least as long as the control takes for it, be it one move or the chords of an arc. No move is fed
+//! faster than at the rapid rate. Where a program dwells or stops the machine comes to rest, and approaches, whose beginning nobody
+//! knows, do not count.
 //!
 //! What single axes need besides is in [`super::axis_limits`]: those of upright tools where the machine has accelerations or jerks
 //! of their own, and those of machines with rotary axes. Rates of X, Y and Z are feeds that no move of an upright tool exceeds.
@@ -24,6 +26,8 @@
 //! A backward pass then limits speeds to what can still be braked, a forward pass to what can have been
 //! reached: both in one sweep, O(n). The path starts and ends at rest. Jerk along the path is that of single axes, where they have
 //! limits of it; without, real machines take somewhat longer.
+
+use std::ops::Range;
 
 use super::Machine;
 use super::axis_limits::time_of_linear;
@@ -39,31 +43,43 @@ pub(super) const SECONDS_PER_MINUTE: f64 = 60.0;
 pub(super) const NO_MOVE: f64 = 1e-9;
 
 /// A move with a length, in mm and s.
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Block {
     /// Its index in the path.
     pub step: usize,
     pub length: f64,
     pub direction: Vector3,
+    /// Length of the program's line that it belongs to.
+    pub line: f64,
+    /// The machine rests before it.
+    pub rests: bool,
     /// Feed, mm/s.
     pub feed: f64,
     /// Square of the speed at which the corner before it can be run at most.
     pub corner: f64,
     /// Angle that the corner before it turns by, and its curvature, 1/mm.
     pub turn: f64,
-    curvature: f64,
+    pub curvature: f64,
     /// Square of the speed at its start and at its end.
     pub entry: f64,
     pub exit: f64,
 }
 
 impl Block {
+    /// Turns from the move before it by an angle, rad.
+    pub fn bend_from(&mut self, last: &Self, turn: f64, machine: &Machine) {
+        self.turn = turn;
+        self.curvature = 2.0 * turn / (last.length + self.length);
+        self.corner = corner_speed_squared(last, self, machine);
+    }
+
     /// Square of the greatest speed within the move when its ends are run at the squared speeds `ends`.
     pub fn peak(&self, ends: [f64; 2], acceleration: f64) -> f64 {
         (0.5 * (ends[0] + ends[1]) + acceleration * self.length).min(self.feed * self.feed)
     }
 }
 
-/// Time for the whole path, s. Moves of no length, or of no more than a millionth of a micrometre, take none. Infinite when a move has no positive feed
+/// Time for the whole path, s, dwells aside. Moves of no length, or of no more than a millionth of a micrometre, take none. Infinite when a move has no positive feed
 /// or `machine` fails its [`Machine::check`].
 ///
 /// # Errors
@@ -86,7 +102,8 @@ pub fn at_most(path: &Toolpath, machine: &Machine, [slowest, fastest]: [f64; 2])
     let most = least(&machine.accelerations, machine.acceleration);
     let ramps = jerk::ramp(fastest / SECONDS_PER_MINUTE, most, least(&machine.jerks, f64::INFINITY));
     let one = |(from, to, step): (geometry::Point3, geometry::Point3, &Move)| {
-        let slowest = if step.kind == MoveKind::Rapid { machine.rapid_rate } else { slowest };
+        let rapid = step.kind == MoveKind::Rapid;
+        let slowest = if rapid { machine.rapid_rate } else { slowest.min(machine.rapid_rate) };
         let slowest = least(&machine.rates, slowest);
         (to - from).norm() * SECONDS_PER_MINUTE / slowest + ramps
     };
@@ -98,47 +115,35 @@ pub(super) fn profile(path: &Toolpath, machine: &Machine) -> Option<Vec<Block>> 
     let acceleration = machine.acceleration;
     let mut blocks: Vec<Block> = Vec::with_capacity(path.len());
     let rates = if path.is_upright() { machine.rates } else { [f64::INFINITY; 3] };
-    for (k, (from, to, step)) in path.segments().enumerate() {
+    let mut stops = path.origin.stops.iter().peekable();
+    let mut lines = lengths_of_lines(path).into_iter().peekable();
+    let mut rests = true;
+    for (k, ((from, to, step), counts)) in path.segments().zip(path.counts()).enumerate() {
         let length = (to - from).norm();
-        if length <= NO_MOVE {
+        rests |= stops.next_if(|stop| **stop as usize <= k).is_some() || !counts;
+        if length <= NO_MOVE || !counts {
             continue;
         }
+        while lines.next_if(|(moves, _)| moves.end as usize <= k).is_some() {}
+        let line = lines.peek().filter(|(moves, _)| moves.start as usize <= k);
+        let line = line.map_or(length, |(_, line)| *line);
         let (feed, direction) = (feed(step, machine), (to - from) / length);
         let of_axis = |k: usize| rates[k] / (SECONDS_PER_MINUTE * direction[k].abs());
-        let fastest = (0..3).map(of_axis).fold(length * machine.block_rate, f64::min);
+        let fastest = (0..3).map(of_axis).fold(line * machine.block_rate, f64::min);
         // What is no number stays none.
         let feed = if feed > fastest { fastest } else { feed };
         if !(feed > 0.0 && length.is_finite() && machine.check().is_ok()) {
             return None;
         }
-        let mut block = Block {
-            step: k,
-            length,
-            direction,
-            feed,
-            corner: 0.0,
-            turn: 0.0,
-            curvature: 0.0,
-            entry: 0.0,
-            exit: 0.0,
-        };
-        if let Some(last) = blocks.last() {
-            block.turn = last.direction.cross(&direction).norm().atan2(last.direction.dot(&direction));
-            block.curvature = 2.0 * block.turn / (last.length + length);
-            block.corner = corner_speed_squared(last, &block, machine);
+        let mut block = Block { step: k, length, direction, line, rests, feed, ..Block::default() };
+        rests = false;
+        if let Some(last) = blocks.last().filter(|_| !block.rests) {
+            let turn = last.direction.cross(&direction).norm().atan2(last.direction.dot(&direction));
+            block.bend_from(last, turn, machine);
         }
         blocks.push(block);
     }
-    // A bend begins with a corner of half its turn, so that a change shows over one corner or two. All of
-    // them are run at its speed.
-    let sudden = (24.0 * machine.junction_deviation * machine.jerk * machine.jerk).cbrt();
-    for (k, apart) in (1..blocks.len()).flat_map(|k| [(k, 1), (k, 2)]) {
-        let Some(other) = blocks.get(k + apart) else { continue };
-        let limit = sudden / (other.curvature - blocks[k].curvature).abs();
-        for block in &mut blocks[k..=k + apart] {
-            block.corner = block.corner.min(limit);
-        }
-    }
+    slow_sudden_bends(&mut blocks, machine);
     let mut exit = 0.0;
     for block in blocks.iter_mut().rev() {
         block.entry = block.corner.min(exit + 2.0 * acceleration * block.length);
@@ -155,13 +160,34 @@ pub(super) fn profile(path: &Toolpath, machine: &Machine) -> Option<Vec<Block>> 
     Some(blocks)
 }
 
+/// Lowers the speeds at corners around which the curvature changes suddenly.
+pub(super) fn slow_sudden_bends(blocks: &mut [Block], machine: &Machine) {
+    // A bend begins with a corner of half its turn, so that a change shows over one corner or two. All of
+    // them are run at its speed.
+    let sudden = (24.0 * machine.junction_deviation * machine.jerk * machine.jerk).cbrt();
+    for (k, apart) in (1..blocks.len()).flat_map(|k| [(k, 1), (k, 2)]) {
+        let Some(around) = blocks.get_mut(k..=k + apart) else { continue };
+        if around.iter().any(|block| block.rests) {
+            continue;
+        }
+        let limit = sudden / (around[apart].curvature - around[0].curvature).abs();
+        for block in around {
+            block.corner = block.corner.min(limit);
+        }
+    }
+}
+
+/// The lines of a path of which several moves are pieces, with their lengths.
+fn lengths_of_lines(path: &Toolpath) -> Vec<(Range<u32>, f64)> {
+    let length = |k: u32| (path.moves[k as usize].to.tip - path.start_of(k as usize)).norm();
+    path.origin.pieces.iter().map(|moves| (moves.clone(), moves.clone().map(length).sum())).collect()
+}
+
 /// mm/s.
 fn feed(step: &Move, machine: &Machine) -> f64 {
-    let per_minute = match step.kind {
-        MoveKind::Rapid => machine.rapid_rate,
-        MoveKind::Plunge | MoveKind::Cut | MoveKind::Link | MoveKind::Retract => step.feed_rate,
-    };
-    per_minute / SECONDS_PER_MINUTE
+    // What is no number stays none.
+    let rapid = step.kind == MoveKind::Rapid || step.feed_rate > machine.rapid_rate;
+    (if rapid { machine.rapid_rate } else { step.feed_rate }) / SECONDS_PER_MINUTE
 }
 
 /// Square of the greatest speed from one move into the next.
@@ -247,6 +273,53 @@ mod tests {
         let half = 0.1 + (100.0 - corner.sqrt()) / 1000.0 + (50.0 - 5.0 - (1e4 - corner) / 2000.0) / 100.0;
         let got = time([[0.0; 3], [50.0, 0.0, 0.0], [50.0, 50.0, 0.0]]);
         assert_relative_eq!(got, 2.0 * half, epsilon = 1e-12);
+    }
+
+    /// A machine has no axis that goes faster.
+    #[test]
+    fn no_feed_is_faster_than_the_rapid_rate() {
+        let slow = Machine { rapid_rate: 1500.0, ..MACHINE };
+        let line = path([[0.0; 3], [100.0, 0.0, 0.0]]);
+        assert_relative_eq!(seconds(&line, &slow), 100.0 / 25.0 + 0.025, max_relative = 1e-9);
+        assert!(seconds(&line, &slow) <= at_most(&line, &slow, [6000.0, 6000.0]) * (1.0 + 1e-9));
+    }
+
+    /// A dwell after each of ten moves in one line: all of them from rest to rest.
+    #[test]
+    fn the_machine_rests_where_the_program_stops() {
+        let line = path((0..=10).map(|k| [f64::from(k), 0.0, 0.0]));
+        let mut stopping = line.clone();
+        stopping.origin.stops = (1..10).collect();
+        let one = seconds(&path([[0.0; 3], [1.0, 0.0, 0.0]]), &MACHINE);
+        assert_relative_eq!(seconds(&stopping, &MACHINE), 10.0 * one, max_relative = 1e-9);
+        let own = Machine { accelerations: [1000.0; 3], ..MACHINE };
+        assert_relative_eq!(seconds(&stopping, &own), 10.0 * one, max_relative = 2e-3);
+        // A stop before a move of no length is one before the next.
+        let mut doubled = path((0..=10).flat_map(|k| [[f64::from(k), 0.0, 0.0]; 2]));
+        doubled.origin.stops = vec![10];
+        let mut once = line;
+        once.origin.stops = vec![5];
+        assert_relative_eq!(seconds(&doubled, &MACHINE), seconds(&once, &MACHINE), max_relative = 1e-9);
+    }
+
+    #[test]
+    fn approaches_take_no_time() {
+        let mut line = path([[0.0, 0.0, 200.0], [0.0; 3], [100.0, 0.0, 0.0], [0.0; 3], [100.0, 0.0, 0.0]]);
+        line.origin.approaches = vec![0..1, 2..3];
+        let one = seconds(&path([[0.0; 3], [100.0, 0.0, 0.0]]), &MACHINE);
+        assert_relative_eq!(seconds(&line, &MACHINE), 2.0 * one, max_relative = 1e-9);
+    }
+
+    #[test]
+    fn chords_of_an_arc_are_one_line() {
+        let line = path((0..=2000).map(|k| [0.05 * f64::from(k), 0.0, 0.0]));
+        let mut arcs = line.clone();
+        arcs.origin.pieces = vec![0..1000, 1000..2000];
+        let slow = Machine { block_rate: 1000.0, ..MACHINE };
+        assert_relative_eq!(seconds(&arcs, &slow), 1.1, max_relative = 1e-9);
+        let own = Machine { accelerations: [1000.0; 3], ..slow };
+        assert_relative_eq!(seconds(&arcs, &own), 1.1, max_relative = 2e-3);
+        assert!(seconds(&line, &slow) > 2.0);
     }
 
     #[test]

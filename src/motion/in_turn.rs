@@ -1,9 +1,11 @@
 //! Paths one after the other, as one.
 
+use std::ops::Range;
+
 use crate::{Move, MoveKind, Toolpath};
 
 /// Paths that run one after the other. Between two of them the tool is away: it rises above all of the path, and the next one
-/// comes from there.
+/// comes from there. How the machine does that is not known, and counts as an approach.
 #[derive(Debug, Clone)]
 pub struct PathsInTurn {
     path: Toolpath,
@@ -37,6 +39,12 @@ impl PathsInTurn {
                 path.origin.tools.push((first + if *move_index > 0 { move_index + 2 } else { 0 }, *tool));
             }
         }
+        let begin = path.moves.len() as u32;
+        let behind = |range: &Range<u32>| range.start + begin..range.end + begin;
+        path.origin.approaches.push(begin - 3..begin);
+        path.origin.approaches.extend(next.origin.approaches.iter().map(behind));
+        path.origin.pieces.extend(next.origin.pieces.iter().map(behind));
+        path.origin.stops.extend(next.origin.stops.iter().map(|k| k + begin));
         path.origin.strays = path.origin.strays.max(next.origin.strays);
         path.origin.standing_s += next.origin.standing_s;
         path.origin.leans = path.origin.leans.max(next.origin.leans);
@@ -71,6 +79,8 @@ mod tests {
             let mut path = Toolpath::new(at(0.0, top), vec![step(1.0, 0), step(2.0, 1)]);
             (path.origin.tools, path.origin.lines) = (vec![(0, tool)], vec![10 * tool, 10 * tool + 1]);
             path.origin.strays = 1e-3 * top;
+            path.origin.pieces.push(0..2);
+            path.origin.stops.push(1);
             path
         };
         let mut all = PathsInTurn::new(path(1, 5.0));
@@ -83,6 +93,15 @@ mod tests {
         assert_eq!(passes, [0, 1, 2, 2, 2, 2, 3, 4, 4, 4, 4, 5]);
         assert_eq!(all.origin.lines, [10, 11, 20, 20, 20, 20, 21, 20, 20, 20, 20, 21]);
         assert_eq!(all.origin.tools, [(0, 1), (3, 2)]);
+        assert_eq!(all.origin.approaches, [2..5, 7..10]);
+        assert_eq!(
+            (&all.origin.pieces[..], &all.origin.stops[..]),
+            (&[0..2, 5..7, 10..12][..], &[1, 6, 11][..])
+        );
+        let part = all.part(4..7).origin;
+        assert_eq!((part.approaches.len(), part.approaches[0].clone()), (1, 0..1));
+        assert_eq!((part.pieces.len(), part.pieces[0].clone(), part.stops), (1, 1..3, vec![2]));
+        assert_eq!(all.counts().filter(|counts| *counts).count(), 6);
         assert_eq!((all.origin.strays, all.part(1..2).origin.strays), (7e-3, 7e-3));
     }
 }

@@ -90,8 +90,15 @@ pub struct Origin {
     pub lines: Vec<u32>,
     /// How far its motion may be off these moves, mm, where arcs and turns are moves here.
     pub strays: f64,
-    /// Time for which the tip stands besides its moves, s.
+    /// Time for which the program dwells, s.
     pub standing_s: f64,
+    /// The moves of each line of the program that several moves stand for, as the chords of an arc, in order.
+    pub pieces: Vec<Range<u32>>,
+    /// Moves before which the machine comes to rest, in order.
+    pub stops: Vec<u32>,
+    /// Moves whose beginning no program tells, in order: they come from where the machine stood before, or from the change of a
+    /// tool. They count neither as time nor as way.
+    pub approaches: Vec<Range<u32>>,
     /// How far the tool's axis may be off theirs, rad, which `strays` has for the cutter alone: what stands higher is farther off.
     pub leans: f64,
 }
@@ -143,8 +150,23 @@ impl Toolpath {
         let within = shown.take_while(|(first, _)| (*first as usize) < moves.end);
         let tools = within.map(|(first, tool)| (first.saturating_sub(moves.start as u32), *tool)).collect();
         let program = self.origin.program.clone();
-        let origin = Origin { program, tools, lines, standing_s: 0.0, ..self.origin };
+        let [pieces, approaches] =
+            [&self.origin.pieces, &self.origin.approaches].map(|ranges| clipped(ranges, &moves));
+        let stops = self.origin.stops.iter().filter(|k| moves.contains(&(**k as usize)));
+        let stops = stops.map(|k| k - moves.start as u32).collect();
+        let Origin { strays, leans, .. } = self.origin;
+        let origin =
+            Origin { program, tools, lines, strays, standing_s: 0.0, pieces, stops, approaches, leans };
         Self { start: self.location_before(moves.start), moves: self.moves[moves].to_vec(), origin }
+    }
+
+    /// Whether the way and the time of each move count, in order: not those of approaches.
+    pub fn counts(&self) -> impl Iterator<Item = bool> + '_ {
+        let mut approaches = self.origin.approaches.iter().peekable();
+        (0..self.len() as u32).map(move |k| {
+            while approaches.next_if(|range| range.end <= k).is_some() {}
+            !approaches.peek().is_some_and(|range| range.contains(&k))
+        })
     }
 
     /// Number of moves.
@@ -181,6 +203,13 @@ impl Toolpath {
     pub fn passes(&self) -> usize {
         self.moves.iter().map(|m| m.pass as usize + 1).max().unwrap_or(0)
     }
+}
+
+/// What of ranges of moves lies within some moves, counted from their first.
+fn clipped(ranges: &[Range<u32>], moves: &Range<usize>) -> Vec<Range<u32>> {
+    let [first, end] = [moves.start as u32, moves.end as u32];
+    let parts = ranges.iter().map(|range| range.start.max(first)..range.end.min(end));
+    parts.filter(|range| !range.is_empty()).map(|range| range.start - first..range.end - first).collect()
 }
 
 #[cfg(test)]

@@ -159,7 +159,13 @@ pub enum Code {
     },
     /// G65: a subprogram with arguments.
     Macro,
-    /// G61 G64 and others that move nothing by themselves.
+    /// G9: the machine comes to rest behind this block.
+    StopOnce,
+    /// G61 G61.1 G64: it does so behind every block, or no longer.
+    ExactStop(bool),
+    /// G61 of LinuxCNC: it comes to rest at corners alone.
+    ExactPath,
+    /// Others that move nothing by themselves.
     Quiet,
     /// Known, and beyond verification.
     Unsupported(&'static str),
@@ -303,7 +309,7 @@ const COMMON: &[(u16, Code)] = &[
     (61, Code::Unsupported("it interpolates along an exponential curve")),
     (70, Code::Unsupported("it belongs to lathes")),
     (80, Code::Quiet),
-    (90, Code::Quiet),
+    (90, Code::StopOnce),
     (100, Code::Data),
     (110, Code::Quiet),
     (120, Code::Unsupported("the control plans the motion of a circular pocket itself")),
@@ -354,9 +360,9 @@ const COMMON: &[(u16, Code)] = &[
     (591, Code::Work(7)),
     (592, Code::Work(8)),
     (593, Code::Work(9)),
-    (610, Code::Quiet),
-    (611, Code::Quiet),
-    (640, Code::Quiet),
+    (610, Code::ExactStop(true)),
+    (611, Code::ExactStop(true)),
+    (640, Code::ExactStop(false)),
     (650, Code::Macro),
     (660, Code::Unsupported("modal macro calls are not followed")),
     (670, Code::Quiet),
@@ -432,6 +438,7 @@ pub const LINUXCNC: Control = Control {
         (440, None),
         (500, None),
         (541, None),
+        (610, Some(Code::ExactPath)),
         (650, None),
         (670, None),
         (680, None),
@@ -503,6 +510,8 @@ pub const GRBL: Control = Control {
     word: "grbl",
     help: "grbl 1.1",
     codes: &[
+        // The only mode that it has.
+        (610, QUIET),
         (730, None),
         (740, None),
         (760, None),

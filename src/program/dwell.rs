@@ -59,13 +59,12 @@ impl Interpreter<'_> {
 }
 
 impl Program {
-    /// The tip stands for so many seconds before the next step.
+    /// The machine comes to rest, and stands for so many seconds, before the next step.
     pub(crate) fn dwell(&mut self, seconds: f64) {
         let next = self.steps.len();
         match self.dwells.last_mut() {
             Some((step, all)) if *step == next => *all += seconds,
-            _ if seconds > 0.0 => self.dwells.push((next, seconds)),
-            _ => {}
+            _ => self.dwells.push((next, seconds)),
         }
     }
 }

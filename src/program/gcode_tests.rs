@@ -89,14 +89,12 @@ fn moves_are_off_arcs_by_no_more_than_is_told() {
     assert_eq!(straight.origin.strays, 0.0);
 }
 
-/// Minutes that the moves of a program take at their feeds on a table that turns about x and z, standing included.
+/// Minutes that the feeds of a program ask for on a table that turns about x and z.
 fn minutes_on_a_table(text: &str) -> f64 {
     let kinematics = machine::kinematics::Kinematics::by_name("ac-table").unwrap();
     let placing = Placing { chord: 0.001, kinematics: Some(&kinematics), lengths: &|_| None };
-    let path = &read(text).runs(&placing).unwrap()[0].path;
-    let fed = path.segments().filter(|(.., step)| step.kind != motion::MoveKind::Rapid);
-    let moving: f64 = fed.map(|(a, b, step)| (b - a).norm() / step.feed_rate).sum();
-    moving + path.origin.standing_s / 60.0
+    let run = read(text).runs(&placing).unwrap().swap_remove(0);
+    run.joints.iter().map(|place| place.pace.asked_s / 60.0).sum()
 }
 
 #[test]
@@ -113,8 +111,57 @@ fn moves_in_which_axes_turn_take_the_time_of_their_feed() {
         let minutes = minutes_on_a_table(text);
         assert!((minutes / expected - 1.0).abs() < 1e-4, "{text}: {minutes}");
     }
-    // No faster than the axes can.
-    assert!(minutes_on_a_table("G0 X50 Y0 Z20 C0\nG93 G1 C90 F1000000\nM30\n") > 1e-3);
+}
+
+/// Stops and the moves that come from where nobody knows, by the lines before and in which they are.
+fn stops_and_approaches(text: &str, control: &'static Control) -> (Vec<u32>, Vec<u32>) {
+    let read = read_with(text, control, &Setup::from_above(200.0));
+    let placing = Placing { chord: 0.1, kinematics: None, lengths: &|_| None };
+    let path = read.runs(&placing).unwrap().swap_remove(0).path;
+    let line = |k: &u32| path.line_of(*k as usize).unwrap();
+    let approaches = path.origin.approaches.iter().flat_map(|range| range.clone());
+    (path.origin.stops.iter().map(line).collect(), approaches.map(|k| line(&k)).collect())
+}
+
+#[test]
+fn the_machine_rests_at_dwells_and_stops() {
+    let stops = |text: &str, control| stops_and_approaches(text, control).0;
+    assert_eq!(stops("G0 X1\nG1 X2 F9\nG4 P0\nX3\nX4 M0\nX5\nM1\nX6\nM30\n", GENERAL_CONTROL), [4, 6, 8]);
+    // Exact stops end with their mode, that of G9 with its block.
+    let exact = "G61\nG1 X1 F9\nX2\nG64 X3\nX4\nG9 X5\nX6\nM30\n";
+    assert_eq!(stops(exact, &FANUC), [2, 3, 4, 7]);
+    let linuxcnc = Control::from_word("linuxcnc").unwrap();
+    assert_eq!(stops("G61\nG1 X1 F9\nX2\nG61.1\nX3\nX4\nG61\nX5\nM30\n", linuxcnc), [5, 6, 8]);
+    let noted = read_with("G61\nG1 X1 F9\nM30\n", linuxcnc, &Setup::default());
+    assert!(noted.notes[0].text.contains("G61 is timed as G64"), "{:?}", noted.notes);
+    assert_eq!(stops("G61\nG1 X1 F9\nX2\nM30\n", Control::from_word("grbl").unwrap()), []);
+}
+
+#[test]
+fn the_way_from_where_nobody_knows_is_told() {
+    let approaches = |text: &str| stops_and_approaches(text, GENERAL_CONTROL).1;
+    assert_eq!(approaches("G0 X5 Y1\nX9\nZ9\nX0\nZ1\nG1 X2 F9\nM30\n"), [1, 2, 3]);
+    assert_eq!(approaches("G0 X0 Y0 Z10\nX9\nM30\n"), [1]);
+    // Machine zero is a known place.
+    assert_eq!(approaches("G91 G28 Z0\nG90 G0 X0 Y0\nZ10\nX9\nM30\n"), []);
+    assert_eq!(approaches("G53 G0 Z-20\nG0 X5 Y0\nZ10\nG1 X9 F9\nG0 X0\nM30\n"), [1, 2]);
+    // Wherever it begins, a step is known.
+    assert_eq!(approaches("G91 G0 X5 Y1 Z1\nG90 X9\nG1 X2 F9\nM30\n"), [1, 2]);
+    assert_eq!(approaches("G91 G0 X5 Y1 Z1\nG1 X2 F9\nM30\n"), []);
+    // What feeds from there is not left out.
+    assert_eq!(approaches("G1 X5 F9\nG0 Z10\nM30\n"), []);
+}
+
+#[test]
+fn an_arc_is_one_line() {
+    let text = "G0 X10 Y0\nG1 X9 F9\nG3 I-9 J0\nG3 I-9 J0\nG1 X8\nM30\n";
+    let placing = Placing { chord: 0.01, kinematics: None, lengths: &|_| None };
+    let path = read(text).runs(&placing).unwrap().swap_remove(0).path;
+    let arcs = &path.origin.pieces;
+    assert!(
+        arcs.len() == 2 && arcs[0].start == 2 && arcs[0].len() > 10 && arcs[1].end as usize == path.len() - 1
+    );
+    assert_eq!(arcs[0].end, arcs[1].start);
 }
 
 #[test]

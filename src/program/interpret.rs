@@ -60,6 +60,8 @@ struct Asked {
     length: Option<(Length, CodeWord)>,
     radius: Option<(RadiusSide, CodeWord)>,
     quiet: bool,
+    /// The machine comes to rest behind the block.
+    stop: bool,
 }
 
 /// A control that reads a program.
@@ -79,6 +81,11 @@ pub(crate) struct Interpreter<'a> {
     changed: bool,
     /// The program has moved.
     moved: bool,
+    /// It has fed.
+    fed: bool,
+    /// The axes that have been led to a place, and whether this block is the first one that does so with one of them.
+    placed: [bool; 6],
+    places: bool,
     most_repeats: u64,
     /// The cutter's radius, while it is compensated.
     pub compensation: Option<Compensation>,
@@ -105,6 +112,9 @@ impl<'a> Interpreter<'a> {
             out,
             changed: true,
             moved: false,
+            fed: false,
+            placed: [false; 6],
+            places: false,
             most_repeats: setup.most_repeats,
             compensation: None,
             shift: 0,
@@ -198,6 +208,7 @@ impl<'a> Interpreter<'a> {
             return Ok(Next::Line);
         }
         self.block.take(b'N');
+        self.places = false;
         let mut asked = Asked::default();
         let unit_before = self.state.modal.unit;
         if !self.block.g.as_slice().is_empty() {
@@ -231,6 +242,9 @@ impl<'a> Interpreter<'a> {
                 }
             }
             _ => self.motion(&asked)?,
+        }
+        if asked.stop || self.state.modal.exact_stop || self.block.m.as_slice().iter().any(stops) {
+            self.out.dwell(0.0);
         }
         if let Some(letter) = self.block.unused() {
             return Err(Stop::new(self.block.column(letter), Fault::Unused(char::from(letter))));
@@ -278,6 +292,7 @@ impl<'a> Interpreter<'a> {
     /// The codes that set something, and what the others ask for.
     fn settings(&mut self, asked: &mut Asked) -> Result<(), Stop> {
         let words = self.block.g;
+        let mut exact_path = false;
         for word in words.as_slice() {
             let column = usize::from(word.column);
             let Some(code) = self.codes.get(word.tenths) else {
@@ -318,6 +333,12 @@ impl<'a> Interpreter<'a> {
                 Code::Radius(side) => asked.radius = Some((side, *word)),
                 Code::Machine => asked.machine = true,
                 Code::Quiet => asked.quiet = true,
+                Code::StopOnce => asked.stop = true,
+                Code::ExactStop(stop) => (modal.exact_stop, asked.quiet) = (stop, true),
+                Code::ExactPath => {
+                    modal.exact_stop = false;
+                    exact_path = true;
+                }
                 Code::Unsupported(why) => {
                     let code = spelled(word.tenths);
                     return Err(Stop::new(column, Fault::Unsupported { code, why }));
@@ -331,6 +352,9 @@ impl<'a> Interpreter<'a> {
                     None => asked.single = Some((code, *word)),
                 },
             }
+        }
+        if exact_path {
+            self.note("G61 is timed as G64: corners are rounded by no more than the junction deviation");
         }
         self.check_together(asked)
     }
@@ -445,6 +469,7 @@ impl<'a> Interpreter<'a> {
             return Err(Stop::new(usize::from(word.column), Fault::Meanwhile("M6".to_owned())));
         }
         self.turn(Spindle::Off);
+        self.out.dwell(0.0);
         self.load(tool);
         Ok(())
     }
@@ -632,7 +657,9 @@ impl<'a> Interpreter<'a> {
         if named {
             let over = self.target()?;
             self.go(StepKind::Rapid, over)?;
+            self.places = false;
         }
+        (0..6).filter(|k| letters[*k]).for_each(|k| self.place_axis(k));
         let mut to = self.nose();
         (0..6).filter(|k| letters[*k]).for_each(|k| to[k] = self.state.homes[which][k]);
         self.go_to_machine(to)
@@ -705,6 +732,9 @@ impl<'a> Interpreter<'a> {
         let (unit, absolute) = (self.state.modal.unit, self.state.modal.absolute);
         for (k, letter) in AXES.into_iter().enumerate() {
             if let Some(value) = self.block.take(letter) {
+                if absolute {
+                    self.place_axis(k);
+                }
                 let value = if k < 3 { value * unit } else { value };
                 to[k] = if absolute { value } else { to[k] + value };
                 if to[k].is_nan() || to[k].abs() > geometry::MAX_COORDINATE {
@@ -714,6 +744,12 @@ impl<'a> Interpreter<'a> {
             }
         }
         Ok(to)
+    }
+
+    /// An axis is led to a place.
+    fn place_axis(&mut self, axis: usize) {
+        self.places |= !self.placed[axis];
+        self.placed[axis] = true;
     }
 
     fn motion(&mut self, asked: &Asked) -> Result<(), Stop> {
@@ -803,6 +839,7 @@ impl<'a> Interpreter<'a> {
         for (k, letter) in AXES.into_iter().enumerate() {
             if let Some(value) = self.block.take(letter) {
                 to[k] = value * self.unit_of(k);
+                self.place_axis(k);
             }
         }
         if self.state.modal.motion == Motion::Line {
@@ -884,7 +921,11 @@ impl<'a> Interpreter<'a> {
         if self.out.steps.len() as u64 > self.lines.len() as u64 + self.most_repeats {
             return Err(Stop::new(0, Fault::Endless(self.out.steps.len() as u64)));
         }
+        self.fed |= matches!(kind, StepKind::Feed | StepKind::Arc(_));
         self.out.steps.push(Step { kind, to: self.state.place, feed, line, setting });
+        if self.places && !self.fed {
+            self.out.approach = self.out.steps.len();
+        }
         Ok(())
     }
 
@@ -940,6 +981,11 @@ impl<'a> Interpreter<'a> {
             Err(self.value(letter, value, expected))
         }
     }
+}
+
+/// M0 M1 M60: the machine waits.
+fn stops(word: &CodeWord) -> bool {
+    matches!(word.tenths, 0 | 10 | 600)
 }
 
 fn shifted(stop: Stop, by: usize) -> Stop {

@@ -104,8 +104,10 @@ pub struct Program {
     pub start: Place,
     /// The motions, in the order in which they run.
     pub steps: Vec<Step>,
-    /// How long the tip stands, s, each before the step of an index.
+    /// How long the machine dwells, s, each before the step of an index; 0 where it only comes to rest.
     pub dwells: Vec<(usize, f64)>,
+    /// So many steps come from where nobody knows: the first rapids, up to the last one that leads an axis to its first place.
+    pub approach: usize,
     /// The arcs among them.
     pub arcs: Vec<Arc>,
     /// What holds meanwhile.
@@ -145,6 +147,17 @@ impl Program {
     /// The tools in the order of their first feed.
     pub fn tools_that_feed(&self) -> Vec<u32> {
         self.tools_of(|kind| matches!(kind, StepKind::Feed | StepKind::Arc(_)))
+    }
+
+    /// The highest feed of some tools on ways in which no rotary axis turns, mm/min, and its line. Where one turns, the feed is that of
+    /// no single axis.
+    pub fn highest_feed(&self, of_tool: impl Fn(u32) -> bool) -> Option<(f64, u32)> {
+        let fed = |(k, step): (usize, &Step)| {
+            let feeds = matches!(step.kind, StepKind::Feed | StepKind::Arc(_));
+            let turns = self.start_of(k)[3..] != step.to[3..];
+            (feeds && !turns && of_tool(self.setting(step).tool)).then_some((step.feed, step.line))
+        };
+        self.steps.iter().enumerate().filter_map(fed).max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)))
     }
 
     fn tools_of(&self, counts: impl Fn(StepKind) -> bool) -> Vec<u32> {

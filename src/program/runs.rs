@@ -5,7 +5,7 @@
 //! divided so that straight pieces keep the same tolerance.
 
 use geometry::{Point3, Vector3};
-use machine::kinematics::{Joints, Kinematics, Side, Way, Waypoint};
+use machine::kinematics::{Joints, Kinematics, Pace, Side, Way, Waypoint};
 use motion::{ClPoint, Move, MoveKind, Origin, Toolpath};
 
 use crate::error::{Fault, ProgramError};
@@ -79,10 +79,16 @@ impl Program {
                 runs.push(Run::new(setting.tool, start, joints));
             }
             let Some(run) = runs.last_mut() else { continue };
+            let mut rests = false;
             while let Some((_, seconds)) = dwells.next_if(|(step, _)| *step <= k) {
                 run.standing_s += seconds;
+                rests = true;
             }
+            run.pace = Pace { rests: run.pace.rests || rests, goes_on: false, ..Pace::default() };
+            run.pace.from_unknown = k < self.approach;
+            let first = run.path.len() as u32;
             layer.follow(k, step, run).map_err(fault)?;
+            run.line(first, rests);
         }
         if let Some(run) = runs.last_mut() {
             run.standing_s += dwells.map(|(_, seconds)| seconds).sum::<f64>();
@@ -102,13 +108,16 @@ struct Run {
     /// How far arcs are off their chords, and turning moves off their pieces, mm.
     chords_stray: f64,
     turns_stray: f64,
-    /// Time for which the tip stands, s.
+    /// Time for which the machine dwells, s.
     standing_s: f64,
+    /// Of the next place.
+    pace: Pace,
 }
 
 impl Run {
     fn new(tool: u32, start: ClPoint, joints: Option<Joints>) -> Self {
-        let begin = joints.map(|joints| Waypoint { joints, step: 0, way: Way::Approach });
+        let begin =
+            joints.map(|joints| Waypoint { joints, step: 0, way: Way::Approach, pace: Pace::default() });
         let joints = begin.into_iter().collect();
         let path = Toolpath::new(start, Vec::new());
         Self {
@@ -121,7 +130,29 @@ impl Run {
             chords_stray: 0.0,
             turns_stray: 0.0,
             standing_s: 0.0,
+            pace: Pace::default(),
         }
+    }
+
+    /// The moves from `first` on are one line of the program, before which the machine may rest.
+    fn line(&mut self, first: u32, rests: bool) {
+        let (moves, origin) = (first..self.path.len() as u32, &mut self.path.origin);
+        if rests {
+            origin.stops.push(first);
+        }
+        if moves.len() > 1 {
+            origin.pieces.push(moves.clone());
+        }
+        if self.pace.from_unknown && !moves.is_empty() {
+            origin.approaches.push(moves);
+        }
+    }
+
+    /// The joints at the end of a line or of a piece of one.
+    fn push_joints(&mut self, joints: Joints, way: Way, asked_s: f64) {
+        let step = self.path.len().saturating_sub(1);
+        self.joints.push(Waypoint { joints, step, way, pace: Pace { asked_s, ..self.pace } });
+        self.pace = Pace { goes_on: true, rests: false, ..self.pace };
     }
 
     fn finished(self, program: &str) -> ToolRun {
@@ -138,11 +169,7 @@ impl Run {
         let length = (to.tip - self.at.tip).norm();
         let feed = match minutes {
             Some(minutes) if length > NO_WAY => length / minutes,
-            Some(minutes) => {
-                self.standing_s += 60.0 * minutes;
-                step.feed
-            }
-            None => step.feed,
+            _ => step.feed,
         };
         if to != self.at {
             self.push(to, step.kind == StepKind::Rapid, feed, step.line);
@@ -337,8 +364,9 @@ impl Layer<'_> {
         }
         if !run.joints.is_empty() {
             let way = if self.setting.tip_kept { Way::Tip } else { Way::Axes };
-            let (joints, step) = (self.joints(to)?, run.path.len().saturating_sub(1));
-            run.joints.push(Waypoint { joints, step, way });
+            let feed = if step.feed > 0.0 { step.feed } else { FEED_WHERE_NONE };
+            let asked_s = if step.kind == StepKind::Rapid { 0.0 } else { 60.0 * fed_length(from, to) / feed };
+            run.push_joints(self.joints(to)?, way, asked_s);
         }
         Ok(())
     }

@@ -80,6 +80,8 @@ pub(crate) struct Modal {
     pub length: Length,
     /// An M word made the control move the linear axes along with the rotary ones.
     pub tip_kept: bool,
+    /// The machine comes to rest behind every block.
+    pub exact_stop: bool,
 }
 
 /// What stays from one cycle to the next, in units of the program's coordinates (mm).
@@ -137,6 +139,7 @@ impl State {
             initial: true,
             length: Length::Off,
             tip_kept: false,
+            exact_stop: false,
         };
         Self {
             modal,

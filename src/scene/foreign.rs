@@ -96,6 +96,7 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
             before,
             unknown_before,
             others,
+            highest_feed: read.highest_feed(|_| true),
             findings,
             notes,
         }
@@ -113,6 +114,7 @@ pub(super) fn load(request: &mut ToolpathRequest, scene: &Scene) -> Result<(), S
             before,
             unknown_before,
             others: any,
+            highest_feed: read.highest_feed(|of| of == tool),
             findings,
             notes,
         }

@@ -158,6 +158,44 @@ fn it_stands_beside_planned_paths_in_one_table() {
     );
 }
 
+/// Time and air of a plan and of its own program are the same.
+#[test]
+fn a_planned_path_and_its_program_count_the_same() {
+    let home = tempfile::tempdir().unwrap();
+    std::fs::write(home.path().join("plate.stl"), plate()).unwrap();
+    let scene = "[part]\nfile = \"plate.stl\"\n[cutter]\nshape = \"ball\"\ndiameter = 6\n[simulation]\ncell = 0.5\n\
+                 [[toolpath]]\nstrategy = \"zigzag\"\nstepover = 0.4\n";
+    let path_of = |scene: &str, k: usize| {
+        std::fs::write(home.path().join("scene.toml"), scene).unwrap();
+        let answer = millstream(home.path(), &["run", "scene.toml", "--out", "out"]);
+        assert!(answer.code.is_some_and(|code| code < 2), "{}", answer.stderr);
+        let report: Value =
+            serde_json::from_slice(&std::fs::read(home.path().join("out/report.json")).unwrap()).unwrap();
+        ["machining_time_s", "air_length_mm"].map(|key| report["toolpaths"][k]["path"][key].as_f64().unwrap())
+    };
+    let planned = path_of(scene, 0);
+    std::fs::copy(home.path().join("out/zigzag/toolpath.nc"), home.path().join("job.nc")).unwrap();
+    let read = path_of(&format!("{scene}[[toolpath]]\nstrategy = \"program\"\nfile = \"job.nc\"\n"), 1);
+    for (planned, read) in planned.into_iter().zip(read) {
+        assert!((read / planned - 1.0).abs() < 1e-3, "{planned} {read}");
+    }
+}
+
+#[test]
+fn a_feed_above_the_rapid_rate_is_found_with_its_line() {
+    let home = tempfile::tempdir().unwrap();
+    std::fs::write(home.path().join("slow.toml"), "[machine]\nrapid_rate = 500\n").unwrap();
+    let (answer, report) = verify_in(home.path(), &raster(), &["--machine", "slow.toml"]);
+    assert_eq!(answer.code, Some(1), "{}", answer.stderr);
+    let report = report.unwrap();
+    let line = line_of(&raster(), "G1 Z0");
+    let text = format!("the highest feed is 600.0 mm/min in line {line} of job.nc (limit 500.0");
+    assert!(violations(&report).iter().any(|found| found.starts_with(&text)), "{}", answer.stdout);
+    let path = &report["toolpaths"][0]["path"];
+    let [time, cut] = ["machining_time_s", "cutting_length_mm"].map(|key| path[key].as_f64().unwrap());
+    assert!(time >= 60.0 * cut / 500.0, "{time} {cut}");
+}
+
 #[test]
 fn a_gouge_is_found_with_the_line_that_made_it() {
     let mut program = raster();

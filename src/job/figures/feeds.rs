@@ -16,9 +16,12 @@ const ROUNDING: f64 = 1e-9;
 /// Of every toolpath.
 pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobError> {
     let (scene, path) = (run.scene(), run.path());
-    // The feeds of a program from elsewhere are its own.
-    if run.request.foreign().is_some() {
-        return Ok(Finding::default());
+    // The feeds of a program from elsewhere are its own, as far as the machine can run them.
+    if let Some(read) = run.request.foreign() {
+        let place = |line: u32| format!("in line {line} of {}", path.program_name());
+        let highest = read.highest_feed.map(|(feed, line)| (feed, place(line)));
+        let claim = no_faster_than_rapids(highest, scene.machine.rapid_rate);
+        return Ok(Finding { claims: vec![claim], ..Finding::default() });
     }
     let line = |k: usize| format!("at move {k}{}", run.program_line(k as u32));
     let mut claims = vec![
@@ -79,6 +82,15 @@ fn no_faster(
     };
     let text = format!("the highest feed is {fastest:.1} mm/min {} (limit {limit:.1})", line(k));
     feed(limit, rounded(fastest, limit), text)
+}
+
+/// That a program from elsewhere, whose highest feed, mm/min, and its place are given, feeds no faster than the machine goes at rapid.
+fn no_faster_than_rapids(highest: Option<(f64, String)>, limit: f64) -> Claim {
+    let Some((fastest, place)) = highest else { return feed(limit, 0.0, "no move has a feed".into()) };
+    let text = format!(
+        "the highest feed is {fastest:.1} mm/min {place} (limit {limit:.1}, the machine's rapid rate, at which it is held)"
+    );
+    Claim { gravity: Gravity::Finish, ..feed(limit, rounded(fastest, limit), text) }
 }
 
 /// That moves between passes, those on the surface aside, go down along the tool axis no faster than the plunge rate.
@@ -155,6 +167,18 @@ mod tests {
             in_time(time, longest(&path, &CUTTING, machine)),
         ]
         .map(|claim| claim.verdict())
+    }
+
+    #[test]
+    fn programs_from_elsewhere_feed_no_faster_than_the_machine() {
+        let verdict = |feed: f64| no_faster_than_rapids(Some((feed, "in line 4 of a.nc".into())), 2000.0);
+        assert_eq!([2000.0, 12e3].map(|feed| verdict(feed).verdict()), [Verdict::Pass, Verdict::Fail]);
+        assert!(
+            verdict(12e3)
+                .text
+                .starts_with("the highest feed is 12000.0 mm/min in line 4 of a.nc (limit 2000.0,")
+        );
+        assert_eq!(no_faster_than_rapids(None, 2000.0).verdict(), Verdict::Pass);
     }
 
     #[test]

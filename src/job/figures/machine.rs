@@ -108,8 +108,7 @@ fn travelled(machine: &Kinematics, read: &ReadProgram) -> ([[f64; 2]; 5], f64) {
         ranges[k] = [ranges[k][0].min(value), ranges[k][1].max(value)];
     };
     for (tool, program) in &read.joints {
-        let own = read.gauge_lengths.get(tool).copied().unwrap_or(machine.gauge_length());
-        let chain = Chain::of(&machine.with_gauge_length(own));
+        let chain = Chain::of(&read.with_tool(machine, *tool));
         for (at, way) in program.iter().enumerate().skip(1) {
             way.joints.linear.iter().enumerate().for_each(|(k, value)| widen(k, *value));
             (0..2).for_each(|k| widen(k + 3, way.joints.rotary[k] + read.table_zero[k]));
@@ -200,7 +199,7 @@ fn note(report: &JointReport) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ::machine::kinematics::{Joints, Waypoint};
+    use ::machine::kinematics::{Joints, Pace, Waypoint};
     use geometry::Vector3;
     use motion::{ClPoint, Toolpath};
     use report::Verdict;
@@ -223,6 +222,7 @@ mod tests {
             before: Vec::new(),
             unknown_before: false,
             others: false,
+            highest_feed: None,
             findings: Vec::new(),
             notes: Vec::new(),
         }
@@ -232,7 +232,7 @@ mod tests {
     fn through(way: Way, places: &[[f64; 2]]) -> Vec<Waypoint> {
         let at = |(step, &[x, b]): (usize, &[f64; 2])| {
             let joints = Joints { linear: Vector3::new(x, 0.0, -320.0), rotary: [0.0, f64::to_radians(b)] };
-            Waypoint { joints, step, way }
+            Waypoint { joints, step, way, pace: Pace::default() }
         };
         [[999.0, 170.0]].iter().chain(places).enumerate().map(at).collect()
     }
@@ -279,7 +279,7 @@ mod tests {
         let swing = [-lean, lean].map(|b| {
             let rotary = [0.0, b.to_radians()];
             let linear = Vector3::new(own * rotary[1].sin(), 0.0, low);
-            Waypoint { joints: Joints { linear, rotary }, step: 0, way: Way::Tip }
+            Waypoint { joints: Joints { linear, rotary }, step: 0, way: Way::Tip, pace: Pace::default() }
         });
         let joints = through(Way::Tip, &[]).into_iter().chain(swing).collect::<Vec<_>>();
         for (over, verdict) in [(10.0, Verdict::Fail), (0.01, Verdict::Fail), (-0.01, Verdict::Pass)] {

@@ -82,9 +82,9 @@ fn on_hill(name: &str) -> Kinematics {
 fn hill_stages(name: &str) -> (AxisLimits, Vec<Stage>) {
     let (kinematics, path) = (on_hill(name), hill());
     let joints = follow(&kinematics, &path, &EVENLY).unwrap();
-    let (pieces, _) = pieces(&path, &MACHINE, &kinematics, &joints);
-    let axes = kinematics.axis_limits(&MACHINE);
-    let stages = stages(&pieces, &profile(&path, &MACHINE).unwrap(), &MACHINE, &axes);
+    let (pieces, _) = pieces(&path, &profile(&path, &MACHINE).unwrap(), &MACHINE, &kinematics, &joints);
+    let axes = kinematics.axis_limits();
+    let stages = stages(&pieces, &MACHINE, &axes);
     (axes, stages)
 }
 
@@ -311,9 +311,10 @@ fn no_axis_exceeds_its_jerk() {
         let kinematics = linear(made).with_jerks(jerks);
         let path = hill_in(0.05);
         let joints = follow(&kinematics, &path, &EVENLY).unwrap();
-        let (pieces, standing) = pieces(&path, &MACHINE, &kinematics, &joints);
-        let axes = kinematics.axis_limits(&MACHINE);
-        let run = Run::new(&pieces, &profile(&path, &MACHINE).unwrap(), &MACHINE, &axes, &Silent).unwrap();
+        let (pieces, standing) =
+            pieces(&path, &profile(&path, &MACHINE).unwrap(), &MACHINE, &kinematics, &joints);
+        let axes = kinematics.axis_limits();
+        let run = Run::new(&pieces, &MACHINE, &axes, &Silent).unwrap();
         assert_eq!(standing, 0.0);
         let (slower, before) = (run.time(), time(&path, &MACHINE, &free, &EVENLY));
         assert!(slower > 1.05 * before, "{name}: {slower} {before}");

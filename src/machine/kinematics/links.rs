@@ -46,6 +46,21 @@ pub struct Waypoint {
     pub step: usize,
     /// How the machine comes there.
     pub way: Way,
+    /// How fast the program asks for that; of no account where a path has the feeds.
+    pub pace: Pace,
+}
+
+/// How fast a program asks for the way to a place.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Pace {
+    /// Time that the feed asks for, s; 0 at rapid.
+    pub asked_s: f64,
+    /// It is a further piece of one line, as the chords of an arc are.
+    pub goes_on: bool,
+    /// The machine comes to rest before it.
+    pub rests: bool,
+    /// The program does not tell where it begins.
+    pub from_unknown: bool,
 }
 
 /// How a machine goes from one place of a program to the next.

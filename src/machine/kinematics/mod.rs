@@ -29,14 +29,13 @@ mod tests;
 
 pub use error::KinematicsError;
 pub use follow::{Following, JointLocation, JointPath, PathError, Turn, follow};
-pub use links::{Chain, Link, LinkMove, STRAY, Way, Waypoint};
+pub use links::{Chain, Link, LinkMove, Pace, STRAY, Way, Waypoint};
 pub use presets::{DEFAULT_GAUGE_LENGTH, DEFAULT_ROTARY_ACCELERATION, DEFAULT_ROTARY_RATE, PRESETS, preset};
 pub use program::program_of_three_axes;
 pub use report::{JointReport, LimitViolation, Obstacle, Rewind, SINGULAR_ANGLE, SingularPose};
 
 use angles::Triangle;
 
-use super::Machine;
 use super::axis_limits::AxisLimits;
 
 use geometry::{Point3, Vector3};
@@ -223,13 +222,8 @@ impl Kinematics {
     }
 
     /// What the five joints allow.
-    pub(crate) fn axis_limits(&self, machine: &Machine) -> AxisLimits {
-        AxisLimits {
-            rates: self.rates(),
-            accelerations: self.accelerations(),
-            jerks: self.jerks(),
-            along: machine.acceleration,
-        }
+    pub(crate) fn axis_limits(&self) -> AxisLimits {
+        AxisLimits { rates: self.rates(), accelerations: self.accelerations(), jerks: self.jerks() }
     }
 
     /// Greatest acceleration of the five joints, mm/s² and rad/s².

@@ -4,7 +4,7 @@
 //! machine stands before the first line is not known: the program counts from where X and Y stand over the start at the height of
 //! retract.
 
-use super::{Chain, JointPath, Joints, Kinematics, Turn, Way, Waypoint};
+use super::{Chain, JointPath, Joints, Kinematics, Pace, Turn, Way, Waypoint};
 use geometry::{Point3, Vector3};
 use motion::Toolpath;
 
@@ -15,7 +15,12 @@ impl JointPath {
             linear: Vector3::new(joints.linear.x, joints.linear.y, kinematics.retracted_z()),
             ..joints
         };
-        let at = |joints: Joints, step: usize| Waypoint { joints, step, way: Way::Approach };
+        let at = |joints: Joints, step: usize| Waypoint {
+            joints,
+            step,
+            way: Way::Approach,
+            pace: Pace::default(),
+        };
         // From the height of retract down to a location.
         let down = |joints: &Joints, tip: Point3| {
             kinematics.place(kinematics.over(path, joints.rotary, tip), joints.rotary)
@@ -36,7 +41,7 @@ impl JointPath {
                 Turn::Along | Turn::AtPole if self.following.tip.is_finite() => Way::Axes,
                 Turn::Along | Turn::AtPole => Way::Tip,
             };
-            all.push(Waypoint { joints: location.joints, step, way });
+            all.push(Waypoint { joints: location.joints, step, way, pace: Pace::default() });
             last = location.joints;
         }
         all.push(at(retracted(last), path.len().saturating_sub(1)));
@@ -56,6 +61,7 @@ pub fn program_of_three_axes(path: &Toolpath, rise_to: Option<f64>, chain: &Chai
         joints: Joints { linear: tip.coords + from_tip, rotary: [0.0; 2] },
         step,
         way,
+        pace: Pace::default(),
     };
     let last = path.len().saturating_sub(1);
     let begin = tips.first().map(|tip| at(above(tip), 0, Way::Approach));

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use crate::vocabulary::{Definition, PartKind, Passes, PlanError, Strategy, Task};
 use cutter::{Cutter, Holder};
 use keys::{Located, toml_string};
-use machine::kinematics::Waypoint;
+use machine::kinematics::{Kinematics, Waypoint};
 use motion::{Cutters, Toolpath};
 use program::{Control, Finding};
 
@@ -49,7 +49,7 @@ pub struct ForeignProgram {
 pub struct ReadProgram {
     /// The moves of the tool, or of all.
     pub path: Toolpath,
-    /// The joints of a machine with rotary axes that the program goes through, for each stretch of a tool, with its number. None of
+    /// The joints of a machine with rotary axes, and the pace, that the program goes through, for each stretch of a tool, with its number. None of
     /// cutter locations, and on other machines.
     pub joints: Vec<(u32, Vec<Waypoint>)>,
     /// Where the rotary axes of a table stand in the joints' zero, rad, first and second axis; a head's stand at zero.
@@ -64,10 +64,20 @@ pub struct ReadProgram {
     pub unknown_before: bool,
     /// Whether other tools feed at all.
     pub others: bool,
+    /// Its highest feed where no rotary axis turns, mm/min, and the line.
+    pub highest_feed: Option<(f64, u32)>,
     /// What is wrong with it before it is cut.
     pub findings: Vec<Finding>,
     /// What is to be said of it.
     pub notes: Vec<String>,
+}
+
+impl ReadProgram {
+    /// The machine with a tool, whose length is the machine's own where the table of tools has none.
+    pub fn with_tool(&self, machine: &Kinematics, tool: u32) -> Kinematics {
+        let own = self.gauge_lengths.get(&tool).copied();
+        machine.with_gauge_length(own.unwrap_or(machine.gauge_length()))
+    }
 }
 
 /// How scenes speak of it.

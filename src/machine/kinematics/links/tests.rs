@@ -46,7 +46,7 @@ proptest! {
             machine.place(Point3::from(tips[0]), rotary),
             machine.place(there, [0, 1].map(|k| rotary[k] + size * turn[k])),
         ]
-        .map(|joints| Waypoint { joints, step: 7, way });
+        .map(|joints| Waypoint { joints, step: 7, way, pace: Pace::default() });
         let (middle, reach) = (Point3::from(middle), 150.0);
         let place = middle + Vector3::from(away).normalize() * reach;
         for link in links() {
@@ -85,6 +85,7 @@ fn three_axes_and_presets_have_their_links() {
         joints: Joints { linear: Vector3::new(x, 0.0, 5.0), rotary: [0.0; 2] },
         step: 0,
         way: Way::Axes,
+        pace: Pace::default(),
     };
     let moves = chain.motion(&[at(0.0), at(300.0)], [Link::Linear, Link::Frame], &chain.tip(), 50.0);
     assert_eq!(moves.len(), 1);
