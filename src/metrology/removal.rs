@@ -52,8 +52,12 @@ pub struct RemovalFigures {
     pub p95_material_removal_rate_mm3_min: f64,
     /// Greatest rate over a few cells of travel; of a long move over what it cuts.
     pub max_material_removal_rate_mm3_min: f64,
-    /// Bound of its error, and of how much more a part of a long move takes.
+    /// Bound of its error.
     pub max_material_removal_rate_error_bound_mm3_min: f64,
+    /// As far as cells see, the rate is nowhere greater, also in a part of a long move: held against the greatest width times the
+    /// greatest depth of what the move cuts, which may be much more than its section. Not by voxels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub material_removal_rate_at_most_mm3_min: Option<f64>,
     /// The move that ends the stretch with the greatest rate, counted from 0.
     pub max_material_removal_rate_move: u32,
     /// Greatest height above the tip, along the tool axis, at which the cutter met stock, at the centres of cells or voxels. By
@@ -114,14 +118,12 @@ impl RemovalRecord<'_> {
         if reaches > 0.0 { reaches.max(least).min(length) } else { length }
     }
 
-    /// No section of what a move cuts, across its direction, is greater, mm²: of a plunge the square around it.
-    fn greatest_section(&self, removed: &MoveRemoval) -> f64 {
+    /// By cells: no more is cut for a mm of the way, mm². Ahead it is a section, and below a cutter that goes down what it stands on.
+    fn greatest_section(&self, removed: &MoveRemoval, way: Vector3) -> f64 {
         let wide = removed.radial + removed.radial_bound;
-        let high = match self.axial {
-            AxialBound::Of(bound) => removed.axial + bound,
-            AxialBound::Top(_) => removed.depth,
-        };
-        if removed.along > 0.0 { wide * high } else { wide * wide }
+        let down = (-way.z / way.norm()).max(0.0);
+        let stands_on = wide * if removed.along > 0.0 { removed.along } else { wide };
+        wide * removed.depth + stands_on * down
     }
 }
 
@@ -229,7 +231,7 @@ fn rates(figures: &mut RemovalFigures, path: &Toolpath, found: &RemovalRecord<'_
         stretch.bound += removed.volume_bound;
         stretch.last = k as u32;
         if length > LONG * least {
-            stretch.peak = stretch.peak.max(found.greatest_section(removed) * m.feed_rate);
+            stretch.peak = stretch.peak.max(found.greatest_section(removed, to - from) * m.feed_rate);
         }
         if stretch.length >= least {
             goes_on = stretch.volume > 0.0;
@@ -244,8 +246,9 @@ fn rates(figures: &mut RemovalFigures, path: &Toolpath, found: &RemovalRecord<'_
     stretches.sort_by(|a, b| a.rate().total_cmp(&b.rate()));
     let Some(greatest) = stretches.last() else { return };
     figures.max_material_removal_rate_mm3_min = greatest.rate();
-    figures.max_material_removal_rate_error_bound_mm3_min =
-        (upper - greatest.rate()).max(greatest.bound / greatest.minutes);
+    figures.max_material_removal_rate_error_bound_mm3_min = greatest.bound / greatest.minutes;
+    figures.material_removal_rate_at_most_mm3_min =
+        matches!(found.axial, AxialBound::Top(_)).then_some(upper);
     figures.max_material_removal_rate_move = greatest.last;
     let in_material: f64 = stretches.iter().map(|s| s.minutes).sum();
     let mut below = 0.0;
@@ -330,23 +333,28 @@ mod tests {
         let greatest = |start: [f64; 3], moves: Vec<Move>| {
             let path = Toolpath::new(ClPoint::upright(Point3::from(start)), moves);
             let figures = cut_from_block(&cutter, &path);
-            let (rate, bound) = (
+            [
                 figures.max_material_removal_rate_mm3_min,
                 figures.max_material_removal_rate_error_bound_mm3_min,
-            );
-            (rate, bound)
+                figures.material_removal_rate_at_most_mm3_min.unwrap(),
+            ]
         };
-        // A slot of 6 by 2 mm, half of whose move is in the air.
-        let (rate, bound) = greatest([-24.0, 10.0, -2.0], vec![to(20.0, 10.0, -2.0, MoveKind::Cut)]);
-        assert!((rate - 7200.0).abs() <= bound && bound < 500.0, "{rate} ± {bound}");
+        // A slot of 6 by 2 mm with a round end, half of whose move is in the air.
+        let [rate, bound, most] = greatest([-24.0, 10.0, -2.0], vec![to(20.0, 10.0, -2.0, MoveKind::Cut)]);
+        let mean = 2.0 * (20.0 * 6.0 + 4.5 * std::f64::consts::PI) / 23.0 * 600.0;
+        assert!((rate - mean).abs() <= bound && bound < 100.0, "{rate} ± {bound}: {mean}");
+        assert!((7200.0..7300.0).contains(&most), "{most}");
         // A ramp takes twice the mean where it is deepest.
-        let (rate, bound) = greatest([0.0, 10.0, 0.0], vec![to(36.0, 10.0, -2.0, MoveKind::Cut)]);
-        assert!(rate < 4500.0 && rate + bound >= 7200.0, "{rate} ± {bound}");
+        let [rate, _, most] = greatest([0.0, 10.0, 0.0], vec![to(36.0, 10.0, -2.0, MoveKind::Cut)]);
+        assert!(rate < 5000.0 && most >= 7200.0, "{rate}, {most}");
+        // Down a steep ramp the bottom cuts all at once.
+        let [_, _, most] = greatest([20.0, 10.0, 0.0], vec![to(21.0, 10.0, -1.0, MoveKind::Cut)]);
+        assert!(most >= 9.0 * std::f64::consts::PI * 600.0 * 0.5f64.sqrt(), "{most}");
         // A plunge of three cells' length, the first of them in the air, and a rapid move.
         let plunge = vec![to(20.0, 10.0, -0.1, MoveKind::Plunge), to(20.0, 10.0, 5.0, MoveKind::Rapid)];
-        let (rate, bound) = greatest([20.0, 10.0, 0.05], plunge);
+        let [rate, bound, most] = greatest([20.0, 10.0, 0.05], plunge);
         let truth = 9.0 * std::f64::consts::PI * 600.0;
-        assert!(rate > 0.0 && (rate - truth).abs() <= bound, "{rate} ± {bound}: {truth}");
+        assert!(rate > 0.0 && (rate - truth).abs() <= bound && most >= truth, "{rate} ± {bound}: {truth}");
     }
 
     /// Whatever the cells, stock is as large as it is.

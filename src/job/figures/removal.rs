@@ -58,6 +58,8 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     }
     let (greatest, bound) =
         (r.max_material_removal_rate_mm3_min, r.max_material_removal_rate_error_bound_mm3_min);
+    let at_most = r.material_removal_rate_at_most_mm3_min;
+    let at_most = at_most.map_or_else(String::new, |rate| format!(", nowhere over {:.0}", rate.ceil()));
     let (most, mean) = (r.p95_material_removal_rate_mm3_min, r.mean_material_removal_rate_mm3_min);
     let (axial, axial_bound) = (r.max_axial_engagement_mm, r.max_axial_engagement_error_bound_mm);
     // A bound beyond the figure is that of what was there before the first cut.
@@ -68,7 +70,7 @@ pub(super) fn find(run: &Run<'_>, monitor: &dyn Monitor) -> Result<Finding, JobE
     };
     let rows = vec![
         ("volume removed", format!("{:.0} ± {:.0} mm³", r.volume_mm3, r.volume_error_bound_mm3)),
-        ("removal rate, greatest", format!("{greatest:.0} ± {bound:.0} mm³/min")),
+        ("removal rate, greatest", format!("{greatest:.0} ± {bound:.0} mm³/min{at_most}")),
         ("removal rate, 95 % and mean", format!("{most:.0}, {mean:.0} mm³/min")),
         ("engagement, axial and radial", format!("{axial}, {:.2} mm", r.max_radial_engagement_mm)),
     ];
