@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use geometry::Vector3;
 use motion::{MoveKind, Toolpath};
-use sim::{MoveRemoval, RapidContact, Removal, VoxelRemoval};
+use sim::{ENGAGED, MoveRemoval, RapidContact, Removal, VoxelRemoval};
 
 /// Rates are means over consecutive feed moves of at least so many cells of travel. Fewer let the
 /// cells show that a steep cutter clears at a time; more smooth true peaks away.
@@ -107,15 +107,15 @@ struct RemovalRecord<'a> {
 }
 
 impl RemovalRecord<'_> {
-    /// How much of a move cuts, mm: as far as what it cut reaches along it, and never less than a stretch.
+    /// How much of a move cuts, mm: as far as what it cut reaches along it, and never less than a stretch; of a plunge what it is deep.
     fn in_material(&self, removed: &MoveRemoval, way: Vector3, least: f64) -> f64 {
         let (length, in_plan) = (way.norm(), way.xy().norm());
         let reaches = match self.axial {
             AxialBound::Of(_) => length,
-            AxialBound::Top(_) if in_plan > 1e-9 * length => removed.along * length / in_plan,
+            AxialBound::Top(_) if in_plan > 1e-9 * length => (removed.along * length / in_plan).max(least),
             AxialBound::Top(_) => removed.depth,
         };
-        if reaches > 0.0 { reaches.max(least).min(length) } else { length }
+        if removed.depth > ENGAGED { reaches.min(length) } else { length }
     }
 
     /// By cells: no more is cut for a mm of the way, mm². Ahead it is a section, and below a cutter that goes down what it stands on.
